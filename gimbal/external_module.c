@@ -298,10 +298,16 @@ static bst_status step(void *self, struct bst_step *s) {
 }
 
 static bst_status archive_module(void *self, bst_archive *archive) {
-    (void)self;
-    return bst_fail(bst_archive_ctx(archive), BST_ERR_STATE,
-                    "a gimbal of type \"external\" cannot be saved: its state is that of another "
-                    "program; use another type of gimbal");
+    module *m = self;
+    BST_TRY(bst_link_archive(m->link, m->part, archive));
+    BST_ARCHIVE(archive, m->steps);
+    BST_ARCHIVE(archive, m->command_seen);
+    bst_archive_bool(archive, &m->told_of_gap);
+    m->count = bst_archive_count(archive, m->count, MOST_ATTITUDES + 1);
+    m->at = bst_archive_count(archive, m->at, m->count > 0 ? m->count - 1 : 0);
+    bst_archive_bytes(archive, m->samples, (size_t)m->count * sizeof *m->samples);
+    bst_platform_archive(&m->platform, archive);
+    return BST_OK;
 }
 
 const bst_module_desc bst_gimbal_external_module = {

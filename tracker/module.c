@@ -3,6 +3,7 @@
 #include <assert.h>
 #include <stdlib.h>
 
+#include "boresight/camera_motion.h"
 #include "sim/messages/message_invariants.h"
 #include "sim/onboard/knowledge.h"
 #include "tracker/attitude/photocentre.h"
@@ -151,6 +152,11 @@ static void publish_events(struct bst_step *step, const bst_tracker *tracker) {
     }
 }
 
+/* False for an attitude of zeros, which means that it is not known. */
+static bool is_known(bst_quat q) {
+    return q.x != 0.0 || q.y != 0.0 || q.z != 0.0 || q.w != 0.0;
+}
+
 /* Processes a detections message: tracker step, tracks and predictions. */
 static bst_status process_detections(tracker_module *m, struct bst_step *step,
                                      const bst_detections *detections) {
@@ -169,6 +175,16 @@ static bst_status process_detections(tracker_module *m, struct bst_step *step,
     if (telemetry && !pointing.stale && telemetry->written > 0) {
         input.q_telemetry_now =
             &telemetry->items[(telemetry->written - 1) % telemetry->capacity].q_cam_from_gcrf;
+    }
+    bst_camera_motion motion;
+    if (!is_known(detections->q_telemetry_from_gcrf)) { /* a peer may not know it */
+        if (!telemetry || pointing.stale ||
+            !bst_camera_motion_from_telemetry(telemetry, detections->start_tick,
+                                              detections->end_tick, &motion)) {
+            bst_step_count(step, "tracker_no_attitude");
+            return BST_OK;
+        }
+        input.q_telemetry_mid = &motion.q_cam_from_gcrf;
     }
     double seconds =
         0.5 * (double)(detections->start_tick + detections->end_tick) / m->tick_rate_hz;

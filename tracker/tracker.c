@@ -182,9 +182,15 @@ typedef struct frame_attitude {
     bool usable;
 } frame_attitude;
 
+/* Mid-exposure attitude by telemetry. */
+static bst_quat telemetry_of(const bst_tracker_input *input) {
+    return bst_quat_unit(input->q_telemetry_mid ? *input->q_telemetry_mid
+                                                : input->detections->q_telemetry_from_gcrf);
+}
+
 /* Solves the attitude from the identified stars. Returns the number of t->stars considered. */
 static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
-                          bst_attitude_solution *out) {
+                          bst_quat q_telemetry, bst_attitude_solution *out) {
     int count = 0;
     for (int i = 0; i < d->count && count < MAX_STARS; i++) {
         const bst_detection *item = &d->items[i];
@@ -206,18 +212,18 @@ static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
     /* the stars were identified with this attitude: it is close */
     bst_quat q = d->q_cam_from_gcrf;
     bool given = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w > 0.5;
-    bst_attitude_solve(&t->camera, &t->attitude_params, given ? q : d->q_telemetry_from_gcrf,
-                       t->stars, count, out);
+    bst_attitude_solve(&t->camera, &t->attitude_params, given ? q : q_telemetry, t->stars, count,
+                       out);
     return count;
 }
 
 /* Determines the frame's attitude: from stars, else predicted by the telemetry error filter. */
-static void find_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
+static void find_attitude(bst_tracker *t, const bst_tracker_input *input, const bst_light *light,
                           int64_t tick, double dt_s, frame_attitude *out) {
     memset(out, 0, sizeof *out);
-    bst_quat q_telemetry = bst_quat_unit(d->q_telemetry_from_gcrf);
+    bst_quat q_telemetry = telemetry_of(input);
     bst_attitude_solution solution;
-    int star_count = solve_attitude(t, d, light, &solution);
+    int star_count = solve_attitude(t, input->detections, light, q_telemetry, &solution);
     bst_attitude_error_predict(&t->error, &t->error_params, dt_s);
     out->fix.tick = tick;
     out->fix.stars = solution.stars_used;
@@ -491,7 +497,7 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     bst_light light =
         bst_nav_light_after(input->nav, seconds - (double)input->nav->tick / t->tick_rate_hz);
     frame_attitude attitude;
-    find_attitude(t, d, &light, tick, dt, &attitude);
+    find_attitude(t, input, &light, tick, dt, &attitude);
     t->event_count = 0;
     const bst_tracker_cue *cue = &input->cue;
     bst_tracker_frame_view view = {.tracker = t,
@@ -547,7 +553,7 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     write_tracks(t, d, &attitude.fix, &view.cue, detections_lost, tracks, track_capacity);
     write_predictions(
         t, attitude.fix.tick,
-        input->q_telemetry_now ? *input->q_telemetry_now : bst_quat_unit(d->q_telemetry_from_gcrf),
+        input->q_telemetry_now ? *input->q_telemetry_now : telemetry_of(input),
         predictions, prediction_capacity);
     t->cue_before = *cue;
     t->started = true;

@@ -69,6 +69,8 @@ typedef struct bst_tracker_input {
     /* current attitude telemetry, for the axes of the predicted attitude error; NULL: that of the
      * detections' exposure */
     const bst_quat *q_telemetry_now;
+    /* mid-exposure attitude by telemetry, for detections that do not have it; NULL: they do */
+    const bst_quat *q_telemetry_mid;
     /* cue at mid-exposure */
     bst_tracker_cue cue;
 } bst_tracker_input;

@@ -1,5 +1,5 @@
-/* The simulator as a library: a model is a scenario that has been read and checked, with the sky and
- * the device that its runs share; a sim is one run of it, and all that changes. A program that
+/* The simulator as a library: a model is a scenario that has been read and checked, with the sky
+ * and the device that its runs share; a sim is one run of it, and all that changes. A program that
  * includes this header needs no other.
  *
  *   bst_ctx ctx;
@@ -49,12 +49,10 @@ typedef struct bst_model_options {
 
 /* Reads and checks a scenario.
  *
- * Given:     path     scenario file (JSON); may extend another file. With options->text: the name of
- *                     the text for messages; relative paths in the text start in its folder
- *            options  NULL: the defaults
- * Returned:  *out  the model; NULL on error
- * Errors:    BST_ERR_ARGUMENT, BST_ERR_IO, BST_ERR_FORMAT, BST_ERR_CONFIG, BST_ERR_MEMORY; the
- *            message names file, key and allowed values
+ * Given:     path     scenario file (JSON); may extend another file. With options->text: the name
+ * of the text for messages; relative paths in the text start in its folder options  NULL: the
+ * defaults Returned:  *out  the model; NULL on error Errors:    BST_ERR_ARGUMENT, BST_ERR_IO,
+ * BST_ERR_FORMAT, BST_ERR_CONFIG, BST_ERR_MEMORY; the message names file, key and allowed values
  * Ownership: free *out with bst_model_free, after all of its sims
  * Notes:     loads the plug-ins of the scenario into the process. The star catalogue and the device
  *            are opened by the first bst_sim_create or bst_model_prepare. */
@@ -159,13 +157,11 @@ bst_status bst_sim_run_until(bst_ctx *ctx, bst_sim *sim, double until_s) BST_MUS
 /* Steps until a message is published, or until a time.
  *
  * Given:     scope    "observer/sensor"; NULL: any sensor
- *            channel  "frame", "exposure", "detections", ...; NULL: the end of the next tick at which
- *                     a module steps
- *            until_s  as bst_sim_run_until
- * Returned:  *arrived  false: until_s was reached first; NULL is allowed
- * Errors:    those of bst_sim_run_until; BST_ERR_NOT_FOUND: no module writes such a channel
- * Notes:     the sim stops right after the step that publishes, before any module reads the
- *            message; the next call goes on within the tick. */
+ *            channel  "frame", "exposure", "detections", ...; NULL: the end of the next tick at
+ * which a module steps until_s  as bst_sim_run_until Returned:  *arrived  false: until_s was
+ * reached first; NULL is allowed Errors:    those of bst_sim_run_until; BST_ERR_NOT_FOUND: no
+ * module writes such a channel Notes:     the sim stops right after the step that publishes, before
+ * any module reads the message; the next call goes on within the tick. */
 bst_status bst_sim_step(bst_ctx *ctx, bst_sim *sim, const char *scope, const char *channel,
                         double until_s, bool *arrived) BST_MUST_CHECK;
 
@@ -231,7 +227,8 @@ bst_status bst_sim_view_frame(bst_ctx *ctx, bst_sim *sim, const char *scope,
  *            payload  struct of the channel; copied
  * Errors:    BST_ERR_NOT_FOUND: no external module writes the channel; BST_ERR_ARGUMENT: a value
  *            out of range, the message names it
- * Notes:     the module publishes it at its next step. A later call before that step replaces it. */
+ * Notes:     the module publishes it at its next step. A later call before that step replaces it.
+ */
 bst_status bst_sim_command(bst_ctx *ctx, bst_sim *sim, const char *scope, const char *channel,
                            const void *payload) BST_MUST_CHECK;
 

@@ -12,13 +12,13 @@
 struct bst_model {
     bst_json *json;
     bst_scenario scenario;
-    bool read;                         /* the scenario must be freed */
-    char digest[BST_SHA256_TEXT];      /* of everything that a state depends on */
-    char (*sensors)[160];              /* [sensor_count] "observer/sensor" */
+    bool read;                    /* the scenario must be freed */
+    char digest[BST_SHA256_TEXT]; /* of everything that a state depends on */
+    char (*sensors)[160];         /* [sensor_count] "observer/sensor" */
     int sensor_count;
     char device[256];
     int threads;
-    pthread_mutex_t opening; /* protects `shared` while it is created */
+    pthread_mutex_t opening;  /* protects `shared` while it is created */
     bst_shared_model *shared; /* NULL: not opened yet */
 };
 

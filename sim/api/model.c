@@ -13,9 +13,9 @@
 /* Reads the JSON of a scenario from its file or its text, and applies the overrides. */
 static bst_status read_json(bst_ctx *ctx, const char *path, const bst_model_options *options,
                             bst_json **out) {
-    BST_TRY(options->text ? bst_json_parse_described(ctx, path, options->text,
-                                                     bst_registry_tables(), out)
-                          : bst_json_load_described(ctx, path, bst_registry_tables(), out));
+    BST_TRY(options->text
+                ? bst_json_parse_described(ctx, path, options->text, bst_registry_tables(), out)
+                : bst_json_load_described(ctx, path, bst_registry_tables(), out));
     for (int i = 0; i < options->assignment_count; i++) {
         BST_TRY(bst_json_set(ctx, *out, options->assignments[i]));
     }

@@ -82,8 +82,7 @@ bst_status bst_sim_build(bst_ctx *ctx, bst_sim *sim, uint64_t run) {
     sim->tick = 0;
     sim->failed = false;
     set_hooks(sim);
-    sim->mapped =
-        calloc((size_t)bst_engine_channel_count(engine_of(sim)) + 1, sizeof *sim->mapped);
+    sim->mapped = calloc((size_t)bst_engine_channel_count(engine_of(sim)) + 1, sizeof *sim->mapped);
     return sim->mapped ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a sim");
 }
 

@@ -18,9 +18,9 @@ static const char magic[8] = "BSTSTATE";
 /* First bytes of a saved state. */
 typedef struct state_head {
     char magic[8];
-    uint32_t version;  /* of this layout: STATE_VERSION */
-    uint32_t reserved; /* 0 */
-    char program[VERSION_BYTES];  /* version and revision of the program */
+    uint32_t version;                   /* of this layout: STATE_VERSION */
+    uint32_t reserved;                  /* 0 */
+    char program[VERSION_BYTES];        /* version and revision of the program */
     char scenario[BST_SHA256_TEXT + 7]; /* digest of the scenario */
     uint64_t check;                     /* CRC-32C of the archive */
     uint64_t seed, run;
@@ -93,10 +93,11 @@ static bst_status read_head(bst_ctx *ctx, const bst_sim *sim, const void *bytes,
     head->program[VERSION_BYTES - 1] = head->scenario[BST_SHA256_TEXT - 1] = '\0';
     set_program(program);
     if (head->version != STATE_VERSION || strcmp(head->program, program) != 0) {
-        return bst_fail(ctx, BST_ERR_FORMAT,
-                        "the saved state is of Boresight %s, this is %s: a state is restored by the "
-                        "build that saved it",
-                        head->program, program);
+        return bst_fail(
+            ctx, BST_ERR_FORMAT,
+            "the saved state is of Boresight %s, this is %s: a state is restored by the "
+            "build that saved it",
+            head->program, program);
     }
     if (head->bytes != size - sizeof *head) {
         return bst_fail(ctx, BST_ERR_FORMAT, "the saved state is cut: %zu bytes of %llu",
@@ -136,8 +137,8 @@ static bst_status check_components(bst_ctx *ctx, const bst_sim *sim, const state
 static bst_status restore_components(bst_ctx *ctx, bst_sim *sim, const state_head *head,
                                      const void *bytes, unsigned components) {
     bst_archive *archive;
-    BST_TRY(bst_archive_open(ctx, (const char *)bytes + sizeof *head, (size_t)head->bytes,
-                             &archive));
+    BST_TRY(
+        bst_archive_open(ctx, (const char *)bytes + sizeof *head, (size_t)head->bytes, &archive));
     sim->failed = true; /* until all is restored */
     bst_status status = archive_sim(ctx, sim, archive, components);
     bst_archive_free(archive);
@@ -219,7 +220,8 @@ bst_status bst_sim_restore_file(bst_ctx *ctx, bst_sim *sim, const char *path, un
     const uint64_t most = UINT64_C(4) << 30;
     char *bytes;
     size_t size;
-    BST_TRY(bst_file_read(ctx, path, most, "a state that bst_sim_save_file has saved", &bytes, &size));
+    BST_TRY(
+        bst_file_read(ctx, path, most, "a state that bst_sim_save_file has saved", &bytes, &size));
     bst_status status = bst_sim_restore(ctx, sim, bytes, size, components);
     free(bytes);
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "%s", path);

@@ -24,7 +24,7 @@ typedef struct kept_program {
 } kept_program;
 
 struct bst_device {
-    bst_device *origin; /* the device whose context and programs this one shares; NULL: none */
+    bst_device *origin;      /* the device whose context and programs this one shares; NULL: none */
     cl_device_id parent, id; /* equal unless it is a sub-device */
     cl_context context;
     cl_command_queue queue;

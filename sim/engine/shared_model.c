@@ -7,7 +7,8 @@
 #include "sim/io/psf_fits.h"
 
 /* Creates the onboard knowledge of each sensor: camera, catalogue, cue. */
-static bst_status make_knowledge(bst_ctx *ctx, const bst_scenario *scenario, bst_shared_model *model) {
+static bst_status make_knowledge(bst_ctx *ctx, const bst_scenario *scenario,
+                                 bst_shared_model *model) {
     const bst_observer_config *observers = scenario->observers.items;
     int total = 0;
     for (int i = 0; i < scenario->observers.count; i++) {
@@ -19,8 +20,8 @@ static bst_status make_knowledge(bst_ctx *ctx, const bst_scenario *scenario, bst
     }
     for (int i = 0; i < scenario->observers.count; i++) {
         for (int s = 0; s < observers[i].sensors.count; s++) {
-            bst_status status =
-                bst_knowledge_create(ctx, model->world, i, s, &model->knowledge[model->knowledge_count]);
+            bst_status status = bst_knowledge_create(ctx, model->world, i, s,
+                                                     &model->knowledge[model->knowledge_count]);
             if (status != BST_OK) {
                 return bst_fail_prefix(ctx, status, "%s", scenario->file);
             }

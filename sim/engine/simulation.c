@@ -167,7 +167,8 @@ static bst_status add_modules(bst_ctx *ctx, const bst_scenario *scenario,
     sim->members = calloc((size_t)sim->shared->knowledge_count + 1, sizeof *sim->members);
     sim->scopes = calloc((size_t)sim->shared->knowledge_count + 1, sizeof *sim->scopes);
     if (!sim->members || !sim->scopes) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sensors", sim->shared->knowledge_count);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sensors",
+                        sim->shared->knowledge_count);
     }
     int count = 0;
     for (int i = 0; i < scenario->observers.count; i++) {

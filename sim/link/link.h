@@ -58,10 +58,9 @@ bst_status bst_link_create_local(bst_ctx *ctx, const bst_link_run *run,
 bool bst_link_is_local(const bst_link *link);
 /* Gives a part of a local link the answer to its next step.
  *
- * Given:     scope    "observer/sensor"; NULL: the first sensor with a part that sends such messages
- *            type     of the message
- *            payload  struct of the type; copied
- * Errors:    BST_ERR_NOT_FOUND: no such part; BST_ERR_FORMAT: a value out of range; BST_ERR_MEMORY */
+ * Given:     scope    "observer/sensor"; NULL: the first sensor with a part that sends such
+ * messages type     of the message payload  struct of the type; copied Errors: BST_ERR_NOT_FOUND:
+ * no such part; BST_ERR_FORMAT: a value out of range; BST_ERR_MEMORY */
 bst_status bst_link_put(bst_ctx *ctx, bst_link *link, const char *scope, bst_link_type type,
                         const void *payload) BST_MUST_CHECK;
 /* Archives the commands that a part of a local link has not taken.

@@ -100,7 +100,7 @@ typedef struct link_given {
 typedef struct link_part {
     bst_link_part about;
     link_given given[BST_LINK_TYPES]; /* of a local link */
-    int peer; /* -1: none */
+    int peer;                         /* -1: none */
     bool had_peer;
     int64_t step;                  /* number of the next exchange */
     link_answer ahead[LINK_AHEAD]; /* unawaited steps; their outputs are owned */

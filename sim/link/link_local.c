@@ -31,10 +31,10 @@ static bool may_give(const char *role, bst_link_type type) {
         const char *role;
         bst_link_type type;
     } given[] = {
-        {"imgproc", BST_LINK_DETECTIONS},      {"tracker", BST_LINK_TRACKS},
-        {"tracker", BST_LINK_PREDICTIONS},     {"control", BST_LINK_LOS_COMMAND},
-        {"control", BST_LINK_SENSOR_COMMAND},  {"control", BST_LINK_CONTROL_STATUS},
-        {"gimbal", BST_LINK_POINTING},         {"gimbal", BST_LINK_TARGET_STATES},
+        {"imgproc", BST_LINK_DETECTIONS},     {"tracker", BST_LINK_TRACKS},
+        {"tracker", BST_LINK_PREDICTIONS},    {"control", BST_LINK_LOS_COMMAND},
+        {"control", BST_LINK_SENSOR_COMMAND}, {"control", BST_LINK_CONTROL_STATUS},
+        {"gimbal", BST_LINK_POINTING},        {"gimbal", BST_LINK_TARGET_STATES},
         {"gimbal", BST_LINK_SENSOR_COMMAND},
     };
     for (size_t i = 0; i < sizeof given / sizeof *given; i++) {
@@ -127,7 +127,8 @@ static bst_status archive_given(bst_archive *archive, const bst_wire_message *ab
     if (restoring) {
         void *payload = realloc(given->payload, most);
         if (!payload) {
-            return bst_fail(bst_archive_ctx(archive), BST_ERR_MEMORY, "out of memory for a command");
+            return bst_fail(bst_archive_ctx(archive), BST_ERR_MEMORY,
+                            "out of memory for a command");
         }
         memset(payload, 0, most);
         given->payload = payload;

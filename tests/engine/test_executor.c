@@ -129,8 +129,7 @@ static void unmap_frame(void *owner) {
 }
 
 static void write_frame(module *self, struct bst_step *step, int p) {
-    static const bst_frame_ops ops = {
-        .map = map_frame, .unmap = unmap_frame, .recycle = recycle};
+    static const bst_frame_ops ops = {.map = map_frame, .unmap = unmap_frame, .recycle = recycle};
     pool *from = &self->s->pools[self->sensor];
     int out = from->made - __atomic_load_n(&from->recycled, __ATOMIC_RELAXED);
     from->most = out + 1 > from->most ? out + 1 : from->most;
@@ -476,8 +475,7 @@ static result play_part(scene *s, int threads, const saving *save, const saving 
     add_modules(&ctx, engine, s, descs, modules, pointers, members);
     bst_assert_ok(&ctx, bst_engine_load(&ctx, engine));
     if (restored) {
-        bst_assert_ok(&ctx,
-                      bst_engine_archive(&ctx, engine, restored->archive, BST_STATE_ALL));
+        bst_assert_ok(&ctx, bst_engine_archive(&ctx, engine, restored->archive, BST_STATE_ALL));
     }
     if (threads > 0) {
         bst_assert_ok(&ctx, bst_engine_parallel(&ctx, engine, threads));
@@ -488,8 +486,8 @@ static result play_part(scene *s, int threads, const saving *save, const saving 
                                                      .interrupted = interrupted,
                                                      .wants = wants,
                                                      .ctx = &s->observers});
-    result r = {.status = save ? bst_engine_advance(&ctx, engine, save->tick)
-                               : run_to_end(&ctx, engine)};
+    result r = {.status =
+                    save ? bst_engine_advance(&ctx, engine, save->tick) : run_to_end(&ctx, engine)};
     if (save && r.status == BST_OK) {
         bst_assert_ok(&ctx, bst_engine_archive(&ctx, engine, save->archive, BST_STATE_ALL));
     }

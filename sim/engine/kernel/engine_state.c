@@ -30,7 +30,8 @@ static void free_saved(void *owner) {
     free(owner);
 }
 
-static const bst_frame_ops saved_ops = {.map = map_saved, .unmap = unmap_saved, .recycle = free_saved};
+static const bst_frame_ops saved_ops = {
+    .map = map_saved, .unmap = unmap_saved, .recycle = free_saved};
 
 enum { MOST_PIXELS_PER_AXIS = 65536 };
 
@@ -40,7 +41,8 @@ static bst_status save_frame(bst_ctx *ctx, bst_archive *archive, bst_frame *fram
     int size[2] = {frame->width, frame->height};
     BST_TRY(bst_frame_map(frame, ctx, &pixels));
     BST_ARCHIVE(archive, size);
-    bst_archive_bytes(archive, (uint16_t *)pixels, sizeof *pixels * (size_t)size[0] * (size_t)size[1]);
+    bst_archive_bytes(archive, (uint16_t *)pixels,
+                      sizeof *pixels * (size_t)size[0] * (size_t)size[1]);
     bst_frame_unmap(frame);
     return BST_OK;
 }
@@ -56,10 +58,11 @@ static bst_status restore_frame(bst_ctx *ctx, bst_archive *archive, bst_frame **
                         size[0], size[1]);
     }
     size_t bytes = sizeof(uint16_t) * (size_t)size[0] * (size_t)size[1];
-    saved_frame *saved = bst_archive_remaining(archive) >= bytes ? malloc(sizeof *saved + bytes) : NULL;
+    saved_frame *saved =
+        bst_archive_remaining(archive) >= bytes ? malloc(sizeof *saved + bytes) : NULL;
     if (!saved) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a saved frame of %d x %d pixels", size[0],
-                        size[1]);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a saved frame of %d x %d pixels",
+                        size[0], size[1]);
     }
     saved->frame = (bst_frame){
         .ops = &saved_ops, .owner = saved, .width = size[0], .height = size[1], .references = 1};
@@ -117,8 +120,9 @@ static bst_status archive_message(bst_ctx *ctx, bst_archive *archive, const bst_
     if (type->count) {
         int items = type->count(s->payload);
         if (items < 0 || items > ch->capacity) {
-            return bst_fail(ctx, BST_ERR_FORMAT, "the saved state has %d items in %s/%s (allowed: %d)",
-                            items, ch->scope, type->name, ch->capacity);
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "the saved state has %d items in %s/%s (allowed: %d)", items, ch->scope,
+                            type->name, ch->capacity);
         }
         bst_archive_bytes(archive, (char *)s->payload + type->header_bytes,
                           (size_t)items * type->item_bytes);
@@ -178,7 +182,8 @@ static bst_status archive_channel(bst_ctx *ctx, bst_archive *archive, bst_engine
     BST_ARCHIVE(archive, ch->released);
     if (bst_archive_is_restoring(archive)) {
         if (oldest < 0 || written < oldest || written - oldest > log->depth) {
-            return bst_fail(ctx, BST_ERR_FORMAT, "the saved state has %lld messages of %s/%s (allowed: %d)",
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "the saved state has %lld messages of %s/%s (allowed: %d)",
                             (long long)(written - oldest), ch->scope, ch->type->name, log->depth);
         }
         empty_log(ch);
@@ -247,7 +252,8 @@ static void reschedule(bst_engine *engine) {
 }
 
 /* Archives one record, or skips it if its component is not wanted. */
-typedef bst_status (*archive_part)(bst_ctx *ctx, bst_archive *archive, bst_engine *engine, int index);
+typedef bst_status (*archive_part)(bst_ctx *ctx, bst_archive *archive, bst_engine *engine,
+                                   int index);
 
 static bst_status archive_record(bst_ctx *ctx, bst_archive *archive, bst_engine *engine,
                                  const char *name, bool wanted, archive_part part, int index) {
@@ -284,7 +290,8 @@ bst_status bst_engine_archive(bst_ctx *ctx, bst_engine *engine, bst_archive *arc
     if (!bst_archive_is_restoring(archive)) {
         components = BST_STATE_ALL;
     }
-    BST_TRY(archive_record(ctx, archive, engine, "engine", components & BST_STATE_TIME, part_engine, 0));
+    BST_TRY(archive_record(ctx, archive, engine, "engine", components & BST_STATE_TIME, part_engine,
+                           0));
     for (int i = 0; i < engine->instance_count; i++) {
         const instance *self = engine->instances[i];
         BST_TRY(archive_record(ctx, archive, engine, self->name, components & component_of(self),

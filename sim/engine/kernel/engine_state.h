@@ -9,9 +9,9 @@
 /* Saves the state of an engine, or restores components of it into an engine of the same modules.
  *
  * Given:     archive     saves or restores
- *            components  BST_STATE_... to restore, the others keep their state; ignored while saving
- * Errors:    BST_ERR_STATE: a module cannot be saved, or the engine already has threads (restoring);
- *            BST_ERR_FORMAT: the archive is damaged or that of other modules; BST_ERR_MEMORY,
+ *            components  BST_STATE_... to restore, the others keep their state; ignored while
+ * saving Errors:    BST_ERR_STATE: a module cannot be saved, or the engine already has threads
+ * (restoring); BST_ERR_FORMAT: the archive is damaged or that of other modules; BST_ERR_MEMORY,
  *            BST_ERR_DEVICE
  * Notes:     between two calls of bst_engine_advance. After an error of a restore the engine must
  *            not be stepped. */
