@@ -5,6 +5,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "boresight/status.h"
 
@@ -34,6 +35,20 @@ void bst_archive_bytes(bst_archive *archive, void *data, size_t bytes);
  * Notes:     a saved number beyond capacity is an error, which the caller of the module's function
  *            reports; the number is then 0. */
 int bst_archive_count(bst_archive *archive, int count, int capacity);
+
+/* Saves an integer, or gives the saved one: an index or a counter that must be in range.
+ *
+ * Given:     value        number to save; ignored while restoring
+ *            least, most  allowed values
+ * Returned:  the number, least to most
+ * Notes:     a saved number out of range is an error, which the caller of the module's function
+ *            reports; the number is then `least`. */
+int64_t bst_archive_integer(bst_archive *archive, int64_t value, int64_t least, int64_t most);
+
+/* Saves a flag, or restores it as true or false whatever byte was saved.
+ *
+ * Given:     flag  changed while restoring */
+void bst_archive_bool(bst_archive *archive, bool *flag);
 
 /* Archives one object without pointers: a number, a struct, an array. */
 #define BST_ARCHIVE(archive, object) bst_archive_bytes(archive, &(object), sizeof(object))

@@ -25,7 +25,7 @@ struct bst_archive {
     bool open;
     char name[NAME_BYTES]; /* of the open record */
     bool ended_early, out_of_range, no_memory;
-    int found, allowed; /* number of items that was out of range */
+    int64_t found, least, most; /* number that was out of range, and its limits */
 };
 
 bst_status bst_archive_create(bst_ctx *ctx, bst_archive **out) {
@@ -120,16 +120,36 @@ void bst_archive_bytes(bst_archive *archive, void *data, size_t bytes) {
     }
 }
 
+/* Notes a restored number that is out of range. */
+static bool in_range(bst_archive *archive, int64_t value, int64_t least, int64_t most) {
+    if (value >= least && value <= most) {
+        return true;
+    }
+    archive->out_of_range = true;
+    archive->found = value;
+    archive->least = least;
+    archive->most = most;
+    return false;
+}
+
 int bst_archive_count(bst_archive *archive, int count, int capacity) {
     assert(capacity >= 0 && (archive->restoring || (count >= 0 && count <= capacity)));
     BST_ARCHIVE(archive, count);
-    if (count < 0 || count > capacity) {
-        archive->out_of_range = true;
-        archive->found = count;
-        archive->allowed = capacity;
-        return 0;
+    return in_range(archive, count, 0, capacity) ? count : 0;
+}
+
+int64_t bst_archive_integer(bst_archive *archive, int64_t value, int64_t least, int64_t most) {
+    assert(least <= most && (archive->restoring || (value >= least && value <= most)));
+    BST_ARCHIVE(archive, value);
+    return in_range(archive, value, least, most) ? value : least;
+}
+
+void bst_archive_bool(bst_archive *archive, bool *flag) {
+    unsigned char byte = archive->restoring ? 0 : *flag;
+    BST_ARCHIVE(archive, byte);
+    if (archive->restoring) {
+        *flag = byte != 0;
     }
-    return count;
 }
 
 static bst_status begin_saving(bst_ctx *ctx, bst_archive *archive, const char *name) {
@@ -197,8 +217,9 @@ bst_status bst_archive_end(bst_ctx *ctx, bst_archive *archive) {
     }
     if (archive->out_of_range) {
         return bst_fail(ctx, BST_ERR_FORMAT,
-                        "the saved state of %s has %d items where 0 to %d are allowed",
-                        archive->name, archive->found, archive->allowed);
+                        "the saved state of %s has the number %lld where %lld to %lld are allowed",
+                        archive->name, (long long)archive->found, (long long)archive->least,
+                        (long long)archive->most);
     }
     if (archive->ended_early || archive->position != archive->record) {
         return bst_fail(ctx, BST_ERR_FORMAT,

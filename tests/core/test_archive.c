@@ -86,7 +86,7 @@ static void foreign_records_are_refused(void **state) {
     BST_ARCHIVE(read, m.angle_rad);
     assert_int_equal(bst_archive_count(read, 0, 2), 0);
     assert_int_equal(bst_archive_end(&ctx, read), BST_ERR_FORMAT);
-    assert_non_null(strstr(ctx.message, "3 items where 0 to 2"));
+    assert_non_null(strstr(ctx.message, "the number 3 where 0 to 2"));
     bst_archive_free(read);
     bst_archive_free(saved);
 }
@@ -125,11 +125,49 @@ static void damage_is_an_error(void **state) {
     bst_archive_free(saved);
 }
 
+/* Flags come back as true or false, and integers within their limits. */
+static void flags_and_integers(void **state) {
+    (void)state;
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
+    bst_archive *saved, *read;
+    bool flag = true, other = false;
+    assert_int_equal(bst_archive_create(&ctx, &saved), BST_OK);
+    assert_int_equal(bst_archive_begin(&ctx, saved, "a"), BST_OK);
+    bst_archive_bool(saved, &flag);
+    bst_archive_bool(saved, &other);
+    assert_int_equal(bst_archive_integer(saved, -5, -9, 7), -5);
+    unsigned char damaged = 0x5a;
+    BST_ARCHIVE(saved, damaged);
+    assert_int_equal(bst_archive_integer(saved, INT64_MAX, 0, INT64_MAX), INT64_MAX);
+    assert_int_equal(bst_archive_end(&ctx, saved), BST_OK);
+    size_t size;
+    const void *bytes = bst_archive_data(saved, &size);
+    assert_int_equal(bst_archive_open(&ctx, bytes, size, &read), BST_OK);
+    assert_int_equal(bst_archive_begin(&ctx, read, "a"), BST_OK);
+    flag = false;
+    other = true;
+    bst_archive_bool(read, &flag);
+    bst_archive_bool(read, &other);
+    assert_true(flag && !other);
+    assert_int_equal(bst_archive_integer(read, 0, -9, 7), -5);
+    flag = false;
+    bst_archive_bool(read, &flag);
+    assert_true(flag); /* not 0x5a */
+    /* the least value takes the place of one that is out of range */
+    assert_int_equal(bst_archive_integer(read, 0, 3, 100), 3);
+    assert_int_equal(bst_archive_end(&ctx, read), BST_ERR_FORMAT);
+    assert_non_null(strstr(ctx.message, "9223372036854775807 where 3 to 100"));
+    bst_archive_free(read);
+    bst_archive_free(saved);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(comes_back),
         cmocka_unit_test(foreign_records_are_refused),
         cmocka_unit_test(damage_is_an_error),
+        cmocka_unit_test(flags_and_integers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
