@@ -7,6 +7,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "boresight/archive.h"
 #include "boresight/stage.h"
 
 #pragma GCC visibility push(default)
@@ -88,6 +89,9 @@ typedef struct bst_compensator_stage {
     /* Response from error to output at omega rad per sample, for margins and predicted pointing;
      * NULL: it is not linear, and both are left out. */
     double complex (*response)(const void *state, double omega_per_sample);
+    /* Saves the members of a state that steps change, or restores them into a state that init made
+     * (boresight/archive.h); NULL: a simulation with this compensator cannot be saved. */
+    bst_status (*archive)(void *state, bst_archive *archive);
 } bst_compensator_stage;
 
 /* True if stability margins can be computed: for gains, a specification, or a plug-in with a
@@ -257,6 +261,12 @@ bst_status bst_compensator_plug_status(bst_ctx *ctx,
  * Notes:     the integrator continues from there. A plug-in without `set` keeps its state. */
 void bst_compensator_set(bst_compensator *compensator, double error, double feed_forward,
                          double output);
+
+/* Archives the state of a compensator; a restore goes into one with the same configuration.
+ *
+ * Errors:    BST_ERR_STATE: it is a plug-in without `archive`; those of the plug-in's `archive` */
+bst_status bst_compensator_archive(bst_compensator *compensator,
+                                   bst_archive *archive) BST_MUST_CHECK;
 
 /* Frequency response from error to output, with gain_scale and delay, without the limits.
  *

@@ -7,7 +7,7 @@
 
 #pragma GCC visibility push(default)
 
-#define BST_STAGE_ABI 1
+#define BST_STAGE_ABI 2
 
 typedef struct bst_stage_desc {
     uint32_t abi;     /* BST_STAGE_ABI */

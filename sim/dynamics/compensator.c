@@ -322,6 +322,26 @@ void bst_compensator_set(bst_compensator *c, double error, double feed_forward, 
     }
 }
 
+bst_status bst_compensator_archive(bst_compensator *c, bst_archive *archive) {
+    BST_ARCHIVE(archive, c->limit); /* a mount's servo changes it */
+    BST_ARCHIVE(archive, c->output);
+    bst_archive_bool(archive, &c->limited);
+    if (c->plug) {
+        bst_archive_bool(archive, &c->plug_failed);
+        return c->plug->archive ? c->plug->archive(c->plug_state, archive)
+                                : bst_fail(bst_archive_ctx(archive), BST_ERR_STATE,
+                                           "plug-in %s: the state of its compensator cannot be "
+                                           "saved: it has no function `archive`",
+                                           c->plugin);
+    }
+    bst_archive_bytes(archive, c->state, (size_t)c->stages * sizeof *c->state);
+    c->delay_next = (int)bst_archive_integer(archive, c->delay_next, 0, BST_COMPENSATOR_DELAY - 1);
+    if (c->delay_whole > 0 || c->delay_part > 0.0) {
+        BST_ARCHIVE(archive, c->past);
+    }
+    return BST_OK;
+}
+
 double complex bst_compensator_response(const bst_compensator *c, double omega_radps) {
     double w = omega_radps * c->dt_s;
     if (c->plug) {

@@ -56,8 +56,16 @@ static double complex response(const void *self, double omega) {
     return s->kp + s->ki * s->dt_s / (1.0 - s->keep * cexp(-I * omega));
 }
 
+/* A saved simulation contains what the steps change. */
+static bst_status archive_state(void *self, bst_archive *archive) {
+    state *s = self;
+    BST_ARCHIVE(archive, s->integral);
+    return BST_OK;
+}
+
 /* 4. What the program looks for. */
-static const bst_compensator_stage functions = {sizeof(state), init, step, set, response};
+static const bst_compensator_stage functions = {sizeof(state), init,     step,
+                                                set,           response, archive_state};
 static const bst_stage_desc stage = {
     BST_STAGE_ABI, BST_STAGE_COMPENSATOR,
     "leaky",       "Proportional, with an integrator that forgets.",
