@@ -34,6 +34,8 @@ enum { CATALOGUE_CAPACITY = 16384 };
 static const double SNR_SHARE_EXPECTED = 0.7;
 /* Search radius for stars once the tracker has estimated the pointing error. */
 static const double LOCKED_RADIUS_PX = 10.0;
+/* Least expected SNR of a star that gets a window. */
+static const double WINDOW_STAR_SNR = 12.0;
 /* Shift above which a distorted field is matched twice. */
 static const double RESHIFT_PX = 2.0;
 
@@ -59,7 +61,9 @@ typedef struct imgproc_module {
     bst_stack *stack;               /* NULL: no stacking */
     bst_optics_photometer photometer;
     bst_pixel_learner *pixels;   /* NULL: bad pixels are not learned */
+    double window_v_limit;       /* of stars with windows, by the latest frame; NAN: none yet */
     int64_t steps;               /* number of steps so far */
+    int first_slot;              /* slot of the map that lane 0 uses: 0, or by a restore */
     bst_psf_wings *wings;        /* NULL: the PSF has no wings */
     bst_plugin_detector *plugin; /* NULL: built-in detector */
 } imgproc_module;
@@ -112,6 +116,28 @@ static bst_status open_plugin(const bst_module_env *env, imgproc_module *m) {
                                       (int)m->config->capacity, &m->plugin);
 }
 
+/* Saves or restores the module between two steps. Detections made ahead are not archived: the step
+ * makes them again. */
+static bst_status archive_module(void *self, bst_archive *archive) {
+    imgproc_module *m = self;
+    m->steps = bst_archive_integer(archive, m->steps, 0, INT64_MAX / 2);
+    BST_ARCHIVE(archive, m->window_v_limit);
+    bst_imgproc_discriminator_archive(m->discriminator, archive);
+    if (m->pixels) {
+        BST_TRY(bst_pixel_learner_archive(m->pixels, archive));
+    }
+    if (m->stack) {
+        BST_TRY(bst_stack_archive(m->stack, archive));
+    }
+    if (bst_archive_is_restoring(archive)) {
+        m->first_slot = (int)(m->steps % BST_STEP_LANES); /* lanes begin at 0 again */
+        for (int i = 0; i < BST_STEP_LANES; i++) {
+            m->lanes[i].ready = false;
+        }
+    }
+    return m->plugin ? bst_plugin_detector_archive(m->plugin, archive) : BST_OK;
+}
+
 /* Creates all parts of the module from the configuration. */
 static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
     m->camera = *bst_knowledge_camera(env->knowledge);
@@ -162,6 +188,7 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
         return bst_fail(env->ctx, BST_ERR_MEMORY, "no memory for image processing");
     }
     m->config = config;
+    m->window_v_limit = NAN;
     bst_status status = prepare(env, m);
     if (status != BST_OK) {
         destroy(m);
@@ -179,21 +206,6 @@ static bst_quat attitude_correction(const imgproc_module *m, const bst_predictio
                                               predictions->attitude_error_rate_cam_radps));
 }
 
-/* Length of the star field's shift, px. */
-static double shift_px(const bst_starid_result *r) {
-    return hypot(r->shift_x_px, r->shift_y_px);
-}
-
-/* Attitude corrected by the shift and roll of the identified stars. */
-static bst_quat attitude_from_stars(const imgproc_module *m, const bst_starid_options *o,
-                                    const bst_starid_result *r, bst_quat q) {
-    bst_vec3 seen = bst_camera_unproject(&m->camera, o->centre_x_px + r->shift_x_px,
-                                         o->centre_y_px + r->shift_y_px);
-    bst_vec3 meant = bst_camera_unproject(&m->camera, o->centre_x_px, o->centre_y_px);
-    bst_vec3 turn = bst_vec3_axpy(bst_vec3_cross(meant, seen), r->roll_rad, meant);
-    return bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(turn), q));
-}
-
 /* A frame and the onboard knowledge of its exposure. */
 typedef struct exposure {
     const bst_frame_message *message;
@@ -204,10 +216,10 @@ typedef struct exposure {
 } exposure;
 
 /* Plans the windows to search while a target is tracked; none: the whole frame. */
-static bst_status plan_windows(bst_ctx *ctx, imgproc_module *m, const lane *l, const exposure *e,
+static bst_status plan_windows(bst_ctx *ctx, imgproc_module *m, const exposure *e,
                                bst_quat q_cam_from_gcrf) {
     const bst_frame_message *message = e->message;
-    if (!l->ip ||
+    if (isnan(m->window_v_limit) ||
         message->exposure_id % m->config->full_frame_period < m->config->full_frame_count) {
         return BST_OK;
     }
@@ -215,7 +227,7 @@ static bst_status plan_windows(bst_ctx *ctx, imgproc_module *m, const lane *l, c
     const bst_window_plan_input input = {
         .camera = &m->camera,
         .config = m->config,
-        .ip = l->ip,
+        .v_limit = m->window_v_limit,
         .message = message,
         .motion = e->motion,
         .light = &e->light,
@@ -272,10 +284,11 @@ static bst_status identify_stars(bst_ctx *ctx, imgproc_module *m, const lane *l,
         bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
                          &result);
     }
-    if (m->camera.geometry.general && result.matched > 0 && shift_px(&result) > RESHIFT_PX) {
+    if (m->camera.geometry.general && result.matched > 0 &&
+        hypot(result.shift_x_px, result.shift_y_px) > RESHIFT_PX) {
         /* distortion makes the shift uneven over the field: match again with the corrected attitude
          */
-        *q_cam_from_gcrf = attitude_from_stars(m, &options, &result, out->q_cam_from_gcrf);
+        *q_cam_from_gcrf = bst_starid_attitude(&m->camera, &options, &result, out->q_cam_from_gcrf);
         for (int i = 0; i < out->count; i++) {
             if (out->items[i].label == BST_LABEL_STAR) {
                 out->items[i].label = BST_LABEL_UNKNOWN;
@@ -291,7 +304,7 @@ static bst_status identify_stars(bst_ctx *ctx, imgproc_module *m, const lane *l,
                          &result);
     }
     if (result.matched > 0) {
-        *q_cam_from_gcrf = attitude_from_stars(m, &options, &result, *q_cam_from_gcrf);
+        *q_cam_from_gcrf = bst_starid_attitude(&m->camera, &options, &result, *q_cam_from_gcrf);
     }
     out->stars_identified = result.matched;
     for (int i = 0; i < out->count; i++) {
@@ -398,7 +411,7 @@ static bst_status detect_ahead(void *self, struct bst_step *step) {
         return BST_OK;
     }
     BST_TRY(open_lane(ctx, m, l));
-    l->map = bst_step_lane(step);
+    l->map = (bst_step_lane(step) + m->first_slot) % BST_STEP_LANES;
     int capacity = (int)m->config->capacity;
     if (!l->made) {
         l->made = malloc(sizeof *l->made + (size_t)capacity * sizeof l->made->items[0]);
@@ -520,11 +533,14 @@ static bst_status process_frame(imgproc_module *m, struct bst_step *step,
         e.light = observer_at(m, nav.payload, middle);
     }
     if (m->config->track_windows && e.locked && navigated) {
-        BST_TRY(plan_windows(ctx, m, l, &e, out->q_cam_from_gcrf));
+        BST_TRY(plan_windows(ctx, m, &e, out->q_cam_from_gcrf));
         out->windows = m->windows.count;
     }
     BST_TRY(detections_of(ctx, m, l, &e, out, capacity));
     bool smeared = !m->plugin && bst_imgproc_smeared(l->ip);
+    if (!m->plugin) {
+        m->window_v_limit = bst_imgproc_v_limit(l->ip, WINDOW_STAR_SNR);
+    }
     bst_optics_photometer_begin(&m->photometer);
     bst_imgproc_frame_knowledge known = {.q_cam_from_gcrf = out->q_cam_from_gcrf,
                                          .window = message->window,
@@ -597,4 +613,5 @@ const bst_module_desc bst_imgproc_module = {
     .step = step_module,
     .destroy = destroy,
     .ahead = detect_ahead,
+    .archive = archive_module,
 };

@@ -6,8 +6,6 @@
 
 /* Windows that cover a larger share of the frame than this save nothing. */
 static const double WINDOWS_SHARE = 0.5;
-/* Least expected SNR of a star that gets a window. */
-static const double WINDOW_STAR_SNR = 12.0;
 
 /* Adds windows for the brightest of `count` expected stars; these are moved to the front, brightest
  * first. */
@@ -58,7 +56,7 @@ bst_status bst_window_plan_make(bst_ctx *ctx, const bst_window_plan_input *in,
     }
     int expected = 0;
     const bst_predicted_stars_query query = {in->q_cam_from_gcrf, in->light, *frame, 0.0,
-                                             bst_imgproc_v_limit(in->ip, WINDOW_STAR_SNR)};
+                                             in->v_limit};
     BST_TRY(bst_predicted_stars_expect(ctx, sky, &query, &expected));
     add_star_windows(in, sky, windows, expected);
     *use = bst_region_of_interest_settle(windows, frame, in->message->binning, WINDOWS_SHARE);

@@ -9,7 +9,7 @@
 typedef struct bst_window_plan_input {
     const bst_camera *camera;
     const bst_imgproc_config *config;
-    const bst_imgproc *ip; /* its latest frame gives the limiting magnitude */
+    double v_limit; /* V magnitude of the faintest star that gets a window */
     const bst_frame_message *message;
     const bst_camera_motion *motion;
     const bst_light *light;

@@ -259,34 +259,98 @@ static bst_status finish(void *self, struct bst_step *step) {
     return BST_OK;
 }
 
-/* Switches to another plate scale or jitter: recreates everything that depends on the camera.
- * Frames rendered before are unchanged. */
-static bst_status change_camera(bst_ctx *ctx, scenegen *s, double scale_arcsec,
-                                double jitter_rad2) {
-    bst_camera camera;
-    bst_psf *psf;
-    long long pixels;
-    BST_TRY(
-        bst_psf_camera_trembling(ctx, s->world_camera, scale_arcsec, jitter_rad2, &camera, &psf));
+/* Replaces the renderer by one for `camera`, and the PSF of a changed camera by `psf`. */
+static bst_status replace_renderer(bst_ctx *ctx, scenegen *s, const bst_camera *camera,
+                                   bst_psf *psf) {
     bst_renderer *renderer;
     bst_status status =
-        bst_renderer_create(ctx, s->device, &camera, &s->renderer_options, &renderer);
+        bst_renderer_create(ctx, s->device, camera, &s->renderer_options, &renderer);
     if (status != BST_OK) {
         bst_psf_free(psf);
         return status;
     }
-    bst_status counted = bst_renderer_saturated(ctx, s->renderer, &pixels);
-    s->saturated_before += bst_renderer_saturated_frames(s->renderer);
     bst_renderer_free(s->renderer);
     bst_psf_free(s->psf);
     s->renderer = renderer;
     s->psf = psf;
+    s->options.margin_px = fmax(s->margin_px, bst_renderer_margin_px(renderer));
+    return BST_OK;
+}
+
+/* Sets another plate scale or jitter: recreates everything that depends on the camera. Frames
+ * rendered before are unchanged. */
+static bst_status set_camera(bst_ctx *ctx, scenegen *s, double scale_arcsec, double jitter_rad2) {
+    bst_camera camera;
+    bst_psf *psf;
+    BST_TRY(
+        bst_psf_camera_trembling(ctx, s->world_camera, scale_arcsec, jitter_rad2, &camera, &psf));
+    BST_TRY(replace_renderer(ctx, s, &camera, psf));
     s->jitter_rad2 = jitter_rad2;
     s->changed = camera;
     s->camera = &s->changed;
     bst_field_set_camera(s->field, s->camera);
-    s->options.margin_px = fmax(s->margin_px, bst_renderer_margin_px(renderer));
-    return counted;
+    return BST_OK;
+}
+
+/* Sets the world's camera again. */
+static bst_status reset_camera(bst_ctx *ctx, scenegen *s) {
+    if (s->camera == s->world_camera) {
+        return BST_OK;
+    }
+    BST_TRY(replace_renderer(ctx, s, s->world_camera, NULL));
+    s->jitter_rad2 = 0.0;
+    s->camera = s->world_camera;
+    bst_field_set_camera(s->field, s->camera);
+    return BST_OK;
+}
+
+/* Switches to another plate scale or jitter between two exposures. */
+static bst_status change_camera(bst_ctx *ctx, scenegen *s, double scale_arcsec,
+                                double jitter_rad2) {
+    long long pixels;
+    BST_TRY(bst_renderer_saturated(ctx, s->renderer, &pixels));
+    long long frames = bst_renderer_saturated_frames(s->renderer);
+    BST_TRY(set_camera(ctx, s, scale_arcsec, jitter_rad2));
+    s->saturated_before += frames;
+    return BST_OK;
+}
+
+/* Saves or restores the camera of the latest exposure; the renderer and the PSF follow from it. */
+static bst_status archive_camera(scenegen *s, bst_archive *archive) {
+    bst_ctx *ctx = bst_archive_ctx(archive);
+    bool changed = s->camera != s->world_camera;
+    double scale_arcsec = s->camera->pixel_scale_arcsec, jitter_rad2 = s->jitter_rad2;
+    bst_archive_bool(archive, &changed);
+    BST_ARCHIVE(archive, scale_arcsec);
+    BST_ARCHIVE(archive, jitter_rad2);
+    if (!bst_archive_is_restoring(archive)) {
+        return BST_OK;
+    }
+    if (!changed) {
+        return reset_camera(ctx, s);
+    }
+    if (!(scale_arcsec > 0.0 && isfinite(scale_arcsec) && jitter_rad2 >= 0.0 &&
+          isfinite(jitter_rad2))) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "the saved state has a pixel scale of %g arcsec and a jitter of %g rad^2 "
+                        "(allowed: finite, above 0 and not negative)",
+                        scale_arcsec, jitter_rad2);
+    }
+    return set_camera(ctx, s, scale_arcsec, jitter_rad2);
+}
+
+static bst_status archive_module(void *self, bst_archive *archive) {
+    scenegen *s = self;
+    BST_TRY(archive_camera(s, archive));
+    BST_TRY(bst_renderer_archive(s->renderer, archive));
+    /* between steps all counted frames are reported */
+    s->saturated_told = bst_archive_integer(archive, s->saturated_told, 0, INT64_MAX / 2);
+    s->saturated_before = s->saturated_told - bst_renderer_saturated_frames(s->renderer);
+    return s->stage
+               ? bst_stage_archive(
+                     archive, s->stage_use->plugin,
+                     ((const bst_frame_stage *)s->stage_use->desc->functions)->archive, s->stage)
+               : BST_OK;
 }
 
 /* Renders and publishes the frame; a frame to be dropped is only planned. */
@@ -424,4 +488,5 @@ const bst_module_desc bst_scenegen_module = {
     .step = step_module,
     .destroy = destroy,
     .finish = finish,
+    .archive = archive_module,
 };

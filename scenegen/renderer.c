@@ -15,6 +15,7 @@
 #include "scenegen/frame_pool.h"
 #include "scenegen/reference.h"
 #include "scenegen/render_request.h"
+#include "scenegen/saturation_count.h"
 #include "scenegen/scene_options.h"
 #include "scenegen/scene_plan.h"
 #include "scenegen/smear/rolling_shutter.h"
@@ -51,10 +52,9 @@ struct bst_renderer {
     bst_scene_plan plan;   /* of the latest request, or of its latest band */
     double *rolled_peak_e; /* of all sources, with the bands of a rolling shutter */
     int rolled_capacity, set;
-    int tiles[BST_STAGE_SETS]; /* tiles whose saturated pixels are not counted yet */
-    bool rolled;               /* the latest request had a rolling shutter */
-    bool map;                  /* the background differs between pixels */
-    long long saturated_pixels, saturated_frames;
+    bst_saturation_count saturation;
+    bool rolled;            /* the latest request had a rolling shutter */
+    bool map;               /* the background differs between pixels */
     uint64_t most_bytes;    /* largest buffer of the device */
     double tolerance_sigma; /* without the share of the rolling shutter's bands */
     bst_render_stats stats;
@@ -151,6 +151,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         .temporal_oversample = r->options.temporal_oversample,
         .stamp_radius_px = r->options.stamp_radius_px};
     r->tolerance_sigma = smear.tolerance_sigma;
+    bst_saturation_count_init(&r->saturation);
     bst_status status = bst_tiles_choose(ctx, device, &r->options, &r->most_bytes);
     if (status == BST_OK) {
         status = open_psf(ctx, device, r, &smear);
@@ -239,6 +240,12 @@ void bst_renderer_free(bst_renderer *r) {
     free(r);
 }
 
+bst_status bst_renderer_archive(bst_renderer *r, bst_archive *archive) {
+    assert(r && archive);
+    r->set = bst_upload_ring_archive(r->stage, archive);
+    return bst_saturation_count_archive(&r->saturation, r->stage, archive);
+}
+
 /* True if the errors of the chosen options can be predicted. */
 static bool is_error_predictable(const bst_renderer *r) {
     const bst_renderer_options *o = &r->options;
@@ -304,23 +311,6 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_kernel_
         "placing the scene's nodes");
 }
 
-/* Counts the saturated pixels of the frame that used a set, once. Waits for that frame. */
-static bst_status count_saturated(bst_ctx *ctx, bst_renderer *r, int set) {
-    int tiles = r->tiles[set];
-    const void *counts;
-    if (tiles == 0) {
-        return BST_OK;
-    }
-    r->tiles[set] = 0;
-    r->saturated_pixels = 0;
-    BST_TRY(bst_upload_ring_result(ctx, r->stage, set, BST_STAGE_SATURATED, &counts));
-    for (int i = 0; i < tiles; i++) {
-        r->saturated_pixels += ((const cl_int *)counts)[i];
-    }
-    r->saturated_frames += r->saturated_pixels > 0;
-    return BST_OK;
-}
-
 /* Buffer for the frame's saturation counts. */
 static bst_status saturated_room(bst_ctx *ctx, bst_renderer *r, size_t tiles, cl_mem *out) {
     return bst_upload_ring_room(ctx, r->stage, BST_STAGE_SATURATED, tiles * sizeof(cl_int), out);
@@ -329,7 +319,7 @@ static bst_status saturated_room(bst_ctx *ctx, bst_renderer *r, size_t tiles, cl
 /* Starts the next upload set; another frame may be in progress. */
 static bst_status begin_set(bst_ctx *ctx, bst_renderer *r) {
     r->set = bst_upload_ring_begin(r->stage);
-    return count_saturated(ctx, r, r->set);
+    return bst_saturation_count_frame(ctx, &r->saturation, r->stage, r->set);
 }
 
 /* Renders the light image for the tile kernel if the PSF is not Gaussian. */
@@ -370,7 +360,7 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     p.first_tile = to->first_tile;
     size_t tiles = (size_t)p.tiles_x * (size_t)p.tiles_y;
     if (to->saturated) {
-        r->tiles[r->set] = to->first_tile + (int)tiles;
+        r->saturation.tiles[r->set] = to->first_tile + (int)tiles;
     }
     cl_mem light = r->law;
     if (r->fourier) {
@@ -445,7 +435,7 @@ static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_
         }
         to.first_row = band.window.y0 - q->window.y0;
         BST_TRY(enqueue_tiles(ctx, r, &band, &to));
-        to.first_tile = to.saturated ? r->tiles[r->set] : 0;
+        to.first_tile = to.saturated ? r->saturation.tiles[r->set] : 0;
         all.nodes_bounded = all.nodes_bounded || r->stats.nodes_bounded;
         all.single_kernel = all.single_kernel && r->stats.single_kernel;
         all.predicted_sigma = fmax(all.predicted_sigma, bst_error_budget_error_sigma(r->budget) +
@@ -480,7 +470,7 @@ static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_rend
     int rows = q->window.height / binning;
     cl_mem saturated;
     BST_TRY(saturated_room(ctx, r, (size_t)rows, &saturated));
-    r->tiles[r->set] = rows;
+    r->saturation.tiles[r->set] = rows;
     bst_kernel_frame_params p = bst_render_params(&r->camera, &r->options, q, 0);
     return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, frame, saturated);
 }
@@ -520,7 +510,7 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
         status = bst_device_check(ctx, clFlush(r->queue), "starting the rendering");
     }
     if (status != BST_OK) {
-        r->tiles[r->set] = 0;
+        r->saturation.tiles[r->set] = 0;
         bst_frame_release(frame);
         return status;
     }
@@ -549,9 +539,10 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
 
 bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *r, long long *pixels) {
     for (int i = 1; i <= BST_STAGE_SETS; i++) { /* the latest last */
-        BST_TRY(count_saturated(ctx, r, (r->set + i) % BST_STAGE_SETS));
+        BST_TRY(bst_saturation_count_frame(ctx, &r->saturation, r->stage,
+                                           (r->set + i) % BST_STAGE_SETS));
     }
-    *pixels = r->saturated_pixels;
+    *pixels = r->saturation.pixels;
     return BST_OK;
 }
 
@@ -560,7 +551,7 @@ bst_status bst_renderer_flags(bst_ctx *ctx, bst_renderer *r, size_t pixels, uint
 }
 
 long long bst_renderer_saturated_frames(const bst_renderer *r) {
-    return r->saturated_frames;
+    return r->saturation.frames;
 }
 
 void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {

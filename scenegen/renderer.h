@@ -10,6 +10,7 @@
 #ifndef BST_SCENEGEN_RENDERER_H
 #define BST_SCENEGEN_RENDERER_H
 
+#include "boresight/archive.h"
 #include "boresight/rng.h"
 #include "scenegen/smear/smear.h"
 #include "sim/device/device.h"
@@ -50,6 +51,12 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
                                bst_renderer **out) BST_MUST_CHECK;
 /* Frees a renderer. Frames still referenced stay valid. */
 void bst_renderer_free(bst_renderer *renderer);
+
+/* Saves or restores what later frames depend on, or report: the counts of saturated frames, with
+ * the frames in progress. Everything else follows from the camera, the options and each request.
+ *
+ * Errors:    BST_ERR_DEVICE */
+bst_status bst_renderer_archive(bst_renderer *renderer, bst_archive *archive) BST_MUST_CHECK;
 
 /* One exposure to render. Pointers are lent for the call. */
 typedef struct bst_render_request {

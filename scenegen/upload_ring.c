@@ -91,6 +91,11 @@ void bst_upload_ring_free(bst_upload_ring *s) {
     free(s);
 }
 
+int bst_upload_ring_archive(bst_upload_ring *s, bst_archive *archive) {
+    s->present = (int)bst_archive_integer(archive, s->present, 0, BST_STAGE_SETS - 1);
+    return s->present;
+}
+
 int bst_upload_ring_begin(bst_upload_ring *s) {
     s->present = (s->present + 1) % BST_STAGE_SETS;
     return s->present;

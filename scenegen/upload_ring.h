@@ -5,7 +5,9 @@
 #define BST_SCENEGEN_UPLOAD_RING_H
 
 #include <stddef.h>
+#include <stdint.h>
 
+#include "boresight/archive.h"
 #include "sim/device/device.h"
 
 typedef struct bst_upload_ring bst_upload_ring;
@@ -32,6 +34,12 @@ bst_status bst_upload_ring_create(bst_ctx *ctx, bst_device *device,
                                   bst_upload_ring **out) BST_MUST_CHECK;
 /* Frees the ring; waits for the device. */
 void bst_upload_ring_free(bst_upload_ring *stage);
+
+/* Saves or restores which set is the current one. The buffers' contents are of frames in progress
+ * and are not archived.
+ *
+ * Returned:  index of the current set */
+int bst_upload_ring_archive(bst_upload_ring *stage, bst_archive *archive);
 
 /* Starts the next set and returns its index, 0 to BST_STAGE_SETS - 1. */
 int bst_upload_ring_begin(bst_upload_ring *stage);

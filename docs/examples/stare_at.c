@@ -68,6 +68,11 @@ static bst_status step(void *self, struct bst_step *s) {
     return BST_OK;
 }
 
+/* What a saved simulation contains of it: nothing, as no step changes the state. */
+static bst_status archive(void *self, bst_archive *saved) {
+    return (void)self, (void)saved, BST_OK;
+}
+
 static void destroy(void *self) {
     free(self);
 }
@@ -86,6 +91,7 @@ static const bst_module_desc stare_at_module = {
     .create = create,
     .step = step,
     .destroy = destroy,
+    .archive = archive,
 };
 
 /* 5. What the program looks for in a plug-in. */

@@ -23,6 +23,35 @@ void bst_bad_rows_free(bst_bad_rows *rows) {
     *rows = (bst_bad_rows){0};
 }
 
+/* True if the rows' first indices ascend from 0 to the count, and the columns within each row. */
+static bool is_valid(const bst_bad_rows *rows) {
+    bool valid = rows->first[0] == 0 && rows->first[rows->height] == rows->count;
+    for (int y = 0; y < rows->height && valid; y++) {
+        int last = -1;
+        valid = rows->first[y] <= rows->first[y + 1] && rows->first[y + 1] <= rows->count;
+        for (int i = rows->first[y]; valid && i < rows->first[y + 1]; i++) {
+            valid = rows->column[i] > last && rows->column[i] < rows->width;
+            last = rows->column[i];
+        }
+    }
+    return valid;
+}
+
+bst_status bst_bad_rows_archive(bst_bad_rows *rows, bst_archive *archive) {
+    assert(rows && archive);
+    rows->count = bst_archive_count(archive, rows->count, rows->capacity);
+    bst_archive_bytes(archive, rows->first, ((size_t)rows->height + 1) * sizeof *rows->first);
+    bst_archive_bytes(archive, rows->column, (size_t)rows->count * sizeof *rows->column);
+    if (bst_archive_is_restoring(archive) && !is_valid(rows)) {
+        bst_bad_rows_begin(rows);
+        return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                        "the saved map of bad pixels has rows or columns out of range (allowed: "
+                        "those of a sensor of %d x %d pixels, ascending)",
+                        rows->width, rows->height);
+    }
+    return BST_OK;
+}
+
 void bst_bad_rows_begin(bst_bad_rows *rows) {
     rows->count = 0;
     memset(rows->first, 0, ((size_t)rows->height + 1) * sizeof *rows->first);

@@ -2,6 +2,7 @@
 #ifndef BST_IMGPROC_CALIBRATE_BAD_ROWS_H
 #define BST_IMGPROC_CALIBRATE_BAD_ROWS_H
 
+#include "boresight/archive.h"
 #include "boresight/messages.h"
 #include "boresight/status.h"
 
@@ -19,6 +20,11 @@ bst_status bst_bad_rows_create(bst_ctx *ctx, int width, int height, int capacity
                                bst_bad_rows *out) BST_MUST_CHECK;
 /* Frees the memory of a list of bad pixels and clears the struct, which belongs to the caller. */
 void bst_bad_rows_free(bst_bad_rows *rows);
+
+/* Saves or restores a map of the same sensor and capacity.
+ *
+ * Errors:    BST_ERR_FORMAT for restored rows or columns out of range; the map is empty then */
+bst_status bst_bad_rows_archive(bst_bad_rows *rows, bst_archive *archive) BST_MUST_CHECK;
 
 /* Empties the map. Call bst_bad_rows_add for each bad pixel next, then bst_bad_rows_end. */
 void bst_bad_rows_begin(bst_bad_rows *rows);

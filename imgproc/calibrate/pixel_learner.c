@@ -123,6 +123,63 @@ void bst_pixel_learner_free(bst_pixel_learner *l) {
     free(l);
 }
 
+static void archive_suspect(bst_archive *archive, suspect *s) {
+    BST_ARCHIVE(archive, s->pixel);
+    BST_ARCHIVE(archive, s->binning);
+    bst_archive_bool(archive, &s->bad);
+    BST_ARCHIVE(archive, s->shown);
+    BST_ARCHIVE(archive, s->looks);
+    BST_ARCHIVE(archive, s->sky);
+    BST_ARCHIVE(archive, s->hit);
+    BST_ARCHIVE(archive, s->at_rest);
+    BST_ARCHIVE(archive, s->direction);
+    BST_ARCHIVE(archive, s->offset);
+}
+
+/* True if a pixel with its binning lies on the sensor, after pixel `last`. */
+static bool is_in_order(const bst_pixel_learner *l, const suspect *s, int32_t last) {
+    int64_t width = l->camera.width_px, x = s->pixel % width, y = s->pixel / width;
+    return s->pixel > last && s->binning >= 1 && x + s->binning <= width &&
+           y + s->binning <= l->camera.height_px;
+}
+
+bst_status bst_pixel_learner_archive(bst_pixel_learner *l, bst_archive *archive) {
+    assert(l && archive);
+    bool valid = true;
+    l->count = bst_archive_count(archive, l->count, l->capacity);
+    l->bad_count = 0;
+    for (int i = 0; i < l->count; i++) {
+        suspect *s = &l->items[i];
+        archive_suspect(archive, s);
+        valid = valid && is_in_order(l, s, i > 0 ? s[-1].pixel : -1);
+        l->bad_count += s->bad;
+    }
+    l->lost = bst_archive_integer(archive, l->lost, 0, INT64_MAX / 2);
+    bst_archive_bool(archive, &l->waits);
+    for (int i = 0; i < BST_STEP_LANES; i++) {
+        bst_archive_bool(archive, &l->changed[i]);
+        BST_ARCHIVE(archive, l->maps[i].turn);
+        BST_TRY(bst_bad_rows_archive(&l->maps[i].rows, archive));
+    }
+    BST_ARCHIVE(archive, l->stars);
+    BST_ARCHIVE(archive, l->sharp_stars);
+    BST_ARCHIVE(archive, l->q);
+    BST_ARCHIVE(archive, l->time_s);
+    l->frames = (int)bst_archive_integer(archive, l->frames, 0, INT32_MAX / 2);
+    BST_ARCHIVE(archive, l->q_steady);
+    BST_ARCHIVE(archive, l->steady_radps);
+    BST_ARCHIVE(archive, l->offset);
+    BST_ARCHIVE(archive, l->offset_limit);
+    if (!valid) {
+        l->count = l->bad_count = 0;
+        return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                        "the saved state has suspected pixels that are not on the sensor of %lld x "
+                        "%lld or not in order",
+                        (long long)l->camera.width_px, (long long)l->camera.height_px);
+    }
+    return BST_OK;
+}
+
 void bst_pixel_learner_note_star(bst_pixel_learner *l, bool sharp) {
     l->stars += 1.0;
     l->sharp_stars += sharp ? 1.0 : 0.0;

@@ -57,6 +57,13 @@ bst_status bst_pixel_learner_create(bst_ctx *ctx, const bst_camera *camera,
 /* Frees a pixel learner; NULL is allowed. */
 void bst_pixel_learner_free(bst_pixel_learner *learner);
 
+/* Saves or restores what was learned, and the published bad-pixel maps.
+ *
+ * Errors:    BST_ERR_FORMAT for restored pixels that are not on the sensor or not in order; nothing
+ *            is learned then */
+bst_status bst_pixel_learner_archive(bst_pixel_learner *learner,
+                                     bst_archive *archive) BST_MUST_CHECK;
+
 /* Counts an identified star; sharp: its maximum was sharper than the PSF allows. */
 void bst_pixel_learner_note_star(bst_pixel_learner *learner, bool sharp);
 

@@ -59,6 +59,10 @@ void bst_plugin_detector_free(bst_plugin_detector *p) {
     free(p);
 }
 
+bst_status bst_plugin_detector_archive(bst_plugin_detector *p, bst_archive *archive) {
+    return bst_stage_archive(archive, p->use->plugin, p->stage->archive, p->self);
+}
+
 /* qsort order of detections by position. */
 static int by_position(const void *a, const void *b) {
     const bst_detection *p = a, *q = b;

@@ -22,6 +22,10 @@ bst_status bst_plugin_detector_create(bst_ctx *ctx, const bst_stage_use *use,
 /* Destroys the plug-in's stage and frees the detector; NULL is allowed. */
 void bst_plugin_detector_free(bst_plugin_detector *plugin);
 
+/* Saves or restores the state of the plug-in's stage, as bst_stage_archive. */
+bst_status bst_plugin_detector_archive(bst_plugin_detector *plugin,
+                                       bst_archive *archive) BST_MUST_CHECK;
+
 /* Detects sources with the plug-in, as bst_imgproc_detect.
  *
  * Errors:    BST_ERR_STATE, naming the plug-in, for a position, size or noise that is not finite, a

@@ -361,6 +361,15 @@ void bst_starid_match(bst_starid *s, const bst_starid_options *o,
     }
 }
 
+bst_quat bst_starid_attitude(const bst_camera *camera, const bst_starid_options *o,
+                             const bst_starid_result *r, bst_quat q_cam_from_gcrf) {
+    bst_vec3 seen = bst_camera_unproject(camera, o->centre_x_px + r->shift_x_px,
+                                         o->centre_y_px + r->shift_y_px);
+    bst_vec3 meant = bst_camera_unproject(camera, o->centre_x_px, o->centre_y_px);
+    bst_vec3 turn = bst_vec3_axpy(bst_vec3_cross(meant, seen), r->roll_rad, meant);
+    return bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(turn), q_cam_from_gcrf));
+}
+
 int bst_starid_star_of(const bst_starid *s, int detection) {
     return detection < s->matched_of ? s->star_of[detection] : -1;
 }

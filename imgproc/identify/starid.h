@@ -2,6 +2,7 @@
 #ifndef BST_IMGPROC_IDENTIFY_STARID_H
 #define BST_IMGPROC_IDENTIFY_STARID_H
 
+#include "boresight/camera.h"
 #include "boresight/messages.h"
 
 /* A catalogue star and its predicted position, mean over the exposure. */
@@ -49,6 +50,13 @@ void bst_starid_free(bst_starid *starid);
 void bst_starid_match(bst_starid *starid, const bst_starid_options *options,
                       const bst_imgproc_expected_star *stars, int star_count, bst_detection *items,
                       int count, bst_starid_result *out);
+
+/* Attitude corrected by the shift and roll of a match.
+ *
+ * Given:     q_cam_from_gcrf  attitude with which the stars were predicted
+ * Returned:  q_cam_from_gcrf of the matched stars */
+bst_quat bst_starid_attitude(const bst_camera *camera, const bst_starid_options *options,
+                             const bst_starid_result *result, bst_quat q_cam_from_gcrf);
 
 /* Index of the star that the latest match assigned to a detection; -1: none. */
 int bst_starid_star_of(const bst_starid *starid, int detection);

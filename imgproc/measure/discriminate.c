@@ -1,6 +1,7 @@
 #include "imgproc/measure/discriminate.h"
 
 #include <assert.h>
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +13,7 @@
 #include "sim/optics/photometry.h"
 
 enum { BAND = 8, MAG_BINS = 60, KEEP_MISSED = 8, KEEP_CHARGE = 50 };
+enum { MOST_SEEN = INT_MAX / 2 }; /* frames in which a source was seen: a limit of saved states */
 
 static const double EXPECTED_OBJECTS = 10.0; /* expected in a frame without earlier ones */
 /* 1 sigma position error between frames besides the covariance: attitude, distortion, pixels */
@@ -116,6 +118,55 @@ void bst_imgproc_discriminator_free(bst_imgproc_discriminator *d) {
     }
     bst_arena_free(&d->arena);
     free(d);
+}
+
+static void archive_source(bst_archive *archive, earlier_source *s) {
+    BST_ARCHIVE(archive, s->first);
+    BST_ARCHIVE(archive, s->latest);
+    BST_ARCHIVE(archive, s->first_var);
+    BST_ARCHIVE(archive, s->latest_var);
+    BST_ARCHIVE(archive, s->v_mag);
+    s->seen = (int)bst_archive_integer(archive, s->seen, 1, MOST_SEEN);
+    s->missed = (int)bst_archive_integer(archive, s->missed, 0, MOST_SEEN);
+    bst_archive_bool(archive, &s->moved);
+    bst_archive_bool(archive, &s->fresh);
+    bst_archive_bool(archive, &s->blend);
+}
+
+static void archive_charged(bst_archive *archive, charged *c) {
+    BST_ARCHIVE(archive, c->pixel);
+    c->seen = (int)bst_archive_integer(archive, c->seen, 1, MOST_SEEN);
+    c->missed = (int)bst_archive_integer(archive, c->missed, 0, MOST_SEEN);
+}
+
+/* Saves or restores a window on the sensor. */
+static void archive_window(bst_archive *archive, const bst_camera *camera, bst_window *w) {
+    w->x0 = (int)bst_archive_integer(archive, w->x0, 0, camera->width_px);
+    w->y0 = (int)bst_archive_integer(archive, w->y0, 0, camera->height_px);
+    w->width = (int)bst_archive_integer(archive, w->width, 0, camera->width_px - w->x0);
+    w->height = (int)bst_archive_integer(archive, w->height, 0, camera->height_px - w->y0);
+}
+
+void bst_imgproc_discriminator_archive(bst_imgproc_discriminator *d, bst_archive *archive) {
+    assert(d && archive);
+    int sources = bst_archive_count(archive, d->count, d->room);
+    for (int i = 0; i < sources; i++) {
+        if (bst_archive_is_restoring(archive)) { /* the rest is of the frame in progress */
+            d->sources[i] = (earlier_source){.next = -1};
+        }
+        archive_source(archive, &d->sources[i]);
+    }
+    d->count = sources;
+    d->charge_count = bst_archive_count(archive, d->charge_count, d->room);
+    for (int i = 0; i < d->charge_count; i++) {
+        archive_charged(archive, &d->charge[i]);
+    }
+    BST_ARCHIVE(archive, d->outcomes);
+    bst_archive_bool(archive, &d->covered);
+    bst_archive_bool(archive, &d->charge_covered);
+    BST_ARCHIVE(archive, d->q_cam_from_gcrf);
+    archive_window(archive, &d->camera, &d->window);
+    archive_window(archive, &d->camera, &d->charge_window);
 }
 
 /* Sets a detection's label and its probability, clamped to 0 to 1. */

@@ -3,6 +3,7 @@
 #ifndef BST_IMGPROC_MEASURE_DISCRIMINATE_H
 #define BST_IMGPROC_MEASURE_DISCRIMINATE_H
 
+#include "boresight/archive.h"
 #include "boresight/camera.h"
 #include "boresight/messages.h"
 #include "sim/astro/bodies.h"
@@ -29,6 +30,10 @@ bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *came
                                             bst_imgproc_discriminator **out) BST_MUST_CHECK;
 /* Frees a discriminator; NULL is allowed. */
 void bst_imgproc_discriminator_free(bst_imgproc_discriminator *discriminator);
+
+/* Saves or restores what is remembered of earlier frames. */
+void bst_imgproc_discriminator_archive(bst_imgproc_discriminator *discriminator,
+                                       bst_archive *archive);
 
 /* Sets label and label_probability of a frame's detections. Frames come in order of time.
  *

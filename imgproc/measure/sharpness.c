@@ -57,7 +57,7 @@ static void psf_on_nine_pixels(const source *from, int node, double x, double y,
 
 void bst_sharpness_set(bst_sharpness *s, const bst_imgproc_gauss *psf, const bst_known_psf *known,
                        int binning, double sigma_px) {
-    if (s->sigma_px == sigma_px) {
+    if (s->sigma_px == sigma_px && s->binning == binning) {
         return;
     }
     enum { PHASES = 5 };
@@ -65,6 +65,7 @@ void bst_sharpness_set(bst_sharpness *s, const bst_imgproc_gauss *psf, const bst
     source from = {psf, known, binning, sigma_px};
     int nodes = known ? known->nodes : 0;
     s->sigma_px = sigma_px;
+    s->binning = binning;
     psf_on_nine_pixels(&from, nodes, 0.0, 0.0, image);
     for (int j = 0; j < 3; j++) {
         for (int i = 0; i < 3; i++) {

@@ -20,7 +20,8 @@
 enum { BST_SHARP_GROUPS = 5 };
 
 typedef struct bst_sharpness {
-    double sigma_px; /* sigma for which it was prepared */
+    double sigma_px; /* sigma and binning for which it was prepared */
+    int binning;
     /* Least signal of a BST_PIXEL_SATURATED pixel, e-: its neighbours must be consistent with it.
      * 0: saturated pixels are not tested. The caller sets it. */
     double full_e;

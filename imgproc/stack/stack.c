@@ -99,6 +99,45 @@ void bst_stack_free(bst_stack *s) {
     free(s);
 }
 
+/* Saves or restores frame i of the stack. Returns false if no frame can be like that. */
+static bool archive_frame(bst_stack *s, bst_archive *archive, int i) {
+    BST_ARCHIVE(archive, s->time_s[i]);
+    BST_ARCHIVE(archive, s->q[i]);
+    BST_ARCHIVE(archive, s->noise_e[i]);
+    bst_archive_bytes(archive, stack_map(s, i), (size_t)s->width * (size_t)s->height);
+    return isfinite(s->time_s[i]) && (i == 0 || s->time_s[i] > s->time_s[i - 1]) &&
+           bst_is_unit_quat(s->q[i], BST_LINK_UNIT_TOLERANCE) && isfinite(s->noise_e[i]);
+}
+
+bst_status bst_stack_archive(bst_stack *s, bst_archive *archive) {
+    assert(s && archive);
+    BST_ARCHIVE(archive, s->threshold);
+    BST_ARCHIVE(archive, s->followed);
+    int count = bst_archive_count(archive, s->count, (int)s->config.frames - 1);
+    s->count = count;
+    if (count == 0) {
+        return BST_OK;
+    }
+    s->width = (int)bst_archive_integer(archive, s->width, 1, s->max_width);
+    s->height = (int)bst_archive_integer(archive, s->height, 1, s->max_height);
+    BST_ARCHIVE(archive, s->origin_x_px);
+    BST_ARCHIVE(archive, s->origin_y_px);
+    BST_ARCHIVE(archive, s->binning);
+    BST_ARCHIVE(archive, s->sigma_px);
+    bst_archive_bytes(archive, s->steady, (size_t)s->width * (size_t)s->height * sizeof *s->steady);
+    bool valid = true;
+    for (int i = 0; i < count; i++) {
+        valid = archive_frame(s, archive, i) && valid;
+    }
+    if (!valid) {
+        s->count = 0;
+        return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                        "the saved state has stacked frames with attitudes, times or noise that "
+                        "are not those of frames");
+    }
+    return BST_OK;
+}
+
 /* True if a frame has the size, position and binning of the stack and is later than its last frame.
  */
 static bool continues_stack(const bst_stack *s, const bst_stack_frame *f) {

@@ -13,6 +13,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "boresight/archive.h"
 #include "boresight/camera.h"
 #include "boresight/config.h"
 #include "boresight/vec.h"
@@ -62,6 +63,12 @@ bst_status bst_stack_create(bst_ctx *ctx, const bst_camera *camera, const bst_st
                             int threads, bst_stack **out) BST_MUST_CHECK;
 /* Frees a stack with its thread pool; NULL is allowed. */
 void bst_stack_free(bst_stack *stack);
+
+/* Saves or restores the frames of a stack that is not full, and the figures of the latest search.
+ *
+ * Errors:    BST_ERR_FORMAT for restored frames with attitudes, times or noise that no frame has;
+ *            the stack is empty then */
+bst_status bst_stack_archive(bst_stack *stack, bst_archive *archive) BST_MUST_CHECK;
 
 /* Adds a frame. A stack with config->frames frames is full: bst_stack_search is next.
  *

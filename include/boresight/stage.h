@@ -3,6 +3,7 @@
 #ifndef BORESIGHT_STAGE_H
 #define BORESIGHT_STAGE_H
 
+#include "boresight/archive.h"
 #include "boresight/config.h"
 
 #pragma GCC visibility push(default)
@@ -41,6 +42,16 @@ typedef struct bst_stage_use {
         .key = "plugin", .type = BST_CONFIG_STAGE, .unit = "", .doc = doc_, .choices = kinds_, \
         .size = sizeof(bst_stage_use)                                                          \
     }
+
+/* Archives the state of a plug-in's stage.
+ *
+ * Given:     plugin    path of the library, for messages
+ *            function  member `archive` of the stage's functions; NULL: the stage has none
+ *            self      first argument of the function
+ * Errors:    BST_ERR_STATE without a function; those of the function, with the plug-in's name */
+bst_status bst_stage_archive(bst_archive *archive, const char *plugin,
+                             bst_status (*function)(void *self, bst_archive *archive),
+                             void *self) BST_MUST_CHECK;
 
 /* Opens libraries for bst_stage_read_config. */
 typedef struct bst_stage_loader {

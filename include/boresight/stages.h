@@ -53,6 +53,10 @@ typedef struct bst_detector_stage {
     bst_status (*detect)(void *self, bst_ctx *ctx, const bst_detector_frame *frame,
                          bst_detections *out);
     void (*destroy)(void *self);
+    /* Saves the stage's state, or restores it into a stage that was created from the same
+     * configuration, between two frames (bst_module_desc.archive). NULL: a simulation with this
+     * stage cannot be saved. */
+    bst_status (*archive)(void *self, bst_archive *archive);
 } bst_detector_stage;
 
 /* ---- frame_stage: changes a rendered frame before any module or the recorder reads it. */
@@ -79,6 +83,8 @@ typedef struct bst_frame_stage {
     bst_status (*apply)(void *self, bst_ctx *ctx, const bst_frame_stage_frame *frame,
                         uint16_t *pixels);
     void (*destroy)(void *self);
+    /* As bst_detector_stage.archive. */
+    bst_status (*archive)(void *self, bst_archive *archive);
 } bst_frame_stage;
 
 #pragma GCC visibility pop
