@@ -2,7 +2,7 @@
  * out with rotation matrices from the formulas of Wie (see the header): no axis, wheel or product
  * of inertia is zero, and none equals another. */
 #include "gimbal/spacecraft/spacecraft_control.h"
-#include "tests/test_support.h"
+#include "tests/archive_support.h"
 
 /* natural 0.3 rad/s, damping 0.8: the slope is 0.1875 per s; 70 % of 0.004 rad/s^2 give a straight
  * part up to 0.0028 / 0.1875^2 = 0.07964 rad */
@@ -128,11 +128,35 @@ static void the_way_round_is_kept(void **state) {
     }
 }
 
+static bst_status archive_control(void *control, bst_archive *archive) {
+    bst_spacecraft_attitude_control_archive(control, archive);
+    return BST_OK;
+}
+
+/* After a restore the integral goes on, and a turn of more than half a circle keeps its direction.
+ */
+static void it_is_saved_and_restored(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    for (int k = 0; k < 2; k++) {
+        double first = k ? 3.13 : 1e-3, next = k ? 3.15 : 2e-3;
+        bst_spacecraft_attitude_control c = control_of(0.02), copy = control_of(0.02);
+        (void)step(&c, first, (bst_vec3){0, 0, 0}, false);
+        test_saved saved = test_save(archive_control, &c);
+        bst_assert_ok(&ctx, test_restore(&ctx, archive_control, &copy, saved));
+        bst_vec3 was = step(&c, next, (bst_vec3){0, 0, 0}, false);
+        bst_vec3 is = step(&copy, next, (bst_vec3){0, 0, 0}, false);
+        assert_memory_equal(&was, &is, sizeof was);
+        free(saved.bytes);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(near_the_end_the_law_is_linear),
         cmocka_unit_test(a_slew_brakes_along_its_curve),
         cmocka_unit_test(the_way_round_is_kept),
+        cmocka_unit_test(it_is_saved_and_restored),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

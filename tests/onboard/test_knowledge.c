@@ -311,6 +311,13 @@ static void a_view_is_saved_and_restored(void **state) {
         (void)cue_at(&s, 3.3);
         test_saved saved = test_save(archive_view, s.kview);
         bst_assert_ok(&s.ctx, test_restore(&s.ctx, archive_view, other, saved));
+        bst_vec3 seen[2]; /* of the second that was asked for last */
+        for (int i = 0; i < 2; i++) {
+            bool valid;
+            bst_assert_ok(&s.ctx, bst_knowledge_cue_direction_at(&s.ctx, i ? other : s.kview, 3.9,
+                                                                 &valid, &seen[i]));
+        }
+        assert_memory_equal(&seen[0], &seen[1], sizeof *seen);
         for (int k = 0; k < 40; k++) {
             bst_onboard_cue was = cue_at(&s, 3.3 + 0.4 * k), is;
             bst_assert_ok(&s.ctx, bst_knowledge_cue_at(&s.ctx, other, 3.3 + 0.4 * k, &is));
