@@ -6,12 +6,12 @@
 #include "imgproc/calibrate/calibration.h"
 #include "imgproc/calibrate/pixel_learning.h"
 #include "imgproc/detect/plugin_detector.h"
-#include "imgproc/detect/psf_wings.h"
 #include "imgproc/detect/region_of_interest.h"
 #include "imgproc/identify/predicted_stars.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/measure/discriminate.h"
 #include "imgproc/window_plan.h"
+#include "imgproc/wing_labels.h"
 #include "sim/messages/message_invariants.h"
 #include "sim/onboard/knowledge.h"
 #include "sim/onboard/nav_motion.h"
@@ -321,42 +321,19 @@ static void ground_at(const void *user, double x_px, double y_px, bst_psf_wings_
     bst_imgproc_ground(user, x_px, y_px, &out->level_e, &out->noise_e);
 }
 
-/* Labels artefacts in the PSF wings of bright stars: catalogue stars, including those beside the
- * frame if the attitude is from stars, and saturated sources. */
+/* Labels artefacts in the PSF wings of bright stars. */
 static bst_status label_wings(bst_ctx *ctx, imgproc_module *m, const lane *l, const exposure *e,
                               const bst_imgproc_frame_knowledge *known, bst_detections *out) {
     const bst_frame_message *message = e->message;
-    double dx = 0.0, dy = 0.0,
-           exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz;
-    double bright_e =
-        bst_psf_wings_bright_e(m->wings, out->noise_e / message->binning, out->threshold_snr);
-    if (e->motion) {
-        bst_camera_motion_streak(e->motion, &m->camera, bst_camera_centre_x(&m->camera),
-                                 bst_camera_centre_y(&m->camera), &dx, &dy);
-    }
-    bst_psf_wings_begin(m->wings, dx, dy);
-    if (known->oriented) {
-        int expected = 0;
-        const bst_predicted_stars_query query = {
-            known->q_cam_from_gcrf, &known->light, message->window, BST_WINGS_REACH_PX,
-            bst_camera_v_mag(&m->camera, bright_e / exposure_s)};
-        BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, &query, &expected));
-        for (int i = 0; i < expected; i++) {
-            const bst_imgproc_expected_star *star = &m->sky.expected[i];
-            bst_psf_wings_add(m->wings, star->x_px, star->y_px,
-                              exposure_s * bst_camera_electrons_per_s(&m->camera, star->v_mag));
-        }
-    }
-    for (int i = 0; i < out->count; i++) {
-        const bst_detection *d = &out->items[i];
-        if ((d->flags & BST_DETECTION_SATURATED) && d->flux_e > bright_e &&
-            !bst_psf_wings_holds(m->wings, d->x_px, d->y_px, 5.0)) {
-            bst_psf_wings_add(m->wings, d->x_px, d->y_px, d->flux_e);
-        }
-    }
-    bst_psf_wings_label(m->wings, m->plugin ? bst_plugin_detector_ground : ground_at,
-                        m->plugin ? (const void *)m->plugin : l->ip, message->binning, out);
-    return BST_OK;
+    const bst_wing_labels_input input = {
+        .camera = &m->camera,
+        .known = known,
+        .motion = e->motion,
+        .binning = message->binning,
+        .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz,
+        .ground = m->plugin ? bst_plugin_detector_ground : ground_at,
+        .user = m->plugin ? (const void *)m->plugin : l->ip};
+    return bst_wing_labels_make(ctx, &input, &m->sky, m->wings, out);
 }
 
 /* Camera motion during the exposure from telemetry; false: unknown. */

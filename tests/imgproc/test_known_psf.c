@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "imgproc/detect/low_rank.h"
+#include "imgproc/measure/sharpness.h"
 #include "imgproc/measure/source_profile.h"
 #include "sim/core/simd.h"
 #include "sim/optics/psf_image.h"
@@ -147,6 +148,30 @@ static void a_known_gaussian_has_a_gaussians_images(void **state) {
     bst_psf_free(psf);
 }
 
+/* The sharpness test of binned pixels is that of these pixels, also if the frame before had another
+ * binning and the same least sigma: a frame's result does not depend on earlier frames. */
+static void sharpness_follows_the_binning(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_camera camera = telescope(256);
+    bst_psf *psf = psf_of(&camera);
+    bst_known_psf *known;
+    bst_assert_ok(&ctx, bst_known_psf_create(&ctx, psf, 256.0, 256.0, 0.0, &known));
+    bst_imgproc_gauss *gauss = malloc(sizeof *gauss);
+    assert_non_null(gauss);
+    bst_imgproc_gauss_init(gauss);
+    bst_sharpness fresh = {0}, after = {0};
+    bst_sharpness_set(&fresh, gauss, known, 4, 0.2);
+    bst_sharpness_set(&after, gauss, known, 2, 0.2);
+    assert_true(after.ratio[1][2] != fresh.ratio[1][2]);
+    bst_sharpness_set(&after, gauss, known, 4, 0.2);
+    assert_memory_equal(after.ratio, fresh.ratio, sizeof fresh.ratio);
+    assert_memory_equal(after.floor, fresh.floor, sizeof fresh.floor);
+    free(gauss);
+    bst_known_psf_free(known);
+    bst_psf_free(psf);
+}
+
 /* Against the sum that defines the image, at a corner of the field and where all four mix. */
 static void images_are_those_of_the_place_in_the_field(void **state) {
     (void)state;
@@ -274,6 +299,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(low_rank_finds_the_products_of_an_image),
         cmocka_unit_test(a_known_gaussian_has_a_gaussians_images),
+        cmocka_unit_test(sharpness_follows_the_binning),
         cmocka_unit_test(images_are_those_of_the_place_in_the_field),
         cmocka_unit_test(places_and_light_are_right),
     };
