@@ -389,13 +389,13 @@ static bst_status step_control(void *self, struct bst_step *step) {
     return exchange(m, step, inputs, count);
 }
 
-/* The peer has the state: nothing of it can be saved. */
+/* Archives what was sent to the program that plays the module; a peer has the rest of the state. */
 static bst_status archive_external(void *self, bst_archive *archive) {
-    (void)self;
-    return bst_fail(bst_archive_ctx(archive), BST_ERR_STATE,
-                    "a module of type \"external\" is played by another program, whose state "
-                    "cannot be saved or restored; give it a built-in type (`boresight schema` "
-                    "lists them)");
+    external *m = self;
+    BST_TRY(bst_link_archive(m->link, m->part, archive));
+    BST_ARCHIVE(archive, m->seen);
+    BST_ARCHIVE(archive, m->samples);
+    return BST_OK;
 }
 
 #define EXTERNAL(role_, table_, ports_, rate_, create_, step_)                                   \
