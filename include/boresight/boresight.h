@@ -75,8 +75,9 @@ const char *bst_model_epoch_utc(const bst_model *model);
 int64_t bst_model_tick_rate_hz(const bst_model *model);
 /* Duration of a run as the scenario sets it, s. */
 double bst_model_duration_s(const bst_model *model);
-/* Seed and number of the run as the scenario sets them. */
+/* Seed of all random streams, as the scenario sets it. */
 uint64_t bst_model_seed(const bst_model *model);
+/* Number of the run, as the scenario sets it. */
 uint64_t bst_model_run(const bst_model *model);
 
 /* Number of sensors of all observers. */
@@ -279,10 +280,13 @@ void bst_state_free(void *bytes);
 bst_status bst_sim_restore(bst_ctx *ctx, bst_sim *sim, const void *bytes, size_t size,
                            unsigned components) BST_MUST_CHECK;
 
-/* Saves to a file, which appears complete or not at all, or restores from one.
+/* Saves to a file, which appears complete or not at all.
  *
- * Errors:    those of bst_sim_save and bst_sim_restore; BST_ERR_IO */
+ * Errors:    those of bst_sim_save; BST_ERR_IO */
 bst_status bst_sim_save_file(bst_ctx *ctx, bst_sim *sim, const char *path) BST_MUST_CHECK;
+/* Restores from a file of bst_sim_save_file.
+ *
+ * Errors:    those of bst_sim_restore; BST_ERR_IO, BST_ERR_NOT_FOUND */
 bst_status bst_sim_restore_file(bst_ctx *ctx, bst_sim *sim, const char *path,
                                 unsigned components) BST_MUST_CHECK;
 
