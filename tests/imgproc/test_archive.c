@@ -5,7 +5,7 @@
 #include "tests/archive_support.h"
 #include "tests/imgproc/module_support.h"
 
-enum { FRAMES = 12, PERIOD = 1000, HOT = 40, LAST = (FRAMES + 1) * PERIOD };
+enum { FRAMES = 12, PERIOD = 1000, HOT = 40, NEW_STARS = 5, LAST = (FRAMES + 1) * PERIOD };
 
 /* Pixels of the sequence: stars that a dithered pointing moves, one object, hot pixels, charge. */
 typedef struct sequence {
@@ -31,7 +31,7 @@ static bst_status create_and_tell(const bst_module_env *env, const void *config,
 }
 
 static bst_quat attitude(const sequence *s, int64_t tick) {
-    int64_t frame = (tick + PERIOD / 4) / PERIOD - 1; /* slews between the exposures */
+    int64_t frame = (tick + 7 * PERIOD / 10) / PERIOD - 1; /* slews between the exposures */
     return s->q[frame < 0 ? 0 : frame < FRAMES ? frame : FRAMES - 1];
 }
 
@@ -96,23 +96,41 @@ static void no_change(void *owner) {
 static const bst_frame_ops host_frame = {
     .map = map_pixels, .unmap = no_change, .recycle = no_change};
 
+/* Draws stars that no catalogue has and that appear one after the other; the last one drifts. */
+static void draw_new_stars(bench *b, const sequence *s, int frame) {
+    for (int k = 0; k < NEW_STARS; k++) {
+        double x, y;
+        double drift_px = k == NEW_STARS - 1 ? 0.4 * frame : 0.0;
+        bst_vec3 seen =
+            bst_camera_unproject(&b->s.camera, 70.0 + 90.0 * k + drift_px, 455.0 - 7.0 * k);
+        bst_vec3 at = bst_quat_rotate(bst_quat_conj(s->q[0]), seen);
+        if (frame >= (2 + 2 * k) % 9 &&
+            bst_camera_project(&b->s.camera, bst_quat_rotate(s->q[frame], at), &x, &y)) {
+            synthetic_add(&b->s, x, y, 3000.0, 0, 0);
+        }
+    }
+}
+
 /* Draws the frames of the sequence. */
 static void draw(sequence *s) {
     bench b;
     bench_init(&b);
     for (int i = 0; i < FRAMES; i++) {
         const double scale = 12.0 * BST_ARCSEC_RAD;
-        bst_vec3 turn = {(i % 3 - 1) * 7.3 * scale, (i % 4 - 1.5) * 5.7 * scale, 0.0};
+        int at = i == 6 ? 5 : i; /* once the sky rests, and nothing is learned */
+        bst_vec3 turn = {(at % 3 - 1) * 7.3 * scale, (at % 4 - 1.5) * 5.7 * scale, 0.0};
         s->q[i] = bst_quat_mul(bst_quat_from_rotvec(turn), b.o.q_telemetry);
         b.o.q_true = s->q[i];
         onboard_find_stars(&b.o);
         synthetic_clear(&b.s);
         bench_draw_stars(&b);
+        draw_new_stars(&b, s, i);
         s->object_px[i][0] = 150.0 + 11.0 * i;
         s->object_px[i][1] = 200.0 + 6.0 * i;
         synthetic_add(&b.s, s->object_px[i][0], s->object_px[i][1], 4000.0, 0, 0);
         synthetic_add(&b.s, 300.0 + 9.0 * i, 380.0 - 4.0 * i, 2500.0, 14.0, 6.0);
-        for (int k = 0; k < HOT; k++) { /* the same pixels of the sensor in all frames */
+        for (int k = 0; k < (i < 5 ? HOT - 8 : HOT);
+             k++) { /* the same pixels of the sensor in all frames */
             b.s.mean_e[(37 + 11 * k) * ONBOARD_SIDE + (53 + 131 * k) % ONBOARD_SIDE] += 900.0;
         }
         /* charge that does not return */
@@ -196,7 +214,8 @@ static void play_and_restore(const sequence *s, const char *block, int saving_th
     }
     advance(first, LAST);
     assert_int_equal(first->b.count, FRAMES);
-    for (int k = 0; k < FRAMES; k += k < 4 ? 1 : 3) {
+    const test_saved last = test_save(bst_imgproc_module.archive, self);
+    for (int k = 0; k < FRAMES; k += k < 6 ? 1 : 2) {
         run other;
         begin(&other, s, block, k + 1, threads);
         advance(&other, (k + 1) * PERIOD + 1);
@@ -207,8 +226,13 @@ static void play_and_restore(const sequence *s, const char *block, int saving_th
         for (int i = 0; i < other.b.count; i++) {
             expect_same(other.b.kept[i], first->b.kept[k + 1 + i]);
         }
+        const test_saved end = test_save(bst_imgproc_module.archive, module_self);
+        assert_int_equal(end.size, last.size);
+        assert_memory_equal(end.bytes, last.bytes, last.size);
+        free(end.bytes);
         bench_free(&other.b);
     }
+    free(last.bytes);
     for (int k = 0; k < FRAMES; k++) {
         free(saved[k].bytes);
     }
