@@ -88,11 +88,12 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
                                 const bst_motion_map_frame *frame) {
     assert(map && frame);
     if (frame->count > map->capacity) {
+        const int capacity = frame->count + frame->count / 2; /* few later frames need more */
         free(map->turns);
         free(map->places);
-        map->turns = malloc((size_t)frame->count * sizeof *map->turns);
-        map->places = malloc((size_t)frame->count * sizeof *map->places);
-        map->capacity = map->turns && map->places ? frame->count : 0;
+        map->turns = malloc((size_t)capacity * sizeof *map->turns);
+        map->places = malloc((size_t)capacity * sizeof *map->places);
+        map->capacity = map->turns && map->places ? capacity : 0;
         if (map->capacity == 0) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the motion of the field");
         }

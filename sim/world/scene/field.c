@@ -1,6 +1,7 @@
 #include "sim/world/scene/field.h"
 
 #include <assert.h>
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -164,8 +165,14 @@ bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int
         x_px, y_px);
 }
 
+/* Capacity for `count` items and half as many more: few later frames then need another one. */
+static int with_margin(int count) {
+    return count < INT_MAX / 2 ? count + count / 2 : count;
+}
+
 static bst_status reserve_stars(bst_ctx *ctx, bst_field *field, int count) {
     if (count > field->star_capacity) {
+        count = with_margin(count);
         bst_star *more = realloc(field->stars, (size_t)count * sizeof *more);
         if (!more) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d stars", count);
@@ -190,6 +197,7 @@ static bool bodies_in_field(const bst_camera *camera, const bst_scene_surroundin
 
 static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
     if (count > field->source_capacity) {
+        count = with_margin(count);
         bst_scene_source *more = realloc(field->sources, (size_t)count * sizeof *more);
         if (!more) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sources", count);
@@ -202,6 +210,7 @@ static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
 
 static bst_status reserve_parts(bst_ctx *ctx, bst_field *field, int count) {
     if (count > field->part_capacity) {
+        count = with_margin(count);
         free(field->parts);
         field->parts = malloc((size_t)count * sizeof *field->parts);
         field->part_capacity = field->parts ? count : 0;

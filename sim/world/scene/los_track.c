@@ -27,6 +27,7 @@ static bst_status reserve(bst_ctx *ctx, bst_los_track_store *store, int count) {
     if (count <= store->capacity) {
         return BST_OK;
     }
+    count += count / 2; /* few later exposures then need more */
     double *time_s = realloc(store->time_s, (size_t)count * sizeof *time_s);
     store->time_s = time_s ? time_s : store->time_s;
     bst_quat *q = realloc(store->q, (size_t)count * sizeof *q);
