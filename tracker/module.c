@@ -218,13 +218,19 @@ static bst_status step_module(void *self, struct bst_step *step) {
     }
 }
 
+static bst_status archive_module(void *self, bst_archive *archive) {
+    tracker_module *m = self;
+    bst_knowledge_view_archive(m->view, archive);
+    return bst_tracker_archive(m->tracker, archive);
+}
+
 #define DESCRIPTOR(name, what)                                                                   \
     {                                                                                            \
         .abi = BST_MODULE_ABI, .role = "tracker", .type = #name, .flags = BST_MODULE_DEFERRABLE, \
         .doc = "Attitude from stars, " what ", association by name.",                            \
         .config = bst_tracker_config_table, .config_bytes = sizeof(bst_tracker_config),          \
         .ports = ports, .port_count = PORT_COUNT, .create = create_##name, .step = step_module,  \
-        .destroy = destroy                                                                       \
+        .destroy = destroy, .archive = archive_module                                            \
     }
 
 const bst_module_desc bst_tracker_module = DESCRIPTOR(ekf, "extended Kalman filters");

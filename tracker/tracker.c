@@ -153,6 +153,22 @@ void bst_tracker_free(bst_tracker *t) {
     free(t);
 }
 
+/* `cache` is left out: its directions depend on the catalogue alone. */
+bst_status bst_tracker_archive(bst_tracker *t, bst_archive *archive) {
+    BST_ARCHIVE(archive, t->error);
+    bst_attitude_shared_archive(&t->shared, archive);
+    BST_ARCHIVE(archive, t->target);
+    BST_ARCHIVE(archive, t->cue_before);
+    bst_archive_bool(archive, &t->started);
+    bst_archive_bool(archive, &t->attitude_was_lost);
+    BST_ARCHIVE(archive, t->last_exposure_id);
+    BST_ARCHIVE(archive, t->last_tick);
+    if (bst_archive_is_restoring(archive)) {
+        t->event_count = 0;
+    }
+    return bst_mtt_archive(t->mtt, archive);
+}
+
 const bst_tracker_event *bst_tracker_events(const bst_tracker *t, int *count) {
     *count = t->event_count;
     return t->events;

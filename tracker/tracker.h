@@ -6,6 +6,7 @@
 #ifndef BST_TRACKER_TRACKER_H
 #define BST_TRACKER_TRACKER_H
 
+#include "boresight/archive.h"
 #include "boresight/camera.h"
 #include "boresight/config.h"
 #include "boresight/messages.h"
@@ -113,6 +114,12 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
                               bst_tracker **out) BST_MUST_CHECK;
 /* Frees a tracker; NULL is allowed. */
 void bst_tracker_free(bst_tracker *tracker);
+
+/* Saves or restores the state of a tracker, for bst_module_desc.archive. After a restore there are
+ * no events.
+ *
+ * Errors:    BST_ERR_FORMAT for damaged tracks */
+bst_status bst_tracker_archive(bst_tracker *tracker, bst_archive *archive) BST_MUST_CHECK;
 
 /* Checks whether bst_tracker_step will accept a frame: BST_TRACKER_USED, or the reason for refusal.
  * The content is not examined. */

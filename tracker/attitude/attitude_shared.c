@@ -2,6 +2,7 @@
 
 #include <assert.h>
 #include <math.h>
+#include <string.h>
 
 enum { FEWEST_STARS = 4 };
 /* Prior of the ratio: 0.2 of the standard deviation (tests/e2e/test_orbit_consistency.py), with the
@@ -54,4 +55,32 @@ void bst_attitude_shared_update(bst_attitude_shared *shared, const bst_attitude_
 double bst_attitude_shared_get(const bst_attitude_shared *shared) {
     double mean = (PRIOR_SHARE * PRIOR_FRAMES + shared->ratios) / (PRIOR_FRAMES + shared->frames);
     return fmin(fmax(mean, 0.0), 1.0);
+}
+
+/* True if a slot has a star of the latest frame. */
+static bool is_latest(const bst_attitude_shared *shared, int slot) {
+    return shared->frame > 0 && shared->stars[slot].frame == shared->frame;
+}
+
+void bst_attitude_shared_archive(bst_attitude_shared *shared, bst_archive *archive) {
+    BST_ARCHIVE(archive, shared->frame);
+    BST_ARCHIVE(archive, shared->variance_rad2);
+    BST_ARCHIVE(archive, shared->ratios);
+    BST_ARCHIVE(archive, shared->frames);
+    bool restoring = bst_archive_is_restoring(archive);
+    int count = 0, next = 0;
+    for (int i = 0; !restoring && i < BST_ATTITUDE_SHARED_STARS; i++) {
+        count += is_latest(shared, i);
+    }
+    count = bst_archive_count(archive, count, BST_ATTITUDE_SHARED_STARS);
+    if (restoring) {
+        memset(shared->stars, 0, sizeof shared->stars);
+    }
+    for (int k = 0; k < count; k++) {
+        while (!restoring && !is_latest(shared, next)) {
+            next++;
+        }
+        int slot = (int)bst_archive_integer(archive, next++, 0, BST_ATTITUDE_SHARED_STARS - 1);
+        BST_ARCHIVE(archive, shared->stars[slot]);
+    }
 }

@@ -6,6 +6,7 @@
 #ifndef BST_TRACKER_ATTITUDE_ATTITUDE_SHARED_H
 #define BST_TRACKER_ATTITUDE_ATTITUDE_SHARED_H
 
+#include "boresight/archive.h"
 #include "tracker/attitude/attitude.h"
 
 /* Number of stars stored between frames; a power of two. */
@@ -37,5 +38,9 @@ void bst_attitude_shared_update(bst_attitude_shared *shared, const bst_attitude_
 /* Correlation of successive attitude errors about camera x and y, 0 to 1: the mean over about the
  * last 1000 frames, with a prior of 0.04 weighted as 10 frames. */
 double bst_attitude_shared_get(const bst_attitude_shared *shared);
+
+/* Saves or restores the correlation estimate, for bst_module_desc.archive. Of the stars only those
+ * of the latest frame: no others are compared with the next frame. */
+void bst_attitude_shared_archive(bst_attitude_shared *shared, bst_archive *archive);
 
 #endif

@@ -76,6 +76,17 @@ void bst_mtt_pool_index(bst_mtt_pool *pool) {
     bst_mtt_sort(pool->key, pool->order, pool->count);
 }
 
+void bst_mtt_pool_archive(bst_mtt_pool *pool, int capacity, bst_archive *archive) {
+    BST_ARCHIVE(archive, pool->seconds);
+    BST_ARCHIVE(archive, pool->tick);
+    pool->count = bst_archive_count(archive, pool->count, capacity);
+    bst_archive_bytes(archive, pool->items, (size_t)pool->count * sizeof *pool->items);
+    bst_archive_bytes(archive, pool->used, (size_t)pool->count * sizeof *pool->used);
+    if (bst_archive_is_restoring(archive)) {
+        bst_mtt_pool_index(pool); /* the order depends on the items alone */
+    }
+}
+
 /* First sorted position whose key is at least `key` (binary search). */
 static int lower_bound(const bst_mtt_pool *pool, double key) {
     int low = 0, high = pool->count;

@@ -21,6 +21,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "boresight/archive.h"
 #include "boresight/messages.h"
 #include "boresight/status.h"
 #include "tracker/mtt/filter.h"
@@ -227,6 +228,11 @@ typedef struct bst_mtt bst_mtt;
 bst_status bst_mtt_create(bst_ctx *ctx, const bst_mtt_params *params, bst_mtt **out) BST_MUST_CHECK;
 /* Frees a multi-target tracker; NULL is allowed. */
 void bst_mtt_free(bst_mtt *mtt);
+
+/* Saves or restores all tracks, for bst_module_desc.archive. After a restore there are no events.
+ *
+ * Errors:    BST_ERR_FORMAT for damaged tracks */
+bst_status bst_mtt_archive(bst_mtt *mtt, bst_archive *archive) BST_MUST_CHECK;
 
 /* Processes one frame; frames must be in ascending order of time. Detections beyond max_detections
  * are ignored and counted by bst_mtt_lost. */

@@ -2,6 +2,7 @@
 #ifndef BST_TRACKER_MTT_MULTITARGET_INTERNAL_H
 #define BST_TRACKER_MTT_MULTITARGET_INTERNAL_H
 
+#include "boresight/archive.h"
 #include "sim/core/arena.h"
 #include "tracker/mtt/assignment.h"
 #include "tracker/mtt/multitarget.h"
@@ -86,6 +87,10 @@ struct bst_mtt {
 
 /* Takes the arrays of a pool for `capacity` detections from an arena. */
 void bst_mtt_pool_lay_out(bst_mtt_pool *pool, int capacity, bst_arena *arena);
+/* Saves or restores a pool.
+ *
+ * Given:     capacity  as in bst_mtt_pool_lay_out */
+void bst_mtt_pool_archive(bst_mtt_pool *pool, int capacity, bst_archive *archive);
 /* Heap sort of `count` keys, ascending, and of what goes with them: in place, no worst case, no
  * library sort that may allocate. */
 void bst_mtt_sort(double *key, int *order, int count);
