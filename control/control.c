@@ -102,6 +102,72 @@ bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_contro
     return start_compensator(ctx, control);
 }
 
+/* Saves or restores the search and its current tile. */
+static void archive_search(bst_control *c, bst_archive *archive) {
+    bst_search_archive(&c->search, archive);
+    c->search_step =
+        (int32_t)bst_archive_integer(archive, c->search_step, 0, BST_SEARCH_MAX_TILES - 1);
+    c->search_mode = (int)bst_archive_integer(archive, c->search_mode, 0, BST_MODE_COUNT - 1);
+    bst_archive_bool(archive, &c->search_in_region);
+    BST_ARCHIVE(archive, c->tile_gcrf);
+    BST_ARCHIVE(archive, c->tile_rate_radps);
+    BST_ARCHIVE(archive, c->search_x_gcrf);
+    BST_ARCHIVE(archive, c->tile_tick);
+    BST_ARCHIVE(archive, c->arrival_tick);
+    BST_ARCHIVE(archive, c->frames);
+    BST_ARCHIVE(archive, c->search_since_tick);
+}
+
+/* Saves or restores the mode and the tracks on which it acts. */
+static void archive_mode(bst_control *c, bst_archive *archive) {
+    c->mode = (int)bst_archive_integer(archive, c->mode, 0, BST_MODE_COUNT - 1);
+    BST_ARCHIVE(archive, c->mode_tick);
+    BST_ARCHIVE(archive, c->env.region); /* bst_control_retarget changes it */
+    BST_ARCHIVE(archive, c->held);
+    BST_ARCHIVE(archive, c->lost);
+    BST_ARCHIVE(archive, c->lost_tick);
+    BST_ARCHIVE(archive, c->watch);
+    bst_archive_bool(archive, &c->gave_up);
+    BST_ARCHIVE(archive, c->target_id);
+    BST_ARCHIVE(archive, c->rejected_id);
+    BST_ARCHIVE(archive, c->newest_id);
+    BST_ARCHIVE(archive, c->frame_tick);
+    BST_ARCHIVE(archive, c->frame_interval_ticks);
+    BST_ARCHIVE(archive, c->stare_gcrf);
+    bst_archive_bool(archive, &c->stare_valid);
+}
+
+/* Saves or restores the newest telemetry. */
+static void archive_telemetry(bst_control *c, bst_archive *archive) {
+    BST_ARCHIVE(archive, c->nav);
+    BST_ARCHIVE(archive, c->aberration);
+    bst_archive_bool(archive, &c->nav_valid);
+    BST_ARCHIVE(archive, c->pointing);
+    bst_archive_bool(archive, &c->pointing_valid);
+    bst_archive_bool(archive, &c->settled);
+    BST_ARCHIVE(archive, c->q_body_from_gcrf);
+    BST_ARCHIVE(archive, c->body_tick);
+    BST_ARCHIVE(archive, c->body_rate_radps);
+}
+
+/* The caches are saved, because a cached aim depends on the navigation message at its first use. */
+bst_status bst_control_archive(bst_control *c, bst_archive *archive) {
+    archive_mode(c, archive);
+    archive_search(c, archive);
+    archive_telemetry(c, archive);
+    bst_pointing_error_archive(&c->pointing_error, archive);
+    bst_model_error_archive(&c->model_error, archive);
+    BST_ARCHIVE(archive, c->aimed);
+    BST_ARCHIVE(archive, c->pieces);
+    if (bst_archive_is_restoring(archive)) {
+        c->transition_count = 0;
+    }
+    if (on_image_error(c)) {
+        BST_TRY(bst_image_loop_archive(&c->image_loop, archive));
+    }
+    return bst_guidance_archive(&c->guidance, archive);
+}
+
 /* Updates the body attitude and its rate, low-pass filtered against noise of the attitude estimate.
  */
 static void update_body_attitude(bst_control *c, int64_t tick, bst_quat q) {

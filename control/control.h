@@ -207,6 +207,12 @@ bst_status bst_control_observer_density(bst_ctx *ctx, const bst_control_config *
 bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_control_config *config,
                             const bst_control_env *env) BST_MUST_CHECK;
 
+/* Saves or restores the state of a controller, for bst_module_desc.archive. Transitions and events
+ * are not saved: the caller clears them after each update.
+ *
+ * Errors:    those of bst_guidance_archive and bst_image_loop_archive */
+bst_status bst_control_archive(bst_control *control, bst_archive *archive) BST_MUST_CHECK;
+
 /* Updates the controller with telemetry; NULL: no new message. */
 void bst_control_telemetry(bst_control *control, const bst_pointing_telemetry *pointing,
                            const bst_nav_telemetry *nav);

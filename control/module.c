@@ -164,6 +164,13 @@ static bst_status step(void *self, struct bst_step *s) {
     return BST_OK;
 }
 
+static bst_status archive_control(void *self, bst_archive *archive) {
+    module *m = self;
+    bst_knowledge_view_archive(m->view, archive);
+    bst_archive_bool(archive, &m->sensor_told);
+    return bst_control_archive(&m->control, archive);
+}
+
 const bst_module_desc bst_control_standard_module = {
     .abi = BST_MODULE_ABI,
     .role = "control",
@@ -179,4 +186,5 @@ const bst_module_desc bst_control_standard_module = {
     .create = create,
     .step = step,
     .destroy = destroy,
+    .archive = archive_control,
 };

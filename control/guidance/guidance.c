@@ -24,6 +24,70 @@ void bst_guidance_init(bst_guidance *g, const bst_guidance_config *config,
         .config = *config, .env = *env, .told_from_s = INFINITY, .told_until_s = INFINITY};
 }
 
+/* True if the numbers by which arrays of a slew are accessed are in range. */
+static bool is_intact_slew(const bst_guidance_slew *slew) {
+    return slew->path.count >= 0 && slew->path.count <= BST_PATH_ARCS && slew->speed.count >= 0 &&
+           slew->speed.count <= BST_SLEW_NODES && (!slew->along_path || slew->speed.count >= 2);
+}
+
+/* Saves or restores the slew in progress; none: all zero. */
+static bst_status archive_slew(bst_guidance_slew *slew, bst_archive *archive) {
+    bool active = slew->active;
+    bst_archive_bool(archive, &active);
+    if (active) {
+        BST_ARCHIVE(archive, *slew);
+    }
+    if (!active && bst_archive_is_restoring(archive)) {
+        *slew = (bst_guidance_slew){.active = false};
+    }
+    return is_intact_slew(slew)
+               ? BST_OK
+               : bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                          "the saved slew of the guidance is damaged: %d arcs, %d nodes",
+                          slew->path.count, slew->speed.count);
+}
+
+/* Sets the keep-out cones from `nav`. */
+static void set_zones(bst_guidance *g) {
+    g->zone_count = bst_guidance_zones(g, &g->nav, g->zones);
+    for (int i = 0; i < g->zone_count; i++) {
+        double *half = &g->zones[i].half_angle_rad;
+        *half = fmin(*half + WIDER_RAD, BST_PI - 1e-6);
+    }
+}
+
+/* `nodes` is the work space of one plan. */
+bst_status bst_guidance_archive(bst_guidance *g, bst_archive *archive) {
+    BST_ARCHIVE(archive, g->mount);
+    bst_archive_bool(archive, &g->mount_known);
+    BST_ARCHIVE(archive, g->nav);
+    bst_archive_bool(archive, &g->nav_known);
+    bst_archive_bool(archive, &g->commanded);
+    BST_ARCHIVE(archive, g->last);
+    BST_TRY(archive_slew(&g->slew, archive));
+    bst_archive_bool(archive, &g->near_known);
+    BST_ARCHIVE(archive, g->near_rad);
+    BST_ARCHIVE(archive, g->near_body);
+    g->reach = (int)bst_archive_integer(archive, g->reach, 0, BST_REACH_COUNT - 1);
+    bst_archive_bool(archive, &g->no_way);
+    BST_ARCHIVE(archive, g->ahead_tick);
+    bst_archive_bool(archive, &g->roll_given);
+    BST_ARCHIVE(archive, g->roll_rad);
+    BST_ARCHIVE(archive, g->told_from_s);
+    BST_ARCHIVE(archive, g->told_until_s);
+    if (bst_archive_is_restoring(archive)) {
+        g->event_count = g->zone_count = 0;
+        if (g->nav_known) {
+            set_zones(g);
+        }
+    }
+    return g->mount.axes >= 0 && g->mount.axes <= BST_MOUNT_AXES
+               ? BST_OK
+               : bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                          "the saved mount of the guidance has %d axes, 0 to %d are allowed",
+                          (int)g->mount.axes, BST_MOUNT_AXES);
+}
+
 void bst_guidance_telemetry(bst_guidance *g, const bst_mount_status *mount) {
     if (mount) {
         g->mount = *mount;
@@ -419,11 +483,7 @@ void bst_guidance_see_sky(bst_guidance *g, const bst_nav_telemetry *nav, bst_qua
     g->nav.velocity_gcrf_mps = bst_quat_rotate(error, nav->velocity_gcrf_mps);
     g->nav.sun_m = bst_quat_rotate(error, nav->sun_m);
     g->nav.moon_m = bst_quat_rotate(error, nav->moon_m);
-    g->zone_count = bst_guidance_zones(g, &g->nav, g->zones);
-    for (int i = 0; i < g->zone_count; i++) {
-        double *half = &g->zones[i].half_angle_rad;
-        *half = fmin(*half + WIDER_RAD, BST_PI - 1e-6);
-    }
+    set_zones(g);
 }
 
 bst_status bst_guidance_command(bst_ctx *ctx, bst_guidance *g, const bst_vec3 *boresight,

@@ -2,6 +2,7 @@
 #ifndef BST_CONTROL_GUIDANCE_GUIDANCE_H
 #define BST_CONTROL_GUIDANCE_GUIDANCE_H
 
+#include "boresight/archive.h"
 #include "boresight/config.h"
 #include "boresight/messages.h"
 #include "control/guidance/keep_out.h"
@@ -100,6 +101,12 @@ typedef struct bst_guidance {
 /* Initialises guidance; configuration and environment are copied. */
 void bst_guidance_init(bst_guidance *guidance, const bst_guidance_config *config,
                        const bst_guidance_env *env);
+
+/* Saves or restores the state of guidance, for bst_module_desc.archive, with a slew in progress.
+ * Events are not saved: the caller clears them after each command.
+ *
+ * Errors:    BST_ERR_FORMAT for a damaged slew or mount */
+bst_status bst_guidance_archive(bst_guidance *guidance, bst_archive *archive) BST_MUST_CHECK;
 
 /* Updates the status of the mount; NULL: no new status. */
 void bst_guidance_telemetry(bst_guidance *guidance, const bst_mount_status *mount);

@@ -47,6 +47,19 @@ bst_status bst_image_loop_init(bst_ctx *ctx, bst_image_loop *loop,
     return BST_OK;
 }
 
+bst_status bst_image_loop_archive(bst_image_loop *loop, bst_archive *archive) {
+    for (int a = 0; a < 3; a++) {
+        BST_TRY(bst_compensator_archive(&loop->axis[a], archive));
+    }
+    bst_aim_history_archive(&loop->aims, archive);
+    BST_ARCHIVE(archive, loop->slew_tick);
+    bst_archive_bool(archive, &loop->slewing);
+    BST_ARCHIVE(archive, loop->rest_tick);
+    BST_ARCHIVE(archive, loop->frame_tick);
+    bst_archive_bool(archive, &loop->coasting);
+    return BST_OK;
+}
+
 /* Sets error and rate of the correction at a tick. */
 static void set_correction(bst_image_loop *loop, bst_pointing_error *correction,
                            int64_t effect_tick, const double u[3]) {

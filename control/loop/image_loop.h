@@ -43,6 +43,11 @@ bst_status bst_image_loop_init(bst_ctx *ctx, bst_image_loop *loop,
                                const bst_compensator_config *config,
                                const bst_image_loop_env *env) BST_MUST_CHECK;
 
+/* Saves or restores the loop, for bst_module_desc.archive.
+ *
+ * Errors:    those of bst_compensator_archive */
+bst_status bst_image_loop_archive(bst_image_loop *loop, bst_archive *archive) BST_MUST_CHECK;
+
 /* Stores the command that takes effect at a tick.
  *
  * Given:     effect_tick   tick at which the command takes effect

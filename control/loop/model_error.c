@@ -25,6 +25,24 @@ void bst_model_error_init(bst_model_error *error, const bst_model_error_env *env
     error->spacing_ticks = ticks_of(error, reach_s / (BST_MODEL_ERROR_SAMPLES / 2));
 }
 
+void bst_model_error_archive(bst_model_error *error, bst_archive *archive) {
+    if (!error->active) {
+        return;
+    }
+    bst_aim_history_archive(&error->aims, archive);
+    bst_archive_bool(archive, &error->slewing);
+    BST_ARCHIVE(archive, error->slew_tick);
+    error->telemetry = bst_archive_integer(archive, error->telemetry, 0, INT64_MAX);
+    error->kept = bst_archive_integer(archive, error->kept, 0, INT64_MAX / 2);
+    size_t stored =
+        error->kept < BST_MODEL_ERROR_SAMPLES ? (size_t)error->kept : BST_MODEL_ERROR_SAMPLES;
+    bst_archive_bytes(archive, error->items, stored * sizeof *error->items);
+    BST_ARCHIVE(archive, error->frames);
+    bst_archive_bool(archive, &error->begun);
+    BST_ARCHIVE(archive, error->origin);
+    BST_ARCHIVE(archive, error->estimate);
+}
+
 bst_quat bst_model_error_correction(const bst_model_error *error,
                                     const bst_pointing_error *observer, int64_t tick,
                                     double tick_rate_hz) {

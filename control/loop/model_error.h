@@ -45,6 +45,9 @@ typedef struct bst_model_error_env {
 /* Initialises a model error: a wrong gain or a late model. Inactive for gain 1 and no delay. */
 void bst_model_error_init(bst_model_error *error, const bst_model_error_env *env);
 
+/* Saves or restores a model error, for bst_module_desc.archive. */
+void bst_model_error_archive(bst_model_error *error, bst_archive *archive);
+
 /* Updates the model error with a commanded direction, as bst_pointing_error_uncorrect. */
 void bst_model_error_commanded(bst_model_error *error, const bst_pointing_error *observer,
                                int64_t effect_tick, int64_t half_ticks,

@@ -21,6 +21,18 @@ void bst_pointing_error_init(bst_pointing_error *e, double disturbance_rms_rad,
         .error = BST_QUAT_IDENTITY};
 }
 
+void bst_pointing_error_archive(bst_pointing_error *e, bst_archive *archive) {
+    bst_archive_bool(archive, &e->started);
+    BST_ARCHIVE(archive, e->tick);
+    BST_ARCHIVE(archive, e->error);
+    BST_ARCHIVE(archive, e->rate_gcrf_radps);
+    BST_ARCHIVE(archive, e->p_ee);
+    BST_ARCHIVE(archive, e->p_er);
+    BST_ARCHIVE(archive, e->p_rr);
+    BST_ARCHIVE(archive, e->taken);
+    BST_ARCHIVE(archive, e->rejected);
+}
+
 static bst_quat predicted(const bst_pointing_error *e, double dt) {
     return bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(e->rate_gcrf_radps, dt)), e->error);
 }

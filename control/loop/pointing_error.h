@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "boresight/archive.h"
 #include "boresight/messages.h"
 
 /* q_true = q_telemetry * error, so that the camera looks at the true (inertial) direction s when
@@ -46,6 +47,9 @@ typedef struct bst_pointing_error {
 void bst_pointing_error_init(bst_pointing_error *e, double disturbance_rms_rad,
                              double disturbance_cutoff_hz, double sigma_floor_rad,
                              double initial_sigma_rad, double initial_rate_sigma_radps);
+
+/* Saves or restores the observer's state, for bst_module_desc.archive. */
+void bst_pointing_error_archive(bst_pointing_error *e, bst_archive *archive);
 
 /* Updates the observer with an attitude fix. Invalid fixes and fixes older than the state are
  * ignored. A fix off by more than 8 sigma is rejected, but not more than three in a row; then the

@@ -15,6 +15,16 @@ void bst_aim_history_init(bst_aim_history *history, double tick_rate_hz, double 
         (int64_t)ceil(reach_s * tick_rate_hz / (BST_AIM_HISTORY_SAMPLES - SPARE));
 }
 
+void bst_aim_history_archive(bst_aim_history *history, bst_archive *archive) {
+    bst_archive_bool(archive, &history->any);
+    history->kept =
+        bst_archive_integer(archive, history->kept, history->any ? 1 : 0, INT64_MAX / 2);
+    BST_ARCHIVE(archive, history->last);
+    size_t stored =
+        history->kept < BST_AIM_HISTORY_SAMPLES ? (size_t)history->kept : BST_AIM_HISTORY_SAMPLES;
+    bst_archive_bytes(archive, history->items, stored * sizeof *history->items);
+}
+
 static bst_aim_sample *item(bst_aim_history *history, int64_t i) {
     return &history->items[i % BST_AIM_HISTORY_SAMPLES];
 }

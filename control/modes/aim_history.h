@@ -5,6 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "boresight/archive.h"
 #include "boresight/vec.h"
 
 enum { BST_AIM_HISTORY_SAMPLES = 256 };
@@ -28,6 +29,9 @@ typedef struct bst_aim_history {
 
 /* Initialises an empty history for look-ups up to reach_s before the latest sample. */
 void bst_aim_history_init(bst_aim_history *history, double tick_rate_hz, double reach_s);
+
+/* Saves or restores a history, for bst_module_desc.archive. */
+void bst_aim_history_archive(bst_aim_history *history, bst_archive *archive);
 
 /* Latest sample extrapolated to a tick at its rate; false if there is none. */
 bool bst_aim_history_predict(const bst_aim_history *history, int64_t tick, bst_vec3 *out);

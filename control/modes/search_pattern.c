@@ -116,3 +116,9 @@ double bst_search_sweep_s(const bst_search *search, const bst_search_timing *t) 
     }
     return periods * t->period_s;
 }
+
+void bst_search_archive(bst_search *search, bst_archive *archive) {
+    search->count = bst_archive_count(archive, search->count, BST_SEARCH_MAX_TILES);
+    bst_archive_bool(archive, &search->complete);
+    bst_archive_bytes(archive, search->tile, (size_t)search->count * sizeof *search->tile);
+}

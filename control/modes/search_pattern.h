@@ -4,6 +4,8 @@
 
 #include <stdbool.h>
 
+#include "boresight/archive.h"
+
 #define BST_SEARCH_MAX_TILES 1023
 
 /* Order of the tiles of a grid. */
@@ -37,6 +39,9 @@ typedef struct bst_search {
 
 /* Plans a grid of tiles, centred on the area, that covers it completely. */
 void bst_search_plan(bst_search *search, bst_search_pattern pattern, const bst_search_area *area);
+
+/* Saves or restores the tiles of a search, for bst_module_desc.archive. */
+void bst_search_archive(bst_search *search, bst_archive *archive);
 
 /* Largest field, aligned with the area, that fits in the camera's field of width by height rotated
  * by `turn_rad`. Its sides have the camera's proportion (inverse for rotations nearer to a quarter

@@ -122,6 +122,52 @@ void bst_tasking_free(bst_tasking *t) {
     *t = (bst_tasking){.sensor_count = 0};
 }
 
+/* Saves or restores the task of a sensor, and its newest navigation and mount. */
+static bst_status archive_sensor(bst_tasking *t, int sensor, bst_archive *archive) {
+    bst_tasking_sensor *s = &t->sensors[sensor];
+    bst_knowledge_view_archive(s->view, archive);
+    bst_archive_bool(archive, &s->nav_known);
+    bst_archive_bool(archive, &s->mount_known);
+    BST_ARCHIVE(archive, s->nav);
+    BST_ARCHIVE(archive, s->mount);
+    BST_ARCHIVE(archive, s->task);
+    bst_archive_bool(archive, &s->pointed);
+    BST_ARCHIVE(archive, s->direction);
+    BST_ARCHIVE(archive, s->given_s);
+    BST_ARCHIVE(archive, s->arrival_s);
+    BST_ARCHIVE(archive, s->frames);
+    BST_ARCHIVE(archive, s->frames_wanted);
+    BST_ARCHIVE(archive, s->last_seen_s);
+    BST_ARCHIVE(archive, s->next_plan_s);
+    BST_ARCHIVE(archive, s->quiet_until);
+    if (bst_archive_is_restoring(archive) && s->nav_known) {
+        const bst_nav_telemetry nav = s->nav;
+        bst_tasking_telemetry(t, sensor, &nav, NULL); /* the keep-out zones */
+    }
+    if (s->task.object < -1 || s->task.object >= t->object_count || s->mount.axes < 0 ||
+        s->mount.axes > BST_MOUNT_AXES) {
+        return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                        "the saved task of sensor %d is damaged, or that of another scenario: "
+                        "object %d of %d, a mount with %d axes",
+                        sensor, (int)s->task.object, t->object_count, (int)s->mount.axes);
+    }
+    return BST_OK;
+}
+
+/* `place_m` and `choices` are the work space of one plan; `line` follows from the list. */
+bst_status bst_tasking_archive(bst_tasking *t, bst_archive *archive) {
+    size_t objects = (size_t)t->object_count;
+    bst_archive_bytes(archive, t->seen_s, objects * sizeof *t->seen_s);
+    bst_archive_bytes(archive, t->holder, objects * sizeof *t->holder);
+    bst_archive_bytes(archive, t->not_before,
+                      objects * (size_t)t->sensor_count * sizeof *t->not_before);
+    BST_ARCHIVE(archive, t->next_report_s);
+    for (int i = 0; i < t->sensor_count; i++) {
+        BST_TRY(archive_sensor(t, i, archive));
+    }
+    return BST_OK;
+}
+
 void bst_tasking_tracks(bst_tasking *t, int sensor, const bst_tracks *tracks) {
     assert(t && tracks && sensor >= 0 && sensor < t->sensor_count);
     bst_tasking_sensor *s = &t->sensors[sensor];

@@ -11,6 +11,7 @@
 #ifndef BST_CONTROL_TASKING_TASKING_H
 #define BST_CONTROL_TASKING_TASKING_H
 
+#include "boresight/archive.h"
 #include "boresight/config.h"
 #include "boresight/module.h"
 #include "control/guidance/keep_out.h"
@@ -117,6 +118,11 @@ bst_status bst_tasking_init(bst_ctx *ctx, bst_tasking *tasking, const bst_taskin
                             double tick_rate_hz) BST_MUST_CHECK;
 /* Frees the memory of the tasking and clears the struct, which belongs to the caller. */
 void bst_tasking_free(bst_tasking *tasking);
+
+/* Saves or restores the tasks and observations of all sensors, for bst_module_desc.archive.
+ *
+ * Errors:    BST_ERR_FORMAT for a task on an object that does not exist, or a damaged mount */
+bst_status bst_tasking_archive(bst_tasking *tasking, bst_archive *archive) BST_MUST_CHECK;
 
 /* Updates navigation and mount of a sensor; NULL: no new message. */
 void bst_tasking_telemetry(bst_tasking *tasking, int sensor, const bst_nav_telemetry *nav,

@@ -89,6 +89,10 @@ static bst_status step(void *self, struct bst_step *s) {
     return report(t, s);
 }
 
+static bst_status archive_tasks(void *self, bst_archive *archive) {
+    return bst_tasking_archive(self, archive);
+}
+
 const bst_module_desc bst_tasking_priority_module = {
     .abi = BST_MODULE_ABI,
     .role = "tasking",
@@ -105,4 +109,5 @@ const bst_module_desc bst_tasking_priority_module = {
     .create = create,
     .step = step,
     .destroy = destroy,
+    .archive = archive_tasks,
 };

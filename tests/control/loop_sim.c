@@ -3,7 +3,7 @@
 
 #include <stdlib.h>
 
-#include "tests/test_support.h"
+#include "tests/archive_support.h"
 
 #define MU 3.986004418e14
 
@@ -264,6 +264,30 @@ static void measure(const scene *s, const exposure *x, tracker *k, int64_t frame
     }
 }
 
+static bst_status archive_control(void *control, bst_archive *archive) {
+    return bst_control_archive(control, archive);
+}
+
+/* Replaces control by a new one with its saved state. */
+static void restore_control(bst_ctx *ctx, bst_control *control) {
+    const bst_control_config config = control->config;
+    const bst_control_env env = control->env;
+    test_saved saved = test_save(archive_control, control);
+    memset(control, 0xa5, sizeof *control);
+    bst_assert_ok(ctx, bst_control_init(ctx, control, &config, &env));
+    bst_assert_ok(ctx, test_restore(ctx, archive_control, control, saved));
+    free(saved.bytes);
+}
+
+static uint64_t hash_command(uint64_t hash, const bst_los_command *c) {
+    const bst_vec3 parts[] = {c->direction_gcrf, c->rate_gcrf_radps, c->accel_gcrf_radps2};
+    const unsigned char *bytes = (const unsigned char *)parts;
+    for (size_t i = 0; i < sizeof parts; i++) {
+        hash = (hash ^ bytes[i]) * UINT64_C(0x100000001B3); /* FNV-1a */
+    }
+    return hash;
+}
+
 enum { WAY = 256, PENDING = 8 }; /* commands and messages on their way */
 
 void sim_run(const sim_options *o, sim_result *r) {
@@ -309,6 +333,12 @@ void sim_run(const sim_options *o, sim_result *r) {
                            .cue_at = cue_at,
                            .cue_direction_at = cue_direction_at,
                            .cue_user = &s};
+    if (o->configure) {
+        o->configure(&control_config);
+        env.frame_exposure_s = 0.5;
+        env.frame_period_s = 1.0;
+        env.frame_latency_s = o->frame_delay_s;
+    }
     bst_assert_ok(&ctx, bst_control_init(&ctx, &control, &control_config, &env));
 
     int64_t steps = llround(o->duration_s / dt);
@@ -320,7 +350,8 @@ void sim_run(const sim_options *o, sim_result *r) {
     }
     bst_pointing_telemetry *telemetry = calloc(1, sizeof *telemetry + sizeof(bst_pointing_sample));
     assert_true(errors && telemetry);
-    *r = (sim_result){.confirmed_s = INFINITY};
+    *r = (sim_result){.confirmed_s = INFINITY, .command_hash = UINT64_C(0xCBF29CE484222325)};
+    int64_t updates = 0;
     tracker tracker_state = {0};
     exposure x = {0};
     /* commands on their way: visible 0.1 s after they were published */
@@ -398,12 +429,16 @@ void sim_run(const sim_options *o, sim_result *r) {
         /* control at 20 Hz and whenever tracks arrive */
         bool due = taken < measured && tick >= pending_tick[taken % PENDING];
         if (tick % control_period == 0 || due) {
-            telemetry->written = 1;
+            telemetry->written++;
             telemetry->capacity = 1;
             telemetry->settled = plant.settled;
             telemetry->limited = plant.limited;
             telemetry->items[0] =
                 (bst_pointing_sample){.tick = tick, .q_cam_from_gcrf = plant.q_measured_from_gcrf};
+            if (o->restore_every > 0 && ++updates % o->restore_every == 0) {
+                restore_control(&ctx, &control);
+                r->restored++;
+            }
             bst_control_telemetry(&control, telemetry, &nav);
             static bst_control was_control;
             was_control = control;
@@ -420,6 +455,7 @@ void sim_run(const sim_options *o, sim_result *r) {
             if (commanded) {
                 way[sent % WAY].tick = tick;
                 way[sent++ % WAY].command = command;
+                r->command_hash = hash_command(r->command_hash, &command);
             }
             for (int i = 0; i < control.transition_count; i++) {
                 int to = control.transitions[i].to;

@@ -34,6 +34,10 @@ typedef struct sim_options {
     double control_rate_hz;
     double search_timeout_s;
     int search_pattern; /* bst_search_pattern */
+    void (*configure)(
+        bst_control_config *config); /* changes control's configuration; may be NULL */
+    /* control is saved and restored into a new one after so many updates; 0: never */
+    int restore_every;
 } sim_options;
 
 typedef struct sim_result {
@@ -48,7 +52,9 @@ typedef struct sim_result {
     double worst_jump_px; /* of the command at a change of mode to track */
     double sweep_s;    /* from the first search's beginning until it began again; 0: it did not */
     bst_search search; /* its places */
-    double worst_bump_px; /* at any change of mode: what the command moved less what the aim did */
+    int restored;      /* number of restores */
+    uint64_t command_hash; /* of all commands, bit by bit */
+    double worst_bump_px;  /* at any change of mode: what the command moved less what the aim did */
 } sim_result;
 
 sim_options sim_defaults(void);

@@ -1,6 +1,7 @@
 /* The rule that gives sensors their targets, on a small catalogue. */
 #include "control/tasking/tasking.h"
 #include "sim/onboard/knowledge.h"
+#include "tests/archive_support.h"
 #include "tests/world/world_support.h"
 
 #define FILE_ "\"elements_file\": \"scenarios/catalogue_2022-06.tle\""
@@ -428,6 +429,74 @@ static void a_survey_counts_every_target_once(void **state) {
     tear_down(&f);
 }
 
+static bst_status archive_tasking(void *tasking, bst_archive *archive) {
+    return bst_tasking_archive(tasking, archive);
+}
+
+/* Replaces a tasking by a new one with its saved state. */
+static void restore(fixture *f) {
+    test_saved saved = test_save(archive_tasking, &f->tasking);
+    bst_tasking_free(&f->tasking);
+    bst_assert_ok(&f->ctx, bst_tasking_init(&f->ctx, &f->tasking, &f->config, f->members, 2, 10.0));
+    bst_assert_ok(&f->ctx, test_restore(&f->ctx, archive_tasking, &f->tasking, saved));
+    free(saved.bytes);
+}
+
+static const char busy_list[] =
+    "{\"targets\": [{\"frames\": 3, \"revisit_s\": 60}], \"min_snr\": 0, \"sun_keep_out_deg\": "
+    "40, \"max_rate_arcsec_per_s\": 1e6, \"find_timeout_s\": 20, \"retry_s\": 30}";
+
+/* A tasking that is saved and restored before every plan gives the tasks that another one does. */
+static void a_tasking_is_saved_and_restored(void **state) {
+    (void)state;
+    fixture f, g;
+    start(&f, busy_list);
+    start(&g, busy_list);
+    int tasks = 0, lost = 0;
+    for (int64_t tick = 0; tick < 6000; tick += 20) {
+        for (int s = 0; s < 2; s++) {
+            restore(&g);
+            if (tick % 100 == 0 && f.tasking.sensors[s].task.object % 2 == 0) {
+                tell_tracked(&f, s, tick);
+                tell_tracked(&g, s, tick);
+            }
+            bool given = plan(&f, s, tick);
+            assert_int_equal(plan(&g, s, tick), given);
+            const bst_tasking_sensor *a = &f.tasking.sensors[s], *b = &g.tasking.sensors[s];
+            assert_memory_equal(&a->task, &b->task, sizeof a->task);
+            assert_int_equal(a->quiet_until, b->quiet_until);
+            tasks += given;
+            lost += given && a->task.before != BST_TASK_DONE && a->task.before != BST_TASK_NONE;
+        }
+    }
+    print_message("%d tasks, %d before them not done\n", tasks, lost);
+    assert_true(tasks > 5 && lost > 0);
+    bst_tasking_report a, b;
+    bst_assert_ok(&f.ctx, bst_tasking_survey(&f.ctx, &f.tasking, 600.0, &a));
+    bst_assert_ok(&g.ctx, bst_tasking_survey(&g.ctx, &g.tasking, 600.0, &b));
+    assert_memory_equal(&a, &b, sizeof a);
+    tear_down(&f);
+    tear_down(&g);
+}
+
+static void damaged_tasks_are_refused(void **state) {
+    (void)state;
+    fixture f;
+    start(&f, busy_list);
+    (void)plan(&f, 0, 10);
+    test_saved saved = test_save(archive_tasking, &f.tasking);
+    test_restore_damaged(archive_tasking, &f.tasking, saved, 1);
+    free(saved.bytes);
+    bst_archive *archive;
+    bst_assert_ok(&f.ctx, bst_archive_create(&f.ctx, &archive));
+    f.tasking.sensors[1].task.object = f.tasking.object_count;
+    assert_int_equal(bst_tasking_archive(&f.tasking, archive), BST_ERR_FORMAT);
+    assert_non_null(strstr(f.ctx.message, "task of sensor 1"));
+    bst_archive_free(archive);
+    f.tasking.sensors[1].task.object = -1;
+    tear_down(&f);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(earth_and_sun_are_where_the_geometry_has_them),
@@ -441,6 +510,8 @@ int main(void) {
         cmocka_unit_test(quiet_times_are_kept),
         cmocka_unit_test(priority_and_waiting_decide),
         cmocka_unit_test(a_survey_counts_every_target_once),
+        cmocka_unit_test(a_tasking_is_saved_and_restored),
+        cmocka_unit_test(damaged_tasks_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
