@@ -8,6 +8,8 @@
 #include "obsgen/identify.h"
 #include "obsgen/model/psf_bound.h"
 #include "obsgen/obsgen.h"
+#include "obsgen/pending_exposure.h"
+#include "sim/core/invariant.h"
 #include "sim/messages/message_invariants.h"
 #include "sim/onboard/knowledge.h"
 #include "sim/optics/column_level.h"
@@ -89,19 +91,6 @@ static const bst_port ports[PORT_COUNT] = {
     [PORT_DETECTIONS] = {BST_CHANNEL_DETECTIONS, BST_PORT_OUT, 0, 0.0, 2048},
 };
 
-/* Truth of an exposure until it is processed. */
-typedef struct pending {
-    int64_t exposure_id; /* -1: none */
-    bst_truth *truth;
-    int room;
-    double sigma_px;
-    bst_response response; /* valid if `own_response` */
-    bst_crlb_table image_bound, onboard_bound;
-    bool own_response;             /* one of the PSFs is not Gaussian */
-    double *path_x_px, *path_y_px; /* of a star at the window's centre, minus its mean */
-    int path_count, path_room;
-} pending;
-
 /* Largest number of pending exposures and of stored path steps. */
 enum { PENDING = 16, MOST_STEPS = 1024 };
 /* Relative change of the PSF width above which its bound is tabulated anew. */
@@ -126,7 +115,7 @@ typedef struct obsgen {
     int bound_binning;
     int response_binning;
     bst_optics_photometer photometer;
-    pending waiting[PENDING];
+    bst_obsgen_pending waiting[PENDING];
 } obsgen;
 
 static void destroy(void *self) {
@@ -140,9 +129,7 @@ static void destroy(void *self) {
     bst_psf_free(o->psf);
     bst_optics_photometer_free(&o->photometer);
     for (int i = 0; i < PENDING; i++) {
-        free(o->waiting[i].truth);
-        free(o->waiting[i].path_x_px);
-        free(o->waiting[i].path_y_px);
+        bst_obsgen_pending_free(&o->waiting[i]);
     }
     free(o);
 }
@@ -211,14 +198,8 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     return BST_OK;
 }
 
-/* Sets the true camera to the exposure's plate scale, its PSF widened by the jitter. */
-static bst_status set_camera(bst_ctx *ctx, obsgen *o, double scale_arcsec, double jitter_rad2) {
-    if (scale_arcsec <= 0.0) {
-        scale_arcsec = o->camera.pixel_scale_arcsec;
-    }
-    if (scale_arcsec == o->camera.pixel_scale_arcsec && jitter_rad2 == o->jitter_rad2) {
-        return BST_OK;
-    }
+/* Sets the true camera to a plate scale, its PSF widened by jitter. */
+static bst_status use_camera(bst_ctx *ctx, obsgen *o, double scale_arcsec, double jitter_rad2) {
     bst_camera camera;
     bst_psf *psf;
     BST_TRY(
@@ -233,6 +214,17 @@ static bst_status set_camera(bst_ctx *ctx, obsgen *o, double scale_arcsec, doubl
     return BST_OK;
 }
 
+/* Sets the true camera to the exposure's plate scale and jitter. */
+static bst_status set_camera(bst_ctx *ctx, obsgen *o, double scale_arcsec, double jitter_rad2) {
+    if (scale_arcsec <= 0.0) {
+        scale_arcsec = o->camera.pixel_scale_arcsec;
+    }
+    if (scale_arcsec == o->camera.pixel_scale_arcsec && jitter_rad2 == o->jitter_rad2) {
+        return BST_OK;
+    }
+    return use_camera(ctx, o, scale_arcsec, jitter_rad2);
+}
+
 /* Sigma of the Gaussian with an image's noise-equivalent area, without the pixel width, px. */
 static double own_sigma(const bst_obsgen_image_width *w) {
     return sqrt(fmax(w->across_px * w->along_px - 1.0 / 12.0, 0.04));
@@ -240,7 +232,7 @@ static double own_sigma(const bst_obsgen_image_width *w) {
 
 /* Sets the response of the onboard filter to the exposure's PSF if one of them is not Gaussian;
  * otherwise the generator computes it. */
-static bst_status set_response(bst_ctx *ctx, obsgen *o, int binning, pending *p) {
+static bst_status set_response(bst_ctx *ctx, obsgen *o, int binning, bst_obsgen_pending *p) {
     const bst_camera *known = bst_knowledge_camera(o->knowledge);
     double sigma_px;
     bool gaussian = !o->camera.psf || bst_psf_gaussian(o->camera.psf, &sigma_px);
@@ -281,24 +273,9 @@ static double peak_e(const void *user, int index, const bst_truth_item *item) {
     return bst_generator_peak_e(*(const double *)user, item);
 }
 
-static bst_status reserve_path(bst_ctx *ctx, pending *p, int count) {
-    if (count <= p->path_room) {
-        return BST_OK;
-    }
-    double *x = realloc(p->path_x_px, (size_t)count * sizeof *x);
-    p->path_x_px = x ? x : p->path_x_px;
-    double *y = realloc(p->path_y_px, (size_t)count * sizeof *y);
-    p->path_y_px = y ? y : p->path_y_px;
-    if (!x || !y) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a path of %d steps", count);
-    }
-    p->path_room = count;
-    return BST_OK;
-}
-
 /* Path of a star at the window's centre at even steps: the plant's steps within the exposure. */
 static bst_status star_path(bst_ctx *ctx, const obsgen *o, const bst_los_track *track,
-                            double lead_s, bst_window window, pending *p) {
+                            double lead_s, bst_window window, bst_obsgen_pending *p) {
     double x = window.x0 + 0.5 * (window.width - 1), y = window.y0 + 0.5 * (window.height - 1);
     bst_vec3 star = bst_quat_rotate(bst_quat_conj(track->q_cam_from_gcrf[track->count / 2]),
                                     bst_camera_unproject(&o->camera, x, y));
@@ -309,7 +286,7 @@ static bst_status star_path(bst_ctx *ctx, const obsgen *o, const bst_los_track *
     for (int k = 1; k < count && even; k++) {
         even = fabs(track->time_s[k] - k * step_s) < 1e-3 * step_s;
     }
-    BST_TRY(reserve_path(ctx, p, count));
+    BST_TRY(bst_obsgen_pending_reserve_path(ctx, p, count));
     p->path_count = count;
     for (int k = 0; k < count; k++) {
         bst_quat q =
@@ -328,20 +305,6 @@ static bst_status star_path(bst_ctx *ctx, const obsgen *o, const bst_los_track *
         p->path_x_px[k] -= mean_x;
         p->path_y_px[k] -= mean_y;
     }
-    return BST_OK;
-}
-
-static bst_status reserve(bst_ctx *ctx, pending *p, int count) {
-    if (p->truth && count <= p->room) {
-        return BST_OK;
-    }
-    int room = count + count / 4 + 64;
-    bst_truth *more = realloc(p->truth, sizeof *more + (size_t)room * sizeof more->items[0]);
-    if (!more) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", room);
-    }
-    p->truth = more;
-    p->room = room;
     return BST_OK;
 }
 
@@ -385,7 +348,7 @@ static bst_status store_exposure(obsgen *o, struct bst_step *step, const bst_exp
         bst_step_count(step, "truth_overflow");
     }
     assert(bst_truth_is_valid(truth, capacity));
-    pending *p = &o->waiting[e->id % PENDING];
+    bst_obsgen_pending *p = &o->waiting[e->id % PENDING];
     p->exposure_id = e->dropped ? -1 : e->id;
     if (e->dropped) {
         return BST_OK;
@@ -393,7 +356,7 @@ static bst_status store_exposure(obsgen *o, struct bst_step *step, const bst_exp
     BST_TRY(star_path(ctx, o, &track, options.lead_s, e->window, p));
     p->sigma_px = o->sigma_px;
     BST_TRY(set_response(ctx, o, e->binning > 1 ? e->binning : 1, p));
-    BST_TRY(reserve(ctx, p, count));
+    BST_TRY(bst_obsgen_pending_reserve(ctx, p, count));
     if (truth->lost == 0) {
         memcpy(p->truth, truth, sizeof *truth + (size_t)count * sizeof truth->items[0]);
         return BST_OK;
@@ -448,7 +411,7 @@ static void add_stars(obsgen *o, const bst_generator_frame *frame,
 
 /* Generates and publishes the detections of a stored exposure. */
 static bst_status process_exposure(obsgen *o, struct bst_step *step, const bst_exposure *e) {
-    pending *p = &o->waiting[e->id % PENDING];
+    bst_obsgen_pending *p = &o->waiting[e->id % PENDING];
     if (p->exposure_id != e->id) {
         return BST_OK; /* exposure was dropped */
     }
@@ -542,6 +505,41 @@ static bst_status step_module(void *self, struct bst_step *step) {
     return BST_OK;
 }
 
+/* Saves or restores the true camera: its PSF follows from plate scale and jitter. */
+static bst_status archive_camera(obsgen *o, bst_archive *archive) {
+    bst_ctx *ctx = bst_archive_ctx(archive);
+    double scale_arcsec = o->camera.pixel_scale_arcsec, jitter_rad2 = o->jitter_rad2;
+    BST_ARCHIVE(archive, scale_arcsec);
+    BST_ARCHIVE(archive, jitter_rad2);
+    if (!bst_archive_is_restoring(archive)) {
+        return BST_OK;
+    }
+    if (!(bst_is_positive(scale_arcsec) && bst_is_variance(jitter_rad2))) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "the saved camera of the generator is damaged: a pixel of %g arcsec, a "
+                        "jitter of %g rad^2",
+                        scale_arcsec, jitter_rad2);
+    }
+    return use_camera(ctx, o, scale_arcsec, jitter_rad2);
+}
+
+/* The generator, `response` and the photometer have no state of their own: they are the work space
+ * of a frame, and caches whose values depend on the frame and the camera alone. The bounds are
+ * saved, because they are kept while the width of the PSF changes little. */
+static bst_status archive_module(void *self, bst_archive *archive) {
+    obsgen *o = self;
+    BST_TRY(archive_camera(o, archive));
+    BST_ARCHIVE(archive, o->bound_binning);
+    if (o->bound_binning != 0) {
+        BST_ARCHIVE(archive, o->image_bound);
+        BST_ARCHIVE(archive, o->onboard_bound);
+    }
+    for (int i = 0; i < PENDING; i++) {
+        BST_TRY(bst_obsgen_pending_archive(&o->waiting[i], archive));
+    }
+    return BST_OK;
+}
+
 static const char *const substitutes_for[] = {"scenegen", "imgproc", NULL};
 
 const bst_module_desc bst_obsgen_module = {
@@ -560,5 +558,6 @@ const bst_module_desc bst_obsgen_module = {
     .create = create,
     .step = step_module,
     .destroy = destroy,
+    .archive = archive_module,
     .substitutes_for = substitutes_for,
 };

@@ -1,0 +1,81 @@
+#include "obsgen/pending_exposure.h"
+
+#include <stdlib.h>
+
+/* Greatest number of sources of an exposure and of steps of a path in a saved state: a damaged
+ * number must not take all memory. */
+enum { MOST_SOURCES = 1 << 24, MOST_STEPS = 1 << 20 };
+
+void bst_obsgen_pending_free(bst_obsgen_pending *p) {
+    free(p->truth);
+    free(p->path_x_px);
+    free(p->path_y_px);
+}
+
+bst_status bst_obsgen_pending_reserve_path(bst_ctx *ctx, bst_obsgen_pending *p, int count) {
+    if (count <= p->path_room) {
+        return BST_OK;
+    }
+    double *x = realloc(p->path_x_px, (size_t)count * sizeof *x);
+    p->path_x_px = x ? x : p->path_x_px;
+    double *y = realloc(p->path_y_px, (size_t)count * sizeof *y);
+    p->path_y_px = y ? y : p->path_y_px;
+    if (!x || !y) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a path of %d steps", count);
+    }
+    p->path_room = count;
+    return BST_OK;
+}
+
+bst_status bst_obsgen_pending_reserve(bst_ctx *ctx, bst_obsgen_pending *p, int count) {
+    if (p->truth && count <= p->room) {
+        return BST_OK;
+    }
+    int room = count + count / 4 + 64;
+    bst_truth *more = realloc(p->truth, sizeof *more + (size_t)room * sizeof more->items[0]);
+    if (!more) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", room);
+    }
+    p->truth = more;
+    p->room = room;
+    return BST_OK;
+}
+
+/* Saves or restores header and items of the truth. */
+static bst_status archive_truth(bst_obsgen_pending *p, bst_archive *archive) {
+    bst_ctx *ctx = bst_archive_ctx(archive);
+    BST_TRY(bst_obsgen_pending_reserve(ctx, p, 0));
+    BST_ARCHIVE(archive, *p->truth);
+    int count = bst_archive_count(archive, p->truth->count, MOST_SOURCES);
+    if (count != p->truth->count) {
+        p->truth->count = 0;
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "the saved truth of exposure %lld is damaged: two numbers of its sources "
+                        "differ",
+                        (long long)p->exposure_id);
+    }
+    BST_TRY(bst_obsgen_pending_reserve(ctx, p, count));
+    bst_archive_bytes(archive, p->truth->items, (size_t)count * sizeof *p->truth->items);
+    return BST_OK;
+}
+
+bst_status bst_obsgen_pending_archive(bst_obsgen_pending *p, bst_archive *archive) {
+    BST_ARCHIVE(archive, p->exposure_id);
+    if (p->exposure_id < 0) {
+        return BST_OK;
+    }
+    BST_TRY(archive_truth(p, archive));
+    BST_ARCHIVE(archive, p->sigma_px);
+    bst_archive_bool(archive, &p->own_response);
+    if (p->own_response) {
+        BST_ARCHIVE(archive, p->response);
+        BST_ARCHIVE(archive, p->image_bound);
+        BST_ARCHIVE(archive, p->onboard_bound);
+    }
+    int count = bst_archive_count(archive, p->path_count, MOST_STEPS);
+    BST_TRY(bst_obsgen_pending_reserve_path(bst_archive_ctx(archive), p, count));
+    p->path_count = count;
+    bst_archive_bytes(archive, p->path_x_px, (size_t)count * sizeof *p->path_x_px);
+    bst_archive_bytes(archive, p->path_y_px, (size_t)count * sizeof *p->path_y_px);
+    return BST_OK;
+}

@@ -1,0 +1,43 @@
+/* Truth of an exposure until its detections are generated. Internal to the module. */
+#ifndef BST_OBSGEN_PENDING_EXPOSURE_H
+#define BST_OBSGEN_PENDING_EXPOSURE_H
+
+#include "boresight/archive.h"
+#include "boresight/messages.h"
+#include "obsgen/model/crlb_table.h"
+#include "obsgen/model/response.h"
+
+typedef struct bst_obsgen_pending {
+    int64_t exposure_id; /* -1: none */
+    bst_truth *truth;
+    int room; /* items of `truth`; 0 with NULL */
+    double sigma_px;
+    bst_response response; /* valid if `own_response` */
+    bst_crlb_table image_bound, onboard_bound;
+    bool own_response;             /* one of the PSFs is not Gaussian */
+    double *path_x_px, *path_y_px; /* of a star at the window's centre, minus its mean */
+    int path_count, path_room;
+} bst_obsgen_pending;
+
+/* Frees the memory of a pending exposure; the struct belongs to the caller. */
+void bst_obsgen_pending_free(bst_obsgen_pending *pending);
+
+/* Makes room for the truth of a number of sources.
+ *
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_obsgen_pending_reserve(bst_ctx *ctx, bst_obsgen_pending *pending,
+                                      int count) BST_MUST_CHECK;
+
+/* Makes room for a path of a number of steps.
+ *
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_obsgen_pending_reserve_path(bst_ctx *ctx, bst_obsgen_pending *pending,
+                                           int count) BST_MUST_CHECK;
+
+/* Saves or restores a pending exposure, for bst_module_desc.archive.
+ *
+ * Errors:    BST_ERR_FORMAT for a damaged truth or path; BST_ERR_MEMORY */
+bst_status bst_obsgen_pending_archive(bst_obsgen_pending *pending,
+                                      bst_archive *archive) BST_MUST_CHECK;
+
+#endif
