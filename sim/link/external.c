@@ -389,13 +389,22 @@ static bst_status step_control(void *self, struct bst_step *step) {
     return exchange(m, step, inputs, count);
 }
 
+/* The peer has the state: nothing of it can be saved. */
+static bst_status archive_external(void *self, bst_archive *archive) {
+    (void)self;
+    return bst_fail(bst_archive_ctx(archive), BST_ERR_STATE,
+                    "a module of type \"external\" is played by another program, whose state "
+                    "cannot be saved or restored; give it a built-in type (`boresight schema` "
+                    "lists them)");
+}
+
 #define EXTERNAL(role_, table_, ports_, rate_, create_, step_)                                   \
     {                                                                                            \
         .abi = BST_MODULE_ABI, .role = role_, .type = "external",                                \
         .doc = "Played by another program over the link.", .flags = BST_MODULE_NEEDS_LINK,       \
         .config = table_, .config_bytes = sizeof(external_config), .default_rate_hz = rate_,     \
         .ports = ports_, .port_count = (int)(sizeof ports_ / sizeof *ports_), .create = create_, \
-        .step = step_, .destroy = destroy,                                                       \
+        .step = step_, .destroy = destroy, .archive = archive_external,                          \
     }
 
 const bst_module_desc bst_external_imgproc_module =
