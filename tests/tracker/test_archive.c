@@ -13,11 +13,12 @@ typedef struct variant {
     bst_filter_kind filter;
     bst_mtt_association association;
     bool orbits;
+    bool drifts; /* frames without stars have no usable attitude */
 } variant;
 
 /* What the saved states held, so that no part of them is always empty. */
 typedef struct held {
-    int confirmed, at_rest, stars, stored, mixtures, orbits, targets, unused, events;
+    int confirmed, at_rest, stars, stored, mixtures, orbits, targets, unused, events, losses;
 } held;
 
 static bst_status archive_tracker(void *self, bst_archive *archive) {
@@ -34,6 +35,7 @@ static bst_tracker *make_tracker(world *w, const variant *v) {
     config.motion = v->orbits;
     config.max_coast_s = 20.0; /* the lost target is stored */
     config.max_misses = 8;
+    config.drift_noise_arcsec_per_s15 = v->drifts ? 100.0 : config.drift_noise_arcsec_per_s15;
     bst_assert_ok(&ctx,
                   bst_tracker_create(&ctx, &config, &camera, RATE_HZ, find_star, w, &tracker));
     return tracker;
@@ -49,6 +51,10 @@ static void look_into(const bst_tracker *t, held *h) {
         h->mixtures += tracks[i].models.count > 1;
         h->orbits += tracks[i].orbit.valid;
         h->events += tracks[i].manoeuvre_end_s > 0.0;
+    }
+    const bst_tracker_event *events = bst_tracker_events(t, &count);
+    for (int i = 0; i < count; i++) {
+        h->losses += events[i].kind == BST_TRACKER_ATTITUDE_LOST;
     }
     (void)bst_mtt_memory(t->mtt, &count);
     h->stored += count;
@@ -106,6 +112,9 @@ static void follow(const variant *v, held *h) {
         restored = make_tracker(&w, v);
         bst_assert_ok(&ctx, test_restore(&ctx, archive_tracker, restored, saved));
         free(saved.bytes);
+        if (k > 0) { /* the latest exposure is known */
+            assert_int_equal(bst_tracker_check(restored, w.detections), BST_TRACKER_DUPLICATE);
+        }
         (void)expose(&w, k);
         compare_frame(&w, whole, restored, k, v);
         look_into(restored, h);
@@ -137,7 +146,8 @@ static const options busy = {.sigma_px = 0.1,
 
 static void extended_filter(void **state) {
     (void)state;
-    const variant v = {"ekf, gnn", busy, BST_FILTER_EKF, BST_MTT_GNN, false};
+    const variant v = {
+        .name = "ekf, gnn", .sky = busy, .filter = BST_FILTER_EKF, .association = BST_MTT_GNN};
     held h;
     follow(&v, &h);
     assert_true(h.at_rest > 0 && h.stored > 0);
@@ -145,7 +155,10 @@ static void extended_filter(void **state) {
 
 static void mixtures(void **state) {
     (void)state;
-    variant v = {"ukf, mixture", busy, BST_FILTER_UKF, BST_MTT_MIXTURE, false};
+    variant v = {.name = "ukf, mixture",
+                 .sky = busy,
+                 .filter = BST_FILTER_UKF,
+                 .association = BST_MTT_MIXTURE};
     v.sky.false_alarms = 40; /* several detections in a gate */
     held h;
     follow(&v, &h);
@@ -154,7 +167,8 @@ static void mixtures(void **state) {
 
 static void two_models(void **state) {
     (void)state;
-    const variant v = {"imm, pda", busy, BST_FILTER_IMM, BST_MTT_PDA, false};
+    const variant v = {
+        .name = "imm, pda", .sky = busy, .filter = BST_FILTER_IMM, .association = BST_MTT_PDA};
     held h;
     follow(&v, &h);
     assert_true(h.mixtures > 0 && h.stored > 0);
@@ -162,16 +176,34 @@ static void two_models(void **state) {
 
 static void orbits(void **state) {
     (void)state;
-    const variant v = {"ekf, orbits", busy, BST_FILTER_EKF, BST_MTT_NEAREST, true};
+    const variant v = {.name = "ekf, orbits",
+                       .sky = busy,
+                       .filter = BST_FILTER_EKF,
+                       .association = BST_MTT_NEAREST,
+                       .orbits = true};
     held h;
     follow(&v, &h);
     assert_true(h.orbits > 0);
 }
 
+/* The loss of the attitude is an event of its first frame only. */
+static void lost_attitude(void **state) {
+    (void)state;
+    const variant v = {.name = "no attitude",
+                       .sky = busy,
+                       .filter = BST_FILTER_EKF,
+                       .association = BST_MTT_GNN,
+                       .drifts = true};
+    held h;
+    follow(&v, &h);
+    assert_int_equal(h.losses, 1);
+}
+
 /* A tracker in the middle of a run takes the saved state of another one, earlier or later. */
 static void into_a_used_tracker(void **state) {
     (void)state;
-    const variant v = {"used", busy, BST_FILTER_EKF, BST_MTT_GNN, false};
+    const variant v = {
+        .name = "used", .sky = busy, .filter = BST_FILTER_EKF, .association = BST_MTT_GNN};
     static world w;
     bst_ctx ctx = {0};
     world_open(&w, 12, &v.sky);
@@ -201,7 +233,8 @@ static void into_a_used_tracker(void **state) {
 
 static void damage_is_refused_or_another_state(void **state) {
     (void)state;
-    const variant v = {"damaged", busy, BST_FILTER_EKF, BST_MTT_MIXTURE, false};
+    const variant v = {
+        .name = "damaged", .sky = busy, .filter = BST_FILTER_EKF, .association = BST_MTT_MIXTURE};
     static world w;
     bst_ctx ctx = {0};
     world_open(&w, 13, &v.sky);
@@ -236,9 +269,13 @@ static void damage_is_refused_or_another_state(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(extended_filter),     cmocka_unit_test(mixtures),
-        cmocka_unit_test(two_models),          cmocka_unit_test(orbits),
-        cmocka_unit_test(into_a_used_tracker), cmocka_unit_test(damage_is_refused_or_another_state),
+        cmocka_unit_test(extended_filter),
+        cmocka_unit_test(mixtures),
+        cmocka_unit_test(two_models),
+        cmocka_unit_test(orbits),
+        cmocka_unit_test(lost_attitude),
+        cmocka_unit_test(into_a_used_tracker),
+        cmocka_unit_test(damage_is_refused_or_another_state),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
