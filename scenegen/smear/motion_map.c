@@ -88,7 +88,8 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
                                 const bst_motion_map_frame *frame) {
     assert(map && frame);
     if (frame->count > map->capacity) {
-        const int capacity = frame->count + frame->count / 2; /* few later frames need more */
+        /* few later frames need more */
+        const int capacity = frame->count < 2048 ? 4096 : 2 * frame->count;
         free(map->turns);
         free(map->places);
         map->turns = malloc((size_t)capacity * sizeof *map->turns);
