@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "boresight/vec.h"
+#include "sim/core/pages.h"
 
 enum {
     MEMORY_LOOKS = 64, /* number of looks after which older ones are halved in weight */
@@ -93,8 +94,8 @@ bst_status bst_pixel_learner_create(bst_ctx *ctx, const bst_camera *camera,
     l->capacity = (int)config->capacity;
     l->bad_from = -log(config->false_alarm_probability);
     l->moved_rad = bst_camera_scale_rad(camera) * fmax(MOVED_PX, MOVED_FWHM * camera->psf_fwhm_px);
-    l->items = calloc((size_t)l->capacity, sizeof *l->items);
-    l->merged = calloc((size_t)l->capacity, sizeof *l->merged);
+    l->items = bst_pages_zero((size_t)l->capacity, sizeof *l->items);
+    l->merged = bst_pages_zero((size_t)l->capacity, sizeof *l->merged);
     bst_status status =
         l->items && l->merged
             ? BST_OK
@@ -115,8 +116,8 @@ void bst_pixel_learner_free(bst_pixel_learner *l) {
     if (!l) {
         return;
     }
-    free(l->items);
-    free(l->merged);
+    bst_pages_free(l->items);
+    bst_pages_free(l->merged);
     for (int i = 0; i < BST_STEP_LANES; i++) {
         bst_bad_rows_free(&l->maps[i].rows);
     }

@@ -45,7 +45,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     ip->order = calloc((size_t)capacity, sizeof(int));
     ip->order_swap = calloc((size_t)capacity, sizeof(int));
     ip->row = calloc((size_t)height + 1, sizeof(int));
-    ip->cropped = calloc((size_t)width * (size_t)height, sizeof *ip->cropped);
+    ip->cropped = bst_pages_zero((size_t)width * (size_t)height, sizeof *ip->cropped);
     if (!ip->electrons || !ip->order || !ip->order_swap || !ip->row || !ip->cropped) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
     }
@@ -112,7 +112,7 @@ void bst_imgproc_free(bst_imgproc *ip) {
     free(ip->order);
     free(ip->order_swap);
     free(ip->row);
-    free(ip->cropped);
+    bst_pages_free(ip->cropped);
     bst_background_free(&ip->background);
     bst_filter_free(&ip->filter);
     bst_candidates_free(&ip->candidates);

@@ -43,8 +43,8 @@ bst_status bst_filter_create(bst_ctx *ctx, const bst_known_psf *known, int max_w
     out->point = bst_pages_alloc(map);
     out->best = bst_pages_alloc(map);
     out->maxima = calloc((size_t)max_height, sizeof *out->maxima);
-    out->maximum_x = calloc(pixels, sizeof *out->maximum_x);
-    out->maximum_snr = calloc(pixels, sizeof *out->maximum_snr);
+    out->maximum_x = bst_pages_zero(pixels, sizeof *out->maximum_x);
+    out->maximum_snr = bst_pages_zero(pixels, sizeof *out->maximum_snr);
     out->lines = calloc(out->line_floats * (size_t)threads, sizeof(float));
     out->lent = calloc(1, sizeof *out->lent);
     out->edge_x = calloc((size_t)max_width, sizeof(float));
@@ -68,8 +68,8 @@ void bst_filter_free(bst_filter *f) {
     free(f->point);
     free(f->best);
     free(f->maxima);
-    free(f->maximum_x);
-    free(f->maximum_snr);
+    bst_pages_free(f->maximum_x);
+    bst_pages_free(f->maximum_snr);
     free(f->lines);
     free(f->lent);
     free(f->edge_x);

@@ -7,6 +7,7 @@
 
 #include "imgproc/detect/background.h"
 #include "sim/core/cholesky.h"
+#include "sim/core/pages.h"
 
 enum { MAX_ITERATIONS = 15, MAX_SUMS = BST_FIT_MAX_PARAMETERS * (BST_FIT_MAX_PARAMETERS + 3) / 2 };
 
@@ -24,7 +25,7 @@ bst_status bst_fit_create(bst_ctx *ctx, const bst_imgproc_gauss *psf,
     out->value = calloc(plane, sizeof(float));
     out->fixed = calloc(plane, sizeof(float));
     out->valid = calloc(plane, sizeof(float));
-    out->model = calloc(plane * 4 * BST_FIT_MAX_FREE, sizeof(float));
+    out->model = bst_pages_zero(plane * 4 * BST_FIT_MAX_FREE, sizeof(float));
     out->scratch = calloc(bst_source_profile_scratch(max_side), sizeof(float));
     if (!out->value || !out->fixed || !out->valid || !out->model || !out->scratch) {
         bst_fit_free(out);
@@ -38,7 +39,7 @@ void bst_fit_free(bst_fit *fit) {
     free(fit->value);
     free(fit->fixed);
     free(fit->valid);
-    free(fit->model);
+    bst_pages_free(fit->model);
     free(fit->scratch);
     *fit = (bst_fit){0};
 }

@@ -23,6 +23,7 @@
 #include <stdlib.h>
 
 #include "boresight/status.h"
+#include "sim/core/pages.h"
 
 #if defined(__SANITIZE_ADDRESS__)
 #define BST_ARENA_GAP 64
@@ -45,8 +46,8 @@ typedef struct bst_arena {
     bool overflow;     /* the bytes exceed SIZE_MAX */
 } bst_arena;
 
-/* Alignment of an array, that of malloc. */
-enum { BST_ARENA_ALIGNMENT = 16 };
+/* Alignment of an array, that of malloc; arenas of this many bytes take whole pages. */
+enum { BST_ARENA_ALIGNMENT = 16, BST_ARENA_PAGES = 256 << 10 };
 
 /* Memory for `count` elements of `bytes` each, zero; NULL while the bytes are added up. */
 static inline void *bst_arena_take(bst_arena *a, size_t count, size_t bytes) {
@@ -76,7 +77,9 @@ static inline void *bst_arena_take(bst_arena *a, size_t count, size_t bytes) {
 /* Allocates what was added up, zero; arrays are then taken anew. BST_ERR_MEMORY. */
 static inline bst_status bst_arena_alloc(bst_ctx *ctx, bst_arena *a, const char *what) {
     assert(!a->memory);
-    a->memory = a->overflow ? NULL : calloc(1, a->used + 1);
+    a->memory = a->overflow                  ? NULL
+                : a->used >= BST_ARENA_PAGES ? bst_pages_zero(1, a->used + 1)
+                                             : calloc(1, a->used + 1);
     if (!a->memory) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %s", what);
     }
@@ -87,7 +90,11 @@ static inline bst_status bst_arena_alloc(bst_ctx *ctx, bst_arena *a, const char 
 
 /* Frees all arrays that were taken. */
 static inline void bst_arena_free(bst_arena *a) {
-    free(a->memory);
+    if (a->room >= BST_ARENA_PAGES) {
+        bst_pages_free(a->memory);
+    } else {
+        free(a->memory);
+    }
     *a = (bst_arena){0};
 }
 

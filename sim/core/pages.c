@@ -1,4 +1,4 @@
-#define _DEFAULT_SOURCE /* madvise */
+#define _DEFAULT_SOURCE /* madvise, MAP_ANONYMOUS */
 #include "sim/core/pages.h"
 
 #include <stdint.h>
@@ -22,3 +22,34 @@ void *bst_pages_alloc(size_t bytes) {
 #endif
     return memory;
 }
+
+#if defined(__SANITIZE_ADDRESS__)
+/* the sanitizer knows the ends of what the allocator gives */
+void *bst_pages_zero(size_t count, size_t bytes) {
+    return calloc(count > 0 ? count : 1, bytes > 0 ? bytes : 1);
+}
+
+void bst_pages_free(void *memory) {
+    free(memory);
+}
+#else
+void *bst_pages_zero(size_t count, size_t bytes) {
+    if (bytes > 0 && count > (PTRDIFF_MAX - VECTOR) / bytes) {
+        return NULL;
+    }
+    size_t whole = count * bytes + VECTOR; /* the size stands before the array */
+    void *pages = mmap(NULL, whole, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (pages == MAP_FAILED) {
+        return NULL;
+    }
+    *(size_t *)pages = whole;
+    return (char *)pages + VECTOR;
+}
+
+void bst_pages_free(void *memory) {
+    if (memory) {
+        void *pages = (char *)memory - VECTOR;
+        (void)munmap(pages, *(size_t *)pages);
+    }
+}
+#endif
