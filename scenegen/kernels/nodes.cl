@@ -25,6 +25,9 @@ static float min_of(float16 v) {
     return -max_of(-v);
 }
 
+/* One reduction of both bounds of both axes gave wrong bounds with NVIDIA's compiler (580.159.04),
+ * which left out lanes 1 and 13 of the maxima (tests/scenegen/test_renderer.c,
+ * light_does_not_depend_on_tiles). */
 static int least_of(int16 v) {
     int8 a = min(v.lo, v.hi);
     int4 b = min(a.lo, a.hi);
