@@ -72,11 +72,11 @@ static int taps_for(double sigma_px) {
 
 static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     const bst_device_kernel_source *sources[] = {
-        &bst_kernel_scene_shared, &bst_kernel_nodes,      &bst_kernel_random,
-        &bst_kernel_splat,        &bst_kernel_chunk,      &bst_kernel_noise_law,
-        &bst_kernel_read_tail,    &bst_kernel_detector,   &bst_kernel_light,
-        &bst_kernel_vignetting,   &bst_kernel_background, &bst_kernel_tile,
-        &bst_kernel_readout};
+        &bst_kernel_scene_shared, &bst_kernel_nodes,      &bst_kernel_block_search,
+        &bst_kernel_random,       &bst_kernel_splat,      &bst_kernel_chunk,
+        &bst_kernel_noise_law,    &bst_kernel_read_tail,  &bst_kernel_detector,
+        &bst_kernel_light,        &bst_kernel_vignetting, &bst_kernel_background,
+        &bst_kernel_tile,         &bst_kernel_readout};
     char options[2048];
     bst_scene_build_options(&r->camera, &r->options, r->taps, r->law_degree, r->fourier != NULL,
                             r->detector, options, sizeof options);

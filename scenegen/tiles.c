@@ -23,7 +23,7 @@ bst_status bst_tiles_choose(bst_ctx *ctx, const bst_device *device, bst_renderer
     if (options->tile_width == 0) {
         bool large = (type & CL_DEVICE_TYPE_CPU) && local_bytes >= 256 * 1024;
         options->tile_width = large ? 256 : 64;
-        options->tile_height = large ? 128 : 2;
+        options->tile_height = large ? 128 : 4;
         options->group = large ? 1 : 16;
     }
     size_t need = (size_t)(options->tile_width + 16) *

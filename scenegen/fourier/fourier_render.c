@@ -84,6 +84,7 @@ static bst_status choose_tiles(bst_ctx *ctx, bst_device *device, bst_fourier_ren
 
 static bst_status build(bst_ctx *ctx, bst_device *device, bst_fourier_render *l) {
     const bst_device_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
+                                                 &bst_kernel_block_search,
                                                  &bst_kernel_deposit_shared, &bst_kernel_deposit};
     char options[1024];
     int length = snprintf(
@@ -94,7 +95,8 @@ static bst_status build(bst_ctx *ctx, bst_device *device, bst_fourier_render *l)
         l->nodes > l->field_nodes ? " -DSPECTRA" : "", l->group == 1 ? " -DNEAR_CACHE" : "");
     bst_scene_node_options(&l->camera, l->options.spatial_oversample, options + length,
                            sizeof options - (size_t)length);
-    BST_TRY(bst_device_build(ctx, device, sources, 4, options, &l->program));
+    BST_TRY(bst_device_build(ctx, device, sources, sizeof sources / sizeof *sources, options,
+                             &l->program));
     cl_int code;
     l->kernel = clCreateKernel(l->program, "bst_light_deposit", &code);
     return bst_device_check(ctx, code, "bst_light_deposit");

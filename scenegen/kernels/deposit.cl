@@ -189,12 +189,6 @@ static void deposit_block(bst_deposit_params p, local float *sum, int tile_x, in
     }
 }
 
-/* Which of 16 boxes (x0[16], y0[16], x1[16], y1[16]) touch the tile, a box in px. */
-static int16 boxes_hit(global const float *box, float4 tile) {
-    return (vload16(0, box) <= tile.z) & (vload16(1, box) <= tile.w) &
-           (vload16(2, box) >= tile.x) & (vload16(3, box) >= tile.y);
-}
-
 /* nodes: table of nodes. grid: [samples_y / 16][samples_x][16]. table: [2][BST_SPREAD_TABLE], along
  * x and y. shares: of the spectra, by source. The boxes are those of the nodes kernel, which extend
  * at least as far as the spreading kernel. */
@@ -225,38 +219,20 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
             room.x[k][j] = room.y[k][j] = 0.0f;
         }
     }
-    for (int g = 0; g < p.source_groups; g++) {
-        int16 hit = boxes_hit(source_box + g * 4 * BST_BLOCK, place);
-        if (!any16(hit)) {
+    block_search search = begin_search(place, p.source_groups, 0);
+    for (;;) {
+        int block = next_block(&search, sources, block_box, source_box, 0);
+        if (block < 0) {
+            break;
+        }
+        bst_kernel_source_record s = search.source;
+#ifdef SPECTRA
+        s.electrons *= shares[search.source_index * BST_SPECTRA + p.spectrum];
+        if (s.electrons == 0.0f) {
             continue;
         }
-        int hits[BST_BLOCK], blocks[BST_BLOCK];
-        vstore16(hit, 0, hits);
-        for (int i = 0; i < BST_BLOCK; i++) {
-            if (!hits[i]) {
-                continue;
-            }
-            bst_kernel_source_record s = sources[g * BST_BLOCK + i];
-#ifdef SPECTRA
-            s.electrons *= shares[(g * BST_BLOCK + i) * BST_SPECTRA + p.spectrum];
-            if (s.electrons == 0.0f) {
-                continue;
-            }
 #endif
-            blocks[0] = 1;
-            for (int first = 0; first < s.blocks; first += BST_BLOCK) {
-                if (s.blocks > 1) { /* otherwise the source's box is the block's */
-                    global const float *box = block_box + (s.first_box * BST_BLOCK + first) * 4;
-                    vstore16(boxes_hit(box, place), 0, blocks);
-                }
-                for (int k = 0; k < min(BST_BLOCK, s.blocks - first); k++) {
-                    if (blocks[k]) {
-                        deposit_block(p, sum, left, top, nodes_of(s, first + k, nodes), table,
-                                      field, &room);
-                    }
-                }
-            }
-        }
+        deposit_block(p, sum, left, top, nodes_of(s, block, nodes), table, field, &room);
     }
     int columns = min(DEPOSIT_W, p.samples_x - left);
     int rows = min(DEPOSIT_H, p.samples_y - top); /* samples_y is a multiple of 16 */

@@ -25,13 +25,21 @@ static float min_of(float16 v) {
     return -max_of(-v);
 }
 
-/* Least x, least -x, least y, least -y: all four at once, by halves. */
-static int4 bounds_of(int16 x, int16 y) {
-    int16 u = (int16)(min(x.lo, x.hi), -max(x.lo, x.hi));
-    int16 v = (int16)(min(y.lo, y.hi), -max(y.lo, y.hi));
-    int16 w = (int16)(min(u.even, u.odd), min(v.even, v.odd));
-    int8 z = min(w.even, w.odd);
-    return min(z.even, z.odd);
+/* One reduction of both bounds of both axes gave wrong bounds with NVIDIA's compiler (580.159.04),
+ * which left out lanes 1 and 13 of the maxima (tests/scenegen/test_renderer.c,
+ * light_does_not_depend_on_tiles). */
+static int least_of(int16 v) {
+    int8 a = min(v.lo, v.hi);
+    int4 b = min(a.lo, a.hi);
+    int2 c = min(b.lo, b.hi);
+    return min(c.lo, c.hi);
+}
+
+static int most_of(int16 v) {
+    int8 a = max(v.lo, v.hi);
+    int4 b = max(a.lo, a.hi);
+    int2 c = max(b.lo, b.hi);
+    return max(c.lo, c.hi);
 }
 
 #ifdef FOURIER
@@ -127,9 +135,9 @@ __attribute__((reqd_work_group_size(BST_BLOCK, 1, 1))) kernel void bst_scene_nod
         float reach = (float)s.radius;
         for (int b = 0; b < s.blocks; b++) {
             node_block n = nodes_of(s, b, table);
-            int4 bounds = bounds_of(n.x >> PLACE_BITS, n.y >> PLACE_BITS);
-            float4 r = (float4)((float)bounds.x - reach, (float)bounds.z - reach,
-                                reach + 1.0f - (float)bounds.y, reach + 1.0f - (float)bounds.w);
+            int16 x = n.x >> PLACE_BITS, y = n.y >> PLACE_BITS;
+            float4 r = (float4)((float)least_of(x) - reach, (float)least_of(y) - reach,
+                                (float)most_of(x) + reach + 1.0f, (float)most_of(y) + reach + 1.0f);
             if (s.blocks > 1) {
                 int lane = b % BST_BLOCK;
                 global float *at = block_box + (s.first_box * BST_BLOCK + b - lane) * 4 + lane;

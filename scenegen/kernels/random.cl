@@ -1,8 +1,5 @@
 /* Random numbers, 16 lanes at a time: Philox4x32, normal deviates, elementary functions. */
 
-/* Forces inlining: outside the kernel compilers use short vectors. */
-#define INLINE static inline __attribute__((always_inline))
-
 /* Number of rounds with which Philox passes TestU01's BigCrush; host streams use three more, as its
  * authors recommend (philox_shared.h). */
 #define PHILOX_ROUNDS 7

@@ -2,6 +2,11 @@
 #ifndef BST_SCENEGEN_SCENE_SHARED_H
 #define BST_SCENEGEN_SCENE_SHARED_H
 
+#ifdef __OPENCL_VERSION__
+/* Forces inlining: outside the kernel compilers use short vectors. */
+#define INLINE static inline __attribute__((always_inline))
+#endif
+
 /* Nodes per block: one vector register. */
 #define BST_BLOCK 16
 /* Stamp rows added at once, and the spare rows below a tile that such a run may write. */

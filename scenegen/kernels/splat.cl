@@ -283,35 +283,14 @@ static void splat_node(local float *sum, const splat_nodes *b, int n, int taps) 
     }
 }
 
-/* Which of 16 boxes touch the tile: x0[16], y0[16], x1[16], y1[16]. */
-INLINE int16 boxes_hit(global const float *box, int tile_x, int tile_y) {
-    return (vload16(0, box) <= (float)(tile_x + TILE_W - 1)) &
-           (vload16(1, box) <= (float)(tile_y + TILE_H - 1)) & (vload16(2, box) >= (float)tile_x) &
-           (vload16(3, box) >= (float)tile_y);
-}
-
-static void splat_source(local float *sum, int tile_x, int tile_y, bst_kernel_source_record s,
-                         global const float16 *table, global const float *block_box,
-                         global const float *law, splat_nodes *b) {
-    int hits[BST_BLOCK] = {1}, taps = 2 * s.radius + 2;
-    for (int first = 0; first < s.blocks; first += BST_BLOCK) {
-        if (s.blocks > 1) { /* otherwise the source's box is the block's */
-            global const float *box = block_box + (s.first_box * BST_BLOCK + first) * 4;
-            vstore16(boxes_hit(box, tile_x, tile_y), 0, hits);
-        }
-        for (int k = 0; k < min(BST_BLOCK, s.blocks - first); k++) {
-            if (!hits[k]) {
-                continue;
-            }
-            place_nodes(nodes_of(s, first + k, table), tile_x, tile_y, s.radius, law, b);
-            for (int n = 0; n < BST_BLOCK; n += TEAM) {
-                if (b->near[n] && b->top1[n] - b->top0[n] <= SPREAD) {
-                    splat_team(sum, b, n, taps);
-                } else if (b->near[n]) {
-                    for (int m = n; m < n + TEAM; m++) {
-                        splat_node(sum, b, m, taps);
-                    }
-                }
+/* Adds a block of nodes. */
+static void splat_block(local float *sum, const splat_nodes *b, int taps) {
+    for (int n = 0; n < BST_BLOCK; n += TEAM) {
+        if (b->near[n] && b->top1[n] - b->top0[n] <= SPREAD) {
+            splat_team(sum, b, n, taps);
+        } else if (b->near[n]) {
+            for (int m = n; m < n + TEAM; m++) {
+                splat_node(sum, b, m, taps);
             }
         }
     }
@@ -336,24 +315,16 @@ static void splat_tile(bst_kernel_frame_params p, local float *sum, int tile_x, 
         *(float16 *)b.y[k] = (float16)0.0f;
     }
     b.taps = 0;
-    for (int first = 0; first < p.source_groups; first += BST_BLOCK) {
-        int groups[BST_BLOCK], hits[BST_BLOCK];
-        int16 near = boxes_hit(group_box + first * 4, tile_x, tile_y);
-        if (!any16(near)) {
-            continue;
+    float4 tile = (float4)((float)tile_x, (float)tile_y, (float)(tile_x + TILE_W - 1),
+                           (float)(tile_y + TILE_H - 1));
+    block_search search = begin_search(tile, p.source_groups, group_box);
+    for (;;) {
+        int block = next_block(&search, sources, block_box, source_box, group_box);
+        if (block < 0) {
+            break;
         }
-        vstore16(near, 0, groups);
-        for (int g = first; g < min(first + BST_BLOCK, p.source_groups); g++) {
-            if (!groups[g - first]) {
-                continue;
-            }
-            vstore16(boxes_hit(source_box + g * 4 * BST_BLOCK, tile_x, tile_y), 0, hits);
-            for (int i = 0; i < BST_BLOCK; i++) {
-                if (hits[i]) {
-                    splat_source(sum, tile_x, tile_y, sources[g * BST_BLOCK + i], table, block_box,
-                                 law, &b);
-                }
-            }
-        }
+        int radius = search.source.radius;
+        place_nodes(nodes_of(search.source, block, table), tile_x, tile_y, radius, law, &b);
+        splat_block(sum, &b, 2 * radius + 2);
     }
 }

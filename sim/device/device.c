@@ -418,10 +418,13 @@ static void keep_program(bst_device *device, const bst_device_kernel_source *con
 }
 
 /* Clang warns several hundred times about each 512-bit vector argument on processors without such
- * registers; all functions of a program are compiled alike. */
+ * registers; all functions of a program are compiled alike. Old versions, as in NVIDIA's compiler,
+ * warn of the unknown name instead. */
 static const char no_abi_warnings[] =
-    "#ifdef __clang__\n"
+    "#ifdef __has_warning\n"
+    "#if __has_warning(\"-Wpsabi\")\n"
     "#pragma clang diagnostic ignored \"-Wpsabi\"\n"
+    "#endif\n"
     "#endif\n";
 
 /* Builds an OpenCL program, or returns the one already built. */

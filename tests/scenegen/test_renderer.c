@@ -282,6 +282,36 @@ static void bytes_do_not_depend_on_how_they_are_made(void **state) {
     bytes_do_not_depend_on(*state, 3.0, 100.0);
 }
 
+/* The same light from tiles of one row and more, in every bit: the boxes by which tiles find the
+ * nodes hold every row of every stamp. */
+static void light_does_not_depend_on_tiles(void **state) {
+    fixture *f = *state;
+    enum { W = 300, H = 200, STARS = 400 };
+    static float full[W * H], other[W * H];
+    bst_camera camera = scene_camera(W, H);
+    bst_scene_source *stars = scene_stars(&camera, STARS, 2e6, 6.0, 4);
+    scene_track track = scene_track_make(&camera, &demo);
+    bst_render_request q = {.window = {0, 0, W, H},
+                            .track = &track.track,
+                            .sources = stars,
+                            .count = STARS,
+                            .background_e = 3.0};
+    const int tiles[][3] = {{64, 64, 1}, {64, 1, 32}, {64, 2, 16}, {0, 0, 0}};
+    for (size_t i = 0; i < sizeof tiles / sizeof *tiles; i++) {
+        bst_renderer_options options = bst_renderer_default_options();
+        options.tile_width = tiles[i][0];
+        options.tile_height = tiles[i][1];
+        options.group = tiles[i][2];
+        bst_renderer *r = make(f, &camera, &options);
+        float *image = i == 0 ? full : other;
+        bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, image));
+        assert_memory_equal(image, full, sizeof full);
+        bst_renderer_free(r);
+    }
+    scene_track_free(&track);
+    free(stars);
+}
+
 /* Frames that wait for their reader while others are begun are the same; what goes with them grows
  * meanwhile. */
 static void frames_under_way(void **state) {
@@ -536,6 +566,7 @@ int main(void) {
         cmocka_unit_test(moving_objects_have_their_own_tracks),
         cmocka_unit_test(near_passes_are_drawn_where_they_cross),
         cmocka_unit_test(bytes_do_not_depend_on_how_they_are_made),
+        cmocka_unit_test(light_does_not_depend_on_tiles),
         cmocka_unit_test(frames_under_way),
         cmocka_unit_test(hard_cases),
         cmocka_unit_test(a_hundred_thousand_stars),
