@@ -282,17 +282,6 @@ static void nodes_ahead_of_a_state_are_kept(void **state) {
     }
 }
 
-static void external_is_refused(void **state) {
-    (void)state;
-    bst_ctx ctx = {0};
-    bst_archive *archive;
-    bst_assert_ok(&ctx, bst_archive_create(&ctx, &archive));
-    bst_assert_ok(&ctx, bst_archive_begin(&ctx, archive, "sat/cam/gimbal"));
-    assert_int_equal(bst_gimbal_external_module.archive(NULL, archive), BST_ERR_STATE);
-    assert_non_null(strstr(ctx.message, "its state is that of another program"));
-    bst_archive_free(archive);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(second_order),
@@ -301,7 +290,6 @@ int main(void) {
         cmocka_unit_test(ideal),
         cmocka_unit_test(scripted),
         cmocka_unit_test(nodes_ahead_of_a_state_are_kept),
-        cmocka_unit_test(external_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
