@@ -16,17 +16,31 @@ static const double gauss_place[4] = {0.06943184420297371, 0.33000947820757187, 
 static const double gauss_weight[4] = {0.17392742256872693, 0.32607257743127307,
                                        0.32607257743127307, 0.17392742256872693};
 
+/* Edge between pixels n - 1 and n, sigma * sqrt(2) from the centre, and the tail of the Gaussian
+ * beyond it, on the side away from the centre: erfc, which keeps the relative precision of the
+ * wings. */
+typedef struct edge {
+    double z, tail;
+} edge;
+
+static edge edge_before(int n, double x, double scale) {
+    double z = (n - 0.5 - x) * scale;
+    return (edge){z, erfc(fabs(z))};
+}
+
+static double share_between(edge a, edge b) {
+    if (a.z > 0.0) {
+        return 0.5 * (a.tail - b.tail);
+    }
+    if (b.z < 0.0) {
+        return 0.5 * (b.tail - a.tail);
+    }
+    return 0.5 * (erf(b.z) - erf(a.z));
+}
+
 double bst_reference_pixel_share(double x, double sigma_px, int n) {
     double scale = 1.0 / (sigma_px * sqrt(2.0));
-    double a = (n - 0.5 - x) * scale, b = (n + 0.5 - x) * scale;
-    /* erfc on the side away from the centre keeps the relative precision of the wings */
-    if (a > 0.0) {
-        return 0.5 * (erfc(a) - erfc(b));
-    }
-    if (b < 0.0) {
-        return 0.5 * (erfc(-b) - erfc(-a));
-    }
-    return 0.5 * (erf(b) - erf(a));
+    return share_between(edge_before(n, x, scale), edge_before(n + 1, x, scale));
 }
 
 static int clamp_int(double v, int low, int high) {
@@ -41,15 +55,26 @@ static void add_psf(bst_window w, double sigma, double x, double y, double elect
     int x1 = clamp_int(ceil(x + reach), w.x0 - 1, w.x0 + w.width - 1);
     int y0 = clamp_int(floor(y - reach), w.y0, w.y0 + w.height);
     int y1 = clamp_int(ceil(y + reach), w.y0 - 1, w.y0 + w.height - 1);
-    for (int i = x0; i <= x1; i++) {
-        line[i - w.x0] = electrons * bst_reference_pixel_share(x, sigma, i);
+    if (x0 > x1 || y0 > y1) {
+        return;
     }
+    /* neighbours share an edge */
+    double scale = 1.0 / (sigma * sqrt(2.0));
+    edge from = edge_before(x0, x, scale);
+    for (int i = x0; i <= x1; i++) {
+        edge to = edge_before(i + 1, x, scale);
+        line[i - w.x0] = electrons * share_between(from, to);
+        from = to;
+    }
+    from = edge_before(y0, y, scale);
     for (int j = y0; j <= y1; j++) {
-        double share = bst_reference_pixel_share(y, sigma, j);
+        edge to = edge_before(j + 1, y, scale);
+        double share = share_between(from, to);
         double *row = image + (size_t)(j - w.y0) * (size_t)w.width;
         for (int i = x0; i <= x1; i++) {
             row[i - w.x0] += share * line[i - w.x0];
         }
+        from = to;
     }
 }
 
