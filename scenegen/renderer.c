@@ -70,7 +70,7 @@ static int taps_for(double sigma_px) {
     return taps > MAX_TAPS ? MAX_TAPS : taps;
 }
 
-static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device, double law_widest) {
+static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
     const bst_device_kernel_source *sources[] = {
         &bst_kernel_scene_shared, &bst_kernel_nodes,      &bst_kernel_random,
         &bst_kernel_splat,        &bst_kernel_chunk,      &bst_kernel_noise_law,
@@ -78,8 +78,8 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device, doubl
         &bst_kernel_vignetting,   &bst_kernel_background, &bst_kernel_tile,
         &bst_kernel_readout};
     char options[2048];
-    bst_scene_build_options(&r->camera, &r->options, r->taps, r->law_degree, law_widest,
-                            r->fourier != NULL, r->detector, options, sizeof options);
+    bst_scene_build_options(&r->camera, &r->options, r->taps, r->law_degree, r->fourier != NULL,
+                            r->detector, options, sizeof options);
     BST_TRY(bst_device_build(ctx, device, sources, sizeof sources / sizeof *sources, options,
                              &r->program));
     static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
@@ -173,7 +173,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         smear.law_widest = bst_profile_law_widest(sigma_px, r->law_degree);
     }
     if (status == BST_OK) {
-        status = build(ctx, r, device, smear.law_widest);
+        status = build(ctx, r, device);
     }
     if (status == BST_OK) {
         status = bst_smear_create(ctx, camera, &smear, &r->smear);

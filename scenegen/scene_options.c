@@ -1,6 +1,5 @@
 #include "scenegen/scene_options.h"
 
-#include <math.h>
 #include <stdio.h>
 
 #include "scenegen/detector/vignetting.h"
@@ -8,19 +7,15 @@
 #include "sim/world/scene/skylight.h"
 
 void bst_scene_build_options(const bst_camera *camera, const bst_renderer_options *settings,
-                             int taps, int law_degree, double law_widest, bool fourier,
-                             const bst_detector *detector, char *text, size_t bytes) {
-    double sigma_px = bst_camera_psf_sigma_px(camera);
-    int length = snprintf(text, bytes,
-                          "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d "
-                          "-DEDGE_SCALE=%.9ef%s%s%s",
-                          settings->tile_width, settings->tile_height, settings->group, taps,
-                          1.0 / (sqrt(2.0) * sigma_px), fourier ? " -DFOURIER" : "",
-                          settings->group == 1 ? " -DNEAR_CACHE" : "",
-                          bst_skylight_may_vary(camera) ? " -DBACKGROUND" : "");
+                             int taps, int law_degree, bool fourier, const bst_detector *detector,
+                             char *text, size_t bytes) {
+    int length =
+        snprintf(text, bytes, "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d%s%s%s",
+                 settings->tile_width, settings->tile_height, settings->group, taps,
+                 fourier ? " -DFOURIER" : "", settings->group == 1 ? " -DNEAR_CACHE" : "",
+                 bst_skylight_may_vary(camera) ? " -DBACKGROUND" : "");
     if (law_degree > 0) {
-        length += snprintf(text + length, bytes - (size_t)length,
-                           " -DDEGREE=%d -DBARELY_WIDER=%.9ef", law_degree, law_widest);
+        length += snprintf(text + length, bytes - (size_t)length, " -DDEGREE=%d", law_degree);
     }
     length += bst_vignetting_options(camera, text + length, bytes - (size_t)length);
     length += bst_detector_options(detector, text + length, bytes - (size_t)length);

@@ -10,11 +10,10 @@
  *
  * Given:     taps        of the longest stamp
  *            law_degree  of the stamps' profile law (0: none)
- *            law_widest  largest widening that it supports
  *            fourier     light comes from the Fourier path */
 void bst_scene_build_options(const bst_camera *camera, const bst_renderer_options *settings,
-                             int taps, int law_degree, double law_widest, bool fourier,
-                             const bst_detector *detector, char *text, size_t bytes);
+                             int taps, int law_degree, bool fourier, const bst_detector *detector,
+                             char *text, size_t bytes);
 
 /* Writes the options of kernels/nodes.cl, with a leading space. */
 void bst_scene_node_options(const bst_camera *camera, int spatial_oversample, char *text,

@@ -7,6 +7,8 @@
 /* Stamp rows added at once, and the spare rows below a tile that such a run may write. */
 #define BST_STAMP_RUN 2
 #define BST_SPARE_ROWS (BST_STAMP_RUN - 1)
+/* Floats before the profile law in its buffer (profile_law.h). */
+#define BST_LAW_HEAD 2
 /* Number of coefficients of the profile law's first two derivatives by the widening
  * (profile_law.h). */
 #define BST_LAW_FIRST 6

@@ -1,7 +1,7 @@
 /* Light of one tile from stamps: generates the nodes of the sources that touch the tile (nodes.cl)
  * and sums their pixel-integrated profiles. Options: TILE_W, TILE_H (pixels), TAPS (of the longest
- * profile, a multiple of 16), EDGE_SCALE (1 / (sqrt(2) sigma of the PSF), 1/px), DEGREE and
- * BARELY_WIDER (of the profile law, scenegen/stamp/profile_law.h; without them it is not used).
+ * profile, a multiple of 16), DEGREE (of the profile law; without it the law is not used). `law` is
+ * the buffer of scenegen/stamp/profile_law.h.
  *
  * Every pixel receives its nodes in the order of sources, blocks and nodes, whatever the tile. The
  * float sum is therefore the same for every window and work-group size. */
@@ -150,12 +150,12 @@ INLINE void store_octet(const float16 *t, float *row) {
 INLINE void make_profiles(float16 within, float16 more, float16 height, int radius, int octets,
                           global const float *law, float16 *taps) {
 #ifdef DEGREE
-    if (!any16(more > BARELY_WIDER)) {
-        taps_by_law(within, more, any16(more > 0.0f), height, radius, law, taps);
+    if (!any16(more > law[1])) {
+        taps_by_law(within, more, any16(more > 0.0f), height, radius, law + BST_LAW_HEAD, taps);
     } else
 #endif
     {
-        taps_by_edges(within, rsqrt(1.0f + more) * EDGE_SCALE, height, radius, taps);
+        taps_by_edges(within, rsqrt(1.0f + more) * law[0], height, radius, taps);
     }
     for (int k = 2 * radius + 2; k < octets; k++) {
         taps[k] = (float16)0.0f;

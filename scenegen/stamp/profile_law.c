@@ -123,13 +123,15 @@ bst_status bst_profile_law_buffer(bst_ctx *ctx, cl_context context, double sigma
                         "psf_degree is %d: allowed are 0 and the odd numbers up to %d", degree,
                         BST_LAW_MOST_DEGREE);
     }
-    size_t count = degree > 0 ? (size_t)bst_profile_law_floats(degree, reach) : 1;
+    size_t count = BST_LAW_HEAD + (size_t)(degree > 0 ? bst_profile_law_floats(degree, reach) : 0);
     float *law = calloc(count, sizeof *law);
     if (!law) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the PSF's profile");
     }
+    law[0] = (float)(1.0 / (sqrt(2.0) * sigma_px));
     if (degree > 0) {
-        bst_profile_law(sigma_px, degree, reach, law);
+        law[1] = (float)bst_profile_law_widest(sigma_px, degree);
+        bst_profile_law(sigma_px, degree, reach, law + BST_LAW_HEAD);
     }
     cl_int code;
     *out = clCreateBuffer(context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR, count * sizeof *law,

@@ -28,8 +28,9 @@ int bst_profile_law_floats(int degree, int reach);
  * f + 1/2) / (sqrt(2) sigma)) / 2 - erf((d - f - 1/2) / (sqrt(2) sigma)) / 2. */
 void bst_profile_law(double sigma_px, int degree, int reach, float *law);
 
-/* Profile law in a device buffer; of degree 0: a placeholder. Release it with clReleaseMemObject.
- */
+/* Profile law in a device buffer, after BST_LAW_HEAD floats: 1 / (sqrt(2) sigma), 1/px, and
+ * bst_profile_law_widest. They are no build options, so that PSFs of all widths share a program. Of
+ * degree 0: without a law. Release it with clReleaseMemObject. */
 bst_status bst_profile_law_buffer(bst_ctx *ctx, cl_context context, double sigma_px, int degree,
                                   int reach, cl_mem *out) BST_MUST_CHECK;
 

@@ -87,12 +87,17 @@ static bst_status add_point(bst_ctx *ctx, sweep *s, bst_bench_error_curve *curve
 /* Measures points for several values of an integer renderer option. */
 static bst_status vary_int(bst_ctx *ctx, sweep *s, bst_bench_error_curve *curve, const char *knob,
                            size_t offset, const int *values) {
-    for (; *values > 0; values++) {
+    /* many need a program of their own, which takes seconds to build: half of them in a trial */
+    int step = strcmp(s->name, "small") == 0 ? 2 : 1;
+    for (int i = 0; values[i] > 0; i++) {
+        if (i % step != 0) {
+            continue;
+        }
         bst_renderer_options options = bst_renderer_default_options();
         char text[24];
         options.tolerance_sigma = s->view.scene.tolerance_sigma;
-        memcpy((char *)&options + offset, values, sizeof *values);
-        snprintf(text, sizeof text, "%d", *values);
+        memcpy((char *)&options + offset, &values[i], sizeof values[i]);
+        snprintf(text, sizeof text, "%d", values[i]);
         BST_TRY(add_point(ctx, s, curve, knob, text, &options, 0.0));
     }
     return BST_OK;

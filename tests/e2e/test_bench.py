@@ -60,10 +60,10 @@ def check_from_another_folder():
 
 
 def check_markdown():
-    done = bench("small", "--markdown")
+    done = bench("sgp4", "--markdown")
     assert done.returncode == 0, done.stderr
     rows = [line for line in done.stdout.splitlines() if line.startswith("|")]
-    assert len(rows) == 3 and rows[2].startswith("| `small` |")
+    assert len(rows) == 3 and rows[2].startswith("| `sgp4` |")
     assert len({row.count("|") for row in rows}) == 1
 
 

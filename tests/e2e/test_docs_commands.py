@@ -20,6 +20,7 @@ scratch folder that looks like the repository. A comment on the line before a bl
 import glob
 import os
 import re
+import resource
 import shutil
 import stat
 import subprocess
@@ -167,13 +168,17 @@ class Commands(unittest.TestCase):
         self.assertEqual(failed, [])
         self.assertGreater(count, 0)
 
+    spent_s = 0.0  # of the processor, by blocks so far
+
     def finish(self, place, process, expected, failed):
         try:
             output, _ = process.communicate(timeout=3600 if SLOW else 300)
         except subprocess.TimeoutExpired:
             process.kill()
             output = process.communicate()[0] + "\ntoo slow: mark it <!-- test: slow -->"
-        print(f"{place}: exit code {process.returncode}", flush=True)
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        spent, self.spent_s = used.ru_utime + used.ru_stime - self.spent_s, used.ru_utime + used.ru_stime
+        print(f"{place}: exit code {process.returncode}, {spent:.1f} s of processor time", flush=True)
         if process.returncode != expected:
             failed.append(f"{place}: exit code {process.returncode}, not {expected}: {output[-1500:]}")
 

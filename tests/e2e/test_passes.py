@@ -62,6 +62,7 @@ class Passes(unittest.TestCase):
     def test_away_from_the_pole_by_images(self):
         self.tracked("leo_leo_pass.json")
 
+    @unittest.skipUnless(SEEDS > 1, "slow")
     def test_away_from_the_pole_by_the_generator(self):
         self.tracked("leo_leo_pass.json", GENERATOR)
 

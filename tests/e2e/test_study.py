@@ -221,7 +221,7 @@ class CutDown(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = runs.scratch()
-        cls.path = write(cls.folder, replicates=20)
+        cls.path = write(cls.folder, replicates=20 if KILLS > 2 else 10)
         cls.whole = os.path.join(cls.folder, "whole")
         started = time.monotonic()
         result = study(cls.path, "--out", cls.whole)
@@ -566,7 +566,7 @@ class Devices(unittest.TestCase):
     def test_cores(self):
         """A worker with one core has one thread of PoCL, and stays on it."""
         folder = runs.scratch()
-        path = write(folder, replicates=40)
+        path = write(folder, replicates=40 if KILLS > 2 else 12)
         job = subprocess.Popen([runs.BORESIGHT, "study", path, "--out", folder + "/out", "--quiet",
                                 "--workers", "1", "--cores", "1"], stdout=subprocess.DEVNULL)
         seen = set()
