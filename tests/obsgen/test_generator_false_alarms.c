@@ -1,13 +1,5 @@
-/* False alarms of the generator: noise, wings of bright stars, cosmic rays.
- *
- *     test_obsgen_generator_false_alarms [thorough]
- *
- * Tolerances follow from the number of frames; `thorough` has so many that they are 1 % or so. */
-#include <string.h>
-
+/* False alarms of the generator: noise, wings of bright stars, cosmic rays. */
 #include "tests/obsgen/generator_scene.h"
-
-static bool thorough;
 
 static void false_alarms_are_poisson_with_a_gaussian_tail(void **state) {
     (void)state;
@@ -15,9 +7,9 @@ static void false_alarms_are_poisson_with_a_gaussian_tail(void **state) {
     open_scene(&s);
     s.settings.false_alarms_per_frame = 5.0;
     start(&s);
-    const int frames = thorough ? 4000 : 400;
+    enum { FRAMES = 4000 };
     double n = 0.0, n2 = 0.0, energy = 0.0, x = 0.0, y2 = 0.0, least = 1e9;
-    for (int f = 0; f < frames; f++) {
+    for (int f = 0; f < FRAMES; f++) {
         bst_generator_result r = run(&s, f);
         n += r.count;
         n2 += (double)r.count * r.count;
@@ -31,11 +23,11 @@ static void false_alarms_are_poisson_with_a_gaussian_tail(void **state) {
             y2 += (d->y_px - 0.5 * (SIDE - 1)) * (d->y_px - 0.5 * (SIDE - 1));
         }
     }
-    double mean = n / frames;
+    double mean = n / FRAMES;
     /* four standard deviations each: of a Poisson mean, its variance, an exponential's mean, and
      * the first two moments of a uniform place */
-    bst_assert_close(mean, 5.0, 4.0 * sqrt(5.0 / frames));
-    bst_assert_close((n2 / frames - mean * mean) / mean, 1.0, 4.0 * sqrt(2.0 / frames));
+    bst_assert_close(mean, 5.0, 4.0 * sqrt(5.0 / FRAMES));
+    bst_assert_close((n2 / FRAMES - mean * mean) / mean, 1.0, 4.0 * sqrt(2.0 / FRAMES));
     bst_assert_close(energy / n, 1.0, 4.0 / sqrt(n));
     assert_true(least < 0.001);
     bst_assert_close(x / n, 0.5 * (SIDE - 1), 4.0 * SIDE / sqrt(12.0 * n));
@@ -54,8 +46,8 @@ static void hits_come_at_the_detectors_rate(void **state) {
                                                                      .straggling = 0.12};
     start(&s);
     double seen = 0.0, told = 0.0;
-    const int frames = thorough ? 400 : 100;
-    for (int f = 0; f < frames; f++) {
+    enum { FRAMES = 400 };
+    for (int f = 0; f < FRAMES; f++) {
         bst_generator_result r = run(&s, f);
         for (int i = 0; i < r.count; i++) {
             assert_true(r.items[i].hit && r.items[i].item == -1);
@@ -66,7 +58,7 @@ static void hits_come_at_the_detectors_rate(void **state) {
     /* all of them shine: 1200 e- at least on the filter's few pixels; four standard deviations, and
      * tracks that leave the frame */
     double expected = 5.0 * SIDE * SIDE * 169e-8 * 0.5;
-    bst_assert_close(seen / frames, expected, 4.0 * sqrt(expected / frames) + 0.01 * expected);
+    bst_assert_close(seen / FRAMES, expected, 4.0 * sqrt(expected / FRAMES) + 0.01 * expected);
     /* most fill one pixel or two, and stand out */
     assert_true(told > 0.6 * seen);
     close_scene(&s);
@@ -154,7 +146,7 @@ static void crowded_frames_are_looked_at_twice(void **state) {
 static void hits_on_a_binned_window(void **state) {
     (void)state;
     const double depth_um = 40.0, pitch_um = 13.0;
-    const int frames = thorough ? 150 : 50;
+    enum { FRAMES = 150 };
     for (int b = 1; b <= 2; b++) {
         scene s;
         open_scene(&s);
@@ -168,7 +160,7 @@ static void hits_on_a_binned_window(void **state) {
         s.frame.binning = b;
         start(&s);
         double n = 0.0, drawn = 0.0, sum[2] = {0.0}, turned[2] = {0.0};
-        for (int f = 0; f < frames; f++) {
+        for (int f = 0; f < FRAMES; f++) {
             bst_generator_result r = run(&s, f);
             n += r.count;
             for (int i = 0; i < r.count; i++) {
@@ -183,7 +175,7 @@ static void hits_on_a_binned_window(void **state) {
                 }
             }
         }
-        double expected = 20.0 * 800 * 480 * pitch_um * pitch_um * 1e-8 * (0.5 + 0.7) * frames;
+        double expected = 20.0 * 800 * 480 * pitch_um * pitch_um * 1e-8 * (0.5 + 0.7) * FRAMES;
         /* four standard deviations; one in a hundred has its middle outside */
         bst_assert_close(n, expected, 4.0 * sqrt(expected) + 0.01 * expected);
         bst_assert_close(sum[0] / n, 0.0, 4.0 * sqrt(1.0 / 12.0 / n));
@@ -197,8 +189,7 @@ static void hits_on_a_binned_window(void **state) {
     }
 }
 
-int main(int argc, char **argv) {
-    thorough = argc > 1 && strcmp(argv[1], "thorough") == 0;
+int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(false_alarms_are_poisson_with_a_gaussian_tail),
         cmocka_unit_test(hits_come_at_the_detectors_rate),
