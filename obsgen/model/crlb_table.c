@@ -25,17 +25,6 @@ static double pixel_integral_slope(double k, double c, double sigma) {
     return (exp(-0.5 * b * b) - exp(-0.5 * a * a)) / (sigma * 2.5066282746310002);
 }
 
-/* Share of light of a smeared segment in pixel k: second difference of antiderivatives. */
-static double segment_integral(double k, double c, double sigma, double length) {
-    double sum = 0.0;
-    int parts = length < 0.02 * sigma ? 1 : (int)fmin(ceil(3.0 * length / sigma), 4096.0);
-    double lo = k - 0.5 - 7.0 * sigma, hi = k + 0.5 + 7.0 * sigma;
-    for (int i = 0; i < parts; i++) {
-        double at = c + length * ((i + 0.5) / parts - 0.5);
-        sum += at > lo && at < hi ? pixel_integral(k, at, sigma) : 0.0;
-    }
-    return sum / parts;
-}
 static double segment_integral_slope(double k, double c, double sigma, double length) {
     if (length < 0.02 * sigma) {
         return pixel_integral_slope(k, c, sigma);
@@ -51,28 +40,56 @@ typedef struct profile {
     double share[MAX_PIXELS], slope[MAX_PIXELS];
 } profile;
 
+/* Adds a normal density centred at `at`, integrated over the pixels within 7 sigma. */
+static void add_point(profile *p, double at, double sigma) {
+    double s = sigma * sqrt(2.0), reach = 7.0 * sigma + 1.5;
+    int from = (int)fmax(floor(at - reach) - p->first, 0.0);
+    int to = (int)fmin(ceil(at + reach) - p->first, p->count - 1.0);
+    double before = erf((p->first + from - 0.5 - at) / s);
+    for (int i = from; i <= to; i++) {
+        /* neighbours share an edge */
+        double k = p->first + i, after = erf((k + 0.5 - at) / s);
+        if (at > k - 0.5 - 7.0 * sigma && at < k + 0.5 + 7.0 * sigma) {
+            p->share[i] += 0.5 * (after - before);
+        }
+        before = after;
+    }
+}
+
 /* Pixel-integrated profile of a segment and its derivative. */
 static void make_profile(profile *p, double c, double sigma, double length) {
     double reach = 0.5 * length + 6.0 * sigma + 1.0;
     p->first = (int)floor(c - reach);
     p->count = (int)ceil(c + reach) - p->first + 1;
     p->count = p->count < MAX_PIXELS ? p->count : MAX_PIXELS;
+    memset(p->share, 0, sizeof p->share);
+    int parts = length < 0.02 * sigma ? 1 : (int)fmin(ceil(3.0 * length / sigma), 4096.0);
+    for (int i = 0; i < parts; i++) {
+        add_point(p, c + length * ((i + 0.5) / parts - 0.5), sigma);
+    }
     for (int i = 0; i < p->count; i++) {
-        p->share[i] = segment_integral(p->first + i, c, sigma, length);
+        p->share[i] /= parts;
         p->slope[i] = segment_integral_slope(p->first + i, c, sigma, length);
     }
 }
 
-/* Adds the Fisher information of a product image: along, across, flux. */
-static void add_information(const profile *x, const profile *y, double ratio, double sums[3]) {
+typedef struct information {
+    double along[BST_BOUND_RATIOS], across[BST_BOUND_RATIOS], flux[BST_BOUND_RATIOS];
+} information;
+
+/* Adds the Fisher information of a product image for each ratio. */
+static void add_information(const profile *x, const profile *y,
+                            const double ratio[BST_BOUND_RATIOS], information *sums) {
     for (int j = 0; j < y->count; j++) {
         for (int i = 0; i < x->count; i++) {
             double p = x->share[i] * y->share[j];
-            double w = 1.0 / (1.0 + ratio * p);
             double dx = x->slope[i] * y->share[j], dy = x->share[i] * y->slope[j];
-            sums[0] += w * dx * dx;
-            sums[1] += w * dy * dy;
-            sums[2] += w * p * p;
+            for (int r = 0; r < BST_BOUND_RATIOS; r++) {
+                double w = 1.0 / (1.0 + ratio[r] * p);
+                sums->along[r] += w * dx * dx;
+                sums->across[r] += w * dy * dy;
+                sums->flux[r] += w * p * p;
+            }
         }
     }
 }
@@ -86,29 +103,32 @@ static double total_square(const profile *p) {
 }
 
 void bst_crlb_table_init(bst_crlb_table *b, double sigma_px) {
-    profile x, y;
+    profile x[PHASES], y[PHASES];
     b->sigma_px = sigma_px = fmax(sigma_px, 0.2);
     for (int n = 0; n < BST_BOUND_LENGTHS; n++) {
         /* A streak that does not fit is cut in the middle: the straight part contributes
          * information across the path only, in proportion to its length. */
         double length = length_of(n, sigma_px), most = MAX_PIXELS - 2.0 * (6.0 * sigma_px + 2.0);
         double shown = fmin(length, most), share = length > 0.0 ? shown / length : 1.0;
-        double sums[BST_BOUND_RATIOS][3] = {{0}}, squared = 0.0;
+        double ratio[BST_BOUND_RATIOS], squared = 0.0;
+        information sums = {.flux = {0}};
+        for (int r = 0; r < BST_BOUND_RATIOS; r++) {
+            ratio[r] = share * pow(10.0, FIRST_RATIO + r / PER_DECADE);
+        }
+        for (int phase = 0; phase < PHASES; phase++) {
+            make_profile(&x[phase], (phase + 0.5) / PHASES - 0.5, sigma_px, shown);
+            make_profile(&y[phase], (phase + 0.5) / PHASES - 0.5, sigma_px, 0.0);
+        }
         for (int phase = 0; phase < PHASES * PHASES; phase++) {
-            double cx = (phase % PHASES + 0.5) / PHASES - 0.5;
-            double cy = (double)(phase / PHASES + 0.5) / PHASES - 0.5;
-            make_profile(&x, cx, sigma_px, shown);
-            make_profile(&y, cy, sigma_px, 0.0);
-            for (int r = 0; r < BST_BOUND_RATIOS; r++) {
-                add_information(&x, &y, share * pow(10.0, FIRST_RATIO + r / PER_DECADE), sums[r]);
-            }
-            squared += total_square(&x) * total_square(&y);
+            const profile *along = &x[phase % PHASES], *across = &y[phase / PHASES];
+            add_information(along, across, ratio, &sums);
+            squared += total_square(along) * total_square(across);
         }
         double mean = share / (PHASES * PHASES);
         for (int r = 0; r < BST_BOUND_RATIOS; r++) {
-            b->along[n][r] = (float)log(sums[r][0] * mean * share);
-            b->across[n][r] = (float)log(sums[r][1] * mean);
-            b->flux[n][r] = (float)log(sums[r][2] * mean);
+            b->along[n][r] = (float)log(sums.along[r] * mean * share);
+            b->across[n][r] = (float)log(sums.across[r] * mean);
+            b->flux[n][r] = (float)log(sums.flux[r] * mean);
         }
         b->squared[n] = (float)log(squared * mean);
     }

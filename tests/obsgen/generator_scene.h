@@ -63,7 +63,11 @@ static inline void close_scene(scene *s) {
 /* Electrons of a point source of this SNR. */
 static inline double electrons_of(const scene *s, double snr) {
     static bst_crlb_table bound;
-    bst_crlb_table_init(&bound, s->frame.sigma_px);
+    static double sigma_px; /* that `bound` is of: some scenes ask for each of a thousand sources */
+    if (sigma_px != s->frame.sigma_px) {
+        sigma_px = s->frame.sigma_px;
+        bst_crlb_table_init(&bound, sigma_px);
+    }
     const bst_camera *c = &s->camera;
     double noise = sqrt(s->truth->background_e + c->read_noise_e * c->read_noise_e +
                         c->gain_e_per_dn * c->gain_e_per_dn / 12.0);
