@@ -127,3 +127,25 @@ double bst_matched_pixel_maxima(double sigma_px, double threshold) {
     double stays = stays_above(threshold, lag);
     return above(threshold) * (1.0 - stays) * (1.0 - stays);
 }
+
+double bst_matched_either_above(double first, double second, double correlation) {
+    enum { NODES = 6 };
+    static const double node[NODES] = {-0.932469514203152, -0.661209386466265, -0.238619186083197,
+                                       0.238619186083197,  0.661209386466265,  0.932469514203152};
+    static const double weight[NODES] = {0.171324492379170, 0.360761573048139, 0.467913934572691,
+                                         0.467913934572691, 0.360761573048139, 0.171324492379170};
+    static const double ALL = 4.0; /* sigmas beyond which nothing is left */
+    double root = sqrt(fmax(1.0 - correlation * correlation, 1e-8));
+    /* t: how far the first variable is below its threshold */
+    double start = fmax(-first - ALL, 0.0), end = ALL + fmax(-first, 0.0), sum = 0.0;
+    double lead = second - correlation * first;
+    if (correlation > 0.0) {
+        end = fmin(end, (lead + ALL * root) / correlation);
+    }
+    for (int i = 0; i < NODES && end > start; i++) {
+        double t = start + 0.5 * (end - start) * (1.0 + node[i]);
+        sum += 0.5 * (end - start) * weight[i] * density(first + t) *
+               bst_matched_normal_below((lead - correlation * t) / root);
+    }
+    return bst_matched_normal_below(first) + sum;
+}
