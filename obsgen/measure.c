@@ -134,7 +134,8 @@ static bool is_drawn_out(const bst_generator *g, const generator_source *s) {
 static void set_extent(const bst_generator *g, const generator_source *s, bool as_streak,
                        bst_detection *d) {
     double modelled = as_streak ? g->streak : 0.0, b = g->binning;
-    double length = d->snr >= MOMENTS_SNR ? s->length : modelled;
+    /* on an uneven path a point is the bright part of the light */
+    double length = d->snr >= MOMENTS_SNR && (as_streak || !g->uneven) ? s->length : modelled;
     double across2 = g->sigma * g->sigma, along2 = across2 + length * length / 12.0;
     d->length_px = b * BST_FWHM_PER_SIGMA * sqrt(along2);
     d->width_px = b * BST_FWHM_PER_SIGMA * sqrt(across2);
