@@ -108,11 +108,10 @@ void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) 
     g->path_rms_px = sqrt(residual.fit_px2);
     set_uneven_outputs(g, residual.uniform_px2);
     const bst_obsgen_image_width *w = &g->response.filter;
-    g->shared_noise =
-        fmin(bst_response_product(w, g->star_path, rest) /
-                 sqrt(bst_response_product(w, rest, rest) *
-                      bst_response_product(w, g->star_path, g->star_path)),
-             1.0);
+    g->shared_noise = fmin(bst_response_product(w, g->star_path, rest) /
+                               sqrt(bst_response_product(w, rest, rest) *
+                                    bst_response_product(w, g->star_path, g->star_path)),
+                           1.0);
 }
 
 /* Sets the detection threshold, cached by streak length. Streaks are counted in steps of half a

@@ -196,8 +196,8 @@ static void set_amplitude(const bst_generator *g, generator_source *s) {
     double ideal = s->sharp * s->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e *
                    sqrt(s->visible);
     if (s->broken) { /* at rest */
-        s->amplitude = g->filters[0].efficiency * s->flux_e *
-                       bst_crlb_table_norm(&g->bound, 0.0) / g->noise_e;
+        s->amplitude =
+            g->filters[0].efficiency * s->flux_e * bst_crlb_table_norm(&g->bound, 0.0) / g->noise_e;
         return;
     }
     double efficiency = bst_generator_set_filter(g, s);

@@ -24,8 +24,8 @@ typedef struct generator_source {
     /* output of the frame's other filter relative to this one's amplitude; 0: one filter only */
     double other;
     double start_x, start_y; /* where a point fit to it begins, relative to the mean of its path */
-    uint64_t name;         /* stream of its random draws */
-    int item, head;        /* head: source with which it is merged; -1: none */
+    uint64_t name;           /* stream of its random draws */
+    int item, head;          /* head: source with which it is merged; -1: none */
     bool star, as_streak, found, saturated;
     bool broken; /* longer than is filtered for: detected in fragments */
 } generator_source;
@@ -71,7 +71,7 @@ struct bst_generator {
     double filter_sigma;       /* filters' point image, with the pixel width */
     double cross_sigma;        /* width of the filter output about a source: sqrt(2) times it */
     bst_generator_filter filters[2]; /* for points, for star streaks */
-    double shared_noise; /* correlation of the two filters' noise */
+    double shared_noise;             /* correlation of the two filters' noise */
     double white_share; /* share of the noise variance that is independent between pixels */
     double fit_light;   /* brightest pixel over noise variance, per sqrt(sum p^2) and electron */
     bst_obsgen_path_px straight_path; /* nearest straight path to the true one */
@@ -121,7 +121,7 @@ struct bst_generator {
     struct generator_streaks *streaks;
     /* centroid bias of fits by the true camera motion, by light level */
     double star_bias[GENERATOR_BIASES][2], streak_bias[GENERATOR_BIASES][2];
-    double bias_sigma; /* see bst_star_trail_point_bias */
+    double bias_sigma;  /* see bst_star_trail_point_bias */
     double image_sigma; /* width of a point at rest, including the pixel */
     bst_obsgen_generated *items;
     int count, lost;

@@ -110,8 +110,8 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     double x = b->x + c * error[0] - n * error[1], y = b->y + n * error[0] + c * error[1];
     double bias = cal->phase_bias_px / g->binning, shared[2];
     bool drawn = s->as_streak && !b->point;
-    double light = drawn ? bst_generator_streak_light(g, b->flux_e)
-                         : b->flux_e * truth->norm * g->fit_light;
+    double light =
+        drawn ? bst_generator_streak_light(g, b->flux_e) : b->flux_e * truth->norm * g->fit_light;
     shared_bias(g, s, drawn, light, shared);
     x += shared[0] + bias * sin(2.0 * BST_PI * b->x);
     y += shared[1] + bias * sin(2.0 * BST_PI * b->y);

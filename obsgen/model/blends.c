@@ -58,8 +58,8 @@ static double noisy_level(const bst_generator *g, const generator_source *s) {
     double level = s->amplitude + s->spread * s->noise / g->calibration.slope;
     if (s->other > 0.0) {
         double spread = sqrt(bst_generator_output_variance(g, s, true));
-        level = fmax(level, s->other * s->amplitude + spread * bst_generator_other_noise(g, s) /
-                                                          g->calibration.slope);
+        level = fmax(level, s->other * s->amplitude +
+                                spread * bst_generator_other_noise(g, s) / g->calibration.slope);
     }
     return level;
 }
@@ -325,13 +325,11 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         double bright = g->smeared
                             ? 0.0
                             : out.flux_e * bst_crlb_table_norm(&g->bound, s->length) * g->fit_light;
-        double sum = s->flux_e *
-                     bst_blend_weight(&g->blend_weights, bright, pull_of(g, &at, s));
+        double sum = s->flux_e * bst_blend_weight(&g->blend_weights, bright, pull_of(g, &at, s));
         double x = 0.0, y = 0.0;
         for (int k = 0; k < count; k++) {
-            double light =
-                merged[k].flux_e *
-                bst_blend_weight(&g->blend_weights, bright, pull_of(g, &at, &merged[k]));
+            double light = merged[k].flux_e *
+                           bst_blend_weight(&g->blend_weights, bright, pull_of(g, &at, &merged[k]));
             sum += light;
             x += light * (merged[k].x - s->x);
             y += light * (merged[k].y - s->y);

@@ -50,7 +50,7 @@ double bst_matched_pixel_maxima(double sigma_px, double threshold);
  * Given:     first, second  means above the thresholds
  *            correlation    of the two, 0 to 1
  * Notes:     one integral: P(first) plus that of the second variable's excess where the first is
- *            below; Gauss-Legendre of six nodes, to 1e-4 */
+ *            below; Gauss-Legendre of eight nodes */
 double bst_matched_either_above(double first, double second, double correlation);
 
 #endif

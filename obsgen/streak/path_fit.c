@@ -58,8 +58,7 @@ static void sample_path(const bst_star_trail_path *p, samples *out) {
 
 /* Positions of the streak model about its mean. */
 static void sample_model(const bst_streak_model *m, samples *out) {
-    double length =
-        hypot(m->path.dx, m->path.dy) + 2.0 * hypot(m->bend.dx, m->bend.dy);
+    double length = hypot(m->path.dx, m->path.dy) + 2.0 * hypot(m->bend.dx, m->bend.dy);
     out->count = (int)fmin(ceil(1.5 * length / m->sigma_px) + 1.0, MODEL);
     for (int i = 0; i < out->count; i++) {
         double u = out->count > 1 ? (i + 0.5) / out->count * 2.0 - 1.0 : 0.0;
@@ -88,8 +87,8 @@ static grid grid_about(const samples *model, double sigma) {
     double margin = MARGIN_SIGMAS * sigma, wide = high[0] - low[0], tall = high[1] - low[1];
     double step = fmax(STEP_SIGMAS * sigma, fmax((wide + 2.0 * margin) / (COLUMNS - 1),
                                                  (tall + 2.0 * margin) / (ROWS - 1)));
-    return (grid){low[0] - margin, low[1] - margin, step,
-                  (int)((wide + 2.0 * margin) / step) + 1, (int)((tall + 2.0 * margin) / step) + 1};
+    return (grid){low[0] - margin, low[1] - margin, step, (int)((wide + 2.0 * margin) / step) + 1,
+                  (int)((tall + 2.0 * margin) / step) + 1};
 }
 
 /* Light on the grid and its derivatives by x, by y and by variance. */
@@ -170,14 +169,13 @@ static bool improve(const planes *seen, const planes *model, int n, double light
     f->x += fmin(fmax(g[0], -MOST_STEP_PX), MOST_STEP_PX);
     f->y += fmin(fmax(g[1], -MOST_STEP_PX), MOST_STEP_PX);
     f->flux = fmax(f->flux + g[2], 0.1 * f->flux);
-    f->widening = fmin(fmax(f->widening + g[3], LEAST_WIDENING * variance),
-                       MOST_WIDENING * variance);
+    f->widening =
+        fmin(fmax(f->widening + g[3], LEAST_WIDENING * variance), MOST_WIDENING * variance);
     return fabs(g[0]) > SETTLED_PX || fabs(g[1]) > SETTLED_PX;
 }
 
 bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_streak_model *model,
-                                  const bst_streak_model *stamp, double light,
-                                  double place_px[2]) {
+                                  const bst_streak_model *stamp, double light, double place_px[2]) {
     bst_path_fit_squares squares = {0.0, 0.0};
     samples star, streak, about;
     planes seen, shape;
@@ -253,8 +251,8 @@ bst_path_outputs bst_path_fit_outputs(const bst_star_trail_path *path, bst_obsge
     }
     const bst_obsgen_path_px rest = {0.0, 0.0};
     double norm = image_norm(&s, w);
-    out.point /= 2.0 * BST_PI * root * root *
-                 sqrt(bst_matched_product(rest, rest, w->filter_px)) * norm;
+    out.point /=
+        2.0 * BST_PI * root * root * sqrt(bst_matched_product(rest, rest, w->filter_px)) * norm;
     if (length > 0.0) {
         double scale = 1.0 / (sqrt(2.0 * BST_PI) * root * length *
                               sqrt(bst_matched_product(filter, filter, w->filter_px)) * norm);

@@ -13,7 +13,8 @@ typedef struct bst_streak_model {
     double sigma_px; /* of the PSF, including the pixel */
 } bst_streak_model;
 
-/* Weighted squares on the fitted pixels, of one unit: of all light, and of what the model leaves. */
+/* Weighted squares on the fitted pixels, of one unit: of all light, and of what the model leaves.
+ */
 typedef struct bst_path_fit_squares {
     double all, left;
 } bst_path_fit_squares;

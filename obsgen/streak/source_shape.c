@@ -6,8 +6,8 @@
 #include "obsgen/generator_internal.h"
 #include "obsgen/streak/path_fit.h"
 
-/* Path deviation, px RMS per axis, below which the bias of a streak's fit is the same for bright and
- * faint stars to 0.01 px. */
+/* Path deviation, px RMS per axis, below which the bias of a streak's fit is the same for bright
+ * and faint stars to 0.01 px. */
 static const double UNIFORM_PX = 0.05;
 
 /* Image processing fits both shapes to a point whose streak output is above this share. */
@@ -117,7 +117,8 @@ bst_star_trail_path bst_generator_object_path(const bst_generator *g, const gene
     return (bst_star_trail_path){g->object_x, g->object_y, g->path.count};
 }
 
-/* Efficiencies of both filters and shape of an object in a frame whose stars have an uneven path. */
+/* Efficiencies of both filters and shape of an object in a frame whose stars have an uneven path.
+ */
 static void set_uneven_object(const bst_generator *g, generator_source *s, double efficiency[2]) {
     const bst_star_trail_path path = bst_generator_object_path(g, s);
     const bst_path_widths widths = {g->image_sigma, g->filter_sigma, g->bias_sigma};

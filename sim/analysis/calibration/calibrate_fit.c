@@ -8,8 +8,8 @@ enum { LEAST_SOURCES = 200, LEAST_ALARMS = 10, LEAST_PLACES = 30 };
 
 /* Probability that a source of this SNR is detected, in either filter of its frame. */
 static double detection_probability(const calibrate_trial *t, double snr, double slope) {
-    double z = slope * (snr - (double)t->threshold) /
-               sqrt((double)t->variance + (double)t->shot * snr);
+    double z =
+        slope * (snr - (double)t->threshold) / sqrt((double)t->variance + (double)t->shot * snr);
     double seen = (double)t->other * snr;
     if (!(seen > 0.0)) {
         return bst_matched_normal_below(z);
