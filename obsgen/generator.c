@@ -210,7 +210,8 @@ static void set_amplitude(const bst_generator *g, generator_source *s) {
     /* noise raises the maximum near a source, the more, the flatter the image's peak is */
     double flatness = g->cross_sigma / g->filter_sigma;
     gain = g->smeared ? 1.0 : 1.0 + (gain - 1.0) * flatness * flatness;
-    s->amplitude = gain * efficiency * ideal;
+    s->unraised = efficiency * ideal;
+    s->amplitude = bst_obsgen_peak(s->unraised, gain);
 }
 
 /* Grows the arrays of sources. */
@@ -291,6 +292,7 @@ static void add_crowding(bst_generator *g) {
         if (!s->broken) { /* bias of the output: the filter's sum over its norm times the background
                              excess */
             s->amplitude *= before / g->noise_e;
+            s->unraised *= before / g->noise_e;
             double length = s->as_streak ? g->streak : 0.0;
             s->amplitude -=
                 g->background_bias_e / (bst_crlb_table_norm(&g->bound, length) * g->noise_e);
@@ -311,6 +313,7 @@ static void set_open_sky(bst_generator *g) {
         s->amplitude +=
             g->background_bias_e / (bst_crlb_table_norm(&g->bound, length) * g->noise_e);
         s->amplitude *= g->noise_e / g->dark_noise_e;
+        s->unraised *= g->noise_e / g->dark_noise_e;
     }
     g->background_e -= g->background_bias_e;
     g->background_bias_e = 0.0;

@@ -193,9 +193,7 @@ static void draw_streak_position(const bst_generator *g, const generator_source 
     }
     double across = bst_obsgen_between(bst_obsgen_snrs, cal->across_factor, BST_OBSGEN_SNRS, snr) *
                     sqrt(bound.var_across_px2 * out->widen);
-    double gain =
-        bst_obsgen_between(bst_obsgen_lengths_px, cal->gain, BST_OBSGEN_LENGTHS, s->length);
-    double own = s->amplitude / gain;
+    double own = s->unraised;
     /* standard deviation of the bound relative to the filters' peak without scatter */
     double noise = along * own * sqrt(g->centroid_error->curvature);
     noise = fmin(fmax(noise, LEAST_NOISE), MOST_NOISE);

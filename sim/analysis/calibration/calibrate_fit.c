@@ -33,7 +33,7 @@ static double likelihood(const bst_calibration_fitter *c, int node, double gain,
         if (own != node) {
             continue;
         }
-        double p = detection_probability(t, gain * (double)t->amplitude, slope);
+        double p = detection_probability(t, bst_obsgen_peak((double)t->amplitude, gain), slope);
         sum +=
             log(fmax(t->detected ? p : 1.0 - p, 1e-4)); /* limits the effect of a few wrong pairs */
     }
