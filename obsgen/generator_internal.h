@@ -17,7 +17,7 @@ typedef struct generator_source {
     double ends;           /* share of both streak ends on the frame */
     double seen_x, seen_y; /* centre of the visible part */
     double sharp;          /* factor on its amplitude; 1 for the PSF alone */
-    double unraised;       /* SNR in the filter output at its place, without noise and bias */
+    double unraised;       /* SNR in the filter output at its place, without noise */
     double amplitude;      /* mean peak of the filter output, SNR */
     double peak;           /* amplitude including the light of neighbours */
     double noise, spread;  /* noise draw of the peak; its standard deviation */
