@@ -312,8 +312,7 @@ static void set_open_sky(bst_generator *g) {
     for (int i = 0; i < g->source_count; i++) {
         generator_source *s = &g->sources[i];
         double length = s->as_streak ? g->streak : 0.0;
-        double taken =
-            g->background_bias_e / (bst_crlb_table_norm(&g->bound, length) * g->noise_e);
+        double taken = g->background_bias_e / (bst_crlb_table_norm(&g->bound, length) * g->noise_e);
         s->amplitude += taken;
         s->unraised += taken;
         s->amplitude *= g->noise_e / g->dark_noise_e;
