@@ -1,5 +1,7 @@
 #include "obsgen/calibration.h"
 
+#include <math.h>
+
 #include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -114,6 +116,12 @@ bst_status bst_obsgen_calibration_write(bst_ctx *ctx, const char *path,
     free(text);
     cJSON_Delete(root);
     return status;
+}
+
+double bst_obsgen_peak(double snr, double gain) {
+    /* SNR at which the gain is given; least one at which the source determines the peak */
+    static const double GAIN_SNR = 5.0, LEAST_SNR = 3.0;
+    return snr + (gain - 1.0) * GAIN_SNR * GAIN_SNR / fmax(snr, LEAST_SNR);
 }
 
 double bst_obsgen_between(const double *nodes, const double *values, int count, double at) {

@@ -4,7 +4,7 @@
 
 #include "boresight/config.h"
 
-enum { BST_OBSGEN_CALIBRATION_VERSION = 4, BST_OBSGEN_LENGTHS = 4, BST_OBSGEN_SNRS = 6 };
+enum { BST_OBSGEN_CALIBRATION_VERSION = 5, BST_OBSGEN_LENGTHS = 4, BST_OBSGEN_SNRS = 6 };
 
 /* Streak lengths (px) and SNRs of the nodes of the tables below. Between nodes they are
  * interpolated linearly; beyond them the end values apply. */
@@ -19,7 +19,8 @@ typedef struct bst_obsgen_calibration {
     /* share of the sources' light below the clip that enters the background */
     double background_fraction;
     double crowding; /* share of the square of that light that enters the noise */
-    /* SNR of the matched filter relative to the ideal, by streak length */
+    /* peak of the matched filter near a source of SNR 5 relative to the ideal output, by streak
+     * length; see bst_obsgen_peak */
     double gain[BST_OBSGEN_LENGTHS];
     double slope; /* slope of the probit of the detection probability by SNR; ideal: 1 */
     double false_alarm_factor;    /* false-alarm rate relative to the threshold's design rate */
@@ -50,6 +51,15 @@ bst_status bst_obsgen_calibration_read(bst_ctx *ctx, const char *path,
  * Errors:    BST_ERR_IO, BST_ERR_MEMORY */
 bst_status bst_obsgen_calibration_write(bst_ctx *ctx, const char *path,
                                         const bst_obsgen_calibration *calibration) BST_MUST_CHECK;
+
+/* Mean peak of the filter output near a source, SNR.
+ *
+ * Given:     snr   output at its place without noise
+ *            gain  the peak relative to that at SNR 5
+ * Notes:     the noise has a gradient of variance Lambda at the source, and the output a curvature
+ * of snr Lambda: the peak is g^2 / (2 snr Lambda) higher, in the mean over both axes 1 / snr. A
+ * filter that is flat along a streak, or two filters, leave the peak more room. */
+double bst_obsgen_peak(double snr, double gain);
 
 /* Linear interpolation in a table; the end values apply beyond its nodes. */
 double bst_obsgen_between(const double *nodes, const double *values, int count, double at);

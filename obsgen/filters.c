@@ -16,11 +16,12 @@ typedef struct path_residual {
     double filter_px2; /* from the straight uniform path; for a streak filter, across it */
     /* from the fitted path: a streak model includes the bend known from telemetry */
     double fit_px2;
+    double uniform_px2; /* from the path that telemetry reports, without bend */
 } path_residual;
 
 /* Sets the straight uniform path nearest to the true one. */
 static path_residual fit_straight_path(bst_generator *g) {
-    path_residual out = {0.0, 0.0};
+    path_residual out = {0.0, 0.0, 0.0};
     g->straight_path = g->whole_path;
     if (g->smeared || g->path.count < 3) {
         return out;
@@ -45,6 +46,8 @@ static path_residual fit_straight_path(bst_generator *g) {
         double ex = dx - bent * g->bend_x, ey = dy - bent * g->bend_y;
         out.filter_px2 += weight * (drawn ? across * across : 0.5 * (dx * dx + dy * dy)) / last;
         out.fit_px2 += weight * 0.5 * (ex * ex + ey * ey) / last;
+        double ux = g->path_x[k] - u * g->star_path.dx, uy = g->path_y[k] - u * g->star_path.dy;
+        out.uniform_px2 += weight * 0.5 * (ux * ux + uy * uy) / last;
     }
     return out;
 }
@@ -52,6 +55,22 @@ static path_residual fit_straight_path(bst_generator *g) {
 /* Geometric mean width of an image, px. */
 static double mean_width(const bst_obsgen_image_width *w) {
     return sqrt(w->across_px * w->along_px);
+}
+
+/* Path deviation per axis, in widths of the filter output, from which the filters' outputs are
+ * computed for the true path; below, they are those of the nearest uniform path to 2 %. */
+static const double UNEVEN_SIGMAS = 0.7;
+
+/* Sets the outputs of the filters for a star whose path is far from the filtered one. */
+static void set_uneven_outputs(bst_generator *g, double uniform_px2) {
+    g->uneven = g->streak > 0.0 && g->path.count >= 3 &&
+                uniform_px2 > UNEVEN_SIGMAS * UNEVEN_SIGMAS * g->bias_sigma * g->bias_sigma;
+    if (g->uneven) {
+        const bst_path_widths widths = {g->image_sigma, g->filter_sigma, g->bias_sigma};
+        g->outputs = bst_path_fit_outputs(&g->path, g->star_path, &widths);
+        g->filters[0].efficiency = fmin(g->outputs.point, 1.0);
+        g->filters[1].efficiency = fmin(g->outputs.streak, 1.0);
+    }
 }
 
 void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) {
@@ -70,6 +89,7 @@ void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) 
     g->known_width = mean_width(&g->response.filter) / mean_width(&response.source);
     g->cross_sigma = mean_width(&g->response.both);
     g->bias_sigma = mean_width(&response.both);
+    g->image_sigma = mean_width(&response.source);
     g->filter_sigma = mean_width(&g->response.filter);
     /* the position is determined by the image's gradient */
     double ratio = g->response.maxima_sigma_px / g->filter_sigma;
@@ -85,6 +105,13 @@ void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) 
             sqrt(bst_response_product(&g->response.filter, paths[k], paths[k]) /
                  bst_matched_product(paths[k], paths[k], mean_width(&response.source)));
     }
+    g->path_rms_px = sqrt(residual.fit_px2);
+    set_uneven_outputs(g, residual.uniform_px2);
+    const bst_obsgen_image_width *w = &g->response.filter;
+    g->shared_noise = fmin(bst_response_product(w, g->star_path, rest) /
+                               sqrt(bst_response_product(w, rest, rest) *
+                                    bst_response_product(w, g->star_path, g->star_path)),
+                           1.0);
 }
 
 /* Sets the detection threshold, cached by streak length. Streaks are counted in steps of half a

@@ -191,28 +191,16 @@ static bool position_source(const bst_generator *g, const bst_generator_frame *f
 
 /* Noise-free amplitude of a source in the matched-filter output, and the filter that gives it. */
 static void set_amplitude(const bst_generator *g, generator_source *s) {
-    const bst_obsgen_path_px point = {0.0, 0.0};
     double gain = bst_obsgen_between(bst_obsgen_lengths_px, g->calibration.gain, BST_OBSGEN_LENGTHS,
                                      s->length);
     double ideal = s->sharp * s->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e *
                    sqrt(s->visible);
-    double efficiency = g->filters[0].efficiency;
-    s->as_streak = false;
     if (s->broken) { /* at rest */
-        s->amplitude = efficiency * s->flux_e * bst_crlb_table_norm(&g->bound, 0.0) / g->noise_e;
+        s->amplitude =
+            g->filters[0].efficiency * s->flux_e * bst_crlb_table_norm(&g->bound, 0.0) / g->noise_e;
         return;
     }
-    s->as_streak = s->star && g->streak > 0.0;
-    if (s->as_streak) {
-        efficiency = g->filters[1].efficiency;
-    } else if (!s->star) {
-        efficiency = bst_response_efficiency(&g->response, s->path, point);
-        if (g->streak > 0.0) {
-            double other = bst_response_efficiency(&g->response, s->path, g->star_path);
-            s->as_streak = other > efficiency;
-            efficiency = fmax(other, efficiency);
-        }
-    }
+    double efficiency = bst_generator_set_filter(g, s);
     if (g->image_bound) {
         ideal *= bst_crlb_table_norm(g->image_bound, s->length) /
                  bst_crlb_table_norm(&g->bound, s->length);
@@ -222,7 +210,8 @@ static void set_amplitude(const bst_generator *g, generator_source *s) {
     /* noise raises the maximum near a source, the more, the flatter the image's peak is */
     double flatness = g->cross_sigma / g->filter_sigma;
     gain = g->smeared ? 1.0 : 1.0 + (gain - 1.0) * flatness * flatness;
-    s->amplitude = gain * efficiency * ideal;
+    s->unraised = efficiency * ideal;
+    s->amplitude = bst_obsgen_peak(s->unraised, gain);
 }
 
 /* Grows the arrays of sources. */
@@ -303,9 +292,12 @@ static void add_crowding(bst_generator *g) {
         if (!s->broken) { /* bias of the output: the filter's sum over its norm times the background
                              excess */
             s->amplitude *= before / g->noise_e;
+            s->unraised *= before / g->noise_e;
             double length = s->as_streak ? g->streak : 0.0;
-            s->amplitude -=
+            double taken =
                 g->background_bias_e / (bst_crlb_table_norm(&g->bound, length) * g->noise_e);
+            s->amplitude -= taken;
+            s->unraised -= taken;
         }
     }
 }
@@ -320,9 +312,11 @@ static void set_open_sky(bst_generator *g) {
     for (int i = 0; i < g->source_count; i++) {
         generator_source *s = &g->sources[i];
         double length = s->as_streak ? g->streak : 0.0;
-        s->amplitude +=
-            g->background_bias_e / (bst_crlb_table_norm(&g->bound, length) * g->noise_e);
+        double taken = g->background_bias_e / (bst_crlb_table_norm(&g->bound, length) * g->noise_e);
+        s->amplitude += taken;
+        s->unraised += taken;
         s->amplitude *= g->noise_e / g->dark_noise_e;
+        s->unraised *= g->noise_e / g->dark_noise_e;
     }
     g->background_e -= g->background_bias_e;
     g->background_bias_e = 0.0;
@@ -389,25 +383,6 @@ static bst_status set_path(bst_ctx *ctx, bst_generator *g, const bst_generator_f
     return BST_OK;
 }
 
-/* Centroid bias of the stars' images: as streaks, and as points for each light level. */
-static void set_star_bias(bst_generator *g) {
-    if (g->smeared || g->path.count < 3) {
-        return;
-    }
-    if (g->streak > 0.0) {
-        bst_star_trail_bias(&g->path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
-                            g->total_sigma, g->streak_bias);
-    }
-    double light = GENERATOR_FIRST_LIGHT;
-    for (int i = 0; i < GENERATOR_BIASES; i++, light *= 10.0) {
-        if (i > 0) {
-            memcpy(g->star_bias[i], g->star_bias[i - 1], sizeof g->star_bias[0]);
-        }
-        bst_star_trail_point_bias(&g->path, &g->blend_weights, light, g->bias_sigma,
-                                  g->star_bias[i]);
-    }
-}
-
 /* Sets up all frame quantities: geometry, path, noise, filters. */
 static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_frame *f) {
     g->binning = f->binning > 1 ? f->binning : 1;
@@ -434,7 +409,7 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
     bst_generator_set_response(g, f);
     BST_TRY(set_path(ctx, g, f));
     bst_generator_set_response(g, f); /* after the path is set */
-    set_star_bias(g);
+    bst_generator_set_star_bias(g);
     return BST_OK;
 }
 
@@ -554,7 +529,7 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
             keep_whole_rough(g, i);
         } else if (s->found) {
             generator_blend b = bst_generator_blend_of(g, i);
-            b.point = b.point || bst_generator_fits_point(g, s, &b);
+            b.point = g->uneven ? !s->as_streak : b.point || bst_generator_fits_point(g, s, &b);
             bst_obsgen_generated item = {.detection = bst_generator_measure(g, s, &b),
                                          .item = s->item,
                                          .drawn = s->as_streak && !b.point};
@@ -580,6 +555,8 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
                                   .noise_e = g->noise_e,
                                   .threshold_snr = g->threshold,
                                   .filter = g->filters[g->streak > 0.0],
+                                  .point = g->filters[0],
+                                  .shared_noise = g->shared_noise,
                                   .faint_light_e = g->faint_light_e,
                                   .faint_square_e2 = g->faint_square_e2,
                                   .streak_px = g->streak * g->binning,

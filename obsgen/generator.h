@@ -84,6 +84,8 @@ typedef struct bst_generator_result {
     int count, lost;
     double background_e, noise_e, threshold_snr;
     bst_generator_filter filter; /* for stars */
+    bst_generator_filter point;  /* the frame's other filter, if stars are streaks */
+    double shared_noise;         /* correlation of the noise of both */
     /* per pixel, of sources below the clip of background and noise: mean light and mean squared
      * light */
     double faint_light_e, faint_square_e2;

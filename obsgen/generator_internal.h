@@ -4,6 +4,7 @@
 
 #include "obsgen/generator.h"
 #include "obsgen/model/blend_weight.h"
+#include "obsgen/streak/path_fit.h"
 #include "obsgen/streak/star_trail.h"
 #include "obsgen/streak/streak_centroid_error.h"
 
@@ -16,12 +17,16 @@ typedef struct generator_source {
     double ends;           /* share of both streak ends on the frame */
     double seen_x, seen_y; /* centre of the visible part */
     double sharp;          /* factor on its amplitude; 1 for the PSF alone */
-    double amplitude;      /* SNR in the filter output without noise */
+    double unraised;       /* SNR in the filter output at its place, without noise */
+    double amplitude;      /* mean peak of the filter output, SNR */
     double peak;           /* amplitude including the light of neighbours */
     double noise, spread;  /* noise draw of the peak; its standard deviation */
     double level;          /* amplitude including noise */
-    uint64_t name;         /* stream of its random draws */
-    int item, head;        /* head: source with which it is merged; -1: none */
+    /* output of the frame's other filter relative to this one's amplitude; 0: one filter only */
+    double other;
+    double start_x, start_y; /* where a point fit to it begins, relative to the mean of its path */
+    uint64_t name;           /* stream of its random draws */
+    int item, head;          /* head: source with which it is merged; -1: none */
     bool star, as_streak, found, saturated;
     bool broken; /* longer than is filtered for: detected in fragments */
 } generator_source;
@@ -67,11 +72,17 @@ struct bst_generator {
     double filter_sigma;       /* filters' point image, with the pixel width */
     double cross_sigma;        /* width of the filter output about a source: sqrt(2) times it */
     bst_generator_filter filters[2]; /* for points, for star streaks */
+    double shared_noise;             /* correlation of the two filters' noise */
     double white_share; /* share of the noise variance that is independent between pixels */
     double fit_light;   /* brightest pixel over noise variance, per sqrt(sum p^2) and electron */
     bst_obsgen_path_px straight_path; /* nearest straight path to the true one */
     /* width of the images relative to the fitted ones, by deviations of the path */
     double widening;
+    double path_rms_px; /* of the true path about the fitted one, per axis */
+    bool uneven;        /* the path is far from uniform: filter outputs follow `outputs` */
+    bst_path_outputs outputs;
+    /* lead of a point's fit over a streak's on an uneven path, by light level; see point_lead() */
+    double point_lead[GENERATOR_BIASES];
     double known_width; /* width of the filters' images relative to the PSF's */
     /* centroid variance relative to a Gaussian of the PSF's noise-equivalent area */
     double place_ratio2;
@@ -110,8 +121,9 @@ struct bst_generator {
     bst_obsgen_path_px whole_path; /* from start to end */
     struct generator_streaks *streaks;
     /* centroid bias of fits by the true camera motion, by light level */
-    double star_bias[GENERATOR_BIASES][2], streak_bias[2];
-    double bias_sigma; /* see bst_star_trail_point_bias */
+    double star_bias[GENERATOR_BIASES][2], streak_bias[GENERATOR_BIASES][2];
+    double bias_sigma;  /* see bst_star_trail_point_bias */
+    double image_sigma; /* width of a point at rest, including the pixel */
     bst_obsgen_generated *items;
     int count, lost;
 };
@@ -127,12 +139,29 @@ void bst_generator_set_filters(bst_generator *g);
 double bst_generator_open_share(const bst_generator *g);
 /* Variance per pixel by column offsets, e-^2; 0 if image processing subtracts the column levels. */
 double bst_generator_column_variance(const bst_generator *g);
-/* Variance of the filter output at a source, in SNR^2. */
-double bst_generator_output_variance(const bst_generator *g, const generator_source *s);
+/* Variance of a filter's output at a source, in SNR^2; other: of the filter that it does not show
+ * best. */
+double bst_generator_output_variance(const bst_generator *g, const generator_source *s, bool other);
+/* Standard normal noise of the other filter at a source, of which the own filter has s->noise. */
+double bst_generator_other_noise(const bst_generator *g, const generator_source *s);
 /* Output of the filter for source a at its position, caused by source b, relative to b's amplitude.
  */
 double bst_generator_overlap(const bst_generator *g, const generator_source *a,
                              const generator_source *b);
+/* Sets the centroid bias of the stars' images for each light level: as streaks, and as points. */
+void bst_generator_set_star_bias(bst_generator *g);
+/* Sets the shape in which a source is seen, and the output of the frame's other filter; returns the
+ * efficiency of the filter for that shape. */
+double bst_generator_set_filter(const bst_generator *g, generator_source *s);
+/* Path of an object: that of the stars plus its own uniform motion, relative to its mean; valid
+ * until the next call. */
+bst_star_trail_path bst_generator_object_path(const bst_generator *g, const generator_source *s);
+/* Streak model of image processing in the frame. */
+bst_streak_model bst_generator_streak_model(const bst_generator *g);
+/* True if the streak's fit is worth an iteration of its own: see UNIFORM_PX. */
+bool bst_generator_is_uniform(const bst_generator *g);
+/* Light level of a streak's fit: brightest pixel of the fitted streak over the noise variance. */
+double bst_generator_streak_light(const bst_generator *g, double flux_e);
 /* Filter output above which image processing interpolates maxima. */
 double bst_generator_looks_from(const bst_generator *g);
 /* True if image processing resolves two sources as separate maxima. */

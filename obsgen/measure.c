@@ -12,34 +12,29 @@ static const double LEAST_SEEN = 0.02;
 static void shared_bias(const bst_generator *g, const generator_source *s, bool as_streak,
                         double light, double bias[2]) {
     bool shared = s->star || s->broken || g->path.count < 3;
-    if (shared && as_streak) {
-        bias[0] = g->streak_bias[0];
-        bias[1] = g->streak_bias[1];
-        return;
-    }
     if (shared) {
+        const double(*table)[2] = as_streak ? g->streak_bias : g->star_bias;
         double at = log10(fmax(light, GENERATOR_FIRST_LIGHT) / GENERATOR_FIRST_LIGHT);
         at = fmin(at, GENERATOR_BIASES - 1.001);
         int i = (int)at;
         for (int k = 0; k < 2; k++) {
-            bias[k] = g->star_bias[i][k] + (at - i) * (g->star_bias[i + 1][k] - g->star_bias[i][k]);
+            bias[k] = table[i][k] + (at - i) * (table[i + 1][k] - table[i][k]);
         }
         return;
     }
-    const bst_obsgen_path_px *stars = g->smeared ? &g->whole_path : &g->straight_path;
-    double dx = s->path.dx - stars->dx, dy = s->path.dy - stars->dy;
-    for (int k = 0; k < g->path.count; k++) {
-        double u = (double)k / (g->path.count - 1) - 0.5;
-        g->object_x[k] = g->path_x[k] + u * dx;
-        g->object_y[k] = g->path_y[k] + u * dy;
-    }
-    const bst_star_trail_path path = {g->object_x, g->object_y, g->path.count};
+    const bst_star_trail_path path = bst_generator_object_path(g, s);
     bias[0] = bias[1] = 0.0;
-    if (as_streak) {
-        bst_star_trail_bias(&path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
-                            g->total_sigma, bias);
-    } else {
+    if (!as_streak) {
+        bias[0] = s->start_x;
+        bias[1] = s->start_y;
         bst_star_trail_point_bias(&path, &g->blend_weights, light, g->bias_sigma, bias);
+        return;
+    }
+    bst_star_trail_bias(&path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
+                        g->total_sigma, bias);
+    if (!bst_generator_is_uniform(g)) {
+        const bst_streak_model model = bst_generator_streak_model(g);
+        bst_path_fit(&path, &model, &model, light, bias);
     }
 }
 
@@ -71,17 +66,8 @@ bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
     if (!s->as_streak || b->drawn) {
         return false;
     }
-    const bst_obsgen_image_width *w = &g->response.filter;
-    const bst_obsgen_path_px rest = {0.0, 0.0};
-    double common = bst_response_product(w, g->star_path, rest) /
-                    sqrt(bst_response_product(w, rest, rest) *
-                         bst_response_product(w, g->star_path, g->star_path));
-    double point = bst_response_efficiency(&g->response, s->path, rest);
-    double streak = bst_response_efficiency(&g->response, s->path, g->star_path);
-    /* A fit lowers chi-square by the squared filter output; the two outputs have correlated noise.
-     */
-    double better = s->amplitude / streak * (streak - point) / sqrt(2.0 * fmax(1.0 - common, 1e-6));
-    return better < -bst_generator_draw(g, s, GENERATOR_SHAPE);
+    /* A fit lowers chi-square by the squared filter output. */
+    return s->other * s->amplitude + bst_generator_other_noise(g, s) > s->amplitude + s->noise;
 }
 
 /* Position with error and covariance, along and across the path. */
@@ -123,7 +109,10 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     double n = s->length > 0.0 ? s->path.dy / s->length : 0.0;
     double x = b->x + c * error[0] - n * error[1], y = b->y + n * error[0] + c * error[1];
     double bias = cal->phase_bias_px / g->binning, shared[2];
-    shared_bias(g, s, s->as_streak && !b->point, b->flux_e * truth->norm * g->fit_light, shared);
+    bool drawn = s->as_streak && !b->point;
+    double light =
+        drawn ? bst_generator_streak_light(g, b->flux_e) : b->flux_e * truth->norm * g->fit_light;
+    shared_bias(g, s, drawn, light, shared);
     x += shared[0] + bias * sin(2.0 * BST_PI * b->x);
     y += shared[1] + bias * sin(2.0 * BST_PI * b->y);
     double scale = g->binning, a2 = crlb->var_along_px2 * widen_along * scale * scale,
@@ -145,7 +134,8 @@ static bool is_drawn_out(const bst_generator *g, const generator_source *s) {
 static void set_extent(const bst_generator *g, const generator_source *s, bool as_streak,
                        bst_detection *d) {
     double modelled = as_streak ? g->streak : 0.0, b = g->binning;
-    double length = d->snr >= MOMENTS_SNR ? s->length : modelled;
+    /* on an uneven path a point is the bright part of the light */
+    double length = d->snr >= MOMENTS_SNR && (as_streak || !g->uneven) ? s->length : modelled;
     double across2 = g->sigma * g->sigma, along2 = across2 + length * length / 12.0;
     d->length_px = b * BST_FWHM_PER_SIGMA * sqrt(along2);
     d->width_px = b * BST_FWHM_PER_SIGMA * sqrt(across2);

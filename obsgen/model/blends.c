@@ -27,9 +27,41 @@ double bst_generator_overlap(const bst_generator *g, const generator_source *a,
     return bst_response_falloff(&g->response, dx * c + dy * s, dy * c - dx * s, length);
 }
 
-double bst_generator_output_variance(const bst_generator *g, const generator_source *s) {
-    const bst_generator_filter *filter = &g->filters[s->as_streak];
-    return filter->variance + filter->shot * fmax(s->amplitude, 0.0);
+double bst_generator_output_variance(const bst_generator *g, const generator_source *s,
+                                     bool other) {
+    const bst_generator_filter *filter = &g->filters[s->as_streak != other];
+    double seen = other ? s->other * s->amplitude : s->amplitude;
+    return filter->variance + filter->shot * fmax(seen, 0.0);
+}
+
+double bst_generator_other_noise(const bst_generator *g, const generator_source *s) {
+    double shared = g->shared_noise;
+    return shared * s->noise +
+           sqrt(1.0 - shared * shared) * bst_generator_draw(g, s, GENERATOR_SHAPE);
+}
+
+/* Margin of a peak above the threshold of the filter that shows the source best, or of the other
+ * one, SNR: image processing accepts a maximum that exceeds either. */
+static double margin_of(const bst_generator *g, const generator_source *s, double peak,
+                        bool other) {
+    double threshold = g->filters[s->as_streak != other].threshold;
+    if (!other) {
+        return g->calibration.slope * (peak - threshold) + s->spread * s->noise;
+    }
+    double spread = sqrt(bst_generator_output_variance(g, s, true));
+    return g->calibration.slope * (s->other * peak - threshold) +
+           spread * bst_generator_other_noise(g, s);
+}
+
+/* Amplitude of a source with noise: in its own filter, or in the other one if that is larger. */
+static double noisy_level(const bst_generator *g, const generator_source *s) {
+    double level = s->amplitude + s->spread * s->noise / g->calibration.slope;
+    if (s->other > 0.0) {
+        double spread = sqrt(bst_generator_output_variance(g, s, true));
+        level = fmax(level, s->other * s->amplitude +
+                                spread * bst_generator_other_noise(g, s) / g->calibration.slope);
+    }
+    return level;
 }
 
 /* Index of the first source at most `reach` px above source i; sources are in order of y. */
@@ -62,8 +94,8 @@ void bst_generator_decide(bst_generator *g) {
         generator_source *s = &g->sources[i];
         if (s->amplitude > FAINTEST_SHARE * g->threshold) {
             s->noise = bst_generator_draw(g, s, GENERATOR_PEAK);
-            s->spread = sqrt(bst_generator_output_variance(g, s));
-            s->level = s->amplitude + s->spread * s->noise / g->calibration.slope;
+            s->spread = sqrt(bst_generator_output_variance(g, s, false));
+            s->level = noisy_level(g, s);
             generator_source pixel = {.x = round(s->x), .y = round(s->y)};
             assert(ranks < g->source_count);
             g->ranks[ranks++] = (generator_rank){s->level * bst_generator_overlap(g, s, &pixel), i};
@@ -99,31 +131,41 @@ void bst_generator_decide(bst_generator *g) {
         if (merged) {
             continue;
         }
-        s->found = g->calibration.slope * (peak - g->filters[s->as_streak].threshold) +
-                       s->spread * s->noise >
-                   0.0;
+        s->found = margin_of(g, s, peak, false) > 0.0 ||
+                   (s->other > 0.0 && margin_of(g, s, peak, true) > 0.0);
         s->peak = peak;
     }
 }
 
-/* Part of a source's light near another source: the nearest part of a streak, and the share of its
- * light in a filter there. */
-typedef struct nearest_light {
-    double dx, dy, share;
-} nearest_light;
+/* Most sources, or pieces of longer streaks, in the light of a merged detection. */
+enum { MOST_MERGED = 64 };
 
-static nearest_light nearest_light_of(const bst_generator *g, const generator_source *s,
-                                      const generator_source *o) {
-    nearest_light n = {o->x - s->x, o->y - s->y, 1.0};
-    if (o->length < s->length + 2.0) {
-        return n;
+/* Adds a source's light to that of a merged detection; returns the number of sources then. A
+ * streak longer than the detection's image is added in pieces: its parts lie at various distances.
+ */
+static int add_merged(const bst_generator *g, const generator_source *s, const generator_source *o,
+                      generator_source merged[MOST_MERGED], int count) {
+    int pieces = o->length < s->length + 2.0 ? 1 : (int)ceil(o->length / g->total_sigma);
+    int room = MOST_MERGED - count;
+    pieces = pieces < room ? pieces : room;
+    for (int i = 0; i < pieces; i++) {
+        double u = (i + 0.5) / pieces - 0.5;
+        generator_source *m = &merged[count++];
+        *m = *o;
+        m->x = o->x + u * o->path.dx;
+        m->y = o->y + u * o->path.dy;
+        m->flux_e = o->flux_e / pieces;
     }
-    double c = o->path.dx / o->length, t = o->path.dy / o->length, half = 0.5 * o->length;
-    double along = fmax(-half, fmin(-(n.dx * c + n.dy * t), half));
-    n.dx += along * c;
-    n.dy += along * t;
-    n.share = fmin(1.0, 2.0 * sqrt(BST_PI) * g->total_sigma / o->length);
-    return n;
+    return count;
+}
+
+/* Weight of light at b in the position of a fit to source a that is limited by noise: gradient of
+ * the filter's output, per distance. For Gaussian images it is the output. */
+static double pull_of(const bst_generator *g, const generator_source *a,
+                      const generator_source *b) {
+    double length = a->as_streak ? g->streak : a->length;
+    return length < 0.5 ? bst_response_pull(&g->response, hypot(b->x - a->x, b->y - a->y))
+                        : bst_generator_overlap(g, a, b);
 }
 
 /* Draws the position of a faint streak, whose filter output has a peak that scatters along it.
@@ -151,9 +193,7 @@ static void draw_streak_position(const bst_generator *g, const generator_source 
     }
     double across = bst_obsgen_between(bst_obsgen_snrs, cal->across_factor, BST_OBSGEN_SNRS, snr) *
                     sqrt(bound.var_across_px2 * out->widen);
-    double gain =
-        bst_obsgen_between(bst_obsgen_lengths_px, cal->gain, BST_OBSGEN_LENGTHS, s->length);
-    double own = s->amplitude / gain;
+    double own = s->unraised;
     /* standard deviation of the bound relative to the filters' peak without scatter */
     double noise = along * own * sqrt(g->centroid_error->curvature);
     noise = fmin(fmax(noise, LEAST_NOISE), MOST_NOISE);
@@ -250,9 +290,9 @@ static void merge_to_streak(const bst_generator *g, const generator_source *s,
  * sources converges to the filter output's maximum, found by mean shift. */
 generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
     assert(g && i >= 0 && i < g->source_count);
-    enum { MOST = 24, ROUNDS = 8 };
+    enum { ROUNDS = 8 };
     const generator_source *s = &g->sources[i];
-    generator_source merged[MOST];
+    generator_source merged[MOST_MERGED];
     generator_blend out = {
         .flux_e = s->flux_e, .x = s->x, .y = s->y, .widen = 1.0, .flat = 1.0, .near = false};
     int count = 0;
@@ -271,14 +311,8 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
             out.near = out.near || (fabs(dx) <= half_x && fabs(dy) <= half_y);
             /* both fluxes and positions are free, so their common part is undetermined */
             out.widen *= 1.0 / fmax(1.0 - share * share, 0.1);
-        } else if (count < MOST) {
-            assert(count < MOST);
-            nearest_light n = nearest_light_of(g, s, o);
-            generator_source *m = &merged[count++];
-            *m = *o;
-            m->x = s->x + n.dx;
-            m->y = s->y + n.dy;
-            m->flux_e *= n.share;
+        } else {
+            count = add_merged(g, s, o, merged, count);
         }
     }
     generator_source at = *s;
@@ -289,13 +323,11 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         double bright = g->smeared
                             ? 0.0
                             : out.flux_e * bst_crlb_table_norm(&g->bound, s->length) * g->fit_light;
-        double sum = s->flux_e *
-                     bst_blend_weight(&g->blend_weights, bright, bst_generator_overlap(g, s, &at));
+        double sum = s->flux_e * bst_blend_weight(&g->blend_weights, bright, pull_of(g, &at, s));
         double x = 0.0, y = 0.0;
         for (int k = 0; k < count; k++) {
-            double light =
-                merged[k].flux_e * bst_blend_weight(&g->blend_weights, bright,
-                                                    bst_generator_overlap(g, &at, &merged[k]));
+            double light = merged[k].flux_e *
+                           bst_blend_weight(&g->blend_weights, bright, pull_of(g, &at, &merged[k]));
             sum += light;
             x += light * (merged[k].x - s->x);
             y += light * (merged[k].y - s->y);

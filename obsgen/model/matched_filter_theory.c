@@ -127,3 +127,26 @@ double bst_matched_pixel_maxima(double sigma_px, double threshold) {
     double stays = stays_above(threshold, lag);
     return above(threshold) * (1.0 - stays) * (1.0 - stays);
 }
+
+double bst_matched_either_above(double first, double second, double correlation) {
+    enum { HALF = 4 };
+    static const double node[HALF] = {0.183434642495650, 0.525532409916329, 0.796666477413627,
+                                      0.960289856497536};
+    static const double weight[HALF] = {0.362683783378362, 0.313706645877887, 0.222381034453374,
+                                        0.101228536290376};
+    static const double ALL = 4.0; /* sigmas beyond which nothing is left */
+    double root = sqrt(fmax(1.0 - correlation * correlation, 1e-8));
+    /* t: how far the first variable is below its threshold */
+    double start = fmax(-first - ALL, 0.0), end = ALL + fmax(-first, 0.0), sum = 0.0;
+    double lead = second - correlation * first;
+    if (correlation > 0.0) {
+        end = fmin(end, (lead + ALL * root) / correlation);
+    }
+    for (int i = 0; i < 2 * HALF && end > start; i++) {
+        double at = i % 2 ? node[i / 2] : -node[i / 2];
+        double t = start + 0.5 * (end - start) * (1.0 + at);
+        sum += 0.5 * (end - start) * weight[i / 2] * density(first + t) *
+               bst_matched_normal_below((lead - correlation * t) / root);
+    }
+    return bst_matched_normal_below(first) + sum;
+}

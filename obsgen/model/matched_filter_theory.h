@@ -45,4 +45,12 @@ double bst_matched_threshold(double sigma_px, double length_px, double false_ala
  * the point filter). */
 double bst_matched_pixel_maxima(double sigma_px, double threshold);
 
+/* Probability that at least one of two standard normal variables exceeds its threshold.
+ *
+ * Given:     first, second  means above the thresholds
+ *            correlation    of the two, 0 to 1
+ * Notes:     one integral: P(first) plus that of the second variable's excess where the first is
+ *            below; Gauss-Legendre of eight nodes */
+double bst_matched_either_above(double first, double second, double correlation);
+
 #endif

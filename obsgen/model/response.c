@@ -189,6 +189,18 @@ double bst_response_falloff(const bst_response *r, double along_px, double acros
     return sum / own;
 }
 
+double bst_response_pull(const bst_response *r, double distance_px) {
+    if (!r->falloff.tabulated) {
+        return bst_response_falloff(r, distance_px, 0.0, 0.0);
+    }
+    /* differences over one step of the table */
+    double step = 1.0 / (BST_FALLOFF_PER_PX * r->falloff_scale);
+    double curve = 2.0 * (1.0 - falloff_at(r, step)) / (step * step);
+    double at = fmax(distance_px, step);
+    double slope = (falloff_at(r, at - step) - falloff_at(r, at + step)) / (2.0 * step);
+    return fmin(fmax(slope / (at * curve), 0.0), 1.0);
+}
+
 /* Equivalent Gaussian width from point and line sums. */
 static bst_obsgen_image_width width_of(double point, double line) {
     bst_obsgen_image_width w = {.across_px = 1.0 / (2.0 * sqrt(BST_PI) * line)};

@@ -87,6 +87,11 @@ double bst_response_efficiency(const bst_response *response, bst_obsgen_path_px 
 double bst_response_falloff(const bst_response *response, double along_px, double across_px,
                             double length_px);
 
+/* Weight of light at a distance in the position of a noise-limited fit of a point, relative to
+ * light at its place: gradient of the filter's output per distance, at least 0. For Gaussian images
+ * it equals the output. */
+double bst_response_pull(const bst_response *response, double distance_px);
+
 /* sqrt(sum p^2) of a real image of unit flux smeared by length_px, relative to a Gaussian of the
  * same noise-equivalent area at rest; 1 for a Gaussian. */
 double bst_response_norm_ratio(const bst_response *response, double length_px);

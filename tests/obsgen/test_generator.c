@@ -71,7 +71,7 @@ static void detection_follows_the_ideal_law(void **state) {
                 threshold = r.threshold_snr;
                 noise_e = r.noise_e;
             }
-            double asked, shot, a = s.calibration.gain[0] * snr;
+            double asked, shot, a = bst_obsgen_peak(snr, s.calibration.gain[0]);
             filter_by_sums(&s, threshold, noise_e, &asked, &shot);
             double pd = above(s.calibration.slope * (asked - a) / sqrt(1.0 + shot * a));
             /* four standard deviations of a binomial share, and 0.01 for integrals in the place of

@@ -1,4 +1,5 @@
 /* Matched filters in closed form, against plain sums. */
+#include "boresight/vec.h"
 #include "obsgen/model/matched_filter_theory.h"
 #include "tests/test_support.h"
 
@@ -101,12 +102,32 @@ static void thresholds_have_their_limits(void **state) {
                 bst_matched_threshold(1.0, 0.0, 1.0, pixels, NULL));
 }
 
+/* One or the other of two normal variables: closed forms for independent ones, for equal ones, and
+ * for thresholds of zero (orthant probability). */
+static void either_of_two_exceeds(void **state) {
+    (void)state;
+    const double at[] = {-2.5, -0.4, 0.0, 1.3};
+    for (int i = 0; i < 4; i++) {
+        for (int k = 0; k < 4; k++) {
+            double p = bst_matched_normal_below(at[i]), q = bst_matched_normal_below(at[k]);
+            bst_assert_close(bst_matched_either_above(at[i], at[k], 0.0),
+                             1.0 - (1.0 - p) * (1.0 - q), 1e-3);
+            bst_assert_close(bst_matched_either_above(at[i], at[k], 1.0), fmax(p, q), 1e-3);
+        }
+    }
+    for (double rho = 0.1; rho < 0.99; rho += 0.2) {
+        bst_assert_close(bst_matched_either_above(0.0, 0.0, rho), 0.75 - asin(rho) / (2.0 * BST_PI),
+                         1e-3);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(products_are_those_of_sums),
         cmocka_unit_test(efficiency_is_one_for_its_own_filter_and_less_else),
         cmocka_unit_test(falloff_is_the_autocorrelation),
         cmocka_unit_test(thresholds_have_their_limits),
+        cmocka_unit_test(either_of_two_exceeds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -157,6 +157,22 @@ static void a_psf_goes_by_its_own_image(void **state) {
     assert_true(bst_response_falloff(&r, 3.5, 0.0, 0.0) <
                 bst_matched_falloff(3.5, 0.0, 0.0, sigma) - 0.01);
     bst_assert_close(bst_response_falloff(&r, 0.0, 0.0, 6.0), 1.0, 1e-6);
+    /* faint light at a distance moves the maximum of the output by its weight */
+    for (double far = 0.8; far < 3.0; far += 0.7) {
+        const double light = 0.02;
+        double best = 0.0, most = 0.0;
+        for (double x = -0.1; x < 0.2; x += 1e-3) {
+            /* outputs between the table's distances by the parabola about the maximum */
+            double curve = 1.0 - bst_response_falloff(&r, 1.0 / BST_FALLOFF_PER_PX, 0.0, 0.0);
+            double own = 1.0 - curve * x * x * BST_FALLOFF_PER_PX * BST_FALLOFF_PER_PX;
+            double sum = own + light * bst_response_falloff(&r, far - x, 0.0, 0.0);
+            best = sum > most ? x : best;
+            most = fmax(most, sum);
+        }
+        /* linear pieces of the table: a twentieth */
+        bst_assert_close(best / (light * far), bst_response_pull(&r, far), 0.06);
+    }
+    assert_true(bst_response_pull(&r, 2.9) < bst_response_falloff(&r, 2.9, 0.0, 0.0) - 0.015);
     free(m.share);
     bst_psf_free(psf);
 }

@@ -158,18 +158,25 @@ static void add_place(bst_calibration_fitter *c, const bst_truth_item *t, const 
 
 /* Adds a detection trial of a source near the threshold. */
 static bst_status add_trial(bst_ctx *ctx, bst_calibration_fitter *c, const bst_truth_item *t,
-                            double amplitude, double threshold, const bst_generator_filter *filter,
+                            double amplitude, double threshold, const bst_generator_result *theory,
                             bool detected) {
+    const bst_generator_filter *filter = &theory->filter, *point = &theory->point;
     if (fabs(amplitude - threshold) > PD_REACH) {
         return BST_OK;
     }
     BST_TRY(grow(ctx, (void **)&c->trials, c->trial_count, &c->trial_room, sizeof *c->trials));
-    c->trials[c->trial_count++] = (calibrate_trial){.amplitude = (float)amplitude,
-                                                    .threshold = (float)threshold,
-                                                    .length = (float)length_of(t),
-                                                    .variance = (float)filter->variance,
-                                                    .shot = (float)filter->shot,
-                                                    .detected = detected};
+    c->trials[c->trial_count++] = (calibrate_trial){
+        .amplitude = (float)amplitude,
+        .threshold = (float)threshold,
+        .length = (float)length_of(t),
+        .variance = (float)filter->variance,
+        .shot = (float)filter->shot,
+        .other = theory->streak_px > 0.0 ? (float)(point->efficiency / filter->efficiency) : 0.0f,
+        .other_threshold = (float)(threshold + point->threshold - filter->threshold),
+        .other_variance = (float)point->variance,
+        .other_shot = (float)point->shot,
+        .shared_noise = (float)theory->shared_noise,
+        .detected = detected};
     return BST_OK;
 }
 
@@ -254,8 +261,8 @@ static bst_status add_star(bst_ctx *ctx, bst_calibration_fitter *c, const bst_tr
     double missing = (detections->background_e - theory->background_e) /
                      (bst_crlb_table_norm(&c->bound, length_of(t)) * detections->noise_e);
     double threshold = theory->filter.threshold + detections->threshold_snr - theory->threshold_snr;
-    BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e, threshold + missing,
-                      &theory->filter, k >= 0));
+    BST_TRY(add_trial(ctx, c, t, t->snr * plain / detections->noise_e, threshold + missing, theory,
+                      k >= 0));
     if (k < 0) {
         return BST_OK;
     }

@@ -6,6 +6,19 @@
 /* minimum numbers of data for a fit */
 enum { LEAST_SOURCES = 200, LEAST_ALARMS = 10, LEAST_PLACES = 30 };
 
+/* Probability that a source of this SNR is detected, in either filter of its frame. */
+static double detection_probability(const calibrate_trial *t, double snr, double slope) {
+    double z =
+        slope * (snr - (double)t->threshold) / sqrt((double)t->variance + (double)t->shot * snr);
+    double seen = (double)t->other * snr;
+    if (!(seen > 0.0)) {
+        return bst_matched_normal_below(z);
+    }
+    double other = slope * (seen - (double)t->other_threshold) /
+                   sqrt((double)t->other_variance + (double)t->other_shot * seen);
+    return bst_matched_either_above(z, other, (double)t->shared_noise);
+}
+
 /* Log-likelihood of the detection trials of one streak length. */
 static double likelihood(const bst_calibration_fitter *c, int node, double gain, double slope) {
     double sum = 0.0;
@@ -20,10 +33,7 @@ static double likelihood(const bst_calibration_fitter *c, int node, double gain,
         if (own != node) {
             continue;
         }
-        double snr = gain * (double)t->amplitude;
-        double z = slope * (snr - (double)t->threshold) /
-                   sqrt((double)t->variance + (double)t->shot * snr);
-        double p = 0.5 * erfc(-z * 0.70710678118654752);
+        double p = detection_probability(t, bst_obsgen_peak((double)t->amplitude, gain), slope);
         sum +=
             log(fmax(t->detected ? p : 1.0 - p, 1e-4)); /* limits the effect of a few wrong pairs */
     }

@@ -14,6 +14,9 @@ typedef struct calibrate_trial {
     float amplitude, threshold, length;
     float variance,
         shot; /* noise of the filter output: without the source, and by its photons at SNR 1 */
+    /* of a streak, the point filter: its output relative to the amplitude (0: points), threshold,
+     * noise, and correlation of the noise */
+    float other, other_threshold, other_variance, other_shot, shared_noise;
     bool detected;
 } calibrate_trial;
 

@@ -1,0 +1,263 @@
+#include "obsgen/streak/path_fit.h"
+
+#include <math.h>
+
+#include "boresight/vec.h"
+#include "sim/core/cholesky.h"
+
+enum {
+    SAMPLES = 64, /* of a path */
+    MODEL = 48,   /* of a streak model */
+    /* of the grid on which light is fitted: along the streak and across */
+    COLUMNS = 96,
+    ROWS = 32,
+    PARAMETERS = 4,
+    ROUNDS = 12
+};
+
+/* Margin of the grid about the streak model, and its greatest step, sigmas: at one sigma, sums of
+ * products of two Gaussians are their integrals to 1e-4. */
+static const double MARGIN_SIGMAS = 4.0, STEP_SIGMAS = 1.0;
+/* Limits of the fitted widening relative to the PSF's variance (imgproc/measure/fit.c). */
+static const double LEAST_WIDENING = -0.6, MOST_WIDENING = 1.8;
+/* Largest and smallest step of a fit, px. */
+static const double MOST_STEP_PX = 0.7, SETTLED_PX = 1e-3;
+
+typedef struct samples {
+    double x[SAMPLES], y[SAMPLES], weight[SAMPLES]; /* weight: share of the exposure */
+    int count;
+} samples;
+
+/* Turns samples into the axes along and across a direction. */
+static void turn(samples *s, double cosine, double sine) {
+    for (int i = 0; i < s->count; i++) {
+        double x = s->x[i];
+        s->x[i] = x * cosine + s->y[i] * sine;
+        s->y[i] = s->y[i] * cosine - x * sine;
+    }
+}
+
+/* Averages the path over at most SAMPLES equal parts of the exposure. */
+static void sample_path(const bst_star_trail_path *p, samples *out) {
+    out->count = p->count < SAMPLES ? p->count : SAMPLES;
+    for (int i = 0; i < out->count; i++) {
+        out->x[i] = out->y[i] = out->weight[i] = 0.0;
+    }
+    for (int k = 0; k < p->count; k++) {
+        int i = (int)((long)k * out->count / p->count);
+        double w = (k == 0 || k == p->count - 1 ? 0.5 : 1.0) / (p->count - 1);
+        out->x[i] += w * p->x_px[k];
+        out->y[i] += w * p->y_px[k];
+        out->weight[i] += w;
+    }
+    for (int i = 0; i < out->count; i++) {
+        out->x[i] /= out->weight[i];
+        out->y[i] /= out->weight[i];
+    }
+}
+
+/* Positions of the streak model about its mean. */
+static void sample_model(const bst_streak_model *m, samples *out) {
+    double length = hypot(m->path.dx, m->path.dy) + 2.0 * hypot(m->bend.dx, m->bend.dy);
+    out->count = (int)fmin(ceil(1.5 * length / m->sigma_px) + 1.0, MODEL);
+    for (int i = 0; i < out->count; i++) {
+        double u = out->count > 1 ? (i + 0.5) / out->count * 2.0 - 1.0 : 0.0;
+        double bent = out->count > 1 ? 0.5 * (3.0 * u * u - 1.0) : 0.0;
+        out->x[i] = 0.5 * u * m->path.dx + bent * m->bend.dx;
+        out->y[i] = 0.5 * u * m->path.dy + bent * m->bend.dy;
+        out->weight[i] = 1.0 / out->count;
+    }
+}
+
+/* Grid of places about a fitted streak. */
+typedef struct grid {
+    double x0, y0, step;
+    int columns, rows;
+} grid;
+
+/* Covers the model with its margin; image processing fits no other pixels. */
+static grid grid_about(const samples *model, double sigma) {
+    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+    for (int i = 0; i < model->count; i++) {
+        low[0] = fmin(low[0], model->x[i]);
+        high[0] = fmax(high[0], model->x[i]);
+        low[1] = fmin(low[1], model->y[i]);
+        high[1] = fmax(high[1], model->y[i]);
+    }
+    double margin = MARGIN_SIGMAS * sigma, wide = high[0] - low[0], tall = high[1] - low[1];
+    double step = fmax(STEP_SIGMAS * sigma, fmax((wide + 2.0 * margin) / (COLUMNS - 1),
+                                                 (tall + 2.0 * margin) / (ROWS - 1)));
+    return (grid){low[0] - margin, low[1] - margin, step, (int)((wide + 2.0 * margin) / step) + 1,
+                  (int)((tall + 2.0 * margin) / step) + 1};
+}
+
+/* Light on the grid and its derivatives by x, by y and by variance. */
+typedef struct planes {
+    double value[4][COLUMNS * ROWS];
+} planes;
+
+/* Adds Gaussians at all samples, displaced by (dx, dy); the derivatives too if `all`. */
+static void render(const grid *g, const samples *s, double dx, double dy, double sigma, bool all,
+                   planes *out) {
+    int n = g->columns * g->rows;
+    double v = sigma * sigma, across[3][COLUMNS], down[3][ROWS];
+    for (int k = 0; k < (all ? 4 : 1); k++) {
+        for (int i = 0; i < n; i++) {
+            out->value[k][i] = 0.0;
+        }
+    }
+    for (int i = 0; i < s->count; i++) {
+        for (int c = 0; c < g->columns; c++) {
+            double x = g->x0 + c * g->step - s->x[i] - dx, e = exp(-0.5 * x * x / v);
+            across[0][c] = s->weight[i] * e;
+            across[1][c] = s->weight[i] * e * x / v;
+            across[2][c] = s->weight[i] * e * (x * x / v - 1.0) / v;
+        }
+        for (int r = 0; r < g->rows; r++) {
+            double y = g->y0 + r * g->step - s->y[i] - dy, e = exp(-0.5 * y * y / v);
+            down[0][r] = e;
+            down[1][r] = e * y / v;
+            down[2][r] = e * (y * y / v - 1.0) / v;
+        }
+        for (int r = 0; r < g->rows; r++) {
+            for (int c = 0; c < g->columns; c++) {
+                int at = r * g->columns + c;
+                out->value[0][at] += down[0][r] * across[0][c];
+                if (all) {
+                    out->value[1][at] += down[0][r] * across[1][c];
+                    out->value[2][at] += down[1][r] * across[0][c];
+                    out->value[3][at] +=
+                        0.5 * (down[2][r] * across[0][c] + down[0][r] * across[2][c]);
+                }
+            }
+        }
+    }
+}
+
+/* Fitted parameters: place, flux relative to the true one, widening of the variance, px^2. */
+typedef struct fitted {
+    double x, y, flux, widening;
+} fitted;
+
+/* One Gauss-Newton step; *squares are those before it. False if the place is settled. */
+static bool improve(const planes *seen, const planes *model, int n, double light, double variance,
+                    fitted *f, bst_path_fit_squares *squares) {
+    double a[PARAMETERS][PARAMETERS] = {{0.0}}, g[PARAMETERS] = {0.0}, top = 0.0;
+    for (int i = 0; i < n; i++) {
+        top = fmax(top, model->value[0][i]);
+    }
+    *squares = (bst_path_fit_squares){0.0, 0.0};
+    for (int i = 0; i < n; i++) {
+        double shape = model->value[0][i] + f->widening * model->value[3][i];
+        const double by[PARAMETERS] = {f->flux * model->value[1][i], f->flux * model->value[2][i],
+                                       shape, f->flux * model->value[3][i]};
+        double left = seen->value[0][i] - f->flux * shape;
+        double weight = 1.0 / (1.0 + light * fmax(f->flux * shape, 0.0) / top);
+        squares->all += weight * seen->value[0][i] * seen->value[0][i];
+        squares->left += weight * left * left;
+        for (int p = 0; p < PARAMETERS; p++) {
+            g[p] += weight * by[p] * left;
+            for (int q = 0; q <= p; q++) {
+                a[p][q] += weight * by[p] * by[q];
+            }
+        }
+    }
+    if (!bst_cholesky_factor(a[0], PARAMETERS, PARAMETERS, 1e-11)) {
+        return false;
+    }
+    bst_cholesky_solve(a[0], PARAMETERS, PARAMETERS, g);
+    f->x += fmin(fmax(g[0], -MOST_STEP_PX), MOST_STEP_PX);
+    f->y += fmin(fmax(g[1], -MOST_STEP_PX), MOST_STEP_PX);
+    f->flux = fmax(f->flux + g[2], 0.1 * f->flux);
+    f->widening =
+        fmin(fmax(f->widening + g[3], LEAST_WIDENING * variance), MOST_WIDENING * variance);
+    return fabs(g[0]) > SETTLED_PX || fabs(g[1]) > SETTLED_PX;
+}
+
+bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_streak_model *model,
+                                  const bst_streak_model *stamp, double light, double place_px[2]) {
+    bst_path_fit_squares squares = {0.0, 0.0};
+    samples star, streak, about;
+    planes seen, shape;
+    sample_path(path, &star);
+    sample_model(model, &streak);
+    sample_model(stamp, &about);
+    double length = hypot(stamp->path.dx, stamp->path.dy);
+    double c = length > 0.0 ? stamp->path.dx / length : 1.0;
+    double s = length > 0.0 ? stamp->path.dy / length : 0.0;
+    turn(&star, c, s);
+    turn(&streak, c, s);
+    turn(&about, c, s);
+    grid g = grid_about(&about, stamp->sigma_px);
+    double sigma = model->sigma_px;
+    int n = g.columns * g.rows;
+    render(&g, &star, 0.0, 0.0, sigma, false, &seen);
+    fitted f = {place_px[0] * c + place_px[1] * s, place_px[1] * c - place_px[0] * s, 1.0, 0.0};
+    bool moving = true;
+    for (int round = 0; round < ROUNDS && moving; round++) {
+        render(&g, &streak, f.x, f.y, sigma, true, &shape);
+        moving = improve(&seen, &shape, n, light, sigma * sigma, &f, &squares);
+    }
+    place_px[0] = f.x * c - f.y * s;
+    place_px[1] = f.x * s + f.y * c;
+    return squares;
+}
+
+/* Sum of the products of two sets of Gaussians whose product has the deviation `root`, the second
+ * set displaced by (dx, dy). */
+static double overlap(const samples *a, const samples *b, double dx, double dy, double root) {
+    double sum = 0.0;
+    for (int i = 0; i < a->count; i++) {
+        for (int k = 0; k < b->count; k++) {
+            double x = a->x[i] - b->x[k] - dx, y = a->y[i] - b->y[k] - dy;
+            sum += a->weight[i] * b->weight[k] * exp(-0.5 * (x * x + y * y) / (root * root));
+        }
+    }
+    return sum / (2.0 * BST_PI * root * root);
+}
+
+/* sqrt(sum p^2) of the star's image. */
+static double image_norm(const samples *s, const bst_path_widths *w) {
+    return sqrt(overlap(s, s, 0.0, 0.0, w->source_px * sqrt(2.0)));
+}
+
+bst_path_outputs bst_path_fit_outputs(const bst_star_trail_path *path, bst_obsgen_path_px filter,
+                                      const bst_path_widths *w) {
+    samples s;
+    sample_path(path, &s);
+    double length = hypot(filter.dx, filter.dy), root = w->both_px * sqrt(2.0);
+    double c = length > 0.0 ? filter.dx / length : 1.0, n = length > 0.0 ? filter.dy / length : 0.0;
+    double streak = 0.0, beside = 0.0;
+    bst_path_outputs out = {0.0, 0.0, {0.0, 0.0}, 0.0};
+    for (int k = 0; k < s.count; k++) {
+        double point = 0.0, drawn = 0.0;
+        for (int i = 0; i < s.count; i++) {
+            double dx = s.x[i] - s.x[k], dy = s.y[i] - s.y[k], d2 = dx * dx + dy * dy;
+            point += s.weight[i] * exp(-0.5 * d2 / (root * root));
+            if (length > 0.0) {
+                double u = dx * c + dy * n, v = dy * c - dx * n;
+                drawn += s.weight[i] * exp(-0.5 * v * v / (root * root)) *
+                         (bst_matched_normal_below((u + 0.5 * length) / root) -
+                          bst_matched_normal_below((u - 0.5 * length) / root));
+            }
+        }
+        if (point > out.point) {
+            out.point = point;
+            out.point_at[0] = s.x[k];
+            out.point_at[1] = s.y[k];
+            beside = drawn;
+        }
+        streak = fmax(streak, drawn);
+    }
+    const bst_obsgen_path_px rest = {0.0, 0.0};
+    double norm = image_norm(&s, w);
+    out.point /=
+        2.0 * BST_PI * root * root * sqrt(bst_matched_product(rest, rest, w->filter_px)) * norm;
+    if (length > 0.0) {
+        double scale = 1.0 / (sqrt(2.0 * BST_PI) * root * length *
+                              sqrt(bst_matched_product(filter, filter, w->filter_px)) * norm);
+        out.streak = scale * streak;
+        out.streak_beside = scale * beside;
+    }
+    return out;
+}

@@ -1,0 +1,52 @@
+/* What filters and fits of image processing make of a star whose true path differs from the one
+ * that telemetry reports, as in a slew. Internal to the generator. */
+#ifndef BST_OBSGEN_STREAK_PATH_FIT_H
+#define BST_OBSGEN_STREAK_PATH_FIT_H
+
+#include "obsgen/model/matched_filter_theory.h"
+#include "obsgen/streak/star_trail.h"
+
+/* Streak model of image processing: uniform motion plus bend (coefficient of (3 u^2 - 1) / 2, u
+ * from -1 to 1), px. */
+typedef struct bst_streak_model {
+    bst_obsgen_path_px path, bend;
+    double sigma_px; /* of the PSF, including the pixel */
+} bst_streak_model;
+
+/* Weighted squares on the fitted pixels, of one unit: of all light, and of what the model leaves.
+ */
+typedef struct bst_path_fit_squares {
+    double all, left;
+} bst_path_fit_squares;
+
+/* Fits a streak model, or a point (a model of no length), to the light of a star on its true path,
+ * in the mean over noise. Free parameters are those of image processing: place, flux and width.
+ * Each pixel has the weight 1 / (noise^2 + fitted light).
+ *
+ * Given:     stamp     streak whose surroundings are fitted; `model` itself unless shapes are
+ *                      compared
+ *            light     brightest pixel of the fitted light over the variance of the noise
+ *            place_px  start of the iterations: (0, 0) or the place for another light
+ * Returned:  place_px: relative to the mean of the path, px; the fit's sums of squares */
+bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_streak_model *model,
+                                  const bst_streak_model *stamp, double light, double place_px[2]);
+
+/* Widths of the images of a point, px, including the pixel: of the star, of the filters, and of
+ * the product of both. */
+typedef struct bst_path_widths {
+    double source_px, filter_px, both_px;
+} bst_path_widths;
+
+/* Largest output of both filters for a star on its true path, relative to its SNR in the filter
+ * matched to its real image. */
+typedef struct bst_path_outputs {
+    double point, streak; /* streak: 0 without a streak filter */
+    double point_at[2];   /* of the point filter's maximum relative to the mean of the path, px */
+    double streak_beside; /* output of the streak filter at the point filter's maximum */
+} bst_path_outputs;
+
+/* Computes the largest outputs of the filters for a point and for the straight streak `filter`. */
+bst_path_outputs bst_path_fit_outputs(const bst_star_trail_path *path, bst_obsgen_path_px filter,
+                                      const bst_path_widths *widths);
+
+#endif

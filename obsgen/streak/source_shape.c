@@ -1,0 +1,160 @@
+/* Shape in which image processing sees a source, point or streak, and the bias of the stars' fits.
+ */
+#include <math.h>
+#include <string.h>
+
+#include "obsgen/generator_internal.h"
+#include "obsgen/streak/path_fit.h"
+
+/* Path deviation, px RMS per axis, below which the bias of a streak's fit is the same for bright
+ * and faint stars to 0.01 px. */
+static const double UNIFORM_PX = 0.05;
+
+/* Image processing fits both shapes to a point whose streak output is above this share. */
+static const double CLOSE_SHARE = 0.8;
+/* Lead of a point over a streak that is not fitted. */
+static const double NO_STREAK = 1e3;
+
+bst_streak_model bst_generator_streak_model(const bst_generator *g) {
+    return (bst_streak_model){g->star_path, {g->bend_x, g->bend_y}, g->total_sigma};
+}
+
+bool bst_generator_is_uniform(const bst_generator *g) {
+    return !(g->path_rms_px > UNIFORM_PX);
+}
+
+/* Lead of a point's fit over a streak's: difference of the outputs of their filters, for a source
+ * of SNR 1 without its own noise. A fit lowers chi-square by the square of its filter's output.
+ *
+ * Given:     streak  squares of the streak's fit
+ *            plain   weighted square of all light without the source's own noise
+ *            at_px   start of the point's fit */
+static double point_lead(const bst_generator *g, const bst_star_trail_path *path,
+                         const bst_path_outputs *o, double light, bst_path_fit_squares streak,
+                         double plain, double at_px[2]) {
+    const bst_streak_model model = bst_generator_streak_model(g),
+                           point = {.sigma_px = g->total_sigma};
+    if (!(o->streak > o->point) && !(o->streak_beside > CLOSE_SHARE * o->point)) {
+        return NO_STREAK; /* image processing fits no streak */
+    }
+    double left = bst_path_fit(path, &point, &model, light, at_px).left;
+    double own = sqrt(fmax(1.0 - left / streak.all, 0.0));
+    double other = sqrt(fmax(1.0 - streak.left / streak.all, 0.0));
+    return sqrt(streak.all / plain) * (own - other);
+}
+
+/* True if a point fits a noisy source better than a streak. */
+static bool leads(const bst_generator *g, const generator_source *s, double lead) {
+    double snr = s->sharp * s->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e;
+    double scatter = sqrt(2.0 * fmax(1.0 - g->shared_noise, 1e-6));
+    return lead * snr + scatter * bst_generator_draw(g, s, GENERATOR_SHAPE) > 0.0;
+}
+
+double bst_generator_streak_light(const bst_generator *g, double flux_e) {
+    /* the brightest pixel of a long line is sqrt(2) sum p^2 of its light */
+    double norm = bst_crlb_table_norm(&g->bound, g->streak);
+    return sqrt(2.0) * flux_e * norm * norm / (g->noise_e * g->noise_e);
+}
+
+/* Lead of a point's fit for a star on an uneven path. */
+static double lead_of_star(const bst_generator *g, double flux_e) {
+    double light = bst_generator_streak_light(g, flux_e);
+    double at = log10(fmax(light, GENERATOR_FIRST_LIGHT) / GENERATOR_FIRST_LIGHT);
+    at = fmin(at, GENERATOR_BIASES - 1.001);
+    int i = (int)at;
+    return g->point_lead[i] + (at - i) * (g->point_lead[i + 1] - g->point_lead[i]);
+}
+
+/* Centroid bias of the stars' streaks for each light level, and whether a point fits better. */
+static void set_streak_bias(bst_generator *g) {
+    const bst_streak_model model = bst_generator_streak_model(g);
+    double light = GENERATOR_FIRST_LIGHT, plain = 1.0;
+    double at[2] = {g->outputs.point_at[0], g->outputs.point_at[1]};
+    bst_star_trail_bias(&g->path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
+                        g->total_sigma, g->streak_bias[0]);
+    for (int i = 0; i < GENERATOR_BIASES; i++, light *= 10.0) {
+        bst_path_fit_squares squares = {0.0, 0.0};
+        if (i > 0) {
+            memcpy(g->streak_bias[i], g->streak_bias[i - 1], sizeof g->streak_bias[0]);
+        }
+        if (!bst_generator_is_uniform(g) && (i > 0 || g->uneven)) {
+            squares = bst_path_fit(&g->path, &model, &model, light, g->streak_bias[i]);
+        }
+        plain = i == 0 ? squares.all : plain;
+        g->point_lead[i] =
+            g->uneven ? point_lead(g, &g->path, &g->outputs, light, squares, plain, at) : 0.0;
+    }
+}
+
+void bst_generator_set_star_bias(bst_generator *g) {
+    if (g->smeared || g->path.count < 3) {
+        return;
+    }
+    if (g->streak > 0.0) {
+        set_streak_bias(g);
+    }
+    double light = GENERATOR_FIRST_LIGHT;
+    if (g->uneven) { /* a point is where the star stayed longest */
+        memcpy(g->star_bias[0], g->outputs.point_at, sizeof g->star_bias[0]);
+    }
+    for (int i = 0; i < GENERATOR_BIASES; i++, light *= 10.0) {
+        if (i > 0) {
+            memcpy(g->star_bias[i], g->star_bias[i - 1], sizeof g->star_bias[0]);
+        }
+        bst_star_trail_point_bias(&g->path, &g->blend_weights, light, g->bias_sigma,
+                                  g->star_bias[i]);
+    }
+}
+
+bst_star_trail_path bst_generator_object_path(const bst_generator *g, const generator_source *s) {
+    const bst_obsgen_path_px *stars = g->smeared ? &g->whole_path : &g->straight_path;
+    double dx = s->path.dx - stars->dx, dy = s->path.dy - stars->dy;
+    for (int k = 0; k < g->path.count; k++) {
+        double u = (double)k / (g->path.count - 1) - 0.5;
+        g->object_x[k] = g->path_x[k] + u * dx;
+        g->object_y[k] = g->path_y[k] + u * dy;
+    }
+    return (bst_star_trail_path){g->object_x, g->object_y, g->path.count};
+}
+
+/* Efficiencies of both filters and shape of an object in a frame whose stars have an uneven path.
+ */
+static void set_uneven_object(const bst_generator *g, generator_source *s, double efficiency[2]) {
+    const bst_star_trail_path path = bst_generator_object_path(g, s);
+    const bst_path_widths widths = {g->image_sigma, g->filter_sigma, g->bias_sigma};
+    const bst_streak_model model = bst_generator_streak_model(g);
+    bst_path_outputs o = bst_path_fit_outputs(&path, g->star_path, &widths);
+    double light = bst_generator_streak_light(g, s->flux_e), at[2] = {0.0, 0.0};
+    bst_star_trail_bias(&path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
+                        g->total_sigma, at);
+    double plain = bst_path_fit(&path, &model, &model, GENERATOR_FIRST_LIGHT, at).all;
+    bst_path_fit_squares streak = bst_path_fit(&path, &model, &model, light, at);
+    at[0] = s->start_x = o.point_at[0];
+    at[1] = s->start_y = o.point_at[1];
+    s->as_streak = !leads(g, s, point_lead(g, &path, &o, light, streak, plain, at));
+    efficiency[0] = fmin(o.point, 1.0);
+    efficiency[1] = fmin(o.streak, 1.0);
+}
+
+double bst_generator_set_filter(const bst_generator *g, generator_source *s) {
+    const bst_obsgen_path_px point = {0.0, 0.0};
+    double efficiency[2] = {g->filters[0].efficiency, g->filters[1].efficiency};
+    s->as_streak = false;
+    s->other = 0.0;
+    if (!s->star) {
+        efficiency[0] = bst_response_efficiency(&g->response, s->path, point);
+    }
+    if (!(g->streak > 0.0)) {
+        return efficiency[0];
+    }
+    if (!s->star && g->uneven) {
+        set_uneven_object(g, s, efficiency);
+    } else if (!s->star) {
+        efficiency[1] = bst_response_efficiency(&g->response, s->path, g->star_path);
+        s->as_streak = efficiency[1] > efficiency[0];
+    } else {
+        s->as_streak = !(g->uneven && leads(g, s, lead_of_star(g, s->flux_e)));
+    }
+    s->other = efficiency[!s->as_streak] / efficiency[s->as_streak];
+    return efficiency[s->as_streak];
+}

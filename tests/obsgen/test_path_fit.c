@@ -1,0 +1,275 @@
+/* Stars on a path that telemetry does not know: what is fitted to their light, against sums over
+ * fine pixels, and what the generator reports of them. */
+#include "obsgen/streak/path_fit.h"
+#include "tests/obsgen/generator_scene.h"
+
+enum { STEPS = 401, FINE = 4, ACROSS = 30 * FINE, ALONG = 60 * FINE };
+
+typedef struct path {
+    double x[STEPS], y[STEPS];
+} path;
+
+static bst_star_trail_path route_of(const path *p) {
+    return (bst_star_trail_path){p->x, p->y, STEPS};
+}
+
+static double share_of(int k) {
+    return (k == 0 || k == STEPS - 1 ? 0.5 : 1.0) / (STEPS - 1);
+}
+
+/* Places less their mean. */
+static void centre(path *p) {
+    double x = 0.0, y = 0.0;
+    for (int k = 0; k < STEPS; k++) {
+        x += share_of(k) * p->x[k];
+        y += share_of(k) * p->y[k];
+    }
+    for (int k = 0; k < STEPS; k++) {
+        p->x[k] -= x;
+        p->y[k] -= y;
+    }
+}
+
+/* A path along (0.8, 0.6) that telemetry takes for a uniform one of `length`: it starts fast and
+ * ends slowly. */
+static path slowing(double length, double part) {
+    path p;
+    for (int k = 0; k < STEPS; k++) {
+        double t = (double)k / (STEPS - 1), u = length * (1.0 - pow(1.0 - t, 1.0 + part));
+        p.x[k] = 0.8 * u;
+        p.y[k] = 0.6 * u;
+    }
+    centre(&p);
+    return p;
+}
+
+/* A path of `length` that stays at its end for `rest` of the exposure. */
+static path resting(double length, double rest) {
+    path p;
+    for (int k = 0; k < STEPS; k++) {
+        double t = (double)k / (STEPS - 1), u = length * fmin(t / (1.0 - rest), 1.0);
+        p.x[k] = u;
+        p.y[k] = 0.0;
+    }
+    centre(&p);
+    return p;
+}
+
+/* Pixels of a quarter px along (0.8, 0.6) and across. */
+typedef struct plane {
+    double v[ACROSS][ALONG];
+} plane;
+
+/* Light of a path (NULL: of a uniform one of `length`) displaced along by `shift`. */
+static void draw(plane *out, const path *p, double length, double shift, double sigma) {
+    memset(out, 0, sizeof *out);
+    int count = p ? STEPS : 200;
+    for (int k = 0; k < count; k++) {
+        double u = p ? 0.8 * p->x[k] + 0.6 * p->y[k] : length * ((k + 0.5) / count - 0.5) + shift;
+        double w = p ? share_of(k) : 1.0 / count;
+        for (int j = 0; j < ACROSS; j++) {
+            double y = (double)(j - ACROSS / 2) / FINE, e = exp(-0.5 * y * y / (sigma * sigma));
+            for (int i = 0; i < ALONG && e > 1e-8; i++) {
+                double x = (double)(i - ALONG / 2) / FINE - u;
+                out->v[j][i] += w * e * exp(-0.5 * x * x / (sigma * sigma));
+            }
+        }
+    }
+}
+
+/* How far along a fit of flux, place and width would still move from `shift`, by differences. */
+static double left_to_go(const path *p, double length, double shift, double light, double sigma) {
+    static plane seen, model, next, wide;
+    const double step = 0.02;
+    double flux = 1.0, widening = 0.0, move = 0.0, top = 0.0;
+    draw(&seen, p, 0.0, 0.0, sigma);
+    draw(&model, NULL, length, shift, sigma);
+    draw(&next, NULL, length, shift + step, sigma);
+    draw(&wide, NULL, length, shift, sigma * 1.01);
+    for (int j = 0; j < ACROSS; j++) {
+        for (int i = 0; i < ALONG; i++) {
+            top = fmax(top, model.v[j][i]);
+        }
+    }
+    double variance = sigma * sigma * (1.01 * 1.01 - 1.0);
+    for (int round = 0; round < 12; round++) {
+        double a[3][3] = {{0.0}}, g[3] = {0.0};
+        for (int j = 0; j < ACROSS; j++) {
+            for (int i = 0; i < ALONG; i++) {
+                /* a wider image of the same light is lower by the square of its width */
+                double wider = (wide.v[j][i] / (1.01 * 1.01) - model.v[j][i]) / variance;
+                double shape = model.v[j][i] + widening * wider;
+                const double by[3] = {flux * (next.v[j][i] - model.v[j][i]) / step, shape,
+                                      flux * wider};
+                double w = 1.0 / (1.0 + light * fmax(flux * shape, 0.0) / top);
+                for (int m = 0; m < 3; m++) {
+                    g[m] += w * by[m] * (seen.v[j][i] - flux * shape);
+                    for (int n = 0; n < 3; n++) {
+                        a[m][n] += w * by[m] * by[n];
+                    }
+                }
+            }
+        }
+        for (int m = 0; m < 3; m++) { /* Gauss-Jordan */
+            double pivot = a[m][m];
+            for (int n = 0; n < 3; n++) {
+                a[m][n] /= pivot;
+            }
+            g[m] /= pivot;
+            for (int k = 0; k < 3; k++) {
+                double part = a[k][m];
+                for (int n = 0; n < 3 && k != m; n++) {
+                    a[k][n] -= part * a[m][n];
+                }
+                g[k] -= k != m ? part * g[m] : 0.0;
+            }
+        }
+        move = g[0]; /* the place stays: it is what is tested */
+        flux += g[1];
+        widening += g[2];
+    }
+    return move;
+}
+
+/* The fit has converged on fine pixels too, for faint and bright stars, whose places differ. */
+static void fits_end_where_they_would_on_fine_pixels(void **state) {
+    (void)state;
+    const double sigma = 1.1, length = 10.0, lights[] = {0.1, 10.0, 1000.0};
+    path p = slowing(length, 0.5);
+    bst_star_trail_path route = route_of(&p);
+    bst_streak_model model = {{0.8 * length, 0.6 * length}, {0.0, 0.0}, sigma};
+    double places[3];
+    for (int i = 0; i < 3; i++) {
+        double at[2] = {0.0, 0.0};
+        bst_path_fit_squares squares = bst_path_fit(&route, &model, &model, lights[i], at);
+        assert_true(squares.left > 0.0 && squares.left < 0.1 * squares.all);
+        /* across there is nothing to move to */
+        bst_assert_close(0.8 * at[1] - 0.6 * at[0], 0.0, 2e-3);
+        places[i] = 0.8 * at[0] + 0.6 * at[1];
+        /* steps of 1 sigma in the sums, and where iterations end: 1e-3 px each */
+        bst_assert_close(left_to_go(&p, length, places[i], lights[i], sigma), 0.0, 6e-3);
+    }
+    assert_true(fabs(places[2] - places[0]) > 0.2);
+}
+
+/* The largest outputs of both filters are those of sums over fine pixels. */
+static void outputs_are_those_of_sums(void **state) {
+    (void)state;
+    const double sigma = 1.1, length = 10.0;
+    static plane seen, filter;
+    path p = slowing(length, 1.5);
+    bst_star_trail_path route = route_of(&p);
+    const bst_path_widths widths = {sigma, sigma, sigma};
+    bst_path_outputs o =
+        bst_path_fit_outputs(&route, (bst_obsgen_path_px){0.8 * length, 0.6 * length}, &widths);
+    draw(&seen, &p, 0.0, 0.0, sigma);
+    double best[2] = {0.0, 0.0}, at = 0.0;
+    for (int shape = 0; shape < 2; shape++) {
+        for (double shift = -6.0; shift <= 6.0; shift += 0.25) {
+            double both = 0.0, own = 0.0, norm = 0.0;
+            draw(&filter, NULL, shape ? length : 1e-6, shift, sigma);
+            for (int j = 0; j < ACROSS; j++) {
+                for (int i = 0; i < ALONG; i++) {
+                    both += seen.v[j][i] * filter.v[j][i];
+                    own += seen.v[j][i] * seen.v[j][i];
+                    norm += filter.v[j][i] * filter.v[j][i];
+                }
+            }
+            double output = both / sqrt(own * norm);
+            at = shape == 0 && output > best[0] ? shift : at;
+            best[shape] = fmax(best[shape], output);
+        }
+    }
+    /* the path's samples are up to 0.4 px apart: 1 % of a maximum */
+    bst_assert_close(o.point, best[0], 0.01);
+    bst_assert_close(o.streak, best[1], 0.01);
+    bst_assert_close(0.8 * o.point_at[0] + 0.6 * o.point_at[1], at, 0.3);
+    assert_true(o.streak_beside <= o.streak);
+}
+
+/* Stars of one SNR on a path, of which telemetry reports the ends. */
+static bst_generator_result run_on(scene *s, const path *p, double snr, int64_t exposure) {
+    s->frame.path_x_px = p->x;
+    s->frame.path_y_px = p->y;
+    s->frame.path_count = STEPS;
+    s->frame.streak_dx_px = p->x[STEPS - 1] - p->x[0];
+    s->frame.streak_dy_px = p->y[STEPS - 1] - p->y[0];
+    fill(s, snr);
+    for (int i = 0; i < s->truth->count; i++) {
+        bst_truth_item *t = &s->truth->items[i];
+        t->x_start_px += p->x[0];
+        t->x_end_px += p->x[STEPS - 1];
+        t->y_start_px += p->y[0];
+        t->y_end_px += p->y[STEPS - 1];
+    }
+    return run(s, exposure);
+}
+
+static double mean_along(const scene *s, const bst_generator_result *r, double c, double n) {
+    double sum = 0.0;
+    for (int i = 0; i < r->count; i++) {
+        const bst_truth_item *t = &s->truth->items[r->items[i].item];
+        sum += c * (r->items[i].detection.x_px - t->x_centroid_px) +
+               n * (r->items[i].detection.y_px - t->y_centroid_px);
+    }
+    return sum / r->count;
+}
+
+/* Bright stars of a frame land nearer to the mean of their light than faint ones. */
+static void bright_streaks_have_another_bias(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    path p = slowing(10.0, 0.5);
+    double sigma = sqrt(s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0);
+    const double snrs[2] = {40.0, 6000.0};
+    for (int k = 0; k < 2; k++) {
+        bst_generator_result r = run_on(&s, &p, snrs[k], k);
+        assert_true(r.count > 850);
+        double seen = mean_along(&s, &r, 0.8, 0.6);
+        /* brightest pixel of the streak over the noise variance */
+        double peak = electrons_of(&s, snrs[k]) / (sqrt(2.0 * BST_PI) * sigma * 10.0);
+        double light = peak / (r.noise_e * r.noise_e);
+        /* mean of 900 errors of 0.4 and 0.003 px; the table's levels are a decade apart */
+        bst_assert_close(left_to_go(&p, 10.0, seen, light, sigma), 0.0, k == 0 ? 0.06 : 0.03);
+    }
+    close_scene(&s);
+}
+
+/* A star that rests for most of the exposure is seen where it rests, as a point, whatever the
+ * streak that telemetry reports. */
+static void stars_that_rest_are_points_where_they_rest(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    path p = resting(22.0, 0.85);
+    bst_generator_result r = run_on(&s, &p, 60.0, 0);
+    assert_true(r.count > 850 && !r.smeared);
+    for (int i = 0; i < r.count; i++) {
+        assert_int_equal(r.items[i].detection.flags & BST_DETECTION_STREAK, 0);
+    }
+    /* the mean of 900 errors of 0.05 px; light of the path pulls by a few hundredths */
+    bst_assert_close(mean_along(&s, &r, 1.0, 0.0), p.x[STEPS - 1], 0.15);
+    /* on a uniform path of that length they are streaks about its middle */
+    path even = resting(22.0, 0.0);
+    r = run_on(&s, &even, 60.0, 1);
+    int streaks = 0;
+    for (int i = 0; i < r.count; i++) {
+        streaks += (r.items[i].detection.flags & BST_DETECTION_STREAK) != 0;
+    }
+    assert_int_equal(streaks, r.count);
+    bst_assert_close(mean_along(&s, &r, 1.0, 0.0), 0.0, 0.1);
+    close_scene(&s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(fits_end_where_they_would_on_fine_pixels),
+        cmocka_unit_test(outputs_are_those_of_sums),
+        cmocka_unit_test(bright_streaks_have_another_bias),
+        cmocka_unit_test(stars_that_rest_are_points_where_they_rest),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
