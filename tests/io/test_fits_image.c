@@ -91,6 +91,29 @@ static void expect_error(fixture *f, bst_status status, const char *reason) {
     scratch_remove(&f->place);
 }
 
+/* Three axes of different lengths: the fastest first; only two are an image. */
+static void planes_of_three_axes(void **state) {
+    (void)state;
+    fixture f = begin();
+    header(&f, true, 16, 3, 3, 4);
+    end_header(&f);
+    for (int i = 0; i < 24; i++) {
+        big_endian(&f, (uint64_t)(7 * i - 20), 2);
+    }
+    pad(&f, 0);
+    assert_int_equal(fclose(f.file), 0);
+    f.file = NULL;
+    int nx = 0, ny = 0, planes = 0;
+    float *pixels;
+    bst_assert_ok(&f.ctx, bst_fits_read_planes(&f.ctx, f.path, &nx, &ny, &planes, &pixels));
+    assert_true(nx == 3 && ny == 4 && planes == 2);
+    for (int i = 0; i < 24; i++) {
+        bst_assert_close(pixels[i], 7.0 * i - 20.0, 0.0);
+    }
+    free(pixels);
+    expect_error(&f, BST_ERR_FORMAT, "has no image of two axes");
+}
+
 /* Every BITPIX, row y = 0 first, and brackets in the name are a name. */
 static void all_types(void **state) {
     (void)state;
@@ -216,6 +239,16 @@ static void what_is_wrong_is_said(void **state) {
         &f, BST_ERR_FORMAT,
         "an image of 40000 x 1 pixels (allowed: sides of 1 to 32768, at most 268435456 pixels)");
 
+    /* one row more than 2^28 pixels; nothing of the file but its header is on the disk */
+    f = begin();
+    header(&f, true, 8, 2, 16384, 16385);
+    end_header(&f);
+    assert_int_equal(fflush(f.file), 0);
+    assert_int_equal(ftruncate(fileno(f.file), 2880 + 93213 * 2880L), 0);
+    expect_error(&f, BST_ERR_FORMAT,
+                 "an image of 16384 x 16385 pixels (allowed: sides of 1 to 32768, at most "
+                 "268435456 pixels)");
+
     /* the data stop after the first of 100 rows */
     f = begin();
     header(&f, true, -32, 2, 720, 100);
@@ -229,6 +262,7 @@ static void what_is_wrong_is_said(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_types),
+        cmocka_unit_test(planes_of_three_axes),
         cmocka_unit_test(scaling_and_blank),
         cmocka_unit_test(image_in_an_extension),
         cmocka_unit_test(what_is_wrong_is_said),

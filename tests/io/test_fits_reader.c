@@ -126,6 +126,51 @@ static void test_whole(void **state) {
     scratch_remove(&s);
 }
 
+/* Frames of several windows: the file is as wide as its widest frame and as high as its highest. */
+static void test_windows(void **state) {
+    (void)state;
+    static const int sizes[3][2] = {{5, 9}, {12, 4}, {3, 6}};
+    scratch s;
+    scratch_make(&s);
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
+    bst_camera camera = fixture_camera();
+    const bst_fits_info about = {.observer = "a", .instrument = "b", .camera = &camera};
+    const char *path = scratch_path(&s, "windows.fits");
+    bst_fits *fits;
+    bst_assert_ok(&ctx, bst_fits_create(&ctx, path, BST_FITS_EXTENSIONS, &about, &fits));
+    uint16_t pixels[64];
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 64; k++) {
+            pixels[k] = (uint16_t)(1000 * i + k);
+        }
+        bst_fits_frame frame = {.id = i,
+                                .exposure_s = 0.5,
+                                .window = {20, 30, sizes[i][0], sizes[i][1]},
+                                .binning = 1,
+                                .bits = 16};
+        bst_assert_ok(&ctx, bst_time_from_utc(&ctx, "2022-06-16T23:59:58.25Z", &frame.start));
+        bst_assert_ok(&ctx,
+                      bst_fits_write(&ctx, fits, &frame, pixels, sizes[i][0], sizes[i][1], NULL));
+    }
+    bst_assert_ok(&ctx, bst_fits_close(&ctx, fits));
+    bst_fits_reader *reader;
+    bst_assert_ok(&ctx, bst_fits_reader_open(&ctx, path, &reader));
+    assert_int_equal(bst_fits_reader_info(reader)->width, 12);
+    assert_int_equal(bst_fits_reader_info(reader)->height, 9);
+    for (int i = 0; i < 3; i++) {
+        bst_fits_read_frame frame;
+        bst_assert_ok(&ctx, bst_fits_reader_frame(&ctx, reader, i, &frame));
+        assert_int_equal(frame.width, sizes[i][0]);
+        assert_int_equal(frame.height, sizes[i][1]);
+        for (int k = 0; k < sizes[i][0] * sizes[i][1]; k++) {
+            assert_int_equal(frame.pixels[k], 1000 * i + k);
+        }
+    }
+    bst_fits_reader_close(reader);
+    scratch_remove(&s);
+}
+
 /* Opens bytes and reads all that is there; returns the number of frames that were right. Memory of
  * exact size shows a read beyond it to the address sanitizer. */
 static int read_all(const uint8_t *data, size_t bytes, bool exact) {
@@ -356,7 +401,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_whole),   cmocka_unit_test(test_cut_off),
         cmocka_unit_test(test_damaged), cmocka_unit_test(test_messages),
-        cmocka_unit_test(test_rice),
+        cmocka_unit_test(test_rice),    cmocka_unit_test(test_windows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

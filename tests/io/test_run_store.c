@@ -126,7 +126,7 @@ static void test_refusals(void **state) {
     bst_ctx_init(&ctx, count_log, NULL, BST_LOG_INFO);
     logged = 0;
     bst_run *run, *second;
-    static const char *const bad[] = {"", "/", ".", "..", "a/..", "a/."};
+    static const char *const bad[] = {"", "/", ".", "..", "a/..", "a/.", "a/../", ".//"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         assert_int_equal(bst_run_create(&ctx, bad[i], false, &run), BST_ERR_ARGUMENT);
     }
@@ -181,6 +181,23 @@ static void test_refusals(void **state) {
         assert_int_equal(bst_run_create(&ctx, scratch_path(&s, "locked/run"), false, &run),
                          BST_ERR_IO);
         assert_non_null(strstr(ctx.message, strerror(EACCES)));
+    }
+    scratch_remove(&s);
+}
+
+/* Names that only look like this folder or the one above. */
+static void test_names_of_dots(void **state) {
+    (void)state;
+    scratch s;
+    scratch_make(&s);
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
+    static const char *const good[] = {"..a", ".a", "a..", "..."};
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+        bst_run *run;
+        bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&s, good[i]), false, &run));
+        bst_assert_ok(&ctx, bst_run_finish(&ctx, run));
+        assert_true(scratch_has(scratch_path(&s, good[i])));
     }
     scratch_remove(&s);
 }
@@ -339,7 +356,7 @@ int main(void) {
         cmocka_unit_test(test_finished_run),         cmocka_unit_test(test_refusals),
         cmocka_unit_test(test_name_taken_meanwhile), cmocka_unit_test(test_killed_run),
         cmocka_unit_test(test_table_arguments),      cmocka_unit_test(test_full_disk),
-        cmocka_unit_test(test_atomic_file),
+        cmocka_unit_test(test_atomic_file),          cmocka_unit_test(test_names_of_dots),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
