@@ -66,6 +66,7 @@ OPERATORS = {
              (r"\bfmax\(", "fmin("), (r"\bfabsf?\(", "(")],
     "axis": AXES,
 }
+TABLE_ROW = re.compile(r"^\s*\{?\s*[-+]?[\d.][\d.eExXa-fA-F+\-,\s{}]*\}?,?\s*$")
 STATEMENT = re.compile(r"^\s+[\w>\.\[\]\-\*\(\) ]+ (?:=|\+=|-=|\*=) [^=].*;$")
 
 
@@ -84,7 +85,8 @@ def mutants_of(path, text):
         inside = depth > 0
         depth += line.count("{") - line.count("}")
         # declarations, tables and preprocessor lines hold no logic
-        if inside and not re.match(r"\s*(#|static const|const char)", line) and "assert" not in line:
+        if inside and not re.match(r"\s*(#|static const|const char)", line) and "assert" not in line \
+                and not TABLE_ROW.match(line):
             for kind, rules in OPERATORS.items():
                 for pattern, new in rules:
                     for m in re.finditer(pattern, line):
