@@ -302,6 +302,66 @@ static void no_line_is_missed(void **state) {
     assert_true(checked[1] > 20 && checked[2] > 100 && checked[3] > 100);
 }
 
+/* Largest distance of a line's ends from those of a streak. */
+static double end_error(const bst_streak_line *l, const double e[4]) {
+    double same = fmax(hypot(l->x0 - e[0], l->y0 - e[1]), hypot(l->x1 - e[2], l->y1 - e[3]));
+    double turned = fmax(hypot(l->x0 - e[2], l->y0 - e[3]), hypot(l->x1 - e[0], l->y1 - e[1]));
+    return fmin(same, turned);
+}
+
+/* A frame that is higher than wide, in a search made for wide ones: a streak in each corner of it,
+ * in the last tile of each plane. */
+static void a_high_frame_is_searched_to_its_end(void **state) {
+    fixture *f = *state;
+    const double ends[4][4] = {{262.0, 548.0, 294.0, 552.0},
+                               {20.0, 530.0, 24.0, 556.0},
+                               {270.0, 6.0, 296.0, 12.0},
+                               {8.0, 8.0, 20.0, 30.0}};
+    bst_streak_search search;
+    bst_assert_ok(&f->ctx, bst_streak_search_create(&f->ctx, NULL, HEIGHT, WIDTH, MAX_PX, &search));
+    for (int k = 0; k < 4; k++) {
+        clear(f);
+        const double turned[4] = {ends[k][1], ends[k][0], ends[k][3], ends[k][2]};
+        add_streak(f, turned, SIGMA_PX, 12.0);
+        float *high = calloc(PIXELS, sizeof *high);
+        assert_non_null(high);
+        for (int i = 0; i < PIXELS; i++) {
+            high[i % WIDTH * HEIGHT + i / WIDTH] = f->image[i];
+        }
+        bst_background background;
+        bst_assert_ok(&f->ctx, bst_background_create(&f->ctx, 64, HEIGHT, WIDTH, 1, &background));
+        bst_background_estimate(&background, high, HEIGHT, WIDTH, 0.1f);
+        for (int i = 0; i < background.columns * background.rows; i++) {
+            background.level[i] = 0.0f;
+            background.noise[i] = (float)NOISE_E;
+        }
+        bst_streak_search_fill(&search, high, HEIGHT, WIDTH, &background, SIGMA_PX);
+        assert_int_equal(bst_streak_search_bright(&search), 1);
+        assert_true(end_error(&search.found[0], ends[k]) < 1.2);
+        bst_background_free(&background);
+        free(high);
+    }
+    bst_streak_search_free(&search);
+}
+
+/* Octaves up to lines as long as the longest streak, and no longer than 128 rows. */
+static void octaves_reach_the_longest_streak(void **state) {
+    (void)state;
+    const struct {
+        double max_px;
+        int rows, octaves; /* the last octave's lines have 8, 16, 32, 64, 128 rows at most */
+    } cases[] = {{5.0, 7, 1}, {8.0, 8, 1},   {8.5, 9, 2},    {20.0, 20, 3},
+                 {64, 64, 4}, {64.5, 65, 5}, {300.0, 128, 5}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        bst_ctx ctx = {0};
+        bst_streak_bank bank;
+        bst_assert_ok(&ctx, bst_streak_bank_create(&ctx, 64, 48, cases[k].max_px, 1, &bank));
+        assert_int_equal(bank.max_rows, cases[k].rows);
+        assert_int_equal(bank.octaves, cases[k].octaves);
+        bst_streak_bank_free(&bank);
+    }
+}
+
 /* More hits than a tile holds: the strongest are kept. */
 static void a_full_tile_keeps_the_strongest(void **state) {
     fixture *f = *state;
@@ -350,13 +410,6 @@ static void the_threshold_gives_the_false_alarms(void **state) {
     }
 }
 
-/* Distance of a point from a segment's nearer end. */
-static double end_error(const bst_streak_line *l, const double e[4]) {
-    double same = fmax(hypot(l->x0 - e[0], l->y0 - e[1]), hypot(l->x1 - e[2], l->y1 - e[3]));
-    double turned = fmax(hypot(l->x0 - e[2], l->y0 - e[3]), hypot(l->x1 - e[0], l->y1 - e[1]));
-    return fmin(same, turned);
-}
-
 /* Streaks without noise: each is found once, the brightest first, where it is and with its SNR. A
  * short one and a chain of points are left to the detection of points. */
 static void bright_streaks_are_found_once(void **state) {
@@ -403,6 +456,8 @@ static void faint_streaks_outweigh_pairs_of_points(void **state) {
     const double alarms = 0.02;
     clear(f);
     add_streak(f, ends, SIGMA_PX, 7.2);
+    const double point[4] = {227.0, 149.3, 227.0, 149.3};
+    add_streak(f, point, SIGMA_PX, 2.0); /* one point is brighter than the other */
     fill(f);
     assert_int_equal(bst_streak_search_faint(&f->search, alarms, 0), 1);
     bst_assert_close(f->search.threshold_snr,
@@ -411,6 +466,7 @@ static void faint_streaks_outweigh_pairs_of_points(void **state) {
     assert_true(end_error(&l, ends) < 2.0);
     double more = l.snr * l.snr - l.point_snr[0] * l.point_snr[0] - l.point_snr[1] * l.point_snr[1];
     assert_true(more > 20.0 && l.point_snr[1] > 1.0);
+    assert_true(l.point_snr[0] > 1.3 * l.point_snr[1]);
     /* ln(1 + pairs / alarms) = more / 2 */
     double pairs = alarms * (exp(0.5 * more) - 1.0);
     double points = sqrt(2.0 * pairs * PIXELS / (BST_PI * 81.0)) / 0.7;
@@ -457,6 +513,8 @@ int main(void) {
         cmocka_unit_test_setup_teardown(hits_are_sums_along_their_lines, setup, teardown),
         cmocka_unit_test_setup_teardown(no_line_is_missed, setup, teardown),
         cmocka_unit_test_setup_teardown(a_full_tile_keeps_the_strongest, setup, teardown),
+        cmocka_unit_test_setup_teardown(a_high_frame_is_searched_to_its_end, setup, teardown),
+        cmocka_unit_test(octaves_reach_the_longest_streak),
         cmocka_unit_test(the_threshold_gives_the_false_alarms),
         cmocka_unit_test_setup_teardown(bright_streaks_are_found_once, setup, teardown),
         cmocka_unit_test_setup_teardown(faint_streaks_outweigh_pairs_of_points, setup, teardown),

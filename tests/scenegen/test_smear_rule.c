@@ -426,6 +426,81 @@ static void a_curved_path_keeps_its_moments(void **state) {
     free(list.items);
 }
 
+/* Errors of images that move by 2^(-7/2) to 2^(1/2) of a straight path: with the square of the
+ * scale where one node leaves a variance out, and with the cube beyond the path's own; with the
+ * fourth and sixth power of the moments that two and three nodes miss. */
+static void errors_go_with_powers_of_the_scale(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const double lengths[] = {0.3, 1.2, 2.6};
+    for (int n = 1; n <= 3; n++) {
+        double c = 0.6 * lengths[n - 1], e = 0.8 * lengths[n - 1];
+        const bst_smear_path_point path[] = {{{1.0, 2.0, 0.0}, 0.0},
+                                             {{1.0 + c, 2.0 + e, 0.0}, 1.0}};
+        const bst_smear_node_aim aim = {.psf_sigma_px = 0.85, .tolerance = 0.03};
+        bst_smear_node_list list = {0};
+        bst_assert_ok(&ctx, bst_smear_nodes_from_path(&ctx, path, 2, &aim, &list));
+        assert_int_equal(list.count, n);
+        double whole = list.error[BST_NODE_SCALES - 2];
+        assert_true(whole > 1e-4 && whole < 0.03);
+        for (int k = 0; k < BST_NODE_SCALES; k++) {
+            double scale = pow(2.0, 0.5 * (k - BST_NODE_SCALES + 2));
+            double power = n > 1 ? 2.0 * n : scale > 1.0 ? 3.0 : 2.0;
+            bst_assert_close(list.error[k] / whole / pow(scale, power), 1.0, 1e-6);
+        }
+        free(list.items);
+    }
+}
+
+/* An ellipse as fast jitter has it, xx = 0.045 and yy = 0.03125 px^2: one node, widened by their
+ * mean. Half their difference is wrong whatever moves less than the path; where nodes must not be
+ * widened they are pairs. */
+static void round_jitter_widens_or_splits(void **state) {
+    (void)state;
+    enum { STEPS = 400 };
+    bst_ctx ctx = {0};
+    static bst_smear_path_point path[STEPS + 1];
+    const double sigma2 = 0.85 * 0.85, xx = 0.045, yy = 0.03125;
+    for (int large = 0; large < 2; large++) {
+        double size = large ? 1.6 : 1.0;
+        for (int k = 0; k <= STEPS; k++) {
+            double a = 2.0 * BST_PI * k / STEPS;
+            path[k] = (bst_smear_path_point){
+                {size * sqrt(2.0 * xx) * cos(a), size * sqrt(2.0 * yy) * sin(a), 0.0},
+                (double)k / STEPS};
+        }
+        const bst_smear_node_aim aim = {
+            .psf_sigma_px = 0.85, .tolerance = 0.03, .widest = large ? 0.0 : 0.5};
+        bst_smear_node_list list = {0};
+        bst_assert_ok(&ctx, bst_smear_nodes_from_path(&ctx, path, STEPS + 1, &aim, &list));
+        double wide = list.items[0].variance, v[3] = {wide, 0.0, wide};
+        for (int n = 0; n < list.count; n++) {
+            const bst_smear_node *p = &list.items[n];
+            v[0] += p->weight * p->p[0] * p->p[0];
+            v[1] += p->weight * p->p[0] * p->p[1];
+            v[2] += p->weight * p->p[1] * p->p[1];
+        }
+        if (!large) {
+            assert_int_equal(list.count, 1);
+            bst_assert_close(wide, 0.5 * (xx + yy), 1e-5); /* chords of a circle: 4e-5 */
+            double fixed = 0.5 * (xx - yy) / sigma2;
+            double rest = list.error[BST_NODE_SCALES - 2] - fixed;
+            assert_true(rest > 1e-4);
+            for (int k = 0; k < BST_NODE_SCALES - 1; k++) {
+                double square = pow(2.0, k - BST_NODE_SCALES + 2);
+                bst_assert_close(list.error[k], fixed + rest * square, 1e-3 * fixed);
+            }
+        }
+        if (large) {
+            assert_int_equal(list.count, 4);
+            bst_assert_close(v[0], 2.56 * xx, 1e-4);
+            bst_assert_close(v[1], 0.0, 1e-9);
+            bst_assert_close(v[2], 2.56 * yy, 1e-4);
+        }
+        free(list.items);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nodes_keep_the_moments_along_a_line),
@@ -434,6 +509,8 @@ int main(void) {
         cmocka_unit_test(covariance_left_out_in_a_wide_field),
         cmocka_unit_test(higher_moments_one_by_one),
         cmocka_unit_test(the_fewest_nodes_are_chosen),
+        cmocka_unit_test(errors_go_with_powers_of_the_scale),
+        cmocka_unit_test(round_jitter_widens_or_splits),
         cmocka_unit_test(a_curved_path_keeps_its_moments),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
