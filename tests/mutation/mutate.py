@@ -13,7 +13,9 @@ file equals that of the sound source cannot be noticed and does not count. A bug
 crashes or exceeds its time. Tests run in the order of their last duration, and the first failure ends a bug's trial.
 With --work the copy is kept, and the next call takes over only what has changed since.
 
-The unit suite judges a file by the unit tests of its own part of the tree: sim/world/orbit/… by world_…, tracker/… by
+Rows of numbers, which are tables, hold no logic and get no bugs.
+
+The unit suite judges a file by the unit and device tests of its own part of the tree: sim/world/orbit/… by world_…, tracker/… by
 tracker_…. The command line, sim/app, has few of those: its tests are the e2e suite. The unit suite therefore leaves
 sim/app out (--files still takes its files).
 
@@ -242,7 +244,7 @@ class Tree:
             top = "/".join(path.split("/")[:2])
             prefix = UNIT_TESTS.get(top, path.split("/")[0])
             names = [n for n, (labels, _, _) in self.tests.items()
-                     if re.match(rf"(?:{prefix})_", n) and "unit" in labels and "slow" not in labels]
+                     if re.match(rf"(?:{prefix})(?:_|$)", n) and {"unit", "device"} & set(labels) and "slow" not in labels]
         return sorted(set(names) - self.unsound, key=lambda n: self.costs.get(n, 1.0))
 
     def prove(self, names):

@@ -269,6 +269,48 @@ static void neighbours_widen_each_other(void **state) {
     close_scene(&s);
 }
 
+/* A detection beside the fitted pixels, in any of four directions, is none that is fitted with
+ * them. */
+static void far_neighbours_are_fitted_alone(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    for (int k = 0; k < 8; k++) {
+        /* half a stamp: 3.6 sigma rounded up and 1.5 px, 5.5 px */
+        double away = k < 4 ? 6.5 : 4.5, x = away * (k % 4 == 0 ? 1 : k % 4 == 1 ? -1 : 0);
+        double y = away * (k % 4 == 2 ? 1 : k % 4 == 3 ? -1 : 0);
+        s.truth->count = 0;
+        add_source(&s, 1, 300.2, 400.4, electrons_of(&s, 100.0));
+        add_source(&s, 2, 300.2 + x, 400.4 + y, electrons_of(&s, 90.0));
+        frame_of(&s);
+        int i = source_of(&s, 0);
+        assert_true(s.generator->sources[i].found && s.generator->sources[source_of(&s, 1)].found);
+        assert_true(bst_generator_blend_of(s.generator, i).near == (k >= 4));
+    }
+    close_scene(&s);
+}
+
+/* Of two that are one, that one is seen whose pixel is brighter: here the fainter, in the middle of
+ * its pixel, while the other lies on a corner of four. */
+static void the_brighter_pixel_is_the_one_seen(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    for (int k = 0; k < 4; k++) {
+        double x = k % 2 ? 1.0 : -1.0, y = k / 2 ? 1.0 : -1.0;
+        s.truth->count = 0;
+        add_source(&s, 1, 300.0 + 0.499 * x, 417.0 + 0.499 * y, electrons_of(&s, 210.0));
+        add_source(&s, 2, 300.0 + x, 417.0 + y, electrons_of(&s, 200.0));
+        const bst_generator *g = frame_of(&s);
+        int corner = source_of(&s, 0), middle = source_of(&s, 1);
+        assert_true(g->sources[middle].found && !g->sources[corner].found);
+        assert_int_equal(g->sources[corner].head, middle);
+    }
+    close_scene(&s);
+}
+
 /* A bright pair that is longer than a point is fitted by a streak, whose middle is the centroid of
  * its light; what lies beyond its ends is left out. */
 static void long_pairs_have_their_centroid(void **state) {
@@ -289,8 +331,11 @@ static void long_pairs_have_their_centroid(void **state) {
         s.truth->count = 0;
         add_source(&s, 1, 300.2, 400.4, flux);
         add_source(&s, 2, 300.2 + cases[k].dx, 400.4 + cases[k].dy, flux * part);
+        add_source(&s, 3, 300.2 + 6.0, 400.4 - 5.5, flux * 0.3); /* too far for either */
         const bst_generator *g = frame_of(&s);
-        int i = source_of(&s, 0), o = source_of(&s, 1);
+        int i = source_of(&s, 0), o = source_of(&s, 1), far = source_of(&s, 2);
+        s.generator->sources[far].found = false;
+        s.generator->sources[far].head = i;
         s.generator->sources[i].found = true;
         s.generator->sources[o].found = false;
         s.generator->sources[i].head = -1;
@@ -483,6 +528,8 @@ int main(void) {
         cmocka_unit_test(blends_lie_where_a_single_fit_does),
         cmocka_unit_test(neighbours_widen_each_other),
         cmocka_unit_test(long_pairs_have_their_centroid),
+        cmocka_unit_test(far_neighbours_are_fitted_alone),
+        cmocka_unit_test(the_brighter_pixel_is_the_one_seen),
         cmocka_unit_test(faint_streaks_lie_at_the_top_of_noise),
         cmocka_unit_test(a_long_streak_draws_a_star),
         cmocka_unit_test(streaks_in_line_have_a_flat_top),
