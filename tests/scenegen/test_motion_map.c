@@ -63,8 +63,9 @@ static void make_path(fixture *f, double length_x, double length_y, double roll_
         *node = (bst_smear_node){.p = {tilt_px * length_x * (u + 0.3 * u * u),
                                        tilt_px * length_y * (u - 0.5 * u * u), roll_px * u},
                                  .weight = 1.0 + 0.5 * sin(0.4 * n)};
-        if (n % 9 == 8) { /* a pause */
+        if (n % 9 == 8) { /* a pause: no longer a step than the table's floats are exact */
             memcpy(node->p, node[-1].p, sizeof node->p);
+            node->p[1] += 1e-5;
         }
         sum += node->weight;
     }
@@ -136,7 +137,7 @@ static bst_smear_star_motion_cell star_of(const fixture *f, double x, double y) 
         double step = sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) +
                            (p[2] - q[2]) * (p[2] - q[2]));
         double moved = hypot(at[n][0] - at[n + 1][0], at[n][1] - at[n + 1][1]);
-        out.scale = step > 0.0 ? fmax(out.scale, f->frame.stretch * moved / step) : out.scale;
+        out.scale = step > 1e-3 ? fmax(out.scale, f->frame.stretch * moved / step) : out.scale;
     }
     return out;
 }
