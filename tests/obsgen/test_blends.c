@@ -349,8 +349,8 @@ static void long_pairs_have_their_centroid(void **state) {
         add_source(&s, 1, 300.2, 400.4, flux);
         add_source(&s, 2, 300.2 + cases[k].dx, 400.4 + cases[k].dy, flux * part);
         /* on the other side, and too far */
-        add_source(&s, 3, 300.2 + (cases[k].dx > 0.0 ? -6.5 : 6.5),
-                   400.4 + (cases[k].dy > 0.0 ? -5.0 : 5.0), flux * 0.3);
+        add_source(&s, 3, 300.2 + (cases[k].dx > 0.0 ? -9.5 : 9.5),
+                   400.4 + (cases[k].dy > 0.0 ? -4.0 : 4.0), flux * 0.3);
         const bst_generator *g = frame_of(&s);
         int i = source_of(&s, 0), o = source_of(&s, 1), far = source_of(&s, 2);
         s.generator->sources[far].found = false;
