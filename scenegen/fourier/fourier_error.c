@@ -30,21 +30,19 @@ static double frequency(const lattice *l, int i) {
 /* Rounding of the kernel's float values, relative to its transform at 0. */
 #define ROUNDED 0x1p-24
 
-/* Ratio of the first alias to the kernel's transform at the lattice frequencies of an axis. A point
- * between samples only changes the phase. */
+/* Ratio of the first alias to the kernel's transform at the lattice frequencies of an axis, with
+ * its sign, which changes beyond the transform's main lobe. A point between samples only changes
+ * the phase. */
 static void find_aliases(lattice *l, const bst_fourier_axis *axis, int a) {
     double density = (double)axis->samples / axis->pixels;
     double whole = bst_nufft_kernel_transform(&axis->spread, 0.0);
     for (int i = 0; i < LATTICE; i++) {
         double nu = frequency(l, i) / density;
         double own = fabs(bst_nufft_kernel_transform(&axis->spread, nu));
+        double next = bst_nufft_kernel_transform(&axis->spread, nu + 1.0);
         /* beyond the grid's band everything is lost */
-        l->alias[a][i] = fabs(nu) >= 0.5
-                             ? 1.0
-                             : fmin((fabs(bst_nufft_kernel_transform(&axis->spread, nu + 1.0)) +
-                                     ROUNDED * whole) /
-                                        own,
-                                    1.0);
+        l->alias[a][i] =
+            fabs(nu) >= 0.5 ? 1.0 : copysign(fmin((fabs(next) + ROUNDED * whole) / own, 1.0), next);
     }
 }
 

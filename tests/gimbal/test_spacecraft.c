@@ -234,6 +234,12 @@ static void test_refused(void **state) {
     c.gyro.rate_hz = 30.0;
     assert_int_equal(create(&c, 1e-2, 0, &craft), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "platform/spacecraft: gyro/rate_hz"));
+    /* 100 Hz over 3 and 4; nothing is faster than the plant */
+    assert_non_null(strstr(ctx.message, "rates that do are 33.3333 and 25 Hz"));
+    c.gyro.rate_hz = 250.0;
+    assert_int_equal(create(&c, 1e-2, 0, &craft), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "rates that do are 100 and 50 Hz"));
+    c.gyro.rate_hz = 30.0;
 }
 
 /* The same for who errs in its orbit: it believes to be 100 km further north. */

@@ -114,6 +114,25 @@ static void planes_of_three_axes(void **state) {
     expect_error(&f, BST_ERR_FORMAT, "has no image of two axes");
 }
 
+/* A column of 20,000 pixels is long, but not many. */
+static void a_long_column(void **state) {
+    (void)state;
+    fixture f = begin();
+    header(&f, true, 8, 2, 1, 20000);
+    end_header(&f);
+    for (int i = 0; i < 2500; i++) {
+        big_endian(&f, 0x0102030405060708, 8);
+    }
+    pad(&f, 0);
+    int nx = 0, ny = 0;
+    float *pixels;
+    bst_assert_ok(&f.ctx, read_back(&f, &nx, &ny, &pixels));
+    assert_true(nx == 1 && ny == 20000);
+    bst_assert_close(pixels[19998], 7.0, 0.0);
+    free(pixels);
+    scratch_remove(&f.place);
+}
+
 /* Every BITPIX, row y = 0 first, and brackets in the name are a name. */
 static void all_types(void **state) {
     (void)state;
@@ -262,6 +281,7 @@ static void what_is_wrong_is_said(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(all_types),
+        cmocka_unit_test(a_long_column),
         cmocka_unit_test(planes_of_three_axes),
         cmocka_unit_test(scaling_and_blank),
         cmocka_unit_test(image_in_an_extension),

@@ -168,6 +168,14 @@ static void test_windows(void **state) {
         }
     }
     bst_fits_reader_close(reader);
+    /* blocks of 2880 bytes, the last one filled with zeros after 18 pixels */
+    size_t bytes;
+    uint8_t *data = load(path, &bytes);
+    assert_int_equal(bytes % 2880, 0);
+    for (size_t k = 2 * 18; k < 2880; k++) {
+        assert_int_equal(data[bytes - 2880 + k], 0);
+    }
+    free(data);
     scratch_remove(&s);
 }
 

@@ -288,6 +288,23 @@ static void far_neighbours_are_fitted_alone(void **state) {
         assert_true(s.generator->sources[i].found && s.generator->sources[source_of(&s, 1)].found);
         assert_true(bst_generator_blend_of(s.generator, i).near == (k >= 4));
     }
+    /* streaks along x: beside them no farther than points are, along them by half their length more
+     */
+    s.frame.streak_dx_px = 14.0;
+    const double places[6][2] = {{2.0, 6.5},   {2.0, -6.5}, {13.5, 1.0},
+                                 {-13.5, 1.0}, {12.0, 1.0}, {2.0, -4.5}};
+    for (int k = 0; k < 6; k++) {
+        s.truth->count = 0;
+        draw_as_streak(add_source(&s, 1, 300.2, 400.4, electrons_of(&s, 200.0)), 14.0, 0.0);
+        draw_as_streak(
+            add_source(&s, 2, 300.2 + places[k][0], 400.4 + places[k][1], electrons_of(&s, 190.0)),
+            14.0, 0.0);
+        frame_of(&s);
+        int i = source_of(&s, 0), o = source_of(&s, 1);
+        s.generator->sources[i].found = s.generator->sources[o].found = true;
+        s.generator->sources[i].head = s.generator->sources[o].head = -1;
+        assert_true(bst_generator_blend_of(s.generator, i).near == (k >= 4));
+    }
     close_scene(&s);
 }
 
@@ -331,7 +348,9 @@ static void long_pairs_have_their_centroid(void **state) {
         s.truth->count = 0;
         add_source(&s, 1, 300.2, 400.4, flux);
         add_source(&s, 2, 300.2 + cases[k].dx, 400.4 + cases[k].dy, flux * part);
-        add_source(&s, 3, 300.2 + 6.0, 400.4 - 5.5, flux * 0.3); /* too far for either */
+        /* on the other side, and too far */
+        add_source(&s, 3, 300.2 + (cases[k].dx > 0.0 ? -9.5 : 9.5),
+                   400.4 + (cases[k].dy > 0.0 ? -4.0 : 4.0), flux * 0.3);
         const bst_generator *g = frame_of(&s);
         int i = source_of(&s, 0), o = source_of(&s, 1), far = source_of(&s, 2);
         s.generator->sources[far].found = false;

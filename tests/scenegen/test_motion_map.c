@@ -63,8 +63,9 @@ static void make_path(fixture *f, double length_x, double length_y, double roll_
         *node = (bst_smear_node){.p = {tilt_px * length_x * (u + 0.3 * u * u),
                                        tilt_px * length_y * (u - 0.5 * u * u), roll_px * u},
                                  .weight = 1.0 + 0.5 * sin(0.4 * n)};
-        if (n % 9 == 8) { /* a pause */
+        if (n % 9 == 8) { /* a pause: no longer a step than the table's floats are exact */
             memcpy(node->p, node[-1].p, sizeof node->p);
+            node->p[1] += 1e-5;
         }
         sum += node->weight;
     }
@@ -136,7 +137,7 @@ static bst_smear_star_motion_cell star_of(const fixture *f, double x, double y) 
         double step = sqrt((p[0] - q[0]) * (p[0] - q[0]) + (p[1] - q[1]) * (p[1] - q[1]) +
                            (p[2] - q[2]) * (p[2] - q[2]));
         double moved = hypot(at[n][0] - at[n + 1][0], at[n][1] - at[n + 1][1]);
-        out.scale = step > 0.0 ? fmax(out.scale, f->frame.stretch * moved / step) : out.scale;
+        out.scale = step > 1e-3 ? fmax(out.scale, f->frame.stretch * moved / step) : out.scale;
     }
     return out;
 }
@@ -204,6 +205,36 @@ static void rolls(void **state) {
     compare(f, 0.2, 0.5);
 }
 
+/* Stars that are behind the camera at the end of a turn: only the nodes at which they are before it
+ * count. */
+static void stars_behind_the_camera(void **state) {
+    fixture *f = *state;
+    make_path(f, 4.0, 2.0, 0.0, 1.0);
+    bst_assert_ok(&f->ctx, bst_motion_map_begin(&f->ctx, f->map, &f->frame));
+    const bst_smear_star_motion_cell before = *bst_motion_map_at(f->map, 300.0, -200.0);
+    /* the last node: 115 degrees about x, or about y, in place of the path's end */
+    for (int axis = 0; axis < 2; axis++) {
+        make_path(f, 4.0, 2.0, 0.0, 1.0);
+        bst_smear_node *last = &f->nodes[NODES - 1];
+        last->p[axis] = 2.0 / SCALE;
+        const double w[3] = {last->p[0] * SCALE, last->p[1] * SCALE, 0.0};
+        double m[3][3];
+        matrix_of(w, m);
+        float *t = f->table + (NODES - 1) / BST_BLOCK * BST_TABLE_ROWS * BST_BLOCK +
+                   (NODES - 1) % BST_BLOCK;
+        const double row[9] = {m[0][0] - m[2][2], m[0][1],           m[0][2] / SCALE,
+                               m[1][0],           m[1][1] - m[2][2], m[1][2] / SCALE,
+                               m[2][0] * SCALE,   m[2][1] * SCALE,   m[2][2]};
+        for (int i = 0; i < 9; i++) {
+            t[i * BST_BLOCK] = (float)row[i];
+        }
+        bst_assert_ok(&f->ctx, bst_motion_map_begin(&f->ctx, f->map, &f->frame));
+        const bst_smear_star_motion_cell *cell = bst_motion_map_at(f->map, 300.0, -200.0);
+        bst_assert_close(cell->scale / before.scale, 1.0, 0.02); /* cells of other sizes */
+        assert_true(cell->share > 0.0 && cell->share < 1.1 * before.share);
+    }
+}
+
 /* A centred Gaussian's light in a binned pixel, and its variance with that of a uniform
  * distribution over b pixels less that over one, (b^2 - 1) / 12. */
 static void shares_of_binned_pixels(void **state) {
@@ -219,6 +250,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(slews, setup, teardown),
         cmocka_unit_test_setup_teardown(rolls, setup, teardown),
+        cmocka_unit_test_setup_teardown(stars_behind_the_camera, setup, teardown),
         cmocka_unit_test(shares_of_binned_pixels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -180,6 +180,94 @@ static void sizes_of_a_grid(void **state) {
     bst_assert_close(bst_fourier_density(&band, 0, 2, 1e-12), 5.0, 1e-12);
 }
 
+/* Frequencies up to 1 cycle/px either way, and the first aliases of a grid axis there: OTF of a
+ * Gaussian in pixels times the ratio of the kernel's transforms. */
+enum { FREQUENCIES = 320 };
+static void aliases_of(const bst_fourier_axis *axis, double sigma, double out[FREQUENCIES][2]) {
+    double density = (double)axis->samples / axis->pixels;
+    for (int i = 0; i < FREQUENCIES; i++) {
+        double f = (i + 0.5) * 2.0 / FREQUENCIES - 1.0, nu = f / density;
+        double otf =
+            exp(-2.0 * BST_PI * BST_PI * sigma * sigma * f * f) * sin(BST_PI * f) / BST_PI / f;
+        bool kept = otf > 1e-12 && fabs(nu) < 0.5;
+        for (int m = 0; m < 2; m++) {
+            out[i][m] = kept ? otf * integral(&axis->spread, nu + 2.0 * m - 1.0, 0) /
+                                   integral(&axis->spread, nu, 0)
+                             : 0.0;
+        }
+    }
+}
+
+/* Their light x px from a point at x0 samples. */
+static double alias_at(double aliases[FREQUENCIES][2], double x, double x0) {
+    double sum = 0.0;
+    for (int i = 0; i < FREQUENCIES; i++) {
+        double f = (i + 0.5) * 2.0 / FREQUENCIES - 1.0;
+        for (int m = 0; m < 2; m++) {
+            sum += aliases[i][m] * cos(2.0 * BST_PI * ((2.0 * m - 1.0) * x0 + f * x)) * 2.0 /
+                   FREQUENCIES;
+        }
+    }
+    return sum;
+}
+
+/* By brightness, the errors of a point anywhere between the samples of a grid that is coarse along
+ * one axis only: those of its aliases there, times 1.7, and not those of the other axis. */
+static void errors_of_a_coarse_axis(void **state) {
+    (void)state;
+    enum { CLASSES = 10, STEPS_X = 21 };
+    bst_ctx ctx = {0};
+    const double sigma = 2.4 / 2.3548200450309493, root = sigma * sqrt(2.0);
+    const bst_camera camera = {.width_px = 512,
+                               .height_px = 512,
+                               .pixel_scale_arcsec = 3.0,
+                               .aperture_m = 0.15,
+                               .psf_fwhm_px = 2.4};
+    bst_psf *psf;
+    bst_fourier_band band;
+    bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
+    bst_assert_ok(&ctx, bst_fourier_band_measure(&ctx, psf, 1e-7, &band));
+    bst_fourier_axis coarse = {.pixels = 160, .samples = 224, .spread = {4, 8.0}};
+    bst_fourier_axis fine = {.pixels = 160, .samples = 480, .spread = {8, 18.0}};
+    static double error[STEPS_X], aliases[FREQUENCIES][2];
+    aliases_of(&coarse, sigma, aliases);
+    for (int i = 0; i < STEPS_X; i++) { /* places in steps of 0.25 px */
+        for (int phase = 0; phase < 8; phase++) {
+            error[i] = fmax(error[i], fabs(alias_at(aliases, 0.25 * i, phase / 8.0)));
+        }
+    }
+    double want[CLASSES] = {0.0}, centre = erf(0.5 / root);
+    for (int n = 0; n < STEPS_X * STEPS_X; n++) {
+        double x = 0.25 * (n % STEPS_X), y = 0.25 * (n / STEPS_X);
+        double u = 0.5 * (erf((x + 0.5) / root) - erf((x - 0.5) / root));
+        double v = 0.5 * (erf((y + 0.5) / root) - erf((y - 0.5) / root));
+        double light = u * v / (centre * centre);
+        int k = (int)floor(-log2(light) - 1e-12);
+        k = k < 0 ? 0 : k;
+        if (k < CLASSES) {
+            want[k] = fmax(want[k], 1.7 * error[n % STEPS_X] * v / (centre * centre));
+        }
+    }
+    for (int axis = 0; axis < 2; axis++) {
+        struct {
+            bst_fourier_error error;
+            double guard[32];
+        } told = {.guard = {0.0}};
+        const bst_fourier_axis both[2] = {axis ? fine : coarse, axis ? coarse : fine};
+        bst_assert_ok(&ctx, bst_fourier_error_measure(&ctx, psf, &band, both, &told.error));
+        for (int k = 0; k < CLASSES; k++) {
+            /* places in steps of 0.25 px, and the classes' borders between them */
+            bst_assert_close(told.error.most[k] / want[k], 1.1, 0.25);
+        }
+        /* what is darker than all classes belongs to the last one */
+        assert_true(told.error.most[BST_LIGHT_CLASSES - 1] > 0.0);
+        for (int k = 0; k < 32; k++) {
+            assert_true(told.guard[k] == 0.0);
+        }
+    }
+    bst_psf_free(psf);
+}
+
 /* Errors by brightness over the noise of the darkest pixel of their class. */
 static void errors_by_brightness(void **state) {
     (void)state;
@@ -283,9 +371,10 @@ static void wings_of_other_periods(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(values_and_transforms), cmocka_unit_test(the_error_of_a_grid),
-        cmocka_unit_test(widened_nodes),         cmocka_unit_test(sizes_of_a_grid),
-        cmocka_unit_test(errors_by_brightness),  cmocka_unit_test(wings_of_other_periods),
+        cmocka_unit_test(values_and_transforms),   cmocka_unit_test(the_error_of_a_grid),
+        cmocka_unit_test(widened_nodes),           cmocka_unit_test(sizes_of_a_grid),
+        cmocka_unit_test(errors_of_a_coarse_axis), cmocka_unit_test(errors_by_brightness),
+        cmocka_unit_test(wings_of_other_periods),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
