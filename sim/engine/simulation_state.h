@@ -27,9 +27,9 @@ typedef bst_status (*bst_state_recording_fn)(bst_ctx *ctx, void *user, bst_archi
 
 /* What a state is saved with. */
 typedef struct bst_state_origin {
-    const char *digest; /* bst_scenario_digest */
-    uint64_t seed;      /* of the scenario */
-    int64_t tick;       /* see bst_state_head */
+    const char *digest;               /* bst_scenario_digest */
+    uint64_t seed;                    /* of the scenario */
+    int64_t tick;                     /* see bst_state_head */
     bst_state_recording_fn recording; /* NULL: none */
     void *user;
 } bst_state_origin;

@@ -170,7 +170,12 @@ bst_status bst_fits_archive(bst_ctx *ctx, bst_fits *fits, bst_archive *archive) 
     if (fits->layout == BST_FITS_CUBE) {
         BST_TRY(bst_fits_cube_archive(ctx, fits, archive));
     }
-    return bst_archive_is_restoring(archive) ? cut(ctx, fits) : BST_OK;
+    bst_status status = bst_archive_is_restoring(archive) ? cut(ctx, fits) : BST_OK;
+    if (status != BST_OK) { /* so that bst_fits_close does not complete the file */
+        close(fits->file);
+        fits->file = -1;
+    }
+    return status;
 }
 
 bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,

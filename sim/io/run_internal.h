@@ -27,7 +27,7 @@ struct bst_run {
     char folder[BST_RUN_PATH_BYTES]; /* out + ".partial" */
     bool overwrite;
     bool reopened; /* the tables are there already */
-    int lock; /* file descriptor with the lock on folder/lock */
+    int lock;      /* file descriptor with the lock on folder/lock */
     sqlite3 *db;
     bst_io_table *tables;
     sqlite3_stmt *note_table, *note_column;

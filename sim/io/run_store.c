@@ -299,10 +299,9 @@ static bst_status lock_again(bst_ctx *ctx, bst_run *run) {
                                                "%s: another process is writing this run; wait "
                                                "until it has ended",
                                                run->folder)
-               : errno == ENOENT
-                   ? bst_fail(ctx, BST_ERR_NOT_FOUND, "%s: there is no interrupted run",
-                              run->folder)
-                   : fail_errno(ctx, run->folder, "cannot be locked");
+               : errno == ENOENT    ? bst_fail(ctx, BST_ERR_NOT_FOUND,
+                                               "%s: there is no interrupted run", run->folder)
+                                    : fail_errno(ctx, run->folder, "cannot be locked");
     }
     int full = posix_fallocate(run->lock, 0, SPARE_BYTES);
     errno = full;

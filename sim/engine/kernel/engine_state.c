@@ -41,7 +41,8 @@ static bst_status archive_frame(bst_ctx *ctx, bst_archive *archive, const bst_en
     const slot *owner = owner_of(engine, ch, sequence);
     bool owned = owner->owned;
     BST_ARCHIVE(archive, owned);
-    return owned ? bst_frame_save(ctx, archive, ((bst_frame_message *)owner->payload)->frame) : BST_OK;
+    return owned ? bst_frame_save(ctx, archive, ((bst_frame_message *)owner->payload)->frame)
+                 : BST_OK;
 }
 
 /* Archives a message: header and items in use. */
