@@ -8,22 +8,19 @@
 #include "sim/cli/load.h"
 #include "sim/cli/stop_signals.h"
 #include "sim/run/run_link.h"
-#include "sim/run/run_saving.h"
 #include "sim/run/run_scenario.h"
 
 static const char help_text[] =
     "usage: boresight run SCENARIO.json [options]\n"
     "\n"
-    "Runs a scenario and writes its results to a folder: frames.fits (opens in ds9), run.sqlite "
-    "(truth,\n"
-    "detections, tracks, commands, telemetry, events), manifest.json, quicklook.png, pointing.png. "
-    "While it runs\n"
-    "the folder is called OUT.partial. Ctrl-C closes the run properly, a second one ends it at "
-    "once.\n"
+    "Runs a scenario and writes its results to a folder: frames.fits (opens in ds9), run.sqlite\n"
+    "(truth, detections, tracks, commands, telemetry, events), manifest.json, quicklook.png,\n"
+    "pointing.png. While it runs the folder is called OUT.partial. Ctrl-C closes the run "
+    "properly,\n"
+    "a second one ends it at once.\n"
     "\n"
     "  boresight run scenarios/neossat_geo_track.json --out runs/demo\n"
-    "  boresight run scenarios/neossat_geo_track.json --seed 0x2A --duration 60 --set "
-    "/record/frames=none\n"
+    "  boresight run scenarios/neossat_geo_track.json --duration 60 --set /record/frames=none\n"
     "\n"
     "options:\n";
 
@@ -47,9 +44,7 @@ static bst_status create_and_run(bst_ctx *ctx, run_request *r, const bst_json *j
         bst_json_name_file(ctx, json);
         return status;
     }
-    BST_TRY(bst_run_link_check(ctx, &r->load, scenario, *sim));
-    BST_TRY(r->replay ? bst_run_link_replay(ctx, *sim, r->replay)
-                      : bst_run_link_open(ctx, *sim)); /* before anything is written */
+    BST_TRY(bst_run_link_prepare(ctx, &r->load, scenario, *sim, r->replay));
     BST_TRY(bst_check_rules_apply(ctx, scenario, *sim));
     return bst_run_scenario(ctx, scenario, *sim, request, NULL);
 }

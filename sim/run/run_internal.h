@@ -1,5 +1,5 @@
-/* A run in progress, shared by run_scenario.c (stepping and recording), run_manifest.c and
- * run_saving.c (saved states). */
+/* A run in progress, shared by run_scenario.c (stepping and recording), run_execution.c
+ * (figures), run_manifest.c and run_saving.c (saved states). */
 #ifndef BST_RUN_RUN_INTERNAL_H
 #define BST_RUN_RUN_INTERNAL_H
 
@@ -52,6 +52,8 @@ void bst_run_get_figures(const bst_run_sensor_watch *sensor, bst_run_sensor_figu
 
 /* Wall time of stepping since begin_tick, s. */
 double bst_run_wall_s(const bst_run_execution *run);
+/* Time of the end of the last step, since the epoch, s. */
+double bst_run_seconds(const bst_run_execution *run);
 /* Time that was simulated in this wall time, s. */
 double bst_run_simulated_s(const bst_run_execution *run);
 /* What may happen to the pixels of a sensor's frames. */

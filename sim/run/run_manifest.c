@@ -15,12 +15,6 @@
 #include "sim/run/run_pacing.h"
 #include "sim/run/run_summary.h"
 
-void bst_run_get_figures(const bst_run_sensor_watch *sensor, bst_run_sensor_figures *out) {
-    snprintf(out->scope, sizeof out->scope, "%s", sensor->scope);
-    bst_loop_summary_figures(sensor->summary, &out->loop);
-    bst_run_metrics_figures(sensor->metrics, &out->metrics);
-}
-
 /* Summary of a sensor for the manifest. */
 static cJSON *summary_of(const bst_run_sensor_watch *sensor, double real_time_factor) {
     bst_run_sensor_figures figures;

@@ -28,13 +28,6 @@ static bst_run_sensor_watch *find_sensor(bst_run_execution *run, const char *sco
     return sensor;
 }
 
-bst_run_pixels bst_run_pixels_of(const bst_run_execution *run, const bst_run_sensor_watch *sensor) {
-    return (bst_run_pixels){
-        .recorded = run->recorder && run->scenario->record.frames != BST_RECORD_NO_FRAMES,
-        .pictured = sensor->pictures != NULL,
-        .duration_ticks = run->end_tick};
-}
-
 /* The selection of a channel, restored or new; NULL: there is no room for it. */
 static bst_run_watched *watched_channel(const bst_run_execution *run, bst_run_sensor_watch *sensor,
                                         const char *channel) {
@@ -126,10 +119,6 @@ static void on_judged(void *user, const bst_loop_frame *frame) {
     if (sensor->pictures) {
         bst_run_pictures_judged(sensor->pictures, frame);
     }
-}
-
-double bst_run_wall_s(const bst_run_execution *run) {
-    return run->earlier_s + bst_wall_seconds() - run->started;
 }
 
 /* Prints the progress line on standard error, at most 5 times a second. */
@@ -335,16 +324,6 @@ static bst_status write_ending(bst_run_execution *run, double wall, bst_status e
     return status == BST_OK ? written : status;
 }
 
-/* Time of the end of the last step, since the epoch, s. */
-static double seconds_run(const bst_run_execution *run) {
-    return (double)(bst_engine_tick(bst_simulation_engine(run->sim)) + 1) /
-           (double)run->scenario->tick_rate_hz;
-}
-
-double bst_run_simulated_s(const bst_run_execution *run) {
-    return seconds_run(run) - (double)run->begin_tick / (double)run->scenario->tick_rate_hz;
-}
-
 /* Steps the simulation to its end. */
 static bst_status step_through(bst_run_execution *run, double *wall) {
     bst_ctx *ctx = run->ctx;
@@ -375,7 +354,7 @@ static bst_status step_only(bst_run_execution *run, const bst_run_request *reque
     if (status != BST_OK && !(status == BST_ERR_INTERRUPTED && run->cut)) {
         return status;
     }
-    return bst_run_sightings_finish(run->ctx, run->sightings, seconds_run(run));
+    return bst_run_sightings_finish(run->ctx, run->sightings, bst_run_seconds(run));
 }
 
 /* Opens the folder of the run with its tables and the recorder. */
@@ -406,7 +385,8 @@ static bst_status close_record(bst_run_execution *run, bool stepped, bst_status 
     /* an error while closing must not replace the reason of the end */
     bst_ctx closing = *ctx;
     if (stepped && (status == BST_OK || status == BST_ERR_INTERRUPTED)) {
-        bst_status summed = bst_run_sightings_finish(&closing, run->sightings, seconds_run(run));
+        bst_status summed =
+            bst_run_sightings_finish(&closing, run->sightings, bst_run_seconds(run));
         if (status == BST_OK && summed != BST_OK) {
             *ctx = closing;
             status = summed;
@@ -491,7 +471,7 @@ bst_status bst_run_scenario(bst_ctx *ctx, const bst_scenario *scenario, bst_simu
         print_table(&run, request->out, wall);
     }
     if (status == BST_OK && report) {
-        double part = run.cut ? seconds_run(&run) / scenario->duration_s : 1.0;
+        double part = run.cut ? bst_run_seconds(&run) / scenario->duration_s : 1.0;
         status = fill_report(&run, wall, part, report);
     }
     free_run(&run);

@@ -6,17 +6,18 @@
 #include "sim/engine/simulation.h"
 #include "sim/eval/run_metrics.h"
 #include "sim/eval/sightings.h"
+#include "sim/run/run_saving.h"
 
 typedef struct bst_run_request {
-    const char *out;                     /* output folder; NULL: nothing is written */
-    bool overwrite;                      /* replace an existing run */
-    bool force;                          /* start even if the disk is too small for the frames */
-    bool progress;                       /* progress display on standard error */
-    bool print;                          /* table of results on standard output */
-    bool metrics;                        /* without folder: compute sightings too */
-    double most_s;                       /* > 0, without folder: limit of stepping time */
-    const struct bst_run_saving *saving; /* NULL: the whole run, without saved states */
-    struct bst_run_restored *restored;   /* state that the simulation has; NULL: the start */
+    const char *out;              /* output folder; NULL: nothing is written */
+    bool overwrite;               /* replace an existing run */
+    bool force;                   /* start even if the disk is too small for the frames */
+    bool progress;                /* progress display on standard error */
+    bool print;                   /* table of results on standard output */
+    bool metrics;                 /* without folder: compute sightings too */
+    double most_s;                /* > 0, without folder: limit of stepping time */
+    const bst_run_saving *saving; /* NULL: the whole run, without saved states */
+    bst_run_restored *restored;   /* state that the simulation has; NULL: the start */
 } bst_run_request;
 
 typedef struct bst_run_sensor_figures {
