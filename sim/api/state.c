@@ -5,7 +5,6 @@
 
 #include "sim/api/api_internal.h"
 #include "sim/engine/simulation_state.h"
-#include "sim/io/manifest.h"
 
 static bst_status check_idle(bst_ctx *ctx, const bst_sim *sim) {
     return sim->failed ? bst_fail(ctx, BST_ERR_STATE, "a sim that has failed cannot be saved")
@@ -101,7 +100,7 @@ bst_status bst_sim_save_file(bst_ctx *ctx, bst_sim *sim, const char *path) {
     void *bytes;
     size_t size;
     BST_TRY(bst_sim_save(ctx, sim, &bytes, &size));
-    bst_status status = bst_io_write_file_atomic(ctx, path, bytes, size);
+    bst_status status = bst_state_file_write(ctx, path, bytes, size);
     bst_state_free(bytes);
     return status;
 }

@@ -10,6 +10,7 @@
 #include "boresight/version.h"
 #include "sim/core/file.h"
 #include "sim/engine/kernel/engine_state.h"
+#include "sim/io/manifest.h"
 #include "sim/link/crc32c.h"
 #include "sim/world/world.h"
 
@@ -111,6 +112,10 @@ bst_status bst_state_head_read(bst_ctx *ctx, const void *bytes, size_t size, con
                         "those of the run that was saved");
     }
     return BST_OK;
+}
+
+bst_status bst_state_file_write(bst_ctx *ctx, const char *path, const void *bytes, size_t size) {
+    return bst_io_write_file_atomic(ctx, path, bytes, size);
 }
 
 bst_status bst_state_file_read(bst_ctx *ctx, const char *path, char **bytes, size_t *size) {

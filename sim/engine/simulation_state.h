@@ -66,6 +66,13 @@ bst_status bst_simulation_save(bst_ctx *ctx, bst_simulation *simulation,
 bst_status bst_state_head_read(bst_ctx *ctx, const void *bytes, size_t size, const char *digest,
                                bst_state_head *head) BST_MUST_CHECK;
 
+/* Writes the file of a saved state: readers see the former file or the complete new one.
+ *
+ * Given:     bytes  [size]
+ * Errors:    BST_ERR_IO with path and reason */
+bst_status bst_state_file_write(bst_ctx *ctx, const char *path, const void *bytes,
+                                size_t size) BST_MUST_CHECK;
+
 /* Reads the file of a saved state.
  *
  * Returned:  *bytes  [*size] to be freed with free; NULL on error

@@ -11,7 +11,6 @@
 
 #include "boresight/state.h"
 #include "sim/engine/simulation_state.h"
-#include "sim/io/manifest.h"
 #include "sim/run/run_internal.h"
 
 struct bst_run_restored {
@@ -310,7 +309,7 @@ static bst_status save(bst_run_execution *run, bst_ctx *ctx, int64_t tick) {
                                      .recording = archive_recording,
                                      .user = run};
     BST_TRY(bst_simulation_save(ctx, run->sim, &origin, &bytes, &size));
-    bst_status status = bst_io_write_file_atomic(ctx, path, bytes, size);
+    bst_status status = bst_state_file_write(ctx, path, bytes, size);
     free(bytes);
     return status;
 }
