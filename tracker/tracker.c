@@ -567,10 +567,9 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     t->attitude_was_lost = !attitude.usable;
     choose_target(t, &view.cue, seconds);
     write_tracks(t, d, &attitude.fix, &view.cue, detections_lost, tracks, track_capacity);
-    write_predictions(
-        t, attitude.fix.tick,
-        input->q_telemetry_now ? *input->q_telemetry_now : telemetry_of(input),
-        predictions, prediction_capacity);
+    write_predictions(t, attitude.fix.tick,
+                      input->q_telemetry_now ? *input->q_telemetry_now : telemetry_of(input),
+                      predictions, prediction_capacity);
     t->cue_before = *cue;
     t->started = true;
     t->last_exposure_id = d->exposure_id;

@@ -7,6 +7,7 @@
 #include <cjson/cJSON.h>
 
 #include "sim/api/api_internal.h"
+#include "sim/engine/simulation_state.h"
 #include "sim/registry/registry.h"
 #include "sim/world/world.h"
 
@@ -19,24 +20,6 @@ static bst_status read_json(bst_ctx *ctx, const char *path, const bst_model_opti
     for (int i = 0; i < options->assignment_count; i++) {
         BST_TRY(bst_json_set(ctx, *out, options->assignments[i]));
     }
-    return BST_OK;
-}
-
-/* Digest of the scenario without what no state depends on: names, the end of the run, files. */
-static bst_status digest_scenario(bst_ctx *ctx, bst_model *model) {
-    static const char *const irrelevant[] = {"name",   "description", "duration_s",
-                                             "record", "pacing",      "run"};
-    cJSON *echo = bst_scenario_echo(&model->scenario);
-    for (size_t i = 0; echo && i < sizeof irrelevant / sizeof *irrelevant; i++) {
-        cJSON_DeleteItemFromObjectCaseSensitive(echo, irrelevant[i]);
-    }
-    char *text = echo ? cJSON_PrintUnformatted(echo) : NULL;
-    cJSON_Delete(echo);
-    if (!text) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a model");
-    }
-    bst_sha256_text(text, strlen(text), model->digest);
-    cJSON_free(text);
     return BST_OK;
 }
 
@@ -68,7 +51,7 @@ static bst_status read_model(bst_ctx *ctx, const char *path, const bst_model_opt
     registry.policy = options->no_plugins ? BST_PLUGINS_REFUSE : registry.policy;
     model->read = true; /* free it after an error too */
     BST_TRY(bst_scenario_read(ctx, model->json, &registry, &model->scenario));
-    BST_TRY(digest_scenario(ctx, model));
+    BST_TRY(bst_scenario_digest(ctx, &model->scenario, model->digest));
     return list_sensors(ctx, model);
 }
 

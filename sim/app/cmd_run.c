@@ -13,59 +13,60 @@
 static const char help_text[] =
     "usage: boresight run SCENARIO.json [options]\n"
     "\n"
-    "Runs a scenario and writes its results to a folder: frames.fits (opens in ds9), run.sqlite "
-    "(truth,\n"
-    "detections, tracks, commands, telemetry, events), manifest.json, quicklook.png, pointing.png. "
-    "While it runs\n"
-    "the folder is called OUT.partial. Ctrl-C closes the run properly, a second one ends it at "
-    "once.\n"
+    "Runs a scenario and writes its results to a folder: frames.fits (opens in ds9), run.sqlite\n"
+    "(truth, detections, tracks, commands, telemetry, events), manifest.json, quicklook.png,\n"
+    "pointing.png. While it runs the folder is called OUT.partial. Ctrl-C closes the run "
+    "properly,\n"
+    "a second one ends it at once.\n"
     "\n"
     "  boresight run scenarios/neossat_geo_track.json --out runs/demo\n"
-    "  boresight run scenarios/neossat_geo_track.json --seed 0x2A --duration 60 --set "
-    "/record/frames=none\n"
+    "  boresight run scenarios/neossat_geo_track.json --duration 60 --set /record/frames=none\n"
     "\n"
     "options:\n";
 
 typedef struct run_request {
     bst_load_options load;
     bst_simulation_options simulation;
+    bst_run_saving saving;
     const char *out, *replay;
     int64_t threads;
     bool help, overwrite, quiet, serial, force;
 } run_request;
 
+/* Creates the simulation and runs it. */
+static bst_status create_and_run(bst_ctx *ctx, run_request *r, const bst_json *json,
+                                 const bst_scenario *scenario, bst_simulation **sim,
+                                 bst_run_request *request) {
+    BST_TRY(bst_run_restored_read(ctx, scenario, &r->saving, request->out, r->replay != NULL,
+                                  &r->simulation, &request->restored));
+    bst_status status = bst_simulation_create(ctx, scenario, &r->simulation, sim);
+    if (status != BST_OK) {
+        bst_json_name_file(ctx, json);
+        return status;
+    }
+    BST_TRY(bst_run_link_prepare(ctx, &r->load, scenario, *sim, r->replay));
+    BST_TRY(bst_check_rules_apply(ctx, scenario, *sim));
+    return bst_run_scenario(ctx, scenario, *sim, request, NULL);
+}
+
 static bst_status run_loaded(bst_ctx *ctx, run_request *r, const bst_json *json,
                              const bst_scenario *scenario) {
     char default_out[128];
     snprintf(default_out, sizeof default_out, "runs/%s", scenario->name);
-    const bst_run_request request = {.out = r->out ? r->out : default_out,
-                                     .overwrite = r->overwrite,
-                                     .force = r->force,
-                                     .progress = !r->quiet && isatty(STDERR_FILENO),
-                                     .print = true};
+    bst_run_request request = {.out = r->out ? r->out : default_out,
+                               .overwrite = r->overwrite,
+                               .force = r->force,
+                               .progress = !r->quiet && isatty(STDERR_FILENO),
+                               .print = true,
+                               .saving = &r->saving};
     bst_simulation *sim = NULL;
-    bst_status status = bst_simulation_create(ctx, scenario, &r->simulation, &sim);
-    if (status != BST_OK) {
-        bst_json_name_file(ctx, json);
-    }
-    if (status == BST_OK) {
-        status = bst_run_link_check(ctx, &r->load, scenario, sim);
-    }
-    if (status == BST_OK) {
-        status = r->replay ? bst_run_link_replay(ctx, sim, r->replay)
-                           : bst_run_link_open(ctx, sim); /* before anything is written */
-    }
-    if (status == BST_OK) {
-        status = bst_check_rules_apply(ctx, scenario, sim);
-    }
-    if (status == BST_OK) {
-        status = bst_run_scenario(ctx, scenario, sim, &request, NULL);
-    }
+    bst_status status = create_and_run(ctx, r, json, scenario, &sim, &request);
     if (status != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
     }
     bst_run_link_end(sim, status, ctx->message);
     bst_simulation_free(sim);
+    bst_run_restored_free(request.restored);
     return status;
 }
 
@@ -86,6 +87,7 @@ static const bst_option OPTIONS[] = {
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(run_request, force),
      .doc = "start although the frames will take more space than is free"},
+    BST_RUN_SAVING_OPTIONS_AT(FIELD, saving),
     BST_LINK_OPTIONS_AT(FIELD, load),
     {.name = "replay",
      .kind = BST_OPTION_TEXT,

@@ -1,6 +1,7 @@
 #include "sim/eval/error_statistics.h"
 
 #include <math.h>
+#include <string.h>
 
 #define BIN_RATIO 1.001
 #define BIN_FIRST_PX 1e-5
@@ -14,6 +15,29 @@ void bst_error_statistics_add(bst_error_statistics *s, double x_px, double y_px)
     s->sum_y += y_px;
     s->sum2 += size * size;
     s->largest = fmax(s->largest, size);
+}
+
+void bst_error_statistics_archive(bst_error_statistics *s, bst_archive *archive) {
+    int filled = 0;
+    for (int b = 0; b < BST_ERROR_BINS; b++) {
+        filled += s->bins[b] != 0;
+    }
+    filled = bst_archive_count(archive, filled, BST_ERROR_BINS);
+    if (bst_archive_is_restoring(archive)) {
+        memset(s->bins, 0, sizeof s->bins);
+    }
+    for (int b = 0, k = 0; k < filled; b++, k++) {
+        while (!bst_archive_is_restoring(archive) && s->bins[b] == 0) {
+            b++;
+        }
+        b = (int)bst_archive_integer(archive, b, 0, BST_ERROR_BINS - 1);
+        BST_ARCHIVE(archive, s->bins[b]);
+    }
+    BST_ARCHIVE(archive, s->count);
+    BST_ARCHIVE(archive, s->sum_x);
+    BST_ARCHIVE(archive, s->sum_y);
+    BST_ARCHIVE(archive, s->sum2);
+    BST_ARCHIVE(archive, s->largest);
 }
 
 double bst_error_statistics_rms(const bst_error_statistics *s) {

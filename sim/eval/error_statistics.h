@@ -5,6 +5,8 @@
 
 #include <stdint.h>
 
+#include "boresight/archive.h"
+
 /* Logarithmic bins of 0.1 % from 1e-5 px to 1e8 px, which is more than 180 degrees at 0.01 arcsec a
  * pixel. */
 enum { BST_ERROR_BINS = 30000 };
@@ -16,6 +18,8 @@ typedef struct bst_error_statistics {
 
 /* Adds an error with components (x, y) px. Zero the struct first. */
 void bst_error_statistics_add(bst_error_statistics *statistics, double x_px, double y_px);
+/* Saves or restores the statistics. */
+void bst_error_statistics_archive(bst_error_statistics *statistics, bst_archive *archive);
 /* RMS of the error magnitudes, px; NAN without errors. */
 double bst_error_statistics_rms(const bst_error_statistics *statistics);
 /* Length of the mean vector, px; NAN without errors. */

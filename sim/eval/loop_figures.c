@@ -69,3 +69,15 @@ void bst_loop_tally_figures(const bst_loop_tally *t, bst_loop_figures *f) {
     f->pointing_p99_px = bst_error_statistics_quantile(&t->pointing, 0.99);
     f->pointing_max_px = bst_error_statistics_largest(&t->pointing);
 }
+
+void bst_loop_tally_archive(bst_loop_tally *t, bst_archive *archive) {
+    BST_ARCHIVE(archive, t->frames);
+    BST_ARCHIVE(archive, t->visible);
+    BST_ARCHIVE(archive, t->in_track);
+    BST_ARCHIVE(archive, t->breaks);
+    BST_ARCHIVE(archive, t->visible_acquired);
+    BST_ARCHIVE(archive, t->in_track_acquired);
+    bst_archive_bool(archive, &t->was_in_track);
+    bst_archive_bool(archive, &t->in_track_at_end);
+    bst_error_statistics_archive(&t->pointing, archive);
+}

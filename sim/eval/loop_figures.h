@@ -85,6 +85,8 @@ bool bst_loop_frame_is_pointing(const bst_loop_frame *frame);
 
 /* Adds a frame to the accumulated loop figures. */
 void bst_loop_tally_add(bst_loop_tally *tally, const bst_loop_frame *frame);
+/* Saves or restores the accumulated loop figures. */
+void bst_loop_tally_archive(bst_loop_tally *tally, bst_archive *archive);
 /* Computes the figures that follow from the accumulated frames; the times, final_mode and
  * wrong_target_frames are not changed. */
 void bst_loop_tally_figures(const bst_loop_tally *tally, bst_loop_figures *figures);

@@ -24,6 +24,7 @@ struct bst_loop_summary {
     bst_world_view *view;
     int observer;
     double rate_hz;
+    int object_count; /* of the world */
     int target;
     bst_loop_frame_fn fn;
     void *user;
@@ -57,6 +58,7 @@ bst_status bst_loop_summary_create(bst_ctx *ctx, const bst_world *world, int obs
     s->camera = *bst_world_camera(world, observer, sensor);
     s->observer = observer;
     s->rate_hz = (double)tick_rate_hz;
+    s->object_count = bst_world_object_count(world);
     s->target = target_object;
     s->acquire_tick = -1;
     s->settle_tick = -1;
@@ -72,6 +74,23 @@ void bst_loop_summary_free(bst_loop_summary *s) {
         bst_world_view_free(s->view);
         free(s);
     }
+}
+
+void bst_loop_summary_archive(bst_loop_summary *s, bst_archive *archive) {
+    s->target = (int)bst_archive_integer(archive, s->target, -1, s->object_count - 1);
+    BST_ARCHIVE(archive, s->first);
+    s->next = s->first + bst_archive_integer(archive, s->next - s->first, 0, WAITING);
+    BST_ARCHIVE(archive, s->waiting);
+    BST_ARCHIVE(archive, s->toi);
+    bst_archive_bool(archive, &s->has_toi);
+    BST_ARCHIVE(archive, s->toi_tick);
+    BST_ARCHIVE(archive, s->mode);
+    bst_archive_bool(archive, &s->last_in_track);
+    BST_ARCHIVE(archive, s->newest);
+    BST_ARCHIVE(archive, s->figures);
+    BST_ARCHIVE(archive, s->acquire_tick);
+    BST_ARCHIVE(archive, s->settle_tick);
+    bst_loop_tally_archive(&s->tally, archive);
 }
 
 void bst_loop_summary_on_frame(bst_loop_summary *s, bst_loop_frame_fn fn, void *user) {

@@ -16,6 +16,9 @@ bst_status bst_loop_summary_create(bst_ctx *ctx, const bst_world *world, int obs
 /* Frees a summary; NULL is allowed. */
 void bst_loop_summary_free(bst_loop_summary *summary);
 
+/* Saves or restores what a summary has evaluated. */
+void bst_loop_summary_archive(bst_loop_summary *summary, bst_archive *archive);
+
 /* Callback for each completed frame; it is called a few frames late, for the last frames at the
  * end. */
 typedef void (*bst_loop_frame_fn)(void *user, const bst_loop_frame *frame);

@@ -69,6 +69,58 @@ void bst_run_metrics_free(bst_run_metrics *m) {
     }
 }
 
+/* Makes room for a number of items; false: there is no memory. */
+static bool make_room(void **items, int64_t room, size_t item_bytes) {
+    void *more = realloc(*items, (size_t)(room + 1) * item_bytes);
+    *items = more ? more : *items;
+    return more != NULL;
+}
+
+/* Saves or restores a frame that waits for late messages. */
+static bool archive_frame(known_frame *f, bst_archive *archive, int most) {
+    BST_ARCHIVE(archive, f->exposure_id);
+    f->count = bst_archive_count(archive, f->count, most);
+    if (bst_archive_is_restoring(archive) && f->count > f->room) {
+        if (!make_room((void **)&f->objects, f->count, sizeof *f->objects)) {
+            return false;
+        }
+        f->room = f->count;
+    }
+    for (int i = 0; i < f->count; i++) {
+        known_object *object = &f->objects[i];
+        BST_ARCHIVE(archive, object->id);
+        BST_ARCHIVE(archive, object->direction);
+        BST_ARCHIVE(archive, object->x_px);
+        BST_ARCHIVE(archive, object->y_px);
+        bst_archive_bool(archive, &object->lit);
+    }
+    return true;
+}
+
+bst_status bst_run_metrics_archive(bst_run_metrics *m, bst_archive *archive) {
+    bool enough = true;
+    m->target = (int)bst_archive_integer(archive, m->target, -1, m->object_count - 1);
+    m->newest = (int)bst_archive_integer(archive, m->newest, 0, WAITING - 1);
+    for (int i = 0; i < WAITING && enough; i++) {
+        enough = archive_frame(&m->frames[i], archive, INT32_MAX / 2);
+    }
+    m->track_count = bst_archive_integer(archive, m->track_count, 0, INT32_MAX);
+    if (enough && bst_archive_is_restoring(archive) && m->track_count > m->track_room) {
+        enough = make_room((void **)&m->tracks, m->track_count, sizeof *m->tracks);
+        m->track_room = enough ? m->track_count : m->track_room;
+    }
+    if (!enough) {
+        m->track_count = 0;
+        return bst_fail(bst_archive_ctx(archive), BST_ERR_MEMORY,
+                        "out of memory for the figures of a run");
+    }
+    bst_archive_bytes(archive, m->tracks, (size_t)m->track_count * sizeof *m->tracks);
+    bst_archive_bytes(archive, m->objects, (size_t)m->object_count);
+    bst_error_statistics_archive(&m->track_error, archive);
+    BST_ARCHIVE(archive, m->figures);
+    return BST_OK;
+}
+
 static const known_frame *find_frame(const bst_run_metrics *m, int64_t exposure_id) {
     for (int i = 0; i < WAITING; i++) {
         if (m->frames[i].exposure_id == exposure_id) {

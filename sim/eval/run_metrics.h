@@ -45,6 +45,11 @@ bst_status bst_run_metrics_create(bst_ctx *ctx, const bst_world *world, int obse
 /* Frees the metrics of a run; NULL is allowed. */
 void bst_run_metrics_free(bst_run_metrics *metrics);
 
+/* Saves or restores the metrics.
+ *
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_run_metrics_archive(bst_run_metrics *metrics, bst_archive *archive) BST_MUST_CHECK;
+
 /* Adds the truth of an exposure. Messages come as they are published.
  *
  * Errors:    BST_ERR_MEMORY and those of the world's view */

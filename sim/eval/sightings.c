@@ -257,6 +257,100 @@ static bst_status begin_pass(bst_ctx *ctx, bst_sightings *s, int sensor_index, i
     return BST_OK;
 }
 
+/* ---- saved states ---- */
+
+/* Enlarges an array of records or of indices; false: there is no memory. */
+static bool make_room(void **items, int *room, int needed, size_t item_bytes) {
+    if (needed <= *room) {
+        return true;
+    }
+    void *more = realloc(*items, (size_t)needed * item_bytes);
+    if (!more) {
+        return false;
+    }
+    *items = more;
+    *room = needed;
+    return true;
+}
+
+/* Enters the restored records in the tables that find them. */
+static void index_records(bst_sightings *s) {
+    for (int o = 0; o < s->object_count; o++) {
+        s->whole[o] = -1;
+        for (int i = 0; i < s->sensor_count; i++) {
+            s->sensors[i].record[o] = -1;
+        }
+    }
+    for (int i = 0; i < s->record_count; i++) {
+        const bst_sighting *sum = &s->records[i].sum;
+        *(sum->sensor < 0 ? &s->whole[sum->object] : &s->sensors[sum->sensor].record[sum->object]) =
+            i;
+    }
+}
+
+static void archive_record(const bst_sightings *s, record *r, bst_archive *archive) {
+    BST_ARCHIVE(archive, r->sum);
+    BST_ARCHIVE(archive, r->pass);
+    r->sum.sensor = (int)bst_archive_integer(archive, r->sum.sensor, -1, s->sensor_count - 1);
+    r->sum.object = (int)bst_archive_integer(archive, r->sum.object, 0, s->object_count - 1);
+    r->next = (int)bst_archive_integer(archive, r->next, -1, s->record_count - 1);
+}
+
+/* Saves or restores a frame that waits for its detections and tracks. */
+static void archive_frame(const bst_sightings *s, frame *f, bst_archive *archive) {
+    bst_archive_bool(archive, &f->valid);
+    BST_ARCHIVE(archive, f->exposure_id);
+    BST_ARCHIVE(archive, f->mid_s);
+    BST_ARCHIVE(archive, f->light);
+    f->count = bst_archive_count(archive, f->count, IN_FRAME);
+    for (int i = 0; i < f->count; i++) {
+        seen_object *o = &f->objects[i];
+        o->record = (int)bst_archive_integer(archive, o->record, 0,
+                                             s->record_count > 0 ? s->record_count - 1 : 0);
+        BST_ARCHIVE(archive, o->direction);
+        BST_ARCHIVE(archive, o->x_px);
+        BST_ARCHIVE(archive, o->y_px);
+        bst_archive_bool(archive, &o->detected);
+        BST_ARCHIVE(archive, f->targets[i]);
+    }
+}
+
+/* Saves or restores the frames and current passes of a sensor; false: there is no memory. */
+static bool archive_sensor(const bst_sightings *s, sensor *e, bst_archive *archive) {
+    e->next = (int)bst_archive_integer(archive, e->next, 0, INT32_MAX);
+    for (int i = 0; i < WAITING; i++) {
+        archive_frame(s, &e->frames[i], archive);
+    }
+    e->open_count = bst_archive_count(archive, e->open_count, s->record_count);
+    if (!make_room((void **)&e->open, &e->open_room, e->open_count, sizeof *e->open)) {
+        e->open_count = 0;
+        return false;
+    }
+    for (int i = 0; i < e->open_count; i++) {
+        e->open[i] = (int)bst_archive_integer(archive, e->open[i], 0, s->record_count - 1);
+    }
+    return true;
+}
+
+bst_status bst_sightings_archive(bst_sightings *s, bst_archive *archive) {
+    s->record_count = bst_archive_count(archive, s->record_count, INT32_MAX / 2);
+    bool enough =
+        make_room((void **)&s->records, &s->record_room, s->record_count, sizeof *s->records);
+    for (int i = 0; enough && i < s->record_count; i++) {
+        archive_record(s, &s->records[i], archive);
+    }
+    if (enough && bst_archive_is_restoring(archive)) {
+        index_records(s);
+    }
+    for (int i = 0; enough && i < s->sensor_count; i++) {
+        enough = archive_sensor(s, &s->sensors[i], archive);
+    }
+    BST_ARCHIVE(archive, s->tasks);
+    return enough ? BST_OK
+                  : bst_fail(bst_archive_ctx(archive), BST_ERR_MEMORY,
+                             "out of memory for %d sightings", s->record_count);
+}
+
 /* ---- messages ---- */
 
 bst_status bst_sightings_truth(bst_ctx *ctx, bst_sightings *s, int sensor_index,

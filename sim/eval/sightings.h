@@ -75,6 +75,11 @@ bst_status bst_sightings_create(bst_ctx *ctx, const bst_world *world, int64_t ti
 /* Frees the record of sightings; NULL is allowed. */
 void bst_sightings_free(bst_sightings *sightings);
 
+/* Saves or restores what has been seen.
+ *
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_sightings_archive(bst_sightings *sightings, bst_archive *archive) BST_MUST_CHECK;
+
 /* Adds the truth of an exposure. It comes before the detections of its frame, and these before its
  * tracks.
  *

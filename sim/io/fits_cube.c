@@ -107,6 +107,14 @@ static bool write_row(const bst_fits_cube *cube, const bst_fits_frame *frame) {
                              (long long)sizeof *frame * (long long)cube->planes);
 }
 
+/* Writes the number of planes to the header. */
+static bool write_planes(const bst_fits *fits, int64_t planes) {
+    char value[24];
+    snprintf(value, sizeof value, "%20lld", (long long)planes);
+    /* the card is in one memory page: the write is atomic */
+    return bst_fits_write_at(fits->file, value, 20, NAXIS3_OFFSET + 10);
+}
+
 bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
                                const uint16_t *pixels, int width, int height) {
     bst_fits_cube *cube = &fits->cube;
@@ -126,10 +134,7 @@ bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_fram
         (BST_FITS_BLOCK - (after - cube->data_start) % BST_FITS_BLOCK) % BST_FITS_BLOCK;
     bool ok = write_row(cube, frame) && bst_fits_open_tail(fits, after + fill - fits->end) &&
               bst_fits_write_pixels(fits, pixels, count, offset, fill);
-    char value[24];
-    snprintf(value, sizeof value, "%20lld", (long long)(cube->planes + 1));
-    /* the card is in one memory page: the write is atomic */
-    ok = ok && bst_fits_write_at(fits->file, value, 20, NAXIS3_OFFSET + 10);
+    ok = ok && write_planes(fits, cube->planes + 1);
     bst_status status = ok ? BST_OK : bst_fits_fail_errno(ctx, fits, "cannot be written");
     if (ok) {
         cube->planes++;
@@ -271,4 +276,43 @@ void bst_fits_cube_free(bst_fits *fits) {
     if (fits->cube.rows >= 0) {
         close(fits->cube.rows);
     }
+}
+
+/* Saves the rows of the table, or restores them. */
+static bst_status archive_rows(bst_ctx *ctx, bst_fits *fits, bst_archive *archive) {
+    const bst_fits_cube *cube = &fits->cube;
+    for (int64_t k = 0; k < cube->planes; k++) {
+        bst_fits_frame frame;
+        const off_t at = (off_t)(k * (int64_t)sizeof frame);
+        const bool restoring = bst_archive_is_restoring(archive);
+        if (!restoring && pread(cube->rows, &frame, sizeof frame, at) != (ssize_t)sizeof frame) {
+            return bst_fits_fail_errno(ctx, fits, "cannot read the table's file");
+        }
+        BST_ARCHIVE(archive, frame);
+        if (restoring && !bst_fits_write_at(cube->rows, &frame, sizeof frame, at)) {
+            return bst_fits_fail_errno(ctx, fits, "cannot write the table's file");
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_fits_cube_archive(bst_ctx *ctx, bst_fits *fits, bst_archive *archive) {
+    bst_fits_cube *cube = &fits->cube;
+    BST_ARCHIVE(archive, cube->width);
+    BST_ARCHIVE(archive, cube->height);
+    BST_ARCHIVE(archive, cube->data_start);
+    BST_ARCHIVE(archive, cube->sum);
+    cube->sums_at = bst_archive_integer(archive, cube->sums_at, 0, ONE_PAGE);
+    BST_ARCHIVE(archive, cube->sum_cards);
+    cube->planes = bst_archive_count(archive, (int)cube->planes, INT32_MAX);
+    return archive_rows(ctx, fits, archive);
+}
+
+bst_status bst_fits_cube_cut(bst_ctx *ctx, bst_fits *fits) {
+    char blank[SUM_CARDS];
+    memset(blank, ' ', sizeof blank);
+    bool ok = write_planes(fits, fits->cube.planes) &&
+              (!fits->checksums ||
+               bst_fits_write_at(fits->file, blank, sizeof blank, fits->cube.sums_at));
+    return ok ? BST_OK : bst_fits_fail_errno(ctx, fits, "cannot be cut");
 }

@@ -1,6 +1,7 @@
 #include "sim/io/fits_frames.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -57,8 +58,9 @@ static void free_fits(bst_fits *fits) {
     free(fits);
 }
 
-bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layout,
-                           const bst_fits_info *info, bst_fits **out) {
+/* Checks the arguments and makes a bst_fits without a file. */
+static bst_status make(bst_ctx *ctx, const char *path, bst_fits_layout layout,
+                       const bst_fits_info *info, bst_fits **out) {
     *out = NULL;
     if (layout == BST_FITS_CUBE && info->compression != BST_FITS_RAW) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: a cube is not compressed", path);
@@ -87,6 +89,29 @@ bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layou
     fits->content = info->content;
     fits->checksums = info->checksums;
     copy_names(fits, info);
+    *out = fits;
+    return BST_OK;
+}
+
+/* Starts the thread of a compressed file; gives the file to the caller, or frees it after an
+ * error. */
+static bst_status complete(bst_ctx *ctx, bst_status status, bst_fits *fits, bst_fits **out) {
+    if (status == BST_OK && fits->compression == BST_FITS_RICE) {
+        status = bst_fits_queue_create(ctx, fits);
+    }
+    if (status != BST_OK) {
+        free_fits(fits);
+        return status;
+    }
+    *out = fits;
+    return BST_OK;
+}
+
+bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layout,
+                           const bst_fits_info *info, bst_fits **out) {
+    bst_fits *fits;
+    *out = NULL;
+    BST_TRY(make(ctx, path, layout, info, &fits));
     bst_status status = BST_OK;
     struct stat there;
     if (lstat(fits->path, &there) == 0) {
@@ -97,15 +122,60 @@ bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layou
     } else {
         status = write_primary(ctx, fits);
     }
-    if (status == BST_OK && fits->compression == BST_FITS_RICE) {
-        status = bst_fits_queue_create(ctx, fits);
+    return complete(ctx, status, fits, out);
+}
+
+bst_status bst_fits_reopen(bst_ctx *ctx, const char *path, bst_fits_layout layout,
+                           const bst_fits_info *info, bst_fits **out) {
+    bst_fits *fits;
+    *out = NULL;
+    BST_TRY(make(ctx, path, layout, info, &fits));
+    bst_status status = BST_OK;
+    fits->file = open(fits->path, O_RDWR | O_NOFOLLOW | O_CLOEXEC);
+    if (fits->file < 0) {
+        status = bst_fits_fail_errno(ctx, fits, "cannot be opened");
+    } else if (layout == BST_FITS_CUBE) {
+        status = bst_fits_cube_open(ctx, fits);
     }
-    if (status != BST_OK) {
-        free_fits(fits);
-        return status;
+    return complete(ctx, status, fits, out);
+}
+
+/* Removes what was appended to the file after the saved state. */
+static bst_status cut(bst_ctx *ctx, bst_fits *fits) {
+    struct stat there;
+    if (fstat(fits->file, &there) != 0) {
+        return bst_fits_fail_errno(ctx, fits, "cannot be read");
     }
-    *out = fits;
-    return BST_OK;
+    if (there.st_size < fits->end) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "%s: has %lld bytes, the saved state needs %lld: the run cannot go on from "
+                        "it; run it again from the start",
+                        fits->path, (long long)there.st_size, fits->end);
+    }
+    if (fits->layout == BST_FITS_CUBE) {
+        BST_TRY(bst_fits_cube_cut(ctx, fits));
+    }
+    return bst_fits_close_tail(fits) ? BST_OK : bst_fits_fail_errno(ctx, fits, "cannot be cut");
+}
+
+bst_status bst_fits_archive(bst_ctx *ctx, bst_fits *fits, bst_archive *archive) {
+    if (!bst_archive_is_restoring(archive)) {
+        BST_TRY(bst_fits_flush(ctx, fits));
+        if (fits->file >= 0 && fdatasync(fits->file) != 0) {
+            return bst_fits_fail_errno(ctx, fits, "cannot be flushed to disk");
+        }
+    }
+    fits->end = bst_archive_integer(archive, fits->end, 0, INT64_MAX);
+    fits->frames = bst_archive_integer(archive, fits->frames, 0, INT64_MAX);
+    if (fits->layout == BST_FITS_CUBE) {
+        BST_TRY(bst_fits_cube_archive(ctx, fits, archive));
+    }
+    bst_status status = bst_archive_is_restoring(archive) ? cut(ctx, fits) : BST_OK;
+    if (status != BST_OK) { /* so that bst_fits_close does not complete the file */
+        close(fits->file);
+        fits->file = -1;
+    }
+    return status;
 }
 
 bst_status bst_fits_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,

@@ -6,6 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "boresight/archive.h"
 #include "sim/astro/time.h"
 #include "sim/io/wcs.h"
 
@@ -62,6 +63,19 @@ typedef struct bst_fits bst_fits;
  * cfitsio has no thread support). BST_ERR_ARGUMENT for a compressed cube. */
 bst_status bst_fits_create(bst_ctx *ctx, const char *path, bst_fits_layout layout,
                            const bst_fits_info *info, bst_fits **out) BST_MUST_CHECK;
+
+/* Opens a file that bst_fits_create made, to go on after its archived frames: restore them with
+ * bst_fits_archive before anything else. Arguments and errors as bst_fits_create; BST_ERR_IO also
+ * if the file is missing. */
+bst_status bst_fits_reopen(bst_ctx *ctx, const char *path, bst_fits_layout layout,
+                           const bst_fits_info *info, bst_fits **out) BST_MUST_CHECK;
+
+/* Saves where the file ends, with all frames on the disk, or removes what was appended since.
+ *
+ * Errors:    BST_ERR_IO with file and reason; BST_ERR_FORMAT: the file is shorter than the saved
+ *            one
+ * Notes:     a cube also saves the rows of its table, about 1 KB a frame. */
+bst_status bst_fits_archive(bst_ctx *ctx, bst_fits *fits, bst_archive *archive) BST_MUST_CHECK;
 
 /* Writes a frame of width x height pixels (row-major, after windowing and binning).
  *

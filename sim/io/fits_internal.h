@@ -191,6 +191,14 @@ bst_status bst_fits_cube_write(bst_ctx *ctx, bst_fits *fits, const bst_fits_fram
                                const uint16_t *pixels, int width, int height) BST_MUST_CHECK;
 /* Writes the table of a cube: times and WCS of its planes. */
 bst_status bst_fits_cube_finish(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
+/* Saves the planes of a cube and the rows of its table, or restores them.
+ *
+ * Errors:    BST_ERR_IO */
+bst_status bst_fits_cube_archive(bst_ctx *ctx, bst_fits *fits, bst_archive *archive) BST_MUST_CHECK;
+/* Sets the header of a cube to the archived planes, without checksums until it is complete.
+ *
+ * Errors:    BST_ERR_IO */
+bst_status bst_fits_cube_cut(bst_ctx *ctx, bst_fits *fits) BST_MUST_CHECK;
 /* Closes the unlinked file with the rows of a cube's table, if it is open. */
 void bst_fits_cube_free(bst_fits *fits);
 

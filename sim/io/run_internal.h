@@ -18,6 +18,7 @@ struct bst_io_table {
     sqlite3_stmt *insert;
     char name[64];
     int columns;
+    int64_t rows;
     bst_io_column_type types[BST_TABLE_COLUMNS];
 };
 
@@ -25,7 +26,8 @@ struct bst_run {
     char out[BST_RUN_PATH_BYTES];    /* final name */
     char folder[BST_RUN_PATH_BYTES]; /* out + ".partial" */
     bool overwrite;
-    int lock; /* file descriptor with the lock on folder/lock */
+    bool reopened; /* the tables are there already */
+    int lock;      /* file descriptor with the lock on folder/lock */
     sqlite3 *db;
     bst_io_table *tables;
     sqlite3_stmt *note_table, *note_column;
@@ -43,7 +45,8 @@ bst_status bst_run_path_join(bst_ctx *ctx, char *buffer, size_t bytes, const cha
 /* Checks that the run's folder was not removed, moved or replaced. */
 bst_status bst_run_check_folder(bst_ctx *ctx, const bst_run *run) BST_MUST_CHECK;
 
-/* Creates the run's SQLite database with the tables that describe all others.
+/* Creates the run's SQLite database with the tables that describe all others; opens that of a
+ * reopened run.
  *
  * Errors:    BST_ERR_IO */
 bst_status bst_run_open_database(bst_ctx *ctx, bst_run *run) BST_MUST_CHECK;

@@ -225,7 +225,8 @@ static bst_status check_out(bst_ctx *ctx, const bst_run *run) {
     return BST_OK;
 }
 
-bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite, bst_run **out) {
+/* Makes a run with the names of its folders. */
+static bst_status name_run(bst_ctx *ctx, const char *out_path, bool overwrite, bst_run **out) {
     assert(out_path && out);
     *out = NULL;
     size_t length = out_path ? strlen(out_path) : 0;
@@ -254,7 +255,21 @@ bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite, bs
     run->overwrite = overwrite;
     memcpy(run->out, out_path, length);
     snprintf(run->folder, sizeof run->folder, "%.*s.partial", (int)length, out_path);
+    *out = run;
+    return BST_OK;
+}
 
+static void free_run(bst_run *run) {
+    if (run->lock >= 0) {
+        close(run->lock);
+    }
+    free(run);
+}
+
+bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite, bst_run **out) {
+    bst_run *run = NULL;
+    *out = NULL;
+    BST_TRY(name_run(ctx, out_path, overwrite, &run));
     bst_status status = check_out(ctx, run);
     if (status == BST_OK) {
         status = bst_folder_make_above(ctx, run->out);
@@ -269,14 +284,53 @@ bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite, bs
         }
     }
     if (status != BST_OK) {
-        if (run->lock >= 0) {
-            close(run->lock);
-        }
-        free(run);
+        free_run(run);
         return status;
     }
     *out = run;
     return BST_OK;
+}
+
+/* Locks the folder of an interrupted run. */
+static bst_status lock_again(bst_ctx *ctx, bst_run *run) {
+    run->lock = take_lock(run->folder, 0);
+    if (run->lock < 0) {
+        return errno == EWOULDBLOCK ? bst_fail(ctx, BST_ERR_IO,
+                                               "%s: another process is writing this run; wait "
+                                               "until it has ended",
+                                               run->folder)
+               : errno == ENOENT    ? bst_fail(ctx, BST_ERR_NOT_FOUND,
+                                               "%s: there is no interrupted run", run->folder)
+                                    : fail_errno(ctx, run->folder, "cannot be locked");
+    }
+    int full = posix_fallocate(run->lock, 0, SPARE_BYTES);
+    errno = full;
+    return full == ENOSPC || full == EFBIG ? fail_errno(ctx, run->folder, "cannot make the lock")
+                                           : BST_OK;
+}
+
+bst_status bst_run_reopen(bst_ctx *ctx, const char *out_path, bool overwrite, bst_run **out) {
+    bst_run *run = NULL;
+    *out = NULL;
+    BST_TRY(name_run(ctx, out_path, overwrite, &run));
+    run->reopened = true;
+    bst_status status = check_out(ctx, run);
+    if (status == BST_OK) {
+        status = lock_again(ctx, run);
+    }
+    if (status == BST_OK) {
+        status = bst_run_open_database(ctx, run);
+    }
+    if (status != BST_OK) {
+        free_run(run);
+        return status;
+    }
+    *out = run;
+    return BST_OK;
+}
+
+bool bst_run_is_reopened(const bst_run *run) {
+    return run->reopened;
 }
 
 int64_t bst_run_free_bytes(const char *path) {
@@ -387,13 +441,22 @@ bst_status bst_run_seal(bst_ctx *ctx, bst_run *run) {
     return status == BST_OK ? sync_folder(ctx, run->folder) : status;
 }
 
+/* Removes a file of the run's folder, which may be absent if `needed` is false. */
+static bst_status remove_file(bst_ctx *ctx, const bst_run *run, const char *name, bool needed) {
+    char path[BST_RUN_PATH_BYTES];
+    BST_TRY(bst_run_path_join(ctx, path, sizeof path, run->folder, name));
+    return unlink(path) == 0 || (errno == ENOENT && !needed)
+               ? BST_OK
+               : fail_errno(ctx, path, "cannot be removed");
+}
+
 bst_status bst_run_finish(bst_ctx *ctx, bst_run *run) {
     bst_status status = run->db ? bst_run_seal(ctx, run) : bst_run_check_folder(ctx, run);
-    char lock_path[BST_RUN_PATH_BYTES];
-    bool have_lock_path =
-        bst_run_path_join(NULL, lock_path, sizeof lock_path, run->folder, BST_RUN_LOCK) == BST_OK;
-    if (status == BST_OK && have_lock_path && unlink(lock_path) != 0) {
-        status = fail_errno(ctx, lock_path, "cannot be removed");
+    if (status == BST_OK) {
+        status = remove_file(ctx, run, BST_RUN_STATE, false);
+    }
+    if (status == BST_OK) {
+        status = remove_file(ctx, run, BST_RUN_LOCK, true);
     }
     if (status == BST_OK) {
         status = sync_path(ctx, run->folder);

@@ -7,11 +7,15 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "boresight/archive.h"
 #include "boresight/status.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/* File of an unfinished run's folder: the saved state from which the run can go on. */
+#define BST_RUN_STATE "state"
 
 typedef struct bst_run bst_run;
 typedef struct bst_io_table bst_io_table;
@@ -29,6 +33,22 @@ typedef struct bst_io_table bst_io_table;
  *            process (lock) is refused. */
 bst_status bst_run_create(bst_ctx *ctx, const char *out_path, bool overwrite,
                           bst_run **out) BST_MUST_CHECK;
+
+/* Opens "<out>.partial" of an interrupted run to go on writing it. Create its tables next, by the
+ * same calls as before, then restore what they held with bst_run_archive.
+ *
+ * Errors:    as bst_run_create; BST_ERR_NOT_FOUND: there is no interrupted run
+ * Notes:     nothing is changed before bst_run_archive. */
+bst_status bst_run_reopen(bst_ctx *ctx, const char *out_path, bool overwrite,
+                          bst_run **out) BST_MUST_CHECK;
+/* True if a run was opened by bst_run_reopen. */
+bool bst_run_is_reopened(const bst_run *run);
+
+/* Saves how many rows each table has, or removes the rows after the saved ones.
+ *
+ * Errors:    BST_ERR_FORMAT: a table has fewer rows than were saved; BST_ERR_IO
+ * Notes:     commits the rows; saving also flushes them to disk. */
+bst_status bst_run_archive(bst_ctx *ctx, bst_run *run, bst_archive *archive) BST_MUST_CHECK;
 
 /* The folder that is being written ("<out>.partial"); owned by the run. */
 const char *bst_run_folder(const bst_run *run);

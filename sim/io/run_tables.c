@@ -40,18 +40,23 @@ bst_status bst_run_open_database(bst_ctx *ctx, bst_run *run) {
     /* SQLite may interpret a name that begins with "file:" as a URI */
     snprintf(path, sizeof path, "%s%s/%s", run->folder[0] == '/' ? "" : "./", run->folder,
              BST_RUN_DATABASE);
-    int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
+    int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX;
+    flags |= run->reopened ? 0 : SQLITE_OPEN_CREATE;
     bst_status status = BST_OK;
     if (sqlite3_open_v2(path, &run->db, flags, NULL) != SQLITE_OK) {
-        status = fail_sql(ctx, run, "cannot be made");
+        status = fail_sql(ctx, run, run->reopened ? "cannot be opened" : "cannot be made");
     }
     if (status == BST_OK) {
         /* rows are only appended: 128 KiB of cache suffice; the default grows by 2 MB in a long
          * run */
         status = execute(ctx, run,
                          "PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;"
-                         "PRAGMA cache_size=-128;"
-                         "PRAGMA temp_store=MEMORY; PRAGMA user_version=1;"
+                         "PRAGMA cache_size=-128; PRAGMA temp_store=MEMORY;",
+                         "cannot be set up");
+    }
+    if (status == BST_OK && !run->reopened) {
+        status = execute(ctx, run,
+                         "PRAGMA user_version=1;"
                          "CREATE TABLE tables (\"table\" TEXT PRIMARY KEY, doc TEXT);"
                          "CREATE TABLE columns (\"table\" TEXT, position INTEGER, \"column\" TEXT,"
                          " type TEXT, unit TEXT, doc TEXT, PRIMARY KEY (\"table\", position));",
@@ -189,9 +194,11 @@ bst_status bst_io_table_create(bst_ctx *ctx, bst_run *run, const char *name, con
     /* 64 names of 63 characters with quotes fit into SQL_BYTES */
     char create[SQL_BYTES], insert[SQL_BYTES];
     BST_TRY(write_sql(ctx, name, columns, count, create, insert));
-    BST_TRY(begin_batch(ctx, run));
-    BST_TRY(execute(ctx, run, create, "cannot make a table"));
-    BST_TRY(note_columns(ctx, run, name, doc, columns, count));
+    if (!run->reopened) {
+        BST_TRY(begin_batch(ctx, run));
+        BST_TRY(execute(ctx, run, create, "cannot make a table"));
+        BST_TRY(note_columns(ctx, run, name, doc, columns, count));
+    }
     bst_io_table *table = calloc(1, sizeof *table);
     if (!table) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
@@ -238,10 +245,50 @@ bst_status bst_io_table_append(bst_ctx *ctx, bst_io_table *table, const bst_io_v
     }
     BST_TRY(step_once(ctx, run, table->insert, "cannot store a row"));
     run->batch_rows++;
+    table->rows++;
     struct timespec now;
     clock_gettime(CLOCK_MONOTONIC, &now);
     double age_s = (double)(now.tv_sec - run->batch_start.tv_sec) +
                    1e-9 * (double)(now.tv_nsec - run->batch_start.tv_nsec);
     return run->batch_rows >= BATCH_ROWS || age_s >= BATCH_SECONDS ? bst_run_commit(ctx, run)
                                                                    : BST_OK;
+}
+
+/* Removes the rows of a table after the saved ones, and checks that these are there. */
+static bst_status cut_table(bst_ctx *ctx, bst_run *run, bst_io_table *table) {
+    char sql[256];
+    sqlite3_stmt *newest = NULL;
+    snprintf(sql, sizeof sql, "DELETE FROM \"%s\" WHERE rowid > %lld", table->name,
+             (long long)table->rows);
+    BST_TRY(begin_batch(ctx, run));
+    BST_TRY(execute(ctx, run, sql, "cannot remove rows"));
+    snprintf(sql, sizeof sql, "SELECT max(rowid) FROM \"%s\"", table->name);
+    if (sqlite3_prepare_v2(run->db, sql, -1, &newest, NULL) != SQLITE_OK ||
+        sqlite3_step(newest) != SQLITE_ROW) {
+        sqlite3_finalize(newest);
+        return fail_sql(ctx, run, "cannot be read");
+    }
+    long long rows = sqlite3_column_int64(newest, 0); /* rows are only appended: numbered from 1 */
+    sqlite3_finalize(newest);
+    return rows == table->rows
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_FORMAT,
+                          "%s/%s: table %s has %lld rows, the saved state needs %lld: the run "
+                          "cannot go on from it; run it again from the start",
+                          run->folder, BST_RUN_DATABASE, table->name, rows, (long long)table->rows);
+}
+
+bst_status bst_run_archive(bst_ctx *ctx, bst_run *run, bst_archive *archive) {
+    BST_TRY(bst_run_commit(ctx, run));
+    for (bst_io_table *table = run->tables; table; table = table->next) {
+        table->rows = bst_archive_integer(archive, table->rows, 0, INT64_MAX);
+        if (bst_archive_is_restoring(archive)) {
+            BST_TRY(cut_table(ctx, run, table));
+        }
+    }
+    if (bst_archive_is_restoring(archive)) {
+        return bst_run_commit(ctx, run);
+    }
+    /* to disk: a commit alone may be lost with the power */
+    return execute(ctx, run, "PRAGMA wal_checkpoint(PASSIVE)", "cannot be flushed to disk");
 }

@@ -9,7 +9,8 @@ static bool stop(void *user) {
     return bst_stop_requested();
 }
 
-bst_status bst_run_link_open(bst_ctx *ctx, bst_simulation *simulation) {
+/* Binds the address of the link; stop signals end its waits. */
+static bst_status link_open(bst_ctx *ctx, bst_simulation *simulation) {
     bst_link *link = bst_simulation_link(simulation);
     if (!link) {
         return BST_OK;
@@ -18,8 +19,9 @@ bst_status bst_run_link_open(bst_ctx *ctx, bst_simulation *simulation) {
     return bst_link_open(ctx, link);
 }
 
-bst_status bst_run_link_check(bst_ctx *ctx, const bst_load_options *load,
-                              const bst_scenario *scenario, bst_simulation *simulation) {
+/* Checks that the options --link and --link-keys have an effect. */
+static bst_status link_check(bst_ctx *ctx, const bst_load_options *load,
+                             const bst_scenario *scenario, bst_simulation *simulation) {
     if ((!load->link && !load->link_keys) || bst_simulation_link(simulation)) {
         return BST_OK;
     }
@@ -32,7 +34,8 @@ bst_status bst_run_link_check(bst_ctx *ctx, const bst_load_options *load,
 
 static const char tape[] = "link.packets";
 
-bst_status bst_run_link_replay(bst_ctx *ctx, bst_simulation *simulation, const char *folder) {
+/* Takes the recorded answers of the run in a folder. */
+static bst_status link_replay(bst_ctx *ctx, bst_simulation *simulation, const char *folder) {
     bst_link *link = bst_simulation_link(simulation);
     char path[600];
     if (!link) {
@@ -42,6 +45,13 @@ bst_status bst_run_link_replay(bst_ctx *ctx, bst_simulation *simulation, const c
     }
     snprintf(path, sizeof path, "%.500s/%s", folder, tape);
     return bst_link_replay(ctx, link, path);
+}
+
+bst_status bst_run_link_prepare(bst_ctx *ctx, const bst_load_options *load,
+                                const bst_scenario *scenario, bst_simulation *simulation,
+                                const char *folder) {
+    BST_TRY(link_check(ctx, load, scenario, simulation));
+    return folder ? link_replay(ctx, simulation, folder) : link_open(ctx, simulation);
 }
 
 bst_status bst_run_link_record(bst_ctx *ctx, bst_simulation *simulation, const char *folder) {

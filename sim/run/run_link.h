@@ -5,19 +5,16 @@
 #include "sim/cli/load.h"
 #include "sim/engine/simulation.h"
 
-/* Checks that the options --link and --link-keys have an effect.
+/* Prepares the link of a simulation before anything is written: binds the address if modules are
+ * external, where stop signals end its waits, or takes the recorded answers of a run.
  *
- * Errors:    BST_ERR_ARGUMENT if one is given and no module of the scenario is external */
-bst_status bst_run_link_check(bst_ctx *ctx, const bst_load_options *load,
-                              const bst_scenario *scenario,
-                              bst_simulation *simulation) BST_MUST_CHECK;
-
-/* Binds the address if modules are external; stop signals end its waits. */
-bst_status bst_run_link_open(bst_ctx *ctx, bst_simulation *simulation) BST_MUST_CHECK;
-/* Makes a linked simulation use the recorded answers of the run in this folder. BST_ERR_CONFIG: it
- * has no link. */
-bst_status bst_run_link_replay(bst_ctx *ctx, bst_simulation *simulation,
-                               const char *folder) BST_MUST_CHECK;
+ * Given:     load    options; --link and --link-keys must have an effect
+ *            folder  of the run whose answers are repeated; NULL: peers connect
+ * Errors:    BST_ERR_ARGUMENT: an option without effect; BST_ERR_CONFIG: a replay without a link;
+ *            BST_ERR_IO */
+bst_status bst_run_link_prepare(bst_ctx *ctx, const bst_load_options *load,
+                                const bst_scenario *scenario, bst_simulation *simulation,
+                                const char *folder) BST_MUST_CHECK;
 /* Starts recording the answers of peers into a run's folder; nothing without a link or in a
  * replay. */
 bst_status bst_run_link_record(bst_ctx *ctx, bst_simulation *simulation,

@@ -66,6 +66,58 @@ void bst_run_pictures_free(bst_run_pictures *p) {
     }
 }
 
+/* Makes room for the restored pixels and marks of a picture; false: there is no memory. */
+static bool make_room(picture *pic, size_t pixels, int marks) {
+    free(pic->pixels);
+    free(pic->marks);
+    pic->pixels = pixels > 0 ? malloc(pixels * sizeof *pic->pixels) : NULL;
+    pic->marks = marks > 0 ? malloc((size_t)marks * sizeof *pic->marks) : NULL;
+    pic->mark_count = pic->mark_room = pic->marks ? marks : 0;
+    return (pixels == 0 || pic->pixels) && (marks == 0 || pic->marks);
+}
+
+/* Saves or restores a picture. */
+static bst_status archive_picture(const bst_run_pictures *p, picture *pic, bst_archive *archive) {
+    bool present = pic->pixels != NULL;
+    bst_archive_bool(archive, &present);
+    pic->width = (int)bst_archive_integer(archive, pic->width, 0, p->camera.width_px);
+    pic->height = (int)bst_archive_integer(archive, pic->height, 0, p->camera.height_px);
+    int marks = bst_archive_count(archive, pic->mark_count, INT32_MAX / 2);
+    size_t pixels = present ? (size_t)pic->width * (size_t)pic->height : 0;
+    if (bst_archive_is_restoring(archive) && !make_room(pic, pixels, marks)) {
+        return bst_fail(bst_archive_ctx(archive), BST_ERR_MEMORY, "out of memory for pictures");
+    }
+    bst_archive_bytes(archive, pic->pixels, pixels * sizeof *pic->pixels);
+    bst_archive_bytes(archive, pic->marks, (size_t)marks * sizeof *pic->marks);
+    BST_ARCHIVE(archive, pic->exposure_id);
+    BST_ARCHIVE(archive, pic->mid_tick);
+    BST_ARCHIVE(archive, pic->window);
+    BST_ARCHIVE(archive, pic->binning);
+    bst_archive_bool(archive, &pic->processed);
+    bst_archive_bool(archive, &pic->has_target);
+    BST_ARCHIVE(archive, pic->target_x_px);
+    BST_ARCHIVE(archive, pic->target_y_px);
+    bst_archive_bool(archive, &pic->has_track);
+    BST_ARCHIVE(archive, pic->track_x_px);
+    BST_ARCHIVE(archive, pic->track_y_px);
+    BST_ARCHIVE(archive, pic->track_label);
+    pic->track_label[sizeof pic->track_label - 1] = '\0';
+    BST_ARCHIVE(archive, pic->mode);
+    return BST_OK;
+}
+
+bst_status bst_run_pictures_archive(bst_run_pictures *p, bst_archive *archive) {
+    BST_TRY(archive_picture(p, &p->first, archive));
+    BST_TRY(archive_picture(p, &p->last, archive));
+    BST_TRY(archive_picture(p, &p->pending, archive));
+    BST_ARCHIVE(archive, p->mode);
+    p->point_count = bst_archive_count(archive, p->point_count, MAX_POINTS);
+    bst_archive_bytes(archive, p->points, (size_t)p->point_count * sizeof *p->points);
+    BST_ARCHIVE(archive, p->judged);
+    p->stride = bst_archive_integer(archive, p->stride, 1, INT64_MAX / 2);
+    return BST_OK;
+}
+
 /* Copies the pixels of a frame for the quick-look picture. */
 static bst_status copy_frame(bst_ctx *ctx, bst_run_pictures *p, const bst_frame_message *m) {
     if (!m->frame) {

@@ -3,6 +3,7 @@
 #ifndef BST_RUN_RUN_PICTURES_H
 #define BST_RUN_RUN_PICTURES_H
 
+#include "boresight/archive.h"
 #include "boresight/messages.h"
 #include "sim/eval/loop_summary.h"
 
@@ -19,6 +20,12 @@ bst_status bst_run_pictures_create(bst_ctx *ctx, const bst_camera *camera, int64
                                    bst_run_pictures **out) BST_MUST_CHECK;
 /* Frees the pictures of a run; NULL is allowed. */
 void bst_run_pictures_free(bst_run_pictures *pictures);
+
+/* Saves or restores what the pictures will show.
+ *
+ * Errors:    BST_ERR_MEMORY, BST_ERR_FORMAT */
+bst_status bst_run_pictures_archive(bst_run_pictures *pictures,
+                                    bst_archive *archive) BST_MUST_CHECK;
 
 /* Takes a message of the pictured sensor. */
 bst_status bst_run_pictures_message(bst_ctx *ctx, bst_run_pictures *pictures, const char *channel,

@@ -195,6 +195,10 @@ void bst_run_sightings_free(bst_run_sightings *s) {
     }
 }
 
+bst_status bst_run_sightings_archive(bst_run_sightings *s, bst_archive *archive) {
+    return s ? bst_sightings_archive(s->sightings, archive) : BST_OK;
+}
+
 bst_status bst_run_sightings_message(bst_ctx *ctx, bst_run_sightings *s, int sensor,
                                      const char *channel, const void *payload) {
     if (!s) {

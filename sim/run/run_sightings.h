@@ -2,6 +2,7 @@
 #ifndef BST_RUN_RUN_SIGHTINGS_H
 #define BST_RUN_RUN_SIGHTINGS_H
 
+#include "boresight/archive.h"
 #include "sim/engine/recorder/recorder.h"
 #include "sim/eval/sightings.h"
 #include "sim/io/run_store.h"
@@ -16,6 +17,12 @@ bst_status bst_run_sightings_create(bst_ctx *ctx, const bst_world *world,
                                     const bst_recorder_config *record, int64_t tick_rate_hz,
                                     bst_run *store, bst_run_sightings **out) BST_MUST_CHECK;
 void bst_run_sightings_free(bst_run_sightings *sightings); /* NULL allowed */
+
+/* Saves or restores what has been seen. NULL sightings: nothing.
+ *
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_run_sightings_archive(bst_run_sightings *sightings,
+                                     bst_archive *archive) BST_MUST_CHECK;
 
 /* Takes a message; `sensor`: index over all observers. NULL sightings: nothing. */
 bst_status bst_run_sightings_message(bst_ctx *ctx, bst_run_sightings *sightings, int sensor,

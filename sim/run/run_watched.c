@@ -1,5 +1,6 @@
 #include "sim/run/run_watched.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static bool is_one_of(const char *channel, const char *const *names, int count) {
@@ -25,6 +26,7 @@ void bst_run_watch(bst_run_watched *w, const bst_recorder *recorder, const char 
                            .last = -1,
                            .mode = -1,
                            .pixels = *pixels};
+    snprintf(w->channel, sizeof w->channel, "%s", channel);
     if (strcmp(channel, BST_CHANNEL_FRAME) == 0) {
         w->kind = BST_WATCH_FRAMES;
     } else if (strcmp(channel, BST_CHANNEL_CONTROL_STATUS) == 0) {
@@ -34,6 +36,29 @@ void bst_run_watch(bst_run_watched *w, const bst_recorder *recorder, const char 
     } else {
         w->kind = w->recorded || is_one_of(channel, judged, 4) ? BST_WATCH_ALL : BST_WATCH_NONE;
     }
+}
+
+void bst_run_watched_archive(bst_run_watched *w, bst_archive *archive) {
+    BST_ARCHIVE(archive, w->channel);
+    w->channel[sizeof w->channel - 1] = '\0';
+    BST_ARCHIVE(archive, w->last);
+    BST_ARCHIVE(archive, w->not_due_before);
+    BST_ARCHIVE(archive, w->mode);
+    BST_ARCHIVE(archive, w->target_id);
+    BST_ARCHIVE(archive, w->frames);
+    BST_ARCHIVE(archive, w->end_tick);
+}
+
+void bst_run_watch_again(bst_run_watched *w, const bst_recorder *recorder,
+                         const bst_run_pixels *pixels) {
+    const bst_run_watched restored = *w;
+    bst_run_watch(w, recorder, restored.channel, pixels);
+    w->last = restored.last;
+    w->not_due_before = restored.not_due_before;
+    w->mode = restored.mode;
+    w->target_id = restored.target_id;
+    w->frames = restored.frames;
+    w->end_tick = restored.end_tick;
 }
 
 static bool wants_pixels(bst_run_watched *w, const bst_frame_message *m) {

@@ -20,8 +20,11 @@ typedef struct bst_run_pixels {
     int64_t duration_ticks; /* of the run */
 } bst_run_pixels;
 
+enum { BST_WATCH_NAME_BYTES = 40 };
+
 /* A channel of a sensor. */
 typedef struct bst_run_watched {
+    char channel[BST_WATCH_NAME_BYTES]; /* without scope */
     bst_run_watch_kind kind;
     bool recorded;
     int64_t last;           /* on the recorder's time grid */
@@ -37,6 +40,13 @@ typedef struct bst_run_watched {
 /* Sets up the selection of a channel. `channel`: name without scope. */
 void bst_run_watch(bst_run_watched *watched, const bst_recorder *recorder, const char *channel,
                    const bst_run_pixels *pixels);
+
+/* Saves or restores the selection of a channel. A restored one needs bst_run_watch_again before it
+ * is used. */
+void bst_run_watched_archive(bst_run_watched *watched, bst_archive *archive);
+/* As bst_run_watch for a channel that was restored. */
+void bst_run_watch_again(bst_run_watched *watched, const bst_recorder *recorder,
+                         const bst_run_pixels *pixels);
 
 /* True if a message is used; call it in order. Advances the mark's tick if possible. Frames are
  * passed as metadata only if no consumer needs their pixels. */

@@ -236,8 +236,8 @@ static bst_status run_until(bst_ctx *ctx, bst_engine *engine, int64_t until_tick
     return BST_OK;
 }
 
-/* Calls the finish function of each module instance. */
-static bst_status finish_instances(bst_ctx *ctx, bst_engine *engine) {
+bst_status bst_engine_finish(bst_ctx *ctx, bst_engine *engine) {
+    assert(engine && engine->loaded);
     for (int i = 0; i < engine->instance_count; i++) {
         instance *self = engine->instances[i];
         if (self->spec.desc->finish) {
@@ -268,7 +268,7 @@ bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) 
     }
     if (status == BST_OK || status == BST_ERR_INTERRUPTED) {
         bst_ctx counting = *ctx;
-        bst_status counted = finish_instances(&counting, engine);
+        bst_status counted = bst_engine_finish(&counting, engine);
         if (counted != BST_OK) {
             *ctx = counting;
             return counted;

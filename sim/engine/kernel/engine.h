@@ -119,6 +119,10 @@ bst_status bst_engine_run(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) 
 /* As bst_engine_run, without the modules' actions at the end of a run: more steps follow. With
  * threads, all of them have reached the tick when it returns, and all observers were called. */
 bst_status bst_engine_advance(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) BST_MUST_CHECK;
+/* Lets the modules act as at the end of a run, after bst_engine_advance.
+ *
+ * Errors:    those of the modules */
+bst_status bst_engine_finish(bst_ctx *ctx, bst_engine *engine) BST_MUST_CHECK;
 /* Schedules one additional step of an instance at a tick, between two calls of bst_engine_advance.
  * BST_ERR_NOT_FOUND: no instance has the name. */
 bst_status bst_engine_wake(bst_ctx *ctx, bst_engine *engine, const char *instance,

@@ -141,10 +141,8 @@ static bst_status copy_name(bst_ctx *ctx, char *to, size_t bytes, const char *fr
     return BST_OK;
 }
 
-/* Name of the FITS file of a sensor: "frames.fits", or one file per sensor. `what`: "frames" or a
- * plane. */
-static void frames_file(const bst_recorder *recorder, const bst_recorder_state *s, const char *what,
-                        char *name, size_t bytes) {
+void bst_recorder_file_name(const bst_recorder *recorder, const bst_recorder_state *s,
+                            const char *what, char *name, size_t bytes) {
     if (recorder->sensor_count == 1) {
         snprintf(name, bytes, "%s.fits", what);
         return;
@@ -174,10 +172,13 @@ static bst_status fill(bst_ctx *ctx, bst_recorder *recorder, const bst_recorder_
         s->last_target = -1;
     }
     BST_TRY(bst_recorder_make_tables(ctx, recorder));
+    if (bst_run_is_reopened(recorder->run)) {
+        return BST_OK; /* bst_recorder_archive restores what follows */
+    }
     BST_TRY(bst_recorder_run_row(ctx, recorder));
     for (int i = 0; i < recorder->sensor_count; i++) {
         char name[256];
-        frames_file(recorder, &recorder->sensors[i], "frames", name, sizeof name);
+        bst_recorder_file_name(recorder, &recorder->sensors[i], "frames", name, sizeof name);
         bool kept = recorder->config.frames != BST_RECORD_NO_FRAMES;
         BST_TRY(bst_recorder_sensor_row(ctx, recorder, i, kept ? name : NULL));
     }
@@ -209,6 +210,7 @@ bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_recorder_co
     recorder->config = *config;
     recorder->epoch = info->epoch;
     recorder->tick_rate_hz = info->tick_rate_hz;
+    recorder->begin_tick = info->begin_tick;
     recorder->sensor_count = info->sensor_count;
     recorder->world = info->world;
     bst_status status = bst_recorder_config_check(ctx, config);
@@ -232,11 +234,27 @@ bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_recorder_co
     return BST_OK;
 }
 
-static bst_status open_file(bst_ctx *ctx, bst_recorder *recorder, bst_recorder_state *s,
-                            const char *what, bst_fits_content content, bst_fits **out) {
+const char *bst_recorder_plane_file(int plane) {
+    return plane_choices[plane];
+}
+
+/* Content of a file by its name: frames or a plane. */
+static bst_fits_content content_of(const char *what) {
+    for (int k = 0; k < BST_PLANE_COUNT; k++) {
+        if (strcmp(what, plane_choices[k]) == 0) {
+            return plane_contents[k];
+        }
+    }
+    return BST_FITS_COUNTS;
+}
+
+bst_status bst_recorder_open_file(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                                  const char *what, bool reopen, bst_fits **out) {
     char name[256], path[4096];
-    frames_file(recorder, s, what, name, sizeof name);
+    const bst_recorder_state *s = &recorder->sensors[sensor];
+    bst_recorder_file_name(recorder, s, what, name, sizeof name);
     BST_TRY(bst_run_file(ctx, recorder->run, name, path, sizeof path));
+    bst_fits_content content = content_of(what);
     bool frames = content == BST_FITS_COUNTS;
     bst_fits_info info = {.observer = s->observer,
                           .instrument = s->sensor,
@@ -250,7 +268,8 @@ static bst_status open_file(bst_ctx *ctx, bst_recorder *recorder, bst_recorder_s
                           .content = content};
     bst_fits_layout layout =
         frames && recorder->config.frames == BST_RECORD_CUBE ? BST_FITS_CUBE : BST_FITS_EXTENSIONS;
-    return bst_fits_create(ctx, path, layout, &info, out);
+    return reopen ? bst_fits_reopen(ctx, path, layout, &info, out)
+                  : bst_fits_create(ctx, path, layout, &info, out);
 }
 
 /* Fits the WCS of a frame. If the field is too wide, the frame has no WCS; an event reports it
@@ -294,7 +313,7 @@ static bst_status write_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor,
     int64_t index = -1;
     if (recorder->config.frames != BST_RECORD_NO_FRAMES) {
         if (!s->fits) {
-            BST_TRY(open_file(ctx, recorder, s, "frames", BST_FITS_COUNTS, &s->fits));
+            BST_TRY(bst_recorder_open_file(ctx, recorder, sensor, "frames", false, &s->fits));
         }
         const uint16_t *pixels;
         BST_TRY(bst_frame_map(m->frame, ctx, &pixels));
@@ -328,6 +347,9 @@ static bst_status take_planes(bst_ctx *ctx, bst_recorder *recorder, int sensor, 
     const bst_planes *p = payload;
     bst_recorder_state *s = &recorder->sensors[sensor];
     if (s->shown.id != p->exposure_id) {
+        if (recorder->begin_tick > 0 && s->shown.id < 0) {
+            return BST_OK; /* its frame came before the record began */
+        }
         return bst_fail(ctx, BST_ERR_STATE, "%s/%s: planes of exposure %lld without its frame",
                         s->observer, s->sensor, (long long)p->exposure_id);
     }
@@ -339,8 +361,8 @@ static bst_status take_planes(bst_ctx *ctx, bst_recorder *recorder, int sensor, 
             continue;
         }
         if (!s->planes[k]) {
-            BST_TRY(
-                open_file(ctx, recorder, s, plane_choices[k], plane_contents[k], &s->planes[k]));
+            BST_TRY(bst_recorder_open_file(ctx, recorder, sensor, plane_choices[k], false,
+                                           &s->planes[k]));
         }
         const bst_fits_plane plane = {plane_names[k], pixels, p->width, p->height};
         BST_TRY(bst_fits_write_plane(ctx, s->planes[k], &s->shown, &plane, NULL));
@@ -368,7 +390,7 @@ static bst_status take_frame(bst_ctx *ctx, bst_recorder *recorder, int sensor, c
         BST_TRY(write_waiting(ctx, recorder, sensor, NULL));
     }
     bst_recorder_truth_head *head = find_head(s, m->exposure_id);
-    if (head || !s->has_truth) {
+    if (head || !s->has_truth || m->start_tick < recorder->begin_tick) {
         bst_status status = write_frame(ctx, recorder, sensor, m, head);
         if (head) {
             head->valid = false;

@@ -2,6 +2,7 @@
 #ifndef BST_ENGINE_RECORDER_RECORDER_H
 #define BST_ENGINE_RECORDER_RECORDER_H
 
+#include "boresight/archive.h"
 #include "boresight/camera.h"
 #include "boresight/config.h"
 #include "boresight/messages.h"
@@ -65,6 +66,7 @@ typedef struct bst_recorder_info {
     const char *program; /* program and version, such as "boresight 0.1.0" */
     const bst_recorder_sensor *sensors;
     int sensor_count;
+    int64_t begin_tick; /* first tick of the record; exposures from before it have no truth */
     const struct bst_world
         *world; /* source of object names; must outlive the recorder; may be NULL */
 } bst_recorder_info;
@@ -75,6 +77,14 @@ typedef struct bst_recorder bst_recorder;
  * files: frames.fits, or frames_<observer>_<sensor>.fits when there are several sensors. */
 bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_recorder_config *config,
                                const bst_recorder_info *info, bst_recorder **out) BST_MUST_CHECK;
+
+/* Saves the recorder, with all frames on the disk, or restores it into a reopened run, whose files
+ * are cut to what was saved. Archive the run's tables first (bst_run_archive).
+ *
+ * Errors:    BST_ERR_IO with the file and the reason; BST_ERR_FORMAT: a file is shorter than the
+ *            saved one; BST_ERR_MEMORY */
+bst_status bst_recorder_archive(bst_ctx *ctx, bst_recorder *recorder,
+                                bst_archive *archive) BST_MUST_CHECK;
 
 /* Index of a sensor in info->sensors, -1 when it is not recorded. */
 int bst_recorder_find(const bst_recorder *recorder, const char *observer, const char *sensor);

@@ -65,7 +65,7 @@ struct bst_recorder {
     bst_run *run;
     bst_recorder_config config;
     bst_time epoch;
-    int64_t tick_rate_hz;
+    int64_t tick_rate_hz, begin_tick;
     char program[64];
     const struct bst_world *world;         /* NULL: objects have no names */
     bool *object_seen;                     /* [objects of the world] */
@@ -73,6 +73,18 @@ struct bst_recorder {
     int sensor_count;
     bst_recorder_state sensors[];
 };
+
+/* Opens a FITS file of a sensor, "frames" or that of a plane: a new one, or that of a reopened run,
+ * to be restored by bst_fits_archive. */
+bst_status bst_recorder_open_file(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                                  const char *what, bool reopen, bst_fits **out) BST_MUST_CHECK;
+/* Name of a plane's file, without extension. */
+const char *bst_recorder_plane_file(int plane);
+/* Name of the FITS file of a sensor: "frames.fits", or one file per sensor.
+ *
+ * Given:     what  "frames" or bst_recorder_plane_file */
+void bst_recorder_file_name(const bst_recorder *recorder, const bst_recorder_state *sensor,
+                            const char *what, char *name, size_t bytes);
 
 /* Creates the tables of the run store that the configuration selects. */
 bst_status bst_recorder_make_tables(bst_ctx *ctx, bst_recorder *recorder) BST_MUST_CHECK;
