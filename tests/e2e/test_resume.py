@@ -142,14 +142,15 @@ class Resume(unittest.TestCase):
     def test_killed(self):
         reference = self.reference("rice", runs.TRACK, *SMALL, *RICE, duration=TRACK_S)
         self.assertGreater(len(reference["table detections"]), 50)
-        run = self.run_of("killed", runs.TRACK, *SMALL, *RICE, duration=TRACK_S, every=3)
-        run.stop(signal.SIGKILL, 2)
+        # one state, between a frame (ends at 15.5 s) and its tracks, off the grid of telemetry
+        run = self.run_of("killed", runs.TRACK, *SMALL, *RICE, duration=TRACK_S, every=15.57)
+        run.stop(signal.SIGKILL, 1)
         self.assertTrue(os.path.exists(run.state))
         self.assert_same(run.resume(), reference)
 
     def test_interrupted_cube(self):
         reference = self.reference("cube", runs.TRACK, *SMALL, *CUBE, duration=TRACK_S)
-        run = self.run_of("cube", runs.TRACK, *SMALL, *CUBE, duration=TRACK_S, every=7)
+        run = self.run_of("cube", runs.TRACK, *SMALL, *CUBE, duration=TRACK_S, every=7.31)
         said = run.stop(signal.SIGINT, 1, threads=2)
         self.assertRegex(said, r"boresight: interrupted at \d+\.\d+ s; --restore .*/state goes on")
         # it has completed its cube; the resumed run appends to it all the same
@@ -161,7 +162,7 @@ class Resume(unittest.TestCase):
 
     def test_killed_and_interrupted_again_with_planes(self):
         reference = self.reference("planes", runs.TRACK, *SMALL, *PLANES, duration=TRACK_S)
-        run = self.run_of("planes", runs.TRACK, *SMALL, *PLANES, duration=TRACK_S, every=2)
+        run = self.run_of("planes", runs.TRACK, *SMALL, *PLANES, duration=TRACK_S, every=2.13)
         run.stop(signal.SIGKILL, 3, serial=True)
         run.stop(signal.SIGTERM, 2, "--restore", run.state, threads=2)
         self.assertFalse(runs.manifest(run.out + ".partial")["complete"])
@@ -185,7 +186,7 @@ class Resume(unittest.TestCase):
         sets, duration = [runs.NO_FRAMES], 60
         reference = self.reference("constellation", QUICK, *sets, duration=duration)
         self.assertGreater(len(reference["table truth"]), 100)
-        run = self.run_of(f"constellation {threads}", QUICK, *sets, duration=duration, every=10)
+        run = self.run_of(f"constellation {threads}", QUICK, *sets, duration=duration, every=10.35)
         run.stop(signal.SIGKILL if threads == 1 else signal.SIGINT, 2, threads=threads)
         self.assert_same(run.resume(threads=threads), reference)
 
