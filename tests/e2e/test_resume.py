@@ -21,7 +21,9 @@ import runs
 
 SAVE_STATE = os.path.abspath(sys.argv.pop(1))
 KILLS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 1
-SMALL = [runs.SENSOR + "/camera/width_px=256", runs.SENSOR + "/camera/height_px=256"]
+# a small field with the target in it: acquired after some seconds
+SMALL = [runs.SENSOR + "/camera/width_px=256", runs.SENSOR + "/camera/height_px=256",
+         runs.SENSOR + "/cue/offset_deg=0.02", runs.SENSOR + "/cue/sigma_deg=0.05"]
 RICE = ["/record/compression=rice"]
 RAW = ["/record/compression=none"]
 CUBE = ["/record/frames=cube"]
@@ -142,6 +144,7 @@ class Resume(unittest.TestCase):
     def test_killed(self):
         reference = self.reference("rice", runs.TRACK, *SMALL, *RICE, duration=TRACK_S)
         self.assertGreater(len(reference["table detections"]), 50)
+        self.assertLess(reference["manifest"]["summary"]["time_to_settle_s"], 10)
         # one state, between a frame (ends at 15.5 s) and its tracks, off the grid of telemetry
         run = self.run_of("killed", runs.TRACK, *SMALL, *RICE, duration=TRACK_S, every=15.57)
         run.stop(signal.SIGKILL, 1)
