@@ -140,9 +140,11 @@ def version() -> str:
     return f"{number} ({revision})" if revision else str(number)
 
 
-@_structs.LogFunction
-def _log(_user: Any, level: int, text: bytes) -> None:
+def _to_log(_user: Any, level: int, text: bytes) -> None:
     LOG.log(_LEVELS.get(level, logging.INFO), "%s", text.decode("utf-8", "replace"))
+
+
+_log = _structs.LogFunction(_to_log)
 
 
 class Context:

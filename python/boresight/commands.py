@@ -7,8 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import ArgumentError
-from .messages import (CHANNELS, ControlStatus, Detections, LosCommand, LosSample, Message,
+from .messages import (CHANNELS, ControlStatus, Detections, LosCommand, LosSample,
                        PointingTelemetry, Predictions, SensorCommand, Tracks)
+from .record import Message
 
 COMMANDS: Dict[str, Type[Message]] = {
     "detections": Detections, "tracks": Tracks, "predictions": Predictions,

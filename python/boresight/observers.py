@@ -7,8 +7,9 @@ from typing import Any, Callable, Optional, Set
 from . import _structs
 from ._handle import Guard, Interrupt, SimHandle
 from ._native import LIBRARY
-from .messages import CHANNELS, Message
+from .messages import CHANNELS
 from .payload import message_at
+from .record import Message
 
 _STATE_ERROR = 10  # BST_ERR_STATE: what a callback returns after an exception
 

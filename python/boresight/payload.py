@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ._structs import SimMessage
-from .messages import CHANNELS, LosHistory, Message, PointingTelemetry
+from .messages import CHANNELS, LosHistory, PointingTelemetry
+from .record import Message
 
 _RINGS = (LosHistory, PointingTelemetry)
 

@@ -122,7 +122,7 @@ class Record:
         return {name: plain(value) for name, value in self._members()}
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and self._key() == other._key()  # type: ignore[attr-defined]
+        return type(other) is type(self) and self._key() == other._key()
 
     def __hash__(self) -> int:
         return hash(self._key())
@@ -282,7 +282,7 @@ def structured(items: Any, dtype: np.dtype[np.void], what: str) -> npt.NDArray[n
     """A new array of a dtype from a structured array, a mapping of columns (scalars are repeated),
     or a sequence of records or mappings."""
     if isinstance(items, np.ndarray) and items.dtype == dtype and items.ndim == 1:
-        return items.copy()
+        return np.array(items, dtype)
     if isinstance(items, np.ndarray) and items.dtype.names:
         if items.ndim != 1:
             raise ArgumentError(f"{what} takes one dimension, found shape {items.shape}")

@@ -31,7 +31,7 @@ class _Bits:
         count = np.broadcast_to(np.asarray(n, np.int64), self.bit.shape)
         value = (self.window() >> np.uint64(1)) >> (63 - count).astype(np.uint64)
         self.bit = self.bit + count
-        return value.astype(np.int64)
+        return np.asarray(value, np.int64)
 
     def take_zeros(self, going: npt.NDArray[np.bool_]) -> Ints:
         """Zeros before the next one of the rows in `going`; they and the one are taken."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 import json
 import os
 import pathlib
-import tempfile
+import shutil
+import weakref
 from typing import Any, Dict, Iterator, List, Optional, Sequence, Union, overload
 
 import numpy as np
@@ -94,9 +95,10 @@ class Run:
     The tables are attributes: run.tracks, run.detections, run.truth, run.events ...
     """
 
-    def __init__(self, folder: Path, keep: "Optional[tempfile.TemporaryDirectory[str]]" = None):
+    def __init__(self, folder: Path, temporary: Optional[Path] = None):
         self.folder = pathlib.Path(folder)
-        self._keep = keep  # a temporary folder, which is removed with the run
+        if temporary is not None:  # a folder that is removed with the run
+            weakref.finalize(self, shutil.rmtree, temporary, ignore_errors=True)
         if not self.folder.is_dir():
             raise NotFoundError(f"{folder}: there is no such folder")
         self.manifest = self._json("manifest.json", missing={})

@@ -12,10 +12,11 @@ from ._handle import Guard, SimHandle
 from ._native import LIBRARY, number_argument, text_argument
 from .errors import ArgumentError, BoresightError, FormatError
 from .frame import Frame, take_pixels
-from .messages import Detections, FrameMessage, Message, PointingTelemetry
+from .messages import Detections, FrameMessage, PointingTelemetry
 from .model import Model
 from .observers import Observers
 from .payload import message_at, viewed
+from .record import Message
 from .snapshot import Snapshot, component_bits
 from .views import ChannelViews
 

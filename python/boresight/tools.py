@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import pathlib
+import shutil
 import tempfile
 from typing import Any, Dict, List, Optional, Sequence, Union
 
@@ -32,19 +33,24 @@ def run(scenario: Any, out: Optional[Path] = None, *, progress: bool = False,
                others    as the options of `boresight run`
     Returned:  the run: summary, tables and frames
     Errors:    ProgramError: what the program says; KeyboardInterrupt: the results so far are in
-               OUT.partial
+               OUT.partial, if `out` is given
     """
-    keep = None
+    temporary = None
     if out is None:
-        keep = tempfile.TemporaryDirectory(prefix="boresight-run-")
-        out = pathlib.Path(keep.name) / "run"
+        temporary = tempfile.mkdtemp(prefix="boresight-run-")
+        out = pathlib.Path(temporary) / "run"
     names = external_names(external)
     options = options_of(out=_path(out, "out"), overwrite=overwrite, duration=duration_s, seed=seed,
                          run_number=run_number, device=device, threads=threads, link=link,
                          external=list(names) or None, quiet=not progress)
-    with scenario_arguments(scenario) as words:
-        execute(["run", *words, *options], progress)
-    return Run(out, keep)
+    try:
+        with scenario_arguments(scenario) as words:
+            execute(["run", *words, *options], progress)
+        return Run(out, temporary)
+    except BaseException:
+        if temporary is not None:
+            shutil.rmtree(temporary, ignore_errors=True)
+        raise
 
 
 def pd(scenario: Any, **options: Any) -> Dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Optional, cast
 
 from . import messages as m
+from .record import Message
 
 if TYPE_CHECKING:
     from .frame import Frame
@@ -21,7 +22,7 @@ class ChannelViews:
 
     __slots__ = ()
 
-    def view(self, channel: str) -> Optional[m.Message]:
+    def view(self, channel: str) -> Optional[Message]:
         """Newest message of a channel by its name."""
         raise NotImplementedError
 

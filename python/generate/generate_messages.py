@@ -85,13 +85,16 @@ def property_text(member: Member) -> List[str]:
         kind = python_name(member.type)
         returned, value = kind, f'{kind}.of(self._data["{name}"])'
     elif member.shape or member.type in ARRAYS:
-        returned, value = (f"npt.NDArray[{array_kind(member)}]", f'self._array("{name}")')
+        returned = value = f"npt.NDArray[{array_kind(member)}]"
     else:
         returned = {"double": "float", "bool": "bool"}.get(member.type, "int")
         value = f'{returned}(self._data["{name}"])'
     lines = ["    @property", f"    def {name}(self) -> {returned}:"]
     if doc:
         lines.append("        " + docstring(doc, "        "))
+    if value == returned:  # an array
+        return lines + [f'        value: {returned} = self._array("{name}")',
+                        "        return value", ""]
     return lines + [f"        return {value}", ""]
 
 

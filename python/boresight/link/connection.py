@@ -36,7 +36,8 @@ class Link:
         self._telemetry: Dict[str, Tuple[npt.NDArray[Any], npt.NDArray[Any]]] = {}
         self._latest: Dict[Tuple[str, str], Message] = {}
         self._last: Optional[Step] = None
-        self._socket = zmq.Context.instance().socket(zmq.DEALER)
+        context: Any = zmq.Context.instance()
+        self._socket = context.socket(zmq.DEALER)
         self._socket.linger = 500
         if keys_file is not None:
             keys = read_keys(keys_file)
@@ -146,7 +147,7 @@ class Link:
         self.tick_rate_hz = int(message["tick_rate_hz"])
         self.parts = {item["instance"].decode(): Part(item["instance"].decode(),
                                                       item["role"].decode(), item)
-                      for item in message.items}
+                      for item in message.rows}
         name = message["shared_memory"].decode()
         if name:
             self._shared = SharedFrames(name, int(message["slots"]), int(message["slot_bytes"]))
@@ -172,5 +173,5 @@ class Link:
             ticks, q = self._telemetry.get(instance, (np.zeros(0), np.zeros((0, 4))))
             keep = int(message["capacity"])
             self._telemetry[instance] = (
-                np.concatenate([ticks, message.items["tick"]])[-keep:],
-                np.concatenate([q, message.items["q_cam_from_gcrf"]])[-keep:])
+                np.concatenate([ticks, message.rows["tick"]])[-keep:],
+                np.concatenate([q, message.rows["q_cam_from_gcrf"]])[-keep:])

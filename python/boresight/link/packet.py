@@ -26,6 +26,13 @@ class Message:
         """Type of the message."""
         return str(self.header["type"])
 
+    @property
+    def rows(self) -> npt.NDArray[np.void]:
+        """Items of a message that has some."""
+        if self.items is None:
+            raise LinkError(f"{self.type} has no items")
+        return self.items
+
     def __getitem__(self, name: str) -> Any:
         """A member of the record."""
         return self.record[name]
