@@ -137,3 +137,9 @@ def _message(text: str, code: int) -> str:
 def version() -> Tuple[str, str]:
     """Version and path of the program."""
     return execute(["--version"]).strip(), str(_native.program_path())
+
+
+def main() -> None:
+    """The command `boresight` of an installed wheel: becomes the program."""
+    path = str(_native.program_path())
+    os.execv(path, [path, *sys.argv[1:]])
