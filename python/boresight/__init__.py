@@ -13,8 +13,10 @@ import importlib
 from typing import TYPE_CHECKING, Any, List
 
 if TYPE_CHECKING:
+    from . import config as config
     from . import errors as errors
     from . import messages as messages
+    from .camera import Camera as Camera
     from .commands import los_command as los_command
     from .errors import *  # noqa: F401,F403
     from .frame import Frame as Frame
@@ -28,6 +30,9 @@ if TYPE_CHECKING:
     from .simulation import Sensor as Sensor
     from .simulation import Simulation as Simulation
     from .snapshot import Snapshot as Snapshot
+    from .stages import DetectorFrame as DetectorFrame
+    from .stages import FrameStageFrame as FrameStageFrame
+    from .stages import register as register
     from .tables import Table as Table
     from .tools import Study as Study
     from .tools import check as check
@@ -43,6 +48,7 @@ if TYPE_CHECKING:
     __version__: str
 
 _PLACES = {
+    "camera": ["Camera"],
     "commands": ["los_command"],
     "frame": ["Frame"],
     "model": ["Model"],
@@ -51,10 +57,12 @@ _PLACES = {
     "scenario": ["Scenario"],
     "simulation": ["Sensor", "Simulation"],
     "snapshot": ["Snapshot"],
+    "stages": ["DetectorFrame", "FrameStageFrame", "register"],
     "tables": ["Table"],
     "tools": ["Study", "check", "loop", "new", "orbit", "pd", "report", "run", "schema", "study"],
 }
 _MODULES = ("errors", "messages")
+_INSIDE = ("config", "link", "gym")
 
 
 def _names() -> List[str]:
@@ -74,6 +82,8 @@ def __getattr__(name: str) -> Any:
         value: Any = LIBRARY.bst_version().decode()
         globals()[name] = value
         return value
+    if name in _INSIDE:
+        return importlib.import_module(f".{name}", __name__)
     for module, names in _PLACES.items():
         if name in names:
             value = getattr(importlib.import_module(f".{module}", __name__), name)

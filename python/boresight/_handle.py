@@ -1,6 +1,7 @@
 """The C object of a simulation, guarded: one thread at a time, in the process that made it."""
 from __future__ import annotations
 
+import atexit
 import contextlib
 import os
 import signal
@@ -14,15 +15,22 @@ from .frame import LentCount
 from .model import ModelHandle
 
 
+_exiting: List[bool] = []
+# at the end of the process its memory goes with it: callbacks into Python would come too late
+atexit.register(_exiting.append, True)
+
+
 class SimHandle:
     """A bst_sim; freed when neither a Simulation nor a lent frame refers to it."""
 
     def __init__(self, pointer: int, model: ModelHandle):
         self.pointer, self.model = c_void_p(pointer), model
+        self.callbacks: Any = None  # what C may call until the object is freed
+        self.stages: List[Any] = []  # in Python
         self._process, self._free = os.getpid(), LIBRARY.bst_sim_free
 
-    def __del__(self, getpid: Any = os.getpid) -> None:
-        if getpid() == self._process:
+    def __del__(self, getpid: Any = os.getpid, exiting: List[bool] = _exiting) -> None:
+        if getpid() == self._process and not exiting:
             self._free(self.pointer)
 
 

@@ -101,6 +101,13 @@ _FUNCTIONS = {
                                       _structs.Vec3]),
     "bst_sim_save": (c_int, [c_void_p, c_void_p, POINTER(c_void_p), POINTER(c_size_t)]),
     "bst_state_free": (None, [c_void_p]),
+    "bst_model_camera": (POINTER(_structs.CameraHead), [c_void_p, c_int]),
+    "bst_plugin_register": (c_int, [c_void_p, c_char_p, c_void_p, c_void_p]),
+    "bst_fail": (c_int, [c_void_p, c_int, c_char_p, c_char_p]),
+    "bst_archive_is_restoring": (c_bool, [c_void_p]),
+    "bst_archive_ctx": (c_void_p, [c_void_p]),
+    "bst_archive_bytes": (None, [c_void_p, c_void_p, c_size_t]),
+    "bst_archive_count": (c_int, [c_void_p, c_int, c_int]),
     "bst_sim_restore": (c_int, [c_void_p, c_void_p, c_char_p, c_size_t, c_uint]),
     "bst_sim_clone": (c_int, [c_void_p, c_void_p, POINTER(c_void_p)]),
 }

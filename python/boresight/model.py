@@ -5,10 +5,11 @@ import json
 import os
 import threading
 from ctypes import byref, c_char_p, c_void_p
-from typing import Any, Dict, List, Optional, Sequence
+from typing import Any, Dict, List, Optional, Sequence, Union
 
 from . import _native, _structs
 from ._native import LIBRARY, Context
+from .camera import Camera, camera_of
 from .errors import ArgumentError, ForkError
 from .scenario import Scenario
 
@@ -97,6 +98,16 @@ class Model:
         """Names "observer/sensor"."""
         count = LIBRARY.bst_model_sensor_count(self.handle.pointer)
         return [LIBRARY.bst_model_sensor(self.handle.pointer, k).decode() for k in range(count)]
+
+    def camera(self, sensor: Union[int, str] = 0) -> Camera:
+        """True camera of a sensor, by its number or its name "observer/sensor"."""
+        names = self.sensors
+        number = names.index(sensor) if sensor in names else sensor
+        if isinstance(number, str):
+            raise ArgumentError(f"there is no sensor {number!r} (allowed: {', '.join(names)})")
+        number = _native.integer_argument(number, "sensor", 0, len(names) - 1)
+        self.prepare()
+        return camera_of(LIBRARY.bst_model_camera(self.handle.pointer, number)[0])
 
     def to_dict(self) -> Dict[str, Any]:
         """The complete scenario, with every default written out."""

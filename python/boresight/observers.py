@@ -44,8 +44,7 @@ class Observers:
             observer.event = self._on_event
         observer.interrupted = self._on_interrupted
         LIBRARY.bst_sim_observe(sim.pointer, byref(observer))
-        sim.callbacks = (self._on_message, self._on_event,  # type: ignore[attr-defined]
-                         self._on_interrupted)
+        sim.callbacks = (self._on_message, self._on_event, self._on_interrupted)
 
     def finish(self, status: int) -> None:
         """Raises what a callback raised in the call before, or the error of the call."""

@@ -6,6 +6,7 @@ import os
 import pathlib
 from typing import Any, Dict, Iterator, List, Optional, Sequence, Tuple, Union
 
+from .block import Block, plain
 from .errors import ArgumentError, FileError, NotFoundError
 
 Path = Union[str, "os.PathLike[str]"]
@@ -60,7 +61,7 @@ class Scenario:
     def from_dict(cls, document: Dict[str, Any], folder: Path = ".") -> "Scenario":
         """A scenario of a dictionary; relative paths in it start in `folder`."""
         try:
-            text = json.dumps(document)
+            text = json.dumps(plain(document))
         except (TypeError, ValueError, RecursionError) as error:
             raise ArgumentError(f"this is no JSON document: {error}") from None
         return cls(str(pathlib.Path(folder).resolve() / "scenario"), text)
@@ -74,14 +75,13 @@ class Scenario:
             return cls.from_dict(source)
         if isinstance(source, (str, os.PathLike)):
             return cls.load(source)
-        to_dict = getattr(source, "to_dict", None)
-        if callable(to_dict) and not isinstance(source, type):
-            return cls.from_dict(to_dict())
-        raise ArgumentError(f"a scenario is a Scenario, a path or a dictionary, not "
-                            f"{type(source).__name__}")
+        if isinstance(source, Block):
+            return cls.from_dict(source.to_dict())
+        raise ArgumentError("a scenario is a Scenario, a path, a dictionary or a config.Scenario, "
+                            f"not {type(source).__name__}")
 
     @classmethod
-    def new(cls, observer: Any = None, target: Any = None, *, aperture_m: Optional[float] = None,
+    def new(cls, observer: Any = None, target: Any = None, telescope: Any = None, *, aperture_m: Optional[float] = None,
             pixel_scale_arcsec: Optional[float] = None, focal_length_m: Optional[float] = None,
             period_s: Optional[float] = None, duration_s: Optional[float] = None,
             start_utc: Optional[str] = None) -> "Scenario":
@@ -89,6 +89,7 @@ class Scenario:
 
         Given:     observer, target  catalogue number or name of the element sets that come with
                                      Boresight, or FILE:NUMBER; None: NEOSSat and INMARSAT GX5
+                   telescope         values of its camera: a config.Camera or a dictionary
                    aperture_m, ...   as the options of `boresight new`
         """
         from .program import options_of, work_folder, execute
@@ -98,7 +99,13 @@ class Scenario:
         with work_folder() as folder:
             file = folder / "scenario.json"
             execute(["new", str(file), *options])
-            return cls.from_dict(json.loads(file.read_text(encoding="utf-8")), folder)
+            document = json.loads(file.read_text(encoding="utf-8"))
+        camera = {} if telescope is None else plain(telescope)
+        if not isinstance(camera, dict):
+            raise ArgumentError(f"telescope takes a config.Camera or a dictionary, not "
+                                f"{type(telescope).__name__}")
+        return cls.from_dict(document).with_(
+            {f"/observers/0/sensors/0/camera/{key}": value for key, value in camera.items()})
 
     def with_(self, _values: Optional[Dict[str, Any]] = None, **values: Any) -> "Scenario":
         """A scenario in which some values are replaced.
@@ -137,6 +144,24 @@ class Scenario:
                 raise ArgumentError(f"external: the scenario has no module {name!r} that can be "
                                     "outside (allowed: imgproc, tracker, control, gimbal, or "
                                     "OBSERVER/SENSOR/MODULE)")
+        return self.with_(changes)
+
+    def with_plugin(self, *, detector: Optional[str] = None, frame_stage: Optional[str] = None,
+                    **keys: Any) -> "Scenario":
+        """A scenario in which a plug-in replaces the detector of image processing, or changes
+        frames, of all sensors: the path of a library, or a name that `register` gave.
+
+        Given:     keys  the plug-in's own keys
+        """
+        changes: Dict[str, Any] = {}
+        for role, stage, plugin in (("imgproc", "detector", detector),
+                                    ("scenegen", "frame_stage", frame_stage)):
+            for (pointer, _), found, _ in _modules(self.to_dict()):
+                if plugin is not None and found == role:
+                    changes[f"{pointer}/{stage}"] = {"plugin": plugin, **keys}
+        if not changes:
+            raise ArgumentError("with_plugin: give a detector or a frame_stage, of a scenario with "
+                                "imgproc or scenegen")
         return self.with_(changes)
 
     def validate(self) -> "Scenario":
@@ -182,18 +207,10 @@ _WORLD = ("objects", "star_catalogue", "earth_orientation")
 
 
 def _assignment(pointer: str, value: Any) -> str:
-    to_dict = getattr(value, "to_dict", None)
     try:
-        return f"{pointer}={json.dumps(to_dict() if callable(to_dict) else value, default=_number)}"
+        return f"{pointer}={json.dumps(plain(value))}"
     except (TypeError, ValueError, RecursionError) as error:
         raise ArgumentError(f"{pointer}: {error}") from None
-
-
-def _number(value: Any) -> Any:
-    """NumPy scalars and arrays in JSON."""
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    raise TypeError(f"{type(value).__name__} is nothing that JSON can hold")
 
 
 def _modules(document: Dict[str, Any]) -> Iterator[Tuple[Tuple[str, str], str, Dict[str, Any]]]:

@@ -18,6 +18,7 @@ from .observers import Observers
 from .payload import message_at, viewed
 from .record import Message
 from .snapshot import Snapshot, component_bits
+from .stages import Stage, collected, own, raise_of
 from .views import ChannelViews
 
 BytesLike = Union[bytes, bytearray, memoryview]
@@ -58,13 +59,15 @@ class Simulation(ChannelViews):
             options.other_run = True
             options.run = _native.integer_argument(run, "run", 0, 2**53 - 1)
         context, out, handle = _native.Context(), c_void_p(), self.model.handle
-        context.check(LIBRARY.bst_sim_create(context.pointer, handle.pointer, byref(options),
-                                             byref(out)))
-        self._begin(out)
+        with collected() as stages:
+            context.check(LIBRARY.bst_sim_create(context.pointer, handle.pointer, byref(options),
+                                                 byref(out)))
+        self._begin(out, stages)
 
-    def _begin(self, pointer: c_void_p) -> None:
+    def _begin(self, pointer: c_void_p, stages: List[Stage]) -> None:
         assert pointer.value
         handle = SimHandle(pointer.value, self.model.handle)
+        own(stages, handle)
         self._guard = Guard(handle)
         self._observers = Observers(self._guard)
         self._observers.install(handle)
@@ -161,7 +164,7 @@ class Simulation(ChannelViews):
         with self._guard.use() as sim:
             with self._observers.interrupt:
                 status = LIBRARY.bst_sim_run_until(self._guard.context.pointer, sim.pointer, until)
-            self._observers.finish(status)
+            self._finish(sim, status)
 
     def step(self, channel: Optional[str] = None, *, scope: Optional[str] = None,
              until_s: Optional[float] = None) -> Union[bool, Message, Frame, None]:
@@ -184,7 +187,7 @@ class Simulation(ChannelViews):
             with self._observers.interrupt:
                 status = LIBRARY.bst_sim_step(self._guard.context.pointer, sim.pointer, where,
                                               name, until, byref(arrived))
-            self._observers.finish(status)
+            self._finish(sim, status)
             if channel is None or not arrived.value:
                 return bool(arrived.value) if channel is None else None
             for each, sequence in self._sequences(sim, channel).items() if before else ():
@@ -337,8 +340,8 @@ class Simulation(ChannelViews):
         """Saves the state. The simulation goes on as if it had not been saved."""
         data, size = c_void_p(), c_size_t()
         with self._guard.use() as sim:
-            self._guard.context.check(LIBRARY.bst_sim_save(
-                self._guard.context.pointer, sim.pointer, byref(data), byref(size)))
+            self._finish(sim, LIBRARY.bst_sim_save(self._guard.context.pointer, sim.pointer,
+                                                   byref(data), byref(size)))
         try:
             return Snapshot(ctypes.string_at(data, size.value))
         finally:
@@ -358,16 +361,27 @@ class Simulation(ChannelViews):
         if not data:
             raise FormatError("this is no saved state of a simulation")
         with self._guard.use() as sim:
-            self._guard.context.check(LIBRARY.bst_sim_restore(
-                self._guard.context.pointer, sim.pointer, data, len(data), bits))
+            with collected() as stages:
+                status = LIBRARY.bst_sim_restore(self._guard.context.pointer, sim.pointer, data,
+                                                 len(data), bits)
+            own(stages, sim)
+            self._finish(sim, status)
 
     def clone(self) -> "Simulation":
         """A second simulation of the same model in the same state, without observers."""
         out = c_void_p()
         with self._guard.use() as sim:
-            self._guard.context.check(LIBRARY.bst_sim_clone(
-                self._guard.context.pointer, sim.pointer, byref(out)))
-        return _simulation(self.model, out)
+            with collected() as stages:
+                status = LIBRARY.bst_sim_clone(self._guard.context.pointer, sim.pointer,
+                                               byref(out))
+            self._finish(sim, status)
+        return _simulation(self.model, out, stages)
+
+    def _finish(self, sim: SimHandle, status: int) -> None:
+        """Raises the exception of a call: of an observer, of a stage in Python, or of C."""
+        if status:
+            raise_of(sim)
+        self._observers.finish(status)
 
     def __reduce__(self) -> Any:
         return _unpickled, (self.model, self.save())
@@ -443,11 +457,11 @@ class Sensor(ChannelViews):
         return f"<Sensor {self.scope} of {self.simulation!r}>"
 
 
-def _simulation(model: Model, pointer: c_void_p) -> Simulation:
+def _simulation(model: Model, pointer: c_void_p, stages: List[Stage]) -> Simulation:
     """A Simulation of a C object that exists."""
     simulation = Simulation.__new__(Simulation)
     simulation.model = model
-    simulation._begin(pointer)
+    simulation._begin(pointer, stages)
     return simulation
 
 

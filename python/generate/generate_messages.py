@@ -180,9 +180,11 @@ def c_text(headers: Headers, layout: Layout, structs_file: str) -> str:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     for cls in module.ALL:
-        lines.append(f"SAME(sizeof({cls.C_NAME}), {module.size_of(cls)});")
+        if not getattr(cls, "C_PREFIX", False):
+            lines.append(f"SAME(sizeof({cls.C_NAME}), {module.size_of(cls)});")
         for name, *_ in cls._fields_:
             same(cls.C_NAME, name, getattr(cls, name).offset)
+    lines.append(f"SAME(BST_STAGE_ABI, {module.STAGE_ABI});")
     return "\n".join(lines) + "\n"
 
 
