@@ -219,7 +219,11 @@ class Message(Record):
         return structured(items, dtype, f"{cls.__name__}.items")
 
     def __len__(self) -> int:
+        """Number of items; a message without items is true all the same."""
         return len(self.items)
+
+    def __bool__(self) -> bool:
+        return True
 
     def replace(self: "M", items: Any = None, **members: Any) -> "M":
         """A copy with other items or other values of some members."""

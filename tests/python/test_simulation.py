@@ -71,6 +71,7 @@ class Stepping(unittest.TestCase):
         self.assertEqual(len(status.axis), 3)
         self.assertAlmostEqual(float(np.linalg.norm(status.axis[0].axis_body)), 1.0, delta=1e-12)
         self.assertEqual(self.sim.exposure.window.width, 256)
+        self.assertTrue(self.sim.exposure)  # though it has no items
 
     def test_rings_are_in_order_of_time(self):
         self.sim.run_until(12)  # longer than the ring
