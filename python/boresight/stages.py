@@ -44,7 +44,7 @@ class DetectorFrame(NamedTuple):
 
 
 class FrameStageFrame(NamedTuple):
-    """What a frame stage is told of the frame whose pixels it changes."""
+    """The frame whose pixels a frame stage changes."""
     exposure_id: int
     start_s: float
     end_s: float
