@@ -114,5 +114,77 @@ class Pointing(unittest.TestCase):
             bg.PointingEnv(model=self.model, render_mode="human")
 
 
+class Tasking(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.model = bg.TaskingModel(
+            bst.Scenario.load("constellation_quick.json").with_(duration_s=80), targets=12)
+
+    def test_the_checker_of_gymnasium_passes(self):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            check_env(bg.TaskingEnv(model=self.model))
+
+    def test_the_catalogue_is_where_the_objects_are(self):
+        # true range and direction of a target in the field, against the propagated table
+        catalogue = self.model.catalogue
+        env = bg.TaskingEnv(model=self.model)
+        env.reset(seed=1)
+        first = [int(np.argmax(row[:, 1] - row[:, 0])) for row in
+                 env._observe(env._sim)["targets"]]
+        env.step(np.array(first))
+        found = 0
+        for scope, target in zip(env.sensors, first):
+            truth = env._sim.view("truth", scope)
+            items = truth.items[truth.items["norad"] == catalogue.norad[target]]
+            for item in items:
+                ra, dec = item["ra_rad"], item["dec_rad"]
+                sight = np.array([np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)])
+                middle = 0.5 * (truth.start_tick + truth.end_tick) / env._sim.tick_rate_hz
+                place = truth.observer_gcrf_m + item["range_m"] * sight
+                # m: light takes 0.14 s, in which the satellite moves by 3 km/s in an Earth that
+                # moves by 30 km/s; the true direction contains both
+                self.assertLess(np.linalg.norm(place - catalogue.at(middle)[target]), 5500)
+                found += 1
+        self.assertGreater(found, 1)
+
+    def test_greedy_is_better_than_random(self):
+        env = bg.TaskingEnv(model=self.model)
+        random = bg.tasking_score(env, bg.random_tasks(env), runs=[1])
+        greedy = bg.tasking_score(env, bg.greedy_tasks, runs=[1])
+        self.assertGreaterEqual(greedy, 3)
+        self.assertGreater(greedy, random)
+        self.assertLessEqual(greedy, 12)
+        self.assertGreater(bg.builtin_tasking_score(env, runs=[1]), 1)
+
+    def test_a_seed_is_a_run_and_the_vector_is_its_environments(self):
+        env = bg.TaskingEnv(model=self.model)
+        action = np.array([1, 2, 3, 4, 5])
+        course = []
+        for _ in range(2):
+            env.reset(seed=7)
+            course.append([env.step(action)[:2] for _ in range(2)])
+        vector = bg.TaskingVectorEnv(2, model=self.model)
+        vector.reset(seed=6)
+        course.append([[{k: v[1] for k, v in o.items()}, r[1]] for o, r in
+                       (vector.step(np.array([action, action]))[:2] for _ in range(2))])
+        for other in course[1:]:
+            for (a, reward), (b, same) in zip(course[0], other):
+                np.testing.assert_array_equal(a["targets"], b["targets"])
+                self.assertEqual(reward, same)
+        vector.close()
+
+    def test_misuse_raises(self):
+        env = bg.TaskingEnv(model=self.model)
+        with self.assertRaises(bst.ArgumentError):
+            env.step(np.zeros(5, int))
+        env.reset(seed=1)
+        for wrong in (np.zeros(4, int), np.full(5, 12), np.full(5, -1), np.zeros(5), "x", None):
+            with self.assertRaises(bst.ArgumentError):
+                env.step(wrong)
+        with self.assertRaises(bst.ArgumentError):
+            bg.TaskingModel("neossat_geo_track.json")
+
+
 if __name__ == "__main__":
     main()

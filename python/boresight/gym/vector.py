@@ -11,26 +11,24 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from .pointing import Observation, PointingEnv, pointing_model
+from .tasking import TaskingEnv, TaskingModel
 
 Batch = Dict[str, npt.NDArray[np.float32]]
 
 
-class PointingVectorEnv(VectorEnv[Any, Any, Any]):
-    """Several PointingEnv that share a model. An environment that has ended starts anew with the
+class ThreadedVectorEnv(VectorEnv[Any, Any, Any]):
+    """Several environments, stepped in threads. An environment that has ended starts anew with the
     step after (gymnasium's AutoresetMode.NEXT_STEP).
 
-    Given:     num_envs  environments
-               threads   that step them; 0: one for each environment, at most 32
-               others    as of PointingEnv
+    Given:     envs     of one kind
+               threads  that step them; 0: one for each environment, at most 32
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": []}
 
-    def __init__(self, num_envs: int = 1, scenario: Any = None, *, threads: int = 0,
-                 **options: Any):
-        model = options.pop("model", None) or pointing_model(scenario)
-        self.envs = [PointingEnv(model=model, **options) for _ in range(num_envs)]
-        self.num_envs = num_envs
+    def __init__(self, envs: Sequence[Any], threads: int = 0):
+        self.envs = list(envs)
+        num_envs = self.num_envs = len(self.envs)
         self.single_observation_space = self.envs[0].observation_space
         self.single_action_space = self.envs[0].action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -58,7 +56,9 @@ class PointingVectorEnv(VectorEnv[Any, Any, Any]):
             if self._ended[number]:
                 observation, info = self.envs[number].reset()
                 return observation, 0.0, False, False, info
-            return self.envs[number].step(actions[number])
+            observation, reward, terminated, truncated, info = self.envs[number].step(
+                actions[number])
+            return observation, reward, terminated, truncated, info
         results = list(self._pool.map(one, range(self.num_envs)))
         terminated = np.array([r[2] for r in results])
         truncated = np.array([r[3] for r in results])
@@ -81,3 +81,21 @@ class PointingVectorEnv(VectorEnv[Any, Any, Any]):
         for env in self.envs:
             env.close()
         self._pool.shutdown()
+
+
+class PointingVectorEnv(ThreadedVectorEnv):
+    """Several PointingEnv that share a model; further options are those of PointingEnv."""
+
+    def __init__(self, num_envs: int = 1, scenario: Any = None, *, threads: int = 0,
+                 **options: Any):
+        model = options.pop("model", None) or pointing_model(scenario)
+        super().__init__([PointingEnv(model=model, **options) for _ in range(num_envs)], threads)
+
+
+class TaskingVectorEnv(ThreadedVectorEnv):
+    """Several TaskingEnv that share a model; further options are those of TaskingEnv."""
+
+    def __init__(self, num_envs: int = 1, scenario: Any = None, *, threads: int = 0,
+                 targets: int = 24, **options: Any):
+        model = options.pop("model", None) or TaskingModel(scenario, targets)
+        super().__init__([TaskingEnv(model=model, **options) for _ in range(num_envs)], threads)
