@@ -220,6 +220,19 @@ typedef struct bst_sim_frame {
 bst_status bst_sim_view_frame(bst_ctx *ctx, bst_sim *sim, const char *scope,
                               bst_sim_frame *out) BST_MUST_CHECK;
 
+/* Keeps a frame that bst_sim_view_frame has lent: its pixels stay valid, and unchanged, until
+ * bst_sim_release_frame, also when the sim goes on or is freed.
+ *
+ * Given:     frame  lent, with a message
+ * Returned:  *held  the frame
+ * Errors:    BST_ERR_DEVICE
+ * Notes:     hold few: a renderer has `pool_frames` frames, and fails when all are held. The model
+ *            must outlive what is held. */
+bst_status bst_sim_hold_frame(bst_ctx *ctx, const bst_sim_frame *frame,
+                              bst_frame **held) BST_MUST_CHECK;
+/* Ends a bst_sim_hold_frame; any thread. NULL is allowed. */
+void bst_sim_release_frame(bst_frame *held);
+
 /* Gives a module of type "external" its next output, with the checks of the packet link.
  *
  * Given:     scope    "observer/sensor"; NULL: the first sensor with such a module

@@ -11,7 +11,7 @@ import argparse
 
 import numpy as np
 
-import boresight_link
+from boresight.link import Link
 
 LIGHT_MPS = 299792458.0
 
@@ -37,7 +37,7 @@ def main():
         dec = np.radians(options.dec + options.rate_dec * seconds)
         return np.array([np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)])
 
-    with boresight_link.Link(options.address, serves="control", name="own controller") as link:
+    with Link(options.address, serves="control", name="own controller") as link:
         mode = ""
         for step in link.steps():
             nav, tracks = link.latest(step.part, "nav_telemetry"), link.latest(step.part, "tracks")

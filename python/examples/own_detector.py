@@ -10,7 +10,7 @@ import argparse
 
 import numpy as np
 
-import boresight_link
+from boresight.link import Link
 
 
 def box_sums(image):
@@ -53,7 +53,7 @@ def main():
     parser.add_argument("address", help="for example tcp://127.0.0.1:5555")
     parser.add_argument("--threshold-sigma", type=float, default=5.0)
     options = parser.parse_args()
-    with boresight_link.Link(options.address, serves="imgproc", name="own detector",
+    with Link(options.address, serves="imgproc", name="own detector",
                              shared_memory=True) as link:
         for step in link.steps():
             frame, part = step.frame, step.part

@@ -43,6 +43,10 @@ class Docs(unittest.TestCase):
         cls.keys = schema("schema")
         with open("scenarios/study.schema.json", encoding="utf-8") as file:
             properties(json.load(file), {""}, cls.keys)
+        folder = "python/boresight"
+        cls.package = {name.split(".")[0] for name in os.listdir(folder)} | {"config", "messages"}
+        with open(folder + "/__init__.py", encoding="utf-8") as file:
+            cls.package |= set(re.findall(r"import \w+ as (\w+)", file.read()))
 
     def words(self):
         for path in sorted(glob.glob("docs/**/*.md", recursive=True)) + ["README.md"]:
@@ -58,6 +62,10 @@ class Docs(unittest.TestCase):
             if not re.fullmatch(r"[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)+", word):
                 continue
             parts = word.split(".")
+            if parts[0] == "boresight" and parts[-1] not in FILES:  # a name in the Python package
+                if parts[1] not in self.package:
+                    wrong.append(f"{place}: {word}: not in python/boresight")
+                continue
             if parts[0] not in self.keys or parts[-1] in FILES or "icd.md" in place:
                 continue
             for parent, name in zip(parts, parts[1:]):

@@ -16,7 +16,8 @@ from link_runs import (EMBEDDED, SECONDS, ended, free_port, ipc, python, serve, 
                        wait_until_open)
 
 sys.path.insert(0, "python")
-import boresight_link  # noqa: E402
+import boresight  # noqa: E402
+from boresight import link as client  # noqa: E402
 
 SOURCES = [os.path.join("python", "examples", name)
            for name in ("own_detector.py", "own_controller.py")]
@@ -27,14 +28,14 @@ def tearDownModule():
 
 
 def counters(folder):
-    return boresight_link.read_run(folder).manifest["counters"]
+    return boresight.read_run(folder).manifest["counters"]
 
 
 class SameResults(unittest.TestCase):
     """A part that `boresight serve` plays does what it does inside."""
 
     def same(self, a, b):
-        one, other = boresight_link.read_run(a), boresight_link.read_run(b)
+        one, other = boresight.read_run(a), boresight.read_run(b)
         self.assertEqual(one.tables, other.tables)
         for name in one.tables:
             if name == "events":  # what a part says of itself stays with it
@@ -47,7 +48,7 @@ class SameResults(unittest.TestCase):
     def test_one_part_or_all_outside(self):
         inside = runs.scratch() + "/inside"
         runs.run(runs.TRACK, inside, runs.NO_FRAMES, duration=SECONDS)
-        self.assertGreater(len(boresight_link.read_run(inside).table("tracks")["track_id"]), 1)
+        self.assertGreater(len(boresight.read_run(inside).table("tracks")["track_id"]), 1)
         tcp = f"tcp://127.0.0.1:{free_port()}"
         for address, parts, memory in ((tcp, "control", []), (ipc(), "tracker", []),
                                        (ipc(), "imgproc", ["--shared-memory"]),
@@ -77,7 +78,7 @@ class Replay(unittest.TestCase):
         return again, result
 
     def same(self, a, b):
-        one, other = boresight_link.read_run(a), boresight_link.read_run(b)
+        one, other = boresight.read_run(a), boresight.read_run(b)
         self.assertEqual(one.tables, other.tables)
         for name in one.tables:
             x, y = one.table(name), other.table(name)
@@ -131,14 +132,14 @@ class Replay(unittest.TestCase):
                             duration=6))
             ended(peer)
             if policy == "drop":  # 6 s of simulated time in 6 ms: no machine makes it
-                self.assertGreater(boresight_link.read_run(out).manifest["pacing"]["dropped"], 0)
+                self.assertGreater(boresight.read_run(out).manifest["pacing"]["dropped"], 0)
             again, result = self.replayed(out + "/scenario.json", out)
             self.assertEqual(result.returncode, 0, result.stderr)
             self.same(out, again)
 
 
 class Client(unittest.TestCase):
-    """python/boresight_link.py against the document, and by itself."""
+    """python/boresight/link against the document, and by itself."""
 
     def test_records_are_those_of_the_document(self):
         with open("docs/reference/icd.md", encoding="utf-8") as file:
@@ -150,8 +151,8 @@ class Client(unittest.TestCase):
             name = re.match(r"`(\w+)`", part).group(1)
             seen.add(name)
             pieces = re.split(r"\nItems, ", part)
-            ours = [boresight_link.RECORDS[name]]
-            ours += [boresight_link.ITEMS[name]] if len(pieces) > 1 else []
+            ours = [client.RECORDS[name]]
+            ours += [client.ITEMS[name]] if len(pieces) > 1 else []
             for piece, dtype in zip(pieces, ours):
                 rows = re.findall(r"^\| (\d+) \| (\w+)(?:\[(\d+)\])? \| `([^`]+)` \|", piece, re.M)
                 self.assertEqual([row[3] for row in rows], list(dtype.names))
@@ -162,7 +163,7 @@ class Client(unittest.TestCase):
                     expected = np.dtype("S" + count) if kind == "char" else np.dtype(
                         (formats[kind], (int(count),) if count else ()))
                     self.assertEqual(one, expected, f"{name}.{member}")
-        self.assertEqual(seen, set(boresight_link.RECORDS))
+        self.assertEqual(seen, set(client.RECORDS))
 
     def test_the_worked_example_is_made_the_same(self):
         with open("docs/reference/icd.md", encoding="utf-8") as file:
@@ -170,22 +171,22 @@ class Client(unittest.TestCase):
         text = text[text.index("## A message, byte by byte"):]
         header, dump = re.findall(r"```text\n(.*?)\n```", text, re.S)
         payload = bytes.fromhex("".join(line[4:] for line in dump.splitlines()))
-        record = boresight_link.new_record("los_command")
+        record = client.new_record("los_command")
         record["tick"] = 12600
         record["direction_gcrf"] = 0.6, 0.0, 0.8
         record["rate_gcrf_radps"] = 0.0, 7.292115e-5, 0.0
-        parts = boresight_link.encode("los_command", 5, record, tick=12000, step=40,
+        parts = client.encode("los_command", 5, record, tick=12000, step=40,
                                       instance="neossat/camera/control")
         self.assertEqual(parts[1], payload)
         # the same members; JSON leaves the rest free
         theirs, ours = json.loads(header), json.loads(parts[0])
         self.assertEqual({**theirs, "crc32c": ""}, {**ours, "crc32c": ""})
-        message = boresight_link.decode([header.encode(), payload])
+        message = client.decode([header.encode(), payload])
         self.assertEqual(message["direction_gcrf"][2], 0.8)
 
     def test_checksums(self):
-        self.assertEqual(boresight_link.crc32c(b"123456789"), 0xE3069283)
-        self.assertEqual(boresight_link.crc32c(bytes(32)), 0x8A9136AA)  # RFC 3720, B.4
+        self.assertEqual(client.crc32c(b"123456789"), 0xE3069283)
+        self.assertEqual(client.crc32c(bytes(32)), 0x8A9136AA)  # RFC 3720, B.4
         bits = np.random.default_rng(1).integers(0, 256, 70001).astype(np.uint8).tobytes()
         crc = 0xFFFFFFFF
         wanted = {0, 1, 2047, 2048, 2049, 4095, 5000, 70001}
@@ -194,28 +195,28 @@ class Client(unittest.TestCase):
             for _ in range(8):
                 crc = (crc >> 1) ^ (0x82F63B78 if crc & 1 else 0)
             if n in wanted:
-                self.assertEqual(boresight_link.crc32c(bits[:n]), crc ^ 0xFFFFFFFF, n)
+                self.assertEqual(client.crc32c(bits[:n]), crc ^ 0xFFFFFFFF, n)
 
     def test_a_spoilt_message_is_refused(self):
-        record = boresight_link.new_record("done")
-        parts = boresight_link.encode("done", 0, record)
-        boresight_link.decode(parts)
+        record = client.new_record("done")
+        parts = client.encode("done", 0, record)
+        client.decode(parts)
         for index in range(2):
             for at in range(len(parts[index])):
                 spoilt = [bytearray(part) for part in parts]
                 spoilt[index][at] ^= 1
-                with self.assertRaises(boresight_link.LinkError):
-                    boresight_link.decode(spoilt)
+                with self.assertRaises(client.LinkError):
+                    client.decode(spoilt)
 
     def test_run_folders(self):
         from astropy.io import fits
         out = runs.scratch() + "/run"
         runs.run(runs.STARE, out, duration=3)
-        run = boresight_link.read_run(out)
+        run = boresight.read_run(out)
         with fits.open(out + "/frames.fits") as file:
             theirs = [image for hdu in file if hdu.is_image and hdu.data is not None
                       for image in (hdu.data if hdu.data.ndim == 3 else [hdu.data])]
-        ours = list(run.frames())
+        ours = [frame.data for frame in run.frames]
         self.assertEqual(len(ours), len(theirs))
         for one, other in zip(ours, theirs):
             np.testing.assert_array_equal(one, other)
@@ -230,7 +231,7 @@ class Examples(unittest.TestCase):
         ended(start_run(runs.STARE, out, address, "imgproc", "--set", "/link/shared_memory=true",
                         duration=8))
         ended(peer)
-        run = boresight_link.read_run(out)
+        run = boresight.read_run(out)
         found, truth = run.table("detections"), run.table("truth")
         self.assertEqual(len(run.table("detection_frames")["exposure_id"]), 8)
         near = total = 0
@@ -253,7 +254,7 @@ class Examples(unittest.TestCase):
     def test_a_controller_of_ones_own(self):
         inside, out, address = runs.scratch() + "/inside", runs.scratch() + "/run", ipc()
         runs.run(runs.TRACK, inside, runs.NO_FRAMES, duration=SECONDS)
-        truth = boresight_link.read_run(inside).table("truth")
+        truth = boresight.read_run(inside).table("truth")
         target = truth["kind"] == "object"
         t, ra, dec = (truth[name][target] for name in ("mid_s", "ra_deg", "dec_deg"))
         rate_ra, ra_0 = np.polyfit(t, ra, 1)
@@ -262,7 +263,7 @@ class Examples(unittest.TestCase):
                       "--rate-ra", str(rate_ra), "--rate-dec", str(rate_dec))
         ended(start_run(runs.TRACK, out, address, "control", duration=30))
         self.assertIn("follows the target", ended(peer))
-        summary = boresight_link.read_run(out).manifest["summary"]
+        summary = boresight.read_run(out).manifest["summary"]
         self.assertEqual(summary["final_mode"], "track")
         # telemetry drifts by 5 arcsec/s, 1.7 px a second that passes between frame and command
         self.assertLess(summary["pointing_rms_px"], 4.0)
@@ -312,7 +313,7 @@ class Driver(unittest.TestCase):
         run = subprocess.Popen(words + ["--link", address], stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
         self.truths = []
-        with boresight_link.Link(address, serves="gimbal") as link:
+        with client.Link(address, serves="gimbal") as link:
             for step in link.steps():
                 self.truths += [int(m["exposure_id"]) for m in step.inputs if m.type == "truth"]
                 frames += [(m.record.copy(), m.pixels.copy()) for m in step.inputs
@@ -326,7 +327,7 @@ class Driver(unittest.TestCase):
                     step.send_sensor(exposure_s=0.2, window=(100, 200, 256, 128), binning=2,
                                      pixel_scale_arcsec=4.0)
         said = ended(run)
-        return frames, boresight_link.read_run(out), said
+        return frames, boresight.read_run(out), said
 
     def test_pointing_frames_sensor_and_target(self):
         out = runs.scratch() + "/first"
@@ -339,7 +340,7 @@ class Driver(unittest.TestCase):
         # quaternions of the same rotation; 1e-9 rad is a thousandth of a microradian
         self.assertLess(np.max(1.0 - np.abs(np.sum(q * expected, axis=1))), 1e-12)
         # frames: those of the record, the last one ended too late for the peer
-        recorded = list(run.frames())
+        recorded = [frame.data for frame in run.frames]
         self.assertEqual(len(recorded), 5)
         self.assertEqual(len(frames), 5)
         for (record, pixels), other in zip(frames, recorded):
@@ -376,7 +377,7 @@ class Driver(unittest.TestCase):
         words = runs.command(self.scenario(), out, duration=1)
         run = subprocess.Popen(words + ["--link", address], stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
-        with boresight_link.Link(address, serves="gimbal") as link:
+        with client.Link(address, serves="gimbal") as link:
             for step in link.steps():
                 if step.tick == 0:
                     step.send_pointing([0, 600], [self.attitude(0), self.attitude(600)])
@@ -388,7 +389,7 @@ class Driver(unittest.TestCase):
         count = counters(out)
         self.assertEqual(count["target_state_refused"], 3)
         self.assertEqual(count["pointing_held"], 1)
-        events = "\n".join(boresight_link.read_run(out).table("events")["text"])
+        events = "\n".join(boresight.read_run(out).table("events")["text"])
         for text in ('no object "nobody"', "before the step", "in the order of time",
                      "the line of sight stays"):
             self.assertIn(text, events)
@@ -399,7 +400,7 @@ class Driver(unittest.TestCase):
         address, out, commands = ipc(), runs.scratch() + "/run", 0
         run = start_run(runs.TRACK, out, address, "gimbal", "--set",
                         runs.SENSOR + "/observation_source=generator", duration=2)
-        with boresight_link.Link(address, serves="gimbal") as link:
+        with client.Link(address, serves="gimbal") as link:
             for step in link.steps():
                 command = step.get("los_command")
                 if command is not None:
@@ -410,7 +411,7 @@ class Driver(unittest.TestCase):
         ended(run)
         self.assertGreater(commands, 10)
         self.assertEqual(counters(out)["sensor_command_ignored"], 20)
-        commanded = boresight_link.read_run(out).table("sensor_commands")["exposure_s"]
+        commanded = boresight.read_run(out).table("sensor_commands")["exposure_s"]
         self.assertFalse(np.any(commanded == 0.1))
 
 
@@ -530,7 +531,7 @@ class BadPeers(unittest.TestCase):
                 peer = python(SOURCES[0], address)
             ended(run)
             ended(peer)
-        a, b = (boresight_link.read_run(folder).table("detections") for folder in (whole, broken))
+        a, b = (boresight.read_run(folder).table("detections") for folder in (whole, broken))
         for column in a:
             np.testing.assert_array_equal(a[column], b[column], column)
 
@@ -545,7 +546,7 @@ class BadPeers(unittest.TestCase):
         peer.communicate()
         said = ended(run, timeout=240)
         self.assertIn("of neossat/telescope/imgproc is not answered: no peer plays it", said)
-        found = boresight_link.read_run(out).table("detection_frames")
+        found = boresight.read_run(out).table("detection_frames")
         self.assertGreater(len(found["exposure_id"]), 0)
         self.assertLess(len(found["exposure_id"]), 300)
         self.assertGreaterEqual(counters(out)["link_unanswered"], 1)
@@ -554,8 +555,8 @@ class BadPeers(unittest.TestCase):
         address = ipc()
         run = start_run(runs.STARE, runs.scratch() + "/run", address, "imgproc", "--set",
                         "/link/timeout_s=2", duration=3)
-        with self.assertRaisesRegex(boresight_link.LinkError, "bad_value.*x_px of item 0"):
-            with boresight_link.Link(address, serves="imgproc") as link:
+        with self.assertRaisesRegex(client.LinkError, "bad_value.*x_px of item 0"):
+            with client.Link(address, serves="imgproc") as link:
                 for step in link.steps():
                     step.send_detections(x_px=np.nan, y_px=5.0)
         self.assertIn("its peer has left", ended(run, expected=1))

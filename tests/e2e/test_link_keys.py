@@ -12,7 +12,7 @@ import runs
 from link_runs import ended, free_port, ipc, serve, start_run
 
 sys.path.insert(0, "python")
-import boresight_link  # noqa: E402
+from boresight import link as client  # noqa: E402
 
 
 class Keys(unittest.TestCase):
@@ -41,8 +41,8 @@ class Keys(unittest.TestCase):
         said = ended(start_run(runs.TRACK, runs.scratch() + "/run", ipc(), "control", "--link-keys",
                                known), expected=1)
         self.assertIn("others than this user can read or change it (found mode 0640", said)
-        with self.assertRaisesRegex(boresight_link.LinkError, "found mode 0640"):
-            boresight_link.read_keys(known)
+        with self.assertRaisesRegex(client.LinkError, "found mode 0640"):
+            client.read_keys(known)
 
     def test_peers_with_the_keys(self):
         address = f"tcp://127.0.0.1:{free_port()}"
@@ -54,7 +54,7 @@ class Keys(unittest.TestCase):
         address = ipc()
         out = runs.scratch() + "/run"
         run = start_run(runs.STARE, out, address, "imgproc", "--link-keys", self.keys, duration=3)
-        with boresight_link.Link(address, serves="imgproc", keys_file=self.keys) as link:
+        with client.Link(address, serves="imgproc", keys_file=self.keys) as link:
             for step in link.steps():
                 step.send_detections(x_px=[10.0], y_px=[20.0], flux_e=1000.0, snr=10.0)
         ended(run)
@@ -74,7 +74,7 @@ class Keys(unittest.TestCase):
             address, out = f"tcp://127.0.0.1:{free_port()}", runs.scratch() + "/run"
             run = start_run(runs.TRACK, out, address, "control", "--link-keys", self.keys, "--set",
                             "/link/connect_timeout_s=1.5")
-            link = boresight_link.Link(address, serves="*", keys_file=keys)
+            link = client.Link(address, serves="*", keys_file=keys)
             said = ended(run, expected=1)
             link._socket.close(linger=0)
             self.assertIn("no peer plays neossat/telescope/control", said)

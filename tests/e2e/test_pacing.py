@@ -13,7 +13,8 @@ import numpy as np
 import runs
 
 sys.path.insert(0, "python")
-import boresight_link  # noqa: E402
+import boresight  # noqa: E402
+from boresight import link as client  # noqa: E402
 
 FULL = "--full" in sys.argv
 if FULL:
@@ -46,12 +47,12 @@ def paced(out, mode, *sets, duration=4, external=None, peer=None):
 
 def slow_tracker(seconds):
     def play(address):
-        with boresight_link.Link(address, serves="tracker") as link:
+        with client.Link(address, serves="tracker") as link:
             for step in link.steps():
                 time.sleep(seconds)
-                tracks = boresight_link.new_record("tracks")
+                tracks = client.new_record("tracks")
                 tracks["exposure_id"], tracks["tick"] = step.get("detections")["exposure_id"], step.tick
-                step.send("tracks", tracks, boresight_link.new_items("tracks", 0))
+                step.send("tracks", tracks, client.new_items("tracks", 0))
     return play
 
 
@@ -69,7 +70,7 @@ class RealTime(unittest.TestCase):
         self.assertEqual(len(pacing["response_frames"]), len(pacing["response_up_to_ms"]))
         self.assertAlmostEqual(pacing["deadline_s"], 0.125)
         self.assertIn("late frames", said)
-        a, b = boresight_link.read_run(free), boresight_link.read_run(timed)
+        a, b = boresight.read_run(free), boresight.read_run(timed)
         for name in a.tables:
             if name != "events":
                 for column, values in a.table(name).items():
@@ -83,10 +84,10 @@ class RealTime(unittest.TestCase):
             wall, manifest, _ = paced(out, "realtime", "/pacing/speed=20",
                                       f"/pacing/overrun={policy}", duration=5, external="tracker",
                                       peer=slow_tracker(0.15))
-            pacing, taken = manifest["pacing"], boresight_link.read_run(out).table("exposures")
+            pacing, taken = manifest["pacing"], boresight.read_run(out).table("exposures")
             self.assertEqual(pacing["frames"], 5)
             self.assertGreaterEqual(pacing["overruns"], 2)
-            events = boresight_link.read_run(out).table("events")
+            events = boresight.read_run(out).table("events")
             self.assertEqual(np.sum(events["kind"] == "overrun"), pacing["overruns"])
             if policy == "slip":
                 self.assertEqual(pacing["dropped"], 0)
@@ -161,7 +162,7 @@ class Loop(unittest.TestCase):
             print(pacing)
             self.assertLessEqual(pacing["late"], 0.01 * pacing["frames"])
         # the run waits for its peers and its clock is set back where they are late: the same loop
-        a, b = boresight_link.read_run(inside), boresight_link.read_run(outside)
+        a, b = boresight.read_run(inside), boresight.read_run(outside)
         for name in ("detections", "tracks", "los_commands", "truth"):
             x, y = a.table(name), b.table(name)
             self.assertGreater(len(x["sensor"]), 0)
@@ -186,7 +187,7 @@ class Fast(unittest.TestCase):
     def test_a_quick_peer_is_heard(self):
         out = runs.scratch() + "/run"
         _, manifest, _ = paced(out, "fast", duration=30, external="tracker", peer=slow_tracker(0.0))
-        self.assertGreater(len(boresight_link.read_run(out).table("track_frames")["exposure_id"]), 0)
+        self.assertGreater(len(boresight.read_run(out).table("track_frames")["exposure_id"]), 0)
         self.assertEqual(manifest["pacing"]["mode"], "fast")
 
     def test_without_a_link_it_is_lockstep(self):

@@ -336,8 +336,8 @@ static uint64_t add_layout(uint64_t h, const bst_wire_field *table) {
 }
 
 /* Another layout needs another version: a peer of the old one would read wrong numbers. After a
- * change raise BST_LINK_VERSION and VERSION of python/boresight_link.py, and state the new digest
- * here. */
+ * change raise BST_LINK_VERSION and VERSION of python/boresight/link/tables.py, and state the new
+ * digest here. */
 static void layouts_are_those_of_the_version(void **state) {
     (void)state;
     const struct {

@@ -62,6 +62,11 @@ static bst_status check_stages(bst_ctx *ctx, const bst_plugin *plugin) {
     return BST_OK;
 }
 
+bst_status bst_plugin_check(bst_ctx *ctx, const bst_plugin *plugin) {
+    BST_TRY(check_modules(ctx, plugin));
+    return check_stages(ctx, plugin);
+}
+
 /* Loads the libboresight that is installed with the program if the dynamic linker finds none. Later
  * libraries then use it. False: there is none. */
 static bool load_own_library(void) {
@@ -120,8 +125,7 @@ bst_status bst_plugin_open(bst_ctx *ctx, const char *path, bst_plugin *out) {
                         "build it against this one's",
                         out->file, version(), bst_version());
     }
-    BST_TRY(check_modules(ctx, out));
-    return check_stages(ctx, out);
+    return bst_plugin_check(ctx, out);
 }
 
 /* Lists the content of a plug-in for error messages: module "x" of role "y", ... */

@@ -25,6 +25,12 @@ typedef struct bst_plugin {
  * file and the remedy. */
 bst_status bst_plugin_open(bst_ctx *ctx, const char *path, bst_plugin *out) BST_MUST_CHECK;
 
+/* Checks interface versions, functions and kinds of a plug-in's lists. BST_ERR_CONFIG. */
+bst_status bst_plugin_check(bst_ctx *ctx, const bst_plugin *plugin) BST_MUST_CHECK;
+/* Finds a plug-in that the program has registered (bst_plugin_register); false: there is none. Its
+ * file is its name, its digest is empty. */
+bool bst_plugin_registered(const char *name, bst_plugin *out);
+
 /* Finds a plug-in's module by role and type (NULL: the only module of the role). BST_ERR_CONFIG
  * lists what the library contains. */
 bst_status bst_plugin_module(bst_ctx *ctx, const bst_plugin *plugin, const char *role,

@@ -18,6 +18,9 @@ bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json, const bst_sce
                         "%s: %s: plug-ins are not loaded here, as --no-plugins asks (found \"%s\")",
                         s->file, where, text);
     }
+    if (bst_plugin_registered(text, out)) {
+        return BST_OK;
+    }
     bst_scenario_folder(bst_json_file(json, where), folder, sizeof folder);
     if (text[0] == '/') {
         snprintf(path, sizeof path, "%s", text);

@@ -1,0 +1,145 @@
+"""The program `boresight` that comes with the package: runs it, with its errors as exceptions."""
+from __future__ import annotations
+
+import contextlib
+import os
+import pathlib
+import pty
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from typing import Any, Iterator, List, Sequence, Tuple
+
+from . import _native
+from .errors import ArgumentError, ProgramError
+from .scenario import Scenario
+
+
+@contextlib.contextmanager
+def work_folder() -> Iterator[pathlib.Path]:
+    """A temporary folder."""
+    with tempfile.TemporaryDirectory(prefix="boresight-") as folder:
+        yield pathlib.Path(folder)
+
+
+def options_of(**options: Any) -> List[str]:
+    """Options of the program by name: None and False are left out, True is a flag, the parts of a
+    tuple have ":" between them, those of a list ",": snr=(3, 9, 0.5) is --snr 3:9:0.5."""
+    words: List[str] = []
+    for name, value in options.items():
+        option = "--" + name.rstrip("_").replace("_", "-")
+        if value is None or value is False:
+            continue
+        if value is True:
+            words.append(option)
+            continue
+        if isinstance(value, (list, tuple)):
+            separator = ":" if isinstance(value, tuple) else ","
+            value = separator.join(str(part) for part in value)
+        elif not isinstance(value, (str, int, float, os.PathLike)) and not hasattr(value, "item"):
+            raise ArgumentError(f"{name} takes a number, a text, a path, a tuple or a list, not "
+                                f"{type(value).__name__}")
+        words += [option, str(value)]
+    return words
+
+
+@contextlib.contextmanager
+def scenario_arguments(scenario: Any) -> Iterator[List[str]]:
+    """Arguments of the program that name a scenario: its file, or a temporary one, and --set."""
+    given = Scenario.of(scenario)
+    if given.text is None:
+        yield [given.path, *given.arguments()]
+        return
+    with work_folder() as folder:
+        file = folder / "scenario.json"
+        file.write_text(given.to_json(), encoding="utf-8")
+        yield [str(file)]
+
+
+def execute(arguments: Sequence[str], progress: bool = False, allowed: Sequence[int] = (0,)) -> str:
+    """Runs the program to its end. Ctrl-C ends it properly first.
+
+    Given:     arguments  of the program
+               progress   shows what it writes to the standard error as it comes
+               allowed    exit codes that are no errors
+    Returned:  what it wrote to the standard output
+    Errors:    ProgramError, with what it wrote to the standard error; KeyboardInterrupt
+    """
+    command = [str(_native.program_path()), *arguments]
+    if any("\0" in word for word in command):
+        raise ArgumentError("an argument with a zero in it")
+    reading, writing = pty.openpty() if progress else os.pipe()
+    try:
+        # a session of its own: Ctrl-C comes to it from here alone, and once
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                   stderr=writing, start_new_session=True)
+    except OSError as error:
+        os.close(reading)
+        raise ProgramError(f"{command[0]} cannot be executed: {error.strerror}") from None
+    finally:
+        os.close(writing)
+    said: List[bytes] = []
+    reader = threading.Thread(target=_read, args=(reading, said, progress), daemon=True)
+    reader.start()
+    try:
+        output, _ = process.communicate()
+    except KeyboardInterrupt:
+        process.send_signal(signal.SIGINT)
+        process.communicate()
+        raise
+    finally:
+        reader.join()
+        os.close(reading)
+    text = b"".join(said).decode("utf-8", "replace")
+    if process.returncode not in allowed:
+        raise ProgramError(_message(text, process.returncode), process.returncode)
+    for line in _lines(text):
+        if line.startswith("boresight: warning: ") and not progress:
+            _native.LOG.warning("%s", line[len("boresight: warning: "):])
+    return output.decode("utf-8", "replace")
+
+
+def _read(reading: int, said: List[bytes], progress: bool) -> None:
+    """Collects what the program writes; shows it where that is asked for."""
+    while True:
+        try:
+            data = os.read(reading, 65536)
+        except OSError:  # a terminal without a program
+            return
+        if not data:
+            return
+        said.append(data)
+        if progress:
+            sys.stderr.write(data.decode("utf-8", "replace").replace("\r\n", "\n"))
+            sys.stderr.flush()
+
+
+def _lines(text: str) -> List[str]:
+    """Lines as they stand in the end, without what a progress line overwrote."""
+    return [line.rstrip("\r").rsplit("\r", 1)[-1].replace("\x1b[K", "").strip()
+            for line in text.split("\n")]
+
+
+def _message(text: str, code: int) -> str:
+    """What a program that failed says of it."""
+    lines = [line for line in _lines(text) if line]
+    prefix = "boresight: "
+    errors = [line[len(prefix):] for line in lines
+              if line.startswith(prefix) and not line.startswith(prefix + "warning: ")]
+    if errors:
+        return "\n".join(errors)
+    return "\n".join(lines) or (f"boresight ended by signal {-code}" if code < 0 else
+                                f"boresight ended with exit code {code}")
+
+
+def version() -> Tuple[str, str]:
+    """Version and path of the program."""
+    return execute(["--version"]).strip(), str(_native.program_path())
+
+
+def main() -> None:
+    """The command `boresight` of an installed wheel: becomes the program."""
+    path = str(_native.program_path())
+    os.execv(path, [path, *sys.argv[1:]])

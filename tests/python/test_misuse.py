@@ -1,0 +1,267 @@
+"""Wrong calls from Python: each raises an exception, and the simulation goes on afterwards."""
+import copy
+import gc
+import multiprocessing
+import os
+import pickle
+import threading
+import unittest
+
+import numpy as np
+
+from support import SMALL, bst, main
+
+NO_TEXTS = [5, 1.5, b"bytes", [], {}, object(), ("a",)]
+NO_NUMBERS = ["1", b"1", [], {}, object(), None, 1j, True]
+NO_TIMES = [v for v in NO_NUMBERS if v is not None]
+NO_ITEMS = [5, "text", b"bytes", object(), [1, 2], [None], np.zeros(3), np.zeros((2, 2)),
+            {"nothing": [1]}, {1: [2]}, [{"nothing": 1}], {"x_px": [1, 2], "y_px": [1, 2, 3]},
+            {"x_px": "a"}, {"x_px": [1j]}, {"x_px": [[1, 2], [3, 4]]}, {"flags": [-1]},
+            {"flags": [2**40]}, {"label": [0.5]}, {"star_id": [np.nan]}, {"x_px": [np.nan]},
+            {"x_px": [np.inf]}, {"label": [6]}, {"label_probability": [2.0]},
+            {"cov_yy": [-1.0], "cov_xx": [1.0]}, {"x_px": [object()]}, {"x_px": [None]},
+            np.zeros(2, bst.Track.dtype), np.zeros((1, 1), bst.Detection.dtype)]
+CLOSED = [
+    lambda s: s.step(), lambda s: s.step("frame"), lambda s: s.run_until(1), lambda s: s.tick,
+    lambda s: s.time_s, lambda s: s.run, lambda s: s.frame, lambda s: s.tracks, lambda s: s.truth,
+    lambda s: s.view("exposure"), lambda s: s.save(), lambda s: s.restore(b"x"),
+    lambda s: s.clone(), lambda s: list(s.frames()), lambda s: s.counters, lambda s: s.observe(),
+    lambda s: setattr(s, "detections", []), lambda s: s.command_pointing([0], [0, 0, 0, 1]),
+    lambda s: s.command_state("a", 0, [0, 0, 0], [0, 0, 0]), lambda s: pickle.dumps(s),
+    lambda s: copy.deepcopy(s), lambda s: s.sensor("neossat/telescope").tracks,
+]
+
+
+def wrong_calls(sim):
+    """Wrong calls of a simulation with an external imgproc, as functions."""
+    def put(channel, value):
+        return lambda: sim.command(channel, value)
+
+    for value in NO_TEXTS:
+        yield lambda v=value: sim.step(v)
+        yield lambda v=value: sim.step("frame", scope=v)
+        yield lambda v=value: sim.view(v)
+        yield lambda v=value: sim.view("tracks", v)
+        yield lambda v=value: sim.sensor(v)
+        yield lambda v=value: sim.view_frame(v)
+        yield lambda v=value: sim.frames(v)
+        yield put(value, [])
+    for value in NO_TIMES:
+        yield lambda v=value: sim.run_until(v)
+        yield lambda v=value: sim.step(until_s=v)
+        yield lambda v=value: sim.frames(until_s=v)
+    for value in (np.nan, np.inf, -np.inf, 1e300, 10**400):
+        yield lambda v=value: sim.run_until(v)
+    for value in ("", "nothing", "a\0b", "frame\n", "\udcff"):
+        yield lambda v=value: sim.step(v)
+        yield lambda v=value: sim.view(v)
+        yield lambda v=value: sim.sensor(v)
+        yield lambda v=value: sim.view("tracks", v)
+        yield put(value, [])
+    for value in NO_ITEMS:
+        yield put("detections", value)
+    for channel in ("tracks", "predictions", "los_command", "sensor_command", "control_status",
+                    "frame", "truth", "exposure", "pointing_telemetry"):
+        yield put(channel, {})
+        yield put(channel, None)
+        yield put(channel, bst.Detections())
+    for value in (5, "x", [1, 2], [0, 0, 0], [np.nan, 0, 1], np.zeros((3, 3)), ["a", "b", "c"]):
+        yield put("los_command", value)
+    for ticks, q in (("a", [0, 0, 0, 1]), ([1.5], [0, 0, 0, 1]), ([1, 2], [0, 0, 1]),
+                     ([[1]], [0, 0, 0, 1]), ([1], "q"), ([1], [[0, 0, 0, 1]] * 2),
+                     (np.arange(70000), [0, 0, 0, 1]), ([1], [0, 0, 0, 1])):
+        yield lambda t=ticks, a=q: sim.command_pointing(t, a)
+    for arguments in ((5, 1, [0, 0, 0], [0, 0, 0]), ("INMARSAT GX5", "1", [0, 0, 0], [0, 0, 0]),
+                      ("INMARSAT GX5", 1, [0, 0], [0, 0, 0]),
+                      ("INMARSAT GX5", 1, [0, 0, 0], "abc"), ("nobody", 1, [0, 0, 0], [0, 0, 0]),
+                      ("INMARSAT GX5", np.nan, [0, 0, 0], [0, 0, 0]),
+                      ("INMARSAT GX5", 1, [7e6, 0, 0], [0, 7e3, 0]),
+                      ("INMARSAT GX5", 1, [np.inf, 0, 0], [0, 0, 0])):
+        yield lambda a=arguments: sim.command_state(*a)
+    for value in (5, "text", None, [], b"", b"x", b"BSTSTATE" + bytes(400), bytearray(1000),
+                  bst.Snapshot(b"y" * 300)):
+        yield lambda v=value: sim.restore(v)
+    for value in (5, None, "nothing", [], [5], ["plant", "nothing"], [None]):
+        yield lambda v=value: sim.restore(b"x" * 500, v)
+    for value in (5, "f", [], object()):
+        yield lambda v=value: sim.observe(message=v)
+        yield lambda v=value: sim.observe(event=v)
+    for value in (5, "nothing", ["frame", 5], [None]):
+        yield lambda v=value: sim.observe(channels=v)
+    for name in ("truth", "frame", "tick", "time_s", "exposure"):
+        yield lambda n=name: setattr(sim, n, 1)
+
+
+def wrong_objects():
+    """Wrong constructions, as functions."""
+    for value in (5, None, b"x", [], object(), "no such file.json", "a\0b", {}, {"boresight": 1},
+                  {"x": object()}, {"x": float("nan")}, "/", bst.Scenario):
+        yield lambda v=value: bst.Simulation(v)
+        yield lambda v=value: bst.Model(v)
+    for keys in ({"external": 5}, {"external": [5]}, {"external": ["nothing"]},
+                 {"external": ["scenegen"]}, {"run": -1}, {"run": 1.5}, {"run": "1"},
+                 {"run": 2**70}, {"device": 5}, {"threads": -1}, {"threads": "2"},
+                 {"device": "no such device"}, {"nothing": 1}):
+        yield lambda k=keys: bst.Simulation(SMALL, **k)
+    for values in ({"duration_s": "x"}, {"duration_s": -1}, {"nothing": 1}, {"duration_s": [1]},
+                   {"objects__7__area_m2": 1}, {"objects__0__area_m2": None},
+                   {"duration_s": float("nan")}, {"observers__0__sensors": {}}):
+        yield lambda v=values: SMALL.with_(**v).validate()
+    for values in ({5: 1}, {"no pointer": 1}, {"/duration_s": object()}, {"/duration_s": {1, 2}}):
+        yield lambda v=values: SMALL.with_(v)
+    for kind in (bst.Detections, bst.Tracks, bst.LosCommand, bst.Window, bst.Task):
+        yield lambda k=kind: k(nothing=1)
+        yield lambda k=kind: k("items")
+        yield lambda k=kind: k.of(np.zeros(5))
+        yield lambda k=kind: k.of(b"x")
+        yield lambda k=kind: setattr(k(), "x", 1)
+    for members in ({"exposure_id": "a"}, {"exposure_id": 1.5}, {"exposure_id": 2**70},
+                    {"q_cam_from_gcrf": [1, 2]}, {"count": 3}, {"noise_e": object()}):
+        yield lambda m=members: bst.Detections(**m)
+    yield lambda: bst.read_run("no such folder")
+    yield lambda: bst.orbit(5)
+    yield lambda: bst.pd(SMALL, snr=object())
+    yield lambda: bst.pd(SMALL, json="x")
+    yield lambda: bst.loop(SMALL, nothing=1)
+    yield lambda: bst.study("no such file")
+    yield lambda: bst.report("no such folder")
+
+
+def call_in_child(function):
+    """Result of a function in a forked process: "raised NAME", "returned", or the exit code."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            function()
+            text = "returned"
+        except BaseException as error:  # pylint: disable=broad-except
+            text = f"raised {type(error).__name__}"
+        os.write(writing, text.encode())
+        os._exit(0)
+    os.close(writing)
+    said = os.read(reading, 1000).decode()
+    os.close(reading)
+    _, code = os.waitpid(child, 0)
+    return said if code == 0 else f"exit code {code}"
+
+
+class Misuse(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.model = bst.Model(SMALL, external=["imgproc"]).prepare()
+
+    def setUp(self):
+        self.sim = bst.Simulation(self.model)
+        self.sim.run_until(2)
+
+    def tearDown(self):
+        self.sim.close()
+
+    def check(self, number, call):
+        with self.assertRaises(Exception, msg=f"call {number} raised nothing") as caught:
+            call()
+        self.assertTrue(str(caught.exception), f"call {number}: an exception without a text")
+
+    def test_wrong_calls_raise(self):
+        calls = list(wrong_calls(self.sim))
+        self.assertGreaterEqual(len(calls), 200)
+        for number, call in enumerate(calls):
+            with self.subTest(call=number):
+                self.check(number, call)
+        self.sim.run_until(4)  # unharmed
+        with bst.Simulation(self.model) as other:
+            other.run_until(4)
+            self.assertEqual(other.tracks, self.sim.tracks)
+            np.testing.assert_array_equal(other.frame.data, self.sim.frame.data)
+
+    def test_wrong_constructions_raise(self):
+        for number, call in enumerate(wrong_objects()):
+            with self.subTest(call=number):
+                self.check(number, call)
+
+    def test_closed_simulations_raise(self):
+        self.sim.close()
+        self.sim.close()
+        for number, call in enumerate(CLOSED):
+            with self.subTest(call=number):
+                with self.assertRaises(bst.ClosedError):
+                    call(self.sim)
+        self.assertIn("closed", repr(self.sim))
+
+    def test_arrays_are_read_only(self):
+        frame, message = self.sim.frame, self.sim.exposure
+        with self.assertRaises(ValueError):
+            frame.data[0, 0] = 1
+        with self.assertRaises(ValueError):
+            self.sim.truth.items["x_px" if False else "x_mid_px"][:] = 0
+        with self.assertRaises(ValueError):
+            message.array["id"] = 5
+        with self.assertRaises(bst.ArgumentError):
+            message.id = 5
+
+    def test_one_thread_at_a_time(self):
+        raised, done = [], threading.Event()
+        entered = threading.Event()
+
+        def slow(_message):
+            entered.set()
+            done.wait(20)
+        self.sim.observe(message=slow, channels=["exposure"])
+        thread = threading.Thread(target=lambda: self.sim.run_until(3))
+        thread.start()
+        self.assertTrue(entered.wait(20))
+        for call in (lambda: self.sim.tracks, lambda: self.sim.step(), self.sim.close,
+                     lambda: self.sim.run_until(9), self.sim.save):
+            try:
+                call()
+            except bst.BusyError as error:
+                raised.append(error)
+        done.set()
+        thread.join()
+        self.assertEqual(len(raised), 5)
+        self.assertEqual(self.sim.time_s, 3)
+
+    def test_many_threads_at_random(self):
+        errors = []
+
+        def work(number):
+            for k in range(60):
+                try:
+                    (self.sim.step, lambda: self.sim.tracks, lambda: self.sim.frame,
+                     lambda: self.sim.run_until(self.sim.time_s + 0.05))[(number + k) % 4]()
+                except bst.BusyError:
+                    pass
+                except Exception as error:  # pylint: disable=broad-except
+                    errors.append(error)
+        threads = [threading.Thread(target=work, args=(n,)) for n in range(6)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(errors, [])
+
+    def test_forked_processes_raise(self):
+        frame = self.sim.frame
+        for call in (lambda: self.sim.step(), lambda: self.sim.tracks, lambda: self.sim.save(),
+                     lambda: bst.Simulation(self.model)):
+            self.assertEqual(call_in_child(call), "raised ForkError")
+
+        def drop_all():  # nothing of the parent is freed by its child
+            nonlocal frame
+            self.sim.close()
+            del self.sim
+            frame = None
+            gc.collect()
+        self.assertEqual(call_in_child(drop_all), "returned")
+        self.assertEqual(int(frame.data.sum()), int(self.sim.frame.data.sum()))
+        self.sim.run_until(3)
+
+    def test_spawned_processes_get_the_scenario(self):
+        context = multiprocessing.get_context("spawn")
+        with context.Pool(1) as pool:
+            self.assertEqual(pool.apply(bst.Scenario.to_dict, (SMALL,)), SMALL.to_dict())
+
+
+if __name__ == "__main__":
+    main()
