@@ -131,6 +131,7 @@ static void high_moments(const bst_smear_maker *m, const group *g, bst_smear_mom
             for (int i = 0; i < 3; i++) {
                 d[i] -= x * out->axis[i];
                 out->bend[i] += part * x * x * d[i];
+                out->twist[i] += part * x * x * x * d[i];
             }
             double y2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
             out->drift += part * x * y2;
@@ -150,6 +151,7 @@ static void high_moments(const bst_smear_maker *m, const group *g, bst_smear_mom
     out->across /= weight;
     for (int i = 0; i < 3; i++) {
         out->bend[i] /= weight;
+        out->twist[i] /= weight;
         out->lean[i] /= weight;
     }
 }

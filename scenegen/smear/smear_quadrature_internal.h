@@ -30,6 +30,7 @@ typedef struct bst_smear_moments {
     double covariance[3][3];
     double along[7]; /* E[x^k] */
     double bend[3];  /* E[y x^2], y across the axis */
+    double twist[3]; /* E[y x^3] */
     double drift;    /* E[x y^2] */
     double mixed;    /* E[x^2 y^2] */
     double lean[3];  /* E[y y^2] */

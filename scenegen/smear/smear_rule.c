@@ -9,6 +9,12 @@ static double norm3(const double v[3]) {
     return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
+/* E[x p^2] / E[p^2] of the second orthogonal polynomial p = x^2 - skew x - e[2], E[p^2] = norm. */
+static double second_centre(const double e[7], double skew, double norm) {
+    double v = e[2];
+    return (e[5] - 2.0 * skew * e[4] + (skew * skew - 2.0 * v) * e[3] + 2.0 * skew * v * v) / norm;
+}
+
 /* Gaussian quadrature of n nodes for moments e[0..2n - 1] about the mean. Returns the squared norm
  * of the next orthogonal polynomial, the rule's error of moment 2n; negative if no distribution has
  * these moments. curve: second polynomial at the nodes. */
@@ -35,8 +41,7 @@ static double quadrature(int n, const double e[7], bst_smear_rule *r) {
         return -1.0;
     }
     /* second polynomial: x^2 - skew x - v */
-    double centre2 =
-        (e[5] - 2.0 * skew * e[4] + (skew * skew - 2.0 * v) * e[3] + 2.0 * skew * v * v) / norm;
+    double centre2 = second_centre(e, skew, norm);
     /* third polynomial: (x - centre2)(x^2 - skew x - v) - (norm / v) x; roots by cosines */
     double c2 = -skew - centre2, c1 = centre2 * skew - v - norm / v, c0 = centre2 * v;
     double p = (c2 * c2 - 3.0 * c1) / 9.0, q = (c2 * (2.0 * c2 * c2 - 9.0 * c1) + 27.0 * c0) / 54.0;
@@ -199,30 +204,64 @@ static bool fit_moments(const bst_smear_maker *m, const bst_smear_moments *g, bo
 }
 
 /* Factors that no formula gives: calibrated by tests/scenegen/calibrate_smear_rule.c, where the
- * worst of 36 paths with jitter has 0.94 of the predicted error, and the worst of 24 smooth ones
- * 0.88.
+ * worst of 36 paths with jitter has 0.97 of the predicted error, and the worst of 24 smooth ones
+ * 0.90.
  *
  * Groups are shorter than the PSF is wide, so that what jitter leaves over in neighbours adds up
  * (on straight paths it nearly cancels). MARGIN is that of the quadrature's own error. */
-static const double NEIGHBOURS = 1.8, MARGIN = 1.08;
+static const double NEIGHBOURS = 1.3, MARGIN = 1.08;
+
+/* Higher moments of a group across its axis: those of bst_smear_moments. */
+typedef struct cross_moments {
+    double twist[3], drift, lean[3], mixed;
+} cross_moments;
+
+/* Moments of a group that the nodes of a rule do not have.
+ *
+ * Given:     e  moments along the axis without the widening
+ *
+ * Notes:     Three nodes lie at y = c p(x), with c the rule's bend and p the second orthogonal
+ *            polynomial, x^2 - skew x - v. Sums over the nodes follow from its norm and from
+ *            x p = q + centre p + (norm / v) x, where the third polynomial q is zero at the nodes.
+ */
+static cross_moments missed_cross_moments(const bst_smear_moments *g, const double e[7],
+                                          const bst_smear_rule *r) {
+    cross_moments left = {.drift = g->drift, .mixed = g->mixed - g->along[2] * g->across};
+    memcpy(left.twist, g->twist, sizeof left.twist);
+    memcpy(left.lean, g->lean, sizeof left.lean);
+    if (r->nodes < 3) {
+        return left;
+    }
+    double v = e[2], skew = e[3] / v, norm = e[4] - skew * e[3] - v * v;
+    double centre = second_centre(e, skew, norm), length = norm3(r->bend);
+    double square = norm * (centre * centre + norm / v); /* sum of (x p)^2 */
+    left.drift -= length * length * norm * centre;
+    left.mixed -= length * length * (square - norm * v);
+    for (int i = 0; i < 3; i++) {
+        left.twist[i] -= r->bend[i] * norm * (centre + skew);
+        left.lean[i] -= r->bend[i] * length * length * (square - norm * (skew * centre + v));
+    }
+    return left;
+}
 
 /* Error of the image by third and fourth moments that the rule misses, over the peak.
  *
  * Notes:     Taylor series of the image about the group's mean: each moment that is missed, over
  *            the factorials of its orders, times the greatest derivative of the PSF of those
  *            orders. A Gaussian of unit height and sigma has 1.380 (xxx), exp(-1/2) = 0.607 (xyy),
- *            1 (xxyy) and 3 (xxxx). */
-static double higher_moments_error(const bst_smear_maker *m, const bst_smear_moments *g, bool split,
-                                   const bst_smear_rule *r) {
+ *            0.837 (xxxy), 1 (xxyy) and 3 (xxxx). */
+static double higher_moments_error(const bst_smear_maker *m, const bst_smear_moments *g,
+                                   const double e[7], bool split, const bst_smear_rule *r) {
     double var = m->variance;
     int n = r->nodes;
+    cross_moments left = missed_cross_moments(g, e, r);
     /* 1.380 / 3! = 0.23 of a pure third moment, 0.607 / 2! = 0.30 of a mixed one */
-    double third = 0.3 * fabs(g->drift) + 0.23 * norm3(g->lean);
+    double third = 0.3 * fabs(left.drift) + 0.23 * norm3(left.lean);
     third += n == 1 ? 0.23 * fabs(g->along[3]) : 0.0;
     third += n < 3 ? 0.3 * norm3(g->bend) : 0.0;
     double error = third / (var * sqrt(var));
-    /* E[x^2 y^2]: 1 / (2! 2!) */
-    error += 0.25 * fabs(g->mixed - g->along[2] * g->across) / (var * var);
+    /* E[x^3 y]: 0.837 / 3!; E[x^2 y^2]: 1 / (2! 2!) */
+    error += (0.14 * norm3(left.twist) + 0.25 * fabs(left.mixed)) / (var * var);
     double wide = split
                       ? r->pair[0] * r->pair[0] + r->pair[1] * r->pair[1] + r->pair[2] * r->pair[2]
                       : r->widening;
@@ -244,7 +283,13 @@ void bst_smear_try_rule(const bst_smear_maker *m, const bst_smear_moments *g, in
     if (!fit_moments(m, g, widen, split, &rest, r)) {
         return;
     }
-    double error = higher_moments_error(m, g, split, r);
+    double e[7], u = n == 1 ? 0.0 : r->widening;
+    memcpy(e, g->along, sizeof e);
+    e[2] -= u;
+    e[4] -= u * (6.0 * e[2] + 3.0 * u);
+    e[5] -= 10.0 * u * e[3];
+    e[6] -= u * (15.0 * e[4] + u * (45.0 * e[2] + 15.0 * u));
+    double error = higher_moments_error(m, g, e, split, r);
     if (!(error <= limit)) {
         return;
     }
@@ -259,12 +304,6 @@ void bst_smear_try_rule(const bst_smear_maker *m, const bst_smear_moments *g, in
     if (!(error <= limit)) {
         return;
     }
-    double e[7], u = n == 1 ? 0.0 : r->widening;
-    memcpy(e, g->along, sizeof e);
-    e[2] -= u;
-    e[4] -= u * (6.0 * e[2] + 3.0 * u);
-    e[5] -= 10.0 * u * e[3];
-    e[6] -= u * (15.0 * e[4] + u * (45.0 * e[2] + 15.0 * u));
     double missed = quadrature(n, e, r);
     if (missed < 0.0) {
         return;

@@ -118,7 +118,7 @@ static double worst_ratio(bool jitter, int trials) {
     return worst;
 }
 
-/* NEIGHBOURS 1.8: not below the least factor that covers the worst path, and no more than a sixth
+/* NEIGHBOURS 1.3: not below the least factor that covers the worst path, and no more than a sixth
  * above it. */
 static void neighbours_of_jittered_paths(void **state) {
     (void)state;
@@ -166,6 +166,7 @@ static void taylor_factors(void **state) {
     (void)state;
     bst_assert_close(greatest(3, 0) / 6.0, 0.23, 0.02 * 0.23);        /* E[x^3] */
     bst_assert_close(greatest(1, 2) / 2.0, 0.30, 0.02 * 0.30);        /* E[x y^2] */
+    bst_assert_close(greatest(3, 1) / 6.0, 0.14, 0.02 * 0.14);        /* E[x^3 y] */
     bst_assert_close(greatest(2, 2) / 4.0, 0.25, 0.02 * 0.25);        /* E[x^2 y^2] */
     bst_assert_close(1.2 * greatest(4, 0) / 24.0, 0.15, 0.02 * 0.15); /* fourth cumulant */
     bst_assert_close(greatest(1, 1), 0.37, 0.02 * 0.37);              /* E[x y] */

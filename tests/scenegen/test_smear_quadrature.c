@@ -207,6 +207,49 @@ static void jitter_is_kept_to_the_tolerance(void **state) {
     }
 }
 
+/* Largest error of a short path's image, over its peak, and the error predicted for it. */
+static double short_path_error(const bst_smear_path_point *path, int count, double tolerance,
+                               double *predicted) {
+    bst_ctx ctx = {0};
+    bst_smear_node_list list = {0};
+    double worst = 0.0, peak = 0.0;
+    bst_assert_ok(&ctx, make_nodes(&ctx, path, count, tolerance, 1.0, &list));
+    for (double y = -3.0; y <= 3.0; y += 0.2) {
+        for (double x = -3.0; x <= 3.0; x += 0.2) {
+            double image = true_image(path, count, x, y);
+            peak = fmax(peak, image);
+            worst = fmax(worst, fabs(node_image(&list, x, y) - image));
+        }
+    }
+    *predicted = bst_smear_nodes_error(list.error, 1.0);
+    free(list.items);
+    return worst / peak;
+}
+
+/* Jitter bends a streak like an S, E[y x^3], and reverses a slow one: its mean position across the
+ * axis is no parabola, and nodes on a bend have third moments of their own. */
+static void s_bends_and_reversals_are_predicted(void **state) {
+    (void)state;
+    enum { COUNT = 120 };
+    bst_smear_path_point path[COUNT];
+    for (int trial = 0; trial < 8; trial++) {
+        bool reversal = trial >= 4;
+        double size = 0.06 + 0.03 * (trial % 4), predicted;
+        for (int k = 0; k < COUNT; k++) {
+            double s = (double)k / (COUNT - 1), u = 2.0 * s - 1.0;
+            double x = reversal ? 0.5 * u * u + 0.15 * u : 0.8 * u;
+            double y = reversal ? 3.0 * size * u * (1.0 - 0.4 * u) : size * u * (5.0 * u * u - 3.0);
+            path[k] = (bst_smear_path_point){{x, y, 0.0}, s};
+        }
+        for (double tolerance = 0.02; tolerance > 1e-4; tolerance *= 0.5) {
+            double error = short_path_error(path, COUNT, tolerance, &predicted);
+            /* 2e-6: what the midpoints of the image that is taken for true miss */
+            assert_true(error <= predicted + 2e-6);
+            assert_true(predicted <= tolerance);
+        }
+    }
+}
+
 static void no_duration_is_one_node(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -243,6 +286,7 @@ int main(void) {
         cmocka_unit_test(a_straight_group_is_gauss_legendre),
         cmocka_unit_test(jitter_is_kept_to_the_tolerance),
         cmocka_unit_test(long_segments_are_cut_and_finer_levels_have_more),
+        cmocka_unit_test(s_bends_and_reversals_are_predicted),
         cmocka_unit_test(no_duration_is_one_node),
         cmocka_unit_test(peak_shares),
     };
