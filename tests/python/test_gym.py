@@ -151,7 +151,7 @@ class Tasking(unittest.TestCase):
     def test_greedy_is_better_than_random(self):
         env = bg.TaskingEnv(model=self.model)
         random = bg.tasking_score(env, bg.random_tasks(env), runs=[1])
-        greedy = bg.tasking_score(env, bg.greedy_tasks, runs=[1])
+        greedy = bg.tasking_score(env, bg.greedy_tasks(env), runs=[1])
         self.assertGreaterEqual(greedy, 3)
         self.assertGreater(greedy, random)
         self.assertLessEqual(greedy, 12)

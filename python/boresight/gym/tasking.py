@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import pathlib
-from typing import Any, Dict, List, Optional, Set, Tuple
+from typing import Any, Dict, List, Optional, Tuple
 
 import gymnasium
 import numpy as np
@@ -228,18 +228,28 @@ class TaskingEnv(gymnasium.Env[Observation, Any]):
             self._sim = None
 
 
-def greedy_tasks(observation: Observation, slew_weight: float = 3.0) -> npt.NDArray[np.int64]:
-    """Each sensor in turn takes the visible target with the highest age over the way to it, that no
-    sensor before has taken; it keeps a target that it has not seen yet."""
-    taken: Set[int] = set()
-    chosen: List[int] = []
-    for row in observation["targets"]:
-        value = row[:, 1] * (row[:, 3] + 0.5 * row[:, 2] * (row[:, 3] > 0.5)) / (
-            1.0 + slew_weight * row[:, 0])
-        value[list(taken)] = -1.0
-        chosen.append(int(np.argmax(value)))
-        taken.add(chosen[-1])
-    return np.array(chosen, np.int64)
+def greedy_tasks(env: TaskingEnv, slew_weight: float = 3.0, wait: int = 8) -> Any:
+    """A policy: each sensor in turn takes the visible target with the highest age over the way to
+    it, that no sensor before has taken. A target that was looked at and not detected is left out
+    for `wait` decisions."""
+    left_out = np.zeros(env.count, int)
+    arrived = 0.5 / 180.0  # of the angle in the observation: half a degree
+
+    def act(observation: Observation) -> npt.NDArray[np.int64]:
+        if float(observation["time"][0]) * env.shared.model.duration_s < env.decision_s:
+            left_out[:] = 0  # a new run
+        left_out[:] = np.maximum(left_out - 1, 0)
+        for row in observation["targets"]:
+            left_out[(row[:, 2] == 1) & (row[:, 0] < arrived) & (row[:, 3] > 0.5)] = wait
+        chosen: List[int] = []
+        for row in observation["targets"]:
+            value = row[:, 1] * (row[:, 3] + 0.5 * row[:, 2] * (row[:, 0] >= arrived)) / (
+                1.0 + slew_weight * row[:, 0])
+            value[left_out > 0] *= 0.01
+            value[chosen] = -1.0
+            chosen.append(int(np.argmax(value)))
+        return np.array(chosen, np.int64)
+    return act
 
 
 def random_tasks(env: TaskingEnv, seed: int = 0) -> Any:
