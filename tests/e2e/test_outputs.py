@@ -29,7 +29,7 @@ class Outputs(unittest.TestCase):
              "new": ["--observer-tle", "{elements}"],
              "study": ["{study}"], "pd": ["{scenario}", "--trials", "1"]}
     # options that name what is read
-    INPUTS = {("run", "replay"), ("run", "link-keys"), ("serve", "link-keys"),
+    INPUTS = {("run", "replay"), ("run", "restore"), ("run", "link-keys"), ("serve", "link-keys"),
               ("schema", "plugin"), ("orbit", "observer"), ("propagate", "elements"), ("propagate", "tle"), ("propagate", "eop"),
               ("calibrate-obsgen", "calibration"), ("bench", "tle"), ("bench", "scenario"),
               ("study", "site")}
