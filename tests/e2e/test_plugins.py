@@ -141,7 +141,7 @@ class Plugins(unittest.TestCase):
                 (f'{block}={{"plugin": "empty.so"}}',
                  "empty.so is no plug-in: it defines neither the list bst_plugin_modules"),
                 (f'{block}={{"plugin": "old.so"}}',
-                 "old.so has a stage of interface 99, this program takes 1: build it with"),
+                 "old.so has a stage of interface 99, this program takes 2: build it with"),
                 (f'{control}={{"plugin": "aged.so"}}',
                  "aged.so has a module of interface 2, this program takes 3: build it with"),
                 (f'{block}={{"plugin": "other.so"}}',
