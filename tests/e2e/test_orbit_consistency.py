@@ -107,9 +107,11 @@ class Consistency(unittest.TestCase):
                 f"{'images' if images else 'generator'}: state {state:.1f} of {6 * seeds}, "
                 f"residuals {chi2:.0f} of {dof}")
         print(what, flush=True)
+        # a new law of the generator draws other errors: 95 % for the 20 seeds of --full, 99 % for a few
+        sigmas = 1.96 if seeds >= 20 else 2.58
         for sum_of, of in ((state, 6 * seeds), (chi2, dof)):
-            self.assertGreater(sum_of, quantile(of, -1.96), what)
-            self.assertLess(sum_of, quantile(of, 1.96), what)
+            self.assertGreater(sum_of, quantile(of, -sigmas), what)
+            self.assertLess(sum_of, quantile(of, sigmas), what)
 
     @unittest.skipIf(FULL, "part of --full")
     def test_geo(self):
