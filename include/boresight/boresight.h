@@ -50,9 +50,11 @@ typedef struct bst_model_options {
 /* Reads and checks a scenario.
  *
  * Given:     path     scenario file (JSON); may extend another file. With options->text: the name
- * of the text for messages; relative paths in the text start in its folder options  NULL: the
- * defaults Returned:  *out  the model; NULL on error Errors:    BST_ERR_ARGUMENT, BST_ERR_IO,
- * BST_ERR_FORMAT, BST_ERR_CONFIG, BST_ERR_MEMORY; the message names file, key and allowed values
+ *                     of the text for messages; relative paths start in its folder
+ *            options  NULL: the defaults
+ * Returned:  *out  the model; NULL on error
+ * Errors:    BST_ERR_ARGUMENT, BST_ERR_IO, BST_ERR_FORMAT, BST_ERR_CONFIG, BST_ERR_MEMORY; the
+ *            message names file, key and allowed values
  * Ownership: free *out with bst_model_free, after all of its sims
  * Notes:     loads the plug-ins of the scenario into the process. The star catalogue and the device
  *            are opened by the first bst_sim_create or bst_model_prepare. */
@@ -159,10 +161,12 @@ bst_status bst_sim_run_until(bst_ctx *ctx, bst_sim *sim, double until_s) BST_MUS
  *
  * Given:     scope    "observer/sensor"; NULL: any sensor
  *            channel  "frame", "exposure", "detections", ...; NULL: the end of the next tick at
- * which a module steps until_s  as bst_sim_run_until Returned:  *arrived  false: until_s was
- * reached first; NULL is allowed Errors:    those of bst_sim_run_until; BST_ERR_NOT_FOUND: no
- * module writes such a channel Notes:     the sim stops right after the step that publishes, before
- * any module reads the message; the next call goes on within the tick. */
+ *                     which a module steps
+ *            until_s  as bst_sim_run_until
+ * Returned:  *arrived  false: until_s was reached first; NULL is allowed
+ * Errors:    those of bst_sim_run_until; BST_ERR_NOT_FOUND: no module writes such a channel
+ * Notes:     the sim stops right after the step that publishes, before any module reads the
+ *            message; the next call goes on within the tick. */
 bst_status bst_sim_step(bst_ctx *ctx, bst_sim *sim, const char *scope, const char *channel,
                         double until_s, bool *arrived) BST_MUST_CHECK;
 

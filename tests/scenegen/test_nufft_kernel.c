@@ -71,7 +71,7 @@ static double error_at(const bst_nufft_kernel *s, double nu) {
     return worst;
 }
 
-/* The bound that is told is that of points anywhere between samples, frequency by frequency, and
+/* The stated bound is that of points anywhere between samples, frequency by frequency, and
  * the kernel's beta is as good as any. */
 static void the_error_of_a_grid(void **state) {
     (void)state;

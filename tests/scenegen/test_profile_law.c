@@ -95,7 +95,7 @@ static void degrees_are_as_small_as_they_may_be(void **state) {
     assert_int_equal(bst_profile_law_degree(0.1), 0); /* a step: no polynomial */
 }
 
-/* The widening that is told meets the allowed error, a quarter more does not. */
+/* The stated widening meets the allowed error, a quarter more does not. */
 static void widest_is_as_wide_as_it_may_be(void **state) {
     (void)state;
     int limited = 0;

@@ -1,4 +1,4 @@
-/* Rules of a group of path points: what nodes keep of its moments, and the errors that are told,
+/* Rules of a group of path points: what nodes keep of its moments, and the stated errors,
  * against sums over points and a rotated star. No device. */
 #include "boresight/rng.h"
 #include "boresight/vec.h"

@@ -100,7 +100,8 @@ static void archive_cursors(bst_archive *archive, bst_engine *engine, const chan
     }
 }
 
-/* Releases what the messages of a channel own and empties its log. */
+/* Releases what the messages of a channel own, and forgets memory of the writer that they lend.
+ * Other content may stay: writers fill what they publish. */
 static void empty_log(channel *ch) {
     for (int s = 0; s < ch->log.depth; s++) {
         slot *one = &ch->log.slots[s];
@@ -108,7 +109,9 @@ static void empty_log(channel *ch) {
             ch->type->release(one->payload);
         }
         one->owned = false;
-        memset(one->payload, 0, ch->payload_bytes);
+        if (ch->type->lends) {
+            memset(one->payload, 0, ch->payload_bytes);
+        }
     }
 }
 
