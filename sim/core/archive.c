@@ -54,12 +54,6 @@ void bst_archive_free(bst_archive *archive) {
     }
 }
 
-void bst_archive_clear(bst_archive *archive) {
-    assert(!archive->restoring);
-    archive->size = 0;
-    archive->open = archive->no_memory = false;
-}
-
 const void *bst_archive_data(const bst_archive *archive, size_t *size) {
     *size = archive->size;
     return archive->restoring ? archive->bytes : archive->saved;

@@ -24,9 +24,6 @@ bst_status bst_archive_open(bst_ctx *ctx, const void *bytes, size_t size,
 /* Frees an archive and the bytes that it saved; NULL is allowed. */
 void bst_archive_free(bst_archive *archive);
 
-/* Discards what an archive has saved and keeps its memory. */
-void bst_archive_clear(bst_archive *archive);
-
 /* Bytes saved so far.
  *
  * Returned:  [*size], valid until the next call that saves */

@@ -54,8 +54,6 @@ bst_status bst_link_create(bst_ctx *ctx, const bst_link_config *config, const bs
  * Ownership: free *out with bst_link_close */
 bst_status bst_link_create_local(bst_ctx *ctx, const bst_link_run *run,
                                  bst_link **out) BST_MUST_CHECK;
-/* True for a link of bst_link_create_local. */
-bool bst_link_is_local(const bst_link *link);
 /* Gives a part of a local link the answer to its next step.
  *
  * Given:     scope    "observer/sensor"; NULL: the first sensor with a part that sends such

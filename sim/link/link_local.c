@@ -21,10 +21,6 @@ bst_status bst_link_create_local(bst_ctx *ctx, const bst_link_run *run, bst_link
     return BST_OK;
 }
 
-bool bst_link_is_local(const bst_link *link) {
-    return link && link->local;
-}
-
 /* Messages that a peer in a role may send. */
 static bool may_give(const char *role, bst_link_type type) {
     static const struct {
@@ -55,7 +51,7 @@ bst_status bst_link_put(bst_ctx *ctx, bst_link *link, const char *scope, bst_lin
                         const void *payload) {
     assert(payload && type >= 0 && type < BST_LINK_TYPES);
     const bst_wire_message *about = bst_wire_message_of(type);
-    for (int i = 0; bst_link_is_local(link) && i < link->part_count; i++) {
+    for (int i = 0; link && link->local && i < link->part_count; i++) {
         link_part *part = &link->parts[i];
         if (!may_give(part->about.role, type) || !is_in_scope(part->about.instance, scope)) {
             continue;

@@ -8,6 +8,7 @@ from skewed_scene import EXPOSURE_S, FRAME_DELAY_S, LATENCY_S, THROUGHPUT_ERROR,
 
 class LoopTables:
     """Tests of a SkewedRun: detections, attitude from stars, tracks, control and commands."""
+    MOST_ATTITUDE_SIGMAS = 2.0
 
     # ---------------------------------------------------------------- detections
 
@@ -120,8 +121,9 @@ class LoopTables:
         self.assertGreater(len(pulls), 30)
         # 34 frames: a standard deviation from a median is known to 20 %. The attitude of a mean is that of a shaken
         # exposure: with images the figures are 1.4 to 1.9, with the generator 0.7 to 2.1
+        limit = self.MOST_ATTITUDE_SIGMAS
         for k in range(3):
-            self.assertTrue(0.6 < np.sqrt(np.median(pulls[:, k] ** 2) / 0.455) < 2.5, (k, pulls[:, k]))
+            self.assertTrue(0.6 < np.sqrt(np.median(pulls[:, k] ** 2) / 0.455) < limit, (k, pulls[:, k]))
 
     def test_tracks(self):
         nees, seen, kept = [], {}, {}
