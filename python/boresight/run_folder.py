@@ -14,7 +14,7 @@ import numpy.typing as npt
 from .errors import ArgumentError, FileError, FormatError, NotFoundError
 from .fits import Place, images, read_image, wcs_of
 from .scenario import Scenario
-from .tables import Store, Table
+from .tables import HasTables, Store, Table
 
 Path = Union[str, "os.PathLike[str]"]
 
@@ -89,7 +89,7 @@ class RecordedFrames(Sequence[RecordedFrame]):
         return f"<{len(self)} frames of {self.path}>"
 
 
-class Run:
+class Run(HasTables):
     """The folder of a run, also of an interrupted one: manifest, scenario, tables and frames.
 
     The tables are attributes: run.tracks, run.detections, run.truth, run.events ...
@@ -131,15 +131,6 @@ class Run:
     def complete(self) -> bool:
         """False for a run that was interrupted or failed."""
         return bool(self.manifest.get("complete", False))
-
-    @property
-    def tables(self) -> List[str]:
-        """Names of the tables."""
-        return self._store.names
-
-    def table(self, name: str) -> Table:
-        """A table by name."""
-        return self._store.table(name)
 
     def __getattr__(self, name: str) -> Table:
         if name.startswith("_") or name in ("folder", "manifest"):

@@ -161,3 +161,18 @@ def data_frame(columns: Mapping[str, Column]) -> Any:
     except ImportError:
         raise ImportError("to_pandas needs pandas: pip install boresight[pandas]") from None
     return pandas.DataFrame(dict(columns))
+
+
+class HasTables:
+    """A folder with a store of tables."""
+
+    _store: Store
+
+    @property
+    def tables(self) -> List[str]:
+        """Names of the tables."""
+        return self._store.names
+
+    def table(self, name: str) -> Table:
+        """A table by name."""
+        return self._store.table(name)

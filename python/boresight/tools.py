@@ -17,7 +17,7 @@ from .model import external_names
 from .program import execute, options_of, scenario_arguments, work_folder
 from .run_folder import Path, Run
 from .scenario import Scenario
-from .tables import Store, Table
+from .tables import HasTables, Store, Table
 
 
 def run(scenario: Any, out: Optional[Path] = None, *, progress: bool = False,
@@ -125,21 +125,12 @@ def report(source: Any, out: Optional[Path] = None) -> pathlib.Path:
     return file
 
 
-class Study:
+class Study(HasTables):
     """The folder of a study: its tables, as attributes or by `table`."""
 
     def __init__(self, folder: Path, exit_code: int = 0):
         self.folder, self.exit_code = pathlib.Path(folder), exit_code
         self._store = Store(self.folder / "study.sqlite")
-
-    @property
-    def tables(self) -> List[str]:
-        """Names of the tables."""
-        return self._store.names
-
-    def table(self, name: str) -> Table:
-        """A table by name."""
-        return self._store.table(name)
 
     def __getattr__(self, name: str) -> Table:
         if name.startswith("_") or name in ("folder", "exit_code") or name not in self.tables:
