@@ -4,7 +4,7 @@
     /usr/bin/python3 tests/same_results.py OLD/boresight NEW/boresight
 
 Runs, from the repository root, every shipped scenario for a short time (or its whole study, curve of detection and
-loop analysis in short) with both programs, and compares tables, frames, pictures and printed JSON. What tells a
+loop analysis in short) with both programs, and compares tables, frames, pictures and printed JSON. What differs by a
 program's version, wall time or processor time is left out. Keys of printed JSON are compared under their present
 names (those that NEW's schema marks as deprecated are renamed). Where OLD does not know the present names of the shipped
 scenarios, run this from a checkout of OLD: NEW reads its scenarios with warnings. Prints a line for each and ends with 1

@@ -108,7 +108,7 @@ static void known_factors_are_found(void **state) {
     bst_calibration_counts counts;
     bst_assert_ok(&ctx, bst_calibration_fitter_fit(&ctx, calibrator, &found, &counts));
     assert_int_equal(counts.frames, FRAMES);
-    /* exact but for rounding: both are what was told with each frame */
+    /* exact but for rounding: both are what each frame stated */
     bst_assert_close(found.threshold_offset, 0.1, 1e-9);
     bst_assert_close(found.noise_factor, 1.05, 1e-6);
     /* about 30,000 trials: a gain to 0.3 %, a slope to 2 %; the fit's steps of 0.02 on top */

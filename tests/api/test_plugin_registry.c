@@ -55,7 +55,7 @@ static void registered_stages_run(void **state) {
     bst_sim_frame frame;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
     assert_int_equal(bst_model_load(&ctx, "scenarios/neossat_geo_track.json", &options, &model),
-                     BST_ERR_CONFIG); /* nobody has the name yet: it is taken for a path */
+                     BST_ERR_CONFIG); /* the name is not registered: it is taken for a path */
     bst_assert_ok(&ctx, bst_plugin_register(&ctx, "test:mark", NULL, stages));
     bst_assert_ok(&ctx, bst_plugin_register(&ctx, "test:mark", NULL, stages)); /* anew */
     bst_assert_ok(&ctx, bst_model_load(&ctx, "scenarios/neossat_geo_track.json", &options, &model));

@@ -15,7 +15,7 @@ static void bodies_agree_with_astropy(void **state) {
             const double *theirs;
             double tolerance;
         } pairs[] = {
-            /* We take TT for TDB, which astropy tells apart: 1.7 ms at most, in which the Earth
+            /* We take TT for TDB, which astropy distinguishes: 1.7 ms at most, in which the Earth
              * goes 50 m, the Moon 2 m and the Earth's velocity changes by 1e-5 m/s. */
             {b.sun_m, reference_bodies[i].sun_m, 55.0},
             {b.earth_bary_m, reference_bodies[i].earth_m, 55.0},

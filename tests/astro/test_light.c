@@ -84,7 +84,7 @@ static void inverses_return_to_the_start(void **state) {
         }
         bst_vec3 seen = bst_light_apparent_star(&light, star);
         bst_assert_close(bst_vec3_norm(seen), 1.0, 4e-16 * 2);
-        /* the promise of the header */
+        /* the header's bound */
         bst_assert_close(bst_vec3_angle(bst_light_catalogue_star(&light, seen), star), 0.0, 1e-12);
         seen = bst_light_aberrate(&light, star);
         bst_assert_close(bst_vec3_angle(bst_light_unaberrate(&light, seen), star), 0.0, 1e-12);

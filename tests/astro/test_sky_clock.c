@@ -23,7 +23,7 @@ static void assert_like_exact(const bst_astro_eop *eop, bst_sky_clock *clock, bs
     bst_bodies_at(t, &bodies);
     const bst_vec3 geo[2] = {{42164e3, 0, 0}, {0, 29.8e6, 29.8e6}};
     for (int i = 0; i < 2; i++) {
-        /* the promise of the header; ten times better where no 0h UTC is near */
+        /* the header's bound; ten times better where no 0h UTC is near */
         assert_near(bst_mat3_mul_vec(&sky.frames.gcrf_from_teme, geo[i]),
                     bst_mat3_mul_vec(&frames.gcrf_from_teme, geo[i]), 1e-3);
         assert_near(bst_mat3_mul_vec(&sky.frames.itrf_from_gcrf, geo[i]),

@@ -74,7 +74,7 @@ static void adding_is_exact(void **state) {
     for (size_t i = 0; i < sizeof seconds / sizeof *seconds; i++) {
         bst_time moved = bst_time_add(t, seconds[i]);
         assert_true(moved.jd2 >= 0.0 && moved.jd2 < 1.0 && moved.jd1 == floor(moved.jd1) + 0.5);
-        /* the promise of the header on the way back, which holds no large numbers */
+        /* the header's bound for the inverse, which holds no large numbers */
         bst_assert_close(bst_time_diff(bst_time_add(moved, -seconds[i]), t), 0.0, 1e-10);
     }
     /* 10^9 s are 11574 days and 6400 s: the calendar agrees */

@@ -206,7 +206,7 @@ static int by_id(const void *a, const void *b) {
     return x < y ? -1 : x > y;
 }
 
-/* Same stars, whoever asks: overlapping cones, another order, a cache that holds nothing. */
+/* The same stars for every query: overlapping cones, another order, a cache that holds nothing. */
 static void queries_agree(void **state) {
     (void)state;
     sky a = open_sky("embedded", BST_FAINT_SEED), b = open_sky("embedded", BST_FAINT_SEED);

@@ -1,5 +1,5 @@
 /* Guidance with a simulated mount: slews that take the least time, keep-out cones that the true
- * boresight stays out of, and what is told beforehand. */
+ * boresight stays out of, and its events beforehand. */
 #include <string.h>
 
 #include "control/guidance/guidance.h"
@@ -18,12 +18,12 @@ typedef struct bench {
     bst_vec3 from, rate; /* the aim moves along a great circle: direction and rate at tick 0 */
     bst_vec3 jump_to;    /* and is elsewhere from jump_tick on */
     int64_t jump_tick;
-    bool jumped; /* nobody knows beforehand */
+    bool jumped; /* not announced beforehand */
     double range_m;
     /* found */
     double arrival_s;   /* from when on the boresight is on the aim, to 0.02 degree */
     double nearest_rad; /* least distance to the Sun's direction, after `leaving` */
-    int told[8];
+    int events[8];
     bst_guidance_event last[8];
     bst_los_command before; /* of the slew under way, the latest */
     int followed;           /* commands of slews whose rates have been judged */
@@ -81,9 +81,9 @@ static void judge_rates(bench *b, const bst_los_command *now) {
     if (b->guidance.slew.active && before->near_given && now->near_given && dt == 0.05) {
         bst_vec3 moved =
             bst_vec3_scale(bst_vec3_sub(now->direction_gcrf, before->direction_gcrf), 1.0 / dt);
-        bst_vec3 told =
+        bst_vec3 commanded =
             bst_vec3_scale(bst_vec3_add(now->rate_gcrf_radps, before->rate_gcrf_radps), 0.5);
-        assert_true(bst_vec3_norm(bst_vec3_sub(moved, told)) < most);
+        assert_true(bst_vec3_norm(bst_vec3_sub(moved, commanded)) < most);
         for (int i = 0; i < 2; i++) {
             double turned = (now->near_rad[i] - before->near_rad[i]) / dt;
             bst_assert_close(0.5 * (now->near_radps[i] + before->near_radps[i]), turned, most);
@@ -120,7 +120,7 @@ static void run(bench *b, double seconds) {
             judge_rates(b, &waiting);
             first = first && !give;
             for (int i = 0; i < b->guidance.event_count; i++) {
-                b->told[b->guidance.events[i].kind]++;
+                b->events[b->guidance.events[i].kind]++;
                 b->last[b->guidance.events[i].kind] = b->guidance.events[i];
             }
             b->guidance.event_count = 0;
@@ -219,7 +219,7 @@ static void keeps_out_of_the_sun(void **state) {
     run(&b, 130.0);
     print_message("detour of %.1f deg, arrived at %.1f s, %.3f deg from the Sun\n",
                   b.last[BST_GUIDANCE_DETOUR].length_rad / DEG, b.arrival_s, b.nearest_rad / DEG);
-    assert_int_equal(b.told[BST_GUIDANCE_DETOUR], 1);
+    assert_int_equal(b.events[BST_GUIDANCE_DETOUR], 1);
     assert_true(b.arrival_s < 125.0);
     assert_true(b.nearest_rad > 30 * DEG);
     /* cue and Sun parallel: it waits beside the cone, and goes on when the cue leaves it */
@@ -229,10 +229,10 @@ static void keeps_out_of_the_sun(void **state) {
     b.guidance.config.prediction_horizon_s = 200;
     run(&b, 110.0);
     assert_true(b.nearest_rad > 25 * DEG);
-    assert_int_equal(b.told[BST_GUIDANCE_UNREACHABLE], 1);
+    assert_int_equal(b.events[BST_GUIDANCE_UNREACHABLE], 1);
     assert_int_equal(b.last[BST_GUIDANCE_UNREACHABLE].reason, BST_REACH_SUN);
     bst_assert_close(b.last[BST_GUIDANCE_UNREACHABLE].until_s, 50.0, 0.02); /* 25 / 0.5 */
-    assert_int_equal(b.told[BST_GUIDANCE_REACHABLE], 1);
+    assert_int_equal(b.events[BST_GUIDANCE_REACHABLE], 1);
     print_message("out of the cone at 50 s, followed from %.1f s on\n", b.arrival_s);
     assert_true(b.arrival_s < 105.0);
     /* inside of the cone at the start: out by the shortest way, and round it */
@@ -248,12 +248,12 @@ static void keeps_out_of_the_sun(void **state) {
     b.guidance.config.sun_keep_out_deg = 40;
     b.guidance.config.prediction_horizon_s = 300;
     run(&b, 60.0);
-    assert_int_equal(b.told[BST_GUIDANCE_UNREACHABLE], 1);
+    assert_int_equal(b.events[BST_GUIDANCE_UNREACHABLE], 1);
     assert_true(isinf(b.last[BST_GUIDANCE_UNREACHABLE].until_s));
     assert_true(isinf(b.arrival_s));
 }
 
-/* A target that goes down behind the Earth, told before it does. */
+/* A target that goes down behind the Earth, with an event before it does. */
 static void occultation_ahead(void **state) {
     (void)state;
     bench b;
@@ -261,7 +261,7 @@ static void occultation_ahead(void **state) {
     b.range_m = 2e7;
     b.guidance.config.prediction_horizon_s = 150;
     run(&b, 40.0);
-    assert_int_equal(b.told[BST_GUIDANCE_AHEAD], 1);
+    assert_int_equal(b.events[BST_GUIDANCE_AHEAD], 1);
     assert_int_equal(b.last[BST_GUIDANCE_AHEAD].reason, BST_REACH_BEHIND_EARTH);
     double limb = asin(BST_EARTH_RADIUS_M / 7000e3) / DEG;
     bst_assert_close(b.last[BST_GUIDANCE_AHEAD].from_s, 180.0 - limb, 0.1);

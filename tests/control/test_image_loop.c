@@ -1,5 +1,5 @@
 /* The correction by image error in a loop without dynamics: the camera points at once where it is
- * told, wrong by a rotation that the loop has to find. */
+ * commanded, wrong by a rotation that the loop has to find. */
 #include "boresight/rng.h"
 #include "control/loop/image_loop.h"
 #include "tests/test_support.h"
@@ -69,8 +69,8 @@ static result run(const scene *s, const bst_compensator_config *law, double seco
     for (int64_t tick = 0; tick < total; tick++) {
         /* the command of now, as the gimbal extrapolates it */
         bst_quat c = bst_pointing_error_at(&correction, tick, TICKS);
-        bst_vec3 told = bst_quat_rotate(c, aim_at(s, tick));
-        bst_vec3 sight = bst_quat_rotate(bst_quat_conj(wrong_at(s, tick)), told);
+        bst_vec3 commanded = bst_quat_rotate(c, aim_at(s, tick));
+        bst_vec3 sight = bst_quat_rotate(bst_quat_conj(wrong_at(s, tick)), commanded);
         double off = bst_vec3_angle(sight, aim_at(s, tick));
         r.last_rad = off;
         r.worst_after_rad = 2 * tick > total ? fmax(r.worst_after_rad, off) : 0.0;
@@ -285,14 +285,14 @@ static void test_one_frame_by_hand(void **state) {
         bst_vec3 turned = bst_quat_to_rotvec(bst_pointing_error_at(&c, 700, TICKS));
         bst_assert_close(bst_vec3_dot(turned, axes[n]), 0.05 * 6e-4, 1e-13);
         for (int64_t tick = 660; tick <= 860; tick += 5) {
-            bst_vec3 told[3];
+            bst_vec3 commanded[3];
             const int64_t when[3] = {tick, tick + 100, tick - 100};
             for (int i = 0; i < 3; i++) {
-                told[i] = bst_quat_rotate(bst_pointing_error_at(&c, when[i], TICKS), aim);
+                commanded[i] = bst_quat_rotate(bst_pointing_error_at(&c, when[i], TICKS), aim);
             }
             /* commands act 10 ticks later */
-            assert_true(bst_image_loop_commanded(&loop, &c, tick, 100, told, true, tick - 10) ==
-                        (tick == 780));
+            assert_true(bst_image_loop_commanded(&loop, &c, tick, 100, commanded, true,
+                                                 tick - 10) == (tick == 780));
         }
         bst_assert_close(bst_vec3_norm(c.rate_gcrf_radps), 0.0, 1e-15); /* no integrator */
         turned = bst_quat_to_rotvec(bst_pointing_error_at(&c, 2000, TICKS));

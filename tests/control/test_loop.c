@@ -229,7 +229,7 @@ static void latency_longer_than_a_frame(void **state) {
     for (int k = 0; k < 2; k++) {
         sim_options o = sim_defaults();
         o.frame_delay_s = delays[k];
-        /* slow jitter of 0.5 px cannot be foreseen that far: it comes back, and predictions of the
+        /* slow jitter of 0.5 px cannot be predicted that far: it comes back, and predictions of the
          * target's place add to it */
         comes_through("late", &o, 60.0, 1.0);
     }
@@ -263,8 +263,8 @@ static void a_target_that_never_appears(void **state) {
     check_limits(&r);
 }
 
-/* The time of a sweep with nothing to be found, foreseen from the mount's limits and simulated. */
-static void sweeps_take_as_long_as_foreseen(void **state) {
+/* The time of a sweep with nothing to be found, predicted from the mount's limits and simulated. */
+static void sweeps_take_as_long_as_predicted(void **state) {
     (void)state;
     const double sigmas_deg[] = {0.3, 0.6};
     for (int pattern = BST_SEARCH_NEAREST_FIRST; pattern <= BST_SEARCH_SPIRAL; pattern++) {
@@ -284,12 +284,12 @@ static void sweeps_take_as_long_as_foreseen(void **state) {
                                               .exposure_s = 0.5,
                                               .latency_s = 0.4,
                                               .frames = 4};
-            double foreseen = bst_search_sweep_s(&r.search, &timing);
-            print_message("pattern %d, %d places: %.2f s, foreseen %.2f s\n", pattern,
-                          r.search.count, r.sweep_s, foreseen);
+            double predicted = bst_search_sweep_s(&r.search, &timing);
+            print_message("pattern %d, %d places: %.2f s, predicted %.2f s\n", pattern,
+                          r.search.count, r.sweep_s, predicted);
             /* the first place begins anywhere within a frame period; a slew that ends within 0.1 s
              * of a frame's start may cost a period more or less at a place */
-            bst_assert_close(r.sweep_s, foreseen, 1.0 + 0.02 * foreseen);
+            bst_assert_close(r.sweep_s, predicted, 1.0 + 0.02 * predicted);
         }
     }
 }
@@ -312,7 +312,7 @@ int main(void) {
         cmocka_unit_test(latency_longer_than_a_frame),
         cmocka_unit_test(control_as_slow_as_the_frames_and_a_thousand_times_faster),
         cmocka_unit_test(a_target_that_never_appears),
-        cmocka_unit_test(sweeps_take_as_long_as_foreseen),
+        cmocka_unit_test(sweeps_take_as_long_as_predicted),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

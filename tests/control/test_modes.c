@@ -68,7 +68,7 @@ static void rig_close(rig *r) {
     free(r->telemetry);
 }
 
-/* A gimbal that is where it was told to be, at once. */
+/* A gimbal that is at its command, at once. */
 static void step(rig *r, int64_t tick, bool frame) {
     bst_nav_telemetry nav = {.tick = tick, .sun_m = {1.5e11, 0, 0}};
     bst_vec3 d = {0, 0, 1};

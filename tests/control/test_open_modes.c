@@ -118,7 +118,7 @@ static void rig_close(rig *r) {
     free(r->telemetry);
 }
 
-/* A gimbal that is where it was told to be, at once. */
+/* A gimbal that is at its command, at once. */
 static void step(rig *r, int64_t tick, bool frame) {
     bst_nav_telemetry nav = {.tick = tick, .sun_m = {1.5e11, 0, 0}};
     if (r->commanded) {
@@ -328,7 +328,7 @@ static void candidates_of_a_region(void **state) {
     step(&r, 1500, true);
     assert_int_equal(r.status.mode, BST_MODE_ACQUIRE);
     assert_int_equal(r.control.held.id, 1);
-    /* told to be something else: the search goes on at once, and does not come back to it */
+    /* labelled as something else: the search goes on at once, and does not come back to it */
     r.tracks->items[1].status = BST_TRACK_CONFIRMED;
     r.tracks->items[1].uncorrelated = true;
     step(&r, 2500, true);

@@ -140,7 +140,7 @@ static void limits_of_the_mount(void **state) {
     assert_int_equal(reach, BST_REACH_OK);
 }
 
-/* Loss and reacquisition in a keyhole as predicted, against the mount itself, which is told the
+/* Loss and reacquisition in a keyhole as predicted, against the mount itself, which is given the
  * true direction and rate twenty times a second: within 10 % of the time that is lost. */
 static void keyholes_as_simulated(void **state) {
     (void)state;

@@ -223,7 +223,7 @@ static void test_against_roots(void **state) {
         bst_loop counted = {rational_at, &r, r.dt_s, 0.0, -1, NULL, 0, monic_denominator, NULL};
         assert_int_equal(margins_of(&counted).unstable_closed, outside);
         loop.unstable_poles = 0;
-        if (outside < unstable) { /* a pole that nobody declared is an error, not a count below 0 */
+        if (outside < unstable) { /* an undeclared pole is an error, not a count below 0 */
             bst_ctx ctx = {0};
             assert_int_equal(bst_loop_analyse(&ctx, &loop, &m), BST_ERR_NUMERIC);
             undeclared++;

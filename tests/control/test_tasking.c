@@ -57,7 +57,7 @@ static void start(fixture *f, const char *config) {
     bst_assert_ok(&f->ctx, bst_tasking_init(&f->ctx, &f->tasking, &f->config, f->members, 2, 10.0));
 }
 
-/* Tells a sensor where it is. */
+/* Publishes a sensor's position. */
 static void tell_place(fixture *f, int sensor, double seconds) {
     bst_world_state eye;
     bst_bodies bodies;
@@ -464,8 +464,8 @@ static void a_tasking_is_saved_and_restored(void **state) {
                 tell_tracked(&g, s, tick);
             }
             /* where the spacecraft is, is known from an earlier message in two of three plans */
-            bool told = tick % 60 == 0, given, other;
-            if (told) {
+            bool published = tick % 60 == 0, given, other;
+            if (published) {
                 tell_place(&f, s, (double)tick / 10.0);
                 tell_place(&g, s, (double)tick / 10.0);
             }

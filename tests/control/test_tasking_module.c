@@ -60,7 +60,7 @@ static const bst_scenario_registry registry = {.modules = modules, .count = 3};
 
 enum { KEPT = 16 };
 
-typedef struct told {
+typedef struct observed_run {
     bst_ctx ctx;
     bst_task tasks[2][KEPT];
     int64_t ticks[2][KEPT];
@@ -68,11 +68,11 @@ typedef struct told {
     char reports[KEPT][400];
     int64_t report_ticks[KEPT];
     int report_count;
-} told;
+} observed_run;
 
 static bst_status keep(void *user, const char *scope, const char *channel, const void *payload,
                        int64_t tick) {
-    told *t = user;
+    observed_run *t = user;
     if (strcmp(channel, BST_CHANNEL_TASK) == 0) {
         int s = strcmp(scope, "high/camera") == 0;
         assert_true(s == 1 || strcmp(scope, "low/camera") == 0);
@@ -85,7 +85,7 @@ static bst_status keep(void *user, const char *scope, const char *channel, const
 
 static bst_status hear(void *user, int64_t tick, const char *instance, const char *kind,
                        const char *text) {
-    told *t = user;
+    observed_run *t = user;
     (void)instance;
     if (strcmp(kind, "visible") == 0) {
         assert_true(t->report_count < KEPT);
@@ -112,7 +112,7 @@ static bst_status hear(void *user, int64_t tick, const char *instance, const cha
     "GX5\", \"offset_rtn_m\": [-200000, -300000, 50000]}, " SENSOR(high_)                          \
     "}], \"tasking\": {\"type\": \"priority\", \"rate_hz\": 2, " tasking_ "}}"
 
-static void run(told *t, const char *text, double seconds) {
+static void run(observed_run *t, const char *text, double seconds) {
     memset(t, 0, sizeof *t);
     bst_json *json;
     bst_scenario scenario;
@@ -139,7 +139,7 @@ static void run(told *t, const char *text, double seconds) {
  */
 static void tracks_of_the_sensor_with_the_task_end_it(void **state) {
     (void)state;
-    told t;
+    observed_run t;
     run(&t, SCENARIO("3", "1e9", ONE_TARGET ", \"report_every_s\": 20"), 50.0);
     assert_int_equal(t.count[0], 2);
     assert_int_equal(t.count[1], 0);
@@ -162,7 +162,7 @@ static void tracks_of_the_sensor_with_the_task_end_it(void **state) {
 /* Tracks of the other sensor, which has no task, do not count. */
 static void tracks_of_the_other_do_not(void **state) {
     (void)state;
-    told t;
+    observed_run t;
     run(&t, SCENARIO("1e9", "3", ONE_TARGET ", \"report_every_s\": 0"), 55.0);
     assert_int_equal(t.report_count, 0);
     assert_true(t.count[0] >= 2);
@@ -180,7 +180,7 @@ static void tracks_of_the_other_do_not(void **state) {
  * the spacecraft itself for the low one and for the high one too faint. */
 static void a_report_adds_up(void **state) {
     (void)state;
-    told t;
+    observed_run t;
     run(&t, SCENARIO("1e9", "1e9", "\"targets\": [{}], \"min_snr\": 1e6, \"report_every_s\": 20"),
         5.0);
     assert_int_equal(t.count[0] + t.count[1], 0);

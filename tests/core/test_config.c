@@ -57,23 +57,23 @@ typedef struct staged {
     bst_stage_use plug;
 } staged;
 
-typedef struct plugged {
+typedef struct weighted_config {
     double weight;
     int64_t steps;
-} plugged;
+} weighted_config;
 
 static const char *const stage_kinds[] = {"part", NULL};
 static const bst_config_desc staged_table[] = {BST_REAL(staged, gain, "", 0, 10, "2", "Gain."),
                                                BST_STAGE(staged, plug, stage_kinds, "A library."),
                                                BST_CONFIG_END};
 static const bst_config_desc plugged_table[] = {
-    BST_REAL(plugged, weight, "kg", 0, 1, NULL, "Weight."),
-    BST_INT(plugged, steps, "", 1, 9, "4", "Steps."), BST_CONFIG_END};
+    BST_REAL(weighted_config, weight, "kg", 0, 1, NULL, "Weight."),
+    BST_INT(weighted_config, steps, "", 1, 9, "4", "Steps."), BST_CONFIG_END};
 static const bst_stage_desc plugged_stage = {.abi = BST_STAGE_ABI,
                                              .kind = "part",
                                              .type = "mine",
                                              .config = plugged_table,
-                                             .config_bytes = sizeof(plugged)};
+                                             .config_bytes = sizeof(weighted_config)};
 
 static bst_status load_stage(void *user, bst_ctx *ctx, const bst_json *json, const char *path,
                              const char *plugin, const char *kind, const char *type,
@@ -121,8 +121,8 @@ static void test_stage(void **state) {
             bst_assert_ok(&ctx, status);
             assert_float_equal(s.gain, 2.0, 0.0); /* the table's text, exact */
             assert_ptr_equal(s.plug.desc, &plugged_stage);
-            assert_float_equal(((plugged *)s.plug.config)->weight, 0.5, 0.0); /* exact */
-            assert_int_equal(((plugged *)s.plug.config)->steps, 4);
+            assert_float_equal(((weighted_config *)s.plug.config)->weight, 0.5, 0.0); /* exact */
+            assert_int_equal(((weighted_config *)s.plug.config)->steps, 4);
             cJSON *echo = bst_config_echo(staged_table, &s);
             char *text = cJSON_PrintUnformatted(echo);
             assert_string_equal(text,

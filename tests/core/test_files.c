@@ -70,7 +70,7 @@ static void files_are_read_whole(void **state) {
     expect_words(&ctx, "; give a thing");
     assert_int_equal(bst_file_read(&ctx, folder, 5, "a thing", &text, &bytes), BST_ERR_IO);
     expect_words(&ctx, "; give a thing");
-    /* a pipe that nobody writes is not waited for */
+    /* a pipe without a writer is not waited for */
     assert_int_equal(mkfifo(in_folder("pipe"), 0600), 0);
     assert_int_equal(bst_file_read(&ctx, in_folder("pipe"), 5, "a thing", &text, &bytes),
                      BST_ERR_IO);

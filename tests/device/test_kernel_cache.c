@@ -90,7 +90,7 @@ static void damaged_programs_are_removed(void **state) {
     assert_int_equal(truncate(path[2], (off_t)bytes / 2), 0);
     write_bytes(path[3], "", 0);
     write_bytes(path[4], "garbage", 7);
-    whole[bytes / 2] ^= 1; /* in the middle, where only the sum tells */
+    whole[bytes / 2] ^= 1; /* in the middle, where only the checksum detects it */
     write_bytes(path[5], whole, bytes);
     write_bytes(path[6], "garbage ", 8);
     bool root = geteuid() == 0;
@@ -103,7 +103,7 @@ static void damaged_programs_are_removed(void **state) {
     scratch_remove(&place);
 }
 
-/* Only a folder of this user's own is used; without HOME one that nobody else can write to. */
+/* Only a folder of this user's own is used; without HOME one that no other user can write to. */
 static void caches_of_others_are_not_used(void **state) {
     (void)state;
     scratch place;

@@ -44,7 +44,7 @@ def rows_in(path):
 
 
 def check(out, reference, total, count_in_manifest=True):
-    """Checks what a run of `total` frames that was told to write to `out` left, whenever it ended.
+    """Checks what a run of `total` frames with the output folder `out` left, whenever it ended.
     `reference` holds the images of its first frames. Returns (where it is, frames, rows)."""
     partial = out + ".partial"
     # a folder that was being prepared holds nothing but the lock

@@ -1,4 +1,4 @@
-"""`boresight calframes` from outside: bias, dark and flat frames give back what the detector was told
+"""`boresight calframes` from outside: bias, dark and flat frames give back what the detector was given
 to be, and the maps made of them serve the main job on a sensor with fixed patterns and hits.
 
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_calframes.py BORESIGHT

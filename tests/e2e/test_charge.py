@@ -1,4 +1,4 @@
-"""The main job on a sensor with hot pixels and radiation hits that nobody told image processing of:
+"""The main job on a sensor with hot pixels and radiation hits that image processing has no map of:
 no maps, no list of bad pixels, and none learned (test_detector_effects.py has those).
 
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_charge.py BORESIGHT

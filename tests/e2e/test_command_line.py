@@ -231,7 +231,7 @@ class Folders(unittest.TestCase):
         folder, home = runs.scratch(), runs.scratch()
         os.chmod(folder, 0o555)
         options = {}
-        if os.geteuid() == 0:  # who may write everywhere; so as nobody
+        if os.geteuid() == 0:  # root may write everywhere: run as another user
             os.chown(home, 65534, 65534)
             options = {"user": 65534, "group": 65534, "env": {**os.environ, "HOME": home}}
             try:

@@ -129,9 +129,9 @@ class Constellation(unittest.TestCase):
                 "SELECT sensor, id, count(*) FROM truth WHERE kind = 'object' AND in_field = 1"
                 " AND occulted = 0 GROUP BY sensor, id"):
             truth[sensor, obj] = n
-        told = {(s, o): n for s, o, n in self.db.execute(
+        recorded = {(s, o): n for s, o, n in self.db.execute(
             "SELECT sensor, object, sum(frames) FROM passes GROUP BY sensor, object")}
-        self.assertEqual(truth, told)
+        self.assertEqual(truth, recorded)
 
     def recompute(self):
         """Passes, and times of detections by object and sensor, from truth, detections and exposures alone."""
@@ -238,7 +238,7 @@ class Constellation(unittest.TestCase):
         self.assertLess(s["place_rms_arcsec"], 1.5)
         self.assertLess(s["track_rms_arcsec"], 1.0)
 
-    def test_the_rest_of_the_sky_is_told(self):
+    def test_the_rest_of_the_sky_is_reported(self):
         texts = [row[0] for row in self.db.execute(
             "SELECT text FROM events WHERE source = 'tasking' AND kind = 'visible'")]
         self.assertGreaterEqual(len(texts), 1)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A day of the closed loop with images of 2048 x 2048 pixels that nobody keeps: the target is
+"""A day of the closed loop with images of 2048 x 2048 pixels that are not recorded: the target is
 found and kept, nothing is lost, memory stays flat.
 
 Half a minute of it, or with --full the day with the user's whole star catalogue and on all

@@ -1,4 +1,4 @@
-"""The main job on sensors that bloom, smear and have hot pixels that nobody told image processing of.
+"""The main job on sensors that bloom, smear and have hot pixels that image processing has no map of.
 
 A target that blooms is found, placed as its covariance says and labelled an object; the smear of a
 frame transfer and unmapped hot pixels start at most one false track; the bad pixels are learned; and

@@ -120,7 +120,7 @@ class Discrimination(unittest.TestCase):
 class BrightStars(unittest.TestCase):
     def test_spikes_are_artefacts(self):
         """Two saturated stars with diffraction spikes among stars that no catalogue has: these are
-        found as ever, and the spikes are told from them."""
+        found as ever, and the spikes are distinguished from them."""
         out = runs.scratch() + "/spikes"
         runs.run("scenarios/diffraction.json", out, "/world/faint_stars=statistical",
                  "/world/faint_limit_v_mag=13.5", duration=3, threads=2)

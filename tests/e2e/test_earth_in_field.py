@@ -95,7 +95,7 @@ class Drawn(unittest.TestCase):
         # a quarter of each azimuth's field is sky; the bright ones through a dark filter
         counted = [0, 0]
         for azimuth in (0, 90, 180, 270):
-            out, header, image, told = self.frame(
+            out, header, image, printed = self.frame(
                 azimuth, 0.3, 0.5, f"{CAMERA}/throughput=1e-6", f"{CAMERA}/read_noise_e=1",
                 f"{CAMERA}/background/limb_scale_height_m=0")
             points, turn = hits_of(header, image.shape)
@@ -136,7 +136,7 @@ class Drawn(unittest.TestCase):
             summary = runs.manifest(out)["summary"]
             self.assertEqual([summary[f"{body}_frames"] for body in ("earth", "moon", "sun")],
                              [summary["frames"], 0, 0])
-            self.assertIn("the Earth is in the field from 0.0 s until the end of the run", told)
+            self.assertIn("the Earth is in the field from 0.0 s until the end of the run", printed)
         self.assertGreaterEqual(counted[0], 1)
         self.assertGreaterEqual(counted[1], 1)
 
@@ -200,9 +200,9 @@ class Hidden(unittest.TestCase):
             self.assertTrue(not near or any(not o for o, in near), (exposure, x, y))
 
 
-class Foreseen(unittest.TestCase):
+class Predicted(unittest.TestCase):
     def test_times_of_an_orbit(self):
-        """What `check` foresees of an inertial stare against the frames of the run."""
+        """What `check` predicts of an inertial stare against the frames of the run."""
         ra, dec = limb_direction(0, -15)
         more = (f"{runs.SENSOR}/observation_source=generator",
                 f"{runs.SENSOR}/exposure/period_s=20", "/tick_rate_hz=100",

@@ -99,7 +99,7 @@ class MainJob(unittest.TestCase):
         confirmed, = db.execute("SELECT count(*) FROM events WHERE kind='track_confirmed'").fetchone()
         self.assertGreaterEqual(confirmed, 2)
         # blends and faint streaks, 1 to 7 by the draw of the noise; over 150 were stars at rest
-        # not told from satellites
+        # not distinguished from satellites
         self.assertLessEqual(confirmed, 15)
 
     def test_an_unknown_satellite_is_confirmed(self):

@@ -325,8 +325,8 @@ class Faults(unittest.TestCase):
         free = shutil.disk_usage(self.folder).free
         self.assertRegex(said, "warning: " + words)
         # other programs write here too
-        told = float(re.search(r"and ([0-9.]+) GB are free", said)[1])
-        self.assertAlmostEqual(told, free / 1e9, delta=max(5.0, 0.2 * told))
+        reported = float(re.search(r"and ([0-9.]+) GB are free", said)[1])
+        self.assertAlmostEqual(reported, free / 1e9, delta=max(5.0, 0.2 * reported))
 
     def test_manifest_tells_why(self):
         out = self.out("why")

@@ -171,7 +171,7 @@ class Hostile(unittest.TestCase):
         self.assertEqual(os.listdir(out + "/frames"), ["frame_000000.png"])
 
     def test_locked(self):
-        # another program holds the database; nobody waits for it
+        # another program holds the database; the command does not wait
         run = self.copy()
         database = sqlite3.connect(run + "/run.sqlite", isolation_level=None)
         database.execute("BEGIN EXCLUSIVE")
@@ -207,7 +207,7 @@ class Hostile(unittest.TestCase):
     def test_no_rights(self):
         if os.geteuid() != 0:
             options = {}
-        else:  # who may read and write everywhere; so as nobody
+        else:  # root may read and write everywhere: run as another user
             options = {"user": 65534, "group": 65534}
             try:
                 call("--version", **options)

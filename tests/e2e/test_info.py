@@ -160,7 +160,7 @@ class Complete(unittest.TestCase):
             os.chmod(os.path.join(run, name), 0o444)
         os.chmod(run, 0o555)
         options = {}
-        if os.geteuid() == 0:  # who may write everywhere; so as nobody
+        if os.geteuid() == 0:  # root may write everywhere: run as another user
             os.chmod(os.path.dirname(run), 0o755)
             options = {"user": 65534, "group": 65534}
             try:

@@ -366,7 +366,7 @@ class Light(unittest.TestCase):
             sigma = np.array([row["s"] for row in frames])
             chi2 = np.mean((error / sigma) ** 2)
             print(f"{source}: zero point off by {np.mean(error):.4f} mag (the camera's own: "
-                  f"{2.5 * np.log10(1.3):.4f}), frames scatter {np.std(error):.4f}, told "
+                  f"{2.5 * np.log10(1.3):.4f}), frames scatter {np.std(error):.4f}, stated "
                   f"{np.sqrt(np.mean(sigma ** 2)):.4f}")
             self.assertGreater(len(frames), 15)
             # the same stars in all frames: their own errors do not average out
@@ -399,7 +399,7 @@ class Several(unittest.TestCase):
                     self.check_places(db, k, i, wcs)
             self.assertEqual(db.execute("SELECT count(*) FROM exposures WHERE sensor = ?",
                                         (k,)).fetchone()[0], frames[k])
-        # the observer is at one place, whoever asks
+        # the observer's position is the same for every module
         both = db.execute("SELECT a.*, '|', b.* FROM exposures a JOIN exposures b ON a.mid_s = b.mid_s"
                           " WHERE a.sensor = 0 AND b.sensor = 1").fetchall()
         self.assertEqual(len(both), 3)

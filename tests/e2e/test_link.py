@@ -101,7 +101,7 @@ class Replay(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.same(out, again)
         self.assertFalse(os.path.exists(again + "/link.packets"))
-        # what is not the recorded run is told, not taken
+        # what is not the recorded run is reported, not used
         _, result = self.replayed(out + "/scenario.json", out, duration=9)
         self.assertEqual(result.returncode, 1)
         self.assertIn("the recorded run was shorter", result.stderr)
@@ -347,9 +347,9 @@ class Driver(unittest.TestCase):
             np.testing.assert_array_equal(pixels, other)
         # the sensor, from the exposure at 3 s on: the one at 2 s had opened
         self.assertEqual(self.truths, list(range(5)))
-        told = run.table("frames")
+        stated = run.table("frames")
         self.assertEqual([p.shape for _, p in frames], 3 * [(1024, 1024)] + 2 * [(64, 128)])
-        np.testing.assert_allclose(told["exposure_s"], [0.5] * 3 + [0.2] * 2)
+        np.testing.assert_allclose(stated["exposure_s"], [0.5] * 3 + [0.2] * 2)
         np.testing.assert_allclose(run.table("exposures")["pixel_scale_arcsec"], [3] * 3 + [4] * 2)
         self.assertEqual(frames[3][0]["window.x0"], 100)
         # the target: 1000 km from the observer on the boresight at 1.25 s, at rest against it
@@ -517,7 +517,7 @@ class BadPeers(unittest.TestCase):
         self.assertIn("imgproc, tracker, control", result.stderr)
 
     def test_a_peer_is_killed_and_another_goes_on(self):
-        """The detector keeps nothing between frames: whoever answers, the answers are the same."""
+        """The detector keeps nothing between frames: any of its processes gives the same answer."""
         whole, broken = runs.scratch() + "/whole", runs.scratch() + "/broken"
         for out in (whole, broken):
             address = ipc()

@@ -30,7 +30,7 @@ def errors(out):
             np.array([math.inf if r[1] is None else math.hypot(r[1], r[2]) for r in rows]))
 
 
-def foreseen(scenario, *sets):
+def predicted_losses(scenario, *sets):
     """What `boresight check` warns of."""
     words = [word for one in sets for word in ("--set", one)]
     result = subprocess.run([runs.BORESIGHT, "check", "scenarios/" + scenario, "--quiet", "--set",
@@ -90,25 +90,25 @@ class Passes(unittest.TestCase):
     def lost_as_told(self, *sets, seeds=SEEDS):
         for seed in range(1, seeds + 1):
             out, mid_s, error = self.follow("leo_leo_keyhole.json", seed, *sets)
-            told = [re.match(r"will be lost from ([\d.]+) s until ([\d.]+) s: in the keyhole", text)
+            reported = [re.match(r"will be lost from ([\d.]+) s until ([\d.]+) s: in the keyhole", text)
                     for text, in runs.database(out).execute(
                         "SELECT text FROM events WHERE kind = 'guidance' ORDER BY tick")]
-            told = [match for match in told if match]
-            self.assertGreater(len(told), 0)
-            first, last = float(told[-1].group(1)), float(told[-1].group(2))
+            reported = [match for match in reported if match]
+            self.assertGreater(len(reported), 0)
+            first, last = float(reported[-1].group(1)), float(reported[-1].group(2))
             off = mid_s[error > LOST_PX]
             lost = off.max() - off.min()
-            print(f"keyhole seed {seed}: told {first} to {last} s, lost {off.min():.2f} to "
+            print(f"keyhole seed {seed}: event {first} to {last} s, lost {off.min():.2f} to "
                   f"{off.max():.2f} s")
             # one loss, and its ends to a tenth of its length
             self.assertLess(lost, 0.1 * (len(off) + 5))
             self.assertAlmostEqual(first, off.min(), delta=0.1 * lost)
             self.assertAlmostEqual(last, off.max(), delta=0.1 * lost)
             match = re.search(r"out of reach from ([\d.]+) s until ([\d.]+) s: in the keyhole",
-                              foreseen("leo_leo_keyhole.json"))
+                              predicted_losses("leo_leo_keyhole.json"))
             self.assertAlmostEqual(float(match.group(1)), off.min(), delta=0.1 * lost)
             self.assertAlmostEqual(float(match.group(2)), off.max(), delta=0.1 * lost)
-            # told well before, and tracked to both sides of it
+            # announced well before, and tracked to both sides of it
             when, = runs.database(out).execute(
                 "SELECT max(time_s) FROM events WHERE kind = 'guidance'"
                 " AND text LIKE 'will be lost%'").fetchone()
@@ -123,9 +123,9 @@ class KeepOut(unittest.TestCase):
         out = runs.scratch() + "/run"
         guidance = runs.SENSOR + "/modules/control/guidance/"
         cone = (guidance + "earth_keep_out=true", guidance + "earth_limb_keep_out_deg=40")
-        self.assertRegex(foreseen("leo_leo_pass.json", *cone),
+        self.assertRegex(predicted_losses("leo_leo_pass.json", *cone),
                          r"out of reach from 0.0 s until 6[67]\.\d s: in the keep-out cone of the Earth's")
-        self.assertEqual(foreseen("leo_leo_pass.json"), "")
+        self.assertEqual(predicted_losses("leo_leo_pass.json"), "")
         runs.run("scenarios/leo_leo_pass.json", out, runs.NO_FRAMES, "/record/truth_stars=false",
                  GENERATOR, *cone, guidance + "prediction_horizon_s=200", seed=1, duration=120)
         rows = runs.database(out).execute(
@@ -140,25 +140,25 @@ class KeepOut(unittest.TestCase):
         print(f"nearest to the cone: {min(margin):.3f} degrees outside")
         self.assertGreater(min(margin), 0.0)  # the true boresight; it starts 9 degrees inside
         self.assertLess(margin[0], 0.2)       # and waits at the edge
-        told = [text for text, in runs.database(out).execute(
+        reported = [text for text, in runs.database(out).execute(
             "SELECT text FROM events WHERE kind = 'guidance' ORDER BY tick")]
         # the target rises out of it then, by the margins above of a target that is followed
-        self.assertIn("unreachable until 67.0 s: in the keep-out cone of the Earth's limb", told)
+        self.assertIn("unreachable until 67.0 s: in the keep-out cone of the Earth's limb", reported)
         mid_s, error = errors(out)
         self.assertLess(np.percentile(error[mid_s > 80.0], 99), 2.0)
 
 
 class Faults(unittest.TestCase):
-    def test_a_stuck_axis_is_told(self):
+    def test_a_stuck_axis_is_reported(self):
         out = runs.scratch() + "/run"
         fault = runs.SENSOR + "/modules/gimbal/fault/"
         runs.run("scenarios/full_plant.json", out, runs.NO_FRAMES, GENERATOR,
                  fault + "stuck_axis=outer", fault + "stuck_from_s=0.2", duration=3)
-        told = runs.database(out).execute(
+        reported = runs.database(out).execute(
             "SELECT time_s, text FROM events WHERE kind = 'axis' ORDER BY tick").fetchall()
-        self.assertEqual(told[0][1], "the outer axis is stuck: its motor pushes in vain")
-        self.assertGreater(told[0][0], 0.4)  # 0.25 s of pushing
-        self.assertLess(told[0][0], 1.5)
+        self.assertEqual(reported[0][1], "the outer axis is stuck: its motor pushes in vain")
+        self.assertGreater(reported[0][0], 0.4)  # 0.25 s of pushing
+        self.assertLess(reported[0][0], 1.5)
         self.assertGreaterEqual(runs.manifest(out)["counters"]["axis_stuck"], 1)
         lost = runs.database(out).execute(
             "SELECT count(*) FROM pointing WHERE axis_outer_deg IS NULL OR axis_inner_deg IS NULL")

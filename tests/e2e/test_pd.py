@@ -131,7 +131,7 @@ class Measured(unittest.TestCase):
         self.assertIsNone(out["loss_db_pd50"])  # Pd is above a half all over
 
     def test_a_psf_that_is_known_is_used(self):
-        """A telescope's PSF, with aberrations that differ over the field: what is told of places
+        """A telescope's PSF, with aberrations that differ over the field: what is reported of positions
         and light is true, and a Gaussian of the same noise-equivalent area is not."""
         path = os.path.join(self.folder, "diffraction.json")
         scenario = os.path.join(os.path.dirname(runs.STARE), "diffraction.json")

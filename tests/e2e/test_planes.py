@@ -106,7 +106,7 @@ class Planes(unittest.TestCase):
         for k, (header, mask) in enumerate(self.planes["segmentation"]):
             light = self.planes["stars"][k][1] + self.planes["targets"][k][1]
             level = np.sqrt(self.planes["background"][k][1] + read ** 2)
-            # whoever is above the level is so with the others' light too
+            # a source above the level alone is also above it with the others' light too
             self.assertTrue(np.all(light[mask > 0] > level[mask > 0] * (1 - 1e-4)))
             # what is above it without an owner is the sum of several that are not
             self.assertLess(np.count_nonzero((mask == 0) & (light > 1.5 * level)), 5)

@@ -126,10 +126,10 @@ class Plugins(unittest.TestCase):
 
     def test_margins(self):
         """As the compensator says its response, its loop has margins."""
-        told = self.call("loop", self.scenario, "--set",
+        reported = self.call("loop", self.scenario, "--set",
                          M + '/control/compensator={"plugin": "leaky.so"}')
-        self.assertIn("tracking loop: leaky", told)
-        self.assertRegex(told, r"gain margin +1[0-9]\.")
+        self.assertIn("tracking loop: leaky", reported)
+        self.assertRegex(reported, r"gain margin +1[0-9]\.")
 
     def test_wrong(self):
         block, control = f"{M}/imgproc/detector", f"{M}/control"

@@ -73,7 +73,7 @@ class Scenes(unittest.TestCase):
 
 
 # greatest differences of ten scenes by seed 21: streaks of diffraction patterns (Pd, alarms on their
-# rings), crowded fields (alarms: blends that are told apart otherwise), few blends in one field
+# rings), crowded fields (alarms: blends that are separated differently), few blends in one field
 KNOWN = {"Pd": 0.12, "false alarms": 1.1, "RMS of places": 0.5, "RMS of the track": 0.5,
          "time to confirm": 0.3}
 # one of points and one of streaks

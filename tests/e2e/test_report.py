@@ -321,7 +321,7 @@ class Others(OnePage):
         self.assertEqual(len(page.pictures()), 2 * (6 + 3 + 6))
 
     def test_who_saw_what(self):
-        """Passes and sightings of three objects: who is told, in the order of detections."""
+        """Passes and sightings of three objects: with names, in the order of detections."""
         made = os.path.join(runs.scratch(), "run")
         runs.run("scenarios/two_observers.json", made)
         with sqlite3.connect(made + "/run.sqlite") as tables:

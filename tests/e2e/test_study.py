@@ -115,11 +115,11 @@ class Whole(unittest.TestCase):
                      "wrong_target_frames", "detected_fraction", "track_rms_px", "track_median_px",
                      "track_p95_px", "tracks", "false_tracks", "time_to_confirm_s",
                      "time_to_acquire_s", "time_to_settle_s"):
-            told = float(row[name]) if row[name] else None
-            if told is None:
+            reported = float(row[name]) if row[name] else None
+            if reported is None:
                 self.assertIsNone(summary[name], name)
             else:  # a manifest has 15 digits where they are within an epsilon of the number
-                self.assertAlmostEqual(told, summary[name], delta=3e-16 * abs(told), msg=name)
+                self.assertAlmostEqual(reported, summary[name], delta=3e-16 * abs(reported), msg=name)
         with runs.database(out) as database:
             count, = database.execute("SELECT count(*) FROM detections").fetchone()
         self.assertEqual(int(row["detections"]), count)
@@ -127,7 +127,7 @@ class Whole(unittest.TestCase):
 
     def check_sightings(self, row, out):
         """What is of all sensors together."""
-        told = runs.manifest(out)["sightings"]
+        reported = runs.manifest(out)["sightings"]
         for name, of in (("tasks", "tasks"), ("tasks_done", "tasks_done"),
                          ("passes_seen", "passes_seen"), ("objects_detected", "objects_seen"),
                          ("revisit_mean_s", "revisit_mean_s"),
@@ -136,10 +136,10 @@ class Whole(unittest.TestCase):
                          ("object_custody_seen", "custody_fraction_seen"),
                          ("place_rms_arcsec", "place_rms_arcsec"),
                          ("tracks_rms_arcsec", "track_rms_arcsec")):
-            self.assertEqual(row[name] == "", told[of] is None, name)
+            self.assertEqual(row[name] == "", reported[of] is None, name)
             if row[name]:
                 # JSON has 15 digits where they do
-                self.assertTrue(math.isclose(float(row[name]), told[of], rel_tol=1e-14), name)
+                self.assertTrue(math.isclose(float(row[name]), reported[of], rel_tol=1e-14), name)
 
     def test_several_observers(self):
         """The same of five with tasks, which have a row each in another table."""
@@ -189,9 +189,9 @@ class Whole(unittest.TestCase):
         connection.row_factory = sqlite3.Row
         for name in ("runs", "settings", "statistics", "speed"):
             stored = [dict(r) for r in connection.execute(f"SELECT * FROM {name}")]
-            told = rows(self.out, name)
-            self.assertEqual(len(stored), len(told))
-            for a, b in zip(stored, told):
+            reported = rows(self.out, name)
+            self.assertEqual(len(stored), len(reported))
+            for a, b in zip(stored, reported):
                 self.assertEqual({k: "" if v is None else str(v) for k, v in a.items()
                                   if not isinstance(v, float)},
                                  {k: v for k, v in b.items() if not isinstance(a[k], float)})
@@ -392,23 +392,23 @@ class Pd(unittest.TestCase):
             file.write(emitted.stdout)
         words = emitted.stderr.split("boresight ")[1].split()
         self.assertEqual(words[:2], ["pd", "SCENARIO.json"])
-        told = os.path.join(folder, "pd.json")
-        result = subprocess.run([runs.BORESIGHT, "pd", scenario, *words[2:], "--json", told],
+        reported = os.path.join(folder, "pd.json")
+        result = subprocess.run([runs.BORESIGHT, "pd", scenario, *words[2:], "--json", reported],
                                 capture_output=True, text=True, timeout=600)
         self.assertEqual(result.returncode, 0, result.stderr)
-        with open(told, encoding="utf-8") as file:
-            told = json.load(file)
+        with open(reported, encoding="utf-8") as file:
+            reported = json.load(file)
         row = rows(out)[3]
         self.assertEqual(float(row["streak_px"]), 6)
         # the JSON has 15 digits
         for name in ("loss_db_pd50", "false_alarms_per_frame", "threshold_snr"):
-            self.assertAlmostEqual(float(row[name] or "nan"), told[name] or math.nan,
-                                   delta=1e-14 * abs(told[name] or 1), msg=name)
+            self.assertAlmostEqual(float(row[name] or "nan"), reported[name] or math.nan,
+                                   delta=1e-14 * abs(reported[name] or 1), msg=name)
         curve = [r for r in rows(out, "curve") if r["run"] == "3"]
         self.assertEqual([(float(r["snr"]), float(r["trials"]), float(r["detected"]))
                           for r in curve],
-                         [(p["snr"], p["trials"], p["detected"]) for p in told["points"]])
-        for r, p in zip(curve, told["points"]):
+                         [(p["snr"], p["trials"], p["detected"]) for p in reported["points"]])
+        for r, p in zip(curve, reported["points"]):
             self.assertAlmostEqual(float(r["pd"]), p["pd"], delta=1e-14)
         for pooled in rows(out, "curve_statistics"):
             of = [r for r in rows(out, "curve") if r["snr"] == pooled["snr"] and

@@ -95,9 +95,9 @@ class Random(unittest.TestCase):
         with runs.database(out) as by_hand, \
                 runs.database(os.path.join(self.out, "runs", "000003")) as own:
             query = "SELECT * FROM truth"
-            told = own.execute(query).fetchall()
-            self.assertEqual(by_hand.execute(query).fetchall(), told)
-        self.assertGreater(len(told), 0)
+            reported = own.execute(query).fetchall()
+            self.assertEqual(by_hand.execute(query).fetchall(), reported)
+        self.assertGreater(len(reported), 0)
 
     def test_shards_and_resumption_make_the_same_tables(self):
         out = os.path.join(self.folder, "by_hand")

@@ -1,4 +1,4 @@
-/* Whoever overwrites the truth that modules could read changes nothing that the onboard side says
+/* Overwriting the truth that modules could read changes nothing that the onboard side says
  * or does: detections, tracks and commands stay the same to the byte. The same saboteur on the
  * detections changes tracks and commands, so the comparison can see a difference. */
 #include <stdlib.h>

@@ -250,8 +250,8 @@ static void odd_commands_do_no_harm(void **state) {
     assert_int_equal(l.count, 1);
 }
 
-/* Exposures are those of the middle row; they are told when the last row's is over, and the next
- * one's first row waits for that. */
+/* Exposures are those of the middle row; they are published when the last row's is over, and the
+ * next one's first row waits for that. */
 static void rolling_shutters_take_their_time(void **state) {
     (void)state;
     static const char rolling[] = ", \"detector\": {\"row_time_s\": 1e-4}",

@@ -136,7 +136,7 @@ static bst_status hear_event(void *user, int64_t tick, const char *instance, con
     return BST_OK;
 }
 
-/* Fails at tick value2; tells of every fifth tick. */
+/* Fails at tick value2; reports every fifth tick. */
 static bst_status busy_step(fake *self, struct bst_step *step) {
     if (bst_step_tick(step) == self->value2) {
         bst_step_event(step, "end", "of %d", (int)self->value);
@@ -176,7 +176,7 @@ static const bst_module_desc ahead_sensor_module = FAKE_DESC(ahead_sensor_ports)
                                  .abi = BST_MODULE_ABI,
                                  .role = "fake",
                                  .type = "ahead",
-                                 .doc = "Links, and promises.",
+                                 .doc = "Links, and lookahead.",
                                  .flags = BST_MODULE_MULTI_SENSOR | BST_MODULE_HAS_LOOKAHEAD,
                                  .config_bytes = sizeof(fake *),
                                  .ports = ahead_link_ports,
@@ -185,7 +185,7 @@ static const bst_module_desc ahead_sensor_module = FAKE_DESC(ahead_sensor_ports)
                                  .step = fake_step,
                                  .destroy = fake_destroy};
 
-/* value2: as in busy_step. Tells of its task, and writes two exposures every third step. */
+/* value2: as in busy_step. Publishes its task, and writes two exposures every third step. */
 static bst_status ahead_sensor_step(fake *self, struct bst_step *step) {
     const bst_task *task = bst_step_latest(step, AHEAD_TASK).payload;
     bst_step_event(step, "tell", "task %d", task ? (int)task->id : -1);
@@ -196,8 +196,8 @@ static bst_status ahead_sensor_step(fake *self, struct bst_step *step) {
     return busy_step(self, step);
 }
 
-/* Tells what it reads; gives each sensor a task for a while, of which it promises part. With value
- * set it breaks a promise at that tick. */
+/* Reports what it reads; gives each sensor a task for a while and declares a part of it as
+ * lookahead. With value set it violates its lookahead at that tick. */
 static bst_status ahead_link_step(fake *self, struct bst_step *step) {
     int64_t tick = bst_step_tick(step);
     for (int i = 0; i < 4; i++) {
@@ -292,7 +292,7 @@ static void nor_do_sensors_that_go_ahead(void **state) {
     fake link = {.on_step = ahead_link_step, .value = -1};
     assert_alike(never, &link, BST_OK);
     assert_alike(some, &link, BST_ERR_NUMERIC);
-    link.value = 91; /* a promise is broken */
+    link.value = 91; /* the lookahead is violated */
     assert_alike(never, &link, BST_ERR_STATE);
 }
 

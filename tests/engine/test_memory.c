@@ -112,7 +112,7 @@ static void frames_go_back_after_the_last_reader(void **state) {
     assert_int_equal(p.out, 0);
     assert_int_equal(p.recycled, 100);
 
-    /* nobody reads: back at once */
+    /* no reader: returned at once */
     p = (pool){0};
     w = (fake){.on_step = write_frame, .other = &p};
     engine = fake_engine(&ctx, 1000);

@@ -249,7 +249,7 @@ static void failures_are_those_of_a_serial_run(void **state) {
         assert_int_equal(run(&overlapped, &b, true, false), expected);
         assert_string_equal(b.message, a.message);
         assert_string_equal(a.message, k ? "disk full" : "a_follow at 1.007000 s: lost");
-        /* the same was told before; counts may be of more steps ahead */
+        /* the same was published before; counts may be of more steps ahead */
         *strstr(serial.log, "counted") = *strstr(overlapped.log, "counted") = '\0';
         assert_string_equal(overlapped.log, serial.log);
     }

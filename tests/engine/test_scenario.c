@@ -303,7 +303,7 @@ static void paths_are_made_absolute(void **state) {
     assert_int_equal(system(message), 0);
 }
 
-/* Those who look at what somebody recorded load nothing of it. */
+/* A reader of a recorded run loads nothing of it. */
 static void plugins_can_be_left_out(void **state) {
     (void)state;
     const char *text = SCENARIO(

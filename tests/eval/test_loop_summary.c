@@ -227,7 +227,7 @@ static void the_wrong_target_counts_as_wrong(void **state) {
     close_scene(s);
 }
 
-/* A track that foretells where its hidden target is has no wrong one while its covariance allows
+/* A track that predicts its hidden target has no wrong one while its covariance allows
  * the true place; it has when it does not, and when nothing hides it. */
 static void a_prediction_within_its_covariance_is_not_wrong(void **state) {
     (void)state;

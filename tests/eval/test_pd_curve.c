@@ -61,28 +61,28 @@ static void chance_is_taken_off(void **state) {
     assert_true(bst_pd_without_chance(0.01, chance) == 0.0);
 }
 
-/* Many draws of 500 trials a point: no bias, and the deviation is as told. */
-static void the_deviation_is_as_told(void **state) {
+/* Many draws of 500 trials a point: no bias, and the deviation is as stated. */
+static void the_deviation_is_as_stated(void **state) {
     (void)state;
     enum { RUNS = 400 };
     bst_pd_point points[MOST];
     const double pfa = 2e-7, truth = bst_eval_ideal_snr(pfa, 0.9);
     uint64_t seed = 7;
-    double sum = 0.0, square = 0.0, told = 0.0;
+    double sum = 0.0, square = 0.0, reported = 0.0;
     for (int r = 0; r < RUNS; r++) {
         int n = ideal_counts(pfa, 1.0, 0.0, 500, 0.5, &seed, points);
         bst_pd_needed needed = bst_pd_snr_at(points, n, 0.0, 0.9);
         sum += needed.snr - truth;
         square += (needed.snr - truth) * (needed.snr - truth);
-        told += needed.sigma / RUNS;
+        reported += needed.sigma / RUNS;
     }
     /* 4 sigma of a mean of 400; a deviation from 400 is right to 3.5 %: 5 sigma, and points chosen
      * by what was counted in them */
-    bst_assert_close(sum / RUNS, 0.0, 4 * told / sqrt(RUNS) + 0.1 * told);
-    bst_assert_close(sqrt(square / RUNS) / told, 1.0, 0.2);
+    bst_assert_close(sum / RUNS, 0.0, 4 * reported / sqrt(RUNS) + 0.1 * reported);
+    bst_assert_close(sqrt(square / RUNS) / reported, 1.0, 0.2);
 }
 
-static void what_is_not_reached_is_not_told(void **state) {
+static void what_is_not_reached_is_not_reported(void **state) {
     (void)state;
     bst_pd_point points[MOST];
     int n = ideal_counts(1e-7, 1.0, 0.0, 10000, 0.5, NULL, points);
@@ -142,7 +142,7 @@ static void the_deviation_of_a_bent_curve(void **state) {
 }
 
 /* Points end at Pd 0.6 and go on six sigmas farther: where Pd is 0.9, one sigma beyond the last
- * point that tells, nothing was counted within half a step. */
+ * informative point, nothing was counted within half a step. */
 static void no_crossing_far_beyond_the_points(void **state) {
     (void)state;
     bst_pd_point points[8];
@@ -164,8 +164,8 @@ int main(void) {
         cmocka_unit_test(no_crossing_far_beyond_the_points),
         cmocka_unit_test(a_known_loss_is_found),
         cmocka_unit_test(chance_is_taken_off),
-        cmocka_unit_test(the_deviation_is_as_told),
-        cmocka_unit_test(what_is_not_reached_is_not_told),
+        cmocka_unit_test(the_deviation_is_as_stated),
+        cmocka_unit_test(what_is_not_reached_is_not_reported),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -248,7 +248,7 @@ static void gospa_is_the_least_and_a_metric(void **state) {
 
 /* Two objects over 11 frames of 360 s by hand: the first has track 1, then 3 after a gap of one
  * frame; the second is visible from frame 2 on and has track 2 from frame 4 on, which strays to the
- * first in the last frame; track 9 is nobody's for 5 frames. */
+ * first in the last frame; track 9 belongs to no object for 5 frames. */
 static void track_metrics_by_hand(void **state) {
     (void)state;
     bst_ctx ctx = {0};

@@ -218,7 +218,7 @@ static void test_consistency(void **state) {
                                  sigma, gc.bias_sigma_degph * BST_DEG_RAD / 3600.0, gyro.angle_walk,
                                  gyro.rate_walk);
         for (int n = 1; n <= SAMPLES; n++) {
-            /* a turn whose axis wanders, 0.5 deg/s */
+            /* a turn whose axis drifts, 0.5 deg/s */
             double t = n * dt;
             bst_vec3 turn = bst_vec3_scale((bst_vec3){cos(0.01 * t), sin(0.013 * t), 0.5},
                                            0.5 * BST_DEG_RAD * dt);

@@ -81,7 +81,7 @@ static void torque_to_encoder(void **state) {
     }
 }
 
-/* The inner axis is told to swing; the line of sight answers. */
+/* The inner axis is commanded to swing; the line of sight answers. */
 static void command_to_sight(void **state) {
     (void)state;
     bst_mount_config c = linear_config();

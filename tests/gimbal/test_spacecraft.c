@@ -379,7 +379,7 @@ static void test_sets(void **state) {
         bst_spacecraft_trackers(&none_given, &trackers);
     assert_int_equal(wheels, 4);
     assert_int_equal(trackers, 2);
-    /* names of members, for padding is nobody's */
+    /* names of members, for padding has no member */
     const bst_wheel_config *w = c.wheels.items;
     const bst_spacecraft_star_tracker_config *t = c.star_trackers.items;
     assert_memory_equal(w, wheel, offsetof(bst_wheel_config, failed));

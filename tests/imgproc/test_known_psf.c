@@ -214,7 +214,7 @@ static void images_are_those_of_the_place_in_the_field(void **state) {
             missed += (g - want) * (g - want);
             all += want * want;
         }
-        /* the header's promise, in the mean over places in the pixel; a single one: three times */
+        /* the header's bound, in the mean over places in the pixel; a single one: three times */
         assert_true(missed < 3e-4 * all);
     }
     close_rendered(got);

@@ -49,7 +49,7 @@ static void one_message_per_frame(void **state) {
         assert_int_equal(d->end_tick, 1000 * (i + 1));
         assert_true(d->stars_identified >= 15);
         assert_int_equal(stars_right(&b, d), d->stars_identified);
-        /* nobody predicts: the attitude is telemetry's, which is constant (rounding) */
+        /* without a prediction the attitude is telemetry's, which is constant (rounding) */
         assert_true(angle(d->q_cam_from_gcrf, b.o.q_telemetry) < 1e-14);
         assert_true(angle(d->q_telemetry_from_gcrf, b.o.q_telemetry) < 1e-14);
     }

@@ -187,9 +187,9 @@ static void sky_at_rest(void **state) {
     end(&s);
 }
 
-/* Under a PSF so narrow that shape tells nothing, while the boresight goes aside and back again and
- * again, as a search does: bright defects are learned, for they are seen aside as well; the target,
- * at the same pixel whenever the boresight is back, is not. */
+/* Under a PSF so narrow that shape gives no information, while the boresight goes aside and back
+ * again and again, as a search does: bright defects are learned, for they are seen aside as well;
+ * the target, at the same pixel whenever the boresight is back, is not. */
 static void aside_and_back(void **state) {
     (void)state;
     scene s;

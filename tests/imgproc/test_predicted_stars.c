@@ -3,7 +3,7 @@
 
 /* Where expected stars are put, undone by other functions: pixel to direction, aberration and
  * deflection off, against the catalogue's own direction. 1e-9 rad (0.2 mas, 7e-5 px): what the
- * inverse of the light corrections promises, with room for rounding at 1 rad. */
+ * inverse of the light corrections guarantees, with room for rounding at 1 rad. */
 static void check(bst_camera camera) {
     bst_ctx ctx = {0};
     bst_stars *stars = NULL;

@@ -98,7 +98,7 @@ static void streak_is_the_line_integral(void **state) {
             peak = fmax(peak, f->other[i]);
             worst = fmax(worst, fabs(f->share[i] - f->other[i]));
         }
-        /* what the header promises */
+        /* the header's bound */
         bst_assert_close(worst / peak, 0.0, 1e-5);
     }
 }

@@ -96,7 +96,7 @@ static void spikes_are_artefacts_and_targets_beside_them_are_not(void **state) {
     add(f, 60.0, 60.0, 8.0 * NOISE_E * sqrt(f->area_px2));
     add(f, -70.0, 120.0, 6.0 * NOISE_E * sqrt(f->area_px2));
     add(f, 300.0, 0.0, 6.0 * NOISE_E * sqrt(f->area_px2));
-    /* the star itself, told less bright than it is, and a piece of its core */
+    /* the star itself, with a stated flux below the true one, and a piece of its core */
     add(f, 0.4, 0.2, 0.4 * STAR_E);
     add(f, 7.0, 2.0, 0.003 * STAR_E);
     /* what was labelled before stays */

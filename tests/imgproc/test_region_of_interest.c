@@ -85,7 +85,7 @@ static void windows_show_what_the_frame_shows(void **state) {
             synthetic_add(&s, place[i][0], place[i][1], 2000.0 * pow(1.7, i), dx, dy);
             windows[i] = (bst_window){(int)place[i][0] - 32, (int)place[i][1] - 32, 64, 64};
         }
-        /* what nobody looks at */
+        /* pixels that are not read */
         synthetic_add(&s, 160.0, 160.0, 3e4, dx, dy);
         synthetic_expose(&s, key, 1);
         bst_camera_motion motion = synthetic_motion(&s, dx, dy);

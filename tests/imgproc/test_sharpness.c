@@ -1,4 +1,4 @@
-/* Charge and light told apart by shape, on random frames with fixed seeds. */
+/* Charge and light distinguished by shape, on random frames with fixed seeds. */
 #include <stdlib.h>
 
 #include "imgproc/measure/sharpness.h"

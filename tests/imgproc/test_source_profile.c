@@ -48,7 +48,7 @@ static void compare(fixture *f, const bst_imgproc_shape *s, const bst_imgproc_st
                 worst[part] = fmax(worst[part], fabs(got - e));
             }
         }
-        /* the header's promise for shares; derivatives bend more between the tabulated places and
+        /* the header's bound for shares; derivatives bend more between the tabulated places and
          * the nodes: by 1 / sigma */
         double allowed = part == 0 ? 2e-4 : part < 3 ? 1e-3 : 4e-3;
         if (!(worst[part] <= allowed * fmax(peak[part], 1e-3))) {

@@ -220,7 +220,7 @@ static void all_found(const scene *s, const bst_stack_found *found, int count, i
     assert_in_range(matched, s->bodies - lost, s->bodies);
     assert_in_range(moving - matched, 0, stray);
     /* two degrees of freedom each: the mean of 2 n has a deviation of sqrt(4 n), here 1.4 of 2 for
-     * 9 bodies in five of them; the camera's turn may add to axes that are told alone */
+     * 9 bodies in five of them; the camera's turn may add to axes that are detected alone */
     assert_true(chi / matched < 5.0);
 }
 
@@ -331,8 +331,8 @@ static void hits_alone_are_nothing(void **state) {
     free(s);
 }
 
-/* At rest is told from slow: 0.25 px per frame are 3.75 px in all, 7 standard deviations at SNR
- * 10. */
+/* Rest is distinguished from slow motion: 0.25 px per frame are 3.75 px in all, 7 standard
+ * deviations at SNR 10. */
 static void at_rest_and_slow(void **state) {
     (void)state;
     scene *s = new_scene();

@@ -52,8 +52,8 @@ static double share_of(double i, double sigma) {
     return 0.5 * (erf((i + 0.5) / root) - erf((i - 0.5) / root));
 }
 
-/* Adds a streak as wide as told, of `snr` for the ideal filter of its own image; ends at x0, y0 and
- * x1, y1. */
+/* Adds a streak of the given width, of `snr` for the ideal filter of its own image; ends at x0, y0
+ * and x1, y1. */
 static void add_streak(fixture *f, const double end[4], double sigma, double snr) {
     enum { PARTS = 300 };
     double *light = calloc(PIXELS, sizeof *light), square = 0.0;

@@ -76,7 +76,7 @@ static figures measure(double dx, double dy, double said_x, double said_y, doubl
     return out;
 }
 
-/* Platform drift of 1 px an exposure across the path that the telemetry tells: the error ellipses
+/* Platform drift of 1 px an exposure across the path that the telemetry reports: the error ellipses
  * lie along the path that is, and are right. 288 errors: variances to 8 %, correlations to 0.06. */
 static void drift_is_seen(void **state) {
     (void)state;

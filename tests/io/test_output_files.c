@@ -1,4 +1,4 @@
-/* Files that are being written: nothing that somebody else put there is written through; cells of
+/* Files that are being written: nothing that another process put there is written through; cells of
  * CSV files stay text. */
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -46,7 +46,7 @@ static void expect(const char *path, const char *text) {
     assert_string_equal(found, text);
 }
 
-/* A link at PATH.tmp.PROCESS, a name that can be foreseen, and one at the path itself. */
+/* A link at PATH.tmp.PROCESS, a predictable name, and one at the path itself. */
 static void links_are_not_followed(void **state) {
     (void)state;
     bst_ctx ctx = {0};

@@ -195,7 +195,7 @@ static void what_became_of_it(void **state) {
     assert_int_equal(bst_run_reader_int(r, "SELECT count(*) FROM spots", 0, -1), 50);
     expect_problem(r, "scenario.json is missing");
     bst_run_reader_close(r);
-    /* the scenario tells the epoch where the tables do not */
+    /* the scenario gives the epoch where the tables do not */
     write_text(partial, "scenario.json", "{\"epoch_utc\": \"2001-01-01T00:00:00Z\"}");
     write_text(partial, "manifest.json", "{\"program\": \"boresight\", \"complete\": false}");
     r = open_reader(partial);
@@ -206,7 +206,7 @@ static void what_became_of_it(void **state) {
     bst_time_to_utc(epoch, 0, text, sizeof text);
     assert_string_equal(text, "2001-01-01T00:00:00Z");
     bst_run_reader_close(r);
-    /* complete, it says, and has not got its name; then with its name and a lock that nobody holds
+    /* complete, it says, and has not got its name; then with its name and a lock without a holder
      */
     write_text(partial, "manifest.json", "{\"program\": \"boresight\", \"complete\": true}");
     r = open_reader(partial);
@@ -278,9 +278,9 @@ static void folders_that_are_damaged(void **state) {
 }
 
 /* A query as a table of comma-separated values: names, then rows; reals that read back the same. */
-static int told;
+static int reported;
 static void tell(void *user, int64_t rows) {
-    assert_int_equal(rows, 1024 * ++told);
+    assert_int_equal(rows, 1024 * ++reported);
     *(int64_t *)user = rows;
 }
 
@@ -313,7 +313,7 @@ static void queries_become_csv(void **state) {
                                       scratch_path(&s, "b.csv"), tell, &last, &rows));
     assert_int_equal(rows, 2500);
     assert_int_equal(last, 2048);
-    assert_int_equal(told, 2);
+    assert_int_equal(reported, 2);
     assert_int_equal(bst_csv_write(&ctx, r, "SELECT x FROM nowhere", scratch_path(&s, "c.csv"),
                                    NULL, NULL, NULL),
                      BST_ERR_FORMAT);

@@ -38,7 +38,7 @@ static void too_short(raw_peer *raw, raw_message *m) {
     raw_seal(m);
     raw_send(raw, m);
 }
-static void other_than_told(raw_peer *raw, raw_message *m) {
+static void other_than_stated(raw_peer *raw, raw_message *m) {
     m->payload_bytes -= 8;
     raw_send(raw, m);
 }
@@ -135,7 +135,7 @@ static const spoilt ways[] = {
     {"bad_header", empty_part},
     {"bad_version", bad_version},
     {"bad_length", too_short},
-    {"bad_length", other_than_told},
+    {"bad_length", other_than_stated},
     {"bad_length", header_alone},
     {"bad_length", three_parts},
     {"bad_length", forty_parts},
@@ -167,10 +167,10 @@ static void *spoil_each_first(void *user) {
         raw.sequence++;
         ways[i].send(&raw, &m);
         bst_link_error error = {.sequence = 0};
-        bool told = raw_await(&raw, BST_LINK_ERROR, 10.0, &error) &&
-                    strcmp(error.fault, ways[i].counter) == 0 && *error.text;
-        if (!told) {
-            fprintf(stderr, "way %d: told \"%s\" (%s)\n", i, error.fault, error.text);
+        bool reported = raw_await(&raw, BST_LINK_ERROR, 10.0, &error) &&
+                        strcmp(error.fault, ways[i].counter) == 0 && *error.text;
+        if (!reported) {
+            fprintf(stderr, "way %d: reported \"%s\" (%s)\n", i, error.fault, error.text);
             break; /* the step will not be answered */
         }
         raw_answer(&raw);

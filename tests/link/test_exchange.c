@@ -3,7 +3,7 @@
 
 #include "sim/core/wall_clock.h"
 
-/* Sums the pixels of each frame and answers with a detection that tells the sum. */
+/* Sums the pixels of each frame and answers with a detection that holds the sum. */
 static void serve(link_scene *s, const char *name, bool shared, int leave_after) {
     bst_ctx ctx = {0};
     bst_link_hello hello = {.serves = "imgproc", .shared_memory = shared};

@@ -83,7 +83,7 @@ static void record(void) {
     scene_close(&s);
 }
 
-/* A link that nobody answers. */
+/* A link without a peer. */
 static void open_replay(link_scene *s, const char *path) {
     memset(s, 0, sizeof *s);
     bst_link_config config = {.address = "ipc:///nowhere/at/all", .timeout_s = 0.1};

@@ -292,7 +292,7 @@ static void wrong_headers_are_refused(void **state) {
     }
 }
 
-/* What the sender's struct holds is what tables promise: no member twice, none outside. */
+/* What the sender's struct holds is what the tables declare: no member twice, none outside. */
 static void tables_fit_their_structs(void **state) {
     (void)state;
     for (int type = 0; type < BST_LINK_TYPES; type++) {

@@ -96,7 +96,7 @@ static void places_scatter_by_the_bound(void **state) {
     bst_crlb_table bound;
     bst_crlb_table_init(&bound, s.frame.sigma_px);
     fill(&s, 25.0);
-    double sum2 = 0.0, told = 0.0, flux = 0.0, flux2 = 0.0, cross = 0.0;
+    double sum2 = 0.0, reported = 0.0, flux = 0.0, flux2 = 0.0, cross = 0.0;
     long n = 0;
     for (int f = 0; f < 12; f++) {
         bst_generator_result r = run(&s, f);
@@ -106,7 +106,7 @@ static void places_scatter_by_the_bound(void **state) {
             double dx = d->x_px - t->x_centroid_px, dy = d->y_px - t->y_centroid_px;
             sum2 += dx * dx + dy * dy;
             cross += dx * dy;
-            told += d->cov_xx + d->cov_yy;
+            reported += d->cov_xx + d->cov_yy;
             flux += d->flux_e / t->electrons - 1.0;
             flux2 += (d->flux_e - t->electrons) * (d->flux_e - t->electrons);
             n++;
@@ -119,8 +119,8 @@ static void places_scatter_by_the_bound(void **state) {
     /* four standard deviations of a variance of 21,600 normal deviates: 4 sqrt(2 / n) */
     bst_assert_close(variance / (1.44 * at.var_along_px2), 1.0, 4.0 * sqrt(1.0 / (double)n));
     bst_assert_close(cross / (double)n / variance, 0.0, 4.0 / sqrt((double)n));
-    /* the covariance is told for the measured flux: its mean is off by the square of 5 % */
-    bst_assert_close(told / (2.0 * (double)n) / at.var_along_px2, 1.0, 0.015);
+    /* the covariance is stated for the measured flux: its mean is off by the square of 5 % */
+    bst_assert_close(reported / (2.0 * (double)n) / at.var_along_px2, 1.0, 0.015);
     bst_assert_close(flux2 / (double)n / at.flux_variance, 1.0, 4.0 * sqrt(2.0 / (double)n));
     bst_assert_close(flux / (double)n, 0.0,
                      4.0 * sqrt(at.flux_variance / (double)n) / electrons_of(&s, 25.0));
@@ -167,14 +167,14 @@ static void errors_and_statements_have_their_own_width(void **state) {
         bst_crlb_table_init(&image, sqrt(sigma * sigma + jitter * jitter));
         bst_crlb_table_init(&onboard, hypot(sigma, s.settings.jitter_px));
         double error = bst_crlb_table_of(&image, electrons, noise, 0.0).var_along_px2;
-        double told = bst_crlb_table_of(&onboard, electrons, noise, 0.0).var_along_px2;
+        double reported = bst_crlb_table_of(&onboard, electrons, noise, 0.0).var_along_px2;
         /* the gradient of the narrow PSF on the wide image */
         double model2 = plain2 + s.settings.jitter_px * s.settings.jitter_px;
         double misfit = pow(0.5 * (model2 + wide2), 4.0) / (model2 * model2 * wide2 * wide2);
         assert_true(r.count > 880);
         /* 1800 places: 3.3 % of a variance, three of them; shares of a table */
         bst_assert_close(sum / (error * misfit), 1.0, 0.12);
-        bst_assert_close(stated / told, 1.0, 0.12);
+        bst_assert_close(stated / reported, 1.0, 0.12);
         close_scene(&s);
     }
 }

@@ -45,13 +45,13 @@ static void hits_come_at_the_detectors_rate(void **state) {
                                                                      .e_per_um = 80.0,
                                                                      .straggling = 0.12};
     start(&s);
-    double seen = 0.0, told = 0.0;
+    double seen = 0.0, reported = 0.0;
     enum { FRAMES = 400 };
     for (int f = 0; f < FRAMES; f++) {
         bst_generator_result r = run(&s, f);
         for (int i = 0; i < r.count; i++) {
             assert_true(r.items[i].hit && r.items[i].item == -1);
-            told += r.items[i].detection.label == BST_LABEL_HIT;
+            reported += r.items[i].detection.label == BST_LABEL_HIT;
         }
         seen += r.count;
     }
@@ -60,7 +60,7 @@ static void hits_come_at_the_detectors_rate(void **state) {
     double expected = 5.0 * SIDE * SIDE * 169e-8 * 0.5;
     bst_assert_close(seen / FRAMES, expected, 4.0 * sqrt(expected / FRAMES) + 0.01 * expected);
     /* most fill one pixel or two, and stand out */
-    assert_true(told > 0.6 * seen);
+    assert_true(reported > 0.6 * seen);
     close_scene(&s);
 }
 

@@ -387,7 +387,7 @@ static void slanting_streaks_scatter_as_stated(void **state) {
             s.truth->items[i].y_start_px -= 0.5 * path[1];
             s.truth->items[i].y_end_px += 0.5 * path[1];
         }
-        double got[3] = {0.0}, told[3] = {0.0}, noise = 0.0, n = 0.0;
+        double got[3] = {0.0}, reported[3] = {0.0}, noise = 0.0, n = 0.0;
         for (int f = 0; f < 6; f++) {
             bst_generator_result r = run(&s, 10 * k + f);
             noise = r.noise_e;
@@ -400,7 +400,7 @@ static void slanting_streaks_scatter_as_stated(void **state) {
                 const double says[3] = {d->cov_xx, d->cov_xy, d->cov_yy};
                 for (int a = 0; a < 3; a++) {
                     got[a] += now[a];
-                    told[a] += says[a];
+                    reported[a] += says[a];
                 }
                 /* FWHM of the even path's variance and the PSF's; its direction */
                 double wide = 2.3548200450309493 *
@@ -421,9 +421,9 @@ static void slanting_streaks_scatter_as_stated(void **state) {
         const double error[3] = {want[0] * sqrt(2.0 / n), sqrt((product + want[1] * want[1]) / n),
                                  want[2] * sqrt(2.0 / n)};
         for (int a = 0; a < 3; a++) {
-            /* four standard errors of moments of normal deviates; told for the measured flux */
+            /* four standard errors of moments of normal deviates; stated for the measured flux */
             bst_assert_close(got[a] / n, want[a], 4.0 * error[a]);
-            bst_assert_close(told[a] / n, want[a], 0.02 * sqrt(product));
+            bst_assert_close(reported[a] / n, want[a], 0.02 * sqrt(product));
         }
     }
     close_scene(&s);

@@ -28,7 +28,7 @@ static void places_are_those_of_the_sensor(void **state) {
             s.frame.binning = binning;
             start(&s);
             enum { FRAMES = 250 };
-            double sum[2] = {0.0}, square[2] = {0.0}, told = 0.0;
+            double sum[2] = {0.0}, square[2] = {0.0}, stated = 0.0;
             for (int f = 0; f < FRAMES; f++) {
                 s.truth->count = 0;
                 add_source(&s, 1, x, y, 4e4);
@@ -41,14 +41,14 @@ static void places_are_those_of_the_sensor(void **state) {
                 sum[1] += d->y_px / FRAMES;
                 square[0] += (d->x_px - x) * (d->x_px - x) / FRAMES;
                 square[1] += (d->y_px - y) * (d->y_px - y) / FRAMES;
-                told += 0.5 * (d->cov_xx + d->cov_yy) / FRAMES;
+                stated += 0.5 * (d->cov_xx + d->cov_yy) / FRAMES;
             }
             /* five standard deviations of the mean */
             bst_assert_close(sum[0], x, 5.0 * sqrt(square[0] / FRAMES));
             bst_assert_close(sum[1], y, 5.0 * sqrt(square[1] / FRAMES));
             /* its own covariance is the scatter: four standard deviations of a mean square */
-            bst_assert_close(0.5 * (square[0] + square[1]) / told, 1.0, 4.0 / sqrt(FRAMES));
-            variance[w][binning / 2] = told;
+            bst_assert_close(0.5 * (square[0] + square[1]) / stated, 1.0, 4.0 / sqrt(FRAMES));
+            variance[w][binning / 2] = stated;
             close_scene(&s);
         }
         /* coarse pixels tell a place of 2 px FWHM worse */
@@ -488,8 +488,8 @@ static void false_alarms_fill_the_window(void **state) {
     close_scene(&s);
 }
 
-/* The truth's SNR of a source tells how sharp its image is. One that says what the PSF alone on the
- * mean background gives, sqrt(b^2 (background + dark) + read noise^2) a pixel, changes nothing;
+/* The truth's SNR of a source depends on the sharpness of its image. One from what the PSF alone on
+ * the mean background gives, sqrt(b^2 (background + dark) + read noise^2) a pixel, changes nothing;
  * half of it widens the errors by two. */
 static void a_plain_image_is_as_sharp_as_it_says(void **state) {
     (void)state;

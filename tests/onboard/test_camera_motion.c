@@ -142,7 +142,7 @@ static void streak_is_the_stars_path(void **state) {
     bst_assert_close(cy - by, 0.2, 1e-9);
 }
 
-/* Noise of the telemetry is no bend, and what it does to a true bend is told. 50 samples in the
+/* Noise of the telemetry is no bend, and its effect on a true bend is reported. 50 samples in the
  * exposure: the least-squares coefficient of a Legendre polynomial of degree 2 has sigma
  * sqrt(5 / 50) of a sample's. */
 static void noise_is_no_bend(void **state) {

@@ -86,7 +86,7 @@ static void pixels_hold_the_light_and_its_place(void **state) {
 }
 
 /* A PSF with coma and astigmatism is its own mirror image in no way. Its image against the sum over
- * the frequencies that a period of 64 px tells apart, written out. */
+ * the frequencies that a period of 64 px distinguishes, written out. */
 static void an_aberrated_image_is_the_transform_of_its_otf(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -117,7 +117,7 @@ static void an_aberrated_image_is_the_transform_of_its_otf(void **state) {
         /* light of 4e-9 lies beyond the cut-off in the table of the OTF */
         bst_assert_close(image[places[n][1] * SIDE + places[n][0]], sum, 1e-8);
     }
-    /* no mirror images: coma tells left from right and up from down */
+    /* no mirror images: coma distinguishes left from right and up from down */
     assert_true(fabs(image[24 * SIDE + 28] - image[24 * SIDE + 20]) > 1e-3);
     assert_true(fabs(image[28 * SIDE + 24] - image[20 * SIDE + 24]) > 1e-3);
     bst_psf_free(psf);

@@ -82,14 +82,14 @@ static void the_error_of_a_grid(void **state) {
     for (size_t n = 0; n < sizeof cases / sizeof *cases; n++) {
         bst_nufft_kernel_band band = band_of(cases[n].sigma);
         bst_nufft_kernel s = {cases[n].taps, 0.0};
-        double told = bst_nufft_kernel_choose(&s, &band, cases[n].density), sum = 0.0;
+        double reported = bst_nufft_kernel_choose(&s, &band, cases[n].density), sum = 0.0;
         for (int i = 0; i < BST_SPREAD_BINS; i++) {
             double nu = (i + 0.5) * band.step / cases[n].density;
             sum += band.weight[i] * (nu < 0.5 ? fmin(error_at(&s, nu), 2.0) : 1.0);
         }
-        assert_true(told > 0.95 * sum - 1e-7); /* aliases of the third order are left out */
-        assert_true(told < 1.1 * sum + 1e-7);  /* aliases in phase, at eight places */
-        double best = told;
+        assert_true(reported > 0.95 * sum - 1e-7); /* aliases of the third order are left out */
+        assert_true(reported < 1.1 * sum + 1e-7);  /* aliases in phase, at eight places */
+        double best = reported;
         for (double beta = 0.8; beta < 2.6; beta += 0.1) {
             const bst_nufft_kernel other = {cases[n].taps, beta * cases[n].taps};
             double found = 0.0;
@@ -103,7 +103,7 @@ static void the_error_of_a_grid(void **state) {
     }
 }
 
-/* Nodes widened by a Gaussian: flux is kept, and the error told is what the band's frequencies
+/* Nodes widened by a Gaussian: flux is kept, and the error reported is what the band's frequencies
  * have. No other coefficients have less in the mean square. */
 static void widened_nodes(void **state) {
     (void)state;
@@ -116,7 +116,7 @@ static void widened_nodes(void **state) {
         bst_assert_close(bst_nufft_kernel_widen(&s, &band, density, 0.0, &shape), 0.0, 0.0);
         assert_true(shape.c[0] == 1.0 && shape.c[1] == 0.0 && shape.c[2] == 0.0);
         for (double variance = 0.05; variance < 1.0; variance *= 2.5) {
-            double told = bst_nufft_kernel_widen(&s, &band, density, variance, &shape);
+            double reported = bst_nufft_kernel_widen(&s, &band, density, variance, &shape);
             double t0[3], sums[9] = {0.0}, error = 0.0, flux = 0.0;
             for (int k = 0; k < 3; k++) {
                 t0[k] = integral(&s, 0.0, k);
@@ -138,7 +138,7 @@ static void widened_nodes(void **state) {
                     error += trial == 4 ? band.weight[i] * fabs(got - want) : 0.0;
                 }
             }
-            bst_assert_close(told, error, 0.02 * error + 1e-5);
+            bst_assert_close(reported, error, 0.02 * error + 1e-5);
             for (int trial = 0; trial < 9; trial++) {
                 assert_true(sums[trial] >= sums[4] * (1.0 - 1e-3));
             }
@@ -252,17 +252,17 @@ static void errors_of_a_coarse_axis(void **state) {
         struct {
             bst_fourier_error error;
             double guard[32];
-        } told = {.guard = {0.0}};
+        } reported = {.guard = {0.0}};
         const bst_fourier_axis both[2] = {axis ? fine : coarse, axis ? coarse : fine};
-        bst_assert_ok(&ctx, bst_fourier_error_measure(&ctx, psf, &band, both, &told.error));
+        bst_assert_ok(&ctx, bst_fourier_error_measure(&ctx, psf, &band, both, &reported.error));
         for (int k = 0; k < CLASSES; k++) {
             /* places in steps of 0.25 px, and the classes' borders between them */
-            bst_assert_close(told.error.most[k] / want[k], 1.1, 0.25);
+            bst_assert_close(reported.error.most[k] / want[k], 1.1, 0.25);
         }
         /* what is darker than all classes belongs to the last one */
-        assert_true(told.error.most[BST_LIGHT_CLASSES - 1] > 0.0);
+        assert_true(reported.error.most[BST_LIGHT_CLASSES - 1] > 0.0);
         for (int k = 0; k < 32; k++) {
-            assert_true(told.guard[k] == 0.0);
+            assert_true(reported.guard[k] == 0.0);
         }
     }
     bst_psf_free(psf);

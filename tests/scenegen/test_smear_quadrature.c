@@ -165,7 +165,7 @@ static double worst_error(const bst_smear_path_point *path, int count,
 }
 
 /* Paths with jitter at many frequencies, from none to twice the slew, along and across the axes:
- * the image is right to the tolerance, and to the error that is told. Jitter of a still line of
+ * the image is right to the tolerance, and to the error that is reported. Jitter of a still line of
  * sight needs few nodes when they may be widened. */
 static void jitter_is_kept_to_the_tolerance(void **state) {
     (void)state;

@@ -1,4 +1,4 @@
-/* The tolerance is a promise about the image: random scenes of all kinds of motion and PSF.
+/* The tolerance is a bound on the image's error: random scenes of all kinds of motion and PSF.
  *
  * In every scene: measured error <= predicted error <= tolerance. A scene that cannot be drawn to
  * the tolerance, with the nodes that a frame may have or on the grid of the Fourier path, is

@@ -1,5 +1,5 @@
-/* What is said of a study before its first run: which settings are tried, and whom a fault is put
- * down to. The kind's check keeps a list of what it is asked about. */
+/* Messages about a study before its first run: which settings are tried, and to which a fault is
+ * put down to. The kind's check keeps a list of what it is asked about. */
 #include "tests/studies/fake_kind.h"
 
 typedef struct asked {

@@ -143,8 +143,8 @@ static void test_no_room(void **state) {
     assert_int_equal(f->outcome.missing, 0);
 }
 
-/* A shard whose rows are other runs', and what is no file under a shard's name, hold nobody up:
- * they are put aside, and their runs are made again. */
+/* A shard whose rows are other runs', and what is no file under a shard's name, hold up no other:
+ * they are moved away, and their runs are made again. */
 static void test_wrong_shards(void **state) {
     fixture *f = *state;
     enum { SIZE = 10 };

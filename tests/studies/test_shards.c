@@ -196,7 +196,7 @@ static void test_malformed_middle(void **state) {
         for (int run = 0; run < 5; run++) {
             assert_int_equal(r.state[run], BST_ROW_MISSING);
         }
-        assert_int_equal(access(path, F_OK), -1); /* put aside */
+        assert_int_equal(access(path, F_OK), -1); /* moved away */
         bst_results_free(&r);
     }
 }

@@ -119,15 +119,15 @@ static void start(bst_executor *executor, int64_t id, int64_t first, int64_t sha
 /* All news of the next `seconds`, at most until `wanted` came. */
 static int gather(bst_executor *executor, double seconds, int wanted, bst_study_shard_news *news) {
     bst_ctx ctx = {0};
-    int told = 0;
+    int reported = 0;
     double until = bst_wall_seconds() + seconds;
-    while (told < wanted && bst_wall_seconds() < until) {
+    while (reported < wanted && bst_wall_seconds() < until) {
         int count = 0;
-        bst_assert_ok(
-            &ctx, executor->poll(&ctx, executor->self, 100, news + told, MOST_NEWS - told, &count));
-        told += count;
+        bst_assert_ok(&ctx, executor->poll(&ctx, executor->self, 100, news + reported,
+                                           MOST_NEWS - reported, &count));
+        reported += count;
     }
-    return told;
+    return reported;
 }
 
 static int bytes_of(const char *name) {
@@ -137,7 +137,7 @@ static int bytes_of(const char *name) {
     return stat(path, &about) == 0 ? (int)about.st_size : 0;
 }
 
-/* Five shards in arrays of two: each runs once and is told of once. */
+/* Five shards in arrays of two: each runs once and is reported once. */
 static void test_shards_run_once(void **state) {
     (void)state;
     bst_slurm_site site = quick();
@@ -264,7 +264,7 @@ static void test_submission(void **state) {
     executor.close(executor.self);
 }
 
-/* Jobs of a driver that died are cancelled by the next; cancelling tells of every task. */
+/* Jobs of a driver that died are cancelled by the next; cancelling reports every task. */
 static void test_cancelling(void **state) {
     (void)state;
     bst_slurm_site site = quick();

@@ -155,11 +155,11 @@ static inline bst_quat expose(world *w, int k) {
                           .end_tick = (int64_t)k * RATE_HZ + RATE_HZ / 4};
     bst_vec3 sight = bst_light_aberrate(&w->light, target_direction(w, t, true));
     bst_quat q_true = bst_quat_look(sight, w->e1);
-    bst_vec3 wander = {3 * AS * sin(0.2 * t) + 0.6 * AS * normal(w),
-                       3 * AS * cos(0.17 * t) + 0.6 * AS * normal(w), 2 * AS * normal(w)};
-    q_true = bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(wander), q_true));
+    bst_vec3 deviation = {3 * AS * sin(0.2 * t) + 0.6 * AS * normal(w),
+                          3 * AS * cos(0.17 * t) + 0.6 * AS * normal(w), 2 * AS * normal(w)};
+    q_true = bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(deviation), q_true));
     bst_vec3 drift = {3.6 * AS * t, -3.4 * AS * t, 0.5 * AS * t}; /* 5 arcsec/s */
-    drift = bst_vec3_add(drift, wander);
+    drift = bst_vec3_add(drift, deviation);
     d->q_telemetry_from_gcrf =
         bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(drift, -1.0)), q_true));
     d->q_cam_from_gcrf = d->q_telemetry_from_gcrf;

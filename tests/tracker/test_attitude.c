@@ -272,7 +272,8 @@ static void says_no(void **state) {
     s->stars[1] = s->stars[0];
     bst_attitude_solve(&camera, &params, s->q_true, s->stars, 2, &out);
     assert_false(out.valid);
-    /* two stars whose separation is wrong, and three of which one is wrong: nobody can tell which
+    /* two stars whose separation is wrong, and three of which one is wrong: which one cannot be
+     * decided
      */
     for (uint64_t seed = 0; seed < 50; seed++) {
         s = make_scene(seed, 2, 0, 900.0);

@@ -74,8 +74,8 @@ static double settled_area(double pd) {
 }
 
 /* White acceleration over dt on a true state. */
-static void wander(bst_sky_state *truth, bool manoeuvres, bst_rng_key key, uint64_t run,
-                   uint64_t k) {
+static void random_walk(bst_sky_state *truth, bool manoeuvres, bst_rng_key key, uint64_t run,
+                        uint64_t k) {
     double q = pow((manoeuvres ? manoeuvre_as : noise_as) * AS, 2), n[4];
     bst_rng_normal2(key, run, 2 * k, n);
     bst_rng_normal2(key, run, 2 * k + 1, n + 2);
@@ -143,7 +143,7 @@ static void monte_carlo(const setup *s, figures *out) {
                 turning =
                     turning ? u0 > mixed / manoeuvre_sojourn_s : u0 < mixed / quiescent_sojourn_s;
             }
-            wander(&truth, turning, key, 1, (uint64_t)k);
+            random_walk(&truth, turning, key, 1, (uint64_t)k);
             bst_rng_normal2(key, 2, (uint64_t)k, n);
             bool seen = k < CLEAN || bst_rng_uniform(key, 3, (uint64_t)k) < s->pd;
             bst_mtt_detection own = see(truth.direction, sigma_as * n[0], sigma_as * n[1]);

@@ -1,4 +1,4 @@
-/* Events told from innovations, and tracks that are places of the sensor: statistics by closed
+/* Events reported from innovations, and tracks that are places of the sensor: statistics by closed
  * forms, with correlated innovations and places that differ in x and y. */
 #include "tests/tracker/sky_bench.h"
 #include "tracker/mtt/multitarget_internal.h"
@@ -26,7 +26,7 @@ static void a_manoeuvre_is_told_at_its_rate(void **state) {
             most = fmax(most, statistic_of(&nu[hits - n], n, s));
         }
         /* half a probability at the most is allowed */
-        for (int told = 0; told < 2 && exp(-0.5 * most) < 0.45; told++) {
+        for (int reported = 0; reported < 2 && exp(-0.5 * most) < 0.45; reported++) {
             bst_mtt_params params = defaults();
             const double dt = 2.5;
             params.event_window = 8;
@@ -36,15 +36,16 @@ static void a_manoeuvre_is_told_at_its_rate(void **state) {
             bool event = false;
             double statistic = 0.0;
             for (int i = 0; i < hits; i++) {
-                params.false_events_per_hour = i + 1 < hits ? 1e-30 : (told ? 1.001 : 0.999) * rate;
+                params.false_events_per_hour =
+                    i + 1 < hits ? 1e-30 : (reported ? 1.001 : 0.999) * rate;
                 bst_sky_innovation innovation = {.nu = {nu[i][0], nu[i][1]},
                                                  .s = {s[0], s[1], s[2]}};
                 assert_false(event);
                 event = bst_mtt_note_innovation(&params, &track, &innovation, dt, &statistic);
             }
-            assert_int_equal(event, told);
-            assert_int_equal(track.innovation_count, told ? 0 : hits);
-            if (told) {
+            assert_int_equal(event, reported);
+            assert_int_equal(track.innovation_count, reported ? 0 : hits);
+            if (reported) {
                 bst_assert_close(statistic, most, 1e-9 * most); /* rounding */
             }
         }
@@ -53,7 +54,7 @@ static void a_manoeuvre_is_told_at_its_rate(void **state) {
     bst_mtt_track track = {.id = 1};
     bst_sky_innovation far = {.nu = {100.0, 100.0}, .s = {1.0, 0.0, 1.0}};
     double statistic;
-    params.false_events_per_hour = 0.0; /* none are told */
+    params.false_events_per_hour = 0.0; /* none are reported */
     assert_false(bst_mtt_note_innovation(&params, &track, &far, 1.0, &statistic));
     assert_false(bst_mtt_note_brightness(&params, &track, 100.0, 1.0, &statistic));
     params.false_events_per_hour = 1e9;
@@ -83,7 +84,7 @@ static void a_change_of_brightness_is_told_at_its_rate(void **state) {
                 }
                 most = fmax(most, sum * sum / n);
             }
-            for (int told = 0; told < 2; told++) {
+            for (int reported = 0; reported < 2; reported++) {
                 bst_mtt_params params = defaults();
                 params.event_window = 4; /* windows of 1, 2, 4 */
                 const double dt = 0.5;
@@ -97,12 +98,12 @@ static void a_change_of_brightness_is_told_at_its_rate(void **state) {
                 bool event = false;
                 for (int i = 0; i < hits; i++) {
                     params.false_events_per_hour =
-                        i + 1 < hits ? 1e-30 : (told ? 1.001 : 0.999) * rate;
+                        i + 1 < hits ? 1e-30 : (reported ? 1.001 : 0.999) * rate;
                     event = bst_mtt_note_brightness(&params, &track, sign * z[i], dt, &statistic);
                 }
-                assert_int_equal(event, told);
-                assert_int_equal(track.brightness_count, told ? 0 : hits);
-                if (told) {
+                assert_int_equal(event, reported);
+                assert_int_equal(track.brightness_count, reported ? 0 : hits);
+                if (reported) {
                     bst_assert_close(statistic, most, 1e-12);
                 }
             }
@@ -150,7 +151,7 @@ static void a_place_of_the_sensor_is_weighed(void **state) {
     bst_assert_close(track.fixed.now.y_px, 199.65, 1e-9);
     bst_assert_close(track.fixed.now.variance_px2, 0.5 * r2, 1e-12);
     bst_assert_close(track.fixed.before.x_px, 100.0, 0.0);
-    /* far away, in an image of 3 px, where the motion foresees it better than a defect scatters */
+    /* far away, in an image of 3 px, where the motion predicts it better than a defect scatters */
     double r3 = 0.04 + 0.75 * 0.75;
     d = at(103.0, 204.5, 3.0, 0.2);
     bst_mtt_note_fixed(b->mtt, &d, log(100.0 / (PIXEL * PIXEL)), &track);

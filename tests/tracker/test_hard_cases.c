@@ -110,7 +110,7 @@ static void a_million_updates_of_each_filter(void **state) {
 }
 
 /* An object goes into eclipse for an hour, or is hidden, and comes back: the same identity; another
- * one a few degrees away is somebody else. */
+ * one a few degrees away is another object. */
 static void identity_through_an_hour(void **state) {
     (void)state;
     int kept = 0, mistaken = 0;
@@ -253,14 +253,14 @@ static void false_events_are_as_rare_as_asked(void **state) {
     bst_mtt_free(b->mtt);
 }
 
-/* A burn and a fading by half a magnitude are told within ten frames; hardly any before. One
- * Gaussian tells burns that stay in its gate; the quiet model of an IMM any that it follows. */
-static void manoeuvres_and_flares_are_told(void **state) {
+/* A burn and a fading by half a magnitude are reported within ten frames; hardly any before. One
+ * Gaussian detects burns that stay in its gate; the quiet model of an IMM any that it follows. */
+static void manoeuvres_and_flares_are_reported(void **state) {
     (void)state;
     const bst_filter_kind filters[] = {BST_FILTER_EKF, BST_FILTER_UKF, BST_FILTER_IMM};
     const double burn[] = {0.5, 0.5, 2.0}; /* arcsec/s */
     for (int f = 0; f < 3; f++) {
-        int told[2] = {0}, early = 0;
+        int reported[2] = {0}, early = 0;
         double delay[2] = {0};
         for (uint64_t seed = 0; seed < 100; seed++) {
             bst_mtt_params params = defaults();
@@ -281,7 +281,7 @@ static void manoeuvres_and_flares_are_told(void **state) {
                     early += n[i] > 0 && k <= 30;
                     if (n[i] > 0 && k > 30 && k <= 40 && !done[i]) {
                         done[i] = true;
-                        told[i]++;
+                        reported[i]++;
                         delay[i] += k - 30;
                     }
                 }
@@ -289,18 +289,18 @@ static void manoeuvres_and_flares_are_told(void **state) {
             bst_mtt_free(b->mtt);
         }
         print_message(
-            "filter %d: burns told %d of 100 after %.1f frames, fadings %d after %.1f, "
+            "filter %d: burns reported %d of 100 after %.1f frames, fadings %d after %.1f, "
             "%d too early\n",
-            f, told[0], delay[0] / told[0], told[1], delay[1] / told[1], early);
-        /* the others leave the gate before they are told: the track is lost */
-        assert_true(told[0] >= (filters[f] == BST_FILTER_IMM ? 90 : 60));
-        assert_true(told[1] >= 90);
+            f, reported[0], delay[0] / reported[0], reported[1], delay[1] / reported[1], early);
+        /* the others leave the gate before they are reported: the track is lost */
+        assert_true(reported[0] >= (filters[f] == BST_FILTER_IMM ? 90 : 60));
+        assert_true(reported[1] >= 90);
         assert_true(early <= 1);
     }
 }
 
 /* Full speed ahead by 12 arcsec/s: the IMM keeps the object; one quiet model does where events are
- * told, because a second gate finds what has left the first one. */
+ * reported, because a second gate finds what has left the first one. */
 static void filters_hold_through_a_burn(void **state) {
     (void)state;
     int held[3] = {0};
@@ -348,7 +348,7 @@ static void clutter_is_no_manoeuvre(void **state) {
     params.false_events_per_hour = 1.0;
     bench *b = start(4, &params);
     bst_vec3 corner = bst_vec3_from_radec(1.0, 0.0), d[TRACKS];
-    int told = 0, held = 0;
+    int reported = 0, held = 0;
     for (int i = 0; i < TRACKS; i++) {
         d[i] = along(corner, 0.5 * BST_PI, (200 + 65 * i) * AS);
     }
@@ -364,16 +364,16 @@ static void clutter_is_no_manoeuvre(void **state) {
             see(b, along(up, 0.0, 3000 * AS * (uniform(b) - 0.5)), 13.0);
         }
         frame(b, k);
-        told += events_of(b, BST_MTT_MANOEUVRE);
+        reported += events_of(b, BST_MTT_MANOEUVRE);
     }
     for (int i = 0; i < TRACKS; i++) {
         held += track_at(b, along(d[i], 0.0, 5 * AS * (FRAMES - 1)), 2 * AS) != NULL;
     }
     double hours = TRACKS * FRAMES / 3600.0;
-    print_message("300 alarms a frame: %d manoeuvres told in %.0f h, %d of %d held\n", told, hours,
-                  held, TRACKS);
-    assert_true(told < hours + 3.0 * sqrt(hours)); /* Poisson of mean 11: 0.2 % */
-    assert_true(held >= TRACKS - 2);               /* coasts through five misses in a row */
+    print_message("300 alarms a frame: %d manoeuvres reported in %.0f h, %d of %d held\n", reported,
+                  hours, held, TRACKS);
+    assert_true(reported < hours + 3.0 * sqrt(hours)); /* Poisson of mean 11: 0.2 % */
+    assert_true(held >= TRACKS - 2);                   /* coasts through five misses in a row */
     bst_mtt_free(b->mtt);
 }
 
@@ -478,7 +478,7 @@ int main(void) {
                                        cmocka_unit_test(memory_has_its_limits),
 
                                        cmocka_unit_test(false_events_are_as_rare_as_asked),
-                                       cmocka_unit_test(manoeuvres_and_flares_are_told),
+                                       cmocka_unit_test(manoeuvres_and_flares_are_reported),
                                        cmocka_unit_test(filters_hold_through_a_burn),
                                        cmocka_unit_test(clutter_is_no_manoeuvre),
                                        cmocka_unit_test(five_hundred_tracks_by_each),

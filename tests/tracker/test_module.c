@@ -220,7 +220,7 @@ static void no_pointing(void **state) {
         bench b;
         init(&b);
         onboard_set_error(&b.o, error);
-        if (which == 0) { /* nobody writes it */
+        if (which == 0) { /* it has no writer */
             fake_add(&b.o.ctx, b.o.engine,
                      FAKE_SPEC(onboard_nav_desc, "nav", b.o.navigation_p, 100));
         } else { /* not yet */

@@ -52,7 +52,7 @@ static void random_scenes(void **state) {
             continue;
         }
         double off = nees(&s, &got);
-        /* short arcs, where the valley is bent, are told */
+        /* short arcs, where the valley is bent, are reported */
         if (got.bend > 0.5) {
             print_message(
                 "scene %d, %.0f s, %d sights, range %.0f +- %.0f km: bend %.2g, NEES %.3g\n", k,

@@ -113,7 +113,7 @@ static void takes_nothing_wrong(void **state) {
     t.hits = 4;
     t.chi2 = 4;
     assert_int_equal(choose(&t, 1), 1);
-    /* two young tracks that nothing tells apart: wait */
+    /* two young tracks that nothing distinguishes: wait */
     bst_mtt_track two[2] = {make_track(1, 10, 0.1, 13), make_track(2, 20, -0.1, 13)};
     two[0].hits = two[1].hits = 6;
     assert_int_equal(choose(two, 2), 0);

@@ -320,7 +320,7 @@ static void predictions_hold(void **state) {
     print_message("prediction one frame ahead: target %.2f px, attitude %.2f px at worst\n",
                   worst_px, worst_attitude_px);
     assert_true(worst_px < 0.3);
-    /* frame jitter of 0.2 px per axis cannot be foreseen: 4 sigma, and the wander's bend */
+    /* frame jitter of 0.2 px per axis cannot be predicted: 4 sigma, and the drift's curvature */
     assert_true(worst_attitude_px < 1.2);
     world_close(&w);
 }

@@ -1,4 +1,4 @@
-/* Files of frame updates: what is read, and what every fault is told as. */
+/* Files of frame updates: what is read, and what every fault is reported as. */
 #include "sim/world/frame_updates.h"
 #include "tests/test_support.h"
 
@@ -118,7 +118,7 @@ static const struct {
      {"(frame 4)/objects", "no length", "", ""}},
 };
 
-static void faults_are_told(void **state) {
+static void faults_are_reported(void **state) {
     (void)state;
     for (size_t i = 0; i < sizeof faults / sizeof *faults; i++) {
         bst_ctx ctx = {0};
@@ -151,7 +151,7 @@ static void a_field_too_wide(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(everything),
-                                       cmocka_unit_test(faults_are_told),
+                                       cmocka_unit_test(faults_are_reported),
                                        cmocka_unit_test(a_field_too_wide)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* What an observer sees of an object, and what it is told to look for. */
+/* What an observer sees of an object, and what it is commanded to look for. */
 #include "sim/onboard/knowledge.h"
 #include "tests/world/world_support.h"
 
@@ -211,7 +211,7 @@ static void the_cue_s_rate_is_its_derivative(void **state) {
     bst_world_free(world);
 }
 
-/* A burn changes where the target is, not what the onboard side is told. */
+/* A burn changes where the target is, not what the onboard side knows. */
 static void knowledge_never_sees_burns(void **state) {
     (void)state;
     const char *sensor = ", \"cue\": {\"object\": \"GX5\"}";

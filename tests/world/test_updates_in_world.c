@@ -38,7 +38,7 @@ static void write_file(char path[BST_TEST_PATH + 8]) {
     int fd = mkstemp(base);
     assert_true(fd >= 0);
     close(fd);
-    snprintf(path, BST_TEST_PATH + 8, "%s.json", base); /* the ending tells what it is */
+    snprintf(path, BST_TEST_PATH + 8, "%s.json", base); /* the extension gives the format */
     assert_int_equal(rename(base, path), 0);
     print_object(object[0], sizeof object[0], "A", 2, 2.5);
     print_object(object[1], sizeof object[1], "A", 4, 4.8);

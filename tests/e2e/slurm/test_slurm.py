@@ -116,7 +116,7 @@ class Slurm(unittest.TestCase):
         out = os.path.join(self.folder, "faults")
         driver = self.start(out, self.study)
         wait_until(lambda: len(self.shards_at_work(out)) >= 3, 200, "three shards at work")
-        os.kill(self.pid("node1"), signal.SIGKILL)  # its tasks go on, nobody tells of them
+        os.kill(self.pid("node1"), signal.SIGKILL)  # its tasks go on without a report
         os.kill(self.shards_at_work(out)[-1], signal.SIGKILL)
         os.kill(self.pid("slurmctld"), signal.SIGKILL)
         time.sleep(2)
