@@ -42,7 +42,7 @@ static bst_status start_compensator(bst_ctx *ctx, bst_control *c) {
     if (on_image_error(c)) {
         status = bst_image_loop_init(ctx, &c->image_loop, &config->compensator, &env);
     } else if (config->compensate_attitude) {
-        status = bst_control_observer_density(ctx, config, &env, c->env.pixel_rad,
+        status = bst_control_observer_density(ctx, config, &env, c->env.pixel_rad, c->env.memo,
                                               &c->pointing_error.density);
         const bst_model_error_env model = {.gain = config->compensator.gain_scale,
                                            .late_s = config->compensator.delay_s,

@@ -10,6 +10,7 @@
 #include "control/loop/model_error.h"
 #include "control/loop/pointing_error.h"
 #include "control/modes/search_pattern.h"
+#include "sim/core/memo.h"
 #include "sim/core/quintic.h"
 #include "sim/onboard/knowledge.h"
 
@@ -96,6 +97,7 @@ typedef struct bst_control_env {
     bst_control_region_fn region_at;
     bst_control_belt_eye_fn belt_eye_at;
     void *cue_user;
+    bst_memo *memo; /* of what simulations share; NULL: none */
 } bst_control_env;
 
 typedef struct bst_control_transition {
@@ -197,10 +199,11 @@ typedef struct bst_control {
  * robust_observer the one that bst_observer_design permits.
  *
  * Given:     timing  of the loop; command and servo delays are the configuration's
+ *            memo    as in bst_observer_design
  * Errors:    BST_ERR_CONFIG for a gain_scale of 0; those of bst_observer_design */
 bst_status bst_control_observer_density(bst_ctx *ctx, const bst_control_config *config,
                                         const bst_image_loop_env *timing, double pixel_rad,
-                                        double *density) BST_MUST_CHECK;
+                                        bst_memo *memo, double *density) BST_MUST_CHECK;
 
 /* Initialises a controller; config and env are copied. The struct must not be moved afterwards.
  * Errors: BST_ERR_CONFIG for inconsistent settings. */

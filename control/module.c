@@ -3,6 +3,7 @@
 
 #include "control/control.h"
 #include "control/modules.h"
+#include "sim/core/pages.h"
 #include "sim/messages/message_invariants.h"
 
 enum {
@@ -71,13 +72,13 @@ static void destroy(void *self) {
     module *m = self;
     if (m) {
         bst_knowledge_view_free(m->view);
-        free(m);
+        bst_pages_free(m);
     }
 }
 
 static bst_status create(const bst_module_env *env, const void *config, void **self) {
     assert(env && env->knowledge && env->tick_rate_hz > 0 && config && self);
-    module *m = calloc(1, sizeof *m);
+    module *m = bst_pages_zero(1, sizeof *m);
     if (!m) {
         return bst_fail(env->ctx, BST_ERR_MEMORY, "out of memory for a controller");
     }
@@ -99,7 +100,8 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
                                        .cue_range_at = cue_range_at,
                                        .region_at = region_at,
                                        .belt_eye_at = belt_eye_at,
-                                       .cue_user = m->view};
+                                       .cue_user = m->view,
+                                       .memo = bst_knowledge_memo(env->knowledge)};
         bst_knowledge_region(env->knowledge, &control_env.region);
         status = bst_control_init(env->ctx, &m->control, config, &control_env);
     }

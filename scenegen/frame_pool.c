@@ -12,14 +12,18 @@ typedef struct pooled_frame {
     void *mapped;
     cl_event ready; /* of the mapping; NULL: already mapped */
     bool lent;
+    bool shared; /* a clone of the simulation may hold it */
 } pooled_frame;
+
+/* Frames of a pool that clones may hold. More would leave too few for the simulation itself. */
+enum { MOST_SHARED = 4 };
 
 struct bst_frame_pool {
     cl_command_queue queue;
     int count;
     pthread_mutex_t waiting; /* protects the frames' `ready` */
-    pthread_mutex_t lock;    /* protects lent and closed */
-    int lent;
+    pthread_mutex_t lock;    /* protects lent, shared and closed */
+    int lent, shared;
     bool closed; /* freed by its creator: destroyed with the last frame */
     pooled_frame frames[];
 };
@@ -109,6 +113,8 @@ static void recycle(void *owner) {
     pthread_mutex_lock(&pool->lock);
     f->lent = false;
     pool->lent--;
+    pool->shared -= f->shared;
+    f->shared = false;
     bool last = pool->closed && pool->lent == 0;
     pthread_mutex_unlock(&pool->lock);
     if (last) {
@@ -117,7 +123,21 @@ static void recycle(void *owner) {
     }
 }
 
-static const bst_frame_ops ops = {map, unmap, device_buffer, recycle};
+static bool share(void *owner) {
+    pooled_frame *f = owner;
+    bst_frame_pool *pool = f->pool;
+    pthread_mutex_lock(&pool->lock);
+    if (!f->shared && pool->shared < MOST_SHARED) {
+        f->shared = true;
+        pool->shared++;
+    }
+    bool shared = f->shared;
+    pthread_mutex_unlock(&pool->lock);
+    return shared;
+}
+
+static const bst_frame_ops ops = {
+    .map = map, .unmap = unmap, .device_buffer = device_buffer, .recycle = recycle, .share = share};
 
 bst_status bst_frame_pool_create(bst_ctx *ctx, bst_device *device, int width, int height, int count,
                                  bst_frame_pool **out) {

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/pages.h"
 #include "sim/onboard/nav_motion.h"
 #include "tracker/attitude/sky_of_detection.h"
 
@@ -114,7 +115,7 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
                         "tracker: confirm_frames (%lld) must not be less than confirm_hits (%lld)",
                         (long long)config->confirm_frames, (long long)config->confirm_hits);
     }
-    bst_tracker *t = calloc(1, sizeof *t);
+    bst_tracker *t = bst_pages_zero(1, sizeof *t);
     if (!t) {
         return bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
     }
@@ -124,12 +125,12 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
     t->star_user = star_user;
     bst_mtt_params mtt;
     make_params(t, config, &mtt);
-    t->cache = calloc(STAR_CACHE, sizeof *t->cache);
-    t->stars = calloc(MAX_STARS, sizeof *t->stars);
-    t->detections = calloc((size_t)t->max_detections, sizeof *t->detections);
+    t->cache = bst_pages_zero(STAR_CACHE, sizeof *t->cache);
+    t->stars = bst_pages_zero(MAX_STARS, sizeof *t->stars);
+    t->detections = bst_pages_zero((size_t)t->max_detections, sizeof *t->detections);
     /* per track: confirmed, lost, and two kinds of change; four more for the target */
     t->event_capacity = 4 * ((size_t)mtt.max_tracks + (size_t)mtt.max_stationary_tracks + 1) + 4;
-    t->events = calloc(t->event_capacity, sizeof *t->events);
+    t->events = bst_pages_zero(t->event_capacity, sizeof *t->events);
     bst_status status = t->cache && t->stars && t->detections && t->events
                             ? bst_mtt_create(ctx, &mtt, &t->mtt)
                             : bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
@@ -146,11 +147,11 @@ void bst_tracker_free(bst_tracker *t) {
         return;
     }
     bst_mtt_free(t->mtt);
-    free(t->cache);
-    free(t->stars);
-    free(t->detections);
-    free(t->events);
-    free(t);
+    bst_pages_free(t->cache);
+    bst_pages_free(t->stars);
+    bst_pages_free(t->detections);
+    bst_pages_free(t->events);
+    bst_pages_free(t);
 }
 
 /* `cache` is left out: its directions depend on the catalogue alone. */

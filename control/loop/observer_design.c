@@ -33,7 +33,8 @@ static bst_status is_robust(bst_ctx *ctx, const bst_observer_request *r, double 
     return status;
 }
 
-bst_status bst_observer_design(bst_ctx *ctx, const bst_observer_request *request, double *density) {
+/* Searches the largest density with sufficient margins. */
+static bst_status search(bst_ctx *ctx, const bst_observer_request *request, double *density) {
     double high = request->density, low = high;
     bool robust;
     BST_TRY(is_robust(ctx, request, high, &robust));
@@ -61,9 +62,23 @@ bst_status bst_observer_design(bst_ctx *ctx, const bst_observer_request *request
     return BST_OK;
 }
 
+bst_status bst_observer_design(bst_ctx *ctx, const bst_observer_request *request, bst_memo *memo,
+                               double *density) {
+    const bst_memo_call call = {.function = "bst_observer_design",
+                                .arguments = request,
+                                .argument_bytes = sizeof *request,
+                                .result = density,
+                                .result_bytes = sizeof *density};
+    if (!bst_memo_find(memo, &call)) {
+        BST_TRY(search(ctx, request, density));
+        bst_memo_keep(memo, &call);
+    }
+    return BST_OK;
+}
+
 bst_status bst_control_observer_density(bst_ctx *ctx, const bst_control_config *config,
                                         const bst_image_loop_env *timing, double pixel_rad,
-                                        double *density) {
+                                        bst_memo *memo, double *density) {
     if (config->compensator.gain_scale == 0.0) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "gain_scale: 0 leaves an observer no motion that the frames show; give "
@@ -87,5 +102,5 @@ bst_status bst_control_observer_density(bst_ctx *ctx, const bst_control_config *
                                           .servo_lag_s = timing->servo_lag_s,
                                           .density = e.density,
                                           .sigma = floor_rad};
-    return bst_observer_design(ctx, &request, density);
+    return bst_observer_design(ctx, &request, memo, density);
 }

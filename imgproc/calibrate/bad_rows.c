@@ -1,4 +1,5 @@
 #include "imgproc/calibrate/bad_rows.h"
+#include "sim/core/pages.h"
 
 #include <assert.h>
 #include <stdlib.h>
@@ -9,7 +10,7 @@ bst_status bst_bad_rows_create(bst_ctx *ctx, int width, int height, int capacity
     assert(out && width > 0 && height > 0 && capacity >= 0);
     *out = (bst_bad_rows){.width = width, .height = height, .capacity = capacity};
     out->first = calloc((size_t)height + 1, sizeof *out->first);
-    out->column = calloc((size_t)capacity + 1, sizeof *out->column);
+    out->column = bst_pages_zero((size_t)capacity + 1, sizeof *out->column);
     if (!out->first || !out->column) {
         bst_bad_rows_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a map of %d bad pixels", capacity);
@@ -19,7 +20,7 @@ bst_status bst_bad_rows_create(bst_ctx *ctx, int width, int height, int capacity
 
 void bst_bad_rows_free(bst_bad_rows *rows) {
     free(rows->first);
-    free(rows->column);
+    bst_pages_free(rows->column);
     *rows = (bst_bad_rows){0};
 }
 

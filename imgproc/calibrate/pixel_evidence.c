@@ -1,4 +1,5 @@
 #include "imgproc/calibrate/pixel_evidence.h"
+#include "sim/core/pages.h"
 
 #include <assert.h>
 #include <math.h>
@@ -7,8 +8,8 @@
 bst_status bst_pixel_shows_create(bst_ctx *ctx, int capacity, bst_pixel_shows *out) {
     assert(out && capacity >= 0);
     *out = (bst_pixel_shows){.capacity = capacity};
-    out->items = calloc((size_t)capacity + 1, sizeof *out->items);
-    out->checks = calloc((size_t)capacity + 1, sizeof *out->checks);
+    out->items = bst_pages_zero((size_t)capacity + 1, sizeof *out->items);
+    out->checks = bst_pages_zero((size_t)capacity + 1, sizeof *out->checks);
     if (!out->items || !out->checks) {
         bst_pixel_shows_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the maxima of a frame, %d of them",
@@ -18,8 +19,8 @@ bst_status bst_pixel_shows_create(bst_ctx *ctx, int capacity, bst_pixel_shows *o
 }
 
 void bst_pixel_shows_free(bst_pixel_shows *shows) {
-    free(shows->items);
-    free(shows->checks);
+    bst_pages_free(shows->items);
+    bst_pages_free(shows->checks);
     *shows = (bst_pixel_shows){0};
 }
 

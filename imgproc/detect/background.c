@@ -8,6 +8,7 @@
 #include "imgproc/detect/row_kernels.h"
 #include "imgproc/detect/simd_layout.h"
 #include "imgproc/detect/truncated_moments.h"
+#include "sim/core/pages.h"
 
 /* least pixel noise, in ADC steps: the quantisation noise 1 / sqrt(12) */
 static const float QUANTISATION = 0.28867513f;
@@ -51,7 +52,7 @@ bst_status bst_background_create(bst_ctx *ctx, int mesh_px, int max_width, int m
     height = height < (size_t)max_height ? height : (size_t)max_height;
     out->band = band_stride(max_width) * height;
     out->lent = calloc(1, sizeof *out->lent);
-    out->bands = calloc(out->band * (size_t)threads, sizeof(float));
+    out->bands = bst_pages_zero(out->band * (size_t)threads, sizeof(float));
     if (!out->level || !out->noise || !out->error || !out->left || !out->read || !out->scratch ||
         !out->bands || !out->lent) {
         bst_background_free(out);
@@ -68,7 +69,7 @@ void bst_background_free(bst_background *b) {
     free(b->left);
     free(b->read);
     free(b->scratch);
-    free(b->bands);
+    bst_pages_free(b->bands);
     free(b->lent);
     *b = (bst_background){0};
 }

@@ -84,7 +84,7 @@ bst_status bst_imgproc_create(bst_ctx *ctx, const bst_camera *camera, double ele
                         "FWHM, a positive gain, room for a detection, meshes of at least 4 px and "
                         "a positive false-alarm rate");
     }
-    bst_imgproc *ip = calloc(1, sizeof *ip);
+    bst_imgproc *ip = bst_pages_zero(1, sizeof *ip);
     if (!ip) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for image processing");
     }
@@ -123,7 +123,7 @@ void bst_imgproc_free(bst_imgproc *ip) {
     bst_known_psf_free(ip->known);
     bst_pixel_shows_free(&ip->shows);
     bst_columns_free(&ip->columns);
-    free(ip);
+    bst_pages_free(ip);
 }
 
 /* Pixel reader that masks the stars found by the matched filter. */

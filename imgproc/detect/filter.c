@@ -45,7 +45,7 @@ bst_status bst_filter_create(bst_ctx *ctx, const bst_known_psf *known, int max_w
     out->maxima = calloc((size_t)max_height, sizeof *out->maxima);
     out->maximum_x = bst_pages_zero(pixels, sizeof *out->maximum_x);
     out->maximum_snr = bst_pages_zero(pixels, sizeof *out->maximum_snr);
-    out->lines = calloc(out->line_floats * (size_t)threads, sizeof(float));
+    out->lines = bst_pages_zero(out->line_floats * (size_t)threads, sizeof(float));
     out->lent = calloc(1, sizeof *out->lent);
     out->edge_x = calloc((size_t)max_width, sizeof(float));
     out->edge_y = calloc((size_t)max_height, sizeof(float));
@@ -70,7 +70,7 @@ void bst_filter_free(bst_filter *f) {
     free(f->maxima);
     bst_pages_free(f->maximum_x);
     bst_pages_free(f->maximum_snr);
-    free(f->lines);
+    bst_pages_free(f->lines);
     free(f->lent);
     free(f->edge_x);
     free(f->edge_y);

@@ -1,4 +1,5 @@
 #include "imgproc/identify/predicted_stars.h"
+#include "sim/core/pages.h"
 
 #include <assert.h>
 #include <math.h>
@@ -12,8 +13,8 @@ bst_status bst_predicted_stars_create(bst_ctx *ctx, const bst_camera *camera,
     assert(camera && stars && out && capacity > 0);
     *out = (bst_predicted_stars){
         .camera = camera, .stars = stars, .julian_year = julian_year, .capacity = capacity};
-    out->found = calloc((size_t)capacity, sizeof *out->found);
-    out->expected = calloc((size_t)capacity, sizeof *out->expected);
+    out->found = bst_pages_zero((size_t)capacity, sizeof *out->found);
+    out->expected = bst_pages_zero((size_t)capacity, sizeof *out->expected);
     if (!out->found || !out->expected) {
         bst_predicted_stars_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d catalogue stars", capacity);
@@ -22,8 +23,8 @@ bst_status bst_predicted_stars_create(bst_ctx *ctx, const bst_camera *camera,
 }
 
 void bst_predicted_stars_free(bst_predicted_stars *sky) {
-    free(sky->found);
-    free(sky->expected);
+    bst_pages_free(sky->found);
+    bst_pages_free(sky->expected);
     sky->found = NULL;
     sky->expected = NULL;
 }

@@ -22,11 +22,11 @@ bst_status bst_fit_create(bst_ctx *ctx, const bst_imgproc_gauss *psf,
     assert(psf && profiles && out && max_side > 0);
     size_t plane = (size_t)max_side * (size_t)bst_simd_layout_round_up(max_side);
     *out = (bst_fit){.psf = psf, .profiles = profiles, .max_side = max_side};
-    out->value = calloc(plane, sizeof(float));
-    out->fixed = calloc(plane, sizeof(float));
-    out->valid = calloc(plane, sizeof(float));
+    out->value = bst_pages_zero(plane, sizeof(float));
+    out->fixed = bst_pages_zero(plane, sizeof(float));
+    out->valid = bst_pages_zero(plane, sizeof(float));
     out->model = bst_pages_zero(plane * 4 * BST_FIT_MAX_FREE, sizeof(float));
-    out->scratch = calloc(bst_source_profile_scratch(max_side), sizeof(float));
+    out->scratch = bst_pages_zero(bst_source_profile_scratch(max_side), sizeof(float));
     if (!out->value || !out->fixed || !out->valid || !out->model || !out->scratch) {
         bst_fit_free(out);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a fit on %d x %d pixels", max_side,
@@ -36,11 +36,11 @@ bst_status bst_fit_create(bst_ctx *ctx, const bst_imgproc_gauss *psf,
 }
 
 void bst_fit_free(bst_fit *fit) {
-    free(fit->value);
-    free(fit->fixed);
-    free(fit->valid);
+    bst_pages_free(fit->value);
+    bst_pages_free(fit->fixed);
+    bst_pages_free(fit->valid);
     bst_pages_free(fit->model);
-    free(fit->scratch);
+    bst_pages_free(fit->scratch);
     *fit = (bst_fit){0};
 }
 

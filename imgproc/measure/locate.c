@@ -9,6 +9,7 @@
 #include "imgproc/measure/cosmic_ray.h"
 #include "imgproc/measure/peak_centroid.h"
 #include "imgproc/measure/source_moments.h"
+#include "sim/core/pages.h"
 
 enum {
     FIRST_GROUP = 32, /* brightest sources, fitted before the others */
@@ -40,14 +41,14 @@ bst_status bst_imgproc_locator_create(bst_ctx *ctx, const bst_known_psf *known,
                                  .rows = max_height / BST_LOCATE_CELL_PX + 1};
     bst_imgproc_gauss_init(&out->psf);
     bst_scratch_pool_init(&out->lent, threads);
-    out->found = calloc((size_t)capacity, sizeof *out->found);
-    out->next = calloc((size_t)capacity, sizeof *out->next);
+    out->found = bst_pages_zero((size_t)capacity, sizeof *out->found);
+    out->next = bst_pages_zero((size_t)capacity, sizeof *out->next);
     out->from = calloc((size_t)capacity, sizeof *out->from);
-    out->chosen = calloc(
+    out->chosen = bst_pages_zero(
         (size_t)max_width * (size_t)max_height / 4 + (size_t)max_width + (size_t)max_height + 1, 1);
     out->cell = calloc((size_t)out->columns * (size_t)out->rows, sizeof *out->cell);
     out->charged_capacity = 16 * capacity;
-    out->charged = calloc((size_t)out->charged_capacity, sizeof *out->charged);
+    out->charged = bst_pages_zero((size_t)out->charged_capacity, sizeof *out->charged);
     out->fits = calloc((size_t)threads, sizeof *out->fits);
     if (!out->found || !out->next || !out->from || !out->chosen || !out->cell || !out->charged ||
         !out->fits) {
@@ -65,12 +66,12 @@ bst_status bst_imgproc_locator_create(bst_ctx *ctx, const bst_known_psf *known,
 }
 
 void bst_imgproc_locator_free(bst_imgproc_locator *l) {
-    free(l->found);
-    free(l->next);
+    bst_pages_free(l->found);
+    bst_pages_free(l->next);
     free(l->from);
-    free(l->chosen);
+    bst_pages_free(l->chosen);
     free(l->cell);
-    free(l->charged);
+    bst_pages_free(l->charged);
     for (int i = 0; l->fits && i < l->threads; i++) {
         bst_fit_free(&l->fits[i]);
     }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "imgproc/measure/source_profile_internal.h"
+#include "sim/core/pages.h"
 
 enum { SIDE = BST_PSF_MAX_SIDE + BST_LANES };
 
@@ -14,7 +15,7 @@ bst_status bst_source_profiles_create(bst_ctx *ctx, const bst_known_psf *known,
     int length = known ? bst_simd_layout_round_up(2 * known->reach_px + 1) : BST_PROFILE_LENGTH;
     size_t row = (size_t)(BST_PROFILE_PHASES + 1) * PARTS * (size_t)(length + BST_LANES);
     size_t terms = known ? (size_t)known->terms : 1, nodes = known ? (size_t)known->nodes : 1;
-    out->rows = calloc(BST_LANES + nodes * terms * row, sizeof(float));
+    out->rows = bst_pages_zero(BST_LANES + nodes * terms * row, sizeof(float));
     out->down = known ? calloc(BST_LANES + terms * row, sizeof(float)) : NULL;
     if (!out->rows || (known && !out->down)) {
         bst_source_profiles_free(out);
@@ -24,7 +25,7 @@ bst_status bst_source_profiles_create(bst_ctx *ctx, const bst_known_psf *known,
 }
 
 void bst_source_profiles_free(bst_source_profiles *p) {
-    free(p->rows);
+    bst_pages_free(p->rows);
     free(p->down);
     *p = (bst_source_profiles){0};
 }

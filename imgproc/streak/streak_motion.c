@@ -41,9 +41,9 @@ typedef struct bst_streak_motion_star {
 bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side, bst_streak_motion *out) {
     out->max_side = max_side;
     size_t plane = (size_t)max_side * (size_t)bst_simd_layout_round_up(max_side);
-    out->planes = calloc(plane * (BST_IMAGE_MOTION_PLANES + 2), sizeof *out->planes);
-    out->scratch = calloc(bst_source_profile_scratch(max_side), sizeof *out->scratch);
-    out->pixels = calloc(plane * 2 * BST_STREAK_MOTION_STARS, sizeof *out->pixels);
+    out->planes = bst_pages_zero(plane * (BST_IMAGE_MOTION_PLANES + 2), sizeof *out->planes);
+    out->scratch = bst_pages_zero(bst_source_profile_scratch(max_side), sizeof *out->scratch);
+    out->pixels = bst_pages_zero(plane * 2 * BST_STREAK_MOTION_STARS, sizeof *out->pixels);
     out->stars = calloc(BST_STREAK_MOTION_STARS, sizeof *out->stars);
     if (!out->planes || !out->scratch || !out->pixels || !out->stars) {
         bst_streak_motion_free(out);
@@ -53,9 +53,9 @@ bst_status bst_streak_motion_create(bst_ctx *ctx, int max_side, bst_streak_motio
 }
 
 void bst_streak_motion_free(bst_streak_motion *work) {
-    free(work->planes);
-    free(work->scratch);
-    free(work->pixels);
+    bst_pages_free(work->planes);
+    bst_pages_free(work->scratch);
+    bst_pages_free(work->pixels);
     free(work->stars);
     *work = (bst_streak_motion){0};
 }
@@ -140,6 +140,7 @@ static bool solve(int n, double a[LOCAL][LOCAL], int count, double x[][LOCAL]) {
 enum { ALL = LOCAL + COMMON, SUMS = ALL * (ALL + 3) / 2 };
 
 #define BST_SIMD_KERNELS "imgproc/streak/streak_motion_kernels.inc"
+#include "sim/core/pages.h"
 #include "sim/core/simd_each.inc"
 
 /* Loads a star's pixels, all usable, followed by their validity 1. */

@@ -3,6 +3,7 @@
 #ifndef BORESIGHT_FRAME_H
 #define BORESIGHT_FRAME_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "boresight/status.h"
@@ -22,6 +23,9 @@ typedef struct bst_frame_ops {
     void *(*device_buffer)(void *owner);
     /* Called when the last reference is released: returns the buffer to the pool. */
     void (*recycle)(void *owner);
+    /* May be NULL: refuses. Asks to keep the frame for a clone of the simulation, which may hold it
+     * for any time. False: the owner needs the buffer; the clone copies the pixels. Any thread. */
+    bool (*share)(void *owner);
 } bst_frame_ops;
 
 /* The owner embeds this in its own frame object (no allocation per frame). */

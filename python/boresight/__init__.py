@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .frame import Frame as Frame
     from .messages import *  # noqa: F401,F403
     from .model import Model as Model
+    from .pool import Pool as Pool
     from .record import Message as Message
     from .record import Record as Record
     from .run_folder import Run as Run
@@ -52,6 +53,7 @@ _PLACES = {
     "commands": ["los_command"],
     "frame": ["Frame"],
     "model": ["Model"],
+    "pool": ["Pool"],
     "record": ["Message", "Record"],
     "run_folder": ["Run", "read_run"],
     "scenario": ["Scenario"],

@@ -48,19 +48,29 @@ class Guard:
         self.context = Context()
         self.lent = LentCount()
 
-    @contextlib.contextmanager
-    def use(self) -> Iterator[SimHandle]:
-        """The C object for one call."""
+    def take(self) -> SimHandle:
+        """The C object, for this caller alone until `give_back`."""
         if os.getpid() != self._process:
             raise ForkError("this simulation belongs to the process from which this one was "
                             "forked: create it here, or restore a snapshot of it here")
         if not self._lock.acquire(blocking=False):
             raise BusyError("the simulation is in use: by another thread, or by the call whose "
                             "callback this is; a simulation is for one thread at a time")
+        if self._handle is None:
+            self._lock.release()
+            raise ClosedError("the simulation is closed")
+        return self._handle
+
+    def give_back(self) -> None:
+        """Ends a `take`."""
+        self._lock.release()
+
+    @contextlib.contextmanager
+    def use(self) -> Iterator[SimHandle]:
+        """The C object for one call."""
+        handle = self.take()
         try:
-            if self._handle is None:
-                raise ClosedError("the simulation is closed")
-            yield self._handle
+            yield handle
         finally:
             self._lock.release()
 

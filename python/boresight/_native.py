@@ -110,6 +110,13 @@ _FUNCTIONS = {
     "bst_archive_count": (c_int, [c_void_p, c_int, c_int]),
     "bst_sim_restore": (c_int, [c_void_p, c_void_p, c_char_p, c_size_t, c_uint]),
     "bst_sim_clone": (c_int, [c_void_p, c_void_p, POINTER(c_void_p)]),
+    "bst_sim_pool_create": (c_int, [c_void_p, c_int, POINTER(c_void_p)]),
+    "bst_sim_pool_free": (None, [c_void_p]),
+    "bst_sim_pool_step": (c_int, [c_void_p, c_void_p, c_void_p, c_int, c_char_p, c_void_p,
+                                  c_double, c_void_p]),
+    "bst_sim_pool_view": (c_int, [c_void_p, c_void_p, c_int, c_char_p, c_char_p,
+                                  POINTER(_structs.SimColumns)]),
+    "bst_sim_pool_command": (c_int, [c_void_p, c_void_p, c_int, c_char_p, c_char_p, c_void_p]),
 }
 
 

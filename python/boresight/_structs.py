@@ -54,6 +54,13 @@ class SimFrame(ctypes.Structure):
     _fields_ = [("message", c_void_p), ("pixels", c_void_p), ("width", c_int), ("height", c_int)]
 
 
+class SimColumns(ctypes.Structure):
+    """bst_sim_columns."""
+    C_NAME = "bst_sim_columns"
+    _fields_ = [("headers", c_void_p), ("items", c_void_p), ("item_capacity", c_int),
+                ("item_counts", c_void_p), ("written_at", c_void_p)]
+
+
 class Vec3(ctypes.Structure):
     """bst_vec3."""
     C_NAME = "bst_vec3"
@@ -150,7 +157,7 @@ class FrameStage(ctypes.Structure):
 STAGE_ABI = 2
 """BST_STAGE_ABI."""
 
-ALL: List[Type[Any]] = [Context, ModelOptions, SimOptions, SimObserver, SimMessage, SimFrame, Vec3,
+ALL: List[Type[Any]] = [Context, ModelOptions, SimOptions, SimObserver, SimMessage, SimFrame, SimColumns, Vec3,
                         ChannelType, Window, CameraHead, StageDesc, DetectorEnv, DetectorFrame,
                         FrameStageEnv, FrameStageFrame, DetectorStage, FrameStage]
 

@@ -383,6 +383,11 @@ class Simulation(ChannelViews):
             raise_of(sim)
         self._observers.finish(status)
 
+    def _raise_pending(self, sim: SimHandle) -> None:
+        """Raises what a stage in Python or an observer has raised in a call, if anything."""
+        raise_of(sim)
+        self._observers.finish(0)
+
     def __reduce__(self) -> Any:
         return _unpickled, (self.model, self.save())
 

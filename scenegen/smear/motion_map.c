@@ -7,6 +7,7 @@
 
 #include "boresight/vec.h"
 #include "scenegen/kernels/scene_shared.h"
+#include "sim/core/pages.h"
 
 /* Cells per axis: stars of a cell move alike to within UNLIKE of the path length, or UNLIKE_MANY if
  * most cells are used. ANCHORS: nodes about which light is summed. */
@@ -48,7 +49,7 @@ struct bst_motion_map {
 };
 
 bst_status bst_motion_map_create(bst_ctx *ctx, bst_motion_map **out) {
-    *out = calloc(1, sizeof **out);
+    *out = bst_pages_zero(1, sizeof **out);
     return *out ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the motion of the field");
 }
 
@@ -56,7 +57,7 @@ void bst_motion_map_free(bst_motion_map *map) {
     if (map) {
         free(map->turns);
         free(map->places);
-        free(map);
+        bst_pages_free(map);
     }
 }
 

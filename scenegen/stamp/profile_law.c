@@ -24,15 +24,47 @@ static double share(double sigma_px, double f, int d, int order) {
     return value;
 }
 
-/* Powers of g, |g| <= 1, of the interpolation polynomial through `count` Chebyshev nodes. */
-static void interpolate(double sigma_px, int d, int order, int count, double *power) {
-    double chebyshev[BST_LAW_MOST_DEGREE + 1],
-        before[BST_LAW_MOST_DEGREE + 2] = {0}, now[BST_LAW_MOST_DEGREE + 2] = {1.0};
+enum { MOST_NODES = BST_LAW_MOST_DEGREE + 1, CENTRAL_PX = 4, ERROR_POINTS = 64 };
+
+/* Chebyshev nodes: their places in [-1, 1], and the polynomials T(k) there. */
+typedef struct chebyshev_nodes {
+    int count;
+    double place[MOST_NODES], polynomial[MOST_NODES][MOST_NODES]; /* [k][node] */
+} chebyshev_nodes;
+
+static void set_nodes(chebyshev_nodes *nodes, int count) {
+    assert(count > 0 && count <= MOST_NODES);
+    nodes->count = count;
+    for (int n = 0; n < count; n++) {
+        double angle = BST_PI * (n + 0.5) / count;
+        nodes->place[n] = cos(angle);
+        for (int k = 0; k < count; k++) {
+            nodes->polynomial[k][n] = cos(k * angle);
+        }
+    }
+}
+
+/* Nodes of a law's three orders. */
+static void set_orders(chebyshev_nodes nodes[3], int degree) {
+    const int counts[3] = {degree + 1, BST_LAW_FIRST, BST_LAW_SECOND};
+    for (int order = 0; order < 3; order++) {
+        set_nodes(&nodes[order], counts[order]);
+    }
+}
+
+/* Powers of g, |g| <= 1, of the interpolation polynomial through Chebyshev nodes. */
+static void interpolate(const chebyshev_nodes *nodes, double sigma_px, int d, int order,
+                        double *power) {
+    const int count = nodes->count;
+    double value[MOST_NODES], chebyshev[MOST_NODES],
+        before[MOST_NODES + 1] = {0}, now[MOST_NODES + 1] = {1.0};
+    for (int n = 0; n < count; n++) {
+        value[n] = share(sigma_px, 0.5 * (nodes->place[n] + 1.0), d, order);
+    }
     for (int k = 0; k < count; k++) {
         chebyshev[k] = power[k] = 0.0;
         for (int n = 0; n < count; n++) {
-            double angle = BST_PI * (n + 0.5) / count;
-            chebyshev[k] += share(sigma_px, 0.5 * (cos(angle) + 1.0), d, order) * cos(k * angle);
+            chebyshev[k] += value[n] * nodes->polynomial[k][n];
         }
         chebyshev[k] *= (k == 0 ? 1.0 : 2.0) / count;
     }
@@ -56,34 +88,57 @@ static double value_of(const double *power, int count, double g) {
     return v;
 }
 
-/* Error of the law near the centre for a widened PSF, relative to the central share. */
-static double law_error(double sigma_px, int degree, double widening) {
-    const int counts[3] = {degree + 1, BST_LAW_FIRST, BST_LAW_SECOND};
-    double worst = 0.0;
-    for (int d = 1; d <= 4; d++) {
-        double power[3][BST_LAW_MOST_DEGREE + 1];
-        for (int order = 0; order < 3; order++) {
-            interpolate(sigma_px, d, order, counts[order], power[order]);
-        }
-        for (int k = 0; k <= 64; k++) {
-            double g = k / 32.0 - 1.0, law = 0.0;
-            for (int order = 2; order >= 0; order--) {
-                law = law * widening + value_of(power[order], counts[order], g);
-            }
-            double truth = share(sigma_px * sqrt(1.0 + widening), 0.5 * (g + 1.0), d, 0);
-            worst = fmax(worst, fabs(law - truth));
+/* The law near the centre, of pixels 1 to CENTRAL_PX. */
+typedef struct central_law {
+    double sigma_px;
+    int counts[3];
+    double power[CENTRAL_PX][3][MOST_NODES];
+} central_law;
+
+static void set_central(central_law *law, double sigma_px, int degree) {
+    chebyshev_nodes nodes[3];
+    set_orders(nodes, degree);
+    law->sigma_px = sigma_px;
+    for (int order = 0; order < 3; order++) {
+        law->counts[order] = nodes[order].count;
+        for (int d = 1; d <= CENTRAL_PX; d++) {
+            interpolate(&nodes[order], sigma_px, d, order, law->power[d - 1][order]);
         }
     }
-    return worst / share(sigma_px, 0.0, 0, 0);
+}
+
+/* Error of the law for a widened PSF, relative to the central share. Above `limit` it is only a
+ * lower bound: the search ends at the first point where it exceeds the limit. */
+static double law_error(const central_law *law, double widening, double limit) {
+    double worst = 0.0, peak = share(law->sigma_px, 0.0, 0, 0);
+    for (int d = 1; d <= CENTRAL_PX; d++) {
+        for (int k = 0; k <= ERROR_POINTS; k++) {
+            double g = k / (0.5 * ERROR_POINTS) - 1.0, value = 0.0;
+            for (int order = 2; order >= 0; order--) {
+                value =
+                    value * widening + value_of(law->power[d - 1][order], law->counts[order], g);
+            }
+            double truth = share(law->sigma_px * sqrt(1.0 + widening), 0.5 * (g + 1.0), d, 0);
+            worst = fmax(worst, fabs(value - truth));
+            if (worst / peak > limit) {
+                return worst / peak;
+            }
+        }
+    }
+    return worst / peak;
 }
 
 double bst_profile_law_error(double sigma_px, int degree) {
-    return law_error(sigma_px, degree, 0.0);
+    central_law law;
+    set_central(&law, sigma_px, degree);
+    return law_error(&law, 0.0, INFINITY);
 }
 
 int bst_profile_law_degree(double sigma_px) {
     for (int degree = 5; degree <= BST_LAW_MOST_DEGREE; degree += 2) {
-        if (bst_profile_law_error(sigma_px, degree) < 0.1 * BST_LAW_ERROR) {
+        central_law law;
+        set_central(&law, sigma_px, degree);
+        if (law_error(&law, 0.0, 0.1 * BST_LAW_ERROR) < 0.1 * BST_LAW_ERROR) {
             return degree;
         }
     }
@@ -92,7 +147,9 @@ int bst_profile_law_degree(double sigma_px) {
 
 double bst_profile_law_widest(double sigma_px, int degree) {
     double widest = 0.1;
-    while (widest > 1e-6 && law_error(sigma_px, degree, widest) > BST_LAW_ERROR) {
+    central_law law;
+    set_central(&law, sigma_px, degree);
+    while (widest > 1e-6 && law_error(&law, widest, BST_LAW_ERROR) > BST_LAW_ERROR) {
         widest *= 0.8;
     }
     return widest;
@@ -104,12 +161,13 @@ int bst_profile_law_floats(int degree, int reach) {
 
 void bst_profile_law(double sigma_px, int degree, int reach, float *law) {
     assert(law && sigma_px > 0.0 && degree % 2 == 1 && reach >= 0);
-    const int counts[3] = {degree + 1, BST_LAW_FIRST, BST_LAW_SECOND};
+    chebyshev_nodes nodes[3];
+    set_orders(nodes, degree);
     for (int d = 1; d <= reach; d++) {
         for (int order = 0; order < 3; order++) {
-            double power[BST_LAW_MOST_DEGREE + 1];
-            interpolate(sigma_px, d, order, counts[order], power);
-            for (int i = 0; i < counts[order]; i++) {
+            double power[MOST_NODES];
+            interpolate(&nodes[order], sigma_px, d, order, power);
+            for (int i = 0; i < nodes[order].count; i++) {
                 *law++ = (float)power[i];
             }
         }

@@ -114,21 +114,41 @@ bst_status bst_sim_restore_file(bst_ctx *ctx, bst_sim *sim, const char *path, un
     return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "%s", path);
 }
 
+/* Copies the state of a sim into one that was created with the same run number. The copy refers to
+ * the frames, which a device of their own would not outlive. */
+static bst_status copy_state(bst_ctx *ctx, bst_sim *from, bst_sim *to) {
+    const bool refers = from->own == NULL;
+    bst_archive *saved, *read = NULL;
+    size_t size;
+    BST_TRY(bst_archive_create(ctx, &saved));
+    if (refers) {
+        bst_archive_refer(saved);
+    }
+    bst_status status = bst_simulation_archive(ctx, from->simulation, saved, BST_STATE_ALL);
+    if (status == BST_OK) {
+        const void *bytes = bst_archive_data(saved, &size);
+        status = bst_archive_open(ctx, bytes, size, &read);
+    }
+    if (status == BST_OK && refers) {
+        bst_archive_refer(read);
+    }
+    if (status == BST_OK) {
+        status = bst_simulation_archive(ctx, to->simulation, read, BST_STATE_ALL);
+    }
+    bst_archive_free(read);
+    bst_archive_free(saved);
+    to->tick = from->tick;
+    return status;
+}
+
 bst_status bst_sim_clone(bst_ctx *ctx, bst_sim *sim, bst_sim **out) {
     assert(sim && out);
     *out = NULL;
-    void *bytes;
-    size_t size;
-    BST_TRY(bst_sim_save(ctx, sim, &bytes, &size));
+    BST_TRY(check_idle(ctx, sim));
     const bst_sim_options options = {.other_run = true, .run = bst_sim_run(sim)};
-    bst_sim *copy = NULL;
-    bst_status status = bst_sim_create(ctx, sim->model, &options, &copy);
-    if (status == BST_OK) {
-        bst_state_head head;
-        memcpy(&head, bytes, sizeof head);
-        status = restore_components(ctx, copy, &head, bytes, BST_STATE_ALL);
-    }
-    bst_state_free(bytes);
+    bst_sim *copy;
+    BST_TRY(bst_sim_create(ctx, sim->model, &options, &copy));
+    bst_status status = copy_state(ctx, sim, copy);
     if (status != BST_OK) {
         bst_sim_free(copy);
         return status;

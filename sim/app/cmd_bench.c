@@ -73,7 +73,8 @@ int bst_cmd_bench(int argc, char **argv) {
          .target = &options.scenario,
          .path = BST_PATH_INPUT,
          .argument = "FILE",
-         .doc = "scenario of loop_full (default scenarios/neossat_geo_track.json)"},
+         .doc = "scenario of loop_full, sim_* and env_* (default "
+                "scenarios/neossat_geo_track.json)"},
         {.name = "first-frame",
          .kind = BST_OPTION_FLAG,
          .target = &first_frame,

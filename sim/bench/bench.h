@@ -125,6 +125,22 @@ bst_status bst_bench_open_loop(bst_ctx *ctx, const bst_bench *self,
 bst_status bst_bench_link(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
                           bst_bench_result *out) BST_MUST_CHECK;
 
+/* Benchmark: a second simulation on a model (bench_sims.c). */
+bst_status bst_bench_sim_create(bst_ctx *ctx, const bst_bench *self,
+                                const bst_bench_options *options,
+                                bst_bench_result *out) BST_MUST_CHECK;
+/* Benchmark: the clone of a running simulation (bench_sims.c). */
+bst_status bst_bench_sim_clone(bst_ctx *ctx, const bst_bench *self,
+                               const bst_bench_options *options,
+                               bst_bench_result *out) BST_MUST_CHECK;
+/* Benchmark: a simulation that the program commands each frame: the least that an environment of
+ * Python can cost (bench_envs.c). */
+bst_status bst_bench_env(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
+                         bst_bench_result *out) BST_MUST_CHECK;
+/* Benchmark: 64 of them in threads (bench_envs.c). */
+bst_status bst_bench_envs(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
+                          bst_bench_result *out) BST_MUST_CHECK;
+
 /* Times of repeated calls. */
 enum { BST_BENCH_TIMES = 4096 };
 typedef struct bst_bench_clock {

@@ -18,6 +18,7 @@ enum { NAME_BYTES = 256, FIRST_ROOM = 4096 };
 struct bst_archive {
     bst_ctx *ctx;
     bool restoring;
+    bool refers;          /* bst_archive_refer */
     unsigned char *saved; /* NULL while restoring */
     const unsigned char *bytes;
     size_t size, room, position; /* position: of the next byte to restore */
@@ -45,6 +46,14 @@ bst_status bst_archive_open(bst_ctx *ctx, const void *bytes, size_t size, bst_ar
     (*out)->bytes = bytes;
     (*out)->size = size;
     return BST_OK;
+}
+
+void bst_archive_refer(bst_archive *archive) {
+    archive->refers = true;
+}
+
+bool bst_archive_refers(const bst_archive *archive) {
+    return archive->refers;
 }
 
 void bst_archive_free(bst_archive *archive) {

@@ -21,6 +21,14 @@ bst_status bst_archive_create(bst_ctx *ctx, bst_archive **out) BST_MUST_CHECK;
 bst_status bst_archive_open(bst_ctx *ctx, const void *bytes, size_t size,
                             bst_archive **out) BST_MUST_CHECK;
 
+/* Lets an archive refer to frames by their address instead of their pixels: it is restored in this
+ * process, while the simulation that it saves is unchanged.
+ *
+ * Notes:     of an archive to save to and of the one that restores from its bytes. */
+void bst_archive_refer(bst_archive *archive);
+/* True after bst_archive_refer. */
+bool bst_archive_refers(const bst_archive *archive);
+
 /* Frees an archive and the bytes that it saved; NULL is allowed. */
 void bst_archive_free(bst_archive *archive);
 

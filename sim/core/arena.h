@@ -46,8 +46,8 @@ typedef struct bst_arena {
     bool overflow;     /* the bytes exceed SIZE_MAX */
 } bst_arena;
 
-/* Alignment of an array, that of malloc; arenas of this many bytes take whole pages. */
-enum { BST_ARENA_ALIGNMENT = 16, BST_ARENA_PAGES = 256 << 10 };
+/* Alignment of an array, that of malloc. */
+enum { BST_ARENA_ALIGNMENT = 16 };
 
 /* Memory for `count` elements of `bytes` each, zero; NULL while the bytes are added up. */
 static inline void *bst_arena_take(bst_arena *a, size_t count, size_t bytes) {
@@ -77,9 +77,7 @@ static inline void *bst_arena_take(bst_arena *a, size_t count, size_t bytes) {
 /* Allocates what was added up, zero; arrays are then taken anew. BST_ERR_MEMORY. */
 static inline bst_status bst_arena_alloc(bst_ctx *ctx, bst_arena *a, const char *what) {
     assert(!a->memory);
-    a->memory = a->overflow                  ? NULL
-                : a->used >= BST_ARENA_PAGES ? bst_pages_zero(1, a->used + 1)
-                                             : calloc(1, a->used + 1);
+    a->memory = a->overflow ? NULL : bst_pages_zero(1, a->used + 1);
     if (!a->memory) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %s", what);
     }
@@ -90,11 +88,7 @@ static inline bst_status bst_arena_alloc(bst_ctx *ctx, bst_arena *a, const char 
 
 /* Frees all arrays that were taken. */
 static inline void bst_arena_free(bst_arena *a) {
-    if (a->room >= BST_ARENA_PAGES) {
-        bst_pages_free(a->memory);
-    } else {
-        free(a->memory);
-    }
+    bst_pages_free(a->memory);
     *a = (bst_arena){0};
 }
 

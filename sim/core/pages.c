@@ -3,10 +3,13 @@
 
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/mman.h>
 
 #define VECTOR ((size_t)64)
 #define LARGE_PAGE ((size_t)2 << 20)
+/* bytes below which clearing memory costs less than mapping pages and their first use */
+#define SMALL ((size_t)32 << 10)
 
 void *bst_pages_alloc(size_t bytes) {
     size_t align = bytes >= 2 * LARGE_PAGE ? LARGE_PAGE : VECTOR;
@@ -37,19 +40,32 @@ void *bst_pages_zero(size_t count, size_t bytes) {
     if (bytes > 0 && count > (PTRDIFF_MAX - VECTOR) / bytes) {
         return NULL;
     }
-    size_t whole = count * bytes + VECTOR; /* the size stands before the array */
-    void *pages = mmap(NULL, whole, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    if (pages == MAP_FAILED) {
-        return NULL;
+    size_t whole = count * bytes + VECTOR, mapped = whole < SMALL ? 0 : whole;
+    void *memory;
+    if (mapped == 0) {
+        if (posix_memalign(&memory, VECTOR, whole) != 0) {
+            return NULL;
+        }
+        memset(memory, 0, whole);
+    } else {
+        memory = mmap(NULL, whole, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+        if (memory == MAP_FAILED) {
+            return NULL;
+        }
     }
-    *(size_t *)pages = whole;
-    return (char *)pages + VECTOR;
+    *(size_t *)memory = mapped; /* before the array: the size to unmap */
+    return (char *)memory + VECTOR;
 }
 
 void bst_pages_free(void *memory) {
     if (memory) {
-        void *pages = (char *)memory - VECTOR;
-        (void)munmap(pages, *(size_t *)pages);
+        void *whole = (char *)memory - VECTOR;
+        size_t mapped = *(size_t *)whole;
+        if (mapped == 0) {
+            free(whole);
+        } else {
+            (void)munmap(whole, mapped);
+        }
     }
 }
 #endif

@@ -9,7 +9,8 @@
 void *bst_pages_alloc(size_t bytes);
 
 /* Allocates zeros whose pages the system provides at their first use: a large array costs what is
- * used of it, also when the allocator has memory to reuse, which calloc would clear.
+ * used of it, also when the allocator has memory to reuse, which calloc would clear. A small one
+ * comes from the allocator.
  *
  * Returned:  aligned to 64 bytes; NULL: out of memory. Free with bst_pages_free */
 void *bst_pages_zero(size_t count, size_t bytes);

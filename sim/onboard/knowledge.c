@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/memo.h"
 #include "sim/onboard/knowledge_internal.h"
 #include "sim/optics/psf.h"
 
@@ -74,7 +75,10 @@ bst_status bst_knowledge_create(bst_ctx *ctx, const bst_world *world, int observ
                                    observer, sensor);
         }
     }
-    bst_status status = alter_camera(ctx, &config->knowledge.camera, k);
+    bst_status status = bst_memo_create(ctx, &k->memo);
+    if (status == BST_OK) {
+        status = alter_camera(ctx, &config->knowledge.camera, k);
+    }
     const bst_star_errors_config *errors = &config->knowledge.stars;
     if (status == BST_OK &&
         (errors->missing_fraction > 0.0 || errors->position_error_fraction > 0.0)) {
@@ -93,6 +97,7 @@ void bst_knowledge_free(bst_knowledge *k) {
     if (k) {
         bst_stars_close(k->altered);
         bst_stars_close(k->own_stars);
+        bst_memo_free(k->memo);
         free(k);
     }
 }
@@ -108,6 +113,9 @@ const bst_psf *bst_knowledge_psf(const bst_knowledge *k) {
     return k->psf;
 }
 
+struct bst_memo *bst_knowledge_memo(const bst_knowledge *k) {
+    return k->memo;
+}
 const bst_camera *bst_knowledge_camera(const bst_knowledge *k) {
     return &k->camera;
 }

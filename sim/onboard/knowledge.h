@@ -14,6 +14,9 @@ typedef struct bst_knowledge bst_knowledge;
 /* Camera model on board, with a Gaussian PSF: for another known PSF (bst_knowledge_psf) the
  * Gaussian with the same noise-equivalent area. */
 const bst_camera *bst_knowledge_camera(const bst_knowledge *knowledge);
+/* Memo of parameters that onboard modules derive from their configuration; modules of several
+ * simulations may share it. */
+struct bst_memo *bst_knowledge_memo(const bst_knowledge *knowledge);
 /* Onboard PSF, valid as long as the world; NULL: Gaussian with the camera's psf_fwhm_px, or from a
  * file (see bst_knowledge_psf_file). Without an error in knowledge.camera it is the true PSF. */
 const struct bst_psf *bst_knowledge_psf(const bst_knowledge *knowledge);

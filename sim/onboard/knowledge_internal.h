@@ -14,6 +14,7 @@ struct bst_knowledge {
     const struct bst_psf *psf; /* borrowed from the world; NULL: Gaussian of the camera */
     int observer, sensor;
     double julian_year;
+    struct bst_memo *memo;
 };
 
 /* the cue's direction is cached at whole seconds and interpolated from six of them */

@@ -298,6 +298,45 @@ static void clones_go_the_same_way(void **state) {
     bst_model_free(model);
 }
 
+/* Clones of each of many frames, kept while the simulation goes on and after its end: they hold the
+ * pixels, and the simulation does not run out of frames. */
+static void clones_keep_their_frames(void **state) {
+    (void)state;
+    enum { CLONES = 20, PIXELS = 128 * 96 };
+    static uint16_t pixels[CLONES][PIXELS];
+    bst_ctx ctx;
+    bst_model *model = load(&ctx, main_scenario, NULL, 0);
+    bst_sim *sim = create(&ctx, model), *other = create(&ctx, model), *clones[CLONES], *second;
+    bst_sim_frame frame;
+    bool arrived;
+    const uint64_t expected = hash_until(&ctx, other, 25.0);
+    heard h = {1, 0};
+    bst_sim_observe(sim, &(bst_sim_observer){.user = &h, .message = hear});
+    for (int k = 0; k < CLONES; k++) {
+        bst_assert_ok(&ctx, bst_sim_step(&ctx, sim, NULL, "frame", 25.0, &arrived));
+        assert_true(arrived);
+        bst_assert_ok(&ctx, bst_sim_view_frame(&ctx, sim, NULL, &frame));
+        memcpy(pixels[k], frame.pixels, sizeof pixels[k]);
+        bst_assert_ok(&ctx, bst_sim_clone(&ctx, sim, &clones[k]));
+    }
+    bst_assert_ok(&ctx, bst_sim_run_until(&ctx, sim, 25.0));
+    assert_true(h.hash == expected); /* as without clones */
+    bst_sim_free(sim);
+    for (int k = 0; k < CLONES; k++) {
+        bst_assert_ok(&ctx, bst_sim_view_frame(&ctx, clones[k], NULL, &frame));
+        assert_int_equal(frame.message->exposure_id, k);
+        assert_memory_equal(frame.pixels, pixels[k], sizeof pixels[k]);
+        /* a clone of the clone holds the same frame */
+        bst_assert_ok(&ctx, bst_sim_clone(&ctx, clones[k], &second));
+        bst_sim_free(clones[k]);
+        bst_assert_ok(&ctx, bst_sim_view_frame(&ctx, second, NULL, &frame));
+        assert_memory_equal(frame.pixels, pixels[k], sizeof pixels[k]);
+        bst_sim_free(second);
+    }
+    bst_sim_free(other);
+    bst_model_free(model);
+}
+
 /* Going back in time, and another run number: what is kept and what changes. */
 static void restores_components(void **state) {
     (void)state;
@@ -390,6 +429,7 @@ int main(void) {
         cmocka_unit_test(commands_to_external_modules),
         cmocka_unit_test(states_of_objects),
         cmocka_unit_test(clones_go_the_same_way),
+        cmocka_unit_test(clones_keep_their_frames),
         cmocka_unit_test(restores_components),
         cmocka_unit_test(wrong_states_are_refused),
     };

@@ -58,8 +58,8 @@ static bst_loop_margins margins_of(const bst_control_config *config, double peri
     bst_control_config plain = *config;
     plain.robust_observer = false;
     double asked, density;
-    bst_assert_ok(&ctx, bst_control_observer_density(&ctx, &plain, &env, 1.0, &asked));
-    bst_assert_ok(&ctx, bst_control_observer_density(&ctx, config, &env, 1.0, &density));
+    bst_assert_ok(&ctx, bst_control_observer_density(&ctx, &plain, &env, 1.0, NULL, &asked));
+    bst_assert_ok(&ctx, bst_control_observer_density(&ctx, config, &env, 1.0, NULL, &density));
     assert_true(density <= asked && density > 0.0);
     *lowered = density < asked;
     bst_tracking_observer observer = {.motion_gain = 1.0};

@@ -21,9 +21,30 @@ static void memory_of_any_size_is_aligned(void **state) {
     assert_null(bst_pages_alloc(SIZE_MAX / 2 + 1));
 }
 
+/* Zeros of any size, also where an array that was freed before has left other content. */
+static void zeros_of_any_size(void **state) {
+    (void)state;
+    const size_t sizes[] = {0, 1, 100, 32703, 32704, 100000, 3000000};
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        for (int round = 0; round < 2; round++) {
+            unsigned char *memory = bst_pages_zero(sizes[i], 1);
+            assert_non_null(memory);
+            for (size_t k = 0; k < sizes[i]; k++) {
+                assert_int_equal(memory[k], 0);
+                memory[k] = 0xA5;
+            }
+            bst_pages_free(memory);
+        }
+    }
+    bst_pages_free(NULL);
+    assert_null(bst_pages_zero(SIZE_MAX, 1));
+    assert_null(bst_pages_zero(SIZE_MAX / 4, 8));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(memory_of_any_size_is_aligned),
+        cmocka_unit_test(zeros_of_any_size),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,5 @@
 """Gymnasium environments; left out (exit code 77) where Gymnasium is not installed."""
+import os
 import sys
 import unittest
 import warnings
@@ -48,7 +49,7 @@ class Pointing(unittest.TestCase):
         env = bg.PointingEnv(model=self.model, offset_px=0)
         env.reset(seed=1)
         def object_px():
-            items = env._sim.truth.items
+            items = env.simulation.truth.items
             item = items[items["kind"] == 1][0]
             return np.array([item["x_mid_px"], item["y_mid_px"]])
         for _ in range(2):
@@ -101,6 +102,26 @@ class Pointing(unittest.TestCase):
             ended = terminated | truncated
         self.assertTrue(ended.any())
         vector.close()
+
+    def test_many_environments_have_one_pool_of_threads(self):
+        before = len(os.listdir("/proc/self/task"))
+        vector = bg.PointingVectorEnv(24, model=self.model, threads=3)
+        vector.reset(seed=1)
+        vector.step(np.zeros((24, 2), np.float32))
+        self.assertLessEqual(len(os.listdir("/proc/self/task")), before + 2)  # and this one
+        vector.close()
+
+    def test_the_vector_refuses_wrong_actions(self):
+        vector = bg.PointingVectorEnv(2, model=self.model)
+        with self.assertRaises(bst.ArgumentError):
+            vector.step(np.zeros((2, 2)))
+        vector.reset(seed=1)
+        for wrong in (np.zeros(2), np.zeros((3, 2)), np.full((2, 2), np.nan)):
+            with self.assertRaises(bst.ArgumentError):
+                vector.step(wrong)
+        vector.close()
+        with self.assertRaises(bst.ArgumentError):
+            bg.PointingVectorEnv(2, model=self.model, offset=3)
 
     def test_misuse_raises(self):
         env = bg.PointingEnv(model=self.model)

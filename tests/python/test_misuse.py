@@ -180,6 +180,57 @@ class Misuse(unittest.TestCase):
             with self.subTest(call=number):
                 self.check(number, call)
 
+    def test_a_pool_raises(self):
+        pool, other = bst.Pool(2), bst.Simulation(self.model)
+        pair = [self.sim, None]
+        with pool.hold(pair) as held:
+            exposure = held.view("exposure")
+            small = np.zeros(1, bst.LosCommand.dtype)
+            calls = [
+                lambda: held.step("nonsense"), lambda: held.step(3), lambda: held.step("frame", [1]),
+                lambda: held.step("frame", until_s="x"), lambda: held.step("frame", where=[True]),
+                lambda: held.step("frame", until_s=float("nan")),
+                lambda: held.view("nonsense"), lambda: held.view(None), lambda: held.view("frame", 7),
+                lambda: held.view("exposure", items=-1), lambda: held.view("truth", into=exposure),
+                lambda: held.view("exposure", into=3), lambda: held.view("tracks", "no/sensor"),
+                lambda: held.view("exposure", into=exposure._replace(ticks=exposure.ticks[:1])),
+                lambda: held.view("exposure", into=exposure._replace(counts=exposure.ticks)),
+                lambda: held.command("detections", small), lambda: held.command("x", small),
+                lambda: held.command("los_command", small), lambda: held.command("los_command", 3),
+                lambda: held.command("los_command", np.zeros(2, bst.LosCommand.dtype)),
+                lambda: self.sim.tracks, lambda: self.sim.close(),
+                lambda: pool.hold([other]).__enter__(), lambda: bst.Pool(1).hold(pair).__enter__()]
+            for number, call in enumerate(calls):
+                with self.subTest(call=number):
+                    self.check(number, call)
+        for number, call in enumerate([
+                lambda: held.step("frame"), lambda: held.view("exposure"), held.ticks,
+                lambda: pool.hold([self.sim, self.sim]).__enter__(), lambda: bst.Pool(-1),
+                lambda: bst.Pool("x"), lambda: pool.hold([3]).__enter__()]):
+            with self.subTest(after=number):
+                self.check(number, call)
+        other.close()
+        with self.assertRaises(bst.ClosedError):
+            with pool.hold([self.sim, other]):
+                pass
+        self.assertEqual(call_in_child(lambda: pool.hold([]).__enter__()), "raised ForkError")
+        with pool.hold([self.sim]) as held:  # unharmed
+            self.assertEqual(held.step("frame")[0], 1)
+
+    def test_a_callback_of_a_pool_raises(self):
+        pool, seen = bst.Pool(2), []
+
+        def look(_message):
+            with self.assertRaises(bst.BusyError):
+                held.view("exposure")
+            seen.append(1)
+            raise KeyError("own")
+        self.sim.observe(message=look, channels=["exposure"])
+        with pool.hold([self.sim]) as held:
+            with self.assertRaises(KeyError):
+                held.step("frame")
+        self.assertEqual(seen, [1])
+
     def test_closed_simulations_raise(self):
         self.sim.close()
         self.sim.close()

@@ -9,7 +9,8 @@ from ..messages import SourceKind, TruthFlag
 from ..model import Model
 from ..scenario import Scenario
 from ..simulation import Simulation
-from .pointing import REWARD_PX, Action, Observation, PointingEnv, default_scenario
+from .pointing import Action, Observation, PointingEnv, default_scenario
+from .pointing_group import REWARD_PX
 
 Policy = Callable[[Observation], Action]
 

@@ -2,18 +2,32 @@
 """
 from __future__ import annotations
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 import numpy.typing as npt
+from gymnasium.spaces import Box
+from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from .pointing import Observation, PointingEnv, pointing_model
+from ..errors import ArgumentError
+from ..model import Model
+from ..pool import Pool
+from .pointing import Observation, pointing_model, pointing_observations, pointing_settings
+from .pointing_group import PointingGroup
 from .tasking import TaskingEnv, TaskingModel
 
 Batch = Dict[str, npt.NDArray[np.float32]]
+
+
+def _seeds(seed: Union[int, Sequence[Optional[int]], None], count: int) -> List[Optional[int]]:
+    """Run numbers of environments: seed + k, or those given; None: random ones."""
+    if seed is None:
+        return [None] * count
+    return [seed + k for k in range(count)] if isinstance(seed, int) else list(seed)
 
 
 class ThreadedVectorEnv(VectorEnv[Any, Any, Any]):
@@ -21,7 +35,7 @@ class ThreadedVectorEnv(VectorEnv[Any, Any, Any]):
     step after (gymnasium's AutoresetMode.NEXT_STEP).
 
     Given:     envs     of one kind
-               threads  that step them; 0: one for each environment, at most 32
+               threads  that step them; 0: one for each processor
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": []}
@@ -33,18 +47,13 @@ class ThreadedVectorEnv(VectorEnv[Any, Any, Any]):
         self.single_action_space = self.envs[0].action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._pool = ThreadPoolExecutor(threads or min(num_envs, 32))
+        self._pool = ThreadPoolExecutor(threads or min(num_envs, len(os.sched_getaffinity(0))))
         self._ended = np.zeros(num_envs, bool)
 
     def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None,
               options: Optional[Dict[str, Any]] = None) -> Tuple[Batch, Dict[str, Any]]:
         """Starts all; an integer seed gives environment k the run number seed + k."""
-        if seed is None:
-            seeds: List[Optional[int]] = [None] * self.num_envs
-        elif isinstance(seed, int):
-            seeds = [seed + k for k in range(self.num_envs)]
-        else:
-            seeds = list(seed)
+        seeds = _seeds(seed, self.num_envs)
         results = list(self._pool.map(lambda pair: pair[0].reset(seed=pair[1]),
                                       zip(self.envs, seeds)))
         self._ended[:] = False
@@ -83,13 +92,75 @@ class ThreadedVectorEnv(VectorEnv[Any, Any, Any]):
         self._pool.shutdown()
 
 
-class PointingVectorEnv(ThreadedVectorEnv):
-    """Several PointingEnv that share a model; further options are those of PointingEnv."""
+class PointingVectorEnv(VectorEnv[Any, Any, Any]):
+    """Several PointingEnv that share a model, as arrays: C code steps them in a pool of threads. An
+    environment that has ended starts anew with the step after (AutoresetMode.NEXT_STEP).
+
+    Given:     threads   of the pool; 0: one for each processor
+               settings  as of PointingEnv: model, detections, rate_step_px, offset_px, patience
+    """
+
+    metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": []}
 
     def __init__(self, num_envs: int = 1, scenario: Any = None, *, threads: int = 0,
-                 **options: Any):
-        model = options.pop("model", None) or pointing_model(scenario)
-        super().__init__([PointingEnv(model=model, **options) for _ in range(num_envs)], threads)
+                 model: Optional[Model] = None, **settings: Any):
+        self.num_envs = num_envs
+        self.model = model or pointing_model(scenario)
+        chosen = pointing_settings(settings)
+        self.single_observation_space = pointing_observations(chosen)
+        self.single_action_space = Box(-1, 1, (2,), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._group = PointingGroup(self.model, num_envs, Pool(threads), chosen)
+        self._generators = [seeding.np_random()[0] for _ in range(num_envs)]
+        self._ended = np.zeros(num_envs, bool)
+
+    def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None,
+              options: Optional[Dict[str, Any]] = None) -> Tuple[Batch, Dict[str, Any]]:
+        """Starts all; an integer seed gives environment k the run number seed + k."""
+        seeds = _seeds(seed, self.num_envs)
+        for number, one in enumerate(seeds):
+            if one is not None:
+                self._generators[number] = seeding.np_random(one)[0]
+        self._begin(list(range(self.num_envs)), seeds)
+        self._group.settle()
+        self._ended[:] = False
+        return self._observations(), self._infos()
+
+    def _begin(self, numbers: List[int], seeds: Sequence[Optional[int]]) -> None:
+        generators = [self._generators[number] for number in numbers]
+        runs = [int(generator.integers(2**31)) if seed is None else seed
+                for seed, generator in zip(seeds, generators)]
+        self._group.begin(numbers, runs, generators)
+
+    def step(self, actions: Any) -> Tuple[Batch, Any, Any, Any, Dict[str, Any]]:
+        """Steps all at once."""
+        given = np.asarray(actions, np.float64)
+        if given.shape != (self.num_envs, 2) or not np.all(np.isfinite(given)):
+            raise ArgumentError(f"actions have {self.num_envs} x 2 finite numbers, found "
+                                f"{actions!r}")
+        if any(sim is None for sim in self._group.sims):
+            raise ArgumentError("step before reset, or after close")
+        fresh = self._ended
+        if fresh.any():
+            numbers = [int(k) for k in np.flatnonzero(fresh)]
+            self._begin(numbers, [None] * len(numbers))
+        out = self._group.step(given, fresh)
+        self._ended = out.terminated | out.truncated
+        return (self._observations(), out.reward, out.terminated, out.truncated, self._infos())
+
+    def _observations(self) -> Batch:
+        return {"detections": self._group.detections.copy(),
+                "rate": self._group.rate.astype(np.float32)}
+
+    def _infos(self) -> Dict[str, Any]:
+        there = np.ones(self.num_envs, bool)
+        return {"error_px": self._group.error_px.copy(), "_error_px": there,
+                "in_field": self._group.in_field.copy(), "_in_field": there}
+
+    def close_extras(self, **_: Any) -> None:
+        """Ends the simulations."""
+        self._group.close()
 
 
 class TaskingVectorEnv(ThreadedVectorEnv):

@@ -88,8 +88,8 @@ static bst_status observer_gains(bst_ctx *ctx, const bst_control_config *control
     double density, asked;
     bst_control_config plain = *control;
     plain.robust_observer = false;
-    BST_TRY(bst_control_observer_density(ctx, &plain, env, 1.0, &asked));
-    BST_TRY(bst_control_observer_density(ctx, control, env, 1.0, &density));
+    BST_TRY(bst_control_observer_density(ctx, &plain, env, 1.0, NULL, &asked));
+    BST_TRY(bst_control_observer_density(ctx, control, env, 1.0, NULL, &density));
     double sigma_px = fmax(options->fix_sigma_px, control->fix_sigma_floor_px);
     model->observes = true;
     model->lowered = density < asked;

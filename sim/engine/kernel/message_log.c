@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/pages.h"
 #include "sim/engine/kernel/engine_internal.h"
 
 size_t bst_log_used_bytes(const channel *ch, const void *payload) {
@@ -73,7 +74,7 @@ bst_status bst_log_copy(bst_ctx *ctx, message_log *to, const channel *ch, const 
         status = grow(ctx, to);
     }
     slot *s = status == BST_OK ? &to->slots[to->head] : NULL;
-    if (s && !s->payload && !(s->payload = calloc(1, ch->payload_bytes))) {
+    if (s && !s->payload && !(s->payload = bst_pages_zero(1, ch->payload_bytes))) {
         status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a copy of %s/%s", ch->scope,
                           ch->type->name);
     }
@@ -127,7 +128,7 @@ void bst_log_free(const bst_channel_type *type, message_log *log) {
         if (log->slots[s].owned && type->release) {
             type->release(log->slots[s].payload);
         }
-        free(log->slots[s].payload);
+        bst_pages_free(log->slots[s].payload);
     }
     free(log->slots);
     if (log->copied) {

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/pages.h"
 #include "sim/engine/kernel/engine_internal.h"
 
 static int find_channel(const bst_engine *engine, const char *scope, const bst_channel_type *type) {
@@ -337,7 +338,7 @@ static bst_status allocate_channel(bst_ctx *ctx, const bst_engine *engine, chann
     ch->log.slots = calloc((size_t)ch->log.depth, sizeof *ch->log.slots);
     bool enough = ch->log.slots != NULL;
     for (int s = 0; enough && s < ch->log.depth; s++) {
-        ch->log.slots[s].payload = calloc(1, ch->payload_bytes);
+        ch->log.slots[s].payload = bst_pages_zero(1, ch->payload_bytes);
         enough = ch->log.slots[s].payload != NULL;
     }
     for (int r = 0; r < ch->reader_count; r++) {
