@@ -10,7 +10,7 @@ include(CMakePackageConfigHelpers)
 # Sanitized and fuzzed builds are for this tree's own tests and have none.
 if(NOT BORESIGHT_SANITIZE AND NOT BORESIGHT_FUZZ)
   set(BST_VISIBLE ${PROJECT_SOURCE_DIR}/cmake/libboresight.map)
-  set(parts bst_core bst_messages bst_dynamics bst_astro bst_device bst_catalogue bst_optics bst_world
+  set(parts bst_core bst_fft bst_messages bst_dynamics bst_astro bst_device bst_catalogue bst_optics bst_world
     bst_onboard bst_io bst_link bst_engine bst_eval bst_scenegen bst_gimbal
     bst_imgproc bst_tracker bst_control bst_obsgen bst_scenario_registry bst_api)
   # all objects of each part, not only what others call; the archives then add nothing but what the

@@ -1,9 +1,9 @@
-#include <fftw3.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "scenegen/reference_internal.h"
+#include "sim/core/fft.h"
 
 /* The image is the inverse transform of the OTF times the spectrum S(f) = sum w_j exp(-2 pi i f .
  * x_j) of the positions x_j in time. S is computed on a frequency grid by a non-uniform FFT. The
@@ -48,10 +48,10 @@ typedef struct spectrum {
     int side;   /* period of the image, px; odd */
     int fine;   /* size of the spreading grid */
     double beta;
-    fftw_complex *spread; /* [fine][fine] */
-    fftw_complex *sum;    /* [side][side], frequencies as FFTW orders them */
-    double *shape;        /* [side / 2 + 1]: transform of the spreading function */
-    fftw_plan forward, back;
+    bst_fft_complex_f64 *spread; /* [fine][fine] */
+    bst_fft_complex_f64 *sum;    /* [side][side], frequencies in wrap-around order */
+    double *shape;               /* [side / 2 + 1]: transform of the spreading function */
+    bst_fft *forward, *back;
     int node;     /* current PSF node */
     int shift[2]; /* current frequency shift, cycles/px */
 } spectrum;
@@ -89,38 +89,31 @@ static double bump_transform(const spectrum *s, int k) {
 }
 
 static void spectrum_free(spectrum *s) {
-    if (s->forward) {
-        fftw_destroy_plan(s->forward);
-    }
-    if (s->back) {
-        fftw_destroy_plan(s->back);
-    }
-    fftw_free(s->spread);
-    fftw_free(s->sum);
+    bst_fft_free(s->forward);
+    bst_fft_free(s->back);
+    bst_fft_array_free(s->spread);
+    bst_fft_array_free(s->sum);
     free(s->shape);
 }
 
 static bst_status spectrum_create(bst_ctx *ctx, spectrum *s) {
-    fftw_make_planner_thread_safe();
     int longest = s->window.width > s->window.height ? s->window.width : s->window.height;
     int least = longest + 2 * s->margin;
     s->side = quick_size(least | 1, 2);
     s->fine = quick_size((3 * s->side + 1) / 2 + SPREAD, 1);
     s->beta = 0.976 * BST_PI * SPREAD * (1.0 - 0.5 * s->side / s->fine);
     size_t fine = (size_t)s->fine * (size_t)s->fine, side = (size_t)s->side * (size_t)s->side;
-    s->spread = fftw_alloc_complex(fine);
-    s->sum = fftw_alloc_complex(side);
+    s->spread = bst_fft_array(fine * sizeof *s->spread);
+    s->sum = bst_fft_array(side * sizeof *s->sum);
     s->shape = malloc((size_t)(s->side / 2 + 1) * sizeof *s->shape);
-    if (s->spread && s->sum && s->shape) {
-        s->forward =
-            fftw_plan_dft_2d(s->fine, s->fine, s->spread, s->spread, FFTW_FORWARD, FFTW_ESTIMATE);
-        s->back = fftw_plan_dft_2d(s->side, s->side, s->sum, s->sum, FFTW_BACKWARD, FFTW_ESTIMATE);
-    }
-    if (!s->forward || !s->back) {
+    if (!s->spread || !s->sum || !s->shape) {
         return bst_fail(ctx, BST_ERR_MEMORY,
                         "no memory for the reference image's spectrum on %d x %d places", s->fine,
                         s->fine);
     }
+    BST_TRY(bst_fft_create_f64(ctx, BST_FFT_FORWARD, s->fine, s->fine, *s->spread, *s->spread,
+                               &s->forward));
+    BST_TRY(bst_fft_create_f64(ctx, BST_FFT_INVERSE, s->side, s->side, *s->sum, *s->sum, &s->back));
     memset(s->sum, 0, side * sizeof *s->sum);
     for (int k = 0; k <= s->side / 2; k++) {
         s->shape[k] = bump_transform(s, k);
@@ -161,7 +154,7 @@ static void spread_point(spectrum *s, const instant *p, double light) {
     }
     for (int j = 0; j < SPREAD; j++) {
         double b = bump(s->beta, (first_y + j - v) * 2.0 / SPREAD);
-        fftw_complex *row = s->spread + (size_t)(((first_y + j) % n + n) % n) * (size_t)n;
+        bst_fft_complex_f64 *row = s->spread + (size_t)(((first_y + j) % n + n) % n) * (size_t)n;
         for (int k = 0; k < SPREAD; k++) {
             row[column[k]][0] += re * b * along_x[k];
             row[column[k]][1] += im * b * along_x[k];
@@ -269,8 +262,8 @@ static bst_status add_sources(bst_ctx *ctx, spectrum *s, const bst_scene_source 
 static void add_spectrum(spectrum *s, double times) {
     int reach = s->side / 2, n = s->fine;
     for (int ky = -reach; ky <= reach; ky++) {
-        const fftw_complex *from = s->spread + (size_t)((ky + n) % n) * (size_t)n;
-        fftw_complex *to = s->sum + (size_t)((ky + s->side) % s->side) * (size_t)s->side;
+        const bst_fft_complex_f64 *from = s->spread + (size_t)((ky + n) % n) * (size_t)n;
+        bst_fft_complex_f64 *to = s->sum + (size_t)((ky + s->side) % s->side) * (size_t)s->side;
         double fy = (double)ky / s->side + s->shift[1];
         for (int kx = -reach; kx <= reach; kx++) {
             double fx = (double)kx / s->side + s->shift[0], h[2];
@@ -301,7 +294,7 @@ static bst_status add_all(bst_ctx *ctx, spectrum *s, const bst_scene_source *sou
                 s->shift[1] = ay;
                 memset(s->spread, 0, (size_t)s->fine * (size_t)s->fine * sizeof *s->spread);
                 BST_TRY(add_sources(ctx, s, sources, count));
-                fftw_execute(s->forward);
+                bst_fft_run(s->forward);
                 add_spectrum(s, ax == 0 && ay == 0 ? 1.0 : 2.0);
             }
         }
@@ -325,7 +318,7 @@ bst_status bst_reference_spectrum(bst_ctx *ctx, const bst_camera *camera, const 
         status = add_all(ctx, &s, sources, count);
     }
     if (status == BST_OK) {
-        fftw_execute(s.back);
+        bst_fft_run(s.back);
         double scale = 1.0 / ((double)s.side * s.side);
         for (int j = 0; j < window.height; j++) {
             for (int i = 0; i < window.width; i++) {

@@ -1,10 +1,11 @@
 #include "scenegen/fourier/alias_correction.h"
 
 #include <assert.h>
-#include <fftw3.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "sim/core/fft.h"
 
 enum { PERIODS = 4 };
 
@@ -13,7 +14,7 @@ struct bst_alias_correction {
     int size[2];  /* FFT size of the cells */
     float *room;  /* work space [size y][2 (size x / 2 + 1)] */
     float *kernel;
-    fftwf_plan forward, inverse;
+    bst_fft *forward, *inverse;
 };
 
 static int padded(int n) {
@@ -41,7 +42,7 @@ typedef struct lattice {
     int spectrum;
     const bst_alias_correction_axis *axis[2];
     int n[2];
-    fftwf_complex *data; /* [n y][n x / 2 + 1] */
+    bst_fft_complex_f32 *data; /* [n y][n x / 2 + 1] */
 } lattice;
 
 static void fill_rows(void *user, int begin, int end) {
@@ -64,9 +65,9 @@ static void fill_rows(void *user, int begin, int end) {
                 sum[1] += v[1] / nodes;
             }
             double factor = smooth * (whole - (i % PERIODS == 0 && j % PERIODS == 0 ? part : 0.0));
-            fftwf_complex *z = &l->data[(size_t)row * (size_t)half + (size_t)i];
-            (*z)[0] = (float)(sum[0] * factor);
-            (*z)[1] = (float)(sum[1] * factor);
+            float *z = l->data[(size_t)row * (size_t)half + (size_t)i];
+            z[0] = (float)(sum[0] * factor);
+            z[1] = (float)(sum[1] * factor);
         }
     }
 }
@@ -74,7 +75,7 @@ static void fill_rows(void *user, int begin, int end) {
 /* Copies the kernel for displacements within the cells into the FFT work space; returns its largest
  * value within the used range. */
 static double copy_kernel(bst_alias_correction *w, const lattice *l) {
-    const float *image = (const float *)l->data;
+    const float *image = *l->data;
     double largest = 0.0;
     memset(w->room, 0, sizeof(float) * (size_t)w->size[1] * (size_t)padded(w->size[0]));
     for (int dy = 1 - w->cells[1]; dy < w->cells[1]; dy++) {
@@ -96,23 +97,27 @@ static double copy_kernel(bst_alias_correction *w, const lattice *l) {
 
 static bst_status make_kernel(bst_ctx *ctx, bst_alias_correction *w, lattice *l, bst_parallel *pool,
                               double *largest) {
-    fftwf_plan plan =
-        fftwf_plan_dft_c2r_2d(l->n[1], l->n[0], l->data, (float *)l->data, FFTW_ESTIMATE);
-    if (!plan || !w->forward || !w->inverse) {
-        fftwf_destroy_plan(plan);
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the transform of the far wings");
-    }
+    bst_fft *to_image;
+    BST_TRY(bst_fft_create_f32(ctx, BST_FFT_REAL_INVERSE, l->n[1], l->n[0], *l->data, *l->data,
+                               &to_image));
     bst_parallel_for(pool, l->n[1], 16, fill_rows, l);
-    fftwf_execute(plan);
-    fftwf_destroy_plan(plan);
+    bst_fft_run(to_image);
+    bst_fft_free(to_image);
     *largest = copy_kernel(w, l);
-    fftwf_execute(w->forward);
+    bst_fft_run(w->forward);
     size_t count = (size_t)w->size[1] * (size_t)padded(w->size[0]);
     double scale = 1.0 / ((double)w->size[0] * w->size[1]);
     for (size_t i = 0; i < count; i++) {
         w->kernel[i] = (float)(w->room[i] * scale);
     }
     return BST_OK;
+}
+
+static bst_status make_transforms(bst_ctx *ctx, bst_alias_correction *w) {
+    BST_TRY(bst_fft_create_f32(ctx, BST_FFT_REAL_FORWARD, w->size[1], w->size[0], w->room, w->room,
+                               &w->forward));
+    return bst_fft_create_f32(ctx, BST_FFT_REAL_INVERSE, w->size[1], w->size[0], w->room, w->room,
+                              &w->inverse);
 }
 
 bst_status bst_alias_correction_create(bst_ctx *ctx, const bst_psf *psf, int spectrum,
@@ -132,21 +137,20 @@ bst_status bst_alias_correction_create(bst_ctx *ctx, const bst_psf *psf, int spe
         l.n[a] = (int)lround(2.0 * PERIODS * l.axis[a]->pixels / l.axis[a]->cell_px);
     }
     size_t bytes = sizeof(float) * (size_t)w->size[1] * (size_t)padded(w->size[0]);
-    w->room = fftwf_malloc(bytes);
-    w->kernel = fftwf_malloc(bytes);
-    l.data = fftwf_malloc(sizeof(float) * (size_t)l.n[1] * (size_t)padded(l.n[0]));
+    w->room = bst_fft_array(bytes);
+    w->kernel = malloc(bytes);
+    l.data = bst_fft_array(sizeof(float) * (size_t)l.n[1] * (size_t)padded(l.n[0]));
     bst_status status = BST_OK;
     double largest = 0.0;
     if (!w->room || !w->kernel || !l.data) {
         status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for the far wings");
     } else {
-        w->forward = fftwf_plan_dft_r2c_2d(w->size[1], w->size[0], w->room,
-                                           (fftwf_complex *)w->room, FFTW_ESTIMATE);
-        w->inverse = fftwf_plan_dft_c2r_2d(w->size[1], w->size[0], (fftwf_complex *)w->room,
-                                           w->room, FFTW_ESTIMATE);
+        status = make_transforms(ctx, w);
+    }
+    if (status == BST_OK) {
         status = make_kernel(ctx, w, &l, pool, &largest);
     }
-    fftwf_free(l.data);
+    bst_fft_array_free(l.data);
     if (status != BST_OK || largest * x->used_px * y->used_px < 1e-7) {
         bst_alias_correction_free(w);
         return status;
@@ -157,10 +161,10 @@ bst_status bst_alias_correction_create(bst_ctx *ctx, const bst_psf *psf, int spe
 
 void bst_alias_correction_free(bst_alias_correction *w) {
     if (w) {
-        fftwf_destroy_plan(w->forward);
-        fftwf_destroy_plan(w->inverse);
-        fftwf_free(w->room);
-        fftwf_free(w->kernel);
+        bst_fft_free(w->forward);
+        bst_fft_free(w->inverse);
+        bst_fft_array_free(w->room);
+        free(w->kernel);
         free(w);
     }
 }
@@ -173,13 +177,13 @@ void bst_alias_correction_run(bst_alias_correction *w, float *light) {
         memcpy(w->room + (size_t)j * (size_t)pitch, light + (size_t)j * (size_t)w->cells[0],
                sizeof(float) * (size_t)w->cells[0]);
     }
-    fftwf_execute(w->forward);
+    bst_fft_run(w->forward);
     for (size_t i = 0; i < count; i += 2) {
         float a = w->room[i], b = w->room[i + 1], c = w->kernel[i], d = w->kernel[i + 1];
         w->room[i] = a * c - b * d;
         w->room[i + 1] = a * d + b * c;
     }
-    fftwf_execute(w->inverse);
+    bst_fft_run(w->inverse);
     for (int j = 0; j < w->cells[1]; j++) {
         memcpy(light + (size_t)j * (size_t)w->cells[0], w->room + (size_t)j * (size_t)pitch,
                sizeof(float) * (size_t)w->cells[0]);

@@ -1,9 +1,11 @@
 #include "scenegen/fourier/fourier_error.h"
 
 #include <assert.h>
-#include <fftw3.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
+
+#include "sim/core/fft.h"
 
 /* LATTICE: frequencies per axis over the PSF's band. SIDE: image samples, four per period of the
  * highest frequency. */
@@ -18,8 +20,8 @@ enum { WINGS = 7 };
 typedef struct lattice {
     const bst_psf *psf;
     double step, cutoff, alias[2][LATTICE];
-    fftw_complex *room;
-    fftw_plan plan;
+    bst_fft_complex_f64 *room; /* [SIDE][SIDE] */
+    bst_fft *inverse;
     double *image; /* [IMAGES][SIDE][SIDE] */
 } lattice;
 
@@ -59,13 +61,13 @@ static void make_image(lattice *l, int node, int what) {
             }
             f *= what == ALIAS_X ? l->alias[0][i] : what == ALIAS_Y ? l->alias[1][j] : 1.0;
             bst_psf_otf(l->psf, node, fx, fy, v);
-            fftw_complex *z = &l->room[((j - LATTICE / 2 + SIDE) % SIDE) * SIDE +
-                                       (i - LATTICE / 2 + SIDE) % SIDE];
-            (*z)[0] = v[0] * f;
-            (*z)[1] = v[1] * f;
+            double *z =
+                l->room[((j - LATTICE / 2 + SIDE) % SIDE) * SIDE + (i - LATTICE / 2 + SIDE) % SIDE];
+            z[0] = v[0] * f;
+            z[1] = v[1] * f;
         }
     }
-    fftw_execute(l->plan);
+    bst_fft_run(l->inverse);
     for (int i = 0; i < SIDE * SIDE; i++) {
         image[i] = what == WHOLE ? l->room[i][0] : hypot(l->room[i][0], l->room[i][1]);
     }
@@ -103,25 +105,24 @@ bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst
     lattice l = {.psf = psf,
                  .step = 2.0 * fmax(bst_psf_cutoff(psf), band->cutoff) / LATTICE,
                  .cutoff = band->cutoff,
-                 .room = fftw_malloc(sizeof *l.room * SIDE * SIDE),
-                 .image = fftw_malloc(sizeof *l.image * IMAGES * SIDE * SIDE)};
+                 .room = bst_fft_array(sizeof *l.room * SIDE * SIDE),
+                 .image = malloc(sizeof *l.image * IMAGES * SIDE * SIDE)};
     *out = (bst_fourier_error){{0.0}};
-    if (l.room && l.image) {
-        l.plan = fftw_plan_dft_2d(SIDE, SIDE, l.room, l.room, FFTW_BACKWARD, FFTW_ESTIMATE);
-    }
-    for (int a = 0; a < 2 && l.plan; a++) {
-        find_aliases(&l, &axis[a], a);
-    }
-    for (int n = 0; n < bst_psf_nodes(psf) && l.plan; n++) {
-        add_node_errors(&l, n, band->peak, out);
-    }
     bst_status status =
-        l.plan ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the error of a grid");
-    if (l.plan) {
-        fftw_destroy_plan(l.plan);
+        l.room && l.image
+            ? bst_fft_create_f64(ctx, BST_FFT_INVERSE, SIDE, SIDE, *l.room, *l.room, &l.inverse)
+            : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the error of a grid");
+    if (status == BST_OK) {
+        for (int a = 0; a < 2; a++) {
+            find_aliases(&l, &axis[a], a);
+        }
+        for (int n = 0; n < bst_psf_nodes(psf); n++) {
+            add_node_errors(&l, n, band->peak, out);
+        }
     }
-    fftw_free(l.room);
-    fftw_free(l.image);
+    bst_fft_free(l.inverse);
+    bst_fft_array_free(l.room);
+    free(l.image);
     return status;
 }
 

@@ -1,12 +1,12 @@
 #include "scenegen/fourier/fourier_grid.h"
 
 #include <assert.h>
-#include <fftw3.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "scenegen/fourier/batch_fft.h"
+#include "sim/core/fft.h"
 
 enum {
     LATTICE = 128, /* frequencies per axis over the kept band */
@@ -56,13 +56,11 @@ static void find_cutoff(const bst_psf *psf, double tolerance, bst_fourier_band *
 }
 
 /* Inverse FFT in place of a Hermitian grid [n][n] in wrap-around order. */
-static bst_status invert(bst_ctx *ctx, fftwf_complex *data, int n) {
-    fftwf_plan plan = fftwf_plan_dft_2d(n, n, data, data, FFTW_BACKWARD, FFTW_ESTIMATE);
-    if (!plan) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the transform of a PSF");
-    }
-    fftwf_execute(plan);
-    fftwf_destroy_plan(plan);
+static bst_status invert(bst_ctx *ctx, bst_fft_complex_f32 *data, int n) {
+    bst_fft *inverse;
+    BST_TRY(bst_fft_create_f32(ctx, BST_FFT_INVERSE, n, n, *data, *data, &inverse));
+    bst_fft_run(inverse);
+    bst_fft_free(inverse);
     return BST_OK;
 }
 
@@ -113,7 +111,7 @@ static void measure_parts(const bst_psf *psf, int node, const double peak_px[2],
 }
 
 /* Measures peak, sensitivity to coarse quadrature nodes, and spectrum along x and y. */
-static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *room,
+static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, bst_fft_complex_f32 *room,
                                bst_fourier_band *out) {
     double step = 2.0 * out->cutoff / LATTICE, area = step * step, peak = 0.0;
     double(*peak_px)[2] = calloc((size_t)bst_psf_nodes(psf), sizeof *peak_px);
@@ -127,14 +125,14 @@ static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *
     }
     for (int n = 0; n < bst_psf_nodes(psf); n++) {
         double along[DIRECTIONS][3] = {{0}};
-        memset(room, 0, sizeof(fftwf_complex) * IMAGE * IMAGE);
+        memset(room, 0, sizeof *room * IMAGE * IMAGE);
         for (int j = -LATTICE / 2; j < LATTICE / 2; j++) {
             for (int i = -LATTICE / 2; i < LATTICE / 2; i++) {
                 double fx = i * step, fy = j * step, v[2];
                 bst_psf_otf(psf, n, fx, fy, v);
-                fftwf_complex *z = &room[((j + IMAGE) % IMAGE) * IMAGE + (i + IMAGE) % IMAGE];
-                (*z)[0] = (float)(v[0] * area);
-                (*z)[1] = (float)(v[1] * area);
+                float *z = room[((j + IMAGE) % IMAGE) * IMAGE + (i + IMAGE) % IMAGE];
+                z[0] = (float)(v[0] * area);
+                z[1] = (float)(v[1] * area);
                 double m = hypot(v[0], v[1]) * area, f[2] = {fabs(fx), fabs(fy)};
                 for (int a = 0; a < 2; a++) {
                     int bin = (int)(f[a] / out->axis[a].step);
@@ -193,7 +191,7 @@ static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *
 }
 
 /* Measures the distance beyond which the smoothed wings stay below REACH_SHARE. */
-static bst_status measure_reach(bst_ctx *ctx, const bst_psf *psf, fftwf_complex *room,
+static bst_status measure_reach(bst_ctx *ctx, const bst_psf *psf, bst_fft_complex_f32 *room,
                                 bst_fourier_band *out) {
     double step = 1.0 / (WIDE * WIDE_CELL_PX), area = step * step, reach = 0.0;
     enum { RINGS = WIDE };
@@ -206,9 +204,9 @@ static bst_status measure_reach(bst_ctx *ctx, const bst_psf *psf, fftwf_complex 
                 double s = 2.0 * BST_PI * BST_PI * WIDE_CELL_PX * WIDE_CELL_PX,
                        smooth = exp(-s * (fx * fx + fy * fy));
                 bst_psf_otf(psf, n, fx, fy, v);
-                fftwf_complex *z = &room[((j + WIDE) % WIDE) * WIDE + (i + WIDE) % WIDE];
-                (*z)[0] = (float)(v[0] * smooth * area);
-                (*z)[1] = (float)(v[1] * smooth * area);
+                float *z = room[((j + WIDE) % WIDE) * WIDE + (i + WIDE) % WIDE];
+                z[0] = (float)(v[0] * smooth * area);
+                z[1] = (float)(v[1] * smooth * area);
             }
         }
         BST_TRY(invert(ctx, room, WIDE));
@@ -234,7 +232,7 @@ static bst_status measure_reach(bst_ctx *ctx, const bst_psf *psf, fftwf_complex 
 bst_status bst_fourier_band_measure(bst_ctx *ctx, const bst_psf *psf, double tolerance,
                                     bst_fourier_band *out) {
     assert(psf && out && tolerance > 0.0);
-    fftwf_complex *room = fftwf_malloc(sizeof *room * IMAGE * IMAGE);
+    bst_fft_complex_f32 *room = bst_fft_array(sizeof *room * IMAGE * IMAGE);
     if (!room) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the band of a PSF");
     }
@@ -243,7 +241,7 @@ bst_status bst_fourier_band_measure(bst_ctx *ctx, const bst_psf *psf, double tol
     if (status == BST_OK) {
         status = measure_reach(ctx, psf, room, out);
     }
-    fftwf_free(room);
+    bst_fft_array_free(room);
     return status;
 }
 

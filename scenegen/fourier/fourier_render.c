@@ -1,7 +1,6 @@
 #include "scenegen/fourier/fourier_render.h"
 
 #include <assert.h>
-#include <fftw3.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -199,9 +198,6 @@ bst_status bst_fourier_render_create(bst_ctx *ctx, bst_device *device, const bst
     if (!l) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for light through a general PSF");
     }
-    /* several simulations in one process may plan concurrently */
-    fftwf_make_planner_thread_safe();
-    fftw_make_planner_thread_safe();
     l->camera = *camera;
     l->psf = psf;
     l->options = o;

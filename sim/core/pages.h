@@ -4,6 +4,10 @@
 
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /* Allocates memory aligned to 64 bytes, uninitialised; NULL: out of memory. From 4 MiB on it
  * requests pages of 2 MiB, which the system may decline. Free with free(). */
 void *bst_pages_alloc(size_t bytes);
@@ -16,5 +20,9 @@ void *bst_pages_alloc(size_t bytes);
 void *bst_pages_zero(size_t count, size_t bytes);
 /* Frees memory of bst_pages_zero; NULL is allowed. */
 void bst_pages_free(void *memory);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

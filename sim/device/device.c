@@ -102,7 +102,9 @@ static bst_status list_devices(bst_ctx *ctx, candidate *list, int *count) {
     cl_int code = clGetPlatformIDs(MAX_PLATFORMS, platforms, &platform_count);
     if (code != CL_SUCCESS || platform_count == 0) {
         return bst_fail(ctx, BST_ERR_DEVICE,
-                        "no OpenCL platform found: install one (Debian: pocl-opencl-icd)");
+                        "no OpenCL platform found: install PoCL, which works on any CPU "
+                        "(Debian: apt install pocl-opencl-icd; Python: pip install "
+                        "boresight[pocl]), or the OpenCL driver of a GPU");
     }
     *count = 0;
     for (cl_uint p = 0; p < platform_count && p < MAX_PLATFORMS; p++) {

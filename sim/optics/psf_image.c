@@ -1,10 +1,10 @@
 #include "sim/optics/psf_image.h"
 
-#include <fftw3.h>
 #include <math.h>
 #include <string.h>
 
 #include "boresight/vec.h"
+#include "sim/core/fft.h"
 
 enum { LEAST_PERIOD_PX = 64, MOST_FREQUENCIES = 1024 };
 
@@ -20,7 +20,7 @@ static int period_of(int reach_px) {
 /* OTF at multiples of 1 / period on a grid of `side` frequencies per axis; higher frequencies are
  * aliased. */
 static void fill_spectrum(const bst_psf *psf, int node, double blur_px, int period, int side,
-                          fftw_complex *out) {
+                          bst_fft_complex_f64 *out) {
     double cutoff = bst_psf_cutoff(psf), scale = 1.0 / ((double)period * period);
     cutoff = blur_px > 0.0 ? fmin(cutoff, GAUSSIAN_CUTOFF / blur_px) : cutoff;
     int most = (int)fmin(ceil(cutoff * period), MOST_FREQUENCIES);
@@ -54,23 +54,26 @@ bst_status bst_psf_image(bst_ctx *ctx, const bst_psf *psf, int node, double blur
                          int reach_px, double *out) {
     int period = period_of(reach_px), grid = period * per_px;
     int side = bst_psf_image_side(per_px, reach_px), half = per_px * reach_px;
-    fftw_make_planner_thread_safe();
-    fftw_complex *work = fftw_alloc_complex((size_t)grid * (size_t)grid);
-    fftw_plan plan =
-        work ? fftw_plan_dft_2d(grid, grid, work, work, FFTW_BACKWARD, FFTW_ESTIMATE) : NULL;
-    if (!plan) {
-        fftw_free(work);
+    bst_fft_complex_f64 *work = bst_fft_array((size_t)grid * (size_t)grid * sizeof *work);
+    if (!work) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the image of a point");
     }
+    bst_fft *inverse;
+    bst_status status =
+        bst_fft_create_f64(ctx, BST_FFT_INVERSE, grid, grid, *work, *work, &inverse);
+    if (status != BST_OK) {
+        bst_fft_array_free(work);
+        return status;
+    }
     fill_spectrum(psf, node, blur_px, period, grid, work);
-    fftw_execute(plan);
+    bst_fft_run(inverse);
     for (int j = 0; j < side; j++) {
         size_t row = (size_t)((j - half + grid) % grid) * (size_t)grid;
         for (int i = 0; i < side; i++) {
             out[j * side + i] = work[row + (size_t)((i - half + grid) % grid)][0];
         }
     }
-    fftw_destroy_plan(plan);
-    fftw_free(work);
+    bst_fft_free(inverse);
+    bst_fft_array_free(work);
     return BST_OK;
 }

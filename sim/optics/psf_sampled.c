@@ -1,8 +1,8 @@
-#include <fftw3.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/fft.h"
 #include "sim/optics/psf_internal.h"
 
 /* maximum side of samples, and of the transform grid */
@@ -13,32 +13,29 @@ enum { LONGEST_SAMPLES = 2048, LONGEST_GRID = 4096 };
 
 typedef struct transform {
     int side;
-    double *image;       /* [side][side] */
-    fftw_complex *value; /* [side][side / 2 + 1] */
-    fftw_plan plan;
+    double *image;              /* [side][side] */
+    bst_fft_complex_f64 *value; /* [side][side / 2 + 1] */
+    bst_fft *fft;
 } transform;
 
 static void transform_free(transform *t) {
-    if (t->plan) {
-        fftw_destroy_plan(t->plan);
-    }
-    fftw_free(t->image);
-    fftw_free(t->value);
+    bst_fft_free(t->fft);
+    bst_fft_array_free(t->image);
+    bst_fft_array_free(t->value);
 }
 
 static bst_status transform_create(bst_ctx *ctx, int longest, transform *t) {
-    fftw_make_planner_thread_safe();
     int side = 64;
     while (side < 4 * longest && side < LONGEST_GRID) {
         side *= 2;
     }
     t->side = side;
-    t->image = fftw_alloc_real((size_t)side * (size_t)side);
-    t->value = fftw_alloc_complex((size_t)side * (size_t)(side / 2 + 1));
-    if (t->image && t->value) {
-        t->plan = fftw_plan_dft_r2c_2d(side, side, t->image, t->value, FFTW_ESTIMATE);
+    t->image = bst_fft_array((size_t)side * (size_t)side * sizeof *t->image);
+    t->value = bst_fft_array((size_t)side * (size_t)(side / 2 + 1) * sizeof *t->value);
+    if (!t->image || !t->value) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the transform of a PSF");
     }
-    return t->plan ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the transform of a PSF");
+    return bst_fft_create_f64(ctx, BST_FFT_REAL_FORWARD, side, side, t->image, *t->value, &t->fft);
 }
 
 /* Sum and centroid of PSF samples. */
@@ -103,7 +100,7 @@ static bst_status make_plane(bst_ctx *ctx, const transform *t, const bst_psf_sam
                 (double)p[(size_t)j * (size_t)w + (size_t)i];
         }
     }
-    fftw_execute(t->plan);
+    bst_fft_run(t->fft);
     double reach2 = 0.0;
     for (int ky = -n / 2; ky < n / 2; ky++) {
         for (int kx = 0; kx <= n / 2; kx++) {

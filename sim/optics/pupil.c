@@ -1,11 +1,11 @@
 #include "sim/optics/pupil.h"
 
-#include <fftw3.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "boresight/vec.h"
+#include "sim/core/fft.h"
 
 /* lines per cell for measuring its open fraction */
 enum { LINES = 16 };
@@ -19,11 +19,11 @@ typedef struct stretches {
 
 struct bst_pupil_work {
     int side;
-    double *open;            /* [side][side] */
-    fftwf_complex *field;    /* [side][side] */
-    float *power;            /* [side][side] */
-    fftwf_complex *transfer; /* [side][side / 2 + 1] */
-    fftwf_plan forward, back;
+    double *open;                  /* [side][side] */
+    bst_fft_complex_f32 *field;    /* [side][side] */
+    float *power;                  /* [side][side] */
+    bst_fft_complex_f32 *transfer; /* [side][side / 2 + 1] */
+    bst_fft *forward, *back;
 };
 
 /* Next even number of the form 2^a 3^b 5^c, fast for the FFT. */
@@ -47,16 +47,14 @@ static int side_for(int cells) {
 }
 
 bst_status bst_pupil_work_create(bst_ctx *ctx, int cells, bst_pupil_work **out) {
-    /* FFTW's planner is shared by the process */
-    fftwf_make_planner_thread_safe();
     bst_pupil_work *w = calloc(1, sizeof *w);
     *out = NULL;
     if (w) {
         size_t side = (size_t)side_for(cells), n = side * side;
         w->open = malloc(n * sizeof *w->open);
-        w->field = fftwf_alloc_complex(n);
-        w->power = fftwf_alloc_real(n);
-        w->transfer = fftwf_alloc_complex(side * (side / 2 + 1));
+        w->field = bst_fft_array(n * sizeof *w->field);
+        w->power = bst_fft_array(n * sizeof *w->power);
+        w->transfer = bst_fft_array(side * (side / 2 + 1) * sizeof *w->transfer);
     }
     if (!w || !w->open || !w->field || !w->power || !w->transfer) {
         bst_pupil_work_free(w);
@@ -67,26 +65,21 @@ bst_status bst_pupil_work_create(bst_ctx *ctx, int cells, bst_pupil_work **out) 
 }
 
 static void drop_plans(bst_pupil_work *w) {
-    if (w->forward) {
-        fftwf_destroy_plan(w->forward);
-    }
-    if (w->back) {
-        fftwf_destroy_plan(w->back);
-    }
+    bst_fft_free(w->forward);
+    bst_fft_free(w->back);
     w->forward = w->back = NULL;
     w->side = 0;
 }
 
-/* Creates the FFT plans for apertures of `cells` cells. */
+/* Creates the transforms for apertures of `cells` cells. */
 static bst_status plan(bst_ctx *ctx, bst_pupil_work *w, int cells) {
     int side = side_for(cells);
     if (side != w->side) {
         drop_plans(w);
-        w->forward = fftwf_plan_dft_2d(side, side, w->field, w->field, FFTW_FORWARD, FFTW_ESTIMATE);
-        w->back = fftwf_plan_dft_r2c_2d(side, side, w->power, w->transfer, FFTW_ESTIMATE);
-        if (!w->forward || !w->back) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an aperture of %d cells", cells);
-        }
+        BST_TRY(bst_fft_create_f32(ctx, BST_FFT_FORWARD, side, side, *w->field, *w->field,
+                                   &w->forward));
+        BST_TRY(bst_fft_create_f32(ctx, BST_FFT_REAL_FORWARD, side, side, w->power, *w->transfer,
+                                   &w->back));
         w->side = side;
     }
     return BST_OK;
@@ -96,9 +89,9 @@ void bst_pupil_work_free(bst_pupil_work *w) {
     if (w) {
         drop_plans(w);
         free(w->open);
-        fftwf_free(w->field);
-        fftwf_free(w->power);
-        fftwf_free(w->transfer);
+        bst_fft_array_free(w->field);
+        bst_fft_array_free(w->power);
+        bst_fft_array_free(w->transfer);
         free(w);
     }
 }
@@ -222,13 +215,13 @@ bst_status bst_pupil_transfer(bst_ctx *ctx, bst_pupil_work *w, const bst_pupil *
             area += open;
         }
     }
-    fftwf_execute(w->forward);
+    bst_fft_run(w->forward);
     float scale = (float)(1.0 / (area * (double)n * (double)n));
     for (size_t at = 0; at < (size_t)n * (size_t)n; at++) {
         const float *a = w->field[at];
         w->power[at] = scale * (a[0] * a[0] + a[1] * a[1]);
     }
-    fftwf_execute(w->back);
+    bst_fft_run(w->back);
     *out = (bst_pupil_shifts){&w->transfer[0][0], n / 2 + 1, n};
     return BST_OK;
 }

@@ -1,8 +1,8 @@
-#include <fftw3.h>
 #include <pthread.h>
 
 #include "scenegen/reference.h"
 #include "scenegen/renderer.h"
+#include "sim/core/fft.h"
 #include "sim/optics/psf.h"
 #include "tests/scenegen/device_fixture.h"
 #include "tests/scenegen/scene_support.h"
@@ -21,7 +21,7 @@ typedef struct spot {
 static void exact_image(const bst_psf *psf, bst_window w, const spot *spots, int count, int period,
                         double *image) {
     int last = (int)ceil(bst_psf_cutoff(psf) * period), n = 2 * last + 1;
-    fftw_complex *folded = fftw_malloc(sizeof *folded * (size_t)period * (size_t)period);
+    bst_fft_complex_f64 *folded = bst_fft_array(sizeof *folded * (size_t)period * (size_t)period);
     double *sum = calloc((size_t)n * (size_t)n * 2, sizeof *sum);
     double *px = malloc((size_t)n * 2 * sizeof *px), *py = malloc((size_t)n * 2 * sizeof *py);
     memset(folded, 0, sizeof *folded * (size_t)period * (size_t)period);
@@ -49,21 +49,24 @@ static void exact_image(const bst_psf *psf, bst_window w, const spot *spots, int
             const double *v = sum + 2 * ((size_t)j * (size_t)n + (size_t)i);
             int x = ((i - last) % period + period) % period;
             int y = ((j - last) % period + period) % period;
-            fftw_complex *to = &folded[(size_t)y * (size_t)period + (size_t)x];
-            (*to)[0] += twice * (v[0] * otf[0] - v[1] * otf[1]);
-            (*to)[1] += twice * (v[0] * otf[1] + v[1] * otf[0]);
+            double *to = folded[(size_t)y * (size_t)period + (size_t)x];
+            to[0] += twice * (v[0] * otf[0] - v[1] * otf[1]);
+            to[1] += twice * (v[0] * otf[1] + v[1] * otf[0]);
         }
     }
-    fftw_plan plan = fftw_plan_dft_2d(period, period, folded, folded, FFTW_BACKWARD, FFTW_ESTIMATE);
-    fftw_execute(plan);
-    fftw_destroy_plan(plan);
+    bst_fft *inverse;
+    bst_ctx ctx = {0};
+    bst_assert_ok(&ctx, bst_fft_create_f64(&ctx, BST_FFT_INVERSE, period, period, *folded, *folded,
+                                           &inverse));
+    bst_fft_run(inverse);
+    bst_fft_free(inverse);
     for (int y = 0; y < w.height; y++) {
         for (int x = 0; x < w.width; x++) {
             image[y * w.width + x] =
                 folded[(size_t)y * (size_t)period + (size_t)x][0] / ((double)period * period);
         }
     }
-    fftw_free(folded);
+    bst_fft_array_free(folded);
     free(sum);
     free(px);
     free(py);
