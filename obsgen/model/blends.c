@@ -15,8 +15,6 @@ static const double FLATTEST = 6.0;
 static const double MERGED_CENTROID = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
 /* Random stream of such streaks. */
 static const uint64_t CENTROID_ERROR = (uint64_t)1 << 52;
-/* An isolated detection above this SNR and this many FWHM long is fitted as a streak of its own. */
-static const double OWN_STREAK_SNR = 10.0, OWN_STREAK_LENGTH = 1.5;
 
 double bst_generator_overlap(const bst_generator *g, const generator_source *a,
                              const generator_source *b) {
@@ -155,6 +153,7 @@ static int add_merged(const bst_generator *g, const generator_source *s, const g
         m->x = o->x + u * o->path.dx;
         m->y = o->y + u * o->path.dy;
         m->flux_e = o->flux_e / pieces;
+        m->path = (bst_obsgen_path_px){o->path.dx / pieces, o->path.dy / pieces};
     }
     return count;
 }
@@ -226,66 +225,6 @@ static void draw_streak_position(const bst_generator *g, const generator_source 
     out->snr = top.snr;
 }
 
-/* True if a source's light belongs to another detection, which is fitted jointly. */
-static bool is_of_another(const bst_generator *g, const generator_source *s,
-                          const generator_source *o) {
-    return o->head >= 0 && g->sources[o->head].item != s->item;
-}
-
-/* Largest second moment of the light about (x, y), px^2, as image processing measures it. The
- * Gaussian window has twice the fitted PSF's variance and is removed by adding inverse covariances;
- * the pixel's variance is subtracted. */
-static double longest_moment(const bst_generator *g, const generator_source *s,
-                             const generator_source *merged, int count, double x, double y) {
-    double own = g->response.source.across_px * g->response.source.along_px;
-    double window = 2.0 * g->filter_sigma * g->filter_sigma, both = own + window;
-    double shrunk = window / both, xx = 0.0, xy = 0.0, yy = 0.0, sum = 0.0;
-    for (int k = -1; k < count; k++) {
-        const generator_source *o = k < 0 ? s : &merged[k];
-        if (is_of_another(g, s, o)) {
-            continue;
-        }
-        double dx = o->x - x, dy = o->y - y;
-        double light = o->flux_e * exp(-0.5 * (dx * dx + dy * dy) / both);
-        sum += light;
-        xx += light * dx * dx;
-        xy += light * dx * dy;
-        yy += light * dy * dy;
-    }
-    double scale = shrunk * shrunk / sum, even = own * shrunk;
-    double mean = even + 0.5 * scale * (xx + yy), half = scale * hypot(0.5 * (xx - yy), xy);
-    double windowed = fmin(mean + half, (1.0 - 1e-3) * window);
-    return windowed * window / (window - windowed) - 1.0 / 12.0;
-}
-
-/* Replaces an isolated merged pair longer than a point by a single streak at the centroid of its
- * light. */
-static void merge_to_streak(const bst_generator *g, const generator_source *s,
-                            const generator_source *merged, int count, generator_blend *out) {
-    double snr = out->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e;
-    double point = g->fitted_sigma * g->fitted_sigma;
-    if (g->smeared || out->near || s->as_streak || snr < OWN_STREAK_SNR) {
-        return;
-    }
-    double moment = longest_moment(g, s, merged, count, out->x, out->y);
-    if (moment < OWN_STREAK_LENGTH * OWN_STREAK_LENGTH * point) {
-        return;
-    }
-    /* a uniform streak of this length has this moment */
-    double length = sqrt(12.0 * (moment - point)), x = 0.0, y = 0.0, sum = 0.0;
-    for (int k = -1; k < count; k++) {
-        const generator_source *o = k < 0 ? s : &merged[k];
-        if (hypot(o->x - out->x, o->y - out->y) <= length && !is_of_another(g, s, o)) {
-            sum += o->flux_e;
-            x += o->flux_e * (o->x - s->x);
-            y += o->flux_e * (o->y - s->y);
-        }
-    }
-    out->flux_e = sum;
-    out->x = s->x + x / sum;
-    out->y = s->y + y / sum;
-}
-
 /* Merged light of source i and the neighbours fitted jointly. A single-source fit to several
  * sources converges to the filter output's maximum, found by mean shift. */
 generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
@@ -337,7 +276,7 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         out.y = s->y + y / sum;
     }
     if (count > 0) {
-        merge_to_streak(g, s, merged, count, &out);
+        bst_generator_fit_merged(g, s, merged, count, &out);
     }
     if (count > 0 && s->length > 1.0) {
         /* two streaks in line have a flat peak between them, where noise determines the position */
