@@ -164,6 +164,8 @@ bool bst_generator_is_uniform(const bst_generator *g);
 double bst_generator_streak_light(const bst_generator *g, double flux_e);
 /* Filter output above which image processing interpolates maxima. */
 double bst_generator_looks_from(const bst_generator *g);
+/* By how much the output must fall about a maximum of this level, SNR, for a source of its own. */
+double bst_generator_fall_of_saddle(double level);
 /* True if image processing resolves two sources as separate maxima. */
 bool bst_generator_separates(const bst_generator *g, const generator_source *bright,
                              const generator_source *faint);

@@ -13,6 +13,10 @@ static const double FLATTEST = 6.0;
  * drawn from the filter output. LEAST_NOISE, MOST_NOISE: limits of the output noise relative to
  * white noise. */
 static const double MERGED_CENTROID = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
+/* Light below this SNR does not matter at a maximum, and on its flank. */
+static const double LEAST_LIGHT = 0.01, LEAST_ON_FLANK = 0.3;
+/* A path shorter than this adds less than a tenth to the variance of the image: a point's. */
+static const double SHORT_SIGMAS = 1.1;
 /* Random stream of such streaks. */
 static const uint64_t CENTROID_ERROR = (uint64_t)1 << 52;
 
@@ -80,6 +84,23 @@ static int brighter(const void *a, const void *b) {
     return (p->index > q->index) - (p->index < q->index);
 }
 
+/* Light of a brighter source on the flank of another, SNR: on the line between both, where the
+ * output of the fainter one has fallen so far that its maximum is one of its own. Of streaks in
+ * line it can be much there and none at the maximum: each output reaches a streak's length along
+ * it. */
+static double light_on_flank(const bst_generator *g, const generator_source *s,
+                             const generator_source *bright) {
+    double dx = bright->x - s->x, dy = bright->y - s->y, apart = hypot(dx, dy);
+    double least = 1.0 - bst_generator_fall_of_saddle(s->level) / s->level;
+    for (double step = 1.0; step < apart; step += 1.0) {
+        generator_source at = {.x = s->x + step / apart * dx, .y = s->y + step / apart * dy};
+        if (bst_generator_overlap(g, s, &at) < least) {
+            return bright->amplitude * bst_generator_overlap(g, bright, &at);
+        }
+    }
+    return bright->amplitude;
+}
+
 /* Decides which sources are detected and which are merged with a brighter one. */
 void bst_generator_decide(bst_generator *g) {
     double most = 0.0;
@@ -116,15 +137,14 @@ void bst_generator_decide(bst_generator *g) {
                 continue;
             }
             double light = o->amplitude * bst_generator_overlap(g, o, s);
-            if (light < 0.01) {
-                continue;
-            }
             bool brighter_one = o->found || o->head >= 0; /* a merged maximum counts as well */
-            if (brighter_one && !merged && !bst_generator_separates(g, o, s)) {
+            bool joins = brighter_one && !merged &&
+                         (light > LEAST_LIGHT || light_on_flank(g, s, o) > LEAST_ON_FLANK);
+            if (joins && !bst_generator_separates(g, o, s)) {
                 s->head = o->found ? k : o->head;
                 merged = true;
             }
-            peak += light;
+            peak += light > LEAST_LIGHT ? light : 0.0;
         }
         if (merged) {
             continue;
@@ -163,8 +183,9 @@ static int add_merged(const bst_generator *g, const generator_source *s, const g
 static double pull_of(const bst_generator *g, const generator_source *a,
                       const generator_source *b) {
     double length = a->as_streak ? g->streak : a->length;
-    return length < 0.5 ? bst_response_pull(&g->response, hypot(b->x - a->x, b->y - a->y))
-                        : bst_generator_overlap(g, a, b);
+    return length < SHORT_SIGMAS * g->total_sigma
+               ? bst_response_pull(&g->response, hypot(b->x - a->x, b->y - a->y))
+               : bst_generator_overlap(g, a, b);
 }
 
 /* Draws the position of a faint streak, whose filter output has a peak that scatters along it.

@@ -38,7 +38,8 @@ static double fit_as_point(const bst_generator *g, const generator_source *s,
     double model = g->filter_sigma * g->filter_sigma;
     double image = g->response.source.across_px * g->response.source.along_px;
     double widening = image - model;
-    if (s->peak > WIDTH_SNR) {
+    /* of a PSF that is no Gaussian the pull of each light is known, but not the width */
+    if (s->peak > WIDTH_SNR && !g->response.falloff.tabulated) {
         bst_path_point points[BST_PATH_POINTS];
         int used = 0;
         for (int k = -1; k < count && used + 2 <= BST_PATH_POINTS; k++) {
