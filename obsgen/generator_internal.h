@@ -164,6 +164,8 @@ bool bst_generator_is_uniform(const bst_generator *g);
 double bst_generator_streak_light(const bst_generator *g, double flux_e);
 /* Filter output above which image processing interpolates maxima. */
 double bst_generator_looks_from(const bst_generator *g);
+/* By how much the output must fall about a maximum of this level, SNR, for a source of its own. */
+double bst_generator_fall_of_saddle(double level);
 /* True if image processing resolves two sources as separate maxima. */
 bool bst_generator_separates(const bst_generator *g, const generator_source *bright,
                              const generator_source *faint);
@@ -171,6 +173,10 @@ bool bst_generator_separates(const bst_generator *g, const generator_source *bri
 void bst_generator_decide(bst_generator *g);
 /* Merged light of source i and the neighbours fitted with it. */
 generator_blend bst_generator_blend_of(const bst_generator *g, int i);
+/* Fits an isolated merged detection as image processing does: a bright point with a free width; one
+ * longer than a point as a single streak at the centroid of its light. */
+void bst_generator_fit_merged(const bst_generator *g, const generator_source *s,
+                              const generator_source *merged, int count, generator_blend *out);
 /* True if a point fits a noisy star better than the star streak; for positions not drawn from the
  * filter outputs. */
 bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
@@ -182,7 +188,14 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
 double bst_generator_draw(const bst_generator *g, const generator_source *s, int which);
 
 /* Numbers of a source's random draws. */
-enum { GENERATOR_PEAK, GENERATOR_PLACE, GENERATOR_FLUX, GENERATOR_SHAPE, GENERATOR_DRAWS = 8 };
+enum {
+    GENERATOR_PEAK,
+    GENERATOR_PLACE,
+    GENERATOR_FLUX,
+    GENERATOR_SHAPE,
+    GENERATOR_MOMENT,
+    GENERATOR_DRAWS = 8
+};
 
 /* Keeps an unfitted maximum of the filter output at (x, y), read-out px. item: truth item or -1. */
 void bst_generator_keep_rough(bst_generator *g, double x, double y, double snr, int item);

@@ -13,10 +13,12 @@ static const double FLATTEST = 6.0;
  * drawn from the filter output. LEAST_NOISE, MOST_NOISE: limits of the output noise relative to
  * white noise. */
 static const double MERGED_CENTROID = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
+/* Light below this SNR does not matter at a maximum, and on its flank. */
+static const double LEAST_LIGHT = 0.01, LEAST_ON_FLANK = 0.3;
+/* A path shorter than this adds less than a tenth to the variance of the image: a point's. */
+static const double SHORT_SIGMAS = 1.1;
 /* Random stream of such streaks. */
 static const uint64_t CENTROID_ERROR = (uint64_t)1 << 52;
-/* An isolated detection above this SNR and this many FWHM long is fitted as a streak of its own. */
-static const double OWN_STREAK_SNR = 10.0, OWN_STREAK_LENGTH = 1.5;
 
 double bst_generator_overlap(const bst_generator *g, const generator_source *a,
                              const generator_source *b) {
@@ -82,6 +84,23 @@ static int brighter(const void *a, const void *b) {
     return (p->index > q->index) - (p->index < q->index);
 }
 
+/* Light of a brighter source on the flank of another, SNR: on the line between both, where the
+ * output of the fainter one has fallen so far that its maximum is one of its own. Of streaks in
+ * line it can be much there and none at the maximum: each output reaches a streak's length along
+ * it. */
+static double light_on_flank(const bst_generator *g, const generator_source *s,
+                             const generator_source *bright) {
+    double dx = bright->x - s->x, dy = bright->y - s->y, apart = hypot(dx, dy);
+    double least = 1.0 - bst_generator_fall_of_saddle(s->level) / s->level;
+    for (double step = 1.0; step < apart; step += 1.0) {
+        generator_source at = {.x = s->x + step / apart * dx, .y = s->y + step / apart * dy};
+        if (bst_generator_overlap(g, s, &at) < least) {
+            return bright->amplitude * bst_generator_overlap(g, bright, &at);
+        }
+    }
+    return bright->amplitude;
+}
+
 /* Decides which sources are detected and which are merged with a brighter one. */
 void bst_generator_decide(bst_generator *g) {
     double most = 0.0;
@@ -118,15 +137,14 @@ void bst_generator_decide(bst_generator *g) {
                 continue;
             }
             double light = o->amplitude * bst_generator_overlap(g, o, s);
-            if (light < 0.01) {
-                continue;
-            }
             bool brighter_one = o->found || o->head >= 0; /* a merged maximum counts as well */
-            if (brighter_one && !merged && !bst_generator_separates(g, o, s)) {
+            bool joins = brighter_one && !merged &&
+                         (light > LEAST_LIGHT || light_on_flank(g, s, o) > LEAST_ON_FLANK);
+            if (joins && !bst_generator_separates(g, o, s)) {
                 s->head = o->found ? k : o->head;
                 merged = true;
             }
-            peak += light;
+            peak += light > LEAST_LIGHT ? light : 0.0;
         }
         if (merged) {
             continue;
@@ -155,6 +173,7 @@ static int add_merged(const bst_generator *g, const generator_source *s, const g
         m->x = o->x + u * o->path.dx;
         m->y = o->y + u * o->path.dy;
         m->flux_e = o->flux_e / pieces;
+        m->path = (bst_obsgen_path_px){o->path.dx / pieces, o->path.dy / pieces};
     }
     return count;
 }
@@ -164,8 +183,9 @@ static int add_merged(const bst_generator *g, const generator_source *s, const g
 static double pull_of(const bst_generator *g, const generator_source *a,
                       const generator_source *b) {
     double length = a->as_streak ? g->streak : a->length;
-    return length < 0.5 ? bst_response_pull(&g->response, hypot(b->x - a->x, b->y - a->y))
-                        : bst_generator_overlap(g, a, b);
+    return length < SHORT_SIGMAS * g->total_sigma
+               ? bst_response_pull(&g->response, hypot(b->x - a->x, b->y - a->y))
+               : bst_generator_overlap(g, a, b);
 }
 
 /* Draws the position of a faint streak, whose filter output has a peak that scatters along it.
@@ -226,66 +246,6 @@ static void draw_streak_position(const bst_generator *g, const generator_source 
     out->snr = top.snr;
 }
 
-/* True if a source's light belongs to another detection, which is fitted jointly. */
-static bool is_of_another(const bst_generator *g, const generator_source *s,
-                          const generator_source *o) {
-    return o->head >= 0 && g->sources[o->head].item != s->item;
-}
-
-/* Largest second moment of the light about (x, y), px^2, as image processing measures it. The
- * Gaussian window has twice the fitted PSF's variance and is removed by adding inverse covariances;
- * the pixel's variance is subtracted. */
-static double longest_moment(const bst_generator *g, const generator_source *s,
-                             const generator_source *merged, int count, double x, double y) {
-    double own = g->response.source.across_px * g->response.source.along_px;
-    double window = 2.0 * g->filter_sigma * g->filter_sigma, both = own + window;
-    double shrunk = window / both, xx = 0.0, xy = 0.0, yy = 0.0, sum = 0.0;
-    for (int k = -1; k < count; k++) {
-        const generator_source *o = k < 0 ? s : &merged[k];
-        if (is_of_another(g, s, o)) {
-            continue;
-        }
-        double dx = o->x - x, dy = o->y - y;
-        double light = o->flux_e * exp(-0.5 * (dx * dx + dy * dy) / both);
-        sum += light;
-        xx += light * dx * dx;
-        xy += light * dx * dy;
-        yy += light * dy * dy;
-    }
-    double scale = shrunk * shrunk / sum, even = own * shrunk;
-    double mean = even + 0.5 * scale * (xx + yy), half = scale * hypot(0.5 * (xx - yy), xy);
-    double windowed = fmin(mean + half, (1.0 - 1e-3) * window);
-    return windowed * window / (window - windowed) - 1.0 / 12.0;
-}
-
-/* Replaces an isolated merged pair longer than a point by a single streak at the centroid of its
- * light. */
-static void merge_to_streak(const bst_generator *g, const generator_source *s,
-                            const generator_source *merged, int count, generator_blend *out) {
-    double snr = out->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e;
-    double point = g->fitted_sigma * g->fitted_sigma;
-    if (g->smeared || out->near || s->as_streak || snr < OWN_STREAK_SNR) {
-        return;
-    }
-    double moment = longest_moment(g, s, merged, count, out->x, out->y);
-    if (moment < OWN_STREAK_LENGTH * OWN_STREAK_LENGTH * point) {
-        return;
-    }
-    /* a uniform streak of this length has this moment */
-    double length = sqrt(12.0 * (moment - point)), x = 0.0, y = 0.0, sum = 0.0;
-    for (int k = -1; k < count; k++) {
-        const generator_source *o = k < 0 ? s : &merged[k];
-        if (hypot(o->x - out->x, o->y - out->y) <= length && !is_of_another(g, s, o)) {
-            sum += o->flux_e;
-            x += o->flux_e * (o->x - s->x);
-            y += o->flux_e * (o->y - s->y);
-        }
-    }
-    out->flux_e = sum;
-    out->x = s->x + x / sum;
-    out->y = s->y + y / sum;
-}
-
 /* Merged light of source i and the neighbours fitted jointly. A single-source fit to several
  * sources converges to the filter output's maximum, found by mean shift. */
 generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
@@ -337,7 +297,7 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
         out.y = s->y + y / sum;
     }
     if (count > 0) {
-        merge_to_streak(g, s, merged, count, &out);
+        bst_generator_fit_merged(g, s, merged, count, &out);
     }
     if (count > 0 && s->length > 1.0) {
         /* two streaks in line have a flat peak between them, where noise determines the position */

@@ -29,6 +29,7 @@ typedef struct scene {
     double x, y; /* of the brighter source */
     generator_source light[MOST_LIGHTS];
     int count;
+    bool mixed; /* points and streaks */
 } scene;
 
 typedef struct grid_place {
@@ -42,6 +43,7 @@ static void add_light(scene *s, const generator_source *o) {
     if (s->count < MOST_LIGHTS) {
         generator_source *at = &s->light[s->count++];
         *at = *o;
+        s->mixed = s->mixed || o->as_streak != s->light[0].as_streak;
         at->x = s->x + (o->x - s->x) / factor;
         at->y = s->y + (o->y - s->y) / factor;
     }
@@ -72,14 +74,32 @@ static void collect_lights(scene *s, const generator_source *bright,
     }
 }
 
-/* Noise-free filter output at a pixel. */
+/* Output at a pixel of the filter that does not show the light best, relative to its output at the
+ * light's centre: a point in the streak filter is drawn out like a streak in the point filter. */
+static double output_of_other(const bst_generator *g, const generator_source *light, int x, int y) {
+    double c = g->star_path.dx / g->streak, n = g->star_path.dy / g->streak;
+    double dx = x - light->x, dy = y - light->y, root = sqrt(2.0) * g->cross_sigma;
+    double along = dx * c + dy * n, across = dy * c - dx * n, half = 0.5 * g->streak;
+    double share = bst_matched_normal_below((along + half) / root) -
+                   bst_matched_normal_below((along - half) / root);
+    return exp(-0.5 * across * across / (root * root)) * share /
+           (2.0 * bst_matched_normal_below(half / root) - 1.0);
+}
+
+/* Noise-free output of the filters at a pixel: where points and streaks meet, the larger one of
+ * both, each with the light of all. */
 static double output_of(const scene *s, int x, int y) {
     generator_source pixel = {.x = x, .y = y};
-    double sum = 0.0;
+    double sum[2] = {0.0, 0.0};
     for (int i = 0; i < s->count; i++) {
-        sum += s->light[i].level * bst_generator_overlap(s->g, &s->light[i], &pixel);
+        const generator_source *light = &s->light[i];
+        sum[light->as_streak] += light->level * bst_generator_overlap(s->g, light, &pixel);
+        if (s->mixed) {
+            sum[!light->as_streak] +=
+                light->level * light->other * output_of_other(s->g, light, x, y);
+        }
     }
-    return sum;
+    return fmax(sum[0], sum[1]);
 }
 
 /* Pixel of the output's maximum near a source. */
@@ -154,6 +174,10 @@ double bst_generator_looks_from(const bst_generator *g) {
     return fmax(LOOK_CORNER * corner, LOOK_SHARE) * g->threshold;
 }
 
+double bst_generator_fall_of_saddle(double level) {
+    return fmax(SADDLE_SIGMA, SADDLE_SHARE * level);
+}
+
 bool bst_generator_separates(const bst_generator *g, const generator_source *bright,
                              const generator_source *faint) {
     double factor = g->calibration.blend_distance_factor;
@@ -170,8 +194,7 @@ bool bst_generator_separates(const bst_generator *g, const generator_source *bri
     int dx = ends[1].x - ends[0].x, dy = ends[1].y - ends[0].y;
     int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
     double value = ends[1].value;
-    double least =
-        fmax(value - fmax(SADDLE_SIGMA, SADDLE_SHARE * value), bst_generator_looks_from(g));
+    double least = fmax(value - bst_generator_fall_of_saddle(value), bst_generator_looks_from(g));
     grid_place between[MOST_PIXELS];
     int count = 0;
     double lowest = INFINITY;

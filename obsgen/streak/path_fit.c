@@ -1,5 +1,6 @@
 #include "obsgen/streak/path_fit.h"
 
+#include <assert.h>
 #include <math.h>
 
 #include "boresight/vec.h"
@@ -18,6 +19,8 @@ enum {
 /* Margin of the grid about the streak model, and its greatest step, sigmas: at one sigma, sums of
  * products of two Gaussians are their integrals to 1e-4. */
 static const double MARGIN_SIGMAS = 4.0, STEP_SIGMAS = 1.0;
+/* Least margin of the pixels on which a point is fitted (imgproc/measure/deblend.c). */
+static const double LEAST_MARGIN_PX = 3.5;
 /* Limits of the fitted widening relative to the PSF's variance (imgproc/measure/fit.c). */
 static const double LEAST_WIDENING = -0.6, MOST_WIDENING = 1.8;
 /* Largest and smallest step of a fit, px. */
@@ -75,8 +78,8 @@ typedef struct grid {
     int columns, rows;
 } grid;
 
-/* Covers the model with its margin; image processing fits no other pixels. */
-static grid grid_about(const samples *model, double sigma) {
+/* Covers the model with a margin; image processing fits no other pixels. */
+static grid grid_about(const samples *model, double sigma, double margin) {
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     for (int i = 0; i < model->count; i++) {
         low[0] = fmin(low[0], model->x[i]);
@@ -84,7 +87,7 @@ static grid grid_about(const samples *model, double sigma) {
         low[1] = fmin(low[1], model->y[i]);
         high[1] = fmax(high[1], model->y[i]);
     }
-    double margin = MARGIN_SIGMAS * sigma, wide = high[0] - low[0], tall = high[1] - low[1];
+    double wide = high[0] - low[0], tall = high[1] - low[1];
     double step = fmax(STEP_SIGMAS * sigma, fmax((wide + 2.0 * margin) / (COLUMNS - 1),
                                                  (tall + 2.0 * margin) / (ROWS - 1)));
     return (grid){low[0] - margin, low[1] - margin, step, (int)((wide + 2.0 * margin) / step) + 1,
@@ -188,7 +191,7 @@ bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_str
     turn(&star, c, s);
     turn(&streak, c, s);
     turn(&about, c, s);
-    grid g = grid_about(&about, stamp->sigma_px);
+    grid g = grid_about(&about, stamp->sigma_px, MARGIN_SIGMAS * stamp->sigma_px);
     double sigma = model->sigma_px;
     int n = g.columns * g.rows;
     render(&g, &star, 0.0, 0.0, sigma, false, &seen);
@@ -201,6 +204,32 @@ bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_str
     place_px[0] = f.x * c - f.y * s;
     place_px[1] = f.x * s + f.y * c;
     return squares;
+}
+
+bst_path_point_fit bst_path_fit_points(const bst_path_point *points, int count, double image_px,
+                                       double model_px, double light) {
+    static_assert((int)BST_PATH_POINTS == (int)SAMPLES, "a point is a sample");
+    samples seen_at = {.count = count < SAMPLES ? count : SAMPLES};
+    /* render() gives each Gaussian the peak of its weight */
+    double peak = model_px * model_px / (image_px * image_px);
+    fitted f = {0.0, 0.0, 0.0, 0.0};
+    for (int i = 0; i < seen_at.count; i++) {
+        seen_at.x[i] = points[i].x_px;
+        seen_at.y[i] = points[i].y_px;
+        seen_at.weight[i] = peak * points[i].flux;
+        f.flux += points[i].flux;
+    }
+    const samples point = {.weight = {1.0}, .count = 1};
+    planes seen, shape;
+    bst_path_fit_squares squares;
+    grid g = grid_about(&point, model_px, fmax(MARGIN_SIGMAS * model_px, LEAST_MARGIN_PX));
+    int n = g.columns * g.rows;
+    render(&g, &seen_at, 0.0, 0.0, image_px, false, &seen);
+    for (int round = 0; round < ROUNDS; round++) { /* the width settles after the place */
+        render(&g, &point, f.x, f.y, model_px, true, &shape);
+        (void)improve(&seen, &shape, n, light, model_px * model_px, &f, &squares);
+    }
+    return (bst_path_point_fit){f.x, f.y, f.flux, f.widening};
 }
 
 /* Sum of the products of two sets of Gaussians whose product has the deviation `root`, the second

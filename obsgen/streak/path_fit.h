@@ -1,5 +1,6 @@
 /* What filters and fits of image processing make of a star whose true path differs from the one
- * that telemetry reports, as in a slew. Internal to the generator. */
+ * that telemetry reports, as in a slew, and of several stars fitted as one. Internal to the
+ * generator. */
 #ifndef BST_OBSGEN_STREAK_PATH_FIT_H
 #define BST_OBSGEN_STREAK_PATH_FIT_H
 
@@ -30,6 +31,29 @@ typedef struct bst_path_fit_squares {
  * Returned:  place_px: relative to the mean of the path, px; the fit's sums of squares */
 bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_streak_model *model,
                                   const bst_streak_model *stamp, double light, double place_px[2]);
+
+/* A point's light. */
+typedef struct bst_path_point {
+    double x_px, y_px, flux;
+} bst_path_point;
+
+/* A point as fitted: place, flux and widening of the PSF's variance, px^2. */
+typedef struct bst_path_point_fit {
+    double x_px, y_px, flux, widening_px2;
+} bst_path_point_fit;
+
+/* Fits one point to the light of several, as image processing does: place, flux and width are
+ * free.
+ *
+ * Given:     points    about (0, 0), the centre of the fitted pixels and start of the iterations;
+ *                      at most BST_PATH_POINTS are used
+ *            image_px  deviation of a point's image, including the pixel
+ *            model_px  deviation of the fitted PSF, including the pixel
+ *            light     brightest pixel of a fitted point of flux 1 over the variance of the noise
+ */
+enum { BST_PATH_POINTS = 64 };
+bst_path_point_fit bst_path_fit_points(const bst_path_point *points, int count, double image_px,
+                                       double model_px, double light);
 
 /* Widths of the images of a point, px, including the pixel: of the star, of the filters, and of
  * the product of both. */

@@ -125,44 +125,51 @@ static void maxima_have_their_neighbours_light(void **state) {
 }
 
 /* Least squares with the weights 1 / (noise + model): x, y and flux of one point fitted to the
- * light on a square of pixels about (cx, cy). */
+ * light on a square of pixels about (cx, cy), and for a bright one flux times widening of the
+ * variance, to first order. As in images, gradients are those without widening. */
 typedef struct pixel_fit {
-    double x, y, flux;
+    double x, y, flux, widening;
 } pixel_fit;
 
 enum { HALF = 4, STAMP = 2 * HALF + 1 };
 
 static pixel_fit fit_point(double light[STAMP][STAMP], int cx, int cy, double sigma, double noise_e,
-                           pixel_fit at) {
+                           bool bright, pixel_fit at) {
+    const double h = 1e-4, wider = 0.01;
+    int n = bright ? 4 : 3;
     for (int round = 0; round < 60; round++) {
-        double a[3][4] = {{0.0}};
-        for (int j = 0; j < STAMP; j++) {
-            for (int i = 0; i < STAMP; i++) {
-                int x = cx + i - HALF, y = cy + j - HALF;
-                double h = 1e-4, p = light_at(x, y, at.x, at.y, 0, 0, sigma);
-                const double g[3] = {
-                    at.flux * (light_at(x, y, at.x + h, at.y, 0, 0, sigma) - p) / h,
-                    at.flux * (light_at(x, y, at.x, at.y + h, 0, 0, sigma) - p) / h, p};
-                double weight = 1.0 / (noise_e * noise_e + at.flux * p);
-                for (int r = 0; r < 3; r++) {
-                    for (int c = 0; c < 3; c++) {
-                        a[r][c] += weight * g[r] * g[c];
-                    }
-                    a[r][3] += weight * g[r] * (light[j][i] - at.flux * p);
+        double a[4][5] = {{0.0}};
+        for (int k = 0; k < STAMP * STAMP; k++) {
+            int x = cx + k % STAMP - HALF, y = cy + k / STAMP - HALF;
+            double p = light_at(x, y, at.x, at.y, 0, 0, sigma);
+            double by_variance = (light_at(x, y, at.x, at.y, 0, 0, sigma * sqrt(1.0 + wider)) - p) /
+                                 (wider * sigma * sigma);
+            const double g[4] = {at.flux * (light_at(x, y, at.x + h, at.y, 0, 0, sigma) - p) / h,
+                                 at.flux * (light_at(x, y, at.x, at.y + h, 0, 0, sigma) - p) / h, p,
+                                 by_variance};
+            double model = at.flux * (p + at.widening * by_variance);
+            double weight = 1.0 / (noise_e * noise_e + fmax(model, 0.0));
+            for (int r = 0; r < n; r++) {
+                for (int c = 0; c < n; c++) {
+                    a[r][c] += weight * g[r] * g[c];
                 }
+                a[r][4] += weight * g[r] * (light[k / STAMP][k % STAMP] - model);
             }
         }
-        for (int r = 0; r < 3; r++) { /* Gauss-Jordan */
-            for (int o = 0; o < 3; o++) {
+        for (int r = 0; r < n; r++) { /* Gauss-Jordan */
+            for (int o = 0; o < n; o++) {
                 double factor = o == r ? 0.0 : a[o][r] / a[r][r];
-                for (int c = 0; c < 4; c++) {
+                for (int c = 0; c < 5; c++) {
                     a[o][c] -= factor * a[r][c];
                 }
             }
         }
-        at.x += 0.5 * a[0][3] / a[0][0];
-        at.y += 0.5 * a[1][3] / a[1][1];
-        at.flux += 0.5 * a[2][3] / a[2][2];
+        double widened = at.flux * at.widening;
+        at.x += 0.5 * a[0][4] / a[0][0];
+        at.y += 0.5 * a[1][4] / a[1][1];
+        at.flux += 0.5 * a[2][4] / a[2][2];
+        widened += bright ? 0.5 * a[3][4] / a[3][3] : 0.0;
+        at.widening = widened / at.flux;
     }
     return at;
 }
@@ -173,8 +180,8 @@ static void blends_lie_where_a_single_fit_does(void **state) {
     (void)state;
     const struct {
         double snr, dx, dy, part, dx2, dy2, part2;
-    } cases[] = {{15, 1.2, -0.6, 0.3, 0, 0, 0},
-                 {15, -0.5, 1.3, 0.5, 0, 0, 0},
+    } cases[] = {{10, 1.2, -0.6, 0.3, 0, 0, 0},
+                 {10, -0.5, 1.3, 0.5, 0, 0, 0},
                  {300, 1.1, 0.9, 0.2, 0, 0, 0},
                  {300, -1.2, -0.5, 0.3, 0.4, 1.2, 0.15},
                  {40, 0.3, -1.5, 0.4, 1, 0, 0.2}};
@@ -221,7 +228,8 @@ static void blends_lie_where_a_single_fit_does(void **state) {
                                             py + (p[1] - y) / b, 0, 0, sigma);
                 }
                 pixel_fit fit =
-                    fit_point(light, cx, cy, sigma, g->noise_e, (pixel_fit){px, py, flux});
+                    fit_point(light, cx, cy, sigma, g->noise_e, g->sources[i].peak > 20.0,
+                              (pixel_fit){px, py, flux, 0.0});
                 generator_blend blend = bst_generator_blend_of(g, i);
                 const double got[2][3] = {{blend.x - px, blend.y - py, blend.flux_e / flux - 1.0},
                                           {fit.x - px, fit.y - py, fit.flux / flux - 1.0}};
@@ -232,10 +240,11 @@ static void blends_lie_where_a_single_fit_does(void **state) {
             }
             double far = hypot(moved[1][0], moved[1][1]);
             assert_true(far > 0.1);
-            /* a Gaussian in the place of pixels, a circle of them in that of a square */
-            bst_assert_close(moved[0][0], moved[1][0], 0.002 + 0.05 * far);
-            bst_assert_close(moved[0][1], moved[1][1], 0.002 + 0.05 * far);
-            bst_assert_close(moved[0][2], moved[1][2], 0.15 * moved[1][2]);
+            /* a Gaussian in the place of pixels, a circle of them in that of a square: for pixels
+             * of two sigma, 7 % */
+            bst_assert_close(moved[0][0], moved[1][0], 0.002 + (b > 1 ? 0.07 : 0.03) * far);
+            bst_assert_close(moved[0][1], moved[1][1], 0.002 + (b > 1 ? 0.07 : 0.03) * far);
+            bst_assert_close(moved[0][2], moved[1][2], 0.16 * moved[1][2]);
         }
     }
     close_scene(&s);
@@ -374,7 +383,8 @@ static void long_pairs_have_their_centroid(void **state) {
  * does on rendered pixels. */
 static void a_long_streak_draws_a_star(void **state) {
     (void)state;
-    const double paths[2][2] = {{24.0, 32.0}, {-35.0, 20.0}}, away = 1.2;
+    /* so faint that both together are not fitted as a streak */
+    const double paths[2][2] = {{24.0, 32.0}, {-35.0, 20.0}}, away = 1.2, ray = 2.5;
     scene s;
     open_scene(&s);
     start(&s);
@@ -386,7 +396,7 @@ static void a_long_streak_draws_a_star(void **state) {
         s.truth->count = 0;
         add_source(&s, 1, x, y, flux);
         bst_truth_item *object =
-            add_source(&s, 2, x + along * c - side * n, y + along * n + side * c, 4.0 * flux);
+            add_source(&s, 2, x + along * c - side * n, y + along * n + side * c, ray * flux);
         object->kind = BST_SOURCE_OBJECT;
         draw_as_streak(object, path[0], path[1]);
         const bst_generator *g = frame_of(&s);
@@ -399,16 +409,16 @@ static void a_long_streak_draws_a_star(void **state) {
             for (int u = 0; u < STAMP; u++) {
                 int px = 300 + u - HALF, py = 400 + v - HALF;
                 light[v][u] = flux * light_at(px, py, x, y, 0, 0, s.frame.sigma_px) +
-                              4.0 * flux *
+                              ray * flux *
                                   light_at(px, py, object->x_mid_px, object->y_mid_px, path[0],
                                            path[1], s.frame.sigma_px);
             }
         }
-        pixel_fit fit =
-            fit_point(light, 300, 400, s.frame.sigma_px, g->noise_e, (pixel_fit){x, y, flux});
+        pixel_fit fit = fit_point(light, 300, 400, s.frame.sigma_px, g->noise_e, true,
+                                  (pixel_fit){x, y, flux, 0.0});
         generator_blend b = bst_generator_blend_of(g, i);
         double far = hypot(fit.x - x, fit.y - y);
-        assert_true(far > 0.2);
+        assert_true(far > 0.1);
         /* one source of its nearest light in the place of a line */
         bst_assert_close(b.x, fit.x, 0.15 * far);
         bst_assert_close(b.y, fit.y, 0.15 * far);

@@ -153,20 +153,22 @@ static void pairs_are_separated_as_in_images(void **state) {
     }
 }
 
-/* What is seen as one: fits of a point at small distances, of a streak where the pair is long. */
+/* What is seen as one: fits of a point at small distances, of a streak where the pair is long. The
+ * last seven are near the limit of a streak, where noise and the free width of the fit decide. */
 static void joined_pairs_are_placed_as_in_images(void **state) {
     (void)state;
-    const kind kinds[] = {{8000, 0.3, 1.6, 0}, {8000, 0.3, 2.4, 0}, {8000, 0.2, 3.0, 0},
-                          {8000, 0.8, 2.4, 0}, {8000, 0.8, 3.0, 0}, {2000, 0.25, 2.4, 0},
-                          {2000, 0.9, 2.8, 0}};
+    const kind kinds[] = {{8000, 0.3, 1.6, 0},  {8000, 0.3, 2.4, 0},  {8000, 0.2, 3.0, 0},
+                          {8000, 0.8, 2.4, 0},  {8000, 0.8, 3.0, 0},  {2000, 0.25, 2.4, 0},
+                          {2000, 0.9, 2.8, 0},  {8000, 0.35, 3.0, 0}, {8000, 0.45, 3.0, 0},
+                          {8000, 0.55, 3.0, 0}, {8000, 0.3, 3.4, 0},  {8000, 0.4, 3.2, 0},
+                          {2000, 0.45, 3.0, 0}, {700, 0.5, 3.0, 0}};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         outcome image, generated;
         compare(&kinds[i], 30 + i, &image, &generated);
         printf("flux %g ratio %g at %g px: shift %.3f px, generator %.3f px\n", kinds[i].flux_e,
                kinds[i].ratio, kinds[i].distance, image.shift, generated.shift);
-        /* the fit's variance changes along the blend: to a tenth, and 0.03 px of what is fitted
-         * with a width of its own, and of errors in the mean */
-        bst_assert_close(generated.shift, image.shift, 0.03 + 0.1 * image.shift);
+        /* the streak's fit weighs the pair by its light: 7 % of its centroid; errors in the mean */
+        bst_assert_close(generated.shift, image.shift, 0.02 + 0.07 * image.shift);
     }
 }
 

@@ -297,7 +297,8 @@ static void what_rests_is_drawn_by_the_streak_beside_it(void **state) {
     s.frame.streak_dx_px = length;
     start(&s);
     double sigma2 = s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0;
-    double bright = electrons_of(&s, 15.0), faint = 0.6 * bright;
+    /* fainter than what images fit as a streak of its own */
+    double bright = electrons_of(&s, 8.5), faint = 0.6 * bright;
     double at[2] = {0.0, 0.0}, seen[2] = {0.0, 0.0};
     add_source(&s, 1, 500.0, 500.0, bright)->kind = BST_SOURCE_OBJECT;
     bst_truth_item *t = add_source(&s, 2, 500.0 + 0.5 * length, 500.0 + beside, faint);

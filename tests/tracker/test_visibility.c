@@ -157,8 +157,7 @@ static bst_mtt_detection seen_at(bst_vec3 d, bst_rng_key key, uint64_t n) {
         .snr = 20.0};
 }
 
-static void run_night(night *g, uint64_t seed) {
-    bst_ctx ctx = {0};
+static bst_mtt *make_tracker(bst_ctx *ctx, double max_dormant_s) {
     bst_mtt_params params = {.max_tracks = 50,
                              .max_detections = 50,
                              .association = BST_MTT_MIXTURE,
@@ -178,11 +177,17 @@ static void run_night(night *g, uint64_t seed) {
                              .max_coast_s = 120,
                              .max_sigma_rad = 60 * AS,
                              .max_dormant_tracks = 16,
-                             .max_dormant_s = g->max_dormant_s,
+                             .max_dormant_s = max_dormant_s,
                              .max_dormant_sigma_rad = BST_DEG_RAD,
                              .dormant_gate_chi2 = 18.5};
     bst_mtt *mtt;
-    bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));
+    bst_assert_ok(ctx, bst_mtt_create(ctx, &params, &mtt));
+    return mtt;
+}
+
+static void run_night(night *g, uint64_t seed) {
+    bst_ctx ctx = {0};
+    bst_mtt *mtt = make_tracker(&ctx, g->max_dormant_s);
     bst_rng_key key = bst_rng_make_key(seed, 1, "test", "night");
     for (int k = 0; k < END; k++) {
         bool dark = k >= DARK_FROM && k < DARK_TO;
@@ -289,6 +294,45 @@ static void a_night_longer_than_the_memory_ends_the_track(void **state) {
     assert_true(g.id_after > g.id); /* a new object */
 }
 
+/* A faint track without a detection becomes dormant in the first frame whose own time is more than
+ * half of max_coast_s (120 s) after its last detection, at any frame period. */
+static void a_faint_track_sleeps_after_half_its_coast(void **state) {
+    (void)state;
+    enum { LAST_SEEN = 300, PERIOD = 7, COAST_HALF = 60 };
+    bst_ctx ctx = {0};
+    bst_mtt *mtt = make_tracker(&ctx, 7200);
+    bst_rng_key key = bst_rng_make_key(1, 1, "test", "faint");
+    int asleep_from = 0;
+    for (int k = 0; k < LAST_SEEN + 120; k += k < LAST_SEEN ? 1 : PERIOD) {
+        bst_od_observer eye, side;
+        bst_vec3 d, unused;
+        double range, from, to;
+        look(k, 0.0, &eye, &d, &range);
+        look(k - 0.5, 0.0, &side, &unused, &from);
+        look(k + 0.5, 0.0, &side, &unused, &to);
+        bench b = {.range = {range, 0.02 * range, to - from, 50.0},
+                   .sight = k > LAST_SEEN ? BST_MTT_FAINT : BST_MTT_CLEAR};
+        bst_mtt_detection seen = seen_at(d, key, (uint64_t)k);
+        bst_mtt_frame f = {.tick = k,
+                           .seconds = k,
+                           .detections = &seen,
+                           .count = k <= LAST_SEEN,
+                           .observer = &eye,
+                           .range = range_of,
+                           .sight = sight_of,
+                           .user = &b};
+        bst_mtt_step(mtt, &f);
+        int n;
+        const bst_mtt_track *tracks = bst_mtt_tracks(mtt, &n);
+        for (int i = 0; i < n; i++) {
+            asleep_from = asleep_from == 0 && tracks[i].asleep ? k : asleep_from;
+        }
+    }
+    /* the ninth frame: 63 s after the last detection */
+    assert_int_equal(asleep_from, LAST_SEEN + (COAST_HALF / PERIOD + 1) * PERIOD);
+    bst_mtt_free(mtt);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shadow_by_angle),
@@ -296,6 +340,7 @@ int main(void) {
         cmocka_unit_test(lit_from_behind),
         cmocka_unit_test(it_wakes_as_itself),
         cmocka_unit_test(a_neighbour_that_is_seen_all_night_does_not_become_it),
+        cmocka_unit_test(a_faint_track_sleeps_after_half_its_coast),
         cmocka_unit_test(a_night_longer_than_the_memory_ends_the_track),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

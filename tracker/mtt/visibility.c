@@ -77,9 +77,9 @@ static void inflate_covariance(bst_mtt_track *track) {
 }
 
 /* True if a faint track had no detection for so long that it would soon be deleted. */
-static bool has_faded(const bst_mtt *m, const bst_mtt_track *track) {
+static bool has_faded(const bst_mtt *m, const bst_mtt_track *track, double seconds) {
     return track->sight == BST_MTT_FAINT &&
-           m->now.seconds - track->last_update_s > FADED_SHARE * m->params.max_coast_s;
+           seconds - track->last_update_s > FADED_SHARE * m->params.max_coast_s;
 }
 
 void bst_mtt_look(bst_mtt *m, int t, const bst_mtt_frame *frame) {
@@ -94,7 +94,8 @@ void bst_mtt_look(bst_mtt *m, int t, const bst_mtt_frame *frame) {
         track->lit = track->lit || track->sight < BST_MTT_SHADOW;
         if (!track->lit) {
             track->sight = BST_MTT_CLEAR; /* never predicted visible: the orbit cannot be right */
-        } else if (!track->asleep && (track->sight >= BST_MTT_SHADOW || has_faded(m, track))) {
+        } else if (!track->asleep &&
+                   (track->sight >= BST_MTT_SHADOW || has_faded(m, track, frame->seconds))) {
             track->asleep = true;
             inflate_covariance(track);
         }
