@@ -463,10 +463,32 @@ static void wrong_arguments_are_refused(void **state) {
     assert_int_equal(bst_trajectory_create(&fx.ctx, &o, &t), BST_ERR_ARGUMENT);
     assert_string_equal(fx.ctx.message, "tolerance 1e-12 of an orbit (allowed: 1e-11 to 1e-3)");
     o = good;
-    const bst_astro_thrust burn = {0, -1, {0, 0, 0}};
-    o.burns = &burn;
-    o.burn_count = 1;
-    assert_int_equal(bst_trajectory_create(&fx.ctx, &o, &t), BST_ERR_ARGUMENT);
+    const bst_astro_thrust none = {0, 0, {0, 0, 0}};
+    const bst_astro_thrust wrong[] = {{0, -1, {0, 0, 0}},        {0, 2e10, {0, 0, 0}},
+                                      {-2e10, 0, {0, 0, 0}},     {2e10, 0, {0, 0, 0}},
+                                      {0, 0, {NAN, 0, 0}},       {0, 0, {0, INFINITY, 0}},
+                                      {0, 0, {0, 0, -INFINITY}}, {NAN, 0, {0, 0, 0}}};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        const bst_astro_thrust burns[] = {none, wrong[i]};
+        o.burns = burns;
+        o.burn_count = 2;
+        assert_int_equal(bst_trajectory_create(&fx.ctx, &o, &t), BST_ERR_ARGUMENT);
+        assert_int_equal(strncmp(fx.ctx.message, "burn 1:", 7), 0);
+    }
+    const struct {
+        bst_vec3 position_m, velocity_mps;
+        double at_s;
+    } bad[] = {{{INFINITY, 7e6, 0}, {0, 0, 0}, 0}, {{0, 7e6, NAN}, {0, 0, 0}, 0},
+               {{7e6, 0, 0}, {NAN, 0, 0}, 0},      {{7e6, 0, 0}, {0, 0, INFINITY}, 0},
+               {{7e6, 0, 0}, {0, 0, 0}, -2e10},    {{7e6, 0, 0}, {0, 0, 0}, NAN}};
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        o = good;
+        o.position_m = bad[i].position_m;
+        o.velocity_mps = bad[i].velocity_mps;
+        o.at_s = bad[i].at_s;
+        assert_int_equal(bst_trajectory_create(&fx.ctx, &o, &t), BST_ERR_ARGUMENT);
+        assert_int_equal(strncmp(fx.ctx.message, "the initial state of an orbit", 29), 0);
+    }
     o = good;
     o.forces.drag = true;
     assert_int_equal(bst_trajectory_create(&fx.ctx, &o, &t), BST_ERR_ARGUMENT);

@@ -5,13 +5,15 @@
     tests/mutation/mutate.py --since v0.1.0 --count 60            only in files that changed since a revision
     tests/mutation/mutate.py --files tracker/mtt/sky_filter.c         only in these files
     tests/mutation/mutate.py --suite e2e --count 30               judged by the tests of the whole program
+    tests/mutation/mutate.py --quick --files sim/eval --count 30   seconds for each bug: no copy, see quick_tree.py
     tests/mutation/mutate.py --coverage build-cov --count 100     many bugs: only the tests that execute a bug's line run
     tests/mutation/mutate.py --coverage build-cov --unexecuted sim/world    lines that no unit test of the folder executes
 
 The tree is copied, built once, and every bug is compiled in that copy: nothing here is touched. A bug whose object
 file equals that of the sound source cannot be noticed and does not count. A bug counts as noticed if a test fails,
 crashes or exceeds its time. Tests run in the order of their last duration, and the first failure ends a bug's trial.
-With --work the copy is kept, and the next call takes over only what has changed since.
+With --work the copy is kept, and the next call takes over only what has changed since. With --quick there is no copy:
+see quick_tree.py.
 
 Rows of numbers, which are tables, hold no logic and get no bugs.
 
@@ -42,16 +44,10 @@ import sys
 import tempfile
 import time
 
-import e2e_suite
+from build_files import Judges, listed_tests, run
+from quick_tree import QuickTree
 
 FOLDERS = ["sim", "scenegen", "gimbal", "imgproc", "tracker", "control", "obsgen"]
-# folders whose tests have names of their own: the rest of a path names its tests (tracker/… → tracker_…)
-UNIT_TESTS = {f"sim/{name}": name for name in (
-    "core", "messages", "dynamics", "astro", "device", "catalogue", "optics", "world", "onboard", "io", "link",
-    "engine", "eval", "studies", "registry", "cli", "run", "analysis", "export", "report", "study_kinds", "bench")}
-UNIT_TESTS["sim/app"] = "app|bad_input"
-UNIT_TESTS["sim/onboard"] = "onboard|world_cue"  # the cue as the spacecraft and the world have it
-
 AXES = [(r"\.x\b", ".y"), (r"\.y\b", ".x"), (r"\.z\b", ".y"), (r"\[0\]", "[1]"), (r"\[1\]", "[0]"), (r"\[2\]", "[1]"),
         (r"\b(\w+)_x\b", r"\1_y"), (r"\b(\w+)_y\b", r"\1_x"), (r"\bx_px\b", "y_px"), (r"\by_px\b", "x_px"),
         (r"\bnx\b", "ny"), (r"\bny\b", "nx")]
@@ -98,10 +94,6 @@ def mutants_of(path, text):
                 found.append(("statement", first, text[first:last], ";"))
         at += len(line) + 1
     return found
-
-
-def run(command, **keywords):
-    return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False, **keywords)
 
 
 def same_text(a, b):
@@ -187,23 +179,11 @@ class Coverage:
         return len(missed), len(lines), ranges
 
 
-def listed_tests(build):
-    """{name: (labels, command)} of all tests of a build, whether or not their programs are built yet."""
-    commands, labels = {}, {}
-    for root, _, files in os.walk(os.path.join(build, "tests")):
-        if "CTestTestfile.cmake" in files:
-            with open(os.path.join(root, "CTestTestfile.cmake"), encoding="utf-8") as file:
-                text = file.read()
-            for name, command in re.findall(r"^add_test\(\[=\[(.*?)\]=\] (.*)\)$", text, re.M):
-                commands[name] = re.findall(r'"((?:[^"\\]|\\.)*)"', command)
-            labels.update(re.findall(r'^set_tests_properties\(\[=\[(.*?)\]=\] .*\bLABELS "([^"]*)"', text, re.M))
-    return {name: (labels[name].split(";"), command) for name, command in commands.items() if name in labels}
-
-
-class Tree:
+class Tree(Judges):
     """A copy of the sources with a build of its own."""
 
     def __init__(self, source, folder, preset, jobs):
+        super().__init__()
         self.folder, self.build, self.jobs = folder, os.path.join(folder, "build"), jobs
         listed = run(["git", "-C", source, "ls-files", "-co", "--exclude-standard"]).stdout.split("\n")
         for name in filter(None, listed):
@@ -217,35 +197,9 @@ class Tree:
         self.objects = re.findall(r"^(\S+\.o):", run(["ninja", "-C", self.build, "-t", "targets", "all"]).stdout, re.M)
         self.tests = {name: (labels, os.path.basename(command[0]), " ".join(command))
                       for name, (labels, command) in listed_tests(self.build).items()}
-        self.costs, self.unsound = {}, set()
 
     def make(self, *targets):
         return run(["ninja", "-C", self.build, f"-j{self.jobs}", "--quiet", *targets]).returncode == 0
-
-    def object_of(self, path):
-        """The object of a source, by itself or in a unity build of the nearest folder above with a library of its own."""
-        folder = os.path.dirname(path)
-        while folder:
-            rest = re.escape(os.path.relpath(path, folder))
-            made = [o for o in self.objects if re.fullmatch(rf"{re.escape(folder)}/CMakeFiles/[^/]+\.dir/{rest}\.o", o)]
-            for together in [o for o in self.objects if o.startswith(folder + "/CMakeFiles/") and "/Unity/" in o]:
-                with open(os.path.join(self.build, together[:-len(".o")]), encoding="utf-8") as file:
-                    made += [together] if f'/{path}"' in file.read() else []
-            if made:
-                return made[0]
-            folder = os.path.dirname(folder)
-        return None
-
-    def tests_for(self, path, suite):
-        """Names of the tests that judge a file: those of its folder, or those of the program."""
-        if suite == "e2e":
-            return e2e_suite.concerned(path, [n for n, (labels, _, _) in self.tests.items() if "e2e" in labels])
-        else:
-            top = "/".join(path.split("/")[:2])
-            prefix = UNIT_TESTS.get(top, path.split("/")[0])
-            names = [n for n, (labels, _, _) in self.tests.items()
-                     if re.match(rf"(?:{prefix})(?:_|$)", n) and {"unit", "device"} & set(labels) and "slow" not in labels]
-        return sorted(set(names) - self.unsound, key=lambda n: self.costs.get(n, 1.0))
 
     def prove(self, names):
         """Runs the tests that have not run yet on the sound tree: one that fails there judges nothing."""
@@ -311,6 +265,8 @@ def trial(tree, coverage, name, line, mutant, suite):
     with open(path, encoding="utf-8") as file:
         sound = file.read()
     assert sound[at:at + len(old)] == old
+    if isinstance(tree, QuickTree):
+        return tree.trial(name, sound, mutant, suite, coverage, line)
     target = tree.object_of(name)
     if target is None or not tree.make(target):
         return "equal", "not compiled"
@@ -356,6 +312,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0], epilog="example: mutate.py --count 60 --seed 1")
     parser.add_argument("--source", default=os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
     parser.add_argument("--work", help="folder of the copy, kept for the next time (default: a temporary one)")
+    parser.add_argument("--quick", metavar="BUILD", nargs="?", const="build",
+                        help="no copy: compile each bug by itself and link it before the libraries of this build (build)")
+    parser.add_argument("--skip", nargs="+", default=[], metavar="LABEL", help="leave out tests with these labels (heavy)")
     parser.add_argument("--files", nargs="+", help="files or folders to plant bugs in")
     parser.add_argument("--coverage", help="folder for a build with gcov: run only the tests that execute a bug's line")
     parser.add_argument("--unexecuted", nargs="+", dest="files_unexecuted", metavar="FILE",
@@ -376,7 +335,9 @@ def main():
     options.files = options.files_unexecuted or options.files
     folder = os.path.abspath(options.work) if options.work else tempfile.mkdtemp(prefix="boresight-mutation-")
     try:
-        tree = Tree(options.source, folder, "release", options.jobs)
+        tree = QuickTree(options.source, options.quick, options.jobs) if options.quick else \
+            Tree(options.source, folder, "release", options.jobs)
+        tree.skipped = set(options.skip)
         pools = candidates(options, tree)
         coverage = None
         if options.coverage:

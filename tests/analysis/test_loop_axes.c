@@ -1,0 +1,265 @@
+/* The loops of a second-order mount against closed forms, the bands of its jitter against the
+ * configured RMS, and the report of a model whose numbers are all different. */
+#include <cjson/cJSON.h>
+
+#include "boresight/vec.h"
+#include "sim/analysis/loop/loop_model.h"
+#include "sim/cli/load.h"
+#include "tests/test_support.h"
+
+#define PX 1e-5 /* rad */
+#define GIMBAL "/observers/0/sensors/0/modules/gimbal/"
+
+static double variance_between(const bst_loop_axis *axis, double low_hz, double high_hz) {
+    double sum = 0.0;
+    for (int i = 0; i < axis->band_count; i++) {
+        const bst_tracking_band *b = &axis->bands[i];
+        if (b->low_hz >= low_hz - 1e-9 && b->high_hz <= high_hz + 1e-9) {
+            sum += b->variance;
+        }
+    }
+    return sum;
+}
+
+/* Flat bands have half of the radial variance each; tables the integral of their density, about y
+ * times y_scale; lines half of the square of the amplitude; nothing beyond 0.4 of the plant's rate.
+ */
+static void bands_of_the_jitter(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_jitter_density_point low[] = {{0.5, 2e-3}, {2.0, 2e-3}},
+                             high[] = {{300.0, 1e-4}, {500.0, 1e-4}, {800.0, 1e-4}};
+    bst_platform_config c;
+    bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_platform_config_table, &c));
+    c.jitter_low_px_rms = 0.6;
+    c.jitter_low_cutoff_hz = 0.05;
+    c.jitter_high_px_rms = 0.2;
+    c.jitter_high_band_hz[0] = 5;
+    c.jitter_high_band_hz[1] = 200;
+    c.jitter_psd.low = (bst_config_list){.items = low, .count = 2};
+    c.jitter_psd.high = (bst_config_list){.items = high, .count = 3};
+    c.jitter_psd.y_scale = 2.5;
+    for (int axis = 0; axis < 2; axis++) {
+        bst_loop_axis *a = calloc(1, sizeof *a);
+        assert_non_null(a);
+        double scale = axis == 1 ? 2.5 : 1.0;
+        bst_assert_ok(&ctx, bst_loop_platform_bands(&ctx, &c, PX, 1e-3, axis, a));
+        bst_assert_close(variance_between(a, 0, 0.05), 0.18, 1e-9);
+        bst_assert_close(variance_between(a, 5, 200), 0.02, 1e-9);
+        bst_assert_close(variance_between(a, 0.5, 2), scale * 2e-3 * 1.5, 1e-9);
+        bst_assert_close(variance_between(a, 300, 1e9), scale * 1e-4 * 100.0, 1e-9); /* to 400 Hz */
+        for (int i = 0; i < a->band_count; i++) {
+            assert_true(a->bands[i].low_hz <= a->bands[i].high_hz &&
+                        a->bands[i].high_hz <= 400.001);
+            if (a->bands[i].low_hz >= 0.5 && a->bands[i].high_hz <= 2.0) {
+                /* narrow parts, of the density there: two octaves in eight */
+                assert_true(a->bands[i].high_hz - a->bands[i].low_hz < 0.2);
+                bst_assert_close(a->bands[i].variance / (a->bands[i].high_hz - a->bands[i].low_hz),
+                                 scale * 2e-3, 1e-9);
+            }
+        }
+        bst_loop_add_band(a, 7, 6, 1);
+        bst_loop_add_band(a, 7, 8, 0);
+        int before = a->band_count;
+        bst_loop_add_band(a, 7, 7, 0.5);
+        assert_int_equal(a->band_count, before + 1);
+        bst_assert_close(a->bands[before].variance, 0.5, 0);
+        free(a);
+    }
+}
+
+static bst_loop_model *model_of(bst_json **json, bst_scenario *scenario, const char *const *sets,
+                                int count) {
+    bst_ctx ctx = {0};
+    bst_load_options load = BST_LOAD_DEFAULTS;
+    bst_option none[] = {{.name = NULL}};
+    const bst_loop_options options = {.fix_sigma_px = 0.03};
+    bst_loop_model *model;
+    bst_assert_ok(&ctx, bst_load_check(&ctx, &load, none));
+    for (int i = 0; i < count; i++) {
+        load.set.items[load.set.count++] = sets[i];
+    }
+    bst_assert_ok(
+        &ctx, bst_load_scenario(&ctx, "scenarios/neossat_geo_track.json", &load, json, scenario));
+    bst_assert_ok(&ctx, bst_loop_model_create(&ctx, scenario, 0, 0, &options, &model));
+    assert_non_null(model);
+    return model;
+}
+
+static void a_second_order_mount(void **state) {
+    (void)state;
+    const char *const sets[] = {GIMBAL "natural_frequency_hz=1.5", GIMBAL "damping=0.4",
+                                GIMBAL "platform/drift_arcsec_per_s=[3,-12,5]"};
+    bst_json *json;
+    bst_scenario scenario;
+    bst_loop_model *m = model_of(&json, &scenario, sets, 3);
+    const double w = 2 * BST_PI * 1.5, d = 0.4;
+    assert_int_equal(m->axes, 2);
+    assert_string_equal(m->axis[0].name, "outer");
+    for (int k = 0; k < 2; k++) {
+        const bst_loop_margins *g = &m->axis[k].servo.margins;
+        assert_true(m->axis[k].servo.there && m->axis[k].servo.continuous && g->stable);
+        /* L = (2 d w s + w^2) / s^2 */
+        double cross = w * sqrt(2 * d * d + sqrt(4 * d * d * d * d + 1));
+        double margin = atan(2 * d * cross / w);
+        bst_assert_close(g->crossover_hz, cross / 2 / BST_PI, 1e-3 * cross);
+        bst_assert_close(g->phase_margin_deg, margin * 180 / BST_PI, 0.05);
+        bst_assert_close(g->delay_margin_s, margin / cross, 1e-3 * margin / cross);
+        assert_true(isinf(g->gain_margin_db));
+        bst_assert_close(g->sensitivity_peak, 1 / (2 * d * sqrt(1 - d * d)), 2e-3);
+        double wide = w * sqrt(1 + 2 * d * d + sqrt((1 + 2 * d * d) * (1 + 2 * d * d) + 1));
+        bst_assert_close(g->bandwidth_hz, wide / 2 / BST_PI, 5e-3 * wide);
+    }
+    const bst_loop_axis *outer = &m->axis[0], *inner = &m->axis[1];
+    assert_true(outer->tracked && inner->tracked);
+    /* the outer axis turns about y, the inner about x: lags are as the drifts */
+    bst_assert_close(outer->prediction.lag_px / inner->prediction.lag_px, 4.0, 1e-9);
+    for (int k = 0; k < 2; k++) {
+        const bst_loop_prediction *p = &m->axis[k].prediction;
+        bst_assert_close(
+            p->rms_px * p->rms_px,
+            p->jitter_px * p->jitter_px + p->noise_px * p->noise_px + p->lag_px * p->lag_px, 1e-12);
+        /* 0.5 and 0.2 px radially, half of each about an axis; of the fast one what lies above 1 Hz
+         * of frames each half second */
+        bst_assert_close(p->open_px * p->open_px, 0.125 + 0.02, 1e-6);
+        bst_assert_close(p->above_px * p->above_px, 0.02, 1e-6);
+        assert_true(p->noise_px > 0.0 && p->noise_px < 0.3);
+    }
+    bst_loop_model_free(m);
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+}
+
+/* Twice the error of a frame is twice the noise; no drift, no lag. */
+static void predictions_scale(void **state) {
+    (void)state;
+    const char *const sets[] = {GIMBAL "platform/drift_arcsec_per_s=[0,0,9]",
+                                GIMBAL "platform/jitter_high_px_rms=0"};
+    bst_json *json;
+    bst_scenario scenario;
+    bst_loop_model *m = model_of(&json, &scenario, sets, 2), *twice;
+    bst_ctx ctx = {0};
+    const bst_loop_options options = {.fix_sigma_px = 0.06};
+    bst_assert_ok(&ctx, bst_loop_model_create(&ctx, &scenario, 0, 0, &options, &twice));
+    for (int k = 0; k < 2; k++) {
+        assert_true(m->axis[k].prediction.lag_px == 0.0);
+        bst_assert_close(m->axis[k].prediction.above_px, 0.0, 0.0);
+        double ratio = twice->axis[k].prediction.noise_px / m->axis[k].prediction.noise_px;
+        /* an observer takes other gains for other noise */
+        assert_true(m->observes ? ratio > 1.0 && ratio <= 2.0 : fabs(ratio - 2.0) < 1e-9);
+    }
+    bst_loop_model_free(m);
+    bst_loop_model_free(twice);
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+}
+
+static double number(const cJSON *node, const char *key) {
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(node, key);
+    return cJSON_IsNumber(item) ? item->valuedouble : NAN;
+}
+
+static void expect_margins(const cJSON *node, const bst_loop_margins *m) {
+    const struct {
+        const char *key;
+        double value;
+    } keys[] = {{"gain_margin_db", m->gain_margin_db},
+                {"gain_reduction_margin_db", m->gain_reduction_db},
+                {"phase_margin_deg", m->phase_margin_deg},
+                {"delay_margin_s", m->delay_margin_s},
+                {"sensitivity_peak", m->sensitivity_peak},
+                {"sensitivity_peak_hz", m->sensitivity_peak_hz},
+                {"crossover_hz", m->crossover_hz},
+                {"phase_crossover_hz", m->phase_crossover_hz},
+                {"bandwidth_hz", m->bandwidth_hz}};
+    for (size_t k = 0; k < sizeof keys / sizeof *keys; k++) {
+        bst_assert_close(number(node, keys[k].key), keys[k].value, 0);
+    }
+    assert_int_equal(cJSON_IsTrue(cJSON_GetObjectItem(node, "stable")), m->stable);
+}
+
+static bst_loop_margins margins_of(double first) {
+    return (bst_loop_margins){.stable = first < 500,
+                              .gain_margin_db = first,
+                              .gain_reduction_db = first + 1,
+                              .phase_margin_deg = first + 2,
+                              .delay_margin_s = first + 3,
+                              .sensitivity_peak = first + 4,
+                              .sensitivity_peak_hz = first + 5,
+                              .crossover_hz = first + 6,
+                              .phase_crossover_hz = first + 7,
+                              .bandwidth_hz = first + 8};
+}
+
+static void every_key(void **state) {
+    (void)state;
+    bst_loop_model *m = calloc(1, sizeof *m);
+    assert_non_null(m);
+    m->observer_name = "eye";
+    m->sensor_name = "camera";
+    m->gimbal_type = "mount";
+    m->compensator = "lead_lag";
+    m->timing.period_s = 1.5;
+    m->timing.exposure_s = 2.5;
+    m->timing.frame_latency_s = 3.5;
+    m->timing.command_delay_s = 4.5;
+    m->axes = 2;
+    m->bodies = 1;
+    m->body[0].name = "x";
+    m->body[0].margins = margins_of(100);
+    for (int k = 0; k < 2; k++) {
+        bst_loop_axis *a = &m->axis[k];
+        a->name = k ? "inner" : "outer";
+        a->tracked = true;
+        a->servo.there = k == 1;
+        a->margins = margins_of(200 + 20 * k);
+        a->servo.margins = margins_of(600);
+        a->prediction = (bst_loop_prediction){.rms_px = k ? 4.0 : 3.0,
+                                              .jitter_px = 10 + k,
+                                              .open_px = 20 + k,
+                                              .above_px = 30 + k,
+                                              .noise_px = 40 + k,
+                                              .lag_px = 50 + k};
+    }
+    cJSON *root = bst_loop_json(m);
+    bst_assert_close(number(root, "frame_period_s"), 1.5, 0);
+    bst_assert_close(number(root, "exposure_s"), 2.5, 0);
+    bst_assert_close(number(root, "frame_latency_s"), 3.5, 0);
+    bst_assert_close(number(root, "command_delay_s"), 4.5, 0);
+    bst_assert_close(number(root, "predicted_rms_radial_px"), 5.0, 1e-12);
+    for (int k = 0; k < 2; k++) {
+        const cJSON *node = cJSON_GetArrayItem(cJSON_GetObjectItem(root, "axes"), k);
+        expect_margins(node, &m->axis[k].margins);
+        bst_assert_close(number(node, "predicted_rms_px"), 3.0 + k, 0);
+        bst_assert_close(number(node, "jitter_left_rms_px"), 10 + k, 0);
+        bst_assert_close(number(node, "jitter_open_rms_px"), 20 + k, 0);
+        bst_assert_close(number(node, "jitter_above_half_frame_rate_rms_px"), 30 + k, 0);
+        bst_assert_close(number(node, "frame_noise_rms_px"), 40 + k, 0);
+        bst_assert_close(number(node, "drift_lag_px"), 50 + k, 0);
+        const cJSON *servo = cJSON_GetObjectItem(node, "servo");
+        assert_int_equal(servo != NULL, k);
+        if (servo) {
+            expect_margins(servo, &m->axis[1].servo.margins);
+        }
+    }
+    expect_margins(cJSON_GetArrayItem(cJSON_GetObjectItem(root, "body"), 0), &m->body[0].margins);
+    cJSON_Delete(root);
+    m->compensator = NULL;
+    m->bodies = 0;
+    root = bst_loop_json(m);
+    assert_string_equal(cJSON_GetObjectItem(root, "compensator")->valuestring, "none");
+    assert_null(cJSON_GetObjectItem(root, "body"));
+    assert_null(cJSON_GetObjectItem(root, "predicted_rms_radial_px"));
+    cJSON_Delete(root);
+    free(m);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(bands_of_the_jitter),
+        cmocka_unit_test(a_second_order_mount),
+        cmocka_unit_test(predictions_scale),
+        cmocka_unit_test(every_key),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

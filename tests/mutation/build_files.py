@@ -1,0 +1,63 @@
+"""What both ways of judging a planted bug share: the tests and the objects of a build by Ninja."""
+import os
+import re
+import subprocess
+
+import e2e_suite
+
+# folders whose tests have names of their own: the rest of a path names its tests (tracker/… → tracker_…)
+UNIT_TESTS = {f"sim/{name}": name for name in (
+    "core", "messages", "dynamics", "astro", "device", "catalogue", "optics", "world", "onboard", "io", "link",
+    "engine", "eval", "studies", "registry", "cli", "run", "analysis", "export", "report", "study_kinds", "bench")}
+UNIT_TESTS["sim/app"] = "app|bad_input"
+UNIT_TESTS["sim/onboard"] = "onboard|world_cue"  # the cue as the spacecraft and the world have it
+
+
+def run(command, **keywords):
+    return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False, **keywords)
+
+
+def listed_tests(build):
+    """{name: (labels, command)} of all tests of a build, whether or not their programs are built yet."""
+    commands, labels = {}, {}
+    for root, _, files in os.walk(os.path.join(build, "tests")):
+        if "CTestTestfile.cmake" in files:
+            with open(os.path.join(root, "CTestTestfile.cmake"), encoding="utf-8") as file:
+                text = file.read()
+            for name, command in re.findall(r"^add_test\(\[=\[(.*?)\]=\] (.*)\)$", text, re.M):
+                commands[name] = re.findall(r'"((?:[^"\\]|\\.)*)"', command)
+            labels.update(re.findall(r'^set_tests_properties\(\[=\[(.*?)\]=\] .*\bLABELS "([^"]*)"', text, re.M))
+    return {name: (labels[name].split(";"), command) for name, command in commands.items() if name in labels}
+
+
+class Judges:
+    """Which object holds a source and which tests judge it. Users set build, objects and tests {name: (labels, …)}."""
+
+    def __init__(self):
+        self.build, self.objects, self.tests = "", [], {}
+        self.costs, self.unsound, self.skipped = {}, set(), set()
+
+    def object_of(self, path):
+        """The object of a source, by itself or in a unity build of the nearest folder above with a library of its own."""
+        folder = os.path.dirname(path)
+        while folder:
+            rest = re.escape(os.path.relpath(path, folder))
+            made = [o for o in self.objects if re.fullmatch(rf"{re.escape(folder)}/CMakeFiles/[^/]+\.dir/{rest}\.o", o)]
+            for together in [o for o in self.objects if o.startswith(folder + "/CMakeFiles/") and "/Unity/" in o]:
+                with open(os.path.join(self.build, together[:-len(".o")]), encoding="utf-8") as file:
+                    made += [together] if f'/{path}"' in file.read() else []
+            if made:
+                return made[0]
+            folder = os.path.dirname(folder)
+        return None
+
+    def tests_for(self, path, suite):
+        """Names of the tests that judge a file: those of its folder, or those of the program."""
+        if suite == "e2e":
+            return e2e_suite.concerned(path, [n for n, (labels, _, _) in self.tests.items() if "e2e" in labels])
+        top = "/".join(path.split("/")[:2])
+        prefix = UNIT_TESTS.get(top, path.split("/")[0])
+        names = [n for n, (labels, _, _) in self.tests.items()
+                 if re.match(rf"(?:{prefix})(?:_|$)", n) and {"unit", "device"} & set(labels)
+                 and not ({"slow"} | self.skipped) & set(labels)]
+        return sorted(set(names) - self.unsound, key=lambda n: self.costs.get(n, 1.0))

@@ -1,0 +1,163 @@
+"""Judges planted bugs without a copy of the tree: for mutate.py --quick.
+
+A bug is compiled by itself into a scratch folder (-O1) and linked before the libraries of a build that is there, so
+that it costs one compilation, one link for each test program, and their runs. The sources and the build stay as they
+are. Tests of the shared library (libboresight) are left out: their programs do not link the bug."""
+import hashlib
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+import time
+
+import build_files
+
+
+class QuickTree(build_files.Judges):
+    """A build of the sources, and a scratch folder for the bug."""
+
+    def __init__(self, source, build, jobs):
+        super().__init__()
+        self.folder, self.build, self.jobs = os.path.abspath(source), os.path.abspath(build), jobs
+        if not os.path.exists(os.path.join(self.build, "build.ninja")):
+            sys.exit(f"mutate: {build} holds no build by Ninja: make one (cmake --preset release -G Ninja) or name it")
+        self.scratch = tempfile.TemporaryDirectory(prefix="boresight-mutant-")
+        self.compilations = {}
+        for entry in json.loads(self.ninja("-t", "compdb").stdout):
+            if entry["output"].endswith(".o"):
+                self.compilations[os.path.relpath(entry["output"], self.build)
+                                  if os.path.isabs(entry["output"]) else entry["output"]] = entry
+        self.objects = list(self.compilations)
+        self.tests = {name: (labels, os.path.basename(command[0]), command)
+                      for name, (labels, command) in build_files.listed_tests(self.build).items()}
+        self.sound_objects, self.links, self.target = {}, {}, None
+
+    def ninja(self, *words):
+        return build_files.run(["ninja", "-C", self.build, f"-j{self.jobs}", "--quiet", *words])
+
+    def make(self, *targets):
+        return self.ninja(*targets).returncode == 0
+
+    def compile(self, target, name, text):
+        """Compiles a source, by itself or within its unity build, with this text; digest of the object, or None."""
+        place = os.path.join(self.scratch.name, name)
+        os.makedirs(os.path.dirname(place), exist_ok=True)
+        with open(place, "w", encoding="utf-8") as file:
+            file.write(text)
+        entry = self.compilations[target]
+        unit = os.path.join(entry["directory"], entry["file"])
+        if "/Unity/" in target:
+            with open(unit, encoding="utf-8") as file:
+                together = file.read()
+            unit = os.path.join(self.scratch.name, "unity.c")
+            with open(unit, "w", encoding="utf-8") as file:
+                file.write(together.replace(os.path.join(self.folder, name), place))
+        else:
+            unit = place
+        words, skip = [], 0
+        for word in shlex.split(entry["command"]):
+            if skip or word in ("-o", "-c", "-MT", "-MF"):
+                skip = 0 if skip else 1
+            elif word != "-MD" and not re.fullmatch(r"-O\w*|.*ccache", word):
+                words.append(word)
+        made = build_files.run([*words, "-O1", "-w", "-iquote", os.path.join(self.folder, os.path.dirname(name)),
+                                "-o", self.object(), "-c", unit], cwd=entry["directory"])
+        if made.returncode:
+            return None
+        with open(self.object(), "rb") as file:
+            return hashlib.sha256(file.read()).hexdigest()
+
+    def object(self):
+        return os.path.join(self.scratch.name, "mutant.o")
+
+    def sound(self, target, name, text):
+        """Digest of the object of the sound source, compiled as a bug is."""
+        if (target, name) not in self.sound_objects:
+            self.sound_objects[target, name] = self.compile(target, name, text)
+        return self.sound_objects[target, name]
+
+    def link_of(self, program):
+        """The words that link a program; None for one that is not linked with the libraries themselves."""
+        if program not in self.links:
+            lines = [line for line in self.ninja("-t", "commands", program).stdout.split("\n")
+                     if re.search(rf" -o (\S*/)?{re.escape(program)} ", line)]
+            words = shlex.split(lines[-1].removeprefix(": && ").removesuffix(" && :")) if lines else None
+            self.links[program] = None if words and any("libboresight.so" in w for w in words) else words
+        return self.links[program]
+
+    def link(self, program):
+        """Links a program with the bug into the scratch folder; its path, or None."""
+        words = list(self.link_of(program))
+        at = words.index("-o") + 1
+        path = os.path.join(self.scratch.name, program)
+        words[at:at + 1] = [path] + ([] if self.target in words else [self.object()])
+        words = [self.object() if w == self.target else w for w in words]
+        return path if build_files.run(words, cwd=self.build).returncode == 0 else None
+
+    def program_of(self, name):
+        """The program that a test runs: its own, or boresight; None: neither."""
+        _, first, command = self.tests[name]
+        return first if first.startswith("test_") else \
+            "boresight" if os.path.join(self.build, "boresight") in command else None
+
+    def judges_of(self, path, suite):
+        return [n for n in self.tests_for(path, suite) if self.program_of(n) and self.link_of(self.program_of(n))]
+
+    def prove(self, names):
+        """Runs the tests that have not run yet with the sound programs: one that fails there judges nothing."""
+        for name in [n for n in names if n not in self.costs]:
+            begun = time.monotonic()
+            sound = self.make(self.program_of(name)) and self.passes(self.tests[name][2], 900)
+            self.costs[name] = time.monotonic() - begun
+            if not sound:
+                print(f"mutate: left out, for it fails without a bug: {name}", flush=True)
+                self.unsound.add(name)
+
+    def passes(self, command, seconds):
+        with tempfile.TemporaryDirectory(prefix="boresight-mutant-run-") as rest:
+            try:
+                return subprocess.run(command, cwd=self.folder, timeout=seconds, check=False, stdin=subprocess.DEVNULL,
+                                      stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                                      env={**os.environ, "TMPDIR": rest, "PYTHONDONTWRITEBYTECODE": "1"}).returncode == 0
+            except subprocess.TimeoutExpired:
+                return False
+
+    def judge(self, names):
+        """The first test that fails with the bug that was compiled last, or None."""
+        linked = {}
+        for name in names:
+            program = self.program_of(name)
+            if program not in linked:
+                linked = {program: self.link(program)}
+            if not linked[program]:
+                return name + " (does not link)"
+            own = [re.sub(rf".*/{re.escape(program)}", linked[program], w) if os.path.basename(w) == program else w
+                   for w in self.tests[name][2]]
+            if not self.passes(own, max(30, 10 * self.costs.get(name, 30))):
+                return name
+        return None
+
+    def trial(self, name, text, mutant, suite, coverage, line):
+        """(outcome, the test that noticed), as mutate.trial."""
+        _, at, old, new = mutant
+        self.target = self.object_of(name)
+        if self.target is None:
+            return "equal", "not compiled"
+        names = self.judges_of(name, suite)
+        if coverage:
+            names = coverage.tests_of(name, line, names)
+        self.prove(names)
+        names = sorted((n for n in names if n not in self.unsound), key=self.costs.get)
+        before = self.sound(self.target, name, text)
+        after = self.compile(self.target, name, text[:at] + new + text[at + len(old):])
+        if after is None:
+            return "equal", "does not compile"
+        if after == before:
+            return "equal", "same object"
+        if not names:
+            return "survived", "no tests"
+        failed = self.judge(names)
+        return ("noticed", failed) if failed else ("survived", f"{len(names)} tests passed")
