@@ -4,7 +4,7 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# libboresight: all parts and the list of modules in one shared library, so that a C program links it
+# libboresight: all parts, the list of modules and the commands in one shared library, so that a C program links it
 # with nothing else: the C++ run time and the libraries below come with it. Visible is what
 # include/boresight declares.
 # Sanitized and fuzzed builds are for this tree's own tests and have none.
@@ -12,7 +12,8 @@ if(NOT BORESIGHT_SANITIZE AND NOT BORESIGHT_FUZZ)
   set(BST_VISIBLE ${PROJECT_SOURCE_DIR}/cmake/libboresight.map)
   set(parts bst_core bst_fft bst_messages bst_dynamics bst_astro bst_device bst_catalogue bst_optics bst_world
     bst_onboard bst_io bst_link bst_engine bst_eval bst_scenegen bst_gimbal
-    bst_imgproc bst_tracker bst_control bst_obsgen bst_scenario_registry bst_api)
+    bst_imgproc bst_tracker bst_control bst_obsgen bst_scenario_registry bst_api bst_studies bst_cli
+    bst_run bst_analysis bst_export bst_report bst_study_kinds bst_commands)
   # all objects of each part, not only what others call; the archives then add nothing but what the
   # parts themselves link
   list(TRANSFORM parts REPLACE ".+" "$<TARGET_OBJECTS:\\0>" OUTPUT_VARIABLE objects)

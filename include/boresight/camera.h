@@ -168,6 +168,13 @@ static inline bst_vec3 bst_camera_unproject(const bst_camera *c, double x_px, do
         (bst_vec3){(x_px - bst_camera_centre_x(c)) * s, (y_px - bst_camera_centre_y(c)) * s, 1.0});
 }
 
+/* Directions that fall on points of the sensor: bst_camera_unproject of each.
+ *
+ * Given:     x_px, y_px  [count] full-sensor pixel coordinates
+ * Returned:  v_cam       [count] unit directions in the camera frame */
+void bst_camera_unproject_points(const bst_camera *c, const double *x_px, const double *y_px,
+                                 int count, bst_vec3 *v_cam);
+
 /* True if a direction lies beyond the fold of the distortion, but by no more than a margin.
  *
  * Given:     v_cam      direction in the camera frame, any length

@@ -11,6 +11,7 @@
 
 #define BST_MODULE_ABI 4
 
+struct bst_camera;    /* boresight/camera.h */
 struct bst_world;     /* sim/world: the truth */
 struct bst_knowledge; /* sim/world: onboard knowledge */
 struct bst_device;    /* sim/device */
@@ -160,6 +161,11 @@ void bst_env_set_rate(const bst_module_env *env, double rate_hz);
  *
  * Given:     port  index in desc->ports */
 void bst_env_ignore(const bst_module_env *env, int port);
+
+/* In create: onboard model of this sensor's camera.
+ *
+ * Returned:  the camera; it outlives the module. NULL for a BST_MODULE_MULTI_SENSOR module */
+const struct bst_camera *bst_env_camera(const bst_module_env *env);
 
 /* In create: key of a random stream of this instance.
  *

@@ -12,14 +12,14 @@
  *
  * Given:     name     1 to 120 printable characters with a ":" and without "/" ("python:mine"). A
  *                     second registration of a name replaces the first one
- *            modules  ends with NULL; NULL: none
- *            stages   ends with NULL; NULL: none. With neither, the name is removed
- * Errors:    BST_ERR_ARGUMENT: the name; BST_ERR_CONFIG: a descriptor of another interface
- *            version, or without what it must have; BST_ERR_MEMORY
- * Ownership: lists and descriptors must stay valid as long as the process uses scenarios that name
- *            them
- * Notes:     any thread. In this process only: the program `boresight` does not know the name. */
-bst_status bst_plugin_register(bst_ctx *ctx, const char *name,
+ *            sha256   64 hexadecimal digits: digest of what the plug-in is made of, for manifests.
+ * A study refuses to go on with another one. NULL: none modules  ends with NULL; NULL: none stages
+ * ends with NULL; NULL: none. With neither, the name is removed Errors:    BST_ERR_ARGUMENT: the
+ * name or the digest; BST_ERR_CONFIG: a descriptor of another interface version, or without what it
+ * must have; BST_ERR_MEMORY Ownership: lists and descriptors must stay valid as long as the process
+ * uses scenarios that name them Notes:     any thread. In this process only: the program
+ * `boresight` does not know the name. */
+bst_status bst_plugin_register(bst_ctx *ctx, const char *name, const char *sha256,
                                const bst_module_desc *const *modules,
                                const bst_stage_desc *const *stages) BST_MUST_CHECK;
 

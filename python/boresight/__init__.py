@@ -22,9 +22,13 @@ if TYPE_CHECKING:
     from .frame import Frame as Frame
     from .messages import *  # noqa: F401,F403
     from .model import Model as Model
+    from .modules import ModuleEnv as ModuleEnv
+    from .modules import ModuleStep as ModuleStep
+    from .modules import Port as Port
     from .pool import Pool as Pool
     from .record import Message as Message
     from .record import Record as Record
+    from .registration import register as register
     from .run_folder import Run as Run
     from .run_folder import read_run as read_run
     from .scenario import Scenario as Scenario
@@ -33,7 +37,6 @@ if TYPE_CHECKING:
     from .snapshot import Snapshot as Snapshot
     from .stages import DetectorFrame as DetectorFrame
     from .stages import FrameStageFrame as FrameStageFrame
-    from .stages import register as register
     from .tables import Table as Table
     from .tools import Study as Study
     from .tools import check as check
@@ -53,13 +56,15 @@ _PLACES = {
     "commands": ["los_command"],
     "frame": ["Frame"],
     "model": ["Model"],
+    "modules": ["ModuleEnv", "ModuleStep", "Port"],
     "pool": ["Pool"],
     "record": ["Message", "Record"],
+    "registration": ["register"],
     "run_folder": ["Run", "read_run"],
     "scenario": ["Scenario"],
     "simulation": ["Sensor", "Simulation"],
     "snapshot": ["Snapshot"],
-    "stages": ["DetectorFrame", "FrameStageFrame", "register"],
+    "stages": ["DetectorFrame", "FrameStageFrame"],
     "tables": ["Table"],
     "tools": ["Study", "check", "loop", "new", "orbit", "pd", "report", "run", "schema", "study"],
 }

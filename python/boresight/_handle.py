@@ -26,7 +26,7 @@ class SimHandle:
     def __init__(self, pointer: int, model: ModelHandle):
         self.pointer, self.model = c_void_p(pointer), model
         self.callbacks: Any = None  # what C may call until the object is freed
-        self.stages: List[Any] = []  # in Python
+        self.plugins: List[Any] = []  # instances of plug-ins in Python
         self._process, self._free = os.getpid(), LIBRARY.bst_sim_free
 
     def __del__(self, getpid: Any = os.getpid, exiting: List[bool] = _exiting) -> None:
@@ -95,9 +95,18 @@ class Guard:
         return self._handle is None
 
 
+class UserCode(threading.local):
+    """Number of calls of plug-ins in Python that are running in this thread."""
+    depth = 0
+
+
+user_code = UserCode()
+
+
 class Interrupt:
     """Remembers Ctrl-C while C code runs, so that the C code ends cleanly first. Python calls the
-    handler of a signal when the C code asks, through a callback, whether to stop."""
+    handler of a signal when the C code asks, through a callback, whether to stop. A second Ctrl-C
+    ends the plug-in in Python that is running, and the simulation with it."""
 
     def __init__(self) -> None:
         self._came: List[Tuple[int, Any]] = []
@@ -114,6 +123,8 @@ class Interrupt:
 
     def _note(self, number: int, frame: Any) -> None:
         self._came.append((number, frame))
+        if len(self._came) > 1 and user_code.depth:
+            self._previous(number, frame)
 
     @property
     def came(self) -> bool:

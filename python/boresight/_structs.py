@@ -1,5 +1,5 @@
-"""ctypes structs of the C interface (include/boresight/boresight.h, stages.h). A generated C file
-asserts their layout when the library is built."""
+"""ctypes structs of the C interface (include/boresight/boresight.h, stages.h, module.h). A generated C
+file asserts their layout when the library is built."""
 from __future__ import annotations
 
 import ctypes
@@ -132,6 +132,69 @@ class FrameStageFrame(ctypes.Structure):
                 ("bits", c_int)]
 
 
+class ConfigDesc(ctypes.Structure):
+    """bst_config_desc."""
+    C_NAME = "bst_config_desc"
+    _fields_ = [("key", c_char_p), ("type", c_int), ("unit", c_char_p), ("minimum", c_double),
+                ("maximum", c_double), ("fallback", c_char_p), ("doc", c_char_p),
+                ("offset", c_size_t), ("size", c_size_t), ("choices", c_void_p),
+                ("children", c_void_p), ("item_bytes", c_size_t)]
+
+
+class Port(ctypes.Structure):
+    """bst_port."""
+    C_NAME = "bst_port"
+    _fields_ = [("channel", c_char_p), ("direction", c_int), ("flags", c_uint),
+                ("max_age_s", c_double), ("capacity", c_int)]
+
+
+class FleetMember(ctypes.Structure):
+    """bst_fleet_member."""
+    C_NAME = "bst_fleet_member"
+    _fields_ = [("scope", c_char_p), ("observer", c_int), ("sensor", c_int),
+                ("knowledge", c_void_p), ("frame_exposure_s", c_double),
+                ("frame_period_s", c_double), ("frame_latency_s", c_double)]
+
+
+class ModuleEnv(ctypes.Structure):
+    """bst_module_env."""
+    C_NAME = "bst_module_env"
+    _fields_ = [("ctx", c_void_p), ("instance", c_char_p), ("tick_rate_hz", c_int64),
+                ("period_ticks", c_int64), ("seed", c_uint64), ("run", c_uint64),
+                ("world", c_void_p), ("knowledge", c_void_p), ("device", c_void_p),
+                ("observer", c_int), ("sensor", c_int), ("exposure_s", c_double),
+                ("los_period_ticks", c_int64), ("los_offset_ticks", c_int64),
+                ("planes", c_uint32), ("mask_threshold_sigma", c_double),
+                ("engine_private", c_void_p), ("frame_exposure_s", c_double),
+                ("frame_period_s", c_double), ("frame_latency_s", c_double), ("link", c_void_p),
+                ("members", POINTER(FleetMember)), ("member_count", c_int)]
+
+
+class Sample(ctypes.Structure):
+    """bst_sample."""
+    C_NAME = "bst_sample"
+    _fields_ = [("payload", c_void_p), ("written_tick", c_int64), ("sequence", c_int64),
+                ("stale", c_bool)]
+
+
+MapFunction = CFUNCTYPE(c_int, c_void_p, c_void_p, POINTER(c_void_p))
+OwnerFunction = CFUNCTYPE(None, c_void_p)
+
+
+class FrameOps(ctypes.Structure):
+    """bst_frame_ops."""
+    C_NAME = "bst_frame_ops"
+    _fields_ = [("map", MapFunction), ("unmap", OwnerFunction), ("device_buffer", c_void_p),
+                ("recycle", c_void_p)]
+
+
+class FrameHandle(ctypes.Structure):
+    """bst_frame."""
+    C_NAME = "bst_frame"
+    _fields_ = [("ops", POINTER(FrameOps)), ("owner", c_void_p), ("width", c_int),
+                ("height", c_int), ("references", c_int), ("maps", c_int)]
+
+
 ArchiveFunction = CFUNCTYPE(c_int, c_void_p, c_void_p)
 DestroyFunction = CFUNCTYPE(None, c_void_p)
 DetectorCreate = CFUNCTYPE(c_int, c_void_p, c_void_p, POINTER(DetectorEnv), POINTER(c_void_p))
@@ -154,12 +217,43 @@ class FrameStage(ctypes.Structure):
                 ("destroy", DestroyFunction), ("archive", ArchiveFunction)]
 
 
+ModuleCreate = CFUNCTYPE(c_int, POINTER(ModuleEnv), c_void_p, POINTER(c_void_p))
+StepFunction = CFUNCTYPE(c_int, c_void_p, c_void_p)
+
+
+class ModuleDesc(ctypes.Structure):
+    """bst_module_desc."""
+    C_NAME = "bst_module_desc"
+    _fields_ = [("abi", c_uint32), ("role", c_char_p), ("type", c_char_p), ("doc", c_char_p),
+                ("flags", c_uint), ("config", c_void_p), ("config_bytes", c_size_t),
+                ("default_rate_hz", c_double), ("ports", c_void_p), ("port_count", c_int),
+                ("create", ModuleCreate), ("step", StepFunction), ("destroy", DestroyFunction),
+                ("finish", c_void_p), ("ahead", c_void_p), ("substitutes_for", c_void_p),
+                ("also", c_char_p), ("archive", ArchiveFunction)]
+
+
+CompensatorInit = CFUNCTYPE(c_int, c_void_p, c_void_p, c_double, c_void_p)
+CompensatorStep = CFUNCTYPE(c_double, c_void_p, c_double)
+CompensatorSet = CFUNCTYPE(None, c_void_p, c_double, c_double)
+
+
+class CompensatorStage(ctypes.Structure):
+    """bst_compensator_stage."""
+    C_NAME = "bst_compensator_stage"
+    _fields_ = [("state_bytes", c_size_t), ("init", CompensatorInit), ("step", CompensatorStep),
+                ("set", CompensatorSet), ("response", c_void_p), ("archive", ArchiveFunction)]
+
+
 STAGE_ABI = 2
 """BST_STAGE_ABI."""
+MODULE_ABI = 4
+"""BST_MODULE_ABI."""
 
 ALL: List[Type[Any]] = [Context, ModelOptions, SimOptions, SimObserver, SimMessage, SimFrame, SimColumns, Vec3,
                         ChannelType, Window, CameraHead, StageDesc, DetectorEnv, DetectorFrame,
-                        FrameStageEnv, FrameStageFrame, DetectorStage, FrameStage]
+                        FrameStageEnv, FrameStageFrame, DetectorStage, FrameStage, ConfigDesc,
+                        Port, FleetMember, ModuleEnv, Sample, FrameOps, FrameHandle, ModuleDesc,
+                        CompensatorStage]
 
 
 def size_of(struct: Type[Any]) -> int:

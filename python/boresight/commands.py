@@ -1,7 +1,8 @@
 """Commands to external modules, of what programs have: arrays, columns, directions."""
 from __future__ import annotations
 
-from typing import Any, Dict, Optional, Type
+import math
+from typing import Any, Dict, Mapping, Optional, Type
 
 import numpy as np
 import numpy.typing as npt
@@ -17,14 +18,20 @@ COMMANDS: Dict[str, Type[Message]] = {
 """Channels that a program can write in place of a module."""
 
 
-def command_message(channel: str, value: Any) -> Message:
+_ZERO = np.zeros(3)
+
+
+def command_message(channel: str, value: Any,
+                    allowed: Optional[Mapping[str, Type[Message]]] = None) -> Message:
     """The message of a command: the message itself, or its items or members.
 
+    Given:     allowed  class of the messages of each channel; None: COMMANDS
     Errors:    ArgumentError: the value is nothing of that channel
     """
-    kind = COMMANDS.get(channel)
+    kinds = COMMANDS if allowed is None else allowed
+    kind = kinds.get(channel)
     if kind is None:
-        raise ArgumentError(f"{channel!r} cannot be commanded (allowed: {', '.join(COMMANDS)})"
+        raise ArgumentError(f"{channel!r} cannot be commanded (allowed: {', '.join(kinds)})"
                             if channel in CHANNELS or isinstance(channel, str) else
                             f"a channel is a text, not {type(channel).__name__}")
     if isinstance(value, Message):
@@ -46,8 +53,8 @@ def los_command(direction_gcrf: Any, rate_gcrf_radps: Any = (0.0, 0.0, 0.0),
     """A command of the boresight: an apparent direction in GCRF, which is normalised, at a tick,
     with its rate (rad/s) and acceleration (rad/s2)."""
     direction = vector(direction_gcrf, "direction_gcrf")
-    length = float(np.linalg.norm(direction))
-    if not np.isfinite(length) or length == 0.0:
+    length = math.sqrt(float(np.dot(direction, direction)))
+    if not math.isfinite(length) or length == 0.0:
         raise ArgumentError(f"direction_gcrf: {direction} has no direction")
     return LosCommand(tick=tick, direction_gcrf=direction / length,
                       rate_gcrf_radps=vector(rate_gcrf_radps, "rate_gcrf_radps"),
@@ -56,6 +63,8 @@ def los_command(direction_gcrf: Any, rate_gcrf_radps: Any = (0.0, 0.0, 0.0),
 
 def vector(value: Any, what: str) -> npt.NDArray[np.float64]:
     """Three numbers."""
+    if isinstance(value, tuple) and value == (0.0, 0.0, 0.0):
+        return _ZERO
     try:
         array = np.asarray(value, np.float64)
     except (TypeError, ValueError):

@@ -16,7 +16,7 @@ _RINGS = (LosHistory, PointingTelemetry)
 
 def copied(address: int, dtype: "np.dtype[np.void]", count: int) -> npt.NDArray[np.void]:
     """A copy of `count` values at an address."""
-    return np.frombuffer(bytearray(ctypes.string_at(address, count * dtype.itemsize)), dtype, count)
+    return np.frombuffer(ctypes.string_at(address, count * dtype.itemsize), dtype, count)
 
 
 def message_at(channel: str, payload: int, scope: str, tick: int, sequence: int) -> Message:
@@ -37,8 +37,9 @@ def _items(kind: Type[Message], header: npt.NDArray[np.void], address: int) -> A
     written, capacity = int(header["written"]), int(header["capacity"])
     if written <= capacity:
         return copied(address, dtype, written)
-    ring, newest = copied(address, dtype, capacity), written % capacity
-    return np.concatenate([ring[newest:], ring[:newest]])
+    end, size = written % capacity, dtype.itemsize
+    return np.frombuffer(ctypes.string_at(address + end * size, (capacity - end) * size)
+                         + ctypes.string_at(address, end * size), dtype, capacity)
 
 
 def viewed(channel: str, view: SimMessage, scope: str) -> Optional[Message]:

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import pathlib
 import pty
@@ -10,11 +11,17 @@ import subprocess
 import sys
 import tempfile
 import threading
-from typing import Any, Iterator, List, Sequence, Tuple
+from typing import Any, Iterator, List, Optional, Sequence, Tuple
 
 from . import _native
-from .errors import ArgumentError, ProgramError
+from ._plugin import last_raised
+from .errors import ArgumentError, BusyError, ProgramError
+from .host import Host
 from .scenario import Scenario
+
+
+_INTERRUPTED = 130
+_running = threading.Lock()
 
 
 @contextlib.contextmanager
@@ -58,47 +65,81 @@ def scenario_arguments(scenario: Any) -> Iterator[List[str]]:
         yield [str(file)]
 
 
-def execute(arguments: Sequence[str], progress: bool = False, allowed: Sequence[int] = (0,)) -> str:
+def execute(arguments: Sequence[str], progress: bool = False, allowed: Sequence[int] = (0,),
+            host: Optional[Host] = None) -> str:
     """Runs the program to its end. Ctrl-C ends it properly first.
 
     Given:     arguments  of the program
                progress   shows what it writes to the standard error as it comes
                allowed    exit codes that are no errors
+               host       where plug-ins in Python are; None: the scenario has none
     Returned:  what it wrote to the standard output
     Errors:    ProgramError, with what it wrote to the standard error; KeyboardInterrupt
     """
-    command = [str(_native.program_path()), *arguments]
-    if any("\0" in word for word in command):
+    if any("\0" in word for word in arguments):
         raise ArgumentError("an argument with a zero in it")
     reading, writing = pty.openpty() if progress else os.pipe()
+    said: List[bytes] = []
+    reader = threading.Thread(target=_read, args=(reading, said, progress), daemon=True)
+    last_raised.clear()
+    try:
+        reader.start()
+        try:
+            if host is not None and host.is_here:
+                code, output = _run_here(arguments, writing)
+            else:
+                code, output = _run_process(arguments, writing, host)
+        finally:
+            os.close(writing)
+    finally:
+        reader.join()
+        os.close(reading)
+    text = b"".join(said).decode("utf-8", "replace")
+    if code not in allowed:
+        raise ProgramError(_message(text, code), code) from (last_raised[0] if last_raised
+                                                             else None)
+    for line in _lines(text):
+        if line.startswith("boresight: warning: ") and not progress:
+            _native.LOG.warning("%s", line[len("boresight: warning: "):])
+    return output.decode("utf-8", "replace")
+
+
+def _run_process(arguments: Sequence[str], errors: int,
+                 host: Optional[Host]) -> Tuple[int, bytes]:
+    """Runs the program as a process of its own: exit code and output."""
+    command = [*(host.command() if host is not None else [str(_native.program_path())]),
+               *arguments]
     try:
         # a session of its own: Ctrl-C comes to it from here alone, and once
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                                   stderr=writing, start_new_session=True)
+                                   stderr=errors, start_new_session=True)
     except OSError as error:
-        os.close(reading)
         raise ProgramError(f"{command[0]} cannot be executed: {error.strerror}") from None
-    finally:
-        os.close(writing)
-    said: List[bytes] = []
-    reader = threading.Thread(target=_read, args=(reading, said, progress), daemon=True)
-    reader.start()
     try:
         output, _ = process.communicate()
     except KeyboardInterrupt:
         process.send_signal(signal.SIGINT)
         process.communicate()
         raise
+    return process.returncode, output
+
+
+def _run_here(arguments: Sequence[str], errors: int) -> Tuple[int, bytes]:
+    """Runs a command of the program in this process: exit code and output."""
+    words = [b"boresight", *(os.fsencode(word) for word in arguments)]
+    vector = (ctypes.c_char_p * (len(words) + 1))(*words, None)
+    if not _running.acquire(blocking=False):
+        raise BusyError("another command with plug-ins in Python runs in this process: wait for "
+                        "its end, or give plugins=[MODULE], so that it gets a process of its own")
+    try:
+        with tempfile.TemporaryFile() as output:
+            code = _native.LIBRARY.bst_program_run(len(words), vector, output.fileno(), errors)
+            if code == _INTERRUPTED:
+                raise KeyboardInterrupt
+            output.seek(0)
+            return int(code), output.read()
     finally:
-        reader.join()
-        os.close(reading)
-    text = b"".join(said).decode("utf-8", "replace")
-    if process.returncode not in allowed:
-        raise ProgramError(_message(text, process.returncode), process.returncode)
-    for line in _lines(text):
-        if line.startswith("boresight: warning: ") and not progress:
-            _native.LOG.warning("%s", line[len("boresight: warning: "):])
-    return output.decode("utf-8", "replace")
+        _running.release()
 
 
 def _read(reading: int, said: List[bytes], progress: bool) -> None:

@@ -5,7 +5,7 @@ A record is an immutable copy of its struct, so that it stays valid when the sim
 from __future__ import annotations
 
 import html
-from typing import Any, ClassVar, Iterable, List, Mapping, Optional, Tuple, Type, TypeVar
+from typing import Any, ClassVar, Dict, Iterable, List, Mapping, Optional, Tuple, Type, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,10 @@ def assign(target: npt.NDArray[np.void], name: str, value: Any, what: str) -> No
     if name not in names:
         raise ArgumentError(f"{what} has no member {name!r} (it has: {', '.join(names)})")
     field = target[name]
+    if (type(value) is np.ndarray and field.dtype.kind == "f" and value.dtype == field.dtype
+            and value.shape == field.shape):
+        field[...] = value
+        return
     if field.dtype.names:
         if isinstance(value, Record):
             value = value.array
@@ -145,17 +149,27 @@ class Record:
 
 def packed(array: npt.NDArray[np.void]) -> bytes:
     """Bytes of a structured array, with zeros between its members."""
-    clean = np.zeros(array.shape, array.dtype)
-    _copy_members(clean, array)
-    return clean.tobytes()
+    mask = _masks.get(array.dtype)
+    if mask is None:
+        mask = _masks[array.dtype] = np.zeros(array.dtype.itemsize, np.uint8)
+        _mark(array.dtype, mask)
+    data = np.frombuffer(array.tobytes(), np.uint8)
+    return (data.reshape(-1, len(mask)) & mask).tobytes() if len(data) else b""
 
 
-def _copy_members(target: npt.NDArray[np.void], source: npt.NDArray[np.void]) -> None:
-    for name in source.dtype.names or ():
-        if source.dtype[name].base.names:
-            _copy_members(target[name], source[name])
-        else:
-            target[name] = source[name]
+_masks: Dict["np.dtype[np.void]", npt.NDArray[np.uint8]] = {}
+
+
+def _mark(dtype: Any, mask: npt.NDArray[np.uint8]) -> None:
+    """Sets all bits of the bytes that are members."""
+    for name in dtype.names or ():
+        member, at = dtype.fields[name][:2]
+        for k in range(int(np.prod(member.shape))):
+            one = mask[at + k * member.base.itemsize:at + (k + 1) * member.base.itemsize]
+            if member.base.names:
+                _mark(member.base, one)
+            else:
+                one[:] = 255
 
 
 def _short(value: Any) -> str:

@@ -147,21 +147,37 @@ class Scenario:
         return self.with_(changes)
 
     def with_plugin(self, *, detector: Optional[str] = None, frame_stage: Optional[str] = None,
-                    **keys: Any) -> "Scenario":
-        """A scenario in which a plug-in replaces the detector of image processing, or changes
-        frames, of all sensors: the path of a library, or a name that `register` gave.
+                    compensator: Optional[str] = None, imgproc: Optional[str] = None,
+                    tracker: Optional[str] = None, control: Optional[str] = None,
+                    tasking: Optional[str] = None, **keys: Any) -> "Scenario":
+        """A scenario in which a plug-in replaces modules or parts of them, of all sensors: the path
+        of a library, or a name that `register` gave.
 
-        Given:     keys  the plug-in's own keys
+        Given:     detector     of imgproc
+                   frame_stage  of scenegen
+                   compensator  of control
+                   imgproc, tracker, control, tasking
+                                the whole module; it keeps the delays of its inputs
+                   keys         the plug-in's own keys, and rate_hz, offset_s and delay_s
         """
+        stages = {"detector": ("imgproc", detector), "frame_stage": ("scenegen", frame_stage),
+                  "compensator": ("control", compensator)}
+        modules = {"imgproc": imgproc, "tracker": tracker, "control": control}
         changes: Dict[str, Any] = {}
-        for role, stage, plugin in (("imgproc", "detector", detector),
-                                    ("scenegen", "frame_stage", frame_stage)):
-            for (pointer, _), found, _ in _modules(self.to_dict()):
-                if plugin is not None and found == role:
+        document = self.to_dict()
+        for (pointer, _), role, module in _modules(document):
+            for stage, (owner, plugin) in stages.items():
+                if plugin is not None and owner == role:
                     changes[f"{pointer}/{stage}"] = {"plugin": plugin, **keys}
+            whole = modules.get(role)
+            if whole is not None:
+                changes[pointer] = {**_in_place(role, whole, module), **keys}
+        if tasking is not None:
+            changes["/tasking"] = {**_in_place("tasking", tasking, document.get("tasking") or {}),
+                                   **keys}
         if not changes:
-            raise ArgumentError("with_plugin: give a detector or a frame_stage, of a scenario with "
-                                "imgproc or scenegen")
+            raise ArgumentError("with_plugin: give a detector, frame_stage, compensator, imgproc, "
+                                "tracker, control or tasking, of a scenario with that module")
         return self.with_(changes)
 
     def validate(self) -> "Scenario":
@@ -201,6 +217,16 @@ class Scenario:
     def __repr__(self) -> str:
         changes = "".join(f", {a}" for a in self.assignments)
         return f"<Scenario {self.path}{changes}>"
+
+
+def _in_place(role: str, plugin: str, module: Dict[str, Any]) -> Dict[str, Any]:
+    """Block of a plug-in in place of a module: it keeps the delays of the channels that it reads."""
+    from .registration import registered
+    delays = module.get("delay_s")
+    reads = registered.get(plugin, {}).get(role)
+    if isinstance(delays, dict) and reads is not None:
+        delays = {channel: delay for channel, delay in delays.items() if channel in reads}
+    return {"plugin": plugin, **({"delay_s": delays} if delays else {})}
 
 
 _WORLD = ("objects", "star_catalogue", "earth_orientation")

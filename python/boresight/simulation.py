@@ -18,7 +18,7 @@ from .observers import Observers
 from .payload import message_at, viewed
 from .record import Message
 from .snapshot import Snapshot, component_bits
-from .stages import Stage, collected, own, raise_of
+from ._plugin import Instance, collected, forget_raised, own, raise_of
 from .views import ChannelViews
 
 BytesLike = Union[bytes, bytearray, memoryview]
@@ -59,15 +59,15 @@ class Simulation(ChannelViews):
             options.other_run = True
             options.run = _native.integer_argument(run, "run", 0, 2**53 - 1)
         context, out, handle = _native.Context(), c_void_p(), self.model.handle
-        with collected() as stages:
+        with collected() as plugins:
             context.check(LIBRARY.bst_sim_create(context.pointer, handle.pointer, byref(options),
                                                  byref(out)))
-        self._begin(out, stages)
+        self._begin(out, plugins)
 
-    def _begin(self, pointer: c_void_p, stages: List[Stage]) -> None:
+    def _begin(self, pointer: c_void_p, plugins: List[Instance]) -> None:
         assert pointer.value
         handle = SimHandle(pointer.value, self.model.handle)
-        own(stages, handle)
+        own(plugins, handle)
         self._guard = Guard(handle)
         self._observers = Observers(self._guard)
         self._observers.install(handle)
@@ -162,6 +162,7 @@ class Simulation(ChannelViews):
         """Steps everything that is due before a time, seconds since the scenario's epoch."""
         until = number_argument(until_s, "until_s")
         with self._guard.use() as sim:
+            forget_raised(sim)
             with self._observers.interrupt:
                 status = LIBRARY.bst_sim_run_until(self._guard.context.pointer, sim.pointer, until)
             self._finish(sim, status)
@@ -184,6 +185,7 @@ class Simulation(ChannelViews):
         arrived = c_bool()
         with self._guard.use() as sim:
             before = self._sequences(sim, channel) if channel and scope is None else {}
+            forget_raised(sim)
             with self._observers.interrupt:
                 status = LIBRARY.bst_sim_step(self._guard.context.pointer, sim.pointer, where,
                                               name, until, byref(arrived))
@@ -361,24 +363,24 @@ class Simulation(ChannelViews):
         if not data:
             raise FormatError("this is no saved state of a simulation")
         with self._guard.use() as sim:
-            with collected() as stages:
+            with collected() as plugins:
                 status = LIBRARY.bst_sim_restore(self._guard.context.pointer, sim.pointer, data,
                                                  len(data), bits)
-            own(stages, sim)
+            own(plugins, sim)
             self._finish(sim, status)
 
     def clone(self) -> "Simulation":
         """A second simulation of the same model in the same state, without observers."""
         out = c_void_p()
         with self._guard.use() as sim:
-            with collected() as stages:
+            with collected() as plugins:
                 status = LIBRARY.bst_sim_clone(self._guard.context.pointer, sim.pointer,
                                                byref(out))
             self._finish(sim, status)
-        return _simulation(self.model, out, stages)
+        return _simulation(self.model, out, plugins)
 
     def _finish(self, sim: SimHandle, status: int) -> None:
-        """Raises the exception of a call: of an observer, of a stage in Python, or of C."""
+        """Raises the exception of a call: of an observer, of a plug-in in Python, or of C."""
         if status:
             raise_of(sim)
         self._observers.finish(status)
@@ -462,11 +464,11 @@ class Sensor(ChannelViews):
         return f"<Sensor {self.scope} of {self.simulation!r}>"
 
 
-def _simulation(model: Model, pointer: c_void_p, stages: List[Stage]) -> Simulation:
+def _simulation(model: Model, pointer: c_void_p, plugins: List[Instance]) -> Simulation:
     """A Simulation of a C object that exists."""
     simulation = Simulation.__new__(Simulation)
     simulation.model = model
-    simulation._begin(pointer, stages)
+    simulation._begin(pointer, plugins)
     return simulation
 
 

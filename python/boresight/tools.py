@@ -2,6 +2,8 @@
 
 Options have the names of the program's with "_" for "-"; a tuple stands for numbers with ":"
 between them (snr=(3, 9, 0.5)), a list for words with ",". `boresight COMMAND --help` lists them.
+Plug-ins in Python (`register`) that a scenario names are called in this process. With `plugins`,
+names of Python modules that register them, a new process imports these and runs the command.
 """
 from __future__ import annotations
 
@@ -13,6 +15,7 @@ import tempfile
 from typing import Any, Dict, List, Optional, Sequence, Union
 
 from .errors import ArgumentError, FormatError
+from .host import host_of
 from .model import external_names
 from .program import execute, options_of, scenario_arguments, work_folder
 from .run_folder import Path, Run
@@ -24,12 +27,14 @@ def run(scenario: Any, out: Optional[Path] = None, *, progress: bool = False,
         overwrite: bool = False, duration_s: Optional[float] = None,
         seed: Union[int, str, None] = None, run_number: Optional[int] = None,
         device: Optional[str] = None, threads: Optional[int] = None, external: Sequence[str] = (),
-        link: Optional[str] = None) -> Run:
+        link: Optional[str] = None, plugins: Sequence[str] = ()) -> Run:
     """Runs a scenario with the program and records it.
 
     Given:     scenario  a Scenario, a path or a dictionary
                out       folder of the results; None: a temporary one, removed with the Run
                progress  shows the program's progress
+               plugins   names of Python modules that register plug-ins; the run is that of a new
+                         process, which imports them
                others    as the options of `boresight run`
     Returned:  the run: summary, tables and frames
     Errors:    ProgramError: what the program says; KeyboardInterrupt: the results so far are in
@@ -44,8 +49,9 @@ def run(scenario: Any, out: Optional[Path] = None, *, progress: bool = False,
                          run_number=run_number, device=device, threads=threads, link=link,
                          external=list(names) or None, quiet=not progress)
     try:
+        host = host_of(plugins, scenario)
         with scenario_arguments(scenario) as words:
-            execute(["run", *words, *options], progress)
+            execute(["run", *words, *options], progress, host=host)
         return Run(out, temporary)
     except BaseException:
         if temporary is not None:
@@ -53,26 +59,29 @@ def run(scenario: Any, out: Optional[Path] = None, *, progress: bool = False,
         raise
 
 
-def pd(scenario: Any, **options: Any) -> Dict[str, Any]:
+def pd(scenario: Any, *, plugins: Sequence[str] = (), **options: Any) -> Dict[str, Any]:
     """Measures the detector of a scenario against theory: probability of detection, false alarms,
-    errors of place and flux (`boresight pd`).
+    errors of place and flux (`boresight pd`). A detector in Python is called in this process.
 
     >>> pd("neossat_geo_stare", snr=(3, 9, 0.5), trials=2000)
     """
-    return _with_json("pd", scenario, options)
+    return _with_json("pd", scenario, plugins, options)
 
 
-def loop(scenario: Any, **options: Any) -> Dict[str, Any]:
+def loop(scenario: Any, *, plugins: Sequence[str] = (), **options: Any) -> Dict[str, Any]:
     """Margins and predicted pointing of the control loops of a scenario (`boresight loop`)."""
-    return _with_json("loop", scenario, options)
+    return _with_json("loop", scenario, plugins, options)
 
 
-def _with_json(command: str, scenario: Any, options: Dict[str, Any]) -> Dict[str, Any]:
+def _with_json(command: str, scenario: Any, plugins: Sequence[str],
+               options: Dict[str, Any]) -> Dict[str, Any]:
     if "json" in options:
         raise ArgumentError(f"{command} returns what --json writes: leave json out")
+    host = host_of(plugins, scenario)
     with scenario_arguments(scenario) as words, work_folder() as folder:
         file = folder / "figures.json"
-        execute([command, *words, "--json", str(file), *options_of(**options)])
+        execute([command, *words, "--json", str(file), *options_of(**options)],
+                host=host)
         return dict(_read_json(file))
 
 
@@ -83,11 +92,12 @@ def _read_json(file: pathlib.Path) -> Any:
         raise FormatError(f"{file}: {error}") from None
 
 
-def check(scenario: Any) -> Dict[str, Any]:
+def check(scenario: Any, *, plugins: Sequence[str] = ()) -> Dict[str, Any]:
     """Reads and validates a scenario, opens what it names, wires its modules, and returns it with
     every default written out (`boresight check`). Warnings go to the logger "boresight"."""
+    host = host_of(plugins, scenario)
     with scenario_arguments(scenario) as words:
-        return dict(json.loads(execute(["check", *words])))
+        return dict(json.loads(execute(["check", *words], host=host)))
 
 
 def schema() -> Dict[str, Any]:
@@ -145,15 +155,21 @@ class Study(HasTables):
 
 
 def study(source: Any, out: Optional[Path] = None, *, progress: bool = False,
-          **options: Any) -> Study:
+          plugins: Sequence[str] = (), **options: Any) -> Study:
     """Goes through the settings of a study and makes tables of the results (`boresight study`).
 
     Given:     source   a study file, a dictionary, or the folder of a study (with resume=True)
                out      folder of the results; None: studies/NAME
+               plugins  names of Python modules that register the plug-ins of its scenarios. The
+                        workers are processes, which what this one has registered does not reach
                options  workers=2, dry_run is not one: use `boresight study --dry-run`
     Errors:    ProgramError: runs are missing. Runs that failed by themselves are rows of the table
                of runs
     """
+    host = host_of(plugins)
+    if host is not None and options.get("slurm"):
+        raise ArgumentError("plugins: the jobs of Slurm know no plug-ins in Python: leave slurm "
+                            "out, or write the plug-in in C")
     with work_folder() as folder:
         if isinstance(source, dict):
             file = folder / "study.json"
@@ -163,7 +179,7 @@ def study(source: Any, out: Optional[Path] = None, *, progress: bool = False,
         target = pathlib.Path(_path(out, "out")) if out is not None else _study_folder(file)
         to = [] if file.is_dir() else ["--out", str(target)]
         execute(["study", str(file), *to, *options_of(quiet=not progress, **options)], progress,
-                allowed=(0, 4))
+                allowed=(0, 4), host=host)
     return Study(target)
 
 

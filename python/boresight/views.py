@@ -74,6 +74,10 @@ class ChannelViews:
         """Object that the sensor shall search for."""
         return cast("Optional[m.Task]", self.view("task"))
 
+    @task.setter
+    def task(self, value: Any) -> None:
+        self.command("task", value)
+
     @property
     def detections(self) -> Optional[m.Detections]:
         """What image processing, or the observation generator, found in the newest frame."""

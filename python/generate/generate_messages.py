@@ -164,7 +164,8 @@ def python_text(headers: Headers, layout: Layout) -> str:
 def c_text(headers: Headers, layout: Layout, structs_file: str) -> str:
     """Assertions for the messages and for the ctypes structs of _structs.py."""
     lines = ["/* Asserts that C lays out the structs as the Python package expects. Generated. */",
-             '#include "boresight/boresight.h"', '#include "boresight/sim_pool.h"',
+             '#include "boresight/boresight.h"', '#include "boresight/frame.h"',
+             '#include "boresight/module.h"', '#include "boresight/sim_pool.h"',
              '#include "boresight/stages.h"', "",
              '#define SAME(what, number) _Static_assert((what) == (number), "layout of " #what)',
              ""]
@@ -186,6 +187,7 @@ def c_text(headers: Headers, layout: Layout, structs_file: str) -> str:
         for name, *_ in cls._fields_:
             same(cls.C_NAME, name, getattr(cls, name).offset)
     lines.append(f"SAME(BST_STAGE_ABI, {module.STAGE_ABI});")
+    lines.append(f"SAME(BST_MODULE_ABI, {module.MODULE_ABI});")
     return "\n".join(lines) + "\n"
 
 

@@ -6,6 +6,20 @@
 #include "sim/cli/cli.h"
 #include "sim/registry/registry.h"
 
+/* A command of the program. */
+typedef struct bst_app_command {
+    const char *name;
+    int (*run)(int argc, char **argv);
+    const char *doc; /* one line for the list of commands */
+} bst_app_command;
+
+/* Runs the command that a command line names.
+ *
+ * Given:     argc, argv  of the program
+ *            more        a command besides those that libboresight has; NULL: none
+ * Returned:  exit status (sim/cli/cli.h) */
+int bst_app_run(int argc, char **argv, const bst_app_command *more);
+
 /* boresight new: writes a scenario for an observer and a target. */
 int bst_cmd_new(int argc, char **argv);
 /* boresight run: runs a scenario and records it. */

@@ -8,11 +8,13 @@ static volatile sig_atomic_t stop_requested;
 static const int stop_signals[] = {SIGINT, SIGTERM, SIGHUP};
 enum { STOP_SIGNALS = sizeof stop_signals / sizeof *stop_signals };
 
+static volatile sig_atomic_t process_is_shared; /* with a program that goes on afterwards */
+
 /* The first signal requests a stop; the second one of any kind ends the process. */
 static void on_signal(int number) {
     (void)number;
     stop_requested = 1;
-    for (int i = 0; i < STOP_SIGNALS; i++) {
+    for (int i = 0; i < STOP_SIGNALS && !process_is_shared; i++) {
         signal(stop_signals[i], SIG_DFL);
     }
 }
@@ -30,6 +32,10 @@ void bst_stop_catch_signals(void) {
     /* file size limits and closed pipes shall cause write errors, not end the process */
     signal(SIGXFSZ, SIG_IGN);
     signal(SIGPIPE, SIG_IGN);
+}
+
+void bst_stop_share_process(bool shared) {
+    process_is_shared = shared;
 }
 
 bool bst_stop_requested(void) {

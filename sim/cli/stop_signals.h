@@ -7,6 +7,10 @@
 /* Catches SIGINT, SIGTERM and SIGHUP as stop requests; a second signal ends the process. */
 void bst_stop_catch_signals(void);
 
+/* For commands in the process of another program, which goes on afterwards: a second signal does
+ * not end the process. */
+void bst_stop_share_process(bool shared);
+
 /* True if a signal has asked the program to stop. */
 bool bst_stop_requested(void);
 

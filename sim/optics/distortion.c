@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <string.h>
 
 #include "boresight/camera.h"
@@ -173,6 +174,14 @@ bst_vec3 bst_camera_unproject_general(const bst_camera *c, double x_px, double y
         c, (plane){(x_px - bst_camera_centre_x(c)) * s, (y_px - bst_camera_centre_y(c)) * s});
     double cs = c->geometry.cos_rotation, sn = c->geometry.sin_rotation;
     return bst_vec3_unit((bst_vec3){cs * u.x - sn * u.y, sn * u.x + cs * u.y, 1.0});
+}
+
+void bst_camera_unproject_points(const bst_camera *c, const double *x_px, const double *y_px,
+                                 int count, bst_vec3 *v_cam) {
+    assert(c && count >= 0);
+    for (int i = 0; i < count; i++) {
+        v_cam[i] = bst_camera_unproject(c, x_px[i], y_px[i]);
+    }
 }
 
 void bst_camera_jacobian(const bst_camera *c, bst_vec3 v, double k[2][2]) {

@@ -40,6 +40,8 @@ static const bst_stage_desc stage = {.abi = BST_STAGE_ABI,
                                      .functions = &functions};
 static const bst_stage_desc *const stages[] = {&stage, NULL};
 
+static const char digest[] = "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef";
+
 static const char *const assignments[] = {
     "/record/frames=none", "/observers/0/sensors/0/camera/width_px=128",
     "/observers/0/sensors/0/camera/height_px=96",
@@ -56,8 +58,8 @@ static void registered_stages_run(void **state) {
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
     assert_int_equal(bst_model_load(&ctx, "scenarios/neossat_geo_track.json", &options, &model),
                      BST_ERR_CONFIG); /* the name is not registered: it is taken for a path */
-    bst_assert_ok(&ctx, bst_plugin_register(&ctx, "test:mark", NULL, stages));
-    bst_assert_ok(&ctx, bst_plugin_register(&ctx, "test:mark", NULL, stages)); /* anew */
+    bst_assert_ok(&ctx, bst_plugin_register(&ctx, "test:mark", digest, NULL, stages));
+    bst_assert_ok(&ctx, bst_plugin_register(&ctx, "test:mark", digest, NULL, stages)); /* anew */
     bst_assert_ok(&ctx, bst_model_load(&ctx, "scenarios/neossat_geo_track.json", &options, &model));
     bst_assert_ok(&ctx, bst_sim_create(&ctx, model, NULL, &sim));
     for (int k = 0; k < 2; k++) {
@@ -73,7 +75,7 @@ static void registered_stages_run(void **state) {
     bst_sim_free(sim);
     bst_model_free(model);
     assert_true(created == 1 && applied >= 2 && destroyed == 1);
-    bst_assert_ok(&ctx, bst_plugin_register(&ctx, "test:mark", NULL, NULL)); /* removed */
+    bst_assert_ok(&ctx, bst_plugin_register(&ctx, "test:mark", NULL, NULL, NULL)); /* removed */
     assert_int_equal(bst_model_load(&ctx, "scenarios/neossat_geo_track.json", &options, &model),
                      BST_ERR_CONFIG);
 }
@@ -84,20 +86,27 @@ static void wrong_plugins_are_refused(void **state) {
     bst_ctx ctx;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-        assert_int_equal(bst_plugin_register(&ctx, names[i], NULL, stages), BST_ERR_ARGUMENT);
+        assert_int_equal(bst_plugin_register(&ctx, names[i], NULL, NULL, stages), BST_ERR_ARGUMENT);
     }
     char name[200];
     memset(name, ':', sizeof name);
     name[121] = '\0';
-    assert_int_equal(bst_plugin_register(&ctx, name, NULL, stages), BST_ERR_ARGUMENT);
+    assert_int_equal(bst_plugin_register(&ctx, name, NULL, NULL, stages), BST_ERR_ARGUMENT);
+    static const char *const digests[] = {"", "0123",
+                                          "0123456789abcdef0123456789abcdef0123456789abcdef"
+                                          "0123456789abcdeX"};
+    for (size_t i = 0; i < sizeof digests / sizeof *digests; i++) {
+        assert_int_equal(bst_plugin_register(&ctx, "test:wrong", digests[i], NULL, stages),
+                         BST_ERR_ARGUMENT);
+    }
     bst_stage_desc other = stage;
     const bst_stage_desc *const wrong[] = {&other, NULL};
     other.abi = BST_STAGE_ABI + 1;
-    assert_int_equal(bst_plugin_register(&ctx, "test:wrong", NULL, wrong), BST_ERR_CONFIG);
+    assert_int_equal(bst_plugin_register(&ctx, "test:wrong", NULL, NULL, wrong), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "test:wrong"));
     other = stage;
     other.kind = "nothing";
-    assert_int_equal(bst_plugin_register(&ctx, "test:wrong", NULL, wrong), BST_ERR_CONFIG);
+    assert_int_equal(bst_plugin_register(&ctx, "test:wrong", NULL, NULL, wrong), BST_ERR_CONFIG);
 }
 
 static void held_frames_stay(void **state) {

@@ -11,6 +11,7 @@ set(api_sim/optics camera.h band_config.h psf_config.h detector_config.h backgro
 set(api_sim/onboard camera_motion.h stages.h)
 set(api_sim/engine state.h plugin.h)
 set(api_sim/api boresight.h sim_pool.h)
+set(api_sim/app program.h)
 set(may_include "")
 set(may_sim/core sim/core)
 set(may_sim/messages sim/messages sim/core)

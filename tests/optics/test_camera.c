@@ -61,6 +61,17 @@ static void unproject_inverts_project(void **state) {
     }
 }
 
+static void points_are_unprojected_one_by_one(void **state) {
+    (void)state;
+    const double x_px[] = {-100.5, 0, 511.5, 1023}, y_px[] = {7, 1023, 511.5, -3};
+    bst_vec3 all[4];
+    bst_camera_unproject_points(&telescope, x_px, y_px, 4, all);
+    for (int i = 0; i < 4; i++) {
+        bst_vec3 one = bst_camera_unproject(&telescope, x_px[i], y_px[i]);
+        assert_memory_equal(&all[i], &one, sizeof one);
+    }
+}
+
 /* By hand: 3.6e10 10^(-5.2) = 227144.5 photons/s/m2 of V 13; pupil pi/4 0.0225 = 0.01767146 m2;
  * 0.49 of them detected: 1966.85 e/s. Sky of V 22: 3.6e10 10^(-8.8) = 57.0562 photons/s/m2/arcsec2;
  * 9 arcsec2: 4.44645 e/s/px. */
@@ -256,6 +267,7 @@ int main(void) {
         cmocka_unit_test(scales_that_contradict),
         cmocka_unit_test(projection_is_gnomonic),
         cmocka_unit_test(unproject_inverts_project),
+        cmocka_unit_test(points_are_unprojected_one_by_one),
         cmocka_unit_test(electrons_of_a_star_and_of_the_sky),
         cmocka_unit_test(a_sphere_at_a_geostationary_distance),
         cmocka_unit_test(a_sphere_keeps_the_energy),

@@ -5,6 +5,7 @@
 
 #include "sim/engine/kernel/engine_internal.h"
 #include "sim/link/wire.h"
+#include "sim/onboard/knowledge.h"
 
 void bst_engine_count(bst_engine *engine, const char *what) {
     pthread_mutex_lock(&engine->counting);
@@ -322,6 +323,10 @@ void bst_env_ignore(const bst_module_env *env, int port) {
         }
     }
     self->trigger_count = kept;
+}
+
+const bst_camera *bst_env_camera(const bst_module_env *env) {
+    return env->knowledge ? bst_knowledge_camera(env->knowledge) : NULL;
 }
 
 void bst_env_set_rate(const bst_module_env *env, double rate_hz) {

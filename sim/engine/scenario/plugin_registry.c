@@ -6,10 +6,10 @@
 #include "boresight/plugin.h"
 #include "sim/engine/scenario/plugin.h"
 
-enum { NAME_BYTES = 121 };
+enum { NAME_BYTES = 121, SHA256_BYTES = 65 };
 
 typedef struct registered {
-    char name[NAME_BYTES];
+    char name[NAME_BYTES], sha256[SHA256_BYTES];
     const bst_module_desc *const *modules;
     const bst_stage_desc *const *stages;
 } registered;
@@ -34,6 +34,7 @@ bool bst_plugin_registered(const char *name, bst_plugin *out) {
     if (index >= 0) {
         *out = (bst_plugin){.modules = all[index].modules, .stages = all[index].stages};
         memcpy(out->file, all[index].name, sizeof all[index].name);
+        memcpy(out->sha256, all[index].sha256, sizeof all[index].sha256);
     }
     pthread_mutex_unlock(&lock);
     return index >= 0;
@@ -50,6 +51,16 @@ static bst_status check_name(bst_ctx *ctx, const char *name) {
                            "plug-in \"%.120s\": a name of the program's own plug-in has 1 to 120 "
                            "printable characters, a \":\" and no \"/\", as \"python:mine\"",
                            name);
+}
+
+static bst_status check_digest(bst_ctx *ctx, const char *name, const char *sha256) {
+    return !sha256 || (strlen(sha256) == SHA256_BYTES - 1 &&
+                       strspn(sha256, "0123456789abcdef") == SHA256_BYTES - 1)
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_ARGUMENT,
+                          "plug-in \"%.120s\": its SHA-256 digest has 64 hexadecimal digits (found "
+                          "\"%.80s\")",
+                          name, sha256);
 }
 
 /* Stores an entry, in place of one of the same name. */
@@ -73,12 +84,14 @@ static bst_status store(bst_ctx *ctx, const registered *entry) {
     return BST_OK;
 }
 
-bst_status bst_plugin_register(bst_ctx *ctx, const char *name,
+bst_status bst_plugin_register(bst_ctx *ctx, const char *name, const char *sha256,
                                const bst_module_desc *const *modules,
                                const bst_stage_desc *const *stages) {
     registered entry = {.modules = modules, .stages = stages};
     bst_plugin plugin = {.modules = modules, .stages = stages};
     BST_TRY(check_name(ctx, name));
+    BST_TRY(check_digest(ctx, name, sha256));
+    memcpy(entry.sha256, sha256 ? sha256 : "", sha256 ? SHA256_BYTES : 1);
     memcpy(entry.name, name, strlen(name) + 1);
     memcpy(plugin.file, name, strlen(name) + 1);
     BST_TRY(bst_plugin_check(ctx, &plugin));

@@ -1,6 +1,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "sim/engine/scenario/scenario_internal.h"
 
@@ -26,6 +27,13 @@ bst_status bst_scenario_plugin(bst_ctx *ctx, const bst_json *json, const bst_sce
         snprintf(path, sizeof path, "%s", text);
     } else {
         snprintf(path, sizeof path, "%s/%s", folder, text);
+    }
+    if (strchr(text, ':') && !strchr(text, '/') && access(path, F_OK) != 0) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: %s: no plug-in \"%s\" is registered in this process, and there is no "
+                        "such file; register it before the scenario is read (in Python with "
+                        "boresight.register; another process needs it in plugins=[MODULE])",
+                        s->file, where, text);
     }
     if (bst_plugin_open(ctx, path, out) != BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: %s", s->file, where);
