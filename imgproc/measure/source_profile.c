@@ -114,9 +114,14 @@ void bst_source_profile_render(const bst_source_profiles *t, const bst_imgproc_g
     }
     BST_SIMD_PICK(render)(t, psf, shape, stamp, scratch, planes);
 }
+
 void bst_source_profile_render_motion(const bst_source_profiles *t, const bst_imgproc_gauss *psf,
                                       const bst_imgproc_shape *shape,
                                       const bst_imgproc_stamp *stamp, const double along[2],
                                       float *scratch, float *planes) {
+    if (t->known) {
+        bst_source_profile_render_known(t, psf, shape, stamp, along, scratch, planes);
+        return;
+    }
     BST_SIMD_PICK(render_motion)(t, psf, shape, stamp, along, scratch, planes);
 }

@@ -223,6 +223,76 @@ static void images_are_those_of_the_place_in_the_field(void **state) {
     bst_psf_free(psf);
 }
 
+/* Share of a source's light with a changed path, on the stamp. */
+static void render_changed(rendered *r, const bst_imgproc_shape *shape,
+                           const bst_imgproc_stamp *stamp, const double change_px[4],
+                           float *share) {
+    bst_imgproc_shape changed = *shape;
+    changed.dx_px += change_px[0];
+    changed.dy_px += change_px[1];
+    changed.bend_x_px += change_px[2];
+    changed.bend_y_px += change_px[3];
+    bst_source_profile_render(&r->profiles, &r->psf, &changed, stamp, r->scratch, r->planes);
+    int n = bst_simd_layout_round_up(stamp->width) * stamp->height;
+    memcpy(share, r->planes, (size_t)n * sizeof *share);
+}
+
+/* The derivatives by the motion of all streaks, from which image processing measures the motion,
+ * are those of the known PSF's images: against central differences. */
+static void derivatives_by_motion_are_those_of_the_images(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_camera camera = telescope(256);
+    bst_psf *psf = psf_of(&camera);
+    bst_known_psf *known;
+    bst_assert_ok(&ctx, bst_known_psf_create(&ctx, psf, 256.0, 256.0, 0.14, &known));
+    assert_true(known->terms > 1);
+    rendered *got = open_rendered(known), *other = open_rendered(known);
+    const bst_imgproc_stamp stamp = {100, 40, 18, 22};
+    const bst_imgproc_shape shape = {.x_px = 108.3,
+                                     .y_px = 50.6,
+                                     .dx_px = 1.3,
+                                     .dy_px = 7.8,
+                                     .bend_x_px = -0.1,
+                                     .bend_y_px = -0.2,
+                                     .sigma_px = known->sigma_px};
+    const double length = hypot(1.3, 7.8), ux = 1.3 / length, uy = 7.8 / length, h = 0.05;
+    const double along[2] = {ux, uy};
+    const struct {
+        int plane;
+        double step[4];
+    } by[3] = {{BST_IMAGE_BY_LENGTH, {h * ux, h * uy, 0.0, 0.0}},
+               {BST_IMAGE_BY_ACROSS, {-h * uy, h * ux, 0.0, 0.0}},
+               {BST_IMAGE_BY_BEND, {0.0, 0.0, h * ux, h * uy}}};
+    bst_source_profiles_set(&got->profiles, &got->psf, shape.sigma_px);
+    bst_source_profiles_set(&other->profiles, &other->psf, shape.sigma_px);
+    bst_source_profile_render_motion(&got->profiles, &got->psf, &shape, &stamp, along, got->scratch,
+                                     got->planes);
+    float share[2][SIDE * SIDE];
+    int stride = bst_simd_layout_round_up(stamp.width), n = stride * stamp.height;
+    for (int k = 0; k < 3; k++) {
+        double back[4], peak = 0.0, worst = 0.0;
+        for (int i = 0; i < 4; i++) {
+            back[i] = -by[k].step[i];
+        }
+        render_changed(other, &shape, &stamp, by[k].step, share[0]);
+        render_changed(other, &shape, &stamp, back, share[1]);
+        for (int i = 0; i < n; i++) {
+            double want = ((double)share[0][i] - (double)share[1][i]) / (2.0 * h);
+            bool inside = i % stride < stamp.width;
+            peak = fmax(peak, inside ? fabs(want) : 0.0);
+            worst =
+                fmax(worst, inside ? fabs((double)got->planes[by[k].plane * n + i] - want) : 0.0);
+        }
+        /* the differences' own error is (h / 0.7 px)^2 / 6, 0.1 %; the profiles' interpolation */
+        bst_assert_close(worst, 0.0, 0.01 * peak);
+    }
+    close_rendered(got);
+    close_rendered(other);
+    bst_known_psf_free(known);
+    bst_psf_free(psf);
+}
+
 /* Sources of SNR 30 to 150 all over a frame without noise: places and light that come back. */
 static void places_and_light_are_right(void **state) {
     (void)state;
@@ -301,6 +371,7 @@ int main(void) {
         cmocka_unit_test(a_known_gaussian_has_a_gaussians_images),
         cmocka_unit_test(sharpness_follows_the_binning),
         cmocka_unit_test(images_are_those_of_the_place_in_the_field),
+        cmocka_unit_test(derivatives_by_motion_are_those_of_the_images),
         cmocka_unit_test(places_and_light_are_right),
     };
     int failed = 0;
