@@ -50,8 +50,8 @@ static double cook_torrance(const bst_brdf *f, double in, double out, double bet
     double a2 = f->roughness * f->roughness, n2 = h.normal * h.normal;
     double width = n2 * a2 + (1.0 - n2);
     /* masking over 4 cos cos, height correlated */
-    double mask = 0.5 / (in * sqrt(out * out * (1.0 - a2) + a2) +
-                         out * sqrt(in * in * (1.0 - a2) + a2));
+    double mask =
+        0.5 / (in * sqrt(out * out * (1.0 - a2) + a2) + out * sqrt(in * in * (1.0 - a2) + a2));
     double lobe = a2 / (BST_PI * width * width) * mask * fresnel(f->specular, h.light);
     /* what enters the coating and leaves it again */
     return lobe + f->diffuse / BST_PI * (1.0 - fresnel(f->specular, in)) *
@@ -64,12 +64,11 @@ static double maxwell_beard(const bst_brdf *f, double in, double out, double bet
     /* slopes: s^2 / (pi cos^4 (s^2 + tan^2)^2) integrates to 1 over projected solid angle */
     double spread = s2 + tangent2;
     double slopes = s2 / (BST_PI * n2 * n2 * spread * spread);
-    double mask =
-        fmin(1.0, 2.0 * h.normal * fmin(in, out) / h.light); /* Torrance and Sparrow */
+    double mask = fmin(1.0, 2.0 * h.normal * fmin(in, out) / h.light); /* Torrance and Sparrow */
     double tilt = acos(h.normal), bistatic = acos(h.light);
     double ratio = f->omega_rad > 0.0 ? tilt / f->omega_rad : 0.0;
-    double shadow = f->tau_rad > 0.0 ? (1.0 + ratio * exp(-2.0 * bistatic / f->tau_rad)) / (1.0 + ratio)
-                                     : 1.0;
+    double shadow =
+        f->tau_rad > 0.0 ? (1.0 + ratio * exp(-2.0 * bistatic / f->tau_rad)) / (1.0 + ratio) : 1.0;
     double lobe = fresnel(f->specular, h.light) * slopes * mask * shadow / (4.0 * in * out);
     return lobe + f->diffuse / BST_PI + 2.0 * f->volume / (BST_PI * (in + out));
 }
@@ -118,8 +117,9 @@ double bst_brdf_value(const bst_brdf *brdf, double cos_in, double cos_out, doubl
 double bst_brdf_lobe_rad(const bst_brdf *brdf) {
     switch (brdf->model) {
         case BST_BRDF_PHONG: /* half the angle from the mirror direction */
-            return brdf->specular > 0.0 ? fmin(0.5 * sqrt(2.0 / (brdf->exponent + 1e-9)), 0.5 * BST_PI)
-                                        : 0.5 * BST_PI;
+            return brdf->specular > 0.0
+                       ? fmin(0.5 * sqrt(2.0 / (brdf->exponent + 1e-9)), 0.5 * BST_PI)
+                       : 0.5 * BST_PI;
         case BST_BRDF_ASHIKHMIN_SHIRLEY:
             return fmin(sqrt(2.0 / (brdf->exponent + 1e-9)), 0.5 * BST_PI);
         case BST_BRDF_COOK_TORRANCE:
@@ -143,7 +143,8 @@ double bst_brdf_reflectance(const bst_brdf *brdf, double cos_in) {
         double weight = BST_PI * 3.0 * t * t / POLAR * sin(p) * 2.0 * BST_PI / AROUND;
         for (int k = 0; k < AROUND; k++) {
             double a = 2.0 * BST_PI * (k + 0.5) / AROUND;
-            /* mirror direction (-sin_in, 0, cos_in), perpendicular (cos_in, 0, sin_in), (0, 1, 0) */
+            /* mirror direction (-sin_in, 0, cos_in), perpendicular (cos_in, 0, sin_in), (0, 1, 0)
+             */
             double x = -cos(p) * sin_in + sin(p) * cos(a) * cos_in;
             double z = cos(p) * cos_in + sin(p) * cos(a) * sin_in;
             if (z > 0.0) {

@@ -30,12 +30,12 @@ struct bst_brdf_table;
  *   BINOMIAL           b, c, base, first_power, terms
  *   TABLE              table, borrowed */
 typedef struct bst_brdf {
-    int model;         /* BST_BRDF_... */
-    double diffuse;    /* hemispherical reflectance of the diffuse part */
-    double volume;     /* reflectance of volume scattering */
-    double specular;   /* reflectance of the specular lobe */
-    double exponent;   /* of the lobe's cosine */
-    double roughness;  /* GGX: alpha; Maxwell-Beard: tangent of the width of the slopes */
+    int model;                 /* BST_BRDF_... */
+    double diffuse;            /* hemispherical reflectance of the diffuse part */
+    double volume;             /* reflectance of volume scattering */
+    double specular;           /* reflectance of the specular lobe */
+    double exponent;           /* of the lobe's cosine */
+    double roughness;          /* GGX: alpha; Maxwell-Beard: tangent of the width of the slopes */
     double tau_rad, omega_rad; /* of the shadowing and obscuration function */
     double b[2], c[BST_BRDF_BINOMIAL_TERMS], base;
     int first_power, terms;

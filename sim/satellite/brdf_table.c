@@ -64,8 +64,8 @@ static bst_status add_line(bst_ctx *ctx, bst_brdf_table *t, const double v[5]) {
         t->points = points;
         t->capacity = capacity;
     }
-    t->points[t->count++] = (point){sin(v[0] * BST_DEG_RAD), sin(v[2] * BST_DEG_RAD),
-                                    log10(fmax(v[4], 1e-12))};
+    t->points[t->count++] =
+        (point){sin(v[0] * BST_DEG_RAD), sin(v[2] * BST_DEG_RAD), log10(fmax(v[4], 1e-12))};
     return BST_OK;
 }
 
@@ -85,7 +85,8 @@ static bst_status make_rows(bst_ctx *ctx, bst_brdf_table *t) {
         if (!last || t->points[i].sin_in != last->sin_in) {
             if (t->row_count == ROWS_MAX) {
                 return bst_fail(ctx, BST_ERR_FORMAT,
-                                "more than %d angles of incidence (allowed: %d)", ROWS_MAX, ROWS_MAX);
+                                "more than %d angles of incidence (allowed: %d)", ROWS_MAX,
+                                ROWS_MAX);
             }
             t->rows[t->row_count++] = (row){t->points[i].sin_in, i, 0};
             last = &t->rows[t->row_count - 1];

@@ -51,6 +51,10 @@ static double sphere_light(const bst_curved *c, const bst_brdf *brdf, bst_vec3 s
                            bst_vec3 observer) {
     double phase = bst_vec3_angle(sun, observer), cosine = cos(phase), sum = 0.0;
     double lobe = bst_brdf_lobe_rad(brdf);
+    if (brdf->model == BST_BRDF_LAMBERT) {
+        return 2.0 / 3.0 * c->radius_m * c->radius_m * brdf->diffuse / BST_PI *
+               (sin(phase) + (BST_PI - phase) * cosine);
+    }
     /* longitude in the plane of both directions, from the observer; latitude from that plane */
     breaks longitude = panels(phase - 0.5 * BST_PI, 0.5 * BST_PI, 0.5 * phase, lobe);
     breaks latitude = panels(0.0, 0.5 * BST_PI, 0.0, lobe);

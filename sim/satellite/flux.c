@@ -12,17 +12,24 @@ typedef struct sun_disc {
     bst_vec3 direction[SUN_NODES_MAX];
     double weight[SUN_NODES_MAX];
     int count;
+    bst_vec3 centre;
+    double radius_rad;
 } sun_disc;
+
+/* Radius of the Sun over the width of a lobe above which the disc matters: 1e-3 of the flux. */
+static const double SHARP = 0.05;
 
 /* Nodes for a lobe: limb darkening 1 - 0.6 (1 - mu) (Cox, Allen's Astrophysical Quantities, 4th
  * edition, section 14.7) has the mean square radius 0.45. */
 static void make_sun(const bst_satellite_light *light, double lobe_rad, sun_disc *out) {
     double r = light->sun_radius_rad;
     bst_vec3 e1 = bst_vec3_perpendicular(light->sun), e2 = bst_vec3_cross(light->sun, e1);
+    out->centre = light->sun;
+    out->radius_rad = r;
     out->count = 1;
     out->direction[0] = light->sun;
     out->weight[0] = 1.0;
-    if (!(r > 0.05 * lobe_rad)) {
+    if (!(r > SHARP * lobe_rad)) {
         return;
     }
     /* one ring with the second moment of the disc, or four rings */
@@ -41,18 +48,30 @@ static void make_sun(const bst_satellite_light *light, double lobe_rad, sun_disc
         double radius = r * (fine ? ring_four[i] : ring_one[i]);
         for (int k = 0; k < around; k++) {
             double a = 2.0 * BST_PI * (k + 0.5 * i) / around;
-            bst_vec3 d = bst_vec3_axpy(bst_vec3_axpy(light->sun, radius * cos(a), e1),
-                                       radius * sin(a), e2);
+            bst_vec3 d =
+                bst_vec3_axpy(bst_vec3_axpy(light->sun, radius * cos(a), e1), radius * sin(a), e2);
             out->direction[out->count] = bst_vec3_unit(d);
             out->weight[out->count++] = (fine ? weights[i] / total : weights[i]) / around;
         }
     }
 }
 
+/* Nodes of the disc that a material needs: for wide lobes the Sun is a point. */
+static int nodes_for(const bst_material *m, const sun_disc *sun) {
+    bool wide = sun->radius_rad <= SHARP * bst_brdf_lobe_rad(&m->brdf);
+    return wide ? 1 : sun->count;
+}
+
 /* BRDF times both cosines, mean over the Sun's disc. */
 static double facet_light(const bst_material *m, const sun_disc *sun, bst_vec3 normal,
                           bst_vec3 observer) {
     double out = fmin(bst_vec3_dot(normal, observer), 1.0), sum = 0.0;
+    int nodes = nodes_for(m, sun);
+    if (nodes == 1) {
+        double in = fmin(bst_vec3_dot(normal, sun->centre), 1.0);
+        return m->scale * in * out *
+               bst_brdf_value(&m->brdf, in, out, bst_vec3_dot(sun->centre, observer));
+    }
     for (int i = 0; i < sun->count; i++) {
         double in = bst_vec3_dot(normal, sun->direction[i]);
         if (in > 1e-9 && out > 1e-9) {
@@ -66,7 +85,7 @@ static double facet_light(const bst_material *m, const sun_disc *sun, bst_vec3 n
 
 /* Sums of one evaluation. */
 typedef struct sums {
-    double sun[BST_SATELLITE_MATERIALS_MAX];   /* m^2/sr by material */
+    double sun[BST_SATELLITE_MATERIALS_MAX]; /* m^2/sr by material */
     double earth[BST_SATELLITE_MATERIALS_MAX];
     double curved_all[CURVED_MAX], curved_free[CURVED_MAX]; /* lit and visible projected area */
     sun_disc disc;
@@ -111,13 +130,16 @@ static double add_curved(const bst_satellite_pose *p, const bst_satellite_light 
         const bst_material *m = &sat->materials[c->material];
         double free = s->curved_all[i] > 0.0 ? s->curved_free[i] / s->curved_all[i] : 1.0;
         double sum = 0.0;
-        for (int k = 0; k < s->disc.count && free > 0.0; k++) {
-            bst_vec3 sun = s->disc.direction[k], observer = l->observer;
+        int nodes = free > 0.0 ? nodes_for(m, &s->disc) : 0;
+        for (int k = 0; k < nodes; k++) {
+            bst_vec3 sun = nodes == 1 ? s->disc.centre : s->disc.direction[k];
+            bst_vec3 observer = l->observer;
             if (c->joint >= 0) {
                 sun = bst_mat3_transpose_mul_vec(&p->rotation[c->joint], sun);
                 observer = bst_mat3_transpose_mul_vec(&p->rotation[c->joint], observer);
             }
-            sum += s->disc.weight[k] * bst_curved_light(c, &m->brdf, sun, observer);
+            sum += (nodes == 1 ? 1.0 : s->disc.weight[k]) *
+                   bst_curved_light(c, &m->brdf, sun, observer);
         }
         sum *= m->scale;
         s->sun[c->material] += free * sum;
@@ -167,8 +189,7 @@ static void add_earth_and_emission(bst_satellite_pose *p, const bst_satellite_li
         bool whole;
         double visible = bst_pose_unshadowed(p, i, 1, &whole);
         out->visible_m2 += visible * cosine;
-        out->emission_m2 +=
-            visible * cosine * sat->materials[sat->facets[i].material].emissivity;
+        out->emission_m2 += visible * cosine * sat->materials[sat->facets[i].material].emissivity;
         if (earth && visible > 0.0) {
             add_facing(p, l, i, visible, s);
         }
@@ -211,14 +232,12 @@ void bst_earthlight_at(const bst_earth_surface *surface, bst_vec3 object_m, bst_
                        bst_earthlight *out) {
     enum { RINGS = 8, AROUND = 24 };
     /* Gauss-Legendre, 8 points, on [0, 1]: half of Abramowitz and Stegun, table 25.4 */
-    static const double place[RINGS] = {0.01985507175123185, 0.10166676129318664,
-                                        0.2372337950418355,  0.4082826787521751,
-                                        0.5917173212478249,  0.7627662049581645,
-                                        0.8983332387068134,  0.9801449282487682};
-    static const double weight[RINGS] = {0.05061426814518815, 0.11119051722668725,
-                                         0.15685332293894365, 0.181341891689181,
-                                         0.181341891689181,   0.15685332293894365,
-                                         0.11119051722668725, 0.05061426814518815};
+    static const double place[RINGS] = {
+        0.01985507175123185, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751,
+        0.5917173212478249,  0.7627662049581645,  0.8983332387068134, 0.9801449282487682};
+    static const double weight[RINGS] = {
+        0.05061426814518815, 0.11119051722668725, 0.15685332293894365, 0.181341891689181,
+        0.181341891689181,   0.15685332293894365, 0.11119051722668725, 0.05061426814518815};
     const bst_brdf ground = {.model = BST_BRDF_PHONG,
                              .diffuse = surface->diffuse,
                              .specular = surface->specular,

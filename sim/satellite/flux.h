@@ -47,9 +47,9 @@ typedef struct bst_satellite_flux {
     double sun[BST_SUNLIGHT_COLOURS];   /* full sunlight at 1 au, reflected */
     double earth[BST_SUNLIGHT_COLOURS]; /* earthlight, reflected; with the irradiance of the Sun at
                                            the distance of bst_earthlight */
-    double emission_m2; /* projected visible area times emissivity */
-    double visible_m2;  /* projected visible area */
-    double error;       /* estimated error of sun[BST_SUNLIGHT_V], m^2/sr */
+    double emission_m2;                 /* projected visible area times emissivity */
+    double visible_m2;                  /* projected visible area */
+    double error;                       /* estimated error of sun[BST_SUNLIGHT_V], m^2/sr */
 } bst_satellite_flux;
 
 /* Light of a pose.

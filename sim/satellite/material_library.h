@@ -8,8 +8,8 @@
 /* A surface of a satellite. */
 typedef struct bst_material {
     char name[64];
-    bst_brdf brdf; /* at 0.55 um */
-    double scale;  /* factor on the BRDF */
+    bst_brdf brdf;                       /* at 0.55 um */
+    double scale;                        /* factor on the BRDF */
     double colour[BST_SUNLIGHT_COLOURS]; /* reflectance over that in V, at
                                             bst_sunlight_wavelength_m */
     double emissivity;                   /* hemispherical, thermal infrared */

@@ -26,10 +26,11 @@ bst_status bst_mesh_add_vertex(bst_ctx *ctx, bst_mesh *mesh, bst_vec3 v) {
                               ? realloc(mesh->vertices, (size_t)capacity * sizeof *grown)
                               : NULL;
         if (!grown) {
-            return bst_fail(ctx, mesh->vertex_count < 4 * BST_SATELLITE_FACETS_MAX ? BST_ERR_MEMORY
-                                                                                 : BST_ERR_FORMAT,
-                            "more than %d vertices (allowed: %d); simplify the mesh",
-                            mesh->vertex_count, 4 * BST_SATELLITE_FACETS_MAX);
+            return bst_fail(
+                ctx,
+                mesh->vertex_count < 4 * BST_SATELLITE_FACETS_MAX ? BST_ERR_MEMORY : BST_ERR_FORMAT,
+                "more than %d vertices (allowed: %d); simplify the mesh", mesh->vertex_count,
+                4 * BST_SATELLITE_FACETS_MAX);
         }
         mesh->vertices = grown;
         mesh->vertex_capacity = capacity;
@@ -134,7 +135,7 @@ typedef struct topology {
     ordered *order;
     placed *sorted;
     mesh_edge *edges;
-    int *local; /* by vertex: vertex of the model, or -1 */
+    int *local;     /* by vertex: vertex of the model, or -1 */
     int first, end; /* the piece that is looked at: order[first] to order[end - 1] */
 } topology;
 
@@ -255,21 +256,20 @@ static bst_status add_convex(bst_ctx *ctx, bst_satellite *s, const bst_mesh *mes
         for (int k = 0; k < 3; k++) {
             int w = t->weld[mesh->triangles[triangle][k]];
             if (t->local[w] < 0) {
-                BST_TRY(bst_model_add_vertex(ctx, s, place, bst_vec3_scale(mesh->vertices[w], scale),
-                                             &t->local[w]));
+                BST_TRY(bst_model_add_vertex(
+                    ctx, s, place, bst_vec3_scale(mesh->vertices[w], scale), &t->local[w]));
             }
             corners[k] = t->local[w];
         }
-        BST_TRY(bst_model_add_facet(ctx, s, place, corners, 3, mesh->triangle_material[triangle],
-                                    -1));
+        BST_TRY(
+            bst_model_add_facet(ctx, s, place, corners, 3, mesh->triangle_material[triangle], -1));
     }
     return bst_model_end_occluder(ctx, s, first_facet);
 }
 
 /* Adds each triangle of a piece as a body of its own. */
 static bst_status add_triangles(bst_ctx *ctx, bst_satellite *s, const bst_mesh *mesh,
-                                const topology *t, double scale,
-                                const bst_part_place *place) {
+                                const topology *t, double scale, const bst_part_place *place) {
     bool two_sided = t->open[t->order[t->first].piece] || !is_outward(mesh, t);
     for (int i = t->first; i < t->end; i++) {
         int corners[3], triangle = t->order[i].triangle, first_facet = s->facet_count;

@@ -63,8 +63,7 @@ static const cJSON *element(const gltf *g, const char *list, int64_t index) {
 }
 
 static int base64_digit(char c) {
-    static const char digits[] =
-        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     const char *at = c ? strchr(digits, c) : NULL;
     return at ? (int)(at - digits) : -1;
 }
@@ -99,9 +98,9 @@ static bst_status read_buffer(gltf *g, const cJSON *node, const buffer *bin, buf
     const char *uri = bst_json_member_text(node, "uri", NULL);
     if (!uri) {
         *out = (buffer){bin->bytes, bin->count, false};
-        return bin->bytes ? BST_OK
-                          : bst_fail(g->ctx, BST_ERR_FORMAT,
-                                     "no uri, and the file has no binary chunk");
+        return bin->bytes
+                   ? BST_OK
+                   : bst_fail(g->ctx, BST_ERR_FORMAT, "no uri, and the file has no binary chunk");
     }
     if (strncmp(uri, "data:", 5) == 0) {
         const char *comma = strstr(uri, ";base64,");
@@ -244,8 +243,7 @@ static bst_status node_transform(const gltf *g, const cJSON *node, int64_t index
 
 static double determinant(const bst_mat3 *a) {
     bst_vec3 x = {a->m[0][0], a->m[1][0], a->m[2][0]}, y = {a->m[0][1], a->m[1][1], a->m[2][1]};
-    return bst_vec3_dot(bst_vec3_cross(x, y),
-                        (bst_vec3){a->m[0][2], a->m[1][2], a->m[2][2]});
+    return bst_vec3_dot(bst_vec3_cross(x, y), (bst_vec3){a->m[0][2], a->m[1][2], a->m[2][2]});
 }
 
 /* Adds the triangles of a primitive: lists, strips and fans. */
@@ -271,8 +269,8 @@ static bst_status add_triangles(gltf *g, const accessor *indices, int64_t count,
 static bst_status add_primitive(gltf *g, const cJSON *primitive, const transform *place) {
     int64_t mode = whole(primitive, "mode", 7, 4);
     if (mode < 4) {
-        return bst_fail(g->ctx, BST_ERR_FORMAT,
-                        "mode %lld (allowed: triangles, 4, 5 or 6)", (long long)mode);
+        return bst_fail(g->ctx, BST_ERR_FORMAT, "mode %lld (allowed: triangles, 4, 5 or 6)",
+                        (long long)mode);
     }
     accessor positions, indices;
     const cJSON *attributes = bst_json_member(primitive, "attributes");
@@ -419,9 +417,9 @@ static bst_status split_glb(bst_ctx *ctx, const char *path, buffer *file, buffer
         }
         at += 8 + length;
     }
-    return json->bytes ? BST_OK
-                       : bst_fail(ctx, BST_ERR_FORMAT, "%.400s: no JSON chunk (allowed: GLB 2)",
-                                  path);
+    return json->bytes
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_FORMAT, "%.400s: no JSON chunk (allowed: GLB 2)", path);
 }
 
 bst_status bst_mesh_load_gltf(bst_ctx *ctx, const char *path, bst_mesh *mesh) {

@@ -23,6 +23,7 @@ void bst_satellite_free(bst_satellite *s) {
     free(s->facets);
     free(s->occluders);
     free(s->curved);
+    free(s->shells);
     free(s->parts);
     free(s->materials);
     free(s->joints);
@@ -127,8 +128,10 @@ static bst_status make_joint(bst_ctx *ctx, bst_satellite *s, const bst_satellite
                    .limit_rad = {c->limit_deg[0] * BST_DEG_RAD, c->limit_deg[1] * BST_DEG_RAD}};
     memcpy(j.name, c->name, sizeof j.name);
     if (find_joint(s, c->name) >= 0) {
-        return bst_fail(ctx, BST_ERR_CONFIG, "name: \"%s\" is the name of another joint (allowed: "
-                        "unique names)", c->name);
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "name: \"%s\" is the name of another joint (allowed: "
+                        "unique names)",
+                        c->name);
     }
     if (*c->parent && (j.parent = find_joint(s, c->parent)) < 0) {
         return bst_fail(ctx, BST_ERR_CONFIG,
@@ -182,17 +185,16 @@ static bst_status add_mesh_file(bst_ctx *ctx, bst_satellite *s, const char *path
     bst_part_place own = *place;
     if (status == BST_OK && place->material < 0) {
         if (s->material_count + mesh.material_count + 1 > BST_SATELLITE_MATERIALS_MAX) {
-            status = bst_fail(ctx, BST_ERR_CONFIG, "%.400s: %d materials (allowed: %d in all)", path,
-                              mesh.material_count, BST_SATELLITE_MATERIALS_MAX - 1);
+            status = bst_fail(ctx, BST_ERR_CONFIG, "%.400s: %d materials (allowed: %d in all)",
+                              path, mesh.material_count, BST_SATELLITE_MATERIALS_MAX - 1);
         } else {
             int base = s->material_count;
             for (int i = 0; i < mesh.material_count; i++) {
                 s->materials[s->material_count++] = mesh.materials[i];
             }
             /* what the file gives no material is grey */
-            s->materials[s->material_count++] =
-                (bst_material){"grey", {.model = BST_BRDF_LAMBERT, .diffuse = 0.3}, 1.0,
-                               {1, 1, 1, 1}, 0.8};
+            s->materials[s->material_count++] = (bst_material){
+                "grey", {.model = BST_BRDF_LAMBERT, .diffuse = 0.3}, 1.0, {1, 1, 1, 1}, 0.8};
             for (int i = 0; i < mesh.triangle_count; i++) {
                 int m = mesh.triangle_material[i];
                 mesh.triangle_material[i] = base + (m >= 0 ? m : mesh.material_count);
@@ -267,7 +269,8 @@ static bst_status make_part(bst_ctx *ctx, bst_satellite *s, const bst_satellite_
     part->facet_count = s->facet_count - part->first_facet;
     if (part->facet_count == 0) {
         return bst_fail(ctx, BST_ERR_CONFIG,
-                        "part \"%s\" has no facet with an area (allowed: extents above 0)", c->name);
+                        "part \"%s\" has no facet with an area (allowed: extents above 0)",
+                        c->name);
     }
     return BST_OK;
 }

@@ -15,6 +15,7 @@ typedef struct bst_facet {
     int part, material, joint;
     int occluder; /* convex body that it belongs to and that does not shadow it */
     int curved;   /* curved surface that it approximates; -1: none */
+    bool inside;  /* on the concave side of its occluder, which is a shell */
     double area_m2;
     bst_vec3 normal;
 } bst_facet;
@@ -23,7 +24,18 @@ typedef struct bst_facet {
 typedef struct bst_occluder {
     int first_vertex, vertex_count;
     int first_edge, edge_count;
+    bool closed; /* each edge has one facet on each side */
+    int shell;   /* index of the shell whose convex hull this is; -1: a solid body */
 } bst_occluder;
+
+/* An open convex shell, a dish. A ray that crosses its hull crosses the shell, so that others see a
+ * convex body; from inside, a ray leaves freely through the rim only. Frame of the joint. */
+typedef struct bst_shell {
+    int joint;
+    bst_vec3 apex_m, axis; /* paraboloid along a unit axis */
+    double radius_m, depth_m;
+    int first_rim, rim_count; /* vertices, counter-clockwise about the axis */
+} bst_shell;
 
 /* A surface of revolution about its z axis: the part of a sphere or cone that facets stand for. */
 typedef struct bst_curved {
@@ -57,18 +69,20 @@ typedef struct bst_satellite {
     bst_vec3 *vertices;
     int *vertex_joint;
     int *corner;
-    int (*edges)[2];
+    int (*edges)[4]; /* vertices a, b; the facet with the edge a-b; that with b-a, or below 0 */
     bst_facet *facets;
     bst_occluder *occluders;
     bst_curved *curved;
+    bst_shell *shells;
     bst_satellite_part *parts;
     bst_material *materials;
     bst_joint *joints;
     bst_brdf_table **tables; /* of materials; NULL where a material has none */
     int vertex_count, corner_count, edge_count, facet_count, occluder_count, curved_count;
+    int shell_count;
     int part_count, material_count, joint_count;
     int vertex_capacity, corner_capacity, edge_capacity, facet_capacity, occluder_capacity;
-    int curved_capacity;
+    int curved_capacity, shell_capacity;
     double radius_m; /* of a sphere about the body's origin that contains all parts in any pose */
     double lobe_rad; /* narrowest specular lobe (bst_brdf_lobe_rad) */
 } bst_satellite;

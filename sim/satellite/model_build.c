@@ -23,8 +23,8 @@ bst_status bst_model_add_vertex(bst_ctx *ctx, bst_satellite *s, const bst_part_p
                                 bst_vec3 v, int *index) {
     int capacity = s->vertex_capacity;
     BST_TRY(grow(ctx, (void **)&s->vertex_joint, &capacity, s->vertex_count, sizeof(int)));
-    BST_TRY(grow(ctx, (void **)&s->vertices, &s->vertex_capacity, s->vertex_count,
-                 sizeof(bst_vec3)));
+    BST_TRY(
+        grow(ctx, (void **)&s->vertices, &s->vertex_capacity, s->vertex_count, sizeof(bst_vec3)));
     s->vertices[s->vertex_count] =
         bst_vec3_add(bst_mat3_mul_vec(&place->rotation, v), place->position_m);
     s->vertex_joint[s->vertex_count] = place->joint;
@@ -34,8 +34,8 @@ bst_status bst_model_add_vertex(bst_ctx *ctx, bst_satellite *s, const bst_part_p
 
 bst_status bst_model_add_curved(bst_ctx *ctx, bst_satellite *s, const bst_curved *curved,
                                 int *index) {
-    BST_TRY(grow(ctx, (void **)&s->curved, &s->curved_capacity, s->curved_count,
-                 sizeof *s->curved));
+    BST_TRY(
+        grow(ctx, (void **)&s->curved, &s->curved_capacity, s->curved_count, sizeof *s->curved));
     s->curved[s->curved_count] = *curved;
     *index = s->curved_count++;
     return BST_OK;
@@ -46,8 +46,7 @@ static bst_vec3 area_vector(const bst_satellite *s, const int *corners, int coun
     bst_vec3 sum = {0}, a = s->vertices[corners[0]];
     for (int i = 2; i < count; i++) {
         bst_vec3 b = bst_vec3_sub(s->vertices[corners[i - 1]], a);
-        sum = bst_vec3_axpy(sum, 0.5,
-                            bst_vec3_cross(b, bst_vec3_sub(s->vertices[corners[i]], a)));
+        sum = bst_vec3_axpy(sum, 0.5, bst_vec3_cross(b, bst_vec3_sub(s->vertices[corners[i]], a)));
     }
     return sum;
 }
@@ -73,6 +72,7 @@ bst_status bst_model_add_facet(bst_ctx *ctx, bst_satellite *s, const bst_part_pl
                                             .joint = place->joint,
                                             .occluder = s->occluder_count - 1,
                                             .curved = curved,
+                                            .inside = curved >= 0 && s->curved[curved].side < 0.0,
                                             .area_m2 = size,
                                             .normal = bst_vec3_scale(area, 1.0 / size)};
     for (int i = 0; i < count; i++) {
@@ -87,7 +87,14 @@ bst_status bst_model_begin_occluder(bst_ctx *ctx, bst_satellite *s) {
     BST_TRY(grow(ctx, (void **)&s->occluders, &s->occluder_capacity, s->occluder_count,
                  sizeof *s->occluders));
     s->occluders[s->occluder_count++] =
-        (bst_occluder){.first_vertex = s->vertex_count, .first_edge = s->edge_count};
+        (bst_occluder){.first_vertex = s->vertex_count, .first_edge = s->edge_count, .shell = -1};
+    return BST_OK;
+}
+
+bst_status bst_model_set_shell(bst_ctx *ctx, bst_satellite *s, const bst_shell *shell) {
+    BST_TRY(grow(ctx, (void **)&s->shells, &s->shell_capacity, s->shell_count, sizeof *s->shells));
+    s->occluders[s->occluder_count - 1].shell = s->shell_count;
+    s->shells[s->shell_count++] = *shell;
     return BST_OK;
 }
 
@@ -99,22 +106,29 @@ bst_status bst_model_end_occluder(bst_ctx *ctx, bst_satellite *s, int first_face
         for (int i = 0; i < facet->count; i++) {
             int a = s->corner[facet->first + i];
             int b = s->corner[facet->first + (i + 1) % facet->count];
-            /* each edge of a closed body is in two facets, once in each direction; those of open
-             * curved surfaces may be there only once */
-            bool known = false;
-            for (int e = o->first_edge; e < s->edge_count && !known; e++) {
-                known = (s->edges[e][0] == b && s->edges[e][1] == a) ||
-                        (s->edges[e][0] == a && s->edges[e][1] == b);
+            /* each edge of a closed body is in two facets, once in each direction */
+            int e = o->first_edge;
+            while (e < s->edge_count && !(s->edges[e][0] == b && s->edges[e][1] == a) &&
+                   !(s->edges[e][0] == a && s->edges[e][1] == b)) {
+                e++;
             }
-            if (known) {
+            if (e < s->edge_count) {
+                bool second = s->edges[e][0] == b && s->edges[e][3] == -1;
+                s->edges[e][3] = second ? f : -2;
                 continue;
             }
-            BST_TRY(grow(ctx, (void **)&s->edges, &s->edge_capacity, s->edge_count,
-                         sizeof *s->edges));
+            BST_TRY(
+                grow(ctx, (void **)&s->edges, &s->edge_capacity, s->edge_count, sizeof *s->edges));
             s->edges[s->edge_count][0] = a;
-            s->edges[s->edge_count++][1] = b;
+            s->edges[s->edge_count][1] = b;
+            s->edges[s->edge_count][2] = f;
+            s->edges[s->edge_count++][3] = -1;
         }
     }
     o->edge_count = s->edge_count - o->first_edge;
+    o->closed = true;
+    for (int e = o->first_edge; e < s->edge_count; e++) {
+        o->closed = o->closed && s->edges[e][3] >= 0;
+    }
     return BST_OK;
 }

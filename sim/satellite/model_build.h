@@ -36,6 +36,10 @@ bst_status bst_model_end_occluder(bst_ctx *ctx, bst_satellite *s, int first_face
 bst_status bst_model_add_curved(bst_ctx *ctx, bst_satellite *s, const bst_curved *curved,
                                 int *index) BST_MUST_CHECK;
 
+/* Makes the last occluder the hull of a shell. BST_ERR_MEMORY. */
+bst_status bst_model_set_shell(bst_ctx *ctx, bst_satellite *s,
+                               const bst_shell *shell) BST_MUST_CHECK;
+
 /* Appends a parametric part. Errors of the functions above, and BST_ERR_CONFIG with the key. */
 bst_status bst_model_add_part(bst_ctx *ctx, bst_satellite *s,
                               const bst_satellite_part_config *config,

@@ -144,29 +144,22 @@ static bst_status add_sphere(bst_ctx *ctx, bst_satellite *s, const bst_satellite
     return bst_model_end_occluder(ctx, s, first);
 }
 
-/* One band of a dish: each quadrilateral is a body of its own, with two sides. */
-static bst_status add_dish_band(bst_ctx *ctx, bst_satellite *s, const bst_part_place *place, int n,
-                                const double radius[2], const double z[2]) {
-    int index[2];
-    bst_curved curved = curved_of(place, radius[0], radius[1], z[1] - z[0]);
+/* One band of a dish between two rings, with two sides. */
+static bst_status add_dish_band(bst_ctx *ctx, bst_satellite *s, const bst_part_place *place,
+                                const bst_curved *band, const int *low, const int *high, int n) {
+    int side[2];
+    bst_curved curved = *band;
     curved.material = place->back_material;
-    BST_TRY(bst_model_add_curved(ctx, s, &curved, &index[0]));
+    BST_TRY(bst_model_add_curved(ctx, s, &curved, &side[0]));
     curved.material = place->material;
     curved.side = -1.0;
-    BST_TRY(bst_model_add_curved(ctx, s, &curved, &index[1]));
+    BST_TRY(bst_model_add_curved(ctx, s, &curved, &side[1]));
     for (int i = 0; i < n; i++) {
-        int v[4], first = s->facet_count;
-        BST_TRY(bst_model_begin_occluder(ctx, s));
-        for (int k = 0; k < 4; k++) {
-            double a = 2.0 * BST_PI * (i + (k == 1 || k == 2)) / n;
-            double r = radius[k / 2] * polygon_radius(n);
-            BST_TRY(bst_model_add_vertex(ctx, s, place,
-                                         (bst_vec3){r * cos(a), r * sin(a), z[k / 2]}, &v[k]));
-        }
-        int inside[4] = {v[3], v[2], v[1], v[0]};
-        BST_TRY(bst_model_add_facet(ctx, s, place, v, 4, place->back_material, index[0]));
-        BST_TRY(bst_model_add_facet(ctx, s, place, inside, 4, place->material, index[1]));
-        BST_TRY(bst_model_end_occluder(ctx, s, first));
+        int k = (i + 1) % n, count = low[0] == low[1] ? 3 : 4;
+        int v[4] = {low[i], count == 3 ? high[k] : low[k], count == 3 ? high[i] : high[k], high[i]};
+        int back[4] = {v[count - 1], v[count - 2], v[count - 3], v[0]};
+        BST_TRY(bst_model_add_facet(ctx, s, place, v, count, place->back_material, side[0]));
+        BST_TRY(bst_model_add_facet(ctx, s, place, back, count, place->material, side[1]));
     }
     return BST_OK;
 }
@@ -175,27 +168,35 @@ static bst_status add_dish_band(bst_ctx *ctx, bst_satellite *s, const bst_part_p
 static bst_status add_dish(bst_ctx *ctx, bst_satellite *s, const bst_satellite_part_config *c,
                            const bst_part_place *place) {
     enum { BANDS = 4 };
-    for (int b = 0; b < BANDS; b++) {
-        double radius[2] = {c->radius_m * b / BANDS, c->radius_m * (b + 1) / BANDS}, z[2];
-        for (int k = 0; k < 2; k++) {
-            double q = radius[k] / c->radius_m;
-            z[k] = c->length_m * q * q;
-        }
-        BST_TRY(add_dish_band(ctx, s, place, (int)c->segments, radius, z));
+    int n = (int)c->segments, ring[2][SEGMENTS_MAX], first = s->facet_count;
+    double before_m = 0.0;
+    BST_TRY(bst_model_begin_occluder(ctx, s));
+    BST_TRY(add_ring_or_tip(ctx, s, place, n, 0.0, 0.0, ring[0]));
+    for (int b = 1; b <= BANDS; b++) {
+        double q = (double)b / BANDS, z_m = c->length_m * q * q;
+        BST_TRY(add_ring_or_tip(ctx, s, place, n, c->radius_m * q, z_m, ring[b % 2]));
+        bst_curved band =
+            curved_of(place, c->radius_m * (b - 1) / BANDS, c->radius_m * q, z_m - before_m);
+        BST_TRY(add_dish_band(ctx, s, place, &band, ring[(b + 1) % 2], ring[b % 2], n));
+        before_m = z_m;
     }
-    return BST_OK;
+    BST_TRY(bst_model_end_occluder(ctx, s, first));
+    bst_curved frame = curved_of(place, 0.0, 0.0, 0.0);
+    bst_shell shell = {place->joint, place->position_m,  frame.z, c->radius_m,
+                       c->length_m,  ring[BANDS % 2][0], n};
+    return bst_model_set_shell(ctx, s, &shell);
 }
 
 /* Requires a positive length. */
 static bst_status need(bst_ctx *ctx, const char *key, double value) {
-    return value > 0.0 ? BST_OK
-                       : bst_fail(ctx, BST_ERR_CONFIG,
-                                  "%s: the part has no extent (found %g; allowed: above 0)", key,
-                                  value);
+    return value > 0.0
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_CONFIG,
+                          "%s: the part has no extent (found %g; allowed: above 0)", key, value);
 }
 
-bst_status bst_model_add_part(bst_ctx *ctx, bst_satellite *s,
-                              const bst_satellite_part_config *c, const bst_part_place *place) {
+bst_status bst_model_add_part(bst_ctx *ctx, bst_satellite *s, const bst_satellite_part_config *c,
+                              const bst_part_place *place) {
     switch (c->kind) {
         case BST_PART_BOX:
         case BST_PART_PLATE:

@@ -34,6 +34,9 @@ bst_status bst_polygon_clip_create(bst_ctx *ctx, bst_polygon_clip *clip) BST_MUS
 /* Frees the memory of a clip; the struct belongs to the caller. */
 void bst_polygon_clip_free(bst_polygon_clip *clip);
 
+/* True if an edge of one of two convex polygons separates them; they may touch. */
+bool bst_polygon_is_separate(const bst_point2 *p, int p_count, const bst_point2 *q, int q_count);
+
 /* Starts with one convex polygon.
  *
  * Given:     points  [count] corners, counter-clockwise, at most BST_POLYGON_CORNERS_MAX */
@@ -41,6 +44,12 @@ void bst_polygon_clip_start(bst_polygon_clip *clip, const bst_point2 *points, in
 
 /* Removes a convex polygon (as in bst_polygon_clip_start) from all pieces. */
 void bst_polygon_clip_subtract(bst_polygon_clip *clip, const bst_point2 *points, int count);
+
+/* Removes all that is outside of a convex polygon (as in bst_polygon_clip_start). */
+void bst_polygon_clip_intersect(bst_polygon_clip *clip, const bst_point2 *points, int count);
+
+/* True if nothing is left. */
+bool bst_polygon_clip_is_empty(const bst_polygon_clip *clip);
 
 /* Area of all pieces. */
 double bst_polygon_clip_area(const bst_polygon_clip *clip);

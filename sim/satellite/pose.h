@@ -16,6 +16,7 @@ typedef struct bst_pose_view {
     bst_vec3 x, y, z; /* right-handed; z: unit, from the satellite to the light or the observer */
     double (*bounds)[6]; /* by occluder: lowest and highest x, y, z */
     bst_point2 *outline; /* silhouettes of occluders, counter-clockwise, from 2 * first_vertex */
+    bool *clear;         /* by occluder: no other one can hide any of it */
     int *outline_count;  /* corners of the silhouette; -1: not yet made */
     int *cell_first, *cell_items; /* occluders by cell of a grid, for models with many */
     int cells, cell_item_count, cell_item_capacity;
@@ -25,10 +26,10 @@ typedef struct bst_pose_view {
 /* A pose: work memory of one thread for one model. */
 typedef struct bst_satellite_pose {
     const bst_satellite *satellite;
-    bst_vec3 *vertices; /* body frame */
-    bst_vec3 *normals;  /* of facets, body frame */
-    bst_mat3 *rotation; /* by joint: body frame from joint frame */
-    bst_vec3 *origin;   /* by joint, body frame */
+    bst_vec3 *vertices;     /* body frame */
+    bst_vec3 *normals;      /* of facets, body frame */
+    bst_mat3 *rotation;     /* by joint: body frame from joint frame */
+    bst_vec3 *origin;       /* by joint, body frame */
     bst_pose_view views[2]; /* see bst_pose_look */
     int *seen;              /* by occluder: facet for which it was last found in the grid */
     int seen_stamp;

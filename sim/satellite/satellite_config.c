@@ -105,7 +105,8 @@ static const bst_config_desc part_table[] = {
                "Name of a material; a mesh may leave it out to keep the materials of its file."),
     BST_STRING(bst_satellite_part_config, back_material, "\"\"",
                "plate, dish: material of the other side; empty: the same."),
-    BST_STRING(bst_satellite_part_config, joint, "\"\"", "The joint that carries it; empty: the body."),
+    BST_STRING(bst_satellite_part_config, joint, "\"\"",
+               "The joint that carries it; empty: the body."),
     BST_CONFIG_END,
 };
 

@@ -25,9 +25,9 @@ enum { BST_JOINT_FIXED, BST_JOINT_SUN, BST_JOINT_EARTH, BST_JOINT_TARGET, BST_JO
 
 typedef struct bst_satellite_joint_config {
     char name[64], parent[64];
-    int32_t follows; /* BST_JOINT_... */
-    int64_t axes;    /* 1 or 2 */
-    double axis[3];  /* of the first rotation, in the parent's frame */
+    int32_t follows;  /* BST_JOINT_... */
+    int64_t axes;     /* 1 or 2 */
+    double axis[3];   /* of the first rotation, in the parent's frame */
     double normal[3]; /* what is turned toward what the joint follows */
     double position_m[3];
     double offset_deg, rate_deg_per_s;

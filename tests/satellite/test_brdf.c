@@ -10,8 +10,13 @@ static const bst_brdf models[] = {
     {.model = BST_BRDF_COOK_TORRANCE, .specular = 1.0, .roughness = 0.02},
     {.model = BST_BRDF_COOK_TORRANCE, .specular = 1.0, .roughness = 0.7},
     {.model = BST_BRDF_COOK_TORRANCE, .specular = 0.04, .diffuse = 0.9, .roughness = 0.3},
-    {.model = BST_BRDF_MAXWELL_BEARD, .specular = 0.3, .diffuse = 0.2, .volume = 0.1,
-     .roughness = 0.2, .tau_rad = 0.5, .omega_rad = 0.5},
+    {.model = BST_BRDF_MAXWELL_BEARD,
+     .specular = 0.3,
+     .diffuse = 0.2,
+     .volume = 0.1,
+     .roughness = 0.2,
+     .tau_rad = 0.5,
+     .omega_rad = 0.5},
     {.model = BST_BRDF_MAXWELL_BEARD, .specular = 0.9, .roughness = 0.05},
 };
 enum { MODELS = sizeof models / sizeof models[0] };
@@ -66,8 +71,8 @@ static void known_reflectances(void **state) {
     bst_assert_close(bst_brdf_reflectance(&mirror, c), 0.5 + 0.5 * pow(1 - c, 5), 5e-3);
     /* the diffuse part of Ashikhmin and Shirley reflects Rd (1 - Rs) at normal incidence: their
      * equation 5, 28/23 * (31/32) * 2 * integral of (1 - (1 - u/2)^5) u du */
-    bst_brdf rough = {.model = BST_BRDF_ASHIKHMIN_SHIRLEY, .diffuse = 0.5, .specular = 0.0,
-                      .exponent = 0};
+    bst_brdf rough = {
+        .model = BST_BRDF_ASHIKHMIN_SHIRLEY, .diffuse = 0.5, .specular = 0.0, .exponent = 0};
     double sum = 0.0;
     for (int i = 0; i < 100000; i++) {
         double u = (i + 0.5) / 100000;
@@ -132,8 +137,8 @@ static void table_gives_its_values_and_moves_its_lobe(void **state) {
 
 static void damaged_tables_are_refused(void **state) {
     (void)state;
-    static const char *const texts[] = {"", "1 2 3\n", "1 2 3 4 x\n", "95 0 0 0 1\n",
-                                        "5 0 0 0 -1\n", "5 0 0 0 nan\n"};
+    static const char *const texts[] = {
+        "", "1 2 3\n", "1 2 3 4 x\n", "95 0 0 0 1\n", "5 0 0 0 -1\n", "5 0 0 0 nan\n"};
     for (int i = 0; i < 6; i++) {
         bst_ctx ctx = {0};
         bst_brdf_table *table;

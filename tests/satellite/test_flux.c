@@ -9,15 +9,16 @@ static const double CLOSED = 1e-4;
 static void sphere_has_its_closed_form(void **state) {
     (void)state;
     bst_test_model m = bst_test_model_open(
-        "{" WHITE ", \"parts\": [{\"name\": \"s\", \"kind\": \"sphere\", \"radius_m\": 1.5, "
+        "{" WHITE
+        ", \"parts\": [{\"name\": \"s\", \"kind\": \"sphere\", \"radius_m\": 1.5, "
         "\"material\": \"w\", \"rotation_deg\": [10, 20, 30]}]}");
     uint64_t random = 7;
     for (int i = 0; i < 50; i++) {
         bst_vec3 sun = bst_test_direction(&random), eye = bst_test_direction(&random);
         double phase = bst_vec3_angle(sun, eye);
         /* Lambert's sphere: integral of both cosines over the lit and visible lune */
-        double form = 0.8 / BST_PI * 1.5 * 1.5 * 2.0 / 3.0 *
-                      (sin(phase) + (BST_PI - phase) * cos(phase));
+        double form =
+            0.8 / BST_PI * 1.5 * 1.5 * 2.0 / 3.0 * (sin(phase) + (BST_PI - phase) * cos(phase));
         bst_assert_close(bst_test_flux(&m, sun, eye), form, CLOSED * form + 1e-9);
     }
     bst_test_model_close(&m);
@@ -26,15 +27,15 @@ static void sphere_has_its_closed_form(void **state) {
 static void cylinder_has_its_closed_form(void **state) {
     (void)state;
     bst_test_model m = bst_test_model_open(
-        "{" WHITE ", \"parts\": [{\"name\": \"c\", \"kind\": \"cylinder\", \"radius_m\": 0.7, "
+        "{" WHITE
+        ", \"parts\": [{\"name\": \"c\", \"kind\": \"cylinder\", \"radius_m\": 0.7, "
         "\"length_m\": 3, \"material\": \"w\"}]}");
     uint64_t random = 11;
     for (int i = 0; i < 50; i++) {
         bst_vec3 sun = bst_test_direction(&random), eye = bst_test_direction(&random);
         double azimuth = fabs(bst_wrap_angle(atan2(sun.y, sun.x) - atan2(eye.y, eye.x)));
         double across = hypot(sun.x, sun.y) * hypot(eye.x, eye.y);
-        double side = 0.7 * 3 * across * 0.5 *
-                      (sin(azimuth) + (BST_PI - azimuth) * cos(azimuth));
+        double side = 0.7 * 3 * across * 0.5 * (sin(azimuth) + (BST_PI - azimuth) * cos(azimuth));
         double end = sun.z * eye.z > 0 ? BST_PI * 0.7 * 0.7 * sun.z * eye.z : 0.0;
         double form = 0.8 / BST_PI * (side + end);
         bst_assert_close(bst_test_flux(&m, sun, eye), form, CLOSED * form + 1e-9);
@@ -45,7 +46,8 @@ static void cylinder_has_its_closed_form(void **state) {
 static void box_and_plate_have_their_closed_forms(void **state) {
     (void)state;
     bst_test_model box = bst_test_model_open(
-        "{" WHITE ", \"parts\": [{\"name\": \"b\", \"kind\": \"box\", \"size_m\": [1, 2, 3], "
+        "{" WHITE
+        ", \"parts\": [{\"name\": \"b\", \"kind\": \"box\", \"size_m\": [1, 2, 3], "
         "\"material\": \"w\"}]}");
     bst_test_model plate = bst_test_model_open(
         "{\"materials\": [{\"name\": \"w\", \"diffuse\": 0.8}, {\"name\": \"d\", \"diffuse\": "
@@ -69,7 +71,8 @@ static void box_and_plate_have_their_closed_forms(void **state) {
 static void cone_is_the_sum_of_strips(void **state) {
     (void)state;
     bst_test_model m = bst_test_model_open(
-        "{" WHITE ", \"parts\": [{\"name\": \"c\", \"kind\": \"cone\", \"radius_m\": 1, "
+        "{" WHITE
+        ", \"parts\": [{\"name\": \"c\", \"kind\": \"cone\", \"radius_m\": 1, "
         "\"top_radius_m\": 0.3, \"length_m\": 2, \"open\": true, \"material\": \"w\"}]}");
     uint64_t random = 5;
     double slant = hypot(0.7, 2.0);
@@ -205,7 +208,8 @@ static void panels_follow_the_sun(void **state) {
     bst_assert_close(bst_vec3_angle(n, best), 0, 1e-12);
     bst_test_model_close(&m);
     m = bst_test_model_open(
-        "{" WHITE ", \"joints\": [{\"name\": \"base\", \"follows\": \"spin\", \"axis\": [0, 0, 1], "
+        "{" WHITE
+        ", \"joints\": [{\"name\": \"base\", \"follows\": \"spin\", \"axis\": [0, 0, 1], "
         "\"normal\": [1, 0, 0], \"rate_deg_per_s\": 10}, {\"name\": \"j\", \"parent\": \"base\", "
         "\"follows\": \"sun\", \"axes\": 2, \"axis\": [0, 1, 0], \"normal\": [0, 0, 1]}], "
         "\"parts\": [{\"name\": \"p\", \"kind\": \"plate\", \"joint\": \"j\", \"material\": "
@@ -226,8 +230,8 @@ static void glint_has_the_width_of_the_sun(void **state) {
     for (int i = 0; i < STEPS; i++) {
         double tilt = (i - 0.5 * STEPS) * 0.05 * BST_DEG_RAD;
         bst_vec3 sun = {sin(tilt), 0, cos(tilt)}, eye = {0, 0, 1};
-        bst_satellite_light light = {.sun = sun, .observer = eye, .sunlit = 1,
-                                     .sun_radius_rad = 4.65e-3};
+        bst_satellite_light light = {
+            .sun = sun, .observer = eye, .sunlit = 1, .sun_radius_rad = 4.65e-3};
         bst_satellite_flux flux;
         bst_satellite_flux_at(m.pose, &light, &flux);
         mean += flux.sun[BST_SUNLIGHT_V] / STEPS;
@@ -246,8 +250,9 @@ static void glint_has_the_width_of_the_sun(void **state) {
     bst_test_model_close(&m);
 }
 
-/* From far the Earth is a Lambert sphere at full phase, with the geometric albedo 2/3 of its albedo;
- * near the surface at noon it is a plane of radiance albedo / pi, and a plate receives its albedo. */
+/* From far the Earth is a Lambert sphere at full phase, with the geometric albedo 2/3 of its
+ * albedo; near the surface at noon it is a plane of radiance albedo / pi, and a plate receives its
+ * albedo. */
 static void earthlight_has_its_closed_form(void **state) {
     (void)state;
     bst_earth_surface earth = {.diffuse = 0.3};
