@@ -59,7 +59,7 @@ typedef struct bst_satellite_part_config {
 
 typedef struct bst_satellite_config {
     char file[512]; /* JSON, glTF, GLB or OBJ; "": the lists below */
-    char source[1024];
+    char source[256];
     int32_t confidence;
     bst_config_list materials, joints, parts;
 } bst_satellite_config;

@@ -23,6 +23,7 @@ typedef struct bst_world_object_info {
     double area_m2; /* cross-section of the sphere */
     double albedo;  /* of the sphere */
     const bst_brightness *brightness;
+    const struct bst_object_shape *shape; /* NULL: a sphere */
 } bst_world_object_info;
 
 /* Geocentric state in GCRF. */
