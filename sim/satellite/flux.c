@@ -230,7 +230,7 @@ void bst_satellite_flux_at(bst_satellite_pose *p, const bst_satellite_light *l,
 
 void bst_earthlight_at(const bst_earth_surface *surface, bst_vec3 object_m, bst_vec3 sun,
                        bst_earthlight *out) {
-    enum { RINGS = 8, AROUND = 24 };
+    enum { RINGS = 8 };
     /* Gauss-Legendre, 8 points, on [0, 1]: half of Abramowitz and Stegun, table 25.4 */
     static const double place[RINGS] = {
         0.01985507175123185, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751,
@@ -252,15 +252,19 @@ void bst_earthlight_at(const bst_earth_surface *surface, bst_vec3 object_m, bst_
     bst_vec3 sum = {0};
     double ratio = BST_EARTH_RADIUS_M / distance;
     double cap = ratio * ratio / (1.0 + sqrt((1.0 - ratio) * (1.0 + ratio)));
-    for (int n = 0; n < RINGS; n++) {
+    assert(surface->fineness >= 1 && surface->fineness <= BST_EARTHLIGHT_FINEST);
+    int panels = surface->fineness, around = 24 * panels;
+    for (int n = 0; n < RINGS * panels; n++) {
         /* uniform in the square root of the solid angle: smooth at the limb */
-        double t = 0.5 * BST_PI * place[n], drop = cap * sin(t) * sin(t), c = 1.0 - drop;
+        double t = 0.5 * BST_PI * (n / RINGS + place[n % RINGS]) / panels,
+               drop = cap * sin(t) * sin(t), c = 1.0 - drop;
         double s = sqrt(drop * (2.0 - drop));
-        double solid = cap * sin(2.0 * t) * 0.5 * BST_PI * weight[n] * 2.0 * BST_PI / AROUND;
+        double solid =
+            cap * sin(2.0 * t) * 0.5 * BST_PI * weight[n % RINGS] / panels * 2.0 * BST_PI / around;
         double chord2 = BST_EARTH_RADIUS_M * BST_EARTH_RADIUS_M - distance * distance * s * s;
         double way = distance * c - sqrt(fmax(chord2, 0.0));
-        for (int m = 0; m < AROUND; m++) {
-            double a = 2.0 * BST_PI * (m + 0.5 * (n % 2)) / AROUND;
+        for (int m = 0; m < around; m++) {
+            double a = 2.0 * BST_PI * (m + 0.5 * (n % 2)) / around;
             bst_vec3 u = bst_vec3_axpy(bst_vec3_axpy(bst_vec3_scale(down, c), s * cos(a), e1),
                                        s * sin(a), e2);
             bst_vec3 normal = bst_vec3_unit(bst_vec3_axpy(object_m, way, u));

@@ -5,7 +5,7 @@
 #include "sim/satellite/pose.h"
 
 /* Directions of a quadrature of the earthlight. */
-enum { BST_EARTHLIGHT_MAX = 256 };
+enum { BST_EARTHLIGHT_MAX = 3072, BST_EARTHLIGHT_FINEST = 4 };
 
 /* Earthlight at the satellite: directions to lit places of the Earth, with the irradiance from each
  * over the irradiance of the Sun at the Earth. */
@@ -19,6 +19,7 @@ typedef struct bst_earthlight {
 /* Reflectance of the Earth: energy-conserving Phong (bst_brdf), diffuse only for most uses. */
 typedef struct bst_earth_surface {
     double diffuse, specular, exponent;
+    int fineness; /* of the quadrature: 1 to BST_EARTHLIGHT_FINEST */
 } bst_earth_surface;
 
 /* Earthlight at a place.
@@ -27,8 +28,9 @@ typedef struct bst_earth_surface {
  *            object_m  geocentric position, outside of the Earth
  *            sun       unit, geocentric direction of the Sun, the same axes
  * Returned:  *out  directions in these axes; count 0: the visible Earth is dark
- * Notes:     Gauss-Legendre in the angle from nadir, 8 rings of 24: the irradiance on a plate is
- *            accurate to 1 % in low orbits, most of it from the terminator. */
+ * Notes:     Gauss-Legendre in the angle from nadir, 8 rings of 24 directions times the square of
+ *            the fineness. With 1 the irradiance on a plate is accurate to 1 % in low orbits, most
+ *            of it from the terminator; surfaces with a narrow lobe need more. */
 void bst_earthlight_at(const bst_earth_surface *surface, bst_vec3 object_m, bst_vec3 sun,
                        bst_earthlight *out);
 

@@ -255,7 +255,7 @@ static void glint_has_the_width_of_the_sun(void **state) {
  * albedo. */
 static void earthlight_has_its_closed_form(void **state) {
     (void)state;
-    bst_earth_surface earth = {.diffuse = 0.3};
+    bst_earth_surface earth = {.diffuse = 0.3, .fineness = 1};
     bst_earthlight light;
     double sum = 0.0, d = 1000 * BST_EARTH_RADIUS_M;
     bst_earthlight_at(&earth, (bst_vec3){0, 0, d}, (bst_vec3){0, 0, 1}, &light);

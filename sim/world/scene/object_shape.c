@@ -78,7 +78,7 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
     bst_quat q = bst_body_attitude_at(shape->attitude, &state);
     bst_earthlight earthlight;
     if (b->earthshine) {
-        bst_earth_surface surface = {.diffuse = b->earth_albedo};
+        bst_earth_surface surface = {.diffuse = b->earth_albedo, .fineness = 1};
         bst_earthlight_at(&surface, l->object_m, bst_vec3_unit(l->sun_m), &earthlight);
         turn_earthlight(q, &earthlight);
     }
