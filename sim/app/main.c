@@ -24,6 +24,8 @@ static const command commands[] = {
     {"orbit", bst_cmd_orbit, "an orbit from the directions that a run measured"},
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
     {"loop", bst_cmd_loop, "margins and predicted pointing of a scenario's control loops"},
+    {"lightcurve", bst_cmd_lightcurve,
+     "magnitude of an object or a satellite's shape against time"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"serve", bst_cmd_serve, "play a module of a scenario over the link"},
     {"link-keys", bst_cmd_link_keys, "make keys for a link that takes only peers that have them"},

@@ -335,6 +335,18 @@ bst_status bst_world_view_sight(bst_ctx *ctx, bst_world_view *view, int observer
     return BST_OK;
 }
 
+bst_status bst_world_view_sight_from(bst_ctx *ctx, bst_world_view *view,
+                                     const bst_world_state *place, int object, double seconds,
+                                     bst_world_sight *out) {
+    eye e = {.observer = -1, .seconds = seconds, .state = *place};
+    bst_vec3 now, velocity, emitted;
+    BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_world_time(view->world, seconds), &e.sky));
+    BST_TRY(position_of(ctx, view, object, seconds, FROM_ORBIT, &now, &velocity));
+    BST_TRY(look(ctx, view, &e, (looked_at){object, FROM_ORBIT}, now, &emitted, out));
+    shine(view, &e, &(emission){object, emitted, velocity, 0.0}, out);
+    return BST_OK;
+}
+
 /* Computes the apparent path of an object seen by an observer during an exposure. */
 static bst_status path_from(bst_ctx *ctx, bst_world_view *view,
                             const eye *const eyes[BST_PATH_NODES], looked_at b,
