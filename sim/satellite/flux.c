@@ -128,7 +128,8 @@ static double add_curved(const bst_satellite_pose *p, const bst_satellite_light 
     for (int i = 0; i < sat->curved_count && i < CURVED_MAX; i++) {
         const bst_curved *c = &sat->curved[i];
         const bst_material *m = &sat->materials[c->material];
-        double free = s->curved_all[i] > 0.0 ? s->curved_free[i] / s->curved_all[i] : 1.0;
+        double free =
+            s->curved_all[i] > 0.0 ? fmin(s->curved_free[i] / s->curved_all[i], 1.0) : 1.0;
         double sum = 0.0;
         int nodes = free > 0.0 ? nodes_for(m, &s->disc) : 0;
         for (int k = 0; k < nodes; k++) {

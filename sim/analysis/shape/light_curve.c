@@ -230,6 +230,14 @@ static void write_row(FILE *f, const curve *c, const row *r) {
 /* Plots magnitude and phase angle; the shadow is where the curve ends. */
 static bst_status plot_rows(bst_ctx *ctx, const char *path, const row *rows, int count) {
     bst_plot plot;
+    int lit = 0;
+    for (int i = 0; i < count; i++) {
+        lit += isfinite(rows[i].v_mag);
+    }
+    if (lit == 0) {
+        bst_log(ctx, BST_LOG_WARNING, "%s: not drawn: the object is never seen in light", path);
+        return BST_OK;
+    }
     BST_TRY(bst_plot_begin(ctx, &plot, path, 1000, 500));
     fprintf(plot.script, "$data << EOD\n");
     for (int i = 0; i < count; i++) {
