@@ -8,6 +8,9 @@
 /* Room for the pieces of one facet: a plate behind a thousand struts has some thousand pieces. */
 enum { PIECES = 8192, POINTS = 131072 };
 
+/* Distance over the extent of a polygon below which two corners are one. */
+static const double TINY = 1e-12;
+
 bst_status bst_polygon_clip_create(bst_ctx *ctx, bst_polygon_clip *clip) {
     *clip = (bst_polygon_clip){.points = malloc(POINTS * sizeof *clip->points),
                                .pieces = malloc(PIECES * sizeof *clip->pieces),
@@ -35,24 +38,29 @@ double bst_polygon_area(const bst_point2 *p, int count) {
     return 0.5 * sum;
 }
 
-void bst_polygon_clip_start(bst_polygon_clip *clip, const bst_point2 *points, int count) {
-    assert(count >= 0 && count <= BST_POLYGON_CORNERS_MAX);
-    memcpy(clip->points, points, (size_t)count * sizeof *points);
-    clip->pieces[0] = (bst_polygon_piece){0, count};
-    clip->point_count = count;
-    clip->piece_count = 1;
-    clip->overflow = false;
-}
-
 /* Distance of a point to the left of the edge a-b, times the edge's length. */
 static double left_of(bst_point2 a, bst_point2 b, bst_point2 p) {
     return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
 }
 
-/* True if an edge of q separates p from q. */
+/* Distance from the first corner to the farthest one, by coordinates. */
+static double extent_of(const bst_point2 *p, int count) {
+    double extent = 0.0;
+    for (int i = 1; i < count; i++) {
+        double far = fabs(p[i].x - p[0].x) + fabs(p[i].y - p[0].y);
+        extent = far > extent ? far : extent;
+    }
+    return extent;
+}
+
+/* True if an edge of q separates p from q. An edge as short as rounding has no direction. */
 static bool separated(const bst_point2 *q, int q_count, const bst_point2 *p, int p_count) {
+    double tiny = TINY * extent_of(q, q_count);
     for (int i = 0; i < q_count; i++) {
         bst_point2 a = q[i], b = q[i + 1 < q_count ? i + 1 : 0];
+        if (fabs(b.x - a.x) <= tiny && fabs(b.y - a.y) <= tiny) {
+            continue;
+        }
         int k = 0;
         while (k < p_count && left_of(a, b, p[k]) <= 0.0) {
             k++;
@@ -62,6 +70,16 @@ static bool separated(const bst_point2 *q, int q_count, const bst_point2 *p, int
         }
     }
     return false;
+}
+
+void bst_polygon_clip_start(bst_polygon_clip *clip, const bst_point2 *points, int count) {
+    assert(count >= 0 && count <= BST_POLYGON_CORNERS_MAX);
+    memcpy(clip->points, points, (size_t)count * sizeof *points);
+    clip->pieces[0] = (bst_polygon_piece){0, count};
+    clip->point_count = count;
+    clip->piece_count = 1;
+    clip->overflow = false;
+    clip->tiny = TINY * extent_of(points, count);
 }
 
 bool bst_polygon_is_separate(const bst_point2 *p, int p_count, const bst_point2 *q, int q_count) {
@@ -79,32 +97,58 @@ static bool is_left(bst_point2 a, bst_point2 b, const bst_point2 *p, int count) 
     return true;
 }
 
-/* Splits a convex polygon along the line a-b. Returned: corner counts of the parts to the left and
- * to the right of the line; 0: none. */
-static void split(const bst_point2 *p, int count, bst_point2 a, bst_point2 b, bst_point2 *left,
-                  int *left_count, bst_point2 *right, int *right_count) {
-    int l = 0, r = 0;
-    double before = left_of(a, b, p[count - 1]);
-    bst_point2 last = p[count - 1];
-    for (int i = 0; i < count; i++) {
+/* Corners of a polygon under construction. Corners closer than `tiny` are one: an edge between them
+ * would have a direction of rounding errors. */
+typedef struct outline {
+    bst_point2 *points;
+    int count;
+    double tiny;
+} outline;
+
+static bool same(bst_point2 a, bst_point2 b, double tiny) {
+    return fabs(a.x - b.x) <= tiny && fabs(a.y - b.y) <= tiny;
+}
+
+static void push(outline *to, bst_point2 p) {
+    if (to->count == 0 || !same(to->points[to->count - 1], p, to->tiny)) {
+        to->points[to->count++] = p;
+    }
+}
+
+/* Ends a polygon: one with fewer than three corners is empty. */
+static void close_outline(outline *to) {
+    while (to->count > 1 && same(to->points[to->count - 1], to->points[0], to->tiny)) {
+        to->count--;
+    }
+    to->count = to->count >= 3 ? to->count : 0;
+}
+
+/* Splits a convex polygon along the line a-b into the parts to its left and right, either of which
+ * may be empty. */
+static void split(const outline *from, bst_point2 a, bst_point2 b, outline *left, outline *right) {
+    const bst_point2 *p = from->points;
+    bst_point2 last = p[from->count - 1];
+    double before = left_of(a, b, last);
+    left->count = right->count = 0;
+    for (int i = 0; i < from->count; i++) {
         double now = left_of(a, b, p[i]);
         if ((before > 0.0 && now < 0.0) || (before < 0.0 && now > 0.0)) {
             double u = before / (before - now);
             bst_point2 cut = {last.x + u * (p[i].x - last.x), last.y + u * (p[i].y - last.y)};
-            left[l++] = cut;
-            right[r++] = cut;
+            push(left, cut);
+            push(right, cut);
         }
         if (now >= 0.0) {
-            left[l++] = p[i];
+            push(left, p[i]);
         }
         if (now <= 0.0) {
-            right[r++] = p[i];
+            push(right, p[i]);
         }
         before = now;
         last = p[i];
     }
-    *left_count = l >= 3 ? l : 0;
-    *right_count = r >= 3 ? r : 0;
+    close_outline(left);
+    close_outline(right);
 }
 
 /* Subtracts a convex polygon from one piece. */
@@ -126,16 +170,15 @@ static void cut_piece(bst_polygon_clip *clip, int piece, const bst_point2 *q, in
             clip->overflow = true;
             return; /* the piece stays whole */
         }
-        bst_point2 *outside = clip->points + points;
-        int left_count, right_count;
-        split(rest, count, q[i], q[i + 1 < q_count ? i + 1 : 0], left, &left_count, outside,
-              &right_count);
-        if (right_count > 0 && bst_polygon_area(outside, right_count) > 0.0) {
-            clip->pieces[pieces++] = (bst_polygon_piece){points, right_count};
-            points += right_count;
+        outline whole = {rest, count, clip->tiny}, inside = {left, 0, clip->tiny};
+        outline outside = {clip->points + points, 0, clip->tiny};
+        split(&whole, q[i], q[i + 1 < q_count ? i + 1 : 0], &inside, &outside);
+        if (outside.count > 0 && bst_polygon_area(outside.points, outside.count) > 0.0) {
+            clip->pieces[pieces++] = (bst_polygon_piece){points, outside.count};
+            points += outside.count;
         }
-        memcpy(rest, left, (size_t)left_count * sizeof *rest);
-        count = left_count;
+        memcpy(rest, left, (size_t)inside.count * sizeof *rest);
+        count = inside.count;
     }
     if (count > 0) { /* else they only touch: the piece stays as it is */
         clip->pieces[piece].count = 0;
@@ -144,39 +187,56 @@ static void cut_piece(bst_polygon_clip *clip, int piece, const bst_point2 *q, in
     }
 }
 
-void bst_polygon_clip_subtract(bst_polygon_clip *clip, const bst_point2 *points, int count) {
+/* Copies a polygon without corners that are one. Returned: their number. */
+static int clean(const bst_polygon_clip *clip, const bst_point2 *points, int count,
+                 bst_point2 *to) {
     assert(count <= BST_POLYGON_CORNERS_MAX);
-    if (count < 3) {
-        return;
+    outline out = {to, 0, clip->tiny};
+    for (int i = 0; i < count; i++) {
+        push(&out, points[i]);
     }
-    for (int i = 0, end = clip->piece_count; i < end; i++) {
+    close_outline(&out);
+    return out.count;
+}
+
+void bst_polygon_clip_subtract(bst_polygon_clip *clip, const bst_point2 *points, int count) {
+    bst_point2 q[BST_POLYGON_CORNERS_MAX];
+    int corners = clean(clip, points, count, q);
+    for (int i = 0, end = clip->piece_count; i < end && corners > 0; i++) {
         if (clip->pieces[i].count > 0) {
-            cut_piece(clip, i, points, count);
+            cut_piece(clip, i, q, corners);
         }
     }
 }
 
+/* Keeps what one piece has to the left of a line. */
+static void keep_left(bst_polygon_clip *clip, bst_polygon_piece *piece, bst_point2 a,
+                      bst_point2 b) {
+    bst_point2 right[BST_POLYGON_CORNERS_MAX + 8];
+    if (is_left(a, b, clip->points + piece->first, piece->count)) {
+        return;
+    }
+    if (piece->count + 2 > BST_POLYGON_CORNERS_MAX ||
+        clip->point_count + piece->count + 2 > clip->point_capacity) {
+        clip->overflow = true;
+        return;
+    }
+    outline whole = {clip->points + piece->first, piece->count, clip->tiny};
+    outline inside = {clip->points + clip->point_count, 0, clip->tiny};
+    outline outside = {right, 0, clip->tiny};
+    split(&whole, a, b, &inside, &outside);
+    *piece = (bst_polygon_piece){clip->point_count, inside.count};
+    clip->point_count += inside.count;
+}
+
 void bst_polygon_clip_intersect(bst_polygon_clip *clip, const bst_point2 *points, int count) {
-    bst_point2 left[BST_POLYGON_CORNERS_MAX + 8], right[BST_POLYGON_CORNERS_MAX + 8];
-    assert(count <= BST_POLYGON_CORNERS_MAX);
-    for (int k = 0, end = clip->piece_count; k < end; k++) {
+    bst_point2 q[BST_POLYGON_CORNERS_MAX];
+    int corners = clean(clip, points, count, q);
+    for (int k = 0; k < clip->piece_count; k++) {
         bst_polygon_piece *piece = &clip->pieces[k];
-        for (int i = 0; i < count && piece->count > 0; i++) {
-            int left_count, right_count;
-            if (is_left(points[i], points[i + 1 < count ? i + 1 : 0], clip->points + piece->first,
-                        piece->count)) {
-                continue;
-            }
-            if (piece->count + 2 > BST_POLYGON_CORNERS_MAX ||
-                clip->point_count + piece->count + 2 > clip->point_capacity) {
-                clip->overflow = true;
-                return;
-            }
-            split(clip->points + piece->first, piece->count, points[i],
-                  points[i + 1 < count ? i + 1 : 0], left, &left_count, right, &right_count);
-            memcpy(clip->points + clip->point_count, left, (size_t)left_count * sizeof *left);
-            *piece = (bst_polygon_piece){clip->point_count, left_count};
-            clip->point_count += left_count;
+        piece->count = corners > 0 ? piece->count : 0;
+        for (int i = 0; i < corners && piece->count > 0; i++) {
+            keep_left(clip, piece, q[i], q[i + 1 < corners ? i + 1 : 0]);
         }
     }
 }

@@ -26,6 +26,7 @@ typedef struct bst_polygon_clip {
     int point_count, piece_count;
     int point_capacity, piece_capacity;
     bool overflow; /* the capacity did not suffice: the result is too large */
+    double tiny;   /* corners closer than this are one */
 } bst_polygon_clip;
 
 /* Allocates the memory of a clip; later calls allocate nothing. BST_ERR_MEMORY. The caller frees it
