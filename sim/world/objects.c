@@ -7,6 +7,7 @@
 #include "sim/core/compare.h"
 #include "sim/world/external_states.h"
 #include "sim/world/orbit/constellation.h"
+#include "sim/world/scene/object_shape.h"
 #include "sim/world/world_build.h"
 
 /* An element set of a catalogue that may become an object. */
@@ -57,6 +58,67 @@ static bst_status make_brightness(const bst_world_builder *b, const bst_brightne
     return BST_OK;
 }
 
+/* Phases of the attitude that continue the one before start from where that one ends. */
+static bst_status start_attitude(const bst_world_builder *b, const world_object *object,
+                                 bst_body_attitude *attitude) {
+    int phase = 0;
+    double seconds;
+    while (bst_body_attitude_next_start(attitude, &phase, &seconds)) {
+        bst_world_state state;
+        bst_sky_rotation sky;
+        BST_TRY(bst_sky_clock_at(b->ctx, b->clock, bst_world_time(b->world, seconds), &sky));
+        BST_TRY(bst_world_orbit_state(b->ctx, &object->orbit, b->clock, b->world->epoch, seconds,
+                                      true, &state));
+        bst_vec3 sun = bst_vec3_sub(bst_bodies_sunlight_from(&sky.bodies), state.position_m);
+        bst_attitude_state body = {state.position_m, state.velocity_mps, bst_vec3_unit(sun),
+                                   seconds};
+        bst_body_attitude_start(attitude, phase, &body);
+    }
+    return BST_OK;
+}
+
+/* Builds the shape of a listed object; the world owns it. */
+static bst_status make_shape(const bst_world_builder *b, const bst_object_config *config, int index,
+                             world_object *object) {
+    bool wanted = config->brightness.model == BST_BRIGHTNESS_SHAPE;
+    bool given = bst_object_shape_is_given(&config->shape);
+    if (wanted != given) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG, "%s: /world/objects/%d/%s", b->scenario, index,
+                        wanted ? "shape: the brightness model shape needs a shape (allowed: file, "
+                                 "or materials and parts)"
+                               : "brightness/model: the object has a shape (allowed: \"shape\"; or "
+                                 "leave out the shape)");
+    }
+    if (!given) {
+        return BST_OK;
+    }
+    bst_object_shape *shape;
+    bst_status status =
+        bst_object_shape_create(b->ctx, &config->shape, &config->attitude, b->base_dir, &shape);
+    if (status != BST_OK) {
+        return bst_fail_prefix(b->ctx, status, "%s: /world/objects/%d", b->scenario, index);
+    }
+    shape->index = b->world->shape_count;
+    b->world->shapes[b->world->shape_count++] = shape;
+    object->info.shape = shape;
+    status = start_attitude(b, object, shape->attitude);
+    return status == BST_OK ? BST_OK
+                            : bst_fail_prefix(b->ctx, BST_ERR_CONFIG,
+                                              "%s: /world/objects/%d/attitude", b->scenario, index);
+}
+
+/* Refuses the brightness model shape where objects have none. */
+static bst_status refuse_shape(const bst_world_builder *b, const bst_brightness_config *config,
+                               const char *list, int index) {
+    return config->model != BST_BRIGHTNESS_SHAPE
+               ? BST_OK
+               : bst_fail(b->ctx, BST_ERR_CONFIG,
+                          "%s: /world/%s/%d/brightness/model: shape (allowed here: sphere, "
+                          "standard_magnitude, light_curve); list the object in /world/objects to "
+                          "give it a shape",
+                          b->scenario, list, index);
+}
+
 /* Builds the objects that the scenario lists. */
 static bst_status build_listed(const bst_world_builder *b, const bst_config_list *list) {
     bst_world *world = b->world;
@@ -83,6 +145,7 @@ static bst_status build_listed(const bst_world_builder *b, const bst_config_list
         if (config->external_states) {
             BST_TRY(bst_external_states_create(b->ctx, &object->orbit.external));
         }
+        BST_TRY(make_shape(b, config, i, object));
         bst_name_index_add(world->object_names, object->info.name, i);
     }
     return BST_OK;
@@ -233,6 +296,7 @@ static bst_status build_constellation(const bst_world_builder *b, int index) {
     const bst_constellation_config *config =
         (const bst_constellation_config *)b->constellations->items + index;
     const bst_brightness *brightness = NULL;
+    BST_TRY(refuse_shape(b, &config->brightness, "constellations", index));
     BST_TRY(make_brightness(b, &config->brightness, "constellations", index, &brightness));
     bst_status status = bst_constellation_check(b->ctx, config);
     int slots = (int)(config->satellites / config->planes);
@@ -254,7 +318,8 @@ static bst_status build_all(const bst_world_builder *b, const bst_world_config *
     b->world->brightness = calloc((size_t)config->objects.count + (size_t)config->catalogues.count +
                                       (size_t)config->constellations.count + 1,
                                   sizeof(bst_brightness *));
-    if (!b->world->brightness) {
+    b->world->shapes = calloc((size_t)config->objects.count + 1, sizeof(bst_object_shape *));
+    if (!b->world->brightness || !b->world->shapes) {
         return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for %d objects",
                         config->objects.count);
     }
@@ -263,6 +328,7 @@ static bst_status build_all(const bst_world_builder *b, const bst_world_config *
     const bst_catalogue_config *catalogues = config->catalogues.items;
     for (int i = 0; i < config->catalogues.count; i++) {
         const bst_brightness *made;
+        BST_TRY(refuse_shape(b, &catalogues[i].brightness, "catalogues", i));
         BST_TRY(make_brightness(b, &catalogues[i].brightness, "catalogues", i, &made));
     }
     for (int i = 0; i < b->world->object_count; i++) {

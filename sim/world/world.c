@@ -7,6 +7,7 @@
 #include "sim/optics/psf.h"
 #include "sim/world/orbit/constellation.h"
 #include "sim/world/orbit/ephemeris.h"
+#include "sim/world/scene/object_shape.h"
 #include "sim/world/scene/stray.h"
 #include "sim/world/world_build.h"
 
@@ -245,6 +246,10 @@ void bst_world_free(bst_world *world) {
         bst_brightness_free(world->brightness[i]);
     }
     free(world->brightness);
+    for (int i = 0; i < world->shape_count; i++) {
+        bst_object_shape_free(world->shapes[i]);
+    }
+    free(world->shapes);
     bst_world_files_free(world);
     bst_world_updates_free(world);
     bst_name_index_free(world->object_names);

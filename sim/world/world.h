@@ -23,6 +23,7 @@ typedef struct bst_world_object_info {
     double area_m2; /* cross-section of the sphere */
     double albedo;  /* of the sphere */
     const bst_brightness *brightness;
+    const struct bst_object_shape *shape; /* NULL: a sphere */
 } bst_world_object_info;
 
 /* Geocentric state in GCRF. */
@@ -152,6 +153,15 @@ typedef struct bst_world_sight {
  * Errors:    those of the orbits */
 bst_status bst_world_view_sight(bst_ctx *ctx, bst_world_view *view, int observer, int object,
                                 double seconds, bst_world_sight *out) BST_MUST_CHECK;
+
+/* The same from any place, a site on the Earth too.
+ *
+ * Given:     place    state of the observer at reception, geocentric GCRF
+ *            seconds  time of reception since the epoch
+ * Errors:    those of the orbits */
+bst_status bst_world_view_sight_from(bst_ctx *ctx, bst_world_view *view,
+                                     const bst_world_state *place, int object, double seconds,
+                                     bst_world_sight *out) BST_MUST_CHECK;
 
 /* V magnitude of a Lambertian sphere of cross-section area_m2 and albedo at phase angle and range:
  * V_sun - 2.5 log10(2 albedo area ((pi - phi) cos phi + sin phi) / (3 pi^2 range^2)), V_sun =

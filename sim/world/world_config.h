@@ -9,6 +9,8 @@
 #include "sim/astro/time.h"
 #include "sim/catalogue/stars.h"
 #include "sim/onboard/region.h"
+#include "sim/satellite/body_attitude.h"
+#include "sim/satellite/satellite_config.h"
 #include "sim/world/scene/brightness_config.h"
 
 enum {
@@ -90,6 +92,8 @@ typedef struct bst_object_config {
     bst_brightness_config brightness;
     bst_config_list burns; /* bst_burn_config, sorted by time */
     bool external_states;
+    bst_satellite_config shape;
+    bst_config_list attitude; /* bst_attitude_config, sorted by time */
 } bst_object_config;
 
 typedef struct bst_catalogue_config {

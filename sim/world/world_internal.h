@@ -99,6 +99,8 @@ struct bst_world {
     int object_count;
     bst_brightness **brightness; /* of listed objects, then of catalogues */
     int brightness_count;
+    struct bst_object_shape **shapes; /* of the objects that have one */
+    int shape_count;
     bst_name_index *object_names;
     bst_world_file *files;
     int file_count;

@@ -317,7 +317,7 @@ static void rates_with_an_edge(void **state) {
     for (double width = 2.0; width > 1e-3; width *= 0.4) {
         double edge[2] = {0.31, width}, mean, sum = 0;
         bst_scene_source_rate rate;
-        assert_true(bst_field_rate(step_rate, edge, &rate, &mean));
+        assert_true(bst_field_rate(step_rate, edge, 16, &rate, &mean));
         for (int i = 0; i < 100000; i++) {
             sum += step_rate(edge, (i + 0.5) / 100000) / 100000;
         }
@@ -335,10 +335,10 @@ static void rates_with_an_edge(void **state) {
     }
     double none[2] = {5, 1}, mean;
     bst_scene_source_rate rate;
-    assert_false(bst_field_rate(step_rate, none, &rate, &mean));
+    assert_false(bst_field_rate(step_rate, none, 16, &rate, &mean));
     bst_assert_close(mean, 1, 0);
     double dark[2] = {-5, 1};
-    assert_false(bst_field_rate(step_rate, dark, &rate, &mean));
+    assert_false(bst_field_rate(step_rate, dark, 16, &rate, &mean));
     bst_assert_close(mean, 0, 0);
 }
 

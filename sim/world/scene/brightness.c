@@ -80,6 +80,10 @@ void bst_brightness_free(bst_brightness *brightness) {
     }
 }
 
+const bst_brightness_config *bst_brightness_config_of(const bst_brightness *brightness) {
+    return &brightness->config;
+}
+
 /* Two unit vectors perpendicular to a unit vector and to each other. */
 static void frame_about(bst_vec3 axis, bst_vec3 *e1, bst_vec3 *e2) {
     bst_vec3 helper = fabs(axis.z) < 0.9 ? (bst_vec3){0, 0, 1} : (bst_vec3){1, 0, 0};

@@ -14,6 +14,8 @@ typedef struct bst_brightness bst_brightness;
  * names the key below `brightness`. */
 bst_status bst_brightness_create(bst_ctx *ctx, const bst_brightness_config *config,
                                  const char *base_dir, bst_brightness **out) BST_MUST_CHECK;
+/* Configuration of a brightness model; it belongs to the model. */
+const bst_brightness_config *bst_brightness_config_of(const bst_brightness *brightness);
 /* Frees a brightness model; NULL is allowed. */
 void bst_brightness_free(bst_brightness *brightness);
 
@@ -43,8 +45,8 @@ typedef struct bst_scene_glow {
     bool resolved;             /* may be rendered as a disc */
 } bst_scene_glow;
 
-/* Computes the light of an object. `brightness` NULL: a diffuse sphere without emission, rendered
- * as a point. */
+/* Computes the light of an object without a shape (see object_shape.h). `brightness` NULL: a
+ * diffuse sphere without emission, rendered as a point. */
 void bst_brightness_at(const bst_brightness *brightness, const bst_scene_lighting *lighting,
                        bst_scene_glow *out);
 

@@ -1,11 +1,11 @@
 #include "sim/world/scene/brightness_config.h"
 
-static const char *const models[] = {"sphere", "standard_magnitude", "light_curve", NULL};
+static const char *const models[] = {"sphere", "standard_magnitude", "light_curve", "shape", NULL};
 
 const bst_config_desc bst_brightness_config_table[] = {
     BST_ENUM(bst_brightness_config, model, models, "\"sphere\"",
              "Where reflected light comes from: a sphere of area_m2 and albedo, a standard "
-             "magnitude, or a table."),
+             "magnitude, a table, or the object's shape (for listed objects)."),
     BST_REAL(bst_brightness_config, specular_fraction, "", 0, 1, "0",
              "Part of the reflected light that comes as from a mirror ball, the same at all phase "
              "angles; the rest is diffuse (Lambertian)."),

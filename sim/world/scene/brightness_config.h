@@ -5,7 +5,12 @@
 
 #include "boresight/config.h"
 
-enum { BST_BRIGHTNESS_SPHERE, BST_BRIGHTNESS_STANDARD, BST_BRIGHTNESS_LIGHT_CURVE };
+enum {
+    BST_BRIGHTNESS_SPHERE,
+    BST_BRIGHTNESS_STANDARD,
+    BST_BRIGHTNESS_LIGHT_CURVE,
+    BST_BRIGHTNESS_SHAPE
+};
 
 typedef struct bst_brightness_config {
     int32_t model;            /* BST_BRIGHTNESS_... */

@@ -1,7 +1,10 @@
 /* Objects of a field query: paths, brightness and shape during the exposure. */
 #include "sim/world/scene/field_objects.h"
 
+#include <assert.h>
+
 #include "sim/optics/psf.h"
+#include "sim/world/scene/object_shape.h"
 
 /* instants of the exposure at which an object's light is sampled */
 enum { TIMES = 16 };
@@ -41,22 +44,22 @@ static bool path_touches(const bst_scene_object_query *q, const bst_scene_source
     return false;
 }
 
-bool bst_field_rate(double (*at)(void *user, double u), void *user, bst_scene_source_rate *out,
-                    double *mean) {
-    enum { FIRST = 16 };
+bool bst_field_rate(double (*at)(void *user, double u), void *user, int first,
+                    bst_scene_source_rate *out, double *mean) {
     double middle[BST_RATE_KNOTS], low = INFINITY, high = 0.0;
-    out->count = FIRST + 1;
-    for (int k = 0; k <= FIRST; k++) {
-        out->u[k] = (double)k / FIRST;
+    assert(first >= 2 && first <= 64 && first % 2 == 0);
+    out->count = first + 1;
+    for (int k = 0; k <= first; k++) {
+        out->u[k] = (double)k / first;
         out->rate[k] = at(user, out->u[k]);
         low = fmin(low, out->rate[k]);
         high = fmax(high, out->rate[k]);
     }
-    *mean = out->rate[FIRST / 2];
+    *mean = out->rate[first / 2];
     if (!(high - low > 1e-3 * high)) {
         return false;
     }
-    for (int k = 0; k < FIRST; k++) {
+    for (int k = 0; k < first; k++) {
         middle[k] = at(user, 0.5 * (out->u[k] + out->u[k + 1]));
     }
     while (out->count < BST_RATE_KNOTS) {
@@ -97,6 +100,17 @@ bool bst_field_rate(double (*at)(void *user, double u), void *user, bst_scene_so
         out->light[k] /= *mean;
     }
     return true;
+}
+
+/* Intervals with which the sampling of an object's light begins. */
+static int first_intervals(const bst_scene_object_query *q, int object) {
+    const bst_object_shape *shape = bst_scene_view_object(q->view, object)->shape;
+    if (!shape) {
+        return 16;
+    }
+    double middle_s = 0.5 * (q->span.start_s + q->span.end_s);
+    int samples = bst_object_shape_samples(shape, middle_s, q->span.end_s - q->span.start_s);
+    return samples + samples % 2;
 }
 
 /* Context of an object's brightness during an exposure, for bst_field_rate. */
@@ -218,7 +232,8 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *q, int o
     }
     course c = {q, object, &parts->path, &light};
     if (!mid.occulted && q->span.end_s > q->span.start_s &&
-        bst_field_rate(course_at, &c, &parts->rate, &out->electrons_per_s)) {
+        bst_field_rate(course_at, &c, first_intervals(q, object), &parts->rate,
+                       &out->electrons_per_s)) {
         out->rate = &parts->rate;
     } else {
         out->electrons_per_s =

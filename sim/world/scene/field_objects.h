@@ -49,9 +49,10 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *query, i
                             bool *there) BST_MUST_CHECK;
 
 /* Samples the brightness `at(user, u)` so that linear interpolation is accurate to 1e-5 of the
- * maximum, if the knots suffice. *mean: mean over the exposure. False: the change is below 1e-3 or
- * the brightness is 0; *mean is then the value at the middle. */
-bool bst_field_rate(double (*at)(void *user, double u), void *user, bst_scene_source_rate *out,
-                    double *mean);
+ * maximum, if the knots suffice; it begins with `first` equal intervals, an even number of at most
+ * 64. *mean: mean over the exposure. False: the change is below 1e-3 or the brightness is 0; *mean
+ * is then the value at the middle. */
+bool bst_field_rate(double (*at)(void *user, double u), void *user, int first,
+                    bst_scene_source_rate *out, double *mean);
 
 #endif

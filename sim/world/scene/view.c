@@ -5,6 +5,7 @@
 #include "sim/core/quintic.h"
 #include "sim/world/orbit/ephemeris.h"
 #include "sim/world/scene/field_objects.h"
+#include "sim/world/scene/object_shape.h"
 
 /* State of an observer at one instant, shared by all objects in a frame. */
 typedef struct eye {
@@ -33,7 +34,8 @@ struct bst_world_view {
     const bst_world *world;
     bst_sky_clock *clock;
     pace pace;
-    eye eyes[BST_PATH_NODES]; /* the latest ones, by node of the exposure */
+    eye eyes[BST_PATH_NODES];   /* the latest ones, by node of the exposure */
+    bst_satellite_pose **poses; /* by shape of the world: work memory */
 };
 
 /* Source of positions in a light-time solution; observer and object use the same one. */
@@ -45,6 +47,19 @@ typedef struct looked_at {
     from source;
 } looked_at;
 
+/* Allocates the work memory for the shapes of the world. */
+static bst_status make_poses(bst_ctx *ctx, bst_world_view *view) {
+    const bst_world *world = view->world;
+    view->poses = calloc((size_t)world->shape_count, sizeof(bst_satellite_pose *));
+    if (!view->poses) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a view of the world");
+    }
+    for (int i = 0; i < world->shape_count; i++) {
+        BST_TRY(bst_satellite_pose_create(ctx, world->shapes[i]->satellite, &view->poses[i]));
+    }
+    return BST_OK;
+}
+
 bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world_view **out) {
     *out = NULL;
     bst_world_view *view = calloc(1, sizeof *view);
@@ -53,8 +68,11 @@ bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world
     }
     view->world = world;
     bst_status status = bst_sky_clock_create_on(ctx, world->sky_grid, &view->clock);
+    if (status == BST_OK && world->shape_count > 0) {
+        status = make_poses(ctx, view);
+    }
     if (status != BST_OK) {
-        free(view);
+        bst_world_view_free(view);
         return status;
     }
     *out = view;
@@ -63,6 +81,10 @@ bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world
 
 void bst_world_view_free(bst_world_view *view) {
     if (view) {
+        for (int i = 0; view->poses && i < view->world->shape_count; i++) {
+            bst_satellite_pose_free(view->poses[i]);
+        }
+        free(view->poses);
         bst_sky_clock_free(view->clock);
         free(view);
     }
@@ -244,9 +266,19 @@ static bst_status look(bst_ctx *ctx, bst_world_view *view, const eye *e, looked_
     return BST_OK;
 }
 
-/* Brightness of an object with emission at `emitted_m`, seen from `eye_m`. */
-static void shine_at(const bst_world *world, int object, bst_vec3 emitted_m, bst_vec3 eye_m,
-                     const bst_bodies *bodies, double seconds, bst_world_sight *out) {
+/* An object at the emission of its light. */
+typedef struct emission {
+    int object;
+    bst_vec3 position_m, velocity_mps; /* the velocity matters for shapes only */
+    double seconds;
+} emission;
+
+/* Brightness of an object, seen from `eye_m`. */
+static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 eye_m,
+                     const bst_bodies *bodies, bst_world_sight *out) {
+    const bst_world *world = view->world;
+    int object = at->object;
+    bst_vec3 emitted_m = at->position_m;
     const bst_world_object_info *info = &world->objects[object].info;
     bst_vec3 to_eye = bst_vec3_sub(eye_m, emitted_m);
     bst_vec3 to_sun = bst_vec3_sub(bodies->sun_m, emitted_m);
@@ -260,19 +292,25 @@ static void shine_at(const bst_world *world, int object, bst_vec3 emitted_m, bst
                                    .object_m = emitted_m,
                                    .eye_m = eye_m,
                                    .sun_m = bodies->sun_m,
-                                   .seconds = seconds,
+                                   .seconds = at->seconds,
                                    .sunlit_fraction = sunlight.disc,
                                    .sunlight = &sunlight};
-    bst_brightness_at(info->brightness, &lighting, &out->glow);
+    if (info->shape) {
+        bst_object_shape_glow(info->shape, view->poses[info->shape->index],
+                              bst_brightness_config_of(info->brightness), &lighting,
+                              at->velocity_mps, &out->glow);
+    } else {
+        bst_brightness_at(info->brightness, &lighting, &out->glow);
+    }
     out->v_mag = out->glow.v_mag;
 }
 
 /* Brightness of an object in a sight, and occultation by the Earth. */
-static void shine(const bst_world_view *view, const eye *e, int object, bst_vec3 emitted_m,
-                  bst_world_sight *out) {
-    shine_at(view->world, object, emitted_m, e->state.position_m, &e->sky.bodies,
-             e->seconds - out->light_time_s, out);
-    out->occulted = bst_astro_earth_occults(e->state.position_m, emitted_m, e->sky.bodies.pole);
+static void shine(const bst_world_view *view, const eye *e, emission *at, bst_world_sight *out) {
+    at->seconds = e->seconds - out->light_time_s;
+    shine_at(view, at, e->state.position_m, &e->sky.bodies, out);
+    out->occulted =
+        bst_astro_earth_occults(e->state.position_m, at->position_m, e->sky.bodies.pole);
 }
 
 /* True if object and observer are too near for the interpolated ephemeris. */
@@ -293,7 +331,19 @@ bst_status bst_world_view_sight(bst_ctx *ctx, bst_world_view *view, int observer
         BST_TRY(position_of(ctx, view, object, seconds, source, &now, &velocity));
     }
     BST_TRY(look(ctx, view, &e, (looked_at){object, source}, now, &emitted, out));
-    shine(view, &e, object, emitted, out);
+    shine(view, &e, &(emission){object, emitted, velocity, 0.0}, out);
+    return BST_OK;
+}
+
+bst_status bst_world_view_sight_from(bst_ctx *ctx, bst_world_view *view,
+                                     const bst_world_state *place, int object, double seconds,
+                                     bst_world_sight *out) {
+    eye e = {.observer = -1, .seconds = seconds, .state = *place};
+    bst_vec3 now, velocity, emitted;
+    BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_world_time(view->world, seconds), &e.sky));
+    BST_TRY(position_of(ctx, view, object, seconds, FROM_ORBIT, &now, &velocity));
+    BST_TRY(look(ctx, view, &e, (looked_at){object, FROM_ORBIT}, now, &emitted, out));
+    shine(view, &e, &(emission){object, emitted, velocity, 0.0}, out);
     return BST_OK;
 }
 
@@ -320,7 +370,7 @@ static bst_status path_from(bst_ctx *ctx, bst_world_view *view,
         bst_vec3 apparent = bst_vec3_scale(sight.apparent, bst_vec3_dot(sight.apparent, about));
         path->shift[i / 2] = bst_vec3_sub(apparent, unit);
         if (i == BST_PATH_NODES / 2) {
-            shine(view, e, b.object, emitted, &sight);
+            shine(view, e, &(emission){b.object, emitted, velocity, 0.0}, &sight);
             *mid = sight;
             light->lag_m = bst_vec3_sub(emitted, now);
             light->earth_bary_mps = e->sky.bodies.earth_bary_mps;
@@ -376,7 +426,16 @@ void bst_scene_view_light(const bst_world_view *view, const bst_world_view_span 
     bst_bodies bodies = {.sun_m = quartic(light->sun_m, u),
                          .earth_bary_mps = light->earth_bary_mps,
                          .pole = light->pole};
-    shine_at(view->world, object, emitted_m, eye_m, &bodies, seconds, out);
+    emission at = {object, emitted_m, {0, 0, 0}, seconds};
+    double duration_s = span->end_s - span->start_s;
+    if (view->world->objects[object].info.shape && duration_s > 0.0) {
+        const double h =
+            1e-2; /* the difference of a quartic: exact to h^2 of the third derivative */
+        bst_vec3 after = bst_vec3_add(quartic(light->eye_m, u + h), quartic(path->place, u + h));
+        bst_vec3 before = bst_vec3_add(quartic(light->eye_m, u - h), quartic(path->place, u - h));
+        at.velocity_mps = bst_vec3_scale(bst_vec3_sub(after, before), 1.0 / (2.0 * h * duration_s));
+    }
+    shine_at(view, &at, eye_m, &bodies, out);
 }
 
 bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, const bst_world_view_span *span,

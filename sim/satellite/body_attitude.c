@@ -1,0 +1,314 @@
+#include "sim/satellite/body_attitude.h"
+
+#include <assert.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/core/file.h"
+#include "sim/satellite/tumbling.h"
+
+enum { TABLE_ROWS_MAX = 1000000 };
+#define TABLE_BYTES_MAX ((uint64_t)256 << 20)
+
+static const char *const laws[] = {"nadir", "nadir_sun", "velocity", "sun", "inertial",
+                                   "spin",  "tumble",    "table",    NULL};
+
+const bst_config_desc bst_attitude_config_table[] = {
+    BST_REAL(bst_attitude_config, from_s, "s", -1e9, 1e9, "-1e9",
+             "Start of the phase after the epoch; it lasts until the next one."),
+    BST_ENUM(
+        bst_attitude_config, law, laws, "\"nadir\"",
+        "nadir: z to the Earth's centre, x forward; nadir_sun: z to the Earth's centre, the "
+        "Sun on the side of +x; velocity: x forward; sun: z to the Sun; inertial: fixed; spin: "
+        "constant rate; tumble: free rotation of a rigid body; table: from a file."),
+    BST_REALS(bst_attitude_config, rotation_deg, "deg", -360, 360, "[0, 0, 0]",
+              "nadir, nadir_sun, velocity, sun: rotation of the body from there about its x, then "
+              "y, then z axis."),
+    BST_REALS(bst_attitude_config, quaternion, "", -1, 1, "[0, 0, 0, 0]",
+              "inertial, spin, tumble: attitude at from_s, [x, y, z, w] from GCRF to the body; all "
+              "zero: as at the end of the phase before, for the first phase the axes of GCRF."),
+    BST_REALS(bst_attitude_config, rate_body_deg_per_s, "deg/s", -36000, 36000, "[0, 0, 0]",
+              "spin, tumble: angular velocity at from_s in the body frame."),
+    BST_REALS(bst_attitude_config, inertia_kg_m2, "kg m2", 0, 1e12, "[1, 1, 1]",
+              "tumble: principal moments of inertia about the body's axes."),
+    BST_PATH(bst_attitude_config, file, "\"\"",
+             "table: CSV file with columns time_s, qx, qy, qz, qw (from GCRF to the body), "
+             "relative to the scenario's folder; interpolated along great circles."),
+    BST_CONFIG_END,
+};
+
+/* An attitude at a time. */
+typedef struct row {
+    double seconds;
+    bst_quat q;
+} row;
+
+typedef struct phase {
+    bst_attitude_config config;
+    bst_quat offset; /* body from the law's axes */
+    bst_quat start;
+    bool continues; /* start is not yet known */
+    bst_tumbling *tumbling;
+    row *rows;
+    int row_count;
+} phase;
+
+struct bst_body_attitude {
+    phase *phases;
+    int count;
+};
+
+void bst_body_attitude_free(bst_body_attitude *a) {
+    for (int i = 0; a && i < a->count; i++) {
+        bst_tumbling_free(a->phases[i].tumbling);
+        free(a->phases[i].rows);
+    }
+    if (a) {
+        free(a->phases);
+        free(a);
+    }
+}
+
+/* Body axes from those of the law: the body turns about its own x, then y, then z. */
+static bst_quat offset_of(const double deg[3]) {
+    bst_quat q = BST_QUAT_IDENTITY;
+    q = bst_quat_turn_frame(q, (bst_vec3){deg[0] * BST_DEG_RAD, 0, 0});
+    q = bst_quat_turn_frame(q, (bst_vec3){0, deg[1] * BST_DEG_RAD, 0});
+    return bst_quat_turn_frame(q, (bst_vec3){0, 0, deg[2] * BST_DEG_RAD});
+}
+
+/* Reads the rows of a table of attitudes. */
+static bst_status read_rows(bst_ctx *ctx, const char *path, char *text, phase *p) {
+    int line = 0, capacity = 0;
+    for (char *at = text, *next; at; at = next) {
+        next = strchr(at, '\n');
+        if (next) {
+            *next++ = '\0';
+        }
+        line++;
+        double v[5];
+        at += strspn(at, " \t\r");
+        if (!*at || *at == '#' || strncmp(at, "time_s", 6) == 0) {
+            continue;
+        }
+        int used = 0;
+        bool good = sscanf(at, "%lf ,%lf ,%lf ,%lf ,%lf %n", &v[0], &v[1], &v[2], &v[3], &v[4],
+                           &used) == 5 &&
+                    at[used] == '\0';
+        double norm = good ? sqrt(v[1] * v[1] + v[2] * v[2] + v[3] * v[3] + v[4] * v[4]) : 0.0;
+        if (!good || !(fabs(norm - 1.0) < 1e-3) || !(fabs(v[0]) <= 1e9) ||
+            (p->row_count > 0 && !(v[0] > p->rows[p->row_count - 1].seconds))) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "file: %.400s: line %d: \"%.60s\" (allowed: time_s, qx, qy, qz, qw: "
+                            "ascending times and unit quaternions)",
+                            path, line, at);
+        }
+        if (p->row_count == capacity) {
+            capacity = capacity ? 2 * capacity : 256;
+            row *rows = p->row_count < TABLE_ROWS_MAX
+                            ? realloc(p->rows, (size_t)capacity * sizeof *rows)
+                            : NULL;
+            if (!rows) {
+                return bst_fail(ctx, BST_ERR_MEMORY, "file: %.400s: no memory for %d rows", path,
+                                capacity);
+            }
+            p->rows = rows;
+        }
+        p->rows[p->row_count++] = (row){v[0], bst_quat_unit((bst_quat){v[1], v[2], v[3], v[4]})};
+    }
+    return p->row_count > 0 ? BST_OK
+                            : bst_fail(ctx, BST_ERR_CONFIG, "file: %.400s: no attitudes", path);
+}
+
+static bst_status load_rows(bst_ctx *ctx, const char *base_dir, phase *p) {
+    char path[1100], *text;
+    size_t bytes;
+    const char *file = p->config.file;
+    if (!*file) {
+        return bst_fail(ctx, BST_ERR_CONFIG, "file: the law table needs a file; give its path");
+    }
+    bool relative = *file != '/' && *base_dir;
+    snprintf(path, sizeof path, "%s%s%s", relative ? base_dir : "", relative ? "/" : "", file);
+    if (bst_file_read(ctx, path, TABLE_BYTES_MAX, "a table of attitudes", &text, &bytes) !=
+        BST_OK) {
+        return bst_fail_prefix(ctx, BST_ERR_CONFIG, "file");
+    }
+    bst_status status = bst_file_check_text(ctx, path, text, bytes);
+    status = status == BST_OK ? read_rows(ctx, path, text, p)
+                              : bst_fail_prefix(ctx, BST_ERR_CONFIG, "file");
+    free(text);
+    return status;
+}
+
+static bst_status make_phase(bst_ctx *ctx, const bst_attitude_config *config, bool first,
+                             const char *base_dir, phase *p) {
+    const double *q = config->quaternion;
+    double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    p->config = *config;
+    p->offset = offset_of(config->rotation_deg);
+    p->start = bst_quat_unit((bst_quat){q[0], q[1], q[2], q[3]});
+    if (norm > 0.0 && fabs(norm - 1.0) > 1e-3) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "quaternion: its length is %g (allowed: 1, or all zero)", norm);
+    }
+    bool moves = config->law == BST_ATTITUDE_INERTIAL || config->law == BST_ATTITUDE_SPIN ||
+                 config->law == BST_ATTITUDE_TUMBLE;
+    p->continues = moves && !(norm > 0.0) && !first;
+    if (config->law == BST_ATTITUDE_TABLE) {
+        return load_rows(ctx, base_dir, p);
+    }
+    if (config->law == BST_ATTITUDE_TUMBLE) {
+        bst_vec3 rate =
+            bst_vec3_scale(bst_vec3_from_array(config->rate_body_deg_per_s), BST_DEG_RAD);
+        return bst_tumbling_create(ctx, config->inertia_kg_m2, rate, &p->tumbling);
+    }
+    return BST_OK;
+}
+
+bst_status bst_body_attitude_create(bst_ctx *ctx, const bst_config_list *phases,
+                                    const char *base_dir, bst_body_attitude **out) {
+    static const bst_attitude_config nadir = {.from_s = -1e9, .law = BST_ATTITUDE_NADIR};
+    const bst_attitude_config *configs = phases->count ? phases->items : &nadir;
+    int count = phases->count ? phases->count : 1;
+    *out = NULL;
+    bst_body_attitude *a = calloc(1, sizeof *a);
+    phase *list = a ? calloc((size_t)count, sizeof *list) : NULL;
+    if (!list) {
+        free(a);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an attitude");
+    }
+    a->phases = list;
+    bst_status status = BST_OK;
+    for (int i = 0; i < count && status == BST_OK; i++) {
+        a->count = i + 1;
+        if (i > 0 && !(configs[i].from_s > configs[i - 1].from_s)) {
+            status = bst_fail(ctx, BST_ERR_CONFIG,
+                              "from_s: found %g after %g (allowed: ascending times)",
+                              configs[i].from_s, configs[i - 1].from_s);
+        } else {
+            status = make_phase(ctx, &configs[i], i == 0, base_dir, &list[i]);
+        }
+        if (status != BST_OK) {
+            status = bst_fail_prefix(ctx, status, "%d", i);
+        }
+    }
+    if (status != BST_OK) {
+        bst_body_attitude_free(a);
+        return status;
+    }
+    *out = a;
+    return BST_OK;
+}
+
+/* Axes from two directions: q from the reference to a frame whose axis `main` (0: x, 2: z) points
+ * along a, and whose other one of x and z is as close to b as possible. */
+static bst_quat frame_of(bst_vec3 a, bst_vec3 b, int main) {
+    bst_vec3 z = bst_vec3_unit(main == 2 ? a : bst_vec3_axpy(b, -bst_vec3_dot(a, b), a));
+    bst_vec3 x = main == 2 ? bst_vec3_axpy(b, -bst_vec3_dot(a, b), a) : a;
+    x = bst_vec3_norm(x) > 1e-9 ? bst_vec3_unit(x) : bst_vec3_perpendicular(z);
+    z = main == 2 || bst_vec3_norm(z) > 0.5 ? z : bst_vec3_perpendicular(x);
+    bst_vec3 y = bst_vec3_cross(z, x);
+    bst_mat3 m = {{{x.x, x.y, x.z}, {y.x, y.y, y.z}, {z.x, z.y, z.z}}};
+    return bst_quat_from_mat3(&m);
+}
+
+static bst_quat from_table(const phase *p, double seconds) {
+    int low = 0, high = p->row_count - 1;
+    if (seconds <= p->rows[low].seconds || high == 0) {
+        return p->rows[low].q;
+    }
+    if (seconds >= p->rows[high].seconds) {
+        return p->rows[high].q;
+    }
+    while (high - low > 1) {
+        int middle = (low + high) / 2;
+        *(p->rows[middle].seconds <= seconds ? &low : &high) = middle;
+    }
+    const row *a = &p->rows[low], *b = &p->rows[high];
+    return bst_quat_slerp(a->q, b->q, (seconds - a->seconds) / (b->seconds - a->seconds));
+}
+
+static bst_quat phase_at(const phase *p, const bst_attitude_state *s) {
+    bst_vec3 down = bst_vec3_scale(bst_vec3_unit(s->position_m), -1.0), speed = s->velocity_mps;
+    bst_vec3 ahead = bst_vec3_unit(speed);
+    double since = s->seconds - p->config.from_s;
+    bst_vec3 rate = bst_vec3_scale(bst_vec3_from_array(p->config.rate_body_deg_per_s), BST_DEG_RAD);
+    bst_quat law;
+    switch (p->config.law) {
+        case BST_ATTITUDE_SPIN:
+            return bst_quat_turn_frame(p->start, bst_vec3_scale(rate, since));
+        case BST_ATTITUDE_TUMBLE:
+            return bst_quat_mul(bst_tumbling_at(p->tumbling, since, NULL), p->start);
+        case BST_ATTITUDE_INERTIAL:
+            return p->start;
+        case BST_ATTITUDE_TABLE:
+            return from_table(p, s->seconds);
+        case BST_ATTITUDE_NADIR_SUN:
+            law = frame_of(down, s->sun, 2);
+            break;
+        case BST_ATTITUDE_VELOCITY:
+            law = frame_of(ahead, down, 0);
+            break;
+        case BST_ATTITUDE_SUN:
+            law = frame_of(s->sun, (bst_vec3){0, 0, 1}, 2);
+            break;
+        default:
+            law = frame_of(down, ahead, 2);
+            break;
+    }
+    return bst_quat_mul(p->offset, law);
+}
+
+static const phase *phase_for(const bst_body_attitude *a, double seconds) {
+    int i = a->count - 1;
+    while (i > 0 && seconds < a->phases[i].config.from_s) {
+        i--;
+    }
+    return &a->phases[i];
+}
+
+bool bst_body_attitude_next_start(const bst_body_attitude *a, int *index, double *seconds) {
+    for (int i = *index; i < a->count; i++) {
+        if (a->phases[i].continues) {
+            *index = i;
+            *seconds = a->phases[i].config.from_s;
+            return true;
+        }
+    }
+    return false;
+}
+
+void bst_body_attitude_start(bst_body_attitude *a, int index, const bst_attitude_state *state) {
+    assert(index > 0 && index < a->count);
+    a->phases[index].start = phase_at(&a->phases[index - 1], state);
+    a->phases[index].continues = false;
+}
+
+bst_quat bst_body_attitude_at(const bst_body_attitude *a, const bst_attitude_state *state) {
+    return bst_quat_unit(phase_at(phase_for(a, state->seconds), state));
+}
+
+double bst_body_attitude_rate_radps(const bst_body_attitude *a, double seconds) {
+    const phase *p = phase_for(a, seconds);
+    if (p->config.law == BST_ATTITUDE_TABLE) {
+        double most = 0.0;
+        for (int i = 1; i < p->row_count; i++) {
+            const row *x = &p->rows[i - 1], *y = &p->rows[i];
+            if (y->seconds < seconds - 60.0 || x->seconds > seconds + 60.0) {
+                continue;
+            }
+            double dot =
+                fabs(x->q.x * y->q.x + x->q.y * y->q.y + x->q.z * y->q.z + x->q.w * y->q.w);
+            most = fmax(most, 2.0 * acos(fmin(dot, 1.0)) / (y->seconds - x->seconds));
+        }
+        return most;
+    }
+    bool turns = p->config.law == BST_ATTITUDE_SPIN || p->config.law == BST_ATTITUDE_TUMBLE;
+    double rate = bst_vec3_norm(bst_vec3_from_array(p->config.rate_body_deg_per_s)) * BST_DEG_RAD;
+    if (p->config.law == BST_ATTITUDE_TUMBLE) { /* energy bounds the rate about the smallest axis */
+        const double *i = p->config.inertia_kg_m2;
+        rate *= sqrt(fmax(fmax(i[0], i[1]), i[2]) / fmin(fmin(i[0], i[1]), i[2]));
+    }
+    return turns ? rate : 0.0;
+}

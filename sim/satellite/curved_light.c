@@ -1,0 +1,140 @@
+#include "sim/satellite/curved_light.h"
+
+#include <stdlib.h>
+
+/* Eight-point Gauss-Legendre on [-1, 1] (Abramowitz and Stegun, table 25.4). */
+enum { GAUSS = 8 };
+static const double place[GAUSS] = {-0.9602898564975363, -0.7966664774136267, -0.5255324099163290,
+                                    -0.1834346424956498, 0.1834346424956498,  0.5255324099163290,
+                                    0.7966664774136267,  0.9602898564975363};
+static const double weight[GAUSS] = {0.1012285362903763, 0.2223810344533745, 0.3137066458778873,
+                                     0.3626837833783620, 0.3626837833783620, 0.3137066458778873,
+                                     0.2223810344533745, 0.1012285362903763};
+
+enum { BREAKS_MAX = 16 };
+
+/* Borders of the panels of an integral. */
+typedef struct breaks {
+    double at[BREAKS_MAX];
+    int count;
+} breaks;
+
+static int compare(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Adds a border within (low, high). */
+static void add(breaks *b, double x, double low, double high) {
+    if (x > low && x < high) {
+        b->at[b->count++] = x;
+    }
+}
+
+/* Panels for [low, high] with finer ones about the centre of a lobe. */
+static breaks panels(double low, double high, double centre, double lobe_rad) {
+    static const double steps[] = {1.5, 5.0, 18.0};
+    breaks b = {{low, high}, 2};
+    if (lobe_rad < 1.0) {
+        for (int i = 0; i < 3; i++) {
+            add(&b, centre - steps[i] * lobe_rad, low, high);
+            add(&b, centre + steps[i] * lobe_rad, low, high);
+        }
+    } else {
+        add(&b, 0.5 * (low + high), low, high);
+    }
+    qsort(b.at, (size_t)b.count, sizeof b.at[0], compare);
+    return b;
+}
+
+static double sphere_light(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun,
+                           bst_vec3 observer) {
+    double phase = bst_vec3_angle(sun, observer), cosine = cos(phase), sum = 0.0;
+    double lobe = bst_brdf_lobe_rad(brdf);
+    if (brdf->model == BST_BRDF_LAMBERT) {
+        return 2.0 / 3.0 * c->radius_m * c->radius_m * brdf->diffuse / BST_PI *
+               (sin(phase) + (BST_PI - phase) * cosine);
+    }
+    /* longitude in the plane of both directions, from the observer; latitude from that plane */
+    breaks longitude = panels(phase - 0.5 * BST_PI, 0.5 * BST_PI, 0.5 * phase, lobe);
+    breaks latitude = panels(0.0, 0.5 * BST_PI, 0.0, lobe);
+    for (int p = 0; p + 1 < longitude.count; p++) {
+        double half = 0.5 * (longitude.at[p + 1] - longitude.at[p]);
+        for (int i = 0; i < GAUSS; i++) {
+            double l = longitude.at[p] + half * (1.0 + place[i]);
+            double in = cos(l - phase), out = cos(l), inner = 0.0;
+            for (int q = 0; q + 1 < latitude.count; q++) {
+                double step = 0.5 * (latitude.at[q + 1] - latitude.at[q]);
+                for (int k = 0; k < GAUSS; k++) {
+                    double cb = cos(latitude.at[q] + step * (1.0 + place[k]));
+                    inner += step * weight[k] * cb * cb * cb *
+                             bst_brdf_value(brdf, in * cb, out * cb, cosine);
+                }
+            }
+            sum += half * weight[i] * in * out * inner;
+        }
+    }
+    return 2.0 * c->radius_m * c->radius_m * sum; /* both hemispheres of latitude */
+}
+
+/* Cosine of the angle to a normal as a function of azimuth: level + height cos(azimuth - peak). */
+typedef struct wave {
+    double level, height, peak;
+} wave;
+
+static wave wave_of(const bst_curved *c, bst_vec3 d, double radial, double axial) {
+    double x = bst_vec3_dot(d, c->x), y = bst_vec3_dot(d, c->y);
+    return (wave){axial * bst_vec3_dot(d, c->z), radial * hypot(x, y),
+                  atan2(radial * y, radial * x)};
+}
+
+static double wave_at(wave w, double azimuth) {
+    return w.level + fabs(w.height) * cos(azimuth - w.peak);
+}
+
+/* Adds the zeros of a wave, in [from, from + 2 pi). */
+static void add_zeros(breaks *b, wave w, double from) {
+    double k = -w.level / fabs(w.height);
+    if (fabs(k) < 1.0) {
+        for (int side = -1; side <= 1; side += 2) {
+            double x = w.peak + side * acos(k);
+            x -= 2.0 * BST_PI * floor((x - from) / (2.0 * BST_PI));
+            add(b, x, from, from + 2.0 * BST_PI);
+        }
+    }
+}
+
+static double cone_light(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun,
+                         bst_vec3 observer) {
+    double rise = c->top_radius_m - c->radius_m, slant = hypot(rise, c->length_m), sum = 0.0;
+    double radial = c->side * c->length_m / slant, axial = -c->side * rise / slant;
+    double cosine = bst_vec3_dot(sun, observer), lobe = bst_brdf_lobe_rad(brdf);
+    wave in = wave_of(c, sun, radial, axial), out = wave_of(c, observer, radial, axial);
+    wave half = wave_of(c, bst_vec3_add(sun, observer), radial, axial);
+    double from = half.peak - BST_PI;
+    breaks b = panels(from, from + 2.0 * BST_PI, half.peak, lobe);
+    add_zeros(&b, in, from);
+    add_zeros(&b, out, from);
+    qsort(b.at, (size_t)b.count, sizeof b.at[0], compare);
+    for (int p = 0; p + 1 < b.count; p++) {
+        double step = 0.5 * (b.at[p + 1] - b.at[p]), middle = b.at[p] + step;
+        if (!(wave_at(in, middle) > 0.0 && wave_at(out, middle) > 0.0)) {
+            continue;
+        }
+        for (int i = 0; i < GAUSS; i++) {
+            double a = b.at[p] + step * (1.0 + place[i]);
+            double mu_in = wave_at(in, a), mu_out = wave_at(out, a);
+            if (mu_in > 0.0 && mu_out > 0.0) {
+                sum += step * weight[i] * mu_in * mu_out *
+                       bst_brdf_value(brdf, fmin(mu_in, 1.0), fmin(mu_out, 1.0), cosine);
+            }
+        }
+    }
+    return 0.5 * slant * (c->radius_m + c->top_radius_m) * sum;
+}
+
+double bst_curved_light(const bst_curved *curved, const bst_brdf *brdf, bst_vec3 sun,
+                        bst_vec3 observer) {
+    return curved->sphere ? sphere_light(curved, brdf, sun, observer)
+                          : cone_light(curved, brdf, sun, observer);
+}

@@ -1,0 +1,283 @@
+#include "sim/satellite/flux.h"
+
+#include <assert.h>
+#include <string.h>
+
+#include "sim/satellite/curved_light.h"
+
+enum { SUN_NODES_MAX = 49, CURVED_MAX = 512 };
+
+/* Directions that stand for the Sun's disc. */
+typedef struct sun_disc {
+    bst_vec3 direction[SUN_NODES_MAX];
+    double weight[SUN_NODES_MAX];
+    int count;
+    bst_vec3 centre;
+    double radius_rad;
+} sun_disc;
+
+/* Radius of the Sun over the width of a lobe above which the disc matters: 1e-3 of the flux. */
+static const double SHARP = 0.05;
+
+/* Nodes for a lobe: limb darkening 1 - 0.6 (1 - mu) (Cox, Allen's Astrophysical Quantities, 4th
+ * edition, section 14.7) has the mean square radius 0.45. */
+static void make_sun(const bst_satellite_light *light, double lobe_rad, sun_disc *out) {
+    double r = light->sun_radius_rad;
+    bst_vec3 e1 = bst_vec3_perpendicular(light->sun), e2 = bst_vec3_cross(light->sun, e1);
+    out->centre = light->sun;
+    out->radius_rad = r;
+    out->count = 1;
+    out->direction[0] = light->sun;
+    out->weight[0] = 1.0;
+    if (!(r > SHARP * lobe_rad)) {
+        return;
+    }
+    /* one ring with the second moment of the disc, or four rings */
+    static const double ring_one[] = {0.7745966692414834}, weight_one[] = {0.75};
+    static const double ring_four[] = {0.35, 0.61, 0.79, 0.94};
+    bool fine = r > 0.3 * lobe_rad;
+    int rings = fine ? 4 : 1, around = fine ? 12 : 6;
+    double weights[4] = {weight_one[0]}, total = 0.0;
+    for (int i = 0; i < 4 && fine; i++) { /* rings of equal area, each with its brightness */
+        weights[i] = 1.0 - 0.6 * (1.0 - sqrt(1.0 - ring_four[i] * ring_four[i]));
+        total += weights[i];
+    }
+    out->count = fine ? 0 : 1;
+    out->weight[0] = 0.25;
+    for (int i = 0; i < rings; i++) {
+        double radius = r * (fine ? ring_four[i] : ring_one[i]);
+        for (int k = 0; k < around; k++) {
+            double a = 2.0 * BST_PI * (k + 0.5 * i) / around;
+            bst_vec3 d =
+                bst_vec3_axpy(bst_vec3_axpy(light->sun, radius * cos(a), e1), radius * sin(a), e2);
+            out->direction[out->count] = bst_vec3_unit(d);
+            out->weight[out->count++] = (fine ? weights[i] / total : weights[i]) / around;
+        }
+    }
+}
+
+/* Nodes of the disc that a material needs: for wide lobes the Sun is a point. */
+static int nodes_for(const bst_material *m, const sun_disc *sun) {
+    bool wide = sun->radius_rad <= SHARP * bst_brdf_lobe_rad(&m->brdf);
+    return wide ? 1 : sun->count;
+}
+
+/* BRDF times both cosines, mean over the Sun's disc. */
+static double facet_light(const bst_material *m, const sun_disc *sun, bst_vec3 normal,
+                          bst_vec3 observer) {
+    double out = fmin(bst_vec3_dot(normal, observer), 1.0), sum = 0.0;
+    int nodes = nodes_for(m, sun);
+    if (nodes == 1) {
+        double in = fmin(bst_vec3_dot(normal, sun->centre), 1.0);
+        return m->scale * in * out *
+               bst_brdf_value(&m->brdf, in, out, bst_vec3_dot(sun->centre, observer));
+    }
+    for (int i = 0; i < sun->count; i++) {
+        double in = bst_vec3_dot(normal, sun->direction[i]);
+        if (in > 1e-9 && out > 1e-9) {
+            sum += sun->weight[i] * fmin(in, 1.0) * out *
+                   bst_brdf_value(&m->brdf, fmin(in, 1.0), out,
+                                  bst_vec3_dot(sun->direction[i], observer));
+        }
+    }
+    return sum * m->scale;
+}
+
+/* Sums of one evaluation. */
+typedef struct sums {
+    double sun[BST_SATELLITE_MATERIALS_MAX]; /* m^2/sr by material */
+    double earth[BST_SATELLITE_MATERIALS_MAX];
+    double curved_all[CURVED_MAX], curved_free[CURVED_MAX]; /* lit and visible projected area */
+    sun_disc disc;
+} sums;
+
+/* The last facet whose reflection was computed: large plane faces consist of many. */
+typedef struct last_facet {
+    bst_vec3 normal;
+    int material;
+    double light;
+} last_facet;
+
+static void add_sunlight(bst_satellite_pose *p, const bst_satellite_light *l, int index,
+                         last_facet *last, sums *s) {
+    const bst_facet *f = &p->satellite->facets[index];
+    bst_vec3 n = p->normals[index];
+    double in = bst_vec3_dot(n, l->sun), out = bst_vec3_dot(n, l->observer);
+    if (!(in > 1e-9) || !(out > 1e-9)) {
+        return;
+    }
+    bool whole;
+    double area = bst_pose_unshadowed(p, index, 2, &whole);
+    if (f->curved >= 0 && f->curved < CURVED_MAX) {
+        s->curved_all[f->curved] += f->area_m2 * in * out;
+        s->curved_free[f->curved] += area * in * out;
+        return;
+    }
+    if (last->material != f->material || memcmp(&last->normal, &n, sizeof n) != 0) {
+        const bst_material *m = &p->satellite->materials[f->material];
+        *last = (last_facet){n, f->material, facet_light(m, &s->disc, n, l->observer)};
+    }
+    s->sun[f->material] += area * last->light;
+}
+
+/* Adds the curved surfaces: exact without shadows, times the free part of their facets. Returned:
+ * estimate of the error. */
+static double add_curved(const bst_satellite_pose *p, const bst_satellite_light *l, sums *s) {
+    const bst_satellite *sat = p->satellite;
+    double error = 0.0;
+    for (int i = 0; i < sat->curved_count && i < CURVED_MAX; i++) {
+        const bst_curved *c = &sat->curved[i];
+        const bst_material *m = &sat->materials[c->material];
+        double free =
+            s->curved_all[i] > 0.0 ? fmin(s->curved_free[i] / s->curved_all[i], 1.0) : 1.0;
+        double sum = 0.0;
+        int nodes = free > 0.0 ? nodes_for(m, &s->disc) : 0;
+        for (int k = 0; k < nodes; k++) {
+            bst_vec3 sun = nodes == 1 ? s->disc.centre : s->disc.direction[k];
+            bst_vec3 observer = l->observer;
+            if (c->joint >= 0) {
+                sun = bst_mat3_transpose_mul_vec(&p->rotation[c->joint], sun);
+                observer = bst_mat3_transpose_mul_vec(&p->rotation[c->joint], observer);
+            }
+            sum += (nodes == 1 ? 1.0 : s->disc.weight[k]) *
+                   bst_curved_light(c, &m->brdf, sun, observer);
+        }
+        sum *= m->scale;
+        s->sun[c->material] += free * sum;
+        /* the shadow's border is that of facets, and the lobe may be on either side of it */
+        double lobe = fmin(bst_brdf_lobe_rad(&m->brdf), 1.0);
+        error += sum * free * (1.0 - free) * fmin(0.05 / lobe, 1.0);
+    }
+    return error;
+}
+
+/* Reflected earthlight of a facet, and its thermal emission. */
+static void add_facing(bst_satellite_pose *p, const bst_satellite_light *l, int index,
+                       double visible_m2, sums *s) {
+    const bst_facet *f = &p->satellite->facets[index];
+    const bst_material *m = &p->satellite->materials[f->material];
+    const bst_earthlight *e = l->earthlight;
+    bst_vec3 n = p->normals[index];
+    double out = fmin(bst_vec3_dot(n, l->observer), 1.0), sum = 0.0, lit_m2 = visible_m2;
+    for (int i = 0; i < e->count; i++) {
+        double in = bst_vec3_dot(n, e->direction[i]);
+        if (in > 1e-9) {
+            sum += e->irradiance[i] * in *
+                   bst_brdf_value(&m->brdf, fmin(in, 1.0), out,
+                                  bst_vec3_dot(e->direction[i], l->observer));
+        }
+    }
+    if (sum > 0.0 && bst_vec3_dot(n, e->centre) > 0.05) {
+        bool whole;
+        lit_m2 = bst_pose_unshadowed(p, index, 2, &whole);
+    }
+    s->earth[f->material] += sum * out * m->scale * lit_m2;
+}
+
+/* Light of the facets that face the observer, apart from sunlight. */
+static void add_earth_and_emission(bst_satellite_pose *p, const bst_satellite_light *l, sums *s,
+                                   bst_satellite_flux *out) {
+    const bst_satellite *sat = p->satellite;
+    bool earth = l->earthlight && l->earthlight->count > 0;
+    if (earth) {
+        bst_pose_look(p, 1, l->earthlight->centre);
+    }
+    for (int i = 0; i < sat->facet_count; i++) {
+        double cosine = bst_vec3_dot(p->normals[i], l->observer);
+        if (!(cosine > 1e-9)) {
+            continue;
+        }
+        bool whole;
+        double visible = bst_pose_unshadowed(p, i, 1, &whole);
+        out->visible_m2 += visible * cosine;
+        out->emission_m2 += visible * cosine * sat->materials[sat->facets[i].material].emissivity;
+        if (earth && visible > 0.0) {
+            add_facing(p, l, i, visible, s);
+        }
+    }
+}
+
+void bst_satellite_flux_at(bst_satellite_pose *p, const bst_satellite_light *l,
+                           bst_satellite_flux *out) {
+    assert(p && l && out);
+    const bst_satellite *sat = p->satellite;
+    sums s;
+    memset(s.sun, 0, (size_t)sat->material_count * sizeof s.sun[0]);
+    memset(s.earth, 0, (size_t)sat->material_count * sizeof s.earth[0]);
+    *out = (bst_satellite_flux){.error = 0.0};
+    bst_pose_look(p, 0, l->observer);
+    if (l->sunlit > 0.0) {
+        int curved = sat->curved_count < CURVED_MAX ? sat->curved_count : CURVED_MAX;
+        memset(s.curved_all, 0, (size_t)curved * sizeof s.curved_all[0]);
+        memset(s.curved_free, 0, (size_t)curved * sizeof s.curved_free[0]);
+        make_sun(l, sat->lobe_rad, &s.disc);
+        bst_pose_look(p, 1, l->sun);
+        last_facet last = {.material = -1};
+        for (int i = 0; i < sat->facet_count; i++) {
+            add_sunlight(p, l, i, &last, &s);
+        }
+        out->error = add_curved(p, l, &s);
+    }
+    if (l->earthlight || l->emission) {
+        add_earth_and_emission(p, l, &s, out);
+    }
+    for (int m = 0; m < sat->material_count; m++) {
+        for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
+            out->sun[k] += s.sun[m] * sat->materials[m].colour[k];
+            out->earth[k] += s.earth[m] * sat->materials[m].colour[k];
+        }
+    }
+}
+
+void bst_earthlight_at(const bst_earth_surface *surface, bst_vec3 object_m, bst_vec3 sun,
+                       bst_earthlight *out) {
+    enum { RINGS = 8 };
+    /* Gauss-Legendre, 8 points, on [0, 1]: half of Abramowitz and Stegun, table 25.4 */
+    static const double place[RINGS] = {
+        0.01985507175123185, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751,
+        0.5917173212478249,  0.7627662049581645,  0.8983332387068134, 0.9801449282487682};
+    static const double weight[RINGS] = {
+        0.05061426814518815, 0.11119051722668725, 0.15685332293894365, 0.181341891689181,
+        0.181341891689181,   0.15685332293894365, 0.11119051722668725, 0.05061426814518815};
+    const bst_brdf ground = {.model = BST_BRDF_PHONG,
+                             .diffuse = surface->diffuse,
+                             .specular = surface->specular,
+                             .exponent = surface->exponent};
+    double distance = bst_vec3_norm(object_m);
+    out->count = 0;
+    out->centre = bst_vec3_scale(object_m, -1.0 / distance);
+    if (!(distance > BST_EARTH_RADIUS_M)) {
+        return;
+    }
+    bst_vec3 down = out->centre, e1 = bst_vec3_perpendicular(down), e2 = bst_vec3_cross(down, e1);
+    bst_vec3 sum = {0};
+    double ratio = BST_EARTH_RADIUS_M / distance;
+    double cap = ratio * ratio / (1.0 + sqrt((1.0 - ratio) * (1.0 + ratio)));
+    assert(surface->fineness >= 1 && surface->fineness <= BST_EARTHLIGHT_FINEST);
+    int panels = surface->fineness, around = 24 * panels;
+    for (int n = 0; n < RINGS * panels; n++) {
+        /* uniform in the square root of the solid angle: smooth at the limb */
+        double t = 0.5 * BST_PI * (n / RINGS + place[n % RINGS]) / panels,
+               drop = cap * sin(t) * sin(t), c = 1.0 - drop;
+        double s = sqrt(drop * (2.0 - drop));
+        double solid =
+            cap * sin(2.0 * t) * 0.5 * BST_PI * weight[n % RINGS] / panels * 2.0 * BST_PI / around;
+        double chord2 = BST_EARTH_RADIUS_M * BST_EARTH_RADIUS_M - distance * distance * s * s;
+        double way = distance * c - sqrt(fmax(chord2, 0.0));
+        for (int m = 0; m < around; m++) {
+            double a = 2.0 * BST_PI * (m + 0.5 * (n % 2)) / around;
+            bst_vec3 u = bst_vec3_axpy(bst_vec3_axpy(bst_vec3_scale(down, c), s * cos(a), e1),
+                                       s * sin(a), e2);
+            bst_vec3 normal = bst_vec3_unit(bst_vec3_axpy(object_m, way, u));
+            double in = bst_vec3_dot(normal, sun), up = -bst_vec3_dot(normal, u);
+            if (!(in > 0.0) || !(up > 0.0)) {
+                continue;
+            }
+            double light = solid * in * bst_brdf_value(&ground, in, up, -bst_vec3_dot(u, sun));
+            out->direction[out->count] = u;
+            out->irradiance[out->count++] = light;
+            sum = bst_vec3_axpy(sum, light, u);
+        }
+    }
+    out->centre = out->count ? bst_vec3_unit(sum) : out->centre;
+}

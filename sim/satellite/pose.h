@@ -1,0 +1,73 @@
+/* A satellite's model at one instant: joints turned, and what is lit and visible of each facet. */
+#ifndef BST_SATELLITE_POSE_H
+#define BST_SATELLITE_POSE_H
+
+#include "sim/satellite/model.h"
+#include "sim/satellite/polygon_clip.h"
+
+/* What joints follow, in the body frame; unit vectors. */
+typedef struct bst_satellite_aim {
+    bst_vec3 sun, earth, target;
+    double seconds; /* after the epoch, for joints that spin */
+} bst_satellite_aim;
+
+/* Parallel projection of the model along one direction. */
+typedef struct bst_pose_view {
+    bst_vec3 x, y, z; /* right-handed; z: unit, from the satellite to the light or the observer */
+    double (*bounds)[6]; /* by occluder: lowest and highest x, y, z */
+    bst_point2 *outline; /* silhouettes of occluders, counter-clockwise, from 2 * first_vertex */
+    bool *clear;         /* by occluder: no other one can hide any of it */
+    int *outline_count;  /* corners of the silhouette; -1: not yet made */
+    int *cell_first, *cell_items; /* occluders by cell of a grid, for models with many */
+    int cells, cell_item_count, cell_item_capacity;
+    double origin[2], step[2]; /* of the grid */
+} bst_pose_view;
+
+/* A pose: work memory of one thread for one model. */
+typedef struct bst_satellite_pose {
+    const bst_satellite *satellite;
+    bst_vec3 *vertices;     /* body frame */
+    bst_vec3 *normals;      /* of facets, body frame */
+    bst_mat3 *rotation;     /* by joint: body frame from joint frame */
+    bst_vec3 *origin;       /* by joint, body frame */
+    bst_pose_view views[2]; /* see bst_pose_look */
+    int *seen;              /* by occluder: facet for which it was last found in the grid */
+    int seen_stamp;
+    bst_polygon_clip clip;
+} bst_satellite_pose;
+
+/* Allocates a pose of a model, with all joints at their offsets.
+ *
+ * Given:     satellite  outlives the pose
+ * Returned:  *out  the pose; NULL on error
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_satellite_pose_free */
+bst_status bst_satellite_pose_create(bst_ctx *ctx, const bst_satellite *satellite,
+                                     bst_satellite_pose **out) BST_MUST_CHECK;
+/* Frees a pose; NULL is allowed. */
+void bst_satellite_pose_free(bst_satellite_pose *pose);
+
+/* Turns the joints and places all vertices. */
+void bst_satellite_pose_set(bst_satellite_pose *pose, const bst_satellite_aim *aim);
+
+/* Prepares a view for bst_pose_unshadowed.
+ *
+ * Given:     view       0 or 1
+ *            direction  unit, body frame: from the satellite to the light or the observer */
+void bst_pose_look(bst_satellite_pose *pose, int view, bst_vec3 direction);
+
+/* Area of a facet that the bodies of the model hide from none of the directions of the first
+ * `views` views, m^2. The facet faces all of these directions.
+ *
+ * Returned:  pose->clip holds the convex pieces of that area in the coordinates of
+ *            bst_pose_facet_axes, if *whole is false
+ *            *whole  nothing hides any of it
+ * Notes:     exact for plane facets: the silhouette of each convex body is projected onto the
+ *            facet's plane and subtracted. */
+double bst_pose_unshadowed(bst_satellite_pose *pose, int facet, int views, bool *whole);
+
+/* Axes of a facet's plane: a point of it is *origin + x *e1 + y *e2, body frame. */
+void bst_pose_facet_axes(const bst_satellite_pose *pose, int facet, bst_vec3 *origin, bst_vec3 *e1,
+                         bst_vec3 *e2);
+
+#endif

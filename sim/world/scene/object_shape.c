@@ -1,0 +1,120 @@
+#include "sim/world/scene/object_shape.h"
+
+#include "sim/optics/band.h"
+
+#include <stdlib.h>
+
+/* Radius of the Sun, m (IAU 2015 resolution B3). */
+#define SUN_RADIUS_M 6.957e8
+
+bool bst_object_shape_is_given(const bst_satellite_config *config) {
+    return *config->file || config->parts.count > 0 || config->joints.count > 0 ||
+           config->materials.count > 0;
+}
+
+void bst_object_shape_free(bst_object_shape *shape) {
+    if (shape) {
+        bst_satellite_free(shape->satellite);
+        bst_body_attitude_free(shape->attitude);
+        free(shape);
+    }
+}
+
+bst_status bst_object_shape_create(bst_ctx *ctx, const bst_satellite_config *config,
+                                   const bst_config_list *attitude, const char *base_dir,
+                                   bst_object_shape **out) {
+    bst_object_shape *shape = *out = calloc(1, sizeof *shape);
+    if (!shape) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the shape of an object");
+    }
+    bst_status status = bst_satellite_create(ctx, config, base_dir, &shape->satellite);
+    if (status != BST_OK) {
+        status = bst_fail_prefix(ctx, BST_ERR_CONFIG, "shape");
+    } else {
+        status = bst_body_attitude_create(ctx, attitude, base_dir, &shape->attitude);
+        status = status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "attitude");
+    }
+    if (status != BST_OK) {
+        bst_object_shape_free(shape);
+        *out = NULL;
+    }
+    return status;
+}
+
+/* Turns earthlight into the body frame. */
+static void turn_earthlight(bst_quat q, bst_earthlight *light) {
+    for (int i = 0; i < light->count; i++) {
+        light->direction[i] = bst_quat_rotate(q, light->direction[i]);
+    }
+    light->centre = bst_quat_rotate(q, light->centre);
+}
+
+/* Light per wavelength over that in V, and magnitude, from the model's flux. */
+static void make_glow(const bst_satellite_flux *flux, const bst_scene_lighting *l, double range_m,
+                      bst_scene_glow *out) {
+    double sun_m = bst_vec3_norm(bst_vec3_sub(l->sun_m, l->object_m));
+    double au2 = sun_m * sun_m / (BST_AU_M * BST_AU_M);
+    double sunlight = l->sunlight ? l->sunlight->light[BST_SUNLIGHT_V] : l->sunlit_fraction;
+    double sun = flux->sun[BST_SUNLIGHT_V] * sunlight / au2, earth = flux->earth[BST_SUNLIGHT_V];
+    earth /= bst_vec3_dot(l->sun_m, l->sun_m) / (BST_AU_M * BST_AU_M);
+    double all = (sun + earth) / (range_m * range_m);
+    out->v_mag = all > 0.0 ? BST_SUN_V_MAG - 2.5 * log10(all) : (double)INFINITY;
+    out->earth_share = sun + earth > 0.0 ? earth / (sun + earth) : 0.0;
+    for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
+        double red = l->sunlight && sunlight > 0.0 ? l->sunlight->light[k] / sunlight : 1.0;
+        double own =
+            flux->sun[BST_SUNLIGHT_V] > 0.0 ? flux->sun[k] / flux->sun[BST_SUNLIGHT_V] : 1.0;
+        out->redness[k] = red * own;
+    }
+}
+
+void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *pose,
+                           const bst_brightness_config *b, const bst_scene_lighting *l,
+                           bst_vec3 velocity_mps, bst_scene_glow *out) {
+    bst_vec3 to_eye = bst_vec3_sub(l->eye_m, l->object_m);
+    bst_vec3 to_sun = bst_vec3_sub(l->sun_m, l->object_m);
+    double range_m = bst_vec3_norm(to_eye);
+    bst_attitude_state state = {l->object_m, velocity_mps, bst_vec3_unit(to_sun), l->seconds};
+    bst_quat q = bst_body_attitude_at(shape->attitude, &state);
+    bst_earthlight earthlight;
+    if (b->earthshine) {
+        bst_earth_surface surface = {.diffuse = b->earth_albedo, .fineness = 1};
+        bst_earthlight_at(&surface, l->object_m, bst_vec3_unit(l->sun_m), &earthlight);
+        turn_earthlight(q, &earthlight);
+    }
+    bst_satellite_light light = {
+        .sun = bst_quat_rotate(q, state.sun),
+        .observer = bst_quat_rotate(q, bst_vec3_unit(to_eye)),
+        .sun_radius_rad = SUN_RADIUS_M / bst_vec3_norm(to_sun),
+        .sunlit = l->sunlight ? l->sunlight->light[BST_SUNLIGHT_V] : l->sunlit_fraction,
+        .earthlight = b->earthshine ? &earthlight : NULL,
+        .emission = true};
+    bst_satellite_aim aim = {
+        .sun = light.sun,
+        .earth = bst_quat_rotate(q, bst_vec3_unit(bst_vec3_scale(l->object_m, -1.0))),
+        .target = light.observer,
+        .seconds = l->seconds};
+    bst_satellite_flux flux;
+    bst_satellite_pose_set(pose, &aim);
+    bst_satellite_flux_at(pose, &light, &flux);
+    *out = (bst_scene_glow){.resolved = false};
+    make_glow(&flux, l, range_m, out);
+    out->emission_sr = flux.emission_m2 / (range_m * range_m);
+    double warm = l->sunlit_fraction * pow(b->temperature_k, 4.0) +
+                  (1.0 - l->sunlit_fraction) * pow(b->shadow_temperature_k, 4.0);
+    out->temperature_k = sqrt(sqrt(warm));
+    out->thermal_reflection =
+        flux.visible_m2 > 0.0 ? 1.0 - flux.emission_m2 / flux.visible_m2 : 1.0;
+}
+
+int bst_object_shape_samples(const bst_object_shape *shape, double seconds, double exposure_s) {
+    enum { FEWEST = 16, MOST = 64 };
+    const bst_satellite *s = shape->satellite;
+    double rate = bst_body_attitude_rate_radps(shape->attitude, seconds);
+    for (int i = 0; i < s->joint_count; i++) {
+        rate += s->joints[i].follows == BST_JOINT_SPIN ? fabs(s->joints[i].rate_radps) : 0.0;
+    }
+    /* the half vector moves by the rotation; the Sun's disc widens its lobe by half its radius */
+    double lobe = s->lobe_rad + 0.5 * 4.65e-3;
+    return (int)fmin(fmax(ceil(2.0 * rate * exposure_s / lobe), FEWEST), MOST);
+}

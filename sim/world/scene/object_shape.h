@@ -1,0 +1,52 @@
+/* Space objects with a shape: a satellite's model and its attitude, and the light that follows. */
+#ifndef BST_WORLD_SCENE_OBJECT_SHAPE_H
+#define BST_WORLD_SCENE_OBJECT_SHAPE_H
+
+#include "sim/satellite/body_attitude.h"
+#include "sim/satellite/flux.h"
+#include "sim/world/scene/brightness.h"
+
+/* An object's model and attitude; immutable once the world is built. */
+typedef struct bst_object_shape {
+    bst_satellite *satellite;
+    bst_body_attitude *attitude;
+    int index; /* in the world's list of shapes */
+} bst_object_shape;
+
+/* True if the configuration of an object gives a shape. */
+bool bst_object_shape_is_given(const bst_satellite_config *config);
+
+/* Builds the shape of an object.
+ *
+ * Given:     config    its shape
+ *            attitude  bst_attitude_config; empty: nadir
+ *            base_dir  base of relative paths
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_CONFIG with the path below the object ("shape/parts/0/..."), BST_ERR_MEMORY
+ * Ownership: free *out with bst_object_shape_free */
+bst_status bst_object_shape_create(bst_ctx *ctx, const bst_satellite_config *config,
+                                   const bst_config_list *attitude, const char *base_dir,
+                                   bst_object_shape **out) BST_MUST_CHECK;
+/* Frees a shape; NULL is allowed. */
+void bst_object_shape_free(bst_object_shape *shape);
+
+/* Computes the light of an object with a shape, as bst_brightness_at does for a sphere.
+ *
+ * Given:     pose          work memory of the calling thread, of this shape's model
+ *            brightness    gives earthshine, its albedo, and the temperatures
+ *            lighting      area and albedo are not used
+ *            velocity_mps  of the object, GCRF
+ * Returned:  *out  a point source */
+void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *pose,
+                           const bst_brightness_config *brightness,
+                           const bst_scene_lighting *lighting, bst_vec3 velocity_mps,
+                           bst_scene_glow *out);
+
+/* Number of samples of an exposure, by which no glint is missed: two in the time that a specular
+ * lobe of the model needs to pass, for rotation rates as they are at that time.
+ *
+ * Given:     seconds   middle of the exposure, after the epoch
+ *            exposure_s  its length */
+int bst_object_shape_samples(const bst_object_shape *shape, double seconds, double exposure_s);
+
+#endif

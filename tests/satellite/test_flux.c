@@ -1,0 +1,291 @@
+/* Light of shapes against closed forms and against rays. */
+#include "tests/satellite/satellite_support.h"
+
+#define WHITE "\"materials\": [{\"name\": \"w\", \"diffuse\": 0.8}]"
+
+/* The asked accuracy of closed forms. */
+static const double CLOSED = 1e-4;
+
+static void sphere_has_its_closed_form(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(
+        "{" WHITE
+        ", \"parts\": [{\"name\": \"s\", \"kind\": \"sphere\", \"radius_m\": 1.5, "
+        "\"material\": \"w\", \"rotation_deg\": [10, 20, 30]}]}");
+    uint64_t random = 7;
+    for (int i = 0; i < 50; i++) {
+        bst_vec3 sun = bst_test_direction(&random), eye = bst_test_direction(&random);
+        double phase = bst_vec3_angle(sun, eye);
+        /* Lambert's sphere: integral of both cosines over the lit and visible lune */
+        double form =
+            0.8 / BST_PI * 1.5 * 1.5 * 2.0 / 3.0 * (sin(phase) + (BST_PI - phase) * cos(phase));
+        bst_assert_close(bst_test_flux(&m, sun, eye), form, CLOSED * form + 1e-9);
+    }
+    bst_test_model_close(&m);
+}
+
+static void cylinder_has_its_closed_form(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(
+        "{" WHITE
+        ", \"parts\": [{\"name\": \"c\", \"kind\": \"cylinder\", \"radius_m\": 0.7, "
+        "\"length_m\": 3, \"material\": \"w\"}]}");
+    uint64_t random = 11;
+    for (int i = 0; i < 50; i++) {
+        bst_vec3 sun = bst_test_direction(&random), eye = bst_test_direction(&random);
+        double azimuth = fabs(bst_wrap_angle(atan2(sun.y, sun.x) - atan2(eye.y, eye.x)));
+        double across = hypot(sun.x, sun.y) * hypot(eye.x, eye.y);
+        double side = 0.7 * 3 * across * 0.5 * (sin(azimuth) + (BST_PI - azimuth) * cos(azimuth));
+        double end = sun.z * eye.z > 0 ? BST_PI * 0.7 * 0.7 * sun.z * eye.z : 0.0;
+        double form = 0.8 / BST_PI * (side + end);
+        bst_assert_close(bst_test_flux(&m, sun, eye), form, CLOSED * form + 1e-9);
+    }
+    bst_test_model_close(&m);
+}
+
+static void box_and_plate_have_their_closed_forms(void **state) {
+    (void)state;
+    bst_test_model box = bst_test_model_open(
+        "{" WHITE
+        ", \"parts\": [{\"name\": \"b\", \"kind\": \"box\", \"size_m\": [1, 2, 3], "
+        "\"material\": \"w\"}]}");
+    bst_test_model plate = bst_test_model_open(
+        "{\"materials\": [{\"name\": \"w\", \"diffuse\": 0.8}, {\"name\": \"d\", \"diffuse\": "
+        "0.1}], \"parts\": [{\"name\": \"p\", \"kind\": \"plate\", \"size_m\": [2, 5, 1], "
+        "\"material\": \"w\", \"back_material\": \"d\"}]}");
+    uint64_t random = 3;
+    for (int i = 0; i < 50; i++) {
+        bst_vec3 s = bst_test_direction(&random), e = bst_test_direction(&random);
+        double form = 0.8 / BST_PI *
+                      (6 * fmax(s.x * e.x, 0) + 3 * fmax(s.y * e.y, 0) + 2 * fmax(s.z * e.z, 0));
+        bst_assert_close(bst_test_flux(&box, s, e), form, 1e-9);
+        double albedo = s.z > 0 ? 0.8 : 0.1;
+        form = s.z * e.z > 0 ? albedo / BST_PI * 10 * s.z * e.z : 0.0;
+        bst_assert_close(bst_test_flux(&plate, s, e), form, 1e-9);
+    }
+    bst_test_model_close(&box);
+    bst_test_model_close(&plate);
+}
+
+/* A closed cone, sliced by hand: its light is that of many thin plane strips. */
+static void cone_is_the_sum_of_strips(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(
+        "{" WHITE
+        ", \"parts\": [{\"name\": \"c\", \"kind\": \"cone\", \"radius_m\": 1, "
+        "\"top_radius_m\": 0.3, \"length_m\": 2, \"open\": true, \"material\": \"w\"}]}");
+    uint64_t random = 5;
+    double slant = hypot(0.7, 2.0);
+    for (int i = 0; i < 20; i++) {
+        bst_vec3 s = bst_test_direction(&random), e = bst_test_direction(&random);
+        double sum = 0.0;
+        enum { STRIPS = 100000 };
+        for (int k = 0; k < STRIPS; k++) {
+            double a = 2.0 * BST_PI * (k + 0.5) / STRIPS;
+            bst_vec3 n = {2.0 / slant * cos(a), 2.0 / slant * sin(a), 0.7 / slant};
+            double in = bst_vec3_dot(n, s), out = bst_vec3_dot(n, e);
+            sum += in > 0 && out > 0 ? in * out * slant * 0.65 * 2.0 * BST_PI / STRIPS : 0.0;
+        }
+        double form = 0.8 / BST_PI * sum;
+        bst_assert_close(bst_test_flux(&m, s, e), form, CLOSED * form + 1e-8);
+    }
+    bst_test_model_close(&m);
+}
+
+/* A plate over a larger one: its shadow and its silhouette, which overlap or not. */
+static void shadow_of_a_plate_is_exact(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(
+        "{\"materials\": [{\"name\": \"w\", \"diffuse\": 0.8}, {\"name\": \"d\"}], \"parts\": "
+        "[{\"name\": \"low\", \"kind\": \"plate\", \"size_m\": [10, 10, 1], \"material\": \"w\"}, "
+        "{\"name\": \"high\", \"kind\": \"plate\", \"size_m\": [2, 2, 1], \"position_m\": [0, 0, "
+        "1], \"material\": \"d\"}]}");
+    bst_vec3 s = bst_vec3_unit((bst_vec3){1, 0, 1}), e = bst_vec3_unit((bst_vec3){-0.5, 0, 1});
+    /* shadow x in [-2, 0], silhouette x in [-0.5, 1.5]: 2 x (2 + 2 - 0.5) hidden */
+    double both = 0.8 / BST_PI * s.z * e.z * (100 - 2 * 3.5);
+    bst_assert_close(bst_test_flux(&m, s, e), both, 1e-9);
+    bst_vec3 up = {0, 0, 1};
+    bst_assert_close(bst_test_flux(&m, up, up), 0.8 / BST_PI * 96, 1e-9);
+    bst_vec3 low = bst_vec3_unit((bst_vec3){10, 0, 1}); /* the shadow misses the plate */
+    bst_assert_close(bst_test_flux(&m, low, up), 0.8 / BST_PI * low.z * 96, 1e-9);
+    bst_test_model_close(&m);
+}
+
+static const char CROWDED[] =
+    "{\"materials\": [{\"name\": \"w\", \"diffuse\": 0.8}, {\"name\": \"d\", \"diffuse\": 0.2}], "
+    "\"joints\": [{\"name\": \"j\", \"follows\": \"sun\", \"axis\": [0, 1, 0], \"normal\": [0, 0, "
+    "1]}], \"parts\": ["
+    "{\"name\": \"bus\", \"kind\": \"box\", \"size_m\": [2, 1.5, 2.5], \"material\": \"w\"},"
+    "{\"name\": \"left\", \"kind\": \"plate\", \"size_m\": [2, 4, 1], \"position_m\": [0, 3.2, 0], "
+    "\"joint\": \"j\", \"material\": \"d\"},"
+    "{\"name\": \"right\", \"kind\": \"plate\", \"size_m\": [2, 4, 1], \"position_m\": [0, -3.2, "
+    "0], \"joint\": \"j\", \"material\": \"d\"},"
+    "{\"name\": \"mast\", \"kind\": \"box\", \"size_m\": [0.2, 0.2, 3], \"position_m\": [0.4, 0, "
+    "2], \"rotation_deg\": [20, 10, 0], \"material\": \"w\"}]}";
+
+/* True if a ray from a point of a facet meets another facet (Moeller and Trumbore 1997). */
+static bool ray_meets(const bst_satellite_pose *p, int own, bst_vec3 from, bst_vec3 way) {
+    const bst_satellite *s = p->satellite;
+    for (int f = 0; f < s->facet_count; f++) {
+        const int *c = s->corner + s->facets[f].first;
+        for (int k = 2; k < s->facets[f].count && s->facets[f].occluder != s->facets[own].occluder;
+             k++) {
+            bst_vec3 a = p->vertices[c[0]], u = bst_vec3_sub(p->vertices[c[k - 1]], a);
+            bst_vec3 v = bst_vec3_sub(p->vertices[c[k]], a), q = bst_vec3_cross(way, v);
+            double det = bst_vec3_dot(u, q);
+            bst_vec3 r = bst_vec3_sub(from, a), t = bst_vec3_cross(r, u);
+            double x = bst_vec3_dot(r, q) / det, y = bst_vec3_dot(way, t) / det;
+            if (fabs(det) > 1e-12 && x >= 0 && y >= 0 && x + y <= 1 &&
+                bst_vec3_dot(v, t) / det > 1e-9) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+/* Light by rays from a grid of points on each facet. */
+static double flux_by_rays(const bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye) {
+    enum { SIDE = 200 };
+    const bst_satellite *s = p->satellite;
+    double sum = 0.0;
+    for (int f = 0; f < s->facet_count; f++) {
+        double in = bst_vec3_dot(p->normals[f], sun), out = bst_vec3_dot(p->normals[f], eye);
+        const int *c = s->corner + s->facets[f].first;
+        if (in <= 0 || out <= 0) {
+            continue;
+        }
+        assert_int_equal(s->facets[f].count, 4); /* parallelograms */
+        bst_vec3 a = p->vertices[c[0]], u = bst_vec3_sub(p->vertices[c[1]], a);
+        bst_vec3 v = bst_vec3_sub(p->vertices[c[3]], a);
+        int free = 0;
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            bst_vec3 q = bst_vec3_axpy(bst_vec3_axpy(a, (i % SIDE + 0.5) / SIDE, u),
+                                       ((double)(i / SIDE) + 0.5) / SIDE, v);
+            free += !ray_meets(p, f, q, sun) && !ray_meets(p, f, q, eye);
+        }
+        sum += s->materials[s->facets[f].material].brdf.diffuse / BST_PI * in * out *
+               s->facets[f].area_m2 * free / (SIDE * SIDE);
+    }
+    return sum;
+}
+
+/* Intersecting and articulated parts, some of them partly behind the plane of others. */
+static void shadows_agree_with_rays(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(CROWDED);
+    uint64_t random = 17;
+    int shadowed = 0;
+    for (int i = 0; i < 12; i++) {
+        bst_vec3 sun = bst_test_direction(&random), eye = bst_test_direction(&random);
+        double flux = bst_test_flux(&m, sun, eye), rays = flux_by_rays(m.pose, sun, eye);
+        bst_satellite_pose_set(m.pose, &(bst_satellite_aim){sun, {0, 0, 1}, eye, 0});
+        double whole = 0.0;
+        for (int f = 0; f < m.satellite->facet_count; f++) {
+            double in = bst_vec3_dot(m.pose->normals[f], sun);
+            double out = bst_vec3_dot(m.pose->normals[f], eye);
+            const bst_facet *facet = &m.satellite->facets[f];
+            whole += in > 0 && out > 0 ? m.satellite->materials[facet->material].brdf.diffuse /
+                                             BST_PI * in * out * facet->area_m2
+                                       : 0.0;
+        }
+        shadowed += flux < 0.97 * whole;
+        /* 200 x 200 points: the border of a shadow is uncertain by half a cell, a 400th of an edge;
+         * borders cross it in both directions */
+        bst_assert_close(flux, rays, 2e-3 * whole + 1e-9);
+    }
+    assert_true(shadowed >= 4);
+    bst_test_model_close(&m);
+}
+
+static void panels_follow_the_sun(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(CROWDED);
+    bst_vec3 sun = bst_vec3_unit((bst_vec3){0.5, 0.4, -0.7});
+    bst_satellite_pose_set(m.pose, &(bst_satellite_aim){sun, {0, 0, 1}, {1, 0, 0}, 0});
+    /* the best that one axis can do: the normal is the Sun's component across the axis */
+    bst_vec3 best = bst_vec3_unit((bst_vec3){0.5, 0, -0.7}), n = m.pose->normals[6];
+    bst_assert_close(bst_vec3_angle(n, best), 0, 1e-12);
+    bst_test_model_close(&m);
+    m = bst_test_model_open(
+        "{" WHITE
+        ", \"joints\": [{\"name\": \"base\", \"follows\": \"spin\", \"axis\": [0, 0, 1], "
+        "\"normal\": [1, 0, 0], \"rate_deg_per_s\": 10}, {\"name\": \"j\", \"parent\": \"base\", "
+        "\"follows\": \"sun\", \"axes\": 2, \"axis\": [0, 1, 0], \"normal\": [0, 0, 1]}], "
+        "\"parts\": [{\"name\": \"p\", \"kind\": \"plate\", \"joint\": \"j\", \"material\": "
+        "\"w\"}]}");
+    bst_satellite_pose_set(m.pose, &(bst_satellite_aim){sun, {0, 0, 1}, {1, 0, 0}, 12.3});
+    bst_assert_close(bst_vec3_angle(m.pose->normals[0], sun), 0, 1e-12);
+    bst_test_model_close(&m);
+}
+
+/* A flat mirror's glint has the width of the Sun: twice the tilt turns the ray by twice as much. */
+static void glint_has_the_width_of_the_sun(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(
+        "{\"materials\": [{\"name\": \"osr\", \"library\": \"optical_solar_reflector\"}], "
+        "\"parts\": [{\"name\": \"p\", \"kind\": \"plate\", \"material\": \"osr\"}]}");
+    double mean = 0.0, point = 0.0;
+    enum { STEPS = 400 };
+    for (int i = 0; i < STEPS; i++) {
+        double tilt = (i - 0.5 * STEPS) * 0.05 * BST_DEG_RAD;
+        bst_vec3 sun = {sin(tilt), 0, cos(tilt)}, eye = {0, 0, 1};
+        bst_satellite_light light = {
+            .sun = sun, .observer = eye, .sunlit = 1, .sun_radius_rad = 4.65e-3};
+        bst_satellite_flux flux;
+        bst_satellite_flux_at(m.pose, &light, &flux);
+        mean += flux.sun[BST_SUNLIGHT_V] / STEPS;
+        light.sun_radius_rad = 0;
+        bst_satellite_flux_at(m.pose, &light, &flux);
+        point = fmax(point, flux.sun[BST_SUNLIGHT_V]);
+        if (i == STEPS / 2) { /* the disc is wider than the lobe of 2 x 0.003 rad: it dims */
+            light.sun_radius_rad = 4.65e-3;
+            double peak = flux.sun[BST_SUNLIGHT_V];
+            bst_satellite_flux_at(m.pose, &light, &flux);
+            assert_true(flux.sun[BST_SUNLIGHT_V] < 0.9 * peak);
+            assert_true(flux.sun[BST_SUNLIGHT_V] > 0.4 * peak);
+        }
+    }
+    assert_true(mean > 0 && point > 0);
+    bst_test_model_close(&m);
+}
+
+/* From far the Earth is a Lambert sphere at full phase, with the geometric albedo 2/3 of its
+ * albedo; near the surface at noon it is a plane of radiance albedo / pi, and a plate receives its
+ * albedo. */
+static void earthlight_has_its_closed_form(void **state) {
+    (void)state;
+    bst_earth_surface earth = {.diffuse = 0.3, .fineness = 1};
+    bst_earthlight light;
+    double sum = 0.0, d = 1000 * BST_EARTH_RADIUS_M;
+    bst_earthlight_at(&earth, (bst_vec3){0, 0, d}, (bst_vec3){0, 0, 1}, &light);
+    for (int i = 0; i < light.count; i++) {
+        sum += light.irradiance[i];
+    }
+    double far = 0.3 * 2.0 / 3.0 * 1e-6;
+    bst_assert_close(sum, far, 2e-3 * far); /* a distance of 1000 radii brightens by 1e-3 */
+    bst_earthlight_at(&earth, (bst_vec3){0, 0, BST_EARTH_RADIUS_M + 1.0}, (bst_vec3){0, 0, 1},
+                      &light);
+    sum = 0.0;
+    for (int i = 0; i < light.count; i++) {
+        sum += light.irradiance[i] * -light.direction[i].z;
+    }
+    bst_assert_close(sum, 0.3, 1e-3);
+    bst_earthlight_at(&earth, (bst_vec3){0, 0, 7e6}, (bst_vec3){0, 0, -1}, &light);
+    assert_int_equal(light.count, 0); /* midnight */
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(sphere_has_its_closed_form),
+        cmocka_unit_test(cylinder_has_its_closed_form),
+        cmocka_unit_test(box_and_plate_have_their_closed_forms),
+        cmocka_unit_test(cone_is_the_sum_of_strips),
+        cmocka_unit_test(shadow_of_a_plate_is_exact),
+        cmocka_unit_test(shadows_agree_with_rays),
+        cmocka_unit_test(panels_follow_the_sun),
+        cmocka_unit_test(glint_has_the_width_of_the_sun),
+        cmocka_unit_test(earthlight_has_its_closed_form),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

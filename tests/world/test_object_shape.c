@@ -1,0 +1,147 @@
+/* Objects with a shape in a world: their light, its sampling, and errors of the configuration. */
+#include "sim/world/scene/field_objects.h"
+#include "sim/world/scene/object_shape.h"
+#include "tests/world/world_support.h"
+
+#define SHAPE(parts)                                                                         \
+    "\"brightness\": {\"model\": \"shape\"}, \"shape\": {\"materials\": [{\"name\": \"w\", " \
+    "\"diffuse\": 0.25}], \"parts\": [" parts "]}"
+
+/* The sphere of the other models, as a shape: the same magnitudes at all phases. */
+static void a_round_shape_is_a_sphere(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = test_world_with(
+        "{\"name\": \"shape\", " SHAPE(
+            "{\"name\": \"s\", \"kind\": \"sphere\", \"radius_m\": 2, "
+            "\"material\": \"w\"}") ", " TEST_GX5
+                                    "}, {\"name\": \"sphere\", \"area_m2\": "
+                                    "12.566370614359172, \"albedo\": 0.25, " TEST_GX5 "}",
+        "");
+    bst_world_view *view;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+    for (double t = 0; t < 40000; t += 4000) {
+        bst_world_sight shape, sphere;
+        bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 0, t, &shape));
+        bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 1, t, &sphere));
+        if (isfinite(sphere.v_mag)) {
+            bst_assert_close(shape.v_mag, sphere.v_mag, 1e-9);
+        }
+        bst_assert_close(shape.glow.redness[0], sphere.glow.redness[0], 1e-12);
+    }
+    bst_world_view_free(view);
+    bst_world_free(world);
+}
+
+/* A plate that spins glints twice a turn; samples within an exposure agree with single sights, and
+ * their mean with a dense sum. */
+static void a_spinning_plate_glints(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = test_world_with(
+        "{\"name\": \"p\", \"brightness\": {\"model\": \"shape\"}, \"shape\": {\"materials\": "
+        "[{\"name\": \"m\", \"library\": \"bare_aluminium\"}], \"parts\": [{\"name\": \"p\", "
+        "\"kind\": \"plate\", \"material\": \"m\"}]}, \"attitude\": [{\"law\": \"spin\", "
+        "\"rate_body_deg_per_s\": [60, 10, 0], \"from_s\": 0}], " TEST_GX5 "}",
+        "");
+    bst_world_view *view;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+    bst_scene_source_path path;
+    bst_scene_path_light light;
+    bst_world_sight mid, then, sight;
+    const bst_world_view_span span = {0, 100, 112};
+    bst_assert_ok(&ctx, bst_world_view_path(&ctx, view, &span, 0, &path, &light, &mid));
+    double faint = 0, bright = 1e9;
+    for (int i = 0; i <= 48; i++) {
+        bst_scene_view_light(view, &span, 0, &path, &light, i / 48.0, &then);
+        bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 0, 100 + 0.25 * i, &sight));
+        if (sight.v_mag < 25) {
+            /* light time changes by 2 km in a second: 7e-6 s, 1e-5 of a turn in 12 s */
+            bst_assert_close(then.v_mag, sight.v_mag, 5e-2);
+        }
+        faint = fmax(faint, fmin(sight.v_mag, 99));
+        bright = fmin(bright, sight.v_mag);
+    }
+    assert_true(faint - bright > 3);
+    /* 61 degrees/s for 12 s over lobes of 0.2 rad: 2 * 12.8 / 0.2 samples are more than the most */
+    const bst_object_shape *shape = bst_world_object(world, 0)->shape;
+    assert_int_equal(bst_object_shape_samples(shape, 106, 12), 64);
+    assert_int_equal(bst_object_shape_samples(shape, 106, 0.1), 16);
+    bst_world_view_free(view);
+    bst_world_free(world);
+}
+
+/* Earthlight on a shape is that of the sphere's model where the shape is a sphere. */
+static void earthlight_is_that_of_spheres(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = test_world_with(
+        "{\"name\": \"shape\", \"brightness\": {\"model\": \"shape\", \"earthshine\": true}, "
+        "\"shape\": {\"materials\": [{\"name\": \"w\", \"diffuse\": 0.25}], \"parts\": [{\"name\": "
+        "\"s\", \"kind\": \"sphere\", \"segments\": 64, \"radius_m\": 2, \"material\": "
+        "\"w\"}]}, " TEST_GX5
+        "}, {\"name\": \"sphere\", \"area_m2\": 12.566370614359172, \"albedo\": 0.25, "
+        "\"brightness\": {\"earthshine\": true}, " TEST_GX5 "}",
+        "");
+    bst_world_view *view;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+    for (double t = 0; t < 40000; t += 8000) {
+        bst_world_sight shape, sphere;
+        bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 0, t, &shape));
+        bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, 1, t, &sphere));
+        /* facets of 6 degrees, and 192 directions for the Earth: 2 %, or 0.2 % of a full Earth
+         * where it is a crescent */
+        bst_assert_close(shape.glow.earth_share, sphere.glow.earth_share,
+                         0.02 * sphere.glow.earth_share + 2e-6);
+    }
+    bst_world_view_free(view);
+    bst_world_free(world);
+}
+
+static void wrong_shapes_are_refused(void **state) {
+    (void)state;
+    static const char *const wrong[][2] = {
+        {"\"brightness\": {\"model\": \"shape\"}", "/world/objects/0/shape: "},
+        {"\"shape\": {\"parts\": [{\"name\": \"p\"}]}", "/world/objects/0/brightness/model: "},
+        {SHAPE("{\"name\": \"p\", \"material\": \"v\"}"),
+         "/world/objects/0: shape: /parts/0: material: "},
+        {SHAPE("{\"name\": \"p\", \"material\": \"w\", \"size_m\": [1, 0, 1]}"),
+         "shape: /parts/0: size_m: "},
+        {SHAPE("{\"name\": \"p\", \"material\": \"w\", \"joint\": \"j\"}"),
+         "shape: /parts/0: joint: "},
+        {SHAPE("{\"name\": \"p\", \"kind\": \"mesh\", \"file\": \"/no/such.obj\"}"),
+         "/no/such.obj"},
+        {SHAPE("{\"name\": \"p\", \"material\": \"w\"}, {\"name\": \"p\", \"material\": \"w\"}"),
+         "shape: /parts/1: name: "},
+        {SHAPE("{\"name\": \"p\", \"material\": \"w\"}") ", \"attitude\": [{\"law\": \"tumble\", "
+                                                         "\"inertia_kg_m2\": [1, 1, 5]}]",
+         "/world/objects/0: attitude: 0: inertia_kg_m2: "},
+        {"\"brightness\": {\"model\": \"shape\"}, \"shape\": {\"materials\": [{\"name\": \"m\", "
+         "\"model\": \"phong\", \"diffuse\": 0.9, \"specular\": 0.9}], \"parts\": [{\"name\": "
+         "\"p\", \"material\": \"m\"}]}",
+         "shape: /materials/0: the surface reflects"}};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        bst_ctx ctx = {0};
+        bst_world *world;
+        char text[3000];
+        snprintf(text, sizeof text,
+                 "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [{\"name\": \"o\", "
+                 "%s, " TEST_GX5 "}]}, \"observers\": [{\"name\": \"n\", " TEST_NEOSSAT
+                 ", \"sensors\": [{" TEST_CAMERA "}]}]}",
+                 wrong[i][0]);
+        assert_int_equal(test_world_try(&ctx, TEST_EPOCH, text, &world), BST_ERR_CONFIG);
+        if (!strstr(ctx.message, wrong[i][1])) {
+            fail_msg("%s: not in: %s", wrong[i][1], ctx.message);
+        }
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_round_shape_is_a_sphere),
+        cmocka_unit_test(a_spinning_plate_glints),
+        cmocka_unit_test(earthlight_is_that_of_spheres),
+        cmocka_unit_test(wrong_shapes_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
