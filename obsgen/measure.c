@@ -7,11 +7,35 @@ static const double MOMENTS_SNR = 10.0;
 /* Lower limit of the visible share used for errors. */
 static const double LEAST_SEEN = 0.02;
 
+/* Light of a pixel from which image processing takes it for saturated, e-: by the converter, or at
+ * 0.98 of the full well (imgproc/detect/detect.c). */
+static double saturation_e(const bst_generator *g) {
+    const bst_camera *c = g->camera;
+    double converter_e = (ldexp(1.0, (int)c->bits) - 1.0 - c->offset_dn) * c->gain_e_per_dn;
+    return fmin(converter_e, 0.98 * c->full_well_e * g->binning * g->binning) - g->background_e;
+}
+
+/* Bias of a saturated star's streak: the saturated pixels, where the star moved least, are left out
+ * of the fit. */
+static void saturated_bias(const bst_generator *g, const generator_source *s, double light,
+                           double bias[2]) {
+    bst_streak_model model = bst_generator_streak_model(g);
+    double peak_e = s->flux_e / (2.0 * BST_PI * model.sigma_px * model.sigma_px);
+    model.saturated = fmax(saturation_e(g), 0.0) / peak_e;
+    bst_star_trail_bias(&g->path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
+                        g->total_sigma, bias);
+    bst_path_fit(&g->path, &model, &model, light, bias);
+}
+
 /* Mean centroid bias of a fit: stars share the bias by the camera motion; an object in different
  * motion has its own. */
 static void shared_bias(const bst_generator *g, const generator_source *s, bool as_streak,
                         double light, double bias[2]) {
     bool shared = s->star || s->broken || g->path.count < 3;
+    if (shared && as_streak && s->saturated && !bst_generator_is_uniform(g)) {
+        saturated_bias(g, s, light, bias);
+        return;
+    }
     if (shared) {
         const double(*table)[2] = as_streak ? g->streak_bias : g->star_bias;
         double at = log10(fmax(light, GENERATOR_FIRST_LIGHT) / GENERATOR_FIRST_LIGHT);

@@ -97,6 +97,7 @@ static grid grid_about(const samples *model, double sigma, double margin) {
 /* Light on the grid and its derivatives by x, by y and by variance. */
 typedef struct planes {
     double value[4][COLUMNS * ROWS];
+    double full; /* pixels with more light are left out of the fit */
 } planes;
 
 /* Adds Gaussians at all samples, displaced by (dx, dy); the derivatives too if `all`. */
@@ -155,7 +156,9 @@ static bool improve(const planes *seen, const planes *model, int n, double light
         const double by[PARAMETERS] = {f->flux * model->value[1][i], f->flux * model->value[2][i],
                                        shape, f->flux * model->value[3][i]};
         double left = seen->value[0][i] - f->flux * shape;
-        double weight = 1.0 / (1.0 + light * fmax(f->flux * shape, 0.0) / top);
+        double weight = seen->value[0][i] > seen->full
+                            ? 0.0
+                            : 1.0 / (1.0 + light * fmax(f->flux * shape, 0.0) / top);
         squares->all += weight * seen->value[0][i] * seen->value[0][i];
         squares->left += weight * left * left;
         for (int p = 0; p < PARAMETERS; p++) {
@@ -195,6 +198,7 @@ bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_str
     double sigma = model->sigma_px;
     int n = g.columns * g.rows;
     render(&g, &star, 0.0, 0.0, sigma, false, &seen);
+    seen.full = model->saturated > 0.0 ? model->saturated : INFINITY;
     fitted f = {place_px[0] * c + place_px[1] * s, place_px[1] * c - place_px[0] * s, 1.0, 0.0};
     bool moving = true;
     for (int round = 0; round < ROUNDS && moving; round++) {
@@ -225,6 +229,7 @@ bst_path_point_fit bst_path_fit_points(const bst_path_point *points, int count, 
     grid g = grid_about(&point, model_px, fmax(MARGIN_SIGMAS * model_px, LEAST_MARGIN_PX));
     int n = g.columns * g.rows;
     render(&g, &seen_at, 0.0, 0.0, image_px, false, &seen);
+    seen.full = INFINITY;
     for (int round = 0; round < ROUNDS; round++) { /* the width settles after the place */
         render(&g, &point, f.x, f.y, model_px, true, &shape);
         (void)improve(&seen, &shape, n, light, model_px * model_px, &f, &squares);

@@ -12,6 +12,9 @@
 typedef struct bst_streak_model {
     bst_obsgen_path_px path, bend;
     double sigma_px; /* of the PSF, including the pixel */
+    /* light of a pixel from which on it is saturated and left out of the fit, relative to that of
+     * the whole star at rest; 0: none is */
+    double saturated;
 } bst_streak_model;
 
 /* Weighted squares on the fitted pixels, of one unit: of all light, and of what the model leaves.

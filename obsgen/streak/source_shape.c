@@ -16,7 +16,8 @@ static const double CLOSE_SHARE = 0.8;
 static const double NO_STREAK = 1e3;
 
 bst_streak_model bst_generator_streak_model(const bst_generator *g) {
-    return (bst_streak_model){g->star_path, {g->bend_x, g->bend_y}, g->total_sigma};
+    return (bst_streak_model){
+        .path = g->star_path, .bend = {g->bend_x, g->bend_y}, .sigma_px = g->total_sigma};
 }
 
 bool bst_generator_is_uniform(const bst_generator *g) {

@@ -1,4 +1,5 @@
 /* What the generator makes of streaks, against the laws that it states. */
+#include "obsgen/generator_internal.h"
 #include "tests/obsgen/generator_scene.h"
 
 /* SNR of the filter for a point over that of the streak's own, by sums over fine pixels. */
@@ -497,6 +498,77 @@ static void short_paths_are_placed_with_a_points_gradient(void **state) {
     close_scene(&s);
 }
 
+/* Output of a filter at a distance along the path, relative to its largest: integral of a Gaussian
+ * over the image (of length `a`) and the filter (of length `b`), both lines. */
+static double output_along(double distance, double a, double b, double sigma2) {
+    enum { PARTS = 200 };
+    double sum = 0.0, top = 0.0;
+    for (int i = 0; i < PARTS; i++) {
+        for (int k = 0; k < PARTS; k++) {
+            double d = a * ((i + 0.5) / PARTS - 0.5) - b * ((k + 0.5) / PARTS - 0.5);
+            sum += exp(-0.25 * (d - distance) * (d - distance) / sigma2);
+            top += exp(-0.25 * d * d / sigma2);
+        }
+    }
+    return sum / top;
+}
+
+/* A streak in whose line another source lies: the output between both does not fall by 3 below the
+ * lower maximum, so that images see one (imgproc/detect/candidates.c). The other one is a bright
+ * streak that has no light at the faint maximum, or a point beside the streak's end. */
+static void what_lies_in_line_joins(void **state) {
+    (void)state;
+    enum { FRAMES = 40 };
+    const double length = 12.0;
+    scene s;
+    open_scene(&s);
+    s.settings.false_alarms_per_frame = 1e-3;
+    s.calibration.background_fraction = s.calibration.crowding = 0.0;
+    s.frame.streak_dx_px = length;
+    start(&s);
+    double sigma2 = s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0;
+    for (int point = 0; point < 2; point++) {
+        double levels[2] = {9.0, point ? 9.0 : 600.0}; /* of the streak and of the other */
+        double apart = point ? 0.75 * length : length + 3.6 * sqrt(2.0 * sigma2);
+        double electrons[2] = {1000.0, 1000.0}, share = 0.0, lowest = INFINITY;
+        for (int round = 0; round < 2; round++) { /* the light for these outputs */
+            s.truth->count = 0;
+            for (uint32_t k = 0; k < 2; k++) {
+                bst_truth_item *t = add_source(&s, 1 + k, 500.0 + k * apart, 500.0, electrons[k]);
+                t->kind = k == 1 && point ? BST_SOURCE_OBJECT : BST_SOURCE_STAR;
+                double half = k == 1 && point ? 0.0 : 0.5 * length;
+                t->x_start_px -= half;
+                t->x_end_px += half;
+            }
+            (void)run(&s, 0);
+            for (int i = 0; i < s.generator->source_count; i++) {
+                const generator_source *o = &s.generator->sources[i];
+                electrons[o->item] *= levels[o->item] / o->unraised;
+                share = o->other;
+            }
+        }
+        for (double x = 1.0; x < apart; x += 1.0) {
+            double other = apart - x, both[2] = {0.0, 0.0};
+            both[1] = levels[0] * output_along(x, length, length, sigma2);
+            both[0] = levels[0] * share * output_along(x, length, 1e-3, sigma2);
+            both[1] += levels[1] * (point ? share * output_along(other, 1e-3, length, sigma2)
+                                          : output_along(other, length, length, sigma2));
+            both[0] += point ? levels[1] * output_along(other, 1e-3, 1e-3, sigma2) : 0.0;
+            lowest = fmin(lowest, fmax(both[0], both[1]));
+        }
+        assert_true(lowest > levels[0] - 2.0);
+        assert_true(levels[1] * output_along(apart, length, length, sigma2) < 0.01 || point);
+        int two = 0;
+        for (int n = 1; n <= FRAMES; n++) {
+            two += run(&s, n).count > 1;
+        }
+        printf("lowest output between %.1f and %.1f: %.2f, seen as two in %d of %d\n", levels[0],
+               levels[1], lowest, two, FRAMES);
+        assert_true(two <= FRAMES / 2); /* by noise between the maxima */
+    }
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(places_widen_by_what_is_not_known_of_the_path),
@@ -505,6 +577,7 @@ int main(void) {
         cmocka_unit_test(short_streaks_may_be_points),
         cmocka_unit_test(streaks_are_detected_in_either_filter),
         cmocka_unit_test(what_rests_is_drawn_by_the_streak_beside_it),
+        cmocka_unit_test(what_lies_in_line_joins),
         cmocka_unit_test(the_edge_cuts),
         cmocka_unit_test(long_streaks_are_seen_in_parts),
         cmocka_unit_test(tops_at_rest_scatter_evenly),

@@ -77,8 +77,10 @@ static void draw(plane *out, const path *p, double length, double shift, double 
     }
 }
 
-/* How far along a fit of flux, place and width would still move from `shift`, by differences. */
-static double left_to_go(const path *p, double length, double shift, double light, double sigma) {
+/* How far along a fit of flux, place and width would still move from `shift`, by differences;
+ * pixels with more light than `full` are left out. */
+static double left_to_go(const path *p, double length, double shift, double light, double sigma,
+                         double full) {
     static plane seen, model, next, wide;
     const double step = 0.02;
     double flux = 1.0, widening = 0.0, move = 0.0, top = 0.0;
@@ -101,7 +103,8 @@ static double left_to_go(const path *p, double length, double shift, double ligh
                 double shape = model.v[j][i] + widening * wider;
                 const double by[3] = {flux * (next.v[j][i] - model.v[j][i]) / step, shape,
                                       flux * wider};
-                double w = 1.0 / (1.0 + light * fmax(flux * shape, 0.0) / top);
+                double w =
+                    seen.v[j][i] > full ? 0.0 : 1.0 / (1.0 + light * fmax(flux * shape, 0.0) / top);
                 for (int m = 0; m < 3; m++) {
                     g[m] += w * by[m] * (seen.v[j][i] - flux * shape);
                     for (int n = 0; n < 3; n++) {
@@ -137,7 +140,7 @@ static void fits_end_where_they_would_on_fine_pixels(void **state) {
     const double sigma = 1.1, length = 10.0, lights[] = {0.1, 10.0, 1000.0};
     path p = slowing(length, 0.5);
     bst_star_trail_path route = route_of(&p);
-    bst_streak_model model = {{0.8 * length, 0.6 * length}, {0.0, 0.0}, sigma};
+    bst_streak_model model = {.path = {0.8 * length, 0.6 * length}, .sigma_px = sigma};
     double places[3];
     for (int i = 0; i < 3; i++) {
         double at[2] = {0.0, 0.0};
@@ -147,9 +150,34 @@ static void fits_end_where_they_would_on_fine_pixels(void **state) {
         bst_assert_close(0.8 * at[1] - 0.6 * at[0], 0.0, 2e-3);
         places[i] = 0.8 * at[0] + 0.6 * at[1];
         /* steps of 1 sigma in the sums, and where iterations end: 1e-3 px each */
-        bst_assert_close(left_to_go(&p, length, places[i], lights[i], sigma), 0.0, 6e-3);
+        bst_assert_close(left_to_go(&p, length, places[i], lights[i], sigma, INFINITY), 0.0, 6e-3);
     }
     assert_true(fabs(places[2] - places[0]) > 0.2);
+}
+
+/* The saturated pixels, where the star was slow, are left out: the fit lands farther from the mean
+ * of the light than that of a star that does not saturate. */
+static void saturated_pixels_are_left_out(void **state) {
+    (void)state;
+    const double sigma = 1.1, length = 10.0, light = 100.0, full = 0.25;
+    path p = resting(length, 0.3);
+    for (int k = 0; k < STEPS; k++) {
+        p.y[k] = 0.6 * p.x[k];
+        p.x[k] *= 0.8;
+    }
+    bst_star_trail_path route = route_of(&p);
+    bst_streak_model model = {.path = {0.8 * length, 0.6 * length}, .sigma_px = sigma};
+    double places[2];
+    for (int i = 0; i < 2; i++) {
+        double at[2] = {0.0, 0.0};
+        model.saturated = i > 0 ? full : 0.0;
+        (void)bst_path_fit(&route, &model, &model, light, at);
+        places[i] = 0.8 * at[0] + 0.6 * at[1];
+    }
+    printf("place %.3f, with saturated pixels %.3f\n", places[0], places[1]);
+    assert_true(fabs(places[1]) > 1.2 * fabs(places[0]));
+    /* the limit of saturation runs between the places of the sums, 1 sigma apart */
+    bst_assert_close(left_to_go(&p, length, places[1], light, sigma, full), 0.0, 0.05);
 }
 
 /* The largest outputs of both filters are those of sums over fine pixels. */
@@ -232,7 +260,8 @@ static void bright_streaks_have_another_bias(void **state) {
         double peak = electrons_of(&s, snrs[k]) / (sqrt(2.0 * BST_PI) * sigma * 10.0);
         double light = peak / (r.noise_e * r.noise_e);
         /* mean of 900 errors of 0.4 and 0.003 px; the table's levels are a decade apart */
-        bst_assert_close(left_to_go(&p, 10.0, seen, light, sigma), 0.0, k == 0 ? 0.06 : 0.03);
+        bst_assert_close(left_to_go(&p, 10.0, seen, light, sigma, INFINITY), 0.0,
+                         k == 0 ? 0.06 : 0.03);
     }
     close_scene(&s);
 }
@@ -267,6 +296,7 @@ static void stars_that_rest_are_points_where_they_rest(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fits_end_where_they_would_on_fine_pixels),
+        cmocka_unit_test(saturated_pixels_are_left_out),
         cmocka_unit_test(outputs_are_those_of_sums),
         cmocka_unit_test(bright_streaks_have_another_bias),
         cmocka_unit_test(stars_that_rest_are_points_where_they_rest),
