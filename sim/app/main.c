@@ -26,6 +26,7 @@ static const command commands[] = {
     {"loop", bst_cmd_loop, "margins and predicted pointing of a scenario's control loops"},
     {"lightcurve", bst_cmd_lightcurve,
      "magnitude of an object or a satellite's shape against time"},
+    {"turntable", bst_cmd_turntable, "pictures of a satellite's shape, and a GLB file of it"},
     {"schema", bst_cmd_schema, "print the JSON Schema of scenarios"},
     {"serve", bst_cmd_serve, "play a module of a scenario over the link"},
     {"link-keys", bst_cmd_link_keys, "make keys for a link that takes only peers that have them"},
