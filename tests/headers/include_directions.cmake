@@ -21,7 +21,7 @@ set(may_sim/catalogue sim/catalogue sim/astro sim/core)
 set(may_sim/optics sim/optics sim/messages sim/astro sim/core)
 # the configuration of the world names regions in which a target is searched for
 set(may_sim/satellite sim/satellite sim/astro sim/core)
-set(may_sim/world sim/world sim/onboard/region.h sim/optics sim/catalogue sim/messages sim/astro sim/core)
+set(may_sim/world sim/world sim/onboard/region.h sim/satellite sim/optics sim/catalogue sim/messages sim/astro sim/core)
 set(may_sim/onboard sim/onboard sim/world sim/optics sim/catalogue sim/messages sim/dynamics sim/astro sim/core)
 set(may_sim/io sim/io sim/world sim/optics sim/catalogue sim/messages sim/astro sim/core)
 set(may_sim/link sim/link sim/onboard sim/world sim/optics sim/messages sim/astro sim/core)
