@@ -38,6 +38,8 @@ int bst_cmd_check(int argc, char **argv);
 int bst_cmd_loop(int argc, char **argv);
 /* boresight lightcurve: magnitude of an object against time. */
 int bst_cmd_lightcurve(int argc, char **argv);
+/* boresight turntable: pictures of a satellite's shape. */
+int bst_cmd_turntable(int argc, char **argv);
 /* boresight schema: prints the JSON Schema of scenarios. */
 int bst_cmd_schema(int argc, char **argv);
 /* boresight serve: takes part in a run over the link. */

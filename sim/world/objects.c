@@ -66,7 +66,7 @@ static bst_status start_attitude(const bst_world_builder *b, const world_object 
     while (bst_body_attitude_next_start(attitude, &phase, &seconds)) {
         bst_world_state state;
         bst_sky_rotation sky;
-        BST_TRY(bst_sky_clock_at(b->ctx, b->clock, bst_world_time(b->world, seconds), &sky));
+        BST_TRY(bst_sky_clock_at(b->ctx, b->clock, bst_time_add(b->world->epoch, seconds), &sky));
         BST_TRY(bst_world_orbit_state(b->ctx, &object->orbit, b->clock, b->world->epoch, seconds,
                                       true, &state));
         bst_vec3 sun = bst_vec3_sub(bst_bodies_sunlight_from(&sky.bodies), state.position_m);
