@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 from ctypes import c_void_p
-from typing import Any, Iterator, List, Tuple
+from typing import Any, Callable, Iterator, List, Tuple
 
 from ._native import LIBRARY, Context
 from .errors import BusyError, ClosedError, ForkError
@@ -15,6 +15,14 @@ from .frame import LentCount
 from .model import ModelHandle
 
 
+try:  # without the look-up in enumerations, which takes longer than all else of a call
+    from _signal import getsignal as _get_handler  # type: ignore[import-not-found]
+    from _signal import signal as _set_handler
+except ImportError:
+    _get_handler: Callable[..., Any] = signal.getsignal  # type: ignore[no-redef]
+    _set_handler: Callable[..., Any] = signal.signal  # type: ignore[no-redef]
+
+_SIGINT = int(signal.SIGINT)
 _exiting: List[bool] = []
 # at the end of the process its memory goes with it: callbacks into Python would come too late
 atexit.register(_exiting.append, True)
@@ -116,9 +124,9 @@ class Interrupt:
     def __enter__(self) -> "Interrupt":
         self._came.clear()
         self._active = (threading.current_thread() is threading.main_thread()
-                        and callable(signal.getsignal(signal.SIGINT)))
+                        and callable(_get_handler(_SIGINT)))
         if self._active:
-            self._previous = signal.signal(signal.SIGINT, self._note)
+            self._previous = _set_handler(_SIGINT, self._note)
         return self
 
     def _note(self, number: int, frame: Any) -> None:
@@ -134,6 +142,6 @@ class Interrupt:
     def __exit__(self, *_: Any) -> None:
         if self._active:
             self._active = False
-            signal.signal(signal.SIGINT, self._previous)
+            _set_handler(_SIGINT, self._previous)
             if self._came:
                 self._previous(*self._came[0])  # raises KeyboardInterrupt unless set otherwise
