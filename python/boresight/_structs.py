@@ -185,7 +185,7 @@ class FrameOps(ctypes.Structure):
     """bst_frame_ops."""
     C_NAME = "bst_frame_ops"
     _fields_ = [("map", MapFunction), ("unmap", OwnerFunction), ("device_buffer", c_void_p),
-                ("recycle", c_void_p)]
+                ("recycle", c_void_p), ("share", c_void_p)]
 
 
 class FrameHandle(ctypes.Structure):
