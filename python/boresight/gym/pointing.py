@@ -3,10 +3,8 @@ from __future__ import annotations
 
 from typing import Any, Dict, Optional, Tuple
 
-import gymnasium
 import numpy as np
 import numpy.typing as npt
-from gymnasium import spaces
 
 from ..commands import los_command
 from ..errors import ArgumentError
@@ -14,6 +12,7 @@ from ..messages import Detections, Label, SourceKind, TruthFlag
 from ..model import Model
 from ..scenario import Scenario
 from ..simulation import Simulation
+from .base import Env, spaces
 from .geometry import cam_of_gcrf, gcrf_of_cam, tilted
 
 Observation = Dict[str, npt.NDArray[np.float32]]
@@ -29,7 +28,7 @@ def default_scenario() -> Scenario:
         "/observers/0/sensors/0/cue/offset_deg": 0, "/duration_s": 120})
 
 
-class PointingEnv(gymnasium.Env[Observation, Action]):
+class PointingEnv(Env[Observation, Action]):
     """Commands the line of sight of a telescope from the detections of each frame.
 
     Action: [2] change of the boresight's angular rate along camera +x and +y, in -1 to 1; 1 is
@@ -90,7 +89,7 @@ class PointingEnv(gymnasium.Env[Observation, Action]):
         telemetry = sim.pointing_telemetry
         assert telemetry is not None
         q = telemetry.items["q_cam_from_gcrf"][-1]
-        sim.los_command = tilted(q, shift * np.cos(angle), shift * np.sin(angle))
+        sim.command("los_command", tilted(q, shift * np.cos(angle), shift * np.sin(angle)))
         for _ in range(4):  # the mount settles
             found = sim.step("detections")
         return self._observe(found), self._info()

@@ -13,10 +13,11 @@ from gymnasium.vector.utils import batch_space
 from .pointing import Observation, PointingEnv, pointing_model
 from .tasking import TaskingEnv, TaskingModel
 
+_Base: Any = VectorEnv
 Batch = Dict[str, npt.NDArray[np.float32]]
 
 
-class ThreadedVectorEnv(VectorEnv[Any, Any, Any]):
+class ThreadedVectorEnv(_Base):
     """Several environments, stepped in threads. An environment that has ended starts anew with the
     step after (gymnasium's AutoresetMode.NEXT_STEP).
 
@@ -45,8 +46,11 @@ class ThreadedVectorEnv(VectorEnv[Any, Any, Any]):
             seeds = [seed + k for k in range(self.num_envs)]
         else:
             seeds = list(seed)
-        results = list(self._pool.map(lambda pair: pair[0].reset(seed=pair[1]),
-                                      zip(self.envs, seeds)))
+        def begin(number: int) -> Tuple[Observation, Dict[str, Any]]:
+            env: Any = self.envs[number]
+            observation, info = env.reset(seed=seeds[number])
+            return observation, info
+        results = list(self._pool.map(begin, range(self.num_envs)))
         self._ended[:] = False
         return self._stack([r[0] for r in results]), self._infos([r[1] for r in results])
 
