@@ -5,6 +5,7 @@ usage: docs/make_site.py BORESIGHT SOURCE_FOLDER [HTML_FOLDER]
 
 SOURCE_FOLDER receives the pages that Sphinx reads. Without HTML_FOLDER nothing but these is made. No step needs a network.
 """
+import json
 import pathlib
 import re
 import shutil
@@ -40,6 +41,28 @@ def write_tables(program, path):
         path.write_text(output_of(sys.executable, str(DOCS / "make_tables.py"), str(run / "run.sqlite")), encoding="utf-8")
 
 
+def write_notebook(notebook, page):
+    """A page of a notebook: its texts, and its code as it is executed by tests/python/test_examples.py."""
+    parts = []
+    for cell in json.loads(notebook.read_text(encoding="utf-8"))["cells"]:
+        text = "".join(cell["source"])
+        parts.append(text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```")
+    parts.insert(1, f"The notebook `docs/examples/python/{notebook.name}`, without its outputs.")
+    page.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+
+
+def write_notebooks(source):
+    """Pages of the notebooks, in place of the folder of examples, which is no part of the site."""
+    folder = source / "how-to" / "notebooks"
+    folder.mkdir()
+    for notebook in sorted((source / "examples" / "python").glob("*.ipynb")):
+        write_notebook(notebook, folder / f"{notebook.stem}.md")
+    guide = source / "how-to" / "python.md"
+    text = re.sub(r"\(\.\./examples/python/(\w+)\.ipynb\)", r"(notebooks/\1.md)", guide.read_text(encoding="utf-8"))
+    pages = "\n".join(f"notebooks/{page.stem}" for page in sorted(folder.glob("*.md")))
+    guide.write_text(f"{text}\n```{{toctree}}\n:hidden:\n\n{pages}\n```\n", encoding="utf-8")
+
+
 def generate(program, source):
     if source.exists():
         shutil.rmtree(source)
@@ -50,6 +73,7 @@ def generate(program, source):
     output_of(*keys, str(reference / "study_keys"), input=output_of(program, "study", "--schema"))
     write_commands(program, reference / "commands.md")
     write_tables(program, reference / "database.md")
+    write_notebooks(source)
     output_of(sys.executable, str(DOCS / "make_c_api.py"), str(ROOT / "include" / "boresight"), str(reference / "c_api"))
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     (source / "changes.md").write_text(changes.replace("](docs/", "]("), encoding="utf-8")

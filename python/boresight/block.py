@@ -11,7 +11,8 @@ class Block:
     def to_dict(self) -> Dict[str, Any]:
         """The block as JSON has it."""
         out: Dict[str, Any] = {}
-        for field in fields(self):  # type: ignore[arg-type]
+        block: Any = self  # a dataclass, as all of boresight.config are
+        for field in fields(block):
             value = getattr(self, field.name)
             if value is not None:
                 out[field.name.rstrip("_")] = plain(value)

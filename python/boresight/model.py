@@ -102,10 +102,12 @@ class Model:
     def camera(self, sensor: Union[int, str] = 0) -> Camera:
         """True camera of a sensor, by its number or its name "observer/sensor"."""
         names = self.sensors
-        number = names.index(sensor) if sensor in names else sensor
-        if isinstance(number, str):
-            raise ArgumentError(f"there is no sensor {number!r} (allowed: {', '.join(names)})")
-        number = _native.integer_argument(number, "sensor", 0, len(names) - 1)
+        if isinstance(sensor, str):
+            if sensor not in names:
+                raise ArgumentError(f"there is no sensor {sensor!r} (allowed: "
+                                    f"{', '.join(names)})")
+            sensor = names.index(sensor)
+        number = _native.integer_argument(sensor, "sensor", 0, len(names) - 1)
         self.prepare()
         return camera_of(LIBRARY.bst_model_camera(self.handle.pointer, number)[0])
 
@@ -138,9 +140,8 @@ def _model(scenario: Scenario, external: Sequence[str], device: Optional[str],
 
 def external_names(external: Any) -> "tuple[str, ...]":
     """Names of external modules from a text or a sequence of texts."""
-    names = (external,) if isinstance(external, str) else external
     try:
-        names = tuple(names)
+        names = (external,) if isinstance(external, str) else tuple(external)
     except TypeError:
         raise ArgumentError(f"external takes names of modules, not "
                             f"{type(external).__name__}") from None

@@ -77,6 +77,8 @@ class ModuleEnv:
         if x.ndim != 1 or x.shape != y.shape:
             raise ArgumentError(f"directions_cam takes x_px [n] and y_px [n], found {x.shape} and "
                                 f"{y.shape}")
+        if not np.all(np.isfinite(x)) or not np.all(np.isfinite(y)):
+            raise ArgumentError("directions_cam: a pixel coordinate is not finite")
         if not self._camera:
             raise ClosedError("the camera is that of a simulation that has ended, or of no single "
                               "sensor")
@@ -121,6 +123,7 @@ class Inputs(ChannelViews):
     """
 
     __slots__ = ("_step", "_reads", "_writes", "_base", "_unread", "scope", "_info")
+    _step: "ModuleStep"
 
     def __init__(self, step: "ModuleStep", info: "StepInfo", member: int):
         self._step, self._info, self.scope = step, info, info.scopes[member]
@@ -234,6 +237,9 @@ class ModuleStep(Inputs):
     """
 
     __slots__ = ("pointer", "tick", "time_s", "tick_rate_hz", "info", "_sensors")
+    tick: int
+    time_s: float
+    tick_rate_hz: int
 
     def __init__(self, pointer: int, info: "StepInfo"):
         self.pointer: Optional[int] = pointer

@@ -126,7 +126,8 @@ class Record:
         return {name: plain(value) for name, value in self._members()}
 
     def __eq__(self, other: object) -> bool:
-        return type(other) is type(self) and self._key() == other._key()
+        return (isinstance(other, Record) and type(other) is type(self)
+                and self._key() == other._key())
 
     def __hash__(self) -> int:
         return hash(self._key())

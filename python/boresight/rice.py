@@ -16,7 +16,7 @@ class _Bits:
 
     def __init__(self, heap: bytes, starts: Ints, sizes: Ints):
         # overlapping 64-bit words, one from each byte on
-        self._words = np.ndarray((len(heap) + 1,), ">u8", heap + bytes(8), strides=(1,))
+        self._words: npt.NDArray[np.uint64] = np.ndarray((len(heap) + 1,), ">u8", heap + bytes(8), strides=(1,))
         self.bit = 8 * starts
         self.end = 8 * (starts + sizes)
 

@@ -1,20 +1,13 @@
-"""Gymnasium environments; left out (exit code 77) where Gymnasium is not installed."""
-import os
-import sys
+"""Environments of boresight.gym. What needs Gymnasium is left out where it is not installed."""
 import unittest
 import warnings
 
-try:
-    import gymnasium
-except ImportError:
-    print("gymnasium is not installed: nothing is tested")
-    sys.exit(77)
-
 import numpy as np
-from gymnasium.utils.env_checker import check_env
 
 from support import bst, main
 import boresight.gym as bg
+
+with_gymnasium = unittest.skipUnless(bg.HAS_GYMNASIUM, "gymnasium is not installed")
 
 
 class Pointing(unittest.TestCase):
@@ -31,12 +24,16 @@ class Pointing(unittest.TestCase):
             out.append((observation["detections"].tobytes(), reward, info["error_px"]))
         return out
 
+    @with_gymnasium
     def test_the_checker_of_gymnasium_passes(self):
+        from gymnasium.utils.env_checker import check_env
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             check_env(bg.PointingEnv(model=self.model, render_mode="rgb_array"))
 
+    @with_gymnasium
     def test_it_is_registered(self):
+        import gymnasium
         env = gymnasium.make("boresight/Pointing-v0", model=self.model)
         self.assertIsInstance(env.unwrapped, bg.PointingEnv)
 
@@ -73,6 +70,7 @@ class Pointing(unittest.TestCase):
         self.assertLess(random, 0.1)
         self.assertGreater(greedy, 0.3)
 
+    @with_gymnasium
     def test_the_vector_is_its_environments(self):
         vector = bg.PointingVectorEnv(3, model=self.model)
         observations, infos = vector.reset(seed=5)
@@ -90,6 +88,7 @@ class Pointing(unittest.TestCase):
             self.assertEqual(reward[1], own)
         vector.close()
 
+    @with_gymnasium
     def test_the_vector_starts_ended_ones_anew(self):
         vector = bg.PointingVectorEnv(2, model=self.model, patience=1)
         vector.reset(seed=1)
@@ -141,7 +140,9 @@ class Tasking(unittest.TestCase):
         cls.model = bg.TaskingModel(
             bst.Scenario.load("constellation_quick.json").with_(duration_s=80), targets=12)
 
+    @with_gymnasium
     def test_the_checker_of_gymnasium_passes(self):
+        from gymnasium.utils.env_checker import check_env
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             check_env(bg.TaskingEnv(model=self.model))
@@ -178,21 +179,39 @@ class Tasking(unittest.TestCase):
         self.assertLessEqual(greedy, 12)
         self.assertGreater(bg.builtin_tasking_score(env, runs=[1]), 1)
 
-    def test_a_seed_is_a_run_and_the_vector_is_its_environments(self):
+    def test_whole_numbers_of_seconds_are_times_too(self):
+        env = bg.TaskingEnv(model=self.model, decision_s=10, revisit_s=150)
+        env.reset(seed=1)
+        _, _, _, _, info = env.step(np.zeros(5, int))
+        self.assertEqual(info["age_s"].dtype, np.float64)
+
+    def courses(self, action):
+        """Twice the same steps of the run number 7."""
         env = bg.TaskingEnv(model=self.model)
-        action = np.array([1, 2, 3, 4, 5])
         course = []
         for _ in range(2):
             env.reset(seed=7)
             course.append([env.step(action)[:2] for _ in range(2)])
-        vector = bg.TaskingVectorEnv(2, model=self.model)
-        vector.reset(seed=6)
-        course.append([[{k: v[1] for k, v in o.items()}, r[1]] for o, r in
-                       (vector.step(np.array([action, action]))[:2] for _ in range(2))])
+        return course
+
+    def check_same(self, course):
         for other in course[1:]:
             for (a, reward), (b, same) in zip(course[0], other):
                 np.testing.assert_array_equal(a["targets"], b["targets"])
                 self.assertEqual(reward, same)
+
+    def test_a_seed_is_a_run(self):
+        self.check_same(self.courses(np.array([1, 2, 3, 4, 5])))
+
+    @with_gymnasium
+    def test_the_vector_is_its_environments(self):
+        action = np.array([1, 2, 3, 4, 5])
+        course = self.courses(action)
+        vector = bg.TaskingVectorEnv(2, model=self.model)
+        vector.reset(seed=6)
+        course.append([[{k: v[1] for k, v in o.items()}, r[1]] for o, r in
+                       (vector.step(np.array([action, action]))[:2] for _ in range(2))])
+        self.check_same(course)
         vector.close()
 
     def test_misuse_raises(self):
@@ -205,6 +224,35 @@ class Tasking(unittest.TestCase):
                 env.step(wrong)
         with self.assertRaises(bst.ArgumentError):
             bg.TaskingModel("neossat_geo_track.json")
+
+
+class Plain(unittest.TestCase):
+    """Environments where Gymnasium is not installed."""
+
+    def test_spaces_contain_what_they_sample(self):
+        from boresight.gym.base import PlainSpaces
+        box = PlainSpaces.Box(-1, 1, (2, 3), np.float32)
+        numbers = PlainSpaces.MultiDiscrete([4, 9])
+        both = PlainSpaces.Dict({"a": box, "b": numbers})
+        for space in (box, numbers, both):
+            for _ in range(20):
+                self.assertTrue(space.contains(space.sample()))
+        for space, wrong in ((box, np.full((2, 3), 2, np.float32)), (box, np.zeros((2, 3))),
+                             (box, np.zeros(3, np.float32)), (box, "x"), (numbers, [4, 0]),
+                             (numbers, [-1, 0]), (numbers, [0.5, 0]), (both, {"a": box.sample()})):
+            self.assertFalse(space.contains(wrong))
+
+    def test_it_says_what_needs_gymnasium(self):
+        if not bg.HAS_GYMNASIUM:
+            with self.assertRaisesRegex(ImportError, r"pip install boresight\[gym\]"):
+                bg.TaskingVectorEnv
+
+    def test_observations_are_in_their_spaces(self):
+        env = bg.PointingEnv(model=bg.pointing.pointing_model(
+            bg.pointing.default_scenario().with_(duration_s=20)))
+        observation, _ = env.reset(seed=1)
+        self.assertTrue(env.observation_space.contains(observation))
+        self.assertTrue(env.observation_space.contains(env.step(env.action_space.sample())[0]))
 
 
 if __name__ == "__main__":

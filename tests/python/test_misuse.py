@@ -127,6 +127,101 @@ def wrong_objects():
     yield lambda: bst.report("no such folder")
 
 
+def works(*arguments, **keys):
+    """A function that could be registered."""
+
+
+class NoCall:
+    """A class that cannot be called."""
+
+    def __init__(self, first):
+        self.first = first
+
+
+class NoLaw(NoCall):
+    """A compensator with a wrong number of numbers."""
+    states = 1000
+
+    def step(self, state, error):
+        """Output."""
+        return error
+
+
+def with_attributes(**attributes):
+    """A module with attributes of its own."""
+    def module(step):
+        pass
+    vars(module).update(attributes)
+    return module
+
+
+def with_key(default):
+    """A module with a key."""
+    def module(step, *, key=default):
+        pass
+    return module
+
+
+def wrong_registrations():
+    """Wrong plug-ins, as functions."""
+    roles = ("detector", "frame_stage", "compensator", "imgproc", "tracker", "control", "tasking")
+    for role in roles:
+        for value in (5, "text", b"x", [], {}, object(), NoCall):
+            yield lambda r=role, v=value: bst.register(**{r: v})
+        for name in ("a/b", "a b", "\0", "x" * 200, 5, b"x"):
+            yield lambda r=role, n=name: bst.register(n, **{r: NoLaw if r == "compensator"
+                                                              else works})
+    yield lambda: bst.register()
+    yield lambda: bst.register("name")
+    yield lambda: bst.register(gimbal=works)
+    yield lambda: bst.register(compensator=works)
+    yield lambda: bst.register(compensator=NoLaw)
+    for role in ("imgproc", "tracker", "control", "tasking"):
+        for attributes in ({"rate_hz": "fast"}, {"rate_hz": -1}, {"rate_hz": np.nan},
+                           {"rate_hz": True}, {"ports": 5}, {"ports": ["tracks"]}, {"ports": []},
+                           {"ports": [bst.Port("tracks")]},
+                           {"ports": [bst.Port("nothing", output=True)]},
+                           {"ports": [bst.Port("planes"), bst.Port("task", output=True)]},
+                           {"ports": [bst.Port("frame", output=True)]},
+                           {"ports": [bst.Port("los_history", output=True)]},
+                           {"ports": [bst.Port("tracks"), bst.Port("tracks", output=True)]},
+                           {"ports": [bst.Port("tracks", output=True, capacity=-1)]},
+                           {"ports": [bst.Port("tracks", output=True, capacity=10**6)]},
+                           {"ports": [bst.Port("task", output=True),
+                                      bst.Port("tracks", max_age_s=np.nan)]}):
+            yield lambda r=role, a=attributes: bst.register(**{r: with_attributes(**a)})
+        for default in (None, [], np.nan, 1j, b"x"):
+            yield lambda r=role, d=default: bst.register(**{r: with_key(d)})
+    for keys in ({"tracker": 5}, {"tracker": "python:nobody"}, {"control": "no/file.so"}, {},
+                 {"tasking": "python:nobody"}, {"gimbal": "python:nobody"},
+                 {"compensator": "python:nobody"}):
+        yield lambda k=keys: SMALL.with_plugin(**k).validate()
+
+
+# what a tracker must not do in its step: the text is executed with `step`, `env` and `bst`
+WRONG_STEPS = [
+    "return 5", "return 'tracks'", "return [1]", "return {'tracks': 5}", "return {'nothing': []}",
+    "return {5: []}", "return bst.Detections()", "return [bst.Tracks(), bst.Detections()]",
+    "return {'neossat/telescope': 5}", "step.detections = []", "step.tracks = 5",
+    "step.tracks = 'x'", "step.tracks = [None]", "step.tracks = {'id': ['a']}",
+    "step.tracks = {'nothing': [1]}", "step.los_command = [0, 0, 1]", "step.task = {}",
+    "step.frame", "step.truth", "step.tracks", "step.view('nothing')", "step.view(5)",
+    "step.view(None)", "step.view([])", "step.unread('tracks')", "step.unread([])",
+    "step.command('tracks', 5)", "step.command(5, [])", "step.command(None, None)",
+    "step.command([], [])", "step.event(5, 'x')", "step.event('x', None)", "step.event('a\\0', 'b')",
+    "step.count(5)", "step.count('a\\0')", "step.sensors['nobody']", "step.nothing",
+    "step.nothing = 1", "step.detections.items['x_px'][:] = 0", "step.detections.exposure_id = 5",
+    "step.detections.array['exposure_id'] = 5", "env.directions_cam('x', [1])",
+    "env.directions_cam([1], [1, 2])", "env.directions_cam([[1]], [[1]])",
+    "env.directions_cam(None, [1])", "env.directions_gcrf([1], [1], [0, 0, 0, 2])",
+    "env.directions_gcrf([1], [1], 'q')", "env.directions_gcrf([1], [1], [0, 0, 1])",
+    "env.directions_gcrf([1], [1], None)", "pickle.dumps(env)", "pickle.dumps(step)",
+    "step.tracks = [{'direction_gcrf': [0, 0, 2]}]", "return bst.Tracks([{}])",
+    "return bst.Tracks([{'id': 1, 'direction_gcrf': [0, 0, np.nan]}])",
+    "return bst.Predictions([{'direction_gcrf': [0, 0, 0]}])",
+]
+
+
 def call_in_child(function):
     """Result of a function in a forked process: "raised NAME", "returned", or the exit code."""
     reading, writing = os.pipe()
@@ -230,6 +325,45 @@ class Misuse(unittest.TestCase):
             with self.assertRaises(KeyError):
                 held.step("frame")
         self.assertEqual(seen, [1])
+
+    def test_wrong_registrations_raise(self):
+        calls = list(wrong_registrations())
+        self.assertGreaterEqual(len(calls), 150)
+        for number, call in enumerate(calls):
+            with self.subTest(call=number):
+                self.check(number, call)
+
+    def test_wrong_steps_raise(self):
+        scenario = SMALL.with_({"/observers/0/sensors/0/modules/scenegen/star_limit_v_mag": 5})
+        for number, text in enumerate(WRONG_STEPS):
+            space = {"bst": bst, "np": np, "pickle": pickle}
+            exec("class Wrong:\n    def __init__(self, env):\n        self.env = env\n"
+                 f"    def __call__(self, step):\n        env = self.env\n        {text}\n", space)
+            name = bst.register("wrong", tracker=space["Wrong"])
+            with bst.Simulation(scenario.with_plugin(tracker=name)) as sim, \
+                    self.subTest(step=text):
+                self.check(number, lambda: sim.run_until(2))
+
+    def test_an_env_ends_with_its_simulation(self):
+        kept = []
+
+        class Keeps:
+            def __init__(self, env):
+                kept.append(env)
+
+            def __call__(self, step):
+                kept.append(step)
+        sim = bst.Simulation(SMALL.with_plugin(tracker=bst.register(tracker=Keeps)))
+        sim.run_until(1)
+        self.assertEqual(kept[0].directions_cam([1.0], [2.0]).shape, (1, 3))
+        sim.close()
+        del sim
+        gc.collect()
+        with self.assertRaises(bst.ClosedError):
+            kept[0].directions_cam([1.0], [2.0])
+        self.assertEqual(kept[0].camera.width_px, 256)
+        with self.assertRaises(bst.StateError):
+            kept[1].detections
 
     def test_closed_simulations_raise(self):
         self.sim.close()

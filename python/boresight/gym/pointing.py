@@ -3,10 +3,8 @@ from __future__ import annotations
 
 from typing import Any, Dict, Optional, Tuple
 
-import gymnasium
 import numpy as np
 import numpy.typing as npt
-from gymnasium import spaces
 
 from ..errors import ArgumentError
 from ..messages import Label
@@ -14,6 +12,7 @@ from ..model import Model
 from ..pool import Pool
 from ..scenario import Scenario
 from ..simulation import Simulation
+from .base import Env, spaces
 from .pointing_group import HIGH, LOW, PointingGroup, PointingSettings
 
 Observation = Dict[str, npt.NDArray[np.float32]]
@@ -27,7 +26,7 @@ def default_scenario() -> Scenario:
         "/observers/0/sensors/0/cue/offset_deg": 0, "/duration_s": 120})
 
 
-class PointingEnv(gymnasium.Env[Observation, Action]):
+class PointingEnv(Env[Observation, Action]):
     """Commands the line of sight of a telescope from the detections of each frame.
 
     Action: [2] change of the boresight's angular rate along camera +x and +y, in -1 to 1; 1 is

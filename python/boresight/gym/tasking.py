@@ -4,10 +4,8 @@ from __future__ import annotations
 import pathlib
 from typing import Any, Dict, List, Optional, Tuple
 
-import gymnasium
 import numpy as np
 import numpy.typing as npt
-from gymnasium import spaces
 
 from ..commands import los_command
 from ..errors import ArgumentError
@@ -15,6 +13,7 @@ from ..messages import Detections, Label, NavTelemetry, SourceKind, Truth, Truth
 from ..model import Model
 from ..scenario import Scenario
 from ..simulation import Simulation
+from .base import Env, spaces
 from .catalogue import Catalogue, geostationary, propagated, visible
 from .geometry import cam_of_gcrf, gcrf_of_cam
 
@@ -60,7 +59,7 @@ class Score:
     def __init__(self, norad: npt.NDArray[np.int64], revisit_s: float):
         self._index = {int(n): k for k, n in enumerate(norad)}
         self.revisit_s = revisit_s
-        self.age_s = np.full(len(norad), revisit_s)
+        self.age_s = np.full(len(norad), float(revisit_s))
         self._frames = np.zeros(len(norad), int)
 
     def take(self, message: Any) -> None:
@@ -84,7 +83,7 @@ class Score:
         return gain
 
 
-class TaskingEnv(gymnasium.Env[Observation, Any]):
+class TaskingEnv(Env[Observation, Any]):
     """Chooses the target of each telescope of a constellation, every `decision_s` seconds.
 
     Action: MultiDiscrete, for each sensor the number of its target. The mount slews to the target's
@@ -99,7 +98,7 @@ class TaskingEnv(gymnasium.Env[Observation, Any]):
     "age_s". `reset(seed=n)` starts the run number n.
     """
 
-    metadata = {"render_modes": []}
+    metadata: Dict[str, Any] = {"render_modes": []}
 
     def __init__(self, scenario: Any = None, *, model: Optional[TaskingModel] = None,
                  targets: int = 24, decision_s: float = 20.0, revisit_s: float = 300.0):
@@ -127,7 +126,7 @@ class TaskingEnv(gymnasium.Env[Observation, Any]):
         self._sim = Simulation(self.shared.model, run=run)
         self._score = Score(self.shared.catalogue.norad, self.revisit_s)
         self._sim.observe(message=self._score.take, channels=["truth"])
-        self._detected_s = np.full(self.count, -self.revisit_s)
+        self._detected_s = np.full(self.count, -float(self.revisit_s))
         self._chosen = [-1] * len(self.sensors)
         self._sim.run_until(0.1)  # telemetry is there
         for row, scope in enumerate(self.sensors):  # the first targets that can be seen

@@ -20,6 +20,7 @@ from .pointing import Observation, pointing_model, pointing_observations, pointi
 from .pointing_group import PointingGroup
 from .tasking import TaskingEnv, TaskingModel
 
+_Base: Any = VectorEnv
 Batch = Dict[str, npt.NDArray[np.float32]]
 
 
@@ -30,7 +31,7 @@ def _seeds(seed: Union[int, Sequence[Optional[int]], None], count: int) -> List[
     return [seed + k for k in range(count)] if isinstance(seed, int) else list(seed)
 
 
-class ThreadedVectorEnv(VectorEnv[Any, Any, Any]):
+class ThreadedVectorEnv(_Base):
     """Several environments, stepped in threads. An environment that has ended starts anew with the
     step after (gymnasium's AutoresetMode.NEXT_STEP).
 
@@ -54,8 +55,12 @@ class ThreadedVectorEnv(VectorEnv[Any, Any, Any]):
               options: Optional[Dict[str, Any]] = None) -> Tuple[Batch, Dict[str, Any]]:
         """Starts all; an integer seed gives environment k the run number seed + k."""
         seeds = _seeds(seed, self.num_envs)
-        results = list(self._pool.map(lambda pair: pair[0].reset(seed=pair[1]),
-                                      zip(self.envs, seeds)))
+
+        def begin(number: int) -> Tuple[Observation, Dict[str, Any]]:
+            env: Any = self.envs[number]
+            observation, info = env.reset(seed=seeds[number])
+            return observation, info
+        results = list(self._pool.map(begin, range(self.num_envs)))
         self._ended[:] = False
         return self._stack([r[0] for r in results]), self._infos([r[1] for r in results])
 
@@ -92,7 +97,7 @@ class ThreadedVectorEnv(VectorEnv[Any, Any, Any]):
         self._pool.shutdown()
 
 
-class PointingVectorEnv(VectorEnv[Any, Any, Any]):
+class PointingVectorEnv(_Base):
     """Several PointingEnv that share a model, as arrays: C code steps them in a pool of threads. An
     environment that has ended starts anew with the step after (AutoresetMode.NEXT_STEP).
 
