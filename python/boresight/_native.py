@@ -9,7 +9,7 @@ from ctypes import POINTER, byref, c_bool, c_char_p, c_double, c_int, c_int64, c
     c_uint64, c_void_p
 from typing import Any, List, Optional
 
-from . import _structs
+from . import _pocl, _structs
 from .errors import OF_STATUS, BoresightError, DeviceError
 from .messages import CHANNELS
 
@@ -131,6 +131,7 @@ _FUNCTIONS = {
 
 
 def _load() -> Any:
+    _pocl.offer()
     path = library_path()
     try:
         library = ctypes.CDLL(str(path))
