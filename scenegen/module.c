@@ -212,6 +212,9 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     bst_status status =
         bst_renderer_create(env->ctx, env->device, s->camera, &options, &s->renderer);
     if (status == BST_OK) {
+        status = bst_renderer_prepare(env->ctx, s->renderer);
+    }
+    if (status == BST_OK) {
         status = bst_field_create(env->ctx, env->world, env->observer, env->sensor, &s->field);
     }
     if (status == BST_OK) {
@@ -265,6 +268,9 @@ static bst_status replace_renderer(bst_ctx *ctx, scenegen *s, const bst_camera *
     bst_renderer *renderer;
     bst_status status =
         bst_renderer_create(ctx, s->device, camera, &s->renderer_options, &renderer);
+    if (status == BST_OK && (status = bst_renderer_prepare(ctx, renderer)) != BST_OK) {
+        bst_renderer_free(renderer);
+    }
     if (status != BST_OK) {
         bst_psf_free(psf);
         return status;

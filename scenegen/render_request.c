@@ -91,40 +91,41 @@ double bst_render_exposure_s(const bst_render_request *q) {
     return q->row_time_s != 0.0 ? q->exposure_s : q->track->time_s[q->track->count - 1];
 }
 
-bst_kernel_frame_params bst_render_params(const bst_camera *c, const bst_renderer_options *options,
+bst_kernel_frame_params bst_render_params(const bst_kernel_frame_params *fixed, const bst_camera *c,
+                                          const bst_renderer_options *options,
                                           const bst_render_request *q, int sources) {
     const bst_skylight_map *map = bst_render_background(q);
     bst_window w = q->window;
     int x0 = w.x0 / 64 * 64;
-    return (bst_kernel_frame_params){
-        .window_x0 = w.x0,
-        .window_y0 = w.y0,
-        .window_width = w.width,
-        .window_height = w.height,
-        .sensor_width = (int)c->width_px,
-        .tiles_x0 = x0,
-        .tiles_x = (w.x0 + w.width - x0 + options->tile_width - 1) / options->tile_width,
-        .tiles_y = (w.height + options->tile_height - 1) / options->tile_height,
-        .source_groups = (sources + BST_BLOCK - 1) / BST_BLOCK,
-        .key0 = q->key.k[0],
-        .key1 = q->key.k[1],
-        .exposure_low = (unsigned)((uint64_t)q->exposure_id & 0xFFFFFFFFu),
-        .exposure_high = (unsigned)((uint64_t)q->exposure_id >> 32),
-        .background_e = (float)q->background_e,
-        .dark_e = (float)q->dark_e,
-        .exposure_s = (float)bst_render_exposure_s(q),
-        .read_noise_e = (float)c->read_noise_e,
-        .full_well_e = (float)c->full_well_e,
-        .per_full_well = (float)(1.0 / c->full_well_e),
-        .near_full_e = (float)bst_detector_near_full_e(c->full_well_e),
-        .dn_per_e = (float)(1.0 / c->gain_e_per_dn),
-        .offset_dn = (float)c->offset_dn,
-        .max_dn = (float)((1 << c->bits) - 1),
-        .image_stride = w.width,
-        .map_step = map->step_px,
-        .map_x0 = map->x0_px,
-        .map_y0 = map->y0_px,
-        .map_columns = map->columns,
-        .map_rows = map->rows,
-    };
+    bst_kernel_frame_params p = *fixed;
+    p.window_x0 = w.x0;
+    p.window_y0 = w.y0;
+    p.window_width = w.width;
+    p.window_height = w.height;
+    p.sensor_width = (int)c->width_px;
+    p.tiles_x0 = x0;
+    p.tiles_x = (w.x0 + w.width - x0 + options->tile_width - 1) / options->tile_width;
+    p.tiles_y = (w.height + options->tile_height - 1) / options->tile_height;
+    p.source_groups = (sources + BST_BLOCK - 1) / BST_BLOCK;
+    p.key0 = q->key.k[0];
+    p.key1 = q->key.k[1];
+    p.exposure_low = (unsigned)((uint64_t)q->exposure_id & 0xFFFFFFFFu);
+    p.exposure_high = (unsigned)((uint64_t)q->exposure_id >> 32);
+    p.background_e = (float)q->background_e;
+    p.dark_e = (float)q->dark_e;
+    p.exposure_s = (float)bst_render_exposure_s(q);
+    p.read_noise_e = (float)c->read_noise_e;
+    p.full_well_e = (float)c->full_well_e;
+    p.per_full_well = (float)(1.0 / c->full_well_e);
+    p.near_full_e = (float)bst_detector_near_full_e(c->full_well_e);
+    p.dn_per_e = (float)(1.0 / c->gain_e_per_dn);
+    p.offset_dn = (float)c->offset_dn;
+    p.max_dn = (float)((1 << c->bits) - 1);
+    p.image_stride = w.width;
+    p.map_step = map->step_px;
+    p.map_x0 = map->x0_px;
+    p.map_y0 = map->y0_px;
+    p.map_columns = map->columns;
+    p.map_rows = map->rows;
+    return p;
 }

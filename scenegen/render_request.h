@@ -20,8 +20,10 @@ double bst_render_exposure_s(const bst_render_request *request);
 const bst_skylight_map *bst_render_background(const bst_render_request *request);
 /* Kernel parameters of a frame.
  *
- * Given:     sources  number of rendered sources */
-bst_kernel_frame_params bst_render_params(const bst_camera *camera,
+ * Given:     fixed    parameters that are the camera's, equal in all frames
+ *            sources  number of rendered sources */
+bst_kernel_frame_params bst_render_params(const bst_kernel_frame_params *fixed,
+                                          const bst_camera *camera,
                                           const bst_renderer_options *options,
                                           const bst_render_request *request, int sources);
 

@@ -6,16 +6,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bst_device_kernels.h"
-#include "bst_scenegen_kernels.h"
 #include "scenegen/detector/detector.h"
 #include "scenegen/detector/readout.h"
+#include "scenegen/detector/vignetting.h"
 #include "scenegen/device_array.h"
 #include "scenegen/fourier/fourier_render.h"
 #include "scenegen/frame_pool.h"
 #include "scenegen/reference.h"
 #include "scenegen/render_request.h"
 #include "scenegen/saturation_count.h"
+#include "scenegen/scene_kernels.h"
 #include "scenegen/scene_options.h"
 #include "scenegen/scene_plan.h"
 #include "scenegen/smear/rolling_shutter.h"
@@ -35,7 +35,9 @@ struct bst_renderer {
     int taps, law_degree; /* of the stamps */
     cl_context context;
     cl_command_queue queue;
-    cl_program program;
+    bst_device *device;
+    bst_kernel_frame_params fixed; /* parameters of the kernels that are the camera's */
+    char tile_options[256];        /* build options of the tile kernels */
     cl_kernel nodes_kernel, frame_kernel, expected_kernel;
     bst_psf *psf;
     bst_fourier_render *fourier; /* NULL: Gaussian PSF, light from stamps */
@@ -70,28 +72,41 @@ static int taps_for(double sigma_px) {
     return taps > MAX_TAPS ? MAX_TAPS : taps;
 }
 
-static bst_status build(bst_ctx *ctx, bst_renderer *r, bst_device *device) {
-    const bst_device_kernel_source *sources[] = {
-        &bst_kernel_scene_shared, &bst_kernel_nodes,      &bst_kernel_block_search,
-        &bst_kernel_random,       &bst_kernel_splat,      &bst_kernel_chunk,
-        &bst_kernel_noise_law,    &bst_kernel_read_tail,  &bst_kernel_detector,
-        &bst_kernel_light,        &bst_kernel_vignetting, &bst_kernel_background,
-        &bst_kernel_tile,         &bst_kernel_readout};
-    char options[2048];
-    bst_scene_build_options(&r->camera, &r->options, r->taps, r->law_degree, r->fourier != NULL,
-                            r->detector, options, sizeof options);
-    BST_TRY(bst_device_build(ctx, device, sources, sizeof sources / sizeof *sources, options,
-                             &r->program));
-    static const char *const names[3] = {"bst_scene_nodes", "bst_scene_frame",
-                                         "bst_scene_expected"};
-    cl_kernel *kernels[3] = {&r->nodes_kernel, &r->frame_kernel, &r->expected_kernel};
-    for (int i = 0; i < 3; i++) {
-        cl_int code;
-        *kernels[i] = clCreateKernel(r->program, names[i], &code);
-        BST_TRY(bst_device_check(ctx, code, names[i]));
+/* Builds the kernel of noise-free images at its first use. */
+static bst_status build_expected(bst_ctx *ctx, bst_renderer *r) {
+    return r->expected_kernel
+               ? BST_OK
+               : bst_scene_expected_kernel(ctx, r->device, r->tile_options, &r->expected_kernel);
+}
+
+/* Builds the kernel of frames at its first use. */
+static bst_status build_frame(bst_ctx *ctx, bst_renderer *r) {
+    if (r->frame_kernel) {
+        return BST_OK;
     }
-    BST_TRY(bst_detector_set_program(ctx, r->detector, r->program));
-    return bst_readout_create(ctx, device, &r->camera, r->program, &r->readout);
+    char options[320], detector[64];
+    bst_detector_options(r->detector, detector, sizeof detector);
+    snprintf(options, sizeof options, "%s%s", r->tile_options, detector);
+    return bst_scene_frame_kernel(ctx, r->device, options, &r->frame_kernel);
+}
+
+/* Builds the kernel of the nodes and sets the parameters that are the camera's. */
+static bst_status build(bst_ctx *ctx, bst_renderer *r) {
+    BST_TRY(bst_scene_nodes_kernel(ctx, r->device, &r->nodes_kernel));
+    bst_scene_tile_options(&r->options, r->taps, r->law_degree, r->fourier != NULL, r->tile_options,
+                           sizeof r->tile_options);
+    r->fixed.nodes = bst_scene_node_params(&r->camera, r->options.spatial_oversample);
+    r->fixed.vignetting = bst_vignetting_params(&r->camera);
+    bst_detector_params(r->detector, &r->fixed);
+    return bst_readout_create(ctx, r->device, &r->camera, &r->readout);
+}
+
+bst_status bst_renderer_prepare(bst_ctx *ctx, bst_renderer *r) {
+    if (!bst_detector_whole_columns(r->detector)) {
+        return build_frame(ctx, r);
+    }
+    BST_TRY(build_expected(ctx, r));
+    return bst_readout_prepare(ctx, r->readout);
 }
 
 static bst_status grow(bst_ctx *ctx, bst_renderer *r, bst_device_array *g, size_t bytes) {
@@ -138,6 +153,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->map = bst_skylight_may_vary(camera);
     double sigma_px = bst_camera_psf_sigma_px(camera);
     r->law_degree = r->options.psf_degree;
+    r->device = device;
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
@@ -174,7 +190,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         smear.law_widest = bst_profile_law_widest(sigma_px, r->law_degree);
     }
     if (status == BST_OK) {
-        status = build(ctx, r, device);
+        status = build(ctx, r);
     }
     if (status == BST_OK) {
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
@@ -220,9 +236,6 @@ void bst_renderer_free(bst_renderer *r) {
         if (kernels[i]) {
             clReleaseKernel(kernels[i]);
         }
-    }
-    if (r->program) {
-        clReleaseProgram(r->program);
     }
     bst_upload_ring_free(r->stage);
     bst_frame_pool_free(r->pool);
@@ -299,11 +312,12 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_kernel_
     if (count == 0) {
         return BST_OK;
     }
-    const void *values[] = {
-        &r->sources,         &count, &r->table, &r->block_box.buffer, &r->source_box.buffer,
-        &r->group_box.buffer};
-    const size_t m = sizeof(cl_mem), bytes[] = {m, sizeof count, m, m, m, m};
-    BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 6));
+    const void *values[] = {&r->fixed.nodes,     &r->sources,          &count,
+                            &r->table,           &r->block_box.buffer, &r->source_box.buffer,
+                            &r->group_box.buffer};
+    const size_t m = sizeof(cl_mem);
+    const size_t bytes[] = {sizeof r->fixed.nodes, m, sizeof count, m, m, m, m};
+    BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 7));
     size_t global = groups * BST_BLOCK, local = BST_BLOCK;
     return bst_device_check(
         ctx,
@@ -345,14 +359,15 @@ typedef struct target {
     int first_row, first_tile; /* of a band */
 } target;
 
-/* Enqueues the tile kernel for any kind of image; the kernels share their first eight arguments. */
+/* Enqueues the tile kernel for any kind of image; the kernels share their first nine arguments. */
 static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                                 const target *to) {
     BST_TRY(make_plan(ctx, r, q));
     if (!to->kernel) {
         return BST_OK;
     }
-    bst_kernel_frame_params p = bst_render_params(&r->camera, &r->options, q, r->plan.count);
+    bst_kernel_frame_params p =
+        bst_render_params(&r->fixed, &r->camera, &r->options, q, r->plan.count);
     BST_TRY(enqueue_nodes(ctx, r, &p));
     p.image_stride = to->stride > 0 ? to->stride : p.image_stride;
     p.background_e = to->light_only ? 0.0f : p.background_e;
@@ -366,10 +381,16 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     if (r->fourier) {
         BST_TRY(make_light(ctx, r, q, &p, &light));
     }
-    cl_mem maps[BST_DETECTOR_BUFFERS];
+    cl_mem maps[BST_DETECTOR_BUFFERS], background = NULL;
     bst_detector_buffers(r->detector, maps);
+    if (r->map) {
+        const bst_skylight_map *map = bst_render_background(q);
+        size_t size = (size_t)map->columns * (size_t)map->rows * sizeof *map->e;
+        BST_TRY(
+            bst_upload_ring_put(ctx, r->stage, BST_STAGE_BACKGROUND, map->e, size, &background));
+    }
     cl_kernel kernel = to->kernel;
-    enum { COMMON = 8, ALL = COMMON + 1 + BST_DETECTOR_BUFFERS };
+    enum { COMMON = 9, ALL = COMMON + 1 + BST_DETECTOR_BUFFERS };
     const void *values[ALL] = {&p,
                                &r->sources,
                                &r->table,
@@ -377,24 +398,16 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
                                &r->source_box.buffer,
                                &r->group_box.buffer,
                                &light,
+                               &background,
                                &to->out,
                                &to->saturated};
     const size_t m = sizeof(cl_mem);
-    size_t bytes[ALL] = {sizeof p, m, m, m, m, m, m, m, m};
+    size_t bytes[ALL] = {sizeof p, m, m, m, m, m, m, m, m, m};
     for (int i = 0; i < BST_DETECTOR_BUFFERS; i++) {
         values[COMMON + 1 + i] = &maps[i];
         bytes[COMMON + 1 + i] = m;
     }
-    int count = kernel == r->frame_kernel ? ALL : COMMON;
-    BST_TRY(set_args(ctx, kernel, values, bytes, count));
-    if (r->map) {
-        const bst_skylight_map *map = bst_render_background(q);
-        size_t size = (size_t)map->columns * (size_t)map->rows * sizeof *map->e;
-        cl_mem nodes;
-        BST_TRY(bst_upload_ring_put(ctx, r->stage, BST_STAGE_BACKGROUND, map->e, size, &nodes));
-        BST_TRY(bst_device_check(ctx, clSetKernelArg(kernel, (cl_uint)count, m, &nodes),
-                                 "setting a kernel argument"));
-    }
+    BST_TRY(set_args(ctx, kernel, values, bytes, kernel == r->frame_kernel ? ALL : COMMON));
     size_t group = (size_t)r->options.group, global = (tiles + group - 1) / group * group;
     return bst_device_check(
         ctx, clEnqueueNDRangeKernel(r->queue, kernel, 1, NULL, &global, &group, 0, NULL, NULL),
@@ -405,7 +418,7 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
 static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                                 target to) {
     r->rolled = q->row_time_s != 0.0;
-    if (to.kernel == r->frame_kernel) { /* room for the tiles of all bands */
+    if (to.kernel && to.kernel == r->frame_kernel) { /* room for the tiles of all bands */
         size_t across = (size_t)q->window.width / (size_t)r->options.tile_width + 2;
         size_t rows = (size_t)(r->rolled ? 1 : r->options.tile_height);
         size_t down = ((size_t)q->window.height + rows - 1) / rows;
@@ -462,6 +475,7 @@ static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_rend
     cl_mem image;
     int stride;
     light.window = bst_readout_light_window(r->readout, q->window);
+    BST_TRY(build_expected(ctx, r));
     BST_TRY(bst_readout_image(ctx, r->readout, light.window, &image, &stride));
     BST_TRY(enqueue_image(
         ctx, r, &light,
@@ -471,7 +485,7 @@ static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_rend
     cl_mem saturated;
     BST_TRY(saturated_room(ctx, r, (size_t)rows, &saturated));
     r->saturation.tiles[r->set] = rows;
-    bst_kernel_frame_params p = bst_render_params(&r->camera, &r->options, q, 0);
+    bst_kernel_frame_params p = bst_render_params(&r->fixed, &r->camera, &r->options, q, 0);
     return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, frame, saturated);
 }
 
@@ -486,16 +500,19 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
     BST_TRY(bst_frame_pool_take(ctx, r->pool, request->window.width / binning,
                                 request->window.height / binning, &frame, &buffer));
     double exposure_s = bst_render_exposure_s(request);
-    bst_status status = begin_set(ctx, r);
+    bool staged = binning > 1 || bst_detector_whole_columns(r->detector);
+    bst_status status = staged ? BST_OK : build_frame(ctx, r);
+    if (status == BST_OK) {
+        status = begin_set(ctx, r);
+    }
     if (status == BST_OK) {
         status = bst_detector_begin(ctx, r->detector, r->stage, request->key, request->exposure_id,
                                     exposure_s);
     }
     if (status == BST_OK) {
-        status = binning > 1 || bst_detector_whole_columns(r->detector)
-                     ? render_in_stages(ctx, r, request, binning, buffer)
-                     : enqueue_image(ctx, r, request,
-                                     (target){.kernel = r->frame_kernel, .out = buffer});
+        status = staged ? render_in_stages(ctx, r, request, binning, buffer)
+                        : enqueue_image(ctx, r, request,
+                                        (target){.kernel = r->frame_kernel, .out = buffer});
     }
     if (status == BST_OK) {
         status = bst_frame_pool_enqueued(ctx, frame);
@@ -526,6 +543,7 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
     assert(r && request && image);
     BST_TRY(bst_render_request_check(ctx, &r->camera, request));
     size_t bytes = (size_t)request->window.width * (size_t)request->window.height * sizeof(float);
+    BST_TRY(build_expected(ctx, r));
     BST_TRY(grow(ctx, r, &r->expected, bytes));
     BST_TRY(begin_set(ctx, r));
     BST_TRY(enqueue_image(ctx, r, request,

@@ -41,14 +41,19 @@ typedef struct bst_renderer_options {
 /* Options with their defaults: error tolerance 0.05 sigma, pool of 4 frames. */
 bst_renderer_options bst_renderer_default_options(void);
 
-/* Creates a renderer: builds the kernels and allocates.
+/* Creates a renderer. Each kind of image builds its kernels when it is first used.
  *
- * Given:     options  NULL: defaults
+ * Given:     device   must outlive *out
+ *            options  NULL: defaults
  * Errors:    BST_ERR_ARGUMENT for an unsupported camera (psf_fwhm_px above 70, no pixels, bits
  *            outside 8..16) */
 bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                const bst_renderer_options *options,
                                bst_renderer **out) BST_MUST_CHECK;
+/* Builds the kernels of frames that are not binned, instead of for the first such frame.
+ *
+ * Errors:    BST_ERR_DEVICE, with the first lines of the compiler's log */
+bst_status bst_renderer_prepare(bst_ctx *ctx, bst_renderer *renderer) BST_MUST_CHECK;
 /* Frees a renderer. Frames still referenced stay valid. */
 void bst_renderer_free(bst_renderer *renderer);
 

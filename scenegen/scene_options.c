@@ -2,40 +2,37 @@
 
 #include <stdio.h>
 
-#include "scenegen/detector/vignetting.h"
 #include "scenegen/stamp/fixed_point_px.h"
-#include "sim/world/scene/skylight.h"
 
-void bst_scene_build_options(const bst_camera *camera, const bst_renderer_options *settings,
-                             int taps, int law_degree, bool fourier, const bst_detector *detector,
-                             char *text, size_t bytes) {
+void bst_scene_tile_options(const bst_renderer_options *settings, int taps, int law_degree,
+                            bool fourier, char *text, size_t bytes) {
     int length =
-        snprintf(text, bytes, "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d%s%s%s",
+        snprintf(text, bytes, "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DGROUP=%d -DTAPS=%d%s%s",
                  settings->tile_width, settings->tile_height, settings->group, taps,
-                 fourier ? " -DFOURIER" : "", settings->group == 1 ? " -DNEAR_CACHE" : "",
-                 bst_skylight_may_vary(camera) ? " -DBACKGROUND" : "");
+                 fourier ? " -DFOURIER" : "", settings->group == 1 ? " -DNEAR_CACHE" : "");
     if (law_degree > 0) {
-        length += snprintf(text + length, bytes - (size_t)length, " -DDEGREE=%d", law_degree);
+        snprintf(text + length, bytes - (size_t)length, " -DDEGREE=%d", law_degree);
     }
-    length += bst_vignetting_options(camera, text + length, bytes - (size_t)length);
-    length += bst_detector_options(detector, text + length, bytes - (size_t)length);
-    bst_scene_node_options(camera, settings->spatial_oversample, text + length,
-                           bytes - (size_t)length);
 }
 
-void bst_scene_node_options(const bst_camera *camera, int spatial_oversample, char *text,
-                            size_t bytes) {
-    int length = snprintf(text, bytes, " -DPLACE_BITS=%d", bst_fixed_point_px_bits(camera));
+bst_kernel_node_params bst_scene_node_params(const bst_camera *camera, int spatial_oversample) {
+    int bits = bst_fixed_point_px_bits(camera);
+    float parts = (float)(1 << bits), subpixels = (float)spatial_oversample;
+    bst_kernel_node_params p = {.place_bits = bits, .parts = parts, .per_parts = 1.0f / parts};
     if (spatial_oversample > 0) {
-        length += snprintf(text + length, bytes - (size_t)length, " -DSPATIAL_OVERSAMPLE=%d",
-                           spatial_oversample);
+        p.subpixels = subpixels;
+        p.per_subpixels = 1.0f / subpixels;
     }
-    const bst_camera_distortion *d = &camera->distortion;
     if (bst_camera_distorted(camera)) {
+        const bst_camera_distortion *d = &camera->distortion;
         double a = bst_camera_scale_rad(camera), a2 = a * a, out = camera->geometry.domain / a;
-        snprintf(
-            text + length, bytes - (size_t)length,
-            " -DDISTORTED -DK1=%.9ef -DK2=%.9ef -DK3=%.9ef -DP1=%.9ef -DP2=%.9ef -DFOLD2=%.9ef",
-            d->k1 * a2, d->k2 * a2 * a2, d->k3 * a2 * a2 * a2, d->p1 * a, d->p2 * a, out * out);
+        p.distorted = 1;
+        p.k1 = (float)(d->k1 * a2);
+        p.k2 = (float)(d->k2 * a2 * a2);
+        p.k3 = (float)(d->k3 * a2 * a2 * a2);
+        p.p1 = (float)(d->p1 * a);
+        p.p2 = (float)(d->p2 * a);
+        p.fold2 = (float)(out * out);
     }
+    return p;
 }

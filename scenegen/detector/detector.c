@@ -6,8 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bst_scenegen_kernels.h"
 #include "scenegen/detector/fixed_pattern_noise.h"
 #include "scenegen/kernels/scene_shared.h"
+#include "scenegen/scene_kernels.h"
 
 struct bst_detector {
     bst_camera camera;
@@ -47,35 +49,55 @@ static bool charge_first(const bst_camera *c) {
     return 2.0 * bend * c->read_noise_e * c->read_noise_e / c->full_well_e > 3e-5;
 }
 
-int bst_detector_options(const bst_detector *detector, char *text, size_t bytes) {
+/* True if the read noise has a tail. */
+static bool has_tail(const bst_camera *c) {
+    return c->detector.telegraph_noise_fraction > 0.0 && c->detector.telegraph_noise_rms_e > 0.0;
+}
+
+const char *bst_detector_tail_options(const bst_camera *camera) {
+    return has_tail(camera) ? " -DTAIL" : "";
+}
+
+/* BST_EFFECT_... of the camera. */
+static int effects_of(const bst_detector *detector) {
     const bst_camera *c = &detector->camera;
     const bst_detector_config *d = &c->detector;
     const double *n = d->nonlinearity;
-    double read = c->read_noise_e;
-    int order = read >= 5.0 ? 2 : read >= 3.0 ? 3 : 4;
+    bool nonlinear = n[0] != 0.0 || n[1] != 0.0 || n[2] != 0.0;
+    return (detector->gain ? BST_EFFECT_GAIN : 0) | (detector->dark ? BST_EFFECT_DARK : 0) |
+           (detector->overlay ? BST_EFFECT_OVERLAY : 0) | (nonlinear ? BST_EFFECT_NONLINEAR : 0) |
+           (detector->offsets ? BST_EFFECT_OFFSETS : 0) | (detector->codes ? BST_EFFECT_CODES : 0) |
+           (d->saturation == BST_WELL_BLOOM ? BST_EFFECT_BLOOM : 0) |
+           (d->frame_transfer_s > 0.0 ? BST_EFFECT_TRANSFER : 0) |
+           (detector->flags ? BST_EFFECT_FLAGS : 0);
+}
+
+void bst_detector_options(const bst_detector *detector, char *text, size_t bytes) {
+    double read = detector->camera.read_noise_e;
+    snprintf(text, bytes, " -DCF_ORDER=%d -DEFFECTS=%d%s",
+             read >= 5.0   ? 2
+             : read >= 3.0 ? 3
+                           : 4,
+             effects_of(detector), bst_detector_tail_options(&detector->camera));
+}
+
+void bst_detector_params(const bst_detector *detector, bst_kernel_frame_params *p) {
+    const bst_camera *c = &detector->camera;
+    const bst_detector_config *d = &c->detector;
+    const double *n = d->nonlinearity, read = c->read_noise_e;
     bool alone = charge_first(c) || read < 0.75;
-    const char *from = alone ? "INFINITY -DSEARCH" : read >= 2.0 ? "-1.0f" : "30.0f -DSEARCH";
-    char bend[128] = "", tail[128] = "", transfer[64] = "";
-    if (n[0] != 0.0 || n[1] != 0.0 || n[2] != 0.0) {
-        snprintf(bend, sizeof bend, " -DNONLINEAR -DC1=%.9ef -DC2=%.9ef -DC3=%.9ef", n[0], n[1],
-                 n[2]);
+    p->effects = effects_of(detector);
+    p->maps_stride = detector->stride;
+    p->maps_rows = (int)c->height_px;
+    p->single_from = alone ? INFINITY : read >= 2.0 ? -1.0f : 30.0f;
+    p->bend1 = (float)n[0];
+    p->bend2 = (float)n[1];
+    p->bend3 = (float)n[2];
+    if (has_tail(c)) {
+        p->tail_gap = (float)(-0.5 / log1p(-d->telegraph_noise_fraction));
+        p->tail_rms_e = (float)d->telegraph_noise_rms_e;
     }
-    if (d->telegraph_noise_fraction > 0.0 && d->telegraph_noise_rms_e > 0.0) {
-        snprintf(tail, sizeof tail, " -DTAIL -DTAIL_GAP=%.9ef -DTAIL_RMS=%.9ef",
-                 -0.5 / log1p(-d->telegraph_noise_fraction), d->telegraph_noise_rms_e);
-    }
-    if (d->frame_transfer_s > 0.0) {
-        snprintf(transfer, sizeof transfer, " -DTRANSFER_ROW_S=%.9ef",
-                 d->frame_transfer_s / (double)c->height_px);
-    }
-    return snprintf(
-        text, bytes,
-        " -DCF_ORDER=%d -DSINGLE_FROM=%s -DMAP_STRIDE=%d -DMAP_CELLS=%lld%s%s%s%s%s%s%s%s%s%s",
-        order, from, detector->stride, (long long)detector->stride * c->height_px,
-        detector->gain ? " -DGAIN_MAP" : "", detector->dark ? " -DDARK_MAP" : "",
-        detector->overlay ? " -DOVERLAY" : "", detector->offsets ? " -DOFFSETS" : "",
-        detector->codes ? " -DCODES" : "", bend, tail, transfer,
-        d->saturation == BST_WELL_BLOOM ? " -DBLOOM" : "", detector->flags ? " -DFLAGS" : "");
+    p->transfer_row_s = (float)(d->frame_transfer_s / (double)c->height_px);
 }
 
 static bst_status make_buffer(bst_ctx *ctx, bst_detector *d, size_t bytes, const void *data,
@@ -134,7 +156,7 @@ static bst_status make_codes(bst_ctx *ctx, bst_detector *d) {
     return status;
 }
 
-static bst_status make_all(bst_ctx *ctx, bst_detector *d) {
+static bst_status make_all(bst_ctx *ctx, bst_device *device, bst_detector *d) {
     const bst_detector_config *c = &d->camera.detector;
     if (bst_fixed_pattern_noise_has_gain(&d->camera)) {
         BST_TRY(make_map(ctx, d, bst_fixed_pattern_noise_gain, &d->gain));
@@ -152,6 +174,10 @@ static bst_status make_all(bst_ctx *ctx, bst_detector *d) {
         BST_TRY(make_map(ctx, d, NULL, &d->overlay));
         BST_TRY(bst_cosmic_rays_create(ctx, &c->cosmic_rays, (int)d->camera.width_px,
                                        (int)d->camera.height_px, d->stride, &d->hits));
+        static const bst_device_kernel_source *const sources[] = {&bst_kernel_scene_shared,
+                                                                  &bst_kernel_cosmic_rays};
+        BST_TRY(bst_scene_kernel(ctx, device, sources, 2, "-cl-std=CL1.2", "bst_detector_deposit",
+                                 &d->deposit_kernel));
     }
     return BST_OK;
 }
@@ -171,7 +197,7 @@ bst_status bst_detector_create(bst_ctx *ctx, bst_device *device, const bst_camer
     d->queue = bst_device_queue(device);
     clRetainContext(d->context);
     clRetainCommandQueue(d->queue);
-    bst_status status = make_all(ctx, d);
+    bst_status status = make_all(ctx, device, d);
     if (status != BST_OK) {
         bst_detector_free(d);
         return status;
@@ -198,14 +224,6 @@ void bst_detector_free(bst_detector *d) {
     clReleaseContext(d->context);
     free(d->rows);
     free(d);
-}
-
-bst_status bst_detector_set_program(bst_ctx *ctx, bst_detector *d, cl_program program) {
-    cl_int code = CL_SUCCESS;
-    if (d->hits) {
-        d->deposit_kernel = clCreateKernel(program, "bst_detector_deposit", &code);
-    }
-    return bst_device_check(ctx, code, "bst_detector_deposit");
 }
 
 bst_status bst_detector_keep_flags(bst_ctx *ctx, bst_detector *d) {
@@ -236,16 +254,15 @@ static bst_status deposit(bst_ctx *ctx, bst_detector *d, float sign) {
     }
     /* a fixed work-group size avoids a new kernel build for each count */
     size_t local = BST_HIT_GROUP, global = ((size_t)d->summary.pixels + local - 1) / local * local;
-    cl_int count = d->summary.pixels;
+    cl_int count = d->summary.pixels, stride = d->stride, rows = (cl_int)d->camera.height_px;
+    const void *values[] = {&d->deposits, &sign, &d->overlay, &count, &stride, &rows};
+    const size_t bytes[] = {sizeof(cl_mem), sizeof sign,   sizeof(cl_mem),
+                            sizeof count,   sizeof stride, sizeof rows};
     cl_kernel k = d->deposit_kernel;
-    BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 0, sizeof(cl_mem), &d->deposits),
-                             "setting a kernel argument"));
-    BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 1, sizeof sign, &sign),
-                             "setting a kernel argument"));
-    BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 2, sizeof(cl_mem), &d->overlay),
-                             "setting a kernel argument"));
-    BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 3, sizeof count, &count),
-                             "setting a kernel argument"));
+    for (cl_uint i = 0; i < 6; i++) {
+        BST_TRY(bst_device_check(ctx, clSetKernelArg(k, i, bytes[i], values[i]),
+                                 "setting a kernel argument"));
+    }
     return bst_device_check(
         ctx, clEnqueueNDRangeKernel(d->queue, k, 1, NULL, &global, &local, 0, NULL, NULL),
         "placing radiation hits");

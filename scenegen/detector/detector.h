@@ -8,6 +8,7 @@
 #include "boresight/camera.h"
 #include "boresight/rng.h"
 #include "scenegen/detector/cosmic_rays.h"
+#include "scenegen/kernels/scene_shared.h"
 #include "scenegen/upload_ring.h"
 #include "sim/device/device.h"
 
@@ -30,7 +31,8 @@ void bst_detector_free(bst_detector *detector);
  * Given:     name  "observer/sensor" */
 bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name);
 
-/* Writes the detector's kernel build options, each preceded by a space; returns as snprintf.
+/* Writes the build options of kernels/pixels.cl to text[bytes], each preceded by a space; 64 bytes
+ * suffice.
  *
  * Notes:     Shot and read noise of a pixel come from one normal deviate by a Cornish-Fisher
  *            expansion if that is accurate enough, otherwise from one deviate each. The chi-square
@@ -41,14 +43,14 @@ bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name)
  *   read noise >= 2 e-      all means, to 1/sigma^4
  *   read noise >= 0.75 e-   means from 30 e- on, to 1/sigma^4
  *   below                   never: single electrons are resolved */
-int bst_detector_options(const bst_detector *detector, char *text, size_t bytes);
+void bst_detector_options(const bst_detector *detector, char *text, size_t bytes);
+/* Build options of kernels/read_tail.cl, each preceded by a space. */
+const char *bst_detector_tail_options(const bst_camera *camera);
+/* Sets the detector's parameters of the kernels, from `effects` on. */
+void bst_detector_params(const bst_detector *detector, bst_kernel_frame_params *params);
 
 /* True if a frame needs the light of whole columns (blooming, frame transfer). */
 bool bst_detector_whole_columns(const bst_detector *detector);
-
-/* Sets the program whose kernels the detector itself starts. */
-bst_status bst_detector_set_program(bst_ctx *ctx, bst_detector *detector,
-                                    cl_program program) BST_MUST_CHECK;
 
 /* Prepares the per-exposure effects: cosmic rays and row offsets. */
 bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *detector, bst_upload_ring *stage,
@@ -61,11 +63,11 @@ bst_status bst_detector_end(bst_ctx *ctx, bst_detector *detector) BST_MUST_CHECK
 /* Cosmic-ray summary of the latest exposure. */
 bst_cosmic_rays_summary bst_detector_hits(const bst_detector *detector);
 
-/* Kernel buffers, NULL if the effect is off: gain, dark, overlay, offsets, codes, saturation flags
- * of the frame. */
+/* Kernel buffers, NULL if the effect is off: gain, dark, overlay, offsets,
+ * codes, saturation flags of the frame. */
 void bst_detector_buffers(const bst_detector *detector, cl_mem out[BST_DETECTOR_BUFFERS]);
 
-/* Enables saturation flags in the program and its kernels. Call it before bst_detector_options. */
+/* Enables saturation flags. Call it before bst_detector_params and bst_detector_options. */
 bst_status bst_detector_keep_flags(bst_ctx *ctx, bst_detector *detector) BST_MUST_CHECK;
 /* Reads the saturation flags BST_FLAG_... of the latest frame's `count` pixels. Waits for the
  * frame. */

@@ -1,12 +1,17 @@
 #include "scenegen/detector/readout.h"
 
 #include <assert.h>
+#include <stdio.h>
 #include <stdlib.h>
+
+#include "bst_scenegen_kernels.h"
+#include "scenegen/scene_kernels.h"
 
 enum { TRANSFER, CHARGE, BLOOM, READ, KERNELS };
 
 struct bst_readout {
     bst_camera camera;
+    bst_device *device;
     cl_context context;
     cl_command_queue queue;
     cl_kernel kernels[KERNELS];
@@ -21,32 +26,37 @@ static bool wanted(const bst_readout *r, int kernel) {
                               : kernel != BLOOM || d->saturation == BST_WELL_BLOOM;
 }
 
-bst_status bst_readout_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
-                              cl_program program, bst_readout **out) {
-    assert(device && camera && program && out);
+bst_status bst_readout_prepare(bst_ctx *ctx, bst_readout *r) {
     static const char *const names[KERNELS] = {"bst_detector_transfer", "bst_detector_charge",
                                                "bst_detector_bloom", "bst_detector_read"};
+    static const bst_device_kernel_source *const sources[] = {
+        &bst_kernel_scene_shared, &bst_kernel_lanes,    &bst_kernel_random,   &bst_kernel_chunk,
+        &bst_kernel_read_tail,    &bst_kernel_detector, &bst_kernel_store_dn, &bst_kernel_readout};
+    char options[64];
+    snprintf(options, sizeof options, "-cl-std=CL1.2%s", bst_detector_tail_options(&r->camera));
+    for (int i = 0; i < KERNELS; i++) {
+        if (wanted(r, i) && !r->kernels[i]) {
+            BST_TRY(bst_scene_kernel(ctx, r->device, sources, sizeof sources / sizeof *sources,
+                                     options, names[i], &r->kernels[i]));
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_readout_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
+                              bst_readout **out) {
+    assert(device && camera && out);
     *out = NULL;
     bst_readout *r = calloc(1, sizeof *r);
     if (!r) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the read-out");
     }
     r->camera = *camera;
+    r->device = device;
     r->context = bst_device_context(device);
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
-    for (int i = 0; i < KERNELS; i++) {
-        cl_int code = CL_SUCCESS;
-        if (wanted(r, i)) {
-            r->kernels[i] = clCreateKernel(program, names[i], &code);
-        }
-        bst_status status = bst_device_check(ctx, code, names[i]);
-        if (status != BST_OK) {
-            bst_readout_free(r);
-            return status;
-        }
-    }
     *out = r;
     return BST_OK;
 }
@@ -112,18 +122,14 @@ static bst_status enqueue_kernel(bst_ctx *ctx, bst_readout *r, int kernel,
                                  const bst_kernel_frame_params *p, const cl_mem *buffers,
                                  cl_uint count, size_t items) {
     cl_kernel k = r->kernels[kernel];
-    /* a fixed work-group size avoids a new kernel build for each number of items */
-    size_t local = 64;
-    while (items % local > 0) {
-        local /= 2;
-    }
+    const size_t local = BST_READOUT_GROUP, global = (items + local - 1) / local * local;
     BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 0, sizeof *p, p), "setting a kernel argument"));
     for (cl_uint i = 0; i < count; i++) {
         BST_TRY(bst_device_check(ctx, clSetKernelArg(k, i + 1, sizeof(cl_mem), &buffers[i]),
                                  "setting a kernel argument"));
     }
     return bst_device_check(
-        ctx, clEnqueueNDRangeKernel(r->queue, k, 1, NULL, &items, &local, 0, NULL, NULL),
+        ctx, clEnqueueNDRangeKernel(r->queue, k, 1, NULL, &global, &local, 0, NULL, NULL),
         "reading a frame out");
 }
 
@@ -131,6 +137,7 @@ bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *det
                            const bst_kernel_frame_params *params, bst_window window, int binning,
                            cl_mem frame, cl_mem saturated) {
     assert(r && detector && params && window.width > 0 && window.height > 0);
+    BST_TRY(bst_readout_prepare(ctx, r));
     bst_window light = bst_readout_light_window(r, window);
     bst_kernel_frame_params p = *params;
     cl_mem maps[BST_DETECTOR_BUFFERS];

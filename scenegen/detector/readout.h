@@ -9,15 +9,17 @@
 
 typedef struct bst_readout bst_readout;
 
-/* Creates the read-out of a camera with the kernels that its effects need.
+/* Creates the read-out of a camera.
  *
- * Given:     camera   copied
- *            program  built detector kernels
+ * Given:     device  must outlive *out
+ *            camera  copied
  * Returned:  *out  NULL on error
- * Errors:    BST_ERR_MEMORY, BST_ERR_DEVICE
+ * Errors:    BST_ERR_MEMORY
  * Ownership: free *out with bst_readout_free */
 bst_status bst_readout_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
-                              cl_program program, bst_readout **out) BST_MUST_CHECK;
+                              bst_readout **out) BST_MUST_CHECK;
+/* Builds the kernels that the camera's effects need, instead of for the first frame. */
+bst_status bst_readout_prepare(bst_ctx *ctx, bst_readout *readout) BST_MUST_CHECK;
 /* Frees a read-out with its kernels and buffers on the device; NULL is allowed. */
 void bst_readout_free(bst_readout *readout);
 

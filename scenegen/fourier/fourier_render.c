@@ -10,6 +10,7 @@
 #include "scenegen/fourier/fourier_error.h"
 #include "scenegen/fourier/otf_convolve.h"
 #include "scenegen/kernels/deposit_shared.h"
+#include "scenegen/scene_kernels.h"
 #include "scenegen/scene_options.h"
 
 enum { SETUPS = 4, FIELD_STEP_PX = 16, WRAP_PX = 96, DENSITY_PX = 100000 };
@@ -44,8 +45,8 @@ struct bst_fourier_render {
     int margin;
     bst_parallel *pool;
     cl_context context;
-    cl_program program;
     cl_kernel kernel;
+    bst_kernel_node_params node_params;
     int tile_width, tile_height, group;
     setup setups[SETUPS];
     long long calls;
@@ -82,23 +83,15 @@ static bst_status choose_tiles(bst_ctx *ctx, bst_device *device, bst_fourier_ren
 }
 
 static bst_status build(bst_ctx *ctx, bst_device *device, bst_fourier_render *l) {
-    const bst_device_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_nodes,
-                                                 &bst_kernel_block_search,
-                                                 &bst_kernel_deposit_shared, &bst_kernel_deposit};
-    char options[1024];
-    int length = snprintf(
-        options, sizeof options,
-        "-cl-std=CL1.2 -DFOURIER -DDEPOSIT_W=%d -DDEPOSIT_H=%d "
-        "-DDEPOSIT_GROUP=%d%s%s%s",
-        l->tile_width, l->tile_height, l->group, l->field_nodes > 1 ? " -DFIELD" : "",
-        l->nodes > l->field_nodes ? " -DSPECTRA" : "", l->group == 1 ? " -DNEAR_CACHE" : "");
-    bst_scene_node_options(&l->camera, l->options.spatial_oversample, options + length,
-                           sizeof options - (size_t)length);
-    BST_TRY(bst_device_build(ctx, device, sources, sizeof sources / sizeof *sources, options,
-                             &l->program));
-    cl_int code;
-    l->kernel = clCreateKernel(l->program, "bst_light_deposit", &code);
-    return bst_device_check(ctx, code, "bst_light_deposit");
+    static const bst_device_kernel_source *const sources[] = {
+        &bst_kernel_scene_shared, &bst_kernel_lanes,          &bst_kernel_nodes,
+        &bst_kernel_block_search, &bst_kernel_deposit_shared, &bst_kernel_deposit};
+    char options[128];
+    snprintf(options, sizeof options,
+             "-cl-std=CL1.2 -DFOURIER -DDEPOSIT_W=%d -DDEPOSIT_H=%d -DDEPOSIT_GROUP=%d%s",
+             l->tile_width, l->tile_height, l->group, l->group == 1 ? " -DNEAR_CACHE" : "");
+    return bst_scene_kernel(ctx, device, sources, sizeof sources / sizeof *sources, options,
+                            "bst_light_deposit", &l->kernel);
 }
 
 /* Uploads the field nodes' weights on a grid that the kernel interpolates. */
@@ -173,6 +166,7 @@ static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fourier_render *
     BST_TRY(choose_tiles(ctx, device, l, &threads));
     BST_TRY(bst_parallel_create(ctx, threads, &l->pool));
     BST_TRY(build(ctx, device, l));
+    l->node_params = bst_scene_node_params(&l->camera, l->options.spatial_oversample);
     BST_TRY(bst_fourier_band_measure(ctx, l->psf, 0.1 * l->options.tolerance, &l->band));
     l->widest = BST_WIDEST;
     l->margin = (l->band.reach_px + 15) / 16 * 16;
@@ -240,9 +234,6 @@ void bst_fourier_render_free(bst_fourier_render *l) {
     }
     if (l->kernel) {
         clReleaseKernel(l->kernel);
-    }
-    if (l->program) {
-        clReleaseProgram(l->program);
     }
     bst_parallel_free(l->pool);
     clReleaseContext(l->context);
@@ -382,6 +373,9 @@ static bst_status deposit(bst_ctx *ctx, bst_fourier_render *l, cl_command_queue 
         .field_y = l->field_y,
         .field_per_px_x = (float)((l->field_x - 1) / fmax((double)l->camera.width_px - 1.0, 1.0)),
         .field_per_px_y = (float)((l->field_y - 1) / fmax((double)l->camera.height_px - 1.0, 1.0)),
+        .by_field = l->field_nodes > 1,
+        .by_spectrum = l->nodes > l->field_nodes,
+        .nodes = l->node_params,
     };
     const void *values[] = {&p,
                             &nodes->sources,
@@ -392,7 +386,7 @@ static bst_status deposit(bst_ctx *ctx, bst_fourier_render *l, cl_command_queue 
                             &l->fields[node % l->field_nodes],
                             &s->grid,
                             &nodes->shares};
-    cl_uint count = (cl_uint)(sizeof values / sizeof *values) - (l->nodes == l->field_nodes);
+    cl_uint count = (cl_uint)(sizeof values / sizeof *values);
     for (cl_uint i = 0; i < count; i++) {
         size_t bytes = i == 0 ? sizeof p : sizeof(cl_mem);
         BST_TRY(bst_device_check(ctx, clSetKernelArg(l->kernel, i, bytes, values[i]),

@@ -1,6 +1,4 @@
-/* Varying part of the background, added to a tile's light. Built only with the option BACKGROUND. */
-#ifdef BACKGROUND
-#define BACKGROUND_ARGUMENT , global const float *background
+/* Varying part of the background, added to a tile's light. */
 
 /* Bilinear interpolation between the nodes of bst_skylight_map. Nodes lie at multiples of a power
  * of two, so weights are exact and a pixel's value does not depend on tile or window. */
@@ -53,7 +51,7 @@ static void add_pixels(local float *sum, bst_kernel_frame_params p, int tile_x, 
 static void add_background(local float *sum, bst_kernel_frame_params p, int tile_x, int tile_y, int rows,
                            int columns, global const float *background) {
     if (p.map_step > 32768) {
-        return; /* this frame has no background map */
+        return; /* there is no background map */
     }
     if (p.map_step == 1) {
         add_pixels(sum, p, tile_x, tile_y, rows, columns, background);
@@ -61,9 +59,3 @@ static void add_background(local float *sum, bst_kernel_frame_params p, int tile
         add_nodes(sum, p, tile_x, tile_y, rows, columns, background);
     }
 }
-#define ADD_BACKGROUND(sum, p, t) \
-    add_background(sum, p, (t).x, (t).y, (t).rows, (t).columns, background)
-#else
-#define BACKGROUND_ARGUMENT
-#define ADD_BACKGROUND(sum, p, t)
-#endif

@@ -1,8 +1,7 @@
 /* Deposits the light of all nodes on the grid of the Fourier path: each node is spread over eight
  * by eight samples. Options: DEPOSIT_W, DEPOSIT_H (samples of a tile, a multiple of 16 high),
- * DEPOSIT_GROUP (work-items per work-group), those of nodes.cl, FIELD (weights by field position),
- * SPECTRA (weights by source, possibly negative), NEAR_CACHE (one address space; writes can bypass
- * the caches).
+ * DEPOSIT_GROUP (work-items per work-group), FOURIER (see nodes.cl), NEAR_CACHE (one address space;
+ * writes can bypass the caches).
  *
  * One work-item owns a tile and adds its nodes in the order of sources, blocks and nodes: the sum
  * is the same for every tile and work-group size. Vectors run along y, as in the grid's blocks of
@@ -21,7 +20,6 @@
 #define STREAM(value, p) (*(p) = (value))
 #endif
 
-#ifdef FIELD
 /* Bilinear weight of the field node at a position. */
 static float field_weight(bst_deposit_params p, global const float *field, float x, float y) {
     float u = clamp(x * p.field_per_px_x, 0.0f, (float)(p.field_x - 1));
@@ -32,7 +30,6 @@ static float field_weight(bst_deposit_params p, global const float *field, float
     float high = mix(a[p.field_x], a[p.field_x + 1], u - (float)i);
     return mix(low, high, v - (float)j);
 }
-#endif
 
 /* A block of nodes relative to one tile. */
 typedef struct deposit_nodes {
@@ -112,18 +109,14 @@ static void deposit_team(local float *sum, const deposit_nodes *b, int n, int co
 /* Positions one block's nodes on the grid; returns true if any of them reaches the tile. */
 static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, node_block nodes,
                        global const float *field, deposit_nodes *out) {
-    const float px = 1.0f / (float)(1 << PLACE_BITS);
+    const float px = p.nodes.per_parts;
     float16 x = convert_float16(nodes.x) * px, y = convert_float16(nodes.y) * px;
     float16 u = (x - p.x0) * p.density_x, v = (y - p.y0) * p.density_y;
     float16 floor_u = floor(u), floor_v = floor(v);
     const float before = BST_SPREAD_TAPS / 2 - 1, after = BST_SPREAD_TAPS / 2;
     float16 column = floor_u - (before + (float)tile_x), row = floor_v - (before + (float)tile_y);
     float16 electrons = nodes.electrons, width = nodes.width;
-#ifdef SPECTRA
-    int16 lit = electrons != 0.0f;
-#else
-    int16 lit = electrons > 0.0f;
-#endif
+    int16 lit = p.by_spectrum ? electrons != 0.0f : electrons > 0.0f; /* weights may be negative */
     int16 hit = lit & (column > (float)-BST_SPREAD_TAPS) &
                 (column < (float)DEPOSIT_W) & (row > (float)-BST_SPREAD_TAPS) &
                 (row < (float)DEPOSIT_H) &
@@ -138,15 +131,15 @@ static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, node_block 
     float16 step_v = fmin(floor(phase_v), BST_SPREAD_PHASES - 1.0f);
     float16 level = fmin(floor(width), BST_WIDTHS - 1.0f);
     float16 base = level * (float)(BST_SPREAD_PHASES + 1);
-#ifdef FIELD
-    float at_x[16], at_y[16], e[16];
-    vstore16(x, 0, at_x);
-    vstore16(y, 0, at_y);
-    for (int n = 0; n < BST_BLOCK; n++) {
-        e[n] = field_weight(p, field, at_x[n], at_y[n]);
+    if (p.by_field) {
+        float at_x[16], at_y[16], e[16];
+        vstore16(x, 0, at_x);
+        vstore16(y, 0, at_y);
+        for (int n = 0; n < BST_BLOCK; n++) {
+            e[n] = field_weight(p, field, at_x[n], at_y[n]);
+        }
+        electrons *= vload16(0, e);
     }
-    electrons *= vload16(0, e);
-#endif
     vstore16(hit, 0, out->hit);
     vstore16(convert_int16(column), 0, out->left);
     vstore16(convert_int16(row), 0, out->top);
@@ -190,16 +183,12 @@ static void deposit_block(bst_deposit_params p, local float *sum, int tile_x, in
 }
 
 /* nodes: table of nodes. grid: [samples_y / 16][samples_x][16]. table: [2][BST_SPREAD_TABLE], along
- * x and y. shares: of the spectra, by source. The boxes are those of the nodes kernel, which extend
+ * x and y. shares: [sources][BST_SPECTRA], if p.by_spectrum. The boxes are those of the nodes kernel, which extend
  * at least as far as the spreading kernel. */
 __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light_deposit(
     bst_deposit_params p, global const bst_kernel_source_record *sources, global const float16 *nodes,
     global const float *block_box, global const float *source_box, global const float *table,
-    global const float *field, global float16 *grid
-#ifdef SPECTRA
-    , global const float *shares /* [sources][BST_SPECTRA] */
-#endif
-) {
+    global const float *field, global float16 *grid, global const float *shares) {
     local float16 sums[DEPOSIT_GROUP][DEPOSIT_W * DEPOSIT_STRIDE / 16];
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
@@ -226,13 +215,13 @@ __attribute__((reqd_work_group_size(DEPOSIT_GROUP, 1, 1))) kernel void bst_light
             break;
         }
         bst_kernel_source_record s = search.source;
-#ifdef SPECTRA
-        s.electrons *= shares[search.source_index * BST_SPECTRA + p.spectrum];
-        if (s.electrons == 0.0f) {
-            continue;
+        if (p.by_spectrum) {
+            s.electrons *= shares[search.source_index * BST_SPECTRA + p.spectrum];
+            if (s.electrons == 0.0f) {
+                continue;
+            }
         }
-#endif
-        deposit_block(p, sum, left, top, nodes_of(s, block, nodes), table, field, &room);
+        deposit_block(p, sum, left, top, nodes_of(p.nodes, s, block, nodes), table, field, &room);
     }
     int columns = min(DEPOSIT_W, p.samples_x - left);
     int rows = min(DEPOSIT_H, p.samples_y - top); /* samples_y is a multiple of 16 */

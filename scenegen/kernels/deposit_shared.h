@@ -3,6 +3,10 @@
 #ifndef BST_SCENEGEN_DEPOSIT_SHARED_H
 #define BST_SCENEGEN_DEPOSIT_SHARED_H
 
+#ifndef __OPENCL_VERSION__
+#include "scenegen/kernels/scene_shared.h"
+#endif
+
 /* Sub-sample phases of the spreading kernel's table, plus one row to close the interval. */
 #define BST_SPREAD_PHASES 128
 /* Taps of a table row: one vector. */
@@ -24,6 +28,8 @@ typedef struct bst_deposit_params {
     /* weights of one field node on a sensor grid: [field_y][field_x] from px 0 */
     int field_x, field_y;
     float field_per_px_x, field_per_px_y;
+    int by_field, by_spectrum; /* weights by position in the field; by the sources' spectra */
+    bst_kernel_node_params nodes;
 } bst_deposit_params;
 
 #endif

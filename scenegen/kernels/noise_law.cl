@@ -1,5 +1,5 @@
 /* Electrons with shot and read noise from one normal deviate. Options: CF_ORDER (order of the
- * expansion), SINGLE_FROM (means from here on use one deviate for shot and read noise). */
+ * expansion). */
 
 /* Coefficients of electrons with shot and read noise as a polynomial of a normal deviate. */
 typedef struct noise_law {
@@ -114,7 +114,7 @@ static near_law near_law_of(bst_kernel_frame_params p) {
     near.c5 = cubic_through(law.c5);
 #endif
     near.per_reach = 1.0f / reach;
-    near.serves = reach > 0.0f && max(near.mean - reach, 0.0f) >= SINGLE_FROM &&
+    near.serves = reach > 0.0f && max(near.mean - reach, 0.0f) >= p.single_from &&
                   near.mean + reach <= p.near_full_e;
     return near;
 }

@@ -1,5 +1,5 @@
-/* Tail of the read noise (random telegraph noise): excess noise in few reads. Options: TAIL (with
- * TAIL_GAP, which is -1 / (2 ln(1 - share of the reads)), and TAIL_RMS, electrons).
+/* Tail of the read noise (random telegraph noise): excess noise in few reads. Options: TAIL.
+ * p.tail_gap is -1 / (2 ln(1 - share of the reads)).
  *
  * The reads are drawn in blocks of TAIL_ROWS rows and 64 columns of the read-out, because a single
  * chunk has few reads in the tail. Within a block the distance from one to the next is
@@ -25,8 +25,8 @@ INLINE int16 sum_up(int16 v) {
 }
 
 /* Distances between successive reads in the tail. */
-INLINE int16 tail_gaps(uint16 words) {
-    return 1 + convert_int16(fmin(log_radius2(words) * TAIL_GAP, (float)TAIL_READS));
+INLINE int16 tail_gaps(bst_kernel_frame_params p, uint16 words) {
+    return 1 + convert_int16(fmin(log_radius2(words) * p.tail_gap, (float)TAIL_READS));
 }
 
 /* Draws the block that contains a read; width: of the read-out. */
@@ -43,15 +43,15 @@ static void draw_tail(bst_kernel_frame_params p, int row, int column, int width,
         chunk_words w = chunk_random(p, (block * TAIL_CALLS + call) * 16u, STREAM_TAIL);
         float16 za, zb;
         normal16(w.c, w.d, &za, &zb);
-        int16 at = last + sum_up(tail_gaps(w.a));
+        int16 at = last + sum_up(tail_gaps(p, w.a));
         int read[32] __attribute__((aligned(64)));
         float z[32] __attribute__((aligned(64)));
         *(int16 *)read = at;
-        *(int16 *)(read + 16) = at.sf + sum_up(tail_gaps(w.b));
+        *(int16 *)(read + 16) = at.sf + sum_up(tail_gaps(p, w.b));
         *(float16 *)z = za;
         *(float16 *)(z + 16) = zb;
         for (int k = 0; k < 32 && read[k] < TAIL_READS; k++) {
-            tail->excess[read[k] / 64][read[k] % 64] = z[k] * TAIL_RMS;
+            tail->excess[read[k] / 64][read[k] % 64] = z[k] * p.tail_rms_e;
             tail->rows |= 1u << (read[k] / 64);
         }
         last = read[31];

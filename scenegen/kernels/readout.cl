@@ -1,10 +1,12 @@
 /* Detector in stages, for effects across pixels: blooming along columns, frame transfer under
  * light, binning. An image holds the light of all rows; charge replaces it and is read out from
- * there. One work-item per row, or per 64 columns. Options: BLOOM, TRANSFER_ROW_S (transfer time
- * per row), and those of detector.cl. */
+ * there. One work-item per row, or per 64 columns; surplus work-items of the last group do nothing,
+ * so that the groups of all frames have one size. Options: TAIL (read_tail.cl). */
 
 /* image: [light_height][light_stride] floats, from column p.tiles_x0 and row p.light_y0 of the
  * sensor. */
+
+#define READOUT_GROUP __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1)))
 
 INLINE uint counter_of(int row, int column, int width) {
     return ((uint)row * ((uint)(width + 63) / 64u) + (uint)column / 64u) * 16u;
@@ -18,18 +20,20 @@ INLINE void store_chunk(global float *to, chunk c) {
     v[3] = c.d;
 }
 
-#ifdef TRANSFER_ROW_S
 /* Frame transfer: from source light to expected electrons including sky and response, and the light
  * that a charge packet collects while it passes the other rows of its column. One work-item per 64
  * columns. */
-kernel void bst_detector_transfer(bst_kernel_frame_params p, global float *image,
+READOUT_GROUP kernel void bst_detector_transfer(bst_kernel_frame_params p, global float *image,
                                   global const float *gain) {
     detector_maps maps = {gain, 0, 0, 0, 0};
     int x = (int)get_global_id(0) * 64;
+    if (x >= p.light_stride) {
+        return;
+    }
     chunk sum = {(float16)0.0f, (float16)0.0f, (float16)0.0f, (float16)0.0f};
     for (int y = 0; y < p.light_height; y++) {
         global float *at = image + (size_t)y * p.light_stride + x;
-        size_t map = (size_t)(p.light_y0 + y) * MAP_STRIDE + p.tiles_x0 + x;
+        size_t map = (size_t)(p.light_y0 + y) * p.maps_stride + p.tiles_x0 + x;
         chunk c = expected_chunk(p, maps, map, load_chunk(at));
         sum.a += c.a;
         sum.b += c.b;
@@ -37,7 +41,7 @@ kernel void bst_detector_transfer(bst_kernel_frame_params p, global float *image
         sum.d += c.d;
         store_chunk(at, c);
     }
-    float share = p.exposure_s > 0.0f ? TRANSFER_ROW_S / p.exposure_s : 0.0f;
+    float share = p.exposure_s > 0.0f ? p.transfer_row_s / p.exposure_s : 0.0f;
     for (int y = 0; y < p.light_height; y++) {
         global float *at = image + (size_t)y * p.light_stride + x;
         chunk c = load_chunk(at);
@@ -48,53 +52,52 @@ kernel void bst_detector_transfer(bst_kernel_frame_params p, global float *image
         store_chunk(at, c);
     }
 }
-#endif
 
 /* Replaces the light of every pixel by its charge. One work-item per row. */
-kernel void bst_detector_charge(bst_kernel_frame_params p, global float *image, global const float *gain,
+READOUT_GROUP kernel void bst_detector_charge(bst_kernel_frame_params p, global float *image, global const float *gain,
                                 global const float *dark, global const float *overlay) {
     detector_maps maps = {gain, dark, overlay, 0, 0};
     int row = p.light_y0 + (int)get_global_id(0);
+    if (row >= p.light_y0 + p.light_height) {
+        return;
+    }
     global float *line = image + get_global_id(0) * (size_t)p.light_stride;
     for (int x = 0; x < p.light_stride; x += 64) {
         int column = p.tiles_x0 + x;
-        size_t map = (size_t)row * MAP_STRIDE + column;
+        size_t map = (size_t)row * p.maps_stride + column;
         uint counter = counter_of(row, column, p.sensor_width);
         chunk m = load_chunk(line + x);
-#ifndef TRANSFER_ROW_S
-        m = expected_chunk(p, maps, map, m);
-#endif
+        if (!HAS(p, BST_EFFECT_TRANSFER)) {
+            m = expected_chunk(p, maps, map, m);
+        }
         m = add_dark(p, maps, map, m);
         chunk_words w = chunk_random(p, counter, STREAM_POISSON);
-        chunk q, n = chunk_normal(chunk_random(p, counter, STREAM_POISSON_NORMAL));
-        int16 all = (int16)-1;
-        q.a = draw_charge(m.a, w.a, n.a, all);
-        q.b = draw_charge(m.b, w.b, n.b, all);
-        q.c = draw_charge(m.c, w.c, n.c, all);
-        q.d = draw_charge(m.d, w.d, n.d, all);
-#ifdef OVERLAY
-        chunk over = load_chunk(overlay + map);
-        q.a += over.a;
-        q.b += over.b;
-        q.c += over.c;
-        q.d += over.d;
-#endif
-#ifndef BLOOM
-        q.a = fmin(q.a, p.full_well_e);
-        q.b = fmin(q.b, p.full_well_e);
-        q.c = fmin(q.c, p.full_well_e);
-        q.d = fmin(q.d, p.full_well_e);
-#endif
+        chunk n = chunk_normal(chunk_random(p, counter, STREAM_POISSON_NORMAL));
+        float16 mean[4] = {m.a, m.b, m.c, m.d}, normal[4] = {n.a, n.b, n.c, n.d}, drawn[4];
+        uint16 words[4] = {w.a, w.b, w.c, w.d};
+        KEEP_LOOP
+        for (int v = 0; v < 4; v++) {
+            drawn[v] = draw_charge(mean[v], words[v], normal[v], (int16)-1);
+            if (HAS(p, BST_EFFECT_OVERLAY)) {
+                drawn[v] += ((global const float16 *)(overlay + map))[v];
+            }
+            if (!HAS(p, BST_EFFECT_BLOOM)) {
+                drawn[v] = fmin(drawn[v], p.full_well_e);
+            }
+        }
+        chunk q = {drawn[0], drawn[1], drawn[2], drawn[3]};
         store_chunk(line + x, q);
     }
 }
 
-#ifdef BLOOM
 /* Blooming: charge above the full well leaves a pixel in halves up and down its column and fills
  * the next pixels; what reaches the column's end is lost. `over`: work column of moving charge. One
  * work-item per 16 columns. */
-kernel void bst_detector_bloom(bst_kernel_frame_params p, global float *image, global float *over) {
+READOUT_GROUP kernel void bst_detector_bloom(bst_kernel_frame_params p, global float *image, global float *over) {
     int x = (int)get_global_id(0) * 16;
+    if (x >= p.light_stride) {
+        return;
+    }
     float16 carry = (float16)0.0f, full = (float16)p.full_well_e;
     for (int y = 0; y < p.light_height; y++) { /* towards larger y */
         global float16 *at = (global float16 *)(image + (size_t)y * p.light_stride + x);
@@ -115,20 +118,23 @@ kernel void bst_detector_bloom(bst_kernel_frame_params p, global float *image, g
         carry = carry - take + *half_at;
     }
 }
-#endif
 
 /* Reads charge as digital numbers: p.binning x p.binning pixels are summed before they are read.
  * frame: [window_height][window_width], both after binning. saturated: pixels per row. One
  * work-item per frame row. */
-kernel void bst_detector_read(bst_kernel_frame_params p, global const float *image, global ushort *frame,
+READOUT_GROUP kernel void bst_detector_read(bst_kernel_frame_params p, global const float *image, global ushort *frame,
                               global int *saturated, global const float *offsets,
                               global const ushort *codes, global uchar *flags) {
     detector_maps maps = {0, 0, 0, offsets, codes};
     int y = (int)get_global_id(0), b = p.binning;
+    if (y >= p.window_height) {
+        return;
+    }
     int row = p.window_y0 + y * b;
     global const float *line = image + (size_t)(row - p.light_y0) * p.light_stride;
     global ushort *out = frame + (size_t)y * p.window_width;
-    global uchar *marks = FLAGS_AT(flags, (size_t)y * p.window_width);
+    global uchar *marks =
+        HAS(p, BST_EFFECT_FLAGS) ? flags + (size_t)y * p.window_width : 0;
     /* binned pixels lie on a grid that starts at the window's first pixel */
     int first = p.window_x0 / b / 64 * 64, skip = p.window_x0 / b - first;
     int16 full_count = (int16)0;
@@ -165,29 +171,10 @@ kernel void bst_detector_read(bst_kernel_frame_params p, global const float *ima
         DRAW_TAIL(p, row / b, first + x, p.sensor_width / b, &tail);
         e = ADD_TAIL(&tail, row / b, e);
         chunk dn = convert_chunk(p, maps, row, first + x, e);
-        int to = x - skip;
-        full_count -= store_dn(p, maps, dn.a, brim.a, to, out, marks);
-        full_count -= store_dn(p, maps, dn.b, brim.b, to + 16, out, marks);
-        full_count -= store_dn(p, maps, dn.c, brim.c, to + 32, out, marks);
-        full_count -= store_dn(p, maps, dn.d, brim.d, to + 48, out, marks);
+        full_count -= store_dn(p, maps, dn, brim, x - skip, out, marks);
     }
     int8 s8 = full_count.lo + full_count.hi;
     int4 s4 = s8.lo + s8.hi;
     int2 s2 = s4.lo + s4.hi;
     saturated[y] = s2.lo + s2.hi;
-}
-
-/* A charge deposit of the overlay: pixel index and charge. */
-typedef struct deposit_pixel {
-    int index;
-    float electrons;
-} deposit_pixel;
-
-__attribute__((reqd_work_group_size(BST_HIT_GROUP, 1, 1))) kernel void bst_detector_deposit(
-    global const deposit_pixel *deposits, float sign, global float *overlay, int count) {
-    int i = (int)get_global_id(0);
-    if (i < count) {
-        overlay[deposits[i].index] = sign * deposits[i].electrons;
-        overlay[MAP_CELLS + deposits[i].index / 64] = sign;
-    }
 }

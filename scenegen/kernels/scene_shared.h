@@ -5,6 +5,9 @@
 #ifdef __OPENCL_VERSION__
 /* Forces inlining: outside the kernel compilers use short vectors. */
 #define INLINE static inline __attribute__((always_inline))
+/* Before a loop over the vectors of a chunk in rarely used code, which unrolled would take most of
+ * the program's compile time. */
+#define KEEP_LOOP _Pragma("unroll 1")
 #endif
 
 /* Nodes per block: one vector register. */
@@ -20,6 +23,8 @@
 #define BST_LAW_SECOND 4
 /* Cosmic-ray pixels placed by a work-group. */
 #define BST_HIT_GROUP 64
+/* Work-items of a work-group of the staged read-out. */
+#define BST_READOUT_GROUP 64
 /* Widths in the Fourier path's table: (n / BST_WIDTHS)^2 BST_WIDEST of the PSF variance, n from 0
  * to BST_WIDTHS. Between them it is interpolated linearly in the variance. A Gaussian's peak varies
  * as the inverse square root, so each axis has a relative error of 3/8 w / BST_WIDTHS^2 / (1 + w)^2
@@ -37,7 +42,48 @@
 #define BST_FLAG_FULL_WELL 1
 #define BST_FLAG_CONVERTER 2
 
-/* Only 32-bit members, so that both languages have the same layout. */
+/* Effects of a camera's detector: response per pixel, dark current per pixel, charge in addition to
+ * light (cosmic rays), nonlinearity, offsets of columns and rows, table of output codes, blooming,
+ * light during the transfer; and whether saturation flags are stored. */
+#define BST_EFFECT_GAIN 1
+#define BST_EFFECT_DARK 2
+#define BST_EFFECT_OVERLAY 4
+#define BST_EFFECT_NONLINEAR 8
+#define BST_EFFECT_OFFSETS 16
+#define BST_EFFECT_CODES 32
+#define BST_EFFECT_BLOOM 64
+#define BST_EFFECT_TRANSFER 128
+#define BST_EFFECT_FLAGS 256
+
+/* Laws of bst_kernel_vignetting_params: none; the fourth power of the cosine of the field angle,
+ * 1 / (1 + v1 s)^2; a polynomial, 1 + v1 s + v2 s^2 + v3 s^3. s: squared distance from the centre.
+ */
+#define BST_SHADE_NONE 0
+#define BST_SHADE_COS4 1
+#define BST_SHADE_POLYNOMIAL 2
+
+/* The structures have only 32-bit members, so that both languages have the same layout. */
+
+/* Fixed-point positions of nodes on a camera's sensor. */
+typedef struct bst_kernel_node_params {
+    int place_bits;           /* binary digits after the point */
+    float parts, per_parts;   /* 2^place_bits and its inverse */
+    float subpixels;          /* parts of a pixel per axis to whose centres nodes move; 0: exact */
+    float per_subpixels;      /* 1 / subpixels */
+    int distorted;            /* 0: the members below are not used */
+    float k1, k2, k3, p1, p2; /* distortion (include/boresight/camera.h), scaled to pixels */
+    float fold2;              /* squared distance of the fold from the boresight, px^2 */
+} bst_kernel_node_params;
+
+/* Vignetting of the sources' light. */
+typedef struct bst_kernel_vignetting_params {
+    int law;                  /* BST_SHADE_... */
+    float centre_x, centre_y; /* boresight, px */
+    float limit2;             /* squared distance beyond which there is no light, px^2 */
+    float v1, v2, v3;         /* coefficients of the law, px^-2, px^-4, px^-6 */
+} bst_kernel_vignetting_params;
+
+/* Parameters of a frame. Those from `nodes` on are the camera's, equal in all frames. */
 typedef struct bst_kernel_frame_params {
     int window_x0, window_y0, window_width, window_height;
     int sensor_width;
@@ -62,12 +108,20 @@ typedef struct bst_kernel_frame_params {
         light_stride; /* image that is read out: first sensor row, rows, floats per row */
     int binning;
     int map_step, map_x0, map_y0, map_columns, map_rows; /* of the background map, if it varies */
+    bst_kernel_node_params nodes;
+    bst_kernel_vignetting_params vignetting;
+    int effects;                /* BST_EFFECT_..., where they are no build option */
+    int maps_stride, maps_rows; /* of the detector's maps; the stride is a multiple of 64 */
+    float single_from;          /* means from here on use one deviate for both noises */
+    float bend1, bend2, bend3;  /* nonlinearity, by the share of the full well */
+    float tail_gap, tail_rms_e; /* read noise's tail (read_tail.cl) */
+    float transfer_row_s;       /* transfer time per row */
 } bst_kernel_frame_params;
 
 /* Record of one source for the node kernel. */
 typedef struct bst_kernel_source_record {
     float x_px, y_px; /* relative to the boresight at the reference attitude, without distortion */
-    int place_x, place_y; /* the same in fixed-point px on the sensor (2^PLACE_BITS per px) */
+    int place_x, place_y; /* the same in fixed-point px on the sensor (bst_kernel_node_params) */
     float electrons;      /* in the exposure */
     int first_table;      /* first block in the node table */
     int blocks;

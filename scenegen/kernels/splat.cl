@@ -186,13 +186,12 @@ INLINE int16 team_max(int16 v) {
     return max(v, v.s23016745ab89efcd);
 }
 
-static void place_nodes(node_block nodes, int tile_x, int tile_y, int radius,
-                        global const float *law, splat_nodes *b) {
-    const int rest = (1 << PLACE_BITS) - 1;
-    const float px = 1.0f / (float)(1 << PLACE_BITS);
-    int16 x = nodes.x >> PLACE_BITS, y = nodes.y >> PLACE_BITS;
-    float16 within_x = convert_float16(nodes.x & rest) * px;
-    float16 within_y = convert_float16(nodes.y & rest) * px;
+static void place_nodes(bst_kernel_node_params p, node_block nodes, int tile_x, int tile_y,
+                        int radius, global const float *law, splat_nodes *b) {
+    const int rest = (1 << p.place_bits) - 1;
+    int16 x = nodes.x >> p.place_bits, y = nodes.y >> p.place_bits;
+    float16 within_x = convert_float16(nodes.x & rest) * p.per_parts;
+    float16 within_y = convert_float16(nodes.y & rest) * p.per_parts;
     int taps = 2 * radius + 2, octets = (taps + OCTET - 1) / OCTET * OCTET;
     for (; b->taps > octets; b->taps -= OCTET) {
         for (int n = 0; n < BST_BLOCK; n++) {
@@ -324,7 +323,8 @@ static void splat_tile(bst_kernel_frame_params p, local float *sum, int tile_x, 
             break;
         }
         int radius = search.source.radius;
-        place_nodes(nodes_of(search.source, block, table), tile_x, tile_y, radius, law, &b);
+        place_nodes(p.nodes, nodes_of(p.nodes, search.source, block, table), tile_x, tile_y, radius,
+                    law, &b);
         splat_block(sum, &b, 2 * radius + 2);
     }
 }

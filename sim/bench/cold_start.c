@@ -33,6 +33,7 @@ bst_status bst_bench_first_frame(bst_ctx *ctx, const bst_bench_options *options)
         bst_renderer_options fidelity = bst_renderer_default_options();
         fidelity.tolerance_sigma = scene->tolerance_sigma;
         status = bst_renderer_create(ctx, device, &view.camera, &fidelity, &renderer);
+        status = status == BST_OK ? bst_renderer_prepare(ctx, renderer) : status;
         ends[2] = bst_bench_wall_s();
     }
     if (status == BST_OK) {
