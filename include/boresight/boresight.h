@@ -311,7 +311,9 @@ bst_status bst_sim_restore_file(bst_ctx *ctx, bst_sim *sim, const char *path,
  *
  * Returned:  *out  without observer; NULL on error
  * Errors:    those of bst_sim_create, bst_sim_save and bst_sim_restore
- * Ownership: free *out with bst_sim_free */
+ * Ownership: free *out with bst_sim_free; the sims are independent
+ * Notes:     both hold the newest frame. A sim shares up to four frames with its clones; further
+ *            ones are copied. */
 bst_status bst_sim_clone(bst_ctx *ctx, bst_sim *sim, bst_sim **out) BST_MUST_CHECK;
 
 #pragma GCC visibility pop
