@@ -4,9 +4,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/satellite/separation.h"
+
 static void free_view(bst_pose_view *v) {
     free(v->bounds);
-    free(v->clear);
+    free(v->hiders);
     free(v->outline);
     free(v->outline_count);
     free(v->cell_first);
@@ -20,6 +22,8 @@ void bst_satellite_pose_free(bst_satellite_pose *p) {
         free(p->rotation);
         free(p->origin);
         free(p->seen);
+        free(p->pairs);
+        free(p->faces);
         free_view(&p->views[0]);
         free_view(&p->views[1]);
         bst_polygon_clip_free(&p->clip);
@@ -33,9 +37,9 @@ static bool make_view(const bst_satellite *s, bst_pose_view *v) {
     v->bounds = calloc((size_t)s->occluder_count + 1, sizeof *v->bounds);
     v->outline = calloc(2 * (size_t)s->vertex_count + 8, sizeof *v->outline);
     v->outline_count = calloc((size_t)s->occluder_count + 1, sizeof *v->outline_count);
-    v->clear = calloc((size_t)s->occluder_count + 1, sizeof *v->clear);
-    bool made = v->bounds && v->clear && v->outline && v->outline_count;
-    if (s->occluder_count > 64) {
+    v->hiders = calloc((size_t)s->occluder_count + 1, sizeof *v->hiders);
+    bool made = v->bounds && v->hiders && v->outline && v->outline_count;
+    if (s->occluder_count > BST_SEPARATION_BODIES) {
         v->cells = (int)fmin(sqrt((double)s->occluder_count), 256.0);
         v->cell_item_capacity = 32 * s->occluder_count + v->cells * v->cells;
         v->cell_first = calloc((size_t)(v->cells * v->cells) + 2, sizeof *v->cell_first);
@@ -45,6 +49,31 @@ static bool make_view(const bst_satellite *s, bst_pose_view *v) {
     return made;
 }
 
+/* Lists the plane faces of the bodies. False: out of memory. */
+static bool make_pairs(bst_satellite_pose *p) {
+    const bst_satellite *s = p->satellite;
+    int n = s->occluder_count;
+    if (n > BST_SEPARATION_BODIES) {
+        return true;
+    }
+    p->pairs = calloc((size_t)(n * n) + 1, sizeof *p->pairs);
+    p->faces = malloc(((size_t)n + 1) * sizeof *p->faces);
+    if (!p->pairs || !p->faces) {
+        return false;
+    }
+    memset(p->faces, -1, ((size_t)n + 1) * sizeof *p->faces);
+    for (int f = 0; f < s->facet_count; f++) {
+        int *faces = p->faces[s->facets[f].occluder], k = 0;
+        while (k < BST_SEPARATION_FACES && faces[k] >= 0) {
+            k++;
+        }
+        if (k < BST_SEPARATION_FACES && s->facets[f].curved < 0) {
+            faces[k] = f;
+        }
+    }
+    return true;
+}
+
 bst_status bst_satellite_pose_create(bst_ctx *ctx, const bst_satellite *s,
                                      bst_satellite_pose **out) {
     bst_satellite_pose *p = *out = calloc(1, sizeof *p);
@@ -52,13 +81,14 @@ bst_status bst_satellite_pose_create(bst_ctx *ctx, const bst_satellite *s,
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the pose of a satellite");
     }
     p->satellite = s;
+    p->stamp = 1;
     p->vertices = calloc((size_t)s->vertex_count + 1, sizeof *p->vertices);
     p->normals = calloc((size_t)s->facet_count + 1, sizeof *p->normals);
     p->rotation = calloc((size_t)s->joint_count + 1, sizeof *p->rotation);
     p->origin = calloc((size_t)s->joint_count + 1, sizeof *p->origin);
     p->seen = calloc((size_t)s->occluder_count + 1, sizeof *p->seen);
     bool made = p->vertices && p->normals && p->rotation && p->origin && p->seen &&
-                make_view(s, &p->views[0]) && make_view(s, &p->views[1]);
+                make_view(s, &p->views[0]) && make_view(s, &p->views[1]) && make_pairs(p);
     bst_status status =
         made ? bst_polygon_clip_create(ctx, &p->clip)
              : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the pose of a satellite of %d facets",
@@ -105,6 +135,7 @@ void bst_satellite_pose_set(bst_satellite_pose *p, const bst_satellite_aim *aim)
     if (s->joint_count == 0) {
         return;
     }
+    p->stamp++;
     for (int i = 0; i < s->joint_count; i++) {
         const bst_joint *j = &s->joints[i];
         bst_vec3 to = j->follows == BST_JOINT_SUN     ? aim->sun
@@ -228,9 +259,14 @@ void bst_pose_look(bst_satellite_pose *p, int view, bst_vec3 direction) {
         return;
     }
     for (int o = 0; o < s->occluder_count; o++) {
-        v->clear[o] = true;
-        for (int k = 0; k < s->occluder_count && v->clear[o]; k++) {
-            v->clear[o] = k == o || !may_hide(v->bounds[k], v->bounds[o]);
+        v->hiders[o] = 0;
+        for (int k = 0; k < s->occluder_count; k++) {
+            bst_vec3 axis;
+            /* a ray that does not advance along the axis leads away from the other body */
+            if (may_hide(v->bounds[k], v->bounds[o]) &&
+                (k == o || !bst_separation(p, o, k, &axis) || bst_vec3_dot(axis, v->z) > 1e-12)) {
+                v->hiders[o] |= (uint64_t)1 << k;
+            }
         }
     }
 }
@@ -290,6 +326,7 @@ typedef struct plane {
     double margin_m;                           /* what is less in front of the plane is in it */
     bst_point2 whole[BST_POLYGON_CORNERS_MAX]; /* the facet */
     int count;
+    int body;              /* its occluder */
     bool mapped;           /* the three members below are those of the view */
     bst_point2 zero, x, y; /* from the view's coordinates: zero + u x + v y */
     double nearest_m;      /* largest coordinate of the facet along the view's direction */
@@ -396,6 +433,9 @@ static int silhouette(bst_satellite_pose *p, plane *f, bst_pose_view *v, int occ
 
 /* Subtracts an occluder's silhouette from the facet. */
 static void subtract(bst_satellite_pose *p, plane *f, bst_pose_view *v, int occluder) {
+    bst_vec3 axis;
+    /* where bodies are separate, the ray leads toward this one: see bst_pose_look */
+    bool apart = bst_separation(p, f->body, occluder, &axis);
     const bst_occluder *o = &p->satellite->occluders[occluder];
     bst_point2 moved[BST_POLYGON_CORNERS_MAX];
     int n = silhouette(p, f, v, occluder, moved);
@@ -404,7 +444,7 @@ static void subtract(bst_satellite_pose *p, plane *f, bst_pose_view *v, int occl
     }
     /* all of what is nearer to the light than the whole facet is in front of it, where it matters
      */
-    if (v->bounds[occluder][4] < f->nearest_m) {
+    if (!apart && v->bounds[occluder][4] < f->nearest_m) {
         double height[BST_POLYGON_CORNERS_MAX], low = INFINITY, high = -INFINITY;
         for (int i = 0; i < o->vertex_count; i++) {
             bst_vec3 r = bst_vec3_sub(p->vertices[o->first_vertex + i], f->origin);
@@ -437,6 +477,7 @@ static void start_clip(bst_satellite_pose *p, int index, plane *f) {
     const bst_satellite *s = p->satellite;
     const bst_facet *facet = &s->facets[index];
     f->count = facet->count;
+    f->body = facet->occluder;
     f->normal = p->normals[index];
     bst_pose_facet_axes(p, index, &f->origin, &f->e1, &f->e2);
     f->margin_m = 1e-9 * s->radius_m;
@@ -475,21 +516,31 @@ double bst_pose_unshadowed(bst_satellite_pose *p, int index, int views, bool *wh
     for (int k = 0; k < views; k++) {
         bst_pose_view *v = &p->views[k];
         double b[6];
-        if (v->clear[facet->occluder] && !facet->inside) {
+        bool few = s->occluder_count <= BST_SEPARATION_BODIES;
+        uint64_t hiders = few ? v->hiders[facet->occluder] : 0;
+        if (few && !facet->inside) {
+            hiders &= ~((uint64_t)1 << facet->occluder);
+        }
+        if (few && hiders == 0) {
             continue;
         }
         facet_bounds(p, facet, v, b);
         f.nearest_m = b[5];
         f.mapped = false;
-        if (v->cells == 0 || v->cell_item_count < 0) {
-            for (int o = 0; o < s->occluder_count; o++) {
-                if (may_hide(v->bounds[o], b)) {
-                    try_occluder(p, index, v, o, &f, whole);
-                }
+        for (int o = 0; few && o < s->occluder_count; o++) {
+            if ((hiders >> o & 1) && may_hide(v->bounds[o], b)) {
+                try_occluder(p, index, v, o, &f, whole);
             }
-            if (!*whole && bst_polygon_clip_is_empty(&p->clip)) {
-                return 0.0;
+        }
+        for (int o = 0; !few && v->cell_item_count < 0 && o < s->occluder_count; o++) {
+            if (may_hide(v->bounds[o], b)) {
+                try_occluder(p, index, v, o, &f, whole);
             }
+        }
+        if (!*whole && bst_polygon_clip_is_empty(&p->clip)) {
+            return 0.0;
+        }
+        if (few || v->cell_item_count < 0) {
             continue;
         }
         int stamp = ++p->seen_stamp;

@@ -16,12 +16,22 @@ typedef struct bst_pose_view {
     bst_vec3 x, y, z; /* right-handed; z: unit, from the satellite to the light or the observer */
     double (*bounds)[6]; /* by occluder: lowest and highest x, y, z */
     bst_point2 *outline; /* silhouettes of occluders, counter-clockwise, from 2 * first_vertex */
-    bool *clear;         /* by occluder: no other one can hide any of it */
+    uint64_t *hiders;    /* by occluder: set of those that may hide some of it; for few occluders */
     int *outline_count;  /* corners of the silhouette; -1: not yet made */
     int *cell_first, *cell_items; /* occluders by cell of a grid, for models with many */
     int cells, cell_item_count, cell_item_capacity;
     double origin[2], step[2]; /* of the grid */
 } bst_pose_view;
+
+/* Bodies of a model, at most, for which separating planes are kept; plane faces tried of each. */
+enum { BST_SEPARATION_BODIES = 64, BST_SEPARATION_FACES = 6 };
+
+/* Whether and how two bodies are separate (separation.h). */
+typedef struct bst_pose_pair {
+    int stamp; /* pose in which it was found; 0: not yet */
+    bool separate;
+    bst_vec3 axis;
+} bst_pose_pair;
 
 /* A pose: work memory of one thread for one model. */
 typedef struct bst_satellite_pose {
@@ -33,6 +43,9 @@ typedef struct bst_satellite_pose {
     bst_pose_view views[2]; /* see bst_pose_look */
     int *seen;              /* by occluder: facet for which it was last found in the grid */
     int seen_stamp;
+    int stamp;                          /* counts the poses, from 1 */
+    bst_pose_pair *pairs;               /* [occluders][occluders]; NULL: too many */
+    int (*faces)[BST_SEPARATION_FACES]; /* by occluder: plane facets; -1: no more */
     bst_polygon_clip clip;
 } bst_satellite_pose;
 
