@@ -1,0 +1,68 @@
+/* Sampled images of targets against the closed forms of a Gaussian PSF. */
+#include <math.h>
+
+#include "sim/analysis/pd/pd_image.h"
+#include "tests/test_support.h"
+
+/* A full width at half maximum of 2 px. */
+#define SIGMA_PX (2.0 / 2.354820045)
+
+static bst_psf *gaussian(void) {
+    bst_ctx ctx = {0};
+    bst_psf *psf;
+    const bst_camera camera = {.width_px = 512,
+                               .height_px = 256,
+                               .pixel_scale_arcsec = 2.0,
+                               .aperture_m = 0.1,
+                               .psf_fwhm_px = 2.0,
+                               .optics = {.psf = BST_PSF_GAUSSIAN, .q = 2.0, .wavelengths = 1}};
+    bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
+    return psf;
+}
+
+/* Points between pixels, and paths in all quadrants up to 9 px, whole and broken, beside corners.
+ */
+static const bst_eval_match_target places[] = {{100, 50, 0, 0},         {100.25, 50.4375, 0, 0},
+                                               {310.5, 200.5, 0, 0},    {70.125, 90.875, 4, 0},
+                                               {70.125, 90.875, 0, -7}, {401.3125, 33.5, 5, 3.5},
+                                               {22.75, 160, -8, 4},     {250, 41.0625, -1.5, -2.5}};
+
+static void powers_and_bounds(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_psf *psf = gaussian();
+    bst_pd_image *image;
+    bst_assert_ok(&ctx, bst_pd_image_create(&ctx, psf, 9.0, &image));
+    for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
+        const bst_eval_match_target *p = &places[i];
+        const bst_eval_bound_source source = {p->x_px, p->y_px, p->dx_px, p->dy_px, SIGMA_PX, 4000};
+        /* paths are drawn by points that lie on sixteenths of a pixel */
+        double loose = hypot(p->dx_px, p->dy_px) > 0 ? 6e-3 : 1e-5;
+        double powers[2], truth[2];
+        bst_pd_image_powers(image, p, powers);
+        bst_assert_ok(&ctx, bst_eval_gaussian_powers(&ctx, &source, truth));
+        bst_assert_close(powers[0], truth[0], loose * truth[0]);
+        bst_assert_close(powers[1], truth[1], 2 * loose * truth[1]);
+        for (int own = 0; own < 2; own++) {
+            const bst_eval_bound_noise noise = {11.0, own};
+            bst_location_bound a, b;
+            bst_assert_ok(&ctx, bst_pd_image_bound(&ctx, image, p, 4000, &noise, &a));
+            bst_assert_ok(&ctx, bst_location_bound_gaussian(&ctx, &source, &noise, 8.0, &b));
+            bst_assert_close(a.snr, b.snr, loose * b.snr);
+            for (int k = 0; k < 2; k++) { /* x, y and their cross term */
+                bst_assert_close(a.covariance[k][k], b.covariance[k][k],
+                                 8 * loose * b.covariance[k][k]);
+                double scale = sqrt(b.covariance[0][0] * b.covariance[1][1]);
+                bst_assert_close(a.covariance[k][1 - k], b.covariance[k][1 - k], 8 * loose * scale);
+            }
+        }
+    }
+    bst_pd_image_free(image);
+    bst_pd_image_free(NULL);
+    bst_psf_free(psf);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(powers_and_bounds)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
