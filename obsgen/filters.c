@@ -43,7 +43,7 @@ static path_residual fit_straight_path(bst_generator *g) {
         double dx = g->path_x[k] - u * g->straight_path.dx;
         double dy = g->path_y[k] - u * g->straight_path.dy, across = dy * c - dx * s;
         double bent = drawn ? 6.0 * u * u - 0.5 : 0.0; /* as imgproc's fit models it */
-        double ex = dx - bent * g->bend_x, ey = dy - bent * g->bend_y;
+        double ex = dx - bent * g->fit_bend_x, ey = dy - bent * g->fit_bend_y;
         out.filter_px2 += weight * (drawn ? across * across : 0.5 * (dx * dx + dy * dy)) / last;
         out.fit_px2 += weight * 0.5 * (ex * ex + ey * ey) / last;
         double ux = g->path_x[k] - u * g->star_path.dx, uy = g->path_y[k] - u * g->star_path.dy;

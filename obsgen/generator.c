@@ -408,6 +408,7 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
     g->path.count = 0;
     bst_generator_set_response(g, f);
     BST_TRY(set_path(ctx, g, f));
+    bst_generator_measure_motion(g, f);
     bst_generator_set_response(g, f); /* after the path is set */
     bst_generator_set_star_bias(g);
     return BST_OK;

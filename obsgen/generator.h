@@ -62,6 +62,7 @@ typedef struct bst_generator_frame {
     /* star streak at the window's centre and its bend (bst_camera_motion_bend) as image processing
      * takes them from telemetry, sensor px */
     double streak_dx_px, streak_dy_px, bend_x_px, bend_y_px;
+    double bend_sigma_px; /* 1 sigma of the bend per axis by telemetry's noise, sensor px */
     /* true path of a star there at path_count equal steps of the exposure, minus its mean, sensor
      * px; fewer than 2: straight and uniform */
     const double *path_x_px, *path_y_px;

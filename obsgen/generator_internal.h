@@ -92,6 +92,8 @@ struct bst_generator {
     bst_blend_weights blend_weights;
     bst_obsgen_path_px star_path;
     double bend_x, bend_y;
+    bst_obsgen_path_px fit_path; /* of the streaks that are fitted, and its bend */
+    double fit_bend_x, fit_bend_y;
     bst_star_trail_path path; /* true path; count 0: unknown */
     double *path_x, *path_y, *object_x, *object_y;
     int path_room;
@@ -132,6 +134,9 @@ struct bst_generator {
 double bst_generator_inside(const bst_generator *g, double x, double y, double sigma);
 /* Sets the response of the frame's filters; the path must be set. */
 void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f);
+/* Sets the path and bend of the fitted streaks: those of telemetry, corrected by what image
+ * processing measures on bright streaks; the path must be set. */
+void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f);
 /* Sets thresholds and noise of the frame's filters; the pixel noise must be set. */
 void bst_generator_set_filters(bst_generator *g);
 /* Share of a crowded frame that image processing uses as open sky, from its sources' amplitudes; 1:

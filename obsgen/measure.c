@@ -22,7 +22,7 @@ static void saturated_bias(const bst_generator *g, const generator_source *s, do
     bst_streak_model model = bst_generator_streak_model(g);
     double peak_e = s->flux_e / (2.0 * BST_PI * model.sigma_px * model.sigma_px);
     model.saturated = fmax(saturation_e(g), 0.0) / peak_e;
-    bst_star_trail_bias(&g->path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
+    bst_star_trail_bias(&g->path, g->fit_path.dx, g->fit_path.dy, g->fit_bend_x, g->fit_bend_y,
                         g->total_sigma, bias);
     bst_path_fit(&g->path, &model, &model, light, bias);
 }
@@ -54,7 +54,7 @@ static void shared_bias(const bst_generator *g, const generator_source *s, bool 
         bst_star_trail_point_bias(&path, &g->blend_weights, light, g->bias_sigma, bias);
         return;
     }
-    bst_star_trail_bias(&path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
+    bst_star_trail_bias(&path, g->fit_path.dx, g->fit_path.dy, g->fit_bend_x, g->fit_bend_y,
                         g->total_sigma, bias);
     if (!bst_generator_is_uniform(g)) {
         const bst_streak_model model = bst_generator_streak_model(g);

@@ -443,6 +443,7 @@ static bst_status process_exposure(obsgen *o, struct bst_step *step, const bst_e
                                  e->window.y0 + 0.5 * (e->window.height - 1), &frame.streak_dx_px,
                                  &frame.streak_dy_px);
         bst_camera_motion_bend(&motion, camera, &frame.bend_x_px, &frame.bend_y_px);
+        frame.bend_sigma_px = motion.bend_sigma_rad / bst_camera_scale_rad(camera);
     }
     bst_generator_result made;
     BST_TRY(bst_generator_run(ctx, o->generator, &frame, &made));

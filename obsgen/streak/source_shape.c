@@ -17,7 +17,7 @@ static const double NO_STREAK = 1e3;
 
 bst_streak_model bst_generator_streak_model(const bst_generator *g) {
     return (bst_streak_model){
-        .path = g->star_path, .bend = {g->bend_x, g->bend_y}, .sigma_px = g->total_sigma};
+        .path = g->fit_path, .bend = {g->fit_bend_x, g->fit_bend_y}, .sigma_px = g->total_sigma};
 }
 
 bool bst_generator_is_uniform(const bst_generator *g) {
@@ -71,7 +71,7 @@ static void set_streak_bias(bst_generator *g) {
     const bst_streak_model model = bst_generator_streak_model(g);
     double light = GENERATOR_FIRST_LIGHT, plain = 1.0;
     double at[2] = {g->outputs.point_at[0], g->outputs.point_at[1]};
-    bst_star_trail_bias(&g->path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
+    bst_star_trail_bias(&g->path, g->fit_path.dx, g->fit_path.dy, g->fit_bend_x, g->fit_bend_y,
                         g->total_sigma, g->streak_bias[0]);
     for (int i = 0; i < GENERATOR_BIASES; i++, light *= 10.0) {
         bst_path_fit_squares squares = {0.0, 0.0};
@@ -126,7 +126,7 @@ static void set_uneven_object(const bst_generator *g, generator_source *s, doubl
     const bst_streak_model model = bst_generator_streak_model(g);
     bst_path_outputs o = bst_path_fit_outputs(&path, g->star_path, &widths);
     double light = bst_generator_streak_light(g, s->flux_e), at[2] = {0.0, 0.0};
-    bst_star_trail_bias(&path, g->star_path.dx, g->star_path.dy, g->bend_x, g->bend_y,
+    bst_star_trail_bias(&path, g->fit_path.dx, g->fit_path.dy, g->fit_bend_x, g->fit_bend_y,
                         g->total_sigma, at);
     double plain = bst_path_fit(&path, &model, &model, GENERATOR_FIRST_LIGHT, at).all;
     bst_path_fit_squares streak = bst_path_fit(&path, &model, &model, light, at);

@@ -8,8 +8,6 @@ from skewed_scene import EXPOSURE_S, FRAME_DELAY_S, LATENCY_S, THROUGHPUT_ERROR,
 
 class LoopTables:
     """Tests of a SkewedRun: detections, attitude from stars, tracks, control and commands."""
-    MOST_ATTITUDE_SIGMAS = 2.0
-
     # ---------------------------------------------------------------- detections
 
     def test_detections(self):
@@ -120,10 +118,9 @@ class LoopTables:
               "from the median", np.sqrt(np.median(pulls ** 2, axis=0) / 0.455).round(2))
         self.assertGreater(len(pulls), 30)
         # 34 frames: a standard deviation from a median is known to 20 %. The attitude of a mean is that of a shaken
-        # exposure: with images the figures are 1.4 to 1.9, with the generator 0.7 to 2.1
-        limit = self.MOST_ATTITUDE_SIGMAS
+        # exposure: of 16 seeds the median about x is 1.6 with images and 1.4 with the generator
         for k in range(3):
-            self.assertTrue(0.6 < np.sqrt(np.median(pulls[:, k] ** 2) / 0.455) < limit, (k, pulls[:, k]))
+            self.assertTrue(0.6 < np.sqrt(np.median(pulls[:, k] ** 2) / 0.455) < 2.0, (k, pulls[:, k]))
 
     def test_tracks(self):
         nees, seen, kept = [], {}, {}

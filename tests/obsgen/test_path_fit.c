@@ -1,6 +1,8 @@
 /* Stars on a path that telemetry does not know: what is fitted to their light, against sums over
  * fine pixels, and what the generator reports of them. */
 #include "obsgen/streak/path_fit.h"
+
+#include "obsgen/generator_internal.h"
 #include "tests/obsgen/generator_scene.h"
 
 enum { STEPS = 401, FINE = 4, ACROSS = 30 * FINE, ALONG = 60 * FINE };
@@ -266,6 +268,44 @@ static void bright_streaks_have_another_bias(void **state) {
     close_scene(&s);
 }
 
+/* Image processing measures a bend that telemetry does not report on bright streaks, and fits all
+ * stars with it: their common shift is less. Faint stars show no bend. */
+static void a_bend_is_measured_on_bright_streaks(void **state) {
+    (void)state;
+    const double length = 10.0, bend = 0.25, snrs[2] = {15.0, 400.0};
+    double seen[2];
+    scene s;
+    open_scene(&s);
+    s.frame.bend_sigma_px = bend;
+    start(&s);
+    path p;
+    for (int k = 0; k < STEPS; k++) {
+        double v = 2.0 * k / (STEPS - 1) - 1.0;
+        double u = 0.5 * length * v + bend * 0.5 * (3.0 * v * v - 1.0);
+        p.x[k] = 0.8 * u;
+        p.y[k] = 0.6 * u;
+    }
+    centre(&p);
+    for (int k = 0; k < 2; k++) {
+        (void)run_on(&s, &p, snrs[k], 5);
+        double norm = bst_crlb_table_norm(&s.generator->bound, length) / s.generator->noise_e;
+        for (int i = 0; i < s.truth->count; i++) {
+            s.truth->items[i].electrons = (float)(snrs[k] / norm);
+            s.truth->items[i].snr = (float)snrs[k];
+        }
+        bst_generator_result r = run(&s, 6);
+        assert_true(r.count > 850);
+        seen[k] = mean_along(&s, &r, 0.8, 0.6);
+    }
+    printf("bend of %.2f px: shift %.3f, with bright stars %.3f\n", bend, seen[0], seen[1]);
+    assert_true(seen[0] > 0.15 * bend); /* 0.7 of it at most: imgproc/streak/streak_motion.h */
+    assert_true(seen[0] < 0.8 * bend);
+    /* 12 stars of SNR 400 measure it to length / (sqrt(12) SNR sqrt(12)) without their own noise,
+     * 0.002 px, and twice that with it */
+    bst_assert_close(seen[1], 0.0, 0.015);
+    close_scene(&s);
+}
+
 /* A star that rests for most of the exposure is seen where it rests, as a point, whatever the
  * streak that telemetry reports. */
 static void stars_that_rest_are_points_where_they_rest(void **state) {
@@ -297,6 +337,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fits_end_where_they_would_on_fine_pixels),
         cmocka_unit_test(saturated_pixels_are_left_out),
+        cmocka_unit_test(a_bend_is_measured_on_bright_streaks),
         cmocka_unit_test(outputs_are_those_of_sums),
         cmocka_unit_test(bright_streaks_have_another_bias),
         cmocka_unit_test(stars_that_rest_are_points_where_they_rest),

@@ -1,0 +1,94 @@
+/* Motion of the camera as image processing measures it on bright star streaks
+ * (imgproc/streak/streak_motion.c): what it fits to all streaks of the frame. */
+#include <math.h>
+
+#include "boresight/vec.h"
+#include "obsgen/generator_internal.h"
+
+/* Stars that are used, and the least SNR of one. Shorter paths, in sigmas of the PSF, and paths
+ * that bend by a larger share of their length are not measured. */
+enum { MOST_STARS = 12 };
+static const double LEAST_SNR = 20.0, LEAST_PATH_SIGMAS = 4.0, MOST_BEND = 0.1;
+/* Errors of the telemetry that image processing expects, 1 sigma: of length and direction, px; of
+ * the bend, share of the jitter (imgproc/detect/detect.c). */
+static const double DRIFT_PX = 1.0, JITTER_BEND = 0.075;
+/* Random stream of the bend's error. */
+static const uint64_t BEND_ERROR = (uint64_t)1 << 55;
+
+/* Sum of the squared SNR of the brightest stars, with the noise of their own light: that of their
+ * brightest pixels. */
+static double snr2_of_stars(const bst_generator *g, const bst_truth *t) {
+    double best[MOST_STARS] = {0.0}, sum = 0.0;
+    double read_e = g->camera->read_noise_e, added = (double)g->binning * g->binning;
+    double variance = added * (t->background_e + t->dark_e) + read_e * read_e;
+    double norm = bst_crlb_table_norm(&g->bound, g->streak);
+    for (int i = 0; i < t->count; i++) {
+        const bst_truth_item *item = &t->items[i];
+        bool used = item->kind == BST_SOURCE_STAR && item->snr > LEAST_SNR &&
+                    (item->flags & BST_TRUTH_IN_FIELD) && !(item->flags & BST_TRUTH_SATURATED);
+        /* the brightest pixel of a long line is sqrt(2) sum p^2 of its light */
+        double own = sqrt(2.0) * item->electrons * norm * norm / fmax(variance, 1e-6);
+        double snr2 = item->snr * item->snr / (1.0 + own);
+        if (!used || snr2 <= best[MOST_STARS - 1]) {
+            continue;
+        }
+        int at = MOST_STARS - 1;
+        for (; at > 0 && best[at - 1] < snr2; at--) {
+            best[at] = best[at - 1];
+        }
+        best[at] = snr2;
+    }
+    for (int i = 0; i < MOST_STARS; i++) {
+        sum += best[i];
+    }
+    return sum;
+}
+
+/* Least-squares coefficients of the path: uniform motion along and across the telemetry's path, and
+ * bend along it. */
+static void project(const bst_generator *g, double c, double s, double *along, double *across,
+                    double *bend) {
+    double moment = 0.0, square = 0.0, sums[3] = {0.0};
+    int last = g->path.count - 1;
+    for (int k = 0; k <= last; k++) {
+        double u = (double)k / last - 0.5, bent = 6.0 * u * u - 0.5;
+        double weight = k == 0 || k == last ? 0.5 : 1.0;
+        double x = g->path_x[k] * c + g->path_y[k] * s, y = g->path_y[k] * c - g->path_x[k] * s;
+        moment += weight * u * u;
+        square += weight * bent * bent;
+        sums[0] += weight * u * x;
+        sums[1] += weight * u * y;
+        sums[2] += weight * bent * x;
+    }
+    *along = sums[0] / moment;
+    *across = sums[1] / moment;
+    *bend = sums[2] / square;
+}
+
+void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f) {
+    g->fit_path = g->star_path;
+    g->fit_bend_x = g->bend_x;
+    g->fit_bend_y = g->bend_y;
+    double snr2 = snr2_of_stars(g, f->truth), length = g->streak;
+    if (g->smeared || g->path.count < 3 || !(length >= LEAST_PATH_SIGMAS * g->fitted_sigma) ||
+        hypot(g->bend_x, g->bend_y) > MOST_BEND * length || !(snr2 > 0.0)) {
+        return;
+    }
+    double c = g->star_path.dx / length, s = g->star_path.dy / length, along, across, bend;
+    project(g, c, s, &along, &across, &bend);
+    double told = g->bend_x * c + g->bend_y * s; /* by telemetry */
+    /* The bend shows as a slope of the light along the streak, 6 bend / length from end to middle:
+     * its mean square is 12 (bend / length)^2 of the squared SNR. The ends give the length. */
+    double prior = hypot(JITTER_BEND * g->settings.jitter_px, f->bend_sigma_px) / g->binning;
+    double error2 = length * length / (12.0 * snr2);
+    double share = prior * prior / (prior * prior + error2);
+    double ends2 = 8.0 * g->total_sigma * length / snr2, drift = DRIFT_PX / g->binning;
+    double whole = drift * drift / (drift * drift + ends2);
+    double noise =
+        share * sqrt(error2) * bst_rng_normal(g->key, (uint64_t)f->truth->exposure_id, BEND_ERROR);
+    double more = share * (bend - told) + noise, dx = whole * (along - length);
+    g->fit_path.dx += dx * c - whole * across * s;
+    g->fit_path.dy += dx * s + whole * across * c;
+    g->fit_bend_x += more * c;
+    g->fit_bend_y += more * s;
+}
