@@ -119,8 +119,6 @@ class Pointing(unittest.TestCase):
             with self.assertRaises(bst.ArgumentError):
                 vector.step(wrong)
         vector.close()
-        with self.assertRaises(bst.ArgumentError):
-            bg.PointingVectorEnv(2, model=self.model, offset=3)
 
     def test_misuse_raises(self):
         env = bg.PointingEnv(model=self.model)

@@ -45,22 +45,21 @@ class PointingEnv(Env[Observation, Action]):
 
     Given:     scenario      of one sensor; its control is played by the agent
                model         instead of a scenario: environments share it
-               detections    rows of the observation: 16
-               rate_step_px  20
-               offset_px     greatest distance of the satellite from the boresight at the start: 200
-               patience      10
+               detections    rows of the observation
+               offset_px     greatest distance of the satellite from the boresight at the start
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
 
     def __init__(self, scenario: Any = None, *, model: Optional[Model] = None,
-                 render_mode: Optional[str] = None, **settings: Any):
+                 detections: int = 16, rate_step_px: float = 20.0, offset_px: float = 200.0,
+                 patience: int = 10, render_mode: Optional[str] = None):
         if render_mode not in (None, "rgb_array"):
             raise ArgumentError(f"render_mode {render_mode!r} (allowed: None, \"rgb_array\")")
         self.model = model or pointing_model(scenario)
         self.render_mode = render_mode
-        self.settings = pointing_settings(settings)
-        self.rate_step_px = self.settings.rate_step_px
+        self.settings = PointingSettings(detections, rate_step_px, offset_px, patience)
+        self.rate_step_px = rate_step_px
         self.camera = self.model.camera()
         self.observation_space: Any = pointing_observations(self.settings)
         self.action_space: Any = spaces.Box(-1, 1, (2,), np.float32)
@@ -115,15 +114,6 @@ class PointingEnv(Env[Observation, Action]):
     def close(self) -> None:
         """Ends the simulation."""
         self._group.close()
-
-
-def pointing_settings(given: Dict[str, Any]) -> PointingSettings:
-    """The settings of PointingEnv from its arguments."""
-    unknown = sorted(set(given) - set(PointingSettings._fields))
-    if unknown:
-        raise ArgumentError(f"PointingEnv has no argument {unknown[0]!r} (allowed: scenario, model, "
-                            f"render_mode, {', '.join(PointingSettings._fields)})")
-    return PointingSettings(**given)
 
 
 def pointing_observations(settings: PointingSettings) -> Any:

@@ -26,10 +26,10 @@ Flags = npt.NDArray[np.bool_]
 class PointingSettings(NamedTuple):
     """What the environments of a group have in common; see PointingEnv."""
 
-    detections: int = 16
-    rate_step_px: float = 20.0
-    offset_px: float = 200.0
-    patience: int = 10
+    detections: int
+    rate_step_px: float
+    offset_px: float
+    patience: int
 
 
 class Outcome(NamedTuple):

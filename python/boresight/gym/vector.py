@@ -16,8 +16,8 @@ from gymnasium.vector.utils import batch_space
 from ..errors import ArgumentError
 from ..model import Model
 from ..pool import Pool
-from .pointing import Observation, pointing_model, pointing_observations, pointing_settings
-from .pointing_group import PointingGroup
+from .pointing import Observation, pointing_model, pointing_observations
+from .pointing_group import PointingGroup, PointingSettings
 from .tasking import TaskingEnv, TaskingModel
 
 _Base: Any = VectorEnv
@@ -101,22 +101,23 @@ class PointingVectorEnv(_Base):
     """Several PointingEnv that share a model, as arrays: C code steps them in a pool of threads. An
     environment that has ended starts anew with the step after (AutoresetMode.NEXT_STEP).
 
-    Given:     threads   of the pool; 0: one for each processor
-               settings  as of PointingEnv: model, detections, rate_step_px, offset_px, patience
+    Given:     threads  of the pool; 0: one for each processor
+               the others are those of PointingEnv
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": []}
 
     def __init__(self, num_envs: int = 1, scenario: Any = None, *, threads: int = 0,
-                 model: Optional[Model] = None, **settings: Any):
+                 model: Optional[Model] = None, detections: int = 16, rate_step_px: float = 20.0,
+                 offset_px: float = 200.0, patience: int = 10):
         self.num_envs = num_envs
         self.model = model or pointing_model(scenario)
-        chosen = pointing_settings(settings)
-        self.single_observation_space = pointing_observations(chosen)
+        settings = PointingSettings(detections, rate_step_px, offset_px, patience)
+        self.single_observation_space = pointing_observations(settings)
         self.single_action_space = Box(-1, 1, (2,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._group = PointingGroup(self.model, num_envs, Pool(threads), chosen)
+        self._group = PointingGroup(self.model, num_envs, Pool(threads), settings)
         self._generators = [seeding.np_random()[0] for _ in range(num_envs)]
         self._ended = np.zeros(num_envs, bool)
 
