@@ -47,10 +47,11 @@ class Examples(unittest.TestCase):
         self.assertIn(1, done.labels)
 
     def test_train_tasking(self):
-        # a shorter training than that of the page, and one run
-        done = execute("train_tasking", generations=1, candidates=4, runs=(100,))
+        # the first generation of the page, and one run: its best weights are those of the page
+        done = execute("train_tasking", generations=1, runs=(100,))
+        self.assertEqual(len(done.scores), 6)
         self.assertGreater(done.score["trained"], done.score["random"])
-        self.assertLessEqual(max(done.score.values()), 2 * 10)
+        self.assertGreater(done.score["greedy"], done.score["random"])
 
 
 if __name__ == "__main__":

@@ -40,9 +40,10 @@ class PlainEnv(Generic[ObsType, ActType]):
 class PlainBox:
     """Arrays of a shape with limits."""
 
-    def __init__(self, low: Any, high: Any, shape: Sequence[int], dtype: Any = np.float32):
+    def __init__(self, low: Any, high: Any, shape: Optional[Sequence[int]] = None,
+                 dtype: Any = np.float32):
         self.low, self.high, self.dtype = low, high, np.dtype(dtype)
-        self.shape = tuple(shape)
+        self.shape = np.shape(low) if shape is None else tuple(shape)
 
     def sample(self) -> npt.NDArray[Any]:
         """A random array."""
