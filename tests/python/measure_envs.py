@@ -16,6 +16,12 @@ import time
 
 import numpy as np
 
+try:
+    import gymnasium  # noqa: F401
+except ImportError:
+    print("gymnasium is not installed: nothing is measured")
+    sys.exit(0)
+
 from boresight.gym import PointingEnv, PointingVectorEnv
 from boresight.gym.pointing import pointing_model
 
