@@ -1,7 +1,6 @@
 /* Effects of the detector on a chunk of pixels: charge, response, conversion to digital numbers.
  * Option: EFFECTS (the camera's BST_EFFECT_... bits; the others are not compiled. Without this option
- * each camera has those of p.effects, and cameras share the program; the branches cost 5 % of a frame
- * of `boresight bench acquisition`.) */
+ * each camera has those of p.effects, and cameras share the program, with a branch at each effect. */
 
 #ifdef EFFECTS
 #define HAS(p, effect) ((EFFECTS & (effect)) != 0)

@@ -15,13 +15,11 @@
 INLINE void fetch_maps(bst_kernel_frame_params p, detector_maps maps, int row, int column,
                        int columns) {
     size_t first = (size_t)row * p.maps_stride + column;
-    if (HAS(p, BST_EFFECT_GAIN)) {
-        for (int x = 0; x < columns; x += 16) {
+    for (int x = 0; x < columns; x += 16) {
+        if (HAS(p, BST_EFFECT_GAIN)) {
             FETCH_LINE(maps.gain, first + x);
         }
-    }
-    if (HAS(p, BST_EFFECT_DARK)) {
-        for (int x = 0; x < columns; x += 16) {
+        if (HAS(p, BST_EFFECT_DARK)) {
             FETCH_LINE(maps.dark, first + x);
         }
     }
