@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+"""boresight lightcurve and turntable from outside: tables, pictures, GLB that reads back, and errors.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_shapes.py BORESIGHT
+"""
+import csv
+import io
+import os
+import struct
+import subprocess
+import tempfile
+import unittest
+
+import runs
+
+SATELLITE = "scenarios/satellites/gps_iif.json"
+ORBIT = ["--elements", "scenarios/catalogue_2022-06.tle", "--norad", "39089", "--start", "2022-06-16T02:00:00Z"]
+
+
+def boresight(*words):
+    return subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True)
+
+
+class Shapes(unittest.TestCase):
+    def test_light_curve_from_a_site(self):
+        shown = boresight("lightcurve", "--satellite", SATELLITE, *ORBIT, "--duration", "1200", "--step", "10",
+                          "--site", "32.44,-110.79,2790", "--extinction", "0.2")
+        self.assertEqual(shown.returncode, 0, shown.stderr)
+        rows = list(csv.DictReader(io.StringIO(shown.stdout)))
+        self.assertEqual(len(rows), 121)
+        up = [row for row in rows if float(row["elevation_deg"]) > 0]
+        self.assertTrue(10 < len(up) < 121)
+        self.assertTrue(all(0 < float(row["v_mag"]) < 20 for row in up if float(row["sunlit_fraction"]) == 1))
+        self.assertTrue(all(row["v_mag"] == "" for row in rows if float(row["elevation_deg"]) < 0))
+        # without extinction it is brighter, by 0.2 mag per air mass: at least 0.2
+        clear = boresight("lightcurve", "--satellite", SATELLITE, *ORBIT, "--duration", "1200", "--step", "10",
+                          "--site", "32.44,-110.79,2790")
+        for one, other in zip(rows, csv.DictReader(io.StringIO(clear.stdout))):
+            if one["v_mag"]:
+                self.assertGreaterEqual(float(one["v_mag"]) - float(other["v_mag"]), 0.1999)
+
+    def test_light_curve_of_a_scenario(self):
+        shown = boresight("lightcurve", "scenarios/neossat_geo_track.json", "--duration", "60", "--step", "20")
+        self.assertEqual(shown.returncode, 0, shown.stderr)
+        self.assertEqual(len(shown.stdout.splitlines()), 5)
+
+    def test_turntable_reads_its_own_glb(self):
+        with tempfile.TemporaryDirectory() as folder:
+            png, glb = os.path.join(folder, "a.png"), os.path.join(folder, "a.glb")
+            first = boresight("turntable", SATELLITE, "--png", png, "--glb", glb, "--size-px", "64")
+            self.assertEqual(first.returncode, 0, first.stderr)
+            with open(png, "rb") as file:
+                self.assertEqual(struct.unpack(">II", file.read(24)[16:]), (4 * 64, 2 * 64))
+            again = boresight("turntable", glb)
+            self.assertEqual(again.returncode, 0, again.stderr)
+            self.assertEqual(first.stdout.split("radius")[1], again.stdout.split("radius")[1])
+
+    def test_errors(self):
+        for words, code, reason in (
+                (["lightcurve"], 2, "give either one scenario file or --satellite"),
+                (["lightcurve", "--satellite", SATELLITE], 1, "--elements"),
+                (["lightcurve", "--satellite", SATELLITE, *ORBIT], 1, "give --site or --observer-norad"),
+                (["lightcurve", "--satellite", SATELLITE, *ORBIT, "--site", "95,0,0"], 1, "--site 95,0,0"),
+                (["lightcurve", "scenarios/neossat_geo_track.json", "--object", "none"], 1, "--object none"),
+                (["turntable"], 2, "one satellite is expected"),
+                (["turntable", "no.json"], 1, "no.json")):
+            shown = boresight(*words)
+            self.assertEqual(shown.returncode, code, (words, shown.stderr))
+            self.assertIn(reason, shown.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
