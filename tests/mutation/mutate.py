@@ -313,7 +313,8 @@ def main():
     parser.add_argument("--source", default=os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
     parser.add_argument("--work", help="folder of the copy, kept for the next time (default: a temporary one)")
     parser.add_argument("--quick", metavar="BUILD", nargs="?", const="build",
-                        help="no copy: compile each bug by itself and link it before the libraries of this build (build)")
+                        help="no copy: compile each bug by itself and link it before the libraries of this build (build); "
+                        "one run at a time there")
     parser.add_argument("--skip", nargs="+", default=[], metavar="LABEL", help="leave out tests with these labels (heavy)")
     parser.add_argument("--files", nargs="+", help="files or folders to plant bugs in")
     parser.add_argument("--coverage", help="folder for a build with gcov: run only the tests that execute a bug's line")
