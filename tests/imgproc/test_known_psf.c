@@ -12,7 +12,7 @@
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 
-enum { SIDE = 64, PER_PX = 8, REACH_PX = 10, IMAGE = 2 * PER_PX * REACH_PX + 1 };
+enum { SENSOR = 256, SIDE = 64, PER_PX = 8, REACH_PX = 10, IMAGE = 2 * PER_PX * REACH_PX + 1 };
 
 /* A telescope's PSF with vanes and aberrations that turn over from one corner to the next. */
 static const bst_psf_field_node corners[4] = {
@@ -46,6 +46,16 @@ static bst_psf *psf_of(const bst_camera *camera) {
     bst_ctx ctx = {0};
     bst_psf *psf;
     bst_assert_ok(&ctx, bst_psf_create(&ctx, camera, &psf));
+    return psf;
+}
+
+/* The PSF of telescope(SENSOR), made once: it takes most of the time of this program. */
+static bst_psf *telescope_psf(void) {
+    static bst_psf *psf;
+    if (!psf) {
+        const bst_camera camera = telescope(SENSOR);
+        psf = psf_of(&camera);
+    }
     return psf;
 }
 
@@ -153,10 +163,9 @@ static void a_known_gaussian_has_a_gaussians_images(void **state) {
 static void sharpness_follows_the_binning(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_camera camera = telescope(256);
-    bst_psf *psf = psf_of(&camera);
+    bst_psf *psf = telescope_psf();
     bst_known_psf *known;
-    bst_assert_ok(&ctx, bst_known_psf_create(&ctx, psf, 256.0, 256.0, 0.0, &known));
+    bst_assert_ok(&ctx, bst_known_psf_create(&ctx, psf, SENSOR, SENSOR, 0.0, &known));
     bst_imgproc_gauss *gauss = malloc(sizeof *gauss);
     assert_non_null(gauss);
     bst_imgproc_gauss_init(gauss);
@@ -169,16 +178,13 @@ static void sharpness_follows_the_binning(void **state) {
     assert_memory_equal(after.floor, fresh.floor, sizeof fresh.floor);
     free(gauss);
     bst_known_psf_free(known);
-    bst_psf_free(psf);
 }
 
 /* Against the sum that defines the image, at a corner of the field and where all four mix. */
 static void images_are_those_of_the_place_in_the_field(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    enum { SENSOR = 256 };
-    bst_camera camera = telescope(SENSOR);
-    bst_psf *psf = psf_of(&camera);
+    bst_psf *psf = telescope_psf();
     bst_known_psf *known;
     bst_assert_ok(&ctx, bst_known_psf_create(&ctx, psf, SENSOR, SENSOR, 0.0, &known));
     double *image = malloc(4 * sizeof *image * IMAGE * IMAGE);
@@ -220,7 +226,6 @@ static void images_are_those_of_the_place_in_the_field(void **state) {
     close_rendered(got);
     free(image);
     bst_known_psf_free(known);
-    bst_psf_free(psf);
 }
 
 /* Share of a source's light with a changed path, on the stamp. */
@@ -242,10 +247,9 @@ static void render_changed(rendered *r, const bst_imgproc_shape *shape,
 static void derivatives_by_motion_are_those_of_the_images(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_camera camera = telescope(256);
-    bst_psf *psf = psf_of(&camera);
+    bst_psf *psf = telescope_psf();
     bst_known_psf *known;
-    bst_assert_ok(&ctx, bst_known_psf_create(&ctx, psf, 256.0, 256.0, 0.14, &known));
+    bst_assert_ok(&ctx, bst_known_psf_create(&ctx, psf, SENSOR, SENSOR, 0.14, &known));
     assert_true(known->terms > 1);
     rendered *got = open_rendered(known), *other = open_rendered(known);
     const bst_imgproc_stamp stamp = {100, 40, 18, 22};
@@ -290,18 +294,16 @@ static void derivatives_by_motion_are_those_of_the_images(void **state) {
     close_rendered(got);
     close_rendered(other);
     bst_known_psf_free(known);
-    bst_psf_free(psf);
 }
 
 /* Sources of SNR 30 to 150 all over a frame without noise: places and light that come back. */
 static void places_and_light_are_right(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    enum { SENSOR = 256, CELL = 32, COUNT = (SENSOR / CELL) * (SENSOR / CELL) };
+    enum { CELL = 32, COUNT = (SENSOR / CELL) * (SENSOR / CELL) };
     synthetic s;
     synthetic_init(&s, SENSOR, SENSOR);
-    bst_camera camera = telescope(SENSOR);
-    bst_psf *psf = psf_of(&camera);
+    bst_psf *psf = telescope_psf();
     double *image = malloc(4 * sizeof *image * IMAGE * IMAGE);
     assert_non_null(image);
     for (int n = 0; n < 4; n++) {
@@ -361,7 +363,6 @@ static void places_and_light_are_right(void **state) {
     bst_imgproc_free(ip);
     free(found);
     free(image);
-    bst_psf_free(psf);
     synthetic_free(&s);
 }
 
@@ -379,5 +380,6 @@ int main(void) {
         bst_simd_limit(width);
         failed += cmocka_run_group_tests(tests, NULL, NULL);
     }
+    bst_psf_free(telescope_psf());
     return failed;
 }
