@@ -76,7 +76,7 @@ void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f
     }
     double c = g->star_path.dx / length, s = g->star_path.dy / length, along, across, bend;
     project(g, c, s, &along, &across, &bend);
-    double told = g->bend_x * c + g->bend_y * s; /* by telemetry */
+    double reported = g->bend_x * c + g->bend_y * s; /* by telemetry */
     /* The bend shows as a slope of the light along the streak, 6 bend / length from end to middle:
      * its mean square is 12 (bend / length)^2 of the squared SNR. The ends give the length. */
     double prior = hypot(JITTER_BEND * g->settings.jitter_px, f->bend_sigma_px) / g->binning;
@@ -86,7 +86,7 @@ void bst_generator_measure_motion(bst_generator *g, const bst_generator_frame *f
     double whole = drift * drift / (drift * drift + ends2);
     double noise =
         share * sqrt(error2) * bst_rng_normal(g->key, (uint64_t)f->truth->exposure_id, BEND_ERROR);
-    double more = share * (bend - told) + noise, dx = whole * (along - length);
+    double more = share * (bend - reported) + noise, dx = whole * (along - length);
     g->fit_path.dx += dx * c - whole * across * s;
     g->fit_path.dy += dx * s + whole * across * c;
     g->fit_bend_x += more * c;
