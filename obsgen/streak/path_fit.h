@@ -45,6 +45,9 @@ typedef struct bst_path_point_fit {
     double x_px, y_px, flux, widening_px2;
 } bst_path_point_fit;
 
+/* Most points of bst_path_fit_points. */
+enum { BST_PATH_POINTS = 64 };
+
 /* Fits one point to the light of several, as image processing does: place, flux and width are
  * free.
  *
@@ -54,7 +57,6 @@ typedef struct bst_path_point_fit {
  *            model_px  deviation of the fitted PSF, including the pixel
  *            light     brightest pixel of a fitted point of flux 1 over the variance of the noise
  */
-enum { BST_PATH_POINTS = 64 };
 bst_path_point_fit bst_path_fit_points(const bst_path_point *points, int count, double image_px,
                                        double model_px, double light);
 

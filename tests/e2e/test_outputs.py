@@ -27,12 +27,13 @@ class Outputs(unittest.TestCase):
              "link-keys": [],
              "calibrate-obsgen": ["{scenario}", "--check", "--seeds", "1"], "bench": ["crc32c", "--curve"],
              "new": ["--observer-tle", "{elements}"],
+             "lightcurve": ["{scenario}", "--duration", "0"], "turntable": ["{satellite}"],
              "study": ["{study}"], "pd": ["{scenario}", "--trials", "1"]}
     # options that name what is read
     INPUTS = {("run", "replay"), ("run", "restore"), ("run", "link-keys"), ("serve", "link-keys"),
               ("schema", "plugin"), ("orbit", "observer"), ("propagate", "elements"), ("propagate", "tle"), ("propagate", "eop"),
               ("calibrate-obsgen", "calibration"), ("bench", "tle"), ("bench", "scenario"),
-              ("study", "site")}
+              ("study", "site"), ("lightcurve", "satellite"), ("lightcurve", "elements")}
 
     @classmethod
     def setUpClass(cls):
@@ -41,6 +42,8 @@ class Outputs(unittest.TestCase):
         cls.scenario = os.path.join(cls.folder, "scenario.json")
         cls.elements = os.path.join(cls.folder, "elements.tle")
         shutil.copy("scenarios/catalogue_2022-06.tle", cls.elements)
+        cls.satellite = os.path.join(cls.folder, "satellite.json")
+        shutil.copy("scenarios/satellites/cubesat_3u.json", cls.satellite)
         with open(cls.scenario, "w", encoding="utf-8") as file:
             json.dump({"extends": os.path.abspath(runs.TRACK),
                        "set": {"/world/objects/0/orbit/elements_file": "elements.tle"}}, file)
@@ -68,7 +71,7 @@ class Outputs(unittest.TestCase):
 
     def words(self, command):
         return [word.format(run=self.made, scenario=self.scenario, elements=self.elements,
-                            study=self.study) for word in self.WORDS[command]]
+                            study=self.study, satellite=self.satellite) for word in self.WORDS[command]]
 
     def outputs(self):
         return [(command, name) for command, name in self.options

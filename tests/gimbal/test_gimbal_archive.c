@@ -284,12 +284,9 @@ static void nodes_ahead_of_a_state_are_kept(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(second_order),
-        cmocka_unit_test(azimuth_elevation),
-        cmocka_unit_test(cross_elevation),
-        cmocka_unit_test(ideal),
-        cmocka_unit_test(scripted),
-        cmocka_unit_test(nodes_ahead_of_a_state_are_kept),
+        cmocka_unit_test(second_order),    cmocka_unit_test(azimuth_elevation),
+        cmocka_unit_test(cross_elevation), cmocka_unit_test(ideal),
+        cmocka_unit_test(scripted),        cmocka_unit_test(nodes_ahead_of_a_state_are_kept),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

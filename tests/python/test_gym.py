@@ -102,6 +102,7 @@ class Pointing(unittest.TestCase):
         self.assertTrue(ended.any())
         vector.close()
 
+    @with_gymnasium
     def test_many_environments_have_one_pool_of_threads(self):
         before = len(os.listdir("/proc/self/task"))
         vector = bg.PointingVectorEnv(24, model=self.model, threads=3)
@@ -110,6 +111,7 @@ class Pointing(unittest.TestCase):
         self.assertLessEqual(len(os.listdir("/proc/self/task")), before + 2)  # and this one
         vector.close()
 
+    @with_gymnasium
     def test_the_vector_refuses_wrong_actions(self):
         vector = bg.PointingVectorEnv(2, model=self.model)
         with self.assertRaises(bst.ArgumentError):
