@@ -26,9 +26,17 @@ void *bst_pages_alloc(size_t bytes) {
     return memory;
 }
 
+/* True for more than an address space has. */
+static bool is_too_large(size_t count, size_t bytes) {
+    return bytes > 0 && count > (PTRDIFF_MAX - VECTOR) / bytes;
+}
+
 #if defined(__SANITIZE_ADDRESS__)
 /* the sanitizer knows the ends of what the allocator gives */
 void *bst_pages_zero(size_t count, size_t bytes) {
+    if (is_too_large(count, bytes)) {
+        return NULL;
+    }
     return calloc(count > 0 ? count : 1, bytes > 0 ? bytes : 1);
 }
 
@@ -37,7 +45,7 @@ void bst_pages_free(void *memory) {
 }
 #else
 void *bst_pages_zero(size_t count, size_t bytes) {
-    if (bytes > 0 && count > (PTRDIFF_MAX - VECTOR) / bytes) {
+    if (is_too_large(count, bytes)) {
         return NULL;
     }
     size_t whole = count * bytes + VECTOR, mapped = whole < SMALL ? 0 : whole;

@@ -40,7 +40,9 @@ static int by_importance(const void *a, const void *b) {
 }
 
 void bst_io_mark_sort(bst_io_mark *marks, int count) {
-    qsort(marks, (size_t)count, sizeof *marks, by_importance);
+    if (count > 0) { /* qsort takes no NULL */
+        qsort(marks, (size_t)count, sizeof *marks, by_importance);
+    }
 }
 
 /* Number of detections that are drawn. */

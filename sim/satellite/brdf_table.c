@@ -79,7 +79,9 @@ static int compare_points(const void *a, const void *b) {
 
 /* Sorts the points into rows of one angle of incidence. */
 static bst_status make_rows(bst_ctx *ctx, bst_brdf_table *t) {
-    qsort(t->points, (size_t)t->count, sizeof *t->points, compare_points);
+    if (t->count > 0) { /* qsort takes no NULL */
+        qsort(t->points, (size_t)t->count, sizeof *t->points, compare_points);
+    }
     for (int i = 0; i < t->count; i++) {
         row *last = t->row_count ? &t->rows[t->row_count - 1] : NULL;
         if (!last || t->points[i].sin_in != last->sin_in) {
