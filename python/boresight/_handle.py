@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import importlib
 import os
 import signal
 import threading
@@ -16,11 +17,11 @@ from .model import ModelHandle
 
 
 try:  # without the look-up in enumerations, which takes longer than all else of a call
-    from _signal import getsignal as _get_handler  # type: ignore[import-not-found]
-    from _signal import signal as _set_handler
+    _signals: Any = importlib.import_module("_signal")
 except ImportError:
-    _get_handler: Callable[..., Any] = signal.getsignal  # type: ignore[no-redef]
-    _set_handler: Callable[..., Any] = signal.signal  # type: ignore[no-redef]
+    _signals = signal
+_get_handler: Callable[..., Any] = _signals.getsignal
+_set_handler: Callable[..., Any] = _signals.signal
 
 _SIGINT = int(signal.SIGINT)
 _exiting: List[bool] = []
