@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from .tables import Table as Table
     from .tools import Study as Study
     from .tools import check as check
+    from .tools import lightcurve as lightcurve
     from .tools import loop as loop
     from .tools import new as new
     from .tools import orbit as orbit
@@ -66,7 +67,8 @@ _PLACES = {
     "snapshot": ["Snapshot"],
     "stages": ["DetectorFrame", "FrameStageFrame"],
     "tables": ["Table"],
-    "tools": ["Study", "check", "loop", "new", "orbit", "pd", "report", "run", "schema", "study"],
+    "tools": ["Study", "check", "lightcurve", "loop", "new", "orbit", "pd", "report", "run",
+              "schema", "study"],
 }
 _MODULES = ("errors", "messages")
 _INSIDE = ("config", "link", "gym")

@@ -1,4 +1,5 @@
-"""The commands of the program as functions: run, pd, study, loop, orbit, report, check, new.
+"""The commands of the program as functions: run, pd, study, loop, lightcurve, orbit, report, check,
+new.
 
 Options have the names of the program's with "_" for "-"; a tuple stands for numbers with ":"
 between them (snr=(3, 9, 0.5)), a list for words with ",". `boresight COMMAND --help` lists them.
@@ -7,12 +8,16 @@ names of Python modules that register them, a new process imports these and runs
 """
 from __future__ import annotations
 
+import csv
 import json
 import os
 import pathlib
 import shutil
 import tempfile
 from typing import Any, Dict, List, Optional, Sequence, Union
+
+import numpy as np
+import numpy.typing as npt
 
 from .errors import ArgumentError, FormatError
 from .host import host_of
@@ -71,6 +76,37 @@ def pd(scenario: Any, *, plugins: Sequence[str] = (), **options: Any) -> Dict[st
 def loop(scenario: Any, *, plugins: Sequence[str] = (), **options: Any) -> Dict[str, Any]:
     """Margins and predicted pointing of the control loops of a scenario (`boresight loop`)."""
     return _with_json("loop", scenario, plugins, options)
+
+
+def lightcurve(scenario: Any = None, *, plugins: Sequence[str] = (),
+               **options: Any) -> npt.NDArray[np.void]:
+    """Magnitude against time (`boresight lightcurve`): of an object of a scenario as its observer
+    sees it, or of a satellite's shape (`satellite`) on the orbit of an element set.
+
+    Returned:  [n] rows with the columns of the table: `time_utc` (datetime64), `seconds`, `v_mag`
+               (NAN: in the shadow, behind the Earth, or below the horizon), `phase_deg`, `range_km`,
+               `sunlit_fraction`, `earth_share`, and for sites `elevation_deg` and `azimuth_deg`
+
+    >>> lightcurve(satellite="starlink_v1_5.json", elements="all.tle", norad=44713,
+    ...            start="2022-06-16T04:00:00Z", site=[32.44, -110.79, 2790])["v_mag"]
+    """
+    if "output" in options:
+        raise ArgumentError("lightcurve returns the table: leave output out")
+    if scenario is None:
+        return _light_rows(execute(["lightcurve", *options_of(**options)]))
+    host = host_of(plugins, scenario)
+    with scenario_arguments(scenario) as words:
+        return _light_rows(execute(["lightcurve", *words, *options_of(**options)], host=host))
+
+
+def _light_rows(text: str) -> npt.NDArray[np.void]:
+    names, *rows = csv.reader(text.splitlines())
+    out = np.zeros(len(rows), [(names[0], "M8[ms]"), *((name, "f8") for name in names[1:])])
+    for column, name in enumerate(names):
+        values = [row[column] for row in rows]
+        out[name] = ([np.datetime64(value.rstrip("Z"), "ms") for value in values] if column == 0
+                     else [float(value or "nan") for value in values])
+    return out
 
 
 def _with_json(command: str, scenario: Any, plugins: Sequence[str],

@@ -101,6 +101,25 @@ class Commands(unittest.TestCase):
     def test_loop(self):
         self.assertIn("sensors", bst.loop(MAIN))
 
+    def test_lightcurve(self):
+        rows = bst.lightcurve(MAIN, duration=600, step=60)
+        np.testing.assert_array_equal(rows["seconds"], np.arange(0, 601, 60))
+        np.testing.assert_array_equal(np.diff(rows["time_utc"]), np.timedelta64(60000, "ms"))
+        # the object is a sphere: between two rows only range and phase change
+        phase = np.radians(rows["phase_deg"])
+        lambert = (np.sin(phase) + (np.pi - phase) * np.cos(phase)) / np.pi
+        expected = -2.5 * np.log10(lambert / rows["range_km"] ** 2)
+        np.testing.assert_allclose(np.diff(rows["v_mag"]), np.diff(expected), atol=2e-3)
+        shape = bst.lightcurve(satellite="scenarios/satellites/cubesat_3u.json", norad=44801,
+                               elements="scenarios/catalogue_2022-06.tle", duration=60,
+                               start="2022-06-16T04:00:00Z", site=[32.44, -110.79, 2790])
+        self.assertEqual(len(shape), 7)
+        self.assertTrue(np.all(np.isnan(shape["v_mag"]) == (shape["elevation_deg"] < 0)))
+        with self.assertRaises(bst.ArgumentError):
+            bst.lightcurve(MAIN, output="x.csv")
+        with self.assertRaises(bst.ProgramError):
+            bst.lightcurve(MAIN, object="nobody")
+
     def test_check(self):
         self.assertEqual(bst.check(SMALL), SMALL.to_dict())
 
