@@ -24,7 +24,8 @@ static bst_status begin(bst_ctx *ctx, const bst_bench_options *options, running 
     return bst_sim_run_until(ctx, r->sim, in_exposure_s);
 }
 
-/* Measures the creation of simulations, which are kept: none reuses the memory of another. */
+/* Measures the creation of simulations. They stay allocated: none reuses the memory of an earlier
+ * one. */
 static bst_status measure(bst_ctx *ctx, const running *r, bool clones, bst_bench_result *out) {
     bst_sim *made[SIMS] = {NULL};
     bst_bench_clock clock = {.count = 0};

@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -114,4 +115,9 @@ bool bst_file_write_all(int fd, const void *data, size_t bytes) {
         }
     }
     return true;
+}
+
+void bst_file_resolve(const char *base_dir, const char *file, char *out, size_t bytes) {
+    bool relative = *file && *file != '/' && *base_dir;
+    snprintf(out, bytes, "%s%s%s", relative ? base_dir : "", relative ? "/" : "", file);
 }

@@ -27,6 +27,12 @@ bst_status bst_file_read(bst_ctx *ctx, const char *path, uint64_t max_bytes, con
 /* Writes all bytes, if necessary in several calls; false with errno. */
 bool bst_file_write_all(int fd, const void *data, size_t bytes);
 
+/* Path of a file that a document in the folder `base_dir` names: `file` itself if it is absolute or
+ * empty, or if base_dir is empty.
+ *
+ * Returned:  out  [bytes], cut if it does not fit */
+void bst_file_resolve(const char *base_dir, const char *file, char *out, size_t bytes);
+
 /* Rejects binary files: UTF-16 and zero bytes, with the line number. `name`: file name for
  * messages. BST_ERR_FORMAT. */
 bst_status bst_file_check_text(bst_ctx *ctx, const char *name, const char *text,

@@ -1,12 +1,12 @@
 #include "sim/optics/band.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "boresight/vec.h"
 #include "sim/astro/bodies.h"
+#include "sim/core/file.h"
 #include "sim/optics/curve_file.h"
 #include "sim/optics/solar_table.h"
 
@@ -291,8 +291,7 @@ static bst_status take_table(bst_ctx *ctx, const bst_config_list *list, const ch
     }
     if (*file) {
         char path[1100];
-        bool relative = *file != '/' && *base_dir;
-        snprintf(path, sizeof path, "%s%s%s", relative ? base_dir : "", relative ? "/" : "", file);
+        bst_file_resolve(base_dir, file, path, sizeof path);
         bst_curve_format format = {"a table of spectral response",
                                    wavelength,
                                    strcmp(key, "response") == 0 ? response : transmission,

@@ -128,8 +128,7 @@ static bst_status load_rows(bst_ctx *ctx, const char *base_dir, phase *p) {
     if (!*file) {
         return bst_fail(ctx, BST_ERR_CONFIG, "file: the law table needs a file; give its path");
     }
-    bool relative = *file != '/' && *base_dir;
-    snprintf(path, sizeof path, "%s%s%s", relative ? base_dir : "", relative ? "/" : "", file);
+    bst_file_resolve(base_dir, file, path, sizeof path);
     if (bst_file_read(ctx, path, TABLE_BYTES_MAX, "a table of attitudes", &text, &bytes) !=
         BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "file");
@@ -201,16 +200,11 @@ bst_status bst_body_attitude_create(bst_ctx *ctx, const bst_config_list *phases,
     return BST_OK;
 }
 
-/* Axes from two directions: q from the reference to a frame whose axis `main` (0: x, 2: z) points
- * along a, and whose other one of x and z is as close to b as possible. */
-static bst_quat frame_of(bst_vec3 a, bst_vec3 b, int main) {
-    bst_vec3 z = bst_vec3_unit(main == 2 ? a : bst_vec3_axpy(b, -bst_vec3_dot(a, b), a));
-    bst_vec3 x = main == 2 ? bst_vec3_axpy(b, -bst_vec3_dot(a, b), a) : a;
-    x = bst_vec3_norm(x) > 1e-9 ? bst_vec3_unit(x) : bst_vec3_perpendicular(z);
-    z = main == 2 || bst_vec3_norm(z) > 0.5 ? z : bst_vec3_perpendicular(x);
-    bst_vec3 y = bst_vec3_cross(z, x);
-    bst_mat3 m = {{{x.x, x.y, x.z}, {y.x, y.y, y.z}, {z.x, z.y, z.z}}};
-    return bst_quat_from_mat3(&m);
+/* q from the reference to a frame whose x points along `x` (unit) and whose z is as close to
+ * `near_z` as possible. */
+static bst_quat ahead_frame(bst_vec3 x, bst_vec3 near_z) {
+    bst_vec3 z = bst_vec3_axpy(near_z, -bst_vec3_dot(x, near_z), x);
+    return bst_quat_look(bst_vec3_norm(z) > 1e-9 ? z : bst_vec3_perpendicular(x), x);
 }
 
 static bst_quat from_table(const phase *p, double seconds) {
@@ -245,16 +239,16 @@ static bst_quat phase_at(const phase *p, const bst_attitude_state *s) {
         case BST_ATTITUDE_TABLE:
             return from_table(p, s->seconds);
         case BST_ATTITUDE_NADIR_SUN:
-            law = frame_of(down, s->sun, 2);
+            law = bst_quat_look(down, s->sun);
             break;
         case BST_ATTITUDE_VELOCITY:
-            law = frame_of(ahead, down, 0);
+            law = ahead_frame(ahead, down);
             break;
         case BST_ATTITUDE_SUN:
-            law = frame_of(s->sun, (bst_vec3){0, 0, 1}, 2);
+            law = bst_quat_look(s->sun, (bst_vec3){0, 0, 1});
             break;
         default:
-            law = frame_of(down, ahead, 2);
+            law = bst_quat_look(down, ahead);
             break;
     }
     return bst_quat_mul(p->offset, law);

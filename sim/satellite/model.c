@@ -6,6 +6,7 @@
 #include <string.h>
 #include <strings.h>
 
+#include "sim/core/file.h"
 #include "sim/satellite/model_build.h"
 
 void bst_satellite_free(bst_satellite *s) {
@@ -28,12 +29,6 @@ void bst_satellite_free(bst_satellite *s) {
     free(s->materials);
     free(s->joints);
     free(s);
-}
-
-/* Joins a path to a folder. */
-static void join(char *out, size_t bytes, const char *base_dir, const char *file) {
-    bool relative = *file != '/' && *base_dir;
-    snprintf(out, bytes, "%s%s%s", relative ? base_dir : "", relative ? "/" : "", file);
 }
 
 /* The values of a material of the configuration. */
@@ -68,7 +63,7 @@ static bst_status make_material(bst_ctx *ctx, bst_satellite *s,
             return bst_fail(ctx, BST_ERR_CONFIG,
                             "table_file: the model table needs a file; give its path");
         }
-        join(path, sizeof path, base_dir, c->table_file);
+        bst_file_resolve(base_dir, c->table_file, path, sizeof path);
         bst_status status = bst_brdf_table_load(ctx, path, &s->tables[s->material_count - 1]);
         if (status != BST_OK) {
             return bst_fail_prefix(ctx, BST_ERR_CONFIG, "table_file");
@@ -261,7 +256,7 @@ static bst_status make_part(bst_ctx *ctx, bst_satellite *s, const bst_satellite_
         if (!*c->file) {
             return bst_fail(ctx, BST_ERR_CONFIG, "file: a mesh needs a file; give its path");
         }
-        join(path, sizeof path, base_dir, c->file);
+        bst_file_resolve(base_dir, c->file, path, sizeof path);
         BST_TRY(add_mesh_file(ctx, s, path, c->scale, &place));
     } else {
         BST_TRY(bst_model_add_part(ctx, s, c, &place));
@@ -381,7 +376,7 @@ bst_status bst_satellite_create(bst_ctx *ctx, const bst_satellite_config *config
     *out = NULL;
     if (*config->file) {
         char path[1100];
-        join(path, sizeof path, base_dir, config->file);
+        bst_file_resolve(base_dir, config->file, path, sizeof path);
         bst_status status = bst_satellite_load(ctx, path, out);
         return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, BST_ERR_CONFIG, "/file");
     }

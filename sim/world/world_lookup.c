@@ -1,6 +1,5 @@
 /* Lookup of objects by name and of state files by path. */
-#include <stdio.h>
-
+#include "sim/core/file.h"
 #include "sim/world/world_build.h"
 
 int bst_world_find_object(const bst_world *world, const char *name) {
@@ -9,8 +8,6 @@ int bst_world_find_object(const bst_world *world, const char *name) {
 
 bst_world_path bst_world_path_join(const bst_world_builder *b, const char *path) {
     bst_world_path full;
-    bool as_it_is = path[0] == '/' || !*path || !*b->base_dir;
-    snprintf(full.text, sizeof full.text, "%s%s%s", as_it_is ? "" : b->base_dir,
-             as_it_is ? "" : "/", path);
+    bst_file_resolve(b->base_dir, path, full.text, sizeof full.text);
     return full;
 }

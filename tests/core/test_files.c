@@ -277,15 +277,32 @@ static void failures_have_messages(void **state) {
     assert_string_equal(bst_status_name(BST_STATUS_COUNT), "unknown status");
 }
 
+/* Absolute and empty names, and a document in the working directory, leave a name as it is. */
+static void names_are_resolved(void **state) {
+    (void)state;
+    const struct {
+        const char *base_dir, *file, *path;
+    } cases[] = {{"a/b", "c.csv", "a/b/c.csv"},
+                 {"a/b", "/c.csv", "/c.csv"},
+                 {"", "c.csv", "c.csv"},
+                 {"a/b", "", ""},
+                 {"/", "c.csv", "//c.csv"}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        char path[32];
+        bst_file_resolve(cases[k].base_dir, cases[k].file, path, sizeof path);
+        assert_string_equal(path, cases[k].path);
+    }
+    char small[6];
+    bst_file_resolve("a/b", "c.csv", small, sizeof small);
+    assert_string_equal(small, "a/b/c");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(files_are_read_whole),
-        cmocka_unit_test(text_is_text),
-        cmocka_unit_test(drafts_are_files_of_their_own),
-        cmocka_unit_test(names_of_drafts),
-        cmocka_unit_test(channels_by_name),
-        cmocka_unit_test(names_of_modes),
-        cmocka_unit_test(failures_have_messages),
+        cmocka_unit_test(names_are_resolved), cmocka_unit_test(files_are_read_whole),
+        cmocka_unit_test(text_is_text),       cmocka_unit_test(drafts_are_files_of_their_own),
+        cmocka_unit_test(names_of_drafts),    cmocka_unit_test(channels_by_name),
+        cmocka_unit_test(names_of_modes),     cmocka_unit_test(failures_have_messages),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

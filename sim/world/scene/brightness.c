@@ -2,10 +2,10 @@
 
 #include <assert.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 
 #include "sim/astro/bodies.h"
+#include "sim/core/file.h"
 #include "sim/optics/band.h"
 #include "sim/optics/curve_file.h"
 #include "sim/world/world.h"
@@ -41,8 +41,7 @@ bst_status bst_brightness_create(bst_ctx *ctx, const bst_brightness_config *conf
                           "light_curve_file: the model light_curve needs a file; give its path");
     } else if (config->model == BST_BRIGHTNESS_LIGHT_CURVE) {
         char path[1100];
-        bool relative = *file != '/' && *base_dir;
-        snprintf(path, sizeof path, "%s%s%s", relative ? base_dir : "", relative ? "/" : "", file);
+        bst_file_resolve(base_dir, file, path, sizeof path);
         bst_curve_format format = {"a light curve", abscissae, ordinates, -1e9, 1e9, -40.0, 1e6};
         status = bst_curve_load(ctx, path, &format, &b->curve);
         if (status != BST_OK) {

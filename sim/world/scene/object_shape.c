@@ -1,11 +1,9 @@
 #include "sim/world/scene/object_shape.h"
 
-#include "sim/optics/band.h"
-
 #include <stdlib.h>
 
-/* Radius of the Sun, m (IAU 2015 resolution B3). */
-#define SUN_RADIUS_M 6.957e8
+#include "sim/astro/bodies.h"
+#include "sim/optics/band.h"
 
 bool bst_object_shape_is_given(const bst_satellite_config *config) {
     return *config->file || config->parts.count > 0 || config->joints.count > 0 ||
@@ -85,7 +83,7 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
     bst_satellite_light light = {
         .sun = bst_quat_rotate(q, state.sun),
         .observer = bst_quat_rotate(q, bst_vec3_unit(to_eye)),
-        .sun_radius_rad = SUN_RADIUS_M / bst_vec3_norm(to_sun),
+        .sun_radius_rad = BST_SUN_RADIUS_M / bst_vec3_norm(to_sun),
         .sunlit = l->sunlight ? l->sunlight->light[BST_SUNLIGHT_V] : l->sunlit_fraction,
         .earthlight = b->earthshine ? &earthlight : NULL,
         .emission = true};

@@ -1,8 +1,8 @@
 #include "sim/world/scene/stray.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 
+#include "sim/core/file.h"
 #include "sim/optics/band.h"
 #include "sim/optics/curve_file.h"
 
@@ -19,8 +19,7 @@ static bst_status load(bst_ctx *ctx, const char *file, const char *base_dir, bst
     const bst_curve_format format = {
         "a table of point source transmittance", angle, value, 0.0, 180.0, 0.0, 1e6};
     char path[1100];
-    bool relative = *file != '/' && *base_dir;
-    snprintf(path, sizeof path, "%s%s%s", relative ? base_dir : "", relative ? "/" : "", file);
+    bst_file_resolve(base_dir, file, path, sizeof path);
     bst_status status = bst_curve_load(ctx, path, &format, curve);
     return status == BST_OK ? status : bst_fail_prefix(ctx, BST_ERR_CONFIG, "pst_file");
 }
