@@ -71,6 +71,9 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *s
      * (slow). */
     static const double REST = 0.4;
     bst_error_budget_source error = *bst_smear_last_error(m->smear);
+    if (source->rate && source->rate->error > 0.0) { /* glints that the light curve lacks */
+        error.nodes_e += (float)(source->rate->error * (double)error.peak_e);
+    }
     if (m->fourier) { /* grid error, on dark pixels too */
         double peak_e = bst_smear_last_read_e(m->smear),
                presence = bst_smear_last_presence(m->smear);

@@ -130,12 +130,8 @@ static bst_mat3 joint_rotation(const bst_joint *j, bst_vec3 to, double seconds) 
     return bst_quat_to_mat3(q);
 }
 
-void bst_satellite_pose_set(bst_satellite_pose *p, const bst_satellite_aim *aim) {
+void bst_satellite_pose_turn(bst_satellite_pose *p, const bst_satellite_aim *aim) {
     const bst_satellite *s = p->satellite;
-    if (s->joint_count == 0) {
-        return;
-    }
-    p->stamp++;
     for (int i = 0; i < s->joint_count; i++) {
         const bst_joint *j = &s->joints[i];
         bst_vec3 to = j->follows == BST_JOINT_SUN     ? aim->sun
@@ -152,6 +148,15 @@ void bst_satellite_pose_set(bst_satellite_pose *p, const bst_satellite_aim *aim)
             p->rotation[i] = bst_mat3_mul(r, &p->rotation[i]);
         }
     }
+}
+
+void bst_satellite_pose_set(bst_satellite_pose *p, const bst_satellite_aim *aim) {
+    const bst_satellite *s = p->satellite;
+    if (s->joint_count == 0) {
+        return;
+    }
+    p->stamp++;
+    bst_satellite_pose_turn(p, aim);
     for (int i = 0; i < s->vertex_count; i++) {
         int j = s->vertex_joint[i];
         if (j >= 0) {

@@ -60,6 +60,9 @@ bst_status bst_satellite_pose_create(bst_ctx *ctx, const bst_satellite *satellit
 /* Frees a pose; NULL is allowed. */
 void bst_satellite_pose_free(bst_satellite_pose *pose);
 
+/* Turns the joints only: `rotation` and `origin`. */
+void bst_satellite_pose_turn(bst_satellite_pose *pose, const bst_satellite_aim *aim);
+
 /* Turns the joints and places all vertices. */
 void bst_satellite_pose_set(bst_satellite_pose *pose, const bst_satellite_aim *aim);
 

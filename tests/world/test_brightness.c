@@ -314,14 +314,16 @@ static double step_rate(void *user, double u) {
  * it, and light sums up to 1. */
 static void rates_with_an_edge(void **state) {
     (void)state;
+    const bst_field_rate_start start = {.intervals = 16, .most_knots = 129};
     for (double width = 2.0; width > 1e-3; width *= 0.4) {
         double edge[2] = {0.31, width}, mean, sum = 0;
         bst_scene_source_rate rate;
-        assert_true(bst_field_rate(step_rate, edge, 16, &rate, &mean));
+        assert_true(bst_field_rate(step_rate, edge, &start, &rate, &mean));
         for (int i = 0; i < 100000; i++) {
             sum += step_rate(edge, (i + 0.5) / 100000) / 100000;
         }
         bst_assert_close(mean, sum, 2e-5); /* 128 straight lines on a cubic */
+        assert_true(fabs(mean - sum) <= 1.1 * rate.error * mean + 1e-9);
         bst_scene_source s = {.rate = &rate};
         bst_assert_close(bst_scene_source_light(&s, 0), 0, 0);
         bst_assert_close(bst_scene_source_light(&s, 1), 1, 1e-12); /* rounding */
@@ -335,10 +337,10 @@ static void rates_with_an_edge(void **state) {
     }
     double none[2] = {5, 1}, mean;
     bst_scene_source_rate rate;
-    assert_false(bst_field_rate(step_rate, none, 16, &rate, &mean));
+    assert_false(bst_field_rate(step_rate, none, &start, &rate, &mean));
     bst_assert_close(mean, 1, 0);
     double dark[2] = {-5, 1};
-    assert_false(bst_field_rate(step_rate, dark, 16, &rate, &mean));
+    assert_false(bst_field_rate(step_rate, dark, &start, &rate, &mean));
     bst_assert_close(mean, 0, 0);
 }
 

@@ -19,12 +19,13 @@ typedef struct bst_scene_source_path {
 
 /* Brightness of a source that changes during an exposure (shadow edge, light curve, near pass):
  * linear between knots. */
-enum { BST_RATE_KNOTS = 129 };
+enum { BST_RATE_KNOTS = 385 };
 typedef struct bst_scene_source_rate {
     int count;                    /* knots, >= 2 */
     double u[BST_RATE_KNOTS];     /* time as a fraction of the exposure, from 0 to 1, ascending */
     double rate[BST_RATE_KNOTS];  /* relative to the mean of the exposure */
     double light[BST_RATE_KNOTS]; /* cumulative fraction of the exposure's light, 0 to 1 */
+    double error;                 /* expected error of the light by too few knots, as a fraction */
 } bst_scene_source_rate;
 
 /* A sphere large enough to be rendered as a disc with a terminator. The members diffuse to thermal

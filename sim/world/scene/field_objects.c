@@ -2,9 +2,9 @@
 #include "sim/world/scene/field_objects.h"
 
 #include <assert.h>
+#include <string.h>
 
 #include "sim/optics/psf.h"
-#include "sim/world/scene/object_shape.h"
 
 /* instants of the exposure at which an object's light is sampled */
 enum { TIMES = 16 };
@@ -44,31 +44,59 @@ static bool path_touches(const bst_scene_object_query *q, const bst_scene_source
     return false;
 }
 
-bool bst_field_rate(double (*at)(void *user, double u), void *user, int first,
-                    bst_scene_source_rate *out, double *mean) {
+/* Knots with which a light curve begins, ascending. Value: index of the middle of the exposure. */
+static int first_knots(const bst_field_rate_start *start, bst_scene_source_rate *out) {
+    out->count = start->intervals + 1;
+    for (int k = 0; k <= start->intervals; k++) {
+        out->u[k] = (double)k / start->intervals;
+    }
+    int middle = start->intervals / 2;
+    for (int i = 0; i < start->time_count; i++) {
+        int k = out->count;
+        while (k > 1 && out->u[k - 1] > start->times[i]) {
+            k--;
+        }
+        if (!(start->times[i] > out->u[k - 1])) {
+            continue; /* twice the same time */
+        }
+        memmove(out->u + k + 1, out->u + k, (size_t)(out->count - k) * sizeof *out->u);
+        out->u[k] = start->times[i];
+        out->count++;
+        middle += k <= middle;
+    }
+    return middle;
+}
+
+/* Light that a straight line misses in an interval whose middle has a brightness. */
+static double missed(const bst_scene_source_rate *r, const double *middle, int k) {
+    return fabs(middle[k] - 0.5 * (r->rate[k] + r->rate[k + 1])) * (r->u[k + 1] - r->u[k]);
+}
+
+bool bst_field_rate(double (*at)(void *user, double u), void *user,
+                    const bst_field_rate_start *start, bst_scene_source_rate *out, double *mean) {
     double middle[BST_RATE_KNOTS], low = INFINITY, high = 0.0;
-    assert(first >= 2 && first <= 64 && first % 2 == 0);
-    out->count = first + 1;
-    for (int k = 0; k <= first; k++) {
-        out->u[k] = (double)k / first;
+    assert(start->intervals >= 2 && start->intervals <= 64 && start->intervals % 2 == 0);
+    assert(start->most_knots <= BST_RATE_KNOTS &&
+           start->intervals + 1 + start->time_count < start->most_knots);
+    int central = first_knots(start, out);
+    for (int k = 0; k < out->count; k++) {
         out->rate[k] = at(user, out->u[k]);
         low = fmin(low, out->rate[k]);
         high = fmax(high, out->rate[k]);
     }
-    *mean = out->rate[first / 2];
+    *mean = out->rate[central];
     if (!(high - low > 1e-3 * high)) {
         return false;
     }
-    for (int k = 0; k < first; k++) {
+    for (int k = 0; k + 1 < out->count; k++) {
         middle[k] = at(user, 0.5 * (out->u[k] + out->u[k + 1]));
     }
-    while (out->count < BST_RATE_KNOTS) {
+    while (out->count < start->most_knots) {
         int worst = 0;
         double most = 0.0;
         for (int k = 0; k + 1 < out->count; k++) {
             /* error in area: an image integrates the light */
-            double miss = fabs(middle[k] - 0.5 * (out->rate[k] + out->rate[k + 1])) *
-                          (out->u[k + 1] - out->u[k]);
+            double miss = missed(out, middle, k);
             if (miss > most) {
                 most = miss;
                 worst = k;
@@ -89,28 +117,20 @@ bool bst_field_rate(double (*at)(void *user, double u), void *user, int first,
             middle[k] = at(user, 0.5 * (out->u[k] + out->u[k + 1]));
         }
     }
+    double miss = 0.0;
     out->light[0] = 0.0;
     for (int k = 1; k < out->count; k++) {
         out->light[k] = out->light[k - 1] +
                         0.5 * (out->rate[k] + out->rate[k - 1]) * (out->u[k] - out->u[k - 1]);
+        miss += 2.0 / 3.0 * missed(out, middle, k - 1); /* Simpson's rule against the line */
     }
     *mean = out->light[out->count - 1];
+    out->error = miss / *mean;
     for (int k = 0; k < out->count; k++) {
         out->rate[k] /= *mean;
         out->light[k] /= *mean;
     }
     return true;
-}
-
-/* Intervals with which the sampling of an object's light begins. */
-static int first_intervals(const bst_scene_object_query *q, int object) {
-    const bst_object_shape *shape = bst_scene_view_object(q->view, object)->shape;
-    if (!shape) {
-        return 16;
-    }
-    double middle_s = 0.5 * (q->span.start_s + q->span.end_s);
-    int samples = bst_object_shape_samples(shape, middle_s, q->span.end_s - q->span.start_s);
-    return samples + samples % 2;
 }
 
 /* Context of an object's brightness during an exposure, for bst_field_rate. */
@@ -201,6 +221,35 @@ static bool make_shape(const course *c, const bst_world_sight *mid, const bst_sc
     return true;
 }
 
+static void aspect_at(void *user, double u, bst_object_aspect *out) {
+    const course *c = user;
+    bst_scene_view_aspect(c->query->view, &c->query->span, c->object, c->path, c->light, u, out);
+}
+
+/* Samples the light of an object during the exposure. False: it is constant, see bst_field_rate. */
+static bool sample_light(course *c, bst_scene_source_rate *rate, double *mean) {
+    /* knots of a sphere's light; a part of a shape's for glints, and as many to refine them */
+    enum { SPHERE_KNOTS = 129, GLINT_KNOTS = 160 };
+    double times[GLINT_KNOTS];
+    bst_field_rate_start start = {.intervals = 16, .times = times, .most_knots = SPHERE_KNOTS};
+    const bst_object_shape *shape = bst_scene_view_object(c->query->view, c->object)->shape;
+    if (shape) {
+        const bst_world_view_span *span = &c->query->span;
+        double middle_s = 0.5 * (span->start_s + span->end_s);
+        double exposure_s = span->end_s - span->start_s;
+        start.intervals = bst_object_shape_samples(shape, middle_s, exposure_s);
+        start.time_count =
+            bst_object_shape_glints(shape, bst_scene_view_pose(c->query->view, c->object), middle_s,
+                                    exposure_s, aspect_at, c, times, GLINT_KNOTS);
+        start.most_knots = BST_RATE_KNOTS;
+    }
+    bool changes = bst_field_rate(course_at, c, &start, rate, mean);
+    if (!shape) {
+        rate->error = 0.0; /* smooth: the knots of a sphere suffice */
+    }
+    return changes;
+}
+
 bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *q, int object,
                             bst_scene_object_parts *parts, bst_scene_source *out, bool *there) {
     bst_world_sight mid;
@@ -232,8 +281,7 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *q, int o
     }
     course c = {q, object, &parts->path, &light};
     if (!mid.occulted && q->span.end_s > q->span.start_s &&
-        bst_field_rate(course_at, &c, first_intervals(q, object), &parts->rate,
-                       &out->electrons_per_s)) {
+        sample_light(&c, &parts->rate, &out->electrons_per_s)) {
         out->rate = &parts->rate;
     } else {
         out->electrons_per_s =

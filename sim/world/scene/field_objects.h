@@ -3,6 +3,7 @@
 #define BST_WORLD_SCENE_FIELD_OBJECTS_H
 
 #include "sim/world/scene/field.h"
+#include "sim/world/scene/object_shape.h"
 #include "sim/world/world_internal.h"
 
 typedef struct bst_scene_object_query {
@@ -32,6 +33,14 @@ void bst_scene_view_light(const bst_world_view *view, const bst_world_view_span 
                           const bst_scene_source_path *path, const bst_scene_path_light *light,
                           double u, bst_world_sight *out);
 
+/* Where an object with a shape stands to its light at time u in [0, 1] of a span. */
+void bst_scene_view_aspect(const bst_world_view *view, const bst_world_view_span *span, int object,
+                           const bst_scene_source_path *path, const bst_scene_path_light *light,
+                           double u, bst_object_aspect *out);
+
+/* The view's work memory for an object's shape. */
+bst_satellite_pose *bst_scene_view_pose(const bst_world_view *view, int object);
+
 /* Description of an object in the world of a view. */
 const bst_world_object_info *bst_scene_view_object(const bst_world_view *view, int object);
 
@@ -48,11 +57,22 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *query, i
                             bst_scene_object_parts *parts, bst_scene_source *out,
                             bool *there) BST_MUST_CHECK;
 
-/* Samples the brightness `at(user, u)` so that linear interpolation is accurate to 1e-5 of the
- * maximum, if the knots suffice; it begins with `first` equal intervals, an even number of at most
- * 64. *mean: mean over the exposure. False: the change is below 1e-3 or the brightness is 0; *mean
- * is then the value at the middle. */
-bool bst_field_rate(double (*at)(void *user, double u), void *user, int first,
-                    bst_scene_source_rate *out, double *mean);
+/* Where the sampling of a light curve begins, and how far it goes. */
+typedef struct bst_field_rate_start {
+    int intervals;       /* equal ones; even, at most 64 */
+    const double *times; /* more times, unordered, within (0, 1) */
+    int time_count;
+    int most_knots; /* at most BST_RATE_KNOTS, and above intervals + 1 + time_count */
+} bst_field_rate_start;
+
+/* Samples a brightness so that linear interpolation is accurate to 1e-5 of the maximum, if the
+ * knots suffice: intervals are halved where a straight line misses most light.
+ *
+ * Given:     at     brightness at a time in [0, 1]
+ * Returned:  *out   knots; `error` is the light by which the halved intervals still differ
+ *            *mean  mean over the exposure; at the middle if false is returned
+ * Value:     false: the change is below 1e-3, or the brightness is 0 */
+bool bst_field_rate(double (*at)(void *user, double u), void *user,
+                    const bst_field_rate_start *start, bst_scene_source_rate *out, double *mean);
 
 #endif

@@ -29,6 +29,7 @@ bst_status bst_object_shape_create(bst_ctx *ctx, const bst_satellite_config *con
     if (status != BST_OK) {
         status = bst_fail_prefix(ctx, BST_ERR_CONFIG, "shape");
     } else {
+        shape->glint_count = bst_glint_surfaces(shape->satellite, shape->glints);
         status = bst_body_attitude_create(ctx, attitude, base_dir, &shape->attitude);
         status = status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "attitude");
     }
@@ -66,34 +67,41 @@ static void make_glow(const bst_satellite_flux *flux, const bst_scene_lighting *
     }
 }
 
+void bst_object_shape_aspect(const bst_object_shape *shape, const bst_scene_lighting *l,
+                             bst_vec3 velocity_mps, bst_object_aspect *out) {
+    bst_vec3 to_eye = bst_vec3_sub(l->eye_m, l->object_m);
+    bst_vec3 to_sun = bst_vec3_sub(l->sun_m, l->object_m);
+    bst_attitude_state state = {l->object_m, velocity_mps, bst_vec3_unit(to_sun), l->seconds};
+    bst_quat q = out->q_body_from_gcrf = bst_body_attitude_at(shape->attitude, &state);
+    out->aim = (bst_satellite_aim){
+        .sun = bst_quat_rotate(q, state.sun),
+        .earth = bst_quat_rotate(q, bst_vec3_unit(bst_vec3_scale(l->object_m, -1.0))),
+        .target = bst_quat_rotate(q, bst_vec3_unit(to_eye)),
+        .seconds = l->seconds};
+    out->sun_radius_rad = BST_SUN_RADIUS_M / bst_vec3_norm(to_sun);
+}
+
 void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *pose,
                            const bst_brightness_config *b, const bst_scene_lighting *l,
                            bst_vec3 velocity_mps, bst_scene_glow *out) {
-    bst_vec3 to_eye = bst_vec3_sub(l->eye_m, l->object_m);
-    bst_vec3 to_sun = bst_vec3_sub(l->sun_m, l->object_m);
-    double range_m = bst_vec3_norm(to_eye);
-    bst_attitude_state state = {l->object_m, velocity_mps, bst_vec3_unit(to_sun), l->seconds};
-    bst_quat q = bst_body_attitude_at(shape->attitude, &state);
+    double range_m = bst_vec3_norm(bst_vec3_sub(l->eye_m, l->object_m));
+    bst_object_aspect aspect;
+    bst_object_shape_aspect(shape, l, velocity_mps, &aspect);
     bst_earthlight earthlight;
     if (b->earthshine) {
         bst_earth_surface surface = {.diffuse = b->earth_albedo, .fineness = 1};
         bst_earthlight_at(&surface, l->object_m, bst_vec3_unit(l->sun_m), &earthlight);
-        turn_earthlight(q, &earthlight);
+        turn_earthlight(aspect.q_body_from_gcrf, &earthlight);
     }
     bst_satellite_light light = {
-        .sun = bst_quat_rotate(q, state.sun),
-        .observer = bst_quat_rotate(q, bst_vec3_unit(to_eye)),
-        .sun_radius_rad = BST_SUN_RADIUS_M / bst_vec3_norm(to_sun),
+        .sun = aspect.aim.sun,
+        .observer = aspect.aim.target,
+        .sun_radius_rad = aspect.sun_radius_rad,
         .sunlit = l->sunlight ? l->sunlight->light[BST_SUNLIGHT_V] : l->sunlit_fraction,
         .earthlight = b->earthshine ? &earthlight : NULL,
         .emission = true};
-    bst_satellite_aim aim = {
-        .sun = light.sun,
-        .earth = bst_quat_rotate(q, bst_vec3_unit(bst_vec3_scale(l->object_m, -1.0))),
-        .target = light.observer,
-        .seconds = l->seconds};
     bst_satellite_flux flux;
-    bst_satellite_pose_set(pose, &aim);
+    bst_satellite_pose_set(pose, &aspect.aim);
     bst_satellite_flux_at(pose, &light, &flux);
     *out = (bst_scene_glow){.resolved = false};
     make_glow(&flux, l, range_m, out);
@@ -105,14 +113,59 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
         flux.visible_m2 > 0.0 ? 1.0 - flux.emission_m2 / flux.visible_m2 : 1.0;
 }
 
-int bst_object_shape_samples(const bst_object_shape *shape, double seconds, double exposure_s) {
-    enum { FEWEST = 16, MOST = 64 };
+/* Largest angle by which a surface turns during an exposure, without the motion on the orbit. */
+static double turn_rad(const bst_object_shape *shape, double seconds, double exposure_s) {
     const bst_satellite *s = shape->satellite;
     double rate = bst_body_attitude_rate_radps(shape->attitude, seconds);
     for (int i = 0; i < s->joint_count; i++) {
         rate += s->joints[i].follows == BST_JOINT_SPIN ? fabs(s->joints[i].rate_radps) : 0.0;
     }
-    /* the half vector moves by the rotation; the Sun's disc widens its lobe by half its radius */
-    double lobe = s->lobe_rad + 0.5 * 4.65e-3;
-    return (int)fmin(fmax(ceil(2.0 * rate * exposure_s / lobe), FEWEST), MOST);
+    return rate * exposure_s;
+}
+
+int bst_object_shape_samples(const bst_object_shape *shape, double seconds, double exposure_s) {
+    enum { FEWEST = 16, MOST = 64 };
+    int samples = (int)fmin(
+        fmax(ceil(2.0 * turn_rad(shape, seconds, exposure_s) / BST_GLINT_WIDEST_RAD), FEWEST),
+        MOST);
+    return samples + samples % 2;
+}
+
+/* Context of bst_object_shape_glints. */
+typedef struct glint_search {
+    const bst_object_shape *shape;
+    bst_satellite_pose *pose;
+    void (*aspect)(void *user, double u, bst_object_aspect *out);
+    void *user;
+} glint_search;
+
+static void glint_offsets(void *user, double u, double *offsets) {
+    const glint_search *s = user;
+    bst_object_aspect at;
+    s->aspect(s->user, u, &at);
+    bst_satellite_pose_turn(s->pose, &at.aim);
+    bst_vec3 half = bst_vec3_unit(bst_vec3_add(at.aim.sun, at.aim.target));
+    for (int i = 0; i < s->shape->glint_count; i++) {
+        offsets[i] = bst_glint_offset(&s->shape->glints[i], s->pose, half);
+    }
+}
+
+int bst_object_shape_glints(const bst_object_shape *shape, bst_satellite_pose *pose, double seconds,
+                            double exposure_s,
+                            void (*aspect)(void *user, double u, bst_object_aspect *out),
+                            void *user, double *times, int most) {
+    /* STEP_RAD: of the first scan; at most a sixteenth of the exposure, for motion on the orbit */
+    static const double STEP_RAD = 0.15;
+    enum { FEWEST = 16, MOST = 4096 };
+    if (shape->glint_count == 0) {
+        return 0;
+    }
+    bst_object_aspect middle;
+    aspect(user, 0.5, &middle);
+    glint_search search = {shape, pose, aspect, user};
+    int steps =
+        (int)fmin(fmax(ceil(turn_rad(shape, seconds, exposure_s) / STEP_RAD), FEWEST), MOST);
+    /* the Sun's disc widens the lobe of the half vector by half its radius */
+    return bst_glint_times(shape->glints, shape->glint_count, 0.5 * middle.sun_radius_rad, steps,
+                           glint_offsets, &search, times, most);
 }

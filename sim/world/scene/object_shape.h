@@ -4,14 +4,24 @@
 
 #include "sim/satellite/body_attitude.h"
 #include "sim/satellite/flux.h"
+#include "sim/satellite/glint.h"
 #include "sim/world/scene/brightness.h"
 
 /* An object's model and attitude; immutable once the world is built. */
 typedef struct bst_object_shape {
     bst_satellite *satellite;
     bst_body_attitude *attitude;
-    int index; /* in the world's list of shapes */
+    int index;                                    /* in the world's list of shapes */
+    bst_glint_surface glints[BST_GLINT_SURFACES]; /* surfaces that may glint */
+    int glint_count;
 } bst_object_shape;
+
+/* Where a body stands to its light at one time. */
+typedef struct bst_object_aspect {
+    bst_quat q_body_from_gcrf;
+    bst_satellite_aim aim; /* its `target` is the observer's direction */
+    double sun_radius_rad; /* angular radius of the Sun's disc */
+} bst_object_aspect;
 
 /* True if the configuration of an object gives a shape. */
 bool bst_object_shape_is_given(const bst_satellite_config *config);
@@ -42,11 +52,32 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
                            const bst_scene_lighting *lighting, bst_vec3 velocity_mps,
                            bst_scene_glow *out);
 
-/* Number of samples of an exposure, by which no glint is missed: two in the time that a specular
- * lobe of the model needs to pass, for rotation rates as they are at that time.
+/* Where a body stands to its light.
  *
- * Given:     seconds   middle of the exposure, after the epoch
- *            exposure_s  its length */
+ * Given:     lighting      places of body, observer and Sun; time
+ *            velocity_mps  of the body, GCRF */
+void bst_object_shape_aspect(const bst_object_shape *shape, const bst_scene_lighting *lighting,
+                             bst_vec3 velocity_mps, bst_object_aspect *out);
+
+/* Number of equal intervals with which the sampling of an exposure begins: two in the time that the
+ * widest lobe needs to pass, for rotation rates as they are at that time.
+ *
+ * Given:     seconds     middle of the exposure, after the epoch
+ *            exposure_s  its length
+ * Value:     16 to 64, even */
 int bst_object_shape_samples(const bst_object_shape *shape, double seconds, double exposure_s);
+
+/* Finds the times of an exposure around which a surface glints (bst_glint_times).
+ *
+ * Given:     pose        work memory of the calling thread, of this shape's model
+ *            seconds, exposure_s  as for bst_object_shape_samples
+ *            aspect      where the body stands at a time in [0, 1]
+ *            most        room in `times`
+ * Returned:  times       within (0, 1), unordered
+ * Value:     their number */
+int bst_object_shape_glints(const bst_object_shape *shape, bst_satellite_pose *pose, double seconds,
+                            double exposure_s,
+                            void (*aspect)(void *user, double u, bst_object_aspect *out),
+                            void *user, double *times, int most);
 
 #endif

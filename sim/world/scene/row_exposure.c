@@ -69,6 +69,7 @@ static void rate_during(const bst_scene_source *source, double u0, double u1,
     assert(count < BST_RATE_KNOTS && u0 <= u1);
     knots[count++] = u1;
     part->rate.count = count;
+    part->rate.error = r->error / share;
     for (int k = 0; k < count; k++) {
         part->rate.u[k] = (knots[k] - u0) / (u1 - u0);
         part->rate.rate[k] = bst_scene_source_rate_at(source, knots[k]) * (u1 - u0) / share;

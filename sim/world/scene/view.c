@@ -417,25 +417,54 @@ static bst_vec3 quartic(const bst_vec3 place[BST_PATH_NODES], double u) {
     return sum;
 }
 
-void bst_scene_view_light(const bst_world_view *view, const bst_world_view_span *span, int object,
+/* Object, observer and bodies at time u of a span, from the path of the span. */
+typedef struct instant {
+    emission at;
+    bst_vec3 eye_m;
+    bst_bodies bodies;
+} instant;
+
+static instant instant_at(const bst_world_view *view, const bst_world_view_span *span, int object,
                           const bst_scene_source_path *path, const bst_scene_path_light *light,
-                          double u, bst_world_sight *out) {
-    bst_vec3 eye_m = quartic(light->eye_m, u);
-    bst_vec3 emitted_m = bst_vec3_add(bst_vec3_add(eye_m, quartic(path->place, u)), light->lag_m);
-    double seconds = span->start_s + u * (span->end_s - span->start_s) - light->light_time_s;
-    bst_bodies bodies = {.sun_m = quartic(light->sun_m, u),
-                         .earth_bary_mps = light->earth_bary_mps,
-                         .pole = light->pole};
-    emission at = {object, emitted_m, {0, 0, 0}, seconds};
+                          double u) {
+    instant out = {.eye_m = quartic(light->eye_m, u),
+                   .bodies = {.sun_m = quartic(light->sun_m, u),
+                              .earth_bary_mps = light->earth_bary_mps,
+                              .pole = light->pole}};
     double duration_s = span->end_s - span->start_s;
+    out.at =
+        (emission){object,
+                   bst_vec3_add(bst_vec3_add(out.eye_m, quartic(path->place, u)), light->lag_m),
+                   {0, 0, 0},
+                   span->start_s + u * duration_s - light->light_time_s};
     if (view->world->objects[object].info.shape && duration_s > 0.0) {
         const double h =
             1e-2; /* the difference of a quartic: exact to h^2 of the third derivative */
         bst_vec3 after = bst_vec3_add(quartic(light->eye_m, u + h), quartic(path->place, u + h));
         bst_vec3 before = bst_vec3_add(quartic(light->eye_m, u - h), quartic(path->place, u - h));
-        at.velocity_mps = bst_vec3_scale(bst_vec3_sub(after, before), 1.0 / (2.0 * h * duration_s));
+        out.at.velocity_mps =
+            bst_vec3_scale(bst_vec3_sub(after, before), 1.0 / (2.0 * h * duration_s));
     }
-    shine_at(view, &at, eye_m, &bodies, out);
+    return out;
+}
+
+void bst_scene_view_light(const bst_world_view *view, const bst_world_view_span *span, int object,
+                          const bst_scene_source_path *path, const bst_scene_path_light *light,
+                          double u, bst_world_sight *out) {
+    instant now = instant_at(view, span, object, path, light, u);
+    shine_at(view, &now.at, now.eye_m, &now.bodies, out);
+}
+
+void bst_scene_view_aspect(const bst_world_view *view, const bst_world_view_span *span, int object,
+                           const bst_scene_source_path *path, const bst_scene_path_light *light,
+                           double u, bst_object_aspect *out) {
+    instant now = instant_at(view, span, object, path, light, u);
+    bst_scene_lighting lighting = {.object_m = now.at.position_m,
+                                   .eye_m = now.eye_m,
+                                   .sun_m = now.bodies.sun_m,
+                                   .seconds = now.at.seconds};
+    bst_object_shape_aspect(view->world->objects[object].info.shape, &lighting, now.at.velocity_mps,
+                            out);
 }
 
 bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, const bst_world_view_span *span,
@@ -454,6 +483,10 @@ bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, const bst_wor
     }
     *count = bst_ephemeris_near(view->world->ephemeris, node_time(span, middle), &cone, indices);
     return BST_OK;
+}
+
+bst_satellite_pose *bst_scene_view_pose(const bst_world_view *view, int object) {
+    return view->poses[view->world->objects[object].info.shape->index];
 }
 
 const bst_world_object_info *bst_scene_view_object(const bst_world_view *view, int object) {

@@ -1,0 +1,117 @@
+/* Surfaces that glint, and the times at which they do, for a body that turns about z. */
+#include "sim/satellite/glint.h"
+
+#include "tests/satellite/satellite_support.h"
+
+#define MIRRORS                                                                                \
+    "\"materials\": [{\"name\": \"m\", \"library\": \"optical_solar_reflector\"}, {\"name\": " \
+    "\"w\", \"diffuse\": 0.5}]"
+
+/* A box has six directions, a cylinder one family and two ends; white surfaces have none. */
+static void surfaces_with_narrow_lobes_are_found(void **state) {
+    (void)state;
+    static const struct {
+        const char *parts;
+        int surfaces;
+    } cases[] = {
+        {"{\"name\": \"b\", \"kind\": \"box\", \"material\": \"m\"}", 6},
+        {"{\"name\": \"b\", \"kind\": \"box\", \"material\": \"m\"}, {\"name\": \"c\", \"kind\": "
+         "\"box\", \"material\": \"m\", \"position_m\": [3, 0, 0]}",
+         6},
+        {"{\"name\": \"b\", \"kind\": \"box\", \"material\": \"w\"}", 0},
+        {"{\"name\": \"s\", \"kind\": \"sphere\", \"material\": \"m\"}", 0},
+        {"{\"name\": \"c\", \"kind\": \"cylinder\", \"material\": \"m\"}", 3},
+        {"{\"name\": \"c\", \"kind\": \"cone\", \"radius_m\": 1, \"length_m\": 2, \"material\": "
+         "\"m\"}",
+         2},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char text[1024];
+        snprintf(text, sizeof text, "{" MIRRORS ", \"parts\": [%s]}", cases[i].parts);
+        bst_test_model m = bst_test_model_open(text);
+        bst_glint_surface surfaces[BST_GLINT_SURFACES];
+        assert_int_equal(bst_glint_surfaces(m.satellite, surfaces), cases[i].surfaces);
+        bst_test_model_close(&m);
+    }
+}
+
+/* On each facet of a cone and a cylinder the offset of its own normal is 0. */
+static void normals_of_curved_surfaces_have_no_offset(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(
+        "{" MIRRORS
+        ", \"parts\": [{\"name\": \"c\", \"kind\": \"cone\", \"radius_m\": 1, \"top_radius_m\": "
+        "0.4, \"length_m\": 2, \"segments\": 48, \"material\": \"m\", \"rotation_deg\": [20, 30, "
+        "40]}]}");
+    bst_glint_surface surfaces[BST_GLINT_SURFACES];
+    int count = bst_glint_surfaces(m.satellite, surfaces), curved = 0;
+    for (int i = 0; i < count; i++) {
+        curved = surfaces[i].angle > 0 ? i : curved;
+    }
+    assert_true(surfaces[curved].angle > 0);
+    for (int f = 0; f < m.satellite->facet_count; f++) {
+        if (m.satellite->facets[f].curved >= 0) {
+            bst_assert_close(
+                bst_glint_offset(&surfaces[curved], m.pose, m.satellite->facets[f].normal), 0,
+                2e-3); /* facets of 7.5 degrees lie inside of the surface */
+        }
+    }
+    bst_test_model_close(&m);
+}
+
+/* A body that turns about z, in its own frame: the half vector circles. */
+typedef struct circling {
+    const bst_glint_surface *surfaces;
+    int count;
+    const bst_satellite_pose *pose;
+    double turns, height;
+} circling;
+
+static void offsets(void *user, double u, double *out) {
+    const circling *c = user;
+    double a = 2.0 * BST_PI * c->turns * u, r = sqrt(1.0 - c->height * c->height);
+    bst_vec3 half = {r * cos(a), r * sin(a), c->height};
+    for (int i = 0; i < c->count; i++) {
+        out[i] = bst_glint_offset(&c->surfaces[i], c->pose, half);
+    }
+}
+
+/* The half vector passes the four sides of a box at multiples of a quarter turn. */
+static void glints_of_a_box_are_found(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(
+        "{" MIRRORS ", \"parts\": [{\"name\": \"b\", \"kind\": \"box\", \"material\": \"m\"}]}");
+    bst_glint_surface surfaces[BST_GLINT_SURFACES];
+    circling c = {surfaces, bst_glint_surfaces(m.satellite, surfaces), m.pose, 1.9, 0.004};
+    double times[200];
+    int count = bst_glint_times(surfaces, c.count, 2.3e-3, 80, offsets, &c, times, 200);
+    /* 1.9 turns: eight passages, the first at the start */
+    for (int k = 0; k < 8; k++) {
+        double wanted = k / (4.0 * c.turns);
+        int close = 0, around = 0;
+        for (int i = 0; i < count; i++) {
+            double rad = fabs(times[i] - wanted) * 2.0 * BST_PI * c.turns;
+            close += rad < 1e-4;
+            around += rad < 0.05;
+        }
+        assert_true(k == 0 || close == 1);
+        assert_true(around >= (k == 0 ? 4 : 9));
+    }
+    assert_true(count <= 8 * 9);
+    /* out of reach of the lobe: none */
+    c.height = 0.2;
+    assert_int_equal(bst_glint_times(surfaces, c.count, 2.3e-3, 80, offsets, &c, times, 200), 0);
+    /* little room: whole glints only */
+    c.height = 0.0;
+    assert_int_equal(bst_glint_times(surfaces, c.count, 2.3e-3, 80, offsets, &c, times, 20), 14);
+    bst_test_model_close(&m);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(surfaces_with_narrow_lobes_are_found),
+        cmocka_unit_test(normals_of_curved_surfaces_have_no_offset),
+        cmocka_unit_test(glints_of_a_box_are_found),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
