@@ -107,6 +107,7 @@ bst_kernel_frame_params bst_render_params(const bst_kernel_frame_params *fixed, 
     p.tiles_x = (w.x0 + w.width - x0 + options->tile_width - 1) / options->tile_width;
     p.tiles_y = (w.height + options->tile_height - 1) / options->tile_height;
     p.source_groups = (sources + BST_BLOCK - 1) / BST_BLOCK;
+    p.sources = sources;
     p.key0 = q->key.k[0];
     p.key1 = q->key.k[1];
     p.exposure_low = (unsigned)((uint64_t)q->exposure_id & 0xFFFFFFFFu);

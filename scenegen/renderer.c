@@ -39,6 +39,8 @@ struct bst_renderer {
     bst_kernel_frame_params fixed; /* parameters of the kernels that are the camera's */
     char tile_options[256];        /* build options of the tile kernels */
     cl_kernel nodes_kernel, frame_kernel, expected_kernel;
+    bst_scene_form form; /* of the tile kernels */
+    bool searches_blocks; /* they search the boxes of all blocks (kernels/block_boxes.cl) */
     bst_psf *psf;
     bst_fourier_render *fourier; /* NULL: Gaussian PSF, light from stamps */
     bst_smear *smear;
@@ -76,7 +78,8 @@ static int taps_for(double sigma_px) {
 static bst_status build_expected(bst_ctx *ctx, bst_renderer *r) {
     return r->expected_kernel
                ? BST_OK
-               : bst_scene_expected_kernel(ctx, r->device, r->tile_options, &r->expected_kernel);
+               : bst_scene_expected_kernel(ctx, r->device, r->form, r->tile_options,
+                                           &r->expected_kernel);
 }
 
 /* Builds the kernel of frames at its first use. */
@@ -87,12 +90,15 @@ static bst_status build_frame(bst_ctx *ctx, bst_renderer *r) {
     char options[320], detector[64];
     bst_detector_options(r->detector, detector, sizeof detector);
     snprintf(options, sizeof options, "%s%s", r->tile_options, detector);
-    return bst_scene_frame_kernel(ctx, r->device, options, &r->frame_kernel);
+    return bst_scene_frame_kernel(ctx, r->device, r->form, options, &r->frame_kernel);
 }
 
 /* Builds the kernel of the nodes and sets the parameters that are the camera's. */
 static bst_status build(bst_ctx *ctx, bst_renderer *r) {
-    BST_TRY(bst_scene_nodes_kernel(ctx, r->device, &r->nodes_kernel));
+    r->form = (bst_scene_form){.lanes = r->options.group == 0, .fourier = r->fourier != NULL};
+    r->searches_blocks = r->form.lanes && !r->form.fourier;
+    BST_TRY((r->searches_blocks ? bst_scene_blocks_kernel : bst_scene_nodes_kernel)(
+        ctx, r->device, &r->nodes_kernel));
     bst_scene_tile_options(&r->options, r->taps, r->law_degree, r->fourier != NULL, r->tile_options,
                            sizeof r->tile_options);
     r->fixed.nodes = bst_scene_node_params(&r->camera, r->options.spatial_oversample);
@@ -291,20 +297,56 @@ static bst_status set_args(bst_ctx *ctx, cl_kernel kernel, const void *const *va
     return BST_OK;
 }
 
-/* Uploads sources and tables and enqueues the nodes kernel. */
+/* Uploads sources and tables. */
+static bst_status upload_scene(bst_ctx *ctx, bst_renderer *r) {
+    const bst_scene_plan *plan = &r->plan;
+    int table_blocks;
+    const float *table = bst_smear_table(r->smear, &table_blocks);
+    BST_TRY(bst_upload_ring_put(
+        ctx, r->stage, BST_STAGE_TABLE, table,
+        (size_t)table_blocks * BST_TABLE_ROWS * BST_BLOCK * sizeof(float), &r->table));
+    BST_TRY(bst_upload_ring_put(ctx, r->stage, BST_STAGE_SOURCES, plan->sources,
+                                (size_t)plan->count * sizeof *plan->sources, &r->sources));
+    return plan->shares
+               ? bst_upload_ring_put(ctx, r->stage, BST_STAGE_SHARES, plan->shares,
+                                     (size_t)plan->count * sizeof *plan->shares, &r->shares)
+               : BST_OK;
+}
+
+/* Enqueues the kernel of all blocks' boxes. */
+static bst_status enqueue_blocks(bst_ctx *ctx, bst_renderer *r) {
+    const int count = r->plan.count, blocks = r->plan.blocks;
+    size_t groups = ((size_t)blocks + BST_BLOCK - 1) / BST_BLOCK,
+           fars = (groups + BST_BLOCK - 1) / BST_BLOCK;
+    /* the blocks' boxes are followed by the number of each block's source */
+    size_t owners = (size_t)blocks * BST_BOX_BYTES, bytes = owners + (size_t)blocks * sizeof(cl_int);
+    BST_TRY(grow(ctx, r, &r->block_box, bytes));
+    BST_TRY(grow(ctx, r, &r->source_box, groups * BST_BOX_BYTES));
+    BST_TRY(grow(ctx, r, &r->group_box, fars * BST_BOX_BYTES));
+    if (count == 0) {
+        return BST_OK;
+    }
+    const void *values[] = {&r->fixed.nodes,       &r->sources,           &count,
+                            &blocks,               &r->table,             &r->block_box.buffer,
+                            &r->source_box.buffer, &r->group_box.buffer};
+    const size_t m = sizeof(cl_mem);
+    const size_t sizes[] = {sizeof r->fixed.nodes, m, sizeof count, sizeof blocks, m, m, m, m};
+    BST_TRY(set_args(ctx, r->nodes_kernel, values, sizes, 8));
+    size_t global = fars * BST_BOX_GROUP, local = BST_BOX_GROUP;
+    return bst_device_check(
+        ctx,
+        clEnqueueNDRangeKernel(r->queue, r->nodes_kernel, 1, NULL, &global, &local, 0, NULL, NULL),
+        "placing the scene's blocks");
+}
+
+/* Uploads sources and tables and enqueues the kernel of their boxes. */
 static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_kernel_frame_params *p) {
     const bst_scene_plan *plan = &r->plan;
-    int table_blocks, count = plan->count;
-    const float *table = bst_smear_table(r->smear, &table_blocks);
+    int count = plan->count;
     size_t groups = (size_t)p->source_groups, more = (groups + BST_BLOCK - 1) / BST_BLOCK;
-    size_t block_bytes = BST_BLOCK * sizeof(float);
-    BST_TRY(bst_upload_ring_put(ctx, r->stage, BST_STAGE_TABLE, table,
-                                (size_t)table_blocks * BST_TABLE_ROWS * block_bytes, &r->table));
-    BST_TRY(bst_upload_ring_put(ctx, r->stage, BST_STAGE_SOURCES, plan->sources,
-                                (size_t)count * sizeof *plan->sources, &r->sources));
-    if (plan->shares) {
-        BST_TRY(bst_upload_ring_put(ctx, r->stage, BST_STAGE_SHARES, plan->shares,
-                                    (size_t)count * sizeof *plan->shares, &r->shares));
+    BST_TRY(upload_scene(ctx, r));
+    if (r->searches_blocks) {
+        return enqueue_blocks(ctx, r);
     }
     BST_TRY(grow(ctx, r, &r->block_box, (size_t)plan->boxes * BST_BLOCK * BST_BOX_BYTES));
     BST_TRY(grow(ctx, r, &r->source_box, groups * BST_BLOCK * BST_BOX_BYTES));
@@ -369,6 +411,7 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     bst_kernel_frame_params p =
         bst_render_params(&r->fixed, &r->camera, &r->options, q, r->plan.count);
     BST_TRY(enqueue_nodes(ctx, r, &p));
+    p.blocks = r->plan.blocks;
     p.image_stride = to->stride > 0 ? to->stride : p.image_stride;
     p.background_e = to->light_only ? 0.0f : p.background_e;
     p.first_row = to->first_row;
@@ -408,7 +451,13 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
         bytes[COMMON + 1 + i] = m;
     }
     BST_TRY(set_args(ctx, kernel, values, bytes, kernel == r->frame_kernel ? ALL : COMMON));
-    size_t group = (size_t)r->options.group, global = (tiles + group - 1) / group * group;
+    size_t group = (size_t)r->options.group, global = 0;
+    if (r->form.lanes) {
+        group = (size_t)BST_ROW_LANES * (size_t)r->options.tile_height;
+        global = tiles * group;
+    } else {
+        global = (tiles + group - 1) / group * group;
+    }
     return bst_device_check(
         ctx, clEnqueueNDRangeKernel(r->queue, kernel, 1, NULL, &global, &group, 0, NULL, NULL),
         "rendering a frame");

@@ -1,5 +1,7 @@
 #include "scenegen/scene_kernels.h"
 
+#include <assert.h>
+
 #include "bst_scenegen_kernels.h"
 
 bst_status bst_scene_kernel(bst_ctx *ctx, bst_device *device,
@@ -20,25 +22,82 @@ bst_status bst_scene_nodes_kernel(bst_ctx *ctx, bst_device *device, cl_kernel *o
                             "bst_scene_nodes", out);
 }
 
-/* Sources of the tile kernels' light; those of a kernel follow. */
-#define LIGHT_SOURCES                                                                         \
-    &bst_kernel_scene_shared, &bst_kernel_lanes, &bst_kernel_nodes, &bst_kernel_block_search, \
-        &bst_kernel_splat, &bst_kernel_light, &bst_kernel_vignetting, &bst_kernel_background, \
-        &bst_kernel_tile
-
-bst_status bst_scene_expected_kernel(bst_ctx *ctx, bst_device *device, const char *tile_options,
-                                     cl_kernel *out) {
-    static const bst_device_kernel_source *const sources[] = {LIGHT_SOURCES, &bst_kernel_expected};
-    return bst_scene_kernel(ctx, device, sources, sizeof sources / sizeof *sources, tile_options,
-                            "bst_scene_expected", out);
+bst_status bst_scene_blocks_kernel(bst_ctx *ctx, bst_device *device, cl_kernel *out) {
+    static const bst_device_kernel_source *const sources[] = {
+        &bst_kernel_scene_shared, &bst_kernel_lanes, &bst_kernel_nodes, &bst_kernel_block_boxes};
+    return bst_scene_kernel(ctx, device, sources, sizeof sources / sizeof *sources,
+                            "-cl-std=CL1.2 -DONE_LANE", "bst_scene_block_boxes", out);
 }
 
-bst_status bst_scene_frame_kernel(bst_ctx *ctx, bst_device *device, const char *options,
-                                  cl_kernel *out) {
-    static const bst_device_kernel_source *const sources[] = {
-        LIGHT_SOURCES,         &bst_kernel_random,    &bst_kernel_chunk,
-        &bst_kernel_noise_law, &bst_kernel_read_tail, &bst_kernel_detector,
-        &bst_kernel_pixels,    &bst_kernel_store_dn,  &bst_kernel_frame};
-    return bst_scene_kernel(ctx, device, sources, sizeof sources / sizeof *sources, options,
-                            "bst_scene_frame", out);
+enum { MOST_SOURCES = 24 };
+
+/* Sources of a program. */
+typedef struct program {
+    const bst_device_kernel_source *sources[MOST_SOURCES];
+    int count;
+} program;
+
+static void add(program *p, const bst_device_kernel_source *const *sources, size_t count) {
+    for (size_t i = 0; i < count; i++) {
+        assert(p->count < MOST_SOURCES);
+        p->sources[p->count++] = sources[i];
+    }
+}
+
+#define ADD(program, ...)                                                           \
+    do {                                                                            \
+        const bst_device_kernel_source *const list_of_sources[] = {__VA_ARGS__};    \
+        add(program, list_of_sources, sizeof list_of_sources / sizeof *list_of_sources); \
+    } while (0)
+
+/* Sources of the tile kernels' light; those of a kernel follow. */
+static program light_sources(bst_scene_form form) {
+    program p = {.count = 0};
+    ADD(&p, &bst_kernel_scene_shared, &bst_kernel_lanes);
+    if (form.lanes) {
+        ADD(&p, &bst_kernel_random, &bst_kernel_chunk);
+    }
+    ADD(&p, &bst_kernel_nodes, &bst_kernel_profiles);
+    if (!form.lanes) {
+        ADD(&p, &bst_kernel_block_search, &bst_kernel_splat, &bst_kernel_light);
+    }
+    ADD(&p, &bst_kernel_vignetting, &bst_kernel_background, &bst_kernel_tile);
+    if (form.lanes && !form.fourier) {
+        ADD(&p, &bst_kernel_gather);
+    }
+    if (form.lanes) {
+        ADD(&p, &bst_kernel_lane_tile);
+    }
+    return p;
+}
+
+bst_status bst_scene_expected_kernel(bst_ctx *ctx, bst_device *device, bst_scene_form form,
+                                     const char *tile_options, cl_kernel *out) {
+    program p = light_sources(form);
+    if (form.lanes) {
+        ADD(&p, &bst_kernel_lane_expected);
+    } else {
+        ADD(&p, &bst_kernel_expected);
+    }
+    return bst_scene_kernel(ctx, device, p.sources, p.count, tile_options, "bst_scene_expected",
+                            out);
+}
+
+bst_status bst_scene_frame_kernel(bst_ctx *ctx, bst_device *device, bst_scene_form form,
+                                  const char *options, cl_kernel *out) {
+    program p = light_sources(form);
+    if (!form.lanes) {
+        ADD(&p, &bst_kernel_random, &bst_kernel_chunk);
+    }
+    ADD(&p, &bst_kernel_noise_law, &bst_kernel_read_tail);
+    if (form.lanes) {
+        ADD(&p, &bst_kernel_lane_tail);
+    }
+    ADD(&p, &bst_kernel_detector, &bst_kernel_pixels, &bst_kernel_store_dn);
+    if (form.lanes) {
+        ADD(&p, &bst_kernel_lane_frame);
+    } else {
+        ADD(&p, &bst_kernel_frame);
+    }
+    return bst_scene_kernel(ctx, device, p.sources, p.count, options, "bst_scene_frame", out);
 }

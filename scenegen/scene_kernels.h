@@ -3,6 +3,8 @@
 #ifndef BST_SCENEGEN_SCENE_KERNELS_H
 #define BST_SCENEGEN_SCENE_KERNELS_H
 
+#include <stdbool.h>
+
 #include "sim/device/device.h"
 
 /* Builds a program, or takes one already built, and creates one of its kernels.
@@ -18,18 +20,28 @@ bst_status bst_scene_kernel(bst_ctx *ctx, bst_device *device,
 /* Kernel of the boxes of nodes (kernels/node_boxes.cl). Errors: as bst_device_build. */
 bst_status bst_scene_nodes_kernel(bst_ctx *ctx, bst_device *device, cl_kernel *out) BST_MUST_CHECK;
 
-/* Kernel of noise-free images (kernels/expected.cl).
+/* Kernel of the boxes of all blocks, for tiles that a work-group renders (kernels/block_boxes.cl).
+ * Errors: as bst_device_build */
+bst_status bst_scene_blocks_kernel(bst_ctx *ctx, bst_device *device, cl_kernel *out) BST_MUST_CHECK;
+
+/* How a kernel renders a tile, and from what. */
+typedef struct bst_scene_form {
+    bool lanes;   /* a work-group for each tile, otherwise one work-item */
+    bool fourier; /* the light is an image */
+} bst_scene_form;
+
+/* Kernel of noise-free images (kernels/expected.cl or lane_expected.cl).
  *
  * Given:     tile_options  of bst_scene_tile_options
  * Errors:    as bst_device_build */
-bst_status bst_scene_expected_kernel(bst_ctx *ctx, bst_device *device, const char *tile_options,
-                                     cl_kernel *out) BST_MUST_CHECK;
+bst_status bst_scene_expected_kernel(bst_ctx *ctx, bst_device *device, bst_scene_form form,
+                                     const char *tile_options, cl_kernel *out) BST_MUST_CHECK;
 
-/* Kernel of frames (kernels/frame.cl).
+/* Kernel of frames (kernels/frame.cl or lane_frame.cl).
  *
  * Given:     options  of bst_scene_tile_options, followed by those of bst_detector_options
  * Errors:    as bst_device_build */
-bst_status bst_scene_frame_kernel(bst_ctx *ctx, bst_device *device, const char *options,
-                                  cl_kernel *out) BST_MUST_CHECK;
+bst_status bst_scene_frame_kernel(bst_ctx *ctx, bst_device *device, bst_scene_form form,
+                                  const char *options, cl_kernel *out) BST_MUST_CHECK;
 
 #endif

@@ -45,6 +45,7 @@ static void put_in_order(bst_scene_plan *p, const bst_camera *camera, const bst_
             p->shares[i][k] = (float)bst_psf_share(all[s->first_box].colour, k);
         }
         s->first_box = p->boxes;
+        s->first = p->blocks;
         p->blocks += s->blocks;
         p->boxes += s->blocks > 1 ? (s->blocks + BST_BLOCK - 1) / BST_BLOCK : 0;
     }

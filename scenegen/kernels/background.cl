@@ -1,5 +1,28 @@
 /* Varying part of the background, added to a tile's light. */
 
+#ifdef ONE_LANE
+/* Background of a pixel of the sensor: bilinear between the nodes of bst_skylight_map, which lie at
+ * multiples of a power of two, so that the weights are exact. */
+INLINE float background_of(bst_kernel_frame_params p, int x, int y, global const float *background) {
+    int down = y - p.map_y0, right = x - p.map_x0;
+    if (p.map_step > 32768) {
+        return 0.0f; /* there is no background map */
+    }
+    if (p.map_step == 1) {
+        int known = right >= 0 && right < p.map_columns && down >= 0 && down < p.map_rows;
+        return known ? background[(size_t)down * p.map_columns + right] : 0.0f;
+    }
+    float share = 1.0f / (float)p.map_step;
+    int j = min(down / p.map_step, p.map_rows - 2);
+    int i = clamp(right / p.map_step, 0, p.map_columns - 2);
+    float t = (float)(down - j * p.map_step) * share;
+    float s = (float)(right - i * p.map_step) * share;
+    global const float *above = background + j * p.map_columns + i, *below = above + p.map_columns;
+    float v0 = above[0] + t * (below[0] - above[0]);
+    float v1 = above[1] + t * (below[1] - above[1]);
+    return v0 + s * (v1 - v0);
+}
+#else
 /* Bilinear interpolation between the nodes of bst_skylight_map. Nodes lie at multiples of a power
  * of two, so weights are exact and a pixel's value does not depend on tile or window. */
 static void add_nodes(local float *sum, bst_kernel_frame_params p, int tile_x, int tile_y, int rows,
@@ -59,3 +82,4 @@ static void add_background(local float *sum, bst_kernel_frame_params p, int tile
         add_nodes(sum, p, tile_x, tile_y, rows, columns, background);
     }
 }
+#endif

@@ -123,7 +123,7 @@ static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, node_block 
                 /* light outside the grid would wrap around */
                 (floor_u >= before) & (floor_v >= before) & (floor_u < (float)p.samples_x - after) &
                 (floor_v < (float)p.samples_y - after);
-    if (!any16(hit)) {
+    if (!any_of(hit)) {
         return 0;
     }
     float16 phase_u = (u - floor_u) * BST_SPREAD_PHASES, phase_v = (v - floor_v) * BST_SPREAD_PHASES;
@@ -148,7 +148,7 @@ static int place_nodes(bst_deposit_params p, int tile_x, int tile_y, node_block 
     vstore16(phase_u - step_u, 0, out->share_x);
     vstore16(phase_v - step_v, 0, out->share_y);
     vstore16(width - level, 0, out->share_width);
-    out->wide = any16(width > 0.0f);
+    out->wide = any_of(width > 0.0f);
     vstore16(select((float16)0.0f, electrons, hit), 0, out->electrons);
     return 1;
 }

@@ -23,27 +23,27 @@ typedef struct detector_maps {
 
 /* Probability of zero events in units of 2^-32, the start of the search below. Probabilities are
  * reduced by a relative 5e-7, so that their sum never exceeds one. */
-INLINE float16 first_chance(float16 mean) {
+INLINE lanes first_chance(lanes mean) {
     return exp(-fmin(mean, POISSON_SWITCH)) * (0x1p32f * (1.0f - 2e-6f));
 }
 
 /* Poisson deviates of mean < POISSON_SWITCH by sequential search of the distribution (Devroye 1986,
  * III.2), in integers, all lanes in step; lanes outside `wanted` give 0. The words left over by
  * rounding (2e-6 of them) give the mean. */
-INLINE float16 poisson_search16(float16 mean, uint16 word, int16 wanted) {
-    float16 count = (float16)0.0f, p = first_chance(mean);
-    uint16 rest = word;
-    int16 active = wanted;
-    for (int k = 0; any16(active) && k < 200;) {
+INLINE lanes poisson_search(lanes mean, lanes_uint word, lanes_int wanted) {
+    lanes count = (lanes)0.0f, p = first_chance(mean);
+    lanes_uint rest = word;
+    lanes_int active = wanted;
+    for (int k = 0; any_of(active) && k < 200;) {
         for (int step = 0; step < 4; step++) { /* finished lanes ignore surplus steps */
-            uint16 chance = convert_uint16(p);
-            active &= as_int16(rest > chance);
-            int16 end = (chance == 0u) & (mean < (float)k);
+            lanes_uint chance = to_lanes_uint(p);
+            active &= as_lanes_int(MASK(rest > chance));
+            lanes_int end = MASK((chance == 0u) & (mean < (float)k));
             count = select(count, floor(mean), active & end);
             active &= ~end;
             k++;
-            rest = select(rest, rest - chance, as_uint16(active));
-            count = select(count, (float16)(float)k, active);
+            rest = select(rest, rest - chance, as_lanes_uint(active));
+            count = select(count, (lanes)(float)k, active);
             p *= mean * (1.0f / (float)k);
         }
     }
@@ -53,20 +53,20 @@ INLINE float16 poisson_search16(float16 mean, uint16 word, int16 wanted) {
 /* Poisson deviates of mean >= POISSON_SWITCH from a standard normal: the floor of the
  * Cornish-Fisher expansion of the Poisson quantile (Giles 2016, ACM TOMS 42(1) algorithm 955, Q_N
  * with terms up to 1/mean). */
-INLINE float16 poisson_expand16(float16 mean, float16 w) {
-    float16 root = sqrt(mean), q = w * w;
-    float16 whole = floor(mean);
-    float16 d = (mean - whole) + root * w + (1.0f / 3 + q * (1.0f / 6)) -
+INLINE lanes poisson_expand(lanes mean, lanes w) {
+    lanes root = sqrt(mean), q = w * w;
+    lanes whole = floor(mean);
+    lanes d = (mean - whole) + root * w + (1.0f / 3 + q * (1.0f / 6)) -
                 w * (1.0f / 36 + q * (1.0f / 72)) / root +
                 (-8.0f / 405 + q * (7.0f / 810 + q * (1.0f / 270))) / mean;
     return fmax(whole + floor(d), 0.0f);
 }
 
 /* Amplifier response (nonlinearity) to a charge. */
-INLINE float16 respond(bst_kernel_frame_params p, float16 e) {
+INLINE lanes respond(bst_kernel_frame_params p, lanes e) {
     if (HAS(p, BST_EFFECT_NONLINEAR)) {
-        float16 u = e * p.per_full_well;
-        e = fma(e, u * fma(u, fma(u, (float16)p.bend3, (float16)p.bend2), (float16)p.bend1), e);
+        lanes u = e * p.per_full_well;
+        e = fma(e, u * fma(u, fma(u, (lanes)p.bend3, (lanes)p.bend2), (lanes)p.bend1), e);
     }
     return e;
 }
@@ -80,17 +80,17 @@ INLINE chunk respond_chunk(bst_kernel_frame_params p, chunk e) {
 }
 
 /* Adds read noise after the amplifier. */
-INLINE float16 read_out(bst_kernel_frame_params p, float16 charge, float16 z) {
-    return fma((float16)p.read_noise_e, z, respond(p, charge));
+INLINE lanes read_out(bst_kernel_frame_params p, lanes charge, lanes z) {
+    return fma((lanes)p.read_noise_e, z, respond(p, charge));
 }
 
 /* Charge from two random words: a uniform one, and one that gave the normal deviate w. */
-INLINE float16 draw_charge(float16 mean, uint16 word, float16 w, int16 wanted) {
-    int16 small = mean < POISSON_SWITCH;
-    float16 electrons = poisson_expand16(mean, w);
-    int16 search = wanted & small;
-    if (any16(search)) {
-        electrons = select(electrons, poisson_search16(mean, word, search), small);
+INLINE lanes draw_charge(lanes mean, lanes_uint word, lanes w, lanes_int wanted) {
+    lanes_int small = MASK(mean < POISSON_SWITCH);
+    lanes electrons = poisson_expand(mean, w);
+    lanes_int search = wanted & small;
+    if (any_of(search)) {
+        electrons = select(electrons, poisson_search(mean, word, search), small);
     }
     return electrons;
 }
@@ -116,10 +116,10 @@ INLINE chunk expected_chunk(bst_kernel_frame_params p, detector_maps maps, size_
 INLINE chunk add_dark(bst_kernel_frame_params p, detector_maps maps, size_t map, chunk m) {
     if (HAS(p, BST_EFFECT_DARK)) {
         chunk dark = load_chunk(maps.dark + map);
-        m.a = fma(dark.a, (float16)p.exposure_s, m.a);
-        m.b = fma(dark.b, (float16)p.exposure_s, m.b);
-        m.c = fma(dark.c, (float16)p.exposure_s, m.c);
-        m.d = fma(dark.d, (float16)p.exposure_s, m.d);
+        m.a = fma(dark.a, (lanes)p.exposure_s, m.a);
+        m.b = fma(dark.b, (lanes)p.exposure_s, m.b);
+        m.c = fma(dark.c, (lanes)p.exposure_s, m.c);
+        m.d = fma(dark.d, (lanes)p.exposure_s, m.d);
     } else {
         m.a += p.dark_e;
         m.b += p.dark_e;
@@ -132,11 +132,11 @@ INLINE chunk add_dark(bst_kernel_frame_params p, detector_maps maps, size_t map,
 /* Converts electrons to digital numbers plus one half, before clipping to the converter's range.
  * row, column: of the first pixel on the sensor. */
 INLINE chunk convert_chunk(bst_kernel_frame_params p, detector_maps maps, int row, int column, chunk e) {
-    float16 g = (float16)p.dn_per_e, offset = (float16)(p.offset_dn + 0.5f);
+    lanes g = (lanes)p.dn_per_e, offset = (lanes)(p.offset_dn + 0.5f);
     chunk dn;
     chunk o = {offset, offset, offset, offset};
     if (HAS(p, BST_EFFECT_OFFSETS)) {
-        offset = (float16)(p.offset_dn + 0.5f + maps.offsets[p.maps_stride + row]);
+        offset = (lanes)(p.offset_dn + 0.5f + maps.offsets[p.maps_stride + row]);
         o = load_chunk(maps.offsets + column);
         o.a += offset;
         o.b += offset;

@@ -65,7 +65,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
         for (int x = 0; x < t.columns; x += 64) {
             local float16 *from = (local float16 *)(sum + y * STRIDE + x);
             chunk lights = {from[0], from[1], from[2], from[3]};
-            int lit = any16((lights.a > 0.0f) | (lights.b > 0.0f) | (lights.c > 0.0f) |
+            int lit = any_of((lights.a > 0.0f) | (lights.b > 0.0f) | (lights.c > 0.0f) |
                             (lights.d > 0.0f));
             chunk_flags brim;
             chunk dn = detect_chunk(p, maps, unlit, near, steps, &tails[x / 64], counter, t.y + y,

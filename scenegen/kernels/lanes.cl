@@ -1,7 +1,49 @@
-/* Reductions over the lanes of a vector. */
+/* Values of the pixels, or nodes, that a work-item computes side by side: LANES of them, and
+ * reductions over them. Without option ONE_LANE a work-item has the 16 lanes of a vector, as suits a
+ * CPU; with it one, as suits a GPU, whose work-items share instructions. Kernels of both forms draw
+ * the same random numbers and add the light in the same order. */
 
+#ifdef ONE_LANE
+#define LANES 1
+typedef float lanes;
+typedef int lanes_int;
+typedef uint lanes_uint;
+typedef ushort lanes_ushort;
+#define to_lanes(x) convert_float(x)
+#define to_lanes_int(x) convert_int(x)
+#define to_lanes_uint(x) convert_uint(x)
+#define to_lanes_ushort(x) convert_ushort(x)
+#define as_lanes(x) as_float(x)
+#define as_lanes_int(x) as_int(x)
+#define as_lanes_uint(x) as_uint(x)
+/* A comparison as -1 where it is true; a scalar one gives 1. */
+#define MASK(comparison) (-(comparison))
+/* The sign as such a mask: select() looks at a vector's sign bits and at all bits of a scalar. */
+#define SIGN_MASK(v) ((v) >> 31)
+#else
+#define LANES 16
+typedef float16 lanes;
+typedef int16 lanes_int;
+typedef uint16 lanes_uint;
+typedef ushort16 lanes_ushort;
+#define to_lanes(x) convert_float16(x)
+#define to_lanes_int(x) convert_int16(x)
+#define to_lanes_uint(x) convert_uint16(x)
+#define to_lanes_ushort(x) convert_ushort16(x)
+#define as_lanes(x) as_float16(x)
+#define as_lanes_int(x) as_int16(x)
+#define as_lanes_uint(x) as_uint16(x)
+#define MASK(comparison) (comparison)
+#define SIGN_MASK(v) (v)
+#endif
+
+#ifdef ONE_LANE
+INLINE int any_of(int mask) {
+    return mask < 0;
+}
+#else
 /* any() by halves: some compilers test lane by lane. */
-static int any16(int16 v) {
+static int any_of(int16 v) {
     int8 a = v.lo | v.hi;
     int4 b = a.lo | a.hi;
     int2 c = b.lo | b.hi;
@@ -36,3 +78,4 @@ static int most_of(int16 v) {
     int2 c = max(b.lo, b.hi);
     return max(c.lo, c.hi);
 }
+#endif

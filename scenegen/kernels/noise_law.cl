@@ -3,12 +3,12 @@
 
 /* Coefficients of electrons with shot and read noise as a polynomial of a normal deviate. */
 typedef struct noise_law {
-    float16 c0, c1, c2, c3;
+    lanes c0, c1, c2, c3;
 #if CF_ORDER >= 3
-    float16 c4;
+    lanes c4;
 #endif
 #if CF_ORDER >= 4
-    float16 c5;
+    lanes c5;
 #endif
 } noise_law;
 
@@ -16,35 +16,35 @@ typedef struct noise_law {
  * Cornish-Fisher expansion (Abramowitz and Stegun 26.2.49) to order CF_ORDER of 1 / sigma. All
  * cumulants beyond the variance are the mean, so with a = 1 / sigma, b = mean / sigma^2 the
  * standardised ones are b a, b a^2, b a^3, b a^4. */
-INLINE noise_law noise_law_of(bst_kernel_frame_params p, float16 mean) {
+INLINE noise_law noise_law_of(bst_kernel_frame_params p, lanes mean) {
     noise_law law;
-    float16 variance = fma((float16)p.read_noise_e, (float16)p.read_noise_e, mean);
-    float16 a = rsqrt16(variance), a2 = a * a, b = mean * a2, b2 = b * b;
-    float16 c0 = fma(b, (float16)(-1.0f / 6), mean);
-    float16 c1 = fma(a, fma(b2, (float16)(5.0f / 36), b * (-1.0f / 8)), variance * a);
-    float16 c2 = b * (1.0f / 6);
-    float16 c3 = a * fma(b2, (float16)(-1.0f / 18), b * (1.0f / 24));
+    lanes variance = fma((lanes)p.read_noise_e, (lanes)p.read_noise_e, mean);
+    lanes a = inverse_root(variance), a2 = a * a, b = mean * a2, b2 = b * b;
+    lanes c0 = fma(b, (lanes)(-1.0f / 6), mean);
+    lanes c1 = fma(a, fma(b2, (lanes)(5.0f / 36), b * (-1.0f / 8)), variance * a);
+    lanes c2 = b * (1.0f / 6);
+    lanes c3 = a * fma(b2, (lanes)(-1.0f / 18), b * (1.0f / 24));
 #if CF_ORDER >= 3
-    float16 b3 = b2 * b;
-    c0 = fma(a2, fma(b3, (float16)(17.0f / 324), fma(b2, (float16)(-1.0f / 12), b * (1.0f / 40))),
+    lanes b3 = b2 * b;
+    c0 = fma(a2, fma(b3, (lanes)(17.0f / 324), fma(b2, (lanes)(-1.0f / 12), b * (1.0f / 40))),
              c0);
-    c2 = fma(a2, fma(b3, (float16)(-53.0f / 324), fma(b2, (float16)(5.0f / 24), b * (-1.0f / 20))),
+    c2 = fma(a2, fma(b3, (lanes)(-53.0f / 324), fma(b2, (lanes)(5.0f / 24), b * (-1.0f / 20))),
              c2);
-    law.c4 = a2 * fma(b3, (float16)(1.0f / 27), fma(b2, (float16)(-1.0f / 24), b * (1.0f / 120))) *
+    law.c4 = a2 * fma(b3, (lanes)(1.0f / 27), fma(b2, (lanes)(-1.0f / 24), b * (1.0f / 120))) *
              p.dn_per_e;
 #endif
 #if CF_ORDER >= 4
     /* He5, He3, He1 of the fourth order, collected by powers of z */
-    float16 a3 = a2 * a, b4 = b2 * b2;
-    float16 h5 = fma(b4, (float16)(-252.0f / 7776),
-                     fma(b3, (float16)(14.0f / 288),
-                         fma(b2, (float16)(-3.0f / 384 - 2.0f / 180), b * (1.0f / 720))));
-    float16 h3 = fma(b4, (float16)(-832.0f / 7776),
-                     fma(b3, (float16)(37.0f / 288), b2 * (-6.0f / 384 - 3.0f / 180)));
-    float16 h1 =
-        fma(b4, (float16)(-227.0f / 7776), fma(b3, (float16)(8.0f / 288), b2 * (-2.0f / 384)));
-    c1 = fma(a3, fma(h5, (float16)15.0f, fma(h3, (float16)-3.0f, h1)), c1);
-    c3 = fma(a3, fma(h5, (float16)-10.0f, h3), c3);
+    lanes a3 = a2 * a, b4 = b2 * b2;
+    lanes h5 = fma(b4, (lanes)(-252.0f / 7776),
+                     fma(b3, (lanes)(14.0f / 288),
+                         fma(b2, (lanes)(-3.0f / 384 - 2.0f / 180), b * (1.0f / 720))));
+    lanes h3 = fma(b4, (lanes)(-832.0f / 7776),
+                     fma(b3, (lanes)(37.0f / 288), b2 * (-6.0f / 384 - 3.0f / 180)));
+    lanes h1 =
+        fma(b4, (lanes)(-227.0f / 7776), fma(b3, (lanes)(8.0f / 288), b2 * (-2.0f / 384)));
+    c1 = fma(a3, fma(h5, (lanes)15.0f, fma(h3, (lanes)-3.0f, h1)), c1);
+    c3 = fma(a3, fma(h5, (lanes)-10.0f, h3), c3);
     law.c5 = a3 * h5;
 #endif
     law.c0 = c0;
@@ -55,8 +55,8 @@ INLINE noise_law noise_law_of(bst_kernel_frame_params p, float16 mean) {
 }
 
 /* Electrons with shot and read noise from normal deviate z. */
-INLINE float16 draw_single(noise_law law, float16 z) {
-    float16 dn = law.c3;
+INLINE lanes draw_single(noise_law law, lanes z) {
+    lanes dn = law.c3;
 #if CF_ORDER >= 4
     dn = fma(fma(law.c5, z, law.c4), z, dn);
 #elif CF_ORDER >= 3
@@ -65,6 +65,7 @@ INLINE float16 draw_single(noise_law law, float16 z) {
     return fma(fma(fma(dn, z, law.c2), z, law.c1), z, law.c0);
 }
 
+#ifndef ONE_LANE
 /* Noise law of means about one, by cubics: its coefficients at mean + x / per_reach, |x| <= 1, a
  * quarter of the variance to either side. There the cubic of the standard deviation has a relative
  * error of 2e-5. */
@@ -85,7 +86,7 @@ typedef struct near_law {
 #define NEAR_B 0.382683432f
 
 /* Cubic through f at A, -A, B, -B: ascending powers. */
-INLINE float4 cubic_through(float16 f) {
+INLINE float4 cubic_through(lanes f) {
     const float spread = NEAR_A * NEAR_A - NEAR_B * NEAR_B;
     float even_a = 0.5f * (f.s0 + f.s1), odd_a = (0.5f / NEAR_A) * (f.s0 - f.s1);
     float even_b = 0.5f * (f.s2 + f.s3), odd_b = (0.5f / NEAR_B) * (f.s2 - f.s3);
@@ -101,8 +102,8 @@ static near_law near_law_of(bst_kernel_frame_params p) {
     near_law near;
     near.mean = fma(0.2f, dark + read, dark);
     float reach = 0.25f * (near.mean + read);
-    const float16 places = {NEAR_A, -NEAR_A, NEAR_B, -NEAR_B, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
-    noise_law law = noise_law_of(p, fma(places, (float16)reach, (float16)near.mean));
+    const lanes places = {NEAR_A, -NEAR_A, NEAR_B, -NEAR_B, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+    noise_law law = noise_law_of(p, fma(places, (lanes)reach, (lanes)near.mean));
     near.c0 = cubic_through(law.c0);
     near.c1 = cubic_through(law.c1);
     near.c2 = cubic_through(law.c2);
@@ -119,11 +120,11 @@ static near_law near_law_of(bst_kernel_frame_params p) {
     return near;
 }
 
-INLINE float16 cubic(float4 c, float16 x) {
-    return fma(fma(fma((float16)c.s3, x, (float16)c.s2), x, (float16)c.s1), x, (float16)c.s0);
+INLINE lanes cubic(float4 c, lanes x) {
+    return fma(fma(fma((lanes)c.s3, x, (lanes)c.s2), x, (lanes)c.s1), x, (lanes)c.s0);
 }
 
-INLINE noise_law law_near(near_law near, float16 x) {
+INLINE noise_law law_near(near_law near, lanes x) {
     noise_law law;
     law.c0 = cubic(near.c0, x);
     law.c1 = cubic(near.c1, x);
@@ -137,3 +138,4 @@ INLINE noise_law law_near(near_law near, float16 x) {
 #endif
     return law;
 }
+#endif

@@ -3,10 +3,74 @@
 
 /* Lanes for which one deviate is not accurate enough: small means with little read noise, and means
  * near the full well, where the charge is clipped before read noise is added. */
-INLINE int16 needs_two(bst_kernel_frame_params p, float16 mean) {
-    return (mean < p.single_from) | (mean > p.near_full_e);
+INLINE lanes_int needs_two(bst_kernel_frame_params p, lanes mean) {
+    return MASK((mean < p.single_from) | (mean > p.near_full_e));
 }
 
+/* Vectors of a chunk in memory, for loops over them. */
+typedef struct chunk_lines {
+    lanes v[4];
+} chunk_lines;
+
+INLINE chunk_lines lines_of(chunk c) {
+    chunk_lines l = {{c.a, c.b, c.c, c.d}};
+    return l;
+}
+
+/* Electrons of a chunk with pixels that are far from the near law's means, or struck by charge
+ * `over`: e holds those of the others, before the amplifier. Lanes that need two deviates draw
+ * charge first, then read noise. Few chunks come here, so loops keep the program short. */
+INLINE chunk draw_bright(bst_kernel_frame_params p, chunk mean, chunk over, chunk normal,
+                         chunk_flags far_lanes, uint counter, chunk e, chunk_flags *brim) {
+    chunk_lines m = lines_of(mean), o = lines_of(over), z = lines_of(normal), out = lines_of(e);
+    lanes_int far[4] = {far_lanes.a, far_lanes.b, far_lanes.c, far_lanes.d}, two[4], any = (lanes_int)0;
+    KEEP_LOOP
+    for (int v = 0; v < 4; v++) {
+        if (any_of(far[v])) {
+            out.v[v] = select(out.v[v], draw_single(noise_law_of(p, m.v[v]), z.v[v]), far[v]);
+        }
+        two[v] = needs_two(p, m.v[v]) | MASK(m.v[v] + o.v[v] > p.near_full_e);
+        out.v[v] = respond(p, out.v[v] + o.v[v]);
+        any |= two[v];
+    }
+    if (any_of(any)) {
+        chunk_words words = chunk_random(p, counter, STREAM_POISSON);
+        chunk_lines n = lines_of(chunk_normal(chunk_random(p, counter, STREAM_POISSON_NORMAL)));
+        lanes_uint w[4] = {words.a, words.b, words.c, words.d};
+        lanes_int full[4];
+        KEEP_LOOP
+        for (int v = 0; v < 4; v++) {
+            lanes charge = draw_charge(m.v[v], w[v], n.v[v], two[v]) + o.v[v];
+            full[v] = two[v] & MASK(charge >= p.full_well_e);
+            out.v[v] = select(out.v[v], read_out(p, fmin(charge, p.full_well_e), z.v[v]), two[v]);
+        }
+        brim->a = full[0];
+        brim->b = full[1];
+        brim->c = full[2];
+        brim->d = full[3];
+    }
+    chunk drawn = {out.v[0], out.v[1], out.v[2], out.v[3]};
+    return drawn;
+}
+
+#ifdef ONE_LANE
+/* Digital numbers plus one half of the lane's pixels of a chunk, before clipping to the converter's
+ * range. counter: of the lane. row, column: of its first pixel on the sensor. struck: the chunk has
+ * charge of cosmic rays. light: electrons of the sources. brim: pixels with a full well. */
+INLINE chunk detect_lane(bst_kernel_frame_params p, detector_maps maps, uint counter, int row,
+                         int column, int struck, chunk light, chunk_flags *brim) {
+    size_t map = (size_t)row * p.maps_stride + column;
+    chunk z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
+    chunk m = add_dark(p, maps, map, expected_chunk(p, maps, map, light));
+    chunk over = {0.0f, 0.0f, 0.0f, 0.0f};
+    chunk_flags all = {-1, -1, -1, -1};
+    if (struck) {
+        over = load_chunk(maps.overlay + map);
+    }
+    brim->a = brim->b = brim->c = brim->d = 0;
+    return draw_bright(p, m, over, z, all, counter, m, brim);
+}
+#else
 /* Noise law common to all pixels without source light, if they have the same mean. */
 typedef struct dark_law {
     noise_law law;
@@ -17,18 +81,18 @@ typedef struct dark_law {
 
 #define MOST_STEPS 128
 
-/* steps: cumulative probabilities of the search, equal to those of poisson_search16. */
+/* steps: cumulative probabilities of the search, equal to those of poisson_search. */
 INLINE dark_law dark_law_of(bst_kernel_frame_params p, uint *steps) {
     dark_law dark;
     dark.mean = (p.background_e - p.dark_e) + p.dark_e; /* as the sum of the two below */
-    float16 mean = (float16)dark.mean;
+    lanes mean = (lanes)dark.mean;
     dark.law = noise_law_of(p, mean);
     int shared = !HAS(p, BST_EFFECT_GAIN | BST_EFFECT_DARK);
-    dark.single = shared && !any16(needs_two(p, mean));
+    dark.single = shared && !any_of(needs_two(p, mean));
     dark.steps = 0;
     if (shared && p.single_from > 0.0f && dark.mean < POISSON_SWITCH &&
         dark.mean <= p.near_full_e) {
-        float16 chance = first_chance(mean);
+        lanes chance = first_chance(mean);
         uint sum = 0u;
         for (int k = 0; k < MOST_STEPS; k++) {
             uint part = convert_uint(chance.s0);
@@ -46,7 +110,7 @@ INLINE dark_law dark_law_of(bst_kernel_frame_params p, uint *steps) {
 
 /* Search results for the words of a dark chunk, by counting instead of stepping. */
 INLINE chunk dark_electrons(dark_law dark, const uint *steps, chunk_words w) {
-    chunk_flags n = {(int16)0, (int16)0, (int16)0, (int16)0};
+    chunk_flags n = {(lanes_int)0, (lanes_int)0, (lanes_int)0, (lanes_int)0};
     uint last = 0u;
     for (int k = 0; k < dark.steps; k++) {
         last = steps[k];
@@ -55,60 +119,14 @@ INLINE chunk dark_electrons(dark_law dark, const uint *steps, chunk_words w) {
         n.c += w.c > last;
         n.d += w.d > last;
     }
-    float16 mean = (float16)floor(dark.mean);
+    lanes mean = (lanes)floor(dark.mean);
     chunk e;
-    e.a = select(-convert_float16(n.a), mean, w.a > last);
-    e.b = select(-convert_float16(n.b), mean, w.b > last);
-    e.c = select(-convert_float16(n.c), mean, w.c > last);
-    e.d = select(-convert_float16(n.d), mean, w.d > last);
+    e.a = select(-to_lanes(n.a), mean, w.a > last);
+    e.b = select(-to_lanes(n.b), mean, w.b > last);
+    e.c = select(-to_lanes(n.c), mean, w.c > last);
+    e.d = select(-to_lanes(n.d), mean, w.d > last);
     return e;
 }
-/* Vectors of a chunk in memory, for loops over them. */
-typedef struct chunk_lines {
-    float16 v[4];
-} chunk_lines;
-
-INLINE chunk_lines lines_of(chunk c) {
-    chunk_lines l = {{c.a, c.b, c.c, c.d}};
-    return l;
-}
-
-/* Electrons of a chunk with pixels that are far from the near law's means, or struck by charge
- * `over`: e holds those of the others, before the amplifier. Lanes that need two deviates draw
- * charge first, then read noise. Few chunks come here, so loops keep the program short. */
-INLINE chunk draw_bright(bst_kernel_frame_params p, chunk mean, chunk over, chunk normal,
-                         chunk_flags far_lanes, uint counter, chunk e, chunk_flags *brim) {
-    chunk_lines m = lines_of(mean), o = lines_of(over), z = lines_of(normal), out = lines_of(e);
-    int16 far[4] = {far_lanes.a, far_lanes.b, far_lanes.c, far_lanes.d}, two[4], any = (int16)0;
-    KEEP_LOOP
-    for (int v = 0; v < 4; v++) {
-        if (any16(far[v])) {
-            out.v[v] = select(out.v[v], draw_single(noise_law_of(p, m.v[v]), z.v[v]), far[v]);
-        }
-        two[v] = needs_two(p, m.v[v]) | (m.v[v] + o.v[v] > p.near_full_e);
-        out.v[v] = respond(p, out.v[v] + o.v[v]);
-        any |= two[v];
-    }
-    if (any16(any)) {
-        chunk_words words = chunk_random(p, counter, STREAM_POISSON);
-        chunk_lines n = lines_of(chunk_normal(chunk_random(p, counter, STREAM_POISSON_NORMAL)));
-        uint16 w[4] = {words.a, words.b, words.c, words.d};
-        int16 full[4];
-        KEEP_LOOP
-        for (int v = 0; v < 4; v++) {
-            float16 charge = draw_charge(m.v[v], w[v], n.v[v], two[v]) + o.v[v];
-            full[v] = two[v] & (charge >= p.full_well_e);
-            out.v[v] = select(out.v[v], read_out(p, fmin(charge, p.full_well_e), z.v[v]), two[v]);
-        }
-        brim->a = full[0];
-        brim->b = full[1];
-        brim->c = full[2];
-        brim->d = full[3];
-    }
-    chunk drawn = {out.v[0], out.v[1], out.v[2], out.v[3]};
-    return drawn;
-}
-
 /* Digital numbers plus one half of one chunk, before clipping to the converter's range. counter: of
  * its first lane. row, column: of its first pixel on the sensor. light: electrons of the sources,
  * present if `lit`. brim: lanes with a full well. */
@@ -116,7 +134,7 @@ INLINE chunk detect_chunk(bst_kernel_frame_params p, detector_maps maps, dark_la
                           const uint *steps, const tail_block *tail, uint counter, int row,
                           int column, chunk light, int lit, chunk_flags *brim) {
     chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
-    brim->a = brim->b = brim->c = brim->d = (int16)0;
+    brim->a = brim->b = brim->c = brim->d = (lanes_int)0;
     size_t map = (size_t)row * p.maps_stride + column;
     int struck = HAS(p, BST_EFFECT_OVERLAY) && maps.overlay[overlay_mark(p, map)] != 0.0f;
     if (!lit && !struck && dark.single) {
@@ -127,14 +145,14 @@ INLINE chunk detect_chunk(bst_kernel_frame_params p, detector_maps maps, dark_la
         e = respond_chunk(p, e);
     } else if (!lit && !struck && dark.steps > 0) {
         e = respond_chunk(p, dark_electrons(dark, steps, chunk_random(p, counter, STREAM_POISSON)));
-        e.a = fma((float16)p.read_noise_e, z.a, e.a);
-        e.b = fma((float16)p.read_noise_e, z.b, e.b);
-        e.c = fma((float16)p.read_noise_e, z.c, e.c);
-        e.d = fma((float16)p.read_noise_e, z.d, e.d);
+        e.a = fma((lanes)p.read_noise_e, z.a, e.a);
+        e.b = fma((lanes)p.read_noise_e, z.b, e.b);
+        e.c = fma((lanes)p.read_noise_e, z.c, e.c);
+        e.d = fma((lanes)p.read_noise_e, z.d, e.d);
     } else {
         chunk m = add_dark(p, maps, map, expected_chunk(p, maps, map, light));
         /* lane by lane, so that no pixel depends on its neighbours, which a window may not have */
-        chunk_flags far = {(int16)-1, (int16)-1, (int16)-1, (int16)-1};
+        chunk_flags far = {(lanes_int)-1, (lanes_int)-1, (lanes_int)-1, (lanes_int)-1};
         e = m;
         if (near.serves) {
             chunk x;
@@ -151,8 +169,8 @@ INLINE chunk detect_chunk(bst_kernel_frame_params p, detector_maps maps, dark_la
             far.c = fabs(x.c) > 1.0f;
             far.d = fabs(x.d) > 1.0f;
         }
-        if (struck || any16((far.a | far.b) | (far.c | far.d))) {
-            chunk over = {(float16)0.0f, (float16)0.0f, (float16)0.0f, (float16)0.0f};
+        if (struck || any_of((far.a | far.b) | (far.c | far.d))) {
+            chunk over = {(lanes)0.0f, (lanes)0.0f, (lanes)0.0f, (lanes)0.0f};
             if (struck) {
                 over = load_chunk(maps.overlay + map);
             }
@@ -163,3 +181,4 @@ INLINE chunk detect_chunk(bst_kernel_frame_params p, detector_maps maps, dark_la
     }
     return convert_chunk(p, maps, row, column, ADD_TAIL(tail, row, e));
 }
+#endif

@@ -9,6 +9,14 @@
 /* Most generator calls of a block, a power of two. */
 #define TAIL_CALLS 64u
 
+#ifdef TAIL
+/* Distances between successive reads in the tail. */
+INLINE lanes_int tail_gaps(bst_kernel_frame_params p, lanes_uint words) {
+    return 1 + to_lanes_int(fmin(log_radius2(words) * p.tail_gap, (float)TAIL_READS));
+}
+#endif
+
+#ifndef ONE_LANE
 typedef struct tail_block {
     float excess[TAIL_ROWS][64]; /* electrons */
     uint rows;                   /* bit per row: not all zero */
@@ -24,11 +32,6 @@ INLINE int16 sum_up(int16 v) {
     return v;
 }
 
-/* Distances between successive reads in the tail. */
-INLINE int16 tail_gaps(bst_kernel_frame_params p, uint16 words) {
-    return 1 + convert_int16(fmin(log_radius2(words) * p.tail_gap, (float)TAIL_READS));
-}
-
 /* Draws the block that contains a read; width: of the read-out. */
 static void draw_tail(bst_kernel_frame_params p, int row, int column, int width, tail_block *tail) {
     uint block = (uint)(row / TAIL_ROWS) * ((uint)(width + 63) / 64u) + (uint)column / 64u;
@@ -42,7 +45,7 @@ static void draw_tail(bst_kernel_frame_params p, int row, int column, int width,
     for (uint call = 0u; last < TAIL_READS; call++) {
         chunk_words w = chunk_random(p, (block * TAIL_CALLS + call) * 16u, STREAM_TAIL);
         float16 za, zb;
-        normal16(w.c, w.d, &za, &zb);
+        normal_lanes(w.c, w.d, &za, &zb);
         int16 at = last + sum_up(tail_gaps(p, w.a));
         int read[32] __attribute__((aligned(64)));
         float z[32] __attribute__((aligned(64)));
@@ -76,4 +79,5 @@ INLINE chunk add_tail(const tail_block *tail, int row, chunk e) {
 #else
 #define DRAW_TAIL(p, row, column, width, tail)
 #define ADD_TAIL(tail, row, e) (e)
+#endif
 #endif

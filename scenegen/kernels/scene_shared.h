@@ -6,8 +6,13 @@
 /* Forces inlining: outside the kernel compilers use short vectors. */
 #define INLINE static inline __attribute__((always_inline))
 /* Before a loop over the vectors of a chunk in rarely used code, which unrolled would take most of
- * the program's compile time. */
+ * the program's compile time. A lane's pixels are few, and an array of them that a loop runs over
+ * would go through memory. */
+#ifdef ONE_LANE
+#define KEEP_LOOP _Pragma("unroll")
+#else
 #define KEEP_LOOP _Pragma("unroll 1")
+#endif
 #endif
 
 /* Nodes per block: one vector register. */
@@ -21,6 +26,10 @@
  * (profile_law.h). */
 #define BST_LAW_FIRST 6
 #define BST_LAW_SECOND 4
+/* Blocks whose boxes a work-group of kernels/block_boxes.cl makes, and its work-items. */
+#define BST_BOX_GROUP (BST_BLOCK * BST_BLOCK)
+/* Work-items of a work-group that renders a tile of 64 columns together, for each of its rows. */
+#define BST_ROW_LANES 16
 /* Cosmic-ray pixels placed by a work-group. */
 #define BST_HIT_GROUP 64
 /* Work-items of a work-group of the staged read-out. */
@@ -91,6 +100,7 @@ typedef struct bst_kernel_frame_params {
     int tiles_x, tiles_y;
     int first_row, first_tile; /* within the frame, if the window is one of its bands */
     int source_groups;         /* sources / BST_BLOCK, rounded up */
+    int sources, blocks;       /* rendered sources and blocks of their nodes */
     unsigned key0, key1, exposure_low, exposure_high;
     float background_e; /* expected per pixel: sky and dark current */
     float dark_e;       /* dark current part of background_e */
@@ -127,6 +137,7 @@ typedef struct bst_kernel_source_record {
     int blocks;
     int first_box; /* of the blocks' boxes, in groups of BST_BLOCK */
     int radius;    /* stamp radius beyond the two nearest pixels of a node */
+    int first;     /* of its blocks, among those of all sources */
 } bst_kernel_source_record;
 
 #endif

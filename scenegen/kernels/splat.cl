@@ -1,7 +1,7 @@
 /* Light of one tile from stamps: generates the nodes of the sources that touch the tile (nodes.cl)
  * and sums their pixel-integrated profiles. Options: TILE_W, TILE_H (pixels), TAPS (of the longest
- * profile, a multiple of 16), DEGREE (of the profile law; without it the law is not used). `law` is
- * the buffer of scenegen/stamp/profile_law.h.
+ * profile, a multiple of 16), DEGREE (profiles.cl). `law` is the buffer of
+ * scenegen/stamp/profile_law.h.
  *
  * Every pixel receives its nodes in the order of sources, blocks and nodes, whatever the tile. The
  * float sum is therefore the same for every window and work-group size. */
@@ -32,26 +32,6 @@ typedef struct splat_nodes {
     int taps; /* number of taps that may be non-zero */
 } __attribute__((aligned(64))) splat_nodes;
 
-/* erf(u) to 2.3e-7: a minimax polynomial in u^2 inside +-3.6, and 1 beyond, with an error of 4e-7. */
-INLINE float16 error_function(float16 u) {
-    u = clamp(u, -3.6f, 3.6f);
-    float16 z = fma(u * u, (float16)(2.0f / (3.6f * 3.6f)), (float16)-1.0f);
-    float16 p = fma((float16)-0.000965762343f, z, (float16)0.00263147576f);
-    p = fma(p, z, (float16)-0.00284357269f);
-    p = fma(p, z, (float16)0.00457201151f);
-    p = fma(p, z, (float16)-0.0116267578f);
-    p = fma(p, z, (float16)0.0212467886f);
-    p = fma(p, z, (float16)-0.0325502623f);
-    p = fma(p, z, (float16)0.0482928275f);
-    p = fma(p, z, (float16)-0.0680295662f);
-    p = fma(p, z, (float16)0.0898119023f);
-    p = fma(p, z, (float16)-0.113793967f);
-    p = fma(p, z, (float16)0.143810923f);
-    p = fma(p, z, (float16)-0.195490509f);
-    p = fma(p, z, (float16)0.392712124f);
-    return p * u;
-}
-
 INLINE float16 zip_low(float16 a, float16 b) {
     return (float16)(a.s0, b.s0, a.s1, b.s1, a.s2, b.s2, a.s3, b.s3, a.s4, b.s4, a.s5, b.s5, a.s6,
                      b.s6, a.s7, b.s7);
@@ -63,19 +43,6 @@ INLINE float16 zip_high(float16 a, float16 b) {
 }
 
 #ifdef DEGREE
-#define LAW_FLOATS (DEGREE + 1 + BST_LAW_FIRST + BST_LAW_SECOND)
-
-/* Sum of the even (first 0) or odd (first 1) powers in c[count], without the odd powers' last
- * factor. */
-INLINE float16 powers(global const float *c, int count, int first, float16 g2) {
-    float16 v = (float16)c[count - 2 + first];
-#pragma unroll
-    for (int q = count - 4; q >= 0; q -= 2) {
-        v = fma(v, g2, (float16)c[q + first]);
-    }
-    return v;
-}
-
 /* Taps by the profile law, for nodes as wide as the PSF or slightly wider (`wide`, by `more` PSF
  * variances). Taps at d and 1 - d pixels from the node's own are mirror images. */
 INLINE void taps_by_law(float16 within, float16 more, int wide, float16 height, int radius,
@@ -150,8 +117,8 @@ INLINE void store_octet(const float16 *t, float *row) {
 INLINE void make_profiles(float16 within, float16 more, float16 height, int radius, int octets,
                           global const float *law, float16 *taps) {
 #ifdef DEGREE
-    if (!any16(more > law[1])) {
-        taps_by_law(within, more, any16(more > 0.0f), height, radius, law + BST_LAW_HEAD, taps);
+    if (!any_of(more > law[1])) {
+        taps_by_law(within, more, any_of(more > 0.0f), height, radius, law + BST_LAW_HEAD, taps);
     } else
 #endif
     {

@@ -1,11 +1,38 @@
 /* Digital numbers of a chunk, stored in the frame. */
 
+INLINE lanes_ushort clip_dn(bst_kernel_frame_params p, lanes dn) {
+    return to_lanes_ushort(to_lanes_int(clamp(dn, 0.0f, p.max_dn)));
+}
+
+#ifdef ONE_LANE
+/* Stores a pixel's digital number (plus one half) in the window's row; returns 1 if it is saturated
+ * (`brim`, or converter at its maximum). Pixels outside the window are not stored. */
+INLINE int store_pixel(bst_kernel_frame_params p, detector_maps maps, float dn, int brim, int column,
+                       global ushort *row, global uchar *marks) {
+    if (column < 0 || column >= p.window_width) {
+        return 0;
+    }
+    int top = MASK(dn >= p.max_dn);
+    ushort value = clip_dn(p, dn);
+    row[column] = HAS(p, BST_EFFECT_CODES) ? maps.codes[value] : value;
+    if (HAS(p, BST_EFFECT_FLAGS)) {
+        marks[column] = (uchar)((brim & BST_FLAG_FULL_WELL) | (top & BST_FLAG_CONVERTER));
+    }
+    return -(brim | top);
+}
+
+/* Stores the lane's pixels of a chunk, the first at `column`; returns how many are saturated.
+ * marks: row of flags, if they are stored. */
+INLINE int store_lane(bst_kernel_frame_params p, detector_maps maps, chunk dn, chunk_flags brim,
+                      int column, global ushort *row, global uchar *marks) {
+    return store_pixel(p, maps, dn.a, brim.a, column, row, marks) +
+           store_pixel(p, maps, dn.b, brim.b, column + 16, row, marks) +
+           store_pixel(p, maps, dn.c, brim.c, column + 32, row, marks) +
+           store_pixel(p, maps, dn.d, brim.d, column + 48, row, marks);
+}
+#else
 /* 16 digital numbers at an odd address: vstore16 may become 16 stores. */
 typedef ushort16 __attribute__((aligned(2))) ushort16_anywhere;
-
-INLINE ushort16 clip_dn(bst_kernel_frame_params p, float16 dn) {
-    return convert_ushort16(convert_int16(clamp(dn, 0.0f, p.max_dn)));
-}
 
 /* Stores 16 pixels as store_dn does, each alone. */
 INLINE int16 store_pixels(bst_kernel_frame_params p, detector_maps maps, float16 dn, int16 brim,
@@ -31,7 +58,7 @@ INLINE int16 store_pixels(bst_kernel_frame_params p, detector_maps maps, float16
 }
 
 /* Stores the digital numbers (plus one half) of a chunk in the window's row at `column`. Returns
- * saturated pixels (`brim`, or converter at its maximum) as -1, added up by lanes; pixels outside
+ * saturated pixels (`brim`, or converter at its maximum) as -1, added up by float16; pixels outside
  * the window are 0. marks: row of flags, if they are stored. */
 INLINE int16 store_dn(bst_kernel_frame_params p, detector_maps maps, chunk dn, chunk_flags brim,
                       int column, global ushort *row, global uchar *marks) {
@@ -60,3 +87,4 @@ INLINE int16 store_dn(bst_kernel_frame_params p, detector_maps maps, chunk dn, c
     }
     return full;
 }
+#endif

@@ -1,5 +1,6 @@
 /* Light of one tile of a frame: of the sources, with vignetting, and the background. One work-item
- * per tile. Options: TILE_W, TILE_H, GROUP (work-items per work-group), FOURIER (the light is an
+ * per tile, or a work-group (lane_tile.cl). Options: TILE_W, TILE_H, GROUP (work-items per
+ * work-group; not with ONE_LANE), FOURIER (the light is an
  * image, otherwise it comes from nodes; `light` is the image or the profile law). */
 
 /* Position of a tile: its first pixel on the full sensor and in the window, and its size. Tiles
@@ -19,6 +20,7 @@ static tile_place place_tile(bst_kernel_frame_params p, int tile) {
     return t;
 }
 
+#ifndef ONE_LANE
 /* sum: [TILE_H + BST_SPARE_ROWS][STRIDE]. */
 INLINE void light_tile(local float *sum, bst_kernel_frame_params p, tile_place t,
                        global const bst_kernel_source_record *sources, global const float16 *table,
@@ -33,3 +35,4 @@ INLINE void light_tile(local float *sum, bst_kernel_frame_params p, tile_place t
     shade_tile(sum, p.vignetting, t.x, t.y);
     add_background(sum, p, t.x, t.y, t.rows, t.columns, background);
 }
+#endif

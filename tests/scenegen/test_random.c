@@ -12,16 +12,16 @@ static const bst_device_kernel_source text = {
     "kernel void words(bst_kernel_frame_params p, uint first, uint stream, global uint16 *out) {\n"
     "    uint i = (uint)get_global_id(0);\n"
     "    uint16 w[4];\n"
-    "    philox16(p, first + 16u * i, stream, w, w + 1, w + 2, w + 3);\n"
+    "    philox_lanes(p, first + 16u * i, stream, w, w + 1, w + 2, w + 3);\n"
     "    for (int k = 0; k < 4; k++) out[4 * i + k] = w[k];\n"
     "}\n",
     0, 0};
 
 static void draw(fixture *f, const uint32_t counter[4], const uint32_t key[2], uint32_t *words) {
-    const bst_device_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_random,
-                                                 &text};
+    const bst_device_kernel_source *sources[] = {&bst_kernel_scene_shared, &bst_kernel_lanes,
+                                                 &bst_kernel_random, &text};
     cl_program program;
-    bst_assert_ok(&f->ctx, bst_device_build(&f->ctx, f->device, sources, 3, "", &program));
+    bst_assert_ok(&f->ctx, bst_device_build(&f->ctx, f->device, sources, 4, "", &program));
     cl_int code;
     cl_kernel kernel = clCreateKernel(program, "words", &code);
     bst_assert_ok(&f->ctx, bst_device_check(&f->ctx, code, "kernel"));
