@@ -44,6 +44,7 @@ struct bst_renderer {
     bst_psf *psf;
     bst_fourier_render *fourier; /* NULL: Gaussian PSF, light from stamps */
     bst_smear *smear;
+    bst_parallel *planners; /* for the planning, if the device leaves the processor idle */
     bst_error_budget *budget;
     bst_detector *detector;
     bst_readout *readout;
@@ -198,6 +199,11 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     if (status == BST_OK) {
         status = build(ctx, r);
     }
+    int threads = r->options.planning_threads;
+    if (status == BST_OK && (threads > 1 || (threads == 0 && !bst_device_is_cpu(device)))) {
+        status = bst_parallel_create(ctx, threads, &r->planners);
+        smear.pool = r->planners;
+    }
     if (status == BST_OK) {
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
     }
@@ -246,6 +252,7 @@ void bst_renderer_free(bst_renderer *r) {
     bst_upload_ring_free(r->stage);
     bst_frame_pool_free(r->pool);
     bst_smear_free(r->smear);
+    bst_parallel_free(r->planners);
     bst_error_budget_free(r->budget);
     bst_fourier_render_free(r->fourier);
     bst_psf_free(r->psf);

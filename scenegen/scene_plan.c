@@ -131,14 +131,19 @@ static int blocks_of(int64_t nodes, int sources, int most_blocks) {
     return (int)(blocks < most_blocks ? blocks : most_blocks);
 }
 
+/* Share of the tolerance at which the planning starts. In crowded frames errors of neighbouring
+ * stars add up; starting at about half the tolerance avoids a second planning. */
+static double first_aim(const bst_render_request *q) {
+    enum { CROWD = 500 };
+    static const double CROWD_AIM = 0.45;
+    return q->count > CROWD ? CROWD_AIM : 1.0;
+}
+
 /* Repeats the planning until the predicted error is within the tolerance: with a smaller share of
  * it each time, or, if there are too many nodes, a larger one. */
 static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m, double tolerance,
                                     int most_blocks) {
-    enum { ROUNDS = 8, CROWD = 500, TOO_MANY = 20000 };
-    /* In crowded frames errors of neighbouring stars add up; starting at about half the tolerance
-     * avoids a second planning. */
-    static const double CROWD_AIM = 0.45;
+    enum { ROUNDS = 8, TOO_MANY = 20000 };
     /* LESS: factor below the predicted share. GAIN: improvement that a round must bring, because
      * levels of detail go by factors of two. GRID_SHARE: share of the tolerance above which a finer
      * grid pays. */
@@ -146,7 +151,7 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
                         GRID_SHARE = 0.25, COARSER = 16.0, COARSEST = 1e9;
     p->bounded = false;
     m->blocks = blocks_of(m->max_nodes, m->request->count, most_blocks);
-    double aim = m->request->count > CROWD ? CROWD_AIM : 1.0, before = INFINITY;
+    double aim = first_aim(m->request), before = INFINITY;
     bool fits, coarse = false;
     bst_smear_restart(m->smear, aim);
     BST_TRY(plan_sources(ctx, p, m, &fits));
@@ -215,7 +220,9 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
                              .binning = binning,
                              .sources = q->count,
                              .dark_variance_e2 = dark_e2,
-                             .brightest_e_per_s = brightest};
+                             .brightest_e_per_s = brightest,
+                             .list = q->sources,
+                             .aim = first_aim(q)};
     BST_TRY(bst_smear_begin(ctx, smear, &frame));
     planning m = {.smear = smear,
                   .budget = budget,

@@ -137,11 +137,11 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
     return BST_OK;
 }
 
-static void place_cell(bst_motion_map *map, double x, double y) {
+static void place_cell(const bst_motion_map *map, place *places, double x, double y) {
     for (int n = 0; n < map->count; n++) {
         const double *m = map->turns[n].m;
         double depth = m[6] * x + m[7] * y + m[8], scale = 1.0 / depth;
-        place *p = &map->places[n];
+        place *p = &places[n];
         p->front = depth > 1e-3;
         p->x = ((m[0] + m[8]) * x + m[1] * y + m[2]) * scale;
         p->y = (m[3] * x + (m[4] + m[8]) * y + m[5]) * scale;
@@ -155,7 +155,8 @@ double bst_motion_pixel_share(double sigma_px, int binning, double *spread_px) {
 }
 
 /* Upper bound of a star's light share in one pixel, over the cell. */
-static double cell_share(const bst_motion_map *map, int binning, double radius_px) {
+static double cell_share(const bst_motion_map *map, const place *places, int binning,
+                         double radius_px) {
     double spread, line = bst_motion_pixel_share(map->f.sigma_px, binning, &spread);
     double per = 1.0 / (spread * sqrt(2.0)), best = 0.0;
     /* nodes further apart share no pixel */
@@ -164,10 +165,10 @@ static double cell_share(const bst_motion_map *map, int binning, double radius_p
     double reach2 = reach * reach;
     int stride = map->count / ANCHORS + 1;
     for (int a = 0; a < map->count; a += stride) {
-        const place *at = &map->places[a];
+        const place *at = &places[a];
         double sum = 0.0;
         for (int n = 0; n < map->count && at->front; n++) {
-            const place *p = &map->places[n];
+            const place *p = &places[n];
             double dx = p->x - at->x, dy = p->y - at->y, d2 = dx * dx + dy * dy;
             if (d2 > reach2 || !p->front) {
                 continue;
@@ -183,12 +184,12 @@ static double cell_share(const bst_motion_map *map, int binning, double radius_p
 }
 
 /* Largest motion of a star in the cell relative to the path's, from node to node. */
-static double cell_scale(const bst_motion_map *map, double radius_px) {
+static double cell_scale(const bst_motion_map *map, const place *places, double radius_px) {
     double worst = 0.0, far = map->f.sensor_px + radius_px;
     double least = LEAST_STEP * map->f.sigma_px, near2 = (1.0 - SAFELY) * far * far;
     bool any = false;
     for (int n = 0; n + 1 < map->count; n++) {
-        const place *p = &map->places[n], *q = p + 1;
+        const place *p = &places[n], *q = p + 1;
         const turn *a = &map->turns[n];
         if (!p->front || !q->front || a->step_px < least) {
             continue;
@@ -208,17 +209,18 @@ static double cell_scale(const bst_motion_map *map, double radius_px) {
     return any ? worst : 1.0;
 }
 
-static void fill_cell(bst_motion_map *map, bst_smear_star_motion_cell *cell, double x, double y) {
+static void fill_cell(const bst_motion_map *map, place *places, bst_smear_star_motion_cell *cell,
+                      double x, double y) {
     double radius = map->cell_px * sqrt(0.5);
-    place_cell(map, x, y);
-    cell->share = cell->read_share = cell_share(map, 1, radius);
+    place_cell(map, places, x, y);
+    cell->share = cell->read_share = cell_share(map, places, 1, radius);
     if (map->f.binning > 1) {
-        cell->read_share = cell_share(map, map->f.binning, radius);
+        cell->read_share = cell_share(map, places, map->f.binning, radius);
     }
-    cell->scale = cell_scale(map, radius);
+    cell->scale = cell_scale(map, places, radius);
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     for (int n = 0; n < map->count; n++) {
-        const place *p = &map->places[n];
+        const place *p = &places[n];
         double other = radius * map->turns[n].other_still;
         double way[2] = {p->front ? p->x - x : 0.0, p->front ? p->y - y : 0.0};
         for (int i = 0; i < 2; i++) {
@@ -233,15 +235,66 @@ static void fill_cell(bst_motion_map *map, bst_smear_star_motion_cell *cell, dou
     }
 }
 
-bst_smear_star_motion_cell *bst_motion_map_at(bst_motion_map *map, double x, double y) {
+/* Number of the cell of a position. */
+static int cell_at(const bst_motion_map *map, double x, double y) {
     double per = 1.0 / map->cell_px, most = map->side - 1.0;
     double i = fmin(fmax(floor((x + map->f.reach_px) * per), 0.0), most);
     double j = fmin(fmax(floor((y + map->f.reach_px) * per), 0.0), most);
-    int n = (int)j * map->side + (int)i;
+    return (int)j * map->side + (int)i;
+}
+
+static void fill_number(bst_motion_map *map, place *places, int n) {
+    double x = (n % map->side + 0.5) * map->cell_px - map->f.reach_px;
+    double y = (n / map->side + 0.5) * map->cell_px - map->f.reach_px;
+    fill_cell(map, places, &map->cells[n], x, y);
+}
+
+bst_smear_star_motion_cell *bst_motion_map_at(bst_motion_map *map, double x, double y) {
+    int n = cell_at(map, x, y);
     if (map->filled[n] != map->frame) {
         map->filled[n] = map->frame;
-        fill_cell(map, &map->cells[n], (i + 0.5) * map->cell_px - map->f.reach_px,
-                  (j + 0.5) * map->cell_px - map->f.reach_px);
+        fill_number(map, map->places, n);
     }
     return &map->cells[n];
+}
+
+/* Cells that threads fill. */
+typedef struct cells_to_fill {
+    bst_motion_map *map;
+    int *cells; /* -1: filled when it is asked for */
+} cells_to_fill;
+
+/* Fills some of the cells (callback). */
+static void fill_some(void *user, int begin, int end) {
+    const cells_to_fill *all = user;
+    place *places = malloc((size_t)all->map->count * sizeof *places);
+    for (int k = begin; k < end; k++) {
+        if (places) {
+            fill_number(all->map, places, all->cells[k]);
+        } else {
+            all->cells[k] = -1;
+        }
+    }
+    free(places);
+}
+
+void bst_motion_map_fill(bst_motion_map *map, bst_parallel *pool, const double *xy, int count) {
+    enum { AT_ONCE = 4 };
+    int found = 0, *cells = malloc(MANY_CELLS * MANY_CELLS * sizeof *cells);
+    for (int i = 0; i < count && cells; i++) {
+        int n = isnan(xy[2 * i]) ? -1 : cell_at(map, xy[2 * i], xy[2 * i + 1]);
+        if (n >= 0 && map->filled[n] != map->frame) {
+            map->filled[n] = map->frame;
+            cells[found++] = n;
+        }
+    }
+    cells_to_fill all = {map, cells};
+    bst_parallel_for(pool, found, AT_ONCE, fill_some, &all);
+    for (int k = 0; k < found; k++) {
+        if (cells[k] < 0) { /* no memory for a thread's work space: none of these is marked */
+            map->frame++;
+            break;
+        }
+    }
+    free(cells);
 }

@@ -6,6 +6,7 @@
 #define BST_SCENEGEN_SMEAR_MOTION_MAP_H
 
 #include "scenegen/smear/smear_quadrature.h"
+#include "sim/core/parallel.h"
 
 typedef struct bst_motion_map bst_motion_map;
 
@@ -57,5 +58,9 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
 /* Cell of a star at (x, y) px from the boresight, undistorted, at the reference attitude. Valid
  * until the next frame. */
 bst_smear_star_motion_cell *bst_motion_map_at(bst_motion_map *map, double x, double y);
+
+/* Computes the cells of the stars at xy[2 count], (x, y) as in bst_motion_map_at, on several
+ * threads, for later calls of that function. x NAN: no star. */
+void bst_motion_map_fill(bst_motion_map *map, bst_parallel *pool, const double *xy, int count);
 
 #endif

@@ -21,7 +21,7 @@
 _Static_assert((int)BST_SMEAR_LEVELS <= (int)BST_MOTION_ERRORS,
                "a cell keeps an error of each level");
 
-enum { TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK, MAX_TAPS = BST_PLACE_TAPS };
+enum { MAX_TAPS = BST_PLACE_TAPS };
 
 bst_status bst_smear_create(bst_ctx *ctx, const bst_camera *camera,
                             const bst_smear_options *options, bst_smear **out) {
@@ -78,6 +78,7 @@ void bst_smear_free(bst_smear *s) {
         free(s->nodes.items);
         free(s->points.items);
         free(s->table);
+        bst_smear_free_ahead(s);
         bst_motion_map_free(s->map);
         free(s);
     }
@@ -138,83 +139,6 @@ static bst_smear_path_point attitude_point(const bst_smear *s, bst_quat q, doubl
     return (bst_smear_path_point){{r.x * scale, r.y * scale, r.z * s->half_diagonal_px}, time};
 }
 
-/* Image error of the nodes' profiles, relative to the peak. */
-static double profile_error(const bst_smear *s, const bst_smear_node_list *list) {
-    double psf = s->sigma_px * s->stretch, widest = 0.0, table = 0.0;
-    for (int n = 0; n < list->count; n++) {
-        double w = list->items[n].variance / (psf * psf), wide = 1.0 + w;
-        widest = fmax(widest, w);
-        table = fmax(table, 0.75 * w / (wide * wide));
-    }
-    if (s->options.node_sigma_px > 0.0) {
-        /* by table widths, and by kernel phases: linear interpolation widens by up to a quarter of
-         * a step squared, half of that per axis */
-        double step = 1.0 / (BST_SPREAD_PHASES * s->options.grid_per_px * s->sigma_px);
-        return table / (BST_WIDTHS * BST_WIDTHS) + 0.25 * step * step;
-    }
-    if (widest > s->options.law_widest) {
-        return fmax(s->edge_error, s->point_error);
-    }
-    return widest > 0.0 ? fmax(2.0 * BST_LAW_ERROR, s->point_error) : s->point_error;
-}
-
-/* Appends nodes to the table in whole blocks; to_table fills one column of BST_TABLE_ROWS. */
-static bst_status append_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_node_list *list,
-                               void (*to_table)(const bst_smear *, const bst_smear_node *, float *),
-                               bst_smear_level *out) {
-    int blocks = (list->count + BST_BLOCK - 1) / BST_BLOCK;
-    BST_TRY(bst_smear_reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
-                              TABLE_FLOATS * sizeof(float)));
-    *out = (bst_smear_level){
-        .first_block = s->table_blocks, .blocks = blocks, .profile_error = profile_error(s, list)};
-    double part = bst_smear_nodes_error_part(list->items, list->count, s->sigma_px);
-    for (int k = 0; k < BST_NODE_SCALES; k++) {
-        out->error[k] = part * list->error[k];
-    }
-    s->table_blocks += blocks;
-    for (int n = 0; n < blocks * BST_BLOCK; n++) {
-        float *block = s->table + (size_t)(out->first_block + n / BST_BLOCK) * TABLE_FLOATS;
-        /* the last block is padded with zero-weight copies of the last node */
-        to_table(s, &list->items[n < list->count ? n : list->count - 1], block + n % BST_BLOCK);
-        if (n >= list->count) {
-            block[9 * BST_BLOCK + n % BST_BLOCK] = 0.0f;
-        }
-    }
-    return BST_OK;
-}
-
-/* Widening of a node in PSF variances, before distortion stretches it. */
-static double widening(const bst_smear *s, const bst_smear_node *node) {
-    double psf = s->sigma_px * s->stretch;
-    return node->variance / (psf * psf);
-}
-
-/* Table entry of a camera rotation: v_node = M v_reference as a map of the undistorted tangent
- * plane, px, focal-plane axes, x' - x = ((m00 - m22) x + m01 y + m02 / a - x d) / (d + m22), d = a
- * (m20 x + m21 y). */
-static void attitude_to_table(const bst_smear *s, const bst_smear_node *node, float *t) {
-    double a = bst_camera_scale_rad(&s->camera), tilt = a / (s->stretch * s->wide_field);
-    bst_quat q = bst_quat_from_rotvec(
-        (bst_vec3){node->p[0] * tilt, node->p[1] * tilt, node->p[2] / s->half_diagonal_px});
-    bst_mat3 m = bst_quat_to_mat3(q);
-    double rows[BST_TABLE_ROWS] = {
-        m.m[0][0] - m.m[2][2], m.m[0][1],     m.m[0][2] / a, m.m[1][0], m.m[1][1] - m.m[2][2],
-        m.m[1][2] / a,         m.m[2][0] * a, m.m[2][1] * a, m.m[2][2], node->weight,
-        widening(s, node)};
-    for (int i = 0; i < BST_TABLE_ROWS; i++) {
-        t[i * BST_BLOCK] = (float)rows[i];
-    }
-}
-
-/* Table entry of a source's own path: a shift of the image. */
-static void shift_to_table(const bst_smear *s, const bst_smear_node *node, float *t) {
-    double x = node->p[0] / s->stretch, y = node->p[1] / s->stretch;
-    double rows[BST_TABLE_ROWS] = {0, 0, x, 0, 0, y, 0, 0, 1.0, node->weight, widening(s, node)};
-    for (int i = 0; i < BST_TABLE_ROWS; i++) {
-        t[i * BST_BLOCK] = (float)rows[i];
-    }
-}
-
 double bst_smear_largest_share(bst_smear *s, double *read_share) {
     double least = bst_camera_shrink(&s->camera) / s->stretch;
     for (int n = 0; n < s->nodes.count && least < 1.0; n++) {
@@ -241,32 +165,6 @@ void bst_smear_nodes_box(const bst_smear *s, double low[2], double high[2]) {
             high[i] = fmax(high[i], s->nodes.items[n].p[i] / s->stretch);
         }
     }
-}
-
-bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_path_point *path,
-                                int count, double part, bool turns, double tolerance) {
-    double parts = ceil(part * s->options.temporal_oversample - 1e-9);
-    if (parts > 0.0) {
-        return bst_motion_midpoints(ctx, path, count, (int)parts, &s->nodes);
-    }
-    bst_smear_node_aim aim = {.psf_sigma_px = s->sigma_px,
-                              .tolerance = tolerance,
-                              .widest = s->widest,
-                              .wide_field = turns ? s->wide_field : 1.0,
-                              .curvature = turns ? s->curvature : 0.0};
-    memcpy(aim.pixel_part, s->pixel_part, sizeof aim.pixel_part);
-    return bst_smear_nodes_from_path(ctx, path, count, &aim, &s->nodes);
-}
-
-static bst_status make_level(bst_ctx *ctx, bst_smear *s, int n) {
-    if (s->levels[n].blocks == 0) {
-        bst_smear_nodes_clear(&s->nodes);
-        BST_TRY(
-            bst_smear_path_nodes(ctx, s, s->path, s->path_count, 1.0, !s->single, s->tolerance[n]));
-        BST_TRY(append_nodes(ctx, s, &s->nodes, s->single ? shift_to_table : attitude_to_table,
-                             &s->levels[n]));
-    }
-    return BST_OK;
 }
 
 /* Chooses a shared track for the stars if requested, or accurate enough for the brightest. */
@@ -319,14 +217,14 @@ static bool stays_beside(const bst_smear *s, double x, double y) {
     return x < -far || y < -far || x > s->window.width + far || y > s->window.height + far;
 }
 
-/* Starts the motion map with the nodes of the coarsest level, which were computed last. */
-static bst_status begin_map(bst_ctx *ctx, bst_smear *s) {
+/* Starts the motion map with the nodes of the coarsest level. */
+static bst_status begin_map(bst_ctx *ctx, bst_smear *s, const bst_smear_node_list *first) {
     double tilt = s->tilt_rad / bst_camera_scale_rad(&s->camera) * s->wide_field;
     double from = s->half_diagonal_px / s->stretch;
     bst_motion_map_frame frame = {
-        .nodes = s->nodes.items,
-        .count = s->nodes.count,
-        .table = s->table + (size_t)s->levels[0].first_block * TABLE_FLOATS,
+        .nodes = first->items,
+        .count = first->count,
+        .table = s->table + (size_t)s->levels[0].first_block * BST_TABLE_FLOATS,
         .scale_rad = bst_camera_scale_rad(&s->camera),
         .tilt_px = s->stretch * s->wide_field,
         .roll_px = s->half_diagonal_px,
@@ -338,6 +236,32 @@ static bst_status begin_map(bst_ctx *ctx, bst_smear *s) {
         .stretch = s->stretch,
         .sigma_px = s->share_sigma_px};
     return bst_motion_map_begin(ctx, s->map, &frame);
+}
+
+/* Samples of the track whose path points a thread makes at a time. */
+enum { SAMPLES_AT_ONCE = 128 };
+
+/* Makes the path points from the track's samples begin to end (callback). */
+static void fill_path(void *user, int begin, int end) {
+    bst_smear *s = user;
+    const bst_los_track *track = &s->track;
+    double inverse = s->duration_s > 0.0 ? 1.0 / s->duration_s : 0.0;
+    int at = 0;
+    for (int k = 0; k < begin; k++) {
+        at += s->parts[k];
+    }
+    for (int k = begin; k < end; k++) {
+        int parts = s->parts[k];
+        for (int n = 0; n < parts + (k + 2 == track->count); n++, at++) {
+            double u = (double)n / parts;
+            const bst_quat *ends = &track->q_cam_from_gcrf[k];
+            bst_quat q = n == 0 ? bst_quat_unit(ends[0]) : bst_quat_slerp(ends[0], ends[1], u);
+            double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
+            assert(at < s->path_count);
+            s->turn[at] = q;
+            s->path[at] = attitude_point(s, q, t * inverse);
+        }
+    }
 }
 
 bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *frame) {
@@ -356,7 +280,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
         bst_smear_find_pixel_parts(s->sigma_px, s->binning, s->pixel_part);
     }
     s->sources = frame->sources;
-    s->aim = 1.0;
+    s->aim = frame->aim > 0.0 ? frame->aim : 1.0;
     s->duration_s = track->time_s[track->count - 1];
     s->q_reference = attitude_at(track, 0.5 * s->duration_s);
     s->table_blocks = s->path_count = 0;
@@ -364,27 +288,21 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
     for (int n = 0; n < BST_SMEAR_LEVELS; n++) {
         s->levels[n].blocks = 0;
     }
-    double inverse = s->duration_s > 0.0 ? 1.0 / s->duration_s : 0.0;
     BST_TRY(bst_smear_reserve(ctx, (void **)&s->parts, &s->parts_capacity, track->count,
                               sizeof *s->parts));
     for (int k = 0; k + 1 < track->count; k++) {
-        int parts = s->parts[k] = parts_of(s, k);
-        int points = s->path_count + parts + 1;
-        BST_TRY(
-            bst_smear_reserve(ctx, (void **)&s->path, &s->path_capacity, points, sizeof *s->path));
-        BST_TRY(
-            bst_smear_reserve(ctx, (void **)&s->turn, &s->turn_capacity, points, sizeof *s->turn));
-        for (int n = 0; n < parts + (k + 2 == track->count); n++) {
-            double u = (double)n / parts;
-            const bst_quat *ends = &track->q_cam_from_gcrf[k];
-            bst_quat q = n == 0 ? bst_quat_unit(ends[0]) : bst_quat_slerp(ends[0], ends[1], u);
-            double t = track->time_s[k] + u * (track->time_s[k + 1] - track->time_s[k]);
-            assert(s->path_count < s->path_capacity && s->path_count < s->turn_capacity);
-            s->turn[s->path_count] = q;
-            bst_smear_path_point *p = &s->path[s->path_count++];
-            *p = attitude_point(s, q, t * inverse);
-            s->travel_px = fmax(s->travel_px, fabs(p->p[0]) + fabs(p->p[1]) + fabs(p->p[2]));
-        }
+        s->parts[k] = parts_of(s, k);
+        s->path_count += s->parts[k];
+    }
+    s->path_count++;
+    BST_TRY(bst_smear_reserve(ctx, (void **)&s->path, &s->path_capacity, s->path_count,
+                              sizeof *s->path));
+    BST_TRY(bst_smear_reserve(ctx, (void **)&s->turn, &s->turn_capacity, s->path_count,
+                              sizeof *s->turn));
+    bst_parallel_for(s->options.pool, track->count - 1, SAMPLES_AT_ONCE, fill_path, s);
+    for (int k = 0; k < s->path_count; k++) {
+        const double *p = s->path[k].p;
+        s->travel_px = fmax(s->travel_px, fabs(p[0]) + fabs(p[1]) + fabs(p[2]));
     }
     measure_turn(s);
     choose_motion(s, frame->brightest_e_per_s);
@@ -392,9 +310,16 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
         s->path[k].p[0] *= s->wide_field;
         s->path[k].p[1] *= s->wide_field;
     }
-    BST_TRY(make_level(ctx, s, 0));
+    bst_smear_begin_ahead(s, frame);
+    BST_TRY(bst_smear_make_level(ctx, s, 0));
+    const bst_smear_node_list *first = s->ahead[0].ready ? &s->ahead[0].nodes : &s->nodes;
     if (!s->single) {
-        return begin_map(ctx, s);
+        BST_TRY(begin_map(ctx, s, first));
+        bst_smear_fill_map(s, frame);
+        return BST_OK;
+    }
+    if (first != &s->nodes) { /* the shares below change them */
+        BST_TRY(bst_smear_nodes_copy(ctx, first, &s->nodes));
     }
     bst_smear_nodes_box(s, s->low, s->high);
     s->star_share = bst_smear_largest_share(s, &s->read_share);
@@ -446,10 +371,10 @@ static bst_status star_level(bst_ctx *ctx, bst_smear *s, bst_smear_star_motion_c
                              const bst_smear_level **out, double *error) {
     double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
     int n = bst_smear_choose_level(s, cell ? cell->scale : 1.0);
-    BST_TRY(make_level(ctx, s, n));
+    BST_TRY(bst_smear_make_level(ctx, s, n));
     *error = star_error(s, n, cell);
     while (n + 1 < BST_SMEAR_LEVELS && s->options.temporal_oversample <= 0 && *error > allowed) {
-        BST_TRY(make_level(ctx, s, ++n));
+        BST_TRY(bst_smear_make_level(ctx, s, ++n));
         *error = star_error(s, n, cell);
     }
     *out = &s->levels[n];
@@ -480,22 +405,46 @@ bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, do
     return fabs(*x) < 1e6 && fabs(*y) < 1e6;
 }
 
-bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
-                            bst_kernel_source_record *out, bool *visible) {
-    double x, y, electrons = source->electrons_per_s * s->duration_s;
-    s->last_peak_e = s->last_read_e = s->chord_error = 0.0;
-    s->last_leaves = true;
+bool bst_smear_place_source(const bst_smear *s, const bst_scene_source *source,
+                            bst_smear_place *out) {
+    double electrons = source->electrons_per_s * s->duration_s, x, y;
     bool moving = source->path || source->rate || source->shape;
-    s->disc_px =
+    double disc_px =
         source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
     bool front = bst_smear_project(s, s->q_reference, source->apparent_mid, &x, &y);
     /* a star that only a wide rotation brings into the field: a float offset is inaccurate */
-    double wide = 4.0 * (s->far_px + s->disc_px);
+    double wide = 4.0 * (s->far_px + disc_px);
     moving = moving || !front || x * x + y * y > wide * wide;
-    *visible = !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
+    if (moving) { /* nodes are stored as small floats relative to a position on the sensor */
+        double far = s->far_px;
+        x = front ? fmin(fmax(x, -far), far) : 0.0;
+        y = front ? fmin(fmax(y, -far), far) : 0.0;
+    }
+    *out = (bst_smear_place){
+        .x = x, .y = y, .electrons = electrons, .disc_px = disc_px, .moving = moving};
+    return !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
+}
+
+/* Nodes of a moving source: those computed ahead, if there are any. */
+static bst_status moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
+                               double electrons, double x, double y) {
+    return bst_smear_take_ahead(s, source)
+               ? BST_OK
+               : bst_smear_moving_nodes(ctx, s, source, electrons, x, y);
+}
+
+bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
+                            bst_kernel_source_record *out, bool *visible) {
+    bst_smear_place at;
+    s->last_peak_e = s->last_read_e = s->chord_error = 0.0;
+    s->last_leaves = true;
+    *visible = bst_smear_place_source(s, source, &at);
+    s->disc_px = at.disc_px;
     if (!*visible) {
         return BST_OK;
     }
+    double x = at.x, y = at.y, electrons = at.electrons;
+    const bool moving = at.moving;
     bst_smear_star_motion_cell *cell = NULL;
     double low[2] = {s->low[0], s->low[1]}, high[2] = {s->high[0], s->high[1]};
     if (!moving) {
@@ -518,11 +467,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
     const bst_smear_level *used;
     double travel_px = s->travel_px, error;
     if (moving) {
-        /* nodes are stored as small floats relative to a position on the sensor */
-        double far = s->far_px;
-        x = front ? fmin(fmax(x, -far), far) : 0.0;
-        y = front ? fmin(fmax(y, -far), far) : 0.0;
-        BST_TRY(bst_smear_moving_nodes(ctx, s, source, electrons, x, y));
+        BST_TRY(moving_nodes(ctx, s, source, electrons, x, y));
         if (s->nodes.count == 0) {
             *visible = false;
             return BST_OK;
@@ -533,7 +478,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
             travel_px = fmax(travel_px, fabs(p[0]) + fabs(p[1]));
         }
         bst_smear_nodes_box(s, low, high);
-        BST_TRY(append_nodes(ctx, s, &s->nodes, shift_to_table, &own));
+        BST_TRY(bst_smear_append_nodes(ctx, s, true, &own));
         used = &own;
         error = bst_smear_level_error(used, 1.0);
     } else {

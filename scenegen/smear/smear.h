@@ -8,6 +8,7 @@
 #include "scenegen/fourier/fourier_grid.h"
 #include "scenegen/kernels/scene_shared.h"
 #include "scenegen/smear/error_budget.h"
+#include "sim/core/parallel.h"
 #include "sim/world/scene/field.h"
 
 typedef struct bst_smear bst_smear;
@@ -35,6 +36,7 @@ typedef struct bst_smear_options {
     double pixel_part[BST_PIXEL_PARTS]
                      [3]; /* of the PSF as in bst_smear_node_aim, by binning from 1 on */
     double widest;        /* largest node widening, PSF variances; 0: as much as nodes allow */
+    bst_parallel *pool;   /* threads that share the work; lent; NULL: the caller's alone */
 } bst_smear_options;
 
 /* Creates the smear of a camera.
@@ -57,6 +59,9 @@ typedef struct bst_smear_frame {
     int binning;      /* of the read-out pixels, 1 or more */
     double dark_variance_e2;  /* noise variance of a dark pixel: background, dark and read noise */
     double brightest_e_per_s; /* of the stars */
+    /* to share the work among threads; NULL: each source when it is asked for */
+    const bst_scene_source *list; /* [sources] */
+    double aim;                   /* of the first bst_smear_restart; 0: 1 */
 } bst_smear_frame;
 
 /* Begins an exposure: attitude track, window and sources.

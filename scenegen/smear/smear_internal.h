@@ -1,4 +1,4 @@
-/* Declarations shared by smear.c and smear_moving.c. */
+/* Declarations shared by the files of the smear. */
 #ifndef BST_SCENEGEN_SMEAR_SMEAR_INTERNAL_H
 #define BST_SCENEGEN_SMEAR_SMEAR_INTERNAL_H
 
@@ -12,6 +12,9 @@
  * a bright source's own noise is lower. */
 #define FLANK 0.76
 
+/* Floats of a block of the node table. */
+enum { BST_TABLE_FLOATS = BST_TABLE_ROWS * BST_BLOCK };
+
 /* Levels of detail: level n is accurate to about 0.08 * 2^-n of the smeared image's peak. */
 enum { BST_SMEAR_LEVELS = 14 };
 
@@ -21,6 +24,18 @@ typedef struct bst_smear_level {
      * bst_smear_nodes_error, and of profiles */
     double error[BST_NODE_SCALES], profile_error;
 } bst_smear_level;
+
+/* A level computed ahead of its first use, on another thread. */
+typedef struct bst_smear_ahead_level {
+    bool ready; /* for this frame */
+    bst_smear_node_list nodes;
+    float *table; /* [level.blocks] */
+    int capacity;
+    bst_smear_level level;
+} bst_smear_ahead_level;
+
+/* A moving source whose nodes are computed ahead. */
+typedef struct bst_smear_ahead_path bst_smear_ahead_path;
 
 struct bst_smear {
     bst_camera camera;
@@ -59,6 +74,11 @@ struct bst_smear {
     double low[2], high[2]; /* box of a shared track's positions relative to a star's, px */
     bst_error_budget_source last_error;
     bst_smear_level levels[BST_SMEAR_LEVELS];
+    bst_smear_ahead_level ahead[BST_SMEAR_LEVELS];
+    bst_smear_ahead_path *ahead_paths;
+    int ahead_count, ahead_capacity;
+    double *ahead_xy; /* positions of the stars, px from the boresight */
+    int ahead_xy_capacity;
 
     bst_smear_path_point *path, *own_path;
     int path_count, path_capacity, own_capacity;
@@ -76,6 +96,42 @@ bst_status bst_smear_reserve(bst_ctx *ctx, void **items, int *capacity, int need
 /* Projects to the focal plane: position from the boresight, px, without distortion, which the
  * kernel adds. Returns false if it is behind the camera or far away. */
 bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, double *y);
+
+/* A source's position at the reference attitude, px from the boresight; for a moving one, where its
+ * nodes are relative to. */
+typedef struct bst_smear_place {
+    double x, y, electrons; /* electrons in the exposure */
+    double disc_px;         /* radius of its disc; 0: a point */
+    bool moving;            /* it has nodes of its own */
+} bst_smear_place;
+
+/* Places a source. Returns false if it gives no light. */
+bool bst_smear_place_source(const bst_smear *s, const bst_scene_source *source,
+                            bst_smear_place *out);
+
+/* Appends the nodes of the work list to the table.
+ *
+ * Given:     shift  they are image shifts, not attitudes */
+bst_status bst_smear_append_nodes(bst_ctx *ctx, bst_smear *s, bool shift,
+                                  bst_smear_level *out) BST_MUST_CHECK;
+
+/* Makes level n of the frame unless it is made; from s->ahead, if it is there. */
+bst_status bst_smear_make_level(bst_ctx *ctx, bst_smear *s, int n) BST_MUST_CHECK;
+
+/* Computes level n ahead. Threads may do so for several levels at a time. */
+bst_status bst_smear_make_ahead(bst_ctx *ctx, const bst_smear *s, int n,
+                                bst_smear_ahead_level *out) BST_MUST_CHECK;
+
+/* With a pool of threads: computes the levels that the frame's stars are likely to need and the
+ * nodes of its moving sources. What is missing is computed when it is used. */
+void bst_smear_begin_ahead(bst_smear *s, const bst_smear_frame *frame);
+/* With a pool of threads: fills the motion map's cells that hold stars. */
+void bst_smear_fill_map(bst_smear *s, const bst_smear_frame *frame);
+/* Sets the work list and the last_... values of a moving source, as bst_smear_moving_nodes does, from
+ * those computed ahead. Returns false if there are none. */
+bool bst_smear_take_ahead(bst_smear *s, const bst_scene_source *source);
+/* Frees what was computed ahead. */
+void bst_smear_free_ahead(bst_smear *s);
 
 /* Appends the nodes of a path that takes `part` of the exposure to the work list.
  *

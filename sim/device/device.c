@@ -345,6 +345,11 @@ cl_command_queue bst_device_queue(const bst_device *device) {
 cl_device_id bst_device_id(const bst_device *device) {
     return device->id;
 }
+bool bst_device_is_cpu(const bst_device *device) {
+    cl_device_type type = CL_DEVICE_TYPE_CPU;
+    return clGetDeviceInfo(device->id, CL_DEVICE_TYPE, sizeof type, &type, NULL) != CL_SUCCESS ||
+           (type & CL_DEVICE_TYPE_CPU) != 0;
+}
 const char *bst_device_description(const bst_device *device) {
     return device->description;
 }

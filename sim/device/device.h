@@ -5,6 +5,8 @@
 #define CL_TARGET_OPENCL_VERSION 120
 #include <CL/cl.h>
 
+#include <stdbool.h>
+
 #include "boresight/status.h"
 
 typedef struct bst_device bst_device;
@@ -31,6 +33,8 @@ cl_context bst_device_context(const bst_device *device);
 cl_command_queue bst_device_queue(const bst_device *device);
 /* OpenCL identity of a device; it belongs to the device. */
 cl_device_id bst_device_id(const bst_device *device);
+/* True if a device is the processor itself, so that its work takes time from that of the host. */
+bool bst_device_is_cpu(const bst_device *device);
 /* Description of a device for the manifest: "PoCL 3.1: cpu-..., 2 compute units". */
 const char *bst_device_description(const bst_device *device);
 

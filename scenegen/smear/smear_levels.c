@@ -1,0 +1,157 @@
+/* Levels of detail: nodes of the stars' path, and the table that the kernels read. */
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+#include "scenegen/kernels/deposit_shared.h"
+#include "scenegen/smear/motion.h"
+#include "scenegen/smear/smear_internal.h"
+#include "scenegen/stamp/profile_law.h"
+
+bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_path_point *path,
+                                int count, double part, bool turns, double tolerance) {
+    double parts = ceil(part * s->options.temporal_oversample - 1e-9);
+    if (parts > 0.0) {
+        return bst_motion_midpoints(ctx, path, count, (int)parts, &s->nodes);
+    }
+    bst_smear_node_aim aim = {.psf_sigma_px = s->sigma_px,
+                              .tolerance = tolerance,
+                              .widest = s->widest,
+                              .wide_field = turns ? s->wide_field : 1.0,
+                              .curvature = turns ? s->curvature : 0.0};
+    memcpy(aim.pixel_part, s->pixel_part, sizeof aim.pixel_part);
+    return bst_smear_nodes_from_path(ctx, path, count, &aim, &s->nodes);
+}
+
+/* Image error of the nodes' profiles, relative to the peak. */
+static double profile_error(const bst_smear *s, const bst_smear_node_list *list) {
+    double psf = s->sigma_px * s->stretch, widest = 0.0, table = 0.0;
+    for (int n = 0; n < list->count; n++) {
+        double w = list->items[n].variance / (psf * psf), wide = 1.0 + w;
+        widest = fmax(widest, w);
+        table = fmax(table, 0.75 * w / (wide * wide));
+    }
+    if (s->options.node_sigma_px > 0.0) {
+        /* by table widths, and by kernel phases: linear interpolation widens by up to a quarter of
+         * a step squared, half of that per axis */
+        double step = 1.0 / (BST_SPREAD_PHASES * s->options.grid_per_px * s->sigma_px);
+        return table / (BST_WIDTHS * BST_WIDTHS) + 0.25 * step * step;
+    }
+    if (widest > s->options.law_widest) {
+        return fmax(s->edge_error, s->point_error);
+    }
+    return widest > 0.0 ? fmax(2.0 * BST_LAW_ERROR, s->point_error) : s->point_error;
+}
+
+/* Widening of a node in PSF variances, before distortion stretches it. */
+static double widening(const bst_smear *s, const bst_smear_node *node) {
+    double psf = s->sigma_px * s->stretch;
+    return node->variance / (psf * psf);
+}
+
+/* Table entry of a camera rotation: v_node = M v_reference as a map of the undistorted tangent
+ * plane, px, focal-plane axes, x' - x = ((m00 - m22) x + m01 y + m02 / a - x d) / (d + m22), d = a
+ * (m20 x + m21 y). */
+static void attitude_to_table(const bst_smear *s, const bst_smear_node *node, float *t) {
+    double a = bst_camera_scale_rad(&s->camera), tilt = a / (s->stretch * s->wide_field);
+    bst_quat q = bst_quat_from_rotvec(
+        (bst_vec3){node->p[0] * tilt, node->p[1] * tilt, node->p[2] / s->half_diagonal_px});
+    bst_mat3 m = bst_quat_to_mat3(q);
+    double rows[BST_TABLE_ROWS] = {
+        m.m[0][0] - m.m[2][2], m.m[0][1],     m.m[0][2] / a, m.m[1][0], m.m[1][1] - m.m[2][2],
+        m.m[1][2] / a,         m.m[2][0] * a, m.m[2][1] * a, m.m[2][2], node->weight,
+        widening(s, node)};
+    for (int i = 0; i < BST_TABLE_ROWS; i++) {
+        t[i * BST_BLOCK] = (float)rows[i];
+    }
+}
+
+/* Table entry of a source's own path: a shift of the image. */
+static void shift_to_table(const bst_smear *s, const bst_smear_node *node, float *t) {
+    double x = node->p[0] / s->stretch, y = node->p[1] / s->stretch;
+    double rows[BST_TABLE_ROWS] = {0, 0, x, 0, 0, y, 0, 0, 1.0, node->weight, widening(s, node)};
+    for (int i = 0; i < BST_TABLE_ROWS; i++) {
+        t[i * BST_BLOCK] = (float)rows[i];
+    }
+}
+
+typedef void (*to_table)(const bst_smear *, const bst_smear_node *, float *);
+
+static int blocks_of(const bst_smear_node_list *list) {
+    return (list->count + BST_BLOCK - 1) / BST_BLOCK;
+}
+
+/* Fills whole blocks of a table with nodes, and their errors. column: fills one of
+ * BST_TABLE_ROWS. */
+static void describe_nodes(const bst_smear *s, const bst_smear_node_list *list, to_table column,
+                           float *table, bst_smear_level *out) {
+    *out = (bst_smear_level){.blocks = blocks_of(list), .profile_error = profile_error(s, list)};
+    double part = bst_smear_nodes_error_part(list->items, list->count, s->sigma_px);
+    for (int k = 0; k < BST_NODE_SCALES; k++) {
+        out->error[k] = part * list->error[k];
+    }
+    for (int n = 0; n < out->blocks * BST_BLOCK; n++) {
+        float *block = table + (size_t)(n / BST_BLOCK) * BST_TABLE_FLOATS;
+        /* the last block is padded with zero-weight copies of the last node */
+        column(s, &list->items[n < list->count ? n : list->count - 1], block + n % BST_BLOCK);
+        if (n >= list->count) {
+            block[9 * BST_BLOCK + n % BST_BLOCK] = 0.0f;
+        }
+    }
+}
+
+/* Room for `blocks` more blocks of the frame's table. */
+static bst_status extend_table(bst_ctx *ctx, bst_smear *s, int blocks, float **table) {
+    BST_TRY(bst_smear_reserve(ctx, (void **)&s->table, &s->table_capacity, s->table_blocks + blocks,
+                              BST_TABLE_FLOATS * sizeof(float)));
+    *table = s->table + (size_t)s->table_blocks * BST_TABLE_FLOATS;
+    return BST_OK;
+}
+
+bst_status bst_smear_append_nodes(bst_ctx *ctx, bst_smear *s, bool shift, bst_smear_level *out) {
+    float *table;
+    BST_TRY(extend_table(ctx, s, blocks_of(&s->nodes), &table));
+    describe_nodes(s, &s->nodes, shift ? shift_to_table : attitude_to_table, table, out);
+    out->first_block = s->table_blocks;
+    s->table_blocks += out->blocks;
+    return BST_OK;
+}
+
+bst_status bst_smear_make_level(bst_ctx *ctx, bst_smear *s, int n) {
+    if (s->levels[n].blocks > 0) {
+        return BST_OK;
+    }
+    bst_smear_ahead_level *ahead = &s->ahead[n];
+    if (ahead->ready) {
+        float *table;
+        BST_TRY(extend_table(ctx, s, ahead->level.blocks, &table));
+        memcpy(table, ahead->table, (size_t)ahead->level.blocks * BST_TABLE_FLOATS * sizeof *table);
+        s->levels[n] = ahead->level;
+        s->levels[n].first_block = s->table_blocks;
+        s->table_blocks += ahead->level.blocks;
+        return BST_OK;
+    }
+    bst_smear_nodes_clear(&s->nodes);
+    BST_TRY(bst_smear_path_nodes(ctx, s, s->path, s->path_count, 1.0, !s->single, s->tolerance[n]));
+    return bst_smear_append_nodes(ctx, s, s->single, &s->levels[n]);
+}
+
+bst_status bst_smear_make_ahead(bst_ctx *ctx, const bst_smear *s, int n,
+                                bst_smear_ahead_level *out) {
+    bst_smear own = *s; /* the nodes are the only work space */
+    own.nodes = out->nodes;
+    bst_smear_nodes_clear(&own.nodes);
+    bst_status status = bst_smear_path_nodes(ctx, &own, s->path, s->path_count, 1.0, !s->single,
+                                             s->tolerance[n]);
+    out->nodes = own.nodes;
+    if (status == BST_OK) {
+        status = bst_smear_reserve(ctx, (void **)&out->table, &out->capacity,
+                                   blocks_of(&out->nodes), BST_TABLE_FLOATS * sizeof(float));
+    }
+    if (status == BST_OK) {
+        describe_nodes(s, &out->nodes, s->single ? shift_to_table : attitude_to_table, out->table,
+                       &out->level);
+        out->ready = true;
+    }
+    return status;
+}
