@@ -217,13 +217,13 @@ static bool stays_beside(const bst_smear *s, double x, double y) {
     return x < -far || y < -far || x > s->window.width + far || y > s->window.height + far;
 }
 
-/* Starts the motion map with the nodes of the coarsest level. */
-static bst_status begin_map(bst_ctx *ctx, bst_smear *s, const bst_smear_node_list *first) {
+/* Starts the motion map with the nodes of the coarsest level, which were computed last. */
+static bst_status begin_map(bst_ctx *ctx, bst_smear *s) {
     double tilt = s->tilt_rad / bst_camera_scale_rad(&s->camera) * s->wide_field;
     double from = s->half_diagonal_px / s->stretch;
     bst_motion_map_frame frame = {
-        .nodes = first->items,
-        .count = first->count,
+        .nodes = s->nodes.items,
+        .count = s->nodes.count,
         .table = s->table + (size_t)s->levels[0].first_block * BST_TABLE_FLOATS,
         .scale_rad = bst_camera_scale_rad(&s->camera),
         .tilt_px = s->stretch * s->wide_field,
@@ -279,6 +279,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
     } else {
         bst_smear_find_pixel_parts(s->sigma_px, s->binning, s->pixel_part);
     }
+    bst_smear_clear_ahead(s);
     s->sources = frame->sources;
     s->aim = frame->aim > 0.0 ? frame->aim : 1.0;
     s->duration_s = track->time_s[track->count - 1];
@@ -310,19 +311,14 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
         s->path[k].p[0] *= s->wide_field;
         s->path[k].p[1] *= s->wide_field;
     }
-    bst_smear_begin_ahead(s, frame);
     BST_TRY(bst_smear_make_level(ctx, s, 0));
-    const bst_smear_node_list *first = s->ahead[0].ready ? &s->ahead[0].nodes : &s->nodes;
     if (!s->single) {
-        BST_TRY(begin_map(ctx, s, first));
-        bst_smear_fill_map(s, frame);
-        return BST_OK;
+        BST_TRY(begin_map(ctx, s));
+    } else {
+        bst_smear_nodes_box(s, s->low, s->high);
+        s->star_share = bst_smear_largest_share(s, &s->read_share);
     }
-    if (first != &s->nodes) { /* the shares below change them */
-        BST_TRY(bst_smear_nodes_copy(ctx, first, &s->nodes));
-    }
-    bst_smear_nodes_box(s, s->low, s->high);
-    s->star_share = bst_smear_largest_share(s, &s->read_share);
+    bst_smear_begin_ahead(s, frame);
     return BST_OK;
 }
 
@@ -425,12 +421,17 @@ bool bst_smear_place_source(const bst_smear *s, const bst_scene_source *source,
     return !source->occulted && electrons > 0.0 && electrons < 1e30 && (front || moving);
 }
 
-/* Nodes of a moving source: those computed ahead, if there are any. */
+/* Nodes of a moving source, in the table: those computed ahead, if there are any. *lit: false if it
+ * has none. */
 static bst_status moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
-                               double electrons, double x, double y) {
-    return bst_smear_take_ahead(s, source)
-               ? BST_OK
-               : bst_smear_moving_nodes(ctx, s, source, electrons, x, y);
+                               const bst_smear_place *at, bst_smear_level *out, bool *lit) {
+    bool taken;
+    BST_TRY(bst_smear_take_ahead(ctx, s, source, out, &taken));
+    if (!taken) {
+        BST_TRY(bst_smear_moving_nodes(ctx, s, source, at->electrons, at->x, at->y));
+    }
+    *lit = s->nodes.count > 0;
+    return taken || !*lit ? BST_OK : bst_smear_append_nodes(ctx, s, true, out);
 }
 
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
@@ -467,9 +468,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
     const bst_smear_level *used;
     double travel_px = s->travel_px, error;
     if (moving) {
-        BST_TRY(moving_nodes(ctx, s, source, electrons, x, y));
-        if (s->nodes.count == 0) {
-            *visible = false;
+        BST_TRY(moving_nodes(ctx, s, source, &at, &own, visible));
+        if (!*visible) {
             return BST_OK;
         }
         travel_px = 0.0;
@@ -478,7 +478,6 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
             travel_px = fmax(travel_px, fabs(p[0]) + fabs(p[1]));
         }
         bst_smear_nodes_box(s, low, high);
-        BST_TRY(bst_smear_append_nodes(ctx, s, true, &own));
         used = &own;
         error = bst_smear_level_error(used, 1.0);
     } else {

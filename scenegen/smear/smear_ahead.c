@@ -3,42 +3,25 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "scenegen/reference.h"
 #include "scenegen/smear/smear_internal.h"
 
 struct bst_smear_ahead_path {
     const bst_scene_source *source;
     bst_smear_place place;
     bst_smear own; /* work space and last_... values of this source; the rest is the frame's */
+    bst_smear_ahead_level table;
     double aim;
-    bool ready;
 };
 
 /* Most moving sources computed ahead: a path's work space takes up to a megabyte. */
 enum { MOST_PATHS = 64 };
-
-/* Brightest pixel of the frame's brightest star by its path's extent: a line of light as long as the
- * box of the path. Twice that, as light is not evenly spread. */
-static double brightest_e(const bst_smear *s, double e_per_s) {
-    double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-    for (int k = 0; k < s->path_count; k++) {
-        for (int i = 0; i < 2; i++) {
-            low[i] = fmin(low[i], s->path[k].p[i]);
-            high[i] = fmax(high[i], s->path[k].p[i]);
-        }
-    }
-    double length = hypot(high[0] - low[0], high[1] - low[1]);
-    double line = bst_reference_pixel_share(0.0, s->share_sigma_px, 0);
-    double still = e_per_s * s->duration_s * line * line * s->binning * s->binning;
-    /* a Gaussian has the height of a line of sqrt(2 pi) sigma with its light */
-    return still * fmin(1.0, 2.0 / (1.0 + length / (2.5066 * s->share_sigma_px)));
-}
 
 /* Frees the work space of a path. */
 static void free_path(bst_smear_ahead_path *a) {
     free(a->own.nodes.items);
     free(a->own.points.items);
     free(a->own.own_path);
+    free(a->table.table);
 }
 
 /* Copies the frame into a path's own smear, whose work space stays. */
@@ -77,48 +60,46 @@ static void find_paths(bst_smear *s, const bst_smear_frame *frame) {
         a->source = source;
         a->place = place;
         a->aim = s->aim;
-        a->ready = false;
+        a->table.ready = false;
         lend_frame(s, &a->own);
         a->own.disc_px = place.disc_px;
     }
 }
 
-/* Computes moving sources, then levels (callback). Those that fail are computed again when they are
- * used, and fail there. */
+/* What threads compute: moving sources, then levels, the finest first. */
+typedef struct things_to_make {
+    bst_smear *s;
+    int levels[BST_SMEAR_LEVELS];
+} things_to_make;
+
+/* Computes some of them (callback). Those that fail are computed again when they are used, and fail
+ * there. */
 static void make_some(void *user, int begin, int end) {
-    bst_smear *s = user;
+    const things_to_make *all = user;
+    bst_smear *s = all->s;
     for (int k = begin; k < end; k++) {
         bst_ctx own = {0};
-        if (k < s->ahead_count) {
-            bst_smear_ahead_path *a = &s->ahead_paths[k];
-            a->ready = bst_smear_moving_nodes(&own, &a->own, a->source, a->place.electrons,
-                                              a->place.x, a->place.y) == BST_OK;
-        } else {
-            int n = k - s->ahead_count;
-            s->ahead[n].ready = bst_smear_make_ahead(&own, s, n, &s->ahead[n]) == BST_OK;
+        if (k >= s->ahead_count) {
+            int n = all->levels[k - s->ahead_count];
+            bst_status status = bst_smear_make_ahead(&own, s, n, &s->ahead[n]);
+            s->ahead[n].ready = status == BST_OK;
+            continue;
+        }
+        bst_smear_ahead_path *a = &s->ahead_paths[k];
+        bst_status status = bst_smear_moving_nodes(&own, &a->own, a->source, a->place.electrons,
+                                                   a->place.x, a->place.y);
+        if (status == BST_OK && a->own.nodes.count > 0) {
+            status = bst_smear_describe_ahead(&own, &a->own, true, &a->table);
+            a->table.ready = status == BST_OK;
         }
     }
 }
 
-void bst_smear_begin_ahead(bst_smear *s, const bst_smear_frame *frame) {
-    s->ahead_count = 0;
-    for (int n = 0; n < BST_SMEAR_LEVELS; n++) {
-        s->ahead[n].ready = false;
-    }
-    if (!s->options.pool || !frame->list || bst_parallel_threads(s->options.pool) < 2) {
-        return;
-    }
-    find_paths(s, frame);
-    s->last_read_e = brightest_e(s, frame->brightest_e_per_s);
-    int levels = bst_smear_choose_level(s, 1.0) + 2;
-    levels = levels < BST_SMEAR_LEVELS ? levels : BST_SMEAR_LEVELS;
-    bst_parallel_for(s->options.pool, s->ahead_count + levels, 1, make_some, s);
-}
-
-/* Stars of a frame whose positions threads compute. */
+/* Stars of a frame that threads place; a bit for each level with which one begins. */
 typedef struct stars_to_place {
     bst_smear *s;
     const bst_scene_source *list;
+    unsigned levels;
 } stars_to_place;
 
 /* Places some stars (callback). */
@@ -132,34 +113,72 @@ static void place_some(void *user, int begin, int end) {
     }
 }
 
-void bst_smear_fill_map(bst_smear *s, const bst_smear_frame *frame) {
-    enum { AT_ONCE = 1024 };
+/* Finds the levels with which the stars begin. */
+static void find_levels(stars_to_place *all, int count) {
+    bst_smear *s = all->s;
+    for (int i = 0; i < count; i++) {
+        double x = s->ahead_xy[2 * i], y = s->ahead_xy[2 * i + 1];
+        if (isnan(x)) {
+            continue;
+        }
+        const bst_smear_star_motion_cell *cell = s->single ? NULL : bst_motion_map_at(s->map, x, y);
+        s->last_read_e = all->list[i].electrons_per_s * s->duration_s *
+                         (cell ? cell->read_share : s->read_share);
+        all->levels |= 1U << bst_smear_choose_level(s, cell ? cell->scale : 1.0);
+    }
+}
+
+void bst_smear_clear_ahead(bst_smear *s) {
+    s->ahead_count = 0;
+    for (int n = 0; n < BST_SMEAR_LEVELS; n++) {
+        s->ahead[n].ready = false;
+    }
+}
+
+void bst_smear_begin_ahead(bst_smear *s, const bst_smear_frame *frame) {
+    enum { AT_ONCE = 256 };
     bst_ctx none = {0};
-    if (!s->options.pool || !frame->list ||
+    if (!s->options.pool || !frame->list || bst_parallel_threads(s->options.pool) < 2 ||
         bst_smear_reserve(&none, (void **)&s->ahead_xy, &s->ahead_xy_capacity, frame->sources,
                           2 * sizeof *s->ahead_xy) != BST_OK) {
         return;
     }
-    stars_to_place all = {s, frame->list};
-    bst_parallel_for(s->options.pool, frame->sources, AT_ONCE, place_some, &all);
-    bst_motion_map_fill(s->map, s->options.pool, s->ahead_xy, frame->sources);
-}
-
-bool bst_smear_take_ahead(bst_smear *s, const bst_scene_source *source) {
-    for (int k = 0; k < s->ahead_count; k++) {
-        bst_smear_ahead_path *a = &s->ahead_paths[k];
-        if (a->source == source && a->ready && a->aim == s->aim) {
-            bst_smear_node_list nodes = s->nodes;
-            s->nodes = a->own.nodes;
-            a->own.nodes = nodes;
-            a->ready = false;
-            s->last_peak_e = a->own.last_peak_e;
-            s->last_read_e = a->own.last_read_e;
-            s->chord_error = a->own.chord_error;
-            return true;
+    stars_to_place stars = {s, frame->list, 0U};
+    bst_parallel_for(s->options.pool, frame->sources, AT_ONCE, place_some, &stars);
+    if (!s->single) {
+        bst_motion_map_fill(s->map, s->options.pool, s->ahead_xy, frame->sources);
+    }
+    find_levels(&stars, frame->sources);
+    find_paths(s, frame);
+    things_to_make things = {.s = s};
+    int levels = 0;
+    for (int n = BST_SMEAR_LEVELS - 1; n > 0; n--) {
+        if (stars.levels >> n & 1U) {
+            things.levels[levels++] = n;
         }
     }
-    return false;
+    bst_parallel_for(s->options.pool, s->ahead_count + levels, 1, make_some, &things);
+}
+
+bst_status bst_smear_take_ahead(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
+                                bst_smear_level *out, bool *taken) {
+    *taken = false;
+    for (int k = 0; k < s->ahead_count && !*taken; k++) {
+        bst_smear_ahead_path *a = &s->ahead_paths[k];
+        if (a->source != source || !a->table.ready || a->aim != s->aim) {
+            continue;
+        }
+        bst_smear_node_list nodes = s->nodes;
+        s->nodes = a->own.nodes;
+        a->own.nodes = nodes;
+        a->table.ready = false;
+        s->last_peak_e = a->own.last_peak_e;
+        s->last_read_e = a->own.last_read_e;
+        s->chord_error = a->own.chord_error;
+        BST_TRY(bst_smear_append_ahead(ctx, s, &a->table, out));
+        *taken = true;
+    }
+    return BST_OK;
 }
 
 void bst_smear_free_ahead(bst_smear *s) {

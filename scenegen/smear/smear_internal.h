@@ -118,18 +118,28 @@ bst_status bst_smear_append_nodes(bst_ctx *ctx, bst_smear *s, bool shift,
 /* Makes level n of the frame unless it is made; from s->ahead, if it is there. */
 bst_status bst_smear_make_level(bst_ctx *ctx, bst_smear *s, int n) BST_MUST_CHECK;
 
+/* Appends a level computed ahead to the table. */
+bst_status bst_smear_append_ahead(bst_ctx *ctx, bst_smear *s, const bst_smear_ahead_level *ahead,
+                                  bst_smear_level *out) BST_MUST_CHECK;
+/* Makes a table of its own from the work list.
+ *
+ * Given:     shift  as in bst_smear_append_nodes */
+bst_status bst_smear_describe_ahead(bst_ctx *ctx, const bst_smear *s, bool shift,
+                                    bst_smear_ahead_level *out) BST_MUST_CHECK;
 /* Computes level n ahead. Threads may do so for several levels at a time. */
 bst_status bst_smear_make_ahead(bst_ctx *ctx, const bst_smear *s, int n,
                                 bst_smear_ahead_level *out) BST_MUST_CHECK;
 
-/* With a pool of threads: computes the levels that the frame's stars are likely to need and the
- * nodes of its moving sources. What is missing is computed when it is used. */
+/* Forgets what was computed ahead. */
+void bst_smear_clear_ahead(bst_smear *s);
+/* With a pool of threads: computes the motion map's cells that hold stars, the levels with which the
+ * frame's stars begin, and the nodes of its moving sources. What is missing, or fails, is computed
+ * when it is used. */
 void bst_smear_begin_ahead(bst_smear *s, const bst_smear_frame *frame);
-/* With a pool of threads: fills the motion map's cells that hold stars. */
-void bst_smear_fill_map(bst_smear *s, const bst_smear_frame *frame);
 /* Sets the work list and the last_... values of a moving source, as bst_smear_moving_nodes does, from
- * those computed ahead. Returns false if there are none. */
-bool bst_smear_take_ahead(bst_smear *s, const bst_scene_source *source);
+ * those computed ahead, and appends the nodes to the table. *taken: false if there are none. */
+bst_status bst_smear_take_ahead(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
+                                bst_smear_level *out, bool *taken) BST_MUST_CHECK;
 /* Frees what was computed ahead. */
 void bst_smear_free_ahead(bst_smear *s);
 

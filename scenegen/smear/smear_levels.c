@@ -117,23 +117,38 @@ bst_status bst_smear_append_nodes(bst_ctx *ctx, bst_smear *s, bool shift, bst_sm
     return BST_OK;
 }
 
+bst_status bst_smear_append_ahead(bst_ctx *ctx, bst_smear *s, const bst_smear_ahead_level *ahead,
+                                  bst_smear_level *out) {
+    float *table;
+    int blocks = ahead->level.blocks;
+    BST_TRY(extend_table(ctx, s, blocks, &table));
+    memcpy(table, ahead->table, (size_t)blocks * BST_TABLE_FLOATS * sizeof *table);
+    *out = ahead->level;
+    out->first_block = s->table_blocks;
+    s->table_blocks += blocks;
+    return BST_OK;
+}
+
 bst_status bst_smear_make_level(bst_ctx *ctx, bst_smear *s, int n) {
     if (s->levels[n].blocks > 0) {
         return BST_OK;
     }
-    bst_smear_ahead_level *ahead = &s->ahead[n];
-    if (ahead->ready) {
-        float *table;
-        BST_TRY(extend_table(ctx, s, ahead->level.blocks, &table));
-        memcpy(table, ahead->table, (size_t)ahead->level.blocks * BST_TABLE_FLOATS * sizeof *table);
-        s->levels[n] = ahead->level;
-        s->levels[n].first_block = s->table_blocks;
-        s->table_blocks += ahead->level.blocks;
-        return BST_OK;
+    if (s->ahead[n].ready) {
+        return bst_smear_append_ahead(ctx, s, &s->ahead[n], &s->levels[n]);
     }
     bst_smear_nodes_clear(&s->nodes);
     BST_TRY(bst_smear_path_nodes(ctx, s, s->path, s->path_count, 1.0, !s->single, s->tolerance[n]));
     return bst_smear_append_nodes(ctx, s, s->single, &s->levels[n]);
+}
+
+bst_status bst_smear_describe_ahead(bst_ctx *ctx, const bst_smear *s, bool shift,
+                                    bst_smear_ahead_level *out) {
+    BST_TRY(bst_smear_reserve(ctx, (void **)&out->table, &out->capacity, blocks_of(&s->nodes),
+                              BST_TABLE_FLOATS * sizeof(float)));
+    describe_nodes(s, &s->nodes, shift ? shift_to_table : attitude_to_table, out->table,
+                   &out->level);
+    out->ready = true;
+    return BST_OK;
 }
 
 bst_status bst_smear_make_ahead(bst_ctx *ctx, const bst_smear *s, int n,
@@ -143,15 +158,9 @@ bst_status bst_smear_make_ahead(bst_ctx *ctx, const bst_smear *s, int n,
     bst_smear_nodes_clear(&own.nodes);
     bst_status status = bst_smear_path_nodes(ctx, &own, s->path, s->path_count, 1.0, !s->single,
                                              s->tolerance[n]);
+    if (status == BST_OK) {
+        status = bst_smear_describe_ahead(ctx, &own, s->single, out);
+    }
     out->nodes = own.nodes;
-    if (status == BST_OK) {
-        status = bst_smear_reserve(ctx, (void **)&out->table, &out->capacity,
-                                   blocks_of(&out->nodes), BST_TABLE_FLOATS * sizeof(float));
-    }
-    if (status == BST_OK) {
-        describe_nodes(s, &out->nodes, s->single ? shift_to_table : attitude_to_table, out->table,
-                       &out->level);
-        out->ready = true;
-    }
     return status;
 }

@@ -66,9 +66,6 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
 
 /* Empties a node list. */
 void bst_smear_nodes_clear(bst_smear_node_list *list);
-/* Copies a node list. Errors: BST_ERR_MEMORY. */
-bst_status bst_smear_nodes_copy(bst_ctx *ctx, const bst_smear_node_list *from,
-                                bst_smear_node_list *to) BST_MUST_CHECK;
 
 /* Error of an image that moves by `scale` of the path: an upper bound over the groups, whose terms
  * go with the second to sixth power of the scale. */

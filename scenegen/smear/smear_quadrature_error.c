@@ -1,5 +1,4 @@
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "scenegen/smear/motion.h"
@@ -47,22 +46,6 @@ double bst_smear_nodes_error(const double error[BST_NODE_SCALES], double scale) 
 void bst_smear_nodes_clear(bst_smear_node_list *list) {
     list->count = 0;
     memset(list->error, 0, sizeof list->error);
-}
-
-bst_status bst_smear_nodes_copy(bst_ctx *ctx, const bst_smear_node_list *from,
-                                bst_smear_node_list *to) {
-    if (from->count > to->capacity) {
-        bst_smear_node *items = realloc(to->items, (size_t)from->count * sizeof *items);
-        if (!items) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d nodes of a smear", from->count);
-        }
-        to->items = items;
-        to->capacity = from->count;
-    }
-    memcpy(to->items, from->items, (size_t)from->count * sizeof *to->items);
-    memcpy(to->error, from->error, sizeof to->error);
-    to->count = from->count;
-    return BST_OK;
 }
 
 double bst_smear_nodes_error_part(const bst_smear_node *nodes, int count, double psf_sigma_px) {
