@@ -338,19 +338,58 @@ static float box_error(const bst_error_budget *c, const cell *middle) {
            REST * fmaxf(others, sum.second) + BORDERS * (sum.border - sum.worst_border);
 }
 
+/* Cells by the square of SIDE cells that they lie in, as lists, to find those within REACH of a cell
+ * without a search for each place. */
+enum { SIDE_BITS = 3, SQUARE_BITS = 12 };
+_Static_assert(REACH <= 1 << SIDE_BITS, "a cell's neighbours lie in its square or the next");
+
+typedef struct squares {
+    int first[1 << SQUARE_BITS]; /* place + 1 in `used` of a square's first cell, 0: none */
+    int next[MOST_CROSSINGS];    /* the same for the next of each */
+} squares;
+
+/* First of the list that holds the cells of square (i, j), and perhaps others. */
+static int *square_at(squares *all, int i, int j) {
+    return &all->first[place_of(key_of(i, j)) & ((1U << SQUARE_BITS) - 1U)];
+}
+
+static void fill_squares(const bst_error_budget *c, int cells, squares *all) {
+    memset(all->first, 0, sizeof all->first);
+    for (int k = 0; k < cells; k++) {
+        const cell *p = &c->cells[c->used[k]];
+        int *first = square_at(all, p->u >> SIDE_BITS, p->v >> SIDE_BITS);
+        all->next[k] = *first;
+        *first = k + 1;
+    }
+}
+
 /* Error where the border of the stamps in a cell crosses another: two circles cross if they are no
  * further apart than the sum of their radii. */
-static float crossing_error(const bst_error_budget *c, const cell *middle) {
+static float crossing_error(const bst_error_budget *c, squares *all, const cell *middle) {
     float other = fminf(middle->border - middle->worst_border, middle->worst_border);
-    for (int u = -REACH; u <= REACH; u++) {
-        for (int v = -REACH; v <= REACH; v++) {
-            const cell *p = look_up(c, middle->u + u, middle->v + v);
-            if (p && (u != 0 || v != 0)) {
+    int i = middle->u >> SIDE_BITS, j = middle->v >> SIDE_BITS;
+    for (int n = 0; n < 9; n++) {
+        for (int k = *square_at(all, i + n % 3 - 1, j + n / 3 - 1); k > 0; k = all->next[k - 1]) {
+            const cell *p = &c->cells[c->used[k - 1]];
+            if (p != middle && abs(p->u - middle->u) <= REACH && abs(p->v - middle->v) <= REACH) {
                 other = fmaxf(other, p->worst_border);
             }
         }
     }
     return middle->worst_border + other;
+}
+
+/* Largest error where borders cross, from `worst` on. Both cells of a pair find it; the one with the
+ * larger border, at least half of the pair's error, suffices. */
+static float worst_crossing(const bst_error_budget *c, int cells, float worst) {
+    squares all;
+    assert(cells <= MOST_CROSSINGS);
+    fill_squares(c, cells, &all);
+    for (int i = 0; i < cells; i++) {
+        const cell *p = &c->cells[c->used[i]];
+        worst = 2.0f * p->worst_border > worst ? fmaxf(worst, crossing_error(c, &all, p)) : worst;
+    }
+    return worst;
 }
 
 double bst_error_budget_error_sigma(bst_error_budget *c) {
@@ -370,11 +409,8 @@ double bst_error_budget_error_sigma(bst_error_budget *c) {
         if (cells > MOST_CROSSINGS) { /* too many cells: assume that the worst ones cross */
             worst = fmaxf(worst, 2.0f * border);
         }
-        /* both cells of a pair find it; the one with the larger border, at least half of the pair's
-         * error, suffices */
-        for (int i = 0; i < cells && 2.0f * border > worst; i++) {
-            const cell *p = &c->cells[c->used[i]];
-            worst = 2.0f * p->worst_border > worst ? fmaxf(worst, crossing_error(c, p)) : worst;
+        if (2.0f * border > worst) {
+            worst = worst_crossing(c, cells, worst);
         }
         c->error = fmaxf(worst, apart) + REST * fminf(worst, apart) +
                    c->missing_e / sqrt(c->motion.dark_variance_e2);

@@ -9,6 +9,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "sim/device/build_log.h"
 #include "sim/device/kernel_cache.h"
 
 enum { MAX_PLATFORMS = 16, MAX_DEVICES = 32, NAME_BYTES = 256 };
@@ -356,7 +357,9 @@ const char *bst_device_description(const bst_device *device) {
 
 /* Error with the first lines of the build log. */
 static bst_status build_failure(bst_ctx *ctx, const bst_device *device, cl_program program,
-                                const char *first_name) {
+                                const char *const *texts, int text_count,
+                                const bst_device_kernel_source *const *sources) {
+    const char *first_name = sources[0]->name;
     char cache[NAME_BYTES + 512];
     if (strncmp(device->description, "PoCL", 4) == 0 &&
         bst_kernel_cache_is_unusable(cache, sizeof cache)) {
@@ -368,6 +371,11 @@ static bst_status build_failure(bst_ctx *ctx, const bst_device *device, cl_progr
     char *log = calloc(bytes + 1, 1);
     if (log && bytes) {
         clGetProgramBuildInfo(program, device->id, CL_PROGRAM_BUILD_LOG, bytes, log, NULL);
+        char *named = bst_build_log_with_names(log, texts, text_count, sources);
+        if (named) {
+            free(log);
+            log = named;
+        }
     }
     bst_status status =
         bst_fail(ctx, BST_ERR_DEVICE, "building OpenCL kernels (%s ...) for %s failed:\n%.700s",
@@ -469,7 +477,7 @@ static bst_status build(bst_ctx *ctx, bst_device *device,
     }
     code = clBuildProgram(program, 1, &device->id, options ? options : "", NULL, NULL);
     if (code != CL_SUCCESS) {
-        status = build_failure(ctx, device, program, sources[0]->name);
+        status = build_failure(ctx, device, program, texts, count * 2 + 1, sources);
         goto exit;
     }
     for (int i = 0; i < count; i++) {

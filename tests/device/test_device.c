@@ -1,5 +1,6 @@
 #include "boresight/rng.h"
 #include "bst_device_kernels.h"
+#include "sim/device/build_log.h"
 #include "sim/device/device.h"
 #include "tests/test_support.h"
 
@@ -60,6 +61,22 @@ static void build_errors_name_the_file(void **state) {
     assert_non_null(strstr(ctx.message, "bad_kernel.cl"));
     assert_non_null(strstr(ctx.message, "nonsense"));
     bst_device_close(device);
+}
+
+/* The log of NVIDIA's compiler, which ignores #line and counts the lines of all sources. */
+static void logs_without_names_get_them(void **state) {
+    (void)state;
+    bst_device_kernel_source one = {"one.cl", "int a;\nint b;\n", 0, 0},
+                             two = {"two.cl", "int c;\nint d = e;\n", 0, 0};
+    const bst_device_kernel_source *sources[] = {&one, &two};
+    const char *texts[] = {"#define X\n", "\n#line 1 \"one.cl\"\n", one.text,
+                           "\n#line 1 \"two.cl\"\n", two.text};
+    char *log = bst_build_log_with_names("<kernel>:9:9: error: use of 'e'\n<kernel>:4:5: note\n"
+                                         "<kernel>:1:1: warning <kernel>:99:1: end",
+                                         texts, 5, sources);
+    assert_string_equal(log, "two.cl:2:9: error: use of 'e'\none.cl:1:5: note\n"
+                             "<kernel>:1:1: warning <kernel>:99:1: end");
+    free(log);
 }
 
 /* The shared Philox header gives on the device the words that it gives on the host. */
@@ -181,6 +198,7 @@ int main(void) {
         cmocka_unit_test(unknown_selectors_list_what_there_is),
         cmocka_unit_test(threads_limit_a_cpu_device),
         cmocka_unit_test(build_errors_name_the_file),
+        cmocka_unit_test(logs_without_names_get_them),
         cmocka_unit_test(philox_is_the_same_on_the_device),
         cmocka_unit_test(buffers_hold_their_content),
         cmocka_unit_test(hashes_are_fnv1a_of_the_text),
