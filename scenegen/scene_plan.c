@@ -12,12 +12,13 @@ _Static_assert(BST_SPECTRA == (int)BST_PSF_SPECTRA, "the deposit kernel's shares
 void bst_scene_plan_clear(bst_scene_plan *p) {
     free(p->sources);
     free(p->list);
+    free(p->results);
     free(p->shares);
     free(p->peak_e);
     *p = (bst_scene_plan){.count = 0};
 }
 
-static bst_status reserve(bst_ctx *ctx, bst_scene_plan *p, int count, bool coloured) {
+static bst_status reserve(bst_ctx *ctx, bst_scene_plan *p, int count, bool coloured, bool threads) {
     if (count <= p->capacity) {
         return BST_OK;
     }
@@ -27,7 +28,9 @@ static bst_status reserve(bst_ctx *ctx, bst_scene_plan *p, int count, bool colou
     p->list = malloc(capacity * sizeof *p->list);
     p->peak_e = malloc(capacity * sizeof *p->peak_e);
     p->shares = coloured ? malloc(capacity * sizeof *p->shares) : NULL;
-    if (!p->sources || !p->list || !p->peak_e || (coloured && !p->shares)) {
+    p->results = threads ? malloc(capacity * sizeof *p->results) : NULL;
+    if (!p->sources || !p->list || !p->peak_e || (coloured && !p->shares) ||
+        (threads && !p->results)) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", count);
     }
     p->capacity = (int)capacity;
@@ -102,10 +105,17 @@ static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, boo
     p->count = p->blocks = 0;
     m->grid_sigma = 0.0;
     *fits = true;
+    if (p->results) {
+        BST_TRY(bst_smear_sources(ctx, m->smear, q->sources, q->count, p->results));
+    }
     for (int i = 0; i < q->count && *fits; i++) {
         bst_kernel_source_record *s = &p->list[p->count];
         bool visible;
-        BST_TRY(bst_smear_source(ctx, m->smear, &q->sources[i], s, &visible));
+        if (p->results && p->results[i].known) {
+            bst_smear_recall(m->smear, &p->results[i], s, &visible);
+        } else {
+            BST_TRY(bst_smear_source(ctx, m->smear, &q->sources[i], s, &visible));
+        }
         p->peak_e[i] = bst_smear_last_peak_e(m->smear);
         if (m->fourier && !q->sources[i].occulted && bst_smear_last_leaves(m->smear)) {
             bst_error_budget_miss(m->budget, m->beyond * q->sources[i].electrons_per_s);
@@ -207,7 +217,8 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
                                const bst_scene_plan_limits *limits, const bst_render_request *q) {
     assert(p && camera && smear && budget && limits && q && q->count >= 0);
     double read = camera->read_noise_e, brightest = 0.0;
-    BST_TRY(reserve(ctx, p, q->count, fourier && bst_fourier_render_spectra(fourier) > 1));
+    bool coloured = fourier && bst_fourier_render_spectra(fourier) > 1;
+    BST_TRY(reserve(ctx, p, q->count, coloured, bst_smear_has_threads(smear)));
     for (int i = 0; i < q->count; i++) {
         brightest = q->sources[i].path ? brightest : fmax(brightest, q->sources[i].electrons_per_s);
     }

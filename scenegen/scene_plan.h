@@ -19,6 +19,7 @@ typedef struct bst_scene_plan {
     bool fine;      /* on the finer grid of the Fourier path */
     double *peak_e; /* of all sources of the request: most expected electrons in one pixel */
     bst_kernel_source_record *list; /* work space */
+    bst_smear_result *results;      /* the same, if the smear has threads */
     int capacity;
 } bst_scene_plan;
 

@@ -278,7 +278,7 @@ static void fill_some(void *user, int begin, int end) {
     free(places);
 }
 
-void bst_motion_map_fill(bst_motion_map *map, bst_parallel *pool, const double *xy, int count) {
+bool bst_motion_map_fill(bst_motion_map *map, bst_parallel *pool, const double *xy, int count) {
     enum { AT_ONCE = 4 };
     int found = 0, *cells = malloc(MANY_CELLS * MANY_CELLS * sizeof *cells);
     for (int i = 0; i < count && cells; i++) {
@@ -290,11 +290,11 @@ void bst_motion_map_fill(bst_motion_map *map, bst_parallel *pool, const double *
     }
     cells_to_fill all = {map, cells};
     bst_parallel_for(pool, found, AT_ONCE, fill_some, &all);
+    bool complete = cells != NULL;
     for (int k = 0; k < found; k++) {
-        if (cells[k] < 0) { /* no memory for a thread's work space: none of these is marked */
-            map->frame++;
-            break;
-        }
+        complete = complete && cells[k] >= 0;
     }
     free(cells);
+    map->frame += complete ? 0U : 1U; /* otherwise none of them counts as filled */
+    return complete;
 }

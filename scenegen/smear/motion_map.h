@@ -5,6 +5,8 @@
 #ifndef BST_SCENEGEN_SMEAR_MOTION_MAP_H
 #define BST_SCENEGEN_SMEAR_MOTION_MAP_H
 
+#include <stdbool.h>
+
 #include "scenegen/smear/smear_quadrature.h"
 #include "sim/core/parallel.h"
 
@@ -60,7 +62,8 @@ bst_status bst_motion_map_begin(bst_ctx *ctx, bst_motion_map *map,
 bst_smear_star_motion_cell *bst_motion_map_at(bst_motion_map *map, double x, double y);
 
 /* Computes the cells of the stars at xy[2 count], (x, y) as in bst_motion_map_at, on several
- * threads, for later calls of that function. x NAN: no star. */
-void bst_motion_map_fill(bst_motion_map *map, bst_parallel *pool, const double *xy, int count);
+ * threads, for later calls of that function. x NAN: no star. Returns false if there is too little
+ * memory; cells are then computed at first use. */
+bool bst_motion_map_fill(bst_motion_map *map, bst_parallel *pool, const double *xy, int count);
 
 #endif

@@ -355,10 +355,14 @@ static double star_error(const bst_smear *s, int n, bst_smear_star_motion_cell *
     if (!cell) {
         return bst_smear_level_error(&s->levels[n], 1.0);
     }
-    if (cell->error[n] < 0.0) {
-        cell->error[n] = bst_smear_level_error(&s->levels[n], cell->scale);
+    if (cell->error[n] >= 0.0) {
+        return cell->error[n];
     }
-    return cell->error[n];
+    double error = bst_smear_level_error(&s->levels[n], cell->scale);
+    if (!s->fixed) {
+        cell->error[n] = error;
+    }
+    return error;
 }
 
 /* Chooses the coarsest level that keeps the tolerance for a star, starting from the tolerance's
@@ -426,6 +430,9 @@ bool bst_smear_place_source(const bst_smear *s, const bst_scene_source *source,
 static bst_status moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
                                const bst_smear_place *at, bst_smear_level *out, bool *lit) {
     bool taken;
+    if (s->fixed) {
+        return BST_ERR_STATE; /* seen by bst_smear_sources alone */
+    }
     BST_TRY(bst_smear_take_ahead(ctx, s, source, out, &taken));
     if (!taken) {
         BST_TRY(bst_smear_moving_nodes(ctx, s, source, at->electrons, at->x, at->y));

@@ -85,6 +85,28 @@ bool bst_smear_single(const bst_smear *smear);
 bst_status bst_smear_source(bst_ctx *ctx, bst_smear *smear, const bst_scene_source *source,
                             bst_kernel_source_record *out, bool *visible) BST_MUST_CHECK;
 
+/* What bst_smear_source and the calls about the latest source return. */
+typedef struct bst_smear_result {
+    bool known, visible, leaves;
+    bst_kernel_source_record record;
+    double peak_e, read_e, presence;
+    bst_error_budget_source error;
+} bst_smear_result;
+
+/* Computes several sources of the frame at a time with the options' pool: those that need nothing
+ * but what was computed at the beginning; the others stay unknown. Without a pool all do.
+ *
+ * Given:     list  [count], the frame's sources
+ * Returned:  out   [count]
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_smear_sources(bst_ctx *ctx, bst_smear *smear, const bst_scene_source *list, int count,
+                             bst_smear_result *out) BST_MUST_CHECK;
+/* True if the options have a pool of several threads. */
+bool bst_smear_has_threads(const bst_smear *smear);
+/* Makes a known source the latest one, as bst_smear_source does; *visible and *out as there. */
+void bst_smear_recall(bst_smear *smear, const bst_smear_result *result,
+                      bst_kernel_source_record *out, bool *visible);
+
 /* Largest expected electrons of the latest source in a pixel. */
 double bst_smear_last_peak_e(const bst_smear *smear);
 

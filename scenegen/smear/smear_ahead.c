@@ -128,8 +128,13 @@ static void find_levels(stars_to_place *all, int count) {
     }
 }
 
+bool bst_smear_has_threads(const bst_smear *s) {
+    return s->options.pool && bst_parallel_threads(s->options.pool) > 1;
+}
+
 void bst_smear_clear_ahead(bst_smear *s) {
     s->ahead_count = 0;
+    s->ahead_cells = false;
     for (int n = 0; n < BST_SMEAR_LEVELS; n++) {
         s->ahead[n].ready = false;
     }
@@ -138,16 +143,15 @@ void bst_smear_clear_ahead(bst_smear *s) {
 void bst_smear_begin_ahead(bst_smear *s, const bst_smear_frame *frame) {
     enum { AT_ONCE = 256 };
     bst_ctx none = {0};
-    if (!s->options.pool || !frame->list || bst_parallel_threads(s->options.pool) < 2 ||
+    if (!bst_smear_has_threads(s) || !frame->list ||
         bst_smear_reserve(&none, (void **)&s->ahead_xy, &s->ahead_xy_capacity, frame->sources,
                           2 * sizeof *s->ahead_xy) != BST_OK) {
         return;
     }
     stars_to_place stars = {s, frame->list, 0U};
     bst_parallel_for(s->options.pool, frame->sources, AT_ONCE, place_some, &stars);
-    if (!s->single) {
-        bst_motion_map_fill(s->map, s->options.pool, s->ahead_xy, frame->sources);
-    }
+    s->ahead_cells = s->single || bst_motion_map_fill(s->map, s->options.pool, s->ahead_xy,
+                                                      frame->sources);
     find_levels(&stars, frame->sources);
     find_paths(s, frame);
     things_to_make things = {.s = s};
@@ -179,6 +183,62 @@ bst_status bst_smear_take_ahead(bst_ctx *ctx, bst_smear *s, const bst_scene_sour
         *taken = true;
     }
     return BST_OK;
+}
+
+/* Sources that threads compute. */
+typedef struct sources_to_plan {
+    const bst_smear *s;
+    const bst_scene_source *list;
+    bst_smear_result *out;
+} sources_to_plan;
+
+/* Computes some of them (callback). */
+static void plan_some(void *user, int begin, int end) {
+    const sources_to_plan *all = user;
+    bst_smear own = *all->s;
+    own.fixed = true;
+    for (int i = begin; i < end; i++) {
+        bst_ctx none = {0};
+        bst_smear_result *r = &all->out[i];
+        r->known = bst_smear_source(&none, &own, &all->list[i], &r->record, &r->visible) == BST_OK;
+        r->leaves = own.last_leaves;
+        r->peak_e = own.last_peak_e;
+        r->read_e = own.last_read_e;
+        r->presence = own.last_presence;
+        r->error = own.last_error;
+    }
+}
+
+bst_status bst_smear_sources(bst_ctx *ctx, bst_smear *s, const bst_scene_source *list, int count,
+                             bst_smear_result *out) {
+    enum { AT_ONCE = 256 };
+    if (!s->ahead_cells) {
+        for (int i = 0; i < count; i++) {
+            out[i].known = false;
+        }
+        return BST_OK;
+    }
+    for (int n = 1; n < BST_SMEAR_LEVELS; n++) {
+        if (s->ahead[n].ready) {
+            BST_TRY(bst_smear_make_level(ctx, s, n));
+        }
+    }
+    sources_to_plan all = {s, list, out};
+    bst_parallel_for(s->options.pool, count, AT_ONCE, plan_some, &all);
+    return BST_OK;
+}
+
+void bst_smear_recall(bst_smear *s, const bst_smear_result *result, bst_kernel_source_record *out,
+                      bool *visible) {
+    s->last_leaves = result->leaves;
+    s->last_peak_e = result->peak_e;
+    s->last_read_e = result->read_e;
+    s->last_presence = result->presence;
+    s->last_error = result->error;
+    *visible = result->visible;
+    if (result->visible) {
+        *out = result->record;
+    }
 }
 
 void bst_smear_free_ahead(bst_smear *s) {

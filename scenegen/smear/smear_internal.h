@@ -77,6 +77,8 @@ struct bst_smear {
     bst_smear_ahead_level ahead[BST_SMEAR_LEVELS];
     bst_smear_ahead_path *ahead_paths;
     int ahead_count, ahead_capacity;
+    bool ahead_cells; /* the map's cells of all stars are filled */
+    bool fixed;       /* a thread's copy, which must not change what the copies share */
     double *ahead_xy; /* positions of the stars, px from the boresight */
     int ahead_xy_capacity;
 

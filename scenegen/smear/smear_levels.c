@@ -133,6 +133,9 @@ bst_status bst_smear_make_level(bst_ctx *ctx, bst_smear *s, int n) {
     if (s->levels[n].blocks > 0) {
         return BST_OK;
     }
+    if (s->fixed) {
+        return BST_ERR_STATE; /* seen by bst_smear_sources alone */
+    }
     if (s->ahead[n].ready) {
         return bst_smear_append_ahead(ctx, s, &s->ahead[n], &s->levels[n]);
     }
