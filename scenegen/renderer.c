@@ -15,6 +15,7 @@
 #include "scenegen/reference.h"
 #include "scenegen/render_request.h"
 #include "scenegen/saturation_count.h"
+#include "scenegen/scene_boxes.h"
 #include "scenegen/scene_kernels.h"
 #include "scenegen/scene_options.h"
 #include "scenegen/scene_plan.h"
@@ -38,9 +39,9 @@ struct bst_renderer {
     bst_device *device;
     bst_kernel_frame_params fixed; /* parameters of the kernels that are the camera's */
     char tile_options[256];        /* build options of the tile kernels */
-    cl_kernel nodes_kernel, frame_kernel, expected_kernel;
+    cl_kernel frame_kernel, expected_kernel;
     bst_scene_form form; /* of the tile kernels */
-    bool searches_blocks; /* they search the boxes of all blocks (kernels/block_boxes.cl) */
+    bst_scene_boxes boxes;
     bst_psf *psf;
     bst_fourier_render *fourier; /* NULL: Gaussian PSF, light from stamps */
     bst_smear *smear;
@@ -53,7 +54,7 @@ struct bst_renderer {
     cl_mem law; /* profile law of the stamps */
     bst_upload_ring *stage;
     cl_mem sources, shares, table; /* of the current frame; lent */
-    bst_device_array block_box, source_box, group_box, expected;
+    bst_device_array expected;
     bst_scene_plan plan;   /* of the latest request, or of its latest band */
     double *rolled_peak_e; /* of all sources, with the bands of a rolling shutter */
     int rolled_capacity, set;
@@ -77,10 +78,9 @@ static int taps_for(double sigma_px) {
 
 /* Builds the kernel of noise-free images at its first use. */
 static bst_status build_expected(bst_ctx *ctx, bst_renderer *r) {
-    return r->expected_kernel
-               ? BST_OK
-               : bst_scene_expected_kernel(ctx, r->device, r->form, r->tile_options,
-                                           &r->expected_kernel);
+    return r->expected_kernel ? BST_OK
+                              : bst_scene_expected_kernel(ctx, r->device, r->form, r->tile_options,
+                                                          &r->expected_kernel);
 }
 
 /* Builds the kernel of frames at its first use. */
@@ -97,9 +97,7 @@ static bst_status build_frame(bst_ctx *ctx, bst_renderer *r) {
 /* Builds the kernel of the nodes and sets the parameters that are the camera's. */
 static bst_status build(bst_ctx *ctx, bst_renderer *r) {
     r->form = (bst_scene_form){.lanes = r->options.group == 0, .fourier = r->fourier != NULL};
-    r->searches_blocks = r->form.lanes && !r->form.fourier;
-    BST_TRY((r->searches_blocks ? bst_scene_blocks_kernel : bst_scene_nodes_kernel)(
-        ctx, r->device, &r->nodes_kernel));
+    BST_TRY(bst_scene_boxes_create(ctx, r->device, r->form, r->most_bytes, &r->boxes));
     bst_scene_tile_options(&r->options, r->taps, r->law_degree, r->fourier != NULL, r->tile_options,
                            sizeof r->tile_options);
     r->fixed.nodes = bst_scene_node_params(&r->camera, r->options.spatial_oversample);
@@ -236,19 +234,19 @@ void bst_renderer_free(bst_renderer *r) {
         return;
     }
     clFinish(r->queue);
-    cl_mem buffers[] = {r->law, r->block_box.buffer, r->source_box.buffer, r->group_box.buffer,
-                        r->expected.buffer};
+    cl_mem buffers[] = {r->law, r->expected.buffer};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++) {
         if (buffers[i]) {
             clReleaseMemObject(buffers[i]);
         }
     }
-    cl_kernel kernels[] = {r->nodes_kernel, r->frame_kernel, r->expected_kernel};
-    for (size_t i = 0; i < 3; i++) {
+    cl_kernel kernels[] = {r->frame_kernel, r->expected_kernel};
+    for (size_t i = 0; i < sizeof kernels / sizeof *kernels; i++) {
         if (kernels[i]) {
             clReleaseKernel(kernels[i]);
         }
     }
+    bst_scene_boxes_clear(&r->boxes);
     bst_upload_ring_free(r->stage);
     bst_frame_pool_free(r->pool);
     bst_smear_free(r->smear);
@@ -295,83 +293,27 @@ static bst_status make_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_requ
     return BST_OK;
 }
 
-static bst_status set_args(bst_ctx *ctx, cl_kernel kernel, const void *const *values,
-                           const size_t *bytes, int count) {
-    for (int i = 0; i < count; i++) {
-        BST_TRY(bst_device_check(ctx, clSetKernelArg(kernel, (cl_uint)i, bytes[i], values[i]),
-                                 "setting a kernel argument"));
-    }
-    return BST_OK;
-}
-
-/* Uploads sources and tables. */
-static bst_status upload_scene(bst_ctx *ctx, bst_renderer *r) {
+/* Uploads sources and tables and enqueues the kernel of their boxes. */
+static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r) {
     const bst_scene_plan *plan = &r->plan;
     int table_blocks;
     const float *table = bst_smear_table(r->smear, &table_blocks);
-    BST_TRY(bst_upload_ring_put(
-        ctx, r->stage, BST_STAGE_TABLE, table,
-        (size_t)table_blocks * BST_TABLE_ROWS * BST_BLOCK * sizeof(float), &r->table));
+    BST_TRY(bst_upload_ring_put(ctx, r->stage, BST_STAGE_TABLE, table,
+                                (size_t)table_blocks * BST_TABLE_ROWS * BST_BLOCK * sizeof(float),
+                                &r->table));
     BST_TRY(bst_upload_ring_put(ctx, r->stage, BST_STAGE_SOURCES, plan->sources,
                                 (size_t)plan->count * sizeof *plan->sources, &r->sources));
-    return plan->shares
-               ? bst_upload_ring_put(ctx, r->stage, BST_STAGE_SHARES, plan->shares,
-                                     (size_t)plan->count * sizeof *plan->shares, &r->shares)
-               : BST_OK;
-}
-
-/* Enqueues the kernel of all blocks' boxes. */
-static bst_status enqueue_blocks(bst_ctx *ctx, bst_renderer *r) {
-    const int count = r->plan.count, blocks = r->plan.blocks;
-    size_t groups = ((size_t)blocks + BST_BLOCK - 1) / BST_BLOCK,
-           fars = (groups + BST_BLOCK - 1) / BST_BLOCK;
-    /* the blocks' boxes are followed by the number of each block's source */
-    size_t owners = (size_t)blocks * BST_BOX_BYTES, bytes = owners + (size_t)blocks * sizeof(cl_int);
-    BST_TRY(grow(ctx, r, &r->block_box, bytes));
-    BST_TRY(grow(ctx, r, &r->source_box, groups * BST_BOX_BYTES));
-    BST_TRY(grow(ctx, r, &r->group_box, fars * BST_BOX_BYTES));
-    if (count == 0) {
-        return BST_OK;
+    if (plan->shares) {
+        BST_TRY(bst_upload_ring_put(ctx, r->stage, BST_STAGE_SHARES, plan->shares,
+                                    (size_t)plan->count * sizeof *plan->shares, &r->shares));
     }
-    const void *values[] = {&r->fixed.nodes,       &r->sources,           &count,
-                            &blocks,               &r->table,             &r->block_box.buffer,
-                            &r->source_box.buffer, &r->group_box.buffer};
-    const size_t m = sizeof(cl_mem);
-    const size_t sizes[] = {sizeof r->fixed.nodes, m, sizeof count, sizeof blocks, m, m, m, m};
-    BST_TRY(set_args(ctx, r->nodes_kernel, values, sizes, 8));
-    size_t global = fars * BST_BOX_GROUP, local = BST_BOX_GROUP;
-    return bst_device_check(
-        ctx,
-        clEnqueueNDRangeKernel(r->queue, r->nodes_kernel, 1, NULL, &global, &local, 0, NULL, NULL),
-        "placing the scene's blocks");
-}
-
-/* Uploads sources and tables and enqueues the kernel of their boxes. */
-static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, const bst_kernel_frame_params *p) {
-    const bst_scene_plan *plan = &r->plan;
-    int count = plan->count;
-    size_t groups = (size_t)p->source_groups, more = (groups + BST_BLOCK - 1) / BST_BLOCK;
-    BST_TRY(upload_scene(ctx, r));
-    if (r->searches_blocks) {
-        return enqueue_blocks(ctx, r);
-    }
-    BST_TRY(grow(ctx, r, &r->block_box, (size_t)plan->boxes * BST_BLOCK * BST_BOX_BYTES));
-    BST_TRY(grow(ctx, r, &r->source_box, groups * BST_BLOCK * BST_BOX_BYTES));
-    BST_TRY(grow(ctx, r, &r->group_box, more * BST_BLOCK * BST_BOX_BYTES));
-    if (count == 0) {
-        return BST_OK;
-    }
-    const void *values[] = {&r->fixed.nodes,     &r->sources,          &count,
-                            &r->table,           &r->block_box.buffer, &r->source_box.buffer,
-                            &r->group_box.buffer};
-    const size_t m = sizeof(cl_mem);
-    const size_t bytes[] = {sizeof r->fixed.nodes, m, sizeof count, m, m, m, m};
-    BST_TRY(set_args(ctx, r->nodes_kernel, values, bytes, 7));
-    size_t global = groups * BST_BLOCK, local = BST_BLOCK;
-    return bst_device_check(
-        ctx,
-        clEnqueueNDRangeKernel(r->queue, r->nodes_kernel, 1, NULL, &global, &local, 0, NULL, NULL),
-        "placing the scene's nodes");
+    const bst_scene_boxes_input input = {.nodes = &r->fixed.nodes,
+                                         .count = plan->count,
+                                         .blocks = plan->blocks,
+                                         .boxes = plan->boxes,
+                                         .sources = r->sources,
+                                         .table = r->table};
+    return bst_scene_boxes_enqueue(ctx, &r->boxes, r->queue, &input);
 }
 
 /* Buffer for the frame's saturation counts. */
@@ -388,9 +330,9 @@ static bst_status begin_set(bst_ctx *ctx, bst_renderer *r) {
 /* Renders the light image for the tile kernel if the PSF is not Gaussian. */
 static bst_status make_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                              bst_kernel_frame_params *p, cl_mem *light) {
-    bst_fourier_render_nodes nodes = {r->sources,           r->table,  r->block_box.buffer,
-                                      r->source_box.buffer, r->shares, p->source_groups,
-                                      r->plan.fine};
+    bst_fourier_render_nodes nodes = {
+        r->sources, r->table,         r->boxes.block.buffer, r->boxes.source.buffer,
+        r->shares,  p->source_groups, r->plan.fine};
     bst_fourier_render_image image;
     BST_TRY(bst_fourier_render_frame(ctx, r->fourier, r->queue, q->window, &nodes, &image));
     p->light_first = image.first;
@@ -417,7 +359,7 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     }
     bst_kernel_frame_params p =
         bst_render_params(&r->fixed, &r->camera, &r->options, q, r->plan.count);
-    BST_TRY(enqueue_nodes(ctx, r, &p));
+    BST_TRY(enqueue_nodes(ctx, r));
     p.blocks = r->plan.blocks;
     p.image_stride = to->stride > 0 ? to->stride : p.image_stride;
     p.background_e = to->light_only ? 0.0f : p.background_e;
@@ -444,9 +386,9 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     const void *values[ALL] = {&p,
                                &r->sources,
                                &r->table,
-                               &r->block_box.buffer,
-                               &r->source_box.buffer,
-                               &r->group_box.buffer,
+                               &r->boxes.block.buffer,
+                               &r->boxes.source.buffer,
+                               &r->boxes.group.buffer,
                                &light,
                                &background,
                                &to->out,
@@ -457,7 +399,8 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
         values[COMMON + 1 + i] = &maps[i];
         bytes[COMMON + 1 + i] = m;
     }
-    BST_TRY(set_args(ctx, kernel, values, bytes, kernel == r->frame_kernel ? ALL : COMMON));
+    BST_TRY(bst_scene_kernel_arguments(ctx, kernel, values, bytes,
+                                       kernel == r->frame_kernel ? ALL : COMMON));
     size_t group = (size_t)r->options.group, global = 0;
     if (r->form.lanes) {
         group = (size_t)BST_ROW_LANES * (size_t)r->options.tile_height;

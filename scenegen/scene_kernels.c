@@ -15,6 +15,15 @@ bst_status bst_scene_kernel(bst_ctx *ctx, bst_device *device,
     return bst_device_check(ctx, code, name);
 }
 
+bst_status bst_scene_kernel_arguments(bst_ctx *ctx, cl_kernel kernel, const void *const *values,
+                                      const size_t *bytes, int count) {
+    for (int i = 0; i < count; i++) {
+        BST_TRY(bst_device_check(ctx, clSetKernelArg(kernel, (cl_uint)i, bytes[i], values[i]),
+                                 "setting a kernel argument"));
+    }
+    return BST_OK;
+}
+
 bst_status bst_scene_nodes_kernel(bst_ctx *ctx, bst_device *device, cl_kernel *out) {
     static const bst_device_kernel_source *const sources[] = {
         &bst_kernel_scene_shared, &bst_kernel_lanes, &bst_kernel_nodes, &bst_kernel_node_boxes};
@@ -44,9 +53,9 @@ static void add(program *p, const bst_device_kernel_source *const *sources, size
     }
 }
 
-#define ADD(program, ...)                                                           \
-    do {                                                                            \
-        const bst_device_kernel_source *const list_of_sources[] = {__VA_ARGS__};    \
+#define ADD(program, ...)                                                                \
+    do {                                                                                 \
+        const bst_device_kernel_source *const list_of_sources[] = {__VA_ARGS__};         \
         add(program, list_of_sources, sizeof list_of_sources / sizeof *list_of_sources); \
     } while (0)
 

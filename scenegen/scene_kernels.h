@@ -17,6 +17,14 @@ bst_status bst_scene_kernel(bst_ctx *ctx, bst_device *device,
                             const bst_device_kernel_source *const *sources, int count,
                             const char *options, const char *name, cl_kernel *out) BST_MUST_CHECK;
 
+/* Sets the arguments of a kernel.
+ *
+ * Given:     values  [count]
+ *            bytes   [count] their sizes
+ * Errors:    BST_ERR_DEVICE */
+bst_status bst_scene_kernel_arguments(bst_ctx *ctx, cl_kernel kernel, const void *const *values,
+                                      const size_t *bytes, int count) BST_MUST_CHECK;
+
 /* Kernel of the boxes of nodes (kernels/node_boxes.cl). Errors: as bst_device_build. */
 bst_status bst_scene_nodes_kernel(bst_ctx *ctx, bst_device *device, cl_kernel *out) BST_MUST_CHECK;
 

@@ -338,8 +338,8 @@ static float box_error(const bst_error_budget *c, const cell *middle) {
            REST * fmaxf(others, sum.second) + BORDERS * (sum.border - sum.worst_border);
 }
 
-/* Cells by the square of SIDE cells that they lie in, as lists, to find those within REACH of a cell
- * without a search for each place. */
+/* Cells by the square of SIDE cells that they lie in, as lists, to find those within REACH of a
+ * cell without a search for each place. */
 enum { SIDE_BITS = 3, SQUARE_BITS = 12 };
 _Static_assert(REACH <= 1 << SIDE_BITS, "a cell's neighbours lie in its square or the next");
 
@@ -379,8 +379,8 @@ static float crossing_error(const bst_error_budget *c, squares *all, const cell 
     return middle->worst_border + other;
 }
 
-/* Largest error where borders cross, from `worst` on. Both cells of a pair find it; the one with the
- * larger border, at least half of the pair's error, suffices. */
+/* Largest error where borders cross, from `worst` on. Both cells of a pair find it; the one with
+ * the larger border, at least half of the pair's error, suffices. */
 static float worst_crossing(const bst_error_budget *c, int cells, float worst) {
     squares all;
     assert(cells <= MOST_CROSSINGS);

@@ -99,8 +99,8 @@ typedef struct bst_smear_result {
  * Given:     list  [count], the frame's sources
  * Returned:  out   [count]
  * Errors:    BST_ERR_MEMORY */
-bst_status bst_smear_sources(bst_ctx *ctx, bst_smear *smear, const bst_scene_source *list, int count,
-                             bst_smear_result *out) BST_MUST_CHECK;
+bst_status bst_smear_sources(bst_ctx *ctx, bst_smear *smear, const bst_scene_source *list,
+                             int count, bst_smear_result *out) BST_MUST_CHECK;
 /* True if the options have a pool of several threads. */
 bool bst_smear_has_threads(const bst_smear *smear);
 /* Makes a known source the latest one, as bst_smear_source does; *visible and *out as there. */

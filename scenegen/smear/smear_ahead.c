@@ -150,8 +150,8 @@ void bst_smear_begin_ahead(bst_smear *s, const bst_smear_frame *frame) {
     }
     stars_to_place stars = {s, frame->list, 0U};
     bst_parallel_for(s->options.pool, frame->sources, AT_ONCE, place_some, &stars);
-    s->ahead_cells = s->single || bst_motion_map_fill(s->map, s->options.pool, s->ahead_xy,
-                                                      frame->sources);
+    s->ahead_cells =
+        s->single || bst_motion_map_fill(s->map, s->options.pool, s->ahead_xy, frame->sources);
     find_levels(&stars, frame->sources);
     find_paths(s, frame);
     things_to_make things = {.s = s};

@@ -134,12 +134,13 @@ bst_status bst_smear_make_ahead(bst_ctx *ctx, const bst_smear *s, int n,
 
 /* Forgets what was computed ahead. */
 void bst_smear_clear_ahead(bst_smear *s);
-/* With a pool of threads: computes the motion map's cells that hold stars, the levels with which the
- * frame's stars begin, and the nodes of its moving sources. What is missing, or fails, is computed
- * when it is used. */
+/* With a pool of threads: computes the motion map's cells that hold stars, the levels with which
+ * the frame's stars begin, and the nodes of its moving sources. What is missing, or fails, is
+ * computed when it is used. */
 void bst_smear_begin_ahead(bst_smear *s, const bst_smear_frame *frame);
-/* Sets the work list and the last_... values of a moving source, as bst_smear_moving_nodes does, from
- * those computed ahead, and appends the nodes to the table. *taken: false if there are none. */
+/* Sets the work list and the last_... values of a moving source, as bst_smear_moving_nodes does,
+ * from those computed ahead, and appends the nodes to the table. *taken: false if there are none.
+ */
 bst_status bst_smear_take_ahead(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
                                 bst_smear_level *out, bool *taken) BST_MUST_CHECK;
 /* Frees what was computed ahead. */

@@ -159,8 +159,8 @@ bst_status bst_smear_make_ahead(bst_ctx *ctx, const bst_smear *s, int n,
     bst_smear own = *s; /* the nodes are the only work space */
     own.nodes = out->nodes;
     bst_smear_nodes_clear(&own.nodes);
-    bst_status status = bst_smear_path_nodes(ctx, &own, s->path, s->path_count, 1.0, !s->single,
-                                             s->tolerance[n]);
+    bst_status status =
+        bst_smear_path_nodes(ctx, &own, s->path, s->path_count, 1.0, !s->single, s->tolerance[n]);
     if (status == BST_OK) {
         status = bst_smear_describe_ahead(ctx, &own, s->single, out);
     }

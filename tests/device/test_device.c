@@ -71,11 +71,13 @@ static void logs_without_names_get_them(void **state) {
     const bst_device_kernel_source *sources[] = {&one, &two};
     const char *texts[] = {"#define X\n", "\n#line 1 \"one.cl\"\n", one.text,
                            "\n#line 1 \"two.cl\"\n", two.text};
-    char *log = bst_build_log_with_names("<kernel>:9:9: error: use of 'e'\n<kernel>:4:5: note\n"
-                                         "<kernel>:1:1: warning <kernel>:99:1: end",
-                                         texts, 5, sources);
-    assert_string_equal(log, "two.cl:2:9: error: use of 'e'\none.cl:1:5: note\n"
-                             "<kernel>:1:1: warning <kernel>:99:1: end");
+    char *log = bst_build_log_with_names(
+        "<kernel>:9:9: error: use of 'e'\n<kernel>:4:5: note\n"
+        "<kernel>:1:1: warning <kernel>:99:1: end",
+        texts, 5, sources);
+    assert_string_equal(log,
+                        "two.cl:2:9: error: use of 'e'\none.cl:1:5: note\n"
+                        "<kernel>:1:1: warning <kernel>:99:1: end");
     free(log);
 }
 

@@ -1,0 +1,39 @@
+/* Boxes by which the tiles of a frame find their nodes: of blocks, of sources or groups of blocks,
+ * and of groups of these (kernels/node_boxes.cl, block_boxes.cl). */
+#ifndef BST_SCENEGEN_SCENE_BOXES_H
+#define BST_SCENEGEN_SCENE_BOXES_H
+
+#include "scenegen/device_array.h"
+#include "scenegen/kernels/scene_shared.h"
+#include "scenegen/scene_kernels.h"
+
+typedef struct bst_scene_boxes {
+    bool of_blocks; /* of all blocks, for the search by work-groups (kernels/gather.cl) */
+    cl_context context;
+    uint64_t most_bytes; /* largest buffer of the device */
+    cl_kernel kernel;
+    bst_device_array block, source, group;
+} bst_scene_boxes;
+
+/* Builds the kernel for tiles of a form.
+ *
+ * Given:     most_bytes  largest buffer of the device
+ * Returned:  *out        to be cleared with bst_scene_boxes_clear, after an error too
+ * Errors:    as bst_device_build */
+bst_status bst_scene_boxes_create(bst_ctx *ctx, bst_device *device, bst_scene_form form,
+                                  uint64_t most_bytes, bst_scene_boxes *out) BST_MUST_CHECK;
+/* Releases kernel and buffers. */
+void bst_scene_boxes_clear(bst_scene_boxes *boxes);
+
+/* Sources and nodes of a frame. */
+typedef struct bst_scene_boxes_input {
+    const bst_kernel_node_params *nodes;
+    int count, blocks, boxes; /* of bst_scene_plan */
+    cl_mem sources, table;
+} bst_scene_boxes_input;
+
+/* Enqueues the kernel, with room for its results. Errors: BST_ERR_DEVICE. */
+bst_status bst_scene_boxes_enqueue(bst_ctx *ctx, bst_scene_boxes *boxes, cl_command_queue queue,
+                                   const bst_scene_boxes_input *input) BST_MUST_CHECK;
+
+#endif
