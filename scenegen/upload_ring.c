@@ -123,6 +123,9 @@ bst_status bst_upload_ring_put(bst_ctx *ctx, bst_upload_ring *s, bst_upload_ring
     staged *p = &s->parts[s->present][part];
     BST_TRY(grow(ctx, s, p, bytes));
     if (!p->mapped) {
+        /* the device may still read what was handed over before, for another band of the frame:
+         * NVIDIA's driver lends the same memory again before it is copied */
+        BST_TRY(bst_device_check(ctx, clFinish(s->queue), "waiting for scene memory"));
         BST_TRY(map(ctx, s, p));
     }
     BST_TRY(await(ctx, p));

@@ -205,8 +205,10 @@ static void near_passes_are_drawn_where_they_cross(void **state) {
     }
 }
 
-/* Pixels and group of tiles other than the device's. */
-static const int other_tiles[][3] = {{64, 4, 16}, {64, 16, 2}, {512, 64, 1}};
+/* Pixels and group of tiles other than the device's, of its form: work-items that render a tile
+ * each, or work-groups (test_gpu_form.c compares the forms). */
+static const int other_tiles[2][3][3] = {{{64, 4, 16}, {64, 16, 2}, {512, 64, 1}},
+                                         {{64, 4, 0}, {64, 16, 0}, {64, 3, 0}}};
 
 /* The same pixels from any window, tile, group and number of threads. shapes: number of the tiles
  * above that are tried. */
@@ -247,9 +249,9 @@ static void bytes_do_not_depend_on(fixture *f, double read_noise_e, double full_
     q.window = (bst_window){0, 0, W, H};
     for (int i = 0; i < shapes; i++) {
         bst_renderer_options options = bst_renderer_default_options();
-        options.tile_width = other_tiles[i][0];
-        options.tile_height = other_tiles[i][1];
-        options.group = other_tiles[i][2];
+        options.tile_width = other_tiles[!bst_device_is_cpu(f->device)][i][0];
+        options.tile_height = other_tiles[!bst_device_is_cpu(f->device)][i][1];
+        options.group = other_tiles[!bst_device_is_cpu(f->device)][i][2];
         r = make(f, &camera, &options);
         frame_of(f, r, &q, other);
         assert_memory_equal(full, other, sizeof full);
@@ -302,8 +304,10 @@ static void light_does_not_depend_on_tiles(void **state) {
                             .sources = stars,
                             .count = STARS,
                             .background_e = 3.0};
-    const int tiles[][3] = {{64, 64, 1}, {64, 1, 32}, {64, 2, 16}, {0, 0, 0}};
-    for (size_t i = 0; i < sizeof tiles / sizeof *tiles; i++) {
+    static const int vectors[4][3] = {{64, 64, 1}, {64, 1, 32}, {64, 2, 16}, {0, 0, 0}},
+                     lanes[4][3] = {{64, 16, 0}, {64, 1, 0}, {64, 3, 0}, {0, 0, 0}};
+    for (int i = 0; i < 4; i++) {
+        const int(*tiles)[3] = bst_device_is_cpu(f->device) ? vectors : lanes;
         bst_renderer_options options = bst_renderer_default_options();
         options.tile_width = tiles[i][0];
         options.tile_height = tiles[i][1];
