@@ -143,6 +143,18 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     return BST_OK;
 }
 
+/* Starts the threads of the planning, if the device leaves the processor idle, and creates the
+ * detector. */
+static bst_status open_detector(bst_ctx *ctx, bst_device *device, bst_renderer *r) {
+    int threads = r->options.planning_threads;
+    if (threads > 1 || (threads == 0 && !bst_device_is_cpu(device))) {
+        BST_TRY(bst_parallel_create(ctx, threads, &r->planners));
+    }
+    BST_TRY(bst_detector_create(ctx, device, &r->camera, r->options.pattern, r->planners,
+                                &r->detector));
+    return r->options.saturation_flags ? bst_detector_keep_flags(ctx, r->detector) : BST_OK;
+}
+
 bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                const bst_renderer_options *options, bst_renderer **out) {
     assert(device && camera && out);
@@ -178,10 +190,8 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         status = open_psf(ctx, device, r, &smear);
     }
     if (status == BST_OK) {
-        status = bst_detector_create(ctx, device, camera, r->options.pattern, &r->detector);
-    }
-    if (status == BST_OK && r->options.saturation_flags) {
-        status = bst_detector_keep_flags(ctx, r->detector);
+        status = open_detector(ctx, device, r);
+        smear.pool = r->planners;
     }
     if (status == BST_OK) {
         r->law_degree = r->fourier          ? 0
@@ -196,11 +206,6 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     }
     if (status == BST_OK) {
         status = build(ctx, r);
-    }
-    int threads = r->options.planning_threads;
-    if (status == BST_OK && (threads > 1 || (threads == 0 && !bst_device_is_cpu(device)))) {
-        status = bst_parallel_create(ctx, threads, &r->planners);
-        smear.pool = r->planners;
     }
     if (status == BST_OK) {
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
@@ -250,13 +255,13 @@ void bst_renderer_free(bst_renderer *r) {
     bst_upload_ring_free(r->stage);
     bst_frame_pool_free(r->pool);
     bst_smear_free(r->smear);
-    bst_parallel_free(r->planners);
     bst_error_budget_free(r->budget);
     bst_fourier_render_free(r->fourier);
     bst_psf_free(r->psf);
     bst_readout_free(r->readout);
     bst_rolling_free(r->rolling);
     bst_detector_free(r->detector);
+    bst_parallel_free(r->planners);
     clReleaseCommandQueue(r->queue);
     clReleaseContext(r->context);
     bst_scene_plan_clear(&r->plan);

@@ -14,7 +14,8 @@
 struct bst_detector {
     bst_camera camera;
     bst_rng_key pattern;
-    int stride; /* of the maps: sensor width rounded up to chunks of 64 */
+    bst_parallel *pool; /* lent */
+    int stride;         /* of the maps: sensor width rounded up to chunks of 64 */
     cl_context context;
     cl_command_queue queue;
     cl_mem gain, dark, overlay, offsets, codes, flags;
@@ -183,7 +184,7 @@ static bst_status make_all(bst_ctx *ctx, bst_device *device, bst_detector *d) {
 }
 
 bst_status bst_detector_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
-                               bst_rng_key pattern, bst_detector **out) {
+                               bst_rng_key pattern, bst_parallel *pool, bst_detector **out) {
     assert(device && camera && out);
     *out = NULL;
     bst_detector *d = calloc(1, sizeof *d);
@@ -192,6 +193,7 @@ bst_status bst_detector_create(bst_ctx *ctx, bst_device *device, const bst_camer
     }
     d->camera = *camera;
     d->pattern = pattern;
+    d->pool = pool;
     d->stride = (int)((camera->width_px + 63) / 64 * 64);
     d->context = bst_device_context(device);
     d->queue = bst_device_queue(device);
@@ -278,15 +280,33 @@ static bst_status begin_hits(bst_ctx *ctx, bst_detector *d, bst_upload_ring *sta
     return deposit(ctx, d, 1.0f);
 }
 
+/* Row offsets of an exposure that threads draw. */
+typedef struct rows_to_draw {
+    const float *fixed;
+    float *sum;
+    double rms;
+    bst_rng_key key;
+    uint64_t exposure;
+} rows_to_draw;
+
+/* Draws those of some rows (callback). */
+static void draw_rows(void *user, int begin, int end) {
+    const rows_to_draw *all = user;
+    for (int y = begin; y < end; y++) {
+        double z = bst_rng_normal(all->key, all->exposure, (uint64_t)y);
+        all->sum[y] = all->fixed[y] + (float)(all->rms * z);
+    }
+}
+
 /* Draws and uploads the row offsets of an exposure. */
 static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage, bst_rng_key key,
                              int64_t exposure_id) {
     size_t height = (size_t)d->camera.height_px, bytes = height * sizeof(float);
     float *sum = d->rows + height;
-    double rms = d->camera.detector.row_noise_e / d->camera.gain_e_per_dn;
-    for (size_t y = 0; y < height; y++) {
-        sum[y] = d->rows[y] + (float)(rms * bst_rng_normal(key, (uint64_t)exposure_id, y));
-    }
+    enum { AT_ONCE = 128 };
+    rows_to_draw rows = {d->rows, sum, d->camera.detector.row_noise_e / d->camera.gain_e_per_dn,
+                         key, (uint64_t)exposure_id};
+    bst_parallel_for(d->pool, (int)height, AT_ONCE, draw_rows, &rows);
     cl_mem sent;
     BST_TRY(bst_upload_ring_put(ctx, stage, BST_STAGE_ROWS, sum, bytes, &sent));
     return bst_device_check(

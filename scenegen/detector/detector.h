@@ -10,6 +10,7 @@
 #include "scenegen/detector/cosmic_rays.h"
 #include "scenegen/kernels/scene_shared.h"
 #include "scenegen/upload_ring.h"
+#include "sim/core/parallel.h"
 #include "sim/device/device.h"
 
 enum { BST_DETECTOR_BUFFERS = 6 };
@@ -19,10 +20,12 @@ typedef struct bst_detector bst_detector;
 /* Creates the fixed-pattern maps and tables of a camera on the device.
  *
  * Given:     pattern  random key of the fixed patterns
+ *            pool     threads for what each exposure draws; lent; NULL: the caller's alone
  * Errors:    BST_ERR_CONFIG, naming the key, for an unusable map or code table; BST_ERR_DEVICE,
  *            BST_ERR_MEMORY */
 bst_status bst_detector_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
-                               bst_rng_key pattern, bst_detector **out) BST_MUST_CHECK;
+                               bst_rng_key pattern, bst_parallel *pool,
+                               bst_detector **out) BST_MUST_CHECK;
 /* Frees a detector with its buffers on the device; NULL is allowed. */
 void bst_detector_free(bst_detector *detector);
 

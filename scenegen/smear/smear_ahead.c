@@ -1,6 +1,7 @@
 /* Nodes of a frame computed ahead of their use, on several threads: what a GPU's host is busy with,
  * while the processor's other cores are idle. The results are those computed when they are used. */
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 
 #include "scenegen/smear/smear_internal.h"
@@ -99,7 +100,7 @@ static void make_some(void *user, int begin, int end) {
 typedef struct stars_to_place {
     bst_smear *s;
     const bst_scene_source *list;
-    unsigned levels;
+    atomic_uint levels;
 } stars_to_place;
 
 /* Places some stars (callback). */
@@ -113,19 +114,23 @@ static void place_some(void *user, int begin, int end) {
     }
 }
 
-/* Finds the levels with which the stars begin. */
-static void find_levels(stars_to_place *all, int count) {
-    bst_smear *s = all->s;
-    for (int i = 0; i < count; i++) {
-        double x = s->ahead_xy[2 * i], y = s->ahead_xy[2 * i + 1];
+/* Finds the levels with which some of the stars begin (callback). */
+static void find_levels(void *user, int begin, int end) {
+    stars_to_place *all = user;
+    bst_smear own = *all->s; /* for last_read_e */
+    unsigned levels = 0U;
+    for (int i = begin; i < end; i++) {
+        double x = own.ahead_xy[2 * i], y = own.ahead_xy[2 * i + 1];
         if (isnan(x)) {
             continue;
         }
-        const bst_smear_star_motion_cell *cell = s->single ? NULL : bst_motion_map_at(s->map, x, y);
-        s->last_read_e = all->list[i].electrons_per_s * s->duration_s *
-                         (cell ? cell->read_share : s->read_share);
-        all->levels |= 1U << bst_smear_choose_level(s, cell ? cell->scale : 1.0);
+        const bst_smear_star_motion_cell *cell =
+            own.single ? NULL : bst_motion_map_at(own.map, x, y);
+        own.last_read_e = all->list[i].electrons_per_s * own.duration_s *
+                          (cell ? cell->read_share : own.read_share);
+        levels |= 1U << bst_smear_choose_level(&own, cell ? cell->scale : 1.0);
     }
+    atomic_fetch_or(&all->levels, levels);
 }
 
 bool bst_smear_has_threads(const bst_smear *s) {
@@ -152,12 +157,14 @@ void bst_smear_begin_ahead(bst_smear *s, const bst_smear_frame *frame) {
     bst_parallel_for(s->options.pool, frame->sources, AT_ONCE, place_some, &stars);
     s->ahead_cells =
         s->single || bst_motion_map_fill(s->map, s->options.pool, s->ahead_xy, frame->sources);
-    find_levels(&stars, frame->sources);
+    if (s->ahead_cells) {
+        bst_parallel_for(s->options.pool, frame->sources, AT_ONCE, find_levels, &stars);
+    }
     find_paths(s, frame);
     things_to_make things = {.s = s};
     int levels = 0;
     for (int n = BST_SMEAR_LEVELS - 1; n > 0; n--) {
-        if (stars.levels >> n & 1U) {
+        if (atomic_load(&stars.levels) >> n & 1U) {
             things.levels[levels++] = n;
         }
     }
