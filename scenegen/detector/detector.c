@@ -303,7 +303,7 @@ static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *sta
                              int64_t exposure_id) {
     size_t height = (size_t)d->camera.height_px, bytes = height * sizeof(float);
     float *sum = d->rows + height;
-    enum { AT_ONCE = 128 };
+    enum { AT_ONCE = 512 };
     rows_to_draw rows = {d->rows, sum, d->camera.detector.row_noise_e / d->camera.gain_e_per_dn,
                          key, (uint64_t)exposure_id};
     bst_parallel_for(d->pool, (int)height, AT_ONCE, draw_rows, &rows);

@@ -239,7 +239,7 @@ static bst_status begin_map(bst_ctx *ctx, bst_smear *s) {
 }
 
 /* Samples of the track whose path points a thread makes at a time. */
-enum { SAMPLES_AT_ONCE = 128 };
+enum { SAMPLES_AT_ONCE = 512 };
 
 /* Makes the path points from the track's samples begin to end (callback). */
 static void fill_path(void *user, int begin, int end) {

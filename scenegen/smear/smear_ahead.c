@@ -146,7 +146,7 @@ void bst_smear_clear_ahead(bst_smear *s) {
 }
 
 void bst_smear_begin_ahead(bst_smear *s, const bst_smear_frame *frame) {
-    enum { AT_ONCE = 256 };
+    enum { AT_ONCE = 1024 }; /* some 50 us: waking a thread takes about as long */
     bst_ctx none = {0};
     if (!bst_smear_has_threads(s) || !frame->list ||
         bst_smear_reserve(&none, (void **)&s->ahead_xy, &s->ahead_xy_capacity, frame->sources,

@@ -115,7 +115,10 @@ void bst_parallel_for(bst_parallel *pool, int count, int grain, bst_parallel_fn 
     pool->grain = grain;
     pool->next = 0;
     pool->count = count;
-    pthread_cond_broadcast(&pool->work);
+    /* no more than there are parts: the others would only contend for the lock */
+    for (int i = 0; i < pool->worker_count && i < (count - 1) / grain; i++) {
+        pthread_cond_signal(&pool->work);
+    }
     take_parts(pool);
     while (pool->busy > 0) {
         pthread_cond_wait(&pool->done, &pool->lock);
