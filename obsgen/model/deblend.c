@@ -5,17 +5,20 @@
 
 #include "obsgen/generator_internal.h"
 
-/* Depth of the saddle, sigma and share of the fainter source, that separates two sources; positions
- * closer than CLOSEST_FWHM are one. */
+/* Depth of the saddle, sigma and share of the fainter source, that separates two sources: those of
+ * imgproc/detect/candidates.c; positions closer than CLOSEST_FWHM are one (SAME_FWHM of
+ * imgproc/measure/deblend.c). */
 static const double SADDLE_SIGMA = 3.0, SADDLE_SHARE = 0.15, CLOSEST_FWHM = 0.6;
 /* Interpolation starts at these shares of the threshold: the output of a source between four pixels
- * on one of them. */
+ * on one of them, as in interpolation_threshold of imgproc/detect/detect.c. */
 static const double LOOK_CORNER = 0.93, LOOK_SHARE = 0.65;
-/* Sources farther apart than this, plus their streaks, share no maximum. */
+/* Sources farther apart than this, plus their streaks, share no maximum: the filter output of one
+ * is exp(-8^2 / 4) = 1e-7 of its own there. */
 static const double FAR_SIGMAS = 8.0;
 /* Light below this SNR at both maxima does not affect the saddle. */
 static const double LEAST_LIGHT = 0.3;
-/* A saddle this many sigma away from the limit is decided without a noise draw. */
+/* A saddle this many sigma away from the limit is decided without a noise draw: noise would change
+ * 3e-5 of them. */
 static const double CERTAIN_SIGMAS = 4.0;
 /* Random stream of the noise between two maxima: 32 draws per source. */
 static const uint64_t SADDLE_NOISE = (uint64_t)1 << 54;

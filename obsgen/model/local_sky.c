@@ -7,7 +7,9 @@
 
 #include "boresight/vec.h"
 
-/* Clip level of image processing, and agreement of opposite neighbour meshes in standard errors. */
+/* Clip level of image processing, and agreement of opposite neighbour meshes in standard errors
+ * (imgproc/detect/background.c): 4 of the difference between a mesh and the mean of two, whose
+ * variance is 1 + 1/2 of a mesh's. */
 static const double CLIP_SIGMA = 3.0, AGREEMENT = 4.0 * 1.2247449;
 
 enum { PER_SNR = 4 };
