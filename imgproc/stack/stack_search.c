@@ -9,9 +9,9 @@ enum { GROUP = 4, MAX_GROUPS = BST_STACK_MAX_FRAMES / GROUP, HITS = 16384, MAX_R
 
 /* Grid steps in units of the noise field's length 1 / sqrt(roughness) at the paths' ends: of groups
  * and of the whole stack. A rate is up to half a step off on each axis, so that the ends are off by
- * a quarter of a step, uniformly. At a distance of d lengths the signal loses d^2 / 2: averaged over
- * rates, both axes and the frames (STEP / 4)^2 / 9 = 2 % and 1.2 % of the sum, at most three times
- * that. Pixels, to whose centres all positions are rounded, lose several times as much. */
+ * a quarter of a step, uniformly. At a distance of d lengths the signal loses d^2 / 2: averaged
+ * over rates, both axes and the frames (STEP / 4)^2 / 9 = 2 % and 1.2 % of the sum, at most three
+ * times that. Pixels, to whose centres all positions are rounded, lose several times as much. */
 static const double GROUP_STEP = 1.3, STEP = 1.7;
 /* Grid sums down to this margin below the threshold are refined: the loss of the grid's steps and
  * pixels. Measured by tests/imgproc/calibrate_stack_search.c: 0.5 to 1.0 on average by the width of
