@@ -322,13 +322,41 @@ static void the_body_turns_on(void **state) {
     bst_assert_close(bst_vec3_norm(change), 0.0, 1e-5); /* half of w^2 in a second */
 }
 
+/* A slew begins where the axes are at its tick: at the encoders' angles, carried on by their rates
+ * since. */
+static void slews_begin_at_the_axes(void **state) {
+    (void)state;
+    bench b;
+    open_bench(&b, mount_at(100, 20), (bst_vec3){0, 0, 0});
+    b.guidance.config.slews = BST_SLEWS_PLANNED;
+    bst_mount_status status = {0};
+    bst_mount_two_axis_status(&b.plant, 1000, &status);
+    const double angle[2] = {0.3, -0.2}, rate[2] = {0.02, -0.013};
+    for (int i = 0; i < 2; i++) {
+        status.axis[i].angle_rad = angle[i];
+        status.axis[i].rate_radps = rate[i];
+    }
+    bst_guidance_telemetry(&b.guidance, &status);
+    bst_guidance_see_sky(&b.guidance, &b.nav, BST_QUAT_IDENTITY);
+    bst_los_command command = {.tick = 1400, .direction_gcrf = mount_at(100, 20)};
+    bool give;
+    bst_vec3 boresight = mount_at(0, 0);
+    bst_assert_ok(&b.ctx, bst_guidance_command(&b.ctx, &b.guidance, &boresight, &command, &give));
+    assert_true(give && b.guidance.slew.active && command.near_given);
+    for (int i = 0; i < 2; i++) {
+        double at, speed, accel;
+        bst_slew_axis_at(&b.guidance.slew.axis[i], 0.0, &at, &speed, &accel);
+        bst_assert_close(at, angle[i] + 0.4 * rate[i], 1e-12);
+        bst_assert_close(speed, rate[i], 1e-12);
+        bst_assert_close(command.near_rad[i], angle[i] + 0.4 * rate[i], 1e-12);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_body_turns_on),
-        cmocka_unit_test(cones_of_the_sky),
-        cmocka_unit_test(nothing_asked_nothing_changed),
-        cmocka_unit_test(slews_of_least_time),
-        cmocka_unit_test(keeps_out_of_the_sun),
+        cmocka_unit_test(the_body_turns_on),   cmocka_unit_test(slews_begin_at_the_axes),
+        cmocka_unit_test(cones_of_the_sky),    cmocka_unit_test(nothing_asked_nothing_changed),
+        cmocka_unit_test(slews_of_least_time), cmocka_unit_test(keeps_out_of_the_sun),
         cmocka_unit_test(occultation_ahead),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
