@@ -168,7 +168,8 @@ static void a_turned_sky(void **state) {
             expect_vec(q->items[i].rate_gcrf_radps, turned(&t, p->items[i].rate_gcrf_radps), 1e-10);
         }
     }
-    print_message("%d tracks compared, %d confirmed, %d frames without attitude\n", compared, confirmed, invalid);
+    print_message("%d tracks compared, %d confirmed, %d frames without attitude\n", compared,
+                  confirmed, invalid);
     assert_true(compared > 250 && confirmed > 100 && invalid >= 4);
     world_close(&w);
     bst_tracker_free(t.w.tracker);
@@ -177,7 +178,29 @@ static void a_turned_sky(void **state) {
     free(t.w.predictions);
 }
 
+/* Stars that are vague along columns or along rows leave the attitude about one axis open: either
+ * is too little. */
+static void both_axes_of_the_attitude_are_needed(void **state) {
+    (void)state;
+    static const options o = {.sigma_px = 0.1, .pd = 1.0, .frames = 1};
+    for (int vague = 0; vague < 3; vague++) {
+        static world w;
+        world_open(&w, 6, &o);
+        (void)expose(&w, 0);
+        for (int i = 0; i < w.detections->count; i++) {
+            w.detections->items[i].cov_xx = vague == 1 ? 900.0 : 0.01;
+            w.detections->items[i].cov_yy = vague == 2 ? 900.0 : 0.01;
+        }
+        bst_tracker_input input = make_input(&w, 0);
+        bst_tracker_outcome outcome =
+            bst_tracker_step(w.tracker, &input, w.tracks, 256, w.predictions, 256);
+        assert_int_equal(outcome, vague == 0 ? BST_TRACKER_USED : BST_TRACKER_NO_ATTITUDE);
+        world_close(&w);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_turned_sky)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_turned_sky),
+                                       cmocka_unit_test(both_axes_of_the_attitude_are_needed)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
