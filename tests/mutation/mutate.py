@@ -344,7 +344,8 @@ def main():
                         "one run at a time there")
     parser.add_argument("--skip", nargs="+", default=[], metavar="LABEL", help="leave out tests with these labels (heavy)")
     parser.add_argument("--files", nargs="+", help="files or folders to plant bugs in")
-    parser.add_argument("--bugs", metavar="FILE", help='plant the bugs of a list, JSON [{"file", "old", "new"}], but those whose text is no longer there')
+    parser.add_argument("--bugs", metavar="FILE", help='plant the bugs of a list, JSON [{"file", "old", "new"}], but those '
+                        "whose text is no longer there")
     parser.add_argument("--coverage", help="folder for a build with gcov: run only the tests that execute a bug's line")
     parser.add_argument("--unexecuted", nargs="+", dest="files_unexecuted", metavar="FILE",
                         help="with --coverage: show the lines that no unit test of the folder executes, and end")
