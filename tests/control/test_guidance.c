@@ -306,6 +306,38 @@ static void cones_of_the_sky(void **state) {
     bst_assert_close(bst_vec3_norm(bst_vec3_sub(v, b.guidance.nav.velocity_gcrf_mps)), 0.0, 1e-9);
 }
 
+/* What the look-ahead says of the Earth, of an equatorial circular orbit whose telemetry is 40 s
+ * old: the star at the angle 1.9 + pi from the telemetry's place goes behind the Earth where the
+ * orbit is asin(R / r) before 1.9, and comes back as far after it. */
+static void the_earth_ahead(void **state) {
+    (void)state;
+    bench b;
+    const double r = 7000e3, n = sqrt(BST_EARTH_MU_M3PS2 / (r * r * r)),
+                 half = asin(BST_EARTH_RADIUS_M / r);
+    open_bench(&b, (bst_vec3){cos(1.9 + BST_PI), sin(1.9 + BST_PI), 0}, (bst_vec3){0, 0, 0});
+    b.range_m = 4e7;
+    b.guidance.config.prediction_horizon_s = 4000.0;
+    const bst_nav_telemetry nav = {.tick = 5 * TICKS,
+                                   .position_gcrf_m = {r, 0, 0},
+                                   .velocity_gcrf_mps = {0, r * n, 0},
+                                   .sun_m = {0, 0, 1.5e11}};
+    bst_guidance_see_sky(&b.guidance, &nav, BST_QUAT_IDENTITY);
+    bst_assert_ok(&b.ctx, bst_guidance_look_ahead(&b.ctx, &b.guidance, 45 * TICKS));
+    assert_int_equal(b.guidance.event_count, 1);
+    const bst_guidance_event *e = &b.guidance.events[0];
+    assert_int_equal(e->kind, BST_GUIDANCE_AHEAD);
+    assert_int_equal(e->reason, BST_REACH_BEHIND_EARTH);
+    bst_assert_close(e->from_s, 5.0 + (1.9 - half) / n, 0.5);
+    bst_assert_close(e->until_s, 5.0 + (1.9 + half) / n, 0.5);
+    /* within it: until when */
+    b.guidance.event_count = 0;
+    int64_t inside = (int64_t)((5.0 + 1.9 / n) * TICKS);
+    bst_assert_ok(&b.ctx, bst_guidance_look_ahead(&b.ctx, &b.guidance, inside));
+    assert_int_equal(b.guidance.event_count, 1);
+    assert_int_equal(e->kind, BST_GUIDANCE_UNREACHABLE);
+    bst_assert_close(e->until_s, 5.0 + (1.9 + half) / n, 0.5);
+}
+
 /* In a body that turns at w, what rests among the stars moves by v x w. */
 static void the_body_turns_on(void **state) {
     (void)state;
@@ -354,9 +386,13 @@ static void slews_begin_at_the_axes(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_body_turns_on),   cmocka_unit_test(slews_begin_at_the_axes),
-        cmocka_unit_test(cones_of_the_sky),    cmocka_unit_test(nothing_asked_nothing_changed),
-        cmocka_unit_test(slews_of_least_time), cmocka_unit_test(keeps_out_of_the_sun),
+        cmocka_unit_test(the_body_turns_on),
+        cmocka_unit_test(the_earth_ahead),
+        cmocka_unit_test(slews_begin_at_the_axes),
+        cmocka_unit_test(cones_of_the_sky),
+        cmocka_unit_test(nothing_asked_nothing_changed),
+        cmocka_unit_test(slews_of_least_time),
+        cmocka_unit_test(keeps_out_of_the_sun),
         cmocka_unit_test(occultation_ahead),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
