@@ -5,6 +5,7 @@
 #include "sim/analysis/new/satellite_lookup.h"
 #include "sim/analysis/new/scenario_template.h"
 #include "sim/analysis/new/sensor_design.h"
+#include "sim/astro/sgp4.h"
 #include "sim/cli/plugins.h"
 #include "tests/test_support.h"
 
@@ -185,9 +186,98 @@ static void test_the_text_is_a_scenario(void **state) {
     free(text);
 }
 
+/* A judge that keeps the scenes it refuses, best first. */
+typedef struct judged {
+    bst_new_scene scenes[12];
+    int count;
+} judged;
+
+static bst_status refuse(void *user, bst_ctx *ctx, const bst_new_scene *scene, bool *holds,
+                         char why[256]) {
+    judged *j = user;
+    (void)ctx;
+    assert_true(j->count < 12);
+    j->scenes[j->count++] = *scene;
+    *holds = false;
+    snprintf(why, 256, "refused");
+    return BST_OK;
+}
+
+static bst_vec3 place_of(const bst_sgp4 *sgp4, const bst_elements *e, bst_time t) {
+    bst_time epoch;
+    bst_ctx ctx = {0};
+    double r[3], v[3];
+    bst_assert_ok(&ctx, bst_time_from_utc_jd(&ctx, e->epoch_utc_jd1, e->epoch_utc_jd2, &epoch));
+    assert_int_equal(bst_sgp4_propagate(sgp4, bst_time_diff(t, epoch) / 60.0, r, v), BST_SGP4_OK);
+    return (bst_vec3){1e3 * r[0], 1e3 * r[1], 1e3 * r[2]};
+}
+
+/* The scenes found in two days: range, rate and angle from the limb over the run by SGP4 in TEME
+ * alone (light time and aberration: 30 arcsec; the Earth as a sphere: 0.2 degrees), magnitudes in
+ * their order, and the costs ascending. */
+static void test_scenes_are_as_seen(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_new_request q = {.aperture_m = 0.15,
+                         .name = "search",
+                         .observer_label = "eye",
+                         .start = "2022-06-16T12:00:00Z"};
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "o", "39089", &q.observer));
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "t", "44801", &q.target));
+    bst_sgp4 *eye, *target;
+    bst_assert_ok(
+        &ctx, bst_sgp4_create(&ctx, &q.observer.elements, BST_SGP4_WGS72, BST_SGP4_AFSPC, &eye));
+    bst_assert_ok(
+        &ctx, bst_sgp4_create(&ctx, &q.target.elements, BST_SGP4_WGS72, BST_SGP4_AFSPC, &target));
+    judged j = {.count = 0};
+    bst_new_scene none;
+    assert_int_equal(bst_new_scene_find(&ctx, &q, refuse, &j, &none), BST_ERR_NOT_FOUND);
+    assert_non_null(strstr(ctx.message, "refused"));
+    assert_int_equal(j.count, 12);
+    double before = -INFINITY;
+    for (int k = 0; k < j.count; k++) {
+        const bst_new_scene *s = &j.scenes[k];
+        double range = INFINITY, rate = 0.0, limb = INFINITY;
+        bst_assert_close(s->duration_s, 120.0, 0.0);
+        for (double t = 0.0; t <= s->duration_s; t += 20.0) {
+            bst_vec3 seen[2], here = {0};
+            for (int n = 0; n < 2; n++) {
+                bst_time at = bst_time_add(s->epoch, t + n);
+                here = place_of(eye, &q.observer.elements, at);
+                seen[n] = bst_vec3_sub(place_of(target, &q.target.elements, at), here);
+            }
+            range = fmin(range, bst_vec3_norm(seen[0]));
+            rate = fmax(rate, bst_vec3_angle(seen[0], seen[1]) / BST_ARCSEC_RAD);
+            double down = bst_vec3_angle(seen[0], bst_vec3_scale(here, -1.0));
+            limb = fmin(limb, down - asin(6371e3 / bst_vec3_norm(here)));
+        }
+        bst_assert_close(s->range_m, range, 1e-3 * range);
+        bst_assert_close(s->rate_arcsec_per_s, rate, 0.3);
+        bst_assert_close(s->limb_rad, limb, 0.5 * BST_DEG_RAD);
+        assert_true(s->faintest_v_mag >= s->v_mag && s->faintest_v_mag < s->v_mag + 1.0);
+        double field = s->side_px * s->pixel_arcsec * BST_ARCSEC_RAD;
+        assert_true(s->limb_rad >= field / sqrt(2.0)); /* half a diagonal */
+        double cost = log(s->rate_arcsec_per_s + 10.0) + 0.3 * s->faintest_v_mag;
+        assert_true(cost >= before);
+        before = cost;
+        /* what is refused is not tried again next to it */
+        for (int n = 0; n < k; n++) {
+            assert_true(fabs(bst_time_diff(s->epoch, j.scenes[n].epoch)) > 299.0);
+        }
+        bst_time start;
+        bst_assert_ok(&ctx, bst_time_from_utc(&ctx, q.start, &start));
+        double after = bst_time_diff(s->epoch, start);
+        assert_true(after >= 0.0 && after <= 2.0 * 86400.0);
+        bst_assert_close(fmod(after + 1e-6, 20.0), 0.0, 1e-3);
+    }
+    bst_sgp4_free(eye);
+    bst_sgp4_free(target);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_plain_names),
+        cmocka_unit_test(test_scenes_are_as_seen),
         cmocka_unit_test(test_satellites_are_found),
         cmocka_unit_test(test_satellites_are_refused),
         cmocka_unit_test(test_the_latest_set_is_taken),

@@ -306,6 +306,38 @@ static void cones_of_the_sky(void **state) {
     bst_assert_close(bst_vec3_norm(bst_vec3_sub(v, b.guidance.nav.velocity_gcrf_mps)), 0.0, 1e-9);
 }
 
+/* What the look-ahead says of the Earth, of an equatorial circular orbit whose telemetry is 40 s
+ * old: the star at the angle 1.9 + pi from the telemetry's place goes behind the Earth where the
+ * orbit is asin(R / r) before 1.9, and comes back as far after it. */
+static void the_earth_ahead(void **state) {
+    (void)state;
+    bench b;
+    const double r = 7000e3, n = sqrt(BST_EARTH_MU_M3PS2 / (r * r * r)),
+                 half = asin(BST_EARTH_RADIUS_M / r);
+    open_bench(&b, (bst_vec3){cos(1.9 + BST_PI), sin(1.9 + BST_PI), 0}, (bst_vec3){0, 0, 0});
+    b.range_m = 4e7;
+    b.guidance.config.prediction_horizon_s = 4000.0;
+    const bst_nav_telemetry nav = {.tick = 5 * TICKS,
+                                   .position_gcrf_m = {r, 0, 0},
+                                   .velocity_gcrf_mps = {0, r * n, 0},
+                                   .sun_m = {0, 0, 1.5e11}};
+    bst_guidance_see_sky(&b.guidance, &nav, BST_QUAT_IDENTITY);
+    bst_assert_ok(&b.ctx, bst_guidance_look_ahead(&b.ctx, &b.guidance, 45 * TICKS));
+    assert_int_equal(b.guidance.event_count, 1);
+    const bst_guidance_event *e = &b.guidance.events[0];
+    assert_int_equal(e->kind, BST_GUIDANCE_AHEAD);
+    assert_int_equal(e->reason, BST_REACH_BEHIND_EARTH);
+    bst_assert_close(e->from_s, 5.0 + (1.9 - half) / n, 0.5);
+    bst_assert_close(e->until_s, 5.0 + (1.9 + half) / n, 0.5);
+    /* within it: until when */
+    b.guidance.event_count = 0;
+    int64_t inside = (int64_t)((5.0 + 1.9 / n) * TICKS);
+    bst_assert_ok(&b.ctx, bst_guidance_look_ahead(&b.ctx, &b.guidance, inside));
+    assert_int_equal(b.guidance.event_count, 1);
+    assert_int_equal(e->kind, BST_GUIDANCE_UNREACHABLE);
+    bst_assert_close(e->until_s, 5.0 + (1.9 + half) / n, 0.5);
+}
+
 /* In a body that turns at w, what rests among the stars moves by v x w. */
 static void the_body_turns_on(void **state) {
     (void)state;
@@ -322,9 +354,41 @@ static void the_body_turns_on(void **state) {
     bst_assert_close(bst_vec3_norm(change), 0.0, 1e-5); /* half of w^2 in a second */
 }
 
+/* A slew begins where the axes are at its tick: at the encoders' angles, carried on by their rates
+ * since. */
+static void slews_begin_at_the_axes(void **state) {
+    (void)state;
+    bench b;
+    open_bench(&b, mount_at(100, 20), (bst_vec3){0, 0, 0});
+    b.guidance.config.slews = BST_SLEWS_PLANNED;
+    bst_mount_status status = {0};
+    bst_mount_two_axis_status(&b.plant, 1000, &status);
+    const double angle[2] = {0.3, -0.2}, rate[2] = {0.02, -0.013};
+    for (int i = 0; i < 2; i++) {
+        status.axis[i].angle_rad = angle[i];
+        status.axis[i].rate_radps = rate[i];
+    }
+    bst_guidance_telemetry(&b.guidance, &status);
+    bst_guidance_see_sky(&b.guidance, &b.nav, BST_QUAT_IDENTITY);
+    bst_los_command command = {.tick = 1400, .direction_gcrf = mount_at(100, 20)};
+    bool give;
+    bst_vec3 boresight = mount_at(0, 0);
+    bst_assert_ok(&b.ctx, bst_guidance_command(&b.ctx, &b.guidance, &boresight, &command, &give));
+    assert_true(give && b.guidance.slew.active && command.near_given);
+    for (int i = 0; i < 2; i++) {
+        double at, speed, accel;
+        bst_slew_axis_at(&b.guidance.slew.axis[i], 0.0, &at, &speed, &accel);
+        bst_assert_close(at, angle[i] + 0.4 * rate[i], 1e-12);
+        bst_assert_close(speed, rate[i], 1e-12);
+        bst_assert_close(command.near_rad[i], angle[i] + 0.4 * rate[i], 1e-12);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_body_turns_on),
+        cmocka_unit_test(the_earth_ahead),
+        cmocka_unit_test(slews_begin_at_the_axes),
         cmocka_unit_test(cones_of_the_sky),
         cmocka_unit_test(nothing_asked_nothing_changed),
         cmocka_unit_test(slews_of_least_time),

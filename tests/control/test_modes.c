@@ -104,6 +104,47 @@ static void put_track(rig *r, int64_t id, int hits, double off_px, double rate_o
     t->covariance[2][2] = t->covariance[3][3] = 0.1 * BST_ARCSEC_RAD * 0.1 * BST_ARCSEC_RAD;
 }
 
+/* A cue with this acceleration, rad/s^2. */
+static bst_status turning_cue(void *user, bst_ctx *ctx, double seconds, bool *valid,
+                              bst_vec3 *direction) {
+    (void)ctx;
+    double a = 0.5 * *(double *)user * seconds * seconds;
+    *valid = true;
+    *direction = (bst_vec3){cos(a), sin(a), 0.0};
+    return BST_OK;
+}
+
+static bst_status turning_cue_at(void *user, bst_ctx *ctx, double seconds, bst_onboard_cue *out) {
+    *out = (bst_onboard_cue){.sigma_rad = 0.3 * BST_DEG_RAD};
+    return turning_cue(user, ctx, seconds, &out->valid, &out->direction_gcrf);
+}
+
+/* A cue has jumped if it is farther from where its last two places led than 2e-2 rad/s^2 of
+ * acceleration explain, at steps of t and s seconds 2e-2 t (t + s); a steady acceleration a is off
+ * by a t (t + s) / 2. */
+static void jumps_of_the_cue(void **state) {
+    (void)state;
+    static const int64_t steps[][2] = {{100, 100}, {100, 400}, {400, 100}, {1000, 1000}};
+    for (size_t k = 0; k < sizeof steps / sizeof *steps; k++) {
+        for (int beyond = 0; beyond < 2; beyond++) {
+            rig r;
+            rig_open(&r, NULL, true);
+            double t = (double)steps[k][1] / TICKS, s = (double)steps[k][0] / TICKS;
+            double most = r.control.config.arrival_tolerance_px * PX + 2e-2 * t * (t + s);
+            double accel = (beyond ? 1.05 : 0.95) * 2.0 * most / (t * (t + s));
+            r.control.env.cue_at = turning_cue_at;
+            r.control.env.cue_direction_at = turning_cue;
+            r.control.env.cue_user = &accel;
+            step(&r, 0, false);
+            step(&r, steps[k][0], false);
+            int64_t jumped = r.control.watch.jump_tick;
+            step(&r, steps[k][0] + steps[k][1], false);
+            assert_int_equal(r.control.watch.jump_tick != jumped, beyond);
+            rig_close(&r);
+        }
+    }
+}
+
 static void from_idle_to_track_and_back(void **state) {
     (void)state;
     rig r;
@@ -334,6 +375,7 @@ static void contradictory_settings_are_refused(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(from_idle_to_track_and_back),
+        cmocka_unit_test(jumps_of_the_cue),
         cmocka_unit_test(wasted_frames_and_vague_tracks),
         cmocka_unit_test(a_candidate_that_dies_or_stalls_is_given_up),
         cmocka_unit_test(without_frames_the_search_still_goes_on),

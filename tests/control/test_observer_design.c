@@ -117,10 +117,46 @@ static void test_as_asked(void **state) {
     assert_string_equal(bst_loop_verdict(&m), "has thin margins");
 }
 
+/* A frame arrives half an exposure and its latency after its middle, and acts a command's latency
+ * later. */
+static void test_timing(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_control_config config = defaults();
+    config.disturbance_px_rms = 3.0;
+    const bst_image_loop_env env = {.tick_rate_hz = 1000.0,
+                                    .frame_period_s = 1.0,
+                                    .frame_exposure_s = 0.7,
+                                    .frame_latency_s = 0.9,
+                                    .command_latency_s = 0.45,
+                                    .servo_lag_s = 0.03};
+    const double pixel = 2e-5;
+    bst_control_config plain = config;
+    plain.robust_observer = false;
+    bst_observer_request request = {
+        .timing = {1.0, 0.7, 0.35 + 0.9, 0.35 + 0.9 + 0.45, 0.35 + 0.9 + 0.45},
+        .servo_lag_s = 0.03,
+        .sigma = config.fix_sigma_floor_px * pixel};
+    double density, expected;
+    bst_assert_ok(&ctx,
+                  bst_control_observer_density(&ctx, &plain, &env, pixel, NULL, &request.density));
+    bst_assert_ok(&ctx, bst_control_observer_density(&ctx, &config, &env, pixel, NULL, &density));
+    bst_assert_ok(&ctx, bst_observer_design(&ctx, &request, NULL, &expected));
+    assert_true(expected < 0.5 * request.density); /* the margins bind */
+    bst_assert_close(density, expected, 1e-12 * expected);
+    /* half an exposure more would not be the same */
+    request.timing.arrival_s += 0.35;
+    request.timing.effect_s += 0.35;
+    request.timing.switch_s += 0.35;
+    bst_assert_ok(&ctx, bst_observer_design(&ctx, &request, NULL, &expected));
+    assert_true(expected < 0.9 * density);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_default_margins),
         cmocka_unit_test(test_as_asked),
+        cmocka_unit_test(test_timing),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

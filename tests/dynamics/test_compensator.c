@@ -201,6 +201,33 @@ static void test_anti_windup(void **state) {
     bst_assert_close(bst_compensator_step(&c, 0.0, 30.0), 4.0, ROUNDING);
 }
 
+/* By default the excess over the limit moves the state with the time constant of the zero: 1 / (2
+ * pi f) of a lag, kp / ki of pi, sqrt(kd / ki) of pid; anti_windup_s replaces it. Under a small
+ * error the state then rests at 1 / back of an error's step above the limit (Astrom and Hagglund
+ * 2006, PID control, section 3.5). */
+static void test_tracking_time(void **state) {
+    (void)state;
+    const double h = 1e-3;
+    for (int k = 0; k < 8; k++) {
+        bst_compensator_config config = plain(k % 4 == 0   ? BST_COMPENSATOR_LEAD_LAG
+                                              : k % 4 == 1 ? BST_COMPENSATOR_PI
+                                                           : BST_COMPENSATOR_PID);
+        config.gain = config.proportional = 3.0;
+        config.lag_zero_hz = 0.8;
+        config.integral_per_s = 5.0;
+        config.derivative_s = 0.4;
+        config.derivative_filter_hz =
+            1e3 / BST_PI; /* its pole is at 0: all of the excess is fed back to one pole */
+        config.output_limit = 2.0;
+        config.anti_windup_s = k < 4 ? 0.0 : 0.13;
+        const double times[4] = {1.0 / (2 * BST_PI * 0.8), 3.0 / 5.0, sqrt(0.4 / 5.0),
+                                 sqrt(0.4 / 5.0)};
+        bst_compensator c = made(&config, h);
+        bst_assert_close(c.back, (k < 4 ? h / times[k] : h / 0.13) * (1.0 - c.stage[0].a2), 1e-12);
+        bst_assert_close(c.stage[0].a2, 0.0, 1e-12);
+    }
+}
+
 static void test_rate_limit(void **state) {
     (void)state;
     bst_compensator_config config = plain(BST_COMPENSATOR_PI);
@@ -551,13 +578,21 @@ static void test_refusals(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_tustin),      cmocka_unit_test(test_step_of_pi),
-        cmocka_unit_test(test_step_of_pid), cmocka_unit_test(test_response),
-        cmocka_unit_test(test_anti_windup), cmocka_unit_test(test_rate_limit),
-        cmocka_unit_test(test_bumpless),    cmocka_unit_test(test_delay),
-        cmocka_unit_test(test_limits),      cmocka_unit_test(test_config),
-        cmocka_unit_test(test_plug),        cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_archive),     cmocka_unit_test(test_archive_of_a_plug),
+        cmocka_unit_test(test_tustin),
+        cmocka_unit_test(test_step_of_pi),
+        cmocka_unit_test(test_step_of_pid),
+        cmocka_unit_test(test_response),
+        cmocka_unit_test(test_anti_windup),
+        cmocka_unit_test(test_tracking_time),
+        cmocka_unit_test(test_rate_limit),
+        cmocka_unit_test(test_bumpless),
+        cmocka_unit_test(test_delay),
+        cmocka_unit_test(test_limits),
+        cmocka_unit_test(test_config),
+        cmocka_unit_test(test_plug),
+        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_archive),
+        cmocka_unit_test(test_archive_of_a_plug),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

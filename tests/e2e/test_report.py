@@ -81,6 +81,15 @@ class Page(HTMLParser):
                 out.setdefault(card.find("small").text, card.find("b").text)
         return out
 
+    def notes(self):
+        """Name of each card to the numbers in its note."""
+        out = {}
+        for card in self.root.iter("div"):
+            if card.get("class") == "card" and len(card.findall("small")) == 2:
+                first, note = card.findall("small")
+                out.setdefault(first.text, [float(word) for word in re.findall(r"[\d.]*\d", note.text)])
+        return out
+
     def pictures(self):
         return [base64.b64decode(a["href"].split(",", 1)[1], validate=True)
                 for tag, a in self.elements if tag == "image"]
@@ -142,7 +151,17 @@ class Complete(OnePage):
         with runs.database(self.made) as tables:
             detections, = tables.execute("SELECT sum(detections) FROM detection_frames").fetchone()
             events, = tables.execute("SELECT count(*) FROM events").fetchone()
+            frames, = tables.execute("SELECT count(*) FROM detection_frames").fetchone()
         self.assertEqual(cards["detections"], str(detections))
+        notes = self.page.notes()
+        for name, values, digits in (
+                ("custody", [100 * summary["track_fraction"]], 4),
+                ("time to acquire", [summary["time_to_confirm_s"], summary["time_to_settle_s"]], 4),
+                ("pointing RMS", [99, summary["pointing_p99_px"], summary["pointing_bias_px"]], 2),
+                ("detections", [detections / frames], 3)):
+            self.assertEqual(len(notes[name]), len(values), name)
+            for found, value in zip(notes[name], values):
+                self.assertLessEqual(abs(found - value), 0.51 * 10 ** (math.floor(math.log10(value)) + 1 - digits), name)
         self.assertIn(f"{events} events", self.page.text)
 
     def test_pointing(self):

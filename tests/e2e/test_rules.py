@@ -3,11 +3,18 @@
 
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_rules.py BORESIGHT
 """
+import json
 import os
+import re
 import subprocess
 import unittest
 
+import erfa
+import numpy as np
+
+import figures
 import runs
+from optics import AU_M, angle
 
 MODULES = runs.SENSOR + "/modules"
 # rule, override, words of the warning
@@ -46,6 +53,35 @@ class Rules(unittest.TestCase):
             self.assertEqual(said.returncode, 0, said.stderr)
             self.assertIn(words, said.stderr, rule)
             self.assertIn("warning", said.stderr, rule)
+
+    def test_times_out_of_reach(self):
+        """When the cue enters and leaves the cones about Sun and Moon and goes behind the Earth, by SGP4 and ERFA: 0.02 degrees
+        of aberration, 0.2 of the Earth's figure. The Moon's parallax is a degree."""
+        guidance = MODULES + "/control/guidance"
+        said = check(runs.TRACK, "--quiet", "--set", "/duration_s=86400", "--set", guidance + "/moon_keep_out_deg=60", "--set",
+                     guidance + "/sun_keep_out_deg=60", "--set", runs.SENSOR + "/cue/offset_deg=0").stderr
+        spans = {why: (float(a), float(b)) for a, b, why in re.findall(
+            r"out of reach from ([\d.]+) s until ([\d.]+) s: ([\w -]+?)(?: \(|$)", said, re.M)}
+        with open(runs.TRACK, encoding="utf-8") as file:
+            epoch = json.load(file)["epoch_utc"]
+        eye, target = (figures.Orbit("scenarios/catalogue_2022-06.tle", norad, epoch) for norad in (39089, 44801))
+
+        def angles(t):
+            here = eye.position(t)
+            tt = erfa.taitt(*erfa.utctai(eye.utc[0], eye.utc[1] + t / 86400))
+            sun = -np.array(erfa.epv00(*tt)[0]["p"]) * AU_M - here
+            moon = np.array(erfa.moon98(*tt)["p"]) * AU_M - here
+            line = target.position(t) - here
+            degrees = [np.degrees(angle(line, body)) for body in (sun, moon, -here)]
+            return degrees[0], degrees[1], degrees[2] - np.degrees(np.arcsin(6371e3 / np.linalg.norm(here)))
+        # it leaves the Sun's cone behind the Earth
+        self.assertAlmostEqual(angles(spans["in the keep-out cone of the Sun"][0])[0], 60, delta=0.03)
+        begin, end = spans["in the keep-out cone of the Moon"]
+        self.assertEqual(begin, 0)
+        self.assertLess(angles(0)[1], 60)
+        self.assertAlmostEqual(angles(end)[1], 60, delta=0.03)
+        for t in spans["behind the Earth"]:
+            self.assertAlmostEqual(angles(t)[2], 0, delta=0.2)
 
     def test_the_shipped_scenario_is_not_warned_of(self):
         self.assertEqual(check(runs.TRACK, "--quiet").stderr, "")

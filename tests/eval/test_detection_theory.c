@@ -3,6 +3,7 @@
 
 #include <float.h>
 
+#include "sim/eval/consistency.h"
 #include "tests/test_support.h"
 
 typedef struct pair {
@@ -155,9 +156,32 @@ static void poisson_interval_is_exact(void **state) {
     bst_assert_close(many.high, 1e6 + z * sqrt(1e6 + 1) + (z * z - 1) / 3 + 1, 2e-3);
 }
 
+/* Two-sided bounds of 95 % from tables of chi-square (Abramowitz and Stegun, table 26.8): 0.484419
+ * and 11.1433 of 4 degrees of freedom, 2.17973 and 17.5345 of 8; a step without values is not
+ * judged. */
+static void consistency_has_two_sided_bounds(void **state) {
+    (void)state;
+    const double one[] = {0.484, 0.485, 11.143, 11.144, NAN};
+    bst_consistency c;
+    bst_consistency_check(one, 1, 5, 4, 0.95, &c);
+    assert_int_equal(c.steps_judged, 4);
+    bst_assert_close(c.inside, 0.5, 1e-12);
+    bst_assert_close(c.below, 0.25, 1e-12);
+    bst_assert_close(c.above, 0.25, 1e-12);
+    bst_assert_close(c.mean_over_dof, (0.484 + 0.485 + 11.143 + 11.144) / 16, 1e-12);
+    /* sums of two runs; in the third step one of them has no value */
+    const double two[] = {1.0, 9.0, 0.485, 17.5, 1.179, 8.5, NAN, 0.035};
+    bst_consistency_check(two, 2, 4, 4, 0.95, &c);
+    assert_int_equal(c.steps_judged, 4);
+    bst_assert_close(c.inside, 0.5, 1e-12); /* 17.5 of two and 0.485 of one */
+    bst_assert_close(c.below, 0.25, 1e-12); /* 2.179 */
+    bst_assert_close(c.above, 0.25, 1e-12); /* 17.535 */
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(tail_is_right_to_the_last_places),
+        cmocka_unit_test(consistency_has_two_sided_bounds),
         cmocka_unit_test(inverse_is_right_to_the_last_places),
         cmocka_unit_test(ideal_detector_is_neyman_pearsons),
         cmocka_unit_test(own_light_flattens_the_curve),

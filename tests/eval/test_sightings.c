@@ -357,6 +357,8 @@ static void what_is_no_sighting(void **state) {
         {BST_LABEL_OBJECT, 0, true, 0, 0, 0, false},
         {BST_LABEL_OBJECT, 0, false, 40, 19, 0, true},
         {BST_LABEL_OBJECT, 0, false, 40, 0, 19, false},
+        {BST_LABEL_OBJECT, 0, false, -40, 0, 19, true}, /* negative: along y */
+        {BST_LABEL_OBJECT, 0, false, -40, 19, 0, false},
         {BST_LABEL_OBJECT, 0, false, 0, 1.5, 1.2, true}, /* a width of 2 px */
         {BST_LABEL_OBJECT, 0, false, 0, 1.5, 1.5, false},
     };
@@ -370,10 +372,10 @@ static void what_is_no_sighting(void **state) {
                                              .flags = BST_TRUTH_IN_FIELD,
                                              .x_centroid_px = 200,
                                              .y_centroid_px = 300,
-                                             .x_start_px = 200 - 0.5 * cases[i].dx,
-                                             .x_end_px = 200 + 0.5 * cases[i].dx,
-                                             .y_start_px = 300,
-                                             .y_end_px = 300,
+                                             .x_start_px = 200 - 0.5 * fmax(cases[i].dx, 0),
+                                             .x_end_px = 200 + 0.5 * fmax(cases[i].dx, 0),
+                                             .y_start_px = 300 + 0.5 * fmin(cases[i].dx, 0),
+                                             .y_end_px = 300 - 0.5 * fmin(cases[i].dx, 0),
                                              .electrons = 10,
                                              .snr = 5};
         m.found->count = 1;
@@ -400,11 +402,11 @@ static void what_is_no_sighting(void **state) {
     }
     bst_assert_ok(&f.ctx, bst_sightings_finish(&f.ctx, f.sightings, 1000.0));
     assert_int_equal(f.pass_count, 1);
-    assert_int_equal(f.passes[0].frames, 10);
+    assert_int_equal(f.passes[0].frames, 12);
     assert_int_equal(f.passes[0].detected, expected);
     assert_int_equal(f.passes[0].place.count, 0); /* no attitude to judge it by */
     bst_assert_close(f.passes[0].first_s, 0, 1e-12);
-    bst_assert_close(f.passes[0].last_s, 80, 1e-12);
+    bst_assert_close(f.passes[0].last_s, 100, 1e-12);
     tear_down(&f);
 }
 

@@ -102,12 +102,63 @@ static void interpolation(void **state) {
     }
 }
 
+/* Where a coordinate is between mesh centres, which are at (k + 1/2) mesh - 1/2: the lower one, and
+ * the part of the way to the next; less than 0 and more than 1 beyond the outermost. */
+static int between(double p, int meshes, double *part) {
+    int k = (int)floor((p + 0.5) / 64 - 0.5);
+    k = k < 0 ? 0 : k > meshes - 2 ? meshes - 2 : k;
+    *part = (p - (64 * k + 31.5)) / 64;
+    return k;
+}
+
+static double mixed(const float *v, int columns, int i, int j, double u, double w) {
+    const float *n = v + j * columns + i;
+    return (1 - w) * ((1 - u) * (double)n[0] + u * (double)n[1]) +
+           w * ((1 - u) * (double)n[columns] + u * (double)n[columns + 1]);
+}
+
+/* Maps in which all meshes differ: the level of a row is bilinear, and linear beyond the outermost
+ * centres; noise at a place is bilinear, and 1 / noise of a row is linear between columns, both
+ * constant beyond. */
+static void every_pixel_between_meshes(void **state) {
+    fixture *f = *state;
+    bst_background *b = &f->b;
+    enum { COLUMNS = 4, ROWS = 3 };
+    b->columns = COLUMNS;
+    b->rows = ROWS;
+    b->width = SIDE - 20; /* the last column of meshes is cut */
+    for (int k = 0; k < COLUMNS * ROWS; k++) {
+        b->level[k] = (float)(20.0 + 13.0 * sin(7.0 * k));
+        b->noise[k] = (float)(6.0 + 3.0 * cos(5.0 * k));
+    }
+    float level[SIDE], inverse[SIDE];
+    for (int y = 0; y < 64 * ROWS; y += 5) {
+        double w, u;
+        int j = between(y, ROWS, &w);
+        double held = fmin(fmax(w, 0.0), 1.0);
+        bst_background_row(b, y, level, inverse);
+        for (int x = 0; x < b->width; x++) {
+            int i = between(x, COLUMNS, &u);
+            double part = fmin(fmax(u, 0.0), 1.0);
+            bst_assert_close(level[x], mixed(b->level, COLUMNS, i, j, u, w), 1e-4);
+            bst_assert_close(bst_background_level_at(b, x, y),
+                             mixed(b->level, COLUMNS, i, j, part, held), 1e-4);
+            bst_assert_close(bst_background_noise_at(b, x, y),
+                             mixed(b->noise, COLUMNS, i, j, part, held), 1e-5);
+            double left = mixed(b->noise, COLUMNS, i, j, 0.0, held),
+                   right = mixed(b->noise, COLUMNS, i, j, 1.0, held);
+            bst_assert_close(inverse[x], (1 - part) / left + part / right, 1e-6);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(level_and_noise, setup, teardown),
         cmocka_unit_test_setup_teardown(stars_do_not_count, setup, teardown),
         cmocka_unit_test_setup_teardown(degenerate, setup, teardown),
         cmocka_unit_test_setup_teardown(interpolation, setup, teardown),
+        cmocka_unit_test_setup_teardown(every_pixel_between_meshes, setup, teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,6 @@
 /* The adapter between channels and image processing, in the real engine. */
+#include "imgproc/calibrate/pixel_learning.h"
+#include "sim/onboard/nav_motion.h"
 #include "tests/imgproc/module_support.h"
 
 static const double PIXEL_RAD = 12.0 * BST_ARCSEC_RAD; /* of the sensor in onboard.h */
@@ -32,6 +34,88 @@ static int stars_right(const bench *b, const bst_detections *d) {
         }
     }
     return named;
+}
+
+/* What the module hands on about a frame's time and place; the linker puts these in the functions'
+ * places. */
+static struct {
+    int lights, frames, steps, stacked;
+    double after_s[BENCH_KEPT], exposure_s[BENCH_KEPT], learned_s[BENCH_KEPT],
+        stacked_s[BENCH_KEPT];
+    int binning[BENCH_KEPT];
+} handed;
+
+bst_light __real_bst_nav_light_after(const bst_nav_telemetry *nav, double dt_s);
+bst_light __wrap_bst_nav_light_after(const bst_nav_telemetry *nav, double dt_s);
+bst_light __wrap_bst_nav_light_after(const bst_nav_telemetry *nav, double dt_s) {
+    handed.after_s[handed.lights++ % BENCH_KEPT] = (double)nav->tick / ONBOARD_RATE + dt_s;
+    return __real_bst_nav_light_after(nav, dt_s);
+}
+
+bst_status __real_bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
+                                     const bst_camera_motion *motion, bst_detections *out,
+                                     int capacity);
+bst_status __wrap_bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
+                                     const bst_camera_motion *motion, bst_detections *out,
+                                     int capacity);
+bst_status __wrap_bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
+                                     const bst_camera_motion *motion, bst_detections *out,
+                                     int capacity) {
+    handed.binning[handed.frames % BENCH_KEPT] = frame->binning;
+    handed.exposure_s[handed.frames++ % BENCH_KEPT] = frame->exposure_s;
+    return __real_bst_imgproc_detect(ctx, ip, frame, motion, out, capacity);
+}
+
+void __real_bst_pixel_step(bst_pixel_learner *learner, const bst_camera *camera,
+                           const bst_pixel_step_input *input);
+void __wrap_bst_pixel_step(bst_pixel_learner *learner, const bst_camera *camera,
+                           const bst_pixel_step_input *input);
+void __wrap_bst_pixel_step(bst_pixel_learner *learner, const bst_camera *camera,
+                           const bst_pixel_step_input *input) {
+    handed.learned_s[handed.steps++ % BENCH_KEPT] = input->time_s;
+    __real_bst_pixel_step(learner, camera, input);
+}
+
+bst_stack_frame __real_bst_imgproc_stack_frame(const bst_imgproc *ip, double time_s,
+                                               bst_quat q_cam_from_gcrf);
+bst_stack_frame __wrap_bst_imgproc_stack_frame(const bst_imgproc *ip, double time_s,
+                                               bst_quat q_cam_from_gcrf);
+bst_stack_frame __wrap_bst_imgproc_stack_frame(const bst_imgproc *ip, double time_s,
+                                               bst_quat q_cam_from_gcrf) {
+    handed.stacked_s[handed.stacked++ % BENCH_KEPT] = time_s;
+    return __real_bst_imgproc_stack_frame(ip, time_s, q_cam_from_gcrf);
+}
+
+/* Light, bad pixels and stacks are of the middle of an exposure; thermal signal is of its length.
+ */
+static void times_of_a_frame(void **state) {
+    (void)state;
+    bench b;
+    bench_init(&b);
+    bench_draw_stars(&b);
+    synthetic_expose(&b.s, bst_rng_make_key(5, 0, "test", "module"), 1);
+    bst_assert_ok(
+        &b.o.ctx,
+        bench_configure(
+            &b, "{\"stack\": {\"frames\": 8}, \"bad_pixel_learning\": {\"capacity\": 100}}"));
+    onboard_add_telemetry(&b.o, 0, 0);
+    bst_assert_ok(&b.o.ctx, bench_load(&b, 1000, 1000, false));
+    memset(&handed, 0, sizeof handed);
+    bst_assert_ok(&b.o.ctx, bst_engine_run(&b.o.ctx, b.o.engine, 4000));
+    assert_int_equal(b.count, 3);
+    assert_int_equal(handed.lights, 3);
+    assert_int_equal(handed.frames, 3);
+    assert_int_equal(handed.steps, 3);
+    assert_int_equal(handed.stacked, 3);
+    for (int i = 0; i < 3; i++) {
+        double middle_s = (1000 * (i + 1) - 0.5 * BENCH_EXPOSURE) / ONBOARD_RATE;
+        bst_assert_close(handed.after_s[i], middle_s, 1e-12);
+        bst_assert_close(handed.learned_s[i], middle_s, 1e-12);
+        bst_assert_close(handed.stacked_s[i], middle_s, 1e-12);
+        bst_assert_close(handed.exposure_s[i], (double)BENCH_EXPOSURE / ONBOARD_RATE, 1e-12);
+        assert_int_equal(handed.binning[i], 1);
+    }
+    bench_free(&b);
 }
 
 static void one_message_per_frame(void **state) {
@@ -163,6 +247,7 @@ static void predicted_error_is_applied(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_message_per_frame),
+        cmocka_unit_test(times_of_a_frame),
         cmocka_unit_test(all_waiting_frames_are_taken_in_order),
         cmocka_unit_test(missing_telemetry),
         cmocka_unit_test(stale_telemetry),

@@ -6,6 +6,7 @@
     tests/mutation/mutate.py --files tracker/mtt/sky_filter.c         only in these files
     tests/mutation/mutate.py --suite e2e --count 30               judged by the tests of the whole program
     tests/mutation/mutate.py --quick --files sim/eval --count 30   seconds for each bug: no copy, see quick_tree.py
+    tests/mutation/mutate.py --quick --bugs bugs.json          those of a list
     tests/mutation/mutate.py --coverage build-cov --count 100     many bugs: only the tests that execute a bug's line run
     tests/mutation/mutate.py --coverage build-cov --unexecuted sim/world    lines that no unit test of the folder executes
 
@@ -251,6 +252,32 @@ def candidates(options, tree):
     return [f for f in found if f[1]]
 
 
+def listed(path, tree):
+    """The bugs of a list [{"file", "old", "new"}]: `old` is text that occurs once in the file. Others are stale."""
+    with open(path, encoding="utf-8") as file:
+        items = json.load(file)
+    for item in items:
+        name = os.path.join(tree.folder, item["file"])
+        text = ""
+        if os.path.exists(name):
+            with open(name, encoding="utf-8") as file:
+                text = file.read()
+        if text.count(item["old"]) == 1:
+            yield item["file"], ("listed", text.index(item["old"]), item["old"], item["new"])
+        else:
+            print(f"stale    {item['file']}: {item['old']!r} is there {text.count(item['old'])} times, not once", flush=True)
+
+
+def drawn(pools, rng, most):
+    """Bugs drawn at random, none twice."""
+    tried = set()
+    for _ in range(most):
+        bug = draw(pools, rng)
+        if bug not in tried:
+            tried.add(bug)
+            yield bug
+
+
 def draw(pools, rng):
     """A file by its lines that can hold a bug, a kind among those in it, a place of that kind."""
     name, mutants, _ = rng.choices(pools, [lines for _, _, lines in pools])[0]
@@ -317,6 +344,8 @@ def main():
                         "one run at a time there")
     parser.add_argument("--skip", nargs="+", default=[], metavar="LABEL", help="leave out tests with these labels (heavy)")
     parser.add_argument("--files", nargs="+", help="files or folders to plant bugs in")
+    parser.add_argument("--bugs", metavar="FILE", help='plant the bugs of a list, JSON [{"file", "old", "new"}], but those '
+                        "whose text is no longer there")
     parser.add_argument("--coverage", help="folder for a build with gcov: run only the tests that execute a bug's line")
     parser.add_argument("--unexecuted", nargs="+", dest="files_unexecuted", metavar="FILE",
                         help="with --coverage: show the lines that no unit test of the folder executes, and end")
@@ -350,19 +379,19 @@ def main():
             return show_unexecuted(pools, tree, coverage) if coverage else parser.error("--unexecuted needs --coverage")
         if not pools:
             sys.exit("mutate: no source file to plant a bug in: look at --files and --since")
-        outcomes, tried, begun = [], set(), time.monotonic()
-        for _ in range(20 * options.count):
-            if len(outcomes) == options.count or (outcomes and time.monotonic() > begun + 60 * options.minutes):
+        outcomes, begun = [], time.monotonic()
+        bugs = listed(options.bugs, tree) if options.bugs else drawn(pools, rng, 20 * options.count)
+        for name, mutant in bugs:
+            if (not options.bugs and len(outcomes) == options.count) or \
+                    (outcomes and time.monotonic() > begun + 60 * options.minutes):
                 break
-            name, mutant = draw(pools, rng)
-            if (name, mutant) in tried:
-                continue
-            tried.add((name, mutant))
             with open(os.path.join(tree.folder, name), encoding="utf-8") as file:
                 text = file.read()
             line = text.count("\n", 0, mutant[1]) + 1
             outcome, by = trial(tree, coverage, name, line, mutant, options.suite)
             if outcome == "equal":
+                if options.bugs:
+                    print(f"{outcome:9}{name}:{line} '{mutant[2]}' -> '{mutant[3]}'  {by}", flush=True)
                 continue
             shown = text.split("\n")[line - 1].strip()
             outcomes.append({"file": name, "line": line, "kind": mutant[0], "old": mutant[2], "new": mutant[3],

@@ -34,6 +34,7 @@ class QuickTree(build_files.Judges):
         self.tests = {name: (labels, os.path.basename(command[0]), command)
                       for name, (labels, command) in build_files.listed_tests(self.build).items()}
         self.sound_objects, self.links, self.target = {}, {}, None
+        self.proven, self.made = {}, {}  # of tests, of programs
 
     def ninja(self, *words):
         return build_files.run(["ninja", "-C", self.build, f"-j{self.jobs}", "--quiet", *words])
@@ -106,15 +107,22 @@ class QuickTree(build_files.Judges):
     def judges_of(self, path, suite):
         return [n for n in self.tests_for(path, suite) if self.program_of(n) and self.link_of(self.program_of(n))]
 
-    def prove(self, names):
-        """Runs the tests that have not run yet with the sound programs: one that fails there judges nothing."""
-        for name in [n for n in names if n not in self.costs]:
+    def is_sound(self, name):
+        """Whether a test passes with the sound programs: one that fails there judges nothing."""
+        if name not in self.proven:
             begun = time.monotonic()
-            sound = self.make(self.program_of(name)) and self.passes(self.tests[name][2], 900)
+            self.proven[name] = self.passes(self.tests[name][2], 900)
             self.costs[name] = time.monotonic() - begun
-            if not sound:
+            if not self.proven[name]:
                 print(f"mutate: left out, for it fails without a bug: {name}", flush=True)
                 self.unsound.add(name)
+        return self.proven[name]
+
+    def in_order(self, path, names):
+        """Tests whose names share a word with the file first, then by their last duration."""
+        words = set(re.split(r"[/_.]", path)[-3:-1]) | {os.path.splitext(os.path.basename(path))[0]}
+        kin = {n: sum(w in n for w in words if len(w) > 3) for n in names}
+        return sorted(names, key=lambda n: (-kin[n], self.costs.get(n, 1.0)))
 
     def passes(self, command, seconds):
         with tempfile.TemporaryDirectory(prefix="boresight-mutant-run-") as rest:
@@ -126,17 +134,22 @@ class QuickTree(build_files.Judges):
                 return False
 
     def judge(self, names):
-        """The first test that fails with the bug that was compiled last, or None."""
+        """The first test that fails with the bug that was compiled last and passes without it, or None."""
         linked = {}
         for name in names:
             program = self.program_of(name)
+            if program not in self.made:
+                self.made[program] = self.make(program)
             if program not in linked:
-                linked = {program: self.link(program)}
+                linked = {program: self.link(program) if self.made[program] else None}
             if not linked[program]:  # the object needs libraries that this program has none of
                 continue
             own = [re.sub(rf".*/{re.escape(program)}", linked[program], w) if os.path.basename(w) == program else w
                    for w in self.tests[name][2]]
-            if not self.passes(own, max(30, 10 * self.costs.get(name, 30))):
+            begun = time.monotonic()
+            if self.passes(own, max(30, 10 * self.costs.get(name, 30))):
+                self.costs.setdefault(name, time.monotonic() - begun)
+            elif self.is_sound(name):
                 return name
         return None
 
@@ -149,8 +162,8 @@ class QuickTree(build_files.Judges):
         names = self.judges_of(name, suite)
         if coverage:
             names = coverage.tests_of(name, line, names)
-        self.prove(names)
-        names = sorted((n for n in names if n not in self.unsound), key=self.costs.get)
+        names = [n for n in names if n not in self.unsound]
+        names = names if suite == "e2e" else self.in_order(name, names)  # those have their order
         before = self.sound(self.target, name, text)
         after = self.compile(self.target, name, text[:at] + new + text[at + len(old):])
         if after is None:

@@ -5,7 +5,9 @@
 #include "boresight/messages.h"
 #include "boresight/vec.h"
 #include "sim/report/report.h"
+#include "sim/run/run_observations.h"
 #include "tests/report/run_tables.h"
+#include "tests/world/world_support.h"
 
 enum { N = 24, RATE = 100 };
 
@@ -254,6 +256,107 @@ static void values_of_the_frames(void **state) {
     }
 }
 
+/* The world of a run: PREY seen from the observer "eye" with "camera". */
+typedef struct own_world {
+    bst_sensor_config sensor;
+    bst_observer_config observer;
+    bst_run_scene scene;
+} own_world;
+
+static void open_world(own_world *w) {
+    bst_ctx ctx = {0};
+    memset(w, 0, sizeof *w);
+    snprintf(w->sensor.name, sizeof w->sensor.name, "camera");
+    snprintf(w->observer.name, sizeof w->observer.name, "eye");
+    w->observer.sensors = (bst_config_list){&w->sensor, 1};
+    w->scene.scenario.observers = (bst_config_list){&w->observer, 1};
+    w->scene.world = test_world_with(
+        "{\"name\": \"OTHER\", " TEST_NEOSSAT "}, {\"name\": \"PREY\", " TEST_GX5 "}", "");
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, w->scene.world, &w->scene.view));
+}
+
+/* Directions, range and phase from places of the orbits; the aberrated direction to first order in
+ * v / c (20 arcsec: second order 1 mas); latitude and longitude by the sidereal time, without
+ * precession and polar motion (0.4 degree). */
+static void values_of_the_world(void **state) {
+    fixture *f = *state;
+    bst_ctx ctx = {0};
+    own_world w;
+    open_world(&w);
+    bst_world_view *view = w.scene.view;
+    bst_vec3 geometric[N], apparent[N];
+    double range[N], phase[N];
+    for (int i = 0; i < N; i++) {
+        double t = f->rows[i].mid;
+        bst_world_state eye, prey;
+        bst_bodies bodies;
+        bst_assert_ok(&ctx, bst_world_view_observer_state(&ctx, view, 0, t, &eye));
+        bst_assert_ok(&ctx, bst_world_view_bodies(&ctx, view, t, &bodies));
+        double light_s = 0.0;
+        bst_vec3 line = {0};
+        for (int round = 0; round < 4; round++) {
+            bst_assert_ok(&ctx, bst_world_view_object_state(&ctx, view, 1, t - light_s, &prey));
+            line = bst_vec3_sub(bst_vec3_axpy(prey.position_m, -light_s, bodies.earth_bary_mps),
+                                eye.position_m);
+            light_s = bst_vec3_norm(line) / BST_LIGHT_SPEED_MPS;
+        }
+        geometric[i] = bst_vec3_unit(line);
+        range[i] = test_distance(prey.position_m, eye.position_m);
+        bst_vec3 v = bst_vec3_scale(bst_vec3_add(bodies.earth_bary_mps, eye.velocity_mps),
+                                    1.0 / BST_LIGHT_SPEED_MPS);
+        apparent[i] = bst_vec3_unit(bst_vec3_add(geometric[i], v));
+        phase[i] = bst_vec3_angle(bst_vec3_sub(bodies.sun_m, prey.position_m),
+                                  bst_vec3_sub(eye.position_m, prey.position_m));
+        bst_quat q =
+            bst_quat_look(bst_vec3_unit(bst_vec3_axpy(apparent[i], 2e-3, (bst_vec3){0.6, 0, 0.8})),
+                          (bst_vec3){0.8, 0.6, 0});
+        run_tables_sql(
+            &f->tables,
+            "UPDATE exposures SET q_cam_from_gcrf_mid_x = %.17g, q_cam_from_gcrf_mid_y = %.17g,"
+            " q_cam_from_gcrf_mid_z = %.17g, q_cam_from_gcrf_mid_w = %.17g WHERE exposure_id = %d",
+            q.x, q.y, q.z, q.w, f->rows[i].id);
+        bst_vec3 seen = bst_quat_rotate(q, apparent[i]);
+        /* 4 arcsec a pixel; 2e-3 rad from the axis the plane is off by 1e-6 of it */
+        f->rows[i].x = seen.x / seen.z / (4 * ARCSEC);
+        f->rows[i].y = seen.y / seen.z / (4 * ARCSEC);
+    }
+    /* modes change between the middle and the end of a frame: the end counts */
+    run_tables_sql(&f->tables,
+                   "DELETE FROM control; INSERT INTO control VALUES (1, 0, 0.0, 'idle'), (1, 1, "
+                   "%.17g, 'track')",
+                   f->rows[10].mid + 0.15);
+    bst_run_sensor list[BST_EXPORT_SENSORS];
+    int count;
+    w.scene.run = run_tables_open(&f->tables);
+    bst_assert_ok(&ctx, bst_run_sensors(&ctx, w.scene.run, NULL, list, &count));
+    bst_assert_ok(&ctx, bst_report_read(&ctx, w.scene.run, &w.scene, &list[1], NULL, &f->sensor));
+    for (int i = 0; i < N; i++) {
+        const bst_report_frame *r = &f->sensor.frames[i];
+        bst_vec3 to = bst_vec3_from_radec(r->target_ra_deg * DEG, r->target_dec_deg * DEG);
+        bst_assert_close(bst_vec3_angle(to, geometric[i]), 0.0, 1e-7);
+        to = bst_vec3_from_radec(r->apparent_ra_deg * DEG, r->apparent_dec_deg * DEG);
+        bst_assert_close(bst_vec3_angle(to, apparent[i]), 0.0, 1e-7);
+        bst_assert_close(r->range_m, range[i], 1e-6 * range[i]);
+        bst_assert_close(r->phase_rad, phase[i], 1e-4); /* light from the Sun is 20 arcsec aside */
+        bst_assert_close(r->error_x_px, f->rows[i].x, 0.01);
+        bst_assert_close(r->error_y_px, f->rows[i].y, 0.01);
+        bst_assert_close(r->error_px, hypot(f->rows[i].x, f->rows[i].y), 0.01);
+        assert_int_equal(r->mode, i < 10 ? BST_MODE_IDLE : BST_MODE_TRACK);
+        /* GMST of 2022-06-16 22:10 UT: 280.46062 + 360.98564737 (JD - 2451545) degrees (Meeus 1998,
+         * eq. 12.4) */
+        double days = 2459747.42361111 + r->mid_s / 86400.0 - 2451545.0;
+        const double *here = f->rows[i].here;
+        double lon =
+            atan2(here[1], here[0]) - fmod(280.46061837 + 360.98564736629 * days, 360.0) * DEG;
+        bst_assert_close(sin(r->longitude_rad - lon), 0.0, 0.4 * DEG);
+        assert_true(cos(r->longitude_rad - lon) > 0.0);
+        /* geocentric: at 8000 km and more the geodetic one is 0.1 degree from it */
+        bst_assert_close(r->latitude_rad, atan2(here[2], hypot(here[0], here[1])), 0.4 * DEG);
+    }
+    bst_world_view_free(view);
+    bst_world_free(w.scene.world);
+}
+
 static void errors_of_the_track(void **state) {
     fixture *f = *state;
     read_sensor(f);
@@ -429,6 +532,7 @@ static void frames_without_exposures(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(values_of_the_frames, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(values_of_the_world, set_up, tear_down),
         cmocka_unit_test_setup_teardown(errors_of_the_track, set_up, tear_down),
         cmocka_unit_test_setup_teardown(figures_of_the_loop, set_up, tear_down),
         cmocka_unit_test_setup_teardown(tasks, set_up, tear_down),

@@ -94,10 +94,11 @@ static void columns_of_the_tables(void **state) {
     scratch_make(&place);
     bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&place, "run"), false, &store));
     bst_assert_ok(&ctx, bst_run_sightings_create(&ctx, world, &record, RATE, store, &s));
-    for (int k = 0; k < 5; k++) { /* a pass of five frames, and one at 400 s */
+    for (int k = 0; k < 5; k++) { /* a pass of five frames, one at 400 s and one at 700 s */
         take(&ctx, s, world, 1 + k, k, 10.0 + 2 * k);
     }
     take(&ctx, s, world, 9, 0, 400.0);
+    take(&ctx, s, world, 12, 0, 700.0);
     const bst_task tasks[] = {{.object = 0},
                               {.object = 1, .before = BST_TASK_DONE},
                               {.object = -1, .before = BST_TASK_LOST}};
@@ -111,17 +112,17 @@ static void columns_of_the_tables(void **state) {
     const column keys[] = {{"objects", 2, 0},
                            {"objects_in_field", 1, 0},
                            {"objects_seen", 1, 0},
-                           {"passes", 2, 0},
-                           {"passes_seen", 2, 0},
-                           {"detections", 4, 0},
-                           {"revisits", 1, 0},
-                           {"revisit_mean_s", 386, 1e-9},
+                           {"passes", 3, 0},
+                           {"passes_seen", 3, 0},
+                           {"detections", 5, 0},
+                           {"revisits", 2, 0},
+                           {"revisit_mean_s", 343, 1e-9},
                            {"revisit_most_s", 386, 1e-9},
-                           {"longest_gap_mean_s", 600, 1e-9},
-                           {"custody_fraction_seen", 0.204, 1e-9},
-                           {"custody_fraction_all", 0.102, 1e-9},
-                           {"place_rms_arcsec", 0.75 * sqrt((1 + 4 + 9 + 1) / 4.0), 0.01},
-                           {"track_rms_arcsec", 1.5 * sqrt((1 + 4 + 1) / 3.0), 0.01},
+                           {"longest_gap_mean_s", 386, 1e-9},
+                           {"custody_fraction_seen", 0.304, 1e-9},
+                           {"custody_fraction_all", 0.152, 1e-9},
+                           {"place_rms_arcsec", 0.75 * sqrt((1 + 4 + 9 + 1 + 1) / 5.0), 0.01},
+                           {"track_rms_arcsec", 1.5 * sqrt((1 + 4 + 1 + 1) / 4.0), 0.01},
                            {"tasks", 2, 0},
                            {"tasks_done", 1, 0},
                            {"tasks_not_found", 0, 0},
@@ -159,20 +160,20 @@ static void columns_of_the_tables(void **state) {
     expect_row(run, "SELECT * FROM passes ORDER BY start_s", pass, sizeof pass / sizeof *pass);
     const column sums[] = {{"object", 1, 0},
                            {"norad", 44801, 0},
-                           {"passes", 2, 0},
-                           {"passes_seen", 2, 0},
-                           {"frames", 6, 0},
-                           {"lit", 5, 0},
-                           {"detected", 4, 0},
-                           {"tracked", 3, 0},
+                           {"passes", 3, 0},
+                           {"passes_seen", 3, 0},
+                           {"frames", 7, 0},
+                           {"lit", 6, 0},
+                           {"detected", 5, 0},
+                           {"tracked", 4, 0},
                            {"first_s", 10, 1e-9},
-                           {"last_s", 400, 1e-9},
-                           {"revisits", 1, 0},
-                           {"revisit_mean_s", 386, 1e-9},
+                           {"last_s", 700, 1e-9},
+                           {"revisits", 2, 0},
+                           {"revisit_mean_s", 343, 1e-9},
                            {"revisit_most_s", 386, 1e-9},
-                           {"longest_gap_s", 600, 1e-9},
-                           {"custody_s", 204, 1e-9},
-                           {"custody_fraction", 0.204, 1e-12},
+                           {"longest_gap_s", 386, 1e-9},
+                           {"custody_s", 304, 1e-9},
+                           {"custody_fraction", 0.304, 1e-12},
                            {"snr", 7, 0},
                            {"place_most_arcsec", 2.25, 0.01},
                            {"track_most_arcsec", 3.0, 0.01}};

@@ -219,6 +219,35 @@ static void panels_follow_the_sun(void **state) {
     bst_test_model_close(&m);
 }
 
+/* A spinning joint turns by the right-hand rule from its offset, and its child with it: at t the
+ * normals are (cos a, sin a, 0), and those of the child's axis, which leans in its parent's frame.
+ */
+static void joints_spin_by_the_right_hand(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(
+        "{" WHITE
+        ", \"joints\": [{\"name\": \"base\", \"follows\": \"spin\", \"axis\": [0, 0, 1], "
+        "\"normal\": [1, 0, 0], \"rate_deg_per_s\": 10, \"offset_deg\": 15, \"position_m\": [0, 3, "
+        "0]}, "
+        "{\"name\": \"j\", \"parent\": \"base\", \"follows\": \"spin\", \"axis\": [1, 0, 0], "
+        "\"normal\": [0, 0, 1], \"rate_deg_per_s\": -4, \"position_m\": [2, 0, 1]}], "
+        "\"parts\": [{\"name\": \"p\", \"kind\": \"plate\", \"joint\": \"j\", \"material\": "
+        "\"w\"}]}");
+    for (double t = 0.0; t < 60.0; t += 7.3) {
+        bst_vec3 up = {0, 0, 1};
+        bst_satellite_pose_set(m.pose, &(bst_satellite_aim){up, up, up, t});
+        double a = (15 + 10 * t) * BST_DEG_RAD, b = -4 * t * BST_DEG_RAD;
+        /* z turned about x by b, and then about z by a */
+        bst_vec3 in_base = {0, -sin(b), cos(b)};
+        bst_vec3 expected = {cos(a) * in_base.x - sin(a) * in_base.y,
+                             sin(a) * in_base.x + cos(a) * in_base.y, in_base.z};
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(m.pose->normals[0], expected)), 0, 1e-12);
+        bst_vec3 origin = {2 * cos(a), 3 + 2 * sin(a), 1};
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(m.pose->origin[1], origin)), 0, 1e-12);
+    }
+    bst_test_model_close(&m);
+}
+
 /* A flat mirror's glint has the width of the Sun: twice the tilt turns the ray by twice as much. */
 static void glint_has_the_width_of_the_sun(void **state) {
     (void)state;
@@ -284,6 +313,7 @@ int main(void) {
         cmocka_unit_test(shadow_of_a_plate_is_exact),
         cmocka_unit_test(shadows_agree_with_rays),
         cmocka_unit_test(panels_follow_the_sun),
+        cmocka_unit_test(joints_spin_by_the_right_hand),
         cmocka_unit_test(glint_has_the_width_of_the_sun),
         cmocka_unit_test(earthlight_has_its_closed_form),
     };

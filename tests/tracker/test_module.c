@@ -116,6 +116,19 @@ static void end(bench *b) {
     bst_config_free(bst_tracker_config_table, &b->config);
 }
 
+/* Times at which the module asks for the cue; the linker puts this in the function's place. */
+static double asked_s[KEPT];
+static int asked;
+bst_status __real_bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                       bst_onboard_cue *out);
+bst_status __wrap_bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                       bst_onboard_cue *out);
+bst_status __wrap_bst_knowledge_cue_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
+                                       bst_onboard_cue *out) {
+    asked_s[asked++ % KEPT] = seconds;
+    return __real_bst_knowledge_cue_at(ctx, view, seconds, out);
+}
+
 /* Tracks and predictions for every frame, at its tick; telemetry's error comes out of the stars and
  * is handed back through the predictions. */
 static void one_answer_per_frame(void **state) {
@@ -123,6 +136,7 @@ static void one_answer_per_frame(void **state) {
     const bst_vec3 error = {-0.8 * PIXEL_RAD, 1.5 * PIXEL_RAD, 1e-4};
     bench b;
     init(&b);
+    asked = 0;
     onboard_set_error(&b.o, error);
     onboard_add_telemetry(&b.o, 0, 0);
     load(&b, 1000, 1000);
@@ -149,6 +163,11 @@ static void one_answer_per_frame(void **state) {
             bst_vec3_axpy(p->attitude_error_cam_rad, dt, p->attitude_error_rate_cam_radps);
         bst_assert_close(now.x, error.x, 0.01 * PIXEL_RAD);
         bst_assert_close(now.y, error.y, 0.01 * PIXEL_RAD);
+    }
+    /* the cue is that of the middle of the exposure */
+    assert_int_equal(asked, 6);
+    for (int i = 0; i < 6; i++) {
+        bst_assert_close(asked_s[i], (1000 * (i + 1) - 0.5 * EXPOSURE) / ONBOARD_RATE, 1e-12);
     }
     /* the object that stands still is a track */
     assert_int_equal(b.tracks[5].count, 1);

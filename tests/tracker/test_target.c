@@ -72,6 +72,45 @@ static void misfit_is_chi_square(void **state) {
     bst_assert_close(fit.chi2, expected, 1e-6);
 }
 
+/* Chi-square of two, by elimination. */
+static double chi2_of(const double x[2], double p11, double p12, double p22) {
+    double y = x[1] - p12 / p11 * x[0];
+    return x[0] * x[0] / p11 + y * y / (p22 - p12 * p12 / p11);
+}
+
+/* Covariances of all directions: direction, rate and magnitude each by its own, and the logarithm
+ * of the determinants. */
+static void misfit_off_the_diagonal(void **state) {
+    (void)state;
+    bst_target_cue cue = make_cue();
+    cue.sigma_rad = 10.0 * AS;
+    cue.rate_sigma_radps = 0.04 * AS;
+    bst_mtt_track t = make_track(1, 6.0, 0.12, 13.4);
+    double(*p)[4] = t.state.covariance;
+    p[0][0] = 900.0 * AS * AS;
+    p[1][1] = 600.0 * AS * AS;
+    p[0][1] = p[1][0] = -500.0 * AS * AS;
+    p[2][2] = 0.0024 * AS * AS;
+    p[3][3] = 0.0019 * AS * AS;
+    p[2][3] = p[3][2] = 0.0015 * AS * AS;
+    bst_vec3 east = bst_vec3_unit((bst_vec3){-t.state.direction.y, t.state.direction.x, 0});
+    bst_vec3 north = bst_vec3_cross(t.state.direction, east);
+    bst_vec3 off = bst_vec3_sub(cue.direction, t.state.direction);
+    bst_vec3 slow = bst_vec3_sub(t.state.rate_radps, cue.rate_radps);
+    const double d[2] = {bst_vec3_dot(off, east), bst_vec3_dot(off, north)};
+    const double r[2] = {bst_vec3_dot(slow, east), bst_vec3_dot(slow, north)};
+    double sigma2 = 100.0 * AS * AS;
+    double floor2 = 0.04 * 0.04 * AS * AS + params.rate_floor_radps * params.rate_floor_radps;
+    double m = t.v_mag - cue.v_mag, v = cue.v_mag_sigma * cue.v_mag_sigma + 0.01 + 0.01;
+    double expected = chi2_of(d, p[0][0] + sigma2, p[0][1], p[1][1] + sigma2) +
+                      chi2_of(r, p[2][2] + floor2, p[2][3], p[3][3] + floor2) + m * m / v;
+    bst_target_fit fit = bst_target_misfit(&params, &cue, &t);
+    bst_assert_close(fit.chi2, expected, 1e-3 * expected); /* axes turn by 1e-4 over the distance */
+    double det = ((p[0][0] + sigma2) * (p[1][1] + sigma2) - p[0][1] * p[0][1]) *
+                 ((p[2][2] + floor2) * (p[3][3] + floor2) - p[2][3] * p[2][3]) * v;
+    bst_assert_close(fit.log_det, log(det), 1e-6);
+}
+
 static void takes_the_likeliest(void **state) {
     (void)state;
     bst_mtt_track t[3] = {make_track(1, 100, 1.6, 13), make_track(2, 2160, 0.1, 13),
@@ -243,8 +282,9 @@ static void holds_what_manoeuvres(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(misfit_is_chi_square),      cmocka_unit_test(takes_the_likeliest),
-        cmocka_unit_test(takes_nothing_wrong),       cmocka_unit_test(keeps_and_lets_go),
-        cmocka_unit_test(expects_what_the_cue_says), cmocka_unit_test(holds_what_manoeuvres)};
+        cmocka_unit_test(misfit_is_chi_square), cmocka_unit_test(misfit_off_the_diagonal),
+        cmocka_unit_test(takes_the_likeliest),  cmocka_unit_test(takes_nothing_wrong),
+        cmocka_unit_test(keeps_and_lets_go),    cmocka_unit_test(expects_what_the_cue_says),
+        cmocka_unit_test(holds_what_manoeuvres)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

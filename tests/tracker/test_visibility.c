@@ -6,6 +6,7 @@
 #include "sim/astro/kepler.h"
 #include "tests/test_support.h"
 #include "tests/tracker/geo_look.h"
+#include "tracker/mtt/multitarget_internal.h"
 
 #define AS BST_ARCSEC_RAD
 #define SIGMA (0.3 * AS)
@@ -333,9 +334,66 @@ static void a_faint_track_sleeps_after_half_its_coast(void **state) {
     bst_mtt_free(mtt);
 }
 
+static bst_mtt_sight behind(const void *user, const bst_mtt_track *track, bst_mtt_light *light) {
+    (void)user;
+    (void)track;
+    *light = (bst_mtt_light){.sunlight = 1.0};
+    return BST_MTT_EARTH;
+}
+
+/* A track that falls asleep keeps its correlations: all of its covariances grow by one factor, and
+ * its state is that of its orbit. */
+static void falling_asleep_keeps_correlations(void **state) {
+    (void)state;
+    bst_mtt_track track = {.status = BST_TRACK_CONFIRMED, .lit = true};
+    track.orbit.valid = true;
+    for (int i = 0; i < 6; i++) {
+        for (int j = 0; j < 6; j++) {
+            track.orbit.covariance[i][j] = 1.0 + i + 10.0 * j;
+        }
+        for (int j = 0; j < 4; j++) {
+            track.orbit.cross[i][j] = 100.0 + i + 10.0 * j;
+        }
+    }
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            track.orbit.sky.covariance[i][j] = 200.0 + i + 10.0 * j;
+            track.state.covariance[i][j] = 7.0;
+        }
+    }
+    bool observable = true;
+    bst_mtt m = {
+        .params = {.orbits = true}, .tracks = &track, .track_count = 1, .observable = &observable};
+    const bst_mtt_frame frame = {.sight = behind};
+    const bst_mtt_track before = track;
+    bst_mtt_look(&m, 0, &frame);
+    assert_true(track.asleep && !track.may_miss && !observable);
+    assert_int_equal(m.sleepers, 1);
+    double factor = track.orbit.covariance[0][0] / before.orbit.covariance[0][0];
+    assert_true(factor > 1.0);
+    for (int i = 0; i < 6; i++) {
+        for (int j = 0; j < 6; j++) {
+            bst_assert_close(track.orbit.covariance[i][j], factor * before.orbit.covariance[i][j],
+                             1e-9);
+        }
+        for (int j = 0; j < 4; j++) {
+            bst_assert_close(track.orbit.cross[i][j], factor * before.orbit.cross[i][j], 1e-9);
+        }
+    }
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            bst_assert_close(track.state.covariance[i][j],
+                             factor * before.orbit.sky.covariance[i][j], 1e-9);
+        }
+    }
+    bst_mtt_look(&m, 0, &frame); /* once */
+    bst_assert_close(track.orbit.covariance[0][0], factor * before.orbit.covariance[0][0], 1e-9);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shadow_by_angle),
+        cmocka_unit_test(falling_asleep_keeps_correlations),
         cmocka_unit_test(behind_the_earth),
         cmocka_unit_test(lit_from_behind),
         cmocka_unit_test(it_wakes_as_itself),

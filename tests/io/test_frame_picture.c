@@ -1,0 +1,84 @@
+/* Pictures of frames: where pixels and marks are in them, in pictures of other shapes than the
+ * frame's. */
+#include <stdlib.h>
+
+#include "sim/io/frame_picture.h"
+#include "tests/test_support.h"
+
+enum { COLUMNS = 40, ROWS = 20 };
+
+/* Blue, green, red of a picture; the caller frees it. */
+static uint8_t *drawn(const uint16_t *pixels, const bst_io_overlay *overlay, int width,
+                      int height) {
+    bst_ctx ctx = {0};
+    bst_picture *picture;
+    const bst_io_counts counts = {pixels, COLUMNS, ROWS};
+    uint8_t *bgr = malloc((size_t)(3 * width * height));
+    assert_non_null(bgr);
+    bst_io_stretch stretch = bst_io_stretch_of(pixels, COLUMNS, ROWS);
+    bst_assert_ok(&ctx,
+                  bst_frame_picture(&ctx, &counts, stretch, overlay, width, height, &picture));
+    bst_assert_ok(&ctx, bst_picture_copy(&ctx, picture, bgr));
+    bst_picture_free(picture);
+    return bgr;
+}
+
+/* Centre of what differs between two pictures; false: nothing does. */
+static bool centre_of_change(const uint8_t *a, const uint8_t *b, int width, int height, double *x,
+                             double *y) {
+    double sum = 0.0, at[2] = {0.0};
+    for (int j = 0; j < height; j++) {
+        for (int i = 0; i < width; i++) {
+            const uint8_t *p = a + 3 * (j * width + i), *q = b + 3 * (j * width + i);
+            double change = abs(p[0] - q[0]) + abs(p[1] - q[1]) + abs(p[2] - q[2]);
+            sum += change;
+            at[0] += change * i;
+            at[1] += change * j;
+        }
+    }
+    *x = at[0] / sum;
+    *y = at[1] / sum;
+    return sum > 0.0;
+}
+
+/* The frame is as large as the picture allows and in its middle: pixel k is centred (k + 1/2) scale
+ * - 1/2 from its corner. */
+static void places_in_the_picture(void **state) {
+    (void)state;
+    static const int sizes[][2] = {{400, 300}, {320, 160}, {300, 300}, {600, 120}};
+    for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
+        int width = sizes[k][0], height = sizes[k][1];
+        double scale = fmin(width / 40.0, height / 20.0);
+        double left = (width - (int)(40 * scale)) / 2, top = (height - (int)(20 * scale)) / 2;
+        uint16_t pixels[COLUMNS * ROWS];
+        for (int i = 0; i < COLUMNS * ROWS; i++) {
+            pixels[i] = (uint16_t)(100 + i % 7);
+        }
+        uint8_t *plain = drawn(pixels, NULL, width, height);
+        double x, y;
+        pixels[6 * COLUMNS + 29] = 107;
+        uint8_t *lit = drawn(pixels, NULL, width, height);
+        assert_true(centre_of_change(plain, lit, width, height, &x, &y));
+        bst_assert_close(x, left + 29.5 * scale - 0.5,
+                         0.75); /* edges are drawn in whole pixels */
+        bst_assert_close(y, top + 6.5 * scale - 0.5, 1.2);
+        const bst_io_overlay none = {.count = 0};
+        bst_io_overlay_mark mark = {
+            .kind = BST_OVERLAY_DETECTION, .x_px = 12.3, .y_px = 8.6, .radius_px = 2.0};
+        const bst_io_overlay one = {.marks = &mark, .count = 1};
+        uint8_t *without = drawn(pixels, &none, width, height),
+                *with = drawn(pixels, &one, width, height);
+        assert_true(centre_of_change(without, with, width, height, &x, &y));
+        bst_assert_close(x, left + 12.8 * scale - 0.5, 1.2);
+        bst_assert_close(y, top + 9.1 * scale - 0.5, 1.2);
+        free(plain);
+        free(lit);
+        free(without);
+        free(with);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(places_in_the_picture)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
