@@ -58,6 +58,7 @@ void bst_generator_free(bst_generator *g) {
         free(g->route);
         free(g->way);
         bst_streak_breakup_free(g->streaks);
+        bst_local_sky_free(&g->wing_sky);
         free(g->path_x);
         free(g->path_y);
         free(g->object_x);
@@ -439,6 +440,10 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
     return BST_OK;
 }
 
+double bst_generator_uniform(const bst_generator *g, uint64_t draw) {
+    return bst_rng_uniform(g->key, (uint64_t)g->exposure_id, draw);
+}
+
 double bst_generator_draw(const bst_generator *g, const generator_source *s, int which) {
     return bst_rng_normal(g->key, (uint64_t)g->exposure_id,
                           s->name * GENERATOR_DRAWS + (uint64_t)which);
@@ -540,7 +545,7 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
     if (g->smeared) {
         BST_TRY(bst_streak_breakup_fragments(ctx, g));
     }
-    bst_false_alarms_draw(g);
+    BST_TRY(bst_false_alarms_draw(ctx, g));
     bst_false_alarms_cosmic_rays(g);
     for (int i = 0; i < g->count; i++) {
         bst_detection *d = &g->items[i].detection;
