@@ -22,7 +22,7 @@ static const double WIDEN_ERROR = 1e-3;
 enum { PLAIN, FINE, QUALITIES };
 
 /* Error ratio of the fine to the plain grid. */
-static const double FINER = 1.0 / 16.0;
+static const double FINER = 1.0 / 64.0;
 
 /* Shares of a quality's tolerance: for frequencies beyond the cut-off, and for aliases along each
  * axis. */
