@@ -191,6 +191,9 @@ bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
 /* Generates the detection of a found source: position, flux and size with errors. */
 bst_detection bst_generator_measure(const bst_generator *g, const generator_source *s,
                                     const generator_blend *b);
+/* Light of a pixel from which image processing takes it for saturated, e-: by the converter, or at
+ * 0.98 of the full well (imgproc/detect/detect.c). */
+double bst_generator_saturation_e(const bst_generator *g);
 /* Uniform draw in (0, 1) of the frame, by its number. */
 double bst_generator_uniform(const bst_generator *g, uint64_t draw);
 /* Standard normal draw number `which` of a source. */
