@@ -173,12 +173,17 @@ static void set_extent(const bst_generator *g, const generator_source *s, bool a
     }
 }
 
+/* Nearest pixel of the frame along an axis. */
+static double on_frame(double at, double first, int last) {
+    return fmin(fmax(at, first), first + last);
+}
+
 /* Detection of a source centred off the frame: image processing fits the visible part as a point.
  */
 static void fit_visible_part(const bst_generator *g, const generator_source *s, bst_detection *d) {
     double off_x = g->binning * (s->seen_x - s->x), off_y = g->binning * (s->seen_y - s->y);
-    d->x_px += off_x;
-    d->y_px += off_y;
+    d->x_px = on_frame(d->x_px + off_x, g->origin_x, g->binning * (g->width - 1));
+    d->y_px = on_frame(d->y_px + off_y, g->origin_y, g->binning * (g->height - 1));
     d->flux_e *= s->visible;
     d->flux_sigma_e *= s->visible;
     d->snr *= sqrt(s->visible);
