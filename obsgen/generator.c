@@ -414,7 +414,8 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
         g->total_sigma = sqrt(sigma * sigma + 1.0 / 12.0);
         bst_crlb_table_init(&g->bound, sigma);
     }
-    g->fitted_sigma = fmax(g->onboard_sigma_px / g->binning, 0.2);
+    double onboard = f->response ? f->response->nearest_sigma_px : g->onboard_sigma_px / g->binning;
+    g->fitted_sigma = fmax(onboard, 0.2);
     double length = hypot(f->streak_dx_px, f->streak_dy_px) / g->binning;
     g->bend_x = f->bend_x_px / g->binning;
     g->bend_y = f->bend_y_px / g->binning;

@@ -74,8 +74,7 @@ bst_status bst_false_alarms_draw(bst_ctx *ctx, bst_generator *g) {
         least /= sqrt(g->filters[0].variance);
         expected = bst_matched_pixel_maxima(g->filter_sigma, least) * g->width * g->height;
     }
-    double share = g->streak > 0.0 ? 1.0 - g->streak_share : 1.0;
-    BST_TRY(bst_wing_alarms_draw(ctx, g, share * expected / ((double)g->width * g->height)));
+    BST_TRY(bst_wing_alarms_draw(ctx, g));
     double arrival = 0.0;
     for (uint64_t i = 0; i < 1000000; i++) {
         uint64_t draw = FALSE_ALARM + 8 * i;

@@ -125,6 +125,51 @@ static void sum_spectra(spectral_sums *s, const bst_response_side *source,
     s->filtered = s->point[1];
 }
 
+/* Frequencies of the sums over rings, and directions on half of each. */
+enum { RINGS = 768, DIRECTIONS = 12 };
+
+/* Correlation of an image with the Gaussian of sigma_px in the same pixels, over the Gaussian's own
+ * norm. image, pixel: means over the rings of frequency. */
+static double similarity(const double image[RINGS], const double pixel[RINGS], double step,
+                         double sigma_px) {
+    double both = 0.0, own = 0.0;
+    for (int i = 0; i < RINGS; i++) {
+        double f = step * (i + 0.5), turn = BST_PI * f * sigma_px;
+        double gaussian = pixel[i] * exp(-2.0 * turn * turn);
+        both += f * image[i] * gaussian;
+        own += f * gaussian * gaussian;
+    }
+    return both / sqrt(own);
+}
+
+/* Sigma of the Gaussian nearest to an image, as image processing finds it for its widths
+ * (imgproc/detect/known_psf.c), sensor px. */
+static double nearest_sigma(const bst_response_side *side, int binning, double x_px, double y_px) {
+    const bst_response_side point = {NULL, 0.0};
+    bst_response_nodes nodes, none = {.count = 0};
+    double image[RINGS] = {0.0}, pixel[RINGS] = {0.0};
+    double step = fmin(cutoff(side), MOST_FREQUENCY) / RINGS;
+    bst_response_nodes_at(side, x_px, y_px, &nodes);
+    for (int i = 0; i < RINGS; i++) {
+        for (int a = 0; a < DIRECTIONS; a++) {
+            double f = step * (i + 0.5), angle = BST_PI * (a + 0.5) / DIRECTIONS, at[2];
+            bst_response_otf(side, &nodes, binning, f * cos(angle), f * sin(angle), at);
+            image[i] += at[0];
+            bst_response_otf(&point, &none, binning, f * cos(angle), f * sin(angle), at);
+            pixel[i] += at[0];
+        }
+    }
+    double low = 0.05, high = 20.0;
+    for (int round = 0; round < 40; round++) { /* one maximum */
+        double third = (high - low) / 3.0;
+        bool wider = similarity(image, pixel, step, low + third) <
+                     similarity(image, pixel, step, high - third);
+        low += wider ? third : 0.0;
+        high -= wider ? 0.0 : third;
+    }
+    return 0.5 * (low + high);
+}
+
 /* Root of the variance share at a node of the tabulated widths. */
 static double width_node(int k) {
     double least = sqrt(BST_FALLOFF_LEAST);
@@ -136,7 +181,7 @@ static double width_node(int k) {
  * for images widened by Gaussians. The steps resolve the cusp at 0, which produces the wings. */
 static void tabulate_falloff(const bst_response_side *source, const bst_response_side *filter,
                              int binning, double x_px, double y_px, bst_response *out) {
-    enum { RINGS = 768, DIRECTIONS = 12, ALL = BST_FALLOFF_WIDTHS + 1 }; /* of the half plane */
+    enum { ALL = BST_FALLOFF_WIDTHS + 1 };
     bst_response_nodes nodes[2];
     double limit = fmin(fmax(cutoff(source), cutoff(filter)), MOST_FREQUENCY);
     double spectrum[RINGS][ALL], peak = 0.0;
@@ -266,6 +311,7 @@ void bst_response_set(bst_response *out, const bst_response_side *source,
                               .filter = even(f),
                               .both = even(0.5 * (s + f)),
                               .maxima_sigma_px = sqrt(f),
+                              .nearest_sigma_px = filter->sigma_px / binning,
                               .falloff_scale = 1.0};
         return;
     }
@@ -279,6 +325,7 @@ void bst_response_set(bst_response *out, const bst_response_side *source,
         sums.filtered;
     out->maxima_sigma_px = sqrt(0.5 / fmax(steep, 1e-6));
     out->falloff_scale = 1.0;
+    out->nearest_sigma_px = nearest_sigma(filter, binning, x_px, y_px) / binning;
     out->product_px2 = 2.0 * out->both.across_px * out->both.along_px;
     out->widened_px2 = 0.0;
     tabulate_falloff(source, filter, binning, x_px, y_px, out);

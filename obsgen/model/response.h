@@ -34,12 +34,13 @@ typedef struct bst_falloff {
 
 typedef struct bst_response {
     bst_obsgen_image_width source, filter,
-        both;               /* source x source, filter x filter, source x filter */
-    double maxima_sigma_px; /* Gaussian whose filtered noise has the same density of maxima */
-    bst_falloff falloff;    /* of source x filter */
-    double product_px2;     /* variance of source x filter for which the falloff is tabulated */
-    double widened_px2;     /* variance by which the source has been widened since */
-    double falloff_scale;   /* table distance per px: 1, less for the widest images */
+        both;                /* source x source, filter x filter, source x filter */
+    double maxima_sigma_px;  /* Gaussian whose filtered noise has the same density of maxima */
+    double nearest_sigma_px; /* Gaussian nearest to the filter's image, without the pixel */
+    bst_falloff falloff;     /* of source x filter */
+    double product_px2;      /* variance of source x filter for which the falloff is tabulated */
+    double widened_px2;      /* variance by which the source has been widened since */
+    double falloff_scale;    /* table distance per px: 1, less for the widest images */
 } bst_response;
 
 /* An image model: PSF at a field position, sensor px, widened by a Gaussian. */

@@ -2,21 +2,30 @@
 
 #include <assert.h>
 #include <math.h>
+#include <stdlib.h>
 
 #include "obsgen/generator_internal.h"
 #include "obsgen/model/false_alarms.h"
 
-/* Random stream, beyond those of sources, whose numbers have 33 bits. */
-static const uint64_t WING_ALARM = (uint64_t)1 << 42;
-/* Wing light below LEAST_WING (SNR) causes a negligible number of false alarms; the law of rare
- * maxima holds above LEAST_OUTPUT. */
-static const double LEAST_WING = 0.3, LEAST_OUTPUT = 1.5;
-/* Number of independent noise values between two adjacent maxima. */
-static const double WAY_PLACES = 2.0;
+/* Random stream, beyond those of other draws, and bits of a patch's pixels. */
+static const uint64_t WING_ALARM = (uint64_t)1 << 47;
+enum { PIXEL_BITS = 13 };
+/* Wing light below LEAST_WING (SNR) causes a negligible number of false alarms. */
+static const double LEAST_WING = 0.5;
 /* Wing light per pixel, in pixel noises, that no longer adds to the background of a mesh. */
 static const double LEAST_LIGHT = 0.01;
-/* Half distance of the difference that is the slope of wing light, px. */
-static const double SLOPE_PX = 0.5;
+/* Within so many sigmas of the PSF the output is that of the core, in full. */
+static const double CORE_SIGMAS = 4.0;
+
+/* Pixels about a source: half side of the patch, reach of the filter's kernel. */
+enum {
+    RADIUS = 22,
+    KERNEL = 9,
+    SIDE = 2 * RADIUS + 1,
+    WIDE = SIDE + 2 * KERNEL,
+    MOST_MAXIMA = 256
+};
+_Static_assert(WIDE *WIDE <= 1 << PIXEL_BITS, "a pixel has its own number");
 
 /* A source and the frame in which it has wings. */
 typedef struct winged {
@@ -25,14 +34,16 @@ typedef struct winged {
     double norm; /* sqrt(sum k^2) of the point filter's image k of unit sum */
 } winged;
 
-/* Output and noise of the filter on wing light, SNR, relative to open sky. */
-typedef struct wing_place {
-    double light; /* without the background that image processing subtracts */
-    double noise;
-    double estimated; /* noise that image processing divides by */
-    double slope;     /* of the light per px, along the distance */
-    double nearer;    /* light at the next place of independent noise towards the source */
-} wing_place;
+/* Output of the filter about a source, SNR as image processing measures it. */
+typedef struct patch {
+    int x0, y0; /* frame pixel of the first */
+    float output[SIDE][SIDE], light[SIDE][SIDE];
+} patch;
+
+typedef struct maximum {
+    int x, y; /* in the patch */
+    float snr;
+} maximum;
 
 /* Farthest distance of the tabulated falloff, px. */
 static double table_end_px(const bst_generator *g) {
@@ -55,8 +66,7 @@ static double wing_light(const void *user, double distance_px) {
     return w->norm * wing_output(w, fmin(distance_px, end)) * beyond * beyond * beyond;
 }
 
-/* Half side of the box about a source in which a false alarm is connected to it by its flank, px:
- * image processing compares maxima within it. */
+/* Distance from a source beyond which maxima can be detections of their own, px. */
 static double nearest_px(const bst_generator *g) {
     return ceil(6.0 * g->fitted_sigma + g->streak) + 2.5;
 }
@@ -90,80 +100,144 @@ static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, double norm, bool
     return BST_OK;
 }
 
-static wing_place place_at(const winged *w, double x, double y, double distance_px) {
-    double level, noise, raw = wing_output(w, distance_px);
-    bst_local_sky_at(&w->g->wing_sky, x, y, &level, &noise);
-    double taken = level / w->norm;
-    return (wing_place){
-        .light = raw - taken,
-        .noise = sqrt(1.0 + raw * w->norm / w->g->noise_e),
-        .estimated = noise,
-        .slope = wing_output(w, distance_px + SLOPE_PX) - wing_output(w, distance_px - SLOPE_PX),
-        .nearer = wing_output(w, distance_px - w->g->cross_sigma) - taken};
-}
-
-/* Distance of the threshold from the mean output on wing light, in its noise. */
-static double margin_of(const bst_generator *g, const wing_place *p) {
-    return (g->filters[0].threshold * p->estimated - p->light) / p->noise;
-}
-
-/* Additional false alarms per noise maximum on wing light. A maximum must exceed the threshold, and
- * the path to a higher maximum nearby, which leads towards the source, must drop below the
- * interpolation limit of image processing.
- * At a maximum the gradient of the noise cancels that of the light; it is independent of the noise
- * itself and normal, with the variance 1 / 2 sigma^2 per axis for the filter's Gaussian (Adler
- * 1981, The Geometry of Random Fields, 6.3). */
-static double wing_gain(const bst_generator *g, const wing_place *p) {
-    double t = g->filters[0].threshold, u = fmax(margin_of(g, p), LEAST_OUTPUT);
-    double floor = bst_generator_looks_from(g) * p->estimated;
-    double above = 0.5 * erfc((floor - p->nearer) / (p->noise * sqrt(2.0)));
-    double alone = 1.0 - pow(above, WAY_PLACES);
-    double steep = g->response.maxima_sigma_px * p->slope / p->noise;
-    return fmax(alone * u / t * exp(0.5 * (t * t - u * u) - steep * steep) - 1.0, 0.0);
-}
-
-/* Keeps a false alarm at a place on wing light; draw: number of its random draw. */
-static void keep_alarm(bst_generator *g, const wing_place *p, double x, double y, uint64_t draw) {
-    double least = fmax(margin_of(g, p), 0.0), energy = -log(bst_generator_uniform(g, draw));
-    double above = sqrt(least * least + 2.0 * energy) - least;
-    double snr = g->filters[0].threshold + p->noise / p->estimated * above;
-    bst_obsgen_generated item = {.detection = bst_false_alarms_point(g, x, y, snr, 0.0),
-                                 .item = -1};
-    item.detection.label = BST_LABEL_ARTEFACT;
-    bst_generator_keep(g, &item);
-}
-
-/* Draws false alarms on the wings of one source. Near the source none occur: it is the higher
- * maximum, connected by its flank. */
-static void draw_about(bst_generator *g, const winged *w, double per_px) {
-    enum { RINGS = 32, SECTORS = 8 };
-    const generator_source *s = w->s;
-    double from = nearest_px(g), step = (table_end_px(g) - from) / RINGS;
-    uint64_t draw = WING_ALARM | s->name << 8;
-    double arrival = -log(bst_generator_uniform(g, draw++));
-    for (int i = 0; i < RINGS * SECTORS; i++) {
-        double r = from + (i / SECTORS + 0.5) * step;
-        double angle = 2.0 * BST_PI / SECTORS * (i % SECTORS + 0.5);
-        wing_place p = place_at(w, s->x + r * cos(angle), s->y + r * sin(angle), r);
-        if (!(p.light > 0.0)) {
-            continue;
+/* Draws noise with the correlation of the filter's output: white noise under a Gaussian kernel. */
+static void draw_noise(const bst_generator *g, const generator_source *s, float out[SIDE][SIDE]) {
+    float kernel[2 * KERNEL + 1], sum = 0.0f, rows[WIDE][SIDE];
+    double sigma = g->response.maxima_sigma_px;
+    for (int i = 0; i <= 2 * KERNEL; i++) {
+        double at = (i - KERNEL) / sigma;
+        kernel[i] = (float)exp(-0.5 * at * at);
+        sum += kernel[i] * kernel[i];
+    }
+    uint64_t first = WING_ALARM | s->name << PIXEL_BITS;
+    for (int j = 0; j < WIDE; j++) {
+        float white[WIDE];
+        for (int i = 0; i < WIDE; i++) {
+            white[i] = (float)bst_rng_normal(g->key, (uint64_t)g->exposure_id,
+                                             first + (uint64_t)(j * WIDE + i));
         }
-        arrival -= per_px * wing_gain(g, &p) * 2.0 * BST_PI / SECTORS * r * step;
-        while (arrival < 0.0) {
-            double turn = angle + 2.0 * BST_PI / SECTORS * (bst_generator_uniform(g, draw) - 0.5);
-            double x = s->x + r * cos(turn), y = s->y + r * sin(turn);
-            arrival -= log(bst_generator_uniform(g, draw + 2));
-            bool apart = fmax(fabs(x - s->x), fabs(y - s->y)) > from;
-            if (apart && x > -0.5 && y > -0.5 && x < g->width - 0.5 && y < g->height - 0.5) {
-                keep_alarm(g, &p, x, y, draw + 1);
+        for (int i = 0; i < SIDE; i++) {
+            rows[j][i] = 0.0f;
+            for (int k = 0; k <= 2 * KERNEL; k++) {
+                rows[j][i] += kernel[k] * white[i + k] / sum;
             }
-            draw += 3;
+        }
+    }
+    for (int j = 0; j < SIDE; j++) {
+        for (int i = 0; i < SIDE; i++) {
+            out[j][i] = 0.0f;
+        }
+        for (int k = 0; k <= 2 * KERNEL; k++) {
+            for (int i = 0; i < SIDE; i++) {
+                out[j][i] += kernel[k] * rows[j + k][i];
+            }
         }
     }
 }
 
-bst_status bst_wing_alarms_draw(bst_ctx *ctx, bst_generator *g, double per_px) {
-    assert(ctx && g && per_px >= 0.0);
+/* Sets the filter's output about a source: wing light less the background of the mesh, and noise,
+ * both over the noise that image processing measures. */
+static void set_patch(const winged *w, patch *p) {
+    const bst_generator *g = w->g;
+    double core = CORE_SIGMAS * g->fitted_sigma;
+    p->x0 = (int)lround(w->s->x) - RADIUS;
+    p->y0 = (int)lround(w->s->y) - RADIUS;
+    draw_noise(g, w->s, p->output);
+    for (int j = 0; j < SIDE; j++) {
+        for (int i = 0; i < SIDE; i++) {
+            double x = p->x0 + i, y = p->y0 + j, r = hypot(x - w->s->x, y - w->s->y), level, noise;
+            bst_local_sky_at(&g->wing_sky, x, y, &level, &noise);
+            double raw = wing_output(w, r) * (r < core ? 2.0 : 1.0);
+            double own = sqrt(1.0 + fmax(raw, 0.0) * w->norm / g->noise_e);
+            p->light[j][i] = (float)((raw - level / w->norm) / noise);
+            p->output[j][i] = p->light[j][i] + (float)(own / noise) * p->output[j][i];
+        }
+    }
+}
+
+/* Finds the local maxima of a patch above a level; returns their number. */
+static int find_maxima(const patch *p, double level, maximum found[MOST_MAXIMA]) {
+    int count = 0;
+    for (int j = 1; j + 1 < SIDE; j++) {
+        for (int i = 1; i + 1 < SIDE && count < MOST_MAXIMA; i++) {
+            float here = p->output[j][i];
+            bool top = (double)here > level;
+            for (int k = 0; k < 9 && top; k++) {
+                top = k == 4 || here > p->output[j + k / 3 - 1][i + k % 3 - 1];
+            }
+            if (top) {
+                found[count++] = (maximum){i, j, here};
+            }
+        }
+    }
+    return count;
+}
+
+/* True if the output on the pixels between two maxima stays above `least`. */
+static bool is_ridge(const patch *p, const maximum *a, const maximum *b, double least) {
+    int dx = b->x - a->x, dy = b->y - a->y;
+    int steps = abs(dx) > abs(dy) ? abs(dx) : abs(dy);
+    for (int i = 1; i < steps; i++) {
+        int x = a->x + (int)lround((double)i * dx / steps);
+        int y = a->y + (int)lround((double)i * dy / steps);
+        if (!((double)p->output[y][x] > least)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* True if a ridge connects a maximum to a higher one within reach, as image processing decides. */
+static bool is_connected(const bst_generator *g, const patch *p, const maximum *found, int count,
+                         int k) {
+    const maximum *m = &found[k];
+    int reach = (int)ceil(6.0 * g->fitted_sigma + g->streak) + 2;
+    double least = fmax((double)m->snr - bst_generator_fall_of_saddle((double)m->snr),
+                        bst_generator_looks_from(g));
+    for (int n = 0; n < count; n++) {
+        const maximum *o = &found[n];
+        if (n != k && o->snr > m->snr && abs(o->x - m->x) <= reach && abs(o->y - m->y) <= reach &&
+            is_ridge(p, m, o, least)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* By how much a parabola through three values exceeds the middle one, the largest. */
+static double rise(float left, float middle, float right) {
+    double bend = 2.0 * (double)middle - (double)left - (double)right;
+    double slope = (double)right - (double)left;
+    return bend > 0.0 ? slope * slope / (8.0 * bend) : 0.0;
+}
+
+/* Keeps the false alarms on the wings of one source: maxima above the threshold that no ridge
+ * connects to a higher one, such as the source. */
+static void draw_about(bst_generator *g, const winged *w) {
+    patch p;
+    maximum found[MOST_MAXIMA];
+    set_patch(w, &p);
+    int count = find_maxima(&p, bst_generator_looks_from(g), found);
+    double core = CORE_SIGMAS * g->fitted_sigma;
+    for (int k = 0; k < count; k++) {
+        int i = found[k].x, j = found[k].y, x = p.x0 + i, y = p.y0 + j;
+        double snr = (double)found[k].snr +
+                     rise(p.output[j][i - 1], found[k].snr, p.output[j][i + 1]) +
+                     rise(p.output[j - 1][i], found[k].snr, p.output[j + 1][i]);
+        if (snr <= g->filters[0].threshold || (double)p.light[j][i] < LEAST_WING || x < 0 ||
+            y < 0 || x >= g->width || y >= g->height || hypot(x - w->s->x, y - w->s->y) < core ||
+            is_connected(g, &p, found, count, k)) {
+            continue;
+        }
+        bst_obsgen_generated item = {.detection = bst_false_alarms_point(g, x, y, snr, 0.0),
+                                     .item = -1};
+        item.detection.label = BST_LABEL_ARTEFACT;
+        bst_generator_keep(g, &item);
+    }
+}
+
+bst_status bst_wing_alarms_draw(bst_ctx *ctx, bst_generator *g) {
+    assert(ctx && g);
     if (!g->response.falloff.tabulated || g->smeared) {
         return BST_OK;
     }
@@ -173,7 +247,7 @@ bst_status bst_wing_alarms_draw(bst_ctx *ctx, bst_generator *g, double per_px) {
     for (int i = 0; i < g->source_count && any; i++) {
         winged w = {g, &g->sources[i], norm};
         if (has_wings(&w)) {
-            draw_about(g, &w, per_px);
+            draw_about(g, &w);
         }
     }
     return BST_OK;

@@ -6,11 +6,9 @@
 
 /* Draws noise detections that the wings of bright sources lift above the threshold.
  *
- * Given:     per_px  false alarms of the point filter per pixel of open sky
  * Errors:    BST_ERR_MEMORY
  * Notes:     Image processing subtracts the background of the mesh, to which the wings contribute
  *            too; see bst_local_sky_add_wings. */
-bst_status bst_wing_alarms_draw(bst_ctx *ctx, bst_generator *generator,
-                                double per_px) BST_MUST_CHECK;
+bst_status bst_wing_alarms_draw(bst_ctx *ctx, bst_generator *generator) BST_MUST_CHECK;
 
 #endif
