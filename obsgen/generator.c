@@ -15,8 +15,9 @@
 static const double ROUGH_PX = 8.0;
 /* Clip level of image processing for background and noise, sigma. */
 static const double CLIP_SIGMA = 3.0;
-/* Sources with a smaller share of their image on the frame are not generated. */
-static const double LEAST_VISIBLE = 0.01;
+/* Sources with a smaller share of their image on the frame, and less than this SNR of it, are not
+ * generated. */
+static const double LEAST_VISIBLE = 0.01, LEAST_VISIBLE_SNR = 1.0;
 /* Sigmas of a Gaussian beyond which the error function is 1 in double precision: 6 sqrt(2). */
 static const double ALL_SIGMAS = 8.5;
 
@@ -58,6 +59,7 @@ void bst_generator_free(bst_generator *g) {
         free(g->route);
         free(g->way);
         bst_streak_breakup_free(g->streaks);
+        bst_local_sky_free(&g->wing_sky);
         free(g->path_x);
         free(g->path_y);
         free(g->object_x);
@@ -127,6 +129,17 @@ static void limit_steps(double at, double step, double low, double high, int *fi
     }
 }
 
+/* Output of the filter, for a point so far beyond the centre of the frame's last pixel along an
+ * axis, relative to that of the whole point: beyond it on the last pixel, where the product of
+ * image and filter is a Gaussian midway between both. Noise is that of the filter's part on the
+ * frame. */
+static double edge_output(double beyond_px, double sigma) {
+    double d = fmax(beyond_px, 0.0), seen = 0.5 - fmin(beyond_px, 0.0);
+    /* the product's deviation is sigma / sqrt(2) */
+    double product = 0.5 * erfc((0.5 * d - seen) / sigma);
+    return exp(-0.25 * d * d / (sigma * sigma)) * product / sqrt(0.5 * erfc(-seen / sigma));
+}
+
 /* Sets the visible share of a source's image. The squared light counts, because the image's square
  * is narrower than the image. */
 static void set_visible_share(const bst_generator *g, generator_source *s) {
@@ -134,6 +147,12 @@ static void set_visible_share(const bst_generator *g, generator_source *s) {
     double margin_y = 4.0 * g->sigma + 0.5 * fabs(s->path.dy);
     if (s->x > margin_x && s->y > margin_y && s->x < g->width - 1 - margin_x &&
         s->y < g->height - 1 - margin_y) {
+        return;
+    }
+    if (s->length < g->sigma) {
+        double x = edge_output(fmax(-s->x, s->x - (g->width - 1)), g->total_sigma);
+        double y = edge_output(fmax(-s->y, s->y - (g->height - 1)), g->total_sigma);
+        s->visible = s->ends = x * x * y * y;
         return;
     }
     double narrow = g->total_sigma * sqrt(0.5), sum = 0.0, along = 0.0;
@@ -186,7 +205,7 @@ static bool position_source(const bst_generator *g, const bst_generator_frame *f
         s->broken = true; /* its path is laid out later */
     }
     set_visible_share(g, s);
-    return s->broken || s->visible > LEAST_VISIBLE;
+    return s->broken || s->visible > 0.0;
 }
 
 /* Noise-free amplitude of a source in the matched-filter output, and the filter that gives it. */
@@ -395,7 +414,8 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
         g->total_sigma = sqrt(sigma * sigma + 1.0 / 12.0);
         bst_crlb_table_init(&g->bound, sigma);
     }
-    g->fitted_sigma = fmax(g->onboard_sigma_px / g->binning, 0.2);
+    double onboard = f->response ? f->response->nearest_sigma_px : g->onboard_sigma_px / g->binning;
+    g->fitted_sigma = fmax(onboard, 0.2);
     double length = hypot(f->streak_dx_px, f->streak_dy_px) / g->binning;
     g->bend_x = f->bend_x_px / g->binning;
     g->bend_y = f->bend_y_px / g->binning;
@@ -427,7 +447,8 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
         }
         s->name = (uint64_t)t->items[i].id | (uint64_t)(t->items[i].kind & 1) << 32;
         set_amplitude(g, s);
-        g->source_count++;
+        g->source_count +=
+            s->broken || s->visible > LEAST_VISIBLE || s->unraised > LEAST_VISIBLE_SNR;
     }
     add_crowding(g);
     g->open_share = 1.0;
@@ -437,6 +458,10 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
     }
     qsort(g->sources, (size_t)g->source_count, sizeof *g->sources, by_row);
     return BST_OK;
+}
+
+double bst_generator_uniform(const bst_generator *g, uint64_t draw) {
+    return bst_rng_uniform(g->key, (uint64_t)g->exposure_id, draw);
 }
 
 double bst_generator_draw(const bst_generator *g, const generator_source *s, int which) {
@@ -540,7 +565,7 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
     if (g->smeared) {
         BST_TRY(bst_streak_breakup_fragments(ctx, g));
     }
-    bst_false_alarms_draw(g);
+    BST_TRY(bst_false_alarms_draw(ctx, g));
     bst_false_alarms_cosmic_rays(g);
     for (int i = 0; i < g->count; i++) {
         bst_detection *d = &g->items[i].detection;

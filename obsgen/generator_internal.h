@@ -4,6 +4,7 @@
 
 #include "obsgen/generator.h"
 #include "obsgen/model/blend_weight.h"
+#include "obsgen/model/local_sky.h"
 #include "obsgen/streak/path_fit.h"
 #include "obsgen/streak/star_trail.h"
 #include "obsgen/streak/streak_centroid_error.h"
@@ -122,6 +123,7 @@ struct bst_generator {
     double route_box[4];           /* least and greatest x, least and greatest y */
     bst_obsgen_path_px whole_path; /* from start to end */
     struct generator_streaks *streaks;
+    bst_local_sky wing_sky; /* background by mesh with the wings of bright sources */
     /* centroid bias of fits by the true camera motion, by light level */
     double star_bias[GENERATOR_BIASES][2], streak_bias[GENERATOR_BIASES][2];
     double bias_sigma;  /* see bst_star_trail_point_bias */
@@ -189,6 +191,11 @@ bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
 /* Generates the detection of a found source: position, flux and size with errors. */
 bst_detection bst_generator_measure(const bst_generator *g, const generator_source *s,
                                     const generator_blend *b);
+/* Light of a pixel from which image processing takes it for saturated, e-: by the converter, or at
+ * 0.98 of the full well (imgproc/detect/detect.c). */
+double bst_generator_saturation_e(const bst_generator *g);
+/* Uniform draw in (0, 1) of the frame, by its number. */
+double bst_generator_uniform(const bst_generator *g, uint64_t draw);
 /* Standard normal draw number `which` of a source. */
 double bst_generator_draw(const bst_generator *g, const generator_source *s, int which);
 

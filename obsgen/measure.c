@@ -7,9 +7,7 @@ static const double MOMENTS_SNR = 10.0;
 /* Lower limit of the visible share used for errors. */
 static const double LEAST_SEEN = 0.02;
 
-/* Light of a pixel from which image processing takes it for saturated, e-: by the converter, or at
- * 0.98 of the full well (imgproc/detect/detect.c). */
-static double saturation_e(const bst_generator *g) {
+double bst_generator_saturation_e(const bst_generator *g) {
     const bst_camera *c = g->camera;
     double converter_e = (ldexp(1.0, (int)c->bits) - 1.0 - c->offset_dn) * c->gain_e_per_dn;
     return fmin(converter_e, 0.98 * c->full_well_e * g->binning * g->binning) - g->background_e;
@@ -21,7 +19,7 @@ static void saturated_bias(const bst_generator *g, const generator_source *s, do
                            double bias[2]) {
     bst_streak_model model = bst_generator_streak_model(g);
     double peak_e = s->flux_e / (2.0 * BST_PI * model.sigma_px * model.sigma_px);
-    model.saturated = fmax(saturation_e(g), 0.0) / peak_e;
+    model.saturated = fmax(bst_generator_saturation_e(g), 0.0) / peak_e;
     bst_star_trail_bias(&g->path, g->fit_path.dx, g->fit_path.dy, g->fit_bend_x, g->fit_bend_y,
                         g->total_sigma, bias);
     bst_path_fit(&g->path, &model, &model, light, bias);
@@ -175,12 +173,17 @@ static void set_extent(const bst_generator *g, const generator_source *s, bool a
     }
 }
 
+/* Nearest pixel of the frame along an axis. */
+static double on_frame(double at, double first, int last) {
+    return fmin(fmax(at, first), first + last);
+}
+
 /* Detection of a source centred off the frame: image processing fits the visible part as a point.
  */
 static void fit_visible_part(const bst_generator *g, const generator_source *s, bst_detection *d) {
     double off_x = g->binning * (s->seen_x - s->x), off_y = g->binning * (s->seen_y - s->y);
-    d->x_px += off_x;
-    d->y_px += off_y;
+    d->x_px = on_frame(d->x_px + off_x, g->origin_x, g->binning * (g->width - 1));
+    d->y_px = on_frame(d->y_px + off_y, g->origin_y, g->binning * (g->height - 1));
     d->flux_e *= s->visible;
     d->flux_sigma_e *= s->visible;
     d->snr *= sqrt(s->visible);

@@ -10,8 +10,8 @@ bst_detection bst_false_alarms_point(const bst_generator *generator, double x, d
                                      double length);
 
 /* Draws noise detections: a Poisson number, uniform over the frame, with the upper tail of the
- * filter output. */
-void bst_false_alarms_draw(bst_generator *generator);
+ * filter output; more of them on the wings of bright sources. Errors: BST_ERR_MEMORY. */
+bst_status bst_false_alarms_draw(bst_ctx *ctx, bst_generator *generator) BST_MUST_CHECK;
 
 /* Draws cosmic-ray hits by the detector model: straight tracks at random angles (cosine law)
  * through the sensitive layer, with a Landau-like charge distribution, as the filter detects them.

@@ -12,7 +12,38 @@
  * variance is 1 + 1/2 of a mesh's. */
 static const double CLIP_SIGMA = 3.0, AGREEMENT = 4.0 * 1.2247449;
 
-enum { PER_SNR = 4 };
+enum { PER_SNR = 4, PER_NOISE = 16 };
+
+/* Normal density. */
+static double density(double z) {
+    return exp(-0.5 * z * z) / sqrt(2.0 * BST_PI);
+}
+
+/* Moments of order 0 to 2 of normal values about w, of which only those within the clip count. */
+static void clipped_moments(double w, double out[3]) {
+    double a = -CLIP_SIGMA - w, b = CLIP_SIGMA - w, p = density(a), q = density(b);
+    double all = 0.5 * (erf(b / sqrt(2.0)) - erf(a / sqrt(2.0)));
+    double first = p - q, second = all + a * p - b * q; /* about w */
+    out[0] = all;
+    out[1] = w * all + first;
+    out[2] = w * w * all + 2.0 * w * first + second;
+}
+
+/* Tabulates the influence of a pixel's light. */
+static void tabulate_influence(bst_local_sky *sky) {
+    const double faint = 0.05; /* for the derivatives */
+    double dark[3], dim[3];
+    clipped_moments(0.0, dark);
+    clipped_moments(faint, dim);
+    double mean = dark[2] / dark[0], slope = dim[1] / faint;
+    double bend = (dim[2] - mean * dim[0]) / (faint * faint);
+    for (int i = 0; i < BST_LOCAL_SKY_LIGHTS; i++) {
+        double at[3];
+        clipped_moments((double)i / PER_NOISE, at);
+        sky->influence[i][0] = (float)(at[1] / slope);
+        sky->influence[i][1] = (float)((at[2] - mean * at[0]) / bend);
+    }
+}
 
 /* Tabulates light and squared light of a line below the clip, by its height. */
 static void tabulate(bst_local_sky *sky, double sigma_px) {
@@ -23,6 +54,7 @@ static void tabulate(bst_local_sky *sky, double sigma_px) {
         sky->square[i] = (float)(height * peak * sqrt(0.5) * erfc(sqrt(2.0 * flank)));
     }
     sky->sigma = sigma_px;
+    tabulate_influence(sky);
 }
 
 /* Mesh and fraction of a pixel coordinate. */
@@ -103,6 +135,30 @@ void bst_local_sky_add(bst_local_sky *sky, int x, int y, double height, double l
     float part = (float)(at - i), length = (float)length_px;
     sky->level[k] += length * (sky->light[i] + part * (sky->light[i + 1] - sky->light[i]));
     sky->noise[k] += length * (sky->square[i] + part * (sky->square[i + 1] - sky->square[i]));
+}
+
+void bst_local_sky_add_wings(bst_local_sky *sky, double x, double y, double reach_px,
+                             bst_local_sky_light_fn light, const void *user) {
+    assert(sky && light && reach_px > 0.0);
+    enum { STEP = 2 }; /* px */
+    int left = (int)fmax(x - reach_px, 0.0), top = (int)fmax(y - reach_px, 0.0);
+    int right = (int)fmin(x + reach_px, sky->width - 1.0);
+    int bottom = (int)fmin(y + reach_px, sky->height - 1.0);
+    for (int j = top; j <= bottom; j += STEP) {
+        int row = mesh_of(j, sky->mesh, sky->rows) * sky->columns;
+        for (int i = left; i <= right; i += STEP) {
+            double distance = hypot(i - x, j - y);
+            double at = distance <= reach_px ? PER_NOISE * light(user, distance) : 0.0;
+            if (!(at > 0.0 && at < BST_LOCAL_SKY_LIGHTS - 1.0)) {
+                continue;
+            }
+            int n = (int)at, k = row + mesh_of(i, sky->mesh, sky->columns);
+            float part = (float)(at - n), area = STEP * STEP;
+            const float *low = sky->influence[n], *high = sky->influence[n + 1];
+            sky->level[k] += area * (low[0] + part * (high[0] - low[0]));
+            sky->noise[k] += area * (low[1] + part * (high[1] - low[1]));
+        }
+    }
 }
 
 static int side_of(int i, int mesh, int count, int pixels) {

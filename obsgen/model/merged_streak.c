@@ -53,9 +53,11 @@ static double fit_as_point(const bst_generator *g, const generator_source *s,
             points[used++] = (bst_path_point){dx - px, dy - py, half};
             points[used++] = (bst_path_point){dx + px, dy + py, half};
         }
-        double light = s->flux_e / (2.0 * BST_PI * model * g->noise_e * g->noise_e);
+        double peak_e = s->flux_e / (2.0 * BST_PI * model),
+               light = peak_e / (g->noise_e * g->noise_e);
+        double saturated = s->saturated ? fmax(bst_generator_saturation_e(g), 1.0) / peak_e : 0.0;
         bst_path_point_fit fit =
-            bst_path_fit_points(points, used, sqrt(image), g->filter_sigma, light);
+            bst_path_fit_points(points, used, sqrt(image), g->filter_sigma, light, saturated);
         at->x += fit.x_px;
         at->y += fit.y_px;
         at->flux_e = fit.flux * s->flux_e;

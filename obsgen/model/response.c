@@ -125,36 +125,123 @@ static void sum_spectra(spectral_sums *s, const bst_response_side *source,
     s->filtered = s->point[1];
 }
 
-/* Mean correlation of source and filter over all directions, as a Hankel transform of its spectrum.
- * The steps resolve the cusp at 0, which produces the wings. */
+/* Frequencies of the sums over rings, and directions on half of each. */
+enum { RINGS = 768, DIRECTIONS = 12 };
+
+/* Correlation of an image with the Gaussian of sigma_px in the same pixels, over the Gaussian's own
+ * norm. image, pixel: means over the rings of frequency. */
+static double similarity(const double image[RINGS], const double pixel[RINGS], double step,
+                         double sigma_px) {
+    double both = 0.0, own = 0.0;
+    for (int i = 0; i < RINGS; i++) {
+        double f = step * (i + 0.5), turn = BST_PI * f * sigma_px;
+        double gaussian = pixel[i] * exp(-2.0 * turn * turn);
+        both += f * image[i] * gaussian;
+        own += f * gaussian * gaussian;
+    }
+    return both / sqrt(own);
+}
+
+/* Sigma of the Gaussian nearest to an image, as image processing finds it for its widths
+ * (imgproc/detect/known_psf.c), sensor px. */
+static double nearest_sigma(const bst_response_side *side, int binning, double x_px, double y_px) {
+    const bst_response_side point = {NULL, 0.0};
+    bst_response_nodes nodes, none = {.count = 0};
+    double image[RINGS] = {0.0}, pixel[RINGS] = {0.0};
+    double step = fmin(cutoff(side), MOST_FREQUENCY) / RINGS;
+    bst_response_nodes_at(side, x_px, y_px, &nodes);
+    for (int i = 0; i < RINGS; i++) {
+        for (int a = 0; a < DIRECTIONS; a++) {
+            double f = step * (i + 0.5), angle = BST_PI * (a + 0.5) / DIRECTIONS, at[2];
+            bst_response_otf(side, &nodes, binning, f * cos(angle), f * sin(angle), at);
+            image[i] += at[0];
+            bst_response_otf(&point, &none, binning, f * cos(angle), f * sin(angle), at);
+            pixel[i] += at[0];
+        }
+    }
+    double low = 0.05, high = 20.0;
+    for (int round = 0; round < 40; round++) { /* one maximum */
+        double third = (high - low) / 3.0;
+        bool wider = similarity(image, pixel, step, low + third) <
+                     similarity(image, pixel, step, high - third);
+        low += wider ? third : 0.0;
+        high -= wider ? 0.0 : third;
+    }
+    return 0.5 * (low + high);
+}
+
+/* Root of the variance share at a node of the tabulated widths. */
+static double width_node(int k) {
+    double least = sqrt(BST_FALLOFF_LEAST);
+    double place = cos(BST_PI * (k + 0.5) / BST_FALLOFF_WIDTHS);
+    return 0.5 * (1.0 + least) + 0.5 * (1.0 - least) * place;
+}
+
+/* Mean correlation of source and filter over all directions, as a Hankel transform of its spectrum,
+ * for images widened by Gaussians. The steps resolve the cusp at 0, which produces the wings. */
 static void tabulate_falloff(const bst_response_side *source, const bst_response_side *filter,
-                             int binning, double x_px, double y_px, bst_falloff *out) {
-    enum { RINGS = 768, DIRECTIONS = 12 }; /* of the half plane */
-    const bst_response_side *const sides[2] = {source, filter};
+                             int binning, double x_px, double y_px, bst_response *out) {
+    enum { ALL = BST_FALLOFF_WIDTHS + 1 };
     bst_response_nodes nodes[2];
     double limit = fmin(fmax(cutoff(source), cutoff(filter)), MOST_FREQUENCY);
-    double spectrum[RINGS], sum[BST_FALLOFF_DISTANCES] = {0.0};
-    for (int k = 0; k < 2; k++) {
-        bst_response_nodes_at(sides[k], x_px, y_px, &nodes[k]);
-    }
+    double spectrum[RINGS][ALL], peak = 0.0;
+    bst_response_nodes_at(source, x_px, y_px, &nodes[0]);
+    bst_response_nodes_at(filter, x_px, y_px, &nodes[1]);
     for (int i = 0; i < RINGS; i++) {
-        double f = limit * (i + 0.5) / RINGS;
-        spectrum[i] = 0.0;
+        double f = limit * (i + 0.5) / RINGS, all = 0.0;
         for (int a = 0; a < DIRECTIONS; a++) {
             double angle = BST_PI * (a + 0.5) / DIRECTIONS, p[2], q[2];
             bst_response_otf(source, &nodes[0], binning, f * cos(angle), f * sin(angle), p);
             bst_response_otf(filter, &nodes[1], binning, f * cos(angle), f * sin(angle), q);
-            spectrum[i] += f * (p[0] * q[0] + p[1] * q[1]);
+            all += f * (p[0] * q[0] + p[1] * q[1]);
         }
+        double turn = BST_PI * f * binning;
+        for (int k = 0; k < ALL; k++) {
+            double share = k == 0 ? 1.0 : width_node(k - 1);
+            double more = out->product_px2 * (1.0 / (share * share) - 1.0);
+            spectrum[i][k] = all * exp(-2.0 * turn * turn * more);
+        }
+        peak += spectrum[i][0];
     }
     for (int n = 0; n < BST_FALLOFF_DISTANCES; n++) {
         double turn = 2.0 * BST_PI * n / BST_FALLOFF_PER_PX * limit * binning / RINGS;
+        double sum[ALL] = {0.0};
         for (int i = 0; i < RINGS; i++) {
-            sum[n] += spectrum[i] * j0(turn * (i + 0.5));
+            double wave = j0(turn * (i + 0.5));
+            for (int k = 0; k < ALL; k++) {
+                sum[k] += spectrum[i][k] * wave;
+            }
         }
-        out->value[n] = (float)(sum[n] / sum[0]);
+        out->falloff.value[n] = (float)(sum[0] / peak);
+        for (int k = 1; k < ALL; k++) {
+            out->falloff.widened[k - 1][n] = (float)(sum[k] / peak);
+        }
     }
-    out->tabulated = true;
+    out->falloff.tabulated = true;
+}
+
+/* Sets the falloff of widened images: Lagrange's interpolation between the tabulated widths. */
+static void widen_falloff(bst_response *r) {
+    double weight[BST_FALLOFF_WIDTHS];
+    double share = r->product_px2 / (r->product_px2 + r->widened_px2);
+    double root = sqrt(fmax(share, BST_FALLOFF_LEAST));
+    for (int k = 0; k < BST_FALLOFF_WIDTHS; k++) {
+        weight[k] = 1.0;
+        for (int j = 0; j < BST_FALLOFF_WIDTHS; j++) {
+            double at = width_node(j);
+            weight[k] *= j == k ? 1.0 : (root - at) / (width_node(k) - at);
+        }
+    }
+    double value[BST_FALLOFF_DISTANCES] = {0.0};
+    for (int k = 0; k < BST_FALLOFF_WIDTHS; k++) {
+        for (int n = 0; n < BST_FALLOFF_DISTANCES; n++) {
+            value[n] += weight[k] * (double)r->falloff.widened[k][n];
+        }
+    }
+    for (int n = 0; n < BST_FALLOFF_DISTANCES; n++) {
+        r->falloff.value[n] = (float)(value[n] / value[0]);
+    }
+    r->falloff_scale = fmin(sqrt(share / BST_FALLOFF_LEAST), 1.0);
 }
 
 /* Interpolated falloff at a distance. */
@@ -224,6 +311,7 @@ void bst_response_set(bst_response *out, const bst_response_side *source,
                               .filter = even(f),
                               .both = even(0.5 * (s + f)),
                               .maxima_sigma_px = sqrt(f),
+                              .nearest_sigma_px = filter->sigma_px / binning,
                               .falloff_scale = 1.0};
         return;
     }
@@ -237,7 +325,10 @@ void bst_response_set(bst_response *out, const bst_response_side *source,
         sums.filtered;
     out->maxima_sigma_px = sqrt(0.5 / fmax(steep, 1e-6));
     out->falloff_scale = 1.0;
-    tabulate_falloff(source, filter, binning, x_px, y_px, &out->falloff);
+    out->nearest_sigma_px = nearest_sigma(filter, binning, x_px, y_px) / binning;
+    out->product_px2 = 2.0 * out->both.across_px * out->both.along_px;
+    out->widened_px2 = 0.0;
+    tabulate_falloff(source, filter, binning, x_px, y_px, out);
 }
 
 static bst_obsgen_image_width widen(bst_obsgen_image_width w, double variance_px2) {
@@ -249,8 +340,10 @@ bst_response bst_response_widened(const bst_response *r, double variance_px2) {
     bst_response out = *r;
     out.source = widen(r->source, variance_px2);
     out.both = widen(r->both, 0.5 * variance_px2);
-    out.falloff_scale *=
-        sqrt(r->both.across_px * r->both.along_px / (out.both.across_px * out.both.along_px));
+    out.widened_px2 += variance_px2;
+    if (out.falloff.tabulated && variance_px2 > 0.0) {
+        widen_falloff(&out);
+    }
     return out;
 }
 

@@ -18,19 +18,29 @@ typedef struct bst_obsgen_image_width {
 /* Samples of the falloff: per pixel, and in all. */
 enum { BST_FALLOFF_PER_PX = 6, BST_FALLOFF_DISTANCES = 24 * BST_FALLOFF_PER_PX };
 
-/* Output of the point filter beside a point relative to its peak, by distance in read-out px; mean
- * over all directions. */
+/* Widths for which the falloff is tabulated: Chebyshev nodes of the root of the product's variance
+ * relative to that of the widened product, from the root of BST_FALLOFF_LEAST to 1. With eight of
+ * them interpolation is accurate to 3e-5 of the peak for an Airy pattern. */
+enum { BST_FALLOFF_WIDTHS = 8 };
+#define BST_FALLOFF_LEAST 0.2
+
+/* Output of the point filter beside a point, by distance in read-out px; mean over all directions.
+ */
 typedef struct bst_falloff {
-    bool tabulated; /* false: Gaussian, see bst_matched_falloff */
-    float value[BST_FALLOFF_DISTANCES];
+    bool tabulated;                     /* false: Gaussian, see bst_matched_falloff */
+    float value[BST_FALLOFF_DISTANCES]; /* relative to its peak */
+    float widened[BST_FALLOFF_WIDTHS][BST_FALLOFF_DISTANCES];
 } bst_falloff;
 
 typedef struct bst_response {
     bst_obsgen_image_width source, filter,
-        both;               /* source x source, filter x filter, source x filter */
-    double maxima_sigma_px; /* Gaussian whose filtered noise has the same density of maxima */
-    bst_falloff falloff;    /* of source x filter */
-    double falloff_scale;   /* table distance per px: 1, less for a widened image */
+        both;                /* source x source, filter x filter, source x filter */
+    double maxima_sigma_px;  /* Gaussian whose filtered noise has the same density of maxima */
+    double nearest_sigma_px; /* Gaussian nearest to the filter's image, without the pixel */
+    bst_falloff falloff;     /* of source x filter */
+    double product_px2;      /* variance of source x filter for which the falloff is tabulated */
+    double widened_px2;      /* variance by which the source has been widened since */
+    double falloff_scale;    /* table distance per px: 1, less for the widest images */
 } bst_response;
 
 /* An image model: PSF at a field position, sensor px, widened by a Gaussian. */
@@ -69,7 +79,10 @@ double bst_response_cutoff(const bst_response_side *side);
 void bst_response_set(bst_response *out, const bst_response_side *source,
                       const bst_response_side *filter, int binning, double x_px, double y_px);
 
-/* Response for images wider by variance_px2 than those of `response`. */
+/* Response for images wider by variance_px2 than those of `response`, as by a Gaussian.
+ *
+ * Notes:     A tabulated falloff is that of the product of spectra times exp(-2 pi^2 variance f^2):
+ *            the core widens and rings disappear, but wings keep their light. */
 bst_response bst_response_widened(const bst_response *response, double variance_px2);
 
 /* Overlap integral of two images of this width smeared along p and q, 1/px^2, as

@@ -19,6 +19,8 @@ enum {
 /* Margin of the grid about the streak model, and its greatest step, sigmas: at one sigma, sums of
  * products of two Gaussians are their integrals to 1e-4. */
 static const double MARGIN_SIGMAS = 4.0, STEP_SIGMAS = 1.0;
+/* Step about a saturated point relative to others, for the edge of the saturated pixels. */
+static const double SATURATED_STEP = 0.3;
 /* Least margin of the pixels on which a point is fitted (imgproc/measure/deblend.c). */
 static const double LEAST_MARGIN_PX = 3.5;
 /* Limits of the fitted widening relative to the PSF's variance (imgproc/measure/fit.c). */
@@ -211,7 +213,7 @@ bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_str
 }
 
 bst_path_point_fit bst_path_fit_points(const bst_path_point *points, int count, double image_px,
-                                       double model_px, double light) {
+                                       double model_px, double light, double saturated) {
     static_assert((int)BST_PATH_POINTS == (int)SAMPLES, "a point is a sample");
     samples seen_at = {.count = count < SAMPLES ? count : SAMPLES};
     /* render() gives each Gaussian the peak of its weight */
@@ -226,10 +228,11 @@ bst_path_point_fit bst_path_fit_points(const bst_path_point *points, int count, 
     const samples point = {.weight = {1.0}, .count = 1};
     planes seen, shape;
     bst_path_fit_squares squares;
-    grid g = grid_about(&point, model_px, fmax(MARGIN_SIGMAS * model_px, LEAST_MARGIN_PX));
+    double margin = fmax(MARGIN_SIGMAS * model_px, LEAST_MARGIN_PX);
+    grid g = grid_about(&point, saturated > 0.0 ? SATURATED_STEP * model_px : model_px, margin);
     int n = g.columns * g.rows;
     render(&g, &seen_at, 0.0, 0.0, image_px, false, &seen);
-    seen.full = INFINITY;
+    seen.full = saturated > 0.0 ? saturated : INFINITY;
     for (int round = 0; round < ROUNDS; round++) { /* the width settles after the place */
         render(&g, &point, f.x, f.y, model_px, true, &shape);
         (void)improve(&seen, &shape, n, light, model_px * model_px, &f, &squares);

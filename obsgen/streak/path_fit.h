@@ -56,9 +56,10 @@ enum { BST_PATH_POINTS = 64 };
  *            image_px  deviation of a point's image, including the pixel
  *            model_px  deviation of the fitted PSF, including the pixel
  *            light     brightest pixel of a fitted point of flux 1 over the variance of the noise
- */
+ *            saturated light of a pixel from which on it is saturated and left out of the fit,
+ *                      relative to the brightest pixel of a fitted point of flux 1; 0: none is */
 bst_path_point_fit bst_path_fit_points(const bst_path_point *points, int count, double image_px,
-                                       double model_px, double light);
+                                       double model_px, double light, double saturated);
 
 /* Widths of the images of a point, px, including the pixel: of the star, of the filters, and of
  * the product of both. */

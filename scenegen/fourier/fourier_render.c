@@ -22,7 +22,11 @@ static const double WIDEN_ERROR = 1e-3;
 enum { PLAIN, FINE, QUALITIES };
 
 /* Error ratio of the fine to the plain grid. */
-static const double FINER = 1.0 / 16.0;
+static const double FINER = 1.0 / 64.0;
+
+/* Shares of a quality's tolerance: for frequencies beyond the cut-off, and for aliases along each
+ * axis. */
+static const double CUTOFF_SHARE = 0.1, ALIAS_SHARE = 0.45;
 
 /* Grid, tables and buffers for windows of one size. */
 typedef struct setup {
@@ -37,7 +41,7 @@ struct bst_fourier_render {
     bst_camera camera;
     const bst_psf *psf;
     bst_fourier_render_options options;
-    bst_fourier_band band;
+    bst_fourier_band band[QUALITIES]; /* nodes are those of the plain one */
     double density[QUALITIES][2];
     /* for any window, and for the whole sensor, whose grid is denser */
     bst_fourier_error error[QUALITIES][2];
@@ -135,30 +139,35 @@ static void choose_axes(const bst_fourier_render *l, int quality, int width, int
                         bst_fourier_axis axis[2]) {
     /* smallest wrap-around distance of wings; nearer ones are not smooth */
     int taps = l->options.taps, pad = l->margin + (l->margin < WRAP_PX ? l->margin : WRAP_PX);
-    axis[0] = bst_fourier_axis_choose(&l->band, 0, taps, width + pad, l->density[quality][0]);
-    axis[1] = bst_fourier_axis_choose(&l->band, 1, taps, height + pad, l->density[quality][1]);
+    axis[0] =
+        bst_fourier_axis_choose(&l->band[quality], 0, taps, width + pad, l->density[quality][0]);
+    axis[1] =
+        bst_fourier_axis_choose(&l->band[quality], 1, taps, height + pad, l->density[quality][1]);
 }
 
 /* Sets densities and errors of a grid quality, and the supported widening. */
 static bst_status prepare_quality(bst_ctx *ctx, bst_fourier_render *l, int quality) {
-    double tolerance = 0.45 * l->options.tolerance * (quality == FINE ? FINER : 1.0);
+    double tolerance = l->options.tolerance * (quality == FINE ? FINER : 1.0);
+    bst_fourier_band *band = &l->band[quality];
+    BST_TRY(bst_fourier_band_measure(ctx, l->psf, CUTOFF_SHARE * tolerance, band));
+    l->margin = (l->band[PLAIN].reach_px + 15) / 16 * 16;
     bst_fourier_axis axis[2]; /* as sparse as any window's */
     for (int a = 0; a < 2; a++) {
         bst_nufft_kernel spread = {.taps = l->options.taps};
         bst_nufft_kernel_shape shape;
-        double density = bst_fourier_density(&l->band, a, l->options.taps, tolerance);
+        double density = bst_fourier_density(band, a, l->options.taps, ALIAS_SHARE * tolerance);
         l->density[quality][a] = density;
-        (void)bst_nufft_kernel_choose(&spread, &l->band.axis[a], density);
+        (void)bst_nufft_kernel_choose(&spread, &band->axis[a], density);
         axis[a] = (bst_fourier_axis){DENSITY_PX, (int)floor(DENSITY_PX * density), spread, 0.0};
-        double sigma = l->band.node_sigma_px * density;
-        while (bst_nufft_kernel_widen(&spread, &l->band.axis[a], density, l->widest * sigma * sigma,
+        double sigma = l->band[PLAIN].node_sigma_px * density;
+        while (bst_nufft_kernel_widen(&spread, &band->axis[a], density, l->widest * sigma * sigma,
                                       &shape) > WIDEN_ERROR) {
             l->widest *= 0.8;
         }
     }
-    BST_TRY(bst_fourier_error_measure(ctx, l->psf, &l->band, axis, &l->error[quality][0]));
+    BST_TRY(bst_fourier_error_measure(ctx, l->psf, band, axis, &l->error[quality][0]));
     choose_axes(l, quality, (int)l->camera.width_px, (int)l->camera.height_px, axis);
-    return bst_fourier_error_measure(ctx, l->psf, &l->band, axis, &l->error[quality][1]);
+    return bst_fourier_error_measure(ctx, l->psf, band, axis, &l->error[quality][1]);
 }
 
 static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fourier_render *l) {
@@ -167,9 +176,7 @@ static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fourier_render *
     BST_TRY(bst_parallel_create(ctx, threads, &l->pool));
     BST_TRY(build(ctx, device, l));
     l->node_params = bst_scene_node_params(&l->camera, l->options.spatial_oversample);
-    BST_TRY(bst_fourier_band_measure(ctx, l->psf, 0.1 * l->options.tolerance, &l->band));
     l->widest = BST_WIDEST;
-    l->margin = (l->band.reach_px + 15) / 16 * 16;
     for (int q = 0; q < QUALITIES; q++) {
         BST_TRY(prepare_quality(ctx, l, q));
     }
@@ -242,7 +249,7 @@ void bst_fourier_render_free(bst_fourier_render *l) {
 }
 
 const bst_fourier_band *bst_fourier_render_band(const bst_fourier_render *l) {
-    return &l->band;
+    return &l->band[PLAIN];
 }
 
 int bst_fourier_render_margin_px(const bst_fourier_render *l) {
@@ -279,16 +286,17 @@ double bst_fourier_render_mixing_error(const bst_fourier_render *l) {
 
 /* Tabulates the spreading kernel by sub-sample phase (a point `phase` samples right of sample taps
  * / 2 - 1), also for nodes widened by (n / BST_WIDTHS)^2 BST_WIDEST of the node variance. */
-static void tabulate(const bst_fourier_render *l, int a, const bst_fourier_axis *axis,
+static void tabulate(const bst_fourier_render *l, int quality, int a, const bst_fourier_axis *axis,
                      float *table) {
     double density = (double)axis->samples / axis->pixels;
     int first = BST_SPREAD_TAPS / 2 - axis->spread.taps / 2;
     memset(table, 0, BST_SPREAD_TABLE * sizeof *table);
     for (int n = 0; n <= BST_WIDTHS; n++) {
-        double share = (double)n / BST_WIDTHS, sigma = share * l->band.node_sigma_px * density;
+        double share = (double)n / BST_WIDTHS,
+               sigma = share * l->band[PLAIN].node_sigma_px * density;
         double variance = BST_WIDEST * sigma * sigma;
         bst_nufft_kernel_shape shape;
-        bst_nufft_kernel_widen(&axis->spread, &l->band.axis[a], density, variance, &shape);
+        bst_nufft_kernel_widen(&axis->spread, &l->band[quality].axis[a], density, variance, &shape);
         for (int p = 0; p <= BST_SPREAD_PHASES; p++) {
             float *row = table + (n * (BST_SPREAD_PHASES + 1) + p) * BST_SPREAD_TAPS;
             for (int j = first; j < first + axis->spread.taps; j++) {
@@ -307,7 +315,8 @@ static bst_status make_setup(bst_ctx *ctx, bst_fourier_render *l, int quality, b
     choose_axes(l, quality, window.width, window.height, axis);
     shape.x = axis[0];
     shape.y = axis[1];
-    BST_TRY(bst_otf_convolve_create(ctx, l->psf, l->band.cutoff, &shape, l->pool, &s->fft));
+    BST_TRY(
+        bst_otf_convolve_create(ctx, l->psf, l->band[quality].cutoff, &shape, l->pool, &s->fft));
     s->width = window.width;
     s->height = window.height;
     s->quality = quality;
@@ -316,8 +325,8 @@ static bst_status make_setup(bst_ctx *ctx, bst_fourier_render *l, int quality, b
     if (!table) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the spreading kernel's table");
     }
-    tabulate(l, 0, &shape.x, table);
-    tabulate(l, 1, &shape.y, table + BST_SPREAD_TABLE);
+    tabulate(l, quality, 0, &shape.x, table);
+    tabulate(l, quality, 1, &shape.y, table + BST_SPREAD_TABLE);
     cl_int code;
     s->table = clCreateBuffer(l->context, CL_MEM_READ_ONLY | CL_MEM_COPY_HOST_PTR, table_bytes,
                               table, &code);

@@ -465,8 +465,54 @@ static void saturated_sources_are_placed_worse(void **state) {
     close_scene(&s);
 }
 
+/* Share of a Gaussian's light in pixel k along an axis. */
+static double axis_share(double at, double sigma, int k) {
+    double c = sigma * sqrt(2.0);
+    return 0.5 * (erf((k + 0.5 - at) / c) - erf((k - 0.5 - at) / c));
+}
+
+/* Light of a bright star beyond the edge is a source on the edge; of a fainter one it is too
+ * little. */
+static void bright_stars_beyond_the_edge_are_on_it(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    const double sigma = s.frame.sigma_px;
+    for (int k = 1; k <= 3; k++) {
+        /* output of the filter on the pixel at the edge, for a star so many pixels beyond */
+        double beyond = k, square = 0.0, sum = 0.0;
+        for (int i = -12; i <= 12; i++) {
+            double filter = axis_share(0.0, sigma, i);
+            square += filter * filter;
+            sum += i <= 0 ? filter * axis_share(beyond, sigma, i) : 0.0;
+        }
+        double share = sum / square; /* of the SNR of the whole star */
+        for (int bright = 0; bright < 2; bright++) {
+            double expected = bright ? 100.0 : 1.5;
+            s.truth->count = 0;
+            add_source(&s, 1, SIDE - 1 + beyond, 500.2, electrons_of(&s, expected / share));
+            bst_generator_result r = run(&s, k);
+            assert_int_equal(r.count, bright);
+            if (bright) {
+                const bst_detection *d = &r.items[0].detection;
+                assert_int_equal(d->label, BST_LABEL_ARTEFACT);
+                bst_assert_close(d->x_px, SIDE - 1, 0.2);
+                bst_assert_close(d->y_px, 500.2, 0.5);
+                /* noise is less on the edge, where the filter has 0.78 of its squares */
+                print_message("         %d px: SNR %.1f, pixels %.1f\n", k, d->snr,
+                              expected / sqrt(0.78));
+                /* the pixel of a narrow PSF is no Gaussian: 1.24 and 1.5 at 2 and 3 px */
+                bst_assert_close(log(d->snr / (expected / sqrt(0.78))), 0.0, 0.5);
+            }
+        }
+    }
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(bright_stars_beyond_the_edge_are_on_it),
         cmocka_unit_test(saturated_sources_are_placed_worse),
         cmocka_unit_test(the_brightest_pixel_of_a_streak),
         cmocka_unit_test(the_faintest_star_is_as_bright_as_its_light),

@@ -177,6 +177,46 @@ static void a_psf_goes_by_its_own_image(void **state) {
     bst_psf_free(psf);
 }
 
+/* A path that shakes widens a diffraction pattern as a Gaussian does: the core widens and rings
+ * disappear, but wings keep their light. Truth: the OTF with the Gaussian's in it. */
+static void wings_keep_their_light_when_widened(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_camera camera = {.width_px = 512,
+                         .height_px = 512,
+                         .pixel_scale_arcsec = 2.0,
+                         .aperture_m = 0.15,
+                         .psf_fwhm_px = 2.0,
+                         .optics = {.psf = BST_PSF_DIFFRACTION,
+                                    .q = 1.39,
+                                    .central_obstruction = 0.3,
+                                    .band_nm = {550.0, 551.0},
+                                    .wavelengths = 1,
+                                    .zernike_nm = 550.0,
+                                    .fill_factor = {1.0, 1.0},
+                                    .field_columns = 1,
+                                    .field_rows = 1}};
+    bst_psf *psf;
+    bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
+    const bst_response_side sharp = {psf, 0.0}, filter = {psf, 0.3};
+    bst_response base;
+    bst_response_set(&base, &sharp, &filter, 1, 255.5, 255.5);
+    const double jitter_px[] = {0.2, 0.6, 0.95, 1.4};
+    for (int k = 0; k < 4; k++) {
+        const double v = jitter_px[k] * jitter_px[k];
+        const bst_response_side shaken = {psf, jitter_px[k]};
+        bst_response truth, twice = bst_response_widened(&base, 0.3 * v);
+        bst_response_set(&truth, &shaken, &filter, 1, 255.5, 255.5);
+        twice = bst_response_widened(&twice, 0.7 * v);
+        for (double r = 0.5; r < 23.0; r += 0.5) {
+            /* interpolation: 1e-4 of the peak, where wings have 1e-3 to 1e-2 of it */
+            bst_assert_close(bst_response_falloff(&twice, r, 0.0, 0.0),
+                             bst_response_falloff(&truth, r, 0.0, 0.0), 1e-4);
+        }
+    }
+    bst_psf_free(psf);
+}
+
 static double sinc(double x) {
     return x == 0.0 ? 1.0 : sin(BST_PI * x) / (BST_PI * x);
 }
@@ -252,6 +292,7 @@ int main(void) {
         cmocka_unit_test(products_turn_with_the_paths),
         cmocka_unit_test(gaussians_of_other_widths_lose_by_their_product),
         cmocka_unit_test(a_psf_goes_by_its_own_image),
+        cmocka_unit_test(wings_keep_their_light_when_widened),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

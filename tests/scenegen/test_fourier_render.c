@@ -1,5 +1,6 @@
 #include <pthread.h>
 
+#include "scenegen/fourier/fourier_render.h"
 #include "scenegen/reference.h"
 #include "scenegen/renderer.h"
 #include "sim/core/fft.h"
@@ -396,8 +397,35 @@ static void jitter_widens_nodes(void **state) {
     bst_renderer_free(r);
 }
 
+/* The finer grid is 64 times as accurate in all its parts, aliases and frequencies beyond the
+ * cut-off; less is asked for, because the sizes of grids go by steps of 16. */
+static void the_finer_grid_is_finer(void **state) {
+    fixture *f = *state;
+    bst_camera cameras[3] = {diffraction(128, 96, 1.0), diffraction(128, 96, 2.0),
+                             moffat(128, 96, 2.0)};
+    for (int k = 0; k < 3; k++) {
+        const bst_camera *c = &cameras[k];
+        bst_psf *psf;
+        bst_fourier_render *l;
+        bst_fourier_render_options options = bst_fourier_render_default_options();
+        options.tolerance = 1e-4;
+        bst_assert_ok(&f->ctx, bst_psf_create(&f->ctx, c, &psf));
+        bst_assert_ok(&f->ctx, bst_fourier_render_create(&f->ctx, f->device, c, psf, &options, &l));
+        double sigma[2];
+        for (int fine = 0; fine < 2; fine++) {
+            sigma[fine] = bst_fourier_render_error_sigma(l, fine != 0, false,
+                                                         (bst_window){0, 0, 48, 40}, 1e5, 100.0);
+        }
+        print_message("         plain %.4f sigma, fine %.4f sigma\n", sigma[0], sigma[1]);
+        assert_true(sigma[0] > 0.0 && sigma[1] < sigma[0] / 40.0);
+        bst_fourier_render_free(l);
+        bst_psf_free(psf);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_finer_grid_is_finer),
         cmocka_unit_test(static_stars_of_aberrated_optics),
         cmocka_unit_test(streaks_of_aberrated_optics),
         cmocka_unit_test(faint_streaks_keep_their_light),
