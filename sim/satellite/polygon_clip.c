@@ -152,11 +152,12 @@ static void split(const outline *from, bst_point2 a, bst_point2 b, outline *left
 }
 
 /* Subtracts a convex polygon from one piece. */
-static void cut_piece(bst_polygon_clip *clip, int piece, const bst_point2 *q, int q_count) {
+static void cut_piece(bst_polygon_clip *clip, int piece, const bst_point2 *q, int q_count,
+                      bool overlaps) {
     bst_point2 rest[BST_POLYGON_CORNERS_MAX + 8], left[BST_POLYGON_CORNERS_MAX + 8];
     bst_polygon_piece from = clip->pieces[piece];
     const bst_point2 *p = clip->points + from.first;
-    if (bst_polygon_is_separate(p, from.count, q, q_count)) {
+    if (!overlaps && bst_polygon_is_separate(p, from.count, q, q_count)) {
         return;
     }
     int pieces = clip->piece_count, points = clip->point_count, count = from.count;
@@ -199,12 +200,14 @@ static int clean(const bst_polygon_clip *clip, const bst_point2 *points, int cou
     return out.count;
 }
 
-void bst_polygon_clip_subtract(bst_polygon_clip *clip, const bst_point2 *points, int count) {
+void bst_polygon_clip_subtract(bst_polygon_clip *clip, const bst_point2 *points, int count,
+                               bool overlaps) {
     bst_point2 q[BST_POLYGON_CORNERS_MAX];
     int corners = clean(clip, points, count, q);
+    overlaps = overlaps && clip->piece_count == 1 && clip->pieces[0].first == 0;
     for (int i = 0, end = clip->piece_count; i < end && corners > 0; i++) {
         if (clip->pieces[i].count > 0) {
-            cut_piece(clip, i, q, corners);
+            cut_piece(clip, i, q, corners, overlaps);
         }
     }
 }
