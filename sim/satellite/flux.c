@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "sim/satellite/curved_light.h"
+#include "sim/satellite/gauss_legendre.h"
 
 enum { SUN_NODES_MAX = 49, CURVED_MAX = 512 };
 
@@ -264,14 +265,7 @@ void bst_satellite_flux_at(bst_satellite_pose *p, const bst_satellite_light *l,
 
 void bst_earthlight_at(const bst_earth_surface *surface, bst_vec3 object_m, bst_vec3 sun,
                        bst_earthlight *out) {
-    enum { RINGS = 8 };
-    /* Gauss-Legendre, 8 points, on [0, 1]: half of Abramowitz and Stegun, table 25.4 */
-    static const double place[RINGS] = {
-        0.01985507175123185, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751,
-        0.5917173212478249,  0.7627662049581645,  0.8983332387068134, 0.9801449282487682};
-    static const double weight[RINGS] = {
-        0.05061426814518815, 0.11119051722668725, 0.15685332293894365, 0.181341891689181,
-        0.181341891689181,   0.15685332293894365, 0.11119051722668725, 0.05061426814518815};
+    enum { RINGS = BST_GAUSS_POINTS };
     const bst_brdf ground = {.model = BST_BRDF_PHONG,
                              .diffuse = surface->diffuse,
                              .specular = surface->specular,
@@ -290,11 +284,11 @@ void bst_earthlight_at(const bst_earth_surface *surface, bst_vec3 object_m, bst_
     int panels = surface->fineness, around = 24 * panels;
     for (int n = 0; n < RINGS * panels; n++) {
         /* uniform in the square root of the solid angle: smooth at the limb */
-        double t = 0.5 * BST_PI * (n / RINGS + place[n % RINGS]) / panels,
+        double t = 0.5 * BST_PI * (n / RINGS + 0.5 * (1.0 + bst_gauss_place[n % RINGS])) / panels,
                drop = cap * sin(t) * sin(t), c = 1.0 - drop;
         double s = sqrt(drop * (2.0 - drop));
-        double solid =
-            cap * sin(2.0 * t) * 0.5 * BST_PI * weight[n % RINGS] / panels * 2.0 * BST_PI / around;
+        double solid = cap * sin(2.0 * t) * 0.25 * BST_PI * bst_gauss_weight[n % RINGS] / panels *
+                       2.0 * BST_PI / around;
         double chord2 = BST_EARTH_RADIUS_M * BST_EARTH_RADIUS_M - distance * distance * s * s;
         double way = distance * c - sqrt(fmax(chord2, 0.0));
         for (int m = 0; m < around; m++) {
