@@ -399,8 +399,7 @@ static bool is_within_rim(const bst_satellite_pose *p, int facet, const bst_pose
     double inner = shell->radius_m * cos(BST_PI / shell->rim_count),
            rate = bst_vec3_dot(axis, v->z);
     for (int i = 0; i < own->count; i++) {
-        bst_vec3 q = p->vertices[p->satellite->corner[own->first + i]];
-        bst_vec3 r = bst_vec3_sub(q, centre);
+        bst_vec3 r = bst_vec3_sub(p->vertices[p->satellite->corner[own->first + i]], centre);
         r = bst_vec3_axpy(r, -bst_vec3_dot(r, axis) / rate, v->z);
         if (!(bst_vec3_dot(r, r) < inner * inner)) {
             return false;
@@ -424,11 +423,10 @@ static void look_through_rim(bst_satellite_pose *p, int facet, const plane *f,
     if (is_within_rim(p, facet, v, shell, axis)) {
         return;
     }
-    int n = shell->rim_count;
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < shell->rim_count; i++) {
         rim[i] = drop(f, v, p->vertices[shell->first_rim + i]);
     }
-    bst_polygon_clip_intersect(&p->clip, rim, n);
+    bst_polygon_clip_intersect(&p->clip, rim, shell->rim_count);
 }
 
 /* True if the middle of a facet is inside a shell. */
@@ -564,12 +562,11 @@ double bst_pose_unshadowed(bst_satellite_pose *p, int index, int views, bool *wh
         facet_bounds(p, facet, v, b);
         f.nearest_m = b[5];
         f.mapped = false;
-        for (int o = 0; few && o < s->occluder_count; o++) {
+        bool gone = false;
+        for (int o = 0; few && !gone && o < s->occluder_count; o++) {
             if ((hiders >> o & 1) && may_hide(v->bounds[o], b)) {
                 try_occluder(p, index, v, o, &f, whole);
-                if (!*whole && bst_polygon_clip_is_empty(&p->clip)) {
-                    return 0.0;
-                }
+                gone = !*whole && bst_polygon_clip_is_empty(&p->clip);
             }
         }
         for (int o = 0; !few && v->cell_item_count < 0 && o < s->occluder_count; o++) {
