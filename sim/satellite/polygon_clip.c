@@ -55,19 +55,20 @@ static double extent_of(const bst_point2 *p, int count) {
 
 /* True if an edge of q separates p from q. An edge as short as rounding has no direction. */
 static bool separated(const bst_point2 *q, int q_count, const bst_point2 *p, int p_count) {
-    double tiny = TINY * extent_of(q, q_count);
+    bst_point2 a = q[q_count - 1];
     for (int i = 0; i < q_count; i++) {
-        bst_point2 a = q[i], b = q[i + 1 < q_count ? i + 1 : 0];
-        if (fabs(b.x - a.x) <= tiny && fabs(b.y - a.y) <= tiny) {
-            continue;
-        }
+        bst_point2 b = q[i];
         int k = 0;
         while (k < p_count && left_of(a, b, p[k]) <= 0.0) {
             k++;
         }
         if (k == p_count) {
-            return true;
+            double tiny = TINY * extent_of(q, q_count);
+            if (fabs(b.x - a.x) > tiny || fabs(b.y - a.y) > tiny) {
+                return true;
+            }
         }
+        a = b;
     }
     return false;
 }
