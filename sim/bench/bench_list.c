@@ -33,6 +33,8 @@ const bst_bench bst_bench_list[BST_BENCHES] = {
     {"imgproc_window", "of window", bst_bench_imgproc},
     {"imgproc_stack", "stacks of 16 frames of 2048x2048, rates to 3 px per frame: per frame",
      bst_bench_stack},
+    {"lightcurve", "light curve of a satellite of 498 facets with shadows: per epoch",
+     bst_bench_lightcurve},
     {"loop_full", "closed loop of the main scenario, per frame", bst_bench_loop},
     {"loop_obsgen",
      "a day of the closed loop with the observation generator, per frame of 2 s, plant at 100 Hz",

@@ -2,14 +2,7 @@
 
 #include <stdlib.h>
 
-/* Eight-point Gauss-Legendre on [-1, 1] (Abramowitz and Stegun, table 25.4). */
-enum { GAUSS = 8 };
-static const double place[GAUSS] = {-0.9602898564975363, -0.7966664774136267, -0.5255324099163290,
-                                    -0.1834346424956498, 0.1834346424956498,  0.5255324099163290,
-                                    0.7966664774136267,  0.9602898564975363};
-static const double weight[GAUSS] = {0.1012285362903763, 0.2223810344533745, 0.3137066458778873,
-                                     0.3626837833783620, 0.3626837833783620, 0.3137066458778873,
-                                     0.2223810344533745, 0.1012285362903763};
+#include "sim/satellite/gauss_legendre.h"
 
 enum { BREAKS_MAX = 16 };
 
@@ -60,18 +53,18 @@ static double sphere_light(const bst_curved *c, const bst_brdf *brdf, bst_vec3 s
     breaks latitude = panels(0.0, 0.5 * BST_PI, 0.0, lobe);
     for (int p = 0; p + 1 < longitude.count; p++) {
         double half = 0.5 * (longitude.at[p + 1] - longitude.at[p]);
-        for (int i = 0; i < GAUSS; i++) {
-            double l = longitude.at[p] + half * (1.0 + place[i]);
+        for (int i = 0; i < BST_GAUSS_POINTS; i++) {
+            double l = longitude.at[p] + half * (1.0 + bst_gauss_place[i]);
             double in = cos(l - phase), out = cos(l), inner = 0.0;
             for (int q = 0; q + 1 < latitude.count; q++) {
                 double step = 0.5 * (latitude.at[q + 1] - latitude.at[q]);
-                for (int k = 0; k < GAUSS; k++) {
-                    double cb = cos(latitude.at[q] + step * (1.0 + place[k]));
-                    inner += step * weight[k] * cb * cb * cb *
+                for (int k = 0; k < BST_GAUSS_POINTS; k++) {
+                    double cb = cos(latitude.at[q] + step * (1.0 + bst_gauss_place[k]));
+                    inner += step * bst_gauss_weight[k] * cb * cb * cb *
                              bst_brdf_value(brdf, in * cb, out * cb, cosine);
                 }
             }
-            sum += half * weight[i] * in * out * inner;
+            sum += half * bst_gauss_weight[i] * in * out * inner;
         }
     }
     return 2.0 * c->radius_m * c->radius_m * sum; /* both hemispheres of latitude */
@@ -121,11 +114,11 @@ static double cone_light(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun
         if (!(wave_at(in, middle) > 0.0 && wave_at(out, middle) > 0.0)) {
             continue;
         }
-        for (int i = 0; i < GAUSS; i++) {
-            double a = b.at[p] + step * (1.0 + place[i]);
+        for (int i = 0; i < BST_GAUSS_POINTS; i++) {
+            double a = b.at[p] + step * (1.0 + bst_gauss_place[i]);
             double mu_in = wave_at(in, a), mu_out = wave_at(out, a);
             if (mu_in > 0.0 && mu_out > 0.0) {
-                sum += step * weight[i] * mu_in * mu_out *
+                sum += step * bst_gauss_weight[i] * mu_in * mu_out *
                        bst_brdf_value(brdf, fmin(mu_in, 1.0), fmin(mu_out, 1.0), cosine);
             }
         }

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "sim/satellite/curved_light.h"
+#include "sim/satellite/gauss_legendre.h"
 
 enum { SUN_NODES_MAX = 49, CURVED_MAX = 512 };
 
@@ -87,7 +88,8 @@ static double facet_light(const bst_material *m, const sun_disc *sun, bst_vec3 n
 typedef struct sums {
     double sun[BST_SATELLITE_MATERIALS_MAX]; /* m^2/sr by material */
     double earth[BST_SATELLITE_MATERIALS_MAX];
-    double curved_all[CURVED_MAX], curved_free[CURVED_MAX]; /* lit and visible projected area */
+    double curved_lost[CURVED_MAX]; /* light of facets that is in shadow or hidden, m^2/sr */
+    bool lost;                      /* any of it */
     sun_disc disc;
 } sums;
 
@@ -97,6 +99,35 @@ typedef struct last_facet {
     int material;
     double light;
 } last_facet;
+
+/* BRDF times both cosines of a facet of a curved surface, for the share that is in shadow. */
+static double curved_facet_light(const bst_satellite_pose *p, const bst_satellite_light *l,
+                                 int index) {
+    double in = bst_vec3_dot(p->normals[index], l->sun);
+    double out = bst_vec3_dot(p->normals[index], l->observer);
+    const bst_material *m = &p->satellite->materials[p->satellite->facets[index].material];
+    if (!(in > 1e-9) || !(out > 1e-9)) {
+        return 0.0;
+    }
+    in = fmin(in, 1.0), out = fmin(out, 1.0);
+    return in * out * bst_brdf_value(&m->brdf, in, out, bst_vec3_dot(l->sun, l->observer));
+}
+
+/* The part of each curved surface's light that is free, of what its facets reflect. */
+static void share_of_curved(const bst_satellite_pose *p, const bst_satellite_light *l,
+                            const sums *s, double *share) {
+    const bst_satellite *sat = p->satellite;
+    double all[CURVED_MAX] = {0};
+    for (int i = 0; i < sat->facet_count; i++) {
+        int c = sat->facets[i].curved;
+        if (c >= 0 && c < CURVED_MAX && s->curved_lost[c] > 0.0) {
+            all[c] += sat->facets[i].area_m2 * curved_facet_light(p, l, i);
+        }
+    }
+    for (int c = 0; c < sat->curved_count && c < CURVED_MAX; c++) {
+        share[c] = all[c] > 0.0 ? fmin(fmax(1.0 - s->curved_lost[c] / all[c], 0.0), 1.0) : 1.0;
+    }
+}
 
 static void add_sunlight(bst_satellite_pose *p, const bst_satellite_light *l, int index,
                          last_facet *last, sums *s) {
@@ -109,8 +140,10 @@ static void add_sunlight(bst_satellite_pose *p, const bst_satellite_light *l, in
     bool whole;
     double area = bst_pose_unshadowed(p, index, 2, &whole);
     if (f->curved >= 0 && f->curved < CURVED_MAX) {
-        s->curved_all[f->curved] += f->area_m2 * in * out;
-        s->curved_free[f->curved] += area * in * out;
+        if (!whole && area < f->area_m2) {
+            s->curved_lost[f->curved] += (f->area_m2 - area) * curved_facet_light(p, l, index);
+            s->lost = true;
+        }
         return;
     }
     if (last->material != f->material || memcmp(&last->normal, &n, sizeof n) != 0) {
@@ -124,13 +157,14 @@ static void add_sunlight(bst_satellite_pose *p, const bst_satellite_light *l, in
  * estimate of the error. */
 static double add_curved(const bst_satellite_pose *p, const bst_satellite_light *l, sums *s) {
     const bst_satellite *sat = p->satellite;
-    double error = 0.0;
+    double error = 0.0, share[CURVED_MAX];
+    if (s->lost) {
+        share_of_curved(p, l, s, share);
+    }
     for (int i = 0; i < sat->curved_count && i < CURVED_MAX; i++) {
         const bst_curved *c = &sat->curved[i];
         const bst_material *m = &sat->materials[c->material];
-        double free =
-            s->curved_all[i] > 0.0 ? fmin(s->curved_free[i] / s->curved_all[i], 1.0) : 1.0;
-        double sum = 0.0;
+        double free = !s->lost ? 1.0 : share[i] > 1e-12 ? share[i] : 0.0, sum = 0.0;
         int nodes = free > 0.0 ? nodes_for(m, &s->disc) : 0;
         for (int k = 0; k < nodes; k++) {
             bst_vec3 sun = nodes == 1 ? s->disc.centre : s->disc.direction[k];
@@ -208,8 +242,8 @@ void bst_satellite_flux_at(bst_satellite_pose *p, const bst_satellite_light *l,
     bst_pose_look(p, 0, l->observer);
     if (l->sunlit > 0.0) {
         int curved = sat->curved_count < CURVED_MAX ? sat->curved_count : CURVED_MAX;
-        memset(s.curved_all, 0, (size_t)curved * sizeof s.curved_all[0]);
-        memset(s.curved_free, 0, (size_t)curved * sizeof s.curved_free[0]);
+        memset(s.curved_lost, 0, (size_t)curved * sizeof s.curved_lost[0]);
+        s.lost = false;
         make_sun(l, sat->lobe_rad, &s.disc);
         bst_pose_look(p, 1, l->sun);
         last_facet last = {.material = -1};
@@ -231,14 +265,7 @@ void bst_satellite_flux_at(bst_satellite_pose *p, const bst_satellite_light *l,
 
 void bst_earthlight_at(const bst_earth_surface *surface, bst_vec3 object_m, bst_vec3 sun,
                        bst_earthlight *out) {
-    enum { RINGS = 8 };
-    /* Gauss-Legendre, 8 points, on [0, 1]: half of Abramowitz and Stegun, table 25.4 */
-    static const double place[RINGS] = {
-        0.01985507175123185, 0.10166676129318664, 0.2372337950418355, 0.4082826787521751,
-        0.5917173212478249,  0.7627662049581645,  0.8983332387068134, 0.9801449282487682};
-    static const double weight[RINGS] = {
-        0.05061426814518815, 0.11119051722668725, 0.15685332293894365, 0.181341891689181,
-        0.181341891689181,   0.15685332293894365, 0.11119051722668725, 0.05061426814518815};
+    enum { RINGS = BST_GAUSS_POINTS };
     const bst_brdf ground = {.model = BST_BRDF_PHONG,
                              .diffuse = surface->diffuse,
                              .specular = surface->specular,
@@ -257,11 +284,11 @@ void bst_earthlight_at(const bst_earth_surface *surface, bst_vec3 object_m, bst_
     int panels = surface->fineness, around = 24 * panels;
     for (int n = 0; n < RINGS * panels; n++) {
         /* uniform in the square root of the solid angle: smooth at the limb */
-        double t = 0.5 * BST_PI * (n / RINGS + place[n % RINGS]) / panels,
+        double t = 0.5 * BST_PI * (n / RINGS + 0.5 * (1.0 + bst_gauss_place[n % RINGS])) / panels,
                drop = cap * sin(t) * sin(t), c = 1.0 - drop;
         double s = sqrt(drop * (2.0 - drop));
-        double solid =
-            cap * sin(2.0 * t) * 0.5 * BST_PI * weight[n % RINGS] / panels * 2.0 * BST_PI / around;
+        double solid = cap * sin(2.0 * t) * 0.25 * BST_PI * bst_gauss_weight[n % RINGS] / panels *
+                       2.0 * BST_PI / around;
         double chord2 = BST_EARTH_RADIUS_M * BST_EARTH_RADIUS_M - distance * distance * s * s;
         double way = distance * c - sqrt(fmax(chord2, 0.0));
         for (int m = 0; m < around; m++) {

@@ -60,9 +60,9 @@ typedef struct bst_satellite_flux {
  *            light  directions
  * Returned:  *out
  * Notes:     shadows of plane facets are exact for the centre of the Sun. Curved surfaces are
- *            integrated without shadows and reduced by the part of their facets that is not in
- *            shadow; `error` estimates what that costs. Shadows of earthlight are those of a light
- *            at its centroid. Light that is reflected twice is left out. */
+ *            integrated without shadows and reduced by the part of their facets' light that is not
+ *            in shadow; `error` estimates what that costs. Shadows of earthlight are those of a
+ * light at its centroid. Light that is reflected twice is left out. */
 void bst_satellite_flux_at(bst_satellite_pose *pose, const bst_satellite_light *light,
                            bst_satellite_flux *out);
 

@@ -30,7 +30,7 @@ static const bst_material library[] = {
      1.0,
      {0.15, 1, 1.35, 1.4},
      0.67},
-    /* aluminised Teflon, 1 mil: absorptance 0.14 */
+    /* aluminised Teflon, 2 mil: absorptance 0.14, emittance 0.60 */
     {"mli_silver",
      {.model = BST_BRDF_COOK_TORRANCE, .specular = 0.8, .diffuse = 0.1, .roughness = 0.25},
      1.0,

@@ -264,8 +264,8 @@ static bst_status make_part(bst_ctx *ctx, bst_satellite *s, const bst_satellite_
     part->facet_count = s->facet_count - part->first_facet;
     if (part->facet_count == 0) {
         return bst_fail(ctx, BST_ERR_CONFIG,
-                        "part \"%s\" has no facet with an area (allowed: extents above 0)",
-                        c->name);
+                        "part \"%s\"%s%.400s has no facet with an area (allowed: extents above 0)",
+                        c->name, *c->file ? ": " : "", c->file);
     }
     return BST_OK;
 }

@@ -55,19 +55,20 @@ static double extent_of(const bst_point2 *p, int count) {
 
 /* True if an edge of q separates p from q. An edge as short as rounding has no direction. */
 static bool separated(const bst_point2 *q, int q_count, const bst_point2 *p, int p_count) {
-    double tiny = TINY * extent_of(q, q_count);
+    bst_point2 a = q[q_count - 1];
     for (int i = 0; i < q_count; i++) {
-        bst_point2 a = q[i], b = q[i + 1 < q_count ? i + 1 : 0];
-        if (fabs(b.x - a.x) <= tiny && fabs(b.y - a.y) <= tiny) {
-            continue;
-        }
+        bst_point2 b = q[i];
         int k = 0;
         while (k < p_count && left_of(a, b, p[k]) <= 0.0) {
             k++;
         }
         if (k == p_count) {
-            return true;
+            double tiny = TINY * extent_of(q, q_count);
+            if (fabs(b.x - a.x) > tiny || fabs(b.y - a.y) > tiny) {
+                return true;
+            }
         }
+        a = b;
     }
     return false;
 }
@@ -152,11 +153,12 @@ static void split(const outline *from, bst_point2 a, bst_point2 b, outline *left
 }
 
 /* Subtracts a convex polygon from one piece. */
-static void cut_piece(bst_polygon_clip *clip, int piece, const bst_point2 *q, int q_count) {
+static void cut_piece(bst_polygon_clip *clip, int piece, const bst_point2 *q, int q_count,
+                      bool overlaps) {
     bst_point2 rest[BST_POLYGON_CORNERS_MAX + 8], left[BST_POLYGON_CORNERS_MAX + 8];
     bst_polygon_piece from = clip->pieces[piece];
     const bst_point2 *p = clip->points + from.first;
-    if (bst_polygon_is_separate(p, from.count, q, q_count)) {
+    if (!overlaps && bst_polygon_is_separate(p, from.count, q, q_count)) {
         return;
     }
     int pieces = clip->piece_count, points = clip->point_count, count = from.count;
@@ -199,12 +201,14 @@ static int clean(const bst_polygon_clip *clip, const bst_point2 *points, int cou
     return out.count;
 }
 
-void bst_polygon_clip_subtract(bst_polygon_clip *clip, const bst_point2 *points, int count) {
+void bst_polygon_clip_subtract(bst_polygon_clip *clip, const bst_point2 *points, int count,
+                               bool overlaps) {
     bst_point2 q[BST_POLYGON_CORNERS_MAX];
     int corners = clean(clip, points, count, q);
+    overlaps = overlaps && clip->piece_count == 1 && clip->pieces[0].first == 0;
     for (int i = 0, end = clip->piece_count; i < end && corners > 0; i++) {
         if (clip->pieces[i].count > 0) {
-            cut_piece(clip, i, q, corners);
+            cut_piece(clip, i, q, corners, overlaps);
         }
     }
 }

@@ -43,8 +43,10 @@ bool bst_polygon_is_separate(const bst_point2 *p, int p_count, const bst_point2 
  * Given:     points  [count] corners, counter-clockwise, at most BST_POLYGON_CORNERS_MAX */
 void bst_polygon_clip_start(bst_polygon_clip *clip, const bst_point2 *points, int count);
 
-/* Removes a convex polygon (as in bst_polygon_clip_start) from all pieces. */
-void bst_polygon_clip_subtract(bst_polygon_clip *clip, const bst_point2 *points, int count);
+/* Removes a convex polygon (as in bst_polygon_clip_start) from all pieces. `overlaps`: it is known
+ * to overlap the polygon that the clip was started with. */
+void bst_polygon_clip_subtract(bst_polygon_clip *clip, const bst_point2 *points, int count,
+                               bool overlaps);
 
 /* Removes all that is outside of a convex polygon (as in bst_polygon_clip_start). */
 void bst_polygon_clip_intersect(bst_polygon_clip *clip, const bst_point2 *points, int count);

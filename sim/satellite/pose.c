@@ -244,38 +244,6 @@ static void add_to_bounds(const bst_pose_view *v, bst_vec3 q, double b[6]) {
     }
 }
 
-void bst_pose_look(bst_satellite_pose *p, int view, bst_vec3 direction) {
-    const bst_satellite *s = p->satellite;
-    bst_pose_view *v = &p->views[view];
-    v->z = direction;
-    v->x = bst_vec3_perpendicular(direction);
-    v->y = bst_vec3_cross(v->z, v->x);
-    for (int o = 0; o < s->occluder_count; o++) {
-        const bst_occluder *body = &s->occluders[o];
-        double *b = v->bounds[o];
-        start_bounds(b);
-        for (int i = 0; i < body->vertex_count; i++) {
-            add_to_bounds(v, p->vertices[body->first_vertex + i], b);
-        }
-        v->outline_count[o] = -1;
-    }
-    if (v->cells > 0) {
-        fill_grid(v, s->occluder_count);
-        return;
-    }
-    for (int o = 0; o < s->occluder_count; o++) {
-        v->hiders[o] = 0;
-        for (int k = 0; k < s->occluder_count; k++) {
-            bst_vec3 axis;
-            /* a ray that does not advance along the axis leads away from the other body */
-            if (may_hide(v->bounds[k], v->bounds[o]) &&
-                (k == o || !bst_separation(p, o, k, &axis) || bst_vec3_dot(axis, v->z) > 1e-12)) {
-                v->hiders[o] |= (uint64_t)1 << k;
-            }
-        }
-    }
-}
-
 /* Silhouette of a closed body: the edges between facets that face the view and others, in order.
  * Returned: number of corners; 0 if the edges form no single loop (facets seen edge-on). */
 static int walk_outline(const bst_satellite_pose *p, const bst_pose_view *v, const bst_occluder *o,
@@ -323,6 +291,46 @@ static int outline_of(const bst_satellite_pose *p, bst_pose_view *v, int occlude
     }
     *points = to;
     return v->outline_count[occluder];
+}
+
+/* True if the silhouettes of two bodies overlap, which are not the same one. */
+static bool silhouettes_meet(const bst_satellite_pose *p, bst_pose_view *v, int a, int b) {
+    const bst_point2 *of_a, *of_b;
+    int n = outline_of(p, v, a, &of_a), m = outline_of(p, v, b, &of_b);
+    return !bst_polygon_is_separate(of_a, n, of_b, m);
+}
+
+void bst_pose_look(bst_satellite_pose *p, int view, bst_vec3 direction) {
+    const bst_satellite *s = p->satellite;
+    bst_pose_view *v = &p->views[view];
+    v->z = direction;
+    v->x = bst_vec3_perpendicular(direction);
+    v->y = bst_vec3_cross(v->z, v->x);
+    for (int o = 0; o < s->occluder_count; o++) {
+        const bst_occluder *body = &s->occluders[o];
+        double *b = v->bounds[o];
+        start_bounds(b);
+        for (int i = 0; i < body->vertex_count; i++) {
+            add_to_bounds(v, p->vertices[body->first_vertex + i], b);
+        }
+        v->outline_count[o] = -1;
+    }
+    if (v->cells > 0) {
+        fill_grid(v, s->occluder_count);
+        return;
+    }
+    for (int o = 0; o < s->occluder_count; o++) {
+        v->hiders[o] = 0;
+        for (int k = 0; k < s->occluder_count; k++) {
+            bst_vec3 axis;
+            /* a ray that does not advance along the axis leads away from the other body */
+            if (may_hide(v->bounds[k], v->bounds[o]) &&
+                (k == o || ((!bst_separation(p, o, k, &axis) || bst_vec3_dot(axis, v->z) > 1e-12) &&
+                            silhouettes_meet(p, v, o, k)))) {
+                v->hiders[o] |= (uint64_t)1 << k;
+            }
+        }
+    }
 }
 
 /* The plane of a facet and the projection of a view onto it. */
@@ -374,29 +382,51 @@ static void subtract_front(bst_satellite_pose *p, const plane *f, const bst_pose
     }
     int corners = bst_polygon_hull(points, n, hull);
     if (corners >= 3 && corners <= BST_POLYGON_CORNERS_MAX) {
-        bst_polygon_clip_subtract(&p->clip, hull, corners);
+        bst_polygon_clip_subtract(&p->clip, hull, corners, false);
     }
 }
 
+/* True if rays from all corners of a facet along the view's direction, which goes out through the
+ * rim's plane, pass within the circle that the polygon of the rim contains. */
+static bool is_within_rim(const bst_satellite_pose *p, int facet, const bst_pose_view *v,
+                          const bst_shell *shell, bst_vec3 axis) {
+    const bst_facet *own = &p->satellite->facets[facet];
+    bst_vec3 centre = bst_vec3_axpy(shell->apex_m, shell->depth_m, shell->axis);
+    if (shell->joint >= 0) {
+        centre = bst_vec3_add(p->origin[shell->joint],
+                              bst_mat3_mul_vec(&p->rotation[shell->joint], centre));
+    }
+    double inner = shell->radius_m * cos(BST_PI / shell->rim_count),
+           rate = bst_vec3_dot(axis, v->z);
+    for (int i = 0; i < own->count; i++) {
+        bst_vec3 r = bst_vec3_sub(p->vertices[p->satellite->corner[own->first + i]], centre);
+        r = bst_vec3_axpy(r, -bst_vec3_dot(r, axis) / rate, v->z);
+        if (!(bst_vec3_dot(r, r) < inner * inner)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* Keeps what light reaches through the rim of a shell. */
-static void look_through_rim(bst_satellite_pose *p, const plane *f, const bst_pose_view *v,
-                             const bst_shell *shell) {
-    bst_point2 rim[BST_POLYGON_CORNERS_MAX] = {{0}};
+static void look_through_rim(bst_satellite_pose *p, int facet, const plane *f,
+                             const bst_pose_view *v, const bst_shell *shell) {
+    bst_point2 rim[BST_POLYGON_CORNERS_MAX];
     bst_vec3 axis = shell->axis;
     if (shell->joint >= 0) {
         axis = bst_mat3_mul_vec(&p->rotation[shell->joint], axis);
     }
-    int n = 0;
-    if (bst_vec3_dot(axis, v->z) > 0.0) {
-        for (; n < shell->rim_count; n++) {
-            rim[n] = drop(f, v, p->vertices[shell->first_rim + n]);
-        }
+    if (!(bst_vec3_dot(axis, v->z) > 0.0)) {
+        p->clip.piece_count = 0;
+        return;
     }
-    if (n == 0) {
-        bst_polygon_clip_start(&p->clip, rim, 0);
-    } else {
-        bst_polygon_clip_intersect(&p->clip, rim, n);
+    if (is_within_rim(p, facet, v, shell, axis)) {
+        return;
     }
+    for (int i = 0; i < shell->rim_count; i++) {
+        rim[i] = drop(f, v, p->vertices[shell->first_rim + i]);
+    }
+    bst_polygon_clip_intersect(&p->clip, rim, shell->rim_count);
 }
 
 /* True if the middle of a facet is inside a shell. */
@@ -465,7 +495,7 @@ static void subtract(bst_satellite_pose *p, plane *f, bst_pose_view *v, int occl
             return;
         }
     }
-    bst_polygon_clip_subtract(&p->clip, moved, n);
+    bst_polygon_clip_subtract(&p->clip, moved, n, true);
 }
 
 /* Bounds of a facet in a view. */
@@ -507,7 +537,7 @@ static void try_occluder(bst_satellite_pose *p, int facet, bst_pose_view *v, int
     }
     if (shell >= 0 &&
         (occluder == own->occluder || is_inside(p, own, &p->satellite->shells[shell]))) {
-        look_through_rim(p, f, v, &p->satellite->shells[shell]);
+        look_through_rim(p, facet, f, v, &p->satellite->shells[shell]);
     } else {
         subtract(p, f, v, occluder);
     }
@@ -532,9 +562,11 @@ double bst_pose_unshadowed(bst_satellite_pose *p, int index, int views, bool *wh
         facet_bounds(p, facet, v, b);
         f.nearest_m = b[5];
         f.mapped = false;
-        for (int o = 0; few && o < s->occluder_count; o++) {
+        bool gone = false;
+        for (int o = 0; few && !gone && o < s->occluder_count; o++) {
             if ((hiders >> o & 1) && may_hide(v->bounds[o], b)) {
                 try_occluder(p, index, v, o, &f, whole);
+                gone = !*whole && bst_polygon_clip_is_empty(&p->clip);
             }
         }
         for (int o = 0; !few && v->cell_item_count < 0 && o < s->occluder_count; o++) {

@@ -108,6 +108,10 @@ bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world,
 /* Frees a view; the world is not affected; NULL is allowed. */
 void bst_world_view_free(bst_world_view *view);
 
+/* Leaves the thermal emission of shapes out of all sights: who asks for magnitudes only needs no
+ * visible areas, which take as long as the reflected light. */
+void bst_world_view_reflected_only(bst_world_view *view);
+
 /* True state of an object at `seconds` after the epoch. BST_ERR_NUMERIC: its orbit has decayed. */
 bst_status bst_world_view_object_state(bst_ctx *ctx, bst_world_view *view, int object,
                                        double seconds, bst_world_state *out) BST_MUST_CHECK;

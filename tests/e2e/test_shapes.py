@@ -39,6 +39,21 @@ class Shapes(unittest.TestCase):
             if one["v_mag"]:
                 self.assertGreaterEqual(float(one["v_mag"]) - float(other["v_mag"]), 0.1999)
 
+    def test_light_curve_from_another_orbit(self):
+        """From one processor and from all: the same rows, in blocks of 512."""
+        words = ["lightcurve", "--satellite", SATELLITE, *ORBIT, "--observer-norad", "44801", "--duration", "1100",
+                 "--step", "1"]
+        shown = boresight(*words)
+        self.assertEqual(shown.returncode, 0, shown.stderr)
+        rows = list(csv.DictReader(io.StringIO(shown.stdout)))
+        self.assertEqual(len(rows), 1101)
+        self.assertTrue(all(30000 < float(row["range_km"]) < 50000 for row in rows))
+        self.assertTrue(any(row["v_mag"] for row in rows))
+        one = min(os.sched_getaffinity(0))
+        alone = subprocess.run([runs.BORESIGHT, *words], capture_output=True, text=True,
+                               preexec_fn=lambda: os.sched_setaffinity(0, {one}))
+        self.assertEqual(alone.stdout, shown.stdout)
+
     def test_light_curve_of_a_scenario(self):
         shown = boresight("lightcurve", "scenarios/neossat_geo_track.json", "--duration", "60", "--step", "20")
         self.assertEqual(shown.returncode, 0, shown.stderr)
@@ -61,6 +76,10 @@ class Shapes(unittest.TestCase):
                 (["lightcurve", "--satellite", SATELLITE], 1, "--elements"),
                 (["lightcurve", "--satellite", SATELLITE, *ORBIT], 1, "give --site or --observer-norad"),
                 (["lightcurve", "--satellite", SATELLITE, *ORBIT, "--site", "95,0,0"], 1, "--site 95,0,0"),
+                (["lightcurve", "--satellite", SATELLITE, *ORBIT[:3], "99999", *ORBIT[4:], "--site", "1,1,1"], 1,
+                 "lightcurve: --norad 99999: scenarios/catalogue_2022-06.tle: no element set"),
+                (["lightcurve", "--satellite", SATELLITE, *ORBIT, "--observer-norad", "99998"], 1,
+                 "lightcurve: --observer-norad 99998: "),
                 (["lightcurve", "scenarios/neossat_geo_track.json", "--object", "none"], 1, "--object none"),
                 (["turntable"], 2, "one satellite is expected"),
                 (["turntable", "no.json"], 1, "no.json")):

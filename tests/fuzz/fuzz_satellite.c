@@ -20,7 +20,8 @@ static bool holds(const uint8_t *data, size_t bytes, const char *word) {
     return false;
 }
 
-static void check(bst_ctx *ctx, const bst_satellite *s) {
+/* draw: a number that follows from the input. */
+static void check(bst_ctx *ctx, const bst_satellite *s, unsigned draw) {
     for (int f = 0; f < s->facet_count; f++) {
         if (!(s->facets[f].area_m2 > 0.0) || !isfinite(s->facets[f].area_m2) ||
             !(fabs(bst_vec3_norm(s->facets[f].normal) - 1.0) < 1e-9)) {
@@ -28,8 +29,10 @@ static void check(bst_ctx *ctx, const bst_satellite *s) {
         }
     }
     bst_satellite_pose *pose;
-    /* pairs of facets are compared where a grid does not help: a small model will do */
-    if (s->facet_count > 2000 || bst_satellite_pose_create(ctx, s, &pose) != BST_OK) {
+    /* with sanitizers light takes ten times as long as reading: small models always, others, of
+     * more bodies than BST_SEPARATION_BODIES too, one in eight */
+    bool wanted = s->facet_count <= 24 || (s->facet_count <= 160 && draw % 8 == 0);
+    if (!wanted || bst_satellite_pose_create(ctx, s, &pose) != BST_OK) {
         return;
     }
     bst_vec3 sun = bst_vec3_unit((bst_vec3){0.3, -0.5, 0.7}), eye = {0.6, 0.64, 0.48};
@@ -55,7 +58,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes) {
     bst_status status = bst_satellite_load(&ctx, path, &s);
     FUZZ_CHECK_REASON(ctx, status);
     if (status == BST_OK) {
-        check(&ctx, s);
+        unsigned draw = 0;
+        for (size_t i = 0; i < bytes; i++) {
+            draw = 31 * draw + data[i];
+        }
+        check(&ctx, s, draw >> 8);
     } else if (s) {
         abort();
     }

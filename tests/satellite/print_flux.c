@@ -1,12 +1,43 @@
 /* Prints the light of a satellite in some geometries, with its triangles, for compare_mitsuba.py:
- * one JSON object a line. Materials become Lambertian, the finest facets stand for curved surfaces.
+ * one JSON object a line. Material m reflects by the model of the number FIRST + m, modulo the
+ * seven models, with parameters that are the same in compare_mitsuba.py; FIRST "lambert": all by
+ * Lambert's law. Fine facets stand for curved surfaces.
  *
- *   print_flux SATELLITE.json GEOMETRIES */
+ *   print_flux SATELLITE.json GEOMETRIES FIRST TABLE.csv */
 #include "sim/satellite/flux.h"
 #include "tests/satellite/satellite_support.h"
 
-/* Loads a satellite and makes its curved parts fine. */
-static bst_satellite *load(const char *path) {
+/* Parameters of the models: all of them have lobes that are wide against a facet. */
+static const bst_brdf models[] = {
+    {.model = BST_BRDF_LAMBERT},
+    {.model = BST_BRDF_PHONG, .diffuse = 0.2, .specular = 0.5, .exponent = 20.0},
+    {.model = BST_BRDF_ASHIKHMIN_SHIRLEY, .diffuse = 0.3, .specular = 0.2, .exponent = 30.0},
+    {.model = BST_BRDF_COOK_TORRANCE, .diffuse = 0.2, .specular = 0.5, .roughness = 0.35},
+    {.model = BST_BRDF_BINOMIAL,
+     .b = {-0.4, -0.7},
+     .c = {-1.2, -0.8},
+     .base = 3.0,
+     .first_power = 1,
+     .terms = 2},
+    {.model = BST_BRDF_MAXWELL_BEARD,
+     .diffuse = 0.1,
+     .volume = 0.15,
+     .specular = 0.3,
+     .roughness = 0.35,
+     .tau_rad = 0.3,
+     .omega_rad = 0.5},
+    {.model = BST_BRDF_TABLE},
+};
+
+enum { MODELS = sizeof models / sizeof models[0] };
+
+static void give_up(const bst_ctx *ctx) {
+    fprintf(stderr, "%s\n", ctx->message);
+    exit(1);
+}
+
+/* Loads a satellite and makes its curved parts fine. `first` below 0: Lambert. */
+static bst_satellite *load(const char *path, int first, const bst_brdf_table *table) {
     bst_ctx ctx = {0};
     bst_json *json;
     bst_satellite_config config;
@@ -14,22 +45,24 @@ static bst_satellite *load(const char *path) {
     if (bst_json_load(&ctx, path, &json) != BST_OK ||
         bst_config_read(&ctx, json, bst_json_root(json), "", bst_satellite_config_table, &config) !=
             BST_OK) {
-        fprintf(stderr, "%s\n", ctx.message);
-        exit(1);
+        give_up(&ctx);
     }
     bst_satellite_part_config *parts = config.parts.items;
     for (int i = 0; i < config.parts.count; i++) {
         parts[i].segments = 96;
     }
     if (bst_satellite_create(&ctx, &config, "", &s) != BST_OK) {
-        fprintf(stderr, "%s\n", ctx.message);
-        exit(1);
+        give_up(&ctx);
     }
     bst_config_free(bst_satellite_config_table, &config);
     bst_json_free(json);
     for (int m = 0; m < s->material_count; m++) {
-        s->materials[m].brdf =
-            (bst_brdf){.model = BST_BRDF_LAMBERT, .diffuse = 0.2 + 0.6 * m / s->material_count};
+        bst_brdf *brdf = &s->materials[m].brdf;
+        *brdf = models[first < 0 ? 0 : (first + m) % MODELS];
+        if (brdf->model == BST_BRDF_LAMBERT) {
+            brdf->diffuse = 0.2 + 0.6 * m / s->material_count;
+        }
+        brdf->table = brdf->model == BST_BRDF_TABLE ? table : NULL;
         s->materials[m].scale = 1.0;
     }
     return s;
@@ -43,8 +76,8 @@ static void print_geometry(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye) {
     bst_satellite_flux_at(p, &light, &flux);
     printf(
         "{\"sun\": [%.17g, %.17g, %.17g], \"eye\": [%.17g, %.17g, %.17g], \"flux\": %.17g, "
-        "\"triangles\": [",
-        sun.x, sun.y, sun.z, eye.x, eye.y, eye.z, flux.sun[BST_SUNLIGHT_V]);
+        "\"error\": %.17g, \"triangles\": [",
+        sun.x, sun.y, sun.z, eye.x, eye.y, eye.z, flux.sun[BST_SUNLIGHT_V], flux.error);
     const char *comma = "";
     for (int f = 0; f < s->facet_count; f++) {
         const int *c = s->corner + s->facets[f].first;
@@ -55,7 +88,8 @@ static void print_geometry(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye) {
             continue;
         }
         for (int i = 2; i < s->facets[f].count; i++) {
-            printf("%s[%.4f", comma, s->materials[s->facets[f].material].brdf.diffuse);
+            const bst_brdf *brdf = &s->materials[s->facets[f].material].brdf;
+            printf("%s[[%d, %.17g]", comma, brdf->model, brdf->diffuse);
             const int v[3] = {c[0], c[i - 1], c[i]};
             for (int k = 0; k < 3; k++) {
                 bst_vec3 q = p->vertices[v[k]];
@@ -69,15 +103,19 @@ static void print_geometry(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye) {
 }
 
 int main(int argc, char **argv) {
-    if (argc != 3) {
-        fprintf(stderr, "usage: print_flux SATELLITE.json GEOMETRIES\n");
+    if (argc != 5) {
+        fprintf(stderr, "usage: print_flux SATELLITE.json GEOMETRIES FIRST TABLE.csv\n");
         return 2;
     }
     bst_ctx ctx = {0};
-    bst_satellite *s = load(argv[1]);
+    bst_brdf_table *table;
     bst_satellite_pose *pose;
+    if (bst_brdf_table_load(&ctx, argv[4], &table) != BST_OK) {
+        give_up(&ctx);
+    }
+    bst_satellite *s = load(argv[1], strcmp(argv[3], "lambert") == 0 ? -1 : atoi(argv[3]), table);
     if (bst_satellite_pose_create(&ctx, s, &pose) != BST_OK) {
-        return 1;
+        give_up(&ctx);
     }
     uint64_t random = 31;
     for (int i = 0; i < atoi(argv[2]);) {
@@ -89,5 +127,6 @@ int main(int argc, char **argv) {
     }
     bst_satellite_pose_free(pose);
     bst_satellite_free(s);
+    bst_brdf_table_free(table);
     return 0;
 }

@@ -304,8 +304,36 @@ static void earthlight_has_its_closed_form(void **state) {
     assert_int_equal(light.count, 0); /* midnight */
 }
 
+/* A mirror-like sphere behind a black plate that covers a part of it for the Sun only: what counts
+ * is whether the highlight, at x = 0.5, is in shadow. */
+static void highlights_in_shadow_are_dark(void **state) {
+    (void)state;
+    static const char format[] =
+        "{\"materials\": [{\"name\": \"m\", \"model\": \"cook_torrance\", \"diffuse\": 0, "
+        "\"specular\": "
+        "0.9, \"roughness\": 0.1}, {\"name\": \"black\", \"diffuse\": 0}], \"parts\": [{\"name\": "
+        "\"s\", "
+        "\"kind\": \"sphere\", \"radius_m\": 1, \"segments\": 48, \"material\": \"m\"}, {\"name\": "
+        "\"p\", "
+        "\"kind\": \"plate\", \"size_m\": [1.9, 4, 1], \"position_m\": [%g, 0, 3], \"material\": "
+        "\"black\"}]}";
+    bst_vec3 sun = {0, 0, 1}, eye = {0.8660254037844386, 0, 0.5};
+    double flux[3];
+    const double place_m[3] = {-60.0, 1.05, -0.85}; /* aside; over x > 0.1; over x < 0.1 */
+    for (int i = 0; i < 3; i++) {
+        char text[900];
+        snprintf(text, sizeof text, format, place_m[i]);
+        bst_test_model m = bst_test_model_open(text);
+        flux[i] = bst_test_flux(&m, sun, eye);
+        bst_test_model_close(&m);
+    }
+    assert_true(flux[1] < 0.1 * flux[0]);
+    assert_true(flux[2] > 0.9 * flux[0] && flux[2] < flux[0]);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(highlights_in_shadow_are_dark),
         cmocka_unit_test(sphere_has_its_closed_form),
         cmocka_unit_test(cylinder_has_its_closed_form),
         cmocka_unit_test(box_and_plate_have_their_closed_forms),

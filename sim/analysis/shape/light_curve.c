@@ -5,31 +5,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/astro/frames.h"
+#include "sim/analysis/shape/light_curve_rows.h"
+#include "sim/astro/elements.h"
 #include "sim/astro/geodesy.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/plot.h"
 #include "sim/world/world.h"
 
 enum { ROWS_MAX = 10000000 };
-
-/* What a light curve is computed from. */
-typedef struct curve {
-    const bst_light_curve_request *request;
-    bst_world *world;
-    bst_world_view *view;
-    bst_time epoch;                        /* of the world */
-    double start_s;                        /* after the epoch */
-    int object, observer;                  /* observer -1: the site */
-    bst_vec3 site_itrf_m, east, north, up; /* of the site, ITRF */
-} curve;
-
-/* One row of the table. */
-typedef struct row {
-    double seconds, v_mag; /* v_mag +INFINITY: no light arrives */
-    bst_world_sight sight;
-    double elevation_rad, azimuth_rad; /* NAN without a site */
-} row;
 
 /* Appends an orbit of an element set. */
 static void put_orbit(cJSON *to, const bst_light_curve_request *r, int64_t norad) {
@@ -38,12 +21,25 @@ static void put_orbit(cJSON *to, const bst_light_curve_request *r, int64_t norad
     cJSON_AddNumberToObject(orbit, "norad", (double)norad);
 }
 
+/* Checks that the file has an element set of the number that an option gives. */
+static bst_status check_norad(bst_ctx *ctx, const bst_light_curve_request *r, const char *option,
+                              int64_t norad) {
+    bst_elements *sets = NULL;
+    int count = 0;
+    bst_elements_options only = {.norad = (int)norad};
+    bst_status status = bst_elements_load(ctx, r->elements, &only, &sets, &count);
+    free(sets);
+    return status == BST_OK ? BST_OK
+                            : bst_fail_prefix(ctx, status, "%s %lld", option, (long long)norad);
+}
+
 /* JSON of a world with one satellite; NULL: out of memory. */
 static char *world_text(const bst_light_curve_request *r) {
     cJSON *root = cJSON_CreateObject(), *world = cJSON_AddObjectToObject(root, "world");
     cJSON *object = cJSON_CreateObject();
     cJSON_AddStringToObject(world, "star_catalogue", "embedded");
-    cJSON_AddItemToArray(cJSON_AddArrayToObject(world, "objects"), object);
+    cJSON *objects = cJSON_AddArrayToObject(world, "objects");
+    cJSON_AddItemToArray(objects, object);
     cJSON_AddStringToObject(object, "name", "satellite");
     put_orbit(object, r, r->norad);
     cJSON *brightness = cJSON_AddObjectToObject(object, "brightness");
@@ -53,13 +49,12 @@ static char *world_text(const bst_light_curve_request *r) {
     cJSON *phase = cJSON_CreateObject();
     cJSON_AddStringToObject(phase, "law", r->attitude);
     cJSON_AddItemToArray(cJSON_AddArrayToObject(object, "attitude"), phase);
-    cJSON *observers = cJSON_AddArrayToObject(root, "observers");
+    cJSON_AddArrayToObject(root, "observers");
     if (r->observer_norad > 0) {
         cJSON *observer = cJSON_CreateObject();
         cJSON_AddStringToObject(observer, "name", "observer");
-        cJSON_AddItemToArray(cJSON_AddArrayToObject(observer, "sensors"), cJSON_CreateObject());
         put_orbit(observer, r, r->observer_norad);
-        cJSON_AddItemToArray(observers, observer);
+        cJSON_AddItemToArray(objects, observer);
     }
     char *text = cJSON_PrintUnformatted(root);
     cJSON_Delete(root);
@@ -79,7 +74,7 @@ static const bst_config_desc scene_table[] = {
     BST_CONFIG_END};
 
 /* Makes the world of a satellite without a scenario. */
-static bst_status make_own_world(bst_ctx *ctx, curve *c) {
+static bst_status make_own_world(bst_ctx *ctx, bst_light_curve *c) {
     const bst_light_curve_request *r = c->request;
     bst_json *json = NULL;
     scene s;
@@ -89,6 +84,10 @@ static bst_status make_own_world(bst_ctx *ctx, curve *c) {
                         "--start");
     }
     BST_TRY(bst_time_from_utc(ctx, r->start, &c->epoch));
+    BST_TRY(check_norad(ctx, r, "--norad", r->norad));
+    if (r->observer_norad > 0) {
+        BST_TRY(check_norad(ctx, r, "--observer-norad", r->observer_norad));
+    }
     char *text = world_text(r);
     if (!text) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a world");
@@ -104,7 +103,8 @@ static bst_status make_own_world(bst_ctx *ctx, curve *c) {
         }
     }
     bst_json_free(json);
-    c->observer = r->observer_norad > 0 ? 0 : -1;
+    c->observer = -1;
+    c->observing_object = r->observer_norad > 0 ? 1 : -1;
     return status;
 }
 
@@ -119,7 +119,7 @@ static int find_observer(const bst_scenario *s, const char *name) {
     return -1;
 }
 
-static bst_status use_scenario(bst_ctx *ctx, const bst_scenario *s, curve *c) {
+static bst_status use_scenario(bst_ctx *ctx, const bst_scenario *s, bst_light_curve *c) {
     const bst_light_curve_request *r = c->request;
     c->epoch = s->epoch;
     BST_TRY(
@@ -128,6 +128,7 @@ static bst_status use_scenario(bst_ctx *ctx, const bst_scenario *s, curve *c) {
                 : bst_world_object_count(c->world) > 0 ? 0
                                                        : -1;
     c->observer = find_observer(s, r->observer);
+    c->observing_object = -1;
     if (c->object < 0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "--object %s: the scenario has no such object",
                         r->object ? r->object : "");
@@ -145,14 +146,15 @@ static bst_status use_scenario(bst_ctx *ctx, const bst_scenario *s, curve *c) {
 }
 
 /* Reads --site. */
-static bst_status place_site(bst_ctx *ctx, curve *c) {
+static bst_status place_site(bst_ctx *ctx, bst_light_curve *c) {
     double deg[2], height_m, itrf_m[3];
     int used = 0;
     const char *text = c->request->site;
     if (!text) {
-        return c->observer >= 0 ? BST_OK
-                                : bst_fail(ctx, BST_ERR_ARGUMENT,
-                                           "there is no observer; give --site or --observer-norad");
+        return c->observer >= 0 || c->observing_object >= 0
+                   ? BST_OK
+                   : bst_fail(ctx, BST_ERR_ARGUMENT,
+                              "there is no observer; give --site or --observer-norad");
     }
     if (sscanf(text, "%lf ,%lf ,%lf %n", &deg[0], &deg[1], &height_m, &used) != 3 || text[used] ||
         !(fabs(deg[0]) <= 90.0 && fabs(deg[1]) <= 360.0 && fabs(height_m) <= 1e5)) {
@@ -167,41 +169,7 @@ static bst_status place_site(bst_ctx *ctx, curve *c) {
     c->up = (bst_vec3){cos(lat) * cos(lon), cos(lat) * sin(lon), sin(lat)};
     c->east = (bst_vec3){-sin(lon), cos(lon), 0.0};
     c->north = bst_vec3_cross(c->up, c->east);
-    c->observer = -1;
-    return BST_OK;
-}
-
-/* Air mass at an apparent elevation (Kasten and Young 1989). */
-static double air_mass(double elevation_rad) {
-    double deg = elevation_rad / BST_DEG_RAD;
-    return 1.0 / (sin(elevation_rad) + 0.50572 * pow(deg + 6.07995, -1.6364));
-}
-
-static bst_status row_of_site(bst_ctx *ctx, const curve *c, double at_s, row *out) {
-    bst_astro_earth_frames frames;
-    bst_world_state place;
-    BST_TRY(bst_world_view_earth_frames(ctx, c->view, at_s, &frames));
-    place.position_m = bst_mat3_transpose_mul_vec(&frames.itrf_from_gcrf, c->site_itrf_m);
-    place.velocity_mps = bst_vec3_cross(bst_astro_earth_rate_gcrf(&frames), place.position_m);
-    BST_TRY(bst_world_view_sight_from(ctx, c->view, &place, c->object, at_s, &out->sight));
-    bst_vec3 way = bst_mat3_mul_vec(&frames.itrf_from_gcrf, out->sight.apparent);
-    out->elevation_rad = asin(fmin(fmax(bst_vec3_dot(way, c->up), -1.0), 1.0));
-    double azimuth = atan2(bst_vec3_dot(way, c->east), bst_vec3_dot(way, c->north));
-    out->azimuth_rad = azimuth < 0.0 ? azimuth + 2.0 * BST_PI : azimuth;
-    out->v_mag = out->elevation_rad > 0.0
-                     ? out->sight.v_mag + c->request->extinction_mag * air_mass(out->elevation_rad)
-                     : (double)INFINITY;
-    return BST_OK;
-}
-
-static bst_status make_row(bst_ctx *ctx, const curve *c, double seconds, row *out) {
-    double at_s = c->start_s + seconds;
-    *out = (row){.seconds = seconds, .elevation_rad = NAN, .azimuth_rad = NAN};
-    if (c->observer < 0) {
-        return row_of_site(ctx, c, at_s, out);
-    }
-    BST_TRY(bst_world_view_sight(ctx, c->view, c->observer, c->object, at_s, &out->sight));
-    out->v_mag = out->sight.occulted ? (double)INFINITY : out->sight.v_mag;
+    c->observer = c->observing_object = -1;
     return BST_OK;
 }
 
@@ -213,7 +181,7 @@ static void put(FILE *f, const char *format, double value) {
     }
 }
 
-static void write_row(FILE *f, const curve *c, const row *r) {
+static void write_row(FILE *f, const bst_light_curve *c, const bst_light_curve_row *r) {
     char utc[48];
     bst_time_to_utc(bst_time_add(c->epoch, c->start_s + r->seconds), 3, utc, sizeof utc);
     fprintf(f, "%s,%.3f", utc, r->seconds);
@@ -228,7 +196,8 @@ static void write_row(FILE *f, const curve *c, const row *r) {
 }
 
 /* Plots magnitude and phase angle; the shadow is where the curve ends. */
-static bst_status plot_rows(bst_ctx *ctx, const char *path, const row *rows, int count) {
+static bst_status plot_rows(bst_ctx *ctx, const char *path, const bst_light_curve_row *rows,
+                            int count) {
     bst_plot plot;
     int lit = 0;
     for (int i = 0; i < count; i++) {
@@ -257,15 +226,8 @@ static bst_status plot_rows(bst_ctx *ctx, const char *path, const row *rows, int
     return bst_plot_end(ctx, &plot, NULL);
 }
 
-/* Computes all rows; those of an orbit without a state at a time end the curve with its error. */
-static bst_status compute(bst_ctx *ctx, const curve *c, row *rows, int count) {
-    for (int i = 0; i < count; i++) {
-        BST_TRY(make_row(ctx, c, i * c->request->step_s, &rows[i]));
-    }
-    return BST_OK;
-}
-
-static bst_status write_table(bst_ctx *ctx, const curve *c, const row *rows, int count) {
+static bst_status write_table(bst_ctx *ctx, const bst_light_curve *c,
+                              const bst_light_curve_row *rows, int count) {
     static const char head[] =
         "time_utc,seconds,v_mag,phase_deg,range_km,sunlit_fraction,earth_share,elevation_deg,"
         "azimuth_deg\n";
@@ -284,20 +246,19 @@ static bst_status write_table(bst_ctx *ctx, const curve *c, const row *rows, int
 
 bst_status bst_light_curve_make(bst_ctx *ctx, const bst_light_curve_request *request,
                                 const bst_scenario *scenario) {
-    curve c = {.request = request};
+    bst_light_curve c = {.request = request};
     double rows_wanted = floor(request->duration_s / request->step_s + 1e-9) + 1.0;
     if (!(rows_wanted <= ROWS_MAX)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "--step %g: %.3g rows (allowed: at most %d)",
                         request->step_s, rows_wanted, ROWS_MAX);
     }
     int count = (int)rows_wanted;
-    row *rows = NULL;
+    bst_light_curve_row *rows = NULL;
     bst_status status = scenario ? use_scenario(ctx, scenario, &c) : make_own_world(ctx, &c);
     status = status == BST_OK ? place_site(ctx, &c) : status;
-    status = status == BST_OK ? bst_world_view_create(ctx, c.world, &c.view) : status;
     if (status == BST_OK) {
         rows = malloc((size_t)count * sizeof *rows);
-        status = rows ? compute(ctx, &c, rows, count)
+        status = rows ? bst_light_curve_rows(ctx, &c, 0, count, rows)
                       : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d rows", count);
     }
     status = status == BST_OK ? write_table(ctx, &c, rows, count) : status;
@@ -305,7 +266,6 @@ bst_status bst_light_curve_make(bst_ctx *ctx, const bst_light_curve_request *req
         status = plot_rows(ctx, request->plot, rows, count);
     }
     free(rows);
-    bst_world_view_free(c.view);
     bst_world_free(c.world);
     return status;
 }

@@ -28,6 +28,7 @@ typedef struct bst_scene_lighting {
     double sunlit_fraction;             /* visible fraction of the Sun's disc at the object */
     const bst_astro_sunlight *sunlight; /* with limb darkening and atmosphere; NULL: sunlit_fraction
                                            of the whole Sun at all wavelengths */
+    bool reflected_only;                /* shapes: without thermal emission */
 } bst_scene_lighting;
 
 /* Light of an object. Reflected light has the solar spectrum, reddened by the atmosphere at the

@@ -99,7 +99,7 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
         .sun_radius_rad = aspect.sun_radius_rad,
         .sunlit = l->sunlight ? l->sunlight->light[BST_SUNLIGHT_V] : l->sunlit_fraction,
         .earthlight = b->earthshine ? &earthlight : NULL,
-        .emission = true};
+        .emission = !l->reflected_only};
     bst_satellite_flux flux;
     bst_satellite_pose_set(pose, &aspect.aim);
     bst_satellite_flux_at(pose, &light, &flux);

@@ -36,6 +36,7 @@ struct bst_world_view {
     pace pace;
     eye eyes[BST_PATH_NODES];   /* the latest ones, by node of the exposure */
     bst_satellite_pose **poses; /* by shape of the world: work memory */
+    bool reflected_only;        /* shapes without thermal emission */
 };
 
 /* Source of positions in a light-time solution; observer and object use the same one. */
@@ -273,6 +274,10 @@ typedef struct emission {
     double seconds;
 } emission;
 
+void bst_world_view_reflected_only(bst_world_view *view) {
+    view->reflected_only = true;
+}
+
 /* Brightness of an object, seen from `eye_m`. */
 static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 eye_m,
                      const bst_bodies *bodies, bst_world_sight *out) {
@@ -294,7 +299,8 @@ static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 ey
                                    .sun_m = bodies->sun_m,
                                    .seconds = at->seconds,
                                    .sunlit_fraction = sunlight.disc,
-                                   .sunlight = &sunlight};
+                                   .sunlight = &sunlight,
+                                   .reflected_only = view->reflected_only};
     if (info->shape) {
         bst_object_shape_glow(info->shape, view->poses[info->shape->index],
                               bst_brightness_config_of(info->brightness), &lighting,
