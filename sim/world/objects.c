@@ -92,9 +92,11 @@ static bst_status make_shape(const bst_world_builder *b, const bst_object_config
     if (!given) {
         return BST_OK;
     }
+    const bst_attitude_source source = {b->base_dir, b->world->epoch, bst_world_updates_attitudes,
+                                        b->world};
     bst_object_shape *shape;
     bst_status status =
-        bst_object_shape_create(b->ctx, &config->shape, &config->attitude, b->base_dir, &shape);
+        bst_object_shape_create(b->ctx, &config->shape, &config->attitude, &source, &shape);
     if (status != BST_OK) {
         return bst_fail_prefix(b->ctx, status, "%s: /world/objects/%d", b->scenario, index);
     }
@@ -102,6 +104,9 @@ static bst_status make_shape(const bst_world_builder *b, const bst_object_config
     b->world->shapes[b->world->shape_count++] = shape;
     object->info.shape = shape;
     status = start_attitude(b, object, shape->attitude);
+    if (status == BST_OK && config->external_states) {
+        status = bst_body_attitude_accept(b->ctx, shape->attitude);
+    }
     return status == BST_OK ? BST_OK
                             : bst_fail_prefix(b->ctx, BST_ERR_CONFIG,
                                               "%s: /world/objects/%d/attitude", b->scenario, index);

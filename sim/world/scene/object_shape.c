@@ -19,18 +19,18 @@ void bst_object_shape_free(bst_object_shape *shape) {
 }
 
 bst_status bst_object_shape_create(bst_ctx *ctx, const bst_satellite_config *config,
-                                   const bst_config_list *attitude, const char *base_dir,
-                                   bst_object_shape **out) {
+                                   const bst_config_list *attitude,
+                                   const bst_attitude_source *source, bst_object_shape **out) {
     bst_object_shape *shape = *out = calloc(1, sizeof *shape);
     if (!shape) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the shape of an object");
     }
-    bst_status status = bst_satellite_create(ctx, config, base_dir, &shape->satellite);
+    bst_status status = bst_satellite_create(ctx, config, source->base_dir, &shape->satellite);
     if (status != BST_OK) {
         status = bst_fail_prefix(ctx, BST_ERR_CONFIG, "shape");
     } else {
         shape->glint_count = bst_glint_surfaces(shape->satellite, shape->glints);
-        status = bst_body_attitude_create(ctx, attitude, base_dir, &shape->attitude);
+        status = bst_body_attitude_create(ctx, attitude, source, &shape->attitude);
         status = status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "attitude");
     }
     if (status != BST_OK) {

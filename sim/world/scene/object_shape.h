@@ -30,12 +30,13 @@ bool bst_object_shape_is_given(const bst_satellite_config *config);
  *
  * Given:     config    its shape
  *            attitude  bst_attitude_config; empty: nadir
- *            base_dir  base of relative paths
+ *            source    base of relative paths, and of attitudes from files
  * Returned:  *out  NULL on error
  * Errors:    BST_ERR_CONFIG with the path below the object ("shape/parts/0/..."), BST_ERR_MEMORY
  * Ownership: free *out with bst_object_shape_free */
 bst_status bst_object_shape_create(bst_ctx *ctx, const bst_satellite_config *config,
-                                   const bst_config_list *attitude, const char *base_dir,
+                                   const bst_config_list *attitude,
+                                   const bst_attitude_source *source,
                                    bst_object_shape **out) BST_MUST_CHECK;
 /* Frees a shape; NULL is allowed. */
 void bst_object_shape_free(bst_object_shape *shape);
