@@ -106,10 +106,6 @@ typedef struct reader {
     int count, capacity;
 } reader;
 
-static bst_status fail_line(const reader *r, const char *problem, const char *expected) {
-    return bst_text_fail_at(&r->source, &r->line, problem, r->line.text, r->line.length, expected);
-}
-
 static bst_status fail_meta(const reader *r, key k, const char *problem, const char *expected) {
     char text[160];
     const bst_text_line *value = &r->meta[k];
@@ -132,11 +128,6 @@ static int find_name(bst_text_span name, const char *const *names) {
     return -1;
 }
 
-static bst_status split(const reader *r, bst_text_span *name, bst_text_span *value) {
-    const char *expected, *problem = bst_text_split_keyword(&r->line, name, value, &expected);
-    return problem ? fail_line(r, problem, expected) : BST_OK;
-}
-
 static bst_status read_head(reader *r) {
     bst_text_span name, value;
     if (is_word(&r->line, "META_START") && r->has_version) {
@@ -145,12 +136,12 @@ static bst_status read_head(reader *r) {
         r->where = IN_META;
         return BST_OK;
     }
-    BST_TRY(split(r, &name, &value));
+    BST_TRY(bst_text_split(&r->source, &r->line, &name, &value));
     int k = find_name(name, head_names);
     if (k < 0 || (k == 0) == r->has_version) {
-        return fail_line(r, "no line of an AEM's header",
-                         r->has_version ? "CREATION_DATE, ORIGINATOR, ... or META_START"
-                                        : "CCSDS_AEM_VERS = 1.0 or 2.0 first");
+        return bst_text_fail_line(&r->source, &r->line, "no line of an AEM's header",
+                                  r->has_version ? "CREATION_DATE, ORIGINATOR, ... or META_START"
+                                                 : "CCSDS_AEM_VERS = 1.0 or 2.0 first");
     }
     if (k == 0) {
         r->version_1 = bst_text_is(value, "1.0");
@@ -307,14 +298,15 @@ static bst_status read_meta(reader *r) {
     if (is_word(&r->line, "META_STOP")) {
         return finish_meta(r);
     }
-    BST_TRY(split(r, &name, &value));
+    BST_TRY(bst_text_split(&r->source, &r->line, &name, &value));
     int k = find_name(name, key_names);
     if (k < 0) {
-        return fail_line(r, "the keyword is not known here",
-                         "a keyword of an AEM's metadata (504.0-B-2) such as REF_FRAME_A");
+        return bst_text_fail_line(&r->source, &r->line, "the keyword is not known here",
+                                  "a keyword of an AEM's metadata (504.0-B-2) such as REF_FRAME_A");
     }
     if (r->meta[k].text) {
-        return fail_line(r, "the keyword is given twice", "each keyword once");
+        return bst_text_fail_line(&r->source, &r->line, "the keyword is given twice",
+                                  "each keyword once");
     }
     r->meta[k] = (bst_text_line){value.text, value.length, r->line.number};
     return BST_OK;
@@ -344,7 +336,8 @@ static bst_status make_attitude(const reader *r, const double *v, bst_quat *out)
     bst_quat q = {v[first], v[first + 1], v[first + 2], v[c]};
     double norm = sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
     if (!(fabs(norm - 1.0) < NORM_SLACK)) {
-        return fail_line(r, "the quaternion has not the length 1", "a unit quaternion");
+        return bst_text_fail_line(&r->source, &r->line, "the quaternion has not the length 1",
+                                  "a unit quaternion");
     }
     *out = bst_quat_conj(bst_quat_unit(q));
     return BST_OK;
@@ -369,17 +362,21 @@ static bst_status append(reader *r, double seconds, bst_quat q) {
 static bst_status take_row(reader *r, double seconds, const double *v) {
     double before = r->count > 0 ? r->rows[r->count - 1].seconds : -INFINITY;
     if (!(seconds > before) && !(r->segment_rows == 0 && seconds == before)) {
-        return fail_line(r, "the epoch is not after that of the attitude before it",
-                         "epochs that rise");
+        return bst_text_fail_line(&r->source, &r->line,
+                                  "the epoch is not after that of the attitude before it",
+                                  "epochs that rise");
     }
     if (seconds < r->start_s - 1e-3 || seconds > r->stop_s + 1e-3) {
-        return fail_line(r, "the epoch is outside of START_TIME to STOP_TIME",
-                         "epochs within the segment's span");
+        return bst_text_fail_line(&r->source, &r->line,
+                                  "the epoch is outside of START_TIME to STOP_TIME",
+                                  "epochs within the segment's span");
     }
     if (types[r->type].form == FORM_SPIN && r->segment_rows > 0 &&
         fabs(v[3]) * (seconds - before) > 180.0) {
-        return fail_line(r, "the satellite spins by more than half a turn since the row before",
-                         "rows that stand closer");
+        return bst_text_fail_line(
+            &r->source, &r->line,
+            "the satellite spins by more than half a turn since the row before",
+            "rows that stand closer");
     }
     bst_quat q;
     BST_TRY(make_attitude(r, v, &q));
@@ -400,15 +397,16 @@ static bst_status read_row(reader *r) {
     (void)bst_text_next_word(&rest, &word);
     BST_TRY(read_date(r, &r->line, word, &seconds));
     while (bst_text_next_word(&rest, &word)) {
-        if (n == wanted || !bst_text_number(word, &v[n++])) {
-            return bst_text_fail_at(
-                &r->source, &r->line,
-                n == wanted ? "is one word too many, or no number" : "is not a number", word.text,
-                word.length, expected);
+        if (n == wanted || !bst_text_number(word, &v[n])) {
+            return bst_text_fail_at(&r->source, &r->line,
+                                    n == wanted ? "is one word too many" : "is not a number",
+                                    word.text, word.length, expected);
         }
+        n++;
     }
     if (n < wanted) {
-        return fail_line(r, "fewer numbers than its type has", expected);
+        return bst_text_fail_line(&r->source, &r->line, "fewer numbers than its type has",
+                                  expected);
     }
     return r->wanted ? take_row(r, seconds, v) : BST_OK;
 }
@@ -421,14 +419,16 @@ static bst_status read_line(reader *r) {
             return read_meta(r);
         case BEFORE_DATA:
             if (!is_word(&r->line, "DATA_START")) {
-                return fail_line(r, "a line between metadata and data", "DATA_START");
+                return bst_text_fail_line(&r->source, &r->line, "a line between metadata and data",
+                                          "DATA_START");
             }
             r->where = IN_DATA;
             return BST_OK;
         case AFTER_DATA:
             return is_word(&r->line, "META_START")
                        ? read_head(r)
-                       : fail_line(r, "a line after the data", "META_START, or the end");
+                       : bst_text_fail_line(&r->source, &r->line, "a line after the data",
+                                            "META_START, or the end");
         default:
             break;
     }
@@ -436,7 +436,8 @@ static bst_status read_line(reader *r) {
         return read_row(r);
     }
     if (r->wanted && r->segment_rows == 0) {
-        return fail_line(r, "no attitudes stand before it", "at least one row");
+        return bst_text_fail_line(&r->source, &r->line, "no attitudes stand before it",
+                                  "at least one row");
     }
     r->where = AFTER_DATA;
     return BST_OK;
