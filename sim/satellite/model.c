@@ -16,6 +16,9 @@ void bst_satellite_free(bst_satellite *s) {
     for (int i = 0; i < s->material_count && s->tables; i++) {
         bst_brdf_table_free(s->tables[i]);
     }
+    for (int i = 0; i < s->joint_count; i++) {
+        bst_curve_free(&s->joints[i].table);
+    }
     free(s->tables);
     free(s->vertices);
     free(s->vertex_joint);
@@ -111,7 +114,26 @@ static int find_material(const bst_satellite *s, const char *name) {
     return -1;
 }
 
-static bst_status make_joint(bst_ctx *ctx, bst_satellite *s, const bst_satellite_joint_config *c) {
+/* Reads the angles of a joint. */
+static bst_status load_angles(bst_ctx *ctx, const bst_satellite_joint_config *c,
+                              const char *base_dir, bst_curve *out) {
+    static const char *const times[] = {"time_s", NULL}, *const angles[] = {"angle_deg", NULL};
+    const bst_curve_format format = {
+        "a table of a joint's angles", times, angles, -1e9, 1e9, -1e6, 1e6};
+    char path[1100];
+    if (!*c->file) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "file: a joint that follows a table needs a file; "
+                        "give its path");
+    }
+    bst_file_resolve(base_dir, c->file, path, sizeof path);
+    return bst_curve_load(ctx, path, &format, out) == BST_OK
+               ? BST_OK
+               : bst_fail_prefix(ctx, BST_ERR_CONFIG, "file");
+}
+
+static bst_status make_joint(bst_ctx *ctx, bst_satellite *s, const bst_satellite_joint_config *c,
+                             const char *base_dir) {
     bst_joint j = {.parent = -1,
                    .follows = c->follows,
                    .axes = (int)c->axes,
@@ -120,7 +142,9 @@ static bst_status make_joint(bst_ctx *ctx, bst_satellite *s, const bst_satellite
                    .position_m = bst_vec3_from_array(c->position_m),
                    .offset_rad = c->offset_deg * BST_DEG_RAD,
                    .rate_radps = c->rate_deg_per_s * BST_DEG_RAD,
-                   .limit_rad = {c->limit_deg[0] * BST_DEG_RAD, c->limit_deg[1] * BST_DEG_RAD}};
+                   .limit_rad = {c->limit_deg[0] * BST_DEG_RAD, c->limit_deg[1] * BST_DEG_RAD},
+                   .burn = (int)c->burn - 1,
+                   .turn_rad = c->turn_deg * BST_DEG_RAD};
     memcpy(j.name, c->name, sizeof j.name);
     if (find_joint(s, c->name) >= 0) {
         return bst_fail(ctx, BST_ERR_CONFIG,
@@ -144,7 +168,9 @@ static bst_status make_joint(bst_ctx *ctx, bst_satellite *s, const bst_satellite
                         c->limit_deg[0], c->limit_deg[1]);
     }
     s->joints[s->joint_count++] = j;
-    return BST_OK;
+    return j.follows == BST_JOINT_TABLE
+               ? load_angles(ctx, c, base_dir, &s->joints[s->joint_count - 1].table)
+               : BST_OK;
 }
 
 /* Rotation about x, then y, then z. */
@@ -304,7 +330,7 @@ static bst_status fill(bst_ctx *ctx, bst_satellite *s, const bst_satellite_confi
     BST_TRY(make_materials(ctx, s, &config->materials, base_dir));
     const bst_satellite_joint_config *joints = config->joints.items;
     for (int i = 0; i < config->joints.count; i++) {
-        bst_status status = make_joint(ctx, s, &joints[i]);
+        bst_status status = make_joint(ctx, s, &joints[i], base_dir);
         if (status != BST_OK) {
             return bst_fail_prefix(ctx, status, "/joints/%d", i);
         }

@@ -3,6 +3,7 @@
 #define BST_SATELLITE_MODEL_H
 
 #include "boresight/vec.h"
+#include "sim/astro/curve_file.h"
 #include "sim/satellite/material_library.h"
 #include "sim/satellite/satellite_config.h"
 
@@ -55,6 +56,9 @@ typedef struct bst_joint {
     int axes;
     bst_vec3 axis, normal, position_m;
     double offset_rad, rate_radps, limit_rad[2];
+    bst_curve table; /* BST_JOINT_TABLE: deg by seconds after the epoch; owned by the model */
+    int burn;        /* BST_JOINT_BURN: index of the burn */
+    double turn_rad;
 } bst_joint;
 
 typedef struct bst_satellite_part {

@@ -36,6 +36,9 @@ typedef struct bst_pose_pair {
 /* A pose: work memory of one thread for one model. */
 typedef struct bst_satellite_pose {
     const bst_satellite *satellite;
+    const double *burn_s; /* [burn_count] starts of burns after the epoch, for joints that follow
+                             them; borrowed; set by the owner of the pose; at first none */
+    int burn_count;
     bst_vec3 *vertices;     /* body frame */
     bst_vec3 *normals;      /* of facets, body frame */
     bst_mat3 *rotation;     /* by joint: body frame from joint frame */

@@ -77,6 +77,28 @@ static bst_status start_attitude(const bst_world_builder *b, const world_object 
     return BST_OK;
 }
 
+/* Keeps the starts of the object's burns for joints that follow them. */
+static bst_status set_burns(bst_ctx *ctx, const bst_config_list *burns, bst_object_shape *shape) {
+    const bst_burn_config *items = burns->items;
+    const bst_satellite *s = shape->satellite;
+    for (int i = 0; i < s->joint_count; i++) {
+        if (s->joints[i].follows == BST_JOINT_BURN && s->joints[i].burn >= burns->count) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "shape: /joints/%d/burn: found %d, but the object has %d burns "
+                            "(allowed: the number of one of its burns, from 1)",
+                            i, s->joints[i].burn + 1, burns->count);
+        }
+    }
+    shape->burn_s = calloc((size_t)burns->count + 1, sizeof *shape->burn_s);
+    if (!shape->burn_s) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for burns");
+    }
+    for (int i = 0; i < burns->count; i++) {
+        shape->burn_s[shape->burn_count++] = items[i].time_s;
+    }
+    return BST_OK;
+}
+
 /* Builds the shape of a listed object; the world owns it. */
 static bst_status make_shape(const bst_world_builder *b, const bst_object_config *config, int index,
                              world_object *object) {
@@ -97,6 +119,12 @@ static bst_status make_shape(const bst_world_builder *b, const bst_object_config
     bst_object_shape *shape;
     bst_status status =
         bst_object_shape_create(b->ctx, &config->shape, &config->attitude, &source, &shape);
+    if (status == BST_OK) {
+        status = set_burns(b->ctx, &config->burns, shape);
+        if (status != BST_OK) {
+            bst_object_shape_free(shape);
+        }
+    }
     if (status != BST_OK) {
         return bst_fail_prefix(b->ctx, status, "%s: /world/objects/%d", b->scenario, index);
     }

@@ -166,6 +166,15 @@ static void wrong_shapes_are_refused(void **state) {
          "shape: /parts/0: size_m: "},
         {SHAPE("{\"name\": \"p\", \"material\": \"w\", \"joint\": \"j\"}"),
          "shape: /parts/0: joint: "},
+        {"\"brightness\": {\"model\": \"shape\"}, \"shape\": {\"materials\": [{\"name\": "
+         "\"w\"}], \"joints\": [{\"name\": \"j\", \"follows\": \"table\", \"file\": "
+         "\"/no/angles.csv\"}], \"parts\": [{\"name\": \"p\", \"material\": \"w\"}]}",
+         "shape: /joints/0: file: "},
+        {"\"burns\": [{\"time_s\": 5, \"dv_rtn_mps\": [0, 1, 0]}], \"brightness\": "
+         "{\"model\": \"shape\"}, \"shape\": {\"materials\": [{\"name\": \"w\"}], "
+         "\"joints\": [{\"name\": \"j\", \"follows\": \"burn\", \"burn\": 2}], \"parts\": "
+         "[{\"name\": \"p\", \"material\": \"w\"}]}",
+         "shape: /joints/0/burn: found 2, but the object has 1 burns"},
         {SHAPE("{\"name\": \"p\", \"kind\": \"mesh\", \"file\": \"/no/such.obj\"}"),
          "/no/such.obj"},
         {SHAPE("{\"name\": \"p\", \"material\": \"w\"}, {\"name\": \"p\", \"material\": \"w\"}"),

@@ -5,9 +5,9 @@
 #include <stdlib.h>
 
 #include "sim/astro/bodies.h"
+#include "sim/astro/curve_file.h"
 #include "sim/core/file.h"
 #include "sim/optics/band.h"
-#include "sim/optics/curve_file.h"
 #include "sim/world/world.h"
 
 /* range to which standard magnitudes refer */

@@ -14,6 +14,7 @@ void bst_object_shape_free(bst_object_shape *shape) {
     if (shape) {
         bst_satellite_free(shape->satellite);
         bst_body_attitude_free(shape->attitude);
+        free(shape->burn_s);
         free(shape);
     }
 }
@@ -113,12 +114,28 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
         flux.visible_m2 > 0.0 ? 1.0 - flux.emission_m2 / flux.visible_m2 : 1.0;
 }
 
+/* Largest rate of a joint about a time, apart from what follows the orbit. */
+static double joint_rate_radps(const bst_joint *j, double seconds) {
+    if (j->follows != BST_JOINT_TABLE) {
+        bool turns = j->follows == BST_JOINT_SPIN || j->follows == BST_JOINT_BURN;
+        return turns ? fabs(j->rate_radps) : 0.0;
+    }
+    double most = 0.0;
+    for (int i = 1; i < j->table.count; i++) {
+        double from = j->table.x[i - 1], to = j->table.x[i];
+        if (to > seconds - 60.0 && from < seconds + 60.0) {
+            most = fmax(most, fabs(j->table.y[i] - j->table.y[i - 1]) / (to - from));
+        }
+    }
+    return most * BST_DEG_RAD;
+}
+
 /* Largest angle by which a surface turns during an exposure, without the motion on the orbit. */
 static double turn_rad(const bst_object_shape *shape, double seconds, double exposure_s) {
     const bst_satellite *s = shape->satellite;
     double rate = bst_body_attitude_rate_radps(shape->attitude, seconds);
     for (int i = 0; i < s->joint_count; i++) {
-        rate += s->joints[i].follows == BST_JOINT_SPIN ? fabs(s->joints[i].rate_radps) : 0.0;
+        rate += joint_rate_radps(&s->joints[i], seconds);
     }
     return rate * exposure_s;
 }

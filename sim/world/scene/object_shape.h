@@ -14,6 +14,8 @@ typedef struct bst_object_shape {
     int index;                                    /* in the world's list of shapes */
     bst_glint_surface glints[BST_GLINT_SURFACES]; /* surfaces that may glint */
     int glint_count;
+    double *burn_s; /* [burn_count] starts of the object's burns */
+    int burn_count;
 } bst_object_shape;
 
 /* Where a body stands to its light at one time. */

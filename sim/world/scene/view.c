@@ -56,6 +56,8 @@ static bst_status make_poses(bst_ctx *ctx, bst_world_view *view) {
     }
     for (int i = 0; i < world->shape_count; i++) {
         BST_TRY(bst_satellite_pose_create(ctx, world->shapes[i]->satellite, &view->poses[i]));
+        view->poses[i]->burn_s = world->shapes[i]->burn_s;
+        view->poses[i]->burn_count = world->shapes[i]->burn_count;
     }
     return BST_OK;
 }
