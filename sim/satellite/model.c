@@ -30,6 +30,7 @@ void bst_satellite_free(bst_satellite *s) {
     free(s->shells);
     free(s->parts);
     free(s->materials);
+    free(s->surfaces);
     free(s->joints);
     free(s);
 }
@@ -59,6 +60,8 @@ static bst_status make_material(bst_ctx *ctx, bst_satellite *s,
     }
     m->scale = c->scale;
     snprintf(m->name, sizeof m->name, "%s", c->name);
+    s->surfaces[s->material_count] =
+        (bst_surface_heat){c->absorptance, c->heat_capacity_j_per_m2_k};
     s->material_count++;
     if (c->library == 0 && c->model == BST_BRDF_TABLE) {
         char path[1100];
@@ -296,6 +299,24 @@ static bst_status make_part(bst_ctx *ctx, bst_satellite *s, const bst_satellite_
     return BST_OK;
 }
 
+/* Absorptance of the materials that give none: what they do not reflect at normal incidence. */
+static void make_absorptances(bst_satellite *s) {
+    /* shares of the sunlight (a black body of 5772 K) nearest to bst_sunlight_wavelength_m:
+     * bounds at 0.475, 0.625 and 0.85 um */
+    static const double share[BST_SUNLIGHT_COLOURS] = {0.215, 0.190, 0.217, 0.378};
+    for (int i = 0; i < s->material_count; i++) {
+        const bst_material *m = &s->materials[i];
+        double colour = 0.0;
+        for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
+            colour += share[k] * m->colour[k];
+        }
+        if (isnan(s->surfaces[i].absorptance)) {
+            double reflectance = m->scale * colour * bst_brdf_reflectance(&m->brdf, 1.0);
+            s->surfaces[i].absorptance = fmin(fmax(1.0 - reflectance, 0.0), 1.0);
+        }
+    }
+}
+
 /* Radius of the sphere that contains all parts in any pose, and the narrowest lobe. */
 static void make_extent(bst_satellite *s) {
     for (int i = 0; i < s->vertex_count; i++) {
@@ -315,11 +336,15 @@ static bst_status allocate(bst_ctx *ctx, int parts, int joints, bst_satellite **
     bst_satellite *s = *out = calloc(1, sizeof *s);
     if (s) {
         s->materials = calloc(BST_SATELLITE_MATERIALS_MAX, sizeof *s->materials);
+        s->surfaces = calloc(BST_SATELLITE_MATERIALS_MAX, sizeof *s->surfaces);
+        for (int i = 0; s->surfaces && i < BST_SATELLITE_MATERIALS_MAX; i++) {
+            s->surfaces[i].absorptance = (double)NAN;
+        }
         s->tables = calloc(BST_SATELLITE_MATERIALS_MAX, sizeof *s->tables);
         s->parts = calloc((size_t)parts + 1, sizeof *s->parts);
         s->joints = calloc((size_t)joints + 1, sizeof *s->joints);
     }
-    return s && s->materials && s->tables && s->parts && s->joints
+    return s && s->materials && s->surfaces && s->tables && s->parts && s->joints
                ? BST_OK
                : bst_fail(ctx, BST_ERR_MEMORY, "no memory for a satellite");
 }
@@ -347,6 +372,7 @@ static bst_status fill(bst_ctx *ctx, bst_satellite *s, const bst_satellite_confi
                         "/parts: the satellite has no parts (allowed: at least one, or a file)");
     }
     make_extent(s);
+    make_absorptances(s);
     return BST_OK;
 }
 

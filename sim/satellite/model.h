@@ -67,6 +67,12 @@ typedef struct bst_satellite_part {
     int joint; /* -1: the body */
 } bst_satellite_part;
 
+/* Thermal properties of a material, apart from its emissivity. */
+typedef struct bst_surface_heat {
+    double absorptance;    /* of sunlight */
+    double capacity_jpm2k; /* heat capacity of the surface; 0: it follows its load at once */
+} bst_surface_heat;
+
 /* A satellite's model; immutable; several objects and threads may share it. All arrays belong to
  * it. Joint -1 is the body; `edges` and `corner` index `vertices`. */
 typedef struct bst_satellite {
@@ -80,6 +86,7 @@ typedef struct bst_satellite {
     bst_shell *shells;
     bst_satellite_part *parts;
     bst_material *materials;
+    bst_surface_heat *surfaces; /* by material */
     bst_joint *joints;
     bst_brdf_table **tables; /* of materials; NULL where a material has none */
     int vertex_count, corner_count, edge_count, facet_count, occluder_count, curved_count;

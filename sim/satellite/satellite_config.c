@@ -48,6 +48,12 @@ static const bst_config_desc material_table[] = {
     BST_REAL(bst_satellite_material_config, scale, "", 0, 100, "1", "Factor on the reflectance."),
     BST_REAL(bst_satellite_material_config, emissivity, "", 0, 1, "0.8",
              "Emissivity in the thermal infrared."),
+    BST_OPEN_REAL(bst_satellite_material_config, absorptance, "", 0, 1,
+                  "Absorptance of sunlight, for temperatures (brightness.heat_balance), also with "
+                  "a material of the library; null: 1 minus the reflectance at normal incidence."),
+    BST_REAL(bst_satellite_material_config, heat_capacity_j_per_m2_k, "J/(m2 K)", 0, 1e8, "0",
+             "Heat capacity of the surface, for the heat balance transient, also with a material "
+             "of the library; 0: it follows its load at once."),
     BST_CONFIG_END,
 };
 

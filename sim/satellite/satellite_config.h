@@ -19,6 +19,8 @@ typedef struct bst_satellite_material_config {
                                             bst_sunlight_wavelength_m */
     double scale;                        /* factor on the BRDF */
     double emissivity;
+    double absorptance; /* NAN: by the reflectance */
+    double heat_capacity_j_per_m2_k;
 } bst_satellite_material_config;
 
 enum {

@@ -111,6 +111,15 @@ static bst_status make_shape(const bst_world_builder *b, const bst_object_config
                                : "brightness/model: the object has a shape (allowed: \"shape\"; or "
                                  "leave out the shape)");
     }
+    if (config->brightness.heat_balance != BST_HEAT_NONE &&
+        (!given ||
+         (config->external_states && config->brightness.heat_balance == BST_HEAT_TRANSIENT))) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG, "%s: /world/objects/%d/brightness/heat_balance: %s",
+                        b->scenario, index,
+                        given ? "transient follows from the past of the object, which "
+                                "external_states may change (allowed: none, steady)"
+                              : "it needs a shape (allowed: none; or the brightness model shape)");
+    }
     if (!given) {
         return BST_OK;
     }

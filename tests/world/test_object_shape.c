@@ -155,6 +155,58 @@ static void earthlight_is_that_of_spheres(void **state) {
     bst_world_free(world);
 }
 
+/* A plate that faces the Sun has the temperature of its balance, and with a heat capacity it lags
+ * where the load changes. */
+static void facets_have_their_temperatures(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+#define WARM(name, balance, capacity)                                                              \
+    "{\"name\": \"" name "\", \"brightness\": {\"model\": \"shape\", \"heat_balance\": \"" balance \
+    "\", \"earth_albedo\": 0, \"earth_infrared_w_per_m2\": 0}, \"shape\": {\"materials\": "        \
+    "[{\"name\": \"w\", \"diffuse\": 0.5, \"absorptance\": 0.3, \"emissivity\": 0.6, "             \
+    "\"heat_capacity_j_per_m2_k\": " capacity                                                      \
+    "}], \"parts\": [{\"name\": \"p\", \"kind\": "                                                 \
+    "\"sphere\", \"segments\": 8, \"material\": \"w\"}]}, \"attitude\": [{\"law\": \"sun\"}], "    \
+    "\"orbit\": {\"source\": \"numerical\", \"state\": {\"source\": \"keplerian\", "               \
+    "\"semi_major_axis_m\": 7e6}, \"forces\": {\"gravity\": \"two_body\", \"sun\": false, "        \
+    "\"moon\": false, \"solar_pressure\": false, \"drag\": false}}}"
+    bst_world *world =
+        test_world_with(WARM("steady", "steady", "0") ", " WARM(
+                            "lags", "transient", "5000") ", " WARM("none", "none", "0"),
+                        "");
+    bst_world_view *view;
+    bst_world_sight sight, lag, none;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+    const bst_world_state eye = {{4.2e7, 0, 0}, {0, 3e3, 0}};
+    bool dark = false, lit = false, warm = false;
+    for (double t = 0; t < 6000; t += 400) {
+        bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 0, t, &sight));
+        bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 1, t, &lag));
+        bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 2, t, &none));
+        bst_assert_close(sight.glow.emission_sr, none.glow.emission_sr, 1e-12);
+        double hottest = 0;
+        for (int i = 0; i < sight.glow.emission_count; i++) {
+            hottest = fmax(hottest, sight.glow.emissions[i].temperature_k);
+        }
+        bst_bodies bodies;
+        bst_assert_ok(&ctx, bst_world_view_bodies(&ctx, view, t, &bodies));
+        double au = bst_vec3_norm(bodies.sun_m) / 149597870700.0;
+        double most = pow(0.3 * 1361 / (au * au) / (0.6 * 5.670374419e-8), 0.25);
+        dark = dark || sight.sunlit_fraction == 0;
+        lit = lit || hottest > 0.9 * most;
+        assert_true(hottest < most * 1.0001);
+        assert_true(sight.sunlit_fraction > 0 || hottest == 0);
+        warm = warm || (sight.sunlit_fraction == 0 && lag.glow.temperature_k > 150);
+    }
+    assert_true(dark && lit && warm);
+    /* the same in any order */
+    bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 1, 800, &sight));
+    bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 1, 5600, &sight));
+    bst_assert_close(sight.glow.temperature_k, lag.glow.temperature_k, 0);
+    bst_world_view_free(view);
+    bst_world_free(world);
+}
+
 static void wrong_shapes_are_refused(void **state) {
     (void)state;
     static const char *const wrong[][2] = {
@@ -170,6 +222,11 @@ static void wrong_shapes_are_refused(void **state) {
          "\"w\"}], \"joints\": [{\"name\": \"j\", \"follows\": \"table\", \"file\": "
          "\"/no/angles.csv\"}], \"parts\": [{\"name\": \"p\", \"material\": \"w\"}]}",
          "shape: /joints/0: file: "},
+        {"\"brightness\": {\"heat_balance\": \"steady\"}", "/brightness/heat_balance: it needs"},
+        {"\"external_states\": true, \"brightness\": {\"model\": \"shape\", "
+         "\"heat_balance\": \"transient\"}, \"shape\": {\"materials\": [{\"name\": \"w\"}], "
+         "\"parts\": [{\"name\": \"p\", \"material\": \"w\"}]}",
+         "/brightness/heat_balance: transient"},
         {"\"burns\": [{\"time_s\": 5, \"dv_rtn_mps\": [0, 1, 0]}], \"brightness\": "
          "{\"model\": \"shape\"}, \"shape\": {\"materials\": [{\"name\": \"w\"}], "
          "\"joints\": [{\"name\": \"j\", \"follows\": \"burn\", \"burn\": 2}], \"parts\": "
@@ -208,6 +265,7 @@ int main(void) {
         cmocka_unit_test(a_spinning_plate_glints),
         cmocka_unit_test(glints_are_neither_missed_nor_smeared),
         cmocka_unit_test(earthlight_is_that_of_spheres),
+        cmocka_unit_test(facets_have_their_temperatures),
         cmocka_unit_test(wrong_shapes_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -30,6 +30,14 @@ typedef struct bst_scene_lighting {
                                            of the whole Sun at all wavelengths */
 } bst_scene_lighting;
 
+enum { BST_SCENE_EMISSIONS = 8 };
+
+/* Thermal emission at two temperatures, temperature_k +- deviation_k, half of it at each. */
+typedef struct bst_scene_emission {
+    double sr; /* emissivity times solid angle */
+    double temperature_k, deviation_k;
+} bst_scene_emission;
+
 /* Light of an object. Reflected light has the solar spectrum, reddened by the atmosphere at the
  * edge of the Earth's shadow. */
 typedef struct bst_scene_glow {
@@ -40,6 +48,10 @@ typedef struct bst_scene_glow {
     bst_vec3 earth;        /* unit, GCRF: from the object to the centroid of the earthlight */
     double emission_sr;    /* emissivity times solid angle: of an equivalent black body */
     double temperature_k;
+    /* Parts of the emission, whose sum is emission_sr and whose mean is temperature_k; none: all at
+     * temperature_k. */
+    bst_scene_emission emissions[BST_SCENE_EMISSIONS];
+    int emission_count;
     double thermal_reflection; /* factor on reflected light at thermal wavelengths: reflectance = 1
                                   - emissivity */
     bool resolved;             /* may be rendered as a disc */

@@ -41,14 +41,6 @@ bst_status bst_object_shape_create(bst_ctx *ctx, const bst_satellite_config *con
     return status;
 }
 
-/* Turns earthlight into the body frame. */
-static void turn_earthlight(bst_quat q, bst_earthlight *light) {
-    for (int i = 0; i < light->count; i++) {
-        light->direction[i] = bst_quat_rotate(q, light->direction[i]);
-    }
-    light->centre = bst_quat_rotate(q, light->centre);
-}
-
 /* Light per wavelength over that in V, and magnitude, from the model's flux. */
 static void make_glow(const bst_satellite_flux *flux, const bst_scene_lighting *l, double range_m,
                       bst_scene_glow *out) {
@@ -92,7 +84,7 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
     if (b->earthshine) {
         bst_earth_surface surface = {.diffuse = b->earth_albedo, .fineness = 1};
         bst_earthlight_at(&surface, l->object_m, bst_vec3_unit(l->sun_m), &earthlight);
-        turn_earthlight(aspect.q_body_from_gcrf, &earthlight);
+        bst_earthlight_turn(aspect.q_body_from_gcrf, &earthlight);
     }
     bst_satellite_light light = {
         .sun = aspect.aim.sun,

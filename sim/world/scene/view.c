@@ -5,6 +5,7 @@
 #include "sim/core/quintic.h"
 #include "sim/world/orbit/ephemeris.h"
 #include "sim/world/scene/field_objects.h"
+#include "sim/world/scene/object_heat.h"
 #include "sim/world/scene/object_shape.h"
 
 /* State of an observer at one instant, shared by all objects in a frame. */
@@ -36,6 +37,7 @@ struct bst_world_view {
     pace pace;
     eye eyes[BST_PATH_NODES];   /* the latest ones, by node of the exposure */
     bst_satellite_pose **poses; /* by shape of the world: work memory */
+    bst_object_heat **heats;    /* likewise; NULL where there is no heat balance */
 };
 
 /* Source of positions in a light-time solution; observer and object use the same one. */
@@ -47,11 +49,50 @@ typedef struct looked_at {
     from source;
 } looked_at;
 
+/* Place of an object at a time, for its heat balance. */
+static bool heat_place(void *user, int object, double seconds, bst_object_place *out) {
+    const bst_world_view *view = user;
+    const bst_world *world = view->world;
+    bst_ctx quiet = {0};
+    bst_world_state state;
+    bst_sky_rotation sky;
+    if (bst_sky_clock_at(&quiet, view->clock, bst_world_time(world, seconds), &sky) != BST_OK ||
+        bst_world_orbit_state(&quiet, &world->objects[object].orbit, view->clock, world->epoch,
+                              seconds, true, &state) != BST_OK) {
+        return false;
+    }
+    *out = (bst_object_place){
+        state.position_m, state.velocity_mps, sky.bodies.sun_m,
+        bst_astro_sun_fraction(state.position_m, bst_bodies_sunlight_from(&sky.bodies),
+                               sky.bodies.pole)};
+    return true;
+}
+
+/* Allocates the work memory for the heat balances of the world. */
+static bst_status make_heats(bst_ctx *ctx, bst_world_view *view) {
+    const bst_world *world = view->world;
+    for (int i = 0; i < world->object_count; i++) {
+        const bst_world_object_info *info = &world->objects[i].info;
+        int balance =
+            info->shape ? bst_brightness_config_of(info->brightness)->heat_balance : BST_HEAT_NONE;
+        if (balance == BST_HEAT_NONE) {
+            continue;
+        }
+        bst_object_heat **heat = &view->heats[info->shape->index];
+        BST_TRY(bst_object_heat_create(ctx, info->shape, balance == BST_HEAT_TRANSIENT, heat));
+        (*heat)->place = heat_place;
+        (*heat)->user = view;
+        (*heat)->object = i;
+    }
+    return BST_OK;
+}
+
 /* Allocates the work memory for the shapes of the world. */
 static bst_status make_poses(bst_ctx *ctx, bst_world_view *view) {
     const bst_world *world = view->world;
     view->poses = calloc((size_t)world->shape_count, sizeof(bst_satellite_pose *));
-    if (!view->poses) {
+    view->heats = calloc((size_t)world->shape_count, sizeof(bst_object_heat *));
+    if (!view->poses || !view->heats) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a view of the world");
     }
     for (int i = 0; i < world->shape_count; i++) {
@@ -59,7 +100,7 @@ static bst_status make_poses(bst_ctx *ctx, bst_world_view *view) {
         view->poses[i]->burn_s = world->shapes[i]->burn_s;
         view->poses[i]->burn_count = world->shapes[i]->burn_count;
     }
-    return BST_OK;
+    return make_heats(ctx, view);
 }
 
 bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world_view **out) {
@@ -86,7 +127,11 @@ void bst_world_view_free(bst_world_view *view) {
         for (int i = 0; view->poses && i < view->world->shape_count; i++) {
             bst_satellite_pose_free(view->poses[i]);
         }
+        for (int i = 0; view->heats && i < view->world->shape_count; i++) {
+            bst_object_heat_free(view->heats[i]);
+        }
         free(view->poses);
+        free(view->heats);
         bst_sky_clock_free(view->clock);
         free(view);
     }
@@ -301,6 +346,12 @@ static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 ey
         bst_object_shape_glow(info->shape, view->poses[info->shape->index],
                               bst_brightness_config_of(info->brightness), &lighting,
                               at->velocity_mps, &out->glow);
+        bst_object_heat *heat = view->heats[info->shape->index];
+        if (heat) {
+            bst_object_heat_glow(heat, info->shape, view->poses[info->shape->index],
+                                 bst_brightness_config_of(info->brightness), &lighting,
+                                 at->velocity_mps, &out->glow);
+        }
     } else {
         bst_brightness_at(info->brightness, &lighting, &out->glow);
     }
