@@ -34,6 +34,7 @@ static double earthlight_on(const bst_earthlight *light, bst_vec3 normal) {
 
 void bst_heat_loads(bst_satellite_pose *p, const bst_heat_environment *e, double *load) {
     const bst_satellite *s = p->satellite;
+    assert(s->has_surfaces);
     bool lit = e->sunlight_wpm2 > 0.0;
     if (lit) {
         bst_pose_look(p, 0, e->sun);

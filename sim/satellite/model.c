@@ -60,8 +60,8 @@ static bst_status make_material(bst_ctx *ctx, bst_satellite *s,
     }
     m->scale = c->scale;
     snprintf(m->name, sizeof m->name, "%s", c->name);
-    s->surfaces[s->material_count] =
-        (bst_surface_heat){c->absorptance, c->heat_capacity_j_per_m2_k};
+    s->surfaces[s->material_count] = (bst_surface_heat){
+        .absorptance = c->absorptance, .capacity_jpm2k = c->heat_capacity_j_per_m2_k};
     s->material_count++;
     if (c->library == 0 && c->model == BST_BRDF_TABLE) {
         char path[1100];
@@ -299,24 +299,6 @@ static bst_status make_part(bst_ctx *ctx, bst_satellite *s, const bst_satellite_
     return BST_OK;
 }
 
-/* Absorptance of the materials that give none: what they do not reflect at normal incidence. */
-static void make_absorptances(bst_satellite *s) {
-    /* shares of the sunlight (a black body of 5772 K) nearest to bst_sunlight_wavelength_m:
-     * bounds at 0.475, 0.625 and 0.85 um */
-    static const double share[BST_SUNLIGHT_COLOURS] = {0.215, 0.190, 0.217, 0.378};
-    for (int i = 0; i < s->material_count; i++) {
-        const bst_material *m = &s->materials[i];
-        double colour = 0.0;
-        for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
-            colour += share[k] * m->colour[k];
-        }
-        if (isnan(s->surfaces[i].absorptance)) {
-            double reflectance = m->scale * colour * bst_brdf_reflectance(&m->brdf, 1.0);
-            s->surfaces[i].absorptance = fmin(fmax(1.0 - reflectance, 0.0), 1.0);
-        }
-    }
-}
-
 /* Radius of the sphere that contains all parts in any pose, and the narrowest lobe. */
 static void make_extent(bst_satellite *s) {
     for (int i = 0; i < s->vertex_count; i++) {
@@ -372,7 +354,6 @@ static bst_status fill(bst_ctx *ctx, bst_satellite *s, const bst_satellite_confi
                         "/parts: the satellite has no parts (allowed: at least one, or a file)");
     }
     make_extent(s);
-    make_absorptances(s);
     return BST_OK;
 }
 
@@ -443,4 +424,28 @@ bst_status bst_satellite_create(bst_ctx *ctx, const bst_satellite_config *config
     }
     *out = s;
     return BST_OK;
+}
+
+void bst_satellite_make_surfaces(bst_satellite *s) {
+    s->has_surfaces = true;
+    /* shares of the sunlight (a black body of 5772 K) nearest to bst_sunlight_wavelength_m:
+     * bounds at 0.475, 0.625 and 0.85 um */
+    static const double share[BST_SUNLIGHT_COLOURS] = {0.215, 0.190, 0.217, 0.378};
+    for (int i = 0; i < s->material_count; i++) {
+        const bst_material *m = &s->materials[i];
+        double colour = 0.0;
+        for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
+            colour += share[k] * m->colour[k];
+        }
+        double *table = s->surfaces[i].reflectance;
+        for (int k = 0; k < BST_REFLECTANCE_POINTS; k++) {
+            /* the models are not defined at grazing incidence */
+            double cosine = fmax((double)k / (BST_REFLECTANCE_POINTS - 1), 0.02);
+            table[k] = m->scale * bst_brdf_reflectance(&m->brdf, cosine);
+        }
+        if (isnan(s->surfaces[i].absorptance)) {
+            double reflected = colour * table[BST_REFLECTANCE_POINTS - 1];
+            s->surfaces[i].absorptance = fmin(fmax(1.0 - reflected, 0.0), 1.0);
+        }
+    }
 }

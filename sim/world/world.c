@@ -211,7 +211,11 @@ bst_status bst_world_create(bst_ctx *ctx, const char *scenario, const bst_world_
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the world");
     }
     world->epoch = epoch;
-    bst_world_builder b = {ctx, scenario, base_dir, world, NULL, &config->constellations};
+    bst_world_builder b = {.ctx = ctx,
+                           .scenario = scenario,
+                           .base_dir = base_dir,
+                           .world = world,
+                           .constellations = &config->constellations};
     bst_status status = build(&b, config, observers);
     bst_sky_clock_free(b.clock);
     if (status != BST_OK) {

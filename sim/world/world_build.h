@@ -11,6 +11,11 @@ typedef struct bst_world_builder {
     bst_world *world;     /* under construction; epoch and Earth orientation are set */
     bst_sky_clock *clock;
     const bst_config_list *constellations; /* bst_constellation_config */
+    /* of the object whose orbit is built: its surface, NULL: none, and the starts of the phases of
+     * its attitude */
+    const bst_force_surface *surface;
+    const double *phase_s;
+    int phase_count;
 } bst_world_builder;
 
 /* A file path, joined to the scenario's folder if relative. */

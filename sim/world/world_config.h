@@ -48,6 +48,7 @@ typedef struct bst_force_config {
     char gravity[512]; /* "builtin", "two_body", "j6" or a path as below */
     int64_t degree, order;
     bool sun, moon, solar_pressure, drag;
+    bool shape; /* pressure and drag on the object's shape */
     double density_scale;
     double tolerance;
 } bst_force_config;

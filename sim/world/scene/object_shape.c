@@ -12,6 +12,7 @@ bool bst_object_shape_is_given(const bst_satellite_config *config) {
 
 void bst_object_shape_free(bst_object_shape *shape) {
     if (shape) {
+        bst_shape_forces_free(shape->forces);
         bst_satellite_free(shape->satellite);
         bst_body_attitude_free(shape->attitude);
         free(shape->burn_s);

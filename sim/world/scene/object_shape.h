@@ -5,6 +5,7 @@
 #include "sim/satellite/body_attitude.h"
 #include "sim/satellite/flux.h"
 #include "sim/satellite/glint.h"
+#include "sim/satellite/shape_forces.h"
 #include "sim/world/scene/brightness.h"
 
 /* An object's model and attitude; immutable once the world is built. */
@@ -16,6 +17,7 @@ typedef struct bst_object_shape {
     int glint_count;
     double *burn_s; /* [burn_count] starts of the object's burns */
     int burn_count;
+    bst_shape_forces *forces; /* NULL: the orbit does not follow from the shape */
 } bst_object_shape;
 
 /* Where a body stands to its light at one time. */
