@@ -345,6 +345,10 @@ static int outline_of(const bst_satellite_pose *p, bst_pose_view *v, int occlude
     return v->outline_count[occluder];
 }
 
+int bst_pose_outline(bst_satellite_pose *p, int view, int occluder, const bst_point2 **points) {
+    return outline_of(p, &p->views[view], occluder, points);
+}
+
 /* The plane of a facet and the projection of a view onto it. */
 typedef struct plane {
     bst_vec3 origin, normal, e1, e2;

@@ -75,6 +75,12 @@ void bst_satellite_pose_set(bst_satellite_pose *pose, const bst_satellite_aim *a
  *            direction  unit, body frame: from the satellite to the light or the observer */
 void bst_pose_look(bst_satellite_pose *pose, int view, bst_vec3 direction);
 
+/* Silhouette of a convex body in a view that bst_pose_look prepared.
+ *
+ * Returned:  number of corners, below 3: none
+ *            *points  counter-clockwise, along the view's x and y; they belong to the pose */
+int bst_pose_outline(bst_satellite_pose *pose, int view, int occluder, const bst_point2 **points);
+
 /* Area of a facet that the bodies of the model hide from none of the directions of the first
  * `views` views, m^2. The facet faces all of these directions.
  *

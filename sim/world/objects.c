@@ -212,6 +212,9 @@ static bst_status build_listed(const bst_world_builder *b, const bst_config_list
         object->info.albedo = config->albedo;
         BST_TRY(make_brightness(b, &config->brightness, "objects", i, &object->info.brightness));
         world->object_count = i + 1;
+        if (config->occults) {
+            world->occulters[world->occulter_count++] = i;
+        }
         BST_TRY(make_shape(b, config, i, object));
         BST_TRY(build_orbit(b, config, i, object));
         if (config->external_states) {
@@ -395,7 +398,8 @@ static bst_status build_all(const bst_world_builder *b, const bst_world_config *
                                       (size_t)config->constellations.count + 1,
                                   sizeof(bst_brightness *));
     b->world->shapes = calloc((size_t)config->objects.count + 1, sizeof(bst_object_shape *));
-    if (!b->world->brightness || !b->world->shapes) {
+    b->world->occulters = calloc((size_t)config->objects.count + 1, sizeof(int));
+    if (!b->world->brightness || !b->world->shapes || !b->world->occulters) {
         return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for %d objects",
                         config->objects.count);
     }

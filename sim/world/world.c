@@ -253,6 +253,7 @@ void bst_world_free(bst_world *world) {
     for (int i = 0; i < world->shape_count; i++) {
         bst_object_shape_free(world->shapes[i]);
     }
+    free(world->occulters);
     free(world->shapes);
     bst_world_files_free(world);
     bst_world_updates_free(world);

@@ -93,6 +93,7 @@ typedef struct bst_object_config {
     bst_brightness_config brightness;
     bst_config_list burns; /* bst_burn_config, sorted by time */
     bool external_states;
+    bool occults;
     bst_satellite_config shape;
     bst_config_list attitude; /* bst_attitude_config, sorted by time */
 } bst_object_config;

@@ -31,7 +31,6 @@ static inline bst_test_model bst_test_model_open(const char *text) {
     bst_ctx ctx = {0};
     bst_test_model m;
     bst_assert_ok(&ctx, bst_test_satellite(&ctx, text, &m.satellite));
-    bst_satellite_make_surfaces(m.satellite);
     bst_assert_ok(&ctx, bst_satellite_pose_create(&ctx, m.satellite, &m.pose));
     return m;
 }

@@ -8,6 +8,13 @@
     "{" SURFACE(more) ", \"parts\": [{\"name\": \"p\", \"kind\": \"plate\", \"material\": " \
                       "\"w\"}]}"
 
+/* A model with its absorptances. */
+static bst_test_model open_model(const char *text) {
+    bst_test_model m = bst_test_model_open(text);
+    bst_satellite_make_surfaces(m.satellite);
+    return m;
+}
+
 static const double S = BST_SOLAR_IRRADIANCE_WPM2, SIGMA = BST_STEFAN_BOLTZMANN;
 
 /* A plate at an angle to the Sun: emissivity sigma T^4 = absorptance S cos. */
@@ -16,7 +23,7 @@ static void a_plate_emits_what_it_absorbs(void **state) {
     static const char *const texts[] = {PLATE(""), PLATE(", \"absorptance\": 0.25")};
     static const double absorptance[] = {0.6, 0.25}; /* 1 - diffuse; as given */
     for (int k = 0; k < 2; k++) {
-        bst_test_model m = bst_test_model_open(texts[k]);
+        bst_test_model m = open_model(texts[k]);
         for (int deg = 0; deg < 90; deg += 15) {
             double a = deg * BST_DEG_RAD, load[2];
             bst_heat_environment e = {.sun = {sin(a), 0, cos(a)}, .sunlight_wpm2 = S};
@@ -33,7 +40,7 @@ static void a_plate_emits_what_it_absorbs(void **state) {
 /* A sphere of facets: each at its own temperature; together they emit what its disc absorbs. */
 static void a_sphere_emits_what_its_disc_absorbs(void **state) {
     (void)state;
-    bst_test_model m = bst_test_model_open("{" SURFACE(
+    bst_test_model m = open_model("{" SURFACE(
         "") ", \"parts\": [{\"name\": \"s\", \"kind\": \"sphere\", \"radius_m\": 2, "
             "\"segments\": 64, \"material\": \"w\"}]}");
     const bst_satellite *s = m.satellite;
@@ -83,7 +90,7 @@ static void the_view_factor_is_the_integral(void **state) {
 /* Over the night side only the Earth's infrared heats it: T^4 = F E / sigma, emissivity cancels. */
 static void the_earth_heats_by_its_infrared(void **state) {
     (void)state;
-    bst_test_model m = bst_test_model_open(PLATE(""));
+    bst_test_model m = open_model(PLATE(""));
     double load[2], sine = 6378137.0 / 6878137.0;
     bst_heat_environment e = {
         .sun = {0, 0, 1}, .earth = {0, 0, 1}, .earth_sine = sine, .earth_infrared_wpm2 = 237};
@@ -131,7 +138,7 @@ static bool rise(void *user, bst_satellite_pose *pose, double seconds, bst_heat_
 static void a_history_has_its_time_constant(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    bst_test_model m = bst_test_model_open(PLATE(", \"heat_capacity_j_per_m2_k\": 4000"));
+    bst_test_model m = open_model(PLATE(", \"heat_capacity_j_per_m2_k\": 4000"));
     bst_heat_history *h, *other;
     bst_assert_ok(&ctx, bst_heat_history_create(&ctx, m.satellite, &h));
     bst_assert_ok(&ctx, bst_heat_history_create(&ctx, m.satellite, &other));
@@ -162,7 +169,7 @@ static void a_history_has_its_time_constant(void **state) {
 /* Sorted by temperature, the emission keeps its area and its moments. */
 static void emission_keeps_its_moments(void **state) {
     (void)state;
-    bst_test_model m = bst_test_model_open("{" SURFACE(
+    bst_test_model m = open_model("{" SURFACE(
         "") ", \"parts\": [{\"name\": \"s\", \"kind\": \"sphere\", \"segments\": 32, "
             "\"material\": \"w\"}]}");
     const bst_satellite *s = m.satellite;

@@ -10,7 +10,9 @@
 static bst_test_model part_of(const char *part) {
     char text[1500];
     snprintf(text, sizeof text, "{" GREY ", \"parts\": [%s]}", part);
-    return bst_test_model_open(text);
+    bst_test_model m = bst_test_model_open(text);
+    bst_satellite_make_surfaces(m.satellite);
+    return m;
 }
 
 /* A Lambertian sphere: 1 + 4/9 of its reflectance; its silhouette is a disc. */

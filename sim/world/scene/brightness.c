@@ -269,6 +269,14 @@ void bst_brightness_at(const bst_brightness *b, const bst_scene_lighting *l, bst
     out->thermal_reflection = l->albedo > 0.0 ? (1.0 - c->emissivity) / l->albedo : 0.0;
 }
 
+void bst_scene_glow_dim(bst_scene_glow *glow, double part) {
+    glow->v_mag = part > 0.0 ? glow->v_mag - 2.5 * log10(part) : (double)INFINITY;
+    glow->emission_sr *= part;
+    for (int i = 0; i < glow->emission_count; i++) {
+        glow->emissions[i].sr *= part;
+    }
+}
+
 /* Detected electrons per second of the thermal emission. */
 static double thermal_electrons_per_s(const bst_camera *camera, const bst_scene_glow *glow) {
     if (glow->emission_count == 0) {

@@ -62,6 +62,9 @@ typedef struct bst_scene_glow {
 void bst_brightness_at(const bst_brightness *brightness, const bst_scene_lighting *lighting,
                        bst_scene_glow *out);
 
+/* Leaves a part of all light of an object, 0 to 1. */
+void bst_scene_glow_dim(bst_scene_glow *glow, double part);
+
 /* Detected electrons per second from an object's light. *reflected (may be NULL): the part from
  * reflected light. */
 double bst_scene_glow_electrons_per_s(const bst_camera *camera, const bst_scene_glow *glow,

@@ -7,6 +7,7 @@
 #include "sim/world/scene/field_objects.h"
 #include "sim/world/scene/object_heat.h"
 #include "sim/world/scene/object_shape.h"
+#include "sim/world/scene/occultation.h"
 
 /* State of an observer at one instant, shared by all objects in a frame. */
 typedef struct eye {
@@ -35,9 +36,10 @@ struct bst_world_view {
     const bst_world *world;
     bst_sky_clock *clock;
     pace pace;
-    eye eyes[BST_PATH_NODES];   /* the latest ones, by node of the exposure */
-    bst_satellite_pose **poses; /* by shape of the world: work memory */
-    bst_object_heat **heats;    /* likewise; NULL where there is no heat balance */
+    eye eyes[BST_PATH_NODES];     /* the latest ones, by node of the exposure */
+    bst_satellite_pose **poses;   /* by shape of the world: work memory */
+    bst_object_heat **heats;      /* likewise; NULL where there is no heat balance */
+    bst_occultation *occultation; /* NULL: no object hides others */
 };
 
 /* Source of positions in a light-time solution; observer and object use the same one. */
@@ -114,6 +116,14 @@ bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world
     if (status == BST_OK && world->shape_count > 0) {
         status = make_poses(ctx, view);
     }
+    if (status == BST_OK && world->occulter_count > 0) {
+        int vertices = 0;
+        for (int i = 0; i < world->shape_count; i++) {
+            int n = world->shapes[i]->satellite->vertex_count;
+            vertices = n > vertices ? n : vertices;
+        }
+        status = bst_occultation_create(ctx, vertices, &view->occultation);
+    }
     if (status != BST_OK) {
         bst_world_view_free(view);
         return status;
@@ -132,6 +142,7 @@ void bst_world_view_free(bst_world_view *view) {
         }
         free(view->poses);
         free(view->heats);
+        bst_occultation_free(view->occultation);
         bst_sky_clock_free(view->clock);
         free(view);
     }
@@ -320,6 +331,62 @@ typedef struct emission {
     double seconds;
 } emission;
 
+/* An object as a body of occultations. */
+static bst_occultation_body body_of(const bst_world_view *view, int object, bst_vec3 position_m,
+                                    bst_vec3 velocity_mps, double seconds) {
+    const bst_world_object_info *info = &view->world->objects[object].info;
+    return (bst_occultation_body){
+        .position_m = position_m,
+        .velocity_mps = velocity_mps,
+        .seconds = seconds,
+        .radius_m = info->shape ? info->shape->satellite->radius_m : sqrt(info->area_m2 / BST_PI),
+        .shape = info->shape,
+        .pose = info->shape ? view->poses[info->shape->index] : NULL};
+}
+
+/* What other objects take of an object's sunlight, and hide of it. */
+typedef struct mutual {
+    double sunlight, visible; /* parts that are left */
+} mutual;
+
+/* Occultations of an object by others, when its light passes them. */
+static mutual occultations(const bst_world_view *view, const emission *at, bst_vec3 eye_m,
+                           bst_vec3 sun_m) {
+    const bst_world *world = view->world;
+    mutual out = {1.0, 1.0};
+    bst_occultation_body body =
+        body_of(view, at->object, at->position_m, at->velocity_mps, at->seconds);
+    for (int i = 0; i < world->occulter_count; i++) {
+        int other = world->occulters[i];
+        for (int side = 0; side < 2 && other != at->object; side++) {
+            /* sunlight passed it before the emission, the light to the observer passes after */
+            double seconds = at->seconds, sign = side == 0 ? -1.0 : 1.0;
+            bst_ctx quiet = {0};
+            bst_world_state s;
+            bool known = true;
+            for (int k = 0; k < 2 && known; k++) {
+                known = bst_world_orbit_state(&quiet, &world->objects[other].orbit, view->clock,
+                                              world->epoch, seconds, true, &s) == BST_OK;
+                double way = known ? bst_vec3_norm(bst_vec3_sub(s.position_m, at->position_m)) : 0;
+                seconds = at->seconds + sign * way / BST_LIGHT_SPEED_MPS;
+            }
+            if (!known) {
+                continue;
+            }
+            bst_occultation_body front =
+                body_of(view, other, s.position_m, s.velocity_mps, seconds);
+            if (side == 0) {
+                out.sunlight *=
+                    1.0 - bst_occultation_of_sun(view->occultation, &body, &front, sun_m);
+            } else {
+                out.visible *=
+                    1.0 - bst_occultation_from_eye(view->occultation, &body, &front, eye_m, sun_m);
+            }
+        }
+    }
+    return out;
+}
+
 /* Brightness of an object, seen from `eye_m`. */
 static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 eye_m,
                      const bst_bodies *bodies, bst_world_sight *out) {
@@ -332,6 +399,14 @@ static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 ey
     bst_astro_sunlight sunlight;
     bst_astro_sunlight_at(emitted_m, bst_bodies_sunlight_from(bodies), bodies->pole,
                           world->shadow_atmosphere, &sunlight);
+    mutual others = {1.0, 1.0};
+    if (view->occultation) {
+        others = occultations(view, at, eye_m, bst_bodies_sunlight_from(bodies));
+        sunlight.disc *= others.sunlight;
+        for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
+            sunlight.light[k] *= others.sunlight;
+        }
+    }
     out->phase_rad = bst_vec3_angle(to_eye, to_sun);
     out->sunlit_fraction = sunlight.disc;
     bst_scene_lighting lighting = {.area_m2 = info->area_m2,
@@ -354,6 +429,9 @@ static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 ey
         }
     } else {
         bst_brightness_at(info->brightness, &lighting, &out->glow);
+    }
+    if (others.visible < 1.0) {
+        bst_scene_glow_dim(&out->glow, others.visible);
     }
     out->v_mag = out->glow.v_mag;
 }
