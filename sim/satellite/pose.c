@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/satellite/interreflection.h"
 #include "sim/satellite/separation.h"
 
 static void free_view(bst_pose_view *v) {
@@ -27,6 +28,7 @@ void bst_satellite_pose_free(bst_satellite_pose *p) {
         free_view(&p->views[0]);
         free_view(&p->views[1]);
         bst_polygon_clip_free(&p->clip);
+        bst_interreflection_free(p->interreflection);
         free(p);
     }
 }

@@ -39,12 +39,13 @@ typedef struct bst_satellite_pose {
     const double *burn_s; /* [burn_count] starts of burns after the epoch, for joints that follow
                              them; borrowed; set by the owner of the pose; at first none */
     int burn_count;
-    bst_vec3 *vertices;     /* body frame */
-    bst_vec3 *normals;      /* of facets, body frame */
-    bst_mat3 *rotation;     /* by joint: body frame from joint frame */
-    bst_vec3 *origin;       /* by joint, body frame */
-    bst_pose_view views[2]; /* see bst_pose_look */
-    int *seen;              /* by occluder: facet for which it was last found in the grid */
+    struct bst_interreflection *interreflection; /* owned; NULL: light is reflected once */
+    bst_vec3 *vertices;                          /* body frame */
+    bst_vec3 *normals;                           /* of facets, body frame */
+    bst_mat3 *rotation;                          /* by joint: body frame from joint frame */
+    bst_vec3 *origin;                            /* by joint, body frame */
+    bst_pose_view views[2];                      /* see bst_pose_look */
+    int *seen; /* by occluder: facet for which it was last found in the grid */
     int seen_stamp;
     int stamp;                          /* counts the poses, from 1 */
     bst_pose_pair *pairs;               /* [occluders][occluders]; NULL: too many */

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "sim/core/compare.h"
+#include "sim/satellite/interreflection.h"
 #include "sim/world/external_states.h"
 #include "sim/world/orbit/constellation.h"
 #include "sim/world/scene/object_shape.h"
@@ -131,6 +132,12 @@ static bst_status make_shape(const bst_world_builder *b, const bst_object_config
                                 "external_states may change (allowed: none, steady)"
                               : "it needs a shape (allowed: none; or the brightness model shape)");
     }
+    if (config->brightness.interreflection && !given) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG,
+                        "%s: /world/objects/%d/brightness/interreflection: true, but there is no "
+                        "shape (allowed: false; or the brightness model shape)",
+                        b->scenario, index);
+    }
     if (!given) {
         return BST_OK;
     }
@@ -139,13 +146,15 @@ static bst_status make_shape(const bst_world_builder *b, const bst_object_config
     bst_object_shape *shape;
     bst_status status =
         bst_object_shape_create(b->ctx, &config->shape, &config->attitude, &source, &shape);
+    if (status == BST_OK && config->brightness.interreflection) {
+        shape->interreflection = true;
+        status = bst_interreflection_check(b->ctx, shape->satellite);
+    }
     if (status == BST_OK) {
         status = set_burns(b->ctx, &config->burns, shape);
-        if (status != BST_OK) {
-            bst_object_shape_free(shape);
-        }
     }
     if (status != BST_OK) {
+        bst_object_shape_free(shape); /* NULL if it was not made */
         return bst_fail_prefix(b->ctx, status, "%s: /world/objects/%d", b->scenario, index);
     }
     shape->index = b->world->shape_count;

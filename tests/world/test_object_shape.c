@@ -33,6 +33,45 @@ static void a_round_shape_is_a_sphere(void **state) {
     bst_world_free(world);
 }
 
+/* In the penumbra, with refraction and colours of the atmosphere, a shape has the light of points.
+ */
+static void penumbrae_are_those_of_points(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+#define LOW                                                                                 \
+    "\"orbit\": {\"source\": \"numerical\", \"state\": {\"source\": \"keplerian\", "        \
+    "\"semi_major_axis_m\": 7e6}, \"forces\": {\"gravity\": \"two_body\", \"sun\": false, " \
+    "\"moon\": false, \"solar_pressure\": false, \"drag\": false}}}"
+    bst_world *world = test_world_with(
+        "{\"name\": \"shape\", " SHAPE("{\"name\": \"s\", \"kind\": \"sphere\", \"radius_m\": 2, "
+                                       "\"material\": \"w\"}") ", " LOW
+                                                               ", {\"name\": \"sphere\", "
+                                                               "\"area_m2\": "
+                                                               "12.566370614359172, "
+                                                               "\"albedo\": 0.25, " LOW,
+        "");
+    bst_world_view *view;
+    bst_world_sight shape, sphere;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+    const bst_world_state eye = {{4.2e7, 0, 0}, {0, 3e3, 0}};
+    int partial = 0;
+    for (double t = 0; t < 5900; t += 2) {
+        bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 1, t, &sphere));
+        if (sphere.sunlit_fraction == 0 || sphere.sunlit_fraction == 1) {
+            continue;
+        }
+        bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 0, t, &shape));
+        bst_assert_close(shape.v_mag, sphere.v_mag, 1e-9); /* rounding */
+        for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
+            bst_assert_close(shape.glow.redness[k], sphere.glow.redness[k], 1e-12);
+        }
+        partial += sphere.glow.redness[0] < 0.99;
+    }
+    assert_true(partial >= 3);
+    bst_world_view_free(view);
+    bst_world_free(world);
+}
+
 /* A plate that spins glints twice a turn; samples within an exposure agree with single sights, and
  * their mean with a dense sum. */
 static void a_spinning_plate_glints(void **state) {
@@ -207,6 +246,44 @@ static void facets_have_their_temperatures(void **state) {
     bst_world_free(world);
 }
 
+/* A corner of two plates is brighter with light that goes from one to the other; a plate is not. */
+static void light_is_reflected_twice(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+#define LIT(name, on, more)                                                                    \
+    "{\"name\": \"" name "\", \"brightness\": {\"model\": \"shape\", \"interreflection\": " on \
+    "}, \"shape\": {\"materials\": [{\"name\": \"w\", \"diffuse\": 0.8}], \"joints\": "        \
+    "[{\"name\": "                                                                             \
+    "\"j\", \"follows\": \"spin\", \"rate_deg_per_s\": 1}], \"parts\": [{\"name\": \"p\", "    \
+    "\"kind\": \"plate\", \"joint\": \"j\", \"material\": \"w\"}" more                         \
+    "]}, \"attitude\": "                                                                       \
+    "[{\"law\": \"sun\", \"rotation_deg\": [0, 45, 0]}], " TEST_GX5 "}"
+#define WALL                                                                                     \
+    ", {\"name\": \"q\", \"kind\": \"plate\", \"position_m\": [0.5, 0, 0.5], \"rotation_deg\": " \
+    "[0, -90, 0], \"joint\": \"j\", \"material\": \"w\"}"
+    bst_world *world =
+        test_world_with(LIT("once", "false", WALL) ", " LIT("twice", "true", WALL) ", " LIT(
+                            "plate", "false", "") ", " LIT("plate too", "true", ""),
+                        "");
+    bst_world_view *view;
+    bst_world_sight s[4];
+    double most = 0;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+    for (double t = 0; t < 360; t += 45) { /* the joint turns: new form factors each time */
+        for (int i = 0; i < 4; i++) {
+            bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, i, t, &s[i]));
+        }
+        assert_true(!(s[1].v_mag > s[0].v_mag));
+        if (isfinite(s[0].v_mag)) {
+            most = fmax(most, s[0].v_mag - s[1].v_mag);
+        }
+        assert_true(s[2].v_mag == s[3].v_mag);
+    }
+    assert_true(most > 0.03 && most < 1);
+    bst_world_view_free(view);
+    bst_world_free(world);
+}
+
 static void wrong_shapes_are_refused(void **state) {
     (void)state;
     static const char *const wrong[][2] = {
@@ -222,6 +299,11 @@ static void wrong_shapes_are_refused(void **state) {
          "\"w\"}], \"joints\": [{\"name\": \"j\", \"follows\": \"table\", \"file\": "
          "\"/no/angles.csv\"}], \"parts\": [{\"name\": \"p\", \"material\": \"w\"}]}",
          "shape: /joints/0: file: "},
+        {"\"brightness\": {\"interreflection\": true}", "/brightness/interreflection: true"},
+        {"\"brightness\": {\"model\": \"shape\", \"interreflection\": true}, \"shape\": "
+         "{\"materials\": [{\"name\": \"w\"}], \"parts\": [{\"name\": \"s\", \"kind\": \"sphere\", "
+         "\"segments\": 96, \"material\": \"w\"}]}",
+         "facets, too many for light"},
         {"\"brightness\": {\"heat_balance\": \"steady\"}", "/brightness/heat_balance: it needs"},
         {"\"external_states\": true, \"brightness\": {\"model\": \"shape\", "
          "\"heat_balance\": \"transient\"}, \"shape\": {\"materials\": [{\"name\": \"w\"}], "
@@ -266,6 +348,8 @@ int main(void) {
         cmocka_unit_test(glints_are_neither_missed_nor_smeared),
         cmocka_unit_test(earthlight_is_that_of_spheres),
         cmocka_unit_test(facets_have_their_temperatures),
+        cmocka_unit_test(light_is_reflected_twice),
+        cmocka_unit_test(penumbrae_are_those_of_points),
         cmocka_unit_test(wrong_shapes_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -36,6 +36,9 @@ const bst_config_desc bst_brightness_config_table[] = {
              "transient: with the heat capacity of its material."),
     BST_REAL(bst_brightness_config, earth_infrared_w_per_m2, "W/m2", 0, 1000, "237",
              "steady, transient: exitance of the Earth in the thermal infrared."),
+    BST_BOOL(bst_brightness_config, interreflection, "false",
+             "shape: whether sunlight that one part reflects lights others; one bounce, all of it "
+             "diffuse; at most 1000 facets."),
     BST_BOOL(bst_brightness_config, resolved, "true",
              "Whether the object is drawn as the disc of a sphere of area_m2, with its terminator, "
              "where that is larger than 0.2 px."),

@@ -27,6 +27,7 @@ typedef struct bst_brightness_config {
     double temperature_k, shadow_temperature_k;
     int32_t heat_balance; /* BST_HEAT_... */
     double earth_infrared_w_per_m2;
+    bool interreflection;
     bool resolved; /* rendered as a disc if it is large enough */
 } bst_brightness_config;
 

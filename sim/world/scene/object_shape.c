@@ -4,6 +4,7 @@
 
 #include "sim/astro/bodies.h"
 #include "sim/optics/band.h"
+#include "sim/satellite/interreflection.h"
 
 bool bst_object_shape_is_given(const bst_satellite_config *config) {
     return *config->file || config->parts.count > 0 || config->joints.count > 0 ||
@@ -97,6 +98,9 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
     bst_satellite_flux flux;
     bst_satellite_pose_set(pose, &aspect.aim);
     bst_satellite_flux_at(pose, &light, &flux);
+    if (pose->interreflection && light.sunlit > 0.0) {
+        bst_interreflection_add(pose->interreflection, pose, &light, &flux);
+    }
     *out = (bst_scene_glow){.resolved = false};
     make_glow(&flux, l, range_m, out);
     out->emission_sr = flux.emission_m2 / (range_m * range_m);

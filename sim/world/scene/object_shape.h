@@ -17,6 +17,7 @@ typedef struct bst_object_shape {
     int glint_count;
     double *burn_s; /* [burn_count] starts of the object's burns */
     int burn_count;
+    bool interreflection;     /* light is reflected twice */
     bst_shape_forces *forces; /* NULL: the orbit does not follow from the shape */
 } bst_object_shape;
 

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "sim/core/quintic.h"
+#include "sim/satellite/interreflection.h"
 #include "sim/world/orbit/ephemeris.h"
 #include "sim/world/scene/field_objects.h"
 #include "sim/world/scene/object_heat.h"
@@ -101,6 +102,10 @@ static bst_status make_poses(bst_ctx *ctx, bst_world_view *view) {
         BST_TRY(bst_satellite_pose_create(ctx, world->shapes[i]->satellite, &view->poses[i]));
         view->poses[i]->burn_s = world->shapes[i]->burn_s;
         view->poses[i]->burn_count = world->shapes[i]->burn_count;
+        if (world->shapes[i]->interreflection) {
+            BST_TRY(bst_interreflection_create(ctx, world->shapes[i]->satellite,
+                                               &view->poses[i]->interreflection));
+        }
     }
     return make_heats(ctx, view);
 }
