@@ -154,7 +154,7 @@ static bst_status read_head(reader *r) {
     return BST_OK;
 }
 
-/* Tells the inertial frame from the body: exactly one of A and B is each. */
+/* Finds which of the frames A and B is inertial; the other one is the body. */
 static bst_status read_frames(reader *r) {
     bool inertial[2];
     for (int i = 0; i < 2; i++) {

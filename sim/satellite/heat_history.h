@@ -4,7 +4,7 @@
 
 #include "sim/satellite/heat.h"
 
-/* Sets a pose as it is at a time and tells what heats it then. False: unknown, such as before the
+/* Sets a pose as it is at a time and gives what heats it then. False: unknown, such as before the
  * first state of an orbit. */
 typedef bool bst_heat_source(void *user, bst_satellite_pose *pose, double seconds,
                              bst_heat_environment *out);

@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/satellite/interreflection.h"
 #include "sim/satellite/separation.h"
 
 static void free_view(bst_pose_view *v) {
@@ -28,7 +27,6 @@ void bst_satellite_pose_free(bst_satellite_pose *p) {
         free_view(&p->views[0]);
         free_view(&p->views[1]);
         bst_polygon_clip_free(&p->clip);
-        bst_interreflection_free(p->interreflection);
         free(p);
     }
 }

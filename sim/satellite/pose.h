@@ -39,7 +39,8 @@ typedef struct bst_satellite_pose {
     const double *burn_s; /* [burn_count] starts of burns after the epoch, for joints that follow
                              them; borrowed; set by the owner of the pose; at first none */
     int burn_count;
-    struct bst_interreflection *interreflection; /* owned; NULL: light is reflected once */
+    struct bst_interreflection *interreflection; /* borrowed; NULL: light is reflected
+                                                    once */
     bst_vec3 *vertices;                          /* body frame */
     bst_vec3 *normals;                           /* of facets, body frame */
     bst_mat3 *rotation;                          /* by joint: body frame from joint frame */

@@ -140,6 +140,9 @@ bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world
 void bst_world_view_free(bst_world_view *view) {
     if (view) {
         for (int i = 0; view->poses && i < view->world->shape_count; i++) {
+            if (view->poses[i]) {
+                bst_interreflection_free(view->poses[i]->interreflection);
+            }
             bst_satellite_pose_free(view->poses[i]);
         }
         for (int i = 0; view->heats && i < view->world->shape_count; i++) {
