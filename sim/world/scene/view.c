@@ -3,12 +3,10 @@
 #include <string.h>
 
 #include "sim/core/quintic.h"
-#include "sim/satellite/interreflection.h"
 #include "sim/world/orbit/ephemeris.h"
 #include "sim/world/scene/field_objects.h"
-#include "sim/world/scene/object_heat.h"
 #include "sim/world/scene/object_shape.h"
-#include "sim/world/scene/occultation.h"
+#include "sim/world/scene/view_shapes.h"
 
 /* State of an observer at one instant, shared by all objects in a frame. */
 typedef struct eye {
@@ -37,10 +35,8 @@ struct bst_world_view {
     const bst_world *world;
     bst_sky_clock *clock;
     pace pace;
-    eye eyes[BST_PATH_NODES];     /* the latest ones, by node of the exposure */
-    bst_satellite_pose **poses;   /* by shape of the world: work memory */
-    bst_object_heat **heats;      /* likewise; NULL where there is no heat balance */
-    bst_occultation *occultation; /* NULL: no object hides others */
+    eye eyes[BST_PATH_NODES]; /* the latest ones, by node of the exposure */
+    bst_view_shapes shapes;
 };
 
 /* Source of positions in a light-time solution; observer and object use the same one. */
@@ -52,64 +48,6 @@ typedef struct looked_at {
     from source;
 } looked_at;
 
-/* Place of an object at a time, for its heat balance. */
-static bool heat_place(void *user, int object, double seconds, bst_object_place *out) {
-    const bst_world_view *view = user;
-    const bst_world *world = view->world;
-    bst_ctx quiet = {0};
-    bst_world_state state;
-    bst_sky_rotation sky;
-    if (bst_sky_clock_at(&quiet, view->clock, bst_world_time(world, seconds), &sky) != BST_OK ||
-        bst_world_orbit_state(&quiet, &world->objects[object].orbit, view->clock, world->epoch,
-                              seconds, true, &state) != BST_OK) {
-        return false;
-    }
-    *out = (bst_object_place){
-        state.position_m, state.velocity_mps, sky.bodies.sun_m,
-        bst_astro_sun_fraction(state.position_m, bst_bodies_sunlight_from(&sky.bodies),
-                               sky.bodies.pole)};
-    return true;
-}
-
-/* Allocates the work memory for the heat balances of the world. */
-static bst_status make_heats(bst_ctx *ctx, bst_world_view *view) {
-    const bst_world *world = view->world;
-    for (int i = 0; i < world->object_count; i++) {
-        const bst_world_object_info *info = &world->objects[i].info;
-        int balance =
-            info->shape ? bst_brightness_config_of(info->brightness)->heat_balance : BST_HEAT_NONE;
-        if (balance == BST_HEAT_NONE) {
-            continue;
-        }
-        bst_object_heat **heat = &view->heats[info->shape->index];
-        BST_TRY(bst_object_heat_create(ctx, info->shape, balance == BST_HEAT_TRANSIENT, heat));
-        (*heat)->place = heat_place;
-        (*heat)->user = view;
-        (*heat)->object = i;
-    }
-    return BST_OK;
-}
-
-/* Allocates the work memory for the shapes of the world. */
-static bst_status make_poses(bst_ctx *ctx, bst_world_view *view) {
-    const bst_world *world = view->world;
-    view->poses = calloc((size_t)world->shape_count, sizeof(bst_satellite_pose *));
-    view->heats = calloc((size_t)world->shape_count, sizeof(bst_object_heat *));
-    if (!view->poses || !view->heats) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a view of the world");
-    }
-    for (int i = 0; i < world->shape_count; i++) {
-        BST_TRY(bst_satellite_pose_create(ctx, world->shapes[i]->satellite, &view->poses[i]));
-        view->poses[i]->burn_s = world->shapes[i]->burn_s;
-        view->poses[i]->burn_count = world->shapes[i]->burn_count;
-        if (world->shapes[i]->interreflection) {
-            BST_TRY(bst_interreflection_create(ctx, world->shapes[i]->satellite,
-                                               &view->poses[i]->interreflection));
-        }
-    }
-    return make_heats(ctx, view);
-}
-
 bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world_view **out) {
     *out = NULL;
     bst_world_view *view = calloc(1, sizeof *view);
@@ -118,16 +56,8 @@ bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world
     }
     view->world = world;
     bst_status status = bst_sky_clock_create_on(ctx, world->sky_grid, &view->clock);
-    if (status == BST_OK && world->shape_count > 0) {
-        status = make_poses(ctx, view);
-    }
-    if (status == BST_OK && world->occulter_count > 0) {
-        int vertices = 0;
-        for (int i = 0; i < world->shape_count; i++) {
-            int n = world->shapes[i]->satellite->vertex_count;
-            vertices = n > vertices ? n : vertices;
-        }
-        status = bst_occultation_create(ctx, vertices, &view->occultation);
+    if (status == BST_OK) {
+        status = bst_view_shapes_create(ctx, world, view->clock, &view->shapes);
     }
     if (status != BST_OK) {
         bst_world_view_free(view);
@@ -139,18 +69,7 @@ bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world
 
 void bst_world_view_free(bst_world_view *view) {
     if (view) {
-        for (int i = 0; view->poses && i < view->world->shape_count; i++) {
-            if (view->poses[i]) {
-                bst_interreflection_free(view->poses[i]->interreflection);
-            }
-            bst_satellite_pose_free(view->poses[i]);
-        }
-        for (int i = 0; view->heats && i < view->world->shape_count; i++) {
-            bst_object_heat_free(view->heats[i]);
-        }
-        free(view->poses);
-        free(view->heats);
-        bst_occultation_free(view->occultation);
+        bst_view_shapes_free(&view->shapes);
         bst_sky_clock_free(view->clock);
         free(view);
     }
@@ -332,71 +251,8 @@ static bst_status look(bst_ctx *ctx, bst_world_view *view, const eye *e, looked_
     return BST_OK;
 }
 
-/* An object at the emission of its light. */
-typedef struct emission {
-    int object;
-    bst_vec3 position_m, velocity_mps; /* the velocity matters for shapes only */
-    double seconds;
-} emission;
-
-/* An object as a body of occultations. */
-static bst_occultation_body body_of(const bst_world_view *view, int object, bst_vec3 position_m,
-                                    bst_vec3 velocity_mps, double seconds) {
-    const bst_world_object_info *info = &view->world->objects[object].info;
-    return (bst_occultation_body){
-        .position_m = position_m,
-        .velocity_mps = velocity_mps,
-        .seconds = seconds,
-        .radius_m = info->shape ? info->shape->satellite->radius_m : sqrt(info->area_m2 / BST_PI),
-        .shape = info->shape,
-        .pose = info->shape ? view->poses[info->shape->index] : NULL};
-}
-
-/* What other objects take of an object's sunlight, and hide of it. */
-typedef struct mutual {
-    double sunlight, visible; /* parts that are left */
-} mutual;
-
-/* Occultations of an object by others, when its light passes them. */
-static mutual occultations(const bst_world_view *view, const emission *at, bst_vec3 eye_m,
-                           bst_vec3 sun_m) {
-    const bst_world *world = view->world;
-    mutual out = {1.0, 1.0};
-    bst_occultation_body body =
-        body_of(view, at->object, at->position_m, at->velocity_mps, at->seconds);
-    for (int i = 0; i < world->occulter_count; i++) {
-        int other = world->occulters[i];
-        for (int side = 0; side < 2 && other != at->object; side++) {
-            /* sunlight passed it before the emission, the light to the observer passes after */
-            double seconds = at->seconds, sign = side == 0 ? -1.0 : 1.0;
-            bst_ctx quiet = {0};
-            bst_world_state s;
-            bool known = true;
-            for (int k = 0; k < 2 && known; k++) {
-                known = bst_world_orbit_state(&quiet, &world->objects[other].orbit, view->clock,
-                                              world->epoch, seconds, true, &s) == BST_OK;
-                double way = known ? bst_vec3_norm(bst_vec3_sub(s.position_m, at->position_m)) : 0;
-                seconds = at->seconds + sign * way / BST_LIGHT_SPEED_MPS;
-            }
-            if (!known) {
-                continue;
-            }
-            bst_occultation_body front =
-                body_of(view, other, s.position_m, s.velocity_mps, seconds);
-            if (side == 0) {
-                out.sunlight *=
-                    1.0 - bst_occultation_of_sun(view->occultation, &body, &front, sun_m);
-            } else {
-                out.visible *=
-                    1.0 - bst_occultation_from_eye(view->occultation, &body, &front, eye_m, sun_m);
-            }
-        }
-    }
-    return out;
-}
-
 /* Brightness of an object, seen from `eye_m`. */
-static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 eye_m,
+static void shine_at(const bst_world_view *view, const bst_view_emission *at, bst_vec3 eye_m,
                      const bst_bodies *bodies, bst_world_sight *out) {
     const bst_world *world = view->world;
     int object = at->object;
@@ -407,9 +263,10 @@ static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 ey
     bst_astro_sunlight sunlight;
     bst_astro_sunlight_at(emitted_m, bst_bodies_sunlight_from(bodies), bodies->pole,
                           world->shadow_atmosphere, &sunlight);
-    mutual others = {1.0, 1.0};
-    if (view->occultation) {
-        others = occultations(view, at, eye_m, bst_bodies_sunlight_from(bodies));
+    bst_view_mutual others = {1.0, 1.0};
+    if (view->shapes.occultation) {
+        others = bst_view_shapes_occultations(&view->shapes, at, eye_m,
+                                              bst_bodies_sunlight_from(bodies));
         sunlight.disc *= others.sunlight;
         for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
             sunlight.light[k] *= others.sunlight;
@@ -426,12 +283,12 @@ static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 ey
                                    .sunlit_fraction = sunlight.disc,
                                    .sunlight = &sunlight};
     if (info->shape) {
-        bst_object_shape_glow(info->shape, view->poses[info->shape->index],
+        bst_object_shape_glow(info->shape, view->shapes.poses[info->shape->index],
                               bst_brightness_config_of(info->brightness), &lighting,
                               at->velocity_mps, &out->glow);
-        bst_object_heat *heat = view->heats[info->shape->index];
+        bst_object_heat *heat = view->shapes.heats[info->shape->index];
         if (heat) {
-            bst_object_heat_glow(heat, info->shape, view->poses[info->shape->index],
+            bst_object_heat_glow(heat, info->shape, view->shapes.poses[info->shape->index],
                                  bst_brightness_config_of(info->brightness), &lighting,
                                  at->velocity_mps, &out->glow);
         }
@@ -445,7 +302,8 @@ static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 ey
 }
 
 /* Brightness of an object in a sight, and occultation by the Earth. */
-static void shine(const bst_world_view *view, const eye *e, emission *at, bst_world_sight *out) {
+static void shine(const bst_world_view *view, const eye *e, bst_view_emission *at,
+                  bst_world_sight *out) {
     at->seconds = e->seconds - out->light_time_s;
     shine_at(view, at, e->state.position_m, &e->sky.bodies, out);
     out->occulted =
@@ -470,7 +328,7 @@ bst_status bst_world_view_sight(bst_ctx *ctx, bst_world_view *view, int observer
         BST_TRY(position_of(ctx, view, object, seconds, source, &now, &velocity));
     }
     BST_TRY(look(ctx, view, &e, (looked_at){object, source}, now, &emitted, out));
-    shine(view, &e, &(emission){object, emitted, velocity, 0.0}, out);
+    shine(view, &e, &(bst_view_emission){object, emitted, velocity, 0.0}, out);
     return BST_OK;
 }
 
@@ -482,7 +340,7 @@ bst_status bst_world_view_sight_from(bst_ctx *ctx, bst_world_view *view,
     BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_world_time(view->world, seconds), &e.sky));
     BST_TRY(position_of(ctx, view, object, seconds, FROM_ORBIT, &now, &velocity));
     BST_TRY(look(ctx, view, &e, (looked_at){object, FROM_ORBIT}, now, &emitted, out));
-    shine(view, &e, &(emission){object, emitted, velocity, 0.0}, out);
+    shine(view, &e, &(bst_view_emission){object, emitted, velocity, 0.0}, out);
     return BST_OK;
 }
 
@@ -509,7 +367,7 @@ static bst_status path_from(bst_ctx *ctx, bst_world_view *view,
         bst_vec3 apparent = bst_vec3_scale(sight.apparent, bst_vec3_dot(sight.apparent, about));
         path->shift[i / 2] = bst_vec3_sub(apparent, unit);
         if (i == BST_PATH_NODES / 2) {
-            shine(view, e, &(emission){b.object, emitted, velocity, 0.0}, &sight);
+            shine(view, e, &(bst_view_emission){b.object, emitted, velocity, 0.0}, &sight);
             *mid = sight;
             light->lag_m = bst_vec3_sub(emitted, now);
             light->earth_bary_mps = e->sky.bodies.earth_bary_mps;
@@ -558,7 +416,7 @@ static bst_vec3 quartic(const bst_vec3 place[BST_PATH_NODES], double u) {
 
 /* Object, observer and bodies at time u of a span, from the path of the span. */
 typedef struct instant {
-    emission at;
+    bst_view_emission at;
     bst_vec3 eye_m;
     bst_bodies bodies;
 } instant;
@@ -571,11 +429,11 @@ static instant instant_at(const bst_world_view *view, const bst_world_view_span 
                               .earth_bary_mps = light->earth_bary_mps,
                               .pole = light->pole}};
     double duration_s = span->end_s - span->start_s;
-    out.at =
-        (emission){object,
-                   bst_vec3_add(bst_vec3_add(out.eye_m, quartic(path->place, u)), light->lag_m),
-                   {0, 0, 0},
-                   span->start_s + u * duration_s - light->light_time_s};
+    out.at = (bst_view_emission){
+        object,
+        bst_vec3_add(bst_vec3_add(out.eye_m, quartic(path->place, u)), light->lag_m),
+        {0, 0, 0},
+        span->start_s + u * duration_s - light->light_time_s};
     if (view->world->objects[object].info.shape && duration_s > 0.0) {
         const double h =
             1e-2; /* the difference of a quartic: exact to h^2 of the third derivative */
@@ -625,7 +483,7 @@ bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, const bst_wor
 }
 
 bst_satellite_pose *bst_scene_view_pose(const bst_world_view *view, int object) {
-    return view->poses[view->world->objects[object].info.shape->index];
+    return view->shapes.poses[view->world->objects[object].info.shape->index];
 }
 
 const bst_world_object_info *bst_scene_view_object(const bst_world_view *view, int object) {
