@@ -77,7 +77,10 @@ double bst_heat_after(double kelvin, const double load[2], double emissivity, do
     double emit = emissivity * BST_STEFAN_BOLTZMANN;
     double hottest = fmax(kelvin, bst_heat_steady_k(fmax(load[0], load[1]), emissivity));
     double rate = 4.0 * emit * hottest * hottest * hottest / capacity; /* 1 / time constant */
-    int steps = (int)fmin(fmax(ceil(10.0 * rate * seconds), 1.0), 1000.0);
+    if (rate * seconds > 90.0) { /* it has long followed the load */
+        return bst_heat_steady_k(load[1], emissivity);
+    }
+    int steps = (int)fmax(ceil(10.0 * rate * seconds), 1.0);
     double h = seconds / steps, t = kelvin;
     for (int i = 0; i < steps; i++) {
         double slope = (load[1] - load[0]) / steps, q0 = load[0] + slope * i;

@@ -109,6 +109,9 @@ static void a_surface_cools_by_its_closed_form(void **state) {
         /* fourth order with ten steps a time constant */
         bst_assert_close(bst_heat_after(350, dark, 0.7, 5000, t), want, 1e-4);
     }
+    const double rising[2] = {100, 400}; /* almost no heat capacity: it follows */
+    bst_assert_close(bst_heat_after(350, rising, 0.7, 1e-6, 60), bst_heat_steady_k(400, 0.7), 1e-9);
+    bst_assert_close(bst_heat_after(350, rising, 0.7, 5, 60), bst_heat_steady_k(400, 0.7), 0.2);
     /* small steps are exponential with the time constant C / (4 emissivity sigma T^3) */
     double q = 0.7 * SIGMA * 300 * 300 * 300 * 300, tau = 5000 / (4 * 0.7 * SIGMA * 2.7e7);
     const double level[2] = {q, q};
