@@ -35,7 +35,7 @@ static const bst_port ports[PORT_COUNT] = {
                     .flags = BST_PORT_OPTIONAL | BST_PORT_FEEDBACK},
 };
 
-enum { OUT_POINTING, OUT_STATES, OUT_SENSOR, OUTPUTS };
+enum { OUT_POINTING, OUT_STATES, OUT_ATTITUDES, OUT_SENSOR, OUTPUTS };
 
 typedef struct config {
     double update_rate_hz, exposure_s, period_s;
@@ -85,8 +85,9 @@ static void destroy(void *self) {
 
 static bst_status make_outputs(bst_ctx *ctx, module *m) {
     static const bst_link_type types[OUTPUTS] = {BST_LINK_POINTING, BST_LINK_TARGET_STATES,
+                                                 BST_LINK_TARGET_ATTITUDES,
                                                  BST_LINK_SENSOR_COMMAND};
-    static const int room[OUTPUTS] = {MOST_ATTITUDES, MOST_STATES, 0};
+    static const int room[OUTPUTS] = {MOST_ATTITUDES, MOST_STATES, MOST_STATES, 0};
     m->samples = calloc(MOST_ATTITUDES + 1, sizeof *m->samples);
     bool made = m->samples;
     for (int i = 0; i < OUTPUTS; i++) {
@@ -193,6 +194,23 @@ static void take_states(module *m, struct bst_step *s, const bst_link_target_sta
     }
 }
 
+/* Passes the target attitudes of a message to the world. */
+static void take_attitudes(module *m, struct bst_step *s,
+                           const bst_link_target_attitudes *attitudes) {
+    for (int i = 0; i < attitudes->count; i++) {
+        const bst_link_target_attitude *item = &attitudes->items[i];
+        bst_ctx why = {0};
+        bool past = item->tick < bst_step_tick(s);
+        if (past ||
+            bst_world_turn(&why, m->world, item->object, (double)item->tick / m->base.tick_rate_hz,
+                           item->q_body_from_gcrf, item->rate_body_radps) != BST_OK) {
+            bst_step_count(s, "target_state_refused");
+            bst_step_event(s, "link", "target_attitudes, item %d: %s", i,
+                           past ? "its tick is before the step's" : why.message);
+        }
+    }
+}
+
 /* Publishes the sensor command and other parts of the peer's answer. */
 static void publish_answer(module *m, struct bst_step *s) {
     if (m->outputs[OUT_POINTING].given) {
@@ -200,6 +218,9 @@ static void publish_answer(module *m, struct bst_step *s) {
     }
     if (m->outputs[OUT_STATES].given) {
         take_states(m, s, m->outputs[OUT_STATES].payload);
+    }
+    if (m->outputs[OUT_ATTITUDES].given) {
+        take_attitudes(m, s, m->outputs[OUT_ATTITUDES].payload);
     }
     if (m->outputs[OUT_SENSOR].given && m->commands_sensor) {
         memcpy(bst_step_write(s, PORT_SENSOR, NULL), m->outputs[OUT_SENSOR].payload,

@@ -6,9 +6,9 @@
 
 #include "imgproc/detect/background.h"
 
-/* Model error of a pixel's light as estimated from its neighbours, share of the light: that of a PSF
- * width wrong by 7 % at sigma 0.85 px. The ratio of neighbouring pixels, exp(-1 / (2 s^2)), changes
- * by 1 / s^2 times the relative error of s; s^2 = sigma^2 + 1/12 px^2. */
+/* Model error of a pixel's light as estimated from its neighbours, share of the light: that of a
+ * PSF width wrong by 7 % at sigma 0.85 px. The ratio of neighbouring pixels, exp(-1 / (2 s^2)),
+ * changes by 1 / s^2 times the relative error of s; s^2 = sigma^2 + 1/12 px^2. */
 static const double MODEL_SHARE = 0.09;
 
 typedef struct neighbour {

@@ -269,6 +269,18 @@ bst_status bst_sim_command_pointing(bst_ctx *ctx, bst_sim *sim, const char *scop
 bst_status bst_sim_command_state(bst_ctx *ctx, bst_sim *sim, const char *object, double time_s,
                                  bst_vec3 position_m, bst_vec3 velocity_mps) BST_MUST_CHECK;
 
+/* Sets the attitude of an object with a shape whose key "external_states" is true, in place of its
+ * key "attitude"; it turns at a constant rate until the next command.
+ *
+ * Given:     object            its name
+ *            time_s            since the epoch; later than that of its last attitude
+ *            q_body_from_gcrf  unit
+ *            rate_body_radps   angular velocity, body frame
+ * Errors:    BST_ERR_NOT_FOUND, BST_ERR_ARGUMENT */
+bst_status bst_sim_command_attitude(bst_ctx *ctx, bst_sim *sim, const char *object, double time_s,
+                                    bst_quat q_body_from_gcrf,
+                                    bst_vec3 rate_body_radps) BST_MUST_CHECK;
+
 /* ---- saved states ---- */
 
 /* Saves the state of a sim to memory.

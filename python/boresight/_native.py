@@ -99,6 +99,8 @@ _FUNCTIONS = {
     "bst_sim_command_pointing": (c_int, [c_void_p, c_void_p, c_char_p, c_void_p, c_int]),
     "bst_sim_command_state": (c_int, [c_void_p, c_void_p, c_char_p, c_double, _structs.Vec3,
                                       _structs.Vec3]),
+    "bst_sim_command_attitude": (c_int, [c_void_p, c_void_p, c_char_p, c_double, _structs.Quat,
+                                         _structs.Vec3]),
     "bst_sim_save": (c_int, [c_void_p, c_void_p, POINTER(c_void_p), POINTER(c_size_t)]),
     "bst_state_free": (None, [c_void_p]),
     "bst_model_camera": (POINTER(_structs.CameraHead), [c_void_p, c_int]),

@@ -67,6 +67,12 @@ class Vec3(ctypes.Structure):
     _fields_ = [("x", c_double), ("y", c_double), ("z", c_double)]
 
 
+class Quat(ctypes.Structure):
+    """bst_quat."""
+    C_NAME = "bst_quat"
+    _fields_ = [("x", c_double), ("y", c_double), ("z", c_double), ("w", c_double)]
+
+
 class ChannelType(ctypes.Structure):
     """bst_channel_type."""
     C_NAME = "bst_channel_type"
@@ -250,7 +256,7 @@ MODULE_ABI = 4
 """BST_MODULE_ABI."""
 
 ALL: List[Type[Any]] = [Context, ModelOptions, SimOptions, SimObserver, SimMessage, SimFrame, SimColumns, Vec3,
-                        ChannelType, Window, CameraHead, StageDesc, DetectorEnv, DetectorFrame,
+                        Quat, ChannelType, Window, CameraHead, StageDesc, DetectorEnv, DetectorFrame,
                         FrameStageEnv, FrameStageFrame, DetectorStage, FrameStage, ConfigDesc,
                         Port, FleetMember, ModuleEnv, Sample, FrameOps, FrameHandle, ModuleDesc,
                         CompensatorStage]

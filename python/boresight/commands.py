@@ -61,17 +61,27 @@ def los_command(direction_gcrf: Any, rate_gcrf_radps: Any = (0.0, 0.0, 0.0),
                       accel_gcrf_radps2=vector(accel_gcrf_radps2, "accel_gcrf_radps2"))
 
 
+def _numbers(value: Any, what: str, count: int, word: str) -> npt.NDArray[np.float64]:
+    """`count` numbers; `word` is the count for the message."""
+    try:
+        array = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{what} takes {word} numbers, not {type(value).__name__}") from None
+    if array.shape != (count,):
+        raise ArgumentError(f"{what} takes {word} numbers, found shape {array.shape}")
+    return array
+
+
 def vector(value: Any, what: str) -> npt.NDArray[np.float64]:
     """Three numbers."""
     if isinstance(value, tuple) and value == (0.0, 0.0, 0.0):
         return _ZERO
-    try:
-        array = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{what} takes three numbers, not {type(value).__name__}") from None
-    if array.shape != (3,):
-        raise ArgumentError(f"{what} takes three numbers, found shape {array.shape}")
-    return array
+    return _numbers(value, what, 3, "three")
+
+
+def quaternion(value: Any, what: str) -> npt.NDArray[np.float64]:
+    """Four numbers: x, y, z, w."""
+    return _numbers(value, what, 4, "four")
 
 
 def pointing_samples(ticks: Any, q_cam_from_gcrf: Any) -> npt.NDArray[np.void]:

@@ -336,6 +336,22 @@ class Simulation(ChannelViews):
             self._guard.context.check(LIBRARY.bst_sim_command_state(
                 self._guard.context.pointer, sim.pointer, what, time, position, velocity))
 
+    def command_attitude(self, name: str, time_s: float, q_body_from_gcrf: Any,
+                         rate_body_radps: Any = (0.0, 0.0, 0.0)) -> None:
+        """Sets the attitude of an object with a shape whose key "external_states" is true; it turns
+        at a constant rate until the next command.
+
+        Given:     time_s            since the epoch; later than that of its last attitude
+                   q_body_from_gcrf  [4] x, y, z, w
+                   rate_body_radps   [3] body frame
+        """
+        what, time = text_argument(name, "name"), number_argument(time_s, "time_s")
+        attitude = _structs.Quat(*commands.quaternion(q_body_from_gcrf, "q_body_from_gcrf"))
+        rate = _structs.Vec3(*commands.vector(rate_body_radps, "rate_body_radps"))
+        with self._guard.use() as sim:
+            self._guard.context.check(LIBRARY.bst_sim_command_attitude(
+                self._guard.context.pointer, sim.pointer, what, time, attitude, rate))
+
     # ---- saved states
 
     def save(self) -> Snapshot:

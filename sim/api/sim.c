@@ -331,3 +331,16 @@ bst_status bst_sim_command_state(bst_ctx *ctx, bst_sim *sim, const char *object,
     const bst_world_state state = {position_m, velocity_mps};
     return bst_world_steer(ctx, bst_simulation_world(sim->simulation), object, time_s, &state);
 }
+
+bst_status bst_sim_command_attitude(bst_ctx *ctx, bst_sim *sim, const char *object, double time_s,
+                                    bst_quat q, bst_vec3 rate) {
+    assert(sim && object);
+    const double values[8] = {time_s, q.x, q.y, q.z, q.w, rate.x, rate.y, rate.z};
+    for (int i = 0; i < 8; i++) {
+        if (!isfinite(values[i])) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: a time, attitude or rate is not finite",
+                            object);
+        }
+    }
+    return bst_world_turn(ctx, bst_simulation_world(sim->simulation), object, time_s, q, rate);
+}

@@ -64,7 +64,7 @@ bst_status bst_forces_create(bst_ctx *ctx, const bst_force_model *model, bst_tim
     f->model = *model;
     f->epoch = epoch;
     f->turns = model->eop && (bst_gravity_degree(model->gravity) >= 2 || model->drag);
-    f->has_bodies = model->sun || model->moon || model->solar_pressure;
+    f->has_bodies = model->sun || model->moon || model->solar_pressure || model->surface;
     bst_bodies bodies;
     bst_bodies_at(epoch, &bodies);
     f->pole = bodies.pole; /* constant: it moves by 0.06 arcsec per day, the limb by 6 mm */
@@ -151,6 +151,32 @@ static bst_vec3 third_body(double gm, bst_vec3 r, bst_vec3 s) {
     return bst_vec3_scale(bst_vec3_axpy(r, f, s), -gm / (d2 * sqrt(d2)));
 }
 
+/* Acceleration of a shape by sunlight and air, m/s2. */
+static bst_vec3 surface_forces(const bst_forces *f, const bst_force_state *at, bst_vec3 sun_m,
+                               bst_vec3 fixed, bst_vec3 spin) {
+    const bst_force_model *m = &f->model;
+    const bst_force_surface *s = m->surface;
+    bst_vec3 a = {0.0, 0.0, 0.0}, d = bst_vec3_sub(at->position_m, sun_m);
+    double sunlight =
+        m->solar_pressure ? bst_astro_sun_fraction(at->position_m, sun_m, f->pole) : 0.0;
+    if (sunlight > 0.0) {
+        double pressure =
+            BST_SUNLIGHT_PRESSURE_PA * sunlight * BST_AU_M * BST_AU_M / bst_vec3_dot(d, d);
+        a = bst_vec3_scale(s->light_area_m2(s->user, at), pressure / m->spacecraft.mass_kg);
+    }
+    if (m->drag) {
+        bst_vec3 wind = bst_vec3_sub(at->velocity_mps, bst_vec3_cross(spin, at->position_m));
+        double speed = bst_vec3_norm(wind), height = bst_astro_height_m(fixed);
+        double density = bst_atmosphere_density_kgpm3(height) * m->density_scale;
+        if (density > 0.0 && speed > 0.0) {
+            double area = s->drag_area_m2(s->user, at, bst_vec3_scale(wind, 1.0 / speed));
+            double factor = 0.5 * m->spacecraft.drag_coefficient * area / m->spacecraft.mass_kg;
+            a = bst_vec3_axpy(a, -factor * density * speed, wind);
+        }
+    }
+    return a;
+}
+
 /* Acceleration by atmospheric drag in m/s2; the atmosphere rotates with the Earth. */
 static bst_vec3 drag(const bst_forces *f, bst_vec3 fixed, bst_vec3 r, bst_vec3 v, bst_vec3 spin) {
     bst_vec3 wind = bst_vec3_sub(v, bst_vec3_cross(spin, r));
@@ -182,7 +208,7 @@ bst_status bst_forces_at(bst_ctx *ctx, bst_forces *f, double seconds, bst_vec3 r
     } else {
         a = bst_gravity_acceleration(m->gravity, r);
     }
-    if (m->drag) {
+    if (m->drag && !m->surface) {
         a = bst_vec3_add(a, drag(f, fixed, r, v, spin));
     }
     if (f->has_bodies) {
@@ -194,7 +220,10 @@ bst_status bst_forces_at(bst_ctx *ctx, bst_forces *f, double seconds, bst_vec3 r
         if (m->moon) {
             a = bst_vec3_add(a, third_body(BST_MOON_GM_M3PS2, r, moon));
         }
-        if (m->solar_pressure) {
+        if (m->surface) {
+            bst_force_state at = {seconds, r, v, bst_vec3_unit(bst_vec3_sub(sun, r))};
+            a = bst_vec3_add(a, surface_forces(f, &at, sun, fixed, spin));
+        } else if (m->solar_pressure) {
             bst_vec3 d = bst_vec3_sub(r, sun);
             double d2 = bst_vec3_dot(d, d);
             double size = f->light_accel_au * bst_astro_sun_fraction(r, sun, f->pole) * BST_AU_M *

@@ -22,15 +22,34 @@ typedef struct bst_astro_spacecraft {
         light_coefficient; /* coefficient 1: black or mirror ball; 2: flat mirror facing the Sun */
 } bst_astro_spacecraft;
 
+/* Where a spacecraft is, for the forces on its surface. GCRF. */
+typedef struct bst_force_state {
+    double seconds;                    /* after the epoch */
+    bst_vec3 position_m, velocity_mps; /* geocentric */
+    bst_vec3 sun;                      /* unit: to the Sun */
+} bst_force_state;
+
+/* The surface of a spacecraft with a shape, in place of the areas of the sphere; its functions
+ * depend on their arguments alone and may be called by several threads. */
+typedef struct bst_force_surface {
+    /* Force of sunlight over its pressure on a black surface, m^2. */
+    bst_vec3 (*light_area_m2)(void *user, const bst_force_state *state);
+    /* Area of the silhouette seen from `ahead` (unit), m^2. */
+    double (*drag_area_m2)(void *user, const bst_force_state *state, bst_vec3 ahead);
+    void *user;
+} bst_force_surface;
+
 typedef struct bst_force_model {
     const bst_gravity *gravity; /* borrowed */
     /* Borrowed; NULL: non-rotating Earth with GCRF axes and resting atmosphere. */
     const bst_astro_eop *eop;
-    bool sun, moon;                  /* third bodies as point masses */
-    bool solar_pressure;             /* with the Earth's shadow */
-    bool drag;                       /* in an atmosphere that rotates with the Earth */
-    double density_scale;            /* factor on bst_atmosphere_density_kgpm3 */
-    bst_astro_spacecraft spacecraft; /* used by solar_pressure and drag */
+    bool sun, moon;                   /* third bodies as point masses */
+    bool solar_pressure;              /* with the Earth's shadow */
+    bool drag;                        /* in an atmosphere that rotates with the Earth */
+    double density_scale;             /* factor on bst_atmosphere_density_kgpm3 */
+    bst_astro_spacecraft spacecraft;  /* used by solar_pressure and drag */
+    const bst_force_surface *surface; /* borrowed; NULL: the sphere of the spacecraft; else of this
+                                         only the mass and the drag coefficient count */
 } bst_force_model;
 
 /* A force model with its epoch and caches. One thread at a time; constant memory. Results depend on

@@ -80,10 +80,6 @@ typedef struct reader {
     covariance covariance;
 } reader;
 
-static bst_status fail_line(const reader *r, const char *problem, const char *expected) {
-    return bst_text_fail_at(&r->source, &r->line, problem, r->line.text, r->line.length, expected);
-}
-
 /* Appends a state to the OEM ephemeris. */
 static bst_status append_row(const reader *r, const bst_astro_table_state *row) {
     bst_oem *oem = r->oem;
@@ -122,12 +118,6 @@ static bool starts_with_word(const bst_text_line *line, const char *word) {
            (line->length == length || line->text[length] == ' ' || line->text[length] == '\t');
 }
 
-/* Splits "KEY = value". */
-static bst_status split(const reader *r, bst_text_span *name, bst_text_span *value) {
-    const char *expected, *problem = bst_text_split_keyword(&r->line, name, value, &expected);
-    return problem ? fail_line(r, problem, expected) : BST_OK;
-}
-
 /* Index of a keyword in `names`, a NULL-terminated list; the error suggests the nearest one. */
 static bst_status find_key(const reader *r, bst_text_span name, const char *const *names,
                            int *out) {
@@ -156,13 +146,15 @@ static bst_status read_head(reader *r) {
     int k;
     bool first = !r->head[HEAD_VERSION];
     if (first && (r->line.text[0] == '<' || !starts_with_word(&r->line, head_names[0]))) {
-        return fail_line(r, "the file does not begin as an OEM in KVN does",
-                         "CCSDS_OEM_VERS = 1.0, 2.0 or 3.0");
+        return bst_text_fail_line(&r->source, &r->line,
+                                  "the file does not begin as an OEM in KVN does",
+                                  "CCSDS_OEM_VERS = 1.0, 2.0 or 3.0");
     }
-    BST_TRY(split(r, &name, &value));
+    BST_TRY(bst_text_split(&r->source, &r->line, &name, &value));
     BST_TRY(find_key(r, name, head_names, &k));
     if (r->head[k]) {
-        return fail_line(r, "the keyword is given twice", "each keyword once");
+        return bst_text_fail_line(&r->source, &r->line, "the keyword is given twice",
+                                  "each keyword once");
     }
     r->head[k] = true;
     if (k == HEAD_VERSION && !bst_text_is(value, "1.0") && !bst_text_is(value, "2.0") &&
@@ -177,10 +169,11 @@ static bst_status read_head(reader *r) {
 static bst_status read_meta(reader *r) {
     bst_text_span name, value;
     int k;
-    BST_TRY(split(r, &name, &value));
+    BST_TRY(bst_text_split(&r->source, &r->line, &name, &value));
     BST_TRY(find_key(r, name, meta_names, &k));
     if (r->meta[k].text) {
-        return fail_line(r, "the keyword is given twice", "each keyword once");
+        return bst_text_fail_line(&r->source, &r->line, "the keyword is given twice",
+                                  "each keyword once");
     }
     r->meta[k] = (bst_text_line){value.text, value.length, r->line.number};
     return BST_OK;
@@ -329,8 +322,8 @@ static bst_status read_row(reader *r) {
     BST_TRY(read_date(r, &r->line, word, &t));
     while (bst_text_next_word(&rest, &word)) {
         if (n == 9) {
-            return fail_line(r, "more numbers than a state has",
-                             "an epoch and 6 numbers, or 9 with accelerations");
+            return bst_text_fail_line(&r->source, &r->line, "more numbers than a state has",
+                                      "an epoch and 6 numbers, or 9 with accelerations");
         }
         if (!bst_text_number(word, &v[n++])) {
             return bst_text_fail_at(&r->source, &r->line, "is not a number", word.text, word.length,
@@ -338,8 +331,8 @@ static bst_status read_row(reader *r) {
         }
     }
     if (n != 6 && n != 9) {
-        return fail_line(r, "fewer numbers than a state has",
-                         "an epoch and 6 numbers, or 9 with accelerations");
+        return bst_text_fail_line(&r->source, &r->line, "fewer numbers than a state has",
+                                  "an epoch and 6 numbers, or 9 with accelerations");
     }
     bst_astro_table_state row = {.position_m = {1e3 * v[0], 1e3 * v[1], 1e3 * v[2]},
                                  .velocity_mps = {1e3 * v[3], 1e3 * v[4], 1e3 * v[5]}};
@@ -349,10 +342,11 @@ static bst_status read_row(reader *r) {
         row.t_s = bst_time_diff(t, r->segment.base);
         double step_s = row.t_s - r->oem->rows[r->oem->row_count - 1].t_s;
         if (!(step_s > 0.0)) {
-            return fail_line(r,
-                             step_s == 0.0 ? "the epoch is that of the state before it"
-                                           : "the epoch is before that of the state before it",
-                             "epochs that rise");
+            return bst_text_fail_line(&r->source, &r->line,
+                                      step_s == 0.0
+                                          ? "the epoch is that of the state before it"
+                                          : "the epoch is before that of the state before it",
+                                      "epochs that rise");
         }
         r->largest_step_s = fmax(r->largest_step_s, step_s);
     }
@@ -400,7 +394,8 @@ static bst_status read_covariance(reader *r) {
     bool complete = c->has_epoch && c->rows == 6;
     if (starts_with_word(&r->line, "COVARIANCE_STOP")) {
         if (!complete) {
-            return fail_line(r, "the covariance is not complete", "EPOCH and 6 rows of numbers");
+            return bst_text_fail_line(&r->source, &r->line, "the covariance is not complete",
+                                      "EPOCH and 6 rows of numbers");
         }
         r->where = IN_DATA;
         return BST_OK;
@@ -409,22 +404,25 @@ static bst_status read_covariance(reader *r) {
         bst_text_span name, value;
         bst_time t;
         int k;
-        BST_TRY(split(r, &name, &value));
+        BST_TRY(bst_text_split(&r->source, &r->line, &name, &value));
         BST_TRY(find_key(r, name, names, &k));
         if (k == 0) {
             if (c->has_epoch && !complete) {
-                return fail_line(r, "the covariance before it is not complete",
-                                 "6 rows of numbers");
+                return bst_text_fail_line(&r->source, &r->line,
+                                          "the covariance before it is not complete",
+                                          "6 rows of numbers");
             }
             *c = (covariance){.has_epoch = true};
             return read_date(r, &r->line, value, &t);
         }
         return c->has_epoch && c->rows == 0
                    ? BST_OK
-                   : fail_line(r, "COV_REF_FRAME is in the wrong place", "it after EPOCH");
+                   : bst_text_fail_line(&r->source, &r->line, "COV_REF_FRAME is in the wrong place",
+                                        "it after EPOCH");
     }
     if (!c->has_epoch || c->rows == 6) {
-        return fail_line(r, "a row of a covariance without an EPOCH", "EPOCH = date before it");
+        return bst_text_fail_line(&r->source, &r->line, "a row of a covariance without an EPOCH",
+                                  "EPOCH = date before it");
     }
     bst_text_span rest = {r->line.text, r->line.length}, word;
     int n = 0;
@@ -437,8 +435,10 @@ static bst_status read_covariance(reader *r) {
         n++;
     }
     if (n != ++c->rows) {
-        return fail_line(r, "the row of the covariance has not as many numbers as its place asks",
-                         "the lower triangle: 1 number, then 2, to 6");
+        return bst_text_fail_line(
+            &r->source, &r->line,
+            "the row of the covariance has not as many numbers as its place asks",
+            "the lower triangle: 1 number, then 2, to 6");
     }
     return BST_OK;
 }

@@ -283,3 +283,14 @@ int bst_text_split_csv(const bst_text_line *line, char *scratch, bst_text_span *
         c++;
     }
 }
+
+bst_status bst_text_fail_line(const bst_text_source *source, const bst_text_line *line,
+                              const char *problem, const char *expected) {
+    return bst_text_fail_at(source, line, problem, line->text, line->length, expected);
+}
+
+bst_status bst_text_split(const bst_text_source *source, const bst_text_line *line,
+                          bst_text_span *keyword, bst_text_span *value) {
+    const char *expected, *problem = bst_text_split_keyword(line, keyword, value, &expected);
+    return problem ? bst_text_fail_line(source, line, problem, expected) : BST_OK;
+}

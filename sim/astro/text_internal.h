@@ -40,6 +40,10 @@ bst_status bst_text_fail_at(const bst_text_source *source, const bst_text_line *
                             const char *problem, const char *found, size_t found_length,
                             const char *expected);
 
+/* As bst_text_fail_at; what was found is the whole line. */
+bst_status bst_text_fail_line(const bst_text_source *source, const bst_text_line *line,
+                              const char *problem, const char *expected);
+
 /* BST_ERR_MEMORY with "file: no memory for its WHAT". */
 bst_status bst_text_fail_memory(const bst_text_source *source, const char *what);
 
@@ -73,6 +77,10 @@ bool bst_text_is_plain(bst_text_span span);
  * NULL, or the problem with the line and in *expected what is allowed. */
 const char *bst_text_split_keyword(const bst_text_line *line, bst_text_span *keyword,
                                    bst_text_span *value, const char **expected);
+
+/* As bst_text_split_keyword; BST_ERR_FORMAT with line and what is allowed. */
+bst_status bst_text_split(const bst_text_source *source, const bst_text_line *line,
+                          bst_text_span *keyword, bst_text_span *value) BST_MUST_CHECK;
 
 /* [sign]digits[.digits][(e|E)[sign]digits], also with no digits on one side of the point; the
  * nearest double, in any locale. False for other text and for numbers beyond double. */

@@ -31,7 +31,7 @@ static bool may_give(const char *role, bst_link_type type) {
         {"tracker", BST_LINK_PREDICTIONS},    {"control", BST_LINK_LOS_COMMAND},
         {"control", BST_LINK_SENSOR_COMMAND}, {"control", BST_LINK_CONTROL_STATUS},
         {"gimbal", BST_LINK_POINTING},        {"gimbal", BST_LINK_TARGET_STATES},
-        {"gimbal", BST_LINK_SENSOR_COMMAND},
+        {"gimbal", BST_LINK_SENSOR_COMMAND},  {"gimbal", BST_LINK_TARGET_ATTITUDES},
     };
     for (size_t i = 0; i < sizeof given / sizeof *given; i++) {
         if (given[i].type == type && strcmp(given[i].role, role) == 0) {

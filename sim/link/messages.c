@@ -355,6 +355,17 @@ static const bst_wire_field target_state_items[] = {
     VECTOR(bst_link_target_state, position_gcrf_m, "m", "Geocentric."),
     VECTOR(bst_link_target_state, velocity_gcrf_mps, "m/s", "Geocentric."), END};
 
+static const bst_wire_field target_attitudes[] = {COUNT(bst_link_target_attitudes, "Attitudes."),
+                                                  END};
+
+static const bst_wire_field target_attitude_items[] = {
+    TEXT(bst_link_target_attitude, object,
+         "Its name in the scenario; it has a shape, and its `external_states` is true."),
+    TICK(bst_link_target_attitude, tick, "From when on: not before the step's, in order."),
+    ATTITUDE(bst_link_target_attitude, q_body_from_gcrf, "Attitude of its shape then."),
+    VECTOR(bst_link_target_attitude, rate_body_radps, "rad/s", "Angular velocity, body frame."),
+    END};
+
 static const bst_wire_field pointing[] = {
     COUNT(bst_link_pointing, "Attitudes: 2 for start and end, more for a history."), END};
 
@@ -434,6 +445,11 @@ static const bst_wire_message messages[BST_LINK_TYPES] = {
               bst_link_target_state, target_state_items, 4096,
               "States of steered objects: from its tick on an object moves by two-body motion from "
               "there, until its next state."),
+    [BST_LINK_TARGET_ATTITUDES] =
+        ITEMS("target_attitudes", PEER, bst_link_target_attitudes, items, target_attitudes,
+              bst_link_target_attitude, target_attitude_items, 4096,
+              "Attitudes of steered objects with a shape: from its tick on a shape turns at the "
+              "given rate, until its next attitude."),
 };
 
 const bst_wire_message *bst_wire_message_of(bst_link_type type) {

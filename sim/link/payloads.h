@@ -111,4 +111,17 @@ typedef struct bst_link_target_states {
     bst_link_target_state items[];
 } bst_link_target_states;
 
+/* target_attitudes: attitudes of objects with a shape that the peer commands. */
+typedef struct bst_link_target_attitude {
+    char object[BST_LINK_NAME_BYTES];
+    int64_t tick;
+    bst_quat q_body_from_gcrf;
+    bst_vec3 rate_body_radps;
+} bst_link_target_attitude;
+
+typedef struct bst_link_target_attitudes {
+    int32_t count;
+    bst_link_target_attitude items[];
+} bst_link_target_attitudes;
+
 #endif

@@ -65,6 +65,7 @@ typedef enum bst_link_type {
     BST_LINK_CONTROL_STATUS,
     BST_LINK_POINTING,
     BST_LINK_TARGET_STATES,
+    BST_LINK_TARGET_ATTITUDES,
     BST_LINK_TYPES
 } bst_link_type;
 

@@ -6,8 +6,8 @@
 
 #include "boresight/vec.h"
 #include "sim/astro/bodies.h"
+#include "sim/astro/curve_file.h"
 #include "sim/core/file.h"
-#include "sim/optics/curve_file.h"
 #include "sim/optics/solar_table.h"
 
 #define PLANCK_JS 6.62607015e-34       /* SI, exact */

@@ -1,15 +1,9 @@
 #include "sim/satellite/body_attitude.h"
 
 #include <assert.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
-#include "sim/core/file.h"
 #include "sim/satellite/tumbling.h"
-
-enum { TABLE_ROWS_MAX = 1000000 };
-#define TABLE_BYTES_MAX ((uint64_t)256 << 20)
 
 static const char *const laws[] = {"nadir", "nadir_sun", "velocity", "sun", "inertial",
                                    "spin",  "tumble",    "table",    NULL};
@@ -33,16 +27,14 @@ const bst_config_desc bst_attitude_config_table[] = {
     BST_REALS(bst_attitude_config, inertia_kg_m2, "kg m2", 0, 1e12, "[1, 1, 1]",
               "tumble: principal moments of inertia about the body's axes."),
     BST_PATH(bst_attitude_config, file, "\"\"",
-             "table: CSV file with columns time_s, qx, qy, qz, qw (from GCRF to the body), "
-             "relative to the scenario's folder; interpolated along great circles."),
+             "table: file of attitudes, relative to the scenario's folder: CSV with columns "
+             "time_s, qx, qy, qz, qw (from GCRF to the body), a CCSDS AEM, or the "
+             "frame_updates_file of a sensor; at a constant rate between rows."),
+    BST_STRING(bst_attitude_config, object, "\"\"",
+               "table: object of the AEM (OBJECT_NAME or OBJECT_ID) or of the frame updates; "
+               "empty: the only one."),
     BST_CONFIG_END,
 };
-
-/* An attitude at a time. */
-typedef struct row {
-    double seconds;
-    bst_quat q;
-} row;
 
 typedef struct phase {
     bst_attitude_config config;
@@ -50,13 +42,14 @@ typedef struct phase {
     bst_quat start;
     bool continues; /* start is not yet known */
     bst_tumbling *tumbling;
-    row *rows;
+    bst_attitude_row *rows;
     int row_count;
 } phase;
 
 struct bst_body_attitude {
     phase *phases;
     int count;
+    bst_commanded_attitude *commands; /* NULL: accepts none */
 };
 
 void bst_body_attitude_free(bst_body_attitude *a) {
@@ -65,6 +58,7 @@ void bst_body_attitude_free(bst_body_attitude *a) {
         free(a->phases[i].rows);
     }
     if (a) {
+        bst_commanded_attitude_free(a->commands);
         free(a->phases);
         free(a);
     }
@@ -78,70 +72,18 @@ static bst_quat offset_of(const double deg[3]) {
     return bst_quat_turn_frame(q, (bst_vec3){0, 0, deg[2] * BST_DEG_RAD});
 }
 
-/* Reads the rows of a table of attitudes. */
-static bst_status read_rows(bst_ctx *ctx, const char *path, char *text, phase *p) {
-    int line = 0, capacity = 0;
-    for (char *at = text, *next; at; at = next) {
-        next = strchr(at, '\n');
-        if (next) {
-            *next++ = '\0';
-        }
-        line++;
-        double v[5];
-        at += strspn(at, " \t\r");
-        if (!*at || *at == '#' || strncmp(at, "time_s", 6) == 0) {
-            continue;
-        }
-        int used = 0;
-        bool good = sscanf(at, "%lf ,%lf ,%lf ,%lf ,%lf %n", &v[0], &v[1], &v[2], &v[3], &v[4],
-                           &used) == 5 &&
-                    at[used] == '\0';
-        double norm = good ? sqrt(v[1] * v[1] + v[2] * v[2] + v[3] * v[3] + v[4] * v[4]) : 0.0;
-        if (!good || !(fabs(norm - 1.0) < 1e-3) || !(fabs(v[0]) <= 1e9) ||
-            (p->row_count > 0 && !(v[0] > p->rows[p->row_count - 1].seconds))) {
-            return bst_fail(ctx, BST_ERR_CONFIG,
-                            "file: %.400s: line %d: \"%.60s\" (allowed: time_s, qx, qy, qz, qw: "
-                            "ascending times and unit quaternions)",
-                            path, line, at);
-        }
-        if (p->row_count == capacity) {
-            capacity = capacity ? 2 * capacity : 256;
-            row *rows = p->row_count < TABLE_ROWS_MAX
-                            ? realloc(p->rows, (size_t)capacity * sizeof *rows)
-                            : NULL;
-            if (!rows) {
-                return bst_fail(ctx, BST_ERR_MEMORY, "file: %.400s: no memory for %d rows", path,
-                                capacity);
-            }
-            p->rows = rows;
-        }
-        p->rows[p->row_count++] = (row){v[0], bst_quat_unit((bst_quat){v[1], v[2], v[3], v[4]})};
-    }
-    return p->row_count > 0 ? BST_OK
-                            : bst_fail(ctx, BST_ERR_CONFIG, "file: %.400s: no attitudes", path);
-}
-
-static bst_status load_rows(bst_ctx *ctx, const char *base_dir, phase *p) {
-    char path[1100], *text;
-    size_t bytes;
-    const char *file = p->config.file;
-    if (!*file) {
+static bst_status load_rows(bst_ctx *ctx, const bst_attitude_source *source, phase *p) {
+    const bst_attitude_config *c = &p->config;
+    if (!*c->file) {
         return bst_fail(ctx, BST_ERR_CONFIG, "file: the law table needs a file; give its path");
     }
-    bst_file_resolve(base_dir, file, path, sizeof path);
-    if (bst_file_read(ctx, path, TABLE_BYTES_MAX, "a table of attitudes", &text, &bytes) !=
-        BST_OK) {
-        return bst_fail_prefix(ctx, BST_ERR_CONFIG, "file");
-    }
-    bst_status status = bst_file_check_text(ctx, path, text, bytes);
-    status = status == BST_OK ? read_rows(ctx, path, text, p)
-                              : bst_fail_prefix(ctx, BST_ERR_CONFIG, "file");
-    free(text);
-    return status;
+    bst_status status =
+        bst_attitude_table_load(ctx, source, c->file, c->object, &p->rows, &p->row_count);
+    return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "file");
 }
 
 static bst_status make_phase(bst_ctx *ctx, const bst_attitude_config *config, bool first,
-                             const char *base_dir, phase *p) {
+                             const bst_attitude_source *source, phase *p) {
     const double *q = config->quaternion;
     double norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
     p->config = *config;
@@ -155,7 +97,7 @@ static bst_status make_phase(bst_ctx *ctx, const bst_attitude_config *config, bo
                  config->law == BST_ATTITUDE_TUMBLE;
     p->continues = moves && !(norm > 0.0) && !first;
     if (config->law == BST_ATTITUDE_TABLE) {
-        return load_rows(ctx, base_dir, p);
+        return load_rows(ctx, source, p);
     }
     if (config->law == BST_ATTITUDE_TUMBLE) {
         bst_vec3 rate =
@@ -166,7 +108,7 @@ static bst_status make_phase(bst_ctx *ctx, const bst_attitude_config *config, bo
 }
 
 bst_status bst_body_attitude_create(bst_ctx *ctx, const bst_config_list *phases,
-                                    const char *base_dir, bst_body_attitude **out) {
+                                    const bst_attitude_source *source, bst_body_attitude **out) {
     static const bst_attitude_config nadir = {.from_s = -1e9, .law = BST_ATTITUDE_NADIR};
     const bst_attitude_config *configs = phases->count ? phases->items : &nadir;
     int count = phases->count ? phases->count : 1;
@@ -186,7 +128,7 @@ bst_status bst_body_attitude_create(bst_ctx *ctx, const bst_config_list *phases,
                               "from_s: found %g after %g (allowed: ascending times)",
                               configs[i].from_s, configs[i - 1].from_s);
         } else {
-            status = make_phase(ctx, &configs[i], i == 0, base_dir, &list[i]);
+            status = make_phase(ctx, &configs[i], i == 0, source, &list[i]);
         }
         if (status != BST_OK) {
             status = bst_fail_prefix(ctx, status, "%d", i);
@@ -207,22 +149,6 @@ static bst_quat ahead_frame(bst_vec3 x, bst_vec3 near_z) {
     return bst_quat_look(bst_vec3_norm(z) > 1e-9 ? z : bst_vec3_perpendicular(x), x);
 }
 
-static bst_quat from_table(const phase *p, double seconds) {
-    int low = 0, high = p->row_count - 1;
-    if (seconds <= p->rows[low].seconds || high == 0) {
-        return p->rows[low].q;
-    }
-    if (seconds >= p->rows[high].seconds) {
-        return p->rows[high].q;
-    }
-    while (high - low > 1) {
-        int middle = (low + high) / 2;
-        *(p->rows[middle].seconds <= seconds ? &low : &high) = middle;
-    }
-    const row *a = &p->rows[low], *b = &p->rows[high];
-    return bst_quat_slerp(a->q, b->q, (seconds - a->seconds) / (b->seconds - a->seconds));
-}
-
 static bst_quat phase_at(const phase *p, const bst_attitude_state *s) {
     bst_vec3 down = bst_vec3_scale(bst_vec3_unit(s->position_m), -1.0), speed = s->velocity_mps;
     bst_vec3 ahead = bst_vec3_unit(speed);
@@ -237,7 +163,7 @@ static bst_quat phase_at(const phase *p, const bst_attitude_state *s) {
         case BST_ATTITUDE_INERTIAL:
             return p->start;
         case BST_ATTITUDE_TABLE:
-            return from_table(p, s->seconds);
+            return bst_attitude_table_at(p->rows, p->row_count, s->seconds);
         case BST_ATTITUDE_NADIR_SUN:
             law = bst_quat_look(down, s->sun);
             break;
@@ -280,23 +206,30 @@ void bst_body_attitude_start(bst_body_attitude *a, int index, const bst_attitude
 }
 
 bst_quat bst_body_attitude_at(const bst_body_attitude *a, const bst_attitude_state *state) {
-    return bst_quat_unit(phase_at(phase_for(a, state->seconds), state));
+    bst_quat q;
+    double rate;
+    return a->commands && bst_commanded_attitude_at(a->commands, state->seconds, &q, &rate)
+               ? q
+               : bst_quat_unit(phase_at(phase_for(a, state->seconds), state));
+}
+
+bst_status bst_body_attitude_accept(bst_ctx *ctx, bst_body_attitude *a) {
+    return bst_commanded_attitude_create(ctx, &a->commands);
+}
+
+bst_commanded_attitude *bst_body_attitude_commands(const bst_body_attitude *a) {
+    return a->commands;
 }
 
 double bst_body_attitude_rate_radps(const bst_body_attitude *a, double seconds) {
     const phase *p = phase_for(a, seconds);
+    bst_quat q;
+    double commanded;
+    if (a->commands && bst_commanded_attitude_at(a->commands, seconds, &q, &commanded)) {
+        return commanded;
+    }
     if (p->config.law == BST_ATTITUDE_TABLE) {
-        double most = 0.0;
-        for (int i = 1; i < p->row_count; i++) {
-            const row *x = &p->rows[i - 1], *y = &p->rows[i];
-            if (y->seconds < seconds - 60.0 || x->seconds > seconds + 60.0) {
-                continue;
-            }
-            double dot =
-                fabs(x->q.x * y->q.x + x->q.y * y->q.y + x->q.z * y->q.z + x->q.w * y->q.w);
-            most = fmax(most, 2.0 * acos(fmin(dot, 1.0)) / (y->seconds - x->seconds));
-        }
-        return most;
+        return bst_attitude_table_rate_radps(p->rows, p->row_count, seconds);
     }
     bool turns = p->config.law == BST_ATTITUDE_SPIN || p->config.law == BST_ATTITUDE_TUMBLE;
     double rate = bst_vec3_norm(bst_vec3_from_array(p->config.rate_body_deg_per_s)) * BST_DEG_RAD;

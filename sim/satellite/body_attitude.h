@@ -4,6 +4,8 @@
 
 #include "boresight/config.h"
 #include "boresight/vec.h"
+#include "sim/satellite/attitude_table.h"
+#include "sim/satellite/commanded_attitude.h"
 
 enum {
     BST_ATTITUDE_NADIR,
@@ -25,6 +27,7 @@ typedef struct bst_attitude_config {
     double rate_body_deg_per_s[3];
     double inertia_kg_m2[3];
     char file[512];
+    char object[64]; /* of the file */
 } bst_attitude_config;
 
 extern const bst_config_desc bst_attitude_config_table[];
@@ -41,15 +44,23 @@ typedef struct bst_body_attitude bst_body_attitude;
 
 /* Prepares the phases.
  *
- * Given:     phases    bst_attitude_config, from_s ascending; an empty list: nadir
- *            base_dir  base of relative paths
+ * Given:     phases  bst_attitude_config, from_s ascending; an empty list: nadir
+ *            source  of attitudes from files
  * Returned:  *out  the attitude; NULL on error
  * Errors:    BST_ERR_CONFIG with the key below `attitude`, BST_ERR_MEMORY
  * Ownership: free *out with bst_body_attitude_free */
 bst_status bst_body_attitude_create(bst_ctx *ctx, const bst_config_list *phases,
-                                    const char *base_dir, bst_body_attitude **out) BST_MUST_CHECK;
+                                    const bst_attitude_source *source,
+                                    bst_body_attitude **out) BST_MUST_CHECK;
 /* Frees an attitude; NULL is allowed. */
 void bst_body_attitude_free(bst_body_attitude *attitude);
+
+/* Accepts commands (commanded_attitude.h), which take precedence over the phases from the first one
+ * on. BST_ERR_MEMORY. */
+bst_status bst_body_attitude_accept(bst_ctx *ctx, bst_body_attitude *attitude) BST_MUST_CHECK;
+/* The ring of commands of an attitude; NULL: it accepts none. It belongs to the attitude; threads
+ * may add to it while others read the attitude. */
+bst_commanded_attitude *bst_body_attitude_commands(const bst_body_attitude *attitude);
 
 /* Time at which the next phase starts whose attitude continues that of the phase before (spin or
  * tumble without quaternion), s.

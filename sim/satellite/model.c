@@ -16,6 +16,9 @@ void bst_satellite_free(bst_satellite *s) {
     for (int i = 0; i < s->material_count && s->tables; i++) {
         bst_brdf_table_free(s->tables[i]);
     }
+    for (int i = 0; i < s->joint_count; i++) {
+        bst_curve_free(&s->joints[i].table);
+    }
     free(s->tables);
     free(s->vertices);
     free(s->vertex_joint);
@@ -27,6 +30,7 @@ void bst_satellite_free(bst_satellite *s) {
     free(s->shells);
     free(s->parts);
     free(s->materials);
+    free(s->surfaces);
     free(s->joints);
     free(s);
 }
@@ -56,6 +60,8 @@ static bst_status make_material(bst_ctx *ctx, bst_satellite *s,
     }
     m->scale = c->scale;
     snprintf(m->name, sizeof m->name, "%s", c->name);
+    s->surfaces[s->material_count] = (bst_surface_heat){
+        .absorptance = c->absorptance, .capacity_jpm2k = c->heat_capacity_j_per_m2_k};
     s->material_count++;
     if (c->library == 0 && c->model == BST_BRDF_TABLE) {
         char path[1100];
@@ -111,7 +117,26 @@ static int find_material(const bst_satellite *s, const char *name) {
     return -1;
 }
 
-static bst_status make_joint(bst_ctx *ctx, bst_satellite *s, const bst_satellite_joint_config *c) {
+/* Reads the angles of a joint. */
+static bst_status load_angles(bst_ctx *ctx, const bst_satellite_joint_config *c,
+                              const char *base_dir, bst_curve *out) {
+    static const char *const times[] = {"time_s", NULL}, *const angles[] = {"angle_deg", NULL};
+    const bst_curve_format format = {
+        "a table of a joint's angles", times, angles, -1e9, 1e9, -1e6, 1e6};
+    char path[1100];
+    if (!*c->file) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "file: a joint that follows a table needs a file; "
+                        "give its path");
+    }
+    bst_file_resolve(base_dir, c->file, path, sizeof path);
+    return bst_curve_load(ctx, path, &format, out) == BST_OK
+               ? BST_OK
+               : bst_fail_prefix(ctx, BST_ERR_CONFIG, "file");
+}
+
+static bst_status make_joint(bst_ctx *ctx, bst_satellite *s, const bst_satellite_joint_config *c,
+                             const char *base_dir) {
     bst_joint j = {.parent = -1,
                    .follows = c->follows,
                    .axes = (int)c->axes,
@@ -120,7 +145,9 @@ static bst_status make_joint(bst_ctx *ctx, bst_satellite *s, const bst_satellite
                    .position_m = bst_vec3_from_array(c->position_m),
                    .offset_rad = c->offset_deg * BST_DEG_RAD,
                    .rate_radps = c->rate_deg_per_s * BST_DEG_RAD,
-                   .limit_rad = {c->limit_deg[0] * BST_DEG_RAD, c->limit_deg[1] * BST_DEG_RAD}};
+                   .limit_rad = {c->limit_deg[0] * BST_DEG_RAD, c->limit_deg[1] * BST_DEG_RAD},
+                   .burn = (int)c->burn - 1,
+                   .turn_rad = c->turn_deg * BST_DEG_RAD};
     memcpy(j.name, c->name, sizeof j.name);
     if (find_joint(s, c->name) >= 0) {
         return bst_fail(ctx, BST_ERR_CONFIG,
@@ -144,7 +171,9 @@ static bst_status make_joint(bst_ctx *ctx, bst_satellite *s, const bst_satellite
                         c->limit_deg[0], c->limit_deg[1]);
     }
     s->joints[s->joint_count++] = j;
-    return BST_OK;
+    return j.follows == BST_JOINT_TABLE
+               ? load_angles(ctx, c, base_dir, &s->joints[s->joint_count - 1].table)
+               : BST_OK;
 }
 
 /* Rotation about x, then y, then z. */
@@ -289,11 +318,15 @@ static bst_status allocate(bst_ctx *ctx, int parts, int joints, bst_satellite **
     bst_satellite *s = *out = calloc(1, sizeof *s);
     if (s) {
         s->materials = calloc(BST_SATELLITE_MATERIALS_MAX, sizeof *s->materials);
+        s->surfaces = calloc(BST_SATELLITE_MATERIALS_MAX, sizeof *s->surfaces);
+        for (int i = 0; s->surfaces && i < BST_SATELLITE_MATERIALS_MAX; i++) {
+            s->surfaces[i].absorptance = (double)NAN;
+        }
         s->tables = calloc(BST_SATELLITE_MATERIALS_MAX, sizeof *s->tables);
         s->parts = calloc((size_t)parts + 1, sizeof *s->parts);
         s->joints = calloc((size_t)joints + 1, sizeof *s->joints);
     }
-    return s && s->materials && s->tables && s->parts && s->joints
+    return s && s->materials && s->surfaces && s->tables && s->parts && s->joints
                ? BST_OK
                : bst_fail(ctx, BST_ERR_MEMORY, "no memory for a satellite");
 }
@@ -304,7 +337,7 @@ static bst_status fill(bst_ctx *ctx, bst_satellite *s, const bst_satellite_confi
     BST_TRY(make_materials(ctx, s, &config->materials, base_dir));
     const bst_satellite_joint_config *joints = config->joints.items;
     for (int i = 0; i < config->joints.count; i++) {
-        bst_status status = make_joint(ctx, s, &joints[i]);
+        bst_status status = make_joint(ctx, s, &joints[i], base_dir);
         if (status != BST_OK) {
             return bst_fail_prefix(ctx, status, "/joints/%d", i);
         }
@@ -391,4 +424,28 @@ bst_status bst_satellite_create(bst_ctx *ctx, const bst_satellite_config *config
     }
     *out = s;
     return BST_OK;
+}
+
+void bst_satellite_make_surfaces(bst_satellite *s) {
+    s->has_surfaces = true;
+    /* shares of the sunlight (a black body of 5772 K) nearest to bst_sunlight_wavelength_m:
+     * bounds at 0.475, 0.625 and 0.85 um */
+    static const double share[BST_SUNLIGHT_COLOURS] = {0.215, 0.190, 0.217, 0.378};
+    for (int i = 0; i < s->material_count; i++) {
+        const bst_material *m = &s->materials[i];
+        double colour = 0.0;
+        for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
+            colour += share[k] * m->colour[k];
+        }
+        double *table = s->surfaces[i].reflectance;
+        for (int k = 0; k < BST_REFLECTANCE_POINTS; k++) {
+            /* the models are not defined at grazing incidence */
+            double cosine = fmax((double)k / (BST_REFLECTANCE_POINTS - 1), 0.02);
+            table[k] = m->scale * bst_brdf_reflectance(&m->brdf, cosine);
+        }
+        if (isnan(s->surfaces[i].absorptance)) {
+            double reflected = colour * table[BST_REFLECTANCE_POINTS - 1];
+            s->surfaces[i].absorptance = fmin(fmax(1.0 - reflected, 0.0), 1.0);
+        }
+    }
 }

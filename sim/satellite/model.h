@@ -3,6 +3,7 @@
 #define BST_SATELLITE_MODEL_H
 
 #include "boresight/vec.h"
+#include "sim/astro/curve_file.h"
 #include "sim/satellite/material_library.h"
 #include "sim/satellite/satellite_config.h"
 
@@ -55,6 +56,9 @@ typedef struct bst_joint {
     int axes;
     bst_vec3 axis, normal, position_m;
     double offset_rad, rate_radps, limit_rad[2];
+    bst_curve table; /* BST_JOINT_TABLE: deg by seconds after the epoch; owned by the model */
+    int burn;        /* BST_JOINT_BURN: index of the burn */
+    double turn_rad;
 } bst_joint;
 
 typedef struct bst_satellite_part {
@@ -62,6 +66,16 @@ typedef struct bst_satellite_part {
     int first_facet, facet_count;
     int joint; /* -1: the body */
 } bst_satellite_part;
+
+enum { BST_REFLECTANCE_POINTS = 17 };
+
+/* What a material absorbs: for heat and for the pressure of sunlight. */
+typedef struct bst_surface_heat {
+    double absorptance;    /* of sunlight */
+    double capacity_jpm2k; /* heat capacity of the surface; 0: it follows its load at once */
+    /* in V, at equal steps of the cosine of incidence from 0 to 1 */
+    double reflectance[BST_REFLECTANCE_POINTS];
+} bst_surface_heat;
 
 /* A satellite's model; immutable; several objects and threads may share it. All arrays belong to
  * it. Joint -1 is the body; `edges` and `corner` index `vertices`. */
@@ -76,6 +90,8 @@ typedef struct bst_satellite {
     bst_shell *shells;
     bst_satellite_part *parts;
     bst_material *materials;
+    bst_surface_heat *surfaces; /* by material; see bst_satellite_make_surfaces */
+    bool has_surfaces;
     bst_joint *joints;
     bst_brdf_table **tables; /* of materials; NULL where a material has none */
     int vertex_count, corner_count, edge_count, facet_count, occluder_count, curved_count;
@@ -100,6 +116,11 @@ bst_status bst_satellite_create(bst_ctx *ctx, const bst_satellite_config *config
                                 const char *base_dir, bst_satellite **out) BST_MUST_CHECK;
 /* Frees a model; NULL is allowed. */
 void bst_satellite_free(bst_satellite *satellite);
+
+/* Computes the reflectances of all materials, and the absorptance of those that give none: what
+ * they do not reflect at normal incidence. Needed before heat.h and shape_forces.h, by one thread;
+ * 10 ms a material. */
+void bst_satellite_make_surfaces(bst_satellite *satellite);
 
 /* Reads a model from a file: JSON, or a mesh. Errors and ownership of bst_satellite_create. */
 bst_status bst_satellite_load(bst_ctx *ctx, const char *path, bst_satellite **out) BST_MUST_CHECK;

@@ -36,12 +36,17 @@ typedef struct bst_pose_pair {
 /* A pose: work memory of one thread for one model. */
 typedef struct bst_satellite_pose {
     const bst_satellite *satellite;
-    bst_vec3 *vertices;     /* body frame */
-    bst_vec3 *normals;      /* of facets, body frame */
-    bst_mat3 *rotation;     /* by joint: body frame from joint frame */
-    bst_vec3 *origin;       /* by joint, body frame */
-    bst_pose_view views[2]; /* see bst_pose_look */
-    int *seen;              /* by occluder: facet for which it was last found in the grid */
+    const double *burn_s; /* [burn_count] starts of burns after the epoch, for joints that follow
+                             them; borrowed; set by the owner of the pose; at first none */
+    int burn_count;
+    struct bst_interreflection *interreflection; /* borrowed; NULL: light is reflected
+                                                    once */
+    bst_vec3 *vertices;                          /* body frame */
+    bst_vec3 *normals;                           /* of facets, body frame */
+    bst_mat3 *rotation;                          /* by joint: body frame from joint frame */
+    bst_vec3 *origin;                            /* by joint, body frame */
+    bst_pose_view views[2];                      /* see bst_pose_look */
+    int *seen; /* by occluder: facet for which it was last found in the grid */
     int seen_stamp;
     int stamp;                          /* counts the poses, from 1 */
     bst_pose_pair *pairs;               /* [occluders][occluders]; NULL: too many */
@@ -71,6 +76,12 @@ void bst_satellite_pose_set(bst_satellite_pose *pose, const bst_satellite_aim *a
  * Given:     view       0 or 1
  *            direction  unit, body frame: from the satellite to the light or the observer */
 void bst_pose_look(bst_satellite_pose *pose, int view, bst_vec3 direction);
+
+/* Silhouette of a convex body in a view that bst_pose_look prepared.
+ *
+ * Returned:  number of corners, below 3: none
+ *            *points  counter-clockwise, along the view's x and y; they belong to the pose */
+int bst_pose_outline(bst_satellite_pose *pose, int view, int occluder, const bst_point2 **points);
 
 /* Area of a facet that the bodies of the model hide from none of the directions of the first
  * `views` views, m^2. The facet faces all of these directions.

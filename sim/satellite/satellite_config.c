@@ -5,7 +5,8 @@
 static const char *const brdf_models[] = {"lambert",       "phong",    "ashikhmin_shirley",
                                           "cook_torrance", "binomial", "maxwell_beard",
                                           "table",         NULL};
-static const char *const joint_targets[] = {"fixed", "sun", "earth", "target", "spin", NULL};
+static const char *const joint_targets[] = {"fixed", "sun",   "earth", "target",
+                                            "spin",  "table", "burn",  NULL};
 static const char *const part_kinds[] = {"box",    "plate", "cylinder", "cone",
                                          "sphere", "dish",  "mesh",     NULL};
 static const char *const confidences[] = {"unrated", "guess",    "similar",
@@ -47,6 +48,12 @@ static const bst_config_desc material_table[] = {
     BST_REAL(bst_satellite_material_config, scale, "", 0, 100, "1", "Factor on the reflectance."),
     BST_REAL(bst_satellite_material_config, emissivity, "", 0, 1, "0.8",
              "Emissivity in the thermal infrared."),
+    BST_OPEN_REAL(bst_satellite_material_config, absorptance, "", 0, 1,
+                  "Absorptance of sunlight, for temperatures (brightness.heat_balance), also with "
+                  "a material of the library; null: 1 minus the reflectance at normal incidence."),
+    BST_REAL(bst_satellite_material_config, heat_capacity_j_per_m2_k, "J/(m2 K)", 0, 1e8, "0",
+             "Heat capacity of the surface, for the heat balance transient, also with a material "
+             "of the library; 0: it follows its load at once."),
     BST_CONFIG_END,
 };
 
@@ -56,7 +63,8 @@ static const bst_config_desc joint_table[] = {
                "The joint that carries this one; empty: the body. Parents come first."),
     BST_ENUM(bst_satellite_joint_config, follows, joint_targets, "\"fixed\"",
              "What normal is turned toward: nothing (fixed at offset_deg), the Sun, the Earth's "
-             "centre, the observer (target); spin: it turns at rate_deg_per_s."),
+             "centre, the observer (target); spin: it turns at rate_deg_per_s; table: by a file; "
+             "burn: it turns once, from the start of a burn of the object."),
     BST_INT(bst_satellite_joint_config, axes, "", 1, 2, "1",
             "Number of axes: 1: about axis only; 2: then about the axis perpendicular to axis and "
             "normal, so that normal points there exactly."),
@@ -68,10 +76,19 @@ static const bst_config_desc joint_table[] = {
               "Place of the joint in the parent's frame; parts are placed relative to it."),
     BST_REAL(bst_satellite_joint_config, offset_deg, "deg", -360, 360, "0",
              "Added rotation about axis."),
-    BST_REAL(bst_satellite_joint_config, rate_deg_per_s, "deg/s", -1e4, 1e4, "0",
-             "spin: rate about axis, from offset_deg at the epoch."),
+    BST_REAL(
+        bst_satellite_joint_config, rate_deg_per_s, "deg/s", -1e4, 1e4, "0",
+        "spin: rate about axis, from offset_deg at the epoch; burn: rate of the turn, its sign "
+        "does not count; 0: at once."),
     BST_REALS(bst_satellite_joint_config, limit_deg, "deg", -180, 180, "[-180, 180]",
               "Lowest and highest rotation about axis, before offset_deg."),
+    BST_PATH(bst_satellite_joint_config, file, "\"\"",
+             "table: CSV with columns time_s (after the epoch) and angle_deg, added to offset_deg; "
+             "linear between rows; relative to the folder of the file that names it."),
+    BST_INT(bst_satellite_joint_config, burn, "", 1, 64, "1",
+            "burn: which burn of the object starts the turn; without it the joint stays."),
+    BST_REAL(bst_satellite_joint_config, turn_deg, "deg", -360, 360, "0",
+             "burn: size of the turn about axis, from offset_deg."),
     BST_CONFIG_END,
 };
 

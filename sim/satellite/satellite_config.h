@@ -19,9 +19,19 @@ typedef struct bst_satellite_material_config {
                                             bst_sunlight_wavelength_m */
     double scale;                        /* factor on the BRDF */
     double emissivity;
+    double absorptance; /* NAN: by the reflectance */
+    double heat_capacity_j_per_m2_k;
 } bst_satellite_material_config;
 
-enum { BST_JOINT_FIXED, BST_JOINT_SUN, BST_JOINT_EARTH, BST_JOINT_TARGET, BST_JOINT_SPIN };
+enum {
+    BST_JOINT_FIXED,
+    BST_JOINT_SUN,
+    BST_JOINT_EARTH,
+    BST_JOINT_TARGET,
+    BST_JOINT_SPIN,
+    BST_JOINT_TABLE,
+    BST_JOINT_BURN
+};
 
 typedef struct bst_satellite_joint_config {
     char name[64], parent[64];
@@ -32,6 +42,9 @@ typedef struct bst_satellite_joint_config {
     double position_m[3];
     double offset_deg, rate_deg_per_s;
     double limit_deg[2];
+    char file[512];  /* table */
+    int64_t burn;    /* from 1 */
+    double turn_deg; /* burn */
 } bst_satellite_joint_config;
 
 enum {

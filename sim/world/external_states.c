@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "sim/astro/kepler.h"
+#include "sim/world/scene/object_shape.h"
 #include "sim/world/world_internal.h"
 
 enum { KEPT = 4096 };
@@ -88,6 +89,31 @@ void bst_world_archive(const bst_world *world, bst_archive *archive) {
             bst_external_states_archive(world->objects[i].orbit.external, archive);
         }
     }
+    for (int i = 0; i < world->shape_count; i++) {
+        bst_commanded_attitude *commands = bst_body_attitude_commands(world->shapes[i]->attitude);
+        if (commands) {
+            bst_commanded_attitude_archive(commands, archive);
+        }
+    }
+}
+
+bst_status bst_world_turn(bst_ctx *ctx, const bst_world *world, const char *name, double seconds,
+                          bst_quat q_body_from_gcrf, bst_vec3 rate_body_radps) {
+    int object = bst_world_find_object(world, name);
+    const bst_object_shape *shape = object >= 0 ? world->objects[object].info.shape : NULL;
+    bst_commanded_attitude *commands = shape ? bst_body_attitude_commands(shape->attitude) : NULL;
+    if (!commands) {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND,
+                        "no object \"%.64s\" with a shape whose key \"external_states\" is true",
+                        name);
+    }
+    bst_quat q = q_body_from_gcrf;
+    double norm = sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
+    if (!(fabs(norm - 1.0) < 1e-3)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "%.64s: the quaternion has the length %g (allowed: 1 to 1e-3)", name, norm);
+    }
+    return bst_commanded_attitude_add(ctx, commands, seconds, bst_quat_unit(q), rate_body_radps);
 }
 
 bst_status bst_world_steer(bst_ctx *ctx, const bst_world *world, const char *name, double seconds,

@@ -47,16 +47,21 @@ static const bst_config_desc node_table[] = {
 typedef struct object_config {
     char object[64];
     double start_position_m[3], start_velocity_mps[3], end_position_m[3], end_velocity_mps[3];
+    double start_q_body_from_gcrf[4], end_q_body_from_gcrf[4];
 } object_config;
 
 static const bst_config_desc object_table[] = {
     BST_STRING(object_config, object, NULL, "Name that orbits call it by (states_object)."),
-    BST_REALS(object_config, start_position_m, "m", -1e12, 1e12, NULL,
+    BST_REALS(object_config, start_position_m, "m", -1e12, 1e12, "[0, 0, 0]",
               "Geocentric place at the exposure's start."),
-    BST_REALS(object_config, start_velocity_mps, "m/s", -1e6, 1e6, NULL, "Velocity then."),
-    BST_REALS(object_config, end_position_m, "m", -1e12, 1e12, NULL,
+    BST_REALS(object_config, start_velocity_mps, "m/s", -1e6, 1e6, "[0, 0, 0]", "Velocity then."),
+    BST_REALS(object_config, end_position_m, "m", -1e12, 1e12, "[0, 0, 0]",
               "Geocentric place at the exposure's end."),
-    BST_REALS(object_config, end_velocity_mps, "m/s", -1e6, 1e6, NULL, "Velocity then."),
+    BST_REALS(object_config, end_velocity_mps, "m/s", -1e6, 1e6, "[0, 0, 0]", "Velocity then."),
+    BST_REALS(object_config, start_q_body_from_gcrf, "", -1.001, 1.001, "[0, 0, 0, 0]",
+              "Attitude of its shape at the exposure's start."),
+    BST_REALS(object_config, end_q_body_from_gcrf, "", -1.001, 1.001, "[0, 0, 0, 0]",
+              "Attitude of its shape at the exposure's end."),
     BST_CONFIG_END};
 
 typedef struct frame_config {
@@ -205,6 +210,49 @@ static bst_vec3 vector(const double v[3]) {
     return (bst_vec3){v[0], v[1], v[2]};
 }
 
+/* Reports keys of an object that are missing. */
+static bst_status fail_object(const reader *r, int index, const char *key, const char *problem) {
+    return bst_fail(r->ctx, BST_ERR_CONFIG, "%s: %s/objects/%d/%s: %s", bst_json_name(r->json),
+                    r->path, index, key, problem);
+}
+
+/* Which keys an object of a frame gives. All four of its states, both of its attitudes. */
+static bst_status check_object(const reader *r, int index, bst_frame_object *o,
+                               const object_config *c) {
+    static const char *const keys[] = {"start_position_m",       "start_velocity_mps",
+                                       "end_position_m",         "end_velocity_mps",
+                                       "start_q_body_from_gcrf", "end_q_body_from_gcrf"};
+    const cJSON *list = cJSON_GetObjectItemCaseSensitive(r->node, "objects");
+    const cJSON *node = cJSON_GetArrayItem(list, index);
+    bool given[6];
+    for (int i = 0; i < 6; i++) {
+        given[i] = cJSON_GetObjectItemCaseSensitive(node, keys[i]) != NULL;
+    }
+    o->has_attitudes = given[4] || given[5];
+    o->has_states = given[0] || given[1] || given[2] || given[3] || !o->has_attitudes;
+    for (int i = 0; i < 6; i++) {
+        if (!given[i] && (i < 4 ? o->has_states : o->has_attitudes)) {
+            return fail_object(r, index, keys[i],
+                               i < 4 ? "required (an object has four keys of its states, two of "
+                                       "its attitudes, or all six)"
+                                     : "required with the other key of the attitudes");
+        }
+    }
+    const double *const q[] = {c->start_q_body_from_gcrf, c->end_q_body_from_gcrf};
+    bst_quat *const to[] = {&o->start_q_body_from_gcrf, &o->end_q_body_from_gcrf};
+    for (int i = 0; i < 2 && o->has_attitudes; i++) {
+        double norm =
+            sqrt(q[i][0] * q[i][0] + q[i][1] * q[i][1] + q[i][2] * q[i][2] + q[i][3] * q[i][3]);
+        if (!(fabs(norm - 1.0) <= NORM_SLACK)) {
+            return fail_object(r, index, keys[4 + i],
+                               "not a unit quaternion (allowed: [x, y, z, w] with the scalar w "
+                               "last and a norm of 1 to 1e-5)");
+        }
+        *to[i] = bst_quat_unit((bst_quat){q[i][0], q[i][1], q[i][2], q[i][3]});
+    }
+    return BST_OK;
+}
+
 static bst_status read_objects(reader *r, const bst_config_list *list) {
     bst_frame_updates *u = r->out;
     const object_config *configs = list->items;
@@ -237,6 +285,7 @@ static bst_status read_objects(reader *r, const bst_config_list *list) {
                                 .end_position_m = vector(c->end_position_m),
                                 .end_velocity_mps = vector(c->end_velocity_mps)};
         memcpy(o->name, c->object, sizeof o->name);
+        BST_TRY(check_object(r, i, o, c));
     }
     return BST_OK;
 }

@@ -17,10 +17,13 @@ typedef struct bst_world_pointing_node {
 } bst_world_pointing_node;
 
 /* States of an object at the start and end of one exposure: geocentric, m and m/s, in the frame
- * that the object's orbit names (states_frame). */
+ * that the object's orbit names (states_frame); and its attitudes then. It has one of them or
+ * both. */
 typedef struct bst_frame_object {
     char name[64];
+    bool has_states, has_attitudes;
     bst_vec3 start_position_m, start_velocity_mps, end_position_m, end_velocity_mps;
+    bst_quat start_q_body_from_gcrf, end_q_body_from_gcrf; /* unit */
 } bst_frame_object;
 
 /* Settings that the file gives for one frame. */

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "sim/core/compare.h"
+#include "sim/satellite/interreflection.h"
 #include "sim/world/external_states.h"
 #include "sim/world/orbit/constellation.h"
 #include "sim/world/scene/object_shape.h"
@@ -59,20 +60,53 @@ static bst_status make_brightness(const bst_world_builder *b, const bst_brightne
 }
 
 /* Phases of the attitude that continue the one before start from where that one ends. */
-static bst_status start_attitude(const bst_world_builder *b, const world_object *object,
-                                 bst_body_attitude *attitude) {
+static bst_status start_attitude(const bst_world_builder *b, const bst_object_config *config,
+                                 const world_object *object, bst_body_attitude *attitude) {
+    /* forces on the shape follow from the attitude up to a phase; its own is not yet known */
+    double early_s = config->orbit.forces.shape ? 1e-3 : 0.0;
     int phase = 0;
     double seconds;
     while (bst_body_attitude_next_start(attitude, &phase, &seconds)) {
         bst_world_state state;
         bst_sky_rotation sky;
+        if (early_s > 0.0 && seconds <= config->orbit.state.at_s) {
+            return bst_fail(
+                b->ctx, BST_ERR_CONFIG,
+                "%d/quaternion: missing: with forces.shape a phase that starts at or "
+                "before the time of the orbit's state (found %g s, state at %g s) needs "
+                "its attitude",
+                phase, seconds, config->orbit.state.at_s);
+        }
         BST_TRY(bst_sky_clock_at(b->ctx, b->clock, bst_time_add(b->world->epoch, seconds), &sky));
-        BST_TRY(bst_world_orbit_state(b->ctx, &object->orbit, b->clock, b->world->epoch, seconds,
-                                      true, &state));
+        BST_TRY(bst_world_orbit_state(b->ctx, &object->orbit, b->clock, b->world->epoch,
+                                      seconds - early_s, true, &state));
+        state.position_m = bst_vec3_axpy(state.position_m, early_s, state.velocity_mps);
         bst_vec3 sun = bst_vec3_sub(bst_bodies_sunlight_from(&sky.bodies), state.position_m);
         bst_attitude_state body = {state.position_m, state.velocity_mps, bst_vec3_unit(sun),
                                    seconds};
         bst_body_attitude_start(attitude, phase, &body);
+    }
+    return BST_OK;
+}
+
+/* Keeps the starts of the object's burns for joints that follow them. */
+static bst_status set_burns(bst_ctx *ctx, const bst_config_list *burns, bst_object_shape *shape) {
+    const bst_burn_config *items = burns->items;
+    const bst_satellite *s = shape->satellite;
+    for (int i = 0; i < s->joint_count; i++) {
+        if (s->joints[i].follows == BST_JOINT_BURN && s->joints[i].burn >= burns->count) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "shape: /joints/%d/burn: found %d, but the object has %d burns "
+                            "(allowed: the number of one of its burns, from 1)",
+                            i, s->joints[i].burn + 1, burns->count);
+        }
+    }
+    shape->burn_s = calloc((size_t)burns->count + 1, sizeof *shape->burn_s);
+    if (!shape->burn_s) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for burns");
+    }
+    for (int i = 0; i < burns->count; i++) {
+        shape->burn_s[shape->burn_count++] = items[i].time_s;
     }
     return BST_OK;
 }
@@ -89,22 +123,71 @@ static bst_status make_shape(const bst_world_builder *b, const bst_object_config
                                : "brightness/model: the object has a shape (allowed: \"shape\"; or "
                                  "leave out the shape)");
     }
+    if (config->brightness.heat_balance != BST_HEAT_NONE &&
+        (!given ||
+         (config->external_states && config->brightness.heat_balance == BST_HEAT_TRANSIENT))) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG, "%s: /world/objects/%d/brightness/heat_balance: %s",
+                        b->scenario, index,
+                        given ? "transient follows from the past of the object, which "
+                                "external_states may change (allowed: none, steady)"
+                              : "it needs a shape (allowed: none; or the brightness model shape)");
+    }
+    if (config->brightness.interreflection && !given) {
+        return bst_fail(b->ctx, BST_ERR_CONFIG,
+                        "%s: /world/objects/%d/brightness/interreflection: true, but there is no "
+                        "shape (allowed: false; or the brightness model shape)",
+                        b->scenario, index);
+    }
     if (!given) {
         return BST_OK;
     }
+    const bst_attitude_source source = {b->base_dir, b->world->epoch, bst_world_updates_attitudes,
+                                        b->world};
     bst_object_shape *shape;
     bst_status status =
-        bst_object_shape_create(b->ctx, &config->shape, &config->attitude, b->base_dir, &shape);
+        bst_object_shape_create(b->ctx, &config->shape, &config->attitude, &source, &shape);
+    if (status == BST_OK && config->brightness.interreflection) {
+        shape->interreflection = true;
+        status = bst_interreflection_check(b->ctx, shape->satellite);
+    }
+    if (status == BST_OK) {
+        status = set_burns(b->ctx, &config->burns, shape);
+    }
     if (status != BST_OK) {
+        bst_object_shape_free(shape); /* NULL if it was not made */
         return bst_fail_prefix(b->ctx, status, "%s: /world/objects/%d", b->scenario, index);
     }
     shape->index = b->world->shape_count;
     b->world->shapes[b->world->shape_count++] = shape;
     object->info.shape = shape;
-    status = start_attitude(b, object, shape->attitude);
-    return status == BST_OK ? BST_OK
-                            : bst_fail_prefix(b->ctx, BST_ERR_CONFIG,
-                                              "%s: /world/objects/%d/attitude", b->scenario, index);
+    if (config->orbit.forces.shape || config->brightness.heat_balance != BST_HEAT_NONE) {
+        bst_satellite_make_surfaces(shape->satellite);
+    }
+    if (config->orbit.forces.shape && !config->external_states) {
+        BST_TRY(bst_shape_forces_create(b->ctx, shape->satellite, shape->attitude, shape->burn_s,
+                                        shape->burn_count, &shape->forces));
+    }
+    return config->external_states ? bst_body_attitude_accept(b->ctx, shape->attitude) : BST_OK;
+}
+
+/* Builds the orbit of a listed object; forces may act on its shape. */
+static bst_status build_orbit(const bst_world_builder *b, const bst_object_config *config,
+                              int index, world_object *object) {
+    char path[64];
+    snprintf(path, sizeof path, "/world/objects/%d/orbit", index);
+    bst_world_builder own = *b;
+    double phases[64];
+    const bst_attitude_config *attitude = config->attitude.items;
+    const bst_object_shape *shape = object->info.shape;
+    if (shape && shape->forces) {
+        own.surface = bst_shape_forces_surface(shape->forces);
+        own.phase_s = phases;
+        for (int i = 0; i < config->attitude.count && i < 64; i++) {
+            phases[own.phase_count++] = attitude[i].from_s;
+        }
+    }
+    return bst_world_orbit_build(&own, &config->orbit, &config->burns, path, object->info.name,
+                                 &object->orbit, &object->info.norad);
 }
 
 /* Refuses the brightness model shape where objects have none. */
@@ -137,15 +220,20 @@ static bst_status build_listed(const bst_world_builder *b, const bst_config_list
         object->info.area_m2 = config->area_m2;
         object->info.albedo = config->albedo;
         BST_TRY(make_brightness(b, &config->brightness, "objects", i, &object->info.brightness));
-        char path[64];
-        snprintf(path, sizeof path, "/world/objects/%d/orbit", i);
         world->object_count = i + 1;
-        BST_TRY(bst_world_orbit_build(b, &config->orbit, &config->burns, path, object->info.name,
-                                      &object->orbit, &object->info.norad));
+        if (config->occults) {
+            world->occulters[world->occulter_count++] = i;
+        }
+        BST_TRY(make_shape(b, config, i, object));
+        BST_TRY(build_orbit(b, config, i, object));
         if (config->external_states) {
             BST_TRY(bst_external_states_create(b->ctx, &object->orbit.external));
         }
-        BST_TRY(make_shape(b, config, i, object));
+        if (object->info.shape &&
+            start_attitude(b, config, object, object->info.shape->attitude) != BST_OK) {
+            return bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: /world/objects/%d/attitude",
+                                   b->scenario, i);
+        }
         bst_name_index_add(world->object_names, object->info.name, i);
     }
     return BST_OK;
@@ -319,7 +407,8 @@ static bst_status build_all(const bst_world_builder *b, const bst_world_config *
                                       (size_t)config->constellations.count + 1,
                                   sizeof(bst_brightness *));
     b->world->shapes = calloc((size_t)config->objects.count + 1, sizeof(bst_object_shape *));
-    if (!b->world->brightness || !b->world->shapes) {
+    b->world->occulters = calloc((size_t)config->objects.count + 1, sizeof(int));
+    if (!b->world->brightness || !b->world->shapes || !b->world->occulters) {
         return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for %d objects",
                         config->objects.count);
     }

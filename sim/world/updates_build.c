@@ -61,43 +61,111 @@ const bst_frame_updates *bst_world_frame_updates(const bst_world *world, int obs
     return NULL;
 }
 
-bst_status bst_world_updates_injected(const bst_world_builder *b, const char *path,
-                                      bst_state_table **out) {
-    const world_updates *from = NULL;
-    for (int i = 0; i < b->world->updates_count && !from; i++) {
-        if (strcmp(bst_frame_updates_name(b->world->updates[i].file), path) == 0) {
-            from = &b->world->updates[i];
+/* The sensor whose frame updates a file is. */
+static bst_status find_updates(bst_ctx *ctx, const bst_world *world, const char *path,
+                               const char *other, const world_updates **out) {
+    *out = NULL;
+    for (int i = 0; i < world->updates_count && !*out; i++) {
+        if (strcmp(bst_frame_updates_name(world->updates[i].file), path) == 0) {
+            *out = &world->updates[i];
         }
     }
-    if (!from) {
-        return bst_fail(b->ctx, BST_ERR_CONFIG,
-                        "%s: is no sensor's frame_updates_file, so that its frames have no times "
-                        "(allowed: a .csv file of states, or the frame_updates_file of a sensor)",
-                        path);
+    return *out ? BST_OK
+                : bst_fail(ctx, BST_ERR_CONFIG,
+                           "%s: is no sensor's frame_updates_file, so that its frames have no "
+                           "times (allowed: %s, or the frame_updates_file of a sensor)",
+                           path, other);
+}
+
+/* Number of objects in all frames. */
+static int64_t count_objects(const bst_frame_updates *updates) {
+    int64_t total = 0;
+    for (int i = 0; i < bst_frame_updates_count(updates); i++) {
+        total += bst_frame_updates_item(updates, i)->object_count;
     }
-    int64_t total = 0, n = 0;
-    for (int i = 0; i < bst_frame_updates_count(from->file); i++) {
-        total += bst_frame_updates_item(from->file, i)->object_count;
-    }
+    return total;
+}
+
+bst_status bst_world_updates_injected(const bst_world_builder *b, const char *path,
+                                      bst_state_table **out) {
+    const world_updates *from;
+    BST_TRY(find_updates(b->ctx, b->world, path, "a .csv file of states", &from));
+    int64_t total = count_objects(from->file), n = 0, kept = 0;
     bst_state_table_frame *frames = calloc((size_t)total + 1, sizeof *frames);
     if (!frames) {
         return bst_fail(b->ctx, BST_ERR_MEMORY, "%s: no memory for its states", path);
     }
     bst_frame_cursor c = bst_frame_cursor_begin(from->file, &from->camera, &from->exposure, 0.0);
     for (; n < total; bst_frame_cursor_next(&c)) {
-        for (int k = 0; c.update && k < c.update->object_count; k++) {
+        for (int k = 0; c.update && k < c.update->object_count; k++, n++) {
             const bst_frame_object *o = &c.update->objects[k];
-            frames[n++] = (bst_state_table_frame){.object = o->name,
-                                                  .number = c.frame,
-                                                  .start_s = c.start_s,
-                                                  .end_s = c.start_s + c.exposure_s,
-                                                  .start_position_m = o->start_position_m,
-                                                  .start_velocity_mps = o->start_velocity_mps,
-                                                  .end_position_m = o->end_position_m,
-                                                  .end_velocity_mps = o->end_velocity_mps};
+            if (!o->has_states) {
+                continue;
+            }
+            frames[kept++] = (bst_state_table_frame){.object = o->name,
+                                                     .number = c.frame,
+                                                     .start_s = c.start_s,
+                                                     .end_s = c.start_s + c.exposure_s,
+                                                     .start_position_m = o->start_position_m,
+                                                     .start_velocity_mps = o->start_velocity_mps,
+                                                     .end_position_m = o->end_position_m,
+                                                     .end_velocity_mps = o->end_velocity_mps};
         }
     }
-    bst_status status = bst_state_table_create(b->ctx, path, frames, total, out);
+    bst_status status = bst_state_table_create(b->ctx, path, frames, kept, out);
     free(frames);
     return status;
+}
+
+/* Name of the only object with attitudes; NULL: there are several. */
+static const char *only_object(const bst_frame_updates *updates) {
+    const char *only = "";
+    for (int i = 0; i < bst_frame_updates_count(updates); i++) {
+        const bst_frame_update *update = bst_frame_updates_item(updates, i);
+        for (int k = 0; k < update->object_count; k++) {
+            const bst_frame_object *o = &update->objects[k];
+            if (o->has_attitudes && *only && strcmp(only, o->name) != 0) {
+                return NULL;
+            }
+            only = o->has_attitudes ? o->name : only;
+        }
+    }
+    return only;
+}
+
+bst_status bst_world_updates_attitudes(bst_ctx *ctx, const void *world, const char *path,
+                                       const char *object, bst_attitude_row **rows, int *count) {
+    const world_updates *from;
+    *rows = NULL;
+    *count = 0;
+    BST_TRY(find_updates(ctx, world, path, "CSV, CCSDS AEM", &from));
+    const char *name = *object ? object : only_object(from->file);
+    if (!name) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: attitudes of several objects; give \"object\", the name of one", path);
+    }
+    int64_t total = count_objects(from->file), n = 0;
+    if (total > INT32_MAX / 2 || !(*rows = calloc(2 * (size_t)total + 1, sizeof **rows))) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "%s: no memory for its attitudes", path);
+    }
+    bst_frame_cursor c = bst_frame_cursor_begin(from->file, &from->camera, &from->exposure, 0.0);
+    for (; n < total; bst_frame_cursor_next(&c)) {
+        for (int k = 0; c.update && k < c.update->object_count; k++, n++) {
+            const bst_frame_object *o = &c.update->objects[k];
+            if (o->has_attitudes && strcmp(o->name, name) == 0) {
+                (*rows)[(*count)++] = (bst_attitude_row){c.start_s, o->start_q_body_from_gcrf};
+                (*rows)[(*count)++] =
+                    (bst_attitude_row){c.start_s + c.exposure_s, o->end_q_body_from_gcrf};
+            }
+        }
+    }
+    if (*count == 0) {
+        free(*rows);
+        *rows = NULL;
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "%s: no attitudes of an object \"%.64s\" (allowed: an object with "
+                        "start_q_body_from_gcrf and end_q_body_from_gcrf)",
+                        path, name);
+    }
+    return BST_OK;
 }

@@ -211,7 +211,11 @@ bst_status bst_world_create(bst_ctx *ctx, const char *scenario, const bst_world_
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the world");
     }
     world->epoch = epoch;
-    bst_world_builder b = {ctx, scenario, base_dir, world, NULL, &config->constellations};
+    bst_world_builder b = {.ctx = ctx,
+                           .scenario = scenario,
+                           .base_dir = base_dir,
+                           .world = world,
+                           .constellations = &config->constellations};
     bst_status status = build(&b, config, observers);
     bst_sky_clock_free(b.clock);
     if (status != BST_OK) {
@@ -249,6 +253,7 @@ void bst_world_free(bst_world *world) {
     for (int i = 0; i < world->shape_count; i++) {
         bst_object_shape_free(world->shapes[i]);
     }
+    free(world->occulters);
     free(world->shapes);
     bst_world_files_free(world);
     bst_world_updates_free(world);

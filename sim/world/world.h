@@ -70,6 +70,11 @@ int bst_world_find_object(const bst_world *world, const char *name);
  * object accepts states; BST_ERR_ARGUMENT: not later than the previous state. */
 bst_status bst_world_steer(bst_ctx *ctx, const bst_world *world, const char *name, double seconds,
                            const bst_world_state *state) BST_MUST_CHECK;
+/* Sets the attitude of the shape of an externally commanded object from `seconds` after the epoch;
+ * it turns at the given rate (body frame) until the next command. BST_ERR_NOT_FOUND: no such object
+ * accepts attitudes; BST_ERR_ARGUMENT: not later than the previous one, or no unit quaternion. */
+bst_status bst_world_turn(bst_ctx *ctx, const bst_world *world, const char *name, double seconds,
+                          bst_quat q_body_from_gcrf, bst_vec3 rate_body_radps) BST_MUST_CHECK;
 /* Archives what a run changes of the world: the states of externally commanded objects. All other
  * members are constant or caches whose values depend on the time alone; so are those of
  * bst_world_view. */

@@ -11,6 +11,11 @@ typedef struct bst_world_builder {
     bst_world *world;     /* under construction; epoch and Earth orientation are set */
     bst_sky_clock *clock;
     const bst_config_list *constellations; /* bst_constellation_config */
+    /* of the object whose orbit is built: its surface, NULL: none, and the starts of the phases of
+     * its attitude */
+    const bst_force_surface *surface;
+    const double *phase_s;
+    int phase_count;
 } bst_world_builder;
 
 /* A file path, joined to the scenario's folder if relative. */
@@ -46,6 +51,16 @@ void bst_world_updates_free(bst_world *world);
  * the file. */
 bst_status bst_world_updates_injected(const bst_world_builder *b, const char *path,
                                       bst_state_table **out) BST_MUST_CHECK;
+/* Attitudes of an object from a frame_updates_file: at start and end of its frames.
+ *
+ * Given:     world   bst_world under construction, with its frame updates
+ *            path    the file; it must be that of a sensor
+ *            object  its name in the file; "": the only one with attitudes
+ * Returned:  *rows   [*count] times after the epoch; the caller frees it
+ * Errors:    BST_ERR_CONFIG with the file, BST_ERR_MEMORY */
+bst_status bst_world_updates_attitudes(bst_ctx *ctx, const void *world, const char *path,
+                                       const char *object, bst_attitude_row **rows,
+                                       int *count) BST_MUST_CHECK;
 
 /* Closes the files of orbits of a world. */
 void bst_world_files_free(bst_world *world);

@@ -84,6 +84,8 @@ const bst_config_desc bst_object_config_table[] = {
              "Its states may come while the run goes, from the peer of an external gimbal; the cue "
              "does not know of them."),
     BST_FORMER("steered", "external_states"),
+    BST_BOOL(bst_object_config, occults, "false",
+             "Whether it hides other objects behind it and casts its shadow on them."),
     BST_CONFIG_END,
 };
 

@@ -48,6 +48,7 @@ typedef struct bst_force_config {
     char gravity[512]; /* "builtin", "two_body", "j6" or a path as below */
     int64_t degree, order;
     bool sun, moon, solar_pressure, drag;
+    bool shape; /* pressure and drag on the object's shape */
     double density_scale;
     double tolerance;
 } bst_force_config;
@@ -92,6 +93,7 @@ typedef struct bst_object_config {
     bst_brightness_config brightness;
     bst_config_list burns; /* bst_burn_config, sorted by time */
     bool external_states;
+    bool occults;
     bst_satellite_config shape;
     bst_config_list attitude; /* bst_attitude_config, sorted by time */
 } bst_object_config;

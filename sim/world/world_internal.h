@@ -101,6 +101,8 @@ struct bst_world {
     int brightness_count;
     struct bst_object_shape **shapes; /* of the objects that have one */
     int shape_count;
+    int *occulters; /* objects that hide others and take their sunlight */
+    int occulter_count;
     bst_name_index *object_names;
     bst_world_file *files;
     int file_count;

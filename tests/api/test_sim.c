@@ -275,6 +275,39 @@ static void states_of_objects(void **state) {
     bst_model_free(model);
 }
 
+/* Attitudes of an object with a shape, by command; each sim has its own, also when it is saved. */
+static void attitudes_of_objects(void **state) {
+    (void)state;
+    static const char *const shaped[] = {
+        "/world/objects/0/external_states=true", "/world/objects/0/brightness/model=\"shape\"",
+        "/world/objects/0/shape={\"materials\": [{\"name\": \"w\", \"diffuse\": 0.5}], "
+        "\"parts\": [{\"name\": \"p\", \"kind\": \"plate\", \"material\": \"w\"}]}"};
+    bst_ctx ctx;
+    bst_model *model = load(&ctx, main_scenario, shaped, 3);
+    bst_sim *sim = create(&ctx, model), *other = create(&ctx, model);
+    const bst_quat q = {0.0, 0.6, 0.0, 0.8}, wrong = {0.0, 0.6, 0.0, 0.9};
+    const bst_vec3 rate = {0.0, 0.1, 0.0};
+    bst_assert_ok(&ctx, bst_sim_command_attitude(&ctx, sim, "INMARSAT GX5", 1.0, q, rate));
+    assert_int_equal(bst_sim_command_attitude(&ctx, sim, "INMARSAT GX5", 1.0, q, rate),
+                     BST_ERR_ARGUMENT);
+    bst_assert_ok(&ctx, bst_sim_command_attitude(&ctx, other, "INMARSAT GX5", 0.5, q, rate));
+    assert_int_equal(bst_sim_command_attitude(&ctx, sim, "INMARSAT GX5", 2.0, wrong, rate),
+                     BST_ERR_ARGUMENT);
+    assert_int_equal(bst_sim_command_attitude(&ctx, sim, "NONE", 2.0, q, rate), BST_ERR_NOT_FOUND);
+    bst_assert_ok(&ctx, bst_sim_command_attitude(&ctx, sim, "INMARSAT GX5", 9.0, q, rate));
+    void *saved;
+    size_t bytes;
+    bst_assert_ok(&ctx, bst_sim_save(&ctx, sim, &saved, &bytes));
+    bst_assert_ok(&ctx, bst_sim_restore(&ctx, other, saved, bytes, BST_STATE_ALL));
+    /* the commands came along: a time before the last one is an error there too */
+    assert_int_equal(bst_sim_command_attitude(&ctx, other, "INMARSAT GX5", 8.0, q, rate),
+                     BST_ERR_ARGUMENT);
+    bst_state_free(saved);
+    bst_sim_free(sim);
+    bst_sim_free(other);
+    bst_model_free(model);
+}
+
 /* ---- saved states ---- */
 
 static void clones_go_the_same_way(void **state) {
@@ -428,6 +461,7 @@ int main(void) {
         cmocka_unit_test(a_hundred_sims),
         cmocka_unit_test(commands_to_external_modules),
         cmocka_unit_test(states_of_objects),
+        cmocka_unit_test(attitudes_of_objects),
         cmocka_unit_test(clones_go_the_same_way),
         cmocka_unit_test(clones_keep_their_frames),
         cmocka_unit_test(restores_components),

@@ -296,6 +296,11 @@ class Driver(unittest.TestCase):
             orbit["elements_file"] = os.path.join(folder, orbit["elements_file"])
         del scenario["$schema"]
         scenario["world"]["objects"][0]["external_states"] = True
+        scenario["world"]["objects"].append({
+            "name": "shaped", "external_states": True, "brightness": {"model": "shape"},
+            "orbit": scenario["world"]["objects"][0]["orbit"],
+            "shape": {"materials": [{"name": "w", "diffuse": 0.5}],
+                      "parts": [{"name": "p", "kind": "plate", "material": "w"}]}})
         sensor = scenario["observers"][0]["sensors"][0]
         sensor["modules"] = {"gimbal": {"type": "external"},
                              "scenegen": {"type": "opencl"}}
@@ -385,12 +390,18 @@ class Driver(unittest.TestCase):
                     step.send_states([("nobody", 1200, *state), ("INMARSAT GX5", 1000, *state),
                                       ("INMARSAT GX5", 1300, *state),
                                       ("INMARSAT GX5", 1300, *state)])
+                    turn = ([0, 0, 0, 1], [0, 0, 0.1])
+                    step.send_attitudes([("nobody", 1200, *turn), ("shaped", 1000, *turn),
+                                         ("INMARSAT GX5", 1300, *turn), ("shaped", 1300, *turn),
+                                         ("shaped", 1300, *turn)])
         ended(run)
         count = counters(out)
-        self.assertEqual(count["target_state_refused"], 3)
+        self.assertEqual(count["target_state_refused"], 7)
         self.assertEqual(count["pointing_held"], 1)
         events = "\n".join(boresight.read_run(out).table("events")["text"])
         for text in ('no object "nobody"', "before the step", "in the order of time",
+                     'no object "INMARSAT GX5" with a shape', "an attitude at",
+                     "target_attitudes, item 1: its tick",
                      "the line of sight stays"):
             self.assertIn(text, events)
 

@@ -27,7 +27,8 @@ CLOSED = [
     lambda s: s.view("exposure"), lambda s: s.save(), lambda s: s.restore(b"x"),
     lambda s: s.clone(), lambda s: list(s.frames()), lambda s: s.counters, lambda s: s.observe(),
     lambda s: setattr(s, "detections", []), lambda s: s.command_pointing([0], [0, 0, 0, 1]),
-    lambda s: s.command_state("a", 0, [0, 0, 0], [0, 0, 0]), lambda s: pickle.dumps(s),
+    lambda s: s.command_state("a", 0, [0, 0, 0], [0, 0, 0]),
+    lambda s: s.command_attitude("a", 0, [0, 0, 0, 1]), lambda s: pickle.dumps(s),
     lambda s: copy.deepcopy(s), lambda s: s.sensor("neossat/telescope").tracks,
 ]
 
@@ -78,6 +79,10 @@ def wrong_calls(sim):
                       ("INMARSAT GX5", 1, [7e6, 0, 0], [0, 7e3, 0]),
                       ("INMARSAT GX5", 1, [np.inf, 0, 0], [0, 0, 0])):
         yield lambda a=arguments: sim.command_state(*a)
+    for arguments in ((5, 1, [0, 0, 0, 1]), ("INMARSAT GX5", 1, [0, 0, 1]),
+                      ("INMARSAT GX5", 1, [0, 0, 0, 1], "abc"), ("nobody", 1, [0, 0, 0, 1]),
+                      ("INMARSAT GX5", np.nan, [0, 0, 0, 1]), ("INMARSAT GX5", 1, [0, 0, 0, 1])):
+        yield lambda a=arguments: sim.command_attitude(*a)
     for value in (5, "text", None, [], b"", b"x", b"BSTSTATE" + bytes(400), bytearray(1000),
                   bst.Snapshot(b"y" * 300)):
         yield lambda v=value: sim.restore(v)

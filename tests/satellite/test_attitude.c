@@ -49,11 +49,14 @@ static void symmetric_top_has_its_closed_form(void **state) {
     bst_tumbling_free(t);
 }
 
+/* Files relative to the working folder; no frame updates. */
+static const bst_attitude_source from = {.base_dir = ""};
+
 static bst_quat attitude_at(const bst_attitude_config *c, int count, const bst_attitude_state *s) {
     bst_ctx ctx = {0};
     bst_body_attitude *a;
     bst_config_list list = {(void *)c, count};
-    bst_assert_ok(&ctx, bst_body_attitude_create(&ctx, &list, "", &a));
+    bst_assert_ok(&ctx, bst_body_attitude_create(&ctx, &list, &from, &a));
     int phase = 0;
     double seconds;
     while (bst_body_attitude_next_start(a, &phase, &seconds)) {
@@ -120,7 +123,7 @@ static void wrong_attitudes_are_refused(void **state) {
         bst_ctx ctx = {0};
         bst_body_attitude *a;
         bst_config_list list = {(void *)&wrong[i], 1};
-        assert_int_equal(bst_body_attitude_create(&ctx, &list, "", &a), BST_ERR_CONFIG);
+        assert_int_equal(bst_body_attitude_create(&ctx, &list, &from, &a), BST_ERR_CONFIG);
         assert_null(a);
         assert_non_null(strstr(ctx.message, reasons[i]));
     }

@@ -1,4 +1,6 @@
 /* Light of shapes against closed forms and against rays. */
+#include <unistd.h>
+
 #include "tests/satellite/satellite_support.h"
 
 #define WHITE "\"materials\": [{\"name\": \"w\", \"diffuse\": 0.8}]"
@@ -198,6 +200,48 @@ static void shadows_agree_with_rays(void **state) {
     bst_test_model_close(&m);
 }
 
+/* A joint by a table, and one that a burn turns. */
+static void joints_follow_tables_and_burns(void **state) {
+    (void)state;
+    char path[BST_TEST_PATH], text[1200];
+    bst_test_template(path, "boresight_joint");
+    int fd = mkstemp(path);
+    assert_true(fd >= 0);
+    FILE *f = fdopen(fd, "w");
+    fputs("time_s,angle_deg\n10,0\n20,40\n30,40\n", f);
+    fclose(f);
+    snprintf(text, sizeof text,
+             "{" WHITE
+             ", \"joints\": [{\"name\": \"t\", \"follows\": \"table\", \"file\": \"%s\", "
+             "\"axis\": [1, 0, 0], \"offset_deg\": 5}, {\"name\": \"b\", \"follows\": \"burn\", "
+             "\"burn\": 2, \"turn_deg\": -60, \"rate_deg_per_s\": 3, \"axis\": [1, 0, 0], "
+             "\"offset_deg\": 10}], \"parts\": [{\"name\": \"p\", \"kind\": \"plate\", "
+             "\"joint\": \"t\", \"material\": \"w\"}, {\"name\": \"q\", \"kind\": \"plate\", "
+             "\"position_m\": [5, 0, 0], \"joint\": \"b\", \"material\": \"w\"}]}",
+             path);
+    bst_test_model m = bst_test_model_open(text);
+    static const double burns[] = {3, 20};
+    m.pose->burn_s = burns;
+    m.pose->burn_count = 2;
+    /* front and back of each plate: facets 0 and 2 are the fronts */
+    static const double when[] = {0, 15, 22, 35, 50}, table[] = {5, 25, 45, 45, 45},
+                        burn[] = {10, 10, 4, -35, -50};
+    for (int i = 0; i < 5; i++) {
+        bst_satellite_pose_set(m.pose,
+                               &(bst_satellite_aim){{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, when[i]});
+        for (int k = 0; k < 2; k++) {
+            bst_vec3 n = m.pose->normals[2 * k];
+            double deg = atan2(-n.y, n.z) / BST_DEG_RAD;
+            bst_assert_close(deg, k ? burn[i] : table[i], 1e-9);
+        }
+    }
+    m.pose->burn_count = 1; /* without that burn it stays */
+    bst_satellite_pose_set(m.pose, &(bst_satellite_aim){{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, 50});
+    bst_assert_close(atan2(-m.pose->normals[2].y, m.pose->normals[2].z) / BST_DEG_RAD, 10, 1e-9);
+    bst_test_model_close(&m);
+    unlink(path);
+}
+
 static void panels_follow_the_sun(void **state) {
     (void)state;
     bst_test_model m = bst_test_model_open(CROWDED);
@@ -340,6 +384,7 @@ int main(void) {
         cmocka_unit_test(cone_is_the_sum_of_strips),
         cmocka_unit_test(shadow_of_a_plate_is_exact),
         cmocka_unit_test(shadows_agree_with_rays),
+        cmocka_unit_test(joints_follow_tables_and_burns),
         cmocka_unit_test(panels_follow_the_sun),
         cmocka_unit_test(joints_spin_by_the_right_hand),
         cmocka_unit_test(glint_has_the_width_of_the_sun),

@@ -112,6 +112,12 @@ static const struct {
      {"(frame 4)/pixel_scale_arcsec", "out of range", "", ""}},
     {FILE_OF("{\"frame\": 4, \"objects\": [{\"object\": \"A\"}]}"),
      {"(frame 4)/objects/0/start_position_m", "required", "", ""}},
+    {FILE_OF("{\"frame\": 4, \"objects\": [{\"object\": \"A\", \"start_q_body_from_gcrf\": " Q
+             "}]}"),
+     {"(frame 4)/objects/0/end_q_body_from_gcrf", "required", "", ""}},
+    {FILE_OF("{\"frame\": 4, \"objects\": [{\"object\": \"A\", \"start_q_body_from_gcrf\": " Q
+             ", \"end_q_body_from_gcrf\": [0, 0, 0, 0]}]}"),
+     {"(frame 4)/objects/0/end_q_body_from_gcrf", "unit quaternion", "", ""}},
     {FILE_OF("{\"frame\": 4, \"exposure_s\": 0, \"objects\": [{\"object\": \"A\", "
              "\"start_position_m\": [7e6, 1, 2], \"start_velocity_mps\": [1, 2, 3], "
              "\"end_position_m\": [7e6, 5, 6], \"end_velocity_mps\": [4, 5, 6]}]}"),

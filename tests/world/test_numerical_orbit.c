@@ -252,8 +252,116 @@ static void the_rendezvous_closes_to_200_m(void **state) {
     bst_json_free(json);
 }
 
+/* An orbit under sunlight and air; `object`: more keys of the object; `forces`: of its forces. */
+#define FORCED(name, semi_axis, object, forces)                                              \
+    "{\"name\": \"" name "\", " object                                                       \
+    "\"orbit\": {\"source\": \"numerical\", \"state\": {"                                    \
+    "\"source\": \"keplerian\", \"semi_major_axis_m\": " semi_axis                           \
+    ", \"inclination_deg\": 30}, "                                                           \
+    "\"forces\": {\"gravity\": \"two_body\", \"sun\": false, \"moon\": false, " forces       \
+    "}, \"spacecraft\": {\"mass_kg\": 10, \"drag_area_m2\": 3.14159265358979, \"cd\": 2.2, " \
+    "\"srp_area_m2\": 3.14159265358979, \"cr\": 1.2222222222222222}}}"
+#define BALL                                                                                    \
+    "\"brightness\": {\"model\": \"shape\"}, \"shape\": {\"materials\": [{\"name\": \"w\", "    \
+    "\"diffuse\": 0.5}], \"parts\": [{\"name\": \"s\", \"kind\": \"sphere\", \"radius_m\": 1, " \
+    "\"segments\": 48, \"material\": \"w\"}]}, "
+
+/* A Lambertian sphere moves as the sphere of the same area with the coefficient 1 + 4/9 of its
+ * reflectance, in sunlight with the Earth's shadow and in air. */
+static void a_round_shape_moves_as_a_sphere(void **state) {
+    (void)state;
+    static const char objects[] = FORCED("free", "2e7", "", "\"solar_pressure\": false, "
+                                                            "\"drag\": false") ", "
+        FORCED("ball", "2e7", BALL, "\"shape\": true, \"drag\": false") ", "
+        FORCED("sphere", "2e7", "", "\"drag\": false") ", "
+        FORCED("low", "6.68e6", "", "\"solar_pressure\": false, \"drag\": false") ", "
+        FORCED("low ball", "6.68e6", BALL, "\"shape\": true, \"solar_pressure\": false") ", "
+        FORCED("low sphere", "6.68e6", "", "\"solar_pressure\": false");
+    bst_world *world = test_world_with(objects, "");
+    bst_world_view *view = view_of(world);
+    static const double span[] = {86400, 6000};
+    for (int k = 0; k < 2; k++) {
+        bst_vec3 none = object_at(view, 3 * k, span[k]).position_m;
+        bst_vec3 ball = object_at(view, 3 * k + 1, span[k]).position_m;
+        bst_vec3 sphere = object_at(view, 3 * k + 2, span[k]).position_m;
+        double moved = test_distance(none, sphere);
+        assert_true(moved > 100);
+        /* facets of 7.5 degrees: 0.6 % of the area */
+        bst_assert_close(test_distance(ball, sphere), 0, 1e-2 * moved);
+    }
+    bst_world_view_free(view);
+    bst_world_free(world);
+}
+
+#define PANEL(phases)                                                                          \
+    "\"brightness\": {\"model\": \"shape\"}, \"shape\": {\"materials\": [{\"name\": \"b\"}], " \
+    "\"parts\": [{\"name\": \"p\", \"kind\": \"plate\", \"size_m\": [3, 3, 1], \"material\": " \
+    "\"b\"}]}, \"attitude\": [" phases "], "
+
+/* The states of an orbit whose plate loses its attitude do not depend on the order of requests; the
+ * plate drags by its area: edge-on not at all. */
+static void a_plate_moves_by_its_attitude(void **state) {
+    (void)state;
+    static const char objects[] = FORCED(
+        "turns", "6.68e6", PANEL("{\"law\": \"velocity\", \"rotation_deg\": [0, 90, 0]}, {\"from_s\": "
+                                 "900, \"law\": \"spin\", \"rate_body_deg_per_s\": [0.3, 0.1, 0]}"),
+        "\"shape\": true, \"solar_pressure\": false") ", "
+        FORCED("edge", "6.68e6", PANEL("{\"law\": \"velocity\"}"),
+               "\"shape\": true, \"solar_pressure\": false") ", "
+        FORCED("none", "6.68e6", "", "\"solar_pressure\": false, \"drag\": false");
+    bst_world *world = test_world_with(objects, ""), *other = test_world_with(objects, "");
+    bst_world_view *view = view_of(world), *back = view_of(other);
+    bst_world_state forth[6];
+    for (int i = 0; i < 6; i++) {
+        forth[i] = object_at(view, 0, 500.0 * i);
+    }
+    for (int i = 5; i >= 0; i--) {
+        bst_world_state s = object_at(back, 0, 500.0 * i);
+        assert_memory_equal(&s, &forth[i], sizeof s);
+    }
+    bst_vec3 none = object_at(view, 2, 2500).position_m;
+    /* the axis x is along the orbit in GCRF, the air turns with the Earth: an angle of 3 degrees */
+    double edge = test_distance(object_at(view, 1, 2500).position_m, none);
+    double turned = test_distance(forth[5].position_m, none);
+    assert_true(turned > 200);
+    assert_true(edge < 0.07 * turned);
+    bst_world_view_free(view);
+    bst_world_view_free(back);
+    bst_world_free(world);
+    bst_world_free(other);
+}
+
+static void forces_without_a_shape_are_refused(void **state) {
+    (void)state;
+    static const char *const wrong[][2] = {
+        {FORCED("n", "7e6", "", "\"shape\": true"), "/world/objects/0/orbit/forces/shape"},
+        {FORCED("n", "7e6", "\"external_states\": true, " BALL, "\"shape\": true"),
+         "/world/objects/0/orbit/forces/shape"},
+        {FORCED("n", "7e6", PANEL("{\"from_s\": -5}, {\"from_s\": 0, \"law\": \"spin\"}"),
+                "\"shape\": true"),
+         "/world/objects/0/attitude: 1/quaternion: missing"}};
+    for (int i = 0; i < 3; i++) {
+        bst_ctx ctx = {0};
+        bst_world *world;
+        char text[2500];
+        snprintf(
+            text, sizeof text,
+            "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [%s]}, \"observers\": "
+            "[{\"name\": \"a\", " TEST_NEOSSAT ", \"sensors\": [{\"name\": \"x\", " TEST_CAMERA
+            "}]}]}",
+            wrong[i][0]);
+        assert_int_equal(test_world_try(&ctx, TEST_EPOCH, text, &world), BST_ERR_CONFIG);
+        if (!strstr(ctx.message, wrong[i][1])) {
+            fail_msg("%s: no \"%s\"", ctx.message, wrong[i][1]);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_round_shape_moves_as_a_sphere),
+        cmocka_unit_test(a_plate_moves_by_its_attitude),
+        cmocka_unit_test(forces_without_a_shape_are_refused),
         cmocka_unit_test(keplerian_elements_give_the_orbit),
         cmocka_unit_test(axis_and_mean_anomaly),
         cmocka_unit_test(element_sets_and_other_objects_start_one_too),

@@ -33,6 +33,45 @@ static void a_round_shape_is_a_sphere(void **state) {
     bst_world_free(world);
 }
 
+/* In the penumbra, with refraction and colours of the atmosphere, a shape has the light of points.
+ */
+static void penumbrae_are_those_of_points(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+#define LOW                                                                                 \
+    "\"orbit\": {\"source\": \"numerical\", \"state\": {\"source\": \"keplerian\", "        \
+    "\"semi_major_axis_m\": 7e6}, \"forces\": {\"gravity\": \"two_body\", \"sun\": false, " \
+    "\"moon\": false, \"solar_pressure\": false, \"drag\": false}}}"
+    bst_world *world = test_world_with(
+        "{\"name\": \"shape\", " SHAPE("{\"name\": \"s\", \"kind\": \"sphere\", \"radius_m\": 2, "
+                                       "\"material\": \"w\"}") ", " LOW
+                                                               ", {\"name\": \"sphere\", "
+                                                               "\"area_m2\": "
+                                                               "12.566370614359172, "
+                                                               "\"albedo\": 0.25, " LOW,
+        "");
+    bst_world_view *view;
+    bst_world_sight shape, sphere;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+    const bst_world_state eye = {{4.2e7, 0, 0}, {0, 3e3, 0}};
+    int partial = 0;
+    for (double t = 0; t < 5900; t += 2) {
+        bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 1, t, &sphere));
+        if (sphere.sunlit_fraction == 0 || sphere.sunlit_fraction == 1) {
+            continue;
+        }
+        bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 0, t, &shape));
+        bst_assert_close(shape.v_mag, sphere.v_mag, 1e-9); /* rounding */
+        for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
+            bst_assert_close(shape.glow.redness[k], sphere.glow.redness[k], 1e-12);
+        }
+        partial += sphere.glow.redness[0] < 0.99;
+    }
+    assert_true(partial >= 3);
+    bst_world_view_free(view);
+    bst_world_free(world);
+}
+
 /* A plate that spins glints twice a turn; samples within an exposure agree with single sights, and
  * their mean with a dense sum. */
 static void a_spinning_plate_glints(void **state) {
@@ -155,6 +194,96 @@ static void earthlight_is_that_of_spheres(void **state) {
     bst_world_free(world);
 }
 
+/* A plate that faces the Sun has the temperature of its balance, and with a heat capacity it lags
+ * where the load changes. */
+static void facets_have_their_temperatures(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+#define WARM(name, balance, capacity)                                                              \
+    "{\"name\": \"" name "\", \"brightness\": {\"model\": \"shape\", \"heat_balance\": \"" balance \
+    "\", \"earth_albedo\": 0, \"earth_infrared_w_per_m2\": 0}, \"shape\": {\"materials\": "        \
+    "[{\"name\": \"w\", \"diffuse\": 0.5, \"absorptance\": 0.3, \"emissivity\": 0.6, "             \
+    "\"heat_capacity_j_per_m2_k\": " capacity                                                      \
+    "}], \"parts\": [{\"name\": \"p\", \"kind\": "                                                 \
+    "\"sphere\", \"segments\": 8, \"material\": \"w\"}]}, \"attitude\": [{\"law\": \"sun\"}], "    \
+    "\"orbit\": {\"source\": \"numerical\", \"state\": {\"source\": \"keplerian\", "               \
+    "\"semi_major_axis_m\": 7e6}, \"forces\": {\"gravity\": \"two_body\", \"sun\": false, "        \
+    "\"moon\": false, \"solar_pressure\": false, \"drag\": false}}}"
+    bst_world *world =
+        test_world_with(WARM("steady", "steady", "0") ", " WARM(
+                            "lags", "transient", "5000") ", " WARM("none", "none", "0"),
+                        "");
+    bst_world_view *view;
+    bst_world_sight sight, lag, none;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+    const bst_world_state eye = {{4.2e7, 0, 0}, {0, 3e3, 0}};
+    bool dark = false, lit = false, warm = false;
+    for (double t = 0; t < 6000; t += 400) {
+        bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 0, t, &sight));
+        bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 1, t, &lag));
+        bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 2, t, &none));
+        bst_assert_close(sight.glow.emission_sr, none.glow.emission_sr, 1e-12);
+        double hottest = 0;
+        for (int i = 0; i < sight.glow.emission_count; i++) {
+            hottest = fmax(hottest, sight.glow.emissions[i].temperature_k);
+        }
+        bst_bodies bodies;
+        bst_assert_ok(&ctx, bst_world_view_bodies(&ctx, view, t, &bodies));
+        double au = bst_vec3_norm(bodies.sun_m) / 149597870700.0;
+        double most = pow(0.3 * 1361 / (au * au) / (0.6 * 5.670374419e-8), 0.25);
+        dark = dark || sight.sunlit_fraction == 0;
+        lit = lit || hottest > 0.9 * most;
+        assert_true(hottest < most * 1.0001);
+        assert_true(sight.sunlit_fraction > 0 || hottest == 0);
+        warm = warm || (sight.sunlit_fraction == 0 && lag.glow.temperature_k > 150);
+    }
+    assert_true(dark && lit && warm);
+    /* the same in any order */
+    bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 1, 800, &sight));
+    bst_assert_ok(&ctx, bst_world_view_sight_from(&ctx, view, &eye, 1, 5600, &sight));
+    bst_assert_close(sight.glow.temperature_k, lag.glow.temperature_k, 0);
+    bst_world_view_free(view);
+    bst_world_free(world);
+}
+
+/* A corner of two plates is brighter with light that goes from one to the other; a plate is not. */
+static void light_is_reflected_twice(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+#define LIT(name, on, more)                                                                    \
+    "{\"name\": \"" name "\", \"brightness\": {\"model\": \"shape\", \"interreflection\": " on \
+    "}, \"shape\": {\"materials\": [{\"name\": \"w\", \"diffuse\": 0.8}], \"joints\": "        \
+    "[{\"name\": "                                                                             \
+    "\"j\", \"follows\": \"spin\", \"rate_deg_per_s\": 1}], \"parts\": [{\"name\": \"p\", "    \
+    "\"kind\": \"plate\", \"joint\": \"j\", \"material\": \"w\"}" more                         \
+    "]}, \"attitude\": "                                                                       \
+    "[{\"law\": \"sun\", \"rotation_deg\": [0, 45, 0]}], " TEST_GX5 "}"
+#define WALL                                                                                     \
+    ", {\"name\": \"q\", \"kind\": \"plate\", \"position_m\": [0.5, 0, 0.5], \"rotation_deg\": " \
+    "[0, -90, 0], \"joint\": \"j\", \"material\": \"w\"}"
+    bst_world *world =
+        test_world_with(LIT("once", "false", WALL) ", " LIT("twice", "true", WALL) ", " LIT(
+                            "plate", "false", "") ", " LIT("plate too", "true", ""),
+                        "");
+    bst_world_view *view;
+    bst_world_sight s[4];
+    double most = 0;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+    for (double t = 0; t < 360; t += 45) { /* the joint turns: new form factors each time */
+        for (int i = 0; i < 4; i++) {
+            bst_assert_ok(&ctx, bst_world_view_sight(&ctx, view, 0, i, t, &s[i]));
+        }
+        assert_true(!(s[1].v_mag > s[0].v_mag));
+        if (isfinite(s[0].v_mag)) {
+            most = fmax(most, s[0].v_mag - s[1].v_mag);
+        }
+        assert_true(s[2].v_mag == s[3].v_mag);
+    }
+    assert_true(most > 0.03 && most < 1);
+    bst_world_view_free(view);
+    bst_world_free(world);
+}
+
 static void wrong_shapes_are_refused(void **state) {
     (void)state;
     static const char *const wrong[][2] = {
@@ -166,6 +295,25 @@ static void wrong_shapes_are_refused(void **state) {
          "shape: /parts/0: size_m: "},
         {SHAPE("{\"name\": \"p\", \"material\": \"w\", \"joint\": \"j\"}"),
          "shape: /parts/0: joint: "},
+        {"\"brightness\": {\"model\": \"shape\"}, \"shape\": {\"materials\": [{\"name\": "
+         "\"w\"}], \"joints\": [{\"name\": \"j\", \"follows\": \"table\", \"file\": "
+         "\"/no/angles.csv\"}], \"parts\": [{\"name\": \"p\", \"material\": \"w\"}]}",
+         "shape: /joints/0: file: "},
+        {"\"brightness\": {\"interreflection\": true}", "/brightness/interreflection: true"},
+        {"\"brightness\": {\"model\": \"shape\", \"interreflection\": true}, \"shape\": "
+         "{\"materials\": [{\"name\": \"w\"}], \"parts\": [{\"name\": \"s\", \"kind\": \"sphere\", "
+         "\"segments\": 96, \"material\": \"w\"}]}",
+         "facets, too many for light"},
+        {"\"brightness\": {\"heat_balance\": \"steady\"}", "/brightness/heat_balance: it needs"},
+        {"\"external_states\": true, \"brightness\": {\"model\": \"shape\", "
+         "\"heat_balance\": \"transient\"}, \"shape\": {\"materials\": [{\"name\": \"w\"}], "
+         "\"parts\": [{\"name\": \"p\", \"material\": \"w\"}]}",
+         "/brightness/heat_balance: transient"},
+        {"\"burns\": [{\"time_s\": 5, \"dv_rtn_mps\": [0, 1, 0]}], \"brightness\": "
+         "{\"model\": \"shape\"}, \"shape\": {\"materials\": [{\"name\": \"w\"}], "
+         "\"joints\": [{\"name\": \"j\", \"follows\": \"burn\", \"burn\": 2}], \"parts\": "
+         "[{\"name\": \"p\", \"material\": \"w\"}]}",
+         "shape: /joints/0/burn: found 2, but the object has 1 burns"},
         {SHAPE("{\"name\": \"p\", \"kind\": \"mesh\", \"file\": \"/no/such.obj\"}"),
          "/no/such.obj"},
         {SHAPE("{\"name\": \"p\", \"material\": \"w\"}, {\"name\": \"p\", \"material\": \"w\"}"),
@@ -199,6 +347,9 @@ int main(void) {
         cmocka_unit_test(a_spinning_plate_glints),
         cmocka_unit_test(glints_are_neither_missed_nor_smeared),
         cmocka_unit_test(earthlight_is_that_of_spheres),
+        cmocka_unit_test(facets_have_their_temperatures),
+        cmocka_unit_test(light_is_reflected_twice),
+        cmocka_unit_test(penumbrae_are_those_of_points),
         cmocka_unit_test(wrong_shapes_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "sim/world/frame_updates.h"
+#include "sim/world/scene/object_shape.h"
 #include "tests/world/world_support.h"
 
 static const double place[4][3] = {
@@ -98,7 +99,55 @@ static void states_come_with_the_frames(void **state) {
     unlink(path);
 }
 
+/* Attitudes of a shape come with the frames, on an orbit of another source. */
+static void attitudes_come_with_the_frames(void **state) {
+    (void)state;
+    char path[BST_TEST_PATH + 8], text[3000];
+    bst_ctx ctx = {0};
+    bst_world *world;
+    write_file(path);
+    for (int wrong = 0; wrong < 2; wrong++) {
+        FILE *f = fopen(path, "w");
+        assert_non_null(f);
+        fprintf(f,
+                "{\"boresight_frame_updates\": 1, \"frames\": [{\"frame\": 0, \"objects\": "
+                "[{\"object\": \"A\", \"start_q_body_from_gcrf\": [0, 0, 0, 1], "
+                "\"end_q_body_from_gcrf\": [0, 0, 0.6, 0.8]}, {\"object\": \"B\", "
+                "\"start_q_body_from_gcrf\": [1, 0, 0, 0], \"end_q_body_from_gcrf\": [1, 0, 0, "
+                "0]}]}]}");
+        fclose(f);
+        snprintf(text, sizeof text,
+                 "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [{\"name\": "
+                 "\"target\", " TEST_GX5
+                 ", \"brightness\": {\"model\": \"shape\"}, \"shape\": {\"materials\": "
+                 "[{\"name\": \"w\", \"diffuse\": 0.5}], \"parts\": [{\"name\": \"p\", "
+                 "\"material\": \"w\"}]}, \"attitude\": [{\"law\": \"table\", \"file\": "
+                 "\"%s\"%s}]}]}, \"observers\": [{\"name\": \"a\", " TEST_NEOSSAT
+                 ", \"sensors\": [{\"name\": \"y\", \"exposure\": {\"exposure_s\": 0.5, "
+                 "\"period_s\": 1, \"first_s\": 2}, \"frame_updates_file\": \"%s\", " TEST_CAMERA
+                 "}]}]}",
+                 path, wrong ? "" : ", \"object\": \"A\"", path);
+        if (wrong) {
+            assert_int_equal(test_world_try(&ctx, TEST_EPOCH, text, &world), BST_ERR_CONFIG);
+            assert_non_null(strstr(ctx.message, "attitudes of several objects; give \"object\""));
+            continue;
+        }
+        bst_assert_ok(&ctx, test_world_try(&ctx, TEST_EPOCH, text, &world));
+        const bst_object_shape *shape = bst_world_object(world, 0)->shape;
+        /* at 2.25 s half of the turn of 2 asin 0.6; before and after it is held */
+        static const double when[] = {0, 2, 2.25, 2.5, 9}, half[] = {0, 0, 0.5, 1, 1};
+        for (int i = 0; i < 5; i++) {
+            bst_attitude_state at = {{7e6, 0, 0}, {0, 7e3, 0}, {1, 0, 0}, when[i]};
+            bst_quat q = bst_body_attitude_at(shape->attitude, &at);
+            bst_assert_close(q.z, sin(half[i] * asin(0.6)), 1e-12); /* rounding */
+        }
+        bst_world_free(world);
+    }
+    unlink(path);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(states_come_with_the_frames)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(states_come_with_the_frames),
+                                       cmocka_unit_test(attitudes_come_with_the_frames)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -129,6 +129,16 @@ class Step:
             item["position_gcrf_m"], item["velocity_gcrf_mps"] = position, velocity
         self.send("target_states", new_record("target_states"), items)
 
+    def send_attitudes(self, attitudes: Any) -> None:
+        """Answer of a gimbal: attitudes of commanded objects with a shape: (name, tick, quaternion x, y, z, w
+        from GCRF to the body, angular velocity rad/s in the body frame)."""
+        attitudes = list(attitudes)
+        items = new_items("target_attitudes", len(attitudes))
+        for item, (name, tick, q_body_from_gcrf, rate) in zip(items, attitudes):
+            item["object"], item["tick"] = name, tick
+            item["q_body_from_gcrf"], item["rate_body_radps"] = q_body_from_gcrf, rate
+        self.send("target_attitudes", new_record("target_attitudes"), items)
+
     def done(self) -> None:
         """Ends the step. `Link.steps` does this when the next step is requested."""
         if not self._done:

@@ -116,6 +116,10 @@ _TABLES = {
         "count:i4",
         "object:S64 tick:i8 position_gcrf_m:f8x3 velocity_gcrf_mps:f8x3",
     ),
+    "target_attitudes": (
+        "count:i4",
+        "object:S64 tick:i8 q_body_from_gcrf:f8x4 rate_body_radps:f8x3",
+    ),
 }
 
 

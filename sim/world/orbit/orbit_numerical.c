@@ -54,6 +54,9 @@ const bst_config_desc bst_force_table[] = {
     BST_BOOL(bst_force_config, solar_pressure, "true",
              "Pressure of sunlight, with the Earth's shadow."),
     BST_BOOL(bst_force_config, drag, "true", "Drag of air that turns with the Earth."),
+    BST_BOOL(bst_force_config, shape, "false",
+             "Sunlight and air act on the facets of the object's shape, with its attitude and with "
+             "shadows between parts, instead of on srp_area_m2, cr and drag_area_m2."),
     BST_REAL(bst_force_config, density_scale, "", 0, 1000, "1",
              "What the mean density of the air is multiplied by."),
     BST_REAL(bst_force_config, tolerance, "", 1e-11, 1e-3, "1e-9",
@@ -135,6 +138,27 @@ bst_status bst_world_orbit_make_gravity(const bst_world_builder *b, const bst_fo
                : bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: %s/forces/gravity", b->scenario, path);
 }
 
+/* Burns of a trajectory, and zero burns where the attitude of the shape has a new phase: the
+ * integrator's steps end there. *out: [*count], or NULL; the caller frees it. */
+static bst_status make_thrusts(const bst_world_builder *b, const bst_config_list *burns,
+                               bst_astro_thrust **out, int *count) {
+    const bst_burn_config *items = burns->items;
+    int edges = b->surface ? b->phase_count : 0;
+    *count = 0;
+    *out = calloc((size_t)burns->count + (size_t)edges + 1, sizeof **out);
+    if (!*out) {
+        return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for burns");
+    }
+    for (int i = 0; i < burns->count; i++) {
+        (*out)[(*count)++] = (bst_astro_thrust){items[i].time_s, items[i].duration_s,
+                                                bst_vec3_from_array(items[i].dv_rtn_mps)};
+    }
+    for (int i = 0; i < edges; i++) {
+        (*out)[(*count)++] = (bst_astro_thrust){.time_s = b->phase_s[i]};
+    }
+    return BST_OK;
+}
+
 bst_status bst_world_orbit_build_numerical(const bst_world_builder *b,
                                            const bst_orbit_config *config,
                                            const bst_config_list *burns,
@@ -158,20 +182,24 @@ bst_status bst_world_orbit_build_numerical(const bst_world_builder *b,
         .position_m = state.position_m,
         .velocity_mps = state.velocity_mps,
         .tolerance = f->tolerance};
-    orbit->forces = options.forces;
+    if (f->shape && !b->surface) {
+        return bst_fail(
+            b->ctx, BST_ERR_CONFIG,
+            "%s: %s/forces/shape: true, but there is no shape (allowed: false; true for "
+            "an object with a shape and without external_states)",
+            b->scenario, path);
+    }
+    orbit->forces = options.forces; /* onboard models know the sphere only */
+    options.forces.surface = b->surface;
+    const bst_config_list no_burns = {NULL, 0};
+    bst_astro_thrust *thrusts;
+    BST_TRY(make_thrusts(b, &no_burns, &thrusts, &options.burn_count));
+    options.burns = thrusts;
     bst_status status = bst_trajectory_create(b->ctx, &options, &orbit->unburnt);
+    free(thrusts);
     if (status == BST_OK && burns->count > 0) {
-        const bst_burn_config *items = burns->items;
-        bst_astro_thrust *thrusts = calloc((size_t)burns->count, sizeof *thrusts);
-        if (!thrusts) {
-            return bst_fail(b->ctx, BST_ERR_MEMORY, "out of memory for burns");
-        }
-        for (int i = 0; i < burns->count; i++) {
-            thrusts[i] = (bst_astro_thrust){items[i].time_s, items[i].duration_s,
-                                            bst_vec3_from_array(items[i].dv_rtn_mps)};
-        }
+        BST_TRY(make_thrusts(b, burns, &thrusts, &options.burn_count));
         options.burns = thrusts;
-        options.burn_count = burns->count;
         status = bst_trajectory_create(b->ctx, &options, &orbit->burnt);
         free(thrusts);
     }

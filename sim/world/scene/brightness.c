@@ -5,9 +5,9 @@
 #include <stdlib.h>
 
 #include "sim/astro/bodies.h"
+#include "sim/astro/curve_file.h"
 #include "sim/core/file.h"
 #include "sim/optics/band.h"
-#include "sim/optics/curve_file.h"
 #include "sim/world/world.h"
 
 /* range to which standard magnitudes refer */
@@ -269,6 +269,30 @@ void bst_brightness_at(const bst_brightness *b, const bst_scene_lighting *l, bst
     out->thermal_reflection = l->albedo > 0.0 ? (1.0 - c->emissivity) / l->albedo : 0.0;
 }
 
+void bst_scene_glow_dim(bst_scene_glow *glow, double part) {
+    glow->v_mag = part > 0.0 ? glow->v_mag - 2.5 * log10(part) : (double)INFINITY;
+    glow->emission_sr *= part;
+    for (int i = 0; i < glow->emission_count; i++) {
+        glow->emissions[i].sr *= part;
+    }
+}
+
+/* Detected electrons per second of the thermal emission. */
+static double thermal_electrons_per_s(const bst_camera *camera, const bst_scene_glow *glow) {
+    if (glow->emission_count == 0) {
+        return bst_camera_thermal_electrons_per_s(camera, glow->temperature_k, glow->emission_sr);
+    }
+    double sum = 0.0;
+    for (int i = 0; i < glow->emission_count; i++) {
+        const bst_scene_emission *e = &glow->emissions[i];
+        for (int side = -1; side <= 1; side += 2) {
+            sum += bst_camera_thermal_electrons_per_s(
+                camera, e->temperature_k + side * e->deviation_k, 0.5 * e->sr);
+        }
+    }
+    return sum;
+}
+
 double bst_scene_glow_electrons_per_s(const bst_camera *camera, const bst_scene_glow *glow,
                                       double *reflected) {
     bool thermal = camera->spectrum && bst_band_is_thermal(camera->spectrum);
@@ -283,6 +307,5 @@ double bst_scene_glow_electrons_per_s(const bst_camera *camera, const bst_scene_
     if (reflected) {
         *reflected = sunlight;
     }
-    return sunlight +
-           bst_camera_thermal_electrons_per_s(camera, glow->temperature_k, glow->emission_sr);
+    return sunlight + thermal_electrons_per_s(camera, glow);
 }

@@ -31,6 +31,14 @@ typedef struct bst_scene_lighting {
     bool reflected_only;                /* shapes: without thermal emission */
 } bst_scene_lighting;
 
+enum { BST_SCENE_EMISSIONS = 8 };
+
+/* Thermal emission at two temperatures, temperature_k +- deviation_k, half of it at each. */
+typedef struct bst_scene_emission {
+    double sr; /* emissivity times solid angle */
+    double temperature_k, deviation_k;
+} bst_scene_emission;
+
 /* Light of an object. Reflected light has the solar spectrum, reddened by the atmosphere at the
  * edge of the Earth's shadow. */
 typedef struct bst_scene_glow {
@@ -41,6 +49,10 @@ typedef struct bst_scene_glow {
     bst_vec3 earth;        /* unit, GCRF: from the object to the centroid of the earthlight */
     double emission_sr;    /* emissivity times solid angle: of an equivalent black body */
     double temperature_k;
+    /* Parts of the emission, whose sum is emission_sr and whose mean is temperature_k; none: all at
+     * temperature_k. */
+    bst_scene_emission emissions[BST_SCENE_EMISSIONS];
+    int emission_count;
     double thermal_reflection; /* factor on reflected light at thermal wavelengths: reflectance = 1
                                   - emissivity */
     bool resolved;             /* may be rendered as a disc */
@@ -50,6 +62,9 @@ typedef struct bst_scene_glow {
  * diffuse sphere without emission, rendered as a point. */
 void bst_brightness_at(const bst_brightness *brightness, const bst_scene_lighting *lighting,
                        bst_scene_glow *out);
+
+/* Leaves a part of all light of an object, 0 to 1. */
+void bst_scene_glow_dim(bst_scene_glow *glow, double part);
 
 /* Detected electrons per second from an object's light. *reflected (may be NULL): the part from
  * reflected light. */

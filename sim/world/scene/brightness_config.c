@@ -1,5 +1,6 @@
 #include "sim/world/scene/brightness_config.h"
 
+static const char *const heat_balances[] = {"none", "steady", "transient", NULL};
 static const char *const models[] = {"sphere", "standard_magnitude", "light_curve", "shape", NULL};
 
 const bst_config_desc bst_brightness_config_table[] = {
@@ -29,6 +30,15 @@ const bst_config_desc bst_brightness_config_table[] = {
     BST_REAL(bst_brightness_config, shadow_temperature_k, "K", 0, 5000, "230",
              "Temperature of the object in the Earth's shadow; in penumbra fourth powers are mixed "
              "by the part of the Sun that is seen."),
+    BST_ENUM(bst_brightness_config, heat_balance, heat_balances, "\"none\"",
+             "Temperatures of a shape. none: temperature_k and shadow_temperature_k; steady: each "
+             "facet emits what it absorbs of sunlight, the Earth's reflected light and infrared; "
+             "transient: with the heat capacity of its material."),
+    BST_REAL(bst_brightness_config, earth_infrared_w_per_m2, "W/m2", 0, 1000, "237",
+             "steady, transient: exitance of the Earth in the thermal infrared."),
+    BST_BOOL(bst_brightness_config, interreflection, "false",
+             "shape: whether sunlight that one part reflects lights others; one bounce, all of it "
+             "diffuse; at most 1000 facets."),
     BST_BOOL(bst_brightness_config, resolved, "true",
              "Whether the object is drawn as the disc of a sphere of area_m2, with its terminator, "
              "where that is larger than 0.2 px."),

@@ -5,6 +5,8 @@
 
 #include "boresight/config.h"
 
+enum { BST_HEAT_NONE, BST_HEAT_STEADY, BST_HEAT_TRANSIENT };
+
 enum {
     BST_BRIGHTNESS_SPHERE,
     BST_BRIGHTNESS_STANDARD,
@@ -23,6 +25,9 @@ typedef struct bst_brightness_config {
     double earth_albedo;
     double emissivity;
     double temperature_k, shadow_temperature_k;
+    int32_t heat_balance; /* BST_HEAT_... */
+    double earth_infrared_w_per_m2;
+    bool interreflection;
     bool resolved; /* rendered as a disc if it is large enough */
 } bst_brightness_config;
 

@@ -4,6 +4,7 @@
 
 #include "sim/astro/bodies.h"
 #include "sim/optics/band.h"
+#include "sim/satellite/interreflection.h"
 
 bool bst_object_shape_is_given(const bst_satellite_config *config) {
     return *config->file || config->parts.count > 0 || config->joints.count > 0 ||
@@ -12,25 +13,27 @@ bool bst_object_shape_is_given(const bst_satellite_config *config) {
 
 void bst_object_shape_free(bst_object_shape *shape) {
     if (shape) {
+        bst_shape_forces_free(shape->forces);
         bst_satellite_free(shape->satellite);
         bst_body_attitude_free(shape->attitude);
+        free(shape->burn_s);
         free(shape);
     }
 }
 
 bst_status bst_object_shape_create(bst_ctx *ctx, const bst_satellite_config *config,
-                                   const bst_config_list *attitude, const char *base_dir,
-                                   bst_object_shape **out) {
+                                   const bst_config_list *attitude,
+                                   const bst_attitude_source *source, bst_object_shape **out) {
     bst_object_shape *shape = *out = calloc(1, sizeof *shape);
     if (!shape) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the shape of an object");
     }
-    bst_status status = bst_satellite_create(ctx, config, base_dir, &shape->satellite);
+    bst_status status = bst_satellite_create(ctx, config, source->base_dir, &shape->satellite);
     if (status != BST_OK) {
         status = bst_fail_prefix(ctx, BST_ERR_CONFIG, "shape");
     } else {
         shape->glint_count = bst_glint_surfaces(shape->satellite, shape->glints);
-        status = bst_body_attitude_create(ctx, attitude, base_dir, &shape->attitude);
+        status = bst_body_attitude_create(ctx, attitude, source, &shape->attitude);
         status = status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "attitude");
     }
     if (status != BST_OK) {
@@ -38,14 +41,6 @@ bst_status bst_object_shape_create(bst_ctx *ctx, const bst_satellite_config *con
         *out = NULL;
     }
     return status;
-}
-
-/* Turns earthlight into the body frame. */
-static void turn_earthlight(bst_quat q, bst_earthlight *light) {
-    for (int i = 0; i < light->count; i++) {
-        light->direction[i] = bst_quat_rotate(q, light->direction[i]);
-    }
-    light->centre = bst_quat_rotate(q, light->centre);
 }
 
 /* Light per wavelength over that in V, and magnitude, from the model's flux. */
@@ -91,7 +86,7 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
     if (b->earthshine) {
         bst_earth_surface surface = {.diffuse = b->earth_albedo, .fineness = 1};
         bst_earthlight_at(&surface, l->object_m, bst_vec3_unit(l->sun_m), &earthlight);
-        turn_earthlight(aspect.q_body_from_gcrf, &earthlight);
+        bst_earthlight_turn(aspect.q_body_from_gcrf, &earthlight);
     }
     bst_satellite_light light = {
         .sun = aspect.aim.sun,
@@ -103,6 +98,9 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
     bst_satellite_flux flux;
     bst_satellite_pose_set(pose, &aspect.aim);
     bst_satellite_flux_at(pose, &light, &flux);
+    if (pose->interreflection && light.sunlit > 0.0) {
+        bst_interreflection_add(pose->interreflection, pose, &light, &flux);
+    }
     *out = (bst_scene_glow){.resolved = false};
     make_glow(&flux, l, range_m, out);
     out->emission_sr = flux.emission_m2 / (range_m * range_m);
@@ -113,12 +111,28 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
         flux.visible_m2 > 0.0 ? 1.0 - flux.emission_m2 / flux.visible_m2 : 1.0;
 }
 
+/* Largest rate of a joint about a time, apart from what follows the orbit. */
+static double joint_rate_radps(const bst_joint *j, double seconds) {
+    if (j->follows != BST_JOINT_TABLE) {
+        bool turns = j->follows == BST_JOINT_SPIN || j->follows == BST_JOINT_BURN;
+        return turns ? fabs(j->rate_radps) : 0.0;
+    }
+    double most = 0.0;
+    for (int i = 1; i < j->table.count; i++) {
+        double from = j->table.x[i - 1], to = j->table.x[i];
+        if (to > seconds - 60.0 && from < seconds + 60.0) {
+            most = fmax(most, fabs(j->table.y[i] - j->table.y[i - 1]) / (to - from));
+        }
+    }
+    return most * BST_DEG_RAD;
+}
+
 /* Largest angle by which a surface turns during an exposure, without the motion on the orbit. */
 static double turn_rad(const bst_object_shape *shape, double seconds, double exposure_s) {
     const bst_satellite *s = shape->satellite;
     double rate = bst_body_attitude_rate_radps(shape->attitude, seconds);
     for (int i = 0; i < s->joint_count; i++) {
-        rate += s->joints[i].follows == BST_JOINT_SPIN ? fabs(s->joints[i].rate_radps) : 0.0;
+        rate += joint_rate_radps(&s->joints[i], seconds);
     }
     return rate * exposure_s;
 }

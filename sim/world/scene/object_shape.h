@@ -5,6 +5,7 @@
 #include "sim/satellite/body_attitude.h"
 #include "sim/satellite/flux.h"
 #include "sim/satellite/glint.h"
+#include "sim/satellite/shape_forces.h"
 #include "sim/world/scene/brightness.h"
 
 /* An object's model and attitude; immutable once the world is built. */
@@ -14,6 +15,10 @@ typedef struct bst_object_shape {
     int index;                                    /* in the world's list of shapes */
     bst_glint_surface glints[BST_GLINT_SURFACES]; /* surfaces that may glint */
     int glint_count;
+    double *burn_s; /* [burn_count] starts of the object's burns */
+    int burn_count;
+    bool interreflection;     /* light is reflected twice */
+    bst_shape_forces *forces; /* NULL: the orbit does not follow from the shape */
 } bst_object_shape;
 
 /* Where a body stands to its light at one time. */
@@ -30,12 +35,13 @@ bool bst_object_shape_is_given(const bst_satellite_config *config);
  *
  * Given:     config    its shape
  *            attitude  bst_attitude_config; empty: nadir
- *            base_dir  base of relative paths
+ *            source    base of relative paths, and of attitudes from files
  * Returned:  *out  NULL on error
  * Errors:    BST_ERR_CONFIG with the path below the object ("shape/parts/0/..."), BST_ERR_MEMORY
  * Ownership: free *out with bst_object_shape_free */
 bst_status bst_object_shape_create(bst_ctx *ctx, const bst_satellite_config *config,
-                                   const bst_config_list *attitude, const char *base_dir,
+                                   const bst_config_list *attitude,
+                                   const bst_attitude_source *source,
                                    bst_object_shape **out) BST_MUST_CHECK;
 /* Frees a shape; NULL is allowed. */
 void bst_object_shape_free(bst_object_shape *shape);

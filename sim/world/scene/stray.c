@@ -2,9 +2,9 @@
 
 #include <stdlib.h>
 
+#include "sim/astro/curve_file.h"
 #include "sim/core/file.h"
 #include "sim/optics/band.h"
-#include "sim/optics/curve_file.h"
 
 struct bst_scene_pst {
     int count;

@@ -6,6 +6,7 @@
 #include "sim/world/orbit/ephemeris.h"
 #include "sim/world/scene/field_objects.h"
 #include "sim/world/scene/object_shape.h"
+#include "sim/world/scene/view_shapes.h"
 
 /* State of an observer at one instant, shared by all objects in a frame. */
 typedef struct eye {
@@ -34,9 +35,9 @@ struct bst_world_view {
     const bst_world *world;
     bst_sky_clock *clock;
     pace pace;
-    eye eyes[BST_PATH_NODES];   /* the latest ones, by node of the exposure */
-    bst_satellite_pose **poses; /* by shape of the world: work memory */
-    bool reflected_only;        /* shapes without thermal emission */
+    eye eyes[BST_PATH_NODES]; /* the latest ones, by node of the exposure */
+    bst_view_shapes shapes;
+    bool reflected_only; /* shapes without thermal emission */
 };
 
 /* Source of positions in a light-time solution; observer and object use the same one. */
@@ -48,19 +49,6 @@ typedef struct looked_at {
     from source;
 } looked_at;
 
-/* Allocates the work memory for the shapes of the world. */
-static bst_status make_poses(bst_ctx *ctx, bst_world_view *view) {
-    const bst_world *world = view->world;
-    view->poses = calloc((size_t)world->shape_count, sizeof(bst_satellite_pose *));
-    if (!view->poses) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a view of the world");
-    }
-    for (int i = 0; i < world->shape_count; i++) {
-        BST_TRY(bst_satellite_pose_create(ctx, world->shapes[i]->satellite, &view->poses[i]));
-    }
-    return BST_OK;
-}
-
 bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world_view **out) {
     *out = NULL;
     bst_world_view *view = calloc(1, sizeof *view);
@@ -69,8 +57,8 @@ bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world
     }
     view->world = world;
     bst_status status = bst_sky_clock_create_on(ctx, world->sky_grid, &view->clock);
-    if (status == BST_OK && world->shape_count > 0) {
-        status = make_poses(ctx, view);
+    if (status == BST_OK) {
+        status = bst_view_shapes_create(ctx, world, view->clock, &view->shapes);
     }
     if (status != BST_OK) {
         bst_world_view_free(view);
@@ -82,10 +70,7 @@ bst_status bst_world_view_create(bst_ctx *ctx, const bst_world *world, bst_world
 
 void bst_world_view_free(bst_world_view *view) {
     if (view) {
-        for (int i = 0; view->poses && i < view->world->shape_count; i++) {
-            bst_satellite_pose_free(view->poses[i]);
-        }
-        free(view->poses);
+        bst_view_shapes_free(&view->shapes);
         bst_sky_clock_free(view->clock);
         free(view);
     }
@@ -267,19 +252,12 @@ static bst_status look(bst_ctx *ctx, bst_world_view *view, const eye *e, looked_
     return BST_OK;
 }
 
-/* An object at the emission of its light. */
-typedef struct emission {
-    int object;
-    bst_vec3 position_m, velocity_mps; /* the velocity matters for shapes only */
-    double seconds;
-} emission;
-
 void bst_world_view_reflected_only(bst_world_view *view) {
     view->reflected_only = true;
 }
 
 /* Brightness of an object, seen from `eye_m`. */
-static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 eye_m,
+static void shine_at(const bst_world_view *view, const bst_view_emission *at, bst_vec3 eye_m,
                      const bst_bodies *bodies, bst_world_sight *out) {
     const bst_world *world = view->world;
     int object = at->object;
@@ -290,6 +268,15 @@ static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 ey
     bst_astro_sunlight sunlight;
     bst_astro_sunlight_at(emitted_m, bst_bodies_sunlight_from(bodies), bodies->pole,
                           world->shadow_atmosphere, &sunlight);
+    bst_view_mutual others = {1.0, 1.0};
+    if (view->shapes.occultation) {
+        others = bst_view_shapes_occultations(&view->shapes, at, eye_m,
+                                              bst_bodies_sunlight_from(bodies));
+        sunlight.disc *= others.sunlight;
+        for (int k = 0; k < BST_SUNLIGHT_COLOURS; k++) {
+            sunlight.light[k] *= others.sunlight;
+        }
+    }
     out->phase_rad = bst_vec3_angle(to_eye, to_sun);
     out->sunlit_fraction = sunlight.disc;
     bst_scene_lighting lighting = {.area_m2 = info->area_m2,
@@ -302,17 +289,27 @@ static void shine_at(const bst_world_view *view, const emission *at, bst_vec3 ey
                                    .sunlight = &sunlight,
                                    .reflected_only = view->reflected_only};
     if (info->shape) {
-        bst_object_shape_glow(info->shape, view->poses[info->shape->index],
+        bst_object_shape_glow(info->shape, view->shapes.poses[info->shape->index],
                               bst_brightness_config_of(info->brightness), &lighting,
                               at->velocity_mps, &out->glow);
+        bst_object_heat *heat = view->shapes.heats[info->shape->index];
+        if (heat && !view->reflected_only) {
+            bst_object_heat_glow(heat, info->shape, view->shapes.poses[info->shape->index],
+                                 bst_brightness_config_of(info->brightness), &lighting,
+                                 at->velocity_mps, &out->glow);
+        }
     } else {
         bst_brightness_at(info->brightness, &lighting, &out->glow);
+    }
+    if (others.visible < 1.0) {
+        bst_scene_glow_dim(&out->glow, others.visible);
     }
     out->v_mag = out->glow.v_mag;
 }
 
 /* Brightness of an object in a sight, and occultation by the Earth. */
-static void shine(const bst_world_view *view, const eye *e, emission *at, bst_world_sight *out) {
+static void shine(const bst_world_view *view, const eye *e, bst_view_emission *at,
+                  bst_world_sight *out) {
     at->seconds = e->seconds - out->light_time_s;
     shine_at(view, at, e->state.position_m, &e->sky.bodies, out);
     out->occulted =
@@ -337,7 +334,7 @@ bst_status bst_world_view_sight(bst_ctx *ctx, bst_world_view *view, int observer
         BST_TRY(position_of(ctx, view, object, seconds, source, &now, &velocity));
     }
     BST_TRY(look(ctx, view, &e, (looked_at){object, source}, now, &emitted, out));
-    shine(view, &e, &(emission){object, emitted, velocity, 0.0}, out);
+    shine(view, &e, &(bst_view_emission){object, emitted, velocity, 0.0}, out);
     return BST_OK;
 }
 
@@ -349,7 +346,7 @@ bst_status bst_world_view_sight_from(bst_ctx *ctx, bst_world_view *view,
     BST_TRY(bst_sky_clock_at(ctx, view->clock, bst_world_time(view->world, seconds), &e.sky));
     BST_TRY(position_of(ctx, view, object, seconds, FROM_ORBIT, &now, &velocity));
     BST_TRY(look(ctx, view, &e, (looked_at){object, FROM_ORBIT}, now, &emitted, out));
-    shine(view, &e, &(emission){object, emitted, velocity, 0.0}, out);
+    shine(view, &e, &(bst_view_emission){object, emitted, velocity, 0.0}, out);
     return BST_OK;
 }
 
@@ -376,7 +373,7 @@ static bst_status path_from(bst_ctx *ctx, bst_world_view *view,
         bst_vec3 apparent = bst_vec3_scale(sight.apparent, bst_vec3_dot(sight.apparent, about));
         path->shift[i / 2] = bst_vec3_sub(apparent, unit);
         if (i == BST_PATH_NODES / 2) {
-            shine(view, e, &(emission){b.object, emitted, velocity, 0.0}, &sight);
+            shine(view, e, &(bst_view_emission){b.object, emitted, velocity, 0.0}, &sight);
             *mid = sight;
             light->lag_m = bst_vec3_sub(emitted, now);
             light->earth_bary_mps = e->sky.bodies.earth_bary_mps;
@@ -425,7 +422,7 @@ static bst_vec3 quartic(const bst_vec3 place[BST_PATH_NODES], double u) {
 
 /* Object, observer and bodies at time u of a span, from the path of the span. */
 typedef struct instant {
-    emission at;
+    bst_view_emission at;
     bst_vec3 eye_m;
     bst_bodies bodies;
 } instant;
@@ -438,11 +435,11 @@ static instant instant_at(const bst_world_view *view, const bst_world_view_span 
                               .earth_bary_mps = light->earth_bary_mps,
                               .pole = light->pole}};
     double duration_s = span->end_s - span->start_s;
-    out.at =
-        (emission){object,
-                   bst_vec3_add(bst_vec3_add(out.eye_m, quartic(path->place, u)), light->lag_m),
-                   {0, 0, 0},
-                   span->start_s + u * duration_s - light->light_time_s};
+    out.at = (bst_view_emission){
+        object,
+        bst_vec3_add(bst_vec3_add(out.eye_m, quartic(path->place, u)), light->lag_m),
+        {0, 0, 0},
+        span->start_s + u * duration_s - light->light_time_s};
     if (view->world->objects[object].info.shape && duration_s > 0.0) {
         const double h =
             1e-2; /* the difference of a quartic: exact to h^2 of the third derivative */
@@ -492,7 +489,7 @@ bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, const bst_wor
 }
 
 bst_satellite_pose *bst_scene_view_pose(const bst_world_view *view, int object) {
-    return view->poses[view->world->objects[object].info.shape->index];
+    return view->shapes.poses[view->world->objects[object].info.shape->index];
 }
 
 const bst_world_object_info *bst_scene_view_object(const bst_world_view *view, int object) {

@@ -1,4 +1,4 @@
-#include "sim/optics/curve_file.h"
+#include "sim/astro/curve_file.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,6 +1,7 @@
-/* Reads a curve from a CSV file of two columns: spectral responses and light curves. */
-#ifndef BST_OPTICS_CURVE_FILE_H
-#define BST_OPTICS_CURVE_FILE_H
+/* Reads a curve from a CSV file of two columns: spectral responses, light
+ * curves, angles of joints. */
+#ifndef BST_ASTRO_CURVE_FILE_H
+#define BST_ASTRO_CURVE_FILE_H
 
 #include "boresight/status.h"
 

@@ -1,0 +1,103 @@
+/* Pressure of sunlight and area in the air of shapes, against closed forms. */
+#include "sim/satellite/shape_forces.h"
+#include "tests/satellite/satellite_support.h"
+
+#define GREY                                                                                 \
+    "\"materials\": [{\"name\": \"g\", \"diffuse\": 0.6}, {\"name\": \"m\", \"model\": "     \
+    "\"phong\", \"diffuse\": 0.2, \"specular\": 0.5, \"exponent\": 100}, {\"name\": \"b\", " \
+    "\"diffuse\": 0.6, \"absorptance\": 1}]"
+
+static bst_test_model part_of(const char *part) {
+    char text[1500];
+    snprintf(text, sizeof text, "{" GREY ", \"parts\": [%s]}", part);
+    bst_test_model m = bst_test_model_open(text);
+    bst_satellite_make_surfaces(m.satellite);
+    return m;
+}
+
+/* A Lambertian sphere: 1 + 4/9 of its reflectance; its silhouette is a disc. */
+static void a_sphere_has_its_coefficient(void **state) {
+    (void)state;
+    bst_test_model m = part_of(
+        "{\"name\": \"s\", \"kind\": \"sphere\", \"radius_m\": 1.5, \"segments\": 96, "
+        "\"material\": \"g\"}");
+    double disc = BST_PI * 1.5 * 1.5;
+    uint64_t random = 5;
+    for (int i = 0; i < 5; i++) {
+        bst_vec3 sun = bst_test_direction(&random);
+        bst_vec3 area = bst_shape_light_area_m2(m.pose, sun);
+        double want = disc * (1 + 4.0 / 9 * 0.6);
+        /* facets of 3.75 degrees inside the sphere: 2e-3 of its area */
+        bst_assert_close(bst_vec3_norm(bst_vec3_axpy(area, want, sun)), 0, 3e-3 * want);
+        bst_assert_close(bst_shape_silhouette_m2(m.pose, sun), disc, 3e-3 * disc);
+    }
+    bst_test_model_close(&m);
+}
+
+/* A plate: pressure along the light and along the normal, of black, diffuse and mirror parts. */
+static void a_plate_has_its_force(void **state) {
+    (void)state;
+    static const char *const names[] = {"g", "m", "b"};
+    for (int k = 0; k < 3; k++) {
+        char part[200];
+        snprintf(part, sizeof part,
+                 "{\"name\": \"p\", \"kind\": \"plate\", \"size_m\": [2, 3, 1], \"material\": "
+                 "\"%s\"}",
+                 names[k]);
+        bst_test_model m = part_of(part);
+        for (int deg = 0; deg < 80; deg += 20) {
+            double a = deg * BST_DEG_RAD, c = cos(a);
+            bst_vec3 sun = {sin(a), 0, c}, n = {0, 0, 1};
+            double diffuse = k == 2 ? 0 : k == 1 ? 0.2 : 0.6, mirror = 0;
+            if (k == 1) {
+                mirror = bst_brdf_reflectance(&m.satellite->materials[1].brdf, c) - 0.2;
+                assert_true(deg > 0 || fabs(mirror - 0.5) < 0.02);
+            }
+            bst_vec3 want = bst_vec3_scale(sun, -6 * c * (1 - mirror));
+            want = bst_vec3_axpy(want, -12 * c * (mirror * c + diffuse / 3), n);
+            bst_vec3 got = bst_shape_light_area_m2(m.pose, sun);
+            /* the table of reflectances is linear in steps of 1/16 of the cosine */
+            bst_assert_close(bst_vec3_norm(bst_vec3_sub(got, want)), 0, k == 1 ? 0.02 : 1e-4);
+            bst_assert_close(bst_shape_silhouette_m2(m.pose, sun), 6 * c, 1e-12);
+        }
+        bst_test_model_close(&m);
+    }
+}
+
+/* The side of a Lambertian cylinder across the light: 2 r l (1 + pi / 6 of its reflectance). */
+static void a_cylinder_has_its_force(void **state) {
+    (void)state;
+    bst_test_model m = part_of(
+        "{\"name\": \"c\", \"kind\": \"cylinder\", \"radius_m\": 0.5, \"length_m\": 4, "
+        "\"segments\": 96, \"material\": \"g\"}");
+    double want = 4 * (1 + BST_PI / 6 * 0.6);
+    bst_vec3 got = bst_shape_light_area_m2(m.pose, (bst_vec3){1, 0, 0});
+    bst_assert_close(got.x, -want, 2e-3 * want); /* 96 facets */
+    bst_assert_close(got.y, 0, 1e-9);
+    bst_test_model_close(&m);
+}
+
+/* What a part shadows feels no pressure, and the air meets it once. */
+static void parts_shadow_each_other(void **state) {
+    (void)state;
+    bst_test_model m = part_of(
+        "{\"name\": \"p\", \"kind\": \"plate\", \"size_m\": [2, 2, 1], \"material\": \"b\"}, "
+        "{\"name\": \"q\", \"kind\": \"plate\", \"size_m\": [1, 1, 1], \"position_m\": [0, 0, 1], "
+        "\"material\": \"b\"}");
+    bst_vec3 got = bst_shape_light_area_m2(m.pose, (bst_vec3){0, 0, 1});
+    bst_assert_close(got.z, -4, 1e-9);
+    bst_assert_close(bst_shape_silhouette_m2(m.pose, (bst_vec3){0, 0, 1}), 4, 1e-9);
+    got = bst_shape_light_area_m2(m.pose, bst_vec3_unit((bst_vec3){3, 0, 1}));
+    bst_assert_close(bst_vec3_norm(got), 5 / sqrt(10), 1e-9); /* beside it: both */
+    bst_test_model_close(&m);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_sphere_has_its_coefficient),
+        cmocka_unit_test(a_plate_has_its_force),
+        cmocka_unit_test(a_cylinder_has_its_force),
+        cmocka_unit_test(parts_shadow_each_other),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
