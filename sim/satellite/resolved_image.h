@@ -38,8 +38,8 @@ typedef struct bst_resolved_image {
     double cell_px;
     int x0, y0, width, height;
     bst_resolved_cell *cells; /* [height][width] */
-    int16_t *part;            /* [height][width] part that covers most of the cell in the latest pose
-                                 added; -1: none */
+    int16_t *part; /* [height][width] part that covers most of the cell in the latest pose
+                      added; -1: none */
 } bst_resolved_image;
 
 /* The image of a model, with its work memory; for one thread. */
