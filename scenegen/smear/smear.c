@@ -77,6 +77,7 @@ void bst_smear_free(bst_smear *s) {
         free(s->parts);
         free(s->nodes.items);
         free(s->points.items);
+        bst_smear_bodies_clear(&s->bodies);
         free(s->table);
         bst_motion_map_free(s->map);
         free(s);
@@ -357,6 +358,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
     }
     s->sources = frame->sources;
     s->aim = 1.0;
+    s->frame++;
     s->duration_s = track->time_s[track->count - 1];
     s->q_reference = attitude_at(track, 0.5 * s->duration_s);
     s->table_blocks = s->path_count = 0;
@@ -485,9 +487,12 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
     double x, y, electrons = source->electrons_per_s * s->duration_s;
     s->last_peak_e = s->last_read_e = s->chord_error = 0.0;
     s->last_leaves = true;
-    bool moving = source->path || source->rate || source->shape;
+    bool moving = source->path || source->rate || source->shape || source->body;
     s->disc_px =
         source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
+    if (source->body) {
+        s->disc_px = bst_smear_body_radius_px(s, source);
+    }
     bool front = bst_smear_project(s, s->q_reference, source->apparent_mid, &x, &y);
     /* a star that only a wide rotation brings into the field: a float offset is inaccurate */
     double wide = 4.0 * (s->far_px + s->disc_px);

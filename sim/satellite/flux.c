@@ -206,3 +206,10 @@ void bst_earthlight_at(const bst_earth_surface *surface, bst_vec3 object_m, bst_
     }
     out->centre = out->count ? bst_vec3_unit(sum) : out->centre;
 }
+
+void bst_earthlight_turn(bst_quat q, bst_earthlight *light) {
+    for (int i = 0; i < light->count; i++) {
+        light->direction[i] = bst_quat_rotate(q, light->direction[i]);
+    }
+    light->centre = bst_quat_rotate(q, light->centre);
+}

@@ -40,12 +40,10 @@ bst_status bst_object_shape_create(bst_ctx *ctx, const bst_satellite_config *con
     return status;
 }
 
-/* Turns earthlight into the body frame. */
-static void turn_earthlight(bst_quat q, bst_earthlight *light) {
-    for (int i = 0; i < light->count; i++) {
-        light->direction[i] = bst_quat_rotate(q, light->direction[i]);
-    }
-    light->centre = bst_quat_rotate(q, light->centre);
+double bst_object_shape_temperature_k(const bst_brightness_config *b, double sunlit_fraction) {
+    double warm = sunlit_fraction * pow(b->temperature_k, 4.0) +
+                  (1.0 - sunlit_fraction) * pow(b->shadow_temperature_k, 4.0);
+    return sqrt(sqrt(warm));
 }
 
 /* Light per wavelength over that in V, and magnitude, from the model's flux. */
@@ -91,7 +89,7 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
     if (b->earthshine) {
         bst_earth_surface surface = {.diffuse = b->earth_albedo, .fineness = 1};
         bst_earthlight_at(&surface, l->object_m, bst_vec3_unit(l->sun_m), &earthlight);
-        turn_earthlight(aspect.q_body_from_gcrf, &earthlight);
+        bst_earthlight_turn(aspect.q_body_from_gcrf, &earthlight);
     }
     bst_satellite_light light = {
         .sun = aspect.aim.sun,
@@ -103,12 +101,10 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
     bst_satellite_flux flux;
     bst_satellite_pose_set(pose, &aspect.aim);
     bst_satellite_flux_at(pose, &light, &flux);
-    *out = (bst_scene_glow){.resolved = false};
+    *out = (bst_scene_glow){.resolved = b->resolved};
     make_glow(&flux, l, range_m, out);
     out->emission_sr = flux.emission_m2 / (range_m * range_m);
-    double warm = l->sunlit_fraction * pow(b->temperature_k, 4.0) +
-                  (1.0 - l->sunlit_fraction) * pow(b->shadow_temperature_k, 4.0);
-    out->temperature_k = sqrt(sqrt(warm));
+    out->temperature_k = bst_object_shape_temperature_k(b, l->sunlit_fraction);
     out->thermal_reflection =
         flux.visible_m2 > 0.0 ? 1.0 - flux.emission_m2 / flux.visible_m2 : 1.0;
 }
