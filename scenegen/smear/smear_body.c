@@ -10,7 +10,7 @@
 #include "sim/world/scene/los_track.h"
 
 /* Share of the tolerance for the nodes of the image. */
-#define IMAGE_SHARE 0.5
+#define IMAGE_SHARE 0.25
 /* Image motion by rotation, px, up to which one pose is enough: as a blur it has 1 / 12 of its
  * square as variance. */
 #define STILL_PX 0.1
@@ -173,8 +173,8 @@ static double cell_for(const bst_smear *s, const bst_scene_source *source) {
     double per_px_e = electrons / fmax(0.3 * across_px * across_px, 1.0);
     double allowed = IMAGE_SHARE * s->options.tolerance_sigma *
                      sqrt(0.5 * per_px_e + s->dark_variance_e2) / fmax(per_px_e, 1e-9);
-    /* a cell with a border misses a 24th of its square at most */
-    double cell = s->sigma_px * cbrt(allowed * 24.0 / 0.2);
+    /* of a cell with a border, the second moments are right to some 0.01 of its square */
+    double cell = s->sigma_px * cbrt(allowed * 480.0);
     cell = fmin(cell, across_px / ACROSS);
     double side = 0.5;
     while (side > 1.0 / FINEST && side > cell) {
@@ -306,7 +306,7 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
 
 bst_status bst_smear_body_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
                                 double x, double y, bool *there) {
-    bst_smear_body *b;
+    bst_smear_body *b = NULL;
     *there = true;
     BST_TRY(body_of(ctx, s, source, &b));
     if (b->frame != s->frame) {

@@ -95,25 +95,30 @@ void bst_curved_facet_make(const bst_satellite_pose *p, const bst_curved_places 
     }
 }
 
-void bst_curved_facet_part(const bst_curved_facet *f, int around, int up, int i, int k,
-                           bst_vec3 corner[4]) {
-    double turn = (f->azimuth[1] - f->azimuth[0]) / around, wide = polygon_radius(turn);
-    double step = (f->height[1] - f->height[0]) / up;
+double bst_curved_facet_scale(const bst_curved_facet *f, int around, int up) {
+    double scale = polygon_radius((f->azimuth[1] - f->azimuth[0]) / around);
+    return f->curved->sphere ? scale * polygon_radius((f->height[1] - f->height[0]) / up) : scale;
+}
+
+void bst_curved_facet_part(const bst_curved_facet *f, const int parts[2], const int place[2],
+                           double scale, bst_vec3 corner[4]) {
+    double turn = (f->azimuth[1] - f->azimuth[0]) / parts[0];
+    double step = (f->height[1] - f->height[0]) / parts[1];
     for (int n = 0; n < 4; n++) {
         int right = n == 1 || n == 2, high = n >= 2;
-        double a = f->azimuth[0] + turn * (i + right), v = (double)(k + high) / up, z, r;
+        double a = f->azimuth[0] + turn * (place[0] + right), z, r;
+        double height = f->height[0] + step * (place[1] + high);
         if (f->curved->sphere) {
-            double latitude = f->height[0] + step * (k + high);
-            double radius = f->curved->radius_m * polygon_radius(step);
-            z = radius * sin(latitude);
-            r = radius * cos(latitude);
+            z = scale * f->curved->radius_m * sin(height);
+            r = scale * f->curved->radius_m * cos(height);
         } else {
-            z = f->height[0] + step * (k + high);
-            r = f->radius_m[0] + v * (f->radius_m[1] - f->radius_m[0]);
+            double v = (double)(place[1] + high) / parts[1];
+            z = height;
+            r = scale * (f->radius_m[0] + v * (f->radius_m[1] - f->radius_m[0]));
         }
         bst_vec3 p = bst_vec3_axpy(f->centre, z, f->z);
-        p = bst_vec3_axpy(p, r * wide * cos(a), f->x);
-        corner[n] = bst_vec3_axpy(p, r * wide * sin(a), f->y);
+        p = bst_vec3_axpy(p, r * cos(a), f->x);
+        corner[n] = bst_vec3_axpy(p, r * sin(a), f->y);
     }
 }
 

@@ -29,13 +29,18 @@ typedef struct bst_curved_facet {
 void bst_curved_facet_make(const bst_satellite_pose *pose, const bst_curved_places *places,
                            int facet, bst_curved_facet *out);
 
-/* Corners of part (i, k) of a facet that is divided into `around` x `up`, body frame. The polygons
- * have the area of the circle.
+/* Factor on the radius by which the outline of a surface that is divided into such parts has the
+ * area of the circle. */
+double bst_curved_facet_scale(const bst_curved_facet *facet, int around, int up);
+
+/* Corners of a part of a facet that is divided into parts[0] around and parts[1] up, body frame.
  *
+ * Given:     place  index of the part, around and up
+ *            scale  factor on the radius
  * Returned:  corner  [4] counter-clockwise from outside, from low azimuth and height; two may be
  *                    the same */
-void bst_curved_facet_part(const bst_curved_facet *facet, int around, int up, int i, int k,
-                           bst_vec3 corner[4]);
+void bst_curved_facet_part(const bst_curved_facet *facet, const int parts[2], const int place[2],
+                           double scale, bst_vec3 corner[4]);
 
 /* Normal of the surface at fractions of azimuth and height of a facet, unit, body frame. */
 bst_vec3 bst_curved_facet_normal(const bst_curved_facet *facet, double u, double v);

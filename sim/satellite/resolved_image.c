@@ -125,6 +125,7 @@ typedef struct adding {
     bst_mat3 image_from_body;
     bst_vec3 eye_m; /* body frame */
     double per_m;   /* cells per metre at one metre */
+    double scale;   /* of the current curved surface, see bst_curved_facet_scale */
     bool earth;
 } adding;
 
@@ -143,11 +144,14 @@ typedef struct face {
     bst_vec3 plane;            /* depth at (x, y, 1) in cells: 1 over the scalar product */
     double near_m, far_m;      /* depths of the corners */
     int low[2], width, height; /* box in cells */
+    /* change of the light per cell from the middle, per cell, and its limits; all 0: none */
+    double slope[2], middle[2], least, most;
 } face;
 
 /* Light per cell: where Sun and Earth light the facet, and everywhere. */
 typedef struct shading {
     double sun, earth, uniform;
+    double sun_change[2]; /* across a part of a curved surface, around and up */
 } shading;
 
 /* Sets corners and depths of a facet in the image; false: it shows its back. */
@@ -159,6 +163,8 @@ static bool make_face(const adding *a, const bst_vec3 *corner, int count, bst_ve
         return false;
     }
     out->count = count;
+    out->slope[0] = out->slope[1] = out->least = out->most = 0.0;
+    out->middle[0] = out->middle[1] = 0.0;
     out->near_m = INFINITY;
     out->far_m = 0.0;
     for (int i = 0; i < count; i++) {
@@ -193,7 +199,7 @@ static double cell_sr(const adding *a, bst_vec3 point) {
 /* Light per cell of a surface element where it is lit. */
 static shading shade(const adding *a, int material, bst_vec3 point, bst_vec3 normal) {
     const bst_resolved_light *l = a->light;
-    shading f = {0.0, 0.0, 0.0};
+    shading f = {0.0, 0.0, 0.0, {0.0, 0.0}};
     if (!l) {
         return f;
     }
@@ -332,16 +338,19 @@ static bst_status add_fragments(bst_ctx *ctx, const adding *a, const face *f, do
         bst_surface_fragment piece = {.area = (float)c->area,
                                       .area_x = (float)c->moment_x,
                                       .area_y = (float)c->moment_y,
-                                      .light = (float)(uniform * c->area),
-                                      .light_x = (float)(uniform * c->moment_x),
-                                      .light_y = (float)(uniform * c->moment_y),
                                       .part = f->part};
         double dx = c->moment_x / c->area, dy = c->moment_y / c->area;
         for (int x = c->x; x < c->x + c->run; x++) {
             bst_surface_fragment one = piece;
             double depth_m = depth_at(f, x + 0.5 + dx, c->y + 0.5 + dy);
             one.depth_m = (float)(depth_m - a->view->origin_m.z);
-            one.reach_m = (float)fmin(steep * depth_m * depth_m, 0.5 * (f->far_m - f->near_m));
+            one.reach_m = (float)fmin(steep * depth_m * depth_m, f->far_m - f->near_m);
+            double more = f->slope[0] * (x + 0.5 + dx - f->middle[0]) +
+                          f->slope[1] * (c->y + 0.5 + dy - f->middle[1]);
+            double light = uniform + fmin(fmax(more, f->least), f->most);
+            one.light = (float)(light * c->area);
+            one.light_x = (float)(light * c->moment_x);
+            one.light_y = (float)(light * c->moment_y);
             if (pieces) {
                 size_t at = (size_t)(c->y - f->low[1]) * (size_t)f->width + (size_t)(x - f->low[0]);
                 const lit_cell *lit = &r->lit_cells[at];
@@ -355,20 +364,25 @@ static bst_status add_fragments(bst_ctx *ctx, const adding *a, const face *f, do
     return BST_OK;
 }
 
-/* Step along the circumference of cylinders and cones, px: their sides are straight in the image,
- * and wrong by 0.08 step^2 / radius on average. */
-static const double ROUND_PX = 0.35;
+/* Step between the corners of a circle's polygon at the limb, px: the polygon has the area of the
+ * circle, and its borders are wrong by LIMB_PX. A circle in the image plane is wrong by step^2 /
+ * (24 radius), the straight side of a cylinder by twice that. */
+static const double LIMB_PX = 4e-5;
+
+/* Step elsewhere, px. */
+static const double STEP_PX = 0.5;
 
 /* Largest angle of a part of a curved surface: the light of a part is that of its middle. */
 static const double PART_RAD = 0.05;
 
-/* Parts into which an arc is divided, for steps of step_cells. */
-static int parts_for(const adding *a, double radius_m, double angle, bst_vec3 at,
-                     double step_cells) {
+/* Parts into which an arc is divided: at the limb, or elsewhere. */
+static int parts_for(const adding *a, double radius_m, double angle, bst_vec3 at, bool limb) {
     double depth_m;
     (void)project(a, at, &depth_m);
-    double steps = angle * radius_m * a->per_m / (depth_m * step_cells);
-    return (int)fmin(ceil(fmax(steps, angle / PART_RAD) - 1e-6), PARTS_MAX);
+    double radius_px = radius_m * a->per_m / depth_m * a->r->image.cell_px;
+    double step_px = limb ? sqrt(12.0 * radius_px * LIMB_PX) : STEP_PX;
+    double parts = fmax(angle * radius_px / step_px, angle / PART_RAD);
+    return (int)fmin(ceil(parts - 1e-6), PARTS_MAX);
 }
 
 static bst_status add_plane_facet(bst_ctx *ctx, adding *a, int facet, face *f) {
@@ -381,8 +395,7 @@ static bst_status add_plane_facet(bst_ctx *ctx, adding *a, int facet, face *f) {
         double angle = 2.0 * BST_PI / from->count;
         double side_m = bst_vec3_norm(bst_vec3_sub(
             a->pose->vertices[r->satellite->corner[from->first + 1]], a->pose->vertices[first]));
-        around = parts_for(a, side_m / angle, angle, a->pose->vertices[first],
-                           ROUND_PX / r->image.cell_px);
+        around = parts_for(a, side_m / angle, angle, a->pose->vertices[first], true);
         int most = BST_COVERAGE_CORNERS_MAX / from->count;
         around = around < most ? around : most;
     }
@@ -422,35 +435,83 @@ static bst_status add_plane_facet(bst_ctx *ctx, adding *a, int facet, face *f) {
     return add_fragments(ctx, a, f, s.uniform, pieces);
 }
 
-/* Mean light over part (i, k) of a curved facet, if a lobe is narrower than the part. */
-static shading shade_part(const adding *a, const bst_curved_facet *c, const int parts[2], int i,
-                          int k, bst_vec3 middle) {
-    enum { FINEST = 12 };
-    const bst_material *m = &a->r->satellite->materials[c->curved->material];
-    double lobe = bst_brdf_lobe_rad(&m->brdf);
-    double wide = (c->azimuth[1] - c->azimuth[0]) / parts[0];
-    double high = c->curved->sphere ? (c->height[1] - c->height[0]) / parts[1] : 0.0;
+/* Samples of a part of a curved facet for its light: more where the terminator crosses it or a lobe
+ * is narrower than it is. */
+static void samples_for(const adding *a, const bst_curved_facet *c, const double angle[2],
+                        bst_vec3 normal, bst_vec3 eye, int samples[2]) {
+    enum { LEAST = 2, TERMINATOR = 6, FINEST = 12 };
+    double lobe = bst_brdf_lobe_rad(&a->r->satellite->materials[c->curved->material].brdf);
+    double sum = angle[0] + angle[1];
+    bst_vec3 half = bst_vec3_unit(bst_vec3_add(eye, a->light->sun));
+    bool bright = bst_vec3_angle(half, normal) < sum + 8.0 * lobe;
+    bool terminator = fabs(bst_vec3_dot(normal, a->light->sun)) < 0.5 * sum;
+    for (int n = 0; n < 2; n++) {
+        double wanted = bright ? ceil(angle[n] / (0.4 * lobe)) : 0.0;
+        wanted = fmax(fmin(wanted, FINEST), terminator ? TERMINATOR : LEAST);
+        samples[n] = angle[n] > 0.0 ? (int)wanted : 1;
+    }
+}
+
+/* Mean light of a part of a curved facet. */
+static shading shade_part(const adding *a, const bst_curved_facet *c, const int parts[2],
+                          const int place[2], bst_vec3 middle) {
+    int i = place[0], k = place[1], samples[2];
+    shading mean = {0.0, 0.0, 0.0, {0.0, 0.0}};
+    if (!a->light) {
+        return mean;
+    }
+    double change[2] = {0.0, 0.0}, spread[2] = {0.0, 0.0};
+    bool sphere = c->curved->sphere;
+    const double angle[2] = {(c->azimuth[1] - c->azimuth[0]) / parts[0],
+                             sphere ? (c->height[1] - c->height[0]) / parts[1] : 0.0};
+    bst_vec3 eye = bst_vec3_unit(bst_vec3_sub(a->eye_m, middle));
     bst_vec3 normal = bst_curved_facet_normal(c, (i + 0.5) / parts[0], (k + 0.5) / parts[1]);
-    int fine[2] = {1, 1};
-    if (a->light && fmax(wide, high) > 0.5 * lobe) {
-        bst_vec3 eye = bst_vec3_unit(bst_vec3_sub(a->eye_m, middle));
-        bst_vec3 half = bst_vec3_unit(bst_vec3_add(eye, a->light->sun));
-        if (bst_vec3_angle(half, normal) < wide + high + 8.0 * lobe) {
-            fine[0] = (int)fmin(ceil(wide / (0.4 * lobe)), FINEST);
-            fine[1] = (int)fmin(fmax(ceil(high / (0.4 * lobe)), 1.0), FINEST);
+    samples_for(a, c, angle, normal, eye, samples);
+    double weights = 0.0;
+    for (int n = 0; n < samples[0] * samples[1]; n++) {
+        double u = (i + (n % samples[0] + 0.5) / samples[0]) / parts[0];
+        double v = (k + (n / samples[0] + 0.5) / samples[1]) / parts[1];
+        normal = bst_curved_facet_normal(c, u, v);
+        /* the projected area */
+        double up = sphere ? bst_vec3_dot(normal, c->z) : 0.0;
+        double weight = fmax(bst_vec3_dot(normal, eye), 1e-4) * sqrt(fmax(1.0 - up * up, 0.0));
+        shading one = shade(a, c->curved->material, middle, normal);
+        const double off[2] = {u * parts[0] - i - 0.5, v * parts[1] - k - 0.5};
+        for (int m = 0; m < 2; m++) {
+            change[m] += off[m] * one.sun;
+            spread[m] += off[m] * off[m];
         }
+        mean.sun += weight * one.sun;
+        mean.earth += weight * one.earth;
+        mean.uniform += weight * one.uniform;
+        weights += weight;
     }
-    shading sum = {0.0, 0.0, 0.0};
-    double share = 1.0 / (fine[0] * fine[1]);
-    for (int n = 0; n < fine[0] * fine[1]; n++) {
-        double u = (i + (n % fine[0] + 0.5) / fine[0]) / parts[0];
-        double v = (k + (n / fine[0] + 0.5) / fine[1]) / parts[1];
-        shading one = shade(a, c->curved->material, middle, bst_curved_facet_normal(c, u, v));
-        sum.sun += share * one.sun;
-        sum.earth += share * one.earth;
-        sum.uniform += share * one.uniform;
+    double scale = weights > 0.0 ? 1.0 / weights : 0.0;
+    for (int m = 0; m < 2; m++) {
+        change[m] = spread[m] > 0.0 ? change[m] / spread[m] : 0.0;
     }
-    return sum;
+    return (shading){
+        scale * mean.sun, scale * mean.earth, scale * mean.uniform, {change[0], change[1]}};
+}
+
+/* Sets the slope of the light of a part of a curved facet in the image, from its change across the
+ * part. */
+static void set_slope(const shading *s, face *f) {
+    const bst_point2 *c = f->corner;
+    double ux = 0.5 * (c[1].x - c[0].x + c[2].x - c[3].x);
+    double uy = 0.5 * (c[1].y - c[0].y + c[2].y - c[3].y);
+    double vx = 0.5 * (c[3].x - c[0].x + c[2].x - c[1].x);
+    double vy = 0.5 * (c[3].y - c[0].y + c[2].y - c[1].y);
+    double area = ux * vy - uy * vx, range = fabs(s->sun_change[0]) + fabs(s->sun_change[1]);
+    /* seen edge-on, its mean is enough */
+    if (fabs(area) > 1e-3 * (ux * ux + uy * uy + vx * vx + vy * vy)) {
+        f->slope[0] = (s->sun_change[0] * vy - s->sun_change[1] * uy) / area;
+        f->slope[1] = (s->sun_change[1] * ux - s->sun_change[0] * vx) / area;
+    }
+    f->middle[0] = 0.25 * (c[0].x + c[1].x + c[2].x + c[3].x);
+    f->middle[1] = 0.25 * (c[0].y + c[1].y + c[2].y + c[3].y);
+    f->most = 0.5 * range;
+    f->least = -fmin(0.5 * range, s->sun);
 }
 
 /* A convex polygon with few corners. */
@@ -546,6 +607,9 @@ static bst_status add_part(bst_ctx *ctx, const adding *a, const curved_part *par
         return BST_OK;
     }
     BST_TRY(cover_face(ctx, a, f));
+    if (!pieces && s->sun > 0.0) {
+        set_slope(s, f);
+    }
     if (a->r->whole.count > 0 && pieces && s->sun > 0.0) {
         BST_TRY(clear_lit(ctx, a->r, f));
         BST_TRY(add_part_pieces(ctx, a, part, f, s->sun));
@@ -554,12 +618,14 @@ static bst_status add_part(bst_ctx *ctx, const adding *a, const curved_part *par
     return add_fragments(ctx, a, f, s->sun + s->earth + s->uniform, false);
 }
 
-/* Part (i, k) of a curved facet that is divided into parts[0] x parts[1]. */
+/* A part of a curved facet that is divided into parts[0] x parts[1]. */
 static void make_part(const adding *a, int facet, const bst_curved_facet *c, const int parts[2],
-                      int i, int k, curved_part *out) {
+                      const int place[2], curved_part *out) {
+    static const int one[2] = {1, 1}, first[2] = {0, 0};
+    int i = place[0], k = place[1];
     bst_vec3 whole[4], origin, e1, e2;
-    bst_curved_facet_part(c, parts[0], parts[1], i, k, out->corner);
-    bst_curved_facet_part(c, 1, 1, 0, 0, whole);
+    bst_curved_facet_part(c, parts, place, a->scale, out->corner);
+    bst_curved_facet_part(c, one, first, bst_curved_facet_scale(c, 1, 1), whole);
     bst_pose_facet_axes(a->pose, facet, &origin, &e1, &e2);
     for (int n = 0; n < 4; n++) {
         double u = (double)(i + (n == 1 || n == 2)) / parts[0], v = (double)(k + n / 2) / parts[1];
@@ -570,18 +636,32 @@ static void make_part(const adding *a, int facet, const bst_curved_facet *c, con
     }
 }
 
-static bst_status add_curved_facet(bst_ctx *ctx, const adding *a, int facet, face *f) {
+static bst_status add_curved_facet(bst_ctx *ctx, adding *a, int facet, face *f) {
     const bst_facet *from = &a->r->satellite->facets[facet];
     bst_vec3 normal = a->pose->normals[facet];
     bst_curved_facet c;
     bst_curved_facet_make(a->pose, &a->r->places, facet, &c);
     bst_vec3 first = a->pose->vertices[a->r->satellite->corner[from->first]];
     double radius_m = c.curved->sphere ? c.curved->radius_m : fmax(c.radius_m[0], c.radius_m[1]);
-    double step = (c.curved->sphere ? 1.0 : ROUND_PX) / a->r->image.cell_px;
-    int parts[2] = {parts_for(a, radius_m, c.azimuth[1] - c.azimuth[0], first, step), 1};
+    double turn = c.azimuth[1] - c.azimuth[0], rise = c.height[1] - c.height[0];
+    int parts[2] = {parts_for(a, radius_m, turn, first, false), 1};
+    int fine[2] = {parts_for(a, radius_m, turn, first, true), 1};
+    double half = 0.5 * turn / parts[0];
     if (c.curved->sphere) {
-        parts[1] = parts_for(a, radius_m, c.height[1] - c.height[0], first, step);
+        parts[1] = parts_for(a, radius_m, rise, first, false);
+        fine[1] = parts_for(a, radius_m, rise, first, true);
+        half = 0.5 * hypot(turn / parts[0], rise / parts[1]);
     }
+    const double scale[2] = {
+        /* where large and small parts of a sphere meet, gaps and overlaps have the same area */
+        c.curved->sphere ? sqrt(bst_curved_facet_scale(&c, parts[0], parts[1]))
+                         : bst_curved_facet_scale(&c, fine[0], fine[1]),
+        bst_curved_facet_scale(&c, fine[0], fine[1])};
+    for (int n = 0; n < 2; n++) { /* parts of parts at limb and terminator */
+        fine[n] = (fine[n] + parts[n] - 1) / parts[n];
+    }
+    /* the direction to the observer differs over a facet by this */
+    double near = radius_m / bst_vec3_norm(bst_vec3_sub(a->eye_m, first));
     double lit[2] = {1.0, 1.0};
     bool split = false;
     for (int view = 1; view >= 0 && a->light; view--) { /* the Sun's pieces remain */
@@ -596,17 +676,29 @@ static bst_status add_curved_facet(bst_ctx *ctx, const adding *a, int facet, fac
     }
     for (int n = 0; n < parts[0] * parts[1]; n++) {
         int i = n % parts[0], k = n / parts[0];
-        curved_part part;
-        make_part(a, facet, &c, parts, i, k, &part);
-        bst_vec3 middle = bst_vec3_scale(bst_vec3_add(part.corner[0], part.corner[2]), 0.5);
         bst_vec3 outward = bst_curved_facet_normal(&c, (i + 0.5) / parts[0], (k + 0.5) / parts[1]);
-        if (bst_vec3_dot(outward, bst_vec3_unit(bst_vec3_sub(a->eye_m, middle))) < -0.2) {
+        double up = bst_vec3_dot(outward, bst_vec3_unit(bst_vec3_sub(a->eye_m, first)));
+        bool limb = fabs(up) < 2.5 * half + near;
+        if (up < 0.0 && !limb) {
             continue; /* shows its back */
         }
-        shading s = shade_part(a, &c, parts, i, k, middle);
-        s.sun *= split ? 1.0 : lit[0];
-        s.earth *= lit[1];
-        BST_TRY(add_part(ctx, a, &part, c.curved->side, &s, split, f));
+        limb = limb || (a->light && fabs(bst_vec3_dot(outward, a->light->sun)) < 1.2 * half);
+        int divide[2] = {limb ? fine[0] : 1, limb ? fine[1] : 1};
+        a->scale = scale[limb];
+        int all[2] = {parts[0] * divide[0], parts[1] * divide[1]};
+        for (int m = 0; m < divide[0] * divide[1]; m++) {
+            int place[2] = {i * divide[0] + m % divide[0], k * divide[1] + m / divide[0]};
+            curved_part part;
+            make_part(a, facet, &c, all, place, &part);
+            bst_vec3 middle = bst_vec3_scale(bst_vec3_add(part.corner[0], part.corner[2]), 0.5);
+            shading s = shade_part(a, &c, all, place, middle);
+            for (int v = 0; v < 2; v++) {
+                s.sun_change[v] *= split ? 1.0 : lit[0];
+            }
+            s.sun *= split ? 1.0 : lit[0];
+            s.earth *= lit[1];
+            BST_TRY(add_part(ctx, a, &part, c.curved->side, &s, split, f));
+        }
     }
     return BST_OK;
 }

@@ -37,6 +37,26 @@ bst_status bst_visible_surface_begin(bst_ctx *ctx, bst_visible_surface *s, int w
     return BST_OK;
 }
 
+/* Joins a fragment to another one of the same cell if they are neighbours on one part. */
+static bool join(bst_surface_fragment *to, const bst_surface_fragment *f) {
+    static const float MOST = 1.0001F;
+    float apart = fabsf(to->depth_m - f->depth_m);
+    if (to->part != f->part || apart > to->reach_m + f->reach_m || to->area + f->area > MOST) {
+        return false;
+    }
+    float low = fminf(to->depth_m - to->reach_m, f->depth_m - f->reach_m);
+    float high = fmaxf(to->depth_m + to->reach_m, f->depth_m + f->reach_m);
+    to->depth_m = 0.5F * (low + high);
+    to->reach_m = 0.5F * (high - low);
+    to->area += f->area;
+    to->area_x += f->area_x;
+    to->area_y += f->area_y;
+    to->light += f->light;
+    to->light_x += f->light_x;
+    to->light_y += f->light_y;
+    return true;
+}
+
 bst_status bst_visible_surface_add(bst_ctx *ctx, bst_visible_surface *s, int x, int y,
                                    const bst_surface_fragment *f) {
     assert(x >= 0 && y >= 0 && x < s->width && y < s->height);
@@ -52,6 +72,9 @@ bst_status bst_visible_surface_add(bst_ctx *ctx, bst_visible_surface *s, int x, 
         cell->depth_m = f->depth_m;
         cell->light = f->light;
         cell->part = f->part;
+        return BST_OK;
+    }
+    if (cell->first >= 0 && join(&s->fragments[cell->first], f)) {
         return BST_OK;
     }
     if (s->fragment_count == s->fragment_capacity) {

@@ -38,7 +38,8 @@ void bst_visible_surface_free(bst_visible_surface *surface);
 bst_status bst_visible_surface_begin(bst_ctx *ctx, bst_visible_surface *surface, int width,
                                      int height) BST_MUST_CHECK;
 
-/* Adds a fragment to a cell; `next` is not used. BST_ERR_MEMORY. */
+/* Adds a fragment to a cell; `next` is not used. Neighbours on one part become one fragment if they
+ * are added in turn. BST_ERR_MEMORY. */
 bst_status bst_visible_surface_add(bst_ctx *ctx, bst_visible_surface *surface, int x, int y,
                                    const bst_surface_fragment *fragment) BST_MUST_CHECK;
 
