@@ -203,6 +203,13 @@ static const char *const cylinder =
 static const char *const box =
     MATERIAL "\"kind\": \"box\", \"size_m\": [1.5, 1.1, 2.0], \"material\": \"m\"}]}";
 
+static const char *const two_boxes =
+    "{\"materials\": [{\"name\": \"m\", \"diffuse\": 1}], \"parts\": ["
+    "{\"name\": \"b\", \"kind\": \"box\", \"size_m\": [1.5, 1.1, 2.0], \"material\": \"m\"},"
+    "{\"name\": \"p\", \"kind\": \"plate\", \"size_m\": [3.0, 1.1, 0], \"position_m\": [2.5, 0, "
+    "0.2],"
+    "\"rotation_deg\": [30, 0, 0], \"material\": \"m\"}]}";
+
 static const double bright[] = {1.5e3, 4e4};
 
 /* Corners of a face of the box or plate in the image, and whether it faces the observer. */
@@ -315,8 +322,70 @@ static void test_sphere_and_cylinder(void **state) {
     free(expected);
 }
 
+/* Light and centroid of the frame of a scene whose body is `across` px, relative to the point
+ * source of the same flux. */
+static void light_at(fixture *f, bst_renderer *r, const bst_camera *camera, scene *s, double across,
+                     double *light, double *x, double *y) {
+    static float image[SIDE * SIDE];
+    const scene_motion still = {.duration_s = 1.0, .samples = 2};
+    scene_track track = scene_track_make(camera, &still);
+    double range_m = 2.0 * s->model.satellite->radius_m / bst_camera_scale_rad(camera) / across;
+    double nearer = s->source.range_m / range_m;
+    s->source.range_m = range_m;
+    s->source.electrons_per_s *= nearer * nearer;
+    /* the same electrons at any range */
+    double scale = 2e5 / s->source.electrons_per_s;
+    s->source.electrons_per_s *= scale;
+    s->body.gain[0].sun *= scale;
+    bst_render_request q = {
+        .window = {0, 0, SIDE, SIDE}, .track = &track.track, .sources = &s->source, .count = 1};
+    bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, image));
+    *light = *x = *y = 0.0;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        *light += (double)image[i];
+        *x += (double)image[i] * (i % SIDE);
+        *y += (double)image[i] * (double)(i / SIDE);
+    }
+    *x /= *light;
+    *y /= *light;
+    *light /= s->source.electrons_per_s;
+    scene_track_free(&track);
+}
+
+/* From far to near the light is that of the point source, and its centroid starts at the centre of
+ * mass and moves in proportion to the size: no step where the shape is first drawn (0.02 px), nor
+ * where the grid changes. */
+static void test_hand_over(void **state) {
+    fixture *f = *state;
+    bst_camera camera = small_camera();
+    bst_renderer *r;
+    bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &camera, NULL, &r));
+    const double place[2] = {63.2, 64.45}, sun[3] = {0.7, -0.3, 0.2};
+    const double sizes[] = {0.02, 0.1, 0.5, 1.0, 1.9, 2.1, 5.0, 12.0, 31.0, 33.0, 60.0};
+    scene s;
+    make_scene(&s, &camera, two_boxes, bst_quat_from_rotvec((bst_vec3){2.7, 0.4, 0.3}), place, sun,
+               1e3);
+    double slope[2] = {0.0, 0.0};
+    for (int n = 10; n >= 0; n--) { /* the slope is that of the largest */
+        double light, x, y;
+        light_at(f, r, &camera, &s, sizes[n], &light, &x, &y);
+        if (n == 10) {
+            slope[0] = (x - place[0]) / sizes[n];
+            slope[1] = (y - place[1]) / sizes[n];
+            assert_true(hypot(slope[0], slope[1]) > 0.05); /* there is something to see */
+        }
+        /* the limits */
+        assert_float_equal(light, 1.0, 1e-3);
+        assert_float_equal(x, place[0] + slope[0] * sizes[n], 0.01);
+        assert_float_equal(y, place[1] + slope[1] * sizes[n], 0.01);
+    }
+    bst_test_model_close(&s.model);
+    bst_renderer_free(r);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_boxes),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_hand_over),
+                                       cmocka_unit_test(test_boxes),
                                        cmocka_unit_test(test_sphere_and_cylinder)};
     return cmocka_run_group_tests(tests, open_device, close_device);
 }
