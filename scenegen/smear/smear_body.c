@@ -35,7 +35,7 @@ static const double gauss_weight[GAUSS_MOST][GAUSS_MOST] = {
 
 /* Largest motion of a panel of the quadrature with one to four points, PSF sigmas: the error of
  * integrating an edge's image over it is below 1e-4. */
-static const double gauss_reach[GAUSS_MOST] = {0.1, 0.7, 1.7, 2.8};
+static const double gauss_reach[GAUSS_MOST] = {0.1, 0.7, 1.7, 3.2};
 
 void bst_smear_bodies_clear(bst_smear_bodies *bodies) {
     for (int i = 0; i < bodies->count; i++) {
@@ -165,8 +165,8 @@ static void choose_times(double sigmas, times *out) {
 }
 
 /* Side of the cells for the body, px: a power of two of pixels, or less for small bodies. */
-static double cell_for(const bst_smear *s, const bst_scene_source *source) {
-    enum { FINEST = 16, ACROSS = 32 };
+static double cell_for(const bst_smear *s, const bst_scene_source *source, int poses) {
+    enum { FINEST = 16, ACROSS = 32, FEW = 16 };
     double across_px = 2.0 * bst_smear_body_radius_px(s, source);
     double electrons = source->electrons_per_s * s->duration_s;
     /* a body fills about a third of the square about its sphere */
@@ -177,7 +177,8 @@ static double cell_for(const bst_smear *s, const bst_scene_source *source) {
     double cell = s->sigma_px * cbrt(allowed * 480.0);
     cell = fmin(cell, across_px / ACROSS);
     double side = 0.5;
-    while (side > 1.0 / FINEST && side > cell) {
+    /* the borders of many poses fall on all parts of the cells */
+    while (side > 1.0 / FINEST && side > cell && poses <= FEW) {
         side *= 0.5;
     }
     while (side > across_px / ACROSS) {
@@ -283,7 +284,7 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
     if (b->empty) {
         return BST_OK;
     }
-    b->cell_px = cell_for(s, source);
+    b->cell_px = cell_for(s, source, t.count);
     BST_TRY(bst_resolved_begin(ctx, b->image, low, high, b->cell_px));
     double inverse = 1.0 / source->electrons_per_s;
     for (int k = 0; k < t.count; k++) {

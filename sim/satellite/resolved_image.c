@@ -140,7 +140,7 @@ static bst_point2 project(const adding *a, bst_vec3 p, double *depth_m) {
 /* A facet in the image. */
 typedef struct face {
     bst_point2 corner[BST_COVERAGE_CORNERS_MAX];
-    int count, part;
+    int count, part, curved;
     bst_vec3 plane;            /* depth at (x, y, 1) in cells: 1 over the scalar product */
     double near_m, far_m;      /* depths of the corners */
     int low[2], width, height; /* box in cells */
@@ -338,7 +338,8 @@ static bst_status add_fragments(bst_ctx *ctx, const adding *a, const face *f, do
         bst_surface_fragment piece = {.area = (float)c->area,
                                       .area_x = (float)c->moment_x,
                                       .area_y = (float)c->moment_y,
-                                      .part = f->part};
+                                      .part = f->part,
+                                      .curved = f->curved};
         double dx = c->moment_x / c->area, dy = c->moment_y / c->area;
         for (int x = c->x; x < c->x + c->run; x++) {
             bst_surface_fragment one = piece;
@@ -726,6 +727,7 @@ bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *r, bst_satellite_pose *p
     face f;
     for (int i = 0; i < sat->facet_count; i++) {
         f.part = sat->facets[i].part;
+        f.curved = sat->facets[i].curved;
         BST_TRY(sat->facets[i].curved >= 0 ? add_curved_facet(ctx, &a, i, &f)
                                            : add_plane_facet(ctx, &a, i, &f));
     }

@@ -37,11 +37,13 @@ bst_status bst_visible_surface_begin(bst_ctx *ctx, bst_visible_surface *s, int w
     return BST_OK;
 }
 
-/* Joins a fragment to another one of the same cell if they are neighbours on one part. */
+/* Joins a fragment to another one of the same cell if they are neighbours on a curved
+ * surface. */
 static bool join(bst_surface_fragment *to, const bst_surface_fragment *f) {
     static const float MOST = 1.0001F;
     float apart = fabsf(to->depth_m - f->depth_m);
-    if (to->part != f->part || apart > to->reach_m + f->reach_m || to->area + f->area > MOST) {
+    if (f->curved < 0 || to->curved != f->curved || apart > to->reach_m + f->reach_m ||
+        to->area + f->area > MOST) {
         return false;
     }
     float low = fminf(to->depth_m - to->reach_m, f->depth_m - f->reach_m);

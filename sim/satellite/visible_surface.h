@@ -7,12 +7,13 @@
 
 /* The part of a facet within a cell. Areas in cells, moments about the cell's centre in cells. */
 typedef struct bst_surface_fragment {
-    float depth_m; /* of its middle: behind the body's origin, along the boresight */
-    float reach_m; /* its depths differ from that by up to this */
-    float area, area_x, area_y;    /* and its first moments */
+    float depth_m;              /* of its middle: behind the body's origin, along the boresight */
+    float reach_m;              /* its depths differ from that by up to this */
+    float area, area_x, area_y; /* and its first moments */
     float light, light_x, light_y; /* light of the whole fragment, and its first moments */
     int part;
-    int next; /* of the same cell; -1: none */
+    int curved; /* curved surface that it is a part of; -1: none */
+    int next;   /* of the same cell; -1: none */
 } bst_surface_fragment;
 
 /* The nearest surface that covers a whole cell with uniform light, and the list of the others. */
@@ -38,8 +39,8 @@ void bst_visible_surface_free(bst_visible_surface *surface);
 bst_status bst_visible_surface_begin(bst_ctx *ctx, bst_visible_surface *surface, int width,
                                      int height) BST_MUST_CHECK;
 
-/* Adds a fragment to a cell; `next` is not used. Neighbours on one part become one fragment if they
- * are added in turn. BST_ERR_MEMORY. */
+/* Adds a fragment to a cell; `next` is not used. Neighbours on one curved surface become one
+ * fragment if they are added in turn. BST_ERR_MEMORY. */
 bst_status bst_visible_surface_add(bst_ctx *ctx, bst_visible_surface *surface, int x, int y,
                                    const bst_surface_fragment *fragment) BST_MUST_CHECK;
 
