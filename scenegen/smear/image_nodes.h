@@ -2,8 +2,8 @@
 #ifndef BST_SCENEGEN_SMEAR_IMAGE_NODES_H
 #define BST_SCENEGEN_SMEAR_IMAGE_NODES_H
 
-#include "sim/satellite/resolved_image.h"
 #include "sim/world/scene/disc.h"
+#include "sim/world/scene/source_body.h"
 
 /* Requirements of the nodes. */
 typedef struct bst_image_nodes_aim {

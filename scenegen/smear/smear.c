@@ -488,11 +488,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
     s->last_peak_e = s->last_read_e = s->chord_error = 0.0;
     s->last_leaves = true;
     bool moving = source->path || source->rate || source->shape || source->body;
-    s->disc_px =
-        source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
-    if (source->body) {
-        s->disc_px = bst_smear_body_radius_px(s, source);
-    }
+    s->disc_px = bst_smear_radius_px(s, source);
     bool front = bst_smear_project(s, s->q_reference, source->apparent_mid, &x, &y);
     /* a star that only a wide rotation brings into the field: a float offset is inaccurate */
     double wide = 4.0 * (s->far_px + s->disc_px);

@@ -47,9 +47,12 @@ void bst_smear_bodies_clear(bst_smear_bodies *bodies) {
     *bodies = (bst_smear_bodies){.count = 0};
 }
 
-double bst_smear_body_radius_px(const bst_smear *s, const bst_scene_source *source) {
-    double near = source->body->satellite->radius_m / fmax(source->range_m, 1e-3);
-    return near / bst_camera_scale_rad(&s->camera);
+double bst_smear_radius_px(const bst_smear *s, const bst_scene_source *source) {
+    double scale_rad = bst_camera_scale_rad(&s->camera);
+    if (source->body) {
+        return source->body->satellite->radius_m / fmax(source->range_m, 1e-3) / scale_rad;
+    }
+    return source->shape ? tan(asin(source->shape->radius)) / scale_rad : 0.0;
 }
 
 /* Finds or creates the work memory of a source. Memory of a source that left the field is used
@@ -138,7 +141,7 @@ static void measure(const bst_smear *s, const bst_scene_source *source, double *
         const bst_joint *joint = &b->satellite->joints[j];
         turn += joint->follows == BST_JOINT_SPIN ? fabs(joint->rate_radps) * seconds : 0.0;
     }
-    *turned_px = turn * bst_smear_body_radius_px(s, source);
+    *turned_px = turn * bst_smear_radius_px(s, source);
 }
 
 /* Times of the poses in an exposure. */
@@ -167,7 +170,7 @@ static void choose_times(double sigmas, times *out) {
 /* Side of the cells for the body, px: a power of two of pixels, or less for small bodies. */
 static double cell_for(const bst_smear *s, const bst_scene_source *source, int poses) {
     enum { FINEST = 16, ACROSS = 32, FEW = 16 };
-    double across_px = 2.0 * bst_smear_body_radius_px(s, source);
+    double across_px = 2.0 * bst_smear_radius_px(s, source);
     double electrons = source->electrons_per_s * s->duration_s;
     /* a body fills about a third of the square about its sphere */
     double per_px_e = electrons / fmax(0.3 * across_px * across_px, 1.0);
@@ -217,7 +220,7 @@ static double flux_factor(double across_px, double point, double image) {
 static bst_status find_factor(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
                               const bst_scene_source *source, double u, double *factor) {
     enum { ACROSS = 64 };
-    double across_px = 2.0 * bst_smear_body_radius_px(s, source);
+    double across_px = 2.0 * bst_smear_radius_px(s, source);
     *factor = 1.0;
     if (across_px >= IMAGE_PX) {
         return BST_OK;

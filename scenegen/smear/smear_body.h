@@ -29,7 +29,7 @@ typedef struct bst_smear_bodies {
 /* Frees the memory of the bodies. */
 void bst_smear_bodies_clear(bst_smear_bodies *bodies);
 
-/* Radius of a source's body about its origin, px at the boresight. */
-double bst_smear_body_radius_px(const struct bst_smear *smear, const bst_scene_source *source);
+/* Radius of a source's disc, or of its body about its origin, px at the boresight; 0: a point. */
+double bst_smear_radius_px(const struct bst_smear *smear, const bst_scene_source *source);
 
 #endif

@@ -1,6 +1,7 @@
 #include "sim/satellite/visible_surface.h"
 
 #include <assert.h>
+#include <math.h>
 #include <stdlib.h>
 
 /* Cover above which a cell is full. */
@@ -155,8 +156,8 @@ static int collect(const bst_visible_surface *s, const bst_surface_cell *cell, i
     return count;
 }
 
-double bst_visible_surface_resolve(bst_visible_surface *s, double gap_m, double weight,
-                                   bst_resolved_image *image) {
+double bst_visible_surface_resolve(bst_visible_surface *s, double gap_m, double cell_rad,
+                                   double weight, bst_resolved_image *image) {
     enum { MOST = 64 };
     const bst_surface_fragment *list[MOST];
     double total = 0.0;
@@ -184,12 +185,14 @@ double bst_visible_surface_resolve(bst_visible_surface *s, double gap_m, double 
                 cover(&o, &behind, gap_m);
             }
             bst_resolved_cell *to = &image->cells[at];
-            to->light += (float)(weight * o.light);
-            to->moment_x += (float)(weight * o.light_x);
-            to->moment_y += (float)(weight * o.light_y);
+            double u = (image->x0 + x + 0.5) * cell_rad, v = (image->y0 + y + 0.5) * cell_rad;
+            double c2 = 1.0 / (1.0 + u * u + v * v), part = weight * c2 * sqrt(c2);
+            to->light += (float)(part * o.light);
+            to->moment_x += (float)(part * o.light_x);
+            to->moment_y += (float)(part * o.light_y);
             to->cover += (float)(weight * (1.0 - o.area));
             image->part[at] = (int16_t)o.part;
-            total += o.light;
+            total += c2 * sqrt(c2) * o.light;
             *cell = empty;
         }
     }

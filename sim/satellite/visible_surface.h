@@ -46,10 +46,12 @@ bst_status bst_visible_surface_add(bst_ctx *ctx, bst_visible_surface *surface, i
 
 /* Adds what is visible to an image of the same size, and empties the grid.
  *
- * Given:     gap_m   fragments with less between their depths belong to one surface
- *            weight  factor on light and cover
+ * Given:     gap_m     fragments with less between their depths belong to one surface
+ *            cell_rad  angle of a cell on the image's axis; light is multiplied by the cube of the
+ *                      cosine of the angle from it, by which a cell's solid angle is smaller
+ *            weight    factor on light and cover
  * Returned:  light without the weight */
-double bst_visible_surface_resolve(bst_visible_surface *surface, double gap_m, double weight,
-                                   bst_resolved_image *image);
+double bst_visible_surface_resolve(bst_visible_surface *surface, double gap_m, double cell_rad,
+                                   double weight, bst_resolved_image *image);
 
 #endif
