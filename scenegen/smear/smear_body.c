@@ -19,6 +19,9 @@
 #define POINT_PX 2.0
 #define IMAGE_PX 32.0
 
+/* Poses from which one sample per cell and pose is enough. */
+enum { SAMPLED_POSES = 48 };
+
 enum { POSES_MAX = 1024, PATH_TIMES = 64, GAUSS_MOST = 4 };
 
 /* Gauss-Legendre on [0, 1] with one to four points (Abramowitz and Stegun, table 25.4). */
@@ -287,7 +290,8 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
     if (b->empty) {
         return BST_OK;
     }
-    b->cell_px = cell_for(s, source, t.count);
+    bool fast = t.count >= SAMPLED_POSES && bst_resolved_may_sample(b->satellite);
+    b->cell_px = fast ? 1.0 : cell_for(s, source, t.count);
     BST_TRY(bst_resolved_begin(ctx, b->image, low, high, b->cell_px));
     double inverse = 1.0 / source->electrons_per_s;
     for (int k = 0; k < t.count; k++) {
@@ -300,8 +304,9 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
         if (b->one_pose && source->rate) { /* the path has the rate */
             inverse = 1.0 / (source->electrons_per_s * bst_scene_source_rate_at(source, 0.5));
         }
-        BST_TRY(bst_resolved_add(ctx, b->image, b->pose, &view, &light,
-                                 t.weight[k] * factor * inverse, NULL));
+        double weight = t.weight[k] * factor * inverse;
+        BST_TRY(fast ? bst_resolved_add_sampled(ctx, b->image, b->pose, &view, &light, k, weight)
+                     : bst_resolved_add(ctx, b->image, b->pose, &view, &light, weight, NULL));
     }
     b->error =
         turned_px * turned_px * (b->one_pose ? 1.0 / 12.0 * 0.12 : 0.0) / (sigma_px * sigma_px);

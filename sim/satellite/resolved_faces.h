@@ -12,6 +12,20 @@ typedef struct bst_resolved_lit_cell {
     double light, x, y;
 } bst_resolved_lit_cell;
 
+/* Side of the depth map from the Sun. */
+enum { BST_SHADOW_SIDE = 640 };
+
+/* Work memory of the fast image: zero-initialise. */
+typedef struct bst_resolved_samples {
+    float *near; /* [cells] 1 over the depth of the nearest facet */
+    int *facet;  /* [cells] the nearest facet; -1: none */
+    size_t cells;
+    float *toward;        /* [side][side] place toward the Sun of the nearest facet to it */
+    bst_vec3 *seen, *sun; /* by vertex: cells and 1 over the depth; likewise for the Sun's view */
+    unsigned char *state; /* by facet: 1: its light is known */
+    struct bst_resolved_shading *light; /* by facet */
+} bst_resolved_samples;
+
 struct bst_resolved {
     const bst_satellite *satellite;
     bst_resolved_image image;
@@ -22,6 +36,7 @@ struct bst_resolved {
     bst_resolved_lit_cell *lit_cells; /* in the box of the current facet */
     size_t lit_capacity;
     bst_sun_disc disc;
+    bst_resolved_samples samples;
 };
 
 /* One pose that is added. */
@@ -99,5 +114,16 @@ bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, in
 /* Likewise a facet of a curved surface (resolved_curved.c). */
 bst_status bst_resolved_add_curved_facet(bst_ctx *ctx, bst_resolved_adding *a, int facet,
                                          bst_resolved_face *f) BST_MUST_CHECK;
+
+/* Adds a pose with one sample per cell (resolved_samples.c).
+ *
+ * Given:     index   of the pose: places the samples in their cells
+ *            weight  factor on light and cover
+ * Returned:  *total  light without the weight
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_resolved_sample(bst_ctx *ctx, const bst_resolved_adding *a, int index, double weight,
+                               double *total) BST_MUST_CHECK;
+/* Frees the work memory of samples. */
+void bst_resolved_samples_free(bst_resolved_samples *samples);
 
 #endif

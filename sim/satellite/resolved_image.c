@@ -27,6 +27,7 @@ void bst_resolved_free(bst_resolved *r) {
         free(r->lit_cells);
         bst_curved_places_free(&r->places);
         bst_visible_surface_free(&r->surface);
+        bst_resolved_samples_free(&r->samples);
         bst_polygon_coverage_free(&r->whole);
         bst_polygon_coverage_free(&r->lit);
         free(r);
@@ -93,11 +94,10 @@ bst_status bst_resolved_begin(bst_ctx *ctx, bst_resolved *r, const double low[2]
     return bst_visible_surface_begin(ctx, &r->surface, m->width, m->height);
 }
 
-bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *r, bst_satellite_pose *pose,
-                            const bst_resolved_view *view, const bst_resolved_light *light,
-                            double weight, double *total) {
-    const bst_satellite *sat = r->satellite;
-    assert(pose->satellite == sat && r->image.width > 0);
+/* A pose with its view and light. */
+static bst_resolved_adding start(bst_resolved *r, bst_satellite_pose *pose,
+                                 const bst_resolved_view *view, const bst_resolved_light *light) {
+    assert(pose->satellite == r->satellite && r->image.width > 0);
     bst_resolved_adding a = {.r = r,
                              .pose = pose,
                              .view = view,
@@ -107,7 +107,17 @@ bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *r, bst_satellite_pose *p
     a.eye_m = bst_vec3_scale(bst_mat3_transpose_mul_vec(&a.image_from_body, view->origin_m), -1.0);
     if (light) {
         a.earth = light->earthlight && light->earthlight->count > 0;
-        bst_sun_disc_make(light->sun, light->sun_radius_rad, sat->lobe_rad, &r->disc);
+        bst_sun_disc_make(light->sun, light->sun_radius_rad, r->satellite->lobe_rad, &r->disc);
+    }
+    return a;
+}
+
+bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *r, bst_satellite_pose *pose,
+                            const bst_resolved_view *view, const bst_resolved_light *light,
+                            double weight, double *total) {
+    const bst_satellite *sat = r->satellite;
+    bst_resolved_adding a = start(r, pose, view, light);
+    if (light) {
         bst_pose_look(pose, 0, light->sun);
         if (a.earth) {
             bst_pose_look(pose, 1, light->earthlight->centre);
@@ -127,4 +137,16 @@ bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *r, bst_satellite_pose *p
         *total = sum;
     }
     return BST_OK;
+}
+
+bool bst_resolved_may_sample(const bst_satellite *satellite) {
+    return satellite->curved_count == 0;
+}
+
+bst_status bst_resolved_add_sampled(bst_ctx *ctx, bst_resolved *r, bst_satellite_pose *pose,
+                                    const bst_resolved_view *view, const bst_resolved_light *light,
+                                    int index, double weight) {
+    double total;
+    bst_resolved_adding a = start(r, pose, view, light);
+    return bst_resolved_sample(ctx, &a, index, weight, &total);
 }

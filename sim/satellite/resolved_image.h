@@ -91,6 +91,20 @@ bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *resolved, bst_satellite_
                             const bst_resolved_view *view, const bst_resolved_light *light,
                             double weight, double *total) BST_MUST_CHECK;
 
+/* True if bst_resolved_add_sampled draws a model as well: it has no curved surfaces. */
+bool bst_resolved_may_sample(const bst_satellite *satellite);
+
+/* Adds one of many poses, as bst_resolved_add but fast: one sample per cell, at another place of
+ * the cell for each index, and shadows by a depth map.
+ *
+ * Given:     light  not NULL
+ *            index  0, 1, ... of the pose
+ * Errors:    BST_ERR_MEMORY
+ * Notes:     a single pose has staircases; the sum of dozens has none. Shadows of the Sun only. */
+bst_status bst_resolved_add_sampled(bst_ctx *ctx, bst_resolved *resolved, bst_satellite_pose *pose,
+                                    const bst_resolved_view *view, const bst_resolved_light *light,
+                                    int index, double weight) BST_MUST_CHECK;
+
 /* The image so far; valid until the next call with `resolved`. */
 const bst_resolved_image *bst_resolved_image_of(const bst_resolved *resolved);
 

@@ -145,8 +145,53 @@ static void test_perspective(void **state) {
     bst_test_model_close(&m);
 }
 
+/* The sum of many sampled poses at rest is the exact image: light, cover, and light by quadrant. */
+static void test_samples(void **state) {
+    (void)state;
+    enum { POSES = 64 };
+    bst_ctx ctx = {0};
+    bst_test_model m = bst_test_model_open(flat);
+    bst_resolved *r[2];
+    bst_resolved_gain gain[2] = {{.sun = 1.0}, {.sun = 1.0}};
+    bst_resolved_light light = {.sun = bst_vec3_unit((bst_vec3){0.7, 0.5, 0.4}), .gain = gain};
+    bst_resolved_view view =
+        look_from((bst_vec3){0.2, 0.4, 0.9}, (bst_vec3){1, 0, 0}, 100.0, 0.001);
+    double low[2], high[2], sum[2][2][2] = {{{0}}}, cover[2] = {0}, all = 0.0;
+    assert_true(bst_resolved_may_sample(m.satellite));
+    assert_true(bst_resolved_box(m.pose, &view, low, high));
+    for (int n = 0; n < 2; n++) {
+        bst_assert_ok(&ctx, bst_resolved_create(&ctx, m.satellite, &r[n]));
+        bst_assert_ok(&ctx, bst_resolved_begin(&ctx, r[n], low, high, 1.0));
+        for (int k = 0; k < (n == 0 ? POSES : 1); k++) {
+            if (n == 0) {
+                bst_assert_ok(&ctx, bst_resolved_add_sampled(&ctx, r[n], m.pose, &view, &light, k,
+                                                             1.0 / POSES));
+            } else {
+                bst_assert_ok(&ctx, bst_resolved_add(&ctx, r[n], m.pose, &view, &light, 1.0, NULL));
+            }
+        }
+        const bst_resolved_image *image = bst_resolved_image_of(r[n]);
+        for (int i = 0; i < image->width * image->height; i++) {
+            const bst_resolved_cell *c = &image->cells[i];
+            int right = 2 * (i % image->width) > image->width;
+            int below = 2 * (i / image->width) > image->height;
+            sum[n][right][below] += (double)c->light;
+            cover[n] += (double)c->cover;
+            all += n * (double)c->light;
+        }
+        bst_resolved_free(r[n]);
+    }
+    /* 64 places in each cell, and the bias of the depth map */
+    bst_assert_close(cover[0] / cover[1], 1.0, 2e-3);
+    for (int q = 0; q < 4; q++) {
+        bst_assert_close((sum[0][q & 1][q >> 1] - sum[1][q & 1][q >> 1]) / all, 0.0, 5e-3);
+    }
+    bst_test_model_close(&m);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_agrees_with_flux),
-                                       cmocka_unit_test(test_perspective)};
+                                       cmocka_unit_test(test_perspective),
+                                       cmocka_unit_test(test_samples)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
