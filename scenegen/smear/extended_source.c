@@ -258,6 +258,7 @@ bst_status bst_extended_source_spread(bst_ctx *ctx, const bst_disc_points *point
             node.p[0] += points->items[p].offset.x * stretch;
             node.p[1] += points->items[p].offset.y * stretch;
             node.weight *= points->items[p].share;
+            node.variance += points->items[p].offset.z * stretch * stretch;
             items[n++] = node;
         }
     }

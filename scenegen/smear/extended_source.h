@@ -17,7 +17,7 @@ typedef struct bst_extended_source_view {
 } bst_extended_source_view;
 
 /* Computes the points of the source's disc: x and y of the offset from its centre, px of the
- * undistorted focal plane; z is unused. Small discs and thin crescents use Gauss-Legendre
+ * undistorted focal plane; z is 0. Small discs and thin crescents use Gauss-Legendre
  * quadrature of the lit part. Large discs are scanned pixel by pixel up to the limb.
  *
  * Returned:  *peak  upper bound of the light share in one pixel
@@ -26,8 +26,8 @@ bst_status bst_extended_source_points(bst_ctx *ctx, const bst_scene_source *sour
                                       const bst_extended_source_view *view, bst_disc_points *points,
                                       double *peak) BST_MUST_CHECK;
 
-/* Replaces a path's nodes by those of all disc points along it: positions of `list` plus the
- * points' offsets times `stretch`. Errors: BST_ERR_MEMORY. */
+/* Replaces a path's nodes by those of all points along it: positions of `list` plus the points'
+ * offsets times `stretch`, and likewise their variances (offset.z, px^2). Errors: BST_ERR_MEMORY. */
 bst_status bst_extended_source_spread(bst_ctx *ctx, const bst_disc_points *points, double stretch,
                                       bst_smear_node_list *list) BST_MUST_CHECK;
 

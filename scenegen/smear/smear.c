@@ -77,6 +77,7 @@ void bst_smear_free(bst_smear *s) {
         free(s->parts);
         free(s->nodes.items);
         free(s->points.items);
+        bst_smear_bodies_clear(&s->bodies);
         free(s->table);
         bst_smear_free_ahead(s);
         bst_motion_map_free(s->map);
@@ -282,6 +283,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
     bst_smear_clear_ahead(s);
     s->sources = frame->sources;
     s->aim = frame->aim > 0.0 ? frame->aim : 1.0;
+    s->frame++;
     s->duration_s = track->time_s[track->count - 1];
     s->q_reference = attitude_at(track, 0.5 * s->duration_s);
     s->table_blocks = s->path_count = 0;
@@ -408,9 +410,8 @@ bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, do
 bool bst_smear_place_source(const bst_smear *s, const bst_scene_source *source,
                             bst_smear_place *out) {
     double electrons = source->electrons_per_s * s->duration_s, x, y;
-    bool moving = source->path || source->rate || source->shape;
-    double disc_px =
-        source->shape ? tan(asin(source->shape->radius)) / bst_camera_scale_rad(&s->camera) : 0.0;
+    bool moving = source->path || source->rate || source->shape || source->body;
+    double disc_px = bst_smear_radius_px(s, source);
     bool front = bst_smear_project(s, s->q_reference, source->apparent_mid, &x, &y);
     /* a star that only a wide rotation brings into the field: a float offset is inaccurate */
     double wide = 4.0 * (s->far_px + disc_px);

@@ -43,7 +43,8 @@ static void find_paths(bst_smear *s, const bst_smear_frame *frame) {
     for (int i = 0; i < frame->sources && s->ahead_count < MOST_PATHS; i++) {
         const bst_scene_source *source = &frame->list[i];
         bst_smear_place place;
-        if (!(source->path || source->rate || source->shape) ||
+        /* bodies keep images, which one thread makes */
+        if (!(source->path || source->rate || source->shape) || source->body ||
             !bst_smear_place_source(s, source, &place)) {
             continue;
         }

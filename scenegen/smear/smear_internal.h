@@ -5,6 +5,7 @@
 #include "scenegen/smear/extended_source.h"
 #include "scenegen/smear/motion_map.h"
 #include "scenegen/smear/smear.h"
+#include "scenegen/smear/smear_body.h"
 #include "scenegen/smear/smear_quadrature.h"
 #include "scenegen/stamp/stamp.h"
 
@@ -86,7 +87,9 @@ struct bst_smear {
     int path_count, path_capacity, own_capacity;
     bst_smear_node_list nodes; /* work space */
     bst_disc_points points;    /* work space */
-    double disc_px;            /* radius of the current source's disc; 0: a point */
+    double disc_px;            /* radius of the current source's disc or body; 0: a point */
+    bst_smear_bodies bodies;   /* images of models, kept for the frame */
+    int64_t frame;             /* counts the exposures */
     float *table;
     int table_blocks, table_capacity;
 };
@@ -166,6 +169,18 @@ double bst_smear_allowed(const bst_smear *s, double peak_e);
 /* Coarsest level whose error is within the allowed one for the latest source, for an image that
  * moves by `scale` of the path. */
 int bst_smear_choose_level(const bst_smear *s, double scale);
+
+/* Rotation from camera axes to focal-plane axes. */
+bst_quat bst_smear_focal_turn(const bst_smear *s);
+
+/* Nodes of the centre of a source along its path, relative to (x, y), accurate to a tolerance. */
+bst_status bst_smear_centre_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
+                                  double x, double y, double tolerance) BST_MUST_CHECK;
+
+/* Nodes of a source with a body, relative to (x, y); also sets last_peak_e, last_read_e and
+ * chord_error. No nodes if it gives the sensor no light. *there false: the body has no image. */
+bst_status bst_smear_body_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
+                                double x, double y, bool *there) BST_MUST_CHECK;
 
 /* Nodes of a source that moves, varies or is a disc, relative to (x, y); also sets last_peak_e and
  * last_read_e. No nodes if it gives the sensor no light.

@@ -117,6 +117,22 @@ static bst_status own_nodes(bst_ctx *ctx, bst_smear *s, int count, double x0, do
     return BST_OK;
 }
 
+bst_quat bst_smear_focal_turn(const bst_smear *s) {
+    bool general = s->camera.geometry.general;
+    double turn = general ? asin(s->camera.geometry.sin_rotation) : 0.0;
+    if (general && s->camera.geometry.cos_rotation < 0.0) {
+        turn = BST_PI - turn;
+    }
+    return bst_quat_from_rotvec((bst_vec3){0.0, 0.0, turn});
+}
+
+bst_status bst_smear_centre_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
+                                  double x, double y, double tolerance) {
+    int count;
+    BST_TRY(own_path(ctx, s, source, CHORD_PX, x, y, &count));
+    return own_nodes(ctx, s, count, x, y, tolerance);
+}
+
 /* Computes a disc's points; the work list holds the nodes of its centre about (x, y). *peak: upper
  * bound of the light share in one pixel, without smear. */
 static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source, double x,
@@ -135,11 +151,7 @@ static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_scene_sourc
     double cx = bst_camera_centre_x(&s->camera), cy = bst_camera_centre_y(&s->camera);
     double margin = 0.5 * s->options.taps + 2.0, all = far_px(s) - s->disc_px;
     bool general = s->camera.geometry.general;
-    double turn = general ? asin(s->camera.geometry.sin_rotation) : 0.0;
-    if (general && s->camera.geometry.cos_rotation < 0.0) {
-        turn = BST_PI - turn;
-    }
-    bst_quat focal = bst_quat_from_rotvec((bst_vec3){0.0, 0.0, turn});
+    bst_quat focal = bst_smear_focal_turn(s);
     bst_extended_source_view view = {
         .q_focal_from_gcrf = general ? bst_quat_mul(focal, s->q_reference) : s->q_reference,
         .scale_rad = bst_camera_scale_rad(&s->camera),
@@ -157,6 +169,13 @@ static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_scene_sourc
 bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
                                   double electrons, double x, double y) {
     int count;
+    bool there = false;
+    if (source->body) {
+        BST_TRY(bst_smear_body_nodes(ctx, s, source, x, y, &there));
+    }
+    if (there) {
+        return BST_OK;
+    }
     BST_TRY(own_path(ctx, s, source, CHORD_PX, x, y, &count));
     BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[0]));
     if (s->nodes.count == 0) {

@@ -62,6 +62,10 @@ bst_status bst_bench_ephemeris(bst_ctx *ctx, const bst_bench *self,
 bst_status bst_bench_numerical(bst_ctx *ctx, const bst_bench *self,
                                const bst_bench_options *options,
                                bst_bench_result *out) BST_MUST_CHECK;
+/* Benchmark: frames with the shape of a satellite (bench_resolved.c). */
+bst_status bst_bench_resolved(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
+                              bst_bench_result *out) BST_MUST_CHECK;
+
 /* Benchmark: rendering of the scene self->name (bench_scenes.c). */
 bst_status bst_bench_scene_run(bst_ctx *ctx, const bst_bench *self,
                                const bst_bench_options *options,

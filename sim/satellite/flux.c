@@ -5,84 +5,9 @@
 
 #include "sim/satellite/curved_light.h"
 #include "sim/satellite/gauss_legendre.h"
+#include "sim/satellite/sun_disc.h"
 
-enum { SUN_NODES_MAX = 49, CURVED_MAX = 512 };
-
-/* Directions that stand for the Sun's disc. */
-typedef struct sun_disc {
-    bst_vec3 direction[SUN_NODES_MAX];
-    double weight[SUN_NODES_MAX];
-    int count;
-    bst_vec3 centre;
-    double radius_rad;
-} sun_disc;
-
-/* Radius of the Sun over the width of a lobe above which the disc matters: 1e-3 of the flux. */
-static const double SHARP = 0.05;
-
-/* Nodes for a lobe: limb darkening 1 - 0.6 (1 - mu) (Cox, Allen's Astrophysical Quantities, 4th
- * edition, section 14.7) has the mean square radius 0.45. */
-static void make_sun(const bst_satellite_light *light, double lobe_rad, sun_disc *out) {
-    double r = light->sun_radius_rad;
-    bst_vec3 e1 = bst_vec3_perpendicular(light->sun), e2 = bst_vec3_cross(light->sun, e1);
-    out->centre = light->sun;
-    out->radius_rad = r;
-    out->count = 1;
-    out->direction[0] = light->sun;
-    out->weight[0] = 1.0;
-    if (!(r > SHARP * lobe_rad)) {
-        return;
-    }
-    /* one ring with the second moment of the disc, or four rings */
-    static const double ring_one[] = {0.7745966692414834}, weight_one[] = {0.75};
-    static const double ring_four[] = {0.35, 0.61, 0.79, 0.94};
-    bool fine = r > 0.3 * lobe_rad;
-    int rings = fine ? 4 : 1, around = fine ? 12 : 6;
-    double weights[4] = {weight_one[0]}, total = 0.0;
-    for (int i = 0; i < 4 && fine; i++) { /* rings of equal area, each with its brightness */
-        weights[i] = 1.0 - 0.6 * (1.0 - sqrt(1.0 - ring_four[i] * ring_four[i]));
-        total += weights[i];
-    }
-    out->count = fine ? 0 : 1;
-    out->weight[0] = 0.25;
-    for (int i = 0; i < rings; i++) {
-        double radius = r * (fine ? ring_four[i] : ring_one[i]);
-        for (int k = 0; k < around; k++) {
-            double a = 2.0 * BST_PI * (k + 0.5 * i) / around;
-            bst_vec3 d =
-                bst_vec3_axpy(bst_vec3_axpy(light->sun, radius * cos(a), e1), radius * sin(a), e2);
-            out->direction[out->count] = bst_vec3_unit(d);
-            out->weight[out->count++] = (fine ? weights[i] / total : weights[i]) / around;
-        }
-    }
-}
-
-/* Nodes of the disc that a material needs: for wide lobes the Sun is a point. */
-static int nodes_for(const bst_material *m, const sun_disc *sun) {
-    bool wide = sun->radius_rad <= SHARP * bst_brdf_lobe_rad(&m->brdf);
-    return wide ? 1 : sun->count;
-}
-
-/* BRDF times both cosines, mean over the Sun's disc. */
-static double facet_light(const bst_material *m, const sun_disc *sun, bst_vec3 normal,
-                          bst_vec3 observer) {
-    double out = fmin(bst_vec3_dot(normal, observer), 1.0), sum = 0.0;
-    int nodes = nodes_for(m, sun);
-    if (nodes == 1) {
-        double in = fmin(bst_vec3_dot(normal, sun->centre), 1.0);
-        return m->scale * in * out *
-               bst_brdf_value(&m->brdf, in, out, bst_vec3_dot(sun->centre, observer));
-    }
-    for (int i = 0; i < sun->count; i++) {
-        double in = bst_vec3_dot(normal, sun->direction[i]);
-        if (in > 1e-9 && out > 1e-9) {
-            sum += sun->weight[i] * fmin(in, 1.0) * out *
-                   bst_brdf_value(&m->brdf, fmin(in, 1.0), out,
-                                  bst_vec3_dot(sun->direction[i], observer));
-        }
-    }
-    return sum * m->scale;
-}
+enum { CURVED_MAX = 512 };
 
 /* Sums of one evaluation. */
 typedef struct sums {
@@ -90,7 +15,7 @@ typedef struct sums {
     double earth[BST_SATELLITE_MATERIALS_MAX];
     double curved_lost[CURVED_MAX]; /* light of facets that is in shadow or hidden, m^2/sr */
     bool lost;                      /* any of it */
-    sun_disc disc;
+    bst_sun_disc disc;
 } sums;
 
 /* The last facet whose reflection was computed: large plane faces consist of many. */
@@ -148,7 +73,7 @@ static void add_sunlight(bst_satellite_pose *p, const bst_satellite_light *l, in
     }
     if (last->material != f->material || memcmp(&last->normal, &n, sizeof n) != 0) {
         const bst_material *m = &p->satellite->materials[f->material];
-        *last = (last_facet){n, f->material, facet_light(m, &s->disc, n, l->observer)};
+        *last = (last_facet){n, f->material, bst_facet_light(m, &s->disc, n, l->observer)};
     }
     s->sun[f->material] += area * last->light;
 }
@@ -165,7 +90,7 @@ static double add_curved(const bst_satellite_pose *p, const bst_satellite_light 
         const bst_curved *c = &sat->curved[i];
         const bst_material *m = &sat->materials[c->material];
         double free = !s->lost ? 1.0 : share[i] > 1e-12 ? share[i] : 0.0, sum = 0.0;
-        int nodes = free > 0.0 ? nodes_for(m, &s->disc) : 0;
+        int nodes = free > 0.0 ? bst_sun_disc_nodes(m, &s->disc) : 0;
         for (int k = 0; k < nodes; k++) {
             bst_vec3 sun = nodes == 1 ? s->disc.centre : s->disc.direction[k];
             bst_vec3 observer = l->observer;
@@ -244,7 +169,7 @@ void bst_satellite_flux_at(bst_satellite_pose *p, const bst_satellite_light *l,
         int curved = sat->curved_count < CURVED_MAX ? sat->curved_count : CURVED_MAX;
         memset(s.curved_lost, 0, (size_t)curved * sizeof s.curved_lost[0]);
         s.lost = false;
-        make_sun(l, sat->lobe_rad, &s.disc);
+        bst_sun_disc_make(l->sun, l->sun_radius_rad, sat->lobe_rad, &s.disc);
         bst_pose_look(p, 1, l->sun);
         last_facet last = {.material = -1};
         for (int i = 0; i < sat->facet_count; i++) {

@@ -34,7 +34,7 @@ typedef struct bst_earth_surface {
 void bst_earthlight_at(const bst_earth_surface *surface, bst_vec3 object_m, bst_vec3 sun,
                        bst_earthlight *out);
 
-/* Turns all directions of an earthlight by q, such as into the body frame. */
+/* Turns earthlight into other axes: q_new_from_old, such as into the body frame. */
 void bst_earthlight_turn(bst_quat q, bst_earthlight *light);
 
 /* Where light and observer are, in the body frame. */

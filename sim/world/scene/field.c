@@ -49,6 +49,14 @@ bst_status bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, 
     return BST_OK;
 }
 
+/* Frees the memory of the objects. */
+static void free_parts(bst_field *field) {
+    for (int i = 0; i < field->part_capacity; i++) {
+        free(field->parts[i].body);
+    }
+    free(field->parts);
+}
+
 void bst_field_free(bst_field *field) {
     if (field) {
         bst_world_view_free(field->view);
@@ -58,7 +66,7 @@ void bst_field_free(bst_field *field) {
         bst_los_track_store_free(&field->middle);
         free(field->stars);
         free(field->sources);
-        free(field->parts);
+        free_parts(field);
         free(field->near);
         free(field);
     }
@@ -211,8 +219,8 @@ static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
 static bst_status reserve_parts(bst_ctx *ctx, bst_field *field, int count) {
     if (count > field->part_capacity) {
         count = with_margin(count);
-        free(field->parts);
-        field->parts = malloc((size_t)count * sizeof *field->parts);
+        free_parts(field);
+        field->parts = calloc((size_t)count, sizeof *field->parts);
         field->part_capacity = field->parts ? count : 0;
         if (!field->parts) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d objects", count);

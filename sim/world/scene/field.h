@@ -39,6 +39,8 @@ typedef struct bst_scene_source_shape {
     double thermal;      /* thermal emission, uniform over the disc */
 } bst_scene_source_shape;
 
+struct bst_scene_source_body;
+
 /* A source whose light may reach the window. */
 typedef struct bst_scene_source {
     int32_t kind; /* bst_source_kind */
@@ -46,9 +48,12 @@ typedef struct bst_scene_source {
     bst_vec3 apparent_mid;               /* at mid-exposure, GCRF axes, unit */
     const bst_scene_source_path *path;   /* NULL: at rest; owned by the creator of the source */
     const bst_scene_source_rate *rate;   /* NULL: constant; owned by the creator */
-    const bst_scene_source_shape *shape; /* NULL: a point; owned by the creator */
-    double electrons_per_s;              /* detected, mean over the exposure */
-    float colour[BST_PSF_COLOURS];       /* spectrum (bst_psf_colour); all 0: solar */
+    const bst_scene_source_shape *shape; /* sphere; NULL: a point; owned by the creator */
+    const struct bst_scene_source_body *body; /* model of a satellite (source_body.h); NULL: a point
+                                                 or a sphere; owned by the creator */
+    double body_u[2];                         /* the exposure, as a part of the body's times */
+    double electrons_per_s;                   /* detected, mean over the exposure */
+    float colour[BST_PSF_COLOURS];            /* spectrum (bst_psf_colour); all 0: solar */
     double v_mag;
     double ra_rad, dec_rad; /* as in bst_truth_item */
     double sunlit_fraction, phase_rad, range_m;

@@ -2,6 +2,7 @@
 #include "sim/world/scene/field_objects.h"
 
 #include <assert.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "sim/optics/psf.h"
@@ -250,6 +251,32 @@ static bool sample_light(course *c, bst_scene_source_rate *rate, double *mean) {
     return changes;
 }
 
+/* Makes the body of an object with a shape, if it spans more than a fiftieth of a pixel: its centre
+ * of light is then at most 0.01 px from its centre of mass. */
+static bst_status make_body(bst_ctx *ctx, const course *c, const bst_world_sight *mid,
+                            bst_scene_object_parts *parts, bst_scene_source *out) {
+    static const double LEAST_PX = 0.02;
+    const bst_scene_object_query *q = c->query;
+    const bst_object_shape *shape = bst_scene_view_object(q->view, c->object)->shape;
+    double pixels = shape ? 2.0 * shape->satellite->radius_m / mid->range_m /
+                                bst_camera_scale_rad(q->camera) * bst_camera_stretch(q->camera)
+                          : 0.0;
+    if (!mid->glow.resolved || !(pixels > LEAST_PX) || mid->occulted) {
+        return BST_OK;
+    }
+    if (!parts->body) {
+        parts->body = malloc(sizeof *parts->body);
+        if (!parts->body) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the shape of an object");
+        }
+    }
+    bst_scene_view_body(q->view, &q->span, c->object, c->path, c->light, q->camera, parts->body);
+    out->body = parts->body;
+    out->body_u[0] = 0.0;
+    out->body_u[1] = 1.0;
+    return BST_OK;
+}
+
 bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *q, int object,
                             bst_scene_object_parts *parts, bst_scene_source *out, bool *there) {
     bst_world_sight mid;
@@ -274,7 +301,9 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *q, int o
                               .range_m = mid.range_m,
                               .occulted = mid.occulted};
     bst_vec3_to_radec(mid.geometric, &out->ra_rad, &out->dec_rad);
-    double radius = sqrt(bst_scene_view_object(q->view, object)->area_m2 / BST_PI) / mid.range_m;
+    const bst_world_object_info *info = bst_scene_view_object(q->view, object);
+    double radius = info->shape ? info->shape->satellite->radius_m / mid.range_m
+                                : sqrt(info->area_m2 / BST_PI) / mid.range_m;
     *there = path_touches(q, out, mid.glow.resolved && radius < 1.0 ? asin(radius) : 0.0);
     if (!*there) {
         return BST_OK;
@@ -289,6 +318,9 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *q, int o
     }
     if (q->camera->psf && bst_psf_spectra(q->camera->psf) > 1) {
         make_colour(&c, &mid, out);
+    }
+    if (bst_scene_view_object(q->view, object)->shape) {
+        return make_body(ctx, &c, &mid, parts, out);
     }
     if (make_shape(&c, &mid, out, &parts->shape)) {
         out->shape = &parts->shape;

@@ -4,6 +4,7 @@
 
 #include "sim/world/scene/field.h"
 #include "sim/world/scene/object_shape.h"
+#include "sim/world/scene/source_body.h"
 #include "sim/world/world_internal.h"
 
 typedef struct bst_scene_object_query {
@@ -41,6 +42,11 @@ void bst_scene_view_aspect(const bst_world_view *view, const bst_world_view_span
 /* The view's work memory for an object's shape. */
 bst_satellite_pose *bst_scene_view_pose(const bst_world_view *view, int object);
 
+/* The body of an object with a shape during a span, for a camera. */
+void bst_scene_view_body(const bst_world_view *view, const bst_world_view_span *span, int object,
+                         const bst_scene_source_path *path, const bst_scene_path_light *light,
+                         const bst_camera *camera, bst_scene_source_body *out);
+
 /* Description of an object in the world of a view. */
 const bst_world_object_info *bst_scene_view_object(const bst_world_view *view, int object);
 
@@ -49,6 +55,7 @@ typedef struct bst_scene_object_parts {
     bst_scene_source_path path;
     bst_scene_source_rate rate;
     bst_scene_source_shape shape;
+    bst_scene_source_body *body; /* NULL: none; kept for later queries */
 } bst_scene_object_parts;
 
 /* Makes the source of an object; `parts` holds its path, rate and shape. *there false: it does not

@@ -43,6 +43,12 @@ bst_status bst_object_shape_create(bst_ctx *ctx, const bst_satellite_config *con
     return status;
 }
 
+double bst_object_shape_temperature_k(const bst_brightness_config *b, double sunlit_fraction) {
+    double warm = sunlit_fraction * pow(b->temperature_k, 4.0) +
+                  (1.0 - sunlit_fraction) * pow(b->shadow_temperature_k, 4.0);
+    return sqrt(sqrt(warm));
+}
+
 /* Light per wavelength over that in V, and magnitude, from the model's flux. */
 static void make_glow(const bst_satellite_flux *flux, const bst_scene_lighting *l, double range_m,
                       bst_scene_glow *out) {
@@ -101,12 +107,10 @@ void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *po
     if (pose->interreflection && light.sunlit > 0.0) {
         bst_interreflection_add(pose->interreflection, pose, &light, &flux);
     }
-    *out = (bst_scene_glow){.resolved = false};
+    *out = (bst_scene_glow){.resolved = b->resolved};
     make_glow(&flux, l, range_m, out);
     out->emission_sr = flux.emission_m2 / (range_m * range_m);
-    double warm = l->sunlit_fraction * pow(b->temperature_k, 4.0) +
-                  (1.0 - l->sunlit_fraction) * pow(b->shadow_temperature_k, 4.0);
-    out->temperature_k = sqrt(sqrt(warm));
+    out->temperature_k = bst_object_shape_temperature_k(b, l->sunlit_fraction);
     out->thermal_reflection =
         flux.visible_m2 > 0.0 ? 1.0 - flux.emission_m2 / flux.visible_m2 : 1.0;
 }

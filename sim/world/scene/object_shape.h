@@ -52,11 +52,15 @@ void bst_object_shape_free(bst_object_shape *shape);
  *            brightness    gives earthshine, its albedo, and the temperatures
  *            lighting      area and albedo are not used
  *            velocity_mps  of the object, GCRF
- * Returned:  *out  a point source */
+ * Returned:  *out  light of a point source */
 void bst_object_shape_glow(const bst_object_shape *shape, bst_satellite_pose *pose,
                            const bst_brightness_config *brightness,
                            const bst_scene_lighting *lighting, bst_vec3 velocity_mps,
                            bst_scene_glow *out);
+
+/* Temperature of a body that the Sun lights in part: mean of the fourth powers, K. */
+double bst_object_shape_temperature_k(const bst_brightness_config *brightness,
+                                      double sunlit_fraction);
 
 /* Where a body stands to its light.
  *

@@ -81,7 +81,9 @@ static void rate_during(const bst_scene_source *source, double u0, double u1,
 void bst_scene_source_during(const bst_scene_source *source, double u0, double u1,
                              bst_scene_source_part *part, bst_scene_source *out) {
     *out = *source;
-    double span = u1 - u0;
+    double span = u1 - u0, body = source->body_u[1] - source->body_u[0];
+    out->body_u[0] = source->body_u[0] + u0 * body;
+    out->body_u[1] = source->body_u[0] + u1 * body;
     if (source->path) {
         for (int k = 0; k < BST_PATH_NODES; k++) {
             part->path.place[k] =

@@ -470,6 +470,45 @@ void bst_scene_view_aspect(const bst_world_view *view, const bst_world_view_span
                             out);
 }
 
+void bst_scene_view_body(const bst_world_view *view, const bst_world_view_span *span, int object,
+                         const bst_scene_source_path *path, const bst_scene_path_light *light,
+                         const bst_camera *camera, bst_scene_source_body *out) {
+    const bst_world_object_info *info = &view->world->objects[object].info;
+    const bst_brightness_config *brightness = bst_brightness_config_of(info->brightness);
+    instant middle = instant_at(view, span, object, path, light, 0.5);
+    const bst_bodies *bodies = &middle.bodies;
+    double rate = bst_body_attitude_rate_radps(info->shape->attitude, middle.at.seconds);
+    /* a quarter of a radian between attitudes */
+    double steps = ceil(4.0 * rate * (span->end_s - span->start_s)) + 4.0;
+    out->satellite = info->shape->satellite;
+    out->times = (int)fmin(steps, BST_SOURCE_BODY_TIMES - 1.0) + 1;
+    for (int k = 0; k < out->times; k++) {
+        double u = (double)k / (out->times - 1);
+        bst_view_emission at = instant_at(view, span, object, path, light, u).at;
+        bst_attitude_state state = {at.position_m, at.velocity_mps,
+                                    bst_vec3_unit(bst_vec3_sub(bodies->sun_m, at.position_m)),
+                                    at.seconds};
+        out->q_body_from_gcrf[k] = bst_body_attitude_at(info->shape->attitude, &state);
+        for (int end = 0; end < 2; end++) {
+            if (k == end * (out->times - 1)) {
+                out->object_m[end] = at.position_m;
+                out->seconds[end] = at.seconds;
+            }
+        }
+    }
+    out->sun_m = bodies->sun_m;
+    out->earthshine = brightness->earthshine;
+    out->earth_albedo = brightness->earth_albedo;
+    bst_astro_sunlight sunlight;
+    bst_astro_sunlight_at(middle.at.position_m, bst_bodies_sunlight_from(bodies), bodies->pole,
+                          view->world->shadow_atmosphere, &sunlight);
+    bst_scene_lighting lighting = {.object_m = middle.at.position_m,
+                                   .sun_m = bodies->sun_m,
+                                   .sunlit_fraction = sunlight.disc,
+                                   .sunlight = &sunlight};
+    bst_source_body_set_gain(camera, brightness, &lighting, out);
+}
+
 bst_status bst_world_view_near(bst_ctx *ctx, bst_world_view *view, const bst_world_view_span *span,
                                bst_vec3 axis, double half_angle_rad, int *indices, int *count) {
     bst_ephemeris_cone cone = {.axis = axis,

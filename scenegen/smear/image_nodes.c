@@ -1,0 +1,206 @@
+#include "scenegen/smear/image_nodes.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+
+/* Largest side of the square of a node, px and PSF sigmas: a Gaussian of the same variance differs
+ * in the fourth order. */
+#define SIDE_PX 1.0
+#define SIDE_SIGMAS 1.2
+/* Largest slope of a line's image by its second moment across it: half of 0.4 / sigma^3. */
+#define BEND 0.2
+/* The same for the fourth moment, of which a square has 1 / 120 of its side's fourth power less
+ * than a Gaussian: 3 * 0.4 / (24 * 120). */
+#define BEND_4 4.2e-4
+/* Light on the pixels with the largest error, which are beside a border, over that at the node. */
+#define BESIDE 0.1
+
+/* Moments of the light of a square of cells, px, about the image's first cell. */
+typedef struct moments {
+    double light, x, y, xx, xy, yy;
+} moments;
+
+/* One run. */
+typedef struct run {
+    const bst_resolved_image *image;
+    const bst_image_nodes_aim *aim;
+    bst_disc_points *points;
+    bst_image_nodes_result *out;
+    int shift_x, shift_y; /* cells before the first one in its largest square */
+    int top;              /* side of the largest squares, cells */
+    double *squares;      /* [squares_y][squares_x] light of the largest squares */
+    int squares_x, squares_y;
+    double contrast; /* of the current largest square with those about it, relative to its light */
+} run;
+
+/* Moments of one cell. The light of a cell that a straight border cuts is even in its part. */
+static moments cell_moments(const run *r, int i, int j) {
+    const bst_resolved_image *m = r->image;
+    moments out = {0};
+    i -= r->shift_x;
+    j -= r->shift_y;
+    if (i < 0 || j < 0 || i >= m->width || j >= m->height) {
+        return out;
+    }
+    const bst_resolved_cell *c = &m->cells[(size_t)j * (size_t)m->width + (size_t)i];
+    if (!(c->light > 0.0F)) {
+        return out;
+    }
+    double size = m->cell_px, light = (double)c->light;
+    double dx = fmin(fmax((double)c->moment_x / light, -0.5), 0.5);
+    double dy = fmin(fmax((double)c->moment_y / light, -0.5), 0.5);
+    double x = (i + 0.5 + dx) * size, y = (j + 0.5 + dy) * size;
+    double wide = (1.0 - 2.0 * fabs(dx)) * size, high = (1.0 - 2.0 * fabs(dy)) * size;
+    out.light = light;
+    out.x = light * x;
+    out.y = light * y;
+    out.xx = light * (x * x + wide * wide / 12.0);
+    out.xy = light * x * y;
+    out.yy = light * (y * y + high * high / 12.0);
+    return out;
+}
+
+static void add(moments *to, const moments *m) {
+    to->light += m->light;
+    to->x += m->x;
+    to->y += m->y;
+    to->xx += m->xx;
+    to->xy += m->xy;
+    to->yy += m->yy;
+}
+
+static bst_status push(bst_ctx *ctx, bst_disc_points *list, bst_vec3 offset, double share) {
+    if (list->count == list->capacity) {
+        int capacity = list->capacity ? 2 * list->capacity : 4096;
+        bst_disc_point *items = realloc(list->items, (size_t)capacity * sizeof *items);
+        if (!items) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d nodes of an image", capacity);
+        }
+        list->items = items;
+        list->capacity = capacity;
+    }
+    list->items[list->count++] = (bst_disc_point){offset, share};
+    return BST_OK;
+}
+
+/* Error of a square as one node, in electrons, over that allowed. */
+static double error_of(const run *r, const moments *m, int side, double *variance,
+                       double *error_e) {
+    const bst_image_nodes_aim *a = r->aim;
+    double x = m->x / m->light, y = m->y / m->light, size = side * r->image->cell_px;
+    double xx = fmax(m->xx / m->light - x * x, 0.0), yy = fmax(m->yy / m->light - y * y, 0.0);
+    double xy = m->xy / m->light - x * y, sigma3 = a->sigma_px * a->sigma_px * a->sigma_px;
+    double widest = a->widest * a->sigma_px * a->sigma_px;
+    *variance = fmin(0.5 * (xx + yy), widest);
+    double apart = 0.5 * hypot(xx - yy, 2.0 * xy) + fmax(0.5 * (xx + yy) - widest, 0.0);
+    double electrons = m->light * a->electrons;
+    double sides = size / a->sigma_px;
+    *error_e = BEND * electrons * apart / (size * sigma3);
+    *error_e += BEND_4 * r->contrast * electrons / (size * a->sigma_px) * pow(sides, 4.0);
+    double around = BESIDE * electrons / (size * size);
+    return *error_e / (a->tolerance_sigma * sqrt(around + a->dark_variance_e2));
+}
+
+/* Appends the nodes of a square of cells. *sum: its moments. */
+static bst_status add_square(bst_ctx *ctx, run *r, int i, int j, int side, moments *sum) {
+    int first = r->points->count;
+    *sum = (moments){0};
+    double worst_e = r->out->error_e;
+    if (side == 1) {
+        *sum = cell_moments(r, i, j);
+    } else {
+        int half = side / 2;
+        for (int n = 0; n < 4; n++) {
+            moments part;
+            BST_TRY(add_square(ctx, r, i + half * (n & 1), j + half * (n >> 1), half, &part));
+            add(sum, &part);
+        }
+    }
+    if (!(sum->light > 0.0)) {
+        return BST_OK;
+    }
+    double variance, error_e, size = side * r->image->cell_px;
+    if (side > 1 && r->points->count - first > 1 &&
+        size > fmax(SIDE_PX, SIDE_SIGMAS * r->aim->sigma_px) * (1.0 + 1e-9)) {
+        return BST_OK;
+    }
+    double part = error_of(r, sum, side, &variance, &error_e);
+    if (side > 1 && part > 1.0) {
+        return BST_OK;
+    }
+    r->points->count = first;
+    r->out->error_e = fmax(side > 1 ? fmax(worst_e, error_e) : r->out->error_e, error_e);
+    bst_vec3 at = {(r->image->x0 * r->image->cell_px) + sum->x / sum->light - r->aim->x0,
+                   (r->image->y0 * r->image->cell_px) + sum->y / sum->light - r->aim->y0, variance};
+    return push(ctx, r->points, at, sum->light);
+}
+
+/* Cells before the first one in its square. */
+static int before(int first, int side) {
+    int rest = first % side;
+    return rest < 0 ? rest + side : rest;
+}
+
+/* Largest difference of a square's light from that of its neighbours, relative to it. */
+static double contrast_of(const run *r, int x, int y) {
+    double own = r->squares[y * r->squares_x + x], most = 0.0;
+    for (int v = y - 1; v <= y + 1; v++) {
+        for (int u = x - 1; u <= x + 1; u++) {
+            bool inside = u >= 0 && v >= 0 && u < r->squares_x && v < r->squares_y;
+            most = fmax(most, fabs((inside ? r->squares[v * r->squares_x + u] : 0.0) - own));
+        }
+    }
+    return own > 0.0 ? fmin(most / own, 1.0) : 0.0;
+}
+
+/* Sums the light of the largest squares. */
+static bst_status sum_squares(bst_ctx *ctx, run *r) {
+    const bst_resolved_image *m = r->image;
+    r->squares_x = (m->width + r->shift_x + r->top - 1) / r->top;
+    r->squares_y = (m->height + r->shift_y + r->top - 1) / r->top;
+    r->squares = calloc((size_t)r->squares_x * (size_t)r->squares_y, sizeof *r->squares);
+    if (!r->squares) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an image of %d x %d cells", m->width,
+                        m->height);
+    }
+    for (int j = 0; j < m->height; j++) {
+        const bst_resolved_cell *row = &m->cells[(size_t)j * (size_t)m->width];
+        double *to = &r->squares[(size_t)((j + r->shift_y) / r->top) * (size_t)r->squares_x];
+        for (int i = 0; i < m->width; i++) {
+            to[(i + r->shift_x) / r->top] += (double)row[i].light;
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_image_nodes(bst_ctx *ctx, const bst_resolved_image *image,
+                           const bst_image_nodes_aim *aim, bst_disc_points *points,
+                           bst_image_nodes_result *out) {
+    run r = {.image = image, .aim = aim, .points = points, .out = out, .top = 1};
+    double most = fmax(SIDE_PX, SIDE_SIGMAS * aim->sigma_px) * (1.0 + 1e-9);
+    *out = (bst_image_nodes_result){0};
+    points->count = 0;
+    while (2 * r.top * image->cell_px <= most) {
+        r.top *= 2;
+    }
+    r.shift_x = before(image->x0, r.top);
+    r.shift_y = before(image->y0, r.top);
+    double area = r.top * image->cell_px;
+    area = fmax(area * area, 1e-300);
+    bst_status status = sum_squares(ctx, &r);
+    for (int n = 0; status == BST_OK && n < r.squares_x * r.squares_y; n++) {
+        int x = n % r.squares_x, y = n / r.squares_x;
+        moments sum;
+        if (!(r.squares[n] > 0.0)) {
+            continue;
+        }
+        r.contrast = contrast_of(&r, x, y);
+        status = add_square(ctx, &r, x * r.top, y * r.top, r.top, &sum);
+        out->light += sum.light;
+        out->peak = fmax(out->peak, sum.light * fmax(1.0, 1.0 / area));
+    }
+    free(r.squares);
+    out->peak = fmin(out->peak, out->light);
+    return status;
+}

@@ -1,0 +1,362 @@
+#include "scenegen/smear/smear_body.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include "scenegen/reference.h"
+#include "scenegen/smear/image_nodes.h"
+#include "scenegen/smear/smear_internal.h"
+#include "sim/world/scene/los_track.h"
+
+/* Share of the tolerance for the nodes of the image. */
+#define IMAGE_SHARE 0.25
+/* Image motion by rotation, px, up to which one pose is enough: as a blur it has 1 / 12 of its
+ * square as variance. */
+#define STILL_PX 0.1
+/* Size of the body, px, up to which its light is that of the point source, and from which it is
+ * that of its own image. */
+#define POINT_PX 2.0
+#define IMAGE_PX 32.0
+
+/* Poses from which one sample per cell and pose is enough. */
+enum { SAMPLED_POSES = 48 };
+
+enum { POSES_MAX = 1024, PATH_TIMES = 64, GAUSS_MOST = 4 };
+
+/* Gauss-Legendre on [0, 1] with one to four points (Abramowitz and Stegun, table 25.4). */
+static const double gauss_place[GAUSS_MOST][GAUSS_MOST] = {
+    {0.5},
+    {0.2113248654051871, 0.7886751345948129},
+    {0.1127016653792583, 0.5, 0.8872983346207417},
+    {0.06943184420297371, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629}};
+static const double gauss_weight[GAUSS_MOST][GAUSS_MOST] = {
+    {1.0},
+    {0.5, 0.5},
+    {0.2777777777777778, 0.4444444444444444, 0.2777777777777778},
+    {0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693}};
+
+/* Largest motion of a panel of the quadrature with one to four points, PSF sigmas: the error of
+ * integrating an edge's image over it is below 1e-4. */
+static const double gauss_reach[GAUSS_MOST] = {0.1, 0.7, 1.7, 3.2};
+
+void bst_smear_bodies_clear(bst_smear_bodies *bodies) {
+    for (int i = 0; i < bodies->count; i++) {
+        bst_satellite_pose_free(bodies->items[i].pose);
+        bst_resolved_free(bodies->items[i].image);
+        bst_resolved_free(bodies->items[i].trial);
+    }
+    free(bodies->items);
+    *bodies = (bst_smear_bodies){.count = 0};
+}
+
+double bst_smear_radius_px(const bst_smear *s, const bst_scene_source *source) {
+    double scale_rad = bst_camera_scale_rad(&s->camera);
+    if (source->body) {
+        return source->body->satellite->radius_m / fmax(source->range_m, 1e-3) / scale_rad;
+    }
+    return source->shape ? tan(asin(source->shape->radius)) / scale_rad : 0.0;
+}
+
+/* Finds or creates the work memory of a source. Memory of a source that left the field is used
+ * again. */
+static bst_status body_of(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
+                          bst_smear_body **out) {
+    bst_smear_bodies *all = &s->bodies;
+    const bst_satellite *satellite = source->body->satellite;
+    bst_smear_body *found = NULL;
+    for (int i = 0; i < all->count; i++) {
+        bst_smear_body *b = &all->items[i];
+        if (b->satellite == satellite && b->id == source->id) {
+            *out = b;
+            return BST_OK;
+        }
+        found = b->satellite == satellite && b->frame + 2 < s->frame ? b : found;
+    }
+    if (!found) {
+        if (all->count == all->capacity) {
+            int capacity = all->capacity ? 2 * all->capacity : 4;
+            bst_smear_body *items = realloc(all->items, (size_t)capacity * sizeof *items);
+            if (!items) {
+                return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d satellites", capacity);
+            }
+            all->items = items;
+            all->capacity = capacity;
+        }
+        found = &all->items[all->count];
+        *found = (bst_smear_body){.satellite = satellite};
+        all->count++;
+        BST_TRY(bst_satellite_pose_create(ctx, satellite, &found->pose));
+        BST_TRY(bst_resolved_create(ctx, satellite, &found->image));
+        BST_TRY(bst_resolved_create(ctx, satellite, &found->trial));
+    }
+    found->id = source->id;
+    found->frame = 0;
+    *out = found;
+    return BST_OK;
+}
+
+/* Places the body at time u of the exposure. *light: its illumination, with *earthlight. */
+static void pose_at(const bst_smear *s, const bst_scene_source *source, double u,
+                    bst_satellite_pose *pose, bst_resolved_view *view, bst_resolved_light *light,
+                    bst_earthlight *earthlight) {
+    bst_source_body_state state;
+    bst_source_body_at(source, u, &state, earthlight);
+    bst_quat focal =
+        bst_quat_mul(bst_smear_focal_turn(s), bst_los_track_attitude(&s->track, u * s->duration_s));
+    view->q_image_from_body = bst_quat_mul(focal, bst_quat_conj(state.q_body_from_gcrf));
+    view->origin_m = bst_vec3_scale(bst_quat_rotate(focal, state.apparent), state.range_m);
+    view->scale_rad = bst_camera_scale_rad(&s->camera);
+    if (pose) {
+        bst_satellite_pose_set(pose, &state.aim);
+    }
+    if (light) {
+        *light = (bst_resolved_light){.sun = state.aim.sun,
+                                      .sun_radius_rad = state.sun_radius_rad,
+                                      .earthlight = state.earth ? earthlight : NULL,
+                                      .gain = source->body->gain};
+    }
+}
+
+/* Image motion in the exposure, px: of the body's origin, and of its parts by rotation. */
+static void measure(const bst_smear *s, const bst_scene_source *source, double *moved_px,
+                    double *turned_px) {
+    bst_resolved_view before, view;
+    double turn = 0.0;
+    *moved_px = 0.0;
+    for (int k = 0; k <= PATH_TIMES; k++) {
+        pose_at(s, source, (double)k / PATH_TIMES, NULL, &view, NULL, NULL);
+        if (k > 0) {
+            bst_quat d =
+                bst_quat_mul(view.q_image_from_body, bst_quat_conj(before.q_image_from_body));
+            turn += bst_vec3_norm(bst_quat_to_rotvec(d));
+            double f = 1.0 / view.scale_rad;
+            *moved_px +=
+                f *
+                hypot(view.origin_m.x / view.origin_m.z - before.origin_m.x / before.origin_m.z,
+                      view.origin_m.y / view.origin_m.z - before.origin_m.y / before.origin_m.z);
+        }
+        before = view;
+    }
+    const bst_scene_source_body *b = source->body;
+    double seconds = (b->seconds[1] - b->seconds[0]) * (source->body_u[1] - source->body_u[0]);
+    for (int j = 0; j < b->satellite->joint_count; j++) {
+        const bst_joint *joint = &b->satellite->joints[j];
+        turn += joint->follows == BST_JOINT_SPIN ? fabs(joint->rate_radps) * seconds : 0.0;
+    }
+    *turned_px = turn * bst_smear_radius_px(s, source);
+}
+
+/* Times of the poses in an exposure. */
+typedef struct times {
+    double u[POSES_MAX], weight[POSES_MAX];
+    int count;
+} times;
+
+/* Composite Gauss-Legendre quadrature for an image that moves by that many PSF sigmas. */
+static void choose_times(double sigmas, times *out) {
+    int order = 0;
+    while (order + 1 < GAUSS_MOST && sigmas > gauss_reach[order]) {
+        order++;
+    }
+    double most = POSES_MAX / GAUSS_MOST;
+    int panels = (int)fmin(fmax(ceil(sigmas / gauss_reach[order]), 1.0), most);
+    out->count = 0;
+    for (int p = 0; p < panels; p++) {
+        for (int k = 0; k <= order; k++) {
+            out->u[out->count] = (p + gauss_place[order][k]) / panels;
+            out->weight[out->count++] = gauss_weight[order][k] / panels;
+        }
+    }
+}
+
+/* Side of the cells for the body, px: a power of two of pixels, or less for small bodies. */
+static double cell_for(const bst_smear *s, const bst_scene_source *source, int poses) {
+    enum { FINEST = 16, ACROSS = 32, FEW = 16 };
+    double across_px = 2.0 * bst_smear_radius_px(s, source);
+    double electrons = source->electrons_per_s * s->duration_s;
+    /* a body fills about a third of the square about its sphere */
+    double per_px_e = electrons / fmax(0.3 * across_px * across_px, 1.0);
+    double allowed = IMAGE_SHARE * s->options.tolerance_sigma *
+                     sqrt(0.5 * per_px_e + s->dark_variance_e2) / fmax(per_px_e, 1e-9);
+    /* of a cell with a border, the second moments are right to some 0.01 of its square */
+    double cell = s->sigma_px * cbrt(allowed * 480.0);
+    cell = fmin(cell, across_px / ACROSS);
+    double side = 0.5;
+    /* the borders of many poses fall on all parts of the cells */
+    while (side > 1.0 / FINEST && side > cell && poses <= FEW) {
+        side *= 0.5;
+    }
+    while (side > across_px / ACROSS) {
+        side *= 0.5;
+    }
+    return side;
+}
+
+/* Limits of the image: what can light the sensor. */
+static void clip_box(const bst_smear *s, double room_px, double low[2], double high[2]) {
+    double margin = 0.5 * s->options.taps + 2.0 + room_px;
+    double cx = bst_camera_centre_x(&s->camera), cy = bst_camera_centre_y(&s->camera);
+    bool general = s->camera.geometry.general;
+    const double from[2] = {general ? -s->far_px - room_px : -cx - margin,
+                            general ? -s->far_px - room_px : -cy - margin};
+    const double to[2] = {
+        general ? s->far_px + room_px : (double)s->camera.width_px - cx + margin,
+        general ? s->far_px + room_px : (double)s->camera.height_px - cy + margin};
+    for (int i = 0; i < 2; i++) {
+        low[i] = fmax(low[i], from[i]);
+        high[i] = fmin(high[i], to[i]);
+    }
+}
+
+/* Factor on the light of a pose: brings the flux of a body of few pixels to that of the point. */
+static double flux_factor(double across_px, double point, double image) {
+    if (!(image > 0.0) || !(point > 0.0) || across_px >= IMAGE_PX) {
+        return 1.0;
+    }
+    double x = log(across_px / POINT_PX) / log(IMAGE_PX / POINT_PX);
+    x = fmin(fmax(x, 0.0), 1.0);
+    return pow(point / image, 1.0 - x * x * (3.0 - 2.0 * x));
+}
+
+/* Light of a body's pose over that of the point source, at time u. */
+static bst_status find_factor(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
+                              const bst_scene_source *source, double u, double *factor) {
+    enum { ACROSS = 64 };
+    double across_px = 2.0 * bst_smear_radius_px(s, source);
+    *factor = 1.0;
+    if (across_px >= IMAGE_PX) {
+        return BST_OK;
+    }
+    bst_earthlight earthlight;
+    bst_resolved_light light;
+    bst_resolved_view view;
+    double low[2], high[2], total;
+    pose_at(s, source, u, b->pose, &view, &light, &earthlight);
+    if (!bst_resolved_box(b->pose, &view, low, high)) {
+        return BST_OK;
+    }
+    BST_TRY(bst_resolved_begin(ctx, b->trial, low, high, across_px / ACROSS));
+    BST_TRY(bst_resolved_add(ctx, b->trial, b->pose, &view, &light, 1.0, &total));
+    *factor = flux_factor(across_px, source->electrons_per_s * bst_scene_source_rate_at(source, u),
+                          total);
+    return BST_OK;
+}
+
+/* Box of the image over all poses; false: a pose has none, or all are off the sensor. */
+static bool find_box(const bst_smear *s, const bst_smear_body *b, const bst_scene_source *source,
+                     const times *t, double low[2], double high[2]) {
+    low[0] = low[1] = INFINITY;
+    high[0] = high[1] = -INFINITY;
+    for (int k = 0; k < t->count; k++) {
+        double from[2], to[2];
+        bst_resolved_view view;
+        pose_at(s, source, t->u[k], b->pose, &view, NULL, NULL);
+        if (!bst_resolved_box(b->pose, &view, from, to)) {
+            return false;
+        }
+        for (int i = 0; i < 2; i++) {
+            low[i] = fmin(low[i], from[i]);
+            high[i] = fmax(high[i], to[i]);
+        }
+    }
+    return true;
+}
+
+/* Makes the image of a source for the frame. *there false: a part of the body is beside the
+ * observer. */
+static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
+                             const bst_scene_source *source, bool *there) {
+    double moved_px, turned_px, low[2], high[2];
+    times t = {.u = {0.5}, .weight = {1.0}, .count = 1};
+    measure(s, source, &moved_px, &turned_px);
+    b->one_pose = turned_px <= STILL_PX;
+    double sigma_px = sqrt(s->sigma_px * s->sigma_px + 1.0 / 12.0);
+    if (!b->one_pose) {
+        choose_times((moved_px + turned_px) / sigma_px, &t);
+    }
+    *there = find_box(s, b, source, &t, low, high);
+    if (!*there) {
+        return BST_OK;
+    }
+    b->x0 = b->y0 = 0.0;
+    if (b->one_pose) {
+        (void)bst_smear_project(s, bst_los_track_attitude(&s->track, 0.5 * s->duration_s),
+                                bst_scene_source_direction(source, 0.5), &b->x0, &b->y0);
+    }
+    clip_box(s, b->one_pose ? moved_px : 0.0, low, high);
+    b->empty = !(low[0] < high[0] && low[1] < high[1]);
+    b->frame = s->frame;
+    if (b->empty) {
+        return BST_OK;
+    }
+    bool fast = t.count >= SAMPLED_POSES && bst_resolved_may_sample(b->satellite);
+    b->cell_px = fast ? 1.0 : cell_for(s, source, t.count);
+    BST_TRY(bst_resolved_begin(ctx, b->image, low, high, b->cell_px));
+    double inverse = 1.0 / source->electrons_per_s;
+    for (int k = 0; k < t.count; k++) {
+        bst_earthlight earthlight;
+        bst_resolved_light light;
+        bst_resolved_view view;
+        double factor;
+        BST_TRY(find_factor(ctx, s, b, source, t.u[k], &factor));
+        pose_at(s, source, t.u[k], b->pose, &view, &light, &earthlight);
+        if (b->one_pose && source->rate) { /* the path has the rate */
+            inverse = 1.0 / (source->electrons_per_s * bst_scene_source_rate_at(source, 0.5));
+        }
+        double weight = t.weight[k] * factor * inverse;
+        BST_TRY(fast ? bst_resolved_add_sampled(ctx, b->image, b->pose, &view, &light, k, weight)
+                     : bst_resolved_add(ctx, b->image, b->pose, &view, &light, weight, NULL));
+    }
+    b->error =
+        turned_px * turned_px * (b->one_pose ? 1.0 / 12.0 * 0.12 : 0.0) / (sigma_px * sigma_px);
+    return BST_OK;
+}
+
+bst_status bst_smear_body_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
+                                double x, double y, bool *there) {
+    bst_smear_body *b = NULL;
+    *there = true;
+    BST_TRY(body_of(ctx, s, source, &b));
+    if (b->frame != s->frame) {
+        BST_TRY(make_image(ctx, s, b, source, there));
+        if (!*there) {
+            return BST_OK;
+        }
+    }
+    bst_smear_nodes_clear(&s->nodes);
+    if (b->empty) {
+        return BST_OK;
+    }
+    double electrons = source->electrons_per_s * s->duration_s;
+    bst_image_nodes_aim aim = {.sigma_px = s->sigma_px,
+                               .widest = s->widest,
+                               .electrons = electrons,
+                               .dark_variance_e2 = s->dark_variance_e2,
+                               .tolerance_sigma = IMAGE_SHARE * s->aim * s->options.tolerance_sigma,
+                               .x0 = b->one_pose ? b->x0 : x,
+                               .y0 = b->one_pose ? b->y0 : y};
+    bst_image_nodes_result image;
+    BST_TRY(bst_image_nodes(ctx, bst_resolved_image_of(b->image), &aim, &s->points, &image));
+    double line = bst_reference_pixel_share(0.0, s->share_sigma_px, 0), share = 1.0;
+    double read_share = 1.0;
+    if (b->one_pose) {
+        BST_TRY(bst_smear_centre_nodes(ctx, s, source, x, y, s->tolerance[0]));
+        share = bst_smear_largest_share(s, &read_share);
+        s->last_peak_e = electrons * fmin(share * image.light, image.peak);
+        s->last_read_e =
+            electrons * fmin(read_share * image.light, image.peak * s->binning * s->binning);
+        int level = bst_smear_choose_level(s, 1.0);
+        BST_TRY(bst_smear_centre_nodes(ctx, s, source, x, y, s->tolerance[level]));
+    } else {
+        bst_smear_node_list *list = &s->nodes;
+        BST_TRY(
+            bst_smear_reserve(ctx, (void **)&list->items, &list->capacity, 1, sizeof *list->items));
+        list->items[0] = (bst_smear_node){.weight = 1.0};
+        list->count = 1;
+        s->last_peak_e = electrons * fmin(line * line * image.light, image.peak);
+        s->last_read_e = electrons * fmin(image.light, image.peak * s->binning * s->binning);
+    }
+    s->chord_error = b->error + image.error_e / fmax(s->last_read_e, 1e-9);
+    return bst_extended_source_spread(ctx, &s->points, s->stretch, &s->nodes);
+}

@@ -1,0 +1,35 @@
+/* Sources with the model of a satellite: the image of the body during the exposure. */
+#ifndef BST_SCENEGEN_SMEAR_SMEAR_BODY_H
+#define BST_SCENEGEN_SMEAR_SMEAR_BODY_H
+
+#include "sim/world/scene/source_body.h"
+
+struct bst_smear;
+
+/* The image of one source's body, with its work memory. */
+typedef struct bst_smear_body {
+    const bst_satellite *satellite;
+    uint32_t id; /* of the source */
+    bst_satellite_pose *pose;
+    bst_resolved *image, *trial; /* trial: of single poses, for their light */
+    int64_t frame;               /* for which the image is made; 0: none */
+    double cell_px;
+    double x0, y0; /* origin of the image's positions, px from the boresight */
+    bool one_pose; /* the image of mid-exposure, to be moved along the path */
+    double error;  /* of turning within a pose, relative to the brightest pixel */
+    bool empty;    /* no image */
+} bst_smear_body;
+
+/* The bodies of a camera's sources; zero-initialise it. */
+typedef struct bst_smear_bodies {
+    bst_smear_body *items;
+    int count, capacity;
+} bst_smear_bodies;
+
+/* Frees the memory of the bodies. */
+void bst_smear_bodies_clear(bst_smear_bodies *bodies);
+
+/* Radius of a source's disc, or of its body about its origin, px at the boresight; 0: a point. */
+double bst_smear_radius_px(const struct bst_smear *smear, const bst_scene_source *source);
+
+#endif

@@ -1,0 +1,282 @@
+#include "sim/satellite/resolved_faces.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Largest number of parts of a facet of a curved surface in one direction. */
+enum { PARTS_MAX = 64 };
+
+bst_point2 bst_resolved_project(const bst_resolved_adding *a, bst_vec3 p, double *depth_m) {
+    bst_vec3 q = bst_vec3_add(a->view->origin_m, bst_mat3_mul_vec(&a->image_from_body, p));
+    double f = a->per_m / q.z;
+    *depth_m = q.z;
+    return (bst_point2){q.x * f - a->r->image.x0, q.y * f - a->r->image.y0};
+}
+
+bool bst_resolved_make_face(const bst_resolved_adding *a, const bst_vec3 *corner, int count,
+                            bst_vec3 normal, bst_resolved_face *out) {
+    bst_vec3 from = bst_vec3_sub(a->eye_m, corner[0]);
+    double before_m = bst_vec3_dot(normal, from);
+    if (!(before_m > 1e-9 * bst_vec3_norm(from))) {
+        return false;
+    }
+    out->count = count;
+    out->slope[0] = out->slope[1] = out->least = out->most = 0.0;
+    out->middle[0] = out->middle[1] = 0.0;
+    out->near_m = INFINITY;
+    out->far_m = 0.0;
+    for (int i = 0; i < count; i++) {
+        double depth_m;
+        out->corner[i] = bst_resolved_project(a, corner[i], &depth_m);
+        out->near_m = fmin(out->near_m, depth_m);
+        out->far_m = fmax(out->far_m, depth_m);
+    }
+    /* n . (eye + depth d) = n . corner, d = (x, y, 1) in tangents */
+    bst_vec3 n = bst_mat3_mul_vec(&a->image_from_body, normal);
+    double cell = 1.0 / a->per_m;
+    const bst_resolved_image *m = &a->r->image;
+    out->plane =
+        bst_vec3_scale((bst_vec3){n.x * cell, n.y * cell, n.z + cell * (n.x * m->x0 + n.y * m->y0)},
+                       -1.0 / before_m);
+    return true;
+}
+
+static double depth_at(const bst_resolved_face *f, double x, double y) {
+    double inverse = f->plane.x * x + f->plane.y * y + f->plane.z;
+    double depth_m = inverse > 0.0 ? 1.0 / inverse : f->far_m;
+    return fmin(fmax(depth_m, f->near_m), f->far_m);
+}
+
+bst_resolved_shading bst_resolved_shade(const bst_resolved_adding *a, int material, bst_vec3 point,
+                                        bst_vec3 normal) {
+    const bst_resolved_light *l = a->light;
+    bst_resolved_shading f = {0.0, 0.0, 0.0, {0.0, 0.0}};
+    if (!l) {
+        return f;
+    }
+    const bst_material *m = &a->r->satellite->materials[material];
+    const bst_resolved_gain *gain = &l->gain[material];
+    bst_vec3 eye = bst_vec3_unit(bst_vec3_sub(a->eye_m, point));
+    double sr = 1.0 / (a->per_m * a->per_m), out = fmin(fmax(bst_vec3_dot(normal, eye), 1e-4), 1.0);
+    if (gain->sun > 0.0 && bst_vec3_dot(normal, l->sun) > 1e-9) {
+        f.sun = gain->sun * sr * bst_facet_light(m, &a->r->disc, normal, eye) / out;
+        f.sun = fmax(f.sun, 0.0);
+    }
+    double sum = 0.0;
+    for (int i = 0; a->earth && gain->earth > 0.0 && i < l->earthlight->count; i++) {
+        double in = bst_vec3_dot(normal, l->earthlight->direction[i]);
+        if (in > 1e-9) {
+            sum += l->earthlight->irradiance[i] * in *
+                   bst_brdf_value(&m->brdf, fmin(in, 1.0), out,
+                                  bst_vec3_dot(l->earthlight->direction[i], eye));
+        }
+    }
+    f.earth = gain->earth * sr * sum * m->scale;
+    f.uniform = gain->emission * sr;
+    return f;
+}
+
+/* Exchanges the views, so that the first is that of the other light. */
+static void swap_views(bst_satellite_pose *p) {
+    bst_pose_view v = p->views[0];
+    p->views[0] = p->views[1];
+    p->views[1] = v;
+}
+
+double bst_resolved_lit_fraction(const bst_resolved_adding *a, int facet, int view) {
+    bool whole;
+    double area_m2 = a->r->satellite->facets[facet].area_m2;
+    if (view == 1) {
+        swap_views(a->pose);
+    }
+    double lit_m2 = bst_pose_unshadowed(a->pose, facet, 1, &whole);
+    if (view == 1) {
+        swap_views(a->pose);
+    }
+    return whole || lit_m2 > (1.0 - 1e-9) * area_m2 ? 1.0
+           : lit_m2 > 1e-9 * area_m2                ? lit_m2 / area_m2
+                                                    : 0.0;
+}
+
+bst_status bst_resolved_cover_face(bst_ctx *ctx, const bst_resolved_adding *a,
+                                   bst_resolved_face *f) {
+    bst_resolved *r = a->r;
+    r->whole.count = 0;
+    BST_TRY(bst_polygon_coverage_add(ctx, &r->whole, f->corner, f->count, r->image.width,
+                                     r->image.height));
+    int high[2] = {0, 0};
+    f->low[0] = f->low[1] = INT32_MAX;
+    for (int i = 0; i < r->whole.count; i++) {
+        const bst_coverage_cell *c = &r->whole.cells[i];
+        f->low[0] = c->x < f->low[0] ? c->x : f->low[0];
+        f->low[1] = c->y < f->low[1] ? c->y : f->low[1];
+        high[0] = c->x + c->run > high[0] ? c->x + c->run : high[0];
+        high[1] = c->y >= high[1] ? c->y + 1 : high[1];
+    }
+    f->width = high[0] - f->low[0];
+    f->height = high[1] - f->low[1];
+    return BST_OK;
+}
+
+bst_status bst_resolved_clear_lit(bst_ctx *ctx, bst_resolved *r, const bst_resolved_face *f) {
+    size_t need = (size_t)f->width * (size_t)f->height;
+    if (need > r->lit_capacity) {
+        free(r->lit_cells);
+        r->lit_cells = malloc(need * sizeof *r->lit_cells);
+        r->lit_capacity = r->lit_cells ? need : 0;
+        if (!r->lit_cells) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a facet of %d x %d cells", f->width,
+                            f->height);
+        }
+    }
+    memset(r->lit_cells, 0, need * sizeof *r->lit_cells);
+    return BST_OK;
+}
+
+bst_status bst_resolved_add_lit(bst_ctx *ctx, bst_resolved *r, const bst_resolved_face *f,
+                                const bst_point2 *corner, int count, double light) {
+    r->lit.count = 0;
+    BST_TRY(bst_polygon_coverage_add(ctx, &r->lit, corner, count, r->image.width, r->image.height));
+    for (int i = 0; i < r->lit.count; i++) {
+        const bst_coverage_cell *c = &r->lit.cells[i];
+        int y = c->y - f->low[1];
+        for (int x = c->x - f->low[0]; x < c->x - f->low[0] + c->run; x++) {
+            if (x >= 0 && y >= 0 && x < f->width && y < f->height) {
+                bst_resolved_lit_cell *to = &r->lit_cells[(size_t)y * (size_t)f->width + (size_t)x];
+                to->light += light * c->area;
+                to->x += light * c->moment_x;
+                to->y += light * c->moment_y;
+            }
+        }
+    }
+    return BST_OK;
+}
+
+/* Adds the light of a facet's lit pieces, in pose->clip, to its box. */
+static bst_status add_pieces(bst_ctx *ctx, const bst_resolved_adding *a, int facet,
+                             const bst_resolved_face *f, double light) {
+    const bst_polygon_clip *clip = &a->pose->clip;
+    bst_vec3 origin, e1, e2;
+    bst_pose_facet_axes(a->pose, facet, &origin, &e1, &e2);
+    for (int n = 0; n < clip->piece_count; n++) {
+        const bst_polygon_piece *piece = &clip->pieces[n];
+        bst_point2 corner[BST_COVERAGE_CORNERS_MAX];
+        int count = piece->count < BST_COVERAGE_CORNERS_MAX ? piece->count : 0;
+        for (int i = 0; i < count; i++) {
+            bst_point2 p = clip->points[piece->first + i];
+            double depth_m;
+            corner[i] = bst_resolved_project(
+                a, bst_vec3_axpy(bst_vec3_axpy(origin, p.x, e1), p.y, e2), &depth_m);
+        }
+        BST_TRY(bst_resolved_add_lit(ctx, a->r, f, corner, count, light));
+    }
+    return BST_OK;
+}
+
+bst_status bst_resolved_add_fragments(bst_ctx *ctx, const bst_resolved_adding *a,
+                                      const bst_resolved_face *f, double uniform, bool pieces) {
+    bst_resolved *r = a->r;
+    double steep = 0.5 * (fabs(f->plane.x) + fabs(f->plane.y)); /* of 1 / depth, half a cell */
+    for (int i = 0; i < r->whole.count; i++) {
+        const bst_coverage_cell *c = &r->whole.cells[i];
+        bst_surface_fragment piece = {.area = (float)c->area,
+                                      .area_x = (float)c->moment_x,
+                                      .area_y = (float)c->moment_y,
+                                      .part = f->part,
+                                      .curved = f->curved};
+        double dx = c->moment_x / c->area, dy = c->moment_y / c->area;
+        for (int x = c->x; x < c->x + c->run; x++) {
+            bst_surface_fragment one = piece;
+            double depth_m = depth_at(f, x + 0.5 + dx, c->y + 0.5 + dy);
+            one.depth_m = (float)(depth_m - a->view->origin_m.z);
+            one.reach_m = (float)fmin(steep * depth_m * depth_m, f->far_m - f->near_m);
+            double more = f->slope[0] * (x + 0.5 + dx - f->middle[0]) +
+                          f->slope[1] * (c->y + 0.5 + dy - f->middle[1]);
+            double light = uniform + fmin(fmax(more, f->least), f->most);
+            one.light = (float)(light * c->area);
+            one.light_x = (float)(light * c->moment_x);
+            one.light_y = (float)(light * c->moment_y);
+            if (pieces) {
+                size_t at = (size_t)(c->y - f->low[1]) * (size_t)f->width + (size_t)(x - f->low[0]);
+                const bst_resolved_lit_cell *lit = &r->lit_cells[at];
+                one.light += (float)lit->light;
+                one.light_x += (float)lit->x;
+                one.light_y += (float)lit->y;
+            }
+            BST_TRY(bst_visible_surface_add(ctx, &r->surface, x, c->y, &one));
+        }
+    }
+    return BST_OK;
+}
+
+/* Step between the corners of a circle's polygon at the limb, px: the polygon has the area of the
+ * circle, and its borders are wrong by LIMB_PX. A circle in the image plane is wrong by step^2 /
+ * (24 radius), the straight side of a cylinder by twice that. */
+static const double LIMB_PX = 4e-5;
+
+/* Step elsewhere, px. */
+static const double STEP_PX = 0.5;
+
+/* Largest angle of a part of a curved surface: the light of a part is that of its middle. */
+static const double PART_RAD = 0.05;
+
+int bst_resolved_parts(const bst_resolved_adding *a, double radius_m, double angle, bst_vec3 at,
+                       bool limb) {
+    double depth_m;
+    (void)bst_resolved_project(a, at, &depth_m);
+    double radius_px = radius_m * a->per_m / depth_m * a->r->image.cell_px;
+    double step_px = limb ? sqrt(12.0 * radius_px * LIMB_PX) : STEP_PX;
+    double parts = fmax(angle * radius_px / step_px, angle / PART_RAD);
+    return (int)fmin(ceil(parts - 1e-6), PARTS_MAX);
+}
+
+bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, int facet,
+                                        bst_resolved_face *f) {
+    bst_resolved *r = a->r;
+    const bst_facet *from = &r->satellite->facets[facet];
+    bst_vec3 corner[BST_COVERAGE_CORNERS_MAX], middle = {0};
+    bst_vec3 normal = a->pose->normals[facet];
+    int around = 1, first = r->satellite->corner[from->first];
+    if (r->places.rim[first] >= 0 && from->count > 4) {
+        double angle = 2.0 * BST_PI / from->count;
+        double side_m = bst_vec3_norm(bst_vec3_sub(
+            a->pose->vertices[r->satellite->corner[from->first + 1]], a->pose->vertices[first]));
+        around = bst_resolved_parts(a, side_m / angle, angle, a->pose->vertices[first], true);
+        int most = BST_COVERAGE_CORNERS_MAX / from->count;
+        around = around < most ? around : most;
+    }
+    if (from->count * around > BST_COVERAGE_CORNERS_MAX) {
+        around = 1;
+    }
+    int count = bst_plane_facet_corners(a->pose, &r->places, facet, around, corner);
+    if (!bst_resolved_make_face(a, corner, count, normal, f)) {
+        return BST_OK;
+    }
+    BST_TRY(bst_resolved_cover_face(ctx, a, f));
+    if (r->whole.count == 0) {
+        return BST_OK;
+    }
+    for (int i = 0; i < count; i++) {
+        middle = bst_vec3_axpy(middle, 1.0 / count, corner[i]);
+    }
+    bst_resolved_shading s = bst_resolved_shade(a, from->material, middle, normal);
+    const double light[2] = {s.sun, s.earth};
+    bool pieces = false;
+    for (int view = 0; view < 2; view++) {
+        double lit = light[view] > 0.0 ? 1.0 : 0.0;
+        /* light from below the horizon of the facet that is not from the centroid: no shadow */
+        if (lit > 0.0 && (view == 0 || bst_vec3_dot(normal, a->light->earthlight->centre) > 0.05)) {
+            lit = bst_resolved_lit_fraction(a, facet, view);
+        }
+        if (lit >= 1.0) {
+            s.uniform += light[view];
+        } else if (lit > 0.0) {
+            if (!pieces) {
+                BST_TRY(bst_resolved_clear_lit(ctx, r, f));
+                pieces = true;
+            }
+            BST_TRY(add_pieces(ctx, a, facet, f, light[view]));
+        }
+    }
+    return bst_resolved_add_fragments(ctx, a, f, s.uniform, pieces);
+}

@@ -1,0 +1,129 @@
+/* Facets of a pose in the image: coverage, light and shadows. Internal to sim/satellite. */
+#ifndef BST_SATELLITE_RESOLVED_FACES_H
+#define BST_SATELLITE_RESOLVED_FACES_H
+
+#include "sim/satellite/curved_patches.h"
+#include "sim/satellite/polygon_coverage.h"
+#include "sim/satellite/sun_disc.h"
+#include "sim/satellite/visible_surface.h"
+
+/* Light of a cell that a facet covers in part: sums over lit polygons. */
+typedef struct bst_resolved_lit_cell {
+    double light, x, y;
+} bst_resolved_lit_cell;
+
+/* Side of the depth map from the Sun. */
+enum { BST_SHADOW_SIDE = 640 };
+
+/* Work memory of the fast image: zero-initialise. */
+typedef struct bst_resolved_samples {
+    float *near; /* [cells] 1 over the depth of the nearest facet */
+    int *facet;  /* [cells] the nearest facet; -1: none */
+    size_t cells;
+    float *toward;        /* [side][side] place toward the Sun of the nearest facet to it */
+    bst_vec3 *seen, *sun; /* by vertex: cells and 1 over the depth; likewise for the Sun's view */
+    unsigned char *state; /* by facet: 1: its light is known */
+    struct bst_resolved_shading *light; /* by facet */
+} bst_resolved_samples;
+
+struct bst_resolved {
+    const bst_satellite *satellite;
+    bst_resolved_image image;
+    size_t cell_capacity;
+    bst_curved_places places;
+    bst_visible_surface surface;
+    bst_polygon_coverage whole, lit;  /* of the current facet */
+    bst_resolved_lit_cell *lit_cells; /* in the box of the current facet */
+    size_t lit_capacity;
+    bst_sun_disc disc;
+    bst_resolved_samples samples;
+};
+
+/* One pose that is added. */
+typedef struct bst_resolved_adding {
+    bst_resolved *r;
+    bst_satellite_pose *pose;
+    const bst_resolved_view *view;
+    const bst_resolved_light *light;
+    bst_mat3 image_from_body;
+    bst_vec3 eye_m; /* body frame */
+    double per_m;   /* cells per metre at one metre */
+    double scale;   /* of the current curved surface, see bst_curved_facet_scale */
+    bool earth;
+} bst_resolved_adding;
+
+/* A facet in the image. */
+typedef struct bst_resolved_face {
+    bst_point2 corner[BST_COVERAGE_CORNERS_MAX];
+    int count, part, curved;
+    bst_vec3 plane;            /* depth at (x, y, 1) in cells: 1 over the scalar product */
+    double near_m, far_m;      /* depths of the corners */
+    int low[2], width, height; /* box in cells */
+    /* change of the light per cell from the middle, per cell, and its limits; all 0: none */
+    double slope[2], middle[2], least, most;
+} bst_resolved_face;
+
+/* Light per cell: where Sun and Earth light the facet, and everywhere. */
+typedef struct bst_resolved_shading {
+    double sun, earth, uniform;
+    double sun_change[2]; /* across a part of a curved surface, around and up */
+} bst_resolved_shading;
+
+/* A point of the image plane, in cells. *depth_m: along the boresight. */
+bst_point2 bst_resolved_project(const bst_resolved_adding *a, bst_vec3 p, double *depth_m);
+
+/* Sets corners and depths of a facet in the image. False: it shows its back.
+ *
+ * Given:     corner  [count] body frame
+ *            normal  unit, body frame */
+bool bst_resolved_make_face(const bst_resolved_adding *a, const bst_vec3 *corner, int count,
+                            bst_vec3 normal, bst_resolved_face *out);
+
+/* Light per cell of a surface element of a material, at a point with a normal, body frame. */
+bst_resolved_shading bst_resolved_shade(const bst_resolved_adding *a, int material, bst_vec3 point,
+                                        bst_vec3 normal);
+
+/* Fraction of a facet that a light reaches; the pieces are in pose->clip if it is between 0 and 1.
+ *
+ * Given:     view  0: Sun; 1: earthlight */
+double bst_resolved_lit_fraction(const bst_resolved_adding *a, int facet, int view);
+
+/* Covers the grid by a facet: fills r->whole and the facet's box. BST_ERR_MEMORY. */
+bst_status bst_resolved_cover_face(bst_ctx *ctx, const bst_resolved_adding *a,
+                                   bst_resolved_face *f) BST_MUST_CHECK;
+/* Empties the light of the facet's box. BST_ERR_MEMORY. */
+bst_status bst_resolved_clear_lit(bst_ctx *ctx, bst_resolved *r,
+                                  const bst_resolved_face *f) BST_MUST_CHECK;
+/* Adds the light of a polygon within the facet, corner[count] in cells, to its box.
+ * BST_ERR_MEMORY. */
+bst_status bst_resolved_add_lit(bst_ctx *ctx, bst_resolved *r, const bst_resolved_face *f,
+                                const bst_point2 *corner, int count, double light) BST_MUST_CHECK;
+/* Adds the fragments of a facet to the surface: a uniform light per cell and, with `pieces`, that
+ * of its box. BST_ERR_MEMORY. */
+bst_status bst_resolved_add_fragments(bst_ctx *ctx, const bst_resolved_adding *a,
+                                      const bst_resolved_face *f, double uniform,
+                                      bool pieces) BST_MUST_CHECK;
+
+/* Parts into which an arc is divided: at the limb, or elsewhere. */
+int bst_resolved_parts(const bst_resolved_adding *a, double radius_m, double angle, bst_vec3 at,
+                       bool limb);
+
+/* Adds a plane facet to the surface; f: work space, with part and curved set. BST_ERR_MEMORY. */
+bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, int facet,
+                                        bst_resolved_face *f) BST_MUST_CHECK;
+/* Likewise a facet of a curved surface (resolved_curved.c). */
+bst_status bst_resolved_add_curved_facet(bst_ctx *ctx, bst_resolved_adding *a, int facet,
+                                         bst_resolved_face *f) BST_MUST_CHECK;
+
+/* Adds a pose with one sample per cell (resolved_samples.c).
+ *
+ * Given:     index   of the pose: places the samples in their cells
+ *            weight  factor on light and cover
+ * Returned:  *total  light without the weight
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_resolved_sample(bst_ctx *ctx, const bst_resolved_adding *a, int index, double weight,
+                               double *total) BST_MUST_CHECK;
+/* Frees the work memory of samples. */
+void bst_resolved_samples_free(bst_resolved_samples *samples);
+
+#endif

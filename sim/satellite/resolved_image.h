@@ -1,0 +1,111 @@
+/* Image of a satellite's shape in perspective, before the PSF: exact coverage of small cells. */
+#ifndef BST_SATELLITE_RESOLVED_IMAGE_H
+#define BST_SATELLITE_RESOLVED_IMAGE_H
+
+#include "sim/satellite/flux.h"
+
+/* Where the body is in a camera without distortion. Image axes: x right, y down, z along the
+ * boresight. A point at (X, Y, Z) is at x = X / (Z scale_rad) px from the boresight, y likewise. */
+typedef struct bst_resolved_view {
+    bst_quat q_image_from_body;
+    bst_vec3 origin_m; /* from the observer to the body's origin, image axes */
+    double scale_rad;  /* angle of a px at the boresight */
+} bst_resolved_view;
+
+/* Light of a material, in any unit: from a solid angle of one steradian whose BRDF times cosine of
+ * incidence is 1 (sun: full sunlight; earth: that of bst_earthlight), or that emits. */
+typedef struct bst_resolved_gain {
+    double sun, earth, emission;
+} bst_resolved_gain;
+
+/* Illumination, body frame. */
+typedef struct bst_resolved_light {
+    bst_vec3 sun;                     /* unit */
+    double sun_radius_rad;            /* angular radius of the Sun's disc; 0: a point */
+    const bst_earthlight *earthlight; /* NULL: none */
+    const bst_resolved_gain *gain;    /* [material_count] */
+} bst_resolved_light;
+
+/* A cell: its light, as a quantity and its first moments about the cell's centre in cells, and the
+ * fraction that the body covers. Sums of all poses times their weights. */
+typedef struct bst_resolved_cell {
+    float light, moment_x, moment_y, cover;
+} bst_resolved_cell;
+
+/* A grid of cells. Cell (i, j) has its centre at ((x0 + i + 0.5) cell_px, (y0 + j + 0.5) cell_px)
+ * from the boresight. */
+typedef struct bst_resolved_image {
+    double cell_px;
+    int x0, y0, width, height;
+    bst_resolved_cell *cells; /* [height][width] */
+    int16_t *part; /* [height][width] part that covers most of the cell in the latest pose
+                      added; -1: none */
+} bst_resolved_image;
+
+/* The image of a model, with its work memory; for one thread. */
+typedef struct bst_resolved bst_resolved;
+
+/* Largest number of cells. */
+enum { BST_RESOLVED_CELLS_MAX = 1 << 26 };
+
+/* Creates the work memory for a model.
+ *
+ * Given:     satellite  outlives it
+ * Returned:  *out  NULL on error
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_resolved_free */
+bst_status bst_resolved_create(bst_ctx *ctx, const bst_satellite *satellite,
+                               bst_resolved **out) BST_MUST_CHECK;
+/* Frees the work memory; NULL is allowed. */
+void bst_resolved_free(bst_resolved *resolved);
+
+/* Box of a pose in the image, px from the boresight.
+ *
+ * Returned:  false if a part of the body is beside or behind the observer: it has no image */
+bool bst_resolved_box(const bst_satellite_pose *pose, const bst_resolved_view *view, double low[2],
+                      double high[2]);
+
+/* Starts an empty image.
+ *
+ * Given:     low, high  corners of the box that is wanted, px; light outside is left out
+ *            cell_px    side of a cell
+ * Errors:    BST_ERR_RANGE for more than BST_RESOLVED_CELLS_MAX cells, BST_ERR_MEMORY */
+bst_status bst_resolved_begin(bst_ctx *ctx, bst_resolved *resolved, const double low[2],
+                              const double high[2], double cell_px) BST_MUST_CHECK;
+
+/* Adds a pose.
+ *
+ * Given:     pose    joints as bst_satellite_pose_set left them; its views are changed
+ *            light   illumination; NULL: only cover and parts
+ *            weight  factor on light and cover, for example a share of the exposure
+ * Returned:  *total  light of the pose within the box, without the weight; may be NULL
+ * Errors:    BST_ERR_MEMORY
+ * Notes:     sides of facets and borders of shadows are exact: the light of a cell is that of the
+ *            areas of its visible, lit polygons. Curved surfaces consist of facets of about a cell.
+ *            Where the borders of two bodies cross in a cell, they are taken as independent. The
+ *            Sun casts shadows from the centre of its disc. Light that is reflected twice is left
+ *            out.
+ * Reference: visible areas of a cell from front to back: Carpenter, Computer Graphics 18, 103
+ *            (1984) */
+bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *resolved, bst_satellite_pose *pose,
+                            const bst_resolved_view *view, const bst_resolved_light *light,
+                            double weight, double *total) BST_MUST_CHECK;
+
+/* True if bst_resolved_add_sampled draws a model as well: it has no curved surfaces. */
+bool bst_resolved_may_sample(const bst_satellite *satellite);
+
+/* Adds one of many poses, as bst_resolved_add but fast: one sample per cell, at another place of
+ * the cell for each index, and shadows by a depth map.
+ *
+ * Given:     light  not NULL
+ *            index  0, 1, ... of the pose
+ * Errors:    BST_ERR_MEMORY
+ * Notes:     a single pose has staircases; the sum of dozens has none. Shadows of the Sun only. */
+bst_status bst_resolved_add_sampled(bst_ctx *ctx, bst_resolved *resolved, bst_satellite_pose *pose,
+                                    const bst_resolved_view *view, const bst_resolved_light *light,
+                                    int index, double weight) BST_MUST_CHECK;
+
+/* The image so far; valid until the next call with `resolved`. */
+const bst_resolved_image *bst_resolved_image_of(const bst_resolved *resolved);
+
+#endif

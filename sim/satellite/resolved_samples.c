@@ -1,0 +1,211 @@
+/* The fast image of a mesh: one sample per cell, and shadows by a depth map from the Sun. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/satellite/resolved_faces.h"
+
+void bst_resolved_samples_free(bst_resolved_samples *s) {
+    free(s->near);
+    free(s->facet);
+    free(s->toward);
+    free(s->seen);
+    free(s->sun);
+    free(s->state);
+    free(s->light);
+    *s = (bst_resolved_samples){.cells = 0};
+}
+
+static bst_status reserve(bst_ctx *ctx, const bst_resolved *r, bst_resolved_samples *s) {
+    size_t cells = (size_t)r->image.width * (size_t)r->image.height;
+    size_t side = BST_SHADOW_SIDE;
+    bool made = true;
+    if (!s->toward) {
+        s->toward = malloc(side * side * sizeof *s->toward);
+        s->seen = malloc(((size_t)r->satellite->vertex_count + 1) * sizeof *s->seen);
+        s->sun = malloc(((size_t)r->satellite->vertex_count + 1) * sizeof *s->sun);
+        s->state = malloc((size_t)r->satellite->facet_count + 1);
+        s->light = malloc(((size_t)r->satellite->facet_count + 1) * sizeof *s->light);
+        made = s->toward && s->seen && s->sun && s->state && s->light;
+    }
+    if (made && cells > s->cells) {
+        free(s->near);
+        free(s->facet);
+        s->near = malloc(cells * sizeof *s->near);
+        s->facet = malloc(cells * sizeof *s->facet);
+        made = s->near && s->facet;
+        s->cells = made ? cells : 0;
+    }
+    return made ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the image of a satellite");
+}
+
+/* A grid of samples at the integers, with the greatest value so far. */
+typedef struct target {
+    float *most;
+    int *facet; /* NULL: not wanted */
+    int width, height;
+} target;
+
+/* Enters a triangle: value linear in x and y. Both orientations. */
+static void enter(const target *t, const bst_vec3 *a, const bst_vec3 *b, const bst_vec3 *c,
+                  int facet) {
+    double area = (b->x - a->x) * (c->y - a->y) - (b->y - a->y) * (c->x - a->x);
+    if (!(fabs(area) > 1e-12)) {
+        return;
+    }
+    double low_y = fmin(a->y, fmin(b->y, c->y)), high_y = fmax(a->y, fmax(b->y, c->y));
+    int first = low_y > 0.0 ? (int)ceil(low_y) : 0;
+    int last = high_y < t->height - 1.0 ? (int)floor(high_y) : t->height - 1;
+    double dx = ((b->z - a->z) * (c->y - a->y) - (c->z - a->z) * (b->y - a->y)) / area;
+    double dy = ((c->z - a->z) * (b->x - a->x) - (b->z - a->z) * (c->x - a->x)) / area;
+    const bst_vec3 *corner[4] = {a, b, c, a};
+    for (int y = first; y <= last; y++) {
+        double from = INFINITY, to = -INFINITY;
+        for (int e = 0; e < 3; e++) {
+            const bst_vec3 *p = corner[e], *q = corner[e + 1];
+            if ((p->y <= y) != (q->y <= y)) {
+                double x = p->x + (y - p->y) / (q->y - p->y) * (q->x - p->x);
+                from = x < from ? x : from;
+                to = x > to ? x : to;
+            }
+        }
+        int i = from > 0.0 ? (from < t->width ? (int)ceil(from) : t->width) : 0;
+        int end = to < t->width - 1.0 ? (to < 0.0 ? -1 : (int)floor(to)) : t->width - 1;
+        size_t row = (size_t)y * (size_t)t->width;
+        double value = a->z + dx * (i - a->x) + dy * (y - a->y);
+        for (; i <= end; i++, value += dx) {
+            if ((float)value > t->most[row + (size_t)i]) {
+                t->most[row + (size_t)i] = (float)value;
+                if (t->facet) {
+                    t->facet[row + (size_t)i] = facet;
+                }
+            }
+        }
+    }
+}
+
+/* Enters all facets that face a direction: as seen from the eye, or from the Sun if eye is NULL. */
+static void enter_facets(const bst_resolved_adding *a, const target *t, const bst_vec3 *place,
+                         const bst_vec3 *eye) {
+    const bst_satellite *sat = a->r->satellite;
+    for (int f = 0; f < sat->facet_count; f++) {
+        const bst_facet *facet = &sat->facets[f];
+        const int *v = &sat->corner[facet->first];
+        bst_vec3 from = eye ? bst_vec3_sub(*eye, a->pose->vertices[v[0]]) : a->light->sun;
+        if (!(bst_vec3_dot(a->pose->normals[f], from) > 0.0)) {
+            continue;
+        }
+        for (int i = 1; i + 1 < facet->count; i++) {
+            enter(t, &place[v[0]], &place[v[i]], &place[v[i + 1]], f);
+        }
+    }
+}
+
+/* The Sun's view: cells of its depth map from the body frame. */
+typedef struct sun_view {
+    bst_vec3 x, y, z; /* unit */
+    double per_m;
+} sun_view;
+
+static bst_vec3 in_sun_view(const sun_view *v, bst_vec3 p) {
+    double middle = 0.5 * BST_SHADOW_SIDE;
+    return (bst_vec3){middle + v->per_m * bst_vec3_dot(p, v->x),
+                      middle + v->per_m * bst_vec3_dot(p, v->y), bst_vec3_dot(p, v->z)};
+}
+
+/* Light of a facet, computed when it is first seen. */
+static const bst_resolved_shading *light_of(const bst_resolved_adding *a, bst_resolved_samples *s,
+                                            int f) {
+    if (!s->state[f]) {
+        const bst_facet *facet = &a->r->satellite->facets[f];
+        bst_vec3 middle = {0};
+        for (int i = 0; i < facet->count; i++) {
+            middle = bst_vec3_axpy(middle, 1.0 / facet->count,
+                                   a->pose->vertices[a->r->satellite->corner[facet->first + i]]);
+        }
+        s->light[f] = bst_resolved_shade(a, facet->material, middle, a->pose->normals[f]);
+        s->state[f] = 1;
+    }
+    return &s->light[f];
+}
+
+/* True if a point of a facet sees the Sun. The map's cells are as wide as 1 / per_m, over which the
+ * facet rises by its slope. */
+static bool is_lit(const bst_resolved_samples *s, const sun_view *v, bst_vec3 p, bst_vec3 normal) {
+    bst_vec3 q = in_sun_view(v, p);
+    int x = (int)floor(q.x + 0.5), y = (int)floor(q.y + 0.5);
+    if (x < 0 || y < 0 || x >= BST_SHADOW_SIDE || y >= BST_SHADOW_SIDE) {
+        return true;
+    }
+    double in = fmax(bst_vec3_dot(normal, v->z), 0.05);
+    double rise = (1.0 + sqrt(fmax(1.0 - in * in, 0.0)) / in) / v->per_m;
+    return (double)s->toward[y * BST_SHADOW_SIDE + x] <= q.z + rise;
+}
+
+/* Adds the samples to the image. */
+static double add_samples(const bst_resolved_adding *a, bst_resolved_samples *s, const sun_view *v,
+                          const double offset[2], double weight) {
+    bst_resolved_image *m = &a->r->image;
+    double total = 0.0, cell = 1.0 / a->per_m;
+    for (int y = 0; y < m->height; y++) {
+        for (int x = 0; x < m->width; x++) {
+            size_t at = (size_t)y * (size_t)m->width + (size_t)x;
+            int f = s->facet[at];
+            if (f < 0) {
+                continue;
+            }
+            const bst_resolved_shading *light = light_of(a, s, f);
+            double u = (m->x0 + x + offset[0]) * cell, w = (m->y0 + y + offset[1]) * cell;
+            double sum = light->uniform + light->earth, c2 = 1.0 / (1.0 + u * u + w * w);
+            if (light->sun > 0.0) {
+                double depth_m = 1.0 / (double)s->near[at];
+                bst_vec3 q = {u * depth_m, w * depth_m, depth_m};
+                q = bst_mat3_transpose_mul_vec(&a->image_from_body,
+                                               bst_vec3_sub(q, a->view->origin_m));
+                sum += is_lit(s, v, q, a->pose->normals[f]) ? light->sun : 0.0;
+            }
+            sum *= c2 * sqrt(c2);
+            total += sum;
+            bst_resolved_cell *to = &m->cells[at];
+            to->light += (float)(weight * sum);
+            to->moment_x += (float)(weight * sum * (offset[0] - 0.5));
+            to->moment_y += (float)(weight * sum * (offset[1] - 0.5));
+            to->cover += (float)weight;
+            m->part[at] = (int16_t)a->r->satellite->facets[f].part;
+        }
+    }
+    return total;
+}
+
+bst_status bst_resolved_sample(bst_ctx *ctx, const bst_resolved_adding *a, int index, double weight,
+                               double *total) {
+    bst_resolved *r = a->r;
+    bst_resolved_samples *s = &r->samples;
+    const bst_satellite *sat = r->satellite;
+    BST_TRY(reserve(ctx, r, s));
+    /* places of the sample in its cell: multiples of the golden ratio's generalisation to two
+     * dimensions (Roberts 2018) fill the square evenly */
+    const double offset[2] = {fmod(0.5 + 0.7548776662466927 * index, 1.0),
+                              fmod(0.5 + 0.5698402909980532 * index, 1.0)};
+    sun_view v = {.z = a->light->sun, .per_m = 0.49 * BST_SHADOW_SIDE / sat->radius_m};
+    v.x = bst_vec3_perpendicular(v.z);
+    v.y = bst_vec3_cross(v.z, v.x);
+    for (int i = 0; i < sat->vertex_count; i++) {
+        double depth_m;
+        bst_point2 p = bst_resolved_project(a, a->pose->vertices[i], &depth_m);
+        s->seen[i] = (bst_vec3){p.x - offset[0], p.y - offset[1], 1.0 / depth_m};
+        s->sun[i] = in_sun_view(&v, a->pose->vertices[i]);
+    }
+    size_t cells = (size_t)r->image.width * (size_t)r->image.height;
+    memset(s->near, 0, cells * sizeof *s->near);
+    memset(s->facet, -1, cells * sizeof *s->facet);
+    memset(s->state, 0, (size_t)sat->facet_count + 1);
+    for (int i = 0; i < BST_SHADOW_SIDE * BST_SHADOW_SIDE; i++) {
+        s->toward[i] = -INFINITY;
+    }
+    const target shadow = {s->toward, NULL, BST_SHADOW_SIDE, BST_SHADOW_SIDE};
+    const target image = {s->near, s->facet, r->image.width, r->image.height};
+    enter_facets(a, &shadow, s->sun, NULL);
+    enter_facets(a, &image, s->seen, &a->eye_m);
+    *total = add_samples(a, s, &v, offset, weight);
+    return BST_OK;
+}

@@ -1,0 +1,197 @@
+/* Images of shapes against closed forms, and against the flux of the same model. */
+#include "sim/satellite/resolved_image.h"
+#include "tests/satellite/satellite_support.h"
+
+/* A view along -direction (body frame) from a range, with x of the image along `right`. */
+static bst_resolved_view look_from(bst_vec3 direction, bst_vec3 right, double range_m,
+                                   double scale_rad) {
+    bst_quat q = bst_quat_look(bst_vec3_scale(direction, -1.0), right);
+    return (bst_resolved_view){q, {0, 0, range_m}, scale_rad};
+}
+
+/* Light and cover (px^2) of an image. */
+typedef struct sums {
+    double light, cover;
+} sums;
+
+static sums sum_of(const bst_resolved_image *m) {
+    sums s = {0};
+    for (int j = 0; j < m->height; j++) {
+        for (int i = 0; i < m->width; i++) {
+            const bst_resolved_cell *c = &m->cells[j * m->width + i];
+            s.light += (double)c->light;
+            s.cover += (double)c->cover * m->cell_px * m->cell_px;
+        }
+    }
+    return s;
+}
+
+/* Renders one pose with unit gains for sunlight. */
+static sums render(bst_test_model *m, const bst_resolved_view *view, bst_vec3 sun, double cell_px) {
+    bst_ctx ctx = {0};
+    bst_resolved *r;
+    bst_resolved_gain gain[BST_SATELLITE_MATERIALS_MAX];
+    for (int i = 0; i < m->satellite->material_count; i++) {
+        gain[i] = (bst_resolved_gain){.sun = 1.0};
+    }
+    bst_resolved_light light = {.sun = bst_vec3_unit(sun), .gain = gain};
+    double low[2], high[2], total;
+    assert_true(bst_resolved_box(m->pose, view, low, high));
+    bst_assert_ok(&ctx, bst_resolved_create(&ctx, m->satellite, &r));
+    bst_assert_ok(&ctx, bst_resolved_begin(&ctx, r, low, high, cell_px));
+    bst_assert_ok(&ctx, bst_resolved_add(&ctx, r, m->pose, view, &light, 1.0, &total));
+    const bst_resolved_image *image = bst_resolved_image_of(r);
+    sums s = sum_of(image);
+    /* cells are floats */
+    bst_assert_close((s.light - total) / total, 0.0, 1e-5);
+    bst_resolved_free(r);
+    return s;
+}
+
+static const char *const box =
+    "{\"materials\": [{\"name\": \"m\", \"diffuse\": 0.5}],"
+    "\"parts\": [{\"name\": \"b\", \"kind\": \"box\", \"size_m\": [2, 1, 3], \"material\": "
+    "\"m\"}]}";
+static const char *const sphere =
+    "{\"materials\": [{\"name\": \"m\", \"diffuse\": 0.5}],"
+    "\"parts\": [{\"name\": \"b\", \"kind\": \"sphere\", \"radius_m\": 1, \"material\": \"m\"}]}";
+static const char *const bus =
+    "{\"materials\": [{\"name\": \"m\", \"diffuse\": 0.5}, {\"name\": \"p\", \"diffuse\": 0.2, "
+    "\"specular\": 0.3, \"model\": \"phong\", \"exponent\": 30}],"
+    "\"parts\": [{\"name\": \"b\", \"kind\": \"box\", \"size_m\": [2, 2, 3], \"material\": \"m\"},"
+    "{\"name\": \"w\", \"kind\": \"plate\", \"size_m\": [6, 1.5, 0], \"position_m\": [5, 0, 0], "
+    "\"rotation_deg\": [40, 0, 0], \"material\": \"p\"},"
+    "{\"name\": \"v\", \"kind\": \"plate\", \"size_m\": [6, 1.5, 0], \"position_m\": [-5, 0, 0], "
+    "\"rotation_deg\": [40, 0, 0], \"material\": \"p\"},"
+    "{\"name\": \"c\", \"kind\": \"cylinder\", \"radius_m\": 0.7, \"length_m\": 1.2, "
+    "\"position_m\": [0, 0, 2.3], \"material\": \"m\"},"
+    "{\"name\": \"d\", \"kind\": \"dish\", \"radius_m\": 1, \"length_m\": 0.3, \"position_m\": [0, "
+    "0, 4], \"material\": \"m\"},"
+    "{\"name\": \"s\", \"kind\": \"sphere\", \"radius_m\": 0.6, \"position_m\": [0, 1.8, 0.5], "
+    "\"material\": \"p\"}]}";
+
+static const char *const flat =
+    "{\"materials\": [{\"name\": \"m\", \"diffuse\": 0.5}, {\"name\": \"p\", \"diffuse\": 0.2, "
+    "\"specular\": 0.3, \"model\": \"phong\", \"exponent\": 30}],"
+    "\"parts\": [{\"name\": \"b\", \"kind\": \"box\", \"size_m\": [2, 2, 3], \"material\": \"m\"},"
+    "{\"name\": \"w\", \"kind\": \"plate\", \"size_m\": [6, 1.5, 0], \"position_m\": [5, 0, 0], "
+    "\"rotation_deg\": [40, 0, 0], \"material\": \"p\"},"
+    "{\"name\": \"v\", \"kind\": \"plate\", \"size_m\": [6, 1.5, 0], \"position_m\": [-5, 0, 0], "
+    "\"rotation_deg\": [40, 0, 0], \"material\": \"p\"}]}";
+
+/* From far the light is that of bst_satellite_flux_at: exactly for plane facets with all their
+ * shadows; for curved surfaces to the error of both. */
+static void test_agrees_with_flux(void **state) {
+    (void)state;
+    const char *const texts[] = {box, flat, sphere, bus};
+    /* relative to the mean flux: floats of the cells; facets of spheres; curved surfaces with
+     * shadows, of which the flux takes the lit fraction of all facets */
+    const double tolerance[] = {2e-6, 2e-5, 2e-4, 2e-2};
+    uint64_t seed = 5;
+    for (int t = 0; t < 4; t++) {
+        bst_test_model m = bst_test_model_open(texts[t]);
+        double mean = 0.0, worst = 0.0;
+        for (int n = 0; n < 4; n++) {
+            bst_vec3 sun = bst_test_direction(&seed), eye = bst_test_direction(&seed);
+            double flux = bst_test_flux(&m, sun, eye), range_m = 1e7;
+            bst_resolved_view view =
+                look_from(eye, (bst_vec3){0.3, 0.8, 0.4}, range_m, 0.05 / range_m);
+            sums s = render(&m, &view, sun, 0.25);
+            mean += 0.25 * flux;
+            worst = fmax(worst, fabs(s.light * range_m * range_m - flux));
+            if (t == 2) { /* a disc */
+                bst_assert_close(s.cover * 0.05 * 0.05, BST_PI, 1e-3);
+            }
+        }
+        assert_true(mean > 0.0);
+        bst_assert_close(worst / mean, 0.0, tolerance[t]);
+        bst_test_model_close(&m);
+    }
+}
+
+/* Solid angle of a triangle (Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 125 (1983)).
+ */
+static double triangle_sr(bst_vec3 a, bst_vec3 b, bst_vec3 c) {
+    double la = bst_vec3_norm(a), lb = bst_vec3_norm(b), lc = bst_vec3_norm(c);
+    double up = bst_vec3_dot(a, bst_vec3_cross(b, c));
+    double down =
+        la * lb * lc + bst_vec3_dot(a, b) * lc + bst_vec3_dot(a, c) * lb + bst_vec3_dot(b, c) * la;
+    return fabs(2.0 * atan2(up, down));
+}
+
+/* From nearby the light of a diffuse face is its radiance times its solid angle, in perspective. */
+static void test_perspective(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(box);
+    bst_vec3 sun = bst_vec3_unit((bst_vec3){0.5, 0.4, 0.7}), eye = {3.2, 2.4, 4.0};
+    double range_m = bst_vec3_norm(eye), expected = 0.0;
+    bst_resolved_view view = look_from(eye, (bst_vec3){0, 1, 0}, range_m, 0.005);
+    const bst_satellite *s = m.satellite;
+    for (int f = 0; f < s->facet_count; f++) {
+        const bst_facet *facet = &s->facets[f];
+        bst_vec3 p[4];
+        for (int i = 0; i < 4; i++) {
+            p[i] = bst_vec3_sub(s->vertices[s->corner[facet->first + i]], eye);
+        }
+        double in = bst_vec3_dot(facet->normal, sun);
+        if (in > 0.0 && bst_vec3_dot(facet->normal, p[0]) < 0.0) {
+            expected +=
+                0.5 / BST_PI * in * (triangle_sr(p[0], p[1], p[2]) + triangle_sr(p[0], p[2], p[3]));
+        }
+    }
+    sums image = render(&m, &view, sun, 0.25);
+    /* a cell's solid angle is that at its middle */
+    bst_assert_close(image.light / expected, 1.0, 2e-5);
+    bst_test_model_close(&m);
+}
+
+/* The sum of many sampled poses at rest is the exact image: light, cover, and light by quadrant. */
+static void test_samples(void **state) {
+    (void)state;
+    enum { POSES = 64 };
+    bst_ctx ctx = {0};
+    bst_test_model m = bst_test_model_open(flat);
+    bst_resolved *r[2];
+    bst_resolved_gain gain[2] = {{.sun = 1.0}, {.sun = 1.0}};
+    bst_resolved_light light = {.sun = bst_vec3_unit((bst_vec3){0.7, 0.5, 0.4}), .gain = gain};
+    bst_resolved_view view =
+        look_from((bst_vec3){0.2, 0.4, 0.9}, (bst_vec3){1, 0, 0}, 100.0, 0.001);
+    double low[2], high[2], sum[2][2][2] = {{{0}}}, cover[2] = {0}, all = 0.0;
+    assert_true(bst_resolved_may_sample(m.satellite));
+    assert_true(bst_resolved_box(m.pose, &view, low, high));
+    for (int n = 0; n < 2; n++) {
+        bst_assert_ok(&ctx, bst_resolved_create(&ctx, m.satellite, &r[n]));
+        bst_assert_ok(&ctx, bst_resolved_begin(&ctx, r[n], low, high, 1.0));
+        for (int k = 0; k < (n == 0 ? POSES : 1); k++) {
+            if (n == 0) {
+                bst_assert_ok(&ctx, bst_resolved_add_sampled(&ctx, r[n], m.pose, &view, &light, k,
+                                                             1.0 / POSES));
+            } else {
+                bst_assert_ok(&ctx, bst_resolved_add(&ctx, r[n], m.pose, &view, &light, 1.0, NULL));
+            }
+        }
+        const bst_resolved_image *image = bst_resolved_image_of(r[n]);
+        for (int i = 0; i < image->width * image->height; i++) {
+            const bst_resolved_cell *c = &image->cells[i];
+            int right = 2 * (i % image->width) > image->width;
+            int below = 2 * (i / image->width) > image->height;
+            sum[n][right][below] += (double)c->light;
+            cover[n] += (double)c->cover;
+            all += n * (double)c->light;
+        }
+        bst_resolved_free(r[n]);
+    }
+    /* 64 places in each cell, and the bias of the depth map */
+    bst_assert_close(cover[0] / cover[1], 1.0, 2e-3);
+    for (int q = 0; q < 4; q++) {
+        bst_assert_close((sum[0][q & 1][q >> 1] - sum[1][q & 1][q >> 1]) / all, 0.0, 5e-3);
+    }
+    bst_test_model_close(&m);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_agrees_with_flux),
+                                       cmocka_unit_test(test_perspective),
+                                       cmocka_unit_test(test_samples)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
