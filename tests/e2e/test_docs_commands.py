@@ -30,6 +30,9 @@ import unittest
 
 ROOT = os.getcwd()
 SECONDS = 2
+# where PoCL keeps the kernels that the tests before compiled (its own rule), as HOME is another one here
+KERNELS = os.environ.get("POCL_CACHE_DIR") or os.path.join(
+    os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "pocl", "kcache")
 LANGUAGES = {"sh", "console", "text", "json", "c", "python", "cmake", "{toctree}"}
 # variables that later blocks of a page use; not the variables of one command
 SETTING = re.compile(r"""export .*|\w+=(\S*|"[^"]*")""")
@@ -99,7 +102,7 @@ class Scratch:
         home = os.path.join(self.path, "home")
         os.makedirs(home, exist_ok=True)
         environment = dict(os.environ, DOCS_DURATION=length, PATH=self.tools + ":" + os.environ["PATH"],
-                           HOME=home, POCL_CACHE_DIR=os.environ.get("POCL_CACHE_DIR", os.path.expanduser("~/.cache/pocl")))
+                           HOME=home, POCL_CACHE_DIR=KERNELS)
         folder = self.path
         if "tree" in marks:
             folder = os.path.join(self.path, "tree")
