@@ -2,9 +2,9 @@
 # starts the longest first, so that none is left at the end for one core alone; a clean clone has no
 # times of its own. Only the order counts; a test that is not named counts as short.
 set(bst_costs
-  e2e_docs_commands 110  e2e_bench 50  e2e_study 50  e2e_command_line 45
-  e2e_docs 44  e2e_passes 43  e2e_detector_effects 42  e2e_day_modes 40  e2e_frames 38  e2e_seeds 37
-  e2e_link 34  e2e_faults 33  e2e_resume 32  e2e_interrupted 30  e2e_slurm 30  e2e_tables 27
+  e2e_docs_commands 80  e2e_bench 50  e2e_study 50  e2e_command_line 45
+  e2e_detector_effects 42  e2e_frames 36  e2e_seeds 30
+  e2e_link 34  e2e_day_modes 24  e2e_docs 24  e2e_passes 22  e2e_faults 33  e2e_resume 32  e2e_interrupted 30  e2e_slurm 30  e2e_tables 27
   e2e_camera 26  e2e_random_scenes 26  e2e_planes 26  e2e_acquisition 24  e2e_rules 22
   e2e_discrimination 22  e2e_loop_latency 20  e2e_repeat 20  e2e_threads 20  e2e_pd 20  e2e_loop 20  e2e_study_files 20
   e2e_new 19  e2e_bad_input 18  e2e_random_labels 16  e2e_info 15  e2e_manoeuvre 14

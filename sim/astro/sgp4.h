@@ -20,7 +20,7 @@ typedef enum bst_sgp4_error {
     BST_SGP4_DECAYED = 6
 } bst_sgp4_error;
 
-/* An initialised satellite; immutable. */
+/* An initialised satellite; immutable to its users. */
 typedef struct bst_sgp4 bst_sgp4;
 
 /* Creates an SGP4 propagator from an element set; *out is freed with bst_sgp4_free, NULL on error.
@@ -36,10 +36,11 @@ bst_status bst_sgp4_create(bst_ctx *ctx, const bst_elements *elements, bst_sgp4_
 void bst_sgp4_free(bst_sgp4 *sgp4);
 
 /* State at `minutes` after the element epoch (UTC taken as uniform, as the theory does): TEME, km
- * and km/s. No state is kept between calls: the result does not depend on the order of times, and
- * threads may share a propagator. position/velocity are still written on BST_SGP4_DECAYED, else
- * untouched on error. Times beyond 1e9 minutes or not finite give BST_SGP4_MEAN_MOTION. Resonant
- * orbits are integrated from the epoch each time, in steps of half a day. */
+ * and km/s. The result does not depend on the order of times, and threads may share a propagator.
+ * position/velocity are still written on BST_SGP4_DECAYED, else untouched on error. Times beyond
+ * 1e9 minutes or not finite give BST_SGP4_MEAN_MOTION. Resonant orbits are integrated from the
+ * epoch in steps of half a day, of which the last is remembered: the time that a call takes depends
+ * on the order of times. */
 bst_sgp4_error bst_sgp4_propagate(const bst_sgp4 *sgp4, double minutes, double position_teme_km[3],
                                   double velocity_teme_kmps[3]);
 

@@ -303,32 +303,46 @@ static void resonance_force(const bst_sgp4_deep *d, double lambda, bst_sgp4_comp
     *slope = t1.re + 2.0 * t2.re + 3.0 * t3.re;
 }
 
+/* Taylor step of mean motion and resonance angle by h minutes. */
+static void step_resonance(const bst_sgp4_deep *d, double h, bst_sgp4_knot *k) {
+    double force, slope;
+    resonance_force(d, k->lambda, k->perigee, &force, &slope);
+    double rate = k->n + d->lambda_rate;
+    slope *= rate;
+    k->lambda += h * (rate + 0.5 * h * force);
+    k->n += h * (force + 0.5 * h * slope);
+}
+
 /* Integrates mean motion and resonance angle from the epoch to t by Taylor steps of 720 min. The
- * reference restarts at the epoch if time reverses; always doing so gives unique states. */
+ * reference restarts at the epoch if time reverses; here the states are those of always doing so,
+ * though whole steps that the memo has are not repeated. */
 static void integrate_resonance(const bst_sgp4 *s, double t, double *n_out, double *lambda_out) {
     const bst_sgp4_deep *d = &s->deep;
-    const double step = t < 0.0 ? -STEP_MIN : STEP_MIN;
-    bst_sgp4_complex perigee = d->perigee0, turn = d->perigee_step;
-    if (t < 0.0) {
-        turn.im = -turn.im;
+    const double sign = t < 0.0 ? -1.0 : 1.0;
+    const bst_sgp4_complex turn = {d->perigee_step.re, sign * d->perigee_step.im};
+    /* the multiples of 720 are exact, and so are the differences: t has a finer spacing */
+    double whole = floor(fabs(t) / STEP_MIN);
+    double left = fabs(t) - whole * STEP_MIN;
+    if (left < 0.0) { /* the quotient was rounded up */
+        whole -= 1.0;
+        left += STEP_MIN;
     }
-    double n = s->n0, lambda = d->lambda0, left = t;
-    for (;;) {
-        double force, slope;
-        resonance_force(d, lambda, perigee, &force, &slope);
-        double rate = n + d->lambda_rate;
-        slope *= rate;
-        double h = fabs(left) >= STEP_MIN ? step : left;
-        lambda += h * (rate + 0.5 * h * force);
-        n += h * (force + 0.5 * h * slope);
-        if (fabs(left) < STEP_MIN) {
-            break;
+    bst_sgp4_knot k = {0.0, s->n0, d->lambda0, d->perigee0}, kept;
+    if (whole > 0.0 && bst_sgp4_recall(d->memo, &kept) && sign * kept.steps > 0.0 &&
+        sign * kept.steps <= whole) {
+        k = kept;
+    }
+    if (sign * k.steps < whole) {
+        while (sign * k.steps < whole) {
+            step_resonance(d, sign * STEP_MIN, &k);
+            k.perigee = multiply(k.perigee, turn);
+            k.steps += sign;
         }
-        left -= step;
-        perigee = multiply(perigee, turn);
+        bst_sgp4_remember(d->memo, &k);
     }
-    *n_out = n;
-    *lambda_out = lambda;
+    step_resonance(d, sign * left, &k);
+    *n_out = k.n;
+    *lambda_out = k.lambda;
 }
 
 double bst_sgp4_step_minutes(const bst_sgp4 *s) {

@@ -189,10 +189,21 @@ bst_status bst_sgp4_create(bst_ctx *ctx, const bst_elements *elements, bst_sgp4_
         double days_1950 = (el->epoch_utc_jd1 + el->epoch_utc_jd2) - 2433281.5;
         bst_sgp4_deep_init(s, days_1950 + 18261.5, sidereal_time(days_1950, s->afspc));
     }
+    if (s->deep.resonance != BST_SGP4_NOT_RESONANT) {
+        s->deep.memo = calloc(1, sizeof *s->deep.memo);
+        if (s->deep.memo == NULL) {
+            free(s);
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an SGP4 propagator (%zu bytes)",
+                            sizeof *s->deep.memo);
+        }
+    }
     *out = s;
     return BST_OK;
 }
 
 void bst_sgp4_free(bst_sgp4 *sgp4) {
+    if (sgp4) {
+        free(sgp4->deep.memo);
+    }
     free(sgp4);
 }

@@ -9,6 +9,7 @@
 #define BST_ASTRO_SGP4_INTERNAL_H
 
 #include <math.h>
+#include <stdatomic.h>
 #include <stdbool.h>
 
 #include "boresight/vec.h"
@@ -56,6 +57,21 @@ typedef enum bst_sgp4_resonance {
     BST_SGP4_HALF_DAY
 } bst_sgp4_resonance;
 
+/* A resonant orbit after whole integration steps from the epoch. */
+typedef struct bst_sgp4_knot {
+    double steps;     /* their number, with the sign of the time */
+    double n, lambda; /* mean motion and resonance angle */
+    bst_sgp4_complex perigee;
+} bst_sgp4_knot;
+
+/* The knot that was last integrated, so that the next time needs not begin at the epoch. A knot
+ * depends on its number of steps alone: which one is kept changes no result. Threads share it: odd
+ * versions mark a write (a sequence lock); a thread that meets one goes without. */
+typedef struct bst_sgp4_memo {
+    atomic_uint version; /* 0: empty */
+    _Atomic double steps, n, lambda, perigee_re, perigee_im;
+} bst_sgp4_memo;
+
 /* Deep-space part: mean elements change by Sun, Moon and resonance with the geopotential. */
 typedef struct bst_sgp4_deep {
     double e_rate, i_rate, m_rate, argp_rate, raan_rate; /* secular, by Sun and Moon */
@@ -68,6 +84,7 @@ typedef struct bst_sgp4_deep {
      * Half-day: P_k = sum_j p[k][j] exp(i (j - 1) perigee), j = 0..3. */
     bst_sgp4_complex p[4][4];
     bst_sgp4_complex perigee0, perigee_step; /* exp(i perigee) at epoch, and its turn in a step */
+    bst_sgp4_memo *memo; /* NULL: not resonant; the one part that changes, see there */
 } bst_sgp4_deep;
 
 struct bst_sgp4 {
@@ -121,6 +138,12 @@ void bst_sgp4_deep_init(bst_sgp4 *s, double days_1900, double sidereal0);
 /* Secular effect of Sun and Moon and resonance: moves the mean elements, n included, to time
  * t. */
 void bst_sgp4_deep_secular(const bst_sgp4 *s, double t, bst_sgp4_mean *x);
+
+/* The knot that a memo holds; false: none, or another thread is writing it. */
+bool bst_sgp4_recall(bst_sgp4_memo *memo, bst_sgp4_knot *knot);
+
+/* Keeps a knot, unless another thread is writing one. */
+void bst_sgp4_remember(bst_sgp4_memo *memo, const bst_sgp4_knot *knot);
 
 /* Adds the periodics of Sun and Moon to the elements; gives sin and cos of the new inclination and
  * of the new node. On return i >= 0. */

@@ -1,6 +1,7 @@
 #include "sim/astro/sgp4.h"
 
 #include <float.h>
+#include <pthread.h>
 #include <stdlib.h>
 
 #include "boresight/vec.h"
@@ -233,6 +234,62 @@ static void order_of_times_does_not_matter(void **state) {
     bst_sgp4_free(s);
 }
 
+enum { THREADS = 4, CALLS = 1500, FEW = 64 };
+
+/* One of several threads with one propagator: times ahead and back, at and beside the multiples of
+ * the integration step. */
+typedef struct sharer {
+    const bst_sgp4 *shared;
+    const double *minutes;     /* FEW times */
+    const double (*states)[6]; /* of propagators that were asked for one time only */
+    unsigned seed;
+    int wrong;
+} sharer;
+
+static void *share(void *user) {
+    sharer *s = user;
+    for (int i = 0; i < CALLS; i++) {
+        s->seed = s->seed * 1664525u + 1013904223u;
+        int k = (int)(s->seed >> 16) % FEW;
+        double state[6];
+        bst_sgp4_error error = bst_sgp4_propagate(s->shared, s->minutes[k], state, state + 3);
+        s->wrong += error != BST_SGP4_OK || memcmp(state, s->states[k], sizeof state) != 0;
+    }
+    return NULL;
+}
+
+/* What a propagator remembers of its resonance changes no bit, in any order and in any thread. */
+static void threads_share_a_resonant_orbit(void **state) {
+    (void)state;
+    bst_elements orbits[2] = {molniya(), molniya()};
+    orbits[1].eccentricity = 3e-4; /* of one day */
+    orbits[1].mean_motion_radpmin = 1.0027 * 2.0 * BST_PI / 1440.0;
+    for (int o = 0; o < 2; o++) {
+        double minutes[FEW], states[FEW][6];
+        for (int k = 0; k < FEW; k++) {
+            static const double beside[4] = {0.0, 1e-9, -1e-9, 411.3};
+            minutes[k] = (k % 2 ? -720.0 : 720.0) * (1 + k * k / 20) + beside[k / 2 % 4];
+            bst_sgp4 *once = create(&orbits[o], BST_SGP4_WGS72, BST_SGP4_IMPROVED);
+            assert_int_equal(bst_sgp4_propagate(once, minutes[k], states[k], states[k] + 3),
+                             BST_SGP4_OK);
+            bst_sgp4_free(once);
+        }
+        bst_sgp4 *s = create(&orbits[o], BST_SGP4_WGS72, BST_SGP4_IMPROVED);
+        assert_true(bst_sgp4_step_minutes(s) > 0.0);
+        pthread_t threads[THREADS];
+        sharer sharers[THREADS];
+        for (int i = 0; i < THREADS; i++) {
+            sharers[i] = (sharer){s, minutes, (const double(*)[6])states, (unsigned)i, 0};
+            assert_int_equal(pthread_create(&threads[i], NULL, share, &sharers[i]), 0);
+        }
+        for (int i = 0; i < THREADS; i++) {
+            pthread_join(threads[i], NULL);
+            assert_int_equal(sharers[i].wrong, 0);
+        }
+        bst_sgp4_free(s);
+    }
+}
+
 /* The position may not jump where the resonance integrator takes one more step, nor at the epoch.
  */
 static void no_jump_between_integrator_steps(void **state) {
@@ -330,6 +387,7 @@ int main(void) {
         cmocka_unit_test(verification_output_in_full),
         cmocka_unit_test(agrees_with_the_reference_code),
         cmocka_unit_test(order_of_times_does_not_matter),
+        cmocka_unit_test(threads_share_a_resonant_orbit),
         cmocka_unit_test(no_jump_between_integrator_steps),
         cmocka_unit_test(refuses_what_is_no_orbit),
         cmocka_unit_test(times_out_of_reach_are_errors),

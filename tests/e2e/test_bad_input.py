@@ -116,7 +116,7 @@ class BadInput(unittest.TestCase):
         cut = 0
         for folder, _, names in os.walk(cache):
             for name in names:
-                if name.endswith(".so"):
+                if name == "bst_scene_nodes.so":  # one that takes a second to build, not the frame's
                     os.truncate(os.path.join(folder, name), 1000)
                     cut += 1
         if cut == 0:

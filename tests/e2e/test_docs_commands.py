@@ -8,7 +8,7 @@ A fenced block of language sh or console is run, all blocks of a page in one she
 scratch folder that looks like the repository. A comment on the line before a block changes that:
 
     <!-- test: duration=60 -->  `run` commands simulate 60 s instead of 2 s (a command's own --duration is kept)
-                                (a shipped study is only planned: --dry-run)
+                                (a shipped study is only planned: --dry-run; one of the page has two replicates)
     <!-- test: exit=1 -->       the block ends with this exit code
     <!-- test: background -->   the block runs beside the next ones of its page and must end with 0 by its end
     <!-- test: needs=ds9 -->    counted and printed as not run where the program ds9 is missing
@@ -30,18 +30,26 @@ import unittest
 
 ROOT = os.getcwd()
 SECONDS = 2
+# where PoCL keeps the kernels that the tests before compiled (its own rule), as HOME is another one here
+KERNELS = os.environ.get("POCL_CACHE_DIR") or os.path.join(
+    os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "pocl", "kcache")
 LANGUAGES = {"sh", "console", "text", "json", "c", "python", "cmake", "{toctree}"}
 # variables that later blocks of a page use; not the variables of one command
 SETTING = re.compile(r"""export .*|\w+=(\S*|"[^"]*")""")
 WORDS = re.compile(r"<!-- test: (.*) -->")
 WRAPPER = """#!/usr/bin/env python3
-import os, sys
+import json, os, sys
 words = sys.argv[1:]
 length = os.environ.get("DOCS_DURATION")
 if "run" in words[:3] and length and "--duration" not in words and "--replay" not in words and "--help" not in words:
     words += ["--duration", length]
 if words[:1] == ["study"] and length and "--out" in words and "--emit" not in words and "scenarios/" in words[1]:
     words += ["--dry-run"] if "--dry-run" not in words else []
+elif words[:1] == ["study"] and length and "--out" in words and words[1].endswith(".json"):
+    with open(words[1], encoding="utf-8") as file:
+        study = dict(json.load(file), replicates=2)
+    with open(words[1], "w", encoding="utf-8") as file:
+        json.dump(study, file)
 os.execv({program!r}, [{program!r}] + words)
 """
 
@@ -99,7 +107,7 @@ class Scratch:
         home = os.path.join(self.path, "home")
         os.makedirs(home, exist_ok=True)
         environment = dict(os.environ, DOCS_DURATION=length, PATH=self.tools + ":" + os.environ["PATH"],
-                           HOME=home, POCL_CACHE_DIR=os.environ.get("POCL_CACHE_DIR", os.path.expanduser("~/.cache/pocl")))
+                           HOME=home, POCL_CACHE_DIR=KERNELS)
         folder = self.path
         if "tree" in marks:
             folder = os.path.join(self.path, "tree")

@@ -80,8 +80,8 @@ def measure(frame, places):
     """Electrons of each place within the aperture, corrected for the light outside it, and their
     signal-to-noise ratio."""
     apertures = CircularAperture(places, APERTURE_PX)
-    sky = ApertureStats(frame.electrons, CircularAnnulus(places, *SKY_PX)).median
-    rms = ApertureStats(frame.electrons, CircularAnnulus(places, *SKY_PX)).mad_std
+    around = ApertureStats(frame.electrons, CircularAnnulus(places, *SKY_PX))
+    sky, rms = around.median, around.mad_std
     raw = np.array(aperture_photometry(frame.electrons, apertures)["aperture_sum"])
     # a Gaussian PSF over square pixels, moved by 0.2 px RMS of jitter
     variance = (FWHM_PX / np.sqrt(8 * np.log(2))) ** 2 + 1 / 12 + 0.2 ** 2
@@ -125,7 +125,7 @@ class Stare(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         folder = runs.scratch()
-        jobs = [("cube", 60), ("extensions", 20)]
+        jobs = [("cube", 36), ("extensions", 12)]
         cls.out = {form: os.path.join(folder, form) for form, _ in jobs}
         runs.parallel(lambda job: runs.run(runs.STARE, cls.out[job[0]], f"/record/frames={job[0]}",
                                            duration=job[1]), jobs)
@@ -137,7 +137,7 @@ class Stare(unittest.TestCase):
             rms, mean = np.sqrt(np.mean(np.sum(offset ** 2, axis=1))), offset.mean(axis=0)
             print(f"astrometry, {form}: {len(offset)} places of SNR > 20, RMS {rms:.4f} px "
                   f"(both axes), mean {mean[0]:+.4f} {mean[1]:+.4f} px")
-            self.assertGreater(len(offset), 200 if form == "cube" else 60)
+            self.assertGreater(len(offset), 120 if form == "cube" else 36)
             # the figures of docs/results/closed_loop.md
             self.assertLessEqual(rms, 0.1)
             self.assertLessEqual(np.hypot(*mean), 0.03)
@@ -165,7 +165,7 @@ class Stare(unittest.TestCase):
             scatter = np.std(measured[bright], ddof=1)
             print(f"photometry, {form}: {bright.sum()} stars of SNR > 50, zero point "
                   f"{zero_point:.4f}, expected {expected:.4f}, scatter {scatter:.4f} mag")
-            self.assertGreater(bright.sum(), 100 if form == "cube" else 30)
+            self.assertGreater(bright.sum(), 60 if form == "cube" else 18)
             self.assertLessEqual(abs(zero_point - expected), 0.02)
             self.assertLessEqual(scatter, 0.05)
 
@@ -179,7 +179,7 @@ class Stare(unittest.TestCase):
             np.testing.assert_allclose(a.wcs.wcs.cd, b.wcs.wcs.cd, rtol=1e-13)
             np.testing.assert_allclose(a.wcs.wcs.crval, b.wcs.wcs.crval, rtol=1e-14)
             count += 1
-        self.assertEqual(count, 20)
+        self.assertEqual(count, 12)
 
 
 class Track(unittest.TestCase):
@@ -251,7 +251,7 @@ def sky_of(header, row=None):
 class Moving(unittest.TestCase):
     """A spacecraft that drifts and turns about the line of sight during the exposures, and a
     telescope that slews between them: the WCS of every frame holds."""
-    FRAMES = 15  # one a second
+    FRAMES = 9  # one a second
     DRIFT = runs.SENSOR + "/modules/gimbal/platform/drift_arcsec_per_s=[200, -150, 1200]"
     FORMS = {"extensions": ["/record/frames=extensions", "/record/compression=none"],
              "rice": ["/record/frames=extensions", "/record/compression=rice"],

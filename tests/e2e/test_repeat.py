@@ -47,13 +47,11 @@ class Repeat(unittest.TestCase):
         return os.path.join(self.folder, name, file)
 
     def assert_same(self, a, b):
-        with fits.open(self.path(a)) as one, fits.open(self.path(b)) as two:
-            self.assertEqual(len(one), len(two))
-            for first, second in zip(one, two):
-                # no key holds wall time, so headers agree in every card
-                self.assertEqual(repr(first.header), repr(second.header))
-                if first.data is not None:
-                    self.assertEqual(first.data.tobytes(), second.data.tobytes())
+        # no key holds wall time, so that headers agree in every card as well
+        with open(self.path(a), "rb") as one, open(self.path(b), "rb") as two:
+            frames = one.read()
+            self.assertTrue(frames == two.read(), (a, b))
+        self.assertGreater(len(frames), 1e6)
         mine, other = tables(self.path(a, "")), tables(self.path(b, ""))
         self.assertEqual(list(mine), list(other))
         for name, rows in mine.items():

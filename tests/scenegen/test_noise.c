@@ -153,11 +153,12 @@ static void full_wells_cut_charge_before_it_is_read(void **state) {
     bst_device_close(device);
 }
 
-/* Means that differ from pixel to pixel, by the light of a wide star: grouped by mean, the numbers
- * follow the mixture of the pixels' laws. Read noises on both sides of each change of method. */
+/* Means that differ from pixel to pixel, by the light of a crowd of stars: grouped by mean, the
+ * numbers follow the mixture of the pixels' laws. Read noises on both sides of each change of
+ * method. */
 static void draws_follow_the_law_where_light_varies(void **state) {
     (void)state;
-    enum { N = 128, GROUPS = 6 };
+    enum { N = 128, GROUPS = 6, STARS = 3000 };
     static const double edges[GROUPS + 1] = {0.0, 1.0, 5.0, 20.0, 30.0, 60.0, 1e9};
     static const double read_noises[] = {0.5, 0.75, 1.0, 2.0, 3.0, 5.0};
     static double laws[GROUPS][TOP];
@@ -172,16 +173,15 @@ static void draws_follow_the_law_where_light_varies(void **state) {
     for (size_t c = 0; c < sizeof read_noises / sizeof *read_noises; c++) {
         bst_camera camera = scene_camera(N, N);
         camera.read_noise_e = read_noises[c];
-        camera.psf_fwhm_px = 60.0;
         camera.full_well_e = 1e6;
         camera.offset_dn = OFFSET;
         bst_renderer *r;
         bst_assert_ok(&ctx, bst_renderer_create(&ctx, device, &camera, NULL, &r));
-        bst_scene_source star = scene_star(&camera, 40.3, 52.8, 4e5);
+        bst_scene_source *stars = scene_stars(&camera, STARS, 2e4, 7.0, 5);
         bst_render_request request = {.window = {0, 0, N, N},
                                       .track = &track,
-                                      .sources = &star,
-                                      .count = 1,
+                                      .sources = stars,
+                                      .count = STARS,
                                       .background_e = 0.2,
                                       .key = {{31, (unsigned)c}}};
         bst_assert_ok(&ctx, bst_renderer_render_noise_free(&ctx, r, &request, image));
@@ -219,6 +219,7 @@ static void draws_follow_the_law_where_light_varies(void **state) {
             check_law(what, read_noises[c], laws[g], pixels_of[g], seen[g], pixels_of[g] * frames);
         }
         bst_renderer_free(r);
+        free(stars);
     }
     bst_device_close(device);
 }

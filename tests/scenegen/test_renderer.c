@@ -282,12 +282,13 @@ static void bytes_do_not_depend_on(fixture *f, double read_noise_e, double full_
 
 static void bytes_do_not_depend_on_how_they_are_made(void **state) {
     /* every method of the noise, and wells that fill; the device compiles each order of the noise
-     * law (read noise below 3 and 5 e-) for each shape of tiles: all shapes once, one per order */
+     * law (read noise below 3 and 5 e-) for each shape of tiles, for seconds: all shapes once. The
+     * windows of the other orders begin and end anywhere in their tiles. */
     bytes_do_not_depend_on(*state, 8.0, 65000.0, 3);
     bytes_do_not_depend_on(*state, 8.0, 100.0, 3);
-    bytes_do_not_depend_on(*state, 3.0, 100.0, 1);
-    bytes_do_not_depend_on(*state, 1.0, 65000.0, 1);
-    bytes_do_not_depend_on(*state, 0.4, 65000.0, 1);
+    bytes_do_not_depend_on(*state, 3.0, 100.0, 0);
+    bytes_do_not_depend_on(*state, 1.0, 65000.0, 0);
+    bytes_do_not_depend_on(*state, 0.4, 65000.0, 0);
 }
 
 /* The same light from tiles of one row and more, in every bit: the boxes by which tiles find the

@@ -37,30 +37,44 @@ static bst_mat3 columns(bst_vec3 x, bst_vec3 y, bst_vec3 z) {
     return (bst_mat3){{{x.x, y.x, z.x}, {x.y, y.y, z.y}, {x.z, y.z, z.z}}};
 }
 
-/* Angle between a direction and the edge of the Earth, positive outside, in coordinates in which
- * the Earth is a unit sphere. near: the nearest point of the ray to the centre, or its intersection
- * with the surface; unit. height: of the nearest point above the surface, Earth radii. */
-static double earth_edge(const bst_scene_body_disc *d, int k, bst_vec3 direction, bst_vec3 *near,
-                         double *height) {
-    bst_vec3 way = bst_vec3_unit(bst_mat3_mul_vec(&d->frame[k], direction));
-    double along = -bst_vec3_dot(d->eye[k], way), distance = bst_vec3_norm(d->eye[k]);
-    bst_vec3 closest = bst_vec3_axpy(d->eye[k], along, way);
-    double depth = bst_vec3_norm(closest);
-    *height = along > 0.0 ? depth - 1.0 : distance - 1.0;
-    if (distance <= 1.0) {
-        *near = bst_vec3_unit(d->eye[k]);
-        return -BST_PI;
+/* The point of a ray that is nearest to the Earth's centre, in coordinates in which the Earth is a
+ * unit sphere. */
+typedef struct nearest_point {
+    bst_vec3 way, point;
+    double along, depth; /* from the observer; from the centre */
+} nearest_point;
+
+static nearest_point nearest_to_earth(const bst_scene_body_disc *d, int k, bst_vec3 direction) {
+    nearest_point n;
+    n.way = bst_vec3_unit(bst_mat3_mul_vec(&d->frame[k], direction));
+    n.along = -bst_vec3_dot(d->eye[k], n.way);
+    n.point = bst_vec3_axpy(d->eye[k], n.along, n.way);
+    n.depth = bst_vec3_norm(n.point);
+    return n;
+}
+
+/* Angle between a direction and the edge of the Earth, positive outside. */
+static double earth_edge(const bst_scene_body_disc *d, int k, bst_vec3 direction) {
+    nearest_point n = nearest_to_earth(d, k, direction);
+    return d->distance[k] <= 1.0 ? -BST_PI : atan2(n.depth, n.along) - d->half_angle[k];
+}
+
+/* Unit vector to the nearest point of the ray, or to its intersection with the surface. height: of
+ * the nearest point above the surface, Earth radii. */
+static bst_vec3 earth_place(const bst_scene_body_disc *d, int k, bst_vec3 direction,
+                            double *height) {
+    nearest_point n = nearest_to_earth(d, k, direction);
+    *height = n.along > 0.0 ? n.depth - 1.0 : d->distance[k] - 1.0;
+    if (d->distance[k] <= 1.0) {
+        return bst_vec3_unit(d->eye[k]);
     }
-    double back = depth < 1.0 ? sqrt(1.0 - depth * depth) : 0.0;
-    *near = bst_vec3_unit(bst_vec3_axpy(closest, -back, way));
-    return atan2(depth, along) - asin(1.0 / distance);
+    double back = n.depth < 1.0 ? sqrt(1.0 - n.depth * n.depth) : 0.0;
+    return bst_vec3_unit(bst_vec3_axpy(n.point, -back, n.way));
 }
 
 /* Angle in rad from a direction to the edge of a body's disc. */
 static double edge_at(const bst_scene_body_disc *d, int body, int k, bst_vec3 direction) {
-    bst_vec3 near;
-    double height;
-    return body == BST_BODY_EARTH ? earth_edge(d, k, direction, &near, &height)
+    return body == BST_BODY_EARTH ? earth_edge(d, k, direction)
                                   : bst_vec3_angle(direction, d->centre[k]) - d->radius_rad;
 }
 
@@ -118,6 +132,8 @@ static void make_earth(const bst_camera *camera, const bst_scene_surroundings *a
         d->frame[k] = columns(axes[0], axes[1], axes[2]);
         d->eye[k] =
             bst_vec3_scale(to_unit_sphere(&a->itrf_from_gcrf, eye), 1.0 / BST_EARTH_RADIUS_M);
+        d->distance[k] = bst_vec3_norm(d->eye[k]);
+        d->half_angle[k] = asin(fmin(1.0, 1.0 / d->distance[k]));
         d->centre[k] = bst_quat_rotate(a->q[k], bst_vec3_scale(bst_vec3_unit(eye), -1.0));
         d->sun[k] = bst_vec3_unit(bst_mat3_mul_vec(&a->itrf_from_gcrf, a->bodies.sun_m));
     }
@@ -297,30 +313,23 @@ static bst_vec3 normal_at(bst_vec3 near) {
     return bst_vec3_unit((bst_vec3){near.x, near.y, near.z / (1.0 - BST_EARTH_FLATTENING)});
 }
 
-bool bst_discs_terminator(const bst_discs *discs, const bst_vec3 directions[4]) {
+void bst_discs_daylight(const bst_discs *discs, bst_vec3 direction, bool *day, bool *night) {
     const bst_scene_body_disc *d = &discs->body[BST_BODY_EARTH];
-    bool day = false, night = false;
-    for (int i = 0; i < 4 && d->present; i++) {
-        for (int k = 0; k <= BST_DISC_PARTS; k += BST_DISC_PARTS / 2) {
-            bst_vec3 near;
-            double height;
-            (void)earth_edge(d, k, directions[i], &near, &height);
-            bool lit = bst_vec3_dot(normal_at(near), d->sun[k]) > 0.0;
-            day = day || lit;
-            night = night || !lit;
-        }
+    *day = *night = false;
+    for (int k = 0; k <= BST_DISC_PARTS && d->present; k += BST_DISC_PARTS / 2) {
+        double height;
+        bool lit = bst_vec3_dot(normal_at(earth_place(d, k, direction, &height)), d->sun[k]) > 0.0;
+        *day = *day || lit;
+        *night = *night || !lit;
     }
-    return day && night;
 }
 
 /* Radiance of the Earth's disc, or of its limb glow, at the middle of a time interval. */
 static double earth_radiance(const bst_discs *discs, int k, bst_vec3 direction, double share,
                              double *sunlight) {
     const bst_scene_body_disc *d = &discs->body[BST_BODY_EARTH];
-    bst_vec3 near;
     double height;
-    (void)earth_edge(d, k, direction, &near, &height);
-    bst_vec3 normal = normal_at(near);
+    bst_vec3 normal = normal_at(earth_place(d, k, direction, &height));
     double lit = fmax(bst_vec3_dot(normal, d->sun[k]), 0.0);
     double above = height > 0.0 && discs->limb_scale > 0.0 ? exp(-height / discs->limb_scale) : 0.0;
     above = height > 0.0 ? above : discs->limb_scale > 0.0 ? 1.0 : 0.0;

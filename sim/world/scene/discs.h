@@ -38,6 +38,8 @@ typedef struct bst_scene_body_disc {
     bst_vec3 sun[BST_DISC_PARTS + 1]; /* direction of the Sun: camera axes (Moon), ITRF (Earth) */
     bst_vec3 eye[BST_DISC_PARTS +
                  1]; /* Earth: observer in coordinates in which the Earth is a unit sphere */
+    double distance[BST_DISC_PARTS + 1];   /* Earth: of the observer in those, from the centre */
+    double half_angle[BST_DISC_PARTS + 1]; /* Earth: of the sphere, seen from the observer, rad */
     bst_mat3 frame[BST_DISC_PARTS +
                    1]; /* Earth: rotation and scaling from camera axes to those coordinates */
 } bst_scene_body_disc;
@@ -68,9 +70,10 @@ static inline bool bst_discs_wanted(const bst_camera *camera) {
 double bst_discs_share(const bst_discs *discs, const bst_camera *camera, int body,
                        bst_window window);
 
-/* True if four points of the Earth's disc (directions, unit, camera axes) include day and night:
- * the terminator is between them. False if the Earth is not rendered. */
-bool bst_discs_terminator(const bst_discs *discs, const bst_vec3 directions[4]);
+/* Whether the place of the Earth's surface that is nearest to a direction (unit, camera axes) is
+ * lit by the Sun, and whether it is dark: both if that changes during the exposure, neither if the
+ * Earth is not rendered. */
+void bst_discs_daylight(const bst_discs *discs, bst_vec3 direction, bool *day, bool *night);
 
 /* Distance (px at the boresight's scale) of a direction (unit, camera axes) from the nearest edge
  * of a disc during the exposure, minus the reach of the disc's light. */

@@ -2,6 +2,7 @@
 
 #include <assert.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "sim/messages/message_invariants.h"
 #include "sim/world/scene/stray.h"
@@ -22,11 +23,20 @@ typedef struct lattice {
     size_t capacity;
 } lattice;
 
+/* Corner of cells of the sensor: its distance from the nearest edge of a disc or of the vignetting,
+ * and whether the Earth there is lit, and dark. */
+typedef struct cell_corner {
+    double edge_px;
+    bool day, night;
+} cell_corner;
+
 struct bst_skylight {
     const bst_world *world;
     const bst_camera *camera;
     int step;
     lattice stars, sky, nodes, pixels;
+    cell_corner *corners; /* two rows of `row_corners` */
+    int row_corners;
     bst_skylight_map map;
 };
 
@@ -116,6 +126,7 @@ void bst_skylight_free(bst_skylight *b) {
         free(b->sky.value);
         free(b->nodes.value);
         free(b->pixels.value);
+        free(b->corners);
         free(b);
     }
 }
@@ -228,36 +239,66 @@ static double edge_px(const painter *p, double x, double y) {
     return edge;
 }
 
-/* Checks whether the cell with first corner (x, y) may contain an edge: within half a cell's
- * diagonal, with a margin for larger pixels off axis. */
-static bool cell_has_edge(const painter *p, int x, int y) {
-    int step = p->b->step;
-    double near = INFINITY;
-    bst_vec3 corner[4];
-    for (int k = 0; k < 4; k++) {
-        int cx = x + (k & 1) * step, cy = y + (k >> 1) * step;
-        corner[k] = bst_camera_unproject(p->b->camera, cx, cy);
-        near = fmin(near, edge_px(p, cx, cy));
+static void fill_corners(const painter *p, int x0, int y, cell_corner *row) {
+    for (int i = 0; i < p->b->row_corners; i++) {
+        int x = x0 + i * p->b->step;
+        cell_corner *c = &row[i];
+        c->edge_px = edge_px(p, x, y);
+        bst_discs_daylight(&p->discs, bst_camera_unproject(p->b->camera, x, y), &c->day, &c->night);
     }
-    return bst_discs_terminator(&p->discs, corner) ||
-           near < 1.06 * step / bst_camera_shrink(p->b->camera);
 }
 
-/* True if the edge of a body's disc or of the vignetting crosses the sensor. */
-static bool sensor_has_edge(const painter *p) {
-    const bst_camera *camera = p->b->camera;
-    int step = p->b->step;
-    if (step == 1 || (!bst_discs_any(&p->discs) && !(camera->optics.vignetting.limit_px > 0.0))) {
-        return false;
+/* Begins rows of cells at pixel (x0, y0) that reach x1. */
+static bst_status begin_cells(bst_ctx *ctx, const painter *p, bst_skylight *b, int x0, int y0,
+                              int x1) {
+    int count = (x1 - x0 + b->step - 1) / b->step + 1;
+    cell_corner *corners = realloc(b->corners, 2 * (size_t)count * sizeof *corners);
+    if (!corners) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d corners of background cells", count);
     }
-    for (int y = 0; y < camera->height_px; y += step) {
-        for (int x = 0; x < camera->width_px; x += step) {
-            if (cell_has_edge(p, x, y)) {
-                return true;
-            }
+    b->corners = corners;
+    b->row_corners = count;
+    fill_corners(p, x0, y0, corners + count);
+    return BST_OK;
+}
+
+/* Proceeds to the row of cells whose lower corners are at y. */
+static void next_cells(const painter *p, bst_skylight *b, int x0, int y) {
+    cell_corner *last = b->corners + b->row_corners;
+    memcpy(b->corners, last, (size_t)b->row_corners * sizeof *last);
+    fill_corners(p, x0, y, last);
+}
+
+/* Checks whether cell i of the row may contain an edge: within half a cell's diagonal, with a
+ * margin for larger pixels off axis; or the terminator. */
+static bool cell_has_edge(const painter *p, int i) {
+    double near = INFINITY;
+    bool day = false, night = false;
+    for (int k = 0; k < 4; k++) {
+        const cell_corner *c = &p->b->corners[(k >> 1) * p->b->row_corners + i + (k & 1)];
+        near = fmin(near, c->edge_px);
+        day = day || c->day;
+        night = night || c->night;
+    }
+    return (day && night) || near < 1.06 * p->b->step / bst_camera_shrink(p->b->camera);
+}
+
+/* Whether the edge of a body's disc or of the vignetting crosses the sensor. */
+static bst_status find_edge(bst_ctx *ctx, const painter *p, bst_skylight *b, bool *found) {
+    const bst_camera *camera = b->camera;
+    *found = false;
+    if (b->step == 1 ||
+        (!bst_discs_any(&p->discs) && !(camera->optics.vignetting.limit_px > 0.0))) {
+        return BST_OK;
+    }
+    BST_TRY(begin_cells(ctx, p, b, 0, 0, (int)camera->width_px));
+    for (int y = 0; y < camera->height_px && !*found; y += b->step) {
+        next_cells(p, b, 0, y + b->step);
+        for (int i = 0; i < b->row_corners - 1 && !*found; i++) {
+            *found = cell_has_edge(p, i);
         }
     }
-    return false;
+    return BST_OK;
 }
 
 /* Computes the background per pixel: exactly in cells with an edge, else by interpolation. */
@@ -268,9 +309,11 @@ static bst_status paint_pixels(bst_ctx *ctx, const painter *p, bst_skylight *b, 
     out->columns = window.width;
     out->rows = window.height;
     int x1 = window.x0 + window.width, y1 = window.y0 + window.height;
+    BST_TRY(begin_cells(ctx, p, b, n->x0, n->y0, x1));
     for (int cy = n->y0; cy < y1; cy += n->step) {
+        next_cells(p, b, n->x0, cy + n->step);
         for (int cx = n->x0; cx < x1; cx += n->step) {
-            bool edge = cell_has_edge(p, cx, cy);
+            bool edge = cell_has_edge(p, (cx - n->x0) / n->step);
             for (int y = cy > window.y0 ? cy : window.y0; y < cy + n->step && y < y1; y++) {
                 float *row = out->value + (size_t)(y - window.y0) * (size_t)window.width;
                 for (int x = cx > window.x0 ? cx : window.x0; x < cx + n->step && x < x1; x++) {
@@ -327,7 +370,9 @@ bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *b, const bst_scene_surr
                 paint(&p, n->x0 + i * n->step, n->y0 + j * n->step, (double)b->sky.value[k]);
         }
     }
-    if (sensor_has_edge(&p)) {
+    bool edge;
+    BST_TRY(find_edge(ctx, &p, b, &edge));
+    if (edge) {
         BST_TRY(paint_pixels(ctx, &p, b, window));
         n = &b->pixels;
         n->x0 = window.x0;
