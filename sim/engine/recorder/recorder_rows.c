@@ -234,7 +234,7 @@ bst_status bst_recorder_truth_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
         put_real(&r, star ? NAN : item->range_m);
         BST_TRY(append(ctx, recorder, BST_TABLE_TRUTH, &r));
     }
-    return BST_OK;
+    return bst_recorder_shape_rows(ctx, recorder, sensor, t);
 }
 
 bst_status bst_recorder_los_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
@@ -344,6 +344,7 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
         put_real(&r, item->rate_sigma_pxps);
         put_flag(&r, item->flags & BST_DETECTION_BLOOM);
         BST_TRY(append(ctx, recorder, BST_TABLE_DETECTIONS, &r));
+        BST_TRY(bst_recorder_extended_row(ctx, recorder, sensor, d, i));
     }
     return BST_OK;
 }
