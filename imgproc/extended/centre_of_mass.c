@@ -51,11 +51,12 @@ static bool sun_in_image(const bst_extended_view *v, double x_px, double y_px, d
     return length > 0.0;
 }
 
-/* Share of the outline's centre in the position: 0 at the hand-over size, 1 from twice that on. */
+/* Share of the outline's centre in the position: 0 at the hand-over size, 1 from 1.4 times that on.
+ */
 static double outline_share(const bst_extended_config *config, const bst_camera *camera,
                             double size_px) {
     double handover = config->handover_fwhm * camera->psf_fwhm_px;
-    double t = fmin(fmax(size_px / handover - 1.0, 0.0), 1.0);
+    double t = fmin(fmax((size_px / handover - 1.0) / 0.4, 0.0), 1.0);
     return t * t * (3.0 - 2.0 * t);
 }
 
@@ -107,7 +108,7 @@ void bst_extended_measure(const bst_extended_config *config, const bst_extended_
                                                 terminator_offset(phase, across, blur));
         light_offset = config->phase_offset_factor * bst_light_phase_offset(phase) * across;
     }
-    double share = outline_share(config, v->camera, b * s->moment_size_px);
+    double share = outline_share(config, v->camera, length);
     double total = share * offset + (1.0 - share) * light_offset;
     double x = share * centre_x + (1.0 - share) * light_x;
     double y = share * centre_y + (1.0 - share) * light_y;

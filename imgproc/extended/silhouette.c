@@ -12,9 +12,11 @@ enum { REGIONS_MAX = 4096, SKY_SAMPLES = 8192, SKY_SHARE = 5, BLUR_STEPS = 40 };
 /* Thresholds of the hysteresis, in the noise of a dark pixel. With HIGH no region in 1e8 frames of
  * 2048^2 pixels is noise. */
 static const double HIGH = 8.0, LOW = 4.0;
-/* Least share of a region's median signal of its pixels: above the wings of usual PSFs. */
-static const double LEAST_SHARE = 0.05;
-/* Least flux of a part relative to the part that it is joined to: below it is a star or a hit. */
+/* Least share of a region's median signal of its pixels: above the wings of usual PSFs. If the
+ * median is saturated, a glint outshines parts that belong to the target. */
+static const double LEAST_SHARE = 0.05, LEAST_SHARE_SATURATED = 1e-3;
+/* Least flux or area of a part relative to the part that it is joined to: smaller ones are stars or
+ * hits. */
 static const double LEAST_PART = 0.01;
 /* Reach of the mask beyond a silhouette, in sigma of the PSF: edges have fallen to 1e-3 there. */
 static const double MASK_SIGMAS = 3.0;
@@ -91,10 +93,11 @@ static double read_signal(bst_silhouette_finder *s, const bst_silhouette_frame *
         f->read(f->user, y, 0, f->width, s->signal + (size_t)y * width);
     }
     measure_sky(s, f, &level, &noise);
+    s->saturated_e = (float)(f->full_e - level);
     for (size_t i = 0; i < width * (size_t)f->height; i++) {
         float e = s->signal[i];
         s->signal[i] = e <= BST_PIXEL_NONE            ? 0.0f
-                       : f->raw[i] >= f->saturated_dn ? (float)(f->full_e - level)
+                       : f->raw[i] >= f->saturated_dn ? s->saturated_e
                                                       : e - (float)level;
     }
     return noise;
@@ -139,6 +142,12 @@ static double median_of(const bst_silhouette_finder *s, const bst_bright_region 
     }
     qsort(sample, (size_t)count, sizeof *sample, by_value);
     return (double)sample[count / 2];
+}
+
+/* Least signal of a region's pixels, e-. */
+static double least_of(const bst_silhouette_finder *s, double median, double noise) {
+    bool saturated = median >= (double)s->saturated_e;
+    return fmax(LOW * noise, (saturated ? LEAST_SHARE_SATURATED : LEAST_SHARE) * median);
 }
 
 /* Removes pixels below `least` from a region. */
@@ -188,7 +197,7 @@ static void find_regions(bst_silhouette_finder *s, const bst_silhouette_frame *f
         s->pixel_count += r->count;
     }
     for (int i = 0; i < s->region_count; i++) {
-        double least = fmax(LOW * noise, LEAST_SHARE * median_of(s, &s->regions[i]));
+        double least = least_of(s, median_of(s, &s->regions[i]), noise);
         keep_above(s, f, (float)least, &s->regions[i]);
     }
     qsort(s->regions, (size_t)s->region_count, sizeof *s->regions, largest_first);
@@ -212,8 +221,9 @@ static int join_parts(bst_silhouette_finder *s, const bst_extended_config *confi
         for (int i = first + 1; i < s->region_count; i++) {
             bst_bright_region *r = &s->regions[i];
             double size = hypot(box->x1 - box->x0 + 1, box->y1 - box->y0 + 1);
-            if (r->target >= 0 || r->flux_e < LEAST_PART * s->regions[first].flux_e ||
-                gap_of(box, r) > config->join_share * size) {
+            bool small = r->flux_e < LEAST_PART * s->regions[first].flux_e &&
+                         r->count < LEAST_PART * s->regions[first].count;
+            if (r->target >= 0 || small || gap_of(box, r) > config->join_share * size) {
                 continue;
             }
             r->target = target;
@@ -374,7 +384,7 @@ static void measure(bst_silhouette_finder *s, const bst_silhouette_frame *f, dou
         }
     }
     median = median_of(s, &all);
-    double least = fmax(LOW * noise, LEAST_SHARE * median);
+    double least = least_of(s, median, noise);
     out->flux_e = m->s;
     out->flux_variance = m->s + m->pixels * noise * noise;
     out->light_x_px = box->x0 + m->x / m->s;

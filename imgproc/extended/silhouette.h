@@ -48,7 +48,8 @@ typedef struct bst_bright_region {
 /* Work space for frames up to a size. */
 typedef struct bst_silhouette_finder {
     int max_width, max_height;
-    float *signal; /* [height][width] e- above the sky */
+    float *signal;     /* [height][width] e- above the sky */
+    float saturated_e; /* signal of saturated pixels in the latest frame */
     uint8_t
         *region; /* [height][width] 1: in a bright region; later, in a bounding box: 2 outside */
     int *pixels; /* [2 * height * width] pixels of the regions, region after region */
@@ -87,12 +88,15 @@ typedef struct bst_silhouette_frame {
  *
  * Given:     config  handover_fwhm, return_share and join_share are used
  * Returned:  *out  sources of at least BST_SILHOUETTE_LEAST times the hand-over size; `masked`: of
- * at least the hand-over size mask  [height][width] set to 1 on pixels of masked targets and near
- * them; else unchanged Notes:     level of the sky: the middle of the narrowest interval that holds
- * a fifth of the pixels, so that a target may fill most of the frame. Hysteresis: a region consists
- * of the pixels above 4 sigma that are connected with one above 8 sigma. Pixels below a twentieth
- * of the region's median are then left out: the PSF's wings. Reference: hysteresis: Canny, IEEE
- * Trans. PAMI 8, 679 (1986), section VI */
+ *                  at least the hand-over size
+ *            mask  [height][width] set to 1 on pixels of masked targets and near them; else
+ *                  unchanged
+ * Notes:     level of the sky: the middle of the narrowest interval that holds a fifth of the
+ *            pixels, so that a target may fill most of the frame. Hysteresis: a region consists of
+ *            the pixels above 4 sigma that are connected with one above 8 sigma. Pixels below a
+ *            twentieth of the region's median (a thousandth of a saturated one) are then left out:
+ *            the PSF's wings.
+ * Reference: hysteresis: Canny, IEEE Trans. PAMI 8, 679 (1986), section VI */
 void bst_silhouettes_find(bst_silhouette_finder *finder, const bst_extended_config *config,
                           const bst_silhouette_frame *frame, uint8_t *mask, bst_silhouettes *out);
 
