@@ -50,6 +50,7 @@ typedef struct bst_truth_shape {
     double x_px, y_px;                 /* centre of mass: the origin of the body */
     double x0_px, y0_px, x1_px, y1_px; /* box around all parts, lit or not, without the PSF */
     double size_px;                    /* largest extent of all parts */
+    double x_light_px, y_light_px;     /* centroid of light; of the centre of mass without light */
     bst_quat q_body_from_gcrf;
 } bst_truth_shape;
 

@@ -9,27 +9,30 @@
 void bst_shape_truth_free(bst_shape_truth *work) {
     for (int i = 0; i < BST_TRUTH_SHAPES; i++) {
         bst_satellite_pose_free(work->poses[i]);
+        bst_resolved_free(work->images[i]);
     }
     free(work->points);
     free(work->hull);
     *work = (bst_shape_truth){0};
 }
 
-/* Pose of a model, in place of another one if there is no room. */
-static bst_status pose_of(bst_ctx *ctx, bst_shape_truth *work, const bst_satellite *satellite,
-                          bst_satellite_pose **out) {
-    int free_slot = BST_TRUTH_SHAPES - 1;
+/* Slot of a model's pose and image, in place of another one if there is no room. */
+static bst_status slot_of(bst_ctx *ctx, bst_shape_truth *work, const bst_satellite *satellite,
+                          int *slot) {
+    *slot = BST_TRUTH_SHAPES - 1;
     for (int i = BST_TRUTH_SHAPES - 1; i >= 0; i--) {
-        if (work->poses[i] && work->poses[i]->satellite == satellite) {
-            *out = work->poses[i];
+        if (work->images[i] && work->poses[i]->satellite == satellite) {
+            *slot = i;
             return BST_OK;
         }
-        free_slot = work->poses[i] ? free_slot : i;
+        *slot = work->images[i] ? *slot : i;
     }
-    bst_satellite_pose_free(work->poses[free_slot]);
-    BST_TRY(bst_satellite_pose_create(ctx, satellite, &work->poses[free_slot]));
-    *out = work->poses[free_slot];
-    return BST_OK;
+    bst_satellite_pose_free(work->poses[*slot]);
+    bst_resolved_free(work->images[*slot]);
+    work->poses[*slot] = NULL;
+    work->images[*slot] = NULL;
+    BST_TRY(bst_satellite_pose_create(ctx, satellite, &work->poses[*slot]));
+    return bst_resolved_create(ctx, satellite, &work->images[*slot]);
 }
 
 static bst_status reserve(bst_ctx *ctx, bst_shape_truth *work, int count) {
@@ -56,10 +59,21 @@ static double largest_extent(const bst_point2 *hull, int count) {
     return largest;
 }
 
+/* A body at mid-exposure, and the camera. */
+typedef struct placed_body {
+    const bst_camera *camera;
+    bst_quat q_cam_from_gcrf;
+    const bst_scene_source *source;
+    bst_source_body_state state;
+    bst_earthlight earthlight;
+} placed_body;
+
 /* Projects the body: centre of mass, box and extent. */
-static void project(bst_shape_truth *work, const bst_camera *camera, bst_quat q_cam_from_gcrf,
-                    const bst_source_body_state *body, const bst_satellite_pose *pose,
-                    bst_truth_shape *out) {
+static void project(bst_shape_truth *work, const placed_body *placed,
+                    const bst_satellite_pose *pose, bst_truth_shape *out) {
+    const bst_camera *camera = placed->camera;
+    const bst_source_body_state *body = &placed->state;
+    bst_quat q_cam_from_gcrf = placed->q_cam_from_gcrf;
     bst_vec3 centre = bst_vec3_scale(body->apparent, body->range_m);
     bst_quat back = bst_quat_conj(body->q_body_from_gcrf);
     int count = pose->satellite->vertex_count;
@@ -87,6 +101,43 @@ static void project(bst_shape_truth *work, const bst_camera *camera, bst_quat q_
     out->size_px = largest_extent(work->hull, bst_polygon_hull(work->points, count, work->hull));
 }
 
+/* Finds the centroid of a body's light. */
+static bst_status find_light(bst_ctx *ctx, const placed_body *placed, bst_satellite_pose *pose,
+                             bst_resolved *resolved, bst_truth_shape *out) {
+    enum { ACROSS = 64 };
+    const bst_source_body_state *body = &placed->state;
+    bst_quat q = placed->q_cam_from_gcrf;
+    const bst_resolved_view view = {
+        .q_image_from_body = bst_quat_mul(q, bst_quat_conj(body->q_body_from_gcrf)),
+        .origin_m = bst_vec3_scale(bst_quat_rotate(q_cam_from_gcrf, body->apparent), body->range_m),
+        .scale_rad = bst_camera_scale_rad(camera)};
+    const bst_resolved_light light = {.sun = body->aim.sun,
+                                      .sun_radius_rad = body->sun_radius_rad,
+                                      .earthlight = body->earth ? &placed->earthlight : NULL,
+                                      .gain = placed->source->body->gain};
+    double low[2], high[2], sum = 0.0, x = 0.0, y = 0.0;
+    if (!bst_resolved_box(pose, &view, low, high)) {
+        return BST_OK;
+    }
+    double across = fmax(high[0] - low[0], high[1] - low[1]);
+    BST_TRY(bst_resolved_begin(ctx, resolved, low, high, fmax(across, 1e-6) / ACROSS));
+    BST_TRY(bst_resolved_add(ctx, resolved, pose, &view, &light, 1.0, NULL));
+    const bst_resolved_image *image = bst_resolved_image_of(resolved);
+    for (int i = 0; i < image->width * image->height; i++) {
+        const bst_resolved_cell *c = &image->cells[i];
+        double cx = image->x0 + i % image->width + 0.5, cy = image->y0 + i / image->width + 0.5;
+        sum += (double)c->light;
+        x += (double)c->light * cx + (double)c->moment_x;
+        y += (double)c->light * cy + (double)c->moment_y;
+    }
+    double scale = image->cell_px * view.scale_rad;
+    if (sum > 0.0) {
+        const bst_vec3 direction = {x / sum * scale, y / sum * scale, 1.0};
+        (void)bst_camera_project(placed->camera, direction, &out->x_light_px, &out->y_light_px);
+    }
+    return BST_OK;
+}
+
 bst_status bst_shape_truth_fill(bst_ctx *ctx, bst_shape_truth *work, const bst_camera *camera,
                                 const bst_scene_source *sources, const int *source_of,
                                 bst_truth *truth) {
@@ -97,15 +148,22 @@ bst_status bst_shape_truth_fill(bst_ctx *ctx, bst_shape_truth *work, const bst_c
         if (!source->body) {
             continue;
         }
-        bst_satellite_pose *pose;
-        bst_source_body_state body;
-        BST_TRY(pose_of(ctx, work, source->body->satellite, &pose));
+        int slot;
+        placed_body placed = {
+            .camera = camera, .q_cam_from_gcrf = truth->q_cam_from_gcrf_mid, .source = source};
+        BST_TRY(slot_of(ctx, work, source->body->satellite, &slot));
+        bst_satellite_pose *pose = work->poses[slot];
         BST_TRY(reserve(ctx, work, pose->satellite->vertex_count));
-        bst_source_body_at(source, 0.5, &body, NULL);
-        bst_satellite_pose_set(pose, &body.aim);
+        bst_source_body_at(source, 0.5, &placed.state, &placed.earthlight);
+        bst_satellite_pose_set(pose, &placed.state.aim);
         bst_truth_shape *shape = &truth->shapes[truth->shape_count++];
-        project(work, camera, truth->q_cam_from_gcrf_mid, &body, pose, shape);
+        project(work, &placed, pose, shape);
         shape->item = i;
+        shape->x_light_px = shape->x_px;
+        shape->y_light_px = shape->y_px;
+        BST_TRY(find_light(ctx, &placed, pose, work->images[slot], shape));
+        truth->items[i].x_centroid_px += shape->x_light_px - shape->x_px;
+        truth->items[i].y_centroid_px += shape->y_light_px - shape->y_px;
     }
     return BST_OK;
 }

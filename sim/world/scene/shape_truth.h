@@ -2,12 +2,13 @@
 #ifndef BST_WORLD_SCENE_SHAPE_TRUTH_H
 #define BST_WORLD_SCENE_SHAPE_TRUTH_H
 
-#include "sim/satellite/pose.h"
+#include "sim/satellite/resolved_image.h"
 #include "sim/world/scene/field.h"
 
 /* Work space: poses by model. All zero: empty. */
 typedef struct bst_shape_truth {
     bst_satellite_pose *poses[BST_TRUTH_SHAPES];
+    bst_resolved *images[BST_TRUTH_SHAPES]; /* of the same models */
     bst_point2 *points, *hull;
     int capacity; /* of points */
 } bst_shape_truth;
@@ -21,8 +22,10 @@ void bst_shape_truth_free(bst_shape_truth *work);
  * Given:     sources    of the field query
  *            source_of  [truth->count] index of each item's source
  *            truth      header and items
+ * Returned:  truth->shapes, and x_centroid_px and y_centroid_px of their items
  * Errors:    BST_ERR_MEMORY
- * Notes:     corners are projected in perspective. With a rolling shutter the attitude of the
+ * Notes:     corners are projected in perspective; the light is that of the middle of the exposure,
+ *            from an image of 64 cells across. With a rolling shutter the attitude of the
  *            camera is that of the middle of the exposure. */
 bst_status bst_shape_truth_fill(bst_ctx *ctx, bst_shape_truth *work, const bst_camera *camera,
                                 const bst_scene_source *sources, const int *source_of,
