@@ -109,8 +109,8 @@ static bst_status find_light(bst_ctx *ctx, const placed_body *placed, bst_satell
     bst_quat q = placed->q_cam_from_gcrf;
     const bst_resolved_view view = {
         .q_image_from_body = bst_quat_mul(q, bst_quat_conj(body->q_body_from_gcrf)),
-        .origin_m = bst_vec3_scale(bst_quat_rotate(q_cam_from_gcrf, body->apparent), body->range_m),
-        .scale_rad = bst_camera_scale_rad(camera)};
+        .origin_m = bst_vec3_scale(bst_quat_rotate(q, body->apparent), body->range_m),
+        .scale_rad = bst_camera_scale_rad(placed->camera)};
     const bst_resolved_light light = {.sun = body->aim.sun,
                                       .sun_radius_rad = body->sun_radius_rad,
                                       .earthlight = body->earth ? &placed->earthlight : NULL,
