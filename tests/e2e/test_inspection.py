@@ -3,7 +3,8 @@
 estimated to 3 % of the apparent size, and the track is never lost.
 
     test_inspection.py build/boresight          the approach from 1.5 km to 0.2 km, one seed
-    test_inspection.py build/boresight 20       scenarios/inspection.json as shipped, 20 seeds (./dev slow)
+    test_inspection.py build/boresight 20       scenarios/inspection.json as shipped, and with 19 other seeds and
+                                                attitudes of the target (./dev slow)
 """
 import json
 import os
@@ -13,6 +14,7 @@ import sys
 import tempfile
 
 import numpy as np
+from astropy.io import fits
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 SCENARIO = os.path.join(ROOT, "scenarios", "inspection.json")
@@ -27,6 +29,16 @@ def run(program, folder, seed, changes):
     for key, value in changes.items():
         words += ["--set", f"{key}={json.dumps(value)}"]
     subprocess.run(words, check=True, capture_output=True)
+
+
+def tumbling(seed):
+    """Another attitude at the start and other rates for each seed; the first: as shipped."""
+    if seed == 1:
+        return {}
+    draw = np.random.default_rng(seed)
+    target = "/world/objects/0/attitude/0/"
+    return {target + "rotation_deg": [round(v, 1) for v in draw.uniform(-180.0, 180.0, 3)],
+            target + "rate_body_deg_per_s": [round(v, 2) for v in draw.uniform(-1.5, 1.5, 3)]}
 
 
 def rows(folder, query):
@@ -59,14 +71,55 @@ def figures(result):
             "first": result["first"], "lost": result["lost"], "tracks": result["targets"], "several": result["several"]}
 
 
+def labels(program, folder):
+    """Truth and labels of the target at 60 m against its pixels: centroid of light, box, mask, COCO and SatNet."""
+    out = os.path.join(folder, "labels")
+    run(program, out, 7, {**NEAR, "/duration_s": 24, "/observers/0/orbit/offset_rtn_m": [0, -60, 0],
+                          "/observers/0/burns": [], "/observers/0/sensors/0/exposure/exposure_s": 3e-5,
+                          "/observers/0/sensors/0/modules/control/exposure_schedule": [],
+                          "/record": {"frames": "extensions", "planes": ["segmentation"]}})
+    coco, satnet = (os.path.join(folder, name) for name in ("coco", "satnet"))
+    subprocess.run([program, "export", out, "--coco", coco, "--satnet", satnet], check=True, capture_output=True)
+    truth = rows(out, "SELECT s.exposure_id, s.item, s.x_px, s.y_px, s.x_light_px, s.y_light_px, s.x0_px, s.y0_px, s.x1_px,"
+                      " s.y1_px, s.size_px, f.fits_index, t.x_chief_px, t.range_m FROM shapes s"
+                      " JOIN frames f USING (sensor, exposure_id) JOIN truth t USING (sensor, exposure_id, item)")
+    assert len(truth) >= 8
+    with open(os.path.join(coco, "annotations.json"), encoding="utf-8") as file:
+        boxes = [a for a in json.load(file)["annotations"] if a["category_id"] == 1]
+    assert len(boxes) == len(truth)
+    with fits.open(os.path.join(out, "frames.fits")) as frames, fits.open(os.path.join(out, "segmentation.fits")) as masks:
+        for row, box in zip(truth, boxes):
+            item, (x, y, x_light, y_light, x0, y0, x1, y1, size) = row[1], row[2:11]
+            image = frames[row[11]].data.astype(float) - 100.0
+            rows_, columns = np.nonzero(masks[row[11]].data == item)
+            light = image[rows_, columns]
+            # what the mask leaves out: light below the sky's noise; saturation would show as well
+            assert abs(np.sum(light * columns) / light.sum() - x_light) < 0.05
+            assert abs(np.sum(light * rows_) / light.sum() - y_light) < 0.05
+            # the PSF widens the box by 2.5 sigma or so; parts that are not lit narrow it
+            assert x0 - 6 < columns.min() and columns.max() < x1 + 6 and y0 - 6 < rows_.min() and rows_.max() < y1 + 6
+            assert abs(x - row[12]) < 1e-3 and x0 < x < x1 and y0 < y < y1
+            # of a body of 4.7 m, foreshortened
+            assert 0.25 < size * 120 * np.pi / 648000 * row[13] / 4.71 < 1.03
+            assert abs(box["bbox"][2] - (x1 - x0) - 1.0) < 1e-6 and abs(box["shape"]["size_px"] - size) < 1e-9
+            assert abs(box["shape"]["x_centre_of_mass"] - x - 0.5) < 1e-9 and len(box["segmentation"]) >= 1
+    name = sorted(os.listdir(os.path.join(satnet, "Annotations")))[0]
+    with open(os.path.join(satnet, "Annotations", name), encoding="utf-8") as file:
+        target = [o for o in json.load(file)["data"]["objects"] if o["class_id"] == 1][0]
+    assert abs(target["shape"]["x_centre_of_mass"] * 512 - truth[0][2] - 0.5) < 1e-6
+    assert abs(np.linalg.norm(target["shape"]["q_body_from_gcrf"]) - 1.0) < 1e-9
+
+
 def main():
     program = os.path.abspath(sys.argv[1])
     seeds = int(sys.argv[2]) if len(sys.argv) > 2 else 0
     errors = []
     with tempfile.TemporaryDirectory() as folder:
+        if not seeds:
+            labels(program, folder)
         for seed in range(1, max(seeds, 1) + 1):
             out = os.path.join(folder, "run")
-            run(program, out, seed, {} if seeds else NEAR)
+            run(program, out, seed, tumbling(seed) if seeds else NEAR)
             result = judge(out)
             shown = figures(result)
             print(json.dumps({"seed": seed, **shown}), flush=True)

@@ -104,7 +104,7 @@ static void project(bst_shape_truth *work, const placed_body *placed,
 /* Finds the centroid of a body's light. */
 static bst_status find_light(bst_ctx *ctx, const placed_body *placed, bst_satellite_pose *pose,
                              bst_resolved *resolved, bst_truth_shape *out) {
-    enum { ACROSS = 64 };
+    enum { ACROSS = 256 };
     const bst_source_body_state *body = &placed->state;
     bst_quat q = placed->q_cam_from_gcrf;
     const bst_resolved_view view = {

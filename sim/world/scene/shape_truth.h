@@ -25,7 +25,7 @@ void bst_shape_truth_free(bst_shape_truth *work);
  * Returned:  truth->shapes, and x_centroid_px and y_centroid_px of their items
  * Errors:    BST_ERR_MEMORY
  * Notes:     corners are projected in perspective; the light is that of the middle of the exposure,
- *            from an image of 64 cells across. With a rolling shutter the attitude of the
+ *            from an image of 256 cells across. With a rolling shutter the attitude of the
  *            camera is that of the middle of the exposure. */
 bst_status bst_shape_truth_fill(bst_ctx *ctx, bst_shape_truth *work, const bst_camera *camera,
                                 const bst_scene_source *sources, const int *source_of,
