@@ -7,17 +7,20 @@
 
 #include "sim/core/pages.h"
 
+/* bst_bright_region.target of a small region near a target: it is none of its own. */
+enum { NEAR_TARGET = -2 };
 enum { REGIONS_MAX = 4096, SKY_SAMPLES = 8192, SKY_SHARE = 5, BLUR_STEPS = 40 };
 
 /* Thresholds of the hysteresis, in the noise of a dark pixel. With HIGH no region in 1e8 frames of
  * 2048^2 pixels is noise. */
 static const double HIGH = 8.0, LOW = 4.0;
-/* Least share of a region's median signal of its pixels: above the wings of usual PSFs. If the
- * median is saturated, a glint outshines parts that belong to the target. */
-static const double LEAST_SHARE = 0.05, LEAST_SHARE_SATURATED = 1e-3;
+/* Least share of a region's median signal of its pixels, for small regions: above the wings of
+ * usual PSFs. In larger ones the blur of the edges matters less, and dim parts more: the share
+ * falls with the size from WIDE_FWHM on, to LEAST_SHARE_WIDE. */
+static const double LEAST_SHARE = 0.05, LEAST_SHARE_WIDE = 1e-3, WIDE_FWHM = 10.0;
 /* Least flux or area of a part relative to the part that it is joined to: smaller ones are stars or
  * hits. */
-static const double LEAST_PART = 0.01;
+static const double LEAST_PART = 0.003;
 /* Reach of the mask beyond a silhouette, in sigma of the PSF: edges have fallen to 1e-3 there. */
 static const double MASK_SIGMAS = 3.0;
 /* Most of a frame that can be a target; a frame that is brighter has no sky to compare with. */
@@ -55,7 +58,7 @@ void bst_silhouette_finder_free(bst_silhouette_finder *finder) {
     *finder = (bst_silhouette_finder){0};
 }
 
-static int by_value(const void *a, const void *b) {
+static int by_signal(const void *a, const void *b) {
     float p = *(const float *)a, q = *(const float *)b;
     return (p > q) - (p < q);
 }
@@ -70,7 +73,7 @@ static void measure_sky(const bst_silhouette_finder *s, const bst_silhouette_fra
             sample[count++] = s->signal[i];
         }
     }
-    qsort(sample, (size_t)count, sizeof *sample, by_value);
+    qsort(sample, (size_t)count, sizeof *sample, by_signal);
     int share = count / SKY_SHARE, best = 0;
     for (int i = 0; i + share < count; i++) {
         if (sample[i + share] - sample[i] < sample[best + share] - sample[best]) {
@@ -140,14 +143,19 @@ static double median_of(const bst_silhouette_finder *s, const bst_bright_region 
     for (int i = 0; i < r->count; i += step) {
         sample[count++] = s->signal[s->pixels[r->first + i]];
     }
-    qsort(sample, (size_t)count, sizeof *sample, by_value);
+    qsort(sample, (size_t)count, sizeof *sample, by_signal);
     return (double)sample[count / 2];
 }
 
-/* Least signal of a region's pixels, e-. */
-static double least_of(const bst_silhouette_finder *s, double median, double noise) {
+/* Least signal of a region's pixels, e-. A saturated median says that a glint outshines the rest.
+ */
+static double least_of(const bst_silhouette_finder *s, const bst_silhouette_frame *f,
+                       const bst_bright_region *r, double noise) {
+    double median = median_of(s, r), wide = WIDE_FWHM * BST_FWHM_PER_SIGMA * f->sigma_px;
+    double share = LEAST_SHARE * fmin(pow(wide / sqrt((double)r->count), 2.0), 1.0);
     bool saturated = median >= (double)s->saturated_e;
-    return fmax(LOW * noise, (saturated ? LEAST_SHARE_SATURATED : LEAST_SHARE) * median);
+    return fmax(LOW * noise,
+                (saturated ? LEAST_SHARE_WIDE : fmax(share, LEAST_SHARE_WIDE)) * median);
 }
 
 /* Removes pixels below `least` from a region. */
@@ -197,7 +205,7 @@ static void find_regions(bst_silhouette_finder *s, const bst_silhouette_frame *f
         s->pixel_count += r->count;
     }
     for (int i = 0; i < s->region_count; i++) {
-        double least = least_of(s, median_of(s, &s->regions[i]), noise);
+        double least = least_of(s, f, &s->regions[i], noise);
         keep_above(s, f, (float)least, &s->regions[i]);
     }
     qsort(s->regions, (size_t)s->region_count, sizeof *s->regions, largest_first);
@@ -223,7 +231,11 @@ static int join_parts(bst_silhouette_finder *s, const bst_extended_config *confi
             double size = hypot(box->x1 - box->x0 + 1, box->y1 - box->y0 + 1);
             bool small = r->flux_e < LEAST_PART * s->regions[first].flux_e &&
                          r->count < LEAST_PART * s->regions[first].count;
-            if (r->target >= 0 || small || gap_of(box, r) > config->join_share * size) {
+            if (r->target != -1 || gap_of(box, r) > config->join_share * size) {
+                continue;
+            }
+            if (small) {
+                r->target = NEAR_TARGET;
                 continue;
             }
             r->target = target;
@@ -384,7 +396,7 @@ static void measure(bst_silhouette_finder *s, const bst_silhouette_frame *f, dou
         }
     }
     median = median_of(s, &all);
-    double least = least_of(s, median, noise);
+    double least = least_of(s, f, &all, noise);
     out->flux_e = m->s;
     out->flux_variance = m->s + m->pixels * noise * noise;
     out->light_x_px = box->x0 + m->x / m->s;
@@ -453,7 +465,7 @@ void bst_silhouettes_find(bst_silhouette_finder *s, const bst_extended_config *c
     find_regions(s, f, noise);
     double handover = config->handover_fwhm * BST_FWHM_PER_SIGMA * f->sigma_px;
     for (int i = 0; i < s->region_count && out->count < BST_SILHOUETTES_MAX; i++) {
-        if (s->regions[i].target >= 0) {
+        if (s->regions[i].target != -1) {
             continue;
         }
         bst_bright_region box;

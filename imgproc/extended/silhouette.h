@@ -42,7 +42,7 @@ typedef struct bst_bright_region {
     int first, count; /* its pixels in `pixels` */
     int x0, y0, x1, y1;
     double flux_e;
-    int target; /* silhouette that it belongs to; -1: none */
+    int target; /* silhouette that it belongs to; below 0: none */
 } bst_bright_region;
 
 /* Work space for frames up to a size. */
@@ -94,8 +94,8 @@ typedef struct bst_silhouette_frame {
  * Notes:     level of the sky: the middle of the narrowest interval that holds a fifth of the
  *            pixels, so that a target may fill most of the frame. Hysteresis: a region consists of
  *            the pixels above 4 sigma that are connected with one above 8 sigma. Pixels below a
- *            twentieth of the region's median (a thousandth of a saturated one) are then left out:
- *            the PSF's wings.
+ *            twentieth of the region's median (down to a thousandth in large regions and of a
+ *            saturated median) are then left out: the PSF's wings.
  * Reference: hysteresis: Canny, IEEE Trans. PAMI 8, 679 (1986), section VI */
 void bst_silhouettes_find(bst_silhouette_finder *finder, const bst_extended_config *config,
                           const bst_silhouette_frame *frame, uint8_t *mask, bst_silhouettes *out);

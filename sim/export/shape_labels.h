@@ -24,6 +24,7 @@ typedef struct bst_shape_labels {
  */
 bst_status bst_shape_labels_open(bst_ctx *ctx, const bst_export *export, int sensor,
                                  bst_shape_labels *out) BST_MUST_CHECK;
+/* Ends the labels of a sensor and clears the struct, which belongs to the caller. */
 void bst_shape_labels_close(bst_shape_labels *labels);
 
 /* Finds the label of an item of the truth. Requests come in the order of exposure and item.

@@ -105,6 +105,9 @@ bst_status bst_recorder_run_row(bst_ctx *ctx, bst_recorder *recorder) BST_MUST_C
 bst_status bst_recorder_sensor_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                    const char *file) BST_MUST_CHECK;
 
+/* Middle of an exposure, s after the epoch. */
+double bst_recorder_mid_s(const bst_recorder *recorder, int64_t start_tick, int64_t end_tick);
+
 /* Writes the rows of table shapes; none if the run has no such table. */
 bst_status bst_recorder_shape_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                    const bst_truth *truth) BST_MUST_CHECK;

@@ -50,7 +50,7 @@ static bst_vec3 boresight(bst_quat q_cam_from_gcrf) {
 static double seconds(const bst_recorder *recorder, int64_t tick) {
     return (double)tick / (double)recorder->tick_rate_hz;
 }
-static double mid_seconds(const bst_recorder *recorder, int64_t start_tick, int64_t end_tick) {
+double bst_recorder_mid_s(const bst_recorder *recorder, int64_t start_tick, int64_t end_tick) {
     return 0.5 * (double)(start_tick + end_tick) / (double)recorder->tick_rate_hz;
 }
 
@@ -145,7 +145,7 @@ static bst_status exposure_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
     put_int(&r, t->exposure_id);
     put_int(&r, t->start_tick);
     put_int(&r, t->end_tick);
-    put_real(&r, mid_seconds(recorder, t->start_tick, t->end_tick));
+    put_real(&r, bst_recorder_mid_s(recorder, t->start_tick, t->end_tick));
     put_flag(&r, t->dropped);
     put_quat(&r, t->q_cam_from_gcrf_mid);
     put_quat(&r, t->q_cam_from_gcrf_mean);
@@ -193,7 +193,7 @@ bst_status bst_recorder_truth_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
     (void)written_tick;
     const bst_truth *t = payload;
     BST_TRY(exposure_row(ctx, recorder, sensor, t));
-    double mid_s = mid_seconds(recorder, t->start_tick, t->end_tick);
+    double mid_s = bst_recorder_mid_s(recorder, t->start_tick, t->end_tick);
     for (int i = 0; i < t->count; i++) {
         const bst_truth_item *item = &t->items[i];
         bool star = item->kind == BST_SOURCE_STAR;
@@ -286,7 +286,7 @@ static bool kept(const bst_recorder *recorder, const bst_detection *item) {
 bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                        const void *payload, int64_t written_tick) {
     const bst_detections *d = payload;
-    double mid_s = mid_seconds(recorder, d->start_tick, d->end_tick);
+    double mid_s = bst_recorder_mid_s(recorder, d->start_tick, d->end_tick);
     row head = {.count = 0};
     put_int(&head, sensor);
     put_int(&head, d->exposure_id);

@@ -5,10 +5,6 @@
 
 #define DEG (180.0 / BST_PI)
 
-static double mid_seconds(const bst_recorder *recorder, int64_t start_tick, int64_t end_tick) {
-    return 0.5 * (double)(start_tick + end_tick) / (double)recorder->tick_rate_hz;
-}
-
 bst_status bst_recorder_shape_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                    const bst_truth *t) {
     if (!recorder->tables[BST_TABLE_SHAPES]) {
@@ -20,7 +16,7 @@ bst_status bst_recorder_shape_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
         const bst_io_value row[] = {
             bst_io_int_value(sensor),
             bst_io_int_value(t->exposure_id),
-            bst_io_real_value(mid_seconds(recorder, t->start_tick, t->end_tick)),
+            bst_io_real_value(bst_recorder_mid_s(recorder, t->start_tick, t->end_tick)),
             bst_io_int_value(s->item + 1),
             bst_io_int_value(item->id),
             bst_io_real_value(s->x_px),
@@ -56,7 +52,7 @@ bst_status bst_recorder_extended_row(bst_ctx *ctx, bst_recorder *recorder, int s
     const bst_io_value row[] = {
         bst_io_int_value(sensor),
         bst_io_int_value(d->exposure_id),
-        bst_io_real_value(mid_seconds(recorder, d->start_tick, d->end_tick)),
+        bst_io_real_value(bst_recorder_mid_s(recorder, d->start_tick, d->end_tick)),
         bst_io_int_value(item),
         bst_io_real_value(target->x_px),
         bst_io_real_value(target->y_px),
