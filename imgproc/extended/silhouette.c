@@ -21,6 +21,8 @@ static const double LEAST_SHARE = 0.05, LEAST_SHARE_WIDE = 1e-3, WIDE_FWHM = 10.
 /* Least flux or area of a part relative to the part that it is joined to: smaller ones are stars or
  * hits. */
 static const double LEAST_PART = 0.003;
+/* Least area of a target relative to the largest of the frame: smaller ones are its fragments. */
+static const double LEAST_TARGET = 0.02;
 /* Reach of the mask beyond a silhouette, in sigma of the PSF: edges have fallen to 1e-3 there. */
 static const double MASK_SIGMAS = 3.0;
 /* Most of a frame that can be a target; a frame that is brighter has no sky to compare with. */
@@ -463,7 +465,7 @@ void bst_silhouettes_find(bst_silhouette_finder *s, const bst_extended_config *c
     out->count = 0;
     double noise = read_signal(s, f), total = (double)f->width * (double)f->height;
     find_regions(s, f, noise);
-    double handover = config->handover_fwhm * BST_FWHM_PER_SIGMA * f->sigma_px;
+    double largest = 0.0, handover = config->handover_fwhm * BST_FWHM_PER_SIGMA * f->sigma_px;
     for (int i = 0; i < s->region_count && out->count < BST_SILHOUETTES_MAX; i++) {
         if (s->regions[i].target != -1) {
             continue;
@@ -474,9 +476,13 @@ void bst_silhouettes_find(bst_silhouette_finder *s, const bst_extended_config *c
         light_sums m = add_light(s, f, target, &box);
         double size = m.s > 0.0 ? moment_size(f, &m) : 0.0;
         bool filled = m.pixels > MOST_OF_FRAME * total;
+        if (m.pixels < LEAST_TARGET * largest) {
+            continue;
+        }
         if (size < BST_SILHOUETTE_LEAST * handover || filled) {
             continue;
         }
+        largest = fmax(largest, m.pixels);
         bst_silhouette *t = &out->items[out->count++];
         *t = (bst_silhouette){.moment_size_px = size,
                               .parts = parts,

@@ -106,7 +106,10 @@ bst_status bst_recorder_sensor_row(bst_ctx *ctx, bst_recorder *recorder, int sen
                                    const char *file) BST_MUST_CHECK;
 
 /* Middle of an exposure, s after the epoch. */
-double bst_recorder_mid_s(const bst_recorder *recorder, int64_t start_tick, int64_t end_tick);
+static inline double bst_recorder_mid_s(const bst_recorder *recorder, int64_t start_tick,
+                                        int64_t end_tick) {
+    return 0.5 * (double)(start_tick + end_tick) / (double)recorder->tick_rate_hz;
+}
 
 /* Writes the rows of table shapes; none if the run has no such table. */
 bst_status bst_recorder_shape_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,

@@ -50,10 +50,6 @@ static bst_vec3 boresight(bst_quat q_cam_from_gcrf) {
 static double seconds(const bst_recorder *recorder, int64_t tick) {
     return (double)tick / (double)recorder->tick_rate_hz;
 }
-double bst_recorder_mid_s(const bst_recorder *recorder, int64_t start_tick, int64_t end_tick) {
-    return 0.5 * (double)(start_tick + end_tick) / (double)recorder->tick_rate_hz;
-}
-
 int64_t bst_recorder_not_due_before(const bst_recorder *recorder, int64_t last) {
     double hz = recorder->config.telemetry_hz, rate = (double)recorder->tick_rate_hz;
     double next = ((double)last + 1.0 - 1e-6) * rate / hz;
