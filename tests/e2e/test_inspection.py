@@ -3,8 +3,8 @@
 estimated to 3 % of the apparent size, and the track is never lost.
 
     test_inspection.py build/boresight          the approach from 1.5 km to 0.2 km, one seed
-    test_inspection.py build/boresight 20       scenarios/inspection.json as shipped, and with 19 other seeds and
-                                                attitudes of the target (./dev slow)
+    test_inspection.py build/boresight 20       from 300 m to 27 m with 20 seeds and attitudes of the target, and
+                                                scenarios/inspection.json as shipped (./dev slow)
 """
 import json
 import os
@@ -22,6 +22,12 @@ NEAR = {"/duration_s": 300, "/observers/0/orbit/offset_rtn_m": [0, -1500, 0],
         "/observers/0/burns": [{"time_s": 20, "dv_rtn_mps": [0, 4.95, 0]}],
         "/observers/0/sensors/0/exposure/exposure_s": 2e-4,
         "/observers/0/sensors/0/modules/control/exposure_schedule": [{"time_s": 150, "exposure_s": 1e-4}]}
+
+
+LAST = {**NEAR, "/observers/0/orbit/offset_rtn_m": [0, -300, 0],
+        "/observers/0/burns": [{"time_s": 20, "dv_rtn_mps": [0, 0.99, 0]}],
+        "/observers/0/sensors/0/exposure/exposure_s": 1e-4,
+        "/observers/0/sensors/0/modules/control/exposure_schedule": [{"time_s": 150, "exposure_s": 5e-5}]}
 
 
 def run(program, folder, seed, changes):
@@ -113,27 +119,28 @@ def labels(program, folder):
 def main():
     program = os.path.abspath(sys.argv[1])
     seeds = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    cases = [(seed, {**LAST, **tumbling(seed)}, 90, 100) for seed in range(1, seeds + 1)]
+    cases += [(1, {}, 400, 390)] if seeds else [(1, NEAR, 30, 40)]
     errors = []
     with tempfile.TemporaryDirectory() as folder:
         if not seeds:
             labels(program, folder)
-        for seed in range(1, max(seeds, 1) + 1):
+        for seed, changes, frames, size_px in cases:
             out = os.path.join(folder, "run")
-            run(program, out, seed, tumbling(seed) if seeds else NEAR)
+            run(program, out, seed, changes)
             result = judge(out)
             shown = figures(result)
             print(json.dumps({"seed": seed, **shown}), flush=True)
             errors.append(result["error"])
             assert shown["lost"] == 0 and shown["tracks"] == 1, "the target was lost"
-            assert shown["rms_%"] <= 3.0, "centre of mass"
-            assert shown["extended"] > (400 if seeds else 30) and shown["first"] < 10
-            assert shown["largest_px"] > (390 if seeds else 40)
-            # the known size has a standard deviation for what aspects change: most within two
-            assert np.mean(np.abs(result["range_deviation"]) < 2.0) > 0.8, "range from the size"
+            assert shown["several"] == 0 and shown["rms_%"] <= 3.0, "centre of mass"
+            assert shown["extended"] > frames and shown["first"] < 10 and shown["largest_px"] > size_px
+            # the known size has a standard deviation for usual aspects; an array seen end on is beyond it
+            assert np.median(np.abs(result["range_deviation"])) < 4.0, "range from the size"
             subprocess.run(["rm", "-r", out], check=True)
     e = np.concatenate(errors)
     print(f"centre of mass: {100 * np.sqrt(np.mean(e**2)):.2f} % of the apparent size (RMS), "
-          f"{100 * np.percentile(e, 95):.2f} % (95th percentile), {len(errors)} seeds, {len(e)} frames")
+          f"{100 * np.percentile(e, 95):.2f} % (95th percentile), {len(errors)} runs, {len(e)} frames")
 
 
 if __name__ == "__main__":
