@@ -9,6 +9,12 @@ static const char *const fixed_frames[] = {"inertial", "body", NULL};
 static const bst_config_desc compensator_table[] = {
     BST_COMPENSATOR_KEYS(bst_control_compensators, "\"observer\""), BST_CONFIG_END};
 
+static const bst_config_desc exposure_table[] = {
+    BST_REAL(bst_control_exposure, time_s, "s", 0, 1e9, NULL, "Time after the epoch."),
+    BST_REAL(bst_control_exposure, exposure_s, "s", 1e-9, 3600, NULL,
+             "Exposure time asked of the sensor from then on."),
+    BST_CONFIG_END};
+
 #define C bst_control_config
 const bst_config_desc bst_control_config_table[] = {
     BST_ENUM(C, strategy, strategies, "\"track\"",
@@ -27,6 +33,9 @@ const bst_config_desc bst_control_config_table[] = {
              "Exposure time asked of the sensor; 0 leaves the sensor's own."),
     BST_REAL(C, period_s, "s", 0, 3600, "0",
              "Frame period asked of the sensor; 0 leaves the sensor's own."),
+    BST_LIST(C, exposure_schedule, bst_control_exposure, exposure_table, 0, 10000, "[]",
+             "Exposure times from given times on, as for a target that comes nearer; in order of "
+             "time."),
     BST_REAL(C, command_latency_s, "s", 0, 60, "0.1",
              "Time from a command's publication to its effect: the instant it is computed for."),
     BST_BOOL(C, compensate_attitude, "true",

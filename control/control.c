@@ -64,6 +64,15 @@ bst_status bst_control_init(bst_ctx *ctx, bst_control *control, const bst_contro
                         "other",
                         config->exposure_s, config->period_s);
     }
+    const bst_control_exposure *next = config->exposure_schedule.items;
+    for (int i = 1; i < config->exposure_schedule.count; i++) {
+        if (!(next[i].time_s > next[i - 1].time_s)) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "exposure_schedule/%d/time_s: %g s is not after %g s; put the times in "
+                            "order",
+                            i, next[i].time_s, next[i - 1].time_s);
+        }
+    }
     const double *f = config->fixed_direction;
     if (config->strategy == BST_CONTROL_FIXED && f[0] == 0.0 && f[1] == 0.0 && f[2] == 0.0) {
         return bst_fail(ctx, BST_ERR_CONFIG,

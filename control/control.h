@@ -33,6 +33,12 @@ typedef enum bst_control_fixed_frame {
     BST_CONTROL_FIXED_BODY,
 } bst_control_fixed_frame;
 
+/* An exposure time asked of the sensor from a time on. */
+typedef struct bst_control_exposure {
+    double time_s; /* after the epoch */
+    double exposure_s;
+} bst_control_exposure;
+
 typedef struct bst_control_config {
     int32_t strategy;
     double stare_time_s;
@@ -40,6 +46,7 @@ typedef struct bst_control_config {
     double fixed_direction[3];
     double scan_rate_arcsec_per_s;
     double exposure_s, period_s;
+    bst_config_list exposure_schedule; /* of bst_control_exposure, time_s ascending */
     double command_latency_s;
     bool compensate_attitude;
     bst_compensator_config compensator; /* for BST_CONTROL_OBSERVER: pointing_error's own */

@@ -39,6 +39,7 @@ typedef struct module {
     bst_control control;
     bst_knowledge_view *view;
     bool sensor_told;
+    int exposures_told; /* entries of exposure_schedule that are in effect */
 } module;
 
 static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_onboard_cue *out) {
@@ -117,6 +118,28 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     return BST_OK;
 }
 
+/* Commands the sensor: at the first step, and when an entry of the exposure schedule begins. */
+static void command_sensor(module *m, struct bst_step *s) {
+    const bst_control_config *config = &m->control.config;
+    const bst_control_exposure *schedule = config->exposure_schedule.items;
+    double seconds = (double)bst_step_tick(s) / m->control.env.tick_rate_hz;
+    int before = m->exposures_told;
+    while (m->exposures_told < config->exposure_schedule.count &&
+           schedule[m->exposures_told].time_s <= seconds) {
+        m->exposures_told++;
+    }
+    if (m->sensor_told && m->exposures_told == before) {
+        return;
+    }
+    bst_sensor_command *sensor = bst_step_write(s, PORT_SENSOR, NULL);
+    *sensor = (bst_sensor_command){.exposure_s = m->exposures_told > 0
+                                                     ? schedule[m->exposures_told - 1].exposure_s
+                                                     : config->exposure_s,
+                                   .period_s = config->period_s};
+    assert(bst_sensor_command_is_valid(sensor));
+    m->sensor_told = true;
+}
+
 static bst_status step(void *self, struct bst_step *s) {
     module *m = self;
     bst_control *c = &m->control;
@@ -144,13 +167,7 @@ static bst_status step(void *self, struct bst_step *s) {
         assert(bst_los_command_is_valid(out));
     }
     assert(bst_control_status_is_valid(status));
-    if (!m->sensor_told) {
-        bst_sensor_command *sensor = bst_step_write(s, PORT_SENSOR, NULL);
-        *sensor = (bst_sensor_command){.exposure_s = c->config.exposure_s,
-                                       .period_s = c->config.period_s};
-        assert(bst_sensor_command_is_valid(sensor));
-        m->sensor_told = true;
-    }
+    command_sensor(m, s);
     for (int i = 0; i < c->transition_count; i++) {
         const bst_control_transition *t = &c->transitions[i];
         bst_step_event(s, "mode", "%s -> %s: %s", bst_mode_name(t->from), bst_mode_name(t->to),
@@ -170,6 +187,8 @@ static bst_status archive_control(void *self, bst_archive *archive) {
     module *m = self;
     bst_knowledge_view_archive(m->view, archive);
     bst_archive_bool(archive, &m->sensor_told);
+    m->exposures_told = (int)bst_archive_integer(archive, m->exposures_told, 0,
+                                                 m->control.config.exposure_schedule.count);
     return bst_control_archive(&m->control, archive);
 }
 

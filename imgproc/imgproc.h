@@ -12,6 +12,7 @@
 #include "boresight/module.h"
 #include "boresight/stage.h"
 #include "imgproc/calibrate/pixel_learner_config.h"
+#include "imgproc/extended/extended_config.h"
 #include "imgproc/stack/stack.h"
 #include "sim/optics/photometry.h"
 
@@ -31,6 +32,7 @@ typedef struct bst_imgproc_config {
     bool track_windows; /* search only windows while a target is tracked */
     int64_t window_px, window_stars, full_frame_period, full_frame_count;
     bst_stack_config stack;
+    bst_extended_config extended;
     bst_pixel_learner_config bad_pixel_learning;
     int column_correction;      /* see sim/optics/column_level.h */
     int64_t threads;            /* 0: one per processor */
@@ -45,6 +47,7 @@ extern const bst_config_desc bst_imgproc_config_table[];
 
 struct bst_pixel_map;
 struct bst_pixel_shows;
+struct bst_silhouettes;
 struct bst_psf;
 
 /* Sensor calibration: maps on the full sensor, row-major [height_px][width_px], and the PSF. NULL
@@ -118,6 +121,11 @@ void bst_imgproc_free(bst_imgproc *ip);
 bst_status bst_imgproc_detect(bst_ctx *ctx, bst_imgproc *ip, const bst_imgproc_frame *frame,
                               const bst_camera_motion *motion, bst_detections *out,
                               int capacity) BST_MUST_CHECK;
+
+/* Extended targets of the latest bst_imgproc_detect, in its frame's pixels; valid until the next
+ * frame. None without config.extended.enabled. Pixels of those that are `masked` had no part in the
+ * background and in the detection of points. */
+const struct bst_silhouettes *bst_imgproc_silhouettes(const bst_imgproc *ip);
 
 /* Windows of a frame: disjoint, inside the frame's own window, aligned with its binned pixels, and
  * at least about 24 pixels a side for the background estimate. */

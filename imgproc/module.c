@@ -4,18 +4,11 @@
 #include <string.h>
 
 #include "imgproc/calibrate/calibration.h"
-#include "imgproc/calibrate/pixel_learning.h"
-#include "imgproc/detect/plugin_detector.h"
-#include "imgproc/detect/region_of_interest.h"
-#include "imgproc/identify/predicted_stars.h"
-#include "imgproc/imgproc.h"
-#include "imgproc/measure/discriminate.h"
+#include "imgproc/module_internal.h"
 #include "imgproc/window_plan.h"
-#include "imgproc/wing_labels.h"
 #include "sim/messages/message_invariants.h"
 #include "sim/onboard/knowledge.h"
 #include "sim/onboard/nav_motion.h"
-#include "sim/optics/photometry.h"
 
 enum { PORT_FRAME, PORT_PREDICTIONS, PORT_POINTING, PORT_NAV, PORT_DETECTIONS, PORT_COUNT };
 
@@ -29,47 +22,11 @@ static const bst_port ports[PORT_COUNT] = {
 
 enum { CATALOGUE_CAPACITY = 16384 };
 
-/* Expected stars include those down to this share of the detection threshold, which noise may lift
- * above it. */
-static const double SNR_SHARE_EXPECTED = 0.7;
-/* Search radius for stars once the tracker has estimated the pointing error. */
-static const double LOCKED_RADIUS_PX = 10.0;
 /* Least expected SNR of a star that gets a window. */
 static const double WINDOW_STAR_SNR = 12.0;
-/* Shift above which a distorted field is matched twice. */
-static const double RESHIFT_PX = 2.0;
-
-/* Detector and results of one concurrent step. */
-typedef struct lane {
-    bst_imgproc *ip;      /* NULL: not created yet */
-    bst_detections *made; /* detections computed ahead; NULL in lane 0 until needed */
-    bool ready;           /* `made` holds the detections of the frame below */
-    int map;              /* slot of the learned bad-pixel map used in the current step */
-    int64_t exposure_id;
-} lane;
-
-typedef struct imgproc_module {
-    const bst_imgproc_config *config;
-    bst_camera camera;
-    int64_t tick_rate_hz;
-    bst_imgproc_maps maps;
-    lane lanes[BST_STEP_LANES];
-    bst_starid *starid;
-    bst_imgproc_discriminator *discriminator;
-    bst_predicted_stars sky;
-    bst_region_of_interest windows; /* of the current frame; none: the whole frame */
-    bst_stack *stack;               /* NULL: no stacking */
-    bst_optics_photometer photometer;
-    bst_pixel_learner *pixels;   /* NULL: bad pixels are not learned */
-    double window_v_limit;       /* of stars with windows, by the latest frame; NAN: none yet */
-    int64_t steps;               /* number of steps so far */
-    int first_slot;              /* slot of the map that lane 0 uses: 0, or by a restore */
-    bst_psf_wings *wings;        /* NULL: the PSF has no wings */
-    bst_plugin_detector *plugin; /* NULL: built-in detector */
-} imgproc_module;
 
 static void destroy(void *self) {
-    imgproc_module *m = self;
+    bst_imgproc_state *m = self;
     if (!m) {
         return;
     }
@@ -90,7 +47,7 @@ static void destroy(void *self) {
 }
 
 /* Creates the detector of a lane. */
-static bst_status open_lane(bst_ctx *ctx, imgproc_module *m, lane *l) {
+static bst_status open_lane(bst_ctx *ctx, bst_imgproc_state *m, bst_imgproc_lane *l) {
     if (l->ip || m->plugin) {
         return BST_OK;
     }
@@ -101,15 +58,15 @@ static bst_status open_lane(bst_ctx *ctx, imgproc_module *m, lane *l) {
                : BST_OK;
 }
 
-static bst_status open_plugin(const bst_module_env *env, imgproc_module *m) {
+static bst_status open_plugin(const bst_module_env *env, bst_imgproc_state *m) {
     if (!m->config->detector.desc) {
         return BST_OK;
     }
-    if (m->config->stack.frames > 0 || m->config->track_windows) {
+    if (m->config->stack.frames > 0 || m->config->track_windows || m->config->extended.enabled) {
         return bst_fail(
             env->ctx, BST_ERR_CONFIG,
             "/observers/%d/sensors/%d/modules/imgproc/detector: a plug-in looks at whole "
-            "frames by itself; turn track_windows and stack off",
+            "frames by itself; turn track_windows, stack and extended off",
             env->observer, env->sensor);
     }
     return bst_plugin_detector_create(env->ctx, &m->config->detector, &m->camera, &m->maps,
@@ -119,10 +76,11 @@ static bst_status open_plugin(const bst_module_env *env, imgproc_module *m) {
 /* Saves or restores the module between two steps. Detections made ahead are not archived: the step
  * makes them again. */
 static bst_status archive_module(void *self, bst_archive *archive) {
-    imgproc_module *m = self;
+    bst_imgproc_state *m = self;
     m->steps = bst_archive_integer(archive, m->steps, 0, INT64_MAX / 2);
     BST_ARCHIVE(archive, m->window_v_limit);
     bst_imgproc_discriminator_archive(m->discriminator, archive);
+    bst_extended_step_archive(&m->extended, archive);
     if (m->pixels) {
         BST_TRY(bst_pixel_learner_archive(m->pixels, archive));
     }
@@ -139,7 +97,7 @@ static bst_status archive_module(void *self, bst_archive *archive) {
 }
 
 /* Creates all parts of the module from the configuration. */
-static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
+static bst_status prepare(const bst_module_env *env, bst_imgproc_state *m) {
     m->camera = *bst_knowledge_camera(env->knowledge);
     m->tick_rate_hz = env->tick_rate_hz;
     BST_TRY(bst_calibration_load(env->ctx, m->config, &m->camera, &m->maps));
@@ -167,6 +125,12 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
                         "imgproc: track_windows and stack do not go together: stacks are made of "
                         "whole frames; turn one of them off");
     }
+    m->extended.config = &m->config->extended;
+    if (m->config->extended.enabled && (m->config->stack.frames > 0 || m->config->track_windows)) {
+        return bst_fail(env->ctx, BST_ERR_CONFIG,
+                        "imgproc: extended goes neither with track_windows nor with stack; turn "
+                        "them off");
+    }
     if (m->config->stack.frames > 0) {
         BST_TRY(bst_stack_create(env->ctx, &m->camera, &m->config->stack, (int)m->config->threads,
                                  &m->stack));
@@ -182,7 +146,7 @@ static bst_status prepare(const bst_module_env *env, imgproc_module *m) {
 
 static bst_status create(const bst_module_env *env, const void *config, void **self) {
     assert(env && env->knowledge && env->tick_rate_hz > 0 && config && self);
-    imgproc_module *m = calloc(1, sizeof *m);
+    bst_imgproc_state *m = calloc(1, sizeof *m);
     *self = NULL;
     if (!m) {
         return bst_fail(env->ctx, BST_ERR_MEMORY, "no memory for image processing");
@@ -199,24 +163,15 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
 }
 
 /* Tracker's estimate of the attitude error of the telemetry, propagated to mid-exposure. */
-static bst_quat attitude_correction(const imgproc_module *m, const bst_predictions *predictions,
+static bst_quat attitude_correction(const bst_imgproc_state *m, const bst_predictions *predictions,
                                     double mid_tick) {
     double dt = (mid_tick - (double)predictions->tick) / (double)m->tick_rate_hz;
     return bst_quat_from_rotvec(bst_vec3_axpy(predictions->attitude_error_cam_rad, dt,
                                               predictions->attitude_error_rate_cam_radps));
 }
 
-/* A frame and the onboard knowledge of its exposure. */
-typedef struct exposure {
-    const bst_frame_message *message;
-    const bst_camera_motion *motion; /* NULL: unknown */
-    bst_light light;
-    const bst_predictions *predictions; /* NULL: none */
-    bool locked;                        /* the tracker has estimated the pointing error */
-} exposure;
-
 /* Plans the windows to search while a target is tracked; none: the whole frame. */
-static bst_status plan_windows(bst_ctx *ctx, imgproc_module *m, const exposure *e,
+static bst_status plan_windows(bst_ctx *ctx, bst_imgproc_state *m, const bst_imgproc_exposure *e,
                                bst_quat q_cam_from_gcrf) {
     const bst_frame_message *message = e->message;
     if (isnan(m->window_v_limit) ||
@@ -240,89 +195,14 @@ static bst_status plan_windows(bst_ctx *ctx, imgproc_module *m, const exposure *
     return BST_OK;
 }
 
-/* Keeps only the expected stars that can lie in the windows; returns their number. */
-static int keep_stars_in_windows(imgproc_module *m, int expected) {
-    int kept = 0;
-    for (int i = 0; i < expected; i++) {
-        const bst_imgproc_expected_star *e = &m->sky.expected[i];
-        if (bst_region_of_interest_hold(&m->windows, e->x_px, e->y_px, LOCKED_RADIUS_PX)) {
-            m->sky.expected[kept++] = *e;
-        }
-    }
-    return kept;
-}
-
-/* Identifies the catalogue stars among the detections.
- *
- * Given:     *q_cam_from_gcrf  predicted attitude
- * Returned:  *q_cam_from_gcrf  attitude from the identified stars, if any */
-static bst_status identify_stars(bst_ctx *ctx, imgproc_module *m, const lane *l, const exposure *e,
-                                 bst_detections *out, bst_quat *q_cam_from_gcrf) {
-    const bst_window window = e->message->window;
-    double snr = SNR_SHARE_EXPECTED * out->threshold_snr;
-    double v_limit =
-        m->plugin ? bst_plugin_detector_v_limit(m->plugin, snr) : bst_imgproc_v_limit(l->ip, snr);
-    int expected = 0;
-    bst_predicted_stars_query query = {out->q_cam_from_gcrf, &e->light, window,
-                                       m->config->search_radius_px, v_limit};
-    BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, &query, &expected));
-    expected = m->windows.count > 0 ? keep_stars_in_windows(m, expected) : expected;
-    bst_starid_options options = {m->config->search_radius_px,
-                                  m->config->match_tolerance_px,
-                                  bst_camera_centre_x(&m->camera),
-                                  bst_camera_centre_y(&m->camera),
-                                  window.width,
-                                  window.height};
-    bst_starid_result result = {0};
-    if (e->locked && LOCKED_RADIUS_PX < options.search_radius_px) {
-        options.search_radius_px = LOCKED_RADIUS_PX;
-        bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
-                         &result);
-        options.search_radius_px = m->config->search_radius_px;
-    }
-    if (result.matched == 0) {
-        bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
-                         &result);
-    }
-    if (m->camera.geometry.general && result.matched > 0 &&
-        hypot(result.shift_x_px, result.shift_y_px) > RESHIFT_PX) {
-        /* distortion makes the shift uneven over the field: match again with the corrected attitude
-         */
-        *q_cam_from_gcrf = bst_starid_attitude(&m->camera, &options, &result, out->q_cam_from_gcrf);
-        for (int i = 0; i < out->count; i++) {
-            if (out->items[i].label == BST_LABEL_STAR) {
-                out->items[i].label = BST_LABEL_UNKNOWN;
-                out->items[i].label_probability = 0.0;
-                out->items[i].star_id = 0;
-            }
-        }
-        query.q_cam_from_gcrf = *q_cam_from_gcrf;
-        BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, &query, &expected));
-        expected = m->windows.count > 0 ? keep_stars_in_windows(m, expected) : expected;
-        options.search_radius_px = fmin(options.search_radius_px, LOCKED_RADIUS_PX);
-        bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
-                         &result);
-    }
-    if (result.matched > 0) {
-        *q_cam_from_gcrf = bst_starid_attitude(&m->camera, &options, &result, *q_cam_from_gcrf);
-    }
-    out->stars_identified = result.matched;
-    for (int i = 0; i < out->count; i++) {
-        int star = bst_starid_star_of(m->starid, i);
-        if (star >= 0) {
-            bst_optics_photometer_add(&m->photometer, &out->items[i], m->sky.expected[star].v_mag);
-        }
-    }
-    return BST_OK;
-}
-
 /* Background and noise at a position, for bst_psf_wings_label. */
 static void ground_at(const void *user, double x_px, double y_px, bst_psf_wings_ground *out) {
     bst_imgproc_ground(user, x_px, y_px, &out->level_e, &out->noise_e);
 }
 
 /* Labels artefacts in the PSF wings of bright stars. */
-static bst_status label_wings(bst_ctx *ctx, imgproc_module *m, const lane *l, const exposure *e,
+static bst_status label_wings(bst_ctx *ctx, bst_imgproc_state *m, const bst_imgproc_lane *l,
+                              const bst_imgproc_exposure *e,
                               const bst_imgproc_frame_knowledge *known, bst_detections *out) {
     const bst_frame_message *message = e->message;
     const bst_wing_labels_input input = {
@@ -348,9 +228,9 @@ static bool motion_of(struct bst_step *step, const bst_frame_message *message,
 
 /* Detects the sources of a frame. The result depends on the camera's rotation during the exposure,
  * not on its pointing. */
-static bst_status detect_sources(bst_ctx *ctx, const imgproc_module *m, const lane *l,
-                                 const exposure *e, bool beside_another, bst_detections *out,
-                                 int capacity) {
+static bst_status detect_sources(bst_ctx *ctx, const bst_imgproc_state *m,
+                                 const bst_imgproc_lane *l, const bst_imgproc_exposure *e,
+                                 bool beside_another, bst_detections *out, int capacity) {
     const bst_frame_message *message = e->message;
     const bst_camera_motion *motion = e->motion;
     const bst_imgproc_windows windows = {m->windows.items, m->windows.count};
@@ -378,8 +258,8 @@ static bst_status detect_sources(bst_ctx *ctx, const imgproc_module *m, const la
 
 /* Detects the sources of the next frame ahead of its step. */
 static bst_status detect_ahead(void *self, struct bst_step *step) {
-    imgproc_module *m = self;
-    lane *l = &m->lanes[bst_step_lane(step)];
+    bst_imgproc_state *m = self;
+    bst_imgproc_lane *l = &m->lanes[bst_step_lane(step)];
     bst_ctx *ctx = bst_step_ctx(step);
     l->ready = false;
     bst_sample sample = bst_step_next(step, PORT_FRAME);
@@ -399,7 +279,7 @@ static bst_status detect_ahead(void *self, struct bst_step *step) {
     const bst_frame_message *message = sample.payload;
     bst_camera_motion motion;
     bool oriented = motion_of(step, message, &motion);
-    const exposure e = {.message = message, .motion = oriented ? &motion : NULL};
+    const bst_imgproc_exposure e = {.message = message, .motion = oriented ? &motion : NULL};
     BST_TRY(detect_sources(ctx, m, l, &e, true, l->made, capacity));
     l->exposure_id = message->exposure_id;
     l->ready = true;
@@ -407,8 +287,8 @@ static bst_status detect_ahead(void *self, struct bst_step *step) {
 }
 
 /* Detections of a frame: computed ahead or now. */
-static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l, const exposure *e,
-                                bst_detections *out, int capacity) {
+static bst_status detections_of(bst_ctx *ctx, bst_imgproc_state *m, bst_imgproc_lane *l,
+                                const bst_imgproc_exposure *e, bst_detections *out, int capacity) {
     bool made = l->ready && l->exposure_id == e->message->exposure_id;
     l->ready = false;
     if (!made) {
@@ -426,7 +306,7 @@ static bst_status detections_of(bst_ctx *ctx, imgproc_module *m, lane *l, const 
 }
 
 /* Adds the frame to the stack; a full stack appends its detections to those of its last frame. */
-static void add_to_stack(imgproc_module *m, const lane *l, double middle_tick,
+static void add_to_stack(bst_imgproc_state *m, const bst_imgproc_lane *l, double middle_tick,
                          bst_quat q_cam_from_gcrf, const bst_optics_zero_point *zero_point,
                          bst_detections *out, int capacity) {
     bst_stack_frame frame =
@@ -442,7 +322,7 @@ static void add_to_stack(imgproc_module *m, const lane *l, double middle_tick,
 }
 
 /* Updates the bad-pixel learner with the frame. */
-static void learn_pixels(imgproc_module *m, struct bst_step *step, const lane *l,
+static void learn_pixels(bst_imgproc_state *m, struct bst_step *step, const bst_imgproc_lane *l,
                          const bst_frame_message *message, const bst_imgproc_frame_knowledge *known,
                          bst_detections *out) {
     int64_t lost = bst_pixel_learner_lost(m->pixels);
@@ -461,13 +341,13 @@ static void learn_pixels(imgproc_module *m, struct bst_step *step, const lane *l
 
 /* Observer's position and velocity at mid-exposure; the navigation telemetry may be later by the
  * read-out time. */
-static bst_light observer_at(const imgproc_module *m, const bst_nav_telemetry *nav,
+static bst_light observer_at(const bst_imgproc_state *m, const bst_nav_telemetry *nav,
                              double middle_tick) {
     return bst_nav_light_after(nav, (middle_tick - (double)nav->tick) / (double)m->tick_rate_hz);
 }
 
 /* Labels detections that are no stars, and refines the fit of possible objects. */
-static void label_objects(imgproc_module *m, const lane *l,
+static void label_objects(bst_imgproc_state *m, const bst_imgproc_lane *l,
                           const bst_imgproc_frame_knowledge *known,
                           const bst_optics_zero_point *zero_point, bst_detections *out) {
     bst_imgproc_discriminator_label(m->discriminator, known, out);
@@ -478,14 +358,75 @@ static void label_objects(imgproc_module *m, const lane *l,
     }
 }
 
+/* Detects the frame's sources and fills the message's header, except for the stars.
+ *
+ * Returned:  *e  what is known of the exposure */
+static bst_status detect_frame(bst_imgproc_state *m, struct bst_step *step, bst_imgproc_lane *l,
+                               bst_imgproc_exposure *e, bst_detections *out, int capacity) {
+    const bst_frame_message *message = e->message;
+    bst_sample nav = bst_step_latest(step, PORT_NAV);
+    double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
+    e->locked = e->motion && e->predictions && e->predictions->attitude_valid;
+    if (e->locked) {
+        out->q_cam_from_gcrf = bst_quat_unit(bst_quat_mul(
+            attitude_correction(m, e->predictions, middle), out->q_telemetry_from_gcrf));
+    }
+    m->windows.count = 0;
+    out->windows = 0;
+    e->navigated = nav.payload && !nav.stale;
+    if (e->navigated) {
+        e->light = observer_at(m, nav.payload, middle);
+    }
+    if (m->config->track_windows && e->locked && e->navigated) {
+        BST_TRY(plan_windows(bst_step_ctx(step), m, e, out->q_cam_from_gcrf));
+        out->windows = m->windows.count;
+    }
+    BST_TRY(detections_of(bst_step_ctx(step), m, l, e, out, capacity));
+    if (!m->plugin) {
+        m->window_v_limit = bst_imgproc_v_limit(l->ip, WINDOW_STAR_SNR);
+        const bst_extended_input input = {&m->camera,
+                                          message,
+                                          bst_imgproc_silhouettes(l->ip),
+                                          e->motion && e->navigated,
+                                          e->light.sun_m,
+                                          out->q_cam_from_gcrf};
+        bst_extended_step_begin(&m->extended, &input, out);
+    }
+    return BST_OK;
+}
+
+/* Adds what needs labels: extended targets, and detections of a stack. */
+static void append_detections(bst_imgproc_state *m, const bst_imgproc_lane *l,
+                              const bst_imgproc_exposure *e, bst_quat q_cam_from_gcrf,
+                              const bst_optics_zero_point *zero_point, bst_detections *out,
+                              int capacity) {
+    const bst_frame_message *message = e->message;
+    double ticks = (double)(message->end_tick - message->start_tick);
+    bst_extended_step_append(&m->extended, ticks / (double)m->tick_rate_hz, zero_point, out,
+                             capacity);
+    if (m->stack && !bst_imgproc_smeared(l->ip)) {
+        double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
+        add_to_stack(m, l, middle, q_cam_from_gcrf, zero_point, out, capacity);
+    }
+}
+
+/* Counts what the step reports. */
+static void count_losses(struct bst_step *step, const bst_detections *out) {
+    if (out->stars_identified == 0) {
+        bst_step_count(step, "frame_without_stars");
+    }
+    if (out->lost > 0) {
+        bst_step_count(step, "detections_overflow");
+    }
+}
+
 /* Processes a frame message into detections. */
-static bst_status process_frame(imgproc_module *m, struct bst_step *step,
+static bst_status process_frame(bst_imgproc_state *m, struct bst_step *step,
                                 const bst_frame_message *message) {
     bst_ctx *ctx = bst_step_ctx(step);
-    lane *l = &m->lanes[bst_step_lane(step)];
+    bst_imgproc_lane *l = &m->lanes[bst_step_lane(step)];
     bst_camera_motion motion;
     bool oriented = motion_of(step, message, &motion);
-    bst_sample nav = bst_step_latest(step, PORT_NAV);
     bst_sample predicted = bst_step_latest(step, PORT_PREDICTIONS);
     int capacity = 0;
     bst_detections *out = bst_step_write(step, PORT_DETECTIONS, &capacity);
@@ -494,30 +435,10 @@ static bst_status process_frame(imgproc_module *m, struct bst_step *step,
     out->end_tick = message->end_tick;
     out->q_cam_from_gcrf = out->q_telemetry_from_gcrf = motion.q_cam_from_gcrf;
     const bst_predictions *predictions = predicted.stale ? NULL : predicted.payload;
-    exposure e = {
+    bst_imgproc_exposure e = {
         .message = message, .motion = oriented ? &motion : NULL, .predictions = predictions};
-    e.locked = oriented && predictions && predictions->attitude_valid;
-    double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
-    if (e.locked) {
-        out->q_cam_from_gcrf = bst_quat_unit(
-            bst_quat_mul(attitude_correction(m, predictions, middle), motion.q_cam_from_gcrf));
-    }
-
-    m->windows.count = 0;
-    out->windows = 0;
-    bool navigated = nav.payload && !nav.stale;
-    if (navigated) {
-        e.light = observer_at(m, nav.payload, middle);
-    }
-    if (m->config->track_windows && e.locked && navigated) {
-        BST_TRY(plan_windows(ctx, m, &e, out->q_cam_from_gcrf));
-        out->windows = m->windows.count;
-    }
-    BST_TRY(detections_of(ctx, m, l, &e, out, capacity));
+    BST_TRY(detect_frame(m, step, l, &e, out, capacity));
     bool smeared = !m->plugin && bst_imgproc_smeared(l->ip);
-    if (!m->plugin) {
-        m->window_v_limit = bst_imgproc_v_limit(l->ip, WINDOW_STAR_SNR);
-    }
     bst_optics_photometer_begin(&m->photometer);
     bst_imgproc_frame_knowledge known = {.q_cam_from_gcrf = out->q_cam_from_gcrf,
                                          .window = message->window,
@@ -525,14 +446,15 @@ static bst_status process_frame(imgproc_module *m, struct bst_step *step,
                                                           ? bst_plugin_detector_streak_px(m->plugin)
                                                           : bst_imgproc_streak_px(l->ip),
                                          .predictions = predictions};
-    if (oriented && navigated && !smeared) {
-        BST_TRY(identify_stars(ctx, m, l, &e, out, &known.q_cam_from_gcrf));
+    if (oriented && e.navigated && !smeared) {
+        BST_TRY(bst_imgproc_identify_stars(ctx, m, l, &e, out, &known.q_cam_from_gcrf));
         known.light = e.light;
         known.oriented = out->stars_identified > 0;
     }
     bst_optics_zero_point zero_point = bst_optics_photometer_zero_point(&m->photometer);
     bst_photometry_apply(&zero_point, bst_camera_v_mag(&m->camera, 1.0), out);
     if (predictions) {
+        double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
         known.predictions_age_s = (middle - (double)predictions->tick) / (double)m->tick_rate_hz;
     }
     known.learned = m->pixels;
@@ -547,21 +469,14 @@ static bst_status process_frame(imgproc_module *m, struct bst_step *step,
     if (!smeared) {
         label_objects(m, l, &known, &zero_point, out);
     }
-    if (out->stars_identified == 0) {
-        bst_step_count(step, "frame_without_stars");
-    }
-    if (m->stack && !smeared) {
-        add_to_stack(m, l, middle, known.q_cam_from_gcrf, &zero_point, out, capacity);
-    }
-    if (out->lost > 0) {
-        bst_step_count(step, "detections_overflow");
-    }
+    append_detections(m, l, &e, known.q_cam_from_gcrf, &zero_point, out, capacity);
+    count_losses(step, out);
     assert(bst_detections_are_valid(out, capacity));
     return BST_OK;
 }
 
 static bst_status step_module(void *self, struct bst_step *step) {
-    imgproc_module *m = self;
+    bst_imgproc_state *m = self;
     bst_sample sample;
     /* Lanes alternate by step; without look-ahead the bad-pixel map is equally old. */
     int slot = (int)(m->steps % BST_STEP_LANES);

@@ -283,7 +283,8 @@ static void find_attitude(bst_tracker *t, const bst_tracker_input *input, const 
 static bst_sky_measurement direction_of(const bst_tracker *t, const bst_detection *item,
                                         const frame_attitude *attitude, const bst_light *light) {
     double extra = t->floor_variance_px2;
-    if (item->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE)) {
+    bool blend = (item->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE)) != 0;
+    if (blend && !(item->flags & BST_DETECTION_EXTENDED)) { /* its covariance includes the edge */
         extra += t->blend_variance_px2;
     }
     return bst_sky_of_detection(&t->camera, item, extra, attitude->q_cam_from_gcrf,
@@ -301,7 +302,9 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
         bool positive =
             item->cov_xx > 0.0 && item->cov_xx * item->cov_yy > item->cov_xy * item->cov_xy;
         /* positions less accurate than an unusable attitude would only cause false tracks */
-        bool sharp = item->cov_xx <= t->max_variance_px2 && item->cov_yy <= t->max_variance_px2;
+        bool extended = (item->flags & BST_DETECTION_EXTENDED) != 0; /* cannot be a star */
+        bool sharp = extended ||
+                     (item->cov_xx <= t->max_variance_px2 && item->cov_yy <= t->max_variance_px2);
         /* an uncatalogued star is distinguished from a slow object by its track */
         bool may_move = item->label == BST_LABEL_OBJECT || item->label == BST_LABEL_UNKNOWN ||
                         (item->label == BST_LABEL_STAR && item->star_id == 0);
@@ -324,7 +327,7 @@ static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_
                                 .v_mag = bright ? item->v_mag : 0.0,
                                 .v_mag_sigma = bright ? item->v_mag_sigma : INFINITY,
                                 .snr = item->snr,
-                                .length_rad = scale * item->length_px,
+                                .length_rad = extended ? 0.0 : scale * item->length_px,
                                 .width_px = item->width_px};
     }
     return count;

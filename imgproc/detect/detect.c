@@ -65,6 +65,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
     BST_TRY(bst_imgproc_locator_create(ctx, ip->known, &limits, &ip->locator));
     ip->locator.max_fits = (int)ip->config.max_fits;
     BST_TRY(bst_streak_motion_create(ctx, side, &ip->streak_motion));
+    BST_TRY(bst_imgproc_open_silhouettes(ctx, ip));
     return ip->config.streak_search_px > 0.0
                ? bst_streak_locator_create(ctx, &ip->locator.psf, ip->pool, &streaks, &ip->streaks)
                : BST_OK;
@@ -113,6 +114,7 @@ void bst_imgproc_free(bst_imgproc *ip) {
     free(ip->order_swap);
     free(ip->row);
     bst_pages_free(ip->cropped);
+    bst_imgproc_close_silhouettes(ip);
     bst_background_free(&ip->background);
     bst_filter_free(&ip->filter);
     bst_candidates_free(&ip->candidates);
@@ -344,11 +346,15 @@ static void find_candidates(bst_imgproc *ip, const bst_imgproc_frame *frame,
     ip->exposure_s = frame->exposure_s;
     ip->binning = frame->binning;
 
+    const uint8_t *bad = ip->bad;
+    if (frame == whole && ip->config.extended.enabled) {
+        bad = bst_imgproc_find_silhouettes(ip, frame, motion, sigma, saturation_dn(ip, frame));
+    }
     const bst_bad_rows *learned = ip->map && ip->map->rows.count > 0 ? &ip->map->rows : NULL;
     const bst_columns *columns = ip->columns.count > 0 ? &ip->columns : NULL;
     int first_column = (frame->window.x0 - whole->window.x0) / frame->binning;
     star_masking_reader masking = {
-        {&ip->camera, &ip->maps, ip->bad, frame, learned, columns, first_column}, &ip->filter};
+        {&ip->camera, &ip->maps, bad, frame, learned, columns, first_column}, &ip->filter};
     ip->filter.correct_row = learned || columns ? correct_column_noise : NULL;
     ip->filter.correct_user = &masking.read;
     const bst_calibrate_pixels *read = &masking.read;

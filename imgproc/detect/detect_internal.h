@@ -4,6 +4,7 @@
 
 #include "imgproc/calibrate/calibrate_pixels.h"
 #include "imgproc/calibrate/pixel_learner.h"
+#include "imgproc/extended/silhouette.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/measure/locate.h"
 #include "imgproc/streak/streak_locate.h"
@@ -26,6 +27,11 @@ struct bst_imgproc {
     bst_parallel *pool;
     int *order, *order_swap, *row;
     uint16_t *cropped; /* pixels of a cropped window */
+    /* with config.extended.enabled */
+    bst_silhouette_finder finder;
+    bst_silhouettes silhouettes; /* of the latest frame */
+    uint8_t *silhouette_mask;    /* [height][width] of the latest frame: masked targets */
+    uint8_t *masked; /* [height_px][width_px]: `bad` and masked targets; used if there are some */
     /* of the latest frame */
     bst_locate_frame view;
     bst_camera_motion motion;
@@ -37,6 +43,17 @@ struct bst_imgproc {
     bst_columns columns;      /* column levels of the latest frame; capacity 0: not measured */
     bst_pixel_shows shows; /* bad-pixel evidence of the latest frame; capacity 0: not collected */
 };
+
+/* Allocates what extended targets need, with config.extended.enabled. BST_ERR_MEMORY. */
+bst_status bst_imgproc_open_silhouettes(bst_ctx *ctx, bst_imgproc *ip) BST_MUST_CHECK;
+/* Frees it. */
+void bst_imgproc_close_silhouettes(bst_imgproc *ip);
+
+/* Searches the frame for extended targets: fills ip->silhouettes and, if some are masked,
+ * ip->masked. Returns the map of pixels to leave out: ip->masked or ip->bad. */
+const uint8_t *bst_imgproc_find_silhouettes(bst_imgproc *ip, const bst_imgproc_frame *frame,
+                                            const bst_camera_motion *motion, double sigma_px,
+                                            int saturated_dn);
 
 /* Clears the bad-pixel evidence (ip->shows) before a frame. */
 void bst_imgproc_begin_shows(bst_imgproc *ip);

@@ -71,7 +71,7 @@ void bst_deblend_gather(const bst_imgproc_locator *l, const bst_locate_frame *f,
     cell_range(stamp->x0, stamp->x0 + stamp->width, margin, l->columns, &first_column,
                &last_column);
     cell_range(stamp->y0, stamp->y0 + stamp->height, margin, l->rows, &first_row, &last_row);
-    int near[BST_COMPANY_MAX_FIXED + BST_FIT_MAX_FREE], count = 0,
+    int near[BST_DEBLEND_MAX_FIXED + BST_FIT_MAX_FREE], count = 0,
                                                         across = last_column - first_column + 1;
     for (int c = 0; c < across * (last_row - first_row + 1); c++) {
         int cell = (first_row + c / across) * l->columns + first_column + c % across;
@@ -90,10 +90,10 @@ void bst_deblend_gather(const bst_imgproc_locator *l, const bst_locate_frame *f,
             while (at > 0 && near[at - 1] > k) {
                 at--;
             }
-            if (count == BST_COMPANY_MAX_FIXED + BST_FIT_MAX_FREE && at == count) {
+            if (count == BST_DEBLEND_MAX_FIXED + BST_FIT_MAX_FREE && at == count) {
                 continue;
             }
-            count += count < BST_COMPANY_MAX_FIXED + BST_FIT_MAX_FREE;
+            count += count < BST_DEBLEND_MAX_FIXED + BST_FIT_MAX_FREE;
             for (int m = count - 1; m > at; m--) {
                 near[m] = near[m - 1];
             }
@@ -108,7 +108,7 @@ void bst_deblend_gather(const bst_imgproc_locator *l, const bst_locate_frame *f,
                       s->shape.y_px <= stamp->y0 + stamp->height + 0.5;
         if (inside && out->free_count < BST_FIT_MAX_FREE) {
             out->free[out->free_count++] = s;
-        } else if (out->fixed_count < BST_COMPANY_MAX_FIXED) {
+        } else if (out->fixed_count < BST_DEBLEND_MAX_FIXED) {
             out->fixed[out->fixed_count++] = s;
         }
     }
@@ -139,7 +139,7 @@ bool bst_deblend_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *foun
     bool ok = bst_fit_run(w->fit, &request);
     if (!ok && c.free_count > 1) {
         /* The pixels do not constrain a neighbour, e.g. at the stamp's edge: it stays fixed. */
-        for (int k = 1; k < c.free_count && request.fixed_count < BST_COMPANY_MAX_FIXED; k++) {
+        for (int k = 1; k < c.free_count && request.fixed_count < BST_DEBLEND_MAX_FIXED; k++) {
             c.fixed[request.fixed_count++] = c.free[k];
         }
         copies[0] = *c.free[0];

@@ -4,7 +4,7 @@
 
 #include "imgproc/measure/locate.h"
 
-enum { BST_COMPANY_MAX_FIXED = 12 };
+enum { BST_DEBLEND_MAX_FIXED = 12 };
 
 /* One thread's context in a loop over the located sources. */
 typedef struct bst_imgproc_worker {
@@ -17,7 +17,7 @@ typedef struct bst_imgproc_worker {
 typedef struct bst_deblend {
     const bst_imgproc_source *free[BST_FIT_MAX_FREE]; /* free[0] is the source itself */
     int free_count;
-    const bst_imgproc_source *fixed[BST_COMPANY_MAX_FIXED];
+    const bst_imgproc_source *fixed[BST_DEBLEND_MAX_FIXED];
     int fixed_count;
 } bst_deblend;
 

@@ -24,7 +24,7 @@ bool bst_source_moments_measure(const bst_imgproc_worker *w, int i, bst_imgproc_
         if (!found->rough) {
             bst_deblend_gather(w->l, f, i, &found->source, &stamp, &c);
         }
-        const bst_imgproc_source *others[BST_FIT_MAX_FREE + BST_COMPANY_MAX_FIXED];
+        const bst_imgproc_source *others[BST_FIT_MAX_FREE + BST_DEBLEND_MAX_FIXED];
         int count = 0;
         for (int k = 1; k < c.free_count; k++) {
             others[count++] = c.free[k];

@@ -14,6 +14,7 @@
 #include "sim/core/json_number.h"
 #include "sim/core/text.h"
 #include "sim/export/export.h"
+#include "sim/export/shape_labels.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/fits_reader.h"
 #include "sim/io/frame_picture.h"
@@ -41,6 +42,7 @@ typedef struct job {
     bst_fits_reader *fits;
     bst_io_rows *truth; /* truth rows of the sensor, by exposure; at the next unprocessed row */
     bool truth_more;
+    bst_shape_labels shapes;
     char set[256];
     bst_fits_reader *masks;  /* NULL: the run has none */
     bst_fits_read_mask mask; /* of the current frame; items NULL: none */
@@ -64,6 +66,8 @@ typedef struct box {
     class_kind class;
     double x, y, width, height; /* clipped to the image */
     double x_centroid, y_centroid;
+    bool shaped; /* `shape` is known */
+    bst_shape_label shape;
 } box;
 
 static const char frames_sql[] =
@@ -109,6 +113,31 @@ static bool box_of(const job *j, const frame_row *f, box *out) {
                   (out->class != STAR || bst_io_rows_real(r, 8) <= j->e->star_limit);
     return finite && bright && clip(x, margin, f->width, &out->x, &out->width) &&
            clip(y, margin, f->height, &out->y, &out->height);
+}
+
+/* Coordinates of a frame's image. */
+static bst_shape_label_view view_of(const frame_row *f) {
+    return (bst_shape_label_view){f->x0_px, f->y0_px, f->binning, f->binning};
+}
+
+/* Finds the shape of a box. An object that is larger than the box of a point gets the box around
+ * its parts. False: no part is on the image. */
+static bst_status find_shape(bst_ctx *ctx, job *j, const frame_row *f, box *b, bool *shown) {
+    *shown = true;
+    BST_TRY(bst_shape_labels_find(ctx, &j->shapes, f->id, bst_io_rows_int(j->truth, 17), &b->shape,
+                                  &b->shaped));
+    if (!b->shaped || !(b->shape.size_px > f->binning * j->e->box_px)) {
+        return BST_OK;
+    }
+    const double x[] = {b->shape.x0_px, b->shape.x1_px}, y[] = {b->shape.y0_px, b->shape.y1_px};
+    double ends[2][3];
+    for (int k = 0; k < 3; k++) {
+        ends[0][k] = (x[k / 2] - f->x0_px + 0.5) / f->binning;
+        ends[1][k] = (y[k / 2] - f->y0_px + 0.5) / f->binning;
+    }
+    *shown = clip(ends[0], 0.5 * LEAST_PX, f->width, &b->x, &b->width) &&
+             clip(ends[1], 0.5 * LEAST_PX, f->height, &b->y, &b->height);
+    return BST_OK;
 }
 
 /* ------------------------------------------------------------------ masks */
@@ -214,7 +243,7 @@ static bst_status add_segmentation(bst_ctx *ctx, const job *j, const box *b, cJS
 /* ------------------------------------------------------------------ boxes */
 
 /* Adds the COCO annotation of one true source. */
-static bst_status add_coco_box(bst_ctx *ctx, job *j, const box *b) {
+static bst_status add_coco_box(bst_ctx *ctx, job *j, const frame_row *f, const box *b) {
     cJSON *node = cJSON_CreateObject();
     cJSON_AddNumberToObject(node, "id", (double)(j->boxes + 1));
     cJSON_AddNumberToObject(node, "image_id", (double)(j->written + 1));
@@ -229,6 +258,10 @@ static bst_status add_coco_box(bst_ctx *ctx, job *j, const box *b) {
     bst_json_add_number(node, "snr", bst_io_rows_real(j->truth, 10));
     cJSON_AddStringToObject(node, "object_name", bst_io_rows_text(j->truth, 15));
     cJSON_AddNumberToObject(node, "norad", (double)bst_io_rows_int(j->truth, 16));
+    if (b->shaped) {
+        const bst_shape_label_view view = view_of(f);
+        bst_shape_label_add(&b->shape, &view, node);
+    }
     cJSON_AddItemToArray(j->annotations, node);
     return status;
 }
@@ -251,15 +284,19 @@ static void add_coco_image(job *j, const frame_row *f) {
  * none. */
 static bst_status write_boxes(bst_ctx *ctx, job *j, const frame_row *f, FILE *yolo) {
     for (; j->truth_more && bst_io_rows_int(j->truth, 0) <= f->id;) {
-        box b;
-        if (bst_io_rows_int(j->truth, 0) == f->id && box_of(j, f, &b)) {
+        box b = {.shaped = false};
+        bool shown = bst_io_rows_int(j->truth, 0) == f->id && box_of(j, f, &b);
+        if (shown && b.class == SATELLITE) {
+            BST_TRY(find_shape(ctx, j, f, &b, &shown));
+        }
+        if (shown) {
             if (yolo) {
                 fprintf(yolo, "%d %.9f %.9f %.9f %.9f\n", b.class, (b.x + 0.5 * b.width) / f->width,
                         (b.y + 0.5 * b.height) / f->height, b.width / f->width,
                         b.height / f->height);
             }
             if (j->annotations) {
-                BST_TRY(add_coco_box(ctx, j, &b));
+                BST_TRY(add_coco_box(ctx, j, f, &b));
             }
             j->boxes++;
         }
@@ -373,10 +410,13 @@ static bst_status export_sensor(bst_ctx *ctx, job *j, bool several) {
     if (status == BST_OK) {
         status = bst_fits_reader_open(ctx, path, &j->fits);
     }
+    status = status == BST_OK ? bst_shape_labels_open(ctx, j->e, (int)j->sensor->index, &j->shapes)
+                              : status;
     status = status == BST_OK ? open_masks(ctx, j) : status;
     status = status == BST_OK ? write_frames(ctx, j) : status;
     bst_fits_reader_close(j->fits);
     bst_fits_reader_close(j->masks);
+    bst_shape_labels_close(&j->shapes);
     bst_io_rows_close(j->truth);
     return status;
 }

@@ -16,6 +16,7 @@
 #include "sim/core/json_number.h"
 #include "sim/core/text.h"
 #include "sim/export/export.h"
+#include "sim/export/shape_labels.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/fits_frames.h"
 #include "sim/io/fits_reader.h"
@@ -50,6 +51,7 @@ typedef struct job {
     bst_fits_reader *fits;
     bst_io_rows *truth; /* truth rows of the sensor, by exposure; at the next unprocessed row */
     bool truth_more;
+    bst_shape_labels shapes;
     bool mask; /* the run has a segmentation mask */
     int64_t written;
     double shares[PARTS];
@@ -182,6 +184,23 @@ static cJSON *label(const job *j, const bst_fits_frame *f, int width, int height
     return node;
 }
 
+/* Adds the shape of the current truth row, if it has one; coordinates are fractions of the image.
+ */
+static bst_status add_shape(bst_ctx *ctx, job *j, const frame_row *row, int width, int height,
+                            cJSON *node) {
+    bst_shape_label shape;
+    bool found;
+    BST_TRY(bst_shape_labels_find(ctx, &j->shapes, row->id, bst_io_rows_int(j->truth, 15), &shape,
+                                  &found));
+    if (found) {
+        double binning = row->frame.binning > 1 ? row->frame.binning : 1;
+        const bst_shape_label_view view = {row->frame.window.x0, row->frame.window.y0,
+                                           binning * width, binning * height};
+        bst_shape_label_add(&shape, &view, node);
+    }
+    return BST_OK;
+}
+
 /* Adds the labels of a frame from the truth rows of its exposure; skips earlier rows. */
 static bst_status add_labels(bst_ctx *ctx, job *j, const frame_row *row, int width, int height,
                              cJSON *list, int *satellites) {
@@ -190,6 +209,7 @@ static bst_status add_labels(bst_ctx *ctx, job *j, const frame_row *row, int wid
         if (bst_io_rows_int(j->truth, 0) == row->id) {
             cJSON *node = label(j, &row->frame, width, height);
             if (node) {
+                BST_TRY(add_shape(ctx, j, row, width, height, node));
                 *satellites += strcmp(bst_io_rows_text(j->truth, 1), "star") != 0;
                 cJSON_AddItemToArray(list, node);
             }
@@ -369,7 +389,9 @@ static bst_status export_sensor(bst_ctx *ctx, job *j, int sensors) {
     bst_export_set_name(j->e->run, sensors > 1 ? j->sensor : NULL, j->set);
     BST_TRY(bst_run_reader_file(ctx, j->e->run, j->sensor->file, path, sizeof path));
     BST_TRY(bst_fits_reader_open(ctx, path, &j->fits));
-    bst_status status = write_frames(ctx, j);
+    bst_status status = bst_shape_labels_open(ctx, j->e, (int)j->sensor->index, &j->shapes);
+    status = status == BST_OK ? write_frames(ctx, j) : status;
+    bst_shape_labels_close(&j->shapes);
     bst_fits_reader_close(j->fits);
     j->fits = NULL;
     return status;

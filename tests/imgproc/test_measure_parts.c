@@ -117,7 +117,7 @@ static void neighbours(void **state) {
                     }
                 }
                 if (k == i || q->dropped || q->label == BST_LABEL_HIT || !shares ||
-                    listed == BST_FIT_MAX_FREE + BST_COMPANY_MAX_FIXED) {
+                    listed == BST_FIT_MAX_FREE + BST_DEBLEND_MAX_FIXED) {
                     continue;
                 }
                 listed++;
@@ -126,7 +126,7 @@ static void neighbours(void **state) {
                 if (inside && free_count < BST_FIT_MAX_FREE) {
                     assert_true(free_count < out.free_count);
                     assert_ptr_equal(out.free[free_count++], &q->source);
-                } else if (fixed_count < BST_COMPANY_MAX_FIXED) {
+                } else if (fixed_count < BST_DEBLEND_MAX_FIXED) {
                     assert_true(fixed_count < out.fixed_count);
                     assert_ptr_equal(out.fixed[fixed_count++], &q->source);
                 }

@@ -25,7 +25,20 @@ enum {
     BST_DETECTION_BLOOM =
         1u << 5, /* charge overflowed along its columns: centroid from its wings */
     BST_DETECTION_STACK = 1u << 4, /* detected in a stack of frames that ends with this one */
+    /* larger than the PSF: x_px and y_px are its estimated centre of mass, see extent */
+    BST_DETECTION_EXTENDED = 1u << 6,
 };
+
+/* Measures of an extended target, full-sensor coordinates; all 0 without BST_DETECTION_EXTENDED. */
+typedef struct bst_detection_extent {
+    double light_x_px, light_y_px;     /* centroid of light */
+    double x0_px, y0_px, x1_px, y1_px; /* bounding box */
+    double size_px, size_sigma_px;     /* largest extent of the outline */
+    double area_px2;                   /* of the silhouette, dark holes filled */
+    double phase_rad;                  /* Sun - target - observer, by the onboard Sun */
+    double saturated_share;            /* share of the area that is saturated */
+    double range_m, range_sigma_m;     /* from the known size; 0: size unknown */
+} bst_detection_extent;
 
 typedef struct bst_detection {
     double x_px, y_px;             /* full-sensor coordinates, mid-exposure centroid */
@@ -42,6 +55,7 @@ typedef struct bst_detection {
     double rate_x_pxps,
         rate_y_pxps;        /* rate against the stars; only with BST_DETECTION_STACK, else 0 */
     double rate_sigma_pxps; /* per axis */
+    bst_detection_extent extent;
 } bst_detection;
 
 /* detections (queue): what image processing (or the generator) found in one frame. */

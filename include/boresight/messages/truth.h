@@ -40,6 +40,20 @@ typedef struct bst_truth_item {
     double range_m;         /* object: mid */
 } bst_truth_item;
 
+/* Objects with a shape in one exposure, at most. */
+enum { BST_TRUTH_SHAPES = 8 };
+
+/* An object with a shape at mid-exposure. Pixels are full-sensor coordinates; NAN where a part is
+ * behind the camera. */
+typedef struct bst_truth_shape {
+    int32_t item;                      /* index in items */
+    double x_px, y_px;                 /* centre of mass: the origin of the body */
+    double x0_px, y0_px, x1_px, y1_px; /* box around all parts, lit or not, without the PSF */
+    double size_px;                    /* largest extent of all parts */
+    double x_light_px, y_light_px;     /* centroid of light; of the centre of mass without light */
+    bst_quat q_body_from_gcrf;
+} bst_truth_shape;
+
 /* truth (queue): the true scene of one exposure. */
 typedef struct bst_truth {
     int64_t exposure_id;
@@ -62,7 +76,9 @@ typedef struct bst_truth {
     int64_t nodes;      /* quadrature points of the sources' tracks */
     bool one_track;     /* all stars were rendered with one track */
     double pixel_scale_arcsec; /* of this exposure */
-    int32_t count, lost;       /* items; sources beyond the capacity */
+    int32_t shape_count;
+    bst_truth_shape shapes[BST_TRUTH_SHAPES];
+    int32_t count, lost; /* items; sources beyond the capacity */
     bst_truth_item items[];
 } bst_truth;
 

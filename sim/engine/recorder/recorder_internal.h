@@ -26,6 +26,8 @@ typedef enum bst_recorder_table {
     BST_TABLE_CONTROL,
     BST_TABLE_EVENTS,
     BST_TABLE_TASKS,
+    BST_TABLE_SHAPES,
+    BST_TABLE_EXTENDED,
     BST_TABLE_COUNT
 } bst_recorder_table;
 
@@ -102,6 +104,22 @@ bst_status bst_recorder_run_row(bst_ctx *ctx, bst_recorder *recorder) BST_MUST_C
  *            file    name of its FITS file; NULL: none */
 bst_status bst_recorder_sensor_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                    const char *file) BST_MUST_CHECK;
+
+/* Middle of an exposure, s after the epoch. */
+static inline double bst_recorder_mid_s(const bst_recorder *recorder, int64_t start_tick,
+                                        int64_t end_tick) {
+    return 0.5 * (double)(start_tick + end_tick) / (double)recorder->tick_rate_hz;
+}
+
+/* Writes the rows of table shapes; none if the run has no such table. */
+bst_status bst_recorder_shape_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                                   const bst_truth *truth) BST_MUST_CHECK;
+/* Writes the row of table extended_targets of a detection; none if it is not extended, or the run
+ * has no such table.
+ *
+ * Given:     item  index of the detection */
+bst_status bst_recorder_extended_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                                     const bst_detections *detections, int item) BST_MUST_CHECK;
 
 /* Functions that write the rows of one message. */
 #define BST_RECORDER_ROWS(name)                                                            \

@@ -50,10 +50,6 @@ static bst_vec3 boresight(bst_quat q_cam_from_gcrf) {
 static double seconds(const bst_recorder *recorder, int64_t tick) {
     return (double)tick / (double)recorder->tick_rate_hz;
 }
-static double mid_seconds(const bst_recorder *recorder, int64_t start_tick, int64_t end_tick) {
-    return 0.5 * (double)(start_tick + end_tick) / (double)recorder->tick_rate_hz;
-}
-
 int64_t bst_recorder_not_due_before(const bst_recorder *recorder, int64_t last) {
     double hz = recorder->config.telemetry_hz, rate = (double)recorder->tick_rate_hz;
     double next = ((double)last + 1.0 - 1e-6) * rate / hz;
@@ -145,7 +141,7 @@ static bst_status exposure_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
     put_int(&r, t->exposure_id);
     put_int(&r, t->start_tick);
     put_int(&r, t->end_tick);
-    put_real(&r, mid_seconds(recorder, t->start_tick, t->end_tick));
+    put_real(&r, bst_recorder_mid_s(recorder, t->start_tick, t->end_tick));
     put_flag(&r, t->dropped);
     put_quat(&r, t->q_cam_from_gcrf_mid);
     put_quat(&r, t->q_cam_from_gcrf_mean);
@@ -193,7 +189,7 @@ bst_status bst_recorder_truth_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
     (void)written_tick;
     const bst_truth *t = payload;
     BST_TRY(exposure_row(ctx, recorder, sensor, t));
-    double mid_s = mid_seconds(recorder, t->start_tick, t->end_tick);
+    double mid_s = bst_recorder_mid_s(recorder, t->start_tick, t->end_tick);
     for (int i = 0; i < t->count; i++) {
         const bst_truth_item *item = &t->items[i];
         bool star = item->kind == BST_SOURCE_STAR;
@@ -234,7 +230,7 @@ bst_status bst_recorder_truth_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
         put_real(&r, star ? NAN : item->range_m);
         BST_TRY(append(ctx, recorder, BST_TABLE_TRUTH, &r));
     }
-    return BST_OK;
+    return bst_recorder_shape_rows(ctx, recorder, sensor, t);
 }
 
 bst_status bst_recorder_los_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
@@ -286,7 +282,7 @@ static bool kept(const bst_recorder *recorder, const bst_detection *item) {
 bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                        const void *payload, int64_t written_tick) {
     const bst_detections *d = payload;
-    double mid_s = mid_seconds(recorder, d->start_tick, d->end_tick);
+    double mid_s = bst_recorder_mid_s(recorder, d->start_tick, d->end_tick);
     row head = {.count = 0};
     put_int(&head, sensor);
     put_int(&head, d->exposure_id);
@@ -344,6 +340,7 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
         put_real(&r, item->rate_sigma_pxps);
         put_flag(&r, item->flags & BST_DETECTION_BLOOM);
         BST_TRY(append(ctx, recorder, BST_TABLE_DETECTIONS, &r));
+        BST_TRY(bst_recorder_extended_row(ctx, recorder, sensor, d, i));
     }
     return BST_OK;
 }

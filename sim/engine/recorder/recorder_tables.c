@@ -333,6 +333,48 @@ static const bst_io_column task_columns[] = {
     TEXT("before", "how the task before ended: none, done, not_found or lost"),
 };
 
+static const bst_io_column shape_columns[] = {
+    SENSOR,
+    EXPOSURE,
+    MID,
+    INT("item", "", "number of the source in its exposure: item in truth"),
+    INT("id", "", "object: index in the scenario"),
+    REAL("x_px", "px", "column of the centre of mass, the origin of the body, mid exposure"),
+    REAL("y_px", "px", "row"),
+    REAL("x_light_px", "px", "column of the centroid of light"),
+    REAL("y_light_px", "px", "row"),
+    REAL("x0_px", "px",
+         "box around all parts, lit or not, without the PSF; NULL: behind the camera"),
+    REAL("y0_px", "px", "lowest row"),
+    REAL("x1_px", "px", "highest column"),
+    REAL("y1_px", "px", "highest row"),
+    REAL("size_px", "px", "largest extent of all parts"),
+    QUATERNION("q_body_from_gcrf", "attitude of the body at mid exposure"),
+    REAL("phase_deg", "deg", "Sun - object - observer"),
+    REAL("range_m", "m", "from the observer"),
+};
+static const bst_io_column extended_columns[] = {
+    SENSOR,
+    EXPOSURE,
+    MID,
+    INT("item", "", "number of the detection in its frame: item in detections"),
+    REAL("x_px", "px", "column of the estimated centre of mass, mid exposure"),
+    REAL("y_px", "px", "row"),
+    REAL("x_light_px", "px", "column of the centroid of light"),
+    REAL("y_light_px", "px", "row"),
+    REAL("x0_px", "px", "box"),
+    REAL("y0_px", "px", "lowest row"),
+    REAL("x1_px", "px", "highest column"),
+    REAL("y1_px", "px", "highest row"),
+    REAL("size_px", "px", "largest extent of the outline"),
+    REAL("size_sigma_px", "px", "its standard deviation"),
+    REAL("area_px2", "px^2", "of the silhouette, dark holes filled"),
+    REAL("saturated_share", "", "share of the area that is saturated"),
+    REAL("phase_deg", "deg", "Sun - target - observer, by the onboard Sun"),
+    REAL("range_m", "m", "from the known size; NULL: unknown"),
+    REAL("range_sigma_m", "m", "its standard deviation"),
+};
+
 typedef struct table_spec {
     const char *name, *doc;
     const bst_io_column *columns;
@@ -369,9 +411,25 @@ static const table_spec specs[BST_TABLE_COUNT] = {
         SPEC("control", control_columns, "Control, at the telemetry's rate and at each change."),
     [BST_TABLE_EVENTS] = SPEC("events", event_columns, "Events."),
     [BST_TABLE_TASKS] = SPEC("tasks", task_columns, "What the sensors were given to look for."),
+    [BST_TABLE_SHAPES] =
+        SPEC("shapes", shape_columns, "True outline and attitude of objects with a shape."),
+    [BST_TABLE_EXTENDED] =
+        SPEC("extended_targets", extended_columns, "Detections larger than the PSF."),
 };
 
-static bool wanted(const bst_recorder_config *config, bst_recorder_table table) {
+/* True if an object of the world has a shape. */
+static bool has_shapes(const bst_recorder *recorder) {
+    int count = recorder->world ? bst_world_object_count(recorder->world) : 0;
+    for (int i = 0; i < count; i++) {
+        if (bst_world_object(recorder->world, i)->shape) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool wanted(const bst_recorder *recorder, bst_recorder_table table) {
+    const bst_recorder_config *config = &recorder->config;
     switch (table) {
         case BST_TABLE_EXPOSURES:
         case BST_TABLE_TRUTH:
@@ -396,6 +454,10 @@ static bool wanted(const bst_recorder_config *config, bst_recorder_table table) 
         case BST_TABLE_EVENTS:
         case BST_TABLE_TASKS:
             return config->events;
+        case BST_TABLE_SHAPES:
+            return config->truth && has_shapes(recorder);
+        case BST_TABLE_EXTENDED:
+            return config->detections && has_shapes(recorder);
         default:
             return true;
     }
@@ -403,7 +465,7 @@ static bool wanted(const bst_recorder_config *config, bst_recorder_table table) 
 
 bst_status bst_recorder_make_tables(bst_ctx *ctx, bst_recorder *recorder) {
     for (int i = 0; i < BST_TABLE_COUNT; i++) {
-        if (wanted(&recorder->config, (bst_recorder_table)i)) {
+        if (wanted(recorder, (bst_recorder_table)i)) {
             BST_TRY(bst_io_table_create(ctx, recorder->run, specs[i].name, specs[i].doc,
                                         specs[i].columns, specs[i].count, &recorder->tables[i]));
         }

@@ -13,6 +13,8 @@ typedef struct bst_truth_pick {
 
 void bst_truth_list_free(bst_truth_list *list) {
     free(list->picks);
+    free(list->source_of);
+    bst_shape_truth_free(&list->shapes);
     *list = (bst_truth_list){0};
 }
 
@@ -67,6 +69,19 @@ static double binned_share(const bst_camera *camera, int binning, const bst_trut
     return share;
 }
 
+/* Makes room for the source indices of a truth message. */
+static bst_status reserve_indices(bst_ctx *ctx, bst_truth_list *list, int count) {
+    if (count > list->room) {
+        int *more = realloc(list->source_of, 2 * (size_t)count * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the truth of %d sources", count);
+        }
+        list->source_of = more;
+        list->room = 2 * count;
+    }
+    return BST_OK;
+}
+
 bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_truth_request *q,
                                bst_truth *truth, int capacity, int *source_of) {
     assert(list && q && truth && capacity >= 0 && q->count >= 0);
@@ -76,6 +91,7 @@ bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_tru
     if (truth->lost > 0) {
         BST_TRY(pick_sources(ctx, list, q->sources, q->count, capacity));
     }
+    BST_TRY(reserve_indices(ctx, list, truth->count));
     const bst_camera *camera = q->camera;
     double top_e = ((double)((1 << camera->bits) - 1) - camera->offset_dn) * camera->gain_e_per_dn;
     int binning = q->binning > 1 ? q->binning : 1, added = binning * binning;
@@ -83,6 +99,7 @@ bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_tru
         int k = truth->lost > 0 ? list->picks[i].index : i;
         bst_truth_item *item = &truth->items[i];
         bst_field_truth_item(q->field, q->track, &q->sources[k], q->window, binning, truth, item);
+        list->source_of[i] = k;
         if (source_of) {
             source_of[i] = k;
         }
@@ -96,5 +113,5 @@ bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_tru
             item->flags |= BST_TRUTH_SATURATED;
         }
     }
-    return BST_OK;
+    return bst_shape_truth_fill(ctx, &list->shapes, camera, q->sources, list->source_of, truth);
 }

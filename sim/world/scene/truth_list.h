@@ -2,12 +2,15 @@
 #ifndef BST_WORLD_SCENE_TRUTH_LIST_H
 #define BST_WORLD_SCENE_TRUTH_LIST_H
 
-#include "sim/world/scene/field.h"
+#include "sim/world/scene/shape_truth.h"
 
 /* Work space, reused for every frame. All zero: empty. */
 typedef struct bst_truth_list {
     struct bst_truth_pick *picks;
     int capacity;
+    int *source_of; /* [room] */
+    int room;
+    bst_shape_truth shapes;
 } bst_truth_list;
 
 /* Frees the memory of a list and clears the struct, which belongs to the caller. */
@@ -29,11 +32,11 @@ typedef struct bst_truth_request {
     const void *user;
 } bst_truth_request;
 
-/* Fills the items of `truth` (room for `capacity`) by bst_field_truth_item, after bst_field_query
- * has filled its header. Flags sources that saturate a pixel's well or, after binning, the
- * converter. If there is no room for all, objects and the brightest stars are kept in source order;
- * truth->lost counts the others. source_of (may be NULL): [capacity], the source index of each
- * item. BST_ERR_MEMORY. */
+/* Fills items (room for `capacity`) and shapes of `truth` by bst_field_truth_item, after
+ * bst_field_query has filled its header. Flags sources that saturate a pixel's well or, after
+ * binning, the converter. If there is no room for all, objects and the brightest stars are kept in
+ * source order; truth->lost counts the others. source_of (may be NULL): [capacity], the source
+ * index of each item. BST_ERR_MEMORY. */
 bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_truth_request *request,
                                bst_truth *truth, int capacity, int *source_of) BST_MUST_CHECK;
 

@@ -1,0 +1,46 @@
+/* Convex outline of an extended target, and its measures. */
+#ifndef BST_IMGPROC_EXTENDED_OUTLINE_H
+#define BST_IMGPROC_EXTENDED_OUTLINE_H
+
+/* A point of the image, px. */
+typedef struct bst_outline_point {
+    double x_px, y_px;
+} bst_outline_point;
+
+/* Corners of an outline, at most. */
+enum { BST_OUTLINE_CORNERS = 128 };
+
+/* Convex outline: corners in the order of rising angle from +x towards +y. */
+typedef struct bst_outline {
+    bst_outline_point corner[BST_OUTLINE_CORNERS];
+    int count;
+} bst_outline;
+
+/* Makes the convex hull of points.
+ *
+ * Given:     points  [count]; sorted in place
+ * Returned:  *out  at most BST_OUTLINE_CORNERS corners; of more, those are left out that change
+ *                  the area least
+ *            hull  [2 * count], work space
+ * Reference: Andrew, Inf. Proc. Lett. 9, 216 (1979) */
+void bst_outline_make(bst_outline_point *points, int count, bst_outline_point *hull,
+                      bst_outline *out);
+
+/* Area, px^2, and centroid of an outline; an outline without area has its mean corner as centroid.
+ */
+double bst_outline_centroid(const bst_outline *outline, double *x_px, double *y_px);
+
+/* Largest and smallest extent of an outline.
+ *
+ * Returned:  *length_px  largest distance of two corners (diameter of the outline)
+ *            *angle_rad  direction of that distance, from +x towards +y
+ *            *width_px   smallest distance of two parallel lines that enclose the outline */
+void bst_outline_extent(const bst_outline *outline, double *length_px, double *angle_rad,
+                        double *width_px);
+
+/* Extent of an outline along a direction, px.
+ *
+ * Given:     x, y  the direction, of length 1 */
+double bst_outline_extent_along(const bst_outline *outline, double x, double y);
+
+#endif

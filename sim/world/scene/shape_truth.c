@@ -1,0 +1,169 @@
+#include "sim/world/scene/shape_truth.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include "sim/world/scene/source_body.h"
+
+void bst_shape_truth_free(bst_shape_truth *work) {
+    for (int i = 0; i < BST_TRUTH_SHAPES; i++) {
+        bst_satellite_pose_free(work->poses[i]);
+        bst_resolved_free(work->images[i]);
+    }
+    free(work->points);
+    free(work->hull);
+    *work = (bst_shape_truth){0};
+}
+
+/* Slot of a model's pose and image, in place of another one if there is no room. */
+static bst_status slot_of(bst_ctx *ctx, bst_shape_truth *work, const bst_satellite *satellite,
+                          int *slot) {
+    *slot = BST_TRUTH_SHAPES - 1;
+    for (int i = BST_TRUTH_SHAPES - 1; i >= 0; i--) {
+        if (work->images[i] && work->poses[i]->satellite == satellite) {
+            *slot = i;
+            return BST_OK;
+        }
+        *slot = work->images[i] ? *slot : i;
+    }
+    bst_satellite_pose_free(work->poses[*slot]);
+    bst_resolved_free(work->images[*slot]);
+    work->poses[*slot] = NULL;
+    work->images[*slot] = NULL;
+    BST_TRY(bst_satellite_pose_create(ctx, satellite, &work->poses[*slot]));
+    return bst_resolved_create(ctx, satellite, &work->images[*slot]);
+}
+
+static bst_status reserve(bst_ctx *ctx, bst_shape_truth *work, int count) {
+    if (count <= work->capacity) {
+        return BST_OK;
+    }
+    free(work->points);
+    free(work->hull);
+    work->points = malloc((size_t)count * sizeof *work->points);
+    work->hull = malloc(2 * (size_t)count * sizeof *work->hull);
+    work->capacity = work->points && work->hull ? count : 0;
+    return work->capacity > 0 ? BST_OK
+                              : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d corners", count);
+}
+
+/* Largest distance of two corners. */
+static double largest_extent(const bst_point2 *hull, int count) {
+    double largest = 0.0;
+    for (int i = 0; i < count; i++) {
+        for (int k = 0; k < i; k++) {
+            largest = fmax(largest, hypot(hull[i].x - hull[k].x, hull[i].y - hull[k].y));
+        }
+    }
+    return largest;
+}
+
+/* A body at mid-exposure, and the camera. */
+typedef struct placed_body {
+    const bst_camera *camera;
+    bst_quat q_cam_from_gcrf;
+    const bst_scene_source *source;
+    bst_source_body_state state;
+    bst_earthlight earthlight;
+} placed_body;
+
+/* Projects the body: centre of mass, box and extent. */
+static void project(bst_shape_truth *work, const placed_body *placed,
+                    const bst_satellite_pose *pose, bst_truth_shape *out) {
+    const bst_camera *camera = placed->camera;
+    const bst_source_body_state *body = &placed->state;
+    bst_quat q_cam_from_gcrf = placed->q_cam_from_gcrf;
+    bst_vec3 centre = bst_vec3_scale(body->apparent, body->range_m);
+    bst_quat back = bst_quat_conj(body->q_body_from_gcrf);
+    int count = pose->satellite->vertex_count;
+    *out = (bst_truth_shape){.x_px = NAN,
+                             .y_px = NAN,
+                             .x0_px = INFINITY,
+                             .y0_px = INFINITY,
+                             .x1_px = -INFINITY,
+                             .y1_px = -INFINITY,
+                             .q_body_from_gcrf = body->q_body_from_gcrf};
+    (void)bst_camera_project(camera, bst_quat_rotate(q_cam_from_gcrf, body->apparent), &out->x_px,
+                             &out->y_px);
+    for (int i = 0; i < count; i++) {
+        bst_vec3 v = bst_vec3_add(centre, bst_quat_rotate(back, pose->vertices[i]));
+        bst_point2 *p = &work->points[i];
+        if (!bst_camera_project(camera, bst_quat_rotate(q_cam_from_gcrf, v), &p->x, &p->y)) {
+            out->x0_px = out->y0_px = out->x1_px = out->y1_px = out->size_px = NAN;
+            return;
+        }
+        out->x0_px = fmin(out->x0_px, p->x);
+        out->y0_px = fmin(out->y0_px, p->y);
+        out->x1_px = fmax(out->x1_px, p->x);
+        out->y1_px = fmax(out->y1_px, p->y);
+    }
+    out->size_px = largest_extent(work->hull, bst_polygon_hull(work->points, count, work->hull));
+}
+
+/* Finds the centroid of a body's light. */
+static bst_status find_light(bst_ctx *ctx, const placed_body *placed, bst_satellite_pose *pose,
+                             bst_resolved *resolved, bst_truth_shape *out) {
+    enum { ACROSS = 256 };
+    const bst_source_body_state *body = &placed->state;
+    bst_quat q = placed->q_cam_from_gcrf;
+    const bst_resolved_view view = {
+        .q_image_from_body = bst_quat_mul(q, bst_quat_conj(body->q_body_from_gcrf)),
+        .origin_m = bst_vec3_scale(bst_quat_rotate(q, body->apparent), body->range_m),
+        .scale_rad = bst_camera_scale_rad(placed->camera)};
+    const bst_resolved_light light = {.sun = body->aim.sun,
+                                      .sun_radius_rad = body->sun_radius_rad,
+                                      .earthlight = body->earth ? &placed->earthlight : NULL,
+                                      .gain = placed->source->body->gain};
+    double low[2], high[2], sum = 0.0, x = 0.0, y = 0.0;
+    if (!bst_resolved_box(pose, &view, low, high)) {
+        return BST_OK;
+    }
+    double across = fmax(high[0] - low[0], high[1] - low[1]);
+    BST_TRY(bst_resolved_begin(ctx, resolved, low, high, fmax(across, 1e-6) / ACROSS));
+    BST_TRY(bst_resolved_add(ctx, resolved, pose, &view, &light, 1.0, NULL));
+    const bst_resolved_image *image = bst_resolved_image_of(resolved);
+    for (int i = 0; i < image->width * image->height; i++) {
+        const bst_resolved_cell *c = &image->cells[i];
+        double cx = image->x0 + i % image->width + 0.5, cy = image->y0 + i / image->width + 0.5;
+        sum += (double)c->light;
+        x += (double)c->light * cx + (double)c->moment_x;
+        y += (double)c->light * cy + (double)c->moment_y;
+    }
+    double scale = image->cell_px * view.scale_rad;
+    if (sum > 0.0) {
+        const bst_vec3 direction = {x / sum * scale, y / sum * scale, 1.0};
+        (void)bst_camera_project(placed->camera, direction, &out->x_light_px, &out->y_light_px);
+    }
+    return BST_OK;
+}
+
+bst_status bst_shape_truth_fill(bst_ctx *ctx, bst_shape_truth *work, const bst_camera *camera,
+                                const bst_scene_source *sources, const int *source_of,
+                                bst_truth *truth) {
+    assert(work && camera && truth && (truth->count == 0 || (sources && source_of)));
+    truth->shape_count = 0;
+    for (int i = 0; i < truth->count && truth->shape_count < BST_TRUTH_SHAPES; i++) {
+        const bst_scene_source *source = &sources[source_of[i]];
+        if (!source->body) {
+            continue;
+        }
+        int slot;
+        placed_body placed = {
+            .camera = camera, .q_cam_from_gcrf = truth->q_cam_from_gcrf_mid, .source = source};
+        BST_TRY(slot_of(ctx, work, source->body->satellite, &slot));
+        bst_satellite_pose *pose = work->poses[slot];
+        BST_TRY(reserve(ctx, work, pose->satellite->vertex_count));
+        bst_source_body_at(source, 0.5, &placed.state, &placed.earthlight);
+        bst_satellite_pose_set(pose, &placed.state.aim);
+        bst_truth_shape *shape = &truth->shapes[truth->shape_count++];
+        project(work, &placed, pose, shape);
+        shape->item = i;
+        shape->x_light_px = shape->x_px;
+        shape->y_light_px = shape->y_px;
+        BST_TRY(find_light(ctx, &placed, pose, work->images[slot], shape));
+        truth->items[i].x_centroid_px += shape->x_light_px - shape->x_px;
+        truth->items[i].y_centroid_px += shape->y_light_px - shape->y_px;
+    }
+    return BST_OK;
+}

@@ -1,0 +1,147 @@
+#!/usr/bin/env python3
+"""Closed loop around a tumbling satellite: image processing hands over from a point to a silhouette, its centre of mass is
+estimated to 3 % of the apparent size, and the track is never lost.
+
+    test_inspection.py build/boresight          the approach from 1.5 km to 0.2 km, one seed
+    test_inspection.py build/boresight 20       from 300 m to 27 m with 20 seeds and attitudes of the target, and
+                                                scenarios/inspection.json as shipped (./dev slow)
+"""
+import json
+import os
+import sqlite3
+import subprocess
+import sys
+import tempfile
+
+import numpy as np
+from astropy.io import fits
+
+ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+SCENARIO = os.path.join(ROOT, "scenarios", "inspection.json")
+NEAR = {"/duration_s": 300, "/observers/0/orbit/offset_rtn_m": [0, -1500, 0],
+        "/observers/0/burns": [{"time_s": 20, "dv_rtn_mps": [0, 4.95, 0]}],
+        "/observers/0/sensors/0/exposure/exposure_s": 2e-4,
+        "/observers/0/sensors/0/modules/control/exposure_schedule": [{"time_s": 150, "exposure_s": 1e-4}]}
+
+
+LAST = {**NEAR, "/observers/0/orbit/offset_rtn_m": [0, -300, 0],
+        "/observers/0/burns": [{"time_s": 20, "dv_rtn_mps": [0, 0.99, 0]}],
+        "/observers/0/sensors/0/exposure/exposure_s": 1e-4,
+        "/observers/0/sensors/0/modules/control/exposure_schedule": [{"time_s": 150, "exposure_s": 5e-5}]}
+
+
+def run(program, folder, seed, changes):
+    words = [program, "run", SCENARIO, "--out", folder, "--set", f"/seed={json.dumps(hex(seed))}"]
+    for key, value in changes.items():
+        words += ["--set", f"{key}={json.dumps(value)}"]
+    subprocess.run(words, check=True, capture_output=True)
+
+
+def tumbling(seed):
+    """Another attitude at the start and other rates for each seed; the first: as shipped."""
+    if seed == 1:
+        return {}
+    draw = np.random.default_rng(seed)
+    target = "/world/objects/0/attitude/0/"
+    return {target + "rotation_deg": [round(v, 1) for v in draw.uniform(-180.0, 180.0, 3)],
+            target + "rate_body_deg_per_s": [round(v, 2) for v in draw.uniform(-1.5, 1.5, 3)]}
+
+
+def rows(folder, query):
+    with sqlite3.connect(os.path.join(folder, "run.sqlite")) as store:
+        return store.execute(query).fetchall()
+
+
+def judge(folder):
+    """Errors of the centre of mass, of detections and of the target's track, over the apparent size; sizes; ranges over
+    the true ones and their deviation; frames without the target from its first track on."""
+    found = rows(folder, "SELECT s.size_px, e.x_px - s.x_px, e.y_px - s.y_px, e.range_m / s.range_m,"
+                         " (e.range_m - s.range_m) / e.range_sigma_m, s.phase_deg FROM shapes s"
+                         " JOIN extended_targets e USING (sensor, exposure_id)")
+    several = rows(folder, "SELECT count(*) - count(DISTINCT exposure_id) FROM extended_targets")[0][0]
+    tracked = rows(folder, "SELECT f.exposure_id, f.target_id FROM track_frames f ORDER BY f.exposure_id")
+    first = next((i for i, row in enumerate(tracked) if row[1]), len(tracked))
+    targets = {row[1] for row in tracked[first:]}
+    lost = sum(row[1] == 0 for row in tracked[first:])
+    value = np.array(found, dtype=float)
+    return {"error": np.hypot(value[:, 1], value[:, 2]) / value[:, 0], "size": value[:, 0], "range": value[:, 3],
+            "range_deviation": value[:, 4], "phase": value[:, 5], "several": several, "first": first, "lost": lost,
+            "targets": len(targets), "frames": len(tracked)}
+
+
+def figures(result):
+    e = result["error"]
+    return {"frames": result["frames"], "extended": len(e), "rms_%": round(100 * float(np.sqrt(np.mean(e**2))), 2),
+            "median_%": round(100 * float(np.median(e)), 2), "p95_%": round(100 * float(np.percentile(e, 95)), 2),
+            "max_%": round(100 * float(e.max()), 2), "largest_px": round(float(result["size"].max())),
+            "first": result["first"], "lost": result["lost"], "tracks": result["targets"], "several": result["several"]}
+
+
+def labels(program, folder):
+    """Truth and labels of the target at 60 m against its pixels: centroid of light, box, mask, COCO and SatNet."""
+    out = os.path.join(folder, "labels")
+    run(program, out, 7, {**NEAR, "/duration_s": 24, "/observers/0/orbit/offset_rtn_m": [0, -60, 0],
+                          "/observers/0/burns": [], "/observers/0/sensors/0/exposure/exposure_s": 3e-5,
+                          "/observers/0/sensors/0/modules/control/exposure_schedule": [],
+                          "/record": {"frames": "extensions", "planes": ["segmentation"]}})
+    coco, satnet = (os.path.join(folder, name) for name in ("coco", "satnet"))
+    subprocess.run([program, "export", out, "--coco", coco, "--satnet", satnet], check=True, capture_output=True)
+    truth = rows(out, "SELECT s.exposure_id, s.item, s.x_px, s.y_px, s.x_light_px, s.y_light_px, s.x0_px, s.y0_px, s.x1_px,"
+                      " s.y1_px, s.size_px, f.fits_index, t.x_chief_px, t.range_m FROM shapes s"
+                      " JOIN frames f USING (sensor, exposure_id) JOIN truth t USING (sensor, exposure_id, item)")
+    assert len(truth) >= 8
+    with open(os.path.join(coco, "annotations.json"), encoding="utf-8") as file:
+        boxes = [a for a in json.load(file)["annotations"] if a["category_id"] == 1]
+    assert len(boxes) == len(truth)
+    with fits.open(os.path.join(out, "frames.fits")) as frames, fits.open(os.path.join(out, "segmentation.fits")) as masks:
+        for row, box in zip(truth, boxes):
+            item, (x, y, x_light, y_light, x0, y0, x1, y1, size) = row[1], row[2:11]
+            image = frames[row[11]].data.astype(float) - 100.0
+            rows_, columns = np.nonzero(masks[row[11]].data == item)
+            light = image[rows_, columns]
+            # what the mask leaves out: light below the sky's noise; saturation would show as well
+            assert abs(np.sum(light * columns) / light.sum() - x_light) < 0.05
+            assert abs(np.sum(light * rows_) / light.sum() - y_light) < 0.05
+            # the PSF widens the box by 2.5 sigma or so; parts that are not lit narrow it
+            assert x0 - 6 < columns.min() and columns.max() < x1 + 6 and y0 - 6 < rows_.min() and rows_.max() < y1 + 6
+            assert abs(x - row[12]) < 1e-3 and x0 < x < x1 and y0 < y < y1
+            # of a body of 4.7 m, foreshortened
+            assert 0.25 < size * 120 * np.pi / 648000 * row[13] / 4.71 < 1.03
+            assert abs(box["bbox"][2] - (x1 - x0) - 1.0) < 1e-6 and abs(box["shape"]["size_px"] - size) < 1e-9
+            assert abs(box["shape"]["x_centre_of_mass"] - x - 0.5) < 1e-9 and len(box["segmentation"]) >= 1
+    name = sorted(os.listdir(os.path.join(satnet, "Annotations")))[0]
+    with open(os.path.join(satnet, "Annotations", name), encoding="utf-8") as file:
+        target = [o for o in json.load(file)["data"]["objects"] if o["class_id"] == 1][0]
+    assert abs(target["shape"]["x_centre_of_mass"] * 512 - truth[0][2] - 0.5) < 1e-6
+    assert abs(np.linalg.norm(target["shape"]["q_body_from_gcrf"]) - 1.0) < 1e-9
+
+
+def main():
+    program = os.path.abspath(sys.argv[1])
+    seeds = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    cases = [(seed, {**LAST, **tumbling(seed)}, 90, 100) for seed in range(1, seeds + 1)]
+    cases += [(1, {}, 400, 390)] if seeds else [(1, NEAR, 30, 40)]
+    errors = []
+    with tempfile.TemporaryDirectory() as folder:
+        if not seeds:
+            labels(program, folder)
+        for seed, changes, frames, size_px in cases:
+            out = os.path.join(folder, "run")
+            run(program, out, seed, changes)
+            result = judge(out)
+            shown = figures(result)
+            print(json.dumps({"seed": seed, **shown}), flush=True)
+            errors.append(result["error"])
+            assert shown["lost"] == 0 and shown["tracks"] == 1, "the target was lost"
+            assert shown["several"] == 0 and shown["rms_%"] <= 3.0, "centre of mass"
+            assert shown["extended"] > frames and shown["first"] < 10 and shown["largest_px"] > size_px
+            # the known size has a standard deviation for usual aspects; an array seen end on is beyond it
+            assert np.median(np.abs(result["range_deviation"])) < 4.0, "range from the size"
+            subprocess.run(["rm", "-r", out], check=True)
+    e = np.concatenate(errors)
+    print(f"centre of mass: {100 * np.sqrt(np.mean(e**2)):.2f} % of the apparent size (RMS), "
+          f"{100 * np.percentile(e, 95):.2f} % (95th percentile), {len(errors)} runs, {len(e)} frames")
+
+
+if __name__ == "__main__":
+    main()
