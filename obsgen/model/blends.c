@@ -15,8 +15,8 @@ static const double FLATTEST = 6.0;
 static const double MERGED_CENTROID = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
 /* Light below this SNR does not matter at a maximum, and on its flank. */
 static const double LEAST_LIGHT = 0.01, LEAST_ON_FLANK = 0.3;
-/* A path shorter than this adds less than a tenth to the variance of the image, L^2 / 12 < sigma^2 /
- * 10: a point's. */
+/* A path shorter than this adds less than a tenth to the variance of the image, L^2 / 12 < sigma^2
+ * / 10: a point's. */
 static const double SHORT_SIGMAS = 1.1;
 /* Random stream of such streaks. */
 static const uint64_t CENTROID_ERROR = (uint64_t)1 << 52;

@@ -27,7 +27,8 @@ bst_status bst_extended_source_points(bst_ctx *ctx, const bst_scene_source *sour
                                       double *peak) BST_MUST_CHECK;
 
 /* Replaces a path's nodes by those of all points along it: positions of `list` plus the points'
- * offsets times `stretch`, and likewise their variances (offset.z, px^2). Errors: BST_ERR_MEMORY. */
+ * offsets times `stretch`, and likewise their variances (offset.z, px^2). Errors: BST_ERR_MEMORY.
+ */
 bst_status bst_extended_source_spread(bst_ctx *ctx, const bst_disc_points *points, double stretch,
                                       bst_smear_node_list *list) BST_MUST_CHECK;
 

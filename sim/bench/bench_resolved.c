@@ -27,7 +27,7 @@ typedef struct mesh_size {
 } mesh_size;
 
 static const mesh_size sizes[] = {{"resolved_small", 40, 26, 64.0, 0.0, 40},
-                             {"resolved_large", 200, 126, 600.0, 0.04 * 2.0 * BST_PI, 2}};
+                                  {"resolved_large", 200, 126, 600.0, 0.04 * 2.0 * BST_PI, 2}};
 
 /* Writes a sphere with bumps, of some 1 m, as an OBJ file. */
 static bst_status write_mesh(bst_ctx *ctx, const mesh_size *s, const char *path, FILE *file) {
@@ -165,8 +165,8 @@ static bst_status time_frames(bst_ctx *ctx, bst_renderer *r, const mesh_size *si
 }
 
 /* Difference from a rendering with a tenth of the tolerance, in sigma of a pixel. */
-static bst_status find_error(bst_ctx *ctx, bst_device *device, bst_renderer *r, const mesh_size *size,
-                             scene *s, bst_bench_result *out) {
+static bst_status find_error(bst_ctx *ctx, bst_device *device, bst_renderer *r,
+                             const mesh_size *size, scene *s, bst_bench_result *out) {
     size_t pixels = (size_t)SIDE * SIDE;
     float *image = malloc(2 * pixels * sizeof *image);
     bst_renderer_options options = bst_renderer_default_options();

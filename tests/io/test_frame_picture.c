@@ -59,8 +59,7 @@ static void places_in_the_picture(void **state) {
         pixels[6 * COLUMNS + 29] = 107;
         uint8_t *lit = drawn(pixels, NULL, width, height);
         assert_true(centre_of_change(plain, lit, width, height, &x, &y));
-        bst_assert_close(x, left + 29.5 * scale - 0.5,
-                         0.75); /* edges are drawn in whole pixels */
+        bst_assert_close(x, left + 29.5 * scale - 0.5, 0.75); /* edges are drawn in whole pixels */
         bst_assert_close(y, top + 6.5 * scale - 0.5, 1.2);
         const bst_io_overlay none = {.count = 0};
         bst_io_overlay_mark mark = {

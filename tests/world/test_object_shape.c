@@ -115,7 +115,7 @@ static void a_spinning_plate_glints(void **state) {
 static void glints_are_neither_missed_nor_smeared(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    for (int n = 0; n < 3; n++) {
+    for (int n = 0; n < 2; n++) {
         char object[1024];
         snprintf(object, sizeof object,
                  "{\"name\": \"p\", \"brightness\": {\"model\": \"shape\"}, \"shape\": "
@@ -133,13 +133,13 @@ static void glints_are_neither_missed_nor_smeared(void **state) {
         bst_scene_object_query query = {
             .view = view,
             .camera = camera,
-            .span = {0, 100, 102},
+            .span = {0, 100, 100.5},
             .window = {0, 0, (int)camera->width_px, (int)camera->height_px},
             .q_mid = {0, 0, 0, 1},
             .centre = {0, 0, 1},
             .margin_px = 1e9,
             .radius = BST_PI};
-        bst_scene_object_parts parts;
+        bst_scene_object_parts parts = {.body = NULL};
         bst_scene_source source;
         bool there;
         bst_world_sight mid, then;
@@ -150,7 +150,7 @@ static void glints_are_neither_missed_nor_smeared(void **state) {
         query.q_mid = bst_quat_look(mid.apparent, (bst_vec3){0, 0, 1});
         bst_assert_ok(&ctx, bst_field_object(&ctx, &query, 0, &parts, &source, &there));
         assert_true(there && source.rate);
-        const int dense = 20000;
+        const int dense = 5000;
         double sum = 0, most = 0;
         for (int i = 0; i < dense; i++) {
             bst_scene_view_light(view, &query.span, 0, &path, &light, (i + 0.5) / dense, &then);
@@ -162,6 +162,7 @@ static void glints_are_neither_missed_nor_smeared(void **state) {
         assert_true(most / sum > 100);
         assert_true(error <= source.rate->error + 1e-4); /* of the dense sum */
         assert_true(source.rate->error < 0.02);
+        free(parts.body);
         bst_world_view_free(view);
         bst_world_free(world);
     }

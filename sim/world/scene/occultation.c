@@ -9,8 +9,8 @@ bst_status bst_occultation_create(bst_ctx *ctx, int vertices, bst_occultation **
     if (!w) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for occultations");
     }
-    bst_status status = bst_silhouette_create(ctx, vertices, &w->body);
-    status = status == BST_OK ? bst_silhouette_create(ctx, vertices, &w->front) : status;
+    bst_status status = bst_shape_silhouette_create(ctx, vertices, &w->body);
+    status = status == BST_OK ? bst_shape_silhouette_create(ctx, vertices, &w->front) : status;
     status = status == BST_OK ? bst_polygon_clip_create(ctx, &w->clip) : status;
     if (status != BST_OK) {
         bst_occultation_free(w);
@@ -21,8 +21,8 @@ bst_status bst_occultation_create(bst_ctx *ctx, int vertices, bst_occultation **
 
 void bst_occultation_free(bst_occultation *w) {
     if (w) {
-        bst_silhouette_free(&w->body);
-        bst_silhouette_free(&w->front);
+        bst_shape_silhouette_free(&w->body);
+        bst_shape_silhouette_free(&w->front);
         bst_polygon_clip_free(&w->clip);
         free(w);
     }
@@ -40,9 +40,9 @@ static plane across(bst_vec3 z) {
 
 /* Silhouette of a body in a plane. */
 static void make_silhouette(const bst_occultation_body *b, const plane *p, bst_vec3 sun_m,
-                            bst_vec3 target_m, bst_silhouette *out) {
+                            bst_vec3 target_m, bst_shape_silhouette *out) {
     if (!b->shape) {
-        bst_silhouette_of_sphere(out, b->radius_m);
+        bst_shape_silhouette_of_sphere(out, b->radius_m);
         return;
     }
     bst_vec3 sun = bst_vec3_unit(bst_vec3_sub(sun_m, b->position_m));
@@ -54,7 +54,7 @@ static void make_silhouette(const bst_occultation_body *b, const plane *p, bst_v
         .target = bst_quat_rotate(q, bst_vec3_unit(bst_vec3_sub(target_m, b->position_m))),
         .seconds = b->seconds};
     bst_satellite_pose_set(b->pose, &aim);
-    bst_silhouette_of_pose(out, b->pose, bst_quat_rotate(q, p->x), bst_quat_rotate(q, p->y));
+    bst_shape_silhouette_of_pose(out, b->pose, bst_quat_rotate(q, p->x), bst_quat_rotate(q, p->y));
 }
 
 double bst_occultation_from_eye(bst_occultation *w, const bst_occultation_body *body,
@@ -74,7 +74,7 @@ double bst_occultation_from_eye(bst_occultation *w, const bst_occultation_body *
     }
     make_silhouette(body, &p, sun_m, eye_m, &w->body);
     make_silhouette(front, &p, sun_m, eye_m, &w->front);
-    return bst_silhouette_hidden(&w->clip, &w->body, &w->front, scale, shift);
+    return bst_shape_silhouette_hidden(&w->clip, &w->body, &w->front, scale, shift);
 }
 
 double bst_occultation_of_sun(bst_occultation *w, const bst_occultation_body *body,
@@ -101,7 +101,7 @@ double bst_occultation_of_sun(bst_occultation *w, const bst_occultation_body *bo
         for (int k = 0; k < AROUND; k++) {
             double a = 2.0 * BST_PI * (k + 0.5 * r) / AROUND, off = radius * ring[r] * ahead;
             bst_point2 shift = {middle.x - off * cos(a), middle.y - off * sin(a)};
-            sum += weight * bst_silhouette_hidden(&w->clip, &w->body, &w->front, 1.0, shift);
+            sum += weight * bst_shape_silhouette_hidden(&w->clip, &w->body, &w->front, 1.0, shift);
             total += weight;
         }
     }

@@ -2,7 +2,7 @@
 #ifndef BST_WORLD_SCENE_OCCULTATION_H
 #define BST_WORLD_SCENE_OCCULTATION_H
 
-#include "sim/satellite/silhouette.h"
+#include "sim/satellite/shape_silhouette.h"
 #include "sim/world/scene/object_shape.h"
 
 /* A body at an instant. */
@@ -16,7 +16,7 @@ typedef struct bst_occultation_body {
 
 /* Work memory of one thread. */
 typedef struct bst_occultation {
-    bst_silhouette body, front;
+    bst_shape_silhouette body, front;
     bst_polygon_clip clip;
 } bst_occultation;
 
@@ -32,7 +32,7 @@ void bst_occultation_free(bst_occultation *occultation);
  *            eye_m  the observer
  *            sun_m  the Sun, for attitudes and joints
  * Returned:  0 to 1; of the area, as if all of it were equally bright
- * Notes:     exact silhouettes of shapes (bst_silhouette_of_pose) */
+ * Notes:     exact silhouettes of shapes (bst_shape_silhouette_of_pose) */
 double bst_occultation_from_eye(bst_occultation *work, const bst_occultation_body *body,
                                 const bst_occultation_body *front, bst_vec3 eye_m, bst_vec3 sun_m);
 

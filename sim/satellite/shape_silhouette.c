@@ -1,24 +1,24 @@
-#include "sim/satellite/silhouette.h"
+#include "sim/satellite/shape_silhouette.h"
 
 #include <assert.h>
 #include <stdlib.h>
 
-bst_status bst_silhouette_create(bst_ctx *ctx, int vertices, bst_silhouette *out) {
+bst_status bst_shape_silhouette_create(bst_ctx *ctx, int vertices, bst_shape_silhouette *out) {
     /* outlines have at most twice the vertices of a body; a hull takes three times all */
     int capacity = 3 * vertices + BST_SILHOUETTE_CIRCLE;
-    *out = (bst_silhouette){.capacity = capacity};
+    *out = (bst_shape_silhouette){.capacity = capacity};
     out->points = calloc((size_t)capacity, sizeof *out->points);
     return out->points
                ? BST_OK
                : bst_fail(ctx, BST_ERR_MEMORY, "no memory for a silhouette of %d points", capacity);
 }
 
-void bst_silhouette_free(bst_silhouette *s) {
+void bst_shape_silhouette_free(bst_shape_silhouette *s) {
     free(s->points);
     s->points = NULL;
 }
 
-void bst_silhouette_of_sphere(bst_silhouette *s, double radius_m) {
+void bst_shape_silhouette_of_sphere(bst_shape_silhouette *s, double radius_m) {
     double step = 2.0 * BST_PI / BST_SILHOUETTE_CIRCLE;
     double radius = radius_m * sqrt(step / sin(step)); /* the polygon has the disc's area */
     for (int i = 0; i < BST_SILHOUETTE_CIRCLE; i++) {
@@ -30,7 +30,8 @@ void bst_silhouette_of_sphere(bst_silhouette *s, double radius_m) {
 }
 
 /* Convex hull of a pose with many bodies. */
-static void make_hull(bst_silhouette *s, const bst_satellite_pose *p, bst_vec3 x, bst_vec3 y) {
+static void make_hull(bst_shape_silhouette *s, const bst_satellite_pose *p, bst_vec3 x,
+                      bst_vec3 y) {
     int n = p->satellite->vertex_count;
     bst_point2 *flat = s->points + 2 * n;
     for (int i = 0; i < n; i++) {
@@ -38,7 +39,7 @@ static void make_hull(bst_silhouette *s, const bst_satellite_pose *p, bst_vec3 x
     }
     int corners = bst_polygon_hull(flat, n, s->points);
     if (corners < 3 || corners > BST_POLYGON_CORNERS_MAX) {
-        bst_silhouette_of_sphere(s, p->satellite->radius_m);
+        bst_shape_silhouette_of_sphere(s, p->satellite->radius_m);
         return;
     }
     s->first[0] = 0;
@@ -46,7 +47,8 @@ static void make_hull(bst_silhouette *s, const bst_satellite_pose *p, bst_vec3 x
     s->pieces = 1;
 }
 
-void bst_silhouette_of_pose(bst_silhouette *s, bst_satellite_pose *p, bst_vec3 x, bst_vec3 y) {
+void bst_shape_silhouette_of_pose(bst_shape_silhouette *s, bst_satellite_pose *p, bst_vec3 x,
+                                  bst_vec3 y) {
     const bst_satellite *model = p->satellite;
     assert(3 * model->vertex_count + BST_SILHOUETTE_CIRCLE <= s->capacity);
     if (model->occluder_count > BST_SILHOUETTE_PIECES) {
@@ -74,8 +76,8 @@ void bst_silhouette_of_pose(bst_silhouette *s, bst_satellite_pose *p, bst_vec3 x
 }
 
 /* Area of the union of all pieces, outside of `front` if that is not NULL. */
-static double union_area(bst_polygon_clip *clip, const bst_silhouette *s,
-                         const bst_silhouette *front, double scale, bst_point2 shift) {
+static double union_area(bst_polygon_clip *clip, const bst_shape_silhouette *s,
+                         const bst_shape_silhouette *front, double scale, bst_point2 shift) {
     double area = 0.0;
     for (int i = 0; i < s->pieces; i++) {
         bst_polygon_clip_start(clip, s->points + s->first[i], s->first[i + 1] - s->first[i]);
@@ -97,8 +99,9 @@ static double union_area(bst_polygon_clip *clip, const bst_silhouette *s,
     return area;
 }
 
-double bst_silhouette_hidden(bst_polygon_clip *clip, const bst_silhouette *s,
-                             const bst_silhouette *front, double scale, bst_point2 shift) {
+double bst_shape_silhouette_hidden(bst_polygon_clip *clip, const bst_shape_silhouette *s,
+                                   const bst_shape_silhouette *front, double scale,
+                                   bst_point2 shift) {
     double all = union_area(clip, s, NULL, 0.0, shift);
     double left = all > 0.0 ? union_area(clip, s, front, scale, shift) : 0.0;
     return all > 0.0 ? fmin(fmax(1.0 - left / all, 0.0), 1.0) : 0.0;
