@@ -12,7 +12,19 @@ set(bst_costs
   e2e_orbit_consistency 10  e2e_pacing 10
   scenegen_fidelity 52  tracker_hard_cases 43  scenegen_flags 42  scenegen_background 34
   obsgen_streak_detection 30  control_loop 30  scenegen_rolling_shutter 28  scenegen_hard_cases 25
-  scenegen_tolerance_sweep 16)
+  scenegen_tolerance_sweep 16
+  optics_psf_colour 10
+  scenegen_renderer 52 python_examples 48 scenegen_detector 44 scenegen_colour 37
+  scenegen_cosmic_rays 34 python_gym 32 e2e_knowledge 29 scenegen_fourier_render 26
+  tracker_consistency 24 e2e_report 22 python_program_plugins 21 e2e_calframes 20
+  scenegen_module 19 e2e_plugins 17 e2e_skewed_frames 17 scenegen_extended_source 16
+  engine_executor 15 bad_scenario 14 e2e_install 14 imgproc_streaks 14
+  python_misuse 12 e2e_earth_in_field 11 io_fits_reader 11 e2e_outputs 11
+  imgproc_archive 11 e2e_figures 11 scenegen_resolved_body 10 scenegen_gpu_form 10
+  e2e_hostile_input 10 scenegen_vignetting 9 headers_compile_alone 9 e2e_faint_sky 9
+  imgproc_false_alarms 9 io_fits 9 gimbal_attitude_filter 9 world_field 9
+  scenegen_jitter 9 e2e_link_keys 8 e2e_former_names 8 tracker_orbit 8
+  e2e_study_populations 8 e2e_orbit_files 8 e2e_propagate 8)
 
 # bst_cost(test [device])
 # Tests that use the OpenCL device run one at a time: they are a queue, and begin before all others.

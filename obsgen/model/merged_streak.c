@@ -58,10 +58,14 @@ static double fit_as_point(const bst_generator *g, const generator_source *s,
         double saturated = s->saturated ? fmax(bst_generator_saturation_e(g), 1.0) / peak_e : 0.0;
         bst_path_point_fit fit =
             bst_path_fit_points(points, used, sqrt(image), g->filter_sigma, light, saturated);
-        at->x += fit.x_px;
-        at->y += fit.y_px;
-        at->flux_e = fit.flux * s->flux_e;
-        widening = fit.widening_px2;
+        /* as in imgproc/measure/fit.c: a fit without light, here with that of a long path beyond
+         * its pixels, changes nothing */
+        if (fit.flux > 0.0) {
+            at->x += fit.x_px;
+            at->y += fit.y_px;
+            at->flux_e = fit.flux * s->flux_e;
+            widening = fit.widening_px2;
+        }
     }
     return 2.0 * (model + fmax(widening, 0.0));
 }

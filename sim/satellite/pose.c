@@ -22,6 +22,8 @@ void bst_satellite_pose_free(bst_satellite_pose *p) {
         free(p->rotation);
         free(p->origin);
         free(p->seen);
+        free(p->next);
+        free(p->flat);
         free(p->pairs);
         free(p->faces);
         free_view(&p->views[0]);
@@ -87,8 +89,15 @@ bst_status bst_satellite_pose_create(bst_ctx *ctx, const bst_satellite *s,
     p->rotation = calloc((size_t)s->joint_count + 1, sizeof *p->rotation);
     p->origin = calloc((size_t)s->joint_count + 1, sizeof *p->origin);
     p->seen = calloc((size_t)s->occluder_count + 1, sizeof *p->seen);
-    bool made = p->vertices && p->normals && p->rotation && p->origin && p->seen &&
-                make_view(s, &p->views[0]) && make_view(s, &p->views[1]) && make_pairs(p);
+    int most = 0;
+    for (int o = 0; o < s->occluder_count; o++) {
+        most = s->occluders[o].vertex_count > most ? s->occluders[o].vertex_count : most;
+    }
+    p->next = calloc((size_t)most + 1, sizeof *p->next);
+    p->flat = calloc((size_t)most + 1, sizeof *p->flat);
+    bool made = p->vertices && p->normals && p->rotation && p->origin && p->seen && p->next &&
+                p->flat && make_view(s, &p->views[0]) && make_view(s, &p->views[1]) &&
+                make_pairs(p);
     bst_status status =
         made ? bst_polygon_clip_create(ctx, &p->clip)
              : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the pose of a satellite of %d facets",
@@ -204,7 +213,7 @@ static void add_to_bounds(const bst_pose_view *v, bst_vec3 q, double b[6]) {
  * Returned: number of corners; 0 if the edges form no single loop (facets seen edge-on). */
 static int walk_outline(const bst_satellite_pose *p, const bst_pose_view *v, const bst_occluder *o,
                         bst_point2 *to) {
-    int next[BST_POLYGON_CORNERS_MAX], edges = 0, start = -1, n = 0;
+    int *next = p->next, edges = 0, start = -1, n = 0;
     memset(next, -1, (size_t)o->vertex_count * sizeof next[0]);
     for (int e = o->first_edge; e < o->first_edge + o->edge_count; e++) {
         const int *edge = p->satellite->edges[e];
@@ -237,13 +246,11 @@ static int outline_of(const bst_satellite_pose *p, bst_pose_view *v, int occlude
         v->outline_count[occluder] = n >= 3 ? n : -1;
     }
     if (v->outline_count[occluder] < 0) {
-        bst_point2 flat[BST_POLYGON_CORNERS_MAX];
-        assert(o->vertex_count <= BST_POLYGON_CORNERS_MAX);
         for (int i = 0; i < o->vertex_count; i++) {
             bst_vec3 q = p->vertices[o->first_vertex + i];
-            flat[i] = (bst_point2){bst_vec3_dot(q, v->x), bst_vec3_dot(q, v->y)};
+            p->flat[i] = (bst_point2){bst_vec3_dot(q, v->x), bst_vec3_dot(q, v->y)};
         }
-        v->outline_count[occluder] = bst_polygon_hull(flat, o->vertex_count, to);
+        v->outline_count[occluder] = bst_polygon_hull(p->flat, o->vertex_count, to);
     }
     *points = to;
     return v->outline_count[occluder];

@@ -46,7 +46,9 @@ typedef struct bst_satellite_pose {
     bst_mat3 *rotation;                          /* by joint: body frame from joint frame */
     bst_vec3 *origin;                            /* by joint, body frame */
     bst_pose_view views[2];                      /* see bst_pose_look */
-    int *seen; /* by occluder: facet for which it was last found in the grid */
+    int *next;        /* work memory of outlines: by vertex of the largest occluder */
+    bst_point2 *flat; /* likewise */
+    int *seen;        /* by occluder: facet for which it was last found in the grid */
     int seen_stamp;
     int stamp;                          /* counts the poses, from 1 */
     bst_pose_pair *pairs;               /* [occluders][occluders]; NULL: too many */

@@ -45,7 +45,8 @@ if "run" in words[:3] and length and "--duration" not in words and "--replay" no
     words += ["--duration", length]
 if words[:1] == ["study"] and length and "--out" in words and "--emit" not in words and "scenarios/" in words[1]:
     words += ["--dry-run"] if "--dry-run" not in words else []
-elif words[:1] == ["study"] and length and "--out" in words and words[1].endswith(".json"):
+elif (words[:1] == ["study"] and length and "--out" in words and words[1].endswith(".json")
+      and not os.path.realpath(words[1]).startswith({root!r} + os.sep)):
     with open(words[1], encoding="utf-8") as file:
         study = dict(json.load(file), replicates=2)
     with open(words[1], "w", encoding="utf-8") as file:
@@ -97,7 +98,7 @@ class Scratch:
         os.makedirs(tools)
         for wrapper in (os.path.join(build, "boresight"), os.path.join(tools, "boresight")):
             with open(wrapper, "w", encoding="utf-8") as file:
-                file.write(WRAPPER.format(program=program))
+                file.write(WRAPPER.format(program=program, root=os.path.realpath(ROOT)))
             os.chmod(wrapper, os.stat(wrapper).st_mode | stat.S_IXUSR)
         os.symlink(CMAKE, os.path.join(tools, "cmake"))
         self.tools = tools

@@ -162,7 +162,7 @@ class Plugins(unittest.TestCase):
                 (f'{control}/compensator={{"plugin": "leaky.so", "gain_per_s": 50}}',
                  "gain_per_s: 50/s cannot be stable at a frame every 1 s; give less than 2"),
                 (f'{M}/imgproc={{"type": "standard", "track_windows": true, "detector": '
-                 f'{{"plugin": "box_detector.so"}}}}', "turn track_windows and stack off")):
+                 f'{{"plugin": "box_detector.so"}}}}', "turn track_windows, stack and extended off")):
             self.assertRegex(self.check(setting, code=1), message)
         # a detector that gives nonsense ends the run, and is named
         self.assertRegex(self.call(

@@ -2,6 +2,11 @@
 """Light of satellites against Mitsuba 3: direct sunlight with shadows, by seven reflectance models.
 
 Usage, from the repository root: compare_mitsuba.py PRINT_FLUX [GEOMETRIES] [SATELLITE...]
+                                 compare_mitsuba.py --images PRINT_FLUX [GEOMETRIES] [SATELLITE...]
+
+With --images resolved images are compared, by Lambert's law: the difference in units of the noise that the image
+would have with 10,000 electrons in its brightest pixel and 5 electrons of read noise. Mitsuba's own noise is that of two
+renderings with different seeds.
 
 The models are written here from their publications, and Mitsuba calls them. Skipped (exit code 77)
 where the Python package mitsuba is missing.
@@ -17,6 +22,8 @@ import tempfile
 SATELLITES = ["gps_iif", "inmarsat_gx_like", "starlink_v1_5", "envisat_like", "hubble_like", "iss_like"]
 TOLERANCE = 5e-3
 SIDE, SAMPLES = 256, 16
+IMAGE_SIDE, IMAGE_SAMPLES = 64, 1024  # as in print_flux.c
+IMAGE_TOLERANCE_SIGMA = 0.1
 # incidence and reflection of the table, degrees
 TABLE_IN = list(range(0, 90, 10))
 TABLE_OUT = list(range(-88, 90, 4))
@@ -244,6 +251,60 @@ def compare(mi, program, name, geometries, first):
     return max(map(abs, differences)), used
 
 
+def camera(mi, case):
+    """Mitsuba's perspective camera in the place of the image's."""
+    transform = mi.ScalarTransform4f().look_at(origin=[case["range"] * x for x in case["eye"]], target=[0, 0, 0],
+                                               up=[-x for x in case["down"]])
+    return {"type": "perspective", "fov": 2 * math.degrees(math.atan(IMAGE_SIDE / 2 * case["scale"])),
+            "to_world": transform, "near_clip": 0.5 * case["range"], "far_clip": 2 * case["range"],
+            "film": {"type": "hdrfilm", "width": IMAGE_SIDE, "height": IMAGE_SIDE, "pixel_format": "luminance",
+                     "rfilter": {"type": "box"}},
+            "sampler": {"type": "stratified", "sample_count": IMAGE_SAMPLES}}
+
+
+def render_image(mi, case, folder, seed):
+    scene = {"type": "scene", "integrator": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
+             "sensor": camera(mi, case),
+             "sun": {"type": "directional", "direction": [-x for x in case["sun"]],
+                     "irradiance": {"type": "rgb", "value": [1, 1, 1]}}}
+    scene.update(shapes(case["triangles"], folder))
+    return [float(x) for x in mi.render(mi.load_dict(scene), seed=seed).array]
+
+
+def compare_image(mi, case, folder):
+    """RMS over the lit pixels and largest difference, in sigma, and the same of Mitsuba's noise; difference of the
+    sums."""
+    one, two = (render_image(mi, case, folder, seed) for seed in (1, 2))
+    ours = case["radiance"]
+    there = [(a + b) / 2 for a, b in zip(one, two)]
+    electrons = 1e4 / max(there)
+    differences, noise = [], []
+    for i, value in enumerate(there):
+        if value > 0 or ours[i] > 0:
+            sigma = math.sqrt(value * electrons + 25) / electrons
+            differences.append((ours[i] - value) / sigma)
+            noise.append((one[i] - two[i]) / 2 / sigma)
+    rms = [math.sqrt(sum(x * x for x in v) / len(v)) for v in (differences, noise)]
+    return rms[0], rms[1], max(map(abs, differences)), max(map(abs, noise)), sum(ours) / sum(there) - 1
+
+
+def compare_images(mi, program, geometries, names):
+    worst = 0.0
+    for name in names:
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "table.csv")
+            write_table(path)
+            lines = subprocess.run([program, f"scenarios/satellites/{name}.json", geometries, "lambert", path, "image"],
+                                   check=True, capture_output=True, text=True).stdout.splitlines()
+            for number, line in enumerate(lines):
+                rms, own, most, own_most, total = compare_image(mi, json.loads(line), folder)
+                print(f"{name:18} geometry {number}: difference rms {rms:.3f} sigma, largest {most:.2f}; Mitsuba's "
+                      f"noise {own:.3f}, {own_most:.2f}; sum {total:+.3%}", flush=True)
+                worst = max(worst, math.sqrt(max(rms ** 2 - own ** 2, 0.0)))
+    print(f"largest rms difference without Mitsuba's noise: {worst:.3f} sigma")
+    return worst
+
+
 def main():
     try:
         import mitsuba as mi
@@ -252,6 +313,12 @@ def main():
         sys.exit(77)
     mi.set_variant("scalar_rgb")
     mi.register_bsdf("satellite_surface", make_class(mi))
+    if sys.argv[1] == "--images":
+        geometries, names = sys.argv[3] if len(sys.argv) > 3 else "2", sys.argv[4:] or SATELLITES
+        worst = compare_images(mi, sys.argv[2], geometries, names)
+        if not worst <= IMAGE_TOLERANCE_SIGMA:
+            sys.exit(f"difference {worst:.2f} sigma (allowed: {IMAGE_TOLERANCE_SIGMA:g} sigma)")
+        return
     program = sys.argv[1]
     geometries = sys.argv[2] if len(sys.argv) > 2 else "20"
     names = sys.argv[3:] or SATELLITES

@@ -1,10 +1,11 @@
 /* Prints the light of a satellite in some geometries, with its triangles, for compare_mitsuba.py:
  * one JSON object a line. Material m reflects by the model of the number FIRST + m, modulo the
  * seven models, with parameters that are the same in compare_mitsuba.py; FIRST "lambert": all by
- * Lambert's law. Fine facets stand for curved surfaces.
+ * Lambert's law. Fine facets stand for curved surfaces. With `image` each geometry has a resolved
+ * image too: `radiance` over irradiance, per pixel, from a distance of 300 radii.
  *
- *   print_flux SATELLITE.json GEOMETRIES FIRST TABLE.csv */
-#include "sim/satellite/flux.h"
+ *   print_flux SATELLITE.json GEOMETRIES FIRST TABLE.csv [image] */
+#include "sim/satellite/resolved_image.h"
 #include "tests/satellite/satellite_support.h"
 
 /* Parameters of the models: all of them have lobes that are wide against a facet. */
@@ -68,7 +69,50 @@ static bst_satellite *load(const char *path, int first, const bst_brdf_table *ta
     return s;
 }
 
-static void print_geometry(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye) {
+/* Pixels of the image along a side, of which the satellite's sphere spans SPAN, and cells of one.
+ */
+enum { SIDE = 64, SPAN = 56, FINE = 4 };
+/* Distance of the camera, radii. */
+static const double RANGE = 300.0;
+
+/* Prints the image of a pose as seen from `eye`, and how the camera stands. */
+static void print_image(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye) {
+    const bst_satellite *s = p->satellite;
+    bst_ctx ctx = {0};
+    bst_resolved *resolved;
+    bst_resolved_gain gain[BST_SATELLITE_MATERIALS_MAX];
+    double range_m = RANGE * s->radius_m, scale_rad = 2.0 * s->radius_m / range_m / SPAN;
+    bst_quat look = bst_quat_look(bst_vec3_scale(eye, -1.0), bst_vec3_perpendicular(eye));
+    bst_vec3 down = bst_quat_rotate(bst_quat_conj(look), (bst_vec3){0, 1, 0});
+    bst_resolved_view view = {look, {0, 0, range_m}, scale_rad};
+    bst_resolved_light light = {.sun = sun, .gain = gain};
+    double low[2] = {-SIDE / 2, -SIDE / 2}, high[2] = {SIDE / 2, SIDE / 2};
+    for (int i = 0; i < s->material_count; i++) {
+        gain[i] = (bst_resolved_gain){.sun = 1.0};
+    }
+    if (bst_resolved_create(&ctx, s, &resolved) != BST_OK ||
+        bst_resolved_begin(&ctx, resolved, low, high, 1.0 / FINE) != BST_OK ||
+        bst_resolved_add(&ctx, resolved, p, &view, &light, 1.0, NULL) != BST_OK) {
+        give_up(&ctx);
+    }
+    const bst_resolved_image *image = bst_resolved_image_of(resolved);
+    printf(", \"range\": %.17g, \"scale\": %.17g, \"down\": [%.17g, %.17g, %.17g], \"radiance\": [",
+           range_m, scale_rad, down.x, down.y, down.z);
+    for (int y = 0; y < SIDE; y++) {
+        for (int x = 0; x < SIDE; x++) {
+            double sum = 0.0;
+            for (int k = 0; k < FINE * FINE; k++) {
+                int at = (FINE * y + k / FINE) * image->width + FINE * x + k % FINE;
+                sum += (double)image->cells[at].light;
+            }
+            printf("%s%.9g", x || y ? ", " : "", sum / (scale_rad * scale_rad));
+        }
+    }
+    printf("]");
+    bst_resolved_free(resolved);
+}
+
+static void print_geometry(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye, bool image) {
     const bst_satellite *s = p->satellite;
     bst_satellite_light light = {.sun = sun, .observer = eye, .sunlit = 1.0};
     bst_satellite_flux flux;
@@ -84,7 +128,9 @@ static void print_geometry(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye) {
         const bst_occluder *body = &s->occluders[s->facets[f].occluder];
         /* of two facets in one place only the one that is seen */
         bool thin = body->vertex_count == s->facets[f].count || body->shell >= 0;
-        if (thin && bst_vec3_dot(p->normals[f], eye) <= 0.0) {
+        bst_vec3 to_eye =
+            image ? bst_vec3_sub(bst_vec3_scale(eye, RANGE * s->radius_m), p->vertices[c[0]]) : eye;
+        if (thin && bst_vec3_dot(p->normals[f], to_eye) <= 0.0) {
             continue;
         }
         for (int i = 2; i < s->facets[f].count; i++) {
@@ -99,12 +145,17 @@ static void print_geometry(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye) {
             comma = ", ";
         }
     }
-    printf("]}\n");
+    printf("]");
+    if (image) {
+        print_image(p, sun, eye);
+    }
+    printf("}\n");
 }
 
 int main(int argc, char **argv) {
-    if (argc != 5) {
-        fprintf(stderr, "usage: print_flux SATELLITE.json GEOMETRIES FIRST TABLE.csv\n");
+    bool image = argc == 6 && strcmp(argv[5], "image") == 0;
+    if (argc != 5 && !image) {
+        fprintf(stderr, "usage: print_flux SATELLITE.json GEOMETRIES FIRST TABLE.csv [image]\n");
         return 2;
     }
     bst_ctx ctx = {0};
@@ -121,7 +172,7 @@ int main(int argc, char **argv) {
     for (int i = 0; i < atoi(argv[2]);) {
         bst_vec3 sun = bst_test_direction(&random), eye = bst_test_direction(&random);
         if (bst_vec3_dot(sun, eye) > -0.3) { /* enough light to compare */
-            print_geometry(pose, sun, eye);
+            print_geometry(pose, sun, eye, image);
             i++;
         }
     }
