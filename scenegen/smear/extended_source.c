@@ -4,6 +4,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "scenegen/smear/gauss_legendre.h"
+
 /* Radius, px (or sigmas of a wider PSF), up to which discs use quadrature, which needs fewer
  * points. */
 #define SMALL_RADIUS 12.0
@@ -13,19 +15,7 @@
 /* Crescents narrower than this (px, or PSF sigmas) use quadrature as well. */
 #define THIN_WIDTH 6.0
 
-enum { GAUSS_MOST = 4, FINEST = 16 };
-
-/* Gauss-Legendre on [0, 1] with one to four points (Abramowitz and Stegun, table 25.4). */
-static const double gauss_place[GAUSS_MOST][GAUSS_MOST] = {
-    {0.5},
-    {0.2113248654051871, 0.7886751345948129},
-    {0.1127016653792583, 0.5, 0.8872983346207417},
-    {0.06943184420297371, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629}};
-static const double gauss_weight[GAUSS_MOST][GAUSS_MOST] = {
-    {1.0},
-    {0.5, 0.5},
-    {0.2777777777777778, 0.4444444444444444, 0.2777777777777778},
-    {0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693}};
+enum { FINEST = 16 };
 
 /* Scan of a disc on the focal plane. */
 typedef struct scan {
@@ -83,12 +73,12 @@ static bool chord(const scan *s, double y, double *from, double *to) {
 static bst_status fill(bst_ctx *ctx, scan *s, double y, double height, double from, double to) {
     double a = s->view->scale_rad;
     for (int k = 0; k < s->order; k++) {
-        double x = from + gauss_place[s->order - 1][k] * (to - from);
+        double x = from + bst_smear_gauss_place[s->order - 1][k] * (to - from);
         bst_vec3 v = {x * a, y * a, 1.0};
         double length = bst_vec3_norm(v);
         bst_vec3 d = bst_quat_rotate(s->gcrf_from_focal, bst_vec3_scale(v, 1.0 / length));
         double share = bst_disc_radiance(&s->disc, d) * a * a / (length * length * length) *
-                       height * (to - from) * gauss_weight[s->order - 1][k];
+                       height * (to - from) * bst_smear_gauss_weight[s->order - 1][k];
         if (share > 0.0) {
             BST_TRY(push(ctx, s->out, x - s->x0, y - s->y0, share));
             s->total += share;
@@ -142,8 +132,9 @@ static bst_status scan_disc(bst_ctx *ctx, scan *s) {
         double height = s->cell / strips;
         for (int n = 0; n < strips * s->order; n++) {
             int k = n % s->order;
-            BST_TRY(fill_row(ctx, s, y + height * (n / s->order + gauss_place[s->order - 1][k]),
-                             height * gauss_weight[s->order - 1][k]));
+            BST_TRY(fill_row(ctx, s,
+                             y + height * (n / s->order + bst_smear_gauss_place[s->order - 1][k]),
+                             height * bst_smear_gauss_weight[s->order - 1][k]));
         }
     }
     return BST_OK;
@@ -213,7 +204,7 @@ bst_status bst_extended_source_points(bst_ctx *ctx, const bst_scene_source *sour
         scanned -= shape->earthshine;
         s.disc.earth.scale = 0.0;
     }
-    s.order = (int)fmin(fmax(ceil(2.2 * s.cell / view->sigma_px), 2.0), GAUSS_MOST);
+    s.order = (int)fmin(fmax(ceil(2.2 * s.cell / view->sigma_px), 2.0), BST_SMEAR_GAUSS_MOST);
     double wide = fmin(2.0 * radius_px, view->max_x_px - view->min_x_px);
     double high = fmin(2.0 * radius_px, view->max_y_px - view->min_y_px);
     double squares = fmax(wide * high, 0.0);

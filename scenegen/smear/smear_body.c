@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "scenegen/reference.h"
+#include "scenegen/smear/gauss_legendre.h"
 #include "scenegen/smear/image_nodes.h"
 #include "scenegen/smear/smear_internal.h"
 #include "sim/world/scene/los_track.h"
@@ -22,23 +23,11 @@
 /* Poses from which one sample per cell and pose is enough. */
 enum { SAMPLED_POSES = 48 };
 
-enum { POSES_MAX = 1024, PATH_TIMES = 64, GAUSS_MOST = 4 };
-
-/* Gauss-Legendre on [0, 1] with one to four points (Abramowitz and Stegun, table 25.4). */
-static const double gauss_place[GAUSS_MOST][GAUSS_MOST] = {
-    {0.5},
-    {0.2113248654051871, 0.7886751345948129},
-    {0.1127016653792583, 0.5, 0.8872983346207417},
-    {0.06943184420297371, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629}};
-static const double gauss_weight[GAUSS_MOST][GAUSS_MOST] = {
-    {1.0},
-    {0.5, 0.5},
-    {0.2777777777777778, 0.4444444444444444, 0.2777777777777778},
-    {0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693}};
+enum { POSES_MAX = 1024, PATH_TIMES = 64 };
 
 /* Largest motion of a panel of the quadrature with one to four points, PSF sigmas: the error of
  * integrating an edge's image over it is below 1e-4. */
-static const double gauss_reach[GAUSS_MOST] = {0.1, 0.7, 1.7, 3.2};
+static const double gauss_reach[BST_SMEAR_GAUSS_MOST] = {0.1, 0.7, 1.7, 3.2};
 
 void bst_smear_bodies_clear(bst_smear_bodies *bodies) {
     for (int i = 0; i < bodies->count; i++) {
@@ -156,16 +145,16 @@ typedef struct times {
 /* Composite Gauss-Legendre quadrature for an image that moves by that many PSF sigmas. */
 static void choose_times(double sigmas, times *out) {
     int order = 0;
-    while (order + 1 < GAUSS_MOST && sigmas > gauss_reach[order]) {
+    while (order + 1 < BST_SMEAR_GAUSS_MOST && sigmas > gauss_reach[order]) {
         order++;
     }
-    double most = POSES_MAX / GAUSS_MOST;
+    double most = POSES_MAX / BST_SMEAR_GAUSS_MOST;
     int panels = (int)fmin(fmax(ceil(sigmas / gauss_reach[order]), 1.0), most);
     out->count = 0;
     for (int p = 0; p < panels; p++) {
         for (int k = 0; k <= order; k++) {
-            out->u[out->count] = (p + gauss_place[order][k]) / panels;
-            out->weight[out->count++] = gauss_weight[order][k] / panels;
+            out->u[out->count] = (p + bst_smear_gauss_place[order][k]) / panels;
+            out->weight[out->count++] = bst_smear_gauss_weight[order][k] / panels;
         }
     }
 }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "boresight/vec.h"
+#include "scenegen/smear/gauss_legendre.h"
 #include "scenegen/smear/smear_quadrature_internal.h"
 #include "sim/core/invariant.h"
 
@@ -95,14 +96,6 @@ static void second_moments(const bst_smear_maker *m, const group *g, bst_smear_m
     }
 }
 
-/* Four-point and two-point Gauss-Legendre on [0, 1] (Abramowitz and Stegun, table 25.4): exact for
- * the seventh and third order. */
-static const double gauss_place[2][4] = {
-    {0.06943184420297371, 0.33000947820757187, 0.66999052179242813, 0.93056815579702629},
-    {0.21132486540518712, 0.78867513459481288}};
-static const double gauss_weight[2][4] = {
-    {0.17392742256872693, 0.32607257743127307, 0.32607257743127307, 0.17392742256872693},
-    {0.5, 0.5}};
 /* With so many segments in a group the two-point rule suffices: its error of the fourth moment is 1
  * / segments^4. */
 enum { MANY_SEGMENTS = 6 };
@@ -115,13 +108,13 @@ static void high_moments(const bst_smear_maker *m, const group *g, bst_smear_mom
     while (segments < MANY_SEGMENTS && reaches(m, g, g->first + segments)) {
         segments++;
     }
-    int coarse = segments == MANY_SEGMENTS, points = coarse ? 2 : 4;
+    int points = segments == MANY_SEGMENTS ? 2 : 4;
     for (int k = g->first; reaches(m, g, k); k++) {
         double w = clip(m, g, k, a, b);
         for (int n = 0; n < points && w > 0.0; n++) {
-            double d[3], x = 0.0, part = w * gauss_weight[coarse][n];
+            double d[3], x = 0.0, part = w * bst_smear_gauss_weight[points - 1][n];
             for (int i = 0; i < 3; i++) {
-                d[i] = a[i] + gauss_place[coarse][n] * (b[i] - a[i]) - out->mean[i];
+                d[i] = a[i] + bst_smear_gauss_place[points - 1][n] * (b[i] - a[i]) - out->mean[i];
                 x += d[i] * out->axis[i];
             }
             double power = part;
