@@ -9,8 +9,9 @@
 
 #define BST_LIGHT_SPEED_MPS 299792458.0
 #define BST_AU_M 149597870700.0
-#define BST_SUN_RADIUS_M 6.957e8     /* IAU 2015 nominal */
-#define BST_EARTH_RADIUS_M 6378137.0 /* WGS 84 equatorial */
+#define BST_SUN_RADIUS_M 6.957e8         /* IAU 2015 nominal */
+#define BST_SOLAR_IRRADIANCE_WPM2 1361.0 /* at 1 au; IAU 2015 nominal */
+#define BST_EARTH_RADIUS_M 6378137.0     /* WGS 84 equatorial */
 #define BST_EARTH_FLATTENING (1.0 / 298.257223563)
 #define BST_EARTH_MU_M3PS2 3.986004418e14
 

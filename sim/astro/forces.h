@@ -5,14 +5,14 @@
 
 #include <stdbool.h>
 
+#include "sim/astro/bodies.h"
 #include "sim/astro/frames.h"
 #include "sim/astro/gravity.h"
 
 #define BST_SUN_GM_M3PS2 1.32712440018e20 /* DE405 */
 #define BST_MOON_GM_M3PS2 4.902800076e12  /* DE405 */
-/* solar radiation pressure on a black surface at 1 au: nominal irradiance (IAU 2015) 1361 W/m^2
- * over c */
-#define BST_SUNLIGHT_PRESSURE_PA (1361.0 / 299792458.0)
+/* solar radiation pressure on a black surface at 1 au */
+#define BST_SUNLIGHT_PRESSURE_PA (BST_SOLAR_IRRADIANCE_WPM2 / BST_LIGHT_SPEED_MPS)
 
 /* Sphere model of a spacecraft for radiation pressure and drag. */
 typedef struct bst_astro_spacecraft {

@@ -4,8 +4,6 @@
 
 #include "sim/satellite/flux.h"
 
-/* Nominal solar irradiance at 1 au, W/m^2 (IAU 2015, resolution B3). */
-#define BST_SOLAR_IRRADIANCE_WPM2 1361.0
 /* Stefan-Boltzmann constant, W/m^2/K^4 (CODATA 2018). */
 #define BST_STEFAN_BOLTZMANN 5.670374419e-8
 

@@ -1,4 +1,5 @@
 /* Temperatures of facets against closed forms. */
+#include "sim/astro/bodies.h"
 #include "sim/satellite/heat_history.h"
 #include "tests/satellite/satellite_support.h"
 
