@@ -89,7 +89,7 @@ static bst_status build_frame(bst_ctx *ctx, bst_renderer *r) {
         return BST_OK;
     }
     char options[320], detector[64];
-    bst_detector_options(r->detector, detector, sizeof detector);
+    bst_detector_options(r->detector, r->options.shared_program, detector, sizeof detector);
     snprintf(options, sizeof options, "%s%s", r->tile_options, detector);
     return bst_scene_frame_kernel(ctx, r->device, r->form, options, &r->frame_kernel);
 }

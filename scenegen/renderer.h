@@ -31,6 +31,9 @@ typedef struct bst_renderer_options {
      * paths need them (scenegen/scene_plan.h). If the tolerance requires more, sources are rendered
      * with fewer nodes. */
     long long max_nodes;
+    /* Frames of all detectors use one program, with a branch at each effect: compiled once, as
+     * suits many detectors of few frames each, but up to a third slower. */
+    bool shared_program;
     bool saturation_flags; /* keep the latest frame's flags for bst_renderer_flags */
     int pool_frames;       /* most frames alive at a time (4) */
     int planning_threads;  /* 0: one with a CPU device, otherwise one per processor */

@@ -73,13 +73,17 @@ static int effects_of(const bst_detector *detector) {
            (detector->flags ? BST_EFFECT_FLAGS : 0);
 }
 
-void bst_detector_options(const bst_detector *detector, char *text, size_t bytes) {
+void bst_detector_options(const bst_detector *detector, bool shared, char *text, size_t bytes) {
     double read = detector->camera.read_noise_e;
-    snprintf(text, bytes, " -DCF_ORDER=%d -DEFFECTS=%d%s",
+    char effects[32] = "";
+    if (!shared) {
+        snprintf(effects, sizeof effects, " -DEFFECTS=%d", effects_of(detector));
+    }
+    snprintf(text, bytes, " -DCF_ORDER=%d%s%s",
              read >= 5.0   ? 2
              : read >= 3.0 ? 3
                            : 4,
-             effects_of(detector), bst_detector_tail_options(&detector->camera));
+             effects, bst_detector_tail_options(&detector->camera));
 }
 
 void bst_detector_params(const bst_detector *detector, bst_kernel_frame_params *p) {

@@ -46,7 +46,7 @@ bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name)
  *   read noise >= 2 e-      all means, to 1/sigma^4
  *   read noise >= 0.75 e-   means from 30 e- on, to 1/sigma^4
  *   below                   never: single electrons are resolved */
-void bst_detector_options(const bst_detector *detector, char *text, size_t bytes);
+void bst_detector_options(const bst_detector *detector, bool shared, char *text, size_t bytes);
 /* Build options of kernels/read_tail.cl, each preceded by a space. */
 const char *bst_detector_tail_options(const bst_camera *camera);
 /* Sets the detector's parameters of the kernels, from `effects` on. */

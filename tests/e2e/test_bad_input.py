@@ -105,13 +105,18 @@ class BadInput(unittest.TestCase):
         self.assertIn("set POCL_CACHE_DIR to a folder that can be written", result.stderr)
 
     def test_damaged_kernels_are_built_anew(self):
-        """PoCL aborts for a cached kernel that is cut; and what others may write is not loaded."""
+        """PoCL aborts for a cached kernel that is cut; and what others may write is not loaded. A
+        small stack (ulimit -s) is enough, also for the compiler of OpenCL, which takes the most."""
         cache = os.path.join(runs.scratch(), "kcache")
 
-        def run(**environment):
-            return self.call("run", runs.STARE, "--quiet", "--duration", "1", "--out",
-                             os.path.join(runs.scratch(), "run"), "--set", runs.NO_FRAMES, "--set",
-                             "/world/star_catalogue=embedded", POCL_CACHE_DIR=cache, **environment)
+        def run():
+            words = [runs.BORESIGHT, "run", runs.STARE, "--quiet", "--duration", "1", "--out",
+                     os.path.join(runs.scratch(), "run"), "--set", runs.NO_FRAMES, "--set",
+                     "/world/star_catalogue=embedded"]
+            return subprocess.run(["sh", "-c", 'ulimit -s 64; exec "$@"', "sh", *words],
+                                  capture_output=True, text=True, timeout=4 * SECONDS,
+                                  stdin=subprocess.DEVNULL,
+                                  env={**os.environ, "POCL_CACHE_DIR": cache})
         self.assertEqual(run().returncode, 0)
         cut = 0
         for folder, _, names in os.walk(cache):

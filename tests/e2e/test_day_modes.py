@@ -17,7 +17,7 @@ FULL = "--full" in sys.argv
 if FULL:
     sys.argv.remove("--full")
 SCENARIO = "scenarios/day_eclipse.json"
-LENGTH_S = 86400 if FULL else 12000
+LENGTH_S = 86400 if FULL else 9000
 EARLY_S = 5000  # with an occultation: all that a run allocates has been used
 
 

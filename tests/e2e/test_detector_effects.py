@@ -126,7 +126,7 @@ class Effects(unittest.TestCase):
         for serial in (False, True):
             out = f"{runs.scratch()}/run"
             runs.run(runs.RATE_OPEN, out, runs.NO_FRAMES, DETECTOR + "/hot_fraction=0.003", seed=3,
-                     duration=15, serial=serial)
+                     duration=10, serial=serial)
             tables.append([tuple(row) for row in runs.database(out).execute(
                 "SELECT exposure_id, x_px, y_px, snr, label FROM detections "
                 "ORDER BY exposure_id, item")])

@@ -31,6 +31,8 @@ FORMS = {
     "none": ["/record/frames=none", "/record/telemetry_hz=500"],
 }
 DURATION_S = 12
+# of runs that go on until something ends them: the processor is left to others
+PACED = ["--pacing", "realtime", "--set", "/pacing/speed=10"]
 FRAME_BYTES = 2 * 1024 ** 2
 TOO_LARGE, NO_SPACE = os.strerror(errno.EFBIG), os.strerror(errno.ENOSPC)
 
@@ -225,7 +227,7 @@ class Faults(unittest.TestCase):
 
     def test_living_run_is_left_alone(self):
         out = self.out("living")
-        with subprocess.Popen(runs.command(runs.TRACK, out, *FORMS["extensions"], duration=3000),
+        with subprocess.Popen(runs.command(runs.TRACK, out, *FORMS["extensions"], duration=3000) + PACED,
                               stderr=subprocess.DEVNULL) as process:
             while not os.path.exists(out + ".partial/frames.fits"):
                 time.sleep(0.01)
@@ -244,7 +246,7 @@ class Faults(unittest.TestCase):
     def test_folder_goes_while_the_run_writes(self):
         for form in ("extensions", "rice", "cube", "none"):
             out = self.out(f"going {form}")
-            with subprocess.Popen(runs.command(runs.TRACK, out, *FORMS[form], duration=3000),
+            with subprocess.Popen(runs.command(runs.TRACK, out, *FORMS[form], duration=3000) + PACED,
                                   stderr=subprocess.PIPE, text=True) as process:
                 while not os.path.exists(out + ".partial/run.sqlite"):
                     time.sleep(0.01)

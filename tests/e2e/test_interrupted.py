@@ -27,9 +27,9 @@ FORMS = {
     "cube": ["/record/frames=cube"],
 }
 FULL = KILLS > 9
-REFERENCE_S = 60 if FULL else 30
+REFERENCE_S = 60 if FULL else 25
 SHORT_S = 6
-LONGEST_WAIT_S = 1.5 if FULL else 0.6
+LONGEST_WAIT_S = 1.5 if FULL else 0.4
 
 
 def start(out, form, duration, *words):
@@ -93,10 +93,10 @@ class Interrupted(unittest.TestCase):
 
     def lost(self, form):
         """Kills a run some seconds into its frames; frames seen 4 s before, and what is left. At
-        twenty times real time, so that it leaves the processor to others."""
+        ten times real time, so that it leaves the processor to others."""
         out = os.path.join(self.folder, f"lost {form}")
         path = os.path.join(out + ".partial", "frames.fits")
-        with start(out, form, 3000, "--pacing", "realtime", "--set", "/pacing/speed=20") as process:
+        with start(out, form, 3000, "--pacing", "realtime", "--set", "/pacing/speed=10") as process:
             wait_for_frames(process, out)
             time.sleep(1)
             seen = os.path.getsize(path)

@@ -118,8 +118,8 @@ def diverges(sets, duration):
 
 class Latency(unittest.TestCase):
     def check(self, name, share, gain_near=0.05, delay_near=0.10):
-        """The verdict of both sides of both limits; the marks are those of the issue: 5 % of the
-        gain, 10 % of the delay."""
+        """The verdict of both sides of both limits; the marks: 5 % of the gain, 10 % of the delay;
+        None: not this limit."""
         with tempfile.TemporaryDirectory() as folder:
             self.both_sides(name, share, folder, gain_near, delay_near)
 
@@ -141,7 +141,7 @@ class Latency(unittest.TestCase):
         delay = min(axis["delay_margin_s"] for axis in axes)
         row = []
         for key, limit, near in (("gain_scale", gain, gain_near), ("delay_s", delay, delay_near)):
-            for factor in (1 - near, 1 + near):
+            for factor in (1 - near, 1 + near) if near else ():
                 one = dict(law, **{key: factor * limit})
                 with self.subTest(loop=name, share=share, key=key, factor=factor):
                     self.assertEqual(diverges(dict(sets, **{LAW: one}), duration), factor > 1)
@@ -151,10 +151,10 @@ class Latency(unittest.TestCase):
             print(f"| {name} | {share} | {' | '.join(row)} |", flush=True)
 
     def test_short(self):
-        self.check("observer, 4 frames/s", 0.3, 0.04, 0.06)
+        self.check("observer, 4 frames/s", 0.3, 0.04, 0.06 if FULL else None)
 
     def test_long(self):
-        self.check("observer, gains as asked, 10 frames/s", 1.7)
+        self.check("observer, gains as asked, 10 frames/s", 1.7, 0.05 if FULL else None)
 
     @unittest.skipUnless(FULL, "slow")
     def test_all(self):

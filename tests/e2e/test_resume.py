@@ -29,7 +29,7 @@ RAW = ["/record/compression=none"]
 CUBE = ["/record/frames=cube"]
 PLANES = RAW + ['/record/planes=["saturation"]']
 QUICK = "scenarios/constellation_quick.json"
-TRACK_S = 30
+TRACK_S = 24
 
 
 def content(out):

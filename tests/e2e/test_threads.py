@@ -20,10 +20,10 @@ FULL = "--full" in sys.argv and not sys.argv.remove("--full")
 # more than there are of sensors too
 THREADS = (1, 2, 3, 8) if FULL else (2, 8)
 JOBS = {  # name: scenario, seconds (in full), settings
-    "open": (runs.RATE_OPEN, 5, 8, ["/record/frames=cube"]),
-    "closed": (runs.TRACK, 8, 10, ["/record/frames=extensions"]),
-    "generator": ("scenarios/constellation_quick.json", 40, 60, WIDE),
-    "images": ("scenarios/constellation_images.json", 4, 6, WIDE + SMALL),
+    "open": (runs.RATE_OPEN, 3, 8, ["/record/frames=cube"]),
+    "closed": (runs.TRACK, 5, 10, ["/record/frames=extensions"]),
+    "generator": ("scenarios/constellation_quick.json", 25, 60, WIDE),
+    "images": ("scenarios/constellation_images.json", 3, 6, WIDE + SMALL),
 }
 
 

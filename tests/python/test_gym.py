@@ -187,7 +187,7 @@ class Tasking(unittest.TestCase):
 
     def courses(self, action):
         """Twice the same steps of the run number 7."""
-        env = bg.TaskingEnv(model=self.model)
+        env = bg.TaskingEnv(model=self.model, decision_s=10, revisit_s=150)
         course = []
         for _ in range(2):
             env.reset(seed=7)

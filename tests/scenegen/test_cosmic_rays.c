@@ -170,6 +170,16 @@ static void windows_agree_with_every_effect(void **state) {
             }
         }
         bst_renderer_free(r);
+        if (stage ==
+            0) { /* the program of all detectors gives the same bytes as the camera's own */
+            bst_renderer_options shared = bst_renderer_default_options();
+            shared.shared_program = true;
+            bst_assert_ok(&ctx, bst_renderer_create(&ctx, device, &camera, &shared, &r));
+            request.window = (bst_window){0, 0, W, H};
+            take(&ctx, r, &request, other);
+            assert_memory_equal(other, full, sizeof full);
+            bst_renderer_free(r);
+        }
         free(stars);
     }
     bst_device_close(device);

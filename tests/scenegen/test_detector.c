@@ -38,6 +38,8 @@ static void make(fixture *f) {
     bst_renderer_free(f->renderer);
     bst_renderer_options options = bst_renderer_default_options();
     options.pattern = (bst_rng_key){{21, 22}};
+    /* compiled once, not for each effect; test_cosmic_rays.c compares with the camera's own */
+    options.shared_program = true;
     bst_assert_ok(&f->ctx,
                   bst_renderer_create(&f->ctx, f->device, &f->camera, &options, &f->renderer));
 }

@@ -94,7 +94,7 @@ static void predicted_errors_hold(void **state) {
         {"still, narrow PSF", {.duration_s = 1, .samples = 101}, 10, 5, 0.8, 0.05},
         {"slow", {.x_px = 3, .y_px = 1, .duration_s = .5, .samples = 201}, 10, 5, 2, 0.05},
         {"slow, tight", {.x_px = 3, .y_px = 1, .duration_s = .5, .samples = 201}, 10, 5, 2, .005},
-        {"slow, wide PSF", {.x_px = 3, .y_px = 1, .duration_s = .5, .samples = 201}, 10, 5, 6, .05},
+        {"slow, wide PSF", {.x_px = 3, .y_px = 1, .duration_s = .5, .samples = 201}, 10, 5, 9, .05},
         {"fast", {.x_px = 90, .y_px = 40, .duration_s = 1, .samples = 201}, 10, 5, 2, 0.05},
         {"fast, loose", {.x_px = 90, .y_px = 40, .duration_s = 1, .samples = 201}, 10, 5, 2, 0.5},
         {"fast, sparse", {.x_px = 60, .y_px = -20, .duration_s = 1, .samples = 2}, 10, 5, 2, 0.05},
@@ -150,7 +150,7 @@ static void predicted_errors_hold(void **state) {
  * narrow to wider than the field: the prediction holds and stays near. */
 static void predicted_errors_of_crowds_hold(void **state) {
     fixture *f = *state;
-    static const double fwhm_px[] = {0.8, 2, 2, 4, 10, 40}, reach_px[] = {0, 0, 20, 5, 1};
+    static const double fwhm_px[] = {0.8, 2, 2, 4, 9, 40}, reach_px[] = {0, 0, 20, 5, 1};
     static const double tolerances[] = {0.01, 0.05, 0.2};
     static const int counts[] = {2, 8, 30, 100, 300};
     static const scene_motion motions[] = {

@@ -207,8 +207,11 @@ static void near_passes_are_drawn_where_they_cross(void **state) {
 
 /* Pixels and group of tiles other than the device's, of its form: work-items that render a tile
  * each, or work-groups (test_gpu_form.c compares the forms). */
-static const int other_tiles[2][3][3] = {{{64, 4, 16}, {64, 16, 2}, {512, 64, 1}},
+static const int other_tiles[2][3][3] = {{{64, 4, 16}, {512, 64, 1}, {64, 16, 2}},
                                          {{64, 4, 0}, {64, 16, 0}, {64, 3, 0}}};
+
+/* Each shape of tiles is compiled, for seconds: the others in the slow form. */
+static int frame_shapes = 2, light_shapes = 2;
 
 /* The same pixels from any window, tile, group and number of threads. shapes: number of the tiles
  * above that are tried. */
@@ -284,8 +287,8 @@ static void bytes_do_not_depend_on_how_they_are_made(void **state) {
     /* every method of the noise, and wells that fill; the device compiles each order of the noise
      * law (read noise below 3 and 5 e-) for each shape of tiles, for seconds: all shapes once. The
      * windows of the other orders begin and end anywhere in their tiles. */
-    bytes_do_not_depend_on(*state, 8.0, 65000.0, 3);
-    bytes_do_not_depend_on(*state, 8.0, 100.0, 3);
+    bytes_do_not_depend_on(*state, 8.0, 65000.0, frame_shapes);
+    bytes_do_not_depend_on(*state, 8.0, 100.0, frame_shapes);
     bytes_do_not_depend_on(*state, 3.0, 100.0, 0);
     bytes_do_not_depend_on(*state, 1.0, 65000.0, 0);
     bytes_do_not_depend_on(*state, 0.4, 65000.0, 0);
@@ -305,9 +308,9 @@ static void light_does_not_depend_on_tiles(void **state) {
                             .sources = stars,
                             .count = STARS,
                             .background_e = 3.0};
-    static const int vectors[4][3] = {{64, 64, 1}, {64, 1, 32}, {64, 2, 16}, {0, 0, 0}},
-                     lanes[4][3] = {{64, 16, 0}, {64, 1, 0}, {64, 3, 0}, {0, 0, 0}};
-    for (int i = 0; i < 4; i++) {
+    static const int vectors[4][3] = {{0, 0, 0}, {64, 1, 32}, {64, 2, 16}, {64, 64, 1}},
+                     lanes[4][3] = {{0, 0, 0}, {64, 1, 0}, {64, 3, 0}, {64, 16, 0}};
+    for (int i = 0; i < light_shapes; i++) {
         const int(*tiles)[3] = bst_device_is_cpu(f->device) ? vectors : lanes;
         bst_renderer_options options = bst_renderer_default_options();
         options.tile_width = tiles[i][0];
@@ -348,7 +351,9 @@ static void frames_under_way(void **state) {
                                     .key = {{17, 23}},
                                     .exposure_id = i};
     }
-    bst_renderer *r = make(f, &camera, NULL);
+    bst_renderer_options options = bst_renderer_default_options();
+    options.shared_program = true; /* compiled for test_detector.c too */
+    bst_renderer *r = make(f, &camera, &options);
     long long saturated[FRAMES], pixels;
     for (int i = 0; i < FRAMES; i++) {
         frame_of(f, r, &q[i], alone[i]);
@@ -359,7 +364,7 @@ static void frames_under_way(void **state) {
     assert_true(frames >= 2);
     bst_renderer_free(r);
 
-    r = make(f, &camera, NULL);
+    r = make(f, &camera, &options);
     bst_frame *alive[FRAMES];
     for (int i = 0; i < FRAMES + ALIVE; i++) {
         if (i < FRAMES) {
@@ -568,7 +573,11 @@ static void wrong_requests_and_cameras_are_refused(void **state) {
     assert_int_equal(bst_renderer_create(&f->ctx, f->device, &camera, NULL, &r), BST_ERR_ARGUMENT);
 }
 
-int main(void) {
+int main(int argc, char **argv) {
+    if (argc > 1 && strcmp(argv[1], "slow") == 0) {
+        frame_shapes = 3;
+        light_shapes = 4;
+    }
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(images_agree_with_the_reference),
         cmocka_unit_test(distorted_images_agree_with_the_reference),
