@@ -239,7 +239,7 @@ class Tables(SkewedRun, TruthTables, LoopTables):
 
 class Generated(Tables):
     """What differs where the observation generator takes the place of images."""
-    SOURCE = "generator"
+    SOURCE, BINNING = "generator", 2
     test_frames_and_headers = test_pixels = test_mount_and_pointing = test_navigation = test_line_of_sight = None
     test_places_of_sources = test_light_of_sources = test_units_are_those_of_the_names = None
 

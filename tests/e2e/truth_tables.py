@@ -10,7 +10,7 @@ from astropy.wcs import WCS
 import figures
 import optics
 from optics import ARCSEC, angle, columns, quaternion, rotate, turn_between, unit
-from skewed_scene import DURATION_S, EXPOSURE_S, NORAD, PERIOD_S, SUN_V_MAG, TELEMETRY_HZ, TICKS
+from skewed_scene import DURATION_S, EXPOSURE_S, NORAD, PERIOD_S, SUN_V_MAG, TELEMETRY_HZ, TICKS, WINDOW
 
 
 class TruthTables:
@@ -104,8 +104,9 @@ class TruthTables:
                 mean = weights @ path / weights.sum()
                 self.close([row["x_chief_px"], row["y_chief_px"]], mean, 0.12, e["exposure_id"])
                 self.close([row["x_centroid_px"] - row["x_chief_px"], row["y_centroid_px"] - row["y_chief_px"]], 0, 1e-9)
-                inside = np.all(mean > -0.5) and np.all(mean < [639.5, 479.5])
-                if np.all(np.abs(mean - [319.5, 239.5]) < [318, 238]) or not inside:
+                first, size = np.array(WINDOW[:2]), np.array(WINDOW[2:])
+                inside = np.all(mean > first - 0.5) and np.all(mean < first + size - 0.5)
+                if np.all(np.abs(mean - first - (size - 1) / 2) < size / 2 - 2) or not inside:
                     self.assertEqual(row["in_field"], int(inside))
                 checked[row["kind"]] += 1
         self.assertGreater(checked["star"], 250)
@@ -165,7 +166,9 @@ class TruthTables:
         epoch = Time(self.scene["epoch_utc"], scale="utc")
         camera = self.sensor["camera"]
         zero_point = 2.5 * np.log10(self.light_of(0) / EXPOSURE_S)
-        grid = np.array([(x, y) for x in np.linspace(0, 639, 9) for y in np.linspace(0, 479, 7)])
+        corner = np.array(WINDOW[:2])
+        grid = np.array([(x, y) for x in np.linspace(corner[0], corner[0] + WINDOW[2] - 1, 9)
+                         for y in np.linspace(corner[1], corner[1] + WINDOW[3] - 1, 7)])
         misfits, quiet = [], {e["exposure_id"] for e in self.tracking()}
         with fits.open(os.path.join(self.out, "frames.fits")) as hdus:
             self.assertEqual(len(hdus), len(self.exposures) + 1)
@@ -178,14 +181,14 @@ class TruthTables:
                 start = epoch + TimeDelta(k * PERIOD_S, format="sec")
                 self.assertEqual([frame[c] for c in ("sensor", "exposure_id", "start_tick", "end_tick", "start_s", "exposure_s",
                                                      "x0_px", "y0_px", "width_px", "height_px", "binning", "bits", "fits_index")],
-                                 [0, k, e["start_tick"], e["end_tick"], k * PERIOD_S, EXPOSURE_S, 0, 0, 640, 480, 1, 16, k + 1])
+                                 [0, k, e["start_tick"], e["end_tick"], k * PERIOD_S, EXPOSURE_S, *WINDOW, 1, 16, k + 1])
                 self.assertLess(abs((Time(frame["start_utc"].rstrip("Z"), scale="utc") - start).sec), 1e-6)
                 for key, later in (("DATE-OBS", 0), ("DATE-BEG", 0), ("DATE-AVG", 0.25), ("DATE-END", 0.5)):
                     self.assertLess(abs((Time(h[key], scale="utc") - start).sec - later), 1e-6, key)
                     mjd = "MJD" + key[4:]
                     self.assertLess(abs((Time(h[mjd], format="mjd", scale="utc") - start).sec - later), 1e-6, mjd)
                 for key, value in (("EXPTIME", 0.5), ("GAIN", 1.6), ("RDNOISE", 8), ("OFFSET", 500), ("BITS", 16),
-                                   ("PIXSCALE", 3), ("WINX0", 0), ("WINY0", 0), ("BINNING", 1), ("FRAMEID", k), ("EXTVER", k + 1),
+                                   ("PIXSCALE", 3), ("WINX0", WINDOW[0]), ("WINY0", WINDOW[1]), ("BINNING", 1), ("FRAMEID", k), ("EXTVER", k + 1),
                                    ("INSTRUME", "telescope"), ("OBSERVER", "neossat"), ("OBJECT", "INMARSAT GX5"),
                                    ("EARTHFRC", e["earth_fraction"]), ("MOONFRC", 0), ("SUNFRC", 0)):
                     self.assertEqual(h[key], value, key)
@@ -195,7 +198,10 @@ class TruthTables:
                 for axis in "XYZ":
                     self.assertAlmostEqual(h["OBSPOS" + axis], e[f"observer_gcrf_{axis.lower()}_m"], delta=1e-5)
                     self.assertAlmostEqual(h["OBSVEL" + axis], e[f"observer_gcrf_{axis.lower()}_mps"], delta=1e-8)
-                for key, column in (("CRPIX1", "crpix1"), ("CRPIX2", "crpix2"), ("CRVAL1", "crval1_deg"), ("CRVAL2", "crval2_deg"),
+                # the table's WCS is that of the whole sensor
+                for axis in (1, 2):
+                    self.assertAlmostEqual(h[f"CRPIX{axis}"], frame[f"crpix{axis}"] - WINDOW[axis - 1], delta=1e-9)
+                for key, column in (("CRVAL1", "crval1_deg"), ("CRVAL2", "crval2_deg"),
                                     ("CD1_1", "cd1_1_deg"), ("CD1_2", "cd1_2_deg"), ("CD2_1", "cd2_1_deg"), ("CD2_2", "cd2_2_deg"),
                                     ("WCSRESID", "wcs_residual_px")):
                     self.assertAlmostEqual(h[key], frame[column], delta=1e-12 + 1e-13 * abs(frame[column]), msg=key)
@@ -205,11 +211,11 @@ class TruthTables:
                 ra, dec = np.degrees(np.arctan2(place[:, 1], place[:, 0])), np.degrees(np.arcsin(place[:, 2]))
                 wcs = WCS(h)
                 x, y = wcs.all_world2pix(ra, dec, 0)
-                misfits.append(np.hypot(x - grid[:, 0], y - grid[:, 1]).max())
+                misfits.append(np.hypot(x + corner[0] - grid[:, 0], y + corner[1] - grid[:, 1]).max())
                 self.assertLess(misfits[-1], 2e-3, k)
                 if k in quiet:
                     self.assertAlmostEqual(misfits[-1], frame["wcs_residual_px"], delta=2e-5)
-                self.close(wcs.pixel_to_world_values(grid[:, 0], grid[:, 1])[1], dec, 2e-3 * 3 / 3600)
+                self.close(wcs.pixel_to_world_values(*(grid - corner).T)[1], dec, 2e-3 * 3 / 3600)
         print(f"WCS against aberration and camera: at most {max(misfits):.1e} px off")
 
     def test_pixels(self):
