@@ -13,7 +13,7 @@ from skewed_scene import ELEMENTS, NORAD, OBSERVER, OFFSET_RTN_M, TICKS, scenari
 
 
 class SkewedRun(unittest.TestCase):
-    SOURCE, BINNING = "image", 1
+    SOURCE, BINNING = "image", 2
 
     @classmethod
     def setUpClass(cls):

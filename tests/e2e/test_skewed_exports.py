@@ -27,10 +27,10 @@ class SkewedExports(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = runs.scratch()
         cls.made, cls.out = os.path.join(cls.folder, "run"), os.path.join(cls.folder, "out")
-        runs.run(scenario(cls.folder), cls.made, "/record/telemetry_hz=1")
+        runs.run(scenario(cls.folder), cls.made, "/record/telemetry_hz=1", f"{runs.SENSOR}/exposure/binning=2")
         for words in (("--orbits", "czml", "--step", "4"), ("--orbits", "oem", "--step", "4"), ("--observations", "json"),
                       ("--observations", "csv"), ("--observations", "tdm"),
-                      ("--frames", "png", "--annotate", "--first", "30", "--last", "30", "--size", "288")):
+                      ("--frames", "png", "--annotate", "--first", "30", "--last", "30", "--size", "144")):
             call_well("export", cls.made, *words, "--out", cls.out)
         cls.db = runs.database(cls.made)
         cls.epoch = cls.db.execute("SELECT epoch_utc FROM run").fetchone()[0]
@@ -195,14 +195,14 @@ class SkewedExports(unittest.TestCase):
             self.assertLess(np.linalg.norm(1e3 * np.array(state[3:]) - velocity), 0.1)
 
     def test_marks(self):
-        """The red square stands about the target in a picture of half the window's size."""
+        """The red square stands about the target in a picture of half the binned window's size."""
         width, height, picture = read_png(self.path("frames/frame_000030.png"))
-        self.assertEqual((width, height), (WINDOW[2] // 2, WINDOW[3] // 2))
+        self.assertEqual((width, height), (WINDOW[2] // 4, WINDOW[3] // 4))
         image = np.array([list(row) for row in picture]).reshape(height, width, 3)
         red = (image[:, :, 0] > 200) & (image[:, :, 1] < 130) & (image[:, :, 2] < 130)
         row = self.db.execute("SELECT x_chief_px, y_chief_px FROM truth WHERE kind = 'object' AND id = 0 AND exposure_id = 30"
                               ).fetchone()
-        x, y = ((row[k] - WINDOW[k] + 0.5) / 2 - 0.5 for k in range(2))
+        x, y = ((row[k] - WINDOW[k] + 0.5) / 4 - 0.5 for k in range(2))
         rows, cols = np.nonzero(red)
         near = (np.abs(rows - y) < 13) & (np.abs(cols - x) < 13)
         self.assertGreater(near.sum(), 20)
