@@ -134,10 +134,11 @@ static void test_first_slew(void **state) {
     /* 2 sqrt(25 / 0.01) = 100 s */
     assert_int_equal(bst_check_first_slew(&ctx, "a/b", &moves, 24.9 * BST_DEG_RAD), 0);
     assert_int_equal(bst_check_first_slew(&ctx, "a/b", &moves, 25.1 * BST_DEG_RAD), 1);
-    assert_string_equal(said.last,
-                        "a/b: the slew to the cue, 25.1 deg, takes 100 s at the mount's 0.01 "
-                        "deg/s^2 and at most 2 deg/s, and the run 100 s; raise its limits, or start "
-                        "nearer to the cue");
+    assert_string_equal(
+        said.last,
+        "a/b: the slew to the cue, 25.1 deg, takes 100 s at the mount's 0.01 "
+        "deg/s^2 and at most 2 deg/s, and the run 100 s; raise its limits, or start "
+        "nearer to the cue");
 }
 
 int main(void) {

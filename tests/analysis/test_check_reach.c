@@ -165,14 +165,15 @@ static void expect_geometry(double seconds, const bst_pointing_feasibility_look 
     bst_vec3 wanted = bst_vec3_unit(bst_vec3_axpy(bst_vec3_unit(line), 1.0 / 299792458.0,
                                                   bst_vec3_add(earth, eye.velocity_mps)));
     assert_true(bst_vec3_angle(seen->direction_gcrf, wanted) < 3e-7);
-    /* the axis points to nadir, the second one along the velocity, then 30 degrees about the axis */
+    /* the axis points to nadir, the second one along the velocity, then 30 degrees about the axis
+     */
     bst_quat q = bst_quat_conj(seen->q_body_from_gcrf);
     bst_vec3 down = bst_vec3_unit(bst_vec3_scale(eye.position_m, -1.0));
     bst_vec3 axis = bst_quat_rotate(q, bst_vec3_unit((bst_vec3){1, 2, -2}));
     bst_vec3 second = bst_quat_rotate(q, bst_vec3_unit((bst_vec3){2, -2, -1}));
     bst_assert_close(bst_vec3_angle(axis, down), 0.0, 1e-9);
-    bst_vec3 ahead = bst_vec3_unit(
-        bst_vec3_axpy(eye.velocity_mps, -bst_vec3_dot(eye.velocity_mps, down), down));
+    bst_vec3 ahead =
+        bst_vec3_unit(bst_vec3_axpy(eye.velocity_mps, -bst_vec3_dot(eye.velocity_mps, down), down));
     bst_assert_close(bst_vec3_dot(second, ahead), cos(30 * BST_DEG_RAD), 1e-9);
     bst_assert_close(bst_vec3_dot(bst_vec3_cross(ahead, second), down), sin(30 * BST_DEG_RAD),
                      1e-9);
@@ -198,11 +199,13 @@ static void check(const char *const *own, int count, said_log *said) {
         SENSOR "camera/height_px=500",
         SENSOR "cue/offset_deg=0",
         SENSOR "cue/sigma_deg=0.3",
-        SENSOR "modules/control/guidance={\"limit_fraction\": 0.7, \"loss_tolerance_px\": 8, "
-               "\"sun_keep_out_deg\": 25, \"moon_keep_out_deg\": 12}",
-        SENSOR "modules/gimbal/platform/spacecraft={\"type\": \"rigid_body\", \"attitude\": "
-               "{\"law\": \"nadir\", \"roll_deg\": 30, \"axis\": [1, 2, -2], \"second_axis\": [4, "
-               "-4, -2]}}"};
+        SENSOR
+        "modules/control/guidance={\"limit_fraction\": 0.7, \"loss_tolerance_px\": 8, "
+        "\"sun_keep_out_deg\": 25, \"moon_keep_out_deg\": 12}",
+        SENSOR
+        "modules/gimbal/platform/spacecraft={\"type\": \"rigid_body\", \"attitude\": "
+        "{\"law\": \"nadir\", \"roll_deg\": 30, \"axis\": [1, 2, -2], \"second_axis\": [4, "
+        "-4, -2]}}"};
     bst_load_options load = BST_LOAD_DEFAULTS;
     bst_option none[] = {{.name = NULL}};
     bst_ctx ctx;

@@ -50,7 +50,8 @@ bst_status __wrap_bst_watch_run(bst_ctx *ctx, const bst_scenario *scenario,
                                                .y_end_px = y,
                                                .snr = i < 20 ? 6.5 : 12.0,
                                                .flags = BST_TRUTH_IN_FIELD};
-            /* three do not count: too faint, hidden, out of the field; places count from SNR 5 on */
+            /* three do not count: too faint, hidden, out of the field; places count from SNR 5 on
+             */
             if (i >= SOURCES + 3) {
                 truth->items[i].snr = i == SOURCES + 3 ? 4.9 : 5.1;
                 found->items[found->count++] = (bst_detection){.x_px = x + 1.8 * place_off[g],

@@ -1,5 +1,5 @@
-/* Angles of a TDM up to the fit, and what is made of its solution: report, words, ephemeris and mean
- * elements, against Kepler's closed forms. Linked with a wrap of the fit itself. */
+/* Angles of a TDM up to the fit, and what is made of its solution: report, words, ephemeris and
+ * mean elements, against Kepler's closed forms. Linked with a wrap of the fit itself. */
 #include <cjson/cJSON.h>
 
 #include "boresight/vec.h"
@@ -96,11 +96,12 @@ static int set_up(void **state) {
     segment(file, "BODY", 0, 2);
     fclose(file);
     file = open_file(f->eye, "w");
-    fputs("CCSDS_OEM_VERS = 2.0\nCREATION_DATE = 2022-06-16T00:00:00\nORIGINATOR = TEST\n"
-          "META_START\nOBJECT_NAME = EYE\nOBJECT_ID = EYE\nCENTER_NAME = EARTH\nREF_FRAME = GCRF\n"
-          "TIME_SYSTEM = UTC\nSTART_TIME = 2022-06-16T22:10:00\nSTOP_TIME = 2022-06-16T22:22:00\n"
-          "INTERPOLATION = HERMITE\nINTERPOLATION_DEGREE = 7\nMETA_STOP\n",
-          file);
+    fputs(
+        "CCSDS_OEM_VERS = 2.0\nCREATION_DATE = 2022-06-16T00:00:00\nORIGINATOR = TEST\n"
+        "META_START\nOBJECT_NAME = EYE\nOBJECT_ID = EYE\nCENTER_NAME = EARTH\nREF_FRAME = GCRF\n"
+        "TIME_SYSTEM = UTC\nSTART_TIME = 2022-06-16T22:10:00\nSTOP_TIME = 2022-06-16T22:22:00\n"
+        "INTERPOLATION = HERMITE\nINTERPOLATION_DEGREE = 7\nMETA_STOP\n",
+        file);
     for (int t = 0; t <= 720; t += 30) {
         bst_vec3 r, v;
         eye_at(t, &r, &v);
@@ -109,24 +110,22 @@ static int set_up(void **state) {
                 v.x / 1e3, v.y / 1e3, v.z / 1e3);
     }
     fclose(file);
-    solution = (bst_od_solution){
-        .state = {.time_s = 150.25,
-                  .position_m = {-5.2e6, 3.1e6, 4.4e6},
-                  .velocity_mps = {-4.6e3, -6.1e3, -0.9e3}},
-        .chi2 = 24.0,
-        .dof = 4,
-        .variance_factor = 44.0 / 24.0,
-        .used = 5,
-        .rejected = 1,
-        .rms_rad = 2.25 * BST_ARCSEC_RAD,
-        .range_m = 1.25e6,
-        .range_sigma_m = 350.0,
-        .bend = 0.125};
+    solution = (bst_od_solution){.state = {.time_s = 150.25,
+                                           .position_m = {-5.2e6, 3.1e6, 4.4e6},
+                                           .velocity_mps = {-4.6e3, -6.1e3, -0.9e3}},
+                                 .chi2 = 24.0,
+                                 .dof = 4,
+                                 .variance_factor = 44.0 / 24.0,
+                                 .used = 5,
+                                 .rejected = 1,
+                                 .rms_rad = 2.25 * BST_ARCSEC_RAD,
+                                 .range_m = 1.25e6,
+                                 .range_sigma_m = 350.0,
+                                 .bend = 0.125};
     for (int i = 0; i < 6; i++) {
         for (int k = 0; k < 6; k++) {
-            solution.covariance[i][k] =
-                (i == k ? 100.0 : 1.0) * (i < 3 ? 100.0 : 0.1) * (k < 3 ? 100.0 : 0.1) *
-                (i == k ? 1 + i : 0.1 * (i + k));
+            solution.covariance[i][k] = (i == k ? 100.0 : 1.0) * (i < 3 ? 100.0 : 0.1) *
+                                        (k < 3 ? 100.0 : 0.1) * (i == k ? 1 + i : 0.1 * (i + k));
         }
     }
     *state = f;
@@ -162,8 +161,8 @@ static void read_text(const char *path, char *text, size_t bytes) {
 static void elements_of(bst_vec3 r, bst_vec3 v, double out[6]) {
     bst_vec3 h = bst_vec3_cross(r, v), node = {-h.y, h.x, 0};
     double distance = bst_vec3_norm(r);
-    bst_vec3 e = bst_vec3_sub(bst_vec3_scale(bst_vec3_cross(v, h), 1 / MU),
-                              bst_vec3_scale(r, 1 / distance));
+    bst_vec3 e =
+        bst_vec3_sub(bst_vec3_scale(bst_vec3_cross(v, h), 1 / MU), bst_vec3_scale(r, 1 / distance));
     out[0] = 1 / (2 / distance - bst_vec3_dot(v, v) / MU);
     out[1] = bst_vec3_norm(e);
     out[2] = acos(h.z / bst_vec3_norm(h));
@@ -202,9 +201,9 @@ static void expect_observations(bool aberrated) {
         double ra = ra_deg[i] * BST_DEG_RAD, dec = dec_deg[i] * BST_DEG_RAD;
         bst_vec3 d = {cos(dec) * cos(ra), cos(dec) * sin(ra), sin(dec)};
         if (aberrated) { /* to first order; the second is 1e-8 rad */
-            d = bst_vec3_unit(bst_vec3_axpy(
-                d, -1.0 / 299792458.0,
-                bst_vec3_add(o->observer.earth_bary_mps, o->observer.velocity_mps)));
+            d = bst_vec3_unit(
+                bst_vec3_axpy(d, -1.0 / 299792458.0,
+                              bst_vec3_add(o->observer.earth_bary_mps, o->observer.velocity_mps)));
         }
         bst_assert_close(bst_vec3_angle(d, o->direction), 0, aberrated ? 2e-8 : 1e-12);
         double variance = SIGMA_ARCSEC * SIGMA_ARCSEC * BST_ARCSEC_RAD * BST_ARCSEC_RAD;
@@ -274,8 +273,9 @@ static void expect_ephemeris(const fixture *f, const double elements[6]) {
     static char text[40000];
     read_text(f->oem, text, sizeof text);
     bst_assert_has(text, "from 5 directions of EYE/TDM over 630 s");
-    bst_assert_has(text, "rms of residuals 2.2500 arcsec, chi2/dof 6.0000, covariance multiplied by "
-                         "1.8333");
+    bst_assert_has(text,
+                   "rms of residuals 2.2500 arcsec, chi2/dof 6.0000, covariance multiplied by "
+                   "1.8333");
     const char *line = strstr(text, "META_STOP"), *end_of_rows = strstr(text, "COVARIANCE_START");
     assert_true(line && end_of_rows);
     int rows = 0;
@@ -395,7 +395,8 @@ static void mean_elements(void **state) {
     assert_true(at && tilt);
     assert_int_equal(sscanf(at, "MEAN_MOTION%*[^0-9]%lf", &mean_motion), 1);
     assert_int_equal(sscanf(tilt, "INCLINATION%*[^0-9]%lf", &inclination_deg), 1);
-    /* J2 makes osculating elements vary by 0.2 % and 0.1 degrees; TEME is off GCRF by 0.3 degrees */
+    /* J2 makes osculating elements vary by 0.2 % and 0.1 degrees; TEME is off GCRF by 0.3 degrees
+     */
     double n = sqrt(MU / (elements[0] * elements[0] * elements[0])) * 86400 / 2 / BST_PI;
     bst_assert_close(mean_motion, n, 0.005 * n);
     bst_assert_close(inclination_deg, elements[2] * 180 / BST_PI, 0.3);

@@ -104,8 +104,7 @@ static void expect_bound(const bst_eval_match_target *place, const bst_pd_target
            xx = bound.covariance[0][0], xy = bound.covariance[0][1], yy = bound.covariance[1][1];
     t->bound_square[0] += end * (c * c * xx + 2 * c * s * xy + s * s * yy);
     t->bound_square[1] += end * (s * s * xx - 2 * c * s * xy + c * c * yy);
-    t->flux_bound_square +=
-        bound.covariance[2][2] / stacked / (target->flux_e * target->flux_e);
+    t->flux_bound_square += bound.covariance[2][2] / stacked / (target->flux_e * target->flux_e);
     t->bounds++;
     t->trials++;
 }

@@ -245,13 +245,15 @@ static void words_of_a_measurement(void **state) {
     bst_pd_print(&f->scene, &f->result, &g);
     bst_stdout_give(&out, text, sizeof text);
     bst_assert_has(text, "1250 x 800 px, FWHM 2.2 px, noise 9 e- per pixel, 0.5 s; points\n");
-    bst_assert_has(text, "40 frames with up to 15 targets, 100 without; processing 12.5 ms a frame, "
-                         "33.0 s in all");
+    bst_assert_has(text,
+                   "40 frames with up to 15 targets, 100 without; processing 12.5 ms a frame, "
+                   "33.0 s in all");
     /* Wilson at 400 of 500: 0.7627 to 0.8327 (the closed form above) */
-    snprintf(line, sizeof line,
-             "  7.000   13.00      500  0.8000  0.7627 to 0.8327 %6.4f %7.4f    1.500   1.265   1.414"
-             "   2.20   +0.0300   0.5000\n",
-             bst_eval_ideal_pd(2.5e-6, 7), bst_eval_matched_filter_pd(2.5e-6, 7, 0.05));
+    snprintf(
+        line, sizeof line,
+        "  7.000   13.00      500  0.8000  0.7627 to 0.8327 %6.4f %7.4f    1.500   1.265   1.414"
+        "   2.20   +0.0300   0.5000\n",
+        bst_eval_ideal_pd(2.5e-6, 7), bst_eval_matched_filter_pd(2.5e-6, 7, 0.05));
     bst_assert_has(text, line);
     bst_assert_has(text, "false alarms per frame 2.5 (95 %: 2.2 to 2.83), 2.25 requested\n");
     const struct {
@@ -261,11 +263,12 @@ static void words_of_a_measurement(void **state) {
         {"0.5", 0.5, g.pd50.snr, g.loss_db_pd50, g.loss_db_sigma_pd50, g.own_light_db_pd50},
         {"0.9", 0.9, g.pd90.snr, g.loss_db_pd90, g.loss_db_sigma_pd90, g.own_light_db_pd90}};
     for (int k = 0; k < 2; k++) {
-        snprintf(line, sizeof line,
-                 "  Pd %s at SNR %.3f, ideal %.3f: loss %.2f dB (95 %%: %.2f to %.2f), %.2f dB over",
-                 losses[k].pd, losses[k].snr, bst_eval_ideal_snr(2.5e-6, losses[k].share),
-                 losses[k].loss, losses[k].loss - 1.959963985 * losses[k].sigma,
-                 losses[k].loss + 1.959963985 * losses[k].sigma, losses[k].own);
+        snprintf(
+            line, sizeof line,
+            "  Pd %s at SNR %.3f, ideal %.3f: loss %.2f dB (95 %%: %.2f to %.2f), %.2f dB over",
+            losses[k].pd, losses[k].snr, bst_eval_ideal_snr(2.5e-6, losses[k].share),
+            losses[k].loss, losses[k].loss - 1.959963985 * losses[k].sigma,
+            losses[k].loss + 1.959963985 * losses[k].sigma, losses[k].own);
         bst_assert_has(text, line);
         assert_true(losses[k].sigma > 0.01);
     }

@@ -34,9 +34,9 @@ static int set_up(void **state) {
     load.set.items[load.set.count++] = sets[0];
     bst_assert_ok(&ctx, bst_load_scenario(&ctx, "scenarios/neossat_geo_track.json", &load, &f->json,
                                           &f->scenario));
-    bst_assert_ok(&ctx, bst_world_create(&ctx, f->scenario.file, &f->scenario.world,
-                                         &f->scenario.observers, f->scenario.base_dir,
-                                         f->scenario.epoch, &f->world));
+    bst_assert_ok(
+        &ctx, bst_world_create(&ctx, f->scenario.file, &f->scenario.world, &f->scenario.observers,
+                               f->scenario.base_dir, f->scenario.epoch, &f->world));
     bst_assert_ok(&ctx, bst_world_view_create(&ctx, f->world, &f->view));
     bst_test_template(f->path, "curve");
     int fd = mkstemp(f->path);
@@ -91,9 +91,8 @@ static void make_table(fixture *f, const char *site, double extinction_mag, row 
         if (i == 1) {
             assert_memory_equal(line, "2022-06-16T22:50:00.000Z", 24);
         }
-        double *const fields[] = {&rows[i].seconds,     &rows[i].v_mag,
-                                  &rows[i].phase_deg,   &rows[i].range_km,
-                                  &rows[i].sunlit,      &rows[i].earth_share,
+        double *const fields[] = {&rows[i].seconds,       &rows[i].v_mag,      &rows[i].phase_deg,
+                                  &rows[i].range_km,      &rows[i].sunlit,     &rows[i].earth_share,
                                   &rows[i].elevation_deg, &rows[i].azimuth_deg};
         for (int k = 0; k < 8; k++) {
             *fields[k] = field(&at);
@@ -118,9 +117,9 @@ static bst_vec3 line_from(const fixture *f, bst_vec3 place, double seconds, doub
     double delay_s = bst_vec3_norm(line) / 299792458.0;
     line = bst_vec3_axpy(line, -delay_s, object.velocity_mps);
     *range_m = bst_vec3_norm(line);
-    *phase_deg = bst_vec3_angle(bst_vec3_sub(bodies.sun_m, object.position_m),
-                                bst_vec3_scale(line, -1.0)) *
-                 180 / BST_PI;
+    *phase_deg =
+        bst_vec3_angle(bst_vec3_sub(bodies.sun_m, object.position_m), bst_vec3_scale(line, -1.0)) *
+        180 / BST_PI;
     return bst_vec3_axpy(line, -delay_s, bodies.earth_bary_mps);
 }
 
@@ -198,8 +197,8 @@ static void from_a_site(void **state) {
         bst_assert_close(r->phase_deg, phase_deg, 2e-4);
         /* aberration by the Earth's motion and its rotation of 7.292e-5 rad/s */
         bst_vec3 spin = bst_vec3_cross((bst_vec3){0, 0, 7.292115e-5}, site);
-        bst_vec3 velocity = bst_vec3_add(
-            bodies.earth_bary_mps, bst_mat3_transpose_mul_vec(&frames.itrf_from_gcrf, spin));
+        bst_vec3 velocity = bst_vec3_add(bodies.earth_bary_mps,
+                                         bst_mat3_transpose_mul_vec(&frames.itrf_from_gcrf, spin));
         bst_vec3 seen = bst_mat3_mul_vec(
             &frames.itrf_from_gcrf,
             bst_vec3_unit(bst_vec3_axpy(bst_vec3_unit(line), 1 / 299792458.0, velocity)));
@@ -209,11 +208,10 @@ static void from_a_site(void **state) {
         bst_assert_close(r->azimuth_deg, fmod(azimuth + 360, 360), 2e-5);
         if (elevation > 0) {
             above++;
-            double mass = 1 / (sin(elevation * BST_DEG_RAD) +
-                               0.50572 * pow(elevation + 6.07995, -1.6364));
+            double mass =
+                1 / (sin(elevation * BST_DEG_RAD) + 0.50572 * pow(elevation + 6.07995, -1.6364));
             bst_assert_close(r->v_mag - clear[i].v_mag, 0.2 * mass, 3e-5);
-            bst_assert_close(clear[i].v_mag, magnitude(f, at_s, phase_deg, range_m),
-                             1e-3);
+            bst_assert_close(clear[i].v_mag, magnitude(f, at_s, phase_deg, range_m), 1e-3);
         } else {
             assert_true(isnan(r->v_mag));
         }
@@ -223,8 +221,8 @@ static void from_a_site(void **state) {
 
 /* ------------------------------------------------------------------ pictures and GLB of a box */
 
-#define BOX                                                                                    \
-    "{\"materials\": [{\"name\": \"w\", \"diffuse\": 0.8}], \"parts\": [{\"name\": \"b\", "    \
+#define BOX                                                                                      \
+    "{\"materials\": [{\"name\": \"w\", \"diffuse\": 0.8}], \"parts\": [{\"name\": \"b\", "      \
     "\"kind\": \"box\", \"size_m\": [1, 2, 3], \"position_m\": [0.4, -0.3, 0.5], \"material\": " \
     "\"w\"}]}"
 
@@ -358,11 +356,10 @@ static void a_box_as_glb(void **state) {
     bst_assert_close(area, 22.0, 1e-5);
     bst_assert_close(volume, 6.0, 1e-5); /* triangles are counterclockwise from outside */
     for (int k = 0; k < 3; k++) {
-        bst_assert_close(
-            cJSON_GetArrayItem(cJSON_GetObjectItem(accessor, "min"), k)->valuedouble, low[k], 1e-6);
-        bst_assert_close(
-            cJSON_GetArrayItem(cJSON_GetObjectItem(accessor, "max"), k)->valuedouble, high[k],
-            1e-6);
+        bst_assert_close(cJSON_GetArrayItem(cJSON_GetObjectItem(accessor, "min"), k)->valuedouble,
+                         low[k], 1e-6);
+        bst_assert_close(cJSON_GetArrayItem(cJSON_GetObjectItem(accessor, "max"), k)->valuedouble,
+                         high[k], 1e-6);
     }
     cJSON_Delete(root);
     bst_test_model_close(&m);

@@ -359,8 +359,8 @@ static void no_cue_no_command_but_a_named_target_is_followed(void **state) {
     rig_close(&r);
 }
 
-/* How far a search reaches: sigmas of the cue up to a limit, and its own extent after a loss; a tile
- * of 1024 px covers 0.427 degrees on each side of its middle. */
+/* How far a search reaches: sigmas of the cue up to a limit, and its own extent after a loss; a
+ * tile of 1024 px covers 0.427 degrees on each side of its middle. */
 static void the_extent_of_a_search(void **state) {
     (void)state;
     static const struct {
@@ -393,7 +393,8 @@ static void the_extent_of_a_search(void **state) {
     config.fix_sigma_floor_px = 0.04;
     rig_open(&r, &config, true);
     bst_assert_close(r.control.pointing_error.initial_sigma_rad, 17 * BST_ARCSEC_RAD, 1e-15);
-    bst_assert_close(r.control.pointing_error.initial_rate_sigma_radps, 2.5 * BST_ARCSEC_RAD, 1e-15);
+    bst_assert_close(r.control.pointing_error.initial_rate_sigma_radps, 2.5 * BST_ARCSEC_RAD,
+                     1e-15);
     bst_assert_close(r.control.pointing_error.sigma_floor_rad, 0.04 * PX, 1e-15);
     rig_close(&r);
 }

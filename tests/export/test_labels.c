@@ -141,7 +141,8 @@ static void make_run(run_tables *t, bool masks) {
                 s->y[2], s->chief[0], s->chief[1], s->centroid[0], s->centroid[1], s->v_mag,
                 s->electrons, s->snr);
         }
-        /* the first one is a body: of 11 x 7 px, a corner beyond the frame; the others' are small */
+        /* the first one is a body: of 11 x 7 px, a corner beyond the frame; the others' are small
+         */
         run_tables_sql(t,
                        "INSERT INTO shapes VALUES (0, %d, 1, 107.5, 68.25, 98.5, 64.5, 109.5, 71.5,"
                        " 15, 35.5, 4.2e5, 0.1, -0.2, 0.3, 0.9), (0, %d, 4, 99, 62, 98, 61, 100, 63,"

@@ -1,5 +1,5 @@
-/* Mounts, attitude controller and sensors in the units of their keys: degrees, arcseconds, hertz and
- * hours of the configuration against SI within, each number another one. */
+/* Mounts, attitude controller and sensors in the units of their keys: degrees, arcseconds, hertz
+ * and hours of the configuration against SI within, each number another one. */
 #include "boresight/vec.h"
 #include "gimbal/mount/mount.h"
 #include "gimbal/mount/second_order.h"
@@ -33,8 +33,8 @@ static void a_chain_of_three_axes(void **state) {
         c.cable.stiffness_nm_per_rad[k] = 0.01 + 0.01 * k;
         c.friction.stribeck_degps[k] = 0.1 + 0.05 * k;
     }
-    bst_assert_ok(&ctx, bst_mount_init(&ctx, &m, BST_MOUNT_CROSS_ELEVATION, &c, 1e-3,
-                                       (bst_rng_key){{1, 2}}));
+    bst_assert_ok(
+        &ctx, bst_mount_init(&ctx, &m, BST_MOUNT_CROSS_ELEVATION, &c, 1e-3, (bst_rng_key){{1, 2}}));
     bst_mount_status_of(&m, 0, &s);
     EXPECT(m.encoder_step_rad, 0.6 * arcsec);
     EXPECT(m.encoder_noise_rad, 0.35 * arcsec);
@@ -69,7 +69,8 @@ static void a_second_order_mount(void **state) {
     c.rate_limit_degps = 2.25;
     c.accel_limit_degps2 = 7.5;
     const bst_mount_two_axis_keys keys = {{{0, 0}}, {{0, 0}}, {{0, 0}}};
-    bst_assert_ok(&ctx, bst_mount_two_axis_init(&ctx, &m, &c, BST_QUAT_IDENTITY, 1e-5, 1e-3, &keys));
+    bst_assert_ok(&ctx,
+                  bst_mount_two_axis_init(&ctx, &m, &c, BST_QUAT_IDENTITY, 1e-5, 1e-3, &keys));
     bst_mount_two_axis_status(&m, 0, &s);
     EXPECT(m.encoder_noise_rad, 0.45 * arcsec);
     EXPECT(m.settle_tolerance_rad, 3.5 * arcsec);
@@ -159,7 +160,7 @@ static void a_gyro(void **state) {
                                           .misalignment_arcsec = {0, 0, 60}};
     bst_spacecraft_gyro g;
     bst_spacecraft_gyro_init(&g, &c, 0.02, (bst_rng_key){{1, 2}});
-    EXPECT(g.angle_walk, 0.0125 * deg / 60);          /* sqrt(3600 s) */
+    EXPECT(g.angle_walk, 0.0125 * deg / 60);         /* sqrt(3600 s) */
     EXPECT(g.rate_walk, 0.35 * deg / (3600.0 * 60)); /* 3600^1.5 */
     EXPECT(g.bias_radps.x, 1.5 * deg / 3600);
     EXPECT(g.bias_radps.y, -2.5 * deg / 3600);
@@ -176,8 +177,10 @@ static void a_gyro(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_chain_of_three_axes), cmocka_unit_test(a_second_order_mount),
-        cmocka_unit_test(an_attitude_controller), cmocka_unit_test(a_star_tracker),
+        cmocka_unit_test(a_chain_of_three_axes),
+        cmocka_unit_test(a_second_order_mount),
+        cmocka_unit_test(an_attitude_controller),
+        cmocka_unit_test(a_star_tracker),
         cmocka_unit_test(a_gyro),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -307,17 +307,17 @@ static void an_omm_has_degrees_and_revolutions(void **state) {
     snprintf(e.name, sizeof e.name, "SAT");
     bst_time_utc(utc("2022-06-16T22:10:00.25Z"), &e.epoch_utc_jd1, &e.epoch_utc_jd2);
     FILE *stream = fmemopen(text, sizeof text, "w");
-    bst_assert_ok(&ctx, bst_omm_write(&ctx, stream, &e, "2022-06-17T00:00:00", "TEST", "a \"word\""));
+    bst_assert_ok(&ctx,
+                  bst_omm_write(&ctx, stream, &e, "2022-06-17T00:00:00", "TEST", "a \"word\""));
     fclose(stream);
     static const struct {
         const char *key;
         double value;
-    } numbers[] = {{"MEAN_MOTION", 15.25},        {"ECCENTRICITY", 0.0123},
-                   {"INCLINATION", 97.5},         {"RA_OF_ASC_NODE", 340},
-                   {"ARG_OF_PERICENTER", 130.25}, {"MEAN_ANOMALY", 50},
-                   {"NORAD_CAT_ID", 44801},       {"ELEMENT_SET_NO", 12},
-                   {"REV_AT_EPOCH", 345},         {"BSTAR", 2.5e-5},
-                   {"MEAN_MOTION_DOT", 1.5e-6},   {"MEAN_MOTION_DDOT", -3e-12}};
+    } numbers[] = {
+        {"MEAN_MOTION", 15.25},  {"ECCENTRICITY", 0.0123},      {"INCLINATION", 97.5},
+        {"RA_OF_ASC_NODE", 340}, {"ARG_OF_PERICENTER", 130.25}, {"MEAN_ANOMALY", 50},
+        {"NORAD_CAT_ID", 44801}, {"ELEMENT_SET_NO", 12},        {"REV_AT_EPOCH", 345},
+        {"BSTAR", 2.5e-5},       {"MEAN_MOTION_DOT", 1.5e-6},   {"MEAN_MOTION_DDOT", -3e-12}};
     for (size_t k = 0; k < sizeof numbers / sizeof *numbers; k++) {
         char key[40];
         snprintf(key, sizeof key, "\"%s\": ", numbers[k].key);

@@ -224,8 +224,9 @@ static void limits(void **state) {
     static const struct {
         double until_s, save_every_s;
         const char *message;
-    } cases[] = {{3.333, 0, "--until 3.333: allowed is more than 3.33333333 s, where the run begins, "
-                            "up to 12.5 s"},
+    } cases[] = {{3.333, 0,
+                  "--until 3.333: allowed is more than 3.33333333 s, where the run begins, "
+                  "up to 12.5 s"},
                  {12.501, 0, "--until 12.501: allowed is more than"},
                  {0, 1e-5, "--save-every"}};
     for (int i = 0; i < 3; i++) {

@@ -2,8 +2,9 @@
  * burn, on a joint that turns itself. */
 #include "tests/satellite/satellite_support.h"
 
-#define PLATE(joint)                                                                    \
-    "{\"name\": \"" joint "\", \"kind\": \"plate\", \"size_m\": [1, 1, 1], \"material\": " \
+#define PLATE(joint)                                                 \
+    "{\"name\": \"" joint                                            \
+    "\", \"kind\": \"plate\", \"size_m\": [1, 1, 1], \"material\": " \
     "\"w\", \"joint\": \"" joint "\"}"
 
 static const char model[] =
@@ -38,8 +39,8 @@ static void follows_within_limits(void **state) {
         double sun = cases[i][0] * BST_DEG_RAD, own = cases[i][1] * BST_DEG_RAD;
         /* what lies along the axis does not matter */
         bst_vec3 d = bst_vec3_unit((bst_vec3){sin(sun), 0.4, cos(sun)});
-        bst_satellite_pose_set(m.pose, &(bst_satellite_aim){.sun = d, .earth = {0, 0, 1},
-                                                            .target = {1, 0, 0}});
+        bst_satellite_pose_set(
+            m.pose, &(bst_satellite_aim){.sun = d, .earth = {0, 0, 1}, .target = {1, 0, 0}});
         expect(turned(&m, ARRAY, (bst_vec3){0, 0, 1}), sin(own), 0, cos(own));
         expect(turned(&m, ARRAY, (bst_vec3){0, 1, 0}), 0, 1, 0);
     }
@@ -51,8 +52,9 @@ static void on_a_joint_that_spins(void **state) {
     (void)state;
     bst_test_model m = bst_test_model_open(model);
     bst_vec3 to = bst_vec3_unit((bst_vec3){-0.3, 0.8, 0.45});
-    bst_satellite_pose_set(m.pose, &(bst_satellite_aim){.sun = {0, 0, 1}, .earth = {0, 0, 1},
-                                                        .target = to, .seconds = 100});
+    bst_satellite_pose_set(
+        m.pose,
+        &(bst_satellite_aim){.sun = {0, 0, 1}, .earth = {0, 0, 1}, .target = to, .seconds = 100});
     double c = cos(60 * BST_DEG_RAD), s = sin(60 * BST_DEG_RAD);
     expect(turned(&m, SPUN, (bst_vec3){1, 0, 0}), c, s, 0);
     expect(turned(&m, SPUN, (bst_vec3){0, 1, 0}), -s, c, 0);
@@ -71,9 +73,10 @@ static void at_a_burn(void **state) {
     m.pose->burn_s = burns_s;
     m.pose->burn_count = 2;
     for (int i = 0; i < 4; i++) {
-        bst_satellite_pose_set(m.pose, &(bst_satellite_aim){.sun = {0, 0, 1}, .earth = {0, 0, 1},
-                                                            .target = {1, 0, 0},
-                                                            .seconds = times_s[i]});
+        bst_satellite_pose_set(
+            m.pose,
+            &(bst_satellite_aim){
+                .sun = {0, 0, 1}, .earth = {0, 0, 1}, .target = {1, 0, 0}, .seconds = times_s[i]});
         double a = deg[i] * BST_DEG_RAD;
         expect(turned(&m, BOOM, (bst_vec3){0, 0, 1}), 0, -sin(a), cos(a));
     }

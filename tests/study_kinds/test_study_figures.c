@@ -21,8 +21,8 @@ static void run_of(const char *file, int64_t number, bst_study_result *out,
     cJSON *settings = NULL;
     bst_study_run run = {.study = &study, .place = bst_study_place_of(&study, number)};
     bst_study_values(&study, &run.place, values);
-    bst_assert_ok(&ctx, bst_study_document(&ctx, &study, &run.place, values, &run.scenario,
-                                           &settings));
+    bst_assert_ok(&ctx,
+                  bst_study_document(&ctx, &study, &run.place, values, &run.scenario, &settings));
     run.settings = settings;
     *kind = bst_study_kind_of(study.config.kind);
     const bst_study_worker_place place = {.threads = 3, .device = ""};
@@ -448,13 +448,13 @@ static void labels_of_a_binned_window(void **state) {
     assert_string_equal(cJSON_GetObjectItem(label(root, 0), "object_name")->valuestring,
                         "SAT \"7\"");
     assert_string_equal(cJSON_GetObjectItem(label(root, 0), "object_id")->valuestring, "44801");
-    const expected star[] = {{"class_id", 2},         {"x_center", 0.5}, {"y_center", 0.5},
-                             {"bbox_width", 0},       {"seg_id", 3},     {"x_chief", 0.5},
+    const expected star[] = {{"class_id", 2},    {"x_center", 0.5}, {"y_center", 0.5},
+                             {"bbox_width", 0},  {"seg_id", 3},     {"x_chief", 0.5},
                              {"y_centroid", 0.5}};
     expect_label(label(root, 1), star, sizeof star / sizeof *star);
     assert_string_equal(cJSON_GetObjectItem(label(root, 1), "object_id")->valuestring, "77");
-    const expected whole[] = {{"sequence_id", 8}, {"plane", 0}, {"exposure_s", 0.5},
-                              {"background_e", 12.5}};
+    const expected whole[] = {
+        {"sequence_id", 8}, {"plane", 0}, {"exposure_s", 0.5}, {"background_e", 12.5}};
     expect_label(root, whole, sizeof whole / sizeof *whole);
     cJSON_Delete(root);
     /* boxes of a given size, in pixels of the frame */
