@@ -19,7 +19,8 @@ typedef struct fixture {
 static fixture *make(int stars, int others) {
     fixture *f = test_calloc(1, sizeof *f);
     f->truth = test_calloc(1, sizeof *f->truth + MOST * sizeof f->truth->items[0]);
-    f->frame = (bst_generator_frame){.truth = f->truth, .window = {64, 32, 1000, 800}, .binning = 1};
+    f->frame =
+        (bst_generator_frame){.truth = f->truth, .window = {64, 32, 1000, 800}, .binning = 1};
     f->options = (bst_identify_options){.search_radius_px = 50,
                                         .match_tolerance_px = 5,
                                         .probability = 1,
@@ -200,7 +201,7 @@ static void the_other_labels(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(magnitudes_agree), cmocka_unit_test(chance_is_excluded),
+        cmocka_unit_test(magnitudes_agree),        cmocka_unit_test(chance_is_excluded),
         cmocka_unit_test(neighbours_are_mistaken), cmocka_unit_test(some_are_missed),
         cmocka_unit_test(the_other_labels),
     };

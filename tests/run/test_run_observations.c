@@ -16,9 +16,10 @@ static const double places[FRAMES][2] = {{101.5, 700.25}, {433, 58}, {300, 300},
 static const double covariances[FRAMES][3] = {
     {0.04, 0.015, 0.09}, {0.16, -0.05, 0.025}, {1, 0, 1}, {1, 0, 1}};
 static const double sigmas_arcsec[FRAMES][3] = {{1, 2, 40}, {3, 1.5, 60}, {1, 1, 1}, {1, 1, 1}};
-static const double attitudes[FRAMES][4] = {
-    {0.1, -0.2, 0.4, 0.8888194417315589}, {0.12, -0.2, 0.42, 0.877040477971228},
-    {0, 0, 0, 1}, {0, 0, 0, 1}};
+static const double attitudes[FRAMES][4] = {{0.1, -0.2, 0.4, 0.8888194417315589},
+                                            {0.12, -0.2, 0.42, 0.877040477971228},
+                                            {0, 0, 0, 1},
+                                            {0, 0, 0, 1}};
 
 static void write_scenario(run_tables *t) {
     static const char *const sets[] = {"/world/star_catalogue=embedded",
@@ -121,9 +122,9 @@ static void expect_measured(const bst_camera *camera, const bst_od_observation *
     bst_ctx ctx = {0};
     (void)ctx;
     const bst_vec3 sun = {1.5e11, 0, 0}; /* of no weight to 1e-9 rad */
-    bst_light light = {.velocity_mps = bst_vec3_add(o->observer.earth_bary_mps,
-                                                    o->observer.velocity_mps),
-                       .sun_m = sun};
+    bst_light light = {
+        .velocity_mps = bst_vec3_add(o->observer.earth_bary_mps, o->observer.velocity_mps),
+        .sun_m = sun};
     double x = places[k][0], y = places[k][1], step = 1e-4;
     const bst_vec3 none = {0, 0, 0}, turns[3] = {{step, 0, 0}, {0, step, 0}, {0, 0, step}};
     bst_vec3 d = direction(camera, &light, k, x, y, none), by[5];
@@ -207,13 +208,13 @@ static void measured_and_filtered(void **state) {
         bst_assert_close(bst_time_diff(o->time, scene.scenario.epoch), 2 + 3 * k, 1e-9);
         bst_assert_ok(&ctx, bst_world_view_observer_state(&ctx, scene.view, 0, 2 + 3 * k, &eye));
         bst_assert_ok(&ctx, bst_world_view_bodies(&ctx, scene.view, 2 + 3 * k, &bodies));
-        bst_assert_close(
-            bst_vec3_norm(bst_vec3_sub(o->od.observer.position_m, eye.position_m)), 0, 1e-3);
-        bst_assert_close(
-            bst_vec3_norm(bst_vec3_sub(o->od.observer.velocity_mps, eye.velocity_mps)), 0, 1e-6);
-        bst_assert_close(bst_vec3_norm(bst_vec3_sub(o->od.observer.earth_bary_mps,
-                                                    bodies.earth_bary_mps)),
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(o->od.observer.position_m, eye.position_m)), 0,
+                         1e-3);
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(o->od.observer.velocity_mps, eye.velocity_mps)),
                          0, 1e-6);
+        bst_assert_close(
+            bst_vec3_norm(bst_vec3_sub(o->od.observer.earth_bary_mps, bodies.earth_bary_mps)), 0,
+            1e-6);
         bst_assert_close(o->v_mag, 12.5 + k, 0);
         bst_assert_close(o->snr, 30.0 + k, 0);
         expect_measured(bst_knowledge_camera(knowledge), &o->od, k);
