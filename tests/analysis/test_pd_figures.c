@@ -5,6 +5,7 @@
 #include "boresight/vec.h"
 #include "sim/analysis/pd/pd.h"
 #include "sim/eval/detection_theory.h"
+#include "tests/stdout_text.h"
 #include "tests/test_support.h"
 
 enum { POINTS = 9 };
@@ -218,6 +219,62 @@ static void errors_against_bounds(void **state) {
     free(f);
 }
 
+/* What is printed of a measurement: the row of the point above, losses and their intervals. */
+static void words_of_a_measurement(void **state) {
+    (void)state;
+    static char text[8000];
+    bst_stdout_text out;
+    char line[400];
+    fixture *f = make(0.0);
+    f->result.tallies[4] = (bst_pd_tally){.trials = 500,
+                                          .matched = 400,
+                                          .error_sum = {8.0, -20.0},
+                                          .error_square = {36.0, 64.0},
+                                          .bound_square = {0.4, 1.0},
+                                          .flux_sum = 12.0,
+                                          .flux_square = 4.0,
+                                          .flux_bound_square = 0.05,
+                                          .chi_square = 880.0,
+                                          .bounds = 10};
+    f->result.tallies[4].phase_sum[1][2] = -4.5;
+    f->result.tallies[4].phase_count[1][2] = 9;
+    f->scene.options.false_alarms = 2.25;
+    bst_pd_figures g;
+    bst_pd_figures_of(&f->scene, &f->result, &g);
+    bst_stdout_take(&out);
+    bst_pd_print(&f->scene, &f->result, &g);
+    bst_stdout_give(&out, text, sizeof text);
+    bst_assert_has(text, "1250 x 800 px, FWHM 2.2 px, noise 9 e- per pixel, 0.5 s; points\n");
+    bst_assert_has(text,
+                   "40 frames with up to 15 targets, 100 without; processing 12.5 ms a frame, "
+                   "33.0 s in all");
+    /* Wilson at 400 of 500: 0.7627 to 0.8327 (the closed form above) */
+    snprintf(
+        line, sizeof line,
+        "  7.000   13.00      500  0.8000  0.7627 to 0.8327 %6.4f %7.4f    1.500   1.265   1.414"
+        "   2.20   +0.0300   0.5000\n",
+        bst_eval_ideal_pd(2.5e-6, 7), bst_eval_matched_filter_pd(2.5e-6, 7, 0.05));
+    bst_assert_has(text, line);
+    bst_assert_has(text, "false alarms per frame 2.5 (95 %: 2.2 to 2.83), 2.25 requested\n");
+    const struct {
+        const char *pd;
+        double share, snr, loss, sigma, own;
+    } losses[] = {
+        {"0.5", 0.5, g.pd50.snr, g.loss_db_pd50, g.loss_db_sigma_pd50, g.own_light_db_pd50},
+        {"0.9", 0.9, g.pd90.snr, g.loss_db_pd90, g.loss_db_sigma_pd90, g.own_light_db_pd90}};
+    for (int k = 0; k < 2; k++) {
+        snprintf(
+            line, sizeof line,
+            "  Pd %s at SNR %.3f, ideal %.3f: loss %.2f dB (95 %%: %.2f to %.2f), %.2f dB over",
+            losses[k].pd, losses[k].snr, bst_eval_ideal_snr(2.5e-6, losses[k].share),
+            losses[k].loss, losses[k].loss - 1.959963985 * losses[k].sigma,
+            losses[k].loss + 1.959963985 * losses[k].sigma, losses[k].own);
+        bst_assert_has(text, line);
+        assert_true(losses[k].sigma > 0.01);
+    }
+    free(f);
+}
+
 /* Stars in cells as bst_pd_sky_stars sorts them, and whether a detection is one of them, against a
  * look at each. */
 static double draw(uint64_t *state) {
@@ -286,6 +343,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(losses),
         cmocka_unit_test(errors_against_bounds),
+        cmocka_unit_test(words_of_a_measurement),
         cmocka_unit_test(detections_of_stars),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -359,6 +359,46 @@ static void no_cue_no_command_but_a_named_target_is_followed(void **state) {
     rig_close(&r);
 }
 
+/* How far a search reaches: sigmas of the cue up to a limit, and its own extent after a loss; a
+ * tile of 1024 px covers 0.427 degrees on each side of its middle. */
+static void the_extent_of_a_search(void **state) {
+    (void)state;
+    static const struct {
+        double sigmas, most_deg, extent_deg;
+    } cases[] = {{4, 10, 1.2}, {4, 0.9, 0.9}, {8, 2.1, 2.1}};
+    for (int i = 0; i < 3; i++) {
+        rig r;
+        bst_ctx ctx = {0};
+        bst_control_config config;
+        bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_control_config_table, &config));
+        config.search_sigmas = cases[i].sigmas;
+        config.search_max_deg = cases[i].most_deg;
+        config.search_step = 1.0;
+        rig_open(&r, &config, true);
+        const bst_control_env *env = &r.control.env;
+        bst_assert_close(env->pixel_rad, PX, 0);
+        step(&r, 0, false);
+        step(&r, 1000, true);
+        double field_deg = 2 * atan(512 * PX) / BST_DEG_RAD;
+        double side = ceil(2 * cases[i].extent_deg / field_deg - 1e-9);
+        assert_int_equal(r.control.search.count, side * side);
+        rig_close(&r);
+    }
+    rig r; /* the observer of the pointing error begins with what is known then */
+    bst_ctx ctx = {0};
+    bst_control_config config;
+    bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_control_config_table, &config));
+    config.attitude_sigma_arcsec = 17;
+    config.drift_sigma_arcsec_per_s = 2.5;
+    config.fix_sigma_floor_px = 0.04;
+    rig_open(&r, &config, true);
+    bst_assert_close(r.control.pointing_error.initial_sigma_rad, 17 * BST_ARCSEC_RAD, 1e-15);
+    bst_assert_close(r.control.pointing_error.initial_rate_sigma_radps, 2.5 * BST_ARCSEC_RAD,
+                     1e-15);
+    bst_assert_close(r.control.pointing_error.sigma_floor_rad, 0.04 * PX, 1e-15);
+    rig_close(&r);
+}
+
 static void contradictory_settings_are_refused(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -382,6 +422,7 @@ int main(void) {
         cmocka_unit_test(open_loop_strategies),
         cmocka_unit_test(command_carries_the_aberration_of_the_observer),
         cmocka_unit_test(no_cue_no_command_but_a_named_target_is_followed),
+        cmocka_unit_test(the_extent_of_a_search),
         cmocka_unit_test(contradictory_settings_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

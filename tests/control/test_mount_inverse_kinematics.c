@@ -126,6 +126,10 @@ static void wrap_that_serves(void **state) {
     assert_int_equal(c.serves, N);
     bst_assert_close(c.angle_rad[0], 170 * DEG, 1e-12);
     bst_assert_close(c.slew_s, 330.0 / 2.0, 1e-9);
+    bst_mount_status unlimited = m; /* axes without a rate limit take no time */
+    unlimited.axis[0].rate_limit_radps = unlimited.axis[1].rate_limit_radps = 0.0;
+    assert_true(bst_mount_choose_turn(&unlimited, pass, N, &c));
+    bst_assert_close(c.slew_s, 0.0, 0);
     /* nothing to come: the nearest turn */
     assert_true(bst_mount_choose_turn(&m, pass, 1, &c));
     bst_assert_close(c.angle_rad[0], 530 * DEG, 1e-12);

@@ -92,7 +92,7 @@ static void earth_and_sun_are_where_the_geometry_has_them(void **state) {
     fixture f;
     start(&f,
           "{\"targets\": [{}], \"min_snr\": 0, \"max_rate_arcsec_per_s\": 1e6, "
-          "\"sun_keep_out_deg\": 90, \"moon_keep_out_deg\": 0, "
+          "\"sun_keep_out_deg\": 90, \"moon_keep_out_deg\": 40, "
           "\"earth_limb_keep_out_deg\": 8, \"earth_limb_altitude_km\": 100}");
     bst_world_view *view;
     bst_assert_ok(&f.ctx, bst_world_view_create(&f.ctx, f.world, &view));
@@ -114,10 +114,15 @@ static void earth_and_sun_are_where_the_geometry_has_them(void **state) {
             double sun = bst_vec3_angle(to, bst_vec3_sub(bodies.sun_m, eye.position_m));
             double earth_off = nadir - limb - 8.0 * BST_DEG_RAD, sun_off = sun - 90.0 * BST_DEG_RAD;
             /* light time and aberration move directions by up to 0.2 mrad: not judged there */
-            if (fabs(earth_off) < 1e-3 || fabs(sun_off) < 1e-3) {
+            double moon_off = bst_vec3_angle(to, bst_vec3_sub(bodies.moon_m, eye.position_m)) -
+                              40.0 * BST_DEG_RAD;
+            if (fabs(earth_off) < 1e-3 || fabs(sun_off) < 1e-3 || fabs(moon_off) < 1e-3) {
                 continue;
             }
-            expected = earth_off < 0.0 ? BST_WHY_EARTH : sun_off < 0.0 ? BST_WHY_SUN : expected;
+            expected = earth_off < 0.0  ? BST_WHY_EARTH
+                       : sun_off < 0.0  ? BST_WHY_SUN
+                       : moon_off < 0.0 ? BST_WHY_MOON
+                                        : expected;
             if (expected == BST_WHY_NOT) {
                 assert_true(seen.why == BST_WHY_NOT || seen.why == BST_WHY_SHADOW);
                 double lit =
@@ -129,7 +134,7 @@ static void earth_and_sun_are_where_the_geometry_has_them(void **state) {
         }
     }
     assert_true(reasons[BST_WHY_NOT] > 50 && reasons[BST_WHY_EARTH] > 50 &&
-                reasons[BST_WHY_SUN] > 5);
+                reasons[BST_WHY_SUN] > 5 && reasons[BST_WHY_MOON] > 5);
     bst_tasking_visibility seen;
     bst_assert_ok(&f.ctx, bst_tasking_look(&f.ctx, &f.tasking, 0, NEOSSAT_OBJECT, 0.0, &seen));
     assert_int_equal(seen.why, BST_WHY_ITSELF);
@@ -301,9 +306,13 @@ static void one_target_goes_to_one_sensor_until_it_is_due_again(void **state) {
     fixture f;
     start(&f,
           "{\"targets\": [{\"object\": \"INMARSAT GX5\", \"revisit_s\": 600, \"frames\": 3}], "
-          "\"min_snr\": 0, \"sun_keep_out_deg\": 0}");
+          "\"min_snr\": 0, \"sun_keep_out_deg\": 0, \"sigma_deg\": 0.3, "
+          "\"rate_sigma_arcsec_per_s\": 0.75, \"v_mag_sigma\": 0.4}");
     assert_true(plan(&f, 0, 0));
     const bst_task *task = &f.tasking.sensors[0].task;
+    bst_assert_close(task->sigma_rad, 0.3 * BST_DEG_RAD, 1e-15);
+    bst_assert_close(task->rate_sigma_radps, 0.75 * BST_ARCSEC_RAD, 1e-18);
+    bst_assert_close(task->v_mag_sigma, 0.4, 0);
     assert_int_equal(task->object, GX5);
     assert_int_equal(task->id, 1);
     assert_int_equal(task->norad, 44801);

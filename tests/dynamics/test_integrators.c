@@ -126,10 +126,43 @@ static void principal_axes_are_right_handed(void **state) {
     }
 }
 
+/* A symmetric body with a wheel along its axis: the momentum across the axis turns in the body at
+ * p / A - (p - h) / C, p along the axis, moments A across and C along it, h of the wheel. */
+static void a_wheel_along_each_axis(void **state) {
+    (void)state;
+    const double across = 2.0, along = 3.0, wheel = 0.7, p = 1.0, dt = 0.01;
+    for (int i = 0; i < 3; i++) {
+        int j = (i + 1) % 3, k = (i + 2) % 3;
+        bst_dynamics_free_body body = {.shift = {0.0}};
+        bst_quat q = BST_QUAT_IDENTITY;
+        double pi[3], angle = 10.0 * (p / across - (p - wheel) / along);
+        for (int m = 0; m < 3; m++) {
+            body.per_moment[m] = 1.0 / (m == i ? along : across);
+        }
+        body.shift[i] = wheel;
+        pi[i] = p;
+        pi[j] = 0.3;
+        pi[k] = -0.2;
+        bst_vec3 before = {pi[0], pi[1], pi[2]};
+        for (int n = 0; n < 1000; n++) {
+            bst_dynamics_turn_free_body4(&body, dt, &q, pi);
+        }
+        /* of fourth order: some 1e-10 after 1000 steps of 5 mrad */
+        bst_assert_close(pi[i], p, 1e-8);
+        bst_assert_close(pi[j], 0.3 * cos(angle) + 0.2 * sin(angle), 1e-8);
+        bst_assert_close(pi[k], -0.2 * cos(angle) + 0.3 * sin(angle), 1e-8);
+        /* the momentum in space stays */
+        bst_vec3 back = bst_quat_rotate(bst_quat_conj(q), (bst_vec3){pi[0], pi[1], pi[2]});
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(back, before)), 0.0, 1e-11);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rk4_order), cmocka_unit_test(test_matrix_exp_is_exact),
-        cmocka_unit_test(test_eigen), cmocka_unit_test(principal_axes_are_right_handed),
-        cmocka_unit_test(test_symmetric_in_time)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_rk4_order),
+                                       cmocka_unit_test(test_matrix_exp_is_exact),
+                                       cmocka_unit_test(test_eigen),
+                                       cmocka_unit_test(principal_axes_are_right_handed),
+                                       cmocka_unit_test(test_symmetric_in_time),
+                                       cmocka_unit_test(a_wheel_along_each_axis)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -49,7 +49,7 @@ class LoopTables:
                     own = 2.5 / np.log(10) * row["flux_sigma_e"] / row["flux_e"]
                     self.assertAlmostEqual(row["v_mag_sigma"], np.hypot(own, d["zero_point_sigma_mag"]), delta=1e-6)
                 if not row["edge"] + row["blend"] + row["streak"]:
-                    self.assertGreater(row["snr"], 0.9 * d["threshold_snr"])
+                    self.assertGreater(row["snr"], 0.85 * d["threshold_snr"])
                 self.assertGreater(row["cov_xx_px2"] * row["cov_yy_px2"], row["cov_xy_px2"] ** 2)
                 self.assertGreaterEqual(row["length_px"], row["width_px"] - 1e-9)
                 for key in ("stack", "rate_x_pxps", "rate_y_pxps", "rate_sigma_pxps", "bloom"):
@@ -62,7 +62,7 @@ class LoopTables:
                     matched += 1
         self.assertGreater(matched, 200)
         # the fitted flux over the noise of the background, as the truth's; shaken trails are filtered as straight ones
-        self.assertAlmostEqual(np.median(ratios), 1, delta=0.07)
+        self.assertAlmostEqual(np.median(ratios), 1, delta=0.07 if self.BINNING == 1 else 0.1)
         print("zero point in its sigmas:", np.round([np.mean(pulls), np.std(pulls)], 2), "of", len(pulls))
         self.assertLess(np.abs(pulls).max(), 5)
         self.assertTrue(0.4 < np.std(pulls) < 1.6)

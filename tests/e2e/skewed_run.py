@@ -13,14 +13,15 @@ from skewed_scene import ELEMENTS, NORAD, OBSERVER, OFFSET_RTN_M, TICKS, scenari
 
 
 class SkewedRun(unittest.TestCase):
-    SOURCE = "image"
+    SOURCE, BINNING = "image", 2
 
     @classmethod
     def setUpClass(cls):
         cls.folder = runs.scratch()
         cls.out = os.path.join(cls.folder, "run")
         path = scenario(cls.folder)
-        cls.manifest = runs.run(path, cls.out, f"{runs.SENSOR}/observation_source={cls.SOURCE}")
+        cls.manifest = runs.run(path, cls.out, f"{runs.SENSOR}/observation_source={cls.SOURCE}",
+                                f"{runs.SENSOR}/exposure/binning={cls.BINNING}")
         with open(path, encoding="utf-8") as file:
             cls.scene = json.load(file)
         cls.sensor = cls.scene["observers"][0]["sensors"][0]

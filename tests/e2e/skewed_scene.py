@@ -1,5 +1,5 @@
 """A scene without symmetry, whose tables and exports the tests work out again: a sensor that is not square, turned,
-distorted, its boresight off the centre; a mount with three axes at large angles on a turning spacecraft with sensors of its
+distorted, its boresight off the centre, read in a window off its corner; a mount with three axes at large angles on a turning spacecraft with sensors of its
 own; two targets; an observer that is wrong about its orbit."""
 import json
 import os
@@ -13,6 +13,7 @@ ELEMENTS = "scenarios/catalogue_2022-06.tle"
 OFFSET_RTN_M = np.array([9000.0, -50000.0, 30000.0])  # of the second target from the first
 CAMERA = dict(width_px=640, height_px=480, rotation_deg=33, boresight_offset_px=[24, -17],
               distortion={"k1": -200, "p1": 0.3, "p2": -0.2}, dark_current_e_per_s=5, obscuration=0.2, aperture_m=0.2)
+WINDOW = [32, 24, 576, 440]  # that is read: first column and row, width and height
 NAV_RTN_M, NAV_RTN_MPS, NAV_GROWTH_MPS = np.array([30, -40, 25.0]), np.array([0.02, -0.01, 0.03]), 0.4
 THROUGHPUT_ERROR = 0.05  # of the onboard side
 TELEMETRY_HZ, TICKS, EXPOSURE_S, PERIOD_S = 100, 6000, 0.5, 1.0
@@ -34,6 +35,7 @@ def scenario(folder):
         "source": "relative", "reference": "INMARSAT GX5", "offset_rtn_m": OFFSET_RTN_M.tolist()}})
     sensor = scene["observers"][0]["sensors"][0]
     sensor["camera"].update(CAMERA)
+    sensor["exposure"]["window_px"] = WINDOW
     sensor["cue"].update(offset_deg=0.1, offset_axis="y", offset_angle_deg=20, sigma_deg=0.1)
     sensor["knowledge"] = {"camera": {"throughput_error": THROUGHPUT_ERROR},
                            "orbit": {"position_rtn_m": NAV_RTN_M.tolist(), "velocity_rtn_mps": NAV_RTN_MPS.tolist(),

@@ -17,7 +17,7 @@ import runs
 from runs import call_well
 from optics import ARCSEC, angle, columns, quaternion, rotate, unit
 from readers import read_oem, read_png, read_tdm, seconds
-from skewed_scene import DURATION_S, ELEMENTS, EXPOSURE_S, NAV_GROWTH_MPS, NAV_RTN_M, NAV_RTN_MPS, NORAD, OBSERVER, scenario
+from skewed_scene import DURATION_S, ELEMENTS, EXPOSURE_S, NAV_GROWTH_MPS, NAV_RTN_M, NAV_RTN_MPS, NORAD, OBSERVER, WINDOW, scenario
 
 SHARED_MOTION_M = 0.5  # what two SGP4s and two rotations to GCRF differ by
 
@@ -27,10 +27,10 @@ class SkewedExports(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = runs.scratch()
         cls.made, cls.out = os.path.join(cls.folder, "run"), os.path.join(cls.folder, "out")
-        runs.run(scenario(cls.folder), cls.made, "/record/telemetry_hz=1")
+        runs.run(scenario(cls.folder), cls.made, "/record/telemetry_hz=1", f"{runs.SENSOR}/exposure/binning=2")
         for words in (("--orbits", "czml", "--step", "4"), ("--orbits", "oem", "--step", "4"), ("--observations", "json"),
                       ("--observations", "csv"), ("--observations", "tdm"),
-                      ("--frames", "png", "--annotate", "--first", "30", "--last", "30", "--size", "320")):
+                      ("--frames", "png", "--annotate", "--first", "30", "--last", "30", "--size", "144")):
             call_well("export", cls.made, *words, "--out", cls.out)
         cls.db = runs.database(cls.made)
         cls.epoch = cls.db.execute("SELECT epoch_utc FROM run").fetchone()[0]
@@ -195,14 +195,14 @@ class SkewedExports(unittest.TestCase):
             self.assertLess(np.linalg.norm(1e3 * np.array(state[3:]) - velocity), 0.1)
 
     def test_marks(self):
-        """The red square stands about the target in a picture of half the frame's size."""
+        """The red square stands about the target in a picture of half the binned window's size."""
         width, height, picture = read_png(self.path("frames/frame_000030.png"))
-        self.assertEqual((width, height), (320, 240))
+        self.assertEqual((width, height), (WINDOW[2] // 4, WINDOW[3] // 4))
         image = np.array([list(row) for row in picture]).reshape(height, width, 3)
         red = (image[:, :, 0] > 200) & (image[:, :, 1] < 130) & (image[:, :, 2] < 130)
         row = self.db.execute("SELECT x_chief_px, y_chief_px FROM truth WHERE kind = 'object' AND id = 0 AND exposure_id = 30"
                               ).fetchone()
-        x, y = (row[0] + 0.5) / 2 - 0.5, (row[1] + 0.5) / 2 - 0.5
+        x, y = ((row[k] - WINDOW[k] + 0.5) / 4 - 0.5 for k in range(2))
         rows, cols = np.nonzero(red)
         near = (np.abs(rows - y) < 13) & (np.abs(cols - x) < 13)
         self.assertGreater(near.sum(), 20)

@@ -2,7 +2,7 @@
 """Every column of run.sqlite, the manifest's sums and the keys of frames.fits against numbers that are worked out here with
 numpy, ERFA, sgp4 and astropy from the scenario alone, or from columns that another part of the program filled.
 
-The scene (skewed_scene.py) has no symmetry.
+The scene (skewed_scene.py) has no symmetry; its frames are a window off the corner, binned by 2.
 
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_tables.py BORESIGHT
 """

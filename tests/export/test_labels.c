@@ -116,7 +116,11 @@ static void make_run(run_tables *t, bool masks) {
         " x_start_px REAL, x_mid_px REAL, x_end_px REAL, y_start_px REAL, y_mid_px REAL, y_end_px "
         "REAL,"
         " x_chief_px REAL, y_chief_px REAL, x_centroid_px REAL, y_centroid_px REAL, v_mag REAL,"
-        " electrons REAL, snr REAL, ra_deg REAL, dec_deg REAL)");
+        " electrons REAL, snr REAL, ra_deg REAL, dec_deg REAL);"
+        "CREATE TABLE shapes (sensor INT, exposure_id INT, item INT, x_px REAL, y_px REAL, x0_px "
+        "REAL, y0_px REAL, x1_px REAL, y1_px REAL, size_px REAL, phase_deg REAL, range_m REAL,"
+        " q_body_from_gcrf_x REAL, q_body_from_gcrf_y REAL, q_body_from_gcrf_z REAL,"
+        " q_body_from_gcrf_w REAL)");
     for (int k = 0; k < FRAMES; k++) {
         int id = 10 + 5 * k;
         run_tables_sql(
@@ -137,6 +141,13 @@ static void make_run(run_tables *t, bool masks) {
                 s->y[2], s->chief[0], s->chief[1], s->centroid[0], s->centroid[1], s->v_mag,
                 s->electrons, s->snr);
         }
+        /* the first one is a body: of 11 x 7 px, a corner beyond the frame; the others' are small
+         */
+        run_tables_sql(t,
+                       "INSERT INTO shapes VALUES (0, %d, 1, 107.5, 68.25, 98.5, 64.5, 109.5, 71.5,"
+                       " 15, 35.5, 4.2e5, 0.1, -0.2, 0.3, 0.9), (0, %d, 4, 99, 62, 98, 61, 100, 63,"
+                       " 2, 30, 4e5, 0, 0, 0, 1)",
+                       id, id);
         run_tables_sql(
             t, /* of an exposure that is not kept */
             "INSERT INTO truth VALUES (0, %d, 'object', 1, 9, 9, 110, 110, 110, 70, 70, 70,"
@@ -184,7 +195,8 @@ static double place(double px, double first, int binning) {
     return (px - first + 0.5) / binning;
 }
 
-/* The light's box grown by half the given side, within the image; false: none of it. */
+/* The light's box grown by half the given side, within the image; false: none of it. A body of more
+ * than the side has the box of its parts, half a pixel of the image wider at each end. */
 static bool box_of(const source *s, int binning, double side, double box[4]) {
     double shift[2] = {s->centroid[0] - s->chief[0], s->centroid[1] - s->chief[1]};
     const double *way[2] = {s->x, s->y};
@@ -196,6 +208,10 @@ static bool box_of(const source *s, int binning, double side, double box[4]) {
             low = fmin(low, p);
             high = fmax(high, p);
         }
+        if (s->item == 1 && 15 > binning * side) {
+            low = place(a == 0 ? 98.5 : 64.5, first[a], binning) + side / 2 - 0.5;
+            high = place(a == 0 ? 109.5 : 71.5, first[a], binning) - side / 2 + 0.5;
+        }
         low = fmax(low - side / 2, 0);
         high = fmin(high + side / 2, size[a]);
         if (high - low < 1) {
@@ -205,6 +221,25 @@ static bool box_of(const source *s, int binning, double side, double box[4]) {
         box[a + 2] = high - low;
     }
     return s->electrons > 0 && (strcmp(s->kind, "star") != 0 || s->v_mag <= 10);
+}
+
+/* The body of source 0 in pixels of the image, or in fractions of it. */
+static void expect_shape(const cJSON *label, int binning, double width, double height) {
+    const cJSON *shape = cJSON_GetObjectItem(label, "shape"),
+                *box = cJSON_GetObjectItem(shape, "box"),
+                *q = cJSON_GetObjectItem(shape, "q_body_from_gcrf");
+    const double ends[] = {place(98.5, X0, binning) / width, place(64.5, Y0, binning) / height,
+                           11.0 / binning / width, 7.0 / binning / height},
+                 turn[] = {0.1, -0.2, 0.3, 0.9};
+    bst_assert_close(number(shape, "x_centre_of_mass"), place(107.5, X0, binning) / width, 1e-12);
+    bst_assert_close(number(shape, "y_centre_of_mass"), place(68.25, Y0, binning) / height, 1e-12);
+    for (int e = 0; e < 4; e++) {
+        bst_assert_close(cJSON_GetArrayItem(box, e)->valuedouble, ends[e], 1e-12);
+        bst_assert_close(cJSON_GetArrayItem(q, e)->valuedouble, turn[e], 0);
+    }
+    bst_assert_close(number(shape, "size_px"), 15, 0);
+    bst_assert_close(number(shape, "phase_deg"), 35.5, 0);
+    bst_assert_close(number(shape, "range_m"), 4.2e5, 0);
 }
 
 static void expect_coco(const cJSON *root, bool masks) {
@@ -239,6 +274,10 @@ static void expect_coco(const cJSON *root, bool masks) {
             bst_assert_close(number(a, "v_mag"), s->v_mag, 0);
             bst_assert_close(number(a, "snr"), s->snr, 0);
             bst_assert_close(number(a, "norad"), s->norad, 0);
+            if (s->item == 1) {
+                expect_shape(a, binning_of(k), 1, 1);
+            }
+            assert_int_equal(cJSON_HasObjectItem(a, "shape"), s->item == 1 || s->item == 4);
             bool masked = masks && s->item <= 2;
             bst_assert_close(number(a, "area"), masked ? (s->item == 1 ? 5 : 1) : box[2] * box[3],
                              1e-9);
@@ -371,6 +410,9 @@ static void expect_satnet(const cJSON *root, int k, double side) {
         bst_assert_close(number(o, "snr_aperture"), s->snr, 0);
         bst_assert_close(number(o, "ra"), 123.5, 0);
         bst_assert_close(number(o, "dec"), -7.25, 0);
+        if (s->item == 1) {
+            expect_shape(o, b, WIDTH, HEIGHT);
+        }
         bst_assert_close(number(o, "seg_id"), -1, 0); /* the scenario records no masks */
         char id[20];
         snprintf(id, sizeof id, "%d", !star && s->norad ? s->norad : s->id);

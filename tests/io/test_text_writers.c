@@ -6,6 +6,7 @@
 #include "sim/astro/sgp4.h"
 #include "sim/io/czml_writer.h"
 #include "sim/io/oem_writer.h"
+#include "sim/io/omm_writer.h"
 #include "sim/io/tdm_writer.h"
 #include "tests/test_support.h"
 
@@ -286,12 +287,57 @@ static void bad_calls_are_refused(void **state) {
     }
 }
 
+/* Mean elements in the units of an OMM, each number another one; angles from 0 to 360 degrees. */
+static void an_omm_has_degrees_and_revolutions(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    static char text[4000];
+    bst_elements e = {.norad = 44801,
+                      .element_set = 12,
+                      .revolution = 345,
+                      .mean_motion_radpmin = 15.25 * 2 * BST_PI / 1440,
+                      .eccentricity = 0.0123,
+                      .inclination_rad = 97.5 * BST_DEG_RAD,
+                      .raan_rad = -20 * BST_DEG_RAD,
+                      .arg_perigee_rad = 130.25 * BST_DEG_RAD,
+                      .mean_anomaly_rad = 410 * BST_DEG_RAD,
+                      .bstar = 2.5e-5,
+                      .ndot_rev_day2 = 1.5e-6,
+                      .nddot_rev_day3 = -3e-12};
+    snprintf(e.name, sizeof e.name, "SAT");
+    bst_time_utc(utc("2022-06-16T22:10:00.25Z"), &e.epoch_utc_jd1, &e.epoch_utc_jd2);
+    FILE *stream = fmemopen(text, sizeof text, "w");
+    bst_assert_ok(&ctx,
+                  bst_omm_write(&ctx, stream, &e, "2022-06-17T00:00:00", "TEST", "a \"word\""));
+    fclose(stream);
+    static const struct {
+        const char *key;
+        double value;
+    } numbers[] = {
+        {"MEAN_MOTION", 15.25},  {"ECCENTRICITY", 0.0123},      {"INCLINATION", 97.5},
+        {"RA_OF_ASC_NODE", 340}, {"ARG_OF_PERICENTER", 130.25}, {"MEAN_ANOMALY", 50},
+        {"NORAD_CAT_ID", 44801}, {"ELEMENT_SET_NO", 12},        {"REV_AT_EPOCH", 345},
+        {"BSTAR", 2.5e-5},       {"MEAN_MOTION_DOT", 1.5e-6},   {"MEAN_MOTION_DDOT", -3e-12}};
+    for (size_t k = 0; k < sizeof numbers / sizeof *numbers; k++) {
+        char key[40];
+        snprintf(key, sizeof key, "\"%s\": ", numbers[k].key);
+        const char *at = strstr(text, key);
+        assert_non_null(at);
+        /* 8 digits after the point */
+        bst_assert_close(strtod(at + strlen(key), NULL), numbers[k].value,
+                         fmax(1e-9 * fabs(numbers[k].value), 0));
+    }
+    assert_non_null(strstr(text, "\"EPOCH\": \"2022-06-16T22:10:00.250000\""));
+    assert_non_null(strstr(text, "a \\\"word\\\""));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_oem_of_our_own_comes_back),
         cmocka_unit_test(times_pass_a_leap_second),
         cmocka_unit_test(czml_is_what_cesium_reads),
         cmocka_unit_test(tdm_states_its_corrections),
+        cmocka_unit_test(an_omm_has_degrees_and_revolutions),
         cmocka_unit_test(bad_calls_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -30,7 +30,8 @@ Prints a line for each bug, the survivors with their place, and the score with i
 JASA 22, 209-212). Bugs that change no result (fmax of numbers that are equal, for example) count as survivors: look at
 each one. Ends with 1 if the score is below --least.
 The kinds of bugs are those of mutation testing (Offutt et al. 1996, ACM TOSEM 5(2), 99-118: relational, arithmetic and
-logical operators, constants, statements) and those that physical code invites: signs, axes, squares, roots.
+logical operators, constants, statements) and those that physical code invites: signs, axes, squares, roots, dropped
+factors. --kinds sign axis root product constant dropped draws from the second sort alone.
 """
 
 import argparse
@@ -64,6 +65,10 @@ OPERATORS = {
     "root": [(r"\bsqrtf?\(", "("), (r"\bcos\(", "sin("), (r"\bsin\(", "cos("), (r"\bfmin\(", "fmax("),
              (r"\bfmax\(", "fmin("), (r"\bfabsf?\(", "(")],
     "axis": AXES,
+    # a factor or a term that is forgotten, and an angle or a span of time that counts backwards
+    "dropped": [(r"(?<=[\w\)\]]) [*/] (?:\w+(?:(?:->|\.)\w+|\[\w+\])*|\d+\.\d+)(?=[;,)\s])", ""),
+                (r"(?<=[\w\)\]]) [+-] (?:\w+(?:(?:->|\.)\w+|\[\w+\])*|\d+\.\d+)(?=[;,)])", ""),
+                (r" \* BST_(?:DEG|ARCSEC)_RAD\b", ""), (r" / BST_(?:DEG|ARCSEC)_RAD\b", "")],
 }
 TABLE_ROW = re.compile(r"^\s*\{?\s*[-+]?[\d.][\d.eExXa-fA-F+\-,\s{}]*\}?,?\s*$")
 STATEMENT = re.compile(r"^\s+[\w>\.\[\]\-\*\(\) ]+ (?:=|\+=|-=|\*=) [^=].*;$")
@@ -247,7 +252,7 @@ def candidates(options, tree):
     for name in sorted(names):
         with open(os.path.join(tree.folder, name), encoding="utf-8") as file:
             text = file.read()
-        mutants = mutants_of(name, text)
+        mutants = [m for m in mutants_of(name, text) if not options.kinds or m[0] in options.kinds]
         found.append((name, mutants, len({text.count("\n", 0, m[1]) for m in mutants})))
     return [f for f in found if f[1]]
 
@@ -353,6 +358,8 @@ def main():
     parser.add_argument("--without", nargs="*", default=["bench_"], help="beginnings of file names to leave out")
     parser.add_argument("--suite", choices=["unit", "e2e"], default="unit",
                         help="which tests judge (default unit, which leaves sim/app out: its tests are the e2e suite)")
+    parser.add_argument("--kinds", nargs="+", choices=sorted(OPERATORS) + ["statement"], metavar="KIND",
+                        help=f"only bugs of these kinds: {', '.join(sorted(OPERATORS))}, statement")
     parser.add_argument("--count", type=int, default=30, help="bugs to plant (default 30)")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="plant no more after so many minutes")
     parser.add_argument("--seed", type=int, default=1)

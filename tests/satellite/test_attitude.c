@@ -93,6 +93,17 @@ static void laws_point_their_axes(void **state) {
     c = (bst_attitude_config){.from_s = -1e9, .law = BST_ATTITUDE_NADIR, .rotation_deg = {90}};
     back = bst_quat_conj(attitude_at(&c, 1, &s));
     bst_assert_close(bst_vec3_angle(bst_quat_rotate(back, (bst_vec3){0, 1, 0}), down), 0, 1e-7);
+    /* about x by 20, then about the new y by 30, then about the new z by 50 degrees: the last
+     * row of R1(20) R2(30) R3(50) is what the body has of nadir */
+    c = (bst_attitude_config){
+        .from_s = -1e9, .law = BST_ATTITUDE_NADIR, .rotation_deg = {20, 30, 50}};
+    const double x_turn = 20 * BST_DEG_RAD, y_turn = 30 * BST_DEG_RAD, z_turn = 50 * BST_DEG_RAD;
+    bst_vec3 seen = bst_quat_rotate(attitude_at(&c, 1, &s), down);
+    bst_assert_close(seen.x, -cos(x_turn) * sin(y_turn) * cos(z_turn) + sin(x_turn) * sin(z_turn),
+                     1e-12);
+    bst_assert_close(seen.y, cos(x_turn) * sin(y_turn) * sin(z_turn) + sin(x_turn) * cos(z_turn),
+                     1e-12);
+    bst_assert_close(seen.z, cos(x_turn) * cos(y_turn), 1e-12);
 }
 
 /* It loses its attitude at 90 s and turns from there. */

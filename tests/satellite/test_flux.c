@@ -375,6 +375,37 @@ static void highlights_in_shadow_are_dark(void **state) {
     assert_true(flux[2] > 0.9 * flux[0] && flux[2] < flux[0]);
 }
 
+/* A small plate within a black dish of 2 m radius and 0.5 m depth, halfway out, above the bowl by
+ * more or less than its height there: light from the opening reaches the one inside; the dish hides
+ * the one behind it. */
+static void a_plate_in_a_dish(void **state) {
+    (void)state;
+    /* the bowl is 0.125 m high at 1 m from the axis */
+    static const struct {
+        double z_m;
+        bool lit;
+    } cases[] = {{0.2, true}, {0.15, true}, {0.05, false}};
+    for (int i = 0; i < 3; i++) {
+        char text[600];
+        snprintf(text, sizeof text,
+                 "{\"materials\": [{\"name\": \"w\", \"diffuse\": 0.8}, {\"name\": \"k\"}], "
+                 "\"parts\": [{\"name\": \"d\", \"kind\": \"dish\", \"radius_m\": 2, "
+                 "\"length_m\": 0.5, \"segments\": 96, \"position_m\": [3, -1, 2], \"material\": "
+                 "\"k\"}, {\"name\": \"p\", \"kind\": \"plate\", \"size_m\": [0.1, 0.1, 1], "
+                 "\"position_m\": [4, -1, %g], \"material\": \"w\"}]}",
+                 2 + cases[i].z_m);
+        bst_test_model m = bst_test_model_open(text);
+        bst_vec3 sun = bst_vec3_unit((bst_vec3){0.1, 0.2, 1}),
+                 eye = bst_vec3_unit((bst_vec3){-0.2, 0.1, 1});
+        double whole = 0.8 / BST_PI * 0.01 * sun.z * eye.z;
+        bst_assert_close(bst_test_flux(&m, sun, eye), cases[i].lit ? whole : 0.0, 1e-9);
+        /* from low over the rim only what it leaves is lit */
+        bst_vec3 low = bst_vec3_unit((bst_vec3){-1, 0, 0.05});
+        bst_assert_close(bst_test_flux(&m, low, eye), 0.0, 1e-9);
+        bst_test_model_close(&m);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(highlights_in_shadow_are_dark),
@@ -389,6 +420,7 @@ int main(void) {
         cmocka_unit_test(joints_spin_by_the_right_hand),
         cmocka_unit_test(glint_has_the_width_of_the_sun),
         cmocka_unit_test(earthlight_has_its_closed_form),
+        cmocka_unit_test(a_plate_in_a_dish),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

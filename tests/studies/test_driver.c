@@ -41,6 +41,21 @@ static int tear_down(void **state) {
     return 0;
 }
 
+static int reports;
+static int64_t done_before;
+
+/* Rate and time left are those of the runs done since the start. */
+static void take_progress(void *user, const bst_driver_progress *p) {
+    const fixture *f = user;
+    assert_int_equal(p->runs, RUNS);
+    assert_in_range(p->done, f->results.done, RUNS);
+    if (!isnan(p->left_s)) {
+        reports++;
+        bst_assert_close(p->runs_per_s * p->elapsed_s, (double)(p->done - done_before), 1e-6);
+        bst_assert_close(p->left_s * p->runs_per_s, (double)(RUNS - p->done), 1e-6);
+    }
+}
+
 static bst_status drive(fixture *f, int workers, int64_t shard_runs) {
     bst_executor executor;
     const bst_local_pool_options pool = {.study = &f->study,
@@ -53,11 +68,14 @@ static bst_status drive(fixture *f, int workers, int64_t shard_runs) {
                                         .kind = &fake_kind,
                                         .shard_s = 1.0,
                                         .shard_runs = shard_runs,
-                                        .parallel = workers};
+                                        .parallel = workers,
+                                        .progress = take_progress,
+                                        .user = f};
     bst_results_free(&f->results);
     bst_assert_ok(&f->ctx, bst_results_create(&f->ctx, &f->study, &fake_kind, &f->results));
     bst_assert_ok(&f->ctx, bst_results_load_folder(&f->ctx, &f->results, f->folder, 0, RUNS, true));
     bst_assert_ok(&f->ctx, bst_local_pool_open(&f->ctx, &pool, &executor));
+    done_before = f->results.done;
     bst_status status = bst_driver_run(&f->ctx, &f->results, &executor, &options, &f->outcome);
     executor.close(executor.self);
     return status;
@@ -96,6 +114,7 @@ static void test_same_tables(void **state) {
         bst_assert_ok(&f->ctx, drive(f, pass == 0 ? 1 : 3, pass == 1 ? 17 : 0));
         assert_int_equal(f->outcome.missing, 0);
         assert_int_equal(f->outcome.failed, 1);
+        assert_true(reports > 0);
         assert_int_equal(f->outcome.attempts_lost, pass == 2 ? 2 : 0);
         bst_assert_ok(&f->ctx, bst_study_write_tables(&f->ctx, &f->results, f->folder));
         for (int i = 0; i < 3; i++) {
