@@ -8,10 +8,11 @@
 /* An isolated detection above this SNR and this many FWHM long is fitted as a streak of its own
  * (imgproc/measure/source_moments.c); above WIDTH_SNR the width of its fit is free (locate.c). */
 static const double OWN_STREAK_SNR = 10.0, OWN_STREAK_LENGTH = 1.5, WIDTH_SNR = 20.0;
-/* A streak's fit must lower chi-square by this much (source_moments.c). */
+/* A streak's fit must lower chi-square by this much (LEAST_GAIN of source_moments.c). */
 static const double LEAST_GAIN = 9.0;
 
-/* Light farther than this on an axis does not reach the fitted pixels: they end at 4 sigma. */
+/* Light farther than this on an axis does not reach the fitted pixels: they end at about 4 sigma
+ * (REACH_SIGMAS of imgproc/measure/deblend.c, in whole pixels), and so does the light. */
 static const double FITTED_SIGMAS = 8.0;
 
 /* Symmetric 2 x 2 matrix. */

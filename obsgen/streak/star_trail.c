@@ -255,12 +255,13 @@ static void straight_bias(const bst_star_trail_path *p, double dx_px, double dy_
 void bst_star_trail_point_bias(const bst_star_trail_path *p, const bst_blend_weights *weights,
                                double light, double sigma_px, double bias_px[2]) {
     enum { ROUNDS = 4 };
-    static const double ENOUGH_PX = 0.002, PER_SIGMA = 2.0;
+    /* convergence limit: a fifth of 0.01 px, the bias that matters (source_shape.c) */
+    static const double ENOUGH_PX = 0.002;
     float row[BST_BLEND_DISTANCES];
     bst_blend_weight_row(weights, light, row);
     float x[MOST_STEPS], y[MOST_STEPS], share[MOST_STEPS];
     int count = gather_steps(p, x, y, share);
-    float scale = (float)(PER_SIGMA / sigma_px);
+    float scale = (float)(BST_BLEND_PER_SIGMA / sigma_px);
     for (int round = 0; round < ROUNDS; round++) {
         float at_x = (float)bias_px[0], at_y = (float)bias_px[1];
         float sum = 0.0f, pull_x = 0.0f, pull_y = 0.0f;
