@@ -116,6 +116,7 @@ static double snr_factor(const bst_generator *g, const bst_generator_frame *f,
     const bst_crlb_table *bound = g->image_bound ? g->image_bound : &g->bound;
     double plain = item->electrons * bst_crlb_table_norm(bound, length) / sqrt(fmax(v, 1e-6));
     bool known = item->snr > 0.0 && plain > 0.0;
+    /* limits: noise variance of 25 times and of a quarter of that of the frame */
     return known ? fmin(fmax(item->snr / plain, 0.2), 2.0) : 1.0;
 }
 
@@ -408,6 +409,7 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
     g->width = f->window.width / g->binning;
     g->height = f->window.height / g->binning;
     g->exposure_s = f->exposure_s;
+    /* as in imgproc/detect/detect.c */
     double sigma = fmax(f->sigma_px / g->binning, 0.2);
     if (sigma != g->sigma) {
         g->sigma = sigma;
