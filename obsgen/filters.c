@@ -79,6 +79,7 @@ void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f) 
         response = *f->response;
     } else {
         const bst_response_side source = {NULL, g->sigma * g->binning};
+        /* as in imgproc/detect/detect.c */
         const bst_response_side filter = {NULL, fmax(g->onboard_sigma_px, 0.2 * g->binning)};
         bst_response_set(&response, &source, &filter, g->binning, 0.0, 0.0);
     }
@@ -213,6 +214,7 @@ void bst_generator_set_filters(bst_generator *g) {
     double columns = column_share(g, variance);
     double rows =
         (d->row_offset_rms_e * d->row_offset_rms_e + d->row_noise_e * d->row_noise_e) / variance;
+    /* the alarm rate is not defined for offsets alone */
     g->white_share = fmax(1.0 - columns - rows, 0.05);
     for (int k = 0; k < 2; k++) {
         bst_generator_filter *filter = &g->filters[k];

@@ -116,6 +116,7 @@ static double snr_factor(const bst_generator *g, const bst_generator_frame *f,
     const bst_crlb_table *bound = g->image_bound ? g->image_bound : &g->bound;
     double plain = item->electrons * bst_crlb_table_norm(bound, length) / sqrt(fmax(v, 1e-6));
     bool known = item->snr > 0.0 && plain > 0.0;
+    /* limits: noise variance of 25 times and of a quarter of that of the frame */
     return known ? fmin(fmax(item->snr / plain, 0.2), 2.0) : 1.0;
 }
 
@@ -408,6 +409,7 @@ static bst_status set_frame(bst_ctx *ctx, bst_generator *g, const bst_generator_
     g->width = f->window.width / g->binning;
     g->height = f->window.height / g->binning;
     g->exposure_s = f->exposure_s;
+    /* as in imgproc/detect/detect.c */
     double sigma = fmax(f->sigma_px / g->binning, 0.2);
     if (sigma != g->sigma) {
         g->sigma = sigma;
@@ -541,6 +543,8 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
     g->count = g->lost = 0;
     set_noise(g, f);
     BST_TRY(collect(ctx, g, f));
+    bool full = bst_generator_saturation_e(g) <= 0.0; /* the sky alone saturates every pixel */
+    g->source_count = full ? 0 : g->source_count;
     for (int i = 0; i < g->source_count; i++) {
         g->sources[i].saturated =
             (f->truth->items[g->sources[i].item].flags & BST_TRUTH_SATURATED) != 0;
@@ -562,11 +566,11 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
             bst_generator_keep(g, &item);
         }
     }
-    if (g->smeared) {
-        BST_TRY(bst_streak_breakup_fragments(ctx, g));
+    if (!full) {
+        BST_TRY(g->smeared ? bst_streak_breakup_fragments(ctx, g) : BST_OK);
+        BST_TRY(bst_false_alarms_draw(ctx, g));
+        bst_false_alarms_cosmic_rays(g);
     }
-    BST_TRY(bst_false_alarms_draw(ctx, g));
-    bst_false_alarms_cosmic_rays(g);
     for (int i = 0; i < g->count; i++) {
         bst_detection *d = &g->items[i].detection;
         bool drawn = g->items[i].drawn;

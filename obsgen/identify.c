@@ -82,6 +82,7 @@ static bool is_significant(const bst_identify_options *o, const bst_generator_fr
 static bst_status misidentify(bst_ctx *ctx, const bst_identify_options *o,
                               const bst_generator_frame *f, const bst_obsgen_generated *generated,
                               int count, bst_detection *d) {
+    /* 4 sigma with the least floor, 0.25 px, of images (imgproc/identify/starid.c) */
     double tolerance = fmin(o->match_tolerance_px, 4.0 * sqrt(d->cov_xx + d->cov_yy + 0.0625)),
            nearest = tolerance;
     const bst_truth *t = f->truth;

@@ -10,6 +10,7 @@ static const double LEAST_SEEN = 0.02;
 double bst_generator_saturation_e(const bst_generator *g) {
     const bst_camera *c = g->camera;
     double converter_e = (ldexp(1.0, (int)c->bits) - 1.0 - c->offset_dn) * c->gain_e_per_dn;
+    /* saturated from 98 % of the full well, as in imgproc/detect/detect.c */
     return fmin(converter_e, 0.98 * c->full_well_e * g->binning * g->binning) - g->background_e;
 }
 
@@ -37,6 +38,7 @@ static void shared_bias(const bst_generator *g, const generator_source *s, bool 
     if (shared) {
         const double(*table)[2] = as_streak ? g->streak_bias : g->star_bias;
         double at = log10(fmax(light, GENERATOR_FIRST_LIGHT) / GENERATOR_FIRST_LIGHT);
+        /* inside of the last interval of the table */
         at = fmin(at, GENERATOR_BIASES - 1.001);
         int i = (int)at;
         for (int k = 0; k < 2; k++) {
@@ -212,6 +214,7 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     double noise = together * s->noise +
                    sqrt(1.0 - together * together) * bst_generator_draw(g, s, GENERATOR_FLUX);
     flux -= g->background_bias_e / (fitted.norm * fitted.norm);
+    /* least flux of a step of the fit, as in imgproc/measure/fit.c */
     d.flux_e = fmax(flux + noise * sqrt(fitted.flux_variance * b->widen / seen), 0.1 * fabs(flux));
     if (b->drawn) {
         d.flux_e = b->snr * g->noise_e / fitted.norm;

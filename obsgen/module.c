@@ -466,6 +466,7 @@ static bst_status process_exposure(obsgen *o, struct bst_step *step, const bst_e
             .search_radius_px = o->config->search_radius_px,
             .match_tolerance_px = o->config->match_tolerance_px,
             .probability = o->calibration.star_id_probability,
+            /* a star of 0.7 of the threshold, 3.5 of 5, is detected in 7 % of the frames */
             .v_limit = bst_generator_v_limit(o->generator, 0.7 * made.threshold_snr),
             .locked = locked,
             .shift_px = shift_px(o, p->truth, out->q_cam_from_gcrf),

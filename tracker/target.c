@@ -74,6 +74,7 @@ static bst_target_fit misfit(const bst_target_params *params, const bst_target_c
     add2(&fit, d, s->covariance[0][0] + variance, s->covariance[0][1],
          s->covariance[1][1] + variance, params->direction_chi2);
     if (isfinite(cue->v_mag) && isfinite(cue->v_mag_sigma) && isfinite(track->v_mag)) {
+        /* 0.1 mag: a track is never better known than its photometric zero point */
         double v = cue->v_mag_sigma * cue->v_mag_sigma + track->v_mag_variance + 0.01;
         double m = track->v_mag - cue->v_mag;
         fit.chi2 += m * m / v <= params->magnitude_chi2 ? m * m / v : INFINITY;

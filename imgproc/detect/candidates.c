@@ -11,6 +11,9 @@ enum {
     SOON = 8 /* rows read ahead */
 };
 
+/* A maximum is one of its own if the output falls by this many sigma and this share of it towards
+ * a higher one. Design choices: 3 sigma against noise, 15 % for bright sources, where
+ * errors of PSF and path exceed the noise. */
 static const float SADDLE_SIGMA = 3.0f, SADDLE_SHARE = 0.15f;
 
 static void lay_out(bst_candidates *c, size_t cells) {

@@ -114,6 +114,8 @@ static int node_count(const bst_imgproc_shape *shape) {
     double length =
         (hypot(shape->dx_px, shape->dy_px) + 6.0 * hypot(shape->bend_x_px, shape->bend_y_px)) /
         shape->sigma_px;
+    /* Gauss-Legendre on a uniform path: error below 1e-5 of the peak up to 60 sigma, 2e-8 at 5
+     * sigma */
     return length < 1e-3 ? 1 : (int)fmin(5.0 + 1.15 * length, BST_PSF_MAX_NODES);
 }
 

@@ -9,7 +9,9 @@ static const double BLUR_SIGMA = 0.5, SIZE_SIGMA = 0.02;
 /* Standard error of the offset towards the Sun, share of it. The factor varies by about as much
  * with the attitude of one satellite: tests/imgproc/calibrate_outline.c */
 static const double OFFSET_SIGMA = 0.5;
-/* Standard error of the centre of a target cut by the frame's edge, share of its size. */
+/* Standard error of the centre of a target cut by the frame's edge, share of its visible size.
+ * Design choice: a target of twice that size, of which half is seen, has its centre half of it
+ * away. */
 static const double EDGE_SIGMA = 0.25;
 
 double bst_outline_phase_offset(double phase_rad) {

@@ -11,6 +11,9 @@
 
 enum { VOTERS = 150, PASSES = 5 };
 
+/* Design choices. CELL_PX: vote cell; a shift is refined from there, and stars and detections agree
+ * to a pixel when roll is known. CHANCE: largest probability that votes of chance matches alone are
+ * as many. */
 static const double CELL_PX = 2.0;
 static const double CHANCE = 0.01;
 /* 1 sigma prior of the roll error from onboard knowledge */
@@ -275,6 +278,8 @@ static void fit_shift_and_roll(const bst_starid *s, const match_input *p, int ma
             continue;
         }
         const bst_imgproc_expected_star *star = &stars[s->star_of[i]];
+        /* 0.05 px besides the noise: errors of distortion and catalogue; bright stars get no weight
+         * beyond */
         double wx = 1.0 / (fmax(items[i].cov_xx, 0.0) + 0.0025);
         double wy = 1.0 / (fmax(items[i].cov_yy, 0.0) + 0.0025);
         double dx = items[i].x_px - star->x_px, dy = items[i].y_px - star->y_px;

@@ -5,7 +5,10 @@
 
 #include "imgproc/measure/cosmic_ray.h"
 
-/* Of a Gaussian's light 6e-4 lies outside of a square of this half side, in sigmas. */
+/* Half side of the fitted stamp. REACH_SIGMAS: of a Gaussian's light 6e-4 lies outside of the
+ * square (tests/imgproc/calibrate_deblend.c). LEAST_REACH_PX, design choice: 49 pixels for the
+ * three parameters of the narrowest PSF, most of them with sky only, which determine the fit's
+ * level. */
 static const double REACH_SIGMAS = 3.6, LEAST_REACH_PX = 3.0;
 /* A centre moves by at most LIMIT_PX, one sigma and LIMIT_PER_PATH of the path. Calibrated by
  * tests/imgproc/calibrate_deblend.c: of fits beside neighbours 99 % move by less than a third of
@@ -14,6 +17,9 @@ static const double LIMIT_PX = 1.5, LIMIT_PER_PATH = 0.4;
 /* Fits that end this near to one another are of one source: sqrt(2) sigma, where the images of two
  * equal sources have a correlation of exp(-1/2) (Gaussian: exp(-d^2 / (4 sigma^2))). */
 static const double SAME_FWHM = 0.6;
+/* Neighbours up to a pixel outside of the stamp's border, 1.5 px from its outermost pixel's centre,
+ * are fitted with the source: at 1.5 to 3 px FWHM 6 to 22 % of their light is inside. */
+static const double FREE_OUTSIDE_PX = 1.5;
 
 double bst_deblend_reach(const bst_locate_frame *f) {
     return fmax(LEAST_REACH_PX, ceil(REACH_SIGMAS * f->sigma_px));
@@ -102,10 +108,10 @@ void bst_deblend_gather(const bst_imgproc_locator *l, const bst_locate_frame *f,
     }
     for (int n = 0; n < count; n++) {
         const bst_imgproc_source *s = &l->found[near[n]].source;
-        /* a source just outside has half of its light inside */
-        bool inside = s->shape.x_px >= stamp->x0 - 1.5 && s->shape.y_px >= stamp->y0 - 1.5 &&
-                      s->shape.x_px <= stamp->x0 + stamp->width + 0.5 &&
-                      s->shape.y_px <= stamp->y0 + stamp->height + 0.5;
+        bool inside = s->shape.x_px >= stamp->x0 - FREE_OUTSIDE_PX &&
+                      s->shape.y_px >= stamp->y0 - FREE_OUTSIDE_PX &&
+                      s->shape.x_px <= stamp->x0 + stamp->width - 1 + FREE_OUTSIDE_PX &&
+                      s->shape.y_px <= stamp->y0 + stamp->height - 1 + FREE_OUTSIDE_PX;
         if (inside && out->free_count < BST_FIT_MAX_FREE) {
             out->free[out->free_count++] = s;
         } else if (out->fixed_count < BST_DEBLEND_MAX_FIXED) {

@@ -16,6 +16,11 @@ enum { MAX_ITERATIONS = 15, MAX_SUMS = BST_FIT_MAX_PARAMETERS * (BST_FIT_MAX_PAR
 /* least pivot of the Cholesky factorisation, relative to its diagonal element */
 static const double LEAST_PIVOT = 1e-11;
 static const double SETTLED = 0.03, NEIGHBOUR_SETTLED = 0.1;
+/* Design choices that keep Gauss-Newton where its linear model holds: largest step, px, about a
+ * sigma of the narrowest PSF; least flux after a step, share of that before; limits of the widening
+ * relative to the PSF's variance, for images of 0.63 to 1.7 times its width. */
+static const double MOST_STEP_PX = 0.7, LEAST_FLUX = 0.1, LEAST_WIDENING = -0.6,
+                    MOST_WIDENING = 1.8;
 
 bst_status bst_fit_create(bst_ctx *ctx, const bst_imgproc_gauss *psf,
                           const bst_source_profiles *profiles, int max_side, bst_fit *out) {
@@ -153,11 +158,6 @@ static void solve(const equations *e, double *x) {
     bst_cholesky_solve(e->a[0], BST_FIT_MAX_PARAMETERS, e->parameters, x);
 }
 
-/* Limit of the PSF widening, px^2. */
-static double most_widening(const bst_imgproc_source *s) {
-    return 0.6 * s->shape.sigma_px * s->shape.sigma_px;
-}
-
 /* Moves the sources by the step in e->g, at most limit_px from their start. Returns true if the
  * step is below the convergence limit. */
 static bool apply_step(const bst_fit_request *r, const equations *e,
@@ -167,10 +167,10 @@ static bool apply_step(const bst_fit_request *r, const equations *e,
     for (int s = 0; s < r->free_count; s++) {
         const double *step = e->g + 3 * s;
         bst_imgproc_source *f = r->free[s];
-        double x = clamp(f->shape.x_px + clamp(step[0], -0.7, 0.7), start[s].shape.x_px - limit_px,
-                         start[s].shape.x_px + limit_px);
-        double y = clamp(f->shape.y_px + clamp(step[1], -0.7, 0.7), start[s].shape.y_px - limit_px,
-                         start[s].shape.y_px + limit_px);
+        double x = clamp(f->shape.x_px + clamp(step[0], -MOST_STEP_PX, MOST_STEP_PX),
+                         start[s].shape.x_px - limit_px, start[s].shape.x_px + limit_px);
+        double y = clamp(f->shape.y_px + clamp(step[1], -MOST_STEP_PX, MOST_STEP_PX),
+                         start[s].shape.y_px - limit_px, start[s].shape.y_px + limit_px);
         /* share of the standard deviation from the diagonal, at least 1e-5 px */
         double share = s == 0 ? SETTLED : NEIGHBOUR_SETTLED;
         double slack_x = fmax(1e-5, share / e->a[3 * s][3 * s]);
@@ -178,14 +178,16 @@ static bool apply_step(const bst_fit_request *r, const equations *e,
         settled = settled && fabs(x - f->shape.x_px) < slack_x && fabs(y - f->shape.y_px) < slack_y;
         double product = f->flux_e * f->widening_px2;
         double flux = f->flux_e + step[2];
-        flux = flux > 0.1 * f->flux_e ? flux : 0.1 * f->flux_e;
+        flux = fmax(flux, LEAST_FLUX * f->flux_e);
         settled = settled && fabs(flux - f->flux_e) < share / e->a[3 * s + 2][3 * s + 2];
         f->shape.x_px = x;
         f->shape.y_px = y;
         f->flux_e = flux;
         if (s == 0 && e->free_width) {
             product += e->g[3 * r->free_count];
-            f->widening_px2 = clamp(product / flux, -most_widening(f), 3.0 * most_widening(f));
+            double variance = f->shape.sigma_px * f->shape.sigma_px;
+            f->widening_px2 =
+                clamp(product / flux, LEAST_WIDENING * variance, MOST_WIDENING * variance);
         }
     }
     return settled;

@@ -5,6 +5,15 @@
 
 #include "imgproc/measure/cosmic_ray.h"
 
+/* Source is streak-like from this length, FWHM of the PSF: points with noise measure less, blends
+ * of two and streaks of 2.5 sigma or more reach it. */
+static const double OWN_STREAK_LENGTH = 1.5;
+/* The fit as a streak must lower chi-square by this much: for two more parameters noise does so in
+ * exp(-9 / 2) = 1 % of the points. */
+static const double LEAST_GAIN = 9.0;
+/* Largest change of the path's length per round, share: the three chi-squares of the parabola. */
+static const double MOST_STEP = 0.2;
+
 bool bst_source_moments_measure(const bst_imgproc_worker *w, int i, bst_imgproc_found *found,
                                 double wider) {
     assert(w && found && i >= 0 && i < w->l->count);
@@ -70,7 +79,7 @@ void bst_source_moments_own_streak(const bst_imgproc_worker *w, int i, bst_imgpr
     double psf_fwhm = BST_FWHM_PER_SIGMA * f->sigma_px;
     for (int round = 0; round < 4; round++) {
         if (!bst_source_moments_measure(w, i, found, 2.0 * bst_deblend_reach(f)) ||
-            found->length_px < 1.5 * psf_fwhm) {
+            found->length_px < OWN_STREAK_LENGTH * psf_fwhm) {
             return;
         }
         double spread = (found->length_px * found->length_px - psf_fwhm * psf_fwhm) /
@@ -78,24 +87,28 @@ void bst_source_moments_own_streak(const bst_imgproc_worker *w, int i, bst_imgpr
         double path = fmin(sqrt(12.0 * spread), 0.4 * w->l->max_side), angle = found->angle_rad;
         bst_imgproc_found before = *found;
         bst_imgproc_source longest = before.source;
-        longest.shape.dx_px = 1.2 * path * cos(angle);
-        longest.shape.dy_px = 1.2 * path * sin(angle);
+        longest.shape.dx_px = (1.0 + MOST_STEP) * path * cos(angle);
+        longest.shape.dy_px = (1.0 + MOST_STEP) * path * sin(angle);
         bst_imgproc_stamp stamp = bst_deblend_stamp(w->l, f, &longest);
         double old_path = hypot(before.source.shape.dx_px, before.source.shape.dy_px);
         double old_angle = atan2(before.source.shape.dy_px, before.source.shape.dx_px);
         double old_chi =
             chi_square_of_path(w, i, found, &stamp, &before.source, old_path, old_angle);
-        double low = chi_square_of_path(w, i, found, &stamp, &before.source, 0.8 * path, angle);
-        double high = chi_square_of_path(w, i, found, &stamp, &before.source, 1.2 * path, angle);
+        double low = chi_square_of_path(w, i, found, &stamp, &before.source,
+                                        (1.0 - MOST_STEP) * path, angle);
+        double high = chi_square_of_path(w, i, found, &stamp, &before.source,
+                                         (1.0 + MOST_STEP) * path, angle);
         double chi = chi_square_of_path(w, i, found, &stamp, &before.source, path, angle);
         double bend = low + high - 2.0 * chi, step = 0.0;
         if (isfinite(bend)) {
-            step = bend > 0.0 ? 0.1 * (low - high) / bend : low < high ? -0.2 : 0.2;
-            step = fmax(-0.2, fmin(step, 0.2));
+            step = bend > 0.0   ? 0.5 * MOST_STEP * (low - high) / bend
+                   : low < high ? -MOST_STEP
+                                : MOST_STEP;
+            step = fmax(-MOST_STEP, fmin(step, MOST_STEP));
             chi =
                 chi_square_of_path(w, i, found, &stamp, &before.source, path * (1.0 + step), angle);
         }
-        if (!(chi < old_chi - 9.0)) {
+        if (!(chi < old_chi - LEAST_GAIN)) {
             *found = before;
             return;
         }

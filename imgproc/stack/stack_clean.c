@@ -60,6 +60,8 @@ static bool is_charge(const bst_stack *s, size_t at, double scale) {
 }
 
 void stack_clean_charge(bst_stack *s) {
+    /* filter output of charge in a pixel: at 2.6 sigma exp(-2.6^2 / 4) = 0.18 of its maximum, in
+     * whole pixels and one more */
     double scale = 1.0 / sqrt((double)s->count), radius = ceil(2.6 * s->sigma_px) + 1.0;
     for (int y = 1; y + 1 < s->height; y++) {
         for (int x = 1; x + 1 < s->width; x++) {
@@ -174,6 +176,7 @@ int stack_clean_rest(bst_stack *s) {
     double level = REST_SNR * STACK_QUANTA * sqrt((double)s->count);
     int count;
     while ((count = find_maxima(s, (int)level, s->maxima, STACK_REST)) < 0) {
+        /* too many maxima for the list: a threshold raised by a quarter */
         level *= 1.25;
     }
     rest_job job = {s, s->maxima, s->rest_paths};
@@ -183,6 +186,8 @@ int stack_clean_rest(bst_stack *s) {
     }
     bst_heapsort_indices(s->order, count, stronger_path, s->rest_paths);
     int kept = 0;
+    /* two outputs of equal sources have one maximum to 2 sqrt(2) sigma; 2.2 sigma, design choice,
+     * is well inside */
     double radius = 2.2 * s->sigma_px;
     double seen_by_itself = (double)STACK_VISIBLE / STACK_QUANTA * sqrt((double)s->count);
     for (int i = 0; i < count; i++) {
@@ -205,6 +210,7 @@ int stack_clean_rest(bst_stack *s) {
 }
 
 void stack_clean_path(bst_stack *s, const stack_path *p) {
+    /* filter output of the source: at 3.2 sigma exp(-3.2^2 / 4) = 0.08 of its maximum */
     double radius = 3.2 * s->sigma_px;
     for (int i = 0; i < s->count; i++) {
         double x = p->x + p->vx * s->tau[i], y = p->y + p->vy * s->tau[i];

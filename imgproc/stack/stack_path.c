@@ -88,6 +88,7 @@ static void maximise_sum(const bst_stack *s, stack_path *p, int clamp) {
         best = top.snr > best.snr ? top : best;
         double gain = best.snr - p->snr;
         *p = best;
+        /* a gain below 0.02 sigma changes no decision by more than 0.02 / sqrt(2 pi) = 0.8 % */
         if (gain < 0.02) {
             for (int k = 0; k < 4; k++) {
                 steps[k] *= 0.4;

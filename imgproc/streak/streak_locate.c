@@ -11,10 +11,16 @@
 
 /* most point sources replaced by a streak */
 enum { MOST_PIECES = 64 };
-/* Point density, px^-2, above which bright streaks are not searched among points. */
+/* Point density, px^-2, above which bright streaks are not searched among points: a point per 26
+ * px, about the length of the shortest streak searched for. */
 static const double CROWD_PER_PX = 0.0015;
-/* Above this SNR a source counts as a point unless its area exceeds a point's by these limits. */
+/* Above this SNR a source counts as a point unless its area exceeds a point's by these limits.
+ * Design choices: at about twice the threshold the area is known well enough; 10 px are the
+ * rounding of a point's edge. */
 static const double BRIGHT_POINT_SNR = 12.0, AREA_SHARE = 1.6, AREA_PIXELS = 10.0;
+/* Design choices. A point is no piece of a line if it has OWN_LIGHT times the light of a piece of
+ * its size, and OWN_LIGHT_SNR more, above any maximum of noise. A line may lose LOST_SNR when other
+ * sources are masked: 1.5 standard deviations of its own noise. */
 static const double OWN_LIGHT = 3.0, OWN_LIGHT_SNR = 6.0, LOST_SNR = 1.5;
 
 bst_status bst_streak_locator_create(bst_ctx *ctx, const bst_imgproc_gauss *psf, bst_parallel *pool,
@@ -129,6 +135,7 @@ static void set_line_covariance(const bst_locate_frame *f, const bst_streak_line
     bst_imgproc_source *s = &out->source;
     double length = hypot(s->shape.dx_px, s->shape.dy_px);
     double c = s->shape.dx_px / length, d = s->shape.dy_px / length;
+    /* 0.2 px, design choice: error of the refined line besides noise */
     double across2 = 2.0 * f->sigma_px * f->sigma_px / (line->snr * line->snr) + 0.04;
     double along2 = length * length / 9.0;
     s->cov_xx = along2 * c * c + across2 * d * d;

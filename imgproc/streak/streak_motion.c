@@ -235,6 +235,7 @@ static bool step_star(star *s, const double by[COMMON], double ex, double ey) {
     s->shape.dy_px += by[0] * ey + by[1] * ex;
     s->shape.bend_x_px += by[2] * ex;
     s->shape.bend_y_px += by[2] * ey;
+    /* limits of flux, width and position as in imgproc/measure/fit.c and deblend.c */
     s->flux_e = fmax(s->flux_e + step[2], 0.1 * s->flux_e);
     double variance = s->shape.sigma_px * s->shape.sigma_px * s->flux_e;
     s->product_e = fmax(-0.6 * variance, fmin(s->product_e + step[3], 1.8 * variance));

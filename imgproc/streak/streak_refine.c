@@ -7,6 +7,8 @@ enum { MOST = BST_STREAK_MAX_ROWS + 96, MOST_LAGS = 2 * 24 };
 
 /* Limit, sigma, by which a sample may exceed the path's mean. */
 static const double CLIP_SIGMA = 2.5;
+/* Share of the path's mean above which a row counts as lit, design choice: between sky, 0, and the
+ * path, 1, nearer to the sky because a streak of SNR 7 over 60 rows has 0.9 sigma in a row. */
 static const double LIT_SHARE = 0.35;
 
 /* Straight path in a plane of the streak map: column s0 at row t0, s1 at row t1 (row centres). */

@@ -57,6 +57,8 @@ void bst_streak_search_free(bst_streak_search *s) {
 double bst_streak_threshold(double false_alarms, double width_px, double height_px, double sigma_px,
                             double max_px) {
     double sigma = sqrt(sigma_px * sigma_px + 1.0 / 12.0);
+    /* part of the fitted law: streaks inside of the frame would lack 2 / pi = 0.64 of their length
+     * per axis; those that its edge cuts count in part */
     double inside = fmax(width_px - 0.45 * max_px, 1.0) * fmax(height_px - 0.45 * max_px, 1.0);
     double density = BST_PI / (4.0 * sqrt(12.0 * BST_PI)) * pow(sigma, SIGMA_POWER) * RATE *
                      max_px / (1.0 + max_px / LENGTH_PX);

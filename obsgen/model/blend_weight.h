@@ -3,9 +3,10 @@
 #ifndef BST_OBSGEN_MODEL_BLEND_WEIGHT_H
 #define BST_OBSGEN_MODEL_BLEND_WEIGHT_H
 
-enum { BST_BLEND_LIGHTS = 21, BST_BLEND_DISTANCES = 17 };
+/* Light levels, distances, and distances per sigma: the last one is 8 sigma. */
+enum { BST_BLEND_LIGHTS = 21, BST_BLEND_DISTANCES = 33, BST_BLEND_PER_SIGMA = 4 };
 
-/* Table by light level (quarter decades) and distance (half sigmas). */
+/* Table by light level (quarter decades) and distance. */
 typedef struct bst_blend_weights {
     float weight[BST_BLEND_LIGHTS][BST_BLEND_DISTANCES];
 } bst_blend_weights;
@@ -25,7 +26,8 @@ void bst_blend_weights_init(bst_blend_weights *weights);
  *            x p(x - d) p(x) / (1 + R p(x) / p(0)) */
 double bst_blend_weight(const bst_blend_weights *weights, double light, double overlap);
 
-/* Weights of one light level at distances of 0, 0.5, 1, ... sigma, relative to that at 0. */
+/* Weights of one light level at distances of k / BST_BLEND_PER_SIGMA sigma, relative to that at 0.
+ */
 void bst_blend_weight_row(const bst_blend_weights *weights, double light,
                           float row[BST_BLEND_DISTANCES]);
 

@@ -5,16 +5,36 @@
 #include "boresight/vec.h"
 #include "obsgen/generator_internal.h"
 
-/* Sources below this share of the threshold are not detected; they only contribute light. */
+/* Sources below this share of the threshold are not detected; they only contribute light. At a
+ * threshold of 5, noise lifts a source of 0.3 above it with a probability of Q(3.5) = 2e-4. */
 static const double FAINTEST_SHARE = 0.3;
-/* Largest error factor between merged sources. */
+/* Design choices for merged streaks. FLATTEST: largest error factor of a position on a flat peak.
+ * MERGED_CENTROID: standard deviation along a streak, in PSF sigmas, from which the position is
+ * drawn from the filter output, whose peak is no parabola there. LEAST_NOISE, MOST_NOISE: limits of
+ * the output noise relative to white noise, for calibrations far from theory. Half or twice each
+ * changes the RMS of positions by less than 2 % and no Pd: calibrate-obsgen --check of scene 1 of
+ * tests/e2e/random_scenes.py --seed 2026 (crowded, streaks of 12 px). */
 static const double FLATTEST = 6.0;
-/* MERGED_CENTROID: standard deviation along a streak, in PSF sigmas, above which its position is
- * drawn from the filter output. LEAST_NOISE, MOST_NOISE: limits of the output noise relative to
- * white noise. */
-static const double MERGED_CENTROID = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6, UNLIFTED_SNR = 10.0;
-/* Light below this SNR does not matter at a maximum, and on its flank. */
+static const double MERGED_CENTROID = 0.2, LEAST_NOISE = 0.7, MOST_NOISE = 1.6;
+/* Calibrated factors of streak errors at this SNR have no selection by noise any more: at a
+ * threshold of 5, Pd is 1 - 3e-7. */
+static const double UNLIFTED_SNR = 10.0;
+/* LEAST_LIGHT: light of this SNR changes a Pd by at most 0.01 / sqrt(2 pi) = 0.004. LEAST_ON_FLANK:
+ * light on a maximum's flank of a tenth of the saddle's depth, 3 sigma, decides nothing. */
 static const double LEAST_LIGHT = 0.01, LEAST_ON_FLANK = 0.3;
+/* Light of other sources is looked for to this distance, besides their streaks: there the filter
+ * output of a point is exp(-6^2 / 4) = 1e-4 of its maximum. */
+static const double REACH_SIGMAS = 6.0;
+/* Half side of the stamp that images fit, as REACH_SIGMAS, LEAST_REACH_PX and FREE_OUTSIDE_PX of
+ * imgproc/measure/deblend.c. */
+static const double STAMP_SIGMAS = 3.6, LEAST_STAMP_PX = 3.0, FREE_OUTSIDE_PX = 1.5;
+/* A streak that exceeds the image of the detection by more than this is added in pieces: a shorter
+ * one has its light at one distance to 1 px. */
+static const double ONE_PIECE_PX = 2.0;
+/* Least part of a source that a joint fit determines. Separate sources are SAME_FWHM of
+ * imgproc/measure/deblend.c apart: their overlap is at most exp(-1 / 2), and 1 - exp(-1) = 0.63 is
+ * left. The limit is for streaks in line. */
+static const double LEAST_OWN = 0.1;
 /* A path shorter than this adds less than a tenth to the variance of the image, L^2 / 12 < sigma^2
  * / 10: a point's. */
 static const double SHORT_SIGMAS = 1.1;
@@ -108,7 +128,7 @@ void bst_generator_decide(bst_generator *g) {
     for (int i = 0; i < g->source_count; i++) {
         most = fmax(most, g->sources[i].broken ? 0.0 : g->sources[i].length);
     }
-    g->reach = 6.0 * g->total_sigma + most;
+    g->reach = REACH_SIGMAS * g->total_sigma + most;
     int ranks = 0;
     for (int i = 0; i < g->source_count; i++) {
         generator_source *s = &g->sources[i];
@@ -164,7 +184,7 @@ enum { MOST_MERGED = 64 };
  */
 static int add_merged(const bst_generator *g, const generator_source *s, const generator_source *o,
                       generator_source merged[MOST_MERGED], int count) {
-    int pieces = o->length < s->length + 2.0 ? 1 : (int)ceil(o->length / g->total_sigma);
+    int pieces = o->length < s->length + ONE_PIECE_PX ? 1 : (int)ceil(o->length / g->total_sigma);
     int room = MOST_MERGED - count;
     pieces = pieces < room ? pieces : room;
     for (int i = 0; i < pieces; i++) {
@@ -199,16 +219,20 @@ static void draw_streak_position(const bst_generator *g, const generator_source 
         return;
     }
     const bst_obsgen_calibration *cal = &g->calibration;
-    bst_crlb_table_at bound = bst_crlb_table_of(&g->bound, s->flux_e, g->noise_e, s->length);
+    /* of the image that the true path widens; output and noise fall off between its width and that
+     * of the filters */
+    bst_crlb_table_at bound = bst_crlb_table_wider(g->image_bound ? g->image_bound : &g->bound,
+                                                   s->flux_e, g->noise_e, s->length, g->widening);
+    const double sigma = g->cross_sigma;
     /* below UNLIFTED_SNR the factors already include the selection by noise, which is simulated
      * here */
     double snr = fmax(s->flux_e * bound.norm / g->noise_e, UNLIFTED_SNR);
     double along = bst_obsgen_between(bst_obsgen_snrs, cal->along_factor, BST_OBSGEN_SNRS, snr) *
                    sqrt(bound.var_along_px2 * out->widen);
-    if (along * out->flat < MERGED_CENTROID * g->total_sigma) {
+    if (along * out->flat < MERGED_CENTROID * sigma) {
         return;
     }
-    bst_streak_centroid_error_set(g->centroid_error, g->streak, g->total_sigma);
+    bst_streak_centroid_error_set(g->centroid_error, g->streak, sigma);
     if (g->centroid_error->steps == 0) {
         return;
     }
@@ -218,7 +242,7 @@ static void draw_streak_position(const bst_generator *g, const generator_source 
     /* standard deviation of the bound relative to the filters' peak without scatter */
     double noise = along * own * sqrt(g->centroid_error->curvature);
     noise = fmin(fmax(noise, LEAST_NOISE), MOST_NOISE);
-    double turned = across * own / (g->total_sigma * sqrt(2.0)) / noise;
+    double turned = across * own / (sigma * sqrt(2.0)) / noise;
     turned = fmin(fmax(turned, LEAST_NOISE), MOST_NOISE);
     double c = s->path.dx / s->length, n = s->path.dy / s->length;
     bst_streak_centroid_error_source sources[BST_WANDER_SOURCES] = {{0.0, 0.0, own}};
@@ -257,7 +281,8 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
     generator_blend out = {
         .flux_e = s->flux_e, .x = s->x, .y = s->y, .widen = 1.0, .flat = 1.0, .near = false};
     int count = 0;
-    double beside = 0.0, stamp = fmax(3.0, ceil(3.6 * g->fitted_sigma)) + 1.5;
+    double beside = 0.0,
+           stamp = fmax(LEAST_STAMP_PX, ceil(STAMP_SIGMAS * g->fitted_sigma)) + FREE_OUTSIDE_PX;
     for (int k = first_near(g, i, g->reach);
          k < g->source_count && g->sources[k].y <= s->y + g->reach; k++) {
         const generator_source *o = &g->sources[k];
@@ -271,7 +296,7 @@ generator_blend bst_generator_blend_of(const bst_generator *g, int i) {
             beside += o->amplitude * share;
             out.near = out.near || (fabs(dx) <= half_x && fabs(dy) <= half_y);
             /* both fluxes and positions are free, so their common part is undetermined */
-            out.widen *= 1.0 / fmax(1.0 - share * share, 0.1);
+            out.widen *= 1.0 / fmax(1.0 - share * share, LEAST_OWN);
         } else {
             count = add_merged(g, s, o, merged, count);
         }

@@ -8,9 +8,20 @@
 
 /* Random streams of false alarms, beyond those of sources, whose numbers have 33 bits. */
 static const uint64_t FALSE_ALARM = (uint64_t)1 << 40, HIT = (uint64_t)1 << 41;
-/* Image processing labels a source as an artefact if its brightest pixel exceeds the fitted peak by
- * HOT_SHARE and HOT_SIGMA. */
-static const double HOT_SHARE = 1.1, HOT_SIGMA = 2.5;
+/* Random numbers per false alarm and per cosmic ray. */
+enum { ALARM_DRAWS = 8, HIT_DRAWS = 16 };
+/* Bound of the loops: the largest configured mean is 1e4 a frame. */
+static const uint64_t MOST_ALARMS = 1000000;
+/* Image processing labels a pixel as charge if its neighbours lack so many standard deviations of
+ * the light that the PSF gives them, with this relative error of the PSF (BST_SHARP_DEVIATION and
+ * MODEL_SHARE of imgproc/measure/sharpness.c). */
+static const double SHARP_DEVIATION = 4.0, MODEL_SHARE = 0.09;
+/* A shorter track has the output of a point: sqrt(pi) s erf(l / 2s) / l = 1 - l^2 / (12 s^2). */
+static const double SHORT_TRACK_PX = 0.05;
+/* Length over width from which images measure a streak (imgproc/measure/source_moments.c). */
+static const double OWN_STREAK_LENGTH = 1.5;
+/* Half extent of a source that the frame's edge cuts, sigmas (imgproc/measure/locate.c). */
+static const double EDGE_SIGMAS = 2.0;
 
 bst_detection bst_false_alarms_point(const bst_generator *g, double x, double y, double snr,
                                      double length) {
@@ -34,8 +45,8 @@ bst_detection bst_false_alarms_point(const bst_generator *g, double x, double y,
     d.angle_rad = length > 0.0 ? atan(s / c) : 0.0;
     d.flags = length > 0.0 ? BST_DETECTION_STREAK : 0u;
     d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
-    double edge_x = 2.0 * g->sigma + 0.5 * length * fabs(c);
-    double edge_y = 2.0 * g->sigma + 0.5 * length * fabs(s);
+    double edge_x = EDGE_SIGMAS * g->sigma + 0.5 * length * fabs(c);
+    double edge_y = EDGE_SIGMAS * g->sigma + 0.5 * length * fabs(s);
     if (x < edge_x - 0.5 || y < edge_y - 0.5 || x > g->width - 0.5 - edge_x ||
         y > g->height - 0.5 - edge_y) {
         d.flags |= BST_DETECTION_EDGE;
@@ -63,7 +74,8 @@ static double offset_alarm_factor(const bst_generator *g) {
 bst_status bst_false_alarms_draw(bst_ctx *ctx, bst_generator *g) {
     assert(ctx && g);
     double expected = g->settings.false_alarms_per_frame * g->calibration.false_alarm_factor;
-    /* an overestimated background lowers the output */
+    /* an overestimated background lowers the output: the ratio of exp(-u^2 / 2) at both thresholds
+     */
     double taken = g->background_bias_e / (bst_crlb_table_norm(&g->bound, 0.0) * g->noise_e);
     expected *= exp(-taken * (g->threshold + 0.5 * taken));
     expected *= offset_alarm_factor(g);
@@ -76,8 +88,8 @@ bst_status bst_false_alarms_draw(bst_ctx *ctx, bst_generator *g) {
     }
     BST_TRY(bst_wing_alarms_draw(ctx, g));
     double arrival = 0.0;
-    for (uint64_t i = 0; i < 1000000; i++) {
-        uint64_t draw = FALSE_ALARM + 8 * i;
+    for (uint64_t i = 0; i < MOST_ALARMS; i++) {
+        uint64_t draw = FALSE_ALARM + ALARM_DRAWS * i;
         arrival -= log(bst_generator_uniform(g, draw));
         if (arrival > expected) {
             break;
@@ -102,6 +114,21 @@ bst_status bst_false_alarms_draw(bst_ctx *ctx, bst_generator *g) {
     return BST_OK;
 }
 
+/* Light that the eight neighbours of a pixel with charge lack, in standard deviations, as
+ * sigma_of_group of imgproc/measure/sharpness.c gives them for a Gaussian PSF: noise and shot noise
+ * of the pixel, of the neighbours that are expected to be lit, and error of the PSF.
+ *
+ * Given:     charge_e  charge of the pixel, electrons */
+static double deviation_of_charge(const bst_generator *g, double charge_e) {
+    /* light of a neighbour relative to the pixel's: along an axis, diagonal */
+    double side = exp(-0.5 / (g->filter_sigma * g->filter_sigma)), corner = side * side;
+    double square = 4.0 * (side * side + corner * corner);
+    double cube = 4.0 * (side * side * side + corner * corner * corner);
+    double noise2 = g->noise_e * g->noise_e, model = MODEL_SHARE * charge_e;
+    return charge_e / sqrt(noise2 + charge_e + noise2 / square +
+                           cube / (square * square) * charge_e + model * model);
+}
+
 void bst_false_alarms_cosmic_rays(bst_generator *g) {
     const bst_detector_cosmic_ray_config *h = &g->camera->detector.cosmic_rays;
     if (!(h->rate_per_cm2_s > 0.0)) {
@@ -114,8 +141,8 @@ void bst_false_alarms_cosmic_rays(bst_generator *g) {
     double kernel = 1.0 / (2.0 * BST_PI * g->total_sigma * g->total_sigma) /
                     bst_crlb_table_norm(&g->bound, 0.0) / g->noise_e;
     double arrival = 0.0;
-    for (uint64_t i = 0; i < 1000000; i++) {
-        uint64_t draw = HIT + 16 * i;
+    for (uint64_t i = 0; i < MOST_ALARMS; i++) {
+        uint64_t draw = HIT + HIT_DRAWS * i;
         arrival -= log(bst_generator_uniform(g, draw));
         if (arrival > expected) {
             return;
@@ -130,7 +157,8 @@ void bst_false_alarms_cosmic_rays(bst_generator *g) {
         double y = g->height * bst_generator_uniform(g, draw + 5) - 0.5 + 0.5 * length * sin(angle);
         /* output of a track at its middle, relative to a point */
         double s = g->total_sigma * sqrt(2.0);
-        double seen = length > 0.05 ? s * sqrt(BST_PI) * erf(0.5 * length / s) / length : 1.0;
+        double seen =
+            length > SHORT_TRACK_PX ? s * sqrt(BST_PI) * erf(0.5 * length / s) / length : 1.0;
         double snr = charge * kernel * fmin(seen, 1.0);
         double peak = snr + bst_rng_normal(g->key, (uint64_t)g->exposure_id, draw + 6);
         if (!(peak > g->filters[0].threshold) || x < -0.5 || y < -0.5 || x > g->width - 0.5 ||
@@ -140,13 +168,13 @@ void bst_false_alarms_cosmic_rays(bst_generator *g) {
         bst_obsgen_generated item = {
             .detection = bst_false_alarms_point(g, x, y, peak, 0.0), .item = -1, .hit = true};
         bst_detection *d = &item.detection;
-        double hottest = charge / fmax(length, 1.0) / g->noise_e;
-        bool stands_out = hottest > HOT_SHARE * peak + HOT_SIGMA;
-        if (stands_out &&
+        double sharp = deviation_of_charge(g, charge / fmax(length, 1.0)) +
+                       bst_rng_normal(g->key, (uint64_t)g->exposure_id, draw + 8);
+        if (sharp > SHARP_DEVIATION &&
             bst_generator_uniform(g, draw + 7) < g->calibration.cosmic_ray_flag_probability) {
             d->label = BST_LABEL_HIT;
         }
-        if (length > 1.5 * d->width_px / g->binning) {
+        if (length > OWN_STREAK_LENGTH * d->width_px / g->binning) {
             d->length_px = g->binning * length;
             d->angle_rad = atan(tan(angle));
             d->flags |= BST_DETECTION_STREAK;

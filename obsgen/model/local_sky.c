@@ -130,6 +130,7 @@ static int mesh_of(int at, int mesh, int count) {
 
 void bst_local_sky_add(bst_local_sky *sky, int x, int y, double height, double length_px) {
     int k = mesh_of(y, sky->mesh, sky->rows) * sky->columns + mesh_of(x, sky->mesh, sky->columns);
+    /* inside of the last interval of the table */
     double at = fmin(PER_SNR * height, BST_LOCAL_SKY_HEIGHTS - 1.001);
     int i = (int)at;
     float part = (float)(at - i), length = (float)length_px;

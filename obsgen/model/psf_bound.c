@@ -129,6 +129,7 @@ bst_status bst_psf_bound_init(bst_ctx *ctx, const bst_response_side *side, int b
                               double y_px, double sigma_px, bst_crlb_table *out) {
     bst_response_nodes nodes;
     bst_response_nodes_at(side, x_px, y_px, &nodes);
+    /* as in imgproc/detect/detect.c */
     out->sigma_px = fmax(sigma_px, 0.2);
     for (int n = 0; n < BST_BOUND_LENGTHS; n++) {
         double length = n == 0 ? 0.0 : ldexp(out->sigma_px, n - 1);

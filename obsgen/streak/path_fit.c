@@ -176,6 +176,7 @@ static bool improve(const planes *seen, const planes *model, int n, double light
     bst_cholesky_solve(a[0], PARAMETERS, PARAMETERS, g);
     f->x += fmin(fmax(g[0], -MOST_STEP_PX), MOST_STEP_PX);
     f->y += fmin(fmax(g[1], -MOST_STEP_PX), MOST_STEP_PX);
+    /* as in imgproc/measure/fit.c */
     f->flux = fmax(f->flux + g[2], 0.1 * f->flux);
     f->widening =
         fmin(fmax(f->widening + g[3], LEAST_WIDENING * variance), MOST_WIDENING * variance);

@@ -61,6 +61,7 @@ double bst_generator_streak_light(const bst_generator *g, double flux_e) {
 static double lead_of_star(const bst_generator *g, double flux_e) {
     double light = bst_generator_streak_light(g, flux_e);
     double at = log10(fmax(light, GENERATOR_FIRST_LIGHT) / GENERATOR_FIRST_LIGHT);
+    /* inside of the last interval of the table */
     at = fmin(at, GENERATOR_BIASES - 1.001);
     int i = (int)at;
     return g->point_lead[i] + (at - i) * (g->point_lead[i + 1] - g->point_lead[i]);

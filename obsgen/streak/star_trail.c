@@ -92,6 +92,7 @@ static piece piece_of(const bst_star_trail_path *p, int k, double s) {
                  .half = 0.5 * length / s,
                  .near = 6.0 * s + 0.5 * length,
                  .height = share};
+    /* a shorter step is a point: L^2 / 12 < 0.8 % of s^2 */
     if (length >= 0.3 * s) {
         out.cx = dx / (length * s);
         out.cy = dy / (length * s);
@@ -227,6 +228,7 @@ static void straight_bias(const bst_star_trail_path *p, double dx_px, double dy_
                           double bias_px[2]) {
     double length = hypot(dx_px, dy_px), along = 0.0, across = 0.0, value = 0.0;
     double c = length > 0.0 ? dx_px / length : 1.0, n = length > 0.0 ? dy_px / length : 0.0;
+    /* a shorter path is a point: L^2 / 12 < 0.8 % of s^2 */
     bool drawn = length > 0.3 * s;
     for (int k = 0; k < p->count; k++) {
         double weight = (k == 0 || k == p->count - 1 ? 0.5 : 1.0) / (p->count - 1);
@@ -255,12 +257,13 @@ static void straight_bias(const bst_star_trail_path *p, double dx_px, double dy_
 void bst_star_trail_point_bias(const bst_star_trail_path *p, const bst_blend_weights *weights,
                                double light, double sigma_px, double bias_px[2]) {
     enum { ROUNDS = 4 };
-    static const double ENOUGH_PX = 0.002, PER_SIGMA = 2.0;
+    /* convergence limit: a fifth of 0.01 px, the bias that matters (source_shape.c) */
+    static const double ENOUGH_PX = 0.002;
     float row[BST_BLEND_DISTANCES];
     bst_blend_weight_row(weights, light, row);
     float x[MOST_STEPS], y[MOST_STEPS], share[MOST_STEPS];
     int count = gather_steps(p, x, y, share);
-    float scale = (float)(PER_SIGMA / sigma_px);
+    float scale = (float)(BST_BLEND_PER_SIGMA / sigma_px);
     for (int round = 0; round < ROUNDS; round++) {
         float at_x = (float)bias_px[0], at_y = (float)bias_px[1];
         float sum = 0.0f, pull_x = 0.0f, pull_y = 0.0f;
@@ -321,6 +324,7 @@ void bst_star_trail_bias(const bst_star_trail_path *p, double dx_px, double dy_p
         double far = hypot(step[0], step[1]), share = far > s ? s / far : 1.0;
         bias_px[0] += share * step[0];
         bias_px[1] += share * step[1];
+        /* convergence limit: half of 0.01 px, the bias that matters (source_shape.c) */
         if (far < 0.005) {
             break;
         }

@@ -16,6 +16,7 @@ static double track_off[2]; /* px */
 static double confirm_s[2];
 static int alarms[2]; /* a frame */
 static int missed[2]; /* of the sources of a frame at SNR 6.5 */
+static bool dark;     /* sources are too faint for any figure */
 
 static bool is_generator(const bst_scenario *scenario) {
     const bst_observer_config *observers = scenario->observers.items;
@@ -52,13 +53,13 @@ bst_status __wrap_bst_watch_run(bst_ctx *ctx, const bst_scenario *scenario,
                                                .flags = BST_TRUTH_IN_FIELD};
             /* three do not count: too faint, hidden, out of the field; places count from SNR 5 on
              */
-            if (i >= SOURCES + 3) {
+            if (!dark && i >= SOURCES + 3) {
                 truth->items[i].snr = i == SOURCES + 3 ? 4.9 : 5.1;
                 found->items[found->count++] = (bst_detection){.x_px = x + 1.8 * place_off[g],
                                                                .y_px = y + 2.4 * place_off[g],
                                                                .cov_xx = 0.01,
                                                                .cov_yy = 0.01};
-            } else if (i == SOURCES) {
+            } else if (dark || i == SOURCES) {
                 truth->items[i].snr = 2.9;
             } else if (i > SOURCES) {
                 truth->items[i].flags =
@@ -174,9 +175,10 @@ static void equal_sides(void **state) {
     /* one more in one of 30 frames */
     expect(root, "false alarms per frame", 2 + 1.0 / 30, 2, true, 0.1);
     assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(root, "figures")), 6);
-    /* the extra alarm is in one run of six: the interval is that of how often it is drawn */
+    /* the extra alarm is in one run of six: the interval is that of how often it is drawn, and the
+     * variance of a mean of six has a divisor of five */
     const cJSON *item = figure(root, "false alarms per frame");
-    double sigma = 2.0 / (2 + 1.0 / 30) / (2 + 1.0 / 30) * sqrt(5.0 / 36 / 6) / 5;
+    double sigma = 2.0 / (2 + 1.0 / 30) / (2 + 1.0 / 30) * sqrt(5.0 / 36 / 5) / 5;
     bst_assert_close(number(item, "sigma"), sigma, 0.1 * sigma);
     bst_assert_close(number(item, "high"), 1.0, 1e-9);                /* not drawn at all: 33 % */
     bst_assert_close(number(item, "low"), 2 / (2 + 3.0 / 30), 0.005); /* drawn three times: 5 % */
@@ -209,10 +211,39 @@ static void each_side_that_differs(void **state) {
     }
 }
 
+/* Alarms of the generator where images have none are not equal, and neither is nothing at all. */
+static void one_side_alone_is_not_equivalent(void **state) {
+    (void)state;
+    bool equivalent;
+    set_sides(0.2, 0.5, 20, 1, 5);
+    alarms[0] = -1; /* no alarm in the first frame either */
+    cJSON *root = compare(&equivalent);
+    assert_false(equivalent);
+    const cJSON *alone = cJSON_GetObjectItem(root, "one_sided");
+    assert_int_equal(cJSON_GetArraySize(alone), 1);
+    const cJSON *item = cJSON_GetArrayItem(alone, 0);
+    assert_string_equal(cJSON_GetObjectItem(item, "name")->valuestring, "false alarms per frame");
+    bst_assert_close(number(item, "image"), 0.0, 0.0);
+    bst_assert_close(number(item, "generator"), 1.0, 1e-9);
+    cJSON_Delete(root);
+    set_sides(0.2, NAN, NAN, -1, SOURCES);
+    missed[0] = SOURCES;
+    track_off[0] = confirm_s[0] = NAN;
+    alarms[0] = -1;
+    dark = true;
+    root = compare(&equivalent);
+    dark = false;
+    assert_false(equivalent);
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(root, "figures")), 0);
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(root, "one_sided")), 0);
+    cJSON_Delete(root);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(equal_sides),
         cmocka_unit_test(each_side_that_differs),
+        cmocka_unit_test(one_side_alone_is_not_equivalent),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -64,6 +64,51 @@ static void hits_come_at_the_detectors_rate(void **state) {
     close_scene(&s);
 }
 
+/* Charge of at least 12 sigma in one pixel is detected and labelled by images at FWHM 1.5 px
+ * (tests/imgproc/calibrate_charge.c: 0.87 at 12, 0.99 at 15). */
+static void charge_is_labelled_by_its_sharpness(void **state) {
+    (void)state;
+    enum { FRAMES = 200 };
+    scene s;
+    open_scene(&s);
+    s.camera.psf_fwhm_px = 1.5;
+    s.frame.sigma_px = bst_camera_psf_sigma_px(&s.camera);
+    double noise = sqrt(s.truth->background_e + s.camera.read_noise_e * s.camera.read_noise_e);
+    /* so thin that a track stays in its pixel */
+    s.camera.detector.cosmic_rays = (bst_detector_cosmic_ray_config){
+        .rate_per_cm2_s = 5.0, .pixel_pitch_um = 13.0, .depth_um = 0.1, .e_per_um = 120.0 * noise};
+    start(&s);
+    double seen = 0.0, labelled = 0.0;
+    for (int f = 0; f < FRAMES; f++) {
+        bst_generator_result r = run(&s, f);
+        for (int i = 0; i < r.count; i++) {
+            seen += r.items[i].hit;
+            labelled += r.items[i].hit && r.items[i].detection.label == BST_LABEL_HIT;
+        }
+    }
+    assert_true(seen > 100.0);
+    /* mean over the slants, whose charges are 12 sigma and more: 0.95; four standard deviations */
+    bst_assert_close(labelled / seen, 0.95, 4.0 * sqrt(0.05 / seen) + 0.02);
+    close_scene(&s);
+}
+
+/* Images detect nothing where the sky alone fills the converter. */
+static void a_full_sky_hides_everything(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.settings.false_alarms_per_frame = 5.0;
+    s.truth->background_e = 65535.0 * s.camera.gain_e_per_dn + 1.0;
+    start(&s);
+    add_source(&s, 1, 512.0, 512.0, electrons_of(&s, 100.0));
+    assert_int_equal(run(&s, 0).count, 0);
+    s.camera.bits = 18; /* room above the sky, up to the full well */
+    s.camera.full_well_e = 2e5;
+    start(&s);
+    assert_true(run(&s, 1).count > 1);
+    close_scene(&s);
+}
+
 /* Light of a bright star's wings lifts noise above the threshold where no higher maximum is near.
  */
 static void wings_make_alarms(void **state) {
@@ -193,6 +238,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(false_alarms_are_poisson_with_a_gaussian_tail),
         cmocka_unit_test(hits_come_at_the_detectors_rate),
+        cmocka_unit_test(charge_is_labelled_by_its_sharpness),
+        cmocka_unit_test(a_full_sky_hides_everything),
         cmocka_unit_test(wings_make_alarms),
         cmocka_unit_test(crowded_frames_are_looked_at_twice),
         cmocka_unit_test(hits_on_a_binned_window),

@@ -13,6 +13,7 @@ bool bst_mtt_cue_acceleration(const bst_mtt_frame *frame, double dt_s, bst_vec3 
                                                            frame->cue_before_rate_radps)};
     bst_sky_predict(&cue, dt_s, 0.0);
     bst_vec3 now = frame->cue_direction;
+    /* a jump of more than 26 degrees is another cue, not an acceleration */
     if (!(bst_vec3_dot(cue.direction, now) > 0.9)) {
         return false;
     }
@@ -32,5 +33,7 @@ bool bst_mtt_shares_acceleration(const bst_mtt *m, const bst_mtt_track *track,
     return !track->at_rest &&
            bst_vec3_dot(track->state.direction, frame->cue_direction) >
                cos(m->params.feed_forward_rad) &&
+           /* design choice: what moves ten times slower than the cue is a star or a defect, not the
+            * target */
            bst_vec3_norm(track->state.rate_radps) > 0.1 * bst_vec3_norm(frame->cue_rate_radps);
 }

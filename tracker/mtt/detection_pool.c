@@ -119,5 +119,6 @@ double bst_mtt_brightness_cost(const bst_mtt_track *track, const bst_mtt_detecti
         track->v_mag_variance + 0.09 + detection->v_mag_sigma * detection->v_mag_sigma;
     double difference = track->v_mag - detection->v_mag;
     double chi2 = difference * difference / variance;
+    /* 3 sigma at most: glints are no reason to lose a track */
     return isfinite(chi2) ? 0.5 * fmin(chi2, 9.0) : 0.0;
 }

@@ -129,6 +129,7 @@ static bool is_duplicate(const bst_mtt *mtt, const bst_mtt_track *a, const bst_m
                       b->state.covariance[2][2] + b->state.covariance[3][3];
     return a->merged_in_row >= SAME_FRAMES && b->merged_in_row >= SAME_FRAMES &&
            bst_vec3_norm(apart) < mtt->params.merge_floor_rad &&
+           /* equal rates to 3 sigma */
            bst_vec3_dot(rate, rate) < 9.0 * variance;
 }
 

@@ -235,6 +235,8 @@ static double quadratic_inverse(double p[4][4], const double x[4]) {
 
 double bst_sky_distance2(const bst_sky_state *a, const bst_sky_state *b) {
     assert(a && b);
+    /* beyond 11 degrees the tangent planes differ too much for one covariance; tracks are
+     * arcseconds apart */
     if (!(bst_vec3_dot(a->direction, b->direction) > 0.98)) {
         return INFINITY;
     }

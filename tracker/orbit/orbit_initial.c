@@ -116,6 +116,7 @@ bst_status bst_od_gooding(bst_ctx *ctx, const bst_od_observation o[3], bst_lambe
         if (!good || !isfinite(longest)) {
             break;
         }
+        /* unknowns are logarithms of ranges: a step changes a range by 35 % at most */
         double scale = fmin(1.0, 0.3 / longest), before = hypot(f[0], f[1]);
         bool better = false;
         for (int half = 0; half < 8 && !better; half++, scale *= 0.5) {

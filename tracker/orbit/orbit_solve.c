@@ -127,6 +127,8 @@ static bst_status fit_candidates(bst_ctx *ctx, const bst_od_observation *items, 
 
 /* True if two solutions of a part are the same minimum. */
 static bool is_same(const bst_od_solution *a, const bst_od_solution *b) {
+    /* minima of one part differ by more than 2 % in range or velocity; the iteration converges far
+     * closer */
     return fabs(log(a->range_m / b->range_m)) < 0.02 &&
            bst_vec3_norm(bst_vec3_sub(a->state.velocity_mps, b->state.velocity_mps)) <
                0.02 * bst_vec3_norm(a->state.velocity_mps);
