@@ -8,6 +8,9 @@
 #include "sim/onboard/nav_motion.h"
 #include "tracker/attitude/sky_of_detection.h"
 
+/* Error of the telemetry above which it is kept beside the filter, rad: 5.7 deg. */
+static const double LARGE_ERROR_RAD = 0.1;
+
 /* Least SNR of a detection used by the tracker, share of the detector's threshold: 2.5 at a
  * threshold of 5. */
 static const double LEAST_SNR_SHARE = 0.5;
@@ -123,6 +126,7 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
     t->tick_rate_hz = (double)tick_rate_hz;
     t->star = star;
     t->star_user = star_user;
+    t->reference = BST_QUAT_IDENTITY;
     bst_mtt_params mtt;
     make_params(t, config, &mtt);
     t->cache = bst_pages_zero(STAR_CACHE, sizeof *t->cache);
@@ -157,6 +161,8 @@ void bst_tracker_free(bst_tracker *t) {
 /* `cache` is left out: its directions depend on the catalogue alone. */
 bst_status bst_tracker_archive(bst_tracker *t, bst_archive *archive) {
     BST_ARCHIVE(archive, t->error);
+    bst_archive_bool(archive, &t->referred);
+    BST_ARCHIVE(archive, t->reference);
     bst_attitude_shared_archive(&t->shared, archive);
     BST_ARCHIVE(archive, t->target);
     BST_ARCHIVE(archive, t->cue_before);
@@ -234,6 +240,27 @@ static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_lig
     return count;
 }
 
+/* Telemetry with the large error removed that stars have shown. */
+static bst_quat refer(const bst_tracker *t, bst_quat q_telemetry) {
+    return t->referred ? bst_quat_unit(bst_quat_mul(q_telemetry, t->reference)) : q_telemetry;
+}
+
+/* Moves a large error from the filter to the reference: the filter is one of small angles.
+ *
+ * Given:     q_stars, covariance  the fix that the filter started with */
+static void rebase(bst_tracker *t, bst_quat q_telemetry, bst_quat q_stars,
+                   const double covariance[3][3]) {
+    const double *e = t->error.e;
+    if (bst_vec3_norm((bst_vec3){e[0], e[1], e[2]}) <= LARGE_ERROR_RAD) {
+        return;
+    }
+    t->referred = true;
+    t->reference = bst_quat_unit(bst_quat_mul(bst_quat_conj(q_telemetry), q_stars));
+    t->error = (bst_attitude_error){.started = false};
+    bst_attitude_error_update(&t->error, &t->error_params, refer(t, q_telemetry),
+                              (bst_vec3){0.0, 0.0, 0.0}, covariance);
+}
+
 /* Determines the frame's attitude: from stars, else predicted by the telemetry error filter. */
 static void find_attitude(bst_tracker *t, const bst_tracker_input *input, const bst_light *light,
                           int64_t tick, double dt_s, frame_attitude *out) {
@@ -254,21 +281,33 @@ static void find_attitude(bst_tracker *t, const bst_tracker_input *input, const 
         /* Stars that contradict the telemetry's history come from a camera that turned unevenly
          * during the exposure. Their attitude is not the mid-exposure one and must not be used for
          * pointing. */
-        out->usable = bst_attitude_error_update(&t->error, &t->error_params, q_telemetry,
-                                                out->fix.error_cam_rad, solution.covariance);
+        bst_quat q_known = refer(t, q_telemetry);
+        bst_vec3 e = t->referred ? bst_quat_to_rotvec(bst_quat_mul(solution.q_cam_from_gcrf,
+                                                                   bst_quat_conj(q_known)))
+                                 : out->fix.error_cam_rad;
+        out->usable = bst_attitude_error_update(&t->error, &t->error_params, q_known, e,
+                                                solution.covariance);
+        if (out->usable) {
+            rebase(t, q_telemetry, solution.q_cam_from_gcrf, solution.covariance);
+        }
         out->fix.valid = out->usable;
         if (out->usable) {
             bst_attitude_shared_update(&t->shared, &solution, t->stars, star_count);
         }
     } else {
         bst_vec3 rate;
-        bst_attitude_error_get(&t->error, &t->error_params, q_telemetry, &out->fix.error_cam_rad,
-                               &rate, out->covariance_cam);
+        bst_quat q_known = refer(t, q_telemetry);
+        bst_attitude_error_get(&t->error, &t->error_params, q_known, &out->fix.error_cam_rad, &rate,
+                               out->covariance_cam);
         out->rate_sigma_radps =
             sqrt(fmax(fmax(t->error.p[3][3], t->error.p[4][4]), t->error.p[5][5]));
         out->usable = true;
         out->q_cam_from_gcrf =
-            bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(out->fix.error_cam_rad), q_telemetry));
+            bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(out->fix.error_cam_rad), q_known));
+        if (t->referred) {
+            out->fix.error_cam_rad =
+                bst_quat_to_rotvec(bst_quat_mul(out->q_cam_from_gcrf, bst_quat_conj(q_telemetry)));
+        }
     }
     out->fix.q_cam_from_gcrf = out->q_cam_from_gcrf;
     out->fix.shared = bst_attitude_shared_get(&t->shared);
@@ -456,10 +495,11 @@ static void write_predictions(const bst_tracker *t, int64_t tick, bst_quat q_cam
     double p[3][3];
     const bst_mtt_track *all = bst_mtt_tracks(t->mtt, &count);
     *out = (bst_predictions){.tick = tick};
-    bst_attitude_error_get(&t->error, &t->error_params, q_cam_from_gcrf,
+    bst_attitude_error_get(&t->error, &t->error_params, refer(t, q_cam_from_gcrf),
                            &out->attitude_error_cam_rad, &out->attitude_error_rate_cam_radps, p);
+    /* a correction in camera axes is one of small angles; the camera turns before its use */
     out->attitude_valid =
-        t->error.started && sqrt(fmax(p[0][0], p[1][1])) <= 10.0 * t->max_attitude_sigma_rad;
+        !t->referred && t->error.started && sqrt(fmax(p[0][0], p[1][1])) <= 10.0 * t->max_attitude_sigma_rad;
     for (int r = 0; r < 2; r++) { /* tentative tracks are omitted */
         for (int i = 0; i < count; i++) {
             if (output_rank(&all[i], t->target.id) != r) {

@@ -41,7 +41,10 @@ struct bst_tracker {
     bst_tracker_event *events;
     size_t event_capacity;
     int event_count;
+    /* of the telemetry after `reference`: q_true = q_telemetry * reference * error */
     bst_attitude_error error;
+    bst_quat reference; /* a large error of the telemetry, from stars */
+    bool referred;      /* `reference` is not the identity */
     bst_attitude_shared shared;
     bst_target target;
     bst_tracker_cue cue_before;
