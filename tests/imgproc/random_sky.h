@@ -15,6 +15,8 @@ typedef struct bst_random_sky_options {
     int false_detections;
     bool mirrored;       /* x reversed */
     bool scrambled;      /* places drawn anew: no star is where it should be */
+    bool even;           /* all detections of one brightness */
+    const bst_quat *q_cam_from_gcrf; /* NULL: random */
 } bst_random_sky_options;
 
 enum { BST_RANDOM_SKY_ROOM = 4096 };
