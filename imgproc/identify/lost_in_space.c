@@ -9,7 +9,7 @@
 #include "imgproc/measure/heapsort.h"
 #include "sim/core/arena.h"
 
-enum { MOST_PREDICTED = 512, MOST_CANDIDATES = 64, PASSES = 3 };
+enum { MOST_PREDICTED = 512, MOST_CANDIDATES = 64, PASSES = 5 };
 
 /* Centroid error beyond a detection's own covariance (catalogue, distortion), px. */
 static const double SYSTEMATIC_PX = 0.1;
@@ -23,6 +23,8 @@ static const double FIRST_PX = 2.0, MOST_FIRST_PX = 8.0, LAST_PX = 1.0, LAST_SIG
 /* Chance of a first match above which a candidate is dropped at once. */
 static const double FIRST_LOG_CHANCE = -4.6; /* 1 % */
 static const double BRIGHTEST_V = -2.0;
+/* Least share of the predicted stars that a right attitude matches over the whole field. */
+static const double LEAST_SHARE = 0.35;
 /* Error of a quad's own scale. */
 static const double SCALE_MARGIN = 3e-3;
 
@@ -255,10 +257,13 @@ static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4]
         if (!bst_star_fit_refine(a->s->camera, a->s->matched, matched, &fit)) {
             return BST_OK;
         }
-        tolerance = fmax(LAST_PX, LAST_SIGMAS * bst_star_fit_sigma_px(a->s->matched, matched));
+        /* the stars near the quad are matched first, and carry the fit on to the others */
+        double last = fmax(LAST_PX, LAST_SIGMAS * bst_star_fit_sigma_px(a->s->matched, matched));
+        tolerance = pass + 2 < PASSES ? fmax(last, 0.5 * tolerance) : last;
     }
     double chance = log_chance(a, predicted, matched, sources, tolerance);
-    if (chance > log(a->options->false_rate / out->candidates) ||
+    if (matched < LEAST_SHARE * predicted ||
+        chance > log(a->options->false_rate / out->candidates) ||
         fabs(fit.scale - 1.0) > limit + SCALE_MARGIN) {
         return BST_OK;
     }
