@@ -30,9 +30,10 @@ const bst_config_desc bst_control_config_table[] = {
     BST_REAL(C, scan_rate_arcsec_per_s, "arcsec/s", -36000, 36000, "60",
              "strategy scan: rate along the middle of the cue's region, from its first end to the "
              "second and back; negative: from the second end on."),
-    BST_ENUM(C, attitude, attitudes, "\"telemetry\"",
-             "Attitude at the start. unknown: nothing is commanded (mode lost) until the tracker has "
-             "an attitude from stars; with imgproc/attitude unknown."),
+    BST_ENUM(
+        C, attitude, attitudes, "\"telemetry\"",
+        "Attitude at the start. unknown: nothing is commanded (mode lost) until the tracker has "
+        "an attitude from stars; with imgproc/attitude unknown."),
     BST_INT(C, lost_after_frames, "frames", 0, 1000000, "0",
             "After so many frames in a row without an attitude from stars, with the servo settled, "
             "nothing is commanded until there is one again; 0: never."),

@@ -161,8 +161,8 @@ typedef struct bst_control {
     bst_image_loop image_loop;   /* sets pointing_error, unless the compensator is the observer */
     bst_model_error model_error; /* of the observer */
     int mode;
-    int64_t mode_tick; /* start of the mode */
-    bool attitude_found;              /* from stars, since the start or the latest loss */
+    int64_t mode_tick;               /* start of the mode */
+    bool attitude_found;             /* from stars, since the start or the latest loss */
     int64_t frames_without_attitude; /* at rest, in a row */
     bst_control_transition transitions[BST_CONTROL_TRANSITIONS];
     int transition_count;

@@ -6,8 +6,8 @@
 #include "imgproc/detect/plugin_detector.h"
 #include "imgproc/detect/region_of_interest.h"
 #include "imgproc/extended/extended_step.h"
-#include "imgproc/identify/predicted_stars.h"
 #include "imgproc/identify/lost_in_space.h"
+#include "imgproc/identify/predicted_stars.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/measure/discriminate.h"
 #include "imgproc/wing_labels.h"
@@ -100,7 +100,6 @@ bool bst_imgproc_lost_attitude(const bst_imgproc_lost *lost, bst_quat q_telemetr
  * Errors:    those of the star catalogue; BST_ERR_MEMORY */
 bst_status bst_imgproc_lost_identify(bst_imgproc_state *m, struct bst_step *step,
                                      const bst_imgproc_lane *l, const bst_imgproc_exposure *e,
-                                     bst_detections *out,
-                                     bst_quat *q_cam_from_gcrf) BST_MUST_CHECK;
+                                     bst_detections *out, bst_quat *q_cam_from_gcrf) BST_MUST_CHECK;
 
 #endif

@@ -41,8 +41,8 @@ struct bst_lost_in_space {
     double julian_year, depth_v_mag;
     int max_detections;
     bst_arena arena;
-    int *order;                  /* [max_detections] indices of detections, brightest first */
-    source *sources;             /* [max_detections] in that order */
+    int *order;      /* [max_detections] indices of detections, brightest first */
+    source *sources; /* [max_detections] in that order */
     int count;
     double *nearest2;            /* [max_detections] distance^2 of the star matched to a source */
     int *star_of;                /* [max_detections] predicted star; -1: none */
@@ -139,8 +139,8 @@ typedef struct attempt {
 static bst_status predict(const attempt *a, const bst_star_fit *fit, int *count) {
     bst_lost_in_space *s = a->s;
     const bst_window w = a->frame->window;
-    bst_vec3 centre = bst_camera_unproject(s->camera, w.x0 + 0.5 * (w.width - 1),
-                                           w.y0 + 0.5 * (w.height - 1));
+    bst_vec3 centre =
+        bst_camera_unproject(s->camera, w.x0 + 0.5 * (w.width - 1), w.y0 + 0.5 * (w.height - 1));
     double radius = 0.0;
     for (int i = 0; i < 4; i++) {
         bst_vec3 corner = bst_camera_unproject(s->camera, i % 2 ? w.x0 - 0.5 : w.x0 + w.width - 0.5,
@@ -163,9 +163,8 @@ static bst_status predict(const attempt *a, const bst_star_fit *fit, int *count)
     for (int i = 0; i < total && i < MOST_PREDICTED; i++) {
         bst_star_fit_pair *e = &s->expected[*count];
         e->gcrf = bst_light_apparent_star(a->frame->light, s->found[i].icrs);
-        if (bst_star_fit_project(fit, s->camera, e->gcrf, &e->x_px, &e->y_px) &&
-            e->x_px >= w.x0 && e->x_px <= w.x0 + w.width - 1 && e->y_px >= w.y0 &&
-            e->y_px <= w.y0 + w.height - 1) {
+        if (bst_star_fit_project(fit, s->camera, e->gcrf, &e->x_px, &e->y_px) && e->x_px >= w.x0 &&
+            e->x_px <= w.x0 + w.width - 1 && e->y_px >= w.y0 && e->y_px <= w.y0 + w.height - 1) {
             ++*count;
         }
     }

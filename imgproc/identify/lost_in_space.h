@@ -46,8 +46,8 @@ typedef struct bst_lost_in_space_result {
     bst_quat q_cam_from_gcrf;
     double scale; /* true pixel scale over the camera's */
     int predicted, matched;
-    double rms_px;         /* residual per axis of the matched stars */
-    double log_chance;     /* natural logarithm of the chance of such a match under the null model */
+    double rms_px;     /* residual per axis of the matched stars */
+    double log_chance; /* natural logarithm of the chance of such a match under the null model */
     int quads, candidates; /* tried; patterns that agreed with one */
 } bst_lost_in_space_result;
 

@@ -10,10 +10,10 @@
 /* Bands of declination, each divided into cells of right ascension. Zero-initialise. */
 typedef struct bst_sky_cells {
     int bands;
-    int *band_first;     /* [bands + 1] first cell of each band */
-    int32_t *head;       /* [cells] latest star of each cell; -1: none */
-    int32_t *next;       /* [room] star before it in the same cell */
-    float (*place)[3];   /* [room] unit vectors */
+    int *band_first;   /* [bands + 1] first cell of each band */
+    int32_t *head;     /* [cells] latest star of each cell; -1: none */
+    int32_t *next;     /* [room] star before it in the same cell */
+    float (*place)[3]; /* [room] unit vectors */
     int count, room;
 } bst_sky_cells;
 
@@ -26,8 +26,8 @@ void bst_sky_cells_close(bst_sky_cells *sky);
 /* Adds a star (unit vector); its index is the number of stars before it. */
 void bst_sky_cells_add(bst_sky_cells *sky, bst_vec3 v);
 
-/* Renumbers the stars in order of their cells, so that neighbours are close in memory; no star can be
- * added afterwards. BST_ERR_MEMORY. */
+/* Renumbers the stars in order of their cells, so that neighbours are close in memory; no star can
+ * be added afterwards. BST_ERR_MEMORY. */
 bst_status bst_sky_cells_sort(bst_ctx *ctx, bst_sky_cells *sky) BST_MUST_CHECK;
 
 /* Finds the stars within radius_rad of a direction.

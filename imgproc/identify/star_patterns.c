@@ -21,8 +21,8 @@ static const double LEAST_SEPARATION = 0.01, NEAR_NEIGHBOURS = 0.5, FAR_NEIGHBOU
 /* Catalogue stars per field that suffice, on average over the sky: four times those kept, because
  * the galactic poles have a third of the mean density. */
 static const double WANTED_PER_FIELD = 48.0;
-/* Patterns that the number of neighbours is chosen for: 16 bytes each. Three of five quads of a star
- * are another star's too. */
+/* Patterns that the number of neighbours is chosen for: 16 bytes each. Three of five quads of a
+ * star are another star's too. */
 static const double WANTED_PATTERNS = 1e7, OWN_SHARE = 0.4;
 static const double FAINTEST_V = 20.0, BRIGHTEST_V = 2.0, V_STEP = 0.5;
 /* Ranges of the code's numbers: |C| and |C - 1| are at most 1. */
@@ -38,8 +38,8 @@ typedef struct pattern {
 
 struct bst_star_patterns {
     int count, neighbours; /* neighbours of a star outside crowded places */
-    float (*place)[3]; /* [count] unit vectors */
-    uint32_t *near;    /* [count][MOST_NEIGHBOURS], nearest first; UINT32_MAX: none */
+    float (*place)[3];     /* [count] unit vectors */
+    uint32_t *near;        /* [count][MOST_NEIGHBOURS], nearest first; UINT32_MAX: none */
     int re_cells, im_cells;
     int64_t cells, pattern_count;
     uint32_t *first;   /* [cells + 1] first pattern of each cell */
@@ -423,9 +423,10 @@ static bool agrees(const pattern *e, const window *w) {
 int bst_star_patterns_find(const bst_star_patterns *p, const bst_star_quad *quad, double tolerance,
                            double scale_tolerance, bst_star_patterns_match *out, int capacity) {
     int low[4], high[4], found = 0;
-    window w = {.code_within = (int)ceil(tolerance * 0.5 * 65535.0),
-                .log_size = size_word(quad->size_rad),
-                .size_within = (int)ceil((tolerance - log1p(-scale_tolerance)) / LOG_SIZE_RANGE * 65535.0)};
+    window w = {
+        .code_within = (int)ceil(tolerance * 0.5 * 65535.0),
+        .log_size = size_word(quad->size_rad),
+        .size_within = (int)ceil((tolerance - log1p(-scale_tolerance)) / LOG_SIZE_RANGE * 65535.0)};
     for (int i = 0; i < 4; i++) {
         low[i] = cell_of(p, i, quad->code[i] - tolerance);
         high[i] = cell_of(p, i, quad->code[i] + tolerance);

@@ -22,8 +22,8 @@ typedef struct bst_star_quad {
  * Reference: Lang et al. 2010, AJ 139, 1782 (section 2.2) */
 bool bst_star_quad_make(const bst_vec3 v[4], bst_star_quad *out);
 
-/* Alternative forms of a code that lies within a tolerance of its ordering rules: A and B exchanged,
- * C and D exchanged.
+/* Alternative forms of a code that lies within a tolerance of its ordering rules: A and B
+ * exchanged, C and D exchanged.
  *
  * Returned:  out  up to three alternatives
  *            the number of them */

@@ -35,8 +35,8 @@ static void read_arguments(int argc, char **argv, arguments *a) {
         struct {
             const char *name;
             double *value;
-        } all[] = {{"fields=", &a->fields}, {"scale=", &a->scale},   {"missing=", &a->missing},
-                   {"false=", &a->faults},  {"streak=", &a->streak}, {"field=", &a->field},
+        } all[] = {{"fields=", &a->fields}, {"scale=", &a->scale},     {"missing=", &a->missing},
+                   {"false=", &a->faults},  {"streak=", &a->streak},   {"field=", &a->field},
                    {"lost=", &a->lost},     {"rate=", &a->false_rate}, {"least=", &a->least}};
         bool taken = false;
         for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
@@ -95,9 +95,11 @@ static void try_field(const arguments *a, int f, uint64_t i, const bst_stars *st
         bst_quat_to_rotvec(bst_quat_mul(r.q_cam_from_gcrf, bst_quat_conj(sky.q_cam_from_gcrf)));
     bool right = hypot(e.x, e.y) < 5.0 * bst_camera_scale_rad(&sky.camera);
     if (r.solved && !right) {
-        printf("# field %d: wrong by %.1f px, roll %.3g rad, scale %.5f, true %.5f, %d of %d stars, e^%.1f\n", (int)i,
-               hypot(e.x, e.y) / bst_camera_scale_rad(&sky.camera), e.z, r.scale,
-               1.0 + so.scale_error, r.matched, r.predicted, r.log_chance);
+        printf(
+            "# field %d: wrong by %.1f px, roll %.3g rad, scale %.5f, true %.5f, %d of %d stars, "
+            "e^%.1f\n",
+            (int)i, hypot(e.x, e.y) / bst_camera_scale_rad(&sky.camera), e.z, r.scale,
+            1.0 + so.scale_error, r.matched, r.predicted, r.log_chance);
     }
     n->solved += r.solved && right;
     n->wrong += r.solved && !right;
@@ -128,7 +130,8 @@ static void run_size(const arguments *a, int f, const bst_stars *stars, const bs
     if (strcmp(a->kind, "sky") == 0 && sides_deg[f] >= 1.0) {
         assert_true(share >= a->least);
     }
-    assert_true(n.wrong <= 10.0 * a->false_rate * fmax(n.tried, 1) + 4.0 * sqrt(a->false_rate * n.tried));
+    assert_true(n.wrong <=
+                10.0 * a->false_rate * fmax(n.tried, 1) + 4.0 * sqrt(a->false_rate * n.tried));
     free(n.ms);
     bst_star_patterns_free(patterns);
 }
@@ -141,8 +144,9 @@ int main(int argc, char **argv) {
     bst_assert_ok(&ctx, bst_stars_open(&ctx, a.catalogue, &stars));
     const bst_star_errors_config errors = {.missing_fraction = a.missing, .seed = 7};
     bst_assert_ok(&ctx, bst_stars_with_errors(&ctx, stars, &errors, &onboard));
-    printf("field_deg v_limit tried solved wrong median_ms worst_ms candidates build_s MB patterns "
-           "stars\n");
+    printf(
+        "field_deg v_limit tried solved wrong median_ms worst_ms candidates build_s MB patterns "
+        "stars\n");
     for (int f = 0; f < 6; f++) {
         if (!(a.field > 0.0) || sides_deg[f] == a.field) {
             run_size(&a, f, stars, onboard);

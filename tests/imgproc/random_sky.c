@@ -33,17 +33,16 @@ static void append(const bst_random_sky_options *o, bst_rng_key key, uint64_t in
     if (x < 0.0 || y < 0.0 || x > 1023.0 || y > 1023.0) {
         return;
     }
-    out->items[out->count++] =
-        (bst_detection){.x_px = o->mirrored ? 1023.0 - x : x,
-                        .y_px = y,
-                        .cov_xx = c * c * along * along + s * s * sigma * sigma,
-                        .cov_xy = (o->mirrored ? -1.0 : 1.0) * c * s *
-                                  (along * along - sigma * sigma),
-                        .cov_yy = s * s * along * along + c * c * sigma * sigma,
-                        .flux_e = o->even ? 1000.0 : 100.0 * snr,
-                        .flux_sigma_e = 100.0,
-                        .snr = snr,
-                        .label = BST_LABEL_UNKNOWN};
+    out->items[out->count++] = (bst_detection){
+        .x_px = o->mirrored ? 1023.0 - x : x,
+        .y_px = y,
+        .cov_xx = c * c * along * along + s * s * sigma * sigma,
+        .cov_xy = (o->mirrored ? -1.0 : 1.0) * c * s * (along * along - sigma * sigma),
+        .cov_yy = s * s * along * along + c * c * sigma * sigma,
+        .flux_e = o->even ? 1000.0 : 100.0 * snr,
+        .flux_sigma_e = 100.0,
+        .snr = snr,
+        .label = BST_LABEL_UNKNOWN};
 }
 
 /* Reads the stars of the field down to a magnitude; the caller frees them. */
@@ -72,8 +71,7 @@ void bst_random_sky_draw(const bst_random_sky_options *o, const bst_stars *sky,
     bst_camera true_camera = out->camera;
     true_camera.pixel_scale_arcsec *= 1.0 + o->scale_error;
     out->light = (bst_light){{21000.0, -18000.0, 9000.0}, {1e11, 1.1e11, 0.2e11}};
-    out->q_cam_from_gcrf =
-        o->q_cam_from_gcrf ? *o->q_cam_from_gcrf : random_attitude(key, index);
+    out->q_cam_from_gcrf = o->q_cam_from_gcrf ? *o->q_cam_from_gcrf : random_attitude(key, index);
     bst_vec3 axis = bst_quat_rotate(bst_quat_conj(out->q_cam_from_gcrf), (bst_vec3){0, 0, 1});
     double radius = 1.1 * bst_camera_half_diagonal_rad(&true_camera) + 2e-4;
     bst_star *stars = stars_of(sky, axis, radius, o->v_limit + 0.5, &count);

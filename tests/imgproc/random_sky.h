@@ -7,15 +7,15 @@
 #include "imgproc/identify/lost_in_space.h"
 
 typedef struct bst_random_sky_options {
-    double field_deg;    /* side of a square field of 1024 px */
-    double v_limit;      /* magnitude of SNR 8 */
-    double streak_px;    /* length of the stars' streaks, 0: points; widens centroids along them */
-    double scale_error;  /* true scale over the camera's less 1 */
-    double lost_share;   /* stars that are not detected */
+    double field_deg;   /* side of a square field of 1024 px */
+    double v_limit;     /* magnitude of SNR 8 */
+    double streak_px;   /* length of the stars' streaks, 0: points; widens centroids along them */
+    double scale_error; /* true scale over the camera's less 1 */
+    double lost_share;  /* stars that are not detected */
     int false_detections;
-    bool mirrored;       /* x reversed */
-    bool scrambled;      /* places drawn anew: no star is where it should be */
-    bool even;           /* all detections of one brightness */
+    bool mirrored;                   /* x reversed */
+    bool scrambled;                  /* places drawn anew: no star is where it should be */
+    bool even;                       /* all detections of one brightness */
     const bst_quat *q_cam_from_gcrf; /* NULL: random */
 } bst_random_sky_options;
 

@@ -22,8 +22,7 @@ static int setup(void **state) {
     const bst_star_errors_config errors = {.missing_fraction = 0.4, .seed = 7};
     bst_assert_ok(&s->ctx, bst_stars_with_errors(&s->ctx, s->sky, &errors, &s->onboard));
     const bst_star_patterns_options options = {FIELD_DEG * BST_DEG_RAD, V_LIMIT, YEAR};
-    bst_assert_ok(&s->ctx,
-                  bst_star_patterns_create(&s->ctx, s->onboard, &options, &s->patterns));
+    bst_assert_ok(&s->ctx, bst_star_patterns_create(&s->ctx, s->onboard, &options, &s->patterns));
     *state = s;
     return 0;
 }
@@ -178,10 +177,9 @@ static void null_model(void **state) {
 
 static bst_vec3 on_sphere(uint64_t i) {
     double z = 2.0 * uniform(i, 0) - 1.0;
-    return bst_vec3_unit(
-        bst_vec3_add(bst_vec3_scale(bst_vec3_from_radec(2 * BST_PI * uniform(i, 1), 0.0),
-                                    sqrt(1.0 - z * z)),
-                     (bst_vec3){0, 0, z}));
+    return bst_vec3_unit(bst_vec3_add(
+        bst_vec3_scale(bst_vec3_from_radec(2 * BST_PI * uniform(i, 1), 0.0), sqrt(1.0 - z * z)),
+        (bst_vec3){0, 0, z}));
 }
 
 static void codes(void **state) {
@@ -248,7 +246,8 @@ static void sky_cells(void **state) {
     bst_sky_cells_close(&sky);
 }
 
-/* Quads of known stars: every pattern found for them agrees. Returns how many are the very stars. */
+/* Quads of known stars: every pattern found for them agrees. Returns how many are the very stars.
+ */
 static int find_quads(scene *s, const bst_star *found, int count) {
     static bst_star_patterns_match all[64];
     int quads = 0;
@@ -307,14 +306,14 @@ static void the_fit_is_exact(void **state) {
         bst_vec3 v = bst_camera_unproject(camera, 1000 * uniform(i, 7), 1000 * uniform(i, 8));
         pairs[i].gcrf = bst_quat_rotate(bst_quat_conj(truth.q_cam_from_gcrf), v);
         pairs[i].sigma_px = 0.1 + 0.1 * (double)i;
-        assert_true(bst_star_fit_project(&truth, camera, pairs[i].gcrf, &pairs[i].x_px,
-                                         &pairs[i].y_px));
+        assert_true(
+            bst_star_fit_project(&truth, camera, pairs[i].gcrf, &pairs[i].x_px, &pairs[i].y_px));
     }
     bst_star_fit fit;
     assert_true(bst_star_fit_start(camera, pairs, 0.99, &fit));
     assert_true(bst_star_fit_refine(camera, pairs, 8, &fit));
-    bst_vec3 e = bst_quat_to_rotvec(
-        bst_quat_mul(fit.q_cam_from_gcrf, bst_quat_conj(truth.q_cam_from_gcrf)));
+    bst_vec3 e =
+        bst_quat_to_rotvec(bst_quat_mul(fit.q_cam_from_gcrf, bst_quat_conj(truth.q_cam_from_gcrf)));
     bst_assert_close(bst_vec3_norm(e), 0.0, 1e-12);
     bst_assert_close(fit.scale, 1.02, 1e-12);
     bst_assert_close(fit.rms_px, 0.0, 1e-8);
@@ -324,11 +323,16 @@ static void the_fit_is_exact(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(random_fields_are_solved), cmocka_unit_test(wrong_skies_are_not_solved),
-        cmocka_unit_test(poles),                    cmocka_unit_test(stars_of_one_brightness),
-        cmocka_unit_test(too_few_stars),            cmocka_unit_test(null_model),
-        cmocka_unit_test(codes),                    cmocka_unit_test(sky_cells),
-        cmocka_unit_test(patterns),                 cmocka_unit_test(the_fit_is_exact),
+        cmocka_unit_test(random_fields_are_solved),
+        cmocka_unit_test(wrong_skies_are_not_solved),
+        cmocka_unit_test(poles),
+        cmocka_unit_test(stars_of_one_brightness),
+        cmocka_unit_test(too_few_stars),
+        cmocka_unit_test(null_model),
+        cmocka_unit_test(codes),
+        cmocka_unit_test(sky_cells),
+        cmocka_unit_test(patterns),
+        cmocka_unit_test(the_fit_is_exact),
     };
     return cmocka_run_group_tests(tests, setup, teardown);
 }

@@ -344,11 +344,12 @@ static void telemetry_wrong_by_any_angle(void **state) {
         (void)bst_tracker_step(w.tracker, &input, w.tracks, 256, w.predictions, 256);
         const bst_attitude_fix *fix = &w.tracks->attitude;
         assert_int_equal(fix->valid, k != 50);
-        bst_vec3 off = bst_quat_to_rotvec(bst_quat_mul(fix->q_cam_from_gcrf, bst_quat_conj(q_true)));
+        bst_vec3 off =
+            bst_quat_to_rotvec(bst_quat_mul(fix->q_cam_from_gcrf, bst_quat_conj(q_true)));
         /* 40 stars of 0.1 px; a predicted frame has the jitter of 0.2 px per axis: 5 sigma */
         assert_true(hypot(off.x, off.y) / (3 * AS) < (k == 50 ? 1.2 : 0.15));
-        bst_quat q = bst_quat_mul(bst_quat_from_rotvec(fix->error_cam_rad),
-                                  d->q_telemetry_from_gcrf);
+        bst_quat q =
+            bst_quat_mul(bst_quat_from_rotvec(fix->error_cam_rad), d->q_telemetry_from_gcrf);
         off = bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(fix->q_cam_from_gcrf)));
         assert_true(bst_vec3_norm(off) < 1e-12);
         assert_false(w.predictions->attitude_valid); /* it is one of small angles */
@@ -409,7 +410,7 @@ int main(void) {
                                        cmocka_unit_test(a_bad_first_frame),
                                        cmocka_unit_test(vague_detections),
                                        cmocka_unit_test(telemetry_wrong_by_any_angle),
-        cmocka_unit_test(predictions_hold),
+                                       cmocka_unit_test(predictions_hold),
                                        cmocka_unit_test(late_navigation)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
