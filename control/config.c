@@ -4,6 +4,7 @@
 static const char *const strategies[] = {"track", "stare", "rate", "fixed", "scan", NULL};
 static const char *const patterns[] = {"nearest_first", "raster", "spiral", "belt", NULL};
 static const char *const dwell_rates[] = {"belt", "sidereal", NULL};
+static const char *const attitudes[] = {"telemetry", "unknown", NULL};
 static const char *const fixed_frames[] = {"inertial", "body", NULL};
 
 static const bst_config_desc compensator_table[] = {
@@ -29,6 +30,13 @@ const bst_config_desc bst_control_config_table[] = {
     BST_REAL(C, scan_rate_arcsec_per_s, "arcsec/s", -36000, 36000, "60",
              "strategy scan: rate along the middle of the cue's region, from its first end to the "
              "second and back; negative: from the second end on."),
+    BST_ENUM(
+        C, attitude, attitudes, "\"telemetry\"",
+        "Attitude at the start. unknown: nothing is commanded (mode lost) until the tracker has "
+        "an attitude from stars; with imgproc/attitude unknown."),
+    BST_INT(C, lost_after_frames, "frames", 0, 1000000, "0",
+            "After so many frames in a row without an attitude from stars, with the servo settled, "
+            "nothing is commanded until there is one again; 0: never."),
     BST_REAL(C, exposure_s, "s", 0, 3600, "0",
              "Exposure time asked of the sensor; 0 leaves the sensor's own."),
     BST_REAL(C, period_s, "s", 0, 3600, "0",

@@ -131,6 +131,10 @@ static void archive_search(bst_control *c, bst_archive *archive) {
 static void archive_mode(bst_control *c, bst_archive *archive) {
     c->mode = (int)bst_archive_integer(archive, c->mode, 0, BST_MODE_COUNT - 1);
     BST_ARCHIVE(archive, c->mode_tick);
+    if (bst_control_may_be_lost(c)) {
+        bst_archive_bool(archive, &c->attitude_found);
+        BST_ARCHIVE(archive, c->frames_without_attitude);
+    }
     BST_ARCHIVE(archive, c->env.region); /* bst_control_retarget changes it */
     BST_ARCHIVE(archive, c->held);
     BST_ARCHIVE(archive, c->lost);
@@ -218,6 +222,7 @@ bst_status bst_control_observe(bst_ctx *ctx, bst_control *c, int64_t tick,
     assert(c && tracks && tracks->count >= 0 && tracks->tick <= tick);
     /* a new attitude fix changes the aim, and the held track may change */
     bst_control_forget_aims(c);
+    bst_control_watch_attitude(c, tick, &tracks->attitude);
     if (on_image_error(c)) {
         bst_image_loop_update(&c->image_loop, &c->pointing_error, tick, &tracks->attitude);
         for (int a = 0; a < 3; a++) {

@@ -65,6 +65,8 @@ typedef struct bst_control_config {
     double candidate_rate_sigmas, candidate_score;
     double acquire_timeout_s, track_handover_px;
     double reacquire_coast_s, reacquire_extent_deg;
+    int32_t attitude;          /* at the start, 0: by telemetry, 1: unknown */
+    int64_t lost_after_frames; /* without an attitude from stars, in a row; 0: never lost */
     bst_guidance_config guidance;
 } bst_control_config;
 
@@ -159,7 +161,9 @@ typedef struct bst_control {
     bst_image_loop image_loop;   /* sets pointing_error, unless the compensator is the observer */
     bst_model_error model_error; /* of the observer */
     int mode;
-    int64_t mode_tick; /* start of the mode */
+    int64_t mode_tick;               /* start of the mode */
+    bool attitude_found;             /* from stars, since the start or the latest loss */
+    int64_t frames_without_attitude; /* at rest, in a row */
     bst_control_transition transitions[BST_CONTROL_TRANSITIONS];
     int transition_count;
     bst_nav_telemetry nav;

@@ -80,6 +80,15 @@ bst_status bst_control_best_candidate(bst_ctx *ctx, const bst_control *c, const 
 
 /* ---- modes.c ---- */
 
+/* True if the configuration allows an unknown attitude. */
+static inline bool bst_control_may_be_lost(const bst_control *c) {
+    return c->config.attitude == 1 || c->config.lost_after_frames > 0;
+}
+
+/* Enters and leaves BST_MODE_LOST by the attitude of a frame: after enough frames without one, and
+ * with the next one. An attitude that ends the mode starts the observer anew. */
+void bst_control_watch_attitude(bst_control *c, int64_t tick, const bst_attitude_fix *fix);
+
 /* Leaves BST_MODE_IDLE for the first mode. */
 bst_status bst_control_start(bst_ctx *ctx, bst_control *c, int64_t tick) BST_MUST_CHECK;
 

@@ -20,7 +20,7 @@ const bst_config_desc bst_platform_config_table[] = {
         "above 0.4 rate_hz widens the PSF."),
     BST_OBJECT(P, jitter_psd, bst_jitter_psd_config_table, "{}",
                "Jitter by tables of its density and by harmonic lines, besides the flat bands."),
-    BST_REALS(P, attitude_bias_arcsec, "arcsec", -36000, 36000, "[0, 0, 0]",
+    BST_REALS(P, attitude_bias_arcsec, "arcsec", -648000, 648000, "[0, 0, 0]",
               "Constant error of the believed body attitude, as a rotation about body axes."),
     BST_REAL(
         P, attitude_noise_arcsec, "arcsec", 0, 3600, "0",

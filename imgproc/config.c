@@ -8,6 +8,8 @@ static const bst_config_desc bad_pixel_table[] = {
     BST_CONFIG_END,
 };
 
+static const char *const attitudes[] = {"telemetry", "unknown", NULL};
+
 const bst_config_desc bst_imgproc_config_table[] = {
     BST_INT(bst_imgproc_config, capacity, "", 1, 65536, "2048",
             "Detections kept per frame, the brightest first."),
@@ -34,6 +36,14 @@ const bst_config_desc bst_imgproc_config_table[] = {
              "Greatest pointing error over which stars are identified."),
     BST_REAL(bst_imgproc_config, match_tolerance_px, "px", 0.5, 20, "3",
              "Greatest distance of one star from its place after the common shift."),
+    BST_ENUM(bst_imgproc_config, attitude, attitudes, "\"telemetry\"",
+             "Attitude at the start. telemetry: right within search_radius_px. unknown: wrong by "
+             "any angle; the first frame with enough stars gives it (lost in space)."),
+    BST_INT(bst_imgproc_config, lost_after_frames, "", 0, 1000000, "0",
+            "After so many frames in a row without an identified star the attitude is unknown "
+            "again; 0: never."),
+    BST_REAL(bst_imgproc_config, lost_scale_tolerance, "", 0, 0.1, "0.05",
+             "Largest relative error of the camera's pixel scale while the attitude is unknown."),
     BST_BOOL(
         bst_imgproc_config, track_windows, "false",
         "Look only at windows round the predicted places of tracks and of bright stars while a "

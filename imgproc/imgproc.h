@@ -29,6 +29,9 @@ typedef struct bst_imgproc_config {
     double streak_min_px, streak_max_px;
     double streak_search_px; /* 0: no search for streaks of unknown rate and direction */
     double search_radius_px, match_tolerance_px;
+    int attitude;              /* at start, 0: by telemetry, 1: unknown */
+    int64_t lost_after_frames; /* without a star, in a row; 0: never lost again */
+    double lost_scale_tolerance;
     bool track_windows; /* search only windows while a target is tracked */
     int64_t window_px, window_stars, full_frame_period, full_frame_count;
     bst_stack_config stack;

@@ -43,6 +43,7 @@ static void destroy(void *self) {
     bst_pixel_learner_free(m->pixels);
     bst_psf_wings_free(m->wings);
     bst_plugin_detector_free(m->plugin);
+    bst_imgproc_lost_close(&m->lost);
     free(m);
 }
 
@@ -87,6 +88,7 @@ static bst_status archive_module(void *self, bst_archive *archive) {
     if (m->stack) {
         BST_TRY(bst_stack_archive(m->stack, archive));
     }
+    bst_imgproc_lost_archive(&m->lost, archive);
     if (bst_archive_is_restoring(archive)) {
         m->first_slot = (int)(m->steps % BST_STEP_LANES); /* lanes begin at 0 again */
         for (int i = 0; i < BST_STEP_LANES; i++) {
@@ -140,6 +142,8 @@ static bst_status prepare(const bst_module_env *env, bst_imgproc_state *m) {
         BST_TRY(bst_psf_wings_create(env->ctx, m->maps.psf, (double)m->camera.width_px,
                                      (double)m->camera.height_px, m->config->jitter_px, &m->wings));
     }
+    bst_imgproc_lost_open(m, bst_knowledge_stars(env->knowledge),
+                          bst_knowledge_julian_year(env->knowledge));
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)m->config->capacity);
     return BST_OK;
 }
@@ -371,13 +375,18 @@ static bst_status detect_frame(bst_imgproc_state *m, struct bst_step *step, bst_
         out->q_cam_from_gcrf = bst_quat_unit(bst_quat_mul(
             attitude_correction(m, e->predictions, middle), out->q_telemetry_from_gcrf));
     }
+    if (m->lost.enabled) {
+        /* the tracker's correction is one of small angles */
+        e->locked = e->motion && bst_imgproc_lost_attitude(&m->lost, out->q_telemetry_from_gcrf,
+                                                           &out->q_cam_from_gcrf);
+    }
     m->windows.count = 0;
     out->windows = 0;
     e->navigated = nav.payload && !nav.stale;
     if (e->navigated) {
         e->light = observer_at(m, nav.payload, middle);
     }
-    if (m->config->track_windows && e->locked && e->navigated) {
+    if (m->config->track_windows && e->locked && e->predictions && e->navigated) {
         BST_TRY(plan_windows(bst_step_ctx(step), m, e, out->q_cam_from_gcrf));
         out->windows = m->windows.count;
     }
@@ -447,7 +456,9 @@ static bst_status process_frame(bst_imgproc_state *m, struct bst_step *step,
                                                           : bst_imgproc_streak_px(l->ip),
                                          .predictions = predictions};
     if (oriented && e.navigated && !smeared) {
-        BST_TRY(bst_imgproc_identify_stars(ctx, m, l, &e, out, &known.q_cam_from_gcrf));
+        BST_TRY(m->lost.enabled
+                    ? bst_imgproc_lost_identify(m, step, l, &e, out, &known.q_cam_from_gcrf)
+                    : bst_imgproc_identify_stars(ctx, m, l, &e, out, &known.q_cam_from_gcrf));
         known.light = e.light;
         known.oriented = out->stars_identified > 0;
     }

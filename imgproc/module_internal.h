@@ -6,11 +6,26 @@
 #include "imgproc/detect/plugin_detector.h"
 #include "imgproc/detect/region_of_interest.h"
 #include "imgproc/extended/extended_step.h"
+#include "imgproc/identify/lost_in_space.h"
 #include "imgproc/identify/predicted_stars.h"
 #include "imgproc/imgproc.h"
 #include "imgproc/measure/discriminate.h"
 #include "imgproc/wing_labels.h"
 #include "sim/optics/photometry.h"
+
+/* Attitude that image processing finds by itself, while telemetry may be wrong by any angle. */
+typedef struct bst_imgproc_lost {
+    bool enabled;
+    bool lost;      /* the attitude is unknown */
+    bool known;     /* `error` holds */
+    bst_quat error; /* q_true = q_telemetry * error, of the latest frame with stars */
+    int64_t frames_without_stars;
+    double built_v_limit; /* of `patterns`; NAN: none yet */
+    bst_star_patterns *patterns;
+    bst_lost_in_space *solver;
+    double julian_year;
+    const bst_stars *stars;
+} bst_imgproc_lost;
 
 /* Detector and results of one concurrent step. */
 typedef struct bst_imgproc_lane {
@@ -40,6 +55,7 @@ typedef struct bst_imgproc_state {
     bst_psf_wings *wings;      /* NULL: the PSF has no wings */
     bst_extended_step extended;
     bst_plugin_detector *plugin; /* NULL: built-in detector */
+    bst_imgproc_lost lost;
 } bst_imgproc_state;
 
 /* A frame and the onboard knowledge of its exposure. */
@@ -60,5 +76,30 @@ typedef struct bst_imgproc_exposure {
 bst_status bst_imgproc_identify_stars(bst_ctx *ctx, bst_imgproc_state *m, const bst_imgproc_lane *l,
                                       const bst_imgproc_exposure *e, bst_detections *out,
                                       bst_quat *q_cam_from_gcrf) BST_MUST_CHECK;
+
+/* Prepares identification without an attitude, where the configuration asks for it.
+ *
+ * Given:     stars        must outlive the module
+ *            julian_year  epoch for proper motion */
+void bst_imgproc_lost_open(bst_imgproc_state *m, const bst_stars *stars, double julian_year);
+/* Frees its memory. */
+void bst_imgproc_lost_close(bst_imgproc_lost *lost);
+/* Saves or restores its state, where it is enabled. */
+void bst_imgproc_lost_archive(bst_imgproc_lost *lost, bst_archive *archive);
+
+/* Attitude of a frame by telemetry and the error found before. Returns false if it is not enabled,
+ * or no attitude has been found yet; then *q is unchanged. */
+bool bst_imgproc_lost_attitude(const bst_imgproc_lost *lost, bst_quat q_telemetry_from_gcrf,
+                               bst_quat *q_cam_from_gcrf);
+
+/* Identifies the stars of a frame as bst_imgproc_identify_stars, without an attitude where it is
+ * lost. Publishes an event when the attitude is found and when it is lost.
+ *
+ * Given:     *q_cam_from_gcrf  predicted attitude
+ * Returned:  *q_cam_from_gcrf  attitude from the identified stars, if any
+ * Errors:    those of the star catalogue; BST_ERR_MEMORY */
+bst_status bst_imgproc_lost_identify(bst_imgproc_state *m, struct bst_step *step,
+                                     const bst_imgproc_lane *l, const bst_imgproc_exposure *e,
+                                     bst_detections *out, bst_quat *q_cam_from_gcrf) BST_MUST_CHECK;
 
 #endif

@@ -123,6 +123,7 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
     t->tick_rate_hz = (double)tick_rate_hz;
     t->star = star;
     t->star_user = star_user;
+    t->reference = BST_QUAT_IDENTITY;
     bst_mtt_params mtt;
     make_params(t, config, &mtt);
     t->cache = bst_pages_zero(STAR_CACHE, sizeof *t->cache);
@@ -157,6 +158,8 @@ void bst_tracker_free(bst_tracker *t) {
 /* `cache` is left out: its directions depend on the catalogue alone. */
 bst_status bst_tracker_archive(bst_tracker *t, bst_archive *archive) {
     BST_ARCHIVE(archive, t->error);
+    bst_archive_bool(archive, &t->referred);
+    BST_ARCHIVE(archive, t->reference);
     bst_attitude_shared_archive(&t->shared, archive);
     BST_ARCHIVE(archive, t->target);
     BST_ARCHIVE(archive, t->cue_before);
@@ -175,113 +178,10 @@ const bst_tracker_event *bst_tracker_events(const bst_tracker *t, int *count) {
     return t->events;
 }
 
-/* Direction of a catalogue star, from the cache or the catalogue. */
-static bool find_star(bst_tracker *t, uint32_t id, bst_vec3 *icrs) {
-    cached_star *slot = &t->cache[(id * 2654435761u >> 16) & (STAR_CACHE - 1)];
-    if (slot->id != id) {
-        bst_vec3 direction;
-        if (!t->star(t->star_user, id, &direction)) {
-            return false;
-        }
-        *slot = (cached_star){.id = id, .icrs = direction};
-    }
-    *icrs = slot->icrs;
-    return true;
-}
-
-/* Attitude of a frame and its accuracy. */
-typedef struct frame_attitude {
-    bst_attitude_fix fix;
-    bst_quat q_cam_from_gcrf;
-    double covariance_cam[3][3];
-    /* 1 sigma of the attitude's drift rate that no star of this frame shows */
-    double rate_sigma_radps;
-    bool usable;
-} frame_attitude;
-
-/* Mid-exposure attitude by telemetry. */
-static bst_quat telemetry_of(const bst_tracker_input *input) {
-    return bst_quat_unit(input->q_telemetry_mid ? *input->q_telemetry_mid
-                                                : input->detections->q_telemetry_from_gcrf);
-}
-
-/* Solves the attitude from the identified stars. Returns the number of t->stars considered. */
-static int solve_attitude(bst_tracker *t, const bst_detections *d, const bst_light *light,
-                          bst_quat q_telemetry, bst_attitude_solution *out) {
-    int count = 0;
-    for (int i = 0; i < d->count && count < MAX_STARS; i++) {
-        const bst_detection *item = &d->items[i];
-        bst_vec3 icrs;
-        if (item->label != BST_LABEL_STAR || item->star_id == 0 ||
-            (item->flags & (BST_DETECTION_EDGE | BST_DETECTION_BLEND)) ||
-            !find_star(t, item->star_id, &icrs)) {
-            continue;
-        }
-        t->stars[count++] =
-            (bst_attitude_star){.id = item->star_id,
-                                .apparent_gcrf = bst_light_apparent_star(light, icrs),
-                                .x_px = item->x_px,
-                                .y_px = item->y_px,
-                                .cov_xx = item->cov_xx,
-                                .cov_xy = item->cov_xy,
-                                .cov_yy = item->cov_yy};
-    }
-    /* the stars were identified with this attitude: it is close */
-    bst_quat q = d->q_cam_from_gcrf;
-    bool given = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w > 0.5;
-    bst_attitude_solve(&t->camera, &t->attitude_params, given ? q : q_telemetry, t->stars, count,
-                       out);
-    return count;
-}
-
-/* Determines the frame's attitude: from stars, else predicted by the telemetry error filter. */
-static void find_attitude(bst_tracker *t, const bst_tracker_input *input, const bst_light *light,
-                          int64_t tick, double dt_s, frame_attitude *out) {
-    memset(out, 0, sizeof *out);
-    bst_quat q_telemetry = telemetry_of(input);
-    bst_attitude_solution solution;
-    int star_count = solve_attitude(t, input->detections, light, q_telemetry, &solution);
-    bst_attitude_error_predict(&t->error, &t->error_params, dt_s);
-    out->fix.tick = tick;
-    out->fix.stars = solution.stars_used;
-    out->fix.valid = solution.valid;
-    out->fix.rms_px = solution.rms_px;
-    if (solution.valid) {
-        out->q_cam_from_gcrf = solution.q_cam_from_gcrf;
-        memcpy(out->covariance_cam, solution.covariance, sizeof out->covariance_cam);
-        out->fix.error_cam_rad =
-            bst_quat_to_rotvec(bst_quat_mul(solution.q_cam_from_gcrf, bst_quat_conj(q_telemetry)));
-        /* Stars that contradict the telemetry's history come from a camera that turned unevenly
-         * during the exposure. Their attitude is not the mid-exposure one and must not be used for
-         * pointing. */
-        out->usable = bst_attitude_error_update(&t->error, &t->error_params, q_telemetry,
-                                                out->fix.error_cam_rad, solution.covariance);
-        out->fix.valid = out->usable;
-        if (out->usable) {
-            bst_attitude_shared_update(&t->shared, &solution, t->stars, star_count);
-        }
-    } else {
-        bst_vec3 rate;
-        bst_attitude_error_get(&t->error, &t->error_params, q_telemetry, &out->fix.error_cam_rad,
-                               &rate, out->covariance_cam);
-        out->rate_sigma_radps =
-            sqrt(fmax(fmax(t->error.p[3][3], t->error.p[4][4]), t->error.p[5][5]));
-        out->usable = true;
-        out->q_cam_from_gcrf =
-            bst_quat_unit(bst_quat_mul(bst_quat_from_rotvec(out->fix.error_cam_rad), q_telemetry));
-    }
-    out->fix.q_cam_from_gcrf = out->q_cam_from_gcrf;
-    out->fix.shared = bst_attitude_shared_get(&t->shared);
-    for (int i = 0; i < 3; i++) {
-        out->fix.sigma_rad[i] = sqrt(out->covariance_cam[i][i]);
-    }
-    out->usable = out->usable &&
-                  fmax(out->fix.sigma_rad[0], out->fix.sigma_rad[1]) <= t->max_attitude_sigma_rad;
-}
-
 /* Direction of a detection with its covariance. */
 static bst_sky_measurement direction_of(const bst_tracker *t, const bst_detection *item,
-                                        const frame_attitude *attitude, const bst_light *light) {
+                                        const bst_tracker_attitude *attitude,
+                                        const bst_light *light) {
     double extra = t->floor_variance_px2;
     bool blend = (item->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE)) != 0;
     if (blend && !(item->flags & BST_DETECTION_EXTENDED)) { /* its covariance includes the edge */
@@ -292,8 +192,9 @@ static bst_sky_measurement direction_of(const bst_tracker *t, const bst_detectio
 }
 
 /* Collects the detections that may be objects, as directions. Returns their number. */
-static int collect_objects(bst_tracker *t, const bst_detections *d, const frame_attitude *attitude,
-                           const bst_light *light, int *lost) {
+static int collect_objects(bst_tracker *t, const bst_detections *d,
+                           const bst_tracker_attitude *attitude, const bst_light *light,
+                           int *lost) {
     double scale = bst_camera_scale_rad(&t->camera);
     int count = 0;
     *lost = 0;
@@ -456,10 +357,11 @@ static void write_predictions(const bst_tracker *t, int64_t tick, bst_quat q_cam
     double p[3][3];
     const bst_mtt_track *all = bst_mtt_tracks(t->mtt, &count);
     *out = (bst_predictions){.tick = tick};
-    bst_attitude_error_get(&t->error, &t->error_params, q_cam_from_gcrf,
+    bst_attitude_error_get(&t->error, &t->error_params, bst_tracker_refer(t, q_cam_from_gcrf),
                            &out->attitude_error_cam_rad, &out->attitude_error_rate_cam_radps, p);
-    out->attitude_valid =
-        t->error.started && sqrt(fmax(p[0][0], p[1][1])) <= 10.0 * t->max_attitude_sigma_rad;
+    /* a correction in camera axes is one of small angles; the camera turns before its use */
+    out->attitude_valid = !t->referred && t->error.started &&
+                          sqrt(fmax(p[0][0], p[1][1])) <= 10.0 * t->max_attitude_sigma_rad;
     for (int r = 0; r < 2; r++) { /* tentative tracks are omitted */
         for (int i = 0; i < count; i++) {
             if (output_rank(&all[i], t->target.id) != r) {
@@ -516,8 +418,8 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     double dt = t->started ? (double)(tick - t->last_tick) / t->tick_rate_hz : 0.0;
     bst_light light =
         bst_nav_light_after(input->nav, seconds - (double)input->nav->tick / t->tick_rate_hz);
-    frame_attitude attitude;
-    find_attitude(t, input, &light, tick, dt, &attitude);
+    bst_tracker_attitude attitude;
+    bst_tracker_find_attitude(t, input, &light, tick, dt, &attitude);
     t->event_count = 0;
     const bst_tracker_cue *cue = &input->cue;
     bst_tracker_frame_view view = {.tracker = t,
@@ -571,9 +473,10 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     t->attitude_was_lost = !attitude.usable;
     choose_target(t, &view.cue, seconds);
     write_tracks(t, d, &attitude.fix, &view.cue, detections_lost, tracks, track_capacity);
-    write_predictions(t, attitude.fix.tick,
-                      input->q_telemetry_now ? *input->q_telemetry_now : telemetry_of(input),
-                      predictions, prediction_capacity);
+    write_predictions(
+        t, attitude.fix.tick,
+        input->q_telemetry_now ? *input->q_telemetry_now : bst_tracker_telemetry(input),
+        predictions, prediction_capacity);
     t->cue_before = *cue;
     t->started = true;
     t->last_exposure_id = d->exposure_id;

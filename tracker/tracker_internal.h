@@ -41,7 +41,10 @@ struct bst_tracker {
     bst_tracker_event *events;
     size_t event_capacity;
     int event_count;
+    /* of the telemetry after `reference`: q_true = q_telemetry * reference * error */
     bst_attitude_error error;
+    bst_quat reference; /* a large error of the telemetry, from stars */
+    bool referred;      /* `reference` is not the identity */
     bst_attitude_shared shared;
     bst_target target;
     bst_tracker_cue cue_before;
@@ -79,5 +82,26 @@ bst_mtt_sight bst_tracker_frame_sight_of(const void *user, const bst_mtt_track *
  * on no orbit is extrapolated in a straight line. */
 bool bst_tracker_frame_observer(const bst_tracker *tracker, const bst_nav_telemetry *nav,
                                 double seconds, bst_od_observer *out);
+
+/* Attitude of a frame and its accuracy. */
+typedef struct bst_tracker_attitude {
+    bst_attitude_fix fix;
+    bst_quat q_cam_from_gcrf;
+    double covariance_cam[3][3];
+    /* 1 sigma of the attitude's drift rate that no star of this frame shows */
+    double rate_sigma_radps;
+    bool usable;
+} bst_tracker_attitude;
+
+/* ---- attitude/frame_attitude.c ---- */
+
+/* Mid-exposure attitude by telemetry. */
+bst_quat bst_tracker_telemetry(const bst_tracker_input *input);
+/* Telemetry without the large error that stars have shown. */
+bst_quat bst_tracker_refer(const bst_tracker *t, bst_quat q_telemetry);
+/* Determines the frame's attitude: from stars, else predicted by the telemetry error filter. */
+void bst_tracker_find_attitude(bst_tracker *t, const bst_tracker_input *input,
+                               const bst_light *light, int64_t tick, double dt_s,
+                               bst_tracker_attitude *out);
 
 #endif

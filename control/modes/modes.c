@@ -151,6 +151,27 @@ bst_status bst_control_take_frame(bst_ctx *ctx, bst_control *c, int64_t tick,
     }
 }
 
+void bst_control_watch_attitude(bst_control *c, int64_t tick, const bst_attitude_fix *fix) {
+    if (!bst_control_may_be_lost(c)) {
+        return;
+    }
+    if (fix->valid) {
+        c->frames_without_attitude = 0;
+        c->attitude_found = true;
+        if (c->mode == BST_MODE_LOST) {
+            c->pointing_error.started = false;
+            bst_control_enter(c, BST_MODE_IDLE, tick, "the stars give the attitude");
+        }
+        return;
+    }
+    c->frames_without_attitude += c->settled;
+    if (c->mode != BST_MODE_LOST && c->config.lost_after_frames > 0 &&
+        c->frames_without_attitude >= c->config.lost_after_frames) {
+        c->frames_without_attitude = 0;
+        bst_control_enter(c, BST_MODE_LOST, tick, "no attitude from stars");
+    }
+}
+
 /* Starts an open-loop strategy as soon as there is an aim. */
 static bst_status start_open_loop(bst_ctx *ctx, bst_control *c, int64_t tick) {
     bst_onboard_cue cue;
@@ -179,6 +200,10 @@ static bst_status start_open_loop(bst_ctx *ctx, bst_control *c, int64_t tick) {
 }
 
 bst_status bst_control_start(bst_ctx *ctx, bst_control *c, int64_t tick) {
+    if (c->config.attitude == 1 && !c->attitude_found) {
+        bst_control_enter(c, BST_MODE_LOST, tick, "the attitude is unknown");
+        return BST_OK;
+    }
     if (c->config.strategy != BST_CONTROL_TRACK) {
         return start_open_loop(ctx, c, tick);
     }

@@ -26,7 +26,7 @@ void bst_chart_style(FILE *out) {
                                        "#d59bd0", "#d9b64a", "#7fd3ee", "#a3adba"};
     static const char *const modes[BST_MODE_COUNT] = {
         "#9aa0a6", "#3f7fca", "#e39a1f", "#d6485a", "#2e9e4f", "#a45fc0",
-        "#4b9a80", "#2f95b5", "#5a55a5", "#a8902a", "#3ba39b",
+        "#4b9a80", "#2f95b5", "#5a55a5", "#a8902a", "#3ba39b", "#8a5a3c",
     };
     fputs(":root{", out);
     for (int i = 0; i < BST_CHART_MODE; i++) {

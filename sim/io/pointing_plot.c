@@ -9,7 +9,7 @@
 /* Background colours of the modes, in the order of bst_mode. */
 static const char *const mode_colours[BST_MODE_COUNT] = {
     "#e3e3e3", "#d6e4f5", "#fbe3c0", "#f7d3d8", "#d9efd9", "#eedcf3",
-    "#e6efe9", "#dfeef5", "#d5d3e6", "#f0ead2", "#e2f0ee",
+    "#e6efe9", "#dfeef5", "#d5d3e6", "#f0ead2", "#e2f0ee", "#f2ded2",
 };
 
 /* Ranges of the plotted values. */

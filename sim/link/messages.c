@@ -341,7 +341,7 @@ static const bst_wire_field control_status[] = {
     TICK(bst_control_status, tick, "Of validity."),
     INT(bst_control_status, mode, 0, BST_MODE_COUNT - 1, "",
         "0 idle, 1 slew, 2 search, 3 acquire, 4 track, 5 reacquire, 6 stare, 7 rate, 8 coast, 9 "
-        "fixed, 10 scan."),
+        "fixed, 10 scan, 11 lost."),
     NUMBER(bst_control_status, target_id, 0, "Track, 0 when none."),
     INT(bst_control_status, search_step, -MANY, MANY, "", "Of the search pattern."),
     FIELD_(bst_control_status, aim_error_px, BST_WIRE_F64, 2, BST_WIRE_ANY, 0, 0, "px",

@@ -92,7 +92,7 @@ const char *bst_channel_writers(const char *name) {
 const char *bst_mode_name(int mode) {
     static const char *const names[BST_MODE_COUNT] = {"idle",  "slew",      "search", "acquire",
                                                       "track", "reacquire", "stare",  "rate",
-                                                      "coast", "fixed",     "scan"};
+                                                      "coast", "fixed",     "scan",   "lost"};
     return mode >= 0 && mode < BST_MODE_COUNT ? names[mode] : "unknown";
 }
 

@@ -197,6 +197,8 @@ static void add_events(const bst_run_reader *run, bst_report_warnings *w) {
         {"target_lost", BST_SEVERITY_WARNING, "the track of the target was given up"},
         {"track_lost", BST_SEVERITY_NOTE, "a track was given up"},
         {"attitude_lost", BST_SEVERITY_WARNING, "stars no longer gave an attitude"},
+        {"attitude_unknown", BST_SEVERITY_WARNING, "the attitude was unknown"},
+        {"attitude_found", BST_SEVERITY_NOTE, "the stars gave an unknown attitude"},
         {"guidance", BST_SEVERITY_NOTE, "guidance announced what is out of reach"},
         {"wheels", BST_SEVERITY_WARNING, "reaction wheels came to a limit, or left it"},
         {"star_trackers", BST_SEVERITY_WARNING, "star trackers lost the stars, or found them"},

@@ -515,6 +515,43 @@ static void what_needs_a_region_is_refused_without(void **state) {
     rig_close(&r);
 }
 
+/* Nothing is commanded while the attitude is unknown; the first one from stars begins the slew, at
+ * once with the whole correction. Frames without stars lead back. */
+static void nothing_is_commanded_without_an_attitude(void **state) {
+    (void)state;
+    rig r;
+    bst_control_config config = defaults();
+    config.attitude = 1;
+    config.lost_after_frames = 3;
+    rig_open(&r, &config, BST_REGION_NONE);
+    const bst_quat error = bst_quat_from_rotvec((bst_vec3){0.3, 2.0, -1.0});
+    for (int64_t t = 0; t < 12000; t += 50) {
+        bool frame = t % 1000 == 500;
+        bool valid = (t > 3000 && t < 6000) || t > 10000;
+        r.tracks->attitude = (bst_attitude_fix){.valid = valid, .tick = t - 400};
+        if (valid) {
+            bst_quat q = bst_quat_mul(r.q_cam, error);
+            bst_vec3 e = bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(r.q_cam)));
+            r.tracks->attitude.q_cam_from_gcrf = q;
+            r.tracks->attitude.error_cam_rad = e;
+        }
+        step(&r, t, frame);
+        /* at 3.5 s found; 6.5, 7.5 and 8.5 s without; at 10.5 s found again */
+        bool lost = t < 3500 || (t >= 8500 && t < 10500);
+        assert_int_equal(r.status.mode == BST_MODE_LOST, lost);
+        assert_int_equal(r.commanded, !lost);
+        if (r.commanded && r.status.mode == BST_MODE_SLEW) {
+            bool known;
+            bst_vec3 cue;
+            double s = (double)r.command.tick / TICKS;
+            bst_assert_ok(&r.ctx, cue_direction_at(&r, &r.ctx, s, &known, &cue));
+            bst_vec3 wanted = bst_quat_rotate(error, cue);
+            assert_true(bst_vec3_angle(r.command.direction_gcrf, wanted) < 1e-9); /* rounding */
+        }
+    }
+    rig_close(&r);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_direction_is_held_among_the_stars),
@@ -526,6 +563,7 @@ int main(void) {
         cmocka_unit_test(a_cue_that_jumps_is_followed),
         cmocka_unit_test(a_cue_that_ends_and_comes_back),
         cmocka_unit_test(the_search_gives_up_when_told_to),
+        cmocka_unit_test(nothing_is_commanded_without_an_attitude),
         cmocka_unit_test(what_needs_a_region_is_refused_without),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

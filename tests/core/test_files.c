@@ -232,7 +232,7 @@ static void names_of_modes(void **state) {
     (void)state;
     assert_string_equal(bst_mode_name(BST_MODE_TRACK), "track");
     assert_string_equal(bst_mode_name(0), "idle");
-    assert_string_equal(bst_mode_name(BST_MODE_COUNT - 1), "scan");
+    assert_string_equal(bst_mode_name(BST_MODE_COUNT - 1), "lost");
     assert_string_equal(bst_mode_name(BST_MODE_COUNT), "unknown");
     assert_string_equal(bst_mode_name(-1), "unknown");
     assert_string_equal(bst_task_end_name(BST_TASK_LOST), "lost");

@@ -244,6 +244,39 @@ static void predicted_error_is_applied(void **state) {
     }
 }
 
+/* Telemetry wrong by any angle: nothing is found, unless the attitude is unknown and the stars give
+ * it. The second frame uses the first one's error. */
+static void an_unknown_attitude_is_found(void **state) {
+    (void)state;
+    for (int unknown = 0; unknown < 2; unknown++) {
+        bench b;
+        bench_init(&b);
+        b.o.q_telemetry = bst_quat_unit(bst_quat_mul(
+            b.o.q_true, bst_quat_from_rotvec((bst_vec3){1.1, -0.4, 2.6}))); /* 163 deg */
+        bench_draw_stars(&b);
+        synthetic_expose(&b.s, bst_rng_make_key(5, 0, "test", "module"), 1);
+        bst_assert_ok(&b.o.ctx,
+                      bench_configure(&b, unknown ? "{\"attitude\": \"unknown\"}" : "{}"));
+        onboard_add_telemetry(&b.o, 0, 0);
+        bst_assert_ok(&b.o.ctx, bench_load(&b, 1000, 1000, false));
+        bst_assert_ok(&b.o.ctx, bst_engine_run(&b.o.ctx, b.o.engine, 2001));
+        assert_int_equal(b.count, 2);
+        for (int i = 0; i < b.count; i++) {
+            const bst_detections *d = b.kept[i];
+            assert_true(angle(d->q_telemetry_from_gcrf, b.o.q_telemetry) < 1e-14);
+            if (!unknown) {
+                assert_int_equal(d->stars_identified, 0);
+                continue;
+            }
+            assert_true(d->stars_identified >= 15);
+            assert_int_equal(stars_right(&b, d), d->stars_identified);
+            /* roll is known to some 0.1 px over 200 px */
+            assert_true(angle(d->q_cam_from_gcrf, b.o.q_true) < 2e-3);
+        }
+        bench_free(&b);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_message_per_frame),
@@ -252,6 +285,7 @@ int main(void) {
         cmocka_unit_test(missing_telemetry),
         cmocka_unit_test(stale_telemetry),
         cmocka_unit_test(predicted_error_is_applied),
+        cmocka_unit_test(an_unknown_attitude_is_found),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -325,6 +325,38 @@ static void predictions_hold(void **state) {
     world_close(&w);
 }
 
+/* Telemetry wrong by 170 degrees: the stars of the first frame give the attitude; drift is followed
+ * about it, and a frame without stars is predicted. */
+static void telemetry_wrong_by_any_angle(void **state) {
+    (void)state;
+    static world w;
+    world_open(&w, 2, &plain);
+    const bst_quat wrong = bst_quat_from_rotvec((bst_vec3){1.0, -2.0, 1.96});
+    for (int k = 0; k < 60; k++) {
+        bst_quat q_true = expose(&w, k);
+        bst_detections *d = w.detections;
+        /* as image processing has found it */
+        d->q_telemetry_from_gcrf = bst_quat_unit(bst_quat_mul(d->q_telemetry_from_gcrf, wrong));
+        if (k == 50) {
+            d->count = 0;
+        }
+        bst_tracker_input input = make_input(&w, k);
+        (void)bst_tracker_step(w.tracker, &input, w.tracks, 256, w.predictions, 256);
+        const bst_attitude_fix *fix = &w.tracks->attitude;
+        assert_int_equal(fix->valid, k != 50);
+        bst_vec3 off =
+            bst_quat_to_rotvec(bst_quat_mul(fix->q_cam_from_gcrf, bst_quat_conj(q_true)));
+        /* 40 stars of 0.1 px; a predicted frame has the jitter of 0.2 px per axis: 5 sigma */
+        assert_true(hypot(off.x, off.y) / (3 * AS) < (k == 50 ? 1.2 : 0.15));
+        bst_quat q =
+            bst_quat_mul(bst_quat_from_rotvec(fix->error_cam_rad), d->q_telemetry_from_gcrf);
+        off = bst_quat_to_rotvec(bst_quat_mul(q, bst_quat_conj(fix->q_cam_from_gcrf)));
+        assert_true(bst_vec3_norm(off) < 1e-12);
+        assert_false(w.predictions->attitude_valid); /* it is one of small angles */
+    }
+    world_close(&w);
+}
+
 /* Navigation of 4 s after the middle of the exposure, as a read-out leaves it: stars are aberrated
  * by the velocity of the middle, from which a low circular orbit's has turned by 34 m/s, 24 mas. */
 static void late_navigation(void **state) {
@@ -377,6 +409,7 @@ int main(void) {
                                        cmocka_unit_test(a_frame_of_an_uneven_turn),
                                        cmocka_unit_test(a_bad_first_frame),
                                        cmocka_unit_test(vague_detections),
+                                       cmocka_unit_test(telemetry_wrong_by_any_angle),
                                        cmocka_unit_test(predictions_hold),
                                        cmocka_unit_test(late_navigation)};
     return cmocka_run_group_tests(tests, NULL, NULL);

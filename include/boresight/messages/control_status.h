@@ -20,6 +20,7 @@ typedef enum bst_mode {
     BST_MODE_COAST,     /* on the prediction of a target that cannot be seen */
     BST_MODE_FIXED,     /* open loop, constant direction in inertial space or in the body */
     BST_MODE_SCAN,      /* open loop, along an arc at a constant rate */
+    BST_MODE_LOST,      /* the attitude is unknown: nothing is commanded until stars give it */
     BST_MODE_COUNT
 } bst_mode;
 

@@ -147,4 +147,4 @@ ITEMS: "Dict[str, np.dtype[np.void]]" = {name: _dtype(tables[1]) for name, table
 LABELS = {"unknown": 0, "star": 1, "object": 2, "artefact": 3, "hot_pixel": 4, "hit": 5}
 MODES = {name: number for number, name in enumerate(
     ("idle", "slew", "search", "acquire", "track", "reacquire", "stare", "rate", "coast", "fixed",
-     "scan"))}
+     "scan", "lost"))}

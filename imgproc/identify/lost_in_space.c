@@ -1,0 +1,373 @@
+#include "imgproc/identify/lost_in_space.h"
+
+#include <assert.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "imgproc/identify/null_model.h"
+#include "imgproc/identify/star_fit.h"
+#include "imgproc/measure/heapsort.h"
+#include "sim/core/arena.h"
+
+enum { MOST_PREDICTED = 512, MOST_CANDIDATES = 64, PASSES = 5 };
+
+/* Centroid error beyond a detection's own covariance (catalogue, distortion), px. */
+static const double SYSTEMATIC_PX = 0.1;
+/* Tolerance of a code: so many standard deviations of a star's place in it, and more by the
+ * rounding of the catalogue and by aberration. */
+static const double CODE_SIGMAS = 5.0, CODE_FLOOR = 8e-4, MOST_TOLERANCE = 0.02;
+/* Least distance of a quad's furthest pair, share of the field's shorter side. */
+static const double LEAST_SIZE = 0.08;
+/* Tolerances of matched stars: first, by the quad alone, and last. */
+static const double FIRST_PX = 2.0, MOST_FIRST_PX = 8.0, LAST_PX = 1.0, LAST_SIGMAS = 4.0;
+/* Chance of a first match above which a candidate is dropped at once. */
+static const double FIRST_LOG_CHANCE = -4.6; /* 1 % */
+static const double BRIGHTEST_V = -2.0;
+/* Least share of the predicted stars that a right attitude matches over the whole field. */
+static const double LEAST_SHARE = 0.35;
+/* Error of a quad's own scale. */
+static const double SCALE_MARGIN = 3e-3;
+
+/* A detection that takes part. */
+typedef struct source {
+    double x_px, y_px, sigma_px;
+    bst_vec3 cam; /* unit, by the camera's own scale */
+} source;
+
+struct bst_lost_in_space {
+    const bst_camera *camera;
+    const bst_stars *stars;
+    const bst_star_patterns *patterns;
+    double julian_year, depth_v_mag;
+    int max_detections;
+    bst_arena arena;
+    int *order;      /* [max_detections] indices of detections, brightest first */
+    source *sources; /* [max_detections] in that order */
+    int count;
+    double *nearest2;            /* [max_detections] distance^2 of the star matched to a source */
+    int *star_of;                /* [max_detections] predicted star; -1: none */
+    bst_star *found;             /* [MOST_PREDICTED] */
+    bst_star_fit_pair *expected; /* [MOST_PREDICTED] */
+    bst_star_fit_pair *matched;  /* [MOST_PREDICTED] */
+};
+
+static void lay_out(bst_lost_in_space *s) {
+    size_t items = (size_t)s->max_detections + 1;
+    BST_ARENA_TAKE(&s->arena, s->order, items);
+    BST_ARENA_TAKE(&s->arena, s->sources, items);
+    BST_ARENA_TAKE(&s->arena, s->nearest2, items);
+    BST_ARENA_TAKE(&s->arena, s->star_of, items);
+    BST_ARENA_TAKE(&s->arena, s->found, MOST_PREDICTED);
+    BST_ARENA_TAKE(&s->arena, s->expected, MOST_PREDICTED);
+    BST_ARENA_TAKE(&s->arena, s->matched, MOST_PREDICTED);
+}
+
+bst_status bst_lost_in_space_create(bst_ctx *ctx, const bst_camera *camera, const bst_stars *stars,
+                                    const bst_star_patterns *patterns, double julian_year,
+                                    int max_detections, bst_lost_in_space **out) {
+    assert(camera && stars && patterns && max_detections >= 0 && out);
+    *out = NULL;
+    bst_lost_in_space *s = calloc(1, sizeof *s);
+    if (!s) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for star identification");
+    }
+    bst_star_patterns_info info;
+    bst_star_patterns_get_info(patterns, &info);
+    s->camera = camera;
+    s->stars = stars;
+    s->patterns = patterns;
+    s->julian_year = julian_year;
+    s->depth_v_mag = info.depth_v_mag;
+    s->max_detections = max_detections;
+    lay_out(s);
+    bst_status status = bst_arena_alloc(ctx, &s->arena, "star identification");
+    if (status != BST_OK) {
+        bst_lost_in_space_free(s);
+        return status;
+    }
+    lay_out(s);
+    *out = s;
+    return BST_OK;
+}
+
+void bst_lost_in_space_free(bst_lost_in_space *s) {
+    if (!s) {
+        return;
+    }
+    bst_arena_free(&s->arena);
+    free(s);
+}
+
+static bool brighter(const void *context, int a, int b) {
+    const bst_detection *items = context;
+    return items[a].flux_e != items[b].flux_e ? items[a].flux_e > items[b].flux_e : a < b;
+}
+
+/* Takes over the detections that may be stars, brightest first. */
+static void read_sources(bst_lost_in_space *s, const bst_lost_in_space_frame *frame) {
+    int count = 0;
+    for (int i = 0; i < frame->count && count < s->max_detections; i++) {
+        const bst_detection *d = &frame->items[i];
+        if ((d->label == BST_LABEL_UNKNOWN || d->label == BST_LABEL_STAR) &&
+            !(d->flags & BST_DETECTION_EXTENDED)) {
+            s->order[count++] = i;
+        }
+    }
+    bst_heapsort_indices(s->order, count, brighter, frame->items);
+    for (int i = 0; i < count; i++) {
+        const bst_detection *d = &frame->items[s->order[i]];
+        double variance = fmax(0.5 * (d->cov_xx + d->cov_yy), 0.0);
+        s->sources[i] = (source){.x_px = d->x_px,
+                                 .y_px = d->y_px,
+                                 .sigma_px = sqrt(variance + SYSTEMATIC_PX * SYSTEMATIC_PX),
+                                 .cam = bst_camera_unproject(s->camera, d->x_px, d->y_px)};
+    }
+    s->count = count;
+}
+
+/* A frame that is being solved. */
+typedef struct attempt {
+    bst_ctx *ctx;
+    bst_lost_in_space *s;
+    const bst_lost_in_space_options *options;
+    const bst_lost_in_space_frame *frame;
+    double area_px2, side_px; /* of the window; its shorter side */
+    double most_r2;           /* greatest tangent radius^2 in the window */
+} attempt;
+
+/* Predicts the catalogue stars in the window. */
+static bst_status predict(const attempt *a, const bst_star_fit *fit, int *count) {
+    bst_lost_in_space *s = a->s;
+    const bst_window w = a->frame->window;
+    bst_vec3 centre =
+        bst_camera_unproject(s->camera, w.x0 + 0.5 * (w.width - 1), w.y0 + 0.5 * (w.height - 1));
+    double radius = 0.0;
+    for (int i = 0; i < 4; i++) {
+        bst_vec3 corner = bst_camera_unproject(s->camera, i % 2 ? w.x0 - 0.5 : w.x0 + w.width - 0.5,
+                                               i / 2 ? w.y0 - 0.5 : w.y0 + w.height - 0.5);
+        radius = fmax(radius, bst_vec3_angle(centre, corner));
+    }
+    radius *= 1.0 + a->options->scale_tolerance;
+    bst_vec3 direction = bst_light_catalogue_star(
+        a->frame->light, bst_quat_rotate(bst_quat_conj(fit->q_cam_from_gcrf), centre));
+    int total = 0;
+    double v_limit = fmin(a->frame->v_limit, s->depth_v_mag);
+    for (; v_limit > BRIGHTEST_V; v_limit -= 0.5) {
+        BST_TRY(bst_stars_query(a->ctx, s->stars, direction, radius, v_limit, s->julian_year,
+                                s->found, MOST_PREDICTED, &total));
+        if (total <= MOST_PREDICTED) {
+            break;
+        }
+    }
+    *count = 0;
+    for (int i = 0; i < total && i < MOST_PREDICTED; i++) {
+        bst_star_fit_pair *e = &s->expected[*count];
+        e->gcrf = bst_light_apparent_star(a->frame->light, s->found[i].icrs);
+        if (bst_star_fit_project(fit, s->camera, e->gcrf, &e->x_px, &e->y_px) && e->x_px >= w.x0 &&
+            e->x_px <= w.x0 + w.width - 1 && e->y_px >= w.y0 && e->y_px <= w.y0 + w.height - 1) {
+            ++*count;
+        }
+    }
+    return BST_OK;
+}
+
+/* Matches predicted stars to the nearest of the brightest sources, one to one.
+ *
+ * Returned:  s->matched  the pairs
+ *            number of them */
+static int match(const attempt *a, int predicted, int sources, double tolerance_px) {
+    bst_lost_in_space *s = a->s;
+    int count = 0;
+    for (int i = 0; i < sources; i++) {
+        s->star_of[i] = -1;
+        s->nearest2[i] = tolerance_px * tolerance_px;
+    }
+    for (int k = 0; k < predicted; k++) {
+        const bst_star_fit_pair *e = &s->expected[k];
+        int best = -1;
+        double best2 = tolerance_px * tolerance_px;
+        for (int i = 0; i < sources; i++) {
+            double dx = s->sources[i].x_px - e->x_px, dy = s->sources[i].y_px - e->y_px;
+            double d2 = dx * dx + dy * dy;
+            if (d2 < best2) {
+                best2 = d2;
+                best = i;
+            }
+        }
+        if (best >= 0 && (s->star_of[best] < 0 || best2 < s->nearest2[best])) {
+            s->star_of[best] = k;
+            s->nearest2[best] = best2;
+        }
+    }
+    for (int i = 0; i < sources && count < MOST_PREDICTED; i++) {
+        if (s->star_of[i] >= 0) {
+            const source *from = &s->sources[i];
+            s->matched[count++] = (bst_star_fit_pair){.gcrf = s->expected[s->star_of[i]].gcrf,
+                                                      .x_px = from->x_px,
+                                                      .y_px = from->y_px,
+                                                      .sigma_px = from->sigma_px};
+        }
+    }
+    return count;
+}
+
+/* Number of brightest sources that the predicted stars can be among: detections may be twice as
+ * many as the catalogue's stars. */
+static int rivals(const bst_lost_in_space *s, int predicted) {
+    int most = 2 * predicted + 20;
+    return s->count < most ? s->count : most;
+}
+
+/* Logarithm of the chance that the stars beside the quad's four match. */
+static double log_chance(const attempt *a, int predicted, int matched, int sources,
+                         double tolerance_px) {
+    int others = sources > 4 ? sources - 4 : 0;
+    double chance = bst_null_model_chance(others, tolerance_px, a->area_px2);
+    return bst_null_model_log_tail(predicted > 4 ? predicted - 4 : 0, matched - 4, chance);
+}
+
+/* Tries an attitude from a pattern: counts its stars and refines it.
+ *
+ * Given:     pairs  the quad's four stars */
+static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4], double size_px,
+                              double ratio, bst_lost_in_space_result *out) {
+    bst_star_fit fit;
+    const double limit = a->options->scale_tolerance;
+    if (!bst_star_fit_start(a->s->camera, pairs, ratio, &fit) ||
+        !bst_star_fit_refine(a->s->camera, pairs, 4, &fit) ||
+        fabs(fit.scale - 1.0) > limit + SCALE_MARGIN) {
+        return BST_OK;
+    }
+    double sigma_px = 0.0;
+    for (int i = 0; i < 4; i++) {
+        sigma_px = fmax(sigma_px, pairs[i].sigma_px);
+    }
+    /* the quad's own error grows with the distance from it */
+    double tolerance = fmin(FIRST_PX + 3.0 * sigma_px * a->side_px / size_px, MOST_FIRST_PX);
+    int predicted, sources, matched;
+    for (int pass = 0; pass < PASSES; pass++) {
+        BST_TRY(predict(a, &fit, &predicted));
+        sources = rivals(a->s, predicted);
+        matched = match(a, predicted, sources, tolerance);
+        if (matched < 5 || (pass == 0 && log_chance(a, predicted, matched, sources, tolerance) >
+                                             FIRST_LOG_CHANCE)) {
+            return BST_OK;
+        }
+        if (!bst_star_fit_refine(a->s->camera, a->s->matched, matched, &fit)) {
+            return BST_OK;
+        }
+        /* the stars near the quad are matched first, and carry the fit on to the others */
+        double last = fmax(LAST_PX, LAST_SIGMAS * bst_star_fit_sigma_px(a->s->matched, matched));
+        tolerance = pass + 2 < PASSES ? fmax(last, 0.5 * tolerance) : last;
+    }
+    double chance = log_chance(a, predicted, matched, sources, tolerance);
+    if (matched < LEAST_SHARE * predicted ||
+        chance > log(a->options->false_rate / out->candidates) ||
+        fabs(fit.scale - 1.0) > limit + SCALE_MARGIN) {
+        return BST_OK;
+    }
+    out->solved = true;
+    out->q_cam_from_gcrf = fit.q_cam_from_gcrf;
+    out->scale = fit.scale;
+    out->predicted = predicted;
+    out->matched = matched;
+    out->rms_px = fit.rms_px;
+    out->log_chance = chance;
+    return BST_OK;
+}
+
+/* Tolerance of the code of four sources; also the distance of the furthest pair. */
+static double code_tolerance(const attempt *a, const bst_star_quad *quad, const int star[4],
+                             double *size_px) {
+    const source *s = a->s->sources;
+    const source *from = &s[star[quad->order[0]]], *to = &s[star[quad->order[1]]];
+    double sigma_px = 0.0;
+    for (int i = 0; i < 4; i++) {
+        sigma_px = fmax(sigma_px, s[star[i]].sigma_px);
+    }
+    *size_px = hypot(to->x_px - from->x_px, to->y_px - from->y_px);
+    /* a wrong scale shears the tangent plane away from the boresight */
+    return CODE_FLOOR + CODE_SIGMAS * sigma_px / *size_px +
+           0.5 * a->options->scale_tolerance * a->most_r2;
+}
+
+/* Looks a form of a quad up and tries the patterns that agree. */
+static bst_status try_form(const attempt *a, const bst_star_quad *quad, const int star[4],
+                           double tolerance, double size_px, bst_lost_in_space_result *out) {
+    bst_star_patterns_match found[MOST_CANDIDATES];
+    int count = bst_star_patterns_find(a->s->patterns, quad, tolerance, a->options->scale_tolerance,
+                                       found, MOST_CANDIDATES);
+    count = count < MOST_CANDIDATES ? count : MOST_CANDIDATES;
+    for (int k = 0; k < count && !out->solved; k++) {
+        bst_star_fit_pair pairs[4];
+        for (int i = 0; i < 4; i++) {
+            const source *from = &a->s->sources[star[quad->order[i]]];
+            pairs[i] = (bst_star_fit_pair){
+                .gcrf = bst_light_apparent_star(a->frame->light, found[k].icrs[i]),
+                .x_px = from->x_px,
+                .y_px = from->y_px,
+                .sigma_px = from->sigma_px};
+        }
+        out->candidates++;
+        BST_TRY(try_pattern(a, pairs, size_px, found[k].size_ratio, out));
+    }
+    return BST_OK;
+}
+
+/* Tries a quad of sources in all forms that its rules leave open. */
+static bst_status try_quad(const attempt *a, const int star[4], bst_lost_in_space_result *out) {
+    bst_vec3 v[4];
+    bst_star_quad forms[4];
+    for (int i = 0; i < 4; i++) {
+        v[i] = a->s->sources[star[i]].cam;
+    }
+    if (!bst_star_quad_make(v, &forms[0])) {
+        return BST_OK;
+    }
+    double size_px, tolerance = code_tolerance(a, &forms[0], star, &size_px);
+    if (size_px < LEAST_SIZE * a->side_px || tolerance > MOST_TOLERANCE) {
+        return BST_OK;
+    }
+    out->quads++;
+    int count = 1 + bst_star_quad_alternatives(&forms[0], tolerance, forms + 1);
+    for (int i = 0; i < count && !out->solved; i++) {
+        BST_TRY(try_form(a, &forms[i], star, tolerance, size_px, out));
+    }
+    return BST_OK;
+}
+
+/* Geometry of the window. */
+static void measure_window(attempt *a) {
+    const bst_window w = a->frame->window;
+    a->area_px2 = (double)w.width * (double)w.height;
+    a->side_px = (double)(w.width < w.height ? w.width : w.height);
+    a->most_r2 = 0.0;
+    for (int i = 0; i < 4; i++) {
+        bst_vec3 v = bst_camera_unproject(a->s->camera, w.x0 + (i % 2 ? w.width - 1 : 0),
+                                          w.y0 + (i / 2 ? w.height - 1 : 0));
+        a->most_r2 = fmax(a->most_r2, (v.x * v.x + v.y * v.y) / (v.z * v.z));
+    }
+}
+
+bst_status bst_lost_in_space_solve(bst_ctx *ctx, bst_lost_in_space *lost,
+                                   const bst_lost_in_space_options *options,
+                                   const bst_lost_in_space_frame *frame,
+                                   bst_lost_in_space_result *out) {
+    assert(lost && options && frame && out && frame->light);
+    assert(options->scale_tolerance >= 0.0 && options->scale_tolerance <= 0.1);
+    *out = (bst_lost_in_space_result){.q_cam_from_gcrf = BST_QUAT_IDENTITY, .scale = 1.0};
+    attempt a = {.ctx = ctx, .s = lost, .options = options, .frame = frame};
+    read_sources(lost, frame);
+    measure_window(&a);
+    int most = lost->count < options->max_stars ? lost->count : options->max_stars;
+    for (int l = 3; l < most && !out->solved; l++) {
+        for (int k = 2; k < l && !out->solved; k++) {
+            for (int j = 1; j < k && !out->solved; j++) {
+                for (int i = 0; i < j && !out->solved; i++) {
+                    BST_TRY(try_quad(&a, (const int[4]){i, j, k, l}, out));
+                }
+            }
+        }
+    }
+    return BST_OK;
+}

@@ -1,0 +1,158 @@
+/* Rates of identification without an attitude over random fields, as a table.
+ *
+ * Usage: test_imgproc_lost_in_space_rates [NAME=VALUE ...], with the names of `arguments` below. */
+#include <time.h>
+
+#include "tests/imgproc/random_sky.h"
+#include "tests/test_support.h"
+
+typedef struct arguments {
+    const char *catalogue;
+    double fields, scale, missing, faults, streak, field, lost, false_rate, least;
+    const char *kind; /* sky, mirrored or scrambled */
+} arguments;
+
+static const double YEAR = 2024.6;
+/* Sides of fields and the magnitudes of SNR 8. */
+static const double sides_deg[] = {0.5, 1.0, 3.0, 10.0, 20.0, 30.0};
+static const double limits_v[] = {11.5, 11.0, 9.5, 7.0, 6.0, 5.5};
+
+static bst_random_sky sky;
+
+static double cpu_s(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+static int by_value(const void *a, const void *b) {
+    double d = *(const double *)a - *(const double *)b;
+    return (d > 0.0) - (d < 0.0);
+}
+
+static void read_arguments(int argc, char **argv, arguments *a) {
+    *a = (arguments){.catalogue = "default", .fields = 100, .false_rate = 1e-7, .kind = "sky"};
+    for (int i = 1; i < argc; i++) {
+        struct {
+            const char *name;
+            double *value;
+        } all[] = {{"fields=", &a->fields}, {"scale=", &a->scale},     {"missing=", &a->missing},
+                   {"false=", &a->faults},  {"streak=", &a->streak},   {"field=", &a->field},
+                   {"lost=", &a->lost},     {"rate=", &a->false_rate}, {"least=", &a->least}};
+        bool taken = false;
+        for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
+            size_t n = strlen(all[k].name);
+            if (strncmp(argv[i], all[k].name, n) == 0) {
+                *all[k].value = atof(argv[i] + n);
+                taken = true;
+            }
+        }
+        if (strncmp(argv[i], "catalogue=", 10) == 0) {
+            a->catalogue = argv[i] + 10;
+        } else if (strncmp(argv[i], "kind=", 5) == 0) {
+            a->kind = argv[i] + 5;
+        } else if (!taken) {
+            fail_msg("%s: no argument of this program", argv[i]);
+        }
+    }
+}
+
+/* Counts of one size of field. */
+typedef struct counts {
+    int tried, solved, wrong;
+    double candidates;
+    double *ms;
+} counts;
+
+static void try_field(const arguments *a, int f, uint64_t i, const bst_stars *stars,
+                      const bst_stars *onboard, const bst_star_patterns *patterns, counts *n) {
+    bst_ctx ctx = {0};
+    double u = bst_rng_uniform(bst_rng_make_key(3, 0, "test", "scale"), i, 0);
+    const bst_random_sky_options so = {.field_deg = sides_deg[f],
+                                       .v_limit = limits_v[f],
+                                       .streak_px = a->streak,
+                                       .scale_error = a->scale * (2.0 * u - 1.0),
+                                       .lost_share = a->lost,
+                                       .false_detections = (int)a->faults,
+                                       .mirrored = strcmp(a->kind, "mirrored") == 0,
+                                       .scrambled = strcmp(a->kind, "scrambled") == 0};
+    bst_random_sky_draw(&so, stars, onboard, 11, i, &sky);
+    if (sky.usable < 6) {
+        return;
+    }
+    bst_lost_in_space *lost;
+    bst_assert_ok(&ctx, bst_lost_in_space_create(&ctx, &sky.camera, onboard, patterns, YEAR,
+                                                 BST_RANDOM_SKY_ROOM, &lost));
+    bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
+    options.false_rate = a->false_rate;
+    const bst_lost_in_space_frame frame = {
+        sky.items, sky.count, {0, 0, 1024, 1024}, limits_v[f], &sky.light};
+    bst_lost_in_space_result r;
+    double begin = cpu_s();
+    bst_assert_ok(&ctx, bst_lost_in_space_solve(&ctx, lost, &options, &frame, &r));
+    n->ms[n->tried++] = 1e3 * (cpu_s() - begin);
+    n->candidates += r.candidates;
+    bst_vec3 e =
+        bst_quat_to_rotvec(bst_quat_mul(r.q_cam_from_gcrf, bst_quat_conj(sky.q_cam_from_gcrf)));
+    bool right = hypot(e.x, e.y) < 5.0 * bst_camera_scale_rad(&sky.camera);
+    if (r.solved && !right) {
+        printf(
+            "# field %d: wrong by %.1f px, roll %.3g rad, scale %.5f, true %.5f, %d of %d stars, "
+            "e^%.1f\n",
+            (int)i, hypot(e.x, e.y) / bst_camera_scale_rad(&sky.camera), e.z, r.scale,
+            1.0 + so.scale_error, r.matched, r.predicted, r.log_chance);
+    }
+    n->solved += r.solved && right;
+    n->wrong += r.solved && !right;
+    bst_lost_in_space_free(lost);
+}
+
+static void run_size(const arguments *a, int f, const bst_stars *stars, const bst_stars *onboard) {
+    bst_ctx ctx = {0};
+    bst_star_patterns *patterns;
+    bst_star_patterns_info info;
+    const bst_star_patterns_options options = {sides_deg[f] * BST_DEG_RAD, limits_v[f], YEAR};
+    double begin = cpu_s();
+    bst_assert_ok(&ctx, bst_star_patterns_create(&ctx, onboard, &options, &patterns));
+    double build_s = cpu_s() - begin;
+    bst_star_patterns_get_info(patterns, &info);
+    counts n = {.ms = calloc((size_t)a->fields + 1, sizeof *n.ms)};
+    assert_non_null(n.ms);
+    for (uint64_t i = 0; i < (uint64_t)a->fields; i++) {
+        try_field(a, f, i, stars, onboard, patterns, &n);
+    }
+    qsort(n.ms, (size_t)n.tried, sizeof *n.ms, by_value);
+    double share = n.tried > 0 ? (double)n.solved / n.tried : 0.0;
+    printf("%5.1f %5.1f %6d %.4f %4d %8.2f %8.1f %6.1f %7.2f %6.1f %9lld %8d\n", sides_deg[f],
+           limits_v[f], n.tried, share, n.wrong, n.tried ? n.ms[n.tried / 2] : 0.0,
+           n.tried ? n.ms[n.tried - 1] : 0.0, n.candidates / fmax(n.tried, 1), build_s,
+           (double)info.bytes / 1e6, (long long)info.patterns, info.stars);
+    fflush(stdout);
+    if (strcmp(a->kind, "sky") == 0 && sides_deg[f] >= 1.0) {
+        assert_true(share >= a->least);
+    }
+    assert_true(n.wrong <=
+                10.0 * a->false_rate * fmax(n.tried, 1) + 4.0 * sqrt(a->false_rate * n.tried));
+    free(n.ms);
+    bst_star_patterns_free(patterns);
+}
+
+int main(int argc, char **argv) {
+    arguments a;
+    read_arguments(argc, argv, &a);
+    bst_ctx ctx = {0};
+    bst_stars *stars, *onboard;
+    bst_assert_ok(&ctx, bst_stars_open(&ctx, a.catalogue, &stars));
+    const bst_star_errors_config errors = {.missing_fraction = a.missing, .seed = 7};
+    bst_assert_ok(&ctx, bst_stars_with_errors(&ctx, stars, &errors, &onboard));
+    printf(
+        "field_deg v_limit tried solved wrong median_ms worst_ms candidates build_s MB patterns "
+        "stars\n");
+    for (int f = 0; f < 6; f++) {
+        if (!(a.field > 0.0) || sides_deg[f] == a.field) {
+            run_size(&a, f, stars, onboard);
+        }
+    }
+    bst_stars_close(onboard);
+    bst_stars_close(stars);
+    return 0;
+}
