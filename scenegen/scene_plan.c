@@ -78,11 +78,15 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *s
     if (source->rate && source->rate->error > 0.0) { /* glints that the light curve lacks */
         error.nodes_e += (float)(source->rate->error * (double)error.peak_e);
     }
-    if (m->fourier) { /* grid error, on dark pixels too */
+    if (m->fourier) { /* error of grid and widening, on dark pixels too */
         double peak_e = bst_smear_last_read_e(m->smear),
                presence = bst_smear_last_presence(m->smear);
-        double grid = bst_fourier_render_error_sigma(m->fourier, m->fine, presence < 1.0,
-                                                     m->request->window, peak_e, m->dark_e2);
+        bst_fourier_point point = {.peak_e = peak_e,
+                                   .dark_variance_e2 = m->dark_e2,
+                                   .widening_px2 = bst_smear_last_widening_px2(m->smear),
+                                   .wings = presence < 1.0};
+        double grid =
+            bst_fourier_render_error_sigma(m->fourier, m->fine, m->request->window, &point);
         m->grid_sigma = fmax(m->grid_sigma, grid);
         double nodes_e = (double)error.nodes_e,
                grid_e = grid * sqrt((double)error.peak_e + m->dark_e2);
@@ -197,6 +201,7 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
         before = error;
         if (m->fourier && !m->fine && m->grid_sigma > GRID_SHARE * tolerance) {
             m->fine = true;
+            bst_smear_refine_grid(m->smear, bst_fourier_render_density(m->fourier, true));
         } else {
             aim *= fmin(fmax(LESS * tolerance / error, MOST_STEP), LEAST_STEP);
         }

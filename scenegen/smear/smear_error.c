@@ -29,7 +29,10 @@ void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]) {
     }
 }
 
-/* Error of a level for an image that moves by `scale` of the path, relative to the peak. */
+double bst_smear_level_prediction(const bst_smear_level *level, double scale) {
+    return bst_smear_nodes_error(level->predicted, scale) + level->predicted_profile;
+}
+
 double bst_smear_level_error(const bst_smear_level *level, double scale) {
     return bst_smear_nodes_error(level->error, scale) + level->profile_error;
 }

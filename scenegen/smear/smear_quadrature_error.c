@@ -46,36 +46,63 @@ double bst_smear_nodes_error(const double error[BST_NODE_SCALES], double scale) 
 void bst_smear_nodes_clear(bst_smear_node_list *list) {
     list->count = 0;
     memset(list->error, 0, sizeof list->error);
+    memset(list->predicted, 0, sizeof list->predicted);
 }
 
-double bst_smear_nodes_error_part(const bst_smear_node *nodes, int count, double psf_sigma_px) {
+/* What is averaged over the light of a place. */
+static double value_of(const bst_smear_node *node, int what) {
+    return what == BST_PART_BOUND       ? node->error
+           : what == BST_PART_PREDICTED ? node->predicted
+                                        : node->variance;
+}
+
+void bst_smear_nodes_parts(const bst_smear_node *nodes, int count, double psf_sigma_px,
+                           double part[BST_NODE_PARTS]) {
     enum { ANCHORS = 24 };
-    double scale = 0.5 / (psf_sigma_px * psf_sigma_px), worst = 0.0, least = INFINITY;
-    int brightest = 0;
-    for (int n = 0; n < count; n++) {
-        double error = nodes[n].error * nodes[n].weight;
-        brightest = error > nodes[brightest].error * nodes[brightest].weight ? n : brightest;
-        worst = fmax(worst, nodes[n].error);
-        least = fmin(least, nodes[n].error);
+    double scale = 0.5 / (psf_sigma_px * psf_sigma_px), worst[BST_NODE_PARTS] = {0.0};
+    int brightest[BST_NODE_PARTS] = {0}, unlike = 0;
+    for (int i = 0; i < BST_NODE_PARTS; i++) {
+        double least = INFINITY;
+        for (int n = 0; n < count; n++) {
+            const bst_smear_node *at = &nodes[brightest[i]];
+            double value = value_of(&nodes[n], i);
+            brightest[i] =
+                value * nodes[n].weight > value_of(at, i) * at->weight ? n : brightest[i];
+            worst[i] = fmax(worst[i], value);
+            least = fmin(least, value);
+        }
+        bool alike = !(worst[i] > 0.0) || least > 0.9 * worst[i];
+        part[i] = alike ? 1.0 : 0.0;
+        unlike += !alike;
     }
-    if (!(worst > 0.0) || least > 0.9 * worst) {
-        return 1.0;
+    if (unlike == 0) {
+        return;
     }
-    double light = 0.0, error = 0.0;
+    double light[BST_NODE_PARTS] = {0.0}, sum[BST_NODE_PARTS] = {0.0};
     int stride = count / ANCHORS + 1;
-    for (int a = -1; a < count; a = a < 0 ? 0 : a + stride) {
-        const bst_smear_node *at = &nodes[a < 0 ? brightest : a];
-        double here = 0.0, missed = 0.0;
+    for (int a = -BST_NODE_PARTS; a < count; a = a < 0 ? a + 1 : a + stride) {
+        const bst_smear_node *at = &nodes[a < 0 ? brightest[a + BST_NODE_PARTS] : a];
+        double here[BST_NODE_PARTS] = {0.0}, lit = 0.0;
         for (int n = 0; n < count; n++) {
             const double *p = nodes[n].p;
             double dx = p[0] - at->p[0], dy = p[1] - at->p[1], dz = p[2] - at->p[2];
             double q = (dx * dx + dy * dy + dz * dz) * scale;
             double share = q < 20.0 ? nodes[n].weight * exp(-q) : 0.0;
-            here += share;
-            missed += share * nodes[n].error;
+            lit += share;
+            for (int i = 0; i < BST_NODE_PARTS; i++) {
+                here[i] += share * value_of(&nodes[n], i);
+            }
         }
-        light = fmax(light, here);
-        error = fmax(error, missed);
+        /* bounds, which choose the nodes, do not depend on the other properties */
+        int only = a + BST_NODE_PARTS;
+        for (int i = 0; i < BST_NODE_PARTS; i++) {
+            if (a >= 0 || only == BST_PART_BOUND || only == i) {
+                light[i] = fmax(light[i], lit);
+                sum[i] = fmax(sum[i], here[i]);
+            }
+        }
     }
-    return fmin(error / (worst * light), 1.0);
+    for (int i = 0; i < BST_NODE_PARTS; i++) {
+        part[i] = part[i] > 0.0 ? 1.0 : fmin(sum[i] / (worst[i] * light[i]), 1.0);
+    }
 }

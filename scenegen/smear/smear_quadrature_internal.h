@@ -18,17 +18,17 @@ typedef struct bst_smear_maker {
     double widest;     /* px^2 */
     double wide_field; /* as in bst_smear_node_aim */
     double curvature;
-    double pixel_part[3];
+    double pixel_variance, binned_variance, pixel_part[3];
     double image_share; /* image variance per path variance, mean over the field */
     double most;        /* spread of the next group, px^2 */
     double limit;       /* of `most` */
 } bst_smear_maker;
 
-/* Moments of a group about its mean: along the axis to sixth order, and across. */
+/* Moments of a group about its mean: along the axis to eighth order, and across. */
 typedef struct bst_smear_moments {
     double mean[3], axis[3];
     double covariance[3][3];
-    double along[7]; /* E[x^k] */
+    double along[9]; /* E[x^k] */
     double bend[3];  /* E[y x^2], y across the axis */
     double twist[3]; /* E[y x^3] */
     double drift;    /* E[x y^2] */
@@ -47,6 +47,7 @@ typedef struct bst_smear_rule {
     double curve[3]; /* second orthogonal polynomial at the nodes */
     double error;    /* total */
     double missed;   /* part: missed highest moment */
+    double kernel;   /* px^2: variance of the Peano kernel of the missed moment */
     double fixed;    /* part: wrong widening of images that move by less than the path */
 } bst_smear_rule;
 
@@ -58,6 +59,11 @@ void bst_smear_nodes_main_axis(double a[3][3], double axis[3]);
  * peak. INFINITY if there is no such rule or its error exceeds `limit`. */
 void bst_smear_try_rule(const bst_smear_maker *m, const bst_smear_moments *g, int n, bool widen,
                         bool split, double limit, bst_smear_rule *r);
+
+/* Parts of the missed moment's error that remain if the image moves by 2^((k - BST_NODE_SCALES + 2)
+ * / 2) of the path: below 1 for groups as long as the PSF is wide. */
+void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_rule *r,
+                            double part[BST_NODE_SCALES]);
 
 /* Replaces *best by the rule with the fewest nodes that meets the tolerance, otherwise by the best
  * of three nodes. Rules with an error beyond `limit` are ignored. */
