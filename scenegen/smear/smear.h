@@ -32,7 +32,8 @@ typedef struct bst_smear_options {
     /* non-Gaussian PSF, else 0: Gaussians with the same node sensitivity and the same peak pixel
      * share */
     double node_sigma_px, share_sigma_px;
-    double grid_per_px; /* least grid samples per px */
+    double smoothed_variance_px2; /* as in bst_fourier_band; 0: that of node_sigma_px */
+    double grid_per_px;           /* least grid samples per px */
     double pixel_part[BST_PIXEL_PARTS]
                      [3]; /* of the PSF as in bst_smear_node_aim, by binning from 1 on */
     double widest;        /* largest node widening, PSF variances; 0: as much as nodes allow */

@@ -14,14 +14,17 @@ bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_path
     if (parts > 0.0) {
         return bst_motion_midpoints(ctx, path, count, (int)parts, &s->nodes);
     }
-    bool contained = s->options.node_sigma_px > 0.0; /* the pixel, in another PSF than a Gaussian */
+    double further = s->options.smoothed_variance_px2 - s->sigma_px * s->sigma_px;
+    if (!(s->options.node_sigma_px > 0.0)) { /* another PSF contains the pixel */
+        further = 1.0 / 12.0;
+    }
     bst_smear_node_aim aim = {.psf_sigma_px = s->sigma_px,
                               .tolerance = tolerance,
                               .widest = s->widest,
                               .wide_field = turns ? s->wide_field : 1.0,
                               .curvature = turns ? s->curvature : 0.0,
-                              .pixel_variance = contained ? 0.0 : 1.0 / 12.0,
-                              .binned_variance = (s->binning * s->binning - 1.0) / 12.0};
+                              .binned_variance = (s->binning * s->binning - 1.0) / 12.0,
+                              .further_variance = fmax(further, 0.0)};
     memcpy(aim.pixel_part, s->pixel_part, sizeof aim.pixel_part);
     return bst_smear_nodes_from_path(ctx, path, count, &aim, &s->nodes);
 }

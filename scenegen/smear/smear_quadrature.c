@@ -279,8 +279,8 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
         .widest = aim->widest * variance,
         .wide_field = wide,
         .curvature = aim->curvature,
-        .pixel_variance = aim->pixel_variance,
         .binned_variance = aim->binned_variance,
+        .further_variance = aim->further_variance,
         /* mean over the boresight and four corners: full scale, and 1 / wide^2 across */
         .image_share = (2.0 + 3.0 / (wide * wide)) / 5.0};
     if (!(m.total > 0.0)) {

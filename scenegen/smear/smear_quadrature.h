@@ -58,8 +58,9 @@ typedef struct bst_smear_node_aim {
      * the sensor's corners, which a tangent plane moves further; 0 means 1 */
     double wide_field;
     double curvature; /* bound of the second derivative of the image position by the path, 1/px */
-    /* variances by which a pixel of the sensor, and its binning, widen that Gaussian, px^2 */
-    double pixel_variance, binned_variance;
+    /* variance by which binning widens that Gaussian, and further variance against which the length
+     * of a group smooths derivatives: of the sensor's pixel, or of the PSF's shape; px^2 */
+    double binned_variance, further_variance;
     /* PSF derivatives of order 2, 4, 6 in pixels, relative to their peak and to a Gaussian of
      * psf_sigma_px; 0 means 1 */
     double pixel_part[3];

@@ -18,7 +18,7 @@ typedef struct bst_smear_maker {
     double widest;     /* px^2 */
     double wide_field; /* as in bst_smear_node_aim */
     double curvature;
-    double pixel_variance, binned_variance, pixel_part[3];
+    double binned_variance, further_variance, pixel_part[3];
     double image_share; /* image variance per path variance, mean over the field */
     double most;        /* spread of the next group, px^2 */
     double limit;       /* of `most` */
