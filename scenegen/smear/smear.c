@@ -391,14 +391,14 @@ static double star_prediction(const bst_smear *s, int n, bst_smear_star_motion_c
 /* Chooses the coarsest level whose error bound keeps the tolerance for a star, starting from the
  * tolerance's level. */
 static bst_status star_level(bst_ctx *ctx, bst_smear *s, bst_smear_star_motion_cell *cell,
-                             const bst_smear_level **out, double *predicted) {
-    double error, allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
+                             const bst_smear_level **out, double *error, double *predicted) {
+    double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
     int n = bst_smear_choose_level(s, cell ? cell->scale : 1.0);
     BST_TRY(bst_smear_make_level(ctx, s, n));
-    error = star_error(s, n, cell);
-    while (n + 1 < BST_SMEAR_LEVELS && s->options.temporal_oversample <= 0 && error > allowed) {
+    *error = star_error(s, n, cell);
+    while (n + 1 < BST_SMEAR_LEVELS && s->options.temporal_oversample <= 0 && *error > allowed) {
         BST_TRY(bst_smear_make_level(ctx, s, ++n));
-        error = star_error(s, n, cell);
+        *error = star_error(s, n, cell);
     }
     *predicted = star_prediction(s, n, cell);
     *out = &s->levels[n];
@@ -496,7 +496,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
     }
     bst_smear_level own;
     const bst_smear_level *used;
-    double travel_px = s->travel_px, error;
+    double travel_px = s->travel_px, error, predicted;
     if (moving) {
         BST_TRY(moving_nodes(ctx, s, source, &at, &own, visible));
         if (!*visible) {
@@ -509,9 +509,10 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
         }
         bst_smear_nodes_box(s, low, high);
         used = &own;
-        error = bst_smear_level_prediction(used, 1.0);
+        error = bst_smear_level_error(used, 1.0);
+        predicted = bst_smear_level_prediction(used, 1.0);
     } else {
-        BST_TRY(star_level(ctx, s, cell, &used, &error));
+        BST_TRY(star_level(ctx, s, cell, &used, &error, &predicted));
     }
     s->last_widening_px2 = used->widening_px2;
     int radius = choose_radius(s, s->last_peak_e * s->binning);
@@ -519,6 +520,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
                              .y = y,
                              .travel_px = travel_px,
                              .error = error,
+                             .predicted = predicted,
 
                              .radius = radius,
                              .moving = moving};

@@ -209,7 +209,8 @@ double bst_smear_single_error(const bst_smear *s, double peak_e, double from_bor
 typedef struct bst_smear_drawn {
     double x, y, travel_px;
     double low[2], high[2]; /* box of its positions relative to (x, y) */
-    double error;           /* predicted, of its nodes and profiles, relative to the peak */
+    double error;           /* bound of its nodes and profiles, relative to the peak */
+    double predicted;       /* the same as predicted */
     int radius;             /* of the stamp */
     bool moving;
 } bst_smear_drawn;

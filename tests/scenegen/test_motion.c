@@ -338,13 +338,18 @@ static void errors_fade_outside_the_window(void **state) {
                              .low = {low[0], low[1]},
                              .high = {high[0], high[1]},
                              .radius = 6};
-        const bst_error_budget_source whole = {
-            .peak_e = 50.0f, .nodes_e = 8.0f, .shared_e = 4.0f, .excess_e = 2.0f, .border_e = 1.0f};
+        const bst_error_budget_source whole = {.peak_e = 50.0f,
+                                               .nodes_e = 8.0f,
+                                               .predicted_e = 6.0f,
+                                               .shared_e = 4.0f,
+                                               .excess_e = 2.0f,
+                                               .border_e = 1.0f};
         double share = gaussian ? 0.1 * pow(3.3 / gap, 6.0) : 0.3 * pow(3.3 / gap, 3.0);
         s->last_error = whole;
         bst_smear_bring_to_window(s, &d);
         bst_assert_close(s->last_presence, share, 1e-9);
         bst_assert_close(s->last_error.nodes_e, 8.0 * share, 1e-6);
+        bst_assert_close(s->last_error.predicted_e, 6.0 * share, 1e-6);
         bst_assert_close(s->last_error.shared_e, 4.0 * share, 1e-6);
         assert_true(s->last_error.peak_e == 0.0f && s->last_error.border_e == 1.0f);
         assert_true(s->last_error.excess_e == (gaussian ? 0.0f : 2.0f)); /* 9 px: off the stamp */
