@@ -51,6 +51,7 @@ struct bst_error_budget {
     int *field, field_capacity;
     int first_u, first_v, rows, columns;
     double missing_e;     /* light missing everywhere */
+    bool above;           /* a predicted error exceeds its bound */
     double error[ERRORS]; /* negative: not computed yet */
 };
 
@@ -108,6 +109,7 @@ void bst_error_budget_begin(bst_error_budget *c, const bst_error_budget_motion *
     c->motion.overlap = fmin(
         1.0, (motion->way_px + psf) * psf / ((motion->length_px + psf) * (motion->width_px + psf)));
     c->count = 0;
+    c->above = false;
     c->missing_e = 0.0;
     c->error[BOUND] = -1.0;
 }
@@ -142,6 +144,7 @@ bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *c,
     }
     assert(c->count < c->capacity);
     c->sources[c->count++] = *source;
+    c->above = c->above || source->predicted_e > source->nodes_e;
     return BST_OK;
 }
 
@@ -324,19 +327,18 @@ static int fill_cells(bst_error_budget *c, int spots) {
     return cells;
 }
 
-/* Raises errors to those of the box about a cell. */
-static void raise_to_box(const bst_error_budget *c, const cell *middle, float error[ERRORS]) {
+/* Error of the box about a cell, of one kind. */
+static float box_error(const bst_error_budget *c, const cell *middle, int kind) {
     cell sum = {.key = 0};
+    float squares = 0.0f, worst = 0.0f, second = 0.0f;
     for (int u = -1; u <= 1; u++) {
         for (int v = -1; v <= 1; v++) {
             const cell *p = u == 0 && v == 0 ? middle : look_up(c, middle->u + u, middle->v + v);
             if (p) {
-                for (int k = 0; k < ERRORS; k++) {
-                    sum.squares[k] += p->squares[k];
-                    float less = p->worst[k] < sum.worst[k] ? p->worst[k] : sum.worst[k];
-                    sum.second[k] = greater(greater(sum.second[k], p->second[k]), less);
-                    sum.worst[k] = greater(sum.worst[k], p->worst[k]);
-                }
+                squares += p->squares[kind];
+                float less = p->worst[kind] < worst ? p->worst[kind] : worst;
+                second = greater(greater(second, p->second[kind]), less);
+                worst = greater(worst, p->worst[kind]);
                 sum.shared += p->shared;
                 sum.excess += p->excess;
                 sum.worst_excess = greater(sum.worst_excess, p->worst_excess);
@@ -346,13 +348,10 @@ static void raise_to_box(const bst_error_budget *c, const cell *middle, float er
         }
     }
     float part = (float)c->motion.overlap;
+    float others = sqrtf(part * fmaxf(squares - worst * worst, 0.0f));
     float excess = sum.worst_excess + part * (sum.excess - sum.worst_excess);
-    for (int k = 0; k < ERRORS; k++) {
-        float others = sqrtf(part * fmaxf(sum.squares[k] - sum.worst[k] * sum.worst[k], 0.0f));
-        float box = fmaxf(sum.worst[k] + excess, sum.worst_border) + sum.shared +
-                    REST * fmaxf(others, sum.second[k]) + BORDERS * (sum.border - sum.worst_border);
-        error[k] = greater(error[k], box);
-    }
+    return fmaxf(worst + excess, sum.worst_border) + sum.shared + REST * fmaxf(others, second) +
+           BORDERS * (sum.border - sum.worst_border);
 }
 
 /* Cells by the square of SIDE cells that they lie in, as lists, to find those within REACH of a
@@ -419,7 +418,11 @@ static void sum_errors(bst_error_budget *c) {
     for (int i = 0; i < places; i++) {
         int n = c->columns > 0 ? c->field[i] - 1 : c->used[i];
         if (n >= 0) {
-            raise_to_box(c, &c->cells[n], worst);
+            float bound = box_error(c, &c->cells[n], BOUND);
+            worst[BOUND] = greater(worst[BOUND], bound);
+            if (c->above || bound > worst[PREDICTED]) {
+                worst[PREDICTED] = greater(worst[PREDICTED], box_error(c, &c->cells[n], PREDICTED));
+            }
             border = greater(border, c->cells[n].worst_border);
         }
     }

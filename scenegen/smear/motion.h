@@ -36,9 +36,10 @@ enum { BST_PART_BOUND, BST_PART_PREDICTED, BST_PART_WIDENING, BST_NODE_PARTS };
 /* Largest sums of properties over a smeared image, over its peak, relative to that of the worst
  * node: 1 if all nodes are equal, less if the worst are faint for their speed.
  *
- * Returned:  part  of the bounds of errors, the predicted errors and the widenings */
+ * Given:     widening  that of the widenings matters
+ * Returned:  part      of the bounds of errors, the predicted errors and the widenings */
 void bst_smear_nodes_parts(const bst_smear_node *nodes, int count, double psf_sigma_px,
-                           double part[BST_NODE_PARTS]);
+                           bool widening, double part[BST_NODE_PARTS]);
 
 /* Part of an interval between two track samples over which a source's brightness is smooth. The
  * interval begins at begin_s of duration_s and takes length_s.

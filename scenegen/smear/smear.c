@@ -375,6 +375,9 @@ static double star_error(const bst_smear *s, int n, bst_smear_star_motion_cell *
 
 /* Predicted error, as star_error. */
 static double star_prediction(const bst_smear *s, int n, bst_smear_star_motion_cell *cell) {
+    if (s->levels[n].alike) {
+        return star_error(s, n, cell);
+    }
     if (!cell) {
         return bst_smear_level_prediction(&s->levels[n], 1.0);
     }

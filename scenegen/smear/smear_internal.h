@@ -25,6 +25,7 @@ typedef struct bst_smear_level {
      * bst_smear_nodes_error, their bound and what is predicted, and of profiles */
     double error[BST_NODE_SCALES], predicted[BST_NODE_SCALES];
     double profile_error, predicted_profile;
+    bool alike;          /* predicted errors are the bounds: all groups are short */
     double widening_px2; /* largest mean widening of the nodes at one place */
 } bst_smear_level;
 

@@ -101,11 +101,14 @@ static void describe_nodes(const bst_smear *s, const bst_smear_node_list *list, 
     *out = (bst_smear_level){.blocks = blocks_of(list)};
     double widest = set_profile_error(s, list, out);
     double part[BST_NODE_PARTS];
-    bst_smear_nodes_parts(list->items, list->count, s->sigma_px, part);
+    bst_smear_nodes_parts(list->items, list->count, s->sigma_px, s->options.node_sigma_px > 0.0,
+                          part);
     out->widening_px2 = part[BST_PART_WIDENING] * widest * s->sigma_px * s->sigma_px;
+    out->alike = out->profile_error == out->predicted_profile;
     for (int k = 0; k < BST_NODE_SCALES; k++) {
         out->error[k] = part[BST_PART_BOUND] * list->error[k];
         out->predicted[k] = part[BST_PART_PREDICTED] * list->predicted[k];
+        out->alike = out->alike && out->predicted[k] == out->error[k];
     }
     for (int n = 0; n < out->blocks * BST_BLOCK; n++) {
         float *block = table + (size_t)(n / BST_BLOCK) * BST_TABLE_FLOATS;

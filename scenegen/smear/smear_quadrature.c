@@ -119,7 +119,7 @@ static void high_moments(const bst_smear_maker *m, const group *g, bst_smear_mom
                 x += d[i] * out->axis[i];
             }
             double power = part;
-            for (int o = 0; o <= 8; o++, power *= x) {
+            for (int o = 0; o <= 6; o++, power *= x) {
                 out->along[o] += power;
             }
             for (int i = 0; i < 3; i++) {
@@ -137,7 +137,7 @@ static void high_moments(const bst_smear_maker *m, const group *g, bst_smear_mom
             weight += part;
         }
     }
-    for (int o = 0; o <= 8; o++) {
+    for (int o = 0; o <= 6; o++) {
         out->along[o] /= weight;
     }
     out->drift /= weight;
@@ -150,18 +150,48 @@ static void high_moments(const bst_smear_maker *m, const group *g, bst_smear_mom
     }
 }
 
+/* Sets the Peano kernel of a group's rule, unless the group is short. */
+static void set_kernel(const bst_smear_maker *m, const group *g, const bst_smear_moments *t,
+                       bst_smear_rule *r) {
+    bool split = r->pair[0] != 0.0 || r->pair[1] != 0.0 || r->pair[2] != 0.0;
+    double a[3], b[3], weight = 0.0, high[2] = {0.0, 0.0};
+    if (r->nodes < 2 || split || bst_smear_most_kernel(r) < BST_LEAST_KERNEL * m->variance) {
+        return;
+    }
+    int points = reaches(m, g, g->first + MANY_SEGMENTS) ? 2 : 4;
+    for (int k = g->first; reaches(m, g, k); k++) {
+        double w = clip(m, g, k, a, b);
+        for (int n = 0; n < points && w > 0.0; n++) {
+            double x = 0.0, part = w * bst_smear_gauss_weight[points - 1][n];
+            for (int i = 0; i < 3; i++) {
+                double d = a[i] + bst_smear_gauss_place[points - 1][n] * (b[i] - a[i]) - t->mean[i];
+                x += d * t->axis[i];
+            }
+            double cube = x * x * x, seventh = cube * cube * x;
+            high[0] += part * seventh;
+            high[1] += part * seventh * x;
+            weight += part;
+        }
+    }
+    high[0] /= weight;
+    high[1] /= weight;
+    bst_smear_set_kernel(t, high, r);
+}
+
 /* Raises the list's errors to those of a rule; returns its predicted error. */
 static double raise_error(const bst_smear_maker *m, const bst_smear_rule *r) {
     bst_smear_node_list *list = m->list;
     double part[BST_NODE_SCALES];
     bst_smear_missed_parts(m, r, part);
-    for (int k = 0; k < BST_NODE_SCALES; k++) {
-        double square = exp2(k - (BST_NODE_SCALES - 2)), fourth = square * square;
+    double square = 1.0 / (1 << (BST_NODE_SCALES - 2));
+    for (int k = 0; k < BST_NODE_SCALES; k++, square *= 2.0) {
+        double fourth = square * square;
         double low = square * (square > 1.0 ? sqrt(square) : 1.0);
         double other = r->fixed * fmax(low, 1.0) + (r->error - r->missed - r->fixed) * low;
         double missed = r->missed * (r->nodes == 3 ? fourth * square : fourth);
-        list->error[k] = fmax(list->error[k], other + missed);
-        list->predicted[k] = fmax(list->predicted[k], other + part[k] * missed);
+        double bound = other + missed, predicted = other + part[k] * missed;
+        list->error[k] = bound > list->error[k] ? bound : list->error[k];
+        list->predicted[k] = predicted > list->predicted[k] ? predicted : list->predicted[k];
     }
     return r->error - (1.0 - part[BST_NODE_SCALES - 2]) * r->missed;
 }
@@ -238,6 +268,7 @@ static bst_status close_group(bst_ctx *ctx, bst_smear_maker *m, group g, int dep
     if (best.error > m->tolerance) {
         bst_smear_choose_rule(m, &t, INFINITY, &best);
     }
+    set_kernel(m, &g, &t, &best);
     return emit(ctx, m, &t, &best, weight);
 }
 

@@ -49,60 +49,50 @@ void bst_smear_nodes_clear(bst_smear_node_list *list) {
     memset(list->predicted, 0, sizeof list->predicted);
 }
 
-/* What is averaged over the light of a place. */
-static double value_of(const bst_smear_node *node, int what) {
-    return what == BST_PART_BOUND       ? node->error
-           : what == BST_PART_PREDICTED ? node->predicted
-                                        : node->variance;
-}
-
 void bst_smear_nodes_parts(const bst_smear_node *nodes, int count, double psf_sigma_px,
-                           double part[BST_NODE_PARTS]) {
+                           bool widening, double part[BST_NODE_PARTS]) {
     enum { ANCHORS = 24 };
     double scale = 0.5 / (psf_sigma_px * psf_sigma_px), worst[BST_NODE_PARTS] = {0.0};
-    int brightest[BST_NODE_PARTS] = {0}, unlike = 0;
-    for (int i = 0; i < BST_NODE_PARTS; i++) {
-        double least = INFINITY;
-        for (int n = 0; n < count; n++) {
-            const bst_smear_node *at = &nodes[brightest[i]];
-            double value = value_of(&nodes[n], i);
-            brightest[i] =
-                value * nodes[n].weight > value_of(at, i) * at->weight ? n : brightest[i];
-            worst[i] = fmax(worst[i], value);
-            least = fmin(least, value);
+    double least = INFINITY, narrowest = INFINITY, light = 0.0, sum[BST_NODE_PARTS] = {0.0};
+    int brightest = 0;
+    for (int n = 0; n < count; n++) {
+        const bst_smear_node *at = &nodes[n];
+        double error = at->error * at->weight;
+        brightest = error > nodes[brightest].error * nodes[brightest].weight ? n : brightest;
+        const double value[BST_NODE_PARTS] = {at->error, at->predicted, at->variance};
+        for (int i = 0; i < BST_NODE_PARTS; i++) {
+            worst[i] = value[i] > worst[i] ? value[i] : worst[i];
         }
-        bool alike = !(worst[i] > 0.0) || least > 0.9 * worst[i];
-        part[i] = alike ? 1.0 : 0.0;
-        unlike += !alike;
+        least = at->error < least ? at->error : least;
+        narrowest = at->variance < narrowest ? at->variance : narrowest;
     }
-    if (unlike == 0) {
+    for (int i = 0; i < BST_NODE_PARTS; i++) {
+        part[i] = 1.0;
+    }
+    bool alike = !(worst[BST_PART_BOUND] > 0.0) || least > 0.9 * worst[BST_PART_BOUND];
+    if (alike && (!widening || narrowest >= 0.9 * worst[BST_PART_WIDENING])) {
         return;
     }
-    double light[BST_NODE_PARTS] = {0.0}, sum[BST_NODE_PARTS] = {0.0};
     int stride = count / ANCHORS + 1;
-    for (int a = -BST_NODE_PARTS; a < count; a = a < 0 ? a + 1 : a + stride) {
-        const bst_smear_node *at = &nodes[a < 0 ? brightest[a + BST_NODE_PARTS] : a];
-        double here[BST_NODE_PARTS] = {0.0}, lit = 0.0;
+    for (int a = -1; a < count; a = a < 0 ? 0 : a + stride) {
+        const bst_smear_node *at = &nodes[a < 0 ? brightest : a];
+        double here = 0.0, missed = 0.0, predicted = 0.0, widened = 0.0;
         for (int n = 0; n < count; n++) {
             const double *p = nodes[n].p;
             double dx = p[0] - at->p[0], dy = p[1] - at->p[1], dz = p[2] - at->p[2];
             double q = (dx * dx + dy * dy + dz * dz) * scale;
             double share = q < 20.0 ? nodes[n].weight * exp(-q) : 0.0;
-            lit += share;
-            for (int i = 0; i < BST_NODE_PARTS; i++) {
-                here[i] += share * value_of(&nodes[n], i);
-            }
+            here += share;
+            missed += share * nodes[n].error;
+            predicted += share * nodes[n].predicted;
+            widened += share * nodes[n].variance;
         }
-        /* bounds, which choose the nodes, do not depend on the other properties */
-        int only = a + BST_NODE_PARTS;
-        for (int i = 0; i < BST_NODE_PARTS; i++) {
-            if (a >= 0 || only == BST_PART_BOUND || only == i) {
-                light[i] = fmax(light[i], lit);
-                sum[i] = fmax(sum[i], here[i]);
-            }
-        }
+        light = fmax(light, here);
+        sum[BST_PART_BOUND] = fmax(sum[BST_PART_BOUND], missed);
+        sum[BST_PART_PREDICTED] = fmax(sum[BST_PART_PREDICTED], predicted);
+        sum[BST_PART_WIDENING] = fmax(sum[BST_PART_WIDENING], widened);
     }
-    for (int i = 0; i < BST_NODE_PARTS; i++) {
-        part[i] = part[i] > 0.0 ? 1.0 : fmin(sum[i] / (worst[i] * light[i]), 1.0);
+    for (int i = alike ? BST_PART_PREDICTED : BST_PART_BOUND; i < BST_NODE_PARTS; i++) {
+        part[i] = worst[i] > 0.0 ? fmin(sum[i] / (worst[i] * light), 1.0) : 1.0;
     }
 }

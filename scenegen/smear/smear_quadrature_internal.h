@@ -24,11 +24,11 @@ typedef struct bst_smear_maker {
     double limit;       /* of `most` */
 } bst_smear_maker;
 
-/* Moments of a group about its mean: along the axis to eighth order, and across. */
+/* Moments of a group about its mean: along the axis to sixth order, and across. */
 typedef struct bst_smear_moments {
     double mean[3], axis[3];
     double covariance[3][3];
-    double along[9]; /* E[x^k] */
+    double along[7]; /* E[x^k] */
     double bend[3];  /* E[y x^2], y across the axis */
     double twist[3]; /* E[y x^3] */
     double drift;    /* E[x y^2] */
@@ -59,6 +59,18 @@ void bst_smear_nodes_main_axis(double a[3][3], double axis[3]);
  * peak. INFINITY if there is no such rule or its error exceeds `limit`. */
 void bst_smear_try_rule(const bst_smear_maker *m, const bst_smear_moments *g, int n, bool widen,
                         bool split, double limit, bst_smear_rule *r);
+
+/* Peano kernels of a smaller variance, over that of the PSF, change an error by less than a tenth:
+ * they are left out. */
+#define BST_LEAST_KERNEL 0.02
+
+/* Sets the variance of a rule's Peano kernel.
+ *
+ * Given:     high  E[x^7] and E[x^8] of the group */
+void bst_smear_set_kernel(const bst_smear_moments *g, const double high[2], bst_smear_rule *r);
+
+/* Largest variance of that kernel, px^2. */
+double bst_smear_most_kernel(const bst_smear_rule *r);
 
 /* Parts of the missed moment's error that remain if the image moves by 2^((k - BST_NODE_SCALES + 2)
  * / 2) of the path: below 1 for groups as long as the PSF is wide. */

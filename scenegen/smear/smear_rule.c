@@ -272,36 +272,54 @@ static double higher_moments_error(const bst_smear_maker *m, const bst_smear_mom
     return error;
 }
 
-/* Variance of the Peano kernel of n nodes, px^2.
- *
- * Given:     e       moments along the axis without the widening, to order 8
- *            missed  error of moment 2n
- *
- * Notes:     The kernel K >= 0 gives the error of a smooth function f as the mean of its derivative
- *            of order 2n under K, times missed / (2n)! (Davis and Rabinowitz, Methods of Numerical
- *            Integration, 1984, 4.3). x^(2n + 1) and x^(2n + 2) give its mean and variance. It is a
- *            spline between the path's ends with the nodes as knots. A long thin tail, which
- *            smooths little, counts no more than on a uniform path, where the variance is 0.0595 of
- *            the squared distance of two nodes, and 0.0254 of that of the outer ones of three. */
-static double kernel_variance(int n, const double e[9], double missed, const bst_smear_rule *r) {
-    if (n < 2 || !(missed > 0.0)) {
-        return 0.0;
+/* Takes the moments of a Gaussian of variance u out of e[0..6], about the mean (deconvolution). */
+static inline void take_widening(double e[7], double u) {
+    e[2] -= u;
+    e[4] -= u * (6.0 * e[2] + 3.0 * u);
+    e[5] -= 10.0 * u * e[3];
+    e[6] -= u * (15.0 * e[4] + u * (45.0 * e[2] + 15.0 * u));
+}
+
+double bst_smear_most_kernel(const bst_smear_rule *r) {
+    double low = r->node[0], high = r->node[0];
+    for (int i = 1; i < r->nodes; i++) {
+        low = fmin(low, r->node[i]);
+        high = fmax(high, r->node[i]);
     }
-    double next = e[2 * n + 1], second = e[2 * n + 2], low = r->node[0], high = r->node[0];
+    return (r->nodes == 2 ? 0.0595 : 0.0254) * (high - low) * (high - low);
+}
+
+/* The kernel K >= 0 gives the error of a smooth function f as the mean of its derivative of order
+ * 2n under K, times the missed moment over (2n)! (Davis and Rabinowitz, Methods of Numerical
+ * Integration, 1984, 4.3). x^(2n + 1) and x^(2n + 2) give its mean and variance. It is a spline
+ * between the path's ends with the nodes as knots. A long thin tail, which smooths little, counts
+ * no more than on a uniform path, where the variance is 0.0595 of the squared distance of two
+ * nodes, and 0.0254 of that of the outer ones of three. */
+void bst_smear_set_kernel(const bst_smear_moments *g, const double high[2], bst_smear_rule *r) {
+    int n = r->nodes;
+    double e[9], u = r->widening, missed = 0.0, next = 0.0, second = 0.0;
+    memcpy(e, g->along, sizeof g->along);
+    take_widening(e, u);
+    e[7] = high[0] - u * (21.0 * e[5] + 105.0 * u * e[3]);
+    e[8] = high[1] - u * (28.0 * e[6] + u * (210.0 * e[4] + u * (420.0 * e[2] + 105.0 * u)));
     for (int i = 0; i < n; i++) {
         double x = r->node[i], power = r->weight[i];
-        for (int k = 0; k < 2 * n + 1; k++) {
+        for (int k = 0; k < 2 * n; k++) {
             power *= x;
         }
-        low = fmin(low, x);
-        high = fmax(high, x);
-        next -= power;
-        second -= power * x;
+        missed -= power;
+        next -= power * x;
+        second -= power * x * x;
+    }
+    missed += e[2 * n];
+    next += e[2 * n + 1];
+    second += e[2 * n + 2];
+    if (!(missed > 0.0)) {
+        return;
     }
     double mean = next / ((2 * n + 1) * missed);
     double variance = second / ((n + 1) * (2 * n + 1) * missed) - mean * mean;
-    double most = (n == 2 ? 0.0595 : 0.0254) * (high - low) * (high - low);
-    return fmin(fmax(variance, 0.0), most);
+    r->kernel = fmin(fmax(variance, 0.0), bst_smear_most_kernel(r));
 }
 
 /* Errors of neighbouring groups of three nodes add up where their length is about 2.6 sigma, by 8 %
@@ -315,10 +333,14 @@ static double neighbours_part(double v) {
 void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_rule *r,
                             double part[BST_NODE_SCALES]) {
     enum { LOWEST = 2 - BST_NODE_SCALES };
-    /* a shorter group takes less than a tenth */
-    static const double SHORT = 0.02;
     double lit = m->variance + m->binned_variance, v = r->kernel / (lit + m->further_variance);
     double light[3][3], square = exp2(LOWEST), bend = norm3(r->bend);
+    for (int k = 0; k < BST_NODE_SCALES; k++) {
+        part[k] = 1.0;
+    }
+    if (v < BST_LEAST_KERNEL) {
+        return;
+    }
     for (int i = 0; i < r->nodes; i++) {
         for (int j = 0; j < i; j++) {
             double x = r->node[i] - r->node[j], y = bend * (r->curve[i] - r->curve[j]);
@@ -327,10 +349,6 @@ void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_rule *r,
         light[i][i] = 1.0;
     }
     for (int k = 0; k < BST_NODE_SCALES; k++, square *= 2.0) {
-        part[k] = 1.0;
-        if (v < SHORT) {
-            continue;
-        }
         double peak = 0.0, wide = 1.0 + square * v;
         for (int i = 0; i < r->nodes; i++) {
             double here = 0.0;
@@ -358,14 +376,9 @@ void bst_smear_try_rule(const bst_smear_maker *m, const bst_smear_moments *g, in
     if (!fit_moments(m, g, widen, split, &rest, r)) {
         return;
     }
-    double e[9], u = n == 1 ? 0.0 : r->widening;
+    double e[7];
     memcpy(e, g->along, sizeof e);
-    e[2] -= u;
-    e[4] -= u * (6.0 * e[2] + 3.0 * u);
-    e[5] -= 10.0 * u * e[3];
-    e[6] -= u * (15.0 * e[4] + u * (45.0 * e[2] + 15.0 * u));
-    e[7] -= u * (21.0 * e[5] + 105.0 * u * e[3]);
-    e[8] -= u * (28.0 * e[6] + u * (210.0 * e[4] + u * (420.0 * e[2] + 105.0 * u)));
+    take_widening(e, n == 1 ? 0.0 : r->widening);
     double error = higher_moments_error(m, g, e, split, r);
     if (!(error <= limit)) {
         return;
@@ -390,7 +403,6 @@ void bst_smear_try_rule(const bst_smear_maker *m, const bst_smear_moments *g, in
     double power = n == 3 ? var * var * var : var * var;
     r->missed = n == 1 ? 0.0 : m->pixel_part[n - 1] * missed / (factor[n] / MARGIN * power);
     r->error = error + r->missed;
-    r->kernel = split ? 0.0 : kernel_variance(n, e, missed, r);
 }
 
 void bst_smear_choose_rule(const bst_smear_maker *m, const bst_smear_moments *g, double limit,

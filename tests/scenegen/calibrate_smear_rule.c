@@ -2,9 +2,9 @@
  * derivatives of a Gaussian that its formulas take.
  *
  * A factor is as large as it must be when the worst measured error of many paths is just below the
- * predicted one. Both factors are checked on paths where their term is the greater part of the
- * prediction: fast jitter about a line for NEIGHBOURS, smooth motion for MARGIN. Prints the ratios
- * of measured and predicted error. */
+ * predicted one. The factors are checked on paths where their term is the greater part of the
+ * prediction: fast jitter about a line for NEIGHBOURS, smooth motion for MARGIN, and rows of equal
+ * groups on a line for neighbours_part. Prints the ratios of measured and predicted error. */
 #include <stdlib.h>
 
 #include "boresight/rng.h"

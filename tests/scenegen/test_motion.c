@@ -218,7 +218,7 @@ static void errors_of_faint_groups_count_less(void **state) {
                                                  fmax(0.16 + 0.1 * g, 0.1 + 0.16 * g) / 0.5,
                                                  fmax(0.024 + 0.002 * g, 0.002 + 0.024 * g) / 0.03};
             double part[BST_NODE_PARTS];
-            bst_smear_nodes_parts(nodes, 2, sigma, part);
+            bst_smear_nodes_parts(nodes, 2, sigma, true, part);
             for (int i = 0; i < BST_NODE_PARTS; i++) {
                 bst_assert_close(part[i], sums[i] / light, 1e-8);
             }
@@ -228,12 +228,12 @@ static void errors_of_faint_groups_count_less(void **state) {
     double part[BST_NODE_PARTS];
     const bst_smear_node alike[2] = {{{0, 0, 0}, 0.9, 0.0, 0.95, 0.95},
                                      {{9, 0, 0}, 0.1, 0.0, 1.0, 1.0}};
-    bst_smear_nodes_parts(alike, 2, sigma, part);
+    bst_smear_nodes_parts(alike, 2, sigma, true, part);
     bst_assert_close(part[BST_PART_BOUND], 1.0, 0.0);
     bst_assert_close(part[BST_PART_PREDICTED], 1.0, 0.0);
     const bst_smear_node exact[2] = {{{0, 0, 0}, 0.9, 0.0, 0.0, 0.0},
                                      {{9, 0, 0}, 0.1, 0.0, 0.0, 0.0}};
-    bst_smear_nodes_parts(exact, 2, sigma, part);
+    bst_smear_nodes_parts(exact, 2, sigma, true, part);
     bst_assert_close(part[BST_PART_BOUND], 1.0, 0.0);
 }
 
