@@ -136,8 +136,9 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     BST_TRY(bst_fourier_render_create(ctx, device, &r->camera, r->psf, &light, &r->fourier));
     smear->widest = bst_fourier_render_widest(r->fourier);
     smear->node_sigma_px = bst_fourier_render_band(r->fourier)->node_sigma_px;
+    smear->smoothed_variance_px2 = bst_fourier_render_band(r->fourier)->smoothed_variance_px2;
     smear->share_sigma_px = bst_fourier_render_band(r->fourier)->share_sigma_px;
-    smear->grid_per_px = bst_fourier_render_density(r->fourier);
+    smear->grid_per_px = bst_fourier_render_density(r->fourier, false);
     memcpy(smear->pixel_part, bst_fourier_render_band(r->fourier)->pixel_part,
            sizeof smear->pixel_part);
     return BST_OK;

@@ -64,33 +64,47 @@ typedef struct planning {
     double beyond; /* light per pixel from a source beyond the margin, s */
     int blocks;    /* largest number */
     int64_t max_nodes;
-    bool fine;         /* use the finer grid */
-    double grid_sigma; /* largest grid error */
+    bool fine; /* use the finer grid */
+    /* largest grid error, alone and with what the widening kernel differs by */
+    double grid_sigma, widened_sigma;
 } planning;
+
+/* Sum of two errors of a source, with maxima on different pixels: a share of the lesser adds to the
+ * greater, as for two sources in error_budget.c. Validated by tests/scenegen/test_tolerance_sweep.c
+ * (slow). */
+static float sum_of(double a, double b) {
+    static const double REST = 0.4;
+    return (float)(fmax(a, b) + REST * fmin(a, b));
+}
 
 /* Adds a rendered source's error to the frame's budget. */
 static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *source) {
-    /* Share of the lesser of two errors, with maxima on different pixels, that adds to the greater;
-     * as for two sources in error_budget.c. Validated by tests/scenegen/test_tolerance_sweep.c
-     * (slow). */
-    static const double REST = 0.4;
     bst_error_budget_source error = *bst_smear_last_error(m->smear);
     if (source->rate && source->rate->error > 0.0) { /* glints that the light curve lacks */
-        error.nodes_e += (float)(source->rate->error * (double)error.peak_e);
+        float glints_e = (float)(source->rate->error * (double)error.peak_e);
+        error.nodes_e += glints_e;
+        error.predicted_e += glints_e;
     }
-    if (m->fourier) { /* grid error, on dark pixels too */
-        double peak_e = bst_smear_last_read_e(m->smear),
-               presence = bst_smear_last_presence(m->smear);
-        double grid = bst_fourier_render_error_sigma(m->fourier, m->fine, presence < 1.0,
-                                                     m->request->window, peak_e, m->dark_e2);
+    if (m->fourier) { /* error of grid and widening, on dark pixels too */
+        double presence = bst_smear_last_presence(m->smear),
+               noise_e = sqrt((double)error.peak_e + m->dark_e2);
+        bst_fourier_point point = {.peak_e = bst_smear_last_read_e(m->smear),
+                                   .dark_variance_e2 = m->dark_e2,
+                                   .wings = presence < 1.0};
+        bst_window window = m->request->window;
+        double grid = bst_fourier_render_error_sigma(m->fourier, m->fine, window, &point);
+        error.nodes_e = sum_of((double)error.nodes_e, grid * noise_e);
         m->grid_sigma = fmax(m->grid_sigma, grid);
-        double nodes_e = (double)error.nodes_e,
-               grid_e = grid * sqrt((double)error.peak_e + m->dark_e2);
-        error.nodes_e = (float)(fmax(nodes_e, grid_e) + REST * fmin(nodes_e, grid_e));
+        point.widening_px2 = bst_smear_last_widening_px2(m->smear);
+        if (point.widening_px2 > 0.0) {
+            grid = bst_fourier_render_error_sigma(m->fourier, m->fine, window, &point);
+        }
+        error.predicted_e = sum_of((double)error.predicted_e, grid * noise_e);
+        m->widened_sigma = fmax(m->widened_sigma, grid);
         const float *colour = source->colour;
         if (colour[0] != 0.0F || colour[1] != 0.0F || colour[2] != 0.0F) {
             error.excess_e +=
-                (float)(presence * bst_fourier_render_mixing_error(m->fourier) * peak_e);
+                (float)(presence * bst_fourier_render_mixing_error(m->fourier) * point.peak_e);
         }
     }
     return bst_error_budget_add(ctx, m->budget, &error);
@@ -103,7 +117,7 @@ static bst_status plan_sources(bst_ctx *ctx, bst_scene_plan *p, planning *m, boo
     bst_error_budget_motion motion = bst_smear_motion(m->smear);
     bst_error_budget_begin(m->budget, &motion);
     p->count = p->blocks = 0;
-    m->grid_sigma = 0.0;
+    m->grid_sigma = m->widened_sigma = 0.0;
     *fits = true;
     if (p->results) {
         BST_TRY(bst_smear_sources(ctx, m->smear, q->sources, q->count, p->results));
@@ -189,14 +203,18 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
      * request */
     coarse = coarse || m->request->count > TOO_MANY;
     for (int round = 0, idle = 0; round < ROUNDS && idle < 2 && !coarse; round++) {
-        double error = bst_error_budget_error_sigma(m->budget), last = aim;
+        /* the bound, so that images do not change with the prediction if it is within it */
+        double bound = bst_error_budget_bound_sigma(m->budget), last = aim;
+        double error = fmax(bound, bst_error_budget_error_sigma(m->budget));
         if (error <= tolerance) {
             break;
         }
+        double grid = bound <= tolerance ? m->widened_sigma : m->grid_sigma;
         idle = error > GAIN * before ? idle + 1 : 0;
         before = error;
-        if (m->fourier && !m->fine && m->grid_sigma > GRID_SHARE * tolerance) {
+        if (m->fourier && !m->fine && grid > GRID_SHARE * tolerance) {
             m->fine = true;
+            bst_smear_refine_grid(m->smear, bst_fourier_render_density(m->fourier, true));
         } else {
             aim *= fmin(fmax(LESS * tolerance / error, MOST_STEP), LEAST_STEP);
         }

@@ -11,8 +11,9 @@
  * highest frequency. */
 enum { LATTICE = 96, SIDE = 192 };
 
-/* Images: whole OTF, first aliases along x and y, frequencies beyond the cut-off. */
-enum { WHOLE, ALIAS_X, ALIAS_Y, LOST, IMAGES };
+/* Images: whole OTF, first aliases along x and y, frequencies beyond the cut-off, what the widening
+ * kernel differs by. */
+enum { WHOLE, ALIAS_X, ALIAS_Y, LOST, WIDENED, IMAGES };
 
 /* First brightness class of the wings: a Gaussian three sigma away is at 0.011. */
 enum { WINGS = 7 };
@@ -20,7 +21,8 @@ enum { WINGS = 7 };
 typedef struct lattice {
     const bst_psf *psf;
     double step, cutoff, alias[2][LATTICE];
-    bst_fft_complex_f64 *room; /* [SIDE][SIDE] */
+    double wide[2][LATTICE], ideal[2][LATTICE]; /* widening kernel, and the Gaussian that it fits */
+    bst_fft_complex_f64 *room;                  /* [SIDE][SIDE] */
     bst_fft *inverse;
     double *image; /* [IMAGES][SIDE][SIDE] */
 } lattice;
@@ -48,6 +50,23 @@ static void find_aliases(lattice *l, const bst_fourier_axis *axis, int a) {
     }
 }
 
+/* Transforms of the widening kernel at the lattice frequencies of an axis, for a variance in px^2.
+ */
+static void find_widening(lattice *l, const bst_fourier_axis *axis,
+                          const bst_nufft_kernel_band *band, double variance, int a) {
+    double density = (double)axis->samples / axis->pixels;
+    bst_nufft_kernel_shape shape;
+    (void)bst_nufft_kernel_widen(&axis->spread, band, density, variance * density * density,
+                                 &shape);
+    for (int i = 0; i < LATTICE; i++) {
+        double f = frequency(l, i), nu = f / density;
+        bool inside = fabs(nu) < 0.5; /* beyond the grid's band everything is lost */
+        l->ideal[a][i] = exp(-2.0 * BST_PI * BST_PI * variance * f * f);
+        l->wide[a][i] =
+            inside ? bst_nufft_kernel_shape_transform(&axis->spread, &shape, nu) : l->ideal[a][i];
+    }
+}
+
 /* Renders one of the images of a field node by FFT. */
 static void make_image(lattice *l, int node, int what) {
     double area = l->step * l->step, *image = l->image + what * SIDE * SIDE;
@@ -59,7 +78,10 @@ static void make_image(lattice *l, int node, int what) {
             if (what != WHOLE && kept != (what != LOST)) {
                 continue;
             }
-            f *= what == ALIAS_X ? l->alias[0][i] : what == ALIAS_Y ? l->alias[1][j] : 1.0;
+            f *= what == ALIAS_X   ? l->alias[0][i]
+                 : what == ALIAS_Y ? l->alias[1][j]
+                 : what == WIDENED ? l->wide[0][i] * l->wide[1][j] - l->ideal[0][i] * l->ideal[1][j]
+                                   : 1.0;
             bst_psf_otf(l->psf, node, fx, fy, v);
             double *z =
                 l->room[((j - LATTICE / 2 + SIDE) % SIDE) * SIDE + (i - LATTICE / 2 + SIDE) % SIDE];
@@ -96,18 +118,20 @@ static void add_node_errors(lattice *l, int node, double peak, bst_fourier_error
         double error = SAFE * 2.0 * (at[ALIAS_X * SIDE * SIDE] + at[ALIAS_Y * SIDE * SIDE]) +
                        at[LOST * SIDE * SIDE];
         out->most[k] = fmax(out->most[k], error / peak);
+        out->widened[k] = fmax(out->widened[k], at[WIDENED * SIDE * SIDE] / peak);
     }
 }
 
 bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst_fourier_band *band,
-                                     const bst_fourier_axis axis[2], bst_fourier_error *out) {
-    assert(psf && band && axis && out);
+                                     const bst_fourier_axis axis[2], double widest_px2,
+                                     bst_fourier_error *out) {
+    assert(psf && band && axis && widest_px2 >= 0.0 && out);
     lattice l = {.psf = psf,
                  .step = 2.0 * fmax(bst_psf_cutoff(psf), band->cutoff) / LATTICE,
                  .cutoff = band->cutoff,
                  .room = bst_fft_array(sizeof *l.room * SIDE * SIDE),
                  .image = malloc(sizeof *l.image * IMAGES * SIDE * SIDE)};
-    *out = (bst_fourier_error){{0.0}};
+    *out = (bst_fourier_error){.widest_px2 = widest_px2};
     bst_status status =
         l.room && l.image
             ? bst_fft_create_f64(ctx, BST_FFT_INVERSE, SIDE, SIDE, *l.room, *l.room, &l.inverse)
@@ -115,6 +139,7 @@ bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst
     if (status == BST_OK) {
         for (int a = 0; a < 2; a++) {
             find_aliases(&l, &axis[a], a);
+            find_widening(&l, &axis[a], &band->axis[a], widest_px2, a);
         }
         for (int n = 0; n < bst_psf_nodes(psf); n++) {
             add_node_errors(&l, n, band->peak, out);
@@ -126,15 +151,16 @@ bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst
     return status;
 }
 
-double bst_fourier_error_sigma(const bst_fourier_error *error, bool wings, double peak_e,
-                               double dark_variance_e2) {
-    double worst = 0.0, light_e = peak_e;
+double bst_fourier_error_sigma(const bst_fourier_error *error, const bst_fourier_point *point) {
+    double worst = 0.0, light_e = point->peak_e;
+    double widened = error->widest_px2 > 0.0 ? point->widening_px2 / error->widest_px2 : 0.0;
     for (int k = 0; k < BST_LIGHT_CLASSES; k++) {
         light_e = k + 1 < BST_LIGHT_CLASSES ? 0.5 * light_e : 0.0;
-        if (wings && k < WINGS) {
+        if (point->wings && k < WINGS) {
             continue;
         }
-        worst = fmax(worst, error->most[k] * peak_e / sqrt(light_e + dark_variance_e2));
+        double part = error->most[k] + widened * error->widened[k];
+        worst = fmax(worst, part * point->peak_e / sqrt(light_e + point->dark_variance_e2));
     }
     return worst;
 }

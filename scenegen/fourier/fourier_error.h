@@ -11,19 +11,29 @@ enum { BST_LIGHT_CLASSES = 20 };
 typedef struct bst_fourier_error {
     /* largest error of a pixel of the class, relative to the PSF's peak */
     double most[BST_LIGHT_CLASSES];
+    /* the same of what the widening kernel differs from a Gaussian's convolution, for a node
+     * widened by widest_px2; about in proportion to the widening */
+    double widened[BST_LIGHT_CLASSES], widest_px2;
 } bst_fourier_error;
 
 /* Measures the largest grid errors over all sub-sample positions and field nodes.
  *
- * Given:     axis  grid along x and y
+ * Given:     axis        grid along x and y
+ *            widest_px2  largest widening of a node; 0: none
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst_fourier_band *band,
-                                     const bst_fourier_axis axis[2],
+                                     const bst_fourier_axis axis[2], double widest_px2,
                                      bst_fourier_error *out) BST_MUST_CHECK;
 
-/* Error of the worst pixel, in its sigma, of a point with `peak_e` electrons in its brightest pixel
- * and dark noise variance dark_variance_e2; of its wings only, if `wings`. */
-double bst_fourier_error_sigma(const bst_fourier_error *error, bool wings, double peak_e,
-                               double dark_variance_e2);
+/* A point's light and noise. */
+typedef struct bst_fourier_point {
+    double peak_e;           /* light in its brightest pixel */
+    double dark_variance_e2; /* noise variance of a dark pixel */
+    double widening_px2;     /* of its nodes */
+    bool wings;              /* the window contains only its wings */
+} bst_fourier_point;
+
+/* Error of the worst pixel of a point, in that pixel's sigma. */
+double bst_fourier_error_sigma(const bst_fourier_error *error, const bst_fourier_point *point);
 
 #endif

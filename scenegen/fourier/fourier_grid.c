@@ -118,13 +118,14 @@ static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, bst_fft_complex
     if (!peak_px) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the band of a PSF");
     }
+    double smoothed_px2 = 0.0;
     out->node_sigma_px = INFINITY;
     for (int a = 0; a < 2; a++) {
         out->axis[a].step = out->cutoff / BST_SPREAD_BINS;
         memset(out->axis[a].weight, 0, sizeof out->axis[a].weight);
     }
     for (int n = 0; n < bst_psf_nodes(psf); n++) {
-        double along[DIRECTIONS][3] = {{0}};
+        double along[DIRECTIONS][4] = {{0}};
         memset(room, 0, sizeof *room * IMAGE * IMAGE);
         for (int j = -LATTICE / 2; j < LATTICE / 2; j++) {
             for (int i = -LATTICE / 2; i < LATTICE / 2; i++) {
@@ -144,6 +145,7 @@ static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, bst_fft_complex
                     along[d][0] += w * w * m;
                     along[d][1] += w * w * w * w * m;
                     along[d][2] += w * w * w * w * w * w * m;
+                    along[d][3] += w * w * w * w * w * w * w * w * m;
                 }
             }
         }
@@ -167,6 +169,10 @@ static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, bst_fft_complex
                 double sigma = pow(GAUSSIAN[k] * top / along[d][k], 0.5 / (k + 1));
                 out->node_sigma_px = fmin(out->node_sigma_px, sigma);
             }
+            /* of a Gaussian 5 and 7 times derivatives of order 4 and 6 are those of the next order
+             * times its variance */
+            smoothed_px2 = fmax(smoothed_px2, 5.0 * along[d][1] / along[d][2]);
+            smoothed_px2 = fmax(smoothed_px2, 7.0 * along[d][2] / along[d][3]);
         }
     }
     memset(out->pixel_part, 0, sizeof out->pixel_part);
@@ -174,6 +180,7 @@ static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, bst_fft_complex
         measure_parts(psf, n, peak_px[n], out);
     }
     free(peak_px);
+    out->smoothed_variance_px2 = fmax(smoothed_px2, out->node_sigma_px * out->node_sigma_px);
     out->peak = peak;
     out->lost /= peak;
     for (int a = 0; a < 2; a++) {

@@ -18,6 +18,9 @@ typedef struct bst_fourier_band {
     /* Gaussian as sensitive to coarse nodes: its derivatives of order 2, 4 and 6 relative to its
      * peak (1, 3 and 15 over sigma to that order) are at least the PSF's */
     double node_sigma_px;
+    /* variance of the Gaussian whose derivatives of order 4 and 6 smoothing reduces no more than
+     * the PSF's, at least that of node_sigma_px */
+    double smoothed_variance_px2;
     /* derivatives of order 2, 4 and 6 in pixels binned n + 1 times, relative to their peak and to
      * unbinned pixels */
     double pixel_part[BST_PIXEL_PARTS][3];

@@ -165,9 +165,10 @@ static bst_status prepare_quality(bst_ctx *ctx, bst_fourier_render *l, int quali
             l->widest *= 0.8;
         }
     }
-    BST_TRY(bst_fourier_error_measure(ctx, l->psf, band, axis, &l->error[quality][0]));
+    double sigma_px = l->band[PLAIN].node_sigma_px, widest_px2 = l->widest * sigma_px * sigma_px;
+    BST_TRY(bst_fourier_error_measure(ctx, l->psf, band, axis, widest_px2, &l->error[quality][0]));
     choose_axes(l, quality, (int)l->camera.width_px, (int)l->camera.height_px, axis);
-    return bst_fourier_error_measure(ctx, l->psf, band, axis, &l->error[quality][1]);
+    return bst_fourier_error_measure(ctx, l->psf, band, axis, widest_px2, &l->error[quality][1]);
 }
 
 static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fourier_render *l) {
@@ -256,12 +257,13 @@ int bst_fourier_render_margin_px(const bst_fourier_render *l) {
     return l->margin;
 }
 
-double bst_fourier_render_density(const bst_fourier_render *l) {
-    return fmin(l->density[PLAIN][0], l->density[PLAIN][1]);
+double bst_fourier_render_density(const bst_fourier_render *l, bool fine) {
+    const double *density = l->density[fine ? FINE : PLAIN];
+    return fmin(density[0], density[1]);
 }
 
 void bst_fourier_render_stamp(const bst_fourier_render *l, bst_kernel_source_record *source) {
-    double least = bst_fourier_render_density(l);
+    double least = bst_fourier_render_density(l, false);
     source->radius = (int)ceil(0.5 * l->options.taps / least) + 1;
 }
 
@@ -273,11 +275,10 @@ int bst_fourier_render_spectra(const bst_fourier_render *l) {
     return l->nodes / l->field_nodes;
 }
 
-double bst_fourier_render_error_sigma(const bst_fourier_render *l, bool fine, bool wings,
-                                      bst_window window, double peak_e, double dark_variance_e2) {
+double bst_fourier_render_error_sigma(const bst_fourier_render *l, bool fine, bst_window window,
+                                      const bst_fourier_point *point) {
     bool whole = window.width == l->camera.width_px && window.height == l->camera.height_px;
-    return bst_fourier_error_sigma(&l->error[fine ? FINE : PLAIN][whole], wings, peak_e,
-                                   dark_variance_e2);
+    return bst_fourier_error_sigma(&l->error[fine ? FINE : PLAIN][whole], point);
 }
 
 double bst_fourier_render_mixing_error(const bst_fourier_render *l) {

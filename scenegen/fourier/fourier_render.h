@@ -8,6 +8,7 @@
 #define BST_SCENEGEN_FOURIER_FOURIER_RENDER_H
 
 #include "boresight/messages.h"
+#include "scenegen/fourier/fourier_error.h"
 #include "scenegen/fourier/fourier_grid.h"
 #include "scenegen/kernels/deposit_shared.h"
 #include "scenegen/kernels/scene_shared.h"
@@ -41,8 +42,8 @@ const bst_fourier_band *bst_fourier_render_band(const bst_fourier_render *light)
 /* Distance outside the window, px, from which a source's light is still rendered. */
 int bst_fourier_render_margin_px(const bst_fourier_render *light);
 
-/* Smallest number of grid samples per px and axis. */
-double bst_fourier_render_density(const bst_fourier_render *light);
+/* Smallest number of grid samples per px and axis, of the finer of the two grids if `fine`. */
+double bst_fourier_render_density(const bst_fourier_render *light, bool fine);
 
 /* Sets the reach of a source's nodes in its record. */
 void bst_fourier_render_stamp(const bst_fourier_render *light, bst_kernel_source_record *source);
@@ -53,13 +54,12 @@ double bst_fourier_render_widest(const bst_fourier_render *light);
 /* Number of spectra of the PSF (bst_psf_spectra). */
 int bst_fourier_render_spectra(const bst_fourier_render *light);
 
-/* Error bound of an image by grid and cut-off, in sigma of the worst pixel (fourier_error.h).
+/* Error bound of a source's image by grid, cut-off and widening kernel, in sigma of the worst pixel
+ * (fourier_error.h).
  *
- * Given:     peak_e  electrons of the source's brightest pixel
- *            fine    the finer of the two grids
- *            wings   the window contains only the source's wings */
-double bst_fourier_render_error_sigma(const bst_fourier_render *light, bool fine, bool wings,
-                                      bst_window window, double peak_e, double dark_variance_e2);
+ * Given:     fine  the finer of the two grids */
+double bst_fourier_render_error_sigma(const bst_fourier_render *light, bool fine, bst_window window,
+                                      const bst_fourier_point *point);
 
 /* Error bound by mixing of spectra (bst_psf_mixing_error), relative to the peak of a source with
  * its own spectrum. */

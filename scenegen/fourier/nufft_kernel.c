@@ -79,6 +79,13 @@ double bst_nufft_kernel_shape_value(const bst_nufft_kernel *spread,
     return bst_nufft_kernel_value(spread, t) * (shape->c[0] + q * (shape->c[1] + q * shape->c[2]));
 }
 
+double bst_nufft_kernel_shape_transform(const bst_nufft_kernel *spread,
+                                        const bst_nufft_kernel_shape *shape, double nu) {
+    double t[3];
+    transforms(spread, nu, t);
+    return (shape->c[0] * t[0] + shape->c[1] * t[1] + shape->c[2] * t[2]) / t[0];
+}
+
 double bst_nufft_kernel_widen(const bst_nufft_kernel *spread, const bst_nufft_kernel_band *band,
                               double density, double variance, bst_nufft_kernel_shape *out) {
     *out = (bst_nufft_kernel_shape){{1.0, 0.0, 0.0}};

@@ -44,6 +44,10 @@ typedef struct bst_nufft_kernel_shape {
 double bst_nufft_kernel_widen(const bst_nufft_kernel *spread, const bst_nufft_kernel_band *band,
                               double density, double variance, bst_nufft_kernel_shape *out);
 
+/* Transform of the widening kernel over phi's own, at nu cycles per sample. */
+double bst_nufft_kernel_shape_transform(const bst_nufft_kernel *spread,
+                                        const bst_nufft_kernel_shape *shape, double nu);
+
 /* Value of the widening kernel, phi(t) (c0 + c1 z^2 + c2 z^4) with z = 2 t / taps.
  *
  * Given:     t  distance, samples of the grid */

@@ -19,11 +19,14 @@ enum { REACH = 5, MOST_CROSSINGS = 1000 };
 /* A dense cell array pays for at least MANY spots if one cell in SPARSE is occupied. */
 enum { MANY = 256, SPARSE = 32 };
 
+/* Errors of nodes are summed twice: their bounds, and what is predicted. */
+enum { BOUND, PREDICTED, ERRORS };
+
 /* Sources at one position. */
 typedef struct spot {
     int64_t key;
     unsigned frame; /* frame in which it was filled; older ones are empty */
-    float x, y, peak, nodes, shared, excess, border;
+    float x, y, peak, nodes[ERRORS], shared, excess, border;
 } spot;
 
 /* Error sums of sources in a cell (half a box), in sigma. */
@@ -31,7 +34,8 @@ typedef struct cell {
     int64_t key;
     unsigned frame;
     int u, v;
-    float squares, worst, second, shared, excess, worst_excess, border, worst_border;
+    float squares[ERRORS], worst[ERRORS], second[ERRORS];
+    float shared, excess, worst_excess, border, worst_border;
 } cell;
 
 struct bst_error_budget {
@@ -46,8 +50,9 @@ struct bst_error_budget {
      * columns 0: cells are found by hashing. */
     int *field, field_capacity;
     int first_u, first_v, rows, columns;
-    double missing_e; /* light missing everywhere */
-    double error;     /* negative: not computed yet */
+    double missing_e;     /* light missing everywhere */
+    bool above;           /* a predicted error exceeds its bound */
+    double error[ERRORS]; /* negative: not computed yet */
 };
 
 bst_status bst_error_budget_create(bst_ctx *ctx, bst_error_budget **out) {
@@ -104,14 +109,15 @@ void bst_error_budget_begin(bst_error_budget *c, const bst_error_budget_motion *
     c->motion.overlap = fmin(
         1.0, (motion->way_px + psf) * psf / ((motion->length_px + psf) * (motion->width_px + psf)));
     c->count = 0;
+    c->above = false;
     c->missing_e = 0.0;
-    c->error = -1.0;
+    c->error[BOUND] = -1.0;
 }
 
 void bst_error_budget_miss(bst_error_budget *c, double electrons) {
     assert(c && electrons >= 0.0);
     c->missing_e += electrons;
-    c->error = -1.0;
+    c->error[BOUND] = -1.0;
 }
 
 bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *c,
@@ -138,6 +144,7 @@ bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *c,
     }
     assert(c->count < c->capacity);
     c->sources[c->count++] = *source;
+    c->above = c->above || source->predicted_e > source->nodes_e;
     return BST_OK;
 }
 
@@ -204,15 +211,19 @@ static cell *make_cell(bst_error_budget *c, int u, int v, int *cells) {
 
 /* Merges sources into spots; returns their number. *apart: largest error of sources in their own
  * motion. */
-static int fill_spots(bst_error_budget *c, float *apart) {
+static int fill_spots(bst_error_budget *c, float apart[ERRORS]) {
     float per_px = 1.0f / fmaxf((float)c->motion.sigma_px, 1.0f);
     float dark = (float)c->motion.dark_variance_e2;
     int spots = 0;
     for (int i = 0; i < c->count; i++) {
         const bst_error_budget_source *s = &c->sources[i];
         if (s->apart) {
-            float e = (s->nodes_e + s->excess_e + s->shared_e) / sqrtf(s->peak_e + dark);
-            *apart = fmaxf(*apart, fmaxf(e, s->border_e / sqrtf(dark)));
+            float noise = sqrtf(s->peak_e + dark), border = s->border_e / sqrtf(dark);
+            const float nodes[ERRORS] = {s->nodes_e, s->predicted_e};
+            for (int k = 0; k < ERRORS; k++) {
+                float e = (nodes[k] + s->excess_e + s->shared_e) / noise;
+                apart[k] = fmaxf(apart[k], fmaxf(e, border));
+            }
             continue;
         }
         int64_t key = key_of((int)floorf(s->x_px * per_px), (int)floorf(s->y_px * per_px));
@@ -224,7 +235,8 @@ static int fill_spots(bst_error_budget *c, float *apart) {
             c->used[spots++] = n;
         }
         p->peak += s->peak_e;
-        p->nodes += s->nodes_e;
+        p->nodes[BOUND] += s->nodes_e;
+        p->nodes[PREDICTED] += s->predicted_e;
         p->shared += s->shared_e;
         p->excess += s->excess_e;
         p->border += s->border_e;
@@ -299,10 +311,13 @@ static int fill_cells(bst_error_budget *c, int spots) {
         int u, v;
         cell_of(&l, s, &u, &v);
         cell *p = make_cell(c, u, v, &cells);
-        float lit = 1.0f / sqrtf(s->peak + dark), nodes = s->nodes * lit;
-        p->squares += nodes * nodes;
-        p->second = greater(p->second, nodes < p->worst ? nodes : p->worst);
-        p->worst = greater(p->worst, nodes);
+        float lit = 1.0f / sqrtf(s->peak + dark);
+        for (int k = 0; k < ERRORS; k++) {
+            float nodes = s->nodes[k] * lit;
+            p->squares[k] += nodes * nodes;
+            p->second[k] = greater(p->second[k], nodes < p->worst[k] ? nodes : p->worst[k]);
+            p->worst[k] = greater(p->worst[k], nodes);
+        }
         p->shared += s->shared * lit;
         p->excess += s->excess * lit;
         p->worst_excess = greater(p->worst_excess, s->excess * lit);
@@ -312,17 +327,18 @@ static int fill_cells(bst_error_budget *c, int spots) {
     return cells;
 }
 
-/* Error of the box about a cell. */
-static float box_error(const bst_error_budget *c, const cell *middle) {
+/* Error of the box about a cell, of one kind. */
+static float box_error(const bst_error_budget *c, const cell *middle, int kind) {
     cell sum = {.key = 0};
+    float squares = 0.0f, worst = 0.0f, second = 0.0f;
     for (int u = -1; u <= 1; u++) {
         for (int v = -1; v <= 1; v++) {
             const cell *p = u == 0 && v == 0 ? middle : look_up(c, middle->u + u, middle->v + v);
             if (p) {
-                sum.squares += p->squares;
-                float less = p->worst < sum.worst ? p->worst : sum.worst;
-                sum.second = greater(greater(sum.second, p->second), less);
-                sum.worst = greater(sum.worst, p->worst);
+                squares += p->squares[kind];
+                float less = p->worst[kind] < worst ? p->worst[kind] : worst;
+                second = greater(greater(second, p->second[kind]), less);
+                worst = greater(worst, p->worst[kind]);
                 sum.shared += p->shared;
                 sum.excess += p->excess;
                 sum.worst_excess = greater(sum.worst_excess, p->worst_excess);
@@ -332,10 +348,10 @@ static float box_error(const bst_error_budget *c, const cell *middle) {
         }
     }
     float part = (float)c->motion.overlap;
-    float others = sqrtf(part * fmaxf(sum.squares - sum.worst * sum.worst, 0.0f));
+    float others = sqrtf(part * fmaxf(squares - worst * worst, 0.0f));
     float excess = sum.worst_excess + part * (sum.excess - sum.worst_excess);
-    return fmaxf(sum.worst + excess, sum.worst_border) + sum.shared +
-           REST * fmaxf(others, sum.second) + BORDERS * (sum.border - sum.worst_border);
+    return fmaxf(worst + excess, sum.worst_border) + sum.shared + REST * fmaxf(others, second) +
+           BORDERS * (sum.border - sum.worst_border);
 }
 
 /* Cells by the square of SIDE cells that they lie in, as lists, to find those within REACH of a
@@ -392,28 +408,46 @@ static float worst_crossing(const bst_error_budget *c, int cells, float worst) {
     return worst;
 }
 
-double bst_error_budget_error_sigma(bst_error_budget *c) {
-    if (c->error < 0.0) {
-        float worst = 0.0f, apart = 0.0f, border = 0.0f;
-        c->frame++;
-        int cells = fill_cells(c, fill_spots(c, &apart));
-        /* in the order of the dense array, if there is one */
-        int places = c->columns > 0 ? c->columns * c->rows : cells;
-        for (int i = 0; i < places; i++) {
-            int n = c->columns > 0 ? c->field[i] - 1 : c->used[i];
-            if (n >= 0) {
-                worst = greater(worst, box_error(c, &c->cells[n]));
-                border = greater(border, c->cells[n].worst_border);
+/* Computes the errors of the frame. */
+static void sum_errors(bst_error_budget *c) {
+    float worst[ERRORS] = {0.0f}, apart[ERRORS] = {0.0f}, border = 0.0f;
+    c->frame++;
+    int cells = fill_cells(c, fill_spots(c, apart));
+    /* in the order of the dense array, if there is one */
+    int places = c->columns > 0 ? c->columns * c->rows : cells;
+    for (int i = 0; i < places; i++) {
+        int n = c->columns > 0 ? c->field[i] - 1 : c->used[i];
+        if (n >= 0) {
+            float bound = box_error(c, &c->cells[n], BOUND);
+            worst[BOUND] = greater(worst[BOUND], bound);
+            if (c->above || bound > worst[PREDICTED]) {
+                worst[PREDICTED] = greater(worst[PREDICTED], box_error(c, &c->cells[n], PREDICTED));
             }
+            border = greater(border, c->cells[n].worst_border);
         }
-        if (cells > MOST_CROSSINGS) { /* too many cells: assume that the worst ones cross */
-            worst = fmaxf(worst, 2.0f * border);
-        }
-        if (2.0f * border > worst) {
-            worst = worst_crossing(c, cells, worst);
-        }
-        c->error = fmaxf(worst, apart) + REST * fminf(worst, apart) +
-                   c->missing_e / sqrt(c->motion.dark_variance_e2);
     }
-    return c->error;
+    float crossing = fminf(worst[BOUND], worst[PREDICTED]);
+    if (cells > MOST_CROSSINGS) { /* too many cells: assume that the worst ones cross */
+        crossing = fmaxf(crossing, 2.0f * border);
+    }
+    if (2.0f * border > crossing) {
+        crossing = worst_crossing(c, cells, crossing);
+    }
+    for (int k = 0; k < ERRORS; k++) {
+        worst[k] = fmaxf(worst[k], crossing);
+        c->error[k] = fmaxf(worst[k], apart[k]) + REST * fminf(worst[k], apart[k]) +
+                      c->missing_e / sqrt(c->motion.dark_variance_e2);
+    }
+}
+
+double bst_error_budget_bound_sigma(bst_error_budget *c) {
+    if (c->error[BOUND] < 0.0) {
+        sum_errors(c);
+    }
+    return c->error[BOUND];
+}
+
+double bst_error_budget_error_sigma(bst_error_budget *c) {
+    (void)bst_error_budget_bound_sigma(c);
+    return c->error[PREDICTED];
 }

@@ -32,13 +32,14 @@ bst_error_budget_motion bst_error_budget_motion_of(const bst_smear_path_point *p
 
 /* Error of one source's image. */
 typedef struct bst_error_budget_source {
-    float x_px, y_px; /* position anywhere on its path, at the same time for all sources */
-    float peak_e;     /* largest light in one pixel */
-    float nodes_e;    /* largest error by nodes, profiles and rounding, e- */
-    float shared_e;   /* error by a shared track */
-    float excess_e;   /* light from beyond the stamp, added to it */
-    float border_e;   /* light missing next to the stamp */
-    bool apart;       /* moves further than the stars do */
+    float x_px, y_px;  /* position anywhere on its path, at the same time for all sources */
+    float peak_e;      /* largest light in one pixel */
+    float nodes_e;     /* bound of the error by nodes, profiles and rounding, e- */
+    float predicted_e; /* predicted value of that error */
+    float shared_e;    /* error by a shared track */
+    float excess_e;    /* light from beyond the stamp, added to it */
+    float border_e;    /* light missing next to the stamp */
+    bool apart;        /* moves further than the stars do */
 } bst_error_budget_source;
 
 /* Creates an empty error budget.
@@ -62,7 +63,11 @@ bst_status bst_error_budget_add(bst_ctx *ctx, bst_error_budget *budget,
 /* Adds light that any pixel may lack, e-: of sources too far away to be rendered. */
 void bst_error_budget_miss(bst_error_budget *budget, double electrons);
 
-/* Largest expected error in any pixel, in its sigma. It is computed at the first call. */
+/* Bound of the error in any pixel, in its sigma, that chooses nodes. It is computed at the first
+ * call. */
+double bst_error_budget_bound_sigma(bst_error_budget *budget);
+
+/* Predicted error in any pixel, as bst_error_budget_bound_sigma. */
 double bst_error_budget_error_sigma(bst_error_budget *budget);
 
 #endif

@@ -30,9 +30,16 @@ bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_smear_path_point *path, 
  * on a pixel; uses at most 128 positions of the path. */
 double bst_smear_nodes_peak_share(const bst_smear_node *nodes, int count, double psf_sigma_px);
 
-/* Largest error of a smeared image over its peak, relative to that of the worst node group: 1 if
- * all groups are equal, less if the worst are faint for their speed. */
-double bst_smear_nodes_error_part(const bst_smear_node *nodes, int count, double psf_sigma_px);
+/* Properties of nodes that add up over an image: bounds of errors, predicted errors, widenings. */
+enum { BST_PART_BOUND, BST_PART_PREDICTED, BST_PART_WIDENING, BST_NODE_PARTS };
+
+/* Largest sums of properties over a smeared image, over its peak, relative to that of the worst
+ * node: 1 if all nodes are equal, less if the worst are faint for their speed.
+ *
+ * Given:     widening  that of the widenings matters
+ * Returned:  part      of the bounds of errors, the predicted errors and the widenings */
+void bst_smear_nodes_parts(const bst_smear_node *nodes, int count, double psf_sigma_px,
+                           bool widening, double part[BST_NODE_PARTS]);
 
 /* Part of an interval between two track samples over which a source's brightness is smooth. The
  * interval begins at begin_s of duration_s and takes length_s.

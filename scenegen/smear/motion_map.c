@@ -231,7 +231,7 @@ static void fill_cell(const bst_motion_map *map, place *places, bst_smear_star_m
     memcpy(cell->low, low, sizeof low);
     memcpy(cell->high, high, sizeof high);
     for (int k = 0; k < BST_MOTION_ERRORS; k++) {
-        cell->error[k] = -1.0;
+        cell->error[k] = cell->predicted[k] = -1.0;
     }
 }
 

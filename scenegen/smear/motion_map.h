@@ -22,7 +22,7 @@ typedef struct bst_smear_star_motion_cell {
     /* box of its positions relative to that at the reference attitude, px */
     double low[2], high[2];
     /* caller's cache of errors that depend on `scale`; negative in a new cell */
-    double error[BST_MOTION_ERRORS];
+    double error[BST_MOTION_ERRORS], predicted[BST_MOTION_ERRORS];
 } bst_smear_star_motion_cell;
 
 /* Creates an empty motion map.

@@ -283,6 +283,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
     bst_smear_clear_ahead(s);
     s->sources = frame->sources;
     s->aim = frame->aim > 0.0 ? frame->aim : 1.0;
+    s->grid_per_px = s->options.grid_per_px;
     s->frame++;
     s->duration_s = track->time_s[track->count - 1];
     s->q_reference = attitude_at(track, 0.5 * s->duration_s);
@@ -333,6 +334,11 @@ void bst_smear_restart(bst_smear *s, double aim) {
     }
 }
 
+void bst_smear_refine_grid(bst_smear *s, double per_px) {
+    assert(s && per_px > 0.0);
+    s->grid_per_px = per_px;
+}
+
 double bst_smear_allowed(const bst_smear *s, double peak_e) {
     return s->aim * s->options.tolerance_sigma * sqrt(FLANK * peak_e + s->dark_variance_e2) /
            fmax(peak_e, 1e-9);
@@ -352,7 +358,7 @@ int bst_smear_choose_level(const bst_smear *s, double scale) {
     return n;
 }
 
-/* Error of a level for stars of a cell (NULL: of all stars), cached in the cell. */
+/* Error bound of a level for stars of a cell (NULL: of all stars), cached in the cell. */
 static double star_error(const bst_smear *s, int n, bst_smear_star_motion_cell *cell) {
     if (!cell) {
         return bst_smear_level_error(&s->levels[n], 1.0);
@@ -367,10 +373,28 @@ static double star_error(const bst_smear *s, int n, bst_smear_star_motion_cell *
     return error;
 }
 
-/* Chooses the coarsest level that keeps the tolerance for a star, starting from the tolerance's
- * level. */
+/* Predicted error, as star_error. */
+static double star_prediction(const bst_smear *s, int n, bst_smear_star_motion_cell *cell) {
+    if (s->levels[n].alike) {
+        return star_error(s, n, cell);
+    }
+    if (!cell) {
+        return bst_smear_level_prediction(&s->levels[n], 1.0);
+    }
+    if (cell->predicted[n] >= 0.0) {
+        return cell->predicted[n];
+    }
+    double predicted = bst_smear_level_prediction(&s->levels[n], cell->scale);
+    if (!s->fixed) {
+        cell->predicted[n] = predicted;
+    }
+    return predicted;
+}
+
+/* Chooses the coarsest level whose error bound keeps the tolerance for a star, starting from the
+ * tolerance's level. */
 static bst_status star_level(bst_ctx *ctx, bst_smear *s, bst_smear_star_motion_cell *cell,
-                             const bst_smear_level **out, double *error) {
+                             const bst_smear_level **out, double *error, double *predicted) {
     double allowed = NODE_SHARE * bst_smear_allowed(s, s->last_read_e);
     int n = bst_smear_choose_level(s, cell ? cell->scale : 1.0);
     BST_TRY(bst_smear_make_level(ctx, s, n));
@@ -379,6 +403,7 @@ static bst_status star_level(bst_ctx *ctx, bst_smear *s, bst_smear_star_motion_c
         BST_TRY(bst_smear_make_level(ctx, s, ++n));
         *error = star_error(s, n, cell);
     }
+    *predicted = star_prediction(s, n, cell);
     *out = &s->levels[n];
     return BST_OK;
 }
@@ -474,7 +499,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
     }
     bst_smear_level own;
     const bst_smear_level *used;
-    double travel_px = s->travel_px, error;
+    double travel_px = s->travel_px, error, predicted;
     if (moving) {
         BST_TRY(moving_nodes(ctx, s, source, &at, &own, visible));
         if (!*visible) {
@@ -488,12 +513,20 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
         bst_smear_nodes_box(s, low, high);
         used = &own;
         error = bst_smear_level_error(used, 1.0);
+        predicted = bst_smear_level_prediction(used, 1.0);
     } else {
-        BST_TRY(star_level(ctx, s, cell, &used, &error));
+        BST_TRY(star_level(ctx, s, cell, &used, &error, &predicted));
     }
+    s->last_widening_px2 = used->widening_px2;
     int radius = choose_radius(s, s->last_peak_e * s->binning);
-    bst_smear_drawn drawn = {
-        .x = x, .y = y, .travel_px = travel_px, .error = error, .radius = radius, .moving = moving};
+    bst_smear_drawn drawn = {.x = x,
+                             .y = y,
+                             .travel_px = travel_px,
+                             .error = error,
+                             .predicted = predicted,
+
+                             .radius = radius,
+                             .moving = moving};
     memcpy(drawn.low, low, sizeof low);
     memcpy(drawn.high, high, sizeof high);
     bst_smear_set_error(s, &drawn);
@@ -527,6 +560,10 @@ double bst_smear_last_read_e(const bst_smear *s) {
 
 double bst_smear_last_presence(const bst_smear *s) {
     return s->last_presence;
+}
+
+double bst_smear_last_widening_px2(const bst_smear *s) {
+    return s->last_widening_px2;
 }
 
 bool bst_smear_last_leaves(const bst_smear *s) {

@@ -32,7 +32,8 @@ typedef struct bst_smear_options {
     /* non-Gaussian PSF, else 0: Gaussians with the same node sensitivity and the same peak pixel
      * share */
     double node_sigma_px, share_sigma_px;
-    double grid_per_px; /* least grid samples per px */
+    double smoothed_variance_px2; /* as in bst_fourier_band; 0: that of node_sigma_px */
+    double grid_per_px;           /* least grid samples per px */
     double pixel_part[BST_PIXEL_PARTS]
                      [3]; /* of the PSF as in bst_smear_node_aim, by binning from 1 on */
     double widest;        /* largest node widening, PSF variances; 0: as much as nodes allow */
@@ -74,6 +75,11 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *smear,
 /* Restarts the sources of the frame, aiming at `aim` (> 0; above 1: coarser) of the tolerance. */
 void bst_smear_restart(bst_smear *smear, double aim);
 
+/* Predicts errors for a finer grid, from the frame's next restart to its end.
+ *
+ * Given:     per_px  least grid samples per px */
+void bst_smear_refine_grid(bst_smear *smear, double per_px);
+
 /* True if the frame's stars follow one track as an image shift. */
 bool bst_smear_single(const bst_smear *smear);
 
@@ -89,7 +95,7 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *smear, const bst_scene_sour
 typedef struct bst_smear_result {
     bool known, visible, leaves;
     bst_kernel_source_record record;
-    double peak_e, read_e, presence;
+    double peak_e, read_e, presence, widening_px2;
     bst_error_budget_source error;
 } bst_smear_result;
 
@@ -115,6 +121,8 @@ double bst_smear_last_peak_e(const bst_smear *smear);
 double bst_smear_last_read_e(const bst_smear *smear);
 /* Share of that source's errors that reaches the window: 1 unless it stays beside it. */
 double bst_smear_last_presence(const bst_smear *smear);
+/* Largest mean widening of that source's nodes at one place, px^2. */
+double bst_smear_last_widening_px2(const bst_smear *smear);
 /* True if that source may at times be further from the window than margin_px. */
 bool bst_smear_last_leaves(const bst_smear *smear);
 

@@ -29,7 +29,10 @@ void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]) {
     }
 }
 
-/* Error of a level for an image that moves by `scale` of the path, relative to the peak. */
+double bst_smear_level_prediction(const bst_smear_level *level, double scale) {
+    return bst_smear_nodes_error(level->predicted, scale) + level->predicted_profile;
+}
+
 double bst_smear_level_error(const bst_smear_level *level, double scale) {
     return bst_smear_nodes_error(level->error, scale) + level->profile_error;
 }
@@ -49,7 +52,7 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
     int radius = d->radius;
     double travel_px = d->travel_px;
     double lost = bst_stamp_excess(&s->stamp, radius), peak_e = s->last_read_e;
-    double error = d->error + s->chord_error;
+    double error = d->error + s->chord_error, predicted = d->predicted + s->chord_error;
     int border = radius + 1 < MAX_TAPS / 2 ? radius + 1 : radius;
     /* rounding of fixed-point positions, of the float offset to the node, and of some sums */
     double rounded = 0.86 / s->sigma_px * (1.0 / s->place_parts + 0x1p-24 * travel_px) + 0x1p-22;
@@ -65,6 +68,7 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
                                   .y_px = (float)d->y,
                                   .peak_e = (float)peak_e,
                                   .nodes_e = (float)((flank * error + rounded) * peak_e),
+                                  .predicted_e = (float)((flank * predicted + rounded) * peak_e),
                                   .shared_e = (float)(shared * sigma_e),
                                   .excess_e = (float)(lost * peak_e),
                                   .border_e = (float)(s->last_peak_e * tail),
@@ -106,6 +110,7 @@ void bst_smear_bring_to_window(bst_smear *s, const bst_smear_drawn *d) {
     }
     s->last_presence = presence;
     e->nodes_e *= (float)presence;
+    e->predicted_e *= (float)presence;
     e->shared_e *= (float)presence;
     e->peak_e = 0.0f;
     if (gaussian && gap > d->radius + 2.0) {

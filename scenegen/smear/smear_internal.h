@@ -21,9 +21,12 @@ enum { BST_SMEAR_LEVELS = 14 };
 
 typedef struct bst_smear_level {
     int first_block, blocks; /* blocks 0: not computed in this frame */
-    /* expected errors relative to the smeared image's peak: by motion scale as in
-     * bst_smear_nodes_error, and of profiles */
-    double error[BST_NODE_SCALES], profile_error;
+    /* errors relative to the smeared image's peak: of nodes by motion scale as in
+     * bst_smear_nodes_error, their bound and what is predicted, and of profiles */
+    double error[BST_NODE_SCALES], predicted[BST_NODE_SCALES];
+    double profile_error, predicted_profile;
+    bool alike;          /* predicted errors are the bounds: all groups are short */
+    double widening_px2; /* largest mean widening of the nodes at one place */
 } bst_smear_level;
 
 /* A level computed ahead of its first use, on another thread. */
@@ -58,6 +61,7 @@ struct bst_smear {
     int binning, sources;
     double pixel_part[3]; /* as in bst_smear_node_aim */
     double aim;           /* share of the tolerance */
+    double grid_per_px;   /* least grid samples per px of the frame */
     bst_quat q_reference;
     bst_quat *turn; /* attitude at each path point */
     int *parts;     /* straight parts of the path from each track sample */
@@ -69,7 +73,7 @@ struct bst_smear {
     bool single;         /* the stars share one track */
     double spread_px;    /* largest deviation of corner stars from a shared track */
     double travel_px;    /* largest distance of a node from its source's position */
-    double last_peak_e, last_read_e, last_presence;
+    double last_peak_e, last_read_e, last_presence, last_widening_px2;
     bool last_leaves;
     double chord_error; /* error of the latest source's chord approximation, relative to its peak */
     double low[2], high[2]; /* box of a shared track's positions relative to a star's, px */
@@ -192,8 +196,10 @@ bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_so
 /* pixel_part of bst_smear_node_aim for a Gaussian in binned pixels. */
 void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]);
 
-/* Error of a level for an image that moves by `scale` of the path, relative to the peak. */
+/* Error bound of a level for an image that moves by `scale` of the path, relative to the peak. */
 double bst_smear_level_error(const bst_smear_level *level, double scale);
+/* Predicted error, as bst_smear_level_error. */
+double bst_smear_level_prediction(const bst_smear_level *level, double scale);
 
 /* Error of a star this far from the boresight that follows its track, in sigma of its worst pixel.
  */
@@ -204,7 +210,8 @@ double bst_smear_single_error(const bst_smear *s, double peak_e, double from_bor
 typedef struct bst_smear_drawn {
     double x, y, travel_px;
     double low[2], high[2]; /* box of its positions relative to (x, y) */
-    double error;           /* of its nodes and profiles, relative to the peak */
+    double error;           /* bound of its nodes and profiles, relative to the peak */
+    double predicted;       /* the same as predicted */
     int radius;             /* of the stamp */
     bool moving;
 } bst_smear_drawn;

@@ -14,17 +14,25 @@ bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_path
     if (parts > 0.0) {
         return bst_motion_midpoints(ctx, path, count, (int)parts, &s->nodes);
     }
+    double further = s->options.smoothed_variance_px2 - s->sigma_px * s->sigma_px;
+    if (!(s->options.node_sigma_px > 0.0)) { /* another PSF contains the pixel */
+        further = 1.0 / 12.0;
+    }
     bst_smear_node_aim aim = {.psf_sigma_px = s->sigma_px,
                               .tolerance = tolerance,
                               .widest = s->widest,
                               .wide_field = turns ? s->wide_field : 1.0,
-                              .curvature = turns ? s->curvature : 0.0};
+                              .curvature = turns ? s->curvature : 0.0,
+                              .binned_variance = (s->binning * s->binning - 1.0) / 12.0,
+                              .further_variance = fmax(further, 0.0)};
     memcpy(aim.pixel_part, s->pixel_part, sizeof aim.pixel_part);
     return bst_smear_nodes_from_path(ctx, path, count, &aim, &s->nodes);
 }
 
-/* Image error of the nodes' profiles, relative to the peak. */
-static double profile_error(const bst_smear *s, const bst_smear_node_list *list) {
+/* Sets the image error of the nodes' profiles, relative to the peak. Returns their largest
+ * widening, PSF variances. */
+static double set_profile_error(const bst_smear *s, const bst_smear_node_list *list,
+                                bst_smear_level *out) {
     double psf = s->sigma_px * s->stretch, widest = 0.0, table = 0.0;
     for (int n = 0; n < list->count; n++) {
         double w = list->items[n].variance / (psf * psf), wide = 1.0 + w;
@@ -34,13 +42,18 @@ static double profile_error(const bst_smear *s, const bst_smear_node_list *list)
     if (s->options.node_sigma_px > 0.0) {
         /* by table widths, and by kernel phases: linear interpolation widens by up to a quarter of
          * a step squared, half of that per axis */
+        table /= BST_WIDTHS * BST_WIDTHS;
         double step = 1.0 / (BST_SPREAD_PHASES * s->options.grid_per_px * s->sigma_px);
-        return table / (BST_WIDTHS * BST_WIDTHS) + 0.25 * step * step;
+        double finer = s->options.grid_per_px / s->grid_per_px;
+        out->profile_error = table + 0.25 * step * step;
+        out->predicted_profile = table + 0.25 * step * step * finer * finer;
+        return widest;
     }
-    if (widest > s->options.law_widest) {
-        return fmax(s->edge_error, s->point_error);
-    }
-    return widest > 0.0 ? fmax(2.0 * BST_LAW_ERROR, s->point_error) : s->point_error;
+    out->profile_error = widest > s->options.law_widest ? fmax(s->edge_error, s->point_error)
+                         : widest > 0.0                 ? fmax(2.0 * BST_LAW_ERROR, s->point_error)
+                                                        : s->point_error;
+    out->predicted_profile = out->profile_error;
+    return widest;
 }
 
 /* Widening of a node in PSF variances, before distortion stretches it. */
@@ -85,10 +98,17 @@ static int blocks_of(const bst_smear_node_list *list) {
  * BST_TABLE_ROWS. */
 static void describe_nodes(const bst_smear *s, const bst_smear_node_list *list, to_table column,
                            float *table, bst_smear_level *out) {
-    *out = (bst_smear_level){.blocks = blocks_of(list), .profile_error = profile_error(s, list)};
-    double part = bst_smear_nodes_error_part(list->items, list->count, s->sigma_px);
+    *out = (bst_smear_level){.blocks = blocks_of(list)};
+    double widest = set_profile_error(s, list, out);
+    double part[BST_NODE_PARTS];
+    bst_smear_nodes_parts(list->items, list->count, s->sigma_px, s->options.node_sigma_px > 0.0,
+                          part);
+    out->widening_px2 = part[BST_PART_WIDENING] * widest * s->sigma_px * s->sigma_px;
+    out->alike = out->profile_error == out->predicted_profile;
     for (int k = 0; k < BST_NODE_SCALES; k++) {
-        out->error[k] = part * list->error[k];
+        out->error[k] = part[BST_PART_BOUND] * list->error[k];
+        out->predicted[k] = part[BST_PART_PREDICTED] * list->predicted[k];
+        out->alike = out->alike && out->predicted[k] == out->error[k];
     }
     for (int n = 0; n < out->blocks * BST_BLOCK; n++) {
         float *block = table + (size_t)(n / BST_BLOCK) * BST_TABLE_FLOATS;

@@ -17,7 +17,7 @@ typedef struct group {
 } group;
 
 static bst_status push(bst_ctx *ctx, bst_smear_node_list *list, const double p[3], double weight,
-                       double variance, double error) {
+                       double variance, const double error[2]) {
     if (list->count == list->capacity) {
         int capacity = list->capacity ? 2 * list->capacity : 256;
         bst_smear_node *items = realloc(list->items, (size_t)capacity * sizeof *items);
@@ -28,7 +28,8 @@ static bst_status push(bst_ctx *ctx, bst_smear_node_list *list, const double p[3
         list->capacity = capacity;
     }
     assert(list->count < list->capacity && weight >= 0.0 && variance >= 0.0);
-    list->items[list->count++] = (bst_smear_node){{p[0], p[1], p[2]}, weight, variance, error};
+    list->items[list->count++] =
+        (bst_smear_node){{p[0], p[1], p[2]}, weight, variance, error[0], error[1]};
     return BST_OK;
 }
 
@@ -149,20 +150,56 @@ static void high_moments(const bst_smear_maker *m, const group *g, bst_smear_mom
     }
 }
 
-static void raise_error(bst_smear_node_list *list, const bst_smear_rule *r) {
-    for (int k = 0; k < BST_NODE_SCALES; k++) {
-        double square = exp2(k - (BST_NODE_SCALES - 2)), fourth = square * square;
-        double low = square * (square > 1.0 ? sqrt(square) : 1.0);
-        double error = r->fixed * fmax(low, 1.0) + (r->error - r->missed - r->fixed) * low +
-                       r->missed * (r->nodes == 3 ? fourth * square : fourth);
-        list->error[k] = fmax(list->error[k], error);
+/* Sets the Peano kernel of a group's rule, unless the group is short. */
+static void set_kernel(const bst_smear_maker *m, const group *g, const bst_smear_moments *t,
+                       bst_smear_rule *r) {
+    bool split = r->pair[0] != 0.0 || r->pair[1] != 0.0 || r->pair[2] != 0.0;
+    double a[3], b[3], weight = 0.0, high[2] = {0.0, 0.0};
+    if (r->nodes < 2 || split || bst_smear_most_kernel(r) < BST_LEAST_KERNEL * m->variance) {
+        return;
     }
+    int points = reaches(m, g, g->first + MANY_SEGMENTS) ? 2 : 4;
+    for (int k = g->first; reaches(m, g, k); k++) {
+        double w = clip(m, g, k, a, b);
+        for (int n = 0; n < points && w > 0.0; n++) {
+            double x = 0.0, part = w * bst_smear_gauss_weight[points - 1][n];
+            for (int i = 0; i < 3; i++) {
+                double d = a[i] + bst_smear_gauss_place[points - 1][n] * (b[i] - a[i]) - t->mean[i];
+                x += d * t->axis[i];
+            }
+            double cube = x * x * x, seventh = cube * cube * x;
+            high[0] += part * seventh;
+            high[1] += part * seventh * x;
+            weight += part;
+        }
+    }
+    high[0] /= weight;
+    high[1] /= weight;
+    bst_smear_set_kernel(t, high, r);
+}
+
+/* Raises the list's errors to those of a rule; returns its predicted error. */
+static double raise_error(const bst_smear_maker *m, const bst_smear_rule *r) {
+    bst_smear_node_list *list = m->list;
+    double part[BST_NODE_SCALES];
+    bst_smear_missed_parts(m, r, part);
+    double square = 1.0 / (1 << (BST_NODE_SCALES - 2));
+    for (int k = 0; k < BST_NODE_SCALES; k++, square *= 2.0) {
+        double fourth = square * square;
+        double low = square * (square > 1.0 ? sqrt(square) : 1.0);
+        double other = r->fixed * fmax(low, 1.0) + (r->error - r->missed - r->fixed) * low;
+        double missed = r->missed * (r->nodes == 3 ? fourth * square : fourth);
+        double bound = other + missed, predicted = other + part[k] * missed;
+        list->error[k] = bound > list->error[k] ? bound : list->error[k];
+        list->predicted[k] = predicted > list->predicted[k] ? predicted : list->predicted[k];
+    }
+    return r->error - (1.0 - part[BST_NODE_SCALES - 2]) * r->missed;
 }
 
 static bst_status emit(bst_ctx *ctx, const bst_smear_maker *m, const bst_smear_moments *g,
                        const bst_smear_rule *r, double weight) {
     bool split = r->pair[0] != 0.0 || r->pair[1] != 0.0 || r->pair[2] != 0.0;
-    raise_error(m->list, r);
+    const double error[2] = {r->error, raise_error(m, r)};
     for (int n = 0; n < r->nodes; n++) {
         for (int side = -1; side <= 1; side += 2) {
             double p[3];
@@ -171,7 +208,7 @@ static bst_status emit(bst_ctx *ctx, const bst_smear_maker *m, const bst_smear_m
                        (split ? side * r->pair[i] : 0.0);
             }
             BST_TRY(push(ctx, m->list, p, weight * r->weight[n] * (split ? 0.5 : 1.0),
-                         r->widening * m->image_share, r->error));
+                         r->widening * m->image_share, error));
             if (!split) {
                 break;
             }
@@ -203,7 +240,7 @@ static bst_status close_group(bst_ctx *ctx, bst_smear_maker *m, group g, int dep
     double spread = t.covariance[0][0] + t.covariance[1][1] + t.covariance[2][2];
     double weight = (g.to - g.from) / m->total;
     if (!(spread > 1e-12 * m->variance)) {
-        return push(ctx, m->list, t.mean, weight, 0.0, 0.0);
+        return push(ctx, m->list, t.mean, weight, 0.0, (const double[2]){0.0, 0.0});
     }
     high_moments(m, &g, &t);
     bst_smear_choose_rule(m, &t, m->tolerance, &best);
@@ -231,6 +268,7 @@ static bst_status close_group(bst_ctx *ctx, bst_smear_maker *m, group g, int dep
     if (best.error > m->tolerance) {
         bst_smear_choose_rule(m, &t, INFINITY, &best);
     }
+    set_kernel(m, &g, &t, &best);
     return emit(ctx, m, &t, &best, weight);
 }
 
@@ -272,10 +310,12 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
         .widest = aim->widest * variance,
         .wide_field = wide,
         .curvature = aim->curvature,
+        .binned_variance = aim->binned_variance,
+        .further_variance = aim->further_variance,
         /* mean over the boresight and four corners: full scale, and 1 / wide^2 across */
         .image_share = (2.0 + 3.0 / (wide * wide)) / 5.0};
     if (!(m.total > 0.0)) {
-        return push(ctx, list, path[0].p, 1.0, 0.0, 0.0);
+        return push(ctx, list, path[0].p, 1.0, 0.0, (const double[2]){0.0, 0.0});
     }
     /* three nodes on a uniform part of variance v miss 0.617 v^3 of the sixth moment */
     for (int k = 0; k < 3; k++) {

@@ -23,9 +23,10 @@ typedef struct bst_smear_path_point {
 
 typedef struct bst_smear_node {
     double p[3];
-    double weight;   /* share of the exposure; all nodes sum to 1 */
-    double variance; /* px^2 by which the node's PSF is widened per axis */
-    double error;    /* of its group, relative to the group's own peak */
+    double weight;    /* share of the exposure; all nodes sum to 1 */
+    double variance;  /* px^2 by which the node's PSF is widened per axis */
+    double error;     /* bound of its group, relative to the group's own peak; chooses the nodes */
+    double predicted; /* at most that bound, for images that move like the path */
 } bst_smear_node;
 
 /* Motion scales for which the error is estimated; see bst_smear_nodes_error. */
@@ -35,9 +36,13 @@ enum { BST_NODE_SCALES = 9 };
 typedef struct bst_smear_node_list {
     bst_smear_node *items;
     int count, capacity;
-    /* largest error estimate over the groups, in units of the tolerance, for images that move by
-     * 2^((k - BST_NODE_SCALES + 2) / 2) of the path; the last but one is 1 */
+    /* largest error bound over the groups, relative to the peak, for images that move by
+     * 2^((k - BST_NODE_SCALES + 2) / 2) of the path; the last but one is 1. Nodes are chosen by it
+     */
     double error[BST_NODE_SCALES];
+    /* the same of the predicted error: at most the bound, which takes the greatest derivative of
+     * the PSF for the whole length of a group */
+    double predicted[BST_NODE_SCALES];
 } bst_smear_node_list;
 
 /* Largest widening of a node, PSF variances. */
@@ -53,6 +58,9 @@ typedef struct bst_smear_node_aim {
      * the sensor's corners, which a tangent plane moves further; 0 means 1 */
     double wide_field;
     double curvature; /* bound of the second derivative of the image position by the path, 1/px */
+    /* variance by which binning widens that Gaussian, and further variance against which the length
+     * of a group smooths derivatives: of the sensor's pixel, or of the PSF's shape; px^2 */
+    double binned_variance, further_variance;
     /* PSF derivatives of order 2, 4, 6 in pixels, relative to their peak and to a Gaussian of
      * psf_sigma_px; 0 means 1 */
     double pixel_part[3];

@@ -46,26 +46,37 @@ double bst_smear_nodes_error(const double error[BST_NODE_SCALES], double scale) 
 void bst_smear_nodes_clear(bst_smear_node_list *list) {
     list->count = 0;
     memset(list->error, 0, sizeof list->error);
+    memset(list->predicted, 0, sizeof list->predicted);
 }
 
-double bst_smear_nodes_error_part(const bst_smear_node *nodes, int count, double psf_sigma_px) {
+void bst_smear_nodes_parts(const bst_smear_node *nodes, int count, double psf_sigma_px,
+                           bool widening, double part[BST_NODE_PARTS]) {
     enum { ANCHORS = 24 };
-    double scale = 0.5 / (psf_sigma_px * psf_sigma_px), worst = 0.0, least = INFINITY;
+    double scale = 0.5 / (psf_sigma_px * psf_sigma_px), worst[BST_NODE_PARTS] = {0.0};
+    double least = INFINITY, narrowest = INFINITY, light = 0.0, sum[BST_NODE_PARTS] = {0.0};
     int brightest = 0;
     for (int n = 0; n < count; n++) {
-        double error = nodes[n].error * nodes[n].weight;
+        const bst_smear_node *at = &nodes[n];
+        double error = at->error * at->weight;
         brightest = error > nodes[brightest].error * nodes[brightest].weight ? n : brightest;
-        worst = fmax(worst, nodes[n].error);
-        least = fmin(least, nodes[n].error);
+        const double value[BST_NODE_PARTS] = {at->error, at->predicted, at->variance};
+        for (int i = 0; i < BST_NODE_PARTS; i++) {
+            worst[i] = value[i] > worst[i] ? value[i] : worst[i];
+        }
+        least = at->error < least ? at->error : least;
+        narrowest = at->variance < narrowest ? at->variance : narrowest;
     }
-    if (!(worst > 0.0) || least > 0.9 * worst) {
-        return 1.0;
+    for (int i = 0; i < BST_NODE_PARTS; i++) {
+        part[i] = 1.0;
     }
-    double light = 0.0, error = 0.0;
+    bool alike = !(worst[BST_PART_BOUND] > 0.0) || least > 0.9 * worst[BST_PART_BOUND];
+    if (alike && (!widening || narrowest >= 0.9 * worst[BST_PART_WIDENING])) {
+        return;
+    }
     int stride = count / ANCHORS + 1;
     for (int a = -1; a < count; a = a < 0 ? 0 : a + stride) {
         const bst_smear_node *at = &nodes[a < 0 ? brightest : a];
-        double here = 0.0, missed = 0.0;
+        double here = 0.0, missed = 0.0, predicted = 0.0, widened = 0.0;
         for (int n = 0; n < count; n++) {
             const double *p = nodes[n].p;
             double dx = p[0] - at->p[0], dy = p[1] - at->p[1], dz = p[2] - at->p[2];
@@ -73,9 +84,15 @@ double bst_smear_nodes_error_part(const bst_smear_node *nodes, int count, double
             double share = q < 20.0 ? nodes[n].weight * exp(-q) : 0.0;
             here += share;
             missed += share * nodes[n].error;
+            predicted += share * nodes[n].predicted;
+            widened += share * nodes[n].variance;
         }
         light = fmax(light, here);
-        error = fmax(error, missed);
+        sum[BST_PART_BOUND] = fmax(sum[BST_PART_BOUND], missed);
+        sum[BST_PART_PREDICTED] = fmax(sum[BST_PART_PREDICTED], predicted);
+        sum[BST_PART_WIDENING] = fmax(sum[BST_PART_WIDENING], widened);
     }
-    return fmin(error / (worst * light), 1.0);
+    for (int i = alike ? BST_PART_PREDICTED : BST_PART_BOUND; i < BST_NODE_PARTS; i++) {
+        part[i] = worst[i] > 0.0 ? fmin(sum[i] / (worst[i] * light), 1.0) : 1.0;
+    }
 }

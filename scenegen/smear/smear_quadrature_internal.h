@@ -18,7 +18,7 @@ typedef struct bst_smear_maker {
     double widest;     /* px^2 */
     double wide_field; /* as in bst_smear_node_aim */
     double curvature;
-    double pixel_part[3];
+    double binned_variance, further_variance, pixel_part[3];
     double image_share; /* image variance per path variance, mean over the field */
     double most;        /* spread of the next group, px^2 */
     double limit;       /* of `most` */
@@ -47,6 +47,7 @@ typedef struct bst_smear_rule {
     double curve[3]; /* second orthogonal polynomial at the nodes */
     double error;    /* total */
     double missed;   /* part: missed highest moment */
+    double kernel;   /* px^2: variance of the Peano kernel of the missed moment */
     double fixed;    /* part: wrong widening of images that move by less than the path */
 } bst_smear_rule;
 
@@ -58,6 +59,23 @@ void bst_smear_nodes_main_axis(double a[3][3], double axis[3]);
  * peak. INFINITY if there is no such rule or its error exceeds `limit`. */
 void bst_smear_try_rule(const bst_smear_maker *m, const bst_smear_moments *g, int n, bool widen,
                         bool split, double limit, bst_smear_rule *r);
+
+/* Peano kernels of a smaller variance, over that of the PSF, change an error by less than a tenth:
+ * they are left out. */
+#define BST_LEAST_KERNEL 0.02
+
+/* Sets the variance of a rule's Peano kernel.
+ *
+ * Given:     high  E[x^7] and E[x^8] of the group */
+void bst_smear_set_kernel(const bst_smear_moments *g, const double high[2], bst_smear_rule *r);
+
+/* Largest variance of that kernel, px^2. */
+double bst_smear_most_kernel(const bst_smear_rule *r);
+
+/* Parts of the missed moment's error that remain if the image moves by 2^((k - BST_NODE_SCALES + 2)
+ * / 2) of the path: below 1 for groups as long as the PSF is wide. */
+void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_rule *r,
+                            double part[BST_NODE_SCALES]);
 
 /* Replaces *best by the rule with the fewest nodes that meets the tolerance, otherwise by the best
  * of three nodes. Rules with an error beyond `limit` are ignored. */

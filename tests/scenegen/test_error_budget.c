@@ -45,12 +45,14 @@ static void add(fixture *f, double along, double across, double nodes, double bo
     const bst_error_budget_source s = {.x_px = (float)(0.6 * along - 0.8 * across),
                                        .y_px = (float)(0.8 * along + 0.6 * across),
                                        .nodes_e = (float)(DARK_E * nodes),
+                                       .predicted_e = (float)(DARK_E * nodes),
                                        .border_e = (float)(DARK_E * border)};
     bst_assert_ok(&f->ctx, bst_error_budget_add(&f->ctx, f->budget, &s));
 }
 
 /* Compares with the error by hand; sums of float. */
 static void expect(fixture *f, double sigma) {
+    bst_assert_close(bst_error_budget_bound_sigma(f->budget), sigma, 1e-5 * sigma);
     bst_assert_close(bst_error_budget_error_sigma(f->budget), sigma, 1e-5 * sigma);
 }
 
@@ -62,6 +64,7 @@ static void one_source(void **state) {
                                  .y_px = -3.0f,
                                  .peak_e = 44.0f, /* noise sqrt(44 + 100) = 12 */
                                  .nodes_e = 3.0f,
+                                 .predicted_e = 3.0f,
                                  .shared_e = 2.0f,
                                  .excess_e = 1.0f,
                                  .border_e = 0.5f};
@@ -84,9 +87,18 @@ static void one_source(void **state) {
 static void sources_within_a_sigma_are_one(void **state) {
     fixture *f = *state;
     begin(f);
-    const bst_error_budget_source s[2] = {
-        {.x_px = 10.1f, .y_px = 20.2f, .peak_e = 200.0f, .nodes_e = 3.0f, .shared_e = 1.0f},
-        {.x_px = 10.4f, .y_px = 20.3f, .peak_e = 100.0f, .nodes_e = 5.0f, .excess_e = 3.0f}};
+    const bst_error_budget_source s[2] = {{.x_px = 10.1f,
+                                           .y_px = 20.2f,
+                                           .peak_e = 200.0f,
+                                           .nodes_e = 3.0f,
+                                           .predicted_e = 3.0f,
+                                           .shared_e = 1.0f},
+                                          {.x_px = 10.4f,
+                                           .y_px = 20.3f,
+                                           .peak_e = 100.0f,
+                                           .nodes_e = 5.0f,
+                                           .predicted_e = 5.0f,
+                                           .excess_e = 3.0f}};
     for (int i = 0; i < 2; i++) {
         bst_assert_ok(&f->ctx, bst_error_budget_add(&f->ctx, f->budget, &s[i]));
     }
@@ -181,6 +193,7 @@ static void objects_on_their_own(void **state) {
     const bst_error_budget_source lone = {.x_px = 1.0f,
                                           .peak_e = 300.0f,
                                           .nodes_e = 4.0f,
+                                          .predicted_e = 4.0f,
                                           .shared_e = 1.0f,
                                           .excess_e = 3.0f,
                                           .border_e = 2.0f,
@@ -197,6 +210,28 @@ static void objects_on_their_own(void **state) {
     bst_assert_ok(&f->ctx, bst_error_budget_add(&f->ctx, f->budget, &border));
     add(f, 1.0, 0.0, 1.1, 0.0);
     expect(f, 1.1 + 0.4 * 0.6);
+}
+
+/* Bounds and predicted errors are summed by the same rules, apart from each other: which source is
+ * worst may differ. */
+static void predictions_are_summed_apart(void **state) {
+    fixture *f = *state;
+    begin(f);
+    const bst_error_budget_source s[3] = {
+        {.x_px = 0.0f, .nodes_e = 4.0f, .predicted_e = 1.0f},
+        {.x_px = 2.0f, .nodes_e = 2.0f, .predicted_e = 3.0f},
+        {.x_px = 1.0f, .nodes_e = 5.0f, .predicted_e = 2.0f, .apart = true}};
+    for (int i = 0; i < 2; i++) {
+        bst_assert_ok(&f->ctx, bst_error_budget_add(&f->ctx, f->budget, &s[i]));
+    }
+    bst_assert_close(bst_error_budget_bound_sigma(f->budget), 0.4 + 0.4 * 0.2, 1e-6);
+    bst_assert_close(bst_error_budget_error_sigma(f->budget), 0.3 + 0.4 * 0.1, 1e-6);
+    begin(f);
+    for (int i = 0; i < 3; i++) {
+        bst_assert_ok(&f->ctx, bst_error_budget_add(&f->ctx, f->budget, &s[i]));
+    }
+    bst_assert_close(bst_error_budget_error_sigma(f->budget), 0.34 + 0.4 * 0.2, 1e-6);
+    bst_assert_close(bst_error_budget_bound_sigma(f->budget), 0.5 + 0.4 * 0.48, 1e-6);
 }
 
 /* Many sources, close together or far apart, with one pair among them: only the pair adds up, in
@@ -251,6 +286,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(the_second_worst_of_a_box_counts, setup, teardown),
         cmocka_unit_test_setup_teardown(many_in_a_box_add_in_squares, setup, teardown),
         cmocka_unit_test_setup_teardown(crossing_borders, setup, teardown),
+        cmocka_unit_test_setup_teardown(predictions_are_summed_apart, setup, teardown),
         cmocka_unit_test_setup_teardown(objects_on_their_own, setup, teardown),
         cmocka_unit_test_setup_teardown(pairs_among_many, setup, teardown),
         cmocka_unit_test(motion_of_a_path),

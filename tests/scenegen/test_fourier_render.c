@@ -412,10 +412,12 @@ static void the_finer_grid_is_finer(void **state) {
         bst_assert_ok(&f->ctx, bst_psf_create(&f->ctx, c, &psf));
         bst_assert_ok(&f->ctx, bst_fourier_render_create(&f->ctx, f->device, c, psf, &options, &l));
         double sigma[2];
+        const bst_fourier_point point = {.peak_e = 1e5, .dark_variance_e2 = 100.0};
         for (int fine = 0; fine < 2; fine++) {
-            sigma[fine] = bst_fourier_render_error_sigma(l, fine != 0, false,
-                                                         (bst_window){0, 0, 48, 40}, 1e5, 100.0);
+            sigma[fine] =
+                bst_fourier_render_error_sigma(l, fine != 0, (bst_window){0, 0, 48, 40}, &point);
         }
+        assert_true(bst_fourier_render_density(l, true) > bst_fourier_render_density(l, false));
         print_message("         plain %.4f sigma, fine %.4f sigma\n", sigma[0], sigma[1]);
         assert_true(sigma[0] > 0.0 && sigma[1] < sigma[0] / 40.0);
         bst_fourier_render_free(l);

@@ -192,32 +192,49 @@ static void errors_between_scales(void **state) {
     const double jump[BST_NODE_SCALES] = {0, 0, 0, 0, 0, 0, 0, 0.5, 0.6};
     bst_assert_close(bst_smear_nodes_error(jump, 0.8), 0.5, 0.0); /* no chord from nothing */
     bst_assert_close(bst_smear_nodes_error(jump, 0.5), 0.0, 0.0);
-    const bst_smear_level level = {.error = {0, 0, 0, 0, 0, 0, 0, 0.5, 0.6}, .profile_error = 0.25};
+    const bst_smear_level level = {.error = {0, 0, 0, 0, 0, 0, 0, 0.5, 0.6},
+                                   .predicted = {0, 0, 0, 0, 0, 0, 0, 0.4, 0.5},
+                                   .profile_error = 0.25,
+                                   .predicted_profile = 0.125};
     bst_assert_close(bst_smear_level_error(&level, 1.0), 0.75, 1e-12);
+    bst_assert_close(bst_smear_level_prediction(&level, 1.0), 0.525, 1e-12);
 }
 
 /* Two groups, the fainter with the larger error, apart along each coordinate: at each place the sum
- * of weights and errors with a Gaussian of their distance. */
+ * of weights and errors with a Gaussian of their distance. Predicted errors and widenings add up in
+ * the same way, and do not change the part of the bounds. */
 static void errors_of_faint_groups_count_less(void **state) {
     (void)state;
     const double sigma = 0.85;
     for (int axis = 0; axis < 3; axis++) {
         const double apart[] = {20.0, 1.0, 0.5};
         for (int k = 0; k < 3; k++) {
-            bst_smear_node nodes[2] = {{{1.0, 2.0, 3.0}, 0.8, 0.0, 0.1},
-                                       {{1.0, 2.0, 3.0}, 0.2, 0.0, 1.0}};
+            bst_smear_node nodes[2] = {{{1.0, 2.0, 3.0}, 0.8, 0.03, 0.1, 0.2},
+                                       {{1.0, 2.0, 3.0}, 0.2, 0.01, 1.0, 0.5}};
             nodes[1].p[axis] += apart[k];
             double g = exp(-0.5 * apart[k] * apart[k] / (sigma * sigma));
             double light = fmax(0.8 + 0.2 * g, 0.2 + 0.8 * g);
-            double error = fmax(0.08 + 0.2 * g, 0.2 + 0.08 * g);
-            bst_assert_close(bst_smear_nodes_error_part(nodes, 2, sigma), error / light, 1e-8);
+            const double sums[BST_NODE_PARTS] = {fmax(0.08 + 0.2 * g, 0.2 + 0.08 * g),
+                                                 fmax(0.16 + 0.1 * g, 0.1 + 0.16 * g) / 0.5,
+                                                 fmax(0.024 + 0.002 * g, 0.002 + 0.024 * g) / 0.03};
+            double part[BST_NODE_PARTS];
+            bst_smear_nodes_parts(nodes, 2, sigma, true, part);
+            for (int i = 0; i < BST_NODE_PARTS; i++) {
+                bst_assert_close(part[i], sums[i] / light, 1e-8);
+            }
         }
     }
     /* of errors that are nearly alike all count */
-    const bst_smear_node alike[2] = {{{0, 0, 0}, 0.9, 0.0, 0.95}, {{9, 0, 0}, 0.1, 0.0, 1.0}};
-    bst_assert_close(bst_smear_nodes_error_part(alike, 2, sigma), 1.0, 0.0);
-    const bst_smear_node exact[2] = {{{0, 0, 0}, 0.9, 0.0, 0.0}, {{9, 0, 0}, 0.1, 0.0, 0.0}};
-    bst_assert_close(bst_smear_nodes_error_part(exact, 2, sigma), 1.0, 0.0);
+    double part[BST_NODE_PARTS];
+    const bst_smear_node alike[2] = {{{0, 0, 0}, 0.9, 0.0, 0.95, 0.95},
+                                     {{9, 0, 0}, 0.1, 0.0, 1.0, 1.0}};
+    bst_smear_nodes_parts(alike, 2, sigma, true, part);
+    bst_assert_close(part[BST_PART_BOUND], 1.0, 0.0);
+    bst_assert_close(part[BST_PART_PREDICTED], 1.0, 0.0);
+    const bst_smear_node exact[2] = {{{0, 0, 0}, 0.9, 0.0, 0.0, 0.0},
+                                     {{9, 0, 0}, 0.1, 0.0, 0.0, 0.0}};
+    bst_smear_nodes_parts(exact, 2, sigma, true, part);
+    bst_assert_close(part[BST_PART_BOUND], 1.0, 0.0);
 }
 
 /* Integral of a derivative of the Gaussian (Hermite polynomial of this order times it) over a pixel
@@ -321,13 +338,18 @@ static void errors_fade_outside_the_window(void **state) {
                              .low = {low[0], low[1]},
                              .high = {high[0], high[1]},
                              .radius = 6};
-        const bst_error_budget_source whole = {
-            .peak_e = 50.0f, .nodes_e = 8.0f, .shared_e = 4.0f, .excess_e = 2.0f, .border_e = 1.0f};
+        const bst_error_budget_source whole = {.peak_e = 50.0f,
+                                               .nodes_e = 8.0f,
+                                               .predicted_e = 6.0f,
+                                               .shared_e = 4.0f,
+                                               .excess_e = 2.0f,
+                                               .border_e = 1.0f};
         double share = gaussian ? 0.1 * pow(3.3 / gap, 6.0) : 0.3 * pow(3.3 / gap, 3.0);
         s->last_error = whole;
         bst_smear_bring_to_window(s, &d);
         bst_assert_close(s->last_presence, share, 1e-9);
         bst_assert_close(s->last_error.nodes_e, 8.0 * share, 1e-6);
+        bst_assert_close(s->last_error.predicted_e, 6.0 * share, 1e-6);
         bst_assert_close(s->last_error.shared_e, 4.0 * share, 1e-6);
         assert_true(s->last_error.peak_e == 0.0f && s->last_error.border_e == 1.0f);
         assert_true(s->last_error.excess_e == (gaussian ? 0.0f : 2.0f)); /* 9 px: off the stamp */

@@ -123,6 +123,13 @@ static void widened_nodes(void **state) {
                 flux += shape.c[k] * t0[k];
             }
             bst_assert_close(flux / t0[0], 1.0, 1e-4);
+            for (double nu = 0.0; nu < 0.5; nu += 0.07) { /* same integrals, another rule */
+                double got = 0.0, own = integral(&s, nu, 0);
+                for (int k = 0; k < 3; k++) {
+                    got += shape.c[k] * integral(&s, nu, k) / own;
+                }
+                bst_assert_close(bst_nufft_kernel_shape_transform(&s, &shape, nu), got, 1e-4);
+            }
             for (int i = 0; i < BST_SPREAD_BINS; i++) {
                 double nu = (i + 0.5) * band.step / density, own[3];
                 for (int k = 0; k < 3; k++) {
@@ -254,13 +261,17 @@ static void errors_of_a_coarse_axis(void **state) {
             double guard[32];
         } reported = {.guard = {0.0}};
         const bst_fourier_axis both[2] = {axis ? fine : coarse, axis ? coarse : fine};
-        bst_assert_ok(&ctx, bst_fourier_error_measure(&ctx, psf, &band, both, &reported.error));
+        bst_assert_ok(&ctx,
+                      bst_fourier_error_measure(&ctx, psf, &band, both, 0.0, &reported.error));
         for (int k = 0; k < CLASSES; k++) {
             /* places in steps of 0.25 px, and the classes' borders between them */
             bst_assert_close(reported.error.most[k] / want[k], 1.1, 0.25);
         }
         /* what is darker than all classes belongs to the last one */
         assert_true(reported.error.most[BST_LIGHT_CLASSES - 1] > 0.0);
+        for (int k = 0; k < BST_LIGHT_CLASSES; k++) { /* nothing is widened */
+            assert_true(reported.error.widened[k] < 1e-12);
+        }
         for (int k = 0; k < 32; k++) {
             assert_true(reported.guard[k] == 0.0);
         }
@@ -271,20 +282,112 @@ static void errors_of_a_coarse_axis(void **state) {
 /* Errors by brightness over the noise of the darkest pixel of their class. */
 static void errors_by_brightness(void **state) {
     (void)state;
-    bst_fourier_error e = {{0.0}};
+    bst_fourier_error e = {.widest_px2 = 0.0};
     e.most[0] = 1e-3;
     e.most[8] = 4e-4;
     e.most[BST_LIGHT_CLASSES - 1] = 1e-4;
     const double peak = 1e5, dark = 100.0;
+    bst_fourier_point all = {.peak_e = peak, .dark_variance_e2 = dark, .widening_px2 = 0.3};
+    bst_fourier_point wings = all;
+    wings.wings = true;
     double class0 = 100.0 / sqrt(0.5 * peak + dark), class8 = 40.0 / sqrt(peak / 512.0 + dark);
     double last = 10.0 / sqrt(dark);
-    bst_assert_close(bst_fourier_error_sigma(&e, false, peak, dark), class8, 1e-12);
-    bst_assert_close(bst_fourier_error_sigma(&e, true, peak, dark), class8, 1e-12);
+    bst_assert_close(bst_fourier_error_sigma(&e, &all), class8, 1e-12);
+    bst_assert_close(bst_fourier_error_sigma(&e, &wings), class8, 1e-12);
     e.most[8] = 0.0;
-    bst_assert_close(bst_fourier_error_sigma(&e, false, peak, dark), fmax(class0, last), 1e-12);
+    bst_assert_close(bst_fourier_error_sigma(&e, &all), fmax(class0, last), 1e-12);
     e.most[0] = 4e-3;
-    bst_assert_close(bst_fourier_error_sigma(&e, false, peak, dark), 4.0 * class0, 1e-12);
-    bst_assert_close(bst_fourier_error_sigma(&e, true, peak, dark), last, 1e-12);
+    bst_assert_close(bst_fourier_error_sigma(&e, &all), 4.0 * class0, 1e-12);
+    bst_assert_close(bst_fourier_error_sigma(&e, &wings), last, 1e-12);
+    /* in proportion to the widening, in the same pixel */
+    e.widened[0] = 6e-3;
+    e.widest_px2 = 0.9;
+    bst_assert_close(bst_fourier_error_sigma(&e, &all), (4.0 + 2.0) * class0, 1e-12);
+    all.widening_px2 = 0.0;
+    bst_assert_close(bst_fourier_error_sigma(&e, &all), 4.0 * class0, 1e-12);
+}
+
+/* Transforms along an axis of a Gaussian in pixels: widened by a Gaussian, and by the widening
+ * kernel. */
+static void widened_of(const bst_fourier_axis *axis, const bst_nufft_kernel_shape *shape,
+                       double sigma, double variance, double out[FREQUENCIES][2]) {
+    double density = (double)axis->samples / axis->pixels;
+    for (int i = 0; i < FREQUENCIES; i++) {
+        double f = (i + 0.5) * 2.0 / FREQUENCIES - 1.0, nu = f / density, ratio = 0.0;
+        double otf =
+            exp(-2.0 * BST_PI * BST_PI * sigma * sigma * f * f) * sin(BST_PI * f) / BST_PI / f;
+        for (int k = 0; k < 3 && otf > 1e-9; k++) {
+            ratio += shape->c[k] * integral(&axis->spread, nu, k);
+        }
+        ratio /= otf > 1e-9 ? integral(&axis->spread, nu, 0) : 1.0;
+        out[i][0] = otf * exp(-2.0 * BST_PI * BST_PI * variance * f * f);
+        out[i][1] = otf * ratio;
+    }
+}
+
+/* Their light x px from a point. */
+static void light_at(double transforms[FREQUENCIES][2], double x, double out[2]) {
+    out[0] = out[1] = 0.0;
+    for (int i = 0; i < FREQUENCIES; i++) {
+        double f = (i + 0.5) * 2.0 / FREQUENCIES - 1.0;
+        for (int k = 0; k < 2; k++) {
+            out[k] += transforms[i][k] * cos(2.0 * BST_PI * f * x) * 2.0 / FREQUENCIES;
+        }
+    }
+}
+
+/* What a widened node differs by from the convolution with a Gaussian, by brightness: sums over
+ * frequencies along each axis. Scene 294 of test_tolerance_sweep.c has more of it than of all other
+ * errors. */
+static void errors_of_widened_nodes(void **state) {
+    (void)state;
+    enum { CLASSES = 8, PLACES = 17 };
+    bst_ctx ctx = {0};
+    const double sigma = 2.4 / 2.3548200450309493, variance = 0.25, root = sigma * sqrt(2.0);
+    const bst_camera camera = {.width_px = 512,
+                               .height_px = 512,
+                               .pixel_scale_arcsec = 3.0,
+                               .aperture_m = 0.15,
+                               .psf_fwhm_px = 2.4};
+    bst_psf *psf;
+    bst_fourier_band band;
+    bst_fourier_error error;
+    bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
+    bst_assert_ok(&ctx, bst_fourier_band_measure(&ctx, psf, 1e-7, &band));
+    const bst_fourier_axis axis[2] = {{.pixels = 160, .samples = 320, .spread = {6, 12.0}},
+                                      {.pixels = 160, .samples = 352, .spread = {6, 12.0}}};
+    bst_assert_ok(&ctx, bst_fourier_error_measure(&ctx, psf, &band, axis, variance, &error));
+    assert_true(error.widest_px2 == variance);
+    static double light[2][PLACES][2], transforms[FREQUENCIES][2];
+    for (int a = 0; a < 2; a++) {
+        double density = (double)axis[a].samples / axis[a].pixels;
+        bst_nufft_kernel_shape shape;
+        (void)bst_nufft_kernel_widen(&axis[a].spread, &band.axis[a], density,
+                                     variance * density * density, &shape);
+        widened_of(&axis[a], &shape, sigma, variance, transforms);
+        for (int i = 0; i < PLACES; i++) {
+            light_at(transforms, 0.25 * i, light[a][i]);
+        }
+    }
+    double want[CLASSES] = {0.0}, centre = erf(0.5 / root), worst = 0.0;
+    for (int n = 0; n < PLACES * PLACES; n++) {
+        double x = 0.25 * (n % PLACES), y = 0.25 * (n / PLACES);
+        double u = 0.5 * (erf((x + 0.5) / root) - erf((x - 0.5) / root));
+        double v = 0.5 * (erf((y + 0.5) / root) - erf((y - 0.5) / root));
+        int k = (int)fmax(floor(-log2(u * v / (centre * centre)) - 1e-12), 0.0);
+        const double *a = light[0][n % PLACES], *b = light[1][n / PLACES];
+        double missed = fabs(a[1] * b[1] - a[0] * b[0]) / (centre * centre);
+        if (k < CLASSES) {
+            want[k] = fmax(want[k], missed);
+            worst = fmax(worst, missed);
+        }
+    }
+    assert_true(worst > 1e-5);
+    for (int k = 0; k < CLASSES; k++) {
+        /* places in steps of 0.25 px, and the classes' borders between them */
+        bst_assert_close(error.widened[k], want[k], 0.25 * want[k] + 0.1 * worst);
+    }
+    bst_psf_free(psf);
 }
 
 /* Moffat's wings, (b - 1) / (pi a^2) (1 + (r / a)^2)^-b. */
@@ -374,7 +477,7 @@ int main(void) {
         cmocka_unit_test(values_and_transforms),   cmocka_unit_test(the_error_of_a_grid),
         cmocka_unit_test(widened_nodes),           cmocka_unit_test(sizes_of_a_grid),
         cmocka_unit_test(errors_of_a_coarse_axis), cmocka_unit_test(errors_by_brightness),
-        cmocka_unit_test(wings_of_other_periods),
+        cmocka_unit_test(errors_of_widened_nodes), cmocka_unit_test(wings_of_other_periods),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
