@@ -1,7 +1,11 @@
 /* Facets of curved surfaces in the image. */
 #include <string.h>
 
+#include "sim/satellite/point_shadow.h"
 #include "sim/satellite/resolved_faces.h"
+
+/* Cosine of incidence on a facet below which shadows are those on the middles of its parts. */
+static const double GRAZING = 0.02;
 
 /* Samples of a part of a curved facet for its light: more where the terminator crosses it or a lobe
  * is narrower than it is. */
@@ -234,13 +238,13 @@ bst_status bst_resolved_add_curved_facet(bst_ctx *ctx, bst_resolved_adding *a, i
     /* the direction to the observer differs over a facet by this */
     double near = radius_m / bst_vec3_norm(bst_vec3_sub(a->eye_m, first));
     double lit[2] = {1.0, 1.0};
-    bool split = false;
+    bool split = false, grazing = a->light && bst_vec3_dot(normal, a->light->sun) <= GRAZING;
     for (int view = 1; view >= 0 && a->light; view--) { /* the Sun's pieces remain */
         bst_vec3 direction = view == 0  ? a->light->sun
                              : a->earth ? a->light->earthlight->centre
                                         : (bst_vec3){0};
         /* at grazing incidence the true surface, not its facet, decides */
-        if (bst_vec3_dot(normal, direction) > 0.02) {
+        if (bst_vec3_dot(normal, direction) > GRAZING) {
             lit[view] = bst_resolved_lit_fraction(a, facet, view);
             split = view == 0 && lit[0] > 0.0 && lit[0] < 1.0;
         }
@@ -267,6 +271,10 @@ bst_status bst_resolved_add_curved_facet(bst_ctx *ctx, bst_resolved_adding *a, i
                 s.sun_change[v] *= split ? 1.0 : lit[0];
             }
             s.sun *= split ? 1.0 : lit[0];
+            if (grazing && s.sun > 0.0 &&
+                bst_point_is_shadowed(a->pose, 0, from->occluder, middle)) {
+                s.sun = s.sun_change[0] = s.sun_change[1] = 0.0;
+            }
             s.earth *= lit[1];
             BST_TRY(add_part(ctx, a, &part, c.curved->side, &s, split, f));
         }

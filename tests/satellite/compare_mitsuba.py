@@ -22,7 +22,7 @@ import tempfile
 SATELLITES = ["gps_iif", "inmarsat_gx_like", "starlink_v1_5", "envisat_like", "hubble_like", "iss_like"]
 TOLERANCE = 5e-3
 SIDE, SAMPLES = 256, 16
-IMAGE_SIDE, IMAGE_SAMPLES = 64, 1024  # as in print_flux.c
+IMAGE_SIDE, IMAGE_SAMPLES = 64, 16384  # as in print_flux.c
 IMAGE_TOLERANCE_SIGMA = 0.1
 # incidence and reflection of the table, degrees
 TABLE_IN = list(range(0, 90, 10))
@@ -186,7 +186,7 @@ def make_class(mi):
     return Surface
 
 
-def shapes(triangles, folder):
+def shapes(triangles, folder, own=True):
     """A mesh for each surface, as an OBJ file. One-sided: plates have a facet for each side."""
     out = {}
     for number, surface in enumerate(sorted({tuple(t[0]) for t in triangles})):
@@ -201,7 +201,8 @@ def shapes(triangles, folder):
                     count += 3
         out[f"m{number}"] = {
             "type": "obj", "filename": path, "face_normals": True,
-            "bsdf": {"type": "satellite_surface", "number": surface[0], "diffuse": surface[1]}}
+            "bsdf": {"type": "satellite_surface", "number": surface[0], "diffuse": surface[1]} if own else
+            {"type": "diffuse", "reflectance": {"type": "rgb", "value": [surface[1]] * 3}}}
     return out
 
 
@@ -267,7 +268,7 @@ def render_image(mi, case, folder, seed):
              "sensor": camera(mi, case),
              "sun": {"type": "directional", "direction": [-x for x in case["sun"]],
                      "irradiance": {"type": "rgb", "value": [1, 1, 1]}}}
-    scene.update(shapes(case["triangles"], folder))
+    scene.update(shapes(case["triangles"], folder, own=False))
     return [float(x) for x in mi.render(mi.load_dict(scene), seed=seed).array]
 
 
