@@ -211,6 +211,46 @@ static bst_status reserve(bst_ctx *ctx, bst_visible_surface *s, int count) {
     return BST_OK;
 }
 
+/* True if fragments that are all in front of the cover tile the cell, as neighbours on one surface
+ * do: their areas and first moments are those of the cell, and all are as near as each other. */
+static bool tile_cell(const bst_visible_surface *s, const bst_surface_cell *cell) {
+    static const float MOST = 1e-5F;
+    float area = 0.0F, x = 0.0F, y = 0.0F, least = -INFINITY, most = INFINITY;
+    for (int i = cell->first; i >= 0; i = s->fragments[i].next) {
+        const bst_surface_fragment *f = &s->fragments[i];
+        float half = 0.5F * (fabsf(f->near.x_m) + fabsf(f->near.y_m));
+        if (!f->more_light) {
+            area += f->area;
+            x += f->area_x;
+            y += f->area_y;
+        }
+        least = fmaxf(least, f->near.middle_m - half);
+        most = fminf(most, f->near.middle_m + half);
+        if (cell->part >= 0 &&
+            f->near.middle_m - half <
+                cell->is.cover.near.middle_m +
+                    0.5F * (fabsf(cell->is.cover.near.x_m) + fabsf(cell->is.cover.near.y_m))) {
+            return false;
+        }
+    }
+    return fabsf(area - 1.0F) < MOST && fabsf(x) < MOST && fabsf(y) < MOST && least <= most;
+}
+
+/* Adds the light of the fragments of a cell that hide nothing of each other. */
+static void add_all(const bst_visible_surface *s, const bst_surface_cell *cell,
+                    bst_cell_view *out) {
+    float most = 0.0F;
+    for (int i = cell->first; i >= 0; i = s->fragments[i].next) {
+        const bst_surface_fragment *f = &s->fragments[i];
+        double area = add_whole(f, out);
+        if (!f->more_light) {
+            out->area += area;
+            out->part = f->area > most ? f->part : out->part;
+            most = fmaxf(most, f->area);
+        }
+    }
+}
+
 bst_status bst_cell_view_find(bst_ctx *ctx, bst_visible_surface *s, const bst_surface_cell *cell,
                               bst_polygon_clip *clip, double same_m, bst_cell_view *out) {
     bst_surface_fragment cover = {.area = 1.0F};
@@ -218,6 +258,10 @@ bst_status bst_cell_view_find(bst_ctx *ctx, bst_visible_surface *s, const bst_su
     int count = 0;
     bool several = false;
     *out = (bst_cell_view){.part = -1};
+    if (cell->first >= 0 && tile_cell(s, cell)) {
+        add_all(s, cell, out);
+        return BST_OK;
+    }
     if (cell->part >= 0) {
         cover.near = cell->is.cover.near;
         cover.light = cell->is.cover.light;

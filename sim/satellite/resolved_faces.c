@@ -264,9 +264,6 @@ bst_status bst_resolved_add_fragments(bst_ctx *ctx, const bst_resolved_adding *a
  * (24 radius), the straight side of a cylinder by twice that. */
 static const double LIMB_PX = 4e-5;
 
-/* Step elsewhere, px. */
-static const double STEP_PX = 0.5;
-
 /* Largest angle of a part of a curved surface: the light of a part is that of its middle. */
 static const double PART_RAD = 0.05;
 
@@ -275,7 +272,7 @@ int bst_resolved_parts(const bst_resolved_adding *a, double radius_m, double ang
     double depth_m;
     (void)bst_resolved_project(a, at, &depth_m);
     double radius_px = radius_m * a->per_m / depth_m * a->r->image.cell_px;
-    double step_px = limb ? sqrt(12.0 * radius_px * LIMB_PX) : STEP_PX;
+    double step_px = sqrt(12.0 * radius_px * (limb ? LIMB_PX : BST_RESOLVED_CURVED_PX));
     double parts = fmax(angle * radius_px / step_px, angle / PART_RAD);
     return (int)fmin(ceil(parts - 1e-6), PARTS_MAX);
 }
