@@ -121,7 +121,7 @@ static void pose_at(const bst_smear *s, const bst_scene_source *source, double u
 /* Image motion in the exposure, px: of the body's origin, and of its parts by rotation. */
 static void measure(const bst_smear *s, const bst_scene_source *source, double *moved_px,
                     double *turned_px) {
-    bst_resolved_view before, view;
+    bst_resolved_view before = {.scale_rad = 0.0}, view;
     double turn = 0.0;
     *moved_px = 0.0;
     for (int k = 0; k <= PATH_TIMES; k++) {

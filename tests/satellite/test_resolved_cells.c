@@ -148,8 +148,31 @@ static void test_grazing_shadow(void **state) {
     bst_test_model_close(&m);
 }
 
+/* A sphere of 4,500 vertices that is sunk into a box has the light of a coarser one. */
+static void test_many_vertices(void **state) {
+    (void)state;
+    double flux[2];
+    for (int n = 0; n < 2; n++) {
+        char text[800];
+        snprintf(text, sizeof text,
+                 MATERIALS
+                 "{\"name\": \"b\", \"kind\": \"box\", \"size_m\": [2, 2, 3], "
+                 "\"material\": \"m\"}, {\"name\": \"s\", \"kind\": \"sphere\", "
+                 "\"radius_m\": 1, \"segments\": %d, \"position_m\": [0, 0, 1.7], "
+                 "\"material\": \"w\"}]}",
+                 n ? 96 : 32);
+        bst_test_model m = bst_test_model_open(text);
+        flux[n] = bst_test_flux(&m, bst_vec3_unit((bst_vec3){0.7, 0.4, 0.3}),
+                                bst_vec3_unit((bst_vec3){0.4, 0.6, 0.5}));
+        bst_test_model_close(&m);
+    }
+    assert_true(flux[0] > 0.1);
+    bst_assert_close(flux[1] / flux[0], 1.0, 0.01);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_crossing_facets),
-                                       cmocka_unit_test(test_grazing_shadow)};
+                                       cmocka_unit_test(test_grazing_shadow),
+                                       cmocka_unit_test(test_many_vertices)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
