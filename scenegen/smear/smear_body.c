@@ -20,6 +20,17 @@
 #define POINT_PX 2.0
 #define IMAGE_PX 32.0
 
+/* Share of the tolerance for cells with a border, and light of the pixel with the largest error
+ * over that of the body. */
+#define CELL_SHARE 0.8
+#define BORDER_LIGHT 0.01
+
+/* Error of neighbouring nodes together, over the largest of one. */
+#define NEIGHBOURS 1.25
+
+/* Poses of which the cells have borders at the same places. */
+enum { FEW_POSES = 16 };
+
 /* Poses from which one sample per cell and pose is enough. */
 enum { SAMPLED_POSES = 48 };
 
@@ -110,7 +121,7 @@ static void pose_at(const bst_smear *s, const bst_scene_source *source, double u
 /* Image motion in the exposure, px: of the body's origin, and of its parts by rotation. */
 static void measure(const bst_smear *s, const bst_scene_source *source, double *moved_px,
                     double *turned_px) {
-    bst_resolved_view before, view;
+    bst_resolved_view before = {.scale_rad = 0.0}, view;
     double turn = 0.0;
     *moved_px = 0.0;
     for (int k = 0; k <= PATH_TIMES; k++) {
@@ -159,21 +170,38 @@ static void choose_times(double sigmas, times *out) {
     }
 }
 
-/* Side of the cells for the body, px: a power of two of pixels, or less for small bodies. */
-static double cell_for(const bst_smear *s, const bst_scene_source *source, int poses) {
-    enum { FINEST = 16, ACROSS = 32, FEW = 16 };
+/* Electrons per pixel of the body's lit and visible part, about: a body fills a third of the square
+ * about its sphere, and its lit fraction is that of a sphere. */
+static double per_px_e(const bst_smear *s, const bst_scene_source *source) {
+    bst_earthlight earthlight;
+    bst_resolved_light light;
+    bst_resolved_view view;
+    pose_at(s, source, 0.5, NULL, &view, &light, &earthlight);
+    bst_vec3 eye = bst_quat_rotate(bst_quat_conj(view.q_image_from_body),
+                                   bst_vec3_scale(bst_vec3_unit(view.origin_m), -1.0));
+    double lit = fmax(0.5 * (1.0 + bst_vec3_dot(eye, light.sun)), 0.02);
     double across_px = 2.0 * bst_smear_radius_px(s, source);
     double electrons = source->electrons_per_s * s->duration_s;
-    /* a body fills about a third of the square about its sphere */
-    double per_px_e = electrons / fmax(0.3 * across_px * across_px, 1.0);
-    double allowed = IMAGE_SHARE * s->options.tolerance_sigma *
-                     sqrt(0.5 * per_px_e + s->dark_variance_e2) / fmax(per_px_e, 1e-9);
-    /* of a cell with a border, the second moments are right to some 0.01 of its square */
-    double cell = s->sigma_px * cbrt(allowed * 480.0);
-    cell = fmin(cell, across_px / ACROSS);
+    return electrons / fmax(0.3 * lit * across_px * across_px, 1.0);
+}
+
+/* Error by cells with a border, of which the second moments are right to some 0.01 of the square of
+ * the side, over the light of a pixel. */
+static double cell_error(const bst_smear *s, double side_px) {
+    double sides = side_px / s->sigma_px;
+    return sides * sides * sides / 480.0;
+}
+
+/* Side of the cells for the body, px: a power of two of pixels, or less for small bodies. */
+static double cell_for(const bst_smear *s, const bst_scene_source *source, int poses) {
+    enum { FINEST = 16, ACROSS = 32 };
+    double across_px = 2.0 * bst_smear_radius_px(s, source), light_e = per_px_e(s, source);
+    /* in a pixel beside a border */
+    double allowed_e = CELL_SHARE * s->options.tolerance_sigma *
+                       sqrt(BORDER_LIGHT * light_e + s->dark_variance_e2);
     double side = 0.5;
     /* the borders of many poses fall on all parts of the cells */
-    while (side > 1.0 / FINEST && side > cell && poses <= FEW) {
+    while (side > 1.0 / FINEST && cell_error(s, side) * light_e > allowed_e && poses <= FEW_POSES) {
         side *= 0.5;
     }
     while (side > across_px / ACROSS) {
@@ -299,6 +327,10 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
     }
     b->error =
         turned_px * turned_px * (b->one_pose ? 1.0 / 12.0 * 0.12 : 0.0) / (sigma_px * sigma_px);
+    b->error += t.count <= FEW_POSES ? cell_error(s, b->cell_px) : 0.0;
+    /* a border that is moved by 1 px changes a pixel by 0.4 / sigma of the body's light; 0.5: the
+     * pixels on its dim side have less noise */
+    b->error += b->satellite->curved_count > 0 ? 0.5 * BST_RESOLVED_CURVED_PX / sigma_px : 0.0;
     return BST_OK;
 }
 
@@ -346,6 +378,6 @@ bst_status bst_smear_body_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_sour
         s->last_peak_e = electrons * fmin(line * line * image.light, image.peak);
         s->last_read_e = electrons * fmin(image.light, image.peak * s->binning * s->binning);
     }
-    s->chord_error = b->error + image.error_e / fmax(s->last_read_e, 1e-9);
+    s->chord_error = b->error + NEIGHBOURS * image.error_e / fmax(s->last_read_e, 1e-9);
     return bst_extended_source_spread(ctx, &s->points, s->stretch, &s->nodes);
 }

@@ -15,7 +15,27 @@ typedef struct polygon {
 
 void bst_polygon_coverage_free(bst_polygon_coverage *list) {
     free(list->cells);
+    free(list->corners);
     *list = (bst_polygon_coverage){.count = 0};
+}
+
+void bst_polygon_coverage_clear(bst_polygon_coverage *list) {
+    list->count = list->corner_count = 0;
+}
+
+/* Makes room for corners of one more cell. */
+static bst_status reserve_corners(bst_ctx *ctx, bst_polygon_coverage *list, int more) {
+    if (list->corner_count + more > list->corner_capacity) {
+        int capacity = 2 * list->corner_capacity + 4096 + more;
+        bst_point2 *corners = realloc(list->corners, (size_t)capacity * sizeof *corners);
+        if (!corners) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the %d corners of a polygon",
+                            capacity);
+        }
+        list->corners = corners;
+        list->corner_capacity = capacity;
+    }
+    return BST_OK;
 }
 
 static bst_status push(bst_ctx *ctx, bst_polygon_coverage *list, const bst_coverage_cell *cell) {
@@ -95,20 +115,33 @@ static void extent(const polygon *p, int axis, double *least, double *most) {
 static bst_status add_cell(bst_ctx *ctx, bst_polygon_coverage *list, const polygon *p, int x,
                            int y) {
     double area = 0.0, mx = 0.0, my = 0.0, cx = x + 0.5, cy = y + 0.5;
+    if (p->count < 3) {
+        return BST_OK;
+    }
+    BST_TRY(reserve_corners(ctx, list, p->count));
+    bst_point2 *q = list->corners + list->corner_count;
     for (int i = 0; i < p->count; i++) {
-        bst_point2 a = p->p[i], b = p->p[i + 1 < p->count ? i + 1 : 0];
-        a.x -= cx;
-        a.y -= cy;
-        b.x -= cx;
-        b.y -= cy;
-        double c = a.x * b.y - b.x * a.y;
+        q[i] = (bst_point2){p->p[i].x - cx, p->p[i].y - cy};
+    }
+    for (int i = 0, last = p->count - 1; i < p->count; last = i++) {
+        double c = q[last].x * q[i].y - q[i].x * q[last].y;
         area += c;
-        mx += (a.x + b.x) * c;
-        my += (a.y + b.y) * c;
+        mx += (q[last].x + q[i].x) * c;
+        my += (q[last].y + q[i].y) * c;
     }
     double sign = area < 0.0 ? -1.0 : 1.0;
-    bst_coverage_cell cell = {x, y, 1, 0.5 * sign * area, sign * mx / 6.0, sign * my / 6.0};
-    return cell.area > 1e-14 ? push(ctx, list, &cell) : BST_OK;
+    bst_coverage_cell cell = {
+        x, y, 1, 0.5 * sign * area, sign * mx / 6.0, sign * my / 6.0, list->corner_count, p->count};
+    if (!(cell.area > 1e-14)) {
+        return BST_OK;
+    }
+    for (int i = 0, k = p->count - 1; area < 0.0 && i < k; i++, k--) {
+        bst_point2 swap = q[i];
+        q[i] = q[k];
+        q[k] = swap;
+    }
+    list->corner_count += p->count;
+    return push(ctx, list, &cell);
 }
 
 /* Appends the cells of the part of a row; destroys it. */
@@ -161,7 +194,7 @@ static bst_status add_row(bst_ctx *ctx, bst_polygon_coverage *list, polygon *row
     polygon side;
     cut(row, 0, from, &side, NULL);
     BST_TRY(add_cells(ctx, list, &side, y));
-    bst_coverage_cell run = {from, y, to - from, 1.0, 0.0, 0.0};
+    bst_coverage_cell run = {from, y, to - from, 1.0, 0.0, 0.0, 0, 0};
     BST_TRY(push(ctx, list, &run));
     cut(row, 0, to, NULL, &side);
     return add_cells(ctx, list, &side, y);

@@ -14,17 +14,21 @@ typedef struct bst_coverage_cell {
     int x, y, run;
     double area;               /* covered fraction */
     double moment_x, moment_y; /* integrals of the distance from the cell's centre over it */
+    int first, count;          /* corners of the part within the cell; 0: the cell's own */
 } bst_coverage_cell;
 
-/* Growing list of covered cells: zero-initialise, free with bst_polygon_coverage_free; set count to
- * 0 to use it again. */
+/* Growing list of covered cells: zero-initialise, free with bst_polygon_coverage_free; empty it
+ * with bst_polygon_coverage_clear to use it again. */
 typedef struct bst_polygon_coverage {
     bst_coverage_cell *cells;
-    int count, capacity;
+    bst_point2 *corners; /* counter-clockwise, about the cell's centre */
+    int count, capacity, corner_count, corner_capacity;
 } bst_polygon_coverage;
 
 /* Frees the memory of a list. */
 void bst_polygon_coverage_free(bst_polygon_coverage *list);
+/* Empties a list and keeps its memory. */
+void bst_polygon_coverage_clear(bst_polygon_coverage *list);
 
 /* Appends the cells that a convex polygon covers, row by row, from left to right.
  *

@@ -24,6 +24,8 @@ void bst_satellite_pose_free(bst_satellite_pose *p) {
         free(p->seen);
         free(p->next);
         free(p->flat);
+        free(p->front);
+        free(p->front_hull);
         free(p->pairs);
         free(p->faces);
         free_view(&p->views[0]);
@@ -89,15 +91,19 @@ bst_status bst_satellite_pose_create(bst_ctx *ctx, const bst_satellite *s,
     p->rotation = calloc((size_t)s->joint_count + 1, sizeof *p->rotation);
     p->origin = calloc((size_t)s->joint_count + 1, sizeof *p->origin);
     p->seen = calloc((size_t)s->occluder_count + 1, sizeof *p->seen);
-    int most = 0;
+    int most = 0, both = 0;
     for (int o = 0; o < s->occluder_count; o++) {
-        most = s->occluders[o].vertex_count > most ? s->occluders[o].vertex_count : most;
+        int vertices = s->occluders[o].vertex_count, edges = s->occluders[o].edge_count;
+        most = vertices > most ? vertices : most;
+        both = vertices + edges > both ? vertices + edges : both;
     }
+    p->front = calloc((size_t)both + 1, sizeof *p->front);
+    p->front_hull = calloc(2 * (size_t)both + 2, sizeof *p->front_hull);
     p->next = calloc((size_t)most + 1, sizeof *p->next);
     p->flat = calloc((size_t)most + 1, sizeof *p->flat);
     bool made = p->vertices && p->normals && p->rotation && p->origin && p->seen && p->next &&
-                p->flat && make_view(s, &p->views[0]) && make_view(s, &p->views[1]) &&
-                make_pairs(p);
+                p->flat && p->front && p->front_hull && make_view(s, &p->views[0]) &&
+                make_view(s, &p->views[1]) && make_pairs(p);
     bst_status status =
         made ? bst_polygon_clip_create(ctx, &p->clip)
              : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the pose of a satellite of %d facets",
@@ -303,7 +309,6 @@ void bst_pose_look(bst_satellite_pose *p, int view, bst_vec3 direction) {
 /* The plane of a facet and the projection of a view onto it. */
 typedef struct plane {
     bst_vec3 origin, normal, e1, e2;
-    double margin_m;                           /* what is less in front of the plane is in it */
     bst_point2 whole[BST_POLYGON_CORNERS_MAX]; /* the facet */
     int count;
     int body;              /* its occluder */
@@ -326,31 +331,6 @@ static bst_point2 drop(const plane *f, const bst_pose_view *v, bst_vec3 q) {
     double t = bst_vec3_dot(r, f->normal) / bst_vec3_dot(v->z, f->normal);
     r = bst_vec3_axpy(r, -t, v->z);
     return (bst_point2){bst_vec3_dot(r, f->e1), bst_vec3_dot(r, f->e2)};
-}
-
-/* Subtracts the part of an occluder that is in front of the facet's plane. */
-static void subtract_front(bst_satellite_pose *p, const plane *f, const bst_pose_view *v,
-                           const bst_occluder *o, const double *height) {
-    bst_point2 points[2 * BST_POLYGON_CORNERS_MAX], hull[4 * BST_POLYGON_CORNERS_MAX];
-    int n = 0;
-    for (int i = 0; i < o->vertex_count; i++) {
-        if (height[i] >= 0.0) {
-            points[n++] = drop(f, v, p->vertices[o->first_vertex + i]);
-        }
-    }
-    for (int e = 0; e < o->edge_count && n < 2 * BST_POLYGON_CORNERS_MAX; e++) {
-        const int *edge = p->satellite->edges[o->first_edge + e];
-        double a = height[edge[0] - o->first_vertex], b = height[edge[1] - o->first_vertex];
-        if ((a < 0.0) != (b < 0.0)) {
-            bst_vec3 from = p->vertices[edge[0]];
-            bst_vec3 way = bst_vec3_sub(p->vertices[edge[1]], from);
-            points[n++] = drop(f, v, bst_vec3_axpy(from, a / (a - b), way));
-        }
-    }
-    int corners = bst_polygon_hull(points, n, hull);
-    if (corners >= 3 && corners <= BST_POLYGON_CORNERS_MAX) {
-        bst_polygon_clip_subtract(&p->clip, hull, corners, false);
-    }
 }
 
 /* True if rays from all corners of a facet along the view's direction, which goes out through the
@@ -413,11 +393,9 @@ static bool is_inside(const bst_satellite_pose *p, const bst_facet *facet, const
     return z < shell->depth_m && z > shell->depth_m * across2 / (shell->radius_m * shell->radius_m);
 }
 
-/* The silhouette of an occluder on the facet's plane; 0 if it is clear of the facet. */
-static int silhouette(bst_satellite_pose *p, plane *f, bst_pose_view *v, int occluder,
-                      bst_point2 *moved) {
-    const bst_point2 *outline;
-    int n = outline_of(p, v, occluder, &outline);
+/* Moves an outline from the view's plane into the facet's. */
+static void map_outline(plane *f, const bst_pose_view *v, const bst_point2 *outline, int count,
+                        bst_point2 *moved) {
     if (!f->mapped) { /* the projection of the view's plane onto the facet's is affine */
         bst_point2 x = drop(f, v, v->x), y = drop(f, v, v->y);
         f->zero = drop(f, v, (bst_vec3){0});
@@ -426,11 +404,10 @@ static int silhouette(bst_satellite_pose *p, plane *f, bst_pose_view *v, int occ
         f->mapped = true;
     }
     const bst_point2 a = f->zero, x = f->x, y = f->y;
-    for (int i = 0; i < n; i++) {
+    for (int i = 0; i < count; i++) {
         moved[i].x = a.x + outline[i].x * x.x + outline[i].y * y.x;
         moved[i].y = a.y + outline[i].x * x.y + outline[i].y * y.y;
     }
-    return bst_polygon_is_separate(f->whole, f->count, moved, n) ? 0 : n;
 }
 
 /* Subtracts an occluder's silhouette from the facet. */
@@ -438,31 +415,29 @@ static void subtract(bst_satellite_pose *p, plane *f, bst_pose_view *v, int occl
     bst_vec3 axis;
     /* where bodies are separate, the ray leads toward this one: see bst_pose_look */
     bool apart = bst_separation(p, f->body, occluder, &axis);
-    const bst_occluder *o = &p->satellite->occluders[occluder];
     bst_point2 moved[BST_POLYGON_CORNERS_MAX];
-    int n = silhouette(p, f, v, occluder, moved);
-    if (n == 0) {
+    const bst_point2 *outline;
+    int n = outline_of(p, v, occluder, &outline);
+    n = n <= BST_POLYGON_CORNERS_MAX ? n : 0;
+    map_outline(f, v, outline, n, moved);
+    if (bst_polygon_is_separate(f->whole, f->count, moved, n)) {
         return;
     }
     /* all of what is nearer to the light than the whole facet is in front of it, where it matters
      */
+    bool overlaps = true;
     if (!apart && v->bounds[occluder][4] < f->nearest_m) {
-        double height[BST_POLYGON_CORNERS_MAX], low = INFINITY, high = -INFINITY;
-        for (int i = 0; i < o->vertex_count; i++) {
-            bst_vec3 r = bst_vec3_sub(p->vertices[o->first_vertex + i], f->origin);
-            height[i] = bst_vec3_dot(r, f->normal);
-            low = height[i] < low ? height[i] : low;
-            high = height[i] > high ? height[i] : high;
-        }
-        if (high <= f->margin_m) {
+        int front = bst_pose_front(p, v, occluder, f->origin, f->normal, &outline);
+        if (front == 0) {
             return;
         }
-        if (low < -f->margin_m) {
-            subtract_front(p, f, v, o, height);
-            return;
+        if (front != BST_POSE_ALL_IN_FRONT) {
+            n = front;
+            map_outline(f, v, outline, n, moved);
+            overlaps = false;
         }
     }
-    bst_polygon_clip_subtract(&p->clip, moved, n, true);
+    bst_polygon_clip_subtract(&p->clip, moved, n, overlaps);
 }
 
 /* Bounds of a facet in a view. */
@@ -482,7 +457,6 @@ static void start_clip(bst_satellite_pose *p, int index, plane *f) {
     f->body = facet->occluder;
     f->normal = p->normals[index];
     bst_pose_facet_axes(p, index, &f->origin, &f->e1, &f->e2);
-    f->margin_m = 1e-9 * s->radius_m;
     for (int i = 0; i < facet->count; i++) {
         bst_vec3 r = bst_vec3_sub(p->vertices[s->corner[facet->first + i]], f->origin);
         f->whole[i] = (bst_point2){bst_vec3_dot(r, f->e1), bst_vec3_dot(r, f->e2)};

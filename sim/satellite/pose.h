@@ -46,9 +46,10 @@ typedef struct bst_satellite_pose {
     bst_mat3 *rotation;                          /* by joint: body frame from joint frame */
     bst_vec3 *origin;                            /* by joint, body frame */
     bst_pose_view views[2];                      /* see bst_pose_look */
-    int *next;        /* work memory of outlines: by vertex of the largest occluder */
-    bst_point2 *flat; /* likewise */
-    int *seen;        /* by occluder: facet for which it was last found in the grid */
+    int *next;                      /* work memory of outlines: by vertex of the largest occluder */
+    bst_point2 *flat;               /* likewise */
+    bst_point2 *front, *front_hull; /* work memory of bst_pose_front */
+    int *seen;                      /* by occluder: facet for which it was last found in the grid */
     int seen_stamp;
     int stamp;                          /* counts the poses, from 1 */
     bst_pose_pair *pairs;               /* [occluders][occluders]; NULL: too many */
@@ -84,6 +85,17 @@ void bst_pose_look(bst_satellite_pose *pose, int view, bst_vec3 direction);
  * Returned:  number of corners, below 3: none
  *            *points  counter-clockwise, along the view's x and y; they belong to the pose */
 int bst_pose_outline(bst_satellite_pose *pose, int view, int occluder, const bst_point2 **points);
+
+/* Return value of bst_pose_front: nothing of the body is behind the plane. */
+enum { BST_POSE_ALL_IN_FRONT = -1 };
+
+/* Silhouette, along the view's x and y, of what of a convex body is in front of a plane.
+ *
+ * Given:     point, normal  of the plane, toward the view
+ * Returned:  number of corners; 0: none is; BST_POSE_ALL_IN_FRONT: see bst_pose_outline
+ *            *hull  counter-clockwise; valid until the next call */
+int bst_pose_front(bst_satellite_pose *pose, const bst_pose_view *view, int occluder,
+                   bst_vec3 point, bst_vec3 normal, const bst_point2 **hull);
 
 /* Area of a facet that the bodies of the model hide from none of the directions of the first
  * `views` views, m^2. The facet faces all of these directions.

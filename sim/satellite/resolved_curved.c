@@ -1,7 +1,11 @@
 /* Facets of curved surfaces in the image. */
 #include <string.h>
 
+#include "sim/satellite/part_shadow.h"
 #include "sim/satellite/resolved_faces.h"
+
+/* Cosine of incidence on a facet below which its plane does not tell what is in shadow. */
+static const double GRAZING = 0.02;
 
 /* Samples of a part of a curved facet for its light: more where the terminator crosses it or a lobe
  * is narrower than it is. */
@@ -206,69 +210,111 @@ static void make_part(const bst_resolved_adding *a, int facet, const bst_curved_
     }
 }
 
+/* How a curved facet is divided, and what of it is lit. */
+typedef struct curved_plan {
+    bst_curved_facet c;
+    int facet, parts[2], fine[2]; /* parts of the facet, and of parts at limb and terminator */
+    double scale[2], half, near;  /* half: angle of half a part */
+    bst_vec3 to_eye;
+    /* what the Sun reaches: by part of those bodies, else of the whole facet, of which pose->clip
+     * has the pieces if it is split */
+    bool by_part, split;
+    uint64_t hiders;
+    double lit[2]; /* fraction that Sun and Earth reach */
+} curved_plan;
+
+static void divide(const bst_resolved_adding *a, int facet, curved_plan *p) {
+    const bst_facet *from = &a->r->satellite->facets[facet];
+    bst_vec3 first = a->pose->vertices[a->r->satellite->corner[from->first]];
+    const bst_curved_facet *c = &p->c;
+    bst_curved_facet_make(a->pose, &a->r->places, facet, &p->c);
+    p->facet = facet;
+    double radius_m =
+        c->curved->sphere ? c->curved->radius_m : fmax(c->radius_m[0], c->radius_m[1]);
+    const double angle[2] = {c->azimuth[1] - c->azimuth[0], c->height[1] - c->height[0]};
+    for (int n = 0; n < 2; n++) {
+        bool round = n == 0 || c->curved->sphere;
+        p->parts[n] = round ? bst_resolved_parts(a, radius_m, angle[n], first, false) : 1;
+        p->fine[n] = round ? bst_resolved_parts(a, radius_m, angle[n], first, true) : 1;
+    }
+    p->half = 0.5 * angle[0] / p->parts[0];
+    p->scale[0] = p->scale[1] = bst_curved_facet_scale(c, p->fine[0], p->fine[1]);
+    if (c->curved->sphere) {
+        p->half = 0.5 * hypot(angle[0] / p->parts[0], angle[1] / p->parts[1]);
+        /* where large and small parts of a sphere meet, gaps and overlaps have the same area */
+        p->scale[0] = sqrt(bst_curved_facet_scale(c, p->parts[0], p->parts[1]));
+    }
+    for (int n = 0; n < 2; n++) {
+        p->fine[n] = (p->fine[n] + p->parts[n] - 1) / p->parts[n];
+    }
+    bst_vec3 eye = bst_vec3_sub(a->eye_m, first);
+    p->to_eye = bst_vec3_unit(eye);
+    /* the direction to the observer differs over a facet by this */
+    p->near = radius_m / bst_vec3_norm(eye);
+}
+
+/* Finds what the lights reach. */
+static void find_lit(const bst_resolved_adding *a, curved_plan *p) {
+    bst_vec3 normal = a->pose->normals[p->facet];
+    p->lit[0] = p->lit[1] = 1.0;
+    p->by_part = p->split = false;
+    if (!a->light) {
+        return;
+    }
+    /* at grazing incidence the true surface, not its facet, decides */
+    if (a->earth && bst_vec3_dot(normal, a->light->earthlight->centre) > GRAZING) {
+        p->lit[1] = bst_resolved_lit_fraction(a, p->facet, 1);
+    }
+    p->by_part = bst_part_shadow_hiders(a->pose, 0, p->facet, &p->hiders);
+    if (!p->by_part && bst_vec3_dot(normal, a->light->sun) > GRAZING) {
+        p->lit[0] = bst_resolved_lit_fraction(a, p->facet, 0); /* its pieces remain */
+        p->split = p->lit[0] > 0.0 && p->lit[0] < 1.0;
+    }
+}
+
+/* Adds a part with its light. */
+static bst_status add_lit_part(bst_ctx *ctx, const bst_resolved_adding *a, const curved_plan *p,
+                               const int all[2], const int place[2], bst_resolved_face *f) {
+    curved_part part;
+    make_part(a, p->facet, &p->c, all, place, &part);
+    bst_vec3 middle = bst_vec3_scale(bst_vec3_add(part.corner[0], part.corner[2]), 0.5);
+    bst_resolved_shading s = shade_part(a, &p->c, all, place, middle);
+    bool split = p->split;
+    double lit = split ? 1.0 : p->lit[0];
+    if (p->by_part && p->hiders != 0 && s.sun > 0.0) {
+        double fraction =
+            bst_part_shadow_lit(a->pose, 0, p->facet, p->hiders, part.corner, part.flat);
+        split = fraction > 0.0 && fraction < 1.0;
+        lit = split ? 1.0 : fraction;
+    }
+    s.sun *= lit;
+    s.sun_change[0] *= lit;
+    s.sun_change[1] *= lit;
+    s.earth *= p->lit[1];
+    return add_part(ctx, a, &part, p->c.curved->side, &s, split, f);
+}
+
 bst_status bst_resolved_add_curved_facet(bst_ctx *ctx, bst_resolved_adding *a, int facet,
                                          bst_resolved_face *f) {
-    const bst_facet *from = &a->r->satellite->facets[facet];
-    bst_vec3 normal = a->pose->normals[facet];
-    bst_curved_facet c;
-    bst_curved_facet_make(a->pose, &a->r->places, facet, &c);
-    bst_vec3 first = a->pose->vertices[a->r->satellite->corner[from->first]];
-    double radius_m = c.curved->sphere ? c.curved->radius_m : fmax(c.radius_m[0], c.radius_m[1]);
-    double turn = c.azimuth[1] - c.azimuth[0], rise = c.height[1] - c.height[0];
-    int parts[2] = {bst_resolved_parts(a, radius_m, turn, first, false), 1};
-    int fine[2] = {bst_resolved_parts(a, radius_m, turn, first, true), 1};
-    double half = 0.5 * turn / parts[0];
-    if (c.curved->sphere) {
-        parts[1] = bst_resolved_parts(a, radius_m, rise, first, false);
-        fine[1] = bst_resolved_parts(a, radius_m, rise, first, true);
-        half = 0.5 * hypot(turn / parts[0], rise / parts[1]);
-    }
-    const double scale[2] = {
-        /* where large and small parts of a sphere meet, gaps and overlaps have the same area */
-        c.curved->sphere ? sqrt(bst_curved_facet_scale(&c, parts[0], parts[1]))
-                         : bst_curved_facet_scale(&c, fine[0], fine[1]),
-        bst_curved_facet_scale(&c, fine[0], fine[1])};
-    for (int n = 0; n < 2; n++) { /* parts of parts at limb and terminator */
-        fine[n] = (fine[n] + parts[n] - 1) / parts[n];
-    }
-    /* the direction to the observer differs over a facet by this */
-    double near = radius_m / bst_vec3_norm(bst_vec3_sub(a->eye_m, first));
-    double lit[2] = {1.0, 1.0};
-    bool split = false;
-    for (int view = 1; view >= 0 && a->light; view--) { /* the Sun's pieces remain */
-        bst_vec3 direction = view == 0  ? a->light->sun
-                             : a->earth ? a->light->earthlight->centre
-                                        : (bst_vec3){0};
-        /* at grazing incidence the true surface, not its facet, decides */
-        if (bst_vec3_dot(normal, direction) > 0.02) {
-            lit[view] = bst_resolved_lit_fraction(a, facet, view);
-            split = view == 0 && lit[0] > 0.0 && lit[0] < 1.0;
-        }
-    }
-    for (int n = 0; n < parts[0] * parts[1]; n++) {
-        int i = n % parts[0], k = n / parts[0];
-        bst_vec3 outward = bst_curved_facet_normal(&c, (i + 0.5) / parts[0], (k + 0.5) / parts[1]);
-        double up = bst_vec3_dot(outward, bst_vec3_unit(bst_vec3_sub(a->eye_m, first)));
-        bool limb = fabs(up) < 2.5 * half + near;
+    curved_plan p;
+    divide(a, facet, &p);
+    find_lit(a, &p);
+    for (int n = 0; n < p.parts[0] * p.parts[1]; n++) {
+        int i = n % p.parts[0], k = n / p.parts[0];
+        bst_vec3 outward =
+            bst_curved_facet_normal(&p.c, (i + 0.5) / p.parts[0], (k + 0.5) / p.parts[1]);
+        double up = bst_vec3_dot(outward, p.to_eye);
+        bool limb = fabs(up) < 2.5 * p.half + p.near;
         if (up < 0.0 && !limb) {
             continue; /* shows its back */
         }
-        limb = limb || (a->light && fabs(bst_vec3_dot(outward, a->light->sun)) < 1.2 * half);
-        int divide[2] = {limb ? fine[0] : 1, limb ? fine[1] : 1};
-        a->scale = scale[limb];
-        int all[2] = {parts[0] * divide[0], parts[1] * divide[1]};
-        for (int m = 0; m < divide[0] * divide[1]; m++) {
-            int place[2] = {i * divide[0] + m % divide[0], k * divide[1] + m / divide[0]};
-            curved_part part;
-            make_part(a, facet, &c, all, place, &part);
-            bst_vec3 middle = bst_vec3_scale(bst_vec3_add(part.corner[0], part.corner[2]), 0.5);
-            bst_resolved_shading s = shade_part(a, &c, all, place, middle);
-            for (int v = 0; v < 2; v++) {
-                s.sun_change[v] *= split ? 1.0 : lit[0];
-            }
-            s.sun *= split ? 1.0 : lit[0];
-            s.earth *= lit[1];
-            BST_TRY(add_part(ctx, a, &part, c.curved->side, &s, split, f));
+        limb = limb || (a->light && fabs(bst_vec3_dot(outward, a->light->sun)) < 1.2 * p.half);
+        const int by[2] = {limb ? p.fine[0] : 1, limb ? p.fine[1] : 1};
+        const int all[2] = {p.parts[0] * by[0], p.parts[1] * by[1]};
+        a->scale = p.scale[limb];
+        for (int m = 0; m < by[0] * by[1]; m++) {
+            const int place[2] = {i * by[0] + m % by[0], k * by[1] + m / by[0]};
+            BST_TRY(add_lit_part(ctx, a, &p, all, place, f));
         }
     }
     return BST_OK;

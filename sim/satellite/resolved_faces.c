@@ -23,28 +23,20 @@ bool bst_resolved_make_face(const bst_resolved_adding *a, const bst_vec3 *corner
     out->count = count;
     out->slope[0] = out->slope[1] = out->least = out->most = 0.0;
     out->middle[0] = out->middle[1] = 0.0;
-    out->near_m = INFINITY;
-    out->far_m = 0.0;
     for (int i = 0; i < count; i++) {
         double depth_m;
         out->corner[i] = bst_resolved_project(a, corner[i], &depth_m);
-        out->near_m = fmin(out->near_m, depth_m);
-        out->far_m = fmax(out->far_m, depth_m);
     }
-    /* n . (eye + depth d) = n . corner, d = (x, y, 1) in tangents */
+    /* n . (eye + depth d) = n . corner, d = (x, y, 1) in tangents: 1 over the depth is linear. The
+     * origin's is subtracted before it is multiplied by the square of its depth */
     bst_vec3 n = bst_mat3_mul_vec(&a->image_from_body, normal);
     double cell = 1.0 / a->per_m;
     const bst_resolved_image *m = &a->r->image;
-    out->plane =
-        bst_vec3_scale((bst_vec3){n.x * cell, n.y * cell, n.z + cell * (n.x * m->x0 + n.y * m->y0)},
-                       -1.0 / before_m);
+    double origin_m = a->view->origin_m.z, by = -origin_m / before_m;
+    out->plane.x = origin_m * by * n.x * cell;
+    out->plane.y = origin_m * by * n.y * cell;
+    out->plane.z = origin_m * (by * (n.z + cell * (n.x * m->x0 + n.y * m->y0)) - 1.0);
     return true;
-}
-
-static double depth_at(const bst_resolved_face *f, double x, double y) {
-    double inverse = f->plane.x * x + f->plane.y * y + f->plane.z;
-    double depth_m = inverse > 0.0 ? 1.0 / inverse : f->far_m;
-    return fmin(fmax(depth_m, f->near_m), f->far_m);
 }
 
 bst_resolved_shading bst_resolved_shade(const bst_resolved_adding *a, int material, bst_vec3 point,
@@ -98,10 +90,56 @@ double bst_resolved_lit_fraction(const bst_resolved_adding *a, int facet, int vi
                                                     : 0.0;
 }
 
+bst_status bst_resolved_reach(bst_ctx *ctx, const bst_resolved_adding *a) {
+    bst_resolved *r = a->r;
+    const bst_satellite *sat = r->satellite;
+    /* facets of curved surfaces are divided, so that they reach beyond the body's corners by less
+     * than this share of its size */
+    static const double BEYOND = 0.015;
+    if (sat->occluder_count > BST_SEPARATION_BODIES) {
+        return BST_OK;
+    }
+    for (int o = 0; o < sat->occluder_count; o++) {
+        const bst_occluder *body = &sat->occluders[o];
+        double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+        for (int i = 0; i < body->vertex_count; i++) {
+            double depth_m;
+            bst_point2 p =
+                bst_resolved_project(a, a->pose->vertices[body->first_vertex + i], &depth_m);
+            r->outline[i] = p;
+            low[0] = fmin(low[0], p.x);
+            low[1] = fmin(low[1], p.y);
+            high[0] = fmax(high[0], p.x);
+            high[1] = fmax(high[1], p.y);
+        }
+        double room = BEYOND * fmax(high[0] - low[0], high[1] - low[1]) + 1e-3;
+        for (int i = body->vertex_count - 1; i >= 0; i--) { /* a square about each */
+            bst_point2 p = r->outline[i];
+            for (int k = 0; k < 4; k++) {
+                r->outline[4 * i + k] =
+                    (bst_point2){p.x + (k & 1 ? room : -room), p.y + (k & 2 ? room : -room)};
+            }
+        }
+        int n = bst_polygon_hull(r->outline, 4 * body->vertex_count, r->hull);
+        bst_polygon_coverage_clear(&r->whole);
+        BST_TRY(bst_polygon_coverage_add(ctx, &r->whole, r->hull,
+                                         n < BST_COVERAGE_CORNERS_MAX ? n : 0, r->image.width,
+                                         r->image.height));
+        for (int i = 0; i < r->whole.count; i++) {
+            const bst_coverage_cell *c = &r->whole.cells[i];
+            for (int x = c->x; x < c->x + c->run; x++) {
+                /* the two sides of a shell hide each other */
+                bst_visible_surface_reach(&r->surface, x, c->y, body->shell >= 0 ? -1 : 2 * o);
+            }
+        }
+    }
+    return BST_OK;
+}
+
 bst_status bst_resolved_cover_face(bst_ctx *ctx, const bst_resolved_adding *a,
                                    bst_resolved_face *f) {
     bst_resolved *r = a->r;
-    r->whole.count = 0;
+    bst_polygon_coverage_clear(&r->whole);
     BST_TRY(bst_polygon_coverage_add(ctx, &r->whole, f->corner, f->count, r->image.width,
                                      r->image.height));
     int high[2] = {0, 0};
@@ -118,6 +156,10 @@ bst_status bst_resolved_cover_face(bst_ctx *ctx, const bst_resolved_adding *a,
     return BST_OK;
 }
 
+static bst_resolved_lit_cell *lit_cell(bst_resolved *r, const bst_resolved_face *f, int x, int y) {
+    return &r->lit_cells[(size_t)(y - f->low[1]) * (size_t)f->width + (size_t)(x - f->low[0])];
+}
+
 bst_status bst_resolved_clear_lit(bst_ctx *ctx, bst_resolved *r, const bst_resolved_face *f) {
     size_t need = (size_t)f->width * (size_t)f->height;
     if (need > r->lit_capacity) {
@@ -130,22 +172,47 @@ bst_status bst_resolved_clear_lit(bst_ctx *ctx, bst_resolved *r, const bst_resol
         }
     }
     memset(r->lit_cells, 0, need * sizeof *r->lit_cells);
+    for (int i = 0; i < r->whole.count; i++) {
+        const bst_coverage_cell *c = &r->whole.cells[i];
+        for (int x = c->x; x < c->x + c->run; x++) {
+            lit_cell(r, f, x, c->y)->area = c->area;
+        }
+    }
     return BST_OK;
+}
+
+/* A fragment of a facet. */
+static bst_surface_fragment fragment_of(const bst_resolved_face *f, const bst_coverage_cell *c,
+                                        int x, double light) {
+    double middle_m = f->plane.x * (x + 0.5) + f->plane.y * (c->y + 0.5) + f->plane.z;
+    return (bst_surface_fragment){.near = {(float)middle_m, (float)f->plane.x, (float)f->plane.y},
+                                  .area = (float)c->area,
+                                  .area_x = (float)c->moment_x,
+                                  .area_y = (float)c->moment_y,
+                                  .light = (float)light,
+                                  .part = (int16_t)f->part,
+                                  .body = f->body};
 }
 
 bst_status bst_resolved_add_lit(bst_ctx *ctx, bst_resolved *r, const bst_resolved_face *f,
                                 const bst_point2 *corner, int count, double light) {
-    r->lit.count = 0;
+    bst_polygon_coverage_clear(&r->lit);
     BST_TRY(bst_polygon_coverage_add(ctx, &r->lit, corner, count, r->image.width, r->image.height));
     for (int i = 0; i < r->lit.count; i++) {
         const bst_coverage_cell *c = &r->lit.cells[i];
-        int y = c->y - f->low[1];
-        for (int x = c->x - f->low[0]; x < c->x - f->low[0] + c->run; x++) {
-            if (x >= 0 && y >= 0 && x < f->width && y < f->height) {
-                bst_resolved_lit_cell *to = &r->lit_cells[(size_t)y * (size_t)f->width + (size_t)x];
-                to->light += light * c->area;
-                to->x += light * c->moment_x;
-                to->y += light * c->moment_y;
+        for (int x = c->x; x < c->x + c->run; x++) {
+            if (x < f->low[0] || c->y < f->low[1] || x >= f->low[0] + f->width ||
+                c->y >= f->low[1] + f->height) {
+                continue;
+            }
+            bst_resolved_lit_cell *to = lit_cell(r, f, x, c->y);
+            if (c->area >= to->area - 1e-7) {
+                to->light += light;
+            } else {
+                bst_surface_fragment one = fragment_of(f, c, x, light);
+                one.more_light = true;
+                BST_TRY(bst_visible_surface_add(ctx, &r->surface, x, c->y, &one,
+                                                r->lit.corners + c->first, c->count));
             }
         }
     }
@@ -176,34 +243,17 @@ static bst_status add_pieces(bst_ctx *ctx, const bst_resolved_adding *a, int fac
 bst_status bst_resolved_add_fragments(bst_ctx *ctx, const bst_resolved_adding *a,
                                       const bst_resolved_face *f, double uniform, bool pieces) {
     bst_resolved *r = a->r;
-    double steep = 0.5 * (fabs(f->plane.x) + fabs(f->plane.y)); /* of 1 / depth, half a cell */
     for (int i = 0; i < r->whole.count; i++) {
         const bst_coverage_cell *c = &r->whole.cells[i];
-        bst_surface_fragment piece = {.area = (float)c->area,
-                                      .area_x = (float)c->moment_x,
-                                      .area_y = (float)c->moment_y,
-                                      .part = f->part,
-                                      .curved = f->curved};
         double dx = c->moment_x / c->area, dy = c->moment_y / c->area;
         for (int x = c->x; x < c->x + c->run; x++) {
-            bst_surface_fragment one = piece;
-            double depth_m = depth_at(f, x + 0.5 + dx, c->y + 0.5 + dy);
-            one.depth_m = (float)(depth_m - a->view->origin_m.z);
-            one.reach_m = (float)fmin(steep * depth_m * depth_m, f->far_m - f->near_m);
             double more = f->slope[0] * (x + 0.5 + dx - f->middle[0]) +
                           f->slope[1] * (c->y + 0.5 + dy - f->middle[1]);
             double light = uniform + fmin(fmax(more, f->least), f->most);
-            one.light = (float)(light * c->area);
-            one.light_x = (float)(light * c->moment_x);
-            one.light_y = (float)(light * c->moment_y);
-            if (pieces) {
-                size_t at = (size_t)(c->y - f->low[1]) * (size_t)f->width + (size_t)(x - f->low[0]);
-                const bst_resolved_lit_cell *lit = &r->lit_cells[at];
-                one.light += (float)lit->light;
-                one.light_x += (float)lit->x;
-                one.light_y += (float)lit->y;
-            }
-            BST_TRY(bst_visible_surface_add(ctx, &r->surface, x, c->y, &one));
+            light += pieces ? lit_cell(r, f, x, c->y)->light : 0.0;
+            bst_surface_fragment one = fragment_of(f, c, x, light);
+            BST_TRY(bst_visible_surface_add(ctx, &r->surface, x, c->y, &one,
+                                            r->whole.corners + c->first, c->count));
         }
     }
     return BST_OK;
@@ -214,9 +264,6 @@ bst_status bst_resolved_add_fragments(bst_ctx *ctx, const bst_resolved_adding *a
  * (24 radius), the straight side of a cylinder by twice that. */
 static const double LIMB_PX = 4e-5;
 
-/* Step elsewhere, px. */
-static const double STEP_PX = 0.5;
-
 /* Largest angle of a part of a curved surface: the light of a part is that of its middle. */
 static const double PART_RAD = 0.05;
 
@@ -225,7 +272,7 @@ int bst_resolved_parts(const bst_resolved_adding *a, double radius_m, double ang
     double depth_m;
     (void)bst_resolved_project(a, at, &depth_m);
     double radius_px = radius_m * a->per_m / depth_m * a->r->image.cell_px;
-    double step_px = limb ? sqrt(12.0 * radius_px * LIMB_PX) : STEP_PX;
+    double step_px = sqrt(12.0 * radius_px * (limb ? LIMB_PX : BST_RESOLVED_CURVED_PX));
     double parts = fmax(angle * radius_px / step_px, angle / PART_RAD);
     return (int)fmin(ceil(parts - 1e-6), PARTS_MAX);
 }

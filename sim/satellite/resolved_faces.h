@@ -7,9 +7,10 @@
 #include "sim/satellite/sun_disc.h"
 #include "sim/satellite/visible_surface.h"
 
-/* Light of a cell that a facet covers in part: sums over lit polygons. */
+/* A cell that a facet with shadows covers. */
 typedef struct bst_resolved_lit_cell {
-    double light, x, y;
+    double area;  /* that the facet covers */
+    double light; /* of lit polygons that cover all of that */
 } bst_resolved_lit_cell;
 
 /* Side of the depth map from the Sun. */
@@ -35,6 +36,7 @@ struct bst_resolved {
     bst_polygon_coverage whole, lit;  /* of the current facet */
     bst_resolved_lit_cell *lit_cells; /* in the box of the current facet */
     size_t lit_capacity;
+    bst_point2 *outline, *hull; /* of a body, with room */
     bst_sun_disc disc;
     bst_resolved_samples samples;
 };
@@ -55,9 +57,8 @@ typedef struct bst_resolved_adding {
 /* A facet in the image. */
 typedef struct bst_resolved_face {
     bst_point2 corner[BST_COVERAGE_CORNERS_MAX];
-    int count, part, curved;
-    bst_vec3 plane;            /* depth at (x, y, 1) in cells: 1 over the scalar product */
-    double near_m, far_m;      /* depths of the corners */
+    int count, part, body;
+    bst_vec3 plane;            /* nearness at (x, y, 1) in cells: the scalar product */
     int low[2], width, height; /* box in cells */
     /* change of the light per cell from the middle, per cell, and its limits; all 0: none */
     double slope[2], middle[2], least, most;
@@ -88,14 +89,17 @@ bst_resolved_shading bst_resolved_shade(const bst_resolved_adding *a, int materi
  * Given:     view  0: Sun; 1: earthlight */
 double bst_resolved_lit_fraction(const bst_resolved_adding *a, int facet, int view);
 
+/* Tells the surface which cells the convex bodies of the model reach. BST_ERR_MEMORY. */
+bst_status bst_resolved_reach(bst_ctx *ctx, const bst_resolved_adding *a) BST_MUST_CHECK;
+
 /* Covers the grid by a facet: fills r->whole and the facet's box. BST_ERR_MEMORY. */
 bst_status bst_resolved_cover_face(bst_ctx *ctx, const bst_resolved_adding *a,
                                    bst_resolved_face *f) BST_MUST_CHECK;
-/* Empties the light of the facet's box. BST_ERR_MEMORY. */
+/* Starts the light of the facet's box with none. BST_ERR_MEMORY. */
 bst_status bst_resolved_clear_lit(bst_ctx *ctx, bst_resolved *r,
                                   const bst_resolved_face *f) BST_MUST_CHECK;
-/* Adds the light of a polygon within the facet, corner[count] in cells, to its box.
- * BST_ERR_MEMORY. */
+/* Adds the light of a polygon within the facet, corner[count] in cells: to its box where it covers
+ * all that the facet has of a cell, else to the surface. BST_ERR_MEMORY. */
 bst_status bst_resolved_add_lit(bst_ctx *ctx, bst_resolved *r, const bst_resolved_face *f,
                                 const bst_point2 *corner, int count, double light) BST_MUST_CHECK;
 /* Adds the fragments of a facet to the surface: a uniform light per cell and, with `pieces`, that
@@ -108,7 +112,7 @@ bst_status bst_resolved_add_fragments(bst_ctx *ctx, const bst_resolved_adding *a
 int bst_resolved_parts(const bst_resolved_adding *a, double radius_m, double angle, bst_vec3 at,
                        bool limb);
 
-/* Adds a plane facet to the surface; f: work space, with part and curved set. BST_ERR_MEMORY. */
+/* Adds a plane facet to the surface; f: work space, with part and body set. BST_ERR_MEMORY. */
 bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, int facet,
                                         bst_resolved_face *f) BST_MUST_CHECK;
 /* Likewise a facet of a curved surface (resolved_curved.c). */

@@ -12,7 +12,16 @@ bst_status bst_resolved_create(bst_ctx *ctx, const bst_satellite *satellite, bst
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the image of a satellite");
     }
     r->satellite = satellite;
-    bst_status status = bst_curved_places_create(ctx, satellite, &r->places);
+    int most = 0;
+    for (int o = 0; o < satellite->occluder_count; o++) {
+        int count = satellite->occluders[o].vertex_count;
+        most = count > most ? count : most;
+    }
+    r->outline = malloc((4 * (size_t)most + 4) * sizeof *r->outline);
+    r->hull = malloc((8 * (size_t)most + 8) * sizeof *r->hull);
+    bst_status status = r->outline && r->hull
+                            ? bst_curved_places_create(ctx, satellite, &r->places)
+                            : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the image of a body");
     if (status != BST_OK) {
         bst_resolved_free(r);
         *out = NULL;
@@ -25,6 +34,8 @@ void bst_resolved_free(bst_resolved *r) {
         free(r->image.cells);
         free(r->image.part);
         free(r->lit_cells);
+        free(r->outline);
+        free(r->hull);
         bst_curved_places_free(&r->places);
         bst_visible_surface_free(&r->surface);
         bst_resolved_samples_free(&r->samples);
@@ -94,6 +105,9 @@ bst_status bst_resolved_begin(bst_ctx *ctx, bst_resolved *r, const double low[2]
     return bst_visible_surface_begin(ctx, &r->surface, m->width, m->height);
 }
 
+/* Differences of depth over the satellite's radius that are none. */
+static const double SAME = 2e-6;
+
 /* A pose with its view and light. */
 static bst_resolved_adding start(bst_resolved *r, bst_satellite_pose *pose,
                                  const bst_resolved_view *view, const bst_resolved_light *light) {
@@ -123,16 +137,17 @@ bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *r, bst_satellite_pose *p
             bst_pose_look(pose, 1, light->earthlight->centre);
         }
     }
+    BST_TRY(bst_resolved_reach(ctx, &a));
     bst_resolved_face f;
     for (int i = 0; i < sat->facet_count; i++) {
         f.part = sat->facets[i].part;
-        f.curved = sat->facets[i].curved;
+        f.body = 2 * sat->facets[i].occluder + sat->facets[i].inside;
         BST_TRY(sat->facets[i].curved >= 0 ? bst_resolved_add_curved_facet(ctx, &a, i, &f)
                                            : bst_resolved_add_plane_facet(ctx, &a, i, &f));
     }
-    /* bodies closer than that are one surface */
-    double gap_m = 0.5 * bst_vec3_norm(view->origin_m) / a.per_m;
-    double sum = bst_visible_surface_resolve(&r->surface, gap_m, 1.0 / a.per_m, weight, &r->image);
+    double sum;
+    BST_TRY(bst_visible_surface_resolve(ctx, &r->surface, &pose->clip, SAME * sat->radius_m,
+                                        1.0 / a.per_m, weight, &r->image, &sum));
     if (total) {
         *total = sum;
     }

@@ -45,6 +45,9 @@ typedef struct bst_resolved_image {
 /* The image of a model, with its work memory; for one thread. */
 typedef struct bst_resolved bst_resolved;
 
+/* Gaps and overlaps between parts of curved surfaces have up to half of that width, px. */
+#define BST_RESOLVED_CURVED_PX 2.5e-4
+
 /* Largest number of cells. */
 enum { BST_RESOLVED_CELLS_MAX = 1 << 26 };
 
@@ -81,12 +84,10 @@ bst_status bst_resolved_begin(bst_ctx *ctx, bst_resolved *resolved, const double
  * Returned:  *total  light of the pose within the box, without the weight; may be NULL
  * Errors:    BST_ERR_MEMORY
  * Notes:     sides of facets and borders of shadows are exact: the light of a cell is that of the
- *            areas of its visible, lit polygons. Curved surfaces consist of facets of about a cell.
- *            Where the borders of two bodies cross in a cell, they are taken as independent. The
- *            Sun casts shadows from the centre of its disc. Light that is reflected twice is left
- *            out.
- * Reference: visible areas of a cell from front to back: Carpenter, Computer Graphics 18, 103
- *            (1984) */
+ *            areas of its visible, lit polygons: facets, also of parts that intersect, are cut
+ * where others are nearer. Curved surfaces consist of facets of a fraction of a pixel, and their
+ * shadows at grazing incidence are those on the middles of these. The Sun casts shadows from the
+ * centre of its disc. Light that is reflected twice is left out. */
 bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *resolved, bst_satellite_pose *pose,
                             const bst_resolved_view *view, const bst_resolved_light *light,
                             double weight, double *total) BST_MUST_CHECK;

@@ -4,15 +4,24 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Cover above which a cell is full. */
-#define FULL 0.99999
+/* Cover from which a cell is full. */
+#define FULL 0.99999F
 
-static const bst_surface_cell empty = {.depth_m = INFINITY, .part = -1, .first = -1};
+static const bst_surface_cell empty = {.part = -1, .first = -1, .kind = BST_CELL_EMPTY};
 
 void bst_visible_surface_free(bst_visible_surface *s) {
     free(s->cells);
     free(s->fragments);
+    free(s->corners);
+    free(s->polygons);
     *s = (bst_visible_surface){.width = 0};
+}
+
+static void start_box(bst_visible_surface *s) {
+    s->fragment_count = s->corner_count = 0;
+    s->low[0] = s->width;
+    s->low[1] = s->height;
+    s->high[0] = s->high[1] = 0;
 }
 
 bst_status bst_visible_surface_begin(bst_ctx *ctx, bst_visible_surface *s, int width, int height) {
@@ -31,57 +40,41 @@ bst_status bst_visible_surface_begin(bst_ctx *ctx, bst_visible_surface *s, int w
     }
     s->width = width;
     s->height = height;
-    s->fragment_count = 0;
-    s->low[0] = width;
-    s->low[1] = height;
-    s->high[0] = s->high[1] = 0;
+    start_box(s);
     return BST_OK;
 }
 
-/* Joins a fragment to another one of the same cell if they are neighbours on a curved
- * surface. */
-static bool join(bst_surface_fragment *to, const bst_surface_fragment *f) {
-    static const float MOST = 1.0001F;
-    float apart = fabsf(to->depth_m - f->depth_m);
-    if (f->curved < 0 || to->curved != f->curved || apart > to->reach_m + f->reach_m ||
-        to->area + f->area > MOST) {
-        return false;
-    }
-    float low = fminf(to->depth_m - to->reach_m, f->depth_m - f->reach_m);
-    float high = fmaxf(to->depth_m + to->reach_m, f->depth_m + f->reach_m);
-    to->depth_m = 0.5F * (low + high);
-    to->reach_m = 0.5F * (high - low);
-    to->area += f->area;
-    to->area_x += f->area_x;
-    to->area_y += f->area_y;
-    to->light += f->light;
-    to->light_x += f->light_x;
-    to->light_y += f->light_y;
-    return true;
-}
-
-bst_status bst_visible_surface_add(bst_ctx *ctx, bst_visible_surface *s, int x, int y,
-                                   const bst_surface_fragment *f) {
+/* A cell that is used. */
+static bst_surface_cell *use(bst_visible_surface *s, int x, int y) {
     assert(x >= 0 && y >= 0 && x < s->width && y < s->height);
-    bst_surface_cell *cell = &s->cells[(size_t)y * (size_t)s->width + (size_t)x];
     s->low[0] = x < s->low[0] ? x : s->low[0];
     s->low[1] = y < s->low[1] ? y : s->low[1];
     s->high[0] = x >= s->high[0] ? x + 1 : s->high[0];
     s->high[1] = y >= s->high[1] ? y + 1 : s->high[1];
-    if (f->depth_m >= cell->depth_m) {
-        return BST_OK; /* behind a surface that covers the cell */
+    return &s->cells[(size_t)y * (size_t)s->width + (size_t)x];
+}
+
+void bst_visible_surface_reach(bst_visible_surface *s, int x, int y, int body) {
+    bst_surface_cell *cell = use(s, x, y);
+    if (body >= 0 && cell->kind == BST_CELL_EMPTY) {
+        cell->kind = BST_CELL_OF_ONE;
+        cell->body = body;
+        cell->is.sum.area = cell->is.sum.light = 0.0F;
+        cell->is.sum.light_x = cell->is.sum.light_y = 0.0F;
+    } else if (body < 0 || cell->body != body) {
+        cell->kind = BST_CELL_OF_SEVERAL;
     }
-    if (f->area >= (float)FULL && f->light_x == 0.0F && f->light_y == 0.0F) {
-        cell->depth_m = f->depth_m;
-        cell->light = f->light;
-        cell->part = f->part;
-        return BST_OK;
-    }
-    if (cell->first >= 0 && join(&s->fragments[cell->first], f)) {
-        return BST_OK;
-    }
+}
+
+/* Half of the range of nearness in a cell. */
+static float half_range(const bst_nearness *n) {
+    return 0.5F * (fabsf(n->x_m) + fabsf(n->y_m));
+}
+
+/* Room for one more fragment with corners. */
+static bst_status reserve(bst_ctx *ctx, bst_visible_surface *s, int corners) {
     if (s->fragment_count == s->fragment_capacity) {
-        int capacity = s->fragment_capacity ? 2 * s->fragment_capacity : 16384;
+        int capacity = s->fragment_capacity ? 2 * s->fragment_capacity : 8192;
         bst_surface_fragment *items = realloc(s->fragments, (size_t)capacity * sizeof *items);
         if (!items) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d parts of facets", capacity);
@@ -89,116 +82,105 @@ bst_status bst_visible_surface_add(bst_ctx *ctx, bst_visible_surface *s, int x, 
         s->fragments = items;
         s->fragment_capacity = capacity;
     }
+    if (s->corner_count + corners > s->corner_capacity) {
+        int capacity = 2 * s->corner_capacity + 32768 + corners;
+        bst_fragment_corner *items = realloc(s->corners, (size_t)capacity * sizeof *items);
+        if (!items) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d corners of facets", capacity);
+        }
+        s->corners = items;
+        s->corner_capacity = capacity;
+    }
+    return BST_OK;
+}
+
+/* Adds to the sums of a cell of one body. Another body reaches it by rounding only, and shows where
+ * the cell is left over. */
+static void add_to_sum(bst_surface_cell *cell, const bst_surface_fragment *f) {
+    float share = 1.0F;
+    if (f->body != cell->body) {
+        share = fminf(fmaxf(1.0F - cell->is.sum.area, 0.0F), 1.0F);
+    }
+    cell->is.sum.area += f->more_light ? 0.0F : share * f->area;
+    cell->is.sum.light += share * f->light * f->area;
+    cell->is.sum.light_x += share * f->light * f->area_x;
+    cell->is.sum.light_y += share * f->light * f->area_y;
+    cell->part = cell->part < 0 ? f->part : cell->part;
+}
+
+bst_status bst_visible_surface_add(bst_ctx *ctx, bst_visible_surface *s, int x, int y,
+                                   const bst_surface_fragment *f, const bst_point2 *corners,
+                                   int count) {
+    bst_surface_cell *cell = use(s, x, y);
+    if (cell->kind == BST_CELL_OF_ONE) {
+        add_to_sum(cell, f);
+        return BST_OK;
+    }
+    cell->kind = BST_CELL_OF_SEVERAL;
+    float least = f->near.middle_m - half_range(&f->near);
+    float most = f->near.middle_m + half_range(&f->near);
+    bool whole = (count == 0 || f->area >= FULL) && !f->more_light;
+    if (cell->part >= 0) {
+        float middle = cell->is.cover.near.middle_m, half = half_range(&cell->is.cover.near);
+        if (most < middle - half) {
+            return BST_OK; /* behind a surface that covers the cell */
+        }
+        whole = whole && least > middle + half;
+    }
+    if (whole) {
+        cell->is.cover.near = f->near;
+        cell->is.cover.light = f->light;
+        cell->part = f->part;
+        cell->body = f->body;
+        return BST_OK;
+    }
+    BST_TRY(reserve(ctx, s, count));
     bst_surface_fragment *to = &s->fragments[s->fragment_count];
     *to = *f;
+    to->first = s->corner_count;
+    to->count = count;
+    for (int i = 0; i < count; i++) {
+        s->corners[s->corner_count++] =
+            (bst_fragment_corner){(float)corners[i].x, (float)corners[i].y};
+    }
     to->next = cell->first;
     cell->first = s->fragment_count++;
     return BST_OK;
 }
 
-/* What of a cell is not yet covered, and its light. */
-typedef struct open_cell {
-    double area, x, y; /* uncovered area and its first moments */
-    double before;     /* uncovered area in front of the current surface */
-    double depth_m;    /* largest of the current surface */
-    double light, light_x, light_y;
-    double most; /* largest visible area of a fragment */
-    int part;
-} open_cell;
-
-/* Covers a part of the cell by the next fragment, from front to back. */
-static void cover(open_cell *o, const bst_surface_fragment *f, double gap_m) {
-    if ((double)(f->depth_m - f->reach_m) > o->depth_m + gap_m) {
-        o->before = o->area;
-    }
-    o->depth_m = fmax(o->depth_m, (double)(f->depth_m + f->reach_m));
-    double area, share;
-    if (f->area >= (float)FULL) { /* all that is left */
-        area = o->area;
-        share = area / (double)f->area;
-        o->light_x += share * (double)f->light_x + (double)(f->light / f->area) * o->x;
-        o->light_y += share * (double)f->light_y + (double)(f->light / f->area) * o->y;
-        o->x = o->y = 0.0;
-    } else { /* beside its own surface; independent of those in front */
-        area = fmin((double)f->area * o->before, o->area);
-        share = area / (double)f->area;
-        o->light_x += share * (double)f->light_x;
-        o->light_y += share * (double)f->light_y;
-        o->x -= share * (double)f->area_x;
-        o->y -= share * (double)f->area_y;
-    }
-    o->light += share * (double)f->light;
-    o->area -= area;
-    if (area > o->most) {
-        o->most = area;
-        o->part = f->part;
-    }
-}
-
-/* Collects the fragments of a cell in front of its whole cover, nearest first. */
-static int collect(const bst_visible_surface *s, const bst_surface_cell *cell, int most,
-                   const bst_surface_fragment **list) {
-    int count = 0;
-    for (int i = cell->first; i >= 0; i = s->fragments[i].next) {
-        const bst_surface_fragment *f = &s->fragments[i];
-        if (f->depth_m >= cell->depth_m) {
-            continue;
-        }
-        if (count == most && list[most - 1]->depth_m <= f->depth_m) {
-            continue;
-        }
-        int k = count < most ? count++ : most - 1; /* the farthest is lost */
-        for (; k > 0 && list[k - 1]->depth_m > f->depth_m; k--) {
-            list[k] = list[k - 1];
-        }
-        list[k] = f;
-    }
-    return count;
-}
-
-double bst_visible_surface_resolve(bst_visible_surface *s, double gap_m, double cell_rad,
-                                   double weight, bst_resolved_image *image) {
-    enum { MOST = 64 };
-    const bst_surface_fragment *list[MOST];
-    double total = 0.0;
+bst_status bst_visible_surface_resolve(bst_ctx *ctx, bst_visible_surface *s, bst_polygon_clip *clip,
+                                       double same_m, double cell_rad, double weight,
+                                       bst_resolved_image *image, double *total) {
     assert(image->width == s->width && image->height == s->height);
+    *total = 0.0;
     for (int y = s->low[1]; y < s->high[1]; y++) {
         for (int x = s->low[0]; x < s->high[0]; x++) {
             size_t at = (size_t)y * (size_t)s->width + (size_t)x;
             bst_surface_cell *cell = &s->cells[at];
             if (cell->part < 0 && cell->first < 0) {
+                *cell = empty;
                 continue;
             }
-            open_cell o = {.area = 1.0, .before = 1.0, .depth_m = -INFINITY, .part = -1};
-            int count = 0;
-            if (cell->first >= 0) {
-                count = collect(s, cell, MOST, list);
-            }
-            for (int i = 0; i < count && o.area > 0.0; i++) {
-                cover(&o, list[i], gap_m);
-            }
-            if (cell->part >= 0 && o.area > 0.0) {
-                bst_surface_fragment behind = {.depth_m = cell->depth_m,
-                                               .area = 1.0F,
-                                               .light = cell->light,
-                                               .part = cell->part};
-                cover(&o, &behind, gap_m);
+            bst_cell_view seen;
+            if (cell->kind == BST_CELL_OF_ONE) {
+                seen = (bst_cell_view){(double)cell->is.sum.area, (double)cell->is.sum.light,
+                                       (double)cell->is.sum.light_x, (double)cell->is.sum.light_y,
+                                       cell->part};
+            } else {
+                BST_TRY(bst_cell_view_find(ctx, s, cell, clip, same_m, &seen));
             }
             bst_resolved_cell *to = &image->cells[at];
             double u = (image->x0 + x + 0.5) * cell_rad, v = (image->y0 + y + 0.5) * cell_rad;
             double c2 = 1.0 / (1.0 + u * u + v * v), part = weight * c2 * sqrt(c2);
-            to->light += (float)(part * o.light);
-            to->moment_x += (float)(part * o.light_x);
-            to->moment_y += (float)(part * o.light_y);
-            to->cover += (float)(weight * (1.0 - o.area));
-            image->part[at] = (int16_t)o.part;
-            total += c2 * sqrt(c2) * o.light;
+            to->light += (float)(part * seen.light);
+            to->moment_x += (float)(part * seen.light_x);
+            to->moment_y += (float)(part * seen.light_y);
+            to->cover += (float)(weight * fmin(seen.area, 1.0));
+            image->part[at] = (int16_t)seen.part;
+            *total += c2 * sqrt(c2) * seen.light;
             *cell = empty;
         }
     }
-    s->fragment_count = 0;
-    s->low[0] = s->width;
-    s->low[1] = s->height;
-    s->high[0] = s->high[1] = 0;
-    return total;
+    start_box(s);
+    return BST_OK;
 }

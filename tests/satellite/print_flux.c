@@ -1,10 +1,12 @@
 /* Prints the light of a satellite in some geometries, with its triangles, for compare_mitsuba.py:
  * one JSON object a line. Material m reflects by the model of the number FIRST + m, modulo the
  * seven models, with parameters that are the same in compare_mitsuba.py; FIRST "lambert": all by
- * Lambert's law. Fine facets stand for curved surfaces. With `image` each geometry has a resolved
- * image too: `radiance` over irradiance, per pixel, from a distance of 300 radii.
+ * Lambert's law. Fine facets stand for curved surfaces, finer ones with `image`, where each
+ * geometry has a resolved image too: `radiance` over irradiance, per pixel, from a distance of 300
+ * radii.
  *
  *   print_flux SATELLITE.json GEOMETRIES FIRST TABLE.csv [image] */
+#include "sim/satellite/curved_patches.h"
 #include "sim/satellite/resolved_image.h"
 #include "tests/satellite/satellite_support.h"
 
@@ -112,7 +114,54 @@ static void print_image(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye) {
     bst_resolved_free(resolved);
 }
 
-static void print_geometry(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye, bool image) {
+/* Prints a polygon as triangles. */
+static void print_polygon(const bst_brdf *brdf, const bst_vec3 *corner, int count) {
+    static const char *comma = "";
+    if (count == 0) {
+        comma = "";
+    }
+    for (int i = 2; i < count; i++) {
+        printf("%s[[%d, %.17g]", comma, brdf->model, brdf->diffuse);
+        const bst_vec3 q[3] = {corner[0], corner[i - 1], corner[i]};
+        for (int k = 0; k < 3; k++) {
+            printf(", %.12g, %.12g, %.12g", q[k].x, q[k].y, q[k].z);
+        }
+        printf("]");
+        comma = ", ";
+    }
+}
+
+/* Prints a facet. For an image, facets of curved surfaces are divided: with 96 around, their
+ * outlines differ from circles by 2e-4 of the radius, and their normals by 2 degrees. */
+static void print_facet(const bst_satellite_pose *p, const bst_curved_places *places, int facet,
+                        bool finer) {
+    enum { FINER = 4 };
+    const bst_facet *f = &p->satellite->facets[facet];
+    const bst_brdf *brdf = &p->satellite->materials[f->material].brdf;
+    bst_vec3 corner[BST_POLYGON_CORNERS_MAX];
+    if (!finer || f->curved < 0) {
+        int count = bst_plane_facet_corners(p, places, facet, finer ? FINER : 1, corner);
+        print_polygon(brdf, corner, count);
+        return;
+    }
+    bst_curved_facet c;
+    bst_curved_facet_make(p, places, facet, &c);
+    int parts[2] = {FINER, c.curved->sphere ? FINER : 1};
+    double scale = bst_curved_facet_scale(&c, parts[0], parts[1]);
+    for (int n = 0; n < parts[0] * parts[1]; n++) {
+        const int place[2] = {n % parts[0], n / parts[0]};
+        bst_curved_facet_part(&c, parts, place, scale, corner);
+        if (c.curved->side < 0.0) { /* seen from inside */
+            bst_vec3 swap = corner[1];
+            corner[1] = corner[3];
+            corner[3] = swap;
+        }
+        print_polygon(brdf, corner, 4);
+    }
+}
+
+static void print_geometry(bst_satellite_pose *p, const bst_curved_places *places, bst_vec3 sun,
+                           bst_vec3 eye, bool image) {
     const bst_satellite *s = p->satellite;
     bst_satellite_light light = {.sun = sun, .observer = eye, .sunlit = 1.0};
     bst_satellite_flux flux;
@@ -122,7 +171,7 @@ static void print_geometry(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye, bo
         "{\"sun\": [%.17g, %.17g, %.17g], \"eye\": [%.17g, %.17g, %.17g], \"flux\": %.17g, "
         "\"error\": %.17g, \"triangles\": [",
         sun.x, sun.y, sun.z, eye.x, eye.y, eye.z, flux.sun[BST_SUNLIGHT_V], flux.error);
-    const char *comma = "";
+    print_polygon(NULL, NULL, 0);
     for (int f = 0; f < s->facet_count; f++) {
         const int *c = s->corner + s->facets[f].first;
         const bst_occluder *body = &s->occluders[s->facets[f].occluder];
@@ -130,19 +179,8 @@ static void print_geometry(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 eye, bo
         bool thin = body->vertex_count == s->facets[f].count || body->shell >= 0;
         bst_vec3 to_eye =
             image ? bst_vec3_sub(bst_vec3_scale(eye, RANGE * s->radius_m), p->vertices[c[0]]) : eye;
-        if (thin && bst_vec3_dot(p->normals[f], to_eye) <= 0.0) {
-            continue;
-        }
-        for (int i = 2; i < s->facets[f].count; i++) {
-            const bst_brdf *brdf = &s->materials[s->facets[f].material].brdf;
-            printf("%s[[%d, %.17g]", comma, brdf->model, brdf->diffuse);
-            const int v[3] = {c[0], c[i - 1], c[i]};
-            for (int k = 0; k < 3; k++) {
-                bst_vec3 q = p->vertices[v[k]];
-                printf(", %.9g, %.9g, %.9g", q.x, q.y, q.z);
-            }
-            printf("]");
-            comma = ", ";
+        if (!thin || bst_vec3_dot(p->normals[f], to_eye) > 0.0) {
+            print_facet(p, places, f, image);
         }
     }
     printf("]");
@@ -161,22 +199,25 @@ int main(int argc, char **argv) {
     bst_ctx ctx = {0};
     bst_brdf_table *table;
     bst_satellite_pose *pose;
+    bst_curved_places places;
     if (bst_brdf_table_load(&ctx, argv[4], &table) != BST_OK) {
         give_up(&ctx);
     }
     bst_satellite *s = load(argv[1], strcmp(argv[3], "lambert") == 0 ? -1 : atoi(argv[3]), table);
-    if (bst_satellite_pose_create(&ctx, s, &pose) != BST_OK) {
+    if (bst_satellite_pose_create(&ctx, s, &pose) != BST_OK ||
+        bst_curved_places_create(&ctx, s, &places) != BST_OK) {
         give_up(&ctx);
     }
     uint64_t random = 31;
     for (int i = 0; i < atoi(argv[2]);) {
         bst_vec3 sun = bst_test_direction(&random), eye = bst_test_direction(&random);
         if (bst_vec3_dot(sun, eye) > -0.3) { /* enough light to compare */
-            print_geometry(pose, sun, eye, image);
+            print_geometry(pose, &places, sun, eye, image);
             i++;
         }
     }
     bst_satellite_pose_free(pose);
+    bst_curved_places_free(&places);
     bst_satellite_free(s);
     bst_brdf_table_free(table);
     return 0;

@@ -1,0 +1,105 @@
+#include "sim/satellite/part_shadow.h"
+
+#include <math.h>
+
+#include "sim/satellite/separation.h"
+
+/* Parts reach beyond the corners of their facet by less than this share of the facet's size. */
+static const double BEYOND = 0.1;
+
+bool bst_part_shadow_hiders(bst_satellite_pose *p, int view, int facet, uint64_t *hiders) {
+    const bst_satellite *s = p->satellite;
+    const bst_pose_view *v = &p->views[view];
+    const bst_facet *f = &s->facets[facet];
+    *hiders = 0;
+    if (s->occluder_count > BST_SEPARATION_BODIES) {
+        return false;
+    }
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (int i = 0; i < f->count; i++) {
+        bst_vec3 q = p->vertices[s->corner[f->first + i]];
+        const double c[3] = {bst_vec3_dot(q, v->x), bst_vec3_dot(q, v->y), bst_vec3_dot(q, v->z)};
+        for (int a = 0; a < 3; a++) {
+            low[a] = fmin(low[a], c[a]);
+            high[a] = fmax(high[a], c[a]);
+        }
+    }
+    double room = fmax(fmax(high[0] - low[0], high[1] - low[1]), high[2] - low[2]) * BEYOND;
+    for (int o = 0; o < s->occluder_count; o++) {
+        const double *b = v->bounds[o];
+        if (!(v->hiders[f->occluder] >> o & 1) || (o == f->occluder && !f->inside) ||
+            b[0] > high[0] + room || b[1] < low[0] - room || b[2] > high[1] + room ||
+            b[3] < low[1] - room || b[5] < low[2] - room) {
+            continue;
+        }
+        bst_vec3 axis;
+        if (o != f->occluder && s->occluders[o].shell >= 0 &&
+            !bst_separation(p, f->occluder, o, &axis)) {
+            return false;
+        }
+        *hiders |= (uint64_t)1 << o;
+    }
+    return true;
+}
+
+/* Keeps what light reaches through the rim of the shell that the part is in. */
+static void look_through_rim(bst_satellite_pose *p, const bst_pose_view *v,
+                             const bst_shell *shell) {
+    bst_point2 rim[BST_POLYGON_CORNERS_MAX];
+    bst_vec3 axis = shell->axis;
+    if (shell->joint >= 0) {
+        axis = bst_mat3_mul_vec(&p->rotation[shell->joint], axis);
+    }
+    if (!(bst_vec3_dot(axis, v->z) > 0.0)) {
+        p->clip.piece_count = 0;
+        return;
+    }
+    for (int i = 0; i < shell->rim_count; i++) {
+        bst_vec3 q = p->vertices[shell->first_rim + i];
+        rim[i] = (bst_point2){bst_vec3_dot(q, v->x), bst_vec3_dot(q, v->y)};
+    }
+    bst_polygon_clip_intersect(&p->clip, rim, shell->rim_count);
+}
+
+double bst_part_shadow_lit(bst_satellite_pose *p, int view, int facet, uint64_t hiders,
+                           const bst_vec3 corner[4], bst_point2 flat[4]) {
+    const bst_satellite *s = p->satellite;
+    const bst_pose_view *v = &p->views[view];
+    const bst_facet *f = &s->facets[facet];
+    bst_point2 start[4];
+    int count = 0;
+    for (int i = 0; i < 4; i++) {
+        flat[i] = (bst_point2){bst_vec3_dot(corner[i], v->x), bst_vec3_dot(corner[i], v->y)};
+    }
+    double area = bst_polygon_area(flat, 4);
+    for (int i = 0; i < 4; i++) { /* counter-clockwise, without corners that are the same */
+        bst_point2 q = flat[area < 0.0 ? 3 - i : i];
+        if (count == 0 || q.x != start[count - 1].x || q.y != start[count - 1].y) {
+            start[count++] = q;
+        }
+    }
+    bst_vec3 normal =
+        bst_vec3_cross(bst_vec3_sub(corner[2], corner[0]), bst_vec3_sub(corner[3], corner[1]));
+    normal = bst_vec3_dot(normal, v->z) < 0.0 ? bst_vec3_scale(normal, -1.0) : normal;
+    bst_polygon_clip_start(&p->clip, start, count);
+    for (int o = 0; o < s->occluder_count && hiders >> o > 0; o++) {
+        if (!(hiders >> o & 1)) {
+            continue;
+        }
+        if (o == f->occluder) {
+            look_through_rim(p, v, &s->shells[s->occluders[o].shell]);
+            continue;
+        }
+        /* where bodies are separate, rays lead toward this one: see bst_pose_look */
+        bst_vec3 axis;
+        const bst_point2 *outline = NULL;
+        int n = BST_POSE_ALL_IN_FRONT;
+        if (!bst_separation(p, f->occluder, o, &axis)) {
+            n = bst_pose_front(p, v, o, corner[0], normal, &outline);
+        }
+        n = n == BST_POSE_ALL_IN_FRONT ? bst_pose_outline(p, view, o, &outline) : n;
+        bst_polygon_clip_subtract(&p->clip, outline, n <= BST_POLYGON_CORNERS_MAX ? n : 0, false);
+    }
+    double lit = bst_polygon_clip_area(&p->clip), whole = fabs(area);
+    return lit > (1.0 - 1e-9) * whole ? 1.0 : lit > 1e-9 * whole ? lit / whole : 0.0;
+}
