@@ -8,6 +8,12 @@
 /* Corners of all polygons of a list; of all intersections that are kept at the same time. */
 enum { POINTS = 1024, WORK = 8192 };
 
+/* Distance over the extent of a polygon below which two corners are one. */
+static const double TINY = 1e-12;
+
+/* Corners of an intersection, at most. */
+enum { CORNERS = BST_POLYGON_INTERSECTION_MAX };
+
 /* Intersections after which bst_polygon_uncovered_area gives up: their number can double with each
  * polygon. */
 enum { INTERSECTIONS_MAX = 200 };
@@ -34,15 +40,49 @@ bst_point2 *bst_polygon_covers_begin(bst_polygon_covers *covers, int count) {
                                                                             : NULL;
 }
 
-void bst_polygon_covers_end(bst_polygon_covers *covers, int count) {
-    assert(covers->count < BST_POLYGON_COVERS_MAX);
-    covers->first[covers->count + 1] = covers->first[covers->count] + count;
-    covers->count++;
+/* True if two corners are one: an edge between them would have a direction of rounding errors. */
+static bool is_same(bst_point2 a, bst_point2 b, double tiny) {
+    return fabs(a.x - b.x) <= tiny && fabs(a.y - b.y) <= tiny;
 }
 
-/* Distance of a point to the left of the edge a-b, times the edge's length. */
+void bst_polygon_covers_end(bst_polygon_covers *covers, int count) {
+    assert(covers->count < BST_POLYGON_COVERS_MAX);
+    int first = covers->first[covers->count], n = 0;
+    bst_point2 *p = covers->points + first;
+    double extent = 0.0;
+    for (int i = 1; i < count; i++) {
+        double far = fabs(p[i].x - p[0].x) + fabs(p[i].y - p[0].y);
+        extent = far > extent ? far : extent;
+    }
+    for (int i = 0; i < count; i++) {
+        bool same = n > 0 && is_same(p[n - 1], p[i], TINY * extent);
+        if (!same) {
+            p[n++] = p[i];
+        }
+    }
+    while (n > 1 && is_same(p[n - 1], p[0], TINY * extent)) {
+        n--;
+    }
+    if (n >= 3) {
+        covers->first[++covers->count] = first + n;
+    }
+}
+
+/* Distances of points to the left of the line a-b, times its length. Returned: the smallest. */
+static double distances(const bst_point2 *p, int count, bst_point2 a, bst_point2 b, double *left) {
+    double x = b.x - a.x, y = b.y - a.y, least = INFINITY;
+    for (int i = 0; i < count; i++) {
+        left[i] = x * (p[i].y - a.y) - y * (p[i].x - a.x);
+    }
+    for (int i = 0; i < count; i++) {
+        least = left[i] < least ? left[i] : least;
+    }
+    return least;
+}
+
 static double left_of(bst_point2 a, bst_point2 b, bst_point2 p) {
-    return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
+    double x = b.x - a.x, y = b.y - a.y;
+    return x * (p.y - a.y) - y * (p.x - a.x);
 }
 
 /* True if a convex polygon contains a point, by bisection of the triangles at its first corner. */
@@ -71,35 +111,36 @@ bst_polygon_place bst_polygon_place_of(const bst_point2 *p, int p_count, const b
                                                                           : BST_POLYGON_CROSSING;
 }
 
-/* Keeps what a polygon has to the left of the line a-b. Returned: number of corners; 0: none. There
- * is room for `room` of them, which suffices but for polygons that rounding made concave. */
-static int keep_left(const bst_point2 *p, int count, bst_point2 a, bst_point2 b, int room,
+/* Keeps what a polygon has to the left of a line, by the distances of its corners. Returned: number
+ * of corners; 0: none. There is room for `room` of them, which suffices but for polygons that
+ * rounding made concave. */
+static int keep_left(const bst_point2 *p, int count, const double *left, int room,
                      bst_point2 *out) {
-    int n = 0;
-    bst_point2 last = p[count - 1];
-    double before = left_of(a, b, last);
-    for (int i = 0; i < count; i++) {
-        double now = left_of(a, b, p[i]);
-        if (n < room && ((before > 0.0 && now < 0.0) || (before < 0.0 && now > 0.0))) {
+    int n = 0, last = count - 1;
+    for (int i = 0; i < count; last = i++) {
+        double before = left[last], now = left[i];
+        if (n < room && before * now < 0.0) {
             double u = before / (before - now);
-            out[n++] = (bst_point2){last.x + u * (p[i].x - last.x), last.y + u * (p[i].y - last.y)};
+            out[n++] = (bst_point2){p[last].x + u * (p[i].x - p[last].x),
+                                    p[last].y + u * (p[i].y - p[last].y)};
         }
         if (n < room && now >= 0.0) {
             out[n++] = p[i];
         }
-        before = now;
-        last = p[i];
     }
     return n >= 3 ? n : 0;
 }
 
-/* True if a point of the polygon is to the right of the line a-b. */
-static bool is_cut(const bst_point2 *p, int count, bst_point2 a, bst_point2 b) {
-    int i = 0;
-    while (i < count && left_of(a, b, p[i]) >= 0.0) {
-        i++;
+int bst_polygon_cut(bst_point2 *p, int count, bst_point2 a, bst_point2 b, int room) {
+    bst_point2 kept[CORNERS];
+    double left[CORNERS];
+    assert(room <= CORNERS);
+    if (count == 0 || distances(p, count, a, b, left) >= 0.0) {
+        return count;
     }
-    return i < count;
+    int n = keep_left(p, count, left, room, kept);
+    memcpy(p, kept, (size_t)n * sizeof *p);
+    return n;
 }
 
 /* A circle about a polygon. */
@@ -125,18 +166,20 @@ int bst_polygon_intersection(const bst_point2 *p, int p_count, const bst_point2 
                              bst_point2 *work, bst_point2 *out) {
     const bst_point2 *from = p;
     bst_point2 *to = out;
-    int n = p_count;
+    int n = p_count, room = p_count + q_count;
+    double left[CORNERS];
+    assert(room <= CORNERS);
     const circle about = circle_about(p, p_count);
     for (int i = 0; i < q_count && n > 0; i++) {
         bst_point2 a = q[i], b = q[i + 1 < q_count ? i + 1 : 0];
         /* the circle alone decides for most edges */
-        double left = left_of(a, b, about.centre), x = b.x - a.x, y = b.y - a.y;
-        bool far = left * left > about.radius2 * (x * x + y * y);
-        if (far && left < 0.0) {
+        double middle = left_of(a, b, about.centre), x = b.x - a.x, y = b.y - a.y;
+        bool far = middle * middle > about.radius2 * (x * x + y * y);
+        if (far && middle < 0.0) {
             return 0;
         }
-        if (!far && is_cut(from, n, a, b)) {
-            n = keep_left(from, n, a, b, p_count + q_count, to);
+        if (!far && distances(from, n, a, b, left) < 0.0) {
+            n = keep_left(from, n, left, room, to);
             from = to;
             to = from == out ? work : out;
         }
@@ -161,7 +204,7 @@ static double uncovered(sum *s, const bst_point2 *p, int count, int covers) {
     for (int i = covers - 1; i >= 0; i--) {
         const bst_point2 *q = s->covers->points + s->covers->first[i];
         int q_count = s->covers->first[i + 1] - s->covers->first[i], room = count + q_count;
-        if (s->used + 2 * room > WORK || ++s->intersections > INTERSECTIONS_MAX) {
+        if (room > CORNERS || s->used + 2 * room > WORK || ++s->intersections > INTERSECTIONS_MAX) {
             s->intersections = INTERSECTIONS_MAX + 1;
             return 0.0;
         }

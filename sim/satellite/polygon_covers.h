@@ -7,6 +7,9 @@
 /* Polygons of a list, at most. */
 enum { BST_POLYGON_COVERS_MAX = 12 };
 
+/* Corners of an intersection, at most: the sum of those of both polygons. */
+enum { BST_POLYGON_INTERSECTION_MAX = 4 * BST_POLYGON_CORNERS_MAX };
+
 /* A list of convex polygons with its work memory. */
 typedef struct bst_polygon_covers {
     bst_point2 *points, *work;
@@ -31,7 +34,8 @@ void bst_polygon_covers_free(bst_polygon_covers *covers);
 /* Place for a polygon of `count` corners, counter-clockwise, that bst_polygon_covers_end appends;
  * NULL: the list is full. */
 bst_point2 *bst_polygon_covers_begin(bst_polygon_covers *covers, int count);
-/* Appends the polygon that is in the place of bst_polygon_covers_begin. */
+/* Appends the polygon that is in the place of bst_polygon_covers_begin, without corners that are
+ * one. A polygon of fewer than three is left out. */
 void bst_polygon_covers_end(bst_polygon_covers *covers, int count);
 
 /* Where polygon p is with regard to polygon q; both convex and counter-clockwise. Polygons that
@@ -39,9 +43,16 @@ void bst_polygon_covers_end(bst_polygon_covers *covers, int count);
 bst_polygon_place bst_polygon_place_of(const bst_point2 *p, int p_count, const bst_point2 *q,
                                        int q_count);
 
+/* Keeps what a convex polygon, counter-clockwise, has to the left of the line a-b.
+ *
+ * Given:     points  [room] with `count` corners; room: at most BST_POLYGON_INTERSECTION_MAX
+ * Returned:  number of corners; 0: nothing is left */
+int bst_polygon_cut(bst_point2 *points, int count, bst_point2 a, bst_point2 b, int room);
+
 /* Intersection of two convex polygons, both counter-clockwise.
  *
- * Given:     p, q  [p_count], [q_count]
+ * Given:     p, q  [p_count], [q_count], together at most BST_POLYGON_INTERSECTION_MAX
+ *            q     without edges as short as rounding: bst_polygon_covers_end removes them
  *            work  [p_count + q_count]
  * Returned:  out   [p_count + q_count] room; the number of its corners is the return value; 0: none
  * Reference: Sutherland and Hodgman, Comm. ACM 17, 32 (1974) */

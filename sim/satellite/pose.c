@@ -28,6 +28,7 @@ void bst_satellite_pose_free(bst_satellite_pose *p) {
         free(p->seen);
         free(p->next);
         free(p->flat);
+        free(p->facing);
         free(p->pairs);
         free(p->faces);
         free_view(&p->views[0]);
@@ -102,6 +103,7 @@ bst_status bst_satellite_pose_create(bst_ctx *ctx, const bst_satellite *s,
     p->normals = calloc((size_t)s->facet_count + 1, sizeof *p->normals);
     p->rotation = calloc((size_t)s->joint_count + 1, sizeof *p->rotation);
     p->origin = calloc((size_t)s->joint_count + 1, sizeof *p->origin);
+    p->facing = calloc((size_t)s->facet_count + 1, sizeof *p->facing);
     p->seen = calloc((size_t)s->occluder_count + 1, sizeof *p->seen);
     int most = 0;
     for (int o = 0; o < s->occluder_count; o++) {
@@ -110,7 +112,7 @@ bst_status bst_satellite_pose_create(bst_ctx *ctx, const bst_satellite *s,
     p->next = calloc((size_t)most + 1, sizeof *p->next);
     p->flat = calloc((size_t)most + 1, sizeof *p->flat);
     bool made = p->vertices && p->normals && p->rotation && p->origin && p->seen && p->next &&
-                p->flat && make_view(s, &p->views[0]) && make_view(s, &p->views[1]) &&
+                p->flat && p->facing && make_view(s, &p->views[0]) && make_view(s, &p->views[1]) &&
                 make_pairs(p);
     bst_status status =
         made ? make_polygons(ctx, p)
@@ -198,23 +200,20 @@ static void fill_grid(bst_pose_view *v, int occluders) {
     v->cell_item_count = v->cell_first[n];
 }
 
-/* True if the facet of an edge faces the view; of the edge of a shell, perhaps its rim's plane. */
-static bool is_facing(const bst_satellite_pose *p, const bst_pose_view *v, int facet,
-                      bst_vec3 rim_normal) {
-    return bst_vec3_dot(facet >= 0 ? p->normals[facet] : rim_normal, v->z) > 0.0;
-}
-
 /* Silhouette of a closed body: the edges between facets that face the view and others, in order.
  * Returned: number of corners; 0 if the edges form no single loop (facets seen edge-on). */
 static int walk_outline(const bst_satellite_pose *p, const bst_pose_view *v, const bst_occluder *o,
                         bst_point2 *to) {
     int *next = p->next, edges = 0, start = -1, n = 0;
-    bst_vec3 rim_normal = o->shell >= 0 ? bst_pose_shell_axis(p, o->shell) : (bst_vec3){0};
+    for (int f = o->first_facet; f < o->first_facet + o->facet_count; f++) {
+        p->facing[f] = bst_vec3_dot(p->normals[f], v->z) > 0.0;
+    }
+    bool rim = o->shell >= 0 && bst_vec3_dot(bst_pose_shell_axis(p, o->shell), v->z) > 0.0;
     memset(next, -1, (size_t)o->vertex_count * sizeof next[0]);
     for (int e = o->first_edge; e < o->first_edge + o->edge_count; e++) {
         const int *edge = p->satellite->edges[e];
-        bool left = is_facing(p, v, edge[2], rim_normal);
-        bool right = is_facing(p, v, edge[3], rim_normal);
+        bool left = edge[2] >= 0 ? p->facing[edge[2]] : rim;
+        bool right = edge[3] >= 0 ? p->facing[edge[3]] : rim;
         if (left != right) {
             start = (left ? edge[0] : edge[1]) - o->first_vertex;
             next[start] = (left ? edge[1] : edge[0]) - o->first_vertex;

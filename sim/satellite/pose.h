@@ -52,6 +52,7 @@ typedef struct bst_satellite_pose {
     bst_pose_view views[2];                      /* see bst_pose_look */
     int *next;        /* work memory of outlines: by vertex of the largest occluder */
     bst_point2 *flat; /* likewise */
+    bool *facing;     /* likewise: by facet */
     int *seen;        /* by occluder: facet for which it was last found in the grid */
     int seen_stamp;
     int stamp;                          /* counts the poses, from 1 */

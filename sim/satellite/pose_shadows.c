@@ -4,6 +4,9 @@
 #include "sim/satellite/pose_view.h"
 #include "sim/satellite/separation.h"
 
+/* Room for the corners of a silhouette that was cut at faces: each cut adds at most one. */
+enum { SHADOW_CORNERS = 2 * BST_POLYGON_CORNERS_MAX };
+
 /* A facet, and what is left of it. */
 typedef struct target {
     int facet, body; /* body: its occluder */
@@ -110,13 +113,28 @@ static void move_to_plane(target *t, const bst_pose_view *v, const bst_point2 *f
     }
 }
 
-/* Subtracts the part of an occluder that is in front of the facet's plane.
+/* Subtracts the part of an occluder, which need not be closed, that is in front of the facet's
+ * plane.
  *
- * Given:     height  by vertex of the occluder: distance in front of the plane */
+ * Given:     outline  [corners] its silhouette in the plane */
 static void subtract_front(bst_satellite_pose *p, target *t, const bst_pose_view *v,
-                           const bst_occluder *o, const double *height) {
+                           const bst_occluder *o, const bst_point2 *outline, int corners) {
     bst_point2 points[2 * BST_POLYGON_CORNERS_MAX], hull[4 * BST_POLYGON_CORNERS_MAX];
+    double height[BST_POLYGON_CORNERS_MAX], low = INFINITY, high = -INFINITY;
     int n = 0;
+    for (int i = 0; i < o->vertex_count; i++) {
+        bst_vec3 r = bst_vec3_sub(p->vertices[o->first_vertex + i], t->origin);
+        height[i] = bst_vec3_dot(r, t->normal);
+        low = height[i] < low ? height[i] : low;
+        high = height[i] > high ? height[i] : high;
+    }
+    if (high <= t->margin_m) {
+        return;
+    }
+    if (low >= -t->margin_m) {
+        remove_polygon(p, t, outline, corners);
+        return;
+    }
     for (int i = 0; i < o->vertex_count; i++) {
         if (height[i] >= 0.0) {
             points[n++] = drop(t, v, p->vertices[o->first_vertex + i]);
@@ -131,32 +149,71 @@ static void subtract_front(bst_satellite_pose *p, target *t, const bst_pose_view
             points[n++] = drop(t, v, bst_vec3_axpy(from, a / (a - b), way));
         }
     }
-    int corners = bst_polygon_hull(points, n, hull);
-    if (corners >= 3 && corners <= BST_POLYGON_CORNERS_MAX) {
-        remove_polygon(p, t, hull, corners);
+    int count = bst_polygon_hull(points, n, hull);
+    if (count >= 3 && count <= BST_POLYGON_CORNERS_MAX) {
+        remove_polygon(p, t, hull, count);
     }
 }
 
-/* True if an occluder hides all of a facet that is within its silhouette, although parts of it may
- * be behind the facet: no corner is beyond a face that faces the light. Where a ray leaves a convex
- * body is a concave function of its place, so that corners are enough. */
-static bool hides_whole(const bst_satellite_pose *p, const target *t, const bst_pose_view *v,
-                        const bst_occluder *o) {
+/* Cuts a polygon of the facet's plane at a face of an occluder that faces the light: what is beyond
+ * the face sees the light.
+ *
+ * Given:     q, n  a point and the normal of the face
+ * Returned:  *count  corners that are left, 0: all of the facet is beyond the face
+ *            true if the polygon was cut */
+static bool cut_at_face(const bst_satellite_pose *p, const target *t, bst_vec3 q, bst_vec3 n,
+                        bst_point2 *polygon, int *count) {
     const bst_satellite *s = p->satellite;
     const bst_facet *facet = &s->facets[t->facet];
-    bool hides = o->closed && o->shell < 0;
-    for (int f = o->first_facet; f < o->first_facet + o->facet_count && hides; f++) {
-        if (!(bst_vec3_dot(p->normals[f], v->z) > 0.0)) {
-            continue;
-        }
-        bst_vec3 n = p->normals[f];
-        double face = bst_vec3_dot(p->vertices[s->corner[s->facets[f].first]], n);
-        for (int i = 0; i < facet->count && hides; i++) {
-            bst_vec3 q = p->vertices[s->corner[facet->first + i]];
-            hides = bst_vec3_dot(q, n) < face - 1e-9 * s->radius_m;
+    double face = bst_vec3_dot(q, n), low = INFINITY, high = -INFINITY, margin = 1e-9 * s->radius_m;
+    for (int i = 0; i < facet->count; i++) {
+        double d = bst_vec3_dot(p->vertices[s->corner[facet->first + i]], n) - face;
+        low = d < low ? d : low;
+        high = d > high ? d : high;
+    }
+    if (low >= -margin) {
+        *count = 0;
+        return true;
+    }
+    if (high <= 0.0) {
+        return false;
+    }
+    bst_point2 slope = {bst_vec3_dot(t->e1, n), bst_vec3_dot(t->e2, n)};
+    double level = bst_vec3_dot(t->origin, n) - face,
+           length2 = slope.x * slope.x + slope.y * slope.y;
+    /* a point of the line, and one along it with the inside to its left */
+    bst_point2 a = {-level * slope.x / length2, -level * slope.y / length2};
+    bst_point2 b = {a.x - slope.y, a.y + slope.x};
+    *count = bst_polygon_cut(polygon, *count, a, b, SHADOW_CORNERS);
+    return true;
+}
+
+/* Subtracts an occluder that may be in front of and behind the facet's plane. A ray from a point
+ * within its silhouette meets it unless the point is beyond one of its faces that face the light:
+ * the ray leaves the body last through one of them. */
+static void subtract_by_faces(bst_satellite_pose *p, target *t, const bst_pose_view *v,
+                              const bst_occluder *o, bst_polygon_place place, bst_point2 *polygon,
+                              int count) {
+    const bst_satellite *s = p->satellite;
+    bool cut = false;
+    for (int f = o->first_facet; f < o->first_facet + o->facet_count && count > 0; f++) {
+        if (!s->facets[f].inside && bst_vec3_dot(p->normals[f], v->z) > 0.0) {
+            bst_vec3 q = p->vertices[s->corner[s->facets[f].first]];
+            cut |= cut_at_face(p, t, q, p->normals[f], polygon, &count);
         }
     }
-    return hides;
+    if (count > 0 && o->shell >= 0) {
+        bst_vec3 axis = bst_pose_shell_axis(p, o->shell);
+        if (bst_vec3_dot(axis, v->z) > 0.0) {
+            bst_vec3 q = p->vertices[s->shells[o->shell].first_rim];
+            cut |= cut_at_face(p, t, q, axis, polygon, &count);
+        }
+    }
+    if (!cut && place == BST_POLYGON_WITHIN) {
+        remove_all(p, t);
+    } else if (count >= 3) {
+        remove_polygon(p, t, polygon, count);
+    }
 }
 
 /* Subtracts an occluder's silhouette from the facet. */
@@ -175,32 +232,22 @@ static void subtract(bst_satellite_pose *p, target *t, int view, int occluder) {
      * nearer to the light than the whole facet is in front of it, where it matters */
     bool front =
         v->bounds[occluder][4] >= t->bounds[5] || bst_separation(p, t->body, occluder, &axis);
-    if (place == BST_POLYGON_WITHIN && (front || hides_whole(p, t, v, o))) {
+    if (front && place == BST_POLYGON_WITHIN) {
         remove_all(p, t);
         return;
     }
     if (t->whole) {
         start(p, t);
     }
-    if (!front) {
-        double height[BST_POLYGON_CORNERS_MAX], low = INFINITY, high = -INFINITY;
-        for (int i = 0; i < o->vertex_count; i++) {
-            bst_vec3 r = bst_vec3_sub(p->vertices[o->first_vertex + i], t->origin);
-            height[i] = bst_vec3_dot(r, t->normal);
-            low = height[i] < low ? height[i] : low;
-            high = height[i] > high ? height[i] : high;
-        }
-        if (high <= t->margin_m) {
-            return;
-        }
-        if (low < -t->margin_m) {
-            subtract_front(p, t, v, o, height);
-            return;
-        }
-    }
-    bst_point2 moved[BST_POLYGON_CORNERS_MAX];
+    bst_point2 moved[SHADOW_CORNERS];
     move_to_plane(t, v, outline, n, moved);
-    remove_polygon(p, t, moved, n);
+    if (front) {
+        remove_polygon(p, t, moved, n);
+    } else if (o->closed) {
+        subtract_by_faces(p, t, v, o, place, moved, n);
+    } else {
+        subtract_front(p, t, v, o, moved, n);
+    }
 }
 
 /* Keeps what light reaches through the rim of a shell. */
@@ -326,10 +373,13 @@ static void remove_hidden(bst_satellite_pose *p, target *t, int views) {
             try_cells(p, t, k);
             continue;
         }
-        for (int o = 0; o < s->occluder_count && !is_gone(p, t); o++) {
-            if (!few || (hiders >> o & 1)) {
+        for (int o = 0; few && hiders && !is_gone(p, t); o++, hiders >>= 1) {
+            if (hiders & 1) {
                 try_occluder(p, t, k, o);
             }
+        }
+        for (int o = 0; !few && o < s->occluder_count && !is_gone(p, t); o++) {
+            try_occluder(p, t, k, o);
         }
     }
 }
