@@ -240,10 +240,13 @@ static void subtract(bst_satellite_pose *p, target *t, int view, int occluder) {
         start(p, t);
     }
     bst_point2 moved[SHADOW_CORNERS];
+    if (n > BST_POLYGON_CORNERS_MAX) {
+        return; /* more corners than polygons may have: it casts no partial shadow */
+    }
     move_to_plane(t, v, outline, n, moved);
     if (front) {
         remove_polygon(p, t, moved, n);
-    } else if (o->closed) {
+    } else if (o->closed || o->vertex_count > BST_POLYGON_CORNERS_MAX) {
         subtract_by_faces(p, t, v, o, place, moved, n);
     } else {
         subtract_front(p, t, v, o, moved, n);
