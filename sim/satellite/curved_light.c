@@ -1,7 +1,5 @@
 #include "sim/satellite/curved_light.h"
 
-#include <stdlib.h>
-
 #include "sim/satellite/gauss_legendre.h"
 
 enum { BREAKS_MAX = 16 };
@@ -12,9 +10,16 @@ typedef struct breaks {
     int count;
 } breaks;
 
-static int compare(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
+/* Sorts the borders: few, so that insertion is fastest. */
+static void sort(breaks *b) {
+    for (int i = 1; i < b->count; i++) {
+        double x = b->at[i];
+        int k = i;
+        for (; k > 0 && b->at[k - 1] > x; k--) {
+            b->at[k] = b->at[k - 1];
+        }
+        b->at[k] = x;
+    }
 }
 
 /* Adds a border within (low, high). */
@@ -36,7 +41,7 @@ static breaks panels(double low, double high, double centre, double lobe_rad) {
     } else {
         add(&b, 0.5 * (low + high), low, high);
     }
-    qsort(b.at, (size_t)b.count, sizeof b.at[0], compare);
+    sort(&b);
     return b;
 }
 
@@ -108,15 +113,27 @@ static double cone_light(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun
     breaks b = panels(from, from + 2.0 * BST_PI, half.peak, lobe);
     add_zeros(&b, in, from);
     add_zeros(&b, out, from);
-    qsort(b.at, (size_t)b.count, sizeof b.at[0], compare);
+    sort(&b);
     for (int p = 0; p + 1 < b.count; p++) {
         double step = 0.5 * (b.at[p + 1] - b.at[p]), middle = b.at[p] + step;
         if (!(wave_at(in, middle) > 0.0 && wave_at(out, middle) > 0.0)) {
             continue;
         }
+        /* by the sum of angles, with the points as pairs about the middle */
+        double ci = fabs(in.height) * cos(middle - in.peak);
+        double si = fabs(in.height) * sin(middle - in.peak);
+        double co = fabs(out.height) * cos(middle - out.peak);
+        double so = fabs(out.height) * sin(middle - out.peak);
+        double cosine_at[BST_GAUSS_POINTS / 2], sine_at[BST_GAUSS_POINTS / 2];
+        for (int i = 0; i < BST_GAUSS_POINTS / 2; i++) {
+            cosine_at[i] = cos(step * bst_gauss_place[i]);
+            sine_at[i] = sin(step * bst_gauss_place[i]);
+        }
         for (int i = 0; i < BST_GAUSS_POINTS; i++) {
-            double a = b.at[p] + step * (1.0 + bst_gauss_place[i]);
-            double mu_in = wave_at(in, a), mu_out = wave_at(out, a);
+            int k = i < BST_GAUSS_POINTS / 2 ? i : BST_GAUSS_POINTS - 1 - i;
+            double sine = i == k ? sine_at[k] : -sine_at[k];
+            double mu_in = in.level + ci * cosine_at[k] - si * sine;
+            double mu_out = out.level + co * cosine_at[k] - so * sine;
             if (mu_in > 0.0 && mu_out > 0.0) {
                 sum += step * bst_gauss_weight[i] * mu_in * mu_out *
                        bst_brdf_value(brdf, fmin(mu_in, 1.0), fmin(mu_out, 1.0), cosine);

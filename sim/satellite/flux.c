@@ -62,10 +62,9 @@ static void add_sunlight(bst_satellite_pose *p, const bst_satellite_light *l, in
     if (!(in > 1e-9) || !(out > 1e-9)) {
         return;
     }
-    bool whole;
-    double area = bst_pose_unshadowed(p, index, 2, &whole);
+    double area = bst_pose_unshadowed_area(p, index, 2);
     if (f->curved >= 0 && f->curved < CURVED_MAX) {
-        if (!whole && area < f->area_m2) {
+        if (area < f->area_m2) {
             s->curved_lost[f->curved] += (f->area_m2 - area) * curved_facet_light(p, l, index);
             s->lost = true;
         }
@@ -127,8 +126,7 @@ static void add_facing(bst_satellite_pose *p, const bst_satellite_light *l, int 
         }
     }
     if (sum > 0.0 && bst_vec3_dot(n, e->centre) > 0.05) {
-        bool whole;
-        lit_m2 = bst_pose_unshadowed(p, index, 2, &whole);
+        lit_m2 = bst_pose_unshadowed_area(p, index, 2);
     }
     s->earth[f->material] += sum * out * m->scale * lit_m2;
 }
@@ -146,8 +144,7 @@ static void add_earth_and_emission(bst_satellite_pose *p, const bst_satellite_li
         if (!(cosine > 1e-9)) {
             continue;
         }
-        bool whole;
-        double visible = bst_pose_unshadowed(p, i, 1, &whole);
+        double visible = bst_pose_unshadowed_area(p, i, 1);
         out->visible_m2 += visible * cosine;
         out->emission_m2 += visible * cosine * sat->materials[sat->facets[i].material].emissivity;
         if (earth && visible > 0.0) {

@@ -19,8 +19,7 @@ double bst_heat_sphere_factor(double cosine, double sine) {
 
 /* The part of a facet that the parts of the model leave free toward view 0. */
 static double free_part(bst_satellite_pose *p, int facet) {
-    bool whole;
-    return bst_pose_unshadowed(p, facet, 1, &whole) / p->satellite->facets[facet].area_m2;
+    return bst_pose_unshadowed_area(p, facet, 1) / p->satellite->facets[facet].area_m2;
 }
 
 /* Irradiance of a facet by earthlight over that of the Sun, without shadows. */

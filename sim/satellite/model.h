@@ -24,8 +24,9 @@ typedef struct bst_facet {
 /* A convex body (also a plate or a triangle) that casts shadows: its vertices and edges. */
 typedef struct bst_occluder {
     int first_vertex, vertex_count;
+    int first_facet, facet_count;
     int first_edge, edge_count;
-    bool closed; /* each edge has one facet on each side */
+    bool closed; /* each edge has one facet on each side, or the rim's plane of a shell */
     int shell;   /* index of the shell whose convex hull this is; -1: a solid body */
 } bst_occluder;
 
@@ -83,7 +84,8 @@ typedef struct bst_satellite {
     bst_vec3 *vertices;
     int *vertex_joint;
     int *corner;
-    int (*edges)[4]; /* vertices a, b; the facet with the edge a-b; that with b-a, or below 0 */
+    int (*edges)[4]; /* vertices a, b; the facet with the edge a-b; that with b-a, or below 0. Of
+                        shells: facets of the convex side; -1: the rim's plane */
     bst_facet *facets;
     bst_occluder *occluders;
     bst_curved *curved;

@@ -91,27 +91,57 @@ bst_status bst_model_begin_occluder(bst_ctx *ctx, bst_satellite *s) {
     return BST_OK;
 }
 
+/* Edge of a body between two vertices; s->edge_count: none. */
+static int find_edge(const bst_satellite *s, const bst_occluder *o, int a, int b) {
+    int e = o->first_edge;
+    while (e < s->edge_count && !(s->edges[e][0] == b && s->edges[e][1] == a) &&
+           !(s->edges[e][0] == a && s->edges[e][1] == b)) {
+        e++;
+    }
+    return e;
+}
+
+/* Gives the edges of a shell the facets of its convex side. */
+static void close_shell(bst_satellite *s, bst_occluder *o) {
+    for (int e = o->first_edge; e < o->first_edge + o->edge_count; e++) {
+        s->edges[e][2] = s->edges[e][3] = -1;
+    }
+    for (int f = o->first_facet; f < o->first_facet + o->facet_count; f++) {
+        const bst_facet *facet = &s->facets[f];
+        for (int i = 0; i < facet->count && !facet->inside; i++) {
+            int a = s->corner[facet->first + i];
+            int b = s->corner[facet->first + (i + 1) % facet->count];
+            int e = find_edge(s, o, a, b);
+            if (s->edges[e][2] < 0) {
+                s->edges[e][0] = a;
+                s->edges[e][1] = b;
+            }
+            s->edges[e][s->edges[e][2] < 0 ? 2 : 3] = f;
+        }
+    }
+    o->closed = true;
+}
+
 bst_status bst_model_set_shell(bst_ctx *ctx, bst_satellite *s, const bst_shell *shell) {
     BST_TRY(grow(ctx, (void **)&s->shells, &s->shell_capacity, s->shell_count, sizeof *s->shells));
     s->occluders[s->occluder_count - 1].shell = s->shell_count;
     s->shells[s->shell_count++] = *shell;
+    close_shell(s, &s->occluders[s->occluder_count - 1]);
     return BST_OK;
 }
 
 bst_status bst_model_end_occluder(bst_ctx *ctx, bst_satellite *s, int first_facet) {
     bst_occluder *o = &s->occluders[s->occluder_count - 1];
     o->vertex_count = s->vertex_count - o->first_vertex;
+    o->first_facet = first_facet;
+    o->facet_count = s->facet_count - first_facet;
     for (int f = first_facet; f < s->facet_count; f++) {
         const bst_facet *facet = &s->facets[f];
         for (int i = 0; i < facet->count; i++) {
             int a = s->corner[facet->first + i];
             int b = s->corner[facet->first + (i + 1) % facet->count];
             /* each edge of a closed body is in two facets, once in each direction */
-            int e = o->first_edge;
-            while (e < s->edge_count && !(s->edges[e][0] == b && s->edges[e][1] == a) &&
-                   !(s->edges[e][0] == a && s->edges[e][1] == b)) {
-                e++;
-            }
+            int e = find_edge(s, o, a, b);
             if (e < s->edge_count) {
                 bool second = s->edges[e][0] == b && s->edges[e][3] == -1;
                 s->edges[e][3] = second ? f : -2;

@@ -4,6 +4,7 @@
 
 #include "sim/satellite/model.h"
 #include "sim/satellite/polygon_clip.h"
+#include "sim/satellite/polygon_covers.h"
 
 /* What joints follow, in the body frame; unit vectors. */
 typedef struct bst_satellite_aim {
@@ -14,6 +15,9 @@ typedef struct bst_satellite_aim {
 /* Parallel projection of the model along one direction. */
 typedef struct bst_pose_view {
     bst_vec3 x, y, z; /* right-handed; z: unit, from the satellite to the light or the observer */
+    bst_point2 *flat; /* by vertex: x and y */
+    double *depth_m;  /* by vertex: z */
+    bool *within_rim; /* by vertex of a shell: see bst_pose_is_within_rim */
     double (*bounds)[6]; /* by occluder: lowest and highest x, y, z */
     bst_point2 *outline; /* silhouettes of occluders, counter-clockwise, from 2 * first_vertex */
     uint64_t *hiders;    /* by occluder: set of those that may hide some of it; for few occluders */
@@ -48,6 +52,7 @@ typedef struct bst_satellite_pose {
     bst_pose_view views[2];                      /* see bst_pose_look */
     int *next;                      /* work memory of outlines: by vertex of the largest occluder */
     bst_point2 *flat;               /* likewise */
+    bool *facing;                   /* likewise: by facet */
     bst_point2 *front, *front_hull; /* work memory of bst_pose_front */
     int *seen;                      /* by occluder: facet for which it was last found in the grid */
     int seen_stamp;
@@ -55,6 +60,7 @@ typedef struct bst_satellite_pose {
     bst_pose_pair *pairs;               /* [occluders][occluders]; NULL: too many */
     int (*faces)[BST_SEPARATION_FACES]; /* by occluder: plane facets; -1: no more */
     bst_polygon_clip clip;
+    bst_polygon_covers covers;
 } bst_satellite_pose;
 
 /* Allocates a pose of a model, with all joints at their offsets.
@@ -106,6 +112,10 @@ int bst_pose_front(bst_satellite_pose *pose, const bst_pose_view *view, int occl
  * Notes:     exact for plane facets: the silhouette of each convex body is projected onto the
  *            facet's plane and subtracted. */
 double bst_pose_unshadowed(bst_satellite_pose *pose, int facet, int views, bool *whole);
+
+/* The same area without its pieces, in a part of the time; exactly that of the facet if nothing
+ * hides any of it. */
+double bst_pose_unshadowed_area(bst_satellite_pose *pose, int facet, int views);
 
 /* Axes of a facet's plane: a point of it is *origin + x *e1 + y *e2, body frame. */
 void bst_pose_facet_axes(const bst_satellite_pose *pose, int facet, bst_vec3 *origin, bst_vec3 *e1,

@@ -16,6 +16,14 @@ typedef struct bst_resolved_lit_cell {
 /* Side of the depth map from the Sun. */
 enum { BST_SHADOW_SIDE = 640 };
 
+/* Light of a facet in the fast image, per cell: of the Sun, and other. */
+typedef struct bst_sampled_facet {
+    double sun, other;
+    double rise_m; /* by which neighbours in the depth map are nearer to the Sun */
+    int16_t part;
+    bool known;
+} bst_sampled_facet;
+
 /* Work memory of the fast image: zero-initialise. */
 typedef struct bst_resolved_samples {
     float *near; /* [cells] 1 over the depth of the nearest facet */
@@ -23,8 +31,7 @@ typedef struct bst_resolved_samples {
     size_t cells;
     float *toward;        /* [side][side] place toward the Sun of the nearest facet to it */
     bst_vec3 *seen, *sun; /* by vertex: cells and 1 over the depth; likewise for the Sun's view */
-    unsigned char *state; /* by facet: 1: its light is known */
-    struct bst_resolved_shading *light; /* by facet */
+    bst_sampled_facet *light; /* by facet */
 } bst_resolved_samples;
 
 struct bst_resolved {

@@ -62,10 +62,11 @@ bool bst_resolved_box(const bst_satellite_pose *pose, const bst_resolved_view *v
             return false;
         }
         double f = 1.0 / (p.z * view->scale_rad), margin = margin_m * f;
-        low[0] = fmin(low[0], p.x * f - margin);
-        low[1] = fmin(low[1], p.y * f - margin);
-        high[0] = fmax(high[0], p.x * f + margin);
-        high[1] = fmax(high[1], p.y * f + margin);
+        const double at[2] = {p.x * f, p.y * f};
+        for (int i = 0; i < 2; i++) { /* calls of fmin would take most of the time */
+            low[i] = at[i] - margin < low[i] ? at[i] - margin : low[i];
+            high[i] = at[i] + margin > high[i] ? at[i] + margin : high[i];
+        }
     }
     return pose->satellite->vertex_count > 0;
 }

@@ -10,7 +10,6 @@ void bst_resolved_samples_free(bst_resolved_samples *s) {
     free(s->toward);
     free(s->seen);
     free(s->sun);
-    free(s->state);
     free(s->light);
     *s = (bst_resolved_samples){.cells = 0};
 }
@@ -23,9 +22,8 @@ static bst_status reserve(bst_ctx *ctx, const bst_resolved *r, bst_resolved_samp
         s->toward = malloc(side * side * sizeof *s->toward);
         s->seen = malloc(((size_t)r->satellite->vertex_count + 1) * sizeof *s->seen);
         s->sun = malloc(((size_t)r->satellite->vertex_count + 1) * sizeof *s->sun);
-        s->state = malloc((size_t)r->satellite->facet_count + 1);
         s->light = malloc(((size_t)r->satellite->facet_count + 1) * sizeof *s->light);
-        made = s->toward && s->seen && s->sun && s->state && s->light;
+        made = s->toward && s->seen && s->sun && s->light;
     }
     if (made && cells > s->cells) {
         free(s->near);
@@ -45,6 +43,17 @@ typedef struct target {
     int width, height;
 } target;
 
+static double least_of(double a, double b, double c) {
+    double least = a < b ? a : b;
+    return c < least ? c : least;
+}
+
+/* Smallest integer not below x, for the size of an image; 0: x is below 0. */
+static int first_of(double x) {
+    int i = x > 0.0 ? (int)x : 0;
+    return i < x ? i + 1 : i;
+}
+
 /* Enters a triangle: value linear in x and y. Both orientations. */
 static void enter(const target *t, const bst_vec3 *a, const bst_vec3 *b, const bst_vec3 *c,
                   int facet) {
@@ -52,24 +61,32 @@ static void enter(const target *t, const bst_vec3 *a, const bst_vec3 *b, const b
     if (!(fabs(area) > 1e-12)) {
         return;
     }
-    double low_y = fmin(a->y, fmin(b->y, c->y)), high_y = fmax(a->y, fmax(b->y, c->y));
-    int first = low_y > 0.0 ? (int)ceil(low_y) : 0;
-    int last = high_y < t->height - 1.0 ? (int)floor(high_y) : t->height - 1;
+    double low_y = least_of(a->y, b->y, c->y), high_y = -least_of(-a->y, -b->y, -c->y);
+    int first = low_y < t->height ? first_of(low_y) : t->height;
+    int last = high_y < t->height - 1.0 ? (high_y < 0.0 ? -1 : (int)high_y) : t->height - 1;
+    if (first > last) {
+        return;
+    }
     double dx = ((b->z - a->z) * (c->y - a->y) - (c->z - a->z) * (b->y - a->y)) / area;
     double dy = ((c->z - a->z) * (b->x - a->x) - (b->z - a->z) * (c->x - a->x)) / area;
     const bst_vec3 *corner[4] = {a, b, c, a};
+    double slope[3];
+    for (int e = 0; e < 3; e++) {
+        const bst_vec3 *p = corner[e], *q = corner[e + 1];
+        slope[e] = p->y != q->y ? (q->x - p->x) / (q->y - p->y) : 0.0;
+    }
     for (int y = first; y <= last; y++) {
         double from = INFINITY, to = -INFINITY;
         for (int e = 0; e < 3; e++) {
             const bst_vec3 *p = corner[e], *q = corner[e + 1];
             if ((p->y <= y) != (q->y <= y)) {
-                double x = p->x + (y - p->y) / (q->y - p->y) * (q->x - p->x);
+                double x = p->x + (y - p->y) * slope[e];
                 from = x < from ? x : from;
                 to = x > to ? x : to;
             }
         }
-        int i = from > 0.0 ? (from < t->width ? (int)ceil(from) : t->width) : 0;
-        int end = to < t->width - 1.0 ? (to < 0.0 ? -1 : (int)floor(to)) : t->width - 1;
+        int i = from < t->width ? first_of(from) : t->width;
+        int end = to < t->width - 1.0 ? (to < 0.0 ? -1 : (int)to) : t->width - 1;
         size_t row = (size_t)y * (size_t)t->width;
         double value = a->z + dx * (i - a->x) + dy * (y - a->y);
         for (; i <= end; i++, value += dx) {
@@ -79,23 +96,6 @@ static void enter(const target *t, const bst_vec3 *a, const bst_vec3 *b, const b
                     t->facet[row + (size_t)i] = facet;
                 }
             }
-        }
-    }
-}
-
-/* Enters all facets that face a direction: as seen from the eye, or from the Sun if eye is NULL. */
-static void enter_facets(const bst_resolved_adding *a, const target *t, const bst_vec3 *place,
-                         const bst_vec3 *eye) {
-    const bst_satellite *sat = a->r->satellite;
-    for (int f = 0; f < sat->facet_count; f++) {
-        const bst_facet *facet = &sat->facets[f];
-        const int *v = &sat->corner[facet->first];
-        bst_vec3 from = eye ? bst_vec3_sub(*eye, a->pose->vertices[v[0]]) : a->light->sun;
-        if (!(bst_vec3_dot(a->pose->normals[f], from) > 0.0)) {
-            continue;
-        }
-        for (int i = 1; i + 1 < facet->count; i++) {
-            enter(t, &place[v[0]], &place[v[i]], &place[v[i + 1]], f);
         }
     }
 }
@@ -113,32 +113,73 @@ static bst_vec3 in_sun_view(const sun_view *v, bst_vec3 p) {
 }
 
 /* Light of a facet, computed when it is first seen. */
-static const bst_resolved_shading *light_of(const bst_resolved_adding *a, bst_resolved_samples *s,
-                                            int f) {
-    if (!s->state[f]) {
-        const bst_facet *facet = &a->r->satellite->facets[f];
-        bst_vec3 middle = {0};
-        for (int i = 0; i < facet->count; i++) {
-            middle = bst_vec3_axpy(middle, 1.0 / facet->count,
-                                   a->pose->vertices[a->r->satellite->corner[facet->first + i]]);
-        }
-        s->light[f] = bst_resolved_shade(a, facet->material, middle, a->pose->normals[f]);
-        s->state[f] = 1;
+static const bst_sampled_facet *light_of(const bst_resolved_adding *a, bst_resolved_samples *s,
+                                         const sun_view *v, int f) {
+    bst_sampled_facet *out = &s->light[f];
+    if (out->known) {
+        return out;
     }
-    return &s->light[f];
+    const bst_facet *facet = &a->r->satellite->facets[f];
+    bst_vec3 middle = {0}, normal = a->pose->normals[f];
+    for (int i = 0; i < facet->count; i++) {
+        middle = bst_vec3_axpy(middle, 1.0 / facet->count,
+                               a->pose->vertices[a->r->satellite->corner[facet->first + i]]);
+    }
+    bst_resolved_shading light = bst_resolved_shade(a, facet->material, middle, normal);
+    /* over the width of a cell of the map, 1 / per_m, the facet rises by its slope */
+    double in = fmax(bst_vec3_dot(normal, v->z), 0.05);
+    *out = (bst_sampled_facet){.sun = light.sun,
+                               .other = light.uniform + light.earth,
+                               .rise_m = (1.0 + sqrt(fmax(1.0 - in * in, 0.0)) / in) / v->per_m,
+                               .part = (int16_t)facet->part,
+                               .known = true};
+    return out;
 }
 
-/* True if a point of a facet sees the Sun. The map's cells are as wide as 1 / per_m, over which the
- * facet rises by its slope. */
-static bool is_lit(const bst_resolved_samples *s, const sun_view *v, bst_vec3 p, bst_vec3 normal) {
-    bst_vec3 q = in_sun_view(v, p);
-    int x = (int)floor(q.x + 0.5), y = (int)floor(q.y + 0.5);
-    if (x < 0 || y < 0 || x >= BST_SHADOW_SIDE || y >= BST_SHADOW_SIDE) {
+/* Enters all facets that face a direction: the Sun into its depth map, or the eye into the image.
+ */
+static void enter_facets(const bst_resolved_adding *a, bst_resolved_samples *s, const target *t,
+                         const bst_vec3 *place, const sun_view *sun) {
+    const bst_satellite *sat = a->r->satellite;
+    for (int f = 0; f < sat->facet_count; f++) {
+        const bst_facet *facet = &sat->facets[f];
+        const int *v = &sat->corner[facet->first];
+        bst_vec3 from = t->facet ? bst_vec3_sub(a->eye_m, a->pose->vertices[v[0]]) : a->light->sun;
+        if (!(bst_vec3_dot(a->pose->normals[f], from) > 0.0)) {
+            continue;
+        }
+        for (int i = 1; i + 1 < facet->count; i++) {
+            enter(t, &place[v[0]], &place[v[i]], &place[v[i + 1]], f);
+        }
+        if (t->facet && !a->earth) { /* now, while its memory is near; earthlight takes longer */
+            (void)light_of(a, s, sun, f);
+        }
+    }
+}
+
+/* True if a place of the Sun's view sees the Sun. */
+static bool is_lit(const bst_resolved_samples *s, bst_vec3 q, double rise_m) {
+    double x = q.x + 0.5, y = q.y + 0.5;
+    if (!(x >= 0.0 && y >= 0.0 && x < BST_SHADOW_SIDE && y < BST_SHADOW_SIDE)) {
         return true;
     }
-    double in = fmax(bst_vec3_dot(normal, v->z), 0.05);
-    double rise = (1.0 + sqrt(fmax(1.0 - in * in, 0.0)) / in) / v->per_m;
-    return (double)s->toward[y * BST_SHADOW_SIDE + x] <= q.z + rise;
+    return (double)s->toward[(int)y * BST_SHADOW_SIDE + (int)x] <= q.z + rise_m;
+}
+
+/* From the image to the Sun's view: what is seen at tangents (u, w), at a depth, is at the sum of
+ * `origin` and the depth times u x + w y + z. */
+typedef struct sun_map {
+    bst_vec3 origin, x, y, z;
+} sun_map;
+
+static sun_map map_to_sun(const bst_resolved_adding *a, const sun_view *v) {
+    bst_vec3 axes[4] = {{0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    for (int i = 0; i < 4; i++) {
+        bst_vec3 q = bst_vec3_sub(axes[i], a->view->origin_m);
+        axes[i] = in_sun_view(v, bst_mat3_transpose_mul_vec(&a->image_from_body, q));
+    }
+    return (sun_map){axes[0], bst_vec3_sub(axes[1], axes[0]), bst_vec3_sub(axes[2], axes[0]),
+                     bst_vec3_sub(axes[3], axes[0])};
 }
 
 /* Adds the samples to the image. */
@@ -146,22 +187,23 @@ static double add_samples(const bst_resolved_adding *a, bst_resolved_samples *s,
                           const double offset[2], double weight) {
     bst_resolved_image *m = &a->r->image;
     double total = 0.0, cell = 1.0 / a->per_m;
+    const sun_map map = map_to_sun(a, v);
     for (int y = 0; y < m->height; y++) {
+        double w = (m->y0 + y + offset[1]) * cell;
+        bst_vec3 row = bst_vec3_axpy(map.z, w, map.y);
         for (int x = 0; x < m->width; x++) {
             size_t at = (size_t)y * (size_t)m->width + (size_t)x;
             int f = s->facet[at];
             if (f < 0) {
                 continue;
             }
-            const bst_resolved_shading *light = light_of(a, s, f);
-            double u = (m->x0 + x + offset[0]) * cell, w = (m->y0 + y + offset[1]) * cell;
-            double sum = light->uniform + light->earth, c2 = 1.0 / (1.0 + u * u + w * w);
+            const bst_sampled_facet *light = light_of(a, s, v, f);
+            double u = (m->x0 + x + offset[0]) * cell;
+            double sum = light->other, c2 = 1.0 / (1.0 + u * u + w * w);
             if (light->sun > 0.0) {
                 double depth_m = 1.0 / (double)s->near[at];
-                bst_vec3 q = {u * depth_m, w * depth_m, depth_m};
-                q = bst_mat3_transpose_mul_vec(&a->image_from_body,
-                                               bst_vec3_sub(q, a->view->origin_m));
-                sum += is_lit(s, v, q, a->pose->normals[f]) ? light->sun : 0.0;
+                bst_vec3 q = bst_vec3_axpy(map.origin, depth_m, bst_vec3_axpy(row, u, map.x));
+                sum += is_lit(s, q, light->rise_m) ? light->sun : 0.0;
             }
             sum *= c2 * sqrt(c2);
             total += sum;
@@ -170,7 +212,7 @@ static double add_samples(const bst_resolved_adding *a, bst_resolved_samples *s,
             to->moment_x += (float)(weight * sum * (offset[0] - 0.5));
             to->moment_y += (float)(weight * sum * (offset[1] - 0.5));
             to->cover += (float)weight;
-            m->part[at] = (int16_t)a->r->satellite->facets[f].part;
+            m->part[at] = light->part;
         }
     }
     return total;
@@ -198,14 +240,16 @@ bst_status bst_resolved_sample(bst_ctx *ctx, const bst_resolved_adding *a, int i
     size_t cells = (size_t)r->image.width * (size_t)r->image.height;
     memset(s->near, 0, cells * sizeof *s->near);
     memset(s->facet, -1, cells * sizeof *s->facet);
-    memset(s->state, 0, (size_t)sat->facet_count + 1);
+    for (int f = 0; f < sat->facet_count; f++) {
+        s->light[f].known = false;
+    }
     for (int i = 0; i < BST_SHADOW_SIDE * BST_SHADOW_SIDE; i++) {
         s->toward[i] = -INFINITY;
     }
     const target shadow = {s->toward, NULL, BST_SHADOW_SIDE, BST_SHADOW_SIDE};
     const target image = {s->near, s->facet, r->image.width, r->image.height};
-    enter_facets(a, &shadow, s->sun, NULL);
-    enter_facets(a, &image, s->seen, &a->eye_m);
+    enter_facets(a, s, &shadow, s->sun, &v);
+    enter_facets(a, s, &image, s->seen, &v);
     *total = add_samples(a, s, &v, offset, weight);
     return BST_OK;
 }

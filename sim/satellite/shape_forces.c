@@ -35,8 +35,7 @@ bst_vec3 bst_shape_light_area_m2(bst_satellite_pose *p, bst_vec3 sun) {
         if (!(cosine > 1e-9)) {
             continue;
         }
-        bool whole;
-        double area = bst_pose_unshadowed(p, i, 1, &whole) * cosine;
+        double area = bst_pose_unshadowed_area(p, i, 1) * cosine;
         reflectance(s, s->facets[i].material, cosine, &diffuse, &mirror);
         sum = bst_vec3_axpy(sum, -area * (1.0 - mirror), sun);
         sum = bst_vec3_axpy(sum, -2.0 * area * (mirror * cosine + diffuse / 3.0), p->normals[i]);
@@ -50,8 +49,7 @@ double bst_shape_silhouette_m2(bst_satellite_pose *p, bst_vec3 direction) {
     bst_pose_look(p, 0, direction);
     for (int i = 0; i < s->facet_count; i++) {
         double cosine = bst_vec3_dot(p->normals[i], direction);
-        bool whole;
-        sum += cosine > 1e-9 ? bst_pose_unshadowed(p, i, 1, &whole) * cosine : 0.0;
+        sum += cosine > 1e-9 ? bst_pose_unshadowed_area(p, i, 1) * cosine : 0.0;
     }
     return sum;
 }

@@ -1,0 +1,166 @@
+/* Areas of shadows: intersections of polygons against pieces, silhouettes against hulls. */
+#include "sim/satellite/polygon_covers.h"
+#include "tests/satellite/satellite_support.h"
+
+#define SQUARE(x_, y_, side_)                                               \
+    {                                                                       \
+        {x_, y_}, {(x_) + (side_), y_}, {(x_) + (side_), (y_) + (side_)}, { \
+            x_, (y_) + (side_)                                              \
+        }                                                                   \
+    }
+
+static void add(bst_polygon_covers *covers, const bst_point2 *points, int count) {
+    bst_point2 *to = bst_polygon_covers_begin(covers, count);
+    assert_non_null(to);
+    memcpy(to, points, (size_t)count * sizeof *to);
+    bst_polygon_covers_end(covers, count);
+}
+
+/* A polygon with its corners on an ellipse at random. */
+static int random_polygon(uint64_t *state, bst_point2 *out) {
+    int n = 3 + (int)(14.0 * bst_test_uniform(state));
+    double x = 2.0 * bst_test_uniform(state), y = 2.0 * bst_test_uniform(state);
+    double a = 0.2 + bst_test_uniform(state), b = 0.2 + bst_test_uniform(state);
+    for (int i = 0; i < n; i++) {
+        double angle = 2.0 * BST_PI * (i + 0.9 * bst_test_uniform(state)) / n;
+        out[i] = (bst_point2){x + a * cos(angle), y + b * sin(angle)};
+    }
+    return n;
+}
+
+static void squares_have_closed_forms(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_polygon_covers covers;
+    bst_assert_ok(&ctx, bst_polygon_covers_create(&ctx, &covers));
+    const bst_point2 whole[] = SQUARE(0.0, 0.0, 4.0), a[] = SQUARE(1.0, 1.0, 2.0);
+    const bst_point2 b[] = SQUARE(2.0, 2.0, 3.0), far[] = SQUARE(4.0, 0.0, 1.0);
+    /* sums of a few numbers of size 16 */
+    bst_assert_close(bst_polygon_uncovered_area(&covers, whole, 4), 16.0, 1e-14);
+    add(&covers, a, 4);
+    bst_assert_close(bst_polygon_uncovered_area(&covers, whole, 4), 12.0, 1e-14);
+    add(&covers, b, 4); /* 4 of 9 are in the square, 1 of these in a */
+    bst_assert_close(bst_polygon_uncovered_area(&covers, whole, 4), 9.0, 1e-14);
+    add(&covers, far, 4); /* touches */
+    bst_assert_close(bst_polygon_uncovered_area(&covers, whole, 4), 9.0, 1e-14);
+    add(&covers, whole, 4);
+    assert_true(bst_polygon_uncovered_area(&covers, whole, 4) == 0.0);
+    assert_int_equal(bst_polygon_place_of(a, 4, whole, 4), BST_POLYGON_WITHIN);
+    assert_int_equal(bst_polygon_place_of(whole, 4, a, 4), BST_POLYGON_CROSSING);
+    assert_int_equal(bst_polygon_place_of(b, 4, whole, 4), BST_POLYGON_CROSSING);
+    const bst_point2 beside[] = SQUARE(4.5, 0.0, 1.0);
+    assert_int_equal(bst_polygon_place_of(beside, 4, whole, 4), BST_POLYGON_APART);
+    bst_polygon_covers_free(&covers);
+}
+
+/* Two ways to the same area. */
+static void intersections_agree_with_pieces(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_polygon_covers covers;
+    bst_polygon_clip clip;
+    bst_assert_ok(&ctx, bst_polygon_covers_create(&ctx, &covers));
+    bst_assert_ok(&ctx, bst_polygon_clip_create(&ctx, &clip));
+    uint64_t random = 5;
+    int partial = 0, given_up = 0;
+    for (int i = 0; i < 2000; i++) {
+        bst_point2 p[20], whole[20];
+        int n = random_polygon(&random, whole), wanted = i % BST_POLYGON_COVERS_MAX;
+        bst_polygon_clip_start(&clip, whole, n);
+        covers.count = 0;
+        for (int k = 0; k < wanted; k++) {
+            int m = random_polygon(&random, p);
+            bst_polygon_clip_subtract(&clip, p, m, false);
+            add(&covers, p, m);
+        }
+        double area = bst_polygon_uncovered_area(&covers, whole, n);
+        if (area < 0.0) {
+            given_up++;
+            continue;
+        }
+        bst_assert_close(area, bst_polygon_clip_area(&clip), 1e-13); /* of areas about 1 */
+        partial += area > 1e-9 && area < bst_polygon_area(whole, n) - 1e-9;
+    }
+    assert_true(partial > 500);
+    assert_true(given_up > 0 && given_up < 1000);
+    bst_polygon_covers_free(&covers);
+    bst_polygon_clip_free(&clip);
+}
+
+#define SATELLITE                                                                              \
+    "{\"materials\": [{\"name\": \"w\", \"diffuse\": 0.5}], \"parts\": ["                      \
+    "{\"name\": \"bus\", \"kind\": \"box\", \"size_m\": [2, 2, 3], \"material\": \"w\"}, "     \
+    "{\"name\": \"mast\", \"kind\": \"cylinder\", \"radius_m\": 0.2, \"length_m\": 2, "        \
+    "\"position_m\": [0.5, 0.4, 2.51], \"material\": \"w\"}, "                                    \
+    "{\"name\": \"cone\", \"kind\": \"cone\", \"radius_m\": 0.5, \"top_radius_m\": 0.1, "      \
+    "\"length_m\": 2, \"position_m\": [0.6, -0.5, 1.7], \"material\": \"w\"}, "                \
+    "{\"name\": \"wing\", \"kind\": \"plate\", \"size_m\": [1, 5, 1], \"position_m\": [0, 2, " \
+    "0.5], \"rotation_deg\": [20, 30, 0], \"material\": \"w\"}, "                              \
+    "{\"name\": \"dish\", \"kind\": \"dish\", \"radius_m\": 1, \"length_m\": 0.3, "            \
+    "\"position_m\": [1.8, 0, 1], \"rotation_deg\": [0, -40, 0], \"material\": \"w\"}]}"
+
+/* Bodies that intersect, and a shell. */
+static void areas_agree_with_pieces(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(SATELLITE);
+    uint64_t random = 11;
+    int partial = 0;
+    for (int i = 0; i < 240; i++) {
+        bst_vec3 sun = bst_test_direction(&random), eye = bst_test_direction(&random);
+        if (i % 2) { /* along the mast but for rounding: both of its ends have one outline */
+            sun = (bst_vec3){1e-16 * sun.x, 1e-16 * sun.y, 1.0};
+        }
+        bst_pose_look(m.pose, 0, eye);
+        bst_pose_look(m.pose, 1, sun);
+        for (int f = 0; f < m.satellite->facet_count; f++) {
+            if (bst_vec3_dot(m.pose->normals[f], sun) > 1e-6 &&
+                bst_vec3_dot(m.pose->normals[f], eye) > 1e-6) {
+                bool whole;
+                double pieces = bst_pose_unshadowed(m.pose, f, 2, &whole);
+                double area = bst_pose_unshadowed_area(m.pose, f, 2);
+                /* corners of shadows at grazing angles keep ten digits */
+                bst_assert_close(area, pieces, 1e-10);
+                partial += area > 1e-6 && area < m.satellite->facets[f].area_m2 - 1e-6;
+            }
+        }
+    }
+    assert_true(partial > 500);
+    bst_test_model_close(&m);
+}
+
+/* Silhouettes follow the edges; the hull of all corners is the truth. */
+static void silhouettes_are_hulls(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(SATELLITE);
+    uint64_t random = 3;
+    for (int i = 0; i < 200; i++) {
+        bst_vec3 z = bst_test_direction(&random);
+        bst_pose_look(m.pose, 0, z);
+        for (int o = 0; o < m.satellite->occluder_count; o++) {
+            const bst_occluder *body = &m.satellite->occluders[o];
+            bst_point2 flat[512], hull[1024];
+            for (int k = 0; k < body->vertex_count; k++) {
+                bst_vec3 q = m.pose->vertices[body->first_vertex + k];
+                flat[k] = (bst_point2){bst_vec3_dot(q, m.pose->views[0].x),
+                                       bst_vec3_dot(q, m.pose->views[0].y)};
+            }
+            int corners = bst_polygon_hull(flat, body->vertex_count, hull);
+            const bst_point2 *outline;
+            int n = bst_pose_outline(m.pose, 0, o, &outline);
+            assert_true(body->closed);
+            /* rounding of areas of some square metres */
+            bst_assert_close(bst_polygon_area(outline, n), bst_polygon_area(hull, corners), 1e-12);
+        }
+    }
+    bst_test_model_close(&m);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(squares_have_closed_forms),
+        cmocka_unit_test(intersections_agree_with_pieces),
+        cmocka_unit_test(areas_agree_with_pieces),
+        cmocka_unit_test(silhouettes_are_hulls),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
