@@ -14,6 +14,7 @@ enum { BST_SOURCE_BODY_TIMES = 65 };
  * the middle. */
 typedef struct bst_scene_source_body {
     const bst_satellite *satellite;
+    int first_part; /* number of its first part (bst_world_first_part) */
     int times; /* attitudes at equidistant times from start to end */
     bst_quat q_body_from_gcrf[BST_SOURCE_BODY_TIMES];
     bst_vec3 object_m[2]; /* geocentric position at start and end */
