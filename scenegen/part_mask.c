@@ -111,7 +111,7 @@ static bst_status draw(bst_ctx *ctx, bst_part_mask *work, const frame *f,
     bst_source_body_state state;
     bst_source_body_at(source, 0.5, &state, NULL);
     BST_TRY(use_model(ctx, work, source->body->satellite));
-    bst_satellite_pose_set(work->pose, &state.aim);
+    bst_source_body_set_pose(source, &state, work->pose);
     const bst_resolved_view view = {
         .q_image_from_body =
             bst_quat_mul(f->q_cam_from_gcrf, bst_quat_conj(state.q_body_from_gcrf)),

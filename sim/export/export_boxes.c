@@ -36,7 +36,7 @@ typedef struct job {
     bst_shape_labels shapes;
     char set[256];
     bst_mask_labels masks, parts; /* of sources, and of parts of satellites */
-    cJSON *images, *annotations; /* COCO */
+    cJSON *images, *annotations;  /* COCO */
     int64_t written, boxes;
     int sensors, masked; /* number of exported sensors, and of those with masks */
 } job;
@@ -145,9 +145,8 @@ static bst_status read_masks(bst_ctx *ctx, job *j, const frame_row *f, int64_t i
     const bst_mask_frame frame = {index, f->id, f->width, f->height};
     bst_status status = bst_mask_labels_read(ctx, &j->masks, &frame);
     status = status == BST_OK ? bst_mask_labels_read(ctx, &j->parts, &frame) : status;
-    return status == BST_OK
-               ? BST_OK
-               : bst_fail_prefix(ctx, status, "%s", bst_run_reader_folder(j->e->run));
+    return status == BST_OK ? BST_OK
+                            : bst_fail_prefix(ctx, status, "%s", bst_run_reader_folder(j->e->run));
 }
 
 /* Adds "segmentation" and "area" of the current truth row from its mask pixels; without mask: no

@@ -141,16 +141,41 @@ def check_parts(out, coco):
     assert seen == {0, 1, 2, 3, 4, 5}
 
 
+def check_stars(out):
+    """No star shines through the target: noise-free light of the stars where its parts cover the pixel."""
+    hidden = rows(out, "SELECT count(*) FROM truth WHERE kind = 'star' AND occulted = 1")[0][0]
+    covered = []
+    with fits.open(os.path.join(out, "parts.fits")) as masks, fits.open(os.path.join(out, "stars.fits")) as stars:
+        for mask, light in zip(masks[1:], stars[1:]):
+            parts = {(f, x, y) for f, x, y in rows(out, "SELECT f.fits_index, t.x_mid_px, t.y_mid_px FROM truth t JOIN frames f"
+                                                        " USING (sensor, exposure_id) WHERE t.kind = 'star' AND t.occulted = 1")
+                     if masks[f].header["FRAMEID"] == mask.header["FRAMEID"]}
+            for _, x, y in parts:
+                column, row = round(x), round(y)
+                # a contact within 0.7 px of the pixel's centre may be on either side
+                near = mask.data[row - 1:row + 2, column - 1:column + 2]
+                assert near.any()
+                if near.all():
+                    covered.append(light.data[row, column])
+            for x, y in rows(out, "SELECT t.x_mid_px, t.y_mid_px FROM truth t WHERE t.kind = 'star' AND t.occulted = 0"
+                                  f" AND t.exposure_id = {mask.header['FRAMEID']} AND t.in_field = 1"):
+                column, row = round(x), round(y)
+                if 1 <= row < 511 and 1 <= column < 511:
+                    assert not mask.data[row - 1:row + 2, column - 1:column + 2].all()
+    assert hidden >= 5 and len(covered) >= 5 and max(covered) < 1e-9, (hidden, covered)
+
+
 def labels(program, folder):
     """Truth and labels of the target at 60 m against its pixels: centroid of light, box, masks, COCO and SatNet."""
     out = os.path.join(folder, "labels")
     run(program, out, 7, {**NEAR, "/duration_s": 24, "/observers/0/orbit/offset_rtn_m": [0, -60, 0],
                           "/observers/0/burns": [], "/observers/0/sensors/0/exposure/exposure_s": 3e-5,
                           "/observers/0/sensors/0/modules/control/exposure_schedule": [],
-                          "/record": {"frames": "extensions", "planes": ["segmentation", "parts"]}})
+                          "/record": {"frames": "extensions", "planes": ["stars", "segmentation", "parts"]}})
     coco, satnet = (os.path.join(folder, name) for name in ("coco", "satnet"))
     subprocess.run([program, "export", out, "--coco", coco, "--satnet", satnet], check=True, capture_output=True)
     check_parts(out, coco)
+    check_stars(out)
     truth = rows(out, "SELECT s.exposure_id, s.item, s.x_px, s.y_px, s.x_light_px, s.y_light_px, s.x0_px, s.y0_px, s.x1_px,"
                       " s.y1_px, s.size_px, f.fits_index, t.x_chief_px, t.range_m FROM shapes s"
                       " JOIN frames f USING (sensor, exposure_id) JOIN truth t USING (sensor, exposure_id, item)")

@@ -17,13 +17,13 @@ static const char *const detection_choices[] = {"all", "no_stars", "objects", NU
 static const char *const compression_choices[] = {"none", "rice", "auto", NULL};
 
 /* in the order of bst_plane; also the file names */
-static const char *const plane_choices[] = {"stars",        "targets",    "background",
-                                            "segmentation", "saturation", "parts", NULL};
-static const char *const plane_names[] = {"STARS", "TARGETS", "BACKGROUND", "SEGMENTATION",
-                                          "SATURATION", "PARTS"};
-static const bst_fits_content plane_contents[] = {
-    BST_FITS_ELECTRONS, BST_FITS_ELECTRONS, BST_FITS_ELECTRONS, BST_FITS_ITEMS, BST_FITS_FLAGS,
-    BST_FITS_PARTS};
+static const char *const plane_choices[] = {"stars",      "targets", "background", "segmentation",
+                                            "saturation", "parts",   NULL};
+static const char *const plane_names[] = {"STARS",        "TARGETS",    "BACKGROUND",
+                                          "SEGMENTATION", "SATURATION", "PARTS"};
+static const bst_fits_content plane_contents[] = {BST_FITS_ELECTRONS, BST_FITS_ELECTRONS,
+                                                  BST_FITS_ELECTRONS, BST_FITS_ITEMS,
+                                                  BST_FITS_FLAGS,     BST_FITS_PARTS};
 
 const bst_config_desc bst_record_config_table[] = {
     BST_ENUM(bst_recorder_config, frames, frame_choices, "\"extensions\"",
@@ -39,7 +39,8 @@ const bst_config_desc bst_record_config_table[] = {
         bst_recorder_config, planes, plane_choices, "[]",
         "Noise-free images beside each frame, a FITS file each: expected electrons of the "
         "stars, of the targets, of sky and dark current; the mask of who each pixel belongs "
-        "to; which of the frame's own pixels are saturated; and the part of a satellite with a shape "
+        "to; which of the frame's own pixels are saturated; and the part of a satellite with a "
+        "shape "
         "that covers each pixel."),
     BST_REAL(bst_recorder_config, mask_threshold_sigma, "sigma", 1e-3, 1e6, "1",
              "planes segmentation: least light of a source in a pixel of its own, in the noise of "

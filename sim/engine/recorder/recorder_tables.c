@@ -102,7 +102,7 @@ static const bst_io_column truth_columns[] = {
         "star: Tycho-2 identity, from 2147483648 on statistical; object: index in the scenario"),
     INT("norad", "", "object: catalogue number, else 0"),
     INT("in_field", "", "1: the chief ray's mean place is on the window"),
-    INT("occulted", "", "1: behind the Earth"),
+    INT("occulted", "", "1: behind the Earth, a star also behind a satellite with a shape"),
     INT("saturated", "", "1: it fills pixels"),
     REAL("x_start_px", "px", "column of the chief ray at the start of the exposure"),
     REAL("y_start_px", "px", "row at the start"),

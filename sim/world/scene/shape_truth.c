@@ -155,7 +155,7 @@ bst_status bst_shape_truth_fill(bst_ctx *ctx, bst_shape_truth *work, const bst_c
         bst_satellite_pose *pose = work->poses[slot];
         BST_TRY(reserve(ctx, work, pose->satellite->vertex_count));
         bst_source_body_at(source, 0.5, &placed.state, &placed.earthlight);
-        bst_satellite_pose_set(pose, &placed.state.aim);
+        bst_source_body_set_pose(source, &placed.state, pose);
         bst_truth_shape *shape = &truth->shapes[truth->shape_count++];
         project(work, &placed, pose, shape);
         shape->item = i;
