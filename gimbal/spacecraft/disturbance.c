@@ -21,6 +21,15 @@ const bst_config_desc bst_disturbance_config_table[] = {
     BST_REAL(C, unload_dipole_am2, "A m^2", 0, 1e4, "0",
              "Greatest dipole about each axis of the magnetic torquers that take momentum off the "
              "wheels; 0: none."),
+    BST_PATH(
+        C, shape_file, "\"\"",
+        "Shape of the craft in body axes, a file as of an object's shape (JSON, OBJ, glTF, GLB): "
+        "sunlight and air act on its facets, with shadows between parts, in place of "
+        "srp_area_m2."),
+    BST_REALS(C, centre_of_mass_m, "m", -1e3, 1e3, "[0, 0, 0]",
+              "shape_file: place of the centre of mass in the frame of its parts."),
+    BST_BOOL(C, drag, "true", "shape_file: torque of the air, in the mean atmosphere of drag."),
+    BST_REAL(C, cd, "", 0, 10, "2.2", "shape_file: drag coefficient."),
     BST_CONFIG_END};
 #undef C
 

@@ -13,6 +13,9 @@ typedef struct bst_disturbance_config {
     double residual_dipole_am2[3];
     double constant_torque_nm[3];
     double unload_dipole_am2;
+    char shape_file[512]; /* see surface_torque.h */
+    double centre_of_mass_m[3], cd;
+    bool drag;
 } bst_disturbance_config;
 
 extern const bst_config_desc bst_disturbance_config_table[];
@@ -42,7 +45,7 @@ bst_vec3 bst_spacecraft_unload_dipole(bst_vec3 momentum_nms, bst_vec3 field_t, d
 
 #define BST_UNLOAD_S 600.0
 
-/* Sum of all configured disturbance torques, wheel unloading included. */
+/* Sum of all configured disturbance torques, wheel unloading included, without that on a shape. */
 bst_vec3 bst_disturbance_torque(const bst_disturbance_config *config, const bst_mat3 *inertia_kgm2,
                                 bst_quat q_body_from_gcrf, bst_vec3 position_m, bst_vec3 sun_m,
                                 double sunlit, bst_vec3 wheel_momentum_nms);
