@@ -91,3 +91,20 @@ bst_vec3 bst_disturbance_torque(const bst_disturbance_config *config, const bst_
     }
     return sum;
 }
+
+bst_status bst_disturbance_surface_create(bst_ctx *ctx, const bst_disturbance_config *c,
+                                          bst_surface_torque **out) {
+    *out = NULL;
+    if (!*c->shape_file) {
+        return BST_OK;
+    }
+    if (c->srp_area_m2 > 0.0) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "disturbances/srp_area_m2: %g beside shape_file (allowed: 0, because "
+                        "sunlight acts on the facets of the shape)",
+                        c->srp_area_m2);
+    }
+    bst_status status = bst_surface_torque_create(
+        ctx, c->shape_file, bst_vec3_from_array(c->centre_of_mass_m), c->drag ? c->cd : 0.0, out);
+    return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "disturbances/shape_file");
+}

@@ -8,7 +8,6 @@
 #include "gimbal/jitter/jitter.h"
 #include "gimbal/mount/axis.h"
 #include "gimbal/spacecraft/attitude_warm_up.h"
-#include "gimbal/spacecraft/surface_torque.h"
 #include "sim/core/invariant.h"
 
 /* A delayed star-tracker measurement. */
@@ -234,7 +233,7 @@ static bst_status prepare(bst_ctx *ctx, bst_spacecraft *craft, const bst_spacecr
     double plant_hz = 1.0 / setup->dt_s;
     craft->dt_s = setup->dt_s;
     craft->disturbances = config->disturbances;
-    BST_TRY(bst_surface_torque_create(ctx, &config->disturbances, &craft->surface));
+    BST_TRY(bst_disturbance_surface_create(ctx, &config->disturbances, &craft->surface));
     BST_TRY(set_law(ctx, craft, &config->attitude, setup->q_nominal));
     int wheels;
     const bst_wheel_config *wheel = bst_spacecraft_wheels(config, &wheels);
@@ -510,9 +509,11 @@ static bst_status control(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double
                                                    body->q_body_from_gcrf, craft->sky.position_m,
                                                    craft->sky.sun_m, craft->sky.sunlit, momentum);
     if (craft->surface) {
-        craft->disturbance_nm = bst_vec3_add(
-            craft->disturbance_nm,
-            bst_surface_torque_at(craft->surface, body->q_body_from_gcrf, &craft->sky, seconds));
+        const bst_surface_state state = {body->q_body_from_gcrf,  craft->sky.position_m,
+                                         craft->sky.velocity_mps, craft->sky.sun_m,
+                                         craft->sky.sunlit,       seconds};
+        craft->disturbance_nm =
+            bst_vec3_add(craft->disturbance_nm, bst_surface_torque_at(craft->surface, &state));
     }
     craft->now.unresolved_rad2 = unresolved(craft);
     if (craft->law.law == BST_LAW_FREE) {

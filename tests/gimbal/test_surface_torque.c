@@ -1,6 +1,5 @@
 /* Torque on a spacecraft with a shape: a plate beside the centre of mass, against closed forms. */
 #include "gimbal/spacecraft/spacecraft.h"
-#include "gimbal/spacecraft/surface_torque.h"
 #include "sim/astro/atmosphere.h"
 #include "sim/astro/forces.h"
 #include "tests/io/scratch.h"
@@ -55,20 +54,21 @@ static void test_plate(void **state) {
     bst_ctx ctx = {0};
     bst_disturbance_config c = read_config(with_plate("{" PLATE ", \"cd\": 2}"));
     bst_surface_torque *t;
-    bst_assert_ok(&ctx, bst_surface_torque_create(&ctx, &c, &t));
+    bst_assert_ok(&ctx, bst_disturbance_surface_create(&ctx, &c, &t));
     assert_non_null(t);
     bst_quat q = bst_quat_unit((bst_quat){0.3, -0.2, 0.5, 0.8}), back = bst_quat_conj(q);
     const bst_vec3 z = {0, 0, 1}, x = {1, 0, 0};
     /* far from the air: sunlight on the face, at 2 au, half of the disc */
-    bst_spacecraft_sky sky = {.position_m = {42e6, 0, 0},
-                              .sun_m = bst_vec3_scale(bst_quat_rotate(back, z), 2.0 * BST_AU_M),
-                              .sunlit = 0.5};
+    bst_surface_state sky = {.q_body_from_gcrf = q,
+                             .position_m = {42e6, 0, 0},
+                             .sun_m = bst_vec3_scale(bst_quat_rotate(back, z), 2.0 * BST_AU_M),
+                             .sunlit = 0.5};
     double force = BST_SUNLIGHT_PRESSURE_PA * 6.0 * 0.5 / 4.0;
-    bst_vec3 got = bst_surface_torque_at(t, q, &sky, 0.0);
+    bst_vec3 got = bst_surface_torque_at(t, &sky);
     bst_assert_close(got.y, force * 1.0, 1e-12 * force); /* x times -z is y */
     bst_assert_close(hypot(got.x, got.z), 0.0, 1e-12 * force);
     sky.sunlit = 0.0;
-    bst_assert_close(bst_vec3_norm(bst_surface_torque_at(t, q, &sky, 0.0)), 0.0, 1e-20);
+    bst_assert_close(bst_vec3_norm(bst_surface_torque_at(t, &sky)), 0.0, 1e-20);
     /* air alone, against the back at 60 degrees from its normal */
     sky.position_m = bst_vec3_scale((bst_vec3){1, 0, 0}, 6778137.0);
     bst_vec3 ahead = bst_vec3_axpy(bst_vec3_scale(z, -0.5), sqrt(0.75), x);
@@ -78,7 +78,7 @@ static void test_plate(void **state) {
     double density = bst_atmosphere_density_kgpm3(bst_astro_height_m(sky.position_m));
     double drag = 0.5 * density * 7500.0 * 7500.0 * 2.0 * 6.0 * 0.5;
     assert_true(density > 1e-13);
-    got = bst_surface_torque_at(t, q, &sky, 0.0);
+    got = bst_surface_torque_at(t, &sky);
     /* force -drag ahead at (1, 0, 0): y component -(x Fz) = drag ahead.z */
     bst_assert_close(got.y, drag * ahead.z, 1e-9 * drag);
     bst_assert_close(hypot(got.x, got.z), 0.0, 1e-9 * drag);
@@ -86,16 +86,16 @@ static void test_plate(void **state) {
     bst_config_free(bst_disturbance_config_table, &c);
     /* without air, and without a shape */
     c = read_config(with_plate("{" PLATE ", \"drag\": false}"));
-    bst_assert_ok(&ctx, bst_surface_torque_create(&ctx, &c, &t));
-    bst_assert_close(bst_vec3_norm(bst_surface_torque_at(t, q, &sky, 0.0)), 0.0, 0.0);
+    bst_assert_ok(&ctx, bst_disturbance_surface_create(&ctx, &c, &t));
+    bst_assert_close(bst_vec3_norm(bst_surface_torque_at(t, &sky)), 0.0, 0.0);
     bst_surface_torque_free(t);
     bst_config_free(bst_disturbance_config_table, &c);
     c = read_config("{}");
-    bst_assert_ok(&ctx, bst_surface_torque_create(&ctx, &c, &t));
+    bst_assert_ok(&ctx, bst_disturbance_surface_create(&ctx, &c, &t));
     assert_null(t);
     bst_config_free(bst_disturbance_config_table, &c);
     c = read_config(with_plate("{" PLATE ", \"srp_area_m2\": 2}"));
-    assert_int_equal(bst_surface_torque_create(&ctx, &c, &t), BST_ERR_CONFIG);
+    assert_int_equal(bst_disturbance_surface_create(&ctx, &c, &t), BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "srp_area_m2"));
     bst_config_free(bst_disturbance_config_table, &c);
 }
