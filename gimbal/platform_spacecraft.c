@@ -18,6 +18,7 @@ static bst_status sky_at(void *user, bst_ctx *ctx, double seconds, bst_spacecraf
     BST_TRY(bst_world_view_observer_state(ctx, sky->view, sky->observer, seconds, &state));
     BST_TRY(bst_world_view_bodies(ctx, sky->view, seconds, &bodies));
     out->position_m = state.position_m;
+    out->velocity_mps = state.velocity_mps;
     out->sun_m = bst_vec3_sub(bodies.sun_m, state.position_m);
     out->sunlit =
         bst_astro_sun_fraction(state.position_m, bst_bodies_sunlight_from(&bodies), bodies.pole);

@@ -110,14 +110,15 @@ double bst_generator_inside(const bst_generator *g, double x, double y, double s
 /* SNR of a true source relative to one with the PSF alone on the mean background. Jitter and path
  * bend widen the image, and the local background may differ. */
 static double snr_factor(const bst_generator *g, const bst_generator_frame *f,
-                         const bst_truth_item *item, double length) {
+                         const bst_truth_item *item, const generator_source *s) {
     double v = (double)g->binning * g->binning * (f->truth->background_e + f->truth->dark_e) +
                g->camera->read_noise_e * g->camera->read_noise_e;
     const bst_crlb_table *bound = g->image_bound ? g->image_bound : &g->bound;
-    double plain = item->electrons * bst_crlb_table_norm(bound, length) / sqrt(fmax(v, 1e-6));
+    double plain = item->electrons * bst_crlb_table_norm(bound, s->length) / sqrt(fmax(v, 1e-6));
     bool known = item->snr > 0.0 && plain > 0.0;
     /* limits: noise variance of 25 times and of a quarter of that of the frame */
-    return known ? fmin(fmax(item->snr / plain, 0.2), 2.0) : 1.0;
+    double factor = known ? fmin(fmax(item->snr / s->snr_ratio / plain, 0.2), 2.0) : 1.0;
+    return factor * s->snr_ratio;
 }
 
 /* Limits a range of steps along an axis to those between low and high; at: coordinate of step 0. */
@@ -198,7 +199,7 @@ static bool position_source(const bst_generator *g, const bst_generator_frame *f
     }
     s->length = hypot(s->path.dx, s->path.dy);
     s->flux_e = item->electrons;
-    s->sharp = snr_factor(g, f, item, s->length);
+    s->sharp = snr_factor(g, f, item, s);
     s->visible = s->ends = 1.0;
     s->seen_x = s->x;
     s->seen_y = s->y;
@@ -220,7 +221,7 @@ static void set_amplitude(const bst_generator *g, generator_source *s) {
             g->filters[0].efficiency * s->flux_e * bst_crlb_table_norm(&g->bound, 0.0) / g->noise_e;
         return;
     }
-    double efficiency = bst_generator_set_filter(g, s);
+    double efficiency = bst_generator_set_filter(g, s) * (s->filter_ratio / s->snr_ratio);
     if (g->image_bound) {
         ideal *= bst_crlb_table_norm(g->image_bound, s->length) /
                  bst_crlb_table_norm(&g->bound, s->length);
@@ -444,6 +445,7 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
     for (int i = 0; i < t->count; i++) {
         generator_source *s = &g->sources[g->source_count];
         *s = (generator_source){.item = i, .star = t->items[i].kind == BST_SOURCE_STAR, .head = -1};
+        bst_generator_set_image(g, t, s);
         if (!position_source(g, f, &t->items[i], s)) {
             continue;
         }

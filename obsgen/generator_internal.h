@@ -17,12 +17,14 @@ typedef struct generator_source {
     double visible;        /* share of its squared image on the frame */
     double ends;           /* share of both streak ends on the frame */
     double seen_x, seen_y; /* centre of the visible part */
-    double sharp;          /* factor on its amplitude; 1 for the PSF alone */
-    double unraised;       /* SNR in the filter output at its place, without noise */
-    double amplitude;      /* mean peak of the filter output, SNR */
-    double peak;           /* amplitude including the light of neighbours */
-    double noise, spread;  /* noise draw of the peak; its standard deviation */
-    double level;          /* amplitude including noise */
+    /* image of a shape (bst_truth_shape), read-out px^2; ratios 1 and moments 0: a point */
+    double snr_ratio, filter_ratio, shape_xx, shape_xy, shape_yy;
+    double sharp;         /* factor on its amplitude; 1 for the PSF alone */
+    double unraised;      /* SNR in the filter output at its place, without noise */
+    double amplitude;     /* mean peak of the filter output, SNR */
+    double peak;          /* amplitude including the light of neighbours */
+    double noise, spread; /* noise draw of the peak; its standard deviation */
+    double level;         /* amplitude including noise */
     /* output of the frame's other filter relative to this one's amplitude; 0: one filter only */
     double other;
     double start_x, start_y; /* where a point fit to it begins, relative to the mean of its path */
@@ -134,6 +136,15 @@ struct bst_generator {
 
 /* Share of a Gaussian's light at (x, y) that is on the frame. */
 double bst_generator_inside(const bst_generator *g, double x, double y, double sigma);
+/* Sets the image of a source that has a shape in the truth. */
+void bst_generator_set_image(const bst_generator *g, const bst_truth *truth, generator_source *s);
+/* Factor on the standard deviation of a source's position by the width of its image, along a unit
+ * direction (c, n): that of a Gaussian with its second moments, at its lower SNR. */
+double bst_generator_image_factor(const bst_generator *g, const generator_source *s, double c,
+                                  double n);
+/* Sets length, width and angle of the light of a source with a shape and a path of this length. */
+void bst_generator_set_image_extent(const bst_generator *g, const generator_source *s,
+                                    double length, bst_detection *d);
 /* Sets the response of the frame's filters; the path must be set. */
 void bst_generator_set_response(bst_generator *g, const bst_generator_frame *f);
 /* Sets the path and bend of the fitted streaks: those of telemetry, corrected by what image

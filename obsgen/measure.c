@@ -117,6 +117,17 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     double sharp = s->sharp * bst_crlb_table_norm(bound, s->length) / truth->norm;
     double worse = (s->saturated ? 4.0 : 1.0) / fmin(sharp, 1.0);
     double open = b->drawn ? 0.0 : worse;
+    /* `sharp` has the lower SNR of a shape already */
+    double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
+    double n = s->length > 0.0 ? s->path.dy / s->length : 0.0;
+    if (s->shape_xx + s->shape_yy > 0.0 && !(s->length > 1.0)) { /* the axes of its image */
+        double angle = 0.5 * atan2(2.0 * s->shape_xy, s->shape_xx - s->shape_yy);
+        c = cos(angle);
+        n = sin(angle);
+    }
+    const double shape[2] = {bst_generator_image_factor(g, s, c, n),
+                             bst_generator_image_factor(g, s, -n, c)};
+    open *= s->snr_ratio;
     /* a point model fitted to a short streak */
     double streak = length > 0.0 ? 0.0 : s->length * s->length / 12.0;
     const double model = g->response.filter.across_px * g->response.filter.along_px;
@@ -126,11 +137,9 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     /* the position along a streak comes from its ends and flanks, whatever its bend */
     bool at_rest = length <= 1.0;
     error[0] *= along * open * (at_rest ? mismatch_factor(images, models) : 1.0) * b->flat *
-                sqrt(truth->var_along_px2 * widen_along);
-    error[1] *= across * open * (at_rest ? mismatch_factor(turned, models) : 1.0) *
+                shape[0] * sqrt(truth->var_along_px2 * widen_along);
+    error[1] *= across * open * (at_rest ? mismatch_factor(turned, models) : 1.0) * shape[1] *
                 sqrt(truth->var_across_px2 * widen_across);
-    double c = s->length > 0.0 ? s->path.dx / s->length : 1.0;
-    double n = s->length > 0.0 ? s->path.dy / s->length : 0.0;
     double x = b->x + c * error[0] - n * error[1], y = b->y + n * error[0] + c * error[1];
     double bias = cal->phase_bias_px / g->binning, shared[2];
     bool drawn = s->as_streak && !b->point;
@@ -139,8 +148,9 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     shared_bias(g, s, drawn, light, shared);
     x += shared[0] + bias * sin(2.0 * BST_PI * b->x);
     y += shared[1] + bias * sin(2.0 * BST_PI * b->y);
-    double scale = g->binning, a2 = crlb->var_along_px2 * widen_along * scale * scale,
-           b2 = crlb->var_across_px2 * widen_across * scale * scale;
+    double scale = g->binning;
+    double a2 = crlb->var_along_px2 * widen_along * scale * scale * shape[0] * shape[0];
+    double b2 = crlb->var_across_px2 * widen_across * scale * scale * shape[1] * shape[1];
     d->x_px = g->origin_x + scale * x;
     d->y_px = g->origin_y + scale * y;
     d->cov_xx = c * c * a2 + n * n * b2;
@@ -164,6 +174,9 @@ static void set_extent(const bst_generator *g, const generator_source *s, bool a
     d->length_px = b * BST_FWHM_PER_SIGMA * sqrt(along2);
     d->width_px = b * BST_FWHM_PER_SIGMA * sqrt(across2);
     d->angle_rad = length > 0.01 ? atan2(s->path.dy, s->path.dx) : 0.0;
+    if (d->snr >= MOMENTS_SNR && s->shape_xx + s->shape_yy > 0.0) {
+        bst_generator_set_image_extent(g, s, length, d);
+    }
     if (d->angle_rad > 0.5 * BST_PI) {
         d->angle_rad -= BST_PI;
     } else if (d->angle_rad <= -0.5 * BST_PI) {
@@ -215,15 +228,16 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
                    sqrt(1.0 - together * together) * bst_generator_draw(g, s, GENERATOR_FLUX);
     flux -= g->background_bias_e / (fitted.norm * fitted.norm);
     /* least flux of a step of the fit, as in imgproc/measure/fit.c */
-    d.flux_e = fmax(flux + noise * sqrt(fitted.flux_variance * b->widen / seen), 0.1 * fabs(flux));
+    d.flux_e = fmax(flux + noise * sqrt(fitted.flux_variance * b->widen / seen) / s->snr_ratio,
+                    0.1 * fabs(flux));
     if (b->drawn) {
         d.flux_e = b->snr * g->noise_e / fitted.norm;
     }
     bst_crlb_table_at crlb = bound_of_model(g, d.flux_e, length);
-    d.flux_sigma_e = sqrt(crlb.flux_variance * b->widen / seen);
+    d.flux_sigma_e = sqrt(crlb.flux_variance * b->widen / seen) / s->snr_ratio;
     double norm = bst_crlb_table_norm(&g->bound, length) * g->norm_ratio[own && s->as_streak];
     d.snr = d.flux_e * (g->onboard_bound ? bst_crlb_table_norm(g->onboard_bound, length) : norm) /
-            g->noise_e;
+            g->noise_e * s->snr_ratio;
     measure_place(g, s, b, &truth, &crlb, b->flux_e * truth.norm / g->noise_e, length, &d);
     d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
     set_extent(g, s, s->as_streak && !b->point, &d);

@@ -342,6 +342,7 @@ static bst_status store_exposure(obsgen *o, struct bst_step *step, const bst_exp
                                        .window = e->window,
                                        .binning = e->binning,
                                        .peak_e = peak_e,
+                                       .peak_of_points = true,
                                        .user = &o->sigma_px};
     BST_TRY(bst_truth_list_fill(ctx, &o->list, &request, truth, capacity, NULL));
     if (truth->lost > 0) {

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "scenegen/part_mask.h"
 #include "sim/world/scene/skylight.h"
 
 enum {
@@ -34,7 +35,8 @@ struct bst_plane_maker {
     float *sensor; /* renderer output before binning; NULL: not needed so far */
     uint8_t *saturation;
     float *best; /* light of the source that owns a pixel */
-    int32_t *mask;
+    int32_t *mask, *parts;
+    bst_part_mask part_mask; /* work space */
     uint64_t *cells;
     int cells_x;
     shape *shapes;
@@ -74,6 +76,9 @@ bst_status bst_plane_maker_create(bst_ctx *ctx, uint32_t planes, int width, int 
     if (enough && wants(m, BST_PLANE_SATURATION)) {
         enough = (m->saturation = malloc(m->pixels)) != NULL;
     }
+    if (enough && wants(m, BST_PLANE_PARTS)) {
+        enough = (m->parts = malloc(m->pixels * sizeof *m->parts)) != NULL;
+    }
     if (!enough) {
         bst_plane_maker_free(m);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for noise-free planes of %d x %d pixels",
@@ -93,6 +98,8 @@ void bst_plane_maker_free(bst_plane_maker *m) {
         free(m->saturation);
         free(m->best);
         free(m->mask);
+        free(m->parts);
+        bst_part_mask_free(&m->part_mask);
         free(m->cells);
         free(m->shapes);
         free(m->sources);
@@ -365,7 +372,7 @@ bst_status bst_plane_maker_render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer
     }
     bst_render_request empty = *request;
     empty.count = 0;
-    if (m->planes & ~(UINT32_C(1) << BST_PLANE_SATURATION)) {
+    if (m->planes & ~(UINT32_C(1) << BST_PLANE_SATURATION | UINT32_C(1) << BST_PLANE_PARTS)) {
         BST_TRY(render(ctx, m, renderer, &empty, m->electrons[BST_PLANE_BACKGROUND]));
     }
     if (wants(m, BST_PLANE_STARS)) {
@@ -379,6 +386,9 @@ bst_status bst_plane_maker_render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer
     if (wants(m, BST_PLANE_SEGMENTATION)) {
         BST_TRY(make_mask(ctx, m, renderer, camera, request, shapes));
     }
+    if (m->parts) {
+        BST_TRY(bst_part_mask_draw(ctx, &m->part_mask, camera, request, m->parts));
+    }
     out->exposure_id = request->exposure_id;
     out->width = m->width;
     out->height = m->height;
@@ -387,5 +397,6 @@ bst_status bst_plane_maker_render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer
     }
     out->segmentation = wants(m, BST_PLANE_SEGMENTATION) ? m->mask : NULL;
     out->saturation = m->saturation;
+    out->parts = m->parts;
     return BST_OK;
 }

@@ -21,6 +21,15 @@ const bst_config_desc bst_disturbance_config_table[] = {
     BST_REAL(C, unload_dipole_am2, "A m^2", 0, 1e4, "0",
              "Greatest dipole about each axis of the magnetic torquers that take momentum off the "
              "wheels; 0: none."),
+    BST_PATH(
+        C, shape_file, "\"\"",
+        "Shape of the craft in body axes, a file as of an object's shape (JSON, OBJ, glTF, GLB): "
+        "sunlight and air act on its facets, with shadows between parts, in place of "
+        "srp_area_m2."),
+    BST_REALS(C, centre_of_mass_m, "m", -1e3, 1e3, "[0, 0, 0]",
+              "shape_file: place of the centre of mass in the frame of its parts."),
+    BST_BOOL(C, drag, "true", "shape_file: torque of the air, in the mean atmosphere of drag."),
+    BST_REAL(C, cd, "", 0, 10, "2.2", "shape_file: drag coefficient."),
     BST_CONFIG_END};
 #undef C
 
@@ -81,4 +90,21 @@ bst_vec3 bst_disturbance_torque(const bst_disturbance_config *config, const bst_
         sum = bst_vec3_add(sum, bst_vec3_cross(dipole, field));
     }
     return sum;
+}
+
+bst_status bst_disturbance_surface_create(bst_ctx *ctx, const bst_disturbance_config *c,
+                                          bst_surface_torque **out) {
+    *out = NULL;
+    if (!*c->shape_file) {
+        return BST_OK;
+    }
+    if (c->srp_area_m2 > 0.0) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "disturbances/srp_area_m2: %g beside shape_file (allowed: 0, because "
+                        "sunlight acts on the facets of the shape)",
+                        c->srp_area_m2);
+    }
+    bst_status status = bst_surface_torque_create(
+        ctx, c->shape_file, bst_vec3_from_array(c->centre_of_mass_m), c->drag ? c->cd : 0.0, out);
+    return status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "disturbances/shape_file");
 }

@@ -6,6 +6,7 @@
 
 #include "boresight/config.h"
 #include "boresight/vec.h"
+#include "sim/world/surface_torque.h"
 
 typedef struct bst_disturbance_config {
     bool gravity_gradient;
@@ -13,6 +14,9 @@ typedef struct bst_disturbance_config {
     double residual_dipole_am2[3];
     double constant_torque_nm[3];
     double unload_dipole_am2;
+    char shape_file[512]; /* sim/world/surface_torque.h */
+    double centre_of_mass_m[3], cd;
+    bool drag;
 } bst_disturbance_config;
 
 extern const bst_config_desc bst_disturbance_config_table[];
@@ -42,7 +46,15 @@ bst_vec3 bst_spacecraft_unload_dipole(bst_vec3 momentum_nms, bst_vec3 field_t, d
 
 #define BST_UNLOAD_S 600.0
 
-/* Sum of all configured disturbance torques, wheel unloading included. */
+/* Prepares the torque on the configured shape.
+ *
+ * Returned:  *out  NULL without a shape, and on error
+ * Errors:    BST_ERR_CONFIG for a shape beside srp_area_m2; those of bst_surface_torque_create
+ * Ownership: free *out with bst_surface_torque_free */
+bst_status bst_disturbance_surface_create(bst_ctx *ctx, const bst_disturbance_config *config,
+                                          bst_surface_torque **out) BST_MUST_CHECK;
+
+/* Sum of all configured disturbance torques, wheel unloading included, without that on a shape. */
 bst_vec3 bst_disturbance_torque(const bst_disturbance_config *config, const bst_mat3 *inertia_kgm2,
                                 bst_quat q_body_from_gcrf, bst_vec3 position_m, bst_vec3 sun_m,
                                 double sunlit, bst_vec3 wheel_momentum_nms);

@@ -24,7 +24,8 @@ struct bst_spacecraft {
     double wheel_phase_rad[BST_WHEELS_MOST], wheel_load_kgm2[BST_WHEELS_MOST];
     double motor_nm[BST_WHEELS_MOST];
     bst_disturbance_config disturbances;
-    bst_vec3 disturbance_nm; /* held */
+    bst_surface_torque *surface; /* NULL: no shape */
+    bst_vec3 disturbance_nm;     /* held */
     bst_spacecraft_gyro gyro;
     bst_quat q_at_gyro;          /* true, at the latest sample */
     bst_vec3 turn_since_control; /* sum of gyro samples since the last controller step */
@@ -71,6 +72,7 @@ void bst_spacecraft_command_roll(bst_spacecraft *craft, double roll_rad) {
 void bst_spacecraft_free(bst_spacecraft *craft) {
     if (craft) {
         free(craft->pending);
+        bst_surface_torque_free(craft->surface);
         free(craft);
     }
 }
@@ -231,6 +233,7 @@ static bst_status prepare(bst_ctx *ctx, bst_spacecraft *craft, const bst_spacecr
     double plant_hz = 1.0 / setup->dt_s;
     craft->dt_s = setup->dt_s;
     craft->disturbances = config->disturbances;
+    BST_TRY(bst_disturbance_surface_create(ctx, &config->disturbances, &craft->surface));
     BST_TRY(set_law(ctx, craft, &config->attitude, setup->q_nominal));
     int wheels;
     const bst_wheel_config *wheel = bst_spacecraft_wheels(config, &wheels);
@@ -505,6 +508,13 @@ static bst_status control(bst_ctx *ctx, bst_spacecraft *craft, int64_t n, double
     craft->disturbance_nm = bst_disturbance_torque(&craft->disturbances, &craft->body.inertia,
                                                    body->q_body_from_gcrf, craft->sky.position_m,
                                                    craft->sky.sun_m, craft->sky.sunlit, momentum);
+    if (craft->surface) {
+        const bst_surface_state state = {body->q_body_from_gcrf,  craft->sky.position_m,
+                                         craft->sky.velocity_mps, craft->sky.sun_m,
+                                         craft->sky.sunlit,       seconds};
+        craft->disturbance_nm =
+            bst_vec3_add(craft->disturbance_nm, bst_surface_torque_at(craft->surface, &state));
+    }
     craft->now.unresolved_rad2 = unresolved(craft);
     if (craft->law.law == BST_LAW_FREE) {
         return BST_OK;

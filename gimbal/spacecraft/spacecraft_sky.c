@@ -35,6 +35,7 @@ bst_status bst_spacecraft_sky_grid_at(bst_spacecraft_sky_grid *grid, bst_ctx *ct
     *sky = (bst_spacecraft_sky){.sunlit = 0.0};
     for (int k = 0; k < 4; k++) {
         sky->position_m = bst_vec3_axpy(sky->position_m, w[k], grid->node[k].position_m);
+        sky->velocity_mps = bst_vec3_axpy(sky->velocity_mps, w[k], grid->node[k].velocity_mps);
         sky->sun_m = bst_vec3_axpy(sky->sun_m, w[k], grid->node[k].sun_m);
         sky->sunlit += w[k] * grid->node[k].sunlit;
     }

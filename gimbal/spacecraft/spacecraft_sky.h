@@ -13,9 +13,9 @@
 #define BST_SKY_NODES_PER_S 4
 
 typedef struct bst_spacecraft_sky {
-    bst_vec3 position_m; /* true, geocentric, GCRF */
-    bst_vec3 sun_m;      /* true, from the spacecraft */
-    double sunlit;       /* visible fraction of the Sun's disc */
+    bst_vec3 position_m, velocity_mps; /* true, geocentric, GCRF */
+    bst_vec3 sun_m;                    /* true, from the spacecraft */
+    double sunlit;                     /* visible fraction of the Sun's disc */
     bst_spacecraft_law_inputs known;
 } bst_spacecraft_sky;
 
@@ -33,7 +33,8 @@ typedef struct bst_spacecraft_sky_grid {
     bst_quat attitude[4]; /* wanted by the law */
 } bst_spacecraft_sky_grid;
 
-/* Interpolated environment (only position_m, sun_m and sunlit) and the wanted motion. For seconds
+/* Interpolated environment (only position_m, velocity_mps, sun_m and sunlit) and the wanted motion.
+ * For seconds
  * >= 0 no node is before time 0, and nodes are at most two grid steps later than `seconds`. Errors:
  * those of sky_at. */
 bst_status bst_spacecraft_sky_grid_at(bst_spacecraft_sky_grid *grid, bst_ctx *ctx, double seconds,

@@ -108,7 +108,7 @@ static void pose_at(const bst_smear *s, const bst_scene_source *source, double u
     view->origin_m = bst_vec3_scale(bst_quat_rotate(focal, state.apparent), state.range_m);
     view->scale_rad = bst_camera_scale_rad(&s->camera);
     if (pose) {
-        bst_satellite_pose_set(pose, &state.aim);
+        bst_source_body_set_pose(source, &state, pose);
     }
     if (light) {
         *light = (bst_resolved_light){.sun = state.aim.sun,

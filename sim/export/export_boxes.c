@@ -14,12 +14,12 @@
 #include "sim/core/json_number.h"
 #include "sim/core/text.h"
 #include "sim/export/export.h"
+#include "sim/export/mask_labels.h"
 #include "sim/export/shape_labels.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/fits_reader.h"
 #include "sim/io/frame_picture.h"
 #include "sim/io/grey_png.h"
-#include "sim/io/mask_outline.h"
 
 typedef enum class_kind { SATELLITE, STAR, CLASSES } class_kind;
 
@@ -27,15 +27,6 @@ static const char *const class_names[CLASSES] = {"satellite", "star"};
 
 /* minimum width and height of a box after clipping to the image */
 #define LEAST_PX 1.0
-/* sources in a frame; the truth has room for fewer */
-enum { MOST_ITEMS = 1 << 24 };
-
-/* Bounding box of a source's pixels in the mask; x1 and y1 exclusive; pixels 0: none. */
-typedef struct extent {
-    int x0, y0, x1, y1;
-    int64_t pixels;
-} extent;
-
 typedef struct job {
     const bst_export *e;
     const bst_run_sensor *sensor;
@@ -44,11 +35,8 @@ typedef struct job {
     bool truth_more;
     bst_shape_labels shapes;
     char set[256];
-    bst_fits_reader *masks;  /* NULL: the run has none */
-    bst_fits_read_mask mask; /* of the current frame; items NULL: none */
-    extent *extents;         /* of the sources in the mask, by item number */
-    int extent_count, extent_room;
-    cJSON *images, *annotations; /* COCO */
+    bst_mask_labels masks, parts; /* of sources, and of parts of satellites */
+    cJSON *images, *annotations;  /* COCO */
     int64_t written, boxes;
     int sensors, masked; /* number of exported sensors, and of those with masks */
 } job;
@@ -77,7 +65,7 @@ static const char frames_sql[] =
 static const char truth_sql[] =
     "SELECT t.exposure_id, t.kind, t.x_start_px, t.x_mid_px, t.x_end_px, t.y_start_px, t.y_mid_px,"
     " t.y_end_px, t.v_mag, t.electrons, t.snr, t.x_chief_px, t.y_chief_px, t.x_centroid_px,"
-    " t.y_centroid_px, o.name, t.norad, t.item FROM truth t"
+    " t.y_centroid_px, o.name, t.norad, t.item, t.id FROM truth t"
     " LEFT JOIN objects o ON t.kind = 'object' AND o.id = t.id"
     " WHERE t.sensor = ?1 ORDER BY t.exposure_id, t.rowid";
 
@@ -142,102 +130,35 @@ static bst_status find_shape(bst_ctx *ctx, job *j, const frame_row *f, box *b, b
 
 /* ------------------------------------------------------------------ masks */
 
-/* Opens the segmentation masks of the sensor if they were recorded. */
+/* Opens the recorded masks of the sensor. */
 static bst_status open_masks(bst_ctx *ctx, job *j) {
-    char name[320], path[4096];
-    /* frames.fits -> segmentation.fits, frames_OBSERVER_SENSOR.fits -> ... */
-    if (!j->e->coco || strncmp(j->sensor->file, "frames", 6) != 0) {
+    if (!j->e->coco) {
         return BST_OK;
     }
-    snprintf(name, sizeof name, "segmentation%s", j->sensor->file + 6);
-    BST_TRY(bst_run_reader_file(ctx, j->e->run, name, path, sizeof path));
-    bst_ctx quiet = {0};
-    bst_status status = bst_fits_reader_open_masks(&quiet, path, &j->masks);
-    j->masked += status == BST_OK;
-    return status == BST_OK || status == BST_ERR_NOT_FOUND
-               ? BST_OK
-               : bst_fail(ctx, status, "%s", quiet.message);
+    BST_TRY(bst_mask_labels_open(ctx, j->e->run, j->sensor->file, "segmentation", &j->masks));
+    j->masked += j->masks.fits != NULL;
+    return bst_mask_labels_open(ctx, j->e->run, j->sensor->file, "parts", &j->parts);
 }
 
-/* Computes the bounding box and pixel count of each source in the segmentation mask. */
-static bst_status take_extents(bst_ctx *ctx, job *j) {
-    const bst_fits_read_mask *m = &j->mask;
-    int32_t most = 0;
-    size_t pixels = (size_t)m->width * (size_t)m->height;
-    for (size_t i = 0; i < pixels; i++) {
-        most = m->items[i] > most ? m->items[i] : most;
-    }
-    if (most >= MOST_ITEMS) {
-        return bst_fail(ctx, BST_ERR_FORMAT, "the mask of exposure %lld holds source %d",
-                        (long long)m->exposure_id, most);
-    }
-    if (most + 1 > j->extent_room) {
-        extent *grown = realloc(j->extents, 2 * ((size_t)most + 1) * sizeof *grown);
-        if (!grown) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sources", most);
-        }
-        j->extents = grown;
-        j->extent_room = 2 * (most + 1);
-    }
-    j->extent_count = most + 1;
-    memset(j->extents, 0, (size_t)j->extent_count * sizeof *j->extents);
-    for (size_t i = 0; i < pixels; i++) {
-        if (m->items[i] > 0) {
-            extent *e = &j->extents[m->items[i]];
-            int x = (int)(i % (size_t)m->width), y = (int)(i / (size_t)m->width);
-            bool first = e->pixels++ == 0;
-            e->x0 = first || x < e->x0 ? x : e->x0;
-            e->x1 = first || x >= e->x1 ? x + 1 : e->x1;
-            e->y0 = first ? y : e->y0;
-            e->y1 = y + 1;
-        }
-    }
-    return BST_OK;
-}
-
-/* Reads the mask of a frame and the extents of its sources. */
-static bst_status read_mask(bst_ctx *ctx, job *j, const frame_row *f, int64_t index) {
-    j->mask.items = NULL;
-    if (!j->masks) {
-        return BST_OK;
-    }
-    BST_TRY(bst_fits_reader_mask(ctx, j->masks, index, &j->mask));
-    if (j->mask.exposure_id != f->id || j->mask.width != f->width || j->mask.height != f->height) {
-        return bst_fail(ctx, BST_ERR_FORMAT,
-                        "%s: the masks are not those of the frames (mask %lld is of exposure %lld)",
-                        bst_run_reader_folder(j->e->run), (long long)index,
-                        (long long)j->mask.exposure_id);
-    }
-    return take_extents(ctx, j);
+/* Reads the masks of a frame. */
+static bst_status read_masks(bst_ctx *ctx, job *j, const frame_row *f, int64_t index) {
+    const bst_mask_frame frame = {index, f->id, f->width, f->height};
+    bst_status status = bst_mask_labels_read(ctx, &j->masks, &frame);
+    status = status == BST_OK ? bst_mask_labels_read(ctx, &j->parts, &frame) : status;
+    return status == BST_OK ? BST_OK
+                            : bst_fail_prefix(ctx, status, "%s", bst_run_reader_folder(j->e->run));
 }
 
 /* Adds "segmentation" and "area" of the current truth row from its mask pixels; without mask: no
  * polygons and the area of the box. */
 static bst_status add_segmentation(bst_ctx *ctx, const job *j, const box *b, cJSON *node) {
     int64_t item = bst_io_rows_int(j->truth, 17);
-    bool shown = j->mask.items && item > 0 && item < j->extent_count && j->extents[item].pixels > 0;
-    char *text = NULL;
-    size_t bytes;
-    if (!shown) {
-        bst_json_add_number(node, "area", b->width * b->height);
-        cJSON_AddItemToObject(node, "segmentation", cJSON_CreateArray());
-        return BST_OK;
+    if (bst_mask_labels_pixels(&j->masks, item) > 0) {
+        return bst_mask_labels_add(ctx, &j->masks, item, node);
     }
-    const extent *e = &j->extents[item];
-    const bst_mask_item outlined = {j->mask.items, j->mask.width, (int32_t)item, e->x0,
-                                    e->y0,         e->x1,         e->y1};
-    bst_json_add_number(node, "area", (double)e->pixels);
-    FILE *stream = open_memstream(&text, &bytes);
-    bst_status status = stream ? bst_mask_outline_write(ctx, &outlined, stream)
-                               : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for an outline");
-    if (stream && fclose(stream) != 0 && status == BST_OK) {
-        status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for an outline");
-    }
-    if (status == BST_OK) {
-        cJSON_AddItemToObject(node, "segmentation", cJSON_CreateRaw(text));
-    }
-    free(text);
-    return status;
+    bst_json_add_number(node, "area", b->width * b->height);
+    cJSON_AddItemToObject(node, "segmentation", cJSON_CreateArray());
+    return BST_OK;
 }
 
 /* ------------------------------------------------------------------ boxes */
@@ -261,6 +182,10 @@ static bst_status add_coco_box(bst_ctx *ctx, job *j, const frame_row *f, const b
     if (b->shaped) {
         const bst_shape_label_view view = view_of(f);
         bst_shape_label_add(&b->shape, &view, node);
+        status = status == BST_OK
+                     ? bst_mask_labels_add_parts(ctx, &j->parts, bst_io_rows_int(j->truth, 18),
+                                                 cJSON_GetObjectItem(node, "shape"))
+                     : status;
     }
     cJSON_AddItemToArray(j->annotations, node);
     return status;
@@ -345,7 +270,7 @@ static bst_status write_frame(bst_ctx *ctx, job *j, frame_row *f) {
     snprintf(f->name, sizeof f->name, "%s.%04" PRId64, j->set, f->id);
     if (j->e->coco) {
         BST_TRY(write_image(ctx, j, j->e->coco, f, &image));
-        BST_TRY(read_mask(ctx, j, f, f->fits_index - !cube));
+        BST_TRY(read_masks(ctx, j, f, f->fits_index - !cube));
     }
     if (!j->e->yolo) {
         BST_TRY(write_boxes(ctx, j, f, NULL));
@@ -405,7 +330,7 @@ static bst_status export_sensor(bst_ctx *ctx, job *j, bool several) {
     BST_TRY(bst_run_reader_file(ctx, j->e->run, j->sensor->file, path, sizeof path));
     BST_TRY(bst_io_rows_open(ctx, j->e->run, truth_sql, j->sensor->index, 0, &j->truth));
     bst_status status = bst_io_rows_next(ctx, j->truth, &j->truth_more);
-    j->fits = j->masks = NULL;
+    j->fits = NULL;
     j->sensors++;
     if (status == BST_OK) {
         status = bst_fits_reader_open(ctx, path, &j->fits);
@@ -415,7 +340,8 @@ static bst_status export_sensor(bst_ctx *ctx, job *j, bool several) {
     status = status == BST_OK ? open_masks(ctx, j) : status;
     status = status == BST_OK ? write_frames(ctx, j) : status;
     bst_fits_reader_close(j->fits);
-    bst_fits_reader_close(j->masks);
+    bst_mask_labels_close(&j->masks);
+    bst_mask_labels_close(&j->parts);
     bst_shape_labels_close(&j->shapes);
     bst_io_rows_close(j->truth);
     return status;
@@ -499,7 +425,6 @@ bst_status bst_export_boxes(bst_ctx *ctx, const bst_export *e) {
                             "train: images\nval: images\nnames:\n  0: satellite\n  1: star\n");
     }
     cJSON_Delete(root);
-    free(j.extents);
     const char *const folders[] = {e->coco, e->yolo};
     for (int k = 0; status == BST_OK && k < 2; k++) {
         if (folders[k]) {

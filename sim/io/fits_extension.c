@@ -85,12 +85,14 @@ bst_status bst_fits_write_plane(bst_ctx *ctx, bst_fits *fits, const bst_fits_fra
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: no plane of %d x %d pixels", fits->path, width,
                         height);
     }
-    static const int
-        images[] = {[BST_FITS_ELECTRONS] = FLOAT_IMG,
-                    [BST_FITS_ITEMS] = LONG_IMG,
-                    [BST_FITS_FLAGS] = BYTE_IMG},
-        types[] = {
-            [BST_FITS_ELECTRONS] = TFLOAT, [BST_FITS_ITEMS] = TINT, [BST_FITS_FLAGS] = TBYTE};
+    static const int images[] = {[BST_FITS_ELECTRONS] = FLOAT_IMG,
+                                 [BST_FITS_ITEMS] = LONG_IMG,
+                                 [BST_FITS_PARTS] = LONG_IMG,
+                                 [BST_FITS_FLAGS] = BYTE_IMG},
+                     types[] = {[BST_FITS_ELECTRONS] = TFLOAT,
+                                [BST_FITS_ITEMS] = TINT,
+                                [BST_FITS_PARTS] = TINT,
+                                [BST_FITS_FLAGS] = TBYTE};
     long size[2] = {width, height};
     char *hdu = NULL;
     long long bytes = 0;

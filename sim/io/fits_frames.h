@@ -16,12 +16,13 @@ typedef enum bst_fits_layout { BST_FITS_EXTENSIONS, BST_FITS_CUBE } bst_fits_lay
  * only. */
 typedef enum bst_fits_compression { BST_FITS_RAW, BST_FITS_RICE } bst_fits_compression;
 
-/* Content of the pixels: DN (uint16), expected electrons (float), item numbers of the truth
- * (int32), or saturation flags (uint8). */
+/* Content of the pixels: DN (uint16), expected electrons (float), item numbers of the truth or
+ * numbers of parts (int32), or saturation flags (uint8). */
 typedef enum bst_fits_content {
     BST_FITS_COUNTS,
     BST_FITS_ELECTRONS,
     BST_FITS_ITEMS,
+    BST_FITS_PARTS,
     BST_FITS_FLAGS
 } bst_fits_content;
 

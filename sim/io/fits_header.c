@@ -88,6 +88,8 @@ void bst_fits_put_content(fitsfile *file, bst_fits_content content, int *code) {
         fits_update_key_str(file, "BUNIT", "electron", "expected, before the detector", code);
     } else if (content == BST_FITS_ITEMS) {
         fits_update_key_str(file, "BUNIT", "", "0, or item of the table truth", code);
+    } else if (content == BST_FITS_PARTS) {
+        fits_update_key_str(file, "BUNIT", "", "0, or number of the table parts", code);
     } else {
         fits_update_key_str(file, "BUNIT", "", "1: full well, 2: converter at its top, 3: both",
                             code);

@@ -27,6 +27,7 @@ static const char *const run_names[] = {"run.sqlite",
                                         "background.fits",
                                         "segmentation.fits",
                                         "saturation.fits",
+                                        "parts.fits",
                                         "frames_*_*.fits",
                                         "frames_*_*.fits.rows",
                                         "stars_*_*.fits",
@@ -34,6 +35,7 @@ static const char *const run_names[] = {"run.sqlite",
                                         "background_*_*.fits",
                                         "segmentation_*_*.fits",
                                         "saturation_*_*.fits",
+                                        "parts_*_*.fits",
                                         NULL};
 
 static const char *const study_names[] = {

@@ -255,6 +255,21 @@ static const bst_wire_field detection_items[] = {
     REAL(bst_detection, rate_x_pxps, "px/s", "Against the stars; only of a stack."),
     REAL(bst_detection, rate_y_pxps, "px/s", "The same."),
     REAL(bst_detection, rate_sigma_pxps, "px/s", "1 sigma of each."),
+    REAL(bst_detection, extent.light_x_px, "px",
+         "Of an extended target: centroid of light; this and what follows is 0 without the flag."),
+    REAL(bst_detection, extent.light_y_px, "px", "The same."),
+    REAL(bst_detection, extent.x0_px, "px", "Box: lowest column."),
+    REAL(bst_detection, extent.y0_px, "px", "Lowest row."),
+    REAL(bst_detection, extent.x1_px, "px", "Highest column."),
+    REAL(bst_detection, extent.y1_px, "px", "Highest row."),
+    BOUNDED(bst_detection, extent.size_px, 0, 1e9, "px", "Largest extent of the outline."),
+    BOUNDED(bst_detection, extent.size_sigma_px, 0, 1e9, "px", "1 sigma of it."),
+    BOUNDED(bst_detection, extent.area_px2, 0, 1e12, "px2", "Of the silhouette, holes filled."),
+    BOUNDED(bst_detection, extent.phase_rad, 0, 3.1416, "rad",
+            "Sun - target - observer, by the onboard Sun."),
+    BOUNDED(bst_detection, extent.saturated_share, 0, 1, "", "Of the area, that is saturated."),
+    BOUNDED(bst_detection, extent.range_m, 0, 1e15, "m", "From the known size; 0: not known."),
+    BOUNDED(bst_detection, extent.range_sigma_m, 0, 1e15, "m", "1 sigma of it."),
     END};
 
 static const bst_wire_field predictions[] = {

@@ -54,6 +54,85 @@ double bst_shape_silhouette_m2(bst_satellite_pose *p, bst_vec3 direction) {
     return sum;
 }
 
+/* Adds the area of a polygon and its first moments. */
+static void add_polygon(const bst_point2 *p, int count, double sum[3]) {
+    for (int i = 1; i + 1 < count; i++) {
+        double ax = p[i].x - p[0].x, ay = p[i].y - p[0].y;
+        double bx = p[i + 1].x - p[0].x, by = p[i + 1].y - p[0].y;
+        double area = 0.5 * (ax * by - ay * bx);
+        sum[0] += area;
+        sum[1] += area * (p[0].x + p[i].x + p[i + 1].x) / 3.0;
+        sum[2] += area * (p[0].y + p[i].y + p[i + 1].y) / 3.0;
+    }
+}
+
+/* Centroid of the area that bst_pose_unshadowed left of a facet. */
+static bst_vec3 centroid_of(bst_satellite_pose *p, int facet, bool whole) {
+    const bst_facet *f = &p->satellite->facets[facet];
+    bst_vec3 origin, e1, e2;
+    double sum[3] = {0.0, 0.0, 0.0};
+    bst_pose_facet_axes(p, facet, &origin, &e1, &e2);
+    for (int i = 1; whole && i + 1 < f->count; i++) {
+        const bst_point2 zero = {0.0, 0.0};
+        bst_point2 corner[3] = {zero, zero, zero};
+        for (int k = 1; k < 3; k++) {
+            int vertex = p->satellite->corner[f->first + i + k - 1];
+            bst_vec3 r = bst_vec3_sub(p->vertices[vertex], origin);
+            corner[k] = (bst_point2){bst_vec3_dot(r, e1), bst_vec3_dot(r, e2)};
+        }
+        add_polygon(corner, 3, sum);
+    }
+    for (int i = 0; !whole && i < p->clip.piece_count; i++) {
+        const bst_polygon_piece *piece = &p->clip.pieces[i];
+        add_polygon(p->clip.points + piece->first, piece->count, sum);
+    }
+    if (!(sum[0] > 0.0)) {
+        return origin;
+    }
+    return bst_vec3_axpy(bst_vec3_axpy(origin, sum[1] / sum[0], e1), sum[2] / sum[0], e2);
+}
+
+static void add_load(bst_shape_load *sum, bst_vec3 force, bst_vec3 lever_m) {
+    sum->force = bst_vec3_add(sum->force, force);
+    sum->torque = bst_vec3_add(sum->torque, bst_vec3_cross(lever_m, force));
+}
+
+bst_shape_load bst_shape_light_load(bst_satellite_pose *p, bst_vec3 sun, bst_vec3 centre_m) {
+    const bst_satellite *s = p->satellite;
+    bst_shape_load sum = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    assert(s->has_surfaces);
+    bst_pose_look(p, 0, sun);
+    for (int i = 0; i < s->facet_count; i++) {
+        double cosine = bst_vec3_dot(p->normals[i], sun), diffuse, mirror;
+        bool whole;
+        double area = cosine > 1e-9 ? bst_pose_unshadowed(p, i, 1, &whole) * cosine : 0.0;
+        if (area > 0.0) {
+            reflectance(s, s->facets[i].material, cosine, &diffuse, &mirror);
+            bst_vec3 force = bst_vec3_scale(sun, -area * (1.0 - mirror));
+            force = bst_vec3_axpy(force, -2.0 * area * (mirror * cosine + diffuse / 3.0),
+                                  p->normals[i]);
+            add_load(&sum, force, bst_vec3_sub(centroid_of(p, i, whole), centre_m));
+        }
+    }
+    return sum;
+}
+
+bst_shape_load bst_shape_drag_load(bst_satellite_pose *p, bst_vec3 ahead, bst_vec3 centre_m) {
+    const bst_satellite *s = p->satellite;
+    bst_shape_load sum = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
+    bst_pose_look(p, 0, ahead);
+    for (int i = 0; i < s->facet_count; i++) {
+        double cosine = bst_vec3_dot(p->normals[i], ahead);
+        bool whole;
+        double area = cosine > 1e-9 ? bst_pose_unshadowed(p, i, 1, &whole) * cosine : 0.0;
+        if (area > 0.0) {
+            add_load(&sum, bst_vec3_scale(ahead, -area),
+                     bst_vec3_sub(centroid_of(p, i, whole), centre_m));
+        }
+    }
+    return sum;
+}
+
 /* Places the pose; q_body_from_gcrf. */
 static bst_quat place(const bst_shape_forces *f, const bst_force_state *at) {
     bst_attitude_state state = {at->position_m, at->velocity_mps, at->sun, at->seconds};

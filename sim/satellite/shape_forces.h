@@ -24,6 +24,25 @@ bst_vec3 bst_shape_light_area_m2(bst_satellite_pose *pose, bst_vec3 sun);
  * Given:     direction  unit, body frame: from which it is seen */
 double bst_shape_silhouette_m2(bst_satellite_pose *pose, bst_vec3 direction);
 
+/* Force over a pressure, m^2, and its torque about a point over it, m^3; body frame. */
+typedef struct bst_shape_load {
+    bst_vec3 force, torque;
+} bst_shape_load;
+
+/* Force and torque of sunlight on a pose: the force of bst_shape_light_area_m2, each facet's at the
+ * centroid of its lit area.
+ *
+ * Given:     sun       unit, body frame
+ *            centre_m  point of reference, such as the centre of mass */
+bst_shape_load bst_shape_light_load(bst_satellite_pose *pose, bst_vec3 sun, bst_vec3 centre_m);
+
+/* Drag and its torque on a pose, over the dynamic pressure times the drag coefficient: against the
+ * motion, over the area of each facet that meets the air, at its centroid.
+ *
+ * Given:     ahead     unit, body frame: direction of the motion through the air
+ *            centre_m  as in bst_shape_light_load */
+bst_shape_load bst_shape_drag_load(bst_satellite_pose *pose, bst_vec3 ahead, bst_vec3 centre_m);
+
 /* A shape with its attitude, for a force model; thread-safe. */
 typedef struct bst_shape_forces bst_shape_forces;
 

@@ -75,6 +75,26 @@ void bst_shape_silhouette_of_pose(bst_shape_silhouette *s, bst_satellite_pose *p
     }
 }
 
+bool bst_shape_silhouette_meets(const bst_satellite_pose *p, bst_vec3 eye_m, bst_vec3 direction) {
+    const bst_satellite *model = p->satellite;
+    for (int f = 0; f < model->facet_count; f++) {
+        const bst_facet *facet = &model->facets[f];
+        const int *corner = &model->corner[facet->first];
+        bst_vec3 a = bst_vec3_sub(p->vertices[corner[facet->count - 1]], eye_m);
+        bool inside = bst_vec3_dot(p->normals[f], a) < 0.0; /* it faces the eye */
+        for (int i = 0; i < facet->count && inside; i++) {
+            bst_vec3 b = bst_vec3_sub(p->vertices[corner[i]], eye_m);
+            /* corners are counter-clockwise as the eye sees them */
+            inside = bst_vec3_dot(direction, bst_vec3_cross(a, b)) <= 0.0;
+            a = b;
+        }
+        if (inside) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Area of the union of all pieces, outside of `front` if that is not NULL. */
 static double union_area(bst_polygon_clip *clip, const bst_shape_silhouette *s,
                          const bst_shape_silhouette *front, double scale, bst_point2 shift) {

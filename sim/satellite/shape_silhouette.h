@@ -34,6 +34,14 @@ void bst_shape_silhouette_of_sphere(bst_shape_silhouette *silhouette, double rad
 void bst_shape_silhouette_of_pose(bst_shape_silhouette *silhouette, bst_satellite_pose *pose,
                                   bst_vec3 x, bst_vec3 y);
 
+/* True if a ray meets a facet of a pose: the point is inside the silhouette in perspective.
+ *
+ * Given:     pose       all vertices placed (bst_satellite_pose_set)
+ *            eye_m      start of the ray, body frame
+ *            direction  body frame, any length
+ * Notes:     curved parts have the outline of their facets; a ray along an edge meets it */
+bool bst_shape_silhouette_meets(const bst_satellite_pose *pose, bst_vec3 eye_m, bst_vec3 direction);
+
 /* Part of the area of a silhouette that another one covers.
  *
  * Given:     clip   work memory

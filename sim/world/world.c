@@ -284,6 +284,14 @@ const bst_world_object_info *bst_world_object(const bst_world *world, int object
     assert(world && object >= 0 && object < bst_world_object_count(world));
     return &world->objects[object].info;
 }
+int bst_world_first_part(const bst_world *world, int object) {
+    int number = 1;
+    for (int i = 0; i < object; i++) {
+        const bst_object_shape *shape = bst_world_object(world, i)->shape;
+        number += shape ? shape->satellite->part_count : 0;
+    }
+    return number;
+}
 int bst_world_observer_count(const bst_world *world) {
     return world->observer_count;
 }

@@ -77,15 +77,105 @@ def figures(result):
             "first": result["first"], "lost": result["lost"], "tracks": result["targets"], "several": result["several"]}
 
 
+def turned(q, v):
+    """Vectors turned by a quaternion x, y, z, w."""
+    axis = np.array(q[:3])
+    return v + 2.0 * np.cross(axis, np.cross(axis, v) + q[3] * v)
+
+
+def first_part(parts, eye, ways):
+    """Number of the part, from 1, that each ray from `eye` meets first, 0: none; boxes and plates in the body frame."""
+    nearest, number = np.full(len(ways), np.inf), np.zeros(len(ways), int)
+    for k, part in enumerate(parts):
+        half = np.array(part["size_m"]) / 2
+        half[2] = 1e-6 if part["kind"] == "plate" else half[2]
+        centre = np.array(part["position_m"])
+        with np.errstate(divide="ignore"):
+            ends = np.stack([(centre + sign * half - eye) / ways for sign in (-1, 1)])
+        enter, leave = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
+        hit = (enter <= leave) & (enter > 0) & (enter < nearest)
+        nearest[hit], number[hit] = enter[hit], k + 1
+    return number
+
+
+def check_parts(out, coco):
+    """The plane of parts against rays through the pixels, and the parts of COCO against the plane."""
+    with open(SCENARIO, encoding="utf-8") as file:
+        parts = json.load(file)["world"]["objects"][0]["shape"]["parts"]
+    assert rows(out, "SELECT number, id, object, part FROM parts") == [
+        (k + 1, 0, "target", part["name"]) for k, part in enumerate(parts)]
+    found = rows(out, "SELECT s.x_px, s.y_px, s.range_m, s.q_body_from_gcrf_x, s.q_body_from_gcrf_y, s.q_body_from_gcrf_z,"
+                      " s.q_body_from_gcrf_w, e.q_cam_from_gcrf_mid_x, e.q_cam_from_gcrf_mid_y, e.q_cam_from_gcrf_mid_z,"
+                      " e.q_cam_from_gcrf_mid_w, f.fits_index FROM shapes s JOIN exposures e USING (sensor, exposure_id)"
+                      " JOIN frames f USING (sensor, exposure_id)")
+    row_, column = np.mgrid[0:512, 0:512]
+    scale = 120 * np.pi / 648000
+
+    def direction(x, y):
+        return np.stack([(x - 255.5) * scale, (y - 255.5) * scale, np.ones_like(x, float)], axis=-1)
+
+    with open(os.path.join(coco, "annotations.json"), encoding="utf-8") as file:
+        boxes = [a["shape"]["parts"] for a in json.load(file)["annotations"] if a["category_id"] == 1]
+    seen = set()
+    with fits.open(os.path.join(out, "parts.fits")) as masks:
+        for row, labelled in zip(found[::3], boxes[::3]):
+            mask, to_cam = masks[row[11]].data, np.array(row[7:11])
+            back = to_cam * [-1, -1, -1, 1]
+            place = direction(np.array([row[0]]), np.array([row[1]]))[0]
+            eye = turned(row[3:7], turned(back, -place / np.linalg.norm(place) * row[2]))
+            ways = turned(row[3:7], turned(back, direction(column.ravel(), row_.ravel())))
+            truth = first_part(parts, eye, ways).reshape(mask.shape)
+            # a border is right to 0.35 px: pixels whose neighbours all have one part are exact
+            inside = np.ones(mask.shape, bool)
+            for shift in ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
+                inside &= np.roll(truth, shift, (0, 1)) == truth
+            assert np.array_equal(mask[inside], truth[inside]) and np.count_nonzero(truth) > 500
+            assert np.count_nonzero(mask != truth) < 0.35 * np.count_nonzero(~inside)
+            seen |= set(np.unique(truth))
+            assert {p["number"] for p in labelled} == set(np.unique(mask)) - {0}
+            for part in labelled:
+                rows_, columns = np.nonzero(mask == part["number"])
+                assert part["name"] == parts[part["number"] - 1]["name"] and part["area"] == len(rows_)
+                assert part["bbox"] == [columns.min(), rows_.min(), np.ptp(columns) + 1, np.ptp(rows_) + 1]
+                assert part["segmentation"]
+    assert seen == {0, 1, 2, 3, 4, 5}
+
+
+def check_stars(out):
+    """No star shines through the target: noise-free light of the stars where its parts cover the pixel."""
+    hidden = rows(out, "SELECT count(*) FROM truth WHERE kind = 'star' AND occulted = 1")[0][0]
+    covered = []
+    with fits.open(os.path.join(out, "parts.fits")) as masks, fits.open(os.path.join(out, "stars.fits")) as stars:
+        for mask, light in zip(masks[1:], stars[1:]):
+            parts = {(f, x, y) for f, x, y in rows(out, "SELECT f.fits_index, t.x_mid_px, t.y_mid_px FROM truth t JOIN frames f"
+                                                        " USING (sensor, exposure_id) WHERE t.kind = 'star' AND t.occulted = 1")
+                     if masks[f].header["FRAMEID"] == mask.header["FRAMEID"]}
+            for _, x, y in parts:
+                column, row = round(x), round(y)
+                # a contact within 0.7 px of the pixel's centre may be on either side
+                near = mask.data[row - 1:row + 2, column - 1:column + 2]
+                assert near.any()
+                if near.all():
+                    covered.append(light.data[row, column])
+            for x, y in rows(out, "SELECT t.x_mid_px, t.y_mid_px FROM truth t WHERE t.kind = 'star' AND t.occulted = 0"
+                                  f" AND t.exposure_id = {mask.header['FRAMEID']} AND t.in_field = 1"):
+                column, row = round(x), round(y)
+                if 1 <= row < 511 and 1 <= column < 511:
+                    assert not mask.data[row - 1:row + 2, column - 1:column + 2].all()
+    assert hidden >= 5 and len(covered) >= 5 and max(covered) < 1e-9, (hidden, covered)
+
+
 def labels(program, folder):
-    """Truth and labels of the target at 60 m against its pixels: centroid of light, box, mask, COCO and SatNet."""
+    """Truth and labels of the target at 60 m against its pixels: centroid of light, box, masks, COCO and SatNet."""
     out = os.path.join(folder, "labels")
     run(program, out, 7, {**NEAR, "/duration_s": 24, "/observers/0/orbit/offset_rtn_m": [0, -60, 0],
                           "/observers/0/burns": [], "/observers/0/sensors/0/exposure/exposure_s": 3e-5,
                           "/observers/0/sensors/0/modules/control/exposure_schedule": [],
-                          "/record": {"frames": "extensions", "planes": ["segmentation"]}})
+                          "/record": {"frames": "extensions", "planes": ["stars", "segmentation", "parts"]}})
     coco, satnet = (os.path.join(folder, name) for name in ("coco", "satnet"))
     subprocess.run([program, "export", out, "--coco", coco, "--satnet", satnet], check=True, capture_output=True)
+    check_parts(out, coco)
+    check_stars(out)
     truth = rows(out, "SELECT s.exposure_id, s.item, s.x_px, s.y_px, s.x_light_px, s.y_light_px, s.x0_px, s.y0_px, s.x1_px,"
                       " s.y1_px, s.size_px, f.fits_index, t.x_chief_px, t.range_m FROM shapes s"
                       " JOIN frames f USING (sensor, exposure_id) JOIN truth t USING (sensor, exposure_id, item)")

@@ -175,6 +175,9 @@ void raw_detections(void *detections, int count) {
     d->count = count;
     for (int i = 0; i < count; i++) {
         d->items[i].x_px = 1.5 + i;
+        d->items[i].flags = BST_DETECTION_EXTENDED;
+        d->items[i].extent.size_px = 20.0;
+        d->items[i].extent.range_m = 345.5 + i;
     }
 }
 

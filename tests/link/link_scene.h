@@ -57,7 +57,7 @@ typedef struct raw_message {
     bst_link_header header;
     char text[BST_LINK_HEADER_BYTES];
     size_t text_bytes;
-    uint8_t payload[1024];
+    uint8_t payload[2048];
     size_t payload_bytes;
 } raw_message;
 void raw_make(const raw_peer *raw, raw_message *m, bst_link_type type, const void *payload);

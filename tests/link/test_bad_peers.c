@@ -192,6 +192,8 @@ static void what_is_wrong_is_counted_and_said_and_the_step_goes_on(void **state)
         bst_assert_ok(&s.ctx, scene_step(&s));
         assert_true(s.answered && s.given);
         bst_assert_close(s.detections.items[0].x_px, 1.5, 0.0);
+        bst_assert_close(s.detections.items[0].extent.size_px, 20.0, 0.0);
+        bst_assert_close(s.detections.items[0].extent.range_m, 345.5, 0.0);
         assert_int_equal(scene_count(&s, counter), before + 1);
     }
     assert_true(scene_count(&s, "link_gap") >= 1);

@@ -510,9 +510,71 @@ static void bright_stars_beyond_the_edge_are_on_it(void **state) {
     close_scene(&s);
 }
 
+/* Eight targets apart from each other, whose image is wider along a diagonal than a point. */
+static void fill_with_shapes(scene *s, double snr, const bst_truth_shape *image) {
+    s->truth->count = 0;
+    s->truth->shape_count = BST_TRUTH_SHAPES;
+    for (int i = 0; i < BST_TRUTH_SHAPES; i++) {
+        bst_truth_item *item = add_source(s, (uint32_t)i + 1, 100.0 + 110.3 * i, 90.0 + 97.7 * i,
+                                          electrons_of(s, snr));
+        item->kind = BST_SOURCE_OBJECT;
+        s->truth->shapes[i] = *image;
+        s->truth->shapes[i].item = i;
+    }
+}
+
+static void large_images_are_fainter_and_placed_worse(void **state) {
+    (void)state;
+    enum { FRAMES = 400 };
+    scene s;
+    open_scene(&s);
+    s.calibration.crowding = 0.0;
+    double sigma2 = s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0, threshold;
+    bst_truth_shape image = {.light_xx_px2 = 1.5 * sigma2,
+                             .light_xy_px2 = 1.5 * sigma2,
+                             .light_yy_px2 = 1.5 * sigma2,
+                             .snr_ratio = 0.7,
+                             .filter_ratio = 0.5,
+                             .peak_ratio = 0.5};
+    start(&s);
+    fill_with_shapes(&s, 1.0, &image);
+    threshold = run(&s, 0).threshold_snr;
+    /* the filter's output at twice the threshold, of which the image leaves a half */
+    int found = 0;
+    fill_with_shapes(&s, 2.0 * threshold, &image);
+    for (int k = 1; k <= FRAMES; k++) {
+        found += run(&s, k).count;
+    }
+    bst_assert_close((double)found / (FRAMES * BST_TRUTH_SHAPES), 0.5, 0.06);
+    fill_with_shapes(&s, 200.0, &image);
+    double along = 0.0, across = 0.0, chi2 = 0.0, n = 0.0;
+    for (int k = 1; k <= FRAMES; k++) {
+        bst_generator_result r = run(&s, k);
+        assert_int_equal(r.count, BST_TRUTH_SHAPES);
+        for (int i = 0; i < r.count; i++, n++) {
+            const bst_detection *d = &r.items[i].detection;
+            const bst_truth_item *item = &s.truth->items[r.items[i].item];
+            double x = d->x_px - item->x_centroid_px, y = d->y_px - item->y_centroid_px;
+            double det = d->cov_xx * d->cov_yy - d->cov_xy * d->cov_xy;
+            along += 0.5 * (x + y) * (x + y);
+            across += 0.5 * (x - y) * (x - y);
+            chi2 += (d->cov_yy * x * x - 2.0 * d->cov_xy * x * y + d->cov_xx * y * y) / det;
+            /* FWHM of a Gaussian with the second moments */
+            bst_assert_close(d->length_px, 2.3548 * sqrt(sigma2 - 1.0 / 12.0 + 3.0 * sigma2), 1e-3);
+            bst_assert_close(d->width_px, 2.3548 * s.frame.sigma_px, 1e-3);
+            bst_assert_close(d->angle_rad, 0.25 * BST_PI, 1e-6);
+        }
+    }
+    /* 3200 draws of each: 2.5 % */
+    bst_assert_close(sqrt(along / across), 2.0, 0.15);
+    bst_assert_close(chi2 / (2.0 * n), 1.0, 0.08);
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bright_stars_beyond_the_edge_are_on_it),
+        cmocka_unit_test(large_images_are_fainter_and_placed_worse),
         cmocka_unit_test(saturated_sources_are_placed_worse),
         cmocka_unit_test(the_brightest_pixel_of_a_streak),
         cmocka_unit_test(the_faintest_star_is_as_bright_as_its_light),

@@ -406,6 +406,43 @@ static void a_plate_in_a_dish(void **state) {
     }
 }
 
+/* The Sun's disc blurs the borders of shadows between parts: over its disc (4 rings of equal area
+ * of 12 points) the light of a bus with panels and a boom is that of its centre, as a border loses
+ * on one side what it gains on the other. */
+static void penumbrae_leave_the_light(void **state) {
+    (void)state;
+    enum { RINGS = 4, AROUND = 12, DIRECTIONS = 40 };
+    bst_test_model m = bst_test_model_open(
+        "{" WHITE
+        ", \"parts\": [{\"name\": \"b\", \"kind\": \"box\", \"size_m\": [2, 2, 3], \"material\": "
+        "\"w\"}, {\"name\": \"n\", \"kind\": \"plate\", \"size_m\": [2, 8, 1], \"position_m\": [0, "
+        "6, "
+        "0], \"rotation_deg\": [0, 30, 0], \"material\": \"w\"}, {\"name\": \"d\", \"kind\": "
+        "\"plate\", \"size_m\": [3, 3, 1], \"position_m\": [1, 1, 8], \"rotation_deg\": [20, 10, "
+        "0], "
+        "\"material\": \"w\"}]}");
+    const double sun_rad = 0.00465;
+    uint64_t random = 19;
+    double worst = 0.0, square = 0.0;
+    for (int i = 0; i < DIRECTIONS; i++) {
+        bst_vec3 sun = bst_test_direction(&random), eye = bst_test_direction(&random);
+        bst_vec3 x = bst_vec3_perpendicular(sun), y = bst_vec3_cross(sun, x);
+        double centre = bst_test_flux(&m, sun, eye), sum = 0.0;
+        for (int k = 0; k < RINGS * AROUND; k++) {
+            double r = sun_rad * sqrt((k / AROUND + 0.5) / RINGS);
+            double a = 2.0 * BST_PI * (k % AROUND + 0.5 * (k / AROUND % 2)) / AROUND;
+            bst_vec3 to = bst_vec3_axpy(bst_vec3_axpy(sun, r * cos(a), x), r * sin(a), y);
+            sum += bst_test_flux(&m, bst_vec3_unit(to), eye) / (RINGS * AROUND);
+        }
+        double error = (sum - centre) / fmax(centre, 0.1);
+        worst = fmax(worst, fabs(error));
+        square += error * error / DIRECTIONS;
+    }
+    bst_assert_close(sqrt(square), 0.0, 4e-4);
+    bst_assert_close(worst, 0.0, 2e-3);
+    bst_test_model_close(&m);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(highlights_in_shadow_are_dark),
@@ -419,6 +456,7 @@ int main(void) {
         cmocka_unit_test(panels_follow_the_sun),
         cmocka_unit_test(joints_spin_by_the_right_hand),
         cmocka_unit_test(glint_has_the_width_of_the_sun),
+        cmocka_unit_test(penumbrae_leave_the_light),
         cmocka_unit_test(earthlight_has_its_closed_form),
         cmocka_unit_test(a_plate_in_a_dish),
     };

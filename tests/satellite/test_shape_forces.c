@@ -92,12 +92,81 @@ static void parts_shadow_each_other(void **state) {
     bst_test_model_close(&m);
 }
 
+/* Forces are those of the functions without torque; another point of reference adds the lever times
+ * the force; drag on a box goes through its centre. */
+static void loads_have_their_lever(void **state) {
+    (void)state;
+    bst_test_model m = part_of(
+        "{\"name\": \"b\", \"kind\": \"box\", \"size_m\": [1, 2, 3], \"position_m\": [0.3, -0.2, "
+        "0.5], \"material\": \"m\"}, {\"name\": \"c\", \"kind\": \"cylinder\", \"radius_m\": 0.3, "
+        "\"length_m\": 5, \"position_m\": [0.3, -0.2, 0.5], \"material\": \"g\"}");
+    const bst_vec3 centre = {0.3, -0.2, 0.5}, other = {-1.0, 0.4, 2.0};
+    uint64_t random = 11;
+    for (int i = 0; i < 6; i++) {
+        bst_vec3 sun = bst_test_direction(&random), force = bst_shape_light_area_m2(m.pose, sun);
+        bst_shape_load load = bst_shape_light_load(m.pose, sun, centre);
+        bst_shape_load moved = bst_shape_light_load(m.pose, sun, other);
+        bst_vec3 lever = bst_vec3_cross(bst_vec3_sub(centre, other), force);
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(load.force, force)), 0, 1e-12);
+        bst_assert_close(
+            bst_vec3_norm(bst_vec3_sub(bst_vec3_sub(moved.torque, load.torque), lever)), 0, 1e-11);
+        bst_shape_load drag = bst_shape_drag_load(m.pose, sun, other);
+        bst_vec3 want = bst_vec3_scale(sun, -bst_shape_silhouette_m2(m.pose, sun));
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(drag.force, want)), 0, 1e-12);
+    }
+    bst_test_model_close(&m);
+    m = part_of(
+        "{\"name\": \"b\", \"kind\": \"box\", \"size_m\": [1, 2, 3], \"position_m\": [0.3, -0.2, "
+        "0.5], \"material\": \"m\"}");
+    for (int i = 0; i < 6; i++) {
+        /* drag on a convex body goes through the centroid of its silhouette: none about the centre
+         */
+        bst_shape_load drag = bst_shape_drag_load(m.pose, bst_test_direction(&random), centre);
+        bst_assert_close(bst_vec3_norm(drag.torque), 0, 1e-12);
+    }
+    bst_test_model_close(&m);
+}
+
+/* A plate beside the centre of mass, a third of which another one shadows: force times the lever of
+ * the centroid of what is lit. */
+static void a_plate_off_centre_has_its_torque(void **state) {
+    (void)state;
+    bst_test_model m = part_of(
+        "{\"name\": \"p\", \"kind\": \"plate\", \"size_m\": [3, 2, 1], \"position_m\": [4, 1, 0], "
+        "\"material\": \"b\"}, {\"name\": \"q\", \"kind\": \"plate\", \"size_m\": [1, 2, 1], "
+        "\"position_m\": [5, 1, 0.5], \"material\": \"b\"}");
+    const bst_vec3 sun = {0, 0, 1}, origin = {0, 0, 0};
+    /* black: 4 m^2 at x = 3.5, and 2 m^2 at x = 5, both at y = 1 */
+    bst_shape_load light = bst_shape_light_load(m.pose, sun, origin);
+    bst_assert_close(light.force.z, -6, 1e-9);
+    bst_assert_close(light.torque.x, 1 * -6, 1e-9);
+    bst_assert_close(light.torque.y, 4 * 3.5 + 2 * 5, 1e-9);
+    bst_assert_close(light.torque.z, 0, 1e-9);
+    bst_shape_load drag = bst_shape_drag_load(m.pose, sun, origin);
+    bst_assert_close(drag.torque.y, 4 * 3.5 + 2 * 5, 1e-9);
+    /* from the edge of the second one: the first is shadowed half a metre farther */
+    const bst_vec3 slant = bst_vec3_unit((bst_vec3){1, 0, 1});
+    light = bst_shape_light_load(m.pose, slant, origin);
+    /* black: force along the light, areas times cosine; shadow from x = 4 to 5, lit 2.5 to 4 and 5
+     * to 5.5, and the second plate at z = 0.5 */
+    double f = 2 * sqrt(0.5), torque = 0;
+    const double part[3][3] = {{1.5, 3.25, 0}, {0.5, 5.25, 0}, {1, 5, 0.5}}; /* length, x, z */
+    for (int i = 0; i < 3; i++) {
+        torque += part[i][0] * f * (part[i][2] * -slant.x - part[i][1] * -slant.z);
+    }
+    bst_assert_close(light.torque.y, torque, 1e-9);
+    bst_assert_close(bst_vec3_norm(light.force), 3 * f, 1e-9);
+    bst_test_model_close(&m);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sphere_has_its_coefficient),
         cmocka_unit_test(a_plate_has_its_force),
         cmocka_unit_test(a_cylinder_has_its_force),
         cmocka_unit_test(parts_shadow_each_other),
+        cmocka_unit_test(loads_have_their_lever),
+        cmocka_unit_test(a_plate_off_centre_has_its_torque),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,7 @@
 /* Frames of shapes against closed forms of their images under a Gaussian PSF. */
 #include "scenegen/renderer.h"
 #include "sim/world/scene/source_body.h"
+#include "sim/world/scene/star_occultation.h"
 #include "tests/satellite/satellite_support.h"
 #include "tests/scenegen/device_fixture.h"
 #include "tests/scenegen/scene_support.h"
@@ -165,27 +166,40 @@ static void make_scene(scene *s, const bst_camera *camera, const char *text, bst
         s->body.gain[0].sun * bst_test_flux(&s->model, light, eye) / (RANGE_M * RANGE_M);
 }
 
+/* Draws a source without noise during a track. */
+static void draw_along(fixture *f, const bst_camera *camera, const bst_los_track *track,
+                       const bst_scene_source *source, float image[SIDE * SIDE],
+                       bst_render_stats *stats) {
+    bst_renderer *r;
+    bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, camera, NULL, &r));
+    bst_render_request q = {
+        .window = {0, 0, SIDE, SIDE}, .track = track, .sources = source, .count = 1};
+    bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, image));
+    bst_renderer_get_stats(r, stats);
+    bst_renderer_free(r);
+}
+
+/* Draws a source without noise and motion. */
+static void draw(fixture *f, const bst_camera *camera, const bst_scene_source *source,
+                 float image[SIDE * SIDE], bst_render_stats *stats) {
+    const scene_motion still = {.duration_s = 1.0, .samples = 2};
+    scene_track track = scene_track_make(camera, &still);
+    draw_along(f, camera, &track.track, source, image, stats);
+    scene_track_free(&track);
+}
+
 /* Largest error of the frame in sigma of its pixel. */
 static double compare(fixture *f, const bst_camera *camera, const bst_scene_source *source,
                       const double *expected, double *sigma_e) {
     static float image[SIDE * SIDE];
-    const scene_motion still = {.duration_s = 1.0, .samples = 2};
-    bst_renderer *r;
-    bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, camera, NULL, &r));
-    scene_track track = scene_track_make(camera, &still);
-    bst_render_request q = {
-        .window = {0, 0, SIDE, SIDE}, .track = &track.track, .sources = source, .count = 1};
-    bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, image));
     bst_render_stats stats;
-    bst_renderer_get_stats(r, &stats);
+    draw(f, camera, source, image, &stats);
     double worst = 0.0, read2 = camera->read_noise_e * camera->read_noise_e;
     for (int i = 0; i < SIDE * SIDE; i++) {
         double error = fabs((double)image[i] - expected[i]) / sqrt(expected[i] + read2);
         worst = fmax(worst, error);
     }
     *sigma_e = stats.predicted_sigma;
-    scene_track_free(&track);
-    bst_renderer_free(r);
     return worst;
 }
 
@@ -382,9 +396,86 @@ static void test_hand_over(void **state) {
     bst_renderer_free(r);
 }
 
+/* A panel that a burn 50 s ago has turned by 40 degrees is drawn as one that is mounted so. */
+static void test_joint_at_a_burn(void **state) {
+    fixture *f = *state;
+    bst_camera camera = small_camera();
+    static const char hinged[] =
+        "{\"materials\": [{\"name\": \"m\", \"diffuse\": 1}], \"joints\": [{\"name\": \"j\", "
+        "\"follows\": \"burn\", \"axis\": [0, 1, 0], \"turn_deg\": 40, \"rate_deg_per_s\": 10}], "
+        "\"parts\": [{\"name\": \"p\", \"kind\": \"plate\", \"size_m\": [2.2, 1.3, 0], "
+        "\"joint\": \"j\", \"material\": \"m\"}]}";
+    static const char mounted[] = MATERIAL
+        "\"kind\": \"plate\", \"size_m\": [2.2, 1.3, 0], \"rotation_deg\": [0, 40, 0], "
+        "\"material\": \"m\"}]}";
+    static float images[3][SIDE * SIDE];
+    const double place[2] = {63.2, 64.45}, sun[3] = {0.1, 0.0, 1.0}, burn[] = {50.0};
+    bst_quat q = bst_quat_from_rotvec((bst_vec3){BST_PI, 0.0, 0.0});
+    for (int n = 0; n < 3; n++) { /* mounted, before the burn, after it */
+        scene s;
+        bst_render_stats stats;
+        make_scene(&s, &camera, n == 0 ? mounted : hinged, q, place, sun, 1e3);
+        s.source.electrons_per_s = 1e5; /* the share of the image is that of its own light */
+        s.body.burn_s = burn;
+        s.body.burn_count = 1;
+        s.body.seconds[0] = s.body.seconds[1] = n < 2 ? 0.0 : 100.0;
+        draw(f, &camera, &s.source, images[n], &stats);
+        bst_test_model_close(&s.model);
+    }
+    double worst = 0.0, before = 0.0;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        worst = fmax(worst, fabs((double)images[2][i] - (double)images[0][i]));
+        before = fmax(before, fabs((double)images[1][i] - (double)images[0][i]));
+    }
+    assert_true(worst < 1.0); /* of 1000 electrons: rounding of the rotation */
+    assert_true(before > 300.0);
+}
+
+/* A plate covers a star from mid-exposure on: its trail is that of the first half. */
+static void test_star_behind_a_plate(void **state) {
+    fixture *f = *state;
+    bst_camera camera = small_camera();
+    const scene_motion slew = {.x_px = 40.0, .y_px = 7.0, .duration_s = 1.0, .samples = 11};
+    scene_track track = scene_track_make(&camera, &slew);
+    bst_los_track half = track.track;
+    half.count = 6;
+    bst_star_occultation work = {0};
+    bst_render_stats stats;
+    static float images[2][SIDE * SIDE];
+    for (int n = 0; n < 2; n++) {
+        scene s;
+        const double place[2] = {63.5, 63.5}, sun[3] = {0.0, 0.0, 1.0};
+        make_scene(&s, &camera, plate, (bst_quat){0, 0, 0, 1}, place, sun, 1e3);
+        bst_vec3 from = {-2.2, 0.0, RANGE_M}, to = {0.0, 0.0, RANGE_M};
+        bst_scene_source_path path =
+            bst_scene_source_path_through(from, bst_vec3_scale(bst_vec3_add(from, to), 0.5), to);
+        s.source.path = &path;
+        bst_scene_source sources[] = {{.kind = BST_SOURCE_STAR,
+                                       .apparent_mid = {0, 0, 1},
+                                       .electrons_per_s = n == 0 ? 1e5 : 1e7,
+                                       .range_m = INFINITY},
+                                      s.source};
+        bst_scene_source plain = sources[0];
+        bst_assert_ok(&f->ctx, bst_star_occultation_apply(&f->ctx, &work, sources, 2));
+        bst_assert_close(sources[0].electrons_per_s, 0.5 * plain.electrons_per_s, 20.0);
+        draw_along(f, &camera, &track.track, &sources[0], images[0], &stats);
+        draw_along(f, &camera, &half, &plain, images[1], &stats);
+        double worst = 0.0;
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            double error = (double)images[0][i] - (double)images[1][i];
+            worst = fmax(worst, fabs(error) / sqrt((double)images[1][i] + 25.0));
+        }
+        assert_true(worst < 0.1); /* twice the tolerance of a frame */
+        bst_test_model_close(&s.model);
+    }
+    bst_star_occultation_free(&work);
+    scene_track_free(&track);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_hand_over),
-                                       cmocka_unit_test(test_boxes),
-                                       cmocka_unit_test(test_sphere_and_cylinder)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_hand_over), cmocka_unit_test(test_boxes),
+        cmocka_unit_test(test_joint_at_a_burn), cmocka_unit_test(test_star_behind_a_plate),
+        cmocka_unit_test(test_sphere_and_cylinder)};
     return cmocka_run_group_tests(tests, open_device, close_device);
 }

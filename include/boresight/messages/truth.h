@@ -51,6 +51,11 @@ typedef struct bst_truth_shape {
     double x0_px, y0_px, x1_px, y1_px; /* box around all parts, lit or not, without the PSF */
     double size_px;                    /* largest extent of all parts */
     double x_light_px, y_light_px;     /* centroid of light; of the centre of mass without light */
+    double light_xx_px2, light_xy_px2,
+        light_yy_px2; /* second central moments of the light, without the PSF */
+    /* relative to a point of the same light, 1 for a small body: SNR, output of a filter matched to
+     * a point, and light of the brightest pixel */
+    double snr_ratio, filter_ratio, peak_ratio;
     bst_quat q_body_from_gcrf;
 } bst_truth_shape;
 

@@ -5,7 +5,7 @@ from typing import Any, Dict, List
 
 import numpy as np
 
-VERSION = 4
+VERSION = 5
 
 # Members of each message's record, then of its items: name:type, x for an array. A test compares
 # them with docs/reference/icd.md.
@@ -79,7 +79,10 @@ _TABLES = {
         "x_px:f8 y_px:f8 cov_xx:f8 cov_xy:f8 cov_yy:f8 flux_e:f8 flux_sigma_e:f8 snr:f8 "
         "length_px:f8 width_px:f8 angle_rad:f8 v_mag:f8 v_mag_sigma:f8 flags:u4 "
         "star_id:u4 label:i4 label_probability:f8 rate_x_pxps:f8 rate_y_pxps:f8 "
-        "rate_sigma_pxps:f8",
+        "rate_sigma_pxps:f8 extent.light_x_px:f8 extent.light_y_px:f8 extent.x0_px:f8 "
+        "extent.y0_px:f8 extent.x1_px:f8 extent.y1_px:f8 extent.size_px:f8 "
+        "extent.size_sigma_px:f8 extent.area_px2:f8 extent.phase_rad:f8 "
+        "extent.saturated_share:f8 extent.range_m:f8 extent.range_sigma_m:f8",
     ),
     "predictions": (
         "tick:i8 attitude_valid:i4 count:i4 lost:i4 attitude_error_cam_rad:f8x3 "

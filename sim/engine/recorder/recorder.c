@@ -17,12 +17,13 @@ static const char *const detection_choices[] = {"all", "no_stars", "objects", NU
 static const char *const compression_choices[] = {"none", "rice", "auto", NULL};
 
 /* in the order of bst_plane; also the file names */
-static const char *const plane_choices[] = {"stars",        "targets",    "background",
-                                            "segmentation", "saturation", NULL};
-static const char *const plane_names[] = {"STARS", "TARGETS", "BACKGROUND", "SEGMENTATION",
-                                          "SATURATION"};
-static const bst_fits_content plane_contents[] = {
-    BST_FITS_ELECTRONS, BST_FITS_ELECTRONS, BST_FITS_ELECTRONS, BST_FITS_ITEMS, BST_FITS_FLAGS};
+static const char *const plane_choices[] = {"stars",      "targets", "background", "segmentation",
+                                            "saturation", "parts",   NULL};
+static const char *const plane_names[] = {"STARS",        "TARGETS",    "BACKGROUND",
+                                          "SEGMENTATION", "SATURATION", "PARTS"};
+static const bst_fits_content plane_contents[] = {BST_FITS_ELECTRONS, BST_FITS_ELECTRONS,
+                                                  BST_FITS_ELECTRONS, BST_FITS_ITEMS,
+                                                  BST_FITS_FLAGS,     BST_FITS_PARTS};
 
 const bst_config_desc bst_record_config_table[] = {
     BST_ENUM(bst_recorder_config, frames, frame_choices, "\"extensions\"",
@@ -38,7 +39,9 @@ const bst_config_desc bst_record_config_table[] = {
         bst_recorder_config, planes, plane_choices, "[]",
         "Noise-free images beside each frame, a FITS file each: expected electrons of the "
         "stars, of the targets, of sky and dark current; the mask of who each pixel belongs "
-        "to; and which of the frame's own pixels are saturated."),
+        "to; which of the frame's own pixels are saturated; and the part of a satellite with a "
+        "shape "
+        "that covers each pixel."),
     BST_REAL(bst_recorder_config, mask_threshold_sigma, "sigma", 1e-3, 1e6, "1",
              "planes segmentation: least light of a source in a pixel of its own, in the noise of "
              "a pixel without sources."),
@@ -182,6 +185,7 @@ static bst_status fill(bst_ctx *ctx, bst_recorder *recorder, const bst_recorder_
         bool kept = recorder->config.frames != BST_RECORD_NO_FRAMES;
         BST_TRY(bst_recorder_sensor_row(ctx, recorder, i, kept ? name : NULL));
     }
+    BST_TRY(bst_recorder_part_rows(ctx, recorder));
     return bst_run_commit(ctx, recorder->run);
 }
 
@@ -356,6 +360,7 @@ static bst_status take_planes(bst_ctx *ctx, bst_recorder *recorder, int sensor, 
     for (int k = 0; k < BST_PLANE_COUNT; k++) {
         const void *pixels = k == BST_PLANE_SEGMENTATION ? (const void *)p->segmentation
                              : k == BST_PLANE_SATURATION ? (const void *)p->saturation
+                             : k == BST_PLANE_PARTS      ? (const void *)p->parts
                                                          : (const void *)p->electrons[k];
         if (!pixels) {
             continue;

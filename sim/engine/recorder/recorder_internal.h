@@ -28,6 +28,7 @@ typedef enum bst_recorder_table {
     BST_TABLE_TASKS,
     BST_TABLE_SHAPES,
     BST_TABLE_EXTENDED,
+    BST_TABLE_PARTS,
     BST_TABLE_COUNT
 } bst_recorder_table;
 
@@ -111,6 +112,8 @@ static inline double bst_recorder_mid_s(const bst_recorder *recorder, int64_t st
     return 0.5 * (double)(start_tick + end_tick) / (double)recorder->tick_rate_hz;
 }
 
+/* Writes the rows of table parts; none if the run has no such table. */
+bst_status bst_recorder_part_rows(bst_ctx *ctx, bst_recorder *recorder) BST_MUST_CHECK;
 /* Writes the rows of table shapes; none if the run has no such table. */
 bst_status bst_recorder_shape_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                    const bst_truth *truth) BST_MUST_CHECK;

@@ -2,6 +2,7 @@
 #include <math.h>
 
 #include "sim/engine/recorder/recorder_internal.h"
+#include "sim/world/scene/object_shape.h"
 
 #define DEG (180.0 / BST_PI)
 
@@ -36,6 +37,26 @@ bst_status bst_recorder_shape_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
             bst_io_real_value(item->range_m),
         };
         BST_TRY(bst_io_table_append(ctx, recorder->tables[BST_TABLE_SHAPES], row));
+    }
+    return BST_OK;
+}
+
+bst_status bst_recorder_part_rows(bst_ctx *ctx, bst_recorder *recorder) {
+    bst_io_table *table = recorder->tables[BST_TABLE_PARTS];
+    int count = table && recorder->world ? bst_world_object_count(recorder->world) : 0;
+    for (int i = 0; i < count; i++) {
+        const bst_world_object_info *info = bst_world_object(recorder->world, i);
+        const bst_satellite *satellite = info->shape ? info->shape->satellite : NULL;
+        int first = bst_world_first_part(recorder->world, i);
+        for (int p = 0; satellite && p < satellite->part_count; p++) {
+            const bst_io_value row[] = {
+                bst_io_int_value(first + p),
+                bst_io_int_value(i),
+                bst_io_text_value(info->name),
+                bst_io_text_value(satellite->parts[p].name),
+            };
+            BST_TRY(bst_io_table_append(ctx, table, row));
+        }
     }
     return BST_OK;
 }

@@ -102,7 +102,7 @@ static const bst_io_column truth_columns[] = {
         "star: Tycho-2 identity, from 2147483648 on statistical; object: index in the scenario"),
     INT("norad", "", "object: catalogue number, else 0"),
     INT("in_field", "", "1: the chief ray's mean place is on the window"),
-    INT("occulted", "", "1: behind the Earth"),
+    INT("occulted", "", "1: behind the Earth, a star also behind a satellite with a shape"),
     INT("saturated", "", "1: it fills pixels"),
     REAL("x_start_px", "px", "column of the chief ray at the start of the exposure"),
     REAL("y_start_px", "px", "row at the start"),
@@ -375,6 +375,13 @@ static const bst_io_column extended_columns[] = {
     REAL("range_sigma_m", "m", "its standard deviation"),
 };
 
+static const bst_io_column part_columns[] = {
+    INT("number", "", "value of its pixels in parts.fits, from 1"),
+    INT("id", "", "object: index in the scenario"),
+    TEXT("object", "name of the object"),
+    TEXT("part", "name of the part in the shape"),
+};
+
 typedef struct table_spec {
     const char *name, *doc;
     const bst_io_column *columns;
@@ -415,6 +422,7 @@ static const table_spec specs[BST_TABLE_COUNT] = {
         SPEC("shapes", shape_columns, "True outline and attitude of objects with a shape."),
     [BST_TABLE_EXTENDED] =
         SPEC("extended_targets", extended_columns, "Detections larger than the PSF."),
+    [BST_TABLE_PARTS] = SPEC("parts", part_columns, "Parts of the objects with a shape."),
 };
 
 /* True if an object of the world has a shape. */
@@ -458,6 +466,8 @@ static bool wanted(const bst_recorder *recorder, bst_recorder_table table) {
             return config->truth && has_shapes(recorder);
         case BST_TABLE_EXTENDED:
             return config->detections && has_shapes(recorder);
+        case BST_TABLE_PARTS:
+            return config->planes & UINT32_C(1) << BST_PLANE_PARTS;
         default:
             return true;
     }

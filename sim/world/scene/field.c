@@ -68,6 +68,7 @@ void bst_field_free(bst_field *field) {
         free(field->sources);
         free_parts(field);
         free(field->near);
+        bst_star_occultation_free(&field->hiding);
         free(field);
     }
 }
@@ -465,7 +466,7 @@ static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, i
         used += there;
     }
     *count = n;
-    return BST_OK;
+    return bst_star_occultation_apply(ctx, &field->hiding, field->sources, n);
 }
 
 bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,

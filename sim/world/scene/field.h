@@ -57,7 +57,7 @@ typedef struct bst_scene_source {
     double v_mag;
     double ra_rad, dec_rad; /* as in bst_truth_item */
     double sunlit_fraction, phase_rad, range_m;
-    bool occulted; /* behind the Earth: no light */
+    bool occulted; /* behind the Earth, a star also behind a body: no light */
 } bst_scene_source;
 
 /* Relative position of an object at time u in [0, 1] of the exposure: quartic through five

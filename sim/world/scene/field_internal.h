@@ -6,6 +6,7 @@
 #include "sim/world/scene/field_objects.h"
 #include "sim/world/scene/los_track.h"
 #include "sim/world/scene/skylight.h"
+#include "sim/world/scene/star_occultation.h"
 
 /* Sigma points in (attitude deviation, time) for the mean position (Julier and Uhlmann 1997). Exact
  * to second order; the first point, the mean, has zero weight. */
@@ -29,7 +30,8 @@ struct bst_field {
     int source_capacity;
     bst_scene_object_parts *parts; /* [part_capacity], for the objects among the sources */
     int part_capacity;
-    int *near; /* candidate objects; room for all */
+    int *near;                   /* candidate objects; room for all */
+    bst_star_occultation hiding; /* stars behind satellites */
     bst_quat q_mid;
     double exposure_s;
     bst_quat sigma_q[BST_FIELD_SIGMA_POINTS];

@@ -181,7 +181,7 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     /* peak of the image: point 1 / (2 pi sigma^2); long streak 1 / (sqrt(2 pi) sigma length) */
     double peak =
         out->electrons / (2.0 * BST_PI * across * hypot(along, length / sqrt(2.0 * BST_PI)));
-    if (peak + dark > camera->full_well_e) {
+    if (peak + dark > camera->full_well_e && !source->body) { /* a body: bst_truth_list_fill */
         out->flags |= BST_TRUTH_SATURATED;
     }
 }

@@ -13,6 +13,7 @@ void bst_shape_truth_free(bst_shape_truth *work) {
     }
     free(work->points);
     free(work->hull);
+    bst_shape_light_free(&work->light);
     *work = (bst_shape_truth){0};
 }
 
@@ -101,10 +102,16 @@ static void project(bst_shape_truth *work, const placed_body *placed,
     out->size_px = largest_extent(work->hull, bst_polygon_hull(work->points, count, work->hull));
 }
 
-/* Finds the centroid of a body's light. */
-static bst_status find_light(bst_ctx *ctx, const placed_body *placed, bst_satellite_pose *pose,
-                             bst_resolved *resolved, bst_truth_shape *out) {
-    enum { ACROSS = 256 };
+/* Cells across the image of a body: a sixteenth of a pixel, within limits. */
+static double cells_across(double across_px) {
+    enum { FEWEST = 32, MOST = 256 };
+    return fmin(fmax(16.0 * across_px, FEWEST), MOST);
+}
+
+/* Measures a body's light: centroid, width, and how its image differs from a point's. */
+static bst_status find_light(bst_ctx *ctx, bst_shape_truth *work, const placed_body *placed,
+                             bst_satellite_pose *pose, bst_resolved *resolved,
+                             bst_truth_shape *out) {
     const bst_source_body_state *body = &placed->state;
     bst_quat q = placed->q_cam_from_gcrf;
     const bst_resolved_view view = {
@@ -115,26 +122,29 @@ static bst_status find_light(bst_ctx *ctx, const placed_body *placed, bst_satell
                                       .sun_radius_rad = body->sun_radius_rad,
                                       .earthlight = body->earth ? &placed->earthlight : NULL,
                                       .gain = placed->source->body->gain};
-    double low[2], high[2], sum = 0.0, x = 0.0, y = 0.0;
+    bst_shape_light_figures figures;
+    double low[2], high[2];
+    out->snr_ratio = out->filter_ratio = out->peak_ratio = 1.0;
     if (!bst_resolved_box(pose, &view, low, high)) {
         return BST_OK;
     }
-    double across = fmax(high[0] - low[0], high[1] - low[1]);
-    BST_TRY(bst_resolved_begin(ctx, resolved, low, high, fmax(across, 1e-6) / ACROSS));
+    double across = fmax(fmax(high[0] - low[0], high[1] - low[1]), 1e-6);
+    BST_TRY(bst_resolved_begin(ctx, resolved, low, high, across / cells_across(across)));
     BST_TRY(bst_resolved_add(ctx, resolved, pose, &view, &light, 1.0, NULL));
-    const bst_resolved_image *image = bst_resolved_image_of(resolved);
-    for (int i = 0; i < image->width * image->height; i++) {
-        const bst_resolved_cell *c = &image->cells[i];
-        double cx = image->x0 + i % image->width + 0.5, cy = image->y0 + i / image->width + 0.5;
-        sum += (double)c->light;
-        x += (double)c->light * cx + (double)c->moment_x;
-        y += (double)c->light * cy + (double)c->moment_y;
-    }
-    double scale = image->cell_px * view.scale_rad;
-    if (sum > 0.0) {
-        const bst_vec3 direction = {x / sum * scale, y / sum * scale, 1.0};
+    double sigma_px = sqrt(pow(bst_camera_psf_sigma_px(placed->camera), 2.0) + 1.0 / 12.0);
+    BST_TRY(bst_shape_light_measure(ctx, &work->light, bst_resolved_image_of(resolved), sigma_px,
+                                    &figures));
+    if (figures.light > 0.0) {
+        const bst_vec3 direction = {figures.x_px * view.scale_rad, figures.y_px * view.scale_rad,
+                                    1.0};
         (void)bst_camera_project(placed->camera, direction, &out->x_light_px, &out->y_light_px);
     }
+    out->light_xx_px2 = figures.xx;
+    out->light_xy_px2 = figures.xy;
+    out->light_yy_px2 = figures.yy;
+    out->snr_ratio = figures.snr_ratio;
+    out->filter_ratio = figures.filter_ratio;
+    out->peak_ratio = figures.peak_ratio;
     return BST_OK;
 }
 
@@ -155,13 +165,14 @@ bst_status bst_shape_truth_fill(bst_ctx *ctx, bst_shape_truth *work, const bst_c
         bst_satellite_pose *pose = work->poses[slot];
         BST_TRY(reserve(ctx, work, pose->satellite->vertex_count));
         bst_source_body_at(source, 0.5, &placed.state, &placed.earthlight);
-        bst_satellite_pose_set(pose, &placed.state.aim);
+        bst_source_body_set_pose(source, &placed.state, pose);
         bst_truth_shape *shape = &truth->shapes[truth->shape_count++];
         project(work, &placed, pose, shape);
         shape->item = i;
         shape->x_light_px = shape->x_px;
         shape->y_light_px = shape->y_px;
-        BST_TRY(find_light(ctx, &placed, pose, work->images[slot], shape));
+        BST_TRY(find_light(ctx, work, &placed, pose, work->images[slot], shape));
+        truth->items[i].snr *= shape->snr_ratio;
         truth->items[i].x_centroid_px += shape->x_light_px - shape->x_px;
         truth->items[i].y_centroid_px += shape->y_light_px - shape->y_px;
     }

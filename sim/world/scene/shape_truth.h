@@ -4,11 +4,13 @@
 
 #include "sim/satellite/resolved_image.h"
 #include "sim/world/scene/field.h"
+#include "sim/world/scene/shape_light.h"
 
 /* Work space: poses by model. All zero: empty. */
 typedef struct bst_shape_truth {
     bst_satellite_pose *poses[BST_TRUTH_SHAPES];
     bst_resolved *images[BST_TRUTH_SHAPES]; /* of the same models */
+    bst_shape_light light;
     bst_point2 *points, *hull;
     int capacity; /* of points */
 } bst_shape_truth;
@@ -22,10 +24,11 @@ void bst_shape_truth_free(bst_shape_truth *work);
  * Given:     sources    of the field query
  *            source_of  [truth->count] index of each item's source
  *            truth      header and items
- * Returned:  truth->shapes, and x_centroid_px and y_centroid_px of their items
+ * Returned:  truth->shapes, and x_centroid_px, y_centroid_px and snr of their items
  * Errors:    BST_ERR_MEMORY
  * Notes:     corners are projected in perspective; the light is that of the middle of the exposure,
- *            from an image of 256 cells across. With a rolling shutter the attitude of the
+ *            from an image of up to 256 cells across. The SNR is lowered by the width of the
+ *            image. With a rolling shutter the attitude of the
  *            camera is that of the middle of the exposure. */
 bst_status bst_shape_truth_fill(bst_ctx *ctx, bst_shape_truth *work, const bst_camera *camera,
                                 const bst_scene_source *sources, const int *source_of,

@@ -32,6 +32,13 @@ void bst_source_body_at(const bst_scene_source *source, double u, bst_source_bod
     }
 }
 
+void bst_source_body_set_pose(const bst_scene_source *source, const bst_source_body_state *state,
+                              bst_satellite_pose *pose) {
+    pose->burn_s = source->body->burn_s;
+    pose->burn_count = source->body->burn_count;
+    bst_satellite_pose_set(pose, &state->aim);
+}
+
 void bst_source_body_set_gain(const bst_camera *camera, const bst_brightness_config *brightness,
                               const bst_scene_lighting *l, bst_scene_source_body *body) {
     bool thermal = camera->spectrum && bst_band_is_thermal(camera->spectrum);

@@ -14,11 +14,14 @@ enum { BST_SOURCE_BODY_TIMES = 65 };
  * the middle. */
 typedef struct bst_scene_source_body {
     const bst_satellite *satellite;
-    int times; /* attitudes at equidistant times from start to end */
+    int first_part; /* number of its first part (bst_world_first_part) */
+    int times;      /* attitudes at equidistant times from start to end */
     bst_quat q_body_from_gcrf[BST_SOURCE_BODY_TIMES];
     bst_vec3 object_m[2]; /* geocentric position at start and end */
     bst_vec3 sun_m;       /* geocentric position of the Sun */
     double seconds[2];    /* start and end, after the epoch */
+    const double *burn_s; /* [burn_count] starts of the object's burns, for joints; borrowed */
+    int burn_count;
     bool earthshine;
     double earth_albedo;
     bst_resolved_gain gain[BST_SATELLITE_MATERIALS_MAX];
@@ -41,6 +44,10 @@ typedef struct bst_source_body_state {
  *            *earthlight in the body frame, if out->earth; may be NULL */
 void bst_source_body_at(const bst_scene_source *source, double u, bst_source_body_state *out,
                         bst_earthlight *earthlight);
+
+/* Places a model as a source's body is at a time that bst_source_body_at gave. */
+void bst_source_body_set_pose(const bst_scene_source *source, const bst_source_body_state *state,
+                              bst_satellite_pose *pose);
 
 /* Sets the light of the materials for a camera.
  *

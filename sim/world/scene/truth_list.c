@@ -82,6 +82,32 @@ static bst_status reserve_indices(bst_ctx *ctx, bst_truth_list *list, int count)
     return BST_OK;
 }
 
+/* Flags the items that saturate a pixel's well or the converter. */
+static void flag_saturated(const bst_truth_list *list, const bst_truth_request *q,
+                           bst_truth *truth) {
+    const bst_camera *camera = q->camera;
+    double top_e = ((double)((1 << camera->bits) - 1) - camera->offset_dn) * camera->gain_e_per_dn;
+    int binning = q->binning > 1 ? q->binning : 1, added = binning * binning, shape = 0;
+    for (int i = 0; i < truth->count; i++) {
+        bst_truth_item *item = &truth->items[i];
+        double x = item->x_chief_px, y = item->y_chief_px;
+        double light = isfinite(x) ? bst_camera_illumination(camera, x, y) : 1.0;
+        double dark_e = truth->dark_e + bst_field_background_e(q->field, truth, x, y);
+        double peak_e = light * q->peak_e(q->user, list->source_of[i], item);
+        while (shape < truth->shape_count && truth->shapes[shape].item < i) {
+            shape++;
+        }
+        if (q->peak_of_points && shape < truth->shape_count && truth->shapes[shape].item == i) {
+            peak_e *= truth->shapes[shape].peak_ratio;
+        }
+        /* wells saturate before binning, the converter after it */
+        if (peak_e >= camera->full_well_e - dark_e ||
+            peak_e * binned_share(camera, binning, item) >= top_e - added * dark_e) {
+            item->flags |= BST_TRUTH_SATURATED;
+        }
+    }
+}
+
 bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_truth_request *q,
                                bst_truth *truth, int capacity, int *source_of) {
     assert(list && q && truth && capacity >= 0 && q->count >= 0);
@@ -92,26 +118,18 @@ bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_tru
         BST_TRY(pick_sources(ctx, list, q->sources, q->count, capacity));
     }
     BST_TRY(reserve_indices(ctx, list, truth->count));
-    const bst_camera *camera = q->camera;
-    double top_e = ((double)((1 << camera->bits) - 1) - camera->offset_dn) * camera->gain_e_per_dn;
-    int binning = q->binning > 1 ? q->binning : 1, added = binning * binning;
+    int binning = q->binning > 1 ? q->binning : 1;
     for (int i = 0; i < truth->count; i++) {
         int k = truth->lost > 0 ? list->picks[i].index : i;
-        bst_truth_item *item = &truth->items[i];
-        bst_field_truth_item(q->field, q->track, &q->sources[k], q->window, binning, truth, item);
+        bst_field_truth_item(q->field, q->track, &q->sources[k], q->window, binning, truth,
+                             &truth->items[i]);
         list->source_of[i] = k;
         if (source_of) {
             source_of[i] = k;
         }
-        double x = item->x_chief_px, y = item->y_chief_px;
-        double light = isfinite(x) ? bst_camera_illumination(camera, x, y) : 1.0;
-        double dark_e = truth->dark_e + bst_field_background_e(q->field, truth, x, y);
-        double peak_e = light * q->peak_e(q->user, k, item);
-        /* wells saturate before binning, the converter after it */
-        if (peak_e >= camera->full_well_e - dark_e ||
-            peak_e * binned_share(camera, binning, item) >= top_e - added * dark_e) {
-            item->flags |= BST_TRUTH_SATURATED;
-        }
     }
-    return bst_shape_truth_fill(ctx, &list->shapes, camera, q->sources, list->source_of, truth);
+    BST_TRY(
+        bst_shape_truth_fill(ctx, &list->shapes, q->camera, q->sources, list->source_of, truth));
+    flag_saturated(list, q, truth);
+    return BST_OK;
 }

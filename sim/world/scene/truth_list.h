@@ -29,6 +29,7 @@ typedef struct bst_truth_request {
     bst_window window;
     int binning;
     bst_truth_peak_fn peak_e;
+    bool peak_of_points; /* peak_e takes a shape for a point: it is lowered by peak_ratio */
     const void *user;
 } bst_truth_request;
 

@@ -481,6 +481,9 @@ void bst_scene_view_body(const bst_world_view *view, const bst_world_view_span *
     /* a quarter of a radian between attitudes */
     double steps = ceil(4.0 * rate * (span->end_s - span->start_s)) + 4.0;
     out->satellite = info->shape->satellite;
+    out->burn_s = info->shape->burn_s;
+    out->burn_count = info->shape->burn_count;
+    out->first_part = bst_world_first_part(view->world, object);
     out->times = (int)fmin(steps, BST_SOURCE_BODY_TIMES - 1.0) + 1;
     for (int k = 0; k < out->times; k++) {
         double u = (double)k / (out->times - 1);
