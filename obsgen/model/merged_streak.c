@@ -4,6 +4,7 @@
 
 #include "boresight/vec.h"
 #include "obsgen/generator_internal.h"
+#include "obsgen/model/psf_fit.h"
 
 /* An isolated detection above this SNR and this many FWHM long is fitted as a streak of its own
  * (imgproc/measure/source_moments.c); above WIDTH_SNR the width of its fit is free (locate.c). */
@@ -14,6 +15,8 @@ static const double LEAST_GAIN = 9.0;
 /* Light farther than this on an axis does not reach the fitted pixels: they end at about 4 sigma
  * (REACH_SIGMAS of imgproc/measure/deblend.c, in whole pixels), and so does the light. */
 static const double FITTED_SIGMAS = 8.0;
+/* Stamp and largest move of a fit (imgproc/measure/deblend.c). */
+static const double REACH_SIGMAS = 3.6, LEAST_REACH_PX = 3.0, LIMIT_PX = 1.5;
 
 /* Symmetric 2 x 2 matrix. */
 typedef struct covariance {
@@ -31,6 +34,26 @@ static bool is_of_another(const bst_generator *g, const generator_source *s,
     return o->head >= 0 && g->sources[o->head].item != s->item;
 }
 
+/* Collects the light of a merged detection about (x, y), within `beyond` of it on each axis. Returns
+ * the number of points. */
+static int gather_points(const bst_generator *g, const generator_source *s,
+                         const generator_source *merged, int count, const double about[2],
+                         double beyond, bst_path_point points[BST_PATH_POINTS]) {
+    int used = 0;
+    for (int k = -1; k < count && used + 2 <= BST_PATH_POINTS; k++) {
+        const generator_source *o = k < 0 ? s : &merged[k];
+        double dx = o->x - about[0], dy = o->y - about[1];
+        if (is_of_another(g, s, o) || fabs(dx) > beyond || fabs(dy) > beyond) {
+            continue;
+        }
+        double half = 0.5 * o->flux_e; /* two points have a path's variance */
+        double px = o->path.dx / sqrt(12.0), py = o->path.dy / sqrt(12.0);
+        points[used++] = (bst_path_point){dx - px, dy - py, half};
+        points[used++] = (bst_path_point){dx + px, dy + py, half};
+    }
+    return used;
+}
+
 /* Fits a single point: gives a bright one the place and flux of a fit with a free width. Returns
  * the variance of the Gaussian window of its moments: twice that of the fitted image, never below
  * the PSF's. */
@@ -39,20 +62,13 @@ static double fit_as_point(const bst_generator *g, const generator_source *s,
     double model = g->filter_sigma * g->filter_sigma;
     double image = g->response.source.across_px * g->response.source.along_px;
     double widening = image - model;
-    /* of a PSF that is no Gaussian the pull of each light is known, but not the width */
     if (s->peak > WIDTH_SNR && !g->response.falloff.tabulated) {
         bst_path_point points[BST_PATH_POINTS];
-        int used = 0;
-        for (int k = -1; k < count && used + 2 <= BST_PATH_POINTS; k++) {
-            const generator_source *o = k < 0 ? s : &merged[k];
-            double dx = o->x - at->x, dy = o->y - at->y, beyond = FITTED_SIGMAS * sqrt(model);
-            if (is_of_another(g, s, o) || fabs(dx) > beyond || fabs(dy) > beyond) {
-                continue;
-            }
-            double half = 0.5 * o->flux_e / s->flux_e; /* two points have a path's variance */
-            double px = o->path.dx / sqrt(12.0), py = o->path.dy / sqrt(12.0);
-            points[used++] = (bst_path_point){dx - px, dy - py, half};
-            points[used++] = (bst_path_point){dx + px, dy + py, half};
+        const double about[2] = {at->x, at->y};
+        int used =
+            gather_points(g, s, merged, count, about, FITTED_SIGMAS * sqrt(model), points);
+        for (int i = 0; i < used; i++) {
+            points[i].flux /= s->flux_e;
         }
         double peak_e = s->flux_e / (2.0 * BST_PI * model),
                light = peak_e / (g->noise_e * g->noise_e);
@@ -93,6 +109,16 @@ static double moment_noise(const bst_generator *g, double flux_e, double window,
     return gain * gain * sqrt(variance) / sum;
 }
 
+/* Larger principal moment without the pixel's, px^2, with the noise of its measurement.
+ *
+ * Given:     m  moments with the pixel */
+static double longest_with_noise(const bst_generator *g, const generator_source *s, covariance m,
+                                 double window, double flux_e) {
+    double mean = 0.5 * (m.xx + m.yy), half = hypot(0.5 * (m.xx - m.yy), m.xy);
+    double noise = moment_noise(g, flux_e, window, mean + half, mean - half);
+    return mean + half - 1.0 / 12.0 + noise * bst_generator_draw(g, s, GENERATOR_MOMENT);
+}
+
 /* Largest second moment of the light about the detection, px^2, as image processing measures it:
  * under a Gaussian window, which is removed by adding inverse covariances; the pixel's variance is
  * subtracted. */
@@ -125,10 +151,38 @@ static double longest_moment(const bst_generator *g, const generator_source *s,
     if (!(seen.xx > 0.0 && seen.yy > 0.0 && seen.xx * seen.yy > seen.xy * seen.xy)) {
         return 0.0; /* image processing measures no moments */
     }
-    covariance m = inverse(seen);
-    double mean = 0.5 * (m.xx + m.yy), half = hypot(0.5 * (m.xx - m.yy), m.xy);
-    double noise = moment_noise(g, at->flux_e, window, mean + half, mean - half);
-    return mean + half - 1.0 / 12.0 + noise * bst_generator_draw(g, s, GENERATOR_MOMENT);
+    return longest_with_noise(g, s, inverse(seen), window, at->flux_e);
+}
+
+/* As fit_as_point and longest_moment, on pixels with a PSF that is no Gaussian: the place and flux
+ * of the fit, and the largest second moment about it. */
+static double fit_psf(const bst_generator *g, const generator_source *s,
+                      const generator_source *merged, int count, generator_blend *at) {
+    bst_path_point points[BST_PATH_POINTS];
+    double reach = fmax(LEAST_REACH_PX, ceil(REACH_SIGMAS * g->fitted_sigma));
+    const double about[2] = {s->x, s->y};
+    const double start[2] = {s->x - round(s->x), s->y - round(s->y)};
+    int used = gather_points(g, s, merged, count, about, 4.0 * reach, points);
+    const bst_psf_fit_frame frame = {
+        .reach_px = reach,
+        .sigma_px = g->fitted_sigma,
+        .limit_px = LIMIT_PX + g->fitted_sigma,
+        .noise_e = g->noise_e,
+        .saturated_e = s->saturated ? fmax(bst_generator_saturation_e(g), 1.0) : 0.0};
+    bst_path_point_fit fit = bst_psf_fit_points(&g->response, points, used, start, &frame);
+    at->x = s->x + fit.x_px;
+    at->y = s->y + fit.y_px;
+    at->flux_e = fit.flux;
+    bst_psf_fit_moments m =
+        bst_psf_fit_measure(&g->response, points, used, start, &frame, &fit);
+    if (!(m.xx > 0.0)) {
+        return 0.0;
+    }
+    const double pixel = 1.0 / 12.0;
+    double window =
+        2.0 * (g->fitted_sigma * g->fitted_sigma + fmax(fit.widening_px2, 0.0) + pixel);
+    covariance all = {m.xx + pixel, m.xy, m.yy + pixel};
+    return longest_with_noise(g, s, all, window, fit.flux);
 }
 
 /* By how much a streak's fit lowers chi-square below that of a point: both are 1 - r^2 of the
@@ -148,10 +202,16 @@ void bst_generator_fit_merged(const bst_generator *g, const generator_source *s,
     if (g->smeared || out->near || s->as_streak || snr < OWN_STREAK_SNR) {
         return;
     }
-    double window = fit_as_point(g, s, merged, count, out);
-    double moment = longest_moment(g, s, merged, count, window, out);
+    double fitted = point + 1.0 / 12.0, moment;
+    if (g->response.falloff.tabulated && s->peak > WIDTH_SNR) {
+        moment = fit_psf(g, s, merged, count, out);
+    } else {
+        double window = fit_as_point(g, s, merged, count, out);
+        fitted = 0.5 * window;
+        moment = longest_moment(g, s, merged, count, window, out);
+    }
     if (moment < OWN_STREAK_LENGTH * OWN_STREAK_LENGTH * point ||
-        gain_of_streak(snr, 0.5 * window, moment + 1.0 / 12.0, point + 1.0 / 12.0) < LEAST_GAIN) {
+        gain_of_streak(snr, fitted, moment + 1.0 / 12.0, point + 1.0 / 12.0) < LEAST_GAIN) {
         return;
     }
     /* a uniform streak of this length has this moment */

@@ -220,28 +220,88 @@ static void tabulate_falloff(const bst_response_side *source, const bst_response
     out->falloff.tabulated = true;
 }
 
-/* Sets the falloff of widened images: Lagrange's interpolation between the tabulated widths. */
-static void widen_falloff(bst_response *r) {
-    double weight[BST_FALLOFF_WIDTHS];
-    double share = r->product_px2 / (r->product_px2 + r->widened_px2);
+/* Lagrange's interpolation between the tabulated widths; share: of the narrowest image's variance
+ * in that of the widened one. */
+static void interpolate_widths(float (*table)[BST_FALLOFF_DISTANCES], double share,
+                               double value[BST_FALLOFF_DISTANCES]) {
     double root = sqrt(fmax(share, BST_FALLOFF_LEAST));
+    for (int n = 0; n < BST_FALLOFF_DISTANCES; n++) {
+        value[n] = 0.0;
+    }
     for (int k = 0; k < BST_FALLOFF_WIDTHS; k++) {
-        weight[k] = 1.0;
+        double weight = 1.0;
         for (int j = 0; j < BST_FALLOFF_WIDTHS; j++) {
             double at = width_node(j);
-            weight[k] *= j == k ? 1.0 : (root - at) / (width_node(k) - at);
+            weight *= j == k ? 1.0 : (root - at) / (width_node(k) - at);
         }
-    }
-    double value[BST_FALLOFF_DISTANCES] = {0.0};
-    for (int k = 0; k < BST_FALLOFF_WIDTHS; k++) {
         for (int n = 0; n < BST_FALLOFF_DISTANCES; n++) {
-            value[n] += weight[k] * (double)r->falloff.widened[k][n];
+            value[n] += weight * (double)table[k][n];
         }
     }
+}
+
+/* Sets falloff and image of widened images. */
+static void widen_falloff(bst_response *r) {
+    double value[BST_FALLOFF_DISTANCES];
+    double share = r->product_px2 / (r->product_px2 + r->widened_px2);
+    interpolate_widths(r->falloff.widened, share, value);
     for (int n = 0; n < BST_FALLOFF_DISTANCES; n++) {
         r->falloff.value[n] = (float)(value[n] / value[0]);
     }
     r->falloff_scale = fmin(sqrt(share / BST_FALLOFF_LEAST), 1.0);
+    share = r->image_px2 / (r->image_px2 + r->widened_px2);
+    interpolate_widths(r->falloff.widened_image, share, value);
+    for (int n = 0; n < BST_FALLOFF_DISTANCES; n++) {
+        r->falloff.image[n] = (float)value[n];
+    }
+    r->image_scale = fmin(sqrt(share / BST_FALLOFF_LEAST), 1.0);
+}
+
+/* Tabulates the images of a point, source and fitted PSF, for distances and the source's widths. */
+static void tabulate_images(const bst_response_side *source, const bst_response_side *filter,
+                            int binning, double x_px, double y_px, bst_response *out) {
+    enum { ALL = BST_FALLOFF_WIDTHS + 2 };
+    const bst_response_side *const sides[2] = {source, filter};
+    double limit = fmin(fmax(cutoff(source), cutoff(filter)), MOST_FREQUENCY);
+    double spectrum[RINGS][ALL];
+    bst_response_nodes nodes[2];
+    bst_response_nodes_at(source, x_px, y_px, &nodes[0]);
+    bst_response_nodes_at(filter, x_px, y_px, &nodes[1]);
+    for (int i = 0; i < RINGS; i++) {
+        double f = limit * (i + 0.5) / RINGS, mean[2] = {0.0, 0.0};
+        for (int a = 0; a < 2 * DIRECTIONS; a++) {
+            double angle = BST_PI * (0.5 * a + 0.25) / DIRECTIONS, at[2];
+            double fx = f * cos(angle), fy = f * sin(angle);
+            for (int k = 0; k < 2; k++) {
+                bst_response_otf(sides[k], &nodes[k], binning, fx, fy, at);
+                mean[k] += at[0] / (2 * DIRECTIONS);
+            }
+        }
+        /* area of the ring, in cycles per read-out pixel */
+        double area = 2.0 * BST_PI * f * limit / RINGS * binning * binning;
+        spectrum[i][0] = area * mean[1];
+        spectrum[i][1] = area * mean[0];
+        double turn = BST_PI * f * binning;
+        for (int k = 0; k < BST_FALLOFF_WIDTHS; k++) {
+            double share = width_node(k), more = out->image_px2 * (1.0 / (share * share) - 1.0);
+            spectrum[i][k + 2] = area * mean[0] * exp(-2.0 * turn * turn * more);
+        }
+    }
+    for (int n = 0; n < BST_FALLOFF_DISTANCES; n++) {
+        double turn = 2.0 * BST_PI * n / BST_FALLOFF_PER_PX * limit * binning / RINGS;
+        double sum[ALL] = {0.0};
+        for (int i = 0; i < RINGS; i++) {
+            double wave = j0(turn * (i + 0.5));
+            for (int k = 0; k < ALL; k++) {
+                sum[k] += spectrum[i][k] * wave;
+            }
+        }
+        out->falloff.model[n] = (float)sum[0];
+        out->falloff.image[n] = (float)sum[1];
+        for (int k = 0; k < BST_FALLOFF_WIDTHS; k++) {
+            out->falloff.widened_image[k][n] = (float)sum[k + 2];
+        }
+    }
 }
 
 /* Interpolated falloff at a distance. */
@@ -253,6 +313,38 @@ static double falloff_at(const bst_response *r, double distance_px) {
     }
     double low = (double)r->falloff.value[i], high = (double)r->falloff.value[i + 1];
     return low + (at - i) * (high - low);
+}
+
+/* Cubic interpolation of a table at a place in it, in steps (Lagrange, four points; even about 0),
+ * with its derivatives. */
+static double cubic_at(const float *table, double at, double *slope, double *curvature) {
+    int i = (int)at;
+    if (i >= BST_FALLOFF_DISTANCES - 2) {
+        *slope = *curvature = 0.0;
+        return 0.0;
+    }
+    double t = at - i, a = (double)table[i > 0 ? i - 1 : 1], b = (double)table[i];
+    double c = (double)table[i + 1], d = (double)table[i + 2];
+    double third = (d - a) / 6.0 + 0.5 * (b - c), second = 0.5 * (a + c) - b;
+    double first = c - b - second - third;
+    *slope = first + t * (2.0 * second + 3.0 * t * third);
+    *curvature = 2.0 * second + 6.0 * t * third;
+    return b + t * (first + t * (second + t * third));
+}
+
+double bst_response_image_share(const bst_response *r, double distance_px) {
+    double slope, curvature, scale = r->image_scale;
+    return scale * scale *
+           cubic_at(r->falloff.image, distance_px * scale * BST_FALLOFF_PER_PX, &slope, &curvature);
+}
+
+double bst_response_model_share(const bst_response *r, double distance_px, double *slope,
+                                double *curvature) {
+    double value =
+        cubic_at(r->falloff.model, distance_px * BST_FALLOFF_PER_PX, slope, curvature);
+    *slope *= BST_FALLOFF_PER_PX;
+    *curvature *= BST_FALLOFF_PER_PX * BST_FALLOFF_PER_PX;
+    return value;
 }
 
 double bst_response_falloff(const bst_response *r, double along_px, double across_px,
@@ -329,6 +421,9 @@ void bst_response_set(bst_response *out, const bst_response_side *source,
     out->product_px2 = 2.0 * out->both.across_px * out->both.along_px;
     out->widened_px2 = 0.0;
     tabulate_falloff(source, filter, binning, x_px, y_px, out);
+    out->image_px2 = out->source.across_px * out->source.along_px;
+    out->image_scale = 1.0;
+    tabulate_images(source, filter, binning, x_px, y_px, out);
 }
 
 static bst_obsgen_image_width widen(bst_obsgen_image_width w, double variance_px2) {

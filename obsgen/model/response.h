@@ -30,6 +30,10 @@ typedef struct bst_falloff {
     bool tabulated;                     /* false: Gaussian, see bst_matched_falloff */
     float value[BST_FALLOFF_DISTANCES]; /* relative to its peak */
     float widened[BST_FALLOFF_WIDTHS][BST_FALLOFF_DISTANCES];
+    /* share of a point's light on a pixel at a distance: of the fitted PSF, and of the source for
+     * the same kind of widths */
+    float model[BST_FALLOFF_DISTANCES], image[BST_FALLOFF_DISTANCES];
+    float widened_image[BST_FALLOFF_WIDTHS][BST_FALLOFF_DISTANCES];
 } bst_falloff;
 
 typedef struct bst_response {
@@ -41,6 +45,8 @@ typedef struct bst_response {
     double product_px2;      /* variance of source x filter for which the falloff is tabulated */
     double widened_px2;      /* variance by which the source has been widened since */
     double falloff_scale;    /* table distance per px: 1, less for the widest images */
+    double image_px2;        /* variance of the source for which its image is tabulated */
+    double image_scale;      /* as falloff_scale */
 } bst_response;
 
 /* An image model: PSF at a field position, sensor px, widened by a Gaussian. */
@@ -104,6 +110,13 @@ double bst_response_falloff(const bst_response *response, double along_px, doubl
  * light at its place: gradient of the filter's output per distance, at least 0. For Gaussian images
  * it equals the output. */
 double bst_response_pull(const bst_response *response, double distance_px);
+
+/* Share of a point's light on a pixel whose centre is this far from it, read-out px; mean over all
+ * directions. The falloff must be tabulated. */
+double bst_response_image_share(const bst_response *response, double distance_px);
+/* The same for the PSF that image processing fits, with its first two derivatives by distance. */
+double bst_response_model_share(const bst_response *response, double distance_px, double *slope,
+                                double *curvature);
 
 /* sqrt(sum p^2) of a real image of unit flux smeared by length_px, relative to a Gaussian of the
  * same noise-equivalent area at rest; 1 for a Gaussian. */

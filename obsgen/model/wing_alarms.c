@@ -14,8 +14,12 @@ enum { PIXEL_BITS = 13 };
 static const double LEAST_WING = 0.5;
 /* Wing light per pixel, in pixel noises, that no longer adds to the background of a mesh. */
 static const double LEAST_LIGHT = 0.01;
-/* Within so many sigmas of the PSF the output is that of the core, in full. */
+/* Within so many sigmas of the PSF a maximum is the source's own: the reach of its fit
+ * (REACH_SIGMAS of imgproc/measure/deblend.c, in whole pixels). */
 static const double CORE_SIGMAS = 4.0;
+/* Share of a known PSF's sum of squares that the kernel of image processing may lose by its radius
+ * (imgproc/detect/filter_kernel.c). */
+static const double RADIUS_SHARE = 1e-3;
 
 /* Pixels about a source: half side of the patch, reach of the filter's kernel. */
 enum {
@@ -23,14 +27,24 @@ enum {
     KERNEL = 9,
     SIDE = 2 * RADIUS + 1,
     WIDE = SIDE + 2 * KERNEL,
-    MOST_MAXIMA = 256
+    MOST_MAXIMA = 256,
+    MOST_RADIUS = 15, /* BST_FILTER_MAX_RADIUS */
+    PER_PX = 3,       /* of the table of outputs */
+    DISTANCES = BST_FALLOFF_DISTANCES / BST_FALLOFF_PER_PX * PER_PX
 };
 _Static_assert(WIDE *WIDE <= 1 << PIXEL_BITS, "a pixel has its own number");
+
+/* Output of the point filter by distance from a source, relative to that at it. */
+typedef struct outputs {
+    float at[DISTANCES];
+    double end_px; /* last distance */
+} outputs;
 
 /* A source and the frame in which it has wings. */
 typedef struct winged {
     const bst_generator *g;
     const generator_source *s;
+    const outputs *outputs;
     double norm; /* sqrt(sum k^2) of the point filter's image k of unit sum */
 } winged;
 
@@ -45,15 +59,61 @@ typedef struct maximum {
     float snr;
 } maximum;
 
-/* Farthest distance of the tabulated falloff, px. */
-static double table_end_px(const bst_generator *g) {
-    return (BST_FALLOFF_DISTANCES - 1.0) / BST_FALLOFF_PER_PX / g->response.falloff_scale;
+/* Half side of the filter's square kernel, px, and the fitted PSF on it. */
+static int set_kernel(const bst_response *r, float kernel[MOST_RADIUS + 1][MOST_RADIUS + 1]) {
+    double square[MOST_RADIUS + 1] = {0.0}; /* sum of squares within each half side */
+    for (int v = 0; v <= MOST_RADIUS; v++) {
+        for (int u = 0; u <= MOST_RADIUS; u++) {
+            double slope, curvature, share = bst_response_model_share(r, hypot(u, v), &slope,
+                                                                      &curvature);
+            kernel[v][u] = (float)share;
+            square[u > v ? u : v] += share * share * (u > 0 ? 2.0 : 1.0) * (v > 0 ? 2.0 : 1.0);
+        }
+    }
+    double all = 0.0, inside = 0.0;
+    for (int k = 0; k <= MOST_RADIUS; k++) {
+        all += square[k];
+    }
+    int radius = 0;
+    while (radius < MOST_RADIUS && !((inside += square[radius]) >= (1.0 - RADIUS_SHARE) * all)) {
+        radius++;
+    }
+    return radius;
 }
 
-/* Filter output caused by a source's wings at a distance. Image and filter have equal wings, whose
- * correlation is the sum of both; but image processing's kernel is truncated, hence half. */
+/* Computes the outputs: sums of kernel and image over the kernel's pixels, in the mean of the
+ * directions along the pixels and across them. */
+static void set_outputs(const bst_response *r, outputs *out) {
+    float kernel[MOST_RADIUS + 1][MOST_RADIUS + 1];
+    int radius = set_kernel(r, kernel);
+    out->end_px = (DISTANCES - 1.0) / PER_PX / r->image_scale - radius;
+    for (int n = 0; n < DISTANCES; n++) {
+        double away = (double)n / PER_PX, sum = 0.0;
+        for (int turned = 0; turned < 2 && away <= out->end_px + 1.0; turned++) {
+            double x = turned ? sqrt(0.5) * away : away, y = turned ? x : 0.0;
+            for (int v = -radius; v <= radius; v++) {
+                for (int u = -radius; u <= radius; u++) {
+                    sum += (double)kernel[abs(v)][abs(u)] *
+                           bst_response_image_share(r, hypot(x - u, y - v));
+                }
+            }
+        }
+        out->at[n] = (float)(n == 0 ? sum : sum / (double)out->at[0]);
+    }
+    out->at[0] = 1.0f;
+}
+
+/* Farthest distance of the table of outputs, px. */
+static double table_end_px(const winged *w) {
+    return w->outputs->end_px;
+}
+
+/* Filter output caused by a source at a distance within the table. */
 static double wing_output(const winged *w, double distance_px) {
-    return 0.5 * w->s->amplitude * bst_response_falloff(&w->g->response, distance_px, 0.0, 0.0);
+    double at = fmin(distance_px * PER_PX, DISTANCES - 1.001);
+    int i = (int)at;
+    double low = (double)w->outputs->at[i], high = (double)w->outputs->at[i + 1];
+    return w->s->amplitude * (low + (at - i) * (high - low));
 }
 
 /* Wing light per pixel, in pixel noises (callback). Wings change little over the filter's image,
@@ -61,7 +121,7 @@ static double wing_output(const winged *w, double distance_px) {
  * power of the distance, as those of an aperture with an edge do. */
 static double wing_light(const void *user, double distance_px) {
     const winged *w = user;
-    double end = table_end_px(w->g) - 1.0;
+    double end = table_end_px(w) - 1.0;
     double beyond = fmin(end / distance_px, 1.0);
     return w->norm * wing_output(w, fmin(distance_px, end)) * beyond * beyond * beyond;
 }
@@ -73,15 +133,16 @@ static double nearest_px(const bst_generator *g) {
 
 static bool has_wings(const winged *w) {
     double from = nearest_px(w->g);
-    return w->s->found && table_end_px(w->g) > from && wing_output(w, from) >= LEAST_WING;
+    return w->s->found && table_end_px(w) > from && wing_output(w, from) >= LEAST_WING;
 }
 
 /* Adds the wings of all bright sources to the background by mesh; *any: false if there are none. */
-static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, double norm, bool *any) {
+static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, const outputs *table, double norm,
+                               bool *any) {
     *any = false;
     for (int i = 0; i < g->source_count; i++) {
         const generator_source *s = &g->sources[i];
-        winged w = {g, s, norm};
+        winged w = {g, s, table, norm};
         if (!has_wings(&w)) {
             continue;
         }
@@ -90,7 +151,7 @@ static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, double norm, bool
                                         g->total_sigma));
         }
         *any = true;
-        double end = table_end_px(g) - 1.0;
+        double end = table_end_px(&w) - 1.0;
         double reach = fmax(end * cbrt(wing_light(&w, end) / LEAST_LIGHT), nearest_px(g));
         bst_local_sky_add_wings(&g->wing_sky, s->x, s->y, reach, wing_light, &w);
     }
@@ -139,7 +200,6 @@ static void draw_noise(const bst_generator *g, const generator_source *s, float 
  * both over the noise that image processing measures. */
 static void set_patch(const winged *w, patch *p) {
     const bst_generator *g = w->g;
-    double core = CORE_SIGMAS * g->fitted_sigma;
     p->x0 = (int)lround(w->s->x) - RADIUS;
     p->y0 = (int)lround(w->s->y) - RADIUS;
     draw_noise(g, w->s, p->output);
@@ -147,7 +207,7 @@ static void set_patch(const winged *w, patch *p) {
         for (int i = 0; i < SIDE; i++) {
             double x = p->x0 + i, y = p->y0 + j, r = hypot(x - w->s->x, y - w->s->y), level, noise;
             bst_local_sky_at(&g->wing_sky, x, y, &level, &noise);
-            double raw = wing_output(w, r) * (r < core ? 2.0 : 1.0);
+            double raw = wing_output(w, fmin(r, table_end_px(w)));
             double own = sqrt(1.0 + fmax(raw, 0.0) * w->norm / g->noise_e);
             p->light[j][i] = (float)((raw - level / w->norm) / noise);
             p->output[j][i] = p->light[j][i] + (float)(own / noise) * p->output[j][i];
@@ -242,10 +302,12 @@ bst_status bst_wing_alarms_draw(bst_ctx *ctx, bst_generator *g) {
         return BST_OK;
     }
     double norm = bst_crlb_table_norm(&g->bound, 0.0) * g->norm_ratio[0];
+    outputs table;
     bool any;
-    BST_TRY(set_wing_sky(ctx, g, norm, &any));
+    set_outputs(&g->response, &table);
+    BST_TRY(set_wing_sky(ctx, g, &table, norm, &any));
     for (int i = 0; i < g->source_count && any; i++) {
-        winged w = {g, &g->sources[i], norm};
+        winged w = {g, &g->sources[i], &table, norm};
         if (has_wings(&w)) {
             draw_about(g, &w);
         }
