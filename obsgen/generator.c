@@ -543,6 +543,8 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
     g->count = g->lost = 0;
     set_noise(g, f);
     BST_TRY(collect(ctx, g, f));
+    bool full = bst_generator_saturation_e(g) <= 0.0; /* the sky alone saturates every pixel */
+    g->source_count = full ? 0 : g->source_count;
     for (int i = 0; i < g->source_count; i++) {
         g->sources[i].saturated =
             (f->truth->items[g->sources[i].item].flags & BST_TRUTH_SATURATED) != 0;
@@ -564,11 +566,11 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
             bst_generator_keep(g, &item);
         }
     }
-    if (g->smeared) {
-        BST_TRY(bst_streak_breakup_fragments(ctx, g));
+    if (!full) {
+        BST_TRY(g->smeared ? bst_streak_breakup_fragments(ctx, g) : BST_OK);
+        BST_TRY(bst_false_alarms_draw(ctx, g));
+        bst_false_alarms_cosmic_rays(g);
     }
-    BST_TRY(bst_false_alarms_draw(ctx, g));
-    bst_false_alarms_cosmic_rays(g);
     for (int i = 0; i < g->count; i++) {
         bst_detection *d = &g->items[i].detection;
         bool drawn = g->items[i].drawn;

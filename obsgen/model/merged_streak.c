@@ -34,8 +34,8 @@ static bool is_of_another(const bst_generator *g, const generator_source *s,
     return o->head >= 0 && g->sources[o->head].item != s->item;
 }
 
-/* Collects the light of a merged detection about (x, y), within `beyond` of it on each axis. Returns
- * the number of points. */
+/* Collects the light of a merged detection about (x, y), within `beyond` of it on each axis.
+ * Returns the number of points. */
 static int gather_points(const bst_generator *g, const generator_source *s,
                          const generator_source *merged, int count, const double about[2],
                          double beyond, bst_path_point points[BST_PATH_POINTS]) {
@@ -65,8 +65,7 @@ static double fit_as_point(const bst_generator *g, const generator_source *s,
     if (s->peak > WIDTH_SNR && !g->response.falloff.tabulated) {
         bst_path_point points[BST_PATH_POINTS];
         const double about[2] = {at->x, at->y};
-        int used =
-            gather_points(g, s, merged, count, about, FITTED_SIGMAS * sqrt(model), points);
+        int used = gather_points(g, s, merged, count, about, FITTED_SIGMAS * sqrt(model), points);
         for (int i = 0; i < used; i++) {
             points[i].flux /= s->flux_e;
         }
@@ -173,14 +172,12 @@ static double fit_psf(const bst_generator *g, const generator_source *s,
     at->x = s->x + fit.x_px;
     at->y = s->y + fit.y_px;
     at->flux_e = fit.flux;
-    bst_psf_fit_moments m =
-        bst_psf_fit_measure(&g->response, points, used, start, &frame, &fit);
+    bst_psf_fit_moments m = bst_psf_fit_measure(&g->response, points, used, start, &frame, &fit);
     if (!(m.xx > 0.0)) {
         return 0.0;
     }
     const double pixel = 1.0 / 12.0;
-    double window =
-        2.0 * (g->fitted_sigma * g->fitted_sigma + fmax(fit.widening_px2, 0.0) + pixel);
+    double window = 2.0 * (g->fitted_sigma * g->fitted_sigma + fmax(fit.widening_px2, 0.0) + pixel);
     covariance all = {m.xx + pixel, m.xy, m.yy + pixel};
     return longest_with_noise(g, s, all, window, fit.flux);
 }

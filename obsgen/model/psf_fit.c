@@ -10,7 +10,8 @@ enum { MOST_SIDE = 48, PARAMETERS = 4, ROUNDS = 15 };
 
 /* Limits of a step and of the widening relative to the PSF's variance, and least pivot
  * (imgproc/measure/fit.c). */
-static const double MOST_STEP_PX = 0.7, LEAST_FLUX = 0.1, LEAST_WIDENING = -0.6, MOST_WIDENING = 1.8;
+static const double MOST_STEP_PX = 0.7, LEAST_FLUX = 0.1, LEAST_WIDENING = -0.6,
+                    MOST_WIDENING = 1.8;
 static const double LEAST_PIVOT = 1e-11;
 /* Convergence limit, px: a hundredth of the smallest position error of interest. */
 static const double SETTLED_PX = 1e-4;
@@ -131,8 +132,8 @@ bst_psf_fit_moments bst_psf_fit_measure(const bst_response *response, const bst_
                                     points[i].flux};
     }
     fill(response, about, count, centre, 3.0 * frame->reach_px, &s);
-    double window = 2.0 * (frame->sigma_px * frame->sigma_px + fmax(fit->widening_px2, 0.0) +
-                           1.0 / 12.0);
+    double window =
+        2.0 * (frame->sigma_px * frame->sigma_px + fmax(fit->widening_px2, 0.0) + 1.0 / 12.0);
     double sum = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;
     for (int j = 0; j < s.height; j++) {
         for (int u = 0; u < s.width; u++) {

@@ -340,8 +340,7 @@ double bst_response_image_share(const bst_response *r, double distance_px) {
 
 double bst_response_model_share(const bst_response *r, double distance_px, double *slope,
                                 double *curvature) {
-    double value =
-        cubic_at(r->falloff.model, distance_px * BST_FALLOFF_PER_PX, slope, curvature);
+    double value = cubic_at(r->falloff.model, distance_px * BST_FALLOFF_PER_PX, slope, curvature);
     *slope *= BST_FALLOFF_PER_PX;
     *curvature *= BST_FALLOFF_PER_PX * BST_FALLOFF_PER_PX;
     return value;

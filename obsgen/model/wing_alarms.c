@@ -64,8 +64,8 @@ static int set_kernel(const bst_response *r, float kernel[MOST_RADIUS + 1][MOST_
     double square[MOST_RADIUS + 1] = {0.0}; /* sum of squares within each half side */
     for (int v = 0; v <= MOST_RADIUS; v++) {
         for (int u = 0; u <= MOST_RADIUS; u++) {
-            double slope, curvature, share = bst_response_model_share(r, hypot(u, v), &slope,
-                                                                      &curvature);
+            double slope, curvature,
+                share = bst_response_model_share(r, hypot(u, v), &slope, &curvature);
             kernel[v][u] = (float)share;
             square[u > v ? u : v] += share * share * (u > 0 ? 2.0 : 1.0) * (v > 0 ? 2.0 : 1.0);
         }

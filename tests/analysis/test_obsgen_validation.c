@@ -16,6 +16,7 @@ static double track_off[2]; /* px */
 static double confirm_s[2];
 static int alarms[2]; /* a frame */
 static int missed[2]; /* of the sources of a frame at SNR 6.5 */
+static bool dark;     /* sources are too faint for any figure */
 
 static bool is_generator(const bst_scenario *scenario) {
     const bst_observer_config *observers = scenario->observers.items;
@@ -51,7 +52,7 @@ bst_status __wrap_bst_watch_run(bst_ctx *ctx, const bst_scenario *scenario,
                                                .snr = i < 20 ? 6.5 : 12.0,
                                                .flags = BST_TRUTH_IN_FIELD};
             /* the last three do not count: too faint, hidden, out of the field */
-            if (i == SOURCES) {
+            if (dark || i == SOURCES) {
                 truth->items[i].snr = 2.9;
             } else if (i > SOURCES) {
                 truth->items[i].flags =
@@ -201,10 +202,39 @@ static void each_side_that_differs(void **state) {
     }
 }
 
+/* Alarms of the generator where images have none are not equal, and neither is nothing at all. */
+static void one_side_alone_is_not_equivalent(void **state) {
+    (void)state;
+    bool equivalent;
+    set_sides(0.2, 0.5, 20, 1, 5);
+    alarms[0] = -1; /* no alarm in the first frame either */
+    cJSON *root = compare(&equivalent);
+    assert_false(equivalent);
+    const cJSON *alone = cJSON_GetObjectItem(root, "one_sided");
+    assert_int_equal(cJSON_GetArraySize(alone), 1);
+    const cJSON *item = cJSON_GetArrayItem(alone, 0);
+    assert_string_equal(cJSON_GetObjectItem(item, "name")->valuestring, "false alarms per frame");
+    bst_assert_close(number(item, "image"), 0.0, 0.0);
+    bst_assert_close(number(item, "generator"), 1.0, 1e-9);
+    cJSON_Delete(root);
+    set_sides(0.2, NAN, NAN, -1, SOURCES);
+    missed[0] = SOURCES;
+    track_off[0] = confirm_s[0] = NAN;
+    alarms[0] = -1;
+    dark = true;
+    root = compare(&equivalent);
+    dark = false;
+    assert_false(equivalent);
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(root, "figures")), 0);
+    assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(root, "one_sided")), 0);
+    cJSON_Delete(root);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(equal_sides),
         cmocka_unit_test(each_side_that_differs),
+        cmocka_unit_test(one_side_alone_is_not_equivalent),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -197,9 +197,18 @@ def electrons_per_s(c, v_mag):
             * 10.0 ** (-0.4 * v_mag))
 
 
-def noise_e(c, exposure_s):
+def background_e(c, exposure_s):
     sky = electrons_per_s(c, c["background_mag_arcsec2"]) * c["pixel_scale_arcsec"] ** 2
-    return math.sqrt((sky + c["dark_current_e_per_s"]) * exposure_s + c["read_noise_e"] ** 2)
+    return (sky + c["dark_current_e_per_s"]) * exposure_s
+
+
+def noise_e(c, exposure_s):
+    return math.sqrt(background_e(c, exposure_s) + c["read_noise_e"] ** 2)
+
+
+def full_e(c):
+    """Charge that fills a pixel or the converter."""
+    return min(c["full_well_e"], (2 ** c["bits"] - 1 - c["offset_dn"]) * c["gain_e_per_dn"])
 
 
 def magnitude_of(c, exposure_s, sigma, length, snr):
@@ -237,6 +246,9 @@ def instrument(rng, sky, strategy, rate, catalogue, generator):
         limit = magnitude_of(c, exposure, sigma, streak, 6.0)
         stars = stars_in(c, limit, catalogue)
         if not least <= moved <= most or not 25.0 <= stars <= 1500.0 or limit > 17.0:
+            continue
+        # a sky that fills the converter shows no stars
+        if background_e(c, exposure) > 0.5 * full_e(c):
             continue
         # the target's way through a field that is not followed
         if strategy == "stare" and rate * 20.0 / pixel_rad > c["width_px"]:

@@ -92,6 +92,23 @@ static void charge_is_labelled_by_its_sharpness(void **state) {
     close_scene(&s);
 }
 
+/* Images detect nothing where the sky alone fills the converter. */
+static void a_full_sky_hides_everything(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.settings.false_alarms_per_frame = 5.0;
+    s.truth->background_e = 65535.0 * s.camera.gain_e_per_dn + 1.0;
+    start(&s);
+    add_source(&s, 1, 512.0, 512.0, electrons_of(&s, 100.0));
+    assert_int_equal(run(&s, 0).count, 0);
+    s.camera.bits = 18; /* room above the sky, up to the full well */
+    s.camera.full_well_e = 2e5;
+    start(&s);
+    assert_true(run(&s, 1).count > 1);
+    close_scene(&s);
+}
+
 /* Light of a bright star's wings lifts noise above the threshold where no higher maximum is near.
  */
 static void wings_make_alarms(void **state) {
@@ -222,6 +239,7 @@ int main(void) {
         cmocka_unit_test(false_alarms_are_poisson_with_a_gaussian_tail),
         cmocka_unit_test(hits_come_at_the_detectors_rate),
         cmocka_unit_test(charge_is_labelled_by_its_sharpness),
+        cmocka_unit_test(a_full_sky_hides_everything),
         cmocka_unit_test(wings_make_alarms),
         cmocka_unit_test(crowded_frames_are_looked_at_twice),
         cmocka_unit_test(hits_on_a_binned_window),

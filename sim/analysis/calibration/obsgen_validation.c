@@ -179,19 +179,47 @@ static sampling bootstrap(const figure_of *f, const run_sums *image, const run_s
                       sqrt(fmax(square / n - mean * mean, 0.0))};
 }
 
+/* Results in JSON: figures that both sides have, and those that one side lacks. */
+typedef struct results {
+    cJSON *figures, *one_sided;
+} results;
+
+/* Reports a figure without ratio or difference: one side has no value, or only images have 0. */
+static bool report_one_sided(const figure_of *f, double image, double generator, cJSON *list) {
+    const double values[2] = {image, generator};
+    static const char *const names[2] = {"image", "generator"};
+    char text[2][16] = {"-", "-"};
+    cJSON *item = cJSON_CreateObject();
+    cJSON_AddStringToObject(item, "name", f->name);
+    for (int k = 0; k < 2; k++) {
+        if (isfinite(values[k])) {
+            snprintf(text[k], sizeof text[k], "%.4f", values[k]);
+            cJSON_AddNumberToObject(item, names[k], values[k]);
+        }
+    }
+    cJSON_AddItemToArray(list, item);
+    printf("  %-22s %9s %9s  no %s: not shown\n", f->name, text[0], text[1],
+           f->ratio ? "ratio" : "difference");
+    return false;
+}
+
 /* Compares a figure of generator and image processing; bootstrap interval against the margin. */
 static bool judge(const figure_of *f, const run_sums *image, const run_sums *generator, int seeds,
-                  int *chosen, cJSON *list) {
+                  int *chosen, const results *out) {
     double a = value_of(f, image, NULL, seeds), b = value_of(f, generator, NULL, seeds);
-    if (!isfinite(a) || !isfinite(b) || a == 0.0) {
+    bool none = !isfinite(a) && !isfinite(b);
+    if (none || (f->ratio && a == 0.0 && b == 0.0)) {
         return true;
+    }
+    if (!isfinite(a) || !isfinite(b) || (f->ratio && a == 0.0)) {
+        return report_one_sided(f, a, b, out->one_sided);
     }
     double middle = f->ratio ? 1.0 : 0.0, value = f->ratio ? b / a : b - a;
     sampling s = bootstrap(f, image, generator, seeds, chosen);
     bool inside = s.low >= middle - f->margin && s.high <= middle + f->margin;
     bool beyond = fabs(value - middle) > f->margin + BEYOND_SIGMAS * s.sigma;
-    printf("  %-22s %9.4f %9.4f  %s %7.4f  [%7.4f, %7.4f]  within %.2f: %s\n", f->name, a, b,
-           f->ratio ? "ratio     " : "difference", value, s.low, s.high, f->margin,
+    printf("  %-22s %9.4f %9.4f  %s %7.4f +- %.4f  [%7.4f, %7.4f]  within %.2f: %s\n", f->name, a,
+           b, f->ratio ? "ratio     " : "difference", value, s.sigma, s.low, s.high, f->margin,
            inside   ? "yes"
            : beyond ? "no"
                     : "not shown");
@@ -206,13 +234,32 @@ static bool judge(const figure_of *f, const run_sums *image, const run_sums *gen
     cJSON_AddNumberToObject(item, "margin", f->margin);
     cJSON_AddBoolToObject(item, "inside", inside);
     cJSON_AddBoolToObject(item, "beyond", beyond);
-    cJSON_AddItemToArray(list, item);
+    cJSON_AddItemToArray(out->figures, item);
     return inside;
+}
+
+/* Says why there is no figure at all: what both sides had to compare. */
+static void explain_none(const run_sums *image, const run_sums *generator, int seeds) {
+    double frames = 0.0, most = 0.0;
+    for (int b = 0; b < BINS; b++) {
+        double trials = 0.0;
+        for (int i = 0; i < seeds; i++) {
+            trials += image[i].pd[b].count;
+        }
+        most = fmax(most, trials);
+    }
+    for (int i = 0; i < seeds; i++) {
+        frames += image[i].figure[ALARMS].count + generator[i].figure[ALARMS].count;
+    }
+    printf(
+        "  no figure: in %.0f frames no detection and no track, and at most %.0f sources in an SNR "
+        "bin, %d are needed; is the sky full, or the target never in the field?\n",
+        frames, most, LEAST_TRIALS);
 }
 
 /* Compares all figures of generator and image processing. */
 static bool judge_all(const run_sums *image, const run_sums *generator, int seeds, int *chosen,
-                      cJSON *list) {
+                      const results *out) {
     bool all = true;
     for (int b = 0; b < BINS; b++) {
         figure_of f = {.offset = offsetof(run_sums, pd) + (size_t)b * sizeof(share),
@@ -227,7 +274,7 @@ static bool judge_all(const run_sums *image, const run_sums *generator, int seed
             trials += image[i].pd[b].count;
         }
         if (trials >= LEAST_TRIALS) {
-            all = judge(&f, image, generator, seeds, chosen, list) && all;
+            all = judge(&f, image, generator, seeds, chosen, out) && all;
         }
     }
     static const figure_of others[FIGURES] = {
@@ -236,7 +283,11 @@ static bool judge_all(const run_sums *image, const run_sums *generator, int seed
         {"RMS of the track, px", offsetof(run_sums, figure[TRACK]), true, true, 0.05},
         {"time to confirm, s", offsetof(run_sums, figure[CONFIRM]), false, true, 0.1}};
     for (int k = 0; k < FIGURES; k++) {
-        all = judge(&others[k], image, generator, seeds, chosen, list) && all;
+        all = judge(&others[k], image, generator, seeds, chosen, out) && all;
+    }
+    if (cJSON_GetArraySize(out->figures) + cJSON_GetArraySize(out->one_sided) == 0) {
+        explain_none(image, generator, seeds);
+        all = false;
     }
     return all;
 }
@@ -246,8 +297,10 @@ bst_status bst_obsgen_validation_run(bst_ctx *ctx, const bst_obsgen_validation_o
     size_t seeds = (size_t)o->seeds;
     run_sums *sums = calloc(2 * seeds, sizeof *sums);
     int *chosen = calloc(seeds, sizeof *chosen);
-    cJSON *root = cJSON_CreateObject(), *list = cJSON_AddArrayToObject(root, "figures");
-    bst_status status = sums && chosen && list
+    cJSON *root = cJSON_CreateObject();
+    const results out = {cJSON_AddArrayToObject(root, "figures"),
+                         cJSON_AddArrayToObject(root, "one_sided")};
+    bst_status status = sums && chosen && out.figures && out.one_sided
                             ? BST_OK
                             : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d runs", o->seeds);
     for (int i = 0; i < o->seeds && status == BST_OK; i++) {
@@ -256,9 +309,11 @@ bst_status bst_obsgen_validation_run(bst_ctx *ctx, const bst_obsgen_validation_o
         }
     }
     if (status == BST_OK) {
-        printf("%s, %s each: image, generator, 95 %% interval over runs\n", o->scenario,
-               bst_text_of_count((char[BST_COUNT_TEXT]){0}, o->seeds, "run", "runs"));
-        *equivalent = judge_all(sums, sums + seeds, o->seeds, chosen, list);
+        printf(
+            "%s, %s each: image, generator, standard error and 95 %% interval "
+            "over runs\n",
+            o->scenario, bst_text_of_count((char[BST_COUNT_TEXT]){0}, o->seeds, "run", "runs"));
+        *equivalent = judge_all(sums, sums + seeds, o->seeds, chosen, &out);
         cJSON_AddStringToObject(root, "scenario", o->scenario);
         cJSON_AddNumberToObject(root, "runs", o->seeds);
         cJSON_AddBoolToObject(root, "equivalent", *equivalent);
