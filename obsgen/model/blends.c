@@ -219,16 +219,20 @@ static void draw_streak_position(const bst_generator *g, const generator_source 
         return;
     }
     const bst_obsgen_calibration *cal = &g->calibration;
-    bst_crlb_table_at bound = bst_crlb_table_of(&g->bound, s->flux_e, g->noise_e, s->length);
+    /* of the image that the true path widens; output and noise fall off between its width and that
+     * of the filters */
+    bst_crlb_table_at bound = bst_crlb_table_wider(g->image_bound ? g->image_bound : &g->bound,
+                                                   s->flux_e, g->noise_e, s->length, g->widening);
+    const double sigma = g->cross_sigma;
     /* below UNLIFTED_SNR the factors already include the selection by noise, which is simulated
      * here */
     double snr = fmax(s->flux_e * bound.norm / g->noise_e, UNLIFTED_SNR);
     double along = bst_obsgen_between(bst_obsgen_snrs, cal->along_factor, BST_OBSGEN_SNRS, snr) *
                    sqrt(bound.var_along_px2 * out->widen);
-    if (along * out->flat < MERGED_CENTROID * g->total_sigma) {
+    if (along * out->flat < MERGED_CENTROID * sigma) {
         return;
     }
-    bst_streak_centroid_error_set(g->centroid_error, g->streak, g->total_sigma);
+    bst_streak_centroid_error_set(g->centroid_error, g->streak, sigma);
     if (g->centroid_error->steps == 0) {
         return;
     }
@@ -238,7 +242,7 @@ static void draw_streak_position(const bst_generator *g, const generator_source 
     /* standard deviation of the bound relative to the filters' peak without scatter */
     double noise = along * own * sqrt(g->centroid_error->curvature);
     noise = fmin(fmax(noise, LEAST_NOISE), MOST_NOISE);
-    double turned = across * own / (g->total_sigma * sqrt(2.0)) / noise;
+    double turned = across * own / (sigma * sqrt(2.0)) / noise;
     turned = fmin(fmax(turned, LEAST_NOISE), MOST_NOISE);
     double c = s->path.dx / s->length, n = s->path.dy / s->length;
     bst_streak_centroid_error_source sources[BST_WANDER_SOURCES] = {{0.0, 0.0, own}};
