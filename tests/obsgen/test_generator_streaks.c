@@ -237,9 +237,9 @@ static void tops_at_rest_scatter_evenly(void **state) {
     close_scene(&s);
 }
 
-/* RMS errors along and across of stars of SNR 30 that moved by 8 px along x on a path with a bend
+/* RMS errors along and across of stars, `snr` as points and about half as streaks, that moved by 8 px along x on a path with a bend
  * across it, which telemetry knows, and that trembled. */
-static void errors_of(scene *s, double bend, double tremble, double rms[2]) {
+static void errors_of(scene *s, double snr, double bend, double tremble, double rms[2]) {
     enum { STEPS = 400 };
     double x[STEPS + 1], y[STEPS + 1], sum[2] = {0.0, 0.0}, mean[2], count = 0.0;
     for (int k = 0; k <= STEPS; k++) {
@@ -252,7 +252,7 @@ static void errors_of(scene *s, double bend, double tremble, double rms[2]) {
     s->frame.path_x_px = x;
     s->frame.path_y_px = y;
     s->frame.path_count = STEPS + 1;
-    fill(s, 60.0);
+    fill(s, snr);
     for (int i = 0; i < s->truth->count; i++) {
         s->truth->items[i].x_start_px -= 4.0;
         s->truth->items[i].x_end_px += 4.0;
@@ -345,9 +345,9 @@ static void places_widen_by_what_is_not_known_of_the_path(void **state) {
     open_scene(&s);
     start(&s);
     double straight[2], bent[2], trembling[2], rms = 0.4;
-    errors_of(&s, 0.0, 0.0, straight);
-    errors_of(&s, 1.5, 0.0, bent);
-    errors_of(&s, 0.0, rms, trembling);
+    errors_of(&s, 60.0, 0.0, 0.0, straight);
+    errors_of(&s, 60.0, 1.5, 0.0, bent);
+    errors_of(&s, 60.0, 0.0, rms, trembling);
     double sigma2 = s.frame.sigma_px * s.frame.sigma_px + 1.0 / 12.0;
     double wider = sqrt((sigma2 + rms * rms) / sigma2);
     /* 5400 errors each: 1 % */
@@ -357,6 +357,12 @@ static void places_widen_by_what_is_not_known_of_the_path(void **state) {
      * flank and the noise in it, the 3/2 power; counted light makes it less */
     bst_assert_close(trembling[0] / straight[0], wider, 0.06);
     bst_assert_close(trembling[1] / straight[1], pow(wider, 1.5), 0.06);
+    /* places of faint streaks, drawn from the output of the filters, widen alike */
+    double faint[2], shaken[2];
+    errors_of(&s, 21.0, 0.0, 0.0, faint);
+    errors_of(&s, 21.0, 0.0, rms, shaken);
+    bst_assert_close(shaken[1] / faint[1], pow(wider, 1.5), 0.08);
+    assert_true(shaken[0] / faint[0] > 1.05);
     close_scene(&s);
 }
 
