@@ -167,9 +167,10 @@ static void equal_sides(void **state) {
     /* one more in one of 30 frames */
     expect(root, "false alarms per frame", 2 + 1.0 / 30, 2, true, 0.1);
     assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(root, "figures")), 6);
-    /* the extra alarm is in one run of six: the interval is that of how often it is drawn */
+    /* the extra alarm is in one run of six: the interval is that of how often it is drawn, and the
+     * variance of a mean of six has a divisor of five */
     const cJSON *item = figure(root, "false alarms per frame");
-    double sigma = 2.0 / (2 + 1.0 / 30) / (2 + 1.0 / 30) * sqrt(5.0 / 36 / 6) / 5;
+    double sigma = 2.0 / (2 + 1.0 / 30) / (2 + 1.0 / 30) * sqrt(5.0 / 36 / 5) / 5;
     bst_assert_close(number(item, "sigma"), sigma, 0.1 * sigma);
     bst_assert_close(number(item, "high"), 1.0, 1e-9);                /* not drawn at all: 33 % */
     bst_assert_close(number(item, "low"), 2 / (2 + 3.0 / 30), 0.005); /* drawn three times: 5 % */

@@ -237,8 +237,8 @@ static void tops_at_rest_scatter_evenly(void **state) {
     close_scene(&s);
 }
 
-/* RMS errors along and across of stars, `snr` as points and about half as streaks, that moved by 8 px along x on a path with a bend
- * across it, which telemetry knows, and that trembled. */
+/* RMS errors along and across of stars, `snr` as points and about half as streaks, that moved by 8
+ * px along x on a path with a bend across it, which telemetry knows, and that trembled. */
 static void errors_of(scene *s, double snr, double bend, double tremble, double rms[2]) {
     enum { STEPS = 400 };
     double x[STEPS + 1], y[STEPS + 1], sum[2] = {0.0, 0.0}, mean[2], count = 0.0;

@@ -147,7 +147,7 @@ static double value_of(const figure_of *f, const run_sums *runs, const int *chos
 /* Bootstrap result of a figure. */
 typedef struct sampling {
     double low, high; /* 95 % interval */
-    double sigma;     /* standard deviation */
+    double sigma;     /* standard error */
 } sampling;
 
 /* Bootstrap over runs. A sample takes the same runs from both sides: run i has one seed, and
@@ -174,9 +174,10 @@ static sampling bootstrap(const figure_of *f, const run_sums *image, const run_s
         return (sampling){NAN, NAN, NAN};
     }
     qsort(values, (size_t)n, sizeof *values, bst_compare_doubles);
+    /* resampling n runs gives the variance about their own mean, (n - 1) / n of the true one */
     double mean = sum / n;
     return (sampling){values[(int)(low * (n - 1))], values[(int)((1.0 - low) * (n - 1))],
-                      sqrt(fmax(square / n - mean * mean, 0.0))};
+                      sqrt(fmax(square / n - mean * mean, 0.0) * seeds / fmax(seeds - 1.0, 1.0))};
 }
 
 /* Results in JSON: figures that both sides have, and those that one side lacks. */
