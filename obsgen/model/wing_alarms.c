@@ -34,9 +34,11 @@ enum {
 };
 _Static_assert(WIDE *WIDE <= 1 << PIXEL_BITS, "a pixel has its own number");
 
-/* Output of the point filter by distance from a source, relative to that at it. */
+/* Output of the point filter by distance from a source, relative to that at it, and share of the
+ * source's light on a pixel, averaged with the squares of the kernel: its shot noise in the output.
+ */
 typedef struct outputs {
-    float at[DISTANCES];
+    float at[DISTANCES], light[DISTANCES];
     double end_px; /* last distance */
 } outputs;
 
@@ -88,16 +90,20 @@ static void set_outputs(const bst_response *r, outputs *out) {
     int radius = set_kernel(r, kernel);
     out->end_px = (DISTANCES - 1.0) / PER_PX / r->image_scale - radius;
     for (int n = 0; n < DISTANCES; n++) {
-        double away = (double)n / PER_PX, sum = 0.0;
+        double away = (double)n / PER_PX, sum = 0.0, light = 0.0, squares = 0.0;
         for (int turned = 0; turned < 2 && away <= out->end_px + 1.0; turned++) {
             double x = turned ? sqrt(0.5) * away : away, y = turned ? x : 0.0;
             for (int v = -radius; v <= radius; v++) {
                 for (int u = -radius; u <= radius; u++) {
-                    sum += (double)kernel[abs(v)][abs(u)] *
-                           bst_response_image_share(r, hypot(x - u, y - v));
+                    double weight = (double)kernel[abs(v)][abs(u)];
+                    double share = bst_response_image_share(r, hypot(x - u, y - v));
+                    sum += weight * share;
+                    light += weight * weight * share;
+                    squares += weight * weight;
                 }
             }
         }
+        out->light[n] = (float)(squares > 0.0 ? light / squares : 0.0);
         out->at[n] = (float)(n == 0 ? sum : sum / (double)out->at[0]);
     }
     out->at[0] = 1.0f;
@@ -108,22 +114,26 @@ static double table_end_px(const winged *w) {
     return w->outputs->end_px;
 }
 
-/* Filter output caused by a source at a distance within the table. */
-static double wing_output(const winged *w, double distance_px) {
+/* Value of a table at a distance within it. */
+static double table_at(const float table[DISTANCES], double distance_px) {
     double at = fmin(distance_px * PER_PX, DISTANCES - 1.001);
     int i = (int)at;
-    double low = (double)w->outputs->at[i], high = (double)w->outputs->at[i + 1];
-    return w->s->amplitude * (low + (at - i) * (high - low));
+    return (double)table[i] + (at - i) * ((double)table[i + 1] - (double)table[i]);
 }
 
-/* Wing light per pixel, in pixel noises (callback). Wings change little over the filter's image,
- * whose output for even light is that over the norm. Beyond the table they decrease with the third
+/* Filter output caused by a source at a distance within the table. */
+static double wing_output(const winged *w, double distance_px) {
+    return w->s->amplitude * table_at(w->outputs->at, distance_px);
+}
+
+/* Wing light per pixel, in pixel noises (callback). Beyond the table wings decrease with the third
  * power of the distance, as those of an aperture with an edge do. */
 static double wing_light(const void *user, double distance_px) {
     const winged *w = user;
-    double end = table_end_px(w) - 1.0;
-    double beyond = fmin(end / distance_px, 1.0);
-    return w->norm * wing_output(w, fmin(distance_px, end)) * beyond * beyond * beyond;
+    double end = table_end_px(w) - 1.0, beyond = fmin(end / distance_px, 1.0);
+    return w->s->flux_e / w->g->noise_e *
+           bst_response_image_share(&w->g->response, fmin(distance_px, end)) * beyond * beyond *
+           beyond;
 }
 
 /* Distance from a source beyond which maxima can be detections of their own, px. */
@@ -207,8 +217,9 @@ static void set_patch(const winged *w, patch *p) {
         for (int i = 0; i < SIDE; i++) {
             double x = p->x0 + i, y = p->y0 + j, r = hypot(x - w->s->x, y - w->s->y), level, noise;
             bst_local_sky_at(&g->wing_sky, x, y, &level, &noise);
-            double raw = wing_output(w, fmin(r, table_end_px(w)));
-            double own = sqrt(1.0 + fmax(raw, 0.0) * w->norm / g->noise_e);
+            double away = fmin(r, table_end_px(w)), raw = wing_output(w, away);
+            double own = sqrt(1.0 + w->s->flux_e * table_at(w->outputs->light, away) /
+                                        (g->noise_e * g->noise_e));
             p->light[j][i] = (float)((raw - level / w->norm) / noise);
             p->output[j][i] = p->light[j][i] + (float)(own / noise) * p->output[j][i];
         }
