@@ -307,9 +307,20 @@ static void draw_about(bst_generator *g, const winged *w) {
     }
 }
 
+/* False if no source is bright enough for wings: without its wings the kernel's output is at most
+ * that of the whole filter. Saves the table of outputs. */
+static bool may_have_wings(const bst_generator *g) {
+    double most = 0.0, from = nearest_px(g);
+    for (int i = 0; i < g->source_count; i++) {
+        const generator_source *s = &g->sources[i];
+        most = fmax(most, s->found ? s->amplitude : 0.0);
+    }
+    return most * bst_response_falloff(&g->response, from, 0.0, 0.0) >= LEAST_WING;
+}
+
 bst_status bst_wing_alarms_draw(bst_ctx *ctx, bst_generator *g) {
     assert(ctx && g);
-    if (!g->response.falloff.tabulated || g->smeared) {
+    if (!g->response.falloff.tabulated || g->smeared || !may_have_wings(g)) {
         return BST_OK;
     }
     double norm = bst_crlb_table_norm(&g->bound, 0.0) * g->norm_ratio[0];

@@ -151,6 +151,7 @@ bst_status bst_alias_correction_create(bst_ctx *ctx, const bst_psf *psf, int spe
         status = make_kernel(ctx, w, &l, pool, &largest);
     }
     bst_fft_array_free(l.data);
+    /* a correction below the rounding of single precision, 6e-8, is none */
     if (status != BST_OK || largest * x->used_px * y->used_px < 1e-7) {
         bst_alias_correction_free(w);
         return status;

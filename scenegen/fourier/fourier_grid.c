@@ -15,6 +15,10 @@ enum {
     DIRECTIONS = 8
 };
 
+/* Design choices. WIDE_CELL_PX: cells of the coarse image of the wings. REACH_SHARE: light of a
+ * point on a pixel that still counts, a fifth of an electron of a full well of 6e5. LEAST_DENSITY,
+ * MOST_DENSITY: limits of the grid's samples per pixel, for PSFs of many pixels and of a fraction.
+ */
 static const double WIDE_CELL_PX = 4.0, REACH_SHARE = 3e-7, LEAST_DENSITY = 0.25,
                     MOST_DENSITY = 5.0;
 

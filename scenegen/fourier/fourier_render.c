@@ -162,7 +162,7 @@ static bst_status prepare_quality(bst_ctx *ctx, bst_fourier_render *l, int quali
         double sigma = l->band[PLAIN].node_sigma_px * density;
         while (bst_nufft_kernel_widen(&spread, &band->axis[a], density, l->widest * sigma * sigma,
                                       &shape) > WIDEN_ERROR) {
-            l->widest *= 0.8;
+            l->widest *= 0.8; /* step of the search: at most a fifth too narrow */
         }
     }
     double sigma_px = l->band[PLAIN].node_sigma_px, widest_px2 = l->widest * sigma_px * sigma_px;

@@ -321,6 +321,7 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
     for (int k = 0; k < 3; k++) {
         m.pixel_part[k] = aim->pixel_part[k] > 0.0 ? aim->pixel_part[k] : 1.0;
     }
+    /* 5 % below: the path is not quite uniform */
     m.limit = m.most = 0.95 * m.variance * cbrt(tolerance / m.pixel_part[2] * 48.0 / 0.617);
     group g = {0, path[0].s, path[0].s};
     extent e = {0};
