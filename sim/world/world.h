@@ -52,8 +52,8 @@ int bst_world_object_count(const bst_world *world);
  *
  * Given:     object  index, 0 to one less than the number of objects */
 const bst_world_object_info *bst_world_object(const bst_world *world, int object);
-/* Number of the first part of an object with a shape, from 1: parts are numbered over all objects in
- * their order. For an object without shape: that of the next one with a shape. */
+/* Number of the first part of an object with a shape, from 1: parts are numbered over all objects
+ * in their order. For an object without shape: that of the next one with a shape. */
 int bst_world_first_part(const bst_world *world, int object);
 /* Age of the element set of a body at the scenario's epoch, s. Body: object index, or number of
  * objects + observer index. False: its orbit has no element set. */
