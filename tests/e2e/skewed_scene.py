@@ -1,6 +1,6 @@
 """A scene without symmetry, whose tables and exports the tests work out again: a sensor that is not square, turned,
-distorted, its boresight off the centre, read in a window off its corner; a mount with three axes at large angles on a turning spacecraft with sensors of its
-own; two targets; an observer that is wrong about its orbit."""
+distorted, its boresight off the centre, read in a window off its corner; a mount with three axes at large angles on a
+turning spacecraft with sensors of its own; two targets; an observer that is wrong about its orbit."""
 import json
 import os
 

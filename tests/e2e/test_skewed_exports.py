@@ -17,7 +17,8 @@ import runs
 from runs import call_well
 from optics import ARCSEC, angle, columns, quaternion, rotate, unit
 from readers import read_oem, read_png, read_tdm, seconds
-from skewed_scene import DURATION_S, ELEMENTS, EXPOSURE_S, NAV_GROWTH_MPS, NAV_RTN_M, NAV_RTN_MPS, NORAD, OBSERVER, WINDOW, scenario
+from skewed_scene import (DURATION_S, ELEMENTS, EXPOSURE_S, NAV_GROWTH_MPS, NAV_RTN_M, NAV_RTN_MPS, NORAD, OBSERVER, WINDOW,
+                          scenario)
 
 SHARED_MOTION_M = 0.5  # what two SGP4s and two rotations to GCRF differ by
 

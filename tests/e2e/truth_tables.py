@@ -185,14 +185,15 @@ class TruthTables:
                 start = epoch + TimeDelta(k * PERIOD_S, format="sec")
                 self.assertEqual([frame[c] for c in ("sensor", "exposure_id", "start_tick", "end_tick", "start_s", "exposure_s",
                                                      "x0_px", "y0_px", "width_px", "height_px", "binning", "bits", "fits_index")],
-                                 [0, k, e["start_tick"], e["end_tick"], k * PERIOD_S, EXPOSURE_S, *WINDOW, self.BINNING, 16, k + 1])
+                                 [0, k, e["start_tick"], e["end_tick"], k * PERIOD_S, EXPOSURE_S, *WINDOW, b, 16, k + 1])
                 self.assertLess(abs((Time(frame["start_utc"].rstrip("Z"), scale="utc") - start).sec), 1e-6)
                 for key, later in (("DATE-OBS", 0), ("DATE-BEG", 0), ("DATE-AVG", 0.25), ("DATE-END", 0.5)):
                     self.assertLess(abs((Time(h[key], scale="utc") - start).sec - later), 1e-6, key)
                     mjd = "MJD" + key[4:]
                     self.assertLess(abs((Time(h[mjd], format="mjd", scale="utc") - start).sec - later), 1e-6, mjd)
                 for key, value in (("EXPTIME", 0.5), ("GAIN", 1.6), ("RDNOISE", 8), ("OFFSET", 500), ("BITS", 16),
-                                   ("PIXSCALE", 3 * b), ("WINX0", WINDOW[0]), ("WINY0", WINDOW[1]), ("BINNING", b), ("FRAMEID", k), ("EXTVER", k + 1),
+                                   ("PIXSCALE", 3 * b), ("WINX0", WINDOW[0]), ("WINY0", WINDOW[1]), ("BINNING", b),
+                                   ("FRAMEID", k), ("EXTVER", k + 1),
                                    ("INSTRUME", "telescope"), ("OBSERVER", "neossat"), ("OBJECT", "INMARSAT GX5"),
                                    ("EARTHFRC", e["earth_fraction"]), ("MOONFRC", 0), ("SUNFRC", 0)):
                     self.assertEqual(h[key], value, key)

@@ -116,12 +116,34 @@ static void encoder_noise_is_filtered_as_the_servo_says(void **state) {
     bst_assert_close(sqrt(sum / steps) / expected, 1.0, 0.06);
 }
 
+/* The acceleration is constant within a step: the reference moves by the mean of both rates. */
+static void the_reference_moves_by_its_mean_rate(void **state) {
+    (void)state;
+    const double h = 0.02;
+    const bst_axis_spec spec = {.rate_limit_radps = 0.05,
+                                .accel_limit_radps2 = 0.02,
+                                .natural_frequency_radps = 6,
+                                .damping = 0.7,
+                                .dt_s = h};
+    bst_axis axis;
+    bst_axis_init(&axis, &spec);
+    double x = 0.0, v = 0.0;
+    for (int k = 0; k < 600; k++) {
+        bst_axis_step(&axis, 0.3, 0.0, 0.0);
+        bst_assert_close(axis.reference_rad - x, 0.5 * (v + axis.reference_radps) * h, 1e-15);
+        x = axis.reference_rad;
+        v = axis.reference_radps;
+    }
+    bst_assert_close(x, 0.3, 1e-6);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(servo_follows_the_closed_form),
         cmocka_unit_test(slews_respect_limits_and_take_their_time),
         cmocka_unit_test(constant_rate_leaves_no_lag),
         cmocka_unit_test(encoder_noise_is_filtered_as_the_servo_says),
+        cmocka_unit_test(the_reference_moves_by_its_mean_rate),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
 /* Mounts, attitude controller and sensors in the units of their keys: degrees, arcseconds, hertz
- * and hours of the configuration against SI within, each number another one. */
+ * and hours of the configuration against SI within, each number another one; mounts at their pole.
+ */
 #include "boresight/vec.h"
 #include "gimbal/mount/mount.h"
 #include "gimbal/mount/second_order.h"
@@ -175,6 +176,25 @@ static void a_gyro(void **state) {
     }
 }
 
+static void at_the_pole_the_outer_axis_stays(void **state) {
+    (void)state;
+    for (int type = 0; type < 2; type++) {
+        for (int side = -1; side <= 1; side += 2) {
+            const double there[3] = {0.0, side * 0.5 * BST_PI, 0.0};
+            bst_quat q = bst_mount_attitude(type, there);
+            bst_vec3 pole = bst_quat_rotate(bst_quat_conj(q), (bst_vec3){0, 0, 1});
+            bst_mount_pose pose =
+                bst_mount_solve(type, bst_vec3_unit(pole), (bst_vec3){0.01, 0.02, 0.03}, 0.7);
+            bst_assert_close(pose.angle_rad[0], 0.7, 0);
+            bst_assert_close(pose.angle_rad[1], side * 0.5 * BST_PI, 1e-9);
+            for (int k = 0; k < 3; k++) {
+                assert_true(k < 2 || pose.angle_rad[k] == 0.0);
+                assert_true(pose.rate_radps[k] == 0.0);
+            }
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_chain_of_three_axes),
@@ -182,6 +202,7 @@ int main(void) {
         cmocka_unit_test(an_attitude_controller),
         cmocka_unit_test(a_star_tracker),
         cmocka_unit_test(a_gyro),
+        cmocka_unit_test(at_the_pole_the_outer_axis_stays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

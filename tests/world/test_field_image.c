@@ -166,12 +166,31 @@ static void squares_of_streaks(void **state) {
     }
 }
 
+/* What blurs a path of (12, 5) px besides its length: jitter of 0.5 px along it, of 0.3 px across,
+ * and 2 px of FWHM with the pixel's width. */
+static void blur_along_and_across(void **state) {
+    (void)state;
+    bst_camera camera = test_camera();
+    const bst_scene_source source = {.kind = BST_SOURCE_STAR};
+    const double c = 12.0 / 13, s = 5.0 / 13, uu = 13.0 * 13 / 12 + 0.25, vv = 0.09;
+    const bst_scene_image_moments m = {.x_mean = 100,
+                                       .y_mean = 80,
+                                       .xx = uu * c * c + vv * s * s,
+                                       .xy = (uu - vv) * c * s,
+                                       .yy = uu * s * s + vv * c * c};
+    double along, across, psf = 4 / (8 * log(2)) + 1.0 / 12;
+    bst_assert_close(bst_image_blur(&camera, &source, &m, 12, 5, &along, &across), psf, 1e-12);
+    bst_assert_close(along, sqrt(psf + 0.25), 1e-12);
+    bst_assert_close(across, sqrt(psf + 0.09), 1e-12);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(light_on_a_crooked_track),
         cmocka_unit_test(a_disc_moves_and_widens_the_image),
         cmocka_unit_test(vignetting_moves_the_light),
         cmocka_unit_test(squares_of_streaks),
+        cmocka_unit_test(blur_along_and_across),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
