@@ -231,8 +231,7 @@ static void make_pairs(bst_interreflection *r, const bst_satellite_pose *p) {
 static double visible_m2(bst_interreflection *r, bst_satellite_pose *p, int facet) {
     if (r->visible_m2[facet] < 0.0) {
         double cosine = bst_vec3_dot(p->normals[facet], p->views[0].z);
-        r->visible_m2[facet] =
-            cosine > 1e-9 ? cosine * bst_pose_unshadowed_area(p, facet, 1) : 0.0;
+        r->visible_m2[facet] = cosine > 1e-9 ? cosine * bst_pose_unshadowed_area(p, facet, 1) : 0.0;
     }
     return r->visible_m2[facet];
 }
@@ -263,9 +262,8 @@ void bst_interreflection_add(bst_interreflection *r, bst_satellite_pose *p,
     bst_pose_look(p, 0, light->sun);
     for (int i = 0; i < s->facet_count; i++) {
         double cosine = bst_vec3_dot(p->normals[i], light->sun);
-        r->lit[i] = cosine > 1e-9
-                        ? cosine * bst_pose_unshadowed_area(p, i, 1) / s->facets[i].area_m2
-                        : 0.0;
+        r->lit[i] =
+            cosine > 1e-9 ? cosine * bst_pose_unshadowed_area(p, i, 1) / s->facets[i].area_m2 : 0.0;
         r->visible_m2[i] = -1.0;
     }
     bst_pose_look(p, 0, light->observer);

@@ -29,8 +29,7 @@ typedef struct bst_resolved_samples {
     float *near; /* [cells] 1 over the depth of the nearest facet */
     int *facet;  /* [cells] the nearest facet; -1: none */
     size_t cells;
-    float *toward;        /* [side][side] place toward the Sun of the nearest facet to it */
-    bst_vec3 *seen, *sun; /* by vertex: cells and 1 over the depth; likewise for the Sun's view */
+    float *toward;            /* [side][side] place toward the Sun of the nearest facet to it */
     bst_sampled_facet *light; /* by facet */
 } bst_resolved_samples;
 

@@ -8,8 +8,6 @@ void bst_resolved_samples_free(bst_resolved_samples *s) {
     free(s->near);
     free(s->facet);
     free(s->toward);
-    free(s->seen);
-    free(s->sun);
     free(s->light);
     *s = (bst_resolved_samples){.cells = 0};
 }
@@ -20,10 +18,8 @@ static bst_status reserve(bst_ctx *ctx, const bst_resolved *r, bst_resolved_samp
     bool made = true;
     if (!s->toward) {
         s->toward = malloc(side * side * sizeof *s->toward);
-        s->seen = malloc(((size_t)r->satellite->vertex_count + 1) * sizeof *s->seen);
-        s->sun = malloc(((size_t)r->satellite->vertex_count + 1) * sizeof *s->sun);
         s->light = malloc(((size_t)r->satellite->facet_count + 1) * sizeof *s->light);
-        made = s->toward && s->seen && s->sun && s->light;
+        made = s->toward && s->light;
     }
     if (made && cells > s->cells) {
         free(s->near);
@@ -136,23 +132,42 @@ static const bst_sampled_facet *light_of(const bst_resolved_adding *a, bst_resol
     return out;
 }
 
-/* Enters all facets that face a direction: the Sun into its depth map, or the eye into the image.
- */
-static void enter_facets(const bst_resolved_adding *a, bst_resolved_samples *s, const target *t,
-                         const bst_vec3 *place, const sun_view *sun) {
+/* Where a vertex is in the image, from the sample of cell (0, 0), with 1 over its depth. */
+static bst_vec3 in_image(const bst_resolved_adding *a, const double offset[2], bst_vec3 p) {
+    double depth_m;
+    bst_point2 q = bst_resolved_project(a, p, &depth_m);
+    return (bst_vec3){q.x - offset[0], q.y - offset[1], 1.0 / depth_m};
+}
+
+/* Enters all facets into the Sun's depth map and into the image. Triangles of a mesh share no
+ * vertices, so that each is placed when it is needed: memory takes longer than the computation. */
+static void enter_facets(const bst_resolved_adding *a, bst_resolved_samples *s, const target *map,
+                         const target *image, const sun_view *sun, const double offset[2]) {
     const bst_satellite *sat = a->r->satellite;
     for (int f = 0; f < sat->facet_count; f++) {
         const bst_facet *facet = &sat->facets[f];
         const int *v = &sat->corner[facet->first];
-        bst_vec3 from = t->facet ? bst_vec3_sub(a->eye_m, a->pose->vertices[v[0]]) : a->light->sun;
-        if (!(bst_vec3_dot(a->pose->normals[f], from) > 0.0)) {
-            continue;
+        const bst_vec3 *vertices = a->pose->vertices, *normal = &a->pose->normals[f];
+        if (bst_vec3_dot(*normal, a->light->sun) > 0.0) {
+            bst_vec3 p = in_sun_view(sun, vertices[v[0]]), q = in_sun_view(sun, vertices[v[1]]);
+            for (int i = 2; i < facet->count; i++) {
+                bst_vec3 r = in_sun_view(sun, vertices[v[i]]);
+                enter(map, &p, &q, &r, f);
+                q = r;
+            }
         }
-        for (int i = 1; i + 1 < facet->count; i++) {
-            enter(t, &place[v[0]], &place[v[i]], &place[v[i + 1]], f);
-        }
-        if (t->facet && !a->earth) { /* now, while its memory is near; earthlight takes longer */
-            (void)light_of(a, s, sun, f);
+        s->light[f].known = false;
+        if (bst_vec3_dot(*normal, bst_vec3_sub(a->eye_m, vertices[v[0]])) > 0.0) {
+            bst_vec3 p = in_image(a, offset, vertices[v[0]]);
+            bst_vec3 q = in_image(a, offset, vertices[v[1]]);
+            for (int i = 2; i < facet->count; i++) {
+                bst_vec3 r = in_image(a, offset, vertices[v[i]]);
+                enter(image, &p, &q, &r, f);
+                q = r;
+            }
+            if (!a->earth) { /* now, while its memory is near; earthlight takes longer */
+                (void)light_of(a, s, sun, f);
+            }
         }
     }
 }
@@ -231,25 +246,15 @@ bst_status bst_resolved_sample(bst_ctx *ctx, const bst_resolved_adding *a, int i
     sun_view v = {.z = a->light->sun, .per_m = 0.49 * BST_SHADOW_SIDE / sat->radius_m};
     v.x = bst_vec3_perpendicular(v.z);
     v.y = bst_vec3_cross(v.z, v.x);
-    for (int i = 0; i < sat->vertex_count; i++) {
-        double depth_m;
-        bst_point2 p = bst_resolved_project(a, a->pose->vertices[i], &depth_m);
-        s->seen[i] = (bst_vec3){p.x - offset[0], p.y - offset[1], 1.0 / depth_m};
-        s->sun[i] = in_sun_view(&v, a->pose->vertices[i]);
-    }
     size_t cells = (size_t)r->image.width * (size_t)r->image.height;
     memset(s->near, 0, cells * sizeof *s->near);
     memset(s->facet, -1, cells * sizeof *s->facet);
-    for (int f = 0; f < sat->facet_count; f++) {
-        s->light[f].known = false;
-    }
     for (int i = 0; i < BST_SHADOW_SIDE * BST_SHADOW_SIDE; i++) {
         s->toward[i] = -INFINITY;
     }
     const target shadow = {s->toward, NULL, BST_SHADOW_SIDE, BST_SHADOW_SIDE};
     const target image = {s->near, s->facet, r->image.width, r->image.height};
-    enter_facets(a, s, &shadow, s->sun, &v);
-    enter_facets(a, s, &image, s->seen, &v);
+    enter_facets(a, s, &shadow, &image, &v, offset);
     *total = add_samples(a, s, &v, offset, weight);
     return BST_OK;
 }

@@ -91,7 +91,7 @@ static void intersections_agree_with_pieces(void **state) {
     "{\"materials\": [{\"name\": \"w\", \"diffuse\": 0.5}], \"parts\": ["                      \
     "{\"name\": \"bus\", \"kind\": \"box\", \"size_m\": [2, 2, 3], \"material\": \"w\"}, "     \
     "{\"name\": \"mast\", \"kind\": \"cylinder\", \"radius_m\": 0.2, \"length_m\": 2, "        \
-    "\"position_m\": [0.5, 0.4, 2.51], \"material\": \"w\"}, "                                    \
+    "\"position_m\": [0.5, 0.4, 2.51], \"material\": \"w\"}, "                                 \
     "{\"name\": \"cone\", \"kind\": \"cone\", \"radius_m\": 0.5, \"top_radius_m\": 0.1, "      \
     "\"length_m\": 2, \"position_m\": [0.6, -0.5, 1.7], \"material\": \"w\"}, "                \
     "{\"name\": \"wing\", \"kind\": \"plate\", \"size_m\": [1, 5, 1], \"position_m\": [0, 2, " \
