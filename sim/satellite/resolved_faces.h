@@ -95,7 +95,7 @@ bst_resolved_shading bst_resolved_shade(const bst_resolved_adding *a, int materi
  * Given:     view  0: Sun; 1: earthlight */
 double bst_resolved_lit_fraction(const bst_resolved_adding *a, int facet, int view);
 
-/* Tells the surface which cells the convex bodies of the model reach. BST_ERR_MEMORY. */
+/* Marks the cells of the surface that the convex bodies of the model reach. BST_ERR_MEMORY. */
 bst_status bst_resolved_reach(bst_ctx *ctx, const bst_resolved_adding *a) BST_MUST_CHECK;
 
 /* Covers the grid by a facet: fills r->whole and the facet's box. BST_ERR_MEMORY. */

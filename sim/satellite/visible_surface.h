@@ -29,7 +29,7 @@ typedef struct bst_fragment_corner {
     float x, y;
 } bst_fragment_corner;
 
-/* Who reaches a cell: nobody yet, one body, or several. */
+/* What reaches a cell: no body yet, one, or several. */
 typedef enum bst_cell_kind { BST_CELL_EMPTY, BST_CELL_OF_ONE, BST_CELL_OF_SEVERAL } bst_cell_kind;
 
 /* A cell of one body has the sums of its fragments. One of several has the nearest surface with

@@ -27,7 +27,7 @@ IMAGE_SIDE, IMAGE_SAMPLES = 64, 16384  # as in print_flux.c
 IMAGE_TOLERANCE_SIGMA = 0.1
 # Mitsuba counts in single precision and starts rays to the Sun some 1e-4 of the coordinates away from a surface: at
 # grazing incidence borders of shadows move by a tenth of a pixel. The pixels that differ most are traced again.
-TRACED, RAYS = 40, 128
+TRACED, RAYS = 40, 256
 # incidence and reflection of the table, degrees
 TABLE_IN = list(range(0, 90, 10))
 TABLE_OUT = list(range(-88, 90, 4))

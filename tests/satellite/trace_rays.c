@@ -4,9 +4,9 @@
  *
  *   trace_rays RAYS < SCENE
  *
- * RAYS: along each side of a pixel. SCENE, numbers only: directions to Sun and camera, down in the
- * image, distance, angle of a pixel, pixels along a side; number of pixels, and x and y of each;
- * number of triangles, and reflectance and three corners of each. */
+ * RAYS: square root of their number in a pixel. SCENE, numbers only: directions to Sun and camera,
+ * down in the image, distance, angle of a pixel, pixels along a side; number of pixels, and x and y
+ * of each; number of triangles, and reflectance and three corners of each. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -104,8 +104,10 @@ static double trace(const scene *s, int x, int y, int rays) {
              eye = bst_vec3_scale(s->eye, s->range);
     int *facet = malloc((size_t)(rays * rays) * sizeof *facet);
     for (int k = 0; point && facet && k < rays * rays; k++) {
-        double u = s->scale * (x + (k % rays + 0.5) / rays - s->middle);
-        double v = s->scale * (y + (k / rays + 0.5) / rays - s->middle), nearest = INFINITY, xy[2];
+        /* multiples of the golden ratio's generalisation to two dimensions (Roberts 2018) */
+        double u = s->scale * (x + fmod(0.5 + 0.7548776662466927 * k, 1.0) - s->middle);
+        double v = s->scale * (y + fmod(0.5 + 0.5698402909980532 * k, 1.0) - s->middle);
+        double nearest = INFINITY, xy[2];
         bst_vec3 way = bst_vec3_axpy(bst_vec3_axpy(s->ahead, u, s->right), v, s->down);
         int found = -1;
         for (int i = 0; i < chosen; i++) {
