@@ -114,6 +114,19 @@ static void measure_parts(const bst_psf *psf, int node, const double peak_px[2],
     }
 }
 
+/* Adds the bounds of derivatives of order 2, 4, 6 and 8 along each direction by a frequency whose
+ * modulus is m. */
+static void add_derivatives(double along[DIRECTIONS][4], double fx, double fy, double m) {
+    for (int d = 0; d < DIRECTIONS; d++) {
+        double angle = BST_PI * d / DIRECTIONS;
+        double w = 2.0 * BST_PI * (fx * cos(angle) + fy * sin(angle));
+        along[d][0] += w * w * m;
+        along[d][1] += w * w * w * w * m;
+        along[d][2] += w * w * w * w * w * w * m;
+        along[d][3] += w * w * w * w * w * w * w * w * m;
+    }
+}
+
 /* Measures peak, sensitivity to coarse quadrature nodes, and spectrum along x and y. */
 static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, bst_fft_complex_f32 *room,
                                bst_fourier_band *out) {
@@ -143,14 +156,7 @@ static bst_status measure_core(bst_ctx *ctx, const bst_psf *psf, bst_fft_complex
                     int bin = (int)(f[a] / out->axis[a].step);
                     out->axis[a].weight[bin < BST_SPREAD_BINS ? bin : BST_SPREAD_BINS - 1] += m;
                 }
-                for (int d = 0; d < DIRECTIONS; d++) {
-                    double angle = BST_PI * d / DIRECTIONS;
-                    double w = 2.0 * BST_PI * (fx * cos(angle) + fy * sin(angle));
-                    along[d][0] += w * w * m;
-                    along[d][1] += w * w * w * w * m;
-                    along[d][2] += w * w * w * w * w * w * m;
-                    along[d][3] += w * w * w * w * w * w * w * w * m;
-                }
+                add_derivatives(along, fx, fy, m);
             }
         }
         bst_status status = invert(ctx, room, IMAGE);

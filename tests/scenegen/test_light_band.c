@@ -68,6 +68,28 @@ static void radii_keep_the_limit(void **state) {
     }
 }
 
+/* Largest 5 D4 / D6 and 7 D6 / D8 along an axis and a diagonal, of the sums D of moduli. */
+static double smoothed_variance(void) {
+    enum { STEPS = 240 };
+    double sum[2][3] = {{0.0}}, worst = 0.0;
+    for (int n = 0; n < STEPS * STEPS; n++) {
+        double fx = ((n % STEPS) + 0.5) / STEPS, fy = ((n / STEPS) + 0.5) / STEPS;
+        double m = exp(-2.0 * BST_PI * BST_PI * SIGMA * SIGMA * (fx * fx + fy * fy)) *
+                   sin(BST_PI * fx) * sin(BST_PI * fy) / (fx * fy);
+        /* both diagonals are alike: so is the mean of their powers */
+        double w[3] = {fx, (fx + fy) * sqrt(0.5), (fx - fy) * sqrt(0.5)};
+        for (int k = 0; k < 3; k++) {
+            for (int o = 0; o < 3; o++) {
+                sum[k > 0][o] += m * pow(2.0 * BST_PI * w[k], 4.0 + 2.0 * o);
+            }
+        }
+    }
+    for (int d = 0; d < 2; d++) {
+        worst = fmax(worst, fmax(5.0 * sum[d][0] / sum[d][1], 7.0 * sum[d][1] / sum[d][2]));
+    }
+    return worst;
+}
+
 /* OTF exp(-2 pi^2 sigma^2 f^2) sinc(fx) sinc(fy). numpy, sums over 2401^2 frequencies up to 1.2
  * cycles/px; ours over 64^2 to 128^2 of the band kept. */
 static void the_band_of_a_gaussian(void **state) {
@@ -86,6 +108,9 @@ static void the_band_of_a_gaussian(void **state) {
     bst_assert_close(band.peak, centre * centre, 1e-6); /* single precision, and what is cut */
     bst_assert_close(band.share_sigma_px, SIGMA, 1e-5);
     bst_assert_close(band.node_sigma_px, 1.06123829452949, 1e-4);
+    /* what is cut, and steps of frequency */
+    bst_assert_close(band.smoothed_variance_px2, smoothed_variance(), 0.01);
+    assert_true(band.smoothed_variance_px2 >= band.node_sigma_px * band.node_sigma_px);
     static const double parts[3][3] = {
         {0.7821934705182304, 0.6014843512709983, 0.4564959040425649},
         {0.5841551428286976, 0.36630446596772875, 0.29895622228584806},

@@ -35,7 +35,7 @@ static void moments_of(const double p[POINTS][3], bst_smear_moments *g) {
             d[i] -= x * g->axis[i];
             y2 += d[i] * d[i];
         }
-        for (int k = 0; k <= 8; k++) {
+        for (int k = 0; k <= 6; k++) {
             g->along[k] += pow(x, k) / POINTS;
         }
         for (int i = 0; i < 3; i++) {
