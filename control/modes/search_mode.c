@@ -119,9 +119,12 @@ static bst_status plan_region(bst_ctx *ctx, bst_control *c, int64_t tick, bst_se
 bst_status bst_control_start_search(bst_ctx *ctx, bst_control *c, int mode, int64_t tick,
                                     const char *reason) {
     bst_vec3 image_x = {cos(c->env.rotation_rad), sin(c->env.rotation_rad), 0.0};
-    c->search_x_gcrf = c->pointing_valid
-                           ? bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), image_x)
-                           : (bst_vec3){1, 0, 0};
+    bst_quat q = c->pointing.q_cam_from_gcrf;
+    if (bst_control_may_be_lost(c)) { /* else the telemetry's roll is right within the overlap */
+        q = bst_quat_mul(q, bst_control_correction_at(c, tick));
+    }
+    c->search_x_gcrf =
+        c->pointing_valid ? bst_quat_rotate(bst_quat_conj(q), image_x) : (bst_vec3){1, 0, 0};
     bst_search_pattern pattern = (bst_search_pattern)c->config.search_pattern;
     bst_search_area area = {.field_x_rad = 2.0 * atan(0.5 * c->env.width_px * c->env.pixel_rad),
                             .field_y_rad = 2.0 * atan(0.5 * c->env.height_px * c->env.pixel_rad),

@@ -40,6 +40,7 @@ typedef struct bst_star_patterns_info {
     double stars_per_sr; /* mean density of catalogue stars down to that */
     int64_t bytes;
 } bst_star_patterns_info;
+/* Reads the size of a database. */
 void bst_star_patterns_get_info(const bst_star_patterns *patterns, bst_star_patterns_info *out);
 
 /* A pattern of the database that agrees with a quad: catalogue directions of A, B, C and D. */

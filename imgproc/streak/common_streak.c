@@ -14,7 +14,9 @@ static const double CONNECTED_SIGMA = 2.0;
 /* Negative pixels below this are bad, sigma. */
 static const float LEAST_SIGMA = -5.0f;
 /* A source this near to a brighter one, and fainter by this share, is what its subtraction left. */
-static const double GHOST_PX = 15.0, GHOST_SHARE = 0.08;
+static const double GHOST_PX = 15.0, GHOST_SHARE = 0.15;
+/* A source whose variance along its longer axis is below this times that across is a point. */
+static const double ROUND = 2.0;
 /* Least share of the template's energy inside the frame. */
 static const double LEAST_INSIDE = 0.25;
 
@@ -165,8 +167,8 @@ static bst_status copy_template(bst_ctx *ctx, bst_common_streak *s, const int *l
     return BST_OK;
 }
 
-/* Centroid and principal axis of the template, pointing right. */
-static void principal_axis(const bst_common_streak *s, double centre[2], double axis[2]) {
+/* Centroid and principal axis of the template, pointing right. Returns false for a point. */
+static bool principal_axis(const bst_common_streak *s, double centre[2], double axis[2]) {
     double sum = 0.0, m[5] = {0};
     for (int y = 0; y < s->rows; y++) {
         for (int x = 0; x < s->columns; x++) {
@@ -186,13 +188,18 @@ static void principal_axis(const bst_common_streak *s, double centre[2], double 
     double angle = 0.5 * atan2(2.0 * xy, xx - yy);
     axis[0] = cos(angle);
     axis[1] = sin(angle);
+    double spread = hypot(xx - yy, 2.0 * xy);
+    return xx + yy + spread > ROUND * (xx + yy - spread);
 }
 
 /* Places of the ends: where the light along the principal axis falls to half of that of the last
  * END_PX. A round source has both at its centre. */
 static bst_status find_ends(bst_ctx *ctx, bst_common_streak *s) {
     double centre[2], axis[2];
-    principal_axis(s, centre, axis);
+    if (!principal_axis(s, centre, axis)) {
+        s->ends[0] = s->ends[1] = (bst_common_streak_point){centre[0], centre[1]};
+        return BST_OK;
+    }
     const int half = s->rows + s->columns, bins = 2 * half + 1;
     double *light = calloc(2 * (size_t)bins, sizeof *light), *side = light + bins;
     if (!light) {

@@ -525,6 +525,7 @@ static void nothing_is_commanded_without_an_attitude(void **state) {
     config.lost_after_frames = 3;
     rig_open(&r, &config, BST_REGION_NONE);
     const bst_quat error = bst_quat_from_rotvec((bst_vec3){0.3, 2.0, -1.0});
+    int searched = 0;
     for (int64_t t = 0; t < 12000; t += 50) {
         bool frame = t % 1000 == 500;
         bool valid = (t > 3000 && t < 6000) || t > 10000;
@@ -548,7 +549,14 @@ static void nothing_is_commanded_without_an_attitude(void **state) {
             bst_vec3 wanted = bst_quat_rotate(error, cue);
             assert_true(bst_vec3_angle(r.command.direction_gcrf, wanted) < 1e-9); /* rounding */
         }
+        if (r.status.mode == BST_MODE_SEARCH && searched++ == 0) {
+            /* the places of the search lie along the image's true axes */
+            bst_quat q = bst_quat_conj(bst_quat_mul(r.q_cam, error));
+            bst_vec3 x = bst_quat_rotate(q, (bst_vec3){1, 0, 0});
+            assert_true(bst_vec3_angle(r.control.search_x_gcrf, x) < 1e-6);
+        }
     }
+    assert_true(searched > 0);
     rig_close(&r);
 }
 

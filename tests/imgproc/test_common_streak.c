@@ -1,0 +1,161 @@
+/* The common streak of a frame: shape, ends and stars from the pixels alone. */
+#include "boresight/rng.h"
+#include "imgproc/streak/common_streak.h"
+#include "tests/test_support.h"
+
+enum { SIDE = 240, STARS = 9 };
+
+typedef struct scene {
+    bst_ctx ctx;
+    float pixels[SIDE * SIDE];
+    double x[STARS], y[STARS], flux[STARS]; /* places at the exposure's start */
+} scene;
+
+static double uniform(uint64_t a, uint64_t b) {
+    return bst_rng_uniform(bst_rng_make_key(4, 0, "test", "common streak"), a, b);
+}
+
+/* Path of a star, u from 0 to 1: `length` px to the right and downwards, bent. */
+static void path(double length, double u, double *dx, double *dy) {
+    *dx = length * (0.92 * u - 0.05 * u * u);
+    *dy = length * (0.2 * u + 0.2 * u * u);
+}
+
+static void add_star(scene *s, int i, double length) {
+    int steps = 1 + (int)(4.0 * length);
+    for (int k = 0; k < steps; k++) {
+        double dx, dy;
+        path(length, steps > 1 ? (double)k / (steps - 1) : 0.0, &dx, &dy);
+        double cx = s->x[i] + dx, cy = s->y[i] + dy;
+        for (int y = (int)cy - 5; y <= (int)cy + 5; y++) {
+            for (int x = (int)cx - 5; x <= (int)cx + 5; x++) {
+                if (x >= 0 && y >= 0 && x < SIDE && y < SIDE) {
+                    double r2 = (x - cx) * (x - cx) + (y - cy) * (y - cy);
+                    s->pixels[y * SIDE + x] += (float)(s->flux[i] / steps * exp(-r2 / 1.8));
+                }
+            }
+        }
+    }
+}
+
+/* Stars of unit noise on a slope of columns; with bad pixels. */
+static void draw(scene *s, double length, double per_px) {
+    memset(s, 0, sizeof *s);
+    bst_rng_key key = bst_rng_make_key(4, 0, "test", "noise");
+    for (uint64_t i = 0; i < SIDE * SIDE; i++) {
+        s->pixels[i] = (float)(100.0 + 0.5 * (double)(i % SIDE) + bst_rng_normal(key, i, 0));
+    }
+    for (int i = 0; i < STARS; i++) {
+        /* a grid, so that streaks do not lie on each other */
+        s->x[i] = 22.0 + 68.0 * (i % 3) + 10.0 * uniform((uint64_t)i, 0);
+        s->y[i] = 20.0 + 68.0 * (i / 3) + 12.0 * uniform((uint64_t)i, 1);
+        s->flux[i] = per_px * fmax(length, 1.0) * (i == 4 ? 3.0 : 1.0 + uniform((uint64_t)i, 2));
+        add_star(s, i, length);
+    }
+    s->pixels[5 * SIDE + 7] = NAN;
+    s->pixels[50 * SIDE + 7] = -30000.0f;
+}
+
+/* Every star is found once, at its place by the template's first end. */
+static void check(scene *s, double length) {
+    const bst_common_streak_options options = {
+        .candidates = 3, .max_sources = 40, .least_snr = 15.0};
+    bst_common_streak found;
+    bst_assert_ok(&s->ctx,
+                  bst_common_streak_find(&s->ctx, s->pixels, SIDE, SIDE, &options, &found));
+    assert_true(found.shapes >= 1);
+    bst_assert_close(found.sigma, 1.0, 0.1); /* the stars widen it a little */
+    double dx, dy;
+    path(length, 1.0, &dx, &dy);
+    /* ends by half the light: half a pixel; across a bent end a pixel */
+    bst_assert_close(found.ends[1].x_px - found.ends[0].x_px, dx, 1.5);
+    bst_assert_close(found.ends[1].y_px - found.ends[0].y_px, dy, 1.5);
+    int matched[STARS] = {0};
+    double sum_x = 0.0, sum_y = 0.0, square = 0.0;
+    for (int k = 0; k < found.count; k++) {
+        for (int i = 0; i < STARS; i++) {
+            double ex = found.items[k].x_px + found.ends[0].x_px - s->x[i];
+            double ey = found.items[k].y_px + found.ends[0].y_px - s->y[i];
+            if (hypot(ex, ey) < 4.0) {
+                matched[i]++;
+                sum_x += ex;
+                sum_y += ey;
+                square += ex * ex + ey * ey;
+                assert_true(found.items[k].cov_xx > 0.0 && found.items[k].cov_yy > 0.0);
+            }
+        }
+    }
+    for (int i = 0; i < STARS; i++) {
+        assert_int_equal(matched[i], 1);
+    }
+    assert_true(found.count <= STARS + 2);
+    double bias = hypot(sum_x, sum_y) / STARS;
+    double rms = sqrt(square / STARS - bias * bias);
+    print_message("%g px: %d stars, ends off by %.2f px, stars by %.3f px\n", length, found.count,
+                  bias, rms);
+    assert_true(bias < 1.0); /* as the ends */
+    assert_true(rms < 0.4);  /* 0.1 px of noise, the template's own noise */
+    bst_common_streak_free(&found);
+}
+
+static void points(void **state) {
+    (void)state;
+    static scene s;
+    draw(&s, 0.0, 60.0);
+    check(&s, 0.0);
+}
+
+static void curved_streaks(void **state) {
+    (void)state;
+    static scene s;
+    draw(&s, 45.0, 12.0);
+    check(&s, 45.0);
+}
+
+/* Stars that the frame cuts off are found by the end that is left. */
+static void streaks_at_the_edge(void **state) {
+    (void)state;
+    static scene s;
+    draw(&s, 45.0, 12.0);
+    s.x[0] = SIDE - 25.0;
+    s.y[0] = 205.0;
+    s.flux[0] = 45.0 * 40.0;
+    add_star(&s, 0, 45.0);
+    const bst_common_streak_options options = {
+        .candidates = 3, .max_sources = 40, .least_snr = 15.0};
+    bst_common_streak found;
+    bst_assert_ok(&s.ctx, bst_common_streak_find(&s.ctx, s.pixels, SIDE, SIDE, &options, &found));
+    int seen = 0;
+    for (int k = 0; k < found.count; k++) {
+        seen += hypot(found.items[k].x_px + found.ends[0].x_px - s.x[0],
+                      found.items[k].y_px + found.ends[0].y_px - s.y[0]) < 1.5;
+    }
+    assert_int_equal(seen, 1);
+    bst_common_streak_free(&found);
+}
+
+/* Noise alone has no shape; a number beyond the last shape gives none. */
+static void nothing_to_find(void **state) {
+    (void)state;
+    static scene s;
+    draw(&s, 0.0, 0.0);
+    bst_common_streak_options options = {.candidates = 3, .max_sources = 40, .least_snr = 15.0};
+    bst_common_streak found;
+    for (options.shape = 0; options.shape < 4; options.shape += 3) {
+        bst_assert_ok(&s.ctx,
+                      bst_common_streak_find(&s.ctx, s.pixels, SIDE, SIDE, &options, &found));
+        assert_int_equal(found.shapes, 0);
+        assert_int_equal(found.count, 0);
+        bst_common_streak_free(&found);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(points),
+        cmocka_unit_test(curved_streaks),
+        cmocka_unit_test(streaks_at_the_edge),
+        cmocka_unit_test(nothing_to_find),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
