@@ -134,8 +134,9 @@ struct bst_generator {
     int count, lost;
 };
 
-/* Share of a Gaussian's light at (x, y) that is on the frame. */
-double bst_generator_inside(const bst_generator *g, double x, double y, double sigma);
+/* Sets the visible share of a source's image. The squared light counts, because the image's square
+ * is narrower than the image. */
+void bst_generator_set_visible_share(const bst_generator *g, generator_source *s);
 /* Sets the image of a source that has a shape in the truth. */
 void bst_generator_set_image(const bst_generator *g, const bst_truth *truth, generator_source *s);
 /* Factor on the standard deviation of a source's position by the width of its image, along a unit
