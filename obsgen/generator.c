@@ -461,7 +461,11 @@ bst_status bst_generator_run(bst_ctx *ctx, bst_generator *g, const bst_generator
     g->count = g->lost = 0;
     set_noise(g, f);
     BST_TRY(collect(ctx, g, f));
-    bool full = bst_generator_saturation_e(g) <= 0.0; /* the sky alone saturates every pixel */
+    const bst_truth *truth = f->truth;
+    double disc = fmax(fmax(truth->earth_fraction, truth->moon_fraction), truth->sun_fraction);
+    /* the sky alone saturates every pixel; background_e is that of the middle, which may be on a
+     * disc that leaves the rest dark */
+    bool full = bst_generator_saturation_e(g) <= 0.0 && (disc == 0.0 || disc == 1.0);
     g->source_count = full ? 0 : g->source_count;
     for (int i = 0; i < g->source_count; i++) {
         g->sources[i].saturated =

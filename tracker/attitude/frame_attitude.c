@@ -3,7 +3,8 @@
 
 #include "tracker/tracker_internal.h"
 
-/* Error of the telemetry above which it is kept beside the filter, rad: 5.7 deg. */
+/* Error of the telemetry, beyond what was expected, that is kept beside the filter, rad: 5.7 deg.
+ */
 static const double LARGE_ERROR_RAD = 0.1;
 
 /* Direction of a catalogue star, from the cache or the catalogue. */
@@ -58,13 +59,16 @@ bst_quat bst_tracker_refer(const bst_tracker *t, bst_quat q_telemetry) {
     return t->referred ? bst_quat_unit(bst_quat_mul(q_telemetry, t->reference)) : q_telemetry;
 }
 
-/* Moves a large error from the filter to the reference: the filter is one of small angles.
+/* Moves a large error from the filter to the reference if the filter just started with it: the
+ * filter is one of small angles. An error that grew to that size stays in the filter, which follows
+ * its rate.
  *
- * Given:     q_stars, covariance  the fix that the filter started with */
-static void rebase(bst_tracker *t, bst_quat q_telemetry, bst_quat q_stars,
+ * Given:     expected  error that the filter had predicted, GCRF axes, rad
+ *            q_stars, covariance  the fix */
+static void rebase(bst_tracker *t, bst_vec3 expected, bst_quat q_telemetry, bst_quat q_stars,
                    const double covariance[3][3]) {
-    const double *e = t->error.e;
-    if (bst_vec3_norm((bst_vec3){e[0], e[1], e[2]}) <= LARGE_ERROR_RAD) {
+    bst_vec3 e = bst_vec3_from_array(t->error.e);
+    if (t->error.fixes > 1 || bst_vec3_norm(bst_vec3_sub(e, expected)) <= LARGE_ERROR_RAD) {
         return;
     }
     t->referred = true;
@@ -99,10 +103,12 @@ void bst_tracker_find_attitude(bst_tracker *t, const bst_tracker_input *input,
             t->referred
                 ? bst_quat_to_rotvec(bst_quat_mul(solution.q_cam_from_gcrf, bst_quat_conj(q_known)))
                 : out->fix.error_cam_rad;
+        bst_vec3 expected =
+            t->error.started ? bst_vec3_from_array(t->error.e) : (bst_vec3){0.0, 0.0, 0.0};
         out->usable =
             bst_attitude_error_update(&t->error, &t->error_params, q_known, e, solution.covariance);
         if (out->usable) {
-            rebase(t, q_telemetry, solution.q_cam_from_gcrf, solution.covariance);
+            rebase(t, expected, q_telemetry, solution.q_cam_from_gcrf, solution.covariance);
         }
         out->fix.valid = out->usable;
         if (out->usable) {

@@ -148,47 +148,22 @@ static double length_px(const bst_common_streak *s) {
     return hypot(s->ends[1].x_px - s->ends[0].x_px, s->ends[1].y_px - s->ends[0].y_px);
 }
 
-/* Tries the ends of a shape's streaks until one gives an attitude. */
-static bst_status try_ends(bst_ctx *ctx, solving *s) {
-    int ends = length_px(&s->streak) < POINT_PX ? 1 : 2;
-    s->result.solved = false;
-    for (int end = 0; end < ends && !s->result.solved; end++) {
-        BST_TRY(solve_end(ctx, s, end));
-    }
-    return BST_OK;
-}
-
-/* Tries shapes of streaks and keeps the attitude that is least likely by chance: the brightest
- * source may be two stars, which give an attitude, but no end of a streak. */
+/* Tries shapes of streaks and their ends until one gives an attitude. */
 static bst_status try_shapes(bst_ctx *ctx, solving *s, const float *pixels, int width, int height) {
     bst_common_streak_options options = {
         .candidates = SHAPES, .max_sources = MOST_SOURCES, .least_snr = s->request->least_snr};
-    bst_common_streak streak = {0};
-    bst_lost_in_space_result result = {0};
-    int end = 0;
-    bst_status status = BST_OK;
-    for (; options.shape < SHAPES && status == BST_OK; options.shape++) {
-        status = bst_common_streak_find(ctx, pixels, width, height, &options, &s->streak);
-        if (status == BST_OK && options.shape >= s->streak.shapes) {
+    for (; options.shape < SHAPES && !s->result.solved; options.shape++) {
+        bst_common_streak_free(&s->streak);
+        BST_TRY(bst_common_streak_find(ctx, pixels, width, height, &options, &s->streak));
+        if (options.shape >= s->streak.shapes) {
             break;
         }
-        status = status == BST_OK ? try_ends(ctx, s) : status;
-        if (status == BST_OK &&
-            (options.shape == 0 ||
-             (s->result.solved && (!result.solved || s->result.log_chance < result.log_chance)))) {
-            bst_common_streak other = streak;
-            streak = s->streak;
-            s->streak = other;
-            result = s->result;
-            end = s->end;
+        int ends = length_px(&s->streak) < POINT_PX ? 1 : 2;
+        for (int end = 0; end < ends && !s->result.solved; end++) {
+            BST_TRY(solve_end(ctx, s, end));
         }
-        bst_common_streak_free(&s->streak);
     }
-    bst_common_streak_free(&s->streak);
-    s->streak = streak;
-    s->result = result;
-    s->end = end;
-    return status;
+    return BST_OK;
 }
 
 /* Prints where the middle of the frame looks while the stars are at an end of their streaks. */
