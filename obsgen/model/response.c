@@ -177,6 +177,35 @@ static double width_node(int k) {
     return 0.5 * (1.0 + least) + 0.5 * (1.0 - least) * place;
 }
 
+/* Most spectra that are transformed together. */
+enum { SPECTRA = BST_FALLOFF_WIDTHS + 2 };
+
+/* Share of a spectrum that widening leaves at a frequency.
+ *
+ * Given:     f            cycles/px
+ *            variance_px2 before the widening
+ *            share        root of its share in the widened variance */
+static double widened_share(double f, int binning, double variance_px2, double share) {
+    double turn = BST_PI * f * binning, more = variance_px2 * (1.0 / (share * share) - 1.0);
+    return exp(-2.0 * turn * turn * more);
+}
+
+/* Hankel transform of spectra, given on rings up to the frequency `limit`, at the n-th tabulated
+ * distance. */
+static void transform_at(double (*spectrum)[SPECTRA], int count, double limit, int binning, int n,
+                         double sum[SPECTRA]) {
+    double turn = 2.0 * BST_PI * n / BST_FALLOFF_PER_PX * limit * binning / RINGS;
+    for (int k = 0; k < count; k++) {
+        sum[k] = 0.0;
+    }
+    for (int i = 0; i < RINGS; i++) {
+        double wave = j0(turn * (i + 0.5));
+        for (int k = 0; k < count; k++) {
+            sum[k] += spectrum[i][k] * wave;
+        }
+    }
+}
+
 /* Mean correlation of source and filter over all directions, as a Hankel transform of its spectrum,
  * for images widened by Gaussians. The steps resolve the cusp at 0, which produces the wings. */
 static void tabulate_falloff(const bst_response_side *source, const bst_response_side *filter,
@@ -184,7 +213,7 @@ static void tabulate_falloff(const bst_response_side *source, const bst_response
     enum { ALL = BST_FALLOFF_WIDTHS + 1 };
     bst_response_nodes nodes[2];
     double limit = fmin(fmax(cutoff(source), cutoff(filter)), MOST_FREQUENCY);
-    double spectrum[RINGS][ALL], peak = 0.0;
+    double spectrum[RINGS][SPECTRA], peak = 0.0;
     bst_response_nodes_at(source, x_px, y_px, &nodes[0]);
     bst_response_nodes_at(filter, x_px, y_px, &nodes[1]);
     for (int i = 0; i < RINGS; i++) {
@@ -195,23 +224,15 @@ static void tabulate_falloff(const bst_response_side *source, const bst_response
             bst_response_otf(filter, &nodes[1], binning, f * cos(angle), f * sin(angle), q);
             all += f * (p[0] * q[0] + p[1] * q[1]);
         }
-        double turn = BST_PI * f * binning;
         for (int k = 0; k < ALL; k++) {
             double share = k == 0 ? 1.0 : width_node(k - 1);
-            double more = out->product_px2 * (1.0 / (share * share) - 1.0);
-            spectrum[i][k] = all * exp(-2.0 * turn * turn * more);
+            spectrum[i][k] = all * widened_share(f, binning, out->product_px2, share);
         }
         peak += spectrum[i][0];
     }
     for (int n = 0; n < BST_FALLOFF_DISTANCES; n++) {
-        double turn = 2.0 * BST_PI * n / BST_FALLOFF_PER_PX * limit * binning / RINGS;
-        double sum[ALL] = {0.0};
-        for (int i = 0; i < RINGS; i++) {
-            double wave = j0(turn * (i + 0.5));
-            for (int k = 0; k < ALL; k++) {
-                sum[k] += spectrum[i][k] * wave;
-            }
-        }
+        double sum[SPECTRA];
+        transform_at(spectrum, ALL, limit, binning, n, sum);
         out->falloff.value[n] = (float)(sum[0] / peak);
         for (int k = 1; k < ALL; k++) {
             out->falloff.widened[k - 1][n] = (float)(sum[k] / peak);
@@ -260,10 +281,9 @@ static void widen_falloff(bst_response *r) {
 /* Tabulates the images of a point, source and fitted PSF, for distances and the source's widths. */
 static void tabulate_images(const bst_response_side *source, const bst_response_side *filter,
                             int binning, double x_px, double y_px, bst_response *out) {
-    enum { ALL = BST_FALLOFF_WIDTHS + 2 };
     const bst_response_side *const sides[2] = {source, filter};
     double limit = fmin(fmax(cutoff(source), cutoff(filter)), MOST_FREQUENCY);
-    double spectrum[RINGS][ALL];
+    double spectrum[RINGS][SPECTRA];
     bst_response_nodes nodes[2];
     bst_response_nodes_at(source, x_px, y_px, &nodes[0]);
     bst_response_nodes_at(filter, x_px, y_px, &nodes[1]);
@@ -281,21 +301,14 @@ static void tabulate_images(const bst_response_side *source, const bst_response_
         double area = 2.0 * BST_PI * f * limit / RINGS * binning * binning;
         spectrum[i][0] = area * mean[1];
         spectrum[i][1] = area * mean[0];
-        double turn = BST_PI * f * binning;
         for (int k = 0; k < BST_FALLOFF_WIDTHS; k++) {
-            double share = width_node(k), more = out->image_px2 * (1.0 / (share * share) - 1.0);
-            spectrum[i][k + 2] = area * mean[0] * exp(-2.0 * turn * turn * more);
+            spectrum[i][k + 2] =
+                area * mean[0] * widened_share(f, binning, out->image_px2, width_node(k));
         }
     }
     for (int n = 0; n < BST_FALLOFF_DISTANCES; n++) {
-        double turn = 2.0 * BST_PI * n / BST_FALLOFF_PER_PX * limit * binning / RINGS;
-        double sum[ALL] = {0.0};
-        for (int i = 0; i < RINGS; i++) {
-            double wave = j0(turn * (i + 0.5));
-            for (int k = 0; k < ALL; k++) {
-                sum[k] += spectrum[i][k] * wave;
-            }
-        }
+        double sum[SPECTRA];
+        transform_at(spectrum, SPECTRA, limit, binning, n, sum);
         out->falloff.model[n] = (float)sum[0];
         out->falloff.image[n] = (float)sum[1];
         for (int k = 0; k < BST_FALLOFF_WIDTHS; k++) {

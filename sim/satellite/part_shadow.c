@@ -2,6 +2,7 @@
 
 #include <math.h>
 
+#include "sim/satellite/pose_view.h"
 #include "sim/satellite/separation.h"
 
 /* Parts reach beyond the corners of their facet by less than this share of the facet's size. */
@@ -15,21 +16,17 @@ bool bst_part_shadow_hiders(bst_satellite_pose *p, int view, int facet, uint64_t
     if (s->occluder_count > BST_SEPARATION_BODIES) {
         return false;
     }
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    double e[6]; /* bounds of the facet */
+    bst_pose_start_bounds(e);
     for (int i = 0; i < f->count; i++) {
-        bst_vec3 q = p->vertices[s->corner[f->first + i]];
-        const double c[3] = {bst_vec3_dot(q, v->x), bst_vec3_dot(q, v->y), bst_vec3_dot(q, v->z)};
-        for (int a = 0; a < 3; a++) {
-            low[a] = fmin(low[a], c[a]);
-            high[a] = fmax(high[a], c[a]);
-        }
+        bst_pose_add_to_bounds(v, s->corner[f->first + i], e);
     }
-    double room = fmax(fmax(high[0] - low[0], high[1] - low[1]), high[2] - low[2]) * BEYOND;
+    double room = fmax(fmax(e[1] - e[0], e[3] - e[2]), e[5] - e[4]) * BEYOND;
     for (int o = 0; o < s->occluder_count; o++) {
         const double *b = v->bounds[o];
         if (!(v->hiders[f->occluder] >> o & 1) || (o == f->occluder && !f->inside) ||
-            b[0] > high[0] + room || b[1] < low[0] - room || b[2] > high[1] + room ||
-            b[3] < low[1] - room || b[5] < low[2] - room) {
+            b[0] > e[1] + room || b[1] < e[0] - room || b[2] > e[3] + room || b[3] < e[2] - room ||
+            b[5] < e[4] - room) {
             continue;
         }
         bst_vec3 axis;
@@ -43,22 +40,13 @@ bool bst_part_shadow_hiders(bst_satellite_pose *p, int view, int facet, uint64_t
 }
 
 /* Keeps what light reaches through the rim of the shell that the part is in. */
-static void look_through_rim(bst_satellite_pose *p, const bst_pose_view *v,
-                             const bst_shell *shell) {
-    bst_point2 rim[BST_POLYGON_CORNERS_MAX];
-    bst_vec3 axis = shell->axis;
-    if (shell->joint >= 0) {
-        axis = bst_mat3_mul_vec(&p->rotation[shell->joint], axis);
-    }
-    if (!(bst_vec3_dot(axis, v->z) > 0.0)) {
+static void look_through_rim(bst_satellite_pose *p, const bst_pose_view *v, int index) {
+    const bst_shell *shell = &p->satellite->shells[index];
+    if (!(bst_vec3_dot(bst_pose_shell_axis(p, index), v->z) > 0.0)) {
         p->clip.piece_count = 0;
         return;
     }
-    for (int i = 0; i < shell->rim_count; i++) {
-        bst_vec3 q = p->vertices[shell->first_rim + i];
-        rim[i] = (bst_point2){bst_vec3_dot(q, v->x), bst_vec3_dot(q, v->y)};
-    }
-    bst_polygon_clip_intersect(&p->clip, rim, shell->rim_count);
+    bst_polygon_clip_intersect(&p->clip, v->flat + shell->first_rim, shell->rim_count);
 }
 
 double bst_part_shadow_lit(bst_satellite_pose *p, int view, int facet, uint64_t hiders,
@@ -87,7 +75,7 @@ double bst_part_shadow_lit(bst_satellite_pose *p, int view, int facet, uint64_t 
             continue;
         }
         if (o == f->occluder) {
-            look_through_rim(p, v, &s->shells[s->occluders[o].shell]);
+            look_through_rim(p, v, s->occluders[o].shell);
             continue;
         }
         /* where bodies are separate, rays lead toward this one: see bst_pose_look */

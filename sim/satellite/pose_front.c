@@ -15,7 +15,7 @@ int bst_pose_front(bst_satellite_pose *p, const bst_pose_view *v, int occluder, 
         low = height < low ? height : low;
         high = height > high ? height : high;
         if (height >= 0.0) {
-            p->front[n++] = (bst_point2){bst_vec3_dot(q, v->x), bst_vec3_dot(q, v->y)};
+            p->front[n++] = v->flat[o->first_vertex + i];
         }
     }
     if (high <= margin_m) {
