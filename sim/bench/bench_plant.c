@@ -4,7 +4,7 @@
 #include "gimbal/mount/second_order.h"
 #include "sim/bench/bench.h"
 
-enum { PLANT_ROUNDS = 40, PLANT_STEPS = 25000, TELEMETRY_STEPS = 10 };
+enum { PLANT_ROUNDS = 20, PLANT_STEPS = 25000, TELEMETRY_STEPS = 10 };
 #define PLANT_DT 1e-3
 
 /* Platform of scenarios/neossat_geo_track.json. */
@@ -18,9 +18,11 @@ static bst_platform_config demo_platform(bst_platform_config c) {
 
 /* Line-of-sight command for a geostationary target seen from a low orbit, 20 times a second. */
 static bst_los_command command_at(double t) {
-    double rate = 15.0 * BST_ARCSEC_RAD;
-    return (bst_los_command){.direction_gcrf = {sin(rate * t), 0.01, cos(rate * t)},
-                             .rate_gcrf_radps = {rate * cos(rate * t), 0.0, -rate * sin(rate * t)}};
+    double rate = 15.0 * BST_ARCSEC_RAD, unit = 1.0 / sqrt(1.0 + 0.01 * 0.01);
+    bst_vec3 place = {sin(rate * t), 0.01, cos(rate * t)},
+             change = {rate * cos(rate * t), 0.0, -rate * sin(rate * t)};
+    return (bst_los_command){.direction_gcrf = bst_vec3_scale(place, unit),
+                             .rate_gcrf_radps = bst_vec3_scale(change, unit)};
 }
 
 bst_status bst_bench_plant_second_order(bst_ctx *ctx, const bst_bench *self,

@@ -2,6 +2,7 @@
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -87,6 +88,27 @@ def check_curve(folder):
     assert len(factors) == 12
 
 
+def check_plants():
+    """The benchmarks of plants keep the plants' preconditions: unit directions, among others."""
+    done = bench("plant_second_order", "plant_full", "plant_all", "--markdown")
+    assert done.returncode == 0, done.stderr
+    for name in ("plant_second_order", "plant_full", "plant_all"):
+        assert f"| `{name}` |" in done.stdout, done.stdout
+
+
+def check_every_benchmark():
+    """All benchmarks that the help lists run to their end, one at a time."""
+    listed = subprocess.run([PROGRAM, "help", "bench"], capture_output=True, text=True).stdout
+    names = re.findall(r"^  ([a-z][a-z0-9_]+) {2,}", listed.split("benchmarks (", 1)[1].split("options:")[0], re.M)
+    assert len(names) > 35, names
+    failed = {}
+    for name in names:
+        done = bench(name)
+        if done.returncode != 0:
+            failed[name] = done.stderr
+    assert failed == {}, failed
+
+
 def check_messages():
     done = bench("nonsense")
     assert done.returncode == 2 and "nonsense" in done.stderr
@@ -104,6 +126,9 @@ def main():
         check_markdown_in_another_folder()
         check_curve(os.path.join(folder, "report"))
         check_messages()
+    check_plants()
+    if "--full" in sys.argv[2:]:
+        check_every_benchmark()
 
 
 main()
