@@ -321,7 +321,7 @@ class SmallStack(unittest.TestCase):
         kernels = ("run", runs.STARE, "--quiet", "--duration", "1", "--overwrite", "--out", made,
                    "--set", "/world/star_catalogue=embedded")
         # test_bad_input.py compiles the kernels, which takes the most, with a small stack
-        for kib in (64, 256):
+        for kib in (64,):
             for words in (kernels, ("report", made), ("check", runs.TRACK, "--quiet"),
                           ("loop", runs.TRACK), ("export", made, "--table", "csv", "--orbits", "oem"),
                           ("study", "scenarios/studies/noise.json", "--emit", "0")):

@@ -7,8 +7,8 @@ Usage, from the repository root:
 A fenced block of language sh or console is run, all blocks of a page in one shell session each, page after page, in a
 scratch folder that looks like the repository. A comment on the line before a block changes that:
 
-    <!-- test: duration=60 -->  `run` commands simulate 60 s instead of 2 s (a command's own --duration is kept)
-                                (a shipped study is only planned: --dry-run; one of the page has two replicates)
+    <!-- test: duration=60 -->  `run` commands simulate 60 s instead of 1 s (a command's own --duration is kept)
+                                (a shipped study is only planned: --dry-run; one of the page has two replicates of 45 s)
     <!-- test: exit=1 -->       the block ends with this exit code
     <!-- test: background -->   the block runs beside the next ones of its page and must end with 0 by its end
     <!-- test: needs=ds9 -->    counted and printed as not run where the program ds9 is missing
@@ -29,7 +29,7 @@ import tempfile
 import unittest
 
 ROOT = os.getcwd()
-SECONDS = 2
+SECONDS = 1
 # where PoCL keeps the kernels that the tests before compiled (its own rule), as HOME is another one here
 KERNELS = os.environ.get("POCL_CACHE_DIR") or os.path.join(
     os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"), "pocl", "kcache")
@@ -37,7 +37,8 @@ LANGUAGES = {"sh", "console", "text", "json", "c", "python", "cmake", "{toctree}
 # variables that later blocks of a page use; not the variables of one command
 SETTING = re.compile(r"""export .*|\w+=(\S*|"[^"]*")""")
 WORDS = re.compile(r"<!-- test: (.*) -->")
-WRAPPER = """#!/usr/bin/env python3
+# no site packages: it starts once for each command
+WRAPPER = """#!/usr/bin/python3 -IS
 import json, os, sys
 words = sys.argv[1:]
 length = os.environ.get("DOCS_DURATION")
@@ -49,6 +50,8 @@ elif (words[:1] == ["study"] and length and "--out" in words and words[1].endswi
       and not os.path.realpath(words[1]).startswith({root!r} + os.sep)):
     with open(words[1], encoding="utf-8") as file:
         study = dict(json.load(file), replicates=2)
+    if study.get("set", {{}}).get("/duration_s", 0) > 45:
+        study["set"]["/duration_s"] = 45
     with open(words[1], "w", encoding="utf-8") as file:
         json.dump(study, file)
 os.execv({program!r}, [{program!r}] + words)

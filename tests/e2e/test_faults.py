@@ -32,7 +32,7 @@ FORMS = {
 }
 DURATION_S = 12
 # of runs that go on until something ends them: the processor is left to others
-PACED = ["--pacing", "realtime", "--set", "/pacing/speed=10"]
+PACED = ["--pacing", "realtime", "--set", "/pacing/speed=4"]
 FRAME_BYTES = 2 * 1024 ** 2
 TOO_LARGE, NO_SPACE = os.strerror(errno.EFBIG), os.strerror(errno.ENOSPC)
 

@@ -2,10 +2,13 @@
 """Recorded frames as a user sees them: opened with astropy, stars found with SEP, measured with
 photutils, and compared with the catalogue through each frame's own WCS and the camera's data sheet.
 
-Usage, from the repository root: /usr/bin/python3 tests/e2e/test_frames.py BORESIGHT
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_frames.py BORESIGHT [--full]
+
+With --full three times as many frames.
 """
 import json
 import os
+import sys
 import unittest
 
 import numpy as np
@@ -17,6 +20,10 @@ from astropy.wcs import WCS
 from photutils.aperture import ApertureStats, CircularAnnulus, CircularAperture, aperture_photometry
 
 import runs
+
+FULL = "--full" in sys.argv
+if FULL:
+    sys.argv.remove("--full")
 
 iers.conf.auto_download = False
 iers.conf.iers_degraded_accuracy = "ignore"
@@ -125,7 +132,8 @@ class Stare(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         folder = runs.scratch()
-        jobs = [("cube", 36), ("extensions", 12)]
+        cls.frames = {"cube": 36, "extensions": 12} if FULL else {"cube": 12, "extensions": 5}
+        jobs = list(cls.frames.items())
         cls.out = {form: os.path.join(folder, form) for form, _ in jobs}
         runs.parallel(lambda job: runs.run(runs.STARE, cls.out[job[0]], f"/record/frames={job[0]}",
                                            duration=job[1]), jobs)
@@ -137,7 +145,7 @@ class Stare(unittest.TestCase):
             rms, mean = np.sqrt(np.mean(np.sum(offset ** 2, axis=1))), offset.mean(axis=0)
             print(f"astrometry, {form}: {len(offset)} places of SNR > 20, RMS {rms:.4f} px "
                   f"(both axes), mean {mean[0]:+.4f} {mean[1]:+.4f} px")
-            self.assertGreater(len(offset), 120 if form == "cube" else 36)
+            self.assertGreater(len(offset), 3 * self.frames[form])
             # the figures of docs/results/closed_loop.md
             self.assertLessEqual(rms, 0.1)
             self.assertLessEqual(np.hypot(*mean), 0.03)
@@ -165,7 +173,7 @@ class Stare(unittest.TestCase):
             scatter = np.std(measured[bright], ddof=1)
             print(f"photometry, {form}: {bright.sum()} stars of SNR > 50, zero point "
                   f"{zero_point:.4f}, expected {expected:.4f}, scatter {scatter:.4f} mag")
-            self.assertGreater(bright.sum(), 60 if form == "cube" else 18)
+            self.assertGreater(bright.sum(), 1.5 * self.frames[form])
             self.assertLessEqual(abs(zero_point - expected), 0.02)
             self.assertLessEqual(scatter, 0.05)
 
@@ -179,25 +187,27 @@ class Stare(unittest.TestCase):
             np.testing.assert_allclose(a.wcs.wcs.cd, b.wcs.wcs.cd, rtol=1e-13)
             np.testing.assert_allclose(a.wcs.wcs.crval, b.wcs.wcs.crval, rtol=1e-14)
             count += 1
-        self.assertEqual(count, 12)
+        self.assertEqual(count, self.frames["extensions"])
 
 
 class Track(unittest.TestCase):
     """Frames of the closed loop, as image extensions."""
+    FRAMES = 41 if FULL else 30  # one a second; the target is in track from the 22nd on
 
     @classmethod
     def setUpClass(cls):
         cls.out = os.path.join(runs.scratch(), "track")
-        runs.run(runs.TRACK, cls.out, duration=40, threads=os.cpu_count())
+        runs.run(runs.TRACK, cls.out, duration=cls.FRAMES - 1, threads=os.cpu_count())
 
     def test_every_extension_is_a_frame(self):
         with fits.open(os.path.join(self.out, "frames.fits")) as hdus:
             hdus.verify("exception")
-            self.assertEqual(len(hdus), 41)
+            self.assertEqual(len(hdus), self.FRAMES)
             for k, hdu in enumerate(hdus[1:]):
                 header = hdu.header
-                self.assertEqual((hdu.name, header["FRAMEID"], hdu.data.shape, hdu.data.dtype.name),
-                                 ("FRAME", k, (1024, 1024), "uint16"))
+                self.assertEqual((hdu.name, header["FRAMEID"], hdu.shape), ("FRAME", k, (1024, 1024)))
+                if k % 10 == 0:  # unpacking takes most of the time
+                    self.assertEqual((hdu.data.shape, hdu.data.dtype.name), ((1024, 1024), "uint16"))
                 start = Time("2022-06-16T22:10:00", scale="utc") + TimeDelta(k, format="sec")
                 # the time of a frame to 1 microsecond, the last digit of DATE-OBS
                 self.assertLess(abs((Time(header["DATE-OBS"], scale="utc") - start).sec), 1e-6)
@@ -231,7 +241,7 @@ class Track(unittest.TestCase):
         rms, mean = np.sqrt(np.mean(np.sum(offsets ** 2, axis=1))), offsets.mean(axis=0)
         print(f"target: {len(offsets)} frames, RMS {rms:.4f} px, mean {mean[0]:+.4f} "
               f"{mean[1]:+.4f} px")
-        self.assertGreaterEqual(len(offsets), 15)
+        self.assertGreaterEqual(len(offsets), 15 if FULL else 5)
         # SNR 36: 0.03 px an axis from noise; frames with a star streak across it count too
         self.assertLess(rms, 0.15)
 
@@ -251,7 +261,7 @@ def sky_of(header, row=None):
 class Moving(unittest.TestCase):
     """A spacecraft that drifts and turns about the line of sight during the exposures, and a
     telescope that slews between them: the WCS of every frame holds."""
-    FRAMES = 9  # one a second
+    FRAMES = 9 if FULL else 5  # one a second
     DRIFT = runs.SENSOR + "/modules/gimbal/platform/drift_arcsec_per_s=[200, -150, 1200]"
     FORMS = {"extensions": ["/record/frames=extensions", "/record/compression=none"],
              "rice": ["/record/frames=extensions", "/record/compression=rice"],
@@ -294,7 +304,7 @@ class Moving(unittest.TestCase):
         self.assertEqual(len(worst), self.FRAMES)
         # the frames do move
         self.assertGreater(max(swept), 20)
-        self.assertGreater(between, 100)
+        self.assertGreater(between, 80)
         # an attitude averaged over a turn of 0.003 rad: r (angle)^2 / 24 = 3e-4 px at the corner;
         # acceleration of the slew bends the track of a star by as little
         self.assertLess(max(worst), 0.05)

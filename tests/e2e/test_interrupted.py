@@ -93,10 +93,10 @@ class Interrupted(unittest.TestCase):
 
     def lost(self, form):
         """Kills a run some seconds into its frames; frames seen 4 s before, and what is left. At
-        ten times real time, so that it leaves the processor to others."""
+        four times real time, so that it leaves the processor to others."""
         out = os.path.join(self.folder, f"lost {form}")
         path = os.path.join(out + ".partial", "frames.fits")
-        with start(out, form, 3000, "--pacing", "realtime", "--set", "/pacing/speed=10") as process:
+        with start(out, form, 3000, "--pacing", "realtime", "--set", "/pacing/speed=4") as process:
             wait_for_frames(process, out)
             time.sleep(1)
             seen = os.path.getsize(path)

@@ -12,7 +12,7 @@ import unittest
 import numpy as np
 
 import runs
-from link_runs import (EMBEDDED, SECONDS, ended, free_port, ipc, python, serve, start_run,
+from link_runs import (EMBEDDED, SECONDS, ended, free_port, ipc, near, python, serve, start_run,
                        wait_until_open)
 
 sys.path.insert(0, "python")
@@ -46,8 +46,8 @@ class SameResults(unittest.TestCase):
                 np.testing.assert_array_equal(x[column], y[column], f"{name}.{column}")
 
     def test_one_part_or_all_outside(self):
-        inside = runs.scratch() + "/inside"
-        runs.run(runs.TRACK, inside, runs.NO_FRAMES, duration=SECONDS)
+        scenario, inside = near(), runs.scratch() + "/inside"
+        runs.run(scenario, inside, runs.NO_FRAMES, duration=SECONDS)
         self.assertGreater(len(boresight.read_run(inside).table("tracks")["track_id"]), 1)
         tcp = f"tcp://127.0.0.1:{free_port()}"
         for address, parts, memory in ((tcp, "control", []), (ipc(), "tracker", []),
@@ -56,8 +56,8 @@ class SameResults(unittest.TestCase):
             out = runs.scratch() + "/outside"
             shared = ["--set", "/link/shared_memory=true"] if memory else []
             # peers may be there before the simulation
-            peers = [serve(runs.TRACK, address, part, *memory) for part in parts.split(",")]
-            ended(start_run(runs.TRACK, out, address, parts, *shared))
+            peers = [serve(scenario, address, part, *memory) for part in parts.split(",")]
+            ended(start_run(scenario, out, address, parts, *shared))
             for peer in peers:
                 self.assertIn("complete", ended(peer))
             self.same(inside, out)
@@ -253,7 +253,7 @@ class Examples(unittest.TestCase):
 
     def test_a_controller_of_ones_own(self):
         inside, out, address = runs.scratch() + "/inside", runs.scratch() + "/run", ipc()
-        runs.run(runs.TRACK, inside, runs.NO_FRAMES, duration=SECONDS)
+        runs.run(near(), inside, runs.NO_FRAMES, duration=SECONDS)
         truth = boresight.read_run(inside).table("truth")
         target = truth["kind"] == "object"
         t, ra, dec = (truth[name][target] for name in ("mid_s", "ra_deg", "dec_deg"))
@@ -261,7 +261,7 @@ class Examples(unittest.TestCase):
         rate_dec, dec_0 = np.polyfit(t, dec, 1)
         peer = python(SOURCES[1], address, "--ra", str(ra_0), "--dec", str(dec_0),
                       "--rate-ra", str(rate_ra), "--rate-dec", str(rate_dec))
-        ended(start_run(runs.TRACK, out, address, "control", duration=30))
+        ended(start_run(runs.TRACK, out, address, "control", duration=20))
         self.assertIn("follows the target", ended(peer))
         summary = boresight.read_run(out).manifest["summary"]
         self.assertEqual(summary["final_mode"], "track")
@@ -534,7 +534,7 @@ class BadPeers(unittest.TestCase):
             address = ipc()
             peer = python(SOURCES[0], address)
             run = start_run(runs.STARE, out, address, "imgproc", "--set", "/link/timeout_s=30",
-                            duration=12)
+                            duration=6)
             if out == broken:
                 peer.stdout.readline()
                 peer.kill()
@@ -550,7 +550,7 @@ class BadPeers(unittest.TestCase):
         address, out = ipc(), runs.scratch() + "/run"
         peer = python(SOURCES[0], address)
         run = start_run(runs.STARE, out, address, "imgproc", "--set", "/link/on_timeout=go_on",
-                        "--set", "/link/timeout_s=1", duration=300)
+                        "--set", "/link/timeout_s=3", duration=60)
         for _ in range(2):  # the second step is begun when the first is answered
             peer.stdout.readline()
         peer.kill()
@@ -559,7 +559,7 @@ class BadPeers(unittest.TestCase):
         self.assertIn("of neossat/telescope/imgproc is not answered: no peer plays it", said)
         found = boresight.read_run(out).table("detection_frames")
         self.assertGreater(len(found["exposure_id"]), 0)
-        self.assertLess(len(found["exposure_id"]), 300)
+        self.assertLess(len(found["exposure_id"]), 60)
         self.assertGreaterEqual(counters(out)["link_unanswered"], 1)
 
     def test_a_refused_answer_raises_in_python(self):
