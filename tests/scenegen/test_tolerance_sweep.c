@@ -16,7 +16,7 @@
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
 
-static int scenes = 12, first_scene = 0, stride = 7; /* all motions and PSFs */
+static int scenes = 9, first_scene = 0, stride = 7; /* all motions and PSFs */
 static uint64_t seed = 0;
 enum { SCENES_OF_A_SEED = 200 };
 

@@ -1,5 +1,6 @@
 /* Whole tracks against theory: NEES and NIS over Monte Carlo runs, errors over the posterior
- * Cramer-Rao bound, without and with clutter, for each filter and association. */
+ * Cramer-Rao bound, without and with clutter, for each filter and association.
+ * Usage: test_tracker_consistency [slow]; slow: longer tracks in clutter. */
 #include "boresight/rng.h"
 #include "sim/eval/consistency.h"
 #include "sim/eval/track_bound.h"
@@ -12,6 +13,8 @@
 
 /* frames without clutter, in which the track starts; with clutter but not judged; judged */
 enum { RUNS = 200, CLEAN = 14, SETTLE = 6, START = CLEAN + SETTLE, STEPS = 200, FEW = 60 };
+
+static int clutter_steps = FEW;
 
 typedef struct setup {
     const char *name;
@@ -287,8 +290,8 @@ static void imm_through_manoeuvres(void **state) {
 static void single_target_in_clutter(void **state) {
     (void)state;
     const setup cases[] = {
-        {"mixture", BST_FILTER_EKF, BST_MTT_MIXTURE, 0.9, 0.5, 20, 50, false, STEPS},
-        {"mixture ukf", BST_FILTER_UKF, BST_MTT_MIXTURE, 0.95, 0.5, -89.999, 50, false, STEPS}};
+        {"mixture", BST_FILTER_EKF, BST_MTT_MIXTURE, 0.9, 0.5, 20, 50, false, clutter_steps},
+        {"mixture ukf", BST_FILTER_UKF, BST_MTT_MIXTURE, 0.95, 0.5, -89.999, 50, false, clutter_steps}};
     for (int i = 0; i < 2; i++) {
         figures f;
         monte_carlo(&cases[i], &f);
@@ -312,7 +315,8 @@ static void other_associations_in_clutter(void **state) {
     assert_true(f.lost <= RUNS / 40);
 }
 
-int main(void) {
+int main(int argc, char **argv) {
+    clutter_steps = argc > 1 && strcmp(argv[1], "slow") == 0 ? STEPS : FEW;
     const struct CMUnitTest tests[] = {cmocka_unit_test(filters_without_clutter),
                                        cmocka_unit_test(imm_through_manoeuvres),
                                        cmocka_unit_test(single_target_in_clutter),
