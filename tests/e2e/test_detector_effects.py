@@ -15,7 +15,7 @@ import unittest
 import runs
 
 SEEDS = int(sys.argv.pop()) if len(sys.argv) > 1 and sys.argv[-1].isdigit() else 0
-DURATION = 150 if SEEDS else 90
+DURATION = 150 if SEEDS else 60
 DETECTOR = runs.SENSOR + "/camera/detector"
 # a smaller cue error: the search is not what is tested
 CUE = [] if SEEDS else [runs.SENSOR + "/cue/offset_deg=0.1", runs.SENSOR + "/cue/sigma_deg=0.1"]

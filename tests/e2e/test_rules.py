@@ -49,7 +49,8 @@ class Rules(unittest.TestCase):
         listed = {line.split()[0] for line in check("--rules").stdout.splitlines()}
         self.assertEqual(listed, {rule for rule, _, _ in CASES})
         for rule, override, words in CASES:
-            said = check(runs.TRACK, "--quiet", "--set", override)
+            source = [] if rule == "modules" else ["--set", runs.GENERATOR]
+            said = check(runs.TRACK, "--quiet", *source, "--set", override)
             self.assertEqual(said.returncode, 0, said.stderr)
             self.assertIn(words, said.stderr, rule)
             self.assertIn("warning", said.stderr, rule)
@@ -58,7 +59,7 @@ class Rules(unittest.TestCase):
         """When the cue enters and leaves the cones about Sun and Moon and goes behind the Earth, by SGP4 and ERFA: 0.02 degrees
         of aberration, 0.2 of the Earth's figure. The Moon's parallax is a degree."""
         guidance = MODULES + "/control/guidance"
-        said = check(runs.TRACK, "--quiet", "--set", "/duration_s=86400", "--set", guidance + "/moon_keep_out_deg=60", "--set",
+        said = check(runs.TRACK, "--quiet", "--set", runs.GENERATOR, "--set", "/duration_s=86400", "--set", guidance + "/moon_keep_out_deg=60", "--set",
                      guidance + "/sun_keep_out_deg=60", "--set", runs.SENSOR + "/cue/offset_deg=0").stderr
         spans = {why: (float(a), float(b)) for a, b, why in re.findall(
             r"out of reach from ([\d.]+) s until ([\d.]+) s: ([\w -]+?)(?: \(|$)", said, re.M)}

@@ -122,7 +122,7 @@ static void stars_have_the_psf_of_their_spectrum(void **state) {
             bst_psf *own = own_psf(&f->ctx, c, i);
             bst_assert_ok(&f->ctx, bst_reference_render_psf(
                                        &f->ctx, &c, own, (bst_window){0, 0, WIDTH, HEIGHT},
-                                       &track.track, &sources[i], 1, 1e-6, exact));
+                                       &track.track, &sources[i], 1, 1e-7, exact));
             bst_psf_free(own);
         }
         double predicted = render(f, &c, &track.track, sources, image);
@@ -154,11 +154,11 @@ static void the_reference_mixes_too(void **state) {
     bst_assert_ok(&f->ctx, bst_psf_create(&f->ctx, &c, &psf));
     make_sources(&c, psf, 1e5, sources);
     bst_assert_ok(&f->ctx, bst_reference_render(&f->ctx, &c, window, &track.track, sources, SOURCES,
-                                                1e-6, mixed));
+                                                1e-7, mixed));
     for (int i = 0; i < SOURCES; i++) {
         bst_psf *own = own_psf(&f->ctx, c, i);
         bst_assert_ok(&f->ctx, bst_reference_render_psf(&f->ctx, &c, own, window, &track.track,
-                                                        &sources[i], 1, 1e-6, exact));
+                                                        &sources[i], 1, 1e-7, exact));
         bst_psf_free(own);
     }
     double peak = 0.0, worst = 0.0;
