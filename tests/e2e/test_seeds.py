@@ -46,7 +46,7 @@ del sys.argv[1:]
 def seeds_of(case):
     if options.seeds or options.long:
         return range(1, 1 + (options.seeds or 100))
-    return {"neighbour": (1, 2, 4), "drop": (1, 2)}.get(case, (1,))
+    return {"neighbour": (2, 4, 7), "drop": (1, 2)}.get(case, (1,))
 
 
 def direction(rng):
