@@ -2,10 +2,10 @@
 # starts the longest first, so that none is left at the end for one core alone; a clean clone has no
 # times of its own. Only the order counts; a test that is not named counts as short.
 set(bst_costs
-  e2e_docs_commands 100  e2e_bench 50  e2e_study 50  e2e_command_line 40
+  e2e_docs_commands 100  e2e_bench 50  e2e_study 50  e2e_command_line 35
   e2e_detector_effects 32  e2e_frames 27  e2e_seeds 14
-  e2e_link 33  e2e_day_modes 24  e2e_docs 24  e2e_passes 22  e2e_faults 28  e2e_resume 32  e2e_interrupted 24  e2e_slurm 30  e2e_tables 27
-  e2e_camera 26  e2e_random_scenes 18  e2e_planes 26  e2e_acquisition 24  e2e_rules 12
+  e2e_link 33  e2e_day_modes 24  e2e_docs 24  e2e_passes 22  e2e_faults 25  e2e_resume 32  e2e_interrupted 24  e2e_slurm 30  e2e_tables 27
+  e2e_camera 26  e2e_random_scenes 18  e2e_planes 26  e2e_acquisition 24  e2e_rules 9
   e2e_discrimination 22  e2e_loop_latency 20  e2e_repeat 20  e2e_threads 15  e2e_pd 20  e2e_loop 20  e2e_study_files 20
   e2e_new 19  e2e_bad_input 18  e2e_random_labels 16  e2e_info 15  e2e_manoeuvre 14
   e2e_constellation 12  e2e_boxes 11  e2e_export 10  e2e_hostile_folders 10

@@ -103,7 +103,7 @@ class Rules(unittest.TestCase):
     def test_a_run_that_does_not_fit_is_refused_before_it_starts(self):
         out = os.path.join(runs.scratch(), "run")
         # 33 TB of frames: more than is free anywhere
-        said = subprocess.run(runs.command(runs.TRACK, out, runs.SENSOR + "/camera/width_px=8192",
+        said = subprocess.run(runs.command(runs.STARE, out, runs.SENSOR + "/camera/width_px=8192",
                                            runs.SENSOR + "/camera/height_px=8192", duration=250000),
                               capture_output=True, text=True, check=False)
         self.assertEqual(said.returncode, 1)
