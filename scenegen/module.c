@@ -211,7 +211,7 @@ static bst_status create(const bst_module_env *env, const void *config_object, v
     s->margin_px = c->margin_px;
     bst_status status =
         bst_renderer_create(env->ctx, env->device, s->camera, &options, &s->renderer);
-    if (status == BST_OK) {
+    if (status == BST_OK && !env->never_steps) {
         status = bst_renderer_prepare(env->ctx, s->renderer);
     }
     if (status == BST_OK) {

@@ -94,10 +94,10 @@ static bst_status build_frame(bst_ctx *ctx, bst_renderer *r) {
     return bst_scene_frame_kernel(ctx, r->device, r->form, options, &r->frame_kernel);
 }
 
-/* Builds the kernel of the nodes and sets the parameters that are the camera's. */
+/* Sets the parameters that are the camera's. */
 static bst_status build(bst_ctx *ctx, bst_renderer *r) {
     r->form = (bst_scene_form){.lanes = r->options.group == 0, .fourier = r->fourier != NULL};
-    BST_TRY(bst_scene_boxes_create(ctx, r->device, r->form, r->most_bytes, &r->boxes));
+    r->boxes = bst_scene_boxes_init(r->device, r->form, r->most_bytes);
     bst_scene_tile_options(&r->options, r->taps, r->law_degree, r->fourier != NULL, r->tile_options,
                            sizeof r->tile_options);
     r->fixed.nodes = bst_scene_node_params(&r->camera, r->options.spatial_oversample);
@@ -107,6 +107,7 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r) {
 }
 
 bst_status bst_renderer_prepare(bst_ctx *ctx, bst_renderer *r) {
+    BST_TRY(bst_scene_boxes_prepare(ctx, &r->boxes));
     if (!bst_detector_whole_columns(r->detector)) {
         return build_frame(ctx, r);
     }

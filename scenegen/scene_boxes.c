@@ -2,13 +2,19 @@
 
 #include "scenegen/scene_plan.h"
 
-bst_status bst_scene_boxes_create(bst_ctx *ctx, bst_device *device, bst_scene_form form,
-                                  uint64_t most_bytes, bst_scene_boxes *out) {
-    *out = (bst_scene_boxes){.of_blocks = form.lanes && !form.fourier,
+bst_scene_boxes bst_scene_boxes_init(bst_device *device, bst_scene_form form, uint64_t most_bytes) {
+    return (bst_scene_boxes){.of_blocks = form.lanes && !form.fourier,
+                             .device = device,
                              .context = bst_device_context(device),
                              .most_bytes = most_bytes};
-    return out->of_blocks ? bst_scene_blocks_kernel(ctx, device, &out->kernel)
-                          : bst_scene_nodes_kernel(ctx, device, &out->kernel);
+}
+
+bst_status bst_scene_boxes_prepare(bst_ctx *ctx, bst_scene_boxes *b) {
+    if (b->kernel) {
+        return BST_OK;
+    }
+    return b->of_blocks ? bst_scene_blocks_kernel(ctx, b->device, &b->kernel)
+                        : bst_scene_nodes_kernel(ctx, b->device, &b->kernel);
 }
 
 void bst_scene_boxes_clear(bst_scene_boxes *b) {
@@ -56,6 +62,7 @@ static bst_status enqueue_blocks(bst_ctx *ctx, bst_scene_boxes *b, cl_command_qu
 
 bst_status bst_scene_boxes_enqueue(bst_ctx *ctx, bst_scene_boxes *b, cl_command_queue queue,
                                    const bst_scene_boxes_input *in) {
+    BST_TRY(bst_scene_boxes_prepare(ctx, b));
     if (b->of_blocks) {
         return enqueue_blocks(ctx, b, queue, in);
     }

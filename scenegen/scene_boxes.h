@@ -9,19 +9,21 @@
 
 typedef struct bst_scene_boxes {
     bool of_blocks; /* of all blocks, for the search by work-groups (kernels/gather.cl) */
+    bst_device *device;
     cl_context context;
     uint64_t most_bytes; /* largest buffer of the device */
-    cl_kernel kernel;
+    cl_kernel kernel;    /* NULL before bst_scene_boxes_prepare */
     bst_device_array block, source, group;
 } bst_scene_boxes;
 
-/* Builds the kernel for tiles of a form.
+/* Boxes for tiles of a form, without kernel and buffers.
  *
- * Given:     most_bytes  largest buffer of the device
- * Returned:  *out        to be cleared with bst_scene_boxes_clear, after an error too
- * Errors:    as bst_device_build */
-bst_status bst_scene_boxes_create(bst_ctx *ctx, bst_device *device, bst_scene_form form,
-                                  uint64_t most_bytes, bst_scene_boxes *out) BST_MUST_CHECK;
+ * Given:     device      must outlive the boxes
+ *            most_bytes  largest buffer of the device
+ * Returned:  to be cleared with bst_scene_boxes_clear */
+bst_scene_boxes bst_scene_boxes_init(bst_device *device, bst_scene_form form, uint64_t most_bytes);
+/* Builds the kernel, if it is not there yet. Errors: as bst_device_build. */
+bst_status bst_scene_boxes_prepare(bst_ctx *ctx, bst_scene_boxes *boxes) BST_MUST_CHECK;
 /* Releases kernel and buffers. */
 void bst_scene_boxes_clear(bst_scene_boxes *boxes);
 
@@ -32,7 +34,9 @@ typedef struct bst_scene_boxes_input {
     cl_mem sources, table;
 } bst_scene_boxes_input;
 
-/* Enqueues the kernel, with room for its results. Errors: BST_ERR_DEVICE. */
+/* Enqueues the kernel, built if it is not there yet, with room for its results.
+ *
+ * Errors:    BST_ERR_DEVICE */
 bst_status bst_scene_boxes_enqueue(bst_ctx *ctx, bst_scene_boxes *boxes, cl_command_queue queue,
                                    const bst_scene_boxes_input *input) BST_MUST_CHECK;
 

@@ -101,6 +101,8 @@ typedef struct bst_module_env {
     const bst_fleet_member *
         members; /* of a BST_MODULE_MULTI_SENSOR module: all sensors in scenario order; else NULL */
     int member_count;
+    bool never_steps; /* the simulation is only looked at (boresight check): what takes long and
+                         only step needs, such as compiling kernels, may be left out */
 } bst_module_env;
 
 typedef struct bst_module_desc {

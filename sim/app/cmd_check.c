@@ -59,7 +59,7 @@ int bst_cmd_check(int argc, char **argv) {
         return BST_EXIT_FAILED;
     }
     bst_simulation *sim = NULL;
-    const bst_simulation_options options = {0};
+    const bst_simulation_options options = {.never_steps = true};
     if (bst_simulation_create(&ctx, &scenario, &options, &sim) != BST_OK) {
         bst_json_name_file(&ctx, json);
         fprintf(stderr, "boresight: %s\n", ctx.message);

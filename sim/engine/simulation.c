@@ -25,6 +25,7 @@ struct bst_simulation {
     bst_engine *engine;
     uint64_t run; /* number of the run, which keys its random streams */
     bst_link *link;
+    bool never_steps;     /* options->never_steps */
     bst_module_desc only; /* options->only without input delays */
     bst_port only_ports[BST_MAX_DELAYS];
 };
@@ -96,6 +97,7 @@ static bst_instance_spec sensor_spec(const bst_scenario *scenario, const bst_sim
                                .frame_latency_s = timing.frame_latency_s,
                                .planes = scenario->record.planes,
                                .mask_threshold_sigma = scenario->record.mask_threshold_sigma,
+                               .never_steps = sim->never_steps,
                                .seed = scenario->seed,
                                .run = sim->run};
 }
@@ -315,6 +317,7 @@ static bst_status take_shared(bst_ctx *ctx, const bst_scenario *scenario,
 static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
                         const bst_simulation_options *options, bst_simulation *sim) {
     sim->run = options->other_run ? options->run : (uint64_t)scenario->run;
+    sim->never_steps = options->never_steps;
     BST_TRY(take_shared(ctx, scenario, options, sim));
     BST_TRY(bst_engine_create(ctx, scenario->tick_rate_hz, &sim->engine));
     bst_status status = make_link(ctx, scenario, options, sim);

@@ -358,6 +358,12 @@ class Resolved(unittest.TestCase):
         self.assertEqual((result.returncode, result.stdout, result.stderr), (0, "", ""))
         self.assertEqual(os.listdir(folder), [])
 
+    def test_check_compiles_no_kernel(self):
+        """A check needs no kernel: with an empty cache it would compile for seconds."""
+        cache = runs.scratch()
+        runs.call_well("check", runs.TRACK, "--quiet", env={**os.environ, "POCL_CACHE_DIR": cache})
+        self.assertEqual(glob.glob(os.path.join(cache, "**", "*.bc"), recursive=True), [])
+
     def test_shipped_scenarios(self):
         self.assertGreaterEqual(len(SCENARIOS), 4)
         for path in SCENARIOS:

@@ -60,8 +60,8 @@ static bst_status judge(void *user, bst_ctx *ctx, const bst_new_scene *scene, bo
     bst_ctx_init(&quiet, note_warning, &found, BST_LOG_ERROR);
     status = bst_plugins_scenario_read(&quiet, json, &scenario);
     if (status == BST_OK) {
-        status =
-            bst_simulation_create(&quiet, &scenario, &(bst_simulation_options){0}, &simulation);
+        status = bst_simulation_create(&quiet, &scenario,
+                                       &(bst_simulation_options){.never_steps = true}, &simulation);
     }
     if (status == BST_OK) {
         quiet.log_level = BST_LOG_WARNING;

@@ -145,6 +145,7 @@ bst_status bst_engine_load(bst_ctx *ctx, bst_engine *engine) {
                               .member_count = spec->member_count,
                               .planes = spec->planes,
                               .mask_threshold_sigma = spec->mask_threshold_sigma,
+                              .never_steps = spec->never_steps,
                               .engine_private = self};
         bst_status status = spec->desc->create(&env, spec->config, &self->self);
         if (status != BST_OK) {

@@ -40,6 +40,7 @@ typedef struct bst_instance_spec {
     uint32_t planes;                 /* bit k: the bst_plane k is recorded */
     double mask_threshold_sigma;
     uint64_t seed, run;
+    bool never_steps; /* as in bst_module_env */
 } bst_instance_spec;
 
 /* State of the observer's `wants` for one channel; zero at first. */
