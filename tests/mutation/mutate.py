@@ -362,6 +362,8 @@ def main():
                         help=f"only bugs of these kinds: {', '.join(sorted(OPERATORS))}, statement")
     parser.add_argument("--count", type=int, default=30, help="bugs to plant (default 30)")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="plant no more after so many minutes")
+    parser.add_argument("--budget", type=float, default=float("inf"), metavar="SECONDS",
+                        help="with --quick: processor time of the tests of a bug; it survives if none has failed by then")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--least", type=float, default=0.0, help="least score, 0 to 1, for exit code 0")
@@ -375,6 +377,7 @@ def main():
         tree = QuickTree(options.source, options.quick, options.jobs) if options.quick else \
             Tree(options.source, folder, "release", options.jobs)
         tree.skipped = set(options.skip)
+        tree.budget = options.budget
         pools = candidates(options, tree)
         coverage = None
         if options.coverage:

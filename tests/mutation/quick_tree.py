@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import re
+import resource
 import shlex
 import subprocess
 import sys
@@ -14,6 +15,12 @@ import tempfile
 import time
 
 import build_files
+
+
+def children_seconds():
+    """Processor time of all child processes so far."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 class QuickTree(build_files.Judges):
@@ -34,7 +41,9 @@ class QuickTree(build_files.Judges):
         self.tests = {name: (labels, os.path.basename(command[0]), command)
                       for name, (labels, command) in build_files.listed_tests(self.build).items()}
         self.sound_objects, self.links, self.target = {}, {}, None
-        self.proven, self.made = {}, {}  # of tests, of programs
+        self.proven, self.made, self.included = {}, {}, {}  # of tests, of programs, of programs
+        self.budget, self.ended = float("inf"), False  # processor time of a bug's tests, s
+        self.expected = build_files.expected_seconds(self.folder)
 
     def ninja(self, *words):
         return build_files.run(["ninja", "-C", self.build, f"-j{self.jobs}", "--quiet", *words])
@@ -118,11 +127,29 @@ class QuickTree(build_files.Judges):
                 self.unsound.add(name)
         return self.proven[name]
 
+    def mentions(self, program, path):
+        """How near a test program is to a file: 4 for each source that includes its header, 1 for each that includes
+        another header of its folder."""
+        if program not in self.included:
+            texts = []
+            for target, entry in self.compilations.items():
+                if f"/{program}.dir/" in target and "/tests/" in os.path.join("/", target):
+                    with open(os.path.join(entry["directory"], entry["file"]), encoding="utf-8") as file:
+                        texts.append(set(re.findall(r'^#include "([^"]+)\.h"', file.read(), re.M)))
+            self.included[program] = texts
+        own, folder = os.path.splitext(path)[0], os.path.dirname(path)
+        return sum(4 * (own in names) + any(os.path.dirname(n) == folder for n in names)
+                   for names in self.included[program])
+
     def in_order(self, path, names):
-        """Tests whose names share a word with the file first, then by their last duration."""
+        """Tests that include the file's header or share a word with it first, then by their last duration; of those that
+        never ran, the ones that CTest knows as long come last."""
         words = set(re.split(r"[/_.]", path)[-3:-1]) | {os.path.splitext(os.path.basename(path))[0]}
-        kin = {n: sum(w in n for w in words if len(w) > 3) for n in names}
-        return sorted(names, key=lambda n: (-kin[n], self.costs.get(n, 1.0)))
+        kin = {n: sum(w in n for w in words if len(w) > 3) + self.mentions(self.program_of(n), path) for n in names}
+
+        def cost(name):
+            return self.costs.get(name, self.expected.get(name, 1.0))
+        return sorted(names, key=lambda n: (kin[n] == 0, cost(n) > 5.0, -kin[n], cost(n)))
 
     def passes(self, command, seconds):
         with tempfile.TemporaryDirectory(prefix="boresight-mutant-run-") as rest:
@@ -135,8 +162,11 @@ class QuickTree(build_files.Judges):
 
     def judge(self, names):
         """The first test that fails with the bug that was compiled last and passes without it, or None."""
-        linked = {}
+        linked, begun_cpu = {}, children_seconds()
         for name in names:
+            if children_seconds() > begun_cpu + self.budget:
+                self.ended = True
+                break
             program = self.program_of(name)
             if program not in self.made:
                 self.made[program] = self.make(program)
@@ -172,5 +202,7 @@ class QuickTree(build_files.Judges):
             return "equal", "same object"
         if not names:
             return "survived", "no tests"
+        self.ended = False
         failed = self.judge(names)
-        return ("noticed", failed) if failed else ("survived", f"{len(names)} tests passed")
+        return ("noticed", failed) if failed else \
+            ("survived", "ended by time" if self.ended else f"{len(names)} tests passed")
