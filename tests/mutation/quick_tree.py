@@ -127,29 +127,40 @@ class QuickTree(build_files.Judges):
                 self.unsound.add(name)
         return self.proven[name]
 
-    def mentions(self, program, path):
-        """How near a test program is to a file: 4 for each source that includes its header, 1 for each that includes
-        another header of its folder."""
+    def sources_of(self, program):
+        """[(the headers that it includes, its words)] of a test program's sources."""
         if program not in self.included:
             texts = []
             for target, entry in self.compilations.items():
-                if f"/{program}.dir/" in target and "/tests/" in os.path.join("/", target):
+                if f"/{program}.dir/" in target and "tests/" in target:
                     with open(os.path.join(entry["directory"], entry["file"]), encoding="utf-8") as file:
-                        texts.append(set(re.findall(r'^#include "([^"]+)\.h"', file.read(), re.M)))
+                        text = file.read()
+                    texts.append((set(re.findall(r'^#include "([^"]+)\.h"', text, re.M)), set(re.findall(r"[a-z]{4,}", text))))
             self.included[program] = texts
-        own, folder = os.path.splitext(path)[0], os.path.dirname(path)
-        return sum(4 * (own in names) + any(os.path.dirname(n) == folder for n in names)
-                   for names in self.included[program])
+        return self.included[program]
 
-    def in_order(self, path, names):
-        """Tests that include the file's header or share a word with it first, then by their last duration; of those that
-        never ran, the ones that CTest knows as long come last."""
-        words = set(re.split(r"[/_.]", path)[-3:-1]) | {os.path.splitext(os.path.basename(path))[0]}
-        kin = {n: sum(w in n for w in words if len(w) > 3) + self.mentions(self.program_of(n), path) for n in names}
+    def nearness(self, name, path, near):
+        """How likely a test is to judge a bug: by words of its name, the headers that it includes, and words of the lines
+        about the bug that few tests know."""
+        program = self.program_of(name)
+        own, folder = os.path.splitext(path)[0], os.path.dirname(path)
+        words = set(re.split(r"[/_.]", path)[-3:-1]) | {os.path.basename(own)}
+        score = sum(w in name for w in words if len(w) > 3)
+        for headers, known in self.sources_of(program):
+            score += 4 * (own in headers) + any(os.path.dirname(h) == folder for h in headers)
+            score += sum(near[w] for w in known if w in near)
+        return score
+
+    def in_order(self, path, names, text, line):
+        """The tests that are most likely to judge a bug for their time first."""
+        lines = text.split("\n")
+        words = set(re.findall(r"[a-z]{4,}", "\n".join(lines[max(0, line - 4):line + 3])))
+        sources = [known for n in names for _, known in self.sources_of(self.program_of(n))]
+        near = {w: 1.0 / count for w in words if (count := sum(w in known for known in sources)) > 0}
 
         def cost(name):
             return self.costs.get(name, self.expected.get(name, 1.0))
-        return sorted(names, key=lambda n: (kin[n] == 0, cost(n) > 5.0, -kin[n], cost(n)))
+        return sorted(names, key=lambda n: -(0.05 + self.nearness(n, path, near)) / (0.5 + cost(n)))
 
     def passes(self, command, seconds):
         with tempfile.TemporaryDirectory(prefix="boresight-mutant-run-") as rest:
@@ -193,7 +204,7 @@ class QuickTree(build_files.Judges):
         if coverage:
             names = coverage.tests_of(name, line, names)
         names = [n for n in names if n not in self.unsound]
-        names = names if suite == "e2e" else self.in_order(name, names)  # those have their order
+        names = names if suite == "e2e" else self.in_order(name, names, text, line)  # those have their order
         before = self.sound(self.target, name, text)
         after = self.compile(self.target, name, text[:at] + new + text[at + len(old):])
         if after is None:
