@@ -12,7 +12,6 @@ import shlex
 import subprocess
 import sys
 import tempfile
-import time
 
 import build_files
 
@@ -42,6 +41,10 @@ class QuickTree(build_files.Judges):
                       for name, (labels, command) in build_files.listed_tests(self.build).items()}
         self.sound_objects, self.links, self.target = {}, {}, None
         self.proven, self.made, self.included = {}, {}, {}  # of tests, of programs, of programs
+        self.costs_file = os.path.join(self.build, "test_seconds.json")
+        if os.path.exists(self.costs_file):
+            with open(self.costs_file, encoding="utf-8") as file:
+                self.costs = json.load(file)
         self.budget, self.ended = float("inf"), False  # processor time of a bug's tests, s
         self.expected = build_files.expected_seconds(self.folder)
 
@@ -119,9 +122,9 @@ class QuickTree(build_files.Judges):
     def is_sound(self, name):
         """Whether a test passes with the sound programs: one that fails there judges nothing."""
         if name not in self.proven:
-            begun = time.monotonic()
+            begun = children_seconds()
             self.proven[name] = self.passes(self.tests[name][2], 900)
-            self.costs[name] = time.monotonic() - begun
+            self.keep_cost(name, children_seconds() - begun)
             if not self.proven[name]:
                 print(f"mutate: left out, for it fails without a bug: {name}", flush=True)
                 self.unsound.add(name)
@@ -160,7 +163,13 @@ class QuickTree(build_files.Judges):
 
         def cost(name):
             return self.costs.get(name, self.expected.get(name, 1.0))
-        return sorted(names, key=lambda n: -(0.05 + self.nearness(n, path, near)) / (0.5 + cost(n)))
+        return sorted(names, key=lambda n: -(0.3 + self.nearness(n, path, near)) / (0.5 + cost(n)))
+
+    def keep_cost(self, name, seconds):
+        """Keeps the processor time of a test, for this run and later ones of this build."""
+        self.costs[name] = seconds
+        with open(self.costs_file, "w", encoding="utf-8") as file:
+            json.dump(self.costs, file)
 
     def passes(self, command, seconds):
         with tempfile.TemporaryDirectory(prefix="boresight-mutant-run-") as rest:
@@ -187,9 +196,10 @@ class QuickTree(build_files.Judges):
                 continue
             own = [re.sub(rf".*/{re.escape(program)}", linked[program], w) if os.path.basename(w) == program else w
                    for w in self.tests[name][2]]
-            begun = time.monotonic()
-            if self.passes(own, max(30, 10 * self.costs.get(name, 30))):
-                self.costs.setdefault(name, time.monotonic() - begun)
+            begun = children_seconds()
+            if self.passes(own, max(60, 20 * self.costs.get(name, 30))):
+                if name not in self.costs:
+                    self.keep_cost(name, children_seconds() - begun)
             elif self.is_sound(name):
                 return name
         return None

@@ -475,6 +475,7 @@ static double axis_share(double at, double sigma, int k) {
  * little. */
 static void bright_stars_beyond_the_edge_are_on_it(void **state) {
     (void)state;
+    enum { X0 = 40, Y0 = 130, WIDE = 640, HIGH = 220 };
     scene s;
     open_scene(&s);
     start(&s);
@@ -487,22 +488,26 @@ static void bright_stars_beyond_the_edge_are_on_it(void **state) {
             square += filter * filter;
             sum += i <= 0 ? filter * axis_share(beyond, sigma, i) : 0.0;
         }
-        double share = sum / square; /* of the SNR of the whole star */
-        for (int bright = 0; bright < 2; bright++) {
-            double expected = bright ? 100.0 : 1.5;
+        double share = sum / square;  /* of the SNR of the whole star */
+        for (int n = 0; n < 8; n++) { /* faint and bright, beyond each of the sides */
+            bool bright = n % 2, above = n / 2 % 2, upright = n / 4;
+            double expected = bright ? 100.0 : 1.5, last = upright ? HIGH - 1 : WIDE - 1;
+            double off = above ? last + beyond : -beyond, on = above ? last : 0.0;
+            s.frame.window = (bst_window){X0, Y0, WIDE, HIGH};
             s.truth->count = 0;
-            add_source(&s, 1, SIDE - 1 + beyond, 500.2, electrons_of(&s, expected / share));
+            add_source(&s, 1, X0 + (upright ? 300.2 : off), Y0 + (upright ? off : 100.2),
+                       electrons_of(&s, expected / share));
             bst_generator_result r = run(&s, k);
             assert_int_equal(r.count, bright);
             if (bright) {
                 const bst_detection *d = &r.items[0].detection;
                 assert_int_equal(d->label, BST_LABEL_ARTEFACT);
-                bst_assert_close(d->x_px, SIDE - 1, 0.2);
-                bst_assert_close(d->y_px, 500.2, 0.5);
-                /* noise is less on the edge, where the filter has 0.78 of its squares */
-                print_message("         %d px: SNR %.1f, pixels %.1f\n", k, d->snr,
-                              expected / sqrt(0.78));
-                /* the pixel of a narrow PSF is no Gaussian: 1.24 and 1.5 at 2 and 3 px */
+                double across = upright ? d->y_px - Y0 : d->x_px - X0,
+                       along = upright ? d->x_px - X0 : d->y_px - Y0;
+                bst_assert_close(across, on, 0.2);
+                bst_assert_close(along, upright ? 300.2 : 100.2, 0.5);
+                /* noise is less on the edge, where the filter has 0.78 of its squares; the pixel of
+                 * a narrow PSF is no Gaussian: 1.24 and 1.5 at 2 and 3 px */
                 bst_assert_close(log(d->snr / (expected / sqrt(0.78))), 0.0, 0.5);
             }
         }
