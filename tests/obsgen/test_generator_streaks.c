@@ -121,8 +121,7 @@ static void set_ends(bst_truth_item *item, int way, double middle, double half) 
 }
 
 /* A streak cut by the frame's edge is fitted with its known path, so that place and flux are those
- * of the whole, from half the light; what lies mostly beyond the edge is a point on it; one beside
- * the frame shows nothing. */
+ * of the whole, from half the light; what lies mostly beyond it is a point on it. */
 static void the_edge_cuts(void **state) {
     (void)state;
     for (int way = 0; way < 4; way++) {
@@ -152,8 +151,7 @@ static void the_edge_cuts(void **state) {
         assert_int_equal(r.count, 1);
         d = &r.items[0].detection;
         assert_false(d->flags & BST_DETECTION_STREAK);
-        /* -0.5 to 4 are on the frame: 4.5 of 40 px of the light, to a sixth of a PSF's width, and
-         * the root of that of the SNR */
+        /* 4.5 of 40 px are on the frame, to a sixth of a PSF; the SNR goes by its root */
         bst_assert_close(*seen, way % 2 ? last - 1.75 : 1.75, 1.0);
         bst_assert_close(way / 2 ? d->x_px : d->y_px, 500.0, 0.5);
         bst_assert_close(d->flux_e / light, 4.5 / 40.0, 0.015);
