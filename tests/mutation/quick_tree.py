@@ -182,6 +182,9 @@ class QuickTree(build_files.Judges):
 
     def judge(self, names):
         """The first test that fails with the bug that was compiled last and passes without it, or None."""
+        unmade = {self.program_of(n) for n in names} - set(self.made)
+        if unmade and self.make(*unmade):  # one call of Ninja for all of them
+            self.made.update({program: True for program in unmade})
         linked, begun_cpu = {}, children_seconds()
         for name in names:
             if children_seconds() > begun_cpu + self.budget:
