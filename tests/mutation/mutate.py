@@ -378,7 +378,7 @@ def main():
             Tree(options.source, folder, "release", options.jobs)
         tree.skipped = set(options.skip)
         tree.budget = options.budget
-        pools = candidates(options, tree)
+        pools = [] if options.bugs and not options.coverage else candidates(options, tree)  # some 20 s of processor time for all files
         coverage = None
         if options.coverage:
             names = set().union(*(tree.tests_for(name, "unit") for name, _, _ in pools))
@@ -387,7 +387,7 @@ def main():
                           if coverage.known[n]["code"] == 0}
         if options.files_unexecuted:
             return show_unexecuted(pools, tree, coverage) if coverage else parser.error("--unexecuted needs --coverage")
-        if not pools:
+        if not pools and not options.bugs:
             sys.exit("mutate: no source file to plant a bug in: look at --files and --since")
         outcomes, begun = [], time.monotonic()
         bugs = listed(options.bugs, tree) if options.bugs else drawn(pools, rng, 20 * options.count)
