@@ -6,6 +6,7 @@
 #include "boresight/rng.h"
 #include "sim/world/scene/field.h"
 #include "sim/world/scene/los_track.h"
+#include "sim/world/world_config.h"
 #include "tests/world/world_support.h"
 
 /* A part of a source's time is the same motion and the same light. */
@@ -294,6 +295,38 @@ static void the_largest_way_of_an_image_point(void **state) {
     }
 }
 
+/* Windows up to the sensor's edges, of at least a binned pixel. */
+static void windows_of_the_sensor(void **state) {
+    (void)state;
+    static const struct {
+        double window[4];
+        bool fits;
+    } cases[] = {
+        {{600, 400, 40, 80}, true}, {{601, 400, 40, 80}, false}, {{600, 401, 40, 80}, false},
+        {{0, 0, 640, 480}, true},   {{0, 0, 480, 640}, false},   {{20, 30, 3, 3}, true},
+        {{20, 30, 2, 9}, false},    {{20, 30, 9, 2}, false},     {{20, 30.5, 9, 9}, false},
+        {{20, 30, 9, 9.5}, false},  {{20, 30, 9, 0}, false}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        bst_ctx ctx = {0};
+        bst_exposure_config c = {.binning = 3};
+        memcpy(c.window_px, cases[k].window, sizeof c.window_px);
+        bst_window w;
+        bst_status status = bst_exposure_window(&ctx, &c, 640, 480, &w);
+        assert_int_equal(status, cases[k].fits ? BST_OK : BST_ERR_CONFIG);
+        if (cases[k].fits) {
+            const double got[4] = {w.x0, w.y0, w.width, w.height};
+            assert_memory_equal(got, cases[k].window, sizeof got);
+        } else {
+            assert_non_null(strstr(ctx.message, "640 x 480 pixels, at least the binning of 3"));
+        }
+    }
+    bst_ctx ctx = {0};
+    const bst_exposure_config whole = {.binning = 1};
+    bst_window w;
+    bst_assert_ok(&ctx, bst_exposure_window(&ctx, &whole, 640, 480, &w));
+    assert_true(w.x0 == 0 && w.y0 == 0 && w.width == 640 && w.height == 480);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(parts_are_the_same_polynomials),
@@ -302,6 +335,7 @@ int main(void) {
         cmocka_unit_test(contradictions_are_refused),
         cmocka_unit_test(a_track_is_cut_out_of_the_history),
         cmocka_unit_test(the_largest_way_of_an_image_point),
+        cmocka_unit_test(windows_of_the_sensor),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
