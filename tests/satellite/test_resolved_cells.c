@@ -177,7 +177,7 @@ typedef struct covered {
 
 /* A cell's covered part by counting points of it. */
 static covered count_points(const bst_point2 *p, int corners, double turn, int x, int y) {
-    enum { POINTS = 64 };
+    enum { POINTS = 40 };
     covered sum = {0.0, {0.0, 0.0}};
     for (int k = 0; k < POINTS * POINTS; k++) {
         double u = (k % POINTS + 0.5) / POINTS - 0.5, v = (k / POINTS + 0.5) / POINTS - 0.5;
@@ -204,7 +204,7 @@ static double twice_area(const bst_point2 *q, int count) {
 }
 
 /* Areas and moments of every cell that a polygon covers, of either orientation, also where it
- * leaves the grid on one or the other side. A line across a cell is counted to 0.004. */
+ * leaves the grid on one or the other side. A line across a cell is counted to 0.008. */
 static void test_cells_of_a_polygon(void **state) {
     (void)state;
     enum { WIDE = 13, HIGH = 9, CORNERS = 5 };
@@ -226,9 +226,9 @@ static void test_cells_of_a_polygon(void **state) {
             assert_true(c->x >= 0 && c->y >= 0 && c->x + c->run <= WIDE && c->y < HIGH);
             for (int i = 0; i < c->run; i++) {
                 covered here = count_points(p, CORNERS, turn, c->x + i, c->y);
-                bst_assert_close(c->area, here.area, 0.004);
-                bst_assert_close(c->moment_x, here.moment[0], 0.002);
-                bst_assert_close(c->moment_y, here.moment[1], 0.002);
+                bst_assert_close(c->area, here.area, 0.008);
+                bst_assert_close(c->moment_x, here.moment[0], 0.004);
+                bst_assert_close(c->moment_y, here.moment[1], 0.004);
                 assert_true(seen[c->y][c->x + i] == 0.0);
                 seen[c->y][c->x + i] = c->area;
             }
@@ -241,7 +241,7 @@ static void test_cells_of_a_polygon(void **state) {
         }
         for (int i = 0; i < WIDE * HIGH; i++) { /* none is left out */
             covered here = count_points(p, CORNERS, turn, i % WIDE, i / WIDE);
-            bst_assert_close(seen[i / WIDE][i % WIDE], here.area, 0.004);
+            bst_assert_close(seen[i / WIDE][i % WIDE], here.area, 0.008);
         }
         bst_polygon_coverage_free(&list);
     }
