@@ -2,6 +2,7 @@
 
 #include "boresight/rng.h"
 #include "imgproc/detect/background.h"
+#include "imgproc/detect/truncated_moments.h"
 #include "tests/test_support.h"
 
 enum { SIDE = 256 };
@@ -195,6 +196,57 @@ static void skewed_noise_in_coarse_steps(void **state) {
     }
 }
 
+/* Moments of the values k - 1/2 < (e - origin) / step < k + 1/2 of Poisson electrons with read
+ * noise, of those from k = first to last, by their probabilities. */
+static void moments_by_probabilities(double counted, double read, double step, double origin,
+                                     int first, int last, double *mean, double *variance) {
+    double sum[3] = {0.0, 0.0, 0.0};
+    for (int k = first; k <= last; k++) {
+        double p = 0.0, value = origin + k * step, share = exp(-counted), c = read * sqrt(2.0);
+        for (int n = 0; n < 150; n++) {
+            p += share * 0.5 *
+                 (erf((value + 0.5 * step - n) / c) - erf((value - 0.5 * step - n) / c));
+            share *= counted / (n + 1);
+        }
+        sum[0] += p;
+        sum[1] += p * value;
+        sum[2] += p * value * value;
+    }
+    *mean = sum[1] / sum[0];
+    *variance = sum[2] / sum[0] - *mean * *mean;
+}
+
+/* Mean and deviation of all values from those between two edges, at different distances. */
+static void clipped_moments_are_corrected(void **state) {
+    (void)state;
+    /* electrons, read noise, step; least part of a deviation that is off in mean and in deviation
+     */
+    static const double cases[][4] = {{2.0, 0.5, 0.4, 1e-3},
+                                      {8.0, 0.8, 1.0, 1e-3},
+                                      {50.0, 4.0, 1.0, 2e-3},
+                                      {30.0, 5.0, 3.0, 2e-3},
+                                      {0.0, 6.0, 2.0, 2e-3}};
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        double counted = cases[c][0], read = cases[c][1], step = cases[c][2], mean, variance;
+        double inner, inner_variance, origin = -7.3;
+        moments_by_probabilities(counted, read, step, origin, -300, 400, &mean, &variance);
+        double sigma = sqrt(variance);
+        int first = (int)ceil((mean - 2.6 * sigma - origin) / step),
+            last = (int)floor((mean + 3.2 * sigma - origin) / step);
+        moments_by_probabilities(counted, read, step, origin, first, last, &inner, &inner_variance);
+        const bst_truncated_moments_noise noise = {read * read, step};
+        double got = mean + 0.05 * sigma, deviation = 0.97 * sigma;
+        bst_truncated_moments_solve(&noise, origin + (first - 0.5) * step,
+                                    origin + (last + 0.5) * step, inner, inner_variance, &got,
+                                    &deviation);
+        print_message("         off by %.5f and %.5f (inner %.5f %.5f)\n", (got - mean) / sigma,
+                      deviation / sigma - 1.0, (inner - mean) / sigma,
+                      sqrt(inner_variance) / sigma - 1.0);
+        bst_assert_close((got - mean) / sigma, 0.0, cases[c][3]);
+        bst_assert_close(deviation / sigma, 1.0, cases[c][3]);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(level_and_noise, setup, teardown),
@@ -203,6 +255,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(interpolation, setup, teardown),
         cmocka_unit_test_setup_teardown(every_pixel_between_meshes, setup, teardown),
         cmocka_unit_test_setup_teardown(skewed_noise_in_coarse_steps, setup, teardown),
+        cmocka_unit_test(clipped_moments_are_corrected),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
