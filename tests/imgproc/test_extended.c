@@ -334,7 +334,7 @@ static void handover(void **state) {
 }
 
 /* A silhouette of made-up numbers on a binned window off the corner, whose outline is a rectangle:
- * what is told of it, term by term. */
+ * what is reported of it, term by term. */
 typedef struct made_up {
     bst_camera camera;
     bst_extended_config config;
@@ -438,12 +438,12 @@ static void a_made_up_silhouette(void **state) {
         bst_assert_close(d.length_px, length, 1e-9);
         bst_assert_close(d.width_px, 13.5, 1e-9);
         const bst_detection_extent *e = &d.extent;
-        const double told[] = {e->light_x_px, e->light_y_px, e->x0_px,    e->y0_px,
-                               e->x1_px,      e->y1_px,      e->area_px2, e->saturated_share};
+        const double reported[] = {e->light_x_px, e->light_y_px, e->x0_px,    e->y0_px,
+                                   e->x1_px,      e->y1_px,      e->area_px2, e->saturated_share};
         const double want[] = {light[0],     light[1],    121 + 3 * 84, 61 + 3 * 38,
                                121 + 3 * 96, 61 + 3 * 45, 630.0,        0.2};
         for (int i = 0; i < 8; i++) {
-            bst_assert_close(told[i], want[i], 1e-9);
+            bst_assert_close(reported[i], want[i], 1e-9);
         }
         bst_assert_close(e->size_sigma_px, hypot(0.5 * blur, 0.02 * length), 1e-9);
         bst_assert_close(e->phase_rad, sun ? p : 0.0, 1e-9);

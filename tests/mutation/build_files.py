@@ -31,7 +31,7 @@ def listed_tests(build):
 
 
 def expected_seconds(source):
-    """{name: seconds} of the longer tests, as CTest is told."""
+    """{name: seconds} of the longer tests, from costs.cmake."""
     with open(os.path.join(source, "tests", "costs.cmake"), encoding="utf-8") as file:
         text = file.read()
     return {name: float(seconds) for name, seconds in
