@@ -289,7 +289,7 @@ static void the_largest_way_of_an_image_point(void **state) {
                 bst_camera_project(&c, bst_quat_rotate(q, bst_camera_unproject(&c, x, y)), &u, &v));
             most = fmax(most, hypot(u - x, v - y));
         }
-        double told =
+        double most_px =
             bst_los_track_moved_px(&c, evenly_turned(5.0), bst_quat_mul(q, evenly_turned(5.0)));
         assert_true(most_px > 0.999 * most && most_px < 1.1 * most);
     }
