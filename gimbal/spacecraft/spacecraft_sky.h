@@ -34,9 +34,8 @@ typedef struct bst_spacecraft_sky_grid {
 } bst_spacecraft_sky_grid;
 
 /* Interpolated environment (only position_m, velocity_mps, sun_m and sunlit) and the wanted motion.
- * For seconds
- * >= 0 no node is before time 0, and nodes are at most two grid steps later than `seconds`. Errors:
- * those of sky_at. */
+ * For seconds >= 0 no node is before time 0, and nodes are at most two grid steps later than
+ * `seconds`, within the first step three. Errors: those of sky_at. */
 bst_status bst_spacecraft_sky_grid_at(bst_spacecraft_sky_grid *grid, bst_ctx *ctx, double seconds,
                                       bst_spacecraft_sky *sky,
                                       bst_spacecraft_attitude_reference *reference) BST_MUST_CHECK;

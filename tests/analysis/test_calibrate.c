@@ -1,6 +1,7 @@
 /* The calibration finds the factors that observations were made with: the generator's own. */
 #include "obsgen/generator.h"
 #include "sim/analysis/calibration/calibrate.h"
+#include "sim/analysis/calibration/calibrate_internal.h"
 #include "sim/analysis/calibration/pairing.h"
 #include "tests/test_support.h"
 
@@ -127,6 +128,140 @@ static void known_factors_are_found(void **state) {
     bst_generator_free(generator);
 }
 
+/* Bright stars 50 px apart, each of which hides 29 px on each side, over half of the columns and a
+ * third of the rows: a sixth of the frame. What is found elsewhere is a false alarm. */
+static void false_alarms_are_those_of_the_free_sky(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_camera wide = camera;
+    wide.height_px = 768;
+    bst_calibration_fitter *c;
+    bst_assert_ok(&ctx, bst_calibration_fitter_create(&ctx, &c));
+    const bst_calibration_path path = {.camera = &wide,
+                                       .false_alarms_per_frame = 8.0,
+                                       .streak_min_px = 1.5,
+                                       .streak_max_px = 64.0};
+    bst_assert_ok(&ctx, bst_calibration_fitter_begin(&ctx, c, &path));
+    bst_truth *truth = calloc(1, sizeof *truth + 50 * sizeof truth->items[0]);
+    bst_detections *found = calloc(1, sizeof *found + 4 * sizeof(bst_detection));
+    assert_true(truth && found);
+    truth->background_e = 36.0;
+    truth->count = 50;
+    for (int i = 0; i < 50; i++) {
+        double x = 25.0 + 50.0 * (i % 10), y = 25.0 + 50.0 * (double)(i / 10);
+        truth->items[i] = (bst_truth_item){.kind = BST_SOURCE_STAR,
+                                           .id = (uint32_t)(i + 1),
+                                           .flags = BST_TRUTH_IN_FIELD,
+                                           .x_start_px = x,
+                                           .x_centroid_px = x,
+                                           .x_end_px = x,
+                                           .y_start_px = y,
+                                           .y_centroid_px = y,
+                                           .y_end_px = y,
+                                           .snr = 5000.0,
+                                           .electrons = 1e5};
+    }
+    found->background_e = 36.0;
+    found->noise_e = 10.2;
+    found->threshold_snr = 5.0;
+    /* in the corner that the stars hide, and in the three others */
+    const double places[4][2] = {{300.3, 148.0}, {700.0, 90.0}, {200.0, 600.0}, {900.0, 700.0}};
+    found->count = 4;
+    for (int i = 0; i < 4; i++) {
+        found->items[i] = (bst_detection){
+            .x_px = places[i][0], .y_px = places[i][1], .snr = 6.0 + i, .flux_e = 400.0};
+    }
+    bst_assert_ok(&ctx, bst_calibration_fitter_add(&ctx, c, truth, found, 0.5));
+    bst_assert_close(c->alarms_expected, 8.0 * 5.0 / 6.0, 1e-9);
+    assert_int_equal(c->alarm_count, 3);
+    /* excess over the threshold: half the squared SNR */
+    bst_assert_close(c->alarm_energy[2] - c->alarm_energy[0], 0.5 * (81.0 - 49.0), 1e-9);
+    /* 0.1 sigma of a source too much in the background: SNR is lower by that, and alarms rarer by
+     * the tail at 5.1 */
+    double norm = bst_crlb_table_norm(&c->bound, 0.0);
+    found->background_e += 0.1 * 10.2 * norm;
+    double before = c->alarms_expected;
+    bst_assert_ok(&ctx, bst_calibration_fitter_add(&ctx, c, truth, found, 0.5));
+    bst_assert_close((c->alarms_expected - before) / before, exp(0.5 * (25.0 - 5.1 * 5.1)), 1e-9);
+    free(truth);
+    free(found);
+    bst_calibration_fitter_free(c);
+}
+
+/* Streaks of (8, -6) px whose places are off by a common error and their own: squares along and
+ * across them, in units of the bound, each less its own part of the mean. */
+static void places_along_and_across_the_streak(void **state) {
+    (void)state;
+    enum { STARS = 12 };
+    bst_ctx ctx = {0};
+    bst_calibration_fitter *c;
+    bst_assert_ok(&ctx, bst_calibration_fitter_create(&ctx, &c));
+    const bst_calibration_path path = {.camera = &camera,
+                                       .false_alarms_per_frame = 1.0,
+                                       .streak_min_px = 1.5,
+                                       .streak_max_px = 64.0};
+    bst_assert_ok(&ctx, bst_calibration_fitter_begin(&ctx, c, &path));
+    bst_truth *truth = calloc(1, sizeof *truth + STARS * sizeof truth->items[0]);
+    bst_detections *found = calloc(1, sizeof *found + STARS * sizeof(bst_detection));
+    assert_true(truth && found);
+    truth->background_e = 36.0;
+    truth->dark_e = 8.0;
+    truth->count = found->count = STARS;
+    double own[STARS][2], mean[2] = {0.0, 0.0};
+    for (int i = 0; i < STARS; i++) {
+        double x = 120.0 + 200.0 * (i % 4), y = 150.0 + 250.0 * (double)(i / 4);
+        own[i][0] = 0.04 * sin(2.0 * i) + 0.2;
+        own[i][1] = 0.03 * cos(3.0 * i) - 0.1;
+        mean[0] += own[i][0] / STARS;
+        mean[1] += own[i][1] / STARS;
+        truth->items[i] = (bst_truth_item){.kind = BST_SOURCE_STAR,
+                                           .id = (uint32_t)(i + 1),
+                                           .flags = BST_TRUTH_IN_FIELD,
+                                           .x_start_px = x - 4.0,
+                                           .x_centroid_px = x,
+                                           .x_end_px = x + 4.0,
+                                           .y_start_px = y + 3.0,
+                                           .y_centroid_px = y,
+                                           .y_end_px = y - 3.0,
+                                           .snr = 7.0,
+                                           .electrons = 600.0};
+        found->items[i] = (bst_detection){
+            .x_px = x + own[i][0], .y_px = y + own[i][1], .snr = 7.0, .flux_e = 600.0};
+    }
+    found->background_e = 44.0;
+    found->noise_e = 12.0;
+    found->threshold_snr = 5.0;
+    bst_assert_ok(&ctx, bst_calibration_fitter_add(&ctx, c, truth, found, 0.5));
+    bst_crlb_table_at at = bst_crlb_table_of(&c->bound, 600.0, 12.0, 10.0);
+    double squares[2] = {0.0, 0.0};
+    for (int i = 0; i < STARS; i++) {
+        double dx = own[i][0] - mean[0], dy = own[i][1] - mean[1], n = (STARS - 1.0) / STARS;
+        squares[0] += pow(0.8 * dx - 0.6 * dy, 2.0) / n / at.var_along_px2;
+        squares[1] += pow(0.6 * dx + 0.8 * dy, 2.0) / n / at.var_across_px2;
+    }
+    double sums[2] = {0.0, 0.0};
+    long counts[2] = {0, 0};
+    for (int i = 0; i < BST_OBSGEN_SNRS; i++) {
+        sums[0] += c->along[i].sum;
+        sums[1] += c->across[i].sum;
+        counts[0] += c->along[i].count;
+        counts[1] += c->across[i].count;
+    }
+    assert_int_equal(counts[0], STARS);
+    assert_int_equal(counts[1], STARS);
+    bst_assert_close(sums[0], squares[0], 1e-9);
+    bst_assert_close(sums[1], squares[1], 1e-9);
+    assert_int_equal(c->trial_count, STARS);
+    for (int i = 0; i < STARS; i++) { /* SNR in the noise that was measured */
+        bst_assert_close(c->trials[i].amplitude, 7.0 * sqrt(36.0 + 8.0 + 64.0) / 12.0, 1e-6);
+        bst_assert_close(c->trials[i].length, 10.0, 1e-6);
+        assert_true(c->trials[i].detected && c->trials[i].other > 0.0f);
+    }
+    free(truth);
+    free(found);
+    bst_calibration_fitter_free(c);
+}
+
 static void too_little_is_refused(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -141,6 +276,8 @@ static void too_little_is_refused(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(known_factors_are_found),
+                                       cmocka_unit_test(false_alarms_are_those_of_the_free_sky),
+                                       cmocka_unit_test(places_along_and_across_the_streak),
                                        cmocka_unit_test(too_little_is_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,6 +3,7 @@
 #include <cjson/cJSON.h>
 
 #include "boresight/vec.h"
+#include "gimbal/spacecraft/spacecraft_response.h"
 #include "sim/analysis/loop/loop_model.h"
 #include "sim/cli/load.h"
 #include "tests/test_support.h"
@@ -66,6 +67,41 @@ static void bands_of_the_jitter(void **state) {
         bst_assert_close(a->bands[before].variance, 0.5, 0);
         free(a);
     }
+}
+
+/* What the attitude estimate adds to an axis: bands without gaps from 0 to 10 Hz, each of the
+ * density in its middle over its width, in square pixels; with a spacecraft of known attitude none.
+ */
+static void bands_of_the_attitude(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_spacecraft_config c;
+    bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_spacecraft_config_table, &c));
+    bst_loop_axis *a = calloc(1, sizeof *a);
+    assert_non_null(a);
+    bst_loop_body_bands(&c, 0, PX, a);
+    assert_int_equal(a->band_count, 0);
+    c.type = BST_CRAFT_RIGID_BODY;
+    for (int axis = 0; axis < 3; axis++) {
+        a->band_count = 0;
+        bst_loop_body_bands(&c, axis, PX, a);
+        assert_int_equal(a->band_count, 61);
+        bst_assert_close(a->bands[0].low_hz, 0.0, 0.0);
+        bst_assert_close(a->bands[0].high_hz, 1e-5, 1e-12);
+        bst_assert_close(a->bands[60].high_hz, 10.0, 1e-6);
+        double sum = 0.0, integral = 0.0;
+        for (int i = 1; i <= 60; i++) {
+            bst_assert_close(a->bands[i].low_hz, a->bands[i - 1].high_hz, 0.0);
+            bst_assert_close(log10(a->bands[i].high_hz / a->bands[i].low_hz), 0.1, 1e-9);
+            sum += a->bands[i].variance;
+        }
+        for (int i = 0; i < 6000; i++) { /* by logarithmic steps of a thousandth of a decade */
+            double f = pow(10.0, -5.0 + (i + 0.5) * 1e-3);
+            integral += bst_spacecraft_noise_at(&c, axis, f).knowledge * f * 1e-3 * log(10.0);
+        }
+        bst_assert_close(sum * PX * PX / integral, 1.0, 0.01); /* ten bands in a decade */
+    }
+    free(a);
 }
 
 static bst_loop_model *model_of(bst_json **json, bst_scenario *scenario, const char *const *sets,
@@ -257,6 +293,7 @@ static void every_key(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bands_of_the_jitter),
+        cmocka_unit_test(bands_of_the_attitude),
         cmocka_unit_test(a_second_order_mount),
         cmocka_unit_test(predictions_scale),
         cmocka_unit_test(every_key),

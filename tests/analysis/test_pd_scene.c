@@ -202,11 +202,59 @@ static void targets_of_a_stack(void **state) {
     free(f);
 }
 
+/* Behind a vignetting lens, whose light falls off from a place beside the middle: by magnitude a
+ * star loses light, by SNR it is brighter in front of the lens; under a sky of its own level. */
+static void targets_behind_a_vignetting_lens(void **state) {
+    (void)state;
+    for (int by = 0; by < 2; by++) {
+        fixture *f = make(&(bst_pd_options){.trials = 1000, .by_magnitude = by});
+        f->scene.camera.optics.vignetting = (bst_optics_vignetting){
+            .model = BST_VIGNETTING_POLYNOMIAL, .coefficients = {-0.3, -0.2, 0.1}};
+        set(f, 1);
+        double least = 1.0;
+        for (int i = 0; i < ROOM; i++) {
+            double px = f->places[i].x_px, py = f->places[i].y_px;
+            double light = bst_camera_illumination(&f->scene.camera, px, py);
+            int point = f->targets[i].point;
+            double front = f->sources[i].electrons_per_s * 0.4;
+            double listed = f->scene.flux_e[point],
+                   asked = f->scene.snr[point] * sqrt(70.0) /
+                           sqrt(squares(px, py, 0, 0, f->scene.sigma_px));
+            bst_assert_close(front / (by ? listed : asked / light), 1.0, 1e-6);
+            bst_assert_close(f->targets[i].flux_e / (by ? listed * light : asked), 1.0, 1e-6);
+            least = fmin(least, light);
+        }
+        assert_true(least < 0.9);
+        free(f);
+    }
+}
+
+/* By SNR a streak is as bright as its sum of squares at its angle asks for, from a table over 90
+ * degrees that is straight here. */
+static void streaks_by_snr(void **state) {
+    (void)state;
+    fixture *f = make(&(bst_pd_options){.trials = 1000, .streak_px = 17.0});
+    double table[46];
+    for (int a = 0; a < 46; a++) {
+        table[a] = 0.01 * (1.0 + a / 45.0);
+    }
+    f->scene.sharpness = table;
+    set(f, 3);
+    for (int i = 0; i < ROOM; i++) {
+        double angle = atan2(fabs(f->places[i].dy_px), fabs(f->places[i].dx_px));
+        double square = 0.01 * (1.0 + angle / (0.5 * BST_PI));
+        double flux = f->scene.snr[f->targets[i].point] * sqrt(70.0) / sqrt(square);
+        bst_assert_close(f->targets[i].flux_e / flux, 1.0, 1e-9);
+        bst_assert_close(f->sources[i].electrons_per_s * 0.4 / flux, 1.0, 1e-9);
+    }
+    free(f);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(targets_at_rest),
-        cmocka_unit_test(targets_in_motion),
-        cmocka_unit_test(targets_of_a_stack),
+        cmocka_unit_test(targets_at_rest),    cmocka_unit_test(targets_in_motion),
+        cmocka_unit_test(targets_of_a_stack), cmocka_unit_test(targets_behind_a_vignetting_lens),
+        cmocka_unit_test(streaks_by_snr),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -42,6 +42,16 @@ static void a_known_loss_is_found(void **state) {
                 /* counts are rounded to 1e-9 of the trials */
                 bst_assert_close(bst_pd_loss_db(needed.snr, pfa, pd), losses[k], 1e-6);
             }
+            /* a thousand times as many trials above, then also below: the fit's equations are
+             * uneven, its curve is the same */
+            for (int part = 0; part < 2; part++) {
+                for (int i = part ? 0 : n / 2; i < (part ? n / 4 : n); i++) {
+                    points[i].trials *= 1000;
+                    points[i].detected *= 1000;
+                }
+                bst_pd_needed needed = bst_pd_snr_at(points, n, 0.0, 0.9);
+                bst_assert_close(bst_pd_loss_db(needed.snr, pfa, 0.9), losses[k], 1e-6);
+            }
         }
     }
 }

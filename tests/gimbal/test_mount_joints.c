@@ -1,4 +1,5 @@
 /* Joints of the full mounts against closed forms: springs, modes, friction, stops, momentum. */
+#include "gimbal/mount/mount_geometry.h"
 #include "gimbal/mount/mount_joints.h"
 #include "tests/test_support.h"
 
@@ -339,8 +340,43 @@ static void a_stop_holds_what_pushes_and_lets_go_what_pulls(void **state) {
     bst_assert_close(j.state.rate_radps[1], -DT / 0.28, 1e-12);
 }
 
+/* Past either pole on a great circle: until the azimuth is slower again, the outer axis turns at
+ * its rate by way of the azimuth of the closest approach, at its time. */
+static void the_outer_axis_passes_the_pole_in_time(void **state) {
+    (void)state;
+    const double limit = 0.1, rate = 0.06, offs[3] = {0.05, -0.2, 1.2};
+    int limited = 0;
+    for (int n = 0; n < 2 * 2 * 3 * 2; n++) {
+        int type = n & 1 ? BST_MOUNT_AZIMUTH_ELEVATION : BST_MOUNT_CROSS_ELEVATION;
+        double off = offs[n / 4 % 3], way = n / 12 ? 1.0 : -1.0;
+        bst_vec3 pole = bst_vec3_scale(bst_mount_axis_body(type, 0), n & 2 ? 1.0 : -1.0);
+        bst_vec3 side = bst_vec3_unit(bst_vec3_cross(pole, (bst_vec3){0.3, 0.5, 0.8}));
+        /* closest to the pole at t = 0, by `off` towards `side` */
+        bst_vec3 near = bst_vec3_axpy(bst_vec3_scale(pole, cos(off)), sin(off), side);
+        bst_vec3 along = bst_vec3_scale(bst_vec3_cross(pole, side), way);
+        bst_mount_pose middle = bst_mount_solve(type, near, bst_vec3_scale(along, rate), 0.0);
+        for (double t = -9.75; t < 10.0; t += 0.5) {
+            double a = rate * t;
+            bst_vec3 d = bst_vec3_axpy(bst_vec3_scale(near, cos(a)), sin(a), along);
+            bst_vec3 v = bst_vec3_axpy(bst_vec3_scale(near, -rate * sin(a)), rate * cos(a), along);
+            bst_mount_pose pose = bst_mount_solve(type, d, v, 0.0);
+            double angle, speed;
+            bst_mount_pass_pole(type, d, v, limit, &pose, &angle, &speed);
+            double azimuth = bst_wrap_angle(pose.angle_rad[0] - middle.angle_rad[0]);
+            bool late = fabs(azimuth) > limit * fabs(t) && rate > limit * fabs(sin(off));
+            double wanted = late ? copysign(limit * t, azimuth) : azimuth;
+            bst_assert_close(bst_wrap_angle(angle - middle.angle_rad[0] - wanted), 0.0, 1e-9);
+            bst_assert_close(speed, late ? copysign(limit, pose.rate_radps[0]) : pose.rate_radps[0],
+                             1e-9);
+            limited += late;
+        }
+    }
+    assert_true(limited > 100);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_outer_axis_passes_the_pole_in_time),
         cmocka_unit_test(mass_matrix_is_that_of_the_kinetic_energy),
         cmocka_unit_test(energy_is_kept_without_torque),
         cmocka_unit_test(momentum_of_body_and_mount_is_kept),

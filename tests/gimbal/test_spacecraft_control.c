@@ -2,6 +2,7 @@
  * out with rotation matrices from the formulas of Wie (see the header): no axis, wheel or product
  * of inertia is zero, and none equals another. */
 #include "gimbal/spacecraft/spacecraft_control.h"
+#include "gimbal/spacecraft/spacecraft_sky.h"
 #include "tests/archive_support.h"
 
 /* natural 0.3 rad/s, damping 0.8: the slope is 0.1875 per s; 70 % of 0.004 rad/s^2 give a straight
@@ -151,12 +152,75 @@ static void it_is_saved_and_restored(void **state) {
     }
 }
 
+typedef struct path {
+    int asked;
+    double earliest, latest;
+} path;
+
+/* A cubic path, whose interpolation through four nodes is exact, and known places on a circle at
+ * 0.02 rad/s about an inclined axis. */
+static bst_status cubic_sky(void *user, bst_ctx *ctx, double t, bst_spacecraft_sky *out) {
+    (void)ctx;
+    path *p = user;
+    p->asked++;
+    p->earliest = fmin(p->earliest, t);
+    p->latest = fmax(p->latest, t);
+    bst_vec3 x = {0.6, 0.0, 0.8}, y = {0.0, 1.0, 0.0};
+    double c = cos(0.02 * t), s = sin(0.02 * t);
+    *out = (bst_spacecraft_sky){
+        .position_m = {7e6 + 20.0 * t, 3.0 * t * t, -t * t * t},
+        .velocity_mps = {20.0, 6.0 * t, -3.0 * t * t},
+        .sun_m = {1e3 - t, 2e3 + 0.5 * t * t, 3e3 * t},
+        .sunlit = 0.5 + 0.2 * t,
+        .known = {.position_m = bst_vec3_axpy(bst_vec3_scale(x, 7e6 * c), 7e6 * s, y),
+                  .velocity_mps = bst_vec3_axpy(bst_vec3_scale(y, 7e3 * c), -7e3 * s, x)}};
+    return BST_OK;
+}
+
+/* Environment and wanted motion between the nodes, forwards and back; nothing before the epoch is
+ * asked for after it, and nothing later than two steps ahead, or the fourth node. */
+static void the_sky_is_interpolated_between_nodes(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    path user = {.earliest = INFINITY};
+    const bst_pointing_law law = {
+        .law = BST_LAW_NADIR, .axis = {0, 0, 1}, .second_axis = {1, 0, 0}};
+    bst_spacecraft_sky_grid grid = {.sky_at = cubic_sky, .user = &user, .law = &law};
+    const double times[] = {0.0, 0.1, 0.26, 0.499, 0.5, 0.77, 1.3, 0.9, 2.25, 7.7, 7.7, 3.1};
+    for (size_t k = 0; k < sizeof times / sizeof *times; k++) {
+        double t = times[k];
+        bst_spacecraft_sky sky, want;
+        bst_spacecraft_attitude_reference reference;
+        user.latest = -INFINITY;
+        bst_assert_ok(&ctx, bst_spacecraft_sky_grid_at(&grid, &ctx, t, &sky, &reference));
+        assert_true(user.latest <= (t < 0.25 ? 0.75 : t + 0.5));
+        path unused = {0};
+        bst_assert_ok(&ctx, cubic_sky(&unused, &ctx, t, &want));
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(sky.position_m, want.position_m)), 0, 1e-7);
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(sky.velocity_mps, want.velocity_mps)), 0, 1e-9);
+        bst_assert_close(bst_vec3_norm(bst_vec3_sub(sky.sun_m, want.sun_m)), 0, 1e-8);
+        bst_assert_close(sky.sunlit, fmin(0.5 + 0.2 * t, 1.0), 1e-12);
+        /* nadir along +z, the way along +x: it turns about -y, which is the orbit's pole */
+        bst_vec3 z = bst_quat_rotate(reference.q_body_from_gcrf, want.known.position_m);
+        bst_vec3 x = bst_quat_rotate(reference.q_body_from_gcrf, want.known.velocity_mps);
+        bst_assert_close(bst_vec3_angle(z, (bst_vec3){0, 0, -1}), 0, 1e-7);
+        bst_assert_close(bst_vec3_angle(x, (bst_vec3){1, 0, 0}), 0, 1e-7);
+        bst_assert_close(reference.rate_radps.x, 0.0, 1e-6);
+        bst_assert_close(reference.rate_radps.y, -0.02, 1e-6);
+        bst_assert_close(reference.rate_radps.z, 0.0, 1e-6);
+        bst_assert_close(bst_vec3_norm(reference.accel_radps2), 0.0, 1e-6);
+    }
+    assert_true(user.earliest == 0.0);
+    assert_true(user.asked < 4 * (int)(sizeof times / sizeof *times)); /* nodes are kept */
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(near_the_end_the_law_is_linear),
         cmocka_unit_test(a_slew_brakes_along_its_curve),
         cmocka_unit_test(the_way_round_is_kept),
         cmocka_unit_test(it_is_saved_and_restored),
+        cmocka_unit_test(the_sky_is_interpolated_between_nodes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

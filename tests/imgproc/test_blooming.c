@@ -82,6 +82,9 @@ static void one_source_of_each(void **state) {
                 assert_true(found->flags & BST_DETECTION_BLOOM);
                 /* the charge is counted; wells are known to 2 % */
                 bst_assert_close(found->flux_e / fluxes_e[k], 1.0, 0.03);
+                bst_assert_close(
+                    found->flux_sigma_e / hypot(sqrt(found->flux_e), 0.02 * found->flux_e), 1.0,
+                    1e-6);
                 double dx = found->x_px - x, dy = found->y_px - y;
                 chi2 += dx * dx / found->cov_xx + dy * dy / found->cov_yy;
                 others += d->count - 1;

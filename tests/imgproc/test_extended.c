@@ -3,6 +3,7 @@
 #include <stdlib.h>
 
 #include "boresight/rng.h"
+#include "imgproc/extended/centre_of_mass.h"
 #include "imgproc/extended/extended_step.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
@@ -332,10 +333,156 @@ static void handover(void **state) {
     bench_free(&b);
 }
 
+/* A silhouette of made-up numbers on a binned window off the corner, whose outline is a rectangle:
+ * what is reported of it, term by term. */
+typedef struct made_up {
+    bst_camera camera;
+    bst_extended_config config;
+    bst_extended_view view;
+    bst_silhouette s;
+    double x, y;      /* origin of the window on the sensor */
+    double phase_rad; /* of the target at a place */
+    double along[2];  /* towards the Sun */
+    double across_px; /* extent of the rectangle across that direction, less the blur, sensor px */
+} made_up;
+
+static made_up make_up(double length_px, bool sun_known) {
+    made_up m = {.camera = {.width_px = 900,
+                            .height_px = 700,
+                            .pixel_scale_arcsec = 30.0,
+                            .psf_fwhm_px = 2.0},
+                 .config = SPHERE,
+                 .s = {.centre_x_px = 90.3,
+                       .centre_y_px = 41.6,
+                       .light_x_px = 91.7,
+                       .light_y_px = 40.2,
+                       .area_px2 = 70.0,
+                       .flux_e = 4e4,
+                       .flux_variance = 9e6,
+                       .moment_size_px = 2.0,
+                       .length_px = length_px / 3.0,
+                       .width_px = 4.5,
+                       .angle_rad = 0.8,
+                       .blur_px = 0.7,
+                       .x0_px = 84.0,
+                       .y0_px = 38.0,
+                       .x1_px = 96.0,
+                       .y1_px = 45.0,
+                       .saturated_px = 14}};
+    m.config.phase_offset_factor = 0.8;
+    m.config.target_size_sigma_m = 0.1;
+    bst_outline_point points[4] = {{84, 38}, {96, 38}, {96, 45}, {84, 45}}, hull[8];
+    bst_outline_make(points, 4, hull, &m.s.outline);
+    m.view = (bst_extended_view){.camera = &m.camera,
+                                 .origin_x_px = 121.0,
+                                 .origin_y_px = 61.0,
+                                 .binning = 3.0,
+                                 .sun_known = sun_known,
+                                 .sun_cam = bst_vec3_unit((bst_vec3){0.7, -0.4, -0.3})};
+    return m;
+}
+
+/* Sets the Sun's direction at a place of the sensor: how the image of what is there, s, moves when
+ * it turns towards the Sun, a. x / z goes by a_x - a_z x / z. */
+static void set_sun(made_up *m, double x_px, double y_px) {
+    double scale = bst_camera_scale_rad(&m->camera);
+    double x = (x_px - bst_camera_centre_x(&m->camera)) * scale;
+    double y = (y_px - bst_camera_centre_y(&m->camera)) * scale;
+    bst_vec3 s = bst_vec3_unit((bst_vec3){x, y, 1.0}), sun = m->view.sun_cam;
+    bst_vec3 a = bst_vec3_axpy(sun, -bst_vec3_dot(sun, s), s);
+    double u = a.x - a.z * x, v = a.y - a.z * y;
+    m->along[0] = u / hypot(u, v);
+    m->along[1] = v / hypot(u, v);
+    m->phase_rad = acos(-bst_vec3_dot(sun, s));
+    m->across_px =
+        3.0 * (12.0 * fabs(m->along[1]) + 7.0 * fabs(m->along[0])) - 2.0 * 3.0 * m->s.blur_px;
+}
+
+static void a_made_up_silhouette(void **state) {
+    (void)state;
+    /* hand-over size 6 px: the centroid of light, half of each, the outline's centre */
+    const double lengths[3] = {6.0, 7.2, 27.0};
+    for (int k = 0; k < 3 * 2 * 2; k++) {
+        bool sun = k & 1, edge = k & 2;
+        double length = lengths[k / 4], share = 0.5 * (double)(k / 4);
+        made_up m = make_up(length, sun);
+        m.s.edge = edge;
+        bst_detection d;
+        bst_extended_measure(&m.config, &m.view, &m.s, &d);
+        double light[2] = {121 + 3 * 91.7, 61 + 3 * 40.2};
+        double centre[2] = {121 + 3 * 90.3, 61 + 3 * 41.6};
+        set_sun(&m, centre[0], centre[1]);
+        double p = m.phase_rad, across = m.across_px, blur = 3.0 * 0.7;
+        double apart = 0.5 * across * (1.0 - cos(p));
+        double outline = bst_outline_phase_offset(p) * across + 0.5 * blur * apart / (apart + blur);
+        double offset =
+            sun ? 0.8 * (share * outline + (1.0 - share) * bst_light_phase_offset(p) * across)
+                : 0.0;
+        double at[2];
+        for (int a = 0; a < 2; a++) {
+            at[a] = share * centre[a] + (1.0 - share) * light[a] - offset * m.along[a];
+        }
+        bst_assert_close(d.x_px, at[0], 1e-3); /* a step of 1e-4 rad for the direction */
+        bst_assert_close(d.y_px, at[1], 1e-3);
+        double own =
+            length * length *
+            (SPHERE.centre_sigma * SPHERE.centre_sigma + (edge ? 0.0625 : 0.0) + 9e6 / (4e4 * 4e4));
+        double radial = sun ? 0.5 * offset : 2.0 / (3.0 * BST_PI) * length, r2 = radial * radial;
+        double xx = sun ? m.along[0] * m.along[0] : 1.0, yy = sun ? m.along[1] * m.along[1] : 1.0,
+               xy = sun ? m.along[0] * m.along[1] : 0.0;
+        bst_assert_close(d.cov_xx, own + r2 * xx, 1e-3 * r2);
+        bst_assert_close(d.cov_yy, own + r2 * yy, 1e-3 * r2);
+        bst_assert_close(d.cov_xy, r2 * xy, 1e-3 * r2);
+        bst_assert_close(d.snr, 4e4 / 3e3, 1e-9);
+        bst_assert_close(d.flux_sigma_e, 3e3, 1e-9);
+        bst_assert_close(d.length_px, length, 1e-9);
+        bst_assert_close(d.width_px, 13.5, 1e-9);
+        const bst_detection_extent *e = &d.extent;
+        const double reported[] = {e->light_x_px, e->light_y_px, e->x0_px,    e->y0_px,
+                                   e->x1_px,      e->y1_px,      e->area_px2, e->saturated_share};
+        const double want[] = {light[0],     light[1],    121 + 3 * 84, 61 + 3 * 38,
+                               121 + 3 * 96, 61 + 3 * 45, 630.0,        0.2};
+        for (int i = 0; i < 8; i++) {
+            bst_assert_close(reported[i], want[i], 1e-9);
+        }
+        bst_assert_close(e->size_sigma_px, hypot(0.5 * blur, 0.02 * length), 1e-9);
+        bst_assert_close(e->phase_rad, sun ? p : 0.0, 1e-9);
+        double range = 2.0 / (length * bst_camera_scale_rad(&m.camera));
+        bst_assert_close(e->range_m, range, 1e-9 * range);
+        bst_assert_close(e->range_sigma_m / range, hypot(e->size_sigma_px / length, 0.05), 1e-9);
+        assert_int_equal((d.flags & BST_DETECTION_EDGE) != 0, edge);
+    }
+}
+
+/* A point of the silhouette's light: from a third of the hand-over size on its centroid is moved
+ * back from the Sun, as a whole from twice that on. */
+static void points_are_moved_back_from_the_sun(void **state) {
+    (void)state;
+    const double shares[3] = {0.0, 0.6, 1.0};
+    for (int k = 0; k < 3; k++) {
+        made_up m = make_up(5.0, true);
+        /* sizes by second moments: 0.3 times 6 px, and the share more of that */
+        m.s.moment_size_px = 1.8 * (1.0 + shares[k]) / 3.0 + (k == 2 ? 1.0 : 0.0);
+        bst_detection d = {
+            .x_px = 380.2, .y_px = 190.7, .cov_xx = 0.3, .cov_xy = -0.05, .cov_yy = 0.2};
+        set_sun(&m, d.x_px, d.y_px);
+        double offset = shares[k] * 0.8 * bst_light_phase_offset(m.phase_rad) * m.across_px;
+        bst_extended_correct_point(&m.config, &m.view, &m.s, &d);
+        bst_assert_close(d.x_px, 380.2 - offset * m.along[0], 1e-3);
+        bst_assert_close(d.y_px, 190.7 - offset * m.along[1], 1e-3);
+        double v = 0.25 * offset * offset;
+        bst_assert_close(d.cov_xx, 0.3 + v * m.along[0] * m.along[0], 1e-3 * (v + 1e-6));
+        bst_assert_close(d.cov_xy, -0.05 + v * m.along[0] * m.along[1], 1e-3 * (v + 1e-6));
+        bst_assert_close(d.cov_yy, 0.2 + v * m.along[1] * m.along[1], 1e-3 * (v + 1e-6));
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(offsets_of_a_sphere),
         cmocka_unit_test(outline_of_a_square),
+        cmocka_unit_test(a_made_up_silhouette),
+        cmocka_unit_test(points_are_moved_back_from_the_sun),
         cmocka_unit_test(spheres),
         cmocka_unit_test(parts_and_shadows),
         cmocka_unit_test(saturated),

@@ -176,12 +176,43 @@ static void binned_window_of_streaks(void **state) {
     }
 }
 
+/* A saturated pixel counts within half the path, two standard deviations and a pixel of a source,
+ * in x as in y. */
+static void saturated_pixels_within_the_light(void **state) {
+    (void)state;
+    const double two = 2.0 * 2.0 / 2.3548200450309493;
+    for (int p = 0; p < 2; p++) {
+        double dx = p ? 0.0 : 16.0, dy = p ? 16.0 : 0.0;
+        const double reach[2] = {0.5 * dx + two + 1.0, 0.5 * dy + two + 1.0};
+        for (int k = 0; k < 8; k++) { /* in x or y, to either side, within or beyond by a pixel */
+            int axis = k % 2, side = k / 2 % 2 ? 1 : -1, within = k / 4;
+            fixture f = begin(120, 96);
+            synthetic_add(&f.s, 60.0, 48.0, 2e4, dx, dy);
+            bst_camera_motion motion = synthetic_motion(&f.s, dx, dy);
+            synthetic_expose(&f.s, bst_rng_make_key(14, 0, "test", "locate"), 1);
+            int away = (int)floor(reach[axis]) + (within ? 0 : 2);
+            int x = 60 + (axis ? 0 : side * away), y = 48 + (axis ? side * away : 0);
+            /* a well not much above the streak's pixels of 600 e- */
+            f.s.camera.full_well_e = 1000.0;
+            f.s.pixels[y * 120 + x] =
+                (uint16_t)(f.s.camera.offset_dn + 1000.0 / f.s.camera.gain_e_per_dn);
+            f.ip = synthetic_processor(&f.ctx, &f.s);
+            bst_imgproc_frame frame = synthetic_frame(&f.s);
+            bst_assert_ok(&f.ctx, bst_imgproc_detect(&f.ctx, f.ip, &frame, &motion, f.d, 64));
+            const bst_detection *d = near_to(&f, 60.0, 48.0, 3.0);
+            assert_int_equal((d->flags & BST_DETECTION_SATURATED) != 0, within);
+            end(&f);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(edges_in_x_and_y),
         cmocka_unit_test(snr_of_points_and_streaks),
         cmocka_unit_test(what_lies_outside_is_known_to_a_pixel),
         cmocka_unit_test(binned_window_of_streaks),
+        cmocka_unit_test(saturated_pixels_within_the_light),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -389,6 +389,40 @@ static void law_of_a_place(void **state) {
     bst_imgproc_locator_free(&b.l);
 }
 
+/* Moments of a Gaussian of any axes under the window of a narrower, moving source: its own; with
+ * a pixel that is missing there are none. */
+static void moments_of_a_gaussian(void **state) {
+    (void)state;
+    static float image[WIDTH * HEIGHT];
+    const double covariances[3][3] = {{4.0, 1.2, 2.6}, {2.0, -0.9, 5.0}, {1.1, 0.0, 1.1}};
+    bench b;
+    open_bench(&b);
+    bst_source_profiles_set(&b.l.profiles, &b.l.psf, 0.9);
+    for (int k = 0; k < 3; k++) {
+        const double *s = covariances[k], x0 = 61.3, y0 = 40.6;
+        double det = s[0] * s[2] - s[1] * s[1];
+        for (int i = 0; i < WIDTH * HEIGHT; i++) {
+            double x = i % WIDTH - x0, y = i / WIDTH - y0;
+            image[i] =
+                (float)(900.0 *
+                        exp(-0.5 * (s[2] * x * x - 2.0 * s[1] * x * y + s[0] * y * y) / det));
+        }
+        const bst_imgproc_source source = {
+            .shape = {.x_px = x0, .y_px = y0, .dx_px = 4.0, .dy_px = 1.5, .sigma_px = 0.9},
+            .flux_e = 9000.0};
+        bst_imgproc_stamp stamp = {.x0 = 46, .y0 = 27, .width = 31, .height = 28};
+        bst_fit_data data = {image, WIDTH, HEIGHT, 5.0};
+        double m[3];
+        assert_true(bst_fit_moments(&b.l.fits[0], &data, &stamp, &source, NULL, 0, m));
+        for (int i = 0; i < 3; i++) {
+            bst_assert_close(m[i], s[i], 2e-3); /* of single precision */
+        }
+        image[42 * WIDTH + 60] = BST_PIXEL_BAD;
+        assert_false(bst_fit_moments(&b.l.fits[0], &data, &stamp, &source, NULL, 0, m));
+    }
+    bst_imgproc_locator_free(&b.l);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(stamps),
@@ -400,6 +434,7 @@ int main(void) {
         cmocka_unit_test(light_about_charge),
         cmocka_unit_test(masked_charge_on_a_stamp),
         cmocka_unit_test(law_of_a_place),
+        cmocka_unit_test(moments_of_a_gaussian),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,5 @@
 #include "imgproc/identify/predicted_stars.h"
+#include "imgproc/window_plan.h"
 #include "tests/test_support.h"
 
 /* Where expected stars are put, undone by other functions: pixel to direction, aberration and
@@ -71,9 +72,100 @@ static void expected_stars_lead_back_to_the_catalogue(void **state) {
     check(camera);
 }
 
+/* A window of these half widths, cut at the frame; edges within a pixel, by rounding. */
+static void expect_window(const bst_region_of_interest *w, const bst_window *frame, double x,
+                          double y, double half_x, double half_y) {
+    double x0 = fmax(x - half_x, frame->x0), x1 = fmin(x + half_x, frame->x0 + frame->width - 1);
+    double y0 = fmax(y - half_y, frame->y0), y1 = fmin(y + half_y, frame->y0 + frame->height - 1);
+    for (int i = 0; i < w->count; i++) {
+        const bst_window *a = &w->items[i];
+        if (fabs(a->x0 - x0) <= 1.0 && fabs(a->x0 + a->width - 1 - x1) <= 1.0 &&
+            fabs(a->y0 - y0) <= 1.0 && fabs(a->y0 + a->height - 1 - y1) <= 1.0) {
+            return;
+        }
+    }
+    fail_msg("no window about (%g, %g), %g and %g to the sides", x, y, half_x, half_y);
+}
+
+/* Windows about tracks, where they are seen at mid-exposure, five sigma wider; and about the
+ * brightest stars, wider by half of their way. None without the target in the frame. */
+static void windows_about_tracks_and_stars(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_stars *stars = NULL;
+    bst_assert_ok(&ctx, bst_stars_open(&ctx, "embedded", &stars));
+    const bst_camera camera = {.width_px = 2200, .height_px = 1700, .pixel_scale_arcsec = 12.0};
+    const double scale = bst_camera_scale_rad(&camera), age_s = 1.5;
+    const bst_light light = {{29000.0, -7000.0, 3000.0}, {1e11, 1.1e11, 0.2e11}};
+    const bst_quat q = bst_quat_look(bst_vec3_from_radec(1.4, -0.1), (bst_vec3){0.1, 0.3, 0.9});
+    /* the images move by (r_y, -r_x) with a turn r: 30 to the right, 12 up */
+    const bst_camera_motion motion = {.q_cam_from_gcrf = q,
+                                      .turn_cam_rad = {12.0 * scale, 30.0 * scale, 0.0}};
+    const bst_frame_message message = {.window = {300, 200, 1600, 1200}, .binning = 1};
+    const bst_imgproc_config config = {.window_px = 40, .window_stars = 3};
+    bst_predictions *predictions = calloc(1, sizeof *predictions + 2 * sizeof(bst_prediction));
+    assert_non_null(predictions);
+    bst_predicted_stars sky;
+    bst_assert_ok(&ctx, bst_predicted_stars_create(&ctx, &camera, stars, 2022.0, 4096, &sky));
+    const bst_window_plan_input in = {.camera = &camera,
+                                      .config = &config,
+                                      .v_limit = 7.0,
+                                      .message = &message,
+                                      .motion = &motion,
+                                      .light = &light,
+                                      .predictions = predictions,
+                                      .predictions_age_s = age_s,
+                                      .q_cam_from_gcrf = q};
+    const double places[2][2] = {{1200.4, 330.7}, {1885.2, 900.6}}, sigmas_px[2] = {6.0, 2.0};
+    for (int target = 0; target < 2; target++) {
+        predictions->count = 2;
+        for (int i = 0; i < 2; i++) { /* some 10 px before that at their epoch */
+            bst_vec3 seen = bst_quat_rotate(
+                bst_quat_conj(q), bst_camera_unproject(&camera, places[i][0], places[i][1]));
+            bst_vec3 from = bst_light_unaberrate(&light, seen);
+            bst_vec3 rate = bst_vec3_scale(bst_vec3_cross(from, (bst_vec3){0.2, 0.4, 0.3}), 1e-3);
+            predictions->items[i] =
+                (bst_prediction){.direction_gcrf = bst_vec3_axpy(from, -age_s, rate),
+                                 .rate_gcrf_radps = rate,
+                                 .sigma_rad = sigmas_px[i] * scale,
+                                 .target_of_interest = target && i == 0};
+        }
+        bst_region_of_interest windows;
+        bool use;
+        bst_assert_ok(&ctx, bst_window_plan_make(&ctx, &in, &sky, &windows, &use));
+        assert_int_equal(use, target);
+        if (!target) {
+            continue;
+        }
+        assert_int_equal(windows.count, 5);
+        for (int i = 0; i < 2; i++) {
+            double half = 20.0 + 5.0 * sigmas_px[i];
+            expect_window(&windows, &message.window, places[i][0], places[i][1], half, half);
+        }
+        int count;
+        const bst_predicted_stars_query query = {q, &light, message.window, 0.0, 7.0};
+        bst_assert_ok(&ctx, bst_predicted_stars_expect(&ctx, &sky, &query, &count));
+        double before = -INFINITY;
+        for (int k = 0; k < 3; k++) { /* the brightest one that is fainter than the last */
+            int best = -1;
+            for (int i = 0; i < count; i++) {
+                double v = sky.expected[i].v_mag;
+                best = v > before && (best < 0 || v < sky.expected[best].v_mag) ? i : best;
+            }
+            before = sky.expected[best].v_mag;
+            expect_window(&windows, &message.window, sky.expected[best].x_px,
+                          sky.expected[best].y_px, 20.0 + 15.0, 20.0 + 6.0);
+        }
+    }
+    bst_predicted_stars_free(&sky);
+    bst_stars_close(stars);
+    free(predictions);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(expected_stars_lead_back_to_the_catalogue),
+        cmocka_unit_test(windows_about_tracks_and_stars),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -164,8 +164,112 @@ static void normalised_is_signal_over_noise(void **state) {
     }
 }
 
+/* Weighted sums of 1 to 40 rows, which are taken by eights, fours and twos; and symmetric ones. */
+static void rows_are_combined(void **state) {
+    (void)state;
+    enum { TAPS = 40 };
+    static float rows[TAPS][MOST];
+    const float *in[TAPS];
+    float weight[TAPS], out[MOST];
+    for (int t = 0; t < TAPS; t++) {
+        fill(rows[t], MOST, 1000 + (uint64_t)t);
+        in[t] = rows[t];
+    }
+    fill(weight, TAPS, 2000);
+    for (int taps = 1; taps <= TAPS; taps++) {
+        int count = 1 + 37 * taps % MOST;
+        bst_row_combine(out, count, in, weight, taps);
+        for (int x = 0; x < count; x++) {
+            double sum = 0.0;
+            for (int t = 0; t < taps; t++) {
+                sum += (double)weight[t] * (double)rows[t][x];
+            }
+            bst_assert_close(out[x], sum, 1e-5); /* rounding of up to 40 terms */
+        }
+    }
+    for (int radius = 0; radius <= 12; radius++) {
+        int count = 1 + 53 * radius % MOST;
+        bst_row_even(out, count, in + 20, weight, radius);
+        for (int x = 0; x < count; x++) {
+            double sum = (double)weight[0] * (double)rows[20][x];
+            for (int t = 1; t <= radius; t++) {
+                sum += (double)weight[t] * ((double)rows[20 - t][x] + (double)rows[20 + t][x]);
+            }
+            bst_assert_close(out[x], sum, 1e-5);
+        }
+    }
+}
+
+/* Count, sum and sum of squares of what lies within a limit of a level, both ends included, added
+ * to what is there, for widths that are no multiple of the lanes. */
+static void clipped_sums_are_of_what_is_within(void **state) {
+    (void)state;
+    enum { HIGH = 5, STRIDE = MOST + 3 };
+    static float pixels[HIGH * STRIDE];
+    fill(pixels, HIGH * STRIDE, 3000);
+    for (int width = 1; width <= MOST; width += 13) {
+        const float level = 0.25f, limit = 1.5f;
+        pixels[0] = level + limit;
+        pixels[STRIDE] = level - limit;
+        bst_row_sums sums;
+        memset(&sums, 0, sizeof sums);
+        sums.count[0] = 2.0f;
+        sums.sum[0] = 3.0f;
+        sums.square[0] = 5.0f;
+        bst_row_clipped_sums(pixels, width, HIGH, STRIDE, level, limit, &sums);
+        double n = 2.0, sum = 3.0, square = 5.0, got[3] = {0.0, 0.0, 0.0};
+        for (int i = 0; i < HIGH * width; i++) {
+            double d = (double)(pixels[i / width * STRIDE + i % width] - level);
+            bool within = fabs(d) <= 1.5;
+            n += within;
+            sum += within ? d : 0.0;
+            square += within ? d * d : 0.0;
+        }
+        for (size_t k = 0; k < sizeof sums.sum / sizeof *sums.sum; k++) {
+            got[0] += (double)sums.count[k];
+            got[1] += (double)sums.sum[k];
+            got[2] += (double)sums.square[k];
+        }
+        bst_assert_close(got[0], n, 0.0);
+        bst_assert_close(got[1], sum, 1e-4);
+        bst_assert_close(got[2], square, 1e-4);
+    }
+}
+
+/* A bright pixel hides those within two columns and two rows of it, and no others. */
+static void neighbours_of_bright_pixels_are_masked(void **state) {
+    (void)state;
+    enum { NEAR = BST_ROW_NEAR, HIGH = 2 * BST_ROW_NEAR + 1 };
+    static float rows[HIGH][LINE];
+    const float *in[HIGH];
+    float out[LINE];
+    for (int n = 0; n < 40; n++) {
+        int count = 3 + 17 * n % (MOST - 3), bright_row = n % HIGH, at = 11 * n % (count + 4) - 2;
+        for (int k = 0; k < HIGH; k++) {
+            fill(rows[k], LINE, 4000 + (uint64_t)k);
+            in[k] = rows[k] + PAD;
+        }
+        rows[bright_row][PAD + at] = 9.0f;
+        for (int x = 0; x < count + 1; x++) {
+            out[x] = 1.0f;
+        }
+        bst_row_mask(in, count, 8.0f, out);
+        for (int x = 0; x < count; x++) {
+            bool near = abs(x - at) <= NEAR;
+            assert_true(out[x] == (near ? BST_PIXEL_BAD : 1.0f));
+        }
+        assert_true(out[count] == 1.0f);
+        out[0] = 1.0f;
+        bst_row_mask(in, 1, 10.0f, out); /* nothing exceeds it */
+        assert_true(out[0] == 1.0f);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rows_are_combined),
+        cmocka_unit_test(clipped_sums_are_of_what_is_within),
+        cmocka_unit_test(neighbours_of_bright_pixels_are_masked),
         cmocka_unit_test(median_is_the_middle_value),
         cmocka_unit_test(maxima_exceed_their_neighbours),
         cmocka_unit_test(combinations_are_sums),

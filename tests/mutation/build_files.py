@@ -30,6 +30,14 @@ def listed_tests(build):
     return {name: (labels[name].split(";"), command) for name, command in commands.items() if name in labels}
 
 
+def expected_seconds(source):
+    """{name: seconds} of the longer tests, from costs.cmake."""
+    with open(os.path.join(source, "tests", "costs.cmake"), encoding="utf-8") as file:
+        text = file.read()
+    return {name: float(seconds) for name, seconds in
+            re.findall(r"(\w+) (\d+)(?=[\s)])", text[text.index("set(bst_costs"):text.index("# bst_cost")])}
+
+
 class Judges:
     """Which object holds a source and which tests judge it. Users set build, objects and tests {name: (labels, …)}."""
 

@@ -362,6 +362,8 @@ def main():
                         help=f"only bugs of these kinds: {', '.join(sorted(OPERATORS))}, statement")
     parser.add_argument("--count", type=int, default=30, help="bugs to plant (default 30)")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="plant no more after so many minutes")
+    parser.add_argument("--budget", type=float, default=float("inf"), metavar="SECONDS",
+                        help="with --quick: processor time of the tests of a bug; it survives if none has failed by then")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--least", type=float, default=0.0, help="least score, 0 to 1, for exit code 0")
@@ -375,7 +377,8 @@ def main():
         tree = QuickTree(options.source, options.quick, options.jobs) if options.quick else \
             Tree(options.source, folder, "release", options.jobs)
         tree.skipped = set(options.skip)
-        pools = candidates(options, tree)
+        tree.budget = options.budget
+        pools = [] if options.bugs and not options.coverage else candidates(options, tree)  # some 20 s of processor time for all files
         coverage = None
         if options.coverage:
             names = set().union(*(tree.tests_for(name, "unit") for name, _, _ in pools))
@@ -384,7 +387,7 @@ def main():
                           if coverage.known[n]["code"] == 0}
         if options.files_unexecuted:
             return show_unexecuted(pools, tree, coverage) if coverage else parser.error("--unexecuted needs --coverage")
-        if not pools:
+        if not pools and not options.bugs:
             sys.exit("mutate: no source file to plant a bug in: look at --files and --since")
         outcomes, begun = [], time.monotonic()
         bugs = listed(options.bugs, tree) if options.bugs else drawn(pools, rng, 20 * options.count)

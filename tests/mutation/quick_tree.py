@@ -7,13 +7,19 @@ import hashlib
 import json
 import os
 import re
+import resource
 import shlex
 import subprocess
 import sys
 import tempfile
-import time
 
 import build_files
+
+
+def children_seconds():
+    """Processor time of all child processes so far."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 class QuickTree(build_files.Judges):
@@ -34,7 +40,13 @@ class QuickTree(build_files.Judges):
         self.tests = {name: (labels, os.path.basename(command[0]), command)
                       for name, (labels, command) in build_files.listed_tests(self.build).items()}
         self.sound_objects, self.links, self.target = {}, {}, None
-        self.proven, self.made = {}, {}  # of tests, of programs
+        self.proven, self.made, self.included = {}, {}, {}  # of tests, of programs, of programs
+        self.costs_file = os.path.join(self.build, "test_seconds.json")
+        if os.path.exists(self.costs_file):
+            with open(self.costs_file, encoding="utf-8") as file:
+                self.costs = json.load(file)
+        self.budget, self.ended = float("inf"), False  # processor time of a bug's tests, s
+        self.expected = build_files.expected_seconds(self.folder)
 
     def ninja(self, *words):
         return build_files.run(["ninja", "-C", self.build, f"-j{self.jobs}", "--quiet", *words])
@@ -110,33 +122,77 @@ class QuickTree(build_files.Judges):
     def is_sound(self, name):
         """Whether a test passes with the sound programs: one that fails there judges nothing."""
         if name not in self.proven:
-            begun = time.monotonic()
+            begun = children_seconds()
             self.proven[name] = self.passes(self.tests[name][2], 900)
-            self.costs[name] = time.monotonic() - begun
+            self.keep_cost(name, children_seconds() - begun)
             if not self.proven[name]:
                 print(f"mutate: left out, for it fails without a bug: {name}", flush=True)
                 self.unsound.add(name)
         return self.proven[name]
 
-    def in_order(self, path, names):
-        """Tests whose names share a word with the file first, then by their last duration."""
-        words = set(re.split(r"[/_.]", path)[-3:-1]) | {os.path.splitext(os.path.basename(path))[0]}
-        kin = {n: sum(w in n for w in words if len(w) > 3) for n in names}
-        return sorted(names, key=lambda n: (-kin[n], self.costs.get(n, 1.0)))
+    def sources_of(self, program):
+        """[(the headers that it includes, its words)] of a test program's sources."""
+        if program not in self.included:
+            texts = []
+            for target, entry in self.compilations.items():
+                if f"/{program}.dir/" in target and "tests/" in target:
+                    with open(os.path.join(entry["directory"], entry["file"]), encoding="utf-8") as file:
+                        text = file.read()
+                    texts.append((set(re.findall(r'^#include "([^"]+)\.h"', text, re.M)), set(re.findall(r"[a-z]{4,}", text))))
+            self.included[program] = texts
+        return self.included[program]
+
+    def nearness(self, name, path, near):
+        """How likely a test is to judge a bug: by words of its name, the headers that it includes, and words of the lines
+        about the bug that few tests know."""
+        program = self.program_of(name)
+        own, folder = os.path.splitext(path)[0], os.path.dirname(path)
+        words = set(re.split(r"[/_.]", path)[-3:-1]) | {os.path.basename(own)}
+        score = sum(w in name for w in words if len(w) > 3)
+        for headers, known in self.sources_of(program):
+            score += 4 * (own in headers) + any(os.path.dirname(h) == folder for h in headers)
+            score += sum(near[w] for w in known if w in near)
+        return score
+
+    def in_order(self, path, names, text, line):
+        """The tests that are most likely to judge a bug for their time first."""
+        lines = text.split("\n")
+        words = set(re.findall(r"[a-z]{4,}", "\n".join(lines[max(0, line - 4):line + 3])))
+        sources = [known for n in names for _, known in self.sources_of(self.program_of(n))]
+        near = {w: 1.0 / count for w in words if (count := sum(w in known for known in sources)) > 0}
+
+        def cost(name):
+            return self.costs.get(name, self.expected.get(name, 1.0))
+        return sorted(names, key=lambda n: -(0.3 + self.nearness(n, path, near)) / (0.5 + cost(n)))
+
+    def keep_cost(self, name, seconds):
+        """Keeps the processor time of a test, for this run and later ones of this build."""
+        self.costs[name] = seconds
+        with open(self.costs_file, "w", encoding="utf-8") as file:
+            json.dump(self.costs, file)
 
     def passes(self, command, seconds):
+        """Whether a test passes within so much processor time; a processor shared with others makes it wait longer."""
+        limit = int(seconds) + 1
         with tempfile.TemporaryDirectory(prefix="boresight-mutant-run-") as rest:
             try:
-                return subprocess.run(command, cwd=self.folder, timeout=seconds, check=False, stdin=subprocess.DEVNULL,
+                return subprocess.run(command, cwd=self.folder, timeout=10 * limit, check=False, stdin=subprocess.DEVNULL,
                                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                                      preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (limit, limit)),
                                       env={**os.environ, "TMPDIR": rest, "PYTHONDONTWRITEBYTECODE": "1"}).returncode == 0
             except subprocess.TimeoutExpired:
                 return False
 
     def judge(self, names):
         """The first test that fails with the bug that was compiled last and passes without it, or None."""
-        linked = {}
+        unmade = {self.program_of(n) for n in names} - set(self.made)
+        if unmade and self.make(*unmade):  # one call of Ninja for all of them
+            self.made.update({program: True for program in unmade})
+        linked, begun_cpu = {}, children_seconds()
         for name in names:
+            if children_seconds() > begun_cpu + self.budget:
+                self.ended = True
+                break
             program = self.program_of(name)
             if program not in self.made:
                 self.made[program] = self.make(program)
@@ -146,9 +202,11 @@ class QuickTree(build_files.Judges):
                 continue
             own = [re.sub(rf".*/{re.escape(program)}", linked[program], w) if os.path.basename(w) == program else w
                    for w in self.tests[name][2]]
-            begun = time.monotonic()
-            if self.passes(own, max(30, 10 * self.costs.get(name, 30))):
-                self.costs.setdefault(name, time.monotonic() - begun)
+            begun = children_seconds()
+            usual = self.costs.get(name, self.expected.get(name, 2.0))
+            if self.passes(own, max(20.0, 5.0 * usual)):
+                if name not in self.costs:
+                    self.keep_cost(name, children_seconds() - begun)
             elif self.is_sound(name):
                 return name
         return None
@@ -163,7 +221,7 @@ class QuickTree(build_files.Judges):
         if coverage:
             names = coverage.tests_of(name, line, names)
         names = [n for n in names if n not in self.unsound]
-        names = names if suite == "e2e" else self.in_order(name, names)  # those have their order
+        names = names if suite == "e2e" else self.in_order(name, names, text, line)  # those have their order
         before = self.sound(self.target, name, text)
         after = self.compile(self.target, name, text[:at] + new + text[at + len(old):])
         if after is None:
@@ -172,5 +230,7 @@ class QuickTree(build_files.Judges):
             return "equal", "same object"
         if not names:
             return "survived", "no tests"
+        self.ended = False
         failed = self.judge(names)
-        return ("noticed", failed) if failed else ("survived", f"{len(names)} tests passed")
+        return ("noticed", failed) if failed else \
+            ("survived", "ended by time" if self.ended else f"{len(names)} tests passed")

@@ -1,4 +1,5 @@
-/* False alarms of the generator: noise, wings of bright stars, cosmic rays. */
+/* False alarms of the generator: noise, wings of bright stars, light from beyond the edge, cosmic
+ * rays. */
 #include "tests/obsgen/generator_scene.h"
 
 static void false_alarms_are_poisson_with_a_gaussian_tail(void **state) {
@@ -234,6 +235,109 @@ static void hits_on_a_binned_window(void **state) {
     }
 }
 
+/* Share of a Gaussian's light in pixel k along an axis. */
+static double axis_share(double at, double sigma, int k) {
+    double c = sigma * sqrt(2.0);
+    return 0.5 * (erf((k + 0.5 - at) / c) - erf((k - 0.5 - at) / c));
+}
+
+/* Light of a bright star beyond the edge is a source on the edge; of a fainter one it is too
+ * little. */
+static void bright_stars_beyond_the_edge_are_on_it(void **state) {
+    (void)state;
+    enum { X0 = 40, Y0 = 130, WIDE = 640, HIGH = 220 };
+    scene s;
+    open_scene(&s);
+    start(&s);
+    const double sigma = s.frame.sigma_px;
+    for (int k = 1; k <= 3; k++) {
+        /* output of the filter on the pixel at the edge, for a star so many pixels beyond */
+        double beyond = k, square = 0.0, sum = 0.0;
+        for (int i = -12; i <= 12; i++) {
+            double filter = axis_share(0.0, sigma, i);
+            square += filter * filter;
+            sum += i <= 0 ? filter * axis_share(beyond, sigma, i) : 0.0;
+        }
+        double share = sum / square;  /* of the SNR of the whole star */
+        for (int n = 0; n < 8; n++) { /* faint and bright, beyond each of the sides */
+            bool bright = n % 2, above = n / 2 % 2, upright = n / 4;
+            double expected = bright ? 100.0 : 1.5, last = upright ? HIGH - 1 : WIDE - 1;
+            double off = above ? last + beyond : -beyond, on = above ? last : 0.0;
+            s.frame.window = (bst_window){X0, Y0, WIDE, HIGH};
+            s.truth->count = 0;
+            add_source(&s, 1, X0 + (upright ? 300.2 : off), Y0 + (upright ? off : 100.2),
+                       electrons_of(&s, expected / share));
+            bst_generator_result r = run(&s, k);
+            assert_int_equal(r.count, bright);
+            if (bright) {
+                const bst_detection *d = &r.items[0].detection;
+                assert_int_equal(d->label, BST_LABEL_ARTEFACT);
+                double across = upright ? d->y_px - Y0 : d->x_px - X0,
+                       along = upright ? d->x_px - X0 : d->y_px - Y0;
+                bst_assert_close(across, on, 0.2);
+                bst_assert_close(along, upright ? 300.2 : 100.2, 0.5);
+                /* noise is less on the edge, where the filter has 0.78 of its squares; the pixel of
+                 * a narrow PSF is no Gaussian: 1.24 and 1.5 at 2 and 3 px */
+                bst_assert_close(log(d->snr / (expected / sqrt(0.78))), 0.0, 0.5);
+            }
+        }
+    }
+    close_scene(&s);
+}
+
+/* With the stars' streak in the filter, false alarms have its length and direction and the
+ * covariance of a streak: in its own axes, on a binned window. */
+static void alarms_of_a_streak_are_streaks(void **state) {
+    (void)state;
+    for (int b = 1; b <= 2; b++) {
+        for (int down = 0; down < 2; down++) {
+            scene s;
+            open_scene(&s);
+            s.settings.false_alarms_per_frame = 300.0;
+            s.frame.window = (bst_window){96, 160, 800, 480};
+            s.frame.binning = b;
+            s.frame.streak_dx_px = 12.0 * b;
+            s.frame.streak_dy_px = (down ? -5.0 : 5.0) * b;
+            start(&s);
+            bst_crlb_table bound;
+            bst_crlb_table_init(&bound, s.frame.sigma_px / b);
+            bst_generator_result r = run(&s, 3);
+            int drawn = 0;
+            for (int i = 0; i < r.count; i++) {
+                const bst_detection *d = &r.items[i].detection;
+                bool streak = d->flags & BST_DETECTION_STREAK;
+                double length = streak ? 13.0 : 0.0;
+                drawn += streak;
+                bst_crlb_table_at want = bst_crlb_table_of(&bound, d->flux_e, r.noise_e, length);
+                double c = 12.0 / 13.0, q = s.frame.streak_dy_px / (13.0 * b);
+                double along = c * c * d->cov_xx + 2.0 * c * q * d->cov_xy + q * q * d->cov_yy;
+                double across = q * q * d->cov_xx - 2.0 * c * q * d->cov_xy + c * c * d->cov_yy;
+                double mixed = c * q * (d->cov_yy - d->cov_xx) + (c * c - q * q) * d->cov_xy;
+                double px2 = b * b;
+                bst_assert_close(along / px2, want.var_along_px2, 1e-6 * want.var_along_px2);
+                bst_assert_close(across / px2, want.var_across_px2, 1e-6 * want.var_along_px2);
+                bst_assert_close(mixed / px2, 0.0, 1e-6 * want.var_along_px2);
+                bst_assert_close(d->snr * r.noise_e / d->flux_e,
+                                 bst_crlb_table_norm(&bound, length), 1e-6);
+                double sigma = s.frame.sigma_px / b;
+                bst_assert_close(d->length_px / b,
+                                 BST_FWHM_PER_SIGMA * sqrt(sigma * sigma + length * length / 12.0),
+                                 1e-6);
+                bst_assert_close(d->width_px / b, BST_FWHM_PER_SIGMA * sigma, 1e-6);
+                bst_assert_close(d->angle_rad, streak ? atan2(q, c) : 0.0, 1e-9);
+                /* cut: two deviations and half the path from an edge */
+                double half_x = b * (2.0 * sigma + 0.5 * length * c),
+                       half_y = b * (2.0 * sigma + 0.5 * length * fabs(q));
+                bool cut = d->x_px < 95.5 + half_x || d->x_px > 895.5 - half_x ||
+                           d->y_px < 159.5 + half_y || d->y_px > 639.5 - half_y;
+                assert_int_equal((d->flags & BST_DETECTION_EDGE) != 0, cut);
+            }
+            assert_true(drawn > 30);
+            close_scene(&s);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(false_alarms_are_poisson_with_a_gaussian_tail),
@@ -243,6 +347,8 @@ int main(void) {
         cmocka_unit_test(wings_make_alarms),
         cmocka_unit_test(crowded_frames_are_looked_at_twice),
         cmocka_unit_test(hits_on_a_binned_window),
+        cmocka_unit_test(alarms_of_a_streak_are_streaks),
+        cmocka_unit_test(bright_stars_beyond_the_edge_are_on_it),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

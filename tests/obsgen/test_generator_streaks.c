@@ -107,55 +107,63 @@ static void streaks_are_detected_in_either_filter(void **state) {
     close_scene(&s);
 }
 
+/* Ends along the axis across an edge: from the left, right, top and bottom. */
+static void set_ends(bst_truth_item *item, int way, double middle, double half) {
+    const bool upright = way / 2, back = way % 2;
+    const double last = upright ? 699.0 : SIDE - 1.0;
+    const double at[3] = {middle - half, middle, middle + half};
+    double *const x[3] = {&item->x_start_px, &item->x_centroid_px, &item->x_end_px};
+    double *const y[3] = {&item->y_start_px, &item->y_centroid_px, &item->y_end_px};
+    for (int i = 0; i < 3; i++) {
+        *(upright ? x : y)[i] = 500.0;
+        *(upright ? y : x)[i] = back ? last - at[i] : at[i];
+    }
+}
+
 /* A streak cut by the frame's edge is fitted with its known path, so that place and flux are those
- * of the whole, from half the light; what lies mostly beyond the edge is a point on it; one beside
- * the frame shows nothing. */
+ * of the whole, from half the light; what lies mostly beyond it is a point on it. */
 static void the_edge_cuts(void **state) {
     (void)state;
-    scene s;
-    open_scene(&s);
-    start(&s);
-    double light = electrons_of(&s, 400.0);
-    bst_truth_item *item = add_source(&s, 1, 0.0, 500.0, light);
-    s.frame.streak_dx_px = 40.0;
-    /* in the middle of the frame first */
-    item->x_start_px = 480.0;
-    item->x_centroid_px = 500.0;
-    item->x_end_px = 520.0;
-    bst_generator_result r = run(&s, 0);
-    assert_int_equal(r.count, 1);
-    double whole = r.items[0].detection.snr;
-    item->x_start_px = -20.0;
-    item->x_centroid_px = 0.0;
-    item->x_end_px = 20.0;
-    r = run(&s, 0);
-    assert_int_equal(r.count, 1);
-    const bst_detection *d = &r.items[0].detection;
-    assert_true(d->flags & BST_DETECTION_EDGE);
-    assert_true(d->flags & BST_DETECTION_STREAK);
-    /* six times the bound of half the light at SNR 400 and 40 px */
-    bst_assert_close(d->x_px, 0.0, 0.2);
-    bst_assert_close(d->flux_e, light, 0.05 * light);
-    item->x_start_px = -36.0;
-    item->x_centroid_px = -16.0;
-    item->x_end_px = 4.0;
-    r = run(&s, 0);
-    assert_int_equal(r.count, 1);
-    d = &r.items[0].detection;
-    assert_false(d->flags & BST_DETECTION_STREAK);
-    /* -0.5 to 4 are on the frame: 4.5 of 40 px of the light, to a sixth of a PSF's width, and the
-     * root of that of the SNR */
-    bst_assert_close(d->x_px, 1.75, 1.0);
-    bst_assert_close(d->flux_e / light, 4.5 / 40.0, 0.015);
-    bst_assert_close(d->snr / whole, sqrt(4.5 / 40.0), 0.03);
-    bst_assert_close(d->v_mag, bst_camera_v_mag(&s.camera, d->flux_e / s.frame.exposure_s), 1e-9);
-    item->x_start_px = -60.0;
-    item->x_centroid_px = -40.0;
-    item->x_end_px = -20.0;
-    assert_int_equal(run(&s, 0).count, 0);
-    s.frame.streak_dx_px = 100.0;
-    assert_true(run(&s, 0).smeared);
-    close_scene(&s);
+    for (int way = 0; way < 4; way++) {
+        scene s;
+        open_scene(&s);
+        start(&s);
+        s.frame.window.height = 700;
+        double light = electrons_of(&s, 400.0), last = way / 2 ? 699.0 : SIDE - 1.0;
+        bst_truth_item *item = add_source(&s, 1, 0.0, 500.0, light);
+        *(way / 2 ? &s.frame.streak_dy_px : &s.frame.streak_dx_px) = way % 2 ? -40.0 : 40.0;
+        set_ends(item, way, 500.0, 20.0); /* in the middle of the frame first */
+        bst_generator_result r = run(&s, 0);
+        assert_int_equal(r.count, 1);
+        double whole = r.items[0].detection.snr;
+        set_ends(item, way, 0.0, 20.0);
+        r = run(&s, 0);
+        assert_int_equal(r.count, 1);
+        const bst_detection *d = &r.items[0].detection;
+        const double *seen = way / 2 ? &d->y_px : &d->x_px;
+        assert_true(d->flags & BST_DETECTION_EDGE);
+        assert_true(d->flags & BST_DETECTION_STREAK);
+        /* six times the bound of half the light at SNR 400 and 40 px */
+        bst_assert_close(*seen, way % 2 ? last : 0.0, 0.2);
+        bst_assert_close(d->flux_e, light, 0.05 * light);
+        set_ends(item, way, -16.0, 20.0);
+        r = run(&s, 0);
+        assert_int_equal(r.count, 1);
+        d = &r.items[0].detection;
+        assert_false(d->flags & BST_DETECTION_STREAK);
+        /* 4.5 of 40 px are on the frame, to a sixth of a PSF; the SNR goes by its root */
+        bst_assert_close(*seen, way % 2 ? last - 1.75 : 1.75, 1.0);
+        bst_assert_close(way / 2 ? d->x_px : d->y_px, 500.0, 0.5);
+        bst_assert_close(d->flux_e / light, 4.5 / 40.0, 0.015);
+        bst_assert_close(d->snr / whole, sqrt(4.5 / 40.0), 0.03);
+        bst_assert_close(d->v_mag, bst_camera_v_mag(&s.camera, d->flux_e / s.frame.exposure_s),
+                         1e-9);
+        set_ends(item, way, -40.0, 20.0);
+        assert_int_equal(run(&s, 0).count, 0);
+        s.frame.streak_dx_px = 100.0;
+        assert_true(run(&s, 0).smeared);
+        close_scene(&s);
+    }
 }
 
 /* A streak longer than is filtered for is seen in parts: on its path, above the threshold, more of

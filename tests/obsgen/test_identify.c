@@ -167,6 +167,78 @@ static void neighbours_are_mistaken(void **state) {
     finish(f);
 }
 
+/* The catalogue on board is another one: a star whose place there is as far off as the match
+ * tolerates, 1.6 px of 3 arcsec, is not found; for something else beside it both distances count.
+ */
+static void the_catalogue_on_board_has_other_places(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_stars *stars;
+    bst_assert_ok(&ctx, bst_stars_open(&ctx, "embedded", &stars));
+    static bst_star known[100];
+    int count = 0;
+    bst_assert_ok(&ctx, bst_stars_query(&ctx, stars, bst_vec3_from_radec(1.4, -0.1), 0.3, 6.5,
+                                        2022.0, known, 100, &count));
+    assert_in_range(count, 60, 1000);
+    fixture *f = make(60, 2);
+    bst_identify_options *o = &f->options;
+    o->catalogue = stars;
+    o->world_catalogue = (const bst_stars *)f; /* any other one */
+    o->julian_year = 2022.0;
+    f->truth->pixel_scale_arcsec = 3.0;
+    for (int i = 0; i < 60; i++) {
+        /* 1.3 to 1.9 px off, in right ascension or declination */
+        double off_px = 1.305 + 0.01 * i, off_rad = off_px * 3.0 / 3600.0 * BST_PI / 180.0;
+        double ra, dec;
+        bst_vec3_to_radec(known[i].icrs, &ra, &dec);
+        bst_truth_item *item = &f->truth->items[i];
+        item->id = known[i].id;
+        item->ra_rad = ra + (i % 2 ? off_rad / cos(dec) : 0.0);
+        item->dec_rad = dec + (i % 2 ? 0.0 : off_rad);
+    }
+    f->truth->items[59].id = 1; /* in no catalogue */
+    f->truth->items[59].ra_rad = 0.0;
+    /* stars 0.25 px off on board, with something 1.3 px and 1.4 px beside them */
+    for (int k = 0; k < 2; k++) {
+        bst_truth_item star = f->truth->items[2];
+        double ra;
+        bst_vec3_to_radec(known[60 + k].icrs, &ra, &star.dec_rad);
+        star.id = known[60 + k].id;
+        star.ra_rad = ra;
+        star.dec_rad += 0.25 * 3.0 / 3600.0 * BST_PI / 180.0;
+        star.x_centroid_px = f->items[60 + k].x_px + 1.3 + 0.1 * k;
+        star.y_centroid_px = f->items[60 + k].y_px;
+        f->truth->items[f->truth->count++] = star;
+    }
+    identify(f);
+    for (int i = 0; i < 60; i++) { /* 4 sqrt(0.05 + 0.0475 + 0.0625) = 1.6 */
+        assert_int_equal(f->items[i].label == BST_LABEL_STAR, i < 30);
+    }
+    assert_int_equal(f->items[60].star_id, known[60].id);
+    assert_int_equal(f->items[61].star_id, 0);
+    bst_stars_close(stars);
+    finish(f);
+}
+
+/* Of two undetected stars the nearer one is taken, whichever comes first. */
+static void the_nearer_of_two_is_taken(void **state) {
+    (void)state;
+    for (int order = 0; order < 2; order++) {
+        fixture *f = make(60, 1);
+        for (int k = 0; k < 2; k++) {
+            bst_truth_item star = f->truth->items[0];
+            bool near = k == order;
+            star.id = near ? 5001 : 5002;
+            star.x_centroid_px = f->items[60].x_px + (near ? -0.6 : 0.3);
+            star.y_centroid_px = f->items[60].y_px + (near ? 0.2 : 0.9);
+            f->truth->items[f->truth->count++] = star;
+        }
+        identify(f);
+        assert_int_equal(f->items[60].star_id, 5001);
+        finish(f);
+    }
+}
+
 static void some_are_missed(void **state) {
     (void)state;
     fixture *f = make(300, 0);
@@ -201,9 +273,13 @@ static void the_other_labels(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(magnitudes_agree),        cmocka_unit_test(chance_is_excluded),
-        cmocka_unit_test(neighbours_are_mistaken), cmocka_unit_test(some_are_missed),
+        cmocka_unit_test(magnitudes_agree),
+        cmocka_unit_test(chance_is_excluded),
+        cmocka_unit_test(neighbours_are_mistaken),
+        cmocka_unit_test(some_are_missed),
         cmocka_unit_test(the_other_labels),
+        cmocka_unit_test(the_catalogue_on_board_has_other_places),
+        cmocka_unit_test(the_nearer_of_two_is_taken),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

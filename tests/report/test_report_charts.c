@@ -1,8 +1,11 @@
 /* The charts of a sensor, read back from the page and compared with the frames that they draw. */
 #include "boresight/messages.h"
 #include "boresight/vec.h"
+#include "sim/export/frame_marks.h"
 #include "sim/io/chart.h"
+#include "sim/io/fits_reader.h"
 #include "sim/report/report.h"
+#include "tests/report/run_tables.h"
 #include "tests/report/svg_chart.h"
 
 enum { N = 60, MANY = 2300 };
@@ -435,8 +438,153 @@ static void the_axis_of_time(void **state) {
     bst_report_sensor_free(&s);
 }
 
+/* ---- pictures of frames: the file and the marks are these ---- */
+
+enum { WIDE = 120, HIGH = 80, IN_FILE = 11, MARKS = 420 };
+static uint16_t pixels[WIDE * HIGH];
+static bst_io_overlay_mark marks[MARKS];
+static int64_t frames_read[16];
+static int read_count;
+
+bst_status bst_fits_reader_open(bst_ctx *ctx, const char *path, bst_fits_reader **out) {
+    (void)ctx;
+    *out = strstr(path, "frames.fits") ? (bst_fits_reader *)pixels : NULL;
+    return *out ? BST_OK : BST_ERR_NOT_FOUND;
+}
+
+void bst_fits_reader_close(bst_fits_reader *reader) {
+    (void)reader;
+}
+
+const bst_fits_file_info *bst_fits_reader_info(const bst_fits_reader *reader) {
+    static const bst_fits_file_info info = {.frames = IN_FILE, .width = WIDE, .height = HIGH};
+    (void)reader;
+    return &info;
+}
+
+bst_status bst_fits_reader_id(bst_ctx *ctx, bst_fits_reader *reader, int64_t index, int64_t *id) {
+    (void)ctx;
+    (void)reader;
+    *id = 100 + index;
+    return BST_OK;
+}
+
+bst_status bst_fits_reader_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
+                                 bst_fits_read_frame *out) {
+    (void)ctx;
+    (void)reader;
+    frames_read[read_count++] = index;
+    *out = (bst_fits_read_frame){pixels, WIDE, HIGH, 100 + index};
+    return BST_OK;
+}
+
+bst_status bst_frame_marks_create(bst_ctx *ctx, const bst_run_reader *run, int64_t sensor,
+                                  const char *target, bst_frame_marks **out) {
+    (void)ctx;
+    (void)run;
+    assert_int_equal(sensor, 1);
+    assert_string_equal(target, "PREY");
+    *out = (bst_frame_marks *)marks;
+    return BST_OK;
+}
+
+void bst_frame_marks_free(bst_frame_marks *m) {
+    (void)m;
+}
+
+bst_status bst_frame_marks_exposure(bst_ctx *ctx, bst_frame_marks *m, int64_t index, int64_t *id) {
+    (void)m;
+    (void)index;
+    (void)id;
+    return bst_fail(ctx, BST_ERR_STATE, "every frame has its number");
+}
+
+bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *m, int64_t id, bst_io_overlay *out) {
+    (void)ctx;
+    (void)m;
+    *out = (bst_io_overlay){marks, id == 104 ? MARKS : 4, id == 104 ? "many" : "few"};
+    return BST_OK;
+}
+
+static void expect_mark(const char *page, const char *format, ...) BST_PRINTF(2, 3);
+static void expect_mark(const char *page, const char *format, ...) {
+    char text[200];
+    va_list numbers_of;
+    va_start(numbers_of, format);
+    vsnprintf(text, sizeof text, format, numbers_of);
+    va_end(numbers_of);
+    if (!strstr(page, text)) {
+        fail_msg("no %s", text);
+    }
+}
+
+/* Frames of 120 x 80 px drawn 352 wide, beside 48 x 48 px about the target drawn 180 wide: places
+ * of marks in both, which frames are chosen, and what is said of them. */
+static void pictures_of_frames(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    run_tables t;
+    run_tables_begin(&t, "run.sqlite");
+    run_tables_file(&t, "manifest.json", "{}");
+    run_tables_file(&t, "scenario.json", "{}");
+    bst_run_reader *run = run_tables_open(&t);
+    marks[0] = (bst_io_overlay_mark){BST_OVERLAY_TARGET, 100.25, 30.5, 0.0, 0.0, "PREY"};
+    marks[1] = (bst_io_overlay_mark){BST_OVERLAY_TRACK, 90.0, 20.25, 0.0, 0.0, ""};
+    marks[2] = (bst_io_overlay_mark){BST_OVERLAY_BORESIGHT, 59.5, 39.5, 0.0, 0.0, ""};
+    for (int i = 3; i < MARKS; i++) {
+        marks[i] = (bst_io_overlay_mark){BST_OVERLAY_DETECTION, 12.0, 50.0, 3.0, 0.0, ""};
+    }
+    bst_report_frame facts[2] = {{.exposure_id = 102, .in_track = false},
+                                 {.exposure_id = 103,
+                                  .in_track = true,
+                                  .known = true,
+                                  .error_px = 2.345,
+                                  .snr = 9.81,
+                                  .track_snr = 8.74,
+                                  .detections = 1.0,
+                                  .stars = 4.0}};
+    bst_report_sensor s = {.frames = facts, .count = 2, .has_tracks = true};
+    s.sensor.index = 1;
+    snprintf(s.sensor.file, sizeof s.sensor.file, "frames.fits");
+    snprintf(s.sensor.target, sizeof s.sensor.target, "PREY");
+    char *page;
+    size_t bytes;
+    FILE *out = open_memstream(&page, &bytes);
+    bst_assert_ok(&ctx, bst_report_frames(&ctx, out, run, &s));
+    fclose(out);
+    /* evenly spaced, with the first one in track as the second */
+    const int64_t chosen[] = {0, 3, 4, 6, 8, 10};
+    assert_int_equal(read_count, 6);
+    assert_memory_equal(frames_read, chosen, sizeof chosen);
+    /* pixels count from their middles: (100.25 + 0.5) 352 / 120 = 295.5, 90.9; half side 7 */
+    const double a = 352.0 / 120.0, b = 180.0 / 48.0;
+    expect_mark(page, "viewBox=\"0 0 540 264\"");
+    expect_mark(page, "M%.1f %.1fh14.0v14.0h-14.0z", 100.75 * a - 7.0, 31.0 * a - 7.0);
+    expect_mark(page, "M%.1f %.1fl11.0 11.0l-11.0 11.0l-11.0 -11.0z", 90.5 * a, 20.75 * a - 11.0);
+    expect_mark(page, "M%.1f %.1fH%.1f", 60.0 * a - 11.0, 40.0 * a, 60.0 * a - 4.0);
+    expect_mark(page, "M%.1f %.1fV%.1f", 60.0 * a, 40.0 * a + 4.0, 40.0 * a + 11.0);
+    expect_mark(page, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\"", 12.5 * a, 50.5 * a, 3.0 * a);
+    expect_mark(page, "x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\"", 100.75 * a - 14.0,
+                31.0 * a + 11.0);
+    /* as near to the target as the right edge allows: columns from 72, rows from 31 - 24 */
+    expect_mark(page, "<rect x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"", 72.0 * a,
+                7.0 * a, 48.0 * a, 48.0 * a);
+    expect_mark(page, "M%.1f %.1fh30.8", (100.75 - 72.0) * b - 15.4, (31.0 - 7.0) * b - 15.4);
+    expect_mark(page, "<image x=\"360.0\" y=\"0.0\" width=\"180.0\" height=\"180.0\"");
+    expect_mark(page, "<image x=\"0.0\" y=\"0.0\" width=\"352.0\" height=\"%.1f\"", 80.0 * a);
+    expect_mark(page, "many   400 of 417 detections drawn");
+    const char *const said[] = {"2.35 px from the boresight", "SNR 9.8, measured 8.7",
+                                "1 detection, 4 stars identified", "in track"};
+    for (int i = 0; i < 4; i++) {
+        expect_mark(page, "<text x=\"360.0\" y=\"%.1f\">%s", 201.0 + 19.0 * i, said[i]);
+    }
+    free(page);
+    run_tables_end(&t);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(pictures_of_frames),
         cmocka_unit_test(charts_over_time),
         cmocka_unit_test(a_transient_does_not_flatten_the_axes),
         cmocka_unit_test(nees_and_its_interval),

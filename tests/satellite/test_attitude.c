@@ -1,5 +1,7 @@
 /* Attitude laws, and free rotation with its conserved quantities. */
+#include "sim/satellite/attitude_table.h"
 #include "sim/satellite/body_attitude.h"
+#include "sim/satellite/commanded_attitude.h"
 #include "sim/satellite/tumbling.h"
 #include "tests/test_support.h"
 
@@ -140,6 +142,111 @@ static void wrong_attitudes_are_refused(void **state) {
     }
 }
 
+/* A body's attitude, turned by an angle about an axis of its own: where it sees a star. */
+static bst_vec3 seen_after(bst_quat q, bst_vec3 axis, double angle, bst_vec3 star) {
+    bst_vec3 v = bst_quat_rotate(q, star);
+    /* Rodrigues' formula by -angle */
+    bst_vec3 out =
+        bst_vec3_axpy(bst_vec3_scale(v, cos(angle)), -sin(angle), bst_vec3_cross(axis, v));
+    return bst_vec3_axpy(out, (1.0 - cos(angle)) * bst_vec3_dot(axis, v), axis);
+}
+
+static const bst_vec3 star = {0.36, -0.48, 0.8};
+
+/* Rows at uneven times, one of them with the other sign: turned evenly between them, held outside;
+ * the fastest within a minute. */
+static void rows_are_followed_at_even_rates(void **state) {
+    (void)state;
+    const bst_vec3 axis = {2.0 / 3.0, -1.0 / 3.0, 2.0 / 3.0};
+    const double at_s[5] = {10.0, 20.0, 50.0, 55.0, 500.0}, turned[5] = {0, 0.2, 0.5, 0.9, 1.0};
+    bst_quat start = bst_quat_unit((bst_quat){0.3, -0.1, 0.5, 0.8});
+    bst_attitude_row rows[5];
+    for (int i = 0; i < 5; i++) {
+        bst_quat q = bst_quat_unit(bst_quat_turn_frame(start, bst_vec3_scale(axis, turned[i])));
+        double sign = i == 2 ? -1.0 : 1.0;
+        rows[i] = (bst_attitude_row){at_s[i], {sign * q.x, sign * q.y, sign * q.z, sign * q.w}};
+    }
+    const double when[][2] = {{0.0, 0.0},   {10.0, 0.0}, {14.0, 0.08},  {20.0, 0.2},  {35.0, 0.35},
+                              {52.0, 0.66}, {55.0, 0.9}, {277.5, 0.95}, {500.0, 1.0}, {900.0, 1.0}};
+    for (size_t k = 0; k < sizeof when / sizeof *when; k++) {
+        bst_vec3 got = bst_quat_rotate(bst_attitude_table_at(rows, 5, when[k][0]), star);
+        bst_assert_close(bst_vec3_angle(got, seen_after(start, axis, when[k][1], star)), 0.0, 1e-7);
+    }
+    bst_vec3 one = bst_quat_rotate(bst_attitude_table_at(rows, 1, 700.0), star);
+    bst_assert_close(bst_vec3_angle(one, bst_quat_rotate(start, star)), 0.0, 1e-7);
+    /* 0.02, 0.01, 0.08 and 0.1 / 445 rad/s */
+    const double rates[][2] = {{-45.0, 0.02}, {-51.0, 0.0},  {-11.0, 0.02},        {-10.0, 0.08},
+                               {30.0, 0.08},  {114.0, 0.08}, {116.0, 0.1 / 445.0}, {561.0, 0.0}};
+    for (size_t k = 0; k < sizeof rates / sizeof *rates; k++) {
+        bst_assert_close(bst_attitude_table_rate_radps(rows, 5, rates[k][0]), rates[k][1], 1e-7);
+    }
+}
+
+/* From its time on a command turns the body about its own axes, until the next one; of more than
+ * there is room for the latest are kept. */
+static void commands_hold_until_the_next(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_commanded_attitude *ring;
+    bst_assert_ok(&ctx, bst_commanded_attitude_create(&ctx, &ring));
+    bst_quat q, first = bst_quat_unit((bst_quat){0.1, 0.2, -0.3, 0.9}),
+                second = bst_quat_unit((bst_quat){-0.5, 0.2, 0.1, 0.4});
+    const bst_vec3 rates[2] = {{0.02, -0.01, 0.02}, {-0.006, 0.0, 0.008}};
+    double rate;
+    assert_false(bst_commanded_attitude_at(ring, 5.0, &q, &rate));
+    bst_assert_ok(&ctx, bst_commanded_attitude_add(&ctx, ring, 10.0, first, rates[0]));
+    bst_assert_ok(&ctx, bst_commanded_attitude_add(&ctx, ring, 30.0, second, rates[1]));
+    assert_int_equal(bst_commanded_attitude_add(&ctx, ring, 30.0, first, rates[0]),
+                     BST_ERR_ARGUMENT);
+    assert_false(bst_commanded_attitude_at(ring, 9.99, &q, &rate));
+    for (double t = 10.0; t < 60.0; t += 4.0) {
+        bool late = t >= 30.0;
+        assert_true(bst_commanded_attitude_at(ring, t, &q, &rate));
+        double size = late ? 0.01 : 0.03;
+        bst_vec3 axis = bst_vec3_scale(rates[late], 1.0 / size);
+        bst_vec3 want =
+            seen_after(late ? second : first, axis, size * (t - (late ? 30 : 10)), star);
+        bst_assert_close(bst_vec3_angle(bst_quat_rotate(q, star), want), 0.0, 1e-7);
+        bst_assert_close(rate, size, 1e-12);
+    }
+    for (int i = 1; i <= 4096; i++) {
+        bst_vec3 about_x = {1e-3 * i, 0.0, 0.0};
+        bst_assert_ok(&ctx, bst_commanded_attitude_add(&ctx, ring, 30.0 + i, first, about_x));
+    }
+    assert_true(bst_commanded_attitude_at(ring, 32.5, &q, &rate));
+    bst_assert_close(rate, 2e-3, 1e-12);
+    assert_true(bst_commanded_attitude_at(ring, 4126.5, &q, &rate));
+    bst_assert_close(rate, 4.096, 1e-12);
+    bst_commanded_attitude_free(ring);
+}
+
+/* Largest rate of each law: that of a spin, of a tumbling body's energy about its smallest axis, of
+ * a command where one holds. */
+static void rates_of_the_laws(void **state) {
+    (void)state;
+    bst_attitude_config c[3] = {
+        {.from_s = -1e9, .law = BST_ATTITUDE_SUN},
+        {.from_s = 50, .law = BST_ATTITUDE_SPIN, .rate_body_deg_per_s = {1, -2, 2}},
+        {.from_s = 90,
+         .law = BST_ATTITUDE_TUMBLE,
+         .rate_body_deg_per_s = {0, 4, 3},
+         .inertia_kg_m2 = {2, 1.6, 2.5}}};
+    bst_ctx ctx = {0};
+    bst_body_attitude *a;
+    const bst_config_list list = {c, 3};
+    bst_assert_ok(&ctx, bst_body_attitude_create(&ctx, &list, &from, &a));
+    bst_assert_close(bst_body_attitude_rate_radps(a, 49.9), 0.0, 0.0);
+    bst_assert_close(bst_body_attitude_rate_radps(a, 50.0), 3.0 * BST_DEG_RAD, 1e-12);
+    bst_assert_close(bst_body_attitude_rate_radps(a, 90.0), 5.0 * BST_DEG_RAD * 1.25, 1e-12);
+    bst_assert_ok(&ctx, bst_body_attitude_accept(&ctx, a));
+    bst_assert_close(bst_body_attitude_rate_radps(a, 95.0), 5.0 * BST_DEG_RAD * 1.25, 1e-12);
+    bst_assert_ok(&ctx, bst_commanded_attitude_add(&ctx, bst_body_attitude_commands(a), 92.0,
+                                                   BST_QUAT_IDENTITY, (bst_vec3){0.3, 0.4, 0.0}));
+    bst_assert_close(bst_body_attitude_rate_radps(a, 95.0), 0.5, 1e-12);
+    bst_assert_close(bst_body_attitude_rate_radps(a, 91.0), 5.0 * BST_DEG_RAD * 1.25, 1e-12);
+    bst_body_attitude_free(a);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(tumbling_keeps_energy_and_momentum),
@@ -147,6 +254,9 @@ int main(void) {
         cmocka_unit_test(laws_point_their_axes),
         cmocka_unit_test(a_phase_continues_the_one_before),
         cmocka_unit_test(wrong_attitudes_are_refused),
+        cmocka_unit_test(rows_are_followed_at_even_rates),
+        cmocka_unit_test(commands_hold_until_the_next),
+        cmocka_unit_test(rates_of_the_laws),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -443,8 +443,36 @@ static void penumbrae_leave_the_light(void **state) {
     bst_test_model_close(&m);
 }
 
+/* What faces the observer, and what it emits: a box of two emissivities behind a plate that hides a
+ * quarter of its side. */
+static void what_is_seen_emits(void **state) {
+    (void)state;
+    bst_test_model m = bst_test_model_open(
+        "{\"materials\": [{\"name\": \"m\", \"diffuse\": 0.3, \"emissivity\": 0.8}, {\"name\": "
+        "\"w\", "
+        "\"diffuse\": 0.2, \"emissivity\": 0.25}], \"parts\": [{\"name\": \"b\", \"kind\": "
+        "\"box\", "
+        "\"size_m\": [2, 3, 4], \"material\": \"m\"}, {\"name\": \"p\", \"kind\": \"plate\", "
+        "\"size_m\": [1, 1.5, 0], \"position_m\": [0.5, 0.75, 5], \"material\": \"w\"}]}");
+    for (int k = 0; k < 2; k++) {
+        bst_vec3 eye = k ? bst_vec3_unit((bst_vec3){2, -1, 2}) : (bst_vec3){0, 0, 1};
+        bst_satellite_light light = {.sun = {1, 0, 0}, .observer = eye, .emission = true};
+        bst_satellite_aim aim = {.sun = {1, 0, 0}, .earth = {0, 0, 1}, .target = eye};
+        bst_satellite_flux flux;
+        bst_satellite_pose_set(m.pose, &aim);
+        bst_satellite_flux_at(m.pose, &light, &flux);
+        /* along z the plate hides what lies behind it; from aside, at 45 degrees, nothing */
+        double box_m2 = k ? 12.0 * eye.x - 8.0 * eye.y + 6.0 * eye.z : 6.0 - 1.5;
+        double plate_m2 = 1.5 * eye.z;
+        bst_assert_close(flux.visible_m2, box_m2 + plate_m2, 1e-9);
+        bst_assert_close(flux.emission_m2, 0.8 * box_m2 + 0.25 * plate_m2, 1e-9);
+    }
+    bst_test_model_close(&m);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_seen_emits),
         cmocka_unit_test(highlights_in_shadow_are_dark),
         cmocka_unit_test(sphere_has_its_closed_form),
         cmocka_unit_test(cylinder_has_its_closed_form),

@@ -31,6 +31,9 @@ static void surfaces_with_narrow_lobes_are_found(void **state) {
         bst_test_model m = bst_test_model_open(text);
         bst_glint_surface surfaces[BST_GLINT_SURFACES];
         assert_int_equal(bst_glint_surfaces(m.satellite, surfaces), cases[i].surfaces);
+        for (int k = 0; k < 6 && i < 2; k++) { /* a side of 1 m^2 of each box */
+            bst_assert_close(surfaces[k].area_m2, 1.0 + (double)i, 1e-9);
+        }
         bst_test_model_close(&m);
     }
 }
@@ -49,6 +52,14 @@ static void normals_of_curved_surfaces_have_no_offset(void **state) {
         curved = surfaces[i].angle > 0 ? i : curved;
     }
     assert_true(surfaces[curved].angle > 0);
+    /* of a truncated cone: pi (r + r') times the slant; the ends are circles of 48 corners */
+    bst_assert_close(surfaces[curved].area_m2, BST_PI * 1.4 * hypot(2.0, 0.6), 1e-9);
+    bst_assert_close(surfaces[curved].angle, atan2(2.0, 0.6), 1e-9);
+    double ends = 0.0;
+    for (int i = 0; i < count; i++) {
+        ends += i != curved ? surfaces[i].area_m2 : 0.0;
+    }
+    bst_assert_close(ends, BST_PI * 1.16, 0.01);
     for (int f = 0; f < m.satellite->facet_count; f++) {
         if (m.satellite->facets[f].curved >= 0) {
             bst_assert_close(

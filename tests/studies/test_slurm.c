@@ -54,11 +54,13 @@ static int set_up(void **state) {
         "sbatch",
         "[ ! -e $root/silent ] || { echo 'Unable to contact slurm controller' >&2; exit 1; }\n"
         "[ ! -e $root/refuse ] || { echo 'Invalid account' >&2; exit 1; }\n"
-        "for word; do\n  case $word in --array=0-*) last=${word#--array=0-};; esac\n"
+        "for word; do\n  case $word in --array=0-*) last=${word#--array=0-};; "
+        "--output=*) log=${word#--output=};; esac\n"
         "  echo \"$word\" >>$root/options\ndone\n"
         "job=$(($(cat $root/job 2>/dev/null || echo 100) + 1))\necho $job >$root/job\n"
         "i=0\nwhile [ $i -le $last ]; do\n  echo RUNNING >$root/queue/$job.$i\n"
-        "  [ -e $root/hold ] || (SLURM_ARRAY_TASK_ID=$i sh \"$word\" >/dev/null 2>&1; "
+        "  [ -e $root/hold ] || (SLURM_ARRAY_TASK_ID=$i sh \"$word\" "
+        ">\"$(echo \"$log\" | sed s/%a/$i/)\" 2>&1; "
         "rm -f $root/queue/$job.$i) >/dev/null 2>&1 &\n"
         "  i=$((i + 1))\ndone\necho $job\n");
     write_program(
@@ -69,10 +71,11 @@ static int set_up(void **state) {
     write_program("scancel",
                   "echo \"$*\" >>$root/cancelled\n"
                   "case $* in *--state=RUNNING*) ;; *) rm -f $root/queue/*;; esac\n");
-    write_program("shard",
-                  "echo x >>$root/runs/$1\n"
-                  "case $1 in 7:*) kill -KILL $$;; 8:*) echo 'no room on the disk' >&2; "
-                  "exit 1;; esac\n");
+    write_program(
+        "shard",
+        "echo x >>$root/runs/$1\n"
+        "case $1 in 7:*) echo 'half done'; kill -KILL $$;; 8:*) echo 'no room on the disk' >&2; "
+        "exit 1;; esac\n");
     const char *before = getenv("PATH");
     snprintf(path_before, sizeof path_before, "%s", before ? before : "/usr/bin:/bin");
     snprintf(path, sizeof path, "%s/bin:%s", folder, path_before);
@@ -186,9 +189,13 @@ static void test_ends_are_told_apart(void **state) {
     for (int i = 0; i < 2; i++) {
         if (news[i].id == 0) {
             assert_int_equal(news[i].kind, BST_SHARD_LOST);
-            assert_non_null(strstr(news[i].text, "signal 9"));
+            /* with the end of its log */
+            const char *said = strstr(news[i].text, "killed by signal 9 on ");
+            assert_ptr_equal(said, news[i].text);
+            assert_non_null(strstr(said, ": half done"));
         } else {
             assert_int_equal(news[i].kind, BST_SHARD_ENDED);
+            assert_non_null(strstr(news[i].text, "no room on the disk"));
         }
     }
     executor.close(executor.self);

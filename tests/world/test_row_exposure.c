@@ -6,6 +6,7 @@
 #include "boresight/rng.h"
 #include "sim/world/scene/field.h"
 #include "sim/world/scene/los_track.h"
+#include "sim/world/world_config.h"
 #include "tests/world/world_support.h"
 
 /* A part of a source's time is the same motion and the same light. */
@@ -203,12 +204,138 @@ static void contradictions_are_refused(void **state) {
     assert_int_equal(bst_detector_config_check(&ctx, &d), BST_ERR_CONFIG);
 }
 
+/* Attitude of a camera that turns evenly about an axis, at a tick. */
+static bst_quat evenly_turned(double tick) {
+    bst_vec3 rate = {3e-3, -1e-3, 2e-3};
+    return bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(rate, tick)),
+                        bst_quat_unit((bst_quat){0.1, 0.7, -0.3, 0.2}));
+}
+
+static void expect_track(const bst_los_track *t, double start_tick, double end_tick, int count) {
+    assert_int_equal(t->count, count);
+    bst_assert_close(t->time_s[0], 0.0, 0.0);
+    bst_assert_close(t->time_s[count - 1], (end_tick - start_tick) / 50.0, 1e-12);
+    for (int k = 0; k < count; k++) {
+        bst_quat q = t->q_cam_from_gcrf[k];
+        bst_quat off =
+            bst_quat_mul(evenly_turned(start_tick + 50.0 * t->time_s[k]), bst_quat_conj(q));
+        bst_assert_close(bst_vec3_norm(bst_quat_to_rotvec(bst_quat_unit(off))), 0.0, 1e-9);
+        if (k > 0) {
+            bst_quat p = t->q_cam_from_gcrf[k - 1];
+            assert_true(t->time_s[k] > t->time_s[k - 1]);
+            assert_true(q.x * p.x + q.y * p.y + q.z * p.z + q.w * p.w > 0.0);
+        }
+    }
+}
+
+/* An exposure between the samples of a ring that has gone round, of either sign: begin and end by
+ * interpolation, and all samples between them; and a part of it. */
+static void a_track_is_cut_out_of_the_history(void **state) {
+    (void)state;
+    enum { ROOM = 16, WRITTEN = 21, STEP = 7 };
+    bst_ctx ctx = {0};
+    bst_los_history *h = calloc(1, sizeof *h + ROOM * sizeof h->items[0]);
+    assert_non_null(h);
+    h->capacity = ROOM;
+    h->written = WRITTEN;
+    for (int n = 0; n < WRITTEN; n++) {
+        bst_quat q = evenly_turned(STEP * n);
+        double sign = n % 3 ? 1.0 : -1.0;
+        h->items[n % ROOM] = (bst_los_sample){
+            .tick = STEP * n, .q_cam_from_gcrf = {sign * q.x, sign * q.y, sign * q.z, sign * q.w}};
+    }
+    /* ticks 35 to 140 are there: start, end, and samples */
+    const int spans[][3] = {{37, 96, 10}, {35, 140, 16}, {42, 63, 4},  {43, 47, 2},
+                            {50, 50, 2},  {48, 50, 3},   {139, 140, 2}};
+    bst_los_track_store store = {.capacity = 0}, part_store = {.capacity = 0};
+    for (size_t i = 0; i < sizeof spans / sizeof *spans; i++) {
+        bst_los_track track;
+        int from = spans[i][0], to = spans[i][1];
+        bst_assert_ok(&ctx, bst_los_track_cut(&ctx, &store, h, from, to, 50, &track));
+        if (from < to) {
+            expect_track(&track, from, to, spans[i][2]);
+        }
+        if (i == 0) {
+            bst_los_track part;
+            bst_assert_ok(&ctx, bst_los_track_part(&ctx, &part_store, &track, 0.2, 0.7, &part));
+            expect_track(&part, 47.0, 72.0, 6); /* samples at 49, 56, 63, 70; ends at 47, 72 */
+        }
+    }
+    const int outside[][2] = {{34, 50}, {100, 141}, {0, 200}};
+    for (int i = 0; i < 3; i++) {
+        bst_los_track track;
+        assert_int_equal(
+            bst_los_track_cut(&ctx, &store, h, outside[i][0], outside[i][1], 50, &track),
+            BST_ERR_STATE);
+        assert_non_null(strstr(ctx.message, "ticks 35 to 140"));
+    }
+    bst_los_track_store_free(&store);
+    bst_los_track_store_free(&part_store);
+    free(h);
+}
+
+/* The largest way of an image point, against points of the whole frame: never less, and not a
+ * tenth more for turns about the image's axes and the boresight. */
+static void the_largest_way_of_an_image_point(void **state) {
+    (void)state;
+    const bst_camera c = {.width_px = 1200, .height_px = 400, .pixel_scale_arcsec = 60.0};
+    const bst_vec3 turns[] = {{2e-3, 0, 0}, {0, -2e-3, 0}, {0, 0, 3e-3}, {1.2e-3, 1.6e-3, 0}};
+    for (int n = 0; n < 4; n++) {
+        bst_quat q = bst_quat_from_rotvec(turns[n]);
+        double most = 0.0;
+        for (int i = 0; i <= 24 * 8; i++) {
+            double x = 50.0 * (i % 25), y = 50.0 * (double)(i / 25), u, v;
+            assert_true(
+                bst_camera_project(&c, bst_quat_rotate(q, bst_camera_unproject(&c, x, y)), &u, &v));
+            most = fmax(most, hypot(u - x, v - y));
+        }
+        double most_px =
+            bst_los_track_moved_px(&c, evenly_turned(5.0), bst_quat_mul(q, evenly_turned(5.0)));
+        assert_true(most_px > 0.999 * most && most_px < 1.1 * most);
+    }
+}
+
+/* Windows up to the sensor's edges, of at least a binned pixel. */
+static void windows_of_the_sensor(void **state) {
+    (void)state;
+    static const struct {
+        double window[4];
+        bool fits;
+    } cases[] = {
+        {{600, 400, 40, 80}, true}, {{601, 400, 40, 80}, false}, {{600, 401, 40, 80}, false},
+        {{0, 0, 640, 480}, true},   {{0, 0, 480, 640}, false},   {{20, 30, 3, 3}, true},
+        {{20, 30, 2, 9}, false},    {{20, 30, 9, 2}, false},     {{20, 30.5, 9, 9}, false},
+        {{20, 30, 9, 9.5}, false},  {{20, 30, 9, 0}, false}};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        bst_ctx ctx = {0};
+        bst_exposure_config c = {.binning = 3};
+        memcpy(c.window_px, cases[k].window, sizeof c.window_px);
+        bst_window w;
+        bst_status status = bst_exposure_window(&ctx, &c, 640, 480, &w);
+        assert_int_equal(status, cases[k].fits ? BST_OK : BST_ERR_CONFIG);
+        if (cases[k].fits) {
+            const double got[4] = {w.x0, w.y0, w.width, w.height};
+            assert_memory_equal(got, cases[k].window, sizeof got);
+        } else {
+            assert_non_null(strstr(ctx.message, "640 x 480 pixels, at least the binning of 3"));
+        }
+    }
+    bst_ctx ctx = {0};
+    const bst_exposure_config whole = {.binning = 1};
+    bst_window w;
+    bst_assert_ok(&ctx, bst_exposure_window(&ctx, &whole, 640, 480, &w));
+    assert_true(w.x0 == 0 && w.y0 == 0 && w.width == 640 && w.height == 480);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(parts_are_the_same_polynomials),
         cmocka_unit_test(a_running_image_is_exposed_longer),
         cmocka_unit_test(truth_is_that_of_each_row),
         cmocka_unit_test(contradictions_are_refused),
+        cmocka_unit_test(a_track_is_cut_out_of_the_history),
+        cmocka_unit_test(the_largest_way_of_an_image_point),
+        cmocka_unit_test(windows_of_the_sensor),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

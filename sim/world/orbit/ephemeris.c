@@ -468,13 +468,12 @@ static double kepler(double m, double e) {
 /* Estimated interpolation error at the perigee of a two-body orbit, relative to the semi-major
  * axis. */
 static double perigee_error(double e, double radians_per_step) {
-    double p[3][POINTS + 1] = {{0}};
+    /* along the axis; across it the place is odd, and its tenth difference about perigee is 0 */
+    double p[POINTS + 1] = {0};
     for (int j = 0; j <= POINTS / 2; j++) {
-        double x = kepler(j * radians_per_step, e);
-        p[0][POINTS / 2 + j] = p[0][POINTS / 2 - j] = cos(x);
-        p[1][POINTS / 2 + j] = sqrt(1.0 - e * e) * sin(x);
+        p[POINTS / 2 + j] = p[POINTS / 2 - j] = cos(kepler(j * radians_per_step, e));
     }
-    return ERROR_OF_DIFFERENCE * fabs(tenth_difference(p[0]));
+    return ERROR_OF_DIFFERENCE * fabs(tenth_difference(p));
 }
 
 /* The longest step between knots that is accurate at perigee, where the curvature is largest. */
