@@ -1,4 +1,4 @@
-/* Edges of what is seen in a frame, told from the light that the PSF spreads beyond them. */
+/* Edges of what is seen in a frame, found from the light that the PSF spreads beyond them. */
 #ifndef BST_IMGPROC_EXTENDED_EDGES_H
 #define BST_IMGPROC_EXTENDED_EDGES_H
 

@@ -29,7 +29,7 @@ static const double LEAST_TARGET = 0.02;
 /* Reach of the mask beyond a target's light, in sigma of the PSF: edges have fallen to 1e-3 there.
  */
 static const double MASK_SIGMAS = 3.0;
-/* Ratio of signal and noise from which the slope of a pixel's light tells an edge: the logarithm is
+/* Ratio of signal and noise from which the slope of a pixel's light gives an edge: the logarithm is
  * good to a fifth, which moves the edge by a tenth of the PSF's sigma. */
 static const double EDGE_SNR = 5.0;
 /* Most of a frame that can be a target; a frame that is brighter has no sky to compare with. */
