@@ -60,7 +60,8 @@ const uint8_t *bst_imgproc_find_silhouettes(bst_imgproc *ip, const bst_imgproc_f
                               .full_e = (saturated_dn - c->offset_dn) * c->gain_e_per_dn,
                               .read_variance_e2 = c->read_noise_e * c->read_noise_e +
                                                   c->gain_e_per_dn * c->gain_e_per_dn / 12.0,
-                              .sigma_px = sigma_px};
+                              .sigma_px = sigma_px,
+                              .wings = ip->known != NULL};
     if (motion) {
         bst_camera_motion_streak(motion, c, w->x0 + 0.5 * (w->width - 1),
                                  w->y0 + 0.5 * (w->height - 1), &f.streak_x_px, &f.streak_y_px);

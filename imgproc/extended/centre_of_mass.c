@@ -3,9 +3,9 @@
 #include <assert.h>
 #include <math.h>
 
-/* Standard error of the extents: share of the blur of the edges, and of the size. Measured in
+/* Standard error of the extents: share of the PSF's sigma, and of the size. Measured in
  * tests/imgproc/test_extended.c */
-static const double BLUR_SIGMA = 0.5, SIZE_SIGMA = 0.02;
+static const double LIMB_SIGMA = 0.6, SIZE_SIGMA = 0.02;
 /* Standard error of the offset towards the Sun, share of it. The factor varies by about as much
  * with the attitude of one satellite: tests/imgproc/calibrate_outline.c */
 static const double OFFSET_SIGMA = 0.5;
@@ -22,14 +22,6 @@ double bst_light_phase_offset(double phase_rad) {
     double sine = sin(phase_rad), cosine = cos(phase_rad);
     double light = sine + (BST_PI - phase_rad) * cosine;
     return light > 1e-9 ? 3.0 * BST_PI / 32.0 * sine * (1.0 + cosine) / light : 0.5;
-}
-
-/* Half of the blur of a limb: the threshold widens a limb, but not a terminator, where the light
- * rises slowly. The terminator is apart from the far limb if the phase moves it by more than the
- * blur. */
-static double terminator_offset(double phase_rad, double across_px, double blur_px) {
-    double apart = 0.5 * across_px * (1.0 - cos(phase_rad));
-    return blur_px > 0.0 ? 0.5 * blur_px * apart / (apart + blur_px) : 0.0;
 }
 
 /* Direction of the Sun in the image at a place of the sensor; false: none. */
@@ -82,7 +74,7 @@ void bst_extended_correct_point(const bst_extended_config *config, const bst_ext
         return;
     }
     double across = bst_outline_extent_along(&s->outline, -along[1], along[0]);
-    across = fmax(v->binning * (across - 2.0 * s->blur_px), 0.0);
+    across = v->binning * across;
     double least = BST_SILHOUETTE_LEAST * config->handover_fwhm * v->camera->psf_fwhm_px;
     double share = fmin(fmax(v->binning * s->moment_size_px / least - 1.0, 0.0), 1.0);
     double offset = share * config->phase_offset_factor * bst_light_phase_offset(phase) * across;
@@ -98,16 +90,15 @@ void bst_extended_measure(const bst_extended_config *config, const bst_extended_
                           const bst_silhouette *s, bst_detection *out) {
     assert(config && v && v->camera && s && out && v->binning >= 1.0);
     double b = v->binning, x0 = v->origin_x_px, y0 = v->origin_y_px;
-    double length = b * s->length_px, blur = b * s->blur_px;
+    double length = b * s->length_px;
     double light_x = x0 + b * s->light_x_px, light_y = y0 + b * s->light_y_px;
     double centre_x = x0 + b * s->centre_x_px, centre_y = y0 + b * s->centre_y_px;
     double phase = 0.0, along[2] = {0.0, 0.0}, offset = 0.0, light_offset = 0.0;
     bool lit = sun_in_image(v, centre_x, centre_y, &phase, along);
     if (lit) {
         double across = bst_outline_extent_along(&s->outline, -along[1], along[0]);
-        across = fmax(b * across - 2.0 * blur, 0.0);
-        offset = config->phase_offset_factor * (bst_outline_phase_offset(phase) * across +
-                                                terminator_offset(phase, across, blur));
+        across *= b;
+        offset = config->phase_offset_factor * bst_outline_phase_offset(phase) * across;
         light_offset = config->phase_offset_factor * bst_light_phase_offset(phase) * across;
     }
     double share = outline_share(config, v->camera, length);
@@ -141,7 +132,8 @@ void bst_extended_measure(const bst_extended_config *config, const bst_extended_
                    .x1_px = x0 + b * s->x1_px,
                    .y1_px = y0 + b * s->y1_px,
                    .size_px = length,
-                   .size_sigma_px = hypot(BLUR_SIGMA * blur, SIZE_SIGMA * length),
+                   .size_sigma_px =
+                       hypot(LIMB_SIGMA * bst_camera_psf_sigma_px(v->camera), SIZE_SIGMA * length),
                    .area_px2 = b * b * s->area_px2,
                    .phase_rad = lit ? phase : 0.0,
                    .saturated_share = s->area_px2 > 0.0 ? s->saturated_px / s->area_px2 : 0.0}};

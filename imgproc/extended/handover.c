@@ -6,7 +6,7 @@
 static bool holds(const bst_extended_view *v, const bst_silhouette *s, double x_px, double y_px,
                   double margin_px) {
     double x = (x_px - v->origin_x_px) / v->binning, y = (y_px - v->origin_y_px) / v->binning;
-    double margin = margin_px / v->binning + s->blur_px;
+    double margin = margin_px / v->binning;
     return x >= s->x0_px - margin && x <= s->x1_px + margin && y >= s->y0_px - margin &&
            y <= s->y1_px + margin;
 }

@@ -80,6 +80,19 @@ double bst_outline_centroid(const bst_outline *o, double *x_px, double *y_px) {
     return 0.5 * area;
 }
 
+void bst_outline_bounds(const bst_outline *o, double *x0_px, double *y0_px, double *x1_px,
+                        double *y1_px) {
+    assert(o && x0_px && y0_px && x1_px && y1_px);
+    *x0_px = *y0_px = INFINITY;
+    *x1_px = *y1_px = -INFINITY;
+    for (int i = 0; i < o->count; i++) {
+        *x0_px = fmin(*x0_px, o->corner[i].x_px);
+        *y0_px = fmin(*y0_px, o->corner[i].y_px);
+        *x1_px = fmax(*x1_px, o->corner[i].x_px);
+        *y1_px = fmax(*y1_px, o->corner[i].y_px);
+    }
+}
+
 void bst_outline_extent(const bst_outline *o, double *length_px, double *angle_rad,
                         double *width_px) {
     assert(o && length_px && angle_rad && width_px);

@@ -30,6 +30,10 @@ void bst_outline_make(bst_outline_point *points, int count, bst_outline_point *h
  */
 double bst_outline_centroid(const bst_outline *outline, double *x_px, double *y_px);
 
+/* Bounding box of an outline, px; an outline without corners has none: infinities. */
+void bst_outline_bounds(const bst_outline *outline, double *x0_px, double *y0_px, double *x1_px,
+                        double *y1_px);
+
 /* Largest and smallest extent of an outline.
  *
  * Returned:  *length_px  largest distance of two corners (diameter of the outline)

@@ -5,26 +5,33 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "imgproc/extended/edges.h"
 #include "sim/core/pages.h"
 
 /* bst_bright_region.target of a small region near a target: it is none of its own. */
 enum { NEAR_TARGET = -2 };
-enum { REGIONS_MAX = 4096, SKY_SAMPLES = 8192, SKY_SHARE = 5, BLUR_STEPS = 40 };
+enum { REGIONS_MAX = 4096, SKY_SAMPLES = 8192, SKY_SHARE = 5 };
 
 /* Thresholds of the hysteresis, in the noise of a dark pixel. With HIGH no region in 1e8 frames of
  * 2048^2 pixels is noise. */
 static const double HIGH = 8.0, LOW = 4.0;
-/* Least share of a region's median signal of its pixels, for small regions: above the wings of
+/* Least share of a region's median signal of its pixels: below it is light that the optics scatter.
+ * Design choice: polished optics scatter less than 1e-4 into a pixel some FWHM beside a surface.
+ * With a known PSF, whose wings bst_edges does not know, more in small regions: above the wings of
  * usual PSFs. In larger ones the blur of the edges matters less, and dim parts more: the share
- * falls with the size from WIDE_FWHM on, to LEAST_SHARE_WIDE. */
-static const double LEAST_SHARE = 0.05, LEAST_SHARE_WIDE = 1e-3, WIDE_FWHM = 10.0;
+ * falls with the size from WIDE_FWHM on. */
+static const double LEAST_SHARE = 0.05, LEAST_SHARE_FAR = 1e-4, WIDE_FWHM = 10.0;
 /* Least flux or area of a part relative to the part that it is joined to: smaller ones are stars or
  * hits. */
 static const double LEAST_PART = 0.003;
 /* Least area of a target relative to the largest of the frame: smaller ones are its fragments. */
 static const double LEAST_TARGET = 0.02;
-/* Reach of the mask beyond a silhouette, in sigma of the PSF: edges have fallen to 1e-3 there. */
+/* Reach of the mask beyond a target's light, in sigma of the PSF: edges have fallen to 1e-3 there.
+ */
 static const double MASK_SIGMAS = 3.0;
+/* Ratio of signal and noise from which the slope of a pixel's light gives an edge: the logarithm is
+ * good to a fifth, which moves the edge by a tenth of the PSF's sigma. */
+static const double EDGE_SNR = 5.0;
 /* Most of a frame that can be a target; a frame that is brighter has no sky to compare with. */
 static const double MOST_OF_FRAME = 0.8;
 
@@ -155,9 +162,8 @@ static double least_of(const bst_silhouette_finder *s, const bst_silhouette_fram
                        const bst_bright_region *r, double noise) {
     double median = median_of(s, r), wide = WIDE_FWHM * BST_FWHM_PER_SIGMA * f->sigma_px;
     double share = LEAST_SHARE * fmin(pow(wide / sqrt((double)r->count), 2.0), 1.0);
-    bool saturated = median >= (double)s->saturated_e;
-    return fmax(LOW * noise,
-                (saturated ? LEAST_SHARE_WIDE : fmax(share, LEAST_SHARE_WIDE)) * median);
+    bool steep = !f->wings || median >= (double)s->saturated_e;
+    return fmax(LOW * noise, (steep ? LEAST_SHARE_FAR : fmax(share, LEAST_SHARE_FAR)) * median);
 }
 
 /* Removes pixels below `least` from a region. */
@@ -293,20 +299,6 @@ static double moment_size(const bst_silhouette_frame *f, const light_sums *m) {
     return 4.0 * sqrt(fmax(largest, 0.0));
 }
 
-/* Distance from a straight edge at which its light, blurred by the PSF, falls to a share, px. */
-static double blur_of(double share, double sigma_px) {
-    double low = 0.0, high = 6.0;
-    for (int i = 0; i < BLUR_STEPS; i++) {
-        double middle = 0.5 * (low + high);
-        if (0.5 * erfc(middle / sqrt(2.0)) > share) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return low * sigma_px;
-}
-
 /* Marks what a closed silhouette encloses: in its box, pixels that no path outside the silhouette
  * connects with the box's border belong to it. Returns the sum over its pixels. */
 static light_sums fill_holes(bst_silhouette_finder *s, const bst_silhouette_frame *f,
@@ -346,79 +338,62 @@ static light_sums fill_holes(bst_silhouette_finder *s, const bst_silhouette_fram
     return area;
 }
 
-/* How far beyond the centre of the first pixel inside the signal crosses `least`, 0 to 1. */
-static double crossing(const bst_silhouette_finder *s, int inside, int outside, double least) {
-    double in = (double)s->signal[inside], out = (double)s->signal[outside];
-    return in > least && out < least ? (in - least) / (in - out) : 0.5;
+/* True for a pixel of the shown target with enough light for its logarithm. */
+static bool is_bright(const bst_silhouette_finder *s, int at, double least) {
+    return s->region[at] && (double)s->signal[at] >= least;
 }
 
-/* Outline from the first and last pixel of each row and column, interpolated to the threshold. */
-static void make_outline(bst_silhouette_finder *s, const bst_silhouette_frame *f,
-                         const bst_bright_region *box, double least, bst_outline *out) {
-    int n = 0, width = f->width;
+/* Outline from the light next to the first and last pixel of each row and column that have at least
+ * `least`, or that are shown if none has. */
+static void make_outline(bst_silhouette_finder *s, const bst_edges *edges,
+                         const bst_bright_region *box, double least, double noise,
+                         bst_outline *out) {
+    int n = 0;
     for (int k = 0; k < 2; k++) { /* rows, then columns */
         int lines = k == 0 ? box->y1 - box->y0 + 1 : box->x1 - box->x0 + 1;
         int length = k == 0 ? box->x1 - box->x0 + 1 : box->y1 - box->y0 + 1;
-        int step = k == 0 ? 1 : width, last = k == 0 ? f->width - 1 : f->height - 1;
-        int start = k == 0 ? box->x0 : box->y0;
+        int step = k == 0 ? 1 : edges->width, across = k == 0 ? edges->width : 1;
         for (int i = 0; i < lines; i++) {
-            int from = k == 0 ? (box->y0 + i) * width + box->x0 : box->y0 * width + box->x0 + i;
+            int from = box->y0 * edges->width + box->x0 + i * across;
             int a = 0, b = length - 1;
-            while (a < length && s->region[from + a * step] == 0) {
+            while (a < length && !is_bright(s, from + a * step, least)) {
                 a++;
             }
-            while (b > a && s->region[from + b * step] == 0) {
+            while (b > a && !is_bright(s, from + b * step, least)) {
                 b--;
             }
-            if (a == length) {
-                continue;
+            for (int end = 0; a < length && end < 2; end++) {
+                /* one pixel farther in, neighbours are above the noise */
+                int at = b - a < 2 ? (a + b) / 2 : end == 0 ? a + 1 : b - 1;
+                s->points[n++] = bst_edges_place(edges, box->x0 + (k == 0 ? at : i),
+                                                 box->y0 + (k == 0 ? i : at), noise);
             }
-            int in = from + a * step;
-            double low = start + a - (start + a > 0 ? crossing(s, in, in - step, least) : 0.5);
-            in = from + b * step;
-            double high = start + b + (start + b < last ? crossing(s, in, in + step, least) : 0.5);
-            double line = k == 0 ? box->y0 + i : box->x0 + i;
-            s->points[n++] =
-                k == 0 ? (bst_outline_point){low, line} : (bst_outline_point){line, low};
-            s->points[n++] =
-                k == 0 ? (bst_outline_point){high, line} : (bst_outline_point){line, high};
         }
     }
     bst_outline_make(s->points, n, s->hull, out);
 }
 
-/* Measures the target that consists of the regions of a number. */
+/* Measures a target, whose light is shown. */
 static void measure(bst_silhouette_finder *s, const bst_silhouette_frame *f, double noise,
-                    const bst_bright_region *box, const light_sums *m, bst_silhouette *out) {
-    bst_bright_region all = {.first = s->regions[0].first, .count = 0};
-    double median = 0.0;
-    for (int k = 0; k < s->region_count; k++) { /* of the largest part */
-        if (s->regions[k].target == box->target && s->regions[k].count > all.count) {
-            all = s->regions[k];
-        }
-    }
-    median = median_of(s, &all);
-    double least = least_of(s, f, &all, noise);
+                    const bst_edges *edges, const bst_bright_region *box, const light_sums *m,
+                    bst_silhouette *out) {
     out->flux_e = m->s;
     out->flux_variance = m->s + m->pixels * noise * noise;
     out->light_x_px = box->x0 + m->x / m->s;
     out->light_y_px = box->y0 + m->y / m->s;
     out->saturated_px = m->saturated;
     out->edge = box->x0 <= 0 || box->y0 <= 0 || box->x1 >= f->width - 1 || box->y1 >= f->height - 1;
-    make_outline(s, f, box, least, &out->outline);
+    double half = 0.5 * EDGE_SNR * EDGE_SNR;
+    make_outline(s, edges, box, half + hypot(half, EDGE_SNR * noise), noise, &out->outline);
+    if (out->outline.count < 3) { /* all of it is dim */
+        make_outline(s, edges, box, noise, noise, &out->outline);
+    }
     (void)bst_outline_centroid(&out->outline, &out->centre_x_px, &out->centre_y_px);
     bst_outline_extent(&out->outline, &out->length_px, &out->angle_rad, &out->width_px);
-    double blur = blur_of(fmin(least / fmax(median, least), 0.5), f->sigma_px);
-    out->blur_px = blur;
-    out->length_px = fmax(out->length_px - 2.0 * blur, 0.0);
-    out->width_px = fmax(out->width_px - 2.0 * blur, 0.0);
-    out->x0_px = box->x0 - 0.5 + blur;
-    out->y0_px = box->y0 - 0.5 + blur;
-    out->x1_px = box->x1 + 0.5 - blur;
-    out->y1_px = box->y1 + 0.5 - blur;
+    bst_outline_bounds(&out->outline, &out->x0_px, &out->y0_px, &out->x1_px, &out->y1_px);
 }
 
-/* Marks the pixels of a silhouette and those within `reach` px in the mask. */
+/* Marks the pixels that are shown and those within `reach` px in the mask. */
 static void mark(const bst_silhouette_finder *s, const bst_silhouette_frame *f,
                  const bst_bright_region *box, int reach, uint8_t *mask) {
     for (int y = box->y0; y <= box->y1; y++) {
@@ -443,9 +418,11 @@ static void mark(const bst_silhouette_finder *s, const bst_silhouette_frame *f,
     }
 }
 
-/* Leaves only the regions of one target in s->region within a box. */
-static void show_target(bst_silhouette_finder *s, const bst_silhouette_frame *f, int target,
-                        const bst_bright_region *box) {
+/* Leaves only the regions of one target in s->region within a box, without what is outside of its
+ * edges if these are given. Returns true if any pixel is left. */
+static bool show_target(bst_silhouette_finder *s, const bst_silhouette_frame *f, int target,
+                        const bst_edges *edges, const bst_bright_region *box) {
+    bool any = false;
     for (int y = box->y0; y <= box->y1; y++) {
         memset(s->region + (size_t)y * (size_t)f->width + box->x0, 0,
                (size_t)(box->x1 - box->x0 + 1));
@@ -453,9 +430,12 @@ static void show_target(bst_silhouette_finder *s, const bst_silhouette_frame *f,
     for (int k = 0; k < s->region_count; k++) {
         const bst_bright_region *r = &s->regions[k];
         for (int i = 0; r->target == target && i < r->count; i++) {
-            s->region[s->pixels[r->first + i]] = 1;
+            int at = s->pixels[r->first + i];
+            s->region[at] = !edges || !bst_edges_outside(edges, at % f->width, at / f->width);
+            any = any || s->region[at];
         }
     }
+    return any;
 }
 
 void bst_silhouettes_find(bst_silhouette_finder *s, const bst_extended_config *config,
@@ -465,6 +445,8 @@ void bst_silhouettes_find(bst_silhouette_finder *s, const bst_extended_config *c
     out->count = 0;
     double noise = read_signal(s, f), total = (double)f->width * (double)f->height;
     find_regions(s, f, noise);
+    bst_edges edges;
+    bst_edges_init(&edges, s->signal, f->width, f->height, f->sigma_px);
     double largest = 0.0, handover = config->handover_fwhm * BST_FWHM_PER_SIGMA * f->sigma_px;
     for (int i = 0; i < s->region_count && out->count < BST_SILHOUETTES_MAX; i++) {
         if (s->regions[i].target != -1) {
@@ -488,13 +470,20 @@ void bst_silhouettes_find(bst_silhouette_finder *s, const bst_extended_config *c
                               .parts = parts,
                               .masked = size >= handover,
                               .may_extend = size >= config->return_share * handover};
-        show_target(s, f, target, &box);
+        (void)show_target(s, f, target, NULL, &box);
+        measure(s, f, noise, &edges, &box, &m, t);
+        if (!show_target(s, f, target, &edges, &box)) {
+            out->count--;
+            continue;
+        }
         light_sums area = fill_holes(s, f, &box, s->pixels + s->pixel_count);
         t->area_px2 = area.pixels;
         t->x_px = area.x / area.pixels;
         t->y_px = area.y / area.pixels;
-        measure(s, f, noise, &box, &m, t);
         if (t->masked) {
+            /* with the light beyond the edges */
+            (void)show_target(s, f, target, NULL, &box);
+            (void)fill_holes(s, f, &box, s->pixels + s->pixel_count);
             mark(s, f, &box, (int)ceil(MASK_SIGMAS * f->sigma_px), mask);
         }
     }

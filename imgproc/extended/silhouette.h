@@ -16,14 +16,13 @@ enum { BST_SILHOUETTES_MAX = 8 };
 /* An extended target in a frame; pixels of the frame, origin at the centre of its first pixel. */
 typedef struct bst_silhouette {
     double centre_x_px, centre_y_px; /* of the area within the outline */
-    double area_px2;                 /* of the silhouette, dark holes filled */
-    double x_px, y_px;               /* centroid of that area */
-    double light_x_px, light_y_px;   /* centroid of light */
+    double area_px2;               /* of pixels that are not outside of edges, dark holes filled */
+    double x_px, y_px;             /* centroid of that area */
+    double light_x_px, light_y_px; /* centroid of light */
     double flux_e, flux_variance;
     double moment_size_px; /* size by the second moments of the light, less PSF and star streak */
-    double length_px, width_px, angle_rad; /* extents of the outline, less the blur of its edges */
-    double blur_px;                        /* by which the outline lies outside of the edges */
-    double x0_px, y0_px, x1_px, y1_px;     /* bounding box, less the blur */
+    double length_px, width_px, angle_rad; /* extents of the outline */
+    double x0_px, y0_px, x1_px, y1_px;     /* bounding box of the outline */
     bst_outline outline;
     int saturated_px; /* pixels */
     int parts;        /* connected regions that were joined */
@@ -78,6 +77,7 @@ typedef struct bst_silhouette_frame {
     double full_e;                   /* signal that a saturated pixel counts for, e- */
     double read_variance_e2;         /* noise of a dark pixel, e-^2 */
     double sigma_px;                 /* of the PSF */
+    bool wings;                      /* the PSF has more light far out than a Gaussian */
     double streak_x_px, streak_y_px; /* of a star in this frame */
 } bst_silhouette_frame;
 
@@ -94,9 +94,11 @@ typedef struct bst_silhouette_frame {
  * Notes:     level of the sky: the middle of the narrowest interval that holds a fifth of the
  *            pixels, so that a target may fill most of the frame. Hysteresis: a region consists of
  *            the pixels above 4 sigma that are connected with one above 8 sigma. Pixels below a
- *            twentieth of the region's median (down to a thousandth in large regions and of a
- *            saturated median) are then left out: the PSF's wings.
- * Reference: hysteresis: Canny, IEEE Trans. PAMI 8, 679 (1986), section VI */
+ *            ten-thousandth of the region's median are then left out (with `wings` a twentieth,
+ * down to a thousandth in large regions and of a saturated median). Light, flux and moments are
+ *            those of these pixels. The area leaves out light beyond the edges (bst_edges_outside),
+ * and the outline lies at the edges (bst_edges_place). Reference: hysteresis: Canny, IEEE Trans.
+ * PAMI 8, 679 (1986), section VI */
 void bst_silhouettes_find(bst_silhouette_finder *finder, const bst_extended_config *config,
                           const bst_silhouette_frame *frame, uint8_t *mask, bst_silhouettes *out);
 

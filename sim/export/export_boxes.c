@@ -184,7 +184,7 @@ static bst_status add_coco_box(bst_ctx *ctx, job *j, const frame_row *f, const b
         bst_shape_label_add(&b->shape, &view, node);
         status = status == BST_OK
                      ? bst_mask_labels_add_parts(ctx, &j->parts, bst_io_rows_int(j->truth, 18),
-                                                 cJSON_GetObjectItem(node, "shape"))
+                                                 false, cJSON_GetObjectItem(node, "shape"))
                      : status;
     }
     cJSON_AddItemToArray(j->annotations, node);

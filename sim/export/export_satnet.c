@@ -16,6 +16,7 @@
 #include "sim/core/json_number.h"
 #include "sim/core/text.h"
 #include "sim/export/export.h"
+#include "sim/export/mask_labels.h"
 #include "sim/export/shape_labels.h"
 #include "sim/io/draft_file.h"
 #include "sim/io/fits_frames.h"
@@ -52,7 +53,8 @@ typedef struct job {
     bst_io_rows *truth; /* truth rows of the sensor, by exposure; at the next unprocessed row */
     bool truth_more;
     bst_shape_labels shapes;
-    bool mask; /* the run has a segmentation mask */
+    bst_mask_labels masks; /* of the parts of shapes */
+    bool mask;             /* the run has a segmentation mask */
     int64_t written;
     double shares[PARTS];
     bst_draft *parts; /* [PARTS]; NULL: no split */
@@ -197,6 +199,8 @@ static bst_status add_shape(bst_ctx *ctx, job *j, const frame_row *row, int widt
         const bst_shape_label_view view = {row->frame.window.x0, row->frame.window.y0,
                                            binning * width, binning * height};
         bst_shape_label_add(&shape, &view, node);
+        return bst_mask_labels_add_parts(ctx, &j->masks, bst_io_rows_int(j->truth, 2), true,
+                                         cJSON_GetObjectItem(node, "shape"));
     }
     return BST_OK;
 }
@@ -287,9 +291,13 @@ static int part_of(const job *j, const char *name) {
 static bst_status write_frame(bst_ctx *ctx, job *j, const frame_row *row) {
     char name[300], path[4400];
     bst_fits_read_frame image;
-    const bool cube = bst_fits_reader_info(j->fits)->cube;
-    BST_TRY(
-        bst_fits_reader_frame(ctx, j->fits, cube ? row->fits_index : row->fits_index - 1, &image));
+    int64_t index = bst_fits_reader_info(j->fits)->cube ? row->fits_index : row->fits_index - 1;
+    BST_TRY(bst_fits_reader_frame(ctx, j->fits, index, &image));
+    const bst_mask_frame parts = {index, row->id, image.width, image.height};
+    bst_status read = bst_mask_labels_read(ctx, &j->masks, &parts);
+    if (read != BST_OK) {
+        return bst_fail_prefix(ctx, read, "%s", bst_run_reader_folder(j->e->run));
+    }
     snprintf(name, sizeof name, "%s.%04" PRId64, j->set, row->id);
     snprintf(path, sizeof path, "%.4000s/ImageFiles/%s.fits", j->e->satnet, name);
     char program[64];
@@ -390,8 +398,12 @@ static bst_status export_sensor(bst_ctx *ctx, job *j, int sensors) {
     BST_TRY(bst_run_reader_file(ctx, j->e->run, j->sensor->file, path, sizeof path));
     BST_TRY(bst_fits_reader_open(ctx, path, &j->fits));
     bst_status status = bst_shape_labels_open(ctx, j->e, (int)j->sensor->index, &j->shapes);
+    status = status == BST_OK
+                 ? bst_mask_labels_open(ctx, j->e->run, j->sensor->file, "parts", &j->masks)
+                 : status;
     status = status == BST_OK ? write_frames(ctx, j) : status;
     bst_shape_labels_close(&j->shapes);
+    bst_mask_labels_close(&j->masks);
     bst_fits_reader_close(j->fits);
     j->fits = NULL;
     return status;

@@ -139,11 +139,31 @@ bst_status bst_mask_labels_add(bst_ctx *ctx, const bst_mask_labels *l, int64_t v
     return status;
 }
 
+/* Replaces the polygons of a part by such in shares of the image's width and height. */
+static bst_status make_fractions(bst_ctx *ctx, const bst_mask_labels *l, cJSON *part) {
+    const cJSON *text = cJSON_GetObjectItem(part, "segmentation");
+    cJSON *polygons = cJSON_Parse(text->valuestring), *polygon, *number;
+    if (!polygons) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for an outline");
+    }
+    cJSON_ArrayForEach(polygon, polygons) {
+        bool across = true; /* x, y, x, y, ... */
+        cJSON_ArrayForEach(number, polygon) {
+            cJSON_SetNumberValue(number,
+                                 number->valuedouble / (across ? l->mask.width : l->mask.height));
+            across = !across;
+        }
+    }
+    cJSON_ReplaceItemInObject(part, "segmentation", polygons);
+    return BST_OK;
+}
+
 bst_status bst_mask_labels_add_parts(bst_ctx *ctx, const bst_mask_labels *l, int64_t object,
-                                     cJSON *node) {
+                                     bool fractions, cJSON *node) {
     if (!l->mask.items) {
         return BST_OK;
     }
+    double width = fractions ? l->mask.width : 1.0, height = fractions ? l->mask.height : 1.0;
     cJSON *parts = cJSON_AddArrayToObject(node, "parts");
     for (int i = 0; i < l->part_count; i++) {
         const bst_mask_part *p = &l->parts[i];
@@ -155,9 +175,13 @@ bst_status bst_mask_labels_add_parts(bst_ctx *ctx, const bst_mask_labels *l, int
         cJSON_AddItemToArray(parts, part);
         cJSON_AddStringToObject(part, "name", p->name);
         cJSON_AddNumberToObject(part, "number", (double)p->number);
-        const int bbox[4] = {e->x0, e->y0, e->x1 - e->x0, e->y1 - e->y0};
-        cJSON_AddItemToObject(part, "bbox", cJSON_CreateIntArray(bbox, 4));
+        const double bbox[4] = {e->x0 / width, e->y0 / height, (e->x1 - e->x0) / width,
+                                (e->y1 - e->y0) / height};
+        cJSON_AddItemToObject(part, "bbox", cJSON_CreateDoubleArray(bbox, 4));
         BST_TRY(bst_mask_labels_add(ctx, l, p->number, part));
+        if (fractions) {
+            BST_TRY(make_fractions(ctx, l, part));
+        }
     }
     return BST_OK;
 }

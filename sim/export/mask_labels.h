@@ -59,8 +59,11 @@ bst_status bst_mask_labels_add(bst_ctx *ctx, const bst_mask_labels *labels, int6
                                struct cJSON *node) BST_MUST_CHECK;
 
 /* Adds the array "parts" of an object: name, number, bbox, area and segmentation of each part that
- * has pixels. Nothing if the run has no plane of parts. */
+ * has pixels. Nothing if the run has no plane of parts.
+ *
+ * Given:     fractions  bbox and segmentation in shares of the image's width and height, instead of
+ *                       pixels; the area is in pixels */
 bst_status bst_mask_labels_add_parts(bst_ctx *ctx, const bst_mask_labels *labels, int64_t object,
-                                     struct cJSON *node) BST_MUST_CHECK;
+                                     bool fractions, struct cJSON *node) BST_MUST_CHECK;
 
 #endif

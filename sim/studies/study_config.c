@@ -169,6 +169,8 @@ const bst_config_desc bst_study_cubes_table[] = {
     BST_BOOL(bst_study_cubes_config, compress, "false", "Compress frames (Rice, lossless)."),
     BST_BOOL(bst_study_cubes_config, masks, "false",
              "Write masks of the sources beside the frames: MaskFiles/NNNNNN.fits."),
+    BST_BOOL(bst_study_cubes_config, part_masks, "false",
+             "Write masks of the parts of objects with a shape: PartFiles/NNNNNN.fits."),
     BST_REAL(bst_study_cubes_config, box_px, "px", 0, 1e4, "0",
              "Side of the boxes around objects; 0: the extent of their tracks."),
     BST_REAL(bst_study_cubes_config, star_limit_v_mag, "mag", -30, 40, "40",

@@ -97,7 +97,7 @@ typedef struct bst_study_pd_config {
 typedef struct bst_study_cubes_config {
     char sensor[160];
     double train, validation, test;
-    bool compress, masks;
+    bool compress, masks, part_masks;
     double box_px, star_limit_v_mag;
 } bst_study_cubes_config;
 

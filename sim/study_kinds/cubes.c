@@ -21,6 +21,7 @@
 #include "sim/study_kinds/study_labels.h"
 #include "sim/study_kinds/study_plugins.h"
 #include "sim/world/frame_updates.h"
+#include "sim/world/scene/object_shape.h"
 
 enum {
     FRAMES,
@@ -32,6 +33,7 @@ enum {
     BYTES,
     LABEL_BYTES,
     MASK_BYTES,
+    PART_BYTES,
     PART,
     METRICS
 };
@@ -48,6 +50,7 @@ static const bst_study_metric metrics[METRICS] = {
     [BYTES] = {"bytes", "", "Bytes of the file of frames.", 0},
     [LABEL_BYTES] = {"label_bytes", "", "Bytes of the file of labels.", 0},
     [MASK_BYTES] = {"mask_bytes", "", "Bytes of the file of masks; 0: none.", 0},
+    [PART_BYTES] = {"part_bytes", "", "Bytes of the file of masks of parts; 0: none.", 0},
     [PART] = {"part", "", "0: training, 1: validation, 2: test.", 0},
 };
 
@@ -61,7 +64,7 @@ typedef struct cube {
     char scope[160];
     const char *target; /* FITS OBJECT; NULL: none */
     bst_fits *fits;
-    bst_fits *masks;           /* NULL: none */
+    bst_fits *masks, *parts;   /* of the sources, of parts of shapes; NULL: none */
     bst_fits_frame mask_frame; /* header of the newest frame, without values from its truth */
     bst_study_labels labels;
     double background;
@@ -174,13 +177,20 @@ static bst_status write_frame(cube *c, const bst_frame_message *m, const bst_tru
     return BST_OK;
 }
 
-/* Writes the segmentation mask of the newest frame from its planes. */
+/* Writes the masks of the newest frame from its planes. */
 static bst_status take_planes(cube *c, const bst_planes *p) {
-    if (!c->masks || !p->segmentation || p->exposure_id != c->mask_frame.id) {
+    if (p->exposure_id != c->mask_frame.id) {
         return BST_OK;
     }
-    const bst_fits_plane plane = {"SEGMENTATION", p->segmentation, p->width, p->height};
-    return bst_fits_write_plane(c->ctx, c->masks, &c->mask_frame, &plane, NULL);
+    if (c->masks && p->segmentation) {
+        const bst_fits_plane plane = {"SEGMENTATION", p->segmentation, p->width, p->height};
+        BST_TRY(bst_fits_write_plane(c->ctx, c->masks, &c->mask_frame, &plane, NULL));
+    }
+    if (c->parts && p->parts) {
+        const bst_fits_plane plane = {"PARTS", p->parts, p->width, p->height};
+        BST_TRY(bst_fits_write_plane(c->ctx, c->parts, &c->mask_frame, &plane, NULL));
+    }
+    return BST_OK;
 }
 
 /* Writes a frame with its labels, or keeps it until its truth arrives. */
@@ -269,18 +279,78 @@ static bst_status path_of(bst_ctx *ctx, const bst_study_run *run, const char *fo
     return n > 0 && n < 4096 ? BST_OK : bst_fail(ctx, BST_ERR_ARGUMENT, "%s: too long", run->out);
 }
 
-static bst_status make_folders(bst_ctx *ctx, const char *out, bool masks) {
-    static const char *const names[] = {"ImageFiles", "Annotations", "MaskFiles"};
-    for (int k = 0; k < 2 + masks; k++) {
+/* Files of a sequence: frames, labels, and masks where they are asked for. */
+enum { IMAGE_FILE, LABEL_FILE, MASK_FILE, PART_FILE, FILES };
+
+static const char *const folders[FILES] = {"ImageFiles", "Annotations", "MaskFiles", "PartFiles"};
+static const char *const endings[FILES] = {".fits", ".json", ".fits", ".fits"};
+/* figures that hold their sizes */
+static const int bytes[FILES] = {BYTES, LABEL_BYTES, MASK_BYTES, PART_BYTES};
+
+/* Paths of the files of a sequence, and of their drafts. */
+typedef struct cube_paths {
+    char final[FILES][4096], draft[FILES][4096];
+} cube_paths;
+
+static bool has_file(const bst_study_cubes_config *config, int file) {
+    return file == MASK_FILE ? config->masks : file == PART_FILE ? config->part_masks : true;
+}
+
+static bst_status make_paths(bst_ctx *ctx, const bst_study_run *run, cube_paths *out) {
+    for (int k = 0; k < FILES; k++) {
+        char draft[32];
+        snprintf(draft, sizeof draft, "%s.partial", endings[k]);
+        BST_TRY(path_of(ctx, run, folders[k], endings[k], out->final[k]));
+        BST_TRY(path_of(ctx, run, folders[k], draft, out->draft[k]));
+    }
+    return BST_OK;
+}
+
+static bst_status make_folders(bst_ctx *ctx, const char *out,
+                               const bst_study_cubes_config *config) {
+    for (int k = 0; k < FILES; k++) {
         char path[4200];
-        snprintf(path, sizeof path, "%.4000s/%s", out, names[k]);
+        if (!has_file(config, k)) {
+            continue;
+        }
+        snprintf(path, sizeof path, "%.4000s/%s", out, folders[k]);
         BST_TRY(bst_folder_make(ctx, path));
     }
     return BST_OK;
 }
 
-static bst_status step_through(bst_ctx *ctx, cube *c, bst_simulation *sim, const char *fits,
-                               const char *labels, const char *masks, const bst_study_run *run) {
+/* Numbers and names of the parts of all objects with a shape, as the member "parts". */
+static void put_parts(FILE *stream, const bst_world *world) {
+    bool first = true;
+    fprintf(stream, ",\"parts\":[");
+    for (int i = 0; i < bst_world_object_count(world); i++) {
+        const bst_world_object_info *info = bst_world_object(world, i);
+        const bst_satellite *satellite = info->shape ? info->shape->satellite : NULL;
+        for (int p = 0; satellite && p < satellite->part_count; p++) {
+            fprintf(stream, "%s{\"number\":%d", first ? "" : ",",
+                    bst_world_first_part(world, i) + p);
+            bst_study_labels_text(stream, "object_name", info->name);
+            bst_study_labels_text(stream, "name", satellite->parts[p].name);
+            fputc('}', stream);
+            first = false;
+        }
+    }
+    fprintf(stream, "]");
+}
+
+/* Starts the file of masks `file`. */
+static bst_status create_masks(bst_ctx *ctx, const bst_fits_info *frames, const char *path,
+                               bst_fits **out) {
+    bst_fits_info info = *frames;
+    info.compression = BST_FITS_RAW;
+    info.content = BST_FITS_ITEMS;
+    unlink(path);
+    return bst_fits_create(ctx, path, BST_FITS_EXTENSIONS, &info, out);
+}
+
+static bst_status step_through(bst_ctx *ctx, cube *c, bst_simulation *sim, const cube_paths *paths,
+                               const bst_study_run *run) {
+    const char *fits = paths->draft[IMAGE_FILE], *labels = paths->draft[LABEL_FILE];
     char program[64];
     snprintf(program, sizeof program, "boresight %s", bst_version());
     const char *slash = strchr(c->scope, '/');
@@ -298,10 +368,10 @@ static bst_status step_through(bst_ctx *ctx, cube *c, bst_simulation *sim, const
     BST_TRY(bst_fits_create(ctx, fits, c->config->compress ? BST_FITS_EXTENSIONS : BST_FITS_CUBE,
                             &info, &c->fits));
     if (c->config->masks) {
-        info.compression = BST_FITS_RAW;
-        info.content = BST_FITS_ITEMS;
-        unlink(masks);
-        BST_TRY(bst_fits_create(ctx, masks, BST_FITS_EXTENSIONS, &info, &c->masks));
+        BST_TRY(create_masks(ctx, &info, paths->draft[MASK_FILE], &c->masks));
+    }
+    if (c->config->part_masks) {
+        BST_TRY(create_masks(ctx, &info, paths->draft[PART_FILE], &c->parts));
     }
     int fd;
     BST_TRY(bst_draft_make_at(ctx, labels, &fd));
@@ -315,11 +385,15 @@ static bst_status step_through(bst_ctx *ctx, cube *c, bst_simulation *sim, const
             ",\"filename\":\"%06" PRId64
             ".fits\"},\"sensor\":{\"height\":%lld,\"width\":%lld,"
             "\"iFOVy\":%.12g,\"iFOVx\":%.12g},\"metadata\":{\"program\":\"%s\",\"scenario\":\"%s\","
-            "\"sensor\":\"%s\",\"seed\":\"0x%" PRIX64 "\",\"run\":%" PRId64 "},\"frames\":[",
+            "\"sensor\":\"%s\",\"seed\":\"0x%" PRIX64 "\",\"run\":%" PRId64 "}",
             run->place.run, run->place.run, (long long)c->camera->height_px,
             (long long)c->camera->width_px, c->camera->pixel_scale_arcsec / 3600.0,
             c->camera->pixel_scale_arcsec / 3600.0, program, c->scenario->name, c->scope,
             c->scenario->seed, c->scenario->run);
+    if (c->config->part_masks) {
+        put_parts(c->labels.stream, c->labels.world);
+    }
+    fprintf(c->labels.stream, ",\"frames\":[");
     const bst_engine_hooks hooks = {
         .user = c, .message = on_message, .interrupted = interrupted, .wants = wants, .ctx = ctx};
     bst_engine_set_hooks(bst_simulation_engine(sim), &hooks);
@@ -330,7 +404,9 @@ static bst_status close_files(bst_ctx *ctx, cube *c, bst_status status) {
     bst_ctx quiet = {0};
     bst_status closed = bst_fits_close(status == BST_OK ? ctx : &quiet, c->fits);
     bst_status masks_closed = bst_fits_close(status == BST_OK ? ctx : &quiet, c->masks);
+    bst_status parts_closed = bst_fits_close(status == BST_OK ? ctx : &quiet, c->parts);
     closed = closed == BST_OK ? masks_closed : closed;
+    closed = closed == BST_OK ? parts_closed : closed;
     if (c->labels.stream) {
         fprintf(c->labels.stream,
                 "\n],\"stats\":{\"num_frames\":%" PRId64 ",\"num_satellite_labels\":%" PRId64
@@ -356,8 +432,7 @@ int bst_study_part(const bst_study_cubes_config *c, uint64_t seed, int64_t run) 
     return u < c->train ? 0 : u < c->train + c->validation ? 1 : 2;
 }
 
-static void fill(const cube *c, const char *fits, const char *labels, const char *masks,
-                 const bst_study_run *run, double *m) {
+static void fill(const cube *c, const cube_paths *paths, const bst_study_run *run, double *m) {
     const bst_study_labels *l = &c->labels;
     m[FRAMES] = (double)l->frames;
     m[SATELLITES] = (double)l->satellites;
@@ -365,26 +440,22 @@ static void fill(const cube *c, const char *fits, const char *labels, const char
     m[MEAN_SNR] = l->satellites > 0 ? l->snr_sum / (double)l->satellites : NAN;
     m[LONGEST] = l->satellites > 0 ? l->longest_px : NAN;
     m[BACKGROUND] = l->frames > 0 ? c->background / (double)l->frames : NAN;
-    m[BYTES] = file_bytes(fits);
-    m[LABEL_BYTES] = file_bytes(labels);
-    m[MASK_BYTES] = c->config->masks ? file_bytes(masks) : 0.0;
+    for (int k = 0; k < FILES; k++) {
+        m[bytes[k]] = has_file(c->config, k) ? file_bytes(paths->draft[k]) : 0.0;
+    }
     m[PART] = bst_study_part(c->config, c->scenario->seed, run->place.run);
 }
 
 static bst_status make_cube(bst_ctx *ctx, cube *c, bst_simulation *sim, const bst_study_run *run,
                             bst_study_result *out) {
-    char fits[4096], labels[4096], fits_draft[4096], labels_draft[4096], masks[4096],
-        masks_draft[4096];
-    BST_TRY(path_of(ctx, run, "ImageFiles", ".fits", fits));
-    BST_TRY(path_of(ctx, run, "ImageFiles", ".fits.partial", fits_draft));
-    BST_TRY(path_of(ctx, run, "Annotations", ".json", labels));
-    BST_TRY(path_of(ctx, run, "Annotations", ".json.partial", labels_draft));
-    BST_TRY(path_of(ctx, run, "MaskFiles", ".fits", masks));
-    BST_TRY(path_of(ctx, run, "MaskFiles", ".fits.partial", masks_draft));
-    bst_status status = make_folders(ctx, run->out, c->config->masks);
-    if (status == BST_OK) {
-        status = step_through(ctx, c, sim, fits_draft, labels_draft, masks_draft, run);
+    cube_paths *paths = calloc(1, sizeof *paths);
+    if (!paths) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the paths of a sequence");
     }
+    bst_status status = make_paths(ctx, run, paths);
+    status = status == BST_OK ? make_folders(ctx, run->out, c->config) : status;
+    bool begun = status == BST_OK;
+    status = begun ? step_through(ctx, c, sim, paths, run) : status;
     status = close_files(ctx, c, status);
     if (status == BST_OK && c->labels.frames == 0) {
         status =
@@ -392,24 +463,30 @@ static bst_status make_cube(bst_ctx *ctx, cube *c, bst_simulation *sim, const bs
                      "%s: no frame ends within the run; make duration_s longer", c->scenario->file);
     }
     if (status == BST_OK) {
-        fill(c, fits_draft, labels_draft, masks_draft, run, out->metrics);
-        if ((c->config->masks && rename(masks_draft, masks) != 0) ||
-            rename(fits_draft, fits) != 0 || rename(labels_draft, labels) != 0) {
-            status = bst_fail(ctx, BST_ERR_IO, "%s: cannot be put in its place: %s", fits,
-                              strerror(errno));
+        fill(c, paths, run, out->metrics);
+    }
+    /* the labels last: with them the sequence is complete */
+    static const int order[FILES] = {MASK_FILE, PART_FILE, IMAGE_FILE, LABEL_FILE};
+    for (int k = 0; status == BST_OK && k < FILES; k++) {
+        if (has_file(c->config, order[k]) &&
+            rename(paths->draft[order[k]], paths->final[order[k]]) != 0) {
+            status = bst_fail(ctx, BST_ERR_IO, "%s: cannot be put in its place: %s",
+                              paths->final[order[k]], strerror(errno));
         }
     }
-    if (status != BST_OK) {
-        unlink(fits_draft);
-        unlink(labels_draft);
-        unlink(masks_draft);
+    for (int k = 0; begun && status != BST_OK && k < FILES; k++) {
+        unlink(paths->draft[k]);
     }
+    free(paths);
     return status;
 }
 
 static void ask_for_masks(const bst_study_cubes_config *config, bst_scenario *scenario) {
     if (config->masks) {
         scenario->record.planes |= UINT32_C(1) << BST_PLANE_SEGMENTATION;
+    }
+    if (config->part_masks) {
+        scenario->record.planes |= UINT32_C(1) << BST_PLANE_PARTS;
     }
 }
 
@@ -478,12 +555,14 @@ static bst_status emit_cubes(bst_ctx *ctx, void *user, const bst_study_run *run,
 static bool intact(void *user, const bst_study_run *run, const double *m) {
     char path[4096];
     (void)user;
-    return path_of(NULL, run, "ImageFiles", ".fits", path) == BST_OK &&
-           file_bytes(path) == m[BYTES] &&
-           path_of(NULL, run, "Annotations", ".json", path) == BST_OK &&
-           file_bytes(path) == m[LABEL_BYTES] &&
-           (m[MASK_BYTES] == 0.0 || (path_of(NULL, run, "MaskFiles", ".fits", path) == BST_OK &&
-                                     file_bytes(path) == m[MASK_BYTES]));
+    for (int k = 0; k < FILES; k++) {
+        bool written = k == IMAGE_FILE || k == LABEL_FILE || m[bytes[k]] != 0.0;
+        if (written && (path_of(NULL, run, folders[k], endings[k], path) != BST_OK ||
+                        file_bytes(path) != m[bytes[k]])) {
+            return false;
+        }
+    }
+    return true;
 }
 
 static bst_status finish(bst_ctx *ctx, void *user, const struct bst_results *results,

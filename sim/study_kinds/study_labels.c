@@ -16,7 +16,7 @@ static void put_number(FILE *stream, const char *key, double value) {
     }
 }
 
-static void put_text(FILE *stream, const char *key, const char *text) {
+void bst_study_labels_text(FILE *stream, const char *key, const char *text) {
     fprintf(stream, ",\"%s\":\"", key);
     for (; *text; text++) {
         if (*text == '"' || *text == '\\') {
@@ -72,11 +72,12 @@ static bool put_object(bst_study_labels *l, const bst_frame_message *f, double e
     put_number(s, "y_centroid", (item->y_centroid_px - f->window.y0 + 0.5) / binning / height);
     put_number(s, "x_chief", (item->x_chief_px - f->window.x0 + 0.5) / binning / width);
     put_number(s, "y_chief", (item->y_chief_px - f->window.y0 + 0.5) / binning / height);
-    put_text(s, "source", "boresight");
+    bst_study_labels_text(s, "source", "boresight");
     put_number(s, "magnitude", item->v_mag);
     put_number(s, "pe_per_sec", exposure_s > 0.0 ? item->electrons / exposure_s : NAN);
     fprintf(s, ",\"seg_id\":%d", number);
-    put_text(s, "object_name", star ? "" : bst_world_object(l->world, (int)item->id)->name);
+    bst_study_labels_text(s, "object_name",
+                          star ? "" : bst_world_object(l->world, (int)item->id)->name);
     fprintf(s, ",\"object_id\":\"%" PRId64 "\"",
             star || item->norad == 0 ? (int64_t)item->id : (int64_t)item->norad);
     put_number(s, "snr_aperture", item->snr);
@@ -96,7 +97,7 @@ void bst_study_labels_frame(bst_study_labels *l, const bst_frame_message *frame,
                             const char *start_utc, double exposure_s, const bst_truth *truth) {
     fprintf(l->stream, "%s\n{\"sequence_id\":%" PRId64 ",\"plane\":%" PRId64, l->frames ? "," : "",
             frame->exposure_id, l->frames);
-    put_text(l->stream, "start_utc", start_utc);
+    bst_study_labels_text(l->stream, "start_utc", start_utc);
     put_number(l->stream, "exposure_s", exposure_s);
     put_number(l->stream, "background_e", truth->background_e);
     fprintf(l->stream, ",\"objects\":[");

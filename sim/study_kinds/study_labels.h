@@ -22,4 +22,8 @@ typedef struct bst_study_labels {
 void bst_study_labels_frame(bst_study_labels *labels, const bst_frame_message *frame,
                             const char *start_utc, double exposure_s, const bst_truth *truth);
 
+/* Writes a member of a JSON object after another one: its key, and its text with quotes escaped;
+ * control characters are left out. */
+void bst_study_labels_text(FILE *stream, const char *key, const char *text);
+
 #endif

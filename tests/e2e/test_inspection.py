@@ -202,6 +202,13 @@ def labels(program, folder):
     name = sorted(os.listdir(os.path.join(satnet, "Annotations")))[0]
     with open(os.path.join(satnet, "Annotations", name), encoding="utf-8") as file:
         target = [o for o in json.load(file)["data"]["objects"] if o["class_id"] == 1][0]
+    # the same parts as COCO's, in fractions of the image
+    for ours, theirs in zip(target["shape"]["parts"], boxes[0]["shape"]["parts"], strict=True):
+        assert [ours[k] for k in ("name", "number", "area")] == [theirs[k] for k in ("name", "number", "area")]
+        assert np.allclose(512 * np.array(ours["bbox"]), theirs["bbox"], rtol=0, atol=1e-9)
+        for polygon, px in zip(ours["segmentation"], theirs["segmentation"], strict=True):
+            assert np.allclose(512 * np.array(polygon), px, rtol=0, atol=1e-9)
+    assert len(target["shape"]["parts"]) >= 2
     assert abs(target["shape"]["x_centre_of_mass"] * 512 - truth[0][2] - 0.5) < 1e-6
     assert abs(np.linalg.norm(target["shape"]["q_body_from_gcrf"]) - 1.0) < 1e-9
 

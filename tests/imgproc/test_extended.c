@@ -45,6 +45,13 @@ static double winged(const double *p, double x, double y) {
     return u > 1.4 && u < 4.0 && fabs(v) < 0.8 ? p[5] : 0.0;
 }
 
+/* A box of two faces, one to the left and one to the right. p: centre x, y, half width, half
+ * height, signal of the left and of the right face. */
+static double faces(const double *p, double x, double y) {
+    double u = (x - p[0]) / p[2], v = (y - p[1]) / p[3];
+    return fabs(u) >= 1.0 || fabs(v) >= 1.0 ? 0.0 : u < 0.0 ? p[4] : p[5];
+}
+
 /* Adds a scene, blurred by the camera's Gaussian, to the expected electrons. */
 static void draw(synthetic *s, radiance_fn radiance, const double *p) {
     int n = SIDE * FINE, reach = (int)ceil(4.0 * FINE * bst_camera_psf_sigma_px(&s->camera));
@@ -244,9 +251,36 @@ static void parts_and_shadows(void **state) {
     bst_assert_close(t->width_px, 2.0 * p[2], 0.05 * 2.0 * p[2]); /* seen through the corners */
     /* body with its spot, two wings */
     double area = (4.0 + 2.0 * 2.6 * 1.6) * p[2] * p[2];
-    double edges = 2.0 * (4.0 + 2.0 * (2.6 + 1.6)) * p[2]; /* widened by the blur, 2.3 px */
-    bst_assert_close(t->extent.area_px2, area + 2.3 * edges, 0.03 * area);
+    double edges =
+        2.0 * (4.0 + 2.0 * (2.6 + 1.6)) * p[2]; /* widened by less than the PSF's sigma */
+    double sigma = bst_camera_psf_sigma_px(&b.s.camera);
+    assert_true(t->extent.area_px2 > area && t->extent.area_px2 < area + sigma * edges);
     assert_true(points(b.d) <= 4);
+    bench_free(&b);
+}
+
+/* Edges of bright, dim and full faces are all in their places: the centre is that of the box,
+ * however unlike its faces are. */
+static void unlike_faces(void **state) {
+    (void)state;
+    static const double signal[][2] = {
+        {3e4, 3e4}, {3e4, 1.5e3}, {300, 6e4}, {4e5, 2e4}, {1e3, 4e5}};
+    static const double half_px[][2] = {{6.0, 4.0}, {14.0, 9.0}};
+    bench b;
+    bench_init(&b, &SPHERE);
+    for (size_t k = 0; k < 2 * sizeof signal / sizeof *signal; k++) {
+        const double *half = half_px[k % 2], *e = signal[k / 2];
+        const double p[] = {150.25, 170.0, half[0], half[1], e[0], e[1]};
+        synthetic_clear(&b.s);
+        draw(&b.s, faces, p);
+        const bst_detection *t = process(&b, 0.0, 0.0);
+        assert_non_null(t);
+        /* edges are right to a third of a pixel each, by their place between pixels; threshold
+         * crossings miss by 0.8 px with the second pair of faces, and lose the third's dim one */
+        bst_assert_close(t->x_px, p[0], 0.5);
+        bst_assert_close(t->y_px, p[1], 0.2);
+        bst_assert_close(t->extent.size_px, 2.0 * hypot(half[0], half[1]), 1.0);
+    }
     bench_free(&b);
 }
 
@@ -321,9 +355,9 @@ static void handover(void **state) {
             *(now ? &grown : &shrunk) = 2.0 * radius;
             assert_int_equal(now, k <= 30);
         }
-        /* noise of a silhouette, and pixels that come and go */
-        assert_true(k == 0 || fabs(error - before) < 0.3);
-        assert_true(fabs(error) < 0.35);
+        /* noise of an outline, and pixels that come and go */
+        assert_true(k == 0 || fabs(error - before) < 0.45);
+        assert_true(fabs(error) < 0.4);
         extended = now;
         before = error;
     }
@@ -485,6 +519,7 @@ int main(void) {
         cmocka_unit_test(points_are_moved_back_from_the_sun),
         cmocka_unit_test(spheres),
         cmocka_unit_test(parts_and_shadows),
+        cmocka_unit_test(unlike_faces),
         cmocka_unit_test(saturated),
         cmocka_unit_test(limits),
         cmocka_unit_test(handover),
