@@ -19,7 +19,7 @@
 #define MAX_TRACKS 2000
 #define MAX_AT_ONCE 64
 
-static const char *const associations[] = {"gnn", "nearest", "pda", "mixture"};
+static const char *const associations[] = {"gnn", "nearest", "pda", "mixture", "pmb"};
 
 /* Parameters as of the tracker's default configuration at 3 arcsec a pixel. */
 static bst_mtt_params parameters(bst_mtt_association association) {

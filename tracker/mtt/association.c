@@ -80,6 +80,11 @@ int bst_mtt_gated(const bst_mtt *mtt, int t, int *columns) {
     return gate_detections(mtt, t, mtt->largest_sigma, columns, costs);
 }
 
+int bst_mtt_gate(const bst_mtt *mtt, int t, int *columns, double *costs) {
+    assert(mtt && columns && costs && t >= 0 && t < mtt->track_count);
+    return gate_detections(mtt, t, mtt->largest_sigma, columns, costs);
+}
+
 /* Nearest-neighbour association: assigns the cheapest track-detection pair first. */
 static void assign_nearest(bst_mtt *mtt, int rows) {
     int edges = mtt->first[rows];
@@ -150,14 +155,19 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial) {
     for (int i = 0; i < mtt->now.count; i++) {
         mtt->owner[i] = BST_MTT_NOBODY;
     }
-    /* confirmed tracks are associated first: a false tentative track must not take their detections
-     */
-    associate_tracks(mtt, false);
-    bst_mtt_share(mtt);
+    bool jointly = mtt->params.association == BST_MTT_PMB;
+    if (jointly) {
+        bst_mtt_associate_jointly(mtt);
+    } else {
+        /* confirmed tracks are associated first: a false tentative track must not take their
+         * detections */
+        associate_tracks(mtt, false);
+        bst_mtt_share(mtt);
+    }
     bst_mtt_gate_manoeuvres(mtt);
     int unused = 0;
     for (int i = 0; i < mtt->now.count; i++) {
-        unused += !mtt->now.used[i];
+        unused += jointly ? mtt->joint.claimed_firm[i] <= 0.5 : !mtt->now.used[i];
     }
     if (!partial) {
         mtt->alarm_frames++;
@@ -166,5 +176,7 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial) {
             fmax(fmax(mtt->clutter, unused), mtt->params.false_alarms_per_frame) /
             mtt->params.field_sr;
     }
-    associate_tracks(mtt, true);
+    if (!jointly) {
+        associate_tracks(mtt, true);
+    }
 }

@@ -19,6 +19,9 @@ static const double CLUTTER_GAIN = 0.1;
 /* A tentative track is deleted after so many windows of N frames in which it was not confirmed. In
  * the first it needs M hits (M of N); its score and chi-square have the second and the third. */
 enum { TENTATIVE_WINDOWS = 3 };
+/* BST_MTT_PMB: existence probabilities at which a track is confirmed and below which it is deleted,
+ * confirmed or tentative. At the first, one confirmed track in a thousand is false. */
+static const double CONFIRMED_EXISTENCE = 0.999, LEAST_EXISTENCE[2] = {0.5, 1e-4};
 
 static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
     if (p->max_tracks < 1 || p->max_detections < 1 || p->confirm_hits < 2 ||
@@ -72,6 +75,9 @@ static void lay_out(bst_mtt *m) {
     BST_ARENA_TAKE(a, m->shared, nt);
     BST_ARENA_TAKE(a, m->observable, nt);
     BST_ARENA_TAKE(a, m->departed_chi2, nt);
+    if (p->association == BST_MTT_PMB) {
+        bst_mtt_joint_lay_out(&m->joint, (int)nt, p->max_detections, a);
+    }
     bst_mtt_pool_lay_out(&m->now, p->max_detections, a);
     for (int h = 0; h < BST_MTT_HISTORY; h++) {
         bst_mtt_pool_lay_out(&m->history[h], p->max_detections, a);
@@ -283,9 +289,12 @@ static void update_filter(bst_mtt *m, int t) {
     bst_mtt_track *track = &m->tracks[t];
     int given = m->detection_of_track[t];
     bool weighs = m->params.association == BST_MTT_PDA || m->params.association == BST_MTT_MIXTURE;
-    bool apart = m->params.association == BST_MTT_MIXTURE && m->params.filter != BST_FILTER_IMM;
+    bool apart = m->params.association >= BST_MTT_MIXTURE && m->params.filter != BST_FILTER_IMM;
     int components = apart ? BST_FILTER_COMPONENTS : 1;
     bst_filter_candidate candidates[BST_MTT_CANDIDATES];
+    if (m->params.association == BST_MTT_PMB && bst_mtt_joint_update(m, t, components)) {
+        return;
+    }
     if (!weighs || track->status == BST_TRACK_TENTATIVE || track->star || m->shared[t]) {
         if (given >= 0) {
             candidates[0] = (bst_filter_candidate){.measurement = &m->now.items[given].sky,
@@ -366,11 +375,17 @@ static double chi2_limit(int dof) {
     return dof * c * c * c;
 }
 
+/* True if a track is likely enough to be confirmed. */
+static bool is_likely(const bst_mtt *m, const bst_mtt_track *track) {
+    return m->params.association == BST_MTT_PMB ? track->existence > CONFIRMED_EXISTENCE
+                                                : track->score >= m->params.confirm_score;
+}
+
 /* True if a tentative track meets the confirmation criteria. */
 static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
     int dof = 2 * (track->hits - 2);
     if (track->at_rest || track->hits < m->params.confirm_hits ||
-        track->score < m->params.confirm_score || (dof > 0 && track->chi2 > chi2_limit(dof)) ||
+        !is_likely(m, track) || (dof > 0 && track->chi2 > chi2_limit(dof)) ||
         bst_mtt_may_be_fixed(m, track)) {
         return false;
     }
@@ -390,6 +405,11 @@ static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
 static bool must_delete(const bst_mtt *m, const bst_mtt_track *track, bool observed) {
     const bst_mtt_params *p = &m->params;
     double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
+    bool tentative = track->status == BST_TRACK_TENTATIVE;
+    if (p->association == BST_MTT_PMB && !track->at_rest && !track->asleep &&
+        track->existence < LEAST_EXISTENCE[tentative]) {
+        return true;
+    }
     if (track->asleep) {
         return m->seconds - track->last_update_s > p->max_dormant_s ||
                !(variance < p->max_dormant_sigma_rad * p->max_dormant_sigma_rad) ||
