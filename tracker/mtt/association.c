@@ -164,6 +164,9 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial) {
         associate_tracks(mtt, false);
         bst_mtt_share(mtt);
     }
+    if (jointly) {
+        bst_mtt_split_tracks(mtt);
+    }
     bst_mtt_gate_manoeuvres(mtt);
     int unused = 0;
     for (int i = 0; i < mtt->now.count; i++) {

@@ -159,6 +159,10 @@ double bst_mtt_event_probability(const bst_mtt_params *params, double dt_s);
  *            increased by the manoeuvre's process noise over that time. */
 void bst_mtt_gate_manoeuvres(bst_mtt *mtt);
 
+/* Splits missed tracks into two objects that were unresolved until now, if two unused detections
+ * are likelier so than as clutter. BST_MTT_PMB only. */
+void bst_mtt_split_tracks(bst_mtt *m);
+
 /* Tests the innovations of a track's latest hits for a manoeuvre.
  *
  * Given:     innovation  that of the newest hit
