@@ -9,6 +9,10 @@
  * the rate of false tracks stays the same. */
 static const double FEW_ALARMS = 100.0;
 
+/* Mean number of undetected objects in the field (the Poisson part of BST_MTT_PMB): a design choice.
+ * Confirmation depends on its product with 1 / (1 - CONFIRMED_EXISTENCE) only. */
+static const double UNDETECTED = 0.1;
+
 /* Most tracks that one detection starts. */
 enum { MOST_PARTNERS = 16 };
 
@@ -101,8 +105,8 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
         .first_length_rad = earlier->length_rad,
         .at_rest = gate->rest,
     };
-    /* odds of a first detection of an undetected object, one in the field, and of a second one */
-    double odds = mtt->params.detection_probability / fmax(1.0, alarms) *
+    /* odds of the first detection of an undetected object, and of a second one */
+    double odds = UNDETECTED * mtt->params.detection_probability / fmax(1.0, alarms) *
                   mtt->params.detection_probability /
                   (mtt->clutter_density * BST_PI * reach * reach);
     track->existence = odds / (1.0 + odds);

@@ -246,8 +246,10 @@ static void end_long_merge(bst_mtt *m, int t) {
     bst_vec3 off = bst_vec3_sub(a->state.direction, b->state.direction);
     bool alike = frames >= SAME_FRAMES && bst_vec3_norm(off) < m->params.merge_floor_rad &&
                  bst_sky_distance2(&a->state, &b->state) < 9.0;
+    /* an object hidden by a brighter one is followed until max_coast_s */
+    bool equal = m->shared[t] == BST_MTT_WIDENED;
     if (b->star || m->params.max_merged_frames == 0 ||
-        (!alike && frames < m->params.max_merged_frames)) {
+        (!alike && (!equal || frames < m->params.max_merged_frames))) {
         return;
     }
     bst_mtt_track *ended = a->hits > b->hits ? b : a, *kept = ended == a ? b : a;

@@ -20,8 +20,9 @@ static const double CLUTTER_GAIN = 0.1;
  * the first it needs M hits (M of N); its score and chi-square have the second and the third. */
 enum { TENTATIVE_WINDOWS = 3 };
 /* BST_MTT_PMB: existence probabilities at which a track is confirmed and below which it is deleted,
- * confirmed or tentative. At the first, one confirmed track in a thousand is false. */
-static const double CONFIRMED_EXISTENCE = 0.999, LEAST_EXISTENCE[2] = {0.5, 1e-4};
+ * confirmed or tentative. At the first, at most one confirmed track in a hundred is false when it is
+ * confirmed. A track is reported while it rather exists than not: the least mean GOSPA. */
+static const double CONFIRMED_EXISTENCE = 0.99, LEAST_EXISTENCE[2] = {0.5, 1e-7};
 
 static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
     if (p->max_tracks < 1 || p->max_detections < 1 || p->confirm_hits < 2 ||
