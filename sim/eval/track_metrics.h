@@ -1,5 +1,5 @@
-/* Metrics of a multi-target tracker: coverage, time to confirm, breaks, purity, false tracks, ghosts,
- * GOSPA, OSPA(2). */
+/* Metrics of a multi-target tracker: coverage, time to confirm, breaks, purity, false tracks,
+ * ghosts, GOSPA, OSPA(2). */
 #ifndef BST_EVAL_TRACK_METRICS_H
 #define BST_EVAL_TRACK_METRICS_H
 
@@ -18,11 +18,11 @@ typedef struct bst_track_metrics bst_track_metrics;
 
 typedef struct bst_track_figures {
     int64_t frames;
-    double hours;                      /* from the first frame to the last */
-    double gospa_rms;                  /* rad; cutoff as given at creation, order 2 */
+    double hours;      /* from the first frame to the last */
+    double gospa_rms;  /* rad; cutoff as given at creation, order 2 */
     double gospa_mean; /* rad; mean over the frames */
     double ospa2_mean; /* rad; OSPA(2) over BST_TRACK_WINDOW frames, the same cutoff and order */
-    double coverage;                   /* visible frames with a track over visible frames */
+    double coverage;   /* visible frames with a track over visible frames */
     double time_to_confirm_s;          /* mean over objects that had a track, since first visible */
     int objects_seen, objects_tracked; /* ever visible; ever tracked */
     int breaks;    /* times that a tracked object got a track of another identity */

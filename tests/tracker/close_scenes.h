@@ -1,5 +1,5 @@
-/* Scenes of close objects as detections, not images: formations, crossings, clutter, dropped and dim
- * detections. Positions are in px of 3 arcsec on the tangent plane at CLOSE_CENTRE. Two objects
+/* Scenes of close objects as detections, not images: formations, crossings, clutter, dropped and
+ * dim detections. Positions are in px of 3 arcsec on the tangent plane at CLOSE_CENTRE. Two objects
  * closer than CLOSE_RESOLUTION_PX give one detection at the centre of their light. */
 #ifndef BST_TESTS_CLOSE_SCENES_H
 #define BST_TESTS_CLOSE_SCENES_H

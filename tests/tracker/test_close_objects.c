@@ -158,10 +158,11 @@ static bst_track_figures track_scene(bst_mtt_association association, const clos
 }
 
 static void print_figures(const char *name, const bst_track_figures *f) {
-    printf("%s gospa_px %.4f ospa2_px %.4f ghosts %d purity %.4f switches %d coverage %.4f "
-           "false_tracks %d confirm_s %.2f\n",
-           name, f->gospa_mean / CLOSE_PIXEL_RAD, f->ospa2_mean / CLOSE_PIXEL_RAD, f->ghosts,
-           f->purity, f->breaks, f->coverage, f->false_tracks, f->time_to_confirm_s);
+    printf(
+        "%s gospa_px %.4f ospa2_px %.4f ghosts %d purity %.4f switches %d coverage %.4f "
+        "false_tracks %d confirm_s %.2f\n",
+        name, f->gospa_mean / CLOSE_PIXEL_RAD, f->ospa2_mean / CLOSE_PIXEL_RAD, f->ghosts,
+        f->purity, f->breaks, f->coverage, f->false_tracks, f->time_to_confirm_s);
 }
 
 /* Means and sums over seeds. */
@@ -253,17 +254,23 @@ static int score_tracks(const close_kind *kind, uint64_t seed) {
     return 0;
 }
 
-/* Two seeds of each scene with today's association: the figures of each stay near those of
- * docs/results/tracking.md. */
+/* Three seeds of each scene: with existence probabilities there are no ghosts, and the mean GOSPA
+ * stays below a limit and below that of the default association, which has none. */
 static void short_form(void **state) {
     (void)state;
-    /* GOSPA of the mean of 16 seeds and half as much again, for two seeds */
-    static const double most_px[CLOSE_KINDS] = {9, 9, 9, 9, 9, 9};
+    /* px: the mean of 16 seeds in docs/results/close_objects.md and half as much again;
+     * formation12: seed 1 begins with an unresolved pair, which costs 0.3 px of the mean of three
+     * seeds */
+    static const double most_px[CLOSE_KINDS] = {0.16, 0.6, 0.32, 0.88, 0.31, 0.47};
     for (int i = 0; i < CLOSE_KINDS; i++) {
         double us;
-        bst_track_figures f = over_seeds(BST_MTT_MIXTURE, &close_kinds[i], 2, false, &us);
+        bst_track_figures before = over_seeds(BST_MTT_MIXTURE, &close_kinds[i], 3, false, &us);
+        bst_track_figures f = over_seeds(BST_MTT_PMB, &close_kinds[i], 3, false, &us);
         print_figures(close_kinds[i].name, &f);
+        assert_int_equal(f.ghosts, 0);
+        assert_true(f.purity > 0.999);
         assert_true(f.gospa_mean < most_px[i] * CLOSE_PIXEL_RAD);
+        assert_true(f.gospa_mean < 1.05 * before.gospa_mean);
     }
 }
 

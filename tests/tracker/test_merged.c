@@ -61,8 +61,8 @@ static void dim_one_gone(void **state) {
             const bst_mtt_track *track = track_at(b, a, 1.5 * AS);
             assert_true(k < 10 || (track && track->hits > 0.95 * k));
             bst_mtt_tracks(b->mtt, &n);
-            /* with existence probabilities only while the place of the dim one, which is less and less
-             * certain, is likely to be next to the bright one */
+            /* with existence probabilities only while the place of the dim one, which is less and
+             * less certain, is likely to be next to the bright one */
             int until = params.association == BST_MTT_PMB ? 70 : 148;
             assert_true(k < 30 || k > until || n == 2);
         }
@@ -143,8 +143,8 @@ static void slow_crossings(void **state) {
 /* Two objects pass each other within a pixel of 3 arcsec, seen apart all the way: no blends. */
 static void crossing_within_a_pixel(void **state) {
     (void)state;
-    const bst_mtt_association kinds[] = {BST_MTT_GNN, BST_MTT_NEAREST, BST_MTT_PDA,
-                                         BST_MTT_MIXTURE, BST_MTT_PMB};
+    const bst_mtt_association kinds[] = {BST_MTT_GNN, BST_MTT_NEAREST, BST_MTT_PDA, BST_MTT_MIXTURE,
+                                         BST_MTT_PMB};
     for (int a = 0; a < 5; a++) {
         int kept = 0;
         for (uint64_t seed = 0; seed < 50; seed++) {

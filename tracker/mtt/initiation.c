@@ -9,8 +9,8 @@
  * the rate of false tracks stays the same. */
 static const double FEW_ALARMS = 100.0;
 
-/* Mean number of undetected objects in the field (the Poisson part of BST_MTT_PMB): a design choice.
- * Confirmation depends on its product with 1 / (1 - CONFIRMED_EXISTENCE) only. */
+/* Mean number of undetected objects in the field (the Poisson part of BST_MTT_PMB): a design
+ * choice. Confirmation depends on its product with 1 / (1 - CONFIRMED_EXISTENCE) only. */
 static const double UNDETECTED = 0.1;
 
 /* Most tracks that one detection starts. */
@@ -20,9 +20,9 @@ enum { MOST_PARTNERS = 16 };
 typedef struct rate_gate {
     bst_vec3 rate_radps; /* in the tangent plane at the newer detection */
     double gate_radps;
-    int reserve; /* number of track slots to keep free */
-    int history; /* number of earlier frames to search */
-    bool rest;   /* the new tracks are stationary */
+    int reserve;  /* number of track slots to keep free */
+    int history;  /* number of earlier frames to search */
+    bool rest;    /* the new tracks are stationary */
     int partners; /* most tracks that one detection starts */
 } rate_gate;
 
@@ -127,6 +127,23 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     bst_mtt_set_rest(mtt, track, bst_mtt_is_at_rest(mtt, frame, track));
 }
 
+/* True if a pair of detections has started a track in this frame already, in another rate gate. */
+static bool has_started(const bst_mtt *mtt, const bst_mtt_detection *earlier,
+                        const bst_mtt_detection *later) {
+    for (int t = mtt->track_count - 1; t >= 0; t--) {
+        const bst_mtt_track *track = &mtt->tracks[t];
+        if (track->hits != 2 || track->frames != 2 || track->last_update_tick != mtt->now.tick) {
+            return false; /* tracks of this frame are the latest */
+        }
+        bst_vec3 off = bst_vec3_sub(track->first_direction, earlier->sky.direction);
+        if (track->x_px == later->x_px && track->y_px == later->y_px &&
+            bst_vec3_dot(off, off) == 0.0) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Starts tracks from all pairs of detections in the rate gate. */
 static void start_pairs(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame, bool from_cue) {
     for (int i = 0; i < mtt->now.count; i++) {
@@ -149,6 +166,9 @@ static void start_pairs(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame
             bst_mtt_pool *pool = find_partner(mtt, detection, &gate, &beyond, &partner);
             if (!pool) {
                 break;
+            }
+            if (gate.partners > 1 && has_started(mtt, &pool->items[partner], detection)) {
+                continue;
             }
             if (!bst_mtt_has_room(mtt, gate.rest, gate.reserve)) {
                 mtt->lost++;

@@ -20,6 +20,12 @@ static const double OUTSHINES = 2.0 / 3.0;
 /* Hypotheses less probable than this do not enter the filter, whose mixture would drop them. */
 static const double LEAST_PROBABILITY = 1e-4;
 
+/* Existence probabilities at which a track is confirmed and below which it is deleted, confirmed or
+ * tentative. At the first, at most one confirmed track in a hundred is false when it is confirmed.
+ * A track is reported while it rather exists than not: the least mean GOSPA. The last frees the
+ * slots of hopeless ones; M of N ends the others. */
+static const double CONFIRMED_EXISTENCE = 0.99, LEAST_EXISTENCE[2] = {0.5, 1e-7};
+
 void bst_mtt_joint_lay_out(bst_mtt_joint *j, int tracks, int detections, bst_arena *arena) {
     j->hypothesis_room = 8 * tracks + 4096;
     j->state_room = j->hypothesis_room + tracks + 4 * BST_JOINT_MOST_STATES;
@@ -46,8 +52,8 @@ int bst_mtt_joint_add(bst_mtt_joint *j, int track, const bst_joint_hypothesis *h
     }
     int at = j->hypotheses++, *link = &j->head[track];
     j->hypothesis[at] = *hypothesis;
-    while (*link >= 0 && (hypothesis->partner >= 0 ||
-                          j->hypothesis[*link].log_odds >= hypothesis->log_odds)) {
+    while (*link >= 0 &&
+           (hypothesis->partner >= 0 || j->hypothesis[*link].log_odds >= hypothesis->log_odds)) {
         link = &j->hypothesis[*link].next;
     }
     j->hypothesis[at].next = *link;
@@ -88,17 +94,11 @@ static void gate_tracks(bst_mtt *m) {
         double prior = log(track->existence) - log1p(-track->existence * pd);
         prior += count > 0 && !firm && m->params.merge_rad > 0.0 ? log_resolved(m, t) : 0.0;
         for (int i = 0; i < count; i++) {
-            const bst_sky_measurement *sky = &m->now.items[columns[i]].sky;
-            bst_filter_candidate candidate = {.measurement = sky};
-            bst_filter_fit fit;
-            if (bst_filter_evaluate(&m->filter, &track->state, &track->models, &candidate, &fit)) {
-                bst_joint_hypothesis h = {.column = columns[i],
-                                          .partner = -1,
-                                          .sky = *sky,
-                                          .log_likelihood = fit.log_likelihood,
-                                          .log_odds = prior - costs[i]};
-                (void)bst_mtt_joint_add(j, t, &h);
-            }
+            bst_joint_hypothesis h = {.column = columns[i],
+                                      .partner = -1,
+                                      .sky = m->now.items[columns[i]].sky,
+                                      .log_odds = prior - costs[i]};
+            (void)bst_mtt_joint_add(j, t, &h);
         }
     }
 }
@@ -298,8 +298,8 @@ void bst_mtt_associate_jointly(bst_mtt *m) {
 bool bst_mtt_joint_update(bst_mtt *m, int t, int components) {
     const bst_mtt_joint *j = &m->joint;
     bst_mtt_track *track = &m->tracks[t];
-    bool chosen = j->decided[t] >= 0 &&
-                  j->hypothesis[j->decided[t]].column == m->detection_of_track[t];
+    bool chosen =
+        j->decided[t] >= 0 && j->hypothesis[j->decided[t]].column == m->detection_of_track[t];
     if (track->star || (m->detection_of_track[t] >= 0 && !chosen)) {
         return false;
     }
@@ -320,4 +320,32 @@ bool bst_mtt_joint_update(bst_mtt *m, int t, int components) {
         bst_filter_update(&m->filter, &track->state, &track->models, &evidence, components);
     }
     return true;
+}
+
+bool bst_mtt_joint_exists(const bst_mtt *m, const bst_mtt_track *track) {
+    return m->params.association != BST_MTT_PMB || track->existence > CONFIRMED_EXISTENCE;
+}
+
+bool bst_mtt_joint_is_gone(const bst_mtt *m, const bst_mtt_track *track) {
+    return m->params.association == BST_MTT_PMB && !track->at_rest && !track->asleep &&
+           track->existence < LEAST_EXISTENCE[track->status == BST_TRACK_TENTATIVE];
+}
+
+void bst_mtt_joint_drop_duplicates(bst_mtt *m, double same_chi2) {
+    for (int t = 0; t < m->track_count; t++) {
+        bst_mtt_track *track = &m->tracks[t];
+        int column = m->detection_of_track[t];
+        bool open = track->status == BST_TRACK_TENTATIVE && column >= 0 && !track->at_rest;
+        for (int u = 0; u < m->track_count && open && track->existence > 0.0; u++) {
+            bst_mtt_track *other = &m->tracks[u];
+            if (u == t || m->detection_of_track[u] != column || m->shared[u] || other->star ||
+                other->existence < track->existence ||
+                (other->existence == track->existence && other->hits < track->hits) ||
+                bst_sky_distance2(&track->state, &other->state) > same_chi2) {
+                continue;
+            }
+            other->existence = fmin(other->existence + track->existence, MOST_EXISTENCE);
+            track->existence = 0.0;
+        }
+    }
 }

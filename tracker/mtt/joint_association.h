@@ -33,8 +33,7 @@ typedef struct bst_joint_hypothesis {
     int next;    /* next hypothesis of the track, by descending odds if alone; -1: last */
     /* of the track alone; for a shared detection: given the partner's predicted state */
     bst_sky_measurement sky;
-    double log_likelihood; /* of `sky`, rad^-2 */
-    double log_odds;       /* ln of the weight over that of a miss; shared: of both tracks */
+    double log_odds; /* ln of the weight over that of a miss; shared: of both tracks */
     double probability;
 } bst_joint_hypothesis;
 
@@ -78,17 +77,19 @@ typedef struct bst_mtt_joint {
     int *root;      /* union-find of tracks that may be unresolved; -1: the track was in a group */
     int *size;      /* tracks of the set of a root */
     double *missed; /* probability that a track exists and has no detection */
-    double *claimed, *claimed_firm; /* probability that a detection is any, or a confirmed, track's */
-    int *decided;                   /* hypothesis of the track's detection; -1: none */
+    double *claimed,
+        *claimed_firm; /* probability that a detection is any, or a confirmed, track's */
+    int *decided;      /* hypothesis of the track's detection; -1: none */
 } bst_mtt_joint;
 
 struct bst_mtt;
+struct bst_mtt_track;
 
 /* Takes the arrays of a work space for `tracks` tracks and `detections` detections. */
 void bst_mtt_joint_lay_out(bst_mtt_joint *joint, int tracks, int detections, bst_arena *arena);
 
-/* Associates the frame's detections with the predicted tracks: sets the probabilities, the existence
- * of each track, detection_of_track, shared and used. */
+/* Associates the frame's detections with the predicted tracks: sets the probabilities, the
+ * existence of each track, detection_of_track, shared and used. */
 void bst_mtt_associate_jointly(struct bst_mtt *mtt);
 
 /* Updates the filter of track t with the probabilities of its hypotheses.
@@ -97,6 +98,19 @@ void bst_mtt_associate_jointly(struct bst_mtt *mtt);
  * Returned:  false if the track's detection is not one of its hypotheses (manoeuvre gate), or if it
  *            is a star */
 bool bst_mtt_joint_update(struct bst_mtt *mtt, int t, int components);
+
+/* True if the existence probability of a tentative track is high enough for its confirmation; with
+ * other associations always. */
+bool bst_mtt_joint_exists(const struct bst_mtt *mtt, const struct bst_mtt_track *track);
+/* True if a track is to be deleted because it rather does not exist; with other associations never.
+ */
+bool bst_mtt_joint_is_gone(const struct bst_mtt *mtt, const struct bst_mtt_track *track);
+
+/* Ends tentative tracks that have the detection and the state of a likelier track, which takes over
+ * their existence probability: hypotheses on one object that began with different detections.
+ *
+ * Given:     same_chi2  largest distance of their states, 4 degrees of freedom */
+void bst_mtt_joint_drop_duplicates(struct bst_mtt *mtt, double same_chi2);
 
 /* Forms the groups of tracks and enumerates their joint hypotheses. */
 void bst_mtt_joint_enumerate(struct bst_mtt *mtt);

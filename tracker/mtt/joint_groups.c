@@ -86,19 +86,19 @@ static void merge_link(bst_mtt *m, bst_joint_group *g, bst_joint_link *link) {
     int ta = j->member[g->first_member + link->a], tb = j->member[g->first_member + link->b];
     const bst_mtt_track *a = &m->tracks[ta], *b = &m->tracks[tb];
     double pd = m->params.detection_probability;
-    double prior = log(a->existence * b->existence * link->unresolved) - log_missed(m, ta) -
-                   log_missed(m, tb);
+    double prior =
+        log(a->existence * b->existence * link->unresolved) - log_missed(m, ta) - log_missed(m, tb);
     link->log_miss = prior + log(1.0 - pd);
     link->first = j->hypotheses;
     link->count = 0;
     double w = bst_mtt_light_share(a, b);
     bst_vec3 to = bst_tangent_log(a->state.direction, b->state.direction);
     bst_vec3 centre = bst_tangent_exp(a->state.direction, bst_vec3_scale(to, 1.0 - w));
-    double reach = sqrt(m->params.gate_chi2) *
-                   sqrt(a->state.covariance[0][0] + a->state.covariance[1][1] +
-                        b->state.covariance[0][0] + b->state.covariance[1][1] +
-                        m->largest_sigma * m->largest_sigma +
-                        2.0 * m->params.merge_floor_rad * m->params.merge_floor_rad);
+    double reach =
+        sqrt(m->params.gate_chi2) *
+        sqrt(a->state.covariance[0][0] + a->state.covariance[1][1] + b->state.covariance[0][0] +
+             b->state.covariance[1][1] + m->largest_sigma * m->largest_sigma +
+             2.0 * m->params.merge_floor_rad * m->params.merge_floor_rad);
     int begin, end;
     bst_mtt_pool_range(&m->now, centre, reach, &begin, &end);
     for (int i = begin; i < end && link->count < MOST_OWN; i++) {
@@ -111,14 +111,13 @@ static void merge_link(bst_mtt *m, bst_joint_group *g, bst_joint_link *link) {
             continue;
         }
         int edge = edge_of(j, g, column);
-        bst_joint_hypothesis h = {
-            .column = column,
-            .partner = tb,
-            .edge = edge,
-            .sky = fit.of_a,
-            .log_likelihood = fit.log_likelihood,
-            .log_odds = prior + log(pd / m->clutter_density) + fit.log_likelihood -
-                        bst_mtt_merged_brightness_cost(a, b, detection)};
+        bst_joint_hypothesis h = {.column = column,
+                                  .partner = tb,
+                                  .edge = edge,
+                                  .sky = fit.of_a,
+                                  .log_odds = prior + log(pd / m->clutter_density) +
+                                              fit.log_likelihood -
+                                              bst_mtt_merged_brightness_cost(a, b, detection)};
         bst_joint_hypothesis other = h;
         other.partner = ta;
         other.sky = fit.of_b;
@@ -228,10 +227,10 @@ static void prepare(search *s) {
     for (int a = 0; a < g->members; a++) {
         for (int b = a + 1; b < g->members; b++) {
             int ta = j->member[g->first_member + a], tb = j->member[g->first_member + b];
-            double unresolved = m->tracks[ta].star && m->tracks[tb].star
-                                    ? 0.0
-                                    : bst_mtt_unresolved(m->params.merge_rad, &m->tracks[ta],
-                                                         &m->tracks[tb]);
+            double unresolved =
+                m->tracks[ta].star && m->tracks[tb].star
+                    ? 0.0
+                    : bst_mtt_unresolved(m->params.merge_rad, &m->tracks[ta], &m->tracks[tb]);
             if (unresolved < LEAST_UNRESOLVED || s->link_count == BST_JOINT_LINKS) {
                 continue;
             }

@@ -19,10 +19,6 @@ static const double CLUTTER_GAIN = 0.1;
 /* A tentative track is deleted after so many windows of N frames in which it was not confirmed. In
  * the first it needs M hits (M of N); its score and chi-square have the second and the third. */
 enum { TENTATIVE_WINDOWS = 3 };
-/* BST_MTT_PMB: existence probabilities at which a track is confirmed and below which it is deleted,
- * confirmed or tentative. At the first, at most one confirmed track in a hundred is false when it is
- * confirmed. A track is reported while it rather exists than not: the least mean GOSPA. */
-static const double CONFIRMED_EXISTENCE = 0.99, LEAST_EXISTENCE[2] = {0.5, 1e-7};
 
 static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
     if (p->max_tracks < 1 || p->max_detections < 1 || p->confirm_hits < 2 ||
@@ -376,18 +372,12 @@ static double chi2_limit(int dof) {
     return dof * c * c * c;
 }
 
-/* True if a track is likely enough to be confirmed. */
-static bool is_likely(const bst_mtt *m, const bst_mtt_track *track) {
-    return m->params.association == BST_MTT_PMB ? track->existence > CONFIRMED_EXISTENCE
-                                                : track->score >= m->params.confirm_score;
-}
-
 /* True if a tentative track meets the confirmation criteria. */
 static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
     int dof = 2 * (track->hits - 2);
     if (track->at_rest || track->hits < m->params.confirm_hits ||
-        !is_likely(m, track) || (dof > 0 && track->chi2 > chi2_limit(dof)) ||
-        bst_mtt_may_be_fixed(m, track)) {
+        track->score < m->params.confirm_score || !bst_mtt_joint_exists(m, track) ||
+        (dof > 0 && track->chi2 > chi2_limit(dof)) || bst_mtt_may_be_fixed(m, track)) {
         return false;
     }
     /* a second track of an object that is already tracked is not confirmed */
@@ -406,9 +396,7 @@ static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
 static bool must_delete(const bst_mtt *m, const bst_mtt_track *track, bool observed) {
     const bst_mtt_params *p = &m->params;
     double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
-    bool tentative = track->status == BST_TRACK_TENTATIVE;
-    if (p->association == BST_MTT_PMB && !track->at_rest && !track->asleep &&
-        track->existence < LEAST_EXISTENCE[tentative]) {
+    if (bst_mtt_joint_is_gone(m, track)) {
         return true;
     }
     if (track->asleep) {
@@ -550,6 +538,9 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
         unused += !m->now.used[i];
     }
     m->clutter += frame->partial ? 0.0 : CLUTTER_GAIN * (unused - m->clutter);
+    if (m->params.association == BST_MTT_PMB) {
+        bst_mtt_joint_drop_duplicates(m, SAME_CHI2);
+    }
     bst_mtt_update_orbits(m, frame);
     maintain_tracks(m, frame);
     bst_mtt_initiate(m, frame);

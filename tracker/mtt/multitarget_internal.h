@@ -82,7 +82,7 @@ struct bst_mtt {
     double (*extra)[3];      /* extra covariance of a shared detection, tangent axes of the track */
     bst_mtt_sharing *shared;
     bool *observable;
-    bst_mtt_joint joint; /* BST_MTT_PMB only */
+    bst_mtt_joint joint;   /* BST_MTT_PMB only */
     double *departed_chi2; /* chi-square of a manoeuvre detected in this frame with the wider gate;
                               0: none */
 };

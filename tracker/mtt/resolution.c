@@ -43,8 +43,8 @@ static bst_sky_measurement implied(const bst_sky_state *state, double w, const d
     w = fmax(w, LEAST_SHARE);
     bst_sky_measurement out;
     out.direction =
-        bst_tangent_exp(state->direction, bst_tangent_vector(&axes, (nu[0] - other[0]) / w,
-                                                             (nu[1] - other[1]) / w));
+        bst_tangent_exp(state->direction,
+                        bst_tangent_vector(&axes, (nu[0] - other[0]) / w, (nu[1] - other[1]) / w));
     bst_tangent own = bst_tangent_at(out.direction);
     double c, s, a = r[0] / (w * w), b = r[1] / (w * w), e = r[2] / (w * w);
     bst_tangent_turn(state->direction, &axes, out.direction, &own, &c, &s);
@@ -56,8 +56,8 @@ static bst_sky_measurement implied(const bst_sky_state *state, double w, const d
 
 /* The part of bst_mtt_merge for track a. */
 static bool merge_one(const bst_mtt_track *a, const bst_mtt_track *b,
-                      const bst_sky_measurement *measurement, double floor_rad,
-                      bst_mtt_merged *fit, bst_sky_measurement *out) {
+                      const bst_sky_measurement *measurement, double floor_rad, bst_mtt_merged *fit,
+                      bst_sky_measurement *out) {
     bst_sky_innovation innovation;
     if (!bst_sky_innovate(&a->state, measurement, NULL, &innovation)) {
         return false;

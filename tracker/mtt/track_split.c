@@ -5,7 +5,8 @@
 #include "tracker/mtt/multitarget_internal.h"
 #include "tracker/mtt/resolution.h"
 
-/* Two detections of a missed track, and ln of the odds that they are the two objects that it was. */
+/* Two detections of a missed track, and ln of the odds that they are the two objects that it was.
+ */
 typedef struct pair {
     int columns[2];
     double log_odds, share; /* share: of the first one in their light */
@@ -26,8 +27,7 @@ static bool judge(const bst_mtt *m, int t, pair *p) {
     bst_vec3 to = bst_tangent_log(a->sky.direction, b->sky.direction);
     p->share = share_of(a, b);
     bst_sky_measurement centre = a->sky;
-    centre.direction =
-        bst_tangent_exp(a->sky.direction, bst_vec3_scale(to, 1.0 - p->share));
+    centre.direction = bst_tangent_exp(a->sky.direction, bst_vec3_scale(to, 1.0 - p->share));
     double floor2 = m->params.merge_floor_rad * m->params.merge_floor_rad;
     const double extra[3] = {floor2, 0.0, floor2};
     bst_filter_candidate candidate = {.measurement = &centre, .extra = extra};
@@ -72,16 +72,16 @@ static pair find_pair(const bst_mtt *m, int t) {
     return best;
 }
 
-/* Widens a track to one of its two objects, which is `off` (rad) from the centre of light and drew
- * apart from it since the track began. */
-static void widen(bst_mtt_track *track, bst_vec3 off, double age_s) {
+/* Widens a track to one of its two objects, which is `off` (rad) from the centre of light and may
+ * have reached it within interval_s. */
+static void widen(bst_mtt_track *track, bst_vec3 off, double interval_s) {
     bst_sky_state *s = &track->state;
     bst_tangent axes = bst_tangent_at(s->direction);
     double x[2] = {bst_vec3_dot(off, axes.e1), bst_vec3_dot(off, axes.e2)};
     for (int i = 0; i < 2; i++) {
         for (int k = 0; k < 2; k++) {
             s->covariance[i][k] += x[i] * x[k];
-            s->covariance[i + 2][k + 2] += x[i] * x[k] / (age_s * age_s);
+            s->covariance[i + 2][k + 2] += x[i] * x[k] / (interval_s * interval_s);
         }
     }
     track->models.count = 0;
@@ -89,10 +89,10 @@ static void widen(bst_mtt_track *track, bst_vec3 off, double age_s) {
 }
 
 /* Gives a track one of the two detections. */
-static void take(bst_mtt *m, int t, int column, bst_vec3 centre, double age_s) {
+static void take(bst_mtt *m, int t, int column, bst_vec3 centre, double interval_s) {
     bst_mtt_track *track = &m->tracks[t];
     const bst_mtt_detection *d = &m->now.items[column];
-    widen(track, bst_vec3_sub(d->sky.direction, centre), age_s);
+    widen(track, bst_vec3_sub(d->sky.direction, centre), interval_s);
     m->detection_of_track[t] = column;
     m->shared[t] = BST_MTT_ALONE;
     m->joint.decided[t] = m->joint.head[t] = -1;
@@ -112,9 +112,8 @@ static void split(bst_mtt *m, int t, const pair *p) {
     const bst_mtt_detection *a = &m->now.items[p->columns[0]], *b = &m->now.items[p->columns[1]];
     bst_vec3 to = bst_tangent_log(a->sky.direction, b->sky.direction);
     bst_vec3 centre = bst_tangent_exp(a->sky.direction, bst_vec3_scale(to, 1.0 - p->share));
-    /* the older track may have drifted apart for as long as it is old, but at least an interval */
     double before = m->history_count > 0 ? m->history[0].seconds : track->last_update_s;
-    double age_s = fmax(m->now.seconds - before, 1e-3);
+    double interval_s = fmax(m->now.seconds - before, 1e-3);
     int brighter = p->columns[p->share < 0.5], other = p->columns[p->share >= 0.5];
     track->existence *= 1.0 / (1.0 + exp(-p->log_odds));
     *child = *track;
@@ -131,8 +130,8 @@ static void split(bst_mtt *m, int t, const pair *p) {
     m->observable[m->track_count] = true;
     child->may_miss = track->may_miss;
     int at = m->track_count++;
-    take(m, t, brighter, centre, age_s);
-    take(m, at, other, centre, age_s);
+    take(m, t, brighter, centre, interval_s);
+    take(m, at, other, centre, interval_s);
 }
 
 void bst_mtt_split_tracks(bst_mtt *m) {
