@@ -8,8 +8,9 @@
 
 /* Pairs less probably unresolved than this are taken as resolved. */
 static const double LEAST_UNRESOLVED = 0.01;
-/* ln of the smallest weight of a joint hypothesis relative to the largest: 1e-7 */
-static const double LEAST_LOG_WEIGHT = -16.1;
+/* ln of the smallest weight of a joint hypothesis relative to the largest, 4e-18. A miss of a track
+ * next to which another claims its detection is 1e-8 before the groups exchange messages. */
+static const double LEAST_LOG_WEIGHT = -40.0;
 /* Most detections of each track of a group that has several. */
 enum { MOST_OWN = 6 };
 
