@@ -79,20 +79,21 @@ void bst_ospa2_free(bst_ospa2 *o) {
 }
 
 /* Stores a frame in the window. */
-static void store(bst_ospa2 *o, const double *distance, const int *object, int rows,
-                  const int64_t *track_ids, int tracks) {
+static void store(bst_ospa2 *o, const bst_ospa2_input *frame) {
+    int tracks = frame->tracks;
     slot *s = &o->slots[o->frames % o->params.window];
     s->tracks = tracks;
     memset(s->visible, 0, (size_t)o->params.objects * sizeof *s->visible);
     if (tracks > 0) {
-        memcpy(s->id, track_ids, (size_t)tracks * sizeof *s->id);
+        memcpy(s->id, frame->track_ids, (size_t)tracks * sizeof *s->id);
     }
-    for (int r = 0; r < rows; r++) {
-        assert(object[r] >= 0 && object[r] < o->params.objects);
-        s->visible[object[r]] = true;
+    for (int r = 0; r < frame->rows; r++) {
+        int object = frame->object[r];
+        assert(object >= 0 && object < o->params.objects);
+        s->visible[object] = true;
         for (int t = 0; t < tracks; t++) {
-            s->distance[object[r] * o->params.max_at_once + t] =
-                fmin(distance[r * tracks + t], o->params.cutoff);
+            s->distance[object * o->params.max_at_once + t] =
+                fmin(frame->distance[r * tracks + t], o->params.cutoff);
         }
     }
     o->frames++;
@@ -139,13 +140,15 @@ static double mean_distance(const bst_ospa2 *o, int slots, int object, int ident
     return (sum + o->params.cutoff * (either - both)) / either;
 }
 
-bst_status bst_ospa2_frame(bst_ctx *ctx, bst_ospa2 *o, const double *distance, const int *object,
-                           int rows, const int64_t *track_ids, int tracks, double *value) {
-    if (tracks > o->params.max_at_once || rows > o->params.objects || tracks < 0 || rows < 0) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "ospa2: %d objects and %d tracks, room for %d, %d",
-                        rows, tracks, o->params.objects, o->params.max_at_once);
+bst_status bst_ospa2_frame(bst_ctx *ctx, bst_ospa2 *o, const bst_ospa2_input *frame,
+                           double *value) {
+    if (frame->tracks > o->params.max_at_once || frame->rows > o->params.objects ||
+        frame->tracks < 0 || frame->rows < 0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "ospa2: %d objects and %d tracks in a frame, room for %d and %d",
+                        frame->rows, frame->tracks, o->params.objects, o->params.max_at_once);
     }
-    store(o, distance, object, rows, track_ids, tracks);
+    store(o, frame);
     int slots = o->frames < o->params.window ? (int)o->frames : o->params.window;
     int identities = collect(o, slots), objects = 0;
     for (int i = 0; i < o->params.objects; i++) {

@@ -27,18 +27,23 @@ bst_status bst_ospa2_create(bst_ctx *ctx, const bst_ospa2_params *params,
 /* Frees the window; NULL is allowed. */
 void bst_ospa2_free(bst_ospa2 *ospa2);
 
+/* A frame: distances, visible objects and tracks. */
+typedef struct bst_ospa2_input {
+    const double *distance; /* [rows * tracks] between object object[i] and track j, >= 0 */
+    const int *object;      /* [rows] indices of the visible objects */
+    int rows;
+    const int64_t *track_ids; /* [tracks] identities */
+    int tracks;
+} bst_ospa2_input;
+
 /* Adds a frame and computes OSPA(2) over the latest `window` frames.
  *
- * Given:     distance   [rows * tracks] between visible object object[i] and track j, >= 0
- *            object     [rows] indices of the visible objects
- *            track_ids  [tracks] identities
- * Returned:  value      in the unit of the cutoff
+ * Returned:  value  in the unit of the cutoff
  * Notes:     the distance of two tracks is the mean, over the frames of the window in which either
  *            exists, of min(distance, cutoff), with the cutoff where only one exists.
  * Errors:    BST_ERR_ARGUMENT, BST_ERR_MEMORY
  * Reference: Beard, Vo and Vo 2020, eq. 19 and 24 */
-bst_status bst_ospa2_frame(bst_ctx *ctx, bst_ospa2 *ospa2, const double *distance,
-                           const int *object, int rows, const int64_t *track_ids, int tracks,
+bst_status bst_ospa2_frame(bst_ctx *ctx, bst_ospa2 *ospa2, const bst_ospa2_input *frame,
                            double *value) BST_MUST_CHECK;
 
 #endif

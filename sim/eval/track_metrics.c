@@ -147,7 +147,8 @@ bst_status bst_track_metrics_frame(bst_ctx *ctx, bst_track_metrics *m, double se
     m->gospa2 += gospa.gospa * gospa.gospa;
     m->gospa += gospa.gospa;
     double ospa2;
-    BST_TRY(bst_ospa2_frame(ctx, m->window, m->distance, m->row, rows, track_ids, tracks, &ospa2));
+    const bst_ospa2_input window = {m->distance, m->row, rows, track_ids, tracks};
+    BST_TRY(bst_ospa2_frame(ctx, m->window, &window, &ospa2));
     m->ospa2 += ospa2;
     for (int t = 0; t < tracks; t++) {
         m->track[m->identity[t]].alone++;

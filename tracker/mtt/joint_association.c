@@ -46,21 +46,6 @@ void bst_mtt_joint_lay_out(bst_mtt_joint *j, int tracks, int detections, bst_are
     BST_ARENA_TAKE(arena, j->claimed_firm, nd);
 }
 
-int bst_mtt_joint_add(bst_mtt_joint *j, int track, const bst_joint_hypothesis *hypothesis) {
-    if (j->hypotheses == j->hypothesis_room) {
-        return -1;
-    }
-    int at = j->hypotheses++, *link = &j->head[track];
-    j->hypothesis[at] = *hypothesis;
-    while (*link >= 0 &&
-           (hypothesis->partner >= 0 || j->hypothesis[*link].log_odds >= hypothesis->log_odds)) {
-        link = &j->hypothesis[*link].next;
-    }
-    j->hypothesis[at].next = *link;
-    *link = at;
-    return at;
-}
-
 /* ln of the probability that tentative track t is resolved from every confirmed one. */
 static double log_resolved(const bst_mtt *m, int t) {
     double sum = 0.0, near2 = pow(2.0 * m->params.merge_rad, 2);

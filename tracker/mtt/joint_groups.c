@@ -14,6 +14,21 @@ static const double LEAST_LOG_WEIGHT = -40.0;
 /* Most detections of each track of a group that has several. */
 enum { MOST_OWN = 6 };
 
+int bst_mtt_joint_add(bst_mtt_joint *j, int track, const bst_joint_hypothesis *hypothesis) {
+    if (j->hypotheses == j->hypothesis_room) {
+        return -1;
+    }
+    int at = j->hypotheses++, *link = &j->head[track];
+    j->hypothesis[at] = *hypothesis;
+    while (*link >= 0 &&
+           (hypothesis->partner >= 0 || j->hypothesis[*link].log_odds >= hypothesis->log_odds)) {
+        link = &j->hypothesis[*link].next;
+    }
+    j->hypothesis[at].next = *link;
+    *link = at;
+    return at;
+}
+
 /* Root of the set of track t. */
 static int find_root(bst_mtt_joint *j, int t) {
     while (j->root[t] != t) {
