@@ -464,8 +464,8 @@ static void ospa2_by_hand(void **state) {
     const int64_t ids[4] = {1, 2, 2, 0};
     for (int k = 0; k < 4; k++) {
         double value;
-        bst_assert_ok(
-            &ctx, bst_ospa2_frame(&ctx, ospa2, &distance, &object, 1, &ids[k], tracks[k], &value));
+        const bst_ospa2_input frame = {&distance, &object, 1, &ids[k], tracks[k]};
+        bst_assert_ok(&ctx, bst_ospa2_frame(&ctx, ospa2, &frame, &value));
         bst_assert_close(value, expected[k], 1e-15);
     }
     bst_ospa2_free(ospa2);
