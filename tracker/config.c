@@ -4,7 +4,7 @@
 
 /* order of bst_mtt_association */
 static const char *const motions[] = {"constant_rate", "orbit", NULL};
-static const char *const associations[] = {"gnn", "nearest", "pda", "mixture", NULL};
+static const char *const associations[] = {"gnn", "nearest", "pda", "mixture", "pmb", NULL};
 
 const bst_config_desc bst_tracker_config_table[] = {
     BST_REAL(C, star_systematic_px, "px", 0, 10, "0",
@@ -105,7 +105,9 @@ const bst_config_desc bst_tracker_config_table[] = {
         "gnn: the assignment of least total cost. nearest: the cheapest pair first. pda: as gnn, "
         "but the filter of a confirmed track weighs every detection in its gate by its "
         "probability. mixture: as pda, and the likeliest choices live on apart until later "
-        "detections decide; with type imm the same as pda."),
+        "detections decide; with type imm the same as pda. pmb: joint probabilities of all tracks "
+        "and detections, existence probabilities in place of confirm_score, and measurements "
+        "merged of two tracks (Poisson multi-Bernoulli); every pair of detections starts a track."),
     BST_ENUM(
         C, motion, motions, "\"constant_rate\"",
         "constant_rate: along a great circle, with the cue's acceleration near it. orbit: along "

@@ -7,6 +7,7 @@
 
 #include "sim/core/arena.h"
 #include "sim/eval/gospa.h"
+#include "sim/eval/ospa2.h"
 
 typedef struct object_record {
     int64_t visible, tracked, last_track; /* frame counts, and track identity (0: none yet) */
@@ -16,6 +17,8 @@ typedef struct object_record {
 
 typedef struct track_record {
     int64_t id, frames;
+    int alone; /* latest frames in a row without an object */
+    bool ghost;
 } track_record;
 
 struct bst_track_metrics {
@@ -23,7 +26,8 @@ struct bst_track_metrics {
     int objects, max_tracks, max_at_once;
     double cutoff;
     int64_t frames;
-    double first_s, last_s, gospa2;
+    double first_s, last_s, gospa2, gospa, ospa2;
+    bst_ospa2 *window;
     int tracks;
     object_record *object;
     track_record *track;
@@ -62,6 +66,10 @@ bst_status bst_track_metrics_create(bst_ctx *ctx, int objects, int max_tracks, i
     m->cutoff = cutoff_rad;
     lay_out(m);
     bst_status status = bst_arena_alloc(ctx, &m->arena, "the figures of tracks");
+    if (status == BST_OK) {
+        const bst_ospa2_params window = {objects, max_at_once, BST_TRACK_WINDOW, cutoff_rad, 2.0};
+        status = bst_ospa2_create(ctx, &window, &m->window);
+    }
     if (status != BST_OK) {
         bst_track_metrics_free(m);
         return status;
@@ -74,6 +82,7 @@ bst_status bst_track_metrics_create(bst_ctx *ctx, int objects, int max_tracks, i
 void bst_track_metrics_free(bst_track_metrics *m) {
     if (m) {
         bst_arena_free(&m->arena);
+        bst_ospa2_free(m->window);
         free(m);
     }
 }
@@ -136,15 +145,26 @@ bst_status bst_track_metrics_frame(bst_ctx *ctx, bst_track_metrics *m, double se
     bst_gospa_result gospa;
     BST_TRY(bst_gospa(ctx, m->distance, rows, tracks, m->cutoff, 2.0, m->pair, &gospa));
     m->gospa2 += gospa.gospa * gospa.gospa;
+    m->gospa += gospa.gospa;
+    double ospa2;
+    const bst_ospa2_input window = {m->distance, m->row, rows, track_ids, tracks};
+    BST_TRY(bst_ospa2_frame(ctx, m->window, &window, &ospa2));
+    m->ospa2 += ospa2;
+    for (int t = 0; t < tracks; t++) {
+        m->track[m->identity[t]].alone++;
+    }
     for (int r = 0; r < rows; r++) {
         if (m->pair[r] >= 0) {
             int t = m->identity[m->pair[r]], o = m->row[r];
             m->paired[t * m->objects + o]++;
+            m->track[t].alone = 0;
             record_track(&m->object[o], seconds, m->track[t].id);
         }
     }
     for (int t = 0; t < tracks; t++) {
-        m->track[m->identity[t]].frames++;
+        track_record *track = &m->track[m->identity[t]];
+        track->frames++;
+        track->ghost |= track->alone > BST_TRACK_GHOST_FRAMES;
     }
     m->first_s = m->frames == 0 ? seconds : m->first_s;
     m->last_s = seconds;
@@ -157,6 +177,8 @@ void bst_track_metrics_figures(const bst_track_metrics *m, bst_track_figures *ou
     out->frames = m->frames;
     out->hours = (m->last_s - m->first_s) / 3600.0;
     out->gospa_rms = m->frames > 0 ? sqrt(m->gospa2 / (double)m->frames) : NAN;
+    out->gospa_mean = m->frames > 0 ? m->gospa / (double)m->frames : NAN;
+    out->ospa2_mean = m->frames > 0 ? m->ospa2 / (double)m->frames : NAN;
     int64_t visible = 0, tracked = 0, most_sum = 0, paired_sum = 0;
     double wait = 0.0;
     for (int o = 0; o < m->objects; o++) {
@@ -178,6 +200,7 @@ void bst_track_metrics_figures(const bst_track_metrics *m, bst_track_figures *ou
         }
         most_sum += most;
         paired_sum += all;
+        out->ghosts += m->track[t].ghost;
         out->false_tracks += 2 * all < m->track[t].frames;
     }
     out->coverage = visible > 0 ? (double)tracked / (double)visible : NAN;

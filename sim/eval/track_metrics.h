@@ -1,5 +1,5 @@
 /* Metrics of a multi-target tracker: coverage, time to confirm, breaks, purity, false tracks,
- * GOSPA. */
+ * ghosts, GOSPA, OSPA(2). */
 #ifndef BST_EVAL_TRACK_METRICS_H
 #define BST_EVAL_TRACK_METRICS_H
 
@@ -9,13 +9,20 @@
 #include "boresight/status.h"
 #include "boresight/vec.h"
 
+/* Frames of the window of OSPA(2). */
+#define BST_TRACK_WINDOW 10
+/* Frames in a row without an object nearby after which a confirmed track is a ghost. */
+#define BST_TRACK_GHOST_FRAMES 3
+
 typedef struct bst_track_metrics bst_track_metrics;
 
 typedef struct bst_track_figures {
     int64_t frames;
-    double hours;                      /* from the first frame to the last */
-    double gospa_rms;                  /* rad; cutoff as given at creation, order 2 */
-    double coverage;                   /* visible frames with a track over visible frames */
+    double hours;      /* from the first frame to the last */
+    double gospa_rms;  /* rad; cutoff as given at creation, order 2 */
+    double gospa_mean; /* rad; mean over the frames */
+    double ospa2_mean; /* rad; OSPA(2) over BST_TRACK_WINDOW frames, the same cutoff and order */
+    double coverage;   /* visible frames with a track over visible frames */
     double time_to_confirm_s;          /* mean over objects that had a track, since first visible */
     int objects_seen, objects_tracked; /* ever visible; ever tracked */
     int breaks;    /* times that a tracked object got a track of another identity */
@@ -23,6 +30,7 @@ typedef struct bst_track_figures {
                       frames; NAN without any */
     int tracks, false_tracks; /* identities; false: without an object nearby in most frames */
     double false_tracks_per_hour;
+    int ghosts; /* tracks without an object for more than BST_TRACK_GHOST_FRAMES frames in a row */
 } bst_track_figures;
 
 /* Creates the metrics for `objects` true objects, up to max_tracks track identities and max_at_once

@@ -3,6 +3,7 @@
 #include "boresight/vec.h"
 #include "sim/eval/consistency.h"
 #include "sim/eval/gospa.h"
+#include "sim/eval/ospa2.h"
 #include "sim/eval/track_bound.h"
 #include "sim/eval/track_metrics.h"
 #include "tests/test_support.h"
@@ -294,6 +295,7 @@ static void track_metrics_by_hand(void **state) {
     bst_assert_close(f.purity, 15.0 / 16.0, 1e-15); /* track 2 was with the other one once */
     assert_int_equal(f.tracks, 4);
     assert_int_equal(f.false_tracks, 1);
+    assert_int_equal(f.ghosts, 1); /* track 9, for five frames */
     bst_assert_close(f.false_tracks_per_hour, 1.0, 1e-12);
     const bool visible[2] = {true, true};
     const int64_t id = 77, many[4] = {1, 2, 3, 9};
@@ -447,8 +449,32 @@ static void half_of_its_frames_make_a_track_true(void **state) {
     bst_track_metrics_free(m);
 }
 
+/* A window of two frames. An object at 0.2 from its track, whose identity changes in the second
+ * frame: each identity has 0.2 in one frame and the cutoff 1 in the other, and one of the two has
+ * no object: (0.6 + 1)/2. A third frame without the first identity has 0.2 again; one without a
+ * track (0.2 + 1)/2. */
+static void ospa2_by_hand(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_ospa2 *ospa2;
+    const bst_ospa2_params params = {1, 2, 2, 1.0, 1.0}, empty = {1, 2, 0, 1.0, 1.0};
+    bst_assert_ok(&ctx, bst_ospa2_create(&ctx, &params, &ospa2));
+    const double distance = 0.2, expected[4] = {0.2, 0.8, 0.2, 0.6};
+    const int object = 0, tracks[4] = {1, 1, 1, 0};
+    const int64_t ids[4] = {1, 2, 2, 0};
+    for (int k = 0; k < 4; k++) {
+        double value;
+        const bst_ospa2_input frame = {&distance, &object, 1, &ids[k], tracks[k]};
+        bst_assert_ok(&ctx, bst_ospa2_frame(&ctx, ospa2, &frame, &value));
+        bst_assert_close(value, expected[k], 1e-15);
+    }
+    bst_ospa2_free(ospa2);
+    assert_int_equal(bst_ospa2_create(&ctx, &empty, &ospa2), BST_ERR_ARGUMENT);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(bound_of_two_correlated_measurements),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(ospa2_by_hand),
+                                       cmocka_unit_test(bound_of_two_correlated_measurements),
                                        cmocka_unit_test(bound_of_a_step_with_everything),
                                        cmocka_unit_test(fewer_runs_have_wider_bounds),
                                        cmocka_unit_test(half_of_its_frames_make_a_track_true),

@@ -179,7 +179,7 @@ static void orbits(void **state) {
     const variant v = {.name = "ekf, orbits",
                        .sky = busy,
                        .filter = BST_FILTER_EKF,
-                       .association = BST_MTT_NEAREST,
+                       .association = BST_MTT_PMB,
                        .orbits = true};
     held h;
     follow(&v, &h);

@@ -14,7 +14,7 @@ static void through_poles_and_zenith(void **state) {
     const double rates[] = {0.0, 50 * AS, 5 * BST_DEG_RAD};
     const double decs[] = {90.0, -90.0, 89.9999, 0.0, 37.0};
     for (int filter = 0; filter < 3; filter++) {
-        for (int association = 0; association < 4; association++) {
+        for (int association = 0; association < 5; association++) {
             for (int r = 0; r < 3; r++) {
                 for (int k = 0; k < 5; k++) {
                     bst_mtt_params params = defaults();
@@ -381,7 +381,7 @@ static void clutter_is_no_manoeuvre(void **state) {
 static void five_hundred_tracks_by_each(void **state) {
     (void)state;
     for (int filter = 0; filter < 3; filter++) {
-        for (int association = 0; association < 4; association++) {
+        for (int association = 0; association < 5; association++) {
             bst_mtt_params params = defaults();
             params.filter = (bst_filter_kind)filter;
             params.association = (bst_mtt_association)association;

@@ -6,7 +6,7 @@
  * the other one misses, and not both. */
 static void melted_for_good(void **state) {
     (void)state;
-    for (int association = 0; association < 4; association++) {
+    for (int association = 0; association < 5; association++) {
         for (uint64_t seed = 0; seed < 10; seed++) {
             bst_mtt_params params = defaults();
             params.association = (bst_mtt_association)association;
@@ -47,7 +47,7 @@ static void dim_one_gone(void **state) {
     (void)state;
     for (uint64_t seed = 0; seed < 40; seed++) {
         bst_mtt_params params = defaults();
-        params.association = (bst_mtt_association)(seed % 4);
+        params.association = (bst_mtt_association)(seed % 5);
         bench *b = start(seed, &params);
         bst_vec3 from = bst_vec3_from_radec(0.3, 0.2);
         int n = 0;
@@ -61,7 +61,10 @@ static void dim_one_gone(void **state) {
             const bst_mtt_track *track = track_at(b, a, 1.5 * AS);
             assert_true(k < 10 || (track && track->hits > 0.95 * k));
             bst_mtt_tracks(b->mtt, &n);
-            assert_true(k < 30 || k > 148 || n == 2);
+            /* with existence probabilities only while the place of the dim one, which is less and
+             * less certain, is likely to be next to the bright one */
+            int until = params.association == BST_MTT_PMB ? 70 : 148;
+            assert_true(k < 30 || k > until || n == 2);
         }
         assert_int_equal(n, 1);
         bst_mtt_free(b->mtt);
@@ -123,7 +126,7 @@ static bool pass_slowly(uint64_t seed, bst_mtt_association association, double b
 static void slow_crossings(void **state) {
     (void)state;
     const double rates_pxps[] = {0.1, 0.2, 0.5}, brighter_mag[] = {-2, -1.5, -1, 1, 1.5, 2};
-    for (int a = 0; a < 4; a++) {
+    for (int a = 0; a < 5; a++) {
         for (int r = 0; r < 3; r++) {
             int kept = 0;
             for (uint64_t seed = 0; seed < 60; seed++) {
@@ -140,9 +143,9 @@ static void slow_crossings(void **state) {
 /* Two objects pass each other within a pixel of 3 arcsec, seen apart all the way: no blends. */
 static void crossing_within_a_pixel(void **state) {
     (void)state;
-    const bst_mtt_association kinds[] = {BST_MTT_GNN, BST_MTT_NEAREST, BST_MTT_PDA,
-                                         BST_MTT_MIXTURE};
-    for (int a = 0; a < 4; a++) {
+    const bst_mtt_association kinds[] = {BST_MTT_GNN, BST_MTT_NEAREST, BST_MTT_PDA, BST_MTT_MIXTURE,
+                                         BST_MTT_PMB};
+    for (int a = 0; a < 5; a++) {
         int kept = 0;
         for (uint64_t seed = 0; seed < 50; seed++) {
             bst_mtt_params params = defaults();

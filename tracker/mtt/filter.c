@@ -194,7 +194,8 @@ static int branch_hypotheses(const bst_sky_state *state, double log_weight,
         if (bst_sky_innovate(state, candidate->measurement, candidate->extra, &innovation)) {
             hypotheses[n] = *state;
             bst_sky_update(&hypotheses[n], &innovation);
-            logs[n++] = log_weight + log(evidence->hit_weight) + log_density(&innovation);
+            logs[n++] = log_weight + candidate->log_weight + log(evidence->hit_weight) +
+                        log_density(&innovation);
         }
     }
     return n;

@@ -42,6 +42,7 @@ typedef struct bst_filter_fit {
 typedef struct bst_filter_candidate {
     const bst_sky_measurement *measurement;
     const double *extra; /* extra covariance as in bst_sky_innovate; NULL: none */
+    double log_weight;   /* ln of a factor of its hypothesis; bst_filter_evaluate ignores it */
 } bst_filter_candidate;
 
 /* Initialises the models of a newly started state. */

@@ -9,13 +9,21 @@
  * the rate of false tracks stays the same. */
 static const double FEW_ALARMS = 100.0;
 
+/* Mean number of undetected objects in the field (the Poisson part of BST_MTT_PMB): a design
+ * choice. Confirmation depends on its product with 1 / (1 - CONFIRMED_EXISTENCE) only. */
+static const double UNDETECTED = 0.1;
+
+/* Most tracks that one detection starts. */
+enum { MOST_PARTNERS = 16 };
+
 /* Rate gate of a pair: its rate must lie within `gate_radps` of `rate_radps`. */
 typedef struct rate_gate {
     bst_vec3 rate_radps; /* in the tangent plane at the newer detection */
     double gate_radps;
-    int reserve; /* number of track slots to keep free */
-    int history; /* number of earlier frames to search */
-    bool rest;   /* the new tracks are stationary */
+    int reserve;  /* number of track slots to keep free */
+    int history;  /* number of earlier frames to search */
+    bool rest;    /* the new tracks are stationary */
+    int partners; /* most tracks that one detection starts */
 } rate_gate;
 
 /* Trace of a detection's covariance, rad^2. */
@@ -24,9 +32,10 @@ static double spread(const bst_mtt_detection *d) {
 }
 
 /* Finds the unused earlier detection whose pair rate with `detection` is nearest to the gate's
- * centre, newest frame first; NULL: none. */
+ * centre but farther than `beyond` (rad; negative: no limit), newest frame first; NULL: none.
+ * Writes the distance to *beyond. */
 static bst_mtt_pool *find_partner(bst_mtt *mtt, const bst_mtt_detection *detection,
-                                  const rate_gate *gate, int *partner) {
+                                  const rate_gate *gate, double *beyond, int *partner) {
     for (int h = 0; h < mtt->history_count && h < gate->history; h++) {
         bst_mtt_pool *pool = &mtt->history[h];
         double dt = mtt->now.seconds - pool->seconds;
@@ -48,14 +57,15 @@ static bst_mtt_pool *find_partner(bst_mtt *mtt, const bst_mtt_detection *detecti
             double dim = fabs(earlier->v_mag - detection->v_mag);
             double dim_limit = 1.0 + 3.0 * hypot(earlier->v_mag_sigma, detection->v_mag_sigma);
             if (pool->used[k] || off > gate->gate_radps * dt + noise || dim > dim_limit ||
-                off >= best) {
+                off >= best || off <= *beyond) {
                 continue;
             }
             best = off;
             *partner = k;
         }
-        if (best < INFINITY) {
-            return pool;
+        if (best < INFINITY || *beyond >= 0.0) {
+            *beyond = best;
+            return best < INFINITY ? pool : NULL;
         }
     }
     return NULL;
@@ -95,6 +105,11 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
         .first_length_rad = earlier->length_rad,
         .at_rest = gate->rest,
     };
+    /* odds of the first detection of an undetected object, and of a second one */
+    double odds = UNDETECTED * mtt->params.detection_probability / fmax(1.0, alarms) *
+                  mtt->params.detection_probability /
+                  (mtt->clutter_density * BST_PI * reach * reach);
+    track->existence = odds / (1.0 + odds);
     bst_mtt_note_place(track, later);
     bst_mtt_start_fixed(mtt, earlier, track);
     bst_mtt_note_fixed(mtt, later, -log(BST_PI * reach * reach), track);
@@ -110,6 +125,23 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     }
     bst_filter_start(&mtt->filter, &track->state, &track->models);
     bst_mtt_set_rest(mtt, track, bst_mtt_is_at_rest(mtt, frame, track));
+}
+
+/* True if a pair of detections has started a track in this frame already, in another rate gate. */
+static bool has_started(const bst_mtt *mtt, const bst_mtt_detection *earlier,
+                        const bst_mtt_detection *later) {
+    for (int t = mtt->track_count - 1; t >= 0; t--) {
+        const bst_mtt_track *track = &mtt->tracks[t];
+        if (track->hits != 2 || track->frames != 2 || track->last_update_tick != mtt->now.tick) {
+            return false; /* tracks of this frame are the latest */
+        }
+        bst_vec3 off = bst_vec3_sub(track->first_direction, earlier->sky.direction);
+        if (track->x_px == later->x_px && track->y_px == later->y_px &&
+            bst_vec3_dot(off, off) == 0.0) {
+            return true;
+        }
+    }
+    return false;
 }
 
 /* Starts tracks from all pairs of detections in the rate gate. */
@@ -128,19 +160,39 @@ static void start_pairs(bst_mtt *mtt, rate_gate gate, const bst_mtt_frame *frame
                 bst_tangent_carry(frame->cue_direction, detection->sky.direction,
                                   bst_tangent_project(frame->cue_direction, frame->cue_rate_radps));
         }
-        int partner = -1;
-        bst_mtt_pool *pool = find_partner(mtt, detection, &gate, &partner);
-        if (!pool) {
-            continue;
+        double beyond = -1.0;
+        for (int k = 0; k < gate.partners; k++) {
+            int partner = -1;
+            bst_mtt_pool *pool = find_partner(mtt, detection, &gate, &beyond, &partner);
+            if (!pool) {
+                break;
+            }
+            if (gate.partners > 1 && has_started(mtt, &pool->items[partner], detection)) {
+                continue;
+            }
+            if (!bst_mtt_has_room(mtt, gate.rest, gate.reserve)) {
+                mtt->lost++;
+                break;
+            }
+            start_track(mtt, &pool->items[partner], pool, detection, &gate, frame);
+            if (gate.partners == 1) {
+                pool->used[partner] = true;
+                mtt->now.used[i] = true;
+            }
         }
-        if (!bst_mtt_has_room(mtt, gate.rest, gate.reserve)) {
-            mtt->lost++;
-            continue;
-        }
-        start_track(mtt, &pool->items[partner], pool, detection, &gate, frame);
-        pool->used[partner] = true;
-        mtt->now.used[i] = true;
     }
+}
+
+/* Tracks that one detection may start. With existence probabilities every pair does, and later
+ * detections decide; in a crowd only the nearest, so that a quarter of the slots is enough. */
+static int most_partners(const bst_mtt *mtt) {
+    int unused = 0;
+    for (int i = 0; i < mtt->now.count; i++) {
+        unused += !mtt->now.used[i];
+    }
+    int room = mtt->params.max_tracks / (4 * (unused > 0 ? unused : 1));
+    bool all = mtt->params.association == BST_MTT_PMB && room > 1;
+    return !all ? 1 : room < MOST_PARTNERS ? room : MOST_PARTNERS;
 }
 
 void bst_mtt_initiate(bst_mtt *mtt, const bst_mtt_frame *frame) {
@@ -148,18 +200,21 @@ void bst_mtt_initiate(bst_mtt *mtt, const bst_mtt_frame *frame) {
     /* In a field of many uncatalogued stars, two detections at one position are one star, while two
      * at the cue's rate may be two stars: pair stationary ones first. */
     if (params->star_rate_radps > 0.0) {
-        rate_gate rest = {.history = BST_MTT_HISTORY, .rest = true};
+        rate_gate rest = {.history = BST_MTT_HISTORY, .rest = true, .partners = 1};
         start_pairs(mtt, rest, frame, false);
     }
     if (frame->cue_valid) {
         rate_gate gate = {
             .gate_radps = 4.0 * frame->cue_rate_sigma_radps + params->cue_rate_margin_radps,
-            .history = BST_MTT_HISTORY};
+            .history = BST_MTT_HISTORY,
+            .partners = most_partners(mtt)};
         start_pairs(mtt, gate, frame, true);
     }
     /* without the cue the gate is wide: search only the newest frame, and keep a quarter of the
      * slots free for pairs at the cue's rate */
-    rate_gate gate = {
-        .gate_radps = params->max_rate_radps, .reserve = params->max_tracks / 4, .history = 1};
+    rate_gate gate = {.gate_radps = params->max_rate_radps,
+                      .reserve = params->max_tracks / 4,
+                      .history = 1,
+                      .partners = most_partners(mtt)};
     start_pairs(mtt, gate, frame, false);
 }

@@ -72,6 +72,9 @@ static void lay_out(bst_mtt *m) {
     BST_ARENA_TAKE(a, m->shared, nt);
     BST_ARENA_TAKE(a, m->observable, nt);
     BST_ARENA_TAKE(a, m->departed_chi2, nt);
+    if (p->association == BST_MTT_PMB) {
+        bst_mtt_joint_lay_out(&m->joint, (int)nt, p->max_detections, a);
+    }
     bst_mtt_pool_lay_out(&m->now, p->max_detections, a);
     for (int h = 0; h < BST_MTT_HISTORY; h++) {
         bst_mtt_pool_lay_out(&m->history[h], p->max_detections, a);
@@ -283,9 +286,12 @@ static void update_filter(bst_mtt *m, int t) {
     bst_mtt_track *track = &m->tracks[t];
     int given = m->detection_of_track[t];
     bool weighs = m->params.association == BST_MTT_PDA || m->params.association == BST_MTT_MIXTURE;
-    bool apart = m->params.association == BST_MTT_MIXTURE && m->params.filter != BST_FILTER_IMM;
+    bool apart = m->params.association >= BST_MTT_MIXTURE && m->params.filter != BST_FILTER_IMM;
     int components = apart ? BST_FILTER_COMPONENTS : 1;
     bst_filter_candidate candidates[BST_MTT_CANDIDATES];
+    if (m->params.association == BST_MTT_PMB && bst_mtt_joint_update(m, t, components)) {
+        return;
+    }
     if (!weighs || track->status == BST_TRACK_TENTATIVE || track->star || m->shared[t]) {
         if (given >= 0) {
             candidates[0] = (bst_filter_candidate){.measurement = &m->now.items[given].sky,
@@ -370,8 +376,8 @@ static double chi2_limit(int dof) {
 static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
     int dof = 2 * (track->hits - 2);
     if (track->at_rest || track->hits < m->params.confirm_hits ||
-        track->score < m->params.confirm_score || (dof > 0 && track->chi2 > chi2_limit(dof)) ||
-        bst_mtt_may_be_fixed(m, track)) {
+        track->score < m->params.confirm_score || !bst_mtt_joint_exists(m, track) ||
+        (dof > 0 && track->chi2 > chi2_limit(dof)) || bst_mtt_may_be_fixed(m, track)) {
         return false;
     }
     /* a second track of an object that is already tracked is not confirmed */
@@ -390,6 +396,9 @@ static bool may_confirm(const bst_mtt *m, const bst_mtt_track *track) {
 static bool must_delete(const bst_mtt *m, const bst_mtt_track *track, bool observed) {
     const bst_mtt_params *p = &m->params;
     double variance = fmax(track->state.covariance[0][0], track->state.covariance[1][1]);
+    if (bst_mtt_joint_is_gone(m, track)) {
+        return true;
+    }
     if (track->asleep) {
         return m->seconds - track->last_update_s > p->max_dormant_s ||
                !(variance < p->max_dormant_sigma_rad * p->max_dormant_sigma_rad) ||
@@ -529,6 +538,9 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
         unused += !m->now.used[i];
     }
     m->clutter += frame->partial ? 0.0 : CLUTTER_GAIN * (unused - m->clutter);
+    if (m->params.association == BST_MTT_PMB) {
+        bst_mtt_joint_drop_duplicates(m, SAME_CHI2);
+    }
     bst_mtt_update_orbits(m, frame);
     maintain_tracks(m, frame);
     bst_mtt_initiate(m, frame);

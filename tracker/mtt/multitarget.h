@@ -36,6 +36,9 @@ typedef enum bst_mtt_association {
     /* as PDA, but the filter keeps the likeliest association hypotheses as a mixture, so that later
      * detections decide; with BST_FILTER_IMM equal to PDA */
     BST_MTT_MIXTURE,
+    /* joint probabilities of all tracks and detections, with existence probabilities and merged
+     * measurements (joint_association.h); filters keep mixtures as with BST_MTT_MIXTURE */
+    BST_MTT_PMB,
 } bst_mtt_association;
 
 typedef struct bst_mtt_params {
@@ -137,6 +140,7 @@ typedef struct bst_mtt_track {
     int apart;
     int frames;       /* frames since the first detection in which it was observable */
     double score;     /* log-likelihood ratio against clutter */
+    double existence; /* probability that the object exists; BST_MTT_PMB only */
     double chi2;      /* sum over the hits after initiation, 2 degrees of freedom each */
     double last_chi2; /* of the latest detection; negative if the latest frame had none */
     int64_t first_tick, last_update_tick;

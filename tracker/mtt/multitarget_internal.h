@@ -5,6 +5,7 @@
 #include "boresight/archive.h"
 #include "sim/core/arena.h"
 #include "tracker/mtt/assignment.h"
+#include "tracker/mtt/joint_association.h"
 #include "tracker/mtt/multitarget.h"
 
 /* Number of frames whose unused detections are kept for two-point initiation. */
@@ -81,6 +82,7 @@ struct bst_mtt {
     double (*extra)[3];      /* extra covariance of a shared detection, tangent axes of the track */
     bst_mtt_sharing *shared;
     bool *observable;
+    bst_mtt_joint joint;   /* BST_MTT_PMB only */
     double *departed_chi2; /* chi-square of a manoeuvre detected in this frame with the wider gate;
                               0: none */
 };
@@ -110,6 +112,10 @@ double bst_mtt_brightness_cost(const bst_mtt_track *track, const bst_mtt_detecti
 
 /* Assigns shared detections to missed confirmed tracks next to a neighbour. */
 void bst_mtt_share(bst_mtt *mtt);
+
+/* Detections in the gate of track t and their costs (-ln of the likelihood ratio against clutter):
+ * at most BST_MTT_CANDIDATES, the likeliest. Returns their number. */
+int bst_mtt_gate(const bst_mtt *mtt, int t, int *columns, double *costs);
 
 /* Detections in the gate of track t that no other confirmed track has: at most BST_MTT_CANDIDATES,
  * the likeliest. Returns their number. */
@@ -152,6 +158,10 @@ double bst_mtt_event_probability(const bst_mtt_params *params, double dt_s);
  *            detection if that is likelier than a miss and clutter together; then its covariance is
  *            increased by the manoeuvre's process noise over that time. */
 void bst_mtt_gate_manoeuvres(bst_mtt *mtt);
+
+/* Splits missed tracks into two objects that were unresolved until now, if two unused detections
+ * are likelier so than as clutter. BST_MTT_PMB only. */
+void bst_mtt_split_tracks(bst_mtt *m);
 
 /* Tests the innovations of a track's latest hits for a manoeuvre.
  *

@@ -1,0 +1,198 @@
+"""Stone Soup's trackers on the detections of tests/tracker/close_scenes.h.
+
+    python3 -m venv VENV && VENV/bin/pip install stonesoup==1.9 ortools
+    VENV/bin/python tests/tracker/compare_stone_soup.py PROGRAM [SCENE ...] [--seeds N] [--tune N]
+
+PROGRAM is test_tracker_close_objects: it writes the detections and scores the tracks, so that both
+trackers are judged by the same code. GNN (two-dimensional assignment), JPDA and MFA (multi-frame
+assignment) are tuned per scene over GRID, by the mean GOSPA of the first `--tune` seeds, and then
+run with the best over `--seeds`. With `--shared` GNN, which is the fastest, is tuned for all three. Stone Soup knows the motion model, the true density of false alarms
+and the covariance of each detection.
+"""
+
+import argparse
+import datetime
+import subprocess
+import time
+
+import numpy as np
+from stonesoup.dataassociator.mfa import MFADataAssociator
+from stonesoup.dataassociator.neighbour import GNNWith2DAssignment
+from stonesoup.dataassociator.probability import JPDAwithEHM
+from stonesoup.deleter.time import UpdateTimeStepsDeleter
+from stonesoup.functions import gm_reduce_single
+from stonesoup.hypothesiser.distance import DistanceHypothesiser
+from stonesoup.hypothesiser.mfa import MFAHypothesiser
+from stonesoup.hypothesiser.probability import PDAHypothesiser
+from stonesoup.initiator.simple import MultiMeasurementInitiator
+from stonesoup.measures import Mahalanobis
+from stonesoup.models.measurement.linear import LinearGaussian
+from stonesoup.models.transition.linear import (CombinedLinearGaussianTransitionModel,
+                                                ConstantVelocity)
+from stonesoup.predictor.kalman import KalmanPredictor
+from stonesoup.types.array import StateVectors
+from stonesoup.types.detection import Detection
+from stonesoup.types.mixture import GaussianMixture
+from stonesoup.types.numeric import Probability
+from stonesoup.types.state import GaussianState, TaggedWeightedGaussianState
+from stonesoup.types.update import GaussianMixtureUpdate, GaussianStateUpdate
+from stonesoup.updater.kalman import KalmanUpdater
+
+START = datetime.datetime(2000, 1, 1)
+FIELD_PX = 512.0
+# false alarms per frame and probability of detection of each scene, as in close_scenes.h
+SCENES = {"formation7": (1, 0.95), "formation12": (10, 0.95), "crossings": (5, 0.95),
+          "clutter": (30, 0.9), "dropped": (5, 0.8), "dim_crossings": (10, 0.97)}
+# sigma of a new track's rate (px/s), detections that confirm a track, frames without one that end it
+GRID = [(6.0, 2, 4), (6.0, 3, 4), (6.0, 3, 10), (3.0, 3, 10)]
+FIGURES = ("gospa_px", "ospa2_px", "ghosts", "purity", "switches", "coverage", "false_tracks")
+
+
+def read_scene(program, scene, seed):
+    """Detections of each frame."""
+    text = subprocess.run([program, "write", scene, str(seed)], check=True, capture_output=True,
+                          text=True).stdout
+    frames = [set() for _ in range(60)]
+    for line in text.splitlines():
+        frame, x, y, sigma, _, _ = (float(word) for word in line.split())
+        model = LinearGaussian(4, (0, 2), np.diag([sigma**2, sigma**2]))
+        when = START + datetime.timedelta(seconds=frame)
+        frames[int(frame)].add(Detection([[x], [y]], timestamp=when, measurement_model=model))
+    return frames
+
+
+def tagged(state, weight, tag):
+    return TaggedWeightedGaussianState(state.state_vector, state.covar, timestamp=state.timestamp,
+                                       weight=weight, tag=tag)
+
+
+class Tracker:
+    """A tracker of Stone Soup's parts."""
+
+    def __init__(self, kind, scene, sigma_rate, points, patience):
+        alarms, probability = SCENES[scene]
+        density = max(alarms, 0.1) / FIELD_PX**2
+        axis = ConstantVelocity(0.0067**2)  # 0.02 arcsec/s^1.5 at 3 arcsec a pixel
+        self.kind = kind
+        self.predictor = KalmanPredictor(CombinedLinearGaussianTransitionModel([axis, axis]))
+        self.updater = KalmanUpdater(None)
+        near = DistanceHypothesiser(self.predictor, self.updater, Mahalanobis(), missed_distance=4)
+        likely = PDAHypothesiser(self.predictor, self.updater, clutter_spatial_density=density,
+                                 prob_detect=probability, prob_gate=0.9997)
+        if kind == "gnn":
+            self.associator = GNNWith2DAssignment(near)
+        elif kind == "jpda":
+            self.associator = JPDAwithEHM(likely)
+        else:
+            self.associator = MFADataAssociator(MFAHypothesiser(likely), slide_window=3)
+        prior = GaussianState([[0], [0], [0], [0]], np.diag([1, sigma_rate**2] * 2))
+        self.initiator = MultiMeasurementInitiator(
+            prior, deleter=UpdateTimeStepsDeleter(2), data_associator=GNNWith2DAssignment(near),
+            updater=self.updater, min_points=points)
+        self.deleter = UpdateTimeStepsDeleter(patience)
+        self.tracks = set()
+
+    def mixture(self, hypotheses, when):
+        """Update of a track of multi-frame assignment."""
+        parts = []
+        for hypothesis in hypotheses:
+            state = self.updater.update(hypothesis) if hypothesis else hypothesis.prediction
+            parts.append(tagged(state, hypothesis.prediction.weight, hypothesis.prediction.tag))
+        best = max(hypotheses, key=lambda h: float(h.prediction.weight))
+        hit = bool(best)
+        mixture = GaussianMixture(parts)
+        return (GaussianMixtureUpdate(hypothesis=hypotheses, components=parts) if hit
+                else mixture), best.measurement if hit else None
+
+    def step(self, detections, when):
+        """One frame."""
+        free = set(detections)
+        joint = self.associator.associate(self.tracks, detections, when)
+        for track, hypothesis in joint.items():
+            if self.kind == "gnn":
+                if hypothesis:
+                    track.append(self.updater.update(hypothesis))
+                    free.discard(hypothesis.measurement)
+                else:
+                    track.append(hypothesis.prediction)
+            elif self.kind == "jpda":
+                states = [self.updater.update(h) if h else h.prediction for h in hypothesis]
+                weights = np.array([float(h.probability) for h in hypothesis])
+                mean, covar = gm_reduce_single(
+                    StateVectors([s.state_vector for s in states]),
+                    np.stack([s.covar for s in states], axis=2), weights / weights.sum())
+                missed = next(h.probability for h in hypothesis if not h)
+                hits = [h for h in hypothesis if h and h.probability > missed]
+                free -= {h.measurement for h in hits}
+                if hits:
+                    track.append(GaussianStateUpdate(mean, covar, hypothesis, timestamp=when))
+                else:
+                    track.append(GaussianState(mean, covar, timestamp=when))
+            else:
+                state, taken = self.mixture(hypothesis, when)
+                track.append(state)
+                free.discard(taken)
+        self.tracks -= self.deleter.delete_tracks(self.tracks)
+        for track in self.initiator.initiate(free, when):
+            if self.kind == "mfa":
+                track.append(GaussianMixtureUpdate(
+                    hypothesis=track.state.hypothesis,
+                    components=[tagged(track.state, Probability(1), [])]))
+            self.tracks.add(track)
+
+    def places(self):
+        """Identity and position of each track."""
+        for track in self.tracks:
+            state = track.state
+            if self.kind == "mfa":
+                state = max(state.components, key=lambda c: float(c.weight))
+            yield track.id, float(state.state_vector[0]), float(state.state_vector[2])
+
+
+def run(program, kind, scene, seed, settings):
+    """Figures of a scene, and processor time per frame in microseconds."""
+    tracker, lines, names = Tracker(kind, scene, *settings), [], {}
+    frames = read_scene(program, scene, seed)
+    before = time.process_time()
+    for frame, detections in enumerate(frames):
+        tracker.step(detections, START + datetime.timedelta(seconds=frame))
+        for name, x, y in tracker.places():
+            number = names.setdefault(name, len(names) + 1)
+            lines.append(f"{frame} {number} {x:.6f} {y:.6f}")
+    spent = time.process_time() - before
+    words = subprocess.run([program, "score", scene, str(seed)], input="\n".join(lines), check=True,
+                           capture_output=True, text=True).stdout.split()
+    figures = {name: float(words[words.index(name) + 1]) for name in FIGURES}
+    figures["us_per_frame"] = 1e6 * spent / len(frames)
+    return figures
+
+
+def mean(results, name):
+    total = sum(r[name] for r in results)
+    return total if name in ("ghosts", "switches", "false_tracks") else total / len(results)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("program")
+    parser.add_argument("scenes", nargs="*")
+    parser.add_argument("--seeds", type=int, default=8)
+    parser.add_argument("--tune", type=int, default=1)
+    parser.add_argument("--shared", action="store_true")
+    arguments = parser.parse_args()
+    for scene in arguments.scenes or SCENES:
+        best = None
+        for kind in ("gnn", "jpda", "mfa"):
+            def tuned(settings, kind=kind, scene=scene):
+                return mean([run(arguments.program, kind, scene, seed, settings)
+                             for seed in range(arguments.tune)], "gospa_px")
+            best = best if best and arguments.shared else min(GRID, key=tuned)
+            results = [run(arguments.program, kind, scene, seed, best)
+                       for seed in range(arguments.seeds)]
+            print(scene, kind, "rate sigma, points, patience", best,
+                  *(f"{name} {mean(results, name):.4g}" for name in (*FIGURES, "us_per_frame")),
+                  flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,290 @@
+/* Close and crossing objects against their truth: GOSPA, OSPA(2), ghosts, purity, identities.
+ *
+ *     test_close_objects                               the short form, as a test
+ *     test_close_objects run ASSOCIATION SCENE SEEDS   means of a scene over seeds 0 .. SEEDS - 1
+ *     test_close_objects write SCENE SEED              truth and detections, for another tracker
+ *     test_close_objects score SCENE SEED              tracks on standard input: FRAME ID X Y
+ *
+ * compare_stone_soup.py gives Stone Soup's figures on the same detections. */
+#include <time.h>
+
+#include "sim/eval/track_metrics.h"
+#include "tests/tracker/close_scenes.h"
+
+#define AS BST_ARCSEC_RAD
+/* Tracks within 3 px of an object are the object's: below the least distance of a resolved pair. */
+#define CUTOFF_PX 3.0
+/* The first frames, in which no tracker has its tracks yet, are not scored. */
+#define FIRST_SCORED 5
+#define MAX_TRACKS 2000
+#define MAX_AT_ONCE 64
+
+static const char *const associations[] = {"gnn", "nearest", "pda", "mixture", "pmb"};
+
+/* Parameters as of the tracker's default configuration at 3 arcsec a pixel. */
+static bst_mtt_params parameters(bst_mtt_association association) {
+    return (bst_mtt_params){.max_tracks = 256,
+                            .max_detections = CLOSE_DETECTIONS,
+                            .association = association,
+                            .noise_rad2ps3 = pow(0.02 * AS, 2),
+                            .manoeuvre_noise_rad2ps3 = pow(3 * AS, 2),
+                            .quiescent_sojourn_s = 3600,
+                            .manoeuvre_sojourn_s = 60,
+                            .gate_chi2 = 16,
+                            .detection_probability = 0.9,
+                            .false_alarms_per_frame = 1,
+                            .field_sr = pow(CLOSE_FIELD_PX * CLOSE_PIXEL_RAD, 2),
+                            .pixel_rad = CLOSE_PIXEL_RAD,
+                            .confirm_hits = 3,
+                            .confirm_frames = 5,
+                            .confirm_score = 12,
+                            .max_rate_radps = 120 * AS,
+                            .initiation_gap_s = 5,
+                            .max_misses = 12,
+                            .max_coast_s = 120,
+                            .max_sigma_rad = 60 * AS,
+                            .merge_rad = 6 * CLOSE_PIXEL_RAD,
+                            .merge_floor_rad = 0.3 * CLOSE_PIXEL_RAD,
+                            .max_merged_frames = 60,
+                            .star_rate_radps = 0.5 * AS,
+                            .motion_chi2 = 25,
+                            .max_stationary_tracks = 4096,
+                            .brightness_systematic_mag = 0.2,
+                            .brightness_random_walk_mag = 0.05,
+                            .event_window = 8,
+                            .false_events_per_hour = 0.01,
+                            .max_dormant_tracks = 64,
+                            .max_dormant_s = 7200,
+                            .max_dormant_sigma_rad = BST_DEG_RAD,
+                            .dormant_gate_chi2 = 18.5};
+}
+
+/* Tracks of a frame, in px. */
+typedef struct shown {
+    int64_t id[MAX_AT_ONCE];
+    double x[MAX_AT_ONCE], y[MAX_AT_ONCE];
+    int count;
+} shown;
+
+static void score_frame(bst_track_metrics *metrics, const close_scene *scene, int frame,
+                        const shown *tracks) {
+    bst_ctx ctx = {0};
+    bst_vec3 truth[CLOSE_OBJECTS], directions[MAX_AT_ONCE];
+    bool visible[CLOSE_OBJECTS];
+    for (int i = 0; i < scene->kind->objects; i++) {
+        double x, y;
+        close_place(&scene->objects[i], frame, &x, &y);
+        truth[i] = close_direction(x, y);
+        visible[i] = true;
+    }
+    for (int t = 0; t < tracks->count; t++) {
+        directions[t] = close_direction(tracks->x[t], tracks->y[t]);
+    }
+    if (frame >= FIRST_SCORED) {
+        bst_assert_ok(&ctx, bst_track_metrics_frame(&ctx, metrics, frame, truth, visible,
+                                                    tracks->id, directions, tracks->count));
+    }
+}
+
+/* The confirmed tracks of the tracker. */
+static void show(const bst_mtt *mtt, shown *out) {
+    int n;
+    const bst_mtt_track *tracks = bst_mtt_tracks(mtt, &n);
+    out->count = 0;
+    for (int t = 0; t < n && out->count < MAX_AT_ONCE; t++) {
+        if (tracks[t].status != BST_TRACK_TENTATIVE && !tracks[t].star && !tracks[t].asleep) {
+            int i = out->count++;
+            out->id[i] = tracks[t].id;
+            close_pixel(tracks[t].state.direction, &out->x[i], &out->y[i]);
+        }
+    }
+}
+
+static double processor_s(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static bst_track_metrics *open_metrics(const close_kind *kind) {
+    bst_ctx ctx = {0};
+    bst_track_metrics *metrics;
+    bst_assert_ok(&ctx, bst_track_metrics_create(&ctx, kind->objects, MAX_TRACKS, MAX_AT_ONCE,
+                                                 CUTOFF_PX * CLOSE_PIXEL_RAD, &metrics));
+    return metrics;
+}
+
+/* Tracks one scene; adds the tracker's processor time. */
+static bst_track_figures track_scene(bst_mtt_association association, const close_kind *kind,
+                                     uint64_t seed, double *spent_s) {
+    static close_scene scene;
+    static shown tracks;
+    bst_ctx ctx = {0};
+    bst_mtt *mtt;
+    const bst_mtt_params params = parameters(association);
+    bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));
+    bst_track_metrics *metrics = open_metrics(kind);
+    close_open(&scene, kind, seed);
+    for (int k = 0; k < CLOSE_FRAMES; k++) {
+        bst_mtt_detection list[CLOSE_DETECTIONS];
+        close_expose(&scene, k);
+        for (int i = 0; i < scene.count; i++) {
+            const close_detection *d = &scene.list[i];
+            double variance = pow(d->sigma * CLOSE_PIXEL_RAD, 2);
+            list[i] = (bst_mtt_detection){.sky = {.direction = close_direction(d->x, d->y),
+                                                  .cov_11 = variance,
+                                                  .cov_22 = variance},
+                                          .x_px = d->x,
+                                          .y_px = d->y,
+                                          .v_mag = d->v_mag,
+                                          .v_mag_sigma = 1.0857 / d->snr,
+                                          .snr = d->snr,
+                                          .length_rad = 2 * CLOSE_PIXEL_RAD,
+                                          .width_px = 2};
+        }
+        bst_mtt_frame frame = {
+            .tick = k * 1000, .seconds = k, .detections = list, .count = scene.count};
+        double before = processor_s();
+        bst_mtt_step(mtt, &frame);
+        *spent_s += processor_s() - before;
+        show(mtt, &tracks);
+        score_frame(metrics, &scene, k, &tracks);
+    }
+    bst_track_figures figures;
+    bst_track_metrics_figures(metrics, &figures);
+    bst_track_metrics_free(metrics);
+    bst_mtt_free(mtt);
+    return figures;
+}
+
+static void print_figures(const char *name, const bst_track_figures *f) {
+    printf(
+        "%s gospa_px %.4f ospa2_px %.4f ghosts %d purity %.4f switches %d coverage %.4f "
+        "false_tracks %d confirm_s %.2f\n",
+        name, f->gospa_mean / CLOSE_PIXEL_RAD, f->ospa2_mean / CLOSE_PIXEL_RAD, f->ghosts,
+        f->purity, f->breaks, f->coverage, f->false_tracks, f->time_to_confirm_s);
+}
+
+/* Means and sums over seeds. */
+static bst_track_figures over_seeds(bst_mtt_association association, const close_kind *kind,
+                                    int seeds, bool print, double *us_per_frame) {
+    bst_track_figures all = {0};
+    double spent_s = 0.0;
+    for (int seed = 0; seed < seeds; seed++) {
+        bst_track_figures f = track_scene(association, kind, (uint64_t)seed, &spent_s);
+        if (print) {
+            char name[64];
+            snprintf(name, sizeof name, "%s %d", kind->name, seed);
+            print_figures(name, &f);
+        }
+        all.gospa_mean += f.gospa_mean / seeds;
+        all.ospa2_mean += f.ospa2_mean / seeds;
+        all.purity += f.purity / seeds;
+        all.coverage += f.coverage / seeds;
+        all.time_to_confirm_s += f.time_to_confirm_s / seeds;
+        all.ghosts += f.ghosts;
+        all.breaks += f.breaks;
+        all.false_tracks += f.false_tracks;
+    }
+    *us_per_frame = 1e6 * spent_s / seeds / CLOSE_FRAMES;
+    return all;
+}
+
+static const close_kind *find_kind(const char *name) {
+    for (int i = 0; i < CLOSE_KINDS; i++) {
+        if (strcmp(close_kinds[i].name, name) == 0) {
+            return &close_kinds[i];
+        }
+    }
+    return NULL;
+}
+
+static int run_scenes(const char *association, const char *scene, int seeds) {
+    for (int a = 0; a < (int)(sizeof associations / sizeof *associations); a++) {
+        for (int i = 0; i < CLOSE_KINDS && strcmp(associations[a], association) == 0; i++) {
+            bool all = strcmp(scene, "all") == 0;
+            if (all || strcmp(close_kinds[i].name, scene) == 0) {
+                double us;
+                bst_track_figures f =
+                    over_seeds((bst_mtt_association)a, &close_kinds[i], seeds, !all, &us);
+                print_figures(close_kinds[i].name, &f);
+                printf("%s us_per_frame %.0f\n", close_kinds[i].name, us);
+            }
+        }
+    }
+    return 0;
+}
+
+static int write_scene(const close_kind *kind, uint64_t seed) {
+    static close_scene scene;
+    close_open(&scene, kind, seed);
+    for (int k = 0; k < CLOSE_FRAMES; k++) {
+        close_expose(&scene, k);
+        for (int i = 0; i < scene.count; i++) {
+            const close_detection *d = &scene.list[i];
+            printf("%d %.6f %.6f %.6f %.4f %.3f\n", k, d->x, d->y, d->sigma, d->v_mag, d->snr);
+        }
+    }
+    return 0;
+}
+
+static int score_tracks(const close_kind *kind, uint64_t seed) {
+    static close_scene scene;
+    static shown frames[CLOSE_FRAMES];
+    int frame, room = MAX_AT_ONCE;
+    long long id;
+    double x, y;
+    while (scanf("%d %lld %lf %lf", &frame, &id, &x, &y) == 4) {
+        if (frame >= 0 && frame < CLOSE_FRAMES && frames[frame].count < room) {
+            int i = frames[frame].count++;
+            frames[frame].id[i] = id;
+            frames[frame].x[i] = x;
+            frames[frame].y[i] = y;
+        }
+    }
+    bst_track_metrics *metrics = open_metrics(kind);
+    close_open(&scene, kind, seed);
+    for (int k = 0; k < CLOSE_FRAMES; k++) {
+        score_frame(metrics, &scene, k, &frames[k]);
+    }
+    bst_track_figures figures;
+    bst_track_metrics_figures(metrics, &figures);
+    print_figures(kind->name, &figures);
+    bst_track_metrics_free(metrics);
+    return 0;
+}
+
+/* Three seeds of each scene: with existence probabilities there are no ghosts, and the mean GOSPA
+ * stays below a limit and below that of the default association, which has none. */
+static void short_form(void **state) {
+    (void)state;
+    /* px: the mean of 16 seeds in docs/results/close_objects.md and half as much again;
+     * formation12: seed 1 begins with an unresolved pair, which costs 0.3 px of the mean of three
+     * seeds */
+    static const double most_px[CLOSE_KINDS] = {0.16, 0.6, 0.32, 0.88, 0.31, 0.47};
+    for (int i = 0; i < CLOSE_KINDS; i++) {
+        double us;
+        bst_track_figures before = over_seeds(BST_MTT_MIXTURE, &close_kinds[i], 3, false, &us);
+        bst_track_figures f = over_seeds(BST_MTT_PMB, &close_kinds[i], 3, false, &us);
+        print_figures(close_kinds[i].name, &f);
+        assert_int_equal(f.ghosts, 0);
+        assert_true(f.purity > 0.999);
+        assert_true(f.gospa_mean < most_px[i] * CLOSE_PIXEL_RAD);
+        assert_true(f.gospa_mean < 1.05 * before.gospa_mean);
+    }
+}
+
+int main(int argc, char **argv) {
+    const close_kind *kind = argc == 4 ? find_kind(argv[2]) : NULL;
+    if (argc == 5 && strcmp(argv[1], "run") == 0) {
+        return run_scenes(argv[2], argv[3], atoi(argv[4]));
+    }
+    if (kind && strcmp(argv[1], "write") == 0) {
+        return write_scene(kind, (uint64_t)atoi(argv[3]));
+    }
+    if (kind && strcmp(argv[1], "score") == 0) {
+        return score_tracks(kind, (uint64_t)atoi(argv[3]));
+    }
+    const struct CMUnitTest tests[] = {cmocka_unit_test(short_form)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,140 @@
+/* Joint association with existence probabilities, by hand: competition for a detection, a miss, and
+ * merged measurements. */
+#include "tests/tracker/sky_bench.h"
+#include "tracker/mtt/multitarget_internal.h"
+#include "tracker/mtt/resolution.h"
+
+/* A bench with associations by joint probabilities; tracks are set by hand. */
+static bench *start_jointly(double merge_rad) {
+    bst_mtt_params params = defaults();
+    params.association = BST_MTT_PMB;
+    params.merge_rad = merge_rad;
+    bench *b = start(1, &params);
+    b->mtt->alarm_density = b->mtt->clutter_density = 1.0 / params.field_sr;
+    return b;
+}
+
+static bst_mtt_track *add_track(bst_mtt *m, bst_vec3 at, double sigma, double existence) {
+    int t = m->track_count++;
+    m->observable[t] = true;
+    bst_mtt_track *track = &m->tracks[t];
+    *track = (bst_mtt_track){.id = t + 1,
+                             .status = BST_TRACK_CONFIRMED,
+                             .v_mag = 12.0,
+                             .existence = existence,
+                             .may_miss = true};
+    track->state.direction = at;
+    for (int i = 0; i < 4; i++) {
+        track->state.covariance[i][i] = i < 2 ? sigma * sigma : 1e-14;
+    }
+    return track;
+}
+
+static void put(bst_mtt *m, bst_vec3 at) {
+    m->now.used[m->now.count] = false;
+    m->now.items[m->now.count++] = (bst_mtt_detection){
+        .sky = {.direction = at, .cov_11 = SIGMA * SIGMA, .cov_22 = SIGMA * SIGMA},
+        .v_mag = 12.0,
+        .v_mag_sigma = INFINITY,
+        .snr = 10};
+    bst_mtt_pool_index(&m->now);
+}
+
+/* Two tracks of existence r_i and one detection: P(i) = o_i/(1 + o_1 + o_2), with o_i the odds
+ * r_i P_D N_i/(beta (1 - r_i P_D)). Both groups and the detection form a tree: exact. */
+static void two_tracks_compete(void **state) {
+    (void)state;
+    bench *b = start_jointly(0.0);
+    bst_mtt *m = b->mtt;
+    bst_vec3 centre = bst_vec3_from_radec(1.0, 0.4);
+    const double r[2] = {0.9, 0.3}, off[2] = {0.0, 0.5 * AS}, pd = m->params.detection_probability;
+    double odds[2], sum = 1.0;
+    for (int i = 0; i < 2; i++) {
+        add_track(m, along(centre, 0.3, off[i]), SIGMA, r[i]);
+        double s = 2.0 * SIGMA * SIGMA; /* per axis */
+        double n = exp(-0.5 * off[i] * off[i] / s) / (2.0 * BST_PI * s);
+        odds[i] = r[i] * pd * n * m->params.field_sr / (1.0 - r[i] * pd);
+        sum += odds[i];
+    }
+    put(m, centre);
+    bst_mtt_associate(m, false);
+    for (int i = 0; i < 2; i++) {
+        double p = odds[i] / sum, missed = (1.0 - p) * r[i] * (1.0 - pd) / (1.0 - r[i] * pd);
+        /* 1e-6: the direction is rounded to 1e-16 rad of 5e-7 */
+        bst_assert_close(m->joint.hypothesis[m->joint.head[i]].probability / p, 1.0, 1e-6);
+        bst_assert_close(m->tracks[i].existence / (p + missed), 1.0, 1e-6);
+    }
+    assert_int_equal(m->detection_of_track[0], 0);
+    bst_mtt_free(m);
+}
+
+/* Existence after a miss in an empty frame, and of a track that cannot be missed. */
+static void misses_lower_existence(void **state) {
+    (void)state;
+    bench *b = start_jointly(18 * AS);
+    bst_mtt *m = b->mtt;
+    double pd = m->params.detection_probability;
+    add_track(m, bst_vec3_from_radec(1.0, 0.4), SIGMA, 0.8);
+    add_track(m, bst_vec3_from_radec(1.1, 0.4), SIGMA, 0.8)->may_miss = false;
+    bst_mtt_associate(m, false);
+    bst_assert_close(m->tracks[0].existence, 0.8 * (1.0 - pd) / (1.0 - 0.8 * pd), 1e-12);
+    bst_assert_close(m->tracks[1].existence, 0.8, 1e-12);
+    bst_mtt_free(m);
+}
+
+/* The centre of light of two objects, given one's place, is a measurement of the other. */
+static void merged_measurement_is_inverted(void **state) {
+    (void)state;
+    bench *b = start_jointly(18 * AS);
+    bst_mtt *m = b->mtt;
+    bst_vec3 at = bst_vec3_from_radec(1.0, 0.4);
+    bst_mtt_track *a = add_track(m, at, 0.1 * AS, 1.0);
+    bst_mtt_track *other = add_track(m, along(at, 0.3, 4 * AS), 0.2 * AS, 1.0);
+    other->v_mag = 12.0 + 2.5 * log10(3.0); /* a has 3/4 of the light */
+    bst_assert_close(bst_mtt_light_share(a, other), 0.75, 1e-12);
+    bst_sky_measurement z = {
+        .direction = along(at, 0.3, 1 * AS), .cov_11 = SIGMA * SIGMA, .cov_22 = SIGMA * SIGMA};
+    bst_mtt_merged fit;
+    assert_true(bst_mtt_merge(a, other, &z, 0.0, &fit));
+    /* 1e-5 AS: curvature of the sphere over 4 arcsec, and rounding */
+    assert_true(bst_vec3_angle(fit.of_a.direction, a->state.direction) < 1e-5 * AS);
+    assert_true(bst_vec3_angle(fit.of_b.direction, other->state.direction) < 1e-5 * AS);
+    double of_a = (0.3 * 0.3 + 0.0625 * 0.2 * 0.2) / 0.5625 * AS * AS;
+    double of_b = (0.3 * 0.3 + 0.5625 * 0.1 * 0.1) / 0.0625 * AS * AS;
+    bst_assert_close(fit.of_a.cov_11 / of_a, 1.0, 1e-9);
+    bst_assert_close(fit.of_b.cov_22 / of_b, 1.0, 1e-9);
+    /* exactly at merge_rad, with known places, 5 % of pairs are unresolved */
+    bst_mtt_track *far = add_track(m, along(at, 0.3, 18 * AS), 1e-6 * AS, 1.0);
+    a->state.covariance[0][0] = a->state.covariance[1][1] = 1e-12 * AS * AS;
+    bst_assert_close(bst_mtt_unresolved(18 * AS, a, far), 0.05, 1e-4);
+    bst_mtt_free(m);
+}
+
+/* One detection midway between two tracks that are closer than the resolution is of both; were they
+ * resolved, one of them would have been missed and the detection far from either. */
+static void one_detection_of_two_tracks(void **state) {
+    (void)state;
+    bench *b = start_jointly(18 * AS);
+    bst_mtt *m = b->mtt;
+    bst_vec3 at = bst_vec3_from_radec(1.0, 0.4);
+    add_track(m, at, SIGMA, 0.99);
+    add_track(m, along(at, 0.3, 6 * AS), SIGMA, 0.99);
+    put(m, along(at, 0.3, 3 * AS));
+    bst_mtt_associate(m, false);
+    for (int t = 0; t < 2; t++) {
+        assert_int_equal(m->detection_of_track[t], 0);
+        assert_int_equal(m->shared[t], BST_MTT_WIDENED);
+        assert_true(m->tracks[t].existence > 0.99);
+    }
+    bst_mtt_free(m);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(two_tracks_compete),
+        cmocka_unit_test(misses_lower_existence),
+        cmocka_unit_test(merged_measurement_is_inverted),
+        cmocka_unit_test(one_detection_of_two_tracks),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,101 @@
+#include "tracker/mtt/resolution.h"
+
+#include <assert.h>
+#include <math.h>
+
+/* -ln of the probability of an unresolved pair at merge_rad: 5 % */
+static const double LOG_RARE = 2.9957;
+/* a share of light below this carries no information on the position */
+static const double LEAST_SHARE = 1e-3;
+
+/* Position covariance of a track (11, 12, 22) in the tangent axes of a direction nearby. */
+static void position_covariance(const bst_sky_state *state, bst_vec3 direction, double out[3]) {
+    double p[4][4];
+    bst_sky_turn_covariance(state, direction, p);
+    out[0] = p[0][0];
+    out[1] = p[0][1];
+    out[2] = p[1][1];
+}
+
+double bst_mtt_unresolved(double merge_rad, const bst_mtt_track *a, const bst_mtt_track *b) {
+    bst_vec3 d = a->state.direction, to = bst_tangent_log(d, b->state.direction);
+    bst_tangent axes = bst_tangent_at(d);
+    double x = bst_vec3_dot(to, axes.e1), y = bst_vec3_dot(to, axes.e2), pa[3], pb[3];
+    position_covariance(&a->state, d, pa);
+    position_covariance(&b->state, d, pb);
+    double s2 = 0.5 * merge_rad * merge_rad / LOG_RARE;
+    double p11 = s2 + pa[0] + pb[0], p12 = pa[1] + pb[1], p22 = s2 + pa[2] + pb[2];
+    double det = p11 * p22 - p12 * p12;
+    double chi2 = (p22 * x * x - 2.0 * p12 * x * y + p11 * y * y) / det;
+    return det > 0.0 ? s2 / sqrt(det) * exp(-0.5 * chi2) : 0.0;
+}
+
+double bst_mtt_light_share(const bst_mtt_track *a, const bst_mtt_track *b) {
+    return 1.0 / (1.0 + pow(10.0, 0.4 * (a->v_mag - b->v_mag)));
+}
+
+/* Measurement of the direction of a track with share w of the light: nu is the measured centre of
+ * light minus the predicted track, other the other's contribution to it, both in the axes of the
+ * track; r the covariance of their difference. */
+static bst_sky_measurement implied(const bst_sky_state *state, double w, const double nu[2],
+                                   const double other[2], const double r[3]) {
+    bst_tangent axes = bst_tangent_at(state->direction);
+    w = fmax(w, LEAST_SHARE);
+    bst_sky_measurement out;
+    out.direction =
+        bst_tangent_exp(state->direction,
+                        bst_tangent_vector(&axes, (nu[0] - other[0]) / w, (nu[1] - other[1]) / w));
+    bst_tangent own = bst_tangent_at(out.direction);
+    double c, s, a = r[0] / (w * w), b = r[1] / (w * w), e = r[2] / (w * w);
+    bst_tangent_turn(state->direction, &axes, out.direction, &own, &c, &s);
+    out.cov_11 = c * c * a + 2 * c * s * b + s * s * e;
+    out.cov_12 = -c * s * a + (c * c - s * s) * b + c * s * e;
+    out.cov_22 = s * s * a - 2 * c * s * b + c * c * e;
+    return out;
+}
+
+/* The part of bst_mtt_merge for track a. */
+static bool merge_one(const bst_mtt_track *a, const bst_mtt_track *b,
+                      const bst_sky_measurement *measurement, double floor_rad, bst_mtt_merged *fit,
+                      bst_sky_measurement *out) {
+    bst_sky_innovation innovation;
+    if (!bst_sky_innovate(&a->state, measurement, NULL, &innovation)) {
+        return false;
+    }
+    double wa = bst_mtt_light_share(a, b), wb = 1.0 - wa, pa[3], pb[3], r[3], s[3];
+    bst_tangent axes = bst_tangent_at(a->state.direction);
+    bst_vec3 to = bst_tangent_log(a->state.direction, b->state.direction);
+    double other[2] = {wb * bst_vec3_dot(to, axes.e1), wb * bst_vec3_dot(to, axes.e2)};
+    position_covariance(&a->state, a->state.direction, pa);
+    position_covariance(&b->state, a->state.direction, pb);
+    for (int i = 0; i < 3; i++) {
+        double floor2 = i == 1 ? 0.0 : floor_rad * floor_rad;
+        r[i] = innovation.r[i] + wb * wb * pb[i] + floor2;
+        s[i] = r[i] + wa * wa * pa[i];
+    }
+    double x = innovation.nu[0] - other[0], y = innovation.nu[1] - other[1];
+    double det = s[0] * s[2] - s[1] * s[1];
+    if (!(det > 0.0)) {
+        return false;
+    }
+    fit->chi2 = (s[2] * x * x - 2.0 * s[1] * x * y + s[0] * y * y) / det;
+    fit->log_likelihood = -0.5 * fit->chi2 - 0.5 * log(det) - log(2.0 * BST_PI);
+    *out = implied(&a->state, wa, innovation.nu, other, r);
+    return true;
+}
+
+bool bst_mtt_merge(const bst_mtt_track *a, const bst_mtt_track *b,
+                   const bst_sky_measurement *measurement, double floor_rad, bst_mtt_merged *out) {
+    assert(a && b && measurement && out);
+    return merge_one(b, a, measurement, floor_rad, out, &out->of_b) &&
+           merge_one(a, b, measurement, floor_rad, out, &out->of_a);
+}
+
+double bst_mtt_merged_brightness_cost(const bst_mtt_track *a, const bst_mtt_track *b,
+                                      const bst_mtt_detection *detection) {
+    double v = a->v_mag + 2.5 * log10(bst_mtt_light_share(a, b));
+    double variance = fmax(a->v_mag_variance, b->v_mag_variance) + 0.09 +
+                      detection->v_mag_sigma * detection->v_mag_sigma;
+    double chi2 = (v - detection->v_mag) * (v - detection->v_mag) / variance;
+    return isfinite(chi2) ? 0.5 * fmin(chi2, 9.0) : 0.0;
+}

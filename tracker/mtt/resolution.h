@@ -1,0 +1,33 @@
+/* Model of the sensor's resolution: when two objects give one measurement, and what it measures
+ * (Koch and van Keuk, IEEE Trans. AES 33, 1997). */
+#ifndef BST_TRACKER_MTT_RESOLUTION_H
+#define BST_TRACKER_MTT_RESOLUTION_H
+
+#include "tracker/mtt/multitarget.h"
+
+/* Probability that two predicted tracks are unresolved: the mean of exp(-d^2 / (2 s^2)) over their
+ * separation d. s makes it 5 % at merge_rad. */
+double bst_mtt_unresolved(double merge_rad, const bst_mtt_track *a, const bst_mtt_track *b);
+
+/* Share of track a in the light of a and b. */
+double bst_mtt_light_share(const bst_mtt_track *a, const bst_mtt_track *b);
+
+/* A merged measurement of two tracks. */
+typedef struct bst_mtt_merged {
+    double log_likelihood, chi2; /* rad^-2; 2 degrees of freedom */
+    /* direction of each track that the measurement implies, given the other's prediction */
+    bst_sky_measurement of_a, of_b;
+} bst_mtt_merged;
+
+/* Evaluates a detection as the centre of light of tracks a and b.
+ *
+ * Given:     floor_rad  1 sigma per axis added to the measurement
+ * Returned:  false if a covariance is not positive definite */
+bool bst_mtt_merge(const bst_mtt_track *a, const bst_mtt_track *b,
+                   const bst_sky_measurement *measurement, double floor_rad, bst_mtt_merged *out);
+
+/* Brightness term (-ln likelihood, at most 4.5) of a detection of the light of a and b together. */
+double bst_mtt_merged_brightness_cost(const bst_mtt_track *a, const bst_mtt_track *b,
+                                      const bst_mtt_detection *detection);
+
+#endif
