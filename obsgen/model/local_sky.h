@@ -33,7 +33,8 @@ typedef struct bst_local_sky {
     int places_room;
     double sigma; /* for which the tables are computed; 0: none */
     float light[BST_LOCAL_SKY_HEIGHTS], square[BST_LOCAL_SKY_HEIGHTS];
-    float *pixels; /* number of pixels about sources by mesh and light: [mesh][BST_LOCAL_SKY_BINS] */
+    float
+        *pixels; /* number of pixels about sources by mesh and light: [mesh][BST_LOCAL_SKY_BINS] */
     int pixels_room;
 } bst_local_sky;
 
