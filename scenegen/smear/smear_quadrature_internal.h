@@ -88,6 +88,9 @@ typedef struct bst_smear_direction_parts {
     double second, higher, missed;      /* of left-out covariance, of higher moments, of `missed` */
     bool in_range[BST_NODE_DIRECTIONS]; /* directions in which the image may move */
 } bst_smear_direction_parts;
+
+/* Parts of the errors of a rule of `nodes` nodes for a group with this axis: 1 without the PSF's
+ * derivatives. */
 bst_smear_direction_parts bst_smear_find_direction_parts(const bst_smear_maker *m,
                                                          const double axis[3], int nodes);
 /* The part of `missed` in a row of such groups, if the image moves by `scale` of the path. */
