@@ -12,37 +12,12 @@
  * variance is 1 + 1/2 of a mesh's. */
 static const double CLIP_SIGMA = 3.0, AGREEMENT = 4.0 * 1.2247449;
 
-enum { PER_SNR = 4, PER_NOISE = 16 };
+/* MANY_PX: as in imgproc/detect/background.c, which reads half of the rows of a mesh of so many. */
+enum { PER_SNR = 4, PER_NOISE = 4, MANY_PX = 4096 };
 
 /* Normal density. */
 static double density(double z) {
     return exp(-0.5 * z * z) / sqrt(2.0 * BST_PI);
-}
-
-/* Moments of order 0 to 2 of normal values about w, of which only those within the clip count. */
-static void clipped_moments(double w, double out[3]) {
-    double a = -CLIP_SIGMA - w, b = CLIP_SIGMA - w, p = density(a), q = density(b);
-    double all = 0.5 * (erf(b / sqrt(2.0)) - erf(a / sqrt(2.0)));
-    double first = p - q, second = all + a * p - b * q; /* about w */
-    out[0] = all;
-    out[1] = w * all + first;
-    out[2] = w * w * all + 2.0 * w * first + second;
-}
-
-/* Tabulates the influence of a pixel's light. */
-static void tabulate_influence(bst_local_sky *sky) {
-    const double faint = 0.05; /* for the derivatives */
-    double dark[3], dim[3];
-    clipped_moments(0.0, dark);
-    clipped_moments(faint, dim);
-    double mean = dark[2] / dark[0], slope = dim[1] / faint;
-    double bend = (dim[2] - mean * dim[0]) / (faint * faint);
-    for (int i = 0; i < BST_LOCAL_SKY_LIGHTS; i++) {
-        double at[3];
-        clipped_moments((double)i / PER_NOISE, at);
-        sky->influence[i][0] = (float)(at[1] / slope);
-        sky->influence[i][1] = (float)((at[2] - mean * at[0]) / bend);
-    }
 }
 
 /* Tabulates light and squared light of a line below the clip, by its height. */
@@ -54,7 +29,6 @@ static void tabulate(bst_local_sky *sky, double sigma_px) {
         sky->square[i] = (float)(height * peak * sqrt(0.5) * erfc(sqrt(2.0 * flank)));
     }
     sky->sigma = sigma_px;
-    tabulate_influence(sky);
 }
 
 /* Mesh and fraction of a pixel coordinate. */
@@ -119,6 +93,7 @@ bst_status bst_local_sky_begin(bst_ctx *ctx, bst_local_sky *sky, int width, int 
 void bst_local_sky_free(bst_local_sky *sky) {
     free(sky->level);
     free(sky->places);
+    free(sky->pixels);
     *sky = (bst_local_sky){0};
 }
 
@@ -138,6 +113,22 @@ void bst_local_sky_add(bst_local_sky *sky, int x, int y, double height, double l
     sky->noise[k] += length * (sky->square[i] + part * (sky->square[i + 1] - sky->square[i]));
 }
 
+bst_status bst_local_sky_begin_wings(bst_ctx *ctx, bst_local_sky *sky) {
+    assert(sky && sky->columns > 0);
+    int room = sky->columns * sky->rows * BST_LOCAL_SKY_BINS;
+    if (room > sky->pixels_room) {
+        float *more = realloc(sky->pixels, (size_t)room * sizeof *more);
+        if (!more) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the light of %d meshes",
+                            sky->columns * sky->rows);
+        }
+        sky->pixels = more;
+        sky->pixels_room = room;
+    }
+    memset(sky->pixels, 0, (size_t)room * sizeof *sky->pixels);
+    return BST_OK;
+}
+
 void bst_local_sky_add_wings(bst_local_sky *sky, double x, double y, double reach_px,
                              bst_local_sky_light_fn light, const void *user) {
     assert(sky && light && reach_px > 0.0);
@@ -150,15 +141,54 @@ void bst_local_sky_add_wings(bst_local_sky *sky, double x, double y, double reac
         for (int i = left; i <= right; i += STEP) {
             double distance = hypot(i - x, j - y);
             double at = distance <= reach_px ? PER_NOISE * light(user, distance) : 0.0;
-            if (!(at > 0.0 && at < BST_LOCAL_SKY_LIGHTS - 1.0)) {
+            if (!(at > 0.0)) {
                 continue;
             }
+            at = fmin(at, BST_LOCAL_SKY_BINS - 1.001);
             int n = (int)at, k = row + mesh_of(i, sky->mesh, sky->columns);
             float part = (float)(at - n), area = STEP * STEP;
-            const float *low = sky->influence[n], *high = sky->influence[n + 1];
-            sky->level[k] += area * (low[0] + part * (high[0] - low[0]));
-            sky->noise[k] += area * (low[1] + part * (high[1] - low[1]));
+            float *pixels = sky->pixels + k * BST_LOCAL_SKY_BINS + n;
+            pixels[0] += area * (1.0f - part);
+            pixels[1] += area * part;
         }
+    }
+}
+
+/* Adds to moments of order 0 to 2 those of normal values of mean w and deviation sd, of which only
+ * those from low to high count. */
+static void add_clipped(double pixels, double w, double sd, const double clip[2], double out[3]) {
+    double a = (clip[0] - w) / sd, b = (clip[1] - w) / sd, p = density(a), q = density(b);
+    double all = 0.5 * (erf(b / sqrt(2.0)) - erf(a / sqrt(2.0)));
+    double first = sd * (p - q), second = sd * sd * (all + a * p - b * q); /* about w */
+    out[0] += pixels * all;
+    out[1] += pixels * (w * all + first);
+    out[2] += pixels * (w * w * all + 2.0 * w * first + second);
+}
+
+/* Level and noise of a mesh by iterated clipping. */
+static void clip_mesh(const float bins[BST_LOCAL_SKY_BINS], double pixels, double shot,
+                      double *level, double *noise) {
+    enum { PASSES = 5 };
+    /* variance of a normal distribution cut at three deviations */
+    static const double CUT_VARIANCE = 0.97334;
+    double dark = pixels;
+    for (int i = 0; i < BST_LOCAL_SKY_BINS; i++) {
+        dark -= (double)bins[i];
+    }
+    *level = 0.0;
+    *noise = 1.0;
+    for (int pass = 0; pass < PASSES; pass++) {
+        const double clip[2] = {*level - CLIP_SIGMA * *noise, *level + CLIP_SIGMA * *noise};
+        double sum[3] = {0.0};
+        add_clipped(fmax(dark, 0.0), 0.0, 1.0, clip, sum);
+        for (int i = 0; i < BST_LOCAL_SKY_BINS; i++) {
+            double w = (double)i / PER_NOISE;
+            if (bins[i] > 0.0f) {
+                add_clipped((double)bins[i], w, sqrt(1.0 + shot * w), clip, sum);
+            }
+        }
+        *level = sum[1] / sum[0];
+        *noise = sqrt((sum[2] / sum[0] - *level * *level) / CUT_VARIANCE);
     }
 }
 
@@ -166,7 +196,8 @@ static int side_of(int i, int mesh, int count, int pixels) {
     return i + 1 < count ? mesh : pixels - i * mesh;
 }
 
-/* Averages each mesh with the opposite neighbours that agree with it. */
+/* Averages each mesh with the opposite neighbours that agree with it; error: of a mesh, in its
+ * noises. */
 static void smooth_meshes(const bst_local_sky *sky, float *values, double error) {
     static const int across[4][2] = {{1, 0}, {0, 1}, {1, 1}, {1, -1}};
     memcpy(sky->scratch, values, (size_t)(sky->columns * sky->rows) * sizeof *values);
@@ -174,6 +205,7 @@ static void smooth_meshes(const bst_local_sky *sky, float *values, double error)
         for (int i = 0; i < sky->columns; i++) {
             const float *own = sky->scratch + j * sky->columns + i;
             float sum = *own, weight = 1.0f;
+            double most = AGREEMENT * error * (double)sky->noise[j * sky->columns + i];
             for (int d = 0; d < 4; d++) {
                 int u = across[d][0], v = across[d][1];
                 if (i - u < 0 || i + u >= sky->columns || j - abs(v) < 0 ||
@@ -181,7 +213,7 @@ static void smooth_meshes(const bst_local_sky *sky, float *values, double error)
                     continue;
                 }
                 float pair = own[v * sky->columns + u] + own[-v * sky->columns - u];
-                if (fabs((double)(0.5f * pair - *own)) < AGREEMENT * error) {
+                if (fabs((double)(0.5f * pair - *own)) < most) {
                     sum += pair;
                     weight += 2.0f;
                 }
@@ -191,20 +223,43 @@ static void smooth_meshes(const bst_local_sky *sky, float *values, double error)
     }
 }
 
+static double pixels_of(const bst_local_sky *sky, int i, int j) {
+    return (double)side_of(i, sky->mesh, sky->columns, sky->width) *
+           side_of(j, sky->mesh, sky->rows, sky->height);
+}
+
+static void smooth(const bst_local_sky *sky) {
+    /* standard error of a mean of all pixels, or of half of those of a large mesh; that of a
+     * standard deviation is smaller */
+    double error = (sky->mesh * sky->mesh < MANY_PX ? 1.0 : sqrt(2.0)) / sky->mesh;
+    smooth_meshes(sky, sky->level, error);
+    smooth_meshes(sky, sky->noise, error * sqrt(0.5));
+}
+
 void bst_local_sky_settle(bst_local_sky *sky, double share, double crowding) {
     for (int j = 0; j < sky->rows; j++) {
         for (int i = 0; i < sky->columns; i++) {
             int k = j * sky->columns + i;
-            double pixels = (double)side_of(i, sky->mesh, sky->columns, sky->width) *
-                            side_of(j, sky->mesh, sky->rows, sky->height);
+            double pixels = pixels_of(sky, i, j);
             sky->level[k] = (float)(share * (double)sky->level[k] / pixels);
             sky->noise[k] = (float)sqrt(1.0 + crowding * (double)sky->noise[k] / pixels);
         }
     }
-    /* standard error of a mean; that of a standard deviation is smaller */
-    double error = 1.0 / sky->mesh;
-    smooth_meshes(sky, sky->level, error);
-    smooth_meshes(sky, sky->noise, error * sqrt(0.5));
+    smooth(sky);
+}
+
+void bst_local_sky_settle_wings(bst_local_sky *sky, double shot) {
+    for (int j = 0; j < sky->rows; j++) {
+        for (int i = 0; i < sky->columns; i++) {
+            int k = j * sky->columns + i;
+            double level, noise;
+            clip_mesh(sky->pixels + k * BST_LOCAL_SKY_BINS, pixels_of(sky, i, j), shot, &level,
+                      &noise);
+            sky->level[k] = (float)level;
+            sky->noise[k] = (float)noise;
+        }
+    }
+    smooth(sky);
 }
 
 static void set_sides(const float *at, int right, int below, double cell[2][2]) {

@@ -8,8 +8,8 @@
 /* Table size of line heights (SNR, four per unit) for the light below the clip. */
 enum { BST_LOCAL_SKY_HEIGHTS = 256 };
 
-/* Table size of a pixel's light, sixteen per pixel noise. */
-enum { BST_LOCAL_SKY_LIGHTS = 128 };
+/* Bins of a pixel's light, four per pixel noise; the last one also has all brighter pixels. */
+enum { BST_LOCAL_SKY_BINS = 48 };
 
 /* Position of a pixel between the centres of mesh `first` and the next. */
 typedef struct bst_local_sky_place {
@@ -33,8 +33,9 @@ typedef struct bst_local_sky {
     int places_room;
     double sigma; /* for which the tables are computed; 0: none */
     float light[BST_LOCAL_SKY_HEIGHTS], square[BST_LOCAL_SKY_HEIGHTS];
-    /* influence of a pixel's light on level and variance, see bst_local_sky_add_wings */
-    float influence[BST_LOCAL_SKY_LIGHTS][2];
+    float
+        *pixels; /* number of pixels about sources by mesh and light: [mesh][BST_LOCAL_SKY_BINS] */
+    int pixels_room;
 } bst_local_sky;
 
 /* Begins a frame.
@@ -51,16 +52,18 @@ void bst_local_sky_add(bst_local_sky *sky, int x, int y, double height, double l
 /* Light at a distance from a point, in pixel noises per pixel. */
 typedef double (*bst_local_sky_light_fn)(const void *user, double distance_px);
 
-/* Adds the light about a point of the frame, x, y, up to reach_px from it.
- *
- * Notes:     Clipped mean and standard deviation, corrected for the clip, are M-estimators. Light w
- *            on one pixel of N changes them by its influence over N: with normal noise, of which
- *            x = w + z lies within the clip, E[x] and E[x^2 - m] over the derivatives that make
- *            them w and w^2 for faint light. The clip is that of the noise without the light: the
- * level is 10 % too low where the light adds 0.2 noises to it. Reference: Hampel et al. 1986,
- * Robust Statistics, 2.3 */
+/* Begins the light about points of a frame, after bst_local_sky_begin. Errors: BST_ERR_MEMORY. */
+bst_status bst_local_sky_begin_wings(bst_ctx *ctx, bst_local_sky *sky) BST_MUST_CHECK;
+/* Adds the light about a point of the frame, x, y, up to reach_px from it. */
 void bst_local_sky_add_wings(bst_local_sky *sky, double x, double y, double reach_px,
                              bst_local_sky_light_fn light, const void *user);
+/* Sets background excess and relative noise by that light, as bst_local_sky_settle does.
+ *
+ * Given:     shot  variance per light of a pixel, both in noises of a dark pixel
+ * Notes:     Image processing iterates mean and standard deviation of the pixels within three
+ *            deviations. Here the same is done for the distribution of which the pixels are
+ *            samples: normal noise about each pixel's light. */
+void bst_local_sky_settle_wings(bst_local_sky *sky, double shot);
 /* Converts the accumulated light to background excess, in pixel noises, and relative noise per
  * mesh. Meshes are smoothed as image processing does.
  *

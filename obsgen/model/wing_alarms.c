@@ -159,6 +159,7 @@ static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, const outputs *ta
         if (!*any) {
             BST_TRY(bst_local_sky_begin(ctx, &g->wing_sky, g->width, g->height, g->settings.mesh_px,
                                         g->total_sigma));
+            BST_TRY(bst_local_sky_begin_wings(ctx, &g->wing_sky));
         }
         *any = true;
         double end = table_end_px(&w) - 1.0;
@@ -166,7 +167,7 @@ static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, const outputs *ta
         bst_local_sky_add_wings(&g->wing_sky, s->x, s->y, reach, wing_light, &w);
     }
     if (*any) {
-        bst_local_sky_settle(&g->wing_sky, 1.0, 1.0);
+        bst_local_sky_settle_wings(&g->wing_sky, 1.0 / g->noise_e);
     }
     return BST_OK;
 }

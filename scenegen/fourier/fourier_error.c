@@ -109,10 +109,7 @@ static void add_node_errors(lattice *l, int node, double peak, bst_fourier_error
         top = fmax(top, l->image[i]);
     }
     for (int i = 0; i < SIDE * SIDE; i++) {
-        int exponent;
-        (void)frexp(fmax(l->image[i] / top, 1e-12), &exponent); /* fraction in [2^(e-1), 2^e) */
-        int k = exponent > 0 ? 0 : -exponent;
-        k = k < BST_LIGHT_CLASSES ? k : BST_LIGHT_CLASSES - 1;
+        int k = bst_light_class(l->image[i] / top);
         const double *at = l->image + i;
         /* aliases of orders 1 and -1 are complex conjugates */
         double error = SAFE * 2.0 * (at[ALIAS_X * SIDE * SIDE] + at[ALIAS_Y * SIDE * SIDE]) +

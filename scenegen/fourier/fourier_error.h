@@ -3,10 +3,7 @@
 #define BST_SCENEGEN_FOURIER_FOURIER_ERROR_H
 
 #include "scenegen/fourier/fourier_grid.h"
-
-/* Brightness classes: class k has 2^-(k + 1) to 2^-k of the brightest pixel's light; the last one
- * all below. */
-enum { BST_LIGHT_CLASSES = 20 };
+#include "scenegen/light_classes.h"
 
 typedef struct bst_fourier_error {
     /* largest error of a pixel of the class, relative to the PSF's peak */

@@ -258,6 +258,10 @@ bst_status bst_fourier_band_measure(bst_ctx *ctx, const bst_psf *psf, double tol
     if (status == BST_OK) {
         status = measure_reach(ctx, psf, room, out);
     }
+    if (status == BST_OK) {
+        status = bst_psf_sensitivity_measure(ctx, psf, out->cutoff, out->node_sigma_px,
+                                             &out->sensitivity);
+    }
     bst_fft_array_free(room);
     return status;
 }

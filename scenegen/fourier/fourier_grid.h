@@ -5,6 +5,7 @@
 
 #include "boresight/status.h"
 #include "scenegen/fourier/nufft_kernel.h"
+#include "scenegen/fourier/psf_sensitivity.h"
 #include "sim/optics/psf.h"
 
 /* Number of binnings distinguished; the last covers all larger ones. */
@@ -24,7 +25,8 @@ typedef struct bst_fourier_band {
     /* derivatives of order 2, 4 and 6 in pixels binned n + 1 times, relative to their peak and to
      * unbinned pixels */
     double pixel_part[BST_PIXEL_PARTS][3];
-    double share_sigma_px; /* Gaussian with the same peak */
+    bst_psf_sensitivity sensitivity; /* relative to the Gaussian of node_sigma_px */
+    double share_sigma_px;           /* Gaussian with the same peak */
     int reach_px;  /* beyond it a pixel gets less than 3e-7 of a point's light (16 to 160) */
     double beyond; /* largest share of a point's light in a pixel beyond reach_px */
     bst_nufft_kernel_band axis[2];

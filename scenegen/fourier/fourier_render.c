@@ -368,11 +368,17 @@ static bst_status deposit(bst_ctx *ctx, bst_fourier_render *l, cl_command_queue 
                           bst_window window, const bst_fourier_render_nodes *nodes, const setup *s,
                           int node) {
     const bst_otf_convolve_layout *shape = bst_otf_convolve_shape(s->fft);
+    double density_x = (double)shape->x.samples / shape->x.pixels,
+           density_y = (double)shape->y.samples / shape->y.pixels;
+    double coarse_x = round(density_x * BST_DENSITY_PARTS) / BST_DENSITY_PARTS,
+           coarse_y = round(density_y * BST_DENSITY_PARTS) / BST_DENSITY_PARTS;
     bst_deposit_params p = {
         .x0 = (float)(window.x0 - shape->margin),
         .y0 = (float)(window.y0 - shape->margin),
-        .density_x = (float)((double)shape->x.samples / shape->x.pixels),
-        .density_y = (float)((double)shape->y.samples / shape->y.pixels),
+        .coarse_x = (float)coarse_x,
+        .coarse_y = (float)coarse_y,
+        .finer_x = (float)(density_x - coarse_x),
+        .finer_y = (float)(density_y - coarse_y),
         .samples_x = shape->x.samples,
         .samples_y = shape->y.samples,
         .tiles_x = (shape->x.samples + l->tile_width - 1) / l->tile_width,

@@ -14,13 +14,17 @@
 /* Floats of the table for one axis: [BST_WIDTHS + 1][BST_SPREAD_PHASES + 1][BST_SPREAD_TAPS]. */
 #define BST_SPREAD_TABLE ((BST_WIDTHS + 1) * (BST_SPREAD_PHASES + 1) * BST_SPREAD_TAPS)
 
+/* A density of at most 5 times up to 8192 px is exact in single precision. */
+#define BST_DENSITY_PARTS 256
+
 /* Spectrum shares per source, if several spectra are deposited one after the other. */
 #define BST_SPECTRA 4
 
 /* Only 32-bit members, so that both languages have the same layout. */
 typedef struct bst_deposit_params {
-    float x0, y0;               /* full-sensor px of the grid's first sample */
-    float density_x, density_y; /* samples per px */
+    float x0, y0; /* full-sensor px of the grid's first sample, whole */
+    /* samples per px: a multiple of 1 / BST_DENSITY_PARTS, and the rest */
+    float coarse_x, coarse_y, finer_x, finer_y;
     int samples_x, samples_y;   /* multiples of 16 */
     int tiles_x, tiles_y;
     int source_groups;

@@ -280,6 +280,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
     } else {
         bst_smear_find_pixel_parts(s->sigma_px, s->binning, s->pixel_part);
     }
+    s->sensitivity = s->binning == 1 ? s->options.sensitivity : NULL;
     bst_smear_clear_ahead(s);
     s->sources = frame->sources;
     s->aim = frame->aim > 0.0 ? frame->aim : 1.0;

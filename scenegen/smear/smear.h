@@ -36,8 +36,9 @@ typedef struct bst_smear_options {
     double grid_per_px;           /* least grid samples per px */
     double pixel_part[BST_PIXEL_PARTS]
                      [3]; /* of the PSF as in bst_smear_node_aim, by binning from 1 on */
-    double widest;        /* largest node widening, PSF variances; 0: as much as nodes allow */
-    bst_parallel *pool;   /* threads that share the work; lent; NULL: the caller's alone */
+    const bst_psf_sensitivity *sensitivity; /* of that PSF, lent; NULL: unknown */
+    double widest;      /* largest node widening, PSF variances; 0: as much as nodes allow */
+    bst_parallel *pool; /* threads that share the work; lent; NULL: the caller's alone */
 } bst_smear_options;
 
 /* Creates the smear of a camera.

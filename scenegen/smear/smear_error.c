@@ -47,6 +47,26 @@ double bst_smear_single_error(const bst_smear *s, double peak_e, double from_bor
                 peak_e / sqrt(s->dark_variance_e2));
 }
 
+/* Error of the worst pixel, in its sigma, of a source whose greatest error is that of its peak:
+ * beside the peak there is less noise, but not always less error. */
+static double flank_of(const bst_smear *s, double peak_e, double bound) {
+    const bst_psf_sensitivity *psf = s->sensitivity;
+    double worst = 0.0, light_e = peak_e, sigma_e = sqrt(peak_e + s->dark_variance_e2);
+    if (!psf) {
+        return bound;
+    }
+    for (int k = 0; k < BST_LIGHT_CLASSES; k++) {
+        double less_e = k + 1 < BST_LIGHT_CLASSES ? 0.5 * light_e : 0.0;
+        double dim = psf->flank[k] / sqrt(less_e + s->dark_variance_e2);
+        double lit = k + 1 < BST_LIGHT_CLASSES
+                         ? psf->noisy[k] / sqrt(peak_e + s->dark_variance_e2 * peak_e / light_e)
+                         : INFINITY;
+        worst = fmax(worst, sigma_e * fmin(dim, lit));
+        light_e = less_e;
+    }
+    return worst;
+}
+
 /* Sets the image errors of a source at (x, y), wherever it falls. */
 void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
     int radius = d->radius;
@@ -63,16 +83,16 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
     double flank = sigma_e / sqrt(FLANK * peak_e + s->dark_variance_e2);
     /* a border crosses a read-out pixel along its side at most */
     double tail = s->stamp.tail[border] * s->binning;
-    s->last_error =
-        (bst_error_budget_source){.x_px = (float)d->x,
-                                  .y_px = (float)d->y,
-                                  .peak_e = (float)peak_e,
-                                  .nodes_e = (float)((flank * error + rounded) * peak_e),
-                                  .predicted_e = (float)((flank * predicted + rounded) * peak_e),
-                                  .shared_e = (float)(shared * sigma_e),
-                                  .excess_e = (float)(lost * peak_e),
-                                  .border_e = (float)(s->last_peak_e * tail),
-                                  .apart = d->moving && travel_px > s->travel_px};
+    s->last_error = (bst_error_budget_source){
+        .x_px = (float)d->x,
+        .y_px = (float)d->y,
+        .peak_e = (float)peak_e,
+        .nodes_e = (float)((flank * error + rounded) * peak_e),
+        .predicted_e = (float)((flank_of(s, peak_e, flank) * predicted + rounded) * peak_e),
+        .shared_e = (float)(shared * sigma_e),
+        .excess_e = (float)(lost * peak_e),
+        .border_e = (float)(s->last_peak_e * tail),
+        .apart = d->moving && travel_px > s->travel_px};
 }
 
 /* Distance, in sigma of a node, beyond which its errors decrease: for a Gaussian, whose sixth

@@ -59,9 +59,10 @@ struct bst_smear {
     bst_window window;
     double margin_px, dark_variance_e2, duration_s;
     int binning, sources;
-    double pixel_part[3]; /* as in bst_smear_node_aim */
-    double aim;           /* share of the tolerance */
-    double grid_per_px;   /* least grid samples per px of the frame */
+    double pixel_part[3];                   /* as in bst_smear_node_aim */
+    const bst_psf_sensitivity *sensitivity; /* of the frame; NULL: as of the Gaussian */
+    double aim;                             /* share of the tolerance */
+    double grid_per_px;                     /* least grid samples per px of the frame */
     bst_quat q_reference;
     bst_quat *turn; /* attitude at each path point */
     int *parts;     /* straight parts of the path from each track sample */

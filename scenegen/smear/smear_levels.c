@@ -26,6 +26,15 @@ bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_path
                               .binned_variance = (s->binning * s->binning - 1.0) / 12.0,
                               .further_variance = fmax(further, 0.0)};
     memcpy(aim.pixel_part, s->pixel_part, sizeof aim.pixel_part);
+    if (s->sensitivity) {
+        /* the tangent plane stretches the image from the boresight, and turns its motion with it */
+        double more = s->wide_field - 1.0, distorted = bst_camera_distorted(&s->camera) ? 2.0 : 0.0;
+        aim.direction_part = s->sensitivity->part;
+        aim.row_part = s->sensitivity->row;
+        aim.most_per_px = s->sensitivity->most_per_px;
+        aim.turns = turns;
+        aim.unlike_rad = (turns ? asin(more / (2.0 + more)) : 0.0) + distorted;
+    }
     return bst_smear_nodes_from_path(ctx, path, count, &aim, &s->nodes);
 }
 

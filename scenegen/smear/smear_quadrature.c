@@ -178,28 +178,37 @@ static void set_kernel(const bst_smear_maker *m, const group *g, const bst_smear
     bst_smear_set_kernel(t, high, r);
 }
 
-/* Raises the list's errors to those of a rule; returns its predicted error. */
-static double raise_error(const bst_smear_maker *m, const bst_smear_rule *r) {
+/* Raises the list's errors to those of a rule for a group with this axis; returns its predicted
+ * error. Of the missed moment's error, either bound holds: the smoothed sum of the moduli, or the
+ * greatest derivative of a group and of a row of groups. */
+static double raise_error(const bst_smear_maker *m, const double axis[3], const bst_smear_rule *r) {
     bst_smear_node_list *list = m->list;
     double part[BST_NODE_SCALES];
     bst_smear_missed_parts(m, r, part);
+    bst_smear_direction_parts along = bst_smear_find_direction_parts(m, axis, r->nodes);
     double square = 1.0 / (1 << (BST_NODE_SCALES - 2));
     for (int k = 0; k < BST_NODE_SCALES; k++, square *= 2.0) {
         double fourth = square * square;
         double low = square * (square > 1.0 ? sqrt(square) : 1.0);
-        double other = r->fixed * fmax(low, 1.0) + (r->error - r->missed - r->fixed) * low;
+        double fixed = r->fixed * fmax(low, 1.0);
+        double higher = (r->error - r->missed - r->fixed) * low;
         double missed = r->missed * (r->nodes == 3 ? fourth * square : fourth);
-        double bound = other + missed, predicted = other + part[k] * missed;
+        double bound = fixed + higher + missed;
+        if (along.missed < part[k]) {
+            part[k] = fmin(bst_smear_row_part(m, &along, r, sqrt(square)), part[k]);
+        }
+        double predicted = along.second * fixed + along.higher * higher + part[k] * missed;
         list->error[k] = bound > list->error[k] ? bound : list->error[k];
         list->predicted[k] = predicted > list->predicted[k] ? predicted : list->predicted[k];
     }
-    return r->error - (1.0 - part[BST_NODE_SCALES - 2]) * r->missed;
+    return along.second * r->fixed + along.higher * (r->error - r->missed - r->fixed) +
+           part[BST_NODE_SCALES - 2] * r->missed;
 }
 
 static bst_status emit(bst_ctx *ctx, const bst_smear_maker *m, const bst_smear_moments *g,
                        const bst_smear_rule *r, double weight) {
     bool split = r->pair[0] != 0.0 || r->pair[1] != 0.0 || r->pair[2] != 0.0;
-    const double error[2] = {r->error, raise_error(m, r)};
+    const double error[2] = {r->error, raise_error(m, g->axis, r)};
     for (int n = 0; n < r->nodes; n++) {
         for (int side = -1; side <= 1; side += 2) {
             double p[3];
@@ -312,6 +321,11 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
         .curvature = aim->curvature,
         .binned_variance = aim->binned_variance,
         .further_variance = aim->further_variance,
+        .direction_part = aim->direction_part,
+        .row_part = aim->row_part,
+        .most_per_px = aim->most_per_px,
+        .turns = aim->turns,
+        .unlike_rad = aim->unlike_rad,
         /* mean over the boresight and four corners: full scale, and 1 / wide^2 across */
         .image_share = (2.0 + 3.0 / (wide * wide)) / 5.0};
     if (!(m.total > 0.0)) {

@@ -48,6 +48,9 @@ typedef struct bst_smear_node_list {
 /* Largest widening of a node, PSF variances. */
 #define BST_NODE_WIDEST 1.0
 
+/* Directions for which the PSF's derivatives are known: pi d / BST_NODE_DIRECTIONS from x. */
+enum { BST_NODE_DIRECTIONS = 12, BST_ROW_STEPS = 32 };
+
 /* Requirements of the nodes. */
 typedef struct bst_smear_node_aim {
     double psf_sigma_px;
@@ -64,6 +67,16 @@ typedef struct bst_smear_node_aim {
     /* PSF derivatives of order 2, 4, 6 in pixels, relative to their peak and to a Gaussian of
      * psf_sigma_px; 0 means 1 */
     double pixel_part[3];
+    /* the same along directions of the image, for the predicted error; NULL: in all the same.
+     * turns: the path is that of a camera's tilts, which move the image at right angles to their
+     * axis. unlike_rad: how far the image's direction may differ from that at the boresight,
+     * besides by roll */
+    const double (*direction_part)[3]; /* [BST_NODE_DIRECTIONS] */
+    /* with it, along a row of equal groups: order 4 and 6 by groups per px, up to most_per_px */
+    const double (*row_part)[BST_ROW_STEPS][2]; /* [BST_NODE_DIRECTIONS] */
+    double most_per_px;
+    bool turns;
+    double unlike_rad;
 } bst_smear_node_aim;
 
 /* Appends the nodes of a path of `count` >= 2 points (two points at one time: a single node), so

@@ -1,6 +1,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "boresight/vec.h"
 #include "scenegen/smear/motion.h"
 #include "scenegen/smear/smear_quadrature.h"
 #include "scenegen/smear/smear_quadrature_internal.h"
@@ -28,6 +29,63 @@ void bst_smear_nodes_main_axis(double a[3][3], double axis[3]) {
     for (int i = 0; i < 3; i++) {
         axis[i] /= sqrt(length);
     }
+}
+
+/* Directions of the image, from `angle` to within `range`, that the table has. */
+static bool within(double angle, double range, int d) {
+    double step = BST_PI / BST_NODE_DIRECTIONS;
+    double off = fabs(remainder(angle - d * step, BST_PI));
+    return off <= range + step; /* those on both sides */
+}
+
+bst_smear_direction_parts bst_smear_find_direction_parts(const bst_smear_maker *m,
+                                                         const double axis[3], int nodes) {
+    bst_smear_direction_parts out = {1.0, 1.0, 1.0, {false}};
+    if (!m->direction_part) {
+        return out;
+    }
+    /* tilts about x and y move the image along -y and x, and a roll by as much in any direction */
+    double x = m->turns ? axis[1] : axis[0], y = m->turns ? -axis[0] : axis[1];
+    double shift = sqrt(x * x + y * y), roll = fabs(axis[2]);
+    double range = roll < shift ? asin(roll / shift) + m->unlike_rad : BST_PI, angle = atan2(y, x);
+    double any[3] = {0.0}, along[3] = {0.0};
+    for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
+        for (int k = 0; k < 3; k++) {
+            double part = m->direction_part[d][k];
+            any[k] = fmax(any[k], part);
+            along[k] = within(angle, range, d) ? fmax(along[k], part) : along[k];
+        }
+        out.in_range[d] = within(angle, range, d);
+    }
+    /* covariance and higher moments across the axis too: all directions, orders 2 to 4 */
+    out.second = fmin(any[0] / m->pixel_part[0], 1.0);
+    out.higher = fmin(fmax(any[0], any[1]) / m->pixel_part[0], 1.0);
+    out.missed = nodes > 1 ? fmin(along[nodes - 1] / m->pixel_part[nodes - 1], 1.0) : 1.0;
+    return out;
+}
+
+double bst_smear_row_part(const bst_smear_maker *m, const bst_smear_direction_parts *parts,
+                          const bst_smear_rule *r, double scale) {
+    if (!m->direction_part || r->nodes < 2) {
+        return parts->missed;
+    }
+    double low = r->node[0], high = r->node[0], worst = parts->missed;
+    for (int i = 1; i < r->nodes; i++) {
+        low = fmin(low, r->node[i]);
+        high = fmax(high, r->node[i]);
+    }
+    /* outer nodes of Gauss-Legendre quadrature: 0.577 and 0.775 of the length apart */
+    double length = (high - low) / (r->nodes == 2 ? 0.57735027 : 0.77459667) * scale;
+    double at = BST_ROW_STEPS / fmax(m->most_per_px * length, 1e-9);
+    /* groups of a row are not quite equal: a tenth */
+    int from = (int)fmin(floor(0.9 * at), BST_ROW_STEPS - 1.0);
+    int to = (int)fmin(ceil(1.1 * at), BST_ROW_STEPS - 1.0);
+    for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
+        for (int b = from; b <= to && parts->in_range[d]; b++) {
+            worst = fmax(worst, m->row_part[d][b][r->nodes - 2] / m->pixel_part[r->nodes - 1]);
+        }
+    }
+    return worst;
 }
 
 double bst_smear_nodes_error(const double error[BST_NODE_SCALES], double scale) {

@@ -19,6 +19,11 @@ typedef struct bst_smear_maker {
     double wide_field; /* as in bst_smear_node_aim */
     double curvature;
     double binned_variance, further_variance, pixel_part[3];
+    const double (*direction_part)[3]; /* this and the next four as in bst_smear_node_aim */
+    const double (*row_part)[BST_ROW_STEPS][2];
+    double most_per_px;
+    bool turns;
+    double unlike_rad;
     double image_share; /* image variance per path variance, mean over the field */
     double most;        /* spread of the next group, px^2 */
     double limit;       /* of `most` */
@@ -76,6 +81,21 @@ double bst_smear_most_kernel(const bst_smear_rule *r);
  * / 2) of the path: below 1 for groups as long as the PSF is wide. */
 void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_rule *r,
                             double part[BST_NODE_SCALES]);
+
+/* Parts of a rule's errors that the PSF's derivatives along the group's axis leave of the bound,
+ * which takes those of the direction in which the PSF is narrowest. */
+typedef struct bst_smear_direction_parts {
+    double second, higher, missed;      /* of left-out covariance, of higher moments, of `missed` */
+    bool in_range[BST_NODE_DIRECTIONS]; /* directions in which the image may move */
+} bst_smear_direction_parts;
+
+/* Parts of the errors of a rule of `nodes` nodes for a group with this axis: 1 without the PSF's
+ * derivatives. */
+bst_smear_direction_parts bst_smear_find_direction_parts(const bst_smear_maker *m,
+                                                         const double axis[3], int nodes);
+/* The part of `missed` in a row of such groups, if the image moves by `scale` of the path. */
+double bst_smear_row_part(const bst_smear_maker *m, const bst_smear_direction_parts *parts,
+                          const bst_smear_rule *r, double scale);
 
 /* Replaces *best by the rule with the fewest nodes that meets the tolerance, otherwise by the best
  * of three nodes. Rules with an error beyond `limit` are ignored. */

@@ -1,0 +1,184 @@
+#include "scenegen/fourier/psf_sensitivity.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "boresight/vec.h"
+#include "sim/core/fft.h"
+
+/* LATTICE: frequencies per axis over the band. SIDE: image samples, four per period of the highest
+ * frequency. */
+enum { LATTICE = 64, SIDE = 128 };
+
+/* Peak derivatives of order 2, 4 and 6 of a Gaussian with sigma 1, relative to its peak. */
+static const double GAUSSIAN[3] = {1.0, 3.0, 15.0};
+
+/* The light that a derivative falls on is that of a path: smoothed along it at least as by a group
+ * of nodes, 2.5 sigma long. Variance of that length, in sigma squared. */
+#define SMOOTHED (2.5 * 2.5 / 12.0)
+
+typedef struct measuring {
+    bst_fft_complex_f32 *room; /* [SIDE][SIDE] */
+    bst_fft *inverse;
+    double step; /* of the frequencies, cycles/px */
+    double otf[LATTICE * LATTICE][2];
+    float light[SIDE * SIDE]; /* over the peak */
+} measuring;
+
+static double frequency(const measuring *m, int i) {
+    return (i - LATTICE / 2) * m->step;
+}
+
+static float *room_at(const measuring *m, int i, int j) {
+    return m->room[((j - LATTICE / 2 + SIDE) % SIDE) * SIDE + (i - LATTICE / 2 + SIDE) % SIDE];
+}
+
+/* Images of two derivatives of even order along a direction, as the real and the imaginary part:
+ * both are real. Order 0: the PSF, smoothed along the direction. */
+static void make_images(measuring *m, double angle, double smoothed_px2, const int order[2]) {
+    memset(m->room, 0, sizeof *m->room * SIDE * SIDE);
+    for (int k = 0; k < LATTICE * LATTICE; k++) {
+        int i = k % LATTICE, j = k / LATTICE;
+        if (i == 0 || j == 0) { /* its opposite frequency is not on the lattice */
+            continue;
+        }
+        double w = 2.0 * BST_PI * (frequency(m, i) * cos(angle) + frequency(m, j) * sin(angle));
+        double w2 = w * w, smooth = exp(-0.5 * smoothed_px2 * w2);
+        double a = order[0] > 0 ? pow(w2, 0.5 * order[0]) : smooth, b = pow(w2, 0.5 * order[1]);
+        const double *v = m->otf[k];
+        float *z = room_at(m, i, j);
+        z[0] = (float)(a * v[0] - b * v[1]);
+        z[1] = (float)(a * v[1] + b * v[0]);
+    }
+    bst_fft_run(m->inverse);
+}
+
+/* Greatest value near sample k by parabolas along x and y: samples are up to an eighth of the
+ * shortest period from it. */
+static double greatest_near(const measuring *m, int k, int part) {
+    int x = k % SIDE, y = k / SIDE;
+    double here = fabs((double)m->room[k][part]), more = 0.0;
+    for (int axis = 0; axis < 2; axis++) {
+        int before = axis ? (y + SIDE - 1) % SIDE * SIDE + x : y * SIDE + (x + SIDE - 1) % SIDE;
+        int after = axis ? (y + 1) % SIDE * SIDE + x : y * SIDE + (x + 1) % SIDE;
+        double sign = m->room[k][part] < 0.0F ? -1.0 : 1.0;
+        double low = sign * (double)m->room[before][part],
+               high = sign * (double)m->room[after][part];
+        double bend = 2.0 * here - low - high;
+        more += bend > 0.0 ? (high - low) * (high - low) / (8.0 * bend) : 0.0;
+    }
+    return here + more;
+}
+
+/* Raises the sensitivities to those of one derivative of a field node. */
+static void add_derivative(const measuring *m, int part, double gaussian, double *most,
+                           bst_psf_sensitivity *out) {
+    double top = 0.0, at[BST_LIGHT_CLASSES] = {0.0}, noisy[BST_LIGHT_CLASSES] = {0.0};
+    int greatest = 0;
+    for (int k = 0; k < SIDE * SIDE; k++) {
+        double value = fabs((double)m->room[k][part]);
+        int class = bst_light_class((double)m->light[k]);
+        at[class] = fmax(at[class], value);
+        noisy[class] = fmax(noisy[class], value / sqrt(fmax((double)m->light[k], 1e-12)));
+        greatest = value > top ? k : greatest;
+        top = fmax(top, value);
+    }
+    *most = fmax(*most, greatest_near(m, greatest, part) / gaussian);
+    double per = 1.0 / fmax(top, 1e-30);
+    for (int c = 0; c < BST_LIGHT_CLASSES; c++) {
+        out->flank[c] = fmax(out->flank[c], at[c] * per);
+        out->noisy[c] = fmax(out->noisy[c], noisy[c] * per);
+    }
+}
+
+/* Raises the errors of a row of equal groups of nodes on a streak: a comb, of whose frequencies w =
+ * 2 pi / length the image keeps the OTF's. Relative to the streak's light that is 2 w^k A(w) /
+ * A(0), with A the integral of the OTF's modulus across the direction. The Peano kernel of a group
+ * of uniform motion reduces it: its variance is 0.0198 (two nodes) and 0.0152 (three) of the length
+ * squared, so that exp(-w^2 variance / 2) is always the same. */
+static void add_row(const measuring *m, double angle, double sigma_px,
+                    double row[BST_ROW_STEPS][2]) {
+    enum { WIDTH = 2 }; /* steps of the lattice: as many points in each */
+    static const double kernel[2] = {0.68, 0.74};
+    double across[BST_ROW_STEPS + 1] = {0.0};
+    for (int k = 0; k < LATTICE * LATTICE; k++) {
+        int i = k % LATTICE - LATTICE / 2, j = k / LATTICE - LATTICE / 2;
+        double at = fabs(i * cos(angle) + j * sin(angle)) / WIDTH;
+        int bin = (int)at;
+        double size = hypot(m->otf[k][0], m->otf[k][1]), part = at - bin;
+        if (bin < BST_ROW_STEPS) {
+            across[bin] += (1.0 - part) * size;
+            across[bin + 1] += part * size;
+        }
+    }
+    for (int b = 1; b < BST_ROW_STEPS; b++) {
+        double w = 2.0 * BST_PI * WIDTH * b * m->step * sigma_px, w4 = w * w * w * w;
+        /* the bins have the frequencies of both signs, that of 0 half as many */
+        double ripple = across[b] / across[0];
+        row[b][0] = fmax(row[b][0], kernel[0] * ripple * w4 / GAUSSIAN[1]);
+        row[b][1] = fmax(row[b][1], kernel[1] * ripple * w4 * w * w / GAUSSIAN[2]);
+    }
+}
+
+/* Index of the brightest sample, by the real part. */
+static int brightest_of(const measuring *m) {
+    int best = 0;
+    for (int k = 0; k < SIDE * SIDE; k++) {
+        best = m->room[k][0] > m->room[best][0] ? k : best;
+    }
+    return best;
+}
+
+/* Raises the sensitivities to those of a field node. */
+static void measure_node(measuring *m, const bst_psf *psf, int node, double sigma_px,
+                         bst_psf_sensitivity *out) {
+    double square = sigma_px * sigma_px;
+    for (int k = 0; k < LATTICE * LATTICE; k++) {
+        bst_psf_otf(psf, node, frequency(m, k % LATTICE), frequency(m, k / LATTICE), m->otf[k]);
+    }
+    make_images(m, 0.0, 0.0, (const int[2]){0, 2});
+    double peak = greatest_near(m, brightest_of(m), 0);
+    for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
+        double angle = d * BST_PI / BST_NODE_DIRECTIONS, *part = out->part[d];
+        make_images(m, angle, SMOOTHED * square, (const int[2]){0, 2});
+        float top = m->room[brightest_of(m)][0];
+        for (int k = 0; k < SIDE * SIDE; k++) {
+            m->light[k] = m->room[k][0] / top;
+        }
+        add_derivative(m, 1, GAUSSIAN[0] * peak / square, &part[0], out);
+        make_images(m, angle, 0.0, (const int[2]){4, 6});
+        add_derivative(m, 0, GAUSSIAN[1] * peak / (square * square), &part[1], out);
+        add_derivative(m, 1, GAUSSIAN[2] * peak / (square * square * square), &part[2], out);
+        add_row(m, angle, sigma_px, out->row[d]);
+    }
+}
+
+bst_status bst_psf_sensitivity_measure(bst_ctx *ctx, const bst_psf *psf, double cutoff,
+                                       double sigma_px, bst_psf_sensitivity *out) {
+    assert(psf && cutoff > 0.0 && sigma_px > 0.0 && out);
+    measuring *m = calloc(1, sizeof *m);
+    *out = (bst_psf_sensitivity){.part = {{0.0}}};
+    bst_status status = BST_OK;
+    if (m) {
+        m->step = 2.0 * cutoff / LATTICE;
+        out->most_per_px = 2.0 * BST_ROW_STEPS * m->step;
+        m->room = bst_fft_array(sizeof *m->room * SIDE * SIDE);
+    }
+    if (!m || !m->room) {
+        status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for the derivatives of a PSF");
+    } else {
+        status =
+            bst_fft_create_f32(ctx, BST_FFT_INVERSE, SIDE, SIDE, *m->room, *m->room, &m->inverse);
+    }
+    for (int n = 0; status == BST_OK && n < bst_psf_nodes(psf); n++) {
+        measure_node(m, psf, n, sigma_px, out);
+    }
+    if (m) {
+        bst_fft_free(m->inverse);
+        bst_fft_array_free(m->room);
+        free(m);
+    }
+    return status;
+}

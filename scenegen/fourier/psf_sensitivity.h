@@ -1,0 +1,31 @@
+/* How sensitive the image of a PSF is to nodes that replace a path: derivatives by direction, and
+ * where they fall. */
+#ifndef BST_SCENEGEN_FOURIER_PSF_SENSITIVITY_H
+#define BST_SCENEGEN_FOURIER_PSF_SENSITIVITY_H
+
+#include "boresight/status.h"
+#include "scenegen/light_classes.h"
+#include "scenegen/smear/smear_quadrature.h"
+#include "sim/optics/psf.h"
+
+typedef struct bst_psf_sensitivity {
+    /* greatest derivatives of order 2, 4 and 6 along directions pi d / BST_NODE_DIRECTIONS from the
+     * x axis, over the peak and those of a Gaussian of the sigma given */
+    double part[BST_NODE_DIRECTIONS][3];
+    /* the same of order 4 and 6 in the image of a streak of equal groups of nodes, by the groups
+     * per px, BST_ROW_STEPS of them up to most_per_px */
+    double row[BST_NODE_DIRECTIONS][BST_ROW_STEPS][2], most_per_px;
+    /* in pixels of a brightness class: greatest derivative, and greatest derivative over the square
+     * root of light, both over those of the brightest pixel */
+    double flank[BST_LIGHT_CLASSES], noisy[BST_LIGHT_CLASSES];
+} bst_psf_sensitivity;
+
+/* Measures the derivatives of a PSF over all its field nodes, in pixels that are not binned.
+ *
+ * Given:     cutoff    highest frequency, cycles/px
+ *            sigma_px  of the Gaussian
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_psf_sensitivity_measure(bst_ctx *ctx, const bst_psf *psf, double cutoff,
+                                       double sigma_px, bst_psf_sensitivity *out) BST_MUST_CHECK;
+
+#endif
