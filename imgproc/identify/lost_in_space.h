@@ -68,4 +68,7 @@ bst_status bst_lost_in_space_solve(bst_ctx *ctx, bst_lost_in_space *lost,
                                    const bst_lost_in_space_frame *frame,
                                    bst_lost_in_space_result *out) BST_MUST_CHECK;
 
+/* True if the latest frame was solved and a detection of it was matched to a star. */
+bool bst_lost_in_space_matched(const bst_lost_in_space *lost, int detection);
+
 #endif

@@ -3,31 +3,74 @@
 #include <assert.h>
 #include <math.h>
 
-enum { SHAPES = 5 };
+enum { SHAPES = 8, PASSES = 4 };
 /* Ends nearer to each other than this are one: the stars are points. */
 static const double POINT_PX = 4.0;
+/* Streaks are of one length within this. */
+static const double SAME_PX = 1.5;
 
-/* Solves the stars by one end of their streaks, of those that have it in the frame. */
-static bst_status solve_end(bst_ctx *ctx, bst_lost_in_space *lost, const bst_plate_solve_options *o,
-                            int end, bst_plate_solve_result *out) {
-    bst_detection items[BST_PLATE_SOLVE_STARS];
-    const bst_common_streak *streak = &out->streak;
-    int count = 0;
-    for (int i = 0; i < streak->count; i++) {
-        bst_detection d = streak->items[i];
-        d.x_px += streak->ends[end].x_px;
-        d.y_px += streak->ends[end].y_px;
-        if (d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= streak->width - 1 &&
-            d.y_px <= streak->height - 1) {
-            items[count++] = d;
+/* A frame that is being solved. */
+typedef struct attempt {
+    bst_ctx *ctx;
+    bst_lost_in_space *lost;
+    const bst_plate_solve_options *options;
+    bst_streak_finder *finder;
+    bst_common_streak streak;
+    int width, height;
+} attempt;
+
+/* Solves the stars by the middles of their streaks. */
+static bst_status solve_middles(attempt *a, bst_lost_in_space_result *out) {
+    bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
+    options.scale_tolerance = a->options->scale_tolerance;
+    const bst_lost_in_space_frame frame = {a->streak.items,
+                                           a->streak.count,
+                                           {0, 0, a->width, a->height},
+                                           a->options->v_limit,
+                                           a->options->light};
+    return bst_lost_in_space_solve(a->ctx, a->lost, &options, &frame, out);
+}
+
+static double length_px(const bst_common_streak *s) {
+    return hypot(s->ends[1].x_px - s->ends[0].x_px, s->ends[1].y_px - s->ends[0].y_px);
+}
+
+/* Measures the path on the identified stars and solves again, until the streak keeps its length. */
+static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
+    for (int pass = 0; pass < PASSES; pass++) {
+        bool chosen[BST_PLATE_SOLVE_STARS];
+        bst_lost_in_space_result again;
+        double before = length_px(&a->streak);
+        for (int i = 0; i < a->streak.count; i++) {
+            chosen[i] = bst_lost_in_space_matched(a->lost, i);
+        }
+        BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
+        BST_TRY(solve_middles(a, &again));
+        if (!again.solved) {
+            return BST_OK;
+        }
+        *out = again;
+        if (fabs(length_px(&a->streak) - before) < SAME_PX) {
+            return BST_OK;
         }
     }
-    bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
-    options.scale_tolerance = o->scale_tolerance;
-    const bst_lost_in_space_frame frame = {
-        items, count, {0, 0, streak->width, streak->height}, o->v_limit, o->light};
-    out->end = end;
-    return bst_lost_in_space_solve(ctx, lost, &options, &frame, &out->attitude);
+    return BST_OK;
+}
+
+static bst_status try_shapes(attempt *a, bst_plate_solve_result *out) {
+    int shapes = bst_streak_finder_shapes(a->finder);
+    for (int shape = 0; shape < shapes && shape < SHAPES && !out->attitude.solved; shape++) {
+        BST_TRY(bst_streak_finder_find(a->ctx, a->finder, shape, &a->streak));
+        BST_TRY(solve_middles(a, &out->attitude));
+        out->points = length_px(&a->streak) < POINT_PX;
+        if (out->attitude.solved && !out->points) {
+            BST_TRY(improve(a, &out->attitude));
+        }
+        out->stars = a->streak.count;
+        out->ends[0] = a->streak.ends[0];
+        out->ends[1] = a->streak.ends[1];
+    }
+    return BST_OK;
 }
 
 bst_status bst_plate_solve(bst_ctx *ctx, bst_lost_in_space *lost,
@@ -35,25 +78,12 @@ bst_status bst_plate_solve(bst_ctx *ctx, bst_lost_in_space *lost,
                            int height, bst_plate_solve_result *out) {
     assert(lost && options && pixels && out && options->light);
     *out = (bst_plate_solve_result){.points = false};
-    bst_common_streak_options streak = {.candidates = SHAPES,
-                                        .max_sources = BST_PLATE_SOLVE_STARS,
-                                        .least_snr = options->least_snr};
-    for (; streak.shape < SHAPES && !out->attitude.solved; streak.shape++) {
-        bst_common_streak_free(&out->streak);
-        BST_TRY(bst_common_streak_find(ctx, pixels, width, height, &streak, &out->streak));
-        if (streak.shape >= out->streak.shapes) {
-            break;
-        }
-        const bst_common_streak_point *ends = out->streak.ends;
-        out->points =
-            hypot(ends[1].x_px - ends[0].x_px, ends[1].y_px - ends[0].y_px) < POINT_PX;
-        for (int end = 0; end < (out->points ? 1 : 2) && !out->attitude.solved; end++) {
-            BST_TRY(solve_end(ctx, lost, options, end, out));
-        }
-    }
-    return BST_OK;
-}
-
-void bst_plate_solve_free(bst_plate_solve_result *result) {
-    bst_common_streak_free(&result->streak);
+    attempt a = {.ctx = ctx, .lost = lost, .options = options, .width = width, .height = height};
+    const bst_common_streak_options streak = {.max_sources = BST_PLATE_SOLVE_STARS,
+                                              .least_snr = options->least_snr,
+                                              .tangent_per_px = options->tangent_per_px};
+    BST_TRY(bst_streak_finder_create(ctx, pixels, width, height, &streak, &a.finder));
+    bst_status status = try_shapes(&a, out);
+    bst_streak_finder_free(a.finder);
+    return status;
 }

@@ -101,6 +101,10 @@ static void try_field(const arguments *a, int f, uint64_t i, const bst_stars *st
             (int)i, hypot(e.x, e.y) / bst_camera_scale_rad(&sky.camera), e.z, r.scale,
             1.0 + so.scale_error, r.matched, r.predicted, r.log_chance);
     }
+    if (!r.solved && strcmp(a->kind, "sky") == 0) {
+        printf("# field %d: not solved, %d usable stars, %d detections, %d quads, %d candidates\n",
+               (int)i, sky.usable, sky.count, r.quads, r.candidates);
+    }
     n->solved += r.solved && right;
     n->wrong += r.solved && !right;
     bst_lost_in_space_free(lost);

@@ -226,15 +226,11 @@ static void draw(const arguments *a, const bst_stars *stars, const bst_stars *on
     add_noise(s, key, i, strcmp(a->kind, "mirrored") == 0);
 }
 
-/* Distance of the solved boresight from the true one, px: the nearer end of the exposure. */
+/* Distance of the solved boresight from the true one at the middle of the exposure, px. */
 static double off_px(const scene *s, const bst_plate_solve_result *r) {
-    double least = HUGE_VAL;
-    for (int end = 0; end < 2; end++) {
-        bst_vec3 e = bst_quat_to_rotvec(
-            bst_quat_mul(r->attitude.q_cam_from_gcrf, bst_quat_conj(attitude_at(s, end))));
-        least = fmin(least, hypot(e.x, e.y) / bst_camera_scale_rad(&s->truth));
-    }
-    return least;
+    bst_vec3 e = bst_quat_to_rotvec(
+        bst_quat_mul(r->attitude.q_cam_from_gcrf, bst_quat_conj(s->q_cam_from_gcrf)));
+    return hypot(e.x, e.y) / bst_camera_scale_rad(&s->truth);
 }
 
 int main(int argc, char **argv) {
@@ -263,7 +259,7 @@ int main(int argc, char **argv) {
         bst_lost_in_space *lost;
         bst_assert_ok(&ctx, bst_lost_in_space_create(&ctx, &s.camera, onboard, patterns, YEAR,
                                                      BST_PLATE_SOLVE_STARS, &lost));
-        const bst_plate_solve_options o = {0.05, a.v_limit, 8.0, &s.light};
+        const bst_plate_solve_options o = {0.05, a.v_limit, 8.0, bst_camera_scale_rad(&s.camera), &s.light};
         bst_plate_solve_result r;
         double begin = cpu_s();
         bst_assert_ok(&ctx, bst_plate_solve(&ctx, lost, &o, s.pixels, s.side, s.side, &r));
@@ -273,14 +269,13 @@ int main(int argc, char **argv) {
         solved += right;
         wrong += r.attitude.solved && !right;
         if (!right) {
-            const bst_common_streak_point *e = r.streak.ends;
+            const bst_common_streak_point *e = r.ends;
             printf("# field %d: %s, %d usable stars, %d found, streak %.1f px, off %.1f px, scale "
                    "%.5f, true %.5f, chance e^%.1f, %.0f ms\n",
-                   (int)i, r.attitude.solved ? "wrong" : "not solved", s.usable, r.streak.count,
+                   (int)i, r.attitude.solved ? "wrong" : "not solved", s.usable, r.stars,
                    hypot(e[1].x_px - e[0].x_px, e[1].y_px - e[0].y_px), off, r.attitude.scale,
                    s.scale, r.attitude.log_chance, ms[tried - 1]);
         }
-        bst_plate_solve_free(&r);
         bst_lost_in_space_free(lost);
     }
     qsort(ms, (size_t)tried, sizeof *ms, by_value);

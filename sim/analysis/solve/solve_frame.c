@@ -88,7 +88,6 @@ typedef struct solving {
 } solving;
 
 static void close_all(solving *s) {
-    bst_plate_solve_free(&s->result);
     bst_lost_in_space_free(s->solver);
     bst_star_patterns_free(s->patterns);
     bst_stars_close(s->stars);
@@ -116,23 +115,24 @@ static bst_status open_all(bst_ctx *ctx, solving *s, int width, int height) {
                                     BST_PLATE_SOLVE_STARS, &s->solver);
 }
 
-static double length_px(const bst_common_streak *s) {
-    return hypot(s->ends[1].x_px - s->ends[0].x_px, s->ends[1].y_px - s->ends[0].y_px);
+static double length_px(const bst_plate_solve_result *r) {
+    return hypot(r->ends[1].x_px - r->ends[0].x_px, r->ends[1].y_px - r->ends[0].y_px);
 }
 
 static bst_status solve(bst_ctx *ctx, solving *s, const float *pixels, int width, int height) {
     const bst_plate_solve_options options = {.scale_tolerance = s->request->scale_tolerance,
                                              .v_limit = s->request->v_limit,
                                              .least_snr = s->request->least_snr,
+                                             .tangent_per_px = bst_camera_scale_rad(&s->camera),
                                              .light = &s->light};
     return bst_plate_solve(ctx, s->solver, &options, pixels, width, height, &s->result);
 }
 
 /* Prints where the middle of the frame looks while the stars are at an end of their streaks. */
 static void print_end(const solving *s, int end, FILE *out) {
-    const bst_common_streak_point *from = &s->result.streak.ends[s->result.end], *to = &s->result.streak.ends[end];
-    double x = bst_camera_centre_x(&s->camera) - (to->x_px - from->x_px);
-    double y = bst_camera_centre_y(&s->camera) - (to->y_px - from->y_px), ra, dec;
+    const bst_common_streak_point *to = &s->result.ends[end];
+    double x = bst_camera_centre_x(&s->camera) - to->x_px;
+    double y = bst_camera_centre_y(&s->camera) - to->y_px, ra, dec;
     bst_vec3 v = bst_camera_unproject(&s->camera, x, y);
     v = (bst_vec3){v.x * s->result.attitude.scale, v.y * s->result.attitude.scale, v.z};
     bst_quat back = bst_quat_conj(s->result.attitude.q_cam_from_gcrf);
@@ -153,7 +153,7 @@ static void print(const solving *s, FILE *out) {
     const bst_lost_in_space_result *r = &s->result.attitude;
     if (!r->solved) {
         fprintf(out, "no attitude: %d stars found, %d quads and %d patterns tried\n",
-                s->result.streak.count, r->quads, r->candidates);
+                s->result.stars, r->quads, r->candidates);
         return;
     }
     bool points = s->result.points;
@@ -162,7 +162,7 @@ static void print(const solving *s, FILE *out) {
     fprintf(out, "scale      %.5f arcsec/px\n", r->scale * s->camera.pixel_scale_arcsec);
     if (!points) {
         fprintf(out, "streaks    %.1f px from end to end; which end came first is not known\n",
-                length_px(&s->result.streak));
+                length_px(&s->result));
     }
     for (int end = 0; end < (points ? 1 : 2); end++) {
         print_end(s, end, out);
