@@ -7,7 +7,7 @@
 
 #include "sim/core/symmetric.h"
 
-enum { DEGREE = 4, TERMS = DEGREE + 1, BEYOND = 12, PLATEAU = 8, MOST_STARS = 15, ACROSS = 3 };
+enum { DEGREE = 4, TERMS = DEGREE + 1, BEYOND = 12, MOST_STARS = 15, ACROSS = 3 };
 enum { PASSES = 10, LEAST_SAMPLES = 5 };
 
 /* A source whose variance along its longer axis is below this times that across is a point. */
@@ -126,34 +126,28 @@ typedef struct draft {
     double x[BST_STAR_PATH_ROOM], y[BST_STAR_PATH_ROOM], light[BST_STAR_PATH_ROOM];
 } draft;
 
-/* Mean light of samples next to one, inwards. */
-static double plateau(const draft *d, int from, int step) {
-    double sum = 0.0;
-    int n = 0;
-    for (int k = from + 2 * step; n < PLATEAU && k >= 0 && k < d->count; k += step) {
-        sum += d->light[k];
-        n++;
+/* First and last sample of the path, with fractions: the most likely ends of a path of constant light
+ * in Gaussian noise, which is the stretch with the greatest sum of light less half the level. */
+static void find_ends(const draft *d, double level, double ends[2]) {
+    double sum = 0.0, best = -HUGE_VAL;
+    int from = 0, first = 0, last = d->count - 1;
+    for (int k = 0; k < d->count; k++) {
+        if (sum < 0.0) {
+            sum = 0.0;
+            from = k;
+        }
+        sum += d->light[k] - 0.5 * level;
+        if (sum > best) {
+            best = sum;
+            first = from;
+            last = k;
+        }
     }
-    return n > 0 ? sum / n : 0.0;
-}
-
-/* Sample, with a fraction, at which the light reaches half of that further inwards. */
-static double end_of(const draft *d, int step, double level) {
-    int at = step > 0 ? 0 : d->count - 1, last = step > 0 ? d->count - 1 : 0;
-    while (at != last && d->light[at] < 0.35 * level) {
-        at += step;
-    }
-    double half = 0.5 * plateau(d, at, step);
-    half = fmax(half, 0.25 * level);
-    while (at != last && d->light[at] < half) {
-        at += step;
-    }
-    int before = at - step;
-    if (before < 0 || before >= d->count) {
-        return at;
-    }
-    double rise = d->light[at] - d->light[before];
-    return at - step * (rise > 0.0 ? fmin((d->light[at] - half) / rise, 1.0) : 0.0);
+    /* the samples next to the ends may be partly lit */
+    double before = first > 0 ? d->light[first - 1] / level : 0.0;
+    double after = last < d->count - 1 ? d->light[last + 1] / level : 0.0;
+    ends[0] = first - fmax(fmin(before, 0.5), 0.0);
+    ends[1] = last + fmax(fmin(after, 0.5), 0.0);
 }
 
 static void point_at(const draft *d, double k, double *x, double *y) {
@@ -190,15 +184,10 @@ static int by_value(const void *a, const void *b) {
 static void finish(bst_star_path *path, draft *d, double *x_px, double *y_px) {
     double light[BST_STAR_PATH_ROOM], sorted[BST_STAR_PATH_ROOM], m[3];
     smooth(d->light, light, d->count);
-    memcpy(sorted, light, (size_t)d->count * sizeof *sorted);
+    memcpy(sorted, d->light, (size_t)d->count * sizeof *sorted);
     qsort(sorted, (size_t)d->count, sizeof *sorted, by_value);
-    double level = sorted[d->count * 4 / 5];
-    memcpy(d->light, light, (size_t)d->count * sizeof *light);
-    double ends[2] = {end_of(d, 1, level), end_of(d, -1, level)};
-    if (!(ends[1] > ends[0])) {
-        ends[0] = 0.0;
-        ends[1] = d->count - 1;
-    }
+    double level = fmax(sorted[d->count * 2 / 3], 1e-9), ends[2];
+    find_ends(d, level, ends);
     int first = (int)ceil(ends[0]), last = (int)floor(ends[1]);
     point_at(d, 0.5 * (first + last), x_px, y_px);
     bst_star_path_map(path, *x_px, *y_px, m);

@@ -124,7 +124,7 @@ static void streaks_at_the_edge(void **state) {
     (void)state;
     static scene s;
     draw(&s, 45.0, 12.0);
-    s.x[0] = SIDE - 25.0;
+    s.x[0] = SIDE - 32.0;
     s.y[0] = 205.0;
     s.flux[0] = 45.0 * 40.0;
     add_star(&s, 0, 45.0);
