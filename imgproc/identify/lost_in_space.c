@@ -298,8 +298,11 @@ static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4]
         BST_TRY(predict(a, &fit, &predicted));
         sources = rivals(a->s, predicted);
         matched = match(a, predicted, sources, tolerance, &area_px2);
-        if (matched < 5 ||
-            (pass == 0 && log_chance(a, predicted, matched, area_px2) > FIRST_LOG_CHANCE)) {
+        double chance = matched < 5 ? 0.0 : log_chance(a, predicted, matched, area_px2);
+        if (pass == 0) {
+            out->least_log_chance = fmin(out->least_log_chance, chance + log(out->candidates));
+        }
+        if (matched < 5 || (pass == 0 && chance > FIRST_LOG_CHANCE)) {
             return BST_OK;
         }
         if (!bst_star_fit_refine(a->s->camera, a->s->matched, matched, &fit)) {
@@ -309,8 +312,9 @@ static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4]
         tolerance = pass + 2 < PASSES ? fmax(LAST_PX, 0.5 * tolerance) : LAST_PX;
     }
     double chance = log_chance(a, predicted, matched, area_px2);
+    out->least_log_chance = fmin(out->least_log_chance, chance + log(out->candidates));
     if (matched < LEAST_SHARE * predicted ||
-        chance > log(a->options->false_rate / out->candidates) ||
+        chance + log(out->candidates) > log(a->options->false_rate) ||
         fabs(fit.scale - 1.0) > limit + SCALE_MARGIN) {
         return BST_OK;
     }

@@ -42,13 +42,15 @@ typedef struct bst_lost_in_space_frame {
 } bst_lost_in_space_frame;
 
 typedef struct bst_lost_in_space_result {
-    bool solved; /* the rest holds only if true, but for quads and candidates */
+    bool solved; /* the rest holds only if true, but for the last three */
     bst_quat q_cam_from_gcrf;
     double scale; /* true pixel scale over the camera's */
     int predicted, matched;
     double rms_px;     /* residual per axis of the matched stars */
     double log_chance; /* natural logarithm of the chance of such a match under the null model */
     int quads, candidates; /* tried; patterns that agreed with one */
+    double least_log_chance; /* over all candidates, of log_chance plus the logarithm of the number of
+                                candidates so far, accepted or not; at most 0 */
 } bst_lost_in_space_result;
 
 /* Identifies the stars of a frame without an attitude.
