@@ -22,7 +22,7 @@ static const double LEAST_MOST_TOLERANCE = 0.02, MOST_TOLERANCE = 0.06, FEW = 10
 /* Least distance of a quad's furthest pair, share of the field's shorter side. */
 static const double LEAST_SIZE = 0.08;
 /* Tolerances of matched stars: first, by the quad alone, and last. */
-static const double FIRST_PX = 2.0, MOST_FIRST_PX = 8.0, LAST_PX = 0.6, LAST_SIGMAS = 4.0;
+static const double FIRST_PX = 2.0, MOST_FIRST_PX = 8.0, LAST_PX = 0.6, LAST_SIGMAS = 3.0;
 /* Chance of a first match above which a candidate is dropped at once. */
 static const double FIRST_LOG_CHANCE = -4.6; /* 1 % */
 static const double BRIGHTEST_V = -2.0;
@@ -404,6 +404,11 @@ static void measure_window(attempt *a) {
     }
 }
 
+/* True until the frame is solved or enough has been tried. */
+static bool searching(const attempt *a, const bst_lost_in_space_result *out) {
+    return !out->solved && out->candidates < a->options->max_candidates;
+}
+
 bst_status bst_lost_in_space_solve(bst_ctx *ctx, bst_lost_in_space *lost,
                                    const bst_lost_in_space_options *options,
                                    const bst_lost_in_space_frame *frame,
@@ -416,10 +421,10 @@ bst_status bst_lost_in_space_solve(bst_ctx *ctx, bst_lost_in_space *lost,
     read_sources(lost, frame);
     measure_window(&a);
     int most = lost->count < options->max_stars ? lost->count : options->max_stars;
-    for (int l = 3; l < most && !out->solved; l++) {
-        for (int k = 2; k < l && !out->solved; k++) {
-            for (int j = 1; j < k && !out->solved; j++) {
-                for (int i = 0; i < j && !out->solved; i++) {
+    for (int l = 3; l < most && searching(&a, out); l++) {
+        for (int k = 2; k < l && searching(&a, out); k++) {
+            for (int j = 1; j < k && searching(&a, out); j++) {
+                for (int i = 0; i < j && searching(&a, out); i++) {
                     BST_TRY(try_quad(&a, (const int[4]){i, j, k, l}, out));
                 }
             }

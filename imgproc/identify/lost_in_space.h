@@ -11,10 +11,12 @@ typedef struct bst_lost_in_space_options {
     double scale_tolerance; /* largest relative error of the camera's pixel scale, 0 to 0.1 */
     double false_rate;      /* accepted probability of a wrong attitude of a frame, by chance */
     int max_stars;          /* brightest detections that form quads, 4 to 60 */
+    int max_candidates;     /* patterns that are tried at most, > 0 */
 } bst_lost_in_space_options;
 
-/* Usual options: 5 % in scale, 1e-7, 40 stars. */
-#define BST_LOST_IN_SPACE_USUAL ((bst_lost_in_space_options){0.05, 1e-7, 40})
+/* Usual options: 5 % in scale, 1e-7, 40 stars, 5000 patterns: a frame that can be solved takes a few
+ * hundred at most (tests/imgproc/lost_in_space_rates.c). */
+#define BST_LOST_IN_SPACE_USUAL ((bst_lost_in_space_options){0.05, 1e-7, 40, 5000})
 
 /* Work space for one camera and catalogue. */
 typedef struct bst_lost_in_space bst_lost_in_space;

@@ -11,10 +11,12 @@ enum { BLOCK = 16, KERNEL = 5, SHIFTS = 24 };
 /* Least share of the path inside the frame. */
 static const double LEAST_INSIDE = 0.25;
 /* Position error beside the noise: samples at whole pixels, and the path's own error. */
-static const double SYSTEMATIC_PX = 0.25;
+static const double SYSTEMATIC_PX = 0.2;
+/* Reach of the fit to a maximum along a streak: length over REACH_SHARE, and at most MOST_REACH px. */
+static const double REACH_SHARE = 12.0, MOST_REACH = 10.0;
 /* Standard deviation of the place along a streak: the shift at which the expected logarithm of the
  * likelihood falls by this; calibrated by tests/imgproc/streak_fields.c. */
-static const double ALONG_LOSS = 1.0;
+static const double ALONG_LOSS = 0.5;
 
 struct bst_path_filter {
     const bst_star_path *path;
@@ -168,11 +170,30 @@ static float snr_at(const bst_path_filter *f, int x, int y) {
     return f->response[y * f->width + x] * f->per_noise[y * f->width + x];
 }
 
-/* Offset of the vertex of a parabola through three values. */
-static double vertex(float before, float here, float after) {
-    double bend = 2.0 * (double)here - (double)before - (double)after;
-    double offset = bend > 1e-6 ? 0.5 * ((double)after - (double)before) / bend : 0.0;
-    return fmax(fmin(offset, 0.5), -0.5);
+/* SNR at a place, bilinear. */
+static double snr_between(const bst_path_filter *f, double x, double y) {
+    int i = (int)floor(x), j = (int)floor(y);
+    double u = x - i, v = y - j;
+    return (1.0 - v) * ((1.0 - u) * (double)snr_at(f, i, j) + u * (double)snr_at(f, i + 1, j)) +
+           v * ((1.0 - u) * (double)snr_at(f, i, j + 1) + u * (double)snr_at(f, i + 1, j + 1));
+}
+
+/* Shift along a direction to the vertex of a parabola that fits the SNR over a reach on both sides,
+ * px. Along a streak the maximum is flat, and samples at whole pixels make ripples on it. */
+static double vertex(const bst_path_filter *f, double x, double y, double dx, double dy, int reach) {
+    double odd = 0.0, even = 0.0, square = 0.0, fourth = 0.0, sum = 0.0;
+    for (int k = -reach; k <= reach; k++) {
+        double v = snr_between(f, x + k * dx, y + k * dy), k2 = (double)k * k;
+        sum += v;
+        odd += k * v;
+        even += k2 * v;
+        square += k2;
+        fourth += k2 * k2;
+    }
+    int n = 2 * reach + 1;
+    double bend = (n * even - square * sum) / (n * fourth - square * square);
+    double slope = odd / square;
+    return bend < 0.0 ? fmax(fmin(-0.5 * slope / bend, reach), -reach) : 0.0;
 }
 
 /* Standard deviation of a star's place along its streak. */
@@ -211,10 +232,19 @@ bool bst_path_filter_highest(const bst_path_filter *f, bst_path_filter_peak *out
     double along = along_sigma_px(f, (double)best);
     double across = 1.42 * f->psf_sigma_px / (double)best;
     double c2 = across * across + f->systematic_px * f->systematic_px, a2 = along * along + c2;
-    double c = f->direction[0], s = f->direction[1];
+    double c = f->direction[0], s = f->direction[1], u = x, v = y;
+    if (whole) {
+        int reach = (int)fmax(fmin(f->length_px * inside / REACH_SHARE, MOST_REACH), 1.0);
+        double shift = vertex(f, u, v, c, s, reach);
+        u += shift * c;
+        v += shift * s;
+        shift = vertex(f, u, v, -s, c, 1);
+        u -= shift * s;
+        v += shift * c;
+    }
     *out = (bst_path_filter_peak){
-        .x_px = x - f->margin + (whole ? vertex(snr_at(f, x - 1, y), best, snr_at(f, x + 1, y)) : 0),
-        .y_px = y - f->margin + (whole ? vertex(snr_at(f, x, y - 1), best, snr_at(f, x, y + 1)) : 0),
+        .x_px = u - f->margin,
+        .y_px = v - f->margin,
         .amplitude = (double)f->response[at] / variance,
         .snr = (double)best,
         .inside = inside,

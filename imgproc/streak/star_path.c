@@ -248,26 +248,42 @@ bool bst_star_path_fit(bst_star_path *path, const bst_star_path_image *image, co
     return true;
 }
 
-static double median(double *values, int count) {
-    qsort(values, (size_t)count, sizeof *values, by_value);
-    return count % 2 ? values[count / 2] : 0.5 * (values[count / 2] + values[count / 2 - 1]);
+/* Light of a star at a sample, in units of its amplitude. */
+typedef struct lit {
+    double value, amplitude;
+} lit;
+
+static int by_light(const void *a, const void *b) {
+    double d = ((const lit *)a)->value - ((const lit *)b)->value;
+    return (d > 0.0) - (d < 0.0);
 }
 
-/* Median over the stars that have it in the frame of the light at a place of the path. */
+/* Light at a place of the path: the median over the stars that have it in the frame, weighted by
+ * their amplitudes. What crosses a bright star's streak changes it less. */
 static double light_at(const bst_star_path *path, const bst_star_path_image *image,
                        const bst_star_path_star *stars, int count, const double place[2]) {
-    double values[MOST_STARS];
+    lit all[MOST_STARS];
     int inside = 0;
+    double half = 0.0;
     for (int i = 0; i < count; i++) {
         double m[3];
         bst_star_path_map(path, stars[i].x_px, stars[i].y_px, m);
         double x = stars[i].x_px + m[0] * place[0] + m[1] * place[1];
         double y = stars[i].y_px + m[1] * place[0] + m[2] * place[1];
         if (x >= 0.0 && y >= 0.0 && x < image->width - 1 && y < image->height - 1) {
-            values[inside++] = bst_star_path_image_at(image, x, y) / stars[i].amplitude;
+            double a = stars[i].amplitude;
+            all[inside++] = (lit){bst_star_path_image_at(image, x, y) / a, a};
+            half += 0.5 * a;
         }
     }
-    return inside > 0 ? median(values, inside) : 0.0;
+    qsort(all, (size_t)inside, sizeof *all, by_light);
+    for (int i = 0; i < inside; i++) {
+        half -= all[i].amplitude;
+        if (half <= 0.0) {
+            return all[i].value;
+        }
+    }
+    return 0.0;
 }
 
 /* Place of a sample, counted from the path's first and extrapolated beyond its ends; its normal. */

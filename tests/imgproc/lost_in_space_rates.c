@@ -9,6 +9,7 @@
 typedef struct arguments {
     const char *catalogue;
     double fields, scale, missing, faults, streak, field, lost, false_rate, least, stars;
+    const char *lists; /* file to write the detections to; NULL: none */
     const char *kind; /* sky, mirrored, scrambled or planted */
 } arguments;
 
@@ -49,12 +50,29 @@ static void read_arguments(int argc, char **argv, arguments *a) {
         }
         if (strncmp(argv[i], "catalogue=", 10) == 0) {
             a->catalogue = argv[i] + 10;
+        } else if (strncmp(argv[i], "lists=", 6) == 0) {
+            a->lists = argv[i] + 6;
         } else if (strncmp(argv[i], "kind=", 5) == 0) {
             a->kind = argv[i] + 5;
         } else if (!taken) {
             fail_msg("%s: no argument of this program", argv[i]);
         }
     }
+}
+
+/* Appends a field's detections to a file, for other solvers: a line with the field's number, its side,
+ * the attitude q_cam_from_gcrf (x, y, z, w) and the number of detections, then x, y and flux of each. */
+static void write_list(const arguments *a, int f, int field) {
+    FILE *file = fopen(a->lists, "a");
+    assert_non_null(file);
+    const bst_quat q = sky.q_cam_from_gcrf;
+    fprintf(file, "%d %.3f %.9f %.9f %.9f %.9f %d\n", field, sides_deg[f], q.x, q.y, q.z, q.w,
+            sky.count);
+    for (int i = 0; i < sky.count; i++) {
+        fprintf(file, "%.4f %.4f %.1f\n", sky.items[i].x_px, sky.items[i].y_px,
+                sky.items[i].flux_e);
+    }
+    fclose(file);
 }
 
 /* Counts of one size of field. */
@@ -82,6 +100,9 @@ static void try_field(const arguments *a, int f, uint64_t i, const bst_stars *st
     bst_random_sky_draw(&so, stars, onboard, 11, i, &sky);
     if (sky.usable < 6) {
         return;
+    }
+    if (a->lists) {
+        write_list(a, f, (int)i);
     }
     bst_lost_in_space *lost;
     bst_assert_ok(&ctx, bst_lost_in_space_create(&ctx, &sky.camera, onboard, patterns, YEAR,
