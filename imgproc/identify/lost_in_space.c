@@ -35,7 +35,7 @@ static const double SCALE_MARGIN = 3e-3;
 typedef struct source {
     double x_px, y_px;
     double cov_xx, cov_xy, cov_yy; /* of the place, px^2 */
-    bst_vec3 cam; /* unit, by the camera's own scale */
+    bst_vec3 cam;                  /* unit, by the camera's own scale */
 } source;
 
 struct bst_lost_in_space {
@@ -52,9 +52,9 @@ struct bst_lost_in_space {
     double *nearest2; /* [max_detections] distance^2 of the star matched to a source, in units of
                          its tolerance */
     double (*inverse)[3]; /* [max_detections] of the tolerance ellipse's matrix: xx, xy, yy */
-    int matched_of;              /* sources of star_of; 0: not solved */
-    int *star_of;                /* [max_detections] predicted star; -1: none */
-    bst_star *found;             /* [MOST_PREDICTED] */
+    int matched_of;       /* sources of star_of; 0: not solved */
+    int *star_of;         /* [max_detections] predicted star; -1: none */
+    bst_star *found;      /* [MOST_PREDICTED] */
     bst_star_fit_pair *expected; /* [MOST_PREDICTED] */
     bst_star_fit_pair *matched;  /* [MOST_PREDICTED] */
 };
@@ -87,7 +87,8 @@ bst_status bst_lost_in_space_create(bst_ctx *ctx, const bst_camera *camera, cons
     s->patterns = patterns;
     s->julian_year = julian_year;
     s->depth_v_mag = info.depth_v_mag;
-    s->most_tolerance = fmin(0.5 * pow(FEW / fmax((double)info.patterns, 1.0), 0.25), MOST_TOLERANCE);
+    s->most_tolerance =
+        fmin(0.5 * pow(FEW / fmax((double)info.patterns, 1.0), 0.25), MOST_TOLERANCE);
     s->most_tolerance = fmax(s->most_tolerance, LEAST_MOST_TOLERANCE);
     s->max_detections = max_detections;
     lay_out(s);
@@ -258,8 +259,7 @@ static int match(const attempt *a, int predicted, int sources, double tolerance_
     }
     for (int i = 0; i < sources && count < MOST_PREDICTED; i++) {
         if (s->star_of[i] >= 0) {
-            s->matched[count++] =
-                pair_of(&s->sources[i], s->expected[s->star_of[i]].gcrf);
+            s->matched[count++] = pair_of(&s->sources[i], s->expected[s->star_of[i]].gcrf);
         }
     }
     return count;
@@ -282,7 +282,8 @@ static double log_chance(const attempt *a, int predicted, int matched, double ar
  *
  * Given:     pairs  the quad's four stars */
 static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4],
-                              double extrapolation_px, double ratio, bst_lost_in_space_result *out) {
+                              double extrapolation_px, double ratio,
+                              bst_lost_in_space_result *out) {
     bst_star_fit fit;
     const double limit = a->options->scale_tolerance;
     if (!bst_star_fit_start(a->s->camera, pairs, ratio, &fit) ||

@@ -14,8 +14,8 @@ typedef struct bst_lost_in_space_options {
     int max_candidates;     /* patterns that are tried at most, > 0 */
 } bst_lost_in_space_options;
 
-/* Usual options: 5 % in scale, 1e-7, 40 stars, 5000 patterns: a frame that can be solved takes a few
- * hundred at most (tests/imgproc/lost_in_space_rates.c). */
+/* Usual options: 5 % in scale, 1e-7, 40 stars, 5000 patterns: a frame that can be solved takes a
+ * few hundred at most (tests/imgproc/lost_in_space_rates.c). */
 #define BST_LOST_IN_SPACE_USUAL ((bst_lost_in_space_options){0.05, 1e-7, 40, 5000})
 
 /* Work space for one camera and catalogue. */
@@ -50,9 +50,9 @@ typedef struct bst_lost_in_space_result {
     int predicted, matched;
     double rms_px;     /* residual per axis of the matched stars */
     double log_chance; /* natural logarithm of the chance of such a match under the null model */
-    int quads, candidates; /* tried; patterns that agreed with one */
-    double least_log_chance; /* over all candidates, of log_chance plus the logarithm of the number of
-                                candidates so far, accepted or not; at most 0 */
+    int quads, candidates;   /* tried; patterns that agreed with one */
+    double least_log_chance; /* over all candidates, of log_chance plus the logarithm of the number
+                                of candidates so far, accepted or not; at most 0 */
 } bst_lost_in_space_result;
 
 /* Identifies the stars of a frame without an attitude.

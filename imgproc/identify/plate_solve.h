@@ -20,13 +20,13 @@ typedef struct bst_plate_solve_result {
     bst_lost_in_space_result attitude; /* when the stars are at the middle of their streaks */
     int stars;                         /* found in the frame */
     bst_common_streak_point ends[2];   /* of the streaks, relative to their middle, px */
-    bool points; /* the stars are points */
+    bool points;                       /* the stars are points */
 } bst_plate_solve_result;
 
 /* Solves a frame.
  *
- * Of the common streaks that the frame suggests the first that gives an attitude is used. The path is
- * then measured on the identified stars, and the frame is solved again with it.
+ * Of the common streaks that the frame suggests the first that gives an attitude is used. The path
+ * is then measured on the identified stars, and the frame is solved again with it.
  *
  * Given:     lost    for BST_PLATE_SOLVE_STARS detections
  *            pixels  [height][width]; NAN: no value

@@ -14,7 +14,8 @@ enum { MOST_REACH = 12, EDGE_PX = 2, LEAST_PIXELS = 6, REFINING_STARS = 15, LEVE
 
 /* Negative pixels below this are bad, sigma. */
 static const float LEAST_SIGMA = -5.0f;
-/* A pixel above HOT_SIGMA is bad if its neighbours, less their noise, are below this share of it. */
+/* A pixel above HOT_SIGMA is bad if its neighbours, less their noise, are below this share of it.
+ */
 static const float HOT_SIGMA = 8.0f, HOT_SHARE = 0.2f, NEIGHBOUR_SIGMA = 2.0f;
 /* Assumed width of the PSF. */
 static const double USUAL_PSF_SIGMA_PX = 1.0;
@@ -43,9 +44,9 @@ typedef struct shape {
 struct bst_streak_finder {
     int width, height;
     double sigma, psf_sigma_px;
-    float *image;   /* background removed, in units of `sigma` */
-    float *smooth;  /* convolved with the PSF, of unit noise */
-    float *lines;   /* line filter's output */
+    float *image;  /* background removed, in units of `sigma` */
+    float *smooth; /* convolved with the PSF, of unit noise */
+    float *lines;  /* line filter's output */
     float *scratch;
     int *label, *stack;
     int count; /* pixels on the stack: those of the latest source */
@@ -166,7 +167,8 @@ static void convolve(finder *f, double sigma_px) {
 /* Largest mean along short lines of many directions through each pixel, in units of its noise. */
 static void filter_lines(finder *f) {
     const int w = f->width, h = f->height;
-    const double neighbour = exp(-0.25 * LINE_STEP * LINE_STEP / (f->psf_sigma_px * f->psf_sigma_px));
+    const double neighbour =
+        exp(-0.25 * LINE_STEP * LINE_STEP / (f->psf_sigma_px * f->psf_sigma_px));
     const float scale = (float)(1.0 / sqrt((2 * LINE_HALF + 1) + 4.0 * LINE_HALF * neighbour));
     memset(f->lines, 0, (size_t)w * (size_t)h * sizeof *f->lines);
     for (int d = 0; d < DIRECTIONS; d++) {
@@ -333,8 +335,8 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, double least_snr, int most
                            .cov_xx = peak.cov_xx,
                            .cov_xy = peak.cov_xy,
                            .cov_yy = peak.cov_yy};
-        bool inside = d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= f->width - 1 &&
-                      d.y_px <= f->height - 1;
+        bool inside =
+            d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= f->width - 1 && d.y_px <= f->height - 1;
         if (inside && peak.whole && !is_ghost(out, &d)) {
             f->items[out->count++] = d;
         }
@@ -386,7 +388,9 @@ bst_status bst_streak_finder_repeat(bst_ctx *ctx, bst_streak_finder *f, const bo
     return find_all(ctx, f, out);
 }
 
-int bst_streak_finder_shapes(const bst_streak_finder *f) { return f->shape_count; }
+int bst_streak_finder_shapes(const bst_streak_finder *f) {
+    return f->shape_count;
+}
 
 static bst_status allocate(bst_ctx *ctx, finder *f, int width, int height) {
     const size_t n = (size_t)width * (size_t)height;

@@ -12,7 +12,8 @@ enum { BLOCK = 16, KERNEL = 5, SHIFTS = 24 };
 static const double LEAST_INSIDE = 0.25;
 /* Position error beside the noise: samples at whole pixels, and the path's own error. */
 static const double SYSTEMATIC_PX = 0.2;
-/* Reach of the fit to a maximum along a streak: length over REACH_SHARE, and at most MOST_REACH px. */
+/* Reach of the fit to a maximum along a streak: length over REACH_SHARE, and at most MOST_REACH px.
+ */
 static const double REACH_SHARE = 12.0, MOST_REACH = 10.0;
 /* Standard deviation of the place along a streak: the shift at which the expected logarithm of the
  * likelihood falls by this; calibrated by tests/imgproc/streak_fields.c. */
@@ -20,11 +21,11 @@ static const double ALONG_LOSS = 0.5;
 
 struct bst_path_filter {
     const bst_star_path *path;
-    int margin;        /* of places outside the frame, px */
-    int width, height; /* of the arrays below: the frame and its margins */
-    float *response;   /* [height][width] */
-    float *per_noise;  /* [height][width] one over the noise of the response; 0: not searched */
-    float *scratch[2]; /* [height][width] of a star's response; zero between calls */
+    int margin;         /* of places outside the frame, px */
+    int width, height;  /* of the arrays below: the frame and its margins */
+    float *response;    /* [height][width] */
+    float *per_noise;   /* [height][width] one over the noise of the response; 0: not searched */
+    float *scratch[2];  /* [height][width] of a star's response; zero between calls */
     double correlation; /* variance of the response over the sum of the squared light */
     double squares;     /* sum of the squared light of the whole path */
     double psf_sigma_px;
@@ -180,7 +181,8 @@ static double snr_between(const bst_path_filter *f, double x, double y) {
 
 /* Shift along a direction to the vertex of a parabola that fits the SNR over a reach on both sides,
  * px. Along a streak the maximum is flat, and samples at whole pixels make ripples on it. */
-static double vertex(const bst_path_filter *f, double x, double y, double dx, double dy, int reach) {
+static double vertex(const bst_path_filter *f, double x, double y, double dx, double dy,
+                     int reach) {
     double odd = 0.0, even = 0.0, square = 0.0, fourth = 0.0, sum = 0.0;
     for (int k = -reach; k <= reach; k++) {
         double v = snr_between(f, x + k * dx, y + k * dy), k2 = (double)k * k;
@@ -242,16 +244,15 @@ bool bst_path_filter_highest(const bst_path_filter *f, bst_path_filter_peak *out
         u -= shift * s;
         v += shift * c;
     }
-    *out = (bst_path_filter_peak){
-        .x_px = u - f->margin,
-        .y_px = v - f->margin,
-        .amplitude = (double)f->response[at] / variance,
-        .snr = (double)best,
-        .inside = inside,
-        .cov_xx = c * c * a2 + s * s * c2,
-        .cov_xy = c * s * (a2 - c2),
-        .cov_yy = s * s * a2 + c * c * c2,
-        .whole = whole};
+    *out = (bst_path_filter_peak){.x_px = u - f->margin,
+                                  .y_px = v - f->margin,
+                                  .amplitude = (double)f->response[at] / variance,
+                                  .snr = (double)best,
+                                  .inside = inside,
+                                  .cov_xx = c * c * a2 + s * s * c2,
+                                  .cov_xy = c * s * (a2 - c2),
+                                  .cov_yy = s * s * a2 + c * c * c2,
+                                  .whole = whole};
     return true;
 }
 

@@ -24,8 +24,8 @@ void bst_path_filter_free(bst_path_filter *filter);
 
 /* A maximum of the response. */
 typedef struct bst_path_filter_peak {
-    double x_px, y_px;             /* of the path's middle; may lie outside the frame */
-    double amplitude;              /* of the light per sample, in units of the image's noise */
+    double x_px, y_px; /* of the path's middle; may lie outside the frame */
+    double amplitude;  /* of the light per sample, in units of the image's noise */
     double snr;
     double inside;                 /* share of the path inside the frame, by its squared light */
     double cov_xx, cov_xy, cov_yy; /* of the place, px^2 */

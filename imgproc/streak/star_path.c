@@ -65,8 +65,8 @@ static frame frame_of(const bst_star_path_image *image, const int *pixels, int c
     f.round = !(xx + yy + spread > ROUND * (xx + yy - spread));
     for (int i = 0; i < count; i++) {
         if ((double)image->values[pixels[i]] > LEAST_SAMPLE) {
-            double u = (pixels[i] % image->width - f.x) * f.c +
-                       (pixels[i] / image->width - f.y) * f.s;
+            double u =
+                (pixels[i] % image->width - f.x) * f.c + (pixels[i] / image->width - f.y) * f.s;
             f.low = fmin(f.low, u);
             f.high = fmax(f.high, u);
         }
@@ -90,7 +90,8 @@ static bool centre_line(const frame *f, const bst_star_path_image *image, const 
     for (int i = 0; i < count; i++) {
         double x = pixels[i] % image->width - f->x, y = pixels[i] / image->width - f->y;
         double w = (double)image->values[pixels[i]] - LEAST_SAMPLE;
-        double t = (x * f->c + y * f->s - middle) / half, across = y * f->c - x * f->s, power[TERMS];
+        double t = (x * f->c + y * f->s - middle) / half, across = y * f->c - x * f->s,
+               power[TERMS];
         if (w <= 0.0) {
             continue;
         }
@@ -126,8 +127,9 @@ typedef struct draft {
     double x[BST_STAR_PATH_ROOM], y[BST_STAR_PATH_ROOM], light[BST_STAR_PATH_ROOM];
 } draft;
 
-/* First and last sample of the path, with fractions: the most likely ends of a path of constant light
- * in Gaussian noise, which is the stretch with the greatest sum of light less half the level. */
+/* First and last sample of the path, with fractions: the most likely ends of a path of constant
+ * light in Gaussian noise, which is the stretch with the greatest sum of light less half the level.
+ */
 static void find_ends(const draft *d, double level, double ends[2]) {
     double sum = 0.0, best = -HUGE_VAL;
     int from = 0, first = 0, last = d->count - 1;

@@ -10,7 +10,7 @@ typedef struct arguments {
     const char *catalogue;
     double fields, scale, missing, faults, streak, field, lost, false_rate, least, stars;
     const char *lists; /* file to write the detections to; NULL: none */
-    const char *kind; /* sky, mirrored, scrambled or planted */
+    const char *kind;  /* sky, mirrored, scrambled or planted */
 } arguments;
 
 static const double YEAR = 2024.6;
@@ -31,7 +31,8 @@ static int by_value(const void *a, const void *b) {
 }
 
 static void read_arguments(int argc, char **argv, arguments *a) {
-    *a = (arguments){.catalogue = "default", .fields = 100, .false_rate = 1e-7, .stars = 40, .kind = "sky"};
+    *a = (arguments){
+        .catalogue = "default", .fields = 100, .false_rate = 1e-7, .stars = 40, .kind = "sky"};
     for (int i = 1; i < argc; i++) {
         struct {
             const char *name;
@@ -60,8 +61,9 @@ static void read_arguments(int argc, char **argv, arguments *a) {
     }
 }
 
-/* Appends a field's detections to a file, for other solvers: a line with the field's number, its side,
- * the attitude q_cam_from_gcrf (x, y, z, w) and the number of detections, then x, y and flux of each. */
+/* Appends a field's detections to a file, for other solvers: a line with the field's number, its
+ * side, the attitude q_cam_from_gcrf (x, y, z, w) and the number of detections, then x, y and flux
+ * of each. */
 static void write_list(const arguments *a, int f, int field) {
     FILE *file = fopen(a->lists, "a");
     assert_non_null(file);

@@ -1,8 +1,8 @@
 /* Rates of identification from the pixels of rendered streak fields, as a table.
  *
  * Usage: test_imgproc_streak_fields [NAME=VALUE ...], with the names of `arguments` below. Each
- * field is drawn pixel by pixel: the camera turns during the exposure, each star moves along its own
- * gnomonic path, the image has white noise, hot pixels and a slope of its columns. */
+ * field is drawn pixel by pixel: the camera turns during the exposure, each star moves along its
+ * own gnomonic path, the image has white noise, hot pixels and a slope of its columns. */
 #include <time.h>
 
 #include "boresight/rng.h"
@@ -16,12 +16,12 @@ enum { HOT_PIXELS = 20, BLUR = 5, LARGEST = 1024 };
 
 typedef struct arguments {
     const char *catalogue, *kind; /* sky or mirrored */
-    double fields, first, side, field, v_limit, length, bend, scale, missing, least, only;
+    double fields, first, side, field, v_limit, length, bend, scale, missing, least;
 } arguments;
 
 typedef struct scene {
-    bst_camera camera;     /* what the solver believes */
-    bst_camera truth;      /* with its error of scale */
+    bst_camera camera; /* what the solver believes */
+    bst_camera truth;  /* with its error of scale */
     bst_light light;
     bst_quat q_cam_from_gcrf; /* at the middle of the exposure */
     bst_vec3 turn[3];         /* rotation vector: turn[0] u + turn[1] u (1 - u), u from 0 to 1 */
@@ -50,15 +50,14 @@ static void read_arguments(int argc, char **argv, arguments *a) {
                      .v_limit = 9.5,
                      .length = 60,
                      .scale = 0.05,
-                     .missing = 0.4,
-                     .only = -1};
+                     .missing = 0.4};
     for (int i = 1; i < argc; i++) {
         struct {
             const char *name;
             double *value;
-        } all[] = {{"fields=", &a->fields},   {"first=", &a->first},   {"side=", &a->side},
-                   {"field=", &a->field},     {"limit=", &a->v_limit}, {"length=", &a->length},
-                   {"bend=", &a->bend},       {"scale=", &a->scale},   {"missing=", &a->missing},
+        } all[] = {{"fields=", &a->fields}, {"first=", &a->first},   {"side=", &a->side},
+                   {"field=", &a->field},   {"limit=", &a->v_limit}, {"length=", &a->length},
+                   {"bend=", &a->bend},     {"scale=", &a->scale},   {"missing=", &a->missing},
                    {"least=", &a->least}};
         bool taken = false;
         for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
@@ -207,9 +206,8 @@ static void draw(const arguments *a, const bst_stars *stars, const bst_stars *on
     s->usable = 0;
     s->scale = 1.0 + a->scale * (2.0 * bst_rng_uniform(key, i, 3) - 1.0);
     double tangent = tan(0.5 * a->field * BST_DEG_RAD) / (0.5 * s->side);
-    s->camera = (bst_camera){.width_px = s->side,
-                             .height_px = s->side,
-                             .pixel_scale_arcsec = tangent / BST_ARCSEC_RAD};
+    s->camera = (bst_camera){
+        .width_px = s->side, .height_px = s->side, .pixel_scale_arcsec = tangent / BST_ARCSEC_RAD};
     bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &s->camera));
     s->truth = s->camera;
     s->truth.pixel_scale_arcsec *= s->scale;
@@ -259,7 +257,8 @@ int main(int argc, char **argv) {
         bst_lost_in_space *lost;
         bst_assert_ok(&ctx, bst_lost_in_space_create(&ctx, &s.camera, onboard, patterns, YEAR,
                                                      BST_PLATE_SOLVE_STARS, &lost));
-        const bst_plate_solve_options o = {0.05, a.v_limit, 8.0, bst_camera_scale_rad(&s.camera), &s.light};
+        const bst_plate_solve_options o = {0.05, a.v_limit, 8.0, bst_camera_scale_rad(&s.camera),
+                                           &s.light};
         bst_plate_solve_result r;
         double begin = cpu_s();
         bst_assert_ok(&ctx, bst_plate_solve(&ctx, lost, &o, s.pixels, s.side, s.side, &r));
@@ -270,12 +269,12 @@ int main(int argc, char **argv) {
         wrong += r.attitude.solved && !right;
         if (!right) {
             const bst_common_streak_point *e = r.ends;
-            printf("# field %d: %s, %d usable stars, %d found, streak %.1f px, off %.1f px, scale "
-                   "%.5f, true %.5f, chance e^%.1f, %d quads, %d candidates, %.0f ms\n",
-                   (int)i, r.attitude.solved ? "wrong" : "not solved", s.usable, r.stars,
-                   hypot(e[1].x_px - e[0].x_px, e[1].y_px - e[0].y_px), off, r.attitude.scale,
-                   s.scale, r.attitude.log_chance, r.attitude.quads, r.attitude.candidates,
-                   ms[tried - 1]);
+            printf(
+                "# field %d: %s, %d usable stars, %d found, streak %.1f px, off %.1f px, scale "
+                "%.5f, true %.5f, chance e^%.1f, %d quads, %d candidates, %.0f ms\n",
+                (int)i, r.attitude.solved ? "wrong" : "not solved", s.usable, r.stars,
+                hypot(e[1].x_px - e[0].x_px, e[1].y_px - e[0].y_px), off, r.attitude.scale, s.scale,
+                r.attitude.log_chance, r.attitude.quads, r.attitude.candidates, ms[tried - 1]);
         }
         bst_lost_in_space_free(lost);
     }

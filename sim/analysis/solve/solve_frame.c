@@ -144,8 +144,8 @@ static void print_end(const solving *s, int end, FILE *out) {
     double angle = atan2(bst_vec3_dot(column, east), bst_vec3_dot(column, north));
     fprintf(out, "%-10s RA %.5f deg, Dec %.5f deg, rows point to position angle %.3f deg\n",
             s->result.points ? "middle"
-            : end == 0                       ? "left end"
-                                             : "right end",
+            : end == 0       ? "left end"
+                             : "right end",
             ra / BST_DEG_RAD, dec / BST_DEG_RAD, angle / BST_DEG_RAD);
 }
 
