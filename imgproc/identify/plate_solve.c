@@ -4,6 +4,8 @@
 #include <math.h>
 
 enum { SHAPES = 8, PASSES = 4 };
+/* Candidates of a frame of points: most are solved by the first, and pieces of streaks are not. */
+enum { POINT_CANDIDATES = 3000 };
 /* Ends nearer to each other than this are one: the stars are points. */
 static const double POINT_PX = 4.0;
 /* Streaks are of one length within this. */
@@ -20,9 +22,10 @@ typedef struct attempt {
 } attempt;
 
 /* Solves the stars by the middles of their streaks. */
-static bst_status solve_middles(attempt *a, bst_lost_in_space_result *out) {
+static bst_status solve_middles(attempt *a, int candidates, bst_lost_in_space_result *out) {
     bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
     options.scale_tolerance = a->options->scale_tolerance;
+    options.max_candidates = candidates;
     const bst_lost_in_space_frame frame = {a->streak.items,
                                            a->streak.count,
                                            {0, 0, a->width, a->height},
@@ -45,7 +48,7 @@ static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
             chosen[i] = bst_lost_in_space_matched(a->lost, i);
         }
         BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
-        BST_TRY(solve_middles(a, &again));
+        BST_TRY(solve_middles(a, BST_LOST_IN_SPACE_USUAL.max_candidates, &again));
         if (!again.solved) {
             return BST_OK;
         }
@@ -59,9 +62,12 @@ static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
 
 static bst_status try_shapes(attempt *a, bst_plate_solve_result *out) {
     int shapes = bst_streak_finder_shapes(a->finder);
-    for (int shape = 0; shape < shapes && shape < SHAPES && !out->attitude.solved; shape++) {
+    int shape = shapes > 0 ? BST_STREAK_FINDER_POINT : 0;
+    for (; shape < shapes && shape < SHAPES && !out->attitude.solved; shape++) {
+        bool point = shape == BST_STREAK_FINDER_POINT;
         BST_TRY(bst_streak_finder_find(a->ctx, a->finder, shape, &a->streak));
-        BST_TRY(solve_middles(a, &out->attitude));
+        BST_TRY(solve_middles(a, point ? POINT_CANDIDATES : BST_LOST_IN_SPACE_USUAL.max_candidates,
+                              &out->attitude));
         out->points = length_px(&a->streak) < POINT_PX;
         if (out->attitude.solved && !out->points) {
             BST_TRY(improve(a, &out->attitude));

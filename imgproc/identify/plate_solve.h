@@ -25,8 +25,9 @@ typedef struct bst_plate_solve_result {
 
 /* Solves a frame.
  *
- * Of the common streaks that the frame suggests the first that gives an attitude is used. The path
- * is then measured on the identified stars, and the frame is solved again with it.
+ * The stars are taken for points first. Of the common streaks that the frame suggests the first
+ * that gives an attitude is used. The path is then measured on the identified stars, and the frame
+ * is solved again with it.
  *
  * Given:     lost    for BST_PLATE_SOLVE_STARS detections
  *            pixels  [height][width]; NAN: no value

@@ -29,7 +29,9 @@ static const double SHORT_PX = 10.0;
 /* Pixels of a source by which its size is measured, sigma. */
 static const float LEAST_SAMPLE = 3.0f;
 /* A source this near to a brighter one, and fainter by this share, is what its subtraction left. */
-static const double GHOST_PX = 15.0, GHOST_SHARE = 0.15;
+static const double GHOST_PX = 15.0, GHOST_SHARE = 0.25;
+/* Points brighter than BRIGHT_SNR leave residuals up to GHOST_PX, fainter ones up to CLOSE_PX. */
+static const double BRIGHT_SNR = 100.0, CLOSE_PX = 5.0;
 /* Least SNR of the stars that refine the path. */
 static const double REFINING_SNR = 15.0;
 
@@ -322,7 +324,9 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, double least_snr, int most
     BST_TRY(bst_path_filter_create(ctx, &f->path, &image, f->psf_sigma_px, &filter));
     out->items = f->items;
     out->count = 0;
-    for (int i = 0; i < 2 * most && out->count < most; i++) {
+    /* bright points leave many rings; a peak of theirs costs little */
+    const int tries = (f->path.count == 1 ? 20 : 2) * most;
+    for (int i = 0; i < tries && out->count < most; i++) {
         bst_path_filter_peak peak;
         if (!bst_path_filter_highest(filter, &peak) || peak.snr < least_snr) {
             break;
@@ -341,6 +345,9 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, double least_snr, int most
             f->items[out->count++] = d;
         }
         bst_path_filter_subtract(filter, &peak);
+        if (f->path.count == 1) {
+            bst_path_filter_leave_out(filter, &peak, peak.snr > BRIGHT_SNR ? GHOST_PX : CLOSE_PX);
+        }
     }
     bst_path_filter_free(filter);
     return BST_OK;
@@ -371,8 +378,12 @@ static bst_status find_all(bst_ctx *ctx, finder *f, bst_common_streak *out) {
 
 bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *f, int index,
                                   bst_common_streak *out) {
-    assert(f && out && index >= 0 && index < f->shape_count);
+    assert(f && out && index >= BST_STREAK_FINDER_POINT && index < f->shape_count);
     *out = (bst_common_streak){.items = f->items};
+    if (index == BST_STREAK_FINDER_POINT) {
+        bst_star_path_point(&f->path);
+        return find_all(ctx, f, out);
+    }
     if (!fit_shape(f, &f->shapes[index])) {
         return BST_OK;
     }

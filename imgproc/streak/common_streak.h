@@ -42,7 +42,9 @@ bst_status bst_streak_finder_create(bst_ctx *ctx, const float *pixels, int width
                                     bst_streak_finder **out) BST_MUST_CHECK;
 /* Frees a finder; NULL is allowed. */
 void bst_streak_finder_free(bst_streak_finder *finder);
-/* Number of shapes. */
+/* The shape of a point, beside those of sources. */
+enum { BST_STREAK_FINDER_POINT = -1 };
+/* Number of shapes of sources. */
 int bst_streak_finder_shapes(const bst_streak_finder *finder);
 
 /* Finds the stars by one shape.
@@ -52,7 +54,7 @@ int bst_streak_finder_shapes(const bst_streak_finder *finder);
  * (Hogbom 1974, A&AS 15, 417). The brightest stars then give a better path, and the search is
  * repeated. Streaks that the frame cuts off are found if their middle is inside.
  *
- * Given:     index  of the shape, 0 to bst_streak_finder_shapes - 1
+ * Given:     index  BST_STREAK_FINDER_POINT, or 0 to bst_streak_finder_shapes - 1
  * Returned:  *out   valid until the next call with the same finder
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *finder, int index,

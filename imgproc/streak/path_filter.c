@@ -340,3 +340,15 @@ void bst_path_filter_subtract(bst_path_filter *f, const bst_path_filter_peak *pe
         subtract_points(f, box);
     }
 }
+
+void bst_path_filter_leave_out(bst_path_filter *f, const bst_path_filter_peak *peak,
+                               double radius_px) {
+    double cx = peak->x_px + f->margin, cy = peak->y_px + f->margin;
+    for (int y = 0; y < f->height; y++) {
+        for (int x = 0; x < f->width; x++) {
+            if (hypot(x - cx, y - cy) <= radius_px) {
+                f->per_noise[y * f->width + x] = 0.0f;
+            }
+        }
+    }
+}

@@ -38,4 +38,8 @@ bool bst_path_filter_highest(const bst_path_filter *filter, bst_path_filter_peak
 /* Subtracts the response to a star (Hogbom 1974, A&AS 15, 417). */
 void bst_path_filter_subtract(bst_path_filter *filter, const bst_path_filter_peak *peak);
 
+/* Leaves a circle about a peak out of the search: what the subtraction of a bright star left. */
+void bst_path_filter_leave_out(bst_path_filter *filter, const bst_path_filter_peak *peak,
+                               double radius_px);
+
 #endif

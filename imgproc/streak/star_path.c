@@ -213,7 +213,7 @@ static void finish(bst_star_path *path, draft *d, double *x_px, double *y_px) {
     }
 }
 
-static void set_point(bst_star_path *path) {
+void bst_star_path_point(bst_star_path *path) {
     path->count = 1;
     path->place[0][0] = path->place[0][1] = 0.0;
     path->light[0] = 1.0;
@@ -226,7 +226,7 @@ bool bst_star_path_fit(bst_star_path *path, const bst_star_path_image *image, co
     frame f = frame_of(image, pixels, count);
     double c[TERMS], half = 0.5 * (f.high - f.low), middle = 0.5 * (f.high + f.low);
     if (f.round || !(half > 2.0) || !centre_line(&f, image, pixels, count, c)) {
-        set_point(path);
+        bst_star_path_point(path);
         *x_px = f.x;
         *y_px = f.y;
         return true;

@@ -48,6 +48,9 @@ double bst_star_path_image_at(const bst_star_path_image *image, double x_px, dou
 bool bst_star_path_fit(bst_star_path *path, const bst_star_path_image *image, const int *pixels,
                        int count, double *x_px, double *y_px);
 
+/* Makes the path of a point. */
+void bst_star_path_point(bst_star_path *path);
+
 /* A star on the image. */
 typedef struct bst_star_path_star {
     double x_px, y_px, amplitude;
