@@ -15,11 +15,14 @@ enum { MOST_PREDICTED = 512, MOST_CANDIDATES = 64, PASSES = 5 };
 static const double SYSTEMATIC_PX = 0.1;
 /* Tolerance of a code: so many standard deviations of a star's place in it, and more by the
  * rounding of the catalogue and by aberration. */
-static const double CODE_SIGMAS = 5.0, CODE_FLOOR = 8e-4, MOST_TOLERANCE = 0.02;
+static const double CODE_SIGMAS = 5.0, CODE_FLOOR = 8e-4;
+/* Largest tolerance, at which one pattern of FEW agrees with a quad by chance: the codes fill about
+ * half of a box of unit volume, and the sizes of a tenth agree. */
+static const double LEAST_MOST_TOLERANCE = 0.02, MOST_TOLERANCE = 0.06, FEW = 10.0;
 /* Least distance of a quad's furthest pair, share of the field's shorter side. */
 static const double LEAST_SIZE = 0.08;
 /* Tolerances of matched stars: first, by the quad alone, and last. */
-static const double FIRST_PX = 2.0, MOST_FIRST_PX = 8.0, LAST_PX = 1.0, LAST_SIGMAS = 4.0;
+static const double FIRST_PX = 2.0, MOST_FIRST_PX = 8.0, LAST_PX = 0.6, LAST_SIGMAS = 3.0;
 /* Chance of a first match above which a candidate is dropped at once. */
 static const double FIRST_LOG_CHANCE = -4.6; /* 1 % */
 static const double BRIGHTEST_V = -2.0;
@@ -30,8 +33,9 @@ static const double SCALE_MARGIN = 3e-3;
 
 /* A detection that takes part. */
 typedef struct source {
-    double x_px, y_px, sigma_px;
-    bst_vec3 cam; /* unit, by the camera's own scale */
+    double x_px, y_px;
+    double cov_xx, cov_xy, cov_yy; /* of the place, px^2 */
+    bst_vec3 cam;                  /* unit, by the camera's own scale */
 } source;
 
 struct bst_lost_in_space {
@@ -39,14 +43,18 @@ struct bst_lost_in_space {
     const bst_stars *stars;
     const bst_star_patterns *patterns;
     double julian_year, depth_v_mag;
+    double most_tolerance; /* of a code */
     int max_detections;
     bst_arena arena;
     int *order;      /* [max_detections] indices of detections, brightest first */
     source *sources; /* [max_detections] in that order */
     int count;
-    double *nearest2;            /* [max_detections] distance^2 of the star matched to a source */
-    int *star_of;                /* [max_detections] predicted star; -1: none */
-    bst_star *found;             /* [MOST_PREDICTED] */
+    double *nearest2; /* [max_detections] distance^2 of the star matched to a source, in units of
+                         its tolerance */
+    double (*inverse)[3]; /* [max_detections] of the tolerance ellipse's matrix: xx, xy, yy */
+    int matched_of;       /* sources of star_of; 0: not solved */
+    int *star_of;         /* [max_detections] predicted star; -1: none */
+    bst_star *found;      /* [MOST_PREDICTED] */
     bst_star_fit_pair *expected; /* [MOST_PREDICTED] */
     bst_star_fit_pair *matched;  /* [MOST_PREDICTED] */
 };
@@ -56,6 +64,7 @@ static void lay_out(bst_lost_in_space *s) {
     BST_ARENA_TAKE(&s->arena, s->order, items);
     BST_ARENA_TAKE(&s->arena, s->sources, items);
     BST_ARENA_TAKE(&s->arena, s->nearest2, items);
+    BST_ARENA_TAKE(&s->arena, s->inverse, items);
     BST_ARENA_TAKE(&s->arena, s->star_of, items);
     BST_ARENA_TAKE(&s->arena, s->found, MOST_PREDICTED);
     BST_ARENA_TAKE(&s->arena, s->expected, MOST_PREDICTED);
@@ -78,6 +87,9 @@ bst_status bst_lost_in_space_create(bst_ctx *ctx, const bst_camera *camera, cons
     s->patterns = patterns;
     s->julian_year = julian_year;
     s->depth_v_mag = info.depth_v_mag;
+    s->most_tolerance =
+        fmin(0.5 * pow(FEW / fmax((double)info.patterns, 1.0), 0.25), MOST_TOLERANCE);
+    s->most_tolerance = fmax(s->most_tolerance, LEAST_MOST_TOLERANCE);
     s->max_detections = max_detections;
     lay_out(s);
     bst_status status = bst_arena_alloc(ctx, &s->arena, "star identification");
@@ -116,13 +128,34 @@ static void read_sources(bst_lost_in_space *s, const bst_lost_in_space_frame *fr
     bst_heapsort_indices(s->order, count, brighter, frame->items);
     for (int i = 0; i < count; i++) {
         const bst_detection *d = &frame->items[s->order[i]];
-        double variance = fmax(0.5 * (d->cov_xx + d->cov_yy), 0.0);
+        double least = SYSTEMATIC_PX * SYSTEMATIC_PX;
         s->sources[i] = (source){.x_px = d->x_px,
                                  .y_px = d->y_px,
-                                 .sigma_px = sqrt(variance + SYSTEMATIC_PX * SYSTEMATIC_PX),
+                                 .cov_xx = fmax(d->cov_xx, 0.0) + least,
+                                 .cov_xy = d->cov_xy,
+                                 .cov_yy = fmax(d->cov_yy, 0.0) + least,
                                  .cam = bst_camera_unproject(s->camera, d->x_px, d->y_px)};
     }
     s->count = count;
+}
+
+bool bst_lost_in_space_matched(const bst_lost_in_space *s, int detection) {
+    for (int i = 0; i < s->matched_of; i++) {
+        if (s->order[i] == detection) {
+            return s->star_of[i] >= 0;
+        }
+    }
+    return false;
+}
+
+/* A source and its star. */
+static bst_star_fit_pair pair_of(const source *s, bst_vec3 gcrf) {
+    return (bst_star_fit_pair){.gcrf = gcrf,
+                               .x_px = s->x_px,
+                               .y_px = s->y_px,
+                               .cov_xx = s->cov_xx,
+                               .cov_xy = s->cov_xy,
+                               .cov_yy = s->cov_yy};
 }
 
 /* A frame that is being solved. */
@@ -171,24 +204,49 @@ static bst_status predict(const attempt *a, const bst_star_fit *fit, int *count)
     return BST_OK;
 }
 
+/* Standard deviation of a source's place along its worse axis. */
+static double worst_sigma_px(const source *s) {
+    double spread = hypot(s->cov_xx - s->cov_yy, 2.0 * s->cov_xy);
+    return sqrt(0.5 * (s->cov_xx + s->cov_yy + spread));
+}
+
+/* Ellipse about a source that holds its star: so many standard deviations and a tolerance.
+ *
+ * Returned:  inverse  of the ellipse's matrix: xx, xy, yy
+ *            its area, px^2 */
+static double tolerance_ellipse(const source *s, double tolerance_px, double inverse[3]) {
+    const double k = LAST_SIGMAS * LAST_SIGMAS, t = tolerance_px * tolerance_px;
+    const double xx = k * s->cov_xx + t, xy = k * s->cov_xy, yy = k * s->cov_yy + t;
+    const double det = xx * yy - xy * xy;
+    inverse[0] = yy / det;
+    inverse[1] = -xy / det;
+    inverse[2] = xx / det;
+    return BST_PI * sqrt(det);
+}
+
 /* Matches predicted stars to the nearest of the brightest sources, one to one.
  *
  * Returned:  s->matched  the pairs
- *            number of them */
-static int match(const attempt *a, int predicted, int sources, double tolerance_px) {
+ *            *area_px2   of all sources' ellipses
+ *            number of pairs */
+static int match(const attempt *a, int predicted, int sources, double tolerance_px,
+                 double *area_px2) {
     bst_lost_in_space *s = a->s;
     int count = 0;
+    *area_px2 = 0.0;
     for (int i = 0; i < sources; i++) {
         s->star_of[i] = -1;
-        s->nearest2[i] = tolerance_px * tolerance_px;
+        s->nearest2[i] = 1.0;
+        *area_px2 += tolerance_ellipse(&s->sources[i], tolerance_px, s->inverse[i]);
     }
     for (int k = 0; k < predicted; k++) {
         const bst_star_fit_pair *e = &s->expected[k];
         int best = -1;
-        double best2 = tolerance_px * tolerance_px;
+        double best2 = 1.0;
         for (int i = 0; i < sources; i++) {
+            const double *m = s->inverse[i];
             double dx = s->sources[i].x_px - e->x_px, dy = s->sources[i].y_px - e->y_px;
-            double d2 = dx * dx + dy * dy;
+            double d2 = m[0] * dx * dx + 2.0 * m[1] * dx * dy + m[2] * dy * dy;
             if (d2 < best2) {
                 best2 = d2;
                 best = i;
@@ -201,11 +259,7 @@ static int match(const attempt *a, int predicted, int sources, double tolerance_
     }
     for (int i = 0; i < sources && count < MOST_PREDICTED; i++) {
         if (s->star_of[i] >= 0) {
-            const source *from = &s->sources[i];
-            s->matched[count++] = (bst_star_fit_pair){.gcrf = s->expected[s->star_of[i]].gcrf,
-                                                      .x_px = from->x_px,
-                                                      .y_px = from->y_px,
-                                                      .sigma_px = from->sigma_px};
+            s->matched[count++] = pair_of(&s->sources[i], s->expected[s->star_of[i]].gcrf);
         }
     }
     return count;
@@ -219,18 +273,17 @@ static int rivals(const bst_lost_in_space *s, int predicted) {
 }
 
 /* Logarithm of the chance that the stars beside the quad's four match. */
-static double log_chance(const attempt *a, int predicted, int matched, int sources,
-                         double tolerance_px) {
-    int others = sources > 4 ? sources - 4 : 0;
-    double chance = bst_null_model_chance(others, tolerance_px, a->area_px2);
+static double log_chance(const attempt *a, int predicted, int matched, double area_px2) {
+    double chance = bst_null_model_chance(area_px2, a->area_px2);
     return bst_null_model_log_tail(predicted > 4 ? predicted - 4 : 0, matched - 4, chance);
 }
 
 /* Tries an attitude from a pattern: counts its stars and refines it.
  *
  * Given:     pairs  the quad's four stars */
-static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4], double size_px,
-                              double ratio, bst_lost_in_space_result *out) {
+static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4],
+                              double extrapolation_px, double ratio,
+                              bst_lost_in_space_result *out) {
     bst_star_fit fit;
     const double limit = a->options->scale_tolerance;
     if (!bst_star_fit_start(a->s->camera, pairs, ratio, &fit) ||
@@ -238,35 +291,36 @@ static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4]
         fabs(fit.scale - 1.0) > limit + SCALE_MARGIN) {
         return BST_OK;
     }
-    double sigma_px = 0.0;
-    for (int i = 0; i < 4; i++) {
-        sigma_px = fmax(sigma_px, pairs[i].sigma_px);
-    }
     /* the quad's own error grows with the distance from it */
-    double tolerance = fmin(FIRST_PX + 3.0 * sigma_px * a->side_px / size_px, MOST_FIRST_PX);
+    double tolerance = fmin(FIRST_PX + extrapolation_px, MOST_FIRST_PX);
+    double area_px2;
     int predicted, sources, matched;
     for (int pass = 0; pass < PASSES; pass++) {
         BST_TRY(predict(a, &fit, &predicted));
         sources = rivals(a->s, predicted);
-        matched = match(a, predicted, sources, tolerance);
-        if (matched < 5 || (pass == 0 && log_chance(a, predicted, matched, sources, tolerance) >
-                                             FIRST_LOG_CHANCE)) {
+        matched = match(a, predicted, sources, tolerance, &area_px2);
+        double chance = matched < 5 ? 0.0 : log_chance(a, predicted, matched, area_px2);
+        if (pass == 0) {
+            out->least_log_chance = fmin(out->least_log_chance, chance + log(out->candidates));
+        }
+        if (matched < 5 || (pass == 0 && chance > FIRST_LOG_CHANCE)) {
             return BST_OK;
         }
         if (!bst_star_fit_refine(a->s->camera, a->s->matched, matched, &fit)) {
             return BST_OK;
         }
         /* the stars near the quad are matched first, and carry the fit on to the others */
-        double last = fmax(LAST_PX, LAST_SIGMAS * bst_star_fit_sigma_px(a->s->matched, matched));
-        tolerance = pass + 2 < PASSES ? fmax(last, 0.5 * tolerance) : last;
+        tolerance = pass + 2 < PASSES ? fmax(LAST_PX, 0.5 * tolerance) : LAST_PX;
     }
-    double chance = log_chance(a, predicted, matched, sources, tolerance);
+    double chance = log_chance(a, predicted, matched, area_px2);
+    out->least_log_chance = fmin(out->least_log_chance, chance + log(out->candidates));
     if (matched < LEAST_SHARE * predicted ||
-        chance > log(a->options->false_rate / out->candidates) ||
+        chance + log(out->candidates) > log(a->options->false_rate) ||
         fabs(fit.scale - 1.0) > limit + SCALE_MARGIN) {
         return BST_OK;
     }
     out->solved = true;
+    a->s->matched_of = sources;
     out->q_cam_from_gcrf = fit.q_cam_from_gcrf;
     out->scale = fit.scale;
     out->predicted = predicted;
@@ -276,16 +330,20 @@ static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4]
     return BST_OK;
 }
 
-/* Tolerance of the code of four sources; also the distance of the furthest pair. */
+/* Tolerance of the code of four sources.
+ *
+ * Returned:  *size_px           distance of the furthest pair
+ *            *extrapolation_px  error over the field of an attitude from the four */
 static double code_tolerance(const attempt *a, const bst_star_quad *quad, const int star[4],
-                             double *size_px) {
+                             double *size_px, double *extrapolation_px) {
     const source *s = a->s->sources;
     const source *from = &s[star[quad->order[0]]], *to = &s[star[quad->order[1]]];
     double sigma_px = 0.0;
     for (int i = 0; i < 4; i++) {
-        sigma_px = fmax(sigma_px, s[star[i]].sigma_px);
+        sigma_px = fmax(sigma_px, worst_sigma_px(&s[star[i]]));
     }
     *size_px = hypot(to->x_px - from->x_px, to->y_px - from->y_px);
+    *extrapolation_px = 3.0 * sigma_px * a->side_px / *size_px;
     /* a wrong scale shears the tangent plane away from the boresight */
     return CODE_FLOOR + CODE_SIGMAS * sigma_px / *size_px +
            0.5 * a->options->scale_tolerance * a->most_r2;
@@ -293,7 +351,8 @@ static double code_tolerance(const attempt *a, const bst_star_quad *quad, const 
 
 /* Looks a form of a quad up and tries the patterns that agree. */
 static bst_status try_form(const attempt *a, const bst_star_quad *quad, const int star[4],
-                           double tolerance, double size_px, bst_lost_in_space_result *out) {
+                           double tolerance, double extrapolation_px,
+                           bst_lost_in_space_result *out) {
     bst_star_patterns_match found[MOST_CANDIDATES];
     int count = bst_star_patterns_find(a->s->patterns, quad, tolerance, a->options->scale_tolerance,
                                        found, MOST_CANDIDATES);
@@ -301,15 +360,11 @@ static bst_status try_form(const attempt *a, const bst_star_quad *quad, const in
     for (int k = 0; k < count && !out->solved; k++) {
         bst_star_fit_pair pairs[4];
         for (int i = 0; i < 4; i++) {
-            const source *from = &a->s->sources[star[quad->order[i]]];
-            pairs[i] = (bst_star_fit_pair){
-                .gcrf = bst_light_apparent_star(a->frame->light, found[k].icrs[i]),
-                .x_px = from->x_px,
-                .y_px = from->y_px,
-                .sigma_px = from->sigma_px};
+            pairs[i] = pair_of(&a->s->sources[star[quad->order[i]]],
+                               bst_light_apparent_star(a->frame->light, found[k].icrs[i]));
         }
         out->candidates++;
-        BST_TRY(try_pattern(a, pairs, size_px, found[k].size_ratio, out));
+        BST_TRY(try_pattern(a, pairs, extrapolation_px, found[k].size_ratio, out));
     }
     return BST_OK;
 }
@@ -324,14 +379,15 @@ static bst_status try_quad(const attempt *a, const int star[4], bst_lost_in_spac
     if (!bst_star_quad_make(v, &forms[0])) {
         return BST_OK;
     }
-    double size_px, tolerance = code_tolerance(a, &forms[0], star, &size_px);
-    if (size_px < LEAST_SIZE * a->side_px || tolerance > MOST_TOLERANCE) {
+    double size_px, extrapolation_px;
+    double tolerance = code_tolerance(a, &forms[0], star, &size_px, &extrapolation_px);
+    if (size_px < LEAST_SIZE * a->side_px || tolerance > a->s->most_tolerance) {
         return BST_OK;
     }
     out->quads++;
     int count = 1 + bst_star_quad_alternatives(&forms[0], tolerance, forms + 1);
     for (int i = 0; i < count && !out->solved; i++) {
-        BST_TRY(try_form(a, &forms[i], star, tolerance, size_px, out));
+        BST_TRY(try_form(a, &forms[i], star, tolerance, extrapolation_px, out));
     }
     return BST_OK;
 }
@@ -349,6 +405,11 @@ static void measure_window(attempt *a) {
     }
 }
 
+/* True until the frame is solved or enough has been tried. */
+static bool searching(const attempt *a, const bst_lost_in_space_result *out) {
+    return !out->solved && out->candidates < a->options->max_candidates;
+}
+
 bst_status bst_lost_in_space_solve(bst_ctx *ctx, bst_lost_in_space *lost,
                                    const bst_lost_in_space_options *options,
                                    const bst_lost_in_space_frame *frame,
@@ -357,13 +418,14 @@ bst_status bst_lost_in_space_solve(bst_ctx *ctx, bst_lost_in_space *lost,
     assert(options->scale_tolerance >= 0.0 && options->scale_tolerance <= 0.1);
     *out = (bst_lost_in_space_result){.q_cam_from_gcrf = BST_QUAT_IDENTITY, .scale = 1.0};
     attempt a = {.ctx = ctx, .s = lost, .options = options, .frame = frame};
+    lost->matched_of = 0;
     read_sources(lost, frame);
     measure_window(&a);
     int most = lost->count < options->max_stars ? lost->count : options->max_stars;
-    for (int l = 3; l < most && !out->solved; l++) {
-        for (int k = 2; k < l && !out->solved; k++) {
-            for (int j = 1; j < k && !out->solved; j++) {
-                for (int i = 0; i < j && !out->solved; i++) {
+    for (int l = 3; l < most && searching(&a, out); l++) {
+        for (int k = 2; k < l && searching(&a, out); k++) {
+            for (int j = 1; j < k && searching(&a, out); j++) {
+                for (int i = 0; i < j && searching(&a, out); i++) {
                     BST_TRY(try_quad(&a, (const int[4]){i, j, k, l}, out));
                 }
             }

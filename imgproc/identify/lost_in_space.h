@@ -11,10 +11,12 @@ typedef struct bst_lost_in_space_options {
     double scale_tolerance; /* largest relative error of the camera's pixel scale, 0 to 0.1 */
     double false_rate;      /* accepted probability of a wrong attitude of a frame, by chance */
     int max_stars;          /* brightest detections that form quads, 4 to 60 */
+    int max_candidates;     /* patterns that are tried at most, > 0 */
 } bst_lost_in_space_options;
 
-/* Usual options: 5 % in scale, 1e-7, 40 stars. */
-#define BST_LOST_IN_SPACE_USUAL ((bst_lost_in_space_options){0.05, 1e-7, 40})
+/* Usual options: 5 % in scale, 1e-7, 40 stars, 5000 patterns: a frame that can be solved takes a
+ * few hundred at most (tests/imgproc/lost_in_space_rates.c). */
+#define BST_LOST_IN_SPACE_USUAL ((bst_lost_in_space_options){0.05, 1e-7, 40, 5000})
 
 /* Work space for one camera and catalogue. */
 typedef struct bst_lost_in_space bst_lost_in_space;
@@ -42,13 +44,15 @@ typedef struct bst_lost_in_space_frame {
 } bst_lost_in_space_frame;
 
 typedef struct bst_lost_in_space_result {
-    bool solved; /* the rest holds only if true, but for quads and candidates */
+    bool solved; /* the rest holds only if true, but for the last three */
     bst_quat q_cam_from_gcrf;
     double scale; /* true pixel scale over the camera's */
     int predicted, matched;
     double rms_px;     /* residual per axis of the matched stars */
     double log_chance; /* natural logarithm of the chance of such a match under the null model */
-    int quads, candidates; /* tried; patterns that agreed with one */
+    int quads, candidates;   /* tried; patterns that agreed with one */
+    double least_log_chance; /* over all candidates, of log_chance plus the logarithm of the number
+                                of candidates so far, accepted or not; at most 0 */
 } bst_lost_in_space_result;
 
 /* Identifies the stars of a frame without an attitude.
@@ -67,5 +71,8 @@ bst_status bst_lost_in_space_solve(bst_ctx *ctx, bst_lost_in_space *lost,
                                    const bst_lost_in_space_options *options,
                                    const bst_lost_in_space_frame *frame,
                                    bst_lost_in_space_result *out) BST_MUST_CHECK;
+
+/* True if the latest frame was solved and a detection of it was matched to a star. */
+bool bst_lost_in_space_matched(const bst_lost_in_space *lost, int detection);
 
 #endif

@@ -25,7 +25,7 @@ double bst_null_model_log_tail(int predicted, int matched, double chance) {
     return fmin(first + log(sum), 0.0);
 }
 
-double bst_null_model_chance(int detections, double tolerance_px, double area_px2) {
-    assert(detections >= 0 && area_px2 > 0.0);
-    return -expm1(-detections * BST_PI * tolerance_px * tolerance_px / area_px2);
+double bst_null_model_chance(double tolerances_px2, double area_px2) {
+    assert(tolerances_px2 >= 0.0 && area_px2 > 0.0);
+    return -expm1(-tolerances_px2 / area_px2);
 }

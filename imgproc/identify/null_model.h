@@ -10,8 +10,10 @@
  * Returned:  0 to 1; natural logarithm, -INFINITY for a chance of 0 */
 double bst_null_model_log_tail(int predicted, int matched, double chance);
 
-/* Probability that a random place has one of `detections` within tolerance_px, in a field of
- * area_px2, if they are spread evenly. */
-double bst_null_model_chance(int detections, double tolerance_px, double area_px2);
+/* Probability that a random place in a field of area_px2 lies within the tolerance of a detection,
+ * if the detections are spread evenly.
+ *
+ * Given:     tolerances_px2  sum of the areas about the detections */
+double bst_null_model_chance(double tolerances_px2, double area_px2);
 
 #endif

@@ -54,19 +54,22 @@ static bool add_star(const bst_camera *camera, const bst_star_fit_pair *pair,
         return false;
     }
     const double a = u.x / u.z, b = u.y / u.z, f = fit->scale, unit = bst_camera_scale_rad(camera);
-    const double weight = 1.0 / (pair->sigma_px * pair->sigma_px);
+    const double det = pair->cov_xx * pair->cov_yy - pair->cov_xy * pair->cov_xy;
+    const double w[2][2] = {{pair->cov_yy / det, -pair->cov_xy / det},
+                            {-pair->cov_xy / det, pair->cov_xx / det}};
     /* tangent coordinates, by the camera's scale, of the star turned by a small rotation vector;
      * the last parameter is the logarithm of the scale */
     const double j[2][PARAMETERS] = {{-a * b / f, (1.0 + a * a) / f, -b / f, -a / f},
                                      {(-1.0 - b * b) / f, a * b / f, a / f, -b / f}};
     const double r[2] = {(v.x / v.z - a / f) / unit, (v.y / v.z - b / f) / unit};
-    for (int k = 0; k < 2; k++) {
-        *square += r[k] * r[k];
-        for (int p = 0; p < PARAMETERS; p++) {
-            g[p] += weight * j[k][p] / unit * r[k];
-            for (int q = 0; q < PARAMETERS; q++) {
-                m[p][q] += weight * j[k][p] * j[k][q] / (unit * unit);
-            }
+    *square += r[0] * r[0] + r[1] * r[1];
+    for (int p = 0; p < PARAMETERS; p++) {
+        /* the parameter's derivatives, weighted */
+        const double a0 = (w[0][0] * j[0][p] + w[1][0] * j[1][p]) / unit;
+        const double a1 = (w[0][1] * j[0][p] + w[1][1] * j[1][p]) / unit;
+        g[p] += a0 * r[0] + a1 * r[1];
+        for (int q = 0; q < PARAMETERS; q++) {
+            m[p][q] += (a0 * j[0][q] + a1 * j[1][q]) / unit;
         }
     }
     return true;
@@ -113,12 +116,4 @@ bool bst_star_fit_project(const bst_star_fit *fit, const bst_camera *camera, bst
     bst_vec3 u = bst_quat_rotate(fit->q_cam_from_gcrf, gcrf);
     return bst_camera_project(camera, (bst_vec3){u.x / fit->scale, u.y / fit->scale, u.z}, x_px,
                               y_px);
-}
-
-double bst_star_fit_sigma_px(const bst_star_fit_pair *pairs, int count) {
-    double sum = 0.0;
-    for (int i = 0; i < count; i++) {
-        sum += pairs[i].sigma_px * pairs[i].sigma_px;
-    }
-    return count > 0 ? sqrt(sum / count) : 0.0;
 }

@@ -6,9 +6,9 @@
 
 /* A star and its place in the frame. */
 typedef struct bst_star_fit_pair {
-    bst_vec3 gcrf;     /* unit, apparent */
-    double x_px, y_px; /* full-sensor coordinates */
-    double sigma_px;   /* per axis; > 0 */
+    bst_vec3 gcrf;                 /* unit, apparent */
+    double x_px, y_px;             /* full-sensor coordinates */
+    double cov_xx, cov_xy, cov_yy; /* of the place, px^2; positive definite */
 } bst_star_fit_pair;
 
 /* Attitude, and the true pixel scale over the camera's own: the tangent coordinates of a pixel are
@@ -37,8 +37,5 @@ bool bst_star_fit_refine(const bst_camera *camera, const bst_star_fit_pair *pair
 /* Place of a direction in the frame; false: behind the camera. */
 bool bst_star_fit_project(const bst_star_fit *fit, const bst_camera *camera, bst_vec3 gcrf,
                           double *x_px, double *y_px);
-
-/* RMS of the stars' sigma_px. */
-double bst_star_fit_sigma_px(const bst_star_fit_pair *pairs, int count);
 
 #endif

@@ -5,20 +5,60 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/streak/template_filter.h"
+#include "boresight/vec.h"
+#include "imgproc/streak/path_filter.h"
 
-enum { MOST_SHAPES = 8, LEAST_PIXELS = 6, EDGE_PX = 2, MARGIN_PX = 3, END_PX = 10 };
+/* LINE_HALF: samples of a line on either side of a pixel, LINE_STEP px apart. */
+enum { MOST_SHAPES = 64, LINE_HALF = 5, LINE_STEP = 2, LINE_REACH = 11, DIRECTIONS = 16 };
+enum { MOST_REACH = 12, EDGE_PX = 2, LEAST_PIXELS = 6, REFINING_STARS = 15, LEVELS = 8 };
 
-/* Threshold of connected sources on means of 3 x 3 pixels, sigma of a pixel: six of the mean. */
-static const double CONNECTED_SIGMA = 2.0;
 /* Negative pixels below this are bad, sigma. */
 static const float LEAST_SIGMA = -5.0f;
+/* A pixel above HOT_SIGMA is bad if its neighbours, less their noise, are below this share of it.
+ */
+static const float HOT_SIGMA = 8.0f, HOT_SHARE = 0.2f, NEIGHBOUR_SIGMA = 2.0f;
+/* Assumed width of the PSF. */
+static const double USUAL_PSF_SIGMA_PX = 1.0;
+/* A source begins at a pixel above SEED and has those above GROW, in units of the line filter's
+ * noise; brighter ones begin at GROW times powers of two. */
+static const float SEED = 6.5f, GROW = 4.0f;
+/* Sizes of sources that agree: to AGREE_PX and this share. */
+static const double AGREE_PX = 4.0, AGREE_SHARE = 0.08;
+/* Length that is added to sources in their rank, px: points count too. */
+static const double SHORT_PX = 10.0;
+/* Pixels of a source by which its size is measured, sigma. */
+static const float LEAST_SAMPLE = 3.0f;
 /* A source this near to a brighter one, and fainter by this share, is what its subtraction left. */
-static const double GHOST_PX = 15.0, GHOST_SHARE = 0.15;
-/* A source whose variance along its longer axis is below this times that across is a point. */
-static const double ROUND = 2.0;
-/* Least share of the template's energy inside the frame. */
-static const double LEAST_INSIDE = 0.25;
+static const double GHOST_PX = 15.0, GHOST_SHARE = 0.25;
+/* Points brighter than BRIGHT_SNR leave residuals up to GHOST_PX, fainter ones up to CLOSE_PX. */
+static const double BRIGHT_SNR = 100.0, CLOSE_PX = 5.0;
+/* Least SNR of the stars that refine the path. */
+static const double REFINING_SNR = 15.0;
+
+/* A connected source. */
+typedef struct shape {
+    double sum, rank;
+    int from; /* one of its pixels */
+    float level;
+    int x0, x1, y0, y1;
+} shape;
+
+struct bst_streak_finder {
+    int width, height;
+    double sigma, psf_sigma_px;
+    float *image;  /* background removed, in units of `sigma` */
+    float *smooth; /* convolved with the PSF, of unit noise */
+    float *lines;  /* line filter's output */
+    float *scratch;
+    int *label, *stack;
+    int count; /* pixels on the stack: those of the latest source */
+    bst_star_path path;
+    bst_common_streak_options options;
+    bst_detection *items; /* [max_sources + REFINING_STARS] */
+    shape shapes[MOST_SHAPES];
+    int shape_count;
+};
+typedef bst_streak_finder finder;
 
 static int ascending(const void *a, const void *b) {
     float d = *(const float *)a - *(const float *)b;
@@ -38,19 +78,20 @@ static float median(float *values, int count) {
 }
 
 /* Removes the medians of columns and rows and divides by the noise. */
-static void clean(bst_common_streak *s, float *scratch) {
-    const int w = s->width, h = s->height;
+static void clean(finder *f) {
+    const int w = f->width, h = f->height;
+    float *scratch = f->scratch;
     for (int x = 0; x < w; x++) {
         for (int y = 0; y < h; y++) {
-            scratch[y] = s->image[(size_t)y * (size_t)w + (size_t)x];
+            scratch[y] = f->image[(size_t)y * (size_t)w + (size_t)x];
         }
         float level = median(scratch, h);
         for (int y = 0; y < h; y++) {
-            s->image[(size_t)y * (size_t)w + (size_t)x] -= level;
+            f->image[(size_t)y * (size_t)w + (size_t)x] -= level;
         }
     }
     for (int y = 0; y < h; y++) {
-        float *row = &s->image[(size_t)y * (size_t)w];
+        float *row = &f->image[(size_t)y * (size_t)w];
         memcpy(scratch, row, (size_t)w * sizeof *row);
         float level = median(scratch, w);
         for (int x = 0; x < w; x++) {
@@ -59,193 +100,208 @@ static void clean(bst_common_streak *s, float *scratch) {
     }
     const size_t pixels = (size_t)w * (size_t)h;
     for (size_t i = 0; i < pixels; i++) {
-        scratch[i] = fabsf(s->image[i]);
+        scratch[i] = fabsf(f->image[i]);
     }
-    s->sigma = fmax(1.4826 * (double)median(scratch, (int)pixels), 1e-9);
+    f->sigma = fmax(1.4826 * (double)median(scratch, (int)pixels), 1e-9);
     for (size_t i = 0; i < pixels; i++) {
-        float v = s->image[i] / (float)s->sigma;
-        s->image[i] = isnan(v) ? 0.0f : v < LEAST_SIGMA ? LEAST_SIGMA : v;
+        float v = f->image[i] / (float)f->sigma;
+        f->image[i] = isnan(v) ? 0.0f : v < LEAST_SIGMA ? LEAST_SIGMA : v;
     }
 }
 
-/* A connected source. */
-typedef struct shape {
-    double sum;
-    int label, pixels, x0, x1, y0, y1;
-} shape;
+/* Clears pixels that stand out from all their neighbours: no PSF is as narrow. */
+static void remove_hot_pixels(finder *f) {
+    const int w = f->width;
+    for (int y = 1; y < f->height - 1; y++) {
+        for (int x = 1; x < w - 1; x++) {
+            float *at = &f->image[y * w + x], most = LEAST_SIGMA;
+            if (*at < HOT_SIGMA) {
+                continue;
+            }
+            for (int k = 0; k < 9; k++) {
+                float v = at[(k / 3 - 1) * w + k % 3 - 1];
+                most = k != 4 && v > most ? v : most;
+            }
+            *at = most - NEIGHBOUR_SIGMA < HOT_SHARE * *at ? 0.0f : *at;
+        }
+    }
+}
 
-/* Collects the connected pixels of a source, depth first. */
-static shape flood(const bst_common_streak *s, const bool *above, int *label, int *stack, int from,
-                   int number) {
-    const int w = s->width, h = s->height;
-    shape out = {.label = number, .x0 = w, .y0 = h};
-    int depth = 0;
-    stack[depth++] = from;
-    label[from] = number;
-    while (depth > 0) {
-        int i = stack[--depth], x = i % w, y = i / w;
-        out.sum += (double)s->image[i];
-        out.pixels++;
-        out.x0 = x < out.x0 ? x : out.x0;
-        out.x1 = x > out.x1 ? x : out.x1;
-        out.y0 = y < out.y0 ? y : out.y0;
-        out.y1 = y > out.y1 ? y : out.y1;
+/* Convolves the image with a Gaussian; the result has unit noise. */
+static void convolve(finder *f, double sigma_px) {
+    const int w = f->width, h = f->height, reach = (int)ceil(3.0 * sigma_px);
+    float kernel[2 * MOST_REACH + 1];
+    double squares = 0.0;
+    for (int k = -reach; k <= reach; k++) {
+        double v = exp(-0.5 * k * k / (sigma_px * sigma_px));
+        squares += v * v;
+        kernel[k + reach] = (float)v;
+    }
+    for (int k = 0; k <= 2 * reach; k++) {
+        kernel[k] /= (float)sqrt(squares);
+    }
+    memset(f->smooth, 0, (size_t)w * (size_t)h * sizeof *f->smooth);
+    for (int y = 0; y < h; y++) {
+        float *to = &f->scratch[y * w];
+        memset(to, 0, (size_t)w * sizeof *to);
+        for (int k = -reach; k <= reach; k++) {
+            const float *from = &f->image[y * w + k], c = kernel[k + reach];
+            int last = k > 0 ? w - k : w;
+            for (int x = k < 0 ? -k : 0; x < last; x++) {
+                to[x] += c * from[x];
+            }
+        }
+    }
+    for (int y = 0; y < h; y++) {
+        for (int k = -reach; k <= reach; k++) {
+            if (y + k < 0 || y + k >= h) {
+                continue;
+            }
+            const float *from = &f->scratch[(y + k) * w], c = kernel[k + reach];
+            for (int x = 0; x < w; x++) {
+                f->smooth[y * w + x] += c * from[x];
+            }
+        }
+    }
+    f->psf_sigma_px = sigma_px;
+}
+
+/* Largest mean along short lines of many directions through each pixel, in units of its noise. */
+static void filter_lines(finder *f) {
+    const int w = f->width, h = f->height;
+    const double neighbour =
+        exp(-0.25 * LINE_STEP * LINE_STEP / (f->psf_sigma_px * f->psf_sigma_px));
+    const float scale = (float)(1.0 / sqrt((2 * LINE_HALF + 1) + 4.0 * LINE_HALF * neighbour));
+    memset(f->lines, 0, (size_t)w * (size_t)h * sizeof *f->lines);
+    for (int d = 0; d < DIRECTIONS; d++) {
+        int offset[2 * LINE_HALF + 1];
+        for (int k = -LINE_HALF; k <= LINE_HALF; k++) {
+            double r = LINE_STEP * k, angle = BST_PI * d / DIRECTIONS;
+            offset[k + LINE_HALF] = (int)lround(r * sin(angle)) * w + (int)lround(r * cos(angle));
+        }
+        for (int y = LINE_REACH; y < h - LINE_REACH; y++) {
+            float *to = &f->lines[y * w];
+            const float *from = &f->smooth[y * w];
+            for (int x = LINE_REACH; x < w - LINE_REACH; x++) {
+                float sum = 0.0f;
+                for (int k = 0; k <= 2 * LINE_HALF; k++) {
+                    sum += from[x + offset[k]];
+                }
+                sum *= scale;
+                to[x] = sum > to[x] ? sum : to[x];
+            }
+        }
+    }
+}
+
+/* Collects the connected pixels of a source above a level. */
+static shape flood(finder *f, float level, int from, int number) {
+    const int w = f->width, h = f->height;
+    shape out = {.from = from, .level = level, .x0 = w, .y0 = h};
+    f->count = 0;
+    f->stack[f->count++] = from;
+    f->label[from] = number;
+    for (int next = 0; next < f->count; next++) {
+        int i = f->stack[next], x = i % w, y = i / w;
+        out.sum += (double)f->smooth[i];
+        if (f->smooth[i] > LEAST_SAMPLE) { /* the lines reach beyond the source */
+            out.x0 = x < out.x0 ? x : out.x0;
+            out.x1 = x > out.x1 ? x : out.x1;
+            out.y0 = y < out.y0 ? y : out.y0;
+            out.y1 = y > out.y1 ? y : out.y1;
+        }
         for (int k = 0; k < 9; k++) {
             int u = x + k % 3 - 1, v = y + k / 3 - 1;
-            if (u >= 0 && v >= 0 && u < w && v < h && above[v * w + u] && label[v * w + u] == 0) {
-                label[v * w + u] = number;
-                stack[depth++] = v * w + u;
+            if (u >= 0 && v >= 0 && u < w && v < h && f->label[v * w + u] != number &&
+                f->lines[v * w + u] > level) {
+                f->label[v * w + u] = number;
+                f->stack[f->count++] = v * w + u;
             }
         }
     }
     return out;
 }
 
-/* Marks pixels whose mean of 3 x 3 is above the threshold. */
-static void mark(const bst_common_streak *s, bool *above) {
-    const int w = s->width, h = s->height;
-    for (int y = 1; y < h - 1; y++) {
-        for (int x = 1; x < w - 1; x++) {
-            double sum = 0.0;
-            for (int k = 0; k < 9; k++) {
-                sum += (double)s->image[(y + k / 3 - 1) * w + x + k % 3 - 1];
-            }
-            above[y * w + x] = sum > 9.0 * CONNECTED_SIGMA;
-        }
-    }
+static bool agree(int a, int b) {
+    return abs(a - b) <= AGREE_PX + AGREE_SHARE * (a > b ? a : b);
 }
 
-/* Lists the brightest sources that lie wholly inside the frame; returns their number. */
-static int list_shapes(const bst_common_streak *s, const bool *above, int *label, int *stack,
-                       shape out[MOST_SHAPES]) {
-    int count = 0, number = 0;
-    for (int i = 0; i < s->width * s->height; i++) {
-        if (!above[i] || label[i] != 0) {
-            continue;
+/* True for two sources at the same place: one source at two levels. */
+static bool same_place(const shape *a, const shape *b) {
+    return abs(a->x0 - b->x0) + abs(a->x1 - b->x1) + abs(a->y0 - b->y0) + abs(a->y1 - b->y1) <
+           4.0 * AGREE_PX;
+}
+
+/* Adds a source to the list; a full list loses its faintest. */
+static int add_shape(shape *list, int count, const shape *found) {
+    for (int i = 0; i < count; i++) {
+        if (same_place(&list[i], found)) {
+            return count;
         }
-        shape found = flood(s, above, label, stack, i, ++number);
-        if (found.pixels < LEAST_PIXELS || found.x0 <= EDGE_PX || found.y0 <= EDGE_PX ||
-            found.x1 >= s->width - 1 - EDGE_PX || found.y1 >= s->height - 1 - EDGE_PX) {
-            continue;
-        }
-        int at = count < MOST_SHAPES ? count++ : MOST_SHAPES;
-        for (; at > 0 && out[at - 1].sum < found.sum; at--) {
-            if (at < MOST_SHAPES) {
-                out[at] = out[at - 1];
-            }
-        }
+    }
+    int at = count < MOST_SHAPES ? count++ : MOST_SHAPES;
+    for (; at > 0 && list[at - 1].sum < found->sum; at--) {
         if (at < MOST_SHAPES) {
-            out[at] = found;
+            list[at] = list[at - 1];
         }
+    }
+    if (at < MOST_SHAPES) {
+        list[at] = *found;
     }
     return count;
 }
 
-/* Copies a source as the template, of unit energy. */
-static bst_status copy_template(bst_ctx *ctx, bst_common_streak *s, const int *label,
-                                const shape *from) {
-    const int x0 = from->x0 - MARGIN_PX, y0 = from->y0 - MARGIN_PX;
-    s->columns = from->x1 - from->x0 + 1 + 2 * MARGIN_PX;
-    s->rows = from->y1 - from->y0 + 1 + 2 * MARGIN_PX;
-    s->template = calloc((size_t)s->columns * (size_t)s->rows, sizeof *s->template);
-    if (!s->template) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a streak");
+/* Orders shapes: long ones that many others agree with first, then the brightest. */
+static int by_rank(const void *a, const void *b) {
+    const shape *s = a, *t = b;
+    if (s->rank != t->rank) {
+        return s->rank > t->rank ? -1 : 1;
     }
-    double energy = 0.0;
-    for (int pass = 0; pass < 2; pass++) {
-        for (int y = from->y0; y <= from->y1; y++) {
-            for (int x = from->x0; x <= from->x1; x++) {
-                float v = label[y * s->width + x] == from->label ? s->image[y * s->width + x] : 0;
-                if (pass == 0) {
-                    energy += (double)v * (double)v;
-                } else {
-                    s->template[(y - y0) * s->columns + x - x0] = v / (float)sqrt(energy);
-                }
+    return s->sum != t->sum ? (s->sum > t->sum ? -1 : 1) : s->from - t->from;
+}
+
+/* Lists the sources that lie wholly inside the frame, at several levels, by rank; returns their
+ * number. */
+static int list_shapes(finder *f, shape out[MOST_SHAPES]) {
+    int count = 0, number = 0;
+    memset(f->label, 0, (size_t)f->width * (size_t)f->height * sizeof *f->label);
+    for (int l = LEVELS - 1; l >= 0; l--) {
+        float level = GROW * (float)(1 << l), seed = l > 0 ? level : SEED;
+        int first = number;
+        for (int i = 0; i < f->width * f->height; i++) {
+            if (f->lines[i] <= seed || f->label[i] > first) {
+                continue;
+            }
+            shape found = flood(f, level, i, ++number);
+            if (f->count >= LEAST_PIXELS && found.x0 > EDGE_PX && found.y0 > EDGE_PX &&
+                found.x1 < f->width - 1 - EDGE_PX && found.y1 < f->height - 1 - EDGE_PX) {
+                count = add_shape(out, count, &found);
             }
         }
     }
-    return BST_OK;
+    for (int i = 0; i < count; i++) {
+        int width = out[i].x1 - out[i].x0, height = out[i].y1 - out[i].y0, agreeing = 0;
+        for (int k = 0; k < count; k++) {
+            agreeing += k != i && agree(width, out[k].x1 - out[k].x0) &&
+                        agree(height, out[k].y1 - out[k].y0);
+        }
+        out[i].rank = agreeing * (hypot(width, height) + SHORT_PX);
+    }
+    qsort(out, (size_t)count, sizeof *out, by_rank);
+    return count;
 }
 
-/* Centroid and principal axis of the template, pointing right. Returns false for a point. */
-static bool principal_axis(const bst_common_streak *s, double centre[2], double axis[2]) {
-    double sum = 0.0, m[5] = {0};
-    for (int y = 0; y < s->rows; y++) {
-        for (int x = 0; x < s->columns; x++) {
-            double v = fmax((double)s->template[y * s->columns + x], 0.0);
-            sum += v;
-            m[0] += v * x;
-            m[1] += v * y;
-            m[2] += v * x * x;
-            m[3] += v * x * y;
-            m[4] += v * y * y;
-        }
-    }
-    centre[0] = m[0] / sum;
-    centre[1] = m[1] / sum;
-    double xx = m[2] / sum - centre[0] * centre[0], xy = m[3] / sum - centre[0] * centre[1],
-           yy = m[4] / sum - centre[1] * centre[1];
-    double angle = 0.5 * atan2(2.0 * xy, xx - yy);
-    axis[0] = cos(angle);
-    axis[1] = sin(angle);
-    double spread = hypot(xx - yy, 2.0 * xy);
-    return xx + yy + spread > ROUND * (xx + yy - spread);
+static bst_star_path_image image_of(const finder *f) {
+    return (bst_star_path_image){f->smooth, f->width, f->height};
 }
 
-/* Places of the ends: where the light along the principal axis falls to half of that of the last
- * END_PX. A round source has both at its centre. */
-static bst_status find_ends(bst_ctx *ctx, bst_common_streak *s) {
-    double centre[2], axis[2];
-    if (!principal_axis(s, centre, axis)) {
-        s->ends[0] = s->ends[1] = (bst_common_streak_point){centre[0], centre[1]};
-        return BST_OK;
-    }
-    const int half = s->rows + s->columns, bins = 2 * half + 1;
-    double *light = calloc(2 * (size_t)bins, sizeof *light), *side = light + bins;
-    if (!light) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a streak");
-    }
-    double most = 0.0;
-    for (int y = 0; y < s->rows; y++) {
-        for (int x = 0; x < s->columns; x++) {
-            double v = (double)s->template[y * s->columns + x], dx = x - centre[0],
-                   dy = y - centre[1];
-            int bin = half + (int)lround(dx * axis[0] + dy * axis[1]);
-            light[bin] += v;
-            side[bin] += v * (dy * axis[0] - dx * axis[1]);
-            most = fmax(most, light[bin]);
-        }
-    }
-    for (int e = 0; e < 2; e++) {
-        int step = e == 0 ? 1 : -1, at = e == 0 ? 0 : bins - 1;
-        while (light[at] < 0.2 * most) {
-            at += step;
-        }
-        double plateau = 0.0, across = 0.0, weight = 0.0;
-        for (int k = 2; k < END_PX; k++) {
-            plateau += light[at + k * step > 0 && at + k * step < bins ? at + k * step : at];
-        }
-        plateau /= END_PX - 2;
-        at -= 2 * step;
-        while (light[at] < 0.5 * plateau) {
-            at += step;
-        }
-        double before = light[at - step],
-               u = at - half - step * (light[at] - 0.5 * plateau) / (light[at] - before);
-        for (int k = 0; k < 3; k++) {
-            across += side[at + k * step];
-            weight += light[at + k * step];
-        }
-        across /= weight;
-        s->ends[e] = (bst_common_streak_point){centre[0] + u * axis[0] - across * axis[1],
-                                               centre[1] + u * axis[1] + across * axis[0]};
-    }
-    free(light);
-    return BST_OK;
-}
-
-static bool inside(const bst_common_streak *s, double x, double y) {
-    return x >= 0.0 && y >= 0.0 && x <= s->width - 1 && y <= s->height - 1;
+/* Makes the path of a shape. */
+static bool fit_shape(finder *f, const shape *s) {
+    const bst_star_path_image image = image_of(f);
+    double x, y;
+    memset(f->label, 0, (size_t)f->width * (size_t)f->height * sizeof *f->label);
+    flood(f, s->level, s->from, 1);
+    return bst_star_path_fit(&f->path, &image, f->stack, f->count, &x, &y);
 }
 
 /* True for what the subtraction of a brighter source left. */
@@ -261,88 +317,144 @@ static bool is_ghost(const bst_common_streak *s, const bst_detection *d) {
 }
 
 /* Finds the stars one after the other; those that are not kept are subtracted, too. */
-static void find_stars(bst_common_streak *s, bst_template_filter *filter,
-                       const bst_common_streak_options *o) {
-    for (int i = 0; i < 2 * o->max_sources && s->count < o->max_sources; i++) {
-        bst_template_peak peak;
-        if (!bst_template_filter_peak(filter, s->image, LEAST_INSIDE, &peak) ||
-            peak.snr < o->least_snr) {
+static bst_status find_stars(bst_ctx *ctx, finder *f, double least_snr, int most,
+                             bst_common_streak *out) {
+    const bst_star_path_image image = image_of(f);
+    bst_path_filter *filter;
+    BST_TRY(bst_path_filter_create(ctx, &f->path, &image, f->psf_sigma_px, &filter));
+    out->items = f->items;
+    out->count = 0;
+    /* bright points leave many rings; a peak of theirs costs little */
+    const int tries = (f->path.count == 1 ? 20 : 2) * most;
+    for (int i = 0; i < tries && out->count < most; i++) {
+        bst_path_filter_peak peak;
+        if (!bst_path_filter_highest(filter, &peak) || peak.snr < least_snr) {
             break;
         }
         bst_detection d = {.x_px = peak.x_px,
                            .y_px = peak.y_px,
-                           .flux_e = peak.amplitude * s->sigma,
-                           .flux_sigma_e = peak.amplitude * s->sigma / peak.snr,
+                           .flux_e = peak.amplitude * f->sigma,
+                           .flux_sigma_e = peak.amplitude * f->sigma / peak.snr,
                            .snr = peak.snr,
                            .cov_xx = peak.cov_xx,
                            .cov_xy = peak.cov_xy,
                            .cov_yy = peak.cov_yy};
-        bool end = inside(s, d.x_px + s->ends[0].x_px, d.y_px + s->ends[0].y_px) ||
-                   inside(s, d.x_px + s->ends[1].x_px, d.y_px + s->ends[1].y_px);
-        if (end && peak.whole && !is_ghost(s, &d)) {
-            s->items[s->count++] = d;
+        bool inside =
+            d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= f->width - 1 && d.y_px <= f->height - 1;
+        if (inside && peak.whole && !is_ghost(out, &d)) {
+            f->items[out->count++] = d;
         }
-        bst_template_filter_subtract(filter, s->image, &peak);
+        bst_path_filter_subtract(filter, &peak);
+        if (f->path.count == 1) {
+            bst_path_filter_leave_out(filter, &peak, peak.snr > BRIGHT_SNR ? GHOST_PX : CLOSE_PX);
+        }
     }
-}
-
-/* Work space of the search for shapes. */
-typedef struct workspace {
-    float *scratch;
-    bool *above;
-    int *label, *stack;
-} workspace;
-
-static bst_status find(bst_ctx *ctx, const bst_common_streak_options *options, workspace *k,
-                       bst_common_streak *out) {
-    shape shapes[MOST_SHAPES];
-    clean(out, k->scratch);
-    mark(out, k->above);
-    int count = list_shapes(out, k->above, k->label, k->stack, shapes);
-    if (options->shape >= count || options->shape >= options->candidates) {
-        return BST_OK;
-    }
-    out->shapes = count;
-    BST_TRY(copy_template(ctx, out, k->label, &shapes[options->shape]));
-    BST_TRY(find_ends(ctx, out));
-    bst_template_filter *filter;
-    BST_TRY(bst_template_filter_create(ctx, out->width, out->height, out->template, out->columns,
-                                       out->rows, &filter));
-    find_stars(out, filter, options);
-    bst_template_filter_free(filter);
+    bst_path_filter_free(filter);
     return BST_OK;
 }
 
-bst_status bst_common_streak_find(bst_ctx *ctx, const float *pixels, int width, int height,
-                                  const bst_common_streak_options *options,
-                                  bst_common_streak *out) {
-    assert(pixels && options && out && width > 0 && height > 0);
-    *out = (bst_common_streak){.width = width, .height = height};
-    const size_t n = (size_t)width * (size_t)height;
-    workspace k = {.scratch = malloc(n * sizeof(float)),
-                   .above = calloc(n, sizeof(bool)),
-                   .label = calloc(n, sizeof(int)),
-                   .stack = malloc(n * sizeof(int))};
-    out->image = malloc(n * sizeof *out->image);
-    out->items = calloc((size_t)options->max_sources + 1, sizeof *out->items);
-    bst_status status = BST_OK;
-    if (!k.scratch || !k.above || !k.label || !k.stack || !out->image || !out->items) {
-        status =
-            bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a frame of %d x %d px", width, height);
-    } else {
-        memcpy(out->image, pixels, n * sizeof *out->image);
-        status = find(ctx, options, &k, out);
+/* Improves the path by stars. */
+static void refine_path(finder *f, const bst_common_streak *found, const bool *chosen) {
+    const bst_star_path_image image = image_of(f);
+    bst_star_path_star stars[REFINING_STARS];
+    int count = 0;
+    for (int i = 0; i < found->count && count < REFINING_STARS; i++) {
+        if (!chosen || chosen[i]) {
+            stars[count++] = (bst_star_path_star){found->items[i].x_px, found->items[i].y_px,
+                                                  found->items[i].flux_e / f->sigma};
+        }
     }
-    free(k.scratch);
-    free(k.above);
-    free(k.label);
-    free(k.stack);
-    return status;
+    bst_star_path_refine(&f->path, &image, stars, count);
 }
 
-void bst_common_streak_free(bst_common_streak *s) {
-    free(s->image);
-    free(s->template);
-    free(s->items);
-    *s = (bst_common_streak){0};
+/* Finds all stars by the path. */
+static bst_status find_all(bst_ctx *ctx, finder *f, bst_common_streak *out) {
+    out->sigma = f->sigma;
+    for (int e = 0; e < 2; e++) {
+        out->ends[e] = (bst_common_streak_point){f->path.ends[e][0], f->path.ends[e][1]};
+    }
+    return find_stars(ctx, f, f->options.least_snr, f->options.max_sources, out);
+}
+
+bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *f, int index,
+                                  bst_common_streak *out) {
+    assert(f && out && index >= BST_STREAK_FINDER_POINT && index < f->shape_count);
+    *out = (bst_common_streak){.items = f->items};
+    if (index == BST_STREAK_FINDER_POINT) {
+        bst_star_path_point(&f->path);
+        return find_all(ctx, f, out);
+    }
+    if (!fit_shape(f, &f->shapes[index])) {
+        return BST_OK;
+    }
+    BST_TRY(find_stars(ctx, f, REFINING_SNR, REFINING_STARS, out));
+    refine_path(f, out, NULL);
+    return find_all(ctx, f, out);
+}
+
+bst_status bst_streak_finder_repeat(bst_ctx *ctx, bst_streak_finder *f, const bool *chosen,
+                                    bst_common_streak *out) {
+    assert(f && chosen && out);
+    refine_path(f, out, chosen);
+    return find_all(ctx, f, out);
+}
+
+int bst_streak_finder_shapes(const bst_streak_finder *f) {
+    return f->shape_count;
+}
+
+static bst_status allocate(bst_ctx *ctx, finder *f, int width, int height) {
+    const size_t n = (size_t)width * (size_t)height;
+    f->image = calloc(4 * n, sizeof *f->image);
+    f->label = calloc(2 * n, sizeof *f->label);
+    f->items = calloc((size_t)f->options.max_sources + REFINING_STARS, sizeof *f->items);
+    if (!f->image || !f->label || !f->items) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a frame of %d x %d px", width,
+                        height);
+    }
+    f->smooth = f->image + n;
+    f->lines = f->image + 2 * n;
+    f->scratch = f->image + 3 * n;
+    f->stack = f->label + n;
+    return BST_OK;
+}
+
+bst_status bst_streak_finder_create(bst_ctx *ctx, const float *pixels, int width, int height,
+                                    const bst_common_streak_options *options,
+                                    bst_streak_finder **out) {
+    assert(pixels && options && out && width > 0 && height > 0);
+    *out = NULL;
+    finder *f = calloc(1, sizeof *f);
+    if (!f) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a frame");
+    }
+    f->width = width;
+    f->height = height;
+    f->options = *options;
+    f->path.centre[0] = 0.5 * (width - 1);
+    f->path.centre[1] = 0.5 * (height - 1);
+    f->path.tangent_per_px = options->tangent_per_px;
+    bst_status status = allocate(ctx, f, width, height);
+    if (status != BST_OK) {
+        bst_streak_finder_free(f);
+        return status;
+    }
+    memcpy(f->image, pixels, (size_t)width * (size_t)height * sizeof *f->image);
+    clean(f);
+    remove_hot_pixels(f);
+    convolve(f, USUAL_PSF_SIGMA_PX);
+    filter_lines(f);
+    f->shape_count = list_shapes(f, f->shapes);
+    *out = f;
+    return BST_OK;
+}
+
+void bst_streak_finder_free(bst_streak_finder *f) {
+    if (!f) {
+        return;
+    }
+    free(f->image);
+    free(f->label);
+    free(f->items);
+    free(f);
 }

@@ -2,48 +2,69 @@
 #ifndef BST_IMGPROC_STREAK_COMMON_STREAK_H
 #define BST_IMGPROC_STREAK_COMMON_STREAK_H
 
+#include <stdbool.h>
+
 #include "boresight/messages.h"
 #include "boresight/status.h"
 
 typedef struct bst_common_streak_options {
-    int candidates; /* shapes to choose from, the brightest first: shape 0, 1, ... */
-    int shape;      /* the one to use */
     int max_sources;
     double least_snr;
+    double tangent_per_px; /* of the gnomonic projection, at the frame's middle: streaks differ with
+                              the place in a wide field; 0: all are equal */
 } bst_common_streak_options;
 
-/* A point along the streak, relative to the corner of its template. */
+/* A point along the streak, relative to its middle. */
 typedef struct bst_common_streak_point {
     double x_px, y_px;
 } bst_common_streak_point;
 
 typedef struct bst_common_streak {
-    float *image; /* background removed, in units of `sigma` */
-    int width, height;
-    double sigma;    /* noise of the given image */
-    float *template; /* [rows][columns] of the shape: unit sum of squares */
-    int rows, columns;
-    bst_common_streak_point ends[2]; /* the one further left first */
-    int shapes;                      /* shapes that the frame has */
-    bst_detection *items;            /* positions of the template's corner; flux_e: amplitude */
+    double sigma;                    /* noise of the given image */
+    bst_common_streak_point ends[2]; /* at the frame's middle; the one further left first */
+    bst_detection *items;            /* places of the streaks' middles */
     int count;
 } bst_common_streak;
 
-/* Finds the common streak and the stars of a frame.
+/* A frame and the shapes that its stars may have. */
+typedef struct bst_streak_finder bst_streak_finder;
+
+/* Lists the shapes of a frame.
  *
- * The brightest connected source that lies wholly inside the frame is the template; it may be
- * curved and of uneven brightness. A matched filter with it gives the stars, one after the other:
- * the highest maximum is subtracted and the filter repeated (Hogbom 1974, A&AS 15, 417). Streaks
- * that the frame cuts off are found if one of their ends is inside.
+ * Short lines of many directions show streaks that single pixels do not. Connected sources that lie
+ * wholly inside the frame are candidates, first those of a size that several have.
  *
- * Given:     pixels  [height][width]; NAN: no value
- * Returned:  *out    shapes 0: no source lies wholly inside, or none is left for options->shape
+ * Given:     pixels  [height][width]; NAN: no value; not needed after the call
  * Errors:    BST_ERR_MEMORY
- * Ownership: free with bst_common_streak_free, also after an error */
-bst_status bst_common_streak_find(bst_ctx *ctx, const float *pixels, int width, int height,
-                                  const bst_common_streak_options *options,
+ * Ownership: free *out with bst_streak_finder_free */
+bst_status bst_streak_finder_create(bst_ctx *ctx, const float *pixels, int width, int height,
+                                    const bst_common_streak_options *options,
+                                    bst_streak_finder **out) BST_MUST_CHECK;
+/* Frees a finder; NULL is allowed. */
+void bst_streak_finder_free(bst_streak_finder *finder);
+/* The shape of a point, beside those of sources. */
+enum { BST_STREAK_FINDER_POINT = -1 };
+/* Number of shapes of sources. */
+int bst_streak_finder_shapes(const bst_streak_finder *finder);
+
+/* Finds the stars by one shape.
+ *
+ * The centre line of the source is the path; it may be curved and of uneven brightness. A matched
+ * filter along the path gives the stars, one after the other: the highest maximum is subtracted
+ * (Hogbom 1974, A&AS 15, 417). The brightest stars then give a better path, and the search is
+ * repeated. Streaks that the frame cuts off are found if their middle is inside.
+ *
+ * Given:     index  BST_STREAK_FINDER_POINT, or 0 to bst_streak_finder_shapes - 1
+ * Returned:  *out   valid until the next call with the same finder
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *finder, int index,
                                   bst_common_streak *out) BST_MUST_CHECK;
-/* Frees what bst_common_streak_find allocated; the struct belongs to the caller. */
-void bst_common_streak_free(bst_common_streak *streak);
+
+/* Measures the path on chosen stars of the latest search and finds all stars again.
+ *
+ * Given:     chosen  [out->count] stars that are surely right
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_streak_finder_repeat(bst_ctx *ctx, bst_streak_finder *finder, const bool *chosen,
+                                    bst_common_streak *out) BST_MUST_CHECK;
 
 #endif

@@ -15,6 +15,7 @@ typedef struct bst_random_sky_options {
     int false_detections;
     bool mirrored;                   /* x reversed */
     bool scrambled;                  /* places drawn anew: no star is where it should be */
+    bool planted;                    /* scrambled, but for a quad of the onboard catalogue */
     bool even;                       /* all detections of one brightness */
     const bst_quat *q_cam_from_gcrf; /* NULL: random */
 } bst_random_sky_options;

@@ -171,7 +171,7 @@ static void null_model(void **state) {
         }
         hits += hit;
     }
-    double p = bst_null_model_chance(40, 10.0, 1200.0 * 1200.0);
+    double p = bst_null_model_chance(40 * BST_PI * 10.0 * 10.0, 1200.0 * 1200.0);
     bst_assert_close((double)hits / TRIES, p, 4.0 * sqrt(p / TRIES));
 }
 
@@ -305,7 +305,9 @@ static void the_fit_is_exact(void **state) {
     for (uint64_t i = 0; i < 8; i++) {
         bst_vec3 v = bst_camera_unproject(camera, 1000 * uniform(i, 7), 1000 * uniform(i, 8));
         pairs[i].gcrf = bst_quat_rotate(bst_quat_conj(truth.q_cam_from_gcrf), v);
-        pairs[i].sigma_px = 0.1 + 0.1 * (double)i;
+        pairs[i].cov_xx = 0.01 + 0.1 * (double)i;
+        pairs[i].cov_xy = 0.004 * (double)i;
+        pairs[i].cov_yy = 0.02;
         assert_true(
             bst_star_fit_project(&truth, camera, pairs[i].gcrf, &pairs[i].x_px, &pairs[i].y_px));
     }

@@ -3,14 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "imgproc/identify/lost_in_space.h"
-#include "imgproc/streak/common_streak.h"
+#include "imgproc/identify/plate_solve.h"
 #include "sim/astro/time.h"
 #include "sim/io/fits_image.h"
-
-enum { SHAPES = 5, MOST_SOURCES = 100 };
-/* Ends nearer to each other than this are one: the stars are points. */
-static const double POINT_PX = 4.0;
 
 #define Q bst_solve_request
 const bst_option bst_solve_options[] = {
@@ -89,13 +84,10 @@ typedef struct solving {
     bst_stars *stars;
     bst_star_patterns *patterns;
     bst_lost_in_space *solver;
-    bst_common_streak streak;
-    int end; /* the end of the streak whose attitude was found */
-    bst_lost_in_space_result result;
+    bst_plate_solve_result result;
 } solving;
 
 static void close_all(solving *s) {
-    bst_common_streak_free(&s->streak);
     bst_lost_in_space_free(s->solver);
     bst_star_patterns_free(s->patterns);
     bst_stars_close(s->stars);
@@ -120,60 +112,30 @@ static bst_status open_all(bst_ctx *ctx, solving *s, int width, int height) {
     const bst_star_patterns_options options = {2.0 * atan(side), q->v_limit, s->julian_year};
     BST_TRY(bst_star_patterns_create(ctx, s->stars, &options, &s->patterns));
     return bst_lost_in_space_create(ctx, &s->camera, s->stars, s->patterns, s->julian_year,
-                                    MOST_SOURCES, &s->solver);
+                                    BST_PLATE_SOLVE_STARS, &s->solver);
 }
 
-/* Solves the stars by one end of their streaks, of those that have it in the frame. */
-static bst_status solve_end(bst_ctx *ctx, solving *s, int end) {
-    bst_detection items[MOST_SOURCES];
-    int count = 0;
-    for (int i = 0; i < s->streak.count; i++) {
-        bst_detection d = s->streak.items[i];
-        d.x_px += s->streak.ends[end].x_px;
-        d.y_px += s->streak.ends[end].y_px;
-        if (d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= s->streak.width - 1 &&
-            d.y_px <= s->streak.height - 1) {
-            items[count++] = d;
-        }
-    }
-    bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
-    options.scale_tolerance = s->request->scale_tolerance;
-    const bst_lost_in_space_frame frame = {
-        items, count, {0, 0, s->streak.width, s->streak.height}, s->request->v_limit, &s->light};
-    s->end = end;
-    return bst_lost_in_space_solve(ctx, s->solver, &options, &frame, &s->result);
+static double length_px(const bst_plate_solve_result *r) {
+    return hypot(r->ends[1].x_px - r->ends[0].x_px, r->ends[1].y_px - r->ends[0].y_px);
 }
 
-static double length_px(const bst_common_streak *s) {
-    return hypot(s->ends[1].x_px - s->ends[0].x_px, s->ends[1].y_px - s->ends[0].y_px);
-}
-
-/* Tries shapes of streaks and their ends until one gives an attitude. */
-static bst_status try_shapes(bst_ctx *ctx, solving *s, const float *pixels, int width, int height) {
-    bst_common_streak_options options = {
-        .candidates = SHAPES, .max_sources = MOST_SOURCES, .least_snr = s->request->least_snr};
-    for (; options.shape < SHAPES && !s->result.solved; options.shape++) {
-        bst_common_streak_free(&s->streak);
-        BST_TRY(bst_common_streak_find(ctx, pixels, width, height, &options, &s->streak));
-        if (options.shape >= s->streak.shapes) {
-            break;
-        }
-        int ends = length_px(&s->streak) < POINT_PX ? 1 : 2;
-        for (int end = 0; end < ends && !s->result.solved; end++) {
-            BST_TRY(solve_end(ctx, s, end));
-        }
-    }
-    return BST_OK;
+static bst_status solve(bst_ctx *ctx, solving *s, const float *pixels, int width, int height) {
+    const bst_plate_solve_options options = {.scale_tolerance = s->request->scale_tolerance,
+                                             .v_limit = s->request->v_limit,
+                                             .least_snr = s->request->least_snr,
+                                             .tangent_per_px = bst_camera_scale_rad(&s->camera),
+                                             .light = &s->light};
+    return bst_plate_solve(ctx, s->solver, &options, pixels, width, height, &s->result);
 }
 
 /* Prints where the middle of the frame looks while the stars are at an end of their streaks. */
 static void print_end(const solving *s, int end, FILE *out) {
-    const bst_common_streak_point *from = &s->streak.ends[s->end], *to = &s->streak.ends[end];
-    double x = bst_camera_centre_x(&s->camera) - (to->x_px - from->x_px);
-    double y = bst_camera_centre_y(&s->camera) - (to->y_px - from->y_px), ra, dec;
+    const bst_common_streak_point *to = &s->result.ends[end];
+    double x = bst_camera_centre_x(&s->camera) - to->x_px;
+    double y = bst_camera_centre_y(&s->camera) - to->y_px, ra, dec;
     bst_vec3 v = bst_camera_unproject(&s->camera, x, y);
-    v = (bst_vec3){v.x * s->result.scale, v.y * s->result.scale, v.z};
-    bst_quat back = bst_quat_conj(s->result.q_cam_from_gcrf);
+    v = (bst_vec3){v.x * s->result.attitude.scale, v.y * s->result.attitude.scale, v.z};
+    bst_quat back = bst_quat_conj(s->result.attitude.q_cam_from_gcrf);
     bst_vec3 boresight = bst_vec3_unit(bst_quat_rotate(back, v));
     bst_vec3 column = bst_quat_rotate(back, (bst_vec3){0.0, -1.0, 0.0});
     bst_vec3_to_radec(boresight, &ra, &dec);
@@ -181,26 +143,26 @@ static void print_end(const solving *s, int end, FILE *out) {
     bst_vec3 north = bst_vec3_cross(boresight, east);
     double angle = atan2(bst_vec3_dot(column, east), bst_vec3_dot(column, north));
     fprintf(out, "%-10s RA %.5f deg, Dec %.5f deg, rows point to position angle %.3f deg\n",
-            length_px(&s->streak) < POINT_PX ? "middle"
-            : end == 0                       ? "left end"
-                                             : "right end",
+            s->result.points ? "middle"
+            : end == 0       ? "left end"
+                             : "right end",
             ra / BST_DEG_RAD, dec / BST_DEG_RAD, angle / BST_DEG_RAD);
 }
 
 static void print(const solving *s, FILE *out) {
-    const bst_lost_in_space_result *r = &s->result;
+    const bst_lost_in_space_result *r = &s->result.attitude;
     if (!r->solved) {
         fprintf(out, "no attitude: %d stars found, %d quads and %d patterns tried\n",
-                s->streak.count, r->quads, r->candidates);
+                s->result.stars, r->quads, r->candidates);
         return;
     }
-    bool points = length_px(&s->streak) < POINT_PX;
+    bool points = s->result.points;
     fprintf(out, "stars      %d of %d of the catalogue matched, rms %.2f px, chance 1e%.0f\n",
             r->matched, r->predicted, r->rms_px, r->log_chance / log(10.0));
     fprintf(out, "scale      %.5f arcsec/px\n", r->scale * s->camera.pixel_scale_arcsec);
     if (!points) {
         fprintf(out, "streaks    %.1f px from end to end; which end came first is not known\n",
-                length_px(&s->streak));
+                length_px(&s->result));
     }
     for (int end = 0; end < (points ? 1 : 2); end++) {
         print_end(s, end, out);
@@ -216,10 +178,10 @@ bst_status bst_solve_frame(bst_ctx *ctx, const bst_solve_request *request, const
     BST_TRY(bst_fits_read_image(ctx, path, &width, &height, &pixels));
     bst_status status = open_all(ctx, &s, width, height);
     if (status == BST_OK) {
-        status = try_shapes(ctx, &s, pixels, width, height);
+        status = solve(ctx, &s, pixels, width, height);
     }
     if (status == BST_OK) {
-        *solved = s.result.solved;
+        *solved = s.result.attitude.solved;
         print(&s, out);
     }
     free(pixels);

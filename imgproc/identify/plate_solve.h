@@ -1,0 +1,39 @@
+/* Attitude of a frame from its pixels alone: the stars are points or share one unknown streak. */
+#ifndef BST_IMGPROC_IDENTIFY_PLATE_SOLVE_H
+#define BST_IMGPROC_IDENTIFY_PLATE_SOLVE_H
+
+#include "imgproc/identify/lost_in_space.h"
+#include "imgproc/streak/common_streak.h"
+
+/* Most stars of a frame that are used: room for the solver's detections. */
+enum { BST_PLATE_SOLVE_STARS = 100 };
+
+typedef struct bst_plate_solve_options {
+    double scale_tolerance; /* largest relative error of the camera's pixel scale, 0 to 0.1 */
+    double v_limit;         /* faintest V that the frame surely shows */
+    double least_snr;       /* faintest detections that are used */
+    double tangent_per_px;  /* of the camera, at the frame's middle */
+    const bst_light *light;
+} bst_plate_solve_options;
+
+typedef struct bst_plate_solve_result {
+    bst_lost_in_space_result attitude; /* when the stars are at the middle of their streaks */
+    int stars;                         /* found in the frame */
+    bst_common_streak_point ends[2];   /* of the streaks, relative to their middle, px */
+    bool points;                       /* the stars are points */
+} bst_plate_solve_result;
+
+/* Solves a frame.
+ *
+ * The stars are taken for points first. Of the common streaks that the frame suggests the first
+ * that gives an attitude is used. The path is then measured on the identified stars, and the frame
+ * is solved again with it.
+ *
+ * Given:     lost    for BST_PLATE_SOLVE_STARS detections
+ *            pixels  [height][width]; NAN: no value
+ * Errors:    BST_ERR_MEMORY, those of the catalogue */
+bst_status bst_plate_solve(bst_ctx *ctx, bst_lost_in_space *lost,
+                           const bst_plate_solve_options *options, const float *pixels, int width,
+                           int height, bst_plate_solve_result *out) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,354 @@
+#include "imgproc/streak/path_filter.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* BLOCK: side of the squares over which the path's shape changes by less than a pixel. */
+enum { BLOCK = 16, KERNEL = 5, SHIFTS = 24 };
+
+/* Least share of the path inside the frame. */
+static const double LEAST_INSIDE = 0.25;
+/* Position error beside the noise: samples at whole pixels, and the path's own error. */
+static const double SYSTEMATIC_PX = 0.2;
+/* Reach of the fit to a maximum along a streak: length over REACH_SHARE, and at most MOST_REACH px.
+ */
+static const double REACH_SHARE = 12.0, MOST_REACH = 10.0;
+/* Standard deviation of the place along a streak: the shift at which the expected logarithm of the
+ * likelihood falls by this; calibrated by tests/imgproc/streak_fields.c. */
+static const double ALONG_LOSS = 0.5;
+
+struct bst_path_filter {
+    const bst_star_path *path;
+    int margin;         /* of places outside the frame, px */
+    int width, height;  /* of the arrays below: the frame and its margins */
+    float *response;    /* [height][width] */
+    float *per_noise;   /* [height][width] one over the noise of the response; 0: not searched */
+    float *scratch[2];  /* [height][width] of a star's response; zero between calls */
+    double correlation; /* variance of the response over the sum of the squared light */
+    double squares;     /* sum of the squared light of the whole path */
+    double psf_sigma_px;
+    double length_px, direction[2]; /* from end to end */
+    double systematic_px;           /* position error beside the noise */
+    double loss[SHIFTS]; /* share of the response that a shift by so many px along loses */
+};
+
+void bst_path_filter_free(bst_path_filter *f) {
+    if (!f) {
+        return;
+    }
+    free(f->response);
+    free(f->per_noise);
+    free(f->scratch[0]);
+    free(f->scratch[1]);
+    free(f);
+}
+
+/* Greatest distance from the middle in x or y, with the map of the frame's corner. */
+static int margin_of(const bst_star_path *p) {
+    double most = 0.0, m[3];
+    bst_star_path_map(p, 2.0 * p->centre[0], 2.0 * p->centre[1], m);
+    for (int k = 0; k < p->count; k++) {
+        double u = fabs(p->place[k][0]), v = fabs(p->place[k][1]);
+        most = fmax(most, fmax(m[0] * u + fabs(m[1]) * v, fabs(m[1]) * u + m[2] * v));
+    }
+    return (int)ceil(most) + 2;
+}
+
+/* Correlation of two samples of the image at a distance. */
+static double correlation_at(const bst_path_filter *f, double r2) {
+    return exp(-0.25 * r2 / (f->psf_sigma_px * f->psf_sigma_px));
+}
+
+/* Response of the filter to its own path, shifted along it. */
+static double response_at(const bst_path_filter *f, double shift_px) {
+    const bst_star_path *p = f->path;
+    double sum = 0.0;
+    for (int k = 0; k < p->count; k++) {
+        for (int l = 0; l < p->count; l++) {
+            double dx = p->place[k][0] - p->place[l][0] - shift_px * f->direction[0];
+            double dy = p->place[k][1] - p->place[l][1] - shift_px * f->direction[1];
+            double r2 = dx * dx + dy * dy;
+            if (r2 < KERNEL * KERNEL * f->psf_sigma_px * f->psf_sigma_px) {
+                sum += p->light[k] * p->light[l] * correlation_at(f, r2);
+            }
+        }
+    }
+    return sum;
+}
+
+static void measure_path(bst_path_filter *f) {
+    const bst_star_path *p = f->path;
+    for (int k = 0; k < p->count; k++) {
+        f->squares += p->light[k] * p->light[k];
+    }
+    double dx = p->ends[1][0] - p->ends[0][0], dy = p->ends[1][1] - p->ends[0][1];
+    f->length_px = hypot(dx, dy);
+    /* the map is of first order in the rotation: half its square is left out */
+    double half = 0.5 * f->length_px * p->tangent_per_px;
+    f->systematic_px = SYSTEMATIC_PX + 0.5 * half * half * fmax(p->centre[0], p->centre[1]);
+    f->direction[0] = f->length_px > 0.0 ? dx / f->length_px : 1.0;
+    f->direction[1] = f->length_px > 0.0 ? dy / f->length_px : 0.0;
+    double whole = response_at(f, 0.0);
+    f->correlation = whole / f->squares;
+    for (int i = 0; i < SHIFTS; i++) {
+        f->loss[i] = 1.0 - response_at(f, i) / whole;
+    }
+}
+
+/* Sums the image along the path for a block of places. */
+static void filter_block(bst_path_filter *f, const bst_star_path_image *image, int bx, int by) {
+    const bst_star_path *p = f->path;
+    const int x1 = bx + BLOCK < f->width ? bx + BLOCK : f->width;
+    const int y1 = by + BLOCK < f->height ? by + BLOCK : f->height;
+    float light[BLOCK][BLOCK] = {{0}}, squares[BLOCK][BLOCK] = {{0}};
+    double m[3];
+    bst_star_path_map(p, bx + 0.5 * BLOCK - f->margin, by + 0.5 * BLOCK - f->margin, m);
+    for (int k = 0; k < p->count; k++) {
+        double u = p->place[k][0], v = p->place[k][1];
+        int dx = (int)lround(m[0] * u + m[1] * v) - f->margin;
+        int dy = (int)lround(m[1] * u + m[2] * v) - f->margin;
+        float w = (float)p->light[k], w2 = w * w;
+        int from = bx + dx < 0 ? -dx : bx, to = x1 + dx > image->width ? image->width - dx : x1;
+        for (int y = by + dy < 0 ? -dy : by; y < y1 && y + dy < image->height; y++) {
+            const float *row = &image->values[(y + dy) * image->width + dx];
+            for (int x = from; x < to; x++) {
+                light[y - by][x - bx] += w * row[x];
+                squares[y - by][x - bx] += w2;
+            }
+        }
+    }
+    for (int y = by; y < y1; y++) {
+        for (int x = bx; x < x1; x++) {
+            double share = (double)squares[y - by][x - bx] / f->squares;
+            f->response[y * f->width + x] = light[y - by][x - bx];
+            f->per_noise[y * f->width + x] =
+                share < LEAST_INSIDE ? 0.0f
+                                     : (float)(1.0 / sqrt(share * f->squares * f->correlation));
+        }
+    }
+}
+
+bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
+                                  const bst_star_path_image *image, double psf_sigma_px,
+                                  bst_path_filter **out) {
+    assert(path && path->count > 0 && image && psf_sigma_px > 0.0 && out);
+    *out = NULL;
+    bst_path_filter *f = calloc(1, sizeof *f);
+    if (!f) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter");
+    }
+    f->path = path;
+    f->psf_sigma_px = psf_sigma_px;
+    f->margin = margin_of(path);
+    f->width = image->width + 2 * f->margin;
+    f->height = image->height + 2 * f->margin;
+    size_t places = (size_t)f->width * (size_t)f->height;
+    f->response = malloc(places * sizeof *f->response);
+    f->per_noise = malloc(places * sizeof *f->per_noise);
+    f->scratch[0] = calloc(places, sizeof *f->scratch[0]);
+    f->scratch[1] = calloc(places, sizeof *f->scratch[1]);
+    if (!f->response || !f->per_noise || !f->scratch[0] || !f->scratch[1]) {
+        bst_path_filter_free(f);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter of %d x %d px",
+                        image->width, image->height);
+    }
+    measure_path(f);
+    for (int y = 0; y < f->height; y += BLOCK) {
+        for (int x = 0; x < f->width; x += BLOCK) {
+            filter_block(f, image, x, y);
+        }
+    }
+    *out = f;
+    return BST_OK;
+}
+
+static float snr_at(const bst_path_filter *f, int x, int y) {
+    if (x < 0 || y < 0 || x >= f->width || y >= f->height || f->per_noise[y * f->width + x] == 0) {
+        return -1.0f;
+    }
+    return f->response[y * f->width + x] * f->per_noise[y * f->width + x];
+}
+
+/* SNR at a place, bilinear. */
+static double snr_between(const bst_path_filter *f, double x, double y) {
+    int i = (int)floor(x), j = (int)floor(y);
+    double u = x - i, v = y - j;
+    return (1.0 - v) * ((1.0 - u) * (double)snr_at(f, i, j) + u * (double)snr_at(f, i + 1, j)) +
+           v * ((1.0 - u) * (double)snr_at(f, i, j + 1) + u * (double)snr_at(f, i + 1, j + 1));
+}
+
+/* Shift along a direction to the vertex of a parabola that fits the SNR over a reach on both sides,
+ * px. Along a streak the maximum is flat, and samples at whole pixels make ripples on it. */
+static double vertex(const bst_path_filter *f, double x, double y, double dx, double dy,
+                     int reach) {
+    double odd = 0.0, even = 0.0, square = 0.0, fourth = 0.0, sum = 0.0;
+    for (int k = -reach; k <= reach; k++) {
+        double v = snr_between(f, x + k * dx, y + k * dy), k2 = (double)k * k;
+        sum += v;
+        odd += k * v;
+        even += k2 * v;
+        square += k2;
+        fourth += k2 * k2;
+    }
+    int n = 2 * reach + 1;
+    double bend = (n * even - square * sum) / (n * fourth - square * square);
+    double slope = odd / square;
+    return bend < 0.0 ? fmax(fmin(-0.5 * slope / bend, reach), -reach) : 0.0;
+}
+
+/* Standard deviation of a star's place along its streak. */
+static double along_sigma_px(const bst_path_filter *f, double snr) {
+    double wanted = ALONG_LOSS / (snr * snr);
+    for (int i = 1; i < SHIFTS; i++) {
+        if (f->loss[i] >= wanted) {
+            double share = (wanted - f->loss[i - 1]) / (f->loss[i] - f->loss[i - 1]);
+            return i == 1 ? sqrt(share) : i - 1 + share; /* parabolic at its maximum */
+        }
+    }
+    return SHIFTS;
+}
+
+bool bst_path_filter_highest(const bst_path_filter *f, bst_path_filter_peak *out) {
+    assert(f && out);
+    float best = 0.0f;
+    int at = -1;
+    for (int i = 0; i < f->width * f->height; i++) {
+        float v = f->response[i] * f->per_noise[i];
+        if (v > best) {
+            best = v;
+            at = i;
+        }
+    }
+    if (at < 0) {
+        return false;
+    }
+    const int x = at % f->width, y = at / f->width;
+    bool whole = true;
+    for (int k = 0; k < 9; k++) {
+        whole = whole && snr_at(f, x + k % 3 - 1, y + k / 3 - 1) >= 0.0f;
+    }
+    double noise = 1.0 / (double)f->per_noise[at], variance = noise * noise;
+    double inside = variance / (f->squares * f->correlation);
+    double along = along_sigma_px(f, (double)best);
+    double across = 1.42 * f->psf_sigma_px / (double)best;
+    double c2 = across * across + f->systematic_px * f->systematic_px, a2 = along * along + c2;
+    double c = f->direction[0], s = f->direction[1], u = x, v = y;
+    if (whole) {
+        int reach = (int)fmax(fmin(f->length_px * inside / REACH_SHARE, MOST_REACH), 1.0);
+        double shift = vertex(f, u, v, c, s, reach);
+        u += shift * c;
+        v += shift * s;
+        shift = vertex(f, u, v, -s, c, 1);
+        u -= shift * s;
+        v += shift * c;
+    }
+    *out = (bst_path_filter_peak){.x_px = u - f->margin,
+                                  .y_px = v - f->margin,
+                                  .amplitude = (double)f->response[at] / variance,
+                                  .snr = (double)best,
+                                  .inside = inside,
+                                  .cov_xx = c * c * a2 + s * s * c2,
+                                  .cov_xy = c * s * (a2 - c2),
+                                  .cov_yy = s * s * a2 + c * c * c2,
+                                  .whole = whole};
+    return true;
+}
+
+/* A rectangle of places. */
+typedef struct rectangle {
+    int x0, y0, x1, y1;
+} rectangle;
+
+/* Adds the response to a source at a place of the image, as a sum of points. */
+static void add_points(bst_path_filter *f, double x, double y, double amount, const double m[3],
+                       rectangle *box) {
+    const bst_star_path *p = f->path;
+    for (int k = 0; k < p->count; k++) {
+        double u = x - (m[0] * p->place[k][0] + m[1] * p->place[k][1]) + f->margin;
+        double v = y - (m[1] * p->place[k][0] + m[2] * p->place[k][1]) + f->margin;
+        int i = (int)floor(u), j = (int)floor(v);
+        if (i < KERNEL || j < KERNEL || i + 1 + KERNEL >= f->width || j + 1 + KERNEL >= f->height) {
+            continue;
+        }
+        double a = u - i, b = v - j, value = amount * p->light[k];
+        float *at = &f->scratch[0][j * f->width + i];
+        at[0] += (float)((1.0 - a) * (1.0 - b) * value);
+        at[1] += (float)(a * (1.0 - b) * value);
+        at[f->width] += (float)((1.0 - a) * b * value);
+        at[f->width + 1] += (float)(a * b * value);
+        box->x0 = i < box->x0 ? i : box->x0;
+        box->y0 = j < box->y0 ? j : box->y0;
+        box->x1 = i + 1 > box->x1 ? i + 1 : box->x1;
+        box->y1 = j + 1 > box->y1 ? j + 1 : box->y1;
+    }
+}
+
+/* Convolves the points with the correlation of samples, subtracts them, and clears the scratch. */
+static void subtract_points(bst_path_filter *f, rectangle box) {
+    float kernel[2 * KERNEL + 1];
+    for (int k = -KERNEL; k <= KERNEL; k++) {
+        kernel[k + KERNEL] = (float)correlation_at(f, k * k);
+    }
+    const int w = f->width;
+    for (int y = box.y0; y <= box.y1; y++) {
+        for (int x = box.x0 - KERNEL; x <= box.x1 + KERNEL; x++) {
+            float sum = 0.0f;
+            for (int k = -KERNEL; k <= KERNEL; k++) {
+                if (x + k >= box.x0 && x + k <= box.x1) {
+                    sum += kernel[k + KERNEL] * f->scratch[0][y * w + x + k];
+                }
+            }
+            f->scratch[1][y * w + x] = sum;
+        }
+    }
+    for (int k = -KERNEL; k <= KERNEL; k++) {
+        float v = kernel[k + KERNEL];
+        for (int y = box.y0; y <= box.y1; y++) {
+            const float *from = &f->scratch[1][y * w];
+            float *to = &f->response[(y + k) * w];
+            for (int x = box.x0 - KERNEL; x <= box.x1 + KERNEL; x++) {
+                to[x] -= v * from[x];
+            }
+        }
+    }
+    for (int y = box.y0; y <= box.y1; y++) {
+        size_t bytes = (size_t)(box.x1 - box.x0 + 1) * sizeof(float);
+        memset(&f->scratch[0][y * w + box.x0], 0, bytes);
+    }
+}
+
+void bst_path_filter_subtract(bst_path_filter *f, const bst_path_filter_peak *peak) {
+    assert(f && peak);
+    const bst_star_path *p = f->path;
+    const double right = 2.0 * p->centre[0], bottom = 2.0 * p->centre[1];
+    double m[3], there[3];
+    rectangle box = {f->width, f->height, -1, -1};
+    bst_star_path_map(p, peak->x_px, peak->y_px, m);
+    for (int l = 0; l < p->count; l++) {
+        double x = peak->x_px + m[0] * p->place[l][0] + m[1] * p->place[l][1];
+        double y = peak->y_px + m[1] * p->place[l][0] + m[2] * p->place[l][1];
+        if (x < 0.0 || y < 0.0 || x > right || y > bottom) {
+            continue;
+        }
+        /* places whose sample k lies here are about as far from here as the star itself is */
+        bst_star_path_map(p, x, y, there);
+        add_points(f, x, y, peak->amplitude * p->light[l], there, &box);
+    }
+    if (box.x1 >= box.x0) {
+        subtract_points(f, box);
+    }
+}
+
+void bst_path_filter_leave_out(bst_path_filter *f, const bst_path_filter_peak *peak,
+                               double radius_px) {
+    double cx = peak->x_px + f->margin, cy = peak->y_px + f->margin;
+    for (int y = 0; y < f->height; y++) {
+        for (int x = 0; x < f->width; x++) {
+            if (hypot(x - cx, y - cy) <= radius_px) {
+                f->per_noise[y * f->width + x] = 0.0f;
+            }
+        }
+    }
+}

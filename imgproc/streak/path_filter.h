@@ -1,0 +1,45 @@
+/* Matched filter for stars that follow a common path: finds them one after the other. */
+#ifndef BST_IMGPROC_STREAK_PATH_FILTER_H
+#define BST_IMGPROC_STREAK_PATH_FILTER_H
+
+#include "boresight/status.h"
+#include "imgproc/streak/star_path.h"
+
+typedef struct bst_path_filter bst_path_filter;
+
+/* Filters an image.
+ *
+ * The response at a place is the sum of the image along the path there, weighted by the path's
+ * light. Its noise is that of the samples inside the frame.
+ *
+ * Given:     path       must outlive the filter
+ *            image      of unit noise after the convolution with a Gaussian of psf_sigma_px
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_path_filter_free */
+bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
+                                  const bst_star_path_image *image, double psf_sigma_px,
+                                  bst_path_filter **out) BST_MUST_CHECK;
+/* Frees a filter; NULL is allowed. */
+void bst_path_filter_free(bst_path_filter *filter);
+
+/* A maximum of the response. */
+typedef struct bst_path_filter_peak {
+    double x_px, y_px; /* of the path's middle; may lie outside the frame */
+    double amplitude;  /* of the light per sample, in units of the image's noise */
+    double snr;
+    double inside;                 /* share of the path inside the frame, by its squared light */
+    double cov_xx, cov_xy, cov_yy; /* of the place, px^2 */
+    bool whole; /* a maximum on all sides, not one at the limit of what is searched */
+} bst_path_filter_peak;
+
+/* Highest maximum in SNR. Returns false if no value is positive. */
+bool bst_path_filter_highest(const bst_path_filter *filter, bst_path_filter_peak *out);
+
+/* Subtracts the response to a star (Hogbom 1974, A&AS 15, 417). */
+void bst_path_filter_subtract(bst_path_filter *filter, const bst_path_filter_peak *peak);
+
+/* Leaves a circle about a peak out of the search: what the subtraction of a bright star left. */
+void bst_path_filter_leave_out(bst_path_filter *filter, const bst_path_filter_peak *peak,
+                               double radius_px);
+
+#endif
