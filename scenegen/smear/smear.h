@@ -38,6 +38,7 @@ typedef struct bst_smear_options {
                      [3]; /* of the PSF as in bst_smear_node_aim, by binning from 1 on */
     double widest;        /* largest node widening, PSF variances; 0: as much as nodes allow */
     bst_parallel *pool;   /* threads that share the work; lent; NULL: the caller's alone */
+    int body_threads;     /* without a pool: for bodies that turn; 0: one per processor */
 } bst_smear_options;
 
 /* Creates the smear of a camera.
