@@ -9,6 +9,9 @@
 /* Side of a bin, in cells; levels of nearness. */
 enum { BIN = 8, LEVELS = 4096 };
 
+/* Marks of cells: bits. */
+enum { SEVERAL_LAYERS = 1, AT_BORDER = 2 };
+
 /* Width about borders that counts as theirs, in cells: they may cross another one there. */
 static const double MARGIN = 1.0;
 
@@ -175,7 +178,7 @@ static void mark_border(bst_facet_layers *l, bst_point2 a, bst_point2 b) {
         double low = (from < to ? from : to) - MARGIN, high = (from < to ? to : from) + MARGIN;
         if (low <= l->width && high >= 0.0) {
             int i = cell_of(low, l->width), end = cell_of(high, l->width);
-            memset(l->crowded + (size_t)j * (size_t)l->width + i, 1, (size_t)(end - i + 1));
+            memset(l->crowded + (size_t)j * (size_t)l->width + i, AT_BORDER, (size_t)(end - i + 1));
         }
     }
 }
@@ -265,16 +268,17 @@ static void range_of(const bst_facet_layers *l, const bst_layers_box *b, int siz
     out[3] = cell_of((double)b->high[1], l->height) / size;
 }
 
-static bool is_crowded(const bst_facet_layers *l, const bst_layers_box *b) {
-    int at[4];
+/* All marks of the cells of a box. */
+static int marks_of(const bst_facet_layers *l, const bst_layers_box *b) {
+    int at[4], marks = 0;
     range_of(l, b, 1, at);
-    size_t count = (size_t)(at[1] - at[0] + 1);
-    for (int j = at[2]; j <= at[3]; j++) {
-        if (memchr(l->crowded + (size_t)j * (size_t)l->width + at[0], 1, count)) {
-            return true;
+    for (int j = at[2]; j <= at[3] && marks < AT_BORDER; j++) {
+        const uint8_t *row = l->crowded + (size_t)j * (size_t)l->width;
+        for (int i = at[0]; i <= at[1]; i++) {
+            marks |= row[i];
         }
     }
-    return false;
+    return marks;
 }
 
 /* Marks the bins of a box. */
@@ -338,7 +342,8 @@ bst_status bst_facet_layers_find(bst_ctx *ctx, bst_facet_layers *l, const uint8_
     memset(l->needed, 0, (size_t)l->bins_x * (size_t)l->bins_y);
     for (int f = 0; f < facets; f++) {
         const bst_layers_box *b = &l->boxes[f];
-        l->doubtful[f] = wanted[f] && l->facing[f] && b->high[0] >= 0.0F && is_crowded(l, b);
+        l->doubtful[f] =
+            wanted[f] && l->facing[f] && b->high[0] >= 0.0F ? (uint8_t)marks_of(l, b) : 0;
         if (l->doubtful[f]) {
             need_bins(l, b);
             any = true;
@@ -451,6 +456,68 @@ static int hidden_part(const bst_facet_layers *l, int facet, int behind, const o
     return least >= -l->same ? n : keep(to, n, c);
 }
 
+static bool share_vertex(const bst_facet_net *net, int f, int g) {
+    const bst_facet *a = &net->satellite->facets[f], *b = &net->satellite->facets[g];
+    for (int i = a->first; i < a->first + a->count; i++) {
+        for (int k = b->first; k < b->first + b->count; k++) {
+            if (net->corner[i] == net->corner[k]) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+/* True if a facet covers a place; its border does. */
+static bool covers(const bst_facet_layers *l, int facet, bst_point2 p) {
+    static const double ROUNDING = 1e-12;
+    const bst_facet *f = &l->net->satellite->facets[facet];
+    const int *corner = l->net->corner + f->first;
+    for (int i = 0; i < f->count; i++) {
+        bst_point2 a = l->at[corner[i]], b = l->at[corner[i + 1 < f->count ? i + 1 : 0]];
+        if ((b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x) > ROUNDING) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* What of a facet is seen that no border crosses: all of it, or nothing. */
+typedef enum seen_part { SEEN_ALL, SEEN_NOTHING, SEEN_UNKNOWN } seen_part;
+
+/* Finds it at the middle of the facet. Unknown: another facet, not a neighbour, is as near
+ * somewhere, so that the planes may cross. */
+static seen_part look_at_middle(const bst_facet_layers *l, const bst_layers_box *box,
+                                const outline *own) {
+    int at[4];
+    bst_point2 middle = {0.0, 0.0};
+    seen_part seen = SEEN_ALL;
+    for (int i = 0; i < own->count; i++) {
+        middle.x += own->p[i].x / own->count;
+        middle.y += own->p[i].y / own->count;
+    }
+    range_of(l, box, BIN, at);
+    for (int j = at[2]; j <= at[3]; j++) {
+        for (int i = j * l->bins_x + at[0]; i <= j * l->bins_x + at[1]; i++) {
+            const bst_layers_box *b = &l->entries[l->bin_first[i]];
+            const bst_layers_box *end = &l->entries[l->bin_first[i + 1]];
+            for (; b < end && b->nearest <= box->farthest; b++) {
+                if (!boxes_meet(b, box)) {
+                    continue;
+                }
+                if (b->farthest >= box->nearest) {
+                    if (!share_vertex(l->net, b->facet, box->facet)) {
+                        return SEEN_UNKNOWN;
+                    }
+                } else if (seen == SEEN_ALL && covers(l, b->facet, middle)) {
+                    seen = SEEN_NOTHING;
+                }
+            }
+        }
+    }
+    return seen;
+}
+
 bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {
     outline own;
     double plane[3];
@@ -461,6 +528,13 @@ bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {
         return true;
     }
     make_outline(l, facet, &own);
+    if (l->doubtful[facet] < AT_BORDER) {
+        seen_part seen = look_at_middle(l, box, &own);
+        l->clip.piece_count = 0;
+        if (seen != SEEN_UNKNOWN) {
+            return seen == SEEN_ALL;
+        }
+    }
     range_of(l, box, BIN, at);
     l->seen[facet] = facet;
     for (int n = 0; n < (at[1] - at[0] + 1) * (at[3] - at[2] + 1); n++) {

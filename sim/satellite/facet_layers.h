@@ -34,7 +34,8 @@ typedef struct bst_facet_layers {
     int width, height; /* of the grid */
     double same;       /* differences of `near` that are none */
     /* results */
-    uint8_t *doubtful; /* by facet: others may hide some of it */
+    uint8_t
+        *doubtful; /* by facet: others may hide it; 1: all or nothing, but for planes that cross */
     /* work memory */
     uint8_t *crowded;               /* by cell: something may be hidden there */
     bst_layers_box *boxes;          /* by facet that faces the view */
