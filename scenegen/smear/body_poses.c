@@ -9,12 +9,13 @@
 static const double gauss_reach[BST_SMEAR_GAUSS_MOST] = {0.1, 0.7, 1.7, 3.2};
 
 /* Poses from which steps are equal, and the longest step, PSF sigmas, with a tolerance of TOLERANCE
- * or more; its fourth power is as the tolerance. Between equal steps h the
+ * or more; its square is as the tolerance. Between equal steps h the
  * image of an edge that n poses blur is wrong by exp(-2 pi^2 sigma^2 / h^2) / (pi n). At both ends
- * the midpoint rule lacks h^2 / 24 of the derivative, which the weights of three poses replace. */
+ * the midpoint rule lacks h^2 / 24 of the derivative, which the weights of two poses replace in
+ * part. */
 enum { EQUAL_POSES = 32 };
-static const double STEP = 2.0, TOLERANCE = 0.1, STEP_ERROR = 5e-3;
-static const double end_weights[3] = {2.0 / 24.0, -3.0 / 24.0, 1.0 / 24.0};
+static const double STEP = 2.0, TOLERANCE = 0.1, STEP_ERROR = 0.04;
+static const double end_weights[2] = {1.0 / 24.0, -1.0 / 24.0};
 
 void bst_body_times_choose(double sigmas, double tolerance, bst_body_times *out) {
     int order = 0;
@@ -32,15 +33,15 @@ void bst_body_times_choose(double sigmas, double tolerance, bst_body_times *out)
         }
         return;
     }
-    double longest = STEP * pow(fmin(tolerance / TOLERANCE, 1.0), 0.25);
+    double longest = STEP * sqrt(fmin(tolerance / TOLERANCE, 1.0));
     int n = (int)fmin(fmax(ceil(sigmas / longest), EQUAL_POSES), BST_BODY_POSES_MAX);
-    double step = sigmas / n / STEP, step2 = step * step;
-    out->error = STEP_ERROR * step2 * step2 / n;
+    double step = sigmas / n / STEP;
+    out->error = STEP_ERROR * step * step / n;
     out->count = n;
     for (int k = 0; k < n; k++) {
         int from_end = k < n - 1 - k ? k : n - 1 - k;
         out->u[k] = (k + 0.5) / n;
-        out->weight[k] = (1.0 + (from_end < 3 ? end_weights[from_end] : 0.0)) / n;
+        out->weight[k] = (1.0 + (from_end < 2 ? end_weights[from_end] : 0.0)) / n;
     }
 }
 
