@@ -14,7 +14,7 @@ static const double gauss_reach[BST_SMEAR_GAUSS_MOST] = {0.1, 0.7, 1.7, 3.2};
  * the midpoint rule lacks h^2 / 24 of the derivative, which the weights of two poses replace in
  * part. */
 enum { EQUAL_POSES = 32 };
-static const double STEP = 2.0, TOLERANCE = 0.1, STEP_ERROR = 0.04;
+static const double STEP = 1.8, TOLERANCE = 0.1, STEP_ERROR = 0.033;
 static const double end_weights[2] = {1.0 / 24.0, -1.0 / 24.0};
 
 void bst_body_times_choose(double sigmas, double tolerance, bst_body_times *out) {

@@ -36,7 +36,7 @@ static void test_moving_edge(void **state) {
         /* composite Gauss-Legendre: 1e-4 */
         bst_assert_close(worst, 0.0, t.error + 1e-4);
         if (length > 80.0) {
-            assert_true(t.count < length / 1.9);
+            assert_true(t.count < length / 1.7);
         }
     }
     /* a lower tolerance takes shorter steps */
