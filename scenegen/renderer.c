@@ -195,6 +195,8 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     if (status == BST_OK) {
         status = open_detector(ctx, device, r);
         smear.pool = r->planners;
+        int threads = r->options.planning_threads;
+        smear.body_threads = threads > 0 ? threads : bst_device_processors(device);
     }
     if (status == BST_OK) {
         r->law_degree = r->fourier          ? 0

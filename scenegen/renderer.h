@@ -36,7 +36,8 @@ typedef struct bst_renderer_options {
     bool shared_program;
     bool saturation_flags; /* keep the latest frame's flags for bst_renderer_flags */
     int pool_frames;       /* most frames alive at a time (4) */
-    int planning_threads;  /* 0: one with a CPU device, otherwise one per processor */
+    int planning_threads;  /* 0: one with a CPU device (for images of bodies that turn, all that the
+                              device uses), otherwise one per processor */
     /* Tiles, px (width a multiple of 64); tile_width 0: chosen for the device. group: tiles per
      * work-group, a work-item each; 0: a tile, 64 px wide, for each work-group, as suits a GPU. */
     int tile_width, tile_height, group;

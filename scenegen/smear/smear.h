@@ -39,6 +39,7 @@ typedef struct bst_smear_options {
     const bst_psf_sensitivity *sensitivity; /* of that PSF, lent; NULL: unknown */
     double widest;      /* largest node widening, PSF variances; 0: as much as nodes allow */
     bst_parallel *pool; /* threads that share the work; lent; NULL: the caller's alone */
+    int body_threads;   /* without a pool: for bodies that turn; 0: one per processor */
 } bst_smear_options;
 
 /* Creates the smear of a camera.

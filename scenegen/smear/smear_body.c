@@ -5,7 +5,6 @@
 #include <stdlib.h>
 
 #include "scenegen/reference.h"
-#include "scenegen/smear/gauss_legendre.h"
 #include "scenegen/smear/image_nodes.h"
 #include "scenegen/smear/smear_internal.h"
 #include "sim/world/scene/los_track.h"
@@ -31,22 +30,17 @@
 /* Poses of which the cells have borders at the same places. */
 enum { FEW_POSES = 16 };
 
-/* Poses from which one sample per cell and pose is enough. */
-enum { SAMPLED_POSES = 48 };
-
-enum { POSES_MAX = 1024, PATH_TIMES = 64 };
-
-/* Largest motion of a panel of the quadrature with one to four points, PSF sigmas: the error of
- * integrating an edge's image over it is below 1e-4. */
-static const double gauss_reach[BST_SMEAR_GAUSS_MOST] = {0.1, 0.7, 1.7, 3.2};
+enum { PATH_TIMES = 64 };
 
 void bst_smear_bodies_clear(bst_smear_bodies *bodies) {
     for (int i = 0; i < bodies->count; i++) {
         bst_satellite_pose_free(bodies->items[i].pose);
         bst_resolved_free(bodies->items[i].image);
         bst_resolved_free(bodies->items[i].trial);
+        bst_body_poses_free(&bodies->items[i].others);
     }
     free(bodies->items);
+    bst_parallel_free(bodies->pool);
     *bodies = (bst_smear_bodies){.count = 0};
 }
 
@@ -147,29 +141,6 @@ static void measure(const bst_smear *s, const bst_scene_source *source, double *
     *turned_px = turn * bst_smear_radius_px(s, source);
 }
 
-/* Times of the poses in an exposure. */
-typedef struct times {
-    double u[POSES_MAX], weight[POSES_MAX];
-    int count;
-} times;
-
-/* Composite Gauss-Legendre quadrature for an image that moves by that many PSF sigmas. */
-static void choose_times(double sigmas, times *out) {
-    int order = 0;
-    while (order + 1 < BST_SMEAR_GAUSS_MOST && sigmas > gauss_reach[order]) {
-        order++;
-    }
-    double most = POSES_MAX / BST_SMEAR_GAUSS_MOST;
-    int panels = (int)fmin(fmax(ceil(sigmas / gauss_reach[order]), 1.0), most);
-    out->count = 0;
-    for (int p = 0; p < panels; p++) {
-        for (int k = 0; k <= order; k++) {
-            out->u[out->count] = (p + bst_smear_gauss_place[order][k]) / panels;
-            out->weight[out->count++] = bst_smear_gauss_weight[order][k] / panels;
-        }
-    }
-}
-
 /* Electrons per pixel of the body's lit and visible part, about: a body fills a third of the square
  * about its sphere, and its lit fraction is that of a sphere. */
 static double per_px_e(const bst_smear *s, const bst_scene_source *source) {
@@ -204,6 +175,17 @@ static double cell_for(const bst_smear *s, const bst_scene_source *source, int p
     while (side > 1.0 / FINEST && cell_error(s, side) * light_e > allowed_e && poses <= FEW_POSES) {
         side *= 0.5;
     }
+    while (side > across_px / ACROSS) {
+        side *= 0.5;
+    }
+    return side;
+}
+
+/* Side of cells of which all second moments are known, px. */
+static double light_cell_for(const bst_smear *s, const bst_scene_source *source, int poses) {
+    enum { ACROSS = 32 };
+    double across_px = 2.0 * bst_smear_radius_px(s, source);
+    double side = poses > FEW_POSES ? 1.0 : 0.5; /* more: no straight borders at rest */
     while (side > across_px / ACROSS) {
         side *= 0.5;
     }
@@ -262,7 +244,7 @@ static bst_status find_factor(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
 
 /* Box of the image over all poses; false: a pose has none, or all are off the sensor. */
 static bool find_box(const bst_smear *s, const bst_smear_body *b, const bst_scene_source *source,
-                     const times *t, double low[2], double high[2]) {
+                     const bst_body_times *t, double low[2], double high[2]) {
     low[0] = low[1] = INFINITY;
     high[0] = high[1] = -INFINITY;
     for (int k = 0; k < t->count; k++) {
@@ -280,19 +262,88 @@ static bool find_box(const bst_smear *s, const bst_smear_body *b, const bst_scen
     return true;
 }
 
+/* What the poses of an image have in common. */
+typedef struct drawing {
+    const bst_smear *s;
+    const bst_scene_source *source;
+    bst_body_times times; /* weights with the factors on the light */
+} drawing;
+
+/* Adds pose k to an image: its light only, or with `light_only` false with cover and parts. */
+static bst_status draw(bst_ctx *ctx, const drawing *d, int k, bool light_only,
+                       bst_satellite_pose *pose, bst_resolved *image) {
+    bst_earthlight earthlight;
+    bst_resolved_light light;
+    bst_resolved_view view;
+    double weight = d->times.weight[k];
+    pose_at(d->s, d->source, d->times.u[k], pose, &view, &light, &earthlight);
+    return light_only ? bst_resolved_add_light(ctx, image, pose, &view, &light, weight)
+                      : bst_resolved_add(ctx, image, pose, &view, &light, weight, NULL);
+}
+
+/* Callback of several threads. */
+static bst_status draw_light(bst_ctx *ctx, void *user, int k, bst_satellite_pose *pose,
+                             bst_resolved *image) {
+    return draw(ctx, user, k, true, pose, image);
+}
+
+/* Draws all poses in the box low to high. */
+static bst_status draw_poses(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, drawing *d,
+                             const double low[2], const double high[2]) {
+    bool light_only = bst_resolved_may_add_light(b->satellite);
+    b->cell_px = light_only ? light_cell_for(s, d->source, d->times.count)
+                            : cell_for(s, d->source, d->times.count);
+    BST_TRY(bst_resolved_begin(ctx, b->image, low, high, b->cell_px));
+    double inverse = 1.0 / d->source->electrons_per_s;
+    if (b->one_pose && d->source->rate) { /* the path has the rate */
+        inverse /= bst_scene_source_rate_at(d->source, 0.5);
+    }
+    for (int k = 0; k < d->times.count; k++) {
+        double factor;
+        BST_TRY(find_factor(ctx, s, b, d->source, d->times.u[k], &factor));
+        d->times.weight[k] *= factor * inverse;
+    }
+    if (light_only) {
+        bst_parallel *pool = s->options.pool;
+        if (d->times.count > 1 && !pool) {
+            if (!s->bodies.pool) {
+                BST_TRY(bst_parallel_create(ctx, s->options.body_threads, &s->bodies.pool));
+            }
+            pool = s->bodies.pool;
+        }
+        const bst_body_drawing all = {.satellite = b->satellite,
+                                      .pose = b->pose,
+                                      .image = b->image,
+                                      .low = {low[0], low[1]},
+                                      .high = {high[0], high[1]},
+                                      .cell_px = b->cell_px,
+                                      .scale_rad = bst_camera_scale_rad(&s->camera),
+                                      .count = d->times.count,
+                                      .draw = draw_light,
+                                      .user = d,
+                                      .pool = pool};
+        return bst_body_poses_draw(ctx, &b->others, &all);
+    }
+    for (int k = 0; k < d->times.count; k++) {
+        BST_TRY(draw(ctx, d, k, false, b->pose, b->image));
+    }
+    return BST_OK;
+}
+
 /* Makes the image of a source for the frame. *there false: a part of the body is beside the
  * observer. */
 static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
                              const bst_scene_source *source, bool *there) {
     double moved_px, turned_px, low[2], high[2];
-    times t = {.u = {0.5}, .weight = {1.0}, .count = 1};
+    drawing d = {s, source, {.u = {0.5}, .weight = {1.0}, .count = 1}};
     measure(s, source, &moved_px, &turned_px);
     b->one_pose = turned_px <= STILL_PX;
     double sigma_px = sqrt(s->sigma_px * s->sigma_px + 1.0 / 12.0);
     if (!b->one_pose) {
-        choose_times((moved_px + turned_px) / sigma_px, &t);
+        bst_body_times_choose((moved_px + turned_px) / sigma_px, s->options.tolerance_sigma,
+                              &d.times);
     }
-    *there = find_box(s, b, source, &t, low, high);
+    *there = find_box(s, b, source, &d.times, low, high);
     if (!*there) {
         return BST_OK;
     }
@@ -307,27 +358,13 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
     if (b->empty) {
         return BST_OK;
     }
-    bool fast = t.count >= SAMPLED_POSES && bst_resolved_may_sample(b->satellite);
-    b->cell_px = fast ? 1.0 : cell_for(s, source, t.count);
-    BST_TRY(bst_resolved_begin(ctx, b->image, low, high, b->cell_px));
-    double inverse = 1.0 / source->electrons_per_s;
-    for (int k = 0; k < t.count; k++) {
-        bst_earthlight earthlight;
-        bst_resolved_light light;
-        bst_resolved_view view;
-        double factor;
-        BST_TRY(find_factor(ctx, s, b, source, t.u[k], &factor));
-        pose_at(s, source, t.u[k], b->pose, &view, &light, &earthlight);
-        if (b->one_pose && source->rate) { /* the path has the rate */
-            inverse = 1.0 / (source->electrons_per_s * bst_scene_source_rate_at(source, 0.5));
-        }
-        double weight = t.weight[k] * factor * inverse;
-        BST_TRY(fast ? bst_resolved_add_sampled(ctx, b->image, b->pose, &view, &light, k, weight)
-                     : bst_resolved_add(ctx, b->image, b->pose, &view, &light, weight, NULL));
-    }
+    BST_TRY(draw_poses(ctx, s, b, &d, low, high));
     b->error =
         turned_px * turned_px * (b->one_pose ? 1.0 / 12.0 * 0.12 : 0.0) / (sigma_px * sigma_px);
-    b->error += t.count <= FEW_POSES ? cell_error(s, b->cell_px) : 0.0;
+    b->error += d.times.error;
+    if (!bst_resolved_image_of(b->image)->second && d.times.count <= FEW_POSES) {
+        b->error += cell_error(s, b->cell_px);
+    }
     /* a border that is moved by 1 px changes a pixel by 0.4 / sigma of the body's light; 0.5: the
      * pixels on its dim side have less noise */
     b->error += b->satellite->curved_count > 0 ? 0.5 * BST_RESOLVED_CURVED_PX / sigma_px : 0.0;

@@ -2,6 +2,7 @@
 #ifndef BST_SCENEGEN_SMEAR_SMEAR_BODY_H
 #define BST_SCENEGEN_SMEAR_SMEAR_BODY_H
 
+#include "scenegen/smear/body_poses.h"
 #include "sim/world/scene/source_body.h"
 
 struct bst_smear;
@@ -12,6 +13,7 @@ typedef struct bst_smear_body {
     uint32_t id; /* of the source */
     bst_satellite_pose *pose;
     bst_resolved *image, *trial; /* trial: of single poses, for their light */
+    bst_body_poses others;       /* for images of many poses */
     int64_t frame;               /* for which the image is made; 0: none */
     double cell_px;
     double x0, y0; /* origin of the image's positions, px from the boresight */
@@ -24,6 +26,7 @@ typedef struct bst_smear_body {
 typedef struct bst_smear_bodies {
     bst_smear_body *items;
     int count, capacity;
+    bst_parallel *pool; /* for images of many poses, if the options have none */
 } bst_smear_bodies;
 
 /* Frees the memory of the bodies. */

@@ -351,6 +351,14 @@ bool bst_device_is_cpu(const bst_device *device) {
     return clGetDeviceInfo(device->id, CL_DEVICE_TYPE, sizeof type, &type, NULL) != CL_SUCCESS ||
            (type & CL_DEVICE_TYPE_CPU) != 0;
 }
+
+int bst_device_processors(const bst_device *device) {
+    cl_uint units = 0;
+    bool known =
+        bst_device_is_cpu(device) && clGetDeviceInfo(device->id, CL_DEVICE_MAX_COMPUTE_UNITS,
+                                                     sizeof units, &units, NULL) == CL_SUCCESS;
+    return known ? (int)units : 0;
+}
 const char *bst_device_description(const bst_device *device) {
     return device->description;
 }

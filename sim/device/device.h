@@ -35,6 +35,8 @@ cl_command_queue bst_device_queue(const bst_device *device);
 cl_device_id bst_device_id(const bst_device *device);
 /* True if a device is the processor itself, so that its work takes time from that of the host. */
 bool bst_device_is_cpu(const bst_device *device);
+/* Number of processors that a CPU device uses; 0: another device. */
+int bst_device_processors(const bst_device *device);
 /* Description of a device for the manifest: "PoCL 3.1: cpu-..., 2 compute units". */
 const char *bst_device_description(const bst_device *device);
 

@@ -2,7 +2,9 @@
 #ifndef BST_SATELLITE_RESOLVED_FACES_H
 #define BST_SATELLITE_RESOLVED_FACES_H
 
+#include "sim/satellite/area_sums.h"
 #include "sim/satellite/curved_patches.h"
+#include "sim/satellite/facet_layers.h"
 #include "sim/satellite/polygon_coverage.h"
 #include "sim/satellite/sun_disc.h"
 #include "sim/satellite/visible_surface.h"
@@ -13,25 +15,24 @@ typedef struct bst_resolved_lit_cell {
     double light; /* of lit polygons that cover all of that */
 } bst_resolved_lit_cell;
 
-/* Side of the depth map from the Sun. */
-enum { BST_SHADOW_SIDE = 640 };
+/* Lights that cast shadows: the Sun, and the centroid of the earthlight. */
+enum { BST_RESOLVED_LIGHTS = 2 };
 
-/* Light of a facet in the fast image, per cell: of the Sun, and other. */
-typedef struct bst_sampled_facet {
-    double sun, other;
-    double rise_m; /* by which neighbours in the depth map are nearer to the Sun */
-    int16_t part;
-    bool known;
-} bst_sampled_facet;
+/* Differences of depth over the satellite's radius that are none. */
+#define BST_RESOLVED_SAME 2e-6
 
-/* Work memory of the fast image: zero-initialise. */
-typedef struct bst_resolved_samples {
-    float *near; /* [cells] 1 over the depth of the nearest facet */
-    int *facet;  /* [cells] the nearest facet; -1: none */
-    size_t cells;
-    float *toward;            /* [side][side] place toward the Sun of the nearest facet to it */
-    bst_sampled_facet *light; /* by facet */
-} bst_resolved_samples;
+/* Work memory of light by exact areas (resolved_areas.c): zero-initialise. */
+typedef struct bst_resolved_areas {
+    bst_facet_net net;
+    bst_facet_layers eye, lit[BST_RESOLVED_LIGHTS];
+    bst_area_sums sums;
+    double *even;                      /* by facet: light without shadows, per cell */
+    double *from[BST_RESOLVED_LIGHTS]; /* by facet: of each light */
+    uint8_t *wanted;                   /* by facet */
+    bst_resolved_second *second;       /* of the image's cells */
+    size_t second_capacity;
+    bool made;
+} bst_resolved_areas;
 
 struct bst_resolved {
     const bst_satellite *satellite;
@@ -44,7 +45,7 @@ struct bst_resolved {
     size_t lit_capacity;
     bst_point2 *outline, *hull; /* of a body, with room */
     bst_sun_disc disc;
-    bst_resolved_samples samples;
+    bst_resolved_areas areas;
 };
 
 /* One pose that is added. */
@@ -125,15 +126,10 @@ bst_status bst_resolved_add_plane_facet(bst_ctx *ctx, bst_resolved_adding *a, in
 bst_status bst_resolved_add_curved_facet(bst_ctx *ctx, bst_resolved_adding *a, int facet,
                                          bst_resolved_face *f) BST_MUST_CHECK;
 
-/* Adds a pose with one sample per cell (resolved_samples.c).
- *
- * Given:     index   of the pose: places the samples in their cells
- *            weight  factor on light and cover
- * Returned:  *total  light without the weight
- * Errors:    BST_ERR_MEMORY */
-bst_status bst_resolved_sample(bst_ctx *ctx, const bst_resolved_adding *a, int index, double weight,
-                               double *total) BST_MUST_CHECK;
-/* Frees the work memory of samples. */
-void bst_resolved_samples_free(bst_resolved_samples *samples);
+/* Adds the light of a pose to the sums (resolved_areas.c). BST_ERR_MEMORY. */
+bst_status bst_resolved_add_areas(bst_ctx *ctx, const bst_resolved_adding *a,
+                                  double weight) BST_MUST_CHECK;
+/* Frees the work memory of these sums. */
+void bst_resolved_areas_free(bst_resolved_areas *areas);
 
 #endif

@@ -38,7 +38,7 @@ void bst_resolved_free(bst_resolved *r) {
         free(r->hull);
         bst_curved_places_free(&r->places);
         bst_visible_surface_free(&r->surface);
-        bst_resolved_samples_free(&r->samples);
+        bst_resolved_areas_free(&r->areas);
         bst_polygon_coverage_free(&r->whole);
         bst_polygon_coverage_free(&r->lit);
         free(r);
@@ -101,13 +101,11 @@ bst_status bst_resolved_begin(bst_ctx *ctx, bst_resolved *r, const double low[2]
                             m->width, m->height);
         }
     }
+    m->second = NULL;
     memset(m->cells, 0, need * sizeof *m->cells);
     memset(m->part, -1, need * sizeof *m->part);
     return bst_visible_surface_begin(ctx, &r->surface, m->width, m->height);
 }
-
-/* Differences of depth over the satellite's radius that are none. */
-static const double SAME = 2e-6;
 
 /* A pose with its view and light. */
 static bst_resolved_adding start(bst_resolved *r, bst_satellite_pose *pose,
@@ -147,22 +145,18 @@ bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *r, bst_satellite_pose *p
                                            : bst_resolved_add_plane_facet(ctx, &a, i, &f));
     }
     double sum;
-    BST_TRY(bst_visible_surface_resolve(ctx, &r->surface, &pose->clip, SAME * sat->radius_m,
-                                        1.0 / a.per_m, weight, &r->image, &sum));
+    BST_TRY(bst_visible_surface_resolve(ctx, &r->surface, &pose->clip,
+                                        BST_RESOLVED_SAME * sat->radius_m, 1.0 / a.per_m, weight,
+                                        &r->image, &sum));
     if (total) {
         *total = sum;
     }
     return BST_OK;
 }
 
-bool bst_resolved_may_sample(const bst_satellite *satellite) {
-    return satellite->curved_count == 0;
-}
-
-bst_status bst_resolved_add_sampled(bst_ctx *ctx, bst_resolved *r, bst_satellite_pose *pose,
-                                    const bst_resolved_view *view, const bst_resolved_light *light,
-                                    int index, double weight) {
-    double total;
+bst_status bst_resolved_add_light(bst_ctx *ctx, bst_resolved *r, bst_satellite_pose *pose,
+                                  const bst_resolved_view *view, const bst_resolved_light *light,
+                                  double weight) {
     bst_resolved_adding a = start(r, pose, view, light);
-    return bst_resolved_sample(ctx, &a, index, weight, &total);
+    return bst_resolved_add_areas(ctx, &a, weight);
 }

@@ -32,12 +32,18 @@ typedef struct bst_resolved_cell {
     float light, moment_x, moment_y, cover;
 } bst_resolved_cell;
 
+/* Second moments of a cell's light about its centre, in cells. */
+typedef struct bst_resolved_second {
+    float xx, xy, yy;
+} bst_resolved_second;
+
 /* A grid of cells. Cell (i, j) has its centre at ((x0 + i + 0.5) cell_px, (y0 + j + 0.5) cell_px)
  * from the boresight. */
 typedef struct bst_resolved_image {
     double cell_px;
     int x0, y0, width, height;
-    bst_resolved_cell *cells; /* [height][width] */
+    bst_resolved_cell *cells;    /* [height][width] */
+    bst_resolved_second *second; /* [height][width], after bst_resolved_end_light; else NULL */
     int16_t *part; /* [height][width] part that covers most of the cell in the latest pose
                       added; -1: none */
 } bst_resolved_image;
@@ -92,19 +98,25 @@ bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *resolved, bst_satellite_
                             const bst_resolved_view *view, const bst_resolved_light *light,
                             double weight, double *total) BST_MUST_CHECK;
 
-/* True if bst_resolved_add_sampled draws a model as well: it has no curved surfaces. */
-bool bst_resolved_may_sample(const bst_satellite *satellite);
+/* True if the functions below draw a model as bst_resolved_add does: it has no curved surfaces. */
+bool bst_resolved_may_add_light(const bst_satellite *satellite);
 
-/* Adds one of many poses, as bst_resolved_add but fast: one sample per cell, at another place of
- * the cell for each index, and shadows by a depth map.
+/* Starts to sum the light of poses, after bst_resolved_begin. BST_ERR_MEMORY. */
+bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *resolved) BST_MUST_CHECK;
+
+/* Adds the light of a pose to these sums, as bst_resolved_add but fast for models of many facets,
+ * with second moments and without cover and parts. `light` is not NULL. BST_ERR_MEMORY. */
+bst_status bst_resolved_add_light(bst_ctx *ctx, bst_resolved *resolved, bst_satellite_pose *pose,
+                                  const bst_resolved_view *view, const bst_resolved_light *light,
+                                  double weight) BST_MUST_CHECK;
+
+/* Adds the sums of another image that began with the same box and cells. */
+void bst_resolved_join_light(bst_resolved *to, const bst_resolved *from);
+
+/* Sets the light of the image, with its moments, to the sums.
  *
- * Given:     light  not NULL
- *            index  0, 1, ... of the pose
- * Errors:    BST_ERR_MEMORY
- * Notes:     a single pose has staircases; the sum of dozens has none. Shadows of the Sun only. */
-bst_status bst_resolved_add_sampled(bst_ctx *ctx, bst_resolved *resolved, bst_satellite_pose *pose,
-                                    const bst_resolved_view *view, const bst_resolved_light *light,
-                                    int index, double weight) BST_MUST_CHECK;
+ * Given:     scale_rad  angle of a px at the boresight */
+void bst_resolved_end_light(bst_resolved *resolved, double scale_rad);
 
 /* The image so far; valid until the next call with `resolved`. */
 const bst_resolved_image *bst_resolved_image_of(const bst_resolved *resolved);

@@ -65,11 +65,12 @@ static double radiance(const bst_satellite_pose *p, bst_vec3 eye, bst_vec3 way, 
     return s->materials[s->facets[f].material].brdf.diffuse / BST_PI * in;
 }
 
-/* Largest difference of a cell from rays through it, over the light of the brightest one. */
+/* Largest difference of a cell of both kinds of images from rays through it, over the light of the
+ * brightest one. */
 static double compare(bst_test_model *m, bst_vec3 eye, bst_vec3 sun, double scale_rad) {
     enum { RAYS = 48 };
     bst_ctx ctx = {0};
-    bst_resolved *r;
+    bst_resolved *r[2];
     bst_resolved_gain gain[3] = {{.sun = 1.0}, {.sun = 1.0}, {.sun = 1.0}};
     bst_resolved_light light = {.sun = sun, .gain = gain};
     bst_vec3 to = bst_vec3_scale(bst_vec3_unit(eye), -1.0);
@@ -77,10 +78,16 @@ static double compare(bst_test_model *m, bst_vec3 eye, bst_vec3 sun, double scal
     bst_resolved_view view = {look, {0, 0, bst_vec3_norm(eye)}, scale_rad};
     double low[2], high[2], worst = 0.0, brightest = 0.0;
     assert_true(bst_resolved_box(m->pose, &view, low, high));
-    bst_assert_ok(&ctx, bst_resolved_create(&ctx, m->satellite, &r));
-    bst_assert_ok(&ctx, bst_resolved_begin(&ctx, r, low, high, 1.0));
-    bst_assert_ok(&ctx, bst_resolved_add(&ctx, r, m->pose, &view, &light, 1.0, NULL));
-    const bst_resolved_image *image = bst_resolved_image_of(r);
+    for (int k = 0; k < 2; k++) {
+        bst_assert_ok(&ctx, bst_resolved_create(&ctx, m->satellite, &r[k]));
+        bst_assert_ok(&ctx, bst_resolved_begin(&ctx, r[k], low, high, 1.0));
+    }
+    bst_assert_ok(&ctx, bst_resolved_add(&ctx, r[0], m->pose, &view, &light, 1.0, NULL));
+    assert_true(bst_resolved_may_add_light(m->satellite));
+    bst_assert_ok(&ctx, bst_resolved_begin_light(&ctx, r[1]));
+    bst_assert_ok(&ctx, bst_resolved_add_light(&ctx, r[1], m->pose, &view, &light, 1.0));
+    bst_resolved_end_light(r[1], scale_rad);
+    const bst_resolved_image *image = bst_resolved_image_of(r[0]);
     for (int n = 0; n < image->width * image->height; n++) {
         double sum = 0.0;
         for (int k = 0; k < RAYS * RAYS; k++) {
@@ -91,11 +98,14 @@ static double compare(bst_test_model *m, bst_vec3 eye, bst_vec3 sun, double scal
             double part = way.z * way.z * way.z / (RAYS * RAYS);
             sum += part * radiance(m->pose, eye, bst_quat_rotate(bst_quat_conj(look), way), sun);
         }
-        double there = (double)image->cells[n].light / (scale_rad * scale_rad);
-        worst = fmax(worst, fabs(there - sum));
+        for (int k = 0; k < 2; k++) {
+            double there = (double)bst_resolved_image_of(r[k])->cells[n].light;
+            worst = fmax(worst, fabs(there / (scale_rad * scale_rad) - sum));
+        }
         brightest = fmax(brightest, sum);
     }
-    bst_resolved_free(r);
+    bst_resolved_free(r[0]);
+    bst_resolved_free(r[1]);
     assert_true(brightest > 0.0);
     return worst / brightest;
 }

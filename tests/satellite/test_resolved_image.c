@@ -145,53 +145,120 @@ static void test_perspective(void **state) {
     bst_test_model_close(&m);
 }
 
-/* The sum of many sampled poses at rest is the exact image: light, cover, and light by quadrant. */
-static void test_samples(void **state) {
+/* A chain of boxes, turned to each other, in front of a plate: facets of many cells and of parts of
+ * one, with shadows of both lights. */
+static const char *const chain =
+    "{\"materials\": [{\"name\": \"m\", \"diffuse\": 0.5}, {\"name\": \"p\", \"diffuse\": 0.2, "
+    "\"specular\": 0.3, \"model\": \"phong\", \"exponent\": 30}],"
+    "\"parts\": [{\"name\": \"a\", \"kind\": \"box\", \"size_m\": [2, 2, 3], \"material\": \"m\"},"
+    "{\"name\": \"b\", \"kind\": \"box\", \"size_m\": [0.2, 0.3, 4], \"position_m\": [1.5, 0.4, "
+    "1.2], \"rotation_deg\": [20, 30, 10], \"material\": \"p\"},"
+    "{\"name\": \"c\", \"kind\": \"box\", \"size_m\": [0.02, 0.05, 3], \"position_m\": [-0.3, 1.3, "
+    "0.4], \"rotation_deg\": [-30, 10, 70], \"material\": \"m\"},"
+    "{\"name\": \"w\", \"kind\": \"plate\", \"size_m\": [6, 5, 0], \"position_m\": [0, -3, 0], "
+    "\"rotation_deg\": [75, 10, 0], \"material\": \"p\"}]}";
+
+/* The light of a pose as sums over edges is that of bst_resolved_add, with its moments, also in
+ * parts: of poses, and of a box that the body is partly outside of. */
+static void test_light(void **state) {
     (void)state;
-    enum { POSES = 64 };
     bst_ctx ctx = {0};
-    bst_test_model m = bst_test_model_open(flat);
-    bst_resolved *r[2];
-    bst_resolved_gain gain[2] = {{.sun = 1.0}, {.sun = 1.0}};
-    bst_resolved_light light = {.sun = bst_vec3_unit((bst_vec3){0.7, 0.5, 0.4}), .gain = gain};
-    bst_resolved_view view =
-        look_from((bst_vec3){0.2, 0.4, 0.9}, (bst_vec3){1, 0, 0}, 100.0, 0.001);
-    double low[2], high[2], sum[2][2][2] = {{{0}}}, cover[2] = {0}, all = 0.0;
-    assert_true(bst_resolved_may_sample(m.satellite));
+    bst_test_model m = bst_test_model_open(chain);
+    bst_resolved *r[3];
+    bst_resolved_gain gain[2] = {{.sun = 1.0, .earth = 1.0}, {.sun = 1.0, .earth = 2.0}};
+    bst_earthlight earth = {.count = 2,
+                            .direction = {bst_vec3_unit((bst_vec3){-0.6, 0.5, 0.7}),
+                                          bst_vec3_unit((bst_vec3){-0.5, 0.5, 0.9})},
+                            .irradiance = {0.3, 0.2},
+                            .centre = bst_vec3_unit((bst_vec3){-0.55, 0.5, 0.8})};
+    bst_resolved_light light = {
+        .sun = bst_vec3_unit((bst_vec3){0.7, 0.9, 0.4}), .earthlight = &earth, .gain = gain};
+    bst_resolved_view view = look_from((bst_vec3){0.2, 0.7, 0.9}, (bst_vec3){1, 0, 0}, 40.0, 0.004);
+    double low[2], high[2], brightest = 0.0, worst = 0.0;
+    assert_true(bst_resolved_may_add_light(m.satellite));
     assert_true(bst_resolved_box(m.pose, &view, low, high));
-    for (int n = 0; n < 2; n++) {
+    low[0] = 0.6 * low[0] + 0.4 * high[0];
+    high[1] = 0.3 * low[1] + 0.7 * high[1];
+    for (int n = 0; n < 3; n++) {
         bst_assert_ok(&ctx, bst_resolved_create(&ctx, m.satellite, &r[n]));
         bst_assert_ok(&ctx, bst_resolved_begin(&ctx, r[n], low, high, 1.0));
-        for (int k = 0; k < (n == 0 ? POSES : 1); k++) {
-            if (n == 0) {
-                bst_assert_ok(&ctx, bst_resolved_add_sampled(&ctx, r[n], m.pose, &view, &light, k,
-                                                             1.0 / POSES));
-            } else {
-                bst_assert_ok(&ctx, bst_resolved_add(&ctx, r[n], m.pose, &view, &light, 1.0, NULL));
-            }
+        if (n == 0) {
+            bst_assert_ok(&ctx, bst_resolved_add(&ctx, r[n], m.pose, &view, &light, 1.0, NULL));
+            continue;
         }
-        const bst_resolved_image *image = bst_resolved_image_of(r[n]);
-        for (int i = 0; i < image->width * image->height; i++) {
-            const bst_resolved_cell *c = &image->cells[i];
-            int right = 2 * (i % image->width) > image->width;
-            int below = 2 * (i / image->width) > image->height;
-            sum[n][right][below] += (double)c->light;
-            cover[n] += (double)c->cover;
-            all += n * (double)c->light;
-        }
-        bst_resolved_free(r[n]);
+        bst_assert_ok(&ctx, bst_resolved_begin_light(&ctx, r[n]));
+        bst_assert_ok(&ctx, bst_resolved_add_light(&ctx, r[n], m.pose, &view, &light, 0.5));
     }
-    /* 64 places in each cell, and the bias of the depth map */
-    bst_assert_close(cover[0] / cover[1], 1.0, 2e-3);
-    for (int q = 0; q < 4; q++) {
-        bst_assert_close((sum[0][q & 1][q >> 1] - sum[1][q & 1][q >> 1]) / all, 0.0, 5e-3);
+    bst_resolved_join_light(r[1], r[2]);
+    bst_resolved_end_light(r[1], view.scale_rad);
+    const bst_resolved_image *one = bst_resolved_image_of(r[0]), *sum = bst_resolved_image_of(r[1]);
+    for (int i = 0; i < one->width * one->height; i++) {
+        const bst_resolved_cell *c = &one->cells[i], *d = &sum->cells[i];
+        brightest = fmax(brightest, (double)c->light);
+        worst = fmax(worst, fabs((double)c->light - (double)d->light));
+        worst = fmax(worst, fabs((double)c->moment_x - (double)d->moment_x));
+        worst = fmax(worst, fabs((double)c->moment_y - (double)d->moment_y));
+    }
+    assert_true(brightest > 0.0);
+    /* light of polygons that cover a cell to 1e-7 is not cut */
+    bst_assert_close(worst / brightest, 0.0, 2e-6);
+    for (int n = 0; n < 3; n++) {
+        bst_resolved_free(r[n]);
     }
     bst_test_model_close(&m);
 }
 
+/* Second moments are those of cells of a sixteenth of the side. */
+static void test_second_moments(void **state) {
+    (void)state;
+    enum { FINE = 16 };
+    bst_ctx ctx = {0};
+    bst_test_model m = bst_test_model_open(chain);
+    bst_resolved *r[2];
+    bst_resolved_gain gain[2] = {{.sun = 1.0}, {.sun = 1.0}};
+    bst_resolved_light light = {.sun = bst_vec3_unit((bst_vec3){0.7, 0.9, 0.4}), .gain = gain};
+    bst_resolved_view view =
+        look_from((bst_vec3){0.2, 0.7, 0.9}, (bst_vec3){1, 0, 0}, 4000.0, 1e-4);
+    const double low[2] = {-24.0, -24.0}, high[2] = {24.0, 24.0};
+    double brightest = 0.0, worst = 0.0;
+    for (int n = 0; n < 2; n++) {
+        bst_assert_ok(&ctx, bst_resolved_create(&ctx, m.satellite, &r[n]));
+        bst_assert_ok(&ctx, bst_resolved_begin(&ctx, r[n], low, high, n == 0 ? 1.0 : 1.0 / FINE));
+        bst_assert_ok(&ctx, bst_resolved_begin_light(&ctx, r[n]));
+        bst_assert_ok(&ctx, bst_resolved_add_light(&ctx, r[n], m.pose, &view, &light, 1.0));
+        bst_resolved_end_light(r[n], view.scale_rad);
+    }
+    const bst_resolved_image *one = bst_resolved_image_of(r[0]),
+                             *fine = bst_resolved_image_of(r[1]);
+    for (int i = 0; i < one->width * one->height; i++) {
+        double xx = 0.0, xy = 0.0, yy = 0.0;
+        for (int k = 0; k < FINE * FINE; k++) {
+            int column = FINE * (i % one->width) + k % FINE,
+                row = FINE * (i / one->width) + k / FINE;
+            const bst_resolved_cell *c = &fine->cells[row * fine->width + column];
+            double x = (k % FINE + 0.5) / FINE - 0.5, y = (k / FINE + 0.5) / FINE - 0.5;
+            double even = (double)c->light / (12.0 * FINE * FINE);
+            double dx = (double)c->moment_x / FINE, dy = (double)c->moment_y / FINE;
+            xx += (double)c->light * x * x + 2.0 * x * dx + even;
+            xy += (double)c->light * x * y + x * dy + y * dx;
+            yy += (double)c->light * y * y + 2.0 * y * dy + even;
+        }
+        const bst_resolved_second *s = &one->second[i];
+        brightest = fmax(brightest, (double)one->cells[i].light);
+        worst = fmax(worst, fabs((double)s->xx - xx));
+        worst = fmax(worst, fmax(fabs((double)s->xy - xy), fabs((double)s->yy - yy)));
+    }
+    assert_true(brightest > 0.0);
+    /* the light of fine cells with a border is not even: 1 / 12 of 16 of 256 cells' areas */
+    bst_assert_close(worst / brightest, 0.0, 3e-4);
+    bst_resolved_free(r[0]);
+    bst_resolved_free(r[1]);
+    bst_test_model_close(&m);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_agrees_with_flux),
-                                       cmocka_unit_test(test_perspective),
-                                       cmocka_unit_test(test_samples)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_agrees_with_flux), cmocka_unit_test(test_perspective),
+        cmocka_unit_test(test_light), cmocka_unit_test(test_second_moments)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,56 @@
+/* The image of a body in many poses of one exposure, drawn by several threads. */
+#ifndef BST_SCENEGEN_SMEAR_BODY_POSES_H
+#define BST_SCENEGEN_SMEAR_BODY_POSES_H
+
+#include "sim/core/parallel.h"
+#include "sim/world/scene/source_body.h"
+
+enum { BST_BODY_POSES_MAX = 1024 };
+
+/* Poses of an exposure. */
+typedef struct bst_body_times {
+    double u[BST_BODY_POSES_MAX], weight[BST_BODY_POSES_MAX]; /* fractions of the exposure */
+    int count;
+    double error; /* of the quadrature: of the light at a border, over that of the body */
+} bst_body_times;
+
+/* Chooses the poses for an image that moves by that many PSF sigmas.
+ *
+ * Given:     tolerance  allowed error of the frame, in sigma of a pixel */
+void bst_body_times_choose(double sigmas, double tolerance, bst_body_times *out);
+
+/* Poses are drawn in that many images, each with every so-manieth pose, and these are summed: the
+ * same for any number of threads. */
+enum { BST_BODY_GROUPS = 4 };
+
+/* Work memory; zero-initialise, free with bst_body_poses_free. */
+typedef struct bst_body_poses {
+    bst_satellite_pose *pose[BST_BODY_GROUPS - 1]; /* of all groups but the first */
+    bst_resolved *image[BST_BODY_GROUPS - 1];
+} bst_body_poses;
+
+/* Frees the work memory. */
+void bst_body_poses_free(bst_body_poses *poses);
+
+/* Adds pose k to an image. Called on several threads. */
+typedef bst_status (*bst_body_pose_fn)(bst_ctx *ctx, void *user, int k, bst_satellite_pose *pose,
+                                       bst_resolved *image);
+
+/* What is drawn. */
+typedef struct bst_body_drawing {
+    const bst_satellite *satellite;
+    bst_satellite_pose *pose; /* of the first group */
+    bst_resolved *image;      /* of the first group, for which bst_resolved_begin was called */
+    double low[2], high[2], cell_px, scale_rad;
+    int count; /* of poses */
+    bst_body_pose_fn draw;
+    void *user;
+    bst_parallel *pool; /* NULL: the caller's thread */
+} bst_body_drawing;
+
+/* Draws all poses by bst_resolved_add_light in the callback, and sets the light of the image.
+ * Errors of the callback, and BST_ERR_MEMORY. */
+bst_status bst_body_poses_draw(bst_ctx *ctx, bst_body_poses *poses,
+                               const bst_body_drawing *drawing) BST_MUST_CHECK;
+
+#endif

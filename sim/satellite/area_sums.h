@@ -1,0 +1,47 @@
+/* Light of polygons by cell, as sums over their edges: exact areas and first moments. Internal to
+ * sim/satellite. */
+#ifndef BST_SATELLITE_AREA_SUMS_H
+#define BST_SATELLITE_AREA_SUMS_H
+
+#include "sim/satellite/resolved_image.h"
+
+/* What edges add to a cell: to itself, and by row_... to itself and all cells to its right. Light
+ * and its first and second moments: about the cell's centre, of a row about its middle. */
+typedef struct bst_area_cell {
+    double row_light, row_y, row_yy;
+    float light, x, y, xx, xy, yy;
+} bst_area_cell;
+
+/* A grid of sums; zero-initialise, free with bst_area_sums_free. */
+typedef struct bst_area_sums {
+    bst_area_cell *cells; /* [height][width + 1] */
+    int width, height;
+    size_t capacity;
+} bst_area_sums;
+
+/* Frees the memory. */
+void bst_area_sums_free(bst_area_sums *sums);
+
+/* Starts sums without light. BST_ERR_MEMORY. */
+bst_status bst_area_sums_begin(bst_ctx *ctx, bst_area_sums *sums, int width,
+                               int height) BST_MUST_CHECK;
+
+/* Adds an edge. The sum over the edges of a polygon, clockwise with x to the right and y up, is its
+ * light.
+ *
+ * Given:     a, b   ends, in cells; the corner of cell (0, 0) is the origin
+ *            light  of a cell that the polygon covers */
+void bst_area_sums_edge(bst_area_sums *sums, bst_point2 a, bst_point2 b, double light);
+
+/* Adds a polygon, counter-clockwise. */
+void bst_area_sums_polygon(bst_area_sums *sums, const bst_point2 *corners, int count, double light);
+
+/* Adds other sums of the same size. */
+void bst_area_sums_add(bst_area_sums *to, const bst_area_sums *from);
+
+/* Sets light and moments of an image of the same size, with the second ones.
+ *
+ * Given:     cell_rad  see bst_visible_surface_resolve */
+void bst_area_sums_finish(const bst_area_sums *sums, double cell_rad, bst_resolved_image *image);
+
+#endif

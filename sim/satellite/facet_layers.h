@@ -1,0 +1,83 @@
+/* Which facets of a model others hide from a direction or an observer. Internal to sim/satellite.
+ */
+#ifndef BST_SATELLITE_FACET_LAYERS_H
+#define BST_SATELLITE_FACET_LAYERS_H
+
+#include "sim/satellite/facet_net.h"
+#include "sim/satellite/polygon_clip.h"
+
+/* Corners of a facet, at most. */
+enum { BST_LAYERS_CORNERS_MAX = 128 };
+
+/* Box of a facet in a view, in cells, and how near it is: levels of its nearest and farthest place,
+ * 0: the nearest. An empty box is off the grid. */
+typedef struct bst_layers_box {
+    float low[2], high[2];
+    int facet;
+    uint16_t nearest, farthest;
+} bst_layers_box;
+
+/* Where the border of a layer crosses the middle of a row. */
+typedef struct bst_layers_crossing {
+    double x;
+    int row, edge, layers; /* more to its right */
+} bst_layers_crossing;
+
+/* Work memory of a view: zero-initialise, free with bst_facet_layers_free. Set by the caller before
+ * bst_facet_layers_find: */
+typedef struct bst_facet_layers {
+    const bst_facet_net *net;
+    bst_point2 *at;    /* by vertex of the net: place in the view, in cells of a grid */
+    double *near;      /* by vertex: linear on a facet, greater for what hides */
+    uint8_t *facing;   /* by facet, and 0 for one more; of those, corners are clockwise in the view
+                          with x to the right and y up */
+    int width, height; /* of the grid */
+    double same;       /* differences of `near` that are none */
+    /* results */
+    uint8_t
+        *doubtful; /* by facet: others may hide it; 1: all or nothing, but for planes that cross */
+    /* work memory */
+    uint8_t *crowded;               /* by cell: something may be hidden there */
+    bst_layers_box *boxes;          /* by facet that faces the view */
+    int *order;                     /* facets that face the view, the nearest first */
+    bst_layers_crossing *crossings; /* of borders with the middles of rows */
+    int8_t *outside;         /* by edge that is a border: layers on its emptier side, up to 2;
+                                -1: not known */
+    int *bin_first;          /* [bins + 1] */
+    bst_layers_box *entries; /* by bin, the nearest first */
+    uint8_t *needed;         /* by bin */
+    int *seen;               /* by facet: facet for which it was last looked at */
+    int bins_x, bins_y, entry_capacity, crossing_count, crossing_capacity, order_count;
+    double level_from, level_per; /* levels of nearness: per unit from this one on */
+    size_t cell_capacity, bin_capacity;
+    bst_polygon_clip clip;
+} bst_facet_layers;
+
+/* Frees the memory. */
+void bst_facet_layers_free(bst_facet_layers *layers);
+
+/* Allocates what depends on the model and the grid. BST_ERR_MEMORY. */
+bst_status bst_facet_layers_begin(bst_ctx *ctx, bst_facet_layers *layers, const bst_facet_net *net,
+                                  int width, int height) BST_MUST_CHECK;
+
+/* Finds the facets that others may hide, from `at` and `facing`.
+ *
+ * Given:     wanted  by facet: 0: not asked for
+ * Errors:    BST_ERR_MEMORY
+ * Notes:     borders of layers are edges with one facet that faces the view. In cells without a
+ *            border the number of layers is that at the centre, which changes along a row where a
+ *            border is crossed. Facets in cells with one layer, and with no border that has another
+ *            layer behind it or before it, are whole. */
+bst_status bst_facet_layers_find(bst_ctx *ctx, bst_facet_layers *layers,
+                                 const uint8_t *wanted) BST_MUST_CHECK;
+
+/* Cuts from a doubtful facet what others hide. Where planes cross, it is cut along the line.
+ *
+ * Returned:  true: nothing hides any of it. false: layers->clip holds what is left, convex pieces
+ *            counter-clockwise */
+bool bst_facet_layers_cut(bst_facet_layers *layers, int facet);
+
+/* Plane of a facet in the view: near = out[0] + out[1] x + out[2] y. False: it has no area. */
+bool bst_facet_layers_plane(const bst_facet_layers *layers, int facet, double out[3]);
+
+#endif

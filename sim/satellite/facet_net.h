@@ -1,0 +1,30 @@
+/* The facets of a model as a net: vertices that facets share, and edges with a facet on each side.
+ * Internal to sim/satellite. */
+#ifndef BST_SATELLITE_FACET_NET_H
+#define BST_SATELLITE_FACET_NET_H
+
+#include "sim/satellite/model.h"
+
+/* An edge from vertex a to b: `left` has it in that sense, `right` in the other one. Without a
+ * facet on the right, `right` is the number of facets. */
+typedef struct bst_net_edge {
+    int a, b, left, right;
+} bst_net_edge;
+
+/* Vertices of the same place and joint are one. Edges are in the order of their facets. */
+typedef struct bst_facet_net {
+    const bst_satellite *satellite;
+    int *vertex; /* [vertex_count] vertex of the model */
+    int *corner; /* as the model's `corner`, but vertices of the net */
+    bst_net_edge *edges;
+    int vertex_count, edge_count;
+} bst_facet_net;
+
+/* Makes the net of a model, which outlives it. BST_ERR_MEMORY. The caller frees it with
+ * bst_facet_net_free, also after an error. */
+bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *satellite,
+                              bst_facet_net *out) BST_MUST_CHECK;
+/* Frees the memory of a net. */
+void bst_facet_net_free(bst_facet_net *net);
+
+#endif

@@ -1,0 +1,268 @@
+/* Light of a pose by cell, as exact areas: facets that nothing hides by their edges, others by the
+ * polygons that are left of them. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/satellite/polygon_covers.h"
+#include "sim/satellite/resolved_faces.h"
+
+/* Cells across the view from a light. */
+enum { LIGHT_CELLS_MIN = 32, LIGHT_CELLS_MAX = 1024 };
+
+/* Cosine of incidence of the earthlight's centroid below which it casts no shadow. */
+static const double EARTH_LOW = 0.05;
+
+void bst_resolved_areas_free(bst_resolved_areas *s) {
+    bst_facet_net_free(&s->net);
+    bst_facet_layers_free(&s->eye);
+    bst_area_sums_free(&s->sums);
+    for (int n = 0; n < BST_RESOLVED_LIGHTS; n++) {
+        bst_facet_layers_free(&s->lit[n]);
+        free(s->from[n]);
+    }
+    free(s->even);
+    free(s->wanted);
+    free(s->second);
+    *s = (bst_resolved_areas){.made = false};
+}
+
+bool bst_resolved_may_add_light(const bst_satellite *satellite) {
+    if (satellite->curved_count > 0 || satellite->shell_count > 0) {
+        return false;
+    }
+    for (int f = 0; f < satellite->facet_count; f++) {
+        if (satellite->facets[f].count > BST_LAYERS_CORNERS_MAX) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Makes the net and the arrays by facet. */
+static bst_status make(bst_ctx *ctx, bst_resolved *r) {
+    bst_resolved_areas *s = &r->areas;
+    size_t facets = (size_t)r->satellite->facet_count + 1;
+    bst_resolved_areas_free(s);
+    BST_TRY(bst_facet_net_make(ctx, r->satellite, &s->net));
+    s->even = calloc(facets, sizeof *s->even);
+    s->wanted = calloc(facets, sizeof *s->wanted);
+    s->made = s->even && s->wanted;
+    for (int n = 0; n < BST_RESOLVED_LIGHTS; n++) {
+        s->from[n] = calloc(facets, sizeof *s->from[n]);
+        s->made = s->made && s->from[n];
+    }
+    return s->made ? BST_OK
+                   : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the light of %d facets",
+                              r->satellite->facet_count);
+}
+
+bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *r) {
+    bst_resolved_areas *s = &r->areas;
+    size_t cells = (size_t)r->image.width * (size_t)r->image.height;
+    if (!s->made) {
+        BST_TRY(make(ctx, r));
+    }
+    if (cells > s->second_capacity) {
+        free(s->second);
+        s->second = malloc(cells * sizeof *s->second);
+        s->second_capacity = s->second ? cells : 0;
+        if (!s->second) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an image of %d x %d cells",
+                            r->image.width, r->image.height);
+        }
+    }
+    return bst_area_sums_begin(ctx, &r->areas.sums, r->image.width, r->image.height);
+}
+
+void bst_resolved_join_light(bst_resolved *to, const bst_resolved *from) {
+    bst_area_sums_add(&to->areas.sums, &from->areas.sums);
+}
+
+void bst_resolved_end_light(bst_resolved *r, double scale_rad) {
+    r->image.second = r->areas.second;
+    bst_area_sums_finish(&r->areas.sums, r->image.cell_px * scale_rad, &r->image);
+}
+
+/* Places the vertices in the image and finds the facets that face the observer. */
+static bst_status look_from_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
+    bst_resolved_areas *s = &a->r->areas;
+    const bst_satellite *sat = a->r->satellite;
+    bst_facet_layers *l = &s->eye;
+    BST_TRY(bst_facet_layers_begin(ctx, l, &s->net, a->r->image.width, a->r->image.height));
+    l->same = BST_RESOLVED_SAME * sat->radius_m;
+    double origin_m = a->view->origin_m.z;
+    for (int v = 0; v < s->net.vertex_count; v++) {
+        double depth_m;
+        l->at[v] = bst_resolved_project(a, a->pose->vertices[s->net.vertex[v]], &depth_m);
+        l->near[v] = origin_m * ((origin_m - depth_m) / depth_m);
+    }
+    for (int f = 0; f < sat->facet_count; f++) {
+        bst_vec3 from = a->pose->vertices[sat->corner[sat->facets[f].first]];
+        l->facing[f] = bst_vec3_dot(a->pose->normals[f], bst_vec3_sub(a->eye_m, from)) > 0.0;
+    }
+    l->facing[sat->facet_count] = 0;
+    return bst_facet_layers_find(ctx, l, l->facing);
+}
+
+/* Light of the facets that face the observer, if nothing hides them from it. */
+static void shade(const bst_resolved_adding *a) {
+    bst_resolved_areas *s = &a->r->areas;
+    const bst_satellite *sat = a->r->satellite;
+    for (int f = 0; f < sat->facet_count; f++) {
+        if (!s->eye.facing[f]) {
+            continue;
+        }
+        const bst_facet *facet = &sat->facets[f];
+        bst_vec3 middle = {0};
+        for (int i = 0; i < facet->count; i++) {
+            middle = bst_vec3_axpy(middle, 1.0 / facet->count,
+                                   a->pose->vertices[sat->corner[facet->first + i]]);
+        }
+        bst_resolved_shading light =
+            bst_resolved_shade(a, facet->material, middle, a->pose->normals[f]);
+        s->even[f] = light.uniform;
+        s->from[0][f] = light.sun;
+        s->from[1][f] = light.earth;
+    }
+}
+
+/* View from a light: a place in the body frame is at middle + per_m times its x and y. */
+typedef struct light_view {
+    bst_vec3 x, y, z; /* unit; z: toward the light */
+    double middle, per_m;
+    int side;
+} light_view;
+
+static light_view light_view_of(const bst_resolved_adding *a, bst_vec3 direction) {
+    double radius_m = a->r->satellite->radius_m;
+    double across = ceil(2.0 * radius_m * a->per_m / fmax(a->view->origin_m.z, radius_m));
+    light_view v = {.z = direction};
+    v.side = (int)fmin(fmax(across, LIGHT_CELLS_MIN), LIGHT_CELLS_MAX);
+    v.middle = 0.5 * v.side;
+    v.per_m = 0.499 * v.side / radius_m;
+    /* the other way round than axes of a right-handed frame, as in an image with y down */
+    v.y = bst_vec3_perpendicular(direction);
+    v.x = bst_vec3_cross(v.z, v.y);
+    return v;
+}
+
+/* Finds the facets in sight that may be in the shadow of others. */
+static bst_status look_from_light(bst_ctx *ctx, const bst_resolved_adding *a, int n,
+                                  const light_view *v) {
+    bst_resolved_areas *s = &a->r->areas;
+    const bst_satellite *sat = a->r->satellite;
+    bst_facet_layers *l = &s->lit[n];
+    double least = n == 0 ? 0.0 : EARTH_LOW;
+    BST_TRY(bst_facet_layers_begin(ctx, l, &s->net, v->side, v->side));
+    l->same = BST_RESOLVED_SAME * sat->radius_m;
+    for (int i = 0; i < s->net.vertex_count; i++) {
+        bst_vec3 p = a->pose->vertices[s->net.vertex[i]];
+        l->at[i] = (bst_point2){v->middle + v->per_m * bst_vec3_dot(p, v->x),
+                                v->middle + v->per_m * bst_vec3_dot(p, v->y)};
+        l->near[i] = bst_vec3_dot(p, v->z);
+    }
+    for (int f = 0; f < sat->facet_count; f++) {
+        double in = bst_vec3_dot(a->pose->normals[f], v->z);
+        l->facing[f] = in > 0.0;
+        s->wanted[f] = in > least && s->eye.facing[f] && s->from[n][f] > 0.0;
+    }
+    l->facing[sat->facet_count] = 0;
+    return bst_facet_layers_find(ctx, l, s->wanted);
+}
+
+/* Adds the light of what a light reaches of a facet.
+ *
+ * Given:     whole  nothing hides the facet from the observer; else eye.clip has what is seen */
+static void add_lit(const bst_resolved_adding *a, int facet, int n, const light_view *v, bool whole,
+                    double light) {
+    bst_resolved_areas *s = &a->r->areas;
+    const bst_polygon_clip *lit = &s->lit[n].clip, *seen = &s->eye.clip;
+    bst_point2 corner[BST_POLYGON_CORNERS_MAX], both[2 * BST_POLYGON_CORNERS_MAX];
+    bst_point2 work[2 * BST_POLYGON_CORNERS_MAX];
+    double plane[3], depth_m;
+    if (!bst_facet_layers_plane(&s->lit[n], facet, plane)) {
+        return;
+    }
+    for (int i = 0; i < lit->piece_count; i++) {
+        const bst_polygon_piece *piece = &lit->pieces[i];
+        for (int k = 0; k < piece->count; k++) {
+            bst_point2 p = lit->points[piece->first + k];
+            bst_vec3 at = bst_vec3_scale(v->z, plane[0] + plane[1] * p.x + plane[2] * p.y);
+            at = bst_vec3_axpy(at, (p.x - v->middle) / v->per_m, v->x);
+            at = bst_vec3_axpy(at, (p.y - v->middle) / v->per_m, v->y);
+            corner[k] = bst_resolved_project(a, at, &depth_m);
+        }
+        if (whole) {
+            bst_area_sums_polygon(&s->sums, corner, piece->count, light);
+            continue;
+        }
+        for (int j = 0; j < seen->piece_count && piece->count > 0; j++) {
+            const bst_polygon_piece *part = &seen->pieces[j];
+            int count = part->count < 3 ? 0
+                                        : bst_polygon_intersection(corner, piece->count,
+                                                                   seen->points + part->first,
+                                                                   part->count, work, both);
+            bst_area_sums_polygon(&s->sums, both, count, light);
+        }
+    }
+}
+
+/* Adds a facet that faces the observer. Returned: its light per cell, if all of it has the same. */
+static double add_facet(const bst_resolved_adding *a, int facet, const light_view *views,
+                        double weight) {
+    bst_resolved_areas *s = &a->r->areas;
+    bool whole = !s->eye.doubtful[facet] || bst_facet_layers_cut(&s->eye, facet);
+    double even = s->even[facet];
+    if (!whole && bst_polygon_clip_is_empty(&s->eye.clip)) {
+        return 0.0;
+    }
+    for (int n = 0; n < BST_RESOLVED_LIGHTS; n++) {
+        double light = s->from[n][facet];
+        if (!(light > 0.0)) {
+            continue;
+        }
+        if (!s->lit[n].doubtful[facet] || bst_facet_layers_cut(&s->lit[n], facet)) {
+            even += light;
+        } else {
+            add_lit(a, facet, n, &views[n], whole, weight * light);
+        }
+    }
+    if (whole) {
+        return weight * even;
+    }
+    for (int i = 0; i < s->eye.clip.piece_count; i++) {
+        const bst_polygon_piece *piece = &s->eye.clip.pieces[i];
+        bst_area_sums_polygon(&s->sums, s->eye.clip.points + piece->first, piece->count,
+                              weight * even);
+    }
+    return 0.0;
+}
+
+bst_status bst_resolved_add_areas(bst_ctx *ctx, const bst_resolved_adding *a, double weight) {
+    bst_resolved_areas *s = &a->r->areas;
+    const bst_satellite *sat = a->r->satellite;
+    light_view views[BST_RESOLVED_LIGHTS];
+    BST_TRY(look_from_eye(ctx, a));
+    shade(a);
+    views[0] = light_view_of(a, a->light->sun);
+    BST_TRY(look_from_light(ctx, a, 0, &views[0]));
+    if (a->earth) {
+        views[1] = light_view_of(a, a->light->earthlight->centre);
+        BST_TRY(look_from_light(ctx, a, 1, &views[1]));
+    } else if (s->lit[1].doubtful) {
+        memset(s->lit[1].doubtful, 0, (size_t)sat->facet_count);
+    }
+    /* light of whole facets, in place of `even` */
+    for (int f = 0; f < sat->facet_count; f++) {
+        s->even[f] = s->eye.facing[f] ? add_facet(a, f, views, weight) : 0.0;
+    }
+    s->even[sat->facet_count] = 0.0;
+    for (int e = 0; e < s->net.edge_count; e++) {
+        const bst_net_edge *edge = &s->net.edges[e];
+        double step = s->even[edge->left] - s->even[edge->right];
+        if (step != 0.0) {
+            bst_area_sums_edge(&s->sums, s->eye.at[edge->a], s->eye.at[edge->b], step);
+        }
+    }
+    return BST_OK;
+}
