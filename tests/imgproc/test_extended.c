@@ -377,7 +377,7 @@ typedef struct made_up {
     double x, y;      /* origin of the window on the sensor */
     double phase_rad; /* of the target at a place */
     double along[2];  /* towards the Sun */
-    double across_px; /* extent of the rectangle across that direction, less the blur, sensor px */
+    double across_px; /* extent of the rectangle across that direction, sensor px */
 } made_up;
 
 static made_up make_up(double length_px, bool sun_known) {
@@ -397,7 +397,6 @@ static made_up make_up(double length_px, bool sun_known) {
                        .length_px = length_px / 3.0,
                        .width_px = 4.5,
                        .angle_rad = 0.8,
-                       .blur_px = 0.7,
                        .x0_px = 84.0,
                        .y0_px = 38.0,
                        .x1_px = 96.0,
@@ -428,8 +427,7 @@ static void set_sun(made_up *m, double x_px, double y_px) {
     m->along[0] = u / hypot(u, v);
     m->along[1] = v / hypot(u, v);
     m->phase_rad = acos(-bst_vec3_dot(sun, s));
-    m->across_px =
-        3.0 * (12.0 * fabs(m->along[1]) + 7.0 * fabs(m->along[0])) - 2.0 * 3.0 * m->s.blur_px;
+    m->across_px = 3.0 * (12.0 * fabs(m->along[1]) + 7.0 * fabs(m->along[0]));
 }
 
 static void a_made_up_silhouette(void **state) {
@@ -446,9 +444,8 @@ static void a_made_up_silhouette(void **state) {
         double light[2] = {121 + 3 * 91.7, 61 + 3 * 40.2};
         double centre[2] = {121 + 3 * 90.3, 61 + 3 * 41.6};
         set_sun(&m, centre[0], centre[1]);
-        double p = m.phase_rad, across = m.across_px, blur = 3.0 * 0.7;
-        double apart = 0.5 * across * (1.0 - cos(p));
-        double outline = bst_outline_phase_offset(p) * across + 0.5 * blur * apart / (apart + blur);
+        double p = m.phase_rad, across = m.across_px;
+        double outline = bst_outline_phase_offset(p) * across;
         double offset =
             sun ? 0.8 * (share * outline + (1.0 - share) * bst_light_phase_offset(p) * across)
                 : 0.0;
@@ -479,7 +476,8 @@ static void a_made_up_silhouette(void **state) {
         for (int i = 0; i < 8; i++) {
             bst_assert_close(reported[i], want[i], 1e-9);
         }
-        bst_assert_close(e->size_sigma_px, hypot(0.5 * blur, 0.02 * length), 1e-9);
+        double sigma = m.camera.psf_fwhm_px / BST_FWHM_PER_SIGMA;
+        bst_assert_close(e->size_sigma_px, hypot(0.6 * sigma, 0.02 * length), 1e-9);
         bst_assert_close(e->phase_rad, sun ? p : 0.0, 1e-9);
         double range = 2.0 / (length * bst_camera_scale_rad(&m.camera));
         bst_assert_close(e->range_m, range, 1e-9 * range);
