@@ -146,7 +146,8 @@ static bst_status do_sensor(bst_ctx *ctx, job *j) {
     const series all[] = {{"bias", "BIAS", r->bias, 0.0, 0.0},
                           {"dark", "DARK", r->dark, exposure_s, 0.0},
                           {"flat", "FLAT", r->flat, exposure_s, level_e}};
-    bst_status status = BST_OK;
+    /* before the first file: OpenCL's compiler ends the program where it cannot write */
+    bst_status status = bst_renderer_prepare(ctx, j->renderer);
     for (size_t i = 0; status == BST_OK && i < sizeof all / sizeof *all; i++) {
         status = write_series(ctx, j, &all[i]);
     }
