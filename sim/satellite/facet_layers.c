@@ -9,7 +9,7 @@
 /* Side of a bin, in cells; levels of nearness. */
 enum { BIN = 8, LEVELS = 4096 };
 
-/* Marks of cells: bits. */
+/* Marks of cells; borders are marked last. */
 enum { SEVERAL_LAYERS = 1, AT_BORDER = 2 };
 
 /* Width about borders that counts as theirs, in cells: they may cross another one there. */
@@ -152,7 +152,7 @@ static void count_layers(bst_facet_layers *l) {
             double to = more ? c[1].x : l->width;
             if (to > 0.0 && c->x < l->width) {
                 int i = cell_of(c->x, l->width), end = cell_of(to, l->width);
-                memset(l->crowded + (size_t)c->row * (size_t)l->width + i, 1,
+                memset(l->crowded + (size_t)c->row * (size_t)l->width + i, SEVERAL_LAYERS,
                        (size_t)(end - i + 1));
             }
         }

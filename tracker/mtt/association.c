@@ -89,14 +89,12 @@ void bst_mtt_associate(bst_mtt *mtt, bool partial) {
     bool jointly = mtt->params.association == BST_MTT_PMB;
     if (jointly) {
         bst_mtt_associate_jointly(mtt);
+        bst_mtt_split_tracks(mtt);
     } else {
         /* confirmed tracks are associated first: a false tentative track must not take their
          * detections */
         associate_tracks(mtt, false);
         bst_mtt_share(mtt);
-    }
-    if (jointly) {
-        bst_mtt_split_tracks(mtt);
     }
     bst_mtt_gate_manoeuvres(mtt);
     int unused = 0;

@@ -15,14 +15,12 @@ static double largest_spread(const bst_mtt_track *track) {
     return sqrt(sigma2);
 }
 
-/* Gates the detections of track t: the BST_MTT_CANDIDATES cheapest that are free or its own.
- * Returns their number. */
-static int gate_detections(const bst_mtt *mtt, int t, double detection_sigma, int *columns,
-                           double *costs) {
+int bst_mtt_gate(const bst_mtt *mtt, int t, int *columns, double *costs) {
+    assert(mtt && columns && costs && t >= 0 && t < mtt->track_count);
     const bst_mtt_params *params = &mtt->params;
     const bst_mtt_track *track = &mtt->tracks[t];
     double sigma = largest_spread(track);
-    double radius = sqrt(params->gate_chi2) * hypot(sigma, detection_sigma);
+    double radius = sqrt(params->gate_chi2) * hypot(sigma, mtt->largest_sigma);
     int begin, end, count = 0;
     bst_mtt_pool_range(&mtt->now, track->state.direction, radius, &begin, &end);
     for (int i = begin; i < end; i++) {
@@ -61,12 +59,6 @@ static int gate_detections(const bst_mtt *mtt, int t, double detection_sigma, in
 }
 
 int bst_mtt_gated(const bst_mtt *mtt, int t, int *columns) {
-    assert(mtt && columns && t >= 0 && t < mtt->track_count);
     double costs[BST_MTT_CANDIDATES];
-    return gate_detections(mtt, t, mtt->largest_sigma, columns, costs);
-}
-
-int bst_mtt_gate(const bst_mtt *mtt, int t, int *columns, double *costs) {
-    assert(mtt && columns && costs && t >= 0 && t < mtt->track_count);
-    return gate_detections(mtt, t, mtt->largest_sigma, columns, costs);
+    return bst_mtt_gate(mtt, t, columns, costs);
 }

@@ -113,8 +113,8 @@ double bst_mtt_brightness_cost(const bst_mtt_track *track, const bst_mtt_detecti
 /* Assigns shared detections to missed confirmed tracks next to a neighbour. */
 void bst_mtt_share(bst_mtt *mtt);
 
-/* Detections in the gate of track t and their costs (-ln of the likelihood ratio against clutter):
- * at most BST_MTT_CANDIDATES, the likeliest. Returns their number. */
+/* Detections in the gate of track t, free or its own, and their costs (-ln of the likelihood ratio
+ * against clutter): at most BST_MTT_CANDIDATES, the likeliest. Returns their number. */
 int bst_mtt_gate(const bst_mtt *mtt, int t, int *columns, double *costs);
 
 /* Detections in the gate of track t that no other confirmed track has: at most BST_MTT_CANDIDATES,
