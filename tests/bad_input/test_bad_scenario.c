@@ -191,9 +191,20 @@ typedef struct walk {
     int tried;
 } walk;
 
+/* With sanitizers, a scenario takes ten times as long to read: every fourth value is tried; the optimised build tries
+ * them all. */
+#ifdef __SANITIZE_ADDRESS__
+enum { TRIED_EVERY = 4 };
+#else
+enum { TRIED_EVERY = 1 };
+#endif
+
 /* Sets `path` to a value and expects to be refused with "NAME: PATH: PROBLEM (found ...; allowed:
  * ...)". */
 static void refuse_value(walk *w, const char *path, const char *value, const char *problem) {
+    if (w->tried++ % TRIED_EVERY != 0) {
+        return;
+    }
     bst_ctx ctx = {0};
     bst_json *json = NULL;
     char assignment[1200], begin[700];
@@ -208,7 +219,6 @@ static void refuse_value(walk *w, const char *path, const char *value, const cha
         fail_msg("%s: %s", assignment, ctx.message);
     }
     bst_json_free(json);
-    w->tried++;
 }
 
 static void refuse_beyond(walk *w, const char *path, const cJSON *limit, double step) {
