@@ -23,7 +23,7 @@ class Examples(unittest.TestCase):
         self.assertEqual(done.frame.exposure_id, 29)
 
     def test_own_detector(self):
-        measured = execute("own_detector", trials=100).measured
+        measured = execute("own_detector", trials=100, empty_frames=40).measured
         for name, figures in measured.items():
             with self.subTest(detector=name):
                 pd = [point["pd"] for point in figures["points"]]

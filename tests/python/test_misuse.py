@@ -340,13 +340,21 @@ class Misuse(unittest.TestCase):
 
     def test_wrong_steps_raise(self):
         scenario = SMALL.with_({"/observers/0/sensors/0/modules/scenegen/star_limit_v_mag": 5})
+        space = {"bst": bst, "np": np, "pickle": pickle}
+        steps = []  # the one that is tried is the last
+
+        class Wrong:
+            def __init__(self, env):
+                self.env = env
+
+            def __call__(self, step):
+                return steps[-1](self.env, step)
+        # one model for all: its catalogue and kernels are prepared once
+        model = bst.Model(scenario.with_plugin(tracker=bst.register(tracker=Wrong))).prepare()
         for number, text in enumerate(WRONG_STEPS):
-            space = {"bst": bst, "np": np, "pickle": pickle}
-            exec("class Wrong:\n    def __init__(self, env):\n        self.env = env\n"
-                 f"    def __call__(self, step):\n        env = self.env\n        {text}\n", space)
-            name = bst.register("wrong", tracker=space["Wrong"])
-            with bst.Simulation(scenario.with_plugin(tracker=name)) as sim, \
-                    self.subTest(step=text):
+            exec(f"def wrong(env, step):\n    {text}\n", space)
+            steps.append(space["wrong"])
+            with bst.Simulation(model) as sim, self.subTest(step=text):
                 self.check(number, lambda: sim.run_until(2))
 
     def test_an_env_ends_with_its_simulation(self):

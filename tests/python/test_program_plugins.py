@@ -70,7 +70,7 @@ class Plugins(unittest.TestCase):
                 frame.data[0, 0] = 1
             return self.peaks(frame)
         figures = bst.pd(STARE.with_plugin(detector=bst.register("counted", detector=counted)),
-                         snr=(3, 12, 3), trials=400)
+                         snr=(3, 12, 3), trials=400, empty_frames=20)
         self.assertEqual(set(calls), {(256, 256)})
         self.assertGreaterEqual(len(calls), figures["frames"] + figures["empty_frames"])
         pd = [p["pd"] for p in figures["points"]]
@@ -81,15 +81,15 @@ class Plugins(unittest.TestCase):
     def test_keys_reach_the_detector(self):
         def false_alarms(**keys):
             return bst.pd(STARE.with_plugin(detector="python:peaks", **keys), snr=(9, 10, 1),
-                          trials=100)["false_alarms_per_frame"]
+                          trials=100, empty_frames=20)["false_alarms_per_frame"]
         self.assertGreater(false_alarms(threshold_dn=40.0), 3 * false_alarms(threshold_dn=60.0))
         with self.assertRaisesRegex(bst.ScenarioError, "did you mean \"threshold_dn\""):
             STARE.with_plugin(detector="python:peaks", treshold_dn=40.0).validate()
 
     def test_another_process_finds_the_same(self):
         scenario = STARE.with_plugin(detector="python:peaks")
-        here = bst.pd(scenario, snr=(6, 9, 3), trials=100)
-        there = bst.pd(scenario, snr=(6, 9, 3), trials=100, plugins=["peaks_module"])
+        here = bst.pd(scenario, snr=(6, 9, 3), trials=100, empty_frames=5)
+        there = bst.pd(scenario, snr=(6, 9, 3), trials=100, empty_frames=5, plugins=["peaks_module"])
         for figures in (here, there):
             figures.pop("process_ms")
             figures.pop("wall_s")
@@ -141,14 +141,14 @@ class Plugins(unittest.TestCase):
                 raised.append(error)
             return self.peaks(frame)
         name = bst.register("again", detector=again)
-        bst.pd(STARE.with_plugin(detector=name), snr=(6, 9, 3), trials=40)
+        bst.pd(STARE.with_plugin(detector=name), snr=(6, 9, 3), trials=40, empty_frames=2)
         self.assertTrue(raised)
         bst.check(STARE.with_plugin(detector=name))
 
     def test_another_thread_may_run_a_command(self):
         found = []
         thread = threading.Thread(target=lambda: found.append(bst.pd(
-            STARE.with_plugin(detector="python:peaks"), snr=(6, 9, 3), trials=40)))
+            STARE.with_plugin(detector="python:peaks"), snr=(6, 9, 3), trials=40, empty_frames=2)))
         thread.start()
         thread.join()
         self.assertEqual(len(found), 1)
@@ -177,7 +177,7 @@ class Plugins(unittest.TestCase):
         document = study_of("python:peaks", "pd", sweeps=[{"axes": [
             {"path": "/observers/0/sensors/0/modules/imgproc/detector/threshold_dn",
              "values": [30, 45]}]}], pd={"snr_first": 6, "snr_last": 9, "snr_step": 3,
-                                         "trials": 100})
+                                         "trials": 100, "empty_frames": 20})
         document["set"].pop("/duration_s")
         study = bst.study(document, self.folder / "pd", plugins=["peaks_module"], workers=2)
         low, high = study.runs.false_alarms_per_frame
