@@ -138,7 +138,7 @@ class Tasking(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.model = bg.TaskingModel(
-            bst.Scenario.load("constellation_quick.json").with_(duration_s=80), targets=12)
+            bst.Scenario.load("constellation_quick.json").with_(duration_s=60), targets=12)
 
     @with_gymnasium
     def test_the_checker_of_gymnasium_passes(self):
@@ -187,7 +187,7 @@ class Tasking(unittest.TestCase):
 
     def courses(self, action):
         """Twice the same steps of the run number 7."""
-        env = bg.TaskingEnv(model=self.model, decision_s=10, revisit_s=150)
+        env = bg.TaskingEnv(model=self.model, decision_s=5, revisit_s=150)
         course = []
         for _ in range(2):
             env.reset(seed=7)
