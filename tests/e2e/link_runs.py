@@ -10,10 +10,13 @@ SECONDS = 8
 
 
 def near():
-    """The main scenario with a cue that is 0.05 degrees wrong: it has tracks within seconds."""
+    """The main scenario on a quarter of the sensor, with a cue that is 0.05 degrees wrong: it has tracks
+    within seconds."""
     path = runs.scratch() + "/near.json"
     with open(path, "w", encoding="utf-8") as file:
-        file.write(runs.call_well("check", runs.TRACK, *EMBEDDED, "--set", runs.SENSOR + "/cue/offset_deg=0.05"))
+        file.write(runs.call_well(
+            "check", runs.TRACK, *EMBEDDED, "--set", runs.SENSOR + "/cue/offset_deg=0.05", "--set",
+            runs.SENSOR + "/camera/width_px=512", "--set", runs.SENSOR + "/camera/height_px=512"))
     return path
 
 

@@ -43,7 +43,7 @@ del runs.sys.argv[1:]
 SCENARIO = {"cue": "scenarios/cue_one_degree.json", "belt": "scenarios/belt_search.json",
             "eclipse": "scenarios/equinox_eclipse.json"}
 STARS = {"cue": "embedded", "belt": "embedded", "eclipse": "stars/equinox_eclipse.stars"}
-SHORT = {"cue": 6, "belt": 3, "eclipse": 1}
+SHORT = {"cue": 3, "belt": 2, "eclipse": 1}
 IMAGES = {"cue": 10, "belt": 0, "eclipse": 0}
 OBJECT = "/world/objects/0"
 CUE = runs.SENSOR + "/cue"

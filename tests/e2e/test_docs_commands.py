@@ -9,6 +9,7 @@ scratch folder that looks like the repository. A comment on the line before a bl
 
     <!-- test: duration=60 -->  `run` commands simulate 60 s instead of 1 s (a command's own --duration is kept)
                                 (a shipped study is only planned: --dry-run; one of the page has two replicates of 45 s)
+    <!-- test: check -->        without --slow each `run` is only a `check` of the same scenario and settings
     <!-- test: exit=1 -->       the block ends with this exit code
     <!-- test: background -->   the block runs beside the next ones of its page and must end with 0 by its end
     <!-- test: needs=ds9 -->    counted and printed as not run where the program ds9 is missing
@@ -44,6 +45,9 @@ words = sys.argv[1:]
 length = os.environ.get("DOCS_DURATION")
 if "run" in words[:3] and length and "--duration" not in words and "--replay" not in words and "--help" not in words:
     words += ["--duration", length]
+if words[:1] == ["run"] and length and os.environ.get("DOCS_CHECK"):
+    at = words.index("--out")
+    words = ["check", "--quiet"] + [word for word in words[1:at] + words[at + 2:] if word != "--overwrite"]
 if words[:1] == ["study"] and length and "--out" in words and "--emit" not in words and "scenarios/" in words[1]:
     words += ["--dry-run"] if "--dry-run" not in words else []
 elif (words[:1] == ["study"] and length and "--out" in words and words[1].endswith(".json")
@@ -110,7 +114,7 @@ class Scratch:
         length = marks.get("duration", "" if "slow" in marks else str(SECONDS))
         home = os.path.join(self.path, "home")
         os.makedirs(home, exist_ok=True)
-        environment = dict(os.environ, DOCS_DURATION=length, PATH=self.tools + ":" + os.environ["PATH"],
+        environment = dict(os.environ, DOCS_DURATION=length, DOCS_CHECK="" if SLOW else marks.get("check", ""), PATH=self.tools + ":" + os.environ["PATH"],
                            HOME=home, POCL_CACHE_DIR=KERNELS)
         folder = self.path
         if "tree" in marks:

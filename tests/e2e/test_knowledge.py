@@ -20,6 +20,9 @@ import runs
 FOLDER = "scenarios/knowledge/"
 ITEMS = ["dropped_stars", "displaced_stars", "scale", "rotation", "distortion", "clock", "orbit",
          "velocity"]
+# of these only the start and the telemetry are looked at, and that the loop holds
+NO_IMAGES = ("clock", "orbit")
+DURATION = 90  # s, a frame in each
 LIGHT = 299792458.0
 ARCSEC = np.radians(1 / 3600)
 PIXEL = 3 * ARCSEC
@@ -64,8 +67,8 @@ class Loop(unittest.TestCase):
         folder = runs.scratch()
         cls.out = {name: os.path.join(folder, name) for name in ["right"] + ITEMS}
         runs.parallel(lambda name: runs.run(
-            runs.TRACK if name == "right" else FOLDER + name + ".json", cls.out[name],
-            runs.NO_FRAMES, duration=120), cls.out)
+            runs.TRACK if name == "right" else FOLDER + name + ".json", cls.out[name], runs.NO_FRAMES,
+            *([runs.GENERATOR] if name in NO_IMAGES else []), duration=DURATION), cls.out)
         cls.frames = {name: cls.tracked(name) for name in cls.out}
         cls.stars = {name: cls.identified(name) for name in cls.out}
 
@@ -88,7 +91,7 @@ class Loop(unittest.TestCase):
 
     def common(self, name):
         both = sorted(self.frames["right"].keys() & self.frames[name].keys())
-        self.assertGreater(len(both), 80, name)
+        self.assertGreater(len(both), 0.55 * DURATION, name)
         return both
 
     def attitude_errors(self, name):
@@ -127,12 +130,12 @@ class Loop(unittest.TestCase):
                 "WHERE kind = 'object'")}
             return observer, target
         observer, target = rows("right")
-        self.assertEqual(len(observer), 120)
+        self.assertEqual(len(observer), DURATION)
         for name in ITEMS:
             own = rows(name)
             self.assertEqual(own[0], observer, name)
             both = target.keys() & own[1].keys()
-            self.assertGreater(len(both), 95, name)
+            self.assertGreater(len(both), 0.75 * DURATION, name)
             for i in both:
                 self.assertEqual(own[1][i], target[i], name)
 
@@ -203,7 +206,7 @@ class Loop(unittest.TestCase):
             expected.append(np.mean((off - taken @ fit) ** 2))
             seen.append(frame["attitude_rms_px"] ** 2)
             right.append(self.frames["right"][i]["attitude_rms_px"] ** 2)
-        self.assertGreater(len(seen), 25)
+        self.assertGreater(len(seen), 15)
         result = [np.sqrt(np.mean(x)) for x in (seen, right, np.add(right, expected))]
         print(f"{name}: residuals {result[0]:.4f} px in {len(seen)} frames, without {result[1]:.4f}, "
               f"expected {result[2]:.4f}")
@@ -211,14 +214,14 @@ class Loop(unittest.TestCase):
 
     def test_a_scale_error_shows_in_the_residuals(self):
         seen, right, expected = self.residuals("scale", lambda at: 300e-6 * at)
-        # noise times pattern averages out over 90 frames of 25 stars: 1 % (0.03 px x 0.08 px x 2)
+        # noise times pattern averages out over 60 frames of 25 stars: 1 % (0.03 px x 0.08 px x 2)
         self.assertLess(abs(seen / expected - 1), 0.03)
         self.assertGreater(seen, 2 * right)
 
     def test_unknown_distortion_shows_in_the_residuals(self):
         cubic = lambda at: 10 * PIXEL ** 2 * np.sum(at ** 2, axis=1)[:, None] * at
         seen, right, expected = self.residuals("distortion", cubic)
-        # frames in which no star lay in a corner: 30 of them
+        # frames in which no star lay in a corner: a third of them
         self.assertLess(abs(seen / expected - 1), 0.06)
         self.assertGreater(seen, 2 * right)
 
@@ -231,7 +234,7 @@ class Loop(unittest.TestCase):
                          np.sign(q @ true))
         found = np.degrees(np.mean(rolls))
         print(f"0.05 deg of rotation: roll {found:.4f} deg")
-        # roll of a frame from some 25 stars of 0.03 px over 300 px: 2e-5 rad; the mean of 90
+        # roll of a frame from some 25 stars of 0.03 px over 300 px: 2e-5 rad; the mean of 60
         self.assertLess(abs(abs(found) - 0.05), 0.001)
 
     def test_a_velocity_error_is_aberration_in_the_attitude(self):
@@ -243,7 +246,7 @@ class Loop(unittest.TestCase):
         expected = 1000 / LIGHT * (transverse - (transverse @ b) * b) / ARCSEC
         print(f"1 km/s: attitude off by {np.linalg.norm(found):.4f} arcsec, expected "
               f"{np.linalg.norm(expected):.4f}")
-        # a frame's attitude is good to 0.03 arcsec, 90 frames; axes turn by 6 degrees in the run
+        # a frame's attitude is good to 0.03 arcsec, 60 frames; axes turn by 6 degrees in the run
         self.assertLess(np.linalg.norm(found - expected), 0.05)
         self.assertGreater(np.linalg.norm(expected), 0.3)
 

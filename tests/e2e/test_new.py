@@ -155,7 +155,10 @@ class New(unittest.TestCase):
         modules = {"gimbal": {"type": "ideal", "object": "STARLINK-1709"}, "scenegen": {"type": "opencl"}}
         result = call("run", path, "--quiet", "--out", out, "--set", runs.NO_FRAMES,
                       "--set", f"{sensor}/modules={json.dumps(modules)}",
-                      "--set", sensor + '/exposure={"exposure_s": 0.1, "period_s": 5}')
+                      "--set", sensor + '/exposure={"exposure_s": 0.1, "period_s": 5}',
+                      # the same field of few pixels: light of the Earth takes time in each
+                      *(word for key, value in (("width_px", 256), ("height_px", 256), ("pixel_scale_arcsec", 40))
+                        for word in ("--set", f"{sensor}/camera/{key}={value}")))
         self.assertEqual(result.returncode, 0, result.stderr)
         with runs.database(out) as database:
             counts = database.execute("SELECT sum(kind = 'star' AND v_mag < 9) FROM truth"

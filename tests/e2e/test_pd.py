@@ -26,7 +26,9 @@ class Measured(unittest.TestCase):
         cls.path = os.path.join(cls.folder, "pd.json")
         cls.plot = os.path.join(cls.folder, "pd.png")
         cls.words = ["--snr", "3:9:1", "--trials", "300", "--false-alarms", "4", "--empty-frames",
-                     "60", "--threads", "1", "--json", cls.path]
+                     "60", "--threads", "1", "--json", cls.path,
+                     # a quarter of the pixels, with as many false alarms
+                     "--set", runs.SENSOR + "/camera/width_px=512", "--set", runs.SENSOR + "/camera/height_px=512"]
         cls.result = pd(*cls.words, "--plot", cls.plot)
         with open(cls.path) as file:
             cls.out = json.load(file)
@@ -138,7 +140,8 @@ class Measured(unittest.TestCase):
         outs = []
         for extra in ([], ["--set", runs.SENSOR + "/knowledge/camera/psf_fwhm_px=3.09"]):
             result = pd("--snr", "5:30:25", "--trials", "250", "--empty-frames", "10",
-                        "--background", "20", "--json", path, *extra, scenario=scenario)
+                        "--background", "20", "--json", path, *extra, "--set",
+                        runs.SENSOR + "/camera/optics/wavelengths=2", scenario=scenario)
             self.assertEqual(result.returncode, 0, result.stderr)
             with open(path) as file:
                 outs.append(json.load(file)["points"])

@@ -186,10 +186,10 @@ class Resume(unittest.TestCase):
         self.assert_same(run.resume(every=40), reference)
 
     def constellation(self, threads):
-        sets, duration = [runs.NO_FRAMES], 60
+        sets, duration = [runs.NO_FRAMES], 30
         reference = self.reference("constellation", QUICK, *sets, duration=duration)
-        self.assertGreater(len(reference["table truth"]), 100)
-        run = self.run_of(f"constellation {threads}", QUICK, *sets, duration=duration, every=10.35)
+        self.assertGreater(len(reference["table truth"]), 30)
+        run = self.run_of(f"constellation {threads}", QUICK, *sets, duration=duration, every=5.35)
         run.stop(signal.SIGKILL if threads == 1 else signal.SIGINT, 2, threads=threads)
         self.assert_same(run.resume(threads=threads), reference)
 

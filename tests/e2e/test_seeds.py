@@ -10,7 +10,7 @@ neighbour  an object of the same brightness crosses at 2 to 20 px with 1 to 4 px
 
 The right target is in track when it was confirmed, at least 90 % of the later frames in which it is
 visible have the confirmed track of interest on it (within 5 px, as sim/eval defines it), and so has
-the last frame. A case is one or two short runs (neighbour: three that pass nearer than 13 px),
+the last frame. A case is one short run (neighbour: two that pass nearer than 13 px),
 or 100 long ones with --long.
 
 Usage, from the repository root:
@@ -46,7 +46,7 @@ del sys.argv[1:]
 def seeds_of(case):
     if options.seeds or options.long:
         return range(1, 1 + (options.seeds or 100))
-    return {"neighbour": (2, 4, 7), "drop": (1, 2)}.get(case, (1,))
+    return {"neighbour": (2, 4)}.get(case, (1,))
 
 
 def direction(rng):
@@ -181,7 +181,7 @@ class Seeds(unittest.TestCase):
         rms = [o.summary["pointing_rms_px"] for o in outcomes if o.right]
         print(f"{case}: the right target in {sum(right)} of {len(right)}, RMS of those from "
               f"{min(rms):.3f} to {max(rms):.3f} px")
-        # 95 of 100 (the figure of issue and README); all of three
+        # 95 of 100 (the figure of issue and README); all of a few
         self.assertGreaterEqual(sum(right), 0.95 * len(right) if len(right) >= 20 else len(right),
                                 "\n".join(str(o) for o in outcomes if not o.right))
 
@@ -200,8 +200,9 @@ class Seeds(unittest.TestCase):
     def test_drop(self):
         self.assert_right("drop")
         fraction = np.mean([o.dropped for o in self.of("drop")])
-        # binomial: 3 sigma of 240 frames
-        self.assertAlmostEqual(fraction, 0.2, delta=0.078)
+        # binomial: 3 sigma of the frames of all runs
+        frames = sum(scene("drop", o.seed)[1] for o in self.of("drop"))
+        self.assertAlmostEqual(fraction, 0.2, delta=3 * np.sqrt(0.2 * 0.8 / frames))
 
     def test_snr6(self):
         for outcome in self.of("snr6"):

@@ -163,8 +163,10 @@ static void all_detectors_add_it_once(void **state) {
         camera.detector.saturation = kind == 1 ? BST_WELL_BLOOM : BST_WELL_CLIP;
         camera.detector.frame_transfer_s = kind == 2 ? 1e-9 : 0.0; /* no light falls in it */
         scene_track track = scene_track_make(&camera, &demo);
+        bst_renderer_options options = bst_renderer_default_options();
+        options.shared_program = true; /* compiled for test_detector.c too */
         bst_renderer *r;
-        bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &camera, NULL, &r));
+        bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, &camera, &options, &r));
         bst_skylight_map map = make_map(step, nodes);
         bst_window lit = {w.x0, 0, w.width, H};
         bst_skylight_map cut = cut_map(&map, kind == 1 || kind == 2 ? lit : w, part);

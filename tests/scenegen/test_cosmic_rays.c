@@ -89,8 +89,10 @@ static void frames_hold_the_hits_of_their_exposure(void **state) {
     bst_camera camera = scene_camera(W, H);
     camera.detector.cosmic_rays = example;
     camera.detector.cosmic_rays.rate_per_cm2_s = 2000.0;
+    bst_renderer_options options = bst_renderer_default_options();
+    options.shared_program = true; /* compiled for test_detector.c too */
     bst_renderer *r;
-    bst_assert_ok(&ctx, bst_renderer_create(&ctx, device, &camera, NULL, &r));
+    bst_assert_ok(&ctx, bst_renderer_create(&ctx, device, &camera, &options, &r));
     double time_s[2] = {0.0, 1.0};
     bst_quat q[2] = {BST_QUAT_IDENTITY, BST_QUAT_IDENTITY};
     bst_los_track track = {2, time_s, q};
