@@ -4,7 +4,7 @@
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
 
-enum { W = 200, H = 150 };
+enum { W = 200, H = 150, STARS = 150 };
 
 static void renderer_and_reference_agree(void **state) {
     (void)state;
@@ -24,7 +24,7 @@ static void renderer_and_reference_agree(void **state) {
         camera.optics.psf = n == 3 ? BST_PSF_MOFFAT : BST_PSF_GAUSSIAN;
         const scene_motion motion = {.x_px = 12.0, .y_px = 5.0, .duration_s = 1.0, .samples = 2};
         scene_track track = scene_track_make(&camera, &motion);
-        bst_scene_source *stars = scene_stars(&camera, 300, 30000.0, 4.0, 5);
+        bst_scene_source *stars = scene_stars(&camera, STARS, 30000.0, 4.0, 5);
         bst_window window = {20, 10, 170, 130};
         static float fast[W * H];
         static double slow[W * H];
@@ -34,10 +34,10 @@ static void renderer_and_reference_agree(void **state) {
         bst_render_request request = {.window = window,
                                       .track = &track.track,
                                       .sources = stars,
-                                      .count = 300,
+                                      .count = STARS,
                                       .background_e = 20.0};
         bst_assert_ok(&ctx, bst_renderer_render_noise_free(&ctx, renderer, &request, fast));
-        bst_assert_ok(&ctx, bst_reference_render(&ctx, &camera, window, &track.track, stars, 300,
+        bst_assert_ok(&ctx, bst_reference_render(&ctx, &camera, window, &track.track, stars, STARS,
                                                  1e-9, slow));
         double worst = 0.0, most = 0.0, least = 1e9;
         for (int p = 0; p < window.width * window.height; p++) {
