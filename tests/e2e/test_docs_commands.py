@@ -8,7 +8,7 @@ A fenced block of language sh or console is run, all blocks of a page in one she
 scratch folder that looks like the repository. A comment on the line before a block changes that:
 
     <!-- test: duration=60 -->  `run` commands simulate 60 s instead of 1 s (a command's own --duration is kept)
-                                (a shipped study is only planned: --dry-run; one of the page has two replicates of 45 s)
+                                (a shipped study is only planned: --dry-run; one of the page has two replicates of 30 s)
     <!-- test: check -->        without --slow each `run` is only a `check` of the same scenario and settings
     <!-- test: exit=1 -->       the block ends with this exit code
     <!-- test: background -->   the block runs beside the next ones of its page and must end with 0 by its end
@@ -54,8 +54,8 @@ elif (words[:1] == ["study"] and length and "--out" in words and words[1].endswi
       and not os.path.realpath(words[1]).startswith({root!r} + os.sep)):
     with open(words[1], encoding="utf-8") as file:
         study = dict(json.load(file), replicates=2)
-    if study.get("set", {{}}).get("/duration_s", 0) > 45:
-        study["set"]["/duration_s"] = 45
+    if study.get("set", {{}}).get("/duration_s", 0) > 30:
+        study["set"]["/duration_s"] = 30
     with open(words[1], "w", encoding="utf-8") as file:
         json.dump(study, file)
 os.execv({program!r}, [{program!r}] + words)

@@ -40,7 +40,7 @@ def start(out, form, duration, *words):
 def wait_for_frames(process, out):
     while not os.path.exists(os.path.join(out + ".partial", "frames.fits")) and \
             process.poll() is None:
-        time.sleep(0.002)
+        time.sleep(0.01)
 
 
 class Interrupted(unittest.TestCase):

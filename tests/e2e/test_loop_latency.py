@@ -72,6 +72,8 @@ def scene(folder, period, share, mount, late):
         MODULES + "/gimbal/platform/drift_arcsec_per_s": [0.03, -0.04, 0],
     })
     if mount == "second_order":
+        # a loop that diverges ends in swings of some degrees: long streaks take most of the time
+        sets[MODULES + "/gimbal/rate_limit_degps"] = 2
         sets[MODULES + "/gimbal/delay_s/los_command"] = command
         sets[MODULES + "/gimbal/rate_hz"] = 1000 if period < 1 else 200  # of a mount of 8 Hz
         return sets
