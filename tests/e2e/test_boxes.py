@@ -135,6 +135,7 @@ class Boxes(unittest.TestCase):
             frames = {i["id"]: i for i in data["images"]}
             with fits.open(f"{self.folder}/{name}/segmentation.fits") as hdus:
                 masks = {h.header["FRAMEID"]: h.data.copy() for h in hdus[1:]}
+            sizes = {k: dict(zip(*np.unique(m, return_counts=True))) for k, m in masks.items()}  # pixels of each source
             tables = runs.database(self.folder + "/" + name)
             shown = 0
             for a in data["annotations"]:
@@ -148,9 +149,14 @@ class Boxes(unittest.TestCase):
                 places = np.array([[(r[1] - x0 + 0.5) / binning, (r[2] - y0 + 0.5) / binning]
                                    for r in rows], dtype=float)
                 item = rows[np.nanargmin(np.hypot(*(places - near).T))][0]
-                filled = sum(fill(p, mask.shape) for p in a["segmentation"]) if a[
-                    "segmentation"] else np.zeros(mask.shape, int)
-                np.testing.assert_array_equal(filled, mask == item)
+                # all of it lies in the part of the image that the polygons reach
+                xs, ys = ([v for p in a["segmentation"] for v in p[k::2]] for k in range(2))
+                corner = (int(min(xs, default=0)), int(min(ys, default=0)))
+                part = np.s_[corner[1]:int(np.ceil(max(ys, default=0))), corner[0]:int(np.ceil(max(xs, default=0)))]
+                filled = sum((fill(np.array(p) - np.resize(corner, len(p)), mask[part].shape) for p in a["segmentation"]),
+                             np.zeros(mask[part].shape, int))
+                np.testing.assert_array_equal(filled, mask[part] == item)
+                self.assertEqual(filled.sum(), sizes[image["exposure_id"]].get(item, 0))
                 if a["segmentation"]:
                     self.assertEqual(a["area"], filled.sum())
                     shown += 1

@@ -42,9 +42,9 @@ class Frames(unittest.TestCase):
                     "SELECT ra_deg, dec_deg FROM truth WHERE kind = 'star' AND in_field AND snr > 30"
                     " AND NOT saturated AND exposure_id = ?", (k,))]).reshape(-1, 2)
                 image = images[k].astype(float)
-                above = image - sep.Background(image, bw=64, bh=64)
-                noise = sep.Background(image, bw=64, bh=64).globalrms
-                found = sep.extract(above, 5.0, err=noise)
+                background = sep.Background(image, bw=64, bh=64)
+                above = image - background
+                found = sep.extract(above, 5.0, err=background.globalrms)
                 x, y, _ = sep.winpos(above, found["x"], found["y"], np.full(len(found), 0.85))
                 for place in wcs.all_world2pix(stars, 0, tolerance=1e-6, maxiter=60):
                     if not np.all((place > 10) & (place < 1013)):

@@ -266,8 +266,8 @@ class Repeated(unittest.TestCase):
     def test_serial_and_overlapped_runs_are_equal(self):
         folder = runs.scratch()
         a, b = os.path.join(folder, "a"), os.path.join(folder, "b")
-        runs.run(QUICK, a, *WIDE, duration=120, threads=2)  # sensors by two threads
-        runs.run(QUICK, b, *WIDE, duration=120, serial=True)
+        runs.run(QUICK, a, *WIDE, duration=60, threads=2)  # sensors by two threads
+        runs.run(QUICK, b, *WIDE, duration=60, serial=True)
         self.assertEqual(content(a), content(b))
 
 

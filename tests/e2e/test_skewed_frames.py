@@ -263,14 +263,15 @@ class Skewed(unittest.TestCase):
         """First moments of the brightest lonely stars on the recorded pixels, against the truth."""
         r, offsets = self.rows[False], {case: [] for case in range(len(CASES))}
         with fits.open(os.path.join(self.out[False], "frames.fits")) as hdus:
-            images = [h for h in hdus if h.data is not None and h.data.ndim == 2]
+            images = [h.data.astype(float) for h in hdus if h.data is not None and h.data.ndim == 2]
+            images = [image - np.median(image) for image in images]
             for k in np.argsort(-r["electrons"]):
                 number = int(r["exposure_id"][k])
                 case = number // REPEATS
                 window, binning, way, bend = CASES[case]
                 if len(offsets[case]) >= 20:
                     continue
-                image = images[number].data.astype(float)
+                image = images[number]
                 self.assertEqual(image.shape, (window[3] // binning, window[2] // binning))
                 reach = np.array([abs(way[j]) / 2 + abs(bend[j]) + 7 for j in range(2)]) / binning
                 place = [(r[axis][k] - window[j] - 0.5 * (binning - 1)) / binning for j, axis in enumerate("xy")]
@@ -278,7 +279,7 @@ class Skewed(unittest.TestCase):
                 x1, y1 = np.round(np.array(place) + reach).astype(int) + 1
                 if x0 < 3 or y0 < 3 or x1 > image.shape[1] - 3 or y1 > image.shape[0] - 3:
                     continue
-                light = image[y0:y1, x0:x1] - np.median(image)
+                light = image[y0:y1, x0:x1]
                 yy, xx = np.mgrid[y0:y1, x0:x1]
                 offsets[case].append([binning * (np.sum(light * xx) / light.sum() - place[0]),
                                       binning * (np.sum(light * yy) / light.sum() - place[1])])
