@@ -92,6 +92,7 @@ def scenario(folder, generator):
             orbit["elements_file"] = os.path.abspath(os.path.join("scenarios", orbit["elements_file"]))
     base.pop("$schema", None)
     base["duration_s"] = 2.0 * count
+    base["record"] = {**base.get("record", {}), "frames": "extensions", "compression": "none"}  # unpacking takes time
     sensor = base["observers"][0]["sensors"][0]
     sensor["camera"].update(width_px=WIDTH, height_px=HEIGHT, pixel_scale_arcsec=6.0, aperture_m=0.3)
     sensor["camera"].pop("detector", None)
