@@ -47,8 +47,8 @@ class Examples(unittest.TestCase):
         self.assertIn(1, done.labels)
 
     def test_train_tasking(self):
-        # the first generation of the page in short runs: its best weights are those of the page
-        done = execute("train_tasking", generations=1, runs=(100,), duration_s=80)
+        # the first generation of the page, and one run: its best weights are those of the page
+        done = execute("train_tasking", generations=1, runs=(100,))
         self.assertEqual(len(done.scores), 6)
         self.assertGreater(done.score["trained"], done.score["random"])
         self.assertGreater(done.score["greedy"], done.score["random"])

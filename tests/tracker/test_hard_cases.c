@@ -67,11 +67,11 @@ static bool positive(const double p[4][4]) {
     return isfinite(bst_mixture_log_det4(a));
 }
 
-/* Measurements a million times better along one axis than across it, the axes turning, gaps of ten
- * minutes now and then: a million updates of each filter. */
-/* The slow form has a million. */
+/* Of each filter; a million in the slow form. */
 static uint64_t updates = 300000;
 
+/* Measurements a million times better along one axis than across it, the axes turning, gaps of ten
+ * minutes now and then. */
 static void as_many_updates_of_each_filter(void **state) {
     (void)state;
     for (int filter = 0; filter < 3; filter++) {
