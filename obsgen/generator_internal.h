@@ -137,6 +137,9 @@ struct bst_generator {
 /* Sets the visible share of a source's image. The squared light counts, because the image's square
  * is narrower than the image. */
 void bst_generator_set_visible_share(const bst_generator *g, generator_source *s);
+/* Reduces a short piece of light whose centre is off the frame to its part on the frame: flux and
+ * place. That part alone is in the pixels that are fitted. */
+void bst_generator_cut_light(const bst_generator *g, generator_source *light);
 /* Sets the image of a source that has a shape in the truth. */
 void bst_generator_set_image(const bst_generator *g, const bst_truth *truth, generator_source *s);
 /* Factor on the standard deviation of a source's position by the width of its image, along a unit

@@ -1,4 +1,5 @@
 /* Share of a source's image that is on the frame. */
+#include <assert.h>
 #include <math.h>
 #include <stdbool.h>
 
@@ -46,6 +47,31 @@ static double edge_output(double beyond_px, double sigma) {
     /* the product's deviation is sigma / sqrt(2) */
     double product = 0.5 * erfc((0.5 * d - seen) / sigma);
     return exp(-0.25 * d * d / (sigma * sigma)) * product / sqrt(0.5 * erfc(-seen / sigma));
+}
+
+/* Moves a Gaussian beyond the frame along an axis to the centroid of its part on the frame. Returns
+ * the share of its light there.
+ *
+ * Given:     edge   last coordinate of the frame's pixels
+ *            sigma  of the Gaussian, including the pixel */
+static double cut_light(double edge, double sigma, double *at) {
+    double first = -0.5, last = edge + 0.5;
+    double beyond = fmax(first - *at, *at - last) / sigma;
+    if (!(beyond > 0.0)) {
+        return 1.0;
+    }
+    double share = 0.5 * erfc(beyond * sqrt(0.5));
+    /* mean of a normal distribution above `beyond`, less it */
+    double density = exp(-0.5 * beyond * beyond) / sqrt(2.0 * BST_PI);
+    double inside = sigma * (share > 0.0 ? density / share - beyond : 0.0);
+    *at = *at < first ? first + inside : last - inside;
+    return share;
+}
+
+void bst_generator_cut_light(const bst_generator *g, generator_source *light) {
+    assert(g && light);
+    light->flux_e *= cut_light(g->width - 1, g->total_sigma, &light->x) *
+                     cut_light(g->height - 1, g->total_sigma, &light->y);
 }
 
 void bst_generator_set_visible_share(const bst_generator *g, generator_source *s) {

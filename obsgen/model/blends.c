@@ -195,6 +195,7 @@ static int add_merged(const bst_generator *g, const generator_source *s, const g
         m->y = o->y + u * o->path.dy;
         m->flux_e = o->flux_e / pieces;
         m->path = (bst_obsgen_path_px){o->path.dx / pieces, o->path.dy / pieces};
+        bst_generator_cut_light(g, m);
     }
     return count;
 }

@@ -20,7 +20,12 @@ static const double BEYOND_SIGMAS = 4.0;
 /* Positions closer than this along both axes share a node. */
 static const double SAME_PX = 0.7;
 
-enum { GROUP = 8 };
+enum {
+    GROUP = 8,
+    /* Most steps before and after one with which it is averaged: what is left of the jitter of a
+     * path at rest is a twelfth. */
+    MOST_AVERAGED = 72
+};
 
 /* Trail nodes under construction, with a bounding box per GROUP of them. */
 typedef struct trail_builder {
@@ -128,16 +133,51 @@ static void add_light(const bst_star_trail_path *path, double s, bst_star_trail_
     }
 }
 
+/* Steps from k in one direction to the last one on the path within a distance, at most
+ * MOST_AVERAGED. */
+static int steps_within(const bst_star_trail_path *p, int k, int way, double within_px) {
+    int n = 0;
+    for (int i = k + way; i >= 0 && i < p->count && n < MOST_AVERAGED; i += way, n++) {
+        double dx = p->x_px[i] - p->x_px[k], dy = p->y_px[i] - p->y_px[k];
+        if (dx * dx + dy * dy > within_px * within_px) {
+            break;
+        }
+    }
+    return n;
+}
+
+/* Place of step k on the ridge of the filter's output: the line of regression over time of the
+ * steps nearby. The output of a camera that trembles faster than it moves by the width of the
+ * filter has no such bends as the path: on the path itself it would seem to rise and fall. */
+static void ridge_at(const bst_star_trail_path *p, int k, double within_px, double at_px[2]) {
+    int first = k - steps_within(p, k, -1, within_px), last = k + steps_within(p, k, 1, within_px);
+    double count = last - first + 1, middle = 0.5 * (first + last), sum[2] = {0.0, 0.0},
+           slope[2] = {0.0, 0.0};
+    for (int i = first; i <= last; i++) {
+        sum[0] += p->x_px[i];
+        sum[1] += p->y_px[i];
+        slope[0] += (i - middle) * p->x_px[i];
+        slope[1] += (i - middle) * p->y_px[i];
+    }
+    double square = fmax(count * (count * count - 1.0) / 12.0, 1.0); /* of the times */
+    at_px[0] = sum[0] / count + (k - middle) * slope[0] / square;
+    at_px[1] = sum[1] / count + (k - middle) * slope[1] / square;
+}
+
 int bst_star_trail_lay(const bst_star_trail_path *p, double sigma_px, bst_star_trail_node *nodes) {
     trail_builder l = {.nodes = nodes};
-    add_node(&l, p->x_px[0], p->y_px[0], 0.0);
+    /* an even average over this distance to both sides has the variance of the filter's output */
+    double from[2], to[2], within = sqrt(3.0) * sqrt(2.0) * sigma_px;
+    ridge_at(p, 0, within, to);
+    add_node(&l, to[0], to[1], 0.0);
     for (int k = 1; k < p->count; k++) {
-        double dx = p->x_px[k] - p->x_px[k - 1], dy = p->y_px[k] - p->y_px[k - 1];
+        memcpy(from, to, sizeof from);
+        ridge_at(p, k, within, to);
+        double dx = to[0] - from[0], dy = to[1] - from[1];
         int steps = (int)fmin(ceil(hypot(dx, dy)), BST_ROUTE_NODES);
         for (int i = 1; i <= steps; i++) {
             double part = (double)i / steps;
-            add_node(&l, p->x_px[k - 1] + part * dx, p->y_px[k - 1] + part * dy,
-                     (k - 1 + part) / (p->count - 1));
+            add_node(&l, from[0] + part * dx, from[1] + part * dy, (k - 1 + part) / (p->count - 1));
         }
     }
     int last = l.count - 1;

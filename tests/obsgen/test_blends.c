@@ -139,7 +139,7 @@ static pixel_fit fit_point(double light[STAMP][STAMP], int cx, int cy, double si
     int n = bright ? 4 : 3;
     for (int round = 0; round < 60; round++) {
         double a[4][5] = {{0.0}};
-        for (int k = 0; k < STAMP * STAMP; k++) {
+        for (int k = STAMP * (cy < HALF ? HALF - cy : 0); k < STAMP * STAMP; k++) {
             int x = cx + k % STAMP - HALF, y = cy + k / STAMP - HALF;
             double p = light_at(x, y, at.x, at.y, 0, 0, sigma);
             double by_variance = (light_at(x, y, at.x, at.y, 0, 0, sigma * sqrt(1.0 + wider)) - p) /
@@ -246,6 +246,38 @@ static void blends_lie_where_a_single_fit_does(void **state) {
             bst_assert_close(moved[0][1], moved[1][1], 0.002 + (b > 1 ? 0.07 : 0.03) * far);
             bst_assert_close(moved[0][2], moved[1][2], 0.16 * moved[1][2]);
         }
+    }
+    close_scene(&s);
+}
+
+/* Of a star beyond the edge the part on the frame counts, as a point in its centroid. */
+static void light_beyond_the_edge_is_not_fitted(void **state) {
+    (void)state;
+    /* y of a star on the frame; one as bright is beyond the edge, so far to the right and above */
+    const double places[][3] = {{0.2, 2.6, 1.3}, {0.7, 2.9, 1.8}, {0.4, 3.4, 1.1}};
+    scene s;
+    open_scene(&s);
+    start(&s);
+    for (int k = 0; k < 3; k++) {
+        double x = 300.2, y = places[k][0], dx = places[k][1], dy = -(y + 0.5) - places[k][2];
+        double flux = electrons_of(&s, 140.0), light[STAMP][STAMP], sigma = s.frame.sigma_px;
+        s.truth->count = 0;
+        add_source(&s, 1, x, y, flux);
+        add_source(&s, 2, x + dx, y + dy, flux);
+        frame_of(&s);
+        int i = source_of(&s, 0), cy = (int)lround(y);
+        s.generator->sources[source_of(&s, 1)].found = false;
+        s.generator->sources[source_of(&s, 1)].head = i;
+        for (int n = 0; n < STAMP * STAMP; n++) {
+            int u = 300 + n % STAMP - HALF, v = cy + n / STAMP - HALF;
+            light[n / STAMP][n % STAMP] = flux * (light_at(u, v, x, y, 0, 0, sigma) +
+                                                  light_at(u, v, x + dx, y + dy, 0, 0, sigma));
+        }
+        pixel_fit at = {x, y, flux, 0.0};
+        pixel_fit fit = fit_point(light, 300, cy, sigma, s.generator->noise_e, true, at);
+        generator_blend blend = bst_generator_blend_of(s.generator, i);
+        bst_assert_close(hypot(blend.x - fit.x, blend.y - fit.y), 0.0, 0.12);
+        bst_assert_close(blend.flux_e / fit.flux, 1.0, 0.1);
     }
     close_scene(&s);
 }
@@ -555,6 +587,7 @@ int main(void) {
         cmocka_unit_test(outputs_beside_a_source),
         cmocka_unit_test(maxima_have_their_neighbours_light),
         cmocka_unit_test(blends_lie_where_a_single_fit_does),
+        cmocka_unit_test(light_beyond_the_edge_is_not_fitted),
         cmocka_unit_test(neighbours_widen_each_other),
         cmocka_unit_test(long_pairs_have_their_centroid),
         cmocka_unit_test(far_neighbours_are_fitted_alone),

@@ -178,11 +178,40 @@ static void the_way_has_the_light_of_the_path(void **state) {
     bst_assert_close(on, line, 1e-3 * line + 1e-5);
 }
 
+static void the_way_of_a_trembling_camera_is_the_ridge_of_the_light(void **state) {
+    (void)state;
+    static bst_star_trail_node nodes[BST_ROUTE_NODES];
+    const double sigma = 1.2, length = 60.0;
+    path p;
+    /* across by 1 px, faster than the camera moves by the width of the filter */
+    for (int k = 0; k < STEPS; k++) {
+        p.x[k] = length * ((double)k / (STEPS - 1) - 0.5);
+        p.y[k] = sin(1.1 * k);
+    }
+    bst_star_trail_path route = route_of(&p);
+    int count = bst_star_trail_lay(&route, sigma, nodes), inner = 0;
+    double least = INFINITY, most = 0.0;
+    for (int i = 0; i < count; i++) {
+        if (fabs(nodes[i].x) < 0.5 * length - 5.0) {
+            inner++;
+            assert_true(fabs(nodes[i].y) < 0.25);
+            least = fmin(least, nodes[i].light);
+            most = fmax(most, nodes[i].light);
+        }
+    }
+    /* of an even line, widened by half a square pixel: no saddles that would break it up */
+    double s2 = 2.0 * sigma * sigma, line = sqrt(2.0 * BST_PI / (s2 + 0.5)) * s2 / length;
+    assert_true(inner > 40);
+    assert_true(least > 0.95 * most);
+    bst_assert_close(most / line, 1.0, 0.05);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fits_land_where_the_light_overlaps_most),
         cmocka_unit_test(bright_points_land_nearer_to_the_centroid),
         cmocka_unit_test(the_way_has_the_light_of_the_path),
+        cmocka_unit_test(the_way_of_a_trembling_camera_is_the_ridge_of_the_light),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
