@@ -1,5 +1,6 @@
 /* Parts of the generator on their own: widths of images, errors of false alarms, and when stars
  * that are merged look like a streak. */
+#include "boresight/vec.h"
 #include "obsgen/generator_internal.h"
 #include "obsgen/model/false_alarms.h"
 #include "tests/test_support.h"
@@ -159,62 +160,113 @@ static double moment_of(const light *lights, int count, const double about[2], d
     return 0.5 * (xx + yy) + hypot(0.5 * (xx - yy), xy) - 1.0 / 12.0;
 }
 
+enum { LIGHTS = 5 };
+
+/* A bright star, two others on its line, one far along it, and one of another detection beside. */
+static void place(double apart, double angle_rad, light l[LIGHTS]) {
+    double c = cos(angle_rad), s = sin(angle_rad);
+    l[0] = (light){40.2, 30.3, 1.5 * c, 1.5 * s, 1e9};
+    l[1] = (light){40.2 + apart * c, 30.3 + apart * s, 0.0, 0.0, 6e8};
+    l[2] = (light){40.2 - 1.3 * c, 30.3 - 1.3 * s, -0.4, 0.9, 3e8};
+    l[3] = (light){40.2 + 4.8 * c, 30.3 + 4.8 * s, 0.0, 0.0, 2e8};
+    l[4] = (light){41.0, 29.0, 0.0, 0.0, 8e8};
+}
+
+/* What the generator makes of them about a place; true: a streak. */
+static bool merge(bst_generator *g, const light l[LIGHTS], const double about[2], double scale,
+                  uint64_t name, generator_blend *out) {
+    static generator_source sources[LIGHTS];
+    for (int k = 0; k < LIGHTS; k++) {
+        sources[k] = (generator_source){.x = l[k].x,
+                                        .y = l[k].y,
+                                        .path = {.dx = l[k].dx, .dy = l[k].dy},
+                                        .flux_e = scale * l[k].flux,
+                                        .item = k,
+                                        .head = k == 4 ? 4 : -1,
+                                        .peak = 15.0,
+                                        .name = name};
+    }
+    g->sources = sources;
+    *out = (generator_blend){.flux_e = scale * 2e9, .x = about[0], .y = about[1]};
+    bst_generator_fit_merged(g, &sources[0], &sources[1], LIGHTS - 1, out);
+    return out->x != about[0];
+}
+
 /* Without noise, a merged detection becomes a streak where its larger moment is 2.25 times the
  * PSF's; then it is the centroid of the light within the streak's length. Light that belongs to
  * another detection does not count. */
 static void merged_stars(void **state) {
     (void)state;
     bst_generator *g = make(1.0);
-    generator_source sources[4];
-    g->sources = sources;
     g->noise_e = 1e-3;
     double image2 = 1.0 + 1.0 / 12.0, window = 2.0 * image2;
-    int streaks = 0, points = 0;
     for (int way = 0; way < 6; way++) {
-        double c = cos(0.5 * way), s = sin(0.5 * way);
-        for (int step = 0; step < 16; step++) {
-            double apart = 1.0 + 0.15 * step;
-            /* the bright one, two others on its line, and one of another detection beside it */
-            light l[4] = {{40.2, 30.3, 0.6 * c, 0.6 * s, 1e9},
-                          {40.2 + apart * c, 30.3 + apart * s, 0.0, 0.0, 6e8},
-                          {40.2 - 1.3 * c, 30.3 - 1.3 * s, -0.4, 0.9, 3e8},
-                          {41.0, 29.0, 0.0, 0.0, 8e8}};
-            for (int k = 0; k < 4; k++) {
-                sources[k] = (generator_source){.x = l[k].x,
-                                                .y = l[k].y,
-                                                .path = {.dx = l[k].dx, .dy = l[k].dy},
-                                                .flux_e = l[k].flux,
-                                                .item = k,
-                                                .head = -1,
-                                                .peak = 15.0,
-                                                .name = (uint64_t)k};
-            }
-            sources[3].head = 3;
-            const double about[2] = {40.2 + 0.25 * c, 30.3 + 0.25 * s};
-            generator_blend out = {.flux_e = 1e9, .x = about[0], .y = about[1]};
-            bst_generator_fit_merged(g, &sources[0], &sources[1], 3, &out);
-            double moment = moment_of(l, 3, about, image2, window), sum = 0.0, x = 0.0, y = 0.0;
-            if (fabs(moment - 2.25) < 0.01) {
-                continue; /* on the limit */
-            }
-            double length = sqrt(12.0 * (moment - 1.0));
-            for (int k = 0; k < 3; k++) {
-                if (hypot(l[k].x - about[0], l[k].y - about[1]) <= length) {
-                    sum += l[k].flux;
-                    x += l[k].flux * l[k].x;
-                    y += l[k].flux * l[k].y;
-                }
-            }
-            bool streak = moment > 2.25;
-            streaks += streak;
-            points += !streak;
-            bst_assert_close(out.flux_e, streak ? sum : 1e9, 1.0);
-            bst_assert_close(out.x, streak ? x / sum : about[0], 1e-9);
-            bst_assert_close(out.y, streak ? y / sum : about[1], 1e-9);
+        const double about[2] = {40.2 + 0.25 * cos(0.5 * way), 30.3 + 0.25 * sin(0.5 * way)};
+        light l[LIGHTS];
+        generator_blend out;
+        double low = 0.5, high = 3.5;
+        for (int i = 0; i < 20; i++) {
+            double middle = 0.5 * (low + high);
+            place(middle, 0.5 * way, l);
+            *(merge(g, l, about, 1.0, 1, &out) ? &high : &low) = middle;
         }
+        place(high, 0.5 * way, l);
+        assert_true(merge(g, l, about, 1.0, 1, &out));
+        bst_assert_close(moment_of(l, LIGHTS - 1, about, image2, window), 2.25, 0.003);
+        double length = sqrt(12.0 * (2.25 - 1.0)), sum = 0.0, x = 0.0, y = 0.0;
+        for (int k = 0; k < LIGHTS - 1; k++) {
+            if (hypot(l[k].x - about[0], l[k].y - about[1]) <= length) {
+                sum += l[k].flux;
+                x += l[k].flux * l[k].x;
+                y += l[k].flux * l[k].y;
+            }
+        }
+        assert_true(sum < 2e9); /* without the far one */
+        bst_assert_close(out.flux_e, sum, 1.0);
+        bst_assert_close(out.x, x / sum, 1e-9);
+        bst_assert_close(out.y, y / sum, 1e-9);
     }
-    print_message("%d streaks, %d points\n", streaks, points);
-    assert_true(streaks > 20 && points > 20);
+}
+
+/* With noise, how often it is a streak is the probability that the moment exceeds the limit by its
+ * standard deviation: that of sum(w d u^2) / sum(w d) for pixels of unit area, times the square of
+ * moment over windowed moment. */
+static void noise_of_the_moment(void **state) {
+    (void)state;
+    enum { DRAWS = 4000 };
+    const double image2 = 1.0 + 1.0 / 12.0, window = 2.0 * image2, scale = 3e-6;
+    bst_generator *g = make(1.0);
+    const double about[2] = {40.45, 30.3};
+    light l[LIGHTS];
+    generator_blend out;
+    for (int k = 0; k < 2; k++) {
+        g->noise_e = k ? 5.0 : 60.0; /* of the pixels, of the light */
+        place(k ? 1.35 : 1.55, 0.0, l);
+        double moment = moment_of(l, LIGHTS - 1, about, image2, window);
+        /* a Gaussian of both moments stands for the light; the other axis is nearly the PSF's */
+        double along = moment + 1.0 / 12.0, across = image2 + 0.02;
+        double windowed = along * window / (along + window), sum = 0.0, variance = 0.0;
+        for (int i = -60; i <= 60; i++) {
+            for (int j = -60; j <= 60; j++) {
+                double u = 0.2 * i, v = 0.2 * j, w = exp(-0.5 * (u * u + v * v) / window);
+                double d = scale * 2e9 * 0.04 / (2.0 * BST_PI * sqrt(along * across)) *
+                           exp(-0.5 * (u * u / along + v * v / across));
+                double error = w * (u * u - windowed);
+                sum += w * d;
+                variance += error * error * (g->noise_e * g->noise_e * 0.04 + d);
+            }
+        }
+        double gain = along / windowed, sigma = gain * gain * sqrt(variance) / sum;
+        int streaks = 0;
+        for (uint64_t n = 0; n < DRAWS; n++) {
+            streaks += merge(g, l, about, scale, n, &out);
+        }
+        double expected = 0.5 * erfc((2.25 - moment) / sigma / sqrt(2.0));
+        print_message("moment %.3f, sigma %.3f: %.3f of %.3f\n", moment, sigma,
+                      (double)streaks / DRAWS, expected);
+        assert_true(expected > 0.02 && expected < 0.98);
+        bst_assert_close((double)streaks / DRAWS, expected, 0.03);
+    }
 }
 
 int main(void) {
@@ -222,6 +274,7 @@ int main(void) {
         cmocka_unit_test(widths_of_shapes),
         cmocka_unit_test(errors_of_false_alarms),
         cmocka_unit_test(merged_stars),
+        cmocka_unit_test(noise_of_the_moment),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
