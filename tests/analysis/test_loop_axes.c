@@ -105,8 +105,8 @@ static void bands_of_the_attitude(void **state) {
     free(a);
 }
 
-static bst_loop_model *model_of(bst_json **json, bst_scenario *scenario, const char *const *sets,
-                                int count) {
+static bst_loop_model *model_of_file(const char *file, bst_json **json, bst_scenario *scenario,
+                                     const char *const *sets, int count) {
     bst_ctx ctx = {0};
     bst_load_options load = BST_LOAD_DEFAULTS;
     bst_option none[] = {{.name = NULL}};
@@ -116,11 +116,15 @@ static bst_loop_model *model_of(bst_json **json, bst_scenario *scenario, const c
     for (int i = 0; i < count; i++) {
         load.set.items[load.set.count++] = sets[i];
     }
-    bst_assert_ok(
-        &ctx, bst_load_scenario(&ctx, "scenarios/neossat_geo_track.json", &load, json, scenario));
+    bst_assert_ok(&ctx, bst_load_scenario(&ctx, file, &load, json, scenario));
     bst_assert_ok(&ctx, bst_loop_model_create(&ctx, scenario, 0, 0, &options, &model));
     assert_non_null(model);
     return model;
+}
+
+static bst_loop_model *model_of(bst_json **json, bst_scenario *scenario, const char *const *sets,
+                                int count) {
+    return model_of_file("scenarios/neossat_geo_track.json", json, scenario, sets, count);
 }
 
 static void a_second_order_mount(void **state) {
@@ -287,6 +291,50 @@ static void response_and_gains(void **state) {
     bst_json_free(json);
 }
 
+/* A full mount: azimuth about body x, elevation about y, both with a flexible mode whose frequency
+ * the free joint raises; the third axis tracks nothing. A step is followed and a ramp not lagged
+ * behind in the end. */
+static void a_full_mount(void **state) {
+    (void)state;
+    const char *const sets[] = {GIMBAL "platform/drift_arcsec_per_s=[3,-12,5]",
+                                GIMBAL "flexible/frequency_hz=[60,45,0]",
+                                GIMBAL "flexible/inertia_fraction=[0.15,0.2,0.15]"};
+    bst_json *json;
+    bst_scenario scenario;
+    axes_given = 0;
+    bst_loop_model *m = model_of_file("scenarios/full_plant.json", &json, &scenario, sets, 3);
+    assert_int_equal(m->axes, 3);
+    assert_int_equal(axes_given, 2);
+    const double modes[2] = {60.0, 45.0}, shares[2] = {0.15, 0.2};
+    for (int k = 0; k < 2; k++) {
+        const bst_loop_axis *axis = &m->axis[k];
+        assert_string_equal(axis->name, k ? "inner" : "outer");
+        assert_true(axis->tracked && axis->servo.there && !axis->servo.continuous);
+        bst_assert_close(drifts_pxps[k], (k ? -12.0 : 3.0) / 3.0, 1e-9);
+        assert_int_equal(axis->servo.loop.hints, 2);
+        bst_assert_close(axis->servo.hint_hz[0], modes[k], 1e-9);
+        bst_assert_close(axis->servo.hint_hz[1] * axis->servo.hint_hz[1] * (1.0 - shares[k]),
+                         modes[k] * modes[k], 1e-6);
+        const bst_control_servo_response *r = &given[k];
+        bst_assert_close(r->step[0], 0.0, 1e-9);
+        bst_assert_close(r->step[r->count - 1], 1.0, 1e-6);
+        bst_assert_close(r->ramp_lag[r->count - 1], 0.0, 1e-6);
+        /* half of a step is made within the time of the crossover at 6 Hz and of the shaper */
+        double half_s = 0.0;
+        while (r->step[(int)(half_s / r->dt_s + 0.5)] < 0.5) {
+            half_s += r->dt_s;
+        }
+        assert_true(half_s > 0.01 && half_s < 0.1);
+        free((double *)(uintptr_t)r->step);
+        free((double *)(uintptr_t)r->ramp_lag);
+    }
+    assert_false(m->axis[2].tracked);
+    assert_int_equal(m->axis[2].servo.loop.hints, 0);
+    bst_loop_model_free(m);
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+}
+
 static double number(const cJSON *node, const char *key) {
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(node, key);
     return cJSON_IsNumber(item) ? item->valuedouble : NAN;
@@ -389,9 +437,13 @@ static void every_key(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bands_of_the_jitter),  cmocka_unit_test(bands_of_the_attitude),
-        cmocka_unit_test(a_second_order_mount), cmocka_unit_test(predictions_scale),
-        cmocka_unit_test(response_and_gains),   cmocka_unit_test(every_key),
+        cmocka_unit_test(bands_of_the_jitter),
+        cmocka_unit_test(bands_of_the_attitude),
+        cmocka_unit_test(a_second_order_mount),
+        cmocka_unit_test(predictions_scale),
+        cmocka_unit_test(response_and_gains),
+        cmocka_unit_test(a_full_mount),
+        cmocka_unit_test(every_key),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
