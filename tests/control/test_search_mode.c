@@ -233,7 +233,7 @@ static void candidates(void **state) {
             t->rate_gcrf_radps =
                 bst_vec3_add(rate, (bst_vec3){off * cos(angle), off * sin(angle), 0.0});
             t->covariance[2 + (int)(n % 2)][2 + (int)(n % 2)] = sigma * sigma;
-            /* 4 sigma of both rates; one that tells nothing of the target's is no agreement */
+            /* 4 sigma of both rates; one that holds nothing of the target's is no agreement */
             double gate = 4.0 * sqrt(4e-12 + sigma * sigma);
             double widest = fmax(2.0 * 4.0 * 2e-6, bst_vec3_norm(rate));
             bool bright =
