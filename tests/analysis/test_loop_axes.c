@@ -10,6 +10,7 @@
 
 #define PX 1e-5 /* rad */
 #define GIMBAL "/observers/0/sensors/0/modules/gimbal/"
+#define CONTROL "/observers/0/sensors/0/modules/control/"
 
 static double variance_between(const bst_loop_axis *axis, double low_hz, double high_hz) {
     double sum = 0.0;
@@ -104,8 +105,8 @@ static void bands_of_the_attitude(void **state) {
     free(a);
 }
 
-static bst_loop_model *model_of(bst_json **json, bst_scenario *scenario, const char *const *sets,
-                                int count) {
+static bst_loop_model *model_of_file(const char *file, bst_json **json, bst_scenario *scenario,
+                                     const char *const *sets, int count) {
     bst_ctx ctx = {0};
     bst_load_options load = BST_LOAD_DEFAULTS;
     bst_option none[] = {{.name = NULL}};
@@ -115,11 +116,15 @@ static bst_loop_model *model_of(bst_json **json, bst_scenario *scenario, const c
     for (int i = 0; i < count; i++) {
         load.set.items[load.set.count++] = sets[i];
     }
-    bst_assert_ok(
-        &ctx, bst_load_scenario(&ctx, "scenarios/neossat_geo_track.json", &load, json, scenario));
+    bst_assert_ok(&ctx, bst_load_scenario(&ctx, file, &load, json, scenario));
     bst_assert_ok(&ctx, bst_loop_model_create(&ctx, scenario, 0, 0, &options, &model));
     assert_non_null(model);
     return model;
+}
+
+static bst_loop_model *model_of(bst_json **json, bst_scenario *scenario, const char *const *sets,
+                                int count) {
+    return model_of_file("scenarios/neossat_geo_track.json", json, scenario, sets, count);
 }
 
 static void a_second_order_mount(void **state) {
@@ -186,6 +191,146 @@ static void predictions_scale(void **state) {
     }
     bst_loop_model_free(m);
     bst_loop_model_free(twice);
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+}
+
+/* ---- the mount's own response and the observer's gains, as the tracking loop is given them ----
+ */
+
+static bst_control_servo_response given[2];
+static double drifts_pxps[2];
+static int axes_given;
+
+bst_status __real_bst_loop_close_tracking(bst_ctx *ctx, const bst_loop_tracked *tracked,
+                                          bst_loop_model *model, bst_loop_axis *axis);
+bst_status __wrap_bst_loop_close_tracking(bst_ctx *ctx, const bst_loop_tracked *tracked,
+                                          bst_loop_model *model, bst_loop_axis *axis);
+bst_status __wrap_bst_loop_close_tracking(bst_ctx *ctx, const bst_loop_tracked *tracked,
+                                          bst_loop_model *model, bst_loop_axis *axis) {
+    if (tracked->servo->step && axes_given < 2) {
+        bst_control_servo_response *out = &given[axes_given];
+        size_t bytes = (size_t)tracked->servo->count * sizeof *out->step;
+        double *step = malloc(bytes), *lag = malloc(bytes);
+        assert_true(step && lag);
+        memcpy(step, tracked->servo->step, bytes);
+        memcpy(lag, tracked->servo->ramp_lag, bytes);
+        *out = *tracked->servo;
+        out->step = step;
+        out->ramp_lag = lag;
+        drifts_pxps[axes_given++] = tracked->drift_pxps;
+    }
+    return __real_bst_loop_close_tracking(ctx, tracked, model, axis);
+}
+
+/* Angle at time t after a unit step of the command: the reference follows it at k times its error,
+ * the axis the reference by y'' = 2 d w (r' - y') + w^2 (r - y); in a thousand steps. */
+static double follows(double t, double w, double d, double k) {
+    double y = 0.0, rate = 0.0, h = t / 1000;
+    for (int i = 0; i < 1000; i++) {
+        double left = exp(-k * (i + 0.5) * h), middle = y + 0.5 * h * rate;
+        double accel = 2 * d * w * (k * left - rate) + w * w * (1 - left - middle);
+        rate += h * accel;
+        y += h * (rate - 0.5 * h * accel);
+    }
+    return y;
+}
+
+/* Behind a ramp of known rate the axis lags by exp(-d w t) sin(v t) / v, v^2 = w^2 (1 - d^2). */
+static void response_and_gains(void **state) {
+    (void)state;
+    const char *const sets[] = {GIMBAL "natural_frequency_hz=0.7",
+                                GIMBAL "damping=0.3",
+                                GIMBAL "platform/drift_arcsec_per_s=[3,-12,5]",
+                                CONTROL "robust_observer=false",
+                                CONTROL "fix_sigma_floor_px=0.05",
+                                CONTROL "compensator/gain_scale=0.8",
+                                CONTROL "compensator/delay_s=0.07",
+                                CONTROL "disturbance_px_rms=1.5",
+                                CONTROL "disturbance_cutoff_hz=0.08"};
+    bst_json *json;
+    bst_scenario scenario;
+    axes_given = 0;
+    bst_loop_model *m = model_of(&json, &scenario, sets, 9), *noisy;
+    assert_int_equal(axes_given, 2);
+    const double w = 2 * BST_PI * 0.7, d = 0.3, v = w * sqrt(1 - d * d);
+    for (int k = 0; k < 2; k++) {
+        const bst_control_servo_response *r = &given[k];
+        bst_assert_close(drifts_pxps[k], (k == 0 ? -12.0 : 3.0) / 3.0, 1e-12);
+        bst_assert_close(r->dt_s, m->timing.gimbal_period_s, 0.0);
+        /* until both are at rest to 1e-9 of the command */
+        double rest = log(1e9) / (d * w);
+        assert_true(r->count * r->dt_s > 0.85 * rest && r->count * r->dt_s < 1.1 * rest);
+        for (int n = 0; n < r->count; n += n < 100 ? 1 : 17) {
+            double t = (n + 1) * r->dt_s, e = exp(-d * w * t);
+            bst_assert_close(r->step[n], follows(t, w, d, fmin(40, 0.2 / r->dt_s)), 0.01);
+            bst_assert_close(r->ramp_lag[n], e * sin(v * t) / v, 0.01 / w);
+        }
+        free((double *)(uintptr_t)r->step);
+        free((double *)(uintptr_t)r->ramp_lag);
+    }
+    bst_assert_close(m->pixel_rad, 3.0 * BST_ARCSEC_RAD, 1e-15);
+    bst_assert_close(m->alpha_beta.motion_gain, 0.8, 0.0);
+    bst_assert_close(m->alpha_beta.motion_late_s, 0.07, 0.0);
+    assert_true(m->observes && !m->lowered);
+    /* steady state of white acceleration noise: b^2 / (1 - a) = density T^3 / sigma^2, with half of
+     * the radial variance about an axis and a quarter of w^3; a frame's error is at least its floor
+     */
+    double cutoff = 2 * BST_PI * 0.08;
+    double density = 0.5 * 1.5 * 1.5 * cutoff * cutoff * cutoff / 4;
+    bst_ctx ctx = {0};
+    const bst_loop_options options = {.fix_sigma_px = 0.2};
+    bst_assert_ok(&ctx, bst_loop_model_create(&ctx, &scenario, 0, 0, &options, &noisy));
+    double a[2] = {m->alpha_beta.alpha, noisy->alpha_beta.alpha};
+    double b[2] = {m->alpha_beta.beta, noisy->alpha_beta.beta};
+    bst_assert_close(b[0] * b[0] / (1 - a[0]) / density, 1 / 0.05 / 0.05, 1e-3);
+    bst_assert_close(b[1] * b[1] / (1 - a[1]) / density, 1 / 0.2 / 0.2, 1e-3);
+    bst_loop_model_free(m);
+    bst_loop_model_free(noisy);
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+}
+
+/* A full mount: azimuth about body x, elevation about y, both with a flexible mode whose frequency
+ * the free joint raises; the third axis tracks nothing. A step is followed and a ramp not lagged
+ * behind in the end. */
+static void a_full_mount(void **state) {
+    (void)state;
+    const char *const sets[] = {GIMBAL "platform/drift_arcsec_per_s=[3,-12,5]",
+                                GIMBAL "flexible/frequency_hz=[60,45,0]",
+                                GIMBAL "flexible/inertia_fraction=[0.15,0.2,0.15]"};
+    bst_json *json;
+    bst_scenario scenario;
+    axes_given = 0;
+    bst_loop_model *m = model_of_file("scenarios/full_plant.json", &json, &scenario, sets, 3);
+    assert_int_equal(m->axes, 3);
+    assert_int_equal(axes_given, 2);
+    const double modes[2] = {60.0, 45.0}, shares[2] = {0.15, 0.2};
+    for (int k = 0; k < 2; k++) {
+        const bst_loop_axis *axis = &m->axis[k];
+        assert_string_equal(axis->name, k ? "inner" : "outer");
+        assert_true(axis->tracked && axis->servo.there && !axis->servo.continuous);
+        bst_assert_close(drifts_pxps[k], (k ? -12.0 : 3.0) / 3.0, 1e-9);
+        assert_int_equal(axis->servo.loop.hints, 2);
+        bst_assert_close(axis->servo.hint_hz[0], modes[k], 1e-9);
+        bst_assert_close(axis->servo.hint_hz[1] * axis->servo.hint_hz[1] * (1.0 - shares[k]),
+                         modes[k] * modes[k], 1e-6);
+        const bst_control_servo_response *r = &given[k];
+        bst_assert_close(r->step[0], 0.0, 1e-9);
+        bst_assert_close(r->step[r->count - 1], 1.0, 1e-6);
+        bst_assert_close(r->ramp_lag[r->count - 1], 0.0, 1e-6);
+        /* half of a step is made within the time of the crossover at 6 Hz and of the shaper */
+        double half_s = 0.0;
+        while (r->step[(int)(half_s / r->dt_s + 0.5)] < 0.5) {
+            half_s += r->dt_s;
+        }
+        assert_true(half_s > 0.01 && half_s < 0.1);
+        free((double *)(uintptr_t)r->step);
+        free((double *)(uintptr_t)r->ramp_lag);
+    }
+    assert_false(m->axis[2].tracked);
+    assert_int_equal(m->axis[2].servo.loop.hints, 0);
+    bst_loop_model_free(m);
     bst_scenario_free(&scenario);
     bst_json_free(json);
 }
@@ -296,6 +441,8 @@ int main(void) {
         cmocka_unit_test(bands_of_the_attitude),
         cmocka_unit_test(a_second_order_mount),
         cmocka_unit_test(predictions_scale),
+        cmocka_unit_test(response_and_gains),
+        cmocka_unit_test(a_full_mount),
         cmocka_unit_test(every_key),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -339,12 +339,153 @@ static void detections_of_stars(void **state) {
     assert_false(bst_pd_is_star(&(bst_pd_stars){.count = 0}, 2.5, &(bst_detection){0}));
 }
 
+/* ---- the sky of a scene: the world's part in it is made here ---- */
+
+enum { SKY_STARS = 400, SKY_WIDE = 300, SKY_HIGH = 130 };
+static bst_truth_item sky_items[SKY_STARS];
+static bst_scene_source sky_sources[SKY_STARS];
+static const bst_quat sky_attitude = {.w = 0.6, .y = 0.8};
+
+bst_status __wrap_bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                                   bst_field **out);
+bst_status __wrap_bst_field_create(bst_ctx *ctx, const bst_world *world, int observer, int sensor,
+                                   bst_field **out) {
+    (void)ctx;
+    (void)world;
+    assert_int_equal(observer, 1);
+    assert_int_equal(sensor, 2);
+    *out = (bst_field *)sky_items;
+    return BST_OK;
+}
+void __wrap_bst_field_free(bst_field *field);
+void __wrap_bst_field_free(bst_field *field) {
+    (void)field;
+}
+void __wrap_bst_field_set_camera(bst_field *field, const bst_camera *camera);
+void __wrap_bst_field_set_camera(bst_field *field, const bst_camera *camera) {
+    (void)field;
+    assert_int_equal(camera->width_px, SKY_WIDE);
+}
+bst_quat __wrap_bst_world_body_attitude(const bst_world *world, int observer, int sensor);
+bst_quat __wrap_bst_world_body_attitude(const bst_world *world, int observer, int sensor) {
+    (void)world;
+    assert_int_equal(10 * observer + sensor, 12);
+    return sky_attitude;
+}
+bst_status __wrap_bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
+                                  int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
+                                  bst_window window, const bst_field_options *options,
+                                  bst_truth *truth, const bst_scene_source **sources, int *count);
+bst_status __wrap_bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
+                                  int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
+                                  bst_window window, const bst_field_options *options,
+                                  bst_truth *truth, const bst_scene_source **sources, int *count) {
+    (void)ctx;
+    (void)field;
+    (void)track;
+    (void)truth;
+    assert_int_equal(start_tick, 0);
+    assert_int_equal(end_tick, 340); /* 1.7 s */
+    assert_int_equal(tick_rate_hz, 200);
+    assert_int_equal(window.x0, 0);
+    assert_int_equal(window.y0, 0);
+    assert_int_equal(window.width, SKY_WIDE);
+    assert_int_equal(window.height, SKY_HIGH);
+    bst_assert_close(options->v_limit, 16.0, 0.0);
+    assert_true(options->margin_px >= 32.0);
+    *sources = sky_sources;
+    *count = SKY_STARS;
+    return BST_OK;
+}
+void __wrap_bst_field_truth_item(const bst_field *field, const bst_los_track *track,
+                                 const bst_scene_source *source, bst_window window, int binning,
+                                 const bst_truth *header, bst_truth_item *out);
+void __wrap_bst_field_truth_item(const bst_field *field, const bst_los_track *track,
+                                 const bst_scene_source *source, bst_window window, int binning,
+                                 const bst_truth *header, bst_truth_item *out) {
+    (void)field;
+    (void)track;
+    (void)header;
+    assert_int_equal(binning, 1);
+    assert_int_equal(window.width, SKY_WIDE);
+    assert_int_equal(window.height, SKY_HIGH);
+    *out = sky_items[source - sky_sources];
+}
+
+/* Stars of a look, on the frame and up to 90 px beyond: those of SNR 1 and more are found again at
+ * their places, with those beyond the frame in the cells at its edges. */
+static void stars_of_a_look(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_scenario scenario = {.tick_rate_hz = 200};
+    bst_pd_scene scene = {.scenario = &scenario,
+                          .observer = 1,
+                          .sensor = 2,
+                          .exposure_s = 1.7,
+                          .camera = {.width_px = SKY_WIDE, .height_px = SKY_HIGH}};
+    const bst_los_track track = {0};
+    const bst_scene_source *sources;
+    bst_pd_sky *sky;
+    bst_pd_stars stars = {.count = 0};
+    uint64_t seed = 7;
+    int count, expected_count = 0;
+    bst_assert_ok(&ctx, bst_pd_sky_open(&ctx, &scene, &sky));
+    bst_quat q = bst_pd_sky_attitude(sky, 0.3), about = {.w = cos(0.15), .z = sin(0.15)},
+             asked = bst_quat_mul(about, sky_attitude);
+    bst_assert_close(q.w, asked.w, 1e-12);
+    bst_assert_close(q.x, asked.x, 1e-12);
+    bst_assert_close(q.y, asked.y, 1e-12);
+    bst_assert_close(q.z, asked.z, 1e-12);
+    for (int round = 0; round < 2; round++) { /* the list is filled anew */
+        expected_count = 0;
+        for (int i = 0; i < SKY_STARS; i++) {
+            bst_truth_item *t = &sky_items[i];
+            *t = (bst_truth_item){.x_centroid_px = 480 * draw(&seed) - 90,
+                                  .y_centroid_px = 310 * draw(&seed) - 90,
+                                  .x_start_px = 10 + i,
+                                  .x_end_px = 17 + i,
+                                  .y_start_px = 20,
+                                  .y_end_px = 11,
+                                  .snr = i % 5 == 0 ? 0.999 : 1.0 + draw(&seed)};
+            t->x_centroid_px = i % 50 == 3 ? NAN : t->x_centroid_px;
+            expected_count += i % 5 != 0 && i % 50 != 3;
+        }
+        bst_assert_ok(&ctx, bst_pd_sky_look(&ctx, sky, &track, &sources, &count));
+        bst_assert_ok(&ctx, bst_pd_sky_stars(&ctx, sky, &track, sources, count, &stars));
+        assert_int_equal(stars.count, expected_count);
+        assert_int_equal(stars.first[stars.columns * stars.rows], expected_count);
+        for (int i = 0; i < SKY_STARS; i++) {
+            const bst_truth_item *t = &sky_items[i];
+            bool there = false;
+            for (int k = 0; k < stars.count; k++) {
+                const bst_eval_match_target *p = &stars.places[k];
+                there = there || (p->x_px == t->x_centroid_px && p->y_px == t->y_centroid_px &&
+                                  p->dx_px == 7.0 && p->dy_px == -9.0);
+            }
+            assert_int_equal(there, t->snr >= 1.0 && !isnan(t->x_centroid_px));
+        }
+        for (int cell = 0; cell < stars.columns * stars.rows; cell++) {
+            for (int k = stars.first[cell]; k < stars.first[cell + 1]; k++) {
+                const bst_eval_match_target *p = &stars.places[k];
+                int column = cell % stars.columns - 1, row = cell / stars.columns - 1;
+                /* cells of 32 px: 9.4 of them across, 4.1 down, one more on each side for the rest
+                 */
+                assert_int_equal(column, (int)fmin(fmax(floor(p->x_px / 32), -1), 10));
+                assert_int_equal(row, (int)fmin(fmax(floor(p->y_px / 32), -1), 5));
+            }
+        }
+    }
+    bst_pd_stars_free(&stars);
+    bst_pd_sky_close(sky);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(losses),
         cmocka_unit_test(errors_against_bounds),
         cmocka_unit_test(words_of_a_measurement),
         cmocka_unit_test(detections_of_stars),
+        cmocka_unit_test(stars_of_a_look),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

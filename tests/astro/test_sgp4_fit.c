@@ -44,6 +44,25 @@ static void elements_come_back(void **state) {
                            set->raan_rad - set->arg_perigee_rad - set->mean_anomaly_rad;
         bst_assert_close(remainder(longitude, 2.0 * BST_PI), 0.0, 1e-8);
         bst_sgp4_free(sgp4);
+        /* places that jump by 50 m: what they miss the fitted orbit by, in space */
+        for (int i = 0; i < PLACES; i++) {
+            places[i].position_teme_m.x += i % 2 ? 30.0 : -30.0;
+            places[i].position_teme_m.z += i % 2 ? -40.0 : 40.0;
+        }
+        bst_assert_ok(
+            &ctx, bst_sgp4_fit(&ctx, places, PLACES, (bst_vec3){1e3 * r[0], 1e3 * r[1], 1e3 * r[2]},
+                               (bst_vec3){1e3 * v[0], 1e3 * v[1], 1e3 * v[2]}, &got, &rms_m));
+        bst_assert_ok(&ctx, bst_sgp4_create(&ctx, &got, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &sgp4));
+        double square = 0.0;
+        for (int i = 0; i < PLACES; i++) {
+            assert_int_equal(bst_sgp4_propagate(sgp4, places[i].minutes, r, v), BST_SGP4_OK);
+            const bst_vec3 *p = &places[i].position_teme_m;
+            square += pow(1e3 * r[0] - p->x, 2.0) + pow(1e3 * r[1] - p->y, 2.0) +
+                      pow(1e3 * r[2] - p->z, 2.0);
+        }
+        bst_assert_close(rms_m, sqrt(square / PLACES), 1e-3);
+        bst_assert_close(rms_m, 50.0, 2.0);
+        bst_sgp4_free(sgp4);
         free(set);
     }
 }

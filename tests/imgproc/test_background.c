@@ -167,16 +167,46 @@ static int poisson(const fixture *f, double mean, uint64_t pixel) {
     return n;
 }
 
+/* The last clip of each mesh: its half width, least and greatest, and what is not counted noise. */
+static struct {
+    double least, most, read_variance_e2, step_e, origin_e;
+    int count;
+} clips;
+
+void __real_bst_truncated_moments_solve(const bst_truncated_moments_noise *noise, double low,
+                                        double high, double inner_mean, double inner_variance,
+                                        double *mean, double *deviation);
+void __wrap_bst_truncated_moments_solve(const bst_truncated_moments_noise *noise, double low,
+                                        double high, double inner_mean, double inner_variance,
+                                        double *mean, double *deviation);
+void __wrap_bst_truncated_moments_solve(const bst_truncated_moments_noise *noise, double low,
+                                        double high, double inner_mean, double inner_variance,
+                                        double *mean, double *deviation) {
+    if (clips.step_e > 0.0) {
+        bst_assert_close(noise->read_variance_e2, clips.read_variance_e2, 1e-9);
+        bst_assert_close(noise->step_e, clips.step_e, 1e-6);
+        /* midway between digital values */
+        double steps = (low - clips.origin_e) / clips.step_e;
+        bst_assert_close(fabs(steps - floor(steps) - 0.5), 0.0, 1e-3);
+        clips.least = fmin(clips.least, 0.5 * (high - low));
+        clips.most = fmax(clips.most, 0.5 * (high - low));
+        clips.count++;
+    }
+    __real_bst_truncated_moments_solve(noise, low, high, inner_mean, inner_variance, mean,
+                                       deviation);
+}
+
 /* Few counted electrons: their noise is skewed, and the steps of the converter are coarse, with
  * digital values off zero. The clip takes more on one side, which the model of the noise gives
  * back: 16 meshes of 2048 pixels tell the level to sigma / 181 and the noise to 0.4 %. */
 static void skewed_noise_in_coarse_steps(void **state) {
     fixture *f = *state;
-    static const double cases[][3] = {{4.0, 1.2, 0.5},
-                                      {4.0, 1.2, 2.5},
-                                      {20.0, 3.0, 2.5},
-                                      {1.0, 2.0, 0.5}}; /* electrons, read noise, step */
-    for (int c = 0; c < 4; c++) {
+    /* electrons, read noise, step, half width of the last clip in sigmas: more in coarse steps, and
+     * where the counted variance is above 0.4 sigma^3 */
+    static const double cases[][4] = {{4.0, 1.2, 0.5, 3.0},  {4.0, 1.2, 2.5, 4.0},
+                                      {20.0, 3.0, 2.5, 3.0}, {1.0, 2.0, 0.5, 3.0},
+                                      {2.0, 0.5, 0.3, 5.0},  {2.0, 1.2, 0.3, 3.0}};
+    for (int c = 0; c < 6; c++) {
         double mean = cases[c][0], read = cases[c][1], step = cases[c][2], origin = -240.3;
         for (int i = 0; i < SIDE * SIDE; i++) {
             double e =
@@ -184,7 +214,13 @@ static void skewed_noise_in_coarse_steps(void **state) {
             f->image[i] = (float)(step * floor((e - origin) / step + 0.5) + origin);
         }
         const bst_background_input input = {of_image, f->image, step, origin, read * read};
+        memset(&clips, 0, sizeof clips);
+        clips.least = INFINITY;
+        clips.read_variance_e2 = read * read;
+        clips.step_e = step;
+        clips.origin_e = origin;
         bst_background_read(&f->b, NULL, &input, SIDE, SIDE);
+        clips.step_e = 0.0;
         double level = 0.0, noise = 0.0, want = sqrt(mean + read * read + step * step / 12.0);
         for (int k = 0; k < 16; k++) {
             level += (double)f->b.level[k] / 16.0;
@@ -193,6 +229,9 @@ static void skewed_noise_in_coarse_steps(void **state) {
         print_message("         %g: level %.4f noise %.4f of %.4f\n", mean, level, noise, want);
         bst_assert_close(level, mean, 4.0 * want / 181.0);
         bst_assert_close(noise / want, 1.0, 0.016);
+        assert_int_equal(clips.count, 16);
+        bst_assert_close(clips.least, cases[c][3] * want, step + 0.15 * want);
+        bst_assert_close(clips.most, cases[c][3] * want, step + 0.15 * want);
     }
 }
 

@@ -423,6 +423,62 @@ static void moments_of_a_gaussian(void **state) {
     bst_imgproc_locator_free(&b.l);
 }
 
+/* Of two sources the moments depend on the window, a Gaussian of twice the fitted image's variance:
+ * PSF, widening, pixel and path, with its bend. By sums over the pixels. */
+static void moments_under_the_window(void **state) {
+    (void)state;
+    static float image[WIDTH * HEIGHT];
+    const struct {
+        double dx, dy, bend_x, bend_y, widening;
+    } cases[] = {{0, 0, 0, 0, 0.8}, {4, -1.5, 0, 0, -0.3}, {2, 5, 1.1, -0.7, 0.4}};
+    const double x0 = 61.3, y0 = 40.6;
+    bench b;
+    open_bench(&b);
+    bst_source_profiles_set(&b.l.profiles, &b.l.psf, 0.9);
+    for (int k = 0; k < 3; k++) {
+        double same = 2.0 * (0.81 + fmax(cases[k].widening, 0.0) + 1.0 / 12.0);
+        double dx = cases[k].dx, dy = cases[k].dy, bx = cases[k].bend_x, by = cases[k].bend_y;
+        double xx = same + dx * dx / 6.0 + bx * bx / 2.5, yy = same + dy * dy / 6.0 + by * by / 2.5;
+        double xy = dx * dy / 6.0 + bx * by / 2.5, det = xx * yy - xy * xy, sum = 0.0;
+        double i_xx = yy / det, i_xy = -xy / det, i_yy = xx / det, m[3] = {0}, out[3];
+        const bst_imgproc_stamp stamp = {.x0 = 46, .y0 = 27, .width = 31, .height = 28};
+        for (int i = 0; i < WIDTH * HEIGHT; i++) {
+            int px = i % WIDTH, py = i / WIDTH;
+            double x = px - x0, y = py - y0, u = x - 2.4, v = y - 1.1;
+            double light =
+                900.0 * exp(-0.4 * (x * x + y * y)) + 700.0 * exp(-0.3 * (u * u + v * v));
+            image[i] = (float)light;
+            if (px >= stamp.x0 && py >= stamp.y0 && px < stamp.x0 + stamp.width &&
+                py < stamp.y0 + stamp.height) {
+                light *= exp(-0.5 * (i_xx * x * x + 2.0 * i_xy * x * y + i_yy * y * y));
+                sum += light;
+                m[0] += light * x * x;
+                m[1] += light * x * y;
+                m[2] += light * y * y;
+            }
+        }
+        double seen = (m[0] * m[2] - m[1] * m[1]) / sum;
+        double c_xx = m[2] / seen - i_xx, c_xy = -m[1] / seen - i_xy, c_yy = m[0] / seen - i_yy;
+        double c = c_xx * c_yy - c_xy * c_xy;
+        const double asked[3] = {c_yy / c, -c_xy / c, c_xx / c};
+        const bst_imgproc_source source = {.shape = {.x_px = x0,
+                                                     .y_px = y0,
+                                                     .dx_px = dx,
+                                                     .dy_px = dy,
+                                                     .bend_x_px = bx,
+                                                     .bend_y_px = by,
+                                                     .sigma_px = 0.9},
+                                           .widening_px2 = cases[k].widening,
+                                           .flux_e = 9000.0};
+        bst_fit_data data = {image, WIDTH, HEIGHT, 5.0};
+        assert_true(bst_fit_moments(&b.l.fits[0], &data, &stamp, &source, NULL, 0, out));
+        for (int i = 0; i < 3; i++) {
+            bst_assert_close(out[i], asked[i], 5e-3);
+        }
+    }
+    bst_imgproc_locator_free(&b.l);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(stamps),
@@ -435,6 +491,7 @@ int main(void) {
         cmocka_unit_test(masked_charge_on_a_stamp),
         cmocka_unit_test(law_of_a_place),
         cmocka_unit_test(moments_of_a_gaussian),
+        cmocka_unit_test(moments_under_the_window),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

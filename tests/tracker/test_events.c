@@ -193,11 +193,76 @@ static void a_place_of_the_sensor_is_weighed(void **state) {
     bst_mtt_free(b->mtt);
 }
 
+/* What each hit adds to a track, at uneven times and with errors that differ along the axes: the
+ * magnitude by weights of both variances, chi-square, and the logarithm of the likelihood over that
+ * of an alarm, with det S = det(R)^2 / det(R - P) of the updated P. */
+static void what_a_hit_adds(void **state) {
+    (void)state;
+    bst_mtt_params params = defaults();
+    params.brightness_systematic_mag = 0.05;
+    params.brightness_random_walk_mag = 0.08;
+    params.noise_rad2ps3 = pow(0.2 * AS, 2);
+    bst_ctx ctx = {0};
+    bst_mtt *mtt;
+    bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));
+    const double times[] = {0, 1, 2, 3.5, 4.5, 7, 8, 11},
+                 mags[] = {11, 11.4, 10.9, 11.2, 10.7, 11.1, 11.5, 10.8};
+    bst_mtt_track before = {.id = 0};
+    for (int i = 0; i < 8; i++) {
+        double v1 = pow((0.3 + 0.1 * (i % 3)) * AS, 2), v2 = pow(0.5 * AS, 2),
+               off = i % 2 ? 0.3 : -0.4;
+        double sigma = 0.1 + 0.05 * (i % 2);
+        bst_vec3 centre = bst_vec3_from_radec(1.0 + 20 * AS * times[i], 0.2);
+        bst_tangent axes = bst_tangent_at(centre);
+        const bst_mtt_detection one = {
+            .sky = {.direction = bst_tangent_exp(
+                        centre, bst_tangent_vector(&axes, off * AS, -0.5 * off * AS)),
+                    .cov_11 = v1,
+                    .cov_22 = v2},
+            .x_px = 100.5 + i,
+            .y_px = 200.5 - i,
+            .v_mag = mags[i],
+            .v_mag_sigma = sigma,
+            .snr = 20 + i};
+        const bst_mtt_frame f = {
+            .tick = llround(1000 * times[i]), .seconds = times[i], .detections = &one, .count = 1};
+        bst_mtt_step(mtt, &f);
+        int count;
+        const bst_mtt_track *track = bst_mtt_tracks(mtt, &count);
+        assert_true(count == (i > 0));
+        if (i > 1) {
+            double r = 0.05 * 0.05 + sigma * sigma, p = before.v_mag_variance + 0.08 * 0.08;
+            bst_assert_close(1.0 / track->v_mag_variance, 1.0 / p + 1.0 / r, 1e-9);
+            bst_assert_close(track->v_mag, track->v_mag_variance * (before.v_mag / p + mags[i] / r),
+                             1e-9);
+            double a = v1 - track->state.covariance[0][0], b = -track->state.covariance[0][1];
+            double c = v2 - track->state.covariance[1][1];
+            double log_s = 2.0 * log(v1 * v2) - log(a * c - b * b);
+            double chi2 = track->chi2 - before.chi2;
+            bst_assert_close(track->last_chi2, chi2, 1e-9);
+            double alarms = mtt->clutter_density;
+            bst_assert_close(track->score - before.score,
+                             log(0.9 / alarms) - log(2.0 * BST_PI) - 0.5 * log_s - 0.5 * chi2,
+                             0.02);
+            assert_int_equal(track->hits, before.hits + 1);
+            bst_assert_close(track->last_update_s, times[i], 0.0);
+            bst_assert_close(track->x_px, 100.5 + i, 0.0);
+            bst_assert_close(track->y_px, 200.5 - i, 0.0);
+            bst_assert_close(track->snr, 20 + i, 0.0);
+        }
+        if (count) {
+            before = *track;
+        }
+    }
+    bst_mtt_free(mtt);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_manoeuvre_is_told_at_its_rate),
         cmocka_unit_test(a_change_of_brightness_is_told_at_its_rate),
         cmocka_unit_test(a_place_of_the_sensor_is_weighed),
+        cmocka_unit_test(what_a_hit_adds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,7 @@
 /* The choice of the target of interest among tracks made by hand. */
 #include "tests/test_support.h"
 #include "tracker/target.h"
+#include "tracker/tracker_internal.h"
 
 #define AS BST_ARCSEC_RAD
 
@@ -280,11 +281,83 @@ static void holds_what_manoeuvres(void **state) {
     assert_int_equal(target.id, 0);
 }
 
+/* What the tracker asks of a frame: the field without its margin, behind the aberration; the range
+ * of the cue for the target, the assumed one for others; where the observer is. */
+static void queries_of_a_frame(void **state) {
+    (void)state;
+    static bst_tracker t;
+    t = (bst_tracker){.camera = {.width_px = 800, .height_px = 500, .pixel_scale_arcsec = 4.0},
+                      .tick_rate_hz = 500.0,
+                      .target_params = params,
+                      .assumed_range_m = 2e6,
+                      .range_sigma = 0.1,
+                      .range_rate_sigma_mps = 70.0,
+                      .edge_margin_px = 12.0};
+    bst_tracker_frame_view f = {
+        .tracker = &t, .cue = make_cue(), .range_m = 9e6, .range_rate_mps = -400};
+    bst_vec3 z = place(0, 0), moving = {2e4, -1e4, 2.5e4};
+    f.q_cam_from_gcrf = bst_quat_look(z, (bst_vec3){0.2, 0.3, 0.9});
+    f.light = (bst_light){.velocity_mps = moving, .sun_m = {1.5e11, 0, 0}};
+    const double c_mps = 299792458.0;
+    const struct {
+        double x, y;
+        bool in;
+    } at[] = {{12.2, 250, true}, {11.8, 250, false}, {786.8, 250, true}, {787.2, 250, false},
+              {400, 12.2, true}, {400, 11.8, false}, {400, 486.8, true}, {400, 487.2, false}};
+    for (int i = 0; i < 8; i++) {
+        double u = (at[i].x - 399.5) * 4.0 * AS, v = (at[i].y - 249.5) * 4.0 * AS;
+        bst_vec3 seen =
+            bst_quat_rotate(bst_quat_conj(f.q_cam_from_gcrf), bst_vec3_unit((bst_vec3){u, v, 1.0}));
+        /* the direction without aberration, of first order: 3 mas of the second, 0.001 px */
+        bst_vec3 before = bst_vec3_unit(bst_vec3_axpy(seen, -1.0 / c_mps, moving));
+        assert_int_equal(bst_tracker_frame_in_field(&f, before), at[i].in);
+    }
+    assert_false(bst_tracker_frame_in_field(&f, bst_vec3_scale(z, -1.0)));
+    bst_orbit_range range;
+    bst_mtt_track own = make_track(3, 5, 0.0, 13.0), other = make_track(4, 5, 60.0, 13.0);
+    assert_true(bst_tracker_frame_is_expected(&f, &own));
+    assert_false(bst_tracker_frame_is_expected(&f, &other));
+    assert_true(bst_tracker_frame_range_of(&f, &own, &range));
+    bst_assert_close(range.range_m, 9e6, 0.0);
+    bst_assert_close(range.range_sigma_m, 9e5, 1e-6);
+    bst_assert_close(range.range_rate_mps, -400.0, 0.0);
+    bst_assert_close(range.range_rate_sigma_mps, 70.0, 0.0);
+    assert_true(bst_tracker_frame_range_of(&f, &other, &range));
+    bst_assert_close(range.range_m, 2e6, 0.0);
+    bst_assert_close(range.range_sigma_m, 2e5, 1e-6);
+    bst_assert_close(range.range_rate_mps, 0.0, 0.0);
+    bst_assert_close(range.range_rate_sigma_mps, 3000.0, 0.0);
+    t.assumed_range_m = 0.0;
+    assert_false(bst_tracker_frame_range_of(&f, &other, &range));
+    bst_vec3 rate;
+    assert_true(bst_tracker_frame_expected_rate(&f, z, &rate));
+    bst_assert_close(bst_vec3_angle(rate, f.cue.rate_radps), 0.0, 1e-6);
+    bst_assert_close(bst_vec3_norm(rate), 50 * AS, 1e-3 * AS);
+    f.cue.valid = false;
+    assert_false(bst_tracker_frame_expected_rate(&f, z, &rate));
+    /* a circular orbit 2.5 s after its telemetry; the Earth's own velocity is what is left */
+    double r = 7e6, speed = sqrt(3.986004418e14 / r), turn = speed / r * 2.5;
+    const bst_nav_telemetry nav = {.tick = 1000,
+                                   .position_gcrf_m = {r, 0, 0},
+                                   .velocity_gcrf_mps = {0, 0, speed},
+                                   .velocity_bary_mps = {3e4, -1e4, speed + 5e3}};
+    bst_od_observer eye;
+    assert_true(bst_tracker_frame_observer(&t, &nav, 4.5, &eye));
+    bst_assert_close(eye.time_s, 4.5, 0.0);
+    bst_assert_close(eye.position_m.x, r * cos(turn), 0.01);
+    bst_assert_close(eye.position_m.z, r * sin(turn), 0.01);
+    bst_assert_close(eye.velocity_mps.x, -speed * sin(turn), 1e-4);
+    bst_assert_close(eye.velocity_mps.z, speed * cos(turn), 1e-4);
+    bst_assert_close(eye.earth_bary_mps.x, 3e4, 1e-9);
+    bst_assert_close(eye.earth_bary_mps.y, -1e4, 1e-9);
+    bst_assert_close(eye.earth_bary_mps.z, 5e3, 1e-9);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(misfit_is_chi_square), cmocka_unit_test(misfit_off_the_diagonal),
-        cmocka_unit_test(takes_the_likeliest),  cmocka_unit_test(takes_nothing_wrong),
-        cmocka_unit_test(keeps_and_lets_go),    cmocka_unit_test(expects_what_the_cue_says),
-        cmocka_unit_test(holds_what_manoeuvres)};
+        cmocka_unit_test(misfit_is_chi_square),  cmocka_unit_test(misfit_off_the_diagonal),
+        cmocka_unit_test(takes_the_likeliest),   cmocka_unit_test(takes_nothing_wrong),
+        cmocka_unit_test(keeps_and_lets_go),     cmocka_unit_test(expects_what_the_cue_says),
+        cmocka_unit_test(holds_what_manoeuvres), cmocka_unit_test(queries_of_a_frame)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

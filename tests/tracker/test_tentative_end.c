@@ -1,4 +1,5 @@
-/* How long a track that is not yet confirmed waits for its next detection. */
+/* How long tracks wait for their next detection: one that is not yet confirmed, and one whose place
+ * becomes uncertain along one axis. */
 #include <math.h>
 
 #include "tests/tracker/pixel_tracker.h"
@@ -13,11 +14,11 @@ static bst_vec3 place(double x_px) {
     return bst_vec3_from_radec(1.0 + x_px * PX, 0.0);
 }
 
-/* One detection, or none with the object beside the field. */
-static void frame(bst_mtt *mtt, double seconds, bool seen) {
+/* One detection, or none with the object beside the field; its errors along both axes. */
+static void frame_of(bst_mtt *mtt, double seconds, bool seen, double sigma1, double sigma2) {
     const bst_mtt_detection one = {.sky = {.direction = place(2 * seconds),
-                                           .cov_11 = pow(0.1 * PX, 2),
-                                           .cov_22 = pow(0.1 * PX, 2)},
+                                           .cov_11 = pow(sigma1 * PX, 2),
+                                           .cov_22 = pow(sigma2 * PX, 2)},
                                    .v_mag = 13.0,
                                    .v_mag_sigma = 0.05,
                                    .snr = 20};
@@ -27,6 +28,10 @@ static void frame(bst_mtt *mtt, double seconds, bool seen) {
                              .count = seen,
                              .in_field = seen ? NULL : outside};
     bst_mtt_step(mtt, &f);
+}
+
+static void frame(bst_mtt *mtt, double seconds, bool seen) {
+    frame_of(mtt, seconds, seen, 0.1, 0.1);
 }
 
 /* Tracks after a gap that follows detections at 0 and 1 s. */
@@ -67,7 +72,42 @@ static void patience(void **state) {
     }
 }
 
+/* A confirmed track is given up once either standard deviation of its direction is 5 px. */
+static void uncertain_along_an_axis(void **state) {
+    (void)state;
+    for (int axis = 0; axis < 2; axis++) {
+        bst_ctx ctx = {0};
+        bst_mtt *mtt;
+        bst_mtt_params p = pixel_tracker(16, 16);
+        p.max_coast_s = 1e4;
+        p.max_sigma_rad = 5 * PX;
+        bst_assert_ok(&ctx, bst_mtt_create(&ctx, &p, &mtt));
+        int count, n = 0;
+        for (; n < 8; n++) {
+            frame_of(mtt, n, true, axis ? 0.1 : 0.8, axis ? 0.8 : 0.1);
+        }
+        double wide = 0.0, before = 0.0, narrow = 0.0, limit = 25 * PX * PX;
+        for (; n < 400; n++) {
+            frame(mtt, n, false);
+            const bst_mtt_track *track = bst_mtt_tracks(mtt, &count);
+            if (count == 0) {
+                break;
+            }
+            assert_int_not_equal(track->status, BST_TRACK_TENTATIVE);
+            before = wide;
+            wide = track->state.covariance[axis][axis];
+            narrow = track->state.covariance[1 - axis][1 - axis];
+            assert_true(wide < limit);
+        }
+        assert_true(n > 10 && n < 399);
+        assert_true(narrow < 0.5 * wide);
+        assert_true(wide + 3.0 * (wide - before) > limit); /* it was about to exceed it */
+        bst_mtt_free(mtt);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(patience)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(patience),
+                                       cmocka_unit_test(uncertain_along_an_axis)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
