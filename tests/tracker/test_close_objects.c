@@ -16,7 +16,6 @@
 #define CUTOFF_PX 3.0
 /* The first frames, in which no tracker has its tracks yet, are not scored. */
 #define FIRST_SCORED 5
-#define MAX_TRACKS 2000
 #define MAX_AT_ONCE 64
 
 static const char *const associations[] = {"gnn", "nearest", "pda", "mixture", "pmb"};
@@ -70,19 +69,20 @@ static void score_frame(bst_track_metrics *metrics, const close_scene *scene, in
                         const shown *tracks) {
     bst_ctx ctx = {0};
     bst_vec3 truth[CLOSE_OBJECTS], directions[MAX_AT_ONCE];
-    bool visible[CLOSE_OBJECTS];
+    int64_t objects[CLOSE_OBJECTS];
     for (int i = 0; i < scene->kind->objects; i++) {
         double x, y;
         close_place(&scene->objects[i], frame, &x, &y);
         truth[i] = close_direction(x, y);
-        visible[i] = true;
+        objects[i] = i;
     }
     for (int t = 0; t < tracks->count; t++) {
         directions[t] = close_direction(tracks->x[t], tracks->y[t]);
     }
     if (frame >= FIRST_SCORED) {
-        bst_assert_ok(&ctx, bst_track_metrics_frame(&ctx, metrics, frame, truth, visible,
-                                                    tracks->id, directions, tracks->count));
+        const bst_track_frame shot = {frame,      objects,    truth,        scene->kind->objects,
+                                      tracks->id, directions, tracks->count};
+        bst_assert_ok(&ctx, bst_track_metrics_frame(&ctx, metrics, &shot));
     }
 }
 
@@ -109,8 +109,8 @@ static double processor_s(void) {
 static bst_track_metrics *open_metrics(const close_kind *kind) {
     bst_ctx ctx = {0};
     bst_track_metrics *metrics;
-    bst_assert_ok(&ctx, bst_track_metrics_create(&ctx, kind->objects, MAX_TRACKS, MAX_AT_ONCE,
-                                                 CUTOFF_PX * CLOSE_PIXEL_RAD, &metrics));
+    bst_assert_ok(
+        &ctx, bst_track_metrics_create(&ctx, kind->objects, CUTOFF_PX * CLOSE_PIXEL_RAD, &metrics));
     return metrics;
 }
 
