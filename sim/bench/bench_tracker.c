@@ -5,6 +5,7 @@
 
 #include "boresight/rng.h"
 #include "sim/bench/bench.h"
+#include "tracker/mtt/multitarget.h"
 #include "tracker/tracker.h"
 
 enum { STARS = 40, MOST_OBJECTS = 200, ROOM = 600, TICKS_PER_S = 1000 };
@@ -12,8 +13,11 @@ enum { STARS = 40, MOST_OBJECTS = 200, ROOM = 600, TICKS_PER_S = 1000 };
 static const double SIGMA_PX = 0.1, DETECTION_PROBABILITY = 0.9;
 enum { SETTLING_FRAMES = 20, FRAMES = 200 };
 
+/* side of the sensor, px */
+enum { SIDE_PX = 1024 };
+
 static const bst_camera camera = {
-    .width_px = 1024, .height_px = 1024, .pixel_scale_arcsec = 3.0, .psf_fwhm_px = 2.0};
+    .width_px = SIDE_PX, .height_px = SIDE_PX, .pixel_scale_arcsec = 3.0, .psf_fwhm_px = 2.0};
 
 typedef struct scene {
     int objects;
@@ -50,7 +54,7 @@ static void add(scene *s, double x, double y, uint32_t star_id) {
     bst_detections *d = s->detections;
     double n[2];
     bst_rng_normal2(s->key, 1, s->draw++, n);
-    if (d->count < ROOM && x > 0.0 && y > 0.0 && x < camera.width_px && y < camera.height_px) {
+    if (d->count < ROOM && x > 0.0 && y > 0.0 && x < SIDE_PX && y < SIDE_PX) {
         d->items[d->count++] =
             (bst_detection){.x_px = x + SIGMA_PX * n[0],
                             .y_px = y + SIGMA_PX * n[1],
@@ -90,8 +94,8 @@ static void expose(scene *s, int k) {
     }
     for (double p = uniform(s, 0.0, 1.0), l = exp(-s->false_alarms); p > l;
          p *= uniform(s, 0.0, 1.0)) {
-        double x = uniform(s, 0.0, camera.width_px);
-        add(s, x, uniform(s, 0.0, camera.height_px), 0);
+        double x = uniform(s, 0.0, SIDE_PX);
+        add(s, x, uniform(s, 0.0, SIDE_PX), 0);
     }
 }
 
@@ -146,13 +150,13 @@ static bst_status open_scene(bst_ctx *ctx, scene *s, int objects, double false_a
                  .key = bst_rng_make_key(1, 0, "bench", "tracker"),
                  .q = bst_quat_look(bst_vec3_from_radec(0.7, 0.2), (bst_vec3){0, 0, 1})};
     for (int i = 0; i < STARS; i++) {
-        double x = uniform(s, 20.0, camera.width_px - 20.0);
-        s->stars[i] = direction_of(s, x, uniform(s, 20.0, camera.height_px - 20.0));
+        double x = uniform(s, 20.0, SIDE_PX - 20.0);
+        s->stars[i] = direction_of(s, x, uniform(s, 20.0, SIDE_PX - 20.0));
     }
     for (int i = 0; i < objects; i++) {
         for (int a = 0; a < 2; a++) {
             /* stays in the field: at most 221 px of motion */
-            s->place[i][a] = uniform(s, 230.0, camera.width_px - 230.0);
+            s->place[i][a] = uniform(s, 230.0, SIDE_PX - 230.0);
             s->rate[i][a] = uniform(s, -1.0, 1.0);
         }
     }
@@ -164,6 +168,7 @@ static bst_status open_scene(bst_ctx *ctx, scene *s, int objects, double false_a
     }
     BST_TRY(bst_config_defaults(ctx, bst_tracker_config_table, &config));
     config.max_tracks = 2 * ROOM;
+    config.association = BST_MTT_PMB;
     return bst_tracker_create(ctx, &config, &camera, TICKS_PER_S, find_star, s, &s->tracker);
 }
 
