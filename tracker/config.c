@@ -102,12 +102,13 @@ const bst_config_desc bst_tracker_config_table[] = {
             "Room for detections of one frame that are not stars."),
     BST_ENUM(
         C, association, associations, "\"mixture\"",
-        "gnn: the assignment of least total cost. nearest: the cheapest pair first. pda: as gnn, "
-        "but the filter of a confirmed track weighs every detection in its gate by its "
-        "probability. mixture: as pda, and the likeliest choices live on apart until later "
-        "detections decide; with type imm the same as pda. pmb: joint probabilities of all tracks "
-        "and detections, existence probabilities in place of confirm_score, and measurements "
-        "merged of two tracks (Poisson multi-Bernoulli); every pair of detections starts a track."),
+        "pmb: joint probabilities of all tracks and detections, existence probabilities beside "
+        "confirm_score, and measurements merged of two tracks (Poisson multi-Bernoulli); every "
+        "pair of detections starts a track, and the likeliest choices live on apart until later "
+        "detections decide. mixture: each confirmed track on its own weighs every detection in "
+        "its gate by its probability, with choices that live on apart; with type imm the same as "
+        "pda. pda: as mixture, with one Gaussian. gnn: the assignment of least total cost. "
+        "nearest: the cheapest pair first."),
     BST_ENUM(
         C, motion, motions, "\"constant_rate\"",
         "constant_rate: along a great circle, with the cue's acceleration near it. orbit: along "

@@ -128,7 +128,9 @@ static void publish_events(struct bst_step *step, const bst_tracker *tracker) {
                                         [BST_TRACKER_ATTITUDE_LOST] = "attitude_lost",
                                         [BST_TRACKER_TRACK_RESUMED] = "track_resumed",
                                         [BST_TRACKER_MANOEUVRE] = "manoeuvre",
-                                        [BST_TRACKER_BRIGHTNESS_CHANGE] = "brightness_change"};
+                                        [BST_TRACKER_BRIGHTNESS_CHANGE] = "brightness_change",
+                                        [BST_TRACKER_TARGET_AMBIGUOUS] = "target_ambiguous",
+                                        [BST_TRACKER_TARGET_RESOLVED] = "target_resolved"};
     int count;
     const bst_tracker_event *events = bst_tracker_events(tracker, &count);
     for (int i = 0; i < count; i++) {
@@ -139,6 +141,13 @@ static void publish_events(struct bst_step *step, const bst_tracker *tracker) {
             bst_step_event(step, kinds[e->kind], "track %lld, chi-square %.1f of %d, V %.2f",
                            (long long)e->track_id, e->statistic,
                            e->kind == BST_TRACKER_MANOEUVRE ? 2 : 1, e->v_mag);
+        } else if (e->kind == BST_TRACKER_TARGET_AMBIGUOUS) {
+            bst_step_event(
+                step, kinds[e->kind], "track %lld with probability %.3f, track %lld with %.3f",
+                (long long)e->track_id, e->statistic, (long long)e->rival_id, e->rival_probability);
+        } else if (e->kind == BST_TRACKER_TARGET_RESOLVED) {
+            bst_step_event(step, kinds[e->kind], "track %lld with probability %.3f",
+                           (long long)e->track_id, e->statistic);
         } else if (e->kind == BST_TRACKER_TARGET_LOST) {
             bst_step_event(step, kinds[e->kind], "track %lld", (long long)e->track_id);
         } else {

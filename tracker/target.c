@@ -151,18 +151,149 @@ static void store_target(bst_target *target, const bst_target_cue *cue, double s
     }
 }
 
+/* The tracks that fit the cue, and their likelihoods relative to the best one's. */
+typedef struct candidates {
+    const bst_mtt_track *best, *second; /* NULL: none */
+    double lowest, lowest_chi2;         /* chi2 + log_det of the best; its chi2 */
+    double next;                        /* chi2 + log_det of the second */
+    double sum;                         /* of all likelihoods over that of the best */
+} candidates;
+
+/* Compares all tracks with the cue.
+ *
+ * Given:     memory  predicted state of a lost target, which binds the choice; NULL: none */
+static candidates compare(const bst_target_params *params, const bst_target_cue *cue,
+                          const bst_sky_state *memory, const bst_mtt_track *tracks, int count) {
+    candidates c = {.lowest = INFINITY, .lowest_chi2 = INFINITY, .next = INFINITY};
+    for (int i = 0; i < count; i++) {
+        bst_target_fit fit = bst_target_misfit(params, cue, &tracks[i]);
+        if (memory && fit.chi2 < INFINITY) {
+            double distance2 = bst_sky_distance2(memory, &tracks[i].state);
+            fit.chi2 = distance2 <= params->dormant_gate_chi2 ? fit.chi2 + distance2 : INFINITY;
+        }
+        double misfit = fit.chi2 + fit.log_det;
+        if (!(misfit < INFINITY)) {
+            continue;
+        }
+        if (misfit < c.lowest) {
+            c.sum = (c.best ? c.sum * exp(-0.5 * (c.lowest - misfit)) : 0.0) + 1.0;
+            c.second = c.best;
+            c.next = c.lowest;
+            c.best = &tracks[i];
+            c.lowest = misfit;
+            c.lowest_chi2 = fit.chi2;
+        } else {
+            c.sum += exp(-0.5 * (misfit - c.lowest));
+            if (misfit < c.next) {
+                c.second = &tracks[i];
+                c.next = misfit;
+            }
+        }
+    }
+    return c;
+}
+
+/* True if the best candidate has been detected often enough for its misfit. */
+static bool is_mature(const bst_target_params *params, const candidates *c) {
+    return c->best && c->best->hits >= params->min_hits + (int)(0.5 * c->lowest_chi2);
+}
+
+/* Sets the probabilities of target and rival. If an ambiguous target has lost its rival, they
+ * stay: the rival may be unresolved from it. */
+static void set_probability(bst_target *target, const bst_target_params *params, double seconds,
+                            const candidates *c) {
+    bool is_best = c->best && c->best->id == target->id;
+    const bst_mtt_track *rival = is_best ? c->second : c->best;
+    if (!rival && target->ambiguous && seconds - target->rival_seconds <= params->max_dormant_s) {
+        return;
+    }
+    target->rival_seconds = rival ? seconds : target->rival_seconds;
+    double best = c->best ? 1.0 / c->sum : 0.0;
+    double second = c->second ? exp(-0.5 * (c->next - c->lowest)) / c->sum : 0.0;
+    target->rival_id = rival ? rival->id : 0;
+    target->rival_probability = is_best ? second : best;
+    target->probability = is_best ? best
+                          : c->second && c->second->id == target->id
+                              ? second
+                              : fmax(0.0, 1.0 - best - second);
+    target->ambiguous =
+        target->probability < (target->ambiguous ? BST_TARGET_CERTAIN : BST_TARGET_AMBIGUOUS);
+}
+
+/* Makes a track the target. */
+static void take_target(bst_target *target, const bst_target_params *params,
+                        const bst_target_cue *cue, double seconds, const candidates *c) {
+    target->id = c->best->id;
+    target->remembered = false;
+    target->departed = false;
+    target->ambiguous = target->merged = false;
+    set_probability(target, params, seconds, c);
+    store_target(target, cue, seconds, c->best);
+}
+
+/* Compares an ambiguous target with the other tracks; a certain one replaces it. Returns true if
+ * one did. */
+static bool replace(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
+                    double seconds, const bst_mtt_track *tracks, int count) {
+    candidates c = compare(params, cue, NULL, tracks, count);
+    if (!c.best) {
+        return false; /* without a cue, or no track fits: nothing new */
+    }
+    bool replaced =
+        c.best->id != target->id && 1.0 / c.sum > BST_TARGET_CERTAIN && is_mature(params, &c);
+    if (replaced) {
+        take_target(target, params, cue, seconds, &c);
+    } else {
+        set_probability(target, params, seconds, &c);
+    }
+    return replaced;
+}
+
+/* Opens the identity of a target that is resolved again after it shared detections: another object
+ * may have taken over its track. The cue says nothing on a target that left it by manoeuvres. */
+static void reopen(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
+                   const bst_mtt_track *kept) {
+    if (kept->merged_in_row > 0) {
+        target->merged = true;
+    } else if (target->merged && kept->misses_in_row == 0) {
+        target->merged = false;
+        target->ambiguous = target->ambiguous ||
+                            (cue->valid && target->departed &&
+                             rate_chi2(kept, target->departure_radps, cue_variance(params, cue)) <=
+                                 params->rate_chi2);
+    }
+}
+
+/* True if a new track fits the cue, too. It counts as new until it has twice the hits at which it
+ * would be chosen; and not once the target has left the cue by a manoeuvre. */
+static bool has_new_rival(const bst_target_params *params, const bst_target_cue *cue,
+                          const bst_mtt_track *kept, const bst_mtt_track *tracks, int count) {
+    bool rival = false;
+    for (int i = 0; i < count && !rival; i++) {
+        rival = tracks[i].id != kept->id && tracks[i].hits < 2 * params->margin_hits &&
+                bst_target_misfit(params, cue, &tracks[i]).chi2 < INFINITY;
+    }
+    return rival && bst_target_misfit(params, cue, kept).chi2 < INFINITY;
+}
+
 void bst_target_step(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
                      double seconds, const bst_mtt_track *tracks, int count) {
     assert(target && params && cue && count >= 0 && (tracks || count == 0));
     if (target->id != 0) {
         const bst_mtt_track *kept = find(tracks, count, target->id);
         if (kept && !kept->at_rest && !is_released(target, params, cue, kept)) {
-            store_target(target, cue, seconds, kept);
+            reopen(target, params, cue, kept);
+            bool open = target->ambiguous || has_new_rival(params, cue, kept, tracks, count);
+            if (!open || !replace(target, params, cue, seconds, tracks, count)) {
+                store_target(target, cue, seconds, kept);
+            }
             return;
         }
         /* a track mistaken for the target gives no prediction of where the target is */
         target->remembered = kept == NULL;
         target->lost_seconds = seconds;
+        target->ambiguous = target->ambiguous && target->remembered;
+        target->merged = false;
         target->id = 0;
     }
     bst_sky_state memory = target->memory;
@@ -170,31 +301,20 @@ void bst_target_step(bst_target *target, const bst_target_params *params, const 
     if (bound) {
         bst_sky_predict(&memory, seconds - target->memory_seconds, params->memory_noise_rad2ps3);
     }
-    const bst_mtt_track *best = NULL;
-    double lowest = INFINITY, lowest_chi2 = INFINITY, second = INFINITY;
-    for (int i = 0; i < count; i++) {
-        bst_target_fit fit = bst_target_misfit(params, cue, &tracks[i]);
-        if (bound && fit.chi2 < INFINITY) {
-            double distance2 = bst_sky_distance2(&memory, &tracks[i].state);
-            fit.chi2 = distance2 <= params->dormant_gate_chi2 ? fit.chi2 + distance2 : INFINITY;
+    candidates c = compare(params, cue, bound ? &memory : NULL, tracks, count);
+    if (is_mature(params, &c) &&
+        (0.5 * (c.next - c.lowest) >= params->margin || c.best->hits >= params->margin_hits)) {
+        const bst_target before = *target;
+        take_target(target, params, cue, seconds, &c);
+        if (before.ambiguous && bound) {
+            /* the memory says which track goes on, not which object it is */
+            bool rival = target->id == before.rival_id;
+            target->ambiguous = true;
+            target->probability = rival ? before.rival_probability : before.probability;
+            target->rival_probability = rival ? before.probability : before.rival_probability;
+            target->rival_seconds = before.rival_seconds;
+            c = compare(params, cue, NULL, tracks, count);
+            set_probability(target, params, seconds, &c);
         }
-        double misfit = fit.chi2 + fit.log_det;
-        if (misfit < lowest) {
-            second = lowest;
-            lowest = misfit;
-            lowest_chi2 = fit.chi2;
-            best = &tracks[i];
-        } else if (misfit < second) {
-            second = misfit;
-        }
-    }
-    if (best && best->hits < params->min_hits + (int)(0.5 * lowest_chi2)) {
-        return;
-    }
-    if (best && (0.5 * (second - lowest) >= params->margin || best->hits >= params->margin_hits)) {
-        target->id = best->id;
-        target->remembered = false;
-        target->departed = false;
-        store_target(target, cue, seconds, best);
     }
 }

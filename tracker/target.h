@@ -52,6 +52,16 @@ typedef struct bst_target {
      */
     bool departed;
     bst_vec3 departure_radps;
+    /* Identity: the probability that the target is the cue's object, given that one of the tracks
+     * is. While `ambiguous` it is computed anew in each frame; a target that was once certain keeps
+     * its identity until it has shared detections with another object, or a new track fits the cue.
+     */
+    bool ambiguous;
+    bool merged; /* it has shared detections since it was last resolved */
+    double probability;
+    int64_t rival_id; /* the likeliest other track; 0: none */
+    double rival_probability;
+    double rival_seconds; /* latest time at which there was one */
 } bst_target;
 
 /* Result of bst_target_misfit. */
@@ -79,6 +89,11 @@ bst_target_fit bst_target_misfit(const bst_target_params *params, const bst_targ
 bool bst_target_is_expected(const bst_target_params *params, const bst_target_cue *cue,
                             const bst_mtt_track *track, const bst_target *target);
 
+/* Probabilities of identity: below the first a target is ambiguous; above the second it is certain,
+ * and so is another track, which then replaces an ambiguous target. */
+#define BST_TARGET_AMBIGUOUS 0.95
+#define BST_TARGET_CERTAIN 0.99
+
 /* Updates the target of interest after a frame.
  *
  * Given:     seconds  time of the frame
@@ -87,7 +102,12 @@ bool bst_target_is_expected(const bst_target_params *params, const bst_target_cu
  *            rate gradually: a target that is detected and shares no detection may change its rate
  *            freely, within the gate of its filter. Otherwise a track is chosen by the cue and,
  *            after a loss, by the lost target's prediction. Without a cue no new target is chosen.
- */
+ *            Of several tracks that fit the cue, each has the probability
+ *            exp(-(chi2 + log_det)/2) over the sum of all. While the target's is not certain, it is
+ *            ambiguous, and another track replaces it as soon as that one is certain. After
+ *            frames with shared detections, and when a new track fits the cue, the identity is open
+ *            again, unless the target has manoeuvred away from the cue. An ambiguity does not end
+ *            because the other track does: the probability stays for max_dormant_s. */
 void bst_target_step(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
                      double seconds, const bst_mtt_track *tracks, int count);
 

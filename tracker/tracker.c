@@ -273,6 +273,7 @@ static void choose_target(bst_tracker *t, const bst_target_cue *cue, double seco
         t->events[t->event_count - 1].statistic = events[i].statistic;
     }
     int64_t before = t->target.id;
+    bool was_ambiguous = t->target.ambiguous;
     const bst_mtt_track *tracks = bst_mtt_tracks(t->mtt, &count);
     bst_target_step(&t->target, &t->target_params, cue, seconds, tracks, count);
     if (t->target.id != before && before != 0) {
@@ -281,6 +282,15 @@ static void choose_target(bst_tracker *t, const bst_target_cue *cue, double seco
     }
     if (t->target.id != before && t->target.id != 0) {
         add_event(t, BST_TRACKER_TARGET_SELECTED, bst_mtt_find(t->mtt, t->target.id));
+        was_ambiguous = was_ambiguous && before != 0;
+    }
+    if (t->target.id != 0 && t->target.ambiguous != was_ambiguous) {
+        add_event(t, was_ambiguous ? BST_TRACKER_TARGET_RESOLVED : BST_TRACKER_TARGET_AMBIGUOUS,
+                  bst_mtt_find(t->mtt, t->target.id));
+        bst_tracker_event *event = &t->events[t->event_count - 1];
+        event->statistic = t->target.probability;
+        event->rival_id = t->target.rival_id;
+        event->rival_probability = t->target.rival_probability;
     }
 }
 
@@ -403,6 +413,19 @@ bool bst_tracker_may_start_orbit(const bst_tracker *t) {
     return may;
 }
 
+/* The part of the cue that chooses the target. */
+static bst_target_cue target_cue(const bst_tracker_cue *cue) {
+    return (bst_target_cue){.valid = cue->valid,
+                            .direction = cue->direction_gcrf,
+                            .rate_radps = cue->rate_gcrf_radps,
+                            .sigma_rad = cue->sigma_rad,
+                            .rate_sigma_radps = cue->rate_sigma_radps,
+                            .v_mag = cue->v_mag,
+                            .v_mag_sigma = cue->v_mag_sigma,
+                            .in_region = cue->in_region,
+                            .belt_eye = cue->belt_eye};
+}
+
 bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *input,
                                      bst_tracks *tracks, int track_capacity,
                                      bst_predictions *predictions, int prediction_capacity) {
@@ -427,34 +450,28 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
                                    .light = light,
                                    .range_m = cue->range_m,
                                    .range_rate_mps = cue->range_rate_mps,
-                                   .cue = {.valid = cue->valid,
-                                           .direction = cue->direction_gcrf,
-                                           .rate_radps = cue->rate_gcrf_radps,
-                                           .sigma_rad = cue->sigma_rad,
-                                           .rate_sigma_radps = cue->rate_sigma_radps,
-                                           .v_mag = cue->v_mag,
-                                           .v_mag_sigma = cue->v_mag_sigma,
-                                           .in_region = cue->in_region,
-                                           .belt_eye = cue->belt_eye}};
-    bst_mtt_frame frame = {.tick = tick,
-                           .seconds = seconds,
-                           .detections = t->detections,
-                           .partial = d->windows > 0,
-                           .bad_pixels = d->bad_pixels,
-                           .charged = count_charge(d),
-                           .in_field = bst_tracker_frame_in_field,
-                           .expected = bst_tracker_frame_is_expected,
-                           .range = bst_tracker_frame_range_of,
-                           .user = &view,
-                           .expected_rate = cue->in_region ? bst_tracker_frame_expected_rate : NULL,
-                           .cue_valid = cue->valid,
-                           .cue_before_valid = t->cue_before.valid,
-                           .cue_direction = cue->direction_gcrf,
-                           .cue_rate_radps = cue->rate_gcrf_radps,
-                           .cue_before_direction = t->cue_before.direction_gcrf,
-                           .cue_before_rate_radps = t->cue_before.rate_gcrf_radps,
-                           .cue_rate_sigma_radps = cue->rate_sigma_radps,
-                           .common_rate_sigma_radps = attitude.rate_sigma_radps};
+                                   .cue = target_cue(cue)};
+    bst_mtt_frame frame = {
+        .tick = tick,
+        .seconds = seconds,
+        .detections = t->detections,
+        .partial = d->windows > 0,
+        .bad_pixels = d->bad_pixels,
+        .charged = count_charge(d),
+        .in_field = bst_tracker_frame_in_field,
+        .expected = bst_tracker_frame_is_expected,
+        .range = bst_tracker_frame_range_of,
+        .user = &view,
+        .boresight = bst_quat_rotate(bst_quat_conj(attitude.q_cam_from_gcrf), (bst_vec3){0, 0, 1}),
+        .expected_rate = cue->in_region ? bst_tracker_frame_expected_rate : NULL,
+        .cue_valid = cue->valid,
+        .cue_before_valid = t->cue_before.valid,
+        .cue_direction = cue->direction_gcrf,
+        .cue_rate_radps = cue->rate_gcrf_radps,
+        .cue_before_direction = t->cue_before.direction_gcrf,
+        .cue_before_rate_radps = t->cue_before.rate_gcrf_radps,
+        .cue_rate_sigma_radps = cue->rate_sigma_radps,
+        .common_rate_sigma_radps = attitude.rate_sigma_radps};
     if (t->orbits && bst_tracker_frame_observer(t, input->nav, seconds, &view.observer)) {
         frame.observer = &view.observer;
         frame.sight = bst_tracker_frame_sight_of;

@@ -85,6 +85,8 @@ typedef enum bst_tracker_event_kind {
     BST_TRACKER_TRACK_RESUMED, /* a lost track is confirmed again under its identity */
     BST_TRACKER_MANOEUVRE,
     BST_TRACKER_BRIGHTNESS_CHANGE,
+    BST_TRACKER_TARGET_AMBIGUOUS, /* another track may be the cue's object */
+    BST_TRACKER_TARGET_RESOLVED,  /* the target's identity has become certain */
 } bst_tracker_event_kind;
 
 typedef struct bst_tracker_event {
@@ -92,8 +94,12 @@ typedef struct bst_tracker_event {
     int64_t track_id; /* 0: not related to a track */
     bst_vec3 direction_gcrf, rate_gcrf_radps;
     double v_mag;
-    /* chi-square of a manoeuvre (2 degrees of freedom) or of a brightness change (1) */
+    /* chi-square of a manoeuvre (2 degrees of freedom) or of a brightness change (1); ambiguous or
+     * resolved: probability that the track is the cue's object */
     double statistic;
+    /* ambiguous: the likeliest other track */
+    int64_t rival_id;
+    double rival_probability;
 } bst_tracker_event;
 
 /* Outcome of a frame. */

@@ -25,7 +25,7 @@ typedef struct bst_deposit_params {
     float x0, y0; /* full-sensor px of the grid's first sample, whole */
     /* samples per px: a multiple of 1 / BST_DENSITY_PARTS, and the rest */
     float coarse_x, coarse_y, finer_x, finer_y;
-    int samples_x, samples_y;   /* multiples of 16 */
+    int samples_x, samples_y; /* multiples of 16 */
     int tiles_x, tiles_y;
     int source_groups;
     int spectrum; /* spectrum whose light is deposited */

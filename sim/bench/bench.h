@@ -77,6 +77,9 @@ bst_status bst_bench_imgproc(bst_ctx *ctx, const bst_bench *self, const bst_benc
 /* Benchmark: stacks of 16 frames of 2048 x 2048 pixels, per frame (bench_stack.c). */
 bst_status bst_bench_stack(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
                            bst_bench_result *out) BST_MUST_CHECK;
+/* Benchmark: the tracker on made-up detections (bench_tracker.c). */
+bst_status bst_bench_tracker(bst_ctx *ctx, const bst_bench *self, const bst_bench_options *options,
+                             bst_bench_result *out) BST_MUST_CHECK;
 /* Benchmark: a light curve of a satellite with a shape, per epoch (bench_lightcurve.c). */
 bst_status bst_bench_lightcurve(bst_ctx *ctx, const bst_bench *self,
                                 const bst_bench_options *options,

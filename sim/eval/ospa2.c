@@ -6,169 +6,194 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/core/arena.h"
-#include "sim/eval/gospa.h"
+#include "sim/eval/growing.h"
 
-/* A frame of the window. */
-typedef struct slot {
-    int tracks;
-    int64_t *id;      /* [tracks] */
-    bool *visible;    /* [objects] */
-    double *distance; /* [object * max_at_once + track], limited to the cutoff */
-} slot;
+/* Longest window: frames are bits. */
+enum { MOST_FRAMES = 32 };
+
+/* An object or a track of the window. */
+typedef struct member {
+    int64_t id;
+    uint64_t frames; /* bit k: it existed k frames before the latest */
+} member;
+
+/* An object and a track that were nearer than the cutoff in a frame of the window. */
+typedef struct encounter {
+    int64_t object, track;
+    uint64_t frames;              /* in which they were */
+    double distance[MOST_FRAMES]; /* of frame n at n % window */
+} encounter;
 
 struct bst_ospa2 {
-    bst_arena arena; /* of all arrays below */
     bst_ospa2_params params;
     int64_t frames;
-    slot *slots;    /* [window] */
-    int64_t *ids;   /* identities in the window */
-    int *present;   /* number of frames of the window with that identity */
-    int *row;       /* objects in the window */
-    double *matrix; /* [row * identities + identity] mean distance */
+    member *object, *track;
+    int objects, tracks, object_room, track_room;
+    encounter *near;
+    int nears, near_room;
+    bst_gospa_pair *pair;
+    int pair_room;
 };
-
-static void lay_out(bst_ospa2 *o) {
-    size_t objects = (size_t)o->params.objects + 1, now = (size_t)o->params.max_at_once;
-    size_t window = (size_t)o->params.window;
-    BST_ARENA_TAKE(&o->arena, o->slots, window);
-    BST_ARENA_TAKE(&o->arena, o->ids, now * window);
-    BST_ARENA_TAKE(&o->arena, o->present, now * window);
-    BST_ARENA_TAKE(&o->arena, o->row, objects);
-    BST_ARENA_TAKE(&o->arena, o->matrix, objects * now * window);
-    for (size_t k = 0; k < window; k++) {
-        slot part = {0};
-        BST_ARENA_TAKE(&o->arena, part.id, now);
-        BST_ARENA_TAKE(&o->arena, part.visible, objects);
-        BST_ARENA_TAKE(&o->arena, part.distance, objects * now);
-        if (o->slots) {
-            o->slots[k] = part;
-        }
-    }
-}
 
 bst_status bst_ospa2_create(bst_ctx *ctx, const bst_ospa2_params *params, bst_ospa2 **out) {
     *out = NULL;
-    if (params->objects < 0 || params->max_at_once < 1 || params->window < 1 ||
-        !(params->cutoff > 0.0) || !(params->order >= 1.0)) {
+    if (params->window < 1 || params->window > MOST_FRAMES || !(params->cutoff > 0.0) ||
+        !(params->order >= 1.0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "ospa2: needs room for a track, a window of at least a frame, a cutoff > 0 "
-                        "and an order >= 1");
+                        "ospa2: needs a window of 1 to %d frames, a cutoff > 0 and an order >= 1",
+                        MOST_FRAMES);
     }
     bst_ospa2 *o = calloc(1, sizeof *o);
     if (!o) {
         return bst_fail(ctx, BST_ERR_MEMORY, "ospa2: out of memory");
     }
     o->params = *params;
-    lay_out(o);
-    bst_status status = bst_arena_alloc(ctx, &o->arena, "the window of OSPA(2)");
-    if (status != BST_OK) {
-        bst_ospa2_free(o);
-        return status;
-    }
-    lay_out(o);
     *out = o;
     return BST_OK;
 }
 
 void bst_ospa2_free(bst_ospa2 *o) {
     if (o) {
-        bst_arena_free(&o->arena);
+        free(o->object);
+        free(o->track);
+        free(o->near);
+        free(o->pair);
         free(o);
     }
 }
 
-/* Stores a frame in the window. */
-static void store(bst_ospa2 *o, const bst_ospa2_input *frame) {
-    int tracks = frame->tracks;
-    slot *s = &o->slots[o->frames % o->params.window];
-    s->tracks = tracks;
-    memset(s->visible, 0, (size_t)o->params.objects * sizeof *s->visible);
-    if (tracks > 0) {
-        memcpy(s->id, frame->track_ids, (size_t)tracks * sizeof *s->id);
-    }
-    for (int r = 0; r < frame->rows; r++) {
-        int object = frame->object[r];
-        assert(object >= 0 && object < o->params.objects);
-        s->visible[object] = true;
-        for (int t = 0; t < tracks; t++) {
-            s->distance[object * o->params.max_at_once + t] =
-                fmin(frame->distance[r * tracks + t], o->params.cutoff);
-        }
-    }
-    o->frames++;
+bst_status bst_ospa2_archive(bst_ospa2 *o, bst_archive *archive) {
+    BST_ARCHIVE(archive, o->frames);
+    BST_TRY(bst_grow_archive(archive, (void **)&o->object, &o->objects, &o->object_room,
+                             sizeof *o->object));
+    BST_TRY(bst_grow_archive(archive, (void **)&o->track, &o->tracks, &o->track_room,
+                             sizeof *o->track));
+    return bst_grow_archive(archive, (void **)&o->near, &o->nears, &o->near_room, sizeof *o->near);
 }
 
-/* Collects the identities of the window. Returns their number. */
-static int collect(bst_ospa2 *o, int slots) {
-    int count = 0;
-    for (int k = 0; k < slots; k++) {
-        for (int t = 0; t < o->slots[k].tracks; t++) {
-            int i = 0;
-            while (i < count && o->ids[i] != o->slots[k].id[t]) {
-                i++;
-            }
-            if (i == count) {
-                o->ids[count] = o->slots[k].id[t];
-                o->present[count++] = 0;
-            }
-            o->present[i]++;
+/* Moves the window on by a frame, and removes what is no longer in it. */
+static int age(member *members, int count, uint64_t window) {
+    int kept = 0;
+    for (int i = 0; i < count; i++) {
+        members[i].frames = (members[i].frames << 1) & window;
+        if (members[i].frames != 0) {
+            members[kept++] = members[i];
         }
+    }
+    return kept;
+}
+
+/* Index of a member; -1: it is not there. Identities come in about the same order in each frame:
+ * the search begins at `hint`. */
+static int find_member(const member *members, int count, int64_t id, int hint) {
+    for (int n = 0; n < count; n++) {
+        int i = (hint + n) % count;
+        if (members[i].id == id) {
+            return i;
+        }
+    }
+    return -1;
+}
+
+/* Marks the members that exist in the latest frame; new ones are added. */
+static bst_status mark(bst_ctx *ctx, const int64_t *ids, int count, member **members, int *size,
+                       int *room) {
+    int hint = 0;
+    for (int i = 0; i < count; i++) {
+        int at = find_member(*members, *size, ids[i], hint);
+        if (at < 0) {
+            BST_TRY(bst_grow(ctx, (void **)members, *size + 1, room, sizeof **members));
+            at = (*size)++;
+            (*members)[at] = (member){.id = ids[i]};
+        }
+        (*members)[at].frames |= 1u;
+        hint = at + 1;
+    }
+    return BST_OK;
+}
+
+/* Adds the pairs of the latest frame. */
+static bst_status meet(bst_ctx *ctx, bst_ospa2 *o, const bst_ospa2_input *frame) {
+    int hint = 0;
+    for (int i = 0; i < frame->count; i++) {
+        const bst_gospa_pair *pair = &frame->pairs[i];
+        if (!(pair->distance < o->params.cutoff)) {
+            continue;
+        }
+        int64_t object = frame->objects[pair->truth], track = frame->track_ids[pair->track];
+        int at = -1;
+        for (int n = 0; n < o->nears && at < 0; n++) {
+            int k = (hint + n) % o->nears;
+            at = o->near[k].object == object && o->near[k].track == track ? k : -1;
+        }
+        if (at < 0) {
+            BST_TRY(bst_grow(ctx, (void **)&o->near, o->nears + 1, &o->near_room, sizeof *o->near));
+            at = o->nears++;
+            o->near[at] = (encounter){.object = object, .track = track};
+        }
+        o->near[at].frames |= 1u;
+        o->near[at].distance[o->frames % o->params.window] = pair->distance;
+        hint = at + 1;
+    }
+    return BST_OK;
+}
+
+static int count_bits(uint64_t bits) {
+    int count = 0;
+    for (; bits != 0; bits &= bits - 1) {
+        count++;
     }
     return count;
 }
 
-/* Mean distance of an object and an identity over the window. */
-static double mean_distance(const bst_ospa2 *o, int slots, int object, int identity) {
-    int visible = 0, both = 0;
+/* Mean distance over the window of a pair that was near in at least one frame. */
+static double mean_distance(const bst_ospa2 *o, const encounter *near, uint64_t either) {
+    int window = o->params.window, frames = count_bits(either), apart = frames;
     double sum = 0.0;
-    for (int k = 0; k < slots; k++) {
-        const slot *s = &o->slots[k];
-        if (!s->visible[object]) {
-            continue;
-        }
-        visible++;
-        for (int t = 0; t < s->tracks; t++) {
-            if (s->id[t] == o->ids[identity]) {
-                sum += s->distance[object * o->params.max_at_once + t];
-                both++;
-                break;
-            }
+    for (int k = 0; k < window; k++) {
+        if (near->frames >> k & 1u) {
+            sum += near->distance[(o->frames - k) % window];
+            apart--;
         }
     }
-    int either = visible + o->present[identity] - both;
-    return (sum + o->params.cutoff * (either - both)) / either;
+    return (sum + o->params.cutoff * apart) / frames;
 }
 
 bst_status bst_ospa2_frame(bst_ctx *ctx, bst_ospa2 *o, const bst_ospa2_input *frame,
                            double *value) {
-    if (frame->tracks > o->params.max_at_once || frame->rows > o->params.objects ||
-        frame->tracks < 0 || frame->rows < 0) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "ospa2: %d objects and %d tracks in a frame, room for %d and %d",
-                        frame->rows, frame->tracks, o->params.objects, o->params.max_at_once);
-    }
-    store(o, frame);
-    int slots = o->frames < o->params.window ? (int)o->frames : o->params.window;
-    int identities = collect(o, slots), objects = 0;
-    for (int i = 0; i < o->params.objects; i++) {
-        bool seen = false;
-        for (int k = 0; k < slots && !seen; k++) {
-            seen = o->slots[k].visible[i];
-        }
-        if (seen) {
-            for (int j = 0; j < identities; j++) {
-                o->matrix[objects * identities + j] = mean_distance(o, slots, i, j);
-            }
-            o->row[objects++] = i;
+    assert(o && frame && value && frame->rows >= 0 && frame->tracks >= 0 && frame->count >= 0);
+    uint64_t window = (UINT64_C(1) << o->params.window) - 1u;
+    o->frames++;
+    o->objects = age(o->object, o->objects, window);
+    o->tracks = age(o->track, o->tracks, window);
+    int kept = 0;
+    for (int i = 0; i < o->nears; i++) {
+        o->near[i].frames = (o->near[i].frames << 1) & window;
+        if (o->near[i].frames != 0) {
+            o->near[kept++] = o->near[i];
         }
     }
+    o->nears = kept;
+    BST_TRY(mark(ctx, frame->objects, frame->rows, &o->object, &o->objects, &o->object_room));
+    BST_TRY(mark(ctx, frame->track_ids, frame->tracks, &o->track, &o->tracks, &o->track_room));
+    BST_TRY(meet(ctx, o, frame));
+    BST_TRY(bst_grow(ctx, (void **)&o->pair, o->nears + 1, &o->pair_room, sizeof *o->pair));
+    int row = 0, column = 0;
+    for (int i = 0; i < o->nears; i++) {
+        const encounter *near = &o->near[i];
+        row = find_member(o->object, o->objects, near->object, row);
+        column = find_member(o->track, o->tracks, near->track, column);
+        assert(row >= 0 && column >= 0);
+        uint64_t either = o->object[row].frames | o->track[column].frames;
+        o->pair[i] = (bst_gospa_pair){row, column, mean_distance(o, near, either)};
+    }
+    const bst_gospa_problem problem = {o->pair,   o->nears,         o->objects,
+                                       o->tracks, o->params.cutoff, o->params.order};
     bst_gospa_result g;
-    BST_TRY(bst_gospa(ctx, o->matrix, objects, identities, o->params.cutoff, o->params.order, NULL,
-                      &g));
+    BST_TRY(bst_gospa_near(ctx, &problem, NULL, &g));
     /* OSPA: every object or track beyond the pairs of the larger set costs the cutoff, and so does
      * a pair at the cutoff, which GOSPA counts as a miss and a false track */
-    int larger = objects > identities ? objects : identities;
+    int larger = o->objects > o->tracks ? o->objects : o->tracks;
     double power = g.localisation + pow(o->params.cutoff, o->params.order) * (larger - g.pairs);
     *value = larger > 0 ? pow(power / larger, 1.0 / o->params.order) : 0.0;
     return BST_OK;

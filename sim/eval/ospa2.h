@@ -6,15 +6,14 @@
 
 #include <stdint.h>
 
-#include "boresight/status.h"
+#include "boresight/archive.h"
+#include "sim/eval/gospa.h"
 
 typedef struct bst_ospa2 bst_ospa2;
 
 typedef struct bst_ospa2_params {
-    int objects;     /* true objects */
-    int max_at_once; /* most tracks in a frame */
-    int window;      /* frames of the window */
-    double cutoff;   /* in the unit of the distances */
+    int window;    /* frames of the window, 1 to 32 */
+    double cutoff; /* in the unit of the distances */
     double order;
 } bst_ospa2_params;
 
@@ -27,13 +26,19 @@ bst_status bst_ospa2_create(bst_ctx *ctx, const bst_ospa2_params *params,
 /* Frees the window; NULL is allowed. */
 void bst_ospa2_free(bst_ospa2 *ospa2);
 
-/* A frame: distances, visible objects and tracks. */
+/* Saves or restores the window.
+ *
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_ospa2_archive(bst_ospa2 *ospa2, bst_archive *archive) BST_MUST_CHECK;
+
+/* A frame: visible objects, tracks, and the pairs of them nearer than the cutoff. */
 typedef struct bst_ospa2_input {
-    const double *distance; /* [rows * tracks] between object object[i] and track j, >= 0 */
-    const int *object;      /* [rows] indices of the visible objects */
+    const int64_t *objects; /* [rows] identities of the visible objects */
     int rows;
     const int64_t *track_ids; /* [tracks] identities */
     int tracks;
+    const bst_gospa_pair *pairs; /* [count] indices into objects and track_ids */
+    int count;
 } bst_ospa2_input;
 
 /* Adds a frame and computes OSPA(2) over the latest `window` frames.

@@ -3,18 +3,28 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/eval/frame_scores.h"
+#include "sim/eval/growing.h"
+
 /* frames whose truth is kept for late messages: 1 s of latency at 60 Hz */
 enum { WAITING = 64 };
+
+/* Threshold of a detector that states none, SNR. */
+static const double USUAL_THRESHOLD_SNR = 5.0;
 
 typedef struct known_object {
     uint32_t id;
     bst_vec3 direction; /* geometric with light time, mid-exposure */
     double x_px, y_px;  /* mean over the exposure */
-    bool lit;           /* not occulted and illuminated */
+    double snr;
+    bool lit; /* not occulted and illuminated */
 } known_object;
 
 typedef struct known_frame {
     int64_t exposure_id; /* -1: none */
+    double mid_tick;
+    bst_quat q_cam_from_gcrf;
+    bst_light light;
     known_object *objects;
     int count, room;
 } known_frame;
@@ -33,6 +43,10 @@ struct bst_run_metrics {
     uint8_t *objects; /* [objects of the world] bit 0: seen, bit 1: tracked */
     int object_count;
     bst_error_statistics track_error;
+    double threshold_snr; /* of the latest detections that state one */
+    bst_frame_scores *scores;
+    bst_scored_object *scored; /* work space of a frame */
+    int scored_room;
     bst_run_metric_figures figures;
 };
 
@@ -54,6 +68,13 @@ bst_status bst_run_metrics_create(bst_ctx *ctx, const bst_world *world, int obse
     for (int i = 0; i < WAITING; i++) {
         m->frames[i].exposure_id = -1;
     }
+    m->threshold_snr = USUAL_THRESHOLD_SNR;
+    bst_status status = bst_frame_scores_create(
+        ctx, objects, BST_RIGHT_TARGET_PX * bst_camera_scale_rad(&m->camera), &m->scores);
+    if (status != BST_OK) {
+        bst_run_metrics_free(m);
+        return status;
+    }
     *out = m;
     return BST_OK;
 }
@@ -63,6 +84,8 @@ void bst_run_metrics_free(bst_run_metrics *m) {
         for (int i = 0; i < WAITING; i++) {
             free(m->frames[i].objects);
         }
+        bst_frame_scores_free(m->scores);
+        free(m->scored);
         free(m->tracks);
         free(m->objects);
         free(m);
@@ -79,6 +102,9 @@ static bool make_room(void **items, int64_t room, size_t item_bytes) {
 /* Saves or restores a frame that waits for late messages. */
 static bool archive_frame(known_frame *f, bst_archive *archive, int most) {
     BST_ARCHIVE(archive, f->exposure_id);
+    BST_ARCHIVE(archive, f->mid_tick);
+    BST_ARCHIVE(archive, f->q_cam_from_gcrf);
+    BST_ARCHIVE(archive, f->light);
     f->count = bst_archive_count(archive, f->count, most);
     if (bst_archive_is_restoring(archive) && f->count > f->room) {
         if (!make_room((void **)&f->objects, f->count, sizeof *f->objects)) {
@@ -92,6 +118,7 @@ static bool archive_frame(known_frame *f, bst_archive *archive, int most) {
         BST_ARCHIVE(archive, object->direction);
         BST_ARCHIVE(archive, object->x_px);
         BST_ARCHIVE(archive, object->y_px);
+        BST_ARCHIVE(archive, object->snr);
         bst_archive_bool(archive, &object->lit);
     }
     return true;
@@ -118,7 +145,8 @@ bst_status bst_run_metrics_archive(bst_run_metrics *m, bst_archive *archive) {
     bst_archive_bytes(archive, m->objects, (size_t)m->object_count);
     bst_error_statistics_archive(&m->track_error, archive);
     BST_ARCHIVE(archive, m->figures);
-    return BST_OK;
+    BST_ARCHIVE(archive, m->threshold_snr);
+    return bst_frame_scores_archive(m->scores, archive);
 }
 
 static const known_frame *find_frame(const bst_run_metrics *m, int64_t exposure_id) {
@@ -142,6 +170,9 @@ bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_tru
     m->newest = (m->newest + 1) % WAITING;
     known_frame *f = &m->frames[m->newest];
     f->exposure_id = truth->exposure_id;
+    f->mid_tick = 0.5 * (double)(truth->start_tick + truth->end_tick);
+    f->q_cam_from_gcrf = truth->q_cam_from_gcrf_mid;
+    f->light = (bst_light){.velocity_mps = truth->velocity_bary_mps, .sun_m = truth->sun_m};
     f->count = 0;
     for (int i = 0; i < truth->count; i++) {
         const bst_truth_item *item = &truth->items[i];
@@ -163,6 +194,7 @@ bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_tru
                             cos(item->dec_rad) * sin(item->ra_rad), sin(item->dec_rad)},
                            item->x_centroid_px,
                            item->y_centroid_px,
+                           item->snr,
                            !(item->flags & BST_TRUTH_OCCULTED) && item->snr > 0.0};
         if (item->id < (uint32_t)m->object_count) {
             m->objects[item->id] |= 1;
@@ -175,6 +207,8 @@ void bst_run_metrics_detections(bst_run_metrics *m, const bst_detections *detect
     bst_run_losses *lost = &m->figures.losses;
     m->figures.detections += detections->count;
     m->figures.bad_pixels = detections->bad_pixels;
+    m->threshold_snr =
+        detections->threshold_snr > 0.0 ? detections->threshold_snr : m->threshold_snr;
     lost->detections += detections->lost;
     lost->detection_frames += detections->lost > 0;
     lost->no_stars_frames += detections->stars_identified == 0;
@@ -228,6 +262,23 @@ static void add_track_error(bst_run_metrics *m, bst_vec3 direction, bst_vec3 tru
                              bst_vec3_dot(error, bst_vec3_cross(truth, east)) / scale_rad);
 }
 
+/* Scores all tracks of a frame against all objects in the field. */
+static bst_status score_tracks(bst_ctx *ctx, bst_run_metrics *m, const known_frame *f,
+                               const bst_tracks *tracks) {
+    BST_TRY(bst_grow(ctx, (void **)&m->scored, f->count + 1, &m->scored_room, sizeof *m->scored));
+    int count = 0;
+    for (int o = 0; o < f->count; o++) {
+        const known_object *object = &f->objects[o];
+        if (object->id < (uint32_t)m->object_count) {
+            m->scored[count++] = (bst_scored_object){
+                object->id, object->direction, object->lit && object->snr >= m->threshold_snr};
+        }
+    }
+    const bst_scored_frame frame = {&m->camera, f->mid_tick, f->q_cam_from_gcrf,
+                                    f->light,   m->scored,   count};
+    return bst_frame_scores_add(ctx, m->scores, &frame, tracks);
+}
+
 bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *m, const bst_tracks *tracks) {
     const known_frame *f = find_frame(m, tracks->exposure_id);
     double scale = bst_camera_scale_rad(&m->camera);
@@ -267,7 +318,7 @@ bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *m, const bst_tr
             m->objects[nearest->id] |= 2;
         }
     }
-    return BST_OK;
+    return f ? score_tracks(ctx, m, f, tracks) : BST_OK;
 }
 
 void bst_run_metrics_frame(bst_run_metrics *m, const bst_loop_frame *frame) {
@@ -288,6 +339,15 @@ void bst_run_metrics_figures(const bst_run_metrics *m, bst_run_metric_figures *o
     out->track_median_px = bst_error_statistics_quantile(&m->track_error, 0.5);
     out->track_p95_px = bst_error_statistics_quantile(&m->track_error, 0.95);
     out->track_max_px = bst_error_statistics_largest(&m->track_error);
+    bst_track_figures scores;
+    bst_frame_scores_figures(m->scores, &scores);
+    double scale = bst_camera_scale_rad(&m->camera);
+    out->scored_frames = scores.frames;
+    out->gospa_px = scores.gospa_mean / scale;
+    out->ospa2_px = scores.ospa2_mean / scale;
+    out->purity = scores.purity;
+    out->id_switches = scores.breaks;
+    out->ghosts = scores.ghosts;
     out->tracks = m->track_count;
     for (int64_t i = 0; i < m->track_count; i++) {
         out->false_tracks += 2 * m->tracks[i].near_frames < m->tracks[i].frames;

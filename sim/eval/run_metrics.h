@@ -32,6 +32,11 @@ typedef struct bst_run_metric_figures {
     double track_rms_px, track_median_px, track_p95_px, track_max_px;
     /* confirmed tracks by identity; false: no object nearby in most of its frames */
     int64_t tracks, false_tracks;
+    /* of all confirmed tracks against all objects in the field (frame_scores.h); NAN without any */
+    int64_t scored_frames;
+    double gospa_px, ospa2_px; /* cutoff BST_RIGHT_TARGET_PX, order 2; means over scored_frames */
+    double purity;
+    int64_t id_switches, ghosts;
     int64_t bad_pixels;      /* learned by image processing up to the latest frame */
     int64_t objects_seen;    /* objects that were in the field */
     int64_t objects_tracked; /* ever near a confirmed track */

@@ -6,7 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "boresight/status.h"
+#include "boresight/archive.h"
 #include "boresight/vec.h"
 
 /* Frames of the window of OSPA(2). */
@@ -33,20 +33,35 @@ typedef struct bst_track_figures {
     int ghosts; /* tracks without an object for more than BST_TRACK_GHOST_FRAMES frames in a row */
 } bst_track_figures;
 
-/* Creates the metrics for `objects` true objects, up to max_tracks track identities and max_at_once
- * tracks in a frame. Pairs are nearer than cutoff_rad. The caller frees them. */
-bst_status bst_track_metrics_create(bst_ctx *ctx, int objects, int max_tracks, int max_at_once,
-                                    double cutoff_rad, bst_track_metrics **out) BST_MUST_CHECK;
+/* Creates the metrics for true objects 0 to objects - 1. Pairs are nearer than cutoff_rad. The
+ * caller frees them. */
+bst_status bst_track_metrics_create(bst_ctx *ctx, int objects, double cutoff_rad,
+                                    bst_track_metrics **out) BST_MUST_CHECK;
 /* Frees the metrics of tracks; NULL is allowed. */
 void bst_track_metrics_free(bst_track_metrics *metrics);
 
-/* Adds a frame, later than the previous one: true directions (unit) and visibility of all objects,
- * and the confirmed tracks. bst_gospa pairs objects and tracks. BST_ERR_ARGUMENT: too many tracks
- * in a frame or too many identities. */
-bst_status bst_track_metrics_frame(bst_ctx *ctx, bst_track_metrics *metrics, double seconds,
-                                   const bst_vec3 *truth, const bool *visible,
-                                   const int64_t *track_ids, const bst_vec3 *track_directions,
-                                   int tracks) BST_MUST_CHECK;
+/* Saves or restores the metrics.
+ *
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_track_metrics_archive(bst_track_metrics *metrics,
+                                     bst_archive *archive) BST_MUST_CHECK;
+
+/* A frame: the visible objects and the confirmed tracks. */
+typedef struct bst_track_frame {
+    double seconds;
+    const int64_t *objects; /* [visible] numbers of the visible objects, each once */
+    const bst_vec3 *truth;  /* [visible] their true directions, unit */
+    int visible;
+    const int64_t *track_ids;
+    const bst_vec3 *track_directions; /* [tracks] unit */
+    int tracks;
+} bst_track_frame;
+
+/* Adds a frame, later than the previous one. bst_gospa_near pairs objects and tracks.
+ *
+ * Errors:    BST_ERR_ARGUMENT, BST_ERR_MEMORY */
+bst_status bst_track_metrics_frame(bst_ctx *ctx, bst_track_metrics *metrics,
+                                   const bst_track_frame *frame) BST_MUST_CHECK;
 
 /* Computes the figures of tracks over all frames so far; NAN without frames. */
 void bst_track_metrics_figures(const bst_track_metrics *metrics, bst_track_figures *out);

@@ -122,6 +122,9 @@ typedef struct bst_report_sensor {
     int64_t bad_pixels;      /* learned by image processing until the end */
     int64_t track_frames;    /* frames with track errors in the summary; 0: none */
     double track_rms_px, track_median_px, track_p95_px, track_max_px;
+    /* all tracks against all objects, from the summary; 0 and NAN: none */
+    int64_t scored_frames, id_switches, ghosts;
+    double gospa_px, ospa2_px, track_purity;
     bool has_truth;    /* the true direction of the target is known in some frame */
     bool has_tracks;   /* tracks were recorded */
     size_t task_count; /* number of successive targets */

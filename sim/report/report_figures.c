@@ -82,7 +82,10 @@ static void take_summary(bst_report_sensor *s, const cJSON *summary) {
                  {"track_rms_px", &s->track_rms_px},
                  {"track_median_px", &s->track_median_px},
                  {"track_p95_px", &s->track_p95_px},
-                 {"track_max_px", &s->track_max_px}};
+                 {"track_max_px", &s->track_max_px},
+                 {"gospa_px", &s->gospa_px},
+                 {"ospa2_px", &s->ospa2_px},
+                 {"track_purity", &s->track_purity}};
     const struct {
         const char *key;
         int64_t *value;
@@ -92,7 +95,10 @@ static void take_summary(bst_report_sensor *s, const cJSON *summary) {
                   {"wrong_target_frames", &f->wrong_target_frames},
                   {"pointing_frames", &f->pointing_frames},
                   {"bad_pixels", &s->bad_pixels},
-                  {"track_frames", &s->track_frames}};
+                  {"track_frames", &s->track_frames},
+                  {"scored_frames", &s->scored_frames},
+                  {"id_switches", &s->id_switches},
+                  {"ghosts", &s->ghosts}};
     for (size_t k = 0; k < sizeof reals / sizeof *reals; k++) {
         take_real(summary, reals[k].key, reals[k].value);
     }
@@ -118,7 +124,8 @@ void bst_report_judge(bst_report_sensor *s, const cJSON *summary) {
                                  .time_to_acquire_s = NAN,
                                  .time_to_settle_s = NAN};
     s->real_time_factor = NAN;
-    s->track_frames = 0;
+    s->track_frames = s->scored_frames = s->id_switches = s->ghosts = 0;
+    s->gospa_px = s->ospa2_px = s->track_purity = NAN;
     s->track_rms_px = s->track_median_px = s->track_p95_px = s->track_max_px = NAN;
     mark(s);
     for (size_t i = 0; tally && i < s->count; i++) {

@@ -197,6 +197,25 @@ static int64_t count_of(const page *p, const char *sql, int sensor) {
     return bst_run_reader_int(p->run, sql, p->sensors[sensor].sensor.index, 0);
 }
 
+/* Writes the scores of all tracks against all objects in the field. */
+static void put_scores(FILE *out, const bst_report_sensor *s) {
+    char text[32], note[200], word[32], switches[64], ghosts[64];
+    if (s->scored_frames == 0 || !isfinite(s->gospa_px)) {
+        return;
+    }
+    snprintf(note, sizeof note, "all tracks against all objects; OSPA(2) %s px",
+             bst_report_page_number(word, s->ospa2_px, 3));
+    bst_report_page_card(out, bst_report_page_number(text, s->gospa_px, 3), "px", "GOSPA", note);
+    if (isfinite(s->track_purity)) {
+        snprintf(note, sizeof note, "%s, %s",
+                 bst_text_of_count(switches, s->id_switches, "change of identity",
+                                   "changes of identity"),
+                 bst_text_of_count(ghosts, s->ghosts, "ghost", "ghosts"));
+        bst_report_page_card(out, bst_report_page_number(text, 100.0 * s->track_purity, 4), "%",
+                             "track purity", note);
+    }
+}
+
 /* Writes the key figures of a sensor: custody, acquisition, pointing, detections, speed. */
 static void put_cards(const page *p, int i) {
     const bst_report_sensor *s = &p->sensors[i];
@@ -221,6 +240,7 @@ static void put_cards(const page *p, int i) {
         bst_report_page_card(p->out, f->final_mode >= 0 ? bst_mode_name(f->final_mode) : "-", "",
                              "mode at the end", "");
     }
+    put_scores(p->out, s);
     snprintf(text, sizeof text, "%" PRId64, f->frames);
     bst_report_page_card(p->out, text, "", "exposures", "");
     int64_t frames = count_of(p, "SELECT count(*) FROM detection_frames WHERE sensor = ?1", i);

@@ -195,6 +195,8 @@ static void add_events(const bst_run_reader *run, bst_report_warnings *w) {
         {"track_confirmed", -1, ""},
         {"track_resumed", -1, ""},
         {"target_lost", BST_SEVERITY_WARNING, "the track of the target was given up"},
+        {"target_ambiguous", BST_SEVERITY_WARNING, "several tracks may have been the cue's object"},
+        {"target_resolved", BST_SEVERITY_NOTE, "the identity of the target became certain"},
         {"track_lost", BST_SEVERITY_NOTE, "a track was given up"},
         {"attitude_lost", BST_SEVERITY_WARNING, "stars no longer gave an attitude"},
         {"attitude_unknown", BST_SEVERITY_WARNING, "the attitude was unknown"},

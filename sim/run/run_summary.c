@@ -47,6 +47,12 @@ cJSON *bst_run_summary_json(const bst_run_sensor_figures *figures, double real_t
     bst_json_add_number(node, "track_max_px", m->track_max_px);
     add_count(node, "tracks", m->tracks);
     add_count(node, "false_tracks", m->false_tracks);
+    add_count(node, "scored_frames", m->scored_frames);
+    bst_json_add_number(node, "gospa_px", m->gospa_px);
+    bst_json_add_number(node, "ospa2_px", m->ospa2_px);
+    bst_json_add_number(node, "track_purity", m->purity);
+    add_count(node, "id_switches", m->id_switches);
+    add_count(node, "ghosts", m->ghosts);
     add_count(node, "bad_pixels", m->bad_pixels);
     return node;
 }

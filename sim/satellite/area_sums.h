@@ -1,5 +1,5 @@
-/* Light of polygons by cell, as sums over their edges: exact areas with first and second moments. Internal to
- * sim/satellite. */
+/* Light of polygons by cell, as sums over their edges: exact areas with first and second moments.
+ * Internal to sim/satellite. */
 #ifndef BST_SATELLITE_AREA_SUMS_H
 #define BST_SATELLITE_AREA_SUMS_H
 

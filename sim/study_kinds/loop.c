@@ -140,6 +140,11 @@ enum {
     TRACK_P95,
     TRACKS,
     FALSE_TRACKS,
+    GOSPA,
+    OSPA2,
+    TRACK_PURITY,
+    ID_SWITCHES,
+    GHOSTS,
     OBJECTS_SEEN,
     OBJECTS_TRACKED,
     METRICS, /* of one sensor; the following ones are of all sensors together */
@@ -208,6 +213,16 @@ _Static_assert((int)ALL_METRICS <= (int)BST_STUDY_METRICS &&
     [TRACKS] = {"tracks", "", "Confirmed tracks.", BST_METRIC_VALUE},                             \
     [FALSE_TRACKS] = {"false_tracks", "", "Of them: near no object in most of their frames.",     \
                       BST_METRIC_VALUE},                                                          \
+    [GOSPA] = {"gospa_px", "px", "GOSPA of all tracks against all objects in the field, mean.",   \
+               BST_METRIC_VALUE},                                                                 \
+    [OSPA2] = {"ospa2_px", "px", "OSPA(2) of the same over 10 frames, mean.", BST_METRIC_VALUE},  \
+    [TRACK_PURITY] = {"track_purity", "",                                                         \
+                      "Share of the frames of tracks with the object that each has most often.",  \
+                      BST_METRIC_VALUE},                                                          \
+    [ID_SWITCHES] = {"id_switches", "", "Objects' changes to a track of another number.",         \
+                     BST_METRIC_VALUE},                                                           \
+    [GHOSTS] = {"ghosts", "", "Tracks without an object for more than three frames in a row.",    \
+                BST_METRIC_VALUE},                                                                \
     [OBJECTS_SEEN] = {"objects_seen", "", "Objects that were in the field.", BST_METRIC_VALUE},   \
     [OBJECTS_TRACKED] = {"objects_tracked", "", "Of them: those with a confirmed track.",         \
                          BST_METRIC_VALUE}
@@ -269,6 +284,11 @@ static void fill(const bst_run_sensor_figures *f, double *out) {
     out[TRACK_P95] = m->track_p95_px;
     out[TRACKS] = (double)m->tracks;
     out[FALSE_TRACKS] = (double)m->false_tracks;
+    out[GOSPA] = m->gospa_px;
+    out[OSPA2] = m->ospa2_px;
+    out[TRACK_PURITY] = m->purity;
+    out[ID_SWITCHES] = (double)m->id_switches;
+    out[GHOSTS] = (double)m->ghosts;
     out[OBJECTS_SEEN] = (double)m->objects_seen;
     out[OBJECTS_TRACKED] = (double)m->objects_tracked;
 }

@@ -303,6 +303,68 @@ static void another_target(void **state) {
     assert_int_equal(m.detected_frames, 2);
 }
 
+/* Adds a frame with objects 0 and 1 at the threshold and object 2 below it, and its tracks, by
+ * hand: the camera looks at object 1. */
+static void score(fixture *f, int64_t id, const bst_track *tracks, int count) {
+    f->truth->q_cam_from_gcrf_mid =
+        bst_quat_look(bst_vec3_from_radec(2.0, dec_of(1)), (bst_vec3){0, 0, 1});
+    f->truth->sun_m = (bst_vec3){0, 1.5e11, 0};
+    f->truth->exposure_id = id;
+    f->truth->count = OBJECTS;
+    for (int i = 0; i < OBJECTS; i++) {
+        f->truth->items[i] = (bst_truth_item){.kind = BST_SOURCE_OBJECT,
+                                              .id = (uint32_t)i,
+                                              .flags = BST_TRUTH_IN_FIELD,
+                                              .ra_rad = 2.0,
+                                              .dec_rad = dec_of(i),
+                                              .snr = i < 2 ? 6.0 : 5.9};
+    }
+    bst_assert_ok(&f->ctx, bst_run_metrics_truth(&f->ctx, f->metrics, f->truth));
+    f->detections->exposure_id = id;
+    f->detections->count = 0;
+    f->detections->threshold_snr = 6.0;
+    bst_run_metrics_detections(f->metrics, f->detections);
+    f->tracks->exposure_id = id;
+    f->tracks->count = count;
+    memcpy(f->tracks->items, tracks, (size_t)count * sizeof *tracks);
+    bst_assert_ok(&f->ctx, bst_run_metrics_tracks(&f->ctx, f->metrics, f->tracks));
+}
+
+/* First frame: track 1 is 1 px from object 0, object 1 is missed, track 2 is false; track 3 on an
+ * object that is too faint, 4 outside the sensor, 5 hidden and 6 tentative do not count. Second
+ * frame: both objects have exact tracks, object 0 one of another number. */
+static void all_tracks_and_all_objects(void **state) {
+    fixture *f = *state;
+    const bst_track first[] = {
+        {.id = 1, .status = BST_TRACK_CONFIRMED, .direction_gcrf = beside(0, 1, 0)},
+        {.id = 2, .status = BST_TRACK_CONFIRMED, .direction_gcrf = beside(1, 40, 0)},
+        {.id = 3, .status = BST_TRACK_CONFIRMED, .direction_gcrf = beside(2, 2, 0)},
+        {.id = 4, .status = BST_TRACK_COASTING, .direction_gcrf = beside(1, 3000, 0)},
+        {.id = 5,
+         .status = BST_TRACK_COASTING,
+         .hidden = BST_HIDDEN_SHADOW,
+         .direction_gcrf = beside(1, 60, 0)},
+        {.id = 6, .status = BST_TRACK_TENTATIVE, .direction_gcrf = beside(1, 0, 0)}};
+    const bst_track second[] = {
+        {.id = 7, .status = BST_TRACK_CONFIRMED, .direction_gcrf = beside(0, 0, 0)},
+        {.id = 8, .status = BST_TRACK_CONFIRMED, .direction_gcrf = beside(1, 0, 0)}};
+    score(f, 0, first, 6);
+    score(f, 1, second, 2);
+    bst_run_metric_figures m;
+    bst_run_metrics_figures(f->metrics, &m);
+    assert_int_equal(m.scored_frames, 2);
+    /* 1 px, and half of 5^2 px for each of a missed object and a false track; 1e-7 px: angles of
+     * 1e-5 rad have errors of 1e-12 */
+    bst_assert_close(m.gospa_px, 0.5 * sqrt(1.0 + 25.0), 1e-7);
+    /* frame 1: 1 px and a pair at the cutoff, over 2. Frame 2, histories of two frames: object 0
+     * is 3 px from tracks 1 (1 and 5) and 2.5 px from 7, object 1 2.5 px from 8; tracks 1 and 2
+     * are left over: 2.5^2 twice and 5^2 twice, over 4 */
+    bst_assert_close(m.ospa2_px, 0.5 * (sqrt(26.0 / 2.0) + sqrt((2 * 6.25 + 50.0) / 4.0)), 1e-7);
+    assert_int_equal(m.id_switches, 1);
+    assert_int_equal(m.ghosts, 0);
+    bst_assert_close(m.purity, 1.0, 0.0);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(track_errors, set_up, tear_down),
@@ -312,6 +374,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(frames_and_objects, set_up, tear_down),
         cmocka_unit_test_setup_teardown(errors_at_the_pole, set_up, tear_down),
         cmocka_unit_test_setup_teardown(another_target, set_up, tear_down),
+        cmocka_unit_test_setup_teardown(all_tracks_and_all_objects, set_up, tear_down),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -219,6 +219,12 @@ static void expect_same(const outcome *a, const outcome *b) {
     SAME("%.17g", metrics.track_max_px);
     COUNT(metrics.tracks);
     COUNT(metrics.false_tracks);
+    COUNT(metrics.scored_frames);
+    COUNT(metrics.id_switches);
+    COUNT(metrics.ghosts);
+    SAME("%.17g", metrics.gospa_px);
+    SAME("%.17g", metrics.ospa2_px);
+    SAME("%.17g", metrics.purity);
     COUNT(metrics.objects_seen);
     COUNT(metrics.objects_tracked);
     assert_memory_equal(&a->metrics.losses, &b->metrics.losses, sizeof a->metrics.losses);

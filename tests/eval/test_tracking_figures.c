@@ -255,13 +255,13 @@ static void track_metrics_by_hand(void **state) {
     bst_ctx ctx = {0};
     bst_track_metrics *m;
     const double cutoff = 1e-4;
-    bst_assert_ok(&ctx, bst_track_metrics_create(&ctx, 2, 4, 3, cutoff, &m));
+    bst_assert_ok(&ctx, bst_track_metrics_create(&ctx, 2, cutoff, &m));
     const bst_vec3 a = bst_vec3_from_radec(0.0, 0.0), b = bst_vec3_from_radec(0.1, 0.0),
                    far = bst_vec3_from_radec(0.2, 0.3), near_a = bst_vec3_from_radec(3e-5, 0.0);
     const bst_vec3 truth[2] = {a, b};
+    const int64_t objects[2] = {0, 1};
     double gospa2 = 0.0;
     for (int k = 0; k < 11; k++) {
-        const bool visible[2] = {true, k >= 2};
         int64_t ids[3];
         bst_vec3 d[3];
         int n = 0, missed = 0;
@@ -280,7 +280,8 @@ static void track_metrics_by_hand(void **state) {
             d[n++] = far;
         }
         gospa2 += (k == 5 ? 0.0 : 9e-10) + 0.5 * cutoff * cutoff * (missed + (k < 5));
-        bst_assert_ok(&ctx, bst_track_metrics_frame(&ctx, m, 360.0 * k, truth, visible, ids, d, n));
+        const bst_track_frame frame = {360.0 * k, objects, truth, k >= 2 ? 2 : 1, ids, d, n};
+        bst_assert_ok(&ctx, bst_track_metrics_frame(&ctx, m, &frame));
     }
     bst_track_figures f;
     bst_track_metrics_figures(m, &f);
@@ -297,13 +298,9 @@ static void track_metrics_by_hand(void **state) {
     assert_int_equal(f.false_tracks, 1);
     assert_int_equal(f.ghosts, 1); /* track 9, for five frames */
     bst_assert_close(f.false_tracks_per_hour, 1.0, 1e-12);
-    const bool visible[2] = {true, true};
-    const int64_t id = 77, many[4] = {1, 2, 3, 9};
-    const bst_vec3 four[4] = {a, a, b, b};
-    assert_int_equal(bst_track_metrics_frame(&ctx, m, 9e3, truth, visible, &id, &far, 1),
-                     BST_ERR_ARGUMENT);
-    assert_int_equal(bst_track_metrics_frame(&ctx, m, 9e3, truth, visible, many, four, 4),
-                     BST_ERR_ARGUMENT);
+    const int64_t unknown = 2;
+    const bst_track_frame wrong = {9e3, &unknown, truth, 1, NULL, NULL, 0};
+    assert_int_equal(bst_track_metrics_frame(&ctx, m, &wrong), BST_ERR_ARGUMENT);
     bst_track_metrics_free(m);
 }
 
@@ -433,14 +430,15 @@ static void half_of_its_frames_make_a_track_true(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     bst_track_metrics *m;
-    bst_assert_ok(&ctx, bst_track_metrics_create(&ctx, 1, 4, 3, 1e-4, &m));
+    bst_assert_ok(&ctx, bst_track_metrics_create(&ctx, 1, 1e-4, &m));
     const bst_vec3 truth = bst_vec3_from_radec(0.0, 0.0), far = bst_vec3_from_radec(0.2, 0.3);
-    const bool visible = true;
+    const int64_t object = 0;
     /* of six frames, track 1 has the object in two, 2 in three: 1 is false */
     for (int k = 0; k < 6; k++) {
         const int64_t ids[2] = {1, 2};
         const bst_vec3 d[2] = {k < 2 ? truth : far, k >= 3 ? truth : far};
-        bst_assert_ok(&ctx, bst_track_metrics_frame(&ctx, m, k, &truth, &visible, ids, d, 2));
+        const bst_track_frame frame = {k, &object, &truth, 1, ids, d, 2};
+        bst_assert_ok(&ctx, bst_track_metrics_frame(&ctx, m, &frame));
     }
     bst_track_figures f;
     bst_track_metrics_figures(m, &f);
@@ -457,14 +455,15 @@ static void ospa2_by_hand(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     bst_ospa2 *ospa2;
-    const bst_ospa2_params params = {1, 2, 2, 1.0, 1.0}, empty = {1, 2, 0, 1.0, 1.0};
+    const bst_ospa2_params params = {2, 1.0, 1.0}, empty = {0, 1.0, 1.0};
     bst_assert_ok(&ctx, bst_ospa2_create(&ctx, &params, &ospa2));
-    const double distance = 0.2, expected[4] = {0.2, 0.8, 0.2, 0.6};
-    const int object = 0, tracks[4] = {1, 1, 1, 0};
-    const int64_t ids[4] = {1, 2, 2, 0};
+    const double expected[4] = {0.2, 0.8, 0.2, 0.6};
+    const bst_gospa_pair pair = {0, 0, 0.2};
+    const int tracks[4] = {1, 1, 1, 0};
+    const int64_t object = 7, ids[4] = {1, 2, 2, 0};
     for (int k = 0; k < 4; k++) {
         double value;
-        const bst_ospa2_input frame = {&distance, &object, 1, &ids[k], tracks[k]};
+        const bst_ospa2_input frame = {&object, 1, &ids[k], tracks[k], &pair, tracks[k]};
         bst_assert_ok(&ctx, bst_ospa2_frame(&ctx, ospa2, &frame, &value));
         bst_assert_close(value, expected[k], 1e-15);
     }

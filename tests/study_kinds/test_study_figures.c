@@ -249,6 +249,11 @@ bst_status __wrap_bst_run_scenario(bst_ctx *ctx, const bst_scenario *scenario, b
                                                               .track_max_px = 0.33 + k,
                                                               .tracks = 9 + i,
                                                               .false_tracks = 2 + i,
+                                                              .gospa_px = 0.41 + k,
+                                                              .ospa2_px = 0.42 + k,
+                                                              .purity = 0.99 - 0.1 * k,
+                                                              .id_switches = 4 + i,
+                                                              .ghosts = 1 + i,
                                                               .objects_seen = 7 + i,
                                                               .objects_tracked = 6 + i};
     }
@@ -294,6 +299,11 @@ static int of_sensor(int i, expected *list) {
                             {"track_p95_px", 0.21 + k},
                             {"tracks", 9 + k},
                             {"false_tracks", 2 + k},
+                            {"gospa_px", 0.41 + k},
+                            {"ospa2_px", 0.42 + k},
+                            {"track_purity", 0.99 - 0.1 * k},
+                            {"id_switches", 4 + k},
+                            {"ghosts", 1 + k},
                             {"objects_seen", 7 + k},
                             {"objects_tracked", 6 + k}};
     memcpy(list, all, sizeof all);

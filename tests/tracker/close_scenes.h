@@ -20,6 +20,44 @@
 /* detection threshold, SNR */
 #define CLOSE_THRESHOLD 5.0
 
+/* Parameters as of the tracker's default configuration at 3 arcsec a pixel. */
+static inline bst_mtt_params close_parameters(bst_mtt_association association) {
+    return (bst_mtt_params){.max_tracks = 256,
+                            .max_detections = CLOSE_DETECTIONS,
+                            .association = association,
+                            .noise_rad2ps3 = pow(0.02 * BST_ARCSEC_RAD, 2),
+                            .manoeuvre_noise_rad2ps3 = pow(3 * BST_ARCSEC_RAD, 2),
+                            .quiescent_sojourn_s = 3600,
+                            .manoeuvre_sojourn_s = 60,
+                            .gate_chi2 = 16,
+                            .detection_probability = 0.9,
+                            .false_alarms_per_frame = 1,
+                            .field_sr = pow(CLOSE_FIELD_PX * CLOSE_PIXEL_RAD, 2),
+                            .pixel_rad = CLOSE_PIXEL_RAD,
+                            .confirm_hits = 3,
+                            .confirm_frames = 5,
+                            .confirm_score = 12,
+                            .max_rate_radps = 120 * BST_ARCSEC_RAD,
+                            .initiation_gap_s = 5,
+                            .max_misses = 12,
+                            .max_coast_s = 120,
+                            .max_sigma_rad = 60 * BST_ARCSEC_RAD,
+                            .merge_rad = 6 * CLOSE_PIXEL_RAD,
+                            .merge_floor_rad = 0.3 * CLOSE_PIXEL_RAD,
+                            .max_merged_frames = 60,
+                            .star_rate_radps = 0.5 * BST_ARCSEC_RAD,
+                            .motion_chi2 = 25,
+                            .max_stationary_tracks = 4096,
+                            .brightness_systematic_mag = 0.2,
+                            .brightness_random_walk_mag = 0.05,
+                            .event_window = 8,
+                            .false_events_per_hour = 0.01,
+                            .max_dormant_tracks = 64,
+                            .max_dormant_s = 7200,
+                            .max_dormant_sigma_rad = BST_DEG_RAD,
+                            .dormant_gate_chi2 = 18.5};
+}
+
 typedef struct close_kind {
     const char *name;
     int objects;
@@ -208,6 +246,24 @@ static inline void close_pixel(bst_vec3 direction, double *x, double *y) {
     bst_tangent axes = bst_tangent_at(centre);
     *x = 0.5 * CLOSE_FIELD_PX + bst_vec3_dot(to, axes.e1) / CLOSE_PIXEL_RAD;
     *y = 0.5 * CLOSE_FIELD_PX + bst_vec3_dot(to, axes.e2) / CLOSE_PIXEL_RAD;
+}
+
+/* The frame's detections for the tracker. */
+static inline void close_detections(const close_scene *s, bst_mtt_detection *list) {
+    for (int i = 0; i < s->count; i++) {
+        const close_detection *d = &s->list[i];
+        double variance = pow(d->sigma * CLOSE_PIXEL_RAD, 2);
+        list[i] = (bst_mtt_detection){.sky = {.direction = close_direction(d->x, d->y),
+                                              .cov_11 = variance,
+                                              .cov_22 = variance},
+                                      .x_px = d->x,
+                                      .y_px = d->y,
+                                      .v_mag = d->v_mag,
+                                      .v_mag_sigma = 1.0857 / d->snr,
+                                      .snr = d->snr,
+                                      .length_rad = 2 * CLOSE_PIXEL_RAD,
+                                      .width_px = 2};
+    }
 }
 
 #endif

@@ -11,53 +11,13 @@
 #include "sim/eval/track_metrics.h"
 #include "tests/tracker/close_scenes.h"
 
-#define AS BST_ARCSEC_RAD
 /* Tracks within 3 px of an object are the object's: below the least distance of a resolved pair. */
 #define CUTOFF_PX 3.0
 /* The first frames, in which no tracker has its tracks yet, are not scored. */
 #define FIRST_SCORED 5
-#define MAX_TRACKS 2000
 #define MAX_AT_ONCE 64
 
 static const char *const associations[] = {"gnn", "nearest", "pda", "mixture", "pmb"};
-
-/* Parameters as of the tracker's default configuration at 3 arcsec a pixel. */
-static bst_mtt_params parameters(bst_mtt_association association) {
-    return (bst_mtt_params){.max_tracks = 256,
-                            .max_detections = CLOSE_DETECTIONS,
-                            .association = association,
-                            .noise_rad2ps3 = pow(0.02 * AS, 2),
-                            .manoeuvre_noise_rad2ps3 = pow(3 * AS, 2),
-                            .quiescent_sojourn_s = 3600,
-                            .manoeuvre_sojourn_s = 60,
-                            .gate_chi2 = 16,
-                            .detection_probability = 0.9,
-                            .false_alarms_per_frame = 1,
-                            .field_sr = pow(CLOSE_FIELD_PX * CLOSE_PIXEL_RAD, 2),
-                            .pixel_rad = CLOSE_PIXEL_RAD,
-                            .confirm_hits = 3,
-                            .confirm_frames = 5,
-                            .confirm_score = 12,
-                            .max_rate_radps = 120 * AS,
-                            .initiation_gap_s = 5,
-                            .max_misses = 12,
-                            .max_coast_s = 120,
-                            .max_sigma_rad = 60 * AS,
-                            .merge_rad = 6 * CLOSE_PIXEL_RAD,
-                            .merge_floor_rad = 0.3 * CLOSE_PIXEL_RAD,
-                            .max_merged_frames = 60,
-                            .star_rate_radps = 0.5 * AS,
-                            .motion_chi2 = 25,
-                            .max_stationary_tracks = 4096,
-                            .brightness_systematic_mag = 0.2,
-                            .brightness_random_walk_mag = 0.05,
-                            .event_window = 8,
-                            .false_events_per_hour = 0.01,
-                            .max_dormant_tracks = 64,
-                            .max_dormant_s = 7200,
-                            .max_dormant_sigma_rad = BST_DEG_RAD,
-                            .dormant_gate_chi2 = 18.5};
-}
 
 /* Tracks of a frame, in px. */
 typedef struct shown {
@@ -70,19 +30,20 @@ static void score_frame(bst_track_metrics *metrics, const close_scene *scene, in
                         const shown *tracks) {
     bst_ctx ctx = {0};
     bst_vec3 truth[CLOSE_OBJECTS], directions[MAX_AT_ONCE];
-    bool visible[CLOSE_OBJECTS];
+    int64_t objects[CLOSE_OBJECTS];
     for (int i = 0; i < scene->kind->objects; i++) {
         double x, y;
         close_place(&scene->objects[i], frame, &x, &y);
         truth[i] = close_direction(x, y);
-        visible[i] = true;
+        objects[i] = i;
     }
     for (int t = 0; t < tracks->count; t++) {
         directions[t] = close_direction(tracks->x[t], tracks->y[t]);
     }
     if (frame >= FIRST_SCORED) {
-        bst_assert_ok(&ctx, bst_track_metrics_frame(&ctx, metrics, frame, truth, visible,
-                                                    tracks->id, directions, tracks->count));
+        const bst_track_frame shot = {frame,      objects,    truth,        scene->kind->objects,
+                                      tracks->id, directions, tracks->count};
+        bst_assert_ok(&ctx, bst_track_metrics_frame(&ctx, metrics, &shot));
     }
 }
 
@@ -109,8 +70,8 @@ static double processor_s(void) {
 static bst_track_metrics *open_metrics(const close_kind *kind) {
     bst_ctx ctx = {0};
     bst_track_metrics *metrics;
-    bst_assert_ok(&ctx, bst_track_metrics_create(&ctx, kind->objects, MAX_TRACKS, MAX_AT_ONCE,
-                                                 CUTOFF_PX * CLOSE_PIXEL_RAD, &metrics));
+    bst_assert_ok(
+        &ctx, bst_track_metrics_create(&ctx, kind->objects, CUTOFF_PX * CLOSE_PIXEL_RAD, &metrics));
     return metrics;
 }
 
@@ -121,27 +82,14 @@ static bst_track_figures track_scene(bst_mtt_association association, const clos
     static shown tracks;
     bst_ctx ctx = {0};
     bst_mtt *mtt;
-    const bst_mtt_params params = parameters(association);
+    const bst_mtt_params params = close_parameters(association);
     bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &mtt));
     bst_track_metrics *metrics = open_metrics(kind);
     close_open(&scene, kind, seed);
     for (int k = 0; k < CLOSE_FRAMES; k++) {
         bst_mtt_detection list[CLOSE_DETECTIONS];
         close_expose(&scene, k);
-        for (int i = 0; i < scene.count; i++) {
-            const close_detection *d = &scene.list[i];
-            double variance = pow(d->sigma * CLOSE_PIXEL_RAD, 2);
-            list[i] = (bst_mtt_detection){.sky = {.direction = close_direction(d->x, d->y),
-                                                  .cov_11 = variance,
-                                                  .cov_22 = variance},
-                                          .x_px = d->x,
-                                          .y_px = d->y,
-                                          .v_mag = d->v_mag,
-                                          .v_mag_sigma = 1.0857 / d->snr,
-                                          .snr = d->snr,
-                                          .length_rad = 2 * CLOSE_PIXEL_RAD,
-                                          .width_px = 2};
-        }
+        close_detections(&scene, list);
         bst_mtt_frame frame = {
             .tick = k * 1000, .seconds = k, .detections = list, .count = scene.count};
         double before = processor_s();

@@ -292,7 +292,8 @@ static void single_target_in_clutter(void **state) {
     const setup cases[] = {
         {"mixture", BST_FILTER_EKF, BST_MTT_MIXTURE, 0.9, 0.5, 20, 50, false, clutter_steps},
         {"pmb", BST_FILTER_EKF, BST_MTT_PMB, 0.9, 0.5, 20, 50, false, clutter_steps},
-        {"mixture ukf", BST_FILTER_UKF, BST_MTT_MIXTURE, 0.95, 0.5, -89.999, 50, false, clutter_steps}};
+        {"mixture ukf", BST_FILTER_UKF, BST_MTT_MIXTURE, 0.95, 0.5, -89.999, 50, false,
+         clutter_steps}};
     for (int i = 0; i < 3; i++) {
         figures f;
         monte_carlo(&cases[i], &f);

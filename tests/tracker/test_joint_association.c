@@ -129,12 +129,54 @@ static void one_detection_of_two_tracks(void **state) {
     bst_mtt_free(m);
 }
 
+/* Odds of existence of the track that a pair of detections starts after a number of empty frames,
+ * with the boresight moved by `moved` (rad) just before the pair. */
+static double odds_after(int empty_frames, double moved) {
+    bst_mtt_params params = defaults();
+    params.association = BST_MTT_PMB;
+    bench *b = start(1, &params);
+    bst_vec3 axis = bst_vec3_from_radec(1.0, 0.4), object = along(axis, 0.3, 60 * AS);
+    int frames = empty_frames + 2, count;
+    for (int k = 0; k < frames; k++) {
+        bst_vec3 at = k < empty_frames ? along(axis, 2.0, moved) : axis;
+        if (k >= empty_frames) {
+            object = along(object, 0.3, 5 * AS);
+            see(b, object, 12.0);
+        }
+        bst_mtt_frame f = {.tick = k * 6000,
+                           .seconds = k,
+                           .detections = b->list,
+                           .count = b->count,
+                           .boresight = at};
+        bst_mtt_step(b->mtt, &f);
+        b->count = 0;
+    }
+    const bst_mtt_track *tracks = bst_mtt_tracks(b->mtt, &count);
+    assert_int_equal(count, 1);
+    double odds = tracks[0].existence / (1.0 - tracks[0].existence);
+    bst_mtt_free(b->mtt);
+    return odds;
+}
+
+/* A field that was observed has fewer undetected objects: of those in it, 1 - P_D remain after each
+ * frame, and the share f = 120 arcsec/s * 1 s / 3000 arcsec enters, which makes
+ * u = 0.3 f / (1 - (1 - P_D) (1 - f)). New sky has as many as at the beginning. */
+static void observed_sky_starts_fewer_tracks(void **state) {
+    (void)state;
+    const double f = 120.0 / 3000.0, pd = 0.9;
+    double first = odds_after(0, 0.0), ratio = f / (1.0 - (1.0 - pd) * (1.0 - f));
+    /* 1e-9: after 30 frames the beginning has 0.096^30 of its share */
+    bst_assert_close(odds_after(30, 0.0) / first / ratio, 1.0, 1e-9);
+    bst_assert_close(odds_after(30, 3000 * AS) / first, 1.0, 1e-9);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(two_tracks_compete),
         cmocka_unit_test(misses_lower_existence),
         cmocka_unit_test(merged_measurement_is_inverted),
         cmocka_unit_test(one_detection_of_two_tracks),
+        cmocka_unit_test(observed_sky_starts_fewer_tracks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,4 +1,5 @@
 /* The choice of the target of interest among tracks made by hand. */
+#include "boresight/rng.h"
 #include "tests/test_support.h"
 #include "tracker/target.h"
 #include "tracker/tracker_internal.h"
@@ -353,11 +354,123 @@ static void queries_of_a_frame(void **state) {
     bst_assert_close(eye.earth_bary_mps.z, 5e3, 1e-9);
 }
 
+/* Two equal tracks are ambiguous; the rate decides later. A target that became certain keeps its
+ * identity. */
+static void ambiguity_is_resolved_by_time(void **state) {
+    (void)state;
+    bst_target_cue cue = make_cue();
+    for (int first_is_right = 0; first_is_right < 2; first_is_right++) {
+        bst_target target = {0};
+        bst_mtt_track t[2] = {make_track(1, 10, 0.0, 13), make_track(2, 10, 0.0, 13)};
+        bst_target_step(&target, &params, &cue, 0.0, t, 2);
+        assert_int_equal(target.id, 1);
+        assert_true(target.ambiguous);
+        assert_int_equal(target.rival_id, 2);
+        bst_assert_close(target.probability, 0.5, 1e-12);
+        bst_assert_close(target.rival_probability, 0.5, 1e-12);
+        /* 1 arcsec/s off, of 0.512: 1/(1 + exp(-1/(2 * 0.2625))) = 0.870, not enough */
+        t[first_is_right] = make_track(1 + first_is_right, 10, 1.0, 13);
+        bst_target_step(&target, &params, &cue, 1.0, t, 2);
+        assert_int_equal(target.id, 1);
+        assert_true(target.ambiguous);
+        double right = 1.0 / (1.0 + exp(-0.5 / 0.2625));
+        bst_assert_close(target.probability, first_is_right ? right : 1.0 - right, 1e-6);
+        /* 1.7 arcsec/s: odds of 246 */
+        t[first_is_right] = make_track(1 + first_is_right, 10, 1.7, 13);
+        bst_target_step(&target, &params, &cue, 2.0, t, 2);
+        int64_t chosen = first_is_right ? 1 : 2;
+        assert_int_equal(target.id, chosen);
+        assert_false(target.ambiguous);
+        /* now certain: it may manoeuvre */
+        t[0] = make_track(chosen, 10, 1.7, 13);
+        t[1] = make_track(3 - chosen, 10, 0.0, 13);
+        t[1].hits = 16; /* no longer new */
+        bst_target_step(&target, &params, &cue, 3.0, t, 2);
+        assert_int_equal(target.id, chosen);
+        assert_false(target.ambiguous);
+    }
+}
+
+/* Two objects that pass each other swap their tracks while they share detections: the cue's rate
+ * shows it, unless the target had left it by a manoeuvre. */
+static void swapped_tracks_are_noticed(void **state) {
+    (void)state;
+    bst_target_cue cue = make_cue();
+    for (int manoeuvred = 0; manoeuvred < 2; manoeuvred++) {
+        double own = manoeuvred ? 2.5 : 0.0, other = manoeuvred ? 0.0 : 2.5;
+        bst_target target = {0};
+        bst_mtt_track t[2] = {make_track(1, 10, 0.0, 13), make_track(2, 20, other, 13)};
+        bst_target_step(&target, &params, &cue, 0.0, t, 1);
+        t[0] = make_track(1, 10, own, 13);
+        bst_target_step(&target, &params, &cue, 1.0, t, 2);
+        assert_int_equal(target.id, 1);
+        t[0].merged_in_row = t[1].merged_in_row = 5;
+        bst_target_step(&target, &params, &cue, 6.0, t, 2);
+        assert_int_equal(target.id, 1);
+        t[0] = make_track(1, 10, manoeuvred ? own : other, 13);
+        t[1] = make_track(2, 20, 0.0, 13);
+        bst_target_step(&target, &params, &cue, 7.0, t, 2);
+        assert_int_equal(target.id, manoeuvred ? 1 : 2);
+        assert_false(target.ambiguous);
+    }
+}
+
+/* The cue's object has the cue's errors; another one is anywhere in a box of 4 sigma about the cue.
+ * Of the choices with a probability p, the share p is right. */
+static void probabilities_are_calibrated(void **state) {
+    (void)state;
+    enum { TRIALS = 60000, BINS = 5 };
+    bst_rng_key key = bst_rng_make_key(5, 0, "test", "identity");
+    const double sigma[5] = {1800.0, 1800.0, sqrt(0.2625), sqrt(0.2625), sqrt(1.02)};
+    int count[BINS] = {0}, right[BINS] = {0};
+    double sum[BINS] = {0};
+    bst_target_cue cue = make_cue();
+    for (uint64_t n = 0; n < TRIALS; n++) {
+        bst_mtt_track t[2];
+        for (int i = 0; i < 2; i++) {
+            double x[5];
+            for (uint64_t k = 0; k < 5; k++) {
+                x[k] = sigma[k] * (i == 0 ? bst_rng_normal(key, n, k)
+                                          : 8.0 * bst_rng_uniform(key, n, 20 + k) - 4.0);
+            }
+            t[i] = make_track(1 + i, 0, 0, 13 + x[4]);
+            t[i].hits = 30; /* enough for any misfit within the gates */
+            t[i].state.direction = place(x[0], x[1]);
+            bst_tangent axes = bst_tangent_at(place(0, 0));
+            t[i].state.rate_radps =
+                bst_tangent_carry(place(0, 0), t[i].state.direction,
+                                  bst_tangent_vector(&axes, (50 + x[2]) * AS, x[3] * AS));
+        }
+        bst_target target = {0};
+        bst_target_step(&target, &params, &cue, 0.0, t, 2);
+        int bin = (int)(10.0 * (target.probability - 0.5));
+        if (target.id != 0 && bin >= 0) {
+            bin = bin < BINS ? bin : BINS - 1;
+            count[bin]++;
+            right[bin] += target.id == 1;
+            sum[bin] += target.probability;
+        }
+    }
+    for (int b = 0; b < BINS; b++) {
+        double stated = sum[b] / count[b], found = (double)right[b] / count[b];
+        print_message("%d choices: stated %.3f, right %.3f\n", count[b], stated, found);
+        assert_true(count[b] > 100);
+        /* 5 %, and 3 sigma of the share */
+        bst_assert_close(found, stated, 0.05 + 3.0 * sqrt(0.25 / count[b]) * (b < BINS - 1));
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(misfit_is_chi_square),  cmocka_unit_test(misfit_off_the_diagonal),
-        cmocka_unit_test(takes_the_likeliest),   cmocka_unit_test(takes_nothing_wrong),
-        cmocka_unit_test(keeps_and_lets_go),     cmocka_unit_test(expects_what_the_cue_says),
-        cmocka_unit_test(holds_what_manoeuvres), cmocka_unit_test(queries_of_a_frame)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(misfit_is_chi_square),
+                                       cmocka_unit_test(misfit_off_the_diagonal),
+                                       cmocka_unit_test(takes_the_likeliest),
+                                       cmocka_unit_test(takes_nothing_wrong),
+                                       cmocka_unit_test(keeps_and_lets_go),
+                                       cmocka_unit_test(expects_what_the_cue_says),
+                                       cmocka_unit_test(holds_what_manoeuvres),
+                                       cmocka_unit_test(ambiguity_is_resolved_by_time),
+                                       cmocka_unit_test(swapped_tracks_are_noticed),
+                                       cmocka_unit_test(probabilities_are_calibrated),
+                                       cmocka_unit_test(queries_of_a_frame)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

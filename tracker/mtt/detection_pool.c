@@ -78,6 +78,7 @@ void bst_mtt_pool_index(bst_mtt_pool *pool) {
 
 void bst_mtt_pool_archive(bst_mtt_pool *pool, int capacity, bst_archive *archive) {
     BST_ARCHIVE(archive, pool->seconds);
+    BST_ARCHIVE(archive, pool->undetected);
     BST_ARCHIVE(archive, pool->tick);
     pool->count = bst_archive_count(archive, pool->count, capacity);
     bst_archive_bytes(archive, pool->items, (size_t)pool->count * sizeof *pool->items);

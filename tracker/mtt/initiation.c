@@ -9,10 +9,6 @@
  * the rate of false tracks stays the same. */
 static const double FEW_ALARMS = 100.0;
 
-/* Mean number of undetected objects in the field (the Poisson part of BST_MTT_PMB): a design
- * choice. Confirmation depends on its product with 1 / (1 - CONFIRMED_EXISTENCE) only. */
-static const double UNDETECTED = 0.1;
-
 /* Most tracks that one detection starts. */
 enum { MOST_PARTNERS = 16 };
 
@@ -105,9 +101,11 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
         .first_length_rad = earlier->length_rad,
         .at_rest = gate->rest,
     };
-    /* odds of the first detection of an undetected object, and of a second one */
-    double odds = UNDETECTED * mtt->params.detection_probability / fmax(1.0, alarms) *
-                  mtt->params.detection_probability /
+    /* odds of the first detection of an undetected object, of misses after it, and of a second
+     * detection */
+    double pd = mtt->params.detection_probability;
+    double odds = pool->undetected * pd / fmax(1.0, alarms) *
+                  pow(1.0 - pd, (double)(pool - mtt->history)) * pd /
                   (mtt->clutter_density * BST_PI * reach * reach);
     track->existence = odds / (1.0 + odds);
     bst_mtt_note_place(track, later);

@@ -159,6 +159,8 @@ bst_status bst_mtt_archive(bst_mtt *m, bst_archive *archive) {
     bst_archive_bool(archive, &m->started);
     bst_archive_bool(archive, &m->cue_lag_valid);
     BST_ARCHIVE(archive, m->cue_lag_radps2);
+    BST_ARCHIVE(archive, m->undetected);
+    BST_ARCHIVE(archive, m->boresight);
     BST_ARCHIVE(archive, m->bad_pixels);
     BST_ARCHIVE(archive, m->charged);
     BST_ARCHIVE(archive, m->clutter);
@@ -211,6 +213,7 @@ static void predict_tracks(bst_mtt *m, const bst_mtt_frame *frame) {
     double dt = frame->seconds - m->seconds;
     bst_vec3 step = {0}, rate = {0};
     m->sleepers = 0;
+    bst_mtt_predict_undetected(m, frame);
     bool forward = m->started && bst_mtt_cue_acceleration(frame, dt, &step, &rate);
     m->cue_lag_valid = forward && dt > 0.0;
     if (m->cue_lag_valid) {
@@ -523,6 +526,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     assert(!m->started || frame->seconds > m->seconds);
     predict_tracks(m, frame);
     load_detections(m, frame);
+    bst_mtt_observe_undetected(m, frame->partial);
     double floor = m->params.false_alarms_per_frame;
     m->bad_pixels = frame->bad_pixels;
     m->charged = frame->charged;

@@ -184,6 +184,7 @@ typedef struct bst_mtt_frame {
     /* True if a geometric direction is on the sensor, well inside its edge. NULL: always. */
     bool (*in_field)(const void *user, bst_vec3 direction);
     const void *user;
+    bst_vec3 boresight; /* zero vector: the field does not move; BST_MTT_PMB only */
     /* Cue's direction and rate at the previous frame and at this one: for acceleration feed-forward
      * and for the rate gate of initiation. */
     bool cue_valid, cue_before_valid;

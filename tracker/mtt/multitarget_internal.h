@@ -29,6 +29,7 @@ typedef enum bst_mtt_sharing {
 typedef struct bst_mtt_pool {
     double seconds;
     int64_t tick;
+    double undetected; /* mean number of undetected objects in the field before this frame */
     int count;
     int axis;    /* 0, 1, 2: direction component by which detections are sorted */
     int *order;  /* indices into items by ascending component */
@@ -54,6 +55,8 @@ struct bst_mtt {
      * second of the interval; in the tangent plane at the cue. */
     bool cue_lag_valid;
     bst_vec3 cue_lag_radps2;
+    double undetected;      /* mean number of undetected objects in the field */
+    bst_vec3 boresight;     /* of the latest frame; zero vector: unknown */
     int bad_pixels;         /* of the latest frame */
     int charged;            /* charge detections of the latest frame */
     double clutter;         /* smoothed number of unused detections per frame */
@@ -162,6 +165,14 @@ void bst_mtt_gate_manoeuvres(bst_mtt *mtt);
 /* Splits missed tracks into two objects that were unresolved until now, if two unused detections
  * are likelier so than as clutter. BST_MTT_PMB only. */
 void bst_mtt_split_tracks(bst_mtt *m);
+
+/* Predicts the mean number of undetected objects to a frame: objects enter with the sky that the
+ * field reaches, and by their own motion. Called before the time of the frame is set. */
+void bst_mtt_predict_undetected(bst_mtt *m, const bst_mtt_frame *frame);
+/* Stores that number with the frame's detections, and reduces it by the frame's observation.
+ *
+ * Given:     partial  as in bst_mtt_frame */
+void bst_mtt_observe_undetected(bst_mtt *m, bool partial);
 
 /* Tests the innovations of a track's latest hits for a manoeuvre.
  *
