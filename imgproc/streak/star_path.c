@@ -21,7 +21,8 @@ enum { SAME_END = 4 };
 /* Share of samples with light of another star, and the range of that light, in units of the image's
  * noise. */
 static const double CROWDED = 0.2, OTHER_RANGE = 10.0;
-/* Unevenness of a star's light along its streak, 1 sigma. */
+/* Unevenness of a star's light along its streak, 1 sigma. Dark samples have it, too, by the wings of
+ * the PSF: an end then lies where the light has fallen to half. */
 static const double UNEVEN = 0.25;
 /* Neighbouring samples share noise: so many count as one (exp(-1) at a distance of two sigma). */
 static const double CORRELATED = 1.7;
@@ -343,7 +344,7 @@ static double evidence_at(const bst_star_path *path, const bst_star_path_image *
         double v = bst_star_path_image_at(image, x, y), spread = hypot(1.0, UNEVEN * a);
         double other = CROWDED / (OTHER_RANGE + 4.0 * a);
         double lit = exp(-0.5 * (v - a) * (v - a) / (spread * spread)) / spread;
-        double dark = exp(-0.5 * v * v);
+        double dark = exp(-0.5 * v * v / (spread * spread)) / spread;
         sum += log(((1.0 - CROWDED) / ROOT_2PI * lit + other) /
                    ((1.0 - CROWDED) / ROOT_2PI * dark + other));
     }
