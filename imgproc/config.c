@@ -44,6 +44,8 @@ const bst_config_desc bst_imgproc_config_table[] = {
             "again; 0: never."),
     BST_REAL(bst_imgproc_config, lost_scale_tolerance, "", 0, 0.1, "0.05",
              "Largest relative error of the camera's pixel scale while the attitude is unknown."),
+    BST_OBJECT(bst_imgproc_config, camera_calibration, bst_camera_calibrator_config_table, "{}",
+               "Calibration of the camera's geometry in flight."),
     BST_BOOL(
         bst_imgproc_config, track_windows, "false",
         "Look only at windows round the predicted places of tracks and of bright stars while a "

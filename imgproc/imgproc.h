@@ -13,6 +13,7 @@
 #include "boresight/stage.h"
 #include "imgproc/calibrate/pixel_learner_config.h"
 #include "imgproc/extended/extended_config.h"
+#include "imgproc/identify/camera_calibrator.h"
 #include "imgproc/stack/stack.h"
 #include "sim/optics/photometry.h"
 
@@ -32,6 +33,7 @@ typedef struct bst_imgproc_config {
     int attitude;              /* at start, 0: by telemetry, 1: unknown */
     int64_t lost_after_frames; /* without a star, in a row; 0: never lost again */
     double lost_scale_tolerance;
+    bst_camera_calibrator_config camera_calibration;
     bool track_windows; /* search only windows while a target is tracked */
     int64_t window_px, window_stars, full_frame_period, full_frame_count;
     bst_stack_config stack;

@@ -89,6 +89,7 @@ static bst_status archive_module(void *self, bst_archive *archive) {
         BST_TRY(bst_stack_archive(m->stack, archive));
     }
     bst_imgproc_lost_archive(&m->lost, archive);
+    BST_TRY(bst_imgproc_calibration_archive(m, archive));
     if (bst_archive_is_restoring(archive)) {
         m->first_slot = (int)(m->steps % BST_STEP_LANES); /* lanes begin at 0 again */
         for (int i = 0; i < BST_STEP_LANES; i++) {
@@ -142,6 +143,7 @@ static bst_status prepare(const bst_module_env *env, bst_imgproc_state *m) {
         BST_TRY(bst_psf_wings_create(env->ctx, m->maps.psf, (double)m->camera.width_px,
                                      (double)m->camera.height_px, m->config->jitter_px, &m->wings));
     }
+    bst_imgproc_calibration_open(m);
     bst_imgproc_lost_open(m, bst_knowledge_stars(env->knowledge),
                           bst_knowledge_julian_year(env->knowledge));
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)m->config->capacity);
@@ -184,7 +186,7 @@ static bst_status plan_windows(bst_ctx *ctx, bst_imgproc_state *m, const bst_img
     }
     double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
     const bst_window_plan_input input = {
-        .camera = &m->camera,
+        .camera = &m->calibrator.camera,
         .config = m->config,
         .v_limit = m->window_v_limit,
         .message = message,
@@ -210,7 +212,7 @@ static bst_status label_wings(bst_ctx *ctx, bst_imgproc_state *m, const bst_imgp
                               const bst_imgproc_frame_knowledge *known, bst_detections *out) {
     const bst_frame_message *message = e->message;
     const bst_wing_labels_input input = {
-        .camera = &m->camera,
+        .camera = &m->calibrator.camera,
         .known = known,
         .motion = e->motion,
         .binning = message->binning,
@@ -393,12 +395,9 @@ static bst_status detect_frame(bst_imgproc_state *m, struct bst_step *step, bst_
     BST_TRY(detections_of(bst_step_ctx(step), m, l, e, out, capacity));
     if (!m->plugin) {
         m->window_v_limit = bst_imgproc_v_limit(l->ip, WINDOW_STAR_SNR);
-        const bst_extended_input input = {&m->camera,
-                                          message,
-                                          bst_imgproc_silhouettes(l->ip),
-                                          e->motion && e->navigated,
-                                          e->light.sun_m,
-                                          out->q_cam_from_gcrf};
+        const bst_extended_input input = {
+            &m->calibrator.camera,     message,        bst_imgproc_silhouettes(l->ip),
+            e->motion && e->navigated, e->light.sun_m, out->q_cam_from_gcrf};
         bst_extended_step_begin(&m->extended, &input, out);
     }
     return BST_OK;
@@ -443,6 +442,7 @@ static bst_status process_frame(bst_imgproc_state *m, struct bst_step *step,
     out->start_tick = message->start_tick;
     out->end_tick = message->end_tick;
     out->q_cam_from_gcrf = out->q_telemetry_from_gcrf = motion.q_cam_from_gcrf;
+    bst_camera_calibrator_get(&m->calibrator, &out->calibration);
     const bst_predictions *predictions = predicted.stale ? NULL : predicted.payload;
     bst_imgproc_exposure e = {
         .message = message, .motion = oriented ? &motion : NULL, .predictions = predictions};
@@ -459,6 +459,7 @@ static bst_status process_frame(bst_imgproc_state *m, struct bst_step *step,
         BST_TRY(m->lost.enabled
                     ? bst_imgproc_lost_identify(m, step, l, &e, out, &known.q_cam_from_gcrf)
                     : bst_imgproc_identify_stars(ctx, m, l, &e, out, &known.q_cam_from_gcrf));
+        BST_TRY(bst_imgproc_calibrate_camera(m, step, l, &e, out, &known.q_cam_from_gcrf));
         known.light = e.light;
         known.oriented = out->stars_identified > 0;
     }

@@ -13,6 +13,9 @@
 #include "imgproc/wing_labels.h"
 #include "sim/optics/photometry.h"
 
+/* Stars by which the camera's scale is found coarsely. */
+enum { BST_IMGPROC_COARSE_STARS = 1024 };
+
 /* Attitude that image processing finds by itself, while telemetry may be wrong by any angle. */
 typedef struct bst_imgproc_lost {
     bool enabled;
@@ -56,6 +59,9 @@ typedef struct bst_imgproc_state {
     bst_extended_step extended;
     bst_plugin_detector *plugin; /* NULL: built-in detector */
     bst_imgproc_lost lost;
+    bst_camera_calibrator calibrator; /* its camera predicts places; `camera` detects */
+    int64_t calibration_misses;       /* frames in a row without an identified star */
+    bst_imgproc_expected_star coarse[BST_IMGPROC_COARSE_STARS]; /* work space */
 } bst_imgproc_state;
 
 /* A frame and the onboard knowledge of its exposure. */
@@ -76,6 +82,29 @@ typedef struct bst_imgproc_exposure {
 bst_status bst_imgproc_identify_stars(bst_ctx *ctx, bst_imgproc_state *m, const bst_imgproc_lane *l,
                                       const bst_imgproc_exposure *e, bst_detections *out,
                                       bst_quat *q_cam_from_gcrf) BST_MUST_CHECK;
+
+/* Removes the identities of the frame's stars, for another identification. */
+void bst_imgproc_forget_stars(bst_detections *detections);
+
+/* Prepares the calibration of the camera's geometry: at first it is the onboard camera. */
+void bst_imgproc_calibration_open(bst_imgproc_state *m);
+
+/* Saves or restores it, where it is enabled. */
+bst_status bst_imgproc_calibration_archive(bst_imgproc_state *m,
+                                           bst_archive *archive) BST_MUST_CHECK;
+
+/* Learns the camera's geometry from the identified stars, where the configuration asks for it.
+ *
+ * Until the first frame with enough stars, and after three frames without any, scale and rotation
+ * are searched for, and the stars identified again.
+ *
+ * Given:     *q_cam_from_gcrf  attitude from the identified stars, if any
+ * Returned:  *q_cam_from_gcrf  the same after another identification
+ * Errors:    those of the star catalogue */
+bst_status bst_imgproc_calibrate_camera(bst_imgproc_state *m, struct bst_step *step,
+                                        const bst_imgproc_lane *l, const bst_imgproc_exposure *e,
+                                        bst_detections *out,
+                                        bst_quat *q_cam_from_gcrf) BST_MUST_CHECK;
 
 /* Prepares identification without an attitude, where the configuration asks for it.
  *

@@ -6,6 +6,8 @@
 
 /* SNR of the faintest stars that patterns are made of. */
 static const double PATTERN_SNR = 8.0;
+/* Error of the pixel scale of a solved frame, relative: 1 px over half a field of 500 px. */
+static const double SOLVED_SCALE_SIGMA = 2e-3;
 
 void bst_imgproc_lost_open(bst_imgproc_state *m, const bst_stars *stars, double julian_year) {
     bool unknown = m->config->attitude == 1;
@@ -122,6 +124,14 @@ static void count_frame(bst_imgproc_state *m, struct bst_step *step) {
     }
 }
 
+/* Starts the camera's calibration at the scale of a solved frame. */
+static bst_status take_scale(bst_ctx *ctx, bst_imgproc_state *m, double scale) {
+    if (!m->config->camera_calibration.enabled || m->calibrator.frames > 0) {
+        return BST_OK;
+    }
+    return bst_camera_calibrator_set(ctx, &m->calibrator, scale, 0.0, SOLVED_SCALE_SIGMA);
+}
+
 bst_status bst_imgproc_lost_identify(bst_imgproc_state *m, struct bst_step *step,
                                      const bst_imgproc_lane *l, const bst_imgproc_exposure *e,
                                      bst_detections *out, bst_quat *q_cam_from_gcrf) {
@@ -136,6 +146,7 @@ bst_status bst_imgproc_lost_identify(bst_imgproc_state *m, struct bst_step *step
         BST_TRY(solve(ctx, m, l, e, out, &result));
         if (result.solved) {
             *q_cam_from_gcrf = result.q_cam_from_gcrf;
+            BST_TRY(take_scale(ctx, m, result.scale));
             BST_TRY(bst_imgproc_identify_stars(ctx, m, l, e, out, q_cam_from_gcrf));
         }
     }

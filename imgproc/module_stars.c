@@ -23,6 +23,16 @@ static int keep_stars_in_windows(bst_imgproc_state *m, int expected) {
     return kept;
 }
 
+void bst_imgproc_forget_stars(bst_detections *out) {
+    for (int i = 0; i < out->count; i++) {
+        if (out->items[i].label == BST_LABEL_STAR) {
+            out->items[i].label = BST_LABEL_UNKNOWN;
+            out->items[i].label_probability = 0.0;
+            out->items[i].star_id = 0;
+        }
+    }
+}
+
 bst_status bst_imgproc_identify_stars(bst_ctx *ctx, bst_imgproc_state *m, const bst_imgproc_lane *l,
                                       const bst_imgproc_exposure *e, bst_detections *out,
                                       bst_quat *q_cam_from_gcrf) {
@@ -52,18 +62,13 @@ bst_status bst_imgproc_identify_stars(bst_ctx *ctx, bst_imgproc_state *m, const 
         bst_starid_match(m->starid, &options, m->sky.expected, expected, out->items, out->count,
                          &result);
     }
-    if (m->camera.geometry.general && result.matched > 0 &&
+    const bst_camera *camera = m->sky.camera;
+    if (camera->geometry.general && result.matched > 0 &&
         hypot(result.shift_x_px, result.shift_y_px) > RESHIFT_PX) {
         /* distortion makes the shift uneven over the field: match again with the corrected attitude
          */
-        *q_cam_from_gcrf = bst_starid_attitude(&m->camera, &options, &result, out->q_cam_from_gcrf);
-        for (int i = 0; i < out->count; i++) {
-            if (out->items[i].label == BST_LABEL_STAR) {
-                out->items[i].label = BST_LABEL_UNKNOWN;
-                out->items[i].label_probability = 0.0;
-                out->items[i].star_id = 0;
-            }
-        }
+        *q_cam_from_gcrf = bst_starid_attitude(camera, &options, &result, out->q_cam_from_gcrf);
+        bst_imgproc_forget_stars(out);
         query.q_cam_from_gcrf = *q_cam_from_gcrf;
         BST_TRY(bst_predicted_stars_expect(ctx, &m->sky, &query, &expected));
         expected = m->windows.count > 0 ? keep_stars_in_windows(m, expected) : expected;
@@ -72,7 +77,7 @@ bst_status bst_imgproc_identify_stars(bst_ctx *ctx, bst_imgproc_state *m, const 
                          &result);
     }
     if (result.matched > 0) {
-        *q_cam_from_gcrf = bst_starid_attitude(&m->camera, &options, &result, *q_cam_from_gcrf);
+        *q_cam_from_gcrf = bst_starid_attitude(camera, &options, &result, *q_cam_from_gcrf);
     }
     out->stars_identified = result.matched;
     for (int i = 0; i < out->count; i++) {

@@ -5,7 +5,7 @@
 
 #include "boresight/camera_motion.h"
 #include "obsgen/generator.h"
-#include "obsgen/identify.h"
+#include "obsgen/lost_attitude.h"
 #include "obsgen/model/psf_bound.h"
 #include "obsgen/obsgen.h"
 #include "obsgen/pending_exposure.h"
@@ -27,9 +27,11 @@ typedef struct obsgen_config {
     int64_t truth_capacity, capacity, mesh_px;
     double false_alarms_per_frame, jitter_px, streak_min_px, streak_max_px, search_radius_px,
         match_tolerance_px;
-    int column_correction;
+    int column_correction, attitude;
+    int64_t lost_after_frames;
 } obsgen_config;
 
+static const char *const attitudes[] = {"telemetry", "unknown", NULL};
 static const char *const no_file[] = {"theory", NULL};
 
 #define OF_OTHERS " (scenegen's or imgproc's where the sensor has them)"
@@ -60,6 +62,11 @@ static const bst_config_desc config_table[] = {
              "Greatest pointing error over which stars are identified" OF_OTHERS "."),
     BST_REAL(obsgen_config, match_tolerance_px, "px", 0.5, 20, "3",
              "Greatest distance of one star from its place after the common shift" OF_OTHERS "."),
+    BST_ENUM(obsgen_config, attitude, attitudes, "\"telemetry\"",
+             "Attitude at the start: by telemetry, or unknown" OF_OTHERS "."),
+    BST_INT(obsgen_config, lost_after_frames, "", 0, 1000000, "0",
+            "After so many frames in a row without an identified star the attitude is unknown "
+            "again; 0: never" OF_OTHERS "."),
     BST_ENUM(obsgen_config, column_correction, bst_column_level_words, "\"auto\"",
              "Whether each column's level over the others' is taken off" OF_OTHERS "."),
     BST_FORMER("column_level", "column_correction"),
@@ -116,6 +123,7 @@ typedef struct obsgen {
     int response_binning;
     bst_optics_photometer photometer;
     bst_obsgen_pending waiting[PENDING];
+    bst_obsgen_lost lost;
 } obsgen;
 
 static void destroy(void *self) {
@@ -183,6 +191,7 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     o->world_stars = bst_world_stars(env->world);
     o->camera = *o->world_camera;
     o->sigma_px = gaussian_px(&o->camera);
+    o->lost = bst_obsgen_lost_begin(o->config->attitude == 1, o->config->lost_after_frames);
     o->knowledge = env->knowledge;
     o->tick_rate_hz = env->tick_rate_hz;
     o->key = bst_env_rng(env, "observations");
@@ -387,6 +396,13 @@ static void set_attitude(const obsgen *o, struct bst_step *step, const bst_expos
             bst_vec3_axpy(p->attitude_error_cam_rad, dt, p->attitude_error_rate_cam_radps));
         out->q_cam_from_gcrf = bst_quat_unit(bst_quat_mul(error, motion.q_cam_from_gcrf));
     }
+    if (bst_obsgen_lost_enabled(&o->lost)) {
+        /* the tracker's correction is one of small angles */
+        *locked = *oriented && o->lost.known;
+        out->q_cam_from_gcrf =
+            *locked ? bst_quat_unit(bst_quat_mul(motion.q_cam_from_gcrf, o->lost.error))
+                    : motion.q_cam_from_gcrf;
+    }
 }
 
 /* Distance of the stars from their positions by the onboard attitude, px. */
@@ -472,8 +488,7 @@ static bst_status process_exposure(obsgen *o, struct bst_step *step, const bst_e
             .locked = locked,
             .shift_px = shift_px(o, p->truth, out->q_cam_from_gcrf),
             .key = o->key};
-        BST_TRY(bst_obsgen_identify(ctx, &options, &frame, made.items, out->items, out->count,
-                                    &out->stars_identified));
+        BST_TRY(bst_obsgen_lost_identify(&o->lost, step, &options, &frame, made.items, out));
         add_stars(o, &frame, made.items, out);
     }
     bst_optics_zero_point zero_point = bst_optics_photometer_zero_point(&o->photometer);
@@ -532,6 +547,7 @@ static bst_status archive_camera(obsgen *o, bst_archive *archive) {
 static bst_status archive_module(void *self, bst_archive *archive) {
     obsgen *o = self;
     BST_TRY(archive_camera(o, archive));
+    bst_obsgen_lost_archive(&o->lost, archive);
     BST_ARCHIVE(archive, o->bound_binning);
     if (o->bound_binning != 0) {
         BST_ARCHIVE(archive, o->image_bound);

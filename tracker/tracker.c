@@ -119,7 +119,7 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
     if (!t) {
         return bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
     }
-    t->camera = *camera;
+    t->onboard = t->camera = *camera;
     t->tick_rate_hz = (double)tick_rate_hz;
     t->star = star;
     t->star_user = star_user;

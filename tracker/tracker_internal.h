@@ -22,7 +22,7 @@ typedef struct cached_star {
 } cached_star;
 
 struct bst_tracker {
-    bst_camera camera;
+    bst_camera onboard, camera; /* before the flight; as image processing has calibrated it */
     double tick_rate_hz;
     bst_tracker_star_fn star;
     void *star_user;
@@ -99,7 +99,8 @@ typedef struct bst_tracker_attitude {
 bst_quat bst_tracker_telemetry(const bst_tracker_input *input);
 /* Telemetry without the large error that stars have shown. */
 bst_quat bst_tracker_refer(const bst_tracker *t, bst_quat q_telemetry);
-/* Determines the frame's attitude: from stars, else predicted by the telemetry error filter. */
+/* Takes the camera over as calibrated and determines the frame's attitude: from stars, else
+ * predicted by the telemetry error filter. */
 void bst_tracker_find_attitude(bst_tracker *t, const bst_tracker_input *input,
                                const bst_light *light, int64_t tick, double dt_s,
                                bst_tracker_attitude *out);

@@ -10,6 +10,8 @@ enum { POINT_CANDIDATES = 3000 };
 static const double POINT_PX = 4.0;
 /* Streaks are of one length within this. */
 static const double SAME_PX = 1.5;
+/* Least log-likelihood of a streak's ends over that of ends elsewhere: one wrong in 3000. */
+static const double LEAST_MARGIN = 8.0;
 
 /* A frame that is being solved. */
 typedef struct attempt {
@@ -38,7 +40,9 @@ static double length_px(const bst_common_streak *s) {
     return hypot(s->ends[1].x_px - s->ends[0].x_px, s->ends[1].y_px - s->ends[0].y_px);
 }
 
-/* Measures the path on the identified stars and solves again, until the streak keeps its length. */
+/* Measures the path on the identified stars and solves again, until the streak keeps its length.
+ * Ends that are not certain then may lie in the light of other stars, with the middle of the
+ * exposure in the wrong place: such a frame is not solved. */
 static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
     for (int pass = 0; pass < PASSES; pass++) {
         bool chosen[BST_PLATE_SOLVE_STARS];
@@ -49,14 +53,16 @@ static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
         }
         BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
         BST_TRY(solve_middles(a, BST_LOST_IN_SPACE_USUAL.max_candidates, &again));
+        *out = again;
         if (!again.solved) {
             return BST_OK;
         }
-        *out = again;
         if (fabs(length_px(&a->streak) - before) < SAME_PX) {
+            out->solved = a->streak.ends_margin > LEAST_MARGIN;
             return BST_OK;
         }
     }
+    out->solved = false;
     return BST_OK;
 }
 
@@ -73,6 +79,7 @@ static bst_status try_shapes(attempt *a, bst_plate_solve_result *out) {
             BST_TRY(improve(a, &out->attitude));
         }
         out->stars = a->streak.count;
+        out->ends_margin = a->streak.ends_margin;
         out->ends[0] = a->streak.ends[0];
         out->ends[1] = a->streak.ends[1];
     }

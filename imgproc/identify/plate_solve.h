@@ -20,7 +20,8 @@ typedef struct bst_plate_solve_result {
     bst_lost_in_space_result attitude; /* when the stars are at the middle of their streaks */
     int stars;                         /* found in the frame */
     bst_common_streak_point ends[2];   /* of the streaks, relative to their middle, px */
-    bool points;                       /* the stars are points */
+    double ends_margin; /* log-likelihood of these ends over that of ends more than 8 px away */
+    bool points;        /* the stars are points */
 } bst_plate_solve_result;
 
 /* Solves a frame.

@@ -42,7 +42,7 @@ static double effective_v_mag(const bst_camera *camera, const bst_star *star) {
 bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
                                       const bst_predicted_stars_query *query, int *count) {
     assert(sky && query && count);
-    const bst_quat q_cam_from_gcrf = query->q_cam_from_gcrf;
+    const bst_quat q_cam_from_gcrf = sky->q_cam_from_gcrf = query->q_cam_from_gcrf;
     const bst_light *light = query->light;
     const bst_window window = query->window;
     const double margin_px = query->margin_px;

@@ -14,6 +14,7 @@ typedef struct bst_predicted_stars {
     int capacity;
     bst_star *found;                     /* catalogue stars of the query */
     bst_imgproc_expected_star *expected; /* their predicted positions */
+    bst_quat q_cam_from_gcrf;            /* of the latest query */
 } bst_predicted_stars;
 
 /* Allocates the prediction of catalogue stars in a frame.

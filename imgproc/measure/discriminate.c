@@ -112,6 +112,11 @@ bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *came
     return BST_OK;
 }
 
+void bst_imgproc_discriminator_use_camera(bst_imgproc_discriminator *d, const bst_camera *camera) {
+    assert(d && camera && camera->width_px == d->camera.width_px);
+    d->camera = *camera;
+}
+
 void bst_imgproc_discriminator_free(bst_imgproc_discriminator *d) {
     if (!d) {
         return;

@@ -31,6 +31,10 @@ bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *came
 /* Frees a discriminator; NULL is allowed. */
 void bst_imgproc_discriminator_free(bst_imgproc_discriminator *discriminator);
 
+/* Replaces the camera by one of the same sensor whose geometry is known better. */
+void bst_imgproc_discriminator_use_camera(bst_imgproc_discriminator *discriminator,
+                                          const bst_camera *camera);
+
 /* Saves or restores what is remembered of earlier frames. */
 void bst_imgproc_discriminator_archive(bst_imgproc_discriminator *discriminator,
                                        bst_archive *archive);

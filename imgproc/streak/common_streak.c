@@ -370,6 +370,7 @@ static void refine_path(finder *f, const bst_common_streak *found, const bool *c
 /* Finds all stars by the path. */
 static bst_status find_all(bst_ctx *ctx, finder *f, bst_common_streak *out) {
     out->sigma = f->sigma;
+    out->ends_margin = fmin(f->path.margin[0], f->path.margin[1]);
     for (int e = 0; e < 2; e++) {
         out->ends[e] = (bst_common_streak_point){f->path.ends[e][0], f->path.ends[e][1]};
     }

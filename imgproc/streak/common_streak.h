@@ -22,7 +22,8 @@ typedef struct bst_common_streak_point {
 typedef struct bst_common_streak {
     double sigma;                    /* noise of the given image */
     bst_common_streak_point ends[2]; /* at the frame's middle; the one further left first */
-    bst_detection *items;            /* places of the streaks' middles */
+    double ends_margin;   /* log-likelihood of the ends over that of ends more than 8 px away */
+    bst_detection *items; /* places of the streaks' middles */
     int count;
 } bst_common_streak;
 

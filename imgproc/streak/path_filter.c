@@ -25,6 +25,7 @@ struct bst_path_filter {
     int width, height;  /* of the arrays below: the frame and its margins */
     float *response;    /* [height][width] */
     float *per_noise;   /* [height][width] one over the noise of the response; 0: not searched */
+    int *highest;       /* [height] place of a row's highest SNR; -1: not known */
     float *scratch[2];  /* [height][width] of a star's response; zero between calls */
     double correlation; /* variance of the response over the sum of the squared light */
     double squares;     /* sum of the squared light of the whole path */
@@ -40,6 +41,7 @@ void bst_path_filter_free(bst_path_filter *f) {
     }
     free(f->response);
     free(f->per_noise);
+    free(f->highest);
     free(f->scratch[0]);
     free(f->scratch[1]);
     free(f);
@@ -97,6 +99,13 @@ static void measure_path(bst_path_filter *f) {
     }
 }
 
+/* Marks rows whose response changes. */
+static void forget_rows(bst_path_filter *f, int first, int last) {
+    for (int y = first < 0 ? 0 : first; y <= last && y < f->height; y++) {
+        f->highest[y] = -1;
+    }
+}
+
 /* Sums the image along the path for a block of places. */
 static void filter_block(bst_path_filter *f, const bst_star_path_image *image, int bx, int by) {
     const bst_star_path *p = f->path;
@@ -147,13 +156,15 @@ bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
     size_t places = (size_t)f->width * (size_t)f->height;
     f->response = malloc(places * sizeof *f->response);
     f->per_noise = malloc(places * sizeof *f->per_noise);
+    f->highest = malloc((size_t)f->height * sizeof *f->highest);
     f->scratch[0] = calloc(places, sizeof *f->scratch[0]);
     f->scratch[1] = calloc(places, sizeof *f->scratch[1]);
-    if (!f->response || !f->per_noise || !f->scratch[0] || !f->scratch[1]) {
+    if (!f->response || !f->per_noise || !f->highest || !f->scratch[0] || !f->scratch[1]) {
         bst_path_filter_free(f);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter of %d x %d px",
                         image->width, image->height);
     }
+    forget_rows(f, 0, f->height - 1);
     measure_path(f);
     for (int y = 0; y < f->height; y += BLOCK) {
         for (int x = 0; x < f->width; x += BLOCK) {
@@ -210,18 +221,29 @@ static double along_sigma_px(const bst_path_filter *f, double snr) {
     return SHIFTS;
 }
 
-bool bst_path_filter_highest(const bst_path_filter *f, bst_path_filter_peak *out) {
-    assert(f && out);
-    float best = 0.0f;
-    int at = -1;
-    for (int i = 0; i < f->width * f->height; i++) {
-        float v = f->response[i] * f->per_noise[i];
-        if (v > best) {
-            best = v;
-            at = i;
+/* Place of the highest SNR; rows that have not changed keep theirs. */
+static int highest_place(bst_path_filter *f) {
+    int best = 0;
+    for (int y = 0; y < f->height; y++) {
+        if (f->highest[y] < 0) {
+            int at = y * f->width;
+            for (int i = at; i < (y + 1) * f->width; i++) {
+                at = f->response[i] * f->per_noise[i] > f->response[at] * f->per_noise[at] ? i : at;
+            }
+            f->highest[y] = at;
         }
+        int at = f->highest[y];
+        best =
+            f->response[at] * f->per_noise[at] > f->response[best] * f->per_noise[best] ? at : best;
     }
-    if (at < 0) {
+    return best;
+}
+
+bool bst_path_filter_highest(bst_path_filter *f, bst_path_filter_peak *out) {
+    assert(f && out);
+    int at = highest_place(f);
+    float best = f->response[at] * f->per_noise[at];
+    if (!(best > 0.0f)) {
         return false;
     }
     const int x = at % f->width, y = at / f->width;
@@ -338,17 +360,23 @@ void bst_path_filter_subtract(bst_path_filter *f, const bst_path_filter_peak *pe
     }
     if (box.x1 >= box.x0) {
         subtract_points(f, box);
+        forget_rows(f, box.y0 - KERNEL, box.y1 + KERNEL);
     }
 }
 
 void bst_path_filter_leave_out(bst_path_filter *f, const bst_path_filter_peak *peak,
                                double radius_px) {
     double cx = peak->x_px + f->margin, cy = peak->y_px + f->margin;
-    for (int y = 0; y < f->height; y++) {
-        for (int x = 0; x < f->width; x++) {
+    const int y0 = (int)fmax(ceil(cy - radius_px), 0.0);
+    const int y1 = (int)fmin(floor(cy + radius_px), f->height - 1.0);
+    const int x0 = (int)fmax(ceil(cx - radius_px), 0.0);
+    const int x1 = (int)fmin(floor(cx + radius_px), f->width - 1.0);
+    for (int y = y0; y <= y1; y++) {
+        for (int x = x0; x <= x1; x++) {
             if (hypot(x - cx, y - cy) <= radius_px) {
                 f->per_noise[y * f->width + x] = 0.0f;
             }
         }
     }
+    forget_rows(f, y0, y1);
 }

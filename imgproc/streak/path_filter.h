@@ -33,7 +33,7 @@ typedef struct bst_path_filter_peak {
 } bst_path_filter_peak;
 
 /* Highest maximum in SNR. Returns false if no value is positive. */
-bool bst_path_filter_highest(const bst_path_filter *filter, bst_path_filter_peak *out);
+bool bst_path_filter_highest(bst_path_filter *filter, bst_path_filter_peak *out);
 
 /* Subtracts the response to a star (Hogbom 1974, A&AS 15, 417). */
 void bst_path_filter_subtract(bst_path_filter *filter, const bst_path_filter_peak *peak);

@@ -16,6 +16,17 @@ static const double ROUND = 2.5;
 static const double LEAST_SAMPLE = 2.0;
 /* Light of a sample, over that of the path, below which it has no place of its own. */
 static const double LEAST_LIGHT = 1.0;
+/* Samples by which ends may differ and be the same. */
+enum { SAME_END = 4 };
+/* Share of samples with light of another star, and the range of that light, in units of the image's
+ * noise. */
+static const double CROWDED = 0.2, OTHER_RANGE = 10.0;
+/* Unevenness of a star's light along its streak, 1 sigma. Dark samples have it, too, by the wings of
+ * the PSF: an end then lies where the light has fallen to half. */
+static const double UNEVEN = 0.25;
+/* Neighbouring samples share noise: so many count as one (exp(-1) at a distance of two sigma). */
+static const double CORRELATED = 1.7;
+static const double ROOT_2PI = 2.5066282746310002;
 /* Largest correction of the centre line, px. */
 static const double MOST_SHIFT_PX = 2.0;
 
@@ -125,12 +136,27 @@ static bool centre_line(const frame *f, const bst_star_path_image *image, const 
 typedef struct draft {
     int count;
     double x[BST_STAR_PATH_ROOM], y[BST_STAR_PATH_ROOM], light[BST_STAR_PATH_ROOM];
+    double evidence[BST_STAR_PATH_ROOM]; /* log-likelihood of a lit sample over a dark one */
 } draft;
 
-/* First and last sample of the path, with fractions: the most likely ends of a path of constant
- * light in Gaussian noise, which is the stretch with the greatest sum of light less half the level.
- */
-static void find_ends(const draft *d, double level, double ends[2]) {
+/* Greatest likelihood of a first (step -1) or last (step 1) sample more than SAME_END away from a
+ * given one, over the likelihood of that one; logarithm, at most 0.
+ *
+ * Given:     from, end  the path's other and its own last sample */
+static double rival_end(const draft *d, int from, int end, int step) {
+    double sum = 0.0, best = -HUGE_VAL, own = 0.0;
+    int stop = step > 0 ? d->count : -1;
+    for (int k = from; k != stop; k += step) {
+        sum += d->evidence[k];
+        own = k == end ? sum : own;
+        best = abs(k - end) > SAME_END ? fmax(best, sum) : best;
+    }
+    return best - own;
+}
+
+/* First and last sample of the path, with fractions: the most likely ends, which are those of the
+ * stretch with the greatest sum of evidence. */
+static void find_ends(const draft *d, double level, double ends[2], double margin[2]) {
     double sum = 0.0, best = -HUGE_VAL;
     int from = 0, first = 0, last = d->count - 1;
     for (int k = 0; k < d->count; k++) {
@@ -138,13 +164,15 @@ static void find_ends(const draft *d, double level, double ends[2]) {
             sum = 0.0;
             from = k;
         }
-        sum += d->light[k] - 0.5 * level;
+        sum += d->evidence[k];
         if (sum > best) {
             best = sum;
             first = from;
             last = k;
         }
     }
+    margin[0] = -rival_end(d, last, first, -1);
+    margin[1] = -rival_end(d, first, last, 1);
     /* the samples next to the ends may be partly lit */
     double before = first > 0 ? d->light[first - 1] / level : 0.0;
     double after = last < d->count - 1 ? d->light[last + 1] / level : 0.0;
@@ -180,16 +208,21 @@ static int by_value(const void *a, const void *b) {
     return (d > 0.0) - (d < 0.0);
 }
 
+/* Level of a draft's light. */
+static double level_of(const draft *d) {
+    double sorted[BST_STAR_PATH_ROOM];
+    memcpy(sorted, d->light, (size_t)d->count * sizeof *sorted);
+    qsort(sorted, (size_t)d->count, sizeof *sorted, by_value);
+    return fmax(sorted[d->count * 2 / 3], 1e-9);
+}
+
 /* Cuts a draft at its ends and sets the path from it; the map is that of the middle's place.
  *
  * Returned:  x_px, y_px  place of the middle */
 static void finish(bst_star_path *path, draft *d, double *x_px, double *y_px) {
-    double light[BST_STAR_PATH_ROOM], sorted[BST_STAR_PATH_ROOM], m[3];
+    double light[BST_STAR_PATH_ROOM], m[3], ends[2], level = level_of(d);
     smooth(d->light, light, d->count);
-    memcpy(sorted, d->light, (size_t)d->count * sizeof *sorted);
-    qsort(sorted, (size_t)d->count, sizeof *sorted, by_value);
-    double level = fmax(sorted[d->count * 2 / 3], 1e-9), ends[2];
-    find_ends(d, level, ends);
+    find_ends(d, level, ends, path->margin);
     int first = (int)ceil(ends[0]), last = (int)floor(ends[1]);
     point_at(d, 0.5 * (first + last), x_px, y_px);
     bst_star_path_map(path, *x_px, *y_px, m);
@@ -218,6 +251,7 @@ void bst_star_path_point(bst_star_path *path) {
     path->place[0][0] = path->place[0][1] = 0.0;
     path->light[0] = 1.0;
     memset(path->ends, 0, sizeof path->ends);
+    path->margin[0] = path->margin[1] = HUGE_VAL;
 }
 
 bool bst_star_path_fit(bst_star_path *path, const bst_star_path_image *image, const int *pixels,
@@ -245,6 +279,11 @@ bool bst_star_path_fit(bst_star_path *path, const bst_star_path_image *image, co
         d.light[d.count] = bst_star_path_image_at(image, d.x[d.count], d.y[d.count]);
         d.count++;
         u += BST_STAR_PATH_STEP_PX / hypot(1.0, slope);
+    }
+    /* one source: the evidence of Gaussian noise, but for a factor */
+    double level = level_of(&d);
+    for (int k = 0; k < d.count; k++) {
+        d.evidence[k] = d.light[k] - 0.5 * level;
     }
     finish(path, &d, x_px, y_px);
     return true;
@@ -288,6 +327,30 @@ static double light_at(const bst_star_path *path, const bst_star_path_image *ima
     return 0.0;
 }
 
+/* Evidence that a place of the path is lit: log-likelihood over that of a dark one, in the light of
+ * all stars together. A star's sample may hold another star's light with the probability
+ * CROWDED, whether it is lit or not: single stars cannot move an end. */
+static double evidence_at(const bst_star_path *path, const bst_star_path_image *image,
+                          const bst_star_path_star *stars, int count, const double place[2]) {
+    double sum = 0.0;
+    for (int i = 0; i < count; i++) {
+        double m[3], a = stars[i].amplitude;
+        bst_star_path_map(path, stars[i].x_px, stars[i].y_px, m);
+        double x = stars[i].x_px + m[0] * place[0] + m[1] * place[1];
+        double y = stars[i].y_px + m[1] * place[0] + m[2] * place[1];
+        if (x < 0.0 || y < 0.0 || x >= image->width - 1 || y >= image->height - 1) {
+            continue;
+        }
+        double v = bst_star_path_image_at(image, x, y), spread = hypot(1.0, UNEVEN * a);
+        double other = CROWDED / (OTHER_RANGE + 4.0 * a);
+        double lit = exp(-0.5 * (v - a) * (v - a) / (spread * spread)) / spread;
+        double dark = exp(-0.5 * v * v / (spread * spread)) / spread;
+        sum += log(((1.0 - CROWDED) / ROOT_2PI * lit + other) /
+                   ((1.0 - CROWDED) / ROOT_2PI * dark + other));
+    }
+    return sum / CORRELATED;
+}
+
 /* Place of a sample, counted from the path's first and extrapolated beyond its ends; its normal. */
 static void extended_place(const bst_star_path *p, int k, double place[2], double normal[2]) {
     int near = k < 0 ? 0 : k >= p->count ? p->count - 1 : k;
@@ -326,6 +389,7 @@ static void refine_once(bst_star_path *path, const bst_star_path_image *image,
         extended_place(path, k - BEYOND, place, normal);
         double at[2] = {place[0] + smoothed[k] * normal[0], place[1] + smoothed[k] * normal[1]};
         d.light[k] = light_at(path, image, stars, count, at);
+        d.evidence[k] = evidence_at(path, image, stars, count, at);
         d.x[k] = path->centre[0] + at[0];
         d.y[k] = path->centre[1] + at[1];
     }

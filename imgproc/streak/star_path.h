@@ -13,8 +13,10 @@ typedef struct bst_star_path {
     double place[BST_STAR_PATH_ROOM][2]; /* px, for a star at the frame's middle */
     double light[BST_STAR_PATH_ROOM];    /* of a sample, mean 1 over the path */
     double ends[2][2];                   /* where the light ends; the one further left first */
-    double centre[2];                    /* px, of the frame */
-    double tangent_per_px;               /* of the gnomonic projection; 0: all paths are equal */
+    double margin[2]; /* logarithm of the likelihood of each end over that of ends elsewhere: see
+                         bst_star_path_refine */
+    double centre[2]; /* px, of the frame */
+    double tangent_per_px; /* of the gnomonic projection; 0: all paths are equal */
 } bst_star_path;
 
 #define BST_STAR_PATH_STEP_PX 2.0
@@ -56,7 +58,11 @@ typedef struct bst_star_path_star {
     double x_px, y_px, amplitude;
 } bst_star_path_star;
 
-/* Measures centre line, light and ends of the path on the median of several stars. */
+/* Measures centre line and light of the path on the median of several stars, and its ends by the
+ * likelihood of all of them together.
+ *
+ * Returned:  path->margin  logarithm of the likelihood of each end over that of the best one more
+ *                          than 8 px away */
 void bst_star_path_refine(bst_star_path *path, const bst_star_path_image *image,
                           const bst_star_path_star *stars, int count);
 

@@ -230,6 +230,14 @@ static const bst_wire_field detections[] = {
     COUNT(bst_detections, "Items."),
     INT(bst_detections, lost, 0, MANY, "", "Detections that found no room."),
     INT(bst_detections, bad_pixels, 0, MANY, "", "Of the sensor, that are learned to be bad."),
+    INT(bst_detections, calibration.frames, 0, MANY, "",
+        "Of which the camera's geometry was learned; 0: none, and what follows is 0."),
+    BOUNDED(bst_detections, calibration.scale, 0, 10, "", "True pixel scale over the onboard one."),
+    REAL(bst_detections, calibration.rotation_rad, "rad", "Added to the focal plane's rotation."),
+    REAL(bst_detections, calibration.k1, "", "Added to the radial distortion."),
+    REAL(bst_detections, calibration.p1, "", "Added to the tangential distortion."),
+    REAL(bst_detections, calibration.p2, "", "The same."),
+    REALS(bst_detections, calibration.covariance, 25, "", "Of the five, row by row."),
     END};
 
 static const bst_wire_field detection_items[] = {

@@ -106,10 +106,18 @@ static bool is_detection(const bst_detection *d) {
            bst_is_share(d->label_probability);
 }
 
+static bool is_calibration(const bst_camera_calibration *c) {
+    return c->frames == 0 ||
+           (c->frames > 0 && c->scale > 0.0 && isfinite(c->scale) && isfinite(c->rotation_rad) &&
+            isfinite(c->k1) && isfinite(c->p1) && isfinite(c->p2) &&
+            bst_is_covariance(&c->covariance[0][0], BST_CAMERA_CALIBRATION_SIZE));
+}
+
 bool bst_detections_are_valid(const bst_detections *d, int capacity) {
     bool valid = is_count(d->count, d->lost, capacity) && d->start_tick <= d->end_tick &&
                  is_attitude(d->q_cam_from_gcrf) && is_attitude(d->q_telemetry_from_gcrf) &&
-                 d->stars_identified >= 0 && d->windows >= 0 && d->bad_pixels >= 0;
+                 d->stars_identified >= 0 && d->windows >= 0 && d->bad_pixels >= 0 &&
+                 is_calibration(&d->calibration);
     for (int i = 0; valid && i < d->count; i++) {
         valid = is_detection(&d->items[i]);
     }

@@ -44,6 +44,26 @@ class Generator(unittest.TestCase):
         self.assertEqual(tables[0], tables[1])
         self.assertEqual(tables[0], tables[2])
 
+    def test_finds_a_lost_attitude_as_images_do(self):
+        modules = runs.SENSOR + "/modules/"
+        bias = modules + "gimbal/platform/attitude_bias_arcsec=[300000,-200000,100000]"
+        unknown = [modules + "imgproc/attitude=unknown", modules + "control/attitude=unknown"]
+        for name, sets, found in (("lost_image", [runs.NO_FRAMES, *unknown], True),
+                                  ("lost_generator", [GENERATOR, *unknown], True),
+                                  ("lost_telemetry", [GENERATOR], False)):
+            out = os.path.join(self.folder, name)
+            runs.run(runs.TRACK, out, bias, *sets, duration=8)
+            db = runs.database(out)
+            events = db.execute("SELECT time_s FROM events WHERE kind = 'attitude_found'").fetchall()
+            self.assertEqual([e[0] < 1 for e in events], [True] * found, name)  # by the first frame
+            stars = [r[0] for r in db.execute("SELECT stars_identified FROM detection_frames ORDER BY exposure_id")]
+            if found:
+                self.assertGreaterEqual(stars[0], 6, name)
+                # one frame of the slew may be smeared; the others find their stars round the attitude
+                self.assertGreater(sum(n > 0 for n in stars), len(stars) - 3, (name, stars))
+            else:
+                self.assertLess(sum(n > 0 for n in stars), 3, (name, stars))
+
     def test_truth_is_that_of_the_image(self):
         truths = []
         for source in ("image", "generator"):

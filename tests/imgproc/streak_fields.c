@@ -16,7 +16,7 @@ enum { HOT_PIXELS = 20, BLUR = 5, LARGEST = 1024 };
 
 typedef struct arguments {
     const char *catalogue, *kind; /* sky or mirrored */
-    double fields, first, side, field, v_limit, length, bend, scale, missing, least;
+    double fields, first, side, field, v_limit, length, bend, scale, missing, least, snr;
 } arguments;
 
 typedef struct scene {
@@ -50,7 +50,8 @@ static void read_arguments(int argc, char **argv, arguments *a) {
                      .v_limit = 9.5,
                      .length = 60,
                      .scale = 0.05,
-                     .missing = 0.4};
+                     .missing = 0.4,
+                     .snr = 8};
     for (int i = 1; i < argc; i++) {
         struct {
             const char *name;
@@ -58,7 +59,7 @@ static void read_arguments(int argc, char **argv, arguments *a) {
         } all[] = {{"fields=", &a->fields}, {"first=", &a->first},   {"side=", &a->side},
                    {"field=", &a->field},   {"limit=", &a->v_limit}, {"length=", &a->length},
                    {"bend=", &a->bend},     {"scale=", &a->scale},   {"missing=", &a->missing},
-                   {"least=", &a->least}};
+                   {"least=", &a->least},   {"snr=", &a->snr}};
         bool taken = false;
         for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
             size_t n = strlen(all[k].name);
@@ -257,7 +258,7 @@ int main(int argc, char **argv) {
         bst_lost_in_space *lost;
         bst_assert_ok(&ctx, bst_lost_in_space_create(&ctx, &s.camera, onboard, patterns, YEAR,
                                                      BST_PLATE_SOLVE_STARS, &lost));
-        const bst_plate_solve_options o = {0.05, a.v_limit, 8.0, bst_camera_scale_rad(&s.camera),
+        const bst_plate_solve_options o = {0.05, a.v_limit, a.snr, bst_camera_scale_rad(&s.camera),
                                            &s.light};
         bst_plate_solve_result r;
         double begin = cpu_s();
@@ -271,10 +272,11 @@ int main(int argc, char **argv) {
             const bst_common_streak_point *e = r.ends;
             printf(
                 "# field %d: %s, %d usable stars, %d found, streak %.1f px, off %.1f px, scale "
-                "%.5f, true %.5f, chance e^%.1f, %d quads, %d candidates, %.0f ms\n",
+                "%.5f, true %.5f, chance e^%.1f, %d quads, %d candidates, margin %.1f, %.0f ms\n",
                 (int)i, r.attitude.solved ? "wrong" : "not solved", s.usable, r.stars,
                 hypot(e[1].x_px - e[0].x_px, e[1].y_px - e[0].y_px), off, r.attitude.scale, s.scale,
-                r.attitude.log_chance, r.attitude.quads, r.attitude.candidates, ms[tried - 1]);
+                r.attitude.log_chance, r.attitude.quads, r.attitude.candidates, r.ends_margin,
+                ms[tried - 1]);
         }
         bst_lost_in_space_free(lost);
     }

@@ -1,6 +1,7 @@
 /* Attitude of a frame: from its stars, else by telemetry and its filtered error. */
 #include <string.h>
 
+#include "sim/optics/calibrated_camera.h"
 #include "tracker/tracker_internal.h"
 
 /* Error of the telemetry, beyond what was expected, that is kept beside the filter, rad: 5.7 deg.
@@ -78,10 +79,21 @@ static void rebase(bst_tracker *t, bst_vec3 expected, bst_quat q_telemetry, bst_
                               (bst_vec3){0.0, 0.0, 0.0}, covariance);
 }
 
+/* Sets the camera as image processing knows it in this frame; one that folds the image is not used.
+ */
+static void use_calibration(bst_tracker *t, const bst_detections *d) {
+    bst_ctx ignored = {0};
+    if (bst_camera_apply_calibration(&ignored, &t->onboard, &d->calibration, &t->camera) !=
+        BST_OK) {
+        t->camera = t->onboard;
+    }
+}
+
 void bst_tracker_find_attitude(bst_tracker *t, const bst_tracker_input *input,
                                const bst_light *light, int64_t tick, double dt_s,
                                bst_tracker_attitude *out) {
     memset(out, 0, sizeof *out);
+    use_calibration(t, input->detections);
     bst_quat q_telemetry = bst_tracker_telemetry(input);
     bst_attitude_solution solution;
     int star_count = solve_attitude(t, input->detections, light, q_telemetry, &solution);

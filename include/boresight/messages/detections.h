@@ -58,6 +58,20 @@ typedef struct bst_detection {
     bst_detection_extent extent;
 } bst_detection;
 
+/* Number of parameters of bst_camera_calibration. */
+enum { BST_CAMERA_CALIBRATION_SIZE = 5 };
+
+/* What image processing has learned from stars about the camera's geometry, relative to the onboard
+ * camera: bst_camera_apply_calibration. */
+typedef struct bst_camera_calibration {
+    int32_t frames; /* measured so far; 0: none, and the rest is 0 */
+    double scale;   /* true pixel scale over the onboard one */
+    /* to be added to the onboard camera's rotation_deg (in rad) and distortion */
+    double rotation_rad, k1, p1, p2;
+    /* of scale, rotation_rad, k1, p1, p2 */
+    double covariance[BST_CAMERA_CALIBRATION_SIZE][BST_CAMERA_CALIBRATION_SIZE];
+} bst_camera_calibration;
+
 /* detections (queue): what image processing (or the generator) found in one frame. */
 typedef struct bst_detections {
     int64_t exposure_id;
@@ -75,6 +89,7 @@ typedef struct bst_detections {
     int32_t windows; /* number of searched regions of interest around predictions; 0: full frame */
     int32_t count, lost; /* items; detections beyond the capacity */
     int32_t bad_pixels;  /* on the sensor, learned by image processing so far */
+    bst_camera_calibration calibration;
     bst_detection items[];
 } bst_detections;
 

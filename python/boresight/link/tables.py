@@ -5,7 +5,7 @@ from typing import Any, Dict, List
 
 import numpy as np
 
-VERSION = 5
+VERSION = 6
 
 # Members of each message's record, then of its items: name:type, x for an array. A test compares
 # them with docs/reference/icd.md.
@@ -75,7 +75,9 @@ _TABLES = {
         "exposure_id:i8 start_tick:i8 end_tick:i8 q_cam_from_gcrf:f8x4 "
         "q_telemetry_from_gcrf:f8x4 background_e:f8 noise_e:f8 threshold_snr:f8 "
         "zero_point_mag:f8 zero_point_sigma_mag:f8 zero_point_stars:i4 "
-        "stars_identified:i4 windows:i4 count:i4 lost:i4 bad_pixels:i4",
+        "stars_identified:i4 windows:i4 count:i4 lost:i4 bad_pixels:i4 "
+        "calibration.frames:i4 calibration.scale:f8 calibration.rotation_rad:f8 "
+        "calibration.k1:f8 calibration.p1:f8 calibration.p2:f8 calibration.covariance:f8x25",
         "x_px:f8 y_px:f8 cov_xx:f8 cov_xy:f8 cov_yy:f8 flux_e:f8 flux_sigma_e:f8 snr:f8 "
         "length_px:f8 width_px:f8 angle_rad:f8 v_mag:f8 v_mag_sigma:f8 flags:u4 "
         "star_id:u4 label:i4 label_probability:f8 rate_x_pxps:f8 rate_y_pxps:f8 "

@@ -29,6 +29,7 @@ typedef enum bst_recorder_table {
     BST_TABLE_SHAPES,
     BST_TABLE_EXTENDED,
     BST_TABLE_PARTS,
+    BST_TABLE_CAMERA_CALIBRATION,
     BST_TABLE_COUNT
 } bst_recorder_table;
 
@@ -123,6 +124,10 @@ bst_status bst_recorder_shape_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
  * Given:     item  index of the detection */
 bst_status bst_recorder_extended_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                      const bst_detections *detections, int item) BST_MUST_CHECK;
+
+/* Writes the row of table camera_calibration of a frame; none without an estimate or a table. */
+bst_status bst_recorder_calibration_row(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                                        const bst_detections *detections) BST_MUST_CHECK;
 
 /* Functions that write the rows of one message. */
 #define BST_RECORDER_ROWS(name)                                                            \

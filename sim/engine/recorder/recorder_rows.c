@@ -304,6 +304,7 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
     put_int(&head, d->lost);
     put_int(&head, d->bad_pixels);
     BST_TRY(append(ctx, recorder, BST_TABLE_DETECTION_FRAMES, &head));
+    BST_TRY(bst_recorder_calibration_row(ctx, recorder, sensor, d));
     for (int i = 0; i < d->count; i++) {
         const bst_detection *item = &d->items[i];
         if (!kept(recorder, item)) {

@@ -382,6 +382,33 @@ static const bst_io_column part_columns[] = {
     TEXT("part", "name of the part in the shape"),
 };
 
+static const bst_io_column calibration_columns[] = {
+    SENSOR,
+    EXPOSURE,
+    MID,
+    INT("frames", "", "frames that were measured so far"),
+    REAL("scale", "", "true pixel scale over the onboard one"),
+    REAL("rotation_rad", "rad", "added to the onboard rotation of the focal plane"),
+    REAL("k1", "", "added to the onboard radial distortion"),
+    REAL("p1", "", "added to the onboard tangential distortion"),
+    REAL("p2", "", "added to the onboard tangential distortion"),
+    REAL("cov_scale_scale", "", "covariance"),
+    REAL("cov_scale_rotation", "rad", "covariance"),
+    REAL("cov_scale_k1", "", "covariance"),
+    REAL("cov_scale_p1", "", "covariance"),
+    REAL("cov_scale_p2", "", "covariance"),
+    REAL("cov_rotation_rotation", "rad^2", "covariance"),
+    REAL("cov_rotation_k1", "rad", "covariance"),
+    REAL("cov_rotation_p1", "rad", "covariance"),
+    REAL("cov_rotation_p2", "rad", "covariance"),
+    REAL("cov_k1_k1", "", "covariance"),
+    REAL("cov_k1_p1", "", "covariance"),
+    REAL("cov_k1_p2", "", "covariance"),
+    REAL("cov_p1_p1", "", "covariance"),
+    REAL("cov_p1_p2", "", "covariance"),
+    REAL("cov_p2_p2", "", "covariance"),
+};
+
 typedef struct table_spec {
     const char *name, *doc;
     const bst_io_column *columns;
@@ -422,6 +449,9 @@ static const table_spec specs[BST_TABLE_COUNT] = {
         SPEC("shapes", shape_columns, "True outline and attitude of objects with a shape."),
     [BST_TABLE_EXTENDED] =
         SPEC("extended_targets", extended_columns, "Detections larger than the PSF."),
+    [BST_TABLE_CAMERA_CALIBRATION] =
+        SPEC("camera_calibration", calibration_columns,
+             "Geometry of the camera as image processing has learned it from stars."),
     [BST_TABLE_PARTS] = SPEC("parts", part_columns, "Parts of the objects with a shape."),
 };
 
@@ -447,6 +477,7 @@ static bool wanted(const bst_recorder *recorder, bst_recorder_table table) {
             return config->truth && config->telemetry_hz > 0.0;
         case BST_TABLE_DETECTION_FRAMES:
         case BST_TABLE_DETECTIONS:
+        case BST_TABLE_CAMERA_CALIBRATION:
             return config->detections;
         case BST_TABLE_TRACK_FRAMES:
         case BST_TABLE_TRACKS:

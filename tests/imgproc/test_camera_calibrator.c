@@ -1,0 +1,175 @@
+/* Calibration of the camera's geometry from stars at known places. */
+#include "boresight/rng.h"
+#include "imgproc/identify/camera_calibrator.h"
+#include "tests/test_support.h"
+
+enum { STARS = 20, SIZE = BST_CAMERA_CALIBRATION_SIZE };
+static const double SIGMA_PX = 0.1, STAR_SIGMA_PX = 0.05, ROLL_RAD = 1e-4;
+
+typedef struct scene {
+    bst_ctx ctx;
+    bst_camera_calibrator_config config;
+    bst_camera onboard, truth;
+    bst_rng_key key;
+    bst_camera_calibrator_star stars[STARS];
+} scene;
+
+/* A camera of 1024 px at 3 arcsec, and the one on board. */
+static void make_cameras(scene *s, double scale, double rotation_rad, double k1, double p1) {
+    s->onboard =
+        (bst_camera){.width_px = 1024, .height_px = 1024, .pixel_scale_arcsec = 3.0 / scale};
+    bst_assert_ok(&s->ctx, bst_camera_prepare(&s->ctx, &s->onboard));
+    const bst_camera_calibration c = {
+        .frames = 1, .scale = scale, .rotation_rad = rotation_rad, .k1 = k1, .p1 = p1};
+    bst_assert_ok(&s->ctx, bst_camera_apply_calibration(&s->ctx, &s->onboard, &c, &s->truth));
+}
+
+static void setup_scene(scene *s, uint64_t seed) {
+    *s = (scene){.config = {.enabled = true,
+                            .scale_sigma = 0.02,
+                            .rotation_sigma_deg = 0.1,
+                            .distortion_sigma_px = 1.0,
+                            .telemetry_roll_sigma_arcsec = 20.0,
+                            .star_sigma_px = STAR_SIGMA_PX},
+                 .key = bst_rng_make_key(seed, 0, "test", "camera calibrator")};
+}
+
+/* Places random stars of a frame; the attitude differs from the predicted one by 5e-5 rad and about
+ * the boresight by what telemetry says. */
+static bst_camera_calibrator_frame draw(scene *s, uint64_t frame) {
+    bst_vec3 turn = {5e-5 * bst_rng_normal(s->key, frame, 0),
+                     5e-5 * bst_rng_normal(s->key, frame, 1), ROLL_RAD};
+    for (uint64_t i = 0; i < STARS; i++) {
+        bst_camera_calibrator_star *star = &s->stars[i];
+        double error = hypot(SIGMA_PX, STAR_SIGMA_PX);
+        star->x_px = 1023.0 * bst_rng_uniform(s->key, frame, 10 + 4 * i);
+        star->y_px = 1023.0 * bst_rng_uniform(s->key, frame, 11 + 4 * i);
+        star->cam = bst_quat_rotate(bst_quat_conj(bst_quat_from_rotvec(turn)),
+                                    bst_camera_unproject(&s->truth, star->x_px, star->y_px));
+        star->x_px += error * bst_rng_normal(s->key, frame, 12 + 4 * i);
+        star->y_px += error * bst_rng_normal(s->key, frame, 13 + 4 * i);
+        star->cov_xx = star->cov_yy = SIGMA_PX * SIGMA_PX;
+        star->cov_xy = 0.0;
+    }
+    return (bst_camera_calibrator_frame){s->stars, STARS, (double)frame, ROLL_RAD};
+}
+
+/* Scale 2 % and rotation 0.1 deg wrong, distortion of 1.2 px at the corner: 1e-4 after 20 frames.
+ */
+static void learns_scale_rotation_and_distortion(void **state) {
+    (void)state;
+    scene s;
+    setup_scene(&s, 1);
+    make_cameras(&s, 1.02, 1.7e-3, 15.0, 1e-3);
+    bst_camera_calibrator c;
+    bst_camera_calibration out;
+    bst_camera_calibrator_begin(&s.config, &s.onboard, &c);
+    for (uint64_t i = 0; i < 20; i++) {
+        bst_camera_calibrator_frame frame = draw(&s, i);
+        assert_true(bst_camera_calibrator_update(&c, &frame));
+    }
+    bst_camera_calibrator_get(&c, &out);
+    assert_int_equal(out.frames, 20);
+    assert_true(fabs(out.scale - 1.02) < 1e-4); /* asked; 1 sigma is 2e-5 */
+    assert_true(fabs(out.rotation_rad - 1.7e-3) < 1e-4);
+    assert_true(fabs(out.k1 - 15.0) < 1.5);  /* 1 sigma 0.4 */
+    assert_true(fabs(out.p1 - 1e-3) < 3e-3); /* 1 sigma 8e-4 */
+    /* the camera has the true places to within the centroids' errors */
+    for (int i = 0; i < 9; i++) {
+        double x = 511.5 * (i % 3), y = 511.5 * (i / 3), u, v;
+        assert_true(bst_camera_project(&c.camera, bst_camera_unproject(&s.truth, x, y), &u, &v));
+        assert_true(hypot(u - x, v - y) < 0.3); /* with a common shift by p1 and p2 */
+    }
+}
+
+/* NEES of the four parameters that stars alone give, over 200 cameras drawn from the prior. */
+static void covariance_is_that_of_the_errors(void **state) {
+    (void)state;
+    enum { CAMERAS = 200, FRAMES = 3 };
+    double sum = 0.0;
+    for (uint64_t n = 0; n < CAMERAS; n++) {
+        scene s;
+        setup_scene(&s, 100 + n);
+        make_cameras(&s, 1.0 + 0.02 * bst_rng_normal(s.key, 1000, 0), 0.0,
+                     12.0 * bst_rng_normal(s.key, 1000, 1), 0.0);
+        s.config.rotation_sigma_deg = 0.0;
+        bst_camera_calibrator c;
+        bst_camera_calibration out;
+        bst_camera_calibrator_begin(&s.config, &s.onboard, &c);
+        for (uint64_t i = 0; i < FRAMES; i++) {
+            bst_camera_calibrator_frame frame = draw(&s, i);
+            assert_true(bst_camera_calibrator_update(&c, &frame));
+        }
+        bst_camera_calibrator_get(&c, &out);
+        double scale = s.truth.pixel_scale_arcsec / s.onboard.pixel_scale_arcsec;
+        const double e[2] = {out.scale - scale, out.k1 - s.truth.distortion.k1};
+        const double a = out.covariance[0][0], b = out.covariance[0][2], d = out.covariance[2][2];
+        assert_true(a > 0.0 && a * d > b * b);
+        sum += (d * e[0] * e[0] - 2.0 * b * e[0] * e[1] + a * e[1] * e[1]) / (a * d - b * b);
+        assert_true(fabs(out.rotation_rad) < 1e-9); /* known exactly */
+    }
+    /* chi-square with 400 degrees of freedom: mean 2, standard deviation 0.14; 4 sigma */
+    assert_true(fabs(sum / CAMERAS - 2.0) < 0.57);
+}
+
+/* A scale that drifts by 3e-4 in an hour is followed. */
+static void follows_a_drift(void **state) {
+    (void)state;
+    scene s;
+    setup_scene(&s, 3);
+    s.config.drift_px_per_sqrt_h = 0.2;
+    bst_camera_calibrator c;
+    for (uint64_t i = 0; i < 60; i++) {
+        make_cameras(&s, 1.0, 0.0, 0.0, 0.0);
+        s.truth.pixel_scale_arcsec *= 1.0 + 3e-4 * (double)i / 60.0;
+        if (i == 0) {
+            bst_camera_calibrator_begin(&s.config, &s.onboard, &c);
+        }
+        bst_camera_calibrator_frame frame = draw(&s, i);
+        frame.seconds = 60.0 * (double)i;
+        assert_true(bst_camera_calibrator_update(&c, &frame));
+    }
+    bst_camera_calibration out;
+    bst_camera_calibrator_get(&c, &out);
+    assert_true(fabs(out.scale - (1.0 + 3e-4 * 59.0 / 60.0)) < 1e-4); /* 1 sigma 3e-5, and lag */
+}
+
+/* Frames that no camera explains change nothing; outliers are left out; telemetry without a roll
+ * leaves the rotation. */
+static void rejects_what_does_not_fit(void **state) {
+    (void)state;
+    scene s;
+    setup_scene(&s, 4);
+    make_cameras(&s, 1.001, 0.0, 0.0, 0.0);
+    bst_camera_calibrator c, before;
+    bst_camera_calibrator_begin(&s.config, &s.onboard, &c);
+    bst_camera_calibrator_frame frame = draw(&s, 0);
+    frame.count = 3;
+    assert_false(bst_camera_calibrator_update(&c, &frame));
+    frame = draw(&s, 0);
+    for (int i = 0; i < STARS; i += 2) {
+        s.stars[i].x_px += 30.0 * (i % 4 ? 1 : -1);
+    }
+    before = c;
+    assert_false(bst_camera_calibrator_update(&c, &frame));
+    assert_memory_equal(&before, &c, sizeof c);
+    frame = draw(&s, 1);
+    s.stars[3].y_px += 5.0;
+    frame.telemetry_roll_rad = NAN;
+    assert_true(bst_camera_calibrator_update(&c, &frame));
+    bst_camera_calibration out;
+    bst_camera_calibrator_get(&c, &out);
+    assert_true(fabs(out.scale - 1.001) < 4e-4); /* 1 sigma 1e-4 */
+    assert_true(fabs(out.rotation_rad) < 1e-5);
+    assert_true(sqrt(out.covariance[1][1]) > 0.09 * BST_DEG_RAD);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(learns_scale_rotation_and_distortion),
+        cmocka_unit_test(covariance_is_that_of_the_errors),
+        cmocka_unit_test(follows_a_drift),
+        cmocka_unit_test(rejects_what_does_not_fit),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
