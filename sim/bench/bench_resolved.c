@@ -9,6 +9,7 @@
 
 #include "scenegen/renderer.h"
 #include "sim/bench/bench.h"
+#include "sim/bench/bench_scenes.h"
 #include "sim/device/device.h"
 #include "sim/world/scene/source_body.h"
 
@@ -138,16 +139,6 @@ static bst_render_request request_of(scene *s, int frame) {
                                 .exposure_id = frame};
 }
 
-static bst_status map_and_release(bst_ctx *ctx, bst_frame *frame) {
-    const uint16_t *pixels;
-    bst_status status = bst_frame_map(frame, ctx, &pixels);
-    if (status == BST_OK) {
-        bst_frame_unmap(frame);
-    }
-    bst_frame_release(frame);
-    return status;
-}
-
 /* Times frames as in other benchmarks: the next one is planned while one is rendered, and
  * size->together are averaged. */
 static bst_status time_frames(bst_ctx *ctx, bst_renderer *r, const mesh_size *size, scene *s,
@@ -161,7 +152,7 @@ static bst_status time_frames(bst_ctx *ctx, bst_renderer *r, const mesh_size *si
         bst_render_request q = request_of(s, n);
         status = bst_renderer_render(ctx, r, &q, &frame);
         if (before && status == BST_OK) {
-            status = map_and_release(ctx, before);
+            status = bst_bench_map_and_release(ctx, before);
         } else if (before) {
             bst_frame_release(before);
         }
