@@ -8,40 +8,78 @@
  * integrating an edge's image over it is below 1e-4. */
 static const double gauss_reach[BST_SMEAR_GAUSS_MOST] = {0.1, 0.7, 1.7, 3.2};
 
-/* Poses from which steps are equal, and the longest step, PSF sigmas, with a tolerance of TOLERANCE
- * or more; its square is as the tolerance. Between equal steps h the
- * image of an edge that n poses blur is wrong by exp(-2 pi^2 sigma^2 / h^2) / (pi n). At both ends
- * the midpoint rule lacks h^2 / 24 of the derivative, which the weights of two poses replace in
- * part. */
-enum { EQUAL_POSES = 32 };
-static const double STEP = 1.8, TOLERANCE = 0.1, STEP_ERROR = 0.033;
-static const double end_weights[2] = {1.0 / 24.0, -1.0 / 24.0};
+/* Graded poses, for images that move by GRADED sigmas or more: the midpoint rule in s with
+ * u'(s) = STEP (1 - NARROW (exp(-(s / WIDE)^2) + exp(-((n - s) / WIDE)^2))), steps that are NARROW
+ * shorter at both ends, where that rule lacks the square of the step over 24 of the derivative. The
+ * error, of the light at an edge, of steps h over L sigmas is at most
+ * (h exp(-2 pi^2 / h^2) / pi + ENDS (h / 2.4)^2) / L; it is where the edge has passed WIDE steps or
+ * more, or with steps below ALIASED, of which the error is that at the ends, AT_END steps.
+ * tests/scenegen/test_body_poses.c compares these bounds with integrals. */
+static const double GRADED = 10.0, LONGEST = 2.8, SHORTEST = 0.5, STEP_RATIO = 0.98;
+static const double WIDE = 2.5, NARROW = 0.87, ENDS = 1.3e-3, ALIASED = 1.9, AT_END = 0.2;
 
-void bst_body_times_choose(double sigmas, double tolerance, bst_body_times *out) {
-    int order = 0;
+/* Poses that short steps take in addition. */
+static double graded_more(void) {
+    return NARROW * WIDE * sqrt(BST_PI);
+}
+
+static double graded_error(double step, double sigmas) {
+    double ends = step / 2.4;
+    return (step * exp(-2.0 * BST_PI * BST_PI / (step * step)) / BST_PI + ENDS * ends * ends) /
+           sigmas;
+}
+
+/* Steps near both ends are shorter than in the middle. */
+static void choose_graded(double sigmas, int count, double step, bst_body_times *out) {
+    double half = 0.5 * graded_more(), sum = 0.0;
+    for (int k = 0; k < count; k++) {
+        double from = (k + 0.5) / WIDE, to = (count - k - 0.5) / WIDE;
+        double u = (k + 0.5 - half * (erf(from) + erf(count / WIDE) - erf(to))) /
+                   (count - 2.0 * half * erf(count / WIDE));
+        out->u[k] = u;
+        out->weight[k] = 1.0 - NARROW * (exp(-from * from) + exp(-to * to));
+        sum += out->weight[k];
+    }
+    for (int k = 0; k < count; k++) {
+        out->weight[k] /= sum;
+    }
+    out->count = count;
+    out->error = graded_error(step, sigmas);
+    out->light = fmin((step < ALIASED ? AT_END : WIDE) * step / sigmas, 1.0);
+}
+
+/* The number of graded poses for an error. *step: in the middle, sigmas. */
+static int graded_count(double sigmas, double allowed, double *step) {
+    double longest = LONGEST, count;
+    while (longest > SHORTEST && graded_error(longest, sigmas) > allowed) {
+        longest *= STEP_RATIO;
+    }
+    count = fmin(ceil(sigmas / longest + graded_more()), BST_BODY_POSES_MAX);
+    *step = sigmas / (count - graded_more());
+    return (int)count;
+}
+
+void bst_body_times_choose(double sigmas, double allowed, bst_body_times *out) {
+    int order = 0, graded = BST_BODY_POSES_MAX;
+    double step = 0.0;
     while (order + 1 < BST_SMEAR_GAUSS_MOST && sigmas > gauss_reach[order]) {
         order++;
     }
-    int panels = (int)fmin(fmax(ceil(sigmas / gauss_reach[order]), 1.0), EQUAL_POSES);
-    out->error = out->count = 0;
-    if (panels * (order + 1) <= EQUAL_POSES) {
-        for (int p = 0; p < panels; p++) {
-            for (int k = 0; k <= order; k++) {
-                out->u[out->count] = (p + bst_smear_gauss_place[order][k]) / panels;
-                out->weight[out->count++] = bst_smear_gauss_weight[order][k] / panels;
-            }
-        }
+    int panels = (int)fmin(fmax(ceil(sigmas / gauss_reach[order]), 1.0), BST_BODY_POSES_MAX);
+    if (sigmas >= GRADED) {
+        graded = graded_count(sigmas, allowed, &step);
+    }
+    if (graded < panels * (order + 1)) {
+        choose_graded(sigmas, graded, step, out);
         return;
     }
-    double longest = STEP * sqrt(fmin(tolerance / TOLERANCE, 1.0));
-    int n = (int)fmin(fmax(ceil(sigmas / longest), EQUAL_POSES), BST_BODY_POSES_MAX);
-    double step = sigmas / n / STEP;
-    out->error = STEP_ERROR * step * step / n;
-    out->count = n;
-    for (int k = 0; k < n; k++) {
-        int from_end = k < n - 1 - k ? k : n - 1 - k;
-        out->u[k] = (k + 0.5) / n;
-        out->weight[k] = (1.0 + (from_end < 2 ? end_weights[from_end] : 0.0)) / n;
+    out->error = out->count = 0;
+    out->light = 1.0;
+    for (int p = 0; p < panels; p++) {
+        for (int k = 0; k <= order; k++) {
+            out->u[out->count] = (p + bst_smear_gauss_place[order][k]) / panels;
+            out->weight[out->count++] = bst_smear_gauss_weight[order][k] / panels;
+        }
     }
 }
 

@@ -12,12 +12,15 @@ typedef struct bst_body_times {
     double u[BST_BODY_POSES_MAX], weight[BST_BODY_POSES_MAX]; /* fractions of the exposure */
     int count;
     double error; /* of the quadrature: of the light at a border, over that of the body */
+    double light; /* where it is: light at least, over that of the body */
 } bst_body_times;
 
 /* Chooses the poses for an image that moves by that many PSF sigmas.
  *
- * Given:     tolerance  allowed error of the frame, in sigma of a pixel */
-void bst_body_times_choose(double sigmas, double tolerance, bst_body_times *out);
+ * Given:     allowed  error of the light at a border, over that of the body
+ * Returned:  out      its error is larger than allowed if that takes more than BST_BODY_POSES_MAX
+ *                     poses or steps below half a sigma */
+void bst_body_times_choose(double sigmas, double allowed, bst_body_times *out);
 
 /* Poses are drawn in that many images, each with every so-manieth pose, and these are summed: the
  * same for any number of threads. */

@@ -12,6 +12,7 @@ typedef struct bst_image_nodes_aim {
     double electrons; /* of one unit of the image's light */
     double dark_variance_e2;
     double tolerance_sigma; /* of the frame's image, in sigma of a pixel */
+    bool blurred;           /* many poses: the light of a cell has no sharp borders */
     double x0, y0;          /* origin of the nodes' positions, px from the boresight */
 } bst_image_nodes_aim;
 

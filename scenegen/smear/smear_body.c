@@ -24,6 +24,13 @@
 #define CELL_SHARE 0.8
 #define BORDER_LIGHT 0.01
 
+/* Share of the tolerance for the poses, and PSF sigmas from the end of the motion within which
+ * their errors are small. */
+#define POSES_SHARE 0.7
+#define POSES_SIGMAS 5.0
+/* Motion of borders of shadows over that of the body, about. */
+#define FASTER 1.1
+
 /* Error of neighbouring nodes together, over the largest of one. */
 #define NEIGHBOURS 1.25
 
@@ -192,6 +199,13 @@ static double light_cell_for(const bst_smear *s, const bst_scene_source *source,
     return side;
 }
 
+/* Allowed error of the poses of an image that moves, over the light of a pixel. */
+static double poses_allowed(const bst_smear *s, const bst_scene_source *source, double sigmas) {
+    double light_e = per_px_e(s, source), part = fmin(POSES_SIGMAS / sigmas, 1.0);
+    return POSES_SHARE * s->options.tolerance_sigma * sqrt(part * light_e + s->dark_variance_e2) /
+           light_e;
+}
+
 /* Limits of the image: what can light the sensor. */
 static void clip_box(const bst_smear *s, double room_px, double low[2], double high[2]) {
     double margin = 0.5 * s->options.taps + 2.0 + room_px;
@@ -340,8 +354,8 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
     b->one_pose = turned_px <= STILL_PX;
     double sigma_px = sqrt(s->sigma_px * s->sigma_px + 1.0 / 12.0);
     if (!b->one_pose) {
-        bst_body_times_choose((moved_px + turned_px) / sigma_px, s->options.tolerance_sigma,
-                              &d.times);
+        double sigmas = (moved_px + FASTER * turned_px) / sigma_px;
+        bst_body_times_choose(sigmas, poses_allowed(s, source, sigmas), &d.times);
     }
     *there = find_box(s, b, source, &d.times, low, high);
     if (!*there) {
@@ -361,7 +375,9 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
     BST_TRY(draw_poses(ctx, s, b, &d, low, high));
     b->error =
         turned_px * turned_px * (b->one_pose ? 1.0 / 12.0 * 0.12 : 0.0) / (sigma_px * sigma_px);
-    b->error += d.times.error;
+    b->blurred = d.times.count > FEW_POSES;
+    b->poses_error = d.times.error;
+    b->poses_light = d.times.light;
     if (!bst_resolved_image_of(b->image)->second && d.times.count <= FEW_POSES) {
         b->error += cell_error(s, b->cell_px);
     }
@@ -392,6 +408,7 @@ bst_status bst_smear_body_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_sour
                                .electrons = electrons,
                                .dark_variance_e2 = s->dark_variance_e2,
                                .tolerance_sigma = IMAGE_SHARE * s->aim * s->options.tolerance_sigma,
+                               .blurred = b->blurred,
                                .x0 = b->one_pose ? b->x0 : x,
                                .y0 = b->one_pose ? b->y0 : y};
     bst_image_nodes_result image;
@@ -415,6 +432,8 @@ bst_status bst_smear_body_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_sour
         s->last_peak_e = electrons * fmin(line * line * image.light, image.peak);
         s->last_read_e = electrons * fmin(image.light, image.peak * s->binning * s->binning);
     }
+    s->poses_sigma = b->poses_error * s->last_read_e /
+                     sqrt(b->poses_light * s->last_read_e + s->dark_variance_e2);
     s->chord_error = b->error + NEIGHBOURS * image.error_e / fmax(s->last_read_e, 1e-9);
     return bst_extended_source_spread(ctx, &s->points, s->stretch, &s->nodes);
 }

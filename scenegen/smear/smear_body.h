@@ -16,10 +16,12 @@ typedef struct bst_smear_body {
     bst_body_poses others;       /* for images of many poses */
     int64_t frame;               /* for which the image is made; 0: none */
     double cell_px;
-    double x0, y0; /* origin of the image's positions, px from the boresight */
-    bool one_pose; /* the image of mid-exposure, to be moved along the path */
-    double error;  /* of turning within a pose, relative to the brightest pixel */
-    bool empty;    /* no image */
+    double x0, y0;                   /* origin of the image's positions, px from the boresight */
+    bool blurred;                    /* of more poses than FEW_POSES */
+    bool one_pose;                   /* the image of mid-exposure, to be moved along the path */
+    double error;                    /* of turning within a pose, relative to the brightest pixel */
+    double poses_error, poses_light; /* of the poses: see bst_body_times */
+    bool empty;                      /* no image */
 } bst_smear_body;
 
 /* The bodies of a camera's sources; zero-initialise it. */

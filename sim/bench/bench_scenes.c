@@ -268,7 +268,7 @@ static void take_pose(bst_bench_view *v, const pose *p) {
     v->request = p->request;
 }
 
-static bst_status map_and_release(bst_ctx *ctx, bst_frame *frame) {
+bst_status bst_bench_map_and_release(bst_ctx *ctx, bst_frame *frame) {
     const uint16_t *pixels;
     bst_status status = bst_frame_map(frame, ctx, &pixels);
     if (status == BST_OK) {
@@ -296,7 +296,7 @@ static bst_status time_poses(bst_ctx *ctx, bst_renderer *renderer, bst_bench_vie
         if (n < 0 || status != BST_OK) {
             continue;
         }
-        status = map_and_release(ctx, frames[n % 2]);
+        status = bst_bench_map_and_release(ctx, frames[n % 2]);
         frames[n % 2] = NULL;
         if (n >= WARM_UP && latencies < BST_BENCH_TIMES) {
             latency_ms[latencies++] = 1e3 * (bst_bench_wall_s() - asked_s[n % 2]);

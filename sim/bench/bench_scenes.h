@@ -89,4 +89,7 @@ bst_status bst_bench_truth_compare(bst_ctx *ctx, bst_renderer *renderer,
                                    const bst_bench_truth *truth, double faintest_e_per_s,
                                    bst_bench_result *out) BST_MUST_CHECK;
 
+/* Waits for a frame, maps its pixels once and releases it. BST_ERR_DEVICE. */
+bst_status bst_bench_map_and_release(bst_ctx *ctx, bst_frame *frame) BST_MUST_CHECK;
+
 #endif
