@@ -75,6 +75,7 @@ static bst_status try_shapes(attempt *a, bst_plate_solve_result *out) {
         out->stars = a->streak.count;
         out->ends[0] = a->streak.ends[0];
         out->ends[1] = a->streak.ends[1];
+        out->path = *bst_streak_finder_path(a->finder);
     }
     return BST_OK;
 }

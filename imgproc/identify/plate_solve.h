@@ -21,6 +21,7 @@ typedef struct bst_plate_solve_result {
     int stars;                         /* found in the frame */
     bst_common_streak_point ends[2];   /* of the streaks, relative to their middle, px */
     bool points;                       /* the stars are points */
+    bst_star_path path;                /* of the streaks; its light is the time spent along it */
 } bst_plate_solve_result;
 
 /* Solves a frame.

@@ -19,6 +19,8 @@ static const float LEAST_SIGMA = -5.0f;
 static const float HOT_SIGMA = 8.0f, HOT_SHARE = 0.2f, NEIGHBOUR_SIGMA = 2.0f;
 /* Assumed width of the PSF. */
 static const double USUAL_PSF_SIGMA_PX = 1.0;
+/* Widest PSF: three standard deviations fit into MOST_REACH. */
+static const double MOST_PSF_SIGMA_PX = 4.0;
 /* A source begins at a pixel above SEED and has those above GROW, in units of the line filter's
  * noise; brighter ones begin at GROW times powers of two. */
 static const float SEED = 6.5f, GROW = 4.0f;
@@ -34,6 +36,11 @@ static const double GHOST_PX = 15.0, GHOST_SHARE = 0.25;
 static const double BRIGHT_SNR = 100.0, CLOSE_PX = 5.0;
 /* Least SNR of the stars that refine the path. */
 static const double REFINING_SNR = 15.0;
+/* Least share of the path inside the frame, by its squared light, for a star whose middle is too.
+ */
+static const double USUAL_INSIDE = 0.25;
+/* Share of the path inside the frame from which on a streak is whole. */
+static const double WHOLE = 0.97;
 
 /* A connected source. */
 typedef struct shape {
@@ -316,19 +323,28 @@ static bool is_ghost(const bst_common_streak *s, const bst_detection *d) {
     return false;
 }
 
+/* Stars to find. */
+typedef struct wanted {
+    double least_snr;
+    int most;
+    double least_inside; /* share of the path */
+    bool outside;        /* also stars whose place is outside the frame */
+} wanted;
+
 /* Finds the stars one after the other; those that are not kept are subtracted, too. */
-static bst_status find_stars(bst_ctx *ctx, finder *f, double least_snr, int most,
-                             bst_common_streak *out) {
+static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_common_streak *out) {
     const bst_star_path_image image = image_of(f);
+    const int most = q->most;
     bst_path_filter *filter;
-    BST_TRY(bst_path_filter_create(ctx, &f->path, &image, f->psf_sigma_px, &filter));
+    BST_TRY(bst_path_filter_create(ctx, &f->path, &image, f->psf_sigma_px, q->least_inside,
+                                   &filter));
     out->items = f->items;
     out->count = 0;
     /* bright points leave many rings; a peak of theirs costs little */
     const int tries = (f->path.count == 1 ? 20 : 2) * most;
     for (int i = 0; i < tries && out->count < most; i++) {
         bst_path_filter_peak peak;
-        if (!bst_path_filter_highest(filter, &peak) || peak.snr < least_snr) {
+        if (!bst_path_filter_highest(filter, &peak) || peak.snr < q->least_snr) {
             break;
         }
         bst_detection d = {.x_px = peak.x_px,
@@ -338,9 +354,11 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, double least_snr, int most
                            .snr = peak.snr,
                            .cov_xx = peak.cov_xx,
                            .cov_xy = peak.cov_xy,
-                           .cov_yy = peak.cov_yy};
+                           .cov_yy = peak.cov_yy,
+                           .flags = peak.inside < WHOLE ? BST_DETECTION_EDGE : 0};
         bool inside =
-            d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= f->width - 1 && d.y_px <= f->height - 1;
+            q->outside || (d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= f->width - 1 &&
+                           d.y_px <= f->height - 1);
         if (inside && peak.whole && !is_ghost(out, &d)) {
             f->items[out->count++] = d;
         }
@@ -373,7 +391,8 @@ static bst_status find_all(bst_ctx *ctx, finder *f, bst_common_streak *out) {
     for (int e = 0; e < 2; e++) {
         out->ends[e] = (bst_common_streak_point){f->path.ends[e][0], f->path.ends[e][1]};
     }
-    return find_stars(ctx, f, f->options.least_snr, f->options.max_sources, out);
+    const wanted all = {f->options.least_snr, f->options.max_sources, USUAL_INSIDE, false};
+    return find_stars(ctx, f, &all, out);
 }
 
 bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *f, int index,
@@ -387,7 +406,8 @@ bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *f, int index,
     if (!fit_shape(f, &f->shapes[index])) {
         return BST_OK;
     }
-    BST_TRY(find_stars(ctx, f, REFINING_SNR, REFINING_STARS, out));
+    const wanted bright = {REFINING_SNR, REFINING_STARS, USUAL_INSIDE, false};
+    BST_TRY(find_stars(ctx, f, &bright, out));
     refine_path(f, out, NULL);
     return find_all(ctx, f, out);
 }
@@ -397,6 +417,30 @@ bst_status bst_streak_finder_repeat(bst_ctx *ctx, bst_streak_finder *f, const bo
     assert(f && chosen && out);
     refine_path(f, out, chosen);
     return find_all(ctx, f, out);
+}
+
+const bst_star_path *bst_streak_finder_path(const bst_streak_finder *f) {
+    return &f->path;
+}
+
+bst_status bst_streak_finder_follow(bst_ctx *ctx, bst_streak_finder *f, const bst_star_path *path,
+                                    double least_snr, double least_inside,
+                                    bst_common_streak *out) {
+    assert(f && path && path->count > 0 && least_snr > 0.0 && least_inside > 0.0 && out);
+    f->path = *path;
+    *out = (bst_common_streak){.items = f->items, .sigma = f->sigma};
+    for (int e = 0; e < 2; e++) {
+        out->ends[e] = (bst_common_streak_point){f->path.ends[e][0], f->path.ends[e][1]};
+    }
+    const wanted all = {least_snr, f->options.max_sources, least_inside, true};
+    BST_TRY(find_stars(ctx, f, &all, out));
+    /* the matched filter of a line of light of its own width keeps the line's light per pixel */
+    double length = path->count * BST_STAR_PATH_STEP_PX;
+    for (int i = 0; i < out->count; i++) {
+        out->items[i].flux_e *= length;
+        out->items[i].flux_sigma_e *= length;
+    }
+    return BST_OK;
 }
 
 int bst_streak_finder_shapes(const bst_streak_finder *f) {
@@ -442,9 +486,12 @@ bst_status bst_streak_finder_create(bst_ctx *ctx, const float *pixels, int width
     memcpy(f->image, pixels, (size_t)width * (size_t)height * sizeof *f->image);
     clean(f);
     remove_hot_pixels(f);
-    convolve(f, USUAL_PSF_SIGMA_PX);
-    filter_lines(f);
-    f->shape_count = list_shapes(f, f->shapes);
+    convolve(f, options->psf_sigma_px > 0.0 ? fmin(options->psf_sigma_px, MOST_PSF_SIGMA_PX)
+                                            : USUAL_PSF_SIGMA_PX);
+    if (!options->known_path) {
+        filter_lines(f);
+        f->shape_count = list_shapes(f, f->shapes);
+    }
     *out = f;
     return BST_OK;
 }

@@ -12,13 +12,14 @@ typedef struct bst_path_filter bst_path_filter;
  * The response at a place is the sum of the image along the path there, weighted by the path's
  * light. Its noise is that of the samples inside the frame.
  *
- * Given:     path       must outlive the filter
- *            image      of unit noise after the convolution with a Gaussian of psf_sigma_px
+ * Given:     path          must outlive the filter
+ *            image         of unit noise after the convolution with a Gaussian of psf_sigma_px
+ *            least_inside  share of the path that must be inside the frame, by its squared light
  * Errors:    BST_ERR_MEMORY
  * Ownership: free *out with bst_path_filter_free */
 bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
                                   const bst_star_path_image *image, double psf_sigma_px,
-                                  bst_path_filter **out) BST_MUST_CHECK;
+                                  double least_inside, bst_path_filter **out) BST_MUST_CHECK;
 /* Frees a filter; NULL is allowed. */
 void bst_path_filter_free(bst_path_filter *filter);
 
