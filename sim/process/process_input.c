@@ -18,6 +18,8 @@
 static const double TAIL_S = 1.0;
 /* Time between the last exposure and the next one, which the run does not reach, s. */
 static const double LAST_PERIOD_S = 2.0;
+/* Attitudes per exposure that are recorded. */
+static const double PATH_SAMPLES = 50.0;
 /* Gravitational parameter of the Earth, m^3/s^2 (EGM2008), for states at both ends of an exposure. */
 static const double EARTH_GM = 3.986004415e14;
 
@@ -288,6 +290,9 @@ static cJSON *make_scenario(const bst_process *p, cJSON *camera) {
     cJSON_AddItemToArray(cJSON_AddArrayToObject(root, "observers"), make_observer(p, camera));
     cJSON *record = cJSON_AddObjectToObject(root, "record");
     cJSON_AddStringToObject(record, "frames", "extensions");
+    /* attitudes for the path of the streaks in pictures */
+    double exposure_s = fmax(seconds(p->frames[0].exposure_ticks), 1e-3);
+    put_number(record, "telemetry_hz", fmin(fmax(ceil(PATH_SAMPLES / exposure_s), 1.0), 100.0));
     return root;
 }
 

@@ -34,11 +34,11 @@ static void put_field(FILE *out, const char *text) {
     fputc('"', out);
 }
 
-/* frames.csv: a row for each frame. */
-static bst_status write_frames(bst_ctx *ctx, const bst_process *p) {
+/* attitudes.csv: a row for each frame. */
+static bst_status write_attitudes(bst_ctx *ctx, const bst_process *p) {
     char path[4096], utc[40];
     bst_draft draft;
-    BST_TRY(bst_process_path(ctx, p, "products/frames.csv", path));
+    BST_TRY(bst_process_path(ctx, p, "products/attitudes.csv", path));
     BST_TRY(bst_draft_open(ctx, path, &draft));
     FILE *out = draft.stream;
     fputs("frame,file,hdu,plane,start_utc,exposure_s,solved,stars_found,stars_matched,"
@@ -62,6 +62,25 @@ static bst_status write_frames(bst_ctx *ctx, const bst_process *p) {
     return bst_draft_close(ctx, &draft, BST_OK);
 }
 
+/* Places of a star's image at the nodes of a frame, relative to its mean place. */
+static void star_places(const bst_camera *camera, const bst_process_frame *f,
+                        double places[][2]) {
+    double mean[2] = {0.0, 0.0};
+    for (int k = 0; k < f->node_count; k++) {
+        bst_quat turn = bst_quat_mul(f->nodes[k].q_cam_from_gcrf, bst_quat_conj(f->q_middle));
+        (void)bst_camera_project(camera, bst_quat_rotate(turn, (bst_vec3){0, 0, 1}),
+                                 &places[k][0], &places[k][1]);
+        for (int c = 0; k > 0 && c < 2; c++) {
+            double share = f->nodes[k].share - f->nodes[k - 1].share;
+            mean[c] += 0.5 * share * (places[k][c] + places[k - 1][c]);
+        }
+    }
+    for (int k = 0; k < f->node_count; k++) {
+        places[k][0] -= mean[0];
+        places[k][1] -= mean[1];
+    }
+}
+
 /* paths.csv: how the image of a star at the middle of each frame moved. */
 static bst_status write_paths(bst_ctx *ctx, const bst_process *p) {
     char path[4096];
@@ -74,15 +93,11 @@ static bst_status write_paths(bst_ctx *ctx, const bst_process *p) {
     fputs("frame,time_s,dx_px,dy_px\n", draft.stream);
     for (int i = 0; i < p->count; i++) {
         const bst_process_frame *f = &p->frames[i];
+        double places[BST_PROCESS_NODES + 2][2];
+        star_places(&camera, f, places);
         for (int k = 0; k < f->node_count; k++) {
-            double x, y;
-            bst_quat turn =
-                bst_quat_mul(f->nodes[k].q_cam_from_gcrf, bst_quat_conj(f->q_middle));
-            if (bst_camera_project(&camera, bst_quat_rotate(turn, (bst_vec3){0, 0, 1}), &x, &y)) {
-                fprintf(draft.stream, "%d,%.6f,%.3f,%.3f\n", i,
-                        f->nodes[k].share * f->values.exposure_s,
-                        x - bst_camera_centre_x(&camera), y - bst_camera_centre_y(&camera));
-            }
+            fprintf(draft.stream, "%d,%.6f,%.3f,%.3f\n", i,
+                    f->nodes[k].share * f->values.exposure_s, places[k][0], places[k][1]);
         }
     }
     return bst_draft_close(ctx, &draft, BST_OK);
@@ -165,7 +180,7 @@ bst_status bst_process_write_products(bst_ctx *ctx, const bst_process *p) {
     BST_TRY(bst_process_path(ctx, p, "run", folder));
     BST_TRY(bst_process_path(ctx, p, "products", path));
     BST_TRY(bst_folder_make(ctx, path));
-    BST_TRY(write_frames(ctx, p));
+    BST_TRY(write_attitudes(ctx, p));
     BST_TRY(write_paths(ctx, p));
     BST_TRY(bst_run_reader_open(ctx, folder, &run));
     bst_status status = write_light_curves(ctx, p, run);
