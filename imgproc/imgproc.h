@@ -27,7 +27,7 @@ typedef struct bst_imgproc_config {
     double false_alarms_per_frame; /* expected from noise alone */
     double jitter_px;              /* RMS jitter per axis by which the PSF is broadened */
     double streak_min_px, streak_max_px;
-    bool long_streaks; /* find star streaks beyond streak_max_px by their path */
+    bool long_streaks;       /* find star streaks beyond streak_max_px by their path */
     double streak_search_px; /* 0: no search for streaks of unknown rate and direction */
     double search_radius_px, match_tolerance_px;
     int attitude;              /* at start, 0: by telemetry, 1: unknown */

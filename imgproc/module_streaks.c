@@ -9,9 +9,8 @@ enum { NODES = 2048 };
 /* Probability of a star for a streak like those of the identified stars. */
 static const double STAR_PROBABILITY = 0.9;
 
-static const bst_pointing_sample *sample_at(const bst_pointing_telemetry *t, int64_t n) {
-    return &t->items[n % t->capacity];
-}
+/* Sample number n of the ring. */
+#define SAMPLE(t, n) (&(t)->items[(n) % (t)->capacity])
 
 /* Attitude at a tick between two samples, at a constant rate. */
 static bst_quat between(const bst_pointing_sample *a, const bst_pointing_sample *b, double tick) {
@@ -35,8 +34,7 @@ typedef struct star_motion {
 static void add_node(star_motion *s, double tick, bst_quat q_cam_from_gcrf) {
     double x, y;
     bst_quat turn = bst_quat_mul(q_cam_from_gcrf, s->gcrf_from_mean);
-    if (s->count < NODES &&
-        (s->count == 0 || tick > s->nodes[s->count - 1].time) &&
+    if (s->count < NODES && (s->count == 0 || tick > s->nodes[s->count - 1].time) &&
         bst_camera_project(s->camera, bst_quat_rotate(turn, s->direction), &x, &y)) {
         s->nodes[s->count++] = (bst_star_path_node){tick, x, y};
     }
@@ -46,16 +44,16 @@ static void add_node(star_motion *s, double tick, bst_quat q_cam_from_gcrf) {
 static void add_nodes(star_motion *s, const bst_pointing_telemetry *t, double start, double end) {
     int64_t newest = t->written - 1;
     int64_t oldest = t->written > t->capacity ? t->written - t->capacity : 0, first = newest;
-    while (first > oldest && (double)sample_at(t, first)->tick > start) {
+    while (first > oldest && (double)SAMPLE(t, first)->tick > start) {
         first--;
     }
     int64_t last = first;
-    while (last < newest && (double)sample_at(t, last)->tick < end) {
+    while (last < newest && (double)SAMPLE(t, last)->tick < end) {
         last++;
     }
     int64_t every = 1 + (last - first) / (NODES - 4);
     for (int64_t n = first; n < last; n++) {
-        const bst_pointing_sample *a = sample_at(t, n), *b = sample_at(t, n + 1);
+        const bst_pointing_sample *a = SAMPLE(t, n), *b = SAMPLE(t, n + 1);
         if ((double)b->tick <= start) {
             continue;
         }

@@ -33,7 +33,7 @@ static bst_status map(void *owner, bst_ctx *ctx, const uint16_t **pixels) {
 }
 
 static void unmap(void *owner) {
-    (void)owner;
+    assert(((const host_frame *)owner)->lent);
 }
 
 static void recycle(void *owner) {

@@ -116,10 +116,9 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
 
 /* Fails for a frame: file, HDU and plane before the message. */
 static bst_status fail_frame(bst_ctx *ctx, const bst_recorded_frame *f, bst_status status) {
-    return f->place.plane < 0
-               ? bst_fail_prefix(ctx, status, "%s: HDU %d", f->path, f->place.hdu)
-               : bst_fail_prefix(ctx, status, "%s: HDU %d, plane %lld", f->path, f->place.hdu,
-                                 (long long)f->place.plane + 1);
+    return f->place.plane < 0 ? bst_fail_prefix(ctx, status, "%s: HDU %d", f->path, f->place.hdu)
+                              : bst_fail_prefix(ctx, status, "%s: HDU %d, plane %lld", f->path,
+                                                f->place.hdu, (long long)f->place.plane + 1);
 }
 
 /* Compares the header with the exposure of the scenario. */

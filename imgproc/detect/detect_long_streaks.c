@@ -23,9 +23,7 @@ static float *copy_signal(const bst_imgproc *ip) {
     float *pixels = malloc(count * sizeof *pixels);
     for (size_t i = 0; pixels && i < count; i++) {
         float s = v->signal[i];
-        pixels[i] = s >= BST_PIXEL_NONE         ? s
-                    : s == BST_PIXEL_SATURATED ? (float)v->full_e
-                                                : NAN;
+        pixels[i] = s >= BST_PIXEL_NONE ? s : s == BST_PIXEL_SATURATED ? (float)v->full_e : NAN;
     }
     return pixels;
 }
@@ -46,8 +44,7 @@ static void mark_path(const bst_star_path *path, const bst_detection *d, double 
         for (int j = cy - r < 0 ? 0 : cy - r; j <= cy + r && j < height; j++) {
             int from = cx - r < 0 ? 0 : cx - r, to = cx + r < width ? cx + r : width - 1;
             if (from <= to) {
-                memset(mask + (size_t)j * (size_t)width + (size_t)from, 1,
-                       (size_t)(to - from + 1));
+                memset(mask + (size_t)j * (size_t)width + (size_t)from, 1, (size_t)(to - from + 1));
             }
         }
     }
@@ -104,8 +101,7 @@ static bst_status replace(bst_ctx *ctx, bst_imgproc *ip, const bst_common_streak
     const bst_locate_frame *v = &ip->view;
     uint8_t *mask = calloc((size_t)v->width * (size_t)v->height, 1);
     if (!mask) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the paths of %d streaks",
-                        found->count);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the paths of %d streaks", found->count);
     }
     double per_px = found->sigma * path->count * BST_STAR_PATH_STEP_PX;
     for (int i = 0; i < found->count; i++) {
@@ -159,8 +155,7 @@ static bst_status follow(bst_ctx *ctx, bst_imgproc *ip, const bst_star_path *pat
     if (status == BST_OK) {
         ip->streak_px = v->binning * length;
         /* of a line that is summed along the path after the convolution with the PSF */
-        ip->followed_sigma_e =
-            found.sigma * sqrt(2.0 * sqrt(BST_PI) * v->sigma_px * length);
+        ip->followed_sigma_e = found.sigma * sqrt(2.0 * sqrt(BST_PI) * v->sigma_px * length);
         status = replace(ctx, ip, &found, path, out, capacity);
     }
     bst_streak_finder_free(finder);

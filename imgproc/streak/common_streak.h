@@ -75,7 +75,8 @@ const bst_star_path *bst_streak_finder_path(const bst_streak_finder *finder);
 
 /* Finds all stars by a known path, also those whose own place is outside the frame.
  *
- * Given:     path          copied; centre and tangent_per_px as for this frame
+ * Given:     finder        made with known_path
+ *            path          copied; centre and tangent_per_px as for this frame
  *            least_snr     of the part of a streak inside the frame
  *            least_inside  share of the path that must be inside the frame
  * Returned:  *out          places are those at the path's origin; flags has BST_DETECTION_EDGE for

@@ -27,7 +27,7 @@ struct bst_path_filter {
     double correlation; /* variance of the response over the sum of the squared light */
     double squares;     /* sum of the squared light of the whole path */
     double psf_sigma_px;
-    double least_inside; /* share of the path inside the frame */
+    double least_inside;            /* share of the path inside the frame */
     double length_px, direction[2]; /* from end to end */
     double systematic_px;           /* position error beside the noise */
     double loss[SHIFTS]; /* share of the response that a shift by so many px along loses */
@@ -124,7 +124,7 @@ static void filter_block(bst_path_filter *f, const bst_star_path_image *image, i
             f->response[y * f->width + x] = light[y - by][x - bx];
             f->per_noise[y * f->width + x] =
                 share < f->least_inside ? 0.0f
-                                     : (float)(1.0 / sqrt(share * f->squares * f->correlation));
+                                        : (float)(1.0 / sqrt(share * f->squares * f->correlation));
         }
     }
 }
@@ -336,6 +336,18 @@ void bst_path_filter_subtract(bst_path_filter *f, const bst_path_filter_peak *pe
         bst_star_path_map(p, x, y, there);
         add_points(f, x, y, peak->amplitude * p->light[l], there, &box);
     }
+    if (box.x1 >= box.x0) {
+        subtract_points(f, box);
+    }
+}
+
+void bst_path_filter_subtract_point(bst_path_filter *f, double x_px, double y_px,
+                                    double amplitude) {
+    assert(f);
+    double m[3];
+    rectangle box = {f->width, f->height, -1, -1};
+    bst_star_path_map(f->path, x_px, y_px, m);
+    add_points(f, x_px, y_px, amplitude, m, &box);
     if (box.x1 >= box.x0) {
         subtract_points(f, box);
     }

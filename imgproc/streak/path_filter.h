@@ -39,6 +39,13 @@ bool bst_path_filter_highest(const bst_path_filter *filter, bst_path_filter_peak
 /* Subtracts the response to a star (Hogbom 1974, A&AS 15, 417). */
 void bst_path_filter_subtract(bst_path_filter *filter, const bst_path_filter_peak *peak);
 
+/* Subtracts the response to a point source of the image.
+ *
+ * Given:     x_px, y_px  its place
+ *            amplitude   value of the convolved image there */
+void bst_path_filter_subtract_point(bst_path_filter *filter, double x_px, double y_px,
+                                    double amplitude);
+
 /* Leaves a circle about a peak out of the search: what the subtraction of a bright star left. */
 void bst_path_filter_leave_out(bst_path_filter *filter, const bst_path_filter_peak *peak,
                                double radius_px);

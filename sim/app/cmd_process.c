@@ -41,7 +41,6 @@ int bst_cmd_process(int argc, char **argv) {
     }
     q.table = options;
     bst_stop_catch_signals();
-    bst_status status =
-        bst_process_frames(&ctx, &q, (const char *const *)(argv + 1), arguments);
+    bst_status status = bst_process_frames(&ctx, &q, (const char *const *)(argv + 1), arguments);
     return bst_command_line_end_as("process", &ctx, status);
 }

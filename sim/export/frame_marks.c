@@ -44,8 +44,9 @@ static const char *const queries[CURSORS] = {
         "SELECT exposure_id, track_id, status, target_of_interest, x_px, y_px, snr"
         " FROM tracks WHERE sensor = ?1 AND misses_in_row = 0",
     [MODES] = "SELECT tick, mode FROM control WHERE sensor = ?1",
-    [ATTITUDES] = "SELECT tick, q_cam_from_gcrf_x, q_cam_from_gcrf_y, q_cam_from_gcrf_z,"
-                  " q_cam_from_gcrf_w FROM los_truth WHERE sensor = ?1",
+    [ATTITUDES] =
+        "SELECT tick, q_cam_from_gcrf_x, q_cam_from_gcrf_y, q_cam_from_gcrf_z,"
+        " q_cam_from_gcrf_w FROM los_truth WHERE sensor = ?1",
 };
 
 struct bst_frame_marks {
@@ -323,7 +324,9 @@ bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *m, int64_t id, bst
         }
     }
     qsort(m->marks, (size_t)m->count, sizeof *m->marks, by_importance);
-    *out = (bst_io_overlay){.marks = m->marks, .count = m->count, .caption = m->caption,
+    *out = (bst_io_overlay){.marks = m->marks,
+                            .count = m->count,
+                            .caption = m->caption,
                             .path_px = (const double(*)[2])m->path_px,
                             .path_count = m->path_count};
     return BST_OK;

@@ -143,10 +143,10 @@ static bst_status add(bst_ctx *ctx, bst_fits_source *s, const bst_fits_source_hd
     s->hdus[s->count].first = s->frames;
     s->frames += h->size[2];
     s->count++;
-    return s->frames <= MOST_FRAMES ? BST_OK
-                                    : bst_fail(ctx, BST_ERR_FORMAT,
-                                               "%.400s: more than %d frames (allowed: that many)",
-                                               s->path, MOST_FRAMES);
+    return s->frames <= MOST_FRAMES
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_FORMAT, "%.400s: more than %d frames (allowed: that many)",
+                          s->path, MOST_FRAMES);
 }
 
 /* Checks that the data of an HDU are in the file. */
@@ -178,18 +178,18 @@ static bst_status list_frames(bst_ctx *ctx, bst_fits_source *s) {
         bst_fits_source_hdu hdu = {.number = number, .at = at, .data_at = at + h->cards.bytes};
         BST_TRY(describe(ctx, s, h, &hdu));
         BST_TRY(check_data(ctx, s, number, hdu.data_at, h->cards.data_bytes));
-        hdu.end = hdu.data_at + (h->cards.data_bytes + BST_FITS_BLOCK - 1) / BST_FITS_BLOCK *
-                                    BST_FITS_BLOCK;
+        hdu.end = hdu.data_at +
+                  (h->cards.data_bytes + BST_FITS_BLOCK - 1) / BST_FITS_BLOCK * BST_FITS_BLOCK;
         if (hdu.size[0] > 0) {
             hdu.image = number > 1 ? images++ : -1;
             BST_TRY(add(ctx, s, &hdu));
         }
         at = hdu.end;
     }
-    return s->frames > 0 ? BST_OK
-                         : bst_fail(ctx, BST_ERR_FORMAT,
-                                    "%.400s: has no image (allowed: HDUs with NAXIS 2 or 3)",
-                                    s->path);
+    return s->frames > 0
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_FORMAT,
+                          "%.400s: has no image (allowed: HDUs with NAXIS 2 or 3)", s->path);
 }
 
 bst_status bst_fits_source_open(bst_ctx *ctx, const char *path, bst_fits_source **out) {

@@ -36,7 +36,7 @@ struct bst_fits_source {
     int64_t frames;
     bst_fits_source_header primary, header, table; /* header, table: of the selected HDU */
     uint64_t table_at;                             /* data of the table */
-    int64_t selected, plane; /* index in hdus, -1: none; plane of the frame */
+    int64_t selected, plane;                       /* index in hdus, -1: none; plane of the frame */
     struct bst_fits_reader *packed;
 };
 

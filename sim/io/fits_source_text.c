@@ -13,25 +13,25 @@ enum { MOST_ELEMENTS = 1 << 20 };
 /* Bytes of an element of a column by the letter of its TFORM; 0: of no use here. */
 static int width_of(char letter) {
     switch (letter) {
-    case 'L':
-    case 'B':
-    case 'A':
-        return 1;
-    case 'I':
-        return 2;
-    case 'J':
-    case 'E':
-        return 4;
-    case 'K':
-    case 'D':
-    case 'C':
-    case 'P':
-        return 8;
-    case 'M':
-    case 'Q':
-        return 16;
-    default:
-        return 0;
+        case 'L':
+        case 'B':
+        case 'A':
+            return 1;
+        case 'I':
+            return 2;
+        case 'J':
+        case 'E':
+            return 4;
+        case 'K':
+        case 'D':
+        case 'C':
+        case 'P':
+            return 8;
+        case 'M':
+        case 'Q':
+            return 16;
+        default:
+            return 0;
     }
 }
 
@@ -119,10 +119,9 @@ bool bst_fits_source_text(bst_fits_source *s, const char *keyword,
     }
     char card[BST_FITS_CARD];
     size_t length = strlen(keyword);
-    bool found =
-        length > 0 && length <= 8 &&
-        (bst_fits_card_text(s->header.text, s->header.bytes, keyword, card) ||
-         bst_fits_card_text(s->primary.text, s->primary.bytes, keyword, card));
+    bool found = length > 0 && length <= 8 &&
+                 (bst_fits_card_text(s->header.text, s->header.bytes, keyword, card) ||
+                  bst_fits_card_text(s->primary.text, s->primary.bytes, keyword, card));
     if (found) {
         snprintf(value, BST_FITS_SOURCE_TEXT, "%s", card);
     }

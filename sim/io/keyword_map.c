@@ -91,8 +91,8 @@ static bst_status read_map(bst_ctx *ctx, const char *path, bst_json **json, bst_
     bst_status status =
         bst_config_read(ctx, *json, bst_json_root(*json), "", bst_keyword_map_table, out);
     if (status == BST_OK && !*out->time.keyword) {
-        status = bst_fail(ctx, BST_ERR_CONFIG, "%s: /time/keyword: is empty (allowed: a keyword)",
-                          path);
+        status =
+            bst_fail(ctx, BST_ERR_CONFIG, "%s: /time/keyword: is empty (allowed: a keyword)", path);
     }
     snprintf(out->file, sizeof out->file, "%s", path);
     return status;

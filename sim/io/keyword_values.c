@@ -127,9 +127,8 @@ static bst_status read_time(const reading *r, double exposure_s, bst_time *out) 
         return wrong(r, t->keyword, "time", what);
     } else {
         double whole = floor(date);
-        status = bst_time_from_utc_jd(&unheard,
-                                      (t->format == BST_KEYWORD_MJD ? 2400000.5 : 0.0) + whole,
-                                      date - whole, out);
+        status = bst_time_from_utc_jd(
+            &unheard, (t->format == BST_KEYWORD_MJD ? 2400000.5 : 0.0) + whole, date - whole, out);
     }
     if (status != BST_OK) {
         snprintf(what, sizeof what, "is no time: %.200s", unheard.message);

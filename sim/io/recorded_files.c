@@ -18,8 +18,8 @@ static const uint64_t MOST_LIST_BYTES = (uint64_t)64 << 20;
 static bst_status add(bst_ctx *ctx, bst_recorded_files *f, const char *path) {
     if (f->count == f->room) {
         int room = f->room ? 2 * f->room : 16;
-        char **paths = f->count < MOST_FILES ? realloc(f->paths, (size_t)room * sizeof *paths)
-                                             : NULL;
+        char **paths =
+            f->count < MOST_FILES ? realloc(f->paths, (size_t)room * sizeof *paths) : NULL;
         if (!paths) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no room for more than %d files", f->count);
         }

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/compare.h"
 #include "sim/io/recorded_files_internal.h"
 
 struct bst_recorded_frames {
@@ -141,11 +142,6 @@ static bst_status make_room(bst_ctx *ctx, size_t count, float **buffer, size_t *
     return *buffer ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", count);
 }
 
-static int ascending(const void *a, const void *b) {
-    float d = *(const float *)a - *(const float *)b;
-    return (d > 0.0f) - (d < 0.0f);
-}
-
 /* Median of the values that are no NAN; sorts them. 0 without any. */
 static double median(float *values, size_t count) {
     size_t kept = 0;
@@ -154,7 +150,7 @@ static double median(float *values, size_t count) {
             values[kept++] = values[i];
         }
     }
-    qsort(values, kept, sizeof *values, ascending);
+    qsort(values, kept, sizeof *values, bst_compare_floats);
     return kept > 0 ? (double)values[kept / 2] : 0.0;
 }
 

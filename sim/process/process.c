@@ -110,8 +110,9 @@ static void print_solved(const bst_process *p) {
                p->direction_known ? "" : "; which end came first is not known");
     }
     if (!p->placed) {
-        printf("observer   not in the headers: assumed beyond the sky's reach, up to 5 arcsec of "
-               "aberration\n");
+        printf(
+            "observer   not in the headers: assumed beyond the sky's reach, up to 5 arcsec of "
+            "aberration\n");
     }
     fflush(stdout);
 }
@@ -131,9 +132,8 @@ static bst_status run_input(bst_ctx *ctx, const bst_process *p) {
     BST_TRY(bst_load_scenario(ctx, path, &load, &json, &scenario));
     const bst_simulation_options options = {
         .device = q->device, .threads = (int)q->threads, .parallel = true};
-    const bst_run_request request = {.out = out,
-                                     .overwrite = q->overwrite,
-                                     .progress = !q->quiet && isatty(STDERR_FILENO)};
+    const bst_run_request request = {
+        .out = out, .overwrite = q->overwrite, .progress = !q->quiet && isatty(STDERR_FILENO)};
     bst_status status = bst_simulation_create(ctx, &scenario, &options, &sim);
     if (status == BST_OK) {
         status = bst_check_rules_apply(ctx, &scenario, sim);

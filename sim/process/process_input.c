@@ -20,7 +20,8 @@ static const double TAIL_S = 1.0;
 static const double LAST_PERIOD_S = 2.0;
 /* Attitudes per exposure that are recorded. */
 static const double PATH_SAMPLES = 50.0;
-/* Gravitational parameter of the Earth, m^3/s^2 (EGM2008), for states at both ends of an exposure. */
+/* Gravitational parameter of the Earth, m^3/s^2 (EGM2008), for states at both ends of an exposure.
+ */
 static const double EARTH_GM = 3.986004415e14;
 
 static double seconds(int64_t ticks) {
@@ -163,7 +164,8 @@ static cJSON *make_pointing(const bst_process *p) {
         const bst_process_frame *f = &p->frames[i];
         cJSON *frame = cJSON_CreateObject();
         int64_t period = i + 1 < p->count ? f[1].start_tick - f->start_tick
-                                          : f->exposure_ticks + (int64_t)(LAST_PERIOD_S * BST_PROCESS_TICK_RATE_HZ);
+                                          : f->exposure_ticks +
+                                                (int64_t)(LAST_PERIOD_S * BST_PROCESS_TICK_RATE_HZ);
         cJSON_AddNumberToObject(frame, "frame", i);
         put_number(frame, "exposure_s", seconds(f->exposure_ticks));
         put_number(frame, "period_s", seconds(period));
@@ -280,8 +282,7 @@ static cJSON *make_scenario(const bst_process *p, cJSON *camera) {
     bst_time_to_utc(p->frames[0].values.start, 9, epoch, sizeof epoch);
     cJSON_AddNumberToObject(root, "boresight", 1);
     cJSON_AddStringToObject(root, "name", name);
-    cJSON_AddStringToObject(root, "description",
-                            "Recorded frames: written by boresight process.");
+    cJSON_AddStringToObject(root, "description", "Recorded frames: written by boresight process.");
     cJSON_AddStringToObject(root, "epoch_utc", epoch);
     put_number(root, "duration_s", seconds(last->start_tick + last->exposure_ticks) + TAIL_S);
     cJSON_AddNumberToObject(root, "tick_rate_hz", BST_PROCESS_TICK_RATE_HZ);

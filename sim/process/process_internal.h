@@ -56,8 +56,8 @@ enum { BST_PROCESS_TICK_RATE_HZ = 10000 };
 
 /* Reads the map and all headers.
  *
- * Errors:    those of bst_keyword_map_load and bst_recorded_frames_open; BST_ERR_ARGUMENT with file,
- *            HDU and keyword for frames of several sizes or times out of order */
+ * Errors:    those of bst_keyword_map_load and bst_recorded_frames_open; BST_ERR_ARGUMENT with
+ * file, HDU and keyword for frames of several sizes or times out of order */
 bst_status bst_process_survey(bst_ctx *ctx, bst_process *p, const char *const *paths,
                               int count) BST_MUST_CHECK;
 /* Finds the attitudes of the frames from their stars; frames without enough stars stay unsolved.

@@ -41,9 +41,10 @@ static bst_status write_attitudes(bst_ctx *ctx, const bst_process *p) {
     BST_TRY(bst_process_path(ctx, p, "products/attitudes.csv", path));
     BST_TRY(bst_draft_open(ctx, path, &draft));
     FILE *out = draft.stream;
-    fputs("frame,file,hdu,plane,start_utc,exposure_s,solved,stars_found,stars_matched,"
-          "stars_predicted,rms_px,streak_px,direction_known,ra_deg,dec_deg,position_angle_deg\n",
-          out);
+    fputs(
+        "frame,file,hdu,plane,start_utc,exposure_s,solved,stars_found,stars_matched,"
+        "stars_predicted,rms_px,streak_px,direction_known,ra_deg,dec_deg,position_angle_deg\n",
+        out);
     for (int i = 0; i < p->count; i++) {
         const bst_process_frame *f = &p->frames[i];
         bst_time_to_utc(f->values.start, 6, utc, sizeof utc);
@@ -63,13 +64,12 @@ static bst_status write_attitudes(bst_ctx *ctx, const bst_process *p) {
 }
 
 /* Places of a star's image at the nodes of a frame, relative to its mean place. */
-static void star_places(const bst_camera *camera, const bst_process_frame *f,
-                        double places[][2]) {
+static void star_places(const bst_camera *camera, const bst_process_frame *f, double places[][2]) {
     double mean[2] = {0.0, 0.0};
     for (int k = 0; k < f->node_count; k++) {
         bst_quat turn = bst_quat_mul(f->nodes[k].q_cam_from_gcrf, bst_quat_conj(f->q_middle));
-        (void)bst_camera_project(camera, bst_quat_rotate(turn, (bst_vec3){0, 0, 1}),
-                                 &places[k][0], &places[k][1]);
+        (void)bst_camera_project(camera, bst_quat_rotate(turn, (bst_vec3){0, 0, 1}), &places[k][0],
+                                 &places[k][1]);
         for (int c = 0; k > 0 && c < 2; c++) {
             double share = f->nodes[k].share - f->nodes[k - 1].share;
             mean[c] += 0.5 * share * (places[k][c] + places[k - 1][c]);

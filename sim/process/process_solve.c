@@ -5,6 +5,7 @@
 
 #include "sim/astro/bodies.h"
 #include "sim/cli/stop_signals.h"
+#include "sim/core/compare.h"
 #include "sim/process/process_internal.h"
 
 /* Frames without an attitude after which the other order of rows is tried. */
@@ -63,8 +64,8 @@ static void aberrate_header(bst_process_frame *f, const bst_light *light) {
     bst_vec3 b = bst_quat_rotate(bst_quat_conj(f->q_header), (bst_vec3){0, 0, 1});
     bst_vec3 turn = bst_vec3_cross(b, bst_light_apparent_star(light, b));
     /* the camera turns with the sky's frame: q_cam_from_gcrf of the turned axes */
-    f->q_header = bst_quat_unit(
-        bst_quat_mul(f->q_header, bst_quat_from_rotvec(bst_vec3_scale(turn, -1.0))));
+    f->q_header =
+        bst_quat_unit(bst_quat_mul(f->q_header, bst_quat_from_rotvec(bst_vec3_scale(turn, -1.0))));
 }
 
 /* Rotation that moves the image of a star from the frame's middle to a place. */
@@ -152,11 +153,6 @@ static bst_status solve_all(bst_ctx *ctx, bst_process *p, solver *s, bool may_en
     return BST_OK;
 }
 
-static int ascending(const void *a, const void *b) {
-    double d = *(const double *)a - *(const double *)b;
-    return (d > 0.0) - (d < 0.0);
-}
-
 /* Takes the median pixel scale of the solved frames. */
 static bst_status take_scale(bst_ctx *ctx, bst_process *p) {
     double *scales = malloc((size_t)p->count * sizeof *scales);
@@ -169,7 +165,7 @@ static bst_status take_scale(bst_ctx *ctx, bst_process *p) {
             scales[n++] = p->frames[i].scale;
         }
     }
-    qsort(scales, (size_t)n, sizeof *scales, ascending);
+    qsort(scales, (size_t)n, sizeof *scales, bst_compare_doubles);
     p->scale_arcsec *= n > 0 ? scales[n / 2] : 1.0;
     free(scales);
     return BST_OK;
@@ -235,9 +231,8 @@ bst_status bst_process_solve(bst_ctx *ctx, bst_process *p) {
     for (int i = 0; i < p->count; i++) {
         bst_process_frame *f = &p->frames[i];
         /* the headers were read for the order of rows in the files */
-        f->has_header_attitude =
-            f->has_header_attitude &&
-            p->options.flip_rows == (p->request->flip == BST_PROCESS_FLIP_YES);
+        f->has_header_attitude = f->has_header_attitude &&
+                                 p->options.flip_rows == (p->request->flip == BST_PROCESS_FLIP_YES);
         if (f->has_header_attitude) {
             const bst_light light = light_of(f);
             aberrate_header(f, &light);

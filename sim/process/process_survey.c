@@ -46,10 +46,9 @@ static bst_status read_map(bst_ctx *ctx, bst_process *p) {
 
 /* Fails for a frame: "FILE: HDU n: ...". */
 static bst_status fail_frame(bst_ctx *ctx, const bst_process_frame *f, bst_status status) {
-    return f->place.plane < 0
-               ? bst_fail_prefix(ctx, status, "%s: HDU %d", f->path, f->place.hdu)
-               : bst_fail_prefix(ctx, status, "%s: HDU %d, plane %lld", f->path, f->place.hdu,
-                                 (long long)f->place.plane + 1);
+    return f->place.plane < 0 ? bst_fail_prefix(ctx, status, "%s: HDU %d", f->path, f->place.hdu)
+                              : bst_fail_prefix(ctx, status, "%s: HDU %d, plane %lld", f->path,
+                                                f->place.hdu, (long long)f->place.plane + 1);
 }
 
 /* Reads the header of one frame. */
@@ -71,10 +70,9 @@ static bst_status read_frame(bst_ctx *ctx, bst_process *p, int64_t index, bst_pr
                                    r.width, r.height, p->width, p->height));
     }
     double scale;
-    f->has_header_attitude =
-        p->map.attitude == BST_KEYWORD_WCS &&
-        bst_keyword_wcs(bst_recorded_frames_source(p->recorded), &r.place, p->options.flip_rows,
-                        &f->q_header, &scale);
+    f->has_header_attitude = p->map.attitude == BST_KEYWORD_WCS &&
+                             bst_keyword_wcs(bst_recorded_frames_source(p->recorded), &r.place,
+                                             p->options.flip_rows, &f->q_header, &scale);
     return BST_OK;
 }
 
@@ -90,8 +88,7 @@ static bst_status set_ticks(bst_ctx *ctx, bst_process *p) {
         bst_process_frame *f = &p->frames[i], *before = i > 0 ? f - 1 : NULL;
         double start_s = bst_time_diff(f->values.start, p->frames[0].values.start);
         f->start_tick = (int64_t)floor(start_s * BST_PROCESS_TICK_RATE_HZ + 0.5);
-        f->exposure_ticks =
-            (int64_t)floor(f->values.exposure_s * BST_PROCESS_TICK_RATE_HZ + 0.5);
+        f->exposure_ticks = (int64_t)floor(f->values.exposure_s * BST_PROCESS_TICK_RATE_HZ + 0.5);
         int64_t ended = before ? before->start_tick + before->exposure_ticks : 0;
         if (before && (f->start_tick < ended || f->start_tick <= before->start_tick)) {
             return fail_frame(
@@ -149,17 +146,16 @@ static const double ASSUMED_M = 42164e3;
 
 void bst_process_observer(const bst_process_frame *f, bst_vec3 *position_m,
                           bst_vec3 *velocity_mps) {
-    bst_vec3 ahead = bst_quat_rotate(
-        bst_quat_conj(f->solved ? f->q_middle : BST_QUAT_IDENTITY), (bst_vec3){0, 0, 1});
+    bst_vec3 ahead = bst_quat_rotate(bst_quat_conj(f->solved ? f->q_middle : BST_QUAT_IDENTITY),
+                                     (bst_vec3){0, 0, 1});
     *position_m =
         f->values.has_position ? f->values.position_gcrf_m : bst_vec3_scale(ahead, ASSUMED_M);
     *velocity_mps = f->values.has_velocity ? f->values.velocity_gcrf_mps : (bst_vec3){0, 0, 0};
 }
 
-bst_status bst_process_path(bst_ctx *ctx, const bst_process *p, const char *name,
-                            char path[4096]) {
+bst_status bst_process_path(bst_ctx *ctx, const bst_process *p, const char *name, char path[4096]) {
     int n = snprintf(path, 4096, "%s/%s", p->request->out, name);
-    return n > 0 && n < 4096 ? BST_OK
-                             : bst_fail(ctx, BST_ERR_ARGUMENT, "%.80s...: the path is too long",
-                                        p->request->out);
+    return n > 0 && n < 4096
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_ARGUMENT, "%.80s...: the path is too long", p->request->out);
 }

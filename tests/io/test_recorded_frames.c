@@ -388,7 +388,8 @@ static void test_truncated(void **state) {
     }
     save(&f, needed - 1);
     assert_int_equal(try_file(&f, &map), BST_ERR_FORMAT);
-    assert_non_null(strstr(f.ctx.message, "HDU 1: is cut short: BITPIX and NAXISn ask for 12 bytes"));
+    assert_non_null(
+        strstr(f.ctx.message, "HDU 1: is cut short: BITPIX and NAXISn ask for 12 bytes"));
     end(&f);
 }
 
@@ -418,8 +419,9 @@ static void test_mutations(void **state) {
             at[k] = (size_t)(random >> 33) % f.count;
             before[k] = f.bytes[at[k]];
             /* mostly characters of headers */
-            f.bytes[at[k]] = (uint8_t)(random >> 20 & 7 ? "0123456789-'[]:,=T ABEX"[random >> 24 & 15]
-                                                         : (char)(random >> 24));
+            f.bytes[at[k]] =
+                (uint8_t)(random >> 20 & 7 ? "0123456789-'[]:,=T ABEX"[random >> 24 & 15]
+                                           : (char)(random >> 24));
         }
         save(&f, random >> 60 ? f.count : (size_t)(random >> 40) % f.count);
         bst_status status = try_file(&f, &map);
@@ -487,8 +489,8 @@ static void test_wcs(void **state) {
         bst_assert_ok(&f.ctx, bst_fits_source_select(&f.ctx, s, 0, &frame));
         assert_false(bst_keyword_wcs(s, &frame, !flip, &q, &scale)); /* mirrored */
         assert_true(bst_keyword_wcs(s, &frame, flip, &q, &scale));
-        bst_assert_close(scale, 3.6, 1e-12); /* rounding */
-        bst_vec3 z = bst_quat_rotate(q, (bst_vec3){0, 1, 0}); /* RA 90 */
+        bst_assert_close(scale, 3.6, 1e-12);                   /* rounding */
+        bst_vec3 z = bst_quat_rotate(q, (bst_vec3){0, 1, 0});  /* RA 90 */
         bst_vec3 y = bst_quat_rotate(q, (bst_vec3){0, 0, -1}); /* south */
         bst_assert_close(z.z, 1.0, 1e-12);
         bst_assert_close(y.y, 1.0, 1e-9); /* a pixel to the right is 1.7e-5 rad away */
