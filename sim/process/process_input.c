@@ -183,6 +183,25 @@ static void put_default(cJSON *object, const char *key, double value) {
     }
 }
 
+static double camera_number(const cJSON *c, const char *key, double fallback) {
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(c, key);
+    return cJSON_IsNumber(item) ? item->valuedouble : fallback;
+}
+
+/* Light of a star of V = 0 that makes the camera's zero point that of the frames, unless the map
+ * gives it or a band. Without this, stars of an unknown camera have magnitudes too wrong to be
+ * identified. */
+static void put_flux(cJSON *c, double zero_point_mag) {
+    double aperture_m = camera_number(c, "aperture_m", 0.1);
+    double area_m2 =
+        0.25 * BST_PI * aperture_m * aperture_m * (1.0 - camera_number(c, "obscuration", 0.0));
+    double flux = pow(10.0, 0.4 * zero_point_mag) / (area_m2 * camera_number(c, "throughput", 0.8) *
+                                                     camera_number(c, "quantum_efficiency", 0.8));
+    if (isfinite(flux) && !cJSON_GetObjectItemCaseSensitive(c, "band")) {
+        put_default(c, "photon_flux_v0_per_s_m2", fmin(fmax(flux, 1.0), 1e15));
+    }
+}
+
 /* The camera: what the map's "camera" gives, then headers and stars. */
 static bst_status make_camera(bst_ctx *ctx, const bst_process *p, cJSON **out) {
     const bst_keyword_values *v = &p->frames[0].values;
@@ -201,6 +220,7 @@ static bst_status make_camera(bst_ctx *ctx, const bst_process *p, cJSON **out) {
     put_default(c, "gain_e_per_dn", v->gain_e_per_dn / p->map.dn_per_unit);
     put_default(c, "read_noise_e", v->read_noise_e);
     put_default(c, "full_well_e", v->full_well_e);
+    put_flux(c, p->zero_point_mag);
     bool overscan = *p->map.bias_section != '\0';
     put_default(c, "offset_dn",
                 p->map.pedestal_dn + p->map.dn_per_unit * (overscan ? 0.0 : v->offset_dn));

@@ -4,6 +4,7 @@
 
 #include "boresight/camera.h"
 #include "imgproc/identify/plate_solve.h"
+#include "imgproc/identify/predicted_stars.h"
 #include "sim/io/recorded_frames.h"
 #include "sim/process/process.h"
 
@@ -30,6 +31,8 @@ typedef struct bst_process_frame {
     bst_quat q_middle; /* at the middle of the streaks */
     double scale;      /* pixel scale over the camera's */
     double rms_px, streak_px;
+    double
+        zero_point_mag; /* V of one electron per second, by the catalogue's stars; NAN: unknown */
     int matched, predicted, found;
     bst_process_node *nodes; /* [node_count], owned; NULL: not solved, or points */
     int node_count;
@@ -46,7 +49,8 @@ typedef struct bst_process {
     bst_process_frame *frames; /* [count], by time */
     int count;
     int width, height;
-    double scale_arcsec; /* nominal; after solving that of the stars */
+    double scale_arcsec;   /* nominal; after solving that of the stars */
+    double zero_point_mag; /* median of the frames'; NAN: unknown */
     int solved;
     bool direction_known; /* which end of the streaks came first */
     bool placed;          /* the headers give the observer's position */
@@ -72,6 +76,17 @@ bst_status bst_process_write_input(bst_ctx *ctx, const bst_process *p) BST_MUST_
  *
  * Errors:    those of bst_run_reader_open, bst_export_run and bst_report_write */
 bst_status bst_process_write_products(bst_ctx *ctx, const bst_process *p) BST_MUST_CHECK;
+/* Zero point of a frame by the stars that the solver matched.
+ *
+ * Given:     sky     for the camera at the frame's pixel scale
+ *            light   of the observer
+ *            result  of the frame
+ * Returned:  frame->zero_point_mag
+ * Errors:    those of the catalogue; BST_ERR_MEMORY */
+bst_status bst_process_zero_point(bst_ctx *ctx, bst_predicted_stars *sky, const bst_light *light,
+                                  const bst_plate_solve_result *result, double v_limit,
+                                  bst_process_frame *frame) BST_MUST_CHECK;
+
 /* Frees what the steps allocated. */
 void bst_process_free(bst_process *p);
 

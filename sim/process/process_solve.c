@@ -10,6 +10,8 @@
 
 /* Frames without an attitude after which the other order of rows is tried. */
 enum { TRIES = 3 };
+/* Catalogue stars of a frame that have room. */
+enum { PREDICTED = 4096 };
 
 /* The solver with its database, for all frames. */
 typedef struct solver {
@@ -17,11 +19,13 @@ typedef struct solver {
     bst_stars *stars;
     bst_star_patterns *patterns;
     bst_lost_in_space *lost;
+    bst_predicted_stars sky;
     bst_plate_solve_result result;
 } solver;
 
 static void close_solver(solver *s) {
     bst_lost_in_space_free(s->lost);
+    bst_predicted_stars_free(&s->sky);
     bst_star_patterns_free(s->patterns);
     bst_stars_close(s->stars);
 }
@@ -46,6 +50,7 @@ static bst_status open_solver(bst_ctx *ctx, const bst_process *p, solver *s) {
     const bst_star_patterns_options options = {
         2.0 * atan(0.5 * least * bst_camera_scale_rad(&s->camera)), v_limit_of(p), year};
     BST_TRY(bst_star_patterns_create(ctx, s->stars, &options, &s->patterns));
+    BST_TRY(bst_predicted_stars_create(ctx, &s->camera, s->stars, year, PREDICTED, &s->sky));
     return bst_lost_in_space_create(ctx, &s->camera, s->stars, s->patterns, year,
                                     BST_PLATE_SOLVE_STARS, &s->lost);
 }
@@ -136,7 +141,7 @@ static bst_status solve_frame(bst_ctx *ctx, bst_process *p, solver *s, bst_proce
         BST_TRY(set_nodes(ctx, s, f));
     }
     p->solved++;
-    return BST_OK;
+    return bst_process_zero_point(ctx, &s->sky, &light, &s->result, v_limit_of(p), f);
 }
 
 /* Solves all frames in one order of rows; ends early if none of the first is solved. */
@@ -153,8 +158,8 @@ static bst_status solve_all(bst_ctx *ctx, bst_process *p, solver *s, bool may_en
     return BST_OK;
 }
 
-/* Takes the median pixel scale of the solved frames. */
-static bst_status take_scale(bst_ctx *ctx, bst_process *p) {
+/* Takes the median pixel scale and zero point of the solved frames. */
+static bst_status take_medians(bst_ctx *ctx, bst_process *p) {
     double *scales = malloc((size_t)p->count * sizeof *scales);
     int n = 0;
     if (!scales) {
@@ -167,6 +172,14 @@ static bst_status take_scale(bst_ctx *ctx, bst_process *p) {
     }
     qsort(scales, (size_t)n, sizeof *scales, bst_compare_doubles);
     p->scale_arcsec *= n > 0 ? scales[n / 2] : 1.0;
+    n = 0;
+    for (int i = 0; i < p->count; i++) {
+        if (p->frames[i].solved && isfinite(p->frames[i].zero_point_mag)) {
+            scales[n++] = p->frames[i].zero_point_mag;
+        }
+    }
+    qsort(scales, (size_t)n, sizeof *scales, bst_compare_doubles);
+    p->zero_point_mag = n > 0 ? scales[n / 2] : NAN;
     free(scales);
     return BST_OK;
 }
@@ -239,5 +252,5 @@ bst_status bst_process_solve(bst_ctx *ctx, bst_process *p) {
         }
         p->direction_known = orient(p, i) && p->direction_known;
     }
-    return take_scale(ctx, p);
+    return take_medians(ctx, p);
 }
