@@ -112,7 +112,7 @@ class Recorded(unittest.TestCase):
 
     def test_process(self):
         out = self.path("processed")
-        said = call_well("process", self.made, "--map", "boresight", "--out", out, *SOLVE)
+        said = call_well("process", self.made, "--map", "boresight", "--out", out, *SOLVE, timeout=900)
         self.assertIn("attitude from the stars in 3", said)
         self.compare_wcs(out)
         query = "SELECT exposure_id, star_id FROM detections WHERE star_id > 0"
@@ -125,7 +125,7 @@ class Recorded(unittest.TestCase):
         with open(os.path.join(out, "products", "light_curves.csv"), encoding="utf-8") as file:
             stars = {row["id"] for row in csv.DictReader(file) if row["source"] == "star"}
         self.assertEqual(stars, {str(star) for _, star in ours})
-        again = call("process", self.made, "--map", "boresight", "--out", out, *SOLVE)
+        again = call("process", self.made, "--map", "boresight", "--out", out, *SOLVE, timeout=900)
         self.assertEqual(again.returncode, 1)
         self.assertIn("--overwrite", again.stderr)
 
@@ -150,7 +150,7 @@ class Recorded(unittest.TestCase):
                        "pixel_scale_arcsec": {"value": 116}, "pedestal_dn": 1000,
                        "camera": {"psf_fwhm_px": 2, "aperture_m": 0.04}}, file)
         out = self.path("others")
-        said = call_well("process", folder, "--map", own, "--out", out, *SOLVE)
+        said = call_well("process", folder, "--map", own, "--out", out, *SOLVE, timeout=900)
         self.assertIn("attitude from the stars in 3", said)
         self.assertIn("first row last", said)
         self.compare_wcs(out)
