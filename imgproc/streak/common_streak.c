@@ -6,11 +6,10 @@
 #include <string.h>
 
 #include "boresight/vec.h"
-#include "imgproc/streak/path_filter.h"
+#include "imgproc/streak/common_streak_internal.h"
 
 /* LINE_HALF: samples of a line on either side of a pixel, LINE_STEP px apart. */
-enum { MOST_SHAPES = 64, LINE_HALF = 5, LINE_STEP = 2, LINE_REACH = 11, DIRECTIONS = 16 };
-enum { CLIMB = 3 }; /* from a sample of a path to the pixel of a point source */
+enum { LINE_HALF = 5, LINE_STEP = 2, LINE_REACH = 11, DIRECTIONS = 16 };
 enum { MOST_REACH = 12, EDGE_PX = 2, LEAST_PIXELS = 6, REFINING_STARS = 15, LEVELS = 8 };
 
 /* Negative pixels below this are bad, sigma. */
@@ -40,40 +39,10 @@ static const double REFINING_SNR = 15.0;
 /* Least share of the path inside the frame, by its squared light, for a star whose middle is too.
  */
 static const double USUAL_INSIDE = 0.25;
-/* A peak whose median light along the path is below EVEN_SHARE of its mean is no streak. A sample
- * above LEAST_POINT sigma is a point source, of this radius in PSF sigma. */
-static const double EVEN_SHARE = 0.35, LEAST_POINT = 5.0, POINT_SIGMA = 3.5;
-/* Light this near to a star's path, in PSF sigma, and fainter than this share of it, may be what
- * its subtraction left. */
-static const double COVER_SIGMA = 3.5, COVERED_SHARE = 0.2;
-/* Least light of a sample relative to the path's mean, for the median. */
-static const double LEAST_LIGHT = 0.2;
 /* Share of the path inside the frame from which on a streak is whole. */
 static const double WHOLE = 0.97;
 
-/* A connected source. */
-typedef struct shape {
-    double sum, rank;
-    int from; /* one of its pixels */
-    float level;
-    int x0, x1, y0, y1;
-} shape;
-
-struct bst_streak_finder {
-    int width, height;
-    double sigma, psf_sigma_px;
-    float *image;  /* background removed, in units of `sigma` */
-    float *smooth; /* convolved with the PSF, of unit noise */
-    float *lines;  /* line filter's output */
-    float *scratch;
-    int *label, *stack;
-    int count; /* pixels on the stack: those of the latest source */
-    bst_star_path path;
-    bst_common_streak_options options;
-    bst_detection *items; /* [max_sources + REFINING_STARS] */
-    shape shapes[MOST_SHAPES];
-    int shape_count;
-};
+typedef bst_streak_shape shape;
 typedef bst_streak_finder finder;
 
 static int ascending(const void *a, const void *b) {
@@ -255,13 +224,13 @@ static int add_shape(shape *list, int count, const shape *found) {
             return count;
         }
     }
-    int at = count < MOST_SHAPES ? count++ : MOST_SHAPES;
+    int at = count < BST_STREAK_SHAPES ? count++ : BST_STREAK_SHAPES;
     for (; at > 0 && list[at - 1].sum < found->sum; at--) {
-        if (at < MOST_SHAPES) {
+        if (at < BST_STREAK_SHAPES) {
             list[at] = list[at - 1];
         }
     }
-    if (at < MOST_SHAPES) {
+    if (at < BST_STREAK_SHAPES) {
         list[at] = *found;
     }
     return count;
@@ -278,7 +247,7 @@ static int by_rank(const void *a, const void *b) {
 
 /* Lists the sources that lie wholly inside the frame, at several levels, by rank; returns their
  * number. */
-static int list_shapes(finder *f, shape out[MOST_SHAPES]) {
+static int list_shapes(finder *f, shape out[BST_STREAK_SHAPES]) {
     int count = 0, number = 0;
     memset(f->label, 0, (size_t)f->width * (size_t)f->height * sizeof *f->label);
     for (int l = LEVELS - 1; l >= 0; l--) {
@@ -332,114 +301,6 @@ static bool is_ghost(const bst_common_streak *s, const bst_detection *d) {
     return false;
 }
 
-/* Light of a peak's path: median of its samples, and the brightest. */
-typedef struct path_light {
-    double median; /* of the light over that of the path; NAN: no sample is inside */
-    double x, y, most;
-} path_light;
-
-static path_light light_along(const finder *f, const bst_path_filter_peak *peak) {
-    const bst_star_path_image image = image_of(f);
-    float values[BST_STAR_PATH_ROOM];
-    double m[3];
-    int inside = 0;
-    path_light out = {.most = -HUGE_VAL};
-    bst_star_path_map(&f->path, peak->x_px, peak->y_px, m);
-    for (int k = 0; k < f->path.count; k++) {
-        const double *p = f->path.place[k];
-        double x = peak->x_px + m[0] * p[0] + m[1] * p[1];
-        double y = peak->y_px + m[1] * p[0] + m[2] * p[1];
-        if (!(x >= 0.0 && y >= 0.0 && x < f->width - 1 && y < f->height - 1)) {
-            continue;
-        }
-        double v = bst_star_path_image_at(&image, x, y);
-        values[inside++] = (float)(v / fmax(f->path.light[k], LEAST_LIGHT));
-        if (v > out.most) {
-            out.x = x;
-            out.y = y;
-            out.most = v;
-        }
-    }
-    out.median = inside > 0 ? (double)median(values, inside) : NAN;
-    return out;
-}
-
-/* Moves to the highest pixel nearby. */
-static void climb(const finder *f, path_light *at) {
-    int cx = (int)lround(at->x), cy = (int)lround(at->y);
-    for (int y = cy - CLIMB > 0 ? cy - CLIMB : 0; y <= cy + CLIMB && y < f->height; y++) {
-        for (int x = cx - CLIMB > 0 ? cx - CLIMB : 0; x <= cx + CLIMB && x < f->width; x++) {
-            if ((double)f->smooth[y * f->width + x] > at->most) {
-                at->most = (double)f->smooth[y * f->width + x];
-                at->x = x;
-                at->y = y;
-            }
-        }
-    }
-}
-
-/* Removes the point source that makes a peak of the filter: light that is at one place of the path
- * only. Returns false if the light is spread along the path. */
-static bool remove_point(finder *f, bst_path_filter *filter, const bst_path_filter_peak *peak) {
-    path_light l = light_along(f, peak);
-    if (!(l.median < EVEN_SHARE * peak->amplitude)) {
-        return false;
-    }
-    if (l.most < LEAST_POINT) {
-        bst_path_filter_leave_out(filter, peak, CLIMB);
-        return true;
-    }
-    climb(f, &l);
-    bst_path_filter_subtract_point(filter, l.x, l.y, l.most);
-    int r = (int)ceil(POINT_SIGMA * f->psf_sigma_px);
-    int cx = (int)lround(l.x), cy = (int)lround(l.y);
-    for (int y = cy - r > 0 ? cy - r : 0; y <= cy + r && y < f->height; y++) {
-        for (int x = cx - r > 0 ? cx - r : 0; x <= cx + r && x < f->width; x++) {
-            f->smooth[y * f->width + x] = 0.0f;
-        }
-    }
-    return true;
-}
-
-/* Pixel of the frame at a sample of a star's path; -1: outside. */
-static int pixel_on_path(const finder *f, double x_px, double y_px, const double m[3], int k) {
-    const double *p = f->path.place[k];
-    double x = x_px + m[0] * p[0] + m[1] * p[1], y = y_px + m[1] * p[0] + m[2] * p[1];
-    bool inside = x > -0.5 && y > -0.5 && x < f->width - 0.5 && y < f->height - 0.5;
-    return inside ? (int)lround(y) * f->width + (int)lround(x) : -1;
-}
-
-/* Notes the amplitude of a star around its path, in f->lines. */
-static void cover(finder *f, const bst_path_filter_peak *peak) {
-    double m[3];
-    int r = (int)ceil(COVER_SIGMA * f->psf_sigma_px);
-    bst_star_path_map(&f->path, peak->x_px, peak->y_px, m);
-    for (int k = 0; k < f->path.count; k++) {
-        int at = pixel_on_path(f, peak->x_px, peak->y_px, m, k);
-        int cx = at % f->width, cy = at / f->width;
-        for (int y = cy - r > 0 ? cy - r : 0; at >= 0 && y <= cy + r && y < f->height; y++) {
-            for (int x = cx - r > 0 ? cx - r : 0; x <= cx + r && x < f->width; x++) {
-                float *v = &f->lines[y * f->width + x];
-                *v = fmaxf(*v, (float)peak->amplitude);
-            }
-        }
-    }
-}
-
-/* True if most of a peak's path lies on those of much brighter stars: what their subtraction left.
- */
-static bool is_covered(const finder *f, const bst_path_filter_peak *peak) {
-    double m[3];
-    int inside = 0, covered = 0;
-    bst_star_path_map(&f->path, peak->x_px, peak->y_px, m);
-    for (int k = 0; k < f->path.count; k++) {
-        int at = pixel_on_path(f, peak->x_px, peak->y_px, m, k);
-        inside += at >= 0;
-        covered += at >= 0 && peak->amplitude < COVERED_SHARE * (double)f->lines[at];
-    }
-    return 2 * covered > inside;
-}
-
 /* Stars to find. */
 typedef struct wanted {
     double least_snr;
@@ -464,7 +325,7 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
         if (!bst_path_filter_highest(filter, &peak) || peak.snr < q->least_snr) {
             break;
         }
-        if (q->outside && remove_point(f, filter, &peak)) {
+        if (q->outside && bst_streak_finder_remove_point(f, filter, &peak)) {
             continue;
         }
         bst_detection d = {.x_px = peak.x_px,
@@ -478,11 +339,11 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
                            .flags = peak.inside < WHOLE ? BST_DETECTION_EDGE : 0};
         bool inside = q->outside || (d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= f->width - 1 &&
                                      d.y_px <= f->height - 1);
-        bool left = q->outside ? is_covered(f, &peak) : is_ghost(out, &d);
+        bool left = q->outside ? bst_streak_finder_is_covered(f, &peak) : is_ghost(out, &d);
         if (inside && peak.whole && !left) {
             f->items[out->count++] = d;
             if (q->outside) {
-                cover(f, &peak);
+                bst_streak_finder_cover(f, &peak);
             }
         }
         bst_path_filter_subtract(filter, &peak);

@@ -137,7 +137,7 @@ LINES = [
     (("process", F + "/none.fits", "--map", "neossat", "--out", OUT), 1, "none.fits: cannot be opened"),
     (("process", T, "--map", "neossat", "--out", OUT), 1, "track.json: does not begin as a FITS file"),
     (("process", RUN, "--map", "nix", "--out", OUT), 1, "--map nix: there is no such keyword map .allowed: "),
-    (("process", RUN, "--map", "neossat", "--out", OUT), 1, "HDU [12].*: EXPOSURE.AEXPTIME .exposure_s of the map neossat"),
+    (("process", RUN, "--map", "neossat", "--out", OUT), 1, "frames.fits: HDU 1, plane 1: TRIMSEC .section of the map"),
     (("process", "--map", "neossat", "--out", OUT), 2, "at least one file of frames is expected"),
     (("loop", T, "--plot", F + "/x.gif"), 2, "x.gif: the name says neither PNG nor SVG"),
     (("loop", T, "--sensor", "nix"), 1, r"--sensor nix: .*track.json has no such sensor \(allowed: neossat/tel"),
