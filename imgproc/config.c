@@ -29,6 +29,9 @@ const bst_config_desc bst_imgproc_config_table[] = {
              "Star streaks shorter than this are taken for points."),
     BST_REAL(bst_imgproc_config, streak_max_px, "px", 1, 128, "64",
              "Star streaks longer than this are not filtered for."),
+    BST_BOOL(bst_imgproc_config, long_streaks, "false",
+             "Find star streaks longer than streak_max_px, straight or curved, by a matched filter "
+             "along the path that the telemetry of the pointing gives."),
     BST_REAL(bst_imgproc_config, streak_search_px, "px", 0, 128, "0",
              "Greatest length of streaks of unknown rate and direction that are searched for in "
              "frames in which stars are points; 0: no search."),

@@ -28,6 +28,7 @@ typedef struct bst_imgproc_config {
     double false_alarms_per_frame; /* expected from noise alone */
     double jitter_px;              /* RMS jitter per axis by which the PSF is broadened */
     double streak_min_px, streak_max_px;
+    bool long_streaks;       /* find star streaks beyond streak_max_px by their path */
     double streak_search_px; /* 0: no search for streaks of unknown rate and direction */
     double search_radius_px, match_tolerance_px;
     int attitude;              /* at start, 0: by telemetry, 1: unknown */
@@ -54,6 +55,7 @@ struct bst_pixel_map;
 struct bst_pixel_shows;
 struct bst_silhouettes;
 struct bst_psf;
+struct bst_star_path_node;
 
 /* Sensor calibration: maps on the full sensor, row-major [height_px][width_px], and the PSF. NULL
  * means: uniform dark, uniform flat, no bad pixels, Gaussian PSF of the camera's psf_fwhm_px. All
@@ -174,6 +176,26 @@ double bst_imgproc_streak_px(const bst_imgproc *ip);
 /* True if stars moved further in the latest frame than is modelled (streak_max_px). Its detections
  * are then fragments of streaks, and their positions are unreliable. */
 bool bst_imgproc_smeared(const bst_imgproc *ip);
+
+/* Finds the stars of a frame whose streaks are longer than is filtered for (bst_imgproc_smeared),
+ * by a matched filter along the path that they share. Fragments of the streaks among the detections
+ * are removed; what remains are points that did not move with the stars.
+ *
+ * Given:     nodes, count  motion of a star at the middle of the frame, sensor px
+ *            *out          of the latest bst_imgproc_detect
+ * Returned:  *out          streaks with BST_DETECTION_STREAK and their mean place, which may lie
+ *                          outside the frame, and BST_DETECTION_EDGE for those that the frame cuts
+ *            *followed     false: the path is too long, too short, or the frame is empty; then
+ *                          nothing has changed
+ * Errors:    BST_ERR_MEMORY
+ * Notes:     bst_imgproc_v_limit and bst_imgproc_streak_px refer to the streaks then.
+ *            bst_imgproc_refine does nothing until the next frame. */
+bst_status bst_imgproc_follow_streaks(bst_ctx *ctx, bst_imgproc *ip,
+                                      const struct bst_star_path_node *nodes, int count,
+                                      bst_detections *out, int capacity,
+                                      bool *followed) BST_MUST_CHECK;
+/* True for a streak that bst_imgproc_follow_streaks found in the latest frame. */
+bool bst_imgproc_is_followed(const bst_imgproc *ip, const bst_detection *detection);
 
 /* The latest frame as input of a stack (stack.h). Its signal is valid until the next frame.
  * q_cam_from_gcrf and time_s are mid-exposure. */

@@ -447,7 +447,11 @@ static bst_status process_frame(bst_imgproc_state *m, struct bst_step *step,
     bst_imgproc_exposure e = {
         .message = message, .motion = oriented ? &motion : NULL, .predictions = predictions};
     BST_TRY(detect_frame(m, step, l, &e, out, capacity));
-    bool smeared = !m->plugin && bst_imgproc_smeared(l->ip);
+    bool smeared = !m->plugin && bst_imgproc_smeared(l->ip), followed = false;
+    if (smeared && m->config->long_streaks) {
+        bst_sample pointing = bst_step_latest(step, PORT_POINTING);
+        BST_TRY(bst_imgproc_find_long_streaks(ctx, m, l, &e, pointing.payload, out, &followed));
+    }
     bst_optics_photometer_begin(&m->photometer);
     bst_imgproc_frame_knowledge known = {.q_cam_from_gcrf = out->q_cam_from_gcrf,
                                          .window = message->window,
@@ -455,7 +459,7 @@ static bst_status process_frame(bst_imgproc_state *m, struct bst_step *step,
                                                           ? bst_plugin_detector_streak_px(m->plugin)
                                                           : bst_imgproc_streak_px(l->ip),
                                          .predictions = predictions};
-    if (oriented && e.navigated && !smeared) {
+    if (oriented && e.navigated && (!smeared || followed)) {
         BST_TRY(m->lost.enabled
                     ? bst_imgproc_lost_identify(m, step, l, &e, out, &known.q_cam_from_gcrf)
                     : bst_imgproc_identify_stars(ctx, m, l, &e, out, &known.q_cam_from_gcrf));
@@ -478,8 +482,11 @@ static bst_status process_frame(bst_imgproc_state *m, struct bst_step *step,
     if (m->wings && !smeared && m->windows.count == 0) {
         BST_TRY(label_wings(ctx, m, l, &e, &known, out));
     }
-    if (!smeared) {
+    if (!smeared || followed) {
         label_objects(m, l, &known, &zero_point, out);
+        if (followed) {
+            bst_imgproc_label_long_streaks(l, out);
+        }
     }
     append_detections(m, l, &e, known.q_cam_from_gcrf, &zero_point, out, capacity);
     count_losses(step, out);

@@ -106,6 +106,19 @@ bst_status bst_imgproc_calibrate_camera(bst_imgproc_state *m, struct bst_step *s
                                         bst_detections *out,
                                         bst_quat *q_cam_from_gcrf) BST_MUST_CHECK;
 
+/* Finds the long star streaks of a frame (long_streaks), where the camera moved further than is
+ * filtered for.
+ *
+ * Given:     telemetry  attitudes during the exposure; may be NULL
+ * Returned:  *followed  the detections are those of bst_imgproc_follow_streaks
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_imgproc_find_long_streaks(bst_ctx *ctx, const bst_imgproc_state *m,
+                                         const bst_imgproc_lane *l, const bst_imgproc_exposure *e,
+                                         const bst_pointing_telemetry *telemetry,
+                                         bst_detections *out, bool *followed) BST_MUST_CHECK;
+/* Labels the streaks of bst_imgproc_find_long_streaks that no other label fits better: stars. */
+void bst_imgproc_label_long_streaks(const bst_imgproc_lane *l, bst_detections *out);
+
 /* Prepares identification without an attitude, where the configuration asks for it.
  *
  * Given:     stars        must outlive the module

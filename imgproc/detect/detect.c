@@ -370,6 +370,7 @@ static void find_candidates(bst_imgproc *ip, const bst_imgproc_frame *frame,
     double dx, dy;
     filter_streak_vector(ip, whole, motion, &dx, &dy);
     ip->streak_px = hypot(dx, dy) * frame->binning;
+    ip->followed_sigma_e = 0.0;
     bst_filter_set(&ip->filter, sigma, frame->binning, dx, dy);
     /* search for object streaks only if the stars are points */
     bool search =
@@ -547,8 +548,11 @@ void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index,
                         const bst_optics_zero_point *zero_point) {
     assert(ip && detections && zero_point && index >= 0 && index < detections->count);
     bst_detection *item = &detections->items[index];
+    if (ip->windowed || ip->followed_sigma_e > 0.0) {
+        return;
+    }
     const bst_imgproc_found *found = &ip->locator.found[ip->order[index]];
-    if (ip->windowed || !found->rough) {
+    if (!found->rough) {
         return;
     }
     bst_locate_again(&ip->locator, &ip->view, ip->order[index]);
@@ -564,6 +568,7 @@ double bst_imgproc_v_limit(const bst_imgproc *ip, double snr) {
     const bst_filter *f = &ip->filter;
     double norm = f->streak ? f->streak_norm : f->norm;
     double electrons = snr * (double)ip->background.median_noise / norm;
+    electrons = ip->followed_sigma_e > 0.0 ? snr * ip->followed_sigma_e : electrons;
     return -2.5 * log10(electrons / (fmax(ip->exposure_s, 1e-9) * ip->electrons_per_s_v0));
 }
 

@@ -37,6 +37,7 @@ struct bst_imgproc {
     bst_camera_motion motion;
     double exposure_s, binning, streak_px;
     bool smeared, windowed;
+    double followed_sigma_e; /* noise of the flux of a followed streak, e-; 0: none was followed */
     bst_stack_frame left;
     bst_known_psf *known;     /* NULL: Gaussian PSF */
     const bst_pixel_map *map; /* learned bad pixels; NULL: none */

@@ -66,6 +66,34 @@ static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
     return BST_OK;
 }
 
+/* Whole light of a source of unit amplitude. The convolution is with a Gaussian of 1 px and unit
+ * sum of squares, after which a point of light F has the height F / sqrt(4 pi). Along a streak the
+ * amplitude is that of a sample, which its neighbours overlap. */
+static double light_of_amplitude(const bst_plate_solve_result *r) {
+    double light = 0.0;
+    if (r->points) {
+        return sqrt(4.0 * BST_PI);
+    }
+    for (int k = -r->path.count; k <= r->path.count; k++) {
+        double d = BST_STAR_PATH_STEP_PX * k;
+        light += r->path.count * BST_STAR_PATH_STEP_PX * exp(-0.25 * d * d);
+    }
+    return light;
+}
+
+/* Lists the stars that the catalogue has. */
+static void list_matched(const attempt *a, bst_plate_solve_result *out) {
+    double light = light_of_amplitude(out);
+    out->matched_count = 0;
+    for (int i = 0; i < a->streak.count && out->attitude.solved; i++) {
+        const bst_detection *d = &a->streak.items[i];
+        if (bst_lost_in_space_matched(a->lost, i) && !(d->flags & BST_DETECTION_EDGE)) {
+            out->matched[out->matched_count++] =
+                (bst_plate_solve_star){d->x_px, d->y_px, light * d->flux_e};
+        }
+    }
+}
+
 static bst_status try_shapes(attempt *a, bst_plate_solve_result *out) {
     int shapes = bst_streak_finder_shapes(a->finder);
     int shape = shapes > 0 ? BST_STREAK_FINDER_POINT : 0;
@@ -82,6 +110,8 @@ static bst_status try_shapes(attempt *a, bst_plate_solve_result *out) {
         out->ends_margin = a->streak.ends_margin;
         out->ends[0] = a->streak.ends[0];
         out->ends[1] = a->streak.ends[1];
+        out->path = *bst_streak_finder_path(a->finder);
+        list_matched(a, out);
     }
     return BST_OK;
 }

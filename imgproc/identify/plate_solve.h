@@ -16,12 +16,21 @@ typedef struct bst_plate_solve_options {
     const bst_light *light;
 } bst_plate_solve_options;
 
+/* A star of the frame that the catalogue has. */
+typedef struct bst_plate_solve_star {
+    double x_px, y_px; /* at the middle of its streak */
+    double flux;       /* whole light, in the unit of the pixels, for a Gaussian PSF of 1 px */
+} bst_plate_solve_star;
+
 typedef struct bst_plate_solve_result {
     bst_lost_in_space_result attitude; /* when the stars are at the middle of their streaks */
     int stars;                         /* found in the frame */
     bst_common_streak_point ends[2];   /* of the streaks, relative to their middle, px */
     double ends_margin; /* log-likelihood of these ends over that of ends more than 8 px away */
     bool points;        /* the stars are points */
+    bst_star_path path; /* of the streaks; its light is the time spent along it */
+    bst_plate_solve_star matched[BST_PLATE_SOLVE_STARS]; /* whole streaks only */
+    int matched_count;
 } bst_plate_solve_result;
 
 /* Solves a frame.

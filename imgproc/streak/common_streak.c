@@ -6,10 +6,10 @@
 #include <string.h>
 
 #include "boresight/vec.h"
-#include "imgproc/streak/path_filter.h"
+#include "imgproc/streak/common_streak_internal.h"
 
 /* LINE_HALF: samples of a line on either side of a pixel, LINE_STEP px apart. */
-enum { MOST_SHAPES = 64, LINE_HALF = 5, LINE_STEP = 2, LINE_REACH = 11, DIRECTIONS = 16 };
+enum { LINE_HALF = 5, LINE_STEP = 2, LINE_REACH = 11, DIRECTIONS = 16 };
 enum { MOST_REACH = 12, EDGE_PX = 2, LEAST_PIXELS = 6, REFINING_STARS = 15, LEVELS = 8 };
 
 /* Negative pixels below this are bad, sigma. */
@@ -19,6 +19,8 @@ static const float LEAST_SIGMA = -5.0f;
 static const float HOT_SIGMA = 8.0f, HOT_SHARE = 0.2f, NEIGHBOUR_SIGMA = 2.0f;
 /* Assumed width of the PSF. */
 static const double USUAL_PSF_SIGMA_PX = 1.0;
+/* Widest PSF: three standard deviations fit into MOST_REACH. */
+static const double MOST_PSF_SIGMA_PX = 4.0;
 /* A source begins at a pixel above SEED and has those above GROW, in units of the line filter's
  * noise; brighter ones begin at GROW times powers of two. */
 static const float SEED = 6.5f, GROW = 4.0f;
@@ -34,30 +36,13 @@ static const double GHOST_PX = 15.0, GHOST_SHARE = 0.25;
 static const double BRIGHT_SNR = 100.0, CLOSE_PX = 5.0;
 /* Least SNR of the stars that refine the path. */
 static const double REFINING_SNR = 15.0;
+/* Least share of the path inside the frame, by its squared light, for a star whose middle is too.
+ */
+static const double USUAL_INSIDE = 0.25;
+/* Share of the path inside the frame from which on a streak is whole. */
+static const double WHOLE = 0.97;
 
-/* A connected source. */
-typedef struct shape {
-    double sum, rank;
-    int from; /* one of its pixels */
-    float level;
-    int x0, x1, y0, y1;
-} shape;
-
-struct bst_streak_finder {
-    int width, height;
-    double sigma, psf_sigma_px;
-    float *image;  /* background removed, in units of `sigma` */
-    float *smooth; /* convolved with the PSF, of unit noise */
-    float *lines;  /* line filter's output */
-    float *scratch;
-    int *label, *stack;
-    int count; /* pixels on the stack: those of the latest source */
-    bst_star_path path;
-    bst_common_streak_options options;
-    bst_detection *items; /* [max_sources + REFINING_STARS] */
-    shape shapes[MOST_SHAPES];
-    int shape_count;
-};
+typedef bst_streak_shape shape;
 typedef bst_streak_finder finder;
 
 static int ascending(const void *a, const void *b) {
@@ -239,13 +224,13 @@ static int add_shape(shape *list, int count, const shape *found) {
             return count;
         }
     }
-    int at = count < MOST_SHAPES ? count++ : MOST_SHAPES;
+    int at = count < BST_STREAK_SHAPES ? count++ : BST_STREAK_SHAPES;
     for (; at > 0 && list[at - 1].sum < found->sum; at--) {
-        if (at < MOST_SHAPES) {
+        if (at < BST_STREAK_SHAPES) {
             list[at] = list[at - 1];
         }
     }
-    if (at < MOST_SHAPES) {
+    if (at < BST_STREAK_SHAPES) {
         list[at] = *found;
     }
     return count;
@@ -262,7 +247,7 @@ static int by_rank(const void *a, const void *b) {
 
 /* Lists the sources that lie wholly inside the frame, at several levels, by rank; returns their
  * number. */
-static int list_shapes(finder *f, shape out[MOST_SHAPES]) {
+static int list_shapes(finder *f, shape out[BST_STREAK_SHAPES]) {
     int count = 0, number = 0;
     memset(f->label, 0, (size_t)f->width * (size_t)f->height * sizeof *f->label);
     for (int l = LEVELS - 1; l >= 0; l--) {
@@ -316,20 +301,32 @@ static bool is_ghost(const bst_common_streak *s, const bst_detection *d) {
     return false;
 }
 
+/* Stars to find. */
+typedef struct wanted {
+    double least_snr;
+    int most;
+    double least_inside; /* share of the path */
+    bool outside;        /* also stars whose place is outside the frame; no points */
+} wanted;
+
 /* Finds the stars one after the other; those that are not kept are subtracted, too. */
-static bst_status find_stars(bst_ctx *ctx, finder *f, double least_snr, int most,
-                             bst_common_streak *out) {
+static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_common_streak *out) {
     const bst_star_path_image image = image_of(f);
+    const int most = q->most;
     bst_path_filter *filter;
-    BST_TRY(bst_path_filter_create(ctx, &f->path, &image, f->psf_sigma_px, &filter));
+    BST_TRY(
+        bst_path_filter_create(ctx, &f->path, &image, f->psf_sigma_px, q->least_inside, &filter));
     out->items = f->items;
     out->count = 0;
     /* bright points leave many rings; a peak of theirs costs little */
-    const int tries = (f->path.count == 1 ? 20 : 2) * most;
+    const int tries = (f->path.count == 1 || q->outside ? 20 : 2) * most;
     for (int i = 0; i < tries && out->count < most; i++) {
         bst_path_filter_peak peak;
-        if (!bst_path_filter_highest(filter, &peak) || peak.snr < least_snr) {
+        if (!bst_path_filter_highest(filter, &peak) || peak.snr < q->least_snr) {
             break;
+        }
+        if (q->outside && bst_streak_finder_remove_point(f, filter, &peak)) {
+            continue;
         }
         bst_detection d = {.x_px = peak.x_px,
                            .y_px = peak.y_px,
@@ -338,11 +335,16 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, double least_snr, int most
                            .snr = peak.snr,
                            .cov_xx = peak.cov_xx,
                            .cov_xy = peak.cov_xy,
-                           .cov_yy = peak.cov_yy};
-        bool inside =
-            d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= f->width - 1 && d.y_px <= f->height - 1;
-        if (inside && peak.whole && !is_ghost(out, &d)) {
+                           .cov_yy = peak.cov_yy,
+                           .flags = peak.inside < WHOLE ? BST_DETECTION_EDGE : 0};
+        bool inside = q->outside || (d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= f->width - 1 &&
+                                     d.y_px <= f->height - 1);
+        bool left = q->outside ? bst_streak_finder_is_covered(f, &peak) : is_ghost(out, &d);
+        if (inside && peak.whole && !left) {
             f->items[out->count++] = d;
+            if (q->outside) {
+                bst_streak_finder_cover(f, &peak);
+            }
         }
         bst_path_filter_subtract(filter, &peak);
         if (f->path.count == 1) {
@@ -374,7 +376,8 @@ static bst_status find_all(bst_ctx *ctx, finder *f, bst_common_streak *out) {
     for (int e = 0; e < 2; e++) {
         out->ends[e] = (bst_common_streak_point){f->path.ends[e][0], f->path.ends[e][1]};
     }
-    return find_stars(ctx, f, f->options.least_snr, f->options.max_sources, out);
+    const wanted all = {f->options.least_snr, f->options.max_sources, USUAL_INSIDE, false};
+    return find_stars(ctx, f, &all, out);
 }
 
 bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *f, int index,
@@ -388,7 +391,8 @@ bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *f, int index,
     if (!fit_shape(f, &f->shapes[index])) {
         return BST_OK;
     }
-    BST_TRY(find_stars(ctx, f, REFINING_SNR, REFINING_STARS, out));
+    const wanted bright = {REFINING_SNR, REFINING_STARS, USUAL_INSIDE, false};
+    BST_TRY(find_stars(ctx, f, &bright, out));
     refine_path(f, out, NULL);
     return find_all(ctx, f, out);
 }
@@ -398,6 +402,35 @@ bst_status bst_streak_finder_repeat(bst_ctx *ctx, bst_streak_finder *f, const bo
     assert(f && chosen && out);
     refine_path(f, out, chosen);
     return find_all(ctx, f, out);
+}
+
+const bst_star_path *bst_streak_finder_path(const bst_streak_finder *f) {
+    return &f->path;
+}
+
+bst_status bst_streak_finder_follow(bst_ctx *ctx, bst_streak_finder *f, const bst_star_path *path,
+                                    double least_snr, double least_inside, bst_common_streak *out) {
+    assert(f && f->options.known_path && path && path->count > 0 && least_snr > 0.0 &&
+           least_inside > 0.0 && out);
+    f->path = *path;
+    memset(f->lines, 0, (size_t)f->width * (size_t)f->height * sizeof *f->lines);
+    *out = (bst_common_streak){.items = f->items, .sigma = f->sigma};
+    for (int e = 0; e < 2; e++) {
+        out->ends[e] = (bst_common_streak_point){f->path.ends[e][0], f->path.ends[e][1]};
+    }
+    const wanted all = {least_snr, f->options.max_sources, least_inside, true};
+    BST_TRY(find_stars(ctx, f, &all, out));
+    /* The convolution with the PSF keeps a line's light per pixel of its length. The amplitude is
+     * that of one sample; its neighbours overlap it. */
+    double length = 0.0, step = BST_STAR_PATH_STEP_PX / f->psf_sigma_px;
+    for (int k = -path->count; k <= path->count; k++) {
+        length += path->count * BST_STAR_PATH_STEP_PX * exp(-0.25 * k * k * step * step);
+    }
+    for (int i = 0; i < out->count; i++) {
+        out->items[i].flux_e *= length;
+        out->items[i].flux_sigma_e *= length;
+    }
+    return BST_OK;
 }
 
 int bst_streak_finder_shapes(const bst_streak_finder *f) {
@@ -443,9 +476,12 @@ bst_status bst_streak_finder_create(bst_ctx *ctx, const float *pixels, int width
     memcpy(f->image, pixels, (size_t)width * (size_t)height * sizeof *f->image);
     clean(f);
     remove_hot_pixels(f);
-    convolve(f, USUAL_PSF_SIGMA_PX);
-    filter_lines(f);
-    f->shape_count = list_shapes(f, f->shapes);
+    convolve(f, options->psf_sigma_px > 0.0 ? fmin(options->psf_sigma_px, MOST_PSF_SIGMA_PX)
+                                            : USUAL_PSF_SIGMA_PX);
+    if (!options->known_path) {
+        filter_lines(f);
+        f->shape_count = list_shapes(f, f->shapes);
+    }
     *out = f;
     return BST_OK;
 }

@@ -6,12 +6,15 @@
 
 #include "boresight/messages.h"
 #include "boresight/status.h"
+#include "imgproc/streak/star_path.h"
 
 typedef struct bst_common_streak_options {
     int max_sources;
     double least_snr;
     double tangent_per_px; /* of the gnomonic projection, at the frame's middle: streaks differ with
                               the place in a wide field; 0: all are equal */
+    double psf_sigma_px;   /* 0: 1 px */
+    bool known_path;       /* the path comes from bst_streak_finder_follow: no shapes are listed */
 } bst_common_streak_options;
 
 /* A point along the streak, relative to its middle. */
@@ -67,5 +70,22 @@ bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *finder, int i
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_streak_finder_repeat(bst_ctx *ctx, bst_streak_finder *finder, const bool *chosen,
                                     bst_common_streak *out) BST_MUST_CHECK;
+
+/* Path of the latest search; it belongs to the finder. */
+const bst_star_path *bst_streak_finder_path(const bst_streak_finder *finder);
+
+/* Finds all stars by a known path, also those whose own place is outside the frame.
+ *
+ * Given:     finder        made with known_path
+ *            path          copied; centre and tangent_per_px as for this frame
+ *            least_snr     of the part of a streak inside the frame
+ *            least_inside  share of the path that must be inside the frame
+ * Returned:  *out          places are those at the path's origin; flags has BST_DETECTION_EDGE for
+ *                          streaks that the frame cuts; flux_e is that of the whole streak for a
+ *                          Gaussian PSF of the finder's width
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_streak_finder_follow(bst_ctx *ctx, bst_streak_finder *finder,
+                                    const bst_star_path *path, double least_snr,
+                                    double least_inside, bst_common_streak *out) BST_MUST_CHECK;
 
 #endif

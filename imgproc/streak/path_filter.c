@@ -8,8 +8,6 @@
 /* BLOCK: side of the squares over which the path's shape changes by less than a pixel. */
 enum { BLOCK = 16, KERNEL = 5, SHIFTS = 24 };
 
-/* Least share of the path inside the frame. */
-static const double LEAST_INSIDE = 0.25;
 /* Position error beside the noise: samples at whole pixels, and the path's own error. */
 static const double SYSTEMATIC_PX = 0.2;
 /* Reach of the fit to a maximum along a streak: length over REACH_SHARE, and at most MOST_REACH px.
@@ -30,6 +28,7 @@ struct bst_path_filter {
     double correlation; /* variance of the response over the sum of the squared light */
     double squares;     /* sum of the squared light of the whole path */
     double psf_sigma_px;
+    double least_inside;            /* share of the path inside the frame */
     double length_px, direction[2]; /* from end to end */
     double systematic_px;           /* position error beside the noise */
     double loss[SHIFTS]; /* share of the response that a shift by so many px along loses */
@@ -133,16 +132,16 @@ static void filter_block(bst_path_filter *f, const bst_star_path_image *image, i
             double share = (double)squares[y - by][x - bx] / f->squares;
             f->response[y * f->width + x] = light[y - by][x - bx];
             f->per_noise[y * f->width + x] =
-                share < LEAST_INSIDE ? 0.0f
-                                     : (float)(1.0 / sqrt(share * f->squares * f->correlation));
+                share < f->least_inside ? 0.0f
+                                        : (float)(1.0 / sqrt(share * f->squares * f->correlation));
         }
     }
 }
 
 bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
                                   const bst_star_path_image *image, double psf_sigma_px,
-                                  bst_path_filter **out) {
-    assert(path && path->count > 0 && image && psf_sigma_px > 0.0 && out);
+                                  double least_inside, bst_path_filter **out) {
+    assert(path && path->count > 0 && image && psf_sigma_px > 0.0 && least_inside > 0.0 && out);
     *out = NULL;
     bst_path_filter *f = calloc(1, sizeof *f);
     if (!f) {
@@ -150,6 +149,7 @@ bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
     }
     f->path = path;
     f->psf_sigma_px = psf_sigma_px;
+    f->least_inside = least_inside;
     f->margin = margin_of(path);
     f->width = image->width + 2 * f->margin;
     f->height = image->height + 2 * f->margin;
@@ -361,6 +361,18 @@ void bst_path_filter_subtract(bst_path_filter *f, const bst_path_filter_peak *pe
     if (box.x1 >= box.x0) {
         subtract_points(f, box);
         forget_rows(f, box.y0 - KERNEL, box.y1 + KERNEL);
+    }
+}
+
+void bst_path_filter_subtract_point(bst_path_filter *f, double x_px, double y_px,
+                                    double amplitude) {
+    assert(f);
+    double m[3];
+    rectangle box = {f->width, f->height, -1, -1};
+    bst_star_path_map(f->path, x_px, y_px, m);
+    add_points(f, x_px, y_px, amplitude, m, &box);
+    if (box.x1 >= box.x0) {
+        subtract_points(f, box);
     }
 }
 

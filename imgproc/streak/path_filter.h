@@ -12,13 +12,14 @@ typedef struct bst_path_filter bst_path_filter;
  * The response at a place is the sum of the image along the path there, weighted by the path's
  * light. Its noise is that of the samples inside the frame.
  *
- * Given:     path       must outlive the filter
- *            image      of unit noise after the convolution with a Gaussian of psf_sigma_px
+ * Given:     path          must outlive the filter
+ *            image         of unit noise after the convolution with a Gaussian of psf_sigma_px
+ *            least_inside  share of the path that must be inside the frame, by its squared light
  * Errors:    BST_ERR_MEMORY
  * Ownership: free *out with bst_path_filter_free */
 bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
                                   const bst_star_path_image *image, double psf_sigma_px,
-                                  bst_path_filter **out) BST_MUST_CHECK;
+                                  double least_inside, bst_path_filter **out) BST_MUST_CHECK;
 /* Frees a filter; NULL is allowed. */
 void bst_path_filter_free(bst_path_filter *filter);
 
@@ -37,6 +38,13 @@ bool bst_path_filter_highest(bst_path_filter *filter, bst_path_filter_peak *out)
 
 /* Subtracts the response to a star (Hogbom 1974, A&AS 15, 417). */
 void bst_path_filter_subtract(bst_path_filter *filter, const bst_path_filter_peak *peak);
+
+/* Subtracts the response to a point source of the image.
+ *
+ * Given:     x_px, y_px  its place
+ *            amplitude   value of the convolved image there */
+void bst_path_filter_subtract_point(bst_path_filter *filter, double x_px, double y_px,
+                                    double amplitude);
 
 /* Leaves a circle about a peak out of the search: what the subtraction of a bright star left. */
 void bst_path_filter_leave_out(bst_path_filter *filter, const bst_path_filter_peak *peak,

@@ -422,3 +422,62 @@ void bst_star_path_refine(bst_star_path *path, const bst_star_path_image *image,
         }
     }
 }
+
+/* Mean place over the time of a motion. */
+static void mean_place(const bst_star_path_node *nodes, int count, double mean[2]) {
+    double sum[2] = {0.0, 0.0}, total = nodes[count - 1].time - nodes[0].time;
+    for (int i = 1; i < count; i++) {
+        double dt = nodes[i].time - nodes[i - 1].time;
+        sum[0] += 0.5 * dt * (nodes[i].x_px + nodes[i - 1].x_px);
+        sum[1] += 0.5 * dt * (nodes[i].y_px + nodes[i - 1].y_px);
+    }
+    mean[0] = sum[0] / total;
+    mean[1] = sum[1] / total;
+}
+
+bool bst_star_path_of_motion(bst_star_path *path, const bst_star_path_node *nodes, int count) {
+    assert(path && nodes && count >= 2);
+    double length = 0.0, mean[2], total = nodes[count - 1].time - nodes[0].time;
+    for (int i = 1; i < count; i++) {
+        length += hypot(nodes[i].x_px - nodes[i - 1].x_px, nodes[i].y_px - nodes[i - 1].y_px);
+    }
+    int samples = (int)fmin(floor(length / BST_STAR_PATH_STEP_PX + 0.5), BST_STAR_PATH_ROOM + 1);
+    if (!(total > 0.0) || samples < 2 || samples > BST_STAR_PATH_ROOM) {
+        return false;
+    }
+    mean_place(nodes, count, mean);
+    memset(path->light, 0, sizeof path->light);
+    path->count = samples;
+    double step = length / samples, done = 0.0;
+    int next = 0; /* sample whose middle comes next */
+    for (int i = 1; i < count; i++) {
+        double dx = nodes[i].x_px - nodes[i - 1].x_px, dy = nodes[i].y_px - nodes[i - 1].y_px;
+        double piece = hypot(dx, dy), dt = nodes[i].time - nodes[i - 1].time, end = done + piece;
+        for (; next < samples && (next + 0.5) * step <= end && piece > 0.0; next++) {
+            double share = ((next + 0.5) * step - done) / piece;
+            path->place[next][0] = nodes[i - 1].x_px + share * dx - mean[0];
+            path->place[next][1] = nodes[i - 1].y_px + share * dy - mean[1];
+        }
+        /* the light of the piece goes to the samples that it crosses */
+        int first = (int)fmin(floor(done / step), samples - 1);
+        int last = (int)fmin(floor(end / step), samples - 1);
+        for (int k = first; k <= last; k++) {
+            double from = fmax(done, k * step), to = fmin(end, (k + 1) * step);
+            path->light[k] += piece > 0.0 ? dt * fmax(to - from, 0.0) / piece : dt;
+        }
+        done = end;
+    }
+    for (; next < samples; next++) { /* rounding */
+        path->place[next][0] = nodes[count - 1].x_px - mean[0];
+        path->place[next][1] = nodes[count - 1].y_px - mean[1];
+    }
+    for (int k = 0; k < samples; k++) {
+        path->light[k] *= samples / total;
+    }
+    for (int e = 0; e < 2; e++) {
+        const bst_star_path_node *n = e == 0 ? &nodes[0] : &nodes[count - 1];
+        path->ends[e][0] = n->x_px - mean[0];
+        path->ends[e][1] = n->y_px - mean[1];
+    }
+    return true;
+}

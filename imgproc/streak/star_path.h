@@ -53,6 +53,21 @@ bool bst_star_path_fit(bst_star_path *path, const bst_star_path_image *image, co
 /* Makes the path of a point. */
 void bst_star_path_point(bst_star_path *path);
 
+/* Place of a star's image at a time of the exposure. */
+typedef struct bst_star_path_node {
+    double time; /* any unit, ascending */
+    double x_px, y_px;
+} bst_star_path_node;
+
+/* Makes the path of a known motion. Its origin is the mean place over the exposure, and its light
+ * the time that the star spends along it.
+ *
+ * Given:     path          centre and tangent_per_px set
+ *            nodes, count  of a star at the frame's middle, at least 2; straight between them
+ * Returned:  *path         the rest
+ *            false: no time passes, or the path has less than two samples or more than the room */
+bool bst_star_path_of_motion(bst_star_path *path, const bst_star_path_node *nodes, int count);
+
 /* A star on the image. */
 typedef struct bst_star_path_star {
     double x_px, y_px, amplitude;

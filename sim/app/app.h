@@ -32,6 +32,8 @@ int bst_cmd_export(int argc, char **argv);
 int bst_cmd_report(int argc, char **argv);
 /* boresight orbit: determines an orbit from the angles of a track. */
 int bst_cmd_orbit(int argc, char **argv);
+/* boresight process: recorded frames through the onboard chain. */
+int bst_cmd_process(int argc, char **argv);
 /* boresight solve: attitude of a FITS frame; argv[0] is "solve". Returns the exit code. */
 int bst_cmd_solve(int argc, char **argv);
 /* boresight check: checks a scenario without running it. */

@@ -16,6 +16,7 @@ static const bst_app_command commands[] = {
     {"report", bst_cmd_report, "a page of HTML about a run or a study"},
     {"export", bst_cmd_export, "frames, tables, orbits and observations of a run for others"},
     {"orbit", bst_cmd_orbit, "an orbit from the directions that a run measured"},
+    {"process", bst_cmd_process, "frames of other programs through the onboard chain"},
     {"solve", bst_cmd_solve, "where a frame looks, from its stars alone"},
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
     {"loop", bst_cmd_loop, "margins and predicted pointing of a scenario's control loops"},

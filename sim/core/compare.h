@@ -10,6 +10,12 @@ static inline int bst_compare_doubles(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
+/* Compares two floats, ascending; NAN equals everything. */
+static inline int bst_compare_floats(const void *a, const void *b) {
+    float x = *(const float *)a, y = *(const float *)b;
+    return (x > y) - (x < y);
+}
+
 /* Compares two ints, ascending. */
 static inline int bst_compare_ints(const void *a, const void *b) {
     int x = *(const int *)a, y = *(const int *)b;

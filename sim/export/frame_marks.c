@@ -16,26 +16,37 @@ typedef struct cursor {
     bool held;         /* the current row has not been used yet */
 } cursor;
 
-enum { FRAMES, EXPOSURES, OBJECTS, DETECTIONS, TRACKS, MODES, CURSORS };
+enum { FRAMES, EXPOSURES, OBJECTS, DETECTIONS, TRACKS, MODES, ATTITUDES, CURSORS };
+/* PATH: places along a streak that are kept. */
+enum { PATH = 128, LEAST_PATH = 8 };
+
+/* Streaks longer than this are drawn as lines, px of the sensor. */
+static const double LEAST_STREAK_PX = 16.0;
+/* Streaks whose length agrees with that of the stars' path to this share are drawn along it. */
+static const double AGREE_SHARE = 0.25;
 
 /* The first column is the key of the cursor; ?1: the sensor. Rows are in the order of exposures. */
 static const char *const queries[CURSORS] = {
     [FRAMES] =
         "SELECT exposure_id, x0_px, y0_px, binning, utc(start_s + exposure_s / 2),"
-        " exposure_s, (start_tick + end_tick) / 2 FROM frames WHERE sensor = ?1",
+        " exposure_s, (start_tick + end_tick) / 2, start_tick, end_tick FROM frames"
+        " WHERE sensor = ?1",
     [EXPOSURES] =
-        "SELECT exposure_id, boresight_x_px, boresight_y_px FROM exposures"
+        "SELECT exposure_id, boresight_x_px, boresight_y_px, pixel_scale_arcsec FROM exposures"
         " WHERE sensor = ?1",
     [OBJECTS] =
         "SELECT exposure_id, id, norad, x_centroid_px, y_centroid_px FROM truth"
         " WHERE sensor = ?1 AND kind = 'object' AND in_field = 1",
     [DETECTIONS] =
-        "SELECT exposure_id, label, x_px, y_px, length_px, star_id, flux_e FROM detections"
-        " WHERE sensor = ?1",
+        "SELECT exposure_id, label, x_px, y_px, length_px, star_id, flux_e, angle_deg"
+        " FROM detections WHERE sensor = ?1",
     [TRACKS] =
         "SELECT exposure_id, track_id, status, target_of_interest, x_px, y_px, snr"
         " FROM tracks WHERE sensor = ?1 AND misses_in_row = 0",
     [MODES] = "SELECT tick, mode FROM control WHERE sensor = ?1",
+    [ATTITUDES] =
+        "SELECT tick, q_cam_from_gcrf_x, q_cam_from_gcrf_y, q_cam_from_gcrf_z,"
+        " q_cam_from_gcrf_w FROM los_truth WHERE sensor = ?1",
 };
 
 struct bst_frame_marks {
@@ -48,6 +59,10 @@ struct bst_frame_marks {
     double target_x_px, target_y_px;
     char mode[32], caption[200];
     double x0, y0, binning; /* of the frame */
+    /* of the frame's exposure: attitudes, and the places of a star's image, px of the frame */
+    bst_quat attitudes[PATH];
+    double path_px[PATH][2], path_length_px;
+    int path_count;
 };
 
 bst_status bst_frame_marks_create(bst_ctx *ctx, const bst_run_reader *run, int64_t sensor,
@@ -174,7 +189,15 @@ static bst_status add_detection(bst_ctx *ctx, bst_frame_marks *m, const bst_io_r
                 isfinite(flux_e) ? flux_e : 0.0, bst_io_rows_real(rows, 2),
                 bst_io_rows_real(rows, 3)));
     bst_io_overlay_mark *mark = &m->marks[m->count - 1];
-    mark->radius_px = 0.5 * bst_io_rows_real(rows, 4) / m->binning + 2.0;
+    double length = bst_io_rows_real(rows, 4) / m->binning;
+    mark->radius_px = 0.5 * length + 2.0;
+    if (length * m->binning > LEAST_STREAK_PX) {
+        double angle = bst_io_rows_real(rows, 7) * BST_DEG_RAD;
+        mark->half_x_px = 0.5 * length * cos(angle);
+        mark->half_y_px = 0.5 * length * sin(angle);
+        mark->on_path = m->path_count >= LEAST_PATH &&
+                        fabs(length - m->path_length_px) < AGREE_SHARE * m->path_length_px;
+    }
     if (m->has_target && hypot(mark->x_px - m->target_x_px, mark->y_px - m->target_y_px) <=
                              BST_RIGHT_TARGET_PX / m->binning) {
         mark->importance = BST_OVERLAY_OF_TARGET;
@@ -198,11 +221,60 @@ static int by_importance(const void *a, const void *b) {
     return (p->importance < q->importance) - (p->importance > q->importance);
 }
 
+/* Makes the path of a star's image from the attitudes of the exposure, in px of the frame relative
+ * to its mean place. */
+static void make_path(bst_frame_marks *m, double pixel_scale_arcsec) {
+    double mean[2] = {0.0, 0.0}, scale = pixel_scale_arcsec * BST_ARCSEC_RAD * m->binning;
+    for (int k = 0; k < m->path_count; k++) {
+        bst_quat turn = bst_quat_mul(m->attitudes[k], bst_quat_conj(m->attitudes[0]));
+        bst_vec3 v = bst_quat_rotate(turn, (bst_vec3){0, 0, 1});
+        m->path_px[k][0] = v.x / v.z / scale;
+        m->path_px[k][1] = v.y / v.z / scale;
+        mean[0] += m->path_px[k][0] / m->path_count;
+        mean[1] += m->path_px[k][1] / m->path_count;
+    }
+    m->path_length_px = 0.0;
+    for (int k = 0; k < m->path_count; k++) {
+        m->path_px[k][0] -= mean[0];
+        m->path_px[k][1] -= mean[1];
+        m->path_length_px += k == 0 ? 0.0
+                                    : hypot(m->path_px[k][0] - m->path_px[k - 1][0],
+                                            m->path_px[k][1] - m->path_px[k - 1][1]);
+    }
+}
+
+/* Reads the attitudes of an exposure; of too many every second one is kept. */
+static bst_status get_attitudes(bst_ctx *ctx, bst_frame_marks *m, int64_t start, int64_t end) {
+    cursor *c = &m->cursors[ATTITUDES];
+    int64_t every = 1, seen = 0;
+    m->path_count = 0;
+    for (bool found;; seen++) {
+        BST_TRY(advance(ctx, c, start, end, &found));
+        if (!found) {
+            return BST_OK;
+        }
+        if (seen % every != 0) {
+            continue;
+        }
+        if (m->path_count == PATH) {
+            for (int k = 0; k < PATH / 2; k++) {
+                m->attitudes[k] = m->attitudes[2 * k];
+            }
+            m->path_count = PATH / 2;
+            every *= 2;
+        }
+        m->attitudes[m->path_count++] =
+            (bst_quat){bst_io_rows_real(c->rows, 1), bst_io_rows_real(c->rows, 2),
+                       bst_io_rows_real(c->rows, 3), bst_io_rows_real(c->rows, 4)};
+    }
+}
+
 static bst_status get_frame(bst_ctx *ctx, bst_frame_marks *m, int64_t id) {
     cursor *c = &m->cursors[FRAMES];
     bool found;
     m->x0 = m->y0 = 0.0;
     m->binning = 1.0;
+    m->path_count = 0;
     snprintf(m->caption, sizeof m->caption, "frame %" PRId64, id);
     BST_TRY(advance(ctx, c, id, id, &found));
     if (!found) {
@@ -215,6 +287,7 @@ static bst_status get_frame(bst_ctx *ctx, bst_frame_marks *m, int64_t id) {
     snprintf(utc, sizeof utc, "%.23sZ", bst_io_rows_text(c->rows, 4)); /* to the millisecond */
     double exposure_s = bst_io_rows_real(c->rows, 5);
     int64_t tick = bst_io_rows_int(c->rows, 6);
+    BST_TRY(get_attitudes(ctx, m, bst_io_rows_int(c->rows, 7), bst_io_rows_int(c->rows, 8)));
     for (cursor *modes = &m->cursors[MODES];;) {
         BST_TRY(advance(ctx, modes, INT64_MIN, tick, &found));
         if (!found) {
@@ -240,6 +313,7 @@ bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *m, int64_t id, bst
             }
             const bst_io_rows *rows = m->cursors[i].rows;
             if (i == EXPOSURES) {
+                make_path(m, bst_io_rows_real(rows, 3));
                 BST_TRY(add(ctx, m, BST_OVERLAY_BORESIGHT, BST_OVERLAY_FIRST,
                             bst_io_rows_real(rows, 1), bst_io_rows_real(rows, 2)));
             } else {
@@ -250,6 +324,10 @@ bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *m, int64_t id, bst
         }
     }
     qsort(m->marks, (size_t)m->count, sizeof *m->marks, by_importance);
-    *out = (bst_io_overlay){.marks = m->marks, .count = m->count, .caption = m->caption};
+    *out = (bst_io_overlay){.marks = m->marks,
+                            .count = m->count,
+                            .caption = m->caption,
+                            .path_px = (const double(*)[2])m->path_px,
+                            .path_count = m->path_count};
     return BST_OK;
 }

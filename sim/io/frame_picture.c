@@ -54,6 +54,24 @@ static double draw_mark(bst_picture *p, bst_io_overlay_kind kind, double x, doub
     return 0.0;
 }
 
+/* Draws a streak about (x, y) as a line beside its light, or as the path that the stars share, with
+ * a small circle at its place. */
+static void draw_streak(bst_picture *p, const bst_io_overlay *overlay, const bst_io_overlay_mark *m,
+                        double x, double y, double scale) {
+    const bst_io_colour colour = colours[m->kind];
+    bst_picture_circle(p, x, y, 3.0, colour, 1.0);
+    if (!m->on_path) {
+        double dx = m->half_x_px * scale, dy = m->half_y_px * scale;
+        bst_picture_line(p, x - dx, y - dy, x + dx, y + dy, colour, 1.0);
+        return;
+    }
+    for (int k = 1; k < overlay->path_count; k++) {
+        const double *a = overlay->path_px[k - 1], *b = overlay->path_px[k];
+        bst_picture_line(p, x + a[0] * scale, y + a[1] * scale, x + b[0] * scale, y + b[1] * scale,
+                         colour, 1.0);
+    }
+}
+
 /* Draws a line of text on a dark background, legible over stars. */
 static double put_line(bst_picture *p, double x, double y, double height, bst_io_colour colour,
                        const char *text) {
@@ -93,7 +111,11 @@ static void draw_overlay(bst_picture *p, const bst_io_overlay *overlay, int widt
             continue;
         }
         double x = box.x + (m->x_px + 0.5) * scale - 0.5, y = box.y + (m->y_px + 0.5) * scale - 0.5;
-        double r = draw_mark(p, m->kind, x, y, m->radius_px * scale);
+        bool streak = m->on_path || m->half_x_px != 0.0 || m->half_y_px != 0.0;
+        double r = streak ? 5.0 : draw_mark(p, m->kind, x, y, m->radius_px * scale);
+        if (streak) {
+            draw_streak(p, overlay, m, x, y, scale);
+        }
         if (m->label[0]) {
             /* a track's label is above, an object's below: their positions often coincide */
             double base = m->kind == BST_OVERLAY_TRACK ? y - 0.5 * r : y + 0.5 * r + 0.8 * h;

@@ -22,7 +22,9 @@ typedef enum bst_io_overlay_kind {
 typedef struct bst_io_overlay_mark {
     bst_io_overlay_kind kind;
     double x_px, y_px;
-    double radius_px;  /* detections: size of the circle; 0: a default */
+    double radius_px;            /* detections: size of the circle; 0: a default */
+    double half_x_px, half_y_px; /* streaks: from the middle to an end; 0: a circle is drawn */
+    bool on_path;                /* streaks: the overlay's path is drawn instead of a line */
     double importance; /* if there are too many marks, those with the largest value are drawn */
     char label[48];    /* "" for none */
 } bst_io_overlay_mark;
@@ -36,7 +38,9 @@ typedef struct bst_io_overlay_mark {
 typedef struct bst_io_overlay {
     const bst_io_overlay_mark *marks; /* drawn from last to first: the most important in front */
     int count;
-    const char *caption; /* one line, upper left; NULL: none */
+    const char *caption;        /* one line, upper left; NULL: none */
+    const double (*path_px)[2]; /* [path_count] places along a star's streak, relative to its own */
+    int path_count;
 } bst_io_overlay;
 
 /* The pixels of a frame. */

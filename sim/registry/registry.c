@@ -5,6 +5,7 @@
 #include "imgproc/imgproc.h"
 #include "obsgen/obsgen.h"
 #include "scenegen/module.h"
+#include "scenegen/recorded_module.h"
 #include "sim/link/external.h"
 #include "tracker/module.h"
 
@@ -16,6 +17,7 @@ static const bst_module_desc *const modules[] = {
     &bst_gimbal_scripted_module,
     &bst_gimbal_external_module,
     &bst_scenegen_module,
+    &bst_scenegen_recorded_module,
     &bst_imgproc_module,
     &bst_tracker_module,
     &bst_control_standard_module,

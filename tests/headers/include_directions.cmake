@@ -41,6 +41,7 @@ set(may_sim/run sim/run sim/cli sim/engine sim/eval sim/registry ${onboard} sim/
 set(may_sim/analysis sim/analysis ${may_sim/run} sim/run sim/satellite ${subsystems})
 set(may_sim/export sim/export ${may_sim/run})
 set(may_sim/report sim/report sim/export ${may_sim/analysis})
+set(may_sim/process sim/process sim/report ${may_sim/report})
 set(may_sim/study_kinds sim/study_kinds sim/studies ${may_sim/analysis})
 set(may_sim/bench sim/bench sim/api sim/study_kinds sim/studies ${may_sim/analysis})
 set(may_sim/app ${all_folders})

@@ -1,0 +1,57 @@
+/* State of an open FITS file of frames, shared by its source files. */
+#ifndef BST_IO_FITS_SOURCE_INTERNAL_H
+#define BST_IO_FITS_SOURCE_INTERNAL_H
+
+#include "sim/io/fits_cards_internal.h"
+#include "sim/io/fits_source.h"
+
+struct bst_fits_reader;
+
+/* A header in memory; bytes 0: none. */
+typedef struct bst_fits_source_header {
+    char *text;
+    size_t bytes, room;
+    bst_fits_cards cards;
+} bst_fits_source_header;
+
+/* An HDU with frames. */
+typedef struct bst_fits_source_hdu {
+    int number; /* from 1 */
+    int bitpix;
+    int64_t first; /* number of its first frame in the file */
+    int64_t image; /* number among the extensions with an image; -1: the primary array */
+    uint64_t at, data_at, end;
+    int64_t size[3]; /* width, height, planes */
+    bool planes, compressed, has_blank;
+    int64_t blank;
+    double zero, scale;
+} bst_fits_source_hdu;
+
+struct bst_fits_source {
+    char path[4096];
+    int fd;
+    uint64_t bytes; /* of the file */
+    bst_fits_source_hdu *hdus;
+    size_t count, room;
+    int64_t frames;
+    bst_fits_source_header primary, header, table; /* header, table: of the selected HDU */
+    uint64_t table_at;                             /* data of the table */
+    int64_t selected, plane;                       /* index in hdus, -1: none; plane of the frame */
+    struct bst_fits_reader *packed;
+};
+
+/* Reads bytes at an offset; BST_ERR_FORMAT beyond the file's end, BST_ERR_IO. */
+bst_status bst_fits_source_read_at(bst_ctx *ctx, const bst_fits_source *source, void *out,
+                                   uint64_t bytes, uint64_t at) BST_MUST_CHECK;
+/* Loads and parses the header of HDU `number` at an offset. BST_ERR_FORMAT with file and HDU. */
+bst_status bst_fits_source_load_header(bst_ctx *ctx, const bst_fits_source *source, int number,
+                                       uint64_t at, bst_fits_source_header *header) BST_MUST_CHECK;
+/* Value of a key as an integer; `fallback` if it is missing or none. */
+int64_t bst_fits_source_int(const bst_fits_source_header *header, const char *key,
+                            int64_t fallback);
+/* Big-endian floating-point number of 4 or 8 bytes. */
+double bst_fits_source_real_at(const uint8_t *bytes, int width);
+/* Big-endian integer of 1, 2, 4 or 8 bytes; of one byte unsigned. */
+int64_t bst_fits_source_integer_at(const uint8_t *bytes, int width);
+
+#endif

@@ -1,0 +1,106 @@
+/* Keyword maps: which header keywords of a frame give time, exposure, gain and the like. A map is a
+ * JSON file (docs/reference/file_formats.md, "Keyword maps"). */
+#ifndef BST_IO_KEYWORD_MAP_H
+#define BST_IO_KEYWORD_MAP_H
+
+#include "boresight/config.h"
+#include "boresight/vec.h"
+#include "sim/astro/time.h"
+#include "sim/io/fits_source.h"
+
+/* Room for the keywords of a value, "EXPTIME|EXPOSURE": the first one in the header counts. */
+enum { BST_KEYWORD_TEXT = 80 };
+
+/* A number of a frame: factor times the keyword's value, or `value` without the keyword. */
+typedef struct bst_keyword_number {
+    char keyword[BST_KEYWORD_TEXT]; /* "": none */
+    double factor;
+    double value; /* NAN: the keyword is required */
+} bst_keyword_number;
+
+enum { BST_KEYWORD_UTC, BST_KEYWORD_MJD, BST_KEYWORD_JD };
+enum { BST_KEYWORD_START, BST_KEYWORD_MIDDLE, BST_KEYWORD_END };
+
+typedef struct bst_keyword_time {
+    char keyword[BST_KEYWORD_TEXT];
+    char clock_keyword[BST_KEYWORD_TEXT]; /* time of day, where `keyword` has a date alone */
+    int32_t format;                       /* BST_KEYWORD_UTC, _MJD, _JD */
+    int32_t moment;                       /* BST_KEYWORD_START, _MIDDLE, _END */
+} bst_keyword_time;
+
+typedef struct bst_keyword_vector {
+    bst_keyword_number x, y, z;
+} bst_keyword_vector;
+
+enum { BST_KEYWORD_NO_ATTITUDE, BST_KEYWORD_WCS };
+
+typedef struct bst_keyword_map {
+    int64_t format;
+    char name[64];
+    bst_keyword_time time;
+    bst_keyword_number exposure_s, gain_e_per_dn, read_noise_e, offset_dn, full_well_e,
+        pixel_scale_arcsec, exposure_id;
+    bst_keyword_vector observer_position_gcrf_m, observer_velocity_gcrf_mps;
+    int32_t attitude;                     /* BST_KEYWORD_NO_ATTITUDE, _WCS */
+    char image_section[BST_KEYWORD_TEXT]; /* keyword; "": the whole image */
+    char bias_section[BST_KEYWORD_TEXT];  /* keyword; "": no overscan is subtracted */
+    double pedestal_dn, dn_per_unit;      /* count = pedestal_dn + dn_per_unit * value */
+    double star_limit_v_mag;              /* faintest stars that a frame surely shows */
+    char file[512];                       /* of the map; not in the table */
+} bst_keyword_map;
+
+/* Table of a keyword map, for the reference pages and the schema. */
+extern const bst_config_desc bst_keyword_map_table[];
+
+/* Reads a keyword map.
+ *
+ * Given:     path  JSON file
+ * Errors:    those of bst_json_load and bst_config_read */
+bst_status bst_keyword_map_load(bst_ctx *ctx, const char *path,
+                                bst_keyword_map *out) BST_MUST_CHECK;
+
+/* The scenario keys of the camera that the map gives ("camera" of the file): aperture, band, PSF.
+ *
+ * Given:     path  of a map that bst_keyword_map_load took
+ * Returned:  *out  JSON object, which the caller deletes; an empty one if the map has none
+ * Errors:    as bst_keyword_map_load */
+bst_status bst_keyword_map_camera(bst_ctx *ctx, const char *path,
+                                  struct cJSON **out) BST_MUST_CHECK;
+
+/* What the header says of a frame. */
+typedef struct bst_keyword_values {
+    bst_time start;
+    double exposure_s, gain_e_per_dn, read_noise_e, offset_dn, full_well_e, pixel_scale_arcsec;
+    int64_t exposure_id; /* -1: unknown */
+    bool has_position, has_velocity;
+    bst_vec3 position_gcrf_m, velocity_gcrf_mps; /* observer, geocentric */
+} bst_keyword_values;
+
+/* Reads the values of the selected frame of a file.
+ *
+ * Given:     frame  the selection, for messages
+ * Errors:    BST_ERR_FORMAT with file, HDU, keyword and the map's key: a keyword is missing, is no
+ *            number, no time, or out of range */
+bst_status bst_keyword_map_read(bst_ctx *ctx, const bst_keyword_map *map, bst_fits_source *source,
+                                const bst_fits_source_frame *frame,
+                                bst_keyword_values *out) BST_MUST_CHECK;
+
+/* A part of an image, from a keyword "[x1:x2,y1:y2]" that counts pixels from 1.
+ *
+ * Given:     keyword  name; "": the whole image
+ * Returned:  box      x0, y0, width, height; pixels from 0. Width 0: the keyword is empty
+ * Errors:    BST_ERR_FORMAT with file, HDU and keyword: missing, of another form, or not within the
+ *            image */
+bst_status bst_keyword_section(bst_ctx *ctx, const char *keyword, bst_fits_source *source,
+                               const bst_fits_source_frame *frame, int box[4]) BST_MUST_CHECK;
+
+/* Attitude by the TAN WCS of a header (CRPIXn, CRVALn, and CDi_j or CDELTn with CROTA2).
+ *
+ * Given:     flip_rows  the camera's first row is the last of the file
+ * Returned:  *q_cam_from_gcrf  of catalogue places: aberration is not applied
+ *            *scale_arcsec     pixel scale
+ *            false: no or an incomplete WCS, or one that is mirrored for this order of rows */
+bool bst_keyword_wcs(bst_fits_source *source, const bst_fits_source_frame *frame, bool flip_rows,
+                     bst_quat *q_cam_from_gcrf, double *scale_arcsec);
+
+#endif

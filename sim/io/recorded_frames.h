@@ -1,0 +1,79 @@
+/* Recorded frames: the frames of FITS files in their order, one at a time, prepared as counts. */
+#ifndef BST_IO_RECORDED_FRAMES_H
+#define BST_IO_RECORDED_FRAMES_H
+
+#include "sim/io/keyword_map.h"
+
+typedef struct bst_recorded_frames bst_recorded_frames;
+
+/* Opens files of frames.
+ *
+ * Given:     paths, count  each a FITS file; a folder, whose files *.fits, *.fit, *.fts and
+ * *.fits.fz count in the order of their names: of a run only frames.fits, of a SatNet set those in
+ * ImageFiles; or a text file *.txt with a path a line, relative to its folder, lines with # left
+ * out Returned:  *out  all headers have been read once; one file is open at a time Errors:
+ * BST_ERR_NOT_FOUND: no file, or a folder without one; those of bst_fits_source_open Ownership:
+ * free *out with bst_recorded_frames_close */
+bst_status bst_recorded_frames_open(bst_ctx *ctx, const char *const *paths, int count,
+                                    bst_recorded_frames **out) BST_MUST_CHECK;
+/* Closes the files; NULL is allowed. */
+void bst_recorded_frames_close(bst_recorded_frames *frames);
+
+/* Number of frames in all files. */
+int64_t bst_recorded_frames_count(const bst_recorded_frames *frames);
+/* Number of files, and the path of one, which belongs to the frames. */
+int bst_recorded_frames_files(const bst_recorded_frames *frames);
+const char *bst_recorded_frames_file(const bst_recorded_frames *frames, int index);
+
+/* Preparation of the pixels. */
+typedef struct bst_recorded_options {
+    const bst_keyword_map *map; /* NULL: no keyword is read, the whole image is taken as counts */
+    bool flip_rows;             /* the camera's first row is the last of the file */
+} bst_recorded_options;
+
+/* A frame. */
+typedef struct bst_recorded_frame {
+    const char *path; /* of its file; belongs to the frames */
+    bst_fits_source_frame place;
+    int width, height;         /* of the used part */
+    double bias_dn;            /* median of the overscan, in the file's unit; 0: none */
+    bst_keyword_values values; /* with a map */
+} bst_recorded_frame;
+
+/* Selects a frame and reads its keywords.
+ *
+ * Given:     index    from 0
+ * Errors:    those of bst_fits_source_select, bst_keyword_map_read and bst_keyword_section */
+bst_status bst_recorded_frames_select(bst_ctx *ctx, bst_recorded_frames *frames, int64_t index,
+                                      const bst_recorded_options *options,
+                                      bst_recorded_frame *out) BST_MUST_CHECK;
+
+/* File of the selected frame, for other keywords. */
+bst_fits_source *bst_recorded_frames_source(bst_recorded_frames *frames);
+
+/* Reads the pixels of the selected frame: cut to the image section, less the overscan.
+ *
+ * Given:     frame   as bst_recorded_frames_select gave it
+ * Returned:  *pixels  [frame->height][frame->width] in the unit of the file, NAN for blank ones;
+ *                     they belong to the frames, until the next call
+ *            frame->bias_dn
+ * Errors:    those of bst_fits_source_pixels; BST_ERR_MEMORY */
+bst_status bst_recorded_frames_pixels(bst_ctx *ctx, bst_recorded_frames *frames,
+                                      const bst_recorded_options *options,
+                                      bst_recorded_frame *frame,
+                                      const float **pixels) BST_MUST_CHECK;
+
+/* Converts pixels to 16-bit counts, pedestal_dn + dn_per_unit * value, rounded; blank pixels become
+ * the median of the others.
+ *
+ * Given:     pixels, count  values
+ *            map            NULL: pedestal 0, 1 count per unit
+ * Returned:  dn       [count]; what lies outside 0 to 65535 is set to the nearer end
+ *            *clipped number of those; may be NULL
+ *            *blank   number of blank pixels; may be NULL
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_recorded_counts(bst_ctx *ctx, const float *pixels, size_t count,
+                               const bst_keyword_map *map, uint16_t *dn, int64_t *clipped,
+                               int64_t *blank) BST_MUST_CHECK;
+
+#endif

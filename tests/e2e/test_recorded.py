@@ -1,0 +1,191 @@
+#!/usr/bin/env python3
+"""Recorded frames: a run's own frames through the loop again, and `boresight process`.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_recorded.py BORESIGHT
+
+Frames of NEOSSat are no part of the project. Where the environment variable BORESIGHT_NEOSSAT
+names a folder with NEOS_SCI_2024239174545_cord.fits, it is processed too (about 20 s).
+"""
+import csv
+import json
+import os
+import shutil
+import unittest
+
+import numpy
+from astropy.io import fits
+from astropy.wcs import WCS
+
+import runs
+from runs import call, call_well
+
+CAMERA = "/observers/0/sensors/0/camera/"
+MODULES = "/observers/0/sensors/0/modules/"
+MAP = os.path.abspath("scenarios/maps/boresight.json")
+SOLVE = ("--v-limit", "7.5", "--least-snr", "8", "--catalogue", "embedded", "--quiet")
+NEOSSAT = os.path.join(os.environ.get("BORESIGHT_NEOSSAT", ""), "NEOS_SCI_2024239174545_cord.fits")
+# tables of what is known only where frames are rendered
+OF_RENDERING = {"exposures", "truth", "passes", "sightings"}
+
+
+def rows(folder, query):
+    with runs.database(folder) as tables:
+        return [tuple(row) for row in tables.execute(query)]
+
+
+class Recorded(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        """Three frames of 10 degrees."""
+        cls.folder = runs.scratch()
+        cls.scenario = os.path.join(cls.folder, "wide.json")
+        with open(cls.scenario, "w", encoding="utf-8") as file:
+            json.dump({"extends": os.path.abspath(runs.STARE),
+                       "set": {CAMERA + "width_px": 300, CAMERA + "height_px": 300,
+                               CAMERA + "pixel_scale_arcsec": 120, CAMERA + "aperture_m": 0.04,
+                               "/record": {"frames": "extensions", "compression": "rice"}}}, file)
+        cls.made = os.path.join(cls.folder, "run")
+        runs.run(cls.scenario, cls.made, duration=3)
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def recorded(self, frames, keyword_map=MAP, **keys):
+        return MODULES + "scenegen=" + json.dumps({"type": "recorded", "frames": frames,
+                                                   "keyword_map": keyword_map, **keys})
+
+    def test_recorded_frames_give_the_same_results_as_rendered_ones(self):
+        again = self.path("again")
+        runs.run(self.scenario, again, self.recorded(self.made), duration=3)
+        for name, in rows(self.made, "SELECT name FROM sqlite_master WHERE type = 'table'"):
+            if name not in OF_RENDERING:
+                with self.subTest(table=name):
+                    query = f'SELECT * FROM "{name}"'
+                    self.assertEqual(rows(again, query), rows(self.made, query))
+        self.assertGreater(len(rows(again, "SELECT * FROM detections")), 100)
+        with open(os.path.join(again, "frames.fits"), "rb") as a, \
+                open(os.path.join(self.made, "frames.fits"), "rb") as b:
+            self.assertEqual(a.read(), b.read())
+
+    def fails(self, *sets, says):
+        words = runs.command(self.scenario, self.path("failed"), *sets, duration=3)
+        result = call(*words[1:], "--overwrite")
+        self.assertEqual(result.returncode, 1, result.stderr)
+        for text in says:
+            self.assertIn(text, result.stderr)
+        self.assertNotIn("Sanitizer", result.stderr)
+
+    def test_wrong_frames_are_refused_with_file_hdu_and_keyword(self):
+        frames = os.path.join(self.made, "frames.fits")
+        late = self.path("late.fits")
+        shutil.copy(frames, late)
+        with fits.open(late, mode="update", disable_image_compression=True) as file:
+            file[2].header["DATE-OBS"] = "2022-06-16T22:10:01.500000"
+        self.fails(self.recorded(late), says=["late.fits: HDU 3: DATE-OBS gives a start 0.5 s later"])
+        cut = self.path("cut.fits")
+        with open(frames, "rb") as whole, open(cut, "wb") as file:
+            file.write(whole.read()[:-30000])
+        self.fails(self.recorded(cut), says=["cut.fits: HDU 4: is cut short"])
+        wrong = self.path("wrong.json")
+        with open(MAP, encoding="utf-8") as file:
+            keys = json.load(file)
+        keys["exposure_s"] = {"keyword": "EXPOSED"}
+        with open(wrong, "w", encoding="utf-8") as file:
+            json.dump(keys, file)
+        self.fails(self.recorded(frames, wrong),
+                   says=["frames.fits: HDU 2: EXPOSED (exposure_s of the map boresight): is missing"])
+        self.fails(self.recorded(frames), CAMERA + "width_px=299",
+                   says=["frames.fits: HDU 2: NAXIS1 and NAXIS2 give 300 x 300"])
+
+    def compare_wcs(self, folder):
+        """The WCS of the processed frames against that of the truth, at middle and corners. The
+        first frame is of the end of a slew: its streaks are bright at their ends."""
+        places = numpy.array([[149.5, 149.5], [0, 0], [299, 0], [0, 299], [299, 299]])
+        with fits.open(os.path.join(folder, "run", "frames.fits")) as a, \
+                fits.open(os.path.join(self.made, "frames.fits")) as b:
+            self.assertEqual(len(a), len(b))
+            for made, true in zip(a[2:], b[2:]):
+                sky = WCS(true.header).all_pix2world(places, 0)
+                found = WCS(made.header).all_world2pix(sky, 0)
+                # 30 stars, rms 0.03 px; the rest is the pixel scale, common to all frames
+                self.assertLess(numpy.abs(found - places).max(), 0.1)
+
+    def test_process(self):
+        out = self.path("processed")
+        said = call_well("process", self.made, "--map", "boresight", "--out", out, *SOLVE, timeout=900)
+        self.assertIn("attitude from the stars in 3", said)
+        self.compare_wcs(out)
+        query = "SELECT exposure_id, star_id FROM detections WHERE star_id > 0"
+        ours, true = set(rows(os.path.join(out, "run"), query)), set(rows(self.made, query))
+        # the onboard PSF of the run is narrower by the jitter, which faint stars notice
+        self.assertGreater(len(ours & true), 0.85 * len(true))
+        for name in ("report.html", "products/attitudes.csv", "products/light_curves.csv",
+                     "products/paths.csv", "input/scenario.json"):
+            self.assertTrue(os.path.getsize(os.path.join(out, name)) > 0, name)
+        with open(os.path.join(out, "products", "light_curves.csv"), encoding="utf-8") as file:
+            stars = {row["id"] for row in csv.DictReader(file) if row["source"] == "star"}
+        self.assertEqual(stars, {str(star) for _, star in ours})
+        again = call("process", self.made, "--map", "boresight", "--out", out, *SOLVE, timeout=900)
+        self.assertEqual(again.returncode, 1)
+        self.assertIn("--overwrite", again.stderr)
+
+    def test_files_of_others(self):
+        """Real numbers with a blank pixel, a frame a file, out of order, upside down, no WCS."""
+        folder = self.path("night")
+        os.mkdir(folder)
+        with fits.open(os.path.join(self.made, "frames.fits")) as file:
+            for i, hdu in enumerate(file[1:]):
+                pixels = hdu.data.astype(numpy.float32)[::-1] - 500
+                pixels[7, 9] = numpy.nan
+                primary = fits.PrimaryHDU(pixels)
+                primary.header["WHEN"] = hdu.header["DATE-AVG"][:10]
+                primary.header["CLOCK"] = hdu.header["DATE-AVG"][11:]
+                primary.header["MSEC"] = 500
+                primary.writeto(os.path.join(folder, f"{9 - i}.fits"))
+        own = self.path("own.json")
+        with open(own, "w", encoding="utf-8") as file:
+            json.dump({"boresight_keyword_map": 1, "name": "own", "gain_e_per_dn": {"value": 1.6},
+                       "time": {"keyword": "WHEN", "clock_keyword": "CLOCK", "moment": "middle"},
+                       "exposure_s": {"keyword": "MSEC", "factor": 0.001},
+                       "pixel_scale_arcsec": {"value": 116}, "pedestal_dn": 1000,
+                       "camera": {"psf_fwhm_px": 2, "aperture_m": 0.04}}, file)
+        out = self.path("others")
+        said = call_well("process", folder, "--map", own, "--out", out, *SOLVE, timeout=900)
+        self.assertIn("attitude from the stars in 3", said)
+        self.assertIn("first row last", said)
+        self.compare_wcs(out)
+
+    @unittest.skipUnless(os.path.exists(NEOSSAT), "BORESIGHT_NEOSSAT names no folder with the frame")
+    def test_neossat(self):
+        """The science frame: curved streaks of 228 px, whose ends and others' eyes gave."""
+        runs.need_full_catalogue()
+        out = self.path("neossat")
+        call_well("process", NEOSSAT, "--map", "neossat", "--out", out, "--quiet", timeout=1800)
+        with open(os.path.join(out, "products", "paths.csv"), encoding="utf-8") as file:
+            path = numpy.array([[float(r["dx_px"]), float(r["dy_px"])] for r in csv.DictReader(file)])
+        found = numpy.array(rows(os.path.join(out, "run"),
+                                 "SELECT x_px, y_px FROM detections WHERE streak = 1 AND label = 'star'"))
+        stars = rows(os.path.join(out, "run"), "SELECT stars_identified FROM detection_frames")
+        self.assertGreaterEqual(stars[0][0], 8)
+        lines = (found[:, None] + path[None]).reshape(-1, 2)
+        seen = [numpy.hypot(*(lines - place).T).min() < 4 for place in numpy.array(SEEN) / 2]
+        self.assertGreaterEqual(sum(seen), 0.9 * len(SEEN),
+                                [place for place, yes in zip(SEEN, seen) if not yes])
+
+
+# Ends of streaks that eyes see on the frame at twice its size, in those pixels.
+SEEN = [(125, 72), (12, 108), (85, 363), (72, 467), (427, 13), (610, 399), (648, 424), (812, 271),
+        (873, 323), (932, 266), (801, 395), (462, 472), (338, 647), (771, 599), (906, 694),
+        (786, 747), (519, 792), (604, 908), (210, 891), (110, 816), (570, 836), (40, 195),
+        (710, 186), (936, 170), (965, 123), (997, 774), (975, 838), (995, 956), (788, 1014),
+        (470, 90), (540, 254), (427, 291), (212, 245), (500, 547), (487, 650), (127, 655),
+        (282, 796), (170, 810), (82, 822), (93, 988), (350, 40), (278, 38), (378, 762),
+        (752, 830), (575, 570), (520, 998), (935, 975)]
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()

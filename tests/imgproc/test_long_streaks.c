@@ -1,0 +1,142 @@
+/* Stars whose streaks are longer than is filtered for: found by the path of a known motion. */
+#include <stdlib.h>
+
+#include "imgproc/streak/star_path.h"
+#include "tests/imgproc/synthetic.h"
+#include "tests/test_support.h"
+
+enum { SIDE = 224, NODES = 11, STARS = 9, POINTS = 2 };
+
+/* A bent motion of 120 px that slows down. */
+static void bent_motion(bst_star_path_node nodes[NODES]) {
+    for (int k = 0; k < NODES; k++) {
+        double t = (double)k / (NODES - 1), u = 2.0 * (1.3 * t - 0.3 * t * t) - 1.0;
+        nodes[k] = (bst_star_path_node){t, 58.0 * u, 20.0 * u + 14.0 * u * u};
+    }
+}
+
+/* Its mean place. */
+static void mean_of(const bst_star_path_node nodes[NODES], double mean[2]) {
+    mean[0] = mean[1] = 0.0;
+    for (int k = 1; k < NODES; k++) {
+        mean[0] += 0.5 * (nodes[k].x_px + nodes[k - 1].x_px) / (NODES - 1);
+        mean[1] += 0.5 * (nodes[k].y_px + nodes[k - 1].y_px) / (NODES - 1);
+    }
+}
+
+static void test_path_of_a_motion(void **state) {
+    (void)state;
+    bst_star_path_node nodes[NODES];
+    bst_star_path path = {.centre = {100.0, 100.0}};
+    double mean[2], light = 0.0, place[2] = {0.0, 0.0};
+    bent_motion(nodes);
+    mean_of(nodes, mean);
+    assert_true(bst_star_path_of_motion(&path, nodes, NODES));
+    for (int k = 0; k < path.count; k++) {
+        light += path.light[k];
+        place[0] += path.light[k] * path.place[k][0];
+        place[1] += path.light[k] * path.place[k][1];
+        double step = k == 0 ? BST_STAR_PATH_STEP_PX
+                             : hypot(path.place[k][0] - path.place[k - 1][0],
+                                     path.place[k][1] - path.place[k - 1][1]);
+        /* the path is divided evenly; corners between nodes cut the chords */
+        bst_assert_close(step, BST_STAR_PATH_STEP_PX, 0.05);
+    }
+    bst_assert_close(light, path.count, 1e-9);          /* sum of shares */
+    bst_assert_close(place[0] / path.count, 0.0, 0.05); /* samples of 2 px */
+    bst_assert_close(place[1] / path.count, 0.0, 0.05);
+    bst_assert_close(path.ends[0][0], nodes[0].x_px - mean[0], 1e-9);
+    bst_assert_close(path.ends[1][1], nodes[NODES - 1].y_px - mean[1], 1e-9);
+    /* it slows down: light grows with the time spent */
+    assert_true(path.light[path.count - 2] > 1.3 * path.light[1]);
+    const bst_star_path_node rest[2] = {{0.0, 1.0, 1.0}, {1.0, 1.0, 1.0}};
+    const bst_star_path_node far[2] = {{0.0, 0.0, 0.0}, {1.0, 5000.0, 0.0}};
+    assert_false(bst_star_path_of_motion(&path, rest, 2));
+    assert_false(bst_star_path_of_motion(&path, far, 2));
+}
+
+/* Draws a star along the motion about its mean place. */
+static void add_star(synthetic *s, const bst_star_path_node nodes[NODES], const double mean[2],
+                     double x, double y, double flux_e) {
+    for (int k = 1; k < NODES; k++) {
+        double dx = nodes[k].x_px - nodes[k - 1].x_px, dy = nodes[k].y_px - nodes[k - 1].y_px;
+        synthetic_add(s, x + nodes[k - 1].x_px + 0.5 * dx - mean[0],
+                      y + nodes[k - 1].y_px + 0.5 * dy - mean[1], flux_e / (NODES - 1), dx, dy);
+    }
+}
+
+static void test_stars_points_and_edges(void **state) {
+    (void)state;
+    static const struct {
+        double x, y, flux_e;
+        bool cut;
+    } stars[STARS] = {
+        {110, 40, 60000, false},  {130, 90, 12000, false}, {100, 130, 8000, false},
+        {118, 170, 30000, false}, {125, 97, 9000, false}, /* crosses the second one closely */
+        {20, 150, 20000, true},   {-25, 60, 60000, true}, /* mean places outside: */
+        {235, 190, 40000, true},  {215, 60, 25000, true},
+    };
+    static const double points[POINTS][2] = {{60.3, 200.6}, {170.7, 20.2}};
+    bst_ctx ctx = {0};
+    synthetic s;
+    synthetic_init(&s, SIDE, SIDE);
+    bst_star_path_node nodes[NODES];
+    double mean[2];
+    bent_motion(nodes);
+    mean_of(nodes, mean);
+    for (int i = 0; i < STARS; i++) {
+        add_star(&s, nodes, mean, stars[i].x, stars[i].y, stars[i].flux_e);
+    }
+    for (int i = 0; i < POINTS; i++) {
+        synthetic_add(&s, points[i][0], points[i][1], 1200.0, 0.0, 0.0);
+    }
+    synthetic_expose(&s, bst_rng_make_key(26, 0, "test", "long_streaks"), 1);
+    bst_imgproc *ip = synthetic_processor(&ctx, &s);
+    bst_detections *d = synthetic_detections(2048);
+    bst_imgproc_frame frame = synthetic_frame(&s);
+    bst_camera_motion motion = synthetic_motion(&s, 116.0, 40.0);
+    bst_assert_ok(&ctx, bst_imgproc_detect(&ctx, ip, &frame, &motion, d, 2048));
+    assert_true(bst_imgproc_smeared(ip));
+    int fragments = d->count;
+    bool followed;
+    const bst_star_path_node rest[2] = {{0.0, 1.0, 1.0}, {1.0, 1.0, 1.0}};
+    bst_assert_ok(&ctx, bst_imgproc_follow_streaks(&ctx, ip, rest, 2, d, 2048, &followed));
+    assert_false(followed);
+    assert_int_equal(d->count, fragments);
+    bst_assert_ok(&ctx, bst_imgproc_follow_streaks(&ctx, ip, nodes, NODES, d, 2048, &followed));
+    assert_true(followed);
+    assert_true(synthetic_sound(d));
+    for (int i = 0; i < STARS; i++) {
+        /* SNR of 20 and more: 0.1 px of noise, and the filter's samples at whole pixels */
+        int k = synthetic_nearest(d, stars[i].x, stars[i].y, 1.0);
+        assert_true(k >= 0);
+        const bst_detection *p = &d->items[k];
+        assert_true(bst_imgproc_is_followed(ip, p));
+        assert_int_equal((p->flags & BST_DETECTION_EDGE) != 0, stars[i].cut);
+        /* Hogbom's subtraction of crossing stars, and the PSF over the filter's pixels: 10 % */
+        bst_assert_close(p->flux_e, stars[i].flux_e, 0.1 * stars[i].flux_e + 4.0 * p->flux_sigma_e);
+        bst_assert_close(p->length_px, bst_imgproc_streak_px(ip), 0.0);
+    }
+    for (int i = 0; i < POINTS; i++) {
+        int k = synthetic_nearest(d, points[i][0], points[i][1], 1.0);
+        assert_true(k >= 0);
+        assert_false(bst_imgproc_is_followed(ip, &d->items[k]));
+    }
+    /* nothing else: neither ghosts of bright streaks nor fragments, but for one false alarm */
+    assert_true(d->count <= STARS + POINTS + 1);
+    assert_true(fragments > d->count);
+    /* a star of the limit at SNR 6 has six times the noise of a streak's flux */
+    double v6 = bst_imgproc_v_limit(ip, 6.0), v60 = bst_imgproc_v_limit(ip, 60.0);
+    bst_assert_close(v6 - v60, 2.5, 1e-9);
+    bst_imgproc_free(ip);
+    free(d);
+    synthetic_free(&s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_path_of_a_motion),
+        cmocka_unit_test(test_stars_points_and_edges),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
