@@ -290,12 +290,12 @@ bool bst_star_path_fit(bst_star_path *path, const bst_star_path_image *image, co
 }
 
 /* Light of a star at a sample, in units of its amplitude. */
-typedef struct lit {
+typedef struct light_of_star {
     double value, amplitude;
-} lit;
+} light_of_star;
 
 static int by_light(const void *a, const void *b) {
-    double d = ((const lit *)a)->value - ((const lit *)b)->value;
+    double d = ((const light_of_star *)a)->value - ((const light_of_star *)b)->value;
     return (d > 0.0) - (d < 0.0);
 }
 
@@ -303,7 +303,7 @@ static int by_light(const void *a, const void *b) {
  * their amplitudes. What crosses a bright star's streak changes it less. */
 static double light_at(const bst_star_path *path, const bst_star_path_image *image,
                        const bst_star_path_star *stars, int count, const double place[2]) {
-    lit all[MOST_STARS];
+    light_of_star all[MOST_STARS];
     int inside = 0;
     double half = 0.0;
     for (int i = 0; i < count; i++) {
@@ -313,7 +313,7 @@ static double light_at(const bst_star_path *path, const bst_star_path_image *ima
         double y = stars[i].y_px + m[1] * place[0] + m[2] * place[1];
         if (x >= 0.0 && y >= 0.0 && x < image->width - 1 && y < image->height - 1) {
             double a = stars[i].amplitude;
-            all[inside++] = (lit){bst_star_path_image_at(image, x, y) / a, a};
+            all[inside++] = (light_of_star){bst_star_path_image_at(image, x, y) / a, a};
             half += 0.5 * a;
         }
     }
