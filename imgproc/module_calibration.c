@@ -151,7 +151,7 @@ static bool update(bst_imgproc_state *m, const bst_imgproc_exposure *e, const bs
         .stars = stars,
         .count = count,
         .seconds = middle / (double)m->tick_rate_hz,
-        /* a telemetry that may be wrong by any angle tells nothing about the roll */
+        /* a telemetry that may be wrong by any angle does not measure the roll */
         .telemetry_roll_rad = m->lost.enabled ? NAN : telemetry.z};
     return bst_camera_calibrator_update(&m->calibrator, &frame);
 }

@@ -61,7 +61,7 @@ typedef struct bst_camera_calibrator_frame {
     int count;
     double seconds; /* mid-exposure; frames come in order */
     /* rotation about the boresight of the telemetry's attitude against the predicted one, rad; NAN:
-     * telemetry tells nothing about it, and the focal plane's rotation is not estimated */
+     * telemetry does not measure it, and the focal plane's rotation is not estimated */
     double telemetry_roll_rad;
 } bst_camera_calibrator_frame;
 
