@@ -12,8 +12,8 @@ typedef struct bst_recorded_frames bst_recorded_frames;
  * *.fits.fz count in the order of their names: of a run only frames.fits, of a SatNet set those in
  * ImageFiles; or a text file *.txt with a path a line, relative to its folder, lines with # left
  * out Returned:  *out  all headers have been read once; one file is open at a time Errors:
- * BST_ERR_NOT_FOUND: no file, or a folder without one; those of bst_fits_source_open Ownership:
- * free *out with bst_recorded_frames_close */
+ * BST_ERR_NOT_FOUND: no file, or a folder without one; those of bst_fits_source_open
+ * Ownership: free *out with bst_recorded_frames_close */
 bst_status bst_recorded_frames_open(bst_ctx *ctx, const char *const *paths, int count,
                                     bst_recorded_frames **out) BST_MUST_CHECK;
 /* Closes the files; NULL is allowed. */
@@ -21,8 +21,9 @@ void bst_recorded_frames_close(bst_recorded_frames *frames);
 
 /* Number of frames in all files. */
 int64_t bst_recorded_frames_count(const bst_recorded_frames *frames);
-/* Number of files, and the path of one, which belongs to the frames. */
+/* Number of files. */
 int bst_recorded_frames_files(const bst_recorded_frames *frames);
+/* Path of a file, which belongs to the frames. */
 const char *bst_recorded_frames_file(const bst_recorded_frames *frames, int index);
 
 /* Preparation of the pixels. */
