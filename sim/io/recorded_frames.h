@@ -6,13 +6,13 @@
 
 typedef struct bst_recorded_frames bst_recorded_frames;
 
-/* Opens files of frames.
+/* Opens files of frames. All headers are read once; one file is open at a time.
  *
- * Given:     paths, count  each a FITS file; a folder, whose files *.fits, *.fit, *.fts and
- * *.fits.fz count in the order of their names: of a run only frames.fits, of a SatNet set those in
- * ImageFiles; or a text file *.txt with a path a line, relative to its folder, lines with # left
- * out Returned:  *out  all headers have been read once; one file is open at a time Errors:
- * BST_ERR_NOT_FOUND: no file, or a folder without one; those of bst_fits_source_open
+ * A path is a FITS file, a folder or a text file. In a folder the files *.fits, *.fit, *.fts and
+ * *.fits.fz count, in the order of their names; of a run only frames.fits, of a SatNet set those in
+ * ImageFiles. A text file *.txt has a path a line, relative to its folder; # begins a comment.
+ *
+ * Errors:    BST_ERR_NOT_FOUND: no file, or a folder without one; those of bst_fits_source_open
  * Ownership: free *out with bst_recorded_frames_close */
 bst_status bst_recorded_frames_open(bst_ctx *ctx, const char *const *paths, int count,
                                     bst_recorded_frames **out) BST_MUST_CHECK;

@@ -7,6 +7,7 @@
 enum { WIDE = 150, HIGH = 110, MIDDLE_X = 75, MIDDLE_Y = 55 };
 #define TANGENT 0.009 /* a field of 68 x 52 degrees */
 #define PSF 1.3
+#define LEAST_INSIDE 0.25
 
 static float image[WIDE * HIGH];
 static const bst_star_path_image picture = {image, WIDE, HIGH};
@@ -280,7 +281,7 @@ static void two_stars(void **state) {
         draw_star(&p, 112.7, 76.2, 0.6 * bright);
         bst_path_filter *f;
         bst_path_filter_peak one, two;
-        bst_assert_ok(&ctx, bst_path_filter_create(&ctx, &p, &picture, PSF, &f));
+        bst_assert_ok(&ctx, bst_path_filter_create(&ctx, &p, &picture, PSF, LEAST_INSIDE, &f));
         assert_true(bst_path_filter_highest(f, &one));
         /* samples are read at whole pixels: 0.3 px, and a few per cent of the light */
         double near = i == 0 ? 0.8 : 0.4; /* maps are those of blocks of 16 px */
@@ -313,7 +314,7 @@ static void two_stars(void **state) {
             assert_true(two.snr < 0.2 * one.snr);
         }
         bst_path_filter_free(f);
-        bst_assert_ok(&ctx, bst_path_filter_create(&ctx, &p, &picture, PSF, &f));
+        bst_assert_ok(&ctx, bst_path_filter_create(&ctx, &p, &picture, PSF, LEAST_INSIDE, &f));
         bst_path_filter_leave_out(f, &one, 25.0);
         assert_true(bst_path_filter_highest(f, &two));
         bst_assert_close(two.x_px, 112.7, near);
@@ -339,7 +340,7 @@ static void over_the_edges(void **state) {
         straight(&p, i < 2 ? 0.0 : BST_PI / 2.0, 0.0);
         memset(image, 0, sizeof image);
         draw_star(&p, places[i][0], places[i][1], 9.0);
-        bst_assert_ok(&ctx, bst_path_filter_create(&ctx, &p, &picture, PSF, &f));
+        bst_assert_ok(&ctx, bst_path_filter_create(&ctx, &p, &picture, PSF, LEAST_INSIDE, &f));
         assert_true(bst_path_filter_highest(f, &peak));
         double inside = 0.0, all = 0.0;
         for (int k = 0; k < p.count; k++) {

@@ -502,7 +502,8 @@ bst_status bst_frame_marks_exposure(bst_ctx *ctx, bst_frame_marks *m, int64_t in
 bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *m, int64_t id, bst_io_overlay *out) {
     (void)ctx;
     (void)m;
-    *out = (bst_io_overlay){marks, id == 104 ? MARKS : 4, id == 104 ? "many" : "few"};
+    *out = (bst_io_overlay){
+        .marks = marks, .count = id == 104 ? MARKS : 4, .caption = id == 104 ? "many" : "few"};
     return BST_OK;
 }
 
@@ -528,11 +529,13 @@ static void pictures_of_frames(void **state) {
     run_tables_file(&t, "manifest.json", "{}");
     run_tables_file(&t, "scenario.json", "{}");
     bst_run_reader *run = run_tables_open(&t);
-    marks[0] = (bst_io_overlay_mark){BST_OVERLAY_TARGET, 100.25, 30.5, 0.0, 0.0, "PREY"};
-    marks[1] = (bst_io_overlay_mark){BST_OVERLAY_TRACK, 90.0, 20.25, 0.0, 0.0, ""};
-    marks[2] = (bst_io_overlay_mark){BST_OVERLAY_BORESIGHT, 59.5, 39.5, 0.0, 0.0, ""};
+    marks[0] = (bst_io_overlay_mark){
+        .kind = BST_OVERLAY_TARGET, .x_px = 100.25, .y_px = 30.5, .label = "PREY"};
+    marks[1] = (bst_io_overlay_mark){.kind = BST_OVERLAY_TRACK, .x_px = 90.0, .y_px = 20.25};
+    marks[2] = (bst_io_overlay_mark){.kind = BST_OVERLAY_BORESIGHT, .x_px = 59.5, .y_px = 39.5};
     for (int i = 3; i < MARKS; i++) {
-        marks[i] = (bst_io_overlay_mark){BST_OVERLAY_DETECTION, 12.0, 50.0, 3.0, 0.0, ""};
+        marks[i] = (bst_io_overlay_mark){
+            .kind = BST_OVERLAY_DETECTION, .x_px = 12.0, .y_px = 50.0, .radius_px = 3.0};
     }
     bst_report_frame facts[2] = {{.exposure_id = 102, .in_track = false},
                                  {.exposure_id = 103,
