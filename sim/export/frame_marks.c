@@ -323,7 +323,9 @@ bst_status bst_frame_marks_get(bst_ctx *ctx, bst_frame_marks *m, int64_t id, bst
             }
         }
     }
-    qsort(m->marks, (size_t)m->count, sizeof *m->marks, by_importance);
+    if (m->count > 0) {
+        qsort(m->marks, (size_t)m->count, sizeof *m->marks, by_importance);
+    }
     *out = (bst_io_overlay){.marks = m->marks,
                             .count = m->count,
                             .caption = m->caption,

@@ -89,7 +89,7 @@ static void what_is_encoded_is_decoded(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     const bst_wire_message *m = bst_wire_message_of(BST_LINK_DETECTIONS);
-    uint8_t bytes[1024];
+    uint8_t bytes[2048];
     found in, out;
     sample(&in, 3);
     memset(&out, 0, sizeof out);
@@ -112,7 +112,7 @@ static bst_wire_fault decode_changed(bst_link_type type, const void *payload, co
                                      const void *value, size_t bytes) {
     bst_ctx ctx = {0};
     const bst_wire_message *m = bst_wire_message_of(type);
-    uint8_t packet[1024];
+    uint8_t packet[2048];
     found out;
     size_t n = bst_wire_encode(m, payload, packet);
     for (const bst_wire_field *f = m->record; f->name; f++) {
@@ -170,7 +170,7 @@ static void every_length_but_one_is_refused(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     const bst_wire_message *m = bst_wire_message_of(BST_LINK_DETECTIONS);
-    uint8_t bytes[1024] = {0};
+    uint8_t bytes[2048] = {0};
     found in, out;
     sample(&in, 2);
     size_t right = bst_wire_encode(m, &in, bytes);
