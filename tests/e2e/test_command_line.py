@@ -20,7 +20,7 @@ except ImportError:
 
 SCENARIOS = sorted(set(glob.glob("scenarios/**/*.json", recursive=True)) -
                    set(glob.glob("scenarios/updates/*.json")) - set(glob.glob("scenarios/studies/*.json")) -
-                   set(glob.glob("scenarios/satellites/*.json")) -
+                   set(glob.glob("scenarios/satellites/*.json")) - set(glob.glob("scenarios/maps/*.json")) -
                    {"scenarios/boresight.schema.json", "scenarios/study.schema.json"})
 GIMBAL = runs.SENSOR + "/modules/gimbal"
 NO_IMAGES = ("--set", runs.GENERATOR)
