@@ -20,29 +20,25 @@ static const double CORE_SIGMAS = 4.0;
 /* Share of a known PSF's sum of squares that the kernel of image processing may lose by its radius
  * (imgproc/detect/filter_kernel.c). */
 static const double RADIUS_SHARE = 1e-3;
-/* Reach of a PSF that image processing knows, in its equivalent FWHM, and limits of it, sensor px
- * (imgproc/detect/known_psf.c). */
-static const double REACH_FWHM = 2.2, LEAST_REACH_PX = 7.0, MOST_REACH_PX = 46.0;
 
-/* Pixels about a source: half side of the patch, and of the light under its kernels. */
+/* Pixels about a source: half side of the patch, reach of the filter's kernel. */
 enum {
     RADIUS = 22,
+    KERNEL = 9,
     SIDE = 2 * RADIUS + 1,
+    WIDE = SIDE + 2 * KERNEL,
     MOST_MAXIMA = 256,
     MOST_RADIUS = 15, /* BST_FILTER_MAX_RADIUS */
-    WIDE = SIDE + 2 * MOST_RADIUS,
-    PER_PX = 3, /* of the table of outputs */
+    PER_PX = 3,       /* of the table of outputs */
     DISTANCES = BST_FALLOFF_DISTANCES / BST_FALLOFF_PER_PX * PER_PX
 };
 _Static_assert(WIDE *WIDE <= 1 << PIXEL_BITS, "a pixel has its own number");
 
-/* The point filter of image processing, and its output by distance from a source, relative to that
- * at it. */
+/* Output of the point filter by distance from a source, relative to that at it, and share of the
+ * source's light on a pixel, averaged with the squares of the kernel: its shot noise in the output.
+ */
 typedef struct outputs {
-    float kernel[MOST_RADIUS + 1][MOST_RADIUS + 1]; /* unit sum of squares; [|y|][|x|] */
-    int radius;
-    double sum; /* of the kernel */
-    float at[DISTANCES];
+    float at[DISTANCES], light[DISTANCES];
     double end_px; /* last distance */
 } outputs;
 
@@ -51,13 +47,13 @@ typedef struct winged {
     const bst_generator *g;
     const generator_source *s;
     const outputs *outputs;
+    double norm; /* sqrt(sum k^2) of the point filter's image k of unit sum */
 } winged;
 
 /* Output of the filter about a source, SNR as image processing measures it. */
 typedef struct patch {
     int x0, y0; /* frame pixel of the first */
-    float output[SIDE][SIDE];
-    float level[SIDE][SIDE]; /* background that image processing subtracts, in the output */
+    float output[SIDE][SIDE], light[SIDE][SIDE];
 } patch;
 
 typedef struct maximum {
@@ -65,62 +61,49 @@ typedef struct maximum {
     float snr;
 } maximum;
 
-/* Half side to which image processing knows the PSF, read-out px. */
-static int known_reach(const bst_generator *g) {
-    const bst_obsgen_image_width *w = &g->response.filter;
-    double fwhm =
-        g->binning * BST_FWHM_PER_SIGMA * sqrt(fmax(w->across_px * w->along_px - 1.0 / 12.0, 0.0));
-    double reach = fmin(fmax(ceil(REACH_FWHM * fwhm), LEAST_REACH_PX), MOST_REACH_PX);
-    return (int)fmin(ceil(reach / g->binning), MOST_RADIUS);
-}
-
-/* Sets the filter's kernel: the fitted PSF on a square. A square one pixel too wide has twice the
- * output on a wing, because its rim has light of the star's core. */
-static void set_kernel(const bst_generator *g, outputs *out) {
+/* Half side of the filter's square kernel, px, and the fitted PSF on it. */
+static int set_kernel(const bst_response *r, float kernel[MOST_RADIUS + 1][MOST_RADIUS + 1]) {
     double square[MOST_RADIUS + 1] = {0.0}; /* sum of squares within each half side */
-    int reach = known_reach(g);
-    for (int v = 0; v <= reach; v++) {
-        for (int u = 0; u <= reach; u++) {
+    for (int v = 0; v <= MOST_RADIUS; v++) {
+        for (int u = 0; u <= MOST_RADIUS; u++) {
             double slope, curvature,
-                share = bst_response_model_share(&g->response, hypot(u, v), &slope, &curvature);
-            out->kernel[v][u] = (float)share;
+                share = bst_response_model_share(r, hypot(u, v), &slope, &curvature);
+            kernel[v][u] = (float)share;
             square[u > v ? u : v] += share * share * (u > 0 ? 2.0 : 1.0) * (v > 0 ? 2.0 : 1.0);
         }
     }
-    double all = 0.0, inside = square[0];
-    for (int k = 0; k <= reach; k++) {
+    double all = 0.0, inside = 0.0;
+    for (int k = 0; k <= MOST_RADIUS; k++) {
         all += square[k];
     }
-    for (out->radius = 0; out->radius < reach && inside < (1.0 - RADIUS_SHARE) * all;) {
-        inside += square[++out->radius];
+    int radius = 0;
+    while (radius < MOST_RADIUS && !((inside += square[radius]) >= (1.0 - RADIUS_SHARE) * all)) {
+        radius++;
     }
-    out->sum = 0.0;
-    for (int v = 0; v <= out->radius; v++) {
-        for (int u = 0; u <= out->radius; u++) {
-            out->kernel[v][u] /= (float)sqrt(inside);
-            out->sum += (double)out->kernel[v][u] * (u > 0 ? 2.0 : 1.0) * (v > 0 ? 2.0 : 1.0);
-        }
-    }
+    return radius;
 }
 
 /* Computes the outputs: sums of kernel and image over the kernel's pixels, in the mean of the
  * directions along the pixels and across them. */
-static void set_outputs(const bst_generator *g, outputs *out) {
-    const bst_response *r = &g->response;
-    set_kernel(g, out);
-    int radius = out->radius;
+static void set_outputs(const bst_response *r, outputs *out) {
+    float kernel[MOST_RADIUS + 1][MOST_RADIUS + 1];
+    int radius = set_kernel(r, kernel);
     out->end_px = (DISTANCES - 1.0) / PER_PX / r->image_scale - radius;
     for (int n = 0; n < DISTANCES; n++) {
-        double away = (double)n / PER_PX, sum = 0.0;
+        double away = (double)n / PER_PX, sum = 0.0, light = 0.0, squares = 0.0;
         for (int turned = 0; turned < 2 && away <= out->end_px + 1.0; turned++) {
             double x = turned ? sqrt(0.5) * away : away, y = turned ? x : 0.0;
             for (int v = -radius; v <= radius; v++) {
                 for (int u = -radius; u <= radius; u++) {
-                    sum += (double)out->kernel[abs(v)][abs(u)] *
-                           bst_response_image_share(r, hypot(x - u, y - v));
+                    double weight = (double)kernel[abs(v)][abs(u)];
+                    double share = bst_response_image_share(r, hypot(x - u, y - v));
+                    sum += weight * share;
+                    light += weight * weight * share;
+                    squares += weight * weight;
                 }
             }
         }
+        out->light[n] = (float)(squares > 0.0 ? light / squares : 0.0);
         out->at[n] = (float)(n == 0 ? sum : sum / (double)out->at[0]);
     }
     out->at[0] = 1.0f;
@@ -164,11 +147,12 @@ static bool has_wings(const winged *w) {
 }
 
 /* Adds the wings of all bright sources to the background by mesh; *any: false if there are none. */
-static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, const outputs *table, bool *any) {
+static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, const outputs *table, double norm,
+                               bool *any) {
     *any = false;
     for (int i = 0; i < g->source_count; i++) {
         const generator_source *s = &g->sources[i];
-        winged w = {g, s, table};
+        winged w = {g, s, table, norm};
         if (!has_wings(&w)) {
             continue;
         }
@@ -188,47 +172,57 @@ static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, const outputs *ta
     return BST_OK;
 }
 
-/* Draws the pixels under the kernels of a patch: wing light with its shot noise and the noise of
- * the background, in pixel noises. Pixel (0, 0) is `radius` before the patch's. */
-static void draw_pixels(const winged *w, const patch *p, float pixels[WIDE][WIDE]) {
-    const bst_generator *g = w->g;
-    int radius = w->outputs->radius, side = SIDE + 2 * radius;
-    uint64_t first = WING_ALARM | w->s->name << PIXEL_BITS;
-    for (int j = 0; j < side; j++) {
-        for (int i = 0; i < side; i++) {
-            double x = p->x0 + i - radius, y = p->y0 + j - radius;
-            double light = wing_light(w, hypot(x - w->s->x, y - w->s->y));
-            double z =
-                bst_rng_normal(g->key, (uint64_t)g->exposure_id, first + (uint64_t)(j * WIDE + i));
-            pixels[j][i] = (float)(light + sqrt(1.0 + light / g->noise_e) * z);
+/* Draws noise with the correlation of the filter's output: white noise under a Gaussian kernel. */
+static void draw_noise(const bst_generator *g, const generator_source *s, float out[SIDE][SIDE]) {
+    float kernel[2 * KERNEL + 1], sum = 0.0f, rows[WIDE][SIDE];
+    double sigma = g->response.maxima_sigma_px;
+    for (int i = 0; i <= 2 * KERNEL; i++) {
+        double at = (i - KERNEL) / sigma;
+        kernel[i] = (float)exp(-0.5 * at * at);
+        sum += kernel[i] * kernel[i];
+    }
+    uint64_t first = WING_ALARM | s->name << PIXEL_BITS;
+    for (int j = 0; j < WIDE; j++) {
+        float white[WIDE];
+        for (int i = 0; i < WIDE; i++) {
+            white[i] = (float)bst_rng_normal(g->key, (uint64_t)g->exposure_id,
+                                             first + (uint64_t)(j * WIDE + i));
+        }
+        for (int i = 0; i < SIDE; i++) {
+            rows[j][i] = 0.0f;
+            for (int k = 0; k <= 2 * KERNEL; k++) {
+                rows[j][i] += kernel[k] * white[i + k] / sum;
+            }
+        }
+    }
+    for (int j = 0; j < SIDE; j++) {
+        for (int i = 0; i < SIDE; i++) {
+            out[j][i] = 0.0f;
+        }
+        for (int k = 0; k <= 2 * KERNEL; k++) {
+            for (int i = 0; i < SIDE; i++) {
+                out[j][i] += kernel[k] * rows[j + k][i];
+            }
         }
     }
 }
 
-/* Sets the filter's output about a source less the background of the mesh, over the noise that
- * image processing measures. */
+/* Sets the filter's output about a source: wing light less the background of the mesh, and noise,
+ * both over the noise that image processing measures. */
 static void set_patch(const winged *w, patch *p) {
     const bst_generator *g = w->g;
-    const outputs *filter = w->outputs;
-    float pixels[WIDE][WIDE];
     p->x0 = (int)lround(w->s->x) - RADIUS;
     p->y0 = (int)lround(w->s->y) - RADIUS;
-    draw_pixels(w, p, pixels);
+    draw_noise(g, w->s, p->output);
     for (int j = 0; j < SIDE; j++) {
-        float row[SIDE] = {0.0f};
-        for (int v = 0; v <= 2 * filter->radius; v++) {
-            for (int u = 0; u <= 2 * filter->radius; u++) {
-                float weight = filter->kernel[abs(v - filter->radius)][abs(u - filter->radius)];
-                for (int i = 0; i < SIDE; i++) {
-                    row[i] += weight * pixels[j + v][i + u];
-                }
-            }
-        }
         for (int i = 0; i < SIDE; i++) {
-            double level, noise;
-            bst_local_sky_at(&g->wing_sky, p->x0 + i, p->y0 + j, &level, &noise);
-            p->level[j][i] = (float)(filter->sum * level);
-            p->output[j][i] = (row[i] - p->level[j][i]) / (float)noise;
+            double x = p->x0 + i, y = p->y0 + j, r = hypot(x - w->s->x, y - w->s->y), level, noise;
+            bst_local_sky_at(&g->wing_sky, x, y, &level, &noise);
+            double away = fmin(r, table_end_px(w)), raw = wing_output(w, away);
+            double own = sqrt(1.0 + w->s->flux_e * table_at(w->outputs->light, away) /
+                                        (g->noise_e * g->noise_e));
+            p->light[j][i] = (float)((raw - level / w->norm) / noise);
+            p->output[j][i] = p->light[j][i] + (float)(own / noise) * p->output[j][i];
         }
     }
 }
@@ -302,10 +296,8 @@ static void draw_about(bst_generator *g, const winged *w) {
         double snr = (double)found[k].snr +
                      rise(p.output[j][i - 1], found[k].snr, p.output[j][i + 1]) +
                      rise(p.output[j - 1][i], found[k].snr, p.output[j + 1][i]);
-        double away = hypot(x - w->s->x, y - w->s->y);
-        double light = wing_output(w, fmin(away, table_end_px(w))) - (double)p.level[j][i];
-        if (snr <= g->filters[0].threshold || light < LEAST_WING || x < 0 || y < 0 ||
-            x >= g->width || y >= g->height || away < core ||
+        if (snr <= g->filters[0].threshold || (double)p.light[j][i] < LEAST_WING || x < 0 ||
+            y < 0 || x >= g->width || y >= g->height || hypot(x - w->s->x, y - w->s->y) < core ||
             is_connected(g, &p, found, count, k)) {
             continue;
         }
@@ -332,12 +324,13 @@ bst_status bst_wing_alarms_draw(bst_ctx *ctx, bst_generator *g) {
     if (!g->response.falloff.tabulated || g->smeared || !may_have_wings(g)) {
         return BST_OK;
     }
+    double norm = bst_crlb_table_norm(&g->bound, 0.0) * g->norm_ratio[0];
     outputs table;
     bool any;
-    set_outputs(g, &table);
-    BST_TRY(set_wing_sky(ctx, g, &table, &any));
+    set_outputs(&g->response, &table);
+    BST_TRY(set_wing_sky(ctx, g, &table, norm, &any));
     for (int i = 0; i < g->source_count && any; i++) {
-        winged w = {g, &g->sources[i], &table};
+        winged w = {g, &g->sources[i], &table, norm};
         if (has_wings(&w)) {
             draw_about(g, &w);
         }
