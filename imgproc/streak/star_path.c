@@ -21,8 +21,8 @@ enum { SAME_END = 4 };
 /* Share of samples with light of another star, and the range of that light, in units of the image's
  * noise. */
 static const double CROWDED = 0.2, OTHER_RANGE = 10.0;
-/* Unevenness of a star's light along its streak, 1 sigma. Dark samples have it, too, by the wings of
- * the PSF: an end then lies where the light has fallen to half. */
+/* Unevenness of a star's light along its streak, 1 sigma. Dark samples have it, too, by the wings
+ * of the PSF: an end then lies where the light has fallen to half. */
 static const double UNEVEN = 0.25;
 /* Neighbouring samples share noise: so many count as one (exp(-1) at a distance of two sigma). */
 static const double CORRELATED = 1.7;

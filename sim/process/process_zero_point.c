@@ -28,7 +28,10 @@ bst_status bst_process_zero_point(bst_ctx *ctx, bst_predicted_stars *sky, const 
     double values[BST_PLATE_SOLVE_STARS];
     int expected, n = 0;
     const bst_predicted_stars_query query = {
-        f->q_middle, light, {0, 0, (int)sky->camera->width_px, (int)sky->camera->height_px}, NEAR_PX,
+        f->q_middle,
+        light,
+        {0, 0, (int)sky->camera->width_px, (int)sky->camera->height_px},
+        NEAR_PX,
         v_limit + 2.0};
     f->zero_point_mag = NAN;
     BST_TRY(bst_predicted_stars_expect(ctx, sky, &query, &expected));

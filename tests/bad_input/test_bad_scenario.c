@@ -191,8 +191,8 @@ typedef struct walk {
     int tried;
 } walk;
 
-/* With sanitizers, a scenario takes ten times as long to read: every fourth value is tried; the optimised build tries
- * them all. */
+/* With sanitizers, a scenario takes ten times as long to read: every fourth value is tried; the
+ * optimised build tries them all. */
 #ifdef __SANITIZE_ADDRESS__
 enum { TRIED_EVERY = 4 };
 #else
