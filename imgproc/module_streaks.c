@@ -15,10 +15,7 @@ static const double STAR_PROBABILITY = 0.9;
 /* Attitude at a tick between two samples, at a constant rate. */
 static bst_quat between(const bst_pointing_sample *a, const bst_pointing_sample *b, double tick) {
     double share = b->tick > a->tick ? (tick - (double)a->tick) / (double)(b->tick - a->tick) : 0.0;
-    bst_vec3 turn =
-        bst_quat_to_rotvec(bst_quat_mul(b->q_cam_from_gcrf, bst_quat_conj(a->q_cam_from_gcrf)));
-    return bst_quat_unit(
-        bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(turn, share)), a->q_cam_from_gcrf));
+    return bst_quat_slerp(a->q_cam_from_gcrf, b->q_cam_from_gcrf, share);
 }
 
 /* Motion of the image of one star. */

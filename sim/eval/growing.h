@@ -3,9 +3,9 @@
 #define BST_EVAL_GROWING_H
 
 #include <stdint.h>
-#include <stdlib.h>
 
 #include "boresight/archive.h"
+#include "sim/core/memory.h"
 
 /* Gives an array room for `count` items of `bytes`.
  *
@@ -17,11 +17,9 @@ static inline bst_status bst_grow(bst_ctx *ctx, void **items, int count, int *ro
         return BST_OK;
     }
     int more = count + count / 2 + 16;
-    void *grown = realloc(*items, (size_t)more * bytes);
-    if (!grown) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the figures of tracks");
-    }
-    *items = grown;
+    size_t held = (size_t)*room * bytes;
+    BST_TRY(bst_memory_grow(ctx, "out of memory for the figures of tracks", items, &held,
+                            (size_t)more * bytes));
     *room = more;
     return BST_OK;
 }

@@ -87,10 +87,7 @@ static bst_quat attitude_without_stars(const bst_process *p, int i) {
     if (before && after) {
         double share = (double)(f->start_tick - before->start_tick) /
                        (double)(after->start_tick - before->start_tick);
-        bst_vec3 turn =
-            bst_quat_to_rotvec(bst_quat_mul(after->q_middle, bst_quat_conj(before->q_middle)));
-        return bst_quat_unit(
-            bst_quat_mul(bst_quat_from_rotvec(bst_vec3_scale(turn, share)), before->q_middle));
+        return bst_quat_slerp(before->q_middle, after->q_middle, share);
     }
     return before                   ? before->q_middle
            : after                  ? after->q_middle
