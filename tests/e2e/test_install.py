@@ -39,8 +39,8 @@ def only(pattern):
 class Packages(unittest.TestCase):
     def test_docs_name_every_package(self):
         with open("dev", encoding="utf-8") as file:
-            lists = re.findall(r"packages_(?:build|run|test|docs)='([^']*)'", file.read())
-        self.assertEqual(len(lists), 4)
+            lists = re.findall(r"packages_(?:build|run|test|docs|package)='([^']*)'", file.read())
+        self.assertEqual(len(lists), 5)
         with open("docs/how-to/build.md", encoding="utf-8") as file:
             words = set(re.split(r"[\s`.,]+", file.read()))
         missing = set(" ".join(lists).split()) - words
@@ -230,6 +230,23 @@ class Installed(unittest.TestCase):
             dynamic = call("readelf", "-d", file)
             self.assertNotIn("RPATH", dynamic)
             self.assertNotIn("RUNPATH", dynamic)
+
+    def complete(self, *words):
+        """What bash offers for the last of the words, as the installed completion has it."""
+        program = self.stage + "/bin/boresight"
+        script = '. "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _boresight "$1" ' \
+                 '"${COMP_WORDS[COMP_CWORD]}" "${COMP_WORDS[COMP_CWORD - 1]}"; printf "%s\\n" "${COMPREPLY[@]}"'
+        return call("bash", "-c", script, "bash", self.stage + "/share/bash-completion/completions/boresight",
+                    program, *words).split()
+
+    def test_completion(self):
+        self.assertEqual(self.complete("re"), ["report"])
+        self.assertIn("calibrate-obsgen", self.complete("help", ""))
+        self.assertEqual(self.complete("run", "--se"), ["--set", "--seed", "--serial"])
+        self.assertEqual(self.complete("--no-plugins", "export", "run", "--frames", ""), ["png", "mp4"])
+        self.assertEqual(self.complete("run", "scenarios/neossat_geo_t"), ["scenarios/neossat_geo_track.json"])
+        for path in ("zsh/site-functions/_boresight", "fish/vendor_completions.d/boresight.fish"):
+            self.assertTrue(os.path.exists(f"{self.stage}/share/{path}"), path)
 
     def test_destdir(self):
         folder = runs.scratch()
