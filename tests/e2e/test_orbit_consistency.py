@@ -113,7 +113,7 @@ class Consistency(unittest.TestCase):
 
     @unittest.skipIf(FULL, "part of --full")
     def test_geo(self):
-        self.judge("GEO", False, False, 20, 300, "embedded")
+        self.judge("GEO", False, False, 10, 300, "embedded")
 
     @unittest.skipUnless(FULL, "needs --full")
     def test_all(self):
