@@ -61,9 +61,12 @@ class Threads(unittest.TestCase):
             with self.subTest(threads=threads):
                 self.assertEqual(one(threads), serial)
 
+    # else test_repeat.py has both on eight threads
+    @unittest.skipUnless(FULL, "slow")
     def test_open_loop(self):
         self.check("open")
 
+    @unittest.skipUnless(FULL, "slow")
     def test_closed_loop(self):
         self.check("closed")
 
