@@ -324,7 +324,7 @@ class SmallStack(unittest.TestCase):
         made = os.path.join(folder, "run")
         kernels = ("run", runs.STARE, "--quiet", "--duration", "1", "--overwrite", "--out", made,
                    "--set", "/world/star_catalogue=embedded")
-        # test_bad_input.py compiles the kernels, which takes the most, with a small stack
+        # test_bad_input.py compiles kernels, which takes the most, with a small stack
         kib = 64
         for words in (kernels, ("report", made), ("check", runs.TRACK, "--quiet"),
                       ("loop", runs.TRACK), ("export", made, "--table", "csv", "--orbits", "oem"),
