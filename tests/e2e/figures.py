@@ -39,6 +39,7 @@ class Orbit:
 
     def __init__(self, path, norad, epoch_utc):
         self.satellite = element_set(path, norad)
+        self.to_intermediate = {}  # by seconds
         day, clock = epoch_utc.rstrip("Z").split("T")
         year, month, date = map(int, day.split("-"))
         hour, minute, second = clock.split(":")
@@ -49,8 +50,11 @@ class Orbit:
         error, place, _ = self.satellite.sgp4(*utc)
         assert error == 0
         tt = erfa.taitt(*erfa.utctai(*utc))
-        # UT1 cancels but for precession during its difference from UTC
-        to_intermediate = erfa.c2i06a(*tt)
+        # UT1 cancels but for precession during its difference from UTC; the pole moves by 1e-11 rad in a second
+        key = round(seconds)
+        if key not in self.to_intermediate:
+            self.to_intermediate[key] = erfa.c2i06a(*tt)
+        to_intermediate = self.to_intermediate[key]
         teme_to_intermediate = erfa.rz(erfa.gmst82(*utc) - erfa.era00(*utc), np.eye(3))
         return to_intermediate.T @ (teme_to_intermediate @ (np.array(place) * 1e3))
 

@@ -44,9 +44,9 @@ def conjugate(q):
 
 
 def rotate(q, v):
-    """Coordinates of v after q: q_b_from_a takes those in a to those in b."""
-    v = np.asarray(v, float)
-    return v + 2 * cross(q[:3], cross(q[:3], v) + q[3] * v)
+    """Coordinates of v after q: q_b_from_a takes those in a to those in b. Rows of q belong to rows of v."""
+    v, q = np.asarray(v, float), np.asarray(q, float)
+    return v + 2 * cross(q[..., :3], cross(q[..., :3], v) + q[..., 3:] * v)
 
 
 def about(axis, angle_rad):

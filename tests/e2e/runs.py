@@ -19,6 +19,8 @@ RATE_OPEN = "scenarios/neossat_geo_rate_open.json"
 DAY_PLANT = "scenarios/day_plant.json"
 SENSOR = "/observers/0/sensors/0"
 NO_FRAMES = "/record/frames=none"
+# of constellation_quick.json: at its own epoch the Earth's light fills an image, which takes longer than all else
+DARK = "/epoch_utc=2022-06-16T22:15:00Z"
 # without OpenCL, whose start takes most of the time of `check`
 GENERATOR = SENSOR + "/observation_source=generator"
 

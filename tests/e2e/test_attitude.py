@@ -13,7 +13,7 @@ import numpy as np
 
 import runs
 
-SEEDS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 2
+SEEDS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 1
 ARCSEC = np.radians(1 / 3600)
 SETTLED_S = 30
 

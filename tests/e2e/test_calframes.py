@@ -102,7 +102,7 @@ class Calframes(unittest.TestCase):
             sets.append(f"{runs.SENSOR}/modules/imgproc/{key}={path}")
         out = os.path.join(self.folder, "run")
         summary = runs.run(runs.TRACK, out, runs.NO_FRAMES, *sets, seed=1,
-                           duration=60)["summary"]
+                           duration=35)["summary"]
         self.assertEqual(summary["final_mode"], "track")
         self.assertEqual(summary["wrong_target_frames"], 0)
         rows = runs.database(out).execute("SELECT hits, hits_e FROM exposures").fetchall()

@@ -24,6 +24,9 @@ SCENARIOS = sorted(set(glob.glob("scenarios/**/*.json", recursive=True)) -
                    {"scenarios/boresight.schema.json", "scenarios/study.schema.json"})
 GIMBAL = runs.SENSOR + "/modules/gimbal"
 NO_IMAGES = ("--set", runs.GENERATOR)
+# run with their images by other tests, or with the camera of such a scenario
+RUN_ELSEWHERE = re.compile(r"scenarios/(knowledge/.*|leo_leo_.*|galactic_core|crowded_geo_track|link_realtime|"
+                           r"neossat_geo_(track|stare|rate_open))\.json")
 
 
 class Messages(unittest.TestCase):
@@ -321,7 +324,7 @@ class SmallStack(unittest.TestCase):
         made = os.path.join(folder, "run")
         kernels = ("run", runs.STARE, "--quiet", "--duration", "1", "--overwrite", "--out", made,
                    "--set", "/world/star_catalogue=embedded")
-        # test_bad_input.py compiles the kernels, which takes the most, with a small stack
+        # test_bad_input.py compiles kernels, which takes the most, with a small stack
         kib = 64
         for words in (kernels, ("report", made), ("check", runs.TRACK, "--quiet"),
                       ("loop", runs.TRACK), ("export", made, "--table", "csv", "--orbits", "oem"),
@@ -369,7 +372,7 @@ class Resolved(unittest.TestCase):
         for path in SCENARIOS:
             # without the predictions of a whole day, and with fewer wavelengths of the PSF that takes long
             words = ["--duration", "60"] if path.startswith("scenarios/day_") else []
-            if path.startswith("scenarios/knowledge/"):  # the camera is that of TRACK
+            if RUN_ELSEWHERE.fullmatch(path):
                 words += NO_IMAGES
             if path == "scenarios/diffraction.json":
                 words += ["--set", runs.SENSOR + "/camera/optics/wavelengths=2"]

@@ -47,7 +47,7 @@ class Constellation(unittest.TestCase):
         # long enough that objects come again, short of what a test may take
         more = [] if FULL else ["/record/detections_of=all", f"/record/custody_timeout_s={CUSTODY_S}"]
         cls.manifest = runs.run(SCENARIO, cls.out, *WIDE, *more, threads=2 if FULL else 1,
-                                duration=None if FULL else 1500)
+                                duration=None if FULL else 1200)
         cls.db = runs.database(cls.out)
         cls.end_s = cls.db.execute("SELECT max(end_tick) FROM exposures").fetchone()[0] / 6000.0
         print({k: v for k, v in cls.manifest["sightings"].items()}, file=sys.stderr)
@@ -266,8 +266,8 @@ class Repeated(unittest.TestCase):
     def test_serial_and_overlapped_runs_are_equal(self):
         folder = runs.scratch()
         a, b = os.path.join(folder, "a"), os.path.join(folder, "b")
-        runs.run(QUICK, a, *WIDE, duration=60, threads=2)  # sensors by two threads
-        runs.run(QUICK, b, *WIDE, duration=60, serial=True)
+        runs.run(QUICK, a, *WIDE, runs.DARK, duration=60, threads=2)  # sensors by two threads
+        runs.run(QUICK, b, *WIDE, runs.DARK, duration=60, serial=True)
         self.assertEqual(content(a), content(b))
 
 

@@ -7,7 +7,7 @@ Usage, from the repository root:
 A fenced block of language sh or console is run, all blocks of a page in one shell session each, page after page, in a
 scratch folder that looks like the repository. A comment on the line before a block changes that:
 
-    <!-- test: duration=60 -->  `run` commands simulate 60 s instead of 1 s (a command's own --duration is kept)
+    <!-- test: duration=60 -->  `run` commands simulate 60 s instead of 1 s; without the mark a command's own --duration is kept
                                 (a shipped study is only planned: --dry-run; one of the page has two replicates of 30 s)
     <!-- test: check -->        without --slow each `run` is only a `check` of the same scenario and settings
     <!-- test: exit=1 -->       the block ends with this exit code
@@ -43,8 +43,11 @@ WRAPPER = """#!/usr/bin/python3 -IS
 import json, os, sys
 words = sys.argv[1:]
 length = os.environ.get("DOCS_DURATION")
-if "run" in words[:3] and length and "--duration" not in words and "--replay" not in words and "--help" not in words:
-    words += ["--duration", length]
+if "run" in words[:3] and length and "--replay" not in words and "--help" not in words:
+    if "--duration" not in words:
+        words += ["--duration", length]
+    elif os.environ.get("DOCS_OWN"):
+        words[words.index("--duration") + 1] = length
 if words[:1] == ["run"] and length and os.environ.get("DOCS_CHECK"):
     at = words.index("--out")
     words = ["check", "--quiet"] + [word for word in words[1:at] + words[at + 2:] if word != "--overwrite"]
@@ -114,7 +117,8 @@ class Scratch:
         length = marks.get("duration", "" if "slow" in marks else str(SECONDS))
         home = os.path.join(self.path, "home")
         os.makedirs(home, exist_ok=True)
-        environment = dict(os.environ, DOCS_DURATION=length, DOCS_CHECK="" if SLOW else marks.get("check", ""), PATH=self.tools + ":" + os.environ["PATH"],
+        environment = dict(os.environ, DOCS_DURATION=length, DOCS_OWN="" if SLOW else marks.get("duration", ""),
+                           DOCS_CHECK="" if SLOW else marks.get("check", ""), PATH=self.tools + ":" + os.environ["PATH"],
                            HOME=home, POCL_CACHE_DIR=KERNELS)
         folder = self.path
         if "tree" in marks:

@@ -24,16 +24,18 @@ import leftovers
 import runs
 
 FAULTS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 4
+SIDE = 1024 if FAULTS > 4 else 512  # px
+SMALL = [f"{runs.SENSOR}/camera/{side}_px={SIDE}" for side in ("width", "height")]
 FORMS = {
-    "extensions": ["/record/frames=extensions", "/record/compression=none"],
-    "rice": ["/record/frames=extensions", "/record/compression=rice"],
-    "cube": ["/record/frames=cube"],
-    "none": ["/record/frames=none", "/record/telemetry_hz=500"],
+    "extensions": ["/record/frames=extensions", "/record/compression=none", *SMALL],
+    "rice": ["/record/frames=extensions", "/record/compression=rice", *SMALL],
+    "cube": ["/record/frames=cube", *SMALL],
+    "none": ["/record/frames=none", "/record/telemetry_hz=500", *SMALL],
 }
 DURATION_S = 12
 # of runs that go on until something ends them: the processor is left to others
 PACED = ["--pacing", "realtime", "--set", "/pacing/speed=4"]
-FRAME_BYTES = 2 * 1024 ** 2
+FRAME_BYTES = 2 * SIDE ** 2
 TOO_LARGE, NO_SPACE = os.strerror(errno.EFBIG), os.strerror(errno.ENOSPC)
 
 

@@ -22,7 +22,7 @@ ITEMS = ["dropped_stars", "displaced_stars", "scale", "rotation", "distortion", 
          "velocity"]
 # of these only the start and the telemetry are looked at, and that the loop holds
 NO_IMAGES = ("clock", "orbit")
-DURATION = 90  # s, a frame in each
+DURATION = 75  # s, a frame in each
 LIGHT = 299792458.0
 ARCSEC = np.radians(1 / 3600)
 PIXEL = 3 * ARCSEC
@@ -331,7 +331,7 @@ class Width(unittest.TestCase):
             out = os.path.join(folder, name)
             # read noise above all photons: weights of the fit are even, as the formula has them
             runs.run(scenario, out, runs.NO_FRAMES, runs.SENSOR + "/camera/read_noise_e=150",
-                     *sets, duration=24)
+                     *sets, duration=14)
             rows = runs.database(out).execute(
                 "SELECT star_id, avg(snr) FROM detections WHERE label = 'star' AND NOT edge AND NOT "
                 "blend AND NOT saturated AND exposure_id > 1 GROUP BY star_id").fetchall()

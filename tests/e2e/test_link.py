@@ -311,10 +311,10 @@ class Driver(unittest.TestCase):
             json.dump(scenario, file)
         return path
 
-    def drive(self, out, state, gap=False):
+    def drive(self, out, state, gap=False, duration=5):
         """Runs it; the frames that the peer got."""
         address, frames = ipc(), []
-        words = runs.command(self.scenario(), out, duration=5)
+        words = runs.command(self.scenario(), out, duration=duration)
         run = subprocess.Popen(words + ["--link", address], stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True)
         self.truths = []
@@ -362,7 +362,7 @@ class Driver(unittest.TestCase):
         position = np.array([exposures[f"observer_gcrf_{c}_m"][1] for c in "xyz"])
         velocity = np.array([exposures[f"observer_gcrf_{c}_mps"][1] for c in "xyz"])
         state = (position + 1e6 * self.DIRECTION - 0.25 * velocity, velocity)
-        _, run, _ = self.drive(runs.scratch() + "/second", state)
+        _, run, _ = self.drive(runs.scratch() + "/second", state, duration=2)
         truth = run.table("truth")
         there = (truth["kind"] == "object") & (truth["exposure_id"] == 1)
         self.assertEqual(np.sum(there), 1)
@@ -534,7 +534,7 @@ class BadPeers(unittest.TestCase):
             address = ipc()
             peer = python(SOURCES[0], address)
             run = start_run(runs.STARE, out, address, "imgproc", "--set", "/link/timeout_s=30",
-                            duration=6)
+                            duration=4)
             if out == broken:
                 peer.stdout.readline()
                 peer.kill()
@@ -550,7 +550,7 @@ class BadPeers(unittest.TestCase):
         address, out = ipc(), runs.scratch() + "/run"
         peer = python(SOURCES[0], address)
         run = start_run(runs.STARE, out, address, "imgproc", "--set", "/link/on_timeout=go_on",
-                        "--set", "/link/timeout_s=3", duration=60)
+                        "--set", "/link/timeout_s=3", duration=20)
         for _ in range(2):  # the second step is begun when the first is answered
             peer.stdout.readline()
         peer.kill()
@@ -559,7 +559,7 @@ class BadPeers(unittest.TestCase):
         self.assertIn("of neossat/telescope/imgproc is not answered: no peer plays it", said)
         found = boresight.read_run(out).table("detection_frames")
         self.assertGreater(len(found["exposure_id"]), 0)
-        self.assertLess(len(found["exposure_id"]), 60)
+        self.assertLess(len(found["exposure_id"]), 20)
         self.assertGreaterEqual(counters(out)["link_unanswered"], 1)
 
     def test_a_refused_answer_raises_in_python(self):

@@ -3,6 +3,7 @@
 mount's pole and with a third axis through it; without one, lost and found when guidance said.
 
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_passes.py BORESIGHT [SEEDS]
+With one seed, only the middle of each pass is run.
 """
 import math
 import re
@@ -18,6 +19,9 @@ SEEDS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else
 GENERATOR = runs.SENSOR + "/observation_source=generator"
 # the quarter of the images' area: most of the time of a run goes with it
 SMALL = [f"{runs.SENSOR}/camera/{side}_px=512" for side in ("width", "height")] if SEEDS == 1 else []
+# of a pass of 300 s with its culmination at 150 s: the line of sight turns by 0.35 deg/s or more in the first, by 0.18
+# in the others, which leave guidance the time to see what comes: the keyhole at 154 s
+BRISK_S, POLE_S, KEYHOLE_S = ((85, 215), (60, 240), (30, 240)) if SEEDS == 1 else 3 * ((0, 300),)
 SETTLED_S = 5.0  # the cue's 0.3 degree are searched and centred by then
 LOST_PX = 2.0    # guidance's loss_tolerance_px
 
@@ -30,6 +34,12 @@ def errors(out):
         " WHERE e.mid_s > ? ORDER BY e.mid_s", (SETTLED_S,)).fetchall()
     return (np.array([r[0] for r in rows]),
             np.array([math.inf if r[1] is None else math.hypot(r[1], r[2]) for r in rows]))
+
+
+def part(begin_s, end_s):
+    """Overrides that leave this part of a pass, and its duration."""
+    return [f"{orbit}/state/at_s={150 - begin_s}" for orbit in ("/world/objects/0/orbit", "/observers/0/orbit")] + [
+        f"/duration_s={end_s - begin_s}"]
 
 
 def predicted_losses(scenario, *sets):
@@ -49,7 +59,7 @@ class Passes(unittest.TestCase):
         runs.run("scenarios/" + scenario, out, runs.NO_FRAMES, "/record/truth_stars=false", *sets,
                  seed=seed)
         mid_s, error = errors(out)
-        self.assertEqual(len(mid_s), 2950)
+        self.assertEqual(len(mid_s), 10 * (runs.manifest(out)["last_tick"] // 6000 + 1 - SETTLED_S))
         return out, mid_s, error
 
     def tracked(self, scenario, *sets, seeds=SEEDS):
@@ -62,17 +72,17 @@ class Passes(unittest.TestCase):
             self.assertLess(p99, 2.0)
 
     def test_away_from_the_pole_by_images(self):
-        self.tracked("leo_leo_pass.json", *SMALL)
+        self.tracked("leo_leo_pass.json", *SMALL, *part(*BRISK_S))
 
     @unittest.skipUnless(SEEDS > 1, "slow")
     def test_away_from_the_pole_by_the_generator(self):
         self.tracked("leo_leo_pass.json", GENERATOR)
 
     def test_past_the_pole_with_a_third_axis(self):
-        self.tracked("leo_leo_third_axis.json", GENERATOR)
+        self.tracked("leo_leo_third_axis.json", GENERATOR, *part(*POLE_S))
 
     def test_past_the_pole_by_rolling_the_body(self):
-        self.tracked("leo_leo_body_roll.json", GENERATOR)
+        self.tracked("leo_leo_body_roll.json", GENERATOR, *part(*POLE_S))
 
     @unittest.skipUnless(SEEDS > 1, "slow")
     def test_past_the_pole_by_rolling_the_body_by_images(self):
@@ -83,7 +93,7 @@ class Passes(unittest.TestCase):
         self.tracked("leo_leo_third_axis.json", seeds=3)
 
     def test_keyhole(self):
-        self.lost_as_told(GENERATOR)
+        self.lost_as_told(GENERATOR, *part(*KEYHOLE_S))
 
     @unittest.skipUnless(SEEDS > 1, "slow")
     def test_keyhole_by_images(self):
@@ -107,7 +117,7 @@ class Passes(unittest.TestCase):
             self.assertAlmostEqual(first, off.min(), delta=0.1 * lost)
             self.assertAlmostEqual(last, off.max(), delta=0.1 * lost)
             match = re.search(r"out of reach from ([\d.]+) s until ([\d.]+) s: in the keyhole",
-                              predicted_losses("leo_leo_keyhole.json"))
+                              predicted_losses("leo_leo_keyhole.json", *sets))
             self.assertAlmostEqual(float(match.group(1)), off.min(), delta=0.1 * lost)
             self.assertAlmostEqual(float(match.group(2)), off.max(), delta=0.1 * lost)
             # announced well before, and tracked to both sides of it

@@ -4,7 +4,7 @@
 Usage, from the repository root:
   /usr/bin/python3 tests/e2e/test_random_scenes.py BORESIGHT [--full]
 
-Without --full: two scenes, few seeds, the embedded star catalogue; each interval must reach into
+Without --full: one scene, few seeds, the embedded star catalogue; each interval must reach into
 twice its margin. With --full: ten scenes, a hundred seeds, the full star catalogue: prints which
 intervals lie inside their margins (docs/how-to/observation_generator.md), and fails where a figure
 is further off than the known differences.
@@ -39,7 +39,7 @@ class Scenes(unittest.TestCase):
         self.assertNotEqual(made[0]["observers"], other["observers"])
 
     @unittest.skipIf(FULL, "the short version")
-    def test_no_difference_is_shown_on_two_scenes(self):
+    def test_no_difference_is_shown_on_a_scene(self):
         folder = runs.scratch()
         for number in SHORT:
             path = random_scenes.write(folder, SEED, number, runs.BORESIGHT, "embedded", True)
@@ -76,8 +76,8 @@ class Scenes(unittest.TestCase):
 # rings), crowded fields (alarms: blends that are separated differently), few blends in one field
 KNOWN = {"Pd": 0.12, "false alarms": 1.1, "RMS of places": 0.5, "RMS of the track": 0.5,
          "time to confirm": 0.3}
-# one of points and one of streaks
-SHORT = (0, 4)
+# one whose kernels other tests compile: hits in a crowded sky
+SHORT = (2,)
 
 
 def tearDownModule():

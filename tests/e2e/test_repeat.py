@@ -17,10 +17,10 @@ NEAR = [runs.SENSOR + f"/cue/{key}=0.1" for key in ("offset_deg", "sigma_deg")]
 JOBS = {  # name: scenario, record, seed, threads, seconds
     "first": (runs.TRACK, "extensions", 1, 1, 20),
     "serial": (runs.TRACK, "extensions", 1, 1, 20),
-    "threads": (runs.TRACK, "extensions", 1, 2, 20),
-    "cube": (runs.RATE_OPEN, "cube", 7, 1, 12),
-    "cube threads": (runs.RATE_OPEN, "cube", 7, 2, 12),
-    "cube serial": (runs.RATE_OPEN, "cube", 7, 2, 12),
+    "threads": (runs.TRACK, "extensions", 1, 8, 20),
+    "cube": (runs.RATE_OPEN, "cube", 7, 1, 8),
+    "cube threads": (runs.RATE_OPEN, "cube", 7, 8, 8),
+    "cube serial": (runs.RATE_OPEN, "cube", 7, 2, 8),
     "other seed": (runs.TRACK, "extensions", 2, 1, 6),
 }
 

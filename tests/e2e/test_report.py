@@ -119,7 +119,7 @@ class Complete(OnePage):
         cls.folder = runs.scratch()
         cls.made = os.path.join(cls.folder, "run")
         # the target is confirmed after some 22 s
-        cls.manifest = runs.run(runs.TRACK, cls.made, duration=60, seed=1)
+        cls.manifest = runs.run(runs.TRACK, cls.made, duration=52, seed=1)
         result = report(cls.made)
         assert (result.returncode, result.stderr) == (0, ""), result.stderr
         assert result.stdout == cls.made + "/report.html\n"
@@ -181,7 +181,7 @@ class Complete(OnePage):
 
     def test_identity(self):
         for text in (self.manifest["git_revision"], self.manifest["device"], "seed 0x1, run 0",
-                     "2022-06-16T22:10:00.000Z", "2022-06-16T22:11:00.000Z", "neossat/telescope",
+                     "2022-06-16T22:10:00.000Z", "2022-06-16T22:10:52.000Z", "neossat/telescope",
                      "INMARSAT GX5", "idle -> slew: there is a cue"):
             self.assertIn(text, self.page.text.replace("seed0x1", "seed 0x1"))
         self.assertLess(self.page.source.index("Warnings</h2>"),
@@ -263,7 +263,7 @@ class Crowded(OnePage):
         cls.made = os.path.join(runs.scratch(), "run")
         runs.run("scenarios/crowded_geo_track.json", cls.made, "/record/frames=cube",
                  "/world/faint_limit_v_mag=17", runs.SENSOR + "/modules/scenegen/star_limit_v_mag=17",
-                 duration=30)
+                 duration=24)
         assert report(cls.made).returncode == 0
         cls.page = Page(cls.made + "/report.html")
         with runs.database(cls.made) as tables:

@@ -29,7 +29,7 @@ RAW = ["/record/compression=none"]
 CUBE = ["/record/frames=cube"]
 PLANES = RAW + ['/record/planes=["saturation"]']
 QUICK = "scenarios/constellation_quick.json"
-TRACK_S = 24
+TRACK_S = 18
 
 
 def content(out):
@@ -179,14 +179,14 @@ class Resume(unittest.TestCase):
         with open(run.state, "rb") as file:
             first = file.read()
         # goes on far beyond that state, which is put back
-        run.stop(signal.SIGKILL, 1, "--restore", run.state, every=20)
+        run.stop(signal.SIGKILL, 1, "--restore", run.state, every=14)
         with open(run.state, "wb") as file:
             file.write(first)
         self.assertTrue(os.path.exists(run.out + ".partial/frames.fits"))
         self.assert_same(run.resume(every=40), reference)
 
     def constellation(self, threads):
-        sets, duration = [runs.NO_FRAMES], 30
+        sets, duration = [runs.NO_FRAMES, runs.DARK], 30
         reference = self.reference("constellation", QUICK, *sets, duration=duration)
         self.assertGreater(len(reference["table truth"]), 30)
         run = self.run_of(f"constellation {threads}", QUICK, *sets, duration=duration, every=5.35)
@@ -205,7 +205,7 @@ class Resume(unittest.TestCase):
             name, sets = rng.choice([("rice", RICE), ("cube", CUBE), ("planes", PLANES)])
             reference = self.reference(name, runs.TRACK, *SMALL, *sets, duration=TRACK_S)
             run = self.run_of(f"random {k}", runs.TRACK, *SMALL, *sets, duration=TRACK_S,
-                              every=rng.choice([1, 2.5, 9.95]))
+                              every=rng.choice([1, 2.5, 5.95]))
             with self.subTest(k=k, form=name, every=run.every):
                 run.stop(rng.choice([signal.SIGKILL, signal.SIGINT]), rng.randint(1, min(5, int(TRACK_S / run.every) - 1)),
                          threads=rng.choice([1, 2]), serial=rng.random() < 0.3)
@@ -240,10 +240,10 @@ class State(unittest.TestCase):
         cls.folder = runs.scratch()
         cls.state = os.path.join(cls.folder, "saved")
         cls.sets = [*SMALL, *RAW, "/record/planes=[\"saturation\"]"]
-        subprocess.run([SAVE_STATE, runs.TRACK, "20.3", cls.state,
+        subprocess.run([SAVE_STATE, runs.TRACK, "12.3", cls.state,
                         "/world/star_catalogue=embedded", *SMALL], check=True, timeout=120)
 
-    def start(self, *more, scenario=runs.TRACK, sets=None, out="new", duration=30):
+    def start(self, *more, scenario=runs.TRACK, sets=None, out="new", duration=20):
         return subprocess.run(runs.command(scenario, os.path.join(self.folder, out),
                                            *(self.sets if sets is None else sets),
                                            duration=duration) + list(more),
@@ -253,9 +253,9 @@ class State(unittest.TestCase):
         result = self.start("--restore", self.state)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         out, whole = os.path.join(self.folder, "new"), os.path.join(self.folder, "whole")
-        runs.run(runs.TRACK, whole, *self.sets, duration=30)
+        runs.run(runs.TRACK, whole, *self.sets, duration=20)
         manifest = runs.manifest(out)
-        self.assertEqual((manifest["complete"], manifest["begins_at_s"]), (True, 20.3))
+        self.assertEqual((manifest["complete"], manifest["begins_at_s"]), (True, 12.3))
         self.assertEqual(manifest["last_tick"], runs.manifest(whole)["last_tick"])
         new, old = runs.database(out), runs.database(whole)
         for table, key in [("frames", "start_tick"), ("detections", "exposure_id"),
@@ -303,9 +303,9 @@ class State(unittest.TestCase):
         self.refused("another scenario, or of other overrides", *restore, sets=[])
         self.refused("another scenario", *restore, scenario=runs.STARE)
         self.refused("is that of run 0 .* give --run-number 0", *restore, "--run-number", "3")
-        self.refused("is at 20.3 s, the scenario ends at 15 s", *restore, duration=15)
-        self.refused(r"--until 5: allowed is more than 20.3 s", *restore, "--until", "5")
-        self.refused("--until 31: allowed is .* up to 30 s", "--until", "31")
+        self.refused("is at 12.3 s, the scenario ends at 10 s", *restore, duration=10)
+        self.refused(r"--until 5: allowed is more than 12.3 s", *restore, "--until", "5")
+        self.refused("--until 21: allowed is .* up to 20 s", "--until", "21")
         self.refused("--save-every: a time of 1e-05 s is no whole number", "--save-every",
                      "0.00001")
         self.refused("--save-every: a run that follows the clock is not saved", "--save-every",

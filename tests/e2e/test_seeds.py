@@ -2,7 +2,7 @@
 """It really tracks what it sees: the main job made hard, over many seeds.
 
 dark       the target reflects nothing: no track may be taken for it
-burn       a manoeuvre of 10 m/s at 100 s, in a random direction, that the cue does not know
+burn       a manoeuvre of 10 m/s at 100 s (short: 50 s), in a random direction, that the cue does not know
 drop       20 % of the frames are lost
 snr6       the target is so faint that its true signal-to-noise ratio is 6 in a frame
 neighbour  an object of the same brightness crosses at 2 to 20 px with 1 to 4 px/s, between 60 s and
@@ -93,18 +93,18 @@ def scene(case, seed):
     if case == "dark":
         return ["/world/objects/0/albedo=0"], 180 if options.long else 60
     if case == "burn":
-        dv = list(10 * direction(rng))
-        return ['/world/objects/0/burns=' + json.dumps([{"time_s": 100, "dv_rtn_mps": dv}])], \
-            300 if options.long else 150
+        dv, at_s = list(10 * direction(rng)), 100 if options.long else 50
+        return ['/world/objects/0/burns=' + json.dumps([{"time_s": at_s, "dv_rtn_mps": dv}])], \
+            300 if options.long else 90
     if case == "drop":
-        return [runs.SENSOR + "/exposure/dropped_fraction=0.2"], 300 if options.long else 80
+        return [runs.SENSOR + "/exposure/dropped_fraction=0.2"], 300 if options.long else 60
     if case == "snr6":
         v_mag = 13 + 2.5 * np.log10(4 / SNR6_AREA_M2)
         return [f"/world/objects/0/area_m2={SNR6_AREA_M2}",
-                runs.SENSOR + f"/cue/v_mag={v_mag:.2f}"], 300 if options.long else 150
-    at_s = int(rng.uniform(60, 250 if options.long else 80))
+                runs.SENSOR + f"/cue/v_mag={v_mag:.2f}"], 300 if options.long else 100
+    at_s = int(rng.uniform(60, 250) if options.long else rng.uniform(45, 60))
     return ["/world/objects=" + json.dumps([MAIN, neighbour(rng, at_s)])], \
-        300 if options.long else at_s + 40
+        300 if options.long else at_s + 30
 
 
 def unit(ra_deg, dec_deg):

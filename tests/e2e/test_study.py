@@ -149,7 +149,7 @@ class Whole(unittest.TestCase):
         path = write(folder, sweeps=None, dispersions=None, replicates=1,
                      scenarios=[{"file": os.path.abspath("scenarios/constellation_quick.json")}],
                      set={"/duration_s": 60, "/world/star_catalogue": "embedded",
-                          **{sensors.format(i): 6 for i in range(5)}})
+                          "/epoch_utc": runs.DARK.split("=")[1], **{sensors.format(i): 6 for i in range(5)}})
         result = study(path, "--out", os.path.join(folder, "out"), "--workers", "1")
         self.assertEqual(result.returncode, 0, result.stderr)
         with open(os.path.join(folder, "run.json"), "w", encoding="utf-8") as file:
@@ -221,7 +221,7 @@ class CutDown(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = runs.scratch()
-        cls.path = write(cls.folder, replicates=20 if KILLS > 2 else 10)
+        cls.path = write(cls.folder, replicates=20 if KILLS > 2 else 7)
         cls.whole = os.path.join(cls.folder, "whole")
         started = time.monotonic()
         result = study(cls.path, "--out", cls.whole)

@@ -22,8 +22,8 @@ THREADS = (1, 2, 3, 8) if FULL else (8,)
 JOBS = {  # name: scenario, seconds (in full), settings
     "open": (runs.RATE_OPEN, 3, 8, ["/record/frames=cube"]),
     "closed": (runs.TRACK, 5, 10, ["/record/frames=extensions"]),
-    "generator": ("scenarios/constellation_quick.json", 25, 60, WIDE),
-    "images": ("scenarios/constellation_images.json", 3, 6, WIDE + SMALL),
+    "generator": ("scenarios/constellation_quick.json", 25, 60, WIDE + [runs.DARK]),
+    "images": ("scenarios/constellation_images.json", 3, 6, WIDE + SMALL + [runs.DARK]),
 }
 
 
@@ -61,9 +61,12 @@ class Threads(unittest.TestCase):
             with self.subTest(threads=threads):
                 self.assertEqual(one(threads), serial)
 
+    # else test_repeat.py has both on eight threads
+    @unittest.skipUnless(FULL, "slow")
     def test_open_loop(self):
         self.check("open")
 
+    @unittest.skipUnless(FULL, "slow")
     def test_closed_loop(self):
         self.check("closed")
 

@@ -92,7 +92,7 @@ class TruthTables:
                 else:
                     place = self.target.position if row["id"] == 0 else self.neighbour
                     along = self.apparent_path(e, place, ticks / TICKS)
-                path = np.array([self.camera.pixels(rotate(q, v)) for q, v in zip(attitudes, along)])
+                path = self.camera.pixels(rotate(attitudes, along))
                 if np.abs(path[-1] - path[0]).max() > 30:
                     continue  # slews: the ends are sharp, the samples between them too few
                 # 1 m of orbits at 4e7 m is 0.0017 px
@@ -211,6 +211,8 @@ class TruthTables:
                                            ("CD1_2", "cd1_2_deg", b), ("CD2_1", "cd2_1_deg", b), ("CD2_2", "cd2_2_deg", b),
                                            ("WCSRESID", "wcs_residual_px", 1 / b)):
                     self.assertAlmostEqual(h[key], frame[column] * scale, delta=1e-12 + 1e-13 * abs(frame[column]), msg=key)
+                if k % 3 and e["earth_fraction"] == 0:
+                    continue  # astropy's WCS takes most of the time; its keys are those of the table in each frame
                 # catalogue places through aberration, mean attitude and camera, and through astropy's TAN-SIP
                 back = rotate(optics.conjugate(quaternion(e, "q_cam_from_gcrf_mean")), self.camera.directions(grid))
                 place = optics.geometric(e, back, star=True)
