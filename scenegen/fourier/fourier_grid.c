@@ -267,15 +267,13 @@ bst_status bst_fourier_band_measure(bst_ctx *ctx, const bst_psf *psf, double tol
 }
 
 double bst_fourier_density(const bst_fourier_band *band, int axis, int taps, double tolerance) {
-    bst_nufft_kernel spread = {taps, 0.0};
     double low = fmax(0.5 * band->cutoff, LEAST_DENSITY), high = MOST_DENSITY;
-    if (bst_nufft_kernel_choose(&spread, &band->axis[axis], high) > tolerance) {
+    if (!bst_nufft_kernel_suffices(taps, &band->axis[axis], high, tolerance)) {
         return high;
     }
     for (int k = 0; k < 10; k++) {
         double mid = 0.5 * (low + high);
-        *(bst_nufft_kernel_choose(&spread, &band->axis[axis], mid) > tolerance ? &low : &high) =
-            mid;
+        *(bst_nufft_kernel_suffices(taps, &band->axis[axis], mid, tolerance) ? &high : &low) = mid;
     }
     return high;
 }

@@ -6,6 +6,8 @@
 #ifndef BST_SCENEGEN_FOURIER_NUFFT_KERNEL_H
 #define BST_SCENEGEN_FOURIER_NUFFT_KERNEL_H
 
+#include <stdbool.h>
+
 typedef struct bst_nufft_kernel {
     int taps; /* 2 to 8 samples per axis */
     double beta;
@@ -32,6 +34,11 @@ typedef struct bst_nufft_kernel_band {
  *            frequencies beyond the grid's band */
 double bst_nufft_kernel_choose(bst_nufft_kernel *spread, const bst_nufft_kernel_band *band,
                                double density);
+
+/* True if a kernel of this many taps has an error bound, as bst_nufft_kernel_choose returns, of
+ * `tolerance` or less on a grid of `density` samples per px. */
+bool bst_nufft_kernel_suffices(int taps, const bst_nufft_kernel_band *band, double density,
+                               double tolerance);
 
 /* Widening kernel: phi(t) (c0 + c1 z^2 + c2 z^4), z = 2 t / taps. */
 typedef struct bst_nufft_kernel_shape {

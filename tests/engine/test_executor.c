@@ -37,7 +37,7 @@ static void assert_same(const make *m, const scene *serial, const result *expect
     test_free(s);
 }
 
-static int engines = 40;
+static int engines = 16;
 static uint64_t first_seed = 1;
 
 static void assert_threads_change_nothing(const make *m) {

@@ -5,7 +5,7 @@
  */
 #include "tests/engine/random_engine.h"
 
-static int engines = 40;
+static int engines = 16;
 static uint64_t first_seed = 1;
 
 /* A run that is saved at a random tick and restored in another engine gives the records, counters

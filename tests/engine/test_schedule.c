@@ -17,11 +17,11 @@ static bst_status check_period(fake *self, struct bst_step *step) {
     return BST_OK;
 }
 
-/* 86400 s at 6000 Hz: 518,400,000 ticks. The number of steps of period p and offset o before the
+/* 21600 s at 6000 Hz: 129,600,000 ticks. The number of steps of period p and offset o before the
  * end is ceil((ticks - o) / p). */
-static void a_day_of_many_rates_is_exact(void **state) {
+static void hours_of_many_rates_are_exact(void **state) {
     (void)state;
-    const int64_t day = 86400LL * 6000;
+    const int64_t hours = 21600LL * 6000;
     /* 50 Hz, 20 Hz, 24 Hz, 1 Hz, 0.1 Hz, once a day; offsets 0, 7, 249, 5999, 1 */
     const int64_t periods[] = {120, 300, 250, 6000, 60000, 518400000};
     const int64_t offsets[] = {0, 7, 249, 5999, 1, 0};
@@ -44,11 +44,11 @@ static void a_day_of_many_rates_is_exact(void **state) {
     /* in uneven pieces: where a run is cut must not matter */
     bst_assert_ok(&ctx, bst_engine_run(&ctx, engine, 1));
     bst_assert_ok(&ctx, bst_engine_run(&ctx, engine, 123456789));
-    bst_assert_ok(&ctx, bst_engine_run(&ctx, engine, day));
+    bst_assert_ok(&ctx, bst_engine_run(&ctx, engine, hours));
     for (int i = 0; i < 6; i++) {
-        assert_int_equal(fakes[i].steps, (day - offsets[i] + periods[i] - 1) / periods[i]);
+        assert_int_equal(fakes[i].steps, (hours - offsets[i] + periods[i] - 1) / periods[i]);
     }
-    assert_int_equal(bst_engine_tick(engine), day - 1); /* 5999 + n 6000 */
+    assert_int_equal(bst_engine_tick(engine), hours - 1); /* 5999 + n 6000 */
     assert_string_equal(bst_engine_instance_name(engine, 0), "a");
     assert_int_equal(bst_engine_instance_count(engine), 6);
     assert_int_equal(bst_engine_instance_steps(engine, 5), fakes[0].steps);
@@ -390,7 +390,7 @@ static void rates_and_times_that_do_not_divide(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_day_of_many_rates_is_exact),
+        cmocka_unit_test(hours_of_many_rates_are_exact),
         cmocka_unit_test(heap_steps_like_a_list),
         cmocka_unit_test(order_is_topological_then_by_name),
         cmocka_unit_test(triggers_come_at_the_tick_of_visibility),

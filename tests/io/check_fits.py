@@ -1,7 +1,7 @@
 """Reads the files that test_fits.c wrote with astropy and compares them with what it wrote.
 
 Usage: check_fits.py FOLDER        all that test_astropy_reads wrote
-       check_fits.py FOLDER full   a.fits, that a full disk ended
+       check_fits.py FOLDER full   a0.fits to a2.fits, that a full disk ended
 """
 
 import io
@@ -187,12 +187,13 @@ def check_full(folder):
     """What a full disk left: whole frames, and not a warning."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        with fits.open(os.path.join(folder, "a.fits")) as f:
-            f.verify("exception")
-            frames = list(f[0].data) if f[0].data is not None else [hdu.data for hdu in f[1:]]
-            assert len(frames) > 1
-            for i, frame in enumerate(frames):
-                assert (frame == pixels(i)).all(), i
+        for kind in range(3):
+            with fits.open(os.path.join(folder, f"a{kind}.fits")) as f:
+                f.verify("exception")
+                frames = list(f[0].data) if f[0].data is not None else [hdu.data for hdu in f[1:]]
+                assert len(frames) > 1
+                for i, frame in enumerate(frames):
+                    assert (frame == pixels(i)).all(), (kind, i)
 
 
 def check_cut(folder):

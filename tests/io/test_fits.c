@@ -201,16 +201,16 @@ static void test_errors(void **state) {
 
 /* A full disk, played by a limit on the size of files: the error names file and reason, and the
  * frames before it stay, whole. */
-static void full_disk(file_kind kind, rlim_t bytes) {
-    scratch s;
-    scratch_make(&s);
+static void full_disk(scratch *s, int number, file_kind kind, rlim_t bytes) {
+    char name[] = "a0.fits";
+    name[1] = (char)('0' + number);
     pid_t child = fork();
     if (child == 0) {
         bst_ctx ctx;
         bst_ctx_init(&ctx, NULL, NULL, BST_LOG_INFO);
         signal(SIGXFSZ, SIG_IGN);
         const struct rlimit limit = {bytes, bytes};
-        bst_fits *fits = write_frames(&ctx, scratch_path(&s, "a.fits"), kind, 1);
+        bst_fits *fits = write_frames(&ctx, scratch_path(s, name), kind, 1);
         bst_camera camera = small_camera();
         uint16_t pixels[WIDTH * HEIGHT] = {0};
         if (bst_fits_flush(&ctx, fits) != BST_OK || setrlimit(RLIMIT_FSIZE, &limit) != 0) {
@@ -222,7 +222,7 @@ static void full_disk(file_kind kind, rlim_t bytes) {
             bst_fits_frame frame = make_frame(&ctx, &camera, i);
             status = bst_fits_write(&ctx, fits, &frame, pixels, WIDTH, HEIGHT, NULL);
         }
-        bool said = strstr(ctx.message, "a.fits") && strstr(ctx.message, strerror(EFBIG));
+        bool said = strstr(ctx.message, name) && strstr(ctx.message, strerror(EFBIG));
         /* a failure stays one for who asks later */
         bst_status again = kind == RICE ? bst_fits_flush(NULL, fits) : BST_ERR_IO;
         bst_status closed = bst_fits_close(&ctx, fits);
@@ -233,18 +233,20 @@ static void full_disk(file_kind kind, rlim_t bytes) {
     waitpid(child, &status, 0);
     assert_true(WIFEXITED(status));
     assert_int_equal(WEXITSTATUS(status), 0);
+}
+
+static void test_full_disk(void **state) {
+    (void)state;
+    scratch s;
+    scratch_make(&s);
+    full_disk(&s, 0, EXTENSIONS, 40000);
+    full_disk(&s, 1, RICE, 60000);
+    full_disk(&s, 2, CUBE, 40000);
     char command[700];
     snprintf(command, sizeof command, "/usr/bin/python3 tests/io/check_fits.py '%s' full",
              s.folder);
     assert_int_equal(system(command), 0);
     scratch_remove(&s);
-}
-
-static void test_full_disk(void **state) {
-    (void)state;
-    full_disk(EXTENSIONS, 40000);
-    full_disk(RICE, 60000);
-    full_disk(CUBE, 40000);
 }
 
 /* More extensions than the tables of cfitsio hold at first. */

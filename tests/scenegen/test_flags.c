@@ -21,6 +21,7 @@ static long long render(fixture *f, const bst_camera *camera, bst_window w, int 
     }
     bst_renderer_options options = bst_renderer_default_options();
     options.saturation_flags = flags != NULL;
+    options.shared_program = true; /* compiled for test_detector.c too */
     bst_renderer *r;
     bst_assert_ok(&f->ctx, bst_renderer_create(&f->ctx, f->device, camera, &options, &r));
     bst_render_request q = {.window = w,
