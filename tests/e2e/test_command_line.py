@@ -141,7 +141,7 @@ class Messages(unittest.TestCase):
 
 
 class Folders(unittest.TestCase):
-    quick = ("--quiet", "--duration", "1", "--set", runs.NO_FRAMES, "--set",
+    quick = ("--quiet", "--duration", "1", *NO_IMAGES, "--set", runs.NO_FRAMES, "--set",
              "/world/star_catalogue=embedded")
 
     def run_to(self, out, *words):

@@ -2,7 +2,7 @@
 """A day with search, acquisition, track, occultations and an eclipse, without images: nothing
 diverges, no number is lost, memory stays flat.
 
-Three hours and a third of it, or with --full the day with the user's whole star catalogue.
+Two hours of it, or with --full the day with the user's whole star catalogue.
 
 Usage, from the repository root:
   /usr/bin/python3 tests/e2e/test_day_modes.py BORESIGHT [--full]
@@ -19,9 +19,9 @@ FULL = "--full" in sys.argv
 if FULL:
     sys.argv.remove("--full")
 SCENARIO = "scenarios/day_eclipse.json"
-LENGTH_S = 86400 if FULL else 9000
+LENGTH_S = 86400 if FULL else 7200
 # of the processor's time, after the first occultation: all that a run allocates has been used
-EARLY = 0.1 if FULL else 0.6
+EARLY = 0.1 if FULL else 0.75
 
 
 def memory(pid):

@@ -41,7 +41,7 @@ class Figures(FigureChecks, unittest.TestCase):
         return out, summary, mine
 
     def test_rough(self):
-        out, summary, mine = self.play(37, 4500, 7, *ROUGH)
+        out, summary, mine = self.play(37, 3200, 7, *ROUGH)
         print("rough:", mine)
         # the scene is worth it: lost more than once, the axes far apart
         self.assertGreater(mine["breaks"], 2)

@@ -130,7 +130,7 @@ class Stare(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         folder = runs.scratch()
-        cls.frames = {"cube": 36, "extensions": 12} if FULL else {"cube": 12, "extensions": 5}
+        cls.frames = {"cube": 36, "extensions": 12} if FULL else {"cube": 9, "extensions": 4}
         jobs = list(cls.frames.items())
         cls.out = {form: os.path.join(folder, form) for form, _ in jobs}
         runs.parallel(lambda job: runs.run(runs.STARE, cls.out[job[0]], f"/record/frames={job[0]}",
@@ -190,7 +190,7 @@ class Stare(unittest.TestCase):
 
 class Track(unittest.TestCase):
     """Frames of the closed loop, as image extensions."""
-    FRAMES = 41 if FULL else 30  # one a second; the target is in track from the 22nd on
+    FRAMES = 41 if FULL else 28  # one a second; the target is in track from the 22nd on
 
     @classmethod
     def setUpClass(cls):
@@ -259,7 +259,7 @@ def sky_of(header, row=None):
 class Moving(unittest.TestCase):
     """A spacecraft that drifts and turns about the line of sight during the exposures, and a
     telescope that slews between them: the WCS of every frame holds."""
-    FRAMES = 9 if FULL else 4  # one a second
+    FRAMES = 9 if FULL else 3  # one a second
     DRIFT = runs.SENSOR + "/modules/gimbal/platform/drift_arcsec_per_s=[200, -150, 1200]"
     FORMS = {"extensions": ["/record/frames=extensions", "/record/compression=none"],
              "rice": ["/record/frames=extensions", "/record/compression=rice"],

@@ -26,10 +26,15 @@ def fingerprint(folder):
     return out, os.stat(folder).st_mtime_ns
 
 
+# rows are committed every 2 s: until then the processor is left to others
+PACED = ["--pacing", "realtime", "--set", "/pacing/speed=4"]
+SMALL = [f"{runs.SENSOR}/camera/{side}_px=256" for side in ("width", "height")]
+
+
 def start(folder, *sets):
-    """A long run that is under way: its tables hold frames."""
-    process = subprocess.Popen(runs.command(runs.TRACK, os.path.join(folder, "run"), *sets,
-                                            duration=3000),
+    """A long run of small frames that is under way: its tables hold frames."""
+    process = subprocess.Popen(runs.command(runs.TRACK, os.path.join(folder, "run"), *SMALL, *sets,
+                                            duration=3000) + PACED,
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     partial = os.path.join(folder, "run.partial")
     for _ in range(600):

@@ -71,10 +71,12 @@ FULL_MOUNT = dict(FAST, **{
 })
 for one in [key for key in FULL_MOUNT if key.startswith(MODULES + "/gimbal/")]:
     del FULL_MOUNT[one]
+# growth over a run goes with its length times how far the loop is beyond its margin
+NEAR = 0.03 if FULL else 0.045
 LOOPS = {
-    "servo of a full mount, 1 kHz": (FULL_MOUNT, 30, {
+    "servo of a full mount, 1 kHz": (FULL_MOUNT, 30 if FULL else 20, {
         "type": "pid", "crossover_hz": 10, "phase_margin_deg": 50}),
-    "pi, 10 frames/s": (FAST, 100, {"type": "pi", "crossover_hz": 0.5, "phase_margin_deg": 50}),
+    "pi, 10 frames/s": (FAST, 100 if FULL else 67, {"type": "pi", "crossover_hz": 0.5, "phase_margin_deg": 50}),
     "pid with a notch, 10 frames/s": (FAST, 100, {
         "type": "pid", "crossover_hz": 0.6, "phase_margin_deg": 45,
         "notches": [{"frequency_hz": 3, "width_hz": 1, "depth_db": 20}]}),
@@ -155,10 +157,10 @@ class Margins(unittest.TestCase):
                     self.assertEqual(diverges(name, dict(law, **{key: factor * margin})), expected)
 
     def test_servo(self):
-        self.check("servo of a full mount, 1 kHz", 0.03)
+        self.check("servo of a full mount, 1 kHz", NEAR)
 
     def test_pi(self):
-        self.check("pi, 10 frames/s", 0.03)
+        self.check("pi, 10 frames/s", NEAR)
 
     @unittest.skipUnless(FULL, "slow")
     def test_pid(self):

@@ -141,7 +141,8 @@ class Measured(unittest.TestCase):
         for extra in ([], ["--set", runs.SENSOR + "/knowledge/camera/psf_fwhm_px=3.09"]):
             result = pd("--snr", "5:30:25", "--trials", "250", "--empty-frames", "10",
                         "--background", "20", "--json", path, *extra, "--set",
-                        runs.SENSOR + "/camera/optics/wavelengths=2", scenario=scenario)
+                        runs.SENSOR + "/camera/optics/wavelengths=2", "--set", runs.SENSOR + "/camera/width_px=512",
+                        "--set", runs.SENSOR + "/camera/height_px=512", scenario=scenario)
             self.assertEqual(result.returncode, 0, result.stderr)
             with open(path) as file:
                 outs.append(json.load(file)["points"])
