@@ -10,6 +10,8 @@ import runs
 DETECTOR = runs.SENSOR + "/camera/detector"
 CHARGE = [DETECTOR + "/hot_fraction=0.0005", DETECTOR + "/hot_median_e_per_s=1000",
           DETECTOR + "/cosmic_rays/rate_per_cm2_s=20",
+          # of no account; the kernels of test_calframes.py, compiled once
+          DETECTOR + "/prnu_rms=1e-6", DETECTOR + "/column_offset_rms_e=1e-6",
           runs.SENSOR + "/modules/imgproc/bad_pixel_learning/enabled=false"]
 
 

@@ -23,7 +23,7 @@ import runs  # noqa: E402
 
 CLUSTER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "cluster.sh")
 EXPOSURES = [0.4, 0.6, 0.8, 1.0]
-REPLICATES = 4
+REPLICATES = 6
 SITE = {"partition": "test", "poll_s": 0.5, "grace_s": 3, "patience_s": 60, "time_min": 10}
 
 
