@@ -181,7 +181,7 @@ class SatNet(unittest.TestCase):
             self.assertEqual((image.shape, keys["WINX0"], keys["WINY0"], keys["BINNING"]), ((300, 400), 96, 148, 2))
         places = {(o["class_id"], o["object_id"]): o for o in found[1]["objects"]}
         self.assertEqual(len(places), len(found[1]["objects"]))
-        self.assertGreater(len(places), 10)
+        self.assertGreater(len(places), 2)
         for row in rows.execute("SELECT * FROM truth WHERE exposure_id = 1"):
             o = places.pop((2 if row["kind"] == "star" else 1, str(row["norad"] or row["id"])), None)
             if o:
