@@ -325,6 +325,7 @@ typedef struct seen_scene {
     bool found[SOURCES];
     int count;
     double x_px, y_px; /* sums of all detections */
+    double snr, length_px;
     double noise_e, threshold, streak_px;
     bst_generator_filter filter[2];
 } seen_scene;
@@ -385,7 +386,13 @@ static void look(const view *v, double dx, double dy, bool bent, bool few, seen_
                          .read_noise_e = 8.0,
                          .full_well_e = 1e6,
                          .gain_e_per_dn = 1.6,
-                         .bits = 16};
+                         .bits = 16,
+                         .detector.cosmic_rays = {.rate_per_cm2_s = 40.0,
+                                                  .pixel_pitch_um = 15.0 / b,
+                                                  .depth_um = 50.0,
+                                                  .e_per_um = 60.0,
+                                                  .straggling = 0.1,
+                                                  .readout_s = 0.4}};
     bst_generator_settings settings = {.capacity = 256,
                                        .false_alarms_per_frame = 12.0,
                                        .streak_min_px = 1.5,
@@ -435,6 +442,8 @@ static void look(const view *v, double dx, double dy, bool bent, bool few, seen_
         const bst_detection *d = &result.items[i].detection;
         out->x_px += (d->x_px - v->left - 0.5 * (b - 1)) / b;
         out->y_px += (d->y_px - v->top - 0.5 * (b - 1)) / b;
+        out->snr += d->snr;
+        out->length_px += d->length_px / b;
         if (item >= 0 && !out->found[item]) {
             out->found[item] = true;
             out->of[item] = *d;
@@ -549,6 +558,8 @@ static void one_scene_in_many_ways(void **state) {
                 assert_true(first.count > found + 4);
                 bst_assert_close(other.x_px, first.x_px, 1e-6);
                 bst_assert_close(other.y_px, first.y_px, 1e-6);
+                bst_assert_close(other.snr, first.snr, 1e-5);
+                bst_assert_close(other.length_px, first.length_px, 1e-6);
             }
         }
     }
