@@ -13,6 +13,7 @@ typedef struct scene {
     bst_camera onboard, truth;
     bst_rng_key key;
     bst_camera_calibrator_star stars[STARS];
+    bool exact;   /* no errors of places */
     bool slanted; /* each star's errors are three times greater along a direction of its own */
 } scene;
 
@@ -57,8 +58,8 @@ static bst_camera_calibrator_frame draw(scene *s, uint64_t frame) {
                                     bst_camera_unproject(&s->truth, star->x_px, star->y_px));
         a = hypot(along, STAR_SIGMA_PX) * bst_rng_normal(s->key, frame, 12 + 4 * i);
         b = hypot(SIGMA_PX, STAR_SIGMA_PX) * bst_rng_normal(s->key, frame, 13 + 4 * i);
-        star->x_px += c * a - n * b;
-        star->y_px += n * a + c * b;
+        star->x_px += s->exact ? 0.0 : c * a - n * b;
+        star->y_px += s->exact ? 0.0 : n * a + c * b;
         star->cov_xx = c * c * along * along + n * n * SIGMA_PX * SIGMA_PX;
         star->cov_xy = c * n * (along * along - SIGMA_PX * SIGMA_PX);
         star->cov_yy = n * n * along * along + c * c * SIGMA_PX * SIGMA_PX;
@@ -163,6 +164,35 @@ static void follows_a_drift(void **state) {
     assert_true(fabs(out.scale - (1.0 + 3e-4 * 59.0 / 60.0)) < 1e-4); /* 1 sigma 3e-5, and lag */
 }
 
+/* The scale's variance grows by that of the walk: of the corner's place, in so many hours. */
+static void variance_grows_with_time(void **state) {
+    (void)state;
+    const double hours[2] = {0.0, 4.0}, drift_px = 0.3, corner_px = 512.0 * sqrt(2.0);
+    double p[2][2];
+    for (int k = 0; k < 2; k++) {
+        scene s;
+        setup_scene(&s, 5);
+        s.exact = true;
+        s.config.rotation_sigma_deg = s.config.distortion_sigma_px = 0.0;
+        s.config.drift_px_per_sqrt_h = drift_px;
+        make_cameras(&s, 1.0, 0.0, 0.0, (const double[2]){0.0, 0.0});
+        bst_camera_calibrator c;
+        bst_camera_calibrator_begin(&s.config, &s.onboard, &c);
+        bst_camera_calibrator_frame frame = draw(&s, 0);
+        for (int i = 0; i < 2; i++) {
+            bst_camera_calibration out;
+            frame.seconds = 3600.0 * hours[k] * i;
+            assert_true(bst_camera_calibrator_update(&c, &frame));
+            bst_camera_calibrator_get(&c, &out);
+            p[k][i] = out.covariance[0][0];
+        }
+    }
+    double information = 1.0 / p[0][1] - 1.0 / p[0][0]; /* of a frame */
+    double walk = hours[1] * drift_px * drift_px / (corner_px * corner_px);
+    bst_assert_close(1.0 / p[1][1] - information, 1.0 / (p[1][0] + walk), 1e-3 / p[1][0]);
+    assert_true(walk > 0.1 * p[1][0]);
+}
+
 /* Frames that no camera explains change nothing; outliers are left out; telemetry without a roll
  * leaves the rotation. */
 static void rejects_what_does_not_fit(void **state) {
@@ -198,6 +228,7 @@ int main(void) {
         cmocka_unit_test(learns_scale_rotation_and_distortion),
         cmocka_unit_test(covariance_is_that_of_the_errors),
         cmocka_unit_test(follows_a_drift),
+        cmocka_unit_test(variance_grows_with_time),
         cmocka_unit_test(rejects_what_does_not_fit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
