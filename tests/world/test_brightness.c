@@ -234,6 +234,28 @@ static void earthshine_from_far_and_near(void **state) {
     assert_true(isfinite(g.v_mag));
 }
 
+/* All light that was the Sun's goes with the square of its distance: of every model, and by way of
+ * the Earth, whose own distance counts there. */
+static void farther_from_the_sun(void **state) {
+    (void)state;
+    const bst_scene_lighting at_1_au = lit(4e7, 0.8);
+    for (int k = 0; k < 4; k++) {
+        bst_brightness_config c = plain();
+        c.model = k < 2 ? BST_BRIGHTNESS_SPHERE : BST_BRIGHTNESS_STANDARD;
+        c.specular_fraction = k % 2 ? 0.3 : 0.0;
+        c.standard_v_mag = 5.0;
+        for (int earth = 0; earth < 2; earth++) {
+            bst_scene_lighting l = at_1_au;
+            c.earthshine = earth;
+            l.sunlit_fraction = 1 - earth;
+            double before = glow_of(&c, &l).v_mag, from = bst_vec3_norm(l.sun_m);
+            l.sun_m.x += 0.4 * BST_AU_M;
+            double change = earth ? bst_vec3_norm(l.sun_m) / from : 1.4;
+            bst_assert_close(glow_of(&c, &l).v_mag - before, 5.0 * log10(change), 1e-9);
+        }
+    }
+}
+
 /* The surface summed up patch by patch as seen from the eye, over the formula for a far eye. */
 static double patches(double ratio, double phase) {
     enum { N = 600 };
@@ -532,6 +554,7 @@ int main(void) {
         cmocka_unit_test(light_curves_are_those_of_the_instant_of_emission),
         cmocka_unit_test(wrong_curves_are_refused),
         cmocka_unit_test(earthshine_from_far_and_near),
+        cmocka_unit_test(farther_from_the_sun),
         cmocka_unit_test(near_spheres),
         cmocka_unit_test(it_glows_in_the_shadow),
         cmocka_unit_test(rates_with_an_edge),
