@@ -550,8 +550,36 @@ static void bodies_are_found_wherever_the_camera_turns(void **state) {
     }
 }
 
+/* The Sun rises by the ellipsoid's normal, to 0.05 degrees; a sphere's would be 0.19 off. */
+static void day_begins_on_the_ellipsoid(void **state) {
+    (void)state;
+    const double e2 = BST_EARTH_FLATTENING * (2.0 - BST_EARTH_FLATTENING);
+    bst_camera camera = {.width_px = 512, .height_px = 512, .pixel_scale_arcsec = 10};
+    camera.background.earth = true;
+    for (int k = 0; k < 16; k++) {
+        double latitude = (k & 1 ? -0.7 : 0.7), up = (k & 2 ? -0.05 : 0.05) * BST_DEG_RAD;
+        double c = cos(latitude), n = sin(latitude), bearing = 0.5 * BST_PI * (k / 4);
+        double radius = BST_EARTH_RADIUS_M / sqrt(1.0 - e2 * n * n);
+        bst_vec3 normal = {c, 0, n}, north = {-n, 0, c}, east = {0, 1, 0};
+        bst_vec3 level = bst_vec3_axpy(bst_vec3_scale(north, cos(bearing)), sin(bearing), east);
+        bst_vec3 eye = {radius * c + 8e5 * c, 0, radius * (1.0 - e2) * n + 8e5 * n};
+        bst_scene_surroundings a = look_down(eye, 0);
+        a.bodies.sun_m = bst_vec3_scale(
+            bst_vec3_axpy(bst_vec3_scale(level, cos(up)), sin(up), normal), BST_AU_M);
+        for (int i = 0; i <= BST_DISC_PARTS; i++) {
+            a.q[i] = bst_quat_look(bst_vec3_scale(normal, -1.0), north);
+        }
+        bst_discs discs;
+        bool day, night;
+        bst_discs_make(&camera, &a, &discs);
+        bst_discs_daylight(&discs, (bst_vec3){0, 0, 1}, &day, &night);
+        assert_true(day == (up > 0.0) && night == (up < 0.0));
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(day_begins_on_the_ellipsoid),
         cmocka_unit_test(shares_of_windows),
         cmocka_unit_test(angle_from_the_limb),
         cmocka_unit_test(transmittance_is_log_linear),
