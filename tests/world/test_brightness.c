@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "sim/optics/band.h"
+#include "sim/world/scene/discs.h"
 #include "sim/world/scene/field_objects.h"
 #include "tests/world/world_support.h"
 
@@ -253,6 +254,35 @@ static void farther_from_the_sun(void **state) {
             double change = earth ? bst_vec3_norm(l.sun_m) / from : 1.4;
             bst_assert_close(glow_of(&c, &l).v_mag - before, 5.0 * log10(change), 1e-9);
         }
+    }
+}
+
+/* The same of the Earth's disc; the Sun's own is as bright at any distance. */
+static void discs_farther_from_the_sun(void **state) {
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        bst_camera camera = {.width_px = 512, .height_px = 512, .pixel_scale_arcsec = 3};
+        *(k ? &camera.background.sun : &camera.background.earth) = true;
+        camera.background.earth_albedo = 0.3;
+        camera.background.earth_night_mag_arcsec2 = 99;
+        double light[2];
+        for (int far = 0; far < 2; far++) {
+            bst_scene_surroundings a = {.eye_m = {k ? -4e7 : 4e7, 2e7, 0},
+                                        .bodies = {.sun_m = {BST_AU_M * (1 + 0.4 * far), 0, 0},
+                                                   .moon_m = {0, 0, -3.8e8},
+                                                   .pole = {0, 0, 1}},
+                                        .itrf_from_gcrf = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+                                        .exposure_s = 1};
+            a.light.sun_m = bst_vec3_sub(a.bodies.sun_m, a.eye_m);
+            bst_vec3 to = k ? a.light.sun_m : bst_vec3_scale(a.eye_m, -1);
+            for (int i = 0; i <= BST_DISC_PARTS; i++) {
+                a.q[i] = bst_quat_look(bst_vec3_unit(to), (bst_vec3){0, 0, 1});
+            }
+            bst_discs discs;
+            bst_discs_make(&camera, &a, &discs);
+            light[far] = bst_discs_light(&discs, (bst_vec3){0, 0, 1}).sunlight;
+        }
+        bst_assert_close(light[0] / light[1], k ? 1 : 1.96, 1e-3);
     }
 }
 
@@ -555,6 +585,7 @@ int main(void) {
         cmocka_unit_test(wrong_curves_are_refused),
         cmocka_unit_test(earthshine_from_far_and_near),
         cmocka_unit_test(farther_from_the_sun),
+        cmocka_unit_test(discs_farther_from_the_sun),
         cmocka_unit_test(near_spheres),
         cmocka_unit_test(it_glows_in_the_shadow),
         cmocka_unit_test(rates_with_an_edge),
