@@ -99,6 +99,12 @@ static void sun_and_moon_pull_as_point_masses(void **state) {
     }
 }
 
+static bst_vec3 slanted_area(void *user, const bst_force_state *at) {
+    (void)user;
+    (void)at;
+    return (bst_vec3){3, -2, 1};
+}
+
 static void sunlight_pushes_away_and_not_in_the_shadow(void **state) {
     (void)state;
     bst_force_model model = {
@@ -116,6 +122,13 @@ static void sunlight_pushes_away_and_not_in_the_shadow(void **state) {
         double expected = side > 0 ? 1361.0 / 299792458.0 * 1.5 * 10 / 50 / (far * far) : 0;
         /* differences of accelerations of 8 m/s^2 */
         bst_assert_close(distance(push, bst_vec3_scale(u, -expected)), 0, 1e-14);
+        /* on a shape: its area by direction, without a coefficient */
+        const bst_force_surface surface = {.light_area_m2 = slanted_area};
+        bst_force_model shaped = model;
+        shaped.surface = &surface;
+        push = bst_vec3_sub(force(&shaped, 0, r, at_rest), force(&without, 0, r, at_rest));
+        bst_vec3 area = bst_vec3_scale((bst_vec3){3, -2, 1}, expected / 15);
+        bst_assert_close(distance(push, area), 0, 1e-14);
     }
     assert_true(BST_SUNLIGHT_PRESSURE_PA > 4.5e-6 && BST_SUNLIGHT_PRESSURE_PA < 4.6e-6);
 }

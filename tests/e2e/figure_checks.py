@@ -40,9 +40,13 @@ class FigureChecks:
         self.assertLessEqual(abs(float(text) - value),
                              0.51 * 10 ** (math.floor(math.log10(abs(value) or 1.0)) + 1 - digits), text)
 
-    def check_page(self, page, mine):
+    def check_page(self, page, mine, summary):
         """Cards and captions say the same, and it is that. Figures that the run has not are not looked for."""
         cards = page.cards()
+        for card, key, factor, digits in (("GOSPA", "gospa_px", 1, 3), ("track purity", "track_purity", 100, 4)):
+            self.assertEqual(card in cards, summary.get(key) is not None, card)
+            if card in cards:
+                self.near(cards[card], factor * summary[key], digits)
         if mine["custody"] is not None:
             self.near(cards["custody"], 100 * mine["custody"], 4)
         if mine["time_to_acquire_s"] is not None:

@@ -49,7 +49,7 @@ class Figures(FigureChecks, unittest.TestCase):
         self.assertGreater(mine["pointing_max_px"], 5)
         self.compare(mine, summary)
         page = self.read_page(out)
-        self.check_page(page, mine)
+        self.check_page(page, mine, summary)
         # shares per interval, not solid bars: in most of the time there is an attitude in some
         # frames and none in others
         line = [part for part in page.root.iter("svg")
@@ -78,7 +78,7 @@ class Figures(FigureChecks, unittest.TestCase):
         self.assertLess(mine["time_to_confirm_s"], mine["time_to_acquire_s"])
         self.compare(mine, summary)
         page = self.read_page(out)
-        self.check_page(page, mine)
+        self.check_page(page, mine, summary)
         found = re.search(r"In the (\d+) frames that gave it a detection: mean ([\d.]+), median "
                           r"([\d.]+) \(1.39\), (\d+) % between", page.text)
         self.assertEqual(int(found[1]), len(self.nees))

@@ -82,7 +82,7 @@ class RandomLabels(FigureChecks, unittest.TestCase):
         mine, unclear = figures.judge(frames)
         self.assertEqual(unclear, 0)
         self.compare(mine, summary)
-        self.check_page(self.read_page(out), mine)
+        self.check_page(self.read_page(out), mine, summary)
 
     def labels(self, sensor, out):
         camera = sensor["camera"]

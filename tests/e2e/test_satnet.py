@@ -65,6 +65,17 @@ class SatNet(unittest.TestCase):
                          [f"fly.{k:04d}.json" for k in range(8)])
         self.assertFalse(os.path.exists(self.made + ".export"))
 
+    def compare_keys(self, one, other):
+        """All keys of the frame but those of the file's structure."""
+        keys = set(one) & set(other) - {"SIMPLE", "XTENSION", "EXTEND", "BITPIX", "NAXIS", "PCOUNT", "GCOUNT", "COMMENT", ""}
+        self.assertGreater(keys, {"DATE-OBS", "EXPTIME", "GAIN", "WINX0", "WINY0", "BINNING", "FRAMEID", "PIXSCALE", "OBSPOSZ",
+                                  "OBSVELY", "CRVAL1", "CRPIX2", "CD1_2", "CD2_1", "CD2_2"})
+        for key in keys:
+            if isinstance(other[key], float):  # the same solution from what the tables hold
+                self.assertAlmostEqual(one[key], other[key], delta=1e-12 * max(1, abs(other[key])))
+            else:
+                self.assertEqual(one[key], other[key], key)
+
     def test_images_are_the_frames(self):
         with fits.open(self.made + "/frames.fits") as hdus:
             for k, hdu in enumerate(hdus[1:]):
@@ -73,12 +84,21 @@ class SatNet(unittest.TestCase):
                     self.assertEqual(len(single), 1)
                     self.assertEqual(single[0].data.dtype, np.uint16)
                     np.testing.assert_array_equal(single[0].data, hdu.data)
-                    for key in ("DATE-OBS", "EXPTIME", "GAIN", "WINX0", "FRAMEID", "PIXSCALE",
-                                "OBSPOSX"):
-                        self.assertEqual(single[0].header[key], hdu.header[key])
-                    for key in ("CRVAL1", "CRVAL2", "CRPIX1", "CD1_1", "CD1_2"):
-                        # the same solution from what the tables hold
-                        self.assertAlmostEqual(single[0].header[key], hdu.header[key], delta=1e-12)
+                    self.compare_keys(single[0].header, hdu.header)
+
+    def check_places(self, o, row, keys, image):
+        """Fractions of the image against pixels of the sensor."""
+        for axis, size in (("x", image.shape[1]), ("y", image.shape[0])):
+            beside = row[axis + "_centroid_px"] - row[axis + "_chief_px"]  # boxes enclose the light
+
+            def of(when, beside=0.0, axis=axis, size=size):
+                return (row[f"{axis}_{when}_px"] + beside - keys[f"WIN{axis.upper()}0"] + 0.5) / keys["BINNING"] / size
+
+            places = [of(when, beside) for when in ("start", "mid", "end")]
+            for name, want in (("start", places[0]), ("mid", places[1]), ("end", places[2]), ("chief", of("chief")),
+                               ("centroid", of("centroid")), ("min", min(places)), ("max", max(places)),
+                               ("center", (min(places) + max(places)) / 2)):
+                self.assertAlmostEqual(o[f"{axis}_{name}"], want, delta=1e-11)
 
     def test_labels(self):
         rows = runs.database(self.made)
@@ -97,13 +117,9 @@ class SatNet(unittest.TestCase):
                                    (k, o["seg_id"])).fetchone()
                 self.assertEqual(o["class_name"], "Star" if row["kind"] == "star" else "Satellite")
                 self.assertEqual(o["class_id"], 2 if row["kind"] == "star" else 1)
-                for when in ("start", "mid", "end", "chief", "centroid"):
-                    self.assertAlmostEqual(o[f"x_{when}"] * width - 0.5 + keys["WINX0"],
-                                           row[f"x_{when}_px"], delta=1e-9)
-                    self.assertAlmostEqual(o[f"y_{when}"] * height - 0.5 + keys["WINY0"],
-                                           row[f"y_{when}_px"], delta=1e-9)
+                self.check_places(o, row, keys, image)
                 self.assertAlmostEqual(o["bbox_width"] * width, 20, delta=1e-9)
-                self.assertAlmostEqual(o["x_center"], (o["x_min"] + o["x_max"]) / 2, delta=1e-15)
+                self.assertAlmostEqual(o["bbox_height"] * height, 20, delta=1e-9)
                 self.assertAlmostEqual(o["magnitude"], row["v_mag"], delta=1e-12)
                 self.assertAlmostEqual(o["snr_aperture"] / row["snr"], 1.0, delta=1e-14)
                 self.assertAlmostEqual(o["pe_per_sec"] * keys["EXPTIME"], row["electrons"],
@@ -148,7 +164,8 @@ class SatNet(unittest.TestCase):
     def test_cube_of_a_window_and_boxes(self):
         folder = runs.scratch()
         made, out = os.path.join(folder, "cube"), os.path.join(folder, "set")
-        runs.run(runs.STARE, made, "/record/frames=cube", f"{runs.SENSOR}/modules=" + json.dumps(
+        runs.run(runs.STARE, made, "/record/frames=cube", f"{runs.SENSOR}/exposure/binning=2",
+                 f"{runs.SENSOR}/exposure/window_px=[96,148,800,600]", f"{runs.SENSOR}/modules=" + json.dumps(
             {"gimbal": {"type": "ideal", "object": "INMARSAT GX5"},
              "scenegen": {"type": "opencl"}}), duration=3)
         self.assertEqual(call("export", made, "--satnet", out, "--box", "0").returncode, 0)
@@ -158,9 +175,21 @@ class SatNet(unittest.TestCase):
             for k, plane in enumerate(hdus[0].data):
                 np.testing.assert_array_equal(
                     fits.getdata(f"{out}/ImageFiles/cube.{k:04d}.fits"), plane)
-        for o in found[0]["objects"]:
-            self.assertEqual(o["seg_id"], -1)
-            self.assertAlmostEqual(o["bbox_width"], o["x_max"] - o["x_min"], delta=1e-15)
+        rows = runs.database(made)
+        with fits.open(f"{out}/ImageFiles/cube.0001.fits") as hdus:
+            image, keys = hdus[0].data, hdus[0].header
+            self.assertEqual((image.shape, keys["WINX0"], keys["WINY0"], keys["BINNING"]), ((300, 400), 96, 148, 2))
+        places = {(o["class_id"], o["object_id"]): o for o in found[1]["objects"]}
+        self.assertEqual(len(places), len(found[1]["objects"]))
+        self.assertGreater(len(places), 2)
+        for row in rows.execute("SELECT * FROM truth WHERE exposure_id = 1"):
+            o = places.pop((2 if row["kind"] == "star" else 1, str(row["norad"] or row["id"])), None)
+            if o:
+                self.check_places(o, row, keys, image)
+                self.assertEqual(o["seg_id"], -1)
+                self.assertAlmostEqual(o["bbox_width"], o["x_max"] - o["x_min"], delta=1e-15)
+                self.assertAlmostEqual(o["bbox_height"], o["y_max"] - o["y_min"], delta=1e-15)
+        self.assertFalse(places)
 
     def test_misuse(self):
         for words in (("--split", "80,10,10"), ("--satnet", "x", "--split", "80,10"),

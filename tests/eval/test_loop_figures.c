@@ -2,7 +2,7 @@
 #include "sim/eval/loop_figures.h"
 
 #include "boresight/messages.h"
-#include "tests/test_support.h"
+#include "tests/archive_support.h"
 
 static const double px_rad = 2.5 * BST_ARCSEC_RAD;
 
@@ -87,6 +87,11 @@ static void a_track_is_on_target_within_5_px(void **state) {
     assert_false(bst_loop_settles(true, BST_MODE_TRACK, NAN));
 }
 
+static bst_status archive_statistics(void *self, bst_archive *archive) {
+    bst_error_statistics_archive(self, archive);
+    return BST_OK;
+}
+
 static void statistics_of_both_axes(void **state) {
     (void)state;
     bst_error_statistics s = {0};
@@ -108,6 +113,12 @@ static void statistics_of_both_axes(void **state) {
     bst_assert_close(bst_error_statistics_quantile(&s, 0.5) / 3, 1, 0.00051);
     bst_assert_close(bst_error_statistics_quantile(&s, 0.61) / 4, 1, 0.00051);
     bst_assert_close(bst_error_statistics_quantile(&s, 0.99) / sqrt(50), 1, 0.00051);
+    bst_ctx ctx = {0};
+    bst_error_statistics again = {0};
+    test_saved saved = test_save(archive_statistics, &s);
+    bst_assert_ok(&ctx, test_restore(&ctx, archive_statistics, &again, saved));
+    assert_memory_equal(&again, &s, sizeof s);
+    free(saved.bytes);
     /* 180 degrees at 0.01 arcsec a pixel find a bin; no error at all is none */
     bst_error_statistics wide = {0}, none = {0};
     bst_error_statistics_add(&wide, 0, 6.48e7);

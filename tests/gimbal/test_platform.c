@@ -86,15 +86,21 @@ static void jitter_between_samples_is_linear_on_both_axes(void **state) {
     (void)state;
     bst_platform_config config = quiet();
     config.jitter_high_px_rms = 5.0;
-    bst_quat nominal = {0, 0, 0, 1}, straight = {0, 0, 0, 1};
+    bst_quat nominal = bst_quat_look(bst_vec3_from_radec(0.7, -1.1), (bst_vec3){0.3, 1.0, 0.2});
+    bst_quat straight = {0, 0, 0, 1};
     bst_platform p = make(&config, nominal), q = make(&config, nominal);
+    bst_platform other = make(&config, straight); /* the same draws in other axes */
     double moved[2] = {0};
     for (int64_t n = 0; n < 50; n++) {
         double at[2][2];
         for (int k = 0; k < 2; k++) {
             bst_vec3 v = turn(nominal, bst_platform_true_camera(&q, n + k, 0.0, straight));
+            bst_vec3 w = turn(straight, bst_platform_true_camera(&other, n + k, 0.0, straight));
             at[k][0] = v.x;
             at[k][1] = v.y;
+            bst_assert_close(v.x, w.x, 1e-14);
+            bst_assert_close(v.y, w.y, 1e-14);
+            bst_assert_close(v.z, 0.0, 1e-14);
         }
         const double fractions[] = {0.25, 0.7};
         for (int k = 0; k < 2; k++) {

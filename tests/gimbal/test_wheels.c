@@ -113,6 +113,12 @@ static void test_friction(void **state) {
         bst_assert_close(steps * dt, huge ? dt : 100.0, 1.5 * dt);
         double hold = bst_wheel_torque(&wheels.wheel[0], 0.0, 0.9 * config.coulomb_nm, 1e-3, dt);
         bst_assert_close(hold, 0.0, 0.0);
+        /* viscous friction slows either way of turning */
+        bst_wheel viscous = {.viscous_nms = 2e-5, .speed_limit_radps = 500.0};
+        for (int way = -1; way <= 1; way += 2) {
+            double torque = bst_wheel_torque(&viscous, way * 300.0, 1e-3, 1e-3, dt);
+            bst_assert_close(torque, 1e-3 - way * 6e-3, 1e-15);
+        }
         double loose = bst_wheel_torque(&wheels.wheel[0], 0.0, 1.5 * config.coulomb_nm, 1e-3, dt);
         bst_assert_close(loose / config.coulomb_nm, 0.5, 1e-12);
     }

@@ -1,6 +1,7 @@
 /* Calibration of the camera's geometry from stars at known places. */
 #include "boresight/rng.h"
 #include "imgproc/identify/camera_calibrator.h"
+#include "sim/core/symmetric.h"
 #include "tests/test_support.h"
 
 enum { STARS = 20, SIZE = BST_CAMERA_CALIBRATION_SIZE };
@@ -12,15 +13,22 @@ typedef struct scene {
     bst_camera onboard, truth;
     bst_rng_key key;
     bst_camera_calibrator_star stars[STARS];
+    bool exact;   /* no errors of places */
+    bool slanted; /* each star's errors are three times greater along a direction of its own */
 } scene;
 
 /* A camera of 1024 px at 3 arcsec, and the one on board. */
-static void make_cameras(scene *s, double scale, double rotation_rad, double k1, double p1) {
+static void make_cameras(scene *s, double scale, double rotation_rad, double k1,
+                         const double tangential[2]) {
     s->onboard =
         (bst_camera){.width_px = 1024, .height_px = 1024, .pixel_scale_arcsec = 3.0 / scale};
     bst_assert_ok(&s->ctx, bst_camera_prepare(&s->ctx, &s->onboard));
-    const bst_camera_calibration c = {
-        .frames = 1, .scale = scale, .rotation_rad = rotation_rad, .k1 = k1, .p1 = p1};
+    const bst_camera_calibration c = {.frames = 1,
+                                      .scale = scale,
+                                      .rotation_rad = rotation_rad,
+                                      .k1 = k1,
+                                      .p1 = tangential[0],
+                                      .p2 = tangential[1]};
     bst_assert_ok(&s->ctx, bst_camera_apply_calibration(&s->ctx, &s->onboard, &c, &s->truth));
 }
 
@@ -41,15 +49,20 @@ static bst_camera_calibrator_frame draw(scene *s, uint64_t frame) {
                      5e-5 * bst_rng_normal(s->key, frame, 1), ROLL_RAD};
     for (uint64_t i = 0; i < STARS; i++) {
         bst_camera_calibrator_star *star = &s->stars[i];
-        double error = hypot(SIGMA_PX, STAR_SIGMA_PX);
+        double along = s->slanted ? 3.0 * SIGMA_PX : SIGMA_PX;
+        double angle = s->slanted ? BST_PI * bst_rng_uniform(s->key, frame, 200 + i) : 0.0;
+        double c = cos(angle), n = sin(angle), a, b;
         star->x_px = 1023.0 * bst_rng_uniform(s->key, frame, 10 + 4 * i);
         star->y_px = 1023.0 * bst_rng_uniform(s->key, frame, 11 + 4 * i);
         star->cam = bst_quat_rotate(bst_quat_conj(bst_quat_from_rotvec(turn)),
                                     bst_camera_unproject(&s->truth, star->x_px, star->y_px));
-        star->x_px += error * bst_rng_normal(s->key, frame, 12 + 4 * i);
-        star->y_px += error * bst_rng_normal(s->key, frame, 13 + 4 * i);
-        star->cov_xx = star->cov_yy = SIGMA_PX * SIGMA_PX;
-        star->cov_xy = 0.0;
+        a = hypot(along, STAR_SIGMA_PX) * bst_rng_normal(s->key, frame, 12 + 4 * i);
+        b = hypot(SIGMA_PX, STAR_SIGMA_PX) * bst_rng_normal(s->key, frame, 13 + 4 * i);
+        star->x_px += s->exact ? 0.0 : c * a - n * b;
+        star->y_px += s->exact ? 0.0 : n * a + c * b;
+        star->cov_xx = c * c * along * along + n * n * SIGMA_PX * SIGMA_PX;
+        star->cov_xy = c * n * (along * along - SIGMA_PX * SIGMA_PX);
+        star->cov_yy = n * n * along * along + c * c * SIGMA_PX * SIGMA_PX;
     }
     return (bst_camera_calibrator_frame){s->stars, STARS, (double)frame, ROLL_RAD};
 }
@@ -60,7 +73,7 @@ static void learns_scale_rotation_and_distortion(void **state) {
     (void)state;
     scene s;
     setup_scene(&s, 1);
-    make_cameras(&s, 1.02, 1.7e-3, 15.0, 1e-3);
+    make_cameras(&s, 1.02, 1.7e-3, 15.0, (const double[2]){1e-3, 0.0});
     bst_camera_calibrator c;
     bst_camera_calibration out;
     bst_camera_calibrator_begin(&s.config, &s.onboard, &c);
@@ -82,16 +95,20 @@ static void learns_scale_rotation_and_distortion(void **state) {
     }
 }
 
-/* NEES of the four parameters that stars alone give, over 200 cameras drawn from the prior. */
+/* NEES of the four parameters that stars alone give, over 200 cameras drawn from the prior; in one
+ * half of them each star's errors have axes of their own. */
 static void covariance_is_that_of_the_errors(void **state) {
     (void)state;
     enum { CAMERAS = 200, FRAMES = 3 };
-    double sum = 0.0;
+    double sum[2] = {0.0};
     for (uint64_t n = 0; n < CAMERAS; n++) {
         scene s;
         setup_scene(&s, 100 + n);
+        s.slanted = n % 2;
+        const double tangential[2] = {0.125 * bst_rng_normal(s.key, 1000, 2),
+                                      0.125 * bst_rng_normal(s.key, 1000, 3)};
         make_cameras(&s, 1.0 + 0.02 * bst_rng_normal(s.key, 1000, 0), 0.0,
-                     12.0 * bst_rng_normal(s.key, 1000, 1), 0.0);
+                     12.0 * bst_rng_normal(s.key, 1000, 1), tangential);
         s.config.rotation_sigma_deg = 0.0;
         bst_camera_calibrator c;
         bst_camera_calibration out;
@@ -102,14 +119,27 @@ static void covariance_is_that_of_the_errors(void **state) {
         }
         bst_camera_calibrator_get(&c, &out);
         double scale = s.truth.pixel_scale_arcsec / s.onboard.pixel_scale_arcsec;
-        const double e[2] = {out.scale - scale, out.k1 - s.truth.distortion.k1};
-        const double a = out.covariance[0][0], b = out.covariance[0][2], d = out.covariance[2][2];
-        assert_true(a > 0.0 && a * d > b * b);
-        sum += (d * e[0] * e[0] - 2.0 * b * e[0] * e[1] + a * e[1] * e[1]) / (a * d - b * b);
+        const double e[4] = {out.scale - scale, out.k1 - s.truth.distortion.k1,
+                             out.p1 - s.truth.distortion.p1, out.p2 - s.truth.distortion.p2};
+        const int of[4] = {0, 2, 3, 4};
+        double covariance[4][4], inverse[4][4];
+        for (int i = 0; i < 4; i++) {
+            for (int k = 0; k < 4; k++) {
+                covariance[i][k] = out.covariance[of[i]][of[k]];
+            }
+        }
+        assert_true(bst_symmetric_invert(4, covariance[0], inverse[0]));
+        for (int i = 0; i < 4; i++) {
+            for (int k = 0; k < 4; k++) {
+                sum[s.slanted] += e[i] * inverse[i][k] * e[k] / (0.5 * CAMERAS);
+            }
+        }
         assert_true(fabs(out.rotation_rad) < 1e-9); /* known exactly */
     }
-    /* chi-square with 400 degrees of freedom: mean 2, standard deviation 0.14; 4 sigma */
-    assert_true(fabs(sum / CAMERAS - 2.0) < 0.57);
+    print_message("NEES of four: %.3f and %.3f\n", sum[0], sum[1]);
+    /* means of 100 chi-squares of four degrees: standard deviation 0.28; 4 sigma */
+    bst_assert_close(sum[0], 4.0, 1.13);
+    bst_assert_close(sum[1], 4.0, 1.13);
 }
 
 /* A scale that drifts by 3e-4 in an hour is followed. */
@@ -120,7 +150,7 @@ static void follows_a_drift(void **state) {
     s.config.drift_px_per_sqrt_h = 0.2;
     bst_camera_calibrator c;
     for (uint64_t i = 0; i < 60; i++) {
-        make_cameras(&s, 1.0, 0.0, 0.0, 0.0);
+        make_cameras(&s, 1.0, 0.0, 0.0, (const double[2]){0.0, 0.0});
         s.truth.pixel_scale_arcsec *= 1.0 + 3e-4 * (double)i / 60.0;
         if (i == 0) {
             bst_camera_calibrator_begin(&s.config, &s.onboard, &c);
@@ -134,13 +164,42 @@ static void follows_a_drift(void **state) {
     assert_true(fabs(out.scale - (1.0 + 3e-4 * 59.0 / 60.0)) < 1e-4); /* 1 sigma 3e-5, and lag */
 }
 
+/* The scale's variance grows by that of the walk: of the corner's place, in so many hours. */
+static void variance_grows_with_time(void **state) {
+    (void)state;
+    const double hours[2] = {0.0, 4.0}, drift_px = 0.3, corner_px = 512.0 * sqrt(2.0);
+    double p[2][2];
+    for (int k = 0; k < 2; k++) {
+        scene s;
+        setup_scene(&s, 5);
+        s.exact = true;
+        s.config.rotation_sigma_deg = s.config.distortion_sigma_px = 0.0;
+        s.config.drift_px_per_sqrt_h = drift_px;
+        make_cameras(&s, 1.0, 0.0, 0.0, (const double[2]){0.0, 0.0});
+        bst_camera_calibrator c;
+        bst_camera_calibrator_begin(&s.config, &s.onboard, &c);
+        bst_camera_calibrator_frame frame = draw(&s, 0);
+        for (int i = 0; i < 2; i++) {
+            bst_camera_calibration out;
+            frame.seconds = 3600.0 * hours[k] * i;
+            assert_true(bst_camera_calibrator_update(&c, &frame));
+            bst_camera_calibrator_get(&c, &out);
+            p[k][i] = out.covariance[0][0];
+        }
+    }
+    double information = 1.0 / p[0][1] - 1.0 / p[0][0]; /* of a frame */
+    double walk = hours[1] * drift_px * drift_px / (corner_px * corner_px);
+    bst_assert_close(1.0 / p[1][1] - information, 1.0 / (p[1][0] + walk), 1e-3 / p[1][0]);
+    assert_true(walk > 0.1 * p[1][0]);
+}
+
 /* Frames that no camera explains change nothing; outliers are left out; telemetry without a roll
  * leaves the rotation. */
 static void rejects_what_does_not_fit(void **state) {
     (void)state;
     scene s;
     setup_scene(&s, 4);
-    make_cameras(&s, 1.001, 0.0, 0.0, 0.0);
+    make_cameras(&s, 1.001, 0.0, 0.0, (const double[2]){0.0, 0.0});
     bst_camera_calibrator c, before;
     bst_camera_calibrator_begin(&s.config, &s.onboard, &c);
     bst_camera_calibrator_frame frame = draw(&s, 0);
@@ -169,6 +228,7 @@ int main(void) {
         cmocka_unit_test(learns_scale_rotation_and_distortion),
         cmocka_unit_test(covariance_is_that_of_the_errors),
         cmocka_unit_test(follows_a_drift),
+        cmocka_unit_test(variance_grows_with_time),
         cmocka_unit_test(rejects_what_does_not_fit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -35,16 +35,19 @@ static int teardown(void **state) {
     return 0;
 }
 
-/* Solves the detections that were drawn. */
-static void solve(scene *s, int count) {
+/* Solves the detections that were drawn in a window. */
+static void solve_window(scene *s, int count, bst_window window) {
     bst_lost_in_space *lost;
     bst_assert_ok(&s->ctx, bst_lost_in_space_create(&s->ctx, &s->drawn.camera, s->onboard,
                                                     s->patterns, YEAR, BST_RANDOM_SKY_ROOM, &lost));
     const bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
-    const bst_lost_in_space_frame frame = {
-        s->drawn.items, count, {0, 0, 1024, 1024}, V_LIMIT, &s->drawn.light};
+    const bst_lost_in_space_frame frame = {s->drawn.items, count, window, V_LIMIT, &s->drawn.light};
     bst_assert_ok(&s->ctx, bst_lost_in_space_solve(&s->ctx, lost, &options, &frame, &s->result));
     bst_lost_in_space_free(lost);
+}
+
+static void solve(scene *s, int count) {
+    solve_window(s, count, (bst_window){0, 0, 1024, 1024});
 }
 
 /* Distance of the solved boresight from the true one, px. */
@@ -99,6 +102,65 @@ static void wrong_skies_are_not_solved(void **state) {
         assert_true(s->result.quads > 1000);
         assert_false(s->result.solved);
     }
+}
+
+/* Places with long, slanting errors in a window off the corner: the stars that are predicted are
+ * those of the window, and those that match are those within three sigma by their covariance. */
+static void streaks_in_a_window(void **state) {
+    scene *s = *state;
+    const bst_window w = {40, 352, 944, 560};
+    bst_star *stars = calloc(4000, sizeof *stars);
+    assert_non_null(stars);
+    int solved = 0, all_far = 0;
+    for (uint64_t i = 0; i < 6; i++) {
+        bst_random_sky_options o = usual();
+        o.streak_px = 800.0;
+        bst_random_sky_draw(&o, s->sky, s->onboard, 27, i, &s->drawn);
+        int kept = 0, count, predicted = 0, matched = 0, far = 0;
+        for (int k = 0; k < s->drawn.count; k++) {
+            const bst_detection d = s->drawn.items[k];
+            if (d.x_px >= w.x0 && d.x_px < w.x0 + w.width && d.y_px >= w.y0 &&
+                d.y_px < w.y0 + w.height) {
+                s->drawn.items[kept++] = d;
+            }
+        }
+        solve_window(s, kept, w);
+        if (!s->result.solved) {
+            continue;
+        }
+        solved++;
+        const bst_camera *camera = &s->drawn.camera;
+        bst_vec3 axis =
+            bst_quat_rotate(bst_quat_conj(s->drawn.q_cam_from_gcrf), (bst_vec3){0, 0, 1});
+        bst_assert_ok(&s->ctx, bst_stars_query(&s->ctx, s->onboard, axis, 0.15, V_LIMIT, YEAR,
+                                               stars, 4000, &count));
+        for (int k = 0; k < count; k++) {
+            double x, y, near = INFINITY;
+            bst_vec3 v = bst_quat_rotate(s->drawn.q_cam_from_gcrf,
+                                         bst_light_apparent_star(&s->drawn.light, stars[k].icrs));
+            if (!bst_camera_project(camera, v, &x, &y) || x < w.x0 || x > w.x0 + w.width - 1 ||
+                y < w.y0 || y > w.y0 + w.height - 1) {
+                continue;
+            }
+            predicted++;
+            for (int n = 0; n < kept; n++) {
+                const bst_detection *d = &s->drawn.items[n];
+                double dx = d->x_px - x, dy = d->y_px - y;
+                double det = d->cov_xx * d->cov_yy - d->cov_xy * d->cov_xy;
+                near = fmin(
+                    near,
+                    (d->cov_yy * dx * dx - 2.0 * d->cov_xy * dx * dy + d->cov_xx * dy * dy) / det);
+            }
+            matched += near < 9.0;
+            far += near < 9.0 && near > 1.0;
+        }
+        all_far += far;
+        assert_in_range(s->result.predicted, predicted - 1, predicted + 1); /* at the edges */
+        assert_in_range(s->result.matched, matched, matched + 1);           /* within 0.6 px more */
+    }
+    print_message("%d of 6 solved, %d stars beyond one sigma\n", solved, all_far);
+    assert_true(solved >= 4 && all_far > 15);
+    free(stars);
 }
 
 static void poles(void **state) {
@@ -327,6 +389,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_fields_are_solved),
         cmocka_unit_test(wrong_skies_are_not_solved),
+        cmocka_unit_test(streaks_in_a_window),
         cmocka_unit_test(poles),
         cmocka_unit_test(stars_of_one_brightness),
         cmocka_unit_test(too_few_stars),

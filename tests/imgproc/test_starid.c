@@ -330,6 +330,52 @@ static void the_fit_weighs_by_the_errors(void **state) {
     bst_assert_close(s->items[0].label_probability, near / (near + others), 1e-12);
 }
 
+/* Two votes of 18 x 18 pairs, in cells of 4 x 4 px out of 900: chance gives them once in 29 fields
+ * of 1024 x 400 px, and once in 140 of 1024 x 1024, in which they are believed. */
+static void votes_count_by_the_area(void **state) {
+    scene *s = *state;
+    const double sides[3][2] = {{1024, 400}, {400, 1024}, {1024, 1024}};
+    for (int k = 0; k < 3; k++) {
+        s->options = (bst_starid_options){60.0, 3.0, 511.5, 511.5, sides[k][0], sides[k][1]};
+        s->star_count = 18;
+        s->count = 0;
+        for (int i = 0; i < 18; i++) {
+            double x = 100.0 + 150.0 * (i % 6), y = 100.0 + 150.0 * floor(i / 6.0);
+            s->stars[i] = (bst_imgproc_expected_star){x, y, 10.0, (uint32_t)(1000 + i)};
+            detect(s, x + (i < 2 ? 7.3 : 75.0), y - (i < 2 ? 4.1 : 75.0), 10.0, i);
+        }
+        match(s);
+        assert_int_equal(s->result.matched, k == 2 ? 2 : 0);
+    }
+}
+
+/* A star may be 1 mag off and three sigma; fainter by 2.5 mag more if its light is cut. */
+static void magnitudes_that_agree(void **state) {
+    scene *s = *state;
+    const struct {
+        double excess;
+        unsigned flags;
+        bool known;
+    } cases[] = {{1.0, 0, true},
+                 {1.4, 0, false},
+                 {-1.0, 0, true},
+                 {-1.4, 0, false},
+                 {1.4, BST_DETECTION_SATURATED, true},
+                 {3.4, BST_DETECTION_EDGE, true},
+                 {4.0, BST_DETECTION_EDGE, false},
+                 {-1.4, BST_DETECTION_SATURATED, false},
+                 {3.4, BST_DETECTION_BLEND, false}};
+    make_stars(s, 1, 60);
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        s->count = 0;
+        detect_stars(s, 2, 10.0, 5.0, 0.0, 0);
+        s->items[8].v_mag = s->stars[s->truth[8]].v_mag + cases[k].excess;
+        s->items[8].flags = cases[k].flags;
+        match(s);
+        assert_int_equal(s->items[8].star_id != 0, cases[k].known);
+    }
+}
+
 int main(void) {
 #define STARID_TEST(f) cmocka_unit_test_setup_teardown(f, setup, teardown)
     const struct CMUnitTest tests[] = {
@@ -338,6 +384,8 @@ int main(void) {
         STARID_TEST(the_fit_weighs_by_the_errors),
         STARID_TEST(the_tolerance_follows_the_errors_up_to_its_limit),
         STARID_TEST(single_star_when_locked),
+        STARID_TEST(votes_count_by_the_area),
+        STARID_TEST(magnitudes_that_agree),
         STARID_TEST(chance_is_not_a_match),
         STARID_TEST(nothing_to_match),
         STARID_TEST(target_beside_a_star),

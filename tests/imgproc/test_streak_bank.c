@@ -509,6 +509,50 @@ static void neighbours_stay_apart(void **state) {
     assert_int_equal(found, 6);
 }
 
+/* Streaks in eight directions, found in both planes: both ends lie on their line, and the two
+ * brightest points are the greatest of the map along it that are 3.5 sigma apart. */
+static void lines_follow_their_light(void **state) {
+    fixture *f = *state;
+    for (int k = 0; k < 8; k++) {
+        double angle = BST_PI * (k + 0.4) / 8.0, c = cos(angle), n = sin(angle);
+        const double x = 250.0, y = 150.0, half = 14.0;
+        const double ends[4] = {x - half * c, y - half * n, x + half * c, y + half * n};
+        const double bright[2][4] = {{x + 2.0 * c, y + 2.0 * n, x + 2.0 * c, y + 2.0 * n},
+                                     {x - 2.2 * c, y - 2.2 * n, x - 2.2 * c, y - 2.2 * n}};
+        clear(f);
+        add_streak(f, ends, SIGMA_PX, 8.0);
+        add_streak(f, bright[0], SIGMA_PX, 2.0); /* below 5 sigma, to which the map is limited */
+        add_streak(f, bright[1], SIGMA_PX, 1.6);
+        fill(f);
+        assert_int_equal(bst_streak_search_faint(&f->search, 0.02, 0), 1);
+        const bst_streak_line l = f->search.found[0];
+        bst_assert_close((l.x0 - x) * n - (l.y0 - y) * c, 0.0, 0.25);
+        bst_assert_close((l.x1 - x) * n - (l.y1 - y) * c, 0.0, 0.25);
+        assert_true(end_error(&l, ends) < 2.0);
+        fill(f); /* the search blanks what it has found */
+        bool steep = fabs(l.y1 - l.y0) > fabs(l.x1 - l.x0);
+        double top[2] = {0.0, 0.0};
+        int first = 0, rows = (int)lround(steep ? fabs(l.y1 - l.y0) : fabs(l.x1 - l.x0));
+        for (int pass = 0; pass < 2; pass++) {
+            for (int i = 0; i < rows; i++) {
+                double u = (i + 0.5) / rows, best = 0.0;
+                double px = l.x0 + u * (l.x1 - l.x0), py = l.y0 + u * (l.y1 - l.y0);
+                double apart = abs(i - first) * hypot(l.x1 - l.x0, l.y1 - l.y0) / rows;
+                for (int across = -1; across <= 1; across++) {
+                    best = fmax(best, at(f, 0, (int)lround(px) + (steep ? across : 0),
+                                         (int)lround(py) + (steep ? 0 : across)));
+                }
+                if (best > top[pass] && (pass == 0 || apart >= 3.5 * SIGMA_PX)) {
+                    top[pass] = best;
+                    first = pass == 0 ? i : first;
+                }
+            }
+            bst_assert_close(l.point_snr[pass], top[pass], 1e-9);
+            assert_true(top[pass] > 3.5 && top[pass] < 4.9);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(the_map_is_filtered, setup, teardown),
@@ -521,6 +565,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(bright_streaks_are_found_once, setup, teardown),
         cmocka_unit_test_setup_teardown(faint_streaks_outweigh_pairs_of_points, setup, teardown),
         cmocka_unit_test_setup_teardown(neighbours_stay_apart, setup, teardown),
+        cmocka_unit_test_setup_teardown(lines_follow_their_light, setup, teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,7 +14,8 @@ enum { WIDTH = 256, HEIGHT = 192, MOST = 512 };
 typedef struct scene {
     synthetic s; /* as it is drawn: unturned, unbinned */
     double dx, dy;
-    bool windows; /* only these parts are looked at */
+    double roll_rad, bend_x, bend_y; /* of the camera during the exposure; of the stars' paths */
+    bool windows;                    /* only these parts are looked at */
 } scene;
 
 typedef struct view {
@@ -45,12 +46,48 @@ static double hashed(int x, int y) {
     return (h >> 8) / 16777216.0;
 }
 
-static void draw_scene(scene *s, double dx, double dy, bool windows) {
+/* Motion of a camera of the scene or of a view, from what it does to the middle of the frame. */
+static bst_camera_motion motion_of(const scene *s, const view *v, const bst_camera *camera) {
+    double b = v->binning, dx, dy, bx, by;
+    bool mirrored = (v->flip_x + v->flip_y + v->transpose) % 2;
+    synthetic of = {.camera = *camera};
+    turned(v, b * s->dx, b * s->dy, &dx, &dy);
+    turned(v, b * s->bend_x, b * s->bend_y, &bx, &by);
+    bst_camera_motion motion = synthetic_motion(&of, dx, dy);
+    motion.turn_cam_rad.z = (mirrored ? -1.0 : 1.0) * s->roll_rad;
+    bst_camera_motion_add(&motion, camera, 0.0, 0.0, bx, by);
+    return motion;
+}
+
+/* Adds a star whose path is that of its place, in parts where it bends. */
+static void add_star(scene *s, double x, double y, double electrons) {
+    const view plain = {.binning = 1};
+    bst_camera_motion motion = motion_of(s, &plain, &s->s.camera);
+    double dx, dy;
+    int pieces = s->bend_x != 0.0 ? 12 : 1;
+    bst_camera_motion_streak(&motion, &s->s.camera, x, y, &dx, &dy);
+    for (int i = 0; i < pieces; i++) {
+        double to = 2.0 * (i + 1.0) / pieces - 1.0, from = to - 2.0 / pieces, u = to - 1.0 / pieces;
+        /* of (3 u^2 - 1) / 2: over the piece, and its mean */
+        double along = 1.5 * (to * to - from * from);
+        double mean = 0.5 * (to * to + to * from + from * from - 1.0);
+        synthetic_add(&s->s, x + 0.5 * u * dx + mean * s->bend_x,
+                      y + 0.5 * u * dy + mean * s->bend_y, electrons / pieces,
+                      dx / pieces + along * s->bend_x, dy / pieces + along * s->bend_y);
+    }
+}
+
+static void draw_scene(scene *s, double dx, double dy, bool windows, bool turns) {
     memset(s, 0, sizeof *s);
     synthetic_init(&s->s, WIDTH, HEIGHT);
     s->dx = dx;
     s->dy = dy;
     s->windows = windows;
+    if (turns) {
+        s->roll_rad = 0.02;
+        s->bend_x = 0.9;
+        s->bend_y = 1.3;
+    }
     for (int y = 0; y < HEIGHT; y++) {
         for (int x = 0; x < WIDTH; x++) {
             s->s.mean_e[y * WIDTH + x] += 0.03 * x + 0.07 * y;
@@ -61,10 +98,13 @@ static void draw_scene(scene *s, double dx, double dy, bool windows) {
                y = 12.0 + 30.0 * (i / 8) + 9.0 * hashed(i, 2);
         double flux = 900.0 * pow(30.0, hashed(i, 3)) * (i == 21 ? 300.0 : 1.0);
         bool own = dx == 0.0 && i % 12 == 5; /* an object in motion */
-        synthetic_add(&s->s, x, y, (own ? 6.0 : 1.0) * flux, own ? dx + 9.0 : dx,
-                      own ? dy - 5.0 : dy);
+        if (own) {
+            synthetic_add(&s->s, x, y, 6.0 * flux, dx + 9.0, dy - 5.0);
+        } else {
+            add_star(s, x, y, flux);
+        }
         if (i % 7 == 0) {
-            synthetic_add(&s->s, x + 3.1, y - 2.2, 0.7 * flux, dx, dy);
+            add_star(s, x + 3.1, y - 2.2, 0.7 * flux);
         }
     }
     synthetic_expose(&s->s, bst_rng_make_key(3, 0, "test", "symmetries"), 1);
@@ -129,9 +169,7 @@ static void process(const scene *s, const view *v, seen *out) {
     const bst_imgproc_maps maps = {.dark_e_per_s = dark, .flat = flat, .bad = bad};
     bst_imgproc *ip;
     bst_assert_ok(&ctx, bst_imgproc_create(&ctx, &o.camera, 1e8, &o.config, &maps, &ip));
-    double dx, dy;
-    turned(v, b * s->dx, b * s->dy, &dx, &dy);
-    bst_camera_motion motion = synthetic_motion(&o, dx, dy);
+    bst_camera_motion motion = motion_of(s, v, &o.camera);
     const bst_imgproc_frame frame = {.pixels = pixels,
                                      .window = {v->left, v->top, b * wide, b * high},
                                      .binning = b,
@@ -246,15 +284,16 @@ static void compare(const scene *s) {
 static void points(void **state) {
     (void)state;
     scene s;
-    draw_scene(&s, 0.0, 0.0, false);
+    draw_scene(&s, 0.0, 0.0, false, false);
     compare(&s);
     synthetic_free(&s.s);
 }
 
+/* The camera rolls while it turns, and not uniformly. */
 static void streaks(void **state) {
     (void)state;
     scene s;
-    draw_scene(&s, 9.0, -4.0, false);
+    draw_scene(&s, 9.0, -4.0, false, true);
     compare(&s);
     synthetic_free(&s.s);
 }
@@ -263,7 +302,7 @@ static void windows(void **state) {
     (void)state;
     for (int moves = 0; moves < 2; moves++) {
         scene s;
-        draw_scene(&s, moves ? -7.0 : 0.0, moves ? -6.0 : 0.0, true);
+        draw_scene(&s, moves ? -7.0 : 0.0, moves ? -6.0 : 0.0, true, false);
         compare(&s);
         synthetic_free(&s.s);
     }

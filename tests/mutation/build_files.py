@@ -44,6 +44,11 @@ class Judges:
     def __init__(self):
         self.build, self.objects, self.tests = "", [], {}
         self.costs, self.unsound, self.skipped = {}, set(), set()
+        self.first = None  # test that noticed a listed bug before: it is run first
+
+    def first_of_all(self, names):
+        """The names with the test to run first at their head, if it is among them."""
+        return sorted(names, key=lambda n: n != self.first)
 
     def object_of(self, path):
         """The object of a source, by itself or in a unity build of the nearest folder above with a library of its own."""

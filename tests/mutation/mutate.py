@@ -258,7 +258,8 @@ def candidates(options, tree):
 
 
 def listed(path, tree):
-    """The bugs of a list [{"file", "old", "new"}]: `old` is text that occurs once in the file. Others are stale."""
+    """The bugs of a list [{"file", "old", "new", "test"}]: `old` is text that occurs once in the file. Others are stale. The
+    test, which may be left out, is the one to run first."""
     with open(path, encoding="utf-8") as file:
         items = json.load(file)
     for item in items:
@@ -268,6 +269,7 @@ def listed(path, tree):
             with open(name, encoding="utf-8") as file:
                 text = file.read()
         if text.count(item["old"]) == 1:
+            tree.first = item.get("test")
             yield item["file"], ("listed", text.index(item["old"]), item["old"], item["new"])
         else:
             print(f"stale    {item['file']}: {item['old']!r} is there {text.count(item['old'])} times, not once", flush=True)
@@ -307,7 +309,7 @@ def trial(tree, coverage, name, line, mutant, suite):
     if coverage:
         names = coverage.tests_of(name, line, names)
     tree.prove(names)
-    names = [n for n in names if n not in tree.unsound]
+    names = tree.first_of_all([n for n in names if n not in tree.unsound])
     try:
         with open(path, "w", encoding="utf-8") as file:
             file.write(sound[:at] + new + sound[at + len(old):])

@@ -222,6 +222,7 @@ class QuickTree(build_files.Judges):
             names = coverage.tests_of(name, line, names)
         names = [n for n in names if n not in self.unsound]
         names = names if suite == "e2e" else self.in_order(name, names, text, line)  # those have their order
+        names = self.first_of_all(names)
         before = self.sound(self.target, name, text)
         after = self.compile(self.target, name, text[:at] + new + text[at + len(old):])
         if after is None:

@@ -205,9 +205,14 @@ static void hits_on_a_binned_window(void **state) {
         s.frame.window = (bst_window){96, 160, 800, 480};
         s.frame.binning = b;
         start(&s);
-        double n = 0.0, drawn = 0.0, sum[2] = {0.0}, turned[2] = {0.0};
+        double n = 0.0, drawn = 0.0, sum[2] = {0.0}, turned[2] = {0.0}, snr[2] = {0.0};
+        double sigma2 = pow(s.frame.sigma_px / b, 2.0) + 1.0 / 12.0;
+        bst_crlb_table bound;
+        bst_crlb_table_init(&bound, s.frame.sigma_px / b);
         for (int f = 0; f < FRAMES; f++) {
             bst_generator_result r = run(&s, f);
+            double point =
+                1.0 / (2.0 * BST_PI * sigma2 * bst_crlb_table_norm(&bound, 0.0) * r.noise_e);
             n += r.count;
             for (int i = 0; i < r.count; i++) {
                 const bst_detection *d = &r.items[i].detection;
@@ -218,6 +223,12 @@ static void hits_on_a_binned_window(void **state) {
                     turned[0] += cos(2.0 * d->angle_rad);
                     turned[1] += sin(2.0 * d->angle_rad);
                     assert_true(d->length_px > 1.5 * d->width_px);
+                    /* the line's charge under the filter at its middle, and unit noise */
+                    double way_um = hypot(d->length_px * pitch_um, depth_um);
+                    double x = d->length_px / b / sqrt(8.0 * sigma2);
+                    double want = 80.0 * way_um * point * 0.5 * sqrt(BST_PI) * erf(x) / x;
+                    snr[0] += d->snr - want;
+                    snr[1] += (d->snr - want) * (d->snr - want);
                 }
             }
         }
@@ -226,6 +237,8 @@ static void hits_on_a_binned_window(void **state) {
         bst_assert_close(n, expected, 4.0 * sqrt(expected) + 0.01 * expected);
         bst_assert_close(sum[0] / n, 0.0, 4.0 * sqrt(1.0 / 12.0 / n));
         bst_assert_close(sum[1] / n, 0.0, 4.0 * sqrt(1.0 / 12.0 / n));
+        bst_assert_close(snr[0] / drawn, 0.0, 4.0 / sqrt(drawn));
+        bst_assert_close(snr[1] / drawn, 1.0, 4.0 * sqrt(2.0 / drawn));
         /* longer than 1.5 FWHM of 2 px */
         double t = 3.0 * pitch_um / depth_um, share = 1.0 / (1.0 + t * t);
         bst_assert_close(drawn / n, share, 4.0 * sqrt(share * (1.0 - share) / n) + 0.01);

@@ -270,6 +270,8 @@ static const char manifest[] =
     " \"embedded\", \"summary\": {\"pointing_frames\": 1, \"frames\": 77, \"custody\": 0.8125,"
     " \"track_fraction\": 0.9375, \"time_to_acquire_s\": 3.25, \"time_to_confirm_s\": 2.125,"
     " \"time_to_settle_s\": 5.75, \"pointing_rms_px\": 0.2345, \"pointing_p99_px\": 0.678,"
+    " \"scored_frames\": 60, \"gospa_px\": 1.237, \"ospa2_px\": 0.456, \"track_purity\": 0.9765,"
+    " \"id_switches\": 3, \"ghosts\": 1,"
     " \"pointing_bias_px\": 0.0912, \"final_mode\": \"track\", \"real_time_factor\": 12.34}}";
 
 static void cards_of_a_sensor(void **state) {
@@ -285,6 +287,8 @@ static void cards_of_a_sensor(void **state) {
     expect_card(sensor, "time to acquire", "3.250",
                 "confirmed after 2.125 s, settled after 5.750 s");
     expect_card(sensor, "pointing RMS", "0.234", "99 % below 0.678 px, bias 0.091 px");
+    expect_card(sensor, "GOSPA", "1.24", "all tracks against all objects; OSPA(2) 0.456 px");
+    expect_card(sensor, "track purity", "97.65", "3 changes of identity, 1 ghost");
     expect_card(sensor, "mode at the end", "track", "");
     expect_card(sensor, "exposures", "77", "");
     expect_card(sensor, "detections", "17", "8.50 a frame");

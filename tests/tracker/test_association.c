@@ -63,6 +63,22 @@ static void gates_have_two_axes(void **state) {
             set_track(b->mtt, centre, 2 * AS, 2 * AS);
             put(b->mtt, aside(centre, 0.0, 150 * AS), 40 * AS);
             assert_int_equal(chosen(b->mtt), 0);
+            /* with its own axes, also between those of the tangent */
+            for (int turn = 0; turn < 4; turn++) {
+                double angle = 0.25 * BST_PI * turn, c = cos(angle), s = sin(angle);
+                double wide2 = pow(40 * AS, 2), narrow2 = pow(2 * AS, 2);
+                for (int across = 0; across < 2; across++) {
+                    double along = (across ? 30 : 150) * AS;
+                    set_track(b->mtt, centre, 2 * AS, 2 * AS);
+                    put(b->mtt, aside(centre, along * (across ? -s : c), along * (across ? c : s)),
+                        0.0);
+                    bst_sky_measurement *sky = &b->mtt->now.items[0].sky;
+                    sky->cov_11 = c * c * wide2 + s * s * narrow2;
+                    sky->cov_12 = c * s * (wide2 - narrow2);
+                    sky->cov_22 = s * s * wide2 + c * c * narrow2;
+                    assert_int_equal(chosen(b->mtt), across ? -1 : 0);
+                }
+            }
         }
     }
     bst_mtt_free(b->mtt);

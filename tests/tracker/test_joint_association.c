@@ -129,6 +129,36 @@ static void one_detection_of_two_tracks(void **state) {
     bst_mtt_free(m);
 }
 
+/* Two lights of unlike brightness in any direction from each other: each track's place is widened
+ * along the line between them, by its own distance from the centre of light. */
+static void shared_light_widens_along_the_line(void **state) {
+    (void)state;
+    bst_vec3 at = bst_vec3_from_radec(1.0, 0.4);
+    const double share = 1.0 / (1.0 + pow(10.0, -0.4 * 0.5)), floor2 = pow(0.3 * AS, 2);
+    for (int k = 0; k < 4; k++) {
+        bench *b = start_jointly(18 * AS);
+        bst_mtt *m = b->mtt;
+        m->params.merge_floor_rad = 0.3 * AS;
+        bst_vec3 place[2] = {at, along(at, 0.4 + 0.8 * k, 6 * AS)};
+        for (int t = 0; t < 2; t++) {
+            add_track(m, place[t], SIGMA, 0.99)->v_mag = 12.0 + 0.5 * t;
+        }
+        put(m, along(at, 0.4 + 0.8 * k, (1.0 - share) * 6 * AS));
+        bst_mtt_associate(m, false);
+        for (int t = 0; t < 2; t++) {
+            assert_int_equal(m->shared[t], BST_MTT_WIDENED);
+            bst_tangent axes = bst_tangent_at(place[t]);
+            bst_vec3 to =
+                bst_vec3_scale(bst_vec3_sub(place[1 - t], place[t]), t ? share : 1.0 - share);
+            const double s1 = bst_vec3_dot(to, axes.e1), s2 = bst_vec3_dot(to, axes.e2);
+            bst_assert_close(m->extra[t][0] / (s1 * s1 + floor2), 1.0, 1e-6);
+            bst_assert_close((m->extra[t][1] - s1 * s2) / floor2, 0.0, 1e-6);
+            bst_assert_close(m->extra[t][2] / (s2 * s2 + floor2), 1.0, 1e-6);
+        }
+        bst_mtt_free(m);
+    }
+}
+
 /* Odds of existence of the track that a pair of detections starts after a number of empty frames,
  * with the boresight moved by `moved` (rad) just before the pair. */
 static double odds_after(int empty_frames, double moved) {
@@ -176,6 +206,7 @@ int main(void) {
         cmocka_unit_test(misses_lower_existence),
         cmocka_unit_test(merged_measurement_is_inverted),
         cmocka_unit_test(one_detection_of_two_tracks),
+        cmocka_unit_test(shared_light_widens_along_the_line),
         cmocka_unit_test(observed_sky_starts_fewer_tracks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

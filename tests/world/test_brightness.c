@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "sim/optics/band.h"
+#include "sim/world/scene/discs.h"
 #include "sim/world/scene/field_objects.h"
 #include "tests/world/world_support.h"
 
@@ -232,6 +233,57 @@ static void earthshine_from_far_and_near(void **state) {
     g = glow_of(&c, &l);
     bst_assert_close(g.earth_share, 1, 0);
     assert_true(isfinite(g.v_mag));
+}
+
+/* All light that was the Sun's goes with the square of its distance: of every model, and by way of
+ * the Earth, whose own distance counts there. */
+static void farther_from_the_sun(void **state) {
+    (void)state;
+    const bst_scene_lighting at_1_au = lit(4e7, 0.8);
+    for (int k = 0; k < 4; k++) {
+        bst_brightness_config c = plain();
+        c.model = k < 2 ? BST_BRIGHTNESS_SPHERE : BST_BRIGHTNESS_STANDARD;
+        c.specular_fraction = k % 2 ? 0.3 : 0.0;
+        c.standard_v_mag = 5.0;
+        for (int earth = 0; earth < 2; earth++) {
+            bst_scene_lighting l = at_1_au;
+            c.earthshine = earth;
+            l.sunlit_fraction = 1 - earth;
+            double before = glow_of(&c, &l).v_mag, from = bst_vec3_norm(l.sun_m);
+            l.sun_m.x += 0.4 * BST_AU_M;
+            double change = earth ? bst_vec3_norm(l.sun_m) / from : 1.4;
+            bst_assert_close(glow_of(&c, &l).v_mag - before, 5.0 * log10(change), 1e-9);
+        }
+    }
+}
+
+/* The same of the Earth's disc; the Sun's own is as bright at any distance. */
+static void discs_farther_from_the_sun(void **state) {
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        bst_camera camera = {.width_px = 512, .height_px = 512, .pixel_scale_arcsec = 3};
+        *(k ? &camera.background.sun : &camera.background.earth) = true;
+        camera.background.earth_albedo = 0.3;
+        camera.background.earth_night_mag_arcsec2 = 99;
+        double light[2];
+        for (int far = 0; far < 2; far++) {
+            bst_scene_surroundings a = {.eye_m = {k ? -4e7 : 4e7, 2e7, 0},
+                                        .bodies = {.sun_m = {BST_AU_M * (1 + 0.4 * far), 0, 0},
+                                                   .moon_m = {0, 0, -3.8e8},
+                                                   .pole = {0, 0, 1}},
+                                        .itrf_from_gcrf = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+                                        .exposure_s = 1};
+            a.light.sun_m = bst_vec3_sub(a.bodies.sun_m, a.eye_m);
+            bst_vec3 to = k ? a.light.sun_m : bst_vec3_scale(a.eye_m, -1);
+            for (int i = 0; i <= BST_DISC_PARTS; i++) {
+                a.q[i] = bst_quat_look(bst_vec3_unit(to), (bst_vec3){0, 0, 1});
+            }
+            bst_discs discs;
+            bst_discs_make(&camera, &a, &discs);
+            light[far] = bst_discs_light(&discs, (bst_vec3){0, 0, 1}).sunlight;
+        }
+        bst_assert_close(light[0] / light[1], k ? 1 : 1.96, 1e-3);
+    }
 }
 
 /* The surface summed up patch by patch as seen from the eye, over the formula for a far eye. */
@@ -532,6 +584,8 @@ int main(void) {
         cmocka_unit_test(light_curves_are_those_of_the_instant_of_emission),
         cmocka_unit_test(wrong_curves_are_refused),
         cmocka_unit_test(earthshine_from_far_and_near),
+        cmocka_unit_test(farther_from_the_sun),
+        cmocka_unit_test(discs_farther_from_the_sun),
         cmocka_unit_test(near_spheres),
         cmocka_unit_test(it_glows_in_the_shadow),
         cmocka_unit_test(rates_with_an_edge),

@@ -76,7 +76,6 @@ static void query(scene *s, int64_t end_tick, bst_window window) {
 
 static const bst_window full = {0, 0, 1024, 1024};
 
-/* Deterministic noise in [-1, 1). */
 static double noise(unsigned *seed) {
     *seed = *seed * 1664525u + 1013904223u;
     return (double)(*seed >> 8) / 8388608.0 - 1.0;
@@ -108,6 +107,7 @@ static void fill(scene *s, double dx, double dy, double roll, double rms) {
 
 /* Where the source is at many instants of the exposure, with equal weights. */
 enum { FINE = 16, MOST = 500 * FINE + 16 };
+static double x_of[MOST], y_of[MOST];
 static int dense_track(const scene *s, const bst_scene_source *source, double *x, double *y) {
     const bst_camera *camera = bst_world_camera(s->world, 0, 0);
     double total = s->track.time_s[s->track.count - 1];
@@ -127,18 +127,19 @@ static int dense_track(const scene *s, const bst_scene_source *source, double *x
     return n;
 }
 
-static double x_of[MOST], y_of[MOST];
+static double mean_of(const double *values, int n) {
+    double sum = 0;
+    for (int k = 0; k < n; sum += values[k++] / n) {
+    }
+    return sum;
+}
 
 static void expect_means(scene *s, double tolerance_px) {
     assert_true(s->count > 20); /* a patch of the catalogue to V 12 lies there */
     bool object = false;
     for (int i = 0; i < s->count; i++) {
         int n = dense_track(s, &s->sources[i], x_of, y_of);
-        double x = 0, y = 0;
-        for (int k = 0; k < n; k++) {
-            x += x_of[k] / n;
-            y += y_of[k] / n;
-        }
+        double x = mean_of(x_of, n), y = mean_of(y_of, n);
         bst_truth_item item;
         bst_field_truth_item(s->field, &s->track, &s->sources[i], full, 1, &s->truth, &item);
         bst_assert_close(item.x_chief_px, x, tolerance_px);
@@ -148,6 +149,12 @@ static void expect_means(scene *s, double tolerance_px) {
         object |= item.kind == BST_SOURCE_OBJECT;
     }
     assert_true(object);
+    /* the light of a star at the mean attitude's boresight has its middle there */
+    bst_quat back = bst_quat_conj(s->truth.q_cam_from_gcrf_mean);
+    const bst_scene_source star = {.apparent_mid = bst_quat_rotate(back, (bst_vec3){0, 0, 1})};
+    int n = dense_track(s, &star, x_of, y_of);
+    bst_assert_close(mean_of(x_of, n), 511.5, tolerance_px);
+    bst_assert_close(mean_of(y_of, n), 511.5, tolerance_px);
 }
 
 static void mean_places_are_those_of_the_light(void **state) {
@@ -155,7 +162,7 @@ static void mean_places_are_those_of_the_light(void **state) {
     scene s = make_scene(GX5);
     fill(&s, 3, 8, 0, 10); /* tracked, with jitter of 10 px */
     query(&s, 3000, full);
-    expect_means(&s, 0.002);                  /* the task's: a tenth of the best centroid */
+    expect_means(&s, 0.002);                  /* a tenth of the best centroid */
     fill(&s, 200, 224, 2 * BST_DEG_RAD, 0.2); /* a streak of 300 px that turns */
     query(&s, 3000, full);
     expect_means(&s, 0.02);
@@ -167,13 +174,8 @@ static double brute_squared_image(int n, double sigma) {
     enum { SIZE = 420 };
     static double image[SIZE][SIZE];
     memset(image, 0, sizeof image);
-    double x0 = 0, y0 = 0;
-    for (int k = 0; k < n; k++) {
-        x0 += x_of[k] / n;
-        y0 += y_of[k] / n;
-    }
     const double r = sigma * sqrt(2.0);
-    int left = (int)floor(x0) - SIZE / 2, top = (int)floor(y0) - SIZE / 2;
+    int left = (int)mean_of(x_of, n) - SIZE / 2, top = (int)mean_of(y_of, n) - SIZE / 2;
     for (int k = 0; k < n; k++) {
         int cx = (int)floor(x_of[k] + 0.5) - left, cy = (int)floor(y_of[k] + 0.5) - top;
         double wx[15], wy[15];
@@ -190,10 +192,8 @@ static double brute_squared_image(int n, double sigma) {
         }
     }
     double sum = 0;
-    for (int j = 0; j < SIZE; j++) {
-        for (int i = 0; i < SIZE; i++) {
-            sum += image[j][i] * image[j][i];
-        }
+    for (int i = 0; i < SIZE * SIZE; i++) {
+        sum += image[i / SIZE][i % SIZE] * image[i / SIZE][i % SIZE];
     }
     return sum;
 }

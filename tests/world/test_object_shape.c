@@ -33,6 +33,40 @@ static void a_round_shape_is_a_sphere(void **state) {
     bst_world_free(world);
 }
 
+/* The Sun's light goes with the square of its distance from the body, the Earth's with that of the
+ * Sun from the Earth. */
+static void farther_from_the_sun(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = test_world_with(
+        "{\"name\": \"shape\", " SHAPE("{\"name\": \"s\", \"kind\": \"sphere\", \"radius_m\": 2, "
+                                       "\"material\": \"w\"}") ", " TEST_GX5 "}",
+        "");
+    const bst_world_object_info *info = bst_world_object(world, 0);
+    bst_brightness_config config = *bst_brightness_config_of(info->brightness);
+    bst_satellite_pose *pose;
+    bst_assert_ok(&ctx, bst_satellite_pose_create(&ctx, info->shape->satellite, &pose));
+    for (int earth = 0; earth < 2; earth++) {
+        config.earthshine = earth;
+        bst_scene_lighting l = {.object_m = {3e7, 2e7, 0},
+                                .eye_m = {5e7, 4e7, 1e7},
+                                .sun_m = {BST_AU_M, 1e9, 0},
+                                .sunlit_fraction = 1 - earth};
+        bst_scene_glow near, far;
+        bst_object_shape_glow(info->shape, pose, &config, &l, (bst_vec3){0, 3e3, 0}, &near);
+        bst_vec3 before = earth ? l.sun_m : bst_vec3_sub(l.sun_m, l.object_m);
+        l.sun_m = bst_vec3_axpy(l.sun_m, 0.5, before);
+        bst_vec3 after = earth ? l.sun_m : bst_vec3_sub(l.sun_m, l.object_m);
+        bst_object_shape_glow(info->shape, pose, &config, &l, (bst_vec3){0, 3e3, 0}, &far);
+        /* seen from the body the Sun turns by 1e-4 rad when it goes away from the Earth */
+        bst_assert_close(far.v_mag - near.v_mag,
+                         5.0 * log10(bst_vec3_norm(after) / bst_vec3_norm(before)),
+                         earth ? 1e-3 : 1e-9);
+    }
+    bst_satellite_pose_free(pose);
+    bst_world_free(world);
+}
+
 /* In the penumbra, with refraction and colours of the atmosphere, a shape has the light of points.
  */
 static void penumbrae_are_those_of_points(void **state) {
@@ -345,6 +379,7 @@ static void wrong_shapes_are_refused(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_round_shape_is_a_sphere),
+        cmocka_unit_test(farther_from_the_sun),
         cmocka_unit_test(a_spinning_plate_glints),
         cmocka_unit_test(glints_are_neither_missed_nor_smeared),
         cmocka_unit_test(earthlight_is_that_of_spheres),

@@ -168,14 +168,14 @@ static void light_of_materials(void **state) {
                                .photon_flux_v0_per_s_m2 = 3.6e10};
     const bst_brightness_config brightness = {.earthshine = true, .temperature_k = 300.0};
     const bst_scene_lighting lighting = {.object_m = {0.3 * BST_AU_M, 0.4 * BST_AU_M, 0.0},
-                                         .sun_m = {-0.5 * BST_AU_M, 0.4 * BST_AU_M, 0.6 * BST_AU_M},
+                                         .sun_m = {-0.5 * BST_AU_M, 0.4 * BST_AU_M, 0.9 * BST_AU_M},
                                          .sunlit_fraction = 0.7};
     bst_source_body_set_gain(&camera, &brightness, &lighting, &body);
     /* by the definition of a magnitude, pupil of 0.2 m */
     double at_1_au = pow(10.0, 0.4 * 26.74) * 3.6e10 * BST_PI * 0.01 * 0.6 * 0.8;
     double colour = m.satellite->materials[0].colour[BST_SUNLIGHT_V];
-    bst_assert_close(body.gain[0].sun / (0.7 * at_1_au * colour), 1.0 / (0.8 * 0.8 + 0.36), 1e-9);
-    bst_assert_close(body.gain[0].earth / (at_1_au * colour), 1.0 / (0.25 + 0.16 + 0.36), 1e-9);
+    bst_assert_close(body.gain[0].sun / (0.7 * at_1_au * colour), 1.0 / (0.8 * 0.8 + 0.81), 1e-9);
+    bst_assert_close(body.gain[0].earth / (at_1_au * colour), 1.0 / (0.25 + 0.16 + 0.81), 1e-9);
     bst_test_model_close(&m);
 }
 
