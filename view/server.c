@@ -15,13 +15,13 @@
 
 /* Connections that are served at the same time; further ones wait in the queue of the system. A
  * page uses up to 6. Most of the memory of a thread is never touched. */
-#define SERVED_CONNECTIONS "48"
+#define SERVED_CONNECTIONS "192"
 /* A peer that sends or takes nothing for so long loses its connection, ms. */
-#define IDLE_MS "3000"
+#define IDLE_MS "1500"
 /* Longest head of a request, bytes. */
 #define REQUEST_BYTES "8192"
 /* Bytes that are handed to the system at a time: IDLE_MS is counted for each. */
-enum { PIECE_BYTES = 65536 };
+enum { PIECE_BYTES = 16384 };
 /* Answers with data in memory at the same time. */
 enum { ANSWERS_MOST = 12 };
 
@@ -93,6 +93,7 @@ static void send_answer(struct mg_connection *peer, const answer *a, bool head_o
         size_t piece = a->bytes - sent < PIECE_BYTES ? a->bytes - sent : PIECE_BYTES;
         int n = mg_write(peer, (const char *)a->data + sent, piece);
         if (n <= 0) {
+            mg_disable_connection_keep_alive(peer); /* it may have sent further requests */
             return;
         }
         sent += (size_t)n;
@@ -270,16 +271,19 @@ static int on_request(struct mg_connection *peer) {
     const struct mg_request_info *info = mg_get_request_info(peer);
     bst_view_server *server = info->user_data;
     bst_view_request request = {.method = info->request_method,
-                                .target = info->request_uri,
-                                .body_bytes = info->content_length};
+                                .target = info->request_uri};
     char route[BST_VIEW_ROUTE_BYTES];
-    int coded;
+    int coded, lengths;
     request.host = header_of(info, "Host", &request.hosts);
     request.origin = header_of(info, "Origin", &request.origins);
-    if (header_of(info, "Transfer-Encoding", &coded)) {
-        request.body_bytes = 1; /* a body of unknown length */
+    const char *length = header_of(info, "Content-Length", &lengths);
+    if (header_of(info, "Transfer-Encoding", &coded) || (length && strcmp(length, "0") != 0)) {
+        request.body_bytes = 1; /* a body, or one of unknown length */
     }
-    int status = bst_view_guard(&request, server->token, route);
+    /* headers beyond the library's list are not seen */
+    int status = info->num_headers < MG_MAX_HEADERS
+                     ? bst_view_guard(&request, server->token, route)
+                     : BST_HTTP_BAD_REQUEST;
     bool head_only = request.method && strcmp(request.method, "HEAD") == 0;
     if (status != BST_HTTP_OK) {
         answer a = refusal(status);

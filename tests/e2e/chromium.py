@@ -1,7 +1,9 @@
 """Drives a headless Chromium over its debugging pipe (Chrome DevTools Protocol): no package beyond Debian's chromium."""
 import base64
+import fcntl
 import json
 import os
+import select
 import shutil
 import subprocess
 import tempfile
@@ -15,15 +17,18 @@ class Chromium:
 
     def __init__(self, width, height, *options):
         self.folder = tempfile.mkdtemp(prefix="boresight-chromium-")
-        read_end, self.to = os.pipe()
-        self.back, write_end = os.pipe()
-        # the browser reads commands from 3 and writes answers to 4
-        words = ["sh", "-c", f'exec "$@" 3<&{read_end} 4>&{write_end}', "sh", PROGRAM, "--headless=new", "--no-sandbox",
+        # numbers from 20 on, so that 3 and 4 are no end of a pipe
+        ends = (*os.pipe(), *os.pipe())
+        read_end, self.to, self.back, write_end = (fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 20) for end in ends)
+        for end in ends:
+            os.close(end)
+        words = [PROGRAM, "--headless=new", "--no-sandbox",
                  "--remote-debugging-pipe", "--no-first-run", "--disable-extensions", "--disable-background-networking",
                  "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars",
                  f"--user-data-dir={self.folder}", f"--window-size={width},{height}", *options, "about:blank"]
-        self.process = subprocess.Popen(words, pass_fds=(read_end, write_end), stdout=subprocess.DEVNULL,
-                                        stderr=subprocess.DEVNULL)
+        # the browser reads commands from 3 and writes answers to 4
+        self.process = subprocess.Popen(words, pass_fds=(3, 4), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                                        preexec_fn=lambda: (os.dup2(read_end, 3), os.dup2(write_end, 4)))
         os.close(read_end)
         os.close(write_end)
         self.rest, self.number, self.session = b"", 0, None
@@ -47,9 +52,10 @@ class Chromium:
 
     def _next(self):
         while b"\0" not in self.rest:
-            more = os.read(self.back, 1 << 20)
+            ready, _, _ = select.select([self.back], [], [], 120)
+            more = os.read(self.back, 1 << 20) if ready else b""
             if not more:
-                raise RuntimeError("the browser ended")
+                raise RuntimeError("the browser ended, or does not answer")
             self.rest += more
         message, self.rest = self.rest.split(b"\0", 1)
         return json.loads(message)

@@ -169,7 +169,7 @@ class App {
   }
 
   describePosition(details) {
-    const time = this.timeOf(this.current), utc = details.utc ? `${details.utc.replace('T', ' ')} UTC` : '';
+    const time = this.timeOf(this.current), utc = details.utc ? `${details.utc.replace('T', ' ').replace('Z', '')} UTC` : '';
     element('slider').value = String(this.current);
     element('slider').setAttribute('aria-valuetext', `frame ${this.current + 1} of ${this.count}, ${time.toFixed(2)} s`);
     element('position').textContent = `${this.current + 1} / ${this.count} · exposure ${details.exposure_id} · ${time.toFixed(2)} s${utc ? ` · ${utc}` : ''}`;
@@ -204,7 +204,7 @@ class App {
   }
 
   showPlaying() {
-    element('play').textContent = this.playing ? '❚❚' : '▶';
+    element('play').querySelector('path').setAttribute('d', this.playing ? 'M3 2h4v12H3zM9 2h4v12H9z' : 'M4 2v12l10-6z');
     element('play').setAttribute('aria-label', this.playing ? 'Stop' : 'Play');
     element('play').setAttribute('aria-pressed', String(this.playing));
   }

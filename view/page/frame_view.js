@@ -26,9 +26,10 @@ export class FrameView {
     this.limits = null;
     this.cursor = null;
     this.shown = Object.fromEntries(KINDS.map((kind) => [kind.name, kind.shown]));
-    this.waiting = false;
+    this.waiting = true; // until all is there
     this.makeLegend();
     this.listen();
+    this.waiting = false;
     new ResizeObserver(() => this.resize()).observe(this.stage);
     this.resize();
   }
@@ -308,32 +309,33 @@ export class FrameView {
 
   makeLegend() {
     element('legend').replaceChildren(...KINDS.map((kind) => {
-      const label = document.createElement('label'), box = document.createElement('input');
-      const sample = document.createElement('canvas'), count = document.createElement('span');
-      box.type = 'checkbox';
-      box.checked = this.shown[kind.name];
-      box.addEventListener('change', () => { this.shown[kind.name] = box.checked; this.redraw(); });
-      box.id = `show-${kind.name}`;
+      const button = document.createElement('button'), sample = document.createElement('canvas'), count = document.createElement('span');
+      button.type = 'button';
+      button.id = `show-${kind.name}`;
+      button.addEventListener('click', () => this.setShown(kind.name, !this.shown[kind.name]));
       sample.width = sample.height = 36;
       sample.setAttribute('aria-hidden', 'true');
       const context = sample.getContext('2d');
       context.strokeStyle = kind.colour;
-      context.lineWidth = 3;
+      context.lineWidth = 4;
       drawShape(context, kind.shape, 18, 18, kind.shape === 'square' ? 10 : 12);
       count.className = 'count';
       count.id = `count-${kind.name}`;
-      label.append(box, sample, kind.title, count);
-      return label;
+      button.append(sample, kind.title, count);
+      return button;
     }));
+    for (const kind of KINDS) this.setShown(kind.name, kind.shown);
+  }
+
+  setShown(name, shown) {
+    this.shown[name] = shown;
+    element(`show-${name}`).setAttribute('aria-pressed', String(shown));
+    this.redraw();
   }
 
   toggleMarks() {
     const any = Object.values(this.shown).some(Boolean);
-    for (const kind of KINDS) {
-      this.shown[kind.name] = any ? false : kind.shown;
-      element(`show-${kind.name}`).checked = this.shown[kind.name];
-    }
-    this.redraw();
+    for (const kind of KINDS) this.setShown(kind.name, any ? false : kind.shown);
   }
 
   listen() {

@@ -4,8 +4,8 @@ import { compassOf, scaleOf, skyToPixel } from './wcs.js';
 /** Kinds in the order in which they are drawn. Colours: Okabe and Ito (2008). */
 export const KINDS = [
   { name: 'stars', title: 'True stars', colour: '#b8c4cf', shape: 'plus', shown: false },
-  { name: 'identified', title: 'Identified stars', colour: '#2fc79b', shape: 'circle', shown: true },
-  { name: 'detections', title: 'Other detections', colour: '#f0e442', shape: 'circle', shown: true },
+  { name: 'identified', title: 'Stars', colour: '#2fc79b', shape: 'circle', shown: true },
+  { name: 'detections', title: 'Detections', colour: '#f0e442', shape: 'circle', shown: true },
   { name: 'objects', title: 'True objects', colour: '#e884c0', shape: 'square', shown: true },
   { name: 'target', title: 'True target', colour: '#ff7a33', shape: 'square', shown: true },
   { name: 'tracks', title: 'Tracks', colour: '#56b4e9', shape: 'diamond', shown: true },

@@ -56,7 +56,7 @@ class Panel {
     this.plots = plots;
     this.info = info;
     this.lines = [];
-    this.log = false;
+    this.log = info.name === 'pointing_error'; // from a degree in search to parts of a pixel
     this.box = document.createElement('div');
     this.box.className = 'panel';
     const head = document.createElement('div'), title = document.createElement('h3'), gap = document.createElement('span');
@@ -73,7 +73,7 @@ class Panel {
     this.scaleButton = document.createElement('button');
     this.scaleButton.type = 'button';
     this.scaleButton.textContent = 'log';
-    this.scaleButton.setAttribute('aria-pressed', 'false');
+    this.scaleButton.setAttribute('aria-pressed', String(this.log));
     this.scaleButton.setAttribute('aria-label', `Logarithmic axis of ${info.title}`);
     this.scaleButton.addEventListener('click', () => {
       this.log = !this.log;
@@ -142,7 +142,7 @@ class Panel {
   }
 
   axisTicks(extent) {
-    if (!this.log) return ticksOf(extent.low, extent.high, 3);
+    if (!this.log) return ticksOf(extent.low, extent.high, 3.5);
     const ticks = [];
     for (let k = Math.ceil(extent.low); k <= extent.high; k++) ticks.push(10 ** k);
     return ticks.length > 1 ? ticks.slice(0, 8) : ticksOf(10 ** extent.low, 10 ** extent.high, 2).filter((t) => t > 0);
