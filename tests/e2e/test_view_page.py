@@ -54,7 +54,9 @@ class Page(unittest.TestCase):
 
     def shown_pixels(self, page):
         text = page.evaluate("""(() => {
-            const bytes = new Uint8Array(document.boresight.frameView.painter.readBack().buffer);
+            const view = document.boresight.frameView;
+            view.painter.draw(view.image, view.drawing());
+            const bytes = new Uint8Array(view.painter.readBack().buffer);
             let text = '';
             for (let i = 0; i < bytes.length; i += 8192) text += String.fromCharCode(...bytes.subarray(i, i + 8192));
             return btoa(text);

@@ -115,6 +115,7 @@ class Panel {
     const { context, width, height } = prepare(this.canvas), style = getComputedStyle(document.documentElement);
     const colour = (name) => style.getPropertyValue(name).trim();
     const extent = this.extent(), bottom = height - BOTTOM, plots = this.plots;
+    this.describe();
     plots.drawBands(context, TOP, bottom, 0.13);
     context.font = '11px system-ui, sans-serif';
     context.fillStyle = colour('--faint');
@@ -138,7 +139,6 @@ class Panel {
     this.lines.forEach((points, k) => this.drawLine(context, points, toY, colour(`--line-${k % 3}`)));
     context.restore();
     plots.drawCursor(context, 0, bottom, colour('--cursor'));
-    this.describe();
   }
 
   axisTicks(extent) {
