@@ -46,6 +46,9 @@ static bst_status describe(bst_ctx *ctx, bst_view_run *run, cJSON *out) {
     static const char *const keys[] = {"scenario",    "epoch_utc", "seed",    "run",
                                        "device",      "version",   "ended",   "error",
                                        "wall_time_s", "warnings",  "summary", "git_revision"};
+    if (!run->reader) {
+        return bst_fail(ctx, BST_ERR_STATE, "%s: cannot be read", run->path);
+    }
     const cJSON *manifest = bst_run_reader_manifest(run->reader);
     cJSON_AddStringToObject(out, "name", base_name(bst_run_reader_folder(run->reader)));
     cJSON_AddStringToObject(out, "state", bst_run_state_name(bst_run_reader_state(run->reader)));
@@ -128,6 +131,9 @@ static bst_status list_events(bst_ctx *ctx, const bst_view_run *run, cJSON *out)
     bst_ctx ignored = {0};
     bst_status status;
     bool more;
+    if (!run->reader) {
+        return bst_fail(ctx, BST_ERR_STATE, "%s: cannot be read", run->path);
+    }
     cJSON *list = cJSON_AddArrayToObject(out, "events");
     cJSON_AddNumberToObject(
         out, "total", (double)bst_run_reader_int(run->reader, "SELECT count(*) FROM events", 0, 0));

@@ -108,13 +108,6 @@ void bst_view_add_panels(const bst_view_run *run, const bst_view_sensor *s, cJSO
     }
 }
 
-void bst_view_free_lines(bst_view_sensor *s) {
-    for (int i = 0; i < BST_VIEW_LINES; i++) {
-        free(s->lines[i].samples);
-        s->lines[i] = (bst_view_line){.samples = NULL};
-    }
-}
-
 /* Frees the lines that were not used for the longest time, until there is room for another one. */
 static void make_room(bst_view_run *run, const bst_view_line *keep) {
     while (run->samples > SAMPLES_MOST) {

@@ -1,6 +1,7 @@
 #include "view/recorded_run.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -45,45 +46,95 @@ static void read_size(const bst_run_reader *reader, bst_view_sensor *s) {
     bst_io_rows_close(rows);
 }
 
+/* Opens the folder at run->path and reads which sensors it has. */
+static bst_status load(bst_ctx *ctx, bst_view_run *run) {
+    bst_run_sensor sensors[BST_EXPORT_SENSORS];
+    int count = 0;
+    BST_TRY(bst_run_reader_open(ctx, run->path, &run->reader));
+    BST_TRY(bst_run_sensors(ctx, run->reader, NULL, sensors, &count));
+    for (int i = 0; i < count; i++) {
+        run->sensor[i] = (bst_view_sensor){.sensor = sensors[i]};
+        run->sensor[i].target = find_target(run->reader, sensors[i].target);
+        read_size(run->reader, &run->sensor[i]);
+    }
+    run->sensors = count;
+    return BST_OK;
+}
+
+/* Closes the folder and forgets what was read. */
+static void unload(bst_view_run *run) {
+    for (int i = 0; i < run->sensors; i++) {
+        bst_view_sensor *s = &run->sensor[i];
+        bst_fits_reader_close(s->pixels);
+        bst_fits_source_close(s->header);
+        for (int k = 0; k < BST_VIEW_LINES; k++) {
+            free(s->lines[k].samples);
+        }
+        free(s->exposures);
+    }
+    bst_run_reader_close(run->reader);
+    run->reader = NULL;
+    run->sensors = 0;
+    run->samples = 0;
+}
+
 bst_status bst_view_run_open(bst_ctx *ctx, const char *path, bst_view_run **out) {
     bst_view_run *run = calloc(1, sizeof *run);
-    bst_run_sensor sensors[BST_EXPORT_SENSORS];
     *out = NULL;
     if (!run || pthread_mutex_init(&run->lock, NULL) != 0) {
         free(run);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the run");
     }
-    bst_status status = bst_run_reader_open(ctx, path, &run->reader);
-    status =
-        status == BST_OK ? bst_run_sensors(ctx, run->reader, NULL, sensors, &run->sensors) : status;
+    bst_status status = BST_OK;
+    int n = snprintf(run->path, sizeof run->path, "%s", path);
+    if (n < 0 || (size_t)n >= sizeof run->path) {
+        status = bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
+    }
+    status = status == BST_OK ? load(ctx, run) : status;
     if (status != BST_OK) {
-        run->sensors = 0;
         bst_view_run_close(run);
         return status;
-    }
-    for (int i = 0; i < run->sensors; i++) {
-        run->sensor[i].sensor = sensors[i];
-        run->sensor[i].target = find_target(run->reader, sensors[i].target);
-        read_size(run->reader, &run->sensor[i]);
     }
     *out = run;
     return BST_OK;
 }
 
+/* Takes the name that a folder gets when its run is complete. False: `path` is no unfinished one.
+ */
+static bool use_final_name(char *path) {
+    static const char end[] = ".partial";
+    size_t bytes = strlen(path);
+    while (bytes > 1 && path[bytes - 1] == '/') {
+        bytes--;
+    }
+    if (bytes < sizeof end || strncmp(path + bytes - (sizeof end - 1), end, sizeof end - 1) != 0) {
+        return false;
+    }
+    path[bytes - (sizeof end - 1)] = '\0';
+    return true;
+}
+
+bst_status bst_view_run_refresh(bst_ctx *ctx, bst_view_run *run) {
+    pthread_mutex_lock(&run->lock);
+    bst_status status = BST_OK;
+    if (!run->reader || bst_run_reader_state(run->reader) == BST_RUN_RUNNING) {
+        unload(run);
+        status = load(ctx, run);
+        if (status == BST_ERR_NOT_FOUND && use_final_name(run->path)) {
+            unload(run);
+            status = load(ctx, run);
+        }
+    }
+    pthread_mutex_unlock(&run->lock);
+    return status;
+}
+
 void bst_view_run_close(bst_view_run *run) {
-    if (!run) {
-        return;
+    if (run) {
+        unload(run);
+        pthread_mutex_destroy(&run->lock);
+        free(run);
     }
-    for (int i = 0; i < run->sensors; i++) {
-        bst_view_sensor *s = &run->sensor[i];
-        bst_fits_reader_close(s->pixels);
-        bst_fits_source_close(s->header);
-        bst_view_free_lines(s);
-        free(s->exposures);
-    }
-    bst_run_reader_close(run->reader);
-    pthread_mutex_destroy(&run->lock);
-    free(run);
 }
 
 /* ------------------------------------------------------------------ the list of exposures */
@@ -186,7 +237,7 @@ static bst_status list_file(bst_ctx *ctx, bst_view_sensor *s) {
     return BST_OK;
 }
 
-bst_status bst_view_open_pixels(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s) {
+static bst_status open_pixels(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s) {
     char path[4096];
     if (s->pixels) {
         return BST_OK;
@@ -200,7 +251,7 @@ bst_status bst_view_open_pixels(bst_ctx *ctx, bst_view_run *run, bst_view_sensor
 
 static bst_status list_exposures(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s) {
     bst_ctx problem = {0};
-    bst_status status = bst_view_open_pixels(&problem, run, s);
+    bst_status status = open_pixels(&problem, run, s);
     if (status != BST_OK && s->sensor.file[0]) {
         bst_run_reader_note_problem(run->reader, "%s", problem.message);
     }
@@ -272,7 +323,7 @@ static bst_status copy_pixels(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *
     if (frame < 0 || (uint64_t)frame >= s->count || s->exposures[frame].fits_index < 0) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "frame %lld is not kept", (long long)frame);
     }
-    BST_TRY(bst_view_open_pixels(ctx, run, s));
+    BST_TRY(open_pixels(ctx, run, s));
     BST_TRY(bst_fits_reader_frame(ctx, s->pixels, s->exposures[frame].fits_index, &image));
     out->bytes = (size_t)image.width * (size_t)image.height * sizeof *image.pixels;
     out->data = malloc(out->bytes + 1);

@@ -44,6 +44,7 @@ typedef struct bst_view_sensor {
 
 struct bst_view_run {
     pthread_mutex_t lock; /* of everything below: readers of tables and files are not shared */
+    char path[4096];      /* of the folder, as it was given */
     bst_run_reader *reader;
     int sensors;
     bst_view_sensor sensor[BST_EXPORT_SENSORS];
@@ -59,13 +60,5 @@ bst_status bst_view_find_sensor(bst_ctx *ctx, bst_view_run *run, int64_t number,
 
 /* Adds the panels of a sensor to its description: [{name, title, unit, lines}]. */
 void bst_view_add_panels(const bst_view_run *run, const bst_view_sensor *sensor, cJSON *out);
-
-/* Frees the samples of all lines of a sensor. */
-void bst_view_free_lines(bst_view_sensor *sensor);
-
-/* Opens the file of a sensor's pixels. BST_ERR_NOT_FOUND: not kept; else as bst_fits_reader_open.
- */
-bst_status bst_view_open_pixels(bst_ctx *ctx, bst_view_run *run,
-                                bst_view_sensor *sensor) BST_MUST_CHECK;
 
 #endif

@@ -167,6 +167,11 @@ static bst_status get_run(bst_ctx *ctx, bst_view_run *run, data_request *r) {
     return bst_view_run_describe(ctx, run, &r->json);
 }
 
+static bst_status get_refreshed(bst_ctx *ctx, bst_view_run *run, data_request *r) {
+    BST_TRY(bst_view_run_refresh(ctx, run));
+    return bst_view_run_describe(ctx, run, &r->json);
+}
+
 static bst_status get_events(bst_ctx *ctx, bst_view_run *run, data_request *r) {
     return bst_view_run_events(ctx, run, &r->json);
 }
@@ -195,10 +200,10 @@ static bst_status get_plot(bst_ctx *ctx, bst_view_run *run, data_request *r) {
 static const struct {
     const char *route;
     bst_status (*get)(bst_ctx *ctx, bst_view_run *run, data_request *r);
-} data_routes[] = {{"api/run", get_run},     {"api/events", get_events},
-                   {"api/modes", get_modes}, {"api/frames", get_frames},
-                   {"api/frame", get_frame}, {"api/pixels", get_pixels},
-                   {"api/plot", get_plot}};
+} data_routes[] = {{"api/run", get_run},       {"api/refresh", get_refreshed},
+                   {"api/events", get_events}, {"api/modes", get_modes},
+                   {"api/frames", get_frames}, {"api/frame", get_frame},
+                   {"api/pixels", get_pixels}, {"api/plot", get_plot}};
 enum { DATA_ROUTES = sizeof data_routes / sizeof *data_routes };
 
 static int status_of(bst_status status) {
@@ -270,8 +275,7 @@ static const char *header_of(const struct mg_request_info *info, const char *nam
 static int on_request(struct mg_connection *peer) {
     const struct mg_request_info *info = mg_get_request_info(peer);
     bst_view_server *server = info->user_data;
-    bst_view_request request = {.method = info->request_method,
-                                .target = info->request_uri};
+    bst_view_request request = {.method = info->request_method, .target = info->request_uri};
     char route[BST_VIEW_ROUTE_BYTES];
     int coded, lengths;
     request.host = header_of(info, "Host", &request.hosts);
@@ -281,9 +285,8 @@ static int on_request(struct mg_connection *peer) {
         request.body_bytes = 1; /* a body, or one of unknown length */
     }
     /* headers beyond the library's list are not seen */
-    int status = info->num_headers < MG_MAX_HEADERS
-                     ? bst_view_guard(&request, server->token, route)
-                     : BST_HTTP_BAD_REQUEST;
+    int status = info->num_headers < MG_MAX_HEADERS ? bst_view_guard(&request, server->token, route)
+                                                    : BST_HTTP_BAD_REQUEST;
     bool head_only = request.method && strcmp(request.method, "HEAD") == 0;
     if (status != BST_HTTP_OK) {
         answer a = refusal(status);

@@ -7,6 +7,8 @@ Usage, from the repository root: /usr/bin/python3 tests/e2e/test_view_page.py BO
 import base64
 import json
 import os
+import subprocess
+import time
 import unittest
 
 import numpy
@@ -28,6 +30,30 @@ class Cube(test_view.Checks):
         with fits.open(os.path.join(out, "frames.fits")) as file:
             self.check_pixels(viewer, list(next(hdu.data for hdu in file if numpy.ndim(hdu.data) == 3)))
         self.check_marks(viewer, out, 1)
+        self.assertEqual(viewer.end()[0], 0)
+
+
+class Running(unittest.TestCase):
+    def test_run_in_progress(self):
+        """A later look finds what was recorded since, and in the end the folder under its final name."""
+        out = os.path.join(runs.scratch(), "run")
+        process = subprocess.Popen(runs.command(runs.STARE, out, "/pacing/mode=realtime", duration=12), stdout=subprocess.DEVNULL)
+        while not os.path.exists(out + ".partial/run.sqlite"):
+            self.assertIsNone(process.poll())
+            time.sleep(0.05)
+        viewer = test_view.Viewer(out + ".partial/")
+        counts, states = [0], set()
+        while "complete" not in states:
+            described = viewer.json("api/refresh")
+            states.add(described["state"])
+            self.assertLessEqual(states, {"still running", "left over from a killed run", "complete"})
+            counts.append(described["sensors"][0]["frames"])
+            self.assertGreaterEqual(counts[-1], counts[-2])
+            time.sleep(0.5)
+        self.assertGreater(len(set(counts)), 3)
+        self.assertEqual((process.wait(60), counts[-1], described["name"]), (0, 12, "run"))
+        self.assertEqual(viewer.json("api/refresh")["sensors"][0]["frames"], 12)
+        self.assertEqual(len(viewer.get("api/pixels?frame=11")[0]), 2 * 1024 * 1024)
         self.assertEqual(viewer.end()[0], 0)
 
 

@@ -10,6 +10,10 @@ const CACHE_BYTES = 192e6;
 /** Time that a frame is shown while playing, ms. */
 const PLAY_MS = 90;
 
+/** State of a run in progress (bst_run_state_name), and time between two looks at its folder, ms. */
+const RUNNING = 'still running';
+const REFRESH_MS = 2000;
+
 const element = (id) => document.getElementById(id);
 
 class App {
@@ -39,6 +43,43 @@ class App {
       Object.assign(this.frameView.view, { x, y, scale, fitted: false });
       this.frameView.redraw();
     }
+    if (this.run.state === RUNNING) this.follow();
+  }
+
+  /** Asks for what was recorded since, while the run is in progress; stays at the end if it is there. */
+  async follow() {
+    while (this.run.state === RUNNING) {
+      await new Promise((done) => { setTimeout(done, REFRESH_MS); });
+      try {
+        const { sensor } = this, run = await getJson('refresh'), frames = await getNumbers('frames', { sensor });
+        const [modes, events] = await Promise.all([getJson('modes', { sensor }), getJson('events')]);
+        if (sensor !== this.sensor) continue;
+        const atEnd = this.current === this.count - 1;
+        this.run = run;
+        this.describeRun();
+        element('sensor').value = String(sensor);
+        for (const frame of this.cache.keys()) { // may have been without pixels yet
+          if (frame >= this.count - 2 && frame !== this.current) this.cache.delete(frame);
+        }
+        this.setFrames(frames);
+        this.showEvents(events);
+        this.plots.extend(run.sensors[sensor].panels, modes.modes, this.events, this.lastTime(modes.modes));
+        if (atEnd && this.count) await this.goTo(this.count - 1);
+      } catch (error) {
+        this.showProblems([`The run cannot be followed: ${error.message}`]);
+      }
+    }
+  }
+
+  /** @param {Float64Array} frames numbers of all frames */
+  setFrames(frames) {
+    this.frames = frames;
+    this.count = frames.length / NUMBERS;
+    element('slider').max = String(Math.max(0, this.count - 1));
+  }
+
+  lastTime(modes) {
+    return Math.max(this.count ? this.timeOf(this.count - 1) : 1, ...modes.slice(-1).map((mode) => mode.time_s));
   }
 
   describeRun() {
@@ -84,10 +125,8 @@ class App {
     this.frameView.sensorHeight = info.height_px;
     this.frameView.reset();
     this.cache.clear();
-    this.frames = await getNumbers('frames', { sensor });
-    this.count = this.frames.length / NUMBERS;
+    this.setFrames(await getNumbers('frames', { sensor }));
     this.current = -1;
-    element('slider').max = String(Math.max(0, this.count - 1));
     if (this.count === 0) {
       this.frameView.show(null, null, 'This sensor has no frames.');
       element('position').textContent = 'no frames';
@@ -97,8 +136,7 @@ class App {
     const [modes, events] = await Promise.all([getJson('modes', { sensor }), getJson('events')]);
     this.showEvents(events);
     const first = this.count ? this.frames[1] - (this.frames[2] || 0) / 2 : 0;
-    const last = this.count ? this.timeOf(this.count - 1) : 1;
-    this.plots.show(sensor, info.panels, modes.modes, this.events, Math.min(0, first), Math.max(last, ...modes.modes.slice(-1).map((m) => m.time_s)));
+    this.plots.show(sensor, info.panels, modes.modes, this.events, Math.min(0, first), this.lastTime(modes.modes));
     if (this.count) this.plots.setCursor(this.timeOf(Math.max(0, this.current)));
   }
 

@@ -223,6 +223,20 @@ export class Plots {
     this.setRange(this.all.from, this.all.to);
   }
 
+  /** More of the same run: what is in view stays in view, unless all of it was. */
+  extend(panels, modes, events, to) {
+    if (panels.length !== this.panels.length) {
+      this.show(this.sensor, panels, modes, events, this.all.from, to);
+      return;
+    }
+    const all = this.range.from === this.all.from && this.range.to === this.all.to;
+    this.modes = modes;
+    this.events = events;
+    this.all = { from: this.all.from, to: Math.max(to, this.all.to) };
+    if (all) this.setRange(this.all.from, this.all.to);
+    else this.draw();
+  }
+
   setRange(from, to) {
     const least = (this.all.to - this.all.from) * 1e-7;
     if (!(to - from > least)) return;
