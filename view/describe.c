@@ -46,9 +46,6 @@ static bst_status describe(bst_ctx *ctx, bst_view_run *run, cJSON *out) {
     static const char *const keys[] = {"scenario",    "epoch_utc", "seed",    "run",
                                        "device",      "version",   "ended",   "error",
                                        "wall_time_s", "warnings",  "summary", "git_revision"};
-    if (!run->reader) {
-        return bst_fail(ctx, BST_ERR_STATE, "%s: cannot be read", run->path);
-    }
     const cJSON *manifest = bst_run_reader_manifest(run->reader);
     cJSON_AddStringToObject(out, "name", base_name(bst_run_reader_folder(run->reader)));
     cJSON_AddStringToObject(out, "state", bst_run_state_name(bst_run_reader_state(run->reader)));
@@ -80,9 +77,9 @@ static bst_status keep_or_delete(bst_status status, cJSON **out) {
 
 bst_status bst_view_run_describe(bst_ctx *ctx, bst_view_run *run, cJSON **out) {
     *out = cJSON_CreateObject();
-    pthread_mutex_lock(&run->lock);
-    bst_status status = describe(ctx, run, *out);
-    pthread_mutex_unlock(&run->lock);
+    bst_status status = bst_view_lock(ctx, run);
+    status = status == BST_OK ? describe(ctx, run, *out) : status;
+    bst_view_unlock(run);
     return keep_or_delete(status, out);
 }
 
@@ -120,9 +117,10 @@ static bst_status list_modes(bst_ctx *ctx, bst_view_run *run, int64_t number, cJ
 
 bst_status bst_view_run_modes(bst_ctx *ctx, bst_view_run *run, int64_t sensor, cJSON **out) {
     *out = cJSON_CreateObject();
-    pthread_mutex_lock(&run->lock);
-    bst_status status = list_modes(ctx, run, sensor, cJSON_AddArrayToObject(*out, "modes"));
-    pthread_mutex_unlock(&run->lock);
+    bst_status status = bst_view_lock(ctx, run);
+    status = status == BST_OK ? list_modes(ctx, run, sensor, cJSON_AddArrayToObject(*out, "modes"))
+                              : status;
+    bst_view_unlock(run);
     return keep_or_delete(status, out);
 }
 
@@ -131,9 +129,6 @@ static bst_status list_events(bst_ctx *ctx, const bst_view_run *run, cJSON *out)
     bst_ctx ignored = {0};
     bst_status status;
     bool more;
-    if (!run->reader) {
-        return bst_fail(ctx, BST_ERR_STATE, "%s: cannot be read", run->path);
-    }
     cJSON *list = cJSON_AddArrayToObject(out, "events");
     cJSON_AddNumberToObject(
         out, "total", (double)bst_run_reader_int(run->reader, "SELECT count(*) FROM events", 0, 0));
@@ -156,8 +151,8 @@ static bst_status list_events(bst_ctx *ctx, const bst_view_run *run, cJSON *out)
 
 bst_status bst_view_run_events(bst_ctx *ctx, bst_view_run *run, cJSON **out) {
     *out = cJSON_CreateObject();
-    pthread_mutex_lock(&run->lock);
-    bst_status status = list_events(ctx, run, *out);
-    pthread_mutex_unlock(&run->lock);
+    bst_status status = bst_view_lock(ctx, run);
+    status = status == BST_OK ? list_events(ctx, run, *out) : status;
+    bst_view_unlock(run);
     return keep_or_delete(status, out);
 }

@@ -282,10 +282,10 @@ bst_status bst_view_run_frame(bst_ctx *ctx, bst_view_run *run, int64_t sensor, i
                               cJSON **out) {
     bst_view_sensor *s;
     *out = cJSON_CreateObject();
-    pthread_mutex_lock(&run->lock);
-    bst_status status = bst_view_find_sensor(ctx, run, sensor, &s);
+    bst_status status = bst_view_lock(ctx, run);
+    status = status == BST_OK ? bst_view_find_sensor(ctx, run, sensor, &s) : status;
     status = status == BST_OK ? describe_frame(ctx, run, s, frame, *out) : status;
-    pthread_mutex_unlock(&run->lock);
+    bst_view_unlock(run);
     if (status != BST_OK) {
         cJSON_Delete(*out);
         *out = NULL;

@@ -231,9 +231,9 @@ static bst_status plot_panel(bst_ctx *ctx, bst_view_run *run, const bst_view_plo
 bst_status bst_view_run_plot(bst_ctx *ctx, bst_view_run *run, const bst_view_plot *plot,
                              bst_view_bytes *out) {
     *out = (bst_view_bytes){.data = NULL};
-    pthread_mutex_lock(&run->lock);
-    bst_status status = plot_panel(ctx, run, plot, out);
-    pthread_mutex_unlock(&run->lock);
+    bst_status status = bst_view_lock(ctx, run);
+    status = status == BST_OK ? plot_panel(ctx, run, plot, out) : status;
+    bst_view_unlock(run);
     if (status != BST_OK) {
         free(out->data);
         *out = (bst_view_bytes){.data = NULL};

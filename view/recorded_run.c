@@ -46,59 +46,6 @@ static void read_size(const bst_run_reader *reader, bst_view_sensor *s) {
     bst_io_rows_close(rows);
 }
 
-/* Opens the folder at run->path and reads which sensors it has. */
-static bst_status load(bst_ctx *ctx, bst_view_run *run) {
-    bst_run_sensor sensors[BST_EXPORT_SENSORS];
-    int count = 0;
-    BST_TRY(bst_run_reader_open(ctx, run->path, &run->reader));
-    BST_TRY(bst_run_sensors(ctx, run->reader, NULL, sensors, &count));
-    for (int i = 0; i < count; i++) {
-        run->sensor[i] = (bst_view_sensor){.sensor = sensors[i]};
-        run->sensor[i].target = find_target(run->reader, sensors[i].target);
-        read_size(run->reader, &run->sensor[i]);
-    }
-    run->sensors = count;
-    return BST_OK;
-}
-
-/* Closes the folder and forgets what was read. */
-static void unload(bst_view_run *run) {
-    for (int i = 0; i < run->sensors; i++) {
-        bst_view_sensor *s = &run->sensor[i];
-        bst_fits_reader_close(s->pixels);
-        bst_fits_source_close(s->header);
-        for (int k = 0; k < BST_VIEW_LINES; k++) {
-            free(s->lines[k].samples);
-        }
-        free(s->exposures);
-    }
-    bst_run_reader_close(run->reader);
-    run->reader = NULL;
-    run->sensors = 0;
-    run->samples = 0;
-}
-
-bst_status bst_view_run_open(bst_ctx *ctx, const char *path, bst_view_run **out) {
-    bst_view_run *run = calloc(1, sizeof *run);
-    *out = NULL;
-    if (!run || pthread_mutex_init(&run->lock, NULL) != 0) {
-        free(run);
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the run");
-    }
-    bst_status status = BST_OK;
-    int n = snprintf(run->path, sizeof run->path, "%s", path);
-    if (n < 0 || (size_t)n >= sizeof run->path) {
-        status = bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
-    }
-    status = status == BST_OK ? load(ctx, run) : status;
-    if (status != BST_OK) {
-        bst_view_run_close(run);
-        return status;
-    }
-    *out = run;
-    return BST_OK;
-}
-
 /* Takes the name that a folder gets when its run is complete. False: `path` is no unfinished one.
  */
 static bool use_final_name(char *path) {
@@ -114,24 +61,96 @@ static bool use_final_name(char *path) {
     return true;
 }
 
-bst_status bst_view_run_refresh(bst_ctx *ctx, bst_view_run *run) {
-    pthread_mutex_lock(&run->lock);
-    bst_status status = BST_OK;
-    if (!run->reader || bst_run_reader_state(run->reader) == BST_RUN_RUNNING) {
-        unload(run);
-        status = load(ctx, run);
-        if (status == BST_ERR_NOT_FOUND && use_final_name(run->path)) {
-            unload(run);
-            status = load(ctx, run);
+/* Opens the folder, under its final name if the run ended meanwhile. */
+static bst_status open_reader(bst_ctx *ctx, bst_view_run *run) {
+    bst_status status = bst_run_reader_open(ctx, run->path, &run->reader);
+    if (status == BST_ERR_NOT_FOUND && run->running && use_final_name(run->path)) {
+        status = bst_run_reader_open(ctx, run->path, &run->reader);
+    }
+    return status;
+}
+
+/* Forgets what was read about the sensors. */
+static void forget_sensors(bst_view_run *run) {
+    for (int i = 0; i < run->sensors; i++) {
+        bst_view_sensor *s = &run->sensor[i];
+        bst_fits_reader_close(s->pixels);
+        bst_fits_source_close(s->header);
+        for (int k = 0; k < BST_VIEW_LINES; k++) {
+            free(s->lines[k].samples);
         }
+        free(s->exposures);
+    }
+    run->sensors = 0;
+    run->samples = 0;
+}
+
+/* Reads which sensors the run has, and whether it is in progress. */
+static bst_status read_sensors(bst_ctx *ctx, bst_view_run *run) {
+    bst_run_sensor sensors[BST_EXPORT_SENSORS];
+    int count = 0;
+    run->running = bst_run_reader_state(run->reader) == BST_RUN_RUNNING;
+    BST_TRY(bst_run_sensors(ctx, run->reader, NULL, sensors, &count));
+    for (int i = 0; i < count; i++) {
+        run->sensor[i] = (bst_view_sensor){.sensor = sensors[i]};
+        run->sensor[i].target = find_target(run->reader, sensors[i].target);
+        read_size(run->reader, &run->sensor[i]);
+    }
+    run->sensors = count;
+    return BST_OK;
+}
+
+bst_status bst_view_lock(bst_ctx *ctx, bst_view_run *run) {
+    pthread_mutex_lock(&run->lock);
+    return run->reader ? BST_OK : open_reader(ctx, run);
+}
+
+void bst_view_unlock(bst_view_run *run) {
+    if (run->running) {
+        bst_run_reader_close(run->reader);
+        run->reader = NULL;
     }
     pthread_mutex_unlock(&run->lock);
+}
+
+bst_status bst_view_run_open(bst_ctx *ctx, const char *path, bst_view_run **out) {
+    bst_view_run *run = calloc(1, sizeof *run);
+    *out = NULL;
+    if (!run || pthread_mutex_init(&run->lock, NULL) != 0) {
+        free(run);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the run");
+    }
+    int n = snprintf(run->path, sizeof run->path, "%s", path);
+    bst_status status = n >= 0 && (size_t)n < sizeof run->path
+                            ? BST_OK
+                            : bst_fail(ctx, BST_ERR_ARGUMENT, "%s: the path is too long", path);
+    if (status == BST_OK) {
+        status = bst_view_lock(ctx, run);
+        status = status == BST_OK ? read_sensors(ctx, run) : status;
+        bst_view_unlock(run);
+    }
+    if (status != BST_OK) {
+        bst_view_run_close(run);
+        return status;
+    }
+    *out = run;
+    return BST_OK;
+}
+
+bst_status bst_view_run_refresh(bst_ctx *ctx, bst_view_run *run) {
+    bst_status status = bst_view_lock(ctx, run);
+    if (status == BST_OK && run->running) {
+        forget_sensors(run);
+        status = read_sensors(ctx, run);
+    }
+    bst_view_unlock(run);
     return status;
 }
 
 void bst_view_run_close(bst_view_run *run) {
     if (run) {
-        unload(run);
+        forget_sensors(run);
+        bst_run_reader_close(run->reader);
         pthread_mutex_destroy(&run->lock);
         free(run);
     }
@@ -310,10 +329,10 @@ bst_status bst_view_run_frames(bst_ctx *ctx, bst_view_run *run, int64_t sensor,
                                bst_view_bytes *out) {
     bst_view_sensor *s;
     *out = (bst_view_bytes){.data = NULL};
-    pthread_mutex_lock(&run->lock);
-    bst_status status = bst_view_find_sensor(ctx, run, sensor, &s);
+    bst_status status = bst_view_lock(ctx, run);
+    status = status == BST_OK ? bst_view_find_sensor(ctx, run, sensor, &s) : status;
     status = status == BST_OK ? copy_list(ctx, s, out) : status;
-    pthread_mutex_unlock(&run->lock);
+    bst_view_unlock(run);
     return status;
 }
 
@@ -340,9 +359,9 @@ bst_status bst_view_run_pixels(bst_ctx *ctx, bst_view_run *run, int64_t sensor, 
                                bst_view_bytes *out) {
     bst_view_sensor *s;
     *out = (bst_view_bytes){.data = NULL};
-    pthread_mutex_lock(&run->lock);
-    bst_status status = bst_view_find_sensor(ctx, run, sensor, &s);
+    bst_status status = bst_view_lock(ctx, run);
+    status = status == BST_OK ? bst_view_find_sensor(ctx, run, sensor, &s) : status;
     status = status == BST_OK ? copy_pixels(ctx, run, s, frame, out) : status;
-    pthread_mutex_unlock(&run->lock);
+    bst_view_unlock(run);
     return status;
 }

@@ -33,13 +33,12 @@ void bst_view_run_close(bst_view_run *run);
 /* Reads the folder again if its run was in progress: what was recorded since is then found. A run
  * that ended meanwhile is found under its final name.
  *
- * Errors:    those of bst_view_run_open; the other functions then find no sensor, until a later
- *            refresh */
+ * Errors:    those of bst_view_run_open */
 bst_status bst_view_run_refresh(bst_ctx *ctx, bst_view_run *run) BST_MUST_CHECK;
 
 /* Describes the run: name, state, problems, figures, sensors with their panels.
  *
- * Errors:    BST_ERR_STATE: the folder could not be read again; those of the list of exposures
+ * Errors:    those of bst_run_reader_open, while the run is in progress; BST_ERR_MEMORY
  * Ownership: free *out with cJSON_Delete */
 bst_status bst_view_run_describe(bst_ctx *ctx, bst_view_run *run, cJSON **out) BST_MUST_CHECK;
 

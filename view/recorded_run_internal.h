@@ -43,14 +43,25 @@ typedef struct bst_view_sensor {
 } bst_view_sensor;
 
 struct bst_view_run {
-    pthread_mutex_t lock; /* of everything below: readers of tables and files are not shared */
-    char path[4096];      /* of the folder, as it was given */
-    bst_run_reader *reader;
+    pthread_mutex_t lock;   /* of everything below: readers of tables and files are not shared */
+    char path[4096];        /* of the folder, as it was given */
+    bst_run_reader *reader; /* NULL between calls while the run is in progress */
+    bool running;           /* it was in progress when its sensors were read */
     int sensors;
     bst_view_sensor sensor[BST_EXPORT_SENSORS];
     uint64_t requests;
     size_t samples; /* held by all lines */
 };
+
+/* Begins a call: locks the run and opens its tables if they are not open. End it with
+ * bst_view_unlock, also after an error.
+ *
+ * Errors:    those of bst_run_reader_open */
+bst_status bst_view_lock(bst_ctx *ctx, bst_view_run *run) BST_MUST_CHECK;
+
+/* Ends a call. The tables of a run in progress are closed: an open connection would keep the run
+ * from merging its journal at its end. */
+void bst_view_unlock(bst_view_run *run);
 
 /* Finds a sensor by its number and lists its exposures. Call it with the lock held.
  *
