@@ -57,20 +57,32 @@ static void add_polynomial(cJSON *wcs, bst_fits_source *source, const char *name
     }
 }
 
-static void add_wcs(cJSON *node, bst_fits_source *source) {
-    const double crpix[2] = {keyword(source, "CRPIX1"), keyword(source, "CRPIX2")};
-    const double crval[2] = {keyword(source, "CRVAL1"), keyword(source, "CRVAL2")};
-    const double cd[4] = {keyword(source, "CD1_1"), keyword(source, "CD1_2"),
-                          keyword(source, "CD2_1"), keyword(source, "CD2_2")};
-    if (!isfinite(crpix[0] + crpix[1] + crval[0] + crval[1] + cd[0] + cd[1] + cd[2] + cd[3])) {
-        return;
+/* Adds a WCS of crpix, crval (deg) and cd (deg per pixel), eight numbers. NULL: one is missing. */
+static cJSON *make_wcs(cJSON *node, const double value[8]) {
+    for (int i = 0; i < 8; i++) {
+        if (!isfinite(value[i])) {
+            return NULL;
+        }
     }
     cJSON *wcs = cJSON_AddObjectToObject(node, "wcs");
-    cJSON_AddItemToObject(wcs, "crpix", cJSON_CreateDoubleArray(crpix, 2));
-    cJSON_AddItemToObject(wcs, "crval_deg", cJSON_CreateDoubleArray(crval, 2));
-    cJSON_AddItemToObject(wcs, "cd_deg", cJSON_CreateDoubleArray(cd, 4));
-    add_polynomial(wcs, source, "A");
-    add_polynomial(wcs, source, "B");
+    cJSON_AddItemToObject(wcs, "crpix", cJSON_CreateDoubleArray(value, 2));
+    cJSON_AddItemToObject(wcs, "crval_deg", cJSON_CreateDoubleArray(value + 2, 2));
+    cJSON_AddItemToObject(wcs, "cd_deg", cJSON_CreateDoubleArray(value + 4, 4));
+    return wcs;
+}
+
+static void add_wcs(cJSON *node, bst_fits_source *source) {
+    static const char *const names[8] = {"CRPIX1", "CRPIX2", "CRVAL1", "CRVAL2",
+                                         "CD1_1",  "CD1_2",  "CD2_1",  "CD2_2"};
+    double value[8];
+    for (int i = 0; i < 8; i++) {
+        value[i] = keyword(source, names[i]);
+    }
+    cJSON *wcs = make_wcs(node, value);
+    if (wcs) {
+        add_polynomial(wcs, source, "A");
+        add_polynomial(wcs, source, "B");
+    }
 }
 
 /* Adds what the header of the frame says. A file that cannot be read adds nothing. */
@@ -223,6 +235,36 @@ static void add_track(cJSON *list, const bst_io_rows *rows, const bst_view_expos
     bst_json_add_number(node, "dec_deg", bst_io_rows_real(rows, 8));
     cJSON_AddNumberToObject(node, "misses", (double)bst_io_rows_int(rows, 9));
     bst_json_add_number(node, "v_mag", bst_io_rows_real(rows, 10));
+}
+
+/* Adds the WCS that the tables have, which lacks the distortion, where the header could not be
+ * read: the file of a run in progress, or of one that was killed, may end within a frame. */
+static bst_status add_recorded_wcs(bst_ctx *ctx, const bst_view_run *run, const bst_view_sensor *s,
+                                   const bst_view_exposure *frame, cJSON *node) {
+    bst_io_rows *rows;
+    bst_ctx ignored = {0};
+    bool more;
+    double value[8];
+    if (open_from(&ignored, run, s->sensor.index, "frames",
+                  "crpix1, crpix2, crval1_deg, crval2_deg, cd1_1_deg, cd1_2_deg, cd2_1_deg,"
+                  " cd2_2_deg",
+                  frame->id, &rows) != BST_OK) {
+        return BST_OK;
+    }
+    bst_status status = bst_io_rows_next(ctx, rows, &more);
+    if (status == BST_OK && more && bst_io_rows_int(rows, 0) == frame->id) {
+        for (int i = 0; i < 8; i++) {
+            value[i] = bst_io_rows_real(rows, i + 1);
+        }
+        cJSON *wcs = make_wcs(node, value);
+        if (wcs) {
+            cJSON_AddArrayToObject(wcs, "A");
+            cJSON_AddArrayToObject(wcs, "B");
+            cJSON_AddTrueToObject(wcs, "without_distortion");
+        }
+    }
+    bst_io_rows_close(rows);
+    return status;
 }
 
 /* Names of the objects, for their numbers in the truth. */

@@ -8,6 +8,7 @@ import hashlib
 import json
 import os
 import re
+import shutil
 import signal
 import socket
 import sqlite3
@@ -155,6 +156,16 @@ class View(Checks):
             self.assertEqual(frame["gain_e_per_dn"], header["GAIN"])
             self.assertEqual(frame["utc"], header["DATE-AVG"][:23] + "Z")
             self.assertEqual(rows[2][2], header["EXPTIME"])
+        cut = os.path.join(runs.scratch(), "cut")  # as after a kill: within the last frame
+        shutil.copytree(self.made, cut)
+        with open(os.path.join(cut, "frames.fits"), "r+b") as file:
+            file.truncate(os.path.getsize(file.name) - 10000)
+        viewer = Viewer(cut)
+        found = viewer.json("api/frame?sensor=0&frame=1")["wcs"]
+        self.assertTrue(found.pop("without_distortion"))
+        self.assertEqual(found, self.viewer.json("api/frame?sensor=0&frame=1")["wcs"])  # this camera has none
+        self.assertEqual(len(viewer.get("api/pixels?sensor=0&frame=1")[0]), 2 * 1024 * 1024)
+        self.assertEqual(viewer.end()[0], 0)
         for k in range(3):
             with self.assertRaises(urllib.error.HTTPError) as refused:
                 self.viewer.get("api/pixels?sensor=0&frame=" + ("3", "-1", "x")[k])

@@ -16,6 +16,11 @@ const REFRESH_MS = 2000;
 
 const element = (id) => document.getElementById(id);
 
+/** Changes of the mode. @param {number} sensor */
+async function getModes(sensor) {
+  return (await getJson('modes', { sensor })).modes.filter((change) => Number.isFinite(change.time_s));
+}
+
 class App {
   constructor() {
     this.frameView = new FrameView();
@@ -52,7 +57,7 @@ class App {
       await new Promise((done) => { setTimeout(done, REFRESH_MS); });
       try {
         const { sensor } = this, run = await getJson('refresh'), frames = await getNumbers('frames', { sensor });
-        const [modes, events] = await Promise.all([getJson('modes', { sensor }), getJson('events')]);
+        const [modes, events] = await Promise.all([getModes(sensor), getJson('events')]);
         if (sensor !== this.sensor) continue;
         const atEnd = this.current === this.count - 1;
         this.run = run;
@@ -63,7 +68,7 @@ class App {
         }
         this.setFrames(frames);
         this.showEvents(events);
-        this.plots.extend(run.sensors[sensor].panels, modes.modes, this.events, this.lastTime(modes.modes));
+        this.plots.extend(run.sensors[sensor].panels, modes, this.events, this.lastTime(modes));
         if (atEnd && this.count) await this.goTo(this.count - 1);
       } catch (error) {
         this.showProblems([`The run cannot be followed: ${error.message}`]);
@@ -133,10 +138,10 @@ class App {
     } else {
       await this.goTo(Math.min(frame, this.count - 1)); // the picture first
     }
-    const [modes, events] = await Promise.all([getJson('modes', { sensor }), getJson('events')]);
+    const [modes, events] = await Promise.all([getModes(sensor), getJson('events')]);
     this.showEvents(events);
     const first = this.count ? this.frames[1] - (this.frames[2] || 0) / 2 : 0;
-    this.plots.show(sensor, info.panels, modes.modes, this.events, Math.min(0, first), this.lastTime(modes.modes));
+    this.plots.show(sensor, info.panels, modes, this.events, Math.min(0, first), this.lastTime(modes));
     if (this.count) this.plots.setCursor(this.timeOf(Math.max(0, this.current)));
   }
 
@@ -249,7 +254,8 @@ class App {
 
   // ---------------------------------------------------------------- events
 
-  showEvents({ total, events }) {
+  showEvents({ total, events: listed }) {
+    const events = listed.filter((event) => Number.isFinite(event.time_s)); // a damaged table may have others
     this.events = events;
     element('event-count').textContent = total > events.length ? `first ${events.length} of ${total}` : String(total);
     element('events').replaceChildren(...events.map((event) => {

@@ -254,6 +254,7 @@ export class FrameView {
       if (this.details && this.details.wcs) {
         const sky = pixelToSky(this.details.wcs, place.x, place.y);
         parts.push(['RA', formatRa(sky.ra)], ['Dec', formatDec(sky.dec)]);
+        if (this.details.wcs.without_distortion) parts.push(['', '(without distortion)']);
       }
       const near = this.nearest(place);
       if (near) parts.push(['At', near]);
