@@ -1,6 +1,9 @@
-/* Build tool: writes text files as C strings. Usage: embed OUT.c OUT.h FILE...
- * For each FILE "a/b_c.cl" it defines `const bst_device_kernel_source bst_kernel_b_c` (see
- * sim/device/device.h) with the file's name, text and 64-bit FNV-1a hash. */
+/* Build tool: writes text files as C strings.
+ *
+ * embed OUT.c OUT.h FILE...      for each FILE "a/b_c.cl" it defines
+ *     `const bst_device_kernel_source bst_kernel_b_c` (see sim/device/device.h) with the file's
+ *     name, text and 64-bit FNV-1a hash.
+ * embed --page OUT.c FILE...     defines `bst_view_page_files` (see view/page_files.h). */
 #include <ctype.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -10,6 +13,19 @@
 static const char *base_name(const char *path) {
     const char *slash = strrchr(path, '/');
     return slash ? slash + 1 : path;
+}
+
+/* Writes a byte of a string; a line of the file is a line of the string. */
+static void put(FILE *source, int c) {
+    if (c == '\n') {
+        fprintf(source, "\\n\"\n    \"");
+    } else if (c == '"' || c == '\\') {
+        fprintf(source, "\\%c", c);
+    } else if (c >= 32 && c < 127) {
+        fputc(c, source);
+    } else {
+        fprintf(source, "\\%03o", (unsigned)c);
+    }
 }
 
 static int embed(FILE *source, FILE *header, const char *path) {
@@ -30,15 +46,7 @@ static int embed(FILE *source, FILE *header, const char *path) {
             symbol, name);
     for (int c; (c = fgetc(in)) != EOF;) {
         hash = (hash ^ (unsigned char)c) * 0x100000001B3u;
-        if (c == '\n') {
-            fprintf(source, "\\n\"\n    \"");
-        } else if (c == '"' || c == '\\') {
-            fprintf(source, "\\%c", c);
-        } else if (c >= 32 && c < 127) {
-            fputc(c, source);
-        } else {
-            fprintf(source, "\\%03o", (unsigned)c);
-        }
+        put(source, c);
     }
     fclose(in);
     fprintf(source, "\",\n    0x%08xu,\n    0x%08xu};\n", (unsigned)(hash >> 32), (unsigned)hash);
@@ -46,9 +54,41 @@ static int embed(FILE *source, FILE *header, const char *path) {
     return 0;
 }
 
+/* Writes the list of a page's files. */
+static int embed_page(const char *out, int count, char **paths) {
+    FILE *source = fopen(out, "wb");
+    if (!source) {
+        perror(out);
+        return 1;
+    }
+    fprintf(source,
+            "#include \"view/page_files.h\"\n\n"
+            "const bst_view_page_file bst_view_page_files[] = {\n");
+    for (int i = 0; i < count; i++) {
+        FILE *in = fopen(paths[i], "rb");
+        size_t bytes = 0;
+        if (!in) {
+            perror(paths[i]);
+            fclose(source);
+            return 1;
+        }
+        fprintf(source, "    {\"%s\",\n    \"", base_name(paths[i]));
+        for (int c; (c = fgetc(in)) != EOF; bytes++) {
+            put(source, c);
+        }
+        fclose(in);
+        fprintf(source, "\", %zu},\n", bytes);
+    }
+    fprintf(source, "    {NULL, NULL, 0}};\n");
+    return fclose(source) != 0;
+}
+
 int main(int argc, char **argv) {
+    if (argc > 3 && strcmp(argv[1], "--page") == 0) {
+        return embed_page(argv[2], argc - 3, argv + 3);
+    }
     if (argc < 4) {
-        fprintf(stderr, "usage: embed OUT.c OUT.h FILE...\n");
+        fprintf(stderr, "usage: embed OUT.c OUT.h FILE... | --page OUT.c FILE...\n");
         return 2;
     }
     FILE *source = fopen(argv[1], "wb"), *header = fopen(argv[2], "wb");

@@ -21,3 +21,19 @@ function(bst_embed_kernels target)
   target_sources(${target} PRIVATE ${source})
   target_include_directories(${target} PUBLIC ${CMAKE_CURRENT_BINARY_DIR}/embed)
 endfunction()
+
+# bst_embed_page(target file...)
+# Embeds the files of the viewer's page in `target` as `bst_view_page_files` (view/page_files.h).
+function(bst_embed_page target)
+  set(files ${ARGN})
+  list(TRANSFORM files PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/ REGEX "^[^/]")
+  set(source ${CMAKE_CURRENT_BINARY_DIR}/embed/${target}_page.c)
+  file(MAKE_DIRECTORY ${CMAKE_CURRENT_BINARY_DIR}/embed)
+  add_custom_command(
+    OUTPUT ${source}
+    COMMAND bst_embed_tool --page ${source} ${files}
+    DEPENDS bst_embed_tool ${files}
+    COMMENT "Embedding the page of ${target}"
+    VERBATIM)
+  target_sources(${target} PRIVATE ${source})
+endfunction()

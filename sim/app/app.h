@@ -16,7 +16,7 @@ typedef struct bst_app_command {
 /* Runs the command that a command line names.
  *
  * Given:     argc, argv  of the program
- *            more        a command besides those that libboresight has; NULL: none
+ *            more        commands besides those that libboresight has, ended by name NULL; NULL: none
  * Returned:  exit status (sim/cli/cli.h) */
 int bst_app_run(int argc, char **argv, const bst_app_command *more);
 
@@ -60,6 +60,8 @@ int bst_cmd_propagate(int argc, char **argv);
 int bst_cmd_calframes(int argc, char **argv);
 /* boresight bench: measures the speed of the program. */
 int bst_cmd_bench(int argc, char **argv);
+/* boresight view: shows a run in the browser. */
+int bst_cmd_view(int argc, char **argv);
 /* boresight pd: measures the probability of detection of a sensor. */
 int bst_cmd_pd(int argc, char **argv);
 /* boresight calibrate-obsgen: fits the observation generator to rendered images. */

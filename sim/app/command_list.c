@@ -47,7 +47,7 @@ static void usage(FILE *stream, const bst_app_command *more) {
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
         fprintf(stream, "  %-16s %s\n", commands[i].name, commands[i].doc);
     }
-    if (more) {
+    for (; more && more->name; more++) {
         fprintf(stream, "  %-16s %s\n", more->name, more->doc);
     }
     fprintf(
@@ -72,7 +72,10 @@ static const bst_app_command *find_command(const char *name, const bst_app_comma
             return &commands[i];
         }
     }
-    return more && strcmp(name, more->name) == 0 ? more : NULL;
+    while (more && more->name && strcmp(name, more->name) != 0) {
+        more++;
+    }
+    return more && more->name ? more : NULL;
 }
 
 static int unknown_command(const char *name, const bst_app_command *more) {
@@ -83,8 +86,10 @@ static int unknown_command(const char *name, const bst_app_command *more) {
             nearest = commands[i].name;
         }
     }
-    if (more && bst_text_is_nearer(name, more->name, &best)) {
-        nearest = more->name;
+    for (; more && more->name; more++) {
+        if (bst_text_is_nearer(name, more->name, &best)) {
+            nearest = more->name;
+        }
     }
     fprintf(stderr, "boresight: there is no command \"%.80s\"%s%s%s; see boresight --help\n", name,
             nearest ? "; did you mean \"" : "", nearest ? nearest : "", nearest ? "\"?" : "");

@@ -4,7 +4,11 @@
 #include "sim/app/app.h"
 
 int main(int argc, char **argv) {
-    static const bst_app_command bench = {"bench", bst_cmd_bench, "measure speed and error"};
+    static const bst_app_command more[] = {
+        {"view", bst_cmd_view, "look at a run in the browser"},
+        {"bench", bst_cmd_bench, "measure speed and error"},
+        {NULL, NULL, NULL},
+    };
     signal(SIGXFSZ, SIG_IGN); /* a write beyond a limit on file sizes then returns an error */
-    return bst_app_run(argc, argv, &bench);
+    return bst_app_run(argc, argv, more);
 }

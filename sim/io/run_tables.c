@@ -9,6 +9,9 @@
 #define BATCH_ROWS 50000
 #define BATCH_SECONDS 2.0
 #define SQL_BYTES 8192
+/* The end of a run waits up to 2 s for other programs that read its database. */
+#define MERGE_TRIALS 40
+#define MERGE_PAUSE_NS 50000000
 
 static bst_status fail_sql(bst_ctx *ctx, const bst_run *run, const char *what) {
     int last = errno, code = run->db ? sqlite3_errcode(run->db) & 0xff : 0;
@@ -113,6 +116,29 @@ static bst_status begin_batch(bst_ctx *ctx, bst_run *run) {
     return BST_OK;
 }
 
+/* Merges the journal into the database. While another program has the database open, that is not
+ * possible: after some time the journal stays beside it, with the same content. */
+static bst_status merge_journal(bst_ctx *ctx, bst_run *run) {
+    for (int trial = 0; trial < MERGE_TRIALS; trial++) {
+        errno = 0;
+        int code =
+            sqlite3_exec(run->db, "PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode=DELETE;",
+                         NULL, NULL, NULL) &
+            0xff;
+        if (code == SQLITE_OK) {
+            return BST_OK;
+        }
+        if (code != SQLITE_BUSY && code != SQLITE_LOCKED) {
+            return fail_sql(ctx, run, "cannot be completed");
+        }
+        nanosleep(&(struct timespec){.tv_nsec = MERGE_PAUSE_NS}, NULL);
+    }
+    bst_log(ctx, BST_LOG_WARNING,
+            "%s/%s: another program has it open: its journal %s-wal stays; keep both together",
+            run->folder, BST_RUN_DATABASE, BST_RUN_DATABASE);
+    return BST_OK;
+}
+
 bst_status bst_run_close_database(bst_ctx *ctx, bst_run *run) {
     if (!run->db) {
         return BST_OK;
@@ -128,8 +154,7 @@ bst_status bst_run_close_database(bst_ctx *ctx, bst_run *run) {
     sqlite3_finalize(run->note_column);
     run->note_table = run->note_column = NULL;
     if (status == BST_OK) {
-        status = execute(ctx, run, "PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode=DELETE;",
-                         "cannot be completed");
+        status = merge_journal(ctx, run);
     }
     if (sqlite3_close(run->db) != SQLITE_OK && status == BST_OK) {
         status = fail_sql(ctx, run, "cannot be closed");

@@ -61,6 +61,12 @@ elif (words[:1] == ["study"] and length and "--out" in words and words[1].endswi
         study["set"]["/duration_s"] = 30
     with open(words[1], "w", encoding="utf-8") as file:
         json.dump(study, file)
+if words[:1] == ["view"]:  # it shows a run until Ctrl-C
+    import signal, subprocess, urllib.request
+    viewer = subprocess.Popen([{program!r}, *words, "--no-browser"], stdout=subprocess.PIPE, text=True)
+    urllib.request.urlopen(viewer.stdout.readline().strip() + "api/run").close()
+    viewer.send_signal(signal.SIGINT)
+    sys.exit(viewer.wait())
 os.execv({program!r}, [{program!r}] + words)
 """
 

@@ -3,7 +3,7 @@
 import os
 import re
 
-FOLDERS = ["include", "sim", "scenegen", "gimbal", "imgproc", "tracker", "control", "obsgen"]
+FOLDERS = ["include", "sim", "scenegen", "gimbal", "imgproc", "tracker", "control", "obsgen", "view"]
 PROTOTYPE = re.compile(r"^(?!static\b|typedef\b|return\b|else\b)[A-Za-z_][\w \t\*]*?[\s\*](bst_\w+)\s*\(", re.M)
 
 

@@ -118,6 +118,38 @@ static void write_file(const char *path, const char *text) {
     fclose(f);
 }
 
+/* A program that has the database open at the end of the run, as a viewer does, does not fail the
+ * run: nothing is lost, the journal stays. */
+static void test_database_open_elsewhere(void **state) {
+    (void)state;
+    scratch s;
+    scratch_make(&s);
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, count_log, NULL, BST_LOG_INFO);
+    char out[600], path[700], text[64];
+    snprintf(out, sizeof out, "%s/run", s.folder);
+    bst_run *run;
+    bst_io_table *table;
+    bst_assert_ok(&ctx, bst_run_create(&ctx, out, false, &run));
+    bst_assert_ok(&ctx, bst_io_table_create(&ctx, run, "spots", "Spots.", columns, 3, &table));
+    add_rows(&ctx, table, 500);
+    snprintf(path, sizeof path, "%s/run.sqlite", bst_run_folder(run));
+    sqlite3 *reader;
+    assert_int_equal(sqlite3_open_v2(path, &reader, SQLITE_OPEN_READONLY, NULL), SQLITE_OK);
+    assert_int_equal(sqlite3_exec(reader, "SELECT * FROM tables", NULL, NULL, NULL), SQLITE_OK);
+    cJSON *json = cJSON_CreateObject();
+    bst_assert_ok(&ctx, bst_io_run_write_json(&ctx, run, "manifest.json", json));
+    cJSON_Delete(json);
+    logged = 0;
+    bst_assert_ok(&ctx, bst_run_finish(&ctx, run));
+    assert_int_equal(logged, 1);
+    sqlite3_close(reader);
+    snprintf(path, sizeof path, "%s/run.sqlite", out);
+    query(path, "SELECT count(*) FROM spots", text, sizeof text);
+    assert_string_equal(text, "500");
+    scratch_remove(&s);
+}
+
 static void test_refusals(void **state) {
     (void)state;
     scratch s;
@@ -353,10 +385,15 @@ static void test_atomic_file(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_finished_run),         cmocka_unit_test(test_refusals),
-        cmocka_unit_test(test_name_taken_meanwhile), cmocka_unit_test(test_killed_run),
-        cmocka_unit_test(test_table_arguments),      cmocka_unit_test(test_full_disk),
-        cmocka_unit_test(test_atomic_file),          cmocka_unit_test(test_names_of_dots),
+        cmocka_unit_test(test_finished_run),
+        cmocka_unit_test(test_refusals),
+        cmocka_unit_test(test_database_open_elsewhere),
+        cmocka_unit_test(test_name_taken_meanwhile),
+        cmocka_unit_test(test_killed_run),
+        cmocka_unit_test(test_table_arguments),
+        cmocka_unit_test(test_full_disk),
+        cmocka_unit_test(test_atomic_file),
+        cmocka_unit_test(test_names_of_dots),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

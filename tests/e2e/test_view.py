@@ -1,0 +1,299 @@
+#!/usr/bin/env python3
+"""`boresight view` over its network interface: data equal to the files of the run, and what it refuses.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_view.py BORESIGHT
+"""
+import glob
+import hashlib
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import sqlite3
+import subprocess
+import time
+import unittest
+import urllib.error
+import urllib.request
+
+import numpy
+from astropy.io import fits
+
+import runs
+
+HOSTILE = "<script>alert(1)</script>\"'&\n\u202egnp"
+TARGET = "/world/objects/0"
+
+
+def digests(folder):
+    """Names of the files of a folder and their content."""
+    found = {}
+    for name in os.listdir(folder):
+        with open(os.path.join(folder, name), "rb") as file:
+            found[name] = hashlib.sha256(file.read()).hexdigest()
+    return found
+
+
+class Viewer:
+    """A running `boresight view`."""
+
+    def __init__(self, folder, *words):
+        self.process = subprocess.Popen([runs.BORESIGHT, "view", folder, "--no-browser", *words],
+                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.url = self.process.stdout.readline().strip()
+        match = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/([0-9a-f]{32})/", self.url)
+        if not match:
+            raise AssertionError((self.url, self.process.communicate()[1]))
+        self.rest = self.process.stdout.readline()
+        self.port, self.token = int(match.group(1)), match.group(2)
+
+    def end(self):
+        """Ends it by Ctrl-C: exit status, what it printed."""
+        self.process.send_signal(signal.SIGINT)
+        output, errors = self.process.communicate(timeout=30)
+        return self.process.returncode, self.rest + output, errors
+
+    def get(self, route):
+        with urllib.request.urlopen(self.url + route, timeout=60) as answer:
+            return answer.read(), answer.headers
+
+    def json(self, route):
+        return json.loads(self.get(route)[0])
+
+    def numbers(self, route):
+        return numpy.frombuffer(self.get(route)[0], "<f8")
+
+    def connect(self, receive_bytes=None):
+        peer = socket.socket()
+        if receive_bytes:
+            peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_bytes)
+        peer.settimeout(60)
+        peer.connect(("127.0.0.1", self.port))
+        return peer
+
+    def raw(self, text):
+        """Status of the answer to bytes; 0: the connection was closed without one."""
+        with self.connect() as peer:
+            answer = b""
+            try:
+                peer.sendall(text if isinstance(text, bytes) else text.encode("latin-1"))
+                while b"\r\n\r\n" not in answer:
+                    more = peer.recv(65536)
+                    if not more:
+                        break
+                    answer += more
+            except ConnectionError:
+                pass
+        match = re.match(rb"HTTP/1\.1 (\d{3}) ", answer)
+        return int(match.group(1)) if match else 0
+
+    def status(self, path="/{token}/api/run", method="GET", host="127.0.0.1:{port}", more=""):
+        words = {"token": self.token, "port": self.port}
+        lines = [f"{method} {path.format(**words)} HTTP/1.1"] + ([f"Host: {host.format(**words)}"] if host else [])
+        return self.raw("\r\n".join(lines) + "\r\n" + more.format(**words) + "Connection: close\r\n\r\n")
+
+
+class Checks(unittest.TestCase):
+    """Comparisons with the files of a run."""
+
+    def check_pixels(self, viewer, images):
+        rows = viewer.numbers("api/frames?sensor=0").reshape(-1, 5)
+        self.assertEqual(len(rows), len(images))
+        for k, image in enumerate(images):
+            self.assertEqual((rows[k][0], rows[k][3]), (k, k))
+            data, headers = viewer.get(f"api/pixels?sensor=0&frame={k}")
+            shape = int(headers["X-Frame-Height"]), int(headers["X-Frame-Width"])
+            self.assertEqual(shape, image.shape)
+            self.assertTrue(numpy.array_equal(numpy.frombuffer(data, "<u2").reshape(shape), image))
+        return rows
+
+    def check_marks(self, viewer, folder, frame):
+        """Marks of a frame are the rows of its exposure, in pixels of its window."""
+        found = viewer.json(f"api/frame?sensor=0&frame={frame}")
+        with sqlite3.connect(os.path.join(folder, "run.sqlite")) as tables:
+            corner = tables.execute("SELECT x0_px, y0_px FROM frames WHERE exposure_id = ?", (frame,)).fetchone()
+            truth = tables.execute("SELECT id, x_centroid_px, y_centroid_px FROM truth WHERE exposure_id = ? AND in_field = 1",
+                                   (frame,)).fetchall()
+            detections = tables.execute("SELECT x_px, y_px, cov_xx_px2, cov_xy_px2, cov_yy_px2, label FROM detections"
+                                        " WHERE exposure_id = ?", (frame,)).fetchall()
+        self.assertGreater(len(detections), 0)
+        self.assertEqual([mark["id"] for mark in found["truth"]], [row[0] for row in truth])
+        self.assertEqual([mark["label"] for mark in found["detections"]], [row[5] for row in detections])
+        # 1e-9 px: differences of numbers below 1e4 in double precision, printed with 15 digits or more
+        numpy.testing.assert_allclose([[mark["x"], mark["y"]] for mark in found["truth"]],
+                                      [[row[1] - corner[0], row[2] - corner[1]] for row in truth], rtol=0, atol=1e-9)
+        numpy.testing.assert_allclose([[mark[key] for key in ("x", "y", "xx", "xy", "yy")] for mark in found["detections"]],
+                                      [[row[0] - corner[0], row[1] - corner[1], *row[2:5]] for row in detections],
+                                      rtol=1e-12, atol=1e-9)
+
+
+class View(Checks):
+    @classmethod
+    def setUpClass(cls):
+        folder = runs.scratch()
+        cls.made = os.path.join(folder, "<b>run")
+        runs.run(runs.STARE, cls.made, f"{TARGET}/name={json.dumps(HOSTILE)}", f"{runs.SENSOR}/cue/object={json.dumps(HOSTILE)}",
+                 "/record/frames=extensions", "/record/compression=rice", duration=3)
+        cls.before = digests(cls.made)
+        cls.viewer = Viewer(cls.made)
+
+    @classmethod
+    def tearDownClass(cls):
+        code, output, errors = cls.viewer.end()
+        assert (code, errors) == (0, ""), (code, errors)
+        assert output == "Ctrl-C ends it.\n", output
+        assert digests(cls.made) == cls.before
+
+    def test_pixels_of_extensions(self):
+        with fits.open(os.path.join(self.made, "frames.fits")) as file:
+            rows = self.check_pixels(self.viewer, [hdu.data for hdu in file[1:]])
+            frame = self.viewer.json("api/frame?sensor=0&frame=2")
+            header = file[3].header
+            self.assertEqual(frame["wcs"]["crval_deg"], [header["CRVAL1"], header["CRVAL2"]])
+            self.assertEqual(frame["wcs"]["cd_deg"], [header[key] for key in ("CD1_1", "CD1_2", "CD2_1", "CD2_2")])
+            self.assertEqual(frame["gain_e_per_dn"], header["GAIN"])
+            self.assertEqual(frame["utc"], header["DATE-AVG"][:23] + "Z")
+            self.assertEqual(rows[2][2], header["EXPTIME"])
+        cut = os.path.join(runs.scratch(), "cut")  # as after a kill: within the last frame
+        shutil.copytree(self.made, cut)
+        with open(os.path.join(cut, "frames.fits"), "r+b") as file:
+            file.truncate(os.path.getsize(file.name) - 10000)
+        viewer = Viewer(cut)
+        found = viewer.json("api/frame?sensor=0&frame=1")["wcs"]
+        self.assertTrue(found.pop("without_distortion"))
+        self.assertEqual(found, self.viewer.json("api/frame?sensor=0&frame=1")["wcs"])  # this camera has none
+        self.assertEqual(len(viewer.get("api/pixels?sensor=0&frame=1")[0]), 2 * 1024 * 1024)
+        self.assertEqual(viewer.end()[0], 0)
+        for k in range(3):
+            with self.assertRaises(urllib.error.HTTPError) as refused:
+                self.viewer.get("api/pixels?sensor=0&frame=" + ("3", "-1", "x")[k])
+            self.assertEqual(refused.exception.code, (404, 400, 400)[k])
+
+    def test_marks(self):
+        for frame in range(3):
+            self.check_marks(self.viewer, self.made, frame)
+
+    def test_plots_modes_events(self):
+        described = self.viewer.json("api/run")
+        panels = {panel["name"]: panel["lines"] for panel in described["sensors"][0]["panels"]}
+        with sqlite3.connect(os.path.join(self.made, "run.sqlite")) as tables:
+            counts = tables.execute("SELECT mid_s, detections, stars_identified FROM detection_frames").fetchall()
+            modes = tables.execute("SELECT time_s, mode FROM control").fetchall()
+            events = tables.execute("SELECT time_s, source, kind, text FROM events").fetchall()
+        self.assertEqual(panels["detections"], ["all", "identified stars"])
+        numbers = self.viewer.numbers("api/plot?sensor=0&panel=detections&from=0&to=10&columns=100")
+        expected = [len(counts)] + [x for row in counts for x in (row[0], row[1], row[1])]
+        expected += [len(counts)] + [x for row in counts for x in (row[0], row[2], row[2])]
+        self.assertEqual(list(numbers), expected)
+        changes = [row for k, row in enumerate(modes) if k == 0 or row[1] != modes[k - 1][1]]
+        self.assertEqual([(one["time_s"], one["mode"]) for one in self.viewer.json("api/modes?sensor=0")["modes"]], changes)
+        found = self.viewer.json("api/events")
+        self.assertEqual([tuple(one[key] for key in ("time_s", "source", "kind", "text")) for one in found["events"]], events)
+        self.assertEqual(found["total"], len(events))
+        for query in ("panel=no", "panel=detections&from=1&to=1", "panel=detections&columns=0", "panel=detections&to=nan",
+                      "panel=detections&columns=1e3", "panel=a;b", "panel=detections&sensor=99"):
+            self.assertIn(self.viewer.status("/{token}/api/plot?" + query), (400, 404), query)
+
+    def test_hostile_names_are_text(self):
+        described = self.viewer.json("api/run")
+        self.assertEqual(described["name"], "<b>run")
+        self.assertEqual(described["sensors"][0]["target"], HOSTILE)
+        self.assertEqual(self.viewer.json("api/frame?sensor=0&frame=1")["names"]["0"], HOSTILE)
+        page, headers = self.viewer.get("")
+        self.assertNotIn(b"<b>run", page)
+        policy = headers["Content-Security-Policy"]
+        for words in ("default-src 'none'", "script-src 'self'", "frame-ancestors 'none'", "base-uri 'none'"):
+            self.assertIn(words, policy)
+        self.assertNotIn("unsafe", policy)
+        self.assertEqual((headers["X-Content-Type-Options"], headers["Referrer-Policy"]), ("nosniff", "no-referrer"))
+        # no file of the page makes markup or code of text, or names another server
+        files = glob.glob("view/page/*")
+        self.assertGreater(len(files), 8)
+        for path in files:
+            with open(path, "rb") as file:
+                text = file.read()
+            self.assertEqual(self.viewer.get(os.path.basename(path))[0], text)
+            self.assertNotRegex(text, rb"innerHTML|outerHTML|insertAdjacentHTML|document\.write|eval\(|new Function|\son[a-z]+=|"
+                                      rb"(?:src|href)=\"(?:https?:)?//")
+
+    def test_refused(self):
+        status = self.viewer.status
+        self.assertEqual(status(), 200)
+        self.assertEqual(status(host="localhost:1"), 200)  # ssh -L
+        self.assertEqual(status(method="HEAD"), 200)
+        self.assertEqual(status(more="Origin: http://127.0.0.1:{port}\r\n"), 200)
+        for host in ("evil.example", "evil.example:{port}", "127.0.0.1.evil.example:{port}", "192.168.0.1:{port}"):
+            self.assertEqual(status(host=host), 403, host)
+        self.assertEqual(status(host=None), 400)
+        self.assertEqual(status(more="Host: evil.example\r\n"), 400)
+        for origin in ("http://evil.example", "null", "https://127.0.0.1:{port}", "http://127.0.0.1:1"):
+            self.assertEqual(status(more=f"Origin: {origin}\r\n"), 403, origin)
+        wrong = self.viewer.token[:-1] + ("0" if self.viewer.token[-1] != "0" else "1")
+        for path in ("/", "/api/run", f"/{wrong}/api/run", f"/{wrong}/", "/{token}", "/../{token}/", "/index.html"):
+            self.assertEqual(status(path), 403, path)
+        for path in ("../../../../etc/passwd", "..%2f..%2fetc/passwd", "%2e%2e/run.sqlite", "run.sqlite", "frames.fits",
+                     "api/../../x", "./api/run", "api/run/", "API/RUN", "api//run", "manifest.json"):
+            self.assertEqual(status("/{token}/" + path), 404, path)
+        for method in ("POST", "PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT", "PROPFIND", "x"):
+            self.assertIn(status(method=method), (0, 400, 405, 501), method)
+        self.assertEqual(status(more="Content-Length: 5\r\n"), 413)
+        self.assertEqual(status(more="Transfer-Encoding: chunked\r\n"), 413)
+        self.assertEqual(status("/{token}/ws", more="Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+                                "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"), 404)
+
+    def test_malformed(self):
+        line = f"GET /{self.viewer.token}/ HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+        for text in (b"\x00" * 5000 + b"\r\n\r\n", "GET\r\n\r\n", "GET / HTTP/9.9\r\n\r\n", "\r\n\r\n", "GET / HTTP/1.1\r\nHost\r\n\r\n",
+                     line + "X: " + "a" * 100000 + "\r\n\r\n", line + "".join(f"X{i}: a\r\n" for i in range(500)) + "\r\n",
+                     "GET /" + "a" * 100000 + " HTTP/1.1\r\n\r\n", line + "Content-Length: -1\r\n\r\n",
+                     line + "Content-Length: 99999999999999999999\r\n\r\n", bytes(range(256)) * 50 + b"\r\n\r\n"):
+            self.assertIn(self.viewer.raw(text), (0, 400, 403, 405, 411, 413, 414, 431, 500, 505), text[-60:])
+        self.assertEqual(self.viewer.status(), 200)
+
+    def test_slow_readers_and_many_connections(self):
+        """Readers that take nothing, and 500 connections that send nothing, lose theirs; others are served."""
+        slow, begin = [], time.monotonic()
+        for _ in range(14):  # more than there are answers at a time
+            peer = self.viewer.connect(receive_bytes=4096)
+            # together more than the system buffers
+            peer.sendall(20 * f"GET /{self.viewer.token}/api/pixels?frame=1 HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+            slow.append(peer)
+        self.assertEqual(self.viewer.status("/{token}/style.css"), 200)
+        idle = [self.viewer.connect() for _ in range(500)]
+        end = time.monotonic() + 60
+        while self.viewer.status() != 200:  # busy while the slow readers have their time
+            self.assertLess(time.monotonic(), end)
+            time.sleep(0.1)
+        time.sleep(max(0.0, begin + 6.0 - time.monotonic()))
+        for peer in slow:  # cut off before the end
+            received = 0
+            try:
+                while more := peer.recv(1 << 20):
+                    received += len(more)
+            except ConnectionError:
+                pass
+            self.assertLess(received, 40 << 20)
+            peer.close()
+        for peer in idle:
+            peer.close()
+        self.assertEqual(self.viewer.status(), 200)
+
+    def test_port_in_use(self):
+        result = runs.call("view", self.made, "--no-browser", "--port", str(self.viewer.port))
+        self.assertEqual((result.returncode, result.stdout), (1, ""))
+        self.assertIn(f"boresight: port {self.viewer.port} of 127.0.0.1 cannot be opened", result.stderr)
+
+    def test_only_loopback(self):
+        with open(f"/proc/{self.viewer.process.pid}/net/tcp", encoding="ascii") as file:
+            listening = [line.split()[1] for line in file if line.split()[3] == "0A"]
+        self.assertEqual([one for one in listening if one.endswith(f":{self.viewer.port:04X}")], [f"0100007F:{self.viewer.port:04X}"])
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()

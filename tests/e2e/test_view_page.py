@@ -1,0 +1,188 @@
+#!/usr/bin/env python3
+"""The page of `boresight view` in a headless Chromium (Debian's package; skipped where there is none), and the data of a
+cube with a window.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_view_page.py BORESIGHT
+"""
+import base64
+import json
+import os
+import subprocess
+import time
+import unittest
+
+import numpy
+from astropy.io import fits
+from astropy.wcs import WCS
+
+import chromium
+import runs
+import test_view
+
+SHOWN = "document.boresight && document.boresight.current"
+
+
+class Cube(test_view.Checks):
+    def test_cube_in_a_window(self):
+        out = os.path.join(runs.scratch(), "cube")
+        runs.run(runs.STARE, out, "/record/frames=cube", runs.SENSOR + '/exposure/window_px=[100, 60, 200, 160]', duration=2)
+        viewer = test_view.Viewer(out)
+        with fits.open(os.path.join(out, "frames.fits")) as file:
+            self.check_pixels(viewer, list(next(hdu.data for hdu in file if numpy.ndim(hdu.data) == 3)))
+        self.check_marks(viewer, out, 1)
+        self.assertEqual(viewer.end()[0], 0)
+
+
+class Running(unittest.TestCase):
+    def test_run_in_progress(self):
+        """A later look finds what was recorded since, and in the end the folder under its final name."""
+        out = os.path.join(runs.scratch(), "run")
+        process = subprocess.Popen(runs.command(runs.STARE, out, "/pacing/mode=realtime", duration=12), stdout=subprocess.DEVNULL)
+        while not os.path.exists(out + ".partial/run.sqlite"):
+            self.assertIsNone(process.poll())
+            time.sleep(0.05)
+        viewer = test_view.Viewer(out + ".partial/")
+        counts, states = [0], set()
+        while "complete" not in states:
+            described = viewer.json("api/refresh")
+            states.add(described["state"])
+            self.assertLessEqual(states, {"still running", "left over from a killed run", "complete"})
+            counts.append(described["sensors"][0]["frames"])
+            self.assertGreaterEqual(counts[-1], counts[-2])
+            time.sleep(0.5)
+        self.assertGreater(len(set(counts)), 3)
+        self.assertEqual((process.wait(60), counts[-1], described["name"]), (0, 12, "run"))
+        self.assertEqual(viewer.json("api/refresh")["sensors"][0]["frames"], 12)
+        self.assertEqual(len(viewer.get("api/pixels?frame=11")[0]), 2 * 1024 * 1024)
+        self.assertEqual(viewer.end()[0], 0)
+
+
+@unittest.skipUnless(chromium.PROGRAM, "there is no chromium")
+class Page(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.made = os.path.join(runs.scratch(), "<b>run")
+        target = json.dumps(test_view.HOSTILE)
+        runs.run(runs.TRACK, cls.made, f"/world/objects/0/name={target}", f"{runs.SENSOR}/cue/object={target}",
+                 runs.SENSOR + '/camera/distortion={"k1": -200}', duration=24)
+        cls.viewer = test_view.Viewer(cls.made)
+        cls.files = fits.open(os.path.join(cls.made, "frames.fits"))
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.files.close()
+        assert cls.viewer.end()[0] == 0
+
+    def open(self, page, frame, more=""):
+        page.command("Page.navigate", url="about:blank")
+        page.command("Page.navigate", url=f"{self.viewer.url}{more}#frame={frame}")
+        page.wait_for(f"{SHOWN} === {frame} && document.boresight.plots.panels.length > 0")
+
+    def shown_pixels(self, page):
+        text = page.evaluate("""(() => {
+            const view = document.boresight.frameView;
+            view.painter.draw(view.image, view.drawing());
+            const bytes = new Uint8Array(view.painter.readBack().buffer);
+            let text = '';
+            for (let i = 0; i < bytes.length; i += 8192) text += String.fromCharCode(...bytes.subarray(i, i + 8192));
+            return btoa(text);
+        })()""")
+        return numpy.frombuffer(base64.b64decode(text), "<u2").reshape(1024, 1024)
+
+    def test_every_pixel_and_overlay(self):
+        """Read back from the graphics processor: all 16 bits. Marks are where the tables say, on the screen."""
+        with chromium.Chromium(1280, 720) as page:
+            self.open(page, 20)
+            self.assertEqual(page.evaluate("document.boresight.frameView.painter.constructor.name"), "WebglPainter")
+            self.assertTrue(numpy.array_equal(self.shown_pixels(page), self.files[21].data))
+            page.key("ArrowRight")
+            page.wait_for(SHOWN + " === 21")
+            self.assertTrue(numpy.array_equal(self.shown_pixels(page), self.files[22].data))
+            page.key("Home")
+            page.wait_for(SHOWN + " === 0")
+            page.key("End")
+            page.wait_for(SHOWN + " === 23")
+            found = page.evaluate("""(() => {
+                const view = document.boresight.frameView, target = view.sorted.target[0], at = view.toScreen(target.x, target.y);
+                return [target.x, target.y, at.x, at.y, view.view.scale, view.stage.clientWidth, view.stage.clientHeight];
+            })()""")
+            x, y, left, top, scale, width, height = found
+            # the frame is centred: pixel 511.5 in the middle of the stage; exact but for rounding
+            self.assertAlmostEqual(left, width / 2 + (x - 511.5) * scale, delta=1e-6)
+            self.assertAlmostEqual(top, height / 2 + (y - 511.5) * scale, delta=1e-6)
+            self.assertEqual(page.messages, [])
+
+    def test_screen_shows_the_stretch(self):
+        """Colours on the screen are those of the stretch at every pixel of a zoomed part: WebGL and the 2D canvas alike."""
+        look = """(() => {
+            const app = document.boresight, view = app.frameView, law = document.getElementById('law');
+            view.toggleMarks(); law.value = 'manual'; view.limits = { black: 480, white: 620 };
+            Object.assign(view.view, { x: 500, y: 500, scale: 8, fitted: false });
+            view.painter.draw(view.image, view.drawing());
+            const copy = document.createElement('canvas'), w = copy.width = view.canvas.width, h = copy.height = view.canvas.height;
+            const context = copy.getContext('2d');
+            context.drawImage(view.canvas, 0, 0);
+            const data = context.getImageData(0, 0, w, h).data, grey = [];
+            for (let y = 490; y < 510; y++) for (let x = 490; x < 510; x++) {
+                const at = view.toScreen(x, y);
+                grey.push(data[4 * (Math.floor(at.y) * w + Math.floor(at.x))]);
+            }
+            return grey;
+        })()"""
+        with chromium.Chromium(1280, 720) as page:
+            for more, painter in (("", "WebglPainter"), ("?plain", "CanvasPainter")):
+                self.open(page, 20, more)
+                self.assertEqual(page.evaluate("document.boresight.frameView.painter.constructor.name"), painter)
+                part = self.files[21].data[490:510, 490:510].astype(float)
+                expected = 255 * numpy.clip((part - 480) / 140, 0, 1)
+                # 1: rounding of the graphics processor to 8 bits
+                numpy.testing.assert_allclose(page.evaluate(look), expected.ravel(), rtol=0, atol=1)
+
+    def test_directions(self):
+        """RA and Dec of pixels, with distortion, and back, against astropy."""
+        with chromium.Chromium(800, 600) as page:
+            self.open(page, 20)
+            wcs = WCS(self.files[21].header)
+            self.assertIsNotNone(wcs.sip)
+            pixels = [[0, 0], [1023, 0], [0, 1023], [1023, 1023], [511.5, 511.5], [123.25, 871.75]]
+            found = page.evaluate(f"""import('./wcs.js').then((wcs) => {json.dumps(pixels)}.map(([x, y]) => {{
+                const header = document.boresight.frameView.details.wcs, sky = wcs.pixelToSky(header, x, y);
+                const back = wcs.skyToPixel(header, sky.ra, sky.dec);
+                return [sky.ra, sky.dec, back.x, back.y];
+            }}))""")
+            expected = wcs.all_pix2world(numpy.array(pixels), 0)
+            # 1e-9 deg: 4 microarcsec, rounding of the trigonometry; 1e-6 px: the iteration's end
+            numpy.testing.assert_allclose(numpy.array(found)[:, :2], expected, rtol=0, atol=1e-9)
+            numpy.testing.assert_allclose(numpy.array(found)[:, 2:], pixels, rtol=0, atol=1e-6)
+
+    def test_hostile_names_and_labels(self):
+        """Names are text, nothing is blocked by the policy, every control has a name."""
+        with chromium.Chromium(1280, 720) as page:
+            self.open(page, 20)
+            self.assertEqual(page.evaluate("document.getElementById('run-name').textContent"), "<b>run")
+            self.assertEqual(page.evaluate("document.boresight.frameView.sorted.target[0].text"), test_view.HOSTILE)
+            self.assertEqual(page.evaluate("document.querySelectorAll('script').length"), 1)
+            self.assertEqual(page.evaluate("document.querySelectorAll('b:not(.value b)').length"), 0)
+            nameless = page.evaluate("""[...document.querySelectorAll('button, input, select, canvas:not([aria-hidden])')].filter((one) =>
+                !(one.getAttribute('aria-label') || one.textContent.trim() || (one.labels && one.labels.length))).map((one) => one.outerHTML)""")
+            self.assertEqual(nameless, [])
+            self.assertEqual(page.messages, [])
+
+    def test_events_and_plots_move_the_frame(self):
+        with chromium.Chromium(1280, 720) as page:
+            self.open(page, 0)
+            page.evaluate("[...document.querySelectorAll('#events button')].at(-1).click()")
+            page.wait_for(SHOWN + " > 15")
+            events = self.viewer.json("api/events")["events"]
+            rows = self.viewer.numbers("api/frames?sensor=0").reshape(-1, 5)
+            nearest = int(numpy.argmin(abs(rows[:, 1] - events[-1]["time_s"])))
+            page.wait_for(f"{SHOWN} === {nearest}")
+            self.assertEqual(page.evaluate("document.boresight.plots.cursor"), rows[nearest, 1])
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,43 @@
+// Requests to the program that serves this page. The token is part of the page's own address.
+
+/** The server refused or failed; the message is for the user. */
+export class ServerError extends Error {}
+
+/**
+ * @param {string} route below "api/"
+ * @param {Record<string, string | number>} query
+ * @param {AbortSignal} [signal]
+ */
+async function get(route, query, signal) {
+  const words = new URLSearchParams();
+  for (const [name, value] of Object.entries(query)) words.set(name, String(value));
+  const response = await fetch(`api/${route}?${words}`, { signal, cache: 'no-store' });
+  if (!response.ok) {
+    const text = await response.text();
+    throw new ServerError(text || `${response.status} ${response.statusText}`);
+  }
+  return response;
+}
+
+/** @param {string} route @param {Record<string, string | number>} [query] @param {AbortSignal} [signal] */
+export async function getJson(route, query = {}, signal = undefined) {
+  return (await get(route, query, signal)).json();
+}
+
+/** 64-bit floating-point numbers. @param {string} route @param {Record<string, string | number>} query */
+export async function getNumbers(route, query, signal = undefined) {
+  return new Float64Array(await (await get(route, query, signal)).arrayBuffer());
+}
+
+/**
+ * Pixels of a frame, [height][width], 16 bits.
+ * @param {number} sensor @param {number} frame @param {AbortSignal} [signal]
+ */
+export async function getPixels(sensor, frame, signal = undefined) {
+  const response = await get('pixels', { sensor, frame }, signal);
+  return {
+    width: Number(response.headers.get('X-Frame-Width')),
+    height: Number(response.headers.get('X-Frame-Height')),
+    data: new Uint16Array(await response.arrayBuffer()),
+  };
+}

@@ -1,0 +1,337 @@
+// The page: loads a run, and moves frame, plots and events together.
+import { getJson, getNumbers, getPixels } from './api.js';
+import { FrameView } from './frame_view.js';
+import { Plots, shortNumber } from './plots.js';
+
+/** Numbers of a frame in the list (view/recorded_run.h). */
+const NUMBERS = 5;
+/** Frames that are kept, bytes of pixels. */
+const CACHE_BYTES = 192e6;
+/** Time that a frame is shown while playing, ms. */
+const PLAY_MS = 90;
+
+/** State of a run in progress (bst_run_state_name), and time between two looks at its folder, ms. */
+const RUNNING = 'still running';
+const REFRESH_MS = 2000;
+
+const element = (id) => document.getElementById(id);
+
+/** Changes of the mode. @param {number} sensor */
+async function getModes(sensor) {
+  return (await getJson('modes', { sensor })).modes.filter((change) => Number.isFinite(change.time_s));
+}
+
+class App {
+  constructor() {
+    this.frameView = new FrameView();
+    this.plots = new Plots((time) => this.seek(time));
+    this.run = null;
+    this.sensor = 0;
+    this.frames = new Float64Array(0);
+    this.count = 0;
+    this.current = -1;
+    this.wanted = -1;
+    this.busy = false;
+    this.cache = new Map();
+    this.playing = false;
+    this.events = [];
+    this.listen();
+  }
+
+  async start() {
+    const query = new URLSearchParams(location.hash.slice(1));
+    this.run = await getJson('run');
+    this.describeRun();
+    await this.openSensor(Number(query.get('sensor')) || 0, Number(query.get('frame')) || 0);
+    const [x, y, scale] = (query.get('at') || '').split(',').map(Number);
+    if (scale > 0) { // #at=X,Y,SCALE: a place of the frame
+      Object.assign(this.frameView.view, { x, y, scale, fitted: false });
+      this.frameView.redraw();
+    }
+    if (this.run.state === RUNNING) this.follow();
+  }
+
+  /** Asks for what was recorded since, while the run is in progress; stays at the end if it is there. */
+  async follow() {
+    while (this.run.state === RUNNING) {
+      await new Promise((done) => { setTimeout(done, REFRESH_MS); });
+      try {
+        const { sensor } = this, run = await getJson('refresh'), frames = await getNumbers('frames', { sensor });
+        const [modes, events] = await Promise.all([getModes(sensor), getJson('events')]);
+        if (sensor !== this.sensor) continue;
+        const atEnd = this.current === this.count - 1;
+        this.run = run;
+        this.describeRun();
+        element('sensor').value = String(sensor);
+        for (const frame of this.cache.keys()) { // may have been without pixels yet
+          if (frame >= this.count - 2 && frame !== this.current) this.cache.delete(frame);
+        }
+        this.setFrames(frames);
+        this.showEvents(events);
+        this.plots.extend(run.sensors[sensor].panels, modes, this.events, this.lastTime(modes));
+        if (atEnd && this.count) await this.goTo(this.count - 1);
+      } catch (error) {
+        this.showProblems([`The run cannot be followed: ${error.message}`]);
+      }
+    }
+  }
+
+  /** @param {Float64Array} frames numbers of all frames */
+  setFrames(frames) {
+    this.frames = frames;
+    this.count = frames.length / NUMBERS;
+    element('slider').max = String(Math.max(0, this.count - 1));
+  }
+
+  lastTime(modes) {
+    return Math.max(this.count ? this.timeOf(this.count - 1) : 1, ...modes.slice(-1).map((mode) => mode.time_s));
+  }
+
+  describeRun() {
+    const { run } = this, summary = run.manifest.summary || {};
+    document.title = `${run.name} – Boresight`;
+    element('run-name').textContent = run.name;
+    element('run-name').title = run.manifest.scenario || '';
+    element('run-state').textContent = run.state;
+    element('run-state').classList.toggle('bad', run.state !== 'complete');
+    const figures = [
+      ['Final mode', summary.final_mode], ['Pointing RMS', summary.pointing_rms_px, ' px'],
+      ['Custody', summary.custody === undefined || summary.custody === null ? undefined : 100 * summary.custody, ' %'],
+      ['Speed', summary.real_time_factor, '× real time'], ['Warnings', run.manifest.warnings],
+    ];
+    element('figures').replaceChildren(...figures.filter(([, value]) => value !== undefined && value !== null).map(([name, value, unit]) => {
+      const box = document.createElement('div'), key = document.createElement('dt'), text = document.createElement('dd');
+      key.textContent = name;
+      text.textContent = typeof value === 'number' ? shortNumber(value) + (unit || '') : String(value);
+      box.append(key, text);
+      return box;
+    }));
+    this.showProblems(run.problems.concat(run.manifest.error ? [run.manifest.error] : []));
+    element('sensor').replaceChildren(...run.sensors.map((sensor, k) => {
+      const option = document.createElement('option');
+      option.value = String(k);
+      option.textContent = sensor.observer ? `${sensor.observer}/${sensor.name}` : `sensor ${k}`;
+      return option;
+    }));
+    element('sensor-label').hidden = run.sensors.length < 2;
+  }
+
+  showProblems(problems) {
+    element('problems').hidden = problems.length === 0;
+    element('problems').textContent = problems.join('\n');
+  }
+
+  async openSensor(sensor, frame) {
+    const info = this.run.sensors[sensor];
+    if (!info) return;
+    this.sensor = sensor;
+    element('sensor').value = String(sensor);
+    this.frameView.sensorWidth = info.width_px;
+    this.frameView.sensorHeight = info.height_px;
+    this.frameView.reset();
+    this.cache.clear();
+    this.setFrames(await getNumbers('frames', { sensor }));
+    this.current = -1;
+    if (this.count === 0) {
+      this.frameView.show(null, null, 'This sensor has no frames.');
+      element('position').textContent = 'no frames';
+    } else {
+      await this.goTo(Math.min(frame, this.count - 1)); // the picture first
+    }
+    const [modes, events] = await Promise.all([getModes(sensor), getJson('events')]);
+    this.showEvents(events);
+    const first = this.count ? this.frames[1] - (this.frames[2] || 0) / 2 : 0;
+    this.plots.show(sensor, info.panels, modes, this.events, Math.min(0, first), this.lastTime(modes));
+    if (this.count) this.plots.setCursor(this.timeOf(Math.max(0, this.current)));
+  }
+
+  timeOf(frame) { return this.frames[frame * NUMBERS + 1]; }
+
+  // ---------------------------------------------------------------- frames
+
+  /** Shows a frame. Only one is loaded at a time; of those that are asked for meanwhile, the last. */
+  async goTo(frame) {
+    this.wanted = Math.min(this.count - 1, Math.max(0, frame));
+    if (this.busy) return;
+    this.busy = true;
+    try {
+      while (this.wanted !== this.current) {
+        const next = this.wanted;
+        const loaded = await this.load(next);
+        this.current = next;
+        this.frameView.show(loaded.image, loaded.details, loaded.why);
+        this.describePosition(loaded.details);
+        this.plots.setCursor(this.timeOf(next));
+        this.markEvent();
+        document.dispatchEvent(new CustomEvent('frameshown', { detail: next }));
+      }
+    } catch (error) {
+      this.wanted = this.current;
+      this.stop();
+      this.showProblems([`Frame ${frame}: ${error.message}. Is "boresight view" still running?`]);
+    } finally {
+      this.busy = false;
+    }
+    if (this.current + 1 < this.count) this.load(this.current + 1).catch(() => {});
+  }
+
+  load(frame) {
+    const held = this.cache.get(frame);
+    if (held) {
+      this.cache.delete(frame);
+      this.cache.set(frame, held); // the latest last
+      return held.promise;
+    }
+    const entry = { bytes: 0, promise: null };
+    entry.promise = this.fetchFrame(frame, entry);
+    entry.promise.catch(() => this.cache.delete(frame));
+    this.cache.set(frame, entry);
+    this.forget();
+    return entry.promise;
+  }
+
+  async fetchFrame(frame, entry) {
+    const sensor = this.sensor, kept = this.frames[frame * NUMBERS + 3] >= 0;
+    const dropped = this.frames[frame * NUMBERS + 4] === 1;
+    const [image, details] = await Promise.all([
+      kept ? getPixels(sensor, frame) : null, getJson('frame', { sensor, frame }),
+    ]);
+    entry.bytes = image ? image.data.byteLength : 1000;
+    return { image, details, why: dropped ? 'This frame was dropped.' : 'The pixels of this frame were not kept.' };
+  }
+
+  /** Drops the frames that were not shown for the longest time. */
+  forget() {
+    let bytes = 0;
+    for (const entry of this.cache.values()) bytes += entry.bytes;
+    for (const [frame, entry] of this.cache) {
+      if (bytes <= CACHE_BYTES || this.cache.size <= 2) return;
+      bytes -= entry.bytes;
+      this.cache.delete(frame);
+    }
+  }
+
+  describePosition(details) {
+    const time = this.timeOf(this.current), utc = details.utc ? `${details.utc.replace('T', ' ').replace('Z', '')} UTC` : '';
+    element('slider').value = String(this.current);
+    element('slider').setAttribute('aria-valuetext', `frame ${this.current + 1} of ${this.count}, ${time.toFixed(2)} s`);
+    element('position').textContent = `${this.current + 1} / ${this.count} · exposure ${details.exposure_id} · ${time.toFixed(2)} s${utc ? ` · ${utc}` : ''}`;
+  }
+
+  /** Goes to the frame whose middle is nearest to a time. */
+  seek(time) {
+    let low = 0, high = this.count - 1;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.timeOf(middle) < time) low = middle + 1; else high = middle;
+    }
+    if (low > 0 && time - this.timeOf(low - 1) < this.timeOf(low) - time) low--;
+    if (this.count) this.goTo(low);
+  }
+
+  async play() {
+    if (this.current >= this.count - 1) await this.goTo(0);
+    this.playing = true;
+    this.showPlaying();
+    while (this.playing && this.current < this.count - 1) {
+      const begin = performance.now();
+      await this.goTo(this.current + 1);
+      await new Promise((done) => { setTimeout(done, Math.max(0, PLAY_MS - (performance.now() - begin))); });
+    }
+    this.stop();
+  }
+
+  stop() {
+    this.playing = false;
+    this.showPlaying();
+  }
+
+  showPlaying() {
+    element('play').querySelector('path').setAttribute('d', this.playing ? 'M3 2h4v12H3zM9 2h4v12H9z' : 'M4 2v12l10-6z');
+    element('play').setAttribute('aria-label', this.playing ? 'Stop' : 'Play');
+    element('play').setAttribute('aria-pressed', String(this.playing));
+  }
+
+  // ---------------------------------------------------------------- events
+
+  showEvents({ total, events: listed }) {
+    const events = listed.filter((event) => Number.isFinite(event.time_s)); // a damaged table may have others
+    this.events = events;
+    element('event-count').textContent = total > events.length ? `first ${events.length} of ${total}` : String(total);
+    element('events').replaceChildren(...events.map((event) => {
+      const item = document.createElement('li'), button = document.createElement('button');
+      for (const [name, text] of [['when', `${event.time_s.toFixed(2)} s`], ['kind', event.kind], ['what', event.text]]) {
+        const span = document.createElement('span');
+        span.className = name;
+        span.textContent = text;
+        span.dir = name === 'when' ? 'ltr' : 'auto';
+        button.append(span);
+      }
+      button.type = 'button';
+      button.title = event.source;
+      button.addEventListener('click', () => this.seek(event.time_s));
+      item.append(button);
+      return item;
+    }));
+    this.markEvent();
+  }
+
+  /** Marks the last event at or before the frame. */
+  markEvent() {
+    if (this.current < 0) return;
+    const time = this.timeOf(this.current);
+    let at = -1;
+    this.events.forEach((event, k) => { if (event.time_s <= time + 1e-9) at = k; });
+    [...element('events').children].forEach((item, k) => item.classList.toggle('now', k === at));
+  }
+
+  // ---------------------------------------------------------------- controls
+
+  listen() {
+    const on = (id, act) => element(id).addEventListener('click', act);
+    on('first', () => this.goTo(0));
+    on('back', () => this.goTo(this.wanted - 1));
+    on('next', () => this.goTo(this.wanted + 1));
+    on('last', () => this.goTo(this.count - 1));
+    on('play', () => (this.playing ? this.stop() : this.play()));
+    on('help', () => element('keys').showModal());
+    on('theme', () => this.setTheme(document.documentElement.dataset.theme === 'light' ? 'dark' : 'light'));
+    element('slider').addEventListener('input', () => this.goTo(Number(element('slider').value)));
+    element('sensor').addEventListener('change', () => this.openSensor(Number(element('sensor').value), 0));
+    document.addEventListener('keydown', (event) => this.onKey(event));
+    const light = matchMedia('(prefers-color-scheme: light)');
+    light.addEventListener('change', () => this.setTheme(light.matches ? 'light' : 'dark'));
+    this.setTheme(light.matches ? 'light' : 'dark');
+  }
+
+  setTheme(name) {
+    document.documentElement.dataset.theme = name;
+    this.plots.draw();
+    this.frameView.drawHistogram();
+  }
+
+  onKey(event) {
+    const target = event.target, view = this.frameView;
+    if (event.ctrlKey || event.altKey || event.metaKey || element('keys').open) return;
+    if (target instanceof HTMLSelectElement || (target instanceof HTMLInputElement && target.type === 'number')) return;
+    if (event.key === ' ' && (target instanceof HTMLButtonElement || target instanceof HTMLInputElement)) return;
+    const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+    const actions = {
+      PageUp: () => this.goTo(this.wanted - 10), PageDown: () => this.goTo(this.wanted + 10),
+      Home: () => this.goTo(0), End: () => this.goTo(this.count - 1), ' ': () => (this.playing ? this.stop() : this.play()),
+      '+': () => view.zoomTo(view.view.scale * 1.5), '=': () => view.zoomTo(view.view.scale * 1.5), '-': () => view.zoomTo(view.view.scale / 1.5),
+      0: () => view.fit(), 1: () => view.zoomTo(1), w: () => view.pan(0, -60), a: () => view.pan(-60, 0), s: () => view.pan(0, 60), d: () => view.pan(60, 0),
+      c: () => view.centreTarget(), m: () => view.toggleMarks(), '[': () => this.plots.zoom(0.5), ']': () => this.plots.zoom(2),
+      '?': () => element('keys').showModal(),
+    };
+    if (step && event.shiftKey) view.moveCursor(step[0], step[1]);
+    else if (step && step[0] !== 0) this.goTo(this.wanted + step[0]);
+    else if (actions[event.key]) actions[event.key]();
+    else return;
+    event.preventDefault();
+  }
+}
+
+const app = new App();
+document.boresight = app; // for tests of the page
+app.start().catch((error) => app.showProblems([`The run cannot be shown: ${error.message}`]));

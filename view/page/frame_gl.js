@@ -1,0 +1,194 @@
+// Draws 16-bit pixels with a stretch: by WebGL2, or on a 2D canvas where there is none.
+
+/**
+ * What is drawn where. `centre`: place on the frame at the middle of the canvas; `scale`: pixels of
+ * the screen per pixel of the frame; `soft`: digital numbers, 0 for a linear stretch.
+ * @typedef {{ centreX: number, centreY: number, scale: number, black: number, white: number,
+ *   soft: number, invert: boolean }} Drawing
+ */
+
+const VERTEX = `#version 300 es
+void main() { // one triangle over the whole canvas
+  vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
+  gl_Position = vec4(corner, 0.0, 1.0);
+}`;
+
+const FRAGMENT = `#version 300 es
+precision highp float; precision highp int; precision highp usampler2D;
+uniform usampler2D image;
+uniform vec2 size, canvas, centre;
+uniform float scale, black, white, soft;
+uniform bool invert;
+out vec4 colour;
+void main() {
+  vec2 screen = vec2(gl_FragCoord.x, canvas.y - gl_FragCoord.y);
+  vec2 place = (screen - 0.5 * canvas) / scale + centre + 0.5; // pixel i covers i to i + 1
+  if (any(lessThan(place, vec2(0.0))) || any(greaterThanEqual(place, size))) {
+    colour = vec4(0.0);
+    return;
+  }
+  float value;
+  if (scale >= 1.0) {
+    value = float(texelFetch(image, ivec2(place), 0).r);
+  } else { // mean of the pixels below this one
+    float reach = 0.5 / scale;
+    ivec2 a = max(ivec2(floor(place - reach + 0.5)), ivec2(0));
+    ivec2 b = max(min(ivec2(floor(place + reach + 0.5)), ivec2(size)), a + 1);
+    int skip = max(1, (b.x - a.x) / 8);
+    float sum = 0.0, count = 0.0;
+    for (int y = a.y; y < b.y; y += skip) {
+      for (int x = a.x; x < b.x; x += skip) {
+        sum += float(texelFetch(image, ivec2(x, y), 0).r);
+        count += 1.0;
+      }
+    }
+    value = sum / count;
+  }
+  float grey = (value - black) / (white - black);
+  if (soft > 0.0) grey = asinh((value - black) / soft) / asinh((white - black) / soft);
+  grey = clamp(grey, 0.0, 1.0);
+  colour = vec4(vec3(invert ? 1.0 - grey : grey), 1.0);
+}`;
+
+/** Grey level of a value, 0 to 1: the same as in the shader. @param {Drawing} d */
+export function greyOf(value, d) {
+  const grey = d.soft > 0
+    ? Math.asinh((value - d.black) / d.soft) / Math.asinh((d.white - d.black) / d.soft)
+    : (value - d.black) / (d.white - d.black);
+  const clamped = Math.min(1, Math.max(0, grey));
+  return d.invert ? 1 - clamped : clamped;
+}
+
+function compile(gl, kind, source) {
+  const shader = gl.createShader(kind);
+  gl.shaderSource(shader, source);
+  gl.compileShader(shader);
+  return shader;
+}
+
+class WebglPainter {
+  constructor(canvas, gl) {
+    this.canvas = canvas;
+    this.gl = gl;
+    this.most = gl.getParameter(gl.MAX_TEXTURE_SIZE);
+    this.prepare();
+  }
+
+  prepare() {
+    const gl = this.gl, program = gl.createProgram();
+    gl.attachShader(program, compile(gl, gl.VERTEX_SHADER, VERTEX));
+    gl.attachShader(program, compile(gl, gl.FRAGMENT_SHADER, FRAGMENT));
+    gl.linkProgram(program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+      throw new Error(`the shader was refused: ${gl.getProgramInfoLog(program)}`);
+    }
+    gl.useProgram(program);
+    this.places = {};
+    for (const name of ['size', 'canvas', 'centre', 'scale', 'black', 'white', 'soft', 'invert']) {
+      this.places[name] = gl.getUniformLocation(program, name);
+    }
+    gl.bindVertexArray(gl.createVertexArray());
+    this.texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, this.texture);
+    for (const [name, value] of [[gl.TEXTURE_MIN_FILTER, gl.NEAREST], [gl.TEXTURE_MAG_FILTER, gl.NEAREST],
+      [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE]]) {
+      gl.texParameteri(gl.TEXTURE_2D, name, value);
+    }
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 2);
+    this.held = null;
+  }
+
+  /** @param {{width: number, height: number, data: Uint16Array} | null} image @param {Drawing} d */
+  draw(image, d) {
+    const gl = this.gl, canvas = this.canvas;
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    if (!image) return;
+    if (this.held !== image) {
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.R16UI, image.width, image.height, 0, gl.RED_INTEGER, gl.UNSIGNED_SHORT, image.data);
+      this.held = image;
+    }
+    const at = this.places;
+    gl.uniform2f(at.size, image.width, image.height);
+    gl.uniform2f(at.canvas, canvas.width, canvas.height);
+    gl.uniform2f(at.centre, d.centreX, d.centreY);
+    for (const name of ['scale', 'black', 'white', 'soft']) gl.uniform1f(at[name], d[name]);
+    gl.uniform1i(at.invert, d.invert ? 1 : 0);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  fits(image) { return image.width <= this.most && image.height <= this.most; }
+
+  /** The pixels as the graphics processor holds them. */
+  readBack() {
+    const gl = this.gl, image = this.held;
+    if (!image) return null;
+    const buffer = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.texture, 0);
+    const all = new Uint32Array(4 * image.width * image.height);
+    gl.readPixels(0, 0, image.width, image.height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, all);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.deleteFramebuffer(buffer);
+    return Uint16Array.from({ length: image.width * image.height }, (_, i) => all[4 * i]);
+  }
+}
+
+class CanvasPainter {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.context = canvas.getContext('2d');
+    this.held = null;
+  }
+
+  fits() { return true; }
+
+  draw(image, d) {
+    const { width, height } = this.canvas;
+    this.held = image;
+    this.context.clearRect(0, 0, width, height);
+    if (!image || width === 0 || height === 0) return;
+    const out = this.context.createImageData(width, height), grey = new Uint8Array(65536);
+    for (let value = 0; value < 65536; value++) grey[value] = Math.round(255 * greyOf(value, d));
+    const reach = d.scale >= 1 ? 0 : 0.5 / d.scale;
+    for (let y = 0, k = 0; y < height; y++) {
+      const fy = (y + 0.5 - height / 2) / d.scale + d.centreY + 0.5;
+      for (let x = 0; x < width; x++, k += 4) {
+        const fx = (x + 0.5 - width / 2) / d.scale + d.centreX + 0.5;
+        if (fx < 0 || fy < 0 || fx >= image.width || fy >= image.height) continue;
+        out.data[k] = out.data[k + 1] = out.data[k + 2] = grey[Math.round(CanvasPainter.mean(image, fx, fy, reach))];
+        out.data[k + 3] = 255;
+      }
+    }
+    this.context.putImageData(out, 0, 0);
+  }
+
+  static mean(image, x, y, reach) {
+    if (reach === 0) return image.data[Math.floor(y) * image.width + Math.floor(x)];
+    const ax = Math.max(0, Math.floor(x - reach + 0.5)), ay = Math.max(0, Math.floor(y - reach + 0.5));
+    const bx = Math.max(ax + 1, Math.min(image.width, Math.floor(x + reach + 0.5)));
+    const by = Math.max(ay + 1, Math.min(image.height, Math.floor(y + reach + 0.5)));
+    const skip = Math.max(1, Math.floor((bx - ax) / 4));
+    let sum = 0, count = 0;
+    for (let j = ay; j < by; j += skip) {
+      for (let i = ax; i < bx; i += skip) { sum += image.data[j * image.width + i]; count++; }
+    }
+    return sum / count;
+  }
+
+  readBack() { return this.held ? this.held.data : null; }
+}
+
+/** A painter for a canvas. @param {HTMLCanvasElement} canvas @param {boolean} plain without WebGL */
+export function makePainter(canvas, plain) {
+  const gl = plain ? null : canvas.getContext('webgl2', { antialias: false, alpha: true, premultipliedAlpha: true });
+  if (!gl) return new CanvasPainter(canvas);
+  const painter = new WebglPainter(canvas, gl);
+  canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
+  canvas.addEventListener('webglcontextrestored', () => {
+    painter.prepare();
+    canvas.dispatchEvent(new Event('redraw'));
+  });
+  return painter;
+}

@@ -1,0 +1,382 @@
+// The picture of a frame: zoom, stretch, marks, the pixel under the cursor.
+import { makePainter } from './frame_gl.js';
+import { drawCompass, drawMarks, drawShape, KINDS, sortMarks } from './marks.js';
+import { describePixels, limitsOf } from './statistics.js';
+import { formatDec, formatRa, pixelToSky } from './wcs.js';
+
+const SCALE_LEAST = 0.02, SCALE_MOST = 128;
+/** From this scale on, pixels show their values. */
+const VALUE_SCALE = 34;
+const NUMBER = new Intl.NumberFormat('en', { maximumFractionDigits: 1 });
+
+/** An element by its id. @param {string} id */
+const element = (id) => document.getElementById(id);
+
+export class FrameView {
+  constructor() {
+    this.stage = element('stage');
+    this.canvas = element('image');
+    this.overlay = element('overlay');
+    this.painter = makePainter(this.canvas, new URLSearchParams(location.search).has('plain'));
+    this.image = null;
+    this.statistics = null;
+    this.details = null;
+    this.sorted = null;
+    this.view = { x: 0, y: 0, scale: 1, fitted: true };
+    this.limits = null;
+    this.cursor = null;
+    this.shown = Object.fromEntries(KINDS.map((kind) => [kind.name, kind.shown]));
+    this.waiting = true; // until all is there
+    this.makeLegend();
+    this.listen();
+    this.waiting = false;
+    new ResizeObserver(() => this.resize()).observe(this.stage);
+    this.resize();
+  }
+
+  // ---------------------------------------------------------------- what is shown
+
+  /** A new sensor: its stretch and zoom begin anew. */
+  reset() {
+    this.limits = null;
+    this.view.fitted = true;
+  }
+
+  /** @param {{width: number, height: number, data: Uint16Array} | null} image @param {any} details @param {string} why no pixels */
+  show(image, details, why) {
+    const before = this.image;
+    this.image = image;
+    this.details = details;
+    this.sorted = details ? sortMarks(details) : null;
+    this.statistics = image ? describePixels(image.data) : null;
+    element('no-pixels').hidden = Boolean(image);
+    element('no-pixels').textContent = image ? '' : why;
+    if (image && !this.painter.fits(image)) this.usePlain();
+    if (image && !this.limits) this.findLimits();
+    if (image && (!before || before.width !== image.width || before.height !== image.height)) this.view.fitted = true;
+    if (this.view.fitted) this.fit();
+    for (const kind of KINDS) {
+      element(`count-${kind.name}`).textContent = this.sorted ? String(this.sorted[kind.name].length) : '';
+    }
+    this.drawHistogram();
+    this.redraw();
+  }
+
+  /** A canvas has one kind of context for life: the 2D painter needs a new one. */
+  usePlain() {
+    const fresh = this.canvas.cloneNode();
+    this.canvas.replaceWith(fresh);
+    this.canvas = fresh;
+    this.painter = makePainter(fresh, true);
+    this.resize();
+  }
+
+  findLimits() {
+    const law = element('law').value;
+    if (law !== 'manual' || !this.limits) this.limits = limitsOf(law, this.image.data, this.statistics);
+    element('black').value = String(Math.round(this.limits.black));
+    element('white').value = String(Math.round(this.limits.white));
+  }
+
+  drawing() {
+    const ratio = devicePixelRatio || 1, law = element('law').value, limits = this.limits || { black: 0, white: 65535 };
+    const sigma = this.statistics ? this.statistics.sigma : 1;
+    return {
+      centreX: this.view.x, centreY: this.view.y, scale: this.view.scale * ratio,
+      black: limits.black, white: Math.max(limits.white, limits.black + 1),
+      soft: law === 'asinh' ? 3 * sigma : 0, invert: element('invert').checked,
+    };
+  }
+
+  // ---------------------------------------------------------------- geometry
+
+  size() {
+    return { width: this.stage.clientWidth, height: this.stage.clientHeight };
+  }
+
+  resize() {
+    const ratio = devicePixelRatio || 1, { width, height } = this.size();
+    for (const canvas of [this.canvas, this.overlay]) {
+      canvas.width = Math.max(1, Math.round(width * ratio));
+      canvas.height = Math.max(1, Math.round(height * ratio));
+    }
+    if (this.view.fitted) this.fit();
+    this.redraw();
+  }
+
+  toScreen(x, y) {
+    const { width, height } = this.size();
+    return { x: (x - this.view.x) * this.view.scale + width / 2, y: (y - this.view.y) * this.view.scale + height / 2 };
+  }
+
+  toFrame(x, y) {
+    const { width, height } = this.size();
+    return { x: (x - width / 2) / this.view.scale + this.view.x, y: (y - height / 2) / this.view.scale + this.view.y };
+  }
+
+  frameSize() {
+    return this.image || { width: this.sensorWidth || 1024, height: this.sensorHeight || 1024 };
+  }
+
+  fit() {
+    const { width, height } = this.size(), frame = this.frameSize();
+    this.view = {
+      x: (frame.width - 1) / 2, y: (frame.height - 1) / 2, fitted: true,
+      scale: Math.max(SCALE_LEAST, Math.min(width / frame.width, height / frame.height)),
+    };
+    this.redraw();
+  }
+
+  /** Zooms so that the place under (x, y) of the screen stays. */
+  zoomTo(scale, x, y) {
+    const { width, height } = this.size();
+    const place = this.toFrame(x ?? width / 2, y ?? height / 2);
+    const next = Math.min(SCALE_MOST, Math.max(SCALE_LEAST, scale));
+    this.view = {
+      scale: next, fitted: false,
+      x: place.x - ((x ?? width / 2) - width / 2) / next, y: place.y - ((y ?? height / 2) - height / 2) / next,
+    };
+    this.redraw();
+  }
+
+  pan(dx, dy) {
+    this.view.x += dx / this.view.scale;
+    this.view.y += dy / this.view.scale;
+    this.view.fitted = false;
+    this.redraw();
+  }
+
+  centreTarget() {
+    const mark = this.sorted && (this.sorted.target[0] || this.sorted.tracks.find((track) => track.target));
+    if (!mark) return;
+    Object.assign(this.view, { x: mark.x, y: mark.y, fitted: false, scale: Math.max(this.view.scale, 8) });
+    this.redraw();
+  }
+
+  // ---------------------------------------------------------------- drawing
+
+  redraw() {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
+      this.painter.draw(this.image, this.drawing());
+      this.drawOverlay();
+      this.describeCursor();
+      const percent = 100 * this.view.scale;
+      element('zoom').textContent = `${percent < 10 ? percent.toFixed(1) : Math.round(percent)} %`;
+    });
+  }
+
+  drawOverlay() {
+    const context = this.overlay.getContext('2d'), ratio = devicePixelRatio || 1, { width, height } = this.size();
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    context.clearRect(0, 0, width, height);
+    if (!this.image) this.drawOutline(context);
+    if (this.view.scale >= VALUE_SCALE && this.image) this.drawValues(context);
+    const wcs = this.details && this.details.wcs;
+    if (this.sorted) {
+      drawMarks(context, this.sorted, wcs, { toScreen: (x, y) => this.toScreen(x, y), scale: this.view.scale, width, height, shown: this.shown });
+    }
+    if (wcs) drawCompass(context, wcs, { scale: this.view.scale, width, height });
+    if (this.cursor && this.view.scale >= 6) {
+      const at = this.toScreen(this.cursor.x, this.cursor.y), side = this.view.scale;
+      context.strokeStyle = '#ffffff';
+      context.lineWidth = 1;
+      context.strokeRect(at.x - side / 2, at.y - side / 2, side, side);
+    }
+  }
+
+  /** Edge of a frame whose pixels are not there. */
+  drawOutline(context) {
+    const frame = this.frameSize(), a = this.toScreen(-0.5, -0.5), b = this.toScreen(frame.width - 0.5, frame.height - 0.5);
+    context.strokeStyle = '#5b6b7a';
+    context.lineWidth = 1;
+    context.strokeRect(a.x, a.y, b.x - a.x, b.y - a.y);
+  }
+
+  drawValues(context) {
+    const { width, height } = this.size(), a = this.toFrame(0, 0), b = this.toFrame(width, height), image = this.image;
+    context.font = `${Math.min(13, Math.round(this.view.scale / 3.6))}px system-ui, sans-serif`;
+    context.textAlign = 'center';
+    context.textBaseline = 'middle';
+    for (let y = Math.max(0, Math.round(a.y)); y <= Math.min(image.height - 1, Math.round(b.y)); y++) {
+      for (let x = Math.max(0, Math.round(a.x)); x <= Math.min(image.width - 1, Math.round(b.x)); x++) {
+        const at = this.toScreen(x, y), text = String(image.data[y * image.width + x]);
+        context.lineWidth = 2.5;
+        context.strokeStyle = 'rgb(0 0 0 / 70%)';
+        context.strokeText(text, at.x, at.y + 0.32 * this.view.scale);
+        context.fillStyle = '#ffffff';
+        context.fillText(text, at.x, at.y + 0.32 * this.view.scale);
+      }
+    }
+    context.textAlign = 'start';
+    context.textBaseline = 'alphabetic';
+  }
+
+  drawHistogram() {
+    const canvas = element('histogram'), context = canvas.getContext('2d'), { width, height } = canvas;
+    context.clearRect(0, 0, width, height);
+    const s = this.statistics;
+    if (!s || !this.limits) return;
+    const from = s.low - 0.02 * (s.bright - s.low), to = Math.max(s.bright, from + 10) * 1.0, bins = new Float64Array(width);
+    for (let value = Math.max(0, Math.floor(from)); value <= Math.min(65535, to); value++) {
+      bins[Math.min(width - 1, Math.max(0, Math.floor((value - from) / (to - from) * width)))] += s.counts[value];
+    }
+    const most = Math.log1p(Math.max(...bins)), style = getComputedStyle(document.documentElement);
+    context.fillStyle = style.getPropertyValue('--faint');
+    bins.forEach((count, x) => {
+      const h = most > 0 ? Math.log1p(count) / most * (height - 2) : 0;
+      context.fillRect(x, height - h, 1, h);
+    });
+    context.fillStyle = style.getPropertyValue('--accent');
+    for (const limit of [this.limits.black, this.limits.white]) {
+      const x = Math.min(width - 2, Math.max(0, (limit - from) / (to - from) * width));
+      context.fillRect(x, 0, 2, height);
+    }
+  }
+
+  // ---------------------------------------------------------------- the cursor
+
+  describeCursor() {
+    const place = this.cursor, parts = [], image = this.image;
+    if (place) {
+      const x = Math.round(place.x), y = Math.round(place.y);
+      parts.push(['Pixel', this.cursor.exact ? `${place.x.toFixed(1)}, ${place.y.toFixed(1)}` : `${x}, ${y}`]);
+      if (image && x >= 0 && y >= 0 && x < image.width && y < image.height) {
+        const dn = image.data[y * image.width + x], d = this.details;
+        parts.push(['Value', `${dn} DN`]);
+        if (d && Number.isFinite(d.gain_e_per_dn)) {
+          parts.push(['Charge', `${NUMBER.format((dn - (d.offset_dn || 0)) * d.gain_e_per_dn)} e−`]);
+        }
+        if (d && d.saturation_dn && dn >= d.saturation_dn) parts.push(['', 'saturated']);
+      }
+      if (this.details && this.details.wcs) {
+        const sky = pixelToSky(this.details.wcs, place.x, place.y);
+        parts.push(['RA', formatRa(sky.ra)], ['Dec', formatDec(sky.dec)]);
+        if (this.details.wcs.without_distortion) parts.push(['', '(without distortion)']);
+      }
+      const near = this.nearest(place);
+      if (near) parts.push(['At', near]);
+    } else {
+      parts.push(['', 'Point at a pixel for its value and direction.']);
+    }
+    element('readout').replaceChildren(...parts.map(([key, value]) => {
+      const span = document.createElement('span');
+      if (key) {
+        const name = document.createElement('span');
+        name.className = 'key';
+        name.textContent = key;
+        span.append(name);
+      }
+      span.append(value);
+      return span;
+    }));
+  }
+
+  /** Text about the nearest mark that is shown, within 12 px of the screen. */
+  nearest(place) {
+    let best = 12 / this.view.scale, text = '';
+    for (const kind of this.sorted ? KINDS : []) {
+      for (const mark of this.shown[kind.name] ? this.sorted[kind.name] : []) {
+        const distance = Math.hypot(mark.x - place.x, mark.y - place.y);
+        if (distance <= best) {
+          best = distance;
+          text = `${mark.text || kind.title.toLowerCase().replace(/s$/, '')}` +
+            (Number.isFinite(mark.v_mag) ? `, V ${mark.v_mag.toFixed(2)}` : '') +
+            (Number.isFinite(mark.snr) ? `, SNR ${NUMBER.format(mark.snr)}` : '') +
+            (kind.name === 'detections' && mark.label ? ` (${mark.label})` : '') +
+            (mark.status ? ` (${mark.status})` : '');
+        }
+      }
+    }
+    return text;
+  }
+
+  moveCursor(dx, dy) {
+    const frame = this.frameSize(), from = this.cursor || { x: Math.round(this.view.x), y: Math.round(this.view.y) };
+    this.cursor = {
+      x: Math.min(frame.width - 1, Math.max(0, Math.round(from.x) + dx)),
+      y: Math.min(frame.height - 1, Math.max(0, Math.round(from.y) + dy)),
+    };
+    const at = this.toScreen(this.cursor.x, this.cursor.y), { width, height } = this.size();
+    if (at.x < 10 || at.y < 10 || at.x > width - 10 || at.y > height - 10) {
+      Object.assign(this.view, { x: this.cursor.x, y: this.cursor.y, fitted: false });
+    }
+    this.redraw();
+  }
+
+  // ---------------------------------------------------------------- controls
+
+  makeLegend() {
+    element('legend').replaceChildren(...KINDS.map((kind) => {
+      const button = document.createElement('button'), sample = document.createElement('canvas'), count = document.createElement('span');
+      button.type = 'button';
+      button.id = `show-${kind.name}`;
+      button.addEventListener('click', () => this.setShown(kind.name, !this.shown[kind.name]));
+      sample.width = sample.height = 36;
+      sample.setAttribute('aria-hidden', 'true');
+      const context = sample.getContext('2d');
+      context.strokeStyle = kind.colour;
+      context.lineWidth = 4;
+      drawShape(context, kind.shape, 18, 18, kind.shape === 'square' ? 10 : 12);
+      count.className = 'count';
+      count.id = `count-${kind.name}`;
+      button.append(sample, kind.title, count);
+      return button;
+    }));
+    for (const kind of KINDS) this.setShown(kind.name, kind.shown);
+  }
+
+  setShown(name, shown) {
+    this.shown[name] = shown;
+    element(`show-${name}`).setAttribute('aria-pressed', String(shown));
+    this.redraw();
+  }
+
+  toggleMarks() {
+    const any = Object.values(this.shown).some(Boolean);
+    for (const kind of KINDS) this.setShown(kind.name, any ? false : kind.shown);
+  }
+
+  listen() {
+    const overlay = this.overlay;
+    let held = null;
+    overlay.addEventListener('wheel', (event) => {
+      event.preventDefault();
+      this.zoomTo(this.view.scale * 2 ** (-event.deltaY / 240), event.offsetX, event.offsetY);
+    }, { passive: false });
+    overlay.addEventListener('pointerdown', (event) => {
+      held = { x: event.clientX, y: event.clientY };
+      overlay.setPointerCapture(event.pointerId);
+    });
+    overlay.addEventListener('pointermove', (event) => {
+      this.cursor = { ...this.toFrame(event.offsetX, event.offsetY), exact: true };
+      if (held) {
+        this.pan(held.x - event.clientX, held.y - event.clientY);
+        held = { x: event.clientX, y: event.clientY };
+      }
+      this.redraw();
+    });
+    for (const name of ['pointerup', 'pointercancel']) overlay.addEventListener(name, () => { held = null; });
+    overlay.addEventListener('pointerleave', () => { this.cursor = null; this.redraw(); });
+    overlay.addEventListener('dblclick', () => this.fit());
+    this.canvas.addEventListener('redraw', () => this.redraw());
+    element('law').addEventListener('change', () => { if (this.image) this.findLimits(); this.drawHistogram(); this.redraw(); });
+    element('invert').addEventListener('change', () => this.redraw());
+    for (const id of ['black', 'white']) {
+      element(id).addEventListener('input', () => {
+        const value = Number(element(id).value);
+        if (!Number.isFinite(value) || !this.limits) return;
+        if (element('law').value === 'zscale') element('law').value = 'manual';
+        this.limits = { ...this.limits, [id]: value };
+        this.drawHistogram();
+        this.redraw();
+      });
+    }
+    element('zoom-in').addEventListener('click', () => this.zoomTo(this.view.scale * 1.5));
+    element('zoom-out').addEventListener('click', () => this.zoomTo(this.view.scale / 1.5));
+    element('fit').addEventListener('click', () => this.fit());
+    element('actual').addEventListener('click', () => this.zoomTo(1));
+  }
+}

@@ -1,0 +1,75 @@
+/* Internal state of a recorded run, shared by recorded_run.c, describe.c, frame_details.c and
+ * plots.c. */
+#ifndef BST_VIEW_RECORDED_RUN_INTERNAL_H
+#define BST_VIEW_RECORDED_RUN_INTERNAL_H
+
+#include <pthread.h>
+
+#include "sim/io/fits_reader.h"
+#include "sim/io/fits_source.h"
+#include "sim/run/run_sensors.h"
+#include "view/decimate.h"
+#include "view/recorded_run.h"
+
+/* Lines of all panels of a sensor. */
+enum { BST_VIEW_LINES = 15 };
+
+/* An exposure of a sensor. */
+typedef struct bst_view_exposure {
+    int64_t id, fits_index; /* fits_index: in the order of the file, from 0; -1: not kept */
+    double mid_s, exposure_s;
+    double x0_px, y0_px, binning; /* window on the sensor */
+    bool dropped;
+} bst_view_exposure;
+
+/* A line of a panel; read at its first use. */
+typedef struct bst_view_line {
+    bst_view_sample *samples; /* NULL: not read */
+    size_t count;
+    uint64_t used; /* number of the last request for it */
+} bst_view_line;
+
+typedef struct bst_view_sensor {
+    bst_run_sensor sensor;
+    int64_t target; /* row of the table objects; -1: none */
+    int64_t width_px, height_px;
+    double pixel_scale_arcsec; /* NAN: unknown */
+    bst_view_exposure *exposures;
+    size_t count;
+    bst_fits_reader *pixels; /* NULL: not open */
+    bst_fits_source *header; /* NULL: not open */
+    bool listed, no_header;  /* no_header: the headers cannot be read */
+    bst_view_line lines[BST_VIEW_LINES];
+} bst_view_sensor;
+
+struct bst_view_run {
+    pthread_mutex_t lock;   /* of everything below: readers of tables and files are not shared */
+    char path[4096];        /* of the folder, as it was given */
+    bst_run_reader *reader; /* NULL between calls while the run is in progress */
+    bool running;           /* it was in progress when its sensors were read */
+    int sensors;
+    bst_view_sensor sensor[BST_EXPORT_SENSORS];
+    uint64_t requests;
+    size_t samples; /* held by all lines */
+};
+
+/* Begins a call: locks the run and opens its tables if they are not open. End it with
+ * bst_view_unlock, also after an error.
+ *
+ * Errors:    those of bst_run_reader_open */
+bst_status bst_view_lock(bst_ctx *ctx, bst_view_run *run) BST_MUST_CHECK;
+
+/* Ends a call. The tables of a run in progress are closed: an open connection would keep the run
+ * from merging its journal at its end. */
+void bst_view_unlock(bst_view_run *run);
+
+/* Finds a sensor by its number and lists its exposures. Call it with the lock held.
+ *
+ * Errors:    BST_ERR_NOT_FOUND; BST_ERR_MEMORY; BST_ERR_FORMAT: damaged tables */
+bst_status bst_view_find_sensor(bst_ctx *ctx, bst_view_run *run, int64_t number,
+                                bst_view_sensor **out) BST_MUST_CHECK;
+
+/* Adds the panels of a sensor to its description: [{name, title, unit, lines}]. */
+void bst_view_add_panels(const bst_view_run *run, const bst_view_sensor *sensor, cJSON *out);
+
+#endif

@@ -1,0 +1,410 @@
+#include "view/server.h"
+
+#include <errno.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/random.h>
+
+#include <civetweb.h>
+
+#include "view/page_files.h"
+#include "view/request_guard.h"
+
+/* Connections that are served at the same time; further ones wait in the queue of the system. A
+ * page uses up to 6. Most of the memory of a thread is never touched. */
+#define SERVED_CONNECTIONS "192"
+/* A peer that sends or takes nothing for so long loses its connection, ms. */
+#define IDLE_MS "1500"
+/* Longest head of a request, bytes. */
+#define REQUEST_BYTES "8192"
+/* Bytes that are handed to the system at a time: IDLE_MS is counted for each. */
+enum { PIECE_BYTES = 16384 };
+/* Answers with data in memory at the same time. */
+enum { ANSWERS_MOST = 12 };
+
+struct bst_view_server {
+    struct mg_context *http;
+    bst_view_run *run;
+    char token[BST_VIEW_TOKEN_DIGITS + 1];
+    pthread_mutex_t lock; /* of `answers` */
+    int answers;
+};
+
+/* What is sent for a request. */
+typedef struct answer {
+    int status;
+    const char *type;
+    const void *data;
+    size_t bytes;
+    int width, height; /* of pixels; 0: something else */
+} answer;
+
+/* Scripts and data come from this server only, and no other page may show this one. */
+static const char common_headers[] =
+    "Cache-Control: no-store\r\n"
+    "Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; "
+    "img-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'\r\n"
+    "Cross-Origin-Opener-Policy: same-origin\r\n"
+    "Cross-Origin-Resource-Policy: same-origin\r\n"
+    "Referrer-Policy: no-referrer\r\n"
+    "X-Content-Type-Options: nosniff\r\n"
+    "X-Frame-Options: DENY\r\n";
+
+static const char *reason_of(int status) {
+    switch (status) {
+        case BST_HTTP_OK:
+            return "OK";
+        case BST_HTTP_BAD_REQUEST:
+            return "Bad Request";
+        case BST_HTTP_FORBIDDEN:
+            return "Forbidden";
+        case BST_HTTP_NOT_FOUND:
+            return "Not Found";
+        case BST_HTTP_BAD_METHOD:
+            return "Method Not Allowed";
+        case BST_HTTP_TOO_LARGE:
+            return "Content Too Large";
+        case BST_HTTP_BUSY:
+            return "Service Unavailable";
+        default:
+            return "Internal Server Error";
+    }
+}
+
+/* Sends an answer in pieces; stops when the peer is gone or takes nothing. */
+static void send_answer(struct mg_connection *peer, const answer *a, bool head_only) {
+    char size[96] = "";
+    if (a->width > 0) {
+        snprintf(size, sizeof size, "X-Frame-Width: %d\r\nX-Frame-Height: %d\r\n", a->width,
+                 a->height);
+    }
+    /* a refused request may have a body that was not read */
+    const char *connection = a->status == BST_HTTP_OK ? "keep-alive" : "close";
+    mg_printf(peer,
+              "HTTP/1.1 %d %s\r\nContent-Type: %s\r\nContent-Length: %zu\r\nConnection: "
+              "%s\r\n%s%s%s\r\n",
+              a->status, reason_of(a->status), a->type, a->bytes, connection, size,
+              a->status == BST_HTTP_BUSY ? "Retry-After: 1\r\n" : "", common_headers);
+    for (size_t sent = 0; !head_only && sent < a->bytes;) {
+        size_t piece = a->bytes - sent < PIECE_BYTES ? a->bytes - sent : PIECE_BYTES;
+        int n = mg_write(peer, (const char *)a->data + sent, piece);
+        if (n <= 0) {
+            mg_disable_connection_keep_alive(peer); /* it may have sent further requests */
+            return;
+        }
+        sent += (size_t)n;
+    }
+}
+
+static answer text_answer(int status, const char *text) {
+    return (answer){
+        .status = status, .type = "text/plain; charset=utf-8", .data = text, .bytes = strlen(text)};
+}
+
+static answer refusal(int status) {
+    static const char *const texts[] = {
+        "This address needs the token that \"boresight view\" printed.\n",
+        "There is nothing at this address.\n", "The viewer cannot answer this request.\n"};
+    return text_answer(status, texts[status == BST_HTTP_FORBIDDEN   ? 0
+                                     : status == BST_HTTP_NOT_FOUND ? 1
+                                                                    : 2]);
+}
+
+/* ------------------------------------------------------------------ files of the page */
+
+static const char *type_of(const char *name) {
+    static const struct {
+        const char *end, *type;
+    } types[] = {{".html", "text/html; charset=utf-8"},
+                 {".css", "text/css; charset=utf-8"},
+                 {".js", "text/javascript; charset=utf-8"},
+                 {".svg", "image/svg+xml"}};
+    const char *dot = strrchr(name, '.');
+    for (size_t i = 0; dot && i < sizeof types / sizeof *types; i++) {
+        if (strcmp(dot, types[i].end) == 0) {
+            return types[i].type;
+        }
+    }
+    return "application/octet-stream";
+}
+
+static answer page_file(const char *route) {
+    const char *name = *route ? route : "index.html";
+    for (const bst_view_page_file *f = bst_view_page_files; f->name; f++) {
+        if (strcmp(f->name, name) == 0) {
+            return (answer){BST_HTTP_OK, type_of(name), f->data, f->bytes, 0, 0};
+        }
+    }
+    return refusal(BST_HTTP_NOT_FOUND);
+}
+
+/* ------------------------------------------------------------------ data */
+
+/* What a request for data asks for and gets. */
+typedef struct data_request {
+    int64_t sensor, frame, columns;
+    double from_s, to_s;
+    char panel[32];
+    cJSON *json;
+    bst_view_bytes bytes;
+} data_request;
+
+static bool read_query(const char *query, data_request *r) {
+    const int64_t most = INT64_C(1) << 40;
+    return bst_view_query_int(query, "sensor", 0, most, &r->sensor) &&
+           bst_view_query_int(query, "frame", 0, most, &r->frame) &&
+           bst_view_query_int(query, "columns", 1, BST_VIEW_COLUMNS, &r->columns) &&
+           bst_view_query_real(query, "from", &r->from_s) &&
+           bst_view_query_real(query, "to", &r->to_s) &&
+           bst_view_query_word(query, "panel", r->panel, sizeof r->panel);
+}
+
+static bst_status get_run(bst_ctx *ctx, bst_view_run *run, data_request *r) {
+    return bst_view_run_describe(ctx, run, &r->json);
+}
+
+static bst_status get_refreshed(bst_ctx *ctx, bst_view_run *run, data_request *r) {
+    BST_TRY(bst_view_run_refresh(ctx, run));
+    return bst_view_run_describe(ctx, run, &r->json);
+}
+
+static bst_status get_events(bst_ctx *ctx, bst_view_run *run, data_request *r) {
+    return bst_view_run_events(ctx, run, &r->json);
+}
+
+static bst_status get_modes(bst_ctx *ctx, bst_view_run *run, data_request *r) {
+    return bst_view_run_modes(ctx, run, r->sensor, &r->json);
+}
+
+static bst_status get_frames(bst_ctx *ctx, bst_view_run *run, data_request *r) {
+    return bst_view_run_frames(ctx, run, r->sensor, &r->bytes);
+}
+
+static bst_status get_frame(bst_ctx *ctx, bst_view_run *run, data_request *r) {
+    return bst_view_run_frame(ctx, run, r->sensor, r->frame, &r->json);
+}
+
+static bst_status get_pixels(bst_ctx *ctx, bst_view_run *run, data_request *r) {
+    return bst_view_run_pixels(ctx, run, r->sensor, r->frame, &r->bytes);
+}
+
+static bst_status get_plot(bst_ctx *ctx, bst_view_run *run, data_request *r) {
+    const bst_view_plot plot = {r->sensor, r->panel, r->from_s, r->to_s, (int)r->columns};
+    return bst_view_run_plot(ctx, run, &plot, &r->bytes);
+}
+
+static const struct {
+    const char *route;
+    bst_status (*get)(bst_ctx *ctx, bst_view_run *run, data_request *r);
+} data_routes[] = {{"api/run", get_run},       {"api/refresh", get_refreshed},
+                   {"api/events", get_events}, {"api/modes", get_modes},
+                   {"api/frames", get_frames}, {"api/frame", get_frame},
+                   {"api/pixels", get_pixels}, {"api/plot", get_plot}};
+enum { DATA_ROUTES = sizeof data_routes / sizeof *data_routes };
+
+static int status_of(bst_status status) {
+    return status == BST_OK              ? BST_HTTP_OK
+           : status == BST_ERR_NOT_FOUND ? BST_HTTP_NOT_FOUND
+           : status == BST_ERR_ARGUMENT  ? BST_HTTP_BAD_REQUEST
+                                         : BST_HTTP_FAILED;
+}
+
+/* Answers a request for data with what the run has. */
+static void answer_data(struct mg_connection *peer, bst_view_server *server, int route,
+                        const char *query, bool head_only) {
+    bst_ctx ctx = {0};
+    data_request r = {.columns = 1000, .to_s = 1.0};
+    answer a = refusal(BST_HTTP_BAD_REQUEST);
+    char *text = NULL;
+    if (read_query(query, &r)) {
+        bst_status status = data_routes[route].get(&ctx, server->run, &r);
+        text = r.json ? cJSON_PrintUnformatted(r.json) : NULL;
+        if (status != BST_OK) {
+            a = text_answer(status_of(status), ctx.message);
+        } else if (r.json && !text) {
+            a = refusal(BST_HTTP_FAILED);
+        } else if (text) {
+            a = (answer){BST_HTTP_OK, "application/json; charset=utf-8", text, strlen(text), 0, 0};
+        } else {
+            a = (answer){BST_HTTP_OK,   "application/octet-stream",
+                         r.bytes.data,  r.bytes.bytes,
+                         r.bytes.width, r.bytes.height};
+        }
+    }
+    cJSON_Delete(r.json);
+    send_answer(peer, &a, head_only);
+    cJSON_free(text);
+    free(r.bytes.data);
+}
+
+/* Counts the answers in memory. False: there are too many. */
+static bool begin_answer(bst_view_server *server) {
+    pthread_mutex_lock(&server->lock);
+    bool free_place = server->answers < ANSWERS_MOST;
+    server->answers += free_place;
+    pthread_mutex_unlock(&server->lock);
+    return free_place;
+}
+
+static void end_answer(bst_view_server *server) {
+    pthread_mutex_lock(&server->lock);
+    server->answers--;
+    pthread_mutex_unlock(&server->lock);
+}
+
+/* ------------------------------------------------------------------ requests */
+
+/* Finds a header and counts how often it is there. */
+static const char *header_of(const struct mg_request_info *info, const char *name, int *count) {
+    const char *value = NULL;
+    *count = 0;
+    for (int i = 0; i < info->num_headers; i++) {
+        if (strcasecmp(info->http_headers[i].name, name) == 0) {
+            value = info->http_headers[i].value;
+            ++*count;
+        }
+    }
+    return value;
+}
+
+/* Answers every request, so that the library serves no file of its own. Called by its threads. */
+static int on_request(struct mg_connection *peer) {
+    const struct mg_request_info *info = mg_get_request_info(peer);
+    bst_view_server *server = info->user_data;
+    bst_view_request request = {.method = info->request_method, .target = info->request_uri};
+    char route[BST_VIEW_ROUTE_BYTES];
+    int coded, lengths;
+    request.host = header_of(info, "Host", &request.hosts);
+    request.origin = header_of(info, "Origin", &request.origins);
+    const char *length = header_of(info, "Content-Length", &lengths);
+    if (header_of(info, "Transfer-Encoding", &coded) || (length && strcmp(length, "0") != 0)) {
+        request.body_bytes = 1; /* a body, or one of unknown length */
+    }
+    /* headers beyond the library's list are not seen */
+    int status = info->num_headers < MG_MAX_HEADERS ? bst_view_guard(&request, server->token, route)
+                                                    : BST_HTTP_BAD_REQUEST;
+    bool head_only = request.method && strcmp(request.method, "HEAD") == 0;
+    if (status != BST_HTTP_OK) {
+        answer a = refusal(status);
+        send_answer(peer, &a, head_only);
+        return status;
+    }
+    for (int i = 0; i < DATA_ROUTES; i++) {
+        if (strcmp(route, data_routes[i].route) == 0) {
+            if (!begin_answer(server)) {
+                answer busy = refusal(BST_HTTP_BUSY);
+                send_answer(peer, &busy, head_only);
+                return BST_HTTP_BUSY;
+            }
+            answer_data(peer, server, i, info->query_string, head_only);
+            end_answer(server);
+            return BST_HTTP_OK;
+        }
+    }
+    answer a = page_file(route);
+    send_answer(peer, &a, head_only);
+    return a.status;
+}
+
+/* The library's messages, for example of peers that went away, are of no use to the user. */
+static int on_message(const struct mg_connection *peer, const char *message) {
+    (void)peer;
+    (void)message;
+    return 1;
+}
+
+/* Answers that the library makes itself, to what is no request, say no more than the status. */
+static int on_error(struct mg_connection *peer, int status, const char *message) {
+    (void)message;
+    answer a = refusal(status);
+    send_answer(peer, &a, false);
+    return 0;
+}
+
+/* ------------------------------------------------------------------ start and end */
+
+/* Draws a token from the random numbers of the system. */
+static bst_status draw_token(bst_ctx *ctx, char token[BST_VIEW_TOKEN_DIGITS + 1]) {
+    unsigned char random[BST_VIEW_TOKEN_DIGITS / 2];
+    if (getrandom(random, sizeof random, 0) != sizeof random) {
+        return bst_fail(ctx, BST_ERR_IO, "the system gives no random numbers: %s", strerror(errno));
+    }
+    for (size_t i = 0; i < sizeof random; i++) {
+        snprintf(token + 2 * i, 3, "%02x", random[i]);
+    }
+    return BST_OK;
+}
+
+bst_status bst_view_server_start(bst_ctx *ctx, bst_view_run *run, int port,
+                                 char url[BST_VIEW_URL_BYTES], bst_view_server **out) {
+    bst_view_server *server = calloc(1, sizeof *server);
+    char ports[32];
+    *out = NULL;
+    if (!server || pthread_mutex_init(&server->lock, NULL) != 0) {
+        free(server);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the server");
+    }
+    server->run = run;
+    bst_status status = draw_token(ctx, server->token);
+    snprintf(ports, sizeof ports, "127.0.0.1:%d", port);
+    const char *options[] = {"listening_ports",
+                             ports,
+                             "num_threads",
+                             SERVED_CONNECTIONS,
+                             "request_timeout_ms",
+                             IDLE_MS,
+                             "keep_alive_timeout_ms",
+                             IDLE_MS,
+                             "enable_keep_alive",
+                             "yes",
+                             "tcp_nodelay",
+                             "1",
+                             "max_request_size",
+                             REQUEST_BYTES,
+                             "listen_backlog",
+                             "512",
+                             "connection_queue",
+                             "512",
+                             "enable_directory_listing",
+                             "no",
+                             "access_control_list",
+                             "-0.0.0.0/0,+127.0.0.1",
+                             NULL};
+    const struct mg_callbacks callbacks = {
+        .begin_request = on_request, .log_message = on_message, .http_error = on_error};
+    if (status == BST_OK) {
+        server->http = mg_start(&callbacks, server, options);
+    }
+    if (status == BST_OK && !server->http) {
+        status = bst_fail(ctx, BST_ERR_IO,
+                          "port %d of 127.0.0.1 cannot be opened (in use, or not allowed); give "
+                          "another --port, or 0 for any free one",
+                          port);
+    }
+    struct mg_server_port opened = {.port = 0};
+    if (status == BST_OK && mg_get_server_ports(server->http, 1, &opened) < 1) {
+        status = bst_fail(ctx, BST_ERR_IO, "the port of the server is unknown");
+    }
+    if (status != BST_OK) {
+        bst_view_server_stop(server);
+        return status;
+    }
+    snprintf(url, BST_VIEW_URL_BYTES, "http://127.0.0.1:%d/%s/", opened.port, server->token);
+    *out = server;
+    return BST_OK;
+}
+
+void bst_view_server_stop(bst_view_server *server) {
+    if (!server) {
+        return;
+    }
+    if (server->http) {
+        mg_stop(server->http);
+    }
+    pthread_mutex_destroy(&server->lock);
+    free(server);
+}
