@@ -252,11 +252,11 @@ static bst_status score_all(bst_ctx *ctx, scorer *p) {
         s->found = p->found->items ? p->found->items + f : NULL;
         s->truth_count = items_of(p->truth, t, key);
         s->found_count = items_of(p->found, f, key);
-        BST_TRY(score_frame(ctx, p, &frame));
         bool first = i == 0 || p->keys[i - 1].sequence != key->sequence;
         bool last = i + 1 == p->count || p->keys[i + 1].sequence != key->sequence;
         sequence = first ? (tally){0} : sequence;
         p->last_count = first ? 0 : p->last_count;
+        BST_TRY(score_frame(ctx, p, &frame));
         add_tally(&sequence, &frame);
         if (several && last) {
             end_sequence(&sequence);

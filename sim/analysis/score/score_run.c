@@ -4,18 +4,25 @@
 #include "sim/analysis/score/score_points.h"
 #include "sim/run/run_sensors.h"
 
-/* Columns: exposure, x, y, score, identity, and whether the point counts as optional. */
+/* Columns: exposure, x, y, score, identity, and whether the point counts as optional. Positions are
+ * those in the frame: of the window, in binned pixels. */
+#define IN_FRAME(x, x0) "(" x " - COALESCE(f." x0 ", 0) + 0.5) / COALESCE(f.binning, 1) - 0.5"
 static const char *const point_sql[] = {
     [BST_SCORE_DETECTIONS] =
-        "SELECT exposure_id, x_px, y_px, snr, -1, 0 FROM detections WHERE sensor = ?1 AND (label = "
-        "'object' OR (?2 AND label = 'unknown'))",
+        "SELECT d.exposure_id, " IN_FRAME("d.x_px", "x0_px") ", " IN_FRAME("d.y_px", "y0_px")
+        ", d.snr, -1, 0 FROM detections d LEFT JOIN frames f USING (sensor, exposure_id) "
+        "WHERE d.sensor = ?1 AND (d.label = 'object' OR (?2 AND d.label = 'unknown'))",
     [BST_SCORE_TRACKS] =
-        "SELECT exposure_id, x_px, y_px, snr, track_id, 0 FROM tracks WHERE "
-        "sensor = ?1 AND status = 'confirmed' AND misses_in_row = 0",
+        "SELECT t.exposure_id, " IN_FRAME("t.x_px", "x0_px") ", " IN_FRAME("t.y_px", "y0_px")
+        ", t.snr, t.track_id, 0 FROM tracks t LEFT JOIN frames f USING (sensor, exposure_id) "
+        "WHERE t.sensor = ?1 AND t.status = 'confirmed' AND t.misses_in_row = 0",
     [BST_SCORE_TRUTH] =
-        "SELECT exposure_id, x_centroid_px, y_centroid_px, snr, id, 1 FROM truth WHERE sensor = ?1 "
-        "AND kind = 'object' AND in_field = 1 AND occulted = 0 AND electrons > 0",
+        "SELECT t.exposure_id, " IN_FRAME("t.x_centroid_px", "x0_px") ", "
+        IN_FRAME("t.y_centroid_px", "y0_px") ", t.snr, t.id, 1 FROM truth t LEFT JOIN frames f "
+        "USING (sensor, exposure_id) WHERE t.sensor = ?1 AND t.kind = 'object' AND "
+        "t.in_field = 1 AND t.occulted = 0 AND t.electrons > 0",
 };
+#undef IN_FRAME
 
 /* Frames with a result: a truth has all that were exposed. */
 static const char *const frame_sql[] = {
