@@ -31,6 +31,7 @@ static const bst_app_command commands[] = {
     {"stars", bst_cmd_stars, "get, import or describe the star catalogue"},
     {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},
     {"calframes", bst_cmd_calframes, "bias, dark and flat frames of a scenario's sensors"},
+    {"characterize", bst_cmd_characterize, "a sensor from its own bias, dark and flat frames"},
     {"calibrate-obsgen", bst_cmd_calibrate_obsgen,
      "fit the observation generator to the image path, or compare them"},
     {"study", bst_cmd_study, "many runs of varied scenarios, as tables"},
