@@ -36,6 +36,10 @@ int bst_cmd_orbit(int argc, char **argv);
 int bst_cmd_process(int argc, char **argv);
 /* boresight solve: attitude of a FITS frame; argv[0] is "solve". Returns the exit code. */
 int bst_cmd_solve(int argc, char **argv);
+/* boresight score: detections or tracks against truth. */
+int bst_cmd_score(int argc, char **argv);
+/* boresight characterize: a detector block from bias, dark and flat frames. */
+int bst_cmd_characterize(int argc, char **argv);
 /* boresight check: checks a scenario without running it. */
 int bst_cmd_check(int argc, char **argv);
 /* boresight loop: margins and predicted pointing of the control loops. */

@@ -1,4 +1,4 @@
-/* Reads one image from a FITS file, such as a calibration map. */
+/* Reads and writes one image of a FITS file, such as a calibration map. */
 #ifndef BST_IO_FITS_IMAGE_H
 #define BST_IO_FITS_IMAGE_H
 
@@ -25,5 +25,15 @@ bst_status bst_fits_read_planes(bst_ctx *ctx, const char *path, int *width, int 
 bst_status bst_fits_read_image_buffer(bst_ctx *ctx, const char *name, const void *data,
                                       size_t bytes, int *width, int *height,
                                       float **pixels) BST_MUST_CHECK;
+
+/* Writes an image as the primary array of a new FITS file, BITPIX -32. The file appears complete or
+ * not at all.
+ *
+ * Given:     pixels  [height][width]
+ *            unit    value of BUNIT, at most 60 characters
+ * Errors:    those of bst_draft_open and bst_draft_close
+ * Source:    FITS Standard 4.0, sections 3.3 and 5.3 */
+bst_status bst_fits_write_map(bst_ctx *ctx, const char *path, int width, int height,
+                              const float *pixels, const char *unit) BST_MUST_CHECK;
 
 #endif

@@ -11,29 +11,8 @@
 
 enum { MOST_FRAMES = 1000000 };
 
-/* Finds the map: a path, or the name of a shipped one. */
-static bst_status find_map(bst_ctx *ctx, bst_process *p) {
-    const char *name = p->request->map;
-    char shipped[256];
-    snprintf(p->map_path, sizeof p->map_path, "%s", name);
-    if (access(name, R_OK) == 0 && strchr(name, '.')) {
-        return BST_OK;
-    }
-    if (!strchr(name, '/') && strlen(name) < 64) {
-        snprintf(shipped, sizeof shipped, "scenarios/maps/%s.json", name);
-        bst_cli_shipped_file(shipped, p->map_path, sizeof p->map_path);
-        if (access(p->map_path, R_OK) == 0) {
-            return BST_OK;
-        }
-    }
-    return bst_fail(ctx, BST_ERR_NOT_FOUND,
-                    "--map %.400s: there is no such keyword map (allowed: neossat, boresight, "
-                    "satnet, or the path of a file)",
-                    name);
-}
-
 static bst_status read_map(bst_ctx *ctx, bst_process *p) {
-    BST_TRY(find_map(ctx, p));
+    BST_TRY(bst_cli_find_keyword_map(ctx, p->request->map, p->map_path));
     BST_TRY(bst_keyword_map_load(ctx, p->map_path, &p->map));
     if (p->request->scale_arcsec > 0.0) {
         p->map.pixel_scale_arcsec =

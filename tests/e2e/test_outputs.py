@@ -28,7 +28,8 @@ class Outputs(unittest.TestCase):
              "calibrate-obsgen": ["{scenario}", "--check", "--seeds", "1"], "bench": ["crc32c", "--curve"],
              "new": ["--observer-tle", "{elements}"],
              "lightcurve": ["{scenario}", "--duration", "0"], "turntable": ["{satellite}"],
-             "study": ["{study}"], "process": ["{run}", "--map", "boresight"], "pd": ["{scenario}", "--trials", "1"]}
+             "study": ["{study}"], "process": ["{run}", "--map", "boresight"],
+             "score": ["{run}", "--truth", "{run}"], "pd": ["{scenario}", "--trials", "1"]}
     # options that name what is read
     INPUTS = {("run", "replay"), ("run", "restore"), ("run", "link-keys"), ("serve", "link-keys"),
               ("schema", "plugin"), ("orbit", "observer"), ("propagate", "elements"), ("propagate", "tle"), ("propagate", "eop"),

@@ -138,6 +138,23 @@ class SatNet(unittest.TestCase):
                                        np.median(image) + 1000)
             self.assertGreater(stars, 0)
 
+    def test_score_by_annotations_and_by_truth(self):
+        """The labels of a run are its truth, and its detections score the same against both."""
+        def score(*words):
+            return json.loads(call("score", *words, "--json", "-", "--resamples", "50").stdout)
+
+        perfect = score(self.out, "--truth", self.made)
+        self.assertEqual((perfect["frames"], perfect["truths"], perfect["true_positives"],
+                          perfect["false_positives"]), (8, 8, 8, 0))
+        self.assertLess(perfect["figures"]["rms_px"]["value"], 1e-9)  # rounding
+        by_truth = score(self.made, "--truth", self.made)
+        by_labels = score(self.made, "--truth", self.out)
+        self.assertEqual(by_truth["true_positives"], by_labels["true_positives"])
+        self.assertEqual(by_truth["false_positives"], by_labels["false_positives"])
+        found = runs.database(self.made).execute(
+            "SELECT count(*) FROM detections WHERE label = 'object'").fetchone()[0]
+        self.assertEqual(by_truth["true_positives"] + by_truth["false_positives"], found)
+
     def test_split_follows_names(self):
         def parts(folder):
             out = {}

@@ -1,33 +1,11 @@
 #include "sim/analysis/loop/loop_sensors.h"
 
 #include <cjson/cJSON.h>
-#include <errno.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "sim/cli/load.h"
-#include "sim/io/draft_file.h"
-
-/* Writes the figures to a file, or to the standard output for "-". */
-static bst_status write_json(bst_ctx *ctx, const char *path, const cJSON *root) {
-    char *text = cJSON_Print(root);
-    if (!text) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
-    }
-    bool print = strcmp(path, "-") == 0;
-    bst_draft draft = {.stream = stdout};
-    bst_status status = print ? BST_OK : bst_draft_open(ctx, path, &draft);
-    if (status == BST_OK) {
-        bool good = fprintf(draft.stream, "%s\n", text) > 0 && fflush(draft.stream) == 0;
-        status =
-            good ? BST_OK
-                 : bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", path, strerror(errno));
-        status = print ? status : bst_draft_close(ctx, &draft, status);
-    }
-    free(text);
-    return status;
-}
+#include "sim/cli/print_json.h"
 
 /* Prints one sensor's loops and adds them to the report. */
 static bst_status report(bst_ctx *ctx, const bst_loop_report_request *r,
@@ -75,7 +53,7 @@ static bst_status all_sensors(bst_ctx *ctx, const bst_loop_report_request *r,
                                   : "%s: no sensor has a mount that moves under command",
                         r->sensor ? r->sensor : scenario->file);
     }
-    return r->json ? write_json(ctx, r->json, root) : BST_OK;
+    return BST_OK;
 }
 
 bst_status bst_loop_report_sensors(bst_ctx *ctx, const bst_loop_report_request *request,
@@ -83,6 +61,9 @@ bst_status bst_loop_report_sensors(bst_ctx *ctx, const bst_loop_report_request *
     cJSON *root = cJSON_CreateObject();
     bst_status status = root ? all_sensors(ctx, request, scenario, root)
                              : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+    if (status == BST_OK && request->json) {
+        return bst_cli_write_json(ctx, request->json, root);
+    }
     cJSON_Delete(root);
     return status;
 }

@@ -1,0 +1,156 @@
+#include "sim/analysis/characterize/characterize.h"
+
+#include <math.h>
+#include <unistd.h>
+
+#include "sim/cli/shipped.h"
+#include "sim/core/folder.h"
+
+#define Q bst_characterize_request
+const bst_option bst_characterize_options[] = {
+    {.name = "map",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(Q, map),
+     .argument = "MAP",
+     .doc = "keyword map: neossat, boresight, satnet, or the path of a JSON file",
+     .required = true},
+    {.name = "out",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(Q, out),
+     .path = BST_PATH_OUTPUT_FOLDER,
+     .argument = "FOLDER",
+     .doc = "where the results go",
+     .required = true},
+    {.name = "bias",
+     .kind = BST_OPTION_LIST,
+     .offset = offsetof(Q, bias),
+     .path = BST_PATH_INPUT,
+     .argument = "PATH",
+     .doc = "FITS file, folder or list of bias frames; may be given several times"},
+    {.name = "dark",
+     .kind = BST_OPTION_LIST,
+     .offset = offsetof(Q, dark),
+     .path = BST_PATH_INPUT,
+     .argument = "PATH",
+     .doc = "the same of darks of one exposure"},
+    {.name = "flat",
+     .kind = BST_OPTION_LIST,
+     .offset = offsetof(Q, flat),
+     .path = BST_PATH_INPUT,
+     .argument = "PATH",
+     .doc = "the same of flats of one exposure"},
+    {.name = "extends",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(Q, extends),
+     .path = BST_PATH_INPUT,
+     .argument = "FILE",
+     .doc = "scenario whose camera detector.json changes"},
+    {.name = "camera",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(Q, camera),
+     .argument = "POINTER",
+     .doc = "place of the camera in that scenario (default /observers/0/sensors/0/camera)"},
+    {.name = "maps",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(Q, maps),
+     .doc =
+         "detector.json takes dark current and response from the maps, not from their statistics"},
+    {.name = "overwrite",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(Q, overwrite),
+     .doc = "replace earlier results there"},
+    {.name = "help", .kind = BST_OPTION_FLAG, .offset = offsetof(Q, help), .doc = "print this"},
+    {.name = NULL},
+};
+#undef Q
+
+const bst_sensor_figure_name bst_sensor_figure_names[BST_SENSOR_FIGURES] = {
+    [BST_SENSOR_GAIN] = {"gain_e_per_dn", "e-/DN", "gain_e_per_dn"},
+    [BST_SENSOR_READ_NOISE] = {"read_noise_e", "e-", "read_noise_e"},
+    [BST_SENSOR_OFFSET] = {"offset_dn", "DN", "offset_dn"},
+    [BST_SENSOR_OFFSET_DRIFT] = {"offset_drift_dn_per_frame", "DN", NULL},
+    [BST_SENSOR_ROW_NOISE] = {"row_noise_e", "e-", "detector/row_noise_e"},
+    [BST_SENSOR_COLUMN_OFFSET] = {"column_offset_rms_e", "e-", "detector/column_offset_rms_e"},
+    [BST_SENSOR_ROW_OFFSET] = {"row_offset_rms_e", "e-", "detector/row_offset_rms_e"},
+    [BST_SENSOR_DARK] = {"dark_current_e_per_s", "e-/s", "dark_current_e_per_s"},
+    [BST_SENSOR_DARK_MEDIAN] = {"dark_current_median_e_per_s", "e-/s", NULL},
+    [BST_SENSOR_DSNU] = {"dsnu_rms", "", "detector/dsnu_rms"},
+    [BST_SENSOR_HOT_FRACTION] = {"hot_fraction", "", "detector/hot_fraction"},
+    [BST_SENSOR_HOT_MEDIAN] = {"hot_median_e_per_s", "e-/s", "detector/hot_median_e_per_s"},
+    [BST_SENSOR_HOT_SPREAD] = {"hot_spread_dex", "dex", "detector/hot_spread_dex"},
+    [BST_SENSOR_PRNU] = {"prnu_rms", "", "detector/prnu_rms"},
+    [BST_SENSOR_DEAD_FRACTION] = {"dead_fraction", "", "detector/dead_fraction"},
+    [BST_SENSOR_BAD_COLUMNS] = {"bad_columns", "", "detector/bad_columns"},
+    [BST_SENSOR_RAMP] = {"readout_ramp_dn", "DN", NULL},
+    [BST_SENSOR_LINE_FREQUENCY] = {"pick_up_cycles_per_px", "1/px", NULL},
+    [BST_SENSOR_LINE_AMPLITUDE] = {"pick_up_amplitude_e", "e-", NULL},
+    [BST_SENSOR_PARALLEL_TRAIL] = {"cti_parallel_trail_fraction", "", NULL},
+    [BST_SENSOR_SERIAL_TRAIL] = {"cti_serial_trail_fraction", "", NULL},
+};
+
+static void print_figures(FILE *out, const bst_sensor_stacks *s, const bst_sensor_figures *f) {
+    fprintf(out, "frames     %d bias, %d dark, %d flat, %d x %d px\n", s->bias.count, s->dark.count,
+            s->flat.count, f->width, f->height);
+    fprintf(out, "%-28s %12s   %s\n", "", "value", "95 % interval");
+    for (int i = 0; i < BST_SENSOR_FIGURES; i++) {
+        const bst_sensor_estimate *e = &f->figures[i];
+        const bst_sensor_figure_name *name = &bst_sensor_figure_names[i];
+        if (!isfinite(e->value)) {
+            fprintf(out, "%-28s %12s   %s\n", name->key, "-", f->method[i]);
+        } else if (isfinite(e->sigma)) {
+            fprintf(out, "%-28s %12.6g   +-%.2g %s\n", name->key, e->value,
+                    BST_SENSOR_T95 * e->sigma, name->unit);
+        } else {
+            fprintf(out, "%-28s %12.6g   %s (%s)\n", name->key, e->value, name->unit, f->method[i]);
+        }
+    }
+    fflush(out);
+}
+
+static bst_status read_stack(bst_ctx *ctx, const char *kind, const bst_option_list *list,
+                             const bst_keyword_map *map, bst_frame_stack *out) {
+    return list->count > 0 ? bst_frame_stack_read(ctx, kind, list->items, list->count, map, out)
+                           : BST_OK;
+}
+
+/* Reads all frames. */
+static bst_status read_stacks(bst_ctx *ctx, const bst_characterize_request *q,
+                              bst_sensor_stacks *stacks) {
+    char path[4096];
+    bst_keyword_map map;
+    BST_TRY(bst_cli_find_keyword_map(ctx, q->map, path));
+    BST_TRY(bst_keyword_map_load(ctx, path, &map));
+    BST_TRY(read_stack(ctx, "bias", &q->bias, &map, &stacks->bias));
+    BST_TRY(read_stack(ctx, "dark", &q->dark, &map, &stacks->dark));
+    return read_stack(ctx, "flat", &q->flat, &map, &stacks->flat);
+}
+
+bst_status bst_characterize_run(bst_ctx *ctx, const bst_characterize_request *q, FILE *out) {
+    char path[4096];
+    bst_sensor_stacks stacks = {0};
+    bst_sensor_figures figures = {0};
+    int n = snprintf(path, sizeof path, "%s/report.json", q->out);
+    if (n < 0 || (size_t)n >= sizeof path) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%.80s...: the path is too long", q->out);
+    }
+    if (!q->overwrite && access(path, F_OK) == 0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "%s: is there already; give another folder or --overwrite", path);
+    }
+    bst_status status = read_stacks(ctx, q, &stacks);
+    if (status == BST_OK) {
+        status = bst_sensor_figures_compute(ctx, &stacks, &figures);
+    }
+    if (status == BST_OK) {
+        print_figures(out, &stacks, &figures);
+        status = bst_folder_make(ctx, q->out);
+    }
+    if (status == BST_OK) {
+        status = bst_characterize_write(ctx, q, &stacks, &figures);
+    }
+    bst_sensor_figures_free(&figures);
+    bst_frame_stack_free(&stacks.bias);
+    bst_frame_stack_free(&stacks.dark);
+    bst_frame_stack_free(&stacks.flat);
+    return status;
+}

@@ -1,0 +1,47 @@
+/* `boresight characterize`: a sensor's detector block from its bias, dark and flat frames. */
+#ifndef BST_ANALYSIS_CHARACTERIZE_CHARACTERIZE_H
+#define BST_ANALYSIS_CHARACTERIZE_CHARACTERIZE_H
+
+#include <stdio.h>
+
+#include "sim/analysis/characterize/sensor_figures.h"
+#include "sim/cli/options.h"
+
+/* What the command line asks for. */
+typedef struct bst_characterize_request {
+    const char *map, *out, *extends, *camera;
+    bst_option_list bias, dark, flat;
+    bool overwrite, maps, help;
+} bst_characterize_request;
+
+/* Request without any option given. */
+#define BST_CHARACTERIZE_REQUEST_DEFAULTS \
+    { .camera = "/observers/0/sensors/0/camera" }
+
+/* Table of the options, with offsets in a bst_characterize_request. */
+extern const bst_option bst_characterize_options[];
+
+/* Reads the frames, computes the figures, prints them and writes the folder request->out:
+ * detector.json, report.json, dark_map.fits, prnu_map.fits, plot.png (docs/how-to/characterize.md).
+ *
+ * Errors:    BST_ERR_ARGUMENT: no frames, or frames that do not belong together; those of the files
+ *            and outputs */
+bst_status bst_characterize_run(bst_ctx *ctx, const bst_characterize_request *request,
+                                FILE *out) BST_MUST_CHECK;
+
+/* Name in JSON and unit of a figure. */
+typedef struct bst_sensor_figure_name {
+    const char *key, *unit;
+    const char *camera_key; /* of the camera in a scenario; NULL: the model does not have it */
+} bst_sensor_figure_name;
+
+extern const bst_sensor_figure_name bst_sensor_figure_names[BST_SENSOR_FIGURES];
+
+/* Writes the files of the folder.
+ *
+ * Errors:    those of the outputs */
+bst_status bst_characterize_write(bst_ctx *ctx, const bst_characterize_request *request,
+                                  const bst_sensor_stacks *stacks,
+                                  const bst_sensor_figures *figures) BST_MUST_CHECK;
+
+#endif

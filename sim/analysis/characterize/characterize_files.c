@@ -1,0 +1,227 @@
+/* Files that `boresight characterize` writes. */
+#define _XOPEN_SOURCE 700 /* realpath */
+#include <cjson/cJSON.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/analysis/characterize/characterize.h"
+#include "sim/cli/print_json.h"
+#include "sim/core/compare.h"
+#include "sim/core/json_number.h"
+#include "sim/io/fits_image.h"
+#include "sim/io/plot.h"
+
+/* Statistics below this many standard errors are left at the model's 0. */
+static const double LEAST_SIGNIFICANCE = 2.0;
+
+enum { HISTOGRAM_BINS = 200 };
+
+/* Files being written. */
+typedef struct writer {
+    const bst_characterize_request *request;
+    const bst_sensor_stacks *stacks;
+    const bst_sensor_figures *figures;
+} writer;
+
+/* True if detector.json gives a figure. Statistics that maps replace are left out with --maps. */
+static bool is_given(const writer *w, int i) {
+    const bst_sensor_estimate *e = &w->figures->figures[i];
+    bool mapped = (i >= BST_SENSOR_DARK && i <= BST_SENSOR_HOT_SPREAD && w->figures->dark_map) ||
+                  (i >= BST_SENSOR_PRNU && i <= BST_SENSOR_BAD_COLUMNS && w->figures->prnu_map);
+    bool small = bst_sensor_figure_names[i].camera_key &&
+                 strncmp(bst_sensor_figure_names[i].camera_key, "detector/", 9) == 0 &&
+                 !(e->value > LEAST_SIGNIFICANCE * e->sigma);
+    return bst_sensor_figure_names[i].camera_key && isfinite(e->value) && !small &&
+           !(w->request->maps && mapped);
+}
+
+/* The scenario that changes a camera; NULL: out of memory. */
+static cJSON *detector_json(const writer *w) {
+    char pointer[512], base[4096];
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddNumberToObject(root, "boresight", 1);
+    if (w->request->extends) {
+        char *whole = realpath(w->request->extends, NULL);
+        snprintf(base, sizeof base, "%s", whole ? whole : w->request->extends);
+        free(whole);
+        cJSON_AddStringToObject(root, "extends", base);
+    }
+    cJSON *set = cJSON_AddObjectToObject(root, "set");
+    for (int i = 0; i < BST_SENSOR_FIGURES; i++) {
+        if (is_given(w, i)) {
+            snprintf(pointer, sizeof pointer, "%.400s/%s", w->request->camera,
+                     bst_sensor_figure_names[i].camera_key);
+            bst_json_add_number(set, pointer, fmax(w->figures->figures[i].value, 0.0));
+        }
+    }
+    if (w->request->maps && w->figures->dark_map) {
+        snprintf(pointer, sizeof pointer, "%.400s/detector/dark_map", w->request->camera);
+        cJSON_AddStringToObject(set, pointer, "dark_map.fits");
+    }
+    if (w->request->maps && w->figures->prnu_map) {
+        snprintf(pointer, sizeof pointer, "%.400s/detector/prnu_map", w->request->camera);
+        cJSON_AddStringToObject(set, pointer, "prnu_map.fits");
+    }
+    return root;
+}
+
+static void add_trail(cJSON *root, const bst_charge_trail *t) {
+    static const char *const sides[BST_TRAIL_SIDES] = {"rows_above", "rows_below", "columns_right",
+                                                       "columns_left"};
+    cJSON *node = cJSON_AddObjectToObject(root, "charge_trail");
+    cJSON_AddNumberToObject(node, "hot_pixels", t->used);
+    if (!isfinite(t->parallel.value)) {
+        return;
+    }
+    cJSON_AddStringToObject(node, "parallel_direction",
+                            t->parallel_up ? "rows_above" : "rows_below");
+    cJSON_AddStringToObject(node, "serial_direction",
+                            t->serial_right ? "columns_right" : "columns_left");
+    cJSON *classes = cJSON_AddArrayToObject(node, "by_charge");
+    for (int c = 0; c < BST_TRAIL_CLASSES; c++) {
+        cJSON *class = cJSON_CreateObject();
+        cJSON_AddItemToArray(classes, class);
+        bst_json_add_number(class, "charge_dn", t->class_charge[c]);
+        bst_json_add_number(class, "parallel", t->class_parallel[c]);
+        bst_json_add_number(class, "serial", t->class_serial[c]);
+    }
+    for (int side = 0; side < BST_TRAIL_SIDES; side++) {
+        cJSON *list = cJSON_AddArrayToObject(node, sides[side]);
+        for (int k = 0; k < BST_TRAIL_PIXELS; k++) {
+            cJSON_AddItemToArray(list, cJSON_CreateNumber(t->profile[side][k]));
+        }
+    }
+}
+
+/* All figures with their uncertainties; NULL: out of memory. */
+static cJSON *report_json(const writer *w) {
+    const bst_sensor_figures *f = w->figures;
+    cJSON *root = cJSON_CreateObject(), *frames = cJSON_AddObjectToObject(root, "frames");
+    cJSON_AddNumberToObject(frames, "bias", w->stacks->bias.count);
+    cJSON_AddNumberToObject(frames, "dark", w->stacks->dark.count);
+    cJSON_AddNumberToObject(frames, "flat", w->stacks->flat.count);
+    cJSON_AddNumberToObject(frames, "width_px", f->width);
+    cJSON_AddNumberToObject(frames, "height_px", f->height);
+    bst_json_add_number(frames, "dark_exposure_s",
+                        w->stacks->dark.count > 0 ? w->stacks->dark.exposure_s : NAN);
+    cJSON *figures = cJSON_AddObjectToObject(root, "figures");
+    for (int i = 0; i < BST_SENSOR_FIGURES; i++) {
+        const bst_sensor_estimate *e = &f->figures[i];
+        cJSON *node = cJSON_AddObjectToObject(figures, bst_sensor_figure_names[i].key);
+        bst_json_add_number(node, "value", e->value);
+        bst_json_add_number(node, "standard_error", e->sigma);
+        bst_json_add_number(node, "low_95", e->value - BST_SENSOR_T95 * e->sigma);
+        bst_json_add_number(node, "high_95", e->value + BST_SENSOR_T95 * e->sigma);
+        cJSON_AddStringToObject(node, "method", f->method[i]);
+        cJSON_AddBoolToObject(node, "in_detector_model",
+                              bst_sensor_figure_names[i].camera_key != NULL);
+    }
+    cJSON_AddNumberToObject(root, "shielded_columns", f->shielded_columns);
+    cJSON_AddNumberToObject(root, "hot_pixels", (double)f->hot_found);
+    bst_json_add_number(root, "hot_limit_e_per_s", f->dark_map ? f->hot_limit_e_per_s : NAN);
+    cJSON *percentiles = cJSON_AddObjectToObject(root, "dark_current_percentiles_e_per_s");
+    for (int i = 0; i < BST_SENSOR_PERCENTILES; i++) {
+        char key[16];
+        snprintf(key, sizeof key, "%g", bst_sensor_percentiles[i]);
+        bst_json_add_number(percentiles, key, f->percentiles_e_per_s[i]);
+    }
+    add_trail(root, &f->trail);
+    return root;
+}
+
+/* Writes a map without values that are NAN or below 0. */
+static bst_status write_map(bst_ctx *ctx, const writer *w, const char *name, const float *map,
+                            const char *unit) {
+    char path[4096 + 32];
+    size_t pixels = (size_t)w->figures->width * (size_t)w->figures->height;
+    float *good = malloc(pixels * sizeof *good);
+    if (!good) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
+    }
+    for (size_t i = 0; i < pixels; i++) {
+        good[i] = map[i] > 0.0F ? map[i] : 0.0F;
+    }
+    snprintf(path, sizeof path, "%s/%s", w->request->out, name);
+    bst_status status =
+        bst_fits_write_map(ctx, path, w->figures->width, w->figures->height, good, unit);
+    free(good);
+    return status;
+}
+
+/* Histogram of the dark map between its 0.1th percentile and the 99.9th. */
+static void put_histogram(FILE *script, const bst_sensor_figures *f) {
+    int64_t bins[HISTOGRAM_BINS] = {0};
+    double low = f->percentiles_e_per_s[0], high = f->percentiles_e_per_s[6];
+    low -= high - low > 0.0 ? 0.2 * (f->percentiles_e_per_s[4] - low) : 1.0;
+    double width = (high - low) / HISTOGRAM_BINS;
+    size_t pixels = (size_t)f->width * (size_t)f->height;
+    for (size_t i = 0; i < pixels && width > 0.0; i++) {
+        double at = ((double)f->dark_map[i] - low) / width;
+        if (at >= 0.0 && at < HISTOGRAM_BINS) {
+            bins[(int)at]++;
+        }
+    }
+    fprintf(script, "$dark << EOD\n");
+    for (int k = 0; k < HISTOGRAM_BINS; k++) {
+        fprintf(script, "%.6g %lld\n", low + (k + 0.5) * width,
+                (long long)bins[k] + (bins[k] == 0));
+    }
+    fprintf(script, "EOD\n");
+}
+
+/* Plot of the spectrum of the rows and the distribution of the dark current. */
+static bst_status write_plot(bst_ctx *ctx, const writer *w) {
+    const bst_sensor_figures *f = w->figures;
+    char path[4096 + 32];
+    bst_plot plot;
+    int panels = (f->line.power != NULL) + (f->dark_map != NULL);
+    if (panels == 0) {
+        return BST_OK;
+    }
+    snprintf(path, sizeof path, "%s/plot.png", w->request->out);
+    BST_TRY(bst_plot_begin(ctx, &plot, path, 900, 380 * panels));
+    if (f->line.power) {
+        fprintf(plot.script, "$rows << EOD\n");
+        for (int k = 1; k < f->line.bins; k++) {
+            fprintf(plot.script, "%.6g %.6g\n", (double)k / f->width, f->line.power[k]);
+        }
+        fprintf(plot.script, "EOD\n");
+    }
+    if (f->dark_map) {
+        put_histogram(plot.script, f);
+    }
+    fprintf(plot.script, "set multiplot layout %d,1\nset grid\nunset key\n", panels);
+    if (f->line.power) {
+        fprintf(plot.script,
+                "set xlabel 'frequency along a row, cycles/px'\nset ylabel 'power over continuum'\n"
+                "plot $rows with lines, %.6g with lines dashtype 2\n",
+                f->line.least_ratio);
+    }
+    if (f->dark_map) {
+        fprintf(plot.script,
+                "set logscale y\nset xlabel 'dark current, e-/s'\nset ylabel 'pixels'\n"
+                "plot $dark with steps\n");
+    }
+    fprintf(plot.script, "unset multiplot\n");
+    return bst_plot_end(ctx, &plot, NULL);
+}
+
+bst_status bst_characterize_write(bst_ctx *ctx, const bst_characterize_request *request,
+                                  const bst_sensor_stacks *stacks,
+                                  const bst_sensor_figures *figures) {
+    const writer w = {request, stacks, figures};
+    char path[4096 + 32];
+    if (figures->dark_map) {
+        BST_TRY(write_map(ctx, &w, "dark_map.fits", figures->dark_map, "electron/s"));
+    }
+    if (figures->prnu_map) {
+        BST_TRY(write_map(ctx, &w, "prnu_map.fits", figures->prnu_map, ""));
+    }
+    BST_TRY(write_plot(ctx, &w));
+    snprintf(path, sizeof path, "%s/detector.json", request->out);
+    BST_TRY(bst_cli_write_json(ctx, path, detector_json(&w)));
+    snprintf(path, sizeof path, "%s/report.json", request->out);
+    return bst_cli_write_json(ctx, path, report_json(&w));
+}

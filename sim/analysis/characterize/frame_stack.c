@@ -1,0 +1,231 @@
+#include "sim/analysis/characterize/frame_stack.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/analysis/characterize/clipped_moments.h"
+#include "sim/cli/stop_signals.h"
+#include "sim/io/recorded_frames.h"
+
+enum { LEAST_SIDE = 64, MOST_FRAMES = 100000 };
+
+/* Clipping of noise that should be normal, in standard deviations. */
+static const double CLIP = 5.0;
+
+/* Frames being reduced. */
+typedef struct reduction {
+    const char *kind;
+    const bst_keyword_map *map;
+    bst_keyword_map whole; /* the map without sections: overscan and image are cut here */
+    bst_recorded_frames *recorded;
+    bst_frame_stack *stack;
+    float *before;  /* [height][width] the first frame of a pair */
+    float *scratch; /* [height * width] */
+    double *rows;   /* [height] */
+    bst_time first_start;
+} reduction;
+
+void bst_frame_stack_free(bst_frame_stack *s) {
+    free(s->levels);
+    free(s->mean);
+    free(s->last);
+    free(s->overscan);
+    *s = (bst_frame_stack){0};
+}
+
+/* Allocates for frames of the first one's size. */
+static bst_status make_room(bst_ctx *ctx, reduction *r, const bst_recorded_frame *f,
+                            const int box[4], int overscan_width, int frames) {
+    bst_frame_stack *s = r->stack;
+    if (box[2] < LEAST_SIDE || box[3] < LEAST_SIDE) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "%.400s: a %s frame of %d x %d pixels (allowed: sides of %d or more)",
+                        f->path, r->kind, box[2], box[3], LEAST_SIDE);
+    }
+    s->width = box[2];
+    s->height = box[3];
+    s->overscan_width = overscan_width;
+    s->exposure_s = f->values.exposure_s;
+    s->gain_e_per_dn = f->values.gain_e_per_dn;
+    s->integer = true;
+    r->first_start = f->values.start;
+    size_t pixels = (size_t)s->width * (size_t)s->height;
+    s->levels = calloc((size_t)frames, sizeof *s->levels);
+    s->mean = calloc(pixels, sizeof *s->mean);
+    s->last = calloc(pixels, sizeof *s->last);
+    s->overscan = calloc((size_t)overscan_width * (size_t)s->height + 1, sizeof *s->overscan);
+    r->before = calloc(pixels, sizeof *r->before);
+    r->scratch = calloc(pixels, sizeof *r->scratch);
+    r->rows = calloc((size_t)s->height, sizeof *r->rows);
+    return s->levels && s->mean && s->last && s->overscan && r->before && r->scratch && r->rows
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_MEMORY, "no memory for frames of %d x %d pixels", s->width,
+                          s->height);
+}
+
+/* Checks that a frame belongs to the others. */
+static bst_status check_frame(bst_ctx *ctx, const reduction *r, const bst_recorded_frame *f,
+                              const int box[4]) {
+    const bst_frame_stack *s = r->stack;
+    if (box[2] != s->width || box[3] != s->height) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "%.400s: HDU %d: %d x %d pixels, those of the first %s frame are %d x %d "
+                        "(allowed: frames of one size)",
+                        f->path, f->place.hdu, box[2], box[3], r->kind, s->width, s->height);
+    }
+    if (fabs(f->values.exposure_s - s->exposure_s) > 1e-3 * s->exposure_s + 1e-6) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "%.400s: HDU %d: %s gives %g s, the first %s frame has %g s (allowed: %s "
+                        "frames of one exposure); give the others to another run",
+                        f->path, f->place.hdu, r->map->exposure_s.keyword, f->values.exposure_s,
+                        r->kind, s->exposure_s, r->kind);
+    }
+    return BST_OK;
+}
+
+/* Copies a part of an image of `width` columns. */
+static void cut_out(const float *image, int width, const int box[4], float *to) {
+    for (int y = 0; y < box[3]; y++) {
+        memcpy(to + (size_t)y * (size_t)box[2],
+               image + (size_t)(box[1] + y) * (size_t)width + (size_t)box[0],
+               (size_t)box[2] * sizeof *to);
+    }
+}
+
+/* First row or column of a block. */
+static int block_edge(int index, int length) {
+    return (int)((int64_t)index * length / BST_STACK_SIDE);
+}
+
+/* Adds the variance between two frames: rows are levelled, so that noise common to a row is
+ * separate. */
+static void add_pair(reduction *r) {
+    bst_frame_stack *s = r->stack;
+    double rows2 = 0.0, within = 0.0, mean = 0.0;
+    size_t width = (size_t)s->width;
+    for (int y = 0; y < s->height; y++) {
+        const float *a = r->before + (size_t)y * width, *b = s->last + (size_t)y * width;
+        for (size_t x = 0; x < width; x++) {
+            r->scratch[x] = b[x] - a[x];
+        }
+        bst_clipped_moments m = bst_clipped_moments_of(r->scratch, width, CLIP);
+        r->rows[y] = m.mean;
+        within += m.variance / (double)width / s->height;
+        mean += m.mean / s->height;
+    }
+    for (int y = 0; y < s->height; y++) {
+        rows2 += (r->rows[y] - mean) * (r->rows[y] - mean) / (s->height - 1);
+    }
+    s->row_variance += 0.5 * (rows2 - within);
+    for (int k = 0; k < BST_STACK_BLOCKS; k++) {
+        int x0 = block_edge(k % BST_STACK_SIDE, s->width),
+            x1 = block_edge(k % BST_STACK_SIDE + 1, s->width);
+        int y0 = block_edge(k / BST_STACK_SIDE, s->height),
+            y1 = block_edge(k / BST_STACK_SIDE + 1, s->height);
+        size_t n = 0;
+        for (int y = y0; y < y1; y++) {
+            for (int x = x0; x < x1; x++) {
+                size_t i = (size_t)y * width + (size_t)x;
+                r->scratch[n++] = s->last[i] + r->before[i];
+            }
+        }
+        /* dead and hot pixels have other noise; the sum is independent of the difference */
+        bst_clipped_moments sum = bst_clipped_moments_of(r->scratch, n, CLIP);
+        n = 0;
+        for (int y = y0; y < y1; y++) {
+            for (int x = x0; x < x1; x++) {
+                size_t i = (size_t)y * width + (size_t)x;
+                double both = (double)s->last[i] + (double)r->before[i];
+                if (both >= sum.low && both <= sum.high) {
+                    r->scratch[n++] = s->last[i] - r->before[i] - (float)r->rows[y];
+                }
+            }
+        }
+        double freedom = 1.0 - 1.0 / s->width; /* the row's mean is of the same pixels */
+        s->variance[k] += 0.5 * bst_clipped_moments_of(r->scratch, n, CLIP).variance / freedom;
+    }
+    s->pairs++;
+}
+
+/* Reads a frame and adds it to the sums. */
+static bst_status add_frame(bst_ctx *ctx, reduction *r, int64_t index, int frames) {
+    const bst_recorded_options options = {.map = &r->whole};
+    bst_recorded_frame f;
+    const float *image;
+    int box[4], bias[4];
+    BST_TRY(bst_recorded_frames_select(ctx, r->recorded, index, &options, &f));
+    bst_fits_source *source = bst_recorded_frames_source(r->recorded);
+    BST_TRY(bst_keyword_section(ctx, r->map->image_section, source, &f.place, box));
+    BST_TRY(bst_keyword_section(ctx, r->map->bias_section, source, &f.place, bias));
+    if (box[2] == 0) {
+        box[2] = f.width;
+        box[3] = f.height;
+    }
+    /* an overscan of columns beside all rows; others are not used */
+    bool beside = bias[2] > 0 && bias[1] == box[1] && bias[3] == box[3];
+    if (index == 0) {
+        BST_TRY(make_room(ctx, r, &f, box, beside ? bias[2] : 0, frames));
+    }
+    BST_TRY(check_frame(ctx, r, &f, box));
+    BST_TRY(bst_recorded_frames_pixels(ctx, r->recorded, &options, &f, &image));
+    bst_frame_stack *s = r->stack;
+    size_t pixels = (size_t)s->width * (size_t)s->height;
+    cut_out(image, f.width, box, s->last);
+    if (beside && bias[2] == s->overscan_width) {
+        cut_out(image, f.width, bias, s->overscan);
+    }
+    for (size_t i = 0; i < pixels; i++) {
+        s->integer = s->integer && (isnan(s->last[i]) || s->last[i] == floorf(s->last[i]));
+        s->mean[i] += s->last[i];
+        r->scratch[i] = s->last[i];
+    }
+    s->levels[index] = bst_clipped_moments_of(r->scratch, pixels, CLIP).mean;
+    s->start_s = bst_time_diff(f.values.start, r->first_start);
+    if (index % 2 == 1) {
+        add_pair(r);
+    }
+    memcpy(r->before, s->last, pixels * sizeof *r->before);
+    s->count++;
+    return BST_OK;
+}
+
+static bst_status reduce(bst_ctx *ctx, reduction *r, const char *const *paths, int count) {
+    bst_frame_stack *s = r->stack;
+    BST_TRY(bst_recorded_frames_open(ctx, paths, count, &r->recorded));
+    int64_t frames = bst_recorded_frames_count(r->recorded);
+    if (frames > MOST_FRAMES) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%lld %s frames were given (allowed: %d)",
+                        (long long)frames, r->kind, MOST_FRAMES);
+    }
+    for (int64_t i = 0; i < frames; i++) {
+        if (bst_stop_requested()) {
+            return bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted");
+        }
+        BST_TRY(add_frame(ctx, r, i, (int)frames));
+    }
+    size_t pixels = (size_t)s->width * (size_t)s->height;
+    for (size_t i = 0; i < pixels; i++) {
+        s->mean[i] /= (float)s->count;
+    }
+    for (int k = 0; k < BST_STACK_BLOCKS && s->pairs > 0; k++) {
+        s->variance[k] /= s->pairs;
+    }
+    s->row_variance = s->pairs > 0 ? s->row_variance / s->pairs : NAN;
+    return BST_OK;
+}
+
+bst_status bst_frame_stack_read(bst_ctx *ctx, const char *kind, const char *const *paths, int count,
+                                const bst_keyword_map *map, bst_frame_stack *out) {
+    assert(kind && paths && count > 0 && map && out);
+    *out = (bst_frame_stack){0};
+    reduction r = {.kind = kind, .map = map, .whole = *map, .stack = out};
+    r.whole.image_section[0] = r.whole.bias_section[0] = '\0';
+    bst_status status = reduce(ctx, &r, paths, count);
+    bst_recorded_frames_close(r.recorded);
+    free(r.before);
+    free(r.scratch);
+    free(r.rows);
+    return status;
+}

@@ -1,0 +1,167 @@
+#include "sim/analysis/characterize/pick_up_line.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/core/compare.h"
+#include "sim/core/fft.h"
+
+/* Half width of the running median that gives the continuum; the lowest bins have no line. */
+enum { CONTINUUM = 30, FIRST_BIN = 5, GROUPS = 8, STEPS = 24 };
+
+static const double PI = 3.14159265358979323846;
+/* Outliers beyond this many robust standard deviations are clipped. */
+static const float CLIP = 6.0F;
+/* Standard deviations of the continuum that make a line certain. */
+static const double CERTAIN = 7.0;
+
+/* Clips rows at CLIP robust standard deviations. */
+static bst_status clip_rows(bst_ctx *ctx, float *rows, size_t count) {
+    float *copy = malloc(count * sizeof *copy);
+    if (!copy) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", count);
+    }
+    memcpy(copy, rows, count * sizeof *copy);
+    float limit = CLIP * (float)bst_robust_sigma(copy, count);
+    free(copy);
+    for (size_t i = 0; i < count; i++) {
+        rows[i] = isnan(rows[i]) ? 0.0F : fminf(fmaxf(rows[i], -limit), limit);
+    }
+    return BST_OK;
+}
+
+/* Mean power spectrum of the rows through a Hann window. */
+static bst_status mean_spectrum(bst_ctx *ctx, const float *rows, int width, int height,
+                                double *power, int bins) {
+    float *in = bst_fft_array((size_t)width * sizeof *in);
+    float *out = bst_fft_array((size_t)(2 * (width / 2 + 1)) * sizeof *out);
+    bst_fft *fft = NULL;
+    bst_status status = in && out
+                            ? bst_fft_create_f32(ctx, BST_FFT_REAL_FORWARD, 1, width, in, out, &fft)
+                            : bst_fail(ctx, BST_ERR_MEMORY, "no memory for a spectrum");
+    memset(power, 0, (size_t)bins * sizeof *power);
+    for (int y = 0; y < height && status == BST_OK; y++) {
+        for (int x = 0; x < width; x++) {
+            double window = 0.5 - 0.5 * cos(2.0 * PI * (x + 0.5) / width);
+            in[x] = (float)(window * rows[(size_t)y * (size_t)width + (size_t)x]);
+        }
+        bst_fft_run(fft);
+        for (int k = 0; k < bins; k++) {
+            power[k] +=
+                ((double)out[2 * k] * out[2 * k] + (double)out[2 * k + 1] * out[2 * k + 1]) /
+                height;
+        }
+    }
+    bst_fft_free(fft);
+    bst_fft_array_free(in);
+    bst_fft_array_free(out);
+    return status;
+}
+
+/* Divides a spectrum by its running median. */
+static void flatten(double *power, int bins, double *copy) {
+    double window[2 * CONTINUUM + 1];
+    memcpy(copy, power, (size_t)bins * sizeof *copy);
+    for (int k = 0; k < bins; k++) {
+        int from = k > CONTINUUM ? k - CONTINUUM : 1, n = 0;
+        for (int i = from; i <= k + CONTINUUM && i < bins; i++) {
+            window[n++] = copy[i];
+        }
+        qsort(window, (size_t)n, sizeof *window, bst_compare_doubles);
+        power[k] = n > 0 && window[n / 2] > 0.0 ? copy[k] / window[n / 2] : 1.0;
+    }
+}
+
+/* Mean over rows of the squared Fourier sum at a frequency. */
+static double power_at(const float *rows, int width, int from, int to, double cycles_px) {
+    double turn[2] = {cos(2.0 * PI * cycles_px), sin(2.0 * PI * cycles_px)}, sum = 0.0;
+    for (int y = from; y < to; y++) {
+        const float *row = rows + (size_t)y * (size_t)width;
+        double re = 0.0, im = 0.0, c = 1.0, s = 0.0;
+        for (int x = 0; x < width; x++) {
+            re += c * row[x];
+            im += s * row[x];
+            double next = c * turn[0] - s * turn[1];
+            s = c * turn[1] + s * turn[0];
+            c = next;
+        }
+        sum += re * re + im * im;
+    }
+    return sum / (to - from);
+}
+
+/* Frequency of most power between two, by golden section. */
+static double refine(const float *rows, int width, int from, int to, double low, double high) {
+    const double golden = 0.6180339887498949;
+    double a = high - golden * (high - low), b = low + golden * (high - low);
+    double at_a = power_at(rows, width, from, to, a), at_b = power_at(rows, width, from, to, b);
+    for (int i = 0; i < STEPS && high - low > 1e-3 / width; i++) {
+        if (at_a > at_b) {
+            high = b;
+            b = a;
+            at_b = at_a;
+            a = high - golden * (high - low);
+            at_a = power_at(rows, width, from, to, a);
+        } else {
+            low = a;
+            a = b;
+            at_a = at_b;
+            b = low + golden * (high - low);
+            at_b = power_at(rows, width, from, to, b);
+        }
+    }
+    return 0.5 * (low + high);
+}
+
+/* Frequency and amplitude of the line, from groups of rows. */
+static void measure(const float *rows, int width, int height, int peak, bst_pick_up_line *out) {
+    double frequency[GROUPS], amplitude[GROUPS];
+    for (int g = 0; g < GROUPS; g++) {
+        int from = (int)((int64_t)g * height / GROUPS),
+            to = (int)((int64_t)(g + 1) * height / GROUPS);
+        double f = refine(rows, width, from, to, (peak - 1.0) / width, (peak + 1.0) / width);
+        /* the continuum beside the line, outside its side lobes */
+        double beside = 0.0;
+        for (int k = 8; k < 16; k++) {
+            beside += (power_at(rows, width, from, to, f - (k + 0.5) / width) +
+                       power_at(rows, width, from, to, f + (k + 0.5) / width)) /
+                      16.0;
+        }
+        double power = power_at(rows, width, from, to, f) - beside;
+        frequency[g] = f;
+        amplitude[g] = 2.0 * sqrt(fmax(power, 0.0)) / width;
+    }
+    out->frequency = bst_mean_estimate(frequency, GROUPS);
+    out->amplitude = bst_mean_estimate(amplitude, GROUPS);
+}
+
+bst_status bst_pick_up_line_find(bst_ctx *ctx, float *rows, int width, int height,
+                                 bst_pick_up_line *out) {
+    *out = (bst_pick_up_line){.bins = width / 2,
+                              .frequency = {NAN, NAN},
+                              .amplitude = {NAN, NAN},
+                              .least_ratio = 1.0 + CERTAIN / sqrt(height)};
+    BST_TRY(clip_rows(ctx, rows, (size_t)width * (size_t)height));
+    double *power = malloc((size_t)out->bins * sizeof *power);
+    double *copy = malloc((size_t)out->bins * sizeof *copy);
+    bst_status status = power && copy ? mean_spectrum(ctx, rows, width, height, power, out->bins)
+                                      : bst_fail(ctx, BST_ERR_MEMORY, "no memory for a spectrum");
+    if (status != BST_OK) {
+        free(power);
+        free(copy);
+        return status;
+    }
+    flatten(power, out->bins, copy);
+    free(copy);
+    int peak = FIRST_BIN;
+    for (int k = FIRST_BIN; k < out->bins - 1; k++) {
+        peak = power[k] > power[peak] ? k : peak;
+    }
+    out->power = power;
+    out->found = power[peak] > out->least_ratio;
+    if (out->found) {
+        measure(rows, width, height, peak, out);
+    }
+    return BST_OK;
+}

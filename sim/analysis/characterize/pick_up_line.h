@@ -1,0 +1,33 @@
+/* Coherent pick-up: a sine along the rows, of one frequency and any phase in each row. */
+#ifndef BST_ANALYSIS_CHARACTERIZE_PICK_UP_LINE_H
+#define BST_ANALYSIS_CHARACTERIZE_PICK_UP_LINE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "boresight/status.h"
+#include "sim/analysis/characterize/clipped_moments.h"
+
+/* Spectrum of the rows and the strongest line in it. */
+typedef struct bst_pick_up_line {
+    int bins;           /* frequencies 0, 1/width, ... below 1/2 cycles/px */
+    double *power;      /* [bins] mean over rows, relative to the continuum: 1 is white noise */
+    double least_ratio; /* power over the continuum from which a line is certain */
+    bool found;
+    bst_sensor_estimate frequency; /* cycles/px */
+    bst_sensor_estimate amplitude; /* half of peak to peak, in the unit of the rows */
+} bst_pick_up_line;
+
+/* Finds the line.
+ *
+ * Given:     rows  [height][width] without levels of rows and columns; changed: outliers are
+ *                  clipped at 6 robust standard deviations
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free(out->power)
+ * Notes:     The mean spectrum of H rows of white noise scatters by 1/sqrt(H); a line has 7 of
+ *            that. Uncertainties come from the scatter of 8 groups of rows.
+ * Reference: Welch 1967, with a Hann window and rows as segments */
+bst_status bst_pick_up_line_find(bst_ctx *ctx, float *rows, int width, int height,
+                                 bst_pick_up_line *out) BST_MUST_CHECK;
+
+#endif

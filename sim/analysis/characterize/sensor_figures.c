@@ -1,0 +1,95 @@
+#include "sim/analysis/characterize/sensor_figures.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+
+const double bst_sensor_percentiles[BST_SENSOR_PERCENTILES] = {5, 16, 50, 84, 95, 99, 99.9, 99.99};
+
+bool bst_sensor_has_level(const bst_sensor_stacks *s) {
+    return s->bias.count > 0 || (s->dark.count > 0 && s->dark.overscan_width > 0);
+}
+
+void bst_sensor_block_moments(const float *map, int width, int height, double clip, float *scratch,
+                              double *mean, double *variance) {
+    for (int k = 0; k < BST_STACK_BLOCKS; k++) {
+        int bx = k % BST_STACK_SIDE, by = k / BST_STACK_SIDE;
+        size_t n = 0;
+        for (int y = by * height / BST_STACK_SIDE; y < (by + 1) * height / BST_STACK_SIDE; y++) {
+            for (int x = bx * width / BST_STACK_SIDE; x < (bx + 1) * width / BST_STACK_SIDE; x++) {
+                scratch[n++] = map[(size_t)y * (size_t)width + (size_t)x];
+            }
+        }
+        bst_clipped_moments m = bst_clipped_moments_of(scratch, n, clip);
+        mean[k] = m.mean;
+        if (variance) {
+            variance[k] = m.variance;
+        }
+    }
+}
+
+/* Converts an estimate from DN to electrons; the error of the gain is part of it. */
+static void scale(bst_sensor_figures *f, bst_sensor_figure which) {
+    const bst_sensor_estimate *gain = &f->figures[BST_SENSOR_GAIN];
+    bst_sensor_estimate *e = &f->figures[which];
+    double relative = gain->sigma > 0.0 ? gain->sigma / gain->value : 0.0;
+    e->sigma = hypot(e->sigma * gain->value, e->value * gain->value * relative);
+    e->value *= gain->value;
+}
+
+/* First stack with frames. */
+static const bst_frame_stack *first_stack(const bst_sensor_stacks *s) {
+    return s->bias.count > 0 ? &s->bias : s->dark.count > 0 ? &s->dark : &s->flat;
+}
+
+static bst_status check_sizes(bst_ctx *ctx, const bst_sensor_stacks *s) {
+    const bst_frame_stack *first = first_stack(s);
+    const bst_frame_stack *const all[] = {&s->bias, &s->dark, &s->flat};
+    const char *const names[] = {"bias", "dark", "flat"};
+    for (int i = 0; i < 3; i++) {
+        if (all[i]->count > 0 &&
+            (all[i]->width != first->width || all[i]->height != first->height)) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "the %s frames have %d x %d pixels, others %d x %d (allowed: frames of "
+                            "one sensor and size)",
+                            names[i], all[i]->width, all[i]->height, first->width, first->height);
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_sensor_figures_compute(bst_ctx *ctx, const bst_sensor_stacks *stacks,
+                                      bst_sensor_figures *out) {
+    assert(stacks && out);
+    const bst_frame_stack *first = first_stack(stacks);
+    assert(first->count > 0);
+    *out = (bst_sensor_figures){.width = first->width, .height = first->height};
+    for (int i = 0; i < BST_SENSOR_FIGURES; i++) {
+        out->figures[i] = (bst_sensor_estimate){NAN, NAN};
+        out->method[i] = "not determined";
+    }
+    for (int i = 0; i < BST_SENSOR_PERCENTILES; i++) {
+        out->percentiles_e_per_s[i] = NAN;
+    }
+    BST_TRY(check_sizes(ctx, stacks));
+    out->figures[BST_SENSOR_GAIN] = (bst_sensor_estimate){first->gain_e_per_dn, NAN};
+    out->method[BST_SENSOR_GAIN] = "header or map; pairs of flats and bias frames would measure it";
+    out->gain_of_header = true;
+    BST_TRY(bst_sensor_measure_noise(ctx, stacks, out));
+    BST_TRY(bst_sensor_measure_flat(ctx, stacks, out));
+    BST_TRY(bst_sensor_measure_dark(ctx, stacks, out));
+    const bst_sensor_figure in_dn[] = {BST_SENSOR_READ_NOISE, BST_SENSOR_ROW_NOISE,
+                                       BST_SENSOR_COLUMN_OFFSET, BST_SENSOR_ROW_OFFSET,
+                                       BST_SENSOR_LINE_AMPLITUDE};
+    for (size_t i = 0; i < sizeof in_dn / sizeof *in_dn; i++) {
+        scale(out, in_dn[i]);
+    }
+    return BST_OK;
+}
+
+void bst_sensor_figures_free(bst_sensor_figures *figures) {
+    free(figures->line.power);
+    free(figures->dark_map);
+    free(figures->prnu_map);
+    *figures = (bst_sensor_figures){0};
+}

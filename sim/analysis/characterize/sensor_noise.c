@@ -1,0 +1,210 @@
+/* Read noise, level, fixed offsets and pick-up of a sensor. */
+#include <math.h>
+#include <stdlib.h>
+
+#include "sim/analysis/characterize/sensor_figures.h"
+
+/* Variance of rounding to whole numbers, DN^2. */
+static const double ROUNDING = 1.0 / 12.0;
+static const double CLIP = 5.0;
+
+/* Root of a variance and its standard error; 0 for a variance that the noise made negative. */
+static bst_sensor_estimate root_of(bst_sensor_estimate variance) {
+    double value = sqrt(fmax(variance.value, 0.0));
+    /* near 0 the error of the root is that of a variance of one standard error */
+    double floor_value = sqrt(fmax(fabs(variance.value), variance.sigma));
+    return (bst_sensor_estimate){
+        value, floor_value > 0.0 ? 0.5 * variance.sigma / floor_value : variance.sigma};
+}
+
+/* Read noise by pairs of bias frames. */
+static void noise_of_pairs(const bst_frame_stack *bias, bst_sensor_figures *out) {
+    bst_sensor_estimate v = bst_mean_estimate(bias->variance, BST_STACK_BLOCKS);
+    v.value -= bias->integer ? ROUNDING : 0.0;
+    out->figures[BST_SENSOR_READ_NOISE] = root_of(v);
+    out->method[BST_SENSOR_READ_NOISE] = "differences of pairs of bias frames";
+    /* the variance of H row means, chi-square with H - 1 degrees of freedom, of each pair */
+    double within = v.value / bias->width;
+    bst_sensor_estimate rows = {bias->row_variance, sqrt(2.0 / (bias->height - 1) / bias->pairs) *
+                                                        (fmax(bias->row_variance, 0.0) + within)};
+    out->figures[BST_SENSOR_ROW_NOISE] = root_of(rows);
+    out->method[BST_SENSOR_ROW_NOISE] = "means of rows in differences of pairs of bias frames";
+}
+
+/* Read noise by differences of neighbouring columns, in eight parts of the rows. */
+static void noise_of_neighbours(const float *pixels, int width, int height, bool integer,
+                                float *scratch, bst_sensor_figures *out) {
+    enum { PARTS = 8 };
+    double variances[PARTS];
+    for (int part = 0; part < PARTS; part++) {
+        size_t n = 0;
+        for (int y = part * height / PARTS; y < (part + 1) * height / PARTS; y++) {
+            const float *row = pixels + (size_t)y * (size_t)width;
+            for (int x = 1; x < width; x++) {
+                scratch[n++] = row[x] - row[x - 1];
+            }
+        }
+        double sigma = bst_robust_sigma(scratch, n);
+        variances[part] = 0.5 * sigma * sigma;
+    }
+    bst_sensor_estimate v = bst_mean_estimate(variances, PARTS);
+    v.value -= integer ? 1.5 * ROUNDING : 0.0; /* of both pixels, and of their spread in between */
+    out->figures[BST_SENSOR_READ_NOISE] = root_of(v);
+}
+
+/* Mean of each column or row of a map, clipped, and the variance among them. */
+static bst_sensor_estimate offsets_of(const float *map, int width, int height, bool columns,
+                                      double noise, float *scratch) {
+    int lines = columns ? width : height, along = columns ? height : width;
+    size_t step = columns ? (size_t)width : 1, next = columns ? 1 : (size_t)width;
+    double *means = malloc((size_t)lines * sizeof *means);
+    if (!means) {
+        return (bst_sensor_estimate){NAN, NAN};
+    }
+    double mean = 0.0, variance = 0.0;
+    for (int i = 0; i < lines; i++) {
+        for (int k = 0; k < along; k++) {
+            scratch[k] = map[(size_t)i * next + (size_t)k * step];
+        }
+        means[i] = bst_clipped_moments_of(scratch, (size_t)along, CLIP).mean;
+        mean += means[i] / lines;
+    }
+    for (int i = 0; i < lines; i++) {
+        variance += (means[i] - mean) * (means[i] - mean) / (lines - 1);
+    }
+    free(means);
+    return root_of((bst_sensor_estimate){variance - noise, sqrt(2.0 / (lines - 1)) * variance});
+}
+
+/* Level of the bias frames, its drift, and fixed offsets of columns and rows. */
+static void measure_level(const bst_frame_stack *bias, float *scratch, bst_sensor_figures *out) {
+    double means[BST_STACK_BLOCKS], n = bias->count;
+    bst_sensor_block_moments(bias->mean, bias->width, bias->height, CLIP, scratch, means, NULL);
+    bst_sensor_estimate level = bst_mean_estimate(means, BST_STACK_BLOCKS);
+    double pixel =
+        bias->pairs > 0 ? bst_mean_estimate(bias->variance, BST_STACK_BLOCKS).value : 0.0;
+    double row = bias->pairs > 0 ? fmax(bias->row_variance, 0.0) : 0.0;
+    bst_sensor_estimate column =
+        offsets_of(bias->mean, bias->width, bias->height, true, pixel / n / bias->height, scratch);
+    bst_sensor_estimate fixed_row = offsets_of(bias->mean, bias->width, bias->height, false,
+                                               pixel / n / bias->width + row / n, scratch);
+    if (bias->pairs > 0) {
+        out->figures[BST_SENSOR_COLUMN_OFFSET] = column;
+        out->figures[BST_SENSOR_ROW_OFFSET] = fixed_row;
+        out->method[BST_SENSOR_COLUMN_OFFSET] = "means of columns of the mean bias frame";
+        out->method[BST_SENSOR_ROW_OFFSET] = "means of rows of the mean bias frame";
+    }
+    /* offsets of columns and rows are drawn once: blocks in a column share them */
+    level.sigma = sqrt(level.sigma * level.sigma + column.value * column.value / bias->width +
+                       (fixed_row.value * fixed_row.value + row / n) / bias->height);
+    out->figures[BST_SENSOR_OFFSET] = level;
+    out->method[BST_SENSOR_OFFSET] = "mean of the bias frames";
+    if (bias->count < 3) {
+        out->method[BST_SENSOR_OFFSET_DRIFT] = "not determined: needs three bias frames";
+        return;
+    }
+    double middle = 0.5 * (n - 1.0), mean = 0.0, slope = 0.0, rest = 0.0;
+    for (int i = 0; i < bias->count; i++) {
+        mean += bias->levels[i] / n;
+        slope += (i - middle) * bias->levels[i] / (n * (n * n - 1.0) / 12.0);
+    }
+    for (int i = 0; i < bias->count; i++) {
+        double d = bias->levels[i] - mean - slope * (i - middle);
+        rest += d * d / (n - 2.0);
+    }
+    out->figures[BST_SENSOR_OFFSET_DRIFT] =
+        (bst_sensor_estimate){slope, sqrt(rest / (n * (n * n - 1.0) / 12.0))};
+    out->method[BST_SENSOR_OFFSET_DRIFT] = "line through the levels of the bias frames";
+}
+
+/* Last frame without the levels of its rows and of the columns of all frames. */
+static void level_rows(const bst_frame_stack *s, float *rows, float *scratch) {
+    size_t width = (size_t)s->width;
+    float share = s->count > 1 ? sqrtf((float)s->count / (float)(s->count - 1)) : 1.0F;
+    for (int y = 0; y < s->height; y++) {
+        size_t at = (size_t)y * width;
+        for (size_t x = 0; x < width; x++) {
+            rows[at + x] =
+                s->count > 1 ? share * (s->last[at + x] - s->mean[at + x]) : s->last[at + x];
+            scratch[x] = rows[at + x];
+        }
+        float level = (float)bst_clipped_moments_of(scratch, width, CLIP).mean;
+        for (size_t x = 0; x < width; x++) {
+            rows[at + x] -= level;
+        }
+    }
+    for (size_t x = 0; x < width && s->count == 1; x++) {
+        for (int y = 0; y < s->height; y++) {
+            scratch[y] = rows[(size_t)y * width + x];
+        }
+        float level = (float)bst_clipped_moments_of(scratch, (size_t)s->height, CLIP).mean;
+        for (int y = 0; y < s->height; y++) {
+            rows[(size_t)y * width + x] -= level;
+        }
+    }
+}
+
+/* Coherent pick-up in the rows of the frames with the least noise. */
+static bst_status measure_line(bst_ctx *ctx, const bst_frame_stack *s, float *scratch,
+                               bst_sensor_figures *out) {
+    size_t pixels = (size_t)s->width * (size_t)s->height;
+    float *rows = malloc(pixels * sizeof *rows);
+    if (!rows) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
+    }
+    level_rows(s, rows, scratch);
+    bst_status status = bst_pick_up_line_find(ctx, rows, s->width, s->height, &out->line);
+    free(rows);
+    BST_TRY(status);
+    out->figures[BST_SENSOR_LINE_FREQUENCY] = out->line.frequency;
+    out->figures[BST_SENSOR_LINE_AMPLITUDE] = out->line.amplitude;
+    const char *how = out->line.found ? "mean spectrum of the rows"
+                                      : "none: no line above 7 standard deviations of the spectrum";
+    out->method[BST_SENSOR_LINE_FREQUENCY] = out->method[BST_SENSOR_LINE_AMPLITUDE] = how;
+    return BST_OK;
+}
+
+bst_status bst_sensor_measure_noise(bst_ctx *ctx, const bst_sensor_stacks *s,
+                                    bst_sensor_figures *out) {
+    size_t pixels = (size_t)out->width * (size_t)out->height;
+    size_t overscan = (size_t)s->dark.overscan_width * (size_t)out->height;
+    float *scratch = malloc((pixels > overscan ? pixels : overscan) * sizeof *scratch);
+    if (!scratch) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
+    }
+    if (s->bias.pairs > 0) {
+        noise_of_pairs(&s->bias, out);
+    } else if (s->dark.count > 0 && s->dark.overscan_width > 1) {
+        noise_of_neighbours(s->dark.overscan, s->dark.overscan_width, s->dark.height,
+                            s->dark.integer, scratch, out);
+        out->method[BST_SENSOR_READ_NOISE] = "differences of neighbours in the overscan";
+    } else if (s->bias.count > 0) {
+        noise_of_neighbours(s->bias.mean, s->bias.width, s->bias.height, s->bias.integer, scratch,
+                            out);
+        out->method[BST_SENSOR_READ_NOISE] = "differences of neighbours in the bias frame";
+    } else {
+        out->method[BST_SENSOR_READ_NOISE] = "not determined: needs bias frames or an overscan";
+    }
+    if (s->bias.count > 0) {
+        measure_level(&s->bias, scratch, out);
+    } else if (overscan > 0) {
+        double rows[8];
+        for (int part = 0; part < 8; part++) {
+            size_t from = overscan * (size_t)part / 8, to = overscan * (size_t)(part + 1) / 8;
+            for (size_t i = from; i < to; i++) {
+                scratch[i - from] = s->dark.overscan[i];
+            }
+            rows[part] = bst_clipped_moments_of(scratch, to - from, CLIP).mean;
+        }
+        out->figures[BST_SENSOR_OFFSET] = bst_mean_estimate(rows, 8);
+        out->method[BST_SENSOR_OFFSET] = "mean of the overscan";
+    } else {
+        out->method[BST_SENSOR_OFFSET] = "not determined: needs bias frames or an overscan";
+    }
+    const bst_frame_stack *quiet = s->bias.count > 0   ? &s->bias
+                                   : s->dark.count > 0 ? &s->dark
+                                                       : NULL;
+    bst_status status = quiet ? measure_line(ctx, quiet, scratch, out) : BST_OK;
+    free(scratch);
+    return status;
+}
