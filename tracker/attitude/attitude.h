@@ -16,6 +16,10 @@ typedef struct bst_attitude_star {
      * stars is zero */
     bst_vec3 pull_rad;
     double leverage; /* used star: its share in the two angles about camera x and y */
+    /* work space: residual (measured - predicted, px) at the latest attitude and its derivative by
+     * the camera rotation vector, px/rad */
+    bool in_front; /* of the camera; else both are undefined */
+    double residual_px[2], by_rotation_px[2][3];
 } bst_attitude_star;
 
 typedef struct bst_attitude_params {

@@ -34,6 +34,44 @@ double bst_mtt_light_share(const bst_mtt_track *a, const bst_mtt_track *b) {
     return 1.0 / (1.0 + pow(10.0, 0.4 * (a->v_mag - b->v_mag)));
 }
 
+double bst_mtt_detection_share(const bst_mtt_detection *a, const bst_mtt_detection *b) {
+    bool known = isfinite(a->v_mag_sigma) && isfinite(b->v_mag_sigma);
+    return known ? 1.0 / (1.0 + pow(10.0, 0.4 * (a->v_mag - b->v_mag))) : 0.5;
+}
+
+/* Half the chi-square of a magnitude, at most 4.5 as in bst_mtt_brightness_cost; 0: unknown. */
+static double magnitude_cost(double off_mag, double variance) {
+    double chi2 = off_mag * off_mag / variance;
+    return isfinite(chi2) ? 0.5 * fmin(chi2, 9.0) : 0.0;
+}
+
+bst_sky_measurement bst_mtt_perhaps_merged(double merge_rad, double detection_probability,
+                                           const bst_mtt_detection *single,
+                                           const bst_mtt_detection *own,
+                                           const bst_mtt_detection *companion) {
+    assert(single && own && companion && merge_rad > 0.0);
+    bst_vec3 to = bst_tangent_log(own->sky.direction, companion->sky.direction);
+    double s2 = 0.5 * merge_rad * merge_rad / LOG_RARE,
+           share = bst_mtt_detection_share(own, companion);
+    double unresolved = exp(-0.5 * bst_vec3_dot(to, to) / s2);
+    double variance =
+        0.09 + own->v_mag_sigma * own->v_mag_sigma + single->v_mag_sigma * single->v_mag_sigma;
+    double sum_mag = own->v_mag + 2.5 * log10(share);
+    double merged = unresolved * exp(-magnitude_cost(single->v_mag - sum_mag, variance));
+    double missed = (1.0 - unresolved) * (1.0 - detection_probability) *
+                    exp(-magnitude_cost(single->v_mag - own->v_mag, variance));
+    double p = merged / (merged + missed);
+    bst_sky_measurement out = single->sky;
+    bst_vec3 off =
+        bst_tangent_carry(own->sky.direction, out.direction, bst_vec3_scale(to, 1.0 - share));
+    bst_tangent axes = bst_tangent_at(out.direction);
+    double x = bst_vec3_dot(off, axes.e1), y = bst_vec3_dot(off, axes.e2);
+    out.cov_11 += p * x * x;
+    out.cov_12 += p * x * y;
+    out.cov_22 += p * y * y;
+    return out;
+}
+
 /* Measurement of the direction of a track with share w of the light: nu is the measured centre of
  * light minus the predicted track, other the other's contribution to it, both in the axes of the
  * track; r the covariance of their difference. */

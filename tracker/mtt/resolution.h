@@ -12,6 +12,22 @@ double bst_mtt_unresolved(double merge_rad, const bst_mtt_track *a, const bst_mt
 /* Share of track a in the light of a and b. */
 double bst_mtt_light_share(const bst_mtt_track *a, const bst_mtt_track *b);
 
+/* Share of detection a in the light of both; 0.5 if a brightness is unknown. */
+double bst_mtt_detection_share(const bst_mtt_detection *a, const bst_mtt_detection *b);
+
+/* Measurement of an object that gave detection `single` in one frame and `own` in another one, in
+ * which an object next to it gave `companion`.
+ *
+ * Given:     detection_probability  of a resolved object
+ * Returned:  the measurement of `single`, with a covariance that allows for its being the centre of
+ *            light of both objects: increased by p s s^T, where s is the offset of the centre of
+ *            light from `own` in the other frame, and p the probability of a merged measurement
+ *            (against a missed companion), given the separation and the brightness */
+bst_sky_measurement bst_mtt_perhaps_merged(double merge_rad, double detection_probability,
+                                           const bst_mtt_detection *single,
+                                           const bst_mtt_detection *own,
+                                           const bst_mtt_detection *companion);
+
 /* A merged measurement of two tracks. */
 typedef struct bst_mtt_merged {
     double log_likelihood, chi2; /* rad^-2; 2 degrees of freedom */
