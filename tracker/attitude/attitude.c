@@ -6,19 +6,14 @@
 #include "sim/core/invariant.h"
 #include "sim/core/symmetric.h"
 
-/* Misfit of a star for its covariance plus an excess variance. */
-typedef struct star_misfit {
-    double w[3]; /* inverse covariance: xx, xy, yy */
-    double chi2;
-} star_misfit;
-
 /* The identified stars of a frame. */
 typedef struct star_set {
     const bst_camera *camera;
     bst_attitude_star *items;
     int count;
-    bool placed; /* the residuals of the items are those at the attitude q */
+    bool placed; /* the work space of the items is that of q and extra_px2 */
     bst_quat q;
+    double extra_px2;
 } star_set;
 
 /* Residual of a star at an attitude, and its derivative. */
@@ -34,39 +29,56 @@ static void place_star(const bst_camera *camera, bst_quat q, bst_attitude_star *
     /* v rotates by e x v; the pixel is a function of a = vx / vz and b = vy / vz */
     double f = 1.0 / bst_camera_scale_rad(camera), a = v.x / v.z, b = v.y / v.z;
     const double ja[3] = {-a * b, 1 + a * a, -b}, jb[3] = {-(1 + b * b), a * b, a};
-    double by_tangent[2][2];
-    bst_camera_jacobian(camera, v, by_tangent);
+    double by_tangent[2][2] = {{1.0, 0.0}, {0.0, 1.0}};
+    if (camera->geometry.general) {
+        bst_camera_jacobian(camera, v, by_tangent);
+    }
     for (int k = 0; k < 3; k++) {
         star->by_rotation_px[0][k] = (by_tangent[0][0] * ja[k] + by_tangent[0][1] * jb[k]) * f;
         star->by_rotation_px[1][k] = (by_tangent[1][0] * ja[k] + by_tangent[1][1] * jb[k]) * f;
     }
 }
 
-/* Residuals of all stars at an attitude; several steps in a row ask for the same one. */
-static void place_stars(star_set *stars, bst_quat q) {
-    if (stars->placed && memcmp(&stars->q, &q, sizeof q) == 0) {
+/* Inverse covariance of a star with an excess variance. */
+static void invert_covariance(double extra_px2, bst_attitude_star *star) {
+    double cxx = star->cov_xx + extra_px2, cyy = star->cov_yy + extra_px2, cxy = star->cov_xy,
+           det = cxx * cyy - cxy * cxy;
+    star->positive = det > 0.0 && cxx > 0.0;
+    star->information[0] = cyy / det;
+    star->information[1] = -cxy / det;
+    star->information[2] = cxx / det;
+}
+
+/* Misfit of a placed star. */
+static void weigh_star(bst_attitude_star *star) {
+    const double *r = star->residual_px, *w = star->information;
+    star->fits = star->in_front && star->positive;
+    if (star->fits) {
+        star->chi2 = w[0] * r[0] * r[0] + 2 * w[1] * r[0] * r[1] + w[2] * r[1] * r[1];
+        star->fits = isfinite(star->chi2);
+    }
+}
+
+/* Residuals and misfits of all stars at an attitude; several steps in a row ask for the same. */
+static void place_stars(star_set *stars, double extra_px2, bst_quat q) {
+    bool same_q = stars->placed && memcmp(&stars->q, &q, sizeof q) == 0;
+    bool same_extra = stars->placed && stars->extra_px2 == extra_px2;
+    if (same_q && same_extra) {
         return;
     }
     for (int i = 0; i < stars->count; i++) {
-        place_star(stars->camera, q, &stars->items[i]);
+        bst_attitude_star *star = &stars->items[i];
+        if (!same_q) {
+            place_star(stars->camera, q, star);
+        }
+        if (!same_extra) {
+            invert_covariance(extra_px2, star);
+        }
+        weigh_star(star);
     }
     stars->placed = true;
     stars->q = q;
-}
-
-/* Misfit of a placed star; false if the star is behind the camera. */
-static bool misfit_of(const bst_attitude_star *star, double extra_px2, star_misfit *out) {
-    double cxx = star->cov_xx + extra_px2, cyy = star->cov_yy + extra_px2, cxy = star->cov_xy,
-           det = cxx * cyy - cxy * cxy;
-    if (!star->in_front || !(det > 0.0) || !(cxx > 0.0)) {
-        return false;
-    }
-    const double *r = star->residual_px;
-    out->w[0] = cyy / det;
-    out->w[1] = -cxy / det;
-    out->w[2] = cxx / det;
-    out->chi2 = out->w[0] * r[0] * r[0] + 2 * out->w[1] * r[0] * r[1] + out->w[2] * r[1] * r[1];
-    return isfinite(out->chi2);
+    stars->extra_px2 = extra_px2;
 }
 
 typedef enum weighting { WEIGHT_CAUCHY, WEIGHT_GIVEN } weighting;
@@ -75,20 +87,19 @@ typedef enum weighting { WEIGHT_CAUCHY, WEIGHT_GIVEN } weighting;
 static bool attitude_step(star_set *stars, double extra_px2, weighting how, double scale2,
                           bst_quat *q, double covariance[3][3], double *moved_rad) {
     double n[3][3] = {{0}}, g[3] = {0};
-    place_stars(stars, *q);
+    place_stars(stars, extra_px2, *q);
     for (int i = 0; i < stars->count; i++) {
         const bst_attitude_star *star = &stars->items[i];
-        const double *r = star->residual_px, (*j)[3] = star->by_rotation_px;
-        star_misfit s;
-        if (!misfit_of(star, extra_px2, &s)) {
+        const double *r = star->residual_px, (*j)[3] = star->by_rotation_px, *w = star->information;
+        if (!star->fits) {
             continue;
         }
-        double weight = how == WEIGHT_GIVEN ? star->weight : 1.0 / (1.0 + s.chi2 / scale2);
+        double weight = how == WEIGHT_GIVEN ? star->weight : 1.0 / (1.0 + star->chi2 / scale2);
         for (int k = 0; k < 3; k++) {
-            double a = weight * (s.w[0] * j[0][k] + s.w[1] * j[1][k]);
-            double b = weight * (s.w[1] * j[0][k] + s.w[2] * j[1][k]);
+            double a = weight * (w[0] * j[0][k] + w[1] * j[1][k]);
+            double b = weight * (w[1] * j[0][k] + w[2] * j[1][k]);
             g[k] += a * r[0] + b * r[1];
-            for (int m = 0; m < 3; m++) {
+            for (int m = 0; m <= k; m++) { /* the lower triangle is all that is inverted */
                 n[k][m] += a * j[0][m] + b * j[1][m];
             }
         }
@@ -112,11 +123,10 @@ static bool attitude_step(star_set *stars, double extra_px2, weighting how, doub
 static int select_stars(star_set *stars, double extra_px2, double limit, bst_quat q, int *used) {
     int changed = 0;
     *used = 0;
-    place_stars(stars, q);
+    place_stars(stars, extra_px2, q);
     for (int i = 0; i < stars->count; i++) {
-        star_misfit s;
         bst_attitude_star *star = &stars->items[i];
-        double weight = misfit_of(star, extra_px2, &s) && s.chi2 <= limit ? 1.0 : 0.0;
+        double weight = star->fits && star->chi2 <= limit ? 1.0 : 0.0;
         changed += weight != star->weight;
         star->weight = weight;
         *used += weight > 0.0;
@@ -127,11 +137,10 @@ static int select_stars(star_set *stars, double extra_px2, double limit, bst_qua
 static double mean_chi2(star_set *stars, double extra_px2, bst_quat q) {
     double sum = 0.0;
     int n = 0;
-    place_stars(stars, q);
+    place_stars(stars, extra_px2, q);
     for (int i = 0; i < stars->count; i++) {
-        star_misfit s;
-        if (misfit_of(&stars->items[i], extra_px2, &s)) {
-            sum += s.chi2;
+        if (stars->items[i].fits) {
+            sum += stars->items[i].chi2;
             n++;
         }
     }
@@ -142,22 +151,45 @@ static double mean_chi2(star_set *stars, double extra_px2, bst_quat q) {
 enum { FEWEST_FOR_EXCESS = 6, BISECTIONS = 40 };
 static const double LARGEST_EXCESS_PX2 = 4.0;
 
-/* Median chi-square of the stars, by bisection: without memory, independent of order. */
+/* The `rank`-th smallest `sorted` of the stars, rank from 1, none of them NaN; reorders these
+ * numbers (quickselect: Hoare, Comm. ACM 4, 1961). */
+static double select_rank(bst_attitude_star *list, int count, int rank) {
+    int low = 0, high = count - 1, at = rank - 1;
+    while (low < high) {
+        double pivot = list[at].sorted;
+        int i = low, k = high;
+        while (i <= k) {
+            while (list[i].sorted < pivot) {
+                i++;
+            }
+            while (list[k].sorted > pivot) {
+                k--;
+            }
+            if (i <= k) {
+                double swapped = list[i].sorted;
+                list[i++].sorted = list[k].sorted;
+                list[k--].sorted = swapped;
+            }
+        }
+        low = k < at ? i : low;
+        high = i > at ? k : high;
+    }
+    return list[at].sorted;
+}
+
+/* Median chi-square of the stars: the smallest number in steps of 1e6 / 2^60 that is not below half
+ * of them. */
 static double median_chi2(star_set *stars, double extra_px2, bst_quat q) {
     double low = 0.0, high = 1e6;
-    place_stars(stars, q);
+    place_stars(stars, extra_px2, q);
     for (int i = 0; i < stars->count; i++) {
-        star_misfit s;
         bst_attitude_star *star = &stars->items[i];
-        star->weight = misfit_of(star, extra_px2, &s) ? s.chi2 : INFINITY;
+        star->sorted = star->fits ? star->chi2 : INFINITY;
     }
+    double median = select_rank(stars->items, stars->count, (stars->count + 1) / 2);
     for (int k = 0; k < 60; k++) {
         double middle = 0.5 * (low + high);
-        int below = 0;
-        for (int i = 0; i < stars->count; i++) {
-            below += stars->items[i].weight <= middle;
-        }
-        *(2 * below >= stars->count ? &high : &low) = middle;
+        *(middle >= median ? &high : &low) = middle;
     }
     return high;
 }
@@ -180,12 +212,11 @@ static double excess_of_median(star_set *stars, double floor_px2, bst_quat q) {
 /* Sum of chi-square over the stars used. */
 static double total_chi2(star_set *stars, double extra_px2, bst_quat q) {
     double sum = 0.0;
-    place_stars(stars, q);
+    place_stars(stars, extra_px2, q);
     for (int i = 0; i < stars->count; i++) {
-        star_misfit s;
         const bst_attitude_star *star = &stars->items[i];
-        if (star->weight > 0.0 && misfit_of(star, extra_px2, &s)) {
-            sum += s.chi2;
+        if (star->weight > 0.0 && star->fits) {
+            sum += star->chi2;
         }
     }
     return sum;
@@ -252,13 +283,12 @@ static bool solve_robust(star_set *stars, const bst_attitude_params *params, bst
 }
 
 /* Influence of a star on the attitude: its pull and leverage. */
-static void star_influence(const star_misfit *s, const double covariance[3][3],
-                           bst_attitude_star *star) {
-    const double *r = star->residual_px, (*j)[3] = star->by_rotation_px;
+static void star_influence(const double covariance[3][3], bst_attitude_star *star) {
+    const double *r = star->residual_px, (*j)[3] = star->by_rotation_px, *w = star->information;
     double g[3], gain[3] = {0.0}, info[3][3];
     for (int k = 0; k < 3; k++) {
-        double a = s->w[0] * j[0][k] + s->w[1] * j[1][k];
-        double b = s->w[1] * j[0][k] + s->w[2] * j[1][k];
+        double a = w[0] * j[0][k] + w[1] * j[1][k];
+        double b = w[1] * j[0][k] + w[2] * j[1][k];
         g[k] = a * r[0] + b * r[1];
         for (int m = 0; m < 3; m++) {
             info[k][m] = a * j[0][m] + b * j[1][m];
@@ -291,14 +321,13 @@ void bst_attitude_solve(const bst_camera *camera, const bst_attitude_params *par
         return;
     }
     double square = 0.0;
-    place_stars(&set, q);
+    place_stars(&set, extra_px2, q);
     for (int i = 0; i < count; i++) {
-        star_misfit s;
         const double *r = stars[i].residual_px;
-        if (stars[i].weight > 0.0 && misfit_of(&stars[i], extra_px2, &s)) {
-            out->chi2 += s.chi2;
+        if (stars[i].weight > 0.0 && stars[i].fits) {
+            out->chi2 += stars[i].chi2;
             square += r[0] * r[0] + r[1] * r[1];
-            star_influence(&s, (const double(*)[3])out->covariance, &stars[i]);
+            star_influence((const double(*)[3])out->covariance, &stars[i]);
         }
     }
     out->q_cam_from_gcrf = q;
