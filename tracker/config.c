@@ -101,7 +101,7 @@ const bst_config_desc bst_tracker_config_table[] = {
     BST_INT(C, max_detections, "", 1, 1000000, "8192",
             "Room for detections of one frame that are not stars."),
     BST_ENUM(
-        C, association, associations, "\"mixture\"",
+        C, association, associations, "\"pmb\"",
         "pmb: joint probabilities of all tracks and detections, existence probabilities beside "
         "confirm_score, and measurements merged of two tracks (Poisson multi-Bernoulli); every "
         "pair of detections starts a track, and the likeliest choices live on apart until later "

@@ -447,15 +447,29 @@ void bst_sightings_detections(bst_sightings *s, int sensor_index, const bst_dete
     }
 }
 
-/* The confirmed track of an object that was measured in this frame; NULL: none. */
-static const bst_track *track_of(const bst_tracks *tracks, bst_vec3 direction, double reach_rad) {
+/* True if no object of the frame is nearer to a direction than object `own`. */
+static bool is_nearest_object(const frame *f, int own, bst_vec3 direction) {
+    double off = bst_vec3_angle(f->objects[own].direction, direction);
+    for (int i = 0; i < f->count; i++) {
+        if (i != own && bst_vec3_angle(f->objects[i].direction, direction) < off) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* The nearest confirmed track of an object that was measured in this frame; NULL: none. A track
+ * belongs to one object, the nearest. */
+static const bst_track *track_of(const bst_tracks *tracks, const frame *f, int object,
+                                 double reach_rad) {
     const bst_track *nearest = NULL;
     for (int i = 0; i < tracks->count; i++) {
         const bst_track *t = &tracks->items[i];
-        if (t->status == BST_TRACK_CONFIRMED && t->misses_in_row == 0) {
-            double off = bst_vec3_angle(t->direction_gcrf, direction);
-            nearest = off <= reach_rad ? t : nearest;
-            reach_rad = fmin(reach_rad, off);
+        double off = bst_vec3_angle(t->direction_gcrf, f->objects[object].direction);
+        if (t->status == BST_TRACK_CONFIRMED && t->misses_in_row == 0 && off <= reach_rad &&
+            is_nearest_object(f, object, t->direction_gcrf)) {
+            nearest = t;
+            reach_rad = off;
         }
     }
     return nearest;
@@ -477,7 +491,7 @@ void bst_sightings_tracks(bst_sightings *s, int sensor_index, const bst_tracks *
             bst_vec3 seen = bst_light_unaberrate(&f->light, bst_quat_rotate(back, v));
             add_error(&pass->place, bst_vec3_angle(seen, o->direction) / BST_ARCSEC_RAD);
         }
-        const bst_track *track = track_of(tracks, o->direction, reach);
+        const bst_track *track = track_of(tracks, f, i, reach);
         if (track) {
             pass->tracked++;
             pass->target += track->target_of_interest;

@@ -337,6 +337,38 @@ static void errors_on_both_axes_of_a_moving_camera(void **state) {
     tear_down(&f);
 }
 
+/* A track belongs to one object: of two within reach of it, to the nearer one. */
+static void a_track_of_two_objects(void **state) {
+    (void)state;
+    fixture f;
+    set_up(&f, 100.0);
+    messages m = make_messages(1, 10.0);
+    bst_vec3 d = {0, 0, 1};
+    m.tracks->attitude.q_cam_from_gcrf = BST_QUAT_IDENTITY;
+    m.truth->count = 2;
+    for (int i = 0; i < 2; i++) {
+        bst_truth_item *o = &m.truth->items[i];
+        *o = (bst_truth_item){.kind = BST_SOURCE_OBJECT,
+                              .id = (uint32_t)(1 + i),
+                              .flags = BST_TRUTH_IN_FIELD,
+                              .electrons = 1000};
+        /* 12 arcsec apart: 4 px, below the 5 px within which a track may be an object's */
+        bst_vec3 at = bst_vec3_unit(bst_vec3_axpy(d, 12 * i * BST_ARCSEC_RAD, (bst_vec3){1, 0, 0}));
+        bst_vec3_to_radec(at, &o->ra_rad, &o->dec_rad);
+    }
+    m.tracks->count = 1;
+    m.tracks->items[0] = (bst_track){
+        .status = BST_TRACK_CONFIRMED,
+        .direction_gcrf = bst_vec3_unit(bst_vec3_axpy(d, BST_ARCSEC_RAD, (bst_vec3){0, 1, 0}))};
+    give(&f, 0, &m);
+    bst_assert_ok(&f.ctx, bst_sightings_finish(&f.ctx, f.sightings, 1000.0));
+    assert_int_equal(f.pass_count, 2);
+    assert_int_equal(f.passes[0].tracked, 1);
+    bst_assert_close(f.passes[0].track.greatest, 1, 1e-6); /* rounding */
+    assert_int_equal(f.passes[1].tracked, 0);
+    tear_down(&f);
+}
+
 /* Hits, hot pixels and frames that are lost are no sightings; streaks count along their way. */
 static void what_is_no_sighting(void **state) {
     (void)state;
@@ -448,6 +480,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(passes_gaps_and_custody),
                                        cmocka_unit_test(errors_are_angles_to_the_truth),
                                        cmocka_unit_test(errors_on_both_axes_of_a_moving_camera),
+                                       cmocka_unit_test(a_track_of_two_objects),
                                        cmocka_unit_test(what_is_no_sighting),
                                        cmocka_unit_test(revisits_of_several_objects),
                                        cmocka_unit_test(tasks_are_counted_by_their_ends)};

@@ -17,6 +17,8 @@
 /* pairs of equal brightness at rest are separated from 3.5 px on, FWHM 2 px */
 #define CLOSE_RESOLUTION_PX 3.5
 #define CLOSE_PIXEL_RAD (3.0 * BST_ARCSEC_RAD)
+/* and never in frames of bad resolution (kind `half_resolved`) */
+#define CLOSE_BLENDED_PX 5.0
 /* detection threshold, SNR */
 #define CLOSE_THRESHOLD 5.0
 
@@ -65,15 +67,17 @@ typedef struct close_kind {
     bool crossing;                     /* objects 2 i and 2 i + 1 cross */
     double snr_low, snr_high, dropped; /* dropped: share beside those below the threshold */
     double false_alarms;               /* mean per frame */
+    double blended; /* share of the frames that resolve no pair closer than CLOSE_BLENDED_PX */
 } close_kind;
 
 static const close_kind close_kinds[] = {
-    {"formation7", 7, 7.0, 12.0, false, 12.0, 30.0, 0.05, 1.0},
-    {"formation12", 12, 4.0, 15.0, false, 12.0, 30.0, 0.05, 10.0},
-    {"crossings", 18, 0.0, 0.0, true, 12.0, 30.0, 0.05, 5.0},
-    {"clutter", 8, 0.0, 0.0, false, 5.0, 8.0, 0.0, 30.0},
-    {"dropped", 8, 0.0, 0.0, false, 10.0, 20.0, 0.2, 5.0},
-    {"dim_crossings", 10, 0.0, 0.0, true, 6.0, 8.0, 0.0, 10.0},
+    {"formation7", 7, 7.0, 12.0, false, 12.0, 30.0, 0.05, 1.0, 0.0},
+    {"formation12", 12, 4.0, 15.0, false, 12.0, 30.0, 0.05, 10.0, 0.0},
+    {"crossings", 18, 0.0, 0.0, true, 12.0, 30.0, 0.05, 5.0, 0.0},
+    {"clutter", 8, 0.0, 0.0, false, 5.0, 8.0, 0.0, 30.0, 0.0},
+    {"dropped", 8, 0.0, 0.0, false, 10.0, 20.0, 0.2, 5.0, 0.0},
+    {"dim_crossings", 10, 0.0, 0.0, true, 6.0, 8.0, 0.0, 10.0, 0.0},
+    {"half_resolved", 2, 3.7, 4.2, false, 12.0, 18.0, 0.1, 1.0, 0.5},
 };
 #define CLOSE_KINDS ((int)(sizeof close_kinds / sizeof *close_kinds))
 
@@ -196,6 +200,8 @@ static inline void close_add(close_scene *s, double x, double y, double snr, boo
 static inline void close_expose(close_scene *s, int frame) {
     int n = s->kind->objects, group[CLOSE_OBJECTS];
     double x[CLOSE_OBJECTS], y[CLOSE_OBJECTS];
+    bool bad = s->kind->blended > 0.0 && close_uniform(s, 0.0, 1.0) < s->kind->blended;
+    double resolution_px = bad ? CLOSE_BLENDED_PX : CLOSE_RESOLUTION_PX;
     s->count = 0;
     for (int i = 0; i < n; i++) {
         close_place(&s->objects[i], frame, &x[i], &y[i]);
@@ -203,7 +209,7 @@ static inline void close_expose(close_scene *s, int frame) {
     }
     for (int i = 0; i < n; i++) {
         for (int j = 0; j < i; j++) {
-            if (hypot(x[i] - x[j], y[i] - y[j]) < CLOSE_RESOLUTION_PX && group[i] != group[j]) {
+            if (hypot(x[i] - x[j], y[i] - y[j]) < resolution_px && group[i] != group[j]) {
                 int from = group[i], to = group[j];
                 for (int k = 0; k < n; k++) {
                     group[k] = group[k] == from ? to : group[k];

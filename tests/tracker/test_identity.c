@@ -26,7 +26,7 @@ static const bst_target_params target_params = {.direction_chi2 = 18.4,
 /* 1 sigma per axis of the cue: 24 px, more than the objects' distance, and 0.1 px/s */
 static const double CUE_SIGMA_RAD = 0.02 * BST_DEG_RAD, CUE_RATE_SIGMA_RADPS = 0.3 * AS;
 
-static const close_kind pair = {"identity", 2, 0.0, 0.0, true, 15.0, 15.0, 0.05, 5.0};
+static const close_kind pair = {"identity", 2, 0.0, 0.0, true, 15.0, 15.0, 0.05, 5.0, 0.0};
 
 typedef struct tally {
     int runs, none, right, ambiguous, silently_wrong;

@@ -113,8 +113,74 @@ static void many_alarms_ask_for_more(void **state) {
     assert_false(confirmed);
 }
 
+/* Two objects of equal brightness at rest among each other, 4 px apart along the first tangent
+ * axis, in two frames, of which one resolves them. Returns the tracks; the objects move at no rate.
+ */
+static int pair_in_two_frames(bool blended_first, double blend_mag, bst_mtt **mtt,
+                              const bst_mtt_track **tracks) {
+    bst_ctx ctx = {0};
+    bst_mtt_params params = pixel_tracker(16, 16);
+    params.association = BST_MTT_PMB;
+    params.merge_rad = 6 * PX;
+    params.star_rate_radps = 0.0;
+    params.max_rate_radps = 5 * PX;
+    bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, mtt));
+    bst_vec3 centre = {1, 0, 0};
+    bst_tangent axes = bst_tangent_at(centre);
+    for (int k = 0; k < 2; k++) {
+        bst_mtt_detection seen[2];
+        int count = blended_first == (k == 0) ? 1 : 2;
+        for (int i = 0; i < count; i++) {
+            double x = count == 1 ? 0.0 : i == 0 ? -2.02 * PX : 1.98 * PX;
+            seen[i] = (bst_mtt_detection){
+                .sky = {.direction = bst_tangent_exp(centre, bst_tangent_vector(&axes, x, 0.0)),
+                        .cov_11 = 0.01 * PX * PX,
+                        .cov_22 = 0.01 * PX * PX},
+                .x_px = x / PX,
+                .v_mag = count == 1 ? blend_mag : 12.0,
+                .v_mag_sigma = 0.05,
+                .snr = 20,
+                .length_rad = 2 * PX};
+        }
+        bst_mtt_frame f = {.tick = 1000 * k, .seconds = k, .detections = seen, .count = count};
+        bst_mtt_step(*mtt, &f);
+    }
+    int n;
+    *tracks = bst_mtt_tracks(*mtt, &n);
+    return n;
+}
+
+/* A track that begins with a detection of two objects, or whose second one is that, has the rate of
+ * the objects, not the 2 px/s from the centre of light to one of them. If the single detection is
+ * as bright as one object, it is most likely one object: 2 px/s. */
+static void births_from_blended_detections(void **state) {
+    (void)state;
+    for (int k = 0; k < 4; k++) {
+        bool blended_first = k % 2, both = k < 2;
+        bst_mtt *mtt;
+        const bst_mtt_track *tracks;
+        /* 0.7526 mag: twice the light */
+        int n = pair_in_two_frames(blended_first, both ? 12.0 - 0.7526 : 12.0, &mtt, &tracks);
+        assert_int_equal(n, 2);
+        for (int t = 0; t < n; t++) {
+            double rate = bst_vec3_norm(tracks[t].state.rate_radps) / PX;
+            double sigma = sqrt(tracks[t].state.covariance[2][2]) / PX;
+            if (both) {
+                /* 1 px of relative motion, half the offset, and the rest of the other hypothesis */
+                assert_true(rate < 0.2 && sigma > 0.9 && sigma < 1.3);
+                bst_assert_close(tracks[t].v_mag, 12.0, 1e-12);
+            } else {
+                /* a magnitude known to 0.3 leaves 15 % of the weight to the other hypothesis */
+                assert_true(fabs(rate - 2.0) < 0.4 && sigma > 0.7 && sigma < 0.9);
+            }
+        }
+        bst_mtt_free(mtt);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(pairs_have_the_cues_acceleration),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(births_from_blended_detections),
+                                       cmocka_unit_test(pairs_have_the_cues_acceleration),
                                        cmocka_unit_test(many_alarms_ask_for_more)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -16,6 +16,13 @@ typedef struct bst_attitude_star {
      * stars is zero */
     bst_vec3 pull_rad;
     double leverage; /* used star: its share in the two angles about camera x and y */
+    /* work space at the latest attitude and excess variance: residual (measured - predicted, px),
+     * its derivative by the camera rotation vector (px/rad), inverse covariance (xx, xy, yy) */
+    bool in_front; /* of the camera; else the rest is undefined */
+    bool positive; /* its covariance is positive definite; else `information` is undefined */
+    bool fits;     /* both, and chi2 is finite */
+    double residual_px[2], by_rotation_px[2][3], information[3], chi2;
+    double sorted; /* chi2 of some star, for the median */
 } bst_attitude_star;
 
 typedef struct bst_attitude_params {

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "tracker/mtt/multitarget_internal.h"
+#include "tracker/mtt/resolution.h"
 
 /* Number of unassociated detections in a frame up to which `confirm_score` alone keeps false tracks
  * rare: 100 exp(-12) per frame. With more, a track's prior odds are reduced in proportion, so that
@@ -67,6 +68,44 @@ static bst_mtt_pool *find_partner(bst_mtt *mtt, const bst_mtt_detection *detecti
     return NULL;
 }
 
+/* Nearest other unused detection of a frame within merge_rad of one of them; NULL: none. */
+static const bst_mtt_detection *find_neighbour(const bst_mtt *mtt, const bst_mtt_pool *pool,
+                                               const bst_mtt_detection *of) {
+    const bst_mtt_detection *best = NULL;
+    double nearest = mtt->params.merge_rad;
+    int begin, end;
+    bst_mtt_pool_range(pool, of->sky.direction, nearest, &begin, &end);
+    for (int i = begin; i < end; i++) {
+        const bst_mtt_detection *other = &pool->items[pool->order[i]];
+        double off = bst_vec3_norm(bst_vec3_sub(other->sky.direction, of->sky.direction));
+        if (other != of && !pool->used[pool->order[i]] && off < nearest) {
+            nearest = off;
+            best = other;
+        }
+    }
+    return best;
+}
+
+/* Measurements of a pair of detections. If one of the frames resolves two objects where the other
+ * has a single detection, that one may be merged. */
+static void measure_pair(const bst_mtt *mtt, const bst_mtt_detection *earlier,
+                         const bst_mtt_pool *pool, const bst_mtt_detection *later,
+                         bst_mtt_doubtful out[2]) {
+    out[0] = (bst_mtt_doubtful){earlier->sky, 0.0};
+    out[1] = (bst_mtt_doubtful){later->sky, 0.0};
+    if (mtt->params.association != BST_MTT_PMB || !(mtt->params.merge_rad > 0.0)) {
+        return;
+    }
+    const bst_mtt_detection *before = find_neighbour(mtt, pool, earlier),
+                            *after = find_neighbour(mtt, &mtt->now, later);
+    double pd = mtt->params.detection_probability;
+    if (after && !before) {
+        out[0] = bst_mtt_doubt_of_pair(mtt->params.merge_rad, pd, earlier, later, after);
+    } else if (before && !after) {
+        out[1] = bst_mtt_doubt_of_pair(mtt->params.merge_rad, pd, later, earlier, before);
+    }
+}
+
 /* Starts a tentative track from a pair of detections. */
 static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bst_mtt_pool *pool,
                         const bst_mtt_detection *later, const rate_gate *gate,
@@ -77,13 +116,19 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     double variance = floor * floor + earlier->v_mag_sigma * earlier->v_mag_sigma;
     /* prior odds: besides clutter, undetected charge may be as frequent as the charge recognised */
     double alarms = mtt->clutter_density * mtt->params.field_sr + (double)mtt->charged;
+    bst_mtt_doubtful pair[2] = {{earlier->sky, 0.0}, {later->sky, 0.0}};
+    if (!gate->rest) {
+        measure_pair(mtt, earlier, pool, later, pair);
+    }
+    /* a merged detection has the light of two objects */
+    double own = pair[0].merged > 0.5 ? 0.0 : pair[1].merged > 0.5 ? 1.0 : 0.5;
     assert(dt > 0.0 &&
            mtt->track_count < mtt->params.max_tracks + mtt->params.max_stationary_tracks);
     bst_mtt_track *track = &mtt->tracks[mtt->track_count++];
     *track = (bst_mtt_track){
         .id = mtt->next_id++,
         .status = BST_TRACK_TENTATIVE,
-        .v_mag = 0.5 * (earlier->v_mag + later->v_mag),
+        .v_mag = own * earlier->v_mag + (1.0 - own) * later->v_mag,
         .v_mag_variance = isfinite(variance) ? 0.5 * variance : 25.0,
         .snr = later->snr,
         .x_px = later->x_px,
@@ -112,7 +157,7 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     bst_mtt_start_fixed(mtt, earlier, track);
     bst_mtt_note_fixed(mtt, later, -log(BST_PI * reach * reach), track);
     mtt->rest_count += gate->rest;
-    bst_sky_from_pair(&earlier->sky, &later->sky, dt, mtt->params.noise_rad2ps3, &track->state);
+    bst_sky_from_pair(&pair[0].sky, &pair[1].sky, dt, mtt->params.noise_rad2ps3, &track->state);
     if (mtt->cue_lag_valid && bst_mtt_shares_acceleration(mtt, track, frame)) {
         /* the pair's rate is the mean over the interval; correct it to the newer detection by the
          * cue's acceleration */

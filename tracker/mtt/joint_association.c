@@ -10,6 +10,9 @@
 /* Belief propagation ends when no message changes by more, or after so many rounds. */
 static const double MESSAGE_TOLERANCE = 1e-4;
 enum { MOST_ROUNDS = 30 };
+/* Tracks whose states agree to this chi-square (4 degrees of freedom, 50 %) are hypotheses on one
+ * object. */
+static const double SAME_CHI2 = 3.36;
 /* Largest existence probability: 12 misses at a detection probability of 0.9 then make it 0.5. */
 static const double MOST_EXISTENCE = 1.0 - 1e-12;
 /* Frames in a row of two tracks on one detection after which they may be of one object. */
@@ -61,6 +64,40 @@ static double log_resolved(const bst_mtt *m, int t) {
     return sum;
 }
 
+/* True if a detection has another one within merge_rad. */
+static bool is_resolved(const bst_mtt *m, int column) {
+    bst_vec3 at = m->now.items[column].sky.direction;
+    int begin, end;
+    bst_mtt_pool_range(&m->now, at, m->params.merge_rad, &begin, &end);
+    for (int i = begin; i < end; i++) {
+        bst_vec3 off = bst_vec3_sub(m->now.items[m->now.order[i]].sky.direction, at);
+        if (m->now.order[i] != column && bst_vec3_norm(off) < m->params.merge_rad) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Allows for a detection of tentative track t that is of another tentative track, too: the one with
+ * which it is likeliest merged. Such tracks share no detections, but neither may take the centre of
+ * light for its own direction. */
+static void doubt(const bst_mtt *m, int t, bst_joint_hypothesis *h, double single_log_likelihood) {
+    const bst_mtt_track *track = &m->tracks[t];
+    for (int u = 0; u < m->track_count; u++) {
+        const bst_mtt_track *other = &m->tracks[u];
+        if (u == t || other->status != BST_TRACK_TENTATIVE || other->at_rest || other->star ||
+            !m->observable[u] || bst_sky_distance2(&track->state, &other->state) < SAME_CHI2) {
+            continue;
+        }
+        bst_mtt_doubtful both = bst_mtt_doubt_of_track(
+            &m->params, track, other, &m->now.items[h->column], single_log_likelihood);
+        if (both.merged > h->merged) {
+            h->merged = both.merged;
+            h->sky = both.sky;
+        }
+    }
+}
+
 /* Lists the detections in each track's gate as hypotheses. */
 static void gate_tracks(bst_mtt *m) {
     bst_mtt_joint *j = &m->joint;
@@ -83,6 +120,11 @@ static void gate_tracks(bst_mtt *m) {
                                       .partner = -1,
                                       .sky = m->now.items[columns[i]].sky,
                                       .log_odds = prior - costs[i]};
+            if (!firm && !track->at_rest && m->params.merge_rad > 0.0 &&
+                !is_resolved(m, columns[i])) {
+                doubt(m, t, &h,
+                      log(m->clutter_density / m->params.detection_probability) - costs[i]);
+            }
             (void)bst_mtt_joint_add(j, t, &h);
         }
     }
@@ -280,12 +322,17 @@ void bst_mtt_associate_jointly(bst_mtt *m) {
     }
 }
 
+const bst_joint_hypothesis *bst_mtt_joint_decision(const bst_mtt *m, int t) {
+    const bst_mtt_joint *j = &m->joint;
+    bool chosen = m->params.association == BST_MTT_PMB && j->decided[t] >= 0 &&
+                  j->hypothesis[j->decided[t]].column == m->detection_of_track[t];
+    return chosen ? &j->hypothesis[j->decided[t]] : NULL;
+}
+
 bool bst_mtt_joint_update(bst_mtt *m, int t, int components) {
     const bst_mtt_joint *j = &m->joint;
     bst_mtt_track *track = &m->tracks[t];
-    bool chosen =
-        j->decided[t] >= 0 && j->hypothesis[j->decided[t]].column == m->detection_of_track[t];
-    if (track->star || (m->detection_of_track[t] >= 0 && !chosen)) {
+    if (track->star || (m->detection_of_track[t] >= 0 && !bst_mtt_joint_decision(m, t))) {
         return false;
     }
     bst_filter_candidate candidates[BST_MTT_CANDIDATES];

@@ -35,6 +35,7 @@ typedef struct bst_joint_hypothesis {
     bst_sky_measurement sky;
     double log_odds; /* ln of the weight over that of a miss; shared: of both tracks */
     double probability;
+    double merged; /* tentative track: probability that the detection is of another one, too */
 } bst_joint_hypothesis;
 
 /* Two tracks that may be unresolved. */
@@ -98,6 +99,10 @@ void bst_mtt_associate_jointly(struct bst_mtt *mtt);
  * Returned:  false if the track's detection is not one of its hypotheses (manoeuvre gate), or if it
  *            is a star */
 bool bst_mtt_joint_update(struct bst_mtt *mtt, int t, int components);
+
+/* Hypothesis of the detection of track t; NULL: it is missed, or has a detection of the manoeuvre
+ * gate or of a split. */
+const bst_joint_hypothesis *bst_mtt_joint_decision(const struct bst_mtt *mtt, int t);
 
 /* True if the existence probability of a tentative track is high enough for its confirmation; with
  * other associations always. */

@@ -325,8 +325,10 @@ static void update_track(bst_mtt *m, int t) {
     bool hidden = shared == BST_MTT_HIDDEN, outshines = shared == BST_MTT_OUTSHINING;
     bst_filter_candidate candidate = {.extra = shared ? m->extra[t] : NULL};
     bst_filter_fit fit;
+    const bst_joint_hypothesis *decision = bst_mtt_joint_decision(m, t);
+    bool doubtful = decision && decision->merged > 0.0, merged = doubtful && decision->merged > 0.5;
     if (detection) {
-        candidate.measurement = &detection->sky;
+        candidate.measurement = doubtful ? &decision->sky : &detection->sky;
     }
     bool taken = hidden || (detection && bst_filter_evaluate(&m->filter, &track->state,
                                                              &track->models, &candidate, &fit));
@@ -362,7 +364,7 @@ static void update_track(bst_mtt *m, int t) {
         record_event(m, BST_MTT_MANOEUVRE, track, statistic);
         track->manoeuvre_end_s = m->now.seconds + m->params.manoeuvre_sojourn_s;
     }
-    if (!outshines) { /* otherwise the brightness contains the hidden object's light */
+    if (!outshines && !merged) { /* otherwise the brightness contains another object's light */
         update_brightness(m, track, detection, dt);
         bst_mtt_note_light(track);
     }

@@ -7,6 +7,9 @@
 static const double LOG_RARE = 2.9957;
 /* a share of light below this carries no information on the position */
 static const double LEAST_SHARE = 1e-3;
+/* 1 sigma of the motion of two objects relative to each other between two frames, share of the
+ * offset from their centre of light: a design choice */
+static const double RELATIVE_MOTION = 0.5;
 
 /* Position covariance of a track (11, 12, 22) in the tangent axes of a direction nearby. */
 static void position_covariance(const bst_sky_state *state, bst_vec3 direction, double out[3]) {
@@ -34,6 +37,78 @@ double bst_mtt_light_share(const bst_mtt_track *a, const bst_mtt_track *b) {
     return 1.0 / (1.0 + pow(10.0, 0.4 * (a->v_mag - b->v_mag)));
 }
 
+double bst_mtt_detection_share(const bst_mtt_detection *a, const bst_mtt_detection *b) {
+    bool known = isfinite(a->v_mag_sigma) && isfinite(b->v_mag_sigma);
+    return known ? 1.0 / (1.0 + pow(10.0, 0.4 * (a->v_mag - b->v_mag))) : 0.5;
+}
+
+/* Half the chi-square of a magnitude, at most 4.5 as in bst_mtt_brightness_cost; 0: unknown. */
+static double magnitude_cost(double off_mag, double variance) {
+    double chi2 = off_mag * off_mag / variance;
+    return isfinite(chi2) ? 0.5 * fmin(chi2, 9.0) : 0.0;
+}
+
+/* Covariance (11, 12, 22) in the tangent axes of a direction, turned to those of another one. */
+static void turn_covariance(bst_vec3 from, const double cov[3], bst_vec3 to, double out[3]) {
+    bst_tangent axes = bst_tangent_at(from), own = bst_tangent_at(to);
+    double c, s;
+    bst_tangent_turn(from, &axes, to, &own, &c, &s);
+    out[0] = c * c * cov[0] + 2 * c * s * cov[1] + s * s * cov[2];
+    out[1] = -c * s * cov[0] + (c * c - s * s) * cov[1] + c * s * cov[2];
+    out[2] = s * s * cov[0] - 2 * c * s * cov[1] + c * c * cov[2];
+}
+
+/* Mean and covariance of two hypotheses on one measurement, the second of probability p. */
+static bst_sky_measurement mix(const bst_sky_measurement *a, const bst_sky_measurement *b,
+                               double p) {
+    bst_vec3 step = bst_tangent_log(a->direction, b->direction);
+    bst_sky_measurement out = {.direction = bst_tangent_exp(a->direction, bst_vec3_scale(step, p))};
+    const double of_a[3] = {a->cov_11, a->cov_12, a->cov_22},
+                 of_b[3] = {b->cov_11, b->cov_12, b->cov_22};
+    double pa[3], pb[3];
+    turn_covariance(a->direction, of_a, out.direction, pa);
+    turn_covariance(b->direction, of_b, out.direction, pb);
+    bst_vec3 off = bst_tangent_carry(a->direction, out.direction, step);
+    bst_tangent axes = bst_tangent_at(out.direction);
+    double x = bst_vec3_dot(off, axes.e1), y = bst_vec3_dot(off, axes.e2);
+    out.cov_11 = (1.0 - p) * pa[0] + p * pb[0] + p * (1.0 - p) * x * x;
+    out.cov_12 = (1.0 - p) * pa[1] + p * pb[1] + p * (1.0 - p) * x * y;
+    out.cov_22 = (1.0 - p) * pa[2] + p * pb[2] + p * (1.0 - p) * y * y;
+    return out;
+}
+
+bst_mtt_doubtful bst_mtt_doubt_of_pair(double merge_rad, double detection_probability,
+                                       const bst_mtt_detection *single,
+                                       const bst_mtt_detection *own,
+                                       const bst_mtt_detection *companion) {
+    assert(single && own && companion && merge_rad > 0.0);
+    bst_vec3 to = bst_tangent_log(own->sky.direction, companion->sky.direction);
+    double s2 = 0.5 * merge_rad * merge_rad / LOG_RARE;
+    double share = bst_mtt_detection_share(own, companion);
+    double unresolved = exp(-0.5 * bst_vec3_dot(to, to) / s2);
+    double variance =
+        0.09 + own->v_mag_sigma * own->v_mag_sigma + single->v_mag_sigma * single->v_mag_sigma;
+    double sum_mag = own->v_mag + 2.5 * log10(share);
+    double merged = unresolved * exp(-magnitude_cost(single->v_mag - sum_mag, variance));
+    double missed = (1.0 - unresolved) * (1.0 - detection_probability) *
+                    exp(-magnitude_cost(single->v_mag - own->v_mag, variance));
+    /* the object was as far from the centre of light as in the other frame, but for its motion
+     * relative to the companion */
+    bst_vec3 off = bst_tangent_carry(own->sky.direction, single->sky.direction,
+                                     bst_vec3_scale(to, -(1.0 - share)));
+    bst_tangent axes = bst_tangent_at(single->sky.direction);
+    double x = RELATIVE_MOTION * bst_vec3_dot(off, axes.e1),
+           y = RELATIVE_MOTION * bst_vec3_dot(off, axes.e2);
+    const double cov[3] = {single->sky.cov_11 + x * x, single->sky.cov_12 + x * y,
+                           single->sky.cov_22 + y * y};
+    double turned[3];
+    bst_vec3 there = bst_tangent_exp(single->sky.direction, off);
+    turn_covariance(single->sky.direction, cov, there, turned);
+    const bst_sky_measurement implied = {there, turned[0], turned[1], turned[2]};
+    double p = merged / (merged + missed);
+    return (bst_mtt_doubtful){mix(&single->sky, &implied, p), p};
+}
+
 /* Measurement of the direction of a track with share w of the light: nu is the measured centre of
  * light minus the predicted track, other the other's contribution to it, both in the axes of the
  * track; r the covariance of their difference. */
@@ -45,12 +120,12 @@ static bst_sky_measurement implied(const bst_sky_state *state, double w, const d
     out.direction =
         bst_tangent_exp(state->direction,
                         bst_tangent_vector(&axes, (nu[0] - other[0]) / w, (nu[1] - other[1]) / w));
-    bst_tangent own = bst_tangent_at(out.direction);
-    double c, s, a = r[0] / (w * w), b = r[1] / (w * w), e = r[2] / (w * w);
-    bst_tangent_turn(state->direction, &axes, out.direction, &own, &c, &s);
-    out.cov_11 = c * c * a + 2 * c * s * b + s * s * e;
-    out.cov_12 = -c * s * a + (c * c - s * s) * b + c * s * e;
-    out.cov_22 = s * s * a - 2 * c * s * b + c * c * e;
+    const double cov[3] = {r[0] / (w * w), r[1] / (w * w), r[2] / (w * w)};
+    double turned[3];
+    turn_covariance(state->direction, cov, out.direction, turned);
+    out.cov_11 = turned[0];
+    out.cov_12 = turned[1];
+    out.cov_22 = turned[2];
     return out;
 }
 
@@ -89,6 +164,22 @@ bool bst_mtt_merge(const bst_mtt_track *a, const bst_mtt_track *b,
     assert(a && b && measurement && out);
     return merge_one(b, a, measurement, floor_rad, out, &out->of_b) &&
            merge_one(a, b, measurement, floor_rad, out, &out->of_a);
+}
+
+bst_mtt_doubtful bst_mtt_doubt_of_track(const bst_mtt_params *params, const bst_mtt_track *a,
+                                        const bst_mtt_track *b, const bst_mtt_detection *detection,
+                                        double single_log_likelihood) {
+    assert(params && a && b && detection);
+    bst_mtt_merged fit;
+    if (!bst_mtt_merge(a, b, &detection->sky, params->merge_floor_rad, &fit)) {
+        return (bst_mtt_doubtful){detection->sky, 0.0};
+    }
+    double unresolved = fmin(bst_mtt_unresolved(params->merge_rad, a, b), 0.999);
+    double log_ratio = log(unresolved / (1.0 - unresolved)) + fit.log_likelihood -
+                       bst_mtt_merged_brightness_cost(a, b, detection) - single_log_likelihood -
+                       log(1.0 - params->detection_probability);
+    double p = 1.0 / (1.0 + exp(-log_ratio));
+    return (bst_mtt_doubtful){mix(&detection->sky, &fit.of_a, p), p};
 }
 
 double bst_mtt_merged_brightness_cost(const bst_mtt_track *a, const bst_mtt_track *b,

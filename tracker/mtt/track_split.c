@@ -12,12 +12,6 @@ typedef struct pair {
     double log_odds, share; /* share: of the first one in their light */
 } pair;
 
-/* Share of the first detection in the light of both; equal shares if a brightness is unknown. */
-static double share_of(const bst_mtt_detection *a, const bst_mtt_detection *b) {
-    bool known = isfinite(a->v_mag_sigma) && isfinite(b->v_mag_sigma);
-    return known ? 1.0 / (1.0 + pow(10.0, 0.4 * (a->v_mag - b->v_mag))) : 0.5;
-}
-
 /* Odds of a pair of detections: their centre of light continues the track, and they have just been
  * resolved. The alternative is that the track was missed and both are clutter or other objects. The
  * prior of a companion is the one of an undetected object within merge_rad. */
@@ -25,7 +19,7 @@ static bool judge(const bst_mtt *m, int t, pair *p) {
     const bst_mtt_track *track = &m->tracks[t];
     const bst_mtt_detection *a = &m->now.items[p->columns[0]], *b = &m->now.items[p->columns[1]];
     bst_vec3 to = bst_tangent_log(a->sky.direction, b->sky.direction);
-    p->share = share_of(a, b);
+    p->share = bst_mtt_detection_share(a, b);
     bst_sky_measurement centre = a->sky;
     centre.direction = bst_tangent_exp(a->sky.direction, bst_vec3_scale(to, 1.0 - p->share));
     double floor2 = m->params.merge_floor_rad * m->params.merge_floor_rad;
