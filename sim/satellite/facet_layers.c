@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/satellite/polygon_covers.h"
+#include "sim/satellite/polygon_cut.h"
 
 /* Side of a bin, in cells; levels of nearness. */
 enum { BIN = 8, LEVELS = 4096 };

@@ -5,23 +5,26 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Corners of all polygons of a list; of all intersections that are kept at the same time. */
-enum { POINTS = 1024, WORK = 8192 };
+#include "sim/core/simd.h"
 
-/* Distance over the extent of a polygon below which two corners are one. */
+/* Half planes of all sets of a list; corners of all intersections that are kept at the same time.
+ */
+enum { SIDES = 1024, WORK = 8192 };
+
+/* Length of an edge over the extent of its polygon below which it has no direction. */
 static const double TINY = 1e-12;
 
 /* Corners of an intersection, at most. */
-enum { CORNERS = BST_POLYGON_INTERSECTION_MAX };
+enum { CORNERS = 4 * BST_POLYGON_CORNERS_MAX };
 
 /* Intersections after which bst_polygon_uncovered_area gives up: their number can double with each
- * polygon. */
+ * set. */
 enum { INTERSECTIONS_MAX = 200 };
 
 bst_status bst_polygon_covers_create(bst_ctx *ctx, bst_polygon_covers *covers) {
-    *covers = (bst_polygon_covers){.points = malloc(POINTS * sizeof *covers->points),
+    *covers = (bst_polygon_covers){.sides = malloc(SIDES * sizeof *covers->sides),
                                    .work = malloc(WORK * sizeof *covers->work)};
-    if (!covers->points || !covers->work) {
+    if (!covers->sides || !covers->work) {
         bst_polygon_covers_free(covers);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the shadows of a satellite");
     }
@@ -29,100 +32,116 @@ bst_status bst_polygon_covers_create(bst_ctx *ctx, bst_polygon_covers *covers) {
 }
 
 void bst_polygon_covers_free(bst_polygon_covers *covers) {
-    free(covers->points);
+    free(covers->sides);
     free(covers->work);
     *covers = (bst_polygon_covers){0};
 }
 
-bst_point2 *bst_polygon_covers_begin(bst_polygon_covers *covers, int count) {
-    int used = covers->first[covers->count];
-    return covers->count < BST_POLYGON_COVERS_MAX && used + count <= POINTS ? covers->points + used
-                                                                            : NULL;
+void bst_polygon_covers_clear(bst_polygon_covers *covers) {
+    covers->count = covers->pending = 0;
 }
 
-/* True if two corners are one: an edge between them would have a direction of rounding errors. */
-static bool is_same(bst_point2 a, bst_point2 b, double tiny) {
-    return fabs(a.x - b.x) <= tiny && fabs(a.y - b.y) <= tiny;
+bool bst_polygon_covers_add(bst_polygon_covers *covers, bst_half_plane side) {
+    int at = covers->first[covers->count] + covers->pending;
+    if (at >= SIDES) {
+        return false;
+    }
+    covers->sides[at] = side;
+    covers->pending++;
+    return true;
 }
 
-void bst_polygon_covers_end(bst_polygon_covers *covers, int count) {
-    assert(covers->count < BST_POLYGON_COVERS_MAX);
-    int first = covers->first[covers->count], n = 0;
-    bst_point2 *p = covers->points + first;
+bool bst_polygon_covers_end(bst_polygon_covers *covers) {
+    if (covers->count >= BST_POLYGON_COVERS_MAX) {
+        return false;
+    }
+    covers->first[covers->count + 1] = covers->first[covers->count] + covers->pending;
+    covers->count++;
+    covers->pending = 0;
+    return true;
+}
+
+int bst_half_planes_of(const bst_point2 *p, int count, bst_half_planes *sides) {
+    int blocks = (count + BST_HALF_PLANES - 1) / BST_HALF_PLANES;
     double extent = 0.0;
     for (int i = 1; i < count; i++) {
         double far = fabs(p[i].x - p[0].x) + fabs(p[i].y - p[0].y);
         extent = far > extent ? far : extent;
     }
-    for (int i = 0; i < count; i++) {
-        bool same = n > 0 && is_same(p[n - 1], p[i], TINY * extent);
-        if (!same) {
-            p[n++] = p[i];
+    for (int i = 0; i < BST_HALF_PLANES * blocks; i++) {
+        bst_half_planes *to = &sides[i / BST_HALF_PLANES];
+        int lane = i % BST_HALF_PLANES;
+        const bst_point2 *a = &p[i < count ? i : 0], *b = &p[i + 1 < count ? i + 1 : 0];
+        double x = b->x - a->x, y = b->y - a->y, tiny = TINY * extent;
+        bool any = i < count && (fabs(x) > tiny || fabs(y) > tiny);
+        to->u[lane] = any ? -y : 0.0;
+        to->v[lane] = any ? x : 0.0;
+        to->w[lane] = any ? y * a->x - x * a->y : 1.0;
+    }
+    return blocks;
+}
+
+/* Lowest and highest value that each half plane has in a box. */
+BST_CLONES_256 static void extremes_in_box(const bst_half_planes *sides, int blocks,
+                                           const double bounds[4], double *low, double *high) {
+    double x = 0.5 * (bounds[0] + bounds[1]), y = 0.5 * (bounds[2] + bounds[3]);
+    double half_x = 0.5 * (bounds[1] - bounds[0]), half_y = 0.5 * (bounds[3] - bounds[2]);
+    for (int b = 0; b < blocks; b++) {
+        for (int k = 0; k < BST_HALF_PLANES; k++) {
+            double u = sides[b].u[k], v = sides[b].v[k];
+            double middle = u * x + v * y + sides[b].w[k];
+            double reach = fabs(u) * half_x + fabs(v) * half_y;
+            low[BST_HALF_PLANES * b + k] = middle - reach;
+            high[BST_HALF_PLANES * b + k] = middle + reach;
         }
     }
-    while (n > 1 && is_same(p[n - 1], p[0], TINY * extent)) {
-        n--;
-    }
-    if (n >= 3) {
-        covers->first[++covers->count] = first + n;
-    }
 }
 
-/* Distances of points to the left of the line a-b, times its length. Returned: the smallest. */
-static double distances(const bst_point2 *p, int count, bst_point2 a, bst_point2 b, double *left) {
-    double x = b.x - a.x, y = b.y - a.y, least = INFINITY;
-    for (int i = 0; i < count; i++) {
-        left[i] = x * (p[i].y - a.y) - y * (p[i].x - a.x);
+int bst_half_planes_crossing(const bst_half_planes *sides, int blocks, const bst_point2 *p,
+                             int count, const double bounds[4], int *indices) {
+    double low[BST_POLYGON_CORNERS_MAX + BST_HALF_PLANES];
+    double high[BST_POLYGON_CORNERS_MAX + BST_HALF_PLANES];
+    int found = 0, n = BST_HALF_PLANES * blocks;
+    assert(n < BST_POLYGON_CORNERS_MAX + BST_HALF_PLANES);
+    extremes_in_box(sides, blocks, bounds, low, high);
+    for (int i = 0; i < n; i++) {
+        if (high[i] <= 0.0) {
+            return BST_HALF_PLANES_APART;
+        }
+        if (low[i] >= 0.0) {
+            continue;
+        }
+        const bst_half_planes *s = &sides[i / BST_HALF_PLANES];
+        int lane = i % BST_HALF_PLANES, within = 0, outside = 0;
+        double u = s->u[lane], v = s->v[lane], w = s->w[lane];
+        for (int k = 0; k < count; k++) {
+            double value = u * p[k].x + v * p[k].y + w;
+            within += value >= 0.0;
+            outside += value <= 0.0;
+        }
+        if (outside == count) {
+            return BST_HALF_PLANES_APART;
+        }
+        if (within < count) {
+            indices[found++] = i;
+        }
     }
-    for (int i = 0; i < count; i++) {
-        least = left[i] < least ? left[i] : least;
-    }
-    return least;
+    return found;
 }
 
-static double left_of(bst_point2 a, bst_point2 b, bst_point2 p) {
-    double x = b.x - a.x, y = b.y - a.y;
-    return x * (p.y - a.y) - y * (p.x - a.x);
+/* Where an edge of a polygon from a value before to one of another sign crosses zero. */
+static bst_point2 crossing_of(bst_point2 a, bst_point2 b, double before, double now) {
+    double t = before / (before - now);
+    return (bst_point2){a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)};
 }
 
-/* True if a convex polygon contains a point, by bisection of the triangles at its first corner. */
-static bool contains(const bst_point2 *q, int count, bst_point2 p) {
-    int low = 1, high = count - 1;
-    if (left_of(q[0], q[low], p) < 0.0 || left_of(q[0], q[high], p) > 0.0) {
-        return false;
-    }
-    while (high - low > 1) {
-        int middle = (low + high) / 2;
-        *(left_of(q[0], q[middle], p) >= 0.0 ? &low : &high) = middle;
-    }
-    return left_of(q[low], q[high], p) >= 0.0;
-}
-
-bst_polygon_place bst_polygon_place_of(const bst_point2 *p, int p_count, const bst_point2 *q,
-                                       int q_count) {
-    int inside = 0;
-    while (inside < p_count && q_count >= 3 && contains(q, q_count, p[inside])) {
-        inside++;
-    }
-    if (inside == p_count) {
-        return BST_POLYGON_WITHIN;
-    }
-    return inside == 0 && bst_polygon_is_separate(p, p_count, q, q_count) ? BST_POLYGON_APART
-                                                                          : BST_POLYGON_CROSSING;
-}
-
-/* Keeps what a polygon has to the left of a line, by the distances of its corners. Returned: number
- * of corners; 0: none. There is room for `room` of them, which suffices but for polygons that
- * rounding made concave. */
-static int keep_left(const bst_point2 *p, int count, const double *left, int room,
-                     bst_point2 *out) {
+/* Cuts a polygon by the values of a half plane at its corners. Returned: number of corners. */
+static int cut_by(const bst_point2 *p, int count, const double *value, int room, bst_point2 *out) {
     int n = 0, last = count - 1;
     for (int i = 0; i < count; last = i++) {
-        double before = left[last], now = left[i];
+        double before = value[last], now = value[i];
         if (n < room && before * now < 0.0) {
-            double u = before / (before - now);
-            out[n++] = (bst_point2){p[last].x + u * (p[i].x - p[last].x),
-                                    p[last].y + u * (p[i].y - p[last].y)};
+            out[n++] = crossing_of(p[last], p[i], before, now);
         }
         if (n < room && now >= 0.0) {
             out[n++] = p[i];
@@ -131,57 +150,55 @@ static int keep_left(const bst_point2 *p, int count, const double *left, int roo
     return n >= 3 ? n : 0;
 }
 
-int bst_polygon_cut(bst_point2 *p, int count, bst_point2 a, bst_point2 b, int room) {
-    bst_point2 kept[CORNERS];
-    double left[CORNERS];
-    assert(room <= CORNERS);
-    if (count == 0 || distances(p, count, a, b, left) >= 0.0) {
-        return count;
+/* Finds the half planes that may cut a polygon, by its bounds. Returned: their number, or
+ * BST_HALF_PLANES_APART if one of them has no part of it. */
+static int may_cut(const bst_point2 *p, int count, const bst_half_plane *sides, int side_count,
+                   int *indices) {
+    double low[2] = {p[0].x, p[0].y}, high[2] = {p[0].x, p[0].y};
+    int found = 0;
+    for (int i = 1; i < count; i++) {
+        low[0] = p[i].x < low[0] ? p[i].x : low[0];
+        high[0] = p[i].x > high[0] ? p[i].x : high[0];
+        low[1] = p[i].y < low[1] ? p[i].y : low[1];
+        high[1] = p[i].y > high[1] ? p[i].y : high[1];
     }
-    int n = keep_left(p, count, left, room, kept);
-    memcpy(p, kept, (size_t)n * sizeof *p);
-    return n;
+    double x = 0.5 * (low[0] + high[0]), half_x = 0.5 * (high[0] - low[0]);
+    double y = 0.5 * (low[1] + high[1]), half_y = 0.5 * (high[1] - low[1]);
+    for (int i = 0; i < side_count; i++) {
+        const bst_half_plane s = sides[i];
+        double middle = s.u * x + s.v * y + s.w;
+        double reach = fabs(s.u) * half_x + fabs(s.v) * half_y;
+        if (middle + reach <= 0.0) {
+            return BST_HALF_PLANES_APART;
+        }
+        indices[found] = i;
+        found += middle < reach;
+    }
+    return found;
 }
 
-/* A circle about a polygon. */
-typedef struct circle {
-    bst_point2 centre;
-    double radius2; /* square of the radius */
-} circle;
-
-static circle circle_about(const bst_point2 *p, int count) {
-    circle c = {.radius2 = 0.0};
-    for (int i = 0; i < count; i++) {
-        c.centre.x += p[i].x / count;
-        c.centre.y += p[i].y / count;
-    }
-    for (int i = 0; i < count; i++) {
-        double x = p[i].x - c.centre.x, y = p[i].y - c.centre.y, r2 = x * x + y * y;
-        c.radius2 = r2 > c.radius2 ? r2 : c.radius2;
-    }
-    return c;
-}
-
-int bst_polygon_intersection(const bst_point2 *p, int p_count, const bst_point2 *q, int q_count,
-                             bst_point2 *work, bst_point2 *out) {
+int bst_polygon_keep(const bst_point2 *p, int count, const bst_half_plane *sides, int side_count,
+                     bst_point2 *work, bst_point2 *out, bool *cut) {
     const bst_point2 *from = p;
     bst_point2 *to = out;
-    int n = p_count, room = p_count + q_count;
-    double left[CORNERS];
-    assert(room <= CORNERS);
-    const circle about = circle_about(p, p_count);
-    for (int i = 0; i < q_count && n > 0; i++) {
-        bst_point2 a = q[i], b = q[i + 1 < q_count ? i + 1 : 0];
-        /* the circle alone decides for most edges */
-        double middle = left_of(a, b, about.centre), x = b.x - a.x, y = b.y - a.y;
-        bool far = middle * middle > about.radius2 * (x * x + y * y);
-        if (far && middle < 0.0) {
-            return 0;
+    int indices[CORNERS], n = count, room = count + side_count;
+    double value[CORNERS];
+    assert(count > 0 && room <= CORNERS);
+    int wanted = may_cut(p, count, sides, side_count, indices);
+    *cut = wanted == BST_HALF_PLANES_APART;
+    n = *cut ? 0 : n;
+    for (int i = 0; i < wanted && n > 0; i++) {
+        const bst_half_plane s = sides[indices[i]];
+        bool any = false;
+        for (int k = 0; k < n; k++) {
+            value[k] = s.u * from[k].x + s.v * from[k].y + s.w;
+            any |= value[k] < 0.0;
         }
-        if (!far && distances(from, n, a, b, left) < 0.0) {
-            n = keep_left(from, n, left, room, to);
+        if (any) {
+            n = cut_by(from, n, value, room, to);
             from = to;
             to = from == out ? work : out;
+            *cut = true;
         }
     }
     if (n > 0 && from != out) {
@@ -197,21 +214,22 @@ typedef struct sum {
     int intersections; /* so far; above INTERSECTIONS_MAX: given up */
 } sum;
 
-/* Area of a polygon outside of the first `covers` polygons of the list. */
+/* Area of a polygon outside of the first `covers` sets of the list. */
 static double uncovered(sum *s, const bst_point2 *p, int count, int covers) {
     double area = bst_polygon_area(p, count);
     int start = s->used;
     for (int i = covers - 1; i >= 0; i--) {
-        const bst_point2 *q = s->covers->points + s->covers->first[i];
-        int q_count = s->covers->first[i + 1] - s->covers->first[i], room = count + q_count;
+        const bst_half_plane *sides = s->covers->sides + s->covers->first[i];
+        int side_count = s->covers->first[i + 1] - s->covers->first[i], room = count + side_count;
         if (room > CORNERS || s->used + 2 * room > WORK || ++s->intersections > INTERSECTIONS_MAX) {
             s->intersections = INTERSECTIONS_MAX + 1;
             return 0.0;
         }
         bst_point2 *out = s->covers->work + start;
-        int n = bst_polygon_intersection(p, count, q, q_count, out + room, out);
-        if (n == count && memcmp(out, p, (size_t)n * sizeof *p) == 0) {
-            return 0.0; /* the polygon covers all */
+        bool cut;
+        int n = bst_polygon_keep(p, count, sides, side_count, out + room, out, &cut);
+        if (!cut) {
+            return 0.0; /* the set covers all */
         }
         s->used = start + n;
         area -= n > 0 ? uncovered(s, out, n, i) : 0.0;

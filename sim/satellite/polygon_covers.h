@@ -7,23 +7,27 @@
 /* Polygons of a list, at most. */
 enum { BST_POLYGON_COVERS_MAX = 12 };
 
-/* Corners of an intersection, at most: the sum of those of both polygons. */
-enum { BST_POLYGON_INTERSECTION_MAX = 4 * BST_POLYGON_CORNERS_MAX };
+/* Half of a plane: u x + v y + w >= 0. */
+typedef struct bst_half_plane {
+    double u, v, w;
+} bst_half_plane;
 
-/* A list of convex polygons with its work memory. */
+/* Four of them, for loops over many. */
+enum { BST_HALF_PLANES = 4 };
+typedef struct bst_half_planes {
+    double u[BST_HALF_PLANES], v[BST_HALF_PLANES], w[BST_HALF_PLANES];
+} bst_half_planes;
+
+/* A list of convex sets, each the intersection of half planes, with its work memory. Only those
+ * half planes matter whose border crosses the polygon of which the area is wanted. */
 typedef struct bst_polygon_covers {
-    bst_point2 *points, *work;
-    int first[BST_POLYGON_COVERS_MAX + 1]; /* corners of polygon i: points[first[i]] to
-                                              points[first[i + 1] - 1]; first[0] is 0 */
+    bst_half_plane *sides;
+    bst_point2 *work;
+    int first[BST_POLYGON_COVERS_MAX + 1]; /* sides of set i: sides[first[i]] to sides[first[i + 1]
+                                              - 1]; first[0] is 0 */
     int count;
+    int pending; /* sides of the next set */
 } bst_polygon_covers;
-
-/* Where a convex polygon is with regard to another one. */
-typedef enum bst_polygon_place {
-    BST_POLYGON_APART,   /* they share no area */
-    BST_POLYGON_WITHIN,  /* all of it is in the other one */
-    BST_POLYGON_CROSSING /* neither */
-} bst_polygon_place;
 
 /* Allocates the memory of an empty list; later calls allocate nothing. BST_ERR_MEMORY. The caller
  * frees it with bst_polygon_covers_free. */
@@ -31,40 +35,53 @@ bst_status bst_polygon_covers_create(bst_ctx *ctx, bst_polygon_covers *covers) B
 /* Frees the memory of a list; the struct belongs to the caller. */
 void bst_polygon_covers_free(bst_polygon_covers *covers);
 
-/* Place for a polygon of `count` corners, counter-clockwise, that bst_polygon_covers_end appends;
- * NULL: the list is full. */
-bst_point2 *bst_polygon_covers_begin(bst_polygon_covers *covers, int count);
-/* Appends the polygon that is in the place of bst_polygon_covers_begin, without corners that are
- * one. A polygon of fewer than three is left out. */
-void bst_polygon_covers_end(bst_polygon_covers *covers, int count);
+/* Empties the list. */
+void bst_polygon_covers_clear(bst_polygon_covers *covers);
+/* Adds a side to the next set of the list. False: there is no room. */
+bool bst_polygon_covers_add(bst_polygon_covers *covers, bst_half_plane side);
+/* Ends the set that bst_polygon_covers_add began. False: the list is full. */
+bool bst_polygon_covers_end(bst_polygon_covers *covers);
 
-/* Where polygon p is with regard to polygon q; both convex and counter-clockwise. Polygons that
- * only touch may count as crossing. */
-bst_polygon_place bst_polygon_place_of(const bst_point2 *p, int p_count, const bst_point2 *q,
-                                       int q_count);
-
-/* Keeps what a convex polygon, counter-clockwise, has to the left of the line a-b.
+/* Half planes of which a convex polygon is the intersection.
  *
- * Given:     points  [room] with `count` corners; room: at most BST_POLYGON_INTERSECTION_MAX
- * Returned:  number of corners; 0: nothing is left */
-int bst_polygon_cut(bst_point2 *points, int count, bst_point2 a, bst_point2 b, int room);
+ * Given:     points  [count], counter-clockwise, in the same plane
+ * Returned:  sides   [(count + BST_HALF_PLANES - 1) / BST_HALF_PLANES], filled up with planes that
+ *                    contain everything; the number of these blocks is the return value
+ * Notes:     edges as short as rounding have no direction, and become such planes too */
+int bst_half_planes_of(const bst_point2 *points, int count, bst_half_planes *sides);
 
-/* Intersection of two convex polygons, both counter-clockwise.
+/* Return value of bst_half_planes_crossing. */
+enum { BST_HALF_PLANES_APART = -1 };
+
+/* Finds the half planes whose border crosses a polygon.
  *
- * Given:     p, q  [p_count], [q_count], together at most BST_POLYGON_INTERSECTION_MAX
- *            q     without edges as short as rounding: bst_polygon_covers_end removes them
- *            work  [p_count + q_count]
- * Returned:  out   [p_count + q_count] room; the number of its corners is the return value; 0: none
+ * Given:     sides   [blocks], at most BST_POLYGON_CORNERS_MAX planes
+ *            points  [count] of the polygon
+ *            bounds  lowest and highest x, lowest and highest y of the points
+ * Returned:  indices  [BST_HALF_PLANES * blocks] room; the number of these planes is the return
+ *                     value: 0 if all of them contain the polygon, BST_HALF_PLANES_APART if one
+ *                     has no part of it */
+int bst_half_planes_crossing(const bst_half_planes *sides, int blocks, const bst_point2 *points,
+                             int count, const double bounds[4], int *indices);
+
+/* Keeps what a convex polygon has in some half planes.
+ *
+ * Given:     points  [count], counter-clockwise
+ *            sides   [side_count]
+ *            work    [count + side_count]
+ * Returned:  out     [count + side_count] room; the number of its corners is the return value; 0:
+ *                    none
+ *            *cut    false: nothing was removed
  * Reference: Sutherland and Hodgman, Comm. ACM 17, 32 (1974) */
-int bst_polygon_intersection(const bst_point2 *p, int p_count, const bst_point2 *q, int q_count,
-                             bst_point2 *work, bst_point2 *out);
+int bst_polygon_keep(const bst_point2 *points, int count, const bst_half_plane *sides,
+                     int side_count, bst_point2 *work, bst_point2 *out, bool *cut);
 
-/* Area of a convex polygon outside of all polygons of the list.
+/* Area of a convex polygon outside of all sets of the list.
  *
  * Given:     points  [count], counter-clockwise
  * Returned:  the area; below 0: too many of them overlap each other; use bst_polygon_clip
- * Notes:     of polygon i, what earlier ones leave of its intersection counts, which is the same
- *            problem with fewer polygons. */
+ * Notes:     of set i, what earlier ones leave of its intersection counts, which is the same
+ *            problem with fewer sets. */
 double bst_polygon_uncovered_area(const bst_polygon_covers *covers, const bst_point2 *points,
                                   int count);
 

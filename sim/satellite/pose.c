@@ -15,6 +15,8 @@ static void free_view(bst_pose_view *v) {
     free(v->hiders);
     free(v->outline);
     free(v->outline_count);
+    free(v->sides);
+    free(v->side_blocks);
     free(v->cell_first);
     free(v->cell_items);
 }
@@ -33,12 +35,22 @@ void bst_satellite_pose_free(bst_satellite_pose *p) {
         free(p->facing);
         free(p->pairs);
         free(p->faces);
+        free(p->plane);
+        free(p->plane_corner);
+        free(p->sides);
         free_view(&p->views[0]);
         free_view(&p->views[1]);
         bst_polygon_clip_free(&p->clip);
         bst_polygon_covers_free(&p->covers);
         free(p);
     }
+}
+
+/* First block of half planes of an occluder in a view: there is room for one at each vertex. */
+static int first_block(const bst_satellite *s, int occluder) {
+    int vertex =
+        occluder < s->occluder_count ? s->occluders[occluder].first_vertex : s->vertex_count;
+    return vertex / BST_HALF_PLANES + occluder;
 }
 
 /* Allocates a view. The grid of a model with many occluders has about one cell for each; an
@@ -53,7 +65,12 @@ static bool make_view(const bst_satellite *s, bst_pose_view *v) {
     v->hiders = calloc((size_t)s->occluder_count + 1, sizeof *v->hiders);
     bool made = v->flat && v->depth_m && v->within_rim && v->bounds && v->hiders && v->outline &&
                 v->outline_count;
-    if (s->occluder_count > BST_SEPARATION_BODIES) {
+    if (s->occluder_count <= BST_SEPARATION_BODIES) {
+        int blocks = first_block(s, s->occluder_count);
+        v->sides = calloc((size_t)blocks + 1, sizeof *v->sides);
+        v->side_blocks = calloc((size_t)s->occluder_count + 1, sizeof *v->side_blocks);
+        made = made && v->sides && v->side_blocks;
+    } else {
         v->cells = (int)fmin(sqrt((double)s->occluder_count), 256.0);
         v->cell_item_capacity = 32 * s->occluder_count + v->cells * v->cells;
         v->cell_first = calloc((size_t)(v->cells * v->cells) + 2, sizeof *v->cell_first);
@@ -88,6 +105,54 @@ static bool make_pairs(bst_satellite_pose *p) {
     return true;
 }
 
+/* Coordinates of the corners of a facet along the edges of the triangle of its corners 0, a and b.
+ * Returned: the area of the triangle over that of the facet. */
+static double set_plane(bst_satellite_pose *p, int index, int a, int b) {
+    const bst_satellite *s = p->satellite;
+    const bst_facet *f = &s->facets[index];
+    const int *corner = s->corner + f->first;
+    bst_vec3 origin = s->vertices[corner[0]];
+    bst_vec3 x = bst_vec3_sub(s->vertices[corner[a]], origin);
+    bst_vec3 y = bst_vec3_sub(s->vertices[corner[b]], origin), n = bst_vec3_cross(x, y);
+    double n2 = bst_vec3_dot(n, n);
+    for (int i = 0; i < f->count; i++) {
+        bst_vec3 r = bst_vec3_sub(s->vertices[corner[i]], origin);
+        p->plane[f->first + i] = (bst_point2){bst_vec3_dot(bst_vec3_cross(r, y), n) / n2,
+                                              bst_vec3_dot(bst_vec3_cross(x, r), n) / n2};
+    }
+    p->plane_corner[index][0] = a;
+    p->plane_corner[index][1] = b;
+    return 0.5 * sqrt(n2) / f->area_m2;
+}
+
+/* Sets the planes of all facets. */
+static bool make_planes(bst_satellite_pose *p) {
+    const bst_satellite *s = p->satellite;
+    p->plane = calloc((size_t)s->corner_count + 1, sizeof *p->plane);
+    p->plane_corner = calloc((size_t)s->facet_count + 1, sizeof *p->plane_corner);
+    p->sides = calloc(BST_POLYGON_CORNERS_MAX / BST_HALF_PLANES + 1, sizeof *p->sides);
+    for (int f = 0; f < s->facet_count && p->plane && p->plane_corner; f++) {
+        int n = s->facets[f].count, best[2] = {1, 2};
+        /* a third of a regular polygon's corners apart; else the largest triangle */
+        if (set_plane(p, f, n / 3, 2 * n / 3) > 0.1) {
+            continue;
+        }
+        double most = 0.0;
+        for (int a = 1; a < n; a++) {
+            for (int b = a + 1; b < n; b++) {
+                double share = set_plane(p, f, a, b);
+                if (share > most) {
+                    most = share;
+                    best[0] = a;
+                    best[1] = b;
+                }
+            }
+        }
+        (void)set_plane(p, f, best[0], best[1]);
+    }
+    return p->plane && p->plane_corner && p->sides;
+}
+
 static bst_status make_polygons(bst_ctx *ctx, bst_satellite_pose *p) {
     BST_TRY(bst_polygon_clip_create(ctx, &p->clip));
     return bst_polygon_covers_create(ctx, &p->covers);
@@ -119,7 +184,7 @@ bst_status bst_satellite_pose_create(bst_ctx *ctx, const bst_satellite *s,
     p->flat = calloc((size_t)most + 1, sizeof *p->flat);
     bool made = p->vertices && p->normals && p->rotation && p->origin && p->seen && p->next &&
                 p->flat && p->front && p->front_hull && p->facing && make_view(s, &p->views[0]) &&
-                make_view(s, &p->views[1]) && make_pairs(p);
+                make_view(s, &p->views[1]) && make_pairs(p) && make_planes(p);
     bst_status status =
         made ? make_polygons(ctx, p)
              : bst_fail(ctx, BST_ERR_MEMORY, "no memory for the pose of a satellite of %d facets",
@@ -257,6 +322,24 @@ int bst_pose_outline(bst_satellite_pose *p, int view, int occluder, const bst_po
     return outline_of(p, &p->views[view], occluder, points);
 }
 
+int bst_pose_sides(bst_satellite_pose *p, int view, int occluder, const bst_half_planes **sides) {
+    bst_pose_view *v = &p->views[view];
+    bool kept = v->side_blocks != NULL;
+    *sides = kept ? v->sides + first_block(p->satellite, occluder) : p->sides;
+    if (kept && v->side_blocks[occluder] >= 0) {
+        return v->side_blocks[occluder];
+    }
+    const bst_point2 *outline;
+    int n = outline_of(p, v, occluder, &outline);
+    int blocks = n <= BST_POLYGON_CORNERS_MAX
+                     ? bst_half_planes_of(outline, n, (bst_half_planes *)*sides)
+                     : 0;
+    if (kept) {
+        v->side_blocks[occluder] = blocks;
+    }
+    return blocks;
+}
+
 /* True if the silhouettes of two bodies overlap, which are not the same one. */
 static bool silhouettes_meet(const bst_satellite_pose *p, bst_pose_view *v, int a, int b) {
     const bst_point2 *of_a, *of_b;
@@ -302,6 +385,9 @@ void bst_pose_look(bst_satellite_pose *p, int view, bst_vec3 direction) {
             bst_pose_add_to_bounds(v, i, b);
         }
         v->outline_count[o] = -1;
+        if (v->side_blocks) {
+            v->side_blocks[o] = -1;
+        }
         if (body->shell >= 0) {
             mark_within_rim(p, v, body);
         }

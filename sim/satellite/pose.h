@@ -22,6 +22,8 @@ typedef struct bst_pose_view {
     bst_point2 *outline; /* silhouettes of occluders, counter-clockwise, from 2 * first_vertex */
     uint64_t *hiders;    /* by occluder: set of those that may hide some of it; for few occluders */
     int *outline_count;  /* corners of the silhouette; -1: not yet made */
+    bst_half_planes *sides;       /* of silhouettes, from BST_POSE_SIDES_AT; for few occluders */
+    int *side_blocks;             /* blocks of them; -1: not yet made */
     int *cell_first, *cell_items; /* occluders by cell of a grid, for models with many */
     int cells, cell_item_count, cell_item_capacity;
     double origin[2], step[2]; /* of the grid */
@@ -61,6 +63,9 @@ typedef struct bst_satellite_pose {
     int (*faces)[BST_SEPARATION_FACES]; /* by occluder: plane facets; -1: no more */
     bst_polygon_clip clip;
     bst_polygon_covers covers;
+    bst_point2 *plane;      /* by corner of a facet: see plane_corner */
+    int (*plane_corner)[2]; /* by facet: corners that are (1, 0) and (0, 1); corner 0 is (0, 0) */
+    bst_half_planes *sides; /* work memory: of one polygon */
 } bst_satellite_pose;
 
 /* Allocates a pose of a model, with all joints at their offsets.

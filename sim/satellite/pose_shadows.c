@@ -1,27 +1,12 @@
 /* What the bodies of a model hide of its facets. */
 #include <string.h>
 
-#include "sim/satellite/pose_view.h"
+#include "sim/satellite/polygon_cut.h"
+#include "sim/satellite/pose_target.h"
 #include "sim/satellite/separation.h"
 
 /* Room for the corners of a silhouette that was cut at faces: each cut adds at most one. */
 enum { SHADOW_CORNERS = 2 * BST_POLYGON_CORNERS_MAX };
-
-/* A facet, and what is left of it. */
-typedef struct target {
-    int facet, body; /* body: its occluder */
-    bool pieces;     /* pose->clip has what is left; else `left` outside of pose->covers */
-    bool whole;      /* nothing was removed, and the plane is not yet set */
-    bst_vec3 origin, normal, e1, e2;
-    /* corners in the plane: of the facet, or of what rims leave of it, with work memory */
-    bst_point2 left[2 * BST_POLYGON_CORNERS_MAX];
-    int left_count;
-    /* of the current view: */
-    bst_point2 seen[BST_POLYGON_CORNERS_MAX]; /* corners of the facet */
-    double bounds[6];
-    bool mapped;           /* the three members below are known */
-    bst_point2 zero, x, y; /* from the view's coordinates to the plane: zero + u x + v y */
-} target;
 
 void bst_pose_facet_axes(const bst_satellite_pose *p, int facet, bst_vec3 *origin, bst_vec3 *e1,
                          bst_vec3 *e2) {
@@ -32,62 +17,33 @@ void bst_pose_facet_axes(const bst_satellite_pose *p, int facet, bst_vec3 *origi
 }
 
 /* Sets the plane of the facet and starts with all of it. */
-static void start(bst_satellite_pose *p, target *t) {
+static void start(bst_satellite_pose *p, bst_pose_target *t) {
     const bst_satellite *s = p->satellite;
     const bst_facet *facet = &s->facets[t->facet];
+    bst_point2 corners[BST_POLYGON_CORNERS_MAX];
     t->whole = false;
     t->normal = p->normals[t->facet];
     bst_pose_facet_axes(p, t->facet, &t->origin, &t->e1, &t->e2);
-    t->left_count = facet->count;
     for (int i = 0; i < facet->count; i++) {
         bst_vec3 r = bst_vec3_sub(p->vertices[s->corner[facet->first + i]], t->origin);
-        t->left[i] = (bst_point2){bst_vec3_dot(r, t->e1), bst_vec3_dot(r, t->e2)};
+        corners[i] = (bst_point2){bst_vec3_dot(r, t->e1), bst_vec3_dot(r, t->e2)};
     }
-    p->covers.count = 0;
-    if (t->pieces) {
-        bst_polygon_clip_start(&p->clip, t->left, t->left_count);
-    }
+    bst_polygon_clip_start(&p->clip, corners, facet->count);
 }
 
 /* Removes all. */
-static void remove_all(bst_satellite_pose *p, target *t) {
+static void remove_all(bst_satellite_pose *p, bst_pose_target *t) {
     t->whole = false;
-    t->left_count = 0;
-    p->covers.count = 0;
     p->clip.piece_count = 0;
 }
 
-static bool is_gone(const bst_satellite_pose *p, const target *t) {
-    return !t->whole && (t->pieces ? bst_polygon_clip_is_empty(&p->clip) : t->left_count == 0);
-}
-
-/* Goes on with pieces where there are too many covers. */
-static void change_to_pieces(bst_satellite_pose *p, target *t) {
-    const bst_polygon_covers *c = &p->covers;
-    t->pieces = true;
-    bst_polygon_clip_start(&p->clip, t->left, t->left_count);
-    for (int i = 0; i < c->count; i++) {
-        bst_polygon_clip_subtract(&p->clip, c->points + c->first[i], c->first[i + 1] - c->first[i],
-                                  false);
-    }
-}
-
-/* Removes a convex polygon of the plane. */
-static void remove_polygon(bst_satellite_pose *p, target *t, const bst_point2 *points, int count) {
-    bst_point2 *to = t->pieces ? NULL : bst_polygon_covers_begin(&p->covers, count);
-    if (to) {
-        memcpy(to, points, (size_t)count * sizeof *to);
-        bst_polygon_covers_end(&p->covers, count);
-        return;
-    }
-    if (!t->pieces) {
-        change_to_pieces(p, t);
-    }
-    bst_polygon_clip_subtract(&p->clip, points, count, false);
+static bool is_gone(const bst_satellite_pose *p, const bst_pose_target *t) {
+    return !t->whole &&
+           (t->pieces ? bst_polygon_clip_is_empty(&p->clip) : t->left_count == 0 || t->overflow);
 }
 
 /* Coordinates in the facet's plane of a point moved along the view's direction into it. */
-static bst_point2 drop(const target *t, const bst_pose_view *v, bst_vec3 q) {
+static bst_point2 drop(const bst_pose_target *t, const bst_pose_view *v, bst_vec3 q) {
     bst_vec3 r = bst_vec3_sub(q, t->origin);
     double way = bst_vec3_dot(r, t->normal) / bst_vec3_dot(v->z, t->normal);
     r = bst_vec3_axpy(r, -way, v->z);
@@ -95,8 +51,8 @@ static bst_point2 drop(const target *t, const bst_pose_view *v, bst_vec3 q) {
 }
 
 /* Moves a polygon from the view's plane to that of the facet; the projection is affine. */
-static void move_to_plane(target *t, const bst_pose_view *v, const bst_point2 *from, int count,
-                          bst_point2 *to) {
+static void move_to_plane(bst_pose_target *t, const bst_pose_view *v, const bst_point2 *from,
+                          int count, bst_point2 *to) {
     if (!t->mapped) {
         bst_point2 x = drop(t, v, v->x), y = drop(t, v, v->y);
         t->zero = drop(t, v, (bst_vec3){0});
@@ -115,16 +71,16 @@ static void move_to_plane(target *t, const bst_pose_view *v, const bst_point2 *f
  * plane.
  *
  * Given:     outline  [corners] its silhouette in the plane */
-static void subtract_front(bst_satellite_pose *p, target *t, const bst_pose_view *v, int occluder,
-                           const bst_point2 *outline, int corners) {
+static void subtract_front(bst_satellite_pose *p, bst_pose_target *t, const bst_pose_view *v,
+                           int occluder, const bst_point2 *outline, int corners) {
     const bst_point2 *hull;
     bst_point2 moved[BST_POLYGON_CORNERS_MAX];
     int count = bst_pose_front(p, v, occluder, t->origin, t->normal, &hull);
     if (count == BST_POSE_ALL_IN_FRONT) {
-        remove_polygon(p, t, outline, corners);
+        bst_polygon_clip_subtract(&p->clip, outline, corners, false);
     } else if (count > 0) {
         move_to_plane(t, v, hull, count, moved);
-        remove_polygon(p, t, moved, count);
+        bst_polygon_clip_subtract(&p->clip, moved, count, false);
     }
 }
 
@@ -134,8 +90,8 @@ static void subtract_front(bst_satellite_pose *p, target *t, const bst_pose_view
  * Given:     q, n  a point and the normal of the face
  * Returned:  *count  corners that are left, 0: all of the facet is beyond the face
  *            true if the polygon was cut */
-static bool cut_at_face(const bst_satellite_pose *p, const target *t, bst_vec3 q, bst_vec3 n,
-                        bst_point2 *polygon, int *count) {
+static bool cut_at_face(const bst_satellite_pose *p, const bst_pose_target *t, bst_vec3 q,
+                        bst_vec3 n, bst_point2 *polygon, int *count) {
     const bst_satellite *s = p->satellite;
     const bst_facet *facet = &s->facets[t->facet];
     double face = bst_vec3_dot(q, n), low = INFINITY, high = -INFINITY, margin = 1e-9 * s->radius_m;
@@ -164,7 +120,7 @@ static bool cut_at_face(const bst_satellite_pose *p, const target *t, bst_vec3 q
 /* Subtracts an occluder that may be in front of and behind the facet's plane. A ray from a point
  * within its silhouette meets it unless the point is beyond one of its faces that face the light:
  * the ray leaves the body last through one of them. */
-static void subtract_by_faces(bst_satellite_pose *p, target *t, const bst_pose_view *v,
+static void subtract_by_faces(bst_satellite_pose *p, bst_pose_target *t, const bst_pose_view *v,
                               const bst_occluder *o, bst_polygon_place place, bst_point2 *polygon,
                               int count) {
     const bst_satellite *s = p->satellite;
@@ -185,12 +141,12 @@ static void subtract_by_faces(bst_satellite_pose *p, target *t, const bst_pose_v
     if (!cut && place == BST_POLYGON_WITHIN) {
         remove_all(p, t);
     } else if (count >= 3) {
-        remove_polygon(p, t, polygon, count);
+        bst_polygon_clip_subtract(&p->clip, polygon, count, false);
     }
 }
 
 /* Subtracts an occluder's silhouette from the facet. */
-static void subtract(bst_satellite_pose *p, target *t, int view, int occluder) {
+static void subtract(bst_satellite_pose *p, bst_pose_target *t, int view, int occluder) {
     const bst_satellite *s = p->satellite;
     const bst_pose_view *v = &p->views[view];
     const bst_occluder *o = &s->occluders[occluder];
@@ -218,7 +174,7 @@ static void subtract(bst_satellite_pose *p, target *t, int view, int occluder) {
     }
     move_to_plane(t, v, outline, n, moved);
     if (front) {
-        remove_polygon(p, t, moved, n);
+        bst_polygon_clip_subtract(&p->clip, moved, n, false);
     } else if (o->closed || o->vertex_count > BST_POLYGON_CORNERS_MAX) {
         subtract_by_faces(p, t, v, o, place, moved, n);
     } else {
@@ -226,8 +182,19 @@ static void subtract(bst_satellite_pose *p, target *t, int view, int occluder) {
     }
 }
 
+/* True if all corners of a facet of a shell are known to send light out through its rim. */
+static bool is_free(const bst_satellite_pose *p, const bst_pose_target *t, const bst_pose_view *v,
+                    int shell) {
+    const bst_facet *facet = &p->satellite->facets[t->facet];
+    bool free = p->satellite->occluders[t->body].shell == shell;
+    for (int i = 0; i < facet->count && free; i++) {
+        free = v->within_rim[p->satellite->corner[facet->first + i]];
+    }
+    return free;
+}
+
 /* Keeps what light reaches through the rim of a shell. */
-static void look_through_rim(bst_satellite_pose *p, target *t, int view, int index) {
+static void look_through_rim(bst_satellite_pose *p, bst_pose_target *t, int view, int index) {
     const bst_shell *shell = &p->satellite->shells[index];
     const bst_pose_view *v = &p->views[view];
     const bst_facet *facet = &p->satellite->facets[t->facet];
@@ -235,14 +202,11 @@ static void look_through_rim(bst_satellite_pose *p, target *t, int view, int ind
         remove_all(p, t);
         return;
     }
-    bool free = p->satellite->occluders[t->body].shell == index;
-    for (int i = 0; i < facet->count && free; i++) {
-        free = v->within_rim[p->satellite->corner[facet->first + i]];
-    }
     const bst_point2 *outline = v->flat + shell->first_rim;
     bst_polygon_place place =
-        free ? BST_POLYGON_WITHIN
-             : bst_polygon_place_of(t->seen, facet->count, outline, shell->rim_count);
+        is_free(p, t, v, index)
+            ? BST_POLYGON_WITHIN
+            : bst_polygon_place_of(t->seen, facet->count, outline, shell->rim_count);
     if (place == BST_POLYGON_WITHIN) {
         return;
     }
@@ -253,16 +217,9 @@ static void look_through_rim(bst_satellite_pose *p, target *t, int view, int ind
     if (t->whole) {
         start(p, t);
     }
-    bst_point2 moved[BST_POLYGON_CORNERS_MAX], work[2 * BST_POLYGON_CORNERS_MAX];
+    bst_point2 moved[BST_POLYGON_CORNERS_MAX];
     move_to_plane(t, v, outline, shell->rim_count, moved);
-    if (t->pieces) {
-        bst_polygon_clip_intersect(&p->clip, moved, shell->rim_count);
-    } else if (t->left_count + shell->rim_count <= 2 * BST_POLYGON_CORNERS_MAX) {
-        bst_point2 out[2 * BST_POLYGON_CORNERS_MAX];
-        t->left_count =
-            bst_polygon_intersection(t->left, t->left_count, moved, shell->rim_count, work, out);
-        memcpy(t->left, out, (size_t)t->left_count * sizeof *out);
-    }
+    bst_polygon_clip_intersect(&p->clip, moved, shell->rim_count);
 }
 
 /* True if the middle of a facet is inside a shell. */
@@ -283,23 +240,28 @@ static bool is_inside(const bst_satellite_pose *p, const bst_facet *facet, const
 }
 
 /* Removes what an occluder hides, if its bounds meet those of the facet. */
-static void try_occluder(bst_satellite_pose *p, target *t, int view, int occluder) {
+static void try_occluder(bst_satellite_pose *p, bst_pose_target *t, int view, int occluder) {
     const bst_facet *own = &p->satellite->facets[t->facet];
     int shell = p->satellite->occluders[occluder].shell;
     if ((occluder == own->occluder && !own->inside) ||
         !bst_pose_may_hide(p->views[view].bounds[occluder], t->bounds)) {
         return;
     }
-    if (shell >= 0 &&
-        (occluder == own->occluder || is_inside(p, own, &p->satellite->shells[shell]))) {
+    bool rim = shell >= 0 &&
+               (occluder == own->occluder || is_inside(p, own, &p->satellite->shells[shell]));
+    if (rim && t->pieces) {
         look_through_rim(p, t, view, shell);
-    } else {
+    } else if (rim) {
+        bst_pose_area_through_rim(p, t, view, shell, is_free(p, t, &p->views[view], shell));
+    } else if (t->pieces) {
         subtract(p, t, view, occluder);
+    } else {
+        bst_pose_area_subtract(p, t, view, occluder);
     }
 }
 
 /* Corners and bounds of the facet in a view. */
-static void set_view(const bst_satellite_pose *p, target *t, const bst_pose_view *v) {
+static void set_view(const bst_satellite_pose *p, bst_pose_target *t, const bst_pose_view *v) {
     const bst_facet *facet = &p->satellite->facets[t->facet];
     t->mapped = false;
     bst_pose_start_bounds(t->bounds);
@@ -311,7 +273,7 @@ static void set_view(const bst_satellite_pose *p, target *t, const bst_pose_view
 }
 
 /* Tries the occluders of the cells of the view's grid that the facet meets. */
-static void try_cells(bst_satellite_pose *p, target *t, int view) {
+static void try_cells(bst_satellite_pose *p, bst_pose_target *t, int view) {
     const bst_pose_view *v = &p->views[view];
     int stamp = ++p->seen_stamp;
     int x0 = bst_pose_cell(v, 0, t->bounds[0]), x1 = bst_pose_cell(v, 0, t->bounds[1]);
@@ -331,7 +293,7 @@ static void try_cells(bst_satellite_pose *p, target *t, int view) {
 }
 
 /* Removes what the first views do not see of a facet. */
-static void remove_hidden(bst_satellite_pose *p, target *t, int views) {
+static void remove_hidden(bst_satellite_pose *p, bst_pose_target *t, int views) {
     const bst_satellite *s = p->satellite;
     bool few = s->occluder_count <= BST_SEPARATION_BODIES;
     const bst_facet *facet = &s->facets[t->facet];
@@ -362,7 +324,7 @@ static void remove_hidden(bst_satellite_pose *p, target *t, int views) {
 
 double bst_pose_unshadowed(bst_satellite_pose *p, int index, int views, bool *whole) {
     const bst_facet *facet = &p->satellite->facets[index];
-    target t;
+    bst_pose_target t;
     t.facet = index;
     t.body = facet->occluder;
     t.pieces = t.whole = true;
@@ -373,22 +335,16 @@ double bst_pose_unshadowed(bst_satellite_pose *p, int index, int views, bool *wh
 
 double bst_pose_unshadowed_area(bst_satellite_pose *p, int index, int views) {
     const bst_facet *facet = &p->satellite->facets[index];
-    target t;
+    bst_pose_target t;
     t.facet = index;
     t.body = facet->occluder;
-    t.pieces = false;
+    t.pieces = t.overflow = false;
     t.whole = true;
     remove_hidden(p, &t, views);
     if (t.whole) {
         return facet->area_m2;
     }
-    if (!t.pieces) {
-        double area =
-            t.left_count > 0 ? bst_polygon_uncovered_area(&p->covers, t.left, t.left_count) : 0.0;
-        if (area >= 0.0) {
-            return area;
-        }
-        change_to_pieces(p, &t);
-    }
-    return bst_polygon_clip_area(&p->clip);
+    double area = t.overflow ? -1.0 : bst_pose_area_left(p, &t);
+    bool whole;
+    return area >= 0.0 ? area : bst_pose_unshadowed(p, index, views, &whole);
 }

@@ -31,6 +31,11 @@ static inline void bst_pose_add_to_bounds(const bst_pose_view *v, int vertex, do
     }
 }
 
+/* Half planes of an occluder's silhouette in a view, along its x and y. Returned: number of blocks
+ * (bst_half_planes_of); 0: too many corners. They belong to the pose, for a model with many
+ * occluders until the next call. */
+int bst_pose_sides(bst_satellite_pose *pose, int view, int occluder, const bst_half_planes **sides);
+
 /* Axis of a shell, body frame. */
 static inline bst_vec3 bst_pose_shell_axis(const bst_satellite_pose *p, int shell) {
     const bst_shell *s = &p->satellite->shells[shell];

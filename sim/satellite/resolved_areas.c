@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/satellite/polygon_covers.h"
+#include "sim/satellite/polygon_cut.h"
 #include "sim/satellite/resolved_faces.h"
 
 /* Cells across the view from a light. */

@@ -1,5 +1,6 @@
 /* Areas of shadows: intersections of polygons against pieces, silhouettes against hulls. */
 #include "sim/satellite/polygon_covers.h"
+#include "sim/satellite/polygon_cut.h"
 #include "tests/satellite/satellite_support.h"
 
 #define SQUARE(x_, y_, side_)                                               \
@@ -9,11 +10,25 @@
         }                                                                   \
     }
 
+/* Half planes of a polygon, one by one. */
+static int sides_of(const bst_point2 *points, int count, bst_half_plane *out) {
+    bst_half_planes blocks[8];
+    assert_int_equal(bst_half_planes_of(points, count, blocks),
+                     (count + BST_HALF_PLANES - 1) / BST_HALF_PLANES);
+    for (int i = 0; i < count; i++) {
+        const bst_half_planes *b = &blocks[i / BST_HALF_PLANES];
+        int k = i % BST_HALF_PLANES;
+        out[i] = (bst_half_plane){b->u[k], b->v[k], b->w[k]};
+    }
+    return count;
+}
+
 static void add(bst_polygon_covers *covers, const bst_point2 *points, int count) {
-    bst_point2 *to = bst_polygon_covers_begin(covers, count);
-    assert_non_null(to);
-    memcpy(to, points, (size_t)count * sizeof *to);
-    bst_polygon_covers_end(covers, count);
+    bst_half_plane sides[32];
+    for (int i = 0; i < sides_of(points, count, sides); i++) {
+        assert_true(bst_polygon_covers_add(covers, sides[i]));
+    }
+    assert_true(bst_polygon_covers_end(covers));
 }
 
 /* A polygon with its corners on an ellipse at random. */
@@ -67,7 +82,7 @@ static void intersections_agree_with_pieces(void **state) {
         bst_point2 p[20], whole[20];
         int n = random_polygon(&random, whole), wanted = i % BST_POLYGON_COVERS_MAX;
         bst_polygon_clip_start(&clip, whole, n);
-        covers.count = 0;
+        bst_polygon_covers_clear(&covers);
         for (int k = 0; k < wanted; k++) {
             int m = random_polygon(&random, p);
             bst_polygon_clip_subtract(&clip, p, m, false);
@@ -85,6 +100,49 @@ static void intersections_agree_with_pieces(void **state) {
     assert_true(given_up > 0 && given_up < 1000);
     bst_polygon_covers_free(&covers);
     bst_polygon_clip_free(&clip);
+}
+
+/* Half planes that do not cross a polygon do not change the area. */
+static void crossing_sides_suffice(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_polygon_covers covers;
+    bst_assert_ok(&ctx, bst_polygon_covers_create(&ctx, &covers));
+    uint64_t random = 9;
+    int apart = 0, within = 0, fewer = 0;
+    for (int i = 0; i < 4000; i++) {
+        bst_point2 p[20], whole[20];
+        bst_half_planes blocks[8];
+        bst_half_plane sides[32];
+        int n = random_polygon(&random, whole), m = random_polygon(&random, p), crossing[32];
+        double bounds[4] = {INFINITY, -INFINITY, INFINITY, -INFINITY};
+        for (int k = 0; k < n; k++) {
+            whole[k].x = 1.0 + 0.3 * (whole[k].x - 1.0);
+            whole[k].y = 1.0 + 0.3 * (whole[k].y - 1.0);
+            bounds[0] = fmin(bounds[0], whole[k].x), bounds[1] = fmax(bounds[1], whole[k].x);
+            bounds[2] = fmin(bounds[2], whole[k].y), bounds[3] = fmax(bounds[3], whole[k].y);
+        }
+        bst_polygon_covers_clear(&covers);
+        add(&covers, p, m);
+        double right = bst_polygon_uncovered_area(&covers, whole, n);
+        (void)sides_of(p, m, sides);
+        int found = bst_half_planes_crossing(blocks, bst_half_planes_of(p, m, blocks), whole, n,
+                                             bounds, crossing);
+        bst_polygon_covers_clear(&covers);
+        for (int k = 0; k < found; k++) {
+            assert_true(bst_polygon_covers_add(&covers, sides[crossing[k]]));
+        }
+        if (found >= 0) {
+            assert_true(bst_polygon_covers_end(&covers));
+        }
+        /* rounding of areas about 1 */
+        bst_assert_close(bst_polygon_uncovered_area(&covers, whole, n), right, 1e-14);
+        apart += found < 0;
+        within += found == 0;
+        fewer += found > 0 && found < m;
+    }
+    assert_true(apart > 100 && within > 100 && fewer > 1000);
+    bst_polygon_covers_free(&covers);
 }
 
 #define SATELLITE                                                                              \
@@ -159,6 +217,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(squares_have_closed_forms),
         cmocka_unit_test(intersections_agree_with_pieces),
+        cmocka_unit_test(crossing_sides_suffice),
         cmocka_unit_test(areas_agree_with_pieces),
         cmocka_unit_test(silhouettes_are_hulls),
     };
