@@ -7,13 +7,12 @@
 void bst_scene_tile_options(const bst_renderer_options *settings, int taps, int law_degree,
                             bool fourier, char *text, size_t bytes) {
     /* the Fourier path draws no stamps: one program for all of its PSFs */
-    int length =
-        snprintf(text, bytes, "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DTAPS=%d%s%s",
-                 settings->tile_width, settings->tile_height, fourier ? 16 : taps,
-                 fourier ? " -DFOURIER" : "",
-                 settings->group == 0   ? " -DONE_LANE"
-                 : settings->group == 1 ? " -DNEAR_CACHE"
-                                        : "");
+    int length = snprintf(text, bytes, "-cl-std=CL1.2 -DTILE_W=%d -DTILE_H=%d -DTAPS=%d%s%s",
+                          settings->tile_width, settings->tile_height, fourier ? 16 : taps,
+                          fourier ? " -DFOURIER" : "",
+                          settings->group == 0   ? " -DONE_LANE"
+                          : settings->group == 1 ? " -DNEAR_CACHE"
+                                                 : "");
     if (settings->group > 0) {
         length += snprintf(text + length, bytes - (size_t)length, " -DGROUP=%d", settings->group);
     }

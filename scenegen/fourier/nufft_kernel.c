@@ -51,7 +51,8 @@ static double leak(const bst_nufft_kernel *spread, const bst_nufft_kernel_band *
     quadrature q;
     double part[BST_SPREAD_BINS], seen = 0.0;
     make_quadrature(spread, &q);
-    /* high frequencies leak most: they tell soonest that the sum is too large, whatever its order */
+    /* high frequencies leak most: they tell soonest that the sum is too large, whatever its order
+     */
     for (int i = BST_SPREAD_BINS - 1; i >= 0 && seen * ROUNDING < enough; i--) {
         double nu = (i + 0.5) * band->step / density;
         part[i] = 0.0;

@@ -202,7 +202,7 @@ static void draw_stars(bench *b, double *x, double *y) {
  * sky. */
 static void alarms_between_stars(void **state) {
     (void)state;
-    enum { FRAMES = 8 };
+    enum { FRAMES = 4 };
     bench b = {.state = 0};
     double per_frame = 1000.0, *x = calloc(2 * STARS, sizeof *x), *y = x + STARS;
     assert_non_null(x);

@@ -25,7 +25,8 @@ static void make_scene(scene *s) {
                                         .samples = 501,
                                         .seed = 3};
     s->camera = scene_camera(W, H);
-    s->camera.dark_current_e_per_s = 5.0; /* the effects that test_cosmic_rays.c compiles for, too */
+    s->camera.dark_current_e_per_s =
+        5.0; /* the effects that test_cosmic_rays.c compiles for, too */
     s->camera.detector = (bst_detector_config){.prnu_rms = 0.01,
                                                .dsnu_rms = 0.2,
                                                .column_offset_rms_e = 1.0,

@@ -207,9 +207,8 @@ static void near_passes_are_drawn_where_they_cross(void **state) {
 
 /* Pixels and group of tiles other than the device's, of its form: work-items that render a tile
  * each, or work-groups (test_gpu_form.c compares the forms). */
-static const int other_tiles[2][4][3] = {
-    {{64, 1, 32}, {64, 4, 16}, {512, 64, 1}, {64, 16, 2}},
-    {{64, 1, 0}, {64, 4, 0}, {64, 16, 0}, {64, 3, 0}}};
+static const int other_tiles[2][4][3] = {{{64, 1, 32}, {64, 4, 16}, {512, 64, 1}, {64, 16, 2}},
+                                         {{64, 1, 0}, {64, 4, 0}, {64, 16, 0}, {64, 3, 0}}};
 
 /* Each shape of tiles is compiled, for seconds: the others in the slow form. Tiles of one row tell
  * most: they find their nodes by the boxes that hold every row of every stamp. */

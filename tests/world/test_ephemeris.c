@@ -137,7 +137,7 @@ typedef struct answer {
     bool there;
 } answer;
 
-enum { ASKED_BODIES = 30, ASKED_TIMES = 30 };
+enum { ASKED_BODIES = 30, ASKED_TIMES = 15 };
 
 static double asked_time(int k) {
     return k % 2 ? 3.7 * k : -7000 + 3 * DAY * drawn(k, 11);
@@ -263,7 +263,7 @@ static void a_decay_that_is_ahead_changes_no_table(void **state) {
                               .mean_motion_radpmin = 16.46015938 * 2 * BST_PI / 1440};
     set_orbit(&ctx, world, &set, &world->objects[0].orbit);
     int found = 0;
-    for (double t = 1600; t < 4000; t += 24) {
+    for (double t = 1600; t < 4000; t += 48) {
         bst_vec3 first = {0, 0, 0}, r, v;
         renew(&ctx, world);
         (void)bst_ephemeris_places(world->ephemeris, t, &first.x, &first.y, &first.z);
@@ -276,7 +276,7 @@ static void a_decay_that_is_ahead_changes_no_table(void **state) {
         }
         found += isfinite(first.x) && first.x != 0.0;
     }
-    assert_in_range(found, 33, 99); /* some before it, some after it */
+    assert_in_range(found, 16, 49); /* some before it, some after it */
     bst_world_free(world);
 }
 
@@ -356,7 +356,7 @@ static bool seen(bst_ctx *ctx, const bst_world *world, bst_world_view *view, int
 static void no_object_is_missed(void **state) {
     (void)state;
     bst_ctx ctx = {0};
-    enum { OBJECTS = 120, QUERIES = 80 };
+    enum { OBJECTS = 120, QUERIES = 40 };
     bst_world *world = populated(OBJECTS, 3.0);
     family own = {"own", 760, 790, 98.4};
     bst_elements home = elements_of(&own, 1000);
