@@ -311,6 +311,9 @@ static bst_status describe_frame(bst_ctx *ctx, bst_view_run *run, bst_view_senso
     if (f->fits_index >= 0) {
         add_header(run, s, f->fits_index, node);
     }
+    if (!cJSON_HasObjectItem(node, "wcs")) {
+        BST_TRY(add_recorded_wcs(ctx, run, s, f, node));
+    }
     add_names(run, node);
     BST_TRY(
         add_rows(ctx, run, s, f, truth, f->id, add_truth, cJSON_AddArrayToObject(node, "truth")));
