@@ -101,19 +101,6 @@ static moments moments_of_frame(fixture *f, int64_t id) {
     return moments_of(values, n);
 }
 
-static void dark_current_doubles(void **state) {
-    fixture *f = open_with(state, 0.0, 0.0);
-    f->camera.dark_current_e_per_s = 3.0;
-    bst_detector_config *d = &f->camera.detector;
-    d->reference_temperature_c = 20.0;
-    d->temperature_c = 33.0; /* two doublings */
-    bst_assert_close(bst_camera_dark_e_per_s(&f->camera), 12.0, 1e-12);
-    d->temperature_c = 7.0;
-    bst_assert_close(bst_camera_dark_e_per_s(&f->camera), 0.75, 1e-12);
-    *d = (bst_detector_config){0};
-    bst_assert_close(bst_camera_dark_e_per_s(&f->camera), 3.0, 0.0);
-}
-
 /* The mean of many flats is the map; the map has its RMS, dead pixels and columns. */
 static void response_differs_from_pixel_to_pixel(void **state) {
     static float gain[PIXELS];
@@ -589,7 +576,6 @@ static int close_device(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(dark_current_doubles),
         cmocka_unit_test(response_differs_from_pixel_to_pixel),
         cmocka_unit_test(dark_current_differs_from_pixel_to_pixel),
         cmocka_unit_test(maps_come_from_files),

@@ -591,13 +591,10 @@ int main(int argc, char **argv) {
         cmocka_unit_test(streaks_without_end_are_refused),
         cmocka_unit_test(wrong_requests_and_cameras_are_refused),
     };
-    const struct CMUnitTest slow[] = {
-        cmocka_unit_test(bytes_do_not_depend_on_how_they_are_made),
-        cmocka_unit_test(light_does_not_depend_on_tiles),
-    };
-    if (argc > 1 && strcmp(argv[1], "slow") == 0) {
-        frame_shapes = 4;
-        return cmocka_run_group_tests(slow, open_device, close_device);
-    }
-    return cmocka_run_group_tests(tests, open_device, close_device);
+    const struct CMUnitTest slow[] = {cmocka_unit_test(bytes_do_not_depend_on_how_they_are_made),
+                                      cmocka_unit_test(light_does_not_depend_on_tiles)};
+    bool is_slow = argc > 1 && strcmp(argv[1], "slow") == 0;
+    frame_shapes = is_slow ? 4 : frame_shapes;
+    return is_slow ? cmocka_run_group_tests(slow, open_device, close_device)
+                   : cmocka_run_group_tests(tests, open_device, close_device);
 }
