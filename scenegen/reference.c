@@ -143,8 +143,9 @@ static bst_status render_gaussian(bst_ctx *ctx, const bst_camera *camera, double
             /* a source that only touches the window needs no 1e-9 accuracy of its faint tail */
             peak = 1e-9 * sources[i].electrons_per_s * track->time_s[track->count - 1];
             for (size_t p = 0; p < pixels; p++) {
-                change = fmax(change, fabs(fine[p] - coarse[p]));
-                peak = fmax(peak, fine[p]);
+                double step = fabs(fine[p] - coarse[p]);
+                change = step > change ? step : change; /* fmax is a call */
+                peak = fine[p] > peak ? fine[p] : peak;
             }
         }
         for (size_t p = 0; p < pixels; p++) {

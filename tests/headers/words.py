@@ -42,10 +42,14 @@ def main():
     if len(names) < 300:
         sys.exit(f"only {len(names)} files found: run this from the root of the sources")
     patterns = [(re.compile(rf"\b({pattern})\b", re.I), term) for pattern, term in WORDS.items()]
+    any_word = re.compile(rf"\b(?:{'|'.join(f'(?:{pattern})' for pattern in WORDS)})\b", re.I)
     wrong = []
     for name in names:
         with open(name, encoding="utf-8") as file:
-            for number, line in enumerate(file, 1):
+            text = file.read()
+            if not any_word.search(text):  # a fifth of the time of the patterns line by line
+                continue
+            for number, line in enumerate(text.split("\n"), 1):
                 for pattern, term in patterns:
                     if name.startswith("tests/") and TEST_NAMES in pattern.pattern:
                         continue

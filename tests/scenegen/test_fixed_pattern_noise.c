@@ -92,8 +92,21 @@ static void dark_current_of_pixels(void **state) {
     bst_assert_close(sqrt(dex2 / hot), 0.3, 4.0 * 0.3 / sqrt(2.0 * hot));
 }
 
+static void dark_current_doubles(void **state) {
+    (void)state;
+    bst_camera camera = {.dark_current_e_per_s = 3.0,
+                         .detector = {.dark_doubling_k = 6.5, .reference_temperature_c = 20.0}};
+    camera.detector.temperature_c = 33.0; /* two doublings */
+    bst_assert_close(bst_camera_dark_e_per_s(&camera), 12.0, 1e-12);
+    camera.detector.temperature_c = 7.0;
+    bst_assert_close(bst_camera_dark_e_per_s(&camera), 0.75, 1e-12);
+    camera.detector = (bst_detector_config){0};
+    bst_assert_close(bst_camera_dark_e_per_s(&camera), 3.0, 0.0);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(dark_current_doubles),
         cmocka_unit_test(offsets_of_columns_and_rows),
         cmocka_unit_test(dark_current_of_pixels),
     };

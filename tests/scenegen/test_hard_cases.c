@@ -124,18 +124,18 @@ static void a_full_turn_about_the_boresight(void **state) {
 
 /* The field sweeps a great circle: each star crosses in a millionth of the exposure. */
 static void a_full_turn_across_the_sky(void **state) {
-    bst_scene_source stars[4];
+    bst_scene_source stars[2];
     bst_camera camera = scene_camera(160, 128);
-    for (int i = 0; i < 4; i++) {
+    for (int i = 0; i < 2; i++) {
         /* around the circle that the boresight follows, beside each other */
-        double a = 0.5 + 1.5 * i, off = (i - 1.5) * 20.0 * bst_camera_scale_rad(&camera);
+        double a = 0.5 + 3.0 * i, off = (i - 0.5) * 40.0 * bst_camera_scale_rad(&camera);
         stars[i] =
             (bst_scene_source){.kind = BST_SOURCE_STAR,
                                .apparent_mid = bst_vec3_unit((bst_vec3){off, sin(a), cos(a)}),
                                .electrons_per_s = 1e8};
     }
     scene_track t = turning((bst_vec3){1, 0, 0}, full_turn, 721, 0.5);
-    hard_case c = make_case(&t.track, stars, 4);
+    hard_case c = make_case(&t.track, stars, 2);
     check(*state, &c);
     scene_track_free(&t);
 }

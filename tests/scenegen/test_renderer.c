@@ -309,9 +309,10 @@ static void light_does_not_depend_on_tiles(void **state) {
                             .sources = stars,
                             .count = STARS,
                             .background_e = 3.0};
-    static const int vectors[4][3] = {{0, 0, 0}, {64, 1, 32}, {64, 2, 16}, {64, 64, 1}},
-                     lanes[4][3] = {{0, 0, 0}, {64, 1, 0}, {64, 3, 0}, {64, 16, 0}};
-    for (int i = 0; i < 4; i++) {
+    enum { SHAPES = 4 };
+    static const int vectors[SHAPES][3] = {{0, 0, 0}, {64, 1, 32}, {64, 2, 16}, {64, 64, 1}},
+                     lanes[SHAPES][3] = {{0, 0, 0}, {64, 1, 0}, {64, 3, 0}, {64, 16, 0}};
+    for (int i = 0; i < SHAPES; i++) {
         const int(*tiles)[3] = bst_device_is_cpu(f->device) ? vectors : lanes;
         bst_renderer_options options = bst_renderer_default_options();
         options.tile_width = tiles[i][0];
@@ -592,9 +593,8 @@ int main(int argc, char **argv) {
     };
     const struct CMUnitTest slow[] = {cmocka_unit_test(bytes_do_not_depend_on_how_they_are_made),
                                       cmocka_unit_test(light_does_not_depend_on_tiles)};
-    if (argc > 1 && strcmp(argv[1], "slow") == 0) {
-        frame_shapes = 4;
-        return cmocka_run_group_tests(slow, open_device, close_device);
-    }
-    return cmocka_run_group_tests(tests, open_device, close_device);
+    bool is_slow = argc > 1 && strcmp(argv[1], "slow") == 0;
+    frame_shapes = is_slow ? 4 : frame_shapes;
+    return is_slow ? cmocka_run_group_tests(slow, open_device, close_device)
+                   : cmocka_run_group_tests(tests, open_device, close_device);
 }
