@@ -199,7 +199,7 @@ class Exported(unittest.TestCase):
     def test_orbits_of_what_was_seen(self):
         """Of a large catalogue only what came into a field, and what is asked for."""
         made, out = os.path.join(runs.scratch(), "many"), self.out()
-        runs.run("scenarios/constellation_quick.json", made, duration=20)
+        runs.run("scenarios/constellation_quick.json", made, runs.DARK, duration=20)
         rows = runs.database(made).execute
         seen = {row[0] for row in rows(
             "SELECT o.name FROM truth t JOIN objects o ON o.id = t.id"

@@ -50,7 +50,7 @@ class SameResults(unittest.TestCase):
         runs.run(scenario, inside, runs.NO_FRAMES, duration=SECONDS)
         self.assertGreater(len(boresight.read_run(inside).table("tracks")["track_id"]), 1)
         tcp = f"tcp://127.0.0.1:{free_port()}"
-        for address, parts, memory in ((tcp, "control", []), (ipc(), "tracker", []),
+        for address, parts, memory in ((ipc(), "tracker", []),
                                        (ipc(), "imgproc", ["--shared-memory"]),
                                        (tcp, "imgproc,tracker,control", [])):
             out = runs.scratch() + "/outside"
