@@ -21,7 +21,7 @@ set(bst_costs
   engine_executor 15 bad_scenario 14 e2e_install 14 imgproc_streaks 14
   python_misuse 12 e2e_earth_in_field 11 io_fits_reader 11 e2e_outputs 11
   imgproc_archive 11 e2e_figures 11 scenegen_resolved_body 10 scenegen_gpu_form 10
-  e2e_hostile_input 10 scenegen_vignetting 9 headers_compile_alone 9 e2e_faint_sky 9
+  e2e_view 19 e2e_hostile_input 10 scenegen_vignetting 9 headers_compile_alone 9 e2e_faint_sky 9
   imgproc_false_alarms 9 io_fits 9 gimbal_attitude_filter 9 world_field 9
   scenegen_jitter 9 e2e_link_keys 8 e2e_former_names 8 tracker_orbit 8
   e2e_study_populations 8 e2e_orbit_files 8 e2e_propagate 8)
