@@ -16,7 +16,7 @@ set(bst_costs
   control_archive 8  imgproc_statistics 8  python_program_plugins 8  scenegen_extended_source 8
   headers_words 8  python_examples 8  e2e_repeat 8  e2e_manoeuvre 8  e2e_pd 8  e2e_new 8
   e2e_skewed_frames 8  e2e_camera 8  e2e_propagate 8  e2e_plugins 8  obsgen_streak_detection 8
-  e2e_pacing 12  e2e_cube_parts 7  e2e_recorded 7  control_loop 7  e2e_earth_in_field 7
+  e2e_pacing 12  e2e_view 12  e2e_cube_parts 7  e2e_recorded 7  control_loop 7  e2e_earth_in_field 7
   e2e_threads 7  e2e_info 7  e2e_figures 7  e2e_orbit_files 7  e2e_boxes 6  e2e_rules 6
   e2e_skewed_exports 6  e2e_random_scenes 6  e2e_generator 6  obsgen_deblend 6  python_runs 6
   scenegen_gpu_form 6  e2e_hostile_folders 6  e2e_inspection 6  scenegen_flags 6

@@ -38,10 +38,12 @@ def digests(folder):
 
 class Viewer:
     """A running `boresight view`."""
+    running = []  # to be ended where a test failed
 
     def __init__(self, folder, *words):
         self.process = subprocess.Popen([runs.BORESIGHT, "view", folder, "--no-browser", *words],
                                         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.running.append(self.process)
         self.url = self.process.stdout.readline().strip()
         match = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/([0-9a-f]{32})/", self.url)
         if not match:
@@ -303,8 +305,16 @@ class View(Checks):
         self.assertEqual([one for one in listening if one.endswith(f":{self.viewer.port:04X}")], [f"0100007F:{self.viewer.port:04X}"])
 
 
-def tearDownModule():
+def end_all():
+    """Ends the viewers that failed tests left, and removes the folders."""
+    for process in Viewer.running:
+        process.kill()
+        process.communicate()
     runs.clean()
+
+
+def tearDownModule():
+    end_all()
 
 
 if __name__ == "__main__":

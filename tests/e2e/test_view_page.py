@@ -181,7 +181,7 @@ class Page(unittest.TestCase):
 
 
 def tearDownModule():
-    runs.clean()
+    test_view.end_all()
 
 
 if __name__ == "__main__":

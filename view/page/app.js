@@ -267,6 +267,12 @@ class App {
         span.dir = name === 'when' ? 'ltr' : 'auto';
         button.append(span);
       }
+      if (this.run.sensors.length > 1) { // which of them
+        const source = document.createElement('span');
+        source.className = 'source';
+        source.textContent = `${event.source}: `;
+        button.lastElementChild.prepend(source);
+      }
       button.type = 'button';
       button.title = event.source;
       button.addEventListener('click', () => this.seek(event.time_s));
