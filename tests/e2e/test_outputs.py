@@ -29,12 +29,14 @@ class Outputs(unittest.TestCase):
              "new": ["--observer-tle", "{elements}"],
              "lightcurve": ["{scenario}", "--duration", "0"], "turntable": ["{satellite}"],
              "study": ["{study}"], "process": ["{run}", "--map", "boresight"],
+             "characterize": ["--map", "boresight", "--bias", "{run}/frames.fits"],
              "score": ["{run}", "--truth", "{run}"], "pd": ["{scenario}", "--trials", "1"]}
     # options that name what is read
     INPUTS = {("run", "replay"), ("run", "restore"), ("run", "link-keys"), ("serve", "link-keys"),
               ("schema", "plugin"), ("orbit", "observer"), ("propagate", "elements"), ("propagate", "tle"), ("propagate", "eop"),
               ("calibrate-obsgen", "calibration"), ("bench", "tle"), ("bench", "scenario"),
-              ("study", "site"), ("lightcurve", "satellite"), ("lightcurve", "elements")}
+              ("characterize", "bias"), ("characterize", "dark"), ("characterize", "flat"), ("characterize", "extends"),
+              ("score", "truth"), ("study", "site"), ("lightcurve", "satellite"), ("lightcurve", "elements")}
 
     @classmethod
     def setUpClass(cls):

@@ -88,7 +88,7 @@ static bst_sensor_estimate fit_ramp(dark_signal *d, bst_sensor_estimate *slope) 
                 d->scratch[n++] = d->scratch[x];
             }
         }
-        qsort(d->scratch, n, sizeof *d->scratch, bst_compare_floats);
+        bst_sort_floats(d->scratch, n);
         medians[y] = bst_sorted_median(d->scratch, n);
     }
     bst_sensor_estimate intercept = *slope;
@@ -181,7 +181,7 @@ static void measure_percentiles(dark_signal *d, double per_s) {
             d->scratch[n++] = d->map[i];
         }
     }
-    qsort(d->scratch, n, sizeof *d->scratch, bst_compare_floats);
+    bst_sort_floats(d->scratch, n);
     for (int i = 0; i < BST_SENSOR_PERCENTILES && n > 0; i++) {
         size_t at = (size_t)(bst_sensor_percentiles[i] / 100.0 * (double)(n - 1) + 0.5);
         out->percentiles_e_per_s[i] = d->scratch[at] * per_s;
