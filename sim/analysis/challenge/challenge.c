@@ -79,7 +79,7 @@ static bst_status run_scenario(bst_ctx *ctx, const bst_challenge_request *q) {
 /* Frames as those who take part get them. */
 static const char public_sql[] =
     "SELECT exposure_id / 5 + 1 AS sequence, exposure_id % 5 + 1 AS frame, fits_index + 1 AS "
-    "extension, start_utc, exposure_s FROM frames ORDER BY exposure_id";
+    "hdu, start_utc, exposure_s FROM frames ORDER BY exposure_id";
 /* The truth: every frame has a line, without a position if nothing is in it. */
 static const char truth_sql[] =
     "SELECT e.exposure_id / 5 + 1 AS sequence, e.exposure_id % 5 + 1 AS frame, t.x_centroid_px AS "
