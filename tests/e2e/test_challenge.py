@@ -23,7 +23,7 @@ class Challenge(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.out = runs.scratch() + "/set"
-        result = call("challenge", "7", "--out", cls.out, "--sequences", "2", "--size-px", "128", "--catalogue",
+        result = call("challenge", "1", "--out", cls.out, "--sequences", "2", "--size-px", "128", "--catalogue",
                       "embedded", "--threads", "1")
         assert (result.returncode, result.stderr) == (0, ""), result.stderr
         with open(cls.out + "/truth/truth.csv", encoding="utf-8") as file:
@@ -60,9 +60,13 @@ class Challenge(unittest.TestCase):
         self.assertEqual(scored["frames"], 10)
         self.assertEqual(scored["truths"], sum(row["x"] != "" for row in self.truth))
         self.assertEqual(scored["figures"]["f1"]["value"], 1)
+        result = call("score", self.out + "/truth/truth.csv", "--truth", self.out + "/truth/truth.csv", "--json", "-",
+                      "--least-snr", "30")
+        self.assertEqual(json.loads(result.stdout)["optional_truths"],
+                         sum(row["x"] != "" and float(row["snr"]) < 30 for row in self.truth))
 
     def test_a_set_is_not_replaced(self):
-        result = call("challenge", "7", "--out", self.out)
+        result = call("challenge", "1", "--out", self.out)
         self.assertEqual(result.returncode, 1)
         self.assertIn("is there already; give a new folder", result.stderr)
 

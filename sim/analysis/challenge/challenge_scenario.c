@@ -196,7 +196,7 @@ static cJSON *scenario_json(drawing *d, cJSON *camera) {
         cJSON_AddItemToArray(objects, object);
         cJSON_AddStringToObject(object, "name", text);
         cJSON_AddItemToObject(object, "orbit", orbit_json(text));
-        cJSON_AddNumberToObject(object, "area_m2", log_uniform(d, 0.05, 20.0));
+        cJSON_AddNumberToObject(object, "area_m2", log_uniform(d, 1.0, 30.0));
         cJSON_AddNumberToObject(object, "albedo", 0.2);
     }
     cJSON *observer = cJSON_CreateObject(), *sensor = cJSON_CreateObject();

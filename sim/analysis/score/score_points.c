@@ -138,6 +138,9 @@ bst_status bst_score_points_read(bst_ctx *ctx, const char *path,
     if (status == BST_OK && selection->what != BST_SCORE_TRUTH) {
         leave_out_weak(out, selection->least_score);
     }
+    for (int i = 0; selection->what == BST_SCORE_TRUTH && i < out->count; i++) {
+        out->items[i].optional = out->items[i].score < selection->least_snr;
+    }
     sort_points(out);
     return status;
 }
