@@ -54,7 +54,7 @@ class Characterize(unittest.TestCase):
             json.dump({"extends": os.path.abspath(runs.STARE), "seed": hex(seed), "set": values}, file)
         cal = os.path.join(folder, "cal")
         kinds = ("bias", "dark", "flat")
-        result = call("calframes", scenario, "--out", cal, "--exposure", "40", "--threads", "1",
+        result = call("calframes", scenario, "--out", cal, "--exposure", "8", "--threads", "1",
                       *(word for kind in kinds for word in ("--" + kind, str(frames))),
                       "--set", "/world/star_catalogue=embedded")
         self.assertEqual(result.returncode, 0, result.stderr)

@@ -7,7 +7,7 @@
 #include "sim/core/compare.h"
 
 /* Clipping of the dark current's core: hot pixels are beyond it. */
-static const double CLIP = 6.0;
+static const double CLIP = 8.0;
 /* Columns below this share of the median dark signal are shielded. */
 static const double SHIELDED = 0.75;
 /* Least significance of a ramp, and of a median signal for finding shielded columns. */
