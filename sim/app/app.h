@@ -38,6 +38,8 @@ int bst_cmd_process(int argc, char **argv);
 int bst_cmd_solve(int argc, char **argv);
 /* boresight score: detections or tracks against truth. */
 int bst_cmd_score(int argc, char **argv);
+/* boresight challenge: random frames with hidden truth. */
+int bst_cmd_challenge(int argc, char **argv);
 /* boresight characterize: a detector block from bias, dark and flat frames. */
 int bst_cmd_characterize(int argc, char **argv);
 /* boresight check: checks a scenario without running it. */

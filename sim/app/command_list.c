@@ -19,6 +19,7 @@ static const bst_app_command commands[] = {
     {"process", bst_cmd_process, "frames of other programs through the onboard chain"},
     {"solve", bst_cmd_solve, "where a frame looks, from its stars alone"},
     {"score", bst_cmd_score, "detections or tracks against truth or annotations"},
+    {"challenge", bst_cmd_challenge, "random frames with hidden truth, for detectors to find"},
     {"check", bst_cmd_check, "validate a scenario and print it with every default written out"},
     {"loop", bst_cmd_loop, "margins and predicted pointing of a scenario's control loops"},
     {"lightcurve", bst_cmd_lightcurve,

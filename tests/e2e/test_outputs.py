@@ -29,12 +29,15 @@ class Outputs(unittest.TestCase):
              "new": ["--observer-tle", "{elements}"],
              "lightcurve": ["{scenario}", "--duration", "0"], "turntable": ["{satellite}"],
              "study": ["{study}"], "process": ["{run}", "--map", "boresight"],
+             "challenge": ["1"],
+             "characterize": ["--map", "boresight", "--bias", "{run}/frames.fits"],
              "score": ["{run}", "--truth", "{run}"], "pd": ["{scenario}", "--trials", "1"]}
     # options that name what is read
     INPUTS = {("run", "replay"), ("run", "restore"), ("run", "link-keys"), ("serve", "link-keys"),
               ("schema", "plugin"), ("orbit", "observer"), ("propagate", "elements"), ("propagate", "tle"), ("propagate", "eop"),
               ("calibrate-obsgen", "calibration"), ("bench", "tle"), ("bench", "scenario"),
-              ("study", "site"), ("lightcurve", "satellite"), ("lightcurve", "elements")}
+              ("characterize", "bias"), ("characterize", "dark"), ("characterize", "flat"), ("characterize", "extends"),
+              ("score", "truth"), ("study", "site"), ("lightcurve", "satellite"), ("lightcurve", "elements")}
 
     @classmethod
     def setUpClass(cls):
@@ -111,7 +114,7 @@ class Outputs(unittest.TestCase):
             os.symlink(read, soft)
             os.link(read, hard)
             for path in (read, soft, hard):
-                if command not in ("bench", "link-keys"):  # which read none of these
+                if command not in ("bench", "challenge", "link-keys"):  # which read none of these
                     self.refused(command, name, path, f"--{name} {path}: ")
 
     def test_files_that_the_scenario_is_made_of(self):

@@ -1,7 +1,9 @@
 #include "sim/analysis/characterize/clipped_moments.h"
 
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "sim/core/compare.h"
 
@@ -10,6 +12,40 @@ static const double SIGMA_PER_MAD = 1.482602218505602;
 
 double bst_sorted_median(const float *v, size_t n) {
     return n == 0 ? NAN : 0.5 * ((double)v[(n - 1) / 2] + (double)v[n / 2]);
+}
+
+/* Bits of a number so that the order of whole numbers is that of the numbers. */
+static uint32_t key_of(float value) {
+    uint32_t word;
+    memcpy(&word, &value, sizeof word);
+    return word ^ (word >> 31 ? 0xffffffffU : 0x80000000U);
+}
+
+/* Sorts by a byte of the keys, from `from` to `to`. */
+static void sort_by_byte(const float *from, float *to, size_t n, int shift) {
+    size_t places[257] = {0};
+    for (size_t i = 0; i < n; i++) {
+        places[(key_of(from[i]) >> shift & 255U) + 1]++;
+    }
+    for (int k = 0; k < 256; k++) {
+        places[k + 1] += places[k];
+    }
+    for (size_t i = 0; i < n; i++) {
+        to[places[key_of(from[i]) >> shift & 255U]++] = from[i];
+    }
+}
+
+void bst_sort_floats(float *values, size_t count) {
+    float *other = count > 64 ? malloc(count * sizeof *other) : NULL;
+    if (!other) {
+        qsort(values, count, sizeof *values, bst_compare_floats);
+        return;
+    }
+    sort_by_byte(values, other, count, 0);
+    sort_by_byte(other, values, count, 8);
+    sort_by_byte(values, other, count, 16);
+    sort_by_byte(other, values, count, 24);
+    free(other);
 }
 
 /* Sorts values after moving those that are NAN behind the others; returns the number of others. */
@@ -22,7 +58,7 @@ static size_t sort_finite(float *v, size_t n) {
             v[kept++] = value;
         }
     }
-    qsort(v, kept, sizeof *v, bst_compare_floats);
+    bst_sort_floats(v, kept);
     return kept;
 }
 

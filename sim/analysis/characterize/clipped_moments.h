@@ -17,18 +17,21 @@ typedef struct bst_clipped_moments {
 } bst_clipped_moments;
 
 /* Mean and variance of values within `clip` standard deviations of their mean, iterated from median
- * and scaled median absolute deviation until the limits stay.
+ * and quartiles until the limits stay.
  *
  * Given:     values  [count], sorted here; NAN is skipped
  *            clip    5: a normal distribution loses 6e-7 of its values, and 2e-5 of its variance */
 bst_clipped_moments bst_clipped_moments_of(float *values, size_t count, double clip);
 
-/* Scaled median absolute deviation from the median: the standard deviation of normal values. Whole
- * numbers count as spread evenly over +-1/2.
+/* Standard deviation of normal values from their quartiles. Whole numbers count as spread evenly
+ * over +-1/2.
  *
  * Given:     values  [count], sorted here
  * Returned:  NAN without values */
 double bst_robust_sigma(float *values, size_t count);
+
+/* Sorts numbers, none of them NAN, ascending, in time proportional to their number. */
+void bst_sort_floats(float *values, size_t count);
 
 /* Median of sorted values; NAN without any. */
 double bst_sorted_median(const float *values, size_t count);

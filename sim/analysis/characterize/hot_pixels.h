@@ -42,7 +42,7 @@ typedef struct bst_charge_trail {
 /* Stacks the neighbourhoods of isolated hot pixels.
  *
  * Given:     map    [height][width] charge over the level around, in any unit; NAN: not used
- *            least  smallest charge of a hot pixel, 12 standard deviations of the map or more
+ *            least  smallest charge of a hot pixel, 20 standard deviations of the map or more
  *            most   largest, below saturation
  * Returned:  NAN estimates with fewer than 50 hot pixels
  * Notes:     Profiles are medians, which other hot pixels nearby do not shift; uncertainties from

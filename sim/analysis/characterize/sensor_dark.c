@@ -7,13 +7,14 @@
 #include "sim/core/compare.h"
 
 /* Clipping of the dark current's core: hot pixels are beyond it. */
-static const double CLIP = 6.0;
+static const double CLIP = 8.0;
 /* Columns below this share of the median dark signal are shielded. */
 static const double SHIELDED = 0.75;
 /* Least significance of a ramp, and of a median signal for finding shielded columns. */
 static const double CERTAIN = 5.0;
-/* Charge of hot pixels whose trails are measured, in standard deviations of the core. */
-static const double TRAIL = 12.0;
+/* Charge of hot pixels whose trails are measured, in half distances of the 16th and the 84th
+ * percentile, which hot pixels do not widen. */
+static const double TRAIL = 20.0;
 /* Hot pixels lie beyond this quantile of the core's lognormal law, in standard deviations: of a
  * million pixels 0.3 that are not hot. */
 static const double HOT = 5.0;
@@ -88,7 +89,7 @@ static bst_sensor_estimate fit_ramp(dark_signal *d, bst_sensor_estimate *slope) 
                 d->scratch[n++] = d->scratch[x];
             }
         }
-        qsort(d->scratch, n, sizeof *d->scratch, bst_compare_floats);
+        bst_sort_floats(d->scratch, n);
         medians[y] = bst_sorted_median(d->scratch, n);
     }
     bst_sensor_estimate intercept = *slope;
@@ -181,7 +182,7 @@ static void measure_percentiles(dark_signal *d, double per_s) {
             d->scratch[n++] = d->map[i];
         }
     }
-    qsort(d->scratch, n, sizeof *d->scratch, bst_compare_floats);
+    bst_sort_floats(d->scratch, n);
     for (int i = 0; i < BST_SENSOR_PERCENTILES && n > 0; i++) {
         size_t at = (size_t)(bst_sensor_percentiles[i] / 100.0 * (double)(n - 1) + 0.5);
         out->percentiles_e_per_s[i] = d->scratch[at] * per_s;
@@ -218,18 +219,20 @@ static void measure_hot(dark_signal *d, const bst_clipped_moments *core, double 
                             "below the limit";
     out->method[BST_SENSOR_HOT_FRACTION] = out->method[BST_SENSOR_HOT_MEDIAN] =
         out->method[BST_SENSOR_HOT_SPREAD] = how;
+    double median = out->percentiles_e_per_s[2] / per_s;
+    double spread = 0.5 * (out->percentiles_e_per_s[3] - out->percentiles_e_per_s[1]) / per_s;
     for (size_t i = 0; i < pixels; i++) {
-        d->scratch[i] = d->map[i] - (float)core->mean;
+        d->scratch[i] = d->map[i] - (float)median;
     }
     double saturated = 0.9 * 65535.0 - out->figures[BST_SENSOR_OFFSET].value;
-    out->trail = bst_charge_trail_measure(d->scratch, out->width, out->height,
-                                          TRAIL * sqrt(core->variance), saturated);
+    out->trail =
+        bst_charge_trail_measure(d->scratch, out->width, out->height, TRAIL * spread, saturated);
     out->figures[BST_SENSOR_PARALLEL_TRAIL] = out->trail.parallel;
     out->figures[BST_SENSOR_SERIAL_TRAIL] = out->trail.serial;
     out->method[BST_SENSOR_PARALLEL_TRAIL] = out->method[BST_SENSOR_SERIAL_TRAIL] =
         isfinite(out->trail.parallel.value)
             ? "median profile behind hot pixels less the one before them, 5 px"
-            : "not determined: fewer than 50 isolated hot pixels of 12 standard deviations";
+            : "not determined: fewer than 50 isolated hot pixels of 20 standard deviations";
 }
 
 /* Temporal variance of the map without the dark's shot noise. */

@@ -6,28 +6,6 @@
 
 const double bst_sensor_percentiles[BST_SENSOR_PERCENTILES] = {5, 16, 50, 84, 95, 99, 99.9, 99.99};
 
-bool bst_sensor_has_level(const bst_sensor_stacks *s) {
-    return s->bias.count > 0 || (s->dark.count > 0 && s->dark.overscan_width > 0);
-}
-
-void bst_sensor_block_moments(const float *map, int width, int height, double clip, float *scratch,
-                              double *mean, double *variance) {
-    for (int k = 0; k < BST_STACK_BLOCKS; k++) {
-        int bx = k % BST_STACK_SIDE, by = k / BST_STACK_SIDE;
-        size_t n = 0;
-        for (int y = by * height / BST_STACK_SIDE; y < (by + 1) * height / BST_STACK_SIDE; y++) {
-            for (int x = bx * width / BST_STACK_SIDE; x < (bx + 1) * width / BST_STACK_SIDE; x++) {
-                scratch[n++] = map[(size_t)y * (size_t)width + (size_t)x];
-            }
-        }
-        bst_clipped_moments m = bst_clipped_moments_of(scratch, n, clip);
-        mean[k] = m.mean;
-        if (variance) {
-            variance[k] = m.variance;
-        }
-    }
-}
-
 /* Converts an estimate from DN to electrons; the error of the gain is part of it. */
 static void scale(bst_sensor_figures *f, bst_sensor_figure which) {
     const bst_sensor_estimate *gain = &f->figures[BST_SENSOR_GAIN];

@@ -8,6 +8,8 @@
 enum { LEAST_RUN = 8 };
 /* A pixel below this share of its block is dead. */
 static const float DEAD = 0.5F;
+/* A pixel this much above the level in darks is hot: its response is not known. */
+static const double HOT = 2.0;
 static const double CLIP = 5.0;
 
 /* Level that is subtracted from flats: darks are best, then bias frames. */
@@ -45,9 +47,15 @@ static double noise_of(const bst_frame_stack *f, double signal_dn, const bst_sen
 }
 
 /* Counts columns that are dead from one end on, and dead pixels elsewhere. */
-static void measure_dead(const float *map, bst_sensor_figures *out) {
+static void measure_dead(float *map, const bst_frame_stack *level, bst_sensor_figures *out) {
     int bad = 0;
     int64_t dead = 0, good = 0;
+    size_t pixels = (size_t)out->width * (size_t)out->height;
+    for (size_t i = 0; i < pixels; i++) { /* a hot pixel may be full in a flat, and is not dead */
+        map[i] = map[i] < DEAD && level->mean[i] > HOT * out->figures[BST_SENSOR_OFFSET].value
+                     ? 1.0F
+                     : map[i];
+    }
     for (int x = 0; x < out->width; x++) {
         int run[2] = {0, 0}, count = 0;
         for (int end = 0; end < 2; end++) {
@@ -97,7 +105,7 @@ static void measure_response(const bst_sensor_stacks *s, const double *signal, f
     out->figures[BST_SENSOR_PRNU] =
         (bst_sensor_estimate){value, 0.5 * v.sigma / sqrt(fmax(fabs(v.value), v.sigma))};
     out->method[BST_SENSOR_PRNU] = "scatter of the mean flat in 8 x 8 blocks, less its noise";
-    measure_dead(map, out);
+    measure_dead(map, level, out);
 }
 
 bst_status bst_sensor_measure_flat(bst_ctx *ctx, const bst_sensor_stacks *s,

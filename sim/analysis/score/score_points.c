@@ -12,24 +12,12 @@
 
 #include "boresight/config.h"
 #include "sim/core/file.h"
-#include "sim/eval/growing.h"
 #include "sim/io/run_files.h"
 
 enum { MOST_FILES = 1000000 };
 
 /* Largest CSV file. */
 static const uint64_t MOST_BYTES = (uint64_t)256 << 20;
-
-void bst_score_points_free(bst_score_points *points) {
-    free(points->items);
-    free(points->frames);
-    *points = (bst_score_points){0};
-}
-
-int bst_score_key_compare(const bst_score_key *a, const bst_score_key *b) {
-    return a->sequence != b->sequence ? (a->sequence > b->sequence ? 1 : -1)
-                                      : (a->frame > b->frame) - (a->frame < b->frame);
-}
 
 static int by_key(const void *a, const void *b) {
     return bst_score_key_compare(a, b);
@@ -44,25 +32,6 @@ static int by_place(const void *a, const void *b) {
     }
     return p->x_px != q->x_px ? (p->x_px > q->x_px ? 1 : -1)
                               : (p->y_px > q->y_px) - (p->y_px < q->y_px);
-}
-
-bst_status bst_score_points_add_frame(bst_ctx *ctx, bst_score_points *p, bst_score_key key) {
-    if (p->frame_count > 0 && by_key(&p->frames[p->frame_count - 1], &key) == 0) {
-        return BST_OK;
-    }
-    void *frames = p->frames;
-    BST_TRY(bst_grow(ctx, &frames, p->frame_count + 1, &p->frame_room, sizeof *p->frames));
-    p->frames = frames;
-    p->frames[p->frame_count++] = key;
-    return BST_OK;
-}
-
-bst_status bst_score_points_add(bst_ctx *ctx, bst_score_points *p, const bst_score_point *point) {
-    void *items = p->items;
-    BST_TRY(bst_grow(ctx, &items, p->count + 1, &p->room, sizeof *p->items));
-    p->items = items;
-    p->items[p->count++] = *point;
-    return bst_score_points_add_frame(ctx, p, point->key);
 }
 
 /* Sorts frames and points, and removes repeated frames. */
@@ -168,6 +137,9 @@ bst_status bst_score_points_read(bst_ctx *ctx, const char *path,
     }
     if (status == BST_OK && selection->what != BST_SCORE_TRUTH) {
         leave_out_weak(out, selection->least_score);
+    }
+    for (int i = 0; selection->what == BST_SCORE_TRUTH && i < out->count; i++) {
+        out->items[i].optional = out->items[i].score < selection->least_snr;
     }
     sort_points(out);
     return status;

@@ -40,7 +40,7 @@ typedef struct bst_score_selection {
     int what;           /* BST_SCORE_... of a run */
     const char *sensor; /* OBSERVER/SENSOR of a run; NULL: all, each a sequence */
     bool unknown;       /* detections without a label count, too */
-    double least_snr;   /* fainter true objects of a run are optional */
+    double least_snr;   /* fainter true objects are optional */
     double least_score; /* found points with a lower score are left out; NAN: none */
 } bst_score_selection;
 

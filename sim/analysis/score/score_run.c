@@ -4,21 +4,21 @@
 #include "sim/analysis/score/score_points.h"
 #include "sim/run/run_sensors.h"
 
-/* Columns: exposure, x, y, score, identity, and whether the point counts as optional. Positions are
+/* Columns: exposure, x, y, score, identity. Positions are
  * those in the frame: of the window, in binned pixels. */
 #define IN_FRAME(x, x0) "(" x " - COALESCE(f." x0 ", 0) + 0.5) / COALESCE(f.binning, 1) - 0.5"
 static const char *const point_sql[] = {
     [BST_SCORE_DETECTIONS] =
         "SELECT d.exposure_id, " IN_FRAME("d.x_px", "x0_px") ", " IN_FRAME("d.y_px", "y0_px")
-        ", d.snr, -1, 0 FROM detections d LEFT JOIN frames f USING (sensor, exposure_id) "
+        ", d.snr, -1 FROM detections d LEFT JOIN frames f USING (sensor, exposure_id) "
         "WHERE d.sensor = ?1 AND (d.label = 'object' OR (?2 AND d.label = 'unknown'))",
     [BST_SCORE_TRACKS] =
         "SELECT t.exposure_id, " IN_FRAME("t.x_px", "x0_px") ", " IN_FRAME("t.y_px", "y0_px")
-        ", t.snr, t.track_id, 0 FROM tracks t LEFT JOIN frames f USING (sensor, exposure_id) "
+        ", t.snr, t.track_id FROM tracks t LEFT JOIN frames f USING (sensor, exposure_id) "
         "WHERE t.sensor = ?1 AND t.status = 'confirmed' AND t.misses_in_row = 0",
     [BST_SCORE_TRUTH] =
         "SELECT t.exposure_id, " IN_FRAME("t.x_centroid_px", "x0_px") ", "
-        IN_FRAME("t.y_centroid_px", "y0_px") ", t.snr, t.id, 1 FROM truth t LEFT JOIN frames f "
+        IN_FRAME("t.y_centroid_px", "y0_px") ", t.snr, t.id FROM truth t LEFT JOIN frames f "
         "USING (sensor, exposure_id) WHERE t.sensor = ?1 AND t.kind = 'object' AND "
         "t.in_field = 1 AND t.occulted = 0 AND t.electrons > 0",
 };
@@ -60,9 +60,7 @@ static bst_status add_points(bst_ctx *ctx, const bst_run_reader *run, int64_t se
                                    .x_px = bst_io_rows_real(rows, 1),
                                    .y_px = bst_io_rows_real(rows, 2),
                                    .score = bst_io_rows_real(rows, 3),
-                                   .id = bst_io_rows_int(rows, 4),
-                                   .optional = bst_io_rows_int(rows, 5) == 1 &&
-                                               bst_io_rows_real(rows, 3) < selection->least_snr};
+                                   .id = bst_io_rows_int(rows, 4)};
         if (isfinite(p.x_px) && isfinite(p.y_px)) {
             status = bst_score_points_add(ctx, points, &p);
         }

@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+"""boresight characterize: sensors that were simulated are found again, within their intervals.
+
+Usage, from the repository root:
+    /usr/bin/python3 tests/e2e/test_characterize.py BORESIGHT          two random sensors
+    /usr/bin/python3 tests/e2e/test_characterize.py BORESIGHT --full   20 larger ones, and what they gave
+
+Frames of NEOSSat are no part of the project. Where the environment variable BORESIGHT_NEOSSAT names a folder
+with NEOSSAT_240__30_2020214095318.fits, a raw dark with overscan, it is characterized too.
+"""
+import collections
+import json
+import os
+import random
+import sys
+import unittest
+
+import runs
+from runs import call
+
+FULL = "--full" in sys.argv
+if FULL:
+    sys.argv.remove("--full")
+CAMERA = runs.SENSOR + "/camera/"
+NEOSSAT = os.path.join(os.environ.get("BORESIGHT_NEOSSAT", ""), "NEOSSAT_240__30_2020214095318.fits")
+
+
+def tearDownModule():
+    runs.clean()
+
+
+def draw(seed):
+    """Values of a camera and of its detector."""
+    u = random.Random(seed).uniform
+    camera = {"gain_e_per_dn": u(0.8, 4), "read_noise_e": u(4, 15), "offset_dn": u(200, 1500),
+              "dark_current_e_per_s": u(1, 8)}
+    detector = {"dsnu_rms": u(0.05, 0.4), "hot_fraction": u(0.003, 0.01),
+                "hot_median_e_per_s": u(300, 1000), "hot_spread_dex": u(0.2, 0.4), "prnu_rms": u(0.004, 0.02),
+                "dead_fraction": u(0.001, 0.004), "bad_columns": random.Random(seed).randint(0, 3),
+                "column_offset_rms_e": u(2, 5), "row_offset_rms_e": u(2, 5), "row_noise_e": u(1, 4),
+                "fixed_pattern_seed": hex(seed + 1)}
+    return camera, detector
+
+
+class Characterize(unittest.TestCase):
+    def made(self, seed, side, frames):
+        """Report of a sensor that was simulated, and the values that it was made with."""
+        folder = runs.scratch()
+        camera, detector = draw(seed)
+        scenario, out = os.path.join(folder, "sensor.json"), os.path.join(folder, "out")
+        values = {CAMERA + key: value for key, value in
+                  {**camera, "width_px": side, "height_px": side, "detector": detector}.items()}
+        with open(scenario, "w", encoding="utf-8") as file:
+            json.dump({"extends": os.path.abspath(runs.STARE), "seed": hex(seed), "set": values}, file)
+        cal = os.path.join(folder, "cal")
+        kinds = ("bias", "dark", "flat")
+        result = call("calframes", scenario, "--out", cal, "--exposure", "8", "--threads", "1",
+                      *(word for kind in kinds for word in ("--" + kind, str(frames))),
+                      "--set", "/world/star_catalogue=embedded")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        result = call("characterize", "--map", "boresight", "--out", out, "--extends", scenario,
+                      *(word for kind in kinds for word in ("--" + kind, f"{cal}/neossat_telescope_{kind}.fits")))
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        with open(out + "/report.json", encoding="utf-8") as file:
+            report = json.load(file)
+        truth = {**camera, **detector}
+        del truth["fixed_pattern_seed"]
+        return out, truth, report["figures"]
+
+    def test_simulated_sensors_are_found_again(self):
+        inside, of, wrong = collections.Counter(), collections.Counter(), []
+        for seed in range(20 if FULL else 2):
+            out, truth, figures = self.made(seed, 256 if FULL else 160, 8 if FULL else 4)
+            for key, value in truth.items():
+                found = figures[key]
+                of[key] += 1
+                good = found["low_95"] - 1e-12 <= value <= found["high_95"] + 1e-12
+                inside[key] += good
+                if not good:
+                    wrong.append((seed, key, value, found["value"], found["standard_error"]))
+        if FULL:
+            print("inside their 95 % interval:", {key: f"{inside[key]} of {of[key]}" for key in of})
+        # detector.json is a scenario's change of its camera
+        result = call("check", out + "/detector.json")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        resolved = json.loads(result.stdout)["observers"][0]["sensors"][0]["camera"]
+        self.assertAlmostEqual(resolved["read_noise_e"], figures["read_noise_e"]["value"], delta=1e-9)
+        self.assertAlmostEqual(resolved["detector"]["prnu_rms"], figures["prnu_rms"]["value"], delta=1e-9)
+        # of intervals of 95 %; two sensors: 28 values, of which 5 or more lie outside once in 70
+        self.assertGreaterEqual(sum(inside.values()), 0.9 * sum(of.values()) if FULL else sum(of.values()) - 4, wrong)
+        for key in of if FULL else ():
+            self.assertGreaterEqual(inside[key], 16, wrong)  # fewer of 20 once in 400 if 95 % are inside
+
+    def test_what_frames_do_not_say_is_not_written(self):
+        """Bias frames alone: no dark current, no response, and the gain of the header."""
+        folder = runs.scratch()
+        result = call("calframes", runs.STARE, "--out", folder + "/cal", "--bias", "2", "--dark", "0", "--flat", "0",
+                      "--set", CAMERA + "width_px=96", "--set", CAMERA + "height_px=80",
+                      "--set", "/world/star_catalogue=embedded")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        bias = folder + "/cal/neossat_telescope_bias.fits"
+        words = ("characterize", "--map", "boresight", "--bias", bias, "--out", folder + "/out")
+        result = call(*words, "--camera", "/camera")
+        self.assertEqual((result.returncode, result.stderr), (0, ""))
+        with open(folder + "/out/detector.json", encoding="utf-8") as file:
+            given = json.load(file)
+        self.assertNotIn("extends", given)
+        self.assertLessEqual({"/camera/gain_e_per_dn", "/camera/read_noise_e", "/camera/offset_dn"}, set(given["set"]))
+        self.assertEqual([key for key in given["set"] if "dark" in key or "prnu" in key], [])
+        self.assertEqual(given["set"]["/camera/gain_e_per_dn"], 1.6)
+        # 7,680 pixels: 0.8 %; the interval of 5 standard errors
+        self.assertAlmostEqual(given["set"]["/camera/read_noise_e"], 8, delta=0.33)
+        again = call(*words)
+        self.assertEqual(again.returncode, 1)
+        self.assertIn("report.json: is there already; give another folder or --overwrite", again.stderr)
+        wrong = call("characterize", "--map", "boresight", "--bias", bias, "--dark", runs.TRACK, "--out", folder + "/b")
+        self.assertEqual(wrong.returncode, 1)
+        self.assertIn("track.json: does not begin as a FITS file", wrong.stderr)
+
+    @unittest.skipUnless(os.path.exists(NEOSSAT), "BORESIGHT_NEOSSAT names no folder with the dark")
+    def test_neossat(self):
+        """The raw dark of 28 s against figures of another program (numpy), and the header's gain."""
+        out = runs.scratch() + "/out"
+        result = call("characterize", "--map", "neossat", "--dark", NEOSSAT, "--out", out)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(out + "/report.json", encoding="utf-8") as file:
+            report = json.load(file)
+        value = {key: figure["value"] for key, figure in report["figures"].items()}
+        self.assertAlmostEqual(value["read_noise_e"], 18.4, delta=0.05 * 18.4)
+        self.assertAlmostEqual(value["dark_current_median_e_per_s"], 10, delta=0.5)
+        self.assertAlmostEqual(value["readout_ramp_dn"], 269, delta=0.02 * 269)
+        self.assertAlmostEqual(value["pick_up_cycles_per_px"], 0.170, delta=0.0005)
+        self.assertTrue(0.10 <= value["cti_parallel_trail_fraction"] <= 0.13)
+        self.assertEqual(report["charge_trail"]["parallel_direction"], "rows_above")
+        self.assertIsNone(value["prnu_rms"])
+
+
+if __name__ == "__main__":
+    unittest.main()
