@@ -14,8 +14,8 @@ enum { SIDES = 1024, WORK = 8192 };
 /* Length of an edge over the extent of its polygon below which it has no direction. */
 static const double TINY = 1e-12;
 
-/* Corners of an intersection, at most. */
-enum { CORNERS = 4 * BST_POLYGON_CORNERS_MAX };
+/* Corners of an intersection, at most, and those computed at a time. */
+enum { CORNERS = 4 * BST_POLYGON_CORNERS_MAX, BLOCK = 4 };
 
 /* Intersections after which bst_polygon_uncovered_area gives up: their number can double with each
  * set. */
@@ -129,25 +129,52 @@ int bst_half_planes_crossing(const bst_half_planes *sides, int blocks, const bst
     return found;
 }
 
-/* Where an edge of a polygon from a value before to one of another sign crosses zero. */
-static bst_point2 crossing_of(bst_point2 a, bst_point2 b, double before, double now) {
-    double t = before / (before - now);
-    return (bst_point2){a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)};
+/* A polygon by coordinates, filled up to whole blocks with copies of its last corner. */
+typedef struct corners {
+    double x[CORNERS], y[CORNERS];
+    int count;
+} corners;
+
+static void fill_up(corners *c) {
+    for (int i = c->count; i % BLOCK != 0; i++) {
+        c->x[i] = c->x[c->count - 1];
+        c->y[i] = c->y[c->count - 1];
+    }
 }
 
-/* Cuts a polygon by the values of a half plane at its corners. Returned: number of corners. */
-static int cut_by(const bst_point2 *p, int count, const double *value, int room, bst_point2 *out) {
-    int n = 0, last = count - 1;
-    for (int i = 0; i < count; last = i++) {
-        double before = value[last], now = value[i];
-        if (n < room && before * now < 0.0) {
-            out[n++] = crossing_of(p[last], p[i], before, now);
-        }
-        if (n < room && now >= 0.0) {
-            out[n++] = p[i];
+/* Values of a half plane at the corners. Returned: below 0 if one of them is. */
+BST_CLONES_256 static int64_t values_at(const corners *c, bst_half_plane s, double *value) {
+    int64_t sign[BLOCK] = {0}; /* bits of all values, of which the highest is the sign */
+    for (int i = 0; i < c->count; i += BLOCK) {
+        for (int k = 0; k < BLOCK; k++) {
+            int64_t bits;
+            value[i + k] = s.u * c->x[i + k] + s.v * c->y[i + k] + s.w;
+            memcpy(&bits, &value[i + k], sizeof bits);
+            sign[k] |= bits;
         }
     }
-    return n >= 3 ? n : 0;
+    return sign[0] | sign[1] | sign[2] | sign[3];
+}
+
+/* Cuts a polygon by the values of a half plane at its corners. */
+static void cut_by(const corners *from, const double *value, int room, corners *to) {
+    int n = 0, last = from->count - 1;
+    for (int i = 0; i < from->count; last = i++) {
+        double before = value[last], now = value[i];
+        if (n < room && before * now < 0.0) {
+            double t = before / (before - now);
+            to->x[n] = from->x[last] + t * (from->x[i] - from->x[last]);
+            to->y[n++] = from->y[last] + t * (from->y[i] - from->y[last]);
+        }
+        if (n < room && now >= 0.0) {
+            to->x[n] = from->x[i];
+            to->y[n++] = from->y[i];
+        }
+    }
+    to->count = n >= 3 ? n : 0;
+    if (to->count > 0) {
+        fill_up(to);
+    }
 }
 
 /* Finds the half planes that may cut a polygon, by its bounds. Returned: their number, or
@@ -178,33 +205,35 @@ static int may_cut(const bst_point2 *p, int count, const bst_half_plane *sides, 
 }
 
 int bst_polygon_keep(const bst_point2 *p, int count, const bst_half_plane *sides, int side_count,
-                     bst_point2 *work, bst_point2 *out, bool *cut) {
-    const bst_point2 *from = p;
-    bst_point2 *to = out;
-    int indices[CORNERS], n = count, room = count + side_count;
+                     bst_point2 *out, bool *cut) {
+    corners both[2], *from = &both[0], *to = &both[1];
+    int indices[CORNERS], room = count + side_count;
     double value[CORNERS];
     assert(count > 0 && room <= CORNERS);
     int wanted = may_cut(p, count, sides, side_count, indices);
     *cut = wanted == BST_HALF_PLANES_APART;
-    n = *cut ? 0 : n;
-    for (int i = 0; i < wanted && n > 0; i++) {
-        const bst_half_plane s = sides[indices[i]];
-        bool any = false;
-        for (int k = 0; k < n; k++) {
-            value[k] = s.u * from[k].x + s.v * from[k].y + s.w;
-            any |= value[k] < 0.0;
-        }
-        if (any) {
-            n = cut_by(from, n, value, room, to);
+    if (*cut) {
+        return 0;
+    }
+    from->count = count;
+    for (int i = 0; i < count; i++) {
+        from->x[i] = p[i].x;
+        from->y[i] = p[i].y;
+    }
+    fill_up(from);
+    for (int i = 0; i < wanted && from->count > 0; i++) {
+        if (values_at(from, sides[indices[i]], value) < 0) {
+            cut_by(from, value, room, to);
+            corners *other = from;
             from = to;
-            to = from == out ? work : out;
+            to = other;
             *cut = true;
         }
     }
-    if (n > 0 && from != out) {
-        memcpy(out, from, (size_t)n * sizeof *out);
+    for (int i = 0; i < from->count; i++) {
+        out[i] = (bst_point2){from->x[i], from->y[i]};
     }
-    return n;
+    return from->count;
 }
 
 /* A sum of areas in progress. */
@@ -221,13 +250,13 @@ static double uncovered(sum *s, const bst_point2 *p, int count, int covers) {
     for (int i = covers - 1; i >= 0; i--) {
         const bst_half_plane *sides = s->covers->sides + s->covers->first[i];
         int side_count = s->covers->first[i + 1] - s->covers->first[i], room = count + side_count;
-        if (room > CORNERS || s->used + 2 * room > WORK || ++s->intersections > INTERSECTIONS_MAX) {
+        if (room > CORNERS || s->used + room > WORK || ++s->intersections > INTERSECTIONS_MAX) {
             s->intersections = INTERSECTIONS_MAX + 1;
             return 0.0;
         }
         bst_point2 *out = s->covers->work + start;
         bool cut;
-        int n = bst_polygon_keep(p, count, sides, side_count, out + room, out, &cut);
+        int n = bst_polygon_keep(p, count, sides, side_count, out, &cut);
         if (!cut) {
             return 0.0; /* the set covers all */
         }

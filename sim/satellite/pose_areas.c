@@ -188,12 +188,12 @@ void bst_pose_area_through_rim(bst_satellite_pose *p, bst_pose_target *t, int vi
         return;
     }
     bst_half_plane kept[SIDES];
-    bst_point2 work[2 * BST_POLYGON_CORNERS_MAX], out[2 * BST_POLYGON_CORNERS_MAX];
+    bst_point2 out[2 * BST_POLYGON_CORNERS_MAX];
     bool cut;
     for (int i = 0; i < count; i++) {
         kept[i] = in_plane(p, t, p->sides, crossing[i]);
     }
-    t->left_count = bst_polygon_keep(t->left, t->left_count, kept, count, work, out, &cut);
+    t->left_count = bst_polygon_keep(t->left, t->left_count, kept, count, out, &cut);
     memcpy(t->left, out, (size_t)t->left_count * sizeof *out);
 }
 

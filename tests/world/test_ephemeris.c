@@ -102,10 +102,10 @@ static void error_is_below_a_thousandth_of_a_pixel(void **state) {
                 bst_vec3 r, v;
                 if (bst_world_orbit_state(&ctx, &world->objects[i].orbit, clock, world->epoch, t,
                                           true, &direct) != BST_OK) {
-                    assert_false(bst_ephemeris_at(world->ephemeris, i, t, &r, &v));
+                    assert_false(bst_ephemeris_at(world->ephemeris, NULL, i, t, &r, &v));
                     continue;
                 }
-                if (bst_ephemeris_at(world->ephemeris, i, t, &r, &v)) {
+                if (bst_ephemeris_at(world->ephemeris, NULL, i, t, &r, &v)) {
                     used[i % FAMILIES]++;
                     bst_assert_close(test_distance(r, direct.position_m), 0, tolerance);
                     bst_world_state before, after;
@@ -143,15 +143,16 @@ static double asked_time(int k) {
     return k % 2 ? 3.7 * k : -7000 + 3 * DAY * drawn(k, 11);
 }
 
-static void ask(bst_ephemeris *e, int n, answer *out) {
+static void ask(bst_ephemeris *e, bst_ephemeris_reader *reader, int n, answer *out) {
     int body = n % ASKED_BODIES;
-    out->there = bst_ephemeris_at(e, body, asked_time(n / ASKED_BODIES), &out->r, &out->v);
+    out->there = bst_ephemeris_at(e, reader, body, asked_time(n / ASKED_BODIES), &out->r, &out->v);
 }
 
 typedef struct asking {
     bst_ephemeris *ephemeris;
     const answer *expected;
     int from, step, differences;
+    bst_ephemeris_reader reader;
 } asking;
 
 static void *ask_all(void *argument) {
@@ -165,7 +166,7 @@ static void *ask_all(void *argument) {
                 .apex_m = {7e6, 0, 0}, .axis = {1, 0, 0}, .half_angle_rad = 0.1};
             (void)bst_ephemeris_near(a->ephemeris, asked_time(k / ASKED_BODIES), &cone, near);
         }
-        ask(a->ephemeris, k, &got);
+        ask(a->ephemeris, &a->reader, k, &got);
         a->differences += memcmp(&got, &a->expected[k], sizeof got) != 0;
     }
     free(near);
@@ -181,13 +182,13 @@ static void order_and_threads_change_no_bit(void **state) {
     answer *expected = calloc(ALL, sizeof *expected);
     assert_non_null(expected);
     for (int n = 0; n < ALL; n++) {
-        ask(world->ephemeris, n, &expected[n]);
+        ask(world->ephemeris, NULL, n, &expected[n]);
     }
     for (int threads = 1; threads <= 2; threads++) {
         renew(&ctx, world);
         bst_assert_ok(&ctx, bst_ephemeris_prepare(&ctx, world->ephemeris, threads));
-        asking a = {world->ephemeris, expected, 17, 1129, 0},
-               b = {world->ephemeris, expected, 3, 1517, 0};
+        asking a = {world->ephemeris, expected, 17, 1129, 0, {{{0}}}},
+               b = {world->ephemeris, expected, 3, 1517, 0, {{{0}}}};
         pthread_t other;
         assert_int_equal(pthread_create(&other, NULL, ask_all, &b), 0);
         ask_all(&a);
@@ -196,6 +197,22 @@ static void order_and_threads_change_no_bit(void **state) {
         assert_int_equal(b.differences, 0);
     }
     free(expected);
+    bst_world_free(world);
+}
+
+/* Threads at different times, in turn: each keeps its knots, which the ring of 16 could not. */
+static void readers_at_different_times_keep_their_knots(void **state) {
+    (void)state;
+    bst_world *world = test_world_with(GX5, "");
+    bst_ephemeris_reader readers[2] = {{{{0}}}};
+    bst_vec3 r, v;
+    for (int k = 0; k < 100; k++) {
+        for (int i = 0; i < 2; i++) { /* the observer, in a low orbit */
+            assert_true(
+                bst_ephemeris_at(world->ephemeris, &readers[i], 1, 0.01 * k + 7200.0 * i, &r, &v));
+        }
+    }
+    assert_int_equal(bst_ephemeris_knots_made(world->ephemeris), 2 * BST_EPHEMERIS_KNOTS);
     bst_world_free(world);
 }
 
@@ -270,7 +287,7 @@ static void a_decay_that_is_ahead_changes_no_table(void **state) {
         for (double ahead = 16; ahead < 1000; ahead *= 2) {
             bst_vec3 place = {0, 0, 0};
             renew(&ctx, world);
-            (void)bst_ephemeris_at(world->ephemeris, 0, t + ahead, &r, &v);
+            (void)bst_ephemeris_at(world->ephemeris, NULL, 0, t + ahead, &r, &v);
             (void)bst_ephemeris_places(world->ephemeris, t, &place.x, &place.y, &place.z);
             assert_memory_equal(&place, &first, sizeof first);
         }
@@ -470,6 +487,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(error_is_below_a_thousandth_of_a_pixel),
         cmocka_unit_test(order_and_threads_change_no_bit),
+        cmocka_unit_test(readers_at_different_times_keep_their_knots),
         cmocka_unit_test(a_day_takes_no_more_memory_than_a_minute),
         cmocka_unit_test(what_has_decayed_stays_away),
         cmocka_unit_test(a_decay_that_is_ahead_changes_no_table),

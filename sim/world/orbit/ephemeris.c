@@ -9,10 +9,8 @@
 #include "sim/core/invariant.h"
 #include "sim/core/parallel.h"
 #include "sim/core/simd.h"
+#include "sim/world/orbit/ephemeris_polynomial.h"
 
-/* Knots of the interpolating polynomial, and knots for its error estimate: one more on either
- * side. */
-enum { POINTS = 10, CHECKED = POINTS + 2, BEFORE = CHECKED / 2 - 1 };
 /* the bodies form groups that compute their next knot at different times */
 enum { SHARES = 16 };
 /* Knots kept per body; a power of two. More than CHECKED: the next knots are computed one by one,
@@ -20,9 +18,6 @@ enum { SHARES = 16 };
 enum { RING = 16, ROTATIONS = 32 };
 enum { STEP_CLASSES = 5, SHORTEST_STEP_S = 16 };
 
-/* Maximum of |(u - o_0) ... (u - o_9)| / 10! between the two middle knots, in steps. Times the
- * tenth difference it is the polynomial's error. */
-#define ERROR_OF_DIFFERENCE 2.4033e-4
 /* Safety factor of the error estimate: a jump of which a tenth difference shows only a thirtieth is
  * still detected. */
 #define SAFETY 16.0
@@ -72,6 +67,7 @@ struct bst_ephemeris {
     double limit_m;    /* upper limit of the estimated error */
     body *bodies;
     int body_count, object_count;
+    int64_t knots_made; /* by readers, not for tables */
     rotations rotations[STEP_CLASSES];
     table tables[TABLES];
     double *table_memory;
@@ -80,49 +76,6 @@ struct bst_ephemeris {
 /* Knot spacing in s of a step class of the object ephemeris. */
 static double step_of(int step_class) {
     return (double)(SHORTEST_STEP_S << step_class);
-}
-
-/* ---- the polynomial ---- */
-
-/* Lagrange weights of the ten knots at u steps after the fifth knot, 0 <= u <= 1, and their
- * derivatives with respect to u. */
-static void lagrange(double u, double weight[POINTS], double slope[POINTS]) {
-    /* products of the factors before and after each knot, with derivatives */
-    static const double divisor[POINTS] = {-362880, 40320, -10080, 4320,   -2880,
-                                           2880,    -4320, 10080,  -40320, 362880};
-    double left = 1.0, left_slope = 0.0, right[POINTS], right_slope[POINTS];
-    right[POINTS - 1] = 1.0;
-    right_slope[POINTS - 1] = 0.0;
-    for (int j = POINTS - 1; j > 0; j--) {
-        double x = u + (POINTS / 2 - 1) - j;
-        right[j - 1] = right[j] * x;
-        right_slope[j - 1] = right_slope[j] * x + right[j];
-    }
-    for (int j = 0; j < POINTS; j++) {
-        double x = u + (POINTS / 2 - 1) - j;
-        weight[j] = left * right[j] / divisor[j];
-        slope[j] = (left_slope * right[j] + left * right_slope[j]) / divisor[j];
-        left_slope = left_slope * x + left;
-        left *= x;
-    }
-}
-
-/* Tenth difference of p[0..10]. */
-static double tenth_difference(const double *p) {
-    return (p[0] + p[10]) - 10.0 * (p[1] + p[9]) + 45.0 * (p[2] + p[8]) - 120.0 * (p[3] + p[7]) +
-           210.0 * (p[4] + p[6]) - 252.0 * p[5];
-}
-
-/* Checks the estimated error of the polynomial through the inner ten of twelve knots. False for
- * NAN. */
-static bool is_accurate(double p[3][CHECKED], double limit_m) {
-    double a = 0.0, b = 0.0;
-    for (int i = 0; i < 3; i++) {
-        double first = tenth_difference(p[i]), second = tenth_difference(p[i] + 1);
-        a += first * first;
-        b += second * second;
-    }
-    return ERROR_OF_DIFFERENCE * sqrt(a) <= limit_m && ERROR_OF_DIFFERENCE * sqrt(b) <= limit_m;
 }
 
 /* Checks whether a discontinuity of SGP4's deep-space integrator lies within the polynomial of an
@@ -204,37 +157,52 @@ static inline void make_knots(bst_ephemeris *e, body *b, int64_t first, int64_t 
     }
 }
 
-bool bst_ephemeris_at(bst_ephemeris *e, int index, double seconds, bst_vec3 *position_m,
-                      bst_vec3 *velocity_mps) {
-    assert(e && index >= 0 && index < e->body_count && position_m);
+/* Reads the knots of a body's polynomial from the ring, and judges it. */
+static void read_knots(bst_ephemeris *e, int index, int64_t first, bst_ephemeris_knots *out) {
     body *b = &e->bodies[index];
+    *out = (bst_ephemeris_knots){.known = true, .body = index, .first = first};
+    if (spans_jump(b->orbit, step_of(b->step_class), first)) {
+        return;
+    }
+    pthread_mutex_lock(&e->lock);
+    if (first < b->first || first + CHECKED - 1 > b->last) {
+        int64_t low = first > b->first ? first : b->first;
+        int64_t high = first + CHECKED - 1 < b->last ? first + CHECKED - 1 : b->last;
+        e->knots_made += CHECKED - (high >= low ? high - low + 1 : 0);
+    }
+    make_knots(e, b, first, first + CHECKED - 1);
+    for (int j = 0; j < CHECKED; j++) {
+        int slot = slot_of(first + j, RING);
+        for (int i = 0; i < 3; i++) {
+            out->place_m[i][j] = b->place_m[i][slot];
+        }
+    }
+    pthread_mutex_unlock(&e->lock);
+    out->accurate = is_accurate(out->place_m, e->limit_m);
+}
+
+bool bst_ephemeris_at(bst_ephemeris *e, bst_ephemeris_reader *reader, int index, double seconds,
+                      bst_vec3 *position_m, bst_vec3 *velocity_mps) {
+    assert(e && index >= 0 && index < e->body_count && position_m);
+    const body *b = &e->bodies[index];
     if (!b->orbit || !(fabs(seconds) <= 1e9)) {
         return false;
     }
     double step = step_of(b->step_class), whole = floor(seconds / step);
     int64_t first = (int64_t)whole - BEFORE;
-    if (spans_jump(b->orbit, step, first)) {
-        return false;
+    bst_ephemeris_knots own, *knots = reader ? &reader->kept[index % BST_EPHEMERIS_KEPT] : &own;
+    if (!reader || !knots->known || knots->body != index || knots->first != first) {
+        read_knots(e, index, first, knots);
     }
-    double p[3][CHECKED];
-    pthread_mutex_lock(&e->lock);
-    make_knots(e, b, first, first + CHECKED - 1);
-    for (int j = 0; j < CHECKED; j++) {
-        int slot = slot_of(first + j, RING);
-        for (int i = 0; i < 3; i++) {
-            p[i][j] = b->place_m[i][slot];
-        }
-    }
-    pthread_mutex_unlock(&e->lock);
-    if (!is_accurate(p, e->limit_m)) {
+    if (!knots->accurate) {
         return false;
     }
     double weight[POINTS], slope[POINTS], r[3] = {0}, v[3] = {0};
     lagrange(seconds / step - whole, weight, slope);
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < POINTS; j++) {
-            r[i] += weight[j] * p[i][j + 1];
-            v[i] += slope[j] * p[i][j + 1];
+            r[i] += weight[j] * knots->place_m[i][j + 1];
+            v[i] += slope[j] * knots->place_m[i][j + 1];
         }
     }
     if (!(r[0] * r[0] + r[1] * r[1] + r[2] * r[2] > DECAYED_M * DECAYED_M)) {
@@ -243,6 +211,13 @@ bool bst_ephemeris_at(bst_ephemeris *e, int index, double seconds, bst_vec3 *pos
     *position_m = (bst_vec3){r[0], r[1], r[2]};
     *velocity_mps = (bst_vec3){v[0] / step, v[1] / step, v[2] / step};
     return true;
+}
+
+int64_t bst_ephemeris_knots_made(bst_ephemeris *e) {
+    pthread_mutex_lock(&e->lock);
+    int64_t made = e->knots_made;
+    pthread_mutex_unlock(&e->lock);
+    return made;
 }
 
 /* ---- tables ---- */

@@ -26,15 +26,38 @@ void bst_ephemeris_free(bst_ephemeris *ephemeris); /* NULL allowed */
 bst_status bst_ephemeris_prepare(bst_ctx *ctx, bst_ephemeris *ephemeris,
                                  int threads) BST_MUST_CHECK;
 
+/* Knots of the polynomial of a body, those for its error estimate included; bodies of which a
+ * reader keeps them. */
+enum { BST_EPHEMERIS_KNOTS = 12, BST_EPHEMERIS_KEPT = 8 };
+
+/* The last polynomial of a body. */
+typedef struct bst_ephemeris_knots {
+    bool known, accurate; /* accurate: within the error of the ephemeris */
+    int body;
+    int64_t first; /* knot */
+    double place_m[3][BST_EPHEMERIS_KNOTS];
+} bst_ephemeris_knots;
+
+/* What one thread last read. The ephemeris itself keeps 16 knots a body: threads at different
+ * times, such as those of a light curve, would drive each other's knots out of it at each call.
+ * Starts with all members 0; for one ephemeris. */
+typedef struct bst_ephemeris_reader {
+    bst_ephemeris_knots kept[BST_EPHEMERIS_KEPT]; /* by body, modulo their number */
+} bst_ephemeris_reader;
+
 /* Interpolated position and velocity (derivative of the position) of a body at `seconds` after the
  * epoch.
  *
- * Given:     body  object index, or number of objects + observer index
+ * Given:     reader  of this thread; NULL: none
+ *            body    object index, or number of objects + observer index
  * Returned:  false, and nothing written, if the body must be evaluated directly: another
  *            kind of orbit, decayed, or a time where the polynomial is not accurate
- * Notes:     any number of threads may call it */
-bool bst_ephemeris_at(bst_ephemeris *ephemeris, int body, double seconds, bst_vec3 *position_m,
-                      bst_vec3 *velocity_mps);
+ * Notes:     any number of threads may call it, each with a reader of its own */
+bool bst_ephemeris_at(bst_ephemeris *ephemeris, bst_ephemeris_reader *reader, int body,
+                      double seconds, bst_vec3 *position_m, bst_vec3 *velocity_mps);
+
+/* Number of knots that calls of bst_ephemeris_at had to compute so far. */
+int64_t bst_ephemeris_knots_made(bst_ephemeris *ephemeris);
 
 /* A cone of directions from an observer, with tolerances in time and position. */
 typedef struct bst_ephemeris_cone {

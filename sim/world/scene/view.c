@@ -36,6 +36,7 @@ struct bst_world_view {
     bst_sky_clock *clock;
     pace pace;
     eye eyes[BST_PATH_NODES]; /* the latest ones, by node of the exposure */
+    bst_ephemeris_reader reader;
     bst_view_shapes shapes;
     bool reflected_only; /* shapes without thermal emission */
 };
@@ -87,8 +88,8 @@ static const bst_world_orbit *orbit_of(const bst_world *world, int body) {
 static bst_status position_of(bst_ctx *ctx, bst_world_view *view, int body, double seconds,
                               from source, bst_vec3 *position_m, bst_vec3 *velocity_mps) {
     const bst_world *world = view->world;
-    if (source == FROM_EPHEMERIS &&
-        bst_ephemeris_at(world->ephemeris, body, seconds, position_m, velocity_mps)) {
+    if (source == FROM_EPHEMERIS && bst_ephemeris_at(world->ephemeris, &view->reader, body, seconds,
+                                                     position_m, velocity_mps)) {
         return BST_OK;
     }
     bst_world_state state;
@@ -108,7 +109,8 @@ static bst_status state_of(bst_ctx *ctx, bst_world_view *view, int body, double 
                                   true, out));
     bst_vec3 derivative;
     if (source == FROM_EPHEMERIS) {
-        (void)bst_ephemeris_at(world->ephemeris, body, seconds, &out->position_m, &derivative);
+        (void)bst_ephemeris_at(world->ephemeris, &view->reader, body, seconds, &out->position_m,
+                               &derivative);
     }
     return BST_OK;
 }
@@ -161,7 +163,7 @@ static bst_status dense_state(bst_ctx *ctx, bst_world_view *view, int observer, 
     }
     bst_vec3 derivative;
     if (p->made && p->smooth && p->observer == observer && p->second == second &&
-        bst_ephemeris_at(world->ephemeris, world->object_count + observer, seconds,
+        bst_ephemeris_at(world->ephemeris, &view->reader, world->object_count + observer, seconds,
                          &out->position_m, &derivative)) {
         out->velocity_mps = bst_quintic_at(p->quintic, seconds - second);
         return BST_OK;
