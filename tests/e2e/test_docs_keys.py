@@ -13,7 +13,7 @@ import unittest
 import runs
 
 # words with a unit that name no key of a scenario: columns, members of structs, columns of files that users write
-FILES = ("c", "h", "cl", "py", "md", "json", "sqlite", "fits", "mp4", "oem", "txt", "packets")
+FILES = ("c", "h", "cl", "py", "md", "json", "sqlite", "fits", "csv", "mp4", "oem", "txt", "packets")
 UNITS = "_(s|px|deg|m|km|hz|e|mag|arcsec|mps|rad|radps|um|nm|k|kg|nm|pct|db|per_s)"
 
 
