@@ -10,7 +10,7 @@ _boresight_options() {
 }
 
 _boresight() {
-    local program=$1 word=$2 previous=$3 command='' i argument files=no
+    local program=$1 word=$2 previous=$3 command='' i argument='' files=no
     local offers
     COMPREPLY=()
     for ((i = 1; i < COMP_CWORD; i++)); do
@@ -29,7 +29,9 @@ _boresight() {
             *) offers="$(_boresight_commands "$program") help --help --version --plugin --no-plugins" ;;
         esac
     else
-        argument=$(_boresight_options "$program" "$command" | sed -n "s/^$previous //p")
+        if [[ $previous =~ ^--[a-z-]+$ ]]; then # safe as a pattern
+            argument=$(_boresight_options "$program" "$command" | sed -n "s/^$previous //p")
+        fi
         case $previous:$argument in
             --*:*'|'*) offers=${argument//|/ } ;;
             --*:?*) files=yes ;;

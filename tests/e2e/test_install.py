@@ -235,7 +235,7 @@ class Installed(unittest.TestCase):
         """What bash offers for the last of the words, as the installed completion has it."""
         program = self.stage + "/bin/boresight"
         script = '. "$1"; shift; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); _boresight "$1" ' \
-                 '"${COMP_WORDS[COMP_CWORD]}" "${COMP_WORDS[COMP_CWORD - 1]}"; printf "%s\\n" "${COMPREPLY[@]}"'
+                 '"${COMP_WORDS[COMP_CWORD]}" "${COMP_WORDS[COMP_CWORD - 1]}" 2>&1; printf "%s\\n" "${COMPREPLY[@]}"'
         return call("bash", "-c", script, "bash", self.stage + "/share/bash-completion/completions/boresight",
                     program, *words).split()
 
@@ -245,6 +245,7 @@ class Installed(unittest.TestCase):
         self.assertEqual(self.complete("run", "--se"), ["--set", "--seed", "--serial"])
         self.assertEqual(self.complete("--no-plugins", "export", "run", "--frames", ""), ["png", "mp4"])
         self.assertEqual(self.complete("run", "scenarios/neossat_geo_t"), ["scenarios/neossat_geo_track.json"])
+        self.assertEqual(self.complete("view", "runs/a/b", "scenarios/neossat_geo_t"), ["scenarios/neossat_geo_track.json"])
         for path in ("zsh/site-functions/_boresight", "fish/vendor_completions.d/boresight.fish"):
             self.assertTrue(os.path.exists(f"{self.stage}/share/{path}"), path)
 
