@@ -317,8 +317,17 @@ class View(Checks):
                 tables.execute("INSERT INTO exposures SELECT * FROM exposures")
                 tables.execute("INSERT INTO truth SELECT * FROM truth WHERE kind = 'object'")
             tables.execute("UPDATE frames SET fits_index = -9223372036854775808 WHERE exposure_id = 1")
+            tables.execute("CREATE TABLE kept AS SELECT * FROM tracks WHERE exposure_id = 2")
+            tables.execute("UPDATE tracks SET exposure_id = 1")
+            own = tables.execute("SELECT count(*) FROM kept").fetchone()[0]
+            for _ in range(14):
+                tables.execute("INSERT INTO tracks SELECT * FROM tracks")
+            tables.execute("INSERT INTO tracks SELECT * FROM kept")
         begin = time.monotonic()
         viewer = Viewer(made)
+        found = viewer.json("api/frame?sensor=0&frame=2")["tracks"]
+        self.assertGreater(own, 0)
+        self.assertEqual((sum(mark["now"] for mark in found), len(found)), (own, 5000))
         self.assertGreater(viewer.numbers("api/plot?sensor=0&panel=pointing_error&from=0&to=10&columns=100")[0], 0)
         self.assertLess(time.monotonic(), begin + 30)  # a join of all has 800 million rows
         self.assertEqual(viewer.end()[0], 0)
