@@ -164,6 +164,11 @@ class SatNet(unittest.TestCase):
         with sqlite3.connect(copy + "/run.sqlite") as tables:
             tables.execute("UPDATE exposures SET dropped = 1 WHERE exposure_id = 3")
         self.assertEqual(score(self.out, "--truth", copy)["truths"], 7)  # a dropped frame shows nothing
+        with sqlite3.connect(copy + "/run.sqlite") as tables:  # the only sensor, but not the first
+            for (name,) in tables.execute("SELECT m.name FROM sqlite_master m, pragma_table_info(m.name) c"
+                                          " WHERE m.type = 'table' AND c.name = 'sensor'").fetchall():
+                tables.execute(f"UPDATE {name} SET sensor = 1")
+        self.assertEqual(score(copy, "--truth", self.out)["true_positives"], by_labels["true_positives"])
         os.mkdir(copy + "/labels")
         for name, numbered in (("a", {}), ("b", {"sequence_id": 0}), ("c", {"sequence_id": 5}), ("d", {"sequence_id": 0})):
             with open(f"{copy}/labels/{name}.json", "w", encoding="utf-8") as file:
