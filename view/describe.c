@@ -48,7 +48,9 @@ static bst_status describe(bst_ctx *ctx, bst_view_run *run, cJSON *out) {
                                        "wall_time_s", "warnings",  "summary", "git_revision"};
     const cJSON *manifest = bst_run_reader_manifest(run->reader);
     cJSON_AddStringToObject(out, "name", base_name(bst_run_reader_folder(run->reader)));
-    cJSON_AddStringToObject(out, "state", bst_run_state_name(bst_run_reader_state(run->reader)));
+    cJSON_AddStringToObject(
+        out, "state",
+        bst_run_state_name(run->running ? BST_RUN_RUNNING : bst_run_reader_state(run->reader)));
     cJSON_AddStringToObject(out, "viewer_version", bst_version());
     cJSON *copied = cJSON_AddObjectToObject(out, "manifest");
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {

@@ -38,7 +38,10 @@ static void add_polynomial(cJSON *wcs, bst_fits_source *source, const char *name
     cJSON *terms = cJSON_AddArrayToObject(wcs, name);
     char word[32];
     snprintf(word, sizeof word, "%s_ORDER", name);
-    double order = keyword(source, strcmp(name, "B") == 0 ? "A_ORDER" : word);
+    double order = keyword(source, word);
+    if (isnan(order)) {
+        order = keyword(source, "A_ORDER"); /* a cube has one order for both */
+    }
     int element = 0;
     for (int sum = 0; order >= 0.0 && sum <= fmin(order, SIP_ORDER_MOST); sum++) {
         for (int q = 0; q <= sum; q++) {
@@ -120,7 +123,8 @@ static bst_status open_from(bst_ctx *ctx, const bst_view_run *run, int64_t senso
     snprintf(query, sizeof query,
              "SELECT exposure_id, %s FROM %s WHERE rowid >= ?1 AND sensor = ?2 ORDER BY rowid",
              columns, table);
-    int64_t low = 1, high = bst_run_reader_int(run->reader, most, 0, 0) + 1;
+    int64_t low = 1, high = bst_run_reader_int(run->reader, most, 0, 0);
+    high += high < INT64_MAX;
     while (low < high) {
         int64_t middle = low + (high - low) / 2;
         bst_io_rows *rows;
@@ -142,22 +146,28 @@ static bst_status open_from(bst_ctx *ctx, const bst_view_run *run, int64_t senso
 /* What adds a row to a list, in pixels of the frame. */
 typedef void (*add_row)(cJSON *list, const bst_io_rows *rows, const bst_view_exposure *frame);
 
-/* Adds the rows of the exposures `first` to that of the frame. A table that was not recorded gives
- * none. */
+/* Exposures from `first` to `last`. */
+typedef struct exposure_range {
+    int64_t first, last;
+} exposure_range;
+
+/* Adds rows of exposures, until the list has MARKS_MOST. A table that was not recorded gives none.
+ */
 static bst_status add_rows(bst_ctx *ctx, const bst_view_run *run, const bst_view_sensor *s,
                            const bst_view_exposure *frame, const char *const table[2],
-                           int64_t first, add_row add, cJSON *list) {
+                           exposure_range range, add_row add, cJSON *list) {
     bst_io_rows *rows;
     bst_ctx ignored = {0};
     bool more;
     bst_status status;
-    int count = 0;
-    if (open_from(&ignored, run, s->sensor.index, table[0], table[1], first, &rows) != BST_OK) {
+    int count = cJSON_GetArraySize(list);
+    if (open_from(&ignored, run, s->sensor.index, table[0], table[1], range.first, &rows) !=
+        BST_OK) {
         return BST_OK;
     }
     while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more &&
-           bst_io_rows_int(rows, 0) <= frame->id && count < MARKS_MOST) {
-        if (bst_io_rows_int(rows, 0) >= first) {
+           bst_io_rows_int(rows, 0) <= range.last && count < MARKS_MOST) {
+        if (bst_io_rows_int(rows, 0) >= range.first) {
             add(list, rows, frame);
             count++;
         }
@@ -315,12 +325,18 @@ static bst_status describe_frame(bst_ctx *ctx, bst_view_run *run, bst_view_senso
         BST_TRY(add_recorded_wcs(ctx, run, s, f, node));
     }
     add_names(run, node);
-    BST_TRY(
-        add_rows(ctx, run, s, f, truth, f->id, add_truth, cJSON_AddArrayToObject(node, "truth")));
-    BST_TRY(add_rows(ctx, run, s, f, detections, f->id, add_detection,
+    const exposure_range now = {f->id, f->id};
+    BST_TRY(add_rows(ctx, run, s, f, truth, now, add_truth, cJSON_AddArrayToObject(node, "truth")));
+    BST_TRY(add_rows(ctx, run, s, f, detections, now, add_detection,
                      cJSON_AddArrayToObject(node, "detections")));
-    return add_rows(ctx, run, s, f, tracks, s->exposures[oldest].id, add_track,
-                    cJSON_AddArrayToObject(node, "tracks"));
+    cJSON *list = cJSON_AddArrayToObject(node, "tracks");
+    BST_TRY(add_rows(ctx, run, s, f, tracks, now, add_track, list));
+    if (oldest == frame) {
+        return BST_OK;
+    }
+    /* the trail has what room the frame's own tracks leave */
+    const exposure_range trail = {s->exposures[oldest].id, s->exposures[frame - 1].id};
+    return add_rows(ctx, run, s, f, tracks, trail, add_track, list);
 }
 
 bst_status bst_view_run_frame(bst_ctx *ctx, bst_view_run *run, int64_t sensor, int64_t frame,

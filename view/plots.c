@@ -37,7 +37,9 @@ static const struct {
 } lines[BST_VIEW_LINES] = {
     {0, "true", "exposures",
      "SELECT e.mid_s, t.x_mid_px - e.boresight_x_px, t.y_mid_px - e.boresight_y_px"
-     " FROM truth t JOIN exposures e ON e.exposure_id = t.exposure_id AND e.sensor = t.sensor"
+     /* one row an exposure: repeated ones of a hostile file would multiply */
+     " FROM truth t JOIN (SELECT exposure_id, mid_s, boresight_x_px, boresight_y_px FROM exposures"
+     " WHERE sensor = ?1 GROUP BY exposure_id) e ON e.exposure_id = t.exposure_id"
      " WHERE t.sensor = ?1 AND t.kind = 'object' AND t.id = ?2 AND t.in_field = 1",
      true},
     {0, "estimated by control", "control",

@@ -11,6 +11,9 @@
 /* Longest list of exposures; a day of 100 frames a second has 8.6 million. */
 static const size_t EXPOSURES_MOST = 10000000;
 
+/* Looks at a run that is about to end, after which it was killed. */
+enum { ENDINGS_MOST = 5 };
+
 /* Index of the sensor's target in the table objects; -1: none. */
 static int64_t find_target(const bst_run_reader *reader, const char *name) {
     bst_ctx ignored = {0};
@@ -85,11 +88,22 @@ static void forget_sensors(bst_view_run *run) {
     run->samples = 0;
 }
 
+/* True while a process writes the run. A run that is about to end has a complete manifest but not
+ * yet its final name; it looks as if it was killed. */
+static bool is_in_progress(bst_view_run *run) {
+    bst_run_state state = bst_run_reader_state(run->reader);
+    const cJSON *complete =
+        cJSON_GetObjectItemCaseSensitive(bst_run_reader_manifest(run->reader), "complete");
+    bool ending = run->running && state == BST_RUN_KILLED && cJSON_IsTrue(complete);
+    run->endings = ending ? run->endings + 1 : 0;
+    return state == BST_RUN_RUNNING || (ending && run->endings <= ENDINGS_MOST);
+}
+
 /* Reads which sensors the run has, and whether it is in progress. */
 static bst_status read_sensors(bst_ctx *ctx, bst_view_run *run) {
     bst_run_sensor sensors[BST_EXPORT_SENSORS];
     int count = 0;
-    run->running = bst_run_reader_state(run->reader) == BST_RUN_RUNNING;
+    run->running = is_in_progress(run);
     BST_TRY(bst_run_sensors(ctx, run->reader, NULL, sensors, &count));
     for (int i = 0; i < count; i++) {
         run->sensor[i] = (bst_view_sensor){.sensor = sensors[i]};
@@ -158,13 +172,12 @@ void bst_view_run_close(bst_view_run *run) {
 
 /* ------------------------------------------------------------------ the list of exposures */
 
-/* Adds an exposure. NULL: out of memory, or too many. */
+/* Adds an exposure. NULL: out of memory. */
 static bst_view_exposure *add_exposure(bst_view_sensor *s, size_t *room) {
     void *memory = s->exposures;
     size_t needed = (s->count + 1) * sizeof *s->exposures;
-    if (s->count >= EXPOSURES_MOST ||
-        (*room < needed &&
-         bst_memory_grow(NULL, "out of memory", &memory, room, 2 * needed + 65536) != BST_OK)) {
+    if (*room < needed &&
+        bst_memory_grow(NULL, "out of memory", &memory, room, 2 * needed + 65536) != BST_OK) {
         return NULL;
     }
     s->exposures = memory;
@@ -194,6 +207,11 @@ static bst_status read_exposures(bst_ctx *ctx, bst_view_run *run, bst_view_senso
     size_t room = 0;
     BST_TRY(bst_io_rows_open(ctx, run->reader, sql, s->sensor.index, 0, &rows));
     while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
+        if (s->count == EXPOSURES_MOST) {
+            bst_run_reader_note_problem(run->reader, "only the first %zu exposures are listed",
+                                        s->count);
+            break;
+        }
         bst_view_exposure *e = add_exposure(s, &room);
         if (!e) {
             status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %zu exposures", s->count);
@@ -230,9 +248,9 @@ static bst_status read_windows(bst_ctx *ctx, bst_view_run *run, bst_view_sensor 
         if (k == s->count || s->exposures[k].id != id) {
             continue;
         }
-        int64_t index = bst_io_rows_int(rows, 1) - !cube;
-        bool is_kept = !bst_io_rows_is_null(rows, 1) && index >= 0 && index < kept;
-        s->exposures[k].fits_index = is_kept ? index : -1;
+        int64_t index = bst_io_rows_int(rows, 1), first = cube ? 0 : 1;
+        bool is_kept = !bst_io_rows_is_null(rows, 1) && index >= first && index - first < kept;
+        s->exposures[k].fits_index = is_kept ? index - first : -1;
         s->exposures[k].x0_px = bst_io_rows_real(rows, 2);
         s->exposures[k].y0_px = bst_io_rows_real(rows, 3);
         s->exposures[k].binning = fmax(1.0, bst_io_rows_real(rows, 4));
@@ -245,7 +263,7 @@ static bst_status read_windows(bst_ctx *ctx, bst_view_run *run, bst_view_sensor 
 static bst_status list_file(bst_ctx *ctx, bst_view_sensor *s) {
     int64_t frames = s->pixels ? bst_fits_reader_info(s->pixels)->frames : 0;
     size_t room = 0;
-    for (int64_t i = 0; i < frames; i++) {
+    for (int64_t i = 0; i < frames && s->count < EXPOSURES_MOST; i++) {
         bst_view_exposure *e = add_exposure(s, &room);
         if (!e) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %zu exposures", s->count);

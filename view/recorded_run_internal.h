@@ -47,6 +47,7 @@ struct bst_view_run {
     char path[4096];        /* of the folder, as it was given */
     bst_run_reader *reader; /* NULL between calls while the run is in progress */
     bool running;           /* it was in progress when its sensors were read */
+    int endings;            /* looks in a row at which it was about to end */
     int sensors;
     bst_view_sensor sensor[BST_EXPORT_SENSORS];
     uint64_t requests;

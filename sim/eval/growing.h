@@ -16,7 +16,7 @@ static inline bst_status bst_grow(bst_ctx *ctx, void **items, int count, int *ro
     if (count <= *room) {
         return BST_OK;
     }
-    int more = count + count / 2 + 16;
+    int more = count < INT32_MAX / 2 ? count + count / 2 + 16 : INT32_MAX;
     size_t held = (size_t)*room * bytes;
     BST_TRY(bst_memory_grow(ctx, "out of memory for the figures of tracks", items, &held,
                             (size_t)more * bytes));

@@ -241,6 +241,29 @@ static void errors_say_where(void **state) {
     }
 }
 
+static void byte_order_mark_is_no_name(void **state) {
+    (void)state;
+    bst_score_points p;
+    read_csv("\xEF\xBB\xBFx,y,frame\n1,2,3\n", &p);
+    assert_int_equal(p.count, 1);
+    bst_score_points_free(&p);
+}
+
+/* The product of the points would need 2.5 GB. */
+static void frame_with_too_many_points_is_refused(void **state) {
+    (void)state;
+    bst_score_points p = {0};
+    bst_score_result result;
+    const bst_score_options options = {5.0, 0, 1};
+    for (int i = 0; i < 12500; i++) {
+        const bst_score_point point = {.key = {0, 7}, .x_px = 50.0 * i, .id = -1};
+        bst_assert_ok(&ctx, bst_score_points_add(&ctx, &p, &point));
+    }
+    assert_int_equal(bst_score_compute(&ctx, &p, &p, &options, &result), BST_ERR_ARGUMENT);
+    assert_non_null(strstr(ctx.message, "frame 7 has 12500 true and 12500 found points"));
+    bst_score_points_free(&p);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(figures_are_those_by_hand),
@@ -251,6 +274,8 @@ int main(void) {
         cmocka_unit_test(optional_objects_need_not_be_found),
         cmocka_unit_test(points_come_from_json),
         cmocka_unit_test(errors_say_where),
+        cmocka_unit_test(byte_order_mark_is_no_name),
+        cmocka_unit_test(frame_with_too_many_points_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

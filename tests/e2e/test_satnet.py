@@ -6,6 +6,8 @@ Usage, from the repository root: /usr/bin/python3 tests/e2e/test_satnet.py BORES
 import glob
 import json
 import os
+import shutil
+import sqlite3
 import unittest
 
 import numpy as np
@@ -154,6 +156,27 @@ class SatNet(unittest.TestCase):
         found = runs.database(self.made).execute(
             "SELECT count(*) FROM detections WHERE label = 'object'").fetchone()[0]
         self.assertEqual(by_truth["true_positives"] + by_truth["false_positives"], found)
+        copy = os.path.join(runs.scratch(), "copy")
+        shutil.copytree(self.made, copy)
+        with sqlite3.connect(copy + "/run.sqlite") as tables:
+            tables.execute("DROP TABLE frames")  # as with /record/frames none
+        self.assertEqual(score(copy, "--truth", copy)["figures"], by_truth["figures"])
+        with sqlite3.connect(copy + "/run.sqlite") as tables:
+            tables.execute("UPDATE exposures SET dropped = 1 WHERE exposure_id = 3")
+        self.assertEqual(score(self.out, "--truth", copy)["truths"], 7)  # a dropped frame shows nothing
+        with sqlite3.connect(copy + "/run.sqlite") as tables:  # the only sensor, but not the first
+            for (name,) in tables.execute("SELECT m.name FROM sqlite_master m, pragma_table_info(m.name) c"
+                                          " WHERE m.type = 'table' AND c.name = 'sensor'").fetchall():
+                tables.execute(f"UPDATE {name} SET sensor = 1")
+        self.assertEqual(score(copy, "--truth", self.out)["true_positives"], by_labels["true_positives"])
+        os.mkdir(copy + "/labels")
+        for name, numbered in (("a", {}), ("b", {"sequence_id": 0}), ("c", {"sequence_id": 5}), ("d", {"sequence_id": 0})):
+            with open(f"{copy}/labels/{name}.json", "w", encoding="utf-8") as file:
+                json.dump({"data": {**annotations(self.out)[0], "file": numbered}}, file)
+        for name in "bd":  # the place of a is 0
+            self.assertIn("is in two files", call("score", copy + "/labels", "--truth", copy).stderr)
+            os.remove(f"{copy}/labels/{name}.json")
+        self.assertEqual(call("score", copy + "/labels", "--truth", copy).returncode, 0)
 
     def test_split_follows_names(self):
         def parts(folder):

@@ -3,6 +3,7 @@
 
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_view.py BORESIGHT
 """
+import fcntl
 import glob
 import hashlib
 import json
@@ -293,6 +294,43 @@ class View(Checks):
         for peer in idle:
             peer.close()
         self.assertEqual(self.viewer.status(), 200)
+
+    def test_run_that_ends(self):
+        """Between the end of its lock and its final name a run is not one that was killed."""
+        final = os.path.join(runs.scratch(), "ends")
+        shutil.copytree(self.made, final + ".partial")
+        with open(final + ".partial/lock", "w", encoding="ascii") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            viewer = Viewer(final + ".partial")
+        self.assertEqual(viewer.json("api/refresh")["state"], "still running")
+        os.remove(final + ".partial/lock")
+        os.rename(final + ".partial", final)
+        self.assertEqual(viewer.json("api/refresh")["state"], "complete")
+        self.assertEqual(viewer.end()[0], 0)
+
+    def test_hostile_tables(self):
+        """Repeated exposures do not multiply, and a crowded trail leaves the frame its tracks."""
+        made = os.path.join(runs.scratch(), "hostile")
+        shutil.copytree(self.made, made)
+        with sqlite3.connect(made + "/run.sqlite") as tables:
+            for _ in range(14):  # 3 * 2^14 rows each
+                tables.execute("INSERT INTO exposures SELECT * FROM exposures")
+                tables.execute("INSERT INTO truth SELECT * FROM truth WHERE kind = 'object'")
+            tables.execute("UPDATE frames SET fits_index = -9223372036854775808 WHERE exposure_id = 1")
+            tables.execute("CREATE TABLE kept AS SELECT * FROM tracks WHERE exposure_id = 2")
+            tables.execute("UPDATE tracks SET exposure_id = 1")
+            own = tables.execute("SELECT count(*) FROM kept").fetchone()[0]
+            for _ in range(14):
+                tables.execute("INSERT INTO tracks SELECT * FROM tracks")
+            tables.execute("INSERT INTO tracks SELECT * FROM kept")
+        begin = time.monotonic()
+        viewer = Viewer(made)
+        found = viewer.json("api/frame?sensor=0&frame=2")["tracks"]
+        self.assertGreater(own, 0)
+        self.assertEqual((sum(mark["now"] for mark in found), len(found)), (own, 5000))
+        self.assertGreater(viewer.numbers("api/plot?sensor=0&panel=pointing_error&from=0&to=10&columns=100")[0], 0)
+        self.assertLess(time.monotonic(), begin + 30)  # a join of all has 800 million rows
+        self.assertEqual(viewer.end()[0], 0)
 
     def test_port_in_use(self):
         result = runs.call("view", self.made, "--no-browser", "--port", str(self.viewer.port))

@@ -129,6 +129,10 @@ bst_status bst_score_points_add_csv(bst_ctx *ctx, const char *name, char *text,
                                     bst_score_points *points) {
     csv c = {.ctx = ctx, .name = name};
     bool named = false;
+    static const char byte_order_mark[] = "\xEF\xBB\xBF"; /* spreadsheets write it */
+    if (strncmp(text, byte_order_mark, sizeof byte_order_mark - 1) == 0) {
+        text += sizeof byte_order_mark - 1;
+    }
     for (char *line = text; line && *line;) {
         char *end = strchr(line, '\n');
         if (end) {

@@ -1,6 +1,7 @@
 #include "sim/analysis/score/score_figures.h"
 
 #include <assert.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -11,6 +12,9 @@
 /* Cost of an object without a pair, in units of the radius: above the sum of the distances of any
  * frame of up to a million points, so that the assignment has as many pairs as possible. */
 static const double UNPAIRED_RADII = 1e6;
+
+/* Most pairs of a true and a found point of a frame, at 16 bytes each. */
+static const size_t MOST_PAIRS = 50000000;
 
 /* Sums of a frame, or of several. */
 typedef struct tally {
@@ -357,6 +361,13 @@ static bst_status make_room(bst_ctx *ctx, scorer *p) {
         f = skip_to(p->found, f, &p->keys[i]);
         size_t truths = (size_t)items_of(p->truth, t, &p->keys[i]),
                founds = (size_t)items_of(p->found, f, &p->keys[i]);
+        if (truths > 0 && founds > MOST_PAIRS / truths) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "frame %" PRId64
+                            " has %zu true and %zu found points (allowed: a "
+                            "product of at most %zu); leave out weak ones with --least-score",
+                            p->keys[i].frame, truths, founds, MOST_PAIRS);
+        }
         most = truths + founds > most ? truths + founds : most;
         pairs = truths * founds > pairs ? truths * founds : pairs;
     }

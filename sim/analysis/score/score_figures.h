@@ -52,7 +52,7 @@ typedef struct bst_score_result {
  *            most pairs, and of those the least sum of distances. Found points without a pair that
  *            are that near to an optional one do not count. Intervals: percentile bootstrap over
  *            frames, or over sequences if there are several.
- * Errors:    BST_ERR_ARGUMENT: no frame; BST_ERR_MEMORY
+ * Errors:    BST_ERR_ARGUMENT: no frame, or one with too many points; BST_ERR_MEMORY
  * Reference: precision, recall and F1: van Rijsbergen 1979. GOSPA (p = 2, alpha = 2):
  *            sim/eval/gospa.h. spotGEO: kelvins.esa.int/spot-the-geo-satellites/scoring; Chen et
  *            al. 2021, spotGEO dataset. Bootstrap: Efron and Tibshirani 1993, section 13.3 */

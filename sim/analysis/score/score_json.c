@@ -105,7 +105,13 @@ static bst_status add_satnet(bst_ctx *ctx, const char *name, const cJSON *data, 
                        "is no frame (allowed: sensor with width and height in pixels, and the list "
                        "objects, as SatNet has them)");
     }
+    int before = points->frame_count;
     BST_TRY(bst_score_points_add_frame(ctx, points, key));
+    if (points->frame_count == before) {
+        return fail_at(ctx, name, "/data/file",
+                       "the same frame is in two files (allowed: a sequence_id of its own in each "
+                       "file, or in none)");
+    }
     int index = 0;
     for (const cJSON *object = objects->child; object; object = object->next, index++) {
         BST_TRY(add_satellite(ctx, name, object, index, size_px, points));

@@ -4,6 +4,7 @@
 #include <cjson/cJSON.h>
 #include <dirent.h>
 #include <errno.h>
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -77,9 +78,47 @@ static int is_annotation(const struct dirent *entry) {
            strcmp(entry->d_name + length - 5, ".json") == 0;
 }
 
+/* Fails if two files begin with the same frame. `first` has a frame a file; it gets sorted. */
+static bst_status check_files(bst_ctx *ctx, const char *folder, bst_score_key *first, int count) {
+    qsort(first, (size_t)count, sizeof *first, by_key);
+    for (int i = 1; i < count; i++) {
+        if (by_key(&first[i - 1], &first[i]) == 0) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "%.400s: frame %" PRId64 " of sequence %" PRId64
+                            " is in two files (allowed: a number of its own in "
+                            "/data/file/sequence_id of each file, or in none)",
+                            folder, first[i].frame, first[i].sequence);
+        }
+    }
+    return BST_OK;
+}
+
+/* Reads JSON files of a folder. */
+static bst_status read_files(bst_ctx *ctx, const char *folder, struct dirent **entries, int count,
+                             bst_score_points *out) {
+    char file[4400];
+    int files = 0;
+    bst_score_key *first = malloc((size_t)count * sizeof *first);
+    bst_status status =
+        first ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d files", count);
+    for (int i = 0; status == BST_OK && i < count; i++) {
+        int before = out->frame_count;
+        snprintf(file, sizeof file, "%s/%s", folder, entries[i]->d_name);
+        status = read_json(ctx, file, i, out);
+        if (status == BST_OK && out->frame_count > before) {
+            first[files++] = out->frames[before];
+        }
+    }
+    if (status == BST_OK) {
+        status = check_files(ctx, folder, first, files);
+    }
+    free(first);
+    return status;
+}
+
 /* Reads the JSON files of a folder, or of its folder Annotations, in the order of their names. */
 static bst_status read_folder(bst_ctx *ctx, const char *path, bst_score_points *out) {
-    char folder[4096], file[4400];
+    char folder[4096];
     struct stat there;
     struct dirent **entries = NULL;
     snprintf(folder, sizeof folder, "%.4000s/Annotations", path);
@@ -93,12 +132,10 @@ static bst_status read_folder(bst_ctx *ctx, const char *path, bst_score_points *
                           "%.400s: holds neither a run nor annotations (allowed: the folder of a "
                           "run, or one with 1 to %d files *.json as SatNet has them)",
                           folder, MOST_FILES);
+    } else {
+        status = read_files(ctx, folder, entries, count, out);
     }
     for (int i = 0; i < count; i++) {
-        if (status == BST_OK) {
-            snprintf(file, sizeof file, "%s/%s", folder, entries[i]->d_name);
-            status = read_json(ctx, file, i, out);
-        }
         free(entries[i]);
     }
     free(entries);

@@ -1,5 +1,6 @@
 /* Points from the tables of a run. */
 #include <math.h>
+#include <stdio.h>
 
 #include "sim/analysis/score/score_points.h"
 #include "sim/run/run_sensors.h"
@@ -20,9 +21,15 @@ static const char *const point_sql[] = {
         "SELECT t.exposure_id, " IN_FRAME("t.x_centroid_px", "x0_px") ", "
         IN_FRAME("t.y_centroid_px", "y0_px") ", t.snr, t.id FROM truth t LEFT JOIN frames f "
         "USING (sensor, exposure_id) WHERE t.sensor = ?1 AND t.kind = 'object' AND "
-        "t.in_field = 1 AND t.occulted = 0 AND t.electrons > 0",
+        "t.in_field = 1 AND t.occulted = 0 AND t.electrons > 0 AND t.exposure_id NOT IN "
+        "(SELECT exposure_id FROM exposures WHERE sensor = ?1 AND dropped = 1)",
 };
 #undef IN_FRAME
+
+/* Stands for the table frames of a run that did not record it: positions are on the sensor. */
+static const char no_frames_sql[] =
+    "WITH frames(sensor, exposure_id, x0_px, y0_px, binning) AS "
+    "(SELECT NULL, NULL, NULL, NULL, NULL WHERE 0) ";
 
 /* Frames with a result: a truth has all that were exposed. */
 static const char *const frame_sql[] = {
@@ -32,14 +39,14 @@ static const char *const frame_sql[] = {
 };
 
 static bst_status add_frames(bst_ctx *ctx, const bst_run_reader *run, const char *sql,
-                             int64_t sensor, bst_score_points *points) {
+                             int64_t index, int64_t sequence, bst_score_points *points) {
     bst_io_rows *rows;
     bool more = false;
-    BST_TRY(bst_io_rows_open(ctx, run, sql, sensor, 0, &rows));
+    BST_TRY(bst_io_rows_open(ctx, run, sql, index, 0, &rows));
     bst_status status = bst_io_rows_next(ctx, rows, &more);
     while (status == BST_OK && more) {
         status = bst_score_points_add_frame(ctx, points,
-                                            (bst_score_key){sensor, bst_io_rows_int(rows, 0)});
+                                            (bst_score_key){sequence, bst_io_rows_int(rows, 0)});
         if (status == BST_OK) {
             status = bst_io_rows_next(ctx, rows, &more);
         }
@@ -48,15 +55,21 @@ static bst_status add_frames(bst_ctx *ctx, const bst_run_reader *run, const char
     return status;
 }
 
-static bst_status add_points(bst_ctx *ctx, const bst_run_reader *run, int64_t sensor,
-                             const bst_score_selection *selection, bst_score_points *points) {
+/* Adds the points of the sensor `index`; their frames are those of `sequence`. */
+static bst_status add_points(bst_ctx *ctx, const bst_run_reader *run, int64_t index,
+                             int64_t sequence, const bst_score_selection *selection,
+                             bst_score_points *points) {
     bst_io_rows *rows;
     bool more = false;
-    BST_TRY(
-        bst_io_rows_open(ctx, run, point_sql[selection->what], sensor, selection->unknown, &rows));
+    char sql[1000];
+    bool has_frames =
+        bst_run_reader_int(run, "SELECT count(*) FROM sqlite_master WHERE name = 'frames'", 0, 0) >
+        0;
+    snprintf(sql, sizeof sql, "%s%s", has_frames ? "" : no_frames_sql, point_sql[selection->what]);
+    BST_TRY(bst_io_rows_open(ctx, run, sql, index, selection->unknown, &rows));
     bst_status status = bst_io_rows_next(ctx, rows, &more);
     while (status == BST_OK && more) {
-        const bst_score_point p = {.key = {sensor, bst_io_rows_int(rows, 0)},
+        const bst_score_point p = {.key = {sequence, bst_io_rows_int(rows, 0)},
                                    .x_px = bst_io_rows_real(rows, 1),
                                    .y_px = bst_io_rows_real(rows, 2),
                                    .score = bst_io_rows_real(rows, 3),
@@ -81,9 +94,11 @@ bst_status bst_score_points_add_run(bst_ctx *ctx, const char *folder,
     BST_TRY(bst_run_reader_open(ctx, folder, &run));
     bst_status status = bst_run_sensors(ctx, run, selection->sensor, sensors, &count);
     for (int i = 0; status == BST_OK && i < count; i++) {
-        status = add_frames(ctx, run, frame_sql[selection->what], sensors[i].index, points);
+        /* one sensor of several compares with a file that names no sequence */
+        int64_t index = sensors[i].index, sequence = count == 1 ? 0 : index;
+        status = add_frames(ctx, run, frame_sql[selection->what], index, sequence, points);
         if (status == BST_OK) {
-            status = add_points(ctx, run, sensors[i].index, selection, points);
+            status = add_points(ctx, run, index, sequence, selection, points);
         }
     }
     bst_run_reader_close(run);
