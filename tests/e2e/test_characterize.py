@@ -133,7 +133,7 @@ class Characterize(unittest.TestCase):
             for _ in range(4):
                 signal = rng.poisson(light * response + 120 * exposure) / gain
                 pixels = 2 + signal + 3 * rng.standard_normal(signal.shape)
-                pixels[:, bad] = np.nan
+                pixels[bad, :] = np.nan
                 hdus.append(fits.ImageHDU(pixels.astype(np.float32)))
                 hdus[-1].header.update({**header, "EXPTIME": exposure})
             fits.HDUList(hdus).writeto(f"{folder}/{name}.fits")
@@ -164,10 +164,11 @@ class Characterize(unittest.TestCase):
         found = figures("a", ("bias", "bias"), ("flat", "other"), more=("--overwrite",))
         self.assertEqual(found["gain_e_per_dn"]["value"], 1.5)
         self.assertFalse(os.path.exists(folder + "/a/dark_map.fits"))
-        # columns of BLANK pixels leave the dark current as it is
-        frames("gaps", 20, 0, range(60, 70))
+        # rows of BLANK pixels leave the ramp of the read-out and the dark current as they are
+        frames("gaps", 20, np.linspace(0, 200, side)[:, None], range(60, 70))
         found = figures("c", ("bias", "bias"), ("dark", "gaps"))
         self.assertAlmostEqual(found["dark_current_e_per_s"]["value"], 90, delta=1)  # 120 by the header's gain
+        self.assertAlmostEqual(found["readout_ramp_dn"]["value"], 100, delta=3)
 
     @unittest.skipUnless(os.path.exists(NEOSSAT), "BORESIGHT_NEOSSAT names no folder with the dark")
     def test_neossat(self):
