@@ -16,8 +16,9 @@ typedef struct bst_app_command {
 /* Runs the command that a command line names.
  *
  * Given:     argc, argv  of the program
- *            more        commands besides those that libboresight has, ended by name NULL; NULL:
- * none Returned:  exit status (sim/cli/cli.h) */
+ *            more        commands besides those that libboresight has, ended by name NULL;
+ *                        NULL: none
+ * Returned:  exit status (sim/cli/cli.h) */
 int bst_app_run(int argc, char **argv, const bst_app_command *more);
 
 /* boresight new: writes a scenario for an observer and a target. */

@@ -15,6 +15,9 @@ import random
 import sys
 import unittest
 
+import numpy as np
+from astropy.io import fits
+
 import runs
 from runs import call
 
@@ -116,6 +119,56 @@ class Characterize(unittest.TestCase):
         wrong = call("characterize", "--map", "boresight", "--bias", bias, "--dark", runs.TRACK, "--out", folder + "/b")
         self.assertEqual(wrong.returncode, 1)
         self.assertIn("track.json: does not begin as a FITS file", wrong.stderr)
+
+    def test_flats_and_darks_of_other_exposures(self):
+        """A sensor made here, with a level near 0, dark signal and dead pixels: darks of 20 s, flats of 4 s."""
+        folder, rng, gain, side, dead = runs.scratch(), np.random.default_rng(5), 2.0, 128, 32
+        response = 1 + 0.01 * rng.standard_normal((side, side))
+        response.flat[rng.choice(side * side, dead, replace=False)] = 0
+        header = {"GAIN": 1.5, "RDNOISE": 6, "OFFSET": 2, "PIXSCALE": 3, "FRAMEID": 1,
+                  "DATE-OBS": "2026-01-01T00:00:00", **{f"OBS{kind}{axis}": size for kind, size in (("POS", 7e6), ("VEL", 7e3)) for axis in "XYZ"}}
+
+        def frames(name, exposure, light, bad=()):
+            hdus = [fits.PrimaryHDU()]
+            for _ in range(4):
+                signal = rng.poisson(light * response + 120 * exposure) / gain
+                pixels = 2 + signal + 3 * rng.standard_normal(signal.shape)
+                pixels[bad, :] = np.nan
+                hdus.append(fits.ImageHDU(pixels.astype(np.float32)))
+                hdus[-1].header.update({**header, "EXPTIME": exposure})
+            fits.HDUList(hdus).writeto(f"{folder}/{name}.fits")
+
+        def figures(out, *kinds, more=()):
+            words = [word for kind, name in kinds for word in ("--" + kind, f"{folder}/{name}.fits")]
+            runs.call_well("characterize", "--map", "boresight", "--out", f"{folder}/{out}", *words, *more)
+            with open(f"{folder}/{out}/report.json", encoding="utf-8") as file:
+                return json.load(file)["figures"]
+
+        frames("bias", 0, 0)
+        frames("other", 0, 0)
+        frames("dark", 20, 0)
+        frames("flat", 4, 20000)
+        found = figures("a", ("bias", "bias"), ("dark", "dark"), ("flat", "flat"), more=("--extends", runs.STARE))
+        self.assertAlmostEqual(found["prnu_rms"]["value"], 0.01, delta=0.0003)
+        self.assertAlmostEqual(found["dead_fraction"]["value"], dead / side**2, delta=1e-9)
+        self.assertAlmostEqual(found["gain_e_per_dn"]["value"], gain, delta=0.05)
+        with open(folder + "/a/detector.json", encoding="utf-8") as file:
+            self.assertEqual(json.load(file)["set"][CAMERA + "detector/bad_columns"], 0)
+        # darks of another exposure alone are no level of the flats
+        found = figures("b", ("dark", "dark"), ("flat", "flat"))
+        self.assertIsNone(found["prnu_rms"]["value"])
+        self.assertIn("darks of the flats' exposure", found["prnu_rms"]["method"])
+        self.assertAlmostEqual(found["gain_e_per_dn"]["value"], gain, delta=0.05)
+        # flats without light: the header's gain; nothing of the earlier run stays
+        self.assertTrue(os.path.exists(folder + "/a/dark_map.fits"))
+        found = figures("a", ("bias", "bias"), ("flat", "other"), more=("--overwrite",))
+        self.assertEqual(found["gain_e_per_dn"]["value"], 1.5)
+        self.assertFalse(os.path.exists(folder + "/a/dark_map.fits"))
+        # rows of BLANK pixels leave the ramp of the read-out and the dark current as they are
+        frames("gaps", 20, np.linspace(0, 200, side)[:, None], range(60, 70))
+        found = figures("c", ("bias", "bias"), ("dark", "gaps"))
+        self.assertAlmostEqual(found["dark_current_e_per_s"]["value"], 90, delta=1)  # 120 by the header's gain
+        self.assertAlmostEqual(found["readout_ramp_dn"]["value"], 100, delta=3)
 
     @unittest.skipUnless(os.path.exists(NEOSSAT), "BORESIGHT_NEOSSAT names no folder with the dark")
     def test_neossat(self):

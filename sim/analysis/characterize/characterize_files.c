@@ -13,7 +13,8 @@
 #include "sim/io/fits_image.h"
 #include "sim/io/plot.h"
 
-/* Statistics below this many standard errors are left at the model's 0. */
+/* Statistics below this many standard errors are 0, also where the scenario that is extended has
+ * another value. */
 static const double LEAST_SIGNIFICANCE = 2.0;
 
 enum { HISTOGRAM_BINS = 200 };
@@ -25,16 +26,23 @@ typedef struct writer {
     const bst_sensor_figures *figures;
 } writer;
 
-/* True if detector.json gives a figure. Statistics that maps replace are left out with --maps. */
-static bool is_given(const writer *w, int i) {
+/* Value of a figure in detector.json; NAN: left out, as statistics that maps replace with --maps.
+ */
+static double value_given(const writer *w, int i) {
     const bst_sensor_estimate *e = &w->figures->figures[i];
+    const char *key = bst_sensor_figure_names[i].camera_key;
     bool mapped = (i >= BST_SENSOR_DARK && i <= BST_SENSOR_HOT_SPREAD && w->figures->dark_map) ||
                   (i >= BST_SENSOR_PRNU && i <= BST_SENSOR_BAD_COLUMNS && w->figures->prnu_map);
-    bool small = bst_sensor_figure_names[i].camera_key &&
-                 strncmp(bst_sensor_figure_names[i].camera_key, "detector/", 9) == 0 &&
-                 !(e->value > LEAST_SIGNIFICANCE * e->sigma);
-    return bst_sensor_figure_names[i].camera_key && isfinite(e->value) && !small &&
-           !(w->request->maps && mapped);
+    if (!key || !isfinite(e->value) || (w->request->maps && mapped)) {
+        return NAN;
+    }
+    if (strncmp(key, "detector/", 9) != 0) {
+        return fmax(e->value, 0.0);
+    }
+    if (isnan(e->sigma)) { /* of an unknown error: neither significant nor 0 */
+        return NAN;
+    }
+    return e->value > LEAST_SIGNIFICANCE * e->sigma ? e->value : 0.0;
 }
 
 /* The scenario that changes a camera; NULL: out of memory. */
@@ -50,10 +58,11 @@ static cJSON *detector_json(const writer *w) {
     }
     cJSON *set = cJSON_AddObjectToObject(root, "set");
     for (int i = 0; i < BST_SENSOR_FIGURES; i++) {
-        if (is_given(w, i)) {
+        double value = value_given(w, i);
+        if (isfinite(value)) {
             snprintf(pointer, sizeof pointer, "%.400s/%s", w->request->camera,
                      bst_sensor_figure_names[i].camera_key);
-            bst_json_add_number(set, pointer, fmax(w->figures->figures[i].value, 0.0));
+            bst_json_add_number(set, pointer, value);
         }
     }
     if (w->request->maps && w->figures->dark_map) {
@@ -150,7 +159,8 @@ static bst_status write_map(bst_ctx *ctx, const writer *w, const char *name, con
     return status;
 }
 
-/* Histogram of the dark map between its 0.1th percentile and the 99.9th. */
+/* Histogram of the dark map from below its 5th percentile, by a fifth of the distance to the 95th,
+ * to the 99.9th. */
 static void put_histogram(FILE *script, const bst_sensor_figures *f) {
     int64_t bins[HISTOGRAM_BINS] = {0};
     double low = f->percentiles_e_per_s[0], high = f->percentiles_e_per_s[6];
@@ -176,7 +186,8 @@ static bst_status write_plot(bst_ctx *ctx, const writer *w) {
     const bst_sensor_figures *f = w->figures;
     char path[4096 + 32];
     bst_plot plot;
-    int panels = (f->line.power != NULL) + (f->dark_map != NULL);
+    bool dark = f->dark_map && isfinite(f->percentiles_e_per_s[0]); /* a pixel has a value */
+    int panels = (f->line.power != NULL) + dark;
     if (panels == 0) {
         return BST_OK;
     }
@@ -189,7 +200,7 @@ static bst_status write_plot(bst_ctx *ctx, const writer *w) {
         }
         fprintf(plot.script, "EOD\n");
     }
-    if (f->dark_map) {
+    if (dark) {
         put_histogram(plot.script, f);
     }
     fprintf(plot.script, "set multiplot layout %d,1\nset grid\nunset key\n", panels);
@@ -199,7 +210,7 @@ static bst_status write_plot(bst_ctx *ctx, const writer *w) {
                 "plot $rows with lines, %.6g with lines dashtype 2\n",
                 f->line.least_ratio);
     }
-    if (f->dark_map) {
+    if (dark) {
         fprintf(plot.script,
                 "set logscale y\nset xlabel 'dark current, e-/s'\nset ylabel 'pixels'\n"
                 "plot $dark with steps\n");
@@ -208,11 +219,24 @@ static bst_status write_plot(bst_ctx *ctx, const writer *w) {
     return bst_plot_end(ctx, &plot, NULL);
 }
 
+/* Removes maps and plot of an earlier run, so that none stays beside another report. */
+static void remove_earlier(const bst_characterize_request *request) {
+    static const char *const names[] = {"dark_map.fits", "prnu_map.fits", "plot.png"};
+    char path[4096 + 32];
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        snprintf(path, sizeof path, "%s/%s", request->out, names[i]);
+        (void)remove(path); /* mostly there is none; what remains is overwritten below */
+    }
+}
+
 bst_status bst_characterize_write(bst_ctx *ctx, const bst_characterize_request *request,
                                   const bst_sensor_stacks *stacks,
                                   const bst_sensor_figures *figures) {
     const writer w = {request, stacks, figures};
     char path[4096 + 32];
+    if (request->overwrite) {
+        remove_earlier(request);
+    }
     if (figures->dark_map) {
         BST_TRY(write_map(ctx, &w, "dark_map.fits", figures->dark_map, "electron/s"));
     }

@@ -134,6 +134,17 @@ bst_clipped_moments bst_clipped_moments_of(float *values, size_t count, double c
     return m;
 }
 
+bst_sensor_estimate bst_root_estimate(bst_sensor_estimate variance) {
+    if (isnan(variance.value)) {
+        return (bst_sensor_estimate){NAN, NAN};
+    }
+    double value = sqrt(fmax(variance.value, 0.0));
+    /* near 0 the error of the root is that of a variance of one standard error */
+    double floor_value = sqrt(fmax(fabs(variance.value), variance.sigma));
+    return (bst_sensor_estimate){
+        value, floor_value > 0.0 ? 0.5 * variance.sigma / floor_value : variance.sigma};
+}
+
 bst_sensor_estimate bst_mean_estimate(const double *values, int count) {
     double sum = 0.0, sum2 = 0.0;
     int n = 0;

@@ -36,6 +36,9 @@ void bst_sort_floats(float *values, size_t count);
 /* Median of sorted values; NAN without any. */
 double bst_sorted_median(const float *values, size_t count);
 
+/* Root of a variance; 0 for a variance that the noise made negative, NAN for one that is NAN. */
+bst_sensor_estimate bst_root_estimate(bst_sensor_estimate variance);
+
 /* Mean of values and its standard error from their scatter; NAN values are skipped. */
 bst_sensor_estimate bst_mean_estimate(const double *values, int count);
 

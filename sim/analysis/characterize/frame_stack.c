@@ -21,6 +21,7 @@ typedef struct reduction {
     bst_keyword_map whole; /* the map without sections: overscan and image are cut here */
     bst_recorded_frames *recorded;
     bst_frame_stack *stack;
+    double *sum;    /* [height][width] of all frames: a float loses the last bits of many frames */
     float *before;  /* [height][width] the first frame of a pair */
     float *scratch; /* [height * width] */
     double *rows;   /* [height] */
@@ -56,10 +57,12 @@ static bst_status make_room(bst_ctx *ctx, reduction *r, const bst_recorded_frame
     s->mean = calloc(pixels, sizeof *s->mean);
     s->last = calloc(pixels, sizeof *s->last);
     s->overscan = calloc((size_t)overscan_width * (size_t)s->height + 1, sizeof *s->overscan);
+    r->sum = calloc(pixels, sizeof *r->sum);
     r->before = calloc(pixels, sizeof *r->before);
     r->scratch = calloc(pixels, sizeof *r->scratch);
     r->rows = calloc((size_t)s->height, sizeof *r->rows);
-    return s->levels && s->mean && s->last && s->overscan && r->before && r->scratch && r->rows
+    return s->levels && s->mean && s->last && s->overscan && r->sum && r->before && r->scratch &&
+                   r->rows
                ? BST_OK
                : bst_fail(ctx, BST_ERR_MEMORY, "no memory for frames of %d x %d pixels", s->width,
                           s->height);
@@ -178,7 +181,7 @@ static bst_status add_frame(bst_ctx *ctx, reduction *r, int64_t index, int frame
     }
     for (size_t i = 0; i < pixels; i++) {
         s->integer = s->integer && (isnan(s->last[i]) || s->last[i] == floorf(s->last[i]));
-        s->mean[i] += s->last[i];
+        r->sum[i] += s->last[i];
         r->scratch[i] = s->last[i];
     }
     s->levels[index] = bst_clipped_moments_of(r->scratch, pixels, CLIP).mean;
@@ -207,7 +210,7 @@ static bst_status reduce(bst_ctx *ctx, reduction *r, const char *const *paths, i
     }
     size_t pixels = (size_t)s->width * (size_t)s->height;
     for (size_t i = 0; i < pixels; i++) {
-        s->mean[i] /= (float)s->count;
+        s->mean[i] = (float)(r->sum[i] / s->count);
     }
     for (int k = 0; k < BST_STACK_BLOCKS && s->pairs > 0; k++) {
         s->variance[k] /= s->pairs;
@@ -224,6 +227,7 @@ bst_status bst_frame_stack_read(bst_ctx *ctx, const char *kind, const char *cons
     r.whole.image_section[0] = r.whole.bias_section[0] = '\0';
     bst_status status = reduce(ctx, &r, paths, count);
     bst_recorded_frames_close(r.recorded);
+    free(r.sum);
     free(r.before);
     free(r.scratch);
     free(r.rows);

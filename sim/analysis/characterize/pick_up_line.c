@@ -9,6 +9,8 @@
 
 /* Half width of the running median that gives the continuum; the lowest bins have no line. */
 enum { CONTINUUM = 30, FIRST_BIN = 5, GROUPS = 8, STEPS = 24 };
+/* The line and its highest side lobes reach this many bins. */
+enum { LINE_BINS = 4 };
 
 static const double PI = 3.14159265358979323846;
 /* Outliers beyond this many robust standard deviations are clipped. */
@@ -123,12 +125,17 @@ static void measure(const float *rows, int width, int height, int peak, bst_pick
         double f = refine(rows, width, from, to, (peak - 1.0) / width, (peak + 1.0) / width);
         /* the continuum beside the line, outside its side lobes */
         double beside = 0.0;
-        for (int k = 8; k < 16; k++) {
-            beside += (power_at(rows, width, from, to, f - (k + 0.5) / width) +
-                       power_at(rows, width, from, to, f + (k + 0.5) / width)) /
-                      16.0;
+        int samples = 0;
+        for (int k = -16; k < 16; k++) {
+            /* spectra of real rows fold at 0 and 1/2: near an end a sample would be the line */
+            double sample = fabs(f + (k + 0.5) / width);
+            sample = fmin(sample, 1.0 - sample);
+            if ((k < -8 || k >= 8) && fabs(sample - f) * width >= LINE_BINS) {
+                beside += power_at(rows, width, from, to, sample);
+                samples++;
+            }
         }
-        double power = power_at(rows, width, from, to, f) - beside;
+        double power = power_at(rows, width, from, to, f) - beside / samples;
         frequency[g] = f;
         amplitude[g] = 2.0 * sqrt(fmax(power, 0.0)) / width;
     }

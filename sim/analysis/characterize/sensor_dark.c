@@ -39,26 +39,43 @@ static void subtract_level(dark_signal *d) {
     }
 }
 
+/* Closes the gaps of values that are NAN (BLANK pixels, shielded columns); returns the number of
+ * the others. */
+static size_t drop_nan(float *v, size_t count) {
+    size_t n = 0;
+    for (size_t i = 0; i < count; i++) {
+        if (!isnan(v[i])) {
+            v[n++] = v[i];
+        }
+    }
+    return n;
+}
+
 /* Excludes columns without dark signal, as at the edges of many sensors. */
 static void exclude_shielded(dark_signal *d) {
     int width = d->out->width, height = d->out->height;
     double *columns = malloc((size_t)width * sizeof *columns);
     double *sorted = malloc((size_t)width * sizeof *sorted);
+    int known = 0;
     for (int x = 0; columns && sorted && x < width; x++) {
         for (int y = 0; y < height; y++) {
             d->scratch[y] = d->map[(size_t)y * (size_t)width + (size_t)x];
         }
-        double sigma = bst_robust_sigma(d->scratch, (size_t)height); /* sorts */
-        columns[x] = bst_sorted_median(d->scratch, (size_t)height);
-        sorted[x] = columns[x];
+        size_t n = drop_nan(d->scratch, (size_t)height);
+        double sigma = bst_robust_sigma(d->scratch, n); /* sorts, from four values on */
+        columns[x] = n >= 4 ? bst_sorted_median(d->scratch, n) : NAN;
+        if (isnan(columns[x])) {
+            continue;
+        }
+        sorted[known++] = columns[x];
         /* a level that does not differ from 0 in one column says nothing */
-        if (columns[x] < CERTAIN * sigma / sqrt(height)) {
+        if (columns[x] < CERTAIN * sigma / sqrt((double)n)) {
             columns[x] = fmin(columns[x], 0.0);
         }
     }
-    if (columns && sorted) {
-        qsort(sorted, (size_t)width, sizeof *sorted, bst_compare_doubles);
-        double typical = sorted[width / 2], spread = sorted[3 * width / 4] - sorted[width / 4];
+    if (columns && sorted && known > 0) {
+        qsort(sorted, (size_t)known, sizeof *sorted, bst_compare_doubles);
+        double typical = sorted[known / 2], spread = sorted[3 * known / 4] - sorted[known / 4];
         for (int x = 0; x < width; x++) {
             if (typical > 4.0 * spread && columns[x] < SHIELDED * typical) {
                 d->out->shielded_columns++;
@@ -83,12 +100,7 @@ static bst_sensor_estimate fit_ramp(dark_signal *d, bst_sensor_estimate *slope) 
     }
     for (int y = 0; y < height; y++) {
         memcpy(d->scratch, d->map + (size_t)y * width, width * sizeof *d->scratch);
-        size_t n = 0;
-        for (size_t x = 0; x < width; x++) {
-            if (!isnan(d->scratch[x])) {
-                d->scratch[n++] = d->scratch[x];
-            }
-        }
+        size_t n = drop_nan(d->scratch, width);
         bst_sort_floats(d->scratch, n);
         medians[y] = bst_sorted_median(d->scratch, n);
     }
@@ -96,7 +108,7 @@ static bst_sensor_estimate fit_ramp(dark_signal *d, bst_sensor_estimate *slope) 
     for (int turn = 0; turn < 6; turn++) {
         double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, rest = 0;
         for (int y = 0; y < height; y++) {
-            if (turn == 0 || fabs(medians[y] - a - b * y) < limit) {
+            if (isfinite(medians[y]) && (turn == 0 || fabs(medians[y] - a - b * y) < limit)) {
                 n++;
                 sx += y;
                 sy += medians[y];
@@ -109,7 +121,7 @@ static bst_sensor_estimate fit_ramp(dark_signal *d, bst_sensor_estimate *slope) 
         a = (sy - b * sx) / n;
         for (int y = 0; y < height; y++) {
             double r = medians[y] - a - b * y;
-            if (turn == 0 || fabs(medians[y] - old_a - old_b * y) < limit) {
+            if (isfinite(r) && (turn == 0 || fabs(medians[y] - old_a - old_b * y) < limit)) {
                 rest += r * r / (n - 2.0);
             }
         }
@@ -166,9 +178,7 @@ static bst_clipped_moments measure_core(dark_signal *d, double per_s) {
     out->figures[BST_SENSOR_DARK] = (bst_sensor_estimate){dark.value * per_s, dark.sigma * per_s};
     out->method[BST_SENSOR_DARK] = "mean of the pixels that are not hot";
     bst_sensor_estimate v = bst_mean_estimate(medians, BST_STACK_BLOCKS);
-    double dsnu = sqrt(fmax(v.value, 0.0));
-    out->figures[BST_SENSOR_DSNU] =
-        (bst_sensor_estimate){dsnu, 0.5 * v.sigma / sqrt(fmax(fabs(v.value), v.sigma))};
+    out->figures[BST_SENSOR_DSNU] = bst_root_estimate(v);
     out->method[BST_SENSOR_DSNU] = "scatter of the dark map in 8 x 8 blocks, less its noise";
     return core;
 }
@@ -202,7 +212,9 @@ static void measure_hot(dark_signal *d, const bst_clipped_moments *core, double 
         d->scratch[i] = (float)((d->map[i] - core->mean) * per_s);
     }
     /* the noise of the map, and the law of the dark currents, whose tail is longer */
-    double dsnu = out->figures[BST_SENSOR_DSNU].value, log2_sigma = log(1.0 + dsnu * dsnu);
+    double dsnu = out->figures[BST_SENSOR_DSNU].value;
+    dsnu = isfinite(dsnu) ? dsnu : 0.0;
+    double log2_sigma = log(1.0 + dsnu * dsnu);
     double noise = sqrt(d->noise + fmax(core->mean, 0.0) / out->figures[BST_SENSOR_GAIN].value /
                                        d->stacks->dark.count);
     double tail = core->mean * (exp(HOT * sqrt(log2_sigma) - 0.5 * log2_sigma) - 1.0);

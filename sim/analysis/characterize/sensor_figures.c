@@ -3,6 +3,7 @@
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 const double bst_sensor_percentiles[BST_SENSOR_PERCENTILES] = {5, 16, 50, 84, 95, 99, 99.9, 99.99};
 
@@ -61,6 +62,13 @@ bst_status bst_sensor_figures_compute(bst_ctx *ctx, const bst_sensor_stacks *sta
                                        BST_SENSOR_LINE_AMPLITUDE};
     for (size_t i = 0; i < sizeof in_dn / sizeof *in_dn; i++) {
         scale(out, in_dn[i]);
+    }
+    for (int i = 0; i < BST_SENSOR_FIGURES; i++) {
+        if (!isfinite(out->figures[i].value) &&
+            strncmp(out->method[i], "not determined", 14) != 0 &&
+            strncmp(out->method[i], "none", 4) != 0) {
+            out->method[i] = "not determined: too few pixels with a value";
+        }
     }
     return BST_OK;
 }

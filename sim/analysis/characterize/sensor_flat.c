@@ -8,30 +8,75 @@
 enum { LEAST_RUN = 8 };
 /* A pixel below this share of its block is dead. */
 static const float DEAD = 0.5F;
-/* A pixel this much above the level in darks is hot: its response is not known. */
-static const double HOT = 2.0;
 static const double CLIP = 5.0;
 
-/* Level that is subtracted from flats: darks are best, then bias frames. */
-static const bst_frame_stack *level_of(const bst_sensor_stacks *s) {
-    return s->dark.count > 0 ? &s->dark : s->bias.count > 0 ? &s->bias : NULL;
+/* Least significance of a gain that replaces the header's. */
+static const double CERTAIN = 2.0;
+
+/* What is subtracted from the mean flat: share_bias bias frames and share_dark darks. */
+typedef struct flat_level {
+    double share_bias, share_dark;
+    float *mean; /* [height][width] DN */
+} flat_level;
+
+/* Shares of the frames that are subtracted: darks of the flats' exposure are best, then bias frames
+ * with the dark signal scaled to it, then bias frames. Returns false: the frames say none. */
+static bool find_level(const bst_sensor_stacks *s, flat_level *out) {
+    double dark_s = s->dark.exposure_s, flat_s = s->flat.exposure_s;
+    /* the tolerance of frames of one kind */
+    if (s->dark.count > 0 && fabs(dark_s - flat_s) <= 1e-3 * flat_s + 1e-6) {
+        *out = (flat_level){.share_dark = 1.0};
+        return true;
+    }
+    double ratio = s->dark.count > 0 && dark_s > 0.0 && flat_s >= 0.0 ? flat_s / dark_s : 0.0;
+    *out = (flat_level){.share_bias = 1.0 - ratio, .share_dark = ratio};
+    return s->bias.count > 0;
 }
 
-/* Gain by the variance between flats against their level. */
-static void measure_gain(const bst_sensor_stacks *s, const double *signal,
-                         bst_sensor_figures *out) {
+/* Ratio of the sums of two lists; the standard error by leaving out each block in turn. */
+static bst_sensor_estimate ratio_of_sums(const double *above, const double *below, int count) {
+    double a = 0.0, b = 0.0, rest = 0.0;
+    int n = 0;
+    for (int i = 0; i < count; i++) {
+        if (isfinite(above[i]) && isfinite(below[i])) {
+            a += above[i];
+            b += below[i];
+            n++;
+        }
+    }
+    for (int i = 0; i < count; i++) {
+        if (isfinite(above[i]) && isfinite(below[i])) {
+            double d = (a - above[i]) / (b - below[i]) - a / b;
+            rest += d * d * (n - 1.0) / n;
+        }
+    }
+    return n > 1 ? (bst_sensor_estimate){a / b, sqrt(rest)} : (bst_sensor_estimate){NAN, NAN};
+}
+
+/* Gain by the variance between flats against their level. A mean of the blocks' ratios would be
+ * too large, since the noise stands in the denominator. */
+static void measure_gain(const bst_sensor_stacks *s, float *scratch, bst_sensor_figures *out) {
     const bst_frame_stack *quiet = s->bias.pairs > 0   ? &s->bias
                                    : s->dark.pairs > 0 ? &s->dark
                                                        : NULL;
-    double gains[BST_STACK_BLOCKS];
+    double charge[BST_STACK_BLOCKS], below[BST_STACK_BLOCKS], excess[BST_STACK_BLOCKS];
     if (s->flat.pairs == 0 || !quiet) {
         return;
     }
-    double level = bst_mean_estimate(quiet->variance, BST_STACK_BLOCKS).value;
+    /* charge that has shot noise: all above the level whose variance is subtracted */
+    bst_sensor_block_moments(s->flat.mean, out->width, out->height, CLIP, scratch, charge, NULL);
+    bst_sensor_block_moments(quiet->mean, out->width, out->height, CLIP, scratch, below, NULL);
     for (int k = 0; k < BST_STACK_BLOCKS; k++) {
-        gains[k] = signal[k] / (s->flat.variance[k] - level);
+        charge[k] -= below[k];
+        excess[k] = s->flat.variance[k] - quiet->variance[k];
     }
-    out->figures[BST_SENSOR_GAIN] = bst_mean_estimate(gains, BST_STACK_BLOCKS);
+    bst_sensor_estimate gain = ratio_of_sums(charge, excess, BST_STACK_BLOCKS);
+    if (!(gain.value > CERTAIN * gain.sigma && gain.sigma > 0.0)) {
+        out->method[BST_SENSOR_GAIN] =
+            "header or map: the noise of the flats is not above that of the others";
+        return;
+    }
+    out->figures[BST_SENSOR_GAIN] = gain;
     out->method[BST_SENSOR_GAIN] = "photon transfer: variance between pairs of flats";
     out->gain_of_header = false;
 }
@@ -46,15 +91,23 @@ static double noise_of(const bst_frame_stack *f, double signal_dn, const bst_sen
     return (one + rows) / f->count;
 }
 
-/* Counts columns that are dead from one end on, and dead pixels elsewhere. */
-static void measure_dead(float *map, const bst_frame_stack *level, bst_sensor_figures *out) {
+/* Block of a pixel. */
+static int block_of(size_t i, const bst_sensor_figures *f) {
+    int x = (int)(i % (size_t)f->width), y = (int)(i / (size_t)f->width);
+    return (int)((int64_t)x * BST_STACK_SIDE / f->width) +
+           BST_STACK_SIDE * (int)((int64_t)y * BST_STACK_SIDE / f->height);
+}
+
+/* Counts columns that are dead from one end on, and dead pixels elsewhere.
+ *
+ * Given:     hot  [BST_STACK_BLOCKS] level above which a pixel is hot */
+static void measure_dead(float *map, const flat_level *level, const double *hot,
+                         bst_sensor_figures *out) {
     int bad = 0;
     int64_t dead = 0, good = 0;
     size_t pixels = (size_t)out->width * (size_t)out->height;
     for (size_t i = 0; i < pixels; i++) { /* a hot pixel may be full in a flat, and is not dead */
-        map[i] = map[i] < DEAD && level->mean[i] > HOT * out->figures[BST_SENSOR_OFFSET].value
-                     ? 1.0F
-                     : map[i];
+        map[i] = map[i] < DEAD && level->mean[i] > hot[block_of(i, out)] ? 1.0F : map[i];
     }
     for (int x = 0; x < out->width; x++) {
         int run[2] = {0, 0}, count = 0;
@@ -83,62 +136,68 @@ static void measure_dead(float *map, const bst_frame_stack *level, bst_sensor_fi
 }
 
 /* Spread of the response in blocks, and the map of the response. */
-static void measure_response(const bst_sensor_stacks *s, const double *signal, float *scratch,
+static void measure_response(const bst_sensor_stacks *s, const flat_level *level, float *scratch,
                              bst_sensor_figures *out) {
-    const bst_frame_stack *level = level_of(s);
-    double means[BST_STACK_BLOCKS], variances[BST_STACK_BLOCKS], prnu[BST_STACK_BLOCKS];
+    double means[BST_STACK_BLOCKS], variances[BST_STACK_BLOCKS], signal[BST_STACK_BLOCKS],
+        hot[BST_STACK_BLOCKS];
     float *map = out->prnu_map;
-    size_t width = (size_t)out->width;
-    for (size_t i = 0; i < width * (size_t)out->height; i++) {
-        int x = (int)(i % width), y = (int)(i / width);
-        int block = (int)((int64_t)x * BST_STACK_SIDE / out->width) +
-                    BST_STACK_SIDE * (int)((int64_t)y * BST_STACK_SIDE / out->height);
-        map[i] = (float)((s->flat.mean[i] - level->mean[i]) / signal[block]);
+    size_t pixels = (size_t)out->width * (size_t)out->height;
+    bst_sensor_block_moments(s->flat.mean, out->width, out->height, CLIP, scratch, signal, NULL);
+    bst_sensor_block_moments(level->mean, out->width, out->height, CLIP, scratch, means, variances);
+    for (int k = 0; k < BST_STACK_BLOCKS; k++) {
+        signal[k] -= means[k];
+        hot[k] = means[k] + CLIP * sqrt(variances[k]); /* the limit of the clipped mean */
+    }
+    for (size_t i = 0; i < pixels; i++) {
+        map[i] = (float)((s->flat.mean[i] - level->mean[i]) / signal[block_of(i, out)]);
     }
     bst_sensor_block_moments(map, out->width, out->height, CLIP, scratch, means, variances);
+    const double shares[] = {level->share_bias, level->share_dark};
+    const bst_frame_stack *const stacks[] = {&s->bias, &s->dark};
+    double level_noise = 0.0;
+    for (int i = 0; i < 2; i++) {
+        level_noise +=
+            shares[i] != 0.0 ? shares[i] * shares[i] * noise_of(stacks[i], 0.0, out) : 0.0;
+    }
+    double prnu[BST_STACK_BLOCKS];
     for (int k = 0; k < BST_STACK_BLOCKS; k++) {
-        double noise = noise_of(&s->flat, signal[k], out) + noise_of(level, 0.0, out);
+        double noise = noise_of(&s->flat, signal[k], out) + level_noise;
         prnu[k] = variances[k] - noise / (signal[k] * signal[k]);
     }
-    bst_sensor_estimate v = bst_mean_estimate(prnu, BST_STACK_BLOCKS);
-    double value = sqrt(fmax(v.value, 0.0));
-    out->figures[BST_SENSOR_PRNU] =
-        (bst_sensor_estimate){value, 0.5 * v.sigma / sqrt(fmax(fabs(v.value), v.sigma))};
+    out->figures[BST_SENSOR_PRNU] = bst_root_estimate(bst_mean_estimate(prnu, BST_STACK_BLOCKS));
     out->method[BST_SENSOR_PRNU] = "scatter of the mean flat in 8 x 8 blocks, less its noise";
-    measure_dead(map, level, out);
+    measure_dead(map, level, hot, out);
 }
 
 bst_status bst_sensor_measure_flat(bst_ctx *ctx, const bst_sensor_stacks *s,
                                    bst_sensor_figures *out) {
-    const bst_frame_stack *level = level_of(s);
-    if (s->flat.count == 0 || !level) {
+    flat_level level;
+    bool has_level = find_level(s, &level);
+    if (s->flat.count == 0 || !has_level) {
         out->method[BST_SENSOR_PRNU] = out->method[BST_SENSOR_DEAD_FRACTION] =
             out->method[BST_SENSOR_BAD_COLUMNS] =
-                "not determined: needs flats, and darks or bias "
-                "frames";
+                "not determined: needs flats, and bias frames or darks of the flats' exposure";
+    }
+    if (s->flat.count == 0) {
         return BST_OK;
     }
     size_t pixels = (size_t)out->width * (size_t)out->height;
     float *scratch = malloc(pixels * sizeof *scratch);
-    double signal[BST_STACK_BLOCKS], below[BST_STACK_BLOCKS], shot[BST_STACK_BLOCKS];
-    out->prnu_map = malloc(pixels * sizeof *out->prnu_map);
-    if (!scratch || !out->prnu_map) {
-        free(scratch);
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
+    level.mean = malloc(pixels * sizeof *level.mean);
+    out->prnu_map = has_level ? malloc(pixels * sizeof *out->prnu_map) : NULL;
+    bool room = scratch && level.mean && (out->prnu_map || !has_level);
+    if (room) {
+        measure_gain(s, scratch, out);
     }
-    bst_sensor_block_moments(s->flat.mean, out->width, out->height, CLIP, scratch, signal, NULL);
-    /* charge that has shot noise: all above the level whose variance is subtracted */
-    const bst_frame_stack *quiet = s->bias.pairs > 0 ? &s->bias : level;
-    bst_sensor_block_moments(quiet->mean, out->width, out->height, CLIP, scratch, below, NULL);
-    for (int k = 0; k < BST_STACK_BLOCKS; k++) {
-        shot[k] = signal[k] - below[k];
+    if (room && has_level) {
+        for (size_t i = 0; i < pixels; i++) {
+            double bias = level.share_bias != 0.0 ? level.share_bias * s->bias.mean[i] : 0.0;
+            double dark = level.share_dark != 0.0 ? level.share_dark * s->dark.mean[i] : 0.0;
+            level.mean[i] = (float)(bias + dark);
+        }
+        measure_response(s, &level, scratch, out);
     }
-    measure_gain(s, shot, out);
-    bst_sensor_block_moments(level->mean, out->width, out->height, CLIP, scratch, below, NULL);
-    for (int k = 0; k < BST_STACK_BLOCKS; k++) {
-        signal[k] -= below[k];
-    }
-    measure_response(s, signal, scratch, out);
     free(scratch);
-    return BST_OK;
+    free(level.mean);
+    return room ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
 }

@@ -8,26 +8,17 @@
 static const double ROUNDING = 1.0 / 12.0;
 static const double CLIP = 5.0;
 
-/* Root of a variance and its standard error; 0 for a variance that the noise made negative. */
-static bst_sensor_estimate root_of(bst_sensor_estimate variance) {
-    double value = sqrt(fmax(variance.value, 0.0));
-    /* near 0 the error of the root is that of a variance of one standard error */
-    double floor_value = sqrt(fmax(fabs(variance.value), variance.sigma));
-    return (bst_sensor_estimate){
-        value, floor_value > 0.0 ? 0.5 * variance.sigma / floor_value : variance.sigma};
-}
-
 /* Read noise by pairs of bias frames. */
 static void noise_of_pairs(const bst_frame_stack *bias, bst_sensor_figures *out) {
     bst_sensor_estimate v = bst_mean_estimate(bias->variance, BST_STACK_BLOCKS);
     v.value -= bias->integer ? ROUNDING : 0.0;
-    out->figures[BST_SENSOR_READ_NOISE] = root_of(v);
+    out->figures[BST_SENSOR_READ_NOISE] = bst_root_estimate(v);
     out->method[BST_SENSOR_READ_NOISE] = "differences of pairs of bias frames";
     /* the variance of H row means, chi-square with H - 1 degrees of freedom, of each pair */
     double within = v.value / bias->width;
     bst_sensor_estimate rows = {bias->row_variance, sqrt(2.0 / (bias->height - 1) / bias->pairs) *
                                                         (fmax(bias->row_variance, 0.0) + within)};
-    out->figures[BST_SENSOR_ROW_NOISE] = root_of(rows);
+    out->figures[BST_SENSOR_ROW_NOISE] = bst_root_estimate(rows);
     out->method[BST_SENSOR_ROW_NOISE] = "means of rows in differences of pairs of bias frames";
 }
 
@@ -49,7 +40,7 @@ static void noise_of_neighbours(const float *pixels, int width, int height, bool
     }
     bst_sensor_estimate v = bst_mean_estimate(variances, PARTS);
     v.value -= integer ? 1.5 * ROUNDING : 0.0; /* of both pixels, and of their spread in between */
-    out->figures[BST_SENSOR_READ_NOISE] = root_of(v);
+    out->figures[BST_SENSOR_READ_NOISE] = bst_root_estimate(v);
 }
 
 /* Mean of each column or row of a map, clipped, and the variance among them. */
@@ -73,7 +64,8 @@ static bst_sensor_estimate offsets_of(const float *map, int width, int height, b
         variance += (means[i] - mean) * (means[i] - mean) / (lines - 1);
     }
     free(means);
-    return root_of((bst_sensor_estimate){variance - noise, sqrt(2.0 / (lines - 1)) * variance});
+    return bst_root_estimate(
+        (bst_sensor_estimate){variance - noise, sqrt(2.0 / (lines - 1)) * variance});
 }
 
 /* Level of the bias frames, its drift, and fixed offsets of columns and rows. */
@@ -95,8 +87,10 @@ static void measure_level(const bst_frame_stack *bias, float *scratch, bst_senso
         out->method[BST_SENSOR_ROW_OFFSET] = "means of rows of the mean bias frame";
     }
     /* offsets of columns and rows are drawn once: blocks in a column share them */
-    level.sigma = sqrt(level.sigma * level.sigma + column.value * column.value / bias->width +
-                       (fixed_row.value * fixed_row.value + row / n) / bias->height);
+    double columns = isfinite(column.value) ? column.value * column.value : 0.0;
+    double rows = isfinite(fixed_row.value) ? fixed_row.value * fixed_row.value : 0.0;
+    level.sigma =
+        sqrt(level.sigma * level.sigma + columns / bias->width + (rows + row / n) / bias->height);
     out->figures[BST_SENSOR_OFFSET] = level;
     out->method[BST_SENSOR_OFFSET] = "mean of the bias frames";
     if (bias->count < 3) {
