@@ -69,8 +69,9 @@ int bst_half_planes_crossing(const bst_half_planes *sides, int blocks, const bst
  * Given:     points  [count], counter-clockwise
  *            sides   [side_count]
  * Returned:  out     [count + side_count] room, not `points`; the number of its corners is the
- * return value; 0: none *cut    false: nothing was removed Reference: Sutherland and Hodgman, Comm.
- * ACM 17, 32 (1974) */
+ *                    return value; 0: none
+ *            *cut    false: nothing was removed
+ * Reference: Sutherland and Hodgman, Comm. ACM 17, 32 (1974) */
 int bst_polygon_keep(const bst_point2 *points, int count, const bst_half_plane *sides,
                      int side_count, bst_point2 *out, bool *cut);
 

@@ -22,7 +22,7 @@ typedef struct bst_pose_view {
     bst_point2 *outline; /* silhouettes of occluders, counter-clockwise, from 2 * first_vertex */
     uint64_t *hiders;    /* by occluder: set of those that may hide some of it; for few occluders */
     int *outline_count;  /* corners of the silhouette; -1: not yet made */
-    bst_half_planes *sides;       /* of silhouettes, from BST_POSE_SIDES_AT; for few occluders */
+    bst_half_planes *sides;       /* of silhouettes, see bst_pose_sides; for few occluders */
     int *side_blocks;             /* blocks of them; -1: not yet made */
     int *cell_first, *cell_items; /* occluders by cell of a grid, for models with many */
     int cells, cell_item_count, cell_item_capacity;

@@ -120,7 +120,11 @@ void bst_pose_area_subtract(bst_satellite_pose *p, bst_pose_target *t, int view,
     int crossing[SIDES], blocks = bst_pose_sides(p, view, occluder, &sides);
     int corners = s->facets[t->facet].count;
     if (blocks == 0) {
-        return; /* more corners than polygons may have: it casts no shadow */
+        if (v->outline_count[occluder] > BST_POLYGON_CORNERS_MAX) {
+            t->whole = false;
+            t->overflow = true; /* more corners than half planes can be: pieces are used */
+        }
+        return;
     }
     int count = bst_half_planes_crossing(sides, blocks, t->seen, corners, t->bounds, crossing);
     if (count == BST_HALF_PLANES_APART) {

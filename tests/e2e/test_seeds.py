@@ -6,7 +6,7 @@ burn       a manoeuvre of 10 m/s at 100 s (short: 50 s), in a random direction, 
 drop       20 % of the frames are lost
 snr6       the target is so faint that its true signal-to-noise ratio is 6 in a frame
 neighbour  an object of the same brightness crosses at 2 to 20 px with 1 to 4 px/s, between 60 s and
-           250 s, from a random direction
+           250 s (short: 45 s and 60 s), from a random direction
 
 The right target is in track when it was confirmed, at least 90 % of the later frames in which it is
 visible have the confirmed track of interest on it (within 5 px, as sim/eval defines it), and so has

@@ -17,13 +17,15 @@ import runs
 WIDE = [f"/observers/{i}/sensors/0/camera/pixel_scale_arcsec=6" for i in range(5)]
 SMALL = [f"/observers/{i}/sensors/0/camera/{side}_px=512" for i in range(5) for side in ("width", "height")]
 FULL = "--full" in sys.argv and not sys.argv.remove("--full")
+# the long form has the Earth's light too
+DARK = [] if FULL else [runs.DARK]
 # more than there are of sensors too
 THREADS = (1, 2, 3, 8) if FULL else (8,)
 JOBS = {  # name: scenario, seconds (in full), settings
     "open": (runs.RATE_OPEN, 3, 8, ["/record/frames=cube"]),
     "closed": (runs.TRACK, 5, 10, ["/record/frames=extensions"]),
-    "generator": ("scenarios/constellation_quick.json", 25, 60, WIDE + [runs.DARK]),
-    "images": ("scenarios/constellation_images.json", 3, 6, WIDE + SMALL + [runs.DARK]),
+    "generator": ("scenarios/constellation_quick.json", 25, 60, WIDE + DARK),
+    "images": ("scenarios/constellation_images.json", 3, 6, WIDE + SMALL + DARK),
 }
 
 

@@ -1,4 +1,5 @@
 /* Areas of shadows: intersections of polygons against pieces, silhouettes against hulls. */
+#include "sim/satellite/model_build.h"
 #include "sim/satellite/polygon_covers.h"
 #include "sim/satellite/polygon_cut.h"
 #include "tests/satellite/satellite_support.h"
@@ -186,6 +187,53 @@ static void areas_agree_with_pieces(void **state) {
     bst_test_model_close(&m);
 }
 
+/* A double cone of 600 sides, whose silhouette has more corners than polygons may have, hides a
+ * whole box behind it. */
+static void many_corners_hide_a_whole_facet(void **state) {
+    (void)state;
+    enum { SIDES = 600 };
+    bst_ctx ctx = {0};
+    bst_satellite *s;
+    bst_assert_ok(&ctx, bst_test_satellite(&ctx,
+                                           "{\"materials\": [{\"name\": \"w\", \"diffuse\": 0.5}], "
+                                           "\"parts\": [{\"name\": \"a\", \"size_m\": [1, 1, 1], "
+                                           "\"material\": \"w\"}]}",
+                                           &s));
+    bst_part_place place = {
+        .rotation = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, .position_m = {0, 0, 3}, .joint = -1};
+    int first = s->facet_count, rim[SIDES], tip[2];
+    bst_assert_ok(&ctx, bst_model_begin_occluder(&ctx, s));
+    for (int i = 0; i < SIDES; i++) {
+        double a = 2.0 * BST_PI * i / SIDES;
+        bst_vec3 at = {2.0 * cos(a), 2.0 * sin(a), 0};
+        bst_assert_ok(&ctx, bst_model_add_vertex(&ctx, s, &place, at, &rim[i]));
+    }
+    for (int k = 0; k < 2; k++) {
+        bst_vec3 at = {0, 0, k ? 0.1 : -0.1};
+        bst_assert_ok(&ctx, bst_model_add_vertex(&ctx, s, &place, at, &tip[k]));
+    }
+    for (int i = 0; i < 2 * SIDES; i++) {
+        int from = rim[i / 2], to = rim[(i / 2 + 1) % SIDES];
+        int corners[3] = {i % 2 ? from : to, i % 2 ? to : from, tip[i % 2]};
+        bst_assert_ok(&ctx, bst_model_add_facet(&ctx, s, &place, corners, 3, 0, -1));
+    }
+    bst_assert_ok(&ctx, bst_model_end_occluder(&ctx, s, first));
+    bst_test_model m = {.satellite = s};
+    bst_assert_ok(&ctx, bst_satellite_pose_create(&ctx, s, &m.pose));
+    const bst_point2 *outline;
+    int lit = 0;
+    bst_pose_look(m.pose, 0, bst_vec3_unit((bst_vec3){0.01, 0.02, 1}));
+    assert_int_equal(bst_pose_outline(m.pose, 0, 1, &outline), SIDES);
+    for (int f = 0; f < first; f++) {
+        if (m.pose->normals[f].z > 0.5) {
+            bst_assert_close(bst_pose_unshadowed_area(m.pose, f, 1), 0.0, 1e-12);
+            lit++;
+        }
+    }
+    assert_int_equal(lit, 1);
+    bst_test_model_close(&m);
+}
+
 /* Silhouettes follow the edges; the hull of all corners is the truth. */
 static void silhouettes_are_hulls(void **state) {
     (void)state;
@@ -219,6 +267,7 @@ int main(void) {
         cmocka_unit_test(intersections_agree_with_pieces),
         cmocka_unit_test(crossing_sides_suffice),
         cmocka_unit_test(areas_agree_with_pieces),
+        cmocka_unit_test(many_corners_hide_a_whole_facet),
         cmocka_unit_test(silhouettes_are_hulls),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -169,6 +169,8 @@ static void births_from_blended_detections(void **state) {
                 /* 1 px of relative motion, half the offset, and the rest of the other hypothesis */
                 assert_true(rate < 0.2 && sigma > 0.9 && sigma < 1.3);
                 bst_assert_close(tracks[t].v_mag, 12.0, 1e-12);
+                /* of the one detection that is not merged; no floor */
+                bst_assert_close(tracks[t].v_mag_variance, 0.05 * 0.05, 1e-12);
             } else {
                 /* a magnitude known to 0.3 leaves 15 % of the weight to the other hypothesis */
                 assert_true(fabs(rate - 2.0) < 0.4 && sigma > 0.7 && sigma < 0.9);

@@ -129,6 +129,25 @@ static void one_detection_of_two_tracks(void **state) {
     bst_mtt_free(m);
 }
 
+/* A detection between two tentative tracks, nearer to the first: it may be merged with the second's
+ * only if that one exists. Both are 6 sigma apart: two objects, not one. */
+static void false_track_shares_no_light(void **state) {
+    (void)state;
+    const double existence[2] = {1e-3, 0.9};
+    for (int k = 0; k < 2; k++) {
+        bench *b = start_jointly(18 * AS);
+        bst_mtt *m = b->mtt;
+        bst_vec3 at = bst_vec3_from_radec(1.0, 0.4);
+        add_track(m, at, 2 * AS, 0.9)->status = BST_TRACK_TENTATIVE;
+        add_track(m, along(at, 0.3, 12 * AS), 2 * AS, existence[k])->status = BST_TRACK_TENTATIVE;
+        put(m, along(at, 0.3, 3 * AS));
+        bst_mtt_associate(m, false);
+        double merged = m->joint.hypothesis[m->joint.head[0]].merged;
+        assert_true(k == 0 ? merged < 0.01 : merged > 0.5 && merged < 0.9);
+        bst_mtt_free(m);
+    }
+}
+
 /* Two lights of unlike brightness in any direction from each other: each track's place is widened
  * along the line between them, by its own distance from the centre of light. */
 static void shared_light_widens_along_the_line(void **state) {
@@ -206,6 +225,7 @@ int main(void) {
         cmocka_unit_test(misses_lower_existence),
         cmocka_unit_test(merged_measurement_is_inverted),
         cmocka_unit_test(one_detection_of_two_tracks),
+        cmocka_unit_test(false_track_shares_no_light),
         cmocka_unit_test(shared_light_widens_along_the_line),
         cmocka_unit_test(observed_sky_starts_fewer_tracks),
     };

@@ -113,7 +113,6 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     double dt = mtt->now.seconds - pool->seconds;
     double reach = gate->gate_radps * dt + 3.0 * sqrt(spread(earlier) + spread(later));
     double floor = mtt->params.brightness_systematic_mag;
-    double variance = floor * floor + earlier->v_mag_sigma * earlier->v_mag_sigma;
     /* prior odds: besides clutter, undetected charge may be as frequent as the charge recognised */
     double alarms = mtt->clutter_density * mtt->params.field_sr + (double)mtt->charged;
     bst_mtt_doubtful pair[2] = {{earlier->sky, 0.0}, {later->sky, 0.0}};
@@ -122,6 +121,9 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
     }
     /* a merged detection has the light of two objects */
     double own = pair[0].merged > 0.5 ? 0.0 : pair[1].merged > 0.5 ? 1.0 : 0.5;
+    double sigma_mag = own == 0.0 ? later->v_mag_sigma : earlier->v_mag_sigma;
+    /* of the mean of two, or of one alone */
+    double variance = (own == 0.5 ? 0.5 : 1.0) * (floor * floor + sigma_mag * sigma_mag);
     assert(dt > 0.0 &&
            mtt->track_count < mtt->params.max_tracks + mtt->params.max_stationary_tracks);
     bst_mtt_track *track = &mtt->tracks[mtt->track_count++];
@@ -129,7 +131,7 @@ static void start_track(bst_mtt *mtt, const bst_mtt_detection *earlier, const bs
         .id = mtt->next_id++,
         .status = BST_TRACK_TENTATIVE,
         .v_mag = own * earlier->v_mag + (1.0 - own) * later->v_mag,
-        .v_mag_variance = isfinite(variance) ? 0.5 * variance : 25.0,
+        .v_mag_variance = isfinite(variance) ? variance : 25.0,
         .snr = later->snr,
         .x_px = later->x_px,
         .y_px = later->y_px,

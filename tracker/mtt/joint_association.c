@@ -78,6 +78,16 @@ static bool is_resolved(const bst_mtt *m, int column) {
     return false;
 }
 
+/* False if two tracks are resolved for certain: 24 of chi-square apart without position errors, and
+ * 9 with large ones. */
+static bool may_be_unresolved(const bst_mtt *m, const bst_mtt_track *a, const bst_mtt_track *b) {
+    double variance = a->state.covariance[0][0] + a->state.covariance[1][1] +
+                      b->state.covariance[0][0] + b->state.covariance[1][1];
+    double reach = 2.0 * m->params.merge_rad + 3.0 * sqrt(variance);
+    bst_vec3 off = bst_vec3_sub(a->state.direction, b->state.direction);
+    return bst_vec3_dot(off, off) <= reach * reach;
+}
+
 /* Allows for a detection of tentative track t that is of another tentative track, too: the one with
  * which it is likeliest merged. Such tracks share no detections, but neither may take the centre of
  * light for its own direction. */
@@ -86,7 +96,8 @@ static void doubt(const bst_mtt *m, int t, bst_joint_hypothesis *h, double singl
     for (int u = 0; u < m->track_count; u++) {
         const bst_mtt_track *other = &m->tracks[u];
         if (u == t || other->status != BST_TRACK_TENTATIVE || other->at_rest || other->star ||
-            !m->observable[u] || bst_sky_distance2(&track->state, &other->state) < SAME_CHI2) {
+            !m->observable[u] || !may_be_unresolved(m, track, other) ||
+            bst_sky_distance2(&track->state, &other->state) < SAME_CHI2) {
             continue;
         }
         bst_mtt_doubtful both = bst_mtt_doubt_of_track(

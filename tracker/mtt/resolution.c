@@ -175,9 +175,11 @@ bst_mtt_doubtful bst_mtt_doubt_of_track(const bst_mtt_params *params, const bst_
         return (bst_mtt_doubtful){detection->sky, 0.0};
     }
     double unresolved = fmin(bst_mtt_unresolved(params->merge_rad, a, b), 0.999);
-    double log_ratio = log(unresolved / (1.0 - unresolved)) + fit.log_likelihood -
-                       bst_mtt_merged_brightness_cost(a, b, detection) - single_log_likelihood -
-                       log(1.0 - params->detection_probability);
+    double exists = fmin(1.0, b->existence / a->existence);
+    double alone =
+        1.0 - exists + exists * (1.0 - unresolved) * (1.0 - params->detection_probability);
+    double log_ratio = log(exists * unresolved / alone) + fit.log_likelihood -
+                       bst_mtt_merged_brightness_cost(a, b, detection) - single_log_likelihood;
     double p = 1.0 / (1.0 + exp(-log_ratio));
     return (bst_mtt_doubtful){mix(&detection->sky, &fit.of_a, p), p};
 }

@@ -45,8 +45,9 @@ bst_mtt_doubtful bst_mtt_doubt_of_pair(double merge_rad, double detection_probab
                                        const bst_mtt_detection *own,
                                        const bst_mtt_detection *companion);
 
-/* Measurement of track a by a detection of a alone, or of a and b together. b exists if a does, and
- * is missed in the first case.
+/* Measurement of track a by a detection of a alone, or of a and b together. Given that a exists, b
+ * does with the ratio of their existence probabilities, at most 1. In the first case
+ * b does not exist or is missed.
  *
  * Given:     single_log_likelihood  of the detection, of a alone, with the brightness, rad^-2
  *            floor_rad  as in bst_mtt_merge */

@@ -211,7 +211,11 @@ static cJSON *scenario_json(drawing *d, cJSON *camera) {
     cJSON_AddNumberToObject(exposure, "exposure_s", d->exposure_s);
     cJSON_AddNumberToObject(exposure, "period_s", d->exposure_s + PAUSE_S);
     cJSON *modules = cJSON_AddObjectToObject(sensor, "modules");
-    cJSON_AddStringToObject(cJSON_AddObjectToObject(modules, "gimbal"), "type", "scripted");
+    cJSON *gimbal = cJSON_AddObjectToObject(modules, "gimbal");
+    cJSON_AddStringToObject(gimbal, "type", "scripted");
+    /* the longest exposure is longer than the usual history */
+    cJSON_AddNumberToObject(cJSON_AddObjectToObject(gimbal, "platform"), "history_s",
+                            ceil(d->exposure_s) + 4.0);
     cJSON_AddStringToObject(cJSON_AddObjectToObject(modules, "scenegen"), "type", "opencl");
     cJSON_AddStringToObject(cJSON_AddObjectToObject(root, "record"), "frames", "extensions");
     return root;
