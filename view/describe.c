@@ -68,8 +68,7 @@ static bst_status describe(bst_ctx *ctx, bst_view_run *run, cJSON *out) {
     return BST_OK;
 }
 
-/* Deletes a description after an error. */
-static bst_status keep_or_delete(bst_status status, cJSON **out) {
+bst_status bst_view_keep(bst_status status, cJSON **out) {
     if (status != BST_OK) {
         cJSON_Delete(*out);
         *out = NULL;
@@ -82,7 +81,7 @@ bst_status bst_view_run_describe(bst_ctx *ctx, bst_view_run *run, cJSON **out) {
     bst_status status = bst_view_lock(ctx, run);
     status = status == BST_OK ? describe(ctx, run, *out) : status;
     bst_view_unlock(run);
-    return keep_or_delete(status, out);
+    return bst_view_keep(status, out);
 }
 
 /* ------------------------------------------------------------------ modes and events */
@@ -123,7 +122,7 @@ bst_status bst_view_run_modes(bst_ctx *ctx, bst_view_run *run, int64_t sensor, c
     status = status == BST_OK ? list_modes(ctx, run, sensor, cJSON_AddArrayToObject(*out, "modes"))
                               : status;
     bst_view_unlock(run);
-    return keep_or_delete(status, out);
+    return bst_view_keep(status, out);
 }
 
 static bst_status list_events(bst_ctx *ctx, const bst_view_run *run, cJSON *out) {
@@ -156,5 +155,5 @@ bst_status bst_view_run_events(bst_ctx *ctx, bst_view_run *run, cJSON **out) {
     bst_status status = bst_view_lock(ctx, run);
     status = status == BST_OK ? list_events(ctx, run, *out) : status;
     bst_view_unlock(run);
-    return keep_or_delete(status, out);
+    return bst_view_keep(status, out);
 }

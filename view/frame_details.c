@@ -347,9 +347,5 @@ bst_status bst_view_run_frame(bst_ctx *ctx, bst_view_run *run, int64_t sensor, i
     status = status == BST_OK ? bst_view_find_sensor(ctx, run, sensor, &s) : status;
     status = status == BST_OK ? describe_frame(ctx, run, s, frame, *out) : status;
     bst_view_unlock(run);
-    if (status != BST_OK) {
-        cJSON_Delete(*out);
-        *out = NULL;
-    }
-    return status;
+    return bst_view_keep(status, out);
 }

@@ -70,6 +70,9 @@ void bst_view_unlock(bst_view_run *run);
 bst_status bst_view_find_sensor(bst_ctx *ctx, bst_view_run *run, int64_t number,
                                 bst_view_sensor **out) BST_MUST_CHECK;
 
+/* Ends a description: deletes it after an error, *out is then NULL. Returns the status. */
+bst_status bst_view_keep(bst_status status, cJSON **out);
+
 /* Adds the panels of a sensor to its description: [{name, title, unit, lines}]. */
 void bst_view_add_panels(const bst_view_run *run, const bst_view_sensor *sensor, cJSON *out);
 

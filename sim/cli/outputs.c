@@ -300,3 +300,10 @@ bst_status bst_outputs_spare(bst_ctx *ctx, const bst_option *table, const char *
     }
     return BST_OK;
 }
+
+bst_status bst_outputs_refuse_earlier(bst_ctx *ctx, const char *path, bool overwrite) {
+    return overwrite || access(path, F_OK) != 0
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_ARGUMENT,
+                          "%s: is there already; give another folder or --overwrite", path);
+}

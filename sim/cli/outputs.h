@@ -20,4 +20,9 @@ bst_status bst_outputs_check(bst_ctx *ctx, const bst_option *table, const bool *
 bst_status bst_outputs_spare(bst_ctx *ctx, const bst_option *table, const char *input,
                              const char *why) BST_MUST_CHECK;
 
+/* Checks that a result of an earlier command is not replaced without --overwrite.
+ * BST_ERR_ARGUMENT: `path` is there, and `overwrite` false. */
+bst_status bst_outputs_refuse_earlier(bst_ctx *ctx, const char *path,
+                                      bool overwrite) BST_MUST_CHECK;
+
 #endif

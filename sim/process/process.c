@@ -4,10 +4,9 @@
 #include <stdio.h>
 #include <unistd.h>
 
-#include "sim/analysis/check/scenario_rules.h"
-#include "sim/cli/load.h"
+#include "sim/analysis/check/check_run.h"
+#include "sim/cli/outputs.h"
 #include "sim/process/process_internal.h"
-#include "sim/run/run_scenario.h"
 
 #define Q bst_process_request
 const bst_option bst_process_options[] = {
@@ -122,39 +121,21 @@ static bst_status run_input(bst_ctx *ctx, const bst_process *p) {
     const bst_process_request *q = p->request;
     char path[4096], out[4096];
     bst_load_options load = BST_LOAD_DEFAULTS;
-    bst_json *json = NULL;
-    bst_scenario scenario;
-    bst_simulation *sim = NULL;
     load.set = q->set;
     BST_TRY(bst_process_path(ctx, p, "input/scenario.json", path));
     BST_TRY(bst_process_path(ctx, p, "run", out));
-    BST_TRY(bst_load_check(ctx, &load, q->table));
-    BST_TRY(bst_load_scenario(ctx, path, &load, &json, &scenario));
     const bst_simulation_options options = {
         .device = q->device, .threads = (int)q->threads, .parallel = true};
     const bst_run_request request = {
         .out = out, .overwrite = q->overwrite, .progress = !q->quiet && isatty(STDERR_FILENO)};
-    bst_status status = bst_simulation_create(ctx, &scenario, &options, &sim);
-    if (status == BST_OK) {
-        status = bst_check_rules_apply(ctx, &scenario, sim);
-    }
-    if (status == BST_OK) {
-        status = bst_run_scenario(ctx, &scenario, sim, &request, NULL);
-    }
-    bst_simulation_free(sim);
-    bst_scenario_free(&scenario);
-    bst_json_free(json);
-    return status;
+    return bst_check_run_file(ctx, path, load, q->table, &options, &request);
 }
 
 /* Refuses a folder that holds a run of before. */
 static bst_status check_out(bst_ctx *ctx, const bst_process *p) {
     char path[4096];
     BST_TRY(bst_process_path(ctx, p, "run", path));
-    return p->request->overwrite || access(path, F_OK) != 0
-               ? BST_OK
-               : bst_fail(ctx, BST_ERR_ARGUMENT,
-                          "%s: is there already; give another folder or --overwrite", path);
+    return bst_outputs_refuse_earlier(ctx, path, p->request->overwrite);
 }
 
 bst_status bst_process_frames(bst_ctx *ctx, const bst_process_request *request,

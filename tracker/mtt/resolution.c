@@ -33,13 +33,18 @@ double bst_mtt_unresolved(double merge_rad, const bst_mtt_track *a, const bst_mt
     return det > 0.0 ? s2 / sqrt(det) * exp(-0.5 * chi2) : 0.0;
 }
 
+/* Share of the light of the first of two sources, whose magnitudes differ by off_mag. */
+static double share_of(double off_mag) {
+    return 1.0 / (1.0 + pow(10.0, 0.4 * off_mag));
+}
+
 double bst_mtt_light_share(const bst_mtt_track *a, const bst_mtt_track *b) {
-    return 1.0 / (1.0 + pow(10.0, 0.4 * (a->v_mag - b->v_mag)));
+    return share_of(a->v_mag - b->v_mag);
 }
 
 double bst_mtt_detection_share(const bst_mtt_detection *a, const bst_mtt_detection *b) {
     bool known = isfinite(a->v_mag_sigma) && isfinite(b->v_mag_sigma);
-    return known ? 1.0 / (1.0 + pow(10.0, 0.4 * (a->v_mag - b->v_mag))) : 0.5;
+    return known ? share_of(a->v_mag - b->v_mag) : 0.5;
 }
 
 /* Half the chi-square of a magnitude, at most 4.5 as in bst_mtt_brightness_cost; 0: unknown. */
@@ -51,11 +56,7 @@ static double magnitude_cost(double off_mag, double variance) {
 /* Covariance (11, 12, 22) in the tangent axes of a direction, turned to those of another one. */
 static void turn_covariance(bst_vec3 from, const double cov[3], bst_vec3 to, double out[3]) {
     bst_tangent axes = bst_tangent_at(from), own = bst_tangent_at(to);
-    double c, s;
-    bst_tangent_turn(from, &axes, to, &own, &c, &s);
-    out[0] = c * c * cov[0] + 2 * c * s * cov[1] + s * s * cov[2];
-    out[1] = -c * s * cov[0] + (c * c - s * s) * cov[1] + c * s * cov[2];
-    out[2] = s * s * cov[0] - 2 * c * s * cov[1] + c * c * cov[2];
+    bst_tangent_turn_covariance(from, &axes, to, &own, cov, out);
 }
 
 /* Mean and covariance of two hypotheses on one measurement, the second of probability p. */

@@ -124,12 +124,8 @@ bool bst_sky_innovate(const bst_sky_state *state, const bst_sky_measurement *mea
     bst_vec3 step = bst_tangent_log(d, measurement->direction);
     out->nu[0] = bst_vec3_dot(step, axes.e1);
     out->nu[1] = bst_vec3_dot(step, axes.e2);
-    double c, s;
-    bst_tangent_turn(measurement->direction, &own, d, &axes, &c, &s);
-    double a = measurement->cov_11, b = measurement->cov_12, e = measurement->cov_22;
-    out->r[0] = c * c * a + 2 * c * s * b + s * s * e;
-    out->r[1] = -c * s * a + (c * c - s * s) * b + c * s * e;
-    out->r[2] = s * s * a - 2 * c * s * b + c * c * e;
+    const double cov[3] = {measurement->cov_11, measurement->cov_12, measurement->cov_22};
+    bst_tangent_turn_covariance(measurement->direction, &own, d, &axes, cov, out->r);
     for (int i = 0; extra && i < 3; i++) {
         out->r[i] += extra[i];
     }

@@ -66,4 +66,15 @@ static inline void bst_tangent_turn(bst_vec3 a, const bst_tangent *from, bst_vec
     *s = n > 0.0 ? -y / n : 0.0;
 }
 
+/* Covariance (11, 12, 22) in the tangent axes `from` at a, turned to the axes `to` at b. */
+static inline void bst_tangent_turn_covariance(bst_vec3 a, const bst_tangent *from, bst_vec3 b,
+                                               const bst_tangent *to, const double cov[3],
+                                               double out[3]) {
+    double c, s;
+    bst_tangent_turn(a, from, b, to, &c, &s);
+    out[0] = c * c * cov[0] + 2 * c * s * cov[1] + s * s * cov[2];
+    out[1] = -c * s * cov[0] + (c * c - s * s) * cov[1] + c * s * cov[2];
+    out[2] = s * s * cov[0] - 2 * c * s * cov[1] + c * c * cov[2];
+}
+
 #endif

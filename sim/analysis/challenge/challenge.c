@@ -6,12 +6,10 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "sim/analysis/check/scenario_rules.h"
-#include "sim/cli/load.h"
+#include "sim/analysis/check/check_run.h"
 #include "sim/core/folder.h"
 #include "sim/io/csv.h"
 #include "sim/io/draft_file.h"
-#include "sim/run/run_scenario.h"
 
 #define Q bst_challenge_request
 #define FIELD(member) .offset = offsetof(bst_challenge_request, member)
@@ -52,28 +50,13 @@ const bst_option bst_challenge_options[] = {
 /* Runs the scenario in truth/. */
 static bst_status run_scenario(bst_ctx *ctx, const bst_challenge_request *q) {
     char path[4200], out[4200];
-    bst_load_options load = BST_LOAD_DEFAULTS;
-    bst_json *json = NULL;
-    bst_scenario scenario;
-    bst_simulation *sim = NULL;
     snprintf(path, sizeof path, "%.4000s/truth/scenario.json", q->out);
     snprintf(out, sizeof out, "%.4000s/truth/run", q->out);
-    BST_TRY(bst_load_check(ctx, &load, q->table));
-    BST_TRY(bst_load_scenario(ctx, path, &load, &json, &scenario));
     const bst_simulation_options options = {
         .device = q->device, .threads = (int)q->threads, .parallel = true};
     const bst_run_request request = {.out = out, .progress = isatty(STDERR_FILENO)};
-    bst_status status = bst_simulation_create(ctx, &scenario, &options, &sim);
-    if (status == BST_OK) {
-        status = bst_check_rules_apply(ctx, &scenario, sim);
-    }
-    if (status == BST_OK) {
-        status = bst_run_scenario(ctx, &scenario, sim, &request, NULL);
-    }
-    bst_simulation_free(sim);
-    bst_scenario_free(&scenario);
-    bst_json_free(json);
-    return status;
+    return bst_check_run_file(ctx, path, (bst_load_options)BST_LOAD_DEFAULTS, q->table, &options,
+                              &request);
 }
 
 /* Frames as those who take part get them. */

@@ -1,8 +1,8 @@
 #include "sim/analysis/characterize/characterize.h"
 
 #include <math.h>
-#include <unistd.h>
 
+#include "sim/cli/outputs.h"
 #include "sim/cli/shipped.h"
 #include "sim/core/folder.h"
 
@@ -133,10 +133,7 @@ bst_status bst_characterize_run(bst_ctx *ctx, const bst_characterize_request *q,
     if (n < 0 || (size_t)n >= sizeof path) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%.80s...: the path is too long", q->out);
     }
-    if (!q->overwrite && access(path, F_OK) == 0) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "%s: is there already; give another folder or --overwrite", path);
-    }
+    BST_TRY(bst_outputs_refuse_earlier(ctx, path, q->overwrite));
     bst_status status = read_stacks(ctx, q, &stacks);
     if (status == BST_OK) {
         status = bst_sensor_figures_compute(ctx, &stacks, &figures);
