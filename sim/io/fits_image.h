@@ -31,8 +31,7 @@ bst_status bst_fits_read_image_buffer(bst_ctx *ctx, const char *name, const void
  *
  * Given:     pixels  [height][width]
  *            unit    value of BUNIT, at most 60 characters
- * Errors:    those of bst_draft_open and bst_draft_close
- * Source:    FITS Standard 4.0, sections 3.3 and 5.3 */
+ * Errors:    BST_ERR_IO with path and reason */
 bst_status bst_fits_write_map(bst_ctx *ctx, const char *path, int width, int height,
                               const float *pixels, const char *unit) BST_MUST_CHECK;
 
