@@ -18,6 +18,7 @@
 static const char help_text[] =
     "usage: boresight study STUDY.json [options]\n"
     "       boresight study FOLDER --resume\n"
+    "       boresight study STUDY.json --out FOLDER --gather PART...\n"
     "\n"
     "Goes through the settings of a study (docs/how-to/studies.md), runs each as often as it says, "
     "and\n"
@@ -100,9 +101,18 @@ int bst_cmd_study(int argc, char **argv) {
     if (bst_study_request_check(&ctx, &r) != BST_OK) {
         return bst_options_misuse(&ctx, "study");
     }
+    if (r.gather && arguments > 1) {
+        r.parts = argv + 2;
+        r.part_count = arguments - 1;
+        arguments = 1;
+    }
     if (arguments != !r.schema) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "%s study file is expected, %d were given",
                  r.schema ? "with --schema no" : "one", arguments);
+        return bst_options_misuse(&ctx, "study");
+    }
+    if (r.gather && r.part_count == 0) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT, "--gather: name the folders that --shard has made");
         return bst_options_misuse(&ctx, "study");
     }
     if (r.schema) {

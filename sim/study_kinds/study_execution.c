@@ -10,15 +10,17 @@
 #include "sim/core/wall_clock.h"
 #include "sim/io/draft_file.h"
 #include "sim/studies/driver.h"
+#include "sim/studies/gather.h"
 #include "sim/studies/local_pool.h"
+#include "sim/studies/scheduler.h"
 #include "sim/studies/study_folder.h"
 #include "sim/studies/study_outcome.h"
 #include "sim/studies/tables.h"
 #include "sim/study_kinds/study_kinds.h"
 #include "sim/study_kinds/study_plugins.h"
 
-/* Duration of a shard. Slurm takes longer to start one, and so do PoCL and the star catalogue. */
-static const double SHARD_S = 4.0, SLURM_SHARD_S = 60.0;
+/* Duration of a shard. Schedulers take longer to start one, and so do PoCL and the catalogue. */
+static const double SHARD_S = 4.0, SCHEDULED_SHARD_S = 60.0;
 
 /* Progress line on the terminal. */
 typedef struct progress_line {
@@ -86,27 +88,59 @@ static bst_status open_pool(bst_ctx *ctx, const work *w, bst_executor *executor)
     return bst_local_pool_open(ctx, &pool, executor);
 }
 
+/* Starts the executor that the request asks for. */
+static bst_status open_executor(bst_ctx *ctx, const work *w, bst_executor *executor) {
+    const bst_study_request *r = w->request;
+    const char *device = r->device ? r->device : "";
+    return r->slurm       ? bst_study_slurm(ctx, r->site, device, w->out, executor)
+           : r->scheduler ? bst_study_scheduler(ctx, r->scheduler, device, w->out, executor)
+                          : open_pool(ctx, w, executor);
+}
+
+/* Reads what the request names, so that a mistake leaves no folder behind. */
+static bst_status check_inputs(bst_ctx *ctx, const bst_study_request *r) {
+    for (int i = 0; i < r->part_count; i++) {
+        BST_TRY(bst_study_gather_check(ctx, r->parts[i]));
+    }
+    bst_scheduler scheduler;
+    return r->scheduler ? bst_scheduler_load(ctx, r->scheduler, &scheduler) : BST_OK;
+}
+
+/* Loads and copies the rows of the folders of --gather; executes nothing. */
+static bst_status gather(bst_ctx *ctx, const work *w, bst_results *results,
+                         bst_driver_outcome *outcome) {
+    for (int i = 0; i < w->request->part_count; i++) {
+        int64_t files;
+        BST_TRY(bst_study_gather(ctx, results, w->request->parts[i], w->out, &files));
+    }
+    forget_what_is_gone(ctx, results, w->kind, w->out);
+    outcome->done = results->done;
+    outcome->failed = results->failed;
+    outcome->missing = w->study->runs - results->done;
+    return BST_OK;
+}
+
 static bst_status execute(bst_ctx *ctx, const work *w, bst_results *results,
                           bst_driver_outcome *outcome) {
     const bst_study_request *r = w->request;
     bst_executor executor;
+    bool scheduled = r->slurm || r->scheduler;
     progress_line line = {.on = !r->quiet && isatty(STDERR_FILENO) == 1};
     const bst_driver_options options = {
         .out = w->out,
         .kind = w->kind,
-        .shard_s = r->slurm ? SLURM_SHARD_S : SHARD_S,
+        .shard_s = scheduled ? SCHEDULED_SHARD_S : SHARD_S,
         .shard_runs = r->shard_runs,
-        .parallel = r->slurm ? 0 : bst_local_workers((int)r->workers, r->devices.count),
-        .probe = r->slurm,
+        .parallel = scheduled ? 0 : bst_local_workers((int)r->workers, r->devices.count),
+        .probe = scheduled,
         .progress = show,
         .user = &line};
     BST_TRY(bst_results_load_folder(ctx, results, w->out, 0, w->study->runs, true));
-    forget_what_is_gone(ctx, results, w->kind, w->out);
-    if (r->slurm) {
-        BST_TRY(bst_study_slurm(ctx, r->site, r->device ? r->device : "", w->out, &executor));
-    } else {
-        BST_TRY(open_pool(ctx, w, &executor));
+    if (r->gather) {
+        return gather(ctx, w, results, outcome);
     }
+    forget_what_is_gone(ctx, results, w->kind, w->out);
+    BST_TRY(open_executor(ctx, w, &executor));
     bst_status status = bst_driver_run(ctx, results, &executor, &options, outcome);
     executor.close(executor.self);
     if (line.drawn) {
@@ -119,13 +153,16 @@ int bst_study_execute(bst_ctx *ctx, const bst_study_request *r, const bst_study 
                       const bst_study_kind *kind, const char *out) {
     bst_results results;
     bst_driver_outcome outcome = {0};
-    int lock;
+    int lock = -1;
     double started = bst_wall_seconds();
     if (bst_results_create(ctx, study, kind, &results) != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
         return BST_EXIT_FAILED;
     }
-    bst_status status = bst_study_folder_open(ctx, study, out, r->resume, false, &lock);
+    bst_status status = check_inputs(ctx, r);
+    if (status == BST_OK) {
+        status = bst_study_folder_open(ctx, study, out, r->resume || r->gather, false, &lock);
+    }
     if (status == BST_OK) {
         bst_draft_sweep(out); /* drafts of a driver that was killed; the lock is held */
         status = bst_study_plugins_settle(ctx, kind->user, out);

@@ -52,6 +52,11 @@ bst_status bst_study_simulation(bst_ctx *ctx, bst_study_warm *warm, bst_scenario
 bst_status bst_study_print_scenario(bst_ctx *ctx, const bst_scenario *scenario,
                                     FILE *stream) BST_MUST_CHECK;
 
+/* Creates the executor of the scheduler in a file (sim/studies/scheduler.h) for the study in folder
+ * `out`. `device`: of its jobs, "": default. */
+bst_status bst_study_scheduler(bst_ctx *ctx, const char *file, const char *device, const char *out,
+                               bst_executor *executor) BST_MUST_CHECK;
+
 /* Creates the Slurm executor of the study in folder `out`. `site_file` NULL: the user's own, if
  * any; `device`: of its tasks, "": default. */
 bst_status bst_study_slurm(bst_ctx *ctx, const char *site_file, const char *device, const char *out,

@@ -38,10 +38,22 @@ const bst_option bst_study_options[] = {
      .argument = "FILE",
      .doc = "what --slurm is to know of the cluster: account, partition, time (default "
             "boresight/slurm.json in the user's configuration folder, where there is one)"},
+    {.name = "scheduler",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(bst_study_request, scheduler),
+     .path = BST_PATH_INPUT,
+     .argument = "FILE",
+     .doc = "execute through any scheduler: JSON with its commands submit, poll and cancel "
+            "(docs/how-to/schedulers.md)"},
     {.name = "resume",
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(bst_study_request, resume),
      .doc = "do what is missing of a study that was begun there"},
+    {.name = "gather",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(bst_study_request, gather),
+     .doc = "read the folders PART..., which --shard made elsewhere, into FOLDER, and make the "
+            "tables"},
     {.name = "dry-run",
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(bst_study_request, dry_run),
@@ -58,8 +70,8 @@ const bst_option bst_study_options[] = {
      .kind = BST_OPTION_TEXT,
      .offset = offsetof(bst_study_request, shard),
      .argument = "I/N",
-     .doc = "execute part I of N here, for a scheduler of your own (or FIRST:COUNT); then "
-            "--resume for the tables"},
+     .doc = "execute part I of N here, for a scheduler of your own (env/N: I is the number of "
+            "this job in its array; or FIRST:COUNT); then --resume for the tables"},
     {.name = "shard-runs",
      .kind = BST_OPTION_INT,
      .offset = offsetof(bst_study_request, shard_runs),
@@ -87,13 +99,12 @@ const bst_option bst_study_options[] = {
 };
 
 bst_status bst_study_request_check(bst_ctx *ctx, const bst_study_request *r) {
-    const char *const actions[] = {r->schema ? "schema" : NULL, r->emit >= 0 ? "emit" : NULL,
+    const char *const actions[] = {r->schema ? "schema" : NULL,   r->emit >= 0 ? "emit" : NULL,
                                    r->dry_run ? "dry-run" : NULL, r->resume ? "resume" : NULL,
-                                   r->shard ? "shard" : NULL};
+                                   r->gather ? "gather" : NULL,   r->shard ? "shard" : NULL};
     BST_TRY(bst_options_one_of(ctx, actions, sizeof actions / sizeof *actions));
-    if (r->slurm && r->workers > 0) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "--workers is of this machine, --slurm of a cluster");
-    }
+    const char *const places[] = {r->workers > 0 ? "workers" : NULL, r->slurm ? "slurm" : NULL,
+                                  r->scheduler ? "scheduler" : NULL};
+    BST_TRY(bst_options_one_of(ctx, places, sizeof places / sizeof *places));
     return BST_OK;
 }

@@ -7,10 +7,12 @@
 
 /* What the command line asks for. */
 typedef struct bst_study_request {
-    const char *out, *shard, *site, *device; /* texts of these options; NULL: not given */
+    const char *out, *shard, *site, *scheduler, *device; /* these options; NULL: not given */
     int64_t workers, cores, shard_runs;      /* 0: not given */
     int64_t emit;                            /* number of a run; -1: not given */
-    bool resume, dry_run, quiet, schema, help, unpinned, slurm;
+    bool resume, gather, dry_run, quiet, schema, help, unpinned, slurm;
+    char **parts; /* folders that --gather reads */
+    int part_count;
     bst_study_devices devices; /* those of `device` */
 } bst_study_request;
 
@@ -19,8 +21,8 @@ extern const bst_option bst_study_options[];
 
 /* Checks that the options given fit together.
  *
- * Errors:    BST_ERR_ARGUMENT: two options that each ask for another action, or --workers with
- *            --slurm */
+ * Errors:    BST_ERR_ARGUMENT: two options that each ask for another action, --workers with a
+ *            scheduler, or two schedulers */
 bst_status bst_study_request_check(bst_ctx *ctx, const bst_study_request *request) BST_MUST_CHECK;
 
 #endif

@@ -55,7 +55,8 @@ int bst_study_execute_shard(bst_ctx *ctx, const bst_study_request *r, const bst_
         status = bst_results_load_folder(ctx, &results, out, part.first, part.count, false);
     }
     if (status == BST_OK) {
-        int64_t number = exact ? 0 : strtoll(r->shard, NULL, 10) - 1;
+        /* a job of an array ("env/N") has devices of its own */
+        int64_t number = exact || r->shard[0] == 'e' ? 0 : strtoll(r->shard, NULL, 10) - 1;
         bst_shard_worker worker = {.study = study,
                                    .kind = kind,
                                    .out = out,

@@ -37,7 +37,7 @@ class Outputs(unittest.TestCase):
               ("schema", "plugin"), ("orbit", "observer"), ("propagate", "elements"), ("propagate", "tle"), ("propagate", "eop"),
               ("calibrate-obsgen", "calibration"), ("bench", "tle"), ("bench", "scenario"),
               ("characterize", "bias"), ("characterize", "dark"), ("characterize", "flat"), ("characterize", "extends"),
-              ("score", "truth"), ("study", "site"), ("lightcurve", "satellite"), ("lightcurve", "elements")}
+              ("score", "truth"), ("study", "site"), ("study", "scheduler"), ("lightcurve", "satellite"), ("lightcurve", "elements")}
 
     @classmethod
     def setUpClass(cls):
