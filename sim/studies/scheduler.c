@@ -87,7 +87,7 @@ static void read_errors(const scheduler_executor *s, char said[BST_SHARD_TEXT_BY
 typedef struct command_call {
     const char *argv[JOBS_A_CALL + 5];
     int count;                            /* of argv */
-    void (*take)(void *user, char *line); /* gets the lines of its output; NULL: nobody */
+    void (*take)(void *user, char *line); /* gets the lines of its output; NULL: discarded */
     void *user;
     int code;                        /* exit status */
     char said[BST_SHARD_TEXT_BYTES]; /* its first line of errors; "": none */

@@ -1,5 +1,5 @@
 /* Shards of a study as jobs of any scheduler, through three commands of the user: one that submits
- * a job, one that tells the state of jobs, and one that cancels them. Where nodes share no folder
+ * a job, one that reports the state of jobs, and one that cancels them. Where nodes share no folder
  * with the driver, the commands also bring back the files of shards. */
 #ifndef BST_STUDIES_SCHEDULER_H
 #define BST_STUDIES_SCHEDULER_H
