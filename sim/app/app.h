@@ -67,6 +67,8 @@ int bst_cmd_propagate(int argc, char **argv);
 int bst_cmd_calframes(int argc, char **argv);
 /* boresight bench: measures the speed of the program. */
 int bst_cmd_bench(int argc, char **argv);
+/* boresight version: prints versions. */
+int bst_cmd_version(int argc, char **argv);
 /* boresight view: shows a run in the browser. */
 int bst_cmd_view(int argc, char **argv);
 /* boresight pd: measures the probability of detection of a sensor. */

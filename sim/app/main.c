@@ -7,6 +7,7 @@ int main(int argc, char **argv) {
     static const bst_app_command more[] = {
         {"view", bst_cmd_view, "look at a run in the browser"},
         {"bench", bst_cmd_bench, "measure speed and error"},
+        {"version", bst_cmd_version, "versions of the program, its libraries and the machine"},
         {NULL, NULL, NULL},
     };
     signal(SIGXFSZ, SIG_IGN); /* a write beyond a limit on file sizes then returns an error */

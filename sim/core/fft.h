@@ -38,6 +38,9 @@ typedef enum bst_fft_kind {
 /* Transform of one kind, size and precision between two arrays, with its work space. */
 typedef struct bst_fft bst_fft;
 
+/* Name and version of the library that transforms. */
+const char *bst_fft_library(void) BST_NOEXCEPT;
+
 /* Allocates an array for transforms, aligned for vector instructions, uninitialised.
  *
  * Given:     bytes  above 0

@@ -93,3 +93,7 @@ void bst_fft_run(bst_fft *fft) {
         fftw_execute(fft->f64);
     }
 }
+
+const char *bst_fft_library(void) {
+    return fftwf_version;
+}

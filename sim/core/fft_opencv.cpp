@@ -10,6 +10,7 @@
 #include <new>
 #include <opencv2/core.hpp>
 #include <opencv2/core/hal/hal.hpp>
+#include <opencv2/core/version.hpp>
 
 #include "sim/core/fft.h"
 #include "sim/core/pages.h"
@@ -191,4 +192,8 @@ extern "C" void bst_fft_run(bst_fft *fft) noexcept {
     } else {
         fft->transform->apply(fft->in, 2 * line, fft->out, 2 * line);
     }
+}
+
+const char *bst_fft_library(void) noexcept {
+    return "OpenCV " CV_VERSION;
 }

@@ -7,8 +7,11 @@ import glob
 import json
 import os
 import re
+import sqlite3
 import subprocess
 import unittest
+
+import erfa
 
 import runs
 from runs import call
@@ -314,6 +317,14 @@ class Help(unittest.TestCase):
         result = call("--version")
         self.assertEqual(result.returncode, 0)
         self.assertRegex(result.stdout, r"^boresight \d+\.\d+\.\d+ \(\S*\)\n$")
+        self.assertEqual(call("version").stdout, result.stdout)
+        all_of_it = json.loads(call("version", "--json").stdout)
+        self.assertEqual(f"boresight {all_of_it['version']} ({all_of_it['git_revision']})\n", result.stdout)
+        self.assertEqual(all_of_it["libraries"]["SQLite"], sqlite3.sqlite_version)
+        self.assertEqual(all_of_it["libraries"]["ERFA"], erfa.version.erfa_version)
+        shown = call("version", "--verbose").stdout
+        for name, value in all_of_it["libraries"].items():
+            self.assertRegex(shown, rf"\n  {name} +{re.escape(value)}\n")
 
 
 class SmallStack(unittest.TestCase):
