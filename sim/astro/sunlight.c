@@ -62,6 +62,47 @@ static double transmission(const colour *c, int k) {
     return exp(-c->rayleigh_per_km * limb_rows[k].air_km - c->ozone_per_du * limb_rows[k].ozone_du);
 }
 
+/* The rays of one row: they appear at the limb of an Earth that is higher by g. */
+typedef struct ray_row {
+    double impact_m, g_m;
+    bst_earth_limb limb;
+} ray_row;
+
+/* Geometry of the rays of row k; false: they cross the shadow axis before the satellite, beyond the
+ * Moon's distance. */
+static bool see_row(bst_vec3 position_m, bst_vec3 pole, bst_vec3 towards, double way_m, int k,
+                    ray_row *out) {
+    out->impact_m = 1e3 * limb_rows[k].height_km + 1e3 * limb_rows[k].impact_km;
+    out->g_m = out->impact_m - way_m * tan(limb_rows[k].bending_rad);
+    if (BST_EARTH_RADIUS_M + out->g_m < 0.1 * BST_EARTH_RADIUS_M) {
+        return false;
+    }
+    if (!bst_earth_limb_at(position_m, pole, out->g_m, towards, &out->limb)) {
+        out->limb =
+            (bst_earth_limb){.beyond = bst_vec3_dot(position_m, towards) > 0.0 ? 1.0 : -1.0};
+    }
+    return true;
+}
+
+/* Lowest row through whose limb, and those of all rows above, no light comes: deep in the shadow
+ * row 0. LIMB_ROWS: light comes through the highest row. g falls with the height of the rays, and
+ * the Sun's distance from the limb with it. */
+static int lowest_dark_row(bst_vec3 position_m, bst_vec3 pole, bst_vec3 towards, double way_m,
+                           double disc) {
+    int bright = -1, dark = LIMB_ROWS; /* rows that are known to be so */
+    while (dark - bright > 1) {
+        int k = dark == LIMB_ROWS ? LIMB_ROWS - 1 : (bright + dark) / 2;
+        ray_row row;
+        if (see_row(position_m, pole, towards, way_m, k, &row) &&
+            bst_earth_limb_share(&row.limb, disc) <= 0.0) {
+            dark = k;
+        } else {
+            bright = k;
+        }
+    }
+    return dark;
+}
+
 /* Light through the atmosphere. Rays at height h with impact parameter b appear at g = b - way *
  * bending. Between two rows all the light between their g is counted, times the divergence of the
  * bundle along and across the limb. */
@@ -69,36 +110,30 @@ static void through_air(bst_vec3 position_m, bst_vec3 pole, bst_vec3 towards, do
                         bst_astro_sunlight *out) {
     double distance = bst_vec3_norm(position_m);
     double way = sqrt(fmax(distance * distance - BST_EARTH_RADIUS_M * BST_EARTH_RADIUS_M, 0.0));
-    double above[BST_SUNLIGHT_COLOURS], here[BST_SUNLIGHT_COLOURS], g_above = 0.0;
-    double impact_above = 0.0;
-    for (int k = LIMB_ROWS - 1; k >= 0; k--) {
-        double h = 1e3 * limb_rows[k].height_km;
-        double impact = h + 1e3 * limb_rows[k].impact_km;
-        double g = impact - way * tan(limb_rows[k].bending_rad);
-        bst_earth_limb limb;
-        if (BST_EARTH_RADIUS_M + g < 0.1 * BST_EARTH_RADIUS_M) {
-            break; /* rays that cross the shadow axis: beyond the Moon */
-        }
-        if (!bst_earth_limb_at(position_m, pole, g, towards, &limb)) {
-            limb = (bst_earth_limb){.beyond = bst_vec3_dot(position_m, towards) > 0.0 ? 1.0 : -1.0};
-        }
-        share_outside(&limb, disc, here);
+    double above[BST_SUNLIGHT_COLOURS] = {0.0}, here[BST_SUNLIGHT_COLOURS];
+    int dark = lowest_dark_row(position_m, pole, towards, way, disc);
+    ray_row upper = {.g_m = 0.0}, row;
+    for (int c = 0; c < BST_SUNLIGHT_COLOURS; c++) {
+        out->light[c] = 0.0;
+    }
+    for (int k = dark < LIMB_ROWS ? dark : LIMB_ROWS - 1;
+         k >= 0 && see_row(position_m, pole, towards, way, k, &row); k--) {
+        share_outside(&row.limb, disc, here);
         for (int c = 0; c < BST_SUNLIGHT_COLOURS; c++) {
             if (k == LIMB_ROWS - 1) {
                 out->light[c] = here[c];
-            } else {
-                double top = 1e3 * limb_rows[k + 1].height_km;
-                double thinned = (impact_above - impact) / (g_above - g) *
+            } else if (k < dark) {
+                double top = 1e3 * limb_rows[k + 1].height_km, h = 1e3 * limb_rows[k].height_km;
+                double thinned = (upper.impact_m - row.impact_m) / (upper.g_m - row.g_m) *
                                  (BST_EARTH_RADIUS_M + 0.5 * (top + h)) /
-                                 (BST_EARTH_RADIUS_M + 0.5 * (g_above + g));
+                                 (BST_EARTH_RADIUS_M + 0.5 * (upper.g_m + row.g_m));
                 double low = transmission(&colours[c], k), high = transmission(&colours[c], k + 1);
                 double clear = (low + 4.0 * sqrt(low * high) + high) / 6.0; /* Simpson */
                 out->light[c] += fmax(here[c] - above[c], 0.0) * thinned * clear;
             }
             above[c] = here[c];
         }
-        g_above = g;
-        impact_above = impact;
+        upper = row;
         if (above[BST_SUNLIGHT_V] >= 1.0) {
             break; /* no light from below */
         }
