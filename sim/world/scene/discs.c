@@ -292,6 +292,22 @@ double bst_discs_edge_px(const bst_discs *discs, bst_vec3 direction) {
     return nearest;
 }
 
+double bst_discs_sharp_edge_px(const bst_discs *discs, bst_vec3 direction) {
+    double nearest = INFINITY;
+    for (int i = 0; i < BST_BODY_COUNT; i++) {
+        const bst_scene_body_disc *d = &discs->body[i];
+        if (!d->present) {
+            continue;
+        }
+        /* also in the middle of an interval, whose surface stands for all of it */
+        int step = d->parts < BST_DISC_PARTS ? BST_DISC_PARTS / (2 * d->parts) : 1;
+        for (int k = 0; k <= BST_DISC_PARTS; k += step) {
+            nearest = fmin(nearest, fabs(edge_at(d, i, k, direction)) / discs->scale_rad);
+        }
+    }
+    return fmax(nearest - 6.0 * discs->sigma_px, 0.0);
+}
+
 /* Integral of the normal distribution function of z / sigma. */
 static double ramp(double z, double sigma) {
     double u = z / sigma;

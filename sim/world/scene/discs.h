@@ -79,6 +79,10 @@ void bst_discs_daylight(const bst_discs *discs, bst_vec3 direction, bool *day, b
  * of a disc during the exposure, minus the reach of the disc's light. */
 double bst_discs_edge_px(const bst_discs *discs, bst_vec3 direction);
 
+/* Distance of a direction from the nearest blurred edge at the limits and middles of the time
+ * intervals, px. Between them an edge moves uniformly: its light can be interpolated. */
+double bst_discs_sharp_edge_px(const bst_discs *discs, bst_vec3 direction);
+
 /* Mean light from one direction over the exposure. */
 typedef struct bst_disc_light {
     double sunlight; /* from the Sun and, reflected, from Moon and Earth; stars of V = 0 per

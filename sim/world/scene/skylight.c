@@ -225,18 +225,20 @@ static float paint(const painter *p, double x, double y, double sky_e) {
     return (float)(fmax(e, 0.0) * p->around->exposure_s);
 }
 
+/* Distance of a position from the edge of the vignetting, px. */
+static double vignetting_edge_px(const bst_camera *camera, double x, double y) {
+    double limit = camera->optics.vignetting.limit_px;
+    double dx = x - bst_camera_centre_x(camera), dy = y - bst_camera_centre_y(camera);
+    return limit > 0.0 ? fabs(hypot(dx, dy) - limit) : INFINITY;
+}
+
 /* Distance of a node from the nearest edge of a disc or of the vignetting, px. */
 static double edge_px(const painter *p, double x, double y) {
     const bst_camera *camera = p->b->camera;
-    double limit = camera->optics.vignetting.limit_px, edge = INFINITY;
-    if (limit > 0.0) {
-        edge =
-            fabs(hypot(x - bst_camera_centre_x(camera), y - bst_camera_centre_y(camera)) - limit);
-    }
-    if (bst_discs_any(&p->discs)) {
-        edge = fmin(edge, bst_discs_edge_px(&p->discs, bst_camera_unproject(camera, x, y)));
-    }
-    return edge;
+    double edge = vignetting_edge_px(camera, x, y);
+    return bst_discs_any(&p->discs)
+               ? fmin(edge, bst_discs_edge_px(&p->discs, bst_camera_unproject(camera, x, y)))
+               : edge;
 }
 
 static void fill_corners(const painter *p, int x0, int y, cell_corner *row) {
@@ -301,27 +303,110 @@ static bst_status find_edge(bst_ctx *ctx, const painter *p, bst_skylight *b, boo
     return BST_OK;
 }
 
-/* Computes the background per pixel: exactly in cells with an edge, else by interpolation. */
+/* A square of pixels with the background at its corners: (x, y), (x + size, y), (x, y + size),
+ * (x + size, y + size). */
+typedef struct square {
+    int x, y, size;
+    float corner[4];
+} square;
+
+/* Interpolates between the corners of a square; size is a power of two. */
+static float interpolate_square(const square *q, int x, int y) {
+    float s = (float)(x - q->x) / (float)q->size, t = (float)(y - q->y) / (float)q->size;
+    float left = q->corner[0] + t * (q->corner[2] - q->corner[0]);
+    float right = q->corner[1] + t * (q->corner[3] - q->corner[1]);
+    return left + s * (right - left);
+}
+
+/* Background at a pixel, with the interpolated sky. */
+static float paint_pixel(const painter *p, int x, int y) {
+    return paint(p, x, y, (double)interpolate(&p->b->sky, (float)x, (float)y));
+}
+
+/* Cuts a square into four. True: linear interpolation between its corners agrees with the
+ * background at the five new corners to 0.01 sigma of its photon noise or 3e-5 of it. Within the
+ * four squares the error is then about a quarter of that where the light is smooth, and up to a few
+ * times that at the limb and at the terminator. */
+static bool cut_square(const painter *p, const square *q, square part[4]) {
+    int half = q->size / 2;
+    float v[3][3];
+    bool even = true;
+    for (int j = 0; j < 3; j++) {
+        for (int i = 0; i < 3; i++) {
+            if (i != 1 && j != 1) {
+                v[j][i] = q->corner[j + i / 2];
+                continue;
+            }
+            int x = q->x + i * half, y = q->y + j * half;
+            v[j][i] = paint_pixel(p, x, y);
+            float error = fabsf(v[j][i] - interpolate_square(q, x, y));
+            even = even && error <= fmaxf(0.01F * sqrtf(fmaxf(v[j][i], 1.0F)), 3e-5F * v[j][i]);
+        }
+    }
+    for (int k = 0; k < 4; k++) {
+        int i = k & 1, j = k >> 1;
+        part[k] = (square){q->x + i * half,
+                           q->y + j * half,
+                           half,
+                           {v[j][i], v[j][i + 1], v[j + 1][i], v[j + 1][i + 1]}};
+    }
+    return even;
+}
+
+/* Fills the pixels of a square in the window: exactly, or by interpolation. */
+static void fill_pixels(const painter *p, lattice *out, const square *q, bool exact) {
+    int x1 = out->x0 + out->columns, y1 = out->y0 + out->rows;
+    for (int y = q->y > out->y0 ? q->y : out->y0; y < q->y + q->size && y < y1; y++) {
+        float *row = out->value + (size_t)(y - out->y0) * (size_t)out->columns;
+        for (int x = q->x > out->x0 ? q->x : out->x0; x < q->x + q->size && x < x1; x++) {
+            row[x - out->x0] = exact ? paint_pixel(p, x, y) : interpolate_square(q, x, y);
+        }
+    }
+}
+
+/* Fills a square by interpolation within its four quarters, or by smaller squares, down to pixels
+ * where a blurred edge passes. */
+static void fill_square(const painter *p, lattice *out, const square *q) {
+    enum { LEAST = 4 };
+    const bst_camera *camera = p->b->camera;
+    if (q->x + q->size <= out->x0 || q->x >= out->x0 + out->columns || q->y + q->size <= out->y0 ||
+        q->y >= out->y0 + out->rows) {
+        return;
+    }
+    if (q->size <= LEAST) {
+        fill_pixels(p, out, q, true);
+        return;
+    }
+    double x = q->x + 0.5 * q->size, y = q->y + 0.5 * q->size;
+    double edge = fmin(vignetting_edge_px(camera, x, y),
+                       bst_discs_sharp_edge_px(&p->discs, bst_camera_unproject(camera, x, y)));
+    square part[4];
+    /* the square's half diagonal and its size beyond: the light of the limb bends next to it */
+    bool even = cut_square(p, q, part) && edge > 1.7 * q->size / bst_camera_shrink(camera);
+    for (int k = 0; k < 4; k++) {
+        if (even) {
+            fill_pixels(p, out, &part[k], false);
+        } else {
+            fill_square(p, out, &part[k]);
+        }
+    }
+}
+
+/* Computes the background per pixel, cell by cell of the nodes. */
 static bst_status paint_pixels(bst_ctx *ctx, const painter *p, bst_skylight *b, bst_window window) {
     lattice *out = &b->pixels;
-    const lattice *n = &b->nodes, *s = &b->sky;
+    const lattice *n = &b->nodes;
     BST_TRY(set_nodes(ctx, out, 1, window));
     out->columns = window.width;
     out->rows = window.height;
-    int x1 = window.x0 + window.width, y1 = window.y0 + window.height;
-    BST_TRY(begin_cells(ctx, p, b, n->x0, n->y0, x1));
-    for (int cy = n->y0; cy < y1; cy += n->step) {
-        next_cells(p, b, n->x0, cy + n->step);
-        for (int cx = n->x0; cx < x1; cx += n->step) {
-            bool edge = cell_has_edge(p, (cx - n->x0) / n->step);
-            for (int y = cy > window.y0 ? cy : window.y0; y < cy + n->step && y < y1; y++) {
-                float *row = out->value + (size_t)(y - window.y0) * (size_t)window.width;
-                for (int x = cx > window.x0 ? cx : window.x0; x < cx + n->step && x < x1; x++) {
-                    const lattice *from = edge ? s : n;
-                    float e = interpolate(from, (float)x, (float)y);
-                    row[x - window.x0] = edge ? paint(p, x, y, (double)e) : e;
-                }
-            }
+    for (int j = 0; j < n->rows - 1; j++) {
+        for (int i = 0; i < n->columns - 1; i++) {
+            const float *c = n->value + (size_t)j * (size_t)n->columns + i;
+            const square cell = {n->x0 + i * n->step,
+                                 n->y0 + j * n->step,
+                                 n->step,
+                                 {c[0], c[1], c[n->columns], c[n->columns + 1]}};
+            fill_square(p, out, &cell);
         }
     }
     return BST_OK;

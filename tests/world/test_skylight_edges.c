@@ -1,0 +1,95 @@
+/* The sky background where an edge of the Earth's disc is on the sensor. */
+#include "tests/world/skylight_scene.h"
+
+/* With an edge on the sensor the map is drawn pixel by pixel, the same in every window. */
+static void edges_are_drawn_pixel_by_pixel(void **state) {
+    (void)state;
+    bst_world *world = test_world(SKY_WORLD("300", "\"model\": \"sky\""));
+    const bst_camera *camera = bst_world_camera(world, 0, 0);
+    bst_scene_surroundings around = look_down((bst_vec3){4.2164e7, 0, 0}, 0);
+    double to = asin(BST_EARTH_RADIUS_M / 4.2164e7);
+    for (int k = 0; k <= BST_DISC_PARTS; k++) {
+        around.q[k] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0, -to, 0}), around.q[k]);
+    }
+    bst_skylight *a, *b;
+    const bst_skylight_map *whole = make(world, &around, (bst_window){0, 0, 300, 300}, &a);
+    const bst_skylight_map *part = make(world, &around, (bst_window){2, 100, 31, 12}, &b);
+    assert_true(whole->step_px == 1 && part->step_px == 1 && whole->columns == 300);
+    for (int y = 100; y < 112; y++) {
+        for (int x = 2; x < 33; x++) {
+            assert_true(bst_skylight_at(whole, x, y) == bst_skylight_at(part, x, y));
+        }
+    }
+    /* full daylight on one side, with the limb's glancing light; the dark sky on the other */
+    double scale = bst_camera_scale_rad(camera);
+    double day = bst_camera_electrons_per_s(camera, 0) * scale * scale * 0.3 / BST_PI * FULL_SUN;
+    double left = bst_skylight_at(whole, 0, 150), right = bst_skylight_at(whole, 299, 150);
+    double bright = fmax(left, right), dark = fmin(left, right);
+    /* 150 px of 20 arcsec inside the limb, seen at an angle from the normal of asin(sine), which is
+     * the Sun's less the direction's own; 1 % for the tangent plane and the flattening */
+    double from_nadir = to - 150 * scale;
+    double sine = sin(from_nadir) * 4.2164e7 / BST_EARTH_RADIUS_M;
+    double sunward = cos(asin(sine) - from_nadir);
+    bst_assert_close(bright, day * sunward, 0.01 * day * sunward);
+    assert_true(dark < 1e-3 * bright && dark > 0);
+    bst_skylight_free(a);
+    bst_skylight_free(b);
+    bst_world_free(world);
+}
+
+/* Squares that are interpolated differ from every pixel's own value by less than 0.01 sigma of its
+ * photon noise, or 1e-4 of it where it is saturated: a limb that fades over hundreds of pixels,
+ * seen from a geostationary and a low orbit, at rest and while the camera slews along and across
+ * it. */
+static void interpolated_squares_are_right(void **state) {
+    (void)state;
+    static const struct {
+        double radius_m, off_px, slew_px[2];
+    } of[] = {{4.2164e7, 0, {0, 0}},     {4.2164e7, 40, {0, 90}},  {4.2164e7, -60, {70, 20}},
+              {4.2164e7, 30, {600, 50}}, {7.2e6, 0, {0, 0}},       {7.2e6, 100, {40, 0}},
+              {7.2e6, -100, {0, 200}},   {4.2164e7, 120, {0, 0.5}}};
+    bst_world *world = test_world(SKY_WORLD("300", "\"zodiacal\": false"));
+    const bst_camera *camera = bst_world_camera(world, 0, 0);
+    double scale = bst_camera_scale_rad(camera);
+    double sky = bst_camera_background_e_per_s(camera);
+    double sun = bst_camera_electrons_per_s(camera, 0) * scale * scale;
+    for (size_t c = 0; c < sizeof of / sizeof *of; c++) {
+        bst_scene_surroundings around = look_down((bst_vec3){of[c].radius_m, 0, 0}, 0);
+        double to = asin(BST_EARTH_RADIUS_M / of[c].radius_m) + of[c].off_px * scale;
+        for (int k = 0; k <= BST_DISC_PARTS; k++) {
+            double u = ((double)k / BST_DISC_PARTS - 0.5) * scale;
+            bst_quat turn = bst_quat_from_rotvec(
+                (bst_vec3){of[c].slew_px[0] * u, -to + of[c].slew_px[1] * u, 0});
+            around.q[k] = bst_quat_mul(turn, around.q[k]);
+        }
+        bst_skylight *s;
+        const bst_skylight_map *map = make(world, &around, (bst_window){0, 0, 300, 300}, &s);
+        assert_int_equal(map->step_px, 1);
+        bst_discs discs;
+        bst_discs_make(camera, &around, &discs);
+        double worst = 0.0, least = INFINITY, most = 0.0;
+        for (int i = 0; i < 300 * 300; i++) {
+            bst_disc_light l =
+                bst_discs_light(&discs, bst_camera_unproject(camera, i % 300, i / 300));
+            double e = sky * (1 - l.earth) + sun * l.sunlight;
+            double sigma = fmax(0.02 * sqrt(fmax(e, 1.0)), 2e-4 * e);
+            worst = fmax(worst, fabs(bst_skylight_at(map, i % 300, i / 300) - e) / sigma);
+            least = fmin(least, e);
+            most = fmax(most, e);
+        }
+        assert_true(most > 2 * least);
+        if (!(worst < 1.0)) {
+            fail_msg("scene %zu: %g times what is allowed", c, worst);
+        }
+        bst_skylight_free(s);
+    }
+    bst_world_free(world);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(edges_are_drawn_pixel_by_pixel),
+        cmocka_unit_test(interpolated_squares_are_right),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
