@@ -136,8 +136,7 @@ bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int 
         return BST_OK;
     }
     BST_TRY(bst_knowledge_eye_at(ctx, s->view, seconds, &eye, &bodies));
-    if (bst_knowledge_sight_at(&quiet, s->view, object, seconds, &now) != BST_OK ||
-        bst_knowledge_sight_at(&quiet, s->view, object, seconds + step_s, &later) != BST_OK) {
+    if (bst_knowledge_sight_at(&quiet, s->view, object, seconds, &now) != BST_OK) {
         out->why = BST_WHY_NO_ORBIT;
         return BST_OK;
     }
@@ -160,6 +159,9 @@ bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int 
     bool reached = true;
     if (out->snr < t->config.min_snr) {
         out->why = BST_WHY_FAINT;
+    } else if (bst_knowledge_sight_at(&quiet, s->view, object, seconds + step_s, &later) !=
+               BST_OK) {
+        out->why = BST_WHY_NO_ORBIT;
     } else if (bst_vec3_angle(now.geometric, later.geometric) >
                t->config.max_rate_arcsec_per_s * BST_ARCSEC_RAD * step_s) {
         out->why = BST_WHY_RATE;
