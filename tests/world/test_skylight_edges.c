@@ -72,7 +72,7 @@ static void interpolated_squares_are_right(void **state) {
             bst_disc_light l =
                 bst_discs_light(&discs, bst_camera_unproject(camera, i % 300, i / 300));
             double e = sky * (1 - l.earth) + sun * l.sunlight;
-            double sigma = fmax(0.02 * sqrt(fmax(e, 1.0)), 2e-4 * e);
+            double sigma = fmax(0.02 * sqrt(fmax(e, 1.0)), 4e-4 * e);
             worst = fmax(worst, fabs(bst_skylight_at(map, i % 300, i / 300) - e) / sigma);
             least = fmin(least, e);
             most = fmax(most, e);

@@ -365,9 +365,10 @@ static void fill_pixels(const painter *p, lattice *out, const square *q, bool ex
 }
 
 /* Fills a square by interpolation within its four quarters, or by smaller squares, down to pixels
- * where a blurred edge passes. */
+ * where a blurred edge passes. Nine places of a small square see any edge in it, because it is
+ * almost straight; in a large one a disc could lie between them. */
 static void fill_square(const painter *p, lattice *out, const square *q) {
-    enum { LEAST = 4 };
+    enum { SMALL = 8, LEAST = 4 };
     const bst_camera *camera = p->b->camera;
     if (q->x + q->size <= out->x0 || q->x >= out->x0 + out->columns || q->y + q->size <= out->y0 ||
         q->y >= out->y0 + out->rows) {
@@ -377,12 +378,15 @@ static void fill_square(const painter *p, lattice *out, const square *q) {
         fill_pixels(p, out, q, true);
         return;
     }
-    double x = q->x + 0.5 * q->size, y = q->y + 0.5 * q->size;
-    double edge = fmin(vignetting_edge_px(camera, x, y),
-                       bst_discs_sharp_edge_px(&p->discs, bst_camera_unproject(camera, x, y)));
     square part[4];
-    /* the square's half diagonal and its size beyond: the light of the limb bends next to it */
-    bool even = cut_square(p, q, part) && edge > 1.7 * q->size / bst_camera_shrink(camera);
+    bool even = cut_square(p, q, part);
+    if (even && q->size > SMALL) {
+        double x = q->x + 0.5 * q->size, y = q->y + 0.5 * q->size;
+        double edge = fmin(vignetting_edge_px(camera, x, y),
+                           bst_discs_sharp_edge_px(&p->discs, bst_camera_unproject(camera, x, y)));
+        /* half a diagonal, and more: the light of the limb bends next to it */
+        even = edge > 1.7 * q->size / bst_camera_shrink(camera);
+    }
     for (int k = 0; k < 4; k++) {
         if (even) {
             fill_pixels(p, out, &part[k], false);
