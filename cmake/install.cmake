@@ -79,5 +79,8 @@ install(FILES docs/boresight.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
 install(FILES cmake/completions/boresight.bash RENAME boresight
   DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 install(FILES cmake/completions/_boresight DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/site-functions)
+install(FILES cmake/boresight.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications)
+install(FILES view/page/icon.svg RENAME boresight.svg
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps)
 install(FILES cmake/completions/boresight.fish
   DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d)

@@ -46,6 +46,16 @@ class Packages(unittest.TestCase):
         missing = set(" ".join(lists).split()) - words
         self.assertFalse(missing, "packages that ./dev installs and docs/how-to/build.md does not name")
 
+    def test_bill_of_materials(self):
+        """Direct dependencies are the packages of the libraries that the linker wrote into the program."""
+        bill = json.loads(call(sys.executable, "cmake/bill_of_materials.py", runs.BORESIGHT))
+        of = {part["bom-ref"]: part["name"] for part in bill["components"]}
+        direct = {of[ref] for ref in bill["dependencies"][0]["dependsOn"]}
+        self.assertLessEqual({"libsqlite3-0", "libcfitsio10", "ocl-icd-libopencl1", "libc6"}, direct)
+        self.assertLess(direct, set(of.values()))  # libraries of libraries too
+        for part in bill["components"]:
+            self.assertEqual(part["version"], call("dpkg-query", "-W", "-f", "${Version}", part["name"]))
+
 
 class Installed(unittest.TestCase):
     """The stage is made under one name and used under another."""
@@ -223,6 +233,7 @@ class Installed(unittest.TestCase):
         self.assertTrue(os.path.exists(work + "/run/manifest.json"))
         for name in ("share/boresight/scenarios/boresight.schema.json",
                      "share/man/man1/boresight.1", "share/doc/boresight/LICENSE",
+                     "share/applications/boresight.desktop", "share/icons/hicolor/scalable/apps/boresight.svg",
                      "share/doc/boresight/docs/reference/run_folder.md",
                      "share/doc/boresight/docs/examples/use_library/first_frames.c"):
             self.assertTrue(os.path.exists(os.path.join(self.stage, name)), name)
