@@ -31,28 +31,35 @@ def named(program):
     return set(re.findall(r"\(NEEDED\)\s+Shared library: \[(.+)\]", run("readelf", "-d", program)))
 
 
-def package_of(path):
-    """Debian package of a file; it may be listed without the /usr that its folder is a link to."""
-    for name in (path, path.removeprefix("/usr")):
-        found = subprocess.run(["dpkg-query", "-S", name], capture_output=True, text=True, check=False)
-        if found.returncode == 0:
-            return found.stdout.split(": ")[0].split(",")[0]
-    sys.exit(f"{path}: belongs to no Debian package; this program is described on Debian only")
+def packages_of(paths):
+    """Debian packages of files, which may be listed without the /usr that their folder is a link to."""
+    names = {name: path for path in paths for name in (path, path.removeprefix("/usr"))}
+    said = subprocess.run(["dpkg-query", "-S", *names], capture_output=True, text=True, check=False).stdout
+    found = {names[path]: owners.split(",")[0] for owners, path in
+             re.findall(r"^(\S.*): (/\S+)$", said, re.MULTILINE) if path in names}
+    for path in paths:
+        if path not in found:
+            sys.exit(f"{path}: belongs to no Debian package; this program is described on Debian only")
+    return found
 
 
-def component(package):
-    name, version, arch, source, source_version = run(
-        "dpkg-query", "-W", "-f",
-        "${Package}\t${Version}\t${Architecture}\t${source:Package}\t${source:Version}", package).split("\t")
-    purl = f"pkg:deb/debian/{name}@{version.replace('+', '%2B').replace(':', '%3A')}?arch={arch}"
-    return {"type": "library", "bom-ref": purl, "name": name, "version": version, "purl": purl,
-            "properties": [{"name": "debian:source", "value": f"{source} {source_version}"}]}
+def components_of(packages):
+    said = run("dpkg-query", "-W", "-f", "${binary:Package}\t${Package}\t${Version}\t${Architecture}\t"
+               "${source:Package} ${source:Version}\n", *packages)
+    out = {}
+    for line in said.splitlines():
+        key, name, version, arch, source = line.split("\t")
+        purl = f"pkg:deb/debian/{name}@{version.replace('+', '%2B').replace(':', '%3A')}?arch={arch}"
+        out[key.split(":")[0]] = {"type": "library", "bom-ref": purl, "name": name, "version": version, "purl": purl,
+                                  "properties": [{"name": "debian:source", "value": source}]}
+    return out
 
 
 def describe(program):
     libraries = loaded(program)
-    packages = {name: package_of(path) for name, path in libraries.items()}
-    components = {package: component(package) for package in sorted(set(packages.values()))}
+    owner = packages_of(libraries.values())
+    packages = {name: owner[path].split(":")[0] for name, path in libraries.items()}
+    components = components_of(sorted(set(packages.values())))
     version = run(program, "--version").split()[1]
     me = f"boresight@{version}"
     seconds = int(os.environ.get("SOURCE_DATE_EPOCH") or os.path.getmtime(program))
