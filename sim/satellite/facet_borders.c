@@ -9,30 +9,39 @@
 /* Shortest chord of a facet, in cells, of which the middle is within it beyond rounding. */
 static const double LEAST_CHORD = 1e-6;
 
-/* Appends a border. */
-static bst_status push(bst_ctx *ctx, bst_facet_layers *l, const bst_net_edge *edge) {
-    if (l->border_count == l->border_capacity) {
-        int capacity = 2 * l->border_capacity + 1024;
-        void *borders = realloc(l->borders, (size_t)capacity * sizeof *l->borders);
-        if (!borders) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d borders of facets", capacity);
-        }
-        l->borders = borders;
-        l->border_capacity = capacity;
-    }
+static bst_layers_border border_of(const bst_facet_layers *l, const bst_net_edge *edge, int layers) {
     bst_point2 a = l->at[edge->a], b = l->at[edge->b];
-    bst_layers_border *to = &l->borders[l->border_count];
-    *to = (bst_layers_border){
-        a,
-        b,
-        {l->near[edge->a], l->near[edge->b]},
-        {{(float)fmin(a.x, b.x), (float)fmin(a.y, b.y)},
-         {(float)fmax(a.x, b.x), (float)fmax(a.y, b.y)},
-         .facet = l->border_count}};
-    const bst_layers_box *box = &to->box;
-    bool off = box->high[0] < 0.0F || box->high[1] < 0.0F || box->low[0] > (float)l->width ||
-               box->low[1] > (float)l->height;
-    l->border_count += off ? 0 : 1;
+    bool right = b.x > a.x, down = b.y > a.y;
+    return (bst_layers_border){.a = a,
+                               .b = b,
+                               .near = {l->near[edge->a], l->near[edge->b]},
+                               .box = {{(float)(right ? a.x : b.x), (float)(down ? a.y : b.y)},
+                                       {(float)(right ? b.x : a.x), (float)(down ? b.y : a.y)},
+                                       .facet = -1},
+                               .layers = layers,
+                               .outside = -1};
+}
+
+bst_status bst_facet_borders_list(bst_ctx *ctx, bst_facet_layers *l) {
+    l->border_count = 0;
+    for (int e = 0; e < l->net->edge_count; e++) {
+        const bst_net_edge *edge = &l->net->edges[e];
+        int layers = l->facing[edge->left] - l->facing[edge->right];
+        if (layers == 0) {
+            continue;
+        }
+        if (l->border_count == l->border_capacity) {
+            int capacity = 2 * l->border_capacity + 1024;
+            void *borders = realloc(l->borders, (size_t)capacity * sizeof *l->borders);
+            if (!borders) {
+                return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d borders of facets",
+                                capacity);
+            }
+            l->borders = borders;
+            l->border_capacity = capacity;
+        }
+        l->borders[l->border_count++] = border_of(l, edge, layers);
+    }
     return BST_OK;
 }
 
@@ -40,7 +49,12 @@ static bst_status push(bst_ctx *ctx, bst_facet_layers *l, const bst_net_edge *ed
 static void enter(bst_facet_layers *l, bool fill) {
     for (int n = 0; n < l->border_count; n++) {
         int at[4];
-        bst_layers_range(l, &l->borders[n].box, BST_LAYERS_BIN, at);
+        const bst_layers_box *b = &l->borders[n].box;
+        if (b->high[0] < 0.0F || b->high[1] < 0.0F || b->low[0] > (float)l->width ||
+            b->low[1] > (float)l->height) {
+            continue;
+        }
+        bst_layers_range(l, b, BST_LAYERS_BIN, at);
         for (int j = at[2]; j <= at[3]; j++) {
             for (int i = j * l->bins_x + at[0]; i <= j * l->bins_x + at[1]; i++) {
                 if (fill) {
@@ -53,15 +67,8 @@ static void enter(bst_facet_layers *l, bool fill) {
     }
 }
 
-bst_status bst_facet_borders_fill(bst_ctx *ctx, bst_facet_layers *l) {
+bst_status bst_facet_borders_enter(bst_ctx *ctx, bst_facet_layers *l) {
     int bins = l->bins_x * l->bins_y;
-    l->border_count = 0;
-    for (int e = 0; e < l->net->edge_count; e++) {
-        const bst_net_edge *edge = &l->net->edges[e];
-        if (l->facing[edge->left] != l->facing[edge->right]) {
-            BST_TRY(push(ctx, l, edge));
-        }
-    }
     memset(l->border_first, 0, ((size_t)bins + 1) * sizeof *l->border_first);
     enter(l, false);
     for (int i = 0; i < bins; i++) {

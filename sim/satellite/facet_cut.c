@@ -9,13 +9,13 @@
 static const double LEAST_AREA = 1e-9;
 
 static void make_outline(const bst_facet_layers *l, int facet, bst_layers_outline *o) {
-    const bst_facet *f = &l->net->satellite->facets[facet];
-    const int *corner = l->net->corner + f->first;
-    o->count = f->count;
+    const int *corner = l->net->corner + l->net->first[facet];
+    int count = l->net->first[facet + 1] - l->net->first[facet];
+    o->count = count;
     o->low[0] = o->low[1] = o->least = INFINITY;
     o->high[0] = o->high[1] = o->most = -INFINITY;
-    for (int i = 0; i < f->count; i++) {
-        int v = corner[f->count - 1 - i];
+    for (int i = 0; i < count; i++) {
+        int v = corner[count - 1 - i];
         bst_point2 p = l->at[v];
         double near = l->near[v];
         o->p[i] = p;
@@ -29,11 +29,11 @@ static void make_outline(const bst_facet_layers *l, int facet, bst_layers_outlin
 }
 
 bool bst_facet_layers_plane(const bst_facet_layers *l, int facet, double out[3]) {
-    const bst_facet *f = &l->net->satellite->facets[facet];
-    const int *corner = l->net->corner + f->first;
+    const int *corner = l->net->corner + l->net->first[facet];
+    int count = l->net->first[facet + 1] - l->net->first[facet];
     bst_point2 o = l->at[corner[0]];
     double most = 0.0, z0 = l->near[corner[0]];
-    for (int i = 2; i < f->count; i++) {
+    for (int i = 2; i < count; i++) {
         bst_point2 a = l->at[corner[i - 1]], b = l->at[corner[i]];
         double area = (a.x - o.x) * (b.y - o.y) - (b.x - o.x) * (a.y - o.y);
         if (fabs(area) > fabs(most)) {
@@ -106,10 +106,9 @@ static int hidden_part(const bst_facet_layers *l, int facet, int behind, const b
 
 /* Number of vertices that two facets share. */
 static int shared_vertices(const bst_facet_net *net, int f, int g) {
-    const bst_facet *a = &net->satellite->facets[f], *b = &net->satellite->facets[g];
     int shared = 0;
-    for (int i = a->first; i < a->first + a->count; i++) {
-        for (int k = b->first; k < b->first + b->count; k++) {
+    for (int i = net->first[f]; i < net->first[f + 1]; i++) {
+        for (int k = net->first[g]; k < net->first[g + 1]; k++) {
             shared += net->corner[i] == net->corner[k];
         }
     }
@@ -119,10 +118,10 @@ static int shared_vertices(const bst_facet_net *net, int f, int g) {
 /* True if a facet covers a place; its border does. */
 static bool covers(const bst_facet_layers *l, int facet, bst_point2 p) {
     static const double ROUNDING = 1e-12;
-    const bst_facet *f = &l->net->satellite->facets[facet];
-    const int *corner = l->net->corner + f->first;
-    for (int i = 0; i < f->count; i++) {
-        bst_point2 a = l->at[corner[i]], b = l->at[corner[i + 1 < f->count ? i + 1 : 0]];
+    const int *corner = l->net->corner + l->net->first[facet];
+    int count = l->net->first[facet + 1] - l->net->first[facet];
+    for (int i = 0; i < count; i++) {
+        bst_point2 a = l->at[corner[i]], b = l->at[corner[i + 1 < count ? i + 1 : 0]];
         if ((b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x) > ROUNDING) {
             return false;
         }
@@ -208,7 +207,8 @@ bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {
         return seen == SEEN_ALL;
     }
     bst_layers_range(l, box, BST_LAYERS_BIN, at);
-    l->seen[facet] = facet;
+    l->stamp++;
+    l->seen[facet] = l->stamp;
     for (int n = 0; n < (at[1] - at[0] + 1) * (at[3] - at[2] + 1); n++) {
         int columns = at[1] - at[0] + 1;
         int bin = (at[2] + n / columns) * l->bins_x + at[0] + n % columns;
@@ -216,10 +216,10 @@ bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {
         const bst_layers_box *end = &l->entries[l->bin_first[bin + 1]];
         for (; b < end && b->nearest <= box->farthest; b++) {
             bst_point2 part[2 * BST_LAYERS_CORNERS_MAX];
-            if (!boxes_meet(b, box) || l->seen[b->facet] == facet) {
+            if (!boxes_meet(b, box) || l->seen[b->facet] == l->stamp) {
                 continue;
             }
-            l->seen[b->facet] = facet;
+            l->seen[b->facet] = l->stamp;
             int corners = hidden_part(l, b->facet, facet, &own, plane, part);
             if (corners < 3) {
                 continue;

@@ -24,7 +24,8 @@ void bst_facet_layers_free(bst_facet_layers *l) {
     free(l->borders);
     free(l->border_first);
     free(l->border_entries);
-    free(l->outside);
+    free(l->chosen);
+    free(l->marked);
     free(l->needed);
     free(l->bin_first);
     free(l->entries);
@@ -45,9 +46,9 @@ static bst_status reserve_facets(bst_ctx *ctx, bst_facet_layers *l, const bst_fa
     l->boxes = calloc(facets, sizeof *l->boxes);
     l->order = calloc(facets, sizeof *l->order);
     l->seen = calloc(facets, sizeof *l->seen);
-    l->outside = calloc((size_t)net->edge_count + 1, sizeof *l->outside);
+    l->chosen = calloc(facets, sizeof *l->chosen);
     if (!l->at || !l->near || !l->facing || !l->doubtful || !l->boxes || !l->order || !l->seen ||
-        !l->outside) {
+        !l->chosen) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the view of %d facets",
                         net->satellite->facet_count);
     }
@@ -78,12 +79,14 @@ bst_status bst_facet_layers_begin(bst_ctx *ctx, bst_facet_layers *l, const bst_f
         free(l->bin_first);
         free(l->border_first);
         free(l->needed);
+        free(l->marked);
         l->crowded = malloc(cells * sizeof *l->crowded);
         l->bin_first = malloc(bins * sizeof *l->bin_first);
         l->border_first = malloc(bins * sizeof *l->border_first);
         l->needed = malloc(bins * sizeof *l->needed);
+        l->marked = malloc(bins * sizeof *l->marked);
         l->cell_capacity = cells;
-        if (!l->crowded || !l->bin_first || !l->border_first || !l->needed) {
+        if (!l->crowded || !l->bin_first || !l->border_first || !l->needed || !l->marked) {
             l->cell_capacity = 0;
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a view of %d x %d cells", width,
                             height);
@@ -93,8 +96,9 @@ bst_status bst_facet_layers_begin(bst_ctx *ctx, bst_facet_layers *l, const bst_f
 }
 
 /* Appends the crossings of a border with the middles of rows. */
-static bst_status cross_rows(bst_ctx *ctx, bst_facet_layers *l, int edge, int layers) {
-    bst_point2 a = l->at[l->net->edges[edge].a], b = l->at[l->net->edges[edge].b];
+static bst_status cross_rows(bst_ctx *ctx, bst_facet_layers *l, int border) {
+    bst_point2 a = l->borders[border].a, b = l->borders[border].b;
+    int layers = l->borders[border].layers;
     if (b.y < a.y) {
         bst_point2 c = a;
         a = b;
@@ -121,12 +125,12 @@ static bst_status cross_rows(bst_ctx *ctx, bst_facet_layers *l, int edge, int la
     }
     for (int j = (int)first; j < (int)end; j++) {
         l->crossings[l->crossing_count++] =
-            (bst_layers_crossing){a.x + (j + 0.5 - a.y) * slope, j, edge, layers};
+            (bst_layers_crossing){a.x + (j + 0.5 - a.y) * slope, j, border, layers};
     }
     return BST_OK;
 }
 
-/* Orders the crossings by row, then by x; those of one place by their edge. */
+/* Orders the crossings by row, then by x; those of one place by their border. */
 static bst_status sort_crossings(bst_ctx *ctx, bst_facet_layers *l) {
     if (l->crossing_capacity > l->sorted_capacity) {
         free(l->sorted);
@@ -148,7 +152,7 @@ static bst_status sort_crossings(bst_ctx *ctx, bst_facet_layers *l) {
         next[j] = sum;
         sum += count;
     }
-    for (int n = 0; n < l->crossing_count; n++) { /* edges come in order */
+    for (int n = 0; n < l->crossing_count; n++) { /* borders come in order */
         l->sorted[next[l->crossings[n].row]++] = l->crossings[n];
     }
     for (int n = 1; n < l->crossing_count; n++) {
@@ -168,6 +172,16 @@ static bst_status sort_crossings(bst_ctx *ctx, bst_facet_layers *l) {
     return BST_OK;
 }
 
+/* Marks the cells of a row from one place to another, and their bins. */
+static void mark(bst_facet_layers *l, int row, double from, double to, int as) {
+    int first = bst_layers_cell_of(from, l->width), end = bst_layers_cell_of(to, l->width);
+    uint8_t *bins = l->marked + row / BST_LAYERS_BIN * l->bins_x;
+    memset(l->crowded + (size_t)row * (size_t)l->width + first, as, (size_t)(end - first + 1));
+    first /= BST_LAYERS_BIN;
+    end /= BST_LAYERS_BIN;
+    memset(bins + first, 1, (size_t)(end - first + 1));
+}
+
 /* Counts the layers along the rows: marks cells of several, and sets `outside` of the borders. */
 static void count_layers(bst_facet_layers *l) {
     int layers = 0;
@@ -177,16 +191,14 @@ static void count_layers(bst_facet_layers *l) {
             layers = 0;
         }
         int after = layers + c->layers, least = layers < after ? layers : after;
-        int8_t *outside = &l->outside[c->edge];
-        *outside = least > *outside ? (int8_t)(least < 2 ? least : 2) : *outside;
+        int *outside = &l->borders[c->border].outside;
+        *outside = least > *outside ? least : *outside;
         c->layers = layers = after;
         if (layers > 1 || layers < 0) {
             bool more = n + 1 < l->crossing_count && c[1].row == c->row;
             double to = more ? c[1].x : l->width;
             if (to > 0.0 && c->x < l->width) {
-                int i = bst_layers_cell_of(c->x, l->width), end = bst_layers_cell_of(to, l->width);
-                memset(l->crowded + (size_t)c->row * (size_t)l->width + i, BST_LAYERS_SEVERAL,
-                       (size_t)(end - i + 1));
+                mark(l, c->row, c->x, to, BST_LAYERS_SEVERAL);
             }
         }
     }
@@ -210,8 +222,7 @@ static void mark_border(bst_facet_layers *l, bst_point2 a, bst_point2 b) {
         double to = down < b.y ? a.x + (down - a.y) * slope : b.x;
         double low = (from < to ? from : to) - MARGIN, high = (from < to ? to : from) + MARGIN;
         if (low <= l->width && high >= 0.0) {
-            int i = bst_layers_cell_of(low, l->width), end = bst_layers_cell_of(high, l->width);
-            memset(l->crowded + (size_t)j * (size_t)l->width + i, BST_LAYERS_AT_BORDER, (size_t)(end - i + 1));
+            mark(l, j, low, high, BST_LAYERS_AT_BORDER);
         }
     }
 }
@@ -219,30 +230,25 @@ static void mark_border(bst_facet_layers *l, bst_point2 a, bst_point2 b) {
 /* Marks the cells where something may be hidden. */
 static bst_status mark_cells(bst_ctx *ctx, bst_facet_layers *l) {
     memset(l->crowded, 0, (size_t)l->width * (size_t)l->height);
+    memset(l->marked, 0, (size_t)l->bins_x * (size_t)l->bins_y);
     l->crossing_count = 0;
-    for (int e = 0; e < l->net->edge_count; e++) {
-        const bst_net_edge *edge = &l->net->edges[e];
-        int layers = l->facing[edge->left] - l->facing[edge->right];
-        if (layers != 0) {
-            l->outside[e] = -1;
-            BST_TRY(cross_rows(ctx, l, e, layers));
-        }
+    BST_TRY(bst_facet_borders_list(ctx, l));
+    for (int n = 0; n < l->border_count; n++) {
+        BST_TRY(cross_rows(ctx, l, n));
     }
     BST_TRY(sort_crossings(ctx, l));
     count_layers(l);
-    for (int e = 0; e < l->net->edge_count; e++) {
-        const bst_net_edge *edge = &l->net->edges[e];
+    for (int n = 0; n < l->border_count; n++) {
         /* a border that crosses no middle of a row may have layers on both sides */
-        if (l->facing[edge->left] != l->facing[edge->right] && l->outside[e] != 0) {
-            mark_border(l, l->at[edge->a], l->at[edge->b]);
+        if (l->borders[n].outside != 0) {
+            mark_border(l, l->borders[n].a, l->borders[n].b);
         }
     }
     return BST_OK;
 }
 
-/* Finds the boxes of the facets that face the view, and the range of their nearness. */
-static void make_boxes(bst_facet_layers *l) {
-    const bst_satellite *s = l->net->satellite;
+/* Finds the range of nearness. */
+static void find_levels(bst_facet_layers *l) {
     double least = INFINITY, most = -INFINITY;
     for (int v = 0; v < l->net->vertex_count; v++) {
         least = l->near[v] < least ? l->near[v] : least;
@@ -250,16 +256,23 @@ static void make_boxes(bst_facet_layers *l) {
     }
     l->level_from = most + l->same;
     l->level_per = (LEVELS - 1) / fmax(most - least + 2.0 * l->same, 1e-300);
-    for (int f = 0; f < s->facet_count; f++) {
+}
+
+/* Finds the boxes of the facets that face the view, and lists those that are not off the grid. */
+static void make_boxes(bst_facet_layers *l) {
+    int facets = l->net->satellite->facet_count;
+    l->order_count = 0;
+    for (int f = 0; f < facets; f++) {
         if (!l->facing[f]) {
             continue;
         }
-        const int *corner = l->net->corner + s->facets[f].first;
+        const int *corner = l->net->corner + l->net->first[f];
+        const int *end = l->net->corner + l->net->first[f + 1];
         bst_point2 low = l->at[corner[0]], high = low;
         double near = l->near[corner[0]], far = near;
-        for (int i = 1; i < s->facets[f].count; i++) {
-            bst_point2 p = l->at[corner[i]];
-            double z = l->near[corner[i]];
+        for (corner++; corner < end; corner++) {
+            bst_point2 p = l->at[*corner];
+            double z = l->near[*corner];
             low.x = p.x < low.x ? p.x : low.x;
             low.y = p.y < low.y ? p.y : low.y;
             high.x = p.x > high.x ? p.x : high.x;
@@ -273,24 +286,39 @@ static void make_boxes(bst_facet_layers *l) {
                                        f,
                                        (uint16_t)((l->level_from - near - l->same) * l->level_per),
                                        (uint16_t)((l->level_from - far + l->same) * l->level_per)};
+        l->order[l->order_count] = f;
+        l->order_count += off ? 0 : 1;
     }
 }
 
-/* Orders the facets that face the view by their nearest level. */
-static void order_facets(bst_facet_layers *l) {
-    int first[LEVELS + 1] = {0}, facets = l->net->satellite->facet_count;
-    for (int f = 0; f < facets; f++) {
-        first[l->facing[f] && l->boxes[f].high[0] >= 0.0F ? l->boxes[f].nearest + 1 : 0]++;
+/* True if one of the bins of a box is marked. */
+static bool any_bin(const bst_facet_layers *l, const bst_layers_box *b, const uint8_t *marks) {
+    int at[4], found = 0;
+    bst_layers_range(l, b, BST_LAYERS_BIN, at);
+    for (int j = at[2]; j <= at[3]; j++) {
+        for (int i = at[0]; i <= at[1]; i++) {
+            found |= marks[j * l->bins_x + i];
+        }
     }
-    first[0] = 0;
+    return found != 0;
+}
+
+/* Orders the facets of the bins that are needed by their nearest level. */
+static void order_facets(bst_facet_layers *l) {
+    int first[LEVELS + 1] = {0}, count = 0;
+    for (int n = 0; n < l->order_count; n++) {
+        const bst_layers_box *b = &l->boxes[l->order[n]];
+        if (any_bin(l, b, l->needed)) {
+            l->chosen[count++] = l->order[n];
+            first[b->nearest + 1]++;
+        }
+    }
     for (int i = 0; i < LEVELS; i++) {
         first[i + 1] += first[i];
     }
-    l->order_count = first[LEVELS];
-    for (int f = 0; f < facets; f++) {
-        if (l->facing[f] && l->boxes[f].high[0] >= 0.0F) {
-            l->order[first[l->boxes[f].nearest]++] = f;
-        }
+    l->order_count = count;
+    for (int n = 0; n < count; n++) {
+        l->order[first[l->boxes[l->chosen[n]].nearest]++] = l->chosen[n];
     }
 }
 
@@ -361,25 +389,26 @@ static bst_status fill_bins(bst_ctx *ctx, bst_facet_layers *l) {
 }
 
 bst_status bst_facet_layers_find(bst_ctx *ctx, bst_facet_layers *l, const uint8_t *wanted) {
-    int facets = l->net->satellite->facet_count;
     bool any = false;
     BST_TRY(mark_cells(ctx, l));
+    find_levels(l);
     make_boxes(l);
     memset(l->needed, 0, (size_t)l->bins_x * (size_t)l->bins_y);
-    for (int f = 0; f < facets; f++) {
+    memset(l->doubtful, 0, (size_t)l->net->satellite->facet_count);
+    for (int n = 0; n < l->order_count; n++) {
+        int f = l->order[n];
         const bst_layers_box *b = &l->boxes[f];
-        l->doubtful[f] =
-            wanted[f] && l->facing[f] && b->high[0] >= 0.0F ? (uint8_t)marks_of(l, b) : 0;
+        if (wanted[f] && any_bin(l, b, l->marked)) {
+            l->doubtful[f] = (uint8_t)marks_of(l, b);
+        }
         if (l->doubtful[f]) {
             need_bins(l, b);
             any = true;
         }
     }
-    memset(l->seen, -1, ((size_t)facets + 1) * sizeof *l->seen);
     if (any) {
-        BST_TRY(bst_facet_borders_fill(ctx, l));
+        BST_TRY(bst_facet_borders_enter(ctx, l));
         BST_TRY(fill_bins(ctx, l));
     }
     return BST_OK;
 }
-

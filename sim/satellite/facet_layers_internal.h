@@ -41,9 +41,10 @@ static inline void bst_layers_range(const bst_facet_layers *l, const bst_layers_
     out[3] = bst_layers_cell_of((double)b->high[1], l->height) / size;
 }
 
-/* Enters the borders of layers in the bins: edges of which one facet faces the view.
- * BST_ERR_MEMORY. */
-bst_status bst_facet_borders_fill(bst_ctx *ctx, bst_facet_layers *layers) BST_MUST_CHECK;
+/* Lists the borders of layers: edges of which one facet faces the view. BST_ERR_MEMORY. */
+bst_status bst_facet_borders_list(bst_ctx *ctx, bst_facet_layers *layers) BST_MUST_CHECK;
+/* Enters them in the bins. BST_ERR_MEMORY. */
+bst_status bst_facet_borders_enter(bst_ctx *ctx, bst_facet_layers *layers) BST_MUST_CHECK;
 
 /* Finds whether a border crosses the inside of a facet. One that touches it does not.
  *

@@ -15,7 +15,8 @@ typedef struct bst_net_edge {
 typedef struct bst_facet_net {
     const bst_satellite *satellite;
     int *vertex; /* [vertex_count] vertex of the model */
-    int *corner; /* as the model's `corner`, but vertices of the net */
+    int *first;  /* [facet_count + 1] by facet: its first corner; those of facets follow one another */
+    int *corner; /* vertices of the net */
     bst_net_edge *edges;
     int vertex_count, edge_count;
 } bst_facet_net;

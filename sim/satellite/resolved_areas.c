@@ -107,7 +107,7 @@ static bst_status look_from_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
         l->near[v] = origin_m * ((origin_m - depth_m) / depth_m);
     }
     for (int f = 0; f < sat->facet_count; f++) {
-        bst_vec3 from = a->pose->vertices[sat->corner[sat->facets[f].first]];
+        bst_vec3 from = a->pose->vertices[s->net.vertex[s->net.corner[s->net.first[f]]]];
         l->facing[f] = bst_vec3_dot(a->pose->normals[f], bst_vec3_sub(a->eye_m, from)) > 0.0;
     }
     l->facing[sat->facet_count] = 0;
