@@ -144,16 +144,52 @@ static bool may_cross(const bst_facet_layers *l, int facet, int own_facet,
     return !bst_polygon_is_separate(own->p, own->count, other.p, other.count);
 }
 
-/* Finds it at the middle of the facet. Unknown: planes may cross. */
-static seen_part look_at_middle(const bst_facet_layers *l, const bst_layers_box *box,
-                                const bst_layers_outline *own) {
-    int at[4];
+static bst_point2 middle_of(const bst_layers_outline *o) {
     bst_point2 middle = {0.0, 0.0};
-    seen_part seen = SEEN_ALL;
-    for (int i = 0; i < own->count; i++) {
-        middle.x += own->p[i].x / own->count;
-        middle.y += own->p[i].y / own->count;
+    for (int i = 0; i < o->count; i++) {
+        middle.x += o->p[i].x / o->count;
+        middle.y += o->p[i].y / o->count;
     }
+    return middle;
+}
+
+/* Finds it at the middle of a facet that no other one crosses. Unknown: one is as near, or the
+ * middle is off the grid. */
+static seen_part look_at_middle(const bst_facet_layers *l, const bst_layers_box *box,
+                                const bst_layers_outline *own, const double plane[3]) {
+    bst_point2 p = middle_of(own);
+    if (!(p.x >= 0.0 && p.y >= 0.0 && p.x < l->width && p.y < l->height)) {
+        return SEEN_UNKNOWN;
+    }
+    int bin = (int)p.y / BST_LAYERS_BIN * l->bins_x + (int)p.x / BST_LAYERS_BIN;
+    const bst_layers_box *b = &l->entries[l->bin_first[bin]];
+    const bst_layers_box *end = &l->entries[l->bin_first[bin + 1]];
+    double near = plane[0] + plane[1] * p.x + plane[2] * p.y;
+    for (; b < end && b->nearest <= box->farthest; b++) {
+        double other[3];
+        if (b->facet == box->facet || (double)b->low[0] > p.x || (double)b->high[0] < p.x ||
+            (double)b->low[1] > p.y || (double)b->high[1] < p.y || !covers(l, b->facet, p)) {
+            continue;
+        }
+        if (b->farthest < box->nearest) {
+            return SEEN_NOTHING;
+        }
+        if (bst_facet_layers_plane(l, b->facet, other)) {
+            double before = other[0] + other[1] * p.x + other[2] * p.y - near;
+            if (before >= -l->same) {
+                return before > l->same ? SEEN_NOTHING : SEEN_UNKNOWN;
+            }
+        }
+    }
+    return SEEN_ALL;
+}
+
+/* Finds it of a facet that others may cross. Unknown: one does, perhaps. */
+static seen_part look_at_all(const bst_facet_layers *l, const bst_layers_box *box,
+                             const bst_layers_outline *own) {
+    int at[4];
+    bst_point2 middle = middle_of(own);
+    seen_part seen = SEEN_ALL;
     bst_layers_range(l, box, BST_LAYERS_BIN, at);
     for (int j = at[2]; j <= at[3]; j++) {
         for (int i = j * l->bins_x + at[0]; i <= j * l->bins_x + at[1]; i++) {
@@ -188,7 +224,8 @@ static seen_part look_within_borders(const bst_facet_layers *l, const bst_layers
             return SEEN_ALL;
         }
     }
-    return look_at_middle(l, box, own);
+    return l->net->apart[box->facet] ? look_at_middle(l, box, own, plane)
+                                     : look_at_all(l, box, own);
 }
 
 bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {

@@ -9,6 +9,7 @@ void bst_facet_net_free(bst_facet_net *net) {
     free(net->first);
     free(net->corner);
     free(net->edges);
+    free(net->apart);
     *net = (bst_facet_net){.vertex_count = 0};
 }
 
@@ -164,7 +165,8 @@ bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *s, bst_facet_ne
                            .vertex = calloc(vertices, sizeof *out->vertex),
                            .first = calloc((size_t)s->facet_count + 1, sizeof *out->first),
                            .corner = calloc(corners, sizeof *out->corner),
-                           .edges = calloc(corners, sizeof *out->edges)};
+                           .edges = calloc(corners, sizeof *out->edges),
+                           .apart = calloc((size_t)s->facet_count + 1, sizeof *out->apart)};
     work w = {.placed = calloc(vertices, sizeof *w.placed),
               .first = calloc(vertices, sizeof *w.first),
               .number = calloc(vertices, sizeof *w.number),
@@ -172,13 +174,14 @@ bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *s, bst_facet_ne
               .partner = calloc(corners, sizeof *w.partner),
               .sides = calloc(corners, sizeof *w.sides)};
     bst_status status = BST_OK;
-    if (!out->vertex || !out->first || !out->corner || !out->edges || !w.placed || !w.first || !w.number ||
+    if (!out->vertex || !out->first || !out->corner || !out->edges || !out->apart || !w.placed || !w.first || !w.number ||
         !w.facet || !w.partner || !w.sides) {
         status =
             bst_fail(ctx, BST_ERR_MEMORY, "no memory for the edges of %d facets", s->facet_count);
     } else {
         weld(s, &w, out);
         join(s, &w, out);
+        status = bst_facet_net_find_apart(ctx, out);
     }
     free_work(&w);
     return status;
