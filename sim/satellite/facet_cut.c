@@ -72,7 +72,8 @@ static int keep(bst_point2 *p, int count, const double c[3]) {
     return n >= 3 ? n : 0;
 }
 
-/* What a facet hides of another one: the part of their intersection where it is nearer.
+/* What a facet hides of another one: the part where it is nearer, of their intersection or of all
+ * of it.
  *
  * Given:     own, own_plane  the facet behind
  * Returned:  number of corners in to[2 * BST_LAYERS_CORNERS_MAX] */
@@ -86,9 +87,13 @@ static int hidden_part(const bst_facet_layers *l, int facet, int behind, const b
         !bst_facet_layers_plane(l, facet, c)) {
         return 0;
     }
+    if (other.least > own->most) { /* all of it that is before the facet */
+        memcpy(to, other.p, (size_t)other.count * sizeof *to);
+        return other.count;
+    }
     int n = bst_polygon_intersection(other.p, other.count, own->p, own->count, work, to);
-    if (n < 3 || other.least > own->most) {
-        return n;
+    if (n < 3) {
+        return 0;
     }
     for (int i = 0; i < 3; i++) {
         c[i] -= own_plane[i];
