@@ -9,7 +9,8 @@
 /* Shortest chord of a facet, in cells, of which the middle is within it beyond rounding. */
 static const double LEAST_CHORD = 1e-6;
 
-static bst_layers_border border_of(const bst_facet_layers *l, const bst_net_edge *edge, int layers) {
+static bst_layers_border border_of(const bst_facet_layers *l, const bst_net_edge *edge,
+                                   int layers) {
     bst_point2 a = l->at[edge->a], b = l->at[edge->b];
     bool right = b.x > a.x, down = b.y > a.y;
     return (bst_layers_border){.a = a,

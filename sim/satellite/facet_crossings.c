@@ -122,7 +122,7 @@ static side side_of(const bst_facet_net *net, int plane, int facet) {
         least = fmin(least, height);
         most = fmax(most, height);
     }
-    return least >= -same && most <= same  ? IN_THE_PLANE
+    return least >= -same && most <= same   ? IN_THE_PLANE
            : least >= -same || most <= same ? ON_ONE_SIDE
                                             : ON_BOTH_SIDES;
 }
@@ -132,8 +132,8 @@ static bool is_within(const bst_facet_net *net, int facet, bst_vec3 p) {
     double same = SAME * net->satellite->radius_m;
     int first = net->first[facet], end = net->first[facet + 1];
     for (int i = first; i < end; i++) {
-        bst_vec3 a = corner_of(net, i), along =
-                                            bst_vec3_sub(corner_of(net, i + 1 < end ? i + 1 : first), a);
+        bst_vec3 a = corner_of(net, i),
+                 along = bst_vec3_sub(corner_of(net, i + 1 < end ? i + 1 : first), a);
         bst_vec3 in = bst_vec3_cross(net->satellite->facets[facet].normal, along);
         if (bst_vec3_dot(in, bst_vec3_sub(p, a)) < -same * bst_vec3_norm(along)) {
             return false;

@@ -77,8 +77,8 @@ static int keep(bst_point2 *p, int count, const double c[3]) {
  *
  * Given:     own, own_plane  the facet behind
  * Returned:  number of corners in to[2 * BST_LAYERS_CORNERS_MAX] */
-static int hidden_part(const bst_facet_layers *l, int facet, int behind, const bst_layers_outline *own,
-                       const double own_plane[3], bst_point2 *to) {
+static int hidden_part(const bst_facet_layers *l, int facet, int behind,
+                       const bst_layers_outline *own, const double own_plane[3], bst_point2 *to) {
     bst_layers_outline other;
     bst_point2 work[2 * BST_LAYERS_CORNERS_MAX];
     double c[3], least = INFINITY, most = -INFINITY;
@@ -137,8 +137,8 @@ static bool covers(const bst_facet_layers *l, int facet, bst_point2 p) {
 /* What of a facet is seen that no border crosses: all of it, or nothing. */
 typedef enum seen_part { SEEN_ALL, SEEN_NOTHING, SEEN_UNKNOWN } seen_part;
 
-/* True if another facet, as near as `own` somewhere, overlaps it: their planes may cross. Neighbours
- * at an edge lie on both of its sides unless one covers the middle of the other. */
+/* True if another facet, as near as `own` somewhere, overlaps it: their planes may cross.
+ * Neighbours at an edge lie on both of its sides unless one covers the middle of the other. */
 static bool may_cross(const bst_facet_layers *l, int facet, int own_facet,
                       const bst_layers_outline *own, bst_point2 middle) {
     if (shared_vertices(l->net, facet, own_facet) > 1) {

@@ -215,7 +215,8 @@ static void mark_border(bst_facet_layers *l, bst_point2 a, bst_point2 b) {
         return;
     }
     double slope = b.y > a.y ? (b.x - a.x) / (b.y - a.y) : 0.0;
-    int first = bst_layers_cell_of(a.y - MARGIN, l->height), last = bst_layers_cell_of(b.y + MARGIN, l->height);
+    int first = bst_layers_cell_of(a.y - MARGIN, l->height),
+        last = bst_layers_cell_of(b.y + MARGIN, l->height);
     for (int j = first; j <= last; j++) {
         double up = j - MARGIN, down = j + 1.0 + MARGIN;
         double from = up > a.y ? a.x + (up - a.y) * slope : a.x;

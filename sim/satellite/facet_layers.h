@@ -56,11 +56,11 @@ typedef struct bst_facet_layers {
     int *row_first;                 /* [height + 1] */
     bst_layers_border *borders;
     int *border_first, *border_entries; /* borders by bin; [bins + 1] */
-    uint8_t *marked;         /* by bin: a cell is marked in `crowded` */
-    int *bin_first;          /* [bins + 1] */
-    bst_layers_box *entries; /* by bin, the nearest first */
-    uint8_t *needed;         /* by bin */
-    int *seen, stamp;        /* by facet: cut in which it was last looked at */
+    uint8_t *marked;                    /* by bin: a cell is marked in `crowded` */
+    int *bin_first;                     /* [bins + 1] */
+    bst_layers_box *entries;            /* by bin, the nearest first */
+    uint8_t *needed;                    /* by bin */
+    int *seen, stamp;                   /* by facet: cut in which it was last looked at */
     int bins_x, bins_y, entry_capacity, crossing_count, crossing_capacity, order_count;
     double level_from, level_per; /* levels of nearness: per unit from this one on */
     int border_count, border_capacity, border_entry_capacity, row_capacity, sorted_capacity;

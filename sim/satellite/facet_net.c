@@ -174,8 +174,8 @@ bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *s, bst_facet_ne
               .partner = calloc(corners, sizeof *w.partner),
               .sides = calloc(corners, sizeof *w.sides)};
     bst_status status = BST_OK;
-    if (!out->vertex || !out->first || !out->corner || !out->edges || !out->apart || !w.placed || !w.first || !w.number ||
-        !w.facet || !w.partner || !w.sides) {
+    if (!out->vertex || !out->first || !out->corner || !out->edges || !out->apart || !w.placed ||
+        !w.first || !w.number || !w.facet || !w.partner || !w.sides) {
         status =
             bst_fail(ctx, BST_ERR_MEMORY, "no memory for the edges of %d facets", s->facet_count);
     } else {

@@ -15,10 +15,12 @@ typedef struct bst_net_edge {
 typedef struct bst_facet_net {
     const bst_satellite *satellite;
     int *vertex; /* [vertex_count] vertex of the model */
-    int *first;  /* [facet_count + 1] by facet: its first corner; those of facets follow one another */
+    int *first;  /* [facet_count + 1] by facet: its first corner; those of facets follow one another
+                  */
     int *corner; /* vertices of the net */
     bst_net_edge *edges;
-    uint8_t *apart; /* by facet: no other one crosses it or lies in its plane beside it, in any pose */
+    uint8_t
+        *apart; /* by facet: no other one crosses it or lies in its plane beside it, in any pose */
     int vertex_count, edge_count;
 } bst_facet_net;
 

@@ -31,7 +31,7 @@ typedef struct bst_resolved_areas {
     uint8_t *wanted;                   /* by facet */
     int *steps;                        /* edges at which the light of whole facets changes */
     double faint; /* difference of light, over that light, of which an edge is faint */
-    bst_resolved_second *second;       /* of the image's cells */
+    bst_resolved_second *second; /* of the image's cells */
     size_t second_capacity;
     bool made;
 } bst_resolved_areas;
