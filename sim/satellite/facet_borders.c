@@ -92,19 +92,14 @@ bst_status bst_facet_borders_enter(bst_ctx *ctx, bst_facet_layers *l) {
     return BST_OK;
 }
 
-/* Distance of a point to the left of the edge a-b, times the edge's length: exactly 0 at its ends,
- * so that borders at a corner of the facet only touch it. */
-static inline double left_of(bst_point2 a, bst_point2 b, bst_point2 p) {
-    return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
-}
-
 /* Part of a border within a facet, from t[0] to t[1] along it. False: it only touches the facet. */
 static bool part_within(const bst_layers_outline *o, const bst_layers_border *b, double t[2]) {
     double least = INFINITY, most = -INFINITY;
     t[0] = 0.0;
     t[1] = 1.0;
     for (int i = 0, last = o->count - 1; i < o->count; last = i++) {
-        double from = left_of(o->p[last], o->p[i], b->a), to = left_of(o->p[last], o->p[i], b->b);
+        double from = bst_point2_left_of(o->p[last], o->p[i], b->a),
+               to = bst_point2_left_of(o->p[last], o->p[i], b->b);
         if (from <= 0.0 && to <= 0.0) {
             return false;
         }
@@ -113,7 +108,7 @@ static bool part_within(const bst_layers_outline *o, const bst_layers_border *b,
         } else if (to < 0.0) {
             t[1] = fmin(t[1], from / (from - to));
         }
-        double side = left_of(b->a, b->b, o->p[i]);
+        double side = bst_point2_left_of(b->a, b->b, o->p[i]);
         least = side < least ? side : least;
         most = side > most ? side : most;
     }
