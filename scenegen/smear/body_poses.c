@@ -116,7 +116,7 @@ static bst_status draw_group(run *r, int g) {
     if (g > 0) {
         BST_TRY(bst_resolved_begin(ctx, image, d->low, d->high, d->cell_px));
     }
-    BST_TRY(bst_resolved_begin_light(ctx, image));
+    BST_TRY(bst_resolved_begin_light(ctx, image, d->blurred));
     for (int k = g; k < d->count; k += BST_BODY_GROUPS) {
         BST_TRY(d->draw(ctx, d->user, k, pose, image));
     }

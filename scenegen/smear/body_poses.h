@@ -45,7 +45,8 @@ typedef struct bst_body_drawing {
     bst_satellite_pose *pose; /* of the first group */
     bst_resolved *image;      /* of the first group, for which bst_resolved_begin was called */
     double low[2], high[2], cell_px, scale_rad;
-    int count; /* of poses */
+    int count;    /* of poses */
+    bool blurred; /* see bst_resolved_begin_light */
     bst_body_pose_fn draw;
     void *user;
     bst_parallel *pool; /* NULL: the caller's thread */

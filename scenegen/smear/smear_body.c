@@ -333,6 +333,7 @@ static bst_status draw_poses(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, draw
                                       .cell_px = b->cell_px,
                                       .scale_rad = bst_camera_scale_rad(&s->camera),
                                       .count = d->times.count,
+                                      .blurred = d->times.count > FEW_POSES,
                                       .draw = draw_light,
                                       .user = d,
                                       .pool = pool};

@@ -5,16 +5,22 @@
 
 #include "sim/satellite/resolved_image.h"
 
-/* What edges add to a cell: to itself, and by row_... to itself and all cells to its right. Light
- * and its first and second moments: about the cell's centre, of a row about its middle. */
+/* What edges add: to a cell, and by row_... to all cells to its right. Light and its first moments:
+ * about the cell's centre, of a row about its middle. */
 typedef struct bst_area_cell {
-    double row_light, row_y, row_yy;
-    float light, x, y, xx, xy, yy;
+    double row_light;
+    float row_y, light, x, y;
 } bst_area_cell;
+
+/* Second moments, less those of the same light spread evenly over the cell. */
+typedef struct bst_area_second {
+    float row_yy, xx, xy, yy;
+} bst_area_second;
 
 /* A grid of sums; zero-initialise, free with bst_area_sums_free. */
 typedef struct bst_area_sums {
-    bst_area_cell *cells; /* [height][width + 1] */
+    bst_area_cell *cells;    /* [height][width + 1], from the column before the first one on */
+    bst_area_second *second; /* likewise */
     int width, height;
     size_t capacity;
 } bst_area_sums;
@@ -32,6 +38,13 @@ bst_status bst_area_sums_begin(bst_ctx *ctx, bst_area_sums *sums, int width,
  * Given:     a, b   ends, in cells; the corner of cell (0, 0) is the origin
  *            light  of a cell that the polygon covers */
 void bst_area_sums_edge(bst_area_sums *sums, bst_point2 a, bst_point2 b, double light);
+
+/* Adds an edge between surfaces of almost the same light without its second moments: with the
+ * difference d of their light, those of a cell are wrong by at most 0.016 d. */
+void bst_area_sums_faint_edge(bst_area_sums *sums, bst_point2 a, bst_point2 b, double light);
+
+/* Reads the cells of an edge that is added soon ahead of time. */
+void bst_area_sums_expect(const bst_area_sums *sums, bst_point2 a, bst_point2 b);
 
 /* Adds a polygon, counter-clockwise. */
 void bst_area_sums_polygon(bst_area_sums *sums, const bst_point2 *corners, int count, double light);

@@ -20,8 +20,17 @@ typedef struct bst_layers_box {
 /* Where the border of a layer crosses the middle of a row. */
 typedef struct bst_layers_crossing {
     double x;
-    int row, edge, layers; /* more to its right */
+    int row, border, layers; /* more to its right; after counting: layers there */
 } bst_layers_crossing;
+
+/* An edge that is the border of a layer. */
+typedef struct bst_layers_border {
+    bst_point2 a, b;
+    double near[2]; /* at a and b */
+    bst_layers_box box;
+    int layers;  /* more to the right of a-b, with y down */
+    int outside; /* layers on its emptier side where it crosses the middle of a row; -1: nowhere */
+} bst_layers_border;
 
 /* Work memory of a view: zero-initialise, free with bst_facet_layers_free. Set by the caller before
  * bst_facet_layers_find: */
@@ -39,17 +48,23 @@ typedef struct bst_facet_layers {
     /* work memory */
     uint8_t *crowded;               /* by cell: something may be hidden there */
     bst_layers_box *boxes;          /* by facet that faces the view */
-    int *order;                     /* facets that face the view, the nearest first */
-    bst_layers_crossing *crossings; /* of borders with the middles of rows */
-    int8_t *outside;         /* by edge that is a border: layers on its emptier side, up to 2;
-                                -1: not known */
-    int *bin_first;          /* [bins + 1] */
-    bst_layers_box *entries; /* by bin, the nearest first */
-    uint8_t *needed;         /* by bin */
-    int *seen;               /* by facet: facet for which it was last looked at */
+    int *order;                     /* facets that face the view; of those in the bins that are
+                                       needed, the nearest first */
+    int *chosen;                    /* facets in these bins */
+    bst_layers_crossing *crossings; /* of borders with the middles of rows, in order */
+    bst_layers_crossing *sorted;    /* room for them */
+    int *row_first;                 /* [height + 1] */
+    bst_layers_border *borders;
+    int *border_first, *border_entries; /* borders by bin; [bins + 1] */
+    uint8_t *marked;                    /* by bin: a cell is marked in `crowded` */
+    int *bin_first;                     /* [bins + 1] */
+    bst_layers_box *entries;            /* by bin, the nearest first */
+    uint8_t *needed;                    /* by bin */
+    int *seen, stamp;                   /* by facet: cut in which it was last looked at */
     int bins_x, bins_y, entry_capacity, crossing_count, crossing_capacity, order_count;
     double level_from, level_per; /* levels of nearness: per unit from this one on */
-    size_t cell_capacity, bin_capacity;
+    int border_count, border_capacity, border_entry_capacity, row_capacity, sorted_capacity;
+    size_t cell_capacity;
     bst_polygon_clip clip;
 } bst_facet_layers;
 

@@ -1,12 +1,15 @@
 #include "sim/satellite/facet_net.h"
 
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 
 void bst_facet_net_free(bst_facet_net *net) {
     free(net->vertex);
+    free(net->first);
     free(net->corner);
     free(net->edges);
+    free(net->apart);
     *net = (bst_facet_net){.vertex_count = 0};
 }
 
@@ -124,7 +127,10 @@ static void pair_sides(const bst_facet_net *net, work *w, const side *sides, int
 
 /* Makes the edges. */
 static void join(const bst_satellite *s, work *w, bst_facet_net *net) {
+    net->first[s->facet_count] = s->corner_count;
     for (int f = 0; f < s->facet_count; f++) {
+        net->first[f] = s->facets[f].first;
+        assert(f == 0 || net->first[f] == s->facets[f - 1].first + s->facets[f - 1].count);
         for (int i = s->facets[f].first; i < s->facets[f].first + s->facets[f].count; i++) {
             w->facet[i] = f;
         }
@@ -157,8 +163,10 @@ bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *s, bst_facet_ne
     size_t vertices = (size_t)s->vertex_count + 1, corners = (size_t)s->corner_count + 1;
     *out = (bst_facet_net){.satellite = s,
                            .vertex = calloc(vertices, sizeof *out->vertex),
+                           .first = calloc((size_t)s->facet_count + 1, sizeof *out->first),
                            .corner = calloc(corners, sizeof *out->corner),
-                           .edges = calloc(corners, sizeof *out->edges)};
+                           .edges = calloc(corners, sizeof *out->edges),
+                           .apart = calloc((size_t)s->facet_count + 1, sizeof *out->apart)};
     work w = {.placed = calloc(vertices, sizeof *w.placed),
               .first = calloc(vertices, sizeof *w.first),
               .number = calloc(vertices, sizeof *w.number),
@@ -166,13 +174,14 @@ bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *s, bst_facet_ne
               .partner = calloc(corners, sizeof *w.partner),
               .sides = calloc(corners, sizeof *w.sides)};
     bst_status status = BST_OK;
-    if (!out->vertex || !out->corner || !out->edges || !w.placed || !w.first || !w.number ||
-        !w.facet || !w.partner || !w.sides) {
+    if (!out->vertex || !out->first || !out->corner || !out->edges || !out->apart || !w.placed ||
+        !w.first || !w.number || !w.facet || !w.partner || !w.sides) {
         status =
             bst_fail(ctx, BST_ERR_MEMORY, "no memory for the edges of %d facets", s->facet_count);
     } else {
         weld(s, &w, out);
         join(s, &w, out);
+        status = bst_facet_net_find_apart(ctx, out);
     }
     free_work(&w);
     return status;

@@ -15,8 +15,12 @@ typedef struct bst_net_edge {
 typedef struct bst_facet_net {
     const bst_satellite *satellite;
     int *vertex; /* [vertex_count] vertex of the model */
-    int *corner; /* as the model's `corner`, but vertices of the net */
+    int *first;  /* [facet_count + 1] by facet: its first corner; those of facets follow one another
+                  */
+    int *corner; /* vertices of the net */
     bst_net_edge *edges;
+    uint8_t
+        *apart; /* by facet: no other one crosses it or lies in its plane beside it, in any pose */
     int vertex_count, edge_count;
 } bst_facet_net;
 
@@ -24,6 +28,8 @@ typedef struct bst_facet_net {
  * bst_facet_net_free, also after an error. */
 bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *satellite,
                               bst_facet_net *out) BST_MUST_CHECK;
+/* Sets `apart`, which is 0 for models with joints. BST_ERR_MEMORY. */
+bst_status bst_facet_net_find_apart(bst_ctx *ctx, bst_facet_net *net) BST_MUST_CHECK;
 /* Frees the memory of a net. */
 void bst_facet_net_free(bst_facet_net *net);
 

@@ -38,11 +38,6 @@ double bst_polygon_area(const bst_point2 *p, int count) {
     return 0.5 * sum;
 }
 
-/* Distance of a point to the left of the edge a-b, times the edge's length. */
-static double left_of(bst_point2 a, bst_point2 b, bst_point2 p) {
-    return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
-}
-
 /* Distance from the first corner to the farthest one, by coordinates. */
 static double extent_of(const bst_point2 *p, int count) {
     double extent = 0.0;
@@ -59,7 +54,7 @@ static bool separated(const bst_point2 *q, int q_count, const bst_point2 *p, int
     for (int i = 0; i < q_count; i++) {
         bst_point2 b = q[i];
         int k = 0;
-        while (k < p_count && left_of(a, b, p[k]) <= 0.0) {
+        while (k < p_count && bst_point2_left_of(a, b, p[k]) <= 0.0) {
             k++;
         }
         if (k == p_count) {
@@ -91,7 +86,7 @@ bool bst_polygon_is_separate(const bst_point2 *p, int p_count, const bst_point2 
 /* True if no point is to the right of the edge a-b. */
 static bool is_left(bst_point2 a, bst_point2 b, const bst_point2 *p, int count) {
     for (int i = 0; i < count; i++) {
-        if (left_of(a, b, p[i]) < 0.0) {
+        if (bst_point2_left_of(a, b, p[i]) < 0.0) {
             return false;
         }
     }
@@ -129,10 +124,10 @@ static void close_outline(outline *to) {
 static void split(const outline *from, bst_point2 a, bst_point2 b, outline *left, outline *right) {
     const bst_point2 *p = from->points;
     bst_point2 last = p[from->count - 1];
-    double before = left_of(a, b, last);
+    double before = bst_point2_left_of(a, b, last);
     left->count = right->count = 0;
     for (int i = 0; i < from->count; i++) {
-        double now = left_of(a, b, p[i]);
+        double now = bst_point2_left_of(a, b, p[i]);
         if ((before > 0.0 && now < 0.0) || (before < 0.0 && now > 0.0)) {
             double u = before / (before - now);
             bst_point2 cut = {last.x + u * (p[i].x - last.x), last.y + u * (p[i].y - last.y)};
@@ -287,13 +282,13 @@ int bst_polygon_hull(bst_point2 *points, int count, bst_point2 *hull) {
     sort_points(points, count);
     int n = 0;
     for (int i = 0; i < count; i++) {
-        while (n >= 2 && left_of(hull[n - 2], hull[n - 1], points[i]) <= 0.0) {
+        while (n >= 2 && bst_point2_left_of(hull[n - 2], hull[n - 1], points[i]) <= 0.0) {
             n--;
         }
         hull[n++] = points[i];
     }
     for (int i = count - 2, lower = n + 1; i >= 0; i--) {
-        while (n >= lower && left_of(hull[n - 2], hull[n - 1], points[i]) <= 0.0) {
+        while (n >= lower && bst_point2_left_of(hull[n - 2], hull[n - 1], points[i]) <= 0.0) {
             n--;
         }
         hull[n++] = points[i];

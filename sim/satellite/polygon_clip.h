@@ -10,6 +10,12 @@ typedef struct bst_point2 {
     double x, y;
 } bst_point2;
 
+/* Distance of a point to the left of the edge a-b, times the edge's length: exactly 0 at its ends.
+ */
+static inline double bst_point2_left_of(bst_point2 a, bst_point2 b, bst_point2 p) {
+    return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
+}
+
 /* Corners of a convex polygon that the functions below accept. */
 enum { BST_POLYGON_CORNERS_MAX = 512 };
 

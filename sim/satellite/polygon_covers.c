@@ -15,7 +15,7 @@ enum { SIDES = 1024, WORK = 8192 };
 static const double TINY = 1e-12;
 
 /* Corners of an intersection, at most, and those computed at a time. */
-enum { CORNERS = 4 * BST_POLYGON_CORNERS_MAX, BLOCK = 4 };
+enum { CORNERS = 4 * BST_POLYGON_CORNERS_MAX, BLOCK = 4, APART = 40 };
 
 /* Intersections after which bst_polygon_uncovered_area gives up: their number can double with each
  * set. */
@@ -129,9 +129,10 @@ int bst_half_planes_crossing(const bst_half_planes *sides, int blocks, const bst
     return found;
 }
 
-/* A polygon by coordinates, filled up to whole blocks with copies of its last corner. */
+/* A polygon by coordinates, filled up to whole blocks with copies of its last corner. `apart` keeps
+ * the same corners' coordinates at different places of a page of memory. */
 typedef struct corners {
-    double x[CORNERS], y[CORNERS];
+    double x[CORNERS], apart[APART], y[CORNERS], apart_too[APART];
     int count;
 } corners;
 
@@ -156,41 +157,60 @@ BST_CLONES_256 static int64_t values_at(const corners *c, bst_half_plane s, doub
     return sign[0] | sign[1] | sign[2] | sign[3];
 }
 
-/* Cuts a polygon by the values of a half plane at its corners. */
+/* Cuts a polygon by the values of a half plane at its corners. There is room for `room` of them, at
+ * most CORNERS / 2, which suffices but for polygons that rounding made concave; each corner of
+ * `from` adds two at most. */
 static void cut_by(const corners *from, const double *value, int room, corners *to) {
-    int n = 0, last = from->count - 1;
-    for (int i = 0; i < from->count; last = i++) {
-        double before = value[last], now = value[i];
-        if (n < room && before * now < 0.0) {
+    int n = 0, count = from->count;
+    double before = value[count - 1], x = from->x[count - 1], y = from->y[count - 1];
+    for (int i = 0; i < count; i++) {
+        double now = value[i], next_x = from->x[i], next_y = from->y[i];
+        if (before * now < 0.0) {
             double t = before / (before - now);
-            to->x[n] = from->x[last] + t * (from->x[i] - from->x[last]);
-            to->y[n++] = from->y[last] + t * (from->y[i] - from->y[last]);
+            to->x[n] = x + t * (next_x - x);
+            to->y[n++] = y + t * (next_y - y);
         }
-        if (n < room && now >= 0.0) {
-            to->x[n] = from->x[i];
-            to->y[n++] = from->y[i];
-        }
+        to->x[n] = next_x; /* the next one takes its place if it is outside */
+        to->y[n] = next_y;
+        n += now >= 0.0;
+        before = now;
+        x = next_x;
+        y = next_y;
     }
-    to->count = n >= 3 ? n : 0;
+    to->count = n > room ? room : n >= 3 ? n : 0;
     if (to->count > 0) {
         fill_up(to);
     }
 }
 
+/* Lowest and highest coordinates of a polygon. */
+typedef struct bounds {
+    double low[2], high[2];
+} bounds;
+
+static bounds bounds_of(const bst_point2 *p, int count) {
+    bounds b = {{p[0].x, p[0].y}, {p[0].x, p[0].y}};
+    for (int i = 1; i < count; i++) {
+        b.low[0] = p[i].x < b.low[0] ? p[i].x : b.low[0];
+        b.high[0] = p[i].x > b.high[0] ? p[i].x : b.high[0];
+        b.low[1] = p[i].y < b.low[1] ? p[i].y : b.low[1];
+        b.high[1] = p[i].y > b.high[1] ? p[i].y : b.high[1];
+    }
+    return b;
+}
+
+/* True if two polygons have at most a border in common. */
+static bool apart(const bounds *a, const bounds *b) {
+    return a->high[0] <= b->low[0] || b->high[0] <= a->low[0] || a->high[1] <= b->low[1] ||
+           b->high[1] <= a->low[1];
+}
+
 /* Finds the half planes that may cut a polygon, by its bounds. Returned: their number, or
  * BST_HALF_PLANES_APART if one of them has no part of it. */
-static int may_cut(const bst_point2 *p, int count, const bst_half_plane *sides, int side_count,
-                   int *indices) {
-    double low[2] = {p[0].x, p[0].y}, high[2] = {p[0].x, p[0].y};
+static int may_cut(const bounds *b, const bst_half_plane *sides, int side_count, int *indices) {
     int found = 0;
-    for (int i = 1; i < count; i++) {
-        low[0] = p[i].x < low[0] ? p[i].x : low[0];
-        high[0] = p[i].x > high[0] ? p[i].x : high[0];
-        low[1] = p[i].y < low[1] ? p[i].y : low[1];
-        high[1] = p[i].y > high[1] ? p[i].y : high[1];
-    }
-    double x = 0.5 * (low[0] + high[0]), half_x = 0.5 * (high[0] - low[0]);
-    double y = 0.5 * (low[1] + high[1]), half_y = 0.5 * (high[1] - low[1]);
+    double x = 0.5 * (b->low[0] + b->high[0]), half_x = 0.5 * (b->high[0] - b->low[0]);
+    double y = 0.5 * (b->low[1] + b->high[1]), half_y = 0.5 * (b->high[1] - b->low[1]);
     for (int i = 0; i < side_count; i++) {
         const bst_half_plane s = sides[i];
         double middle = s.u * x + s.v * y + s.w;
@@ -204,13 +224,14 @@ static int may_cut(const bst_point2 *p, int count, const bst_half_plane *sides, 
     return found;
 }
 
-int bst_polygon_keep(const bst_point2 *p, int count, const bst_half_plane *sides, int side_count,
-                     bst_point2 *out, bool *cut) {
+/* As bst_polygon_keep, with the polygon's bounds. */
+static int keep(const bst_point2 *p, int count, const bounds *within, const bst_half_plane *sides,
+                int side_count, bst_point2 *out, bool *cut) {
     corners both[2], *from = &both[0], *to = &both[1];
     int indices[CORNERS], room = count + side_count;
     double value[CORNERS];
-    assert(count > 0 && room <= CORNERS);
-    int wanted = may_cut(p, count, sides, side_count, indices);
+    assert(count > 0 && room <= CORNERS / 2);
+    int wanted = may_cut(within, sides, side_count, indices);
     *cut = wanted == BST_HALF_PLANES_APART;
     if (*cut) {
         return 0;
@@ -236,6 +257,13 @@ int bst_polygon_keep(const bst_point2 *p, int count, const bst_half_plane *sides
     return from->count;
 }
 
+int bst_polygon_keep(const bst_point2 *p, int count, const bst_half_plane *sides, int side_count,
+                     bst_point2 *out, bool *cut) {
+    assert(count > 0);
+    const bounds within = bounds_of(p, count);
+    return keep(p, count, &within, sides, side_count, out, cut);
+}
+
 /* A sum of areas in progress. */
 typedef struct sum {
     const bst_polygon_covers *covers;
@@ -243,25 +271,42 @@ typedef struct sum {
     int intersections; /* so far; above INTERSECTIONS_MAX: given up */
 } sum;
 
-/* Area of a polygon outside of the first `covers` sets of the list. */
-static double uncovered(sum *s, const bst_point2 *p, int count, int covers) {
+/* Area of a polygon outside of the first `covers` sets of the list, but for those that are in `off`
+ * as bits. */
+static double uncovered(sum *s, const bst_point2 *p, int count, const bounds *within, int covers,
+                        unsigned off) {
     double area = bst_polygon_area(p, count);
+    bounds parts[BST_POLYGON_COVERS_MAX]; /* of the intersections with the sets so far */
     int start = s->used;
-    for (int i = covers - 1; i >= 0; i--) {
+    for (int i = 0; i < covers; i++) {
         const bst_half_plane *sides = s->covers->sides + s->covers->first[i];
         int side_count = s->covers->first[i + 1] - s->covers->first[i], room = count + side_count;
-        if (room > CORNERS || s->used + room > WORK || ++s->intersections > INTERSECTIONS_MAX) {
+        if (off & 1U << i) {
+            continue;
+        }
+        if (room > CORNERS / 2 || s->used + room > WORK || ++s->intersections > INTERSECTIONS_MAX) {
             s->intersections = INTERSECTIONS_MAX + 1;
             return 0.0;
         }
         bst_point2 *out = s->covers->work + start;
         bool cut;
-        int n = bst_polygon_keep(p, count, sides, side_count, out, &cut);
+        int n = keep(p, count, within, sides, side_count, out, &cut);
         if (!cut) {
             return 0.0; /* the set covers all */
         }
+        if (n == 0) {
+            off |= 1U << i;
+            continue;
+        }
+        parts[i] = bounds_of(out, n);
+        unsigned without = off;
+        for (int k = 0; k < i; k++) {
+            if (!(off & 1U << k) && apart(&parts[k], &parts[i])) {
+                without |= 1U << k;
+            }
+        }
         s->used = start + n;
-        area -= n > 0 ? uncovered(s, out, n, i) : 0.0;
+        area -= uncovered(s, out, n, &parts[i], i, without);
         s->used = start;
     }
     return area;
@@ -270,6 +315,7 @@ static double uncovered(sum *s, const bst_point2 *p, int count, int covers) {
 double bst_polygon_uncovered_area(const bst_polygon_covers *covers, const bst_point2 *points,
                                   int count) {
     sum s = {.covers = covers};
-    double area = uncovered(&s, points, count, covers->count);
+    const bounds within = bounds_of(points, count);
+    double area = uncovered(&s, points, count, &within, covers->count, 0);
     return s.intersections > INTERSECTIONS_MAX ? -1.0 : fmax(area, 0.0);
 }

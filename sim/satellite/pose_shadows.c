@@ -263,13 +263,15 @@ static void try_occluder(bst_satellite_pose *p, bst_pose_target *t, int view, in
 /* Corners and bounds of the facet in a view. */
 static void set_view(const bst_satellite_pose *p, bst_pose_target *t, const bst_pose_view *v) {
     const bst_facet *facet = &p->satellite->facets[t->facet];
+    double bounds[6]; /* apart from what is stored, so that they stay in registers */
     t->mapped = false;
-    bst_pose_start_bounds(t->bounds);
+    bst_pose_start_bounds(bounds);
     for (int i = 0; i < facet->count; i++) {
         int vertex = p->satellite->corner[facet->first + i];
         t->seen[i] = v->flat[vertex];
-        bst_pose_add_to_bounds(v, vertex, t->bounds);
+        bst_pose_add_to_bounds(v, vertex, bounds);
     }
+    memcpy(t->bounds, bounds, sizeof bounds);
 }
 
 /* Tries the occluders of the cells of the view's grid that the facet meets. */

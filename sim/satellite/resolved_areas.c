@@ -9,6 +9,13 @@
 /* Cells across the view from a light. */
 enum { LIGHT_CELLS_MIN = 32, LIGHT_CELLS_MAX = 1024 };
 
+/* Difference of the light of two facets over that of either below which their edge is faint, if
+ * more poses than a few blur the image. */
+static const double FAINT = 0.1;
+
+/* Edges between reading the cells of one and adding it. */
+enum { AHEAD = 8 };
+
 /* Cosine of incidence of the earthlight's centroid below which it casts no shadow. */
 static const double EARTH_LOW = 0.05;
 
@@ -22,6 +29,7 @@ void bst_resolved_areas_free(bst_resolved_areas *s) {
     }
     free(s->even);
     free(s->wanted);
+    free(s->steps);
     free(s->second);
     *s = (bst_resolved_areas){.made = false};
 }
@@ -46,7 +54,8 @@ static bst_status make(bst_ctx *ctx, bst_resolved *r) {
     BST_TRY(bst_facet_net_make(ctx, r->satellite, &s->net));
     s->even = calloc(facets, sizeof *s->even);
     s->wanted = calloc(facets, sizeof *s->wanted);
-    s->made = s->even && s->wanted;
+    s->steps = calloc((size_t)s->net.edge_count + 1, sizeof *s->steps);
+    s->made = s->even && s->wanted && s->steps;
     for (int n = 0; n < BST_RESOLVED_LIGHTS; n++) {
         s->from[n] = calloc(facets, sizeof *s->from[n]);
         s->made = s->made && s->from[n];
@@ -56,12 +65,13 @@ static bst_status make(bst_ctx *ctx, bst_resolved *r) {
                               r->satellite->facet_count);
 }
 
-bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *r) {
+bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *r, bool blurred) {
     bst_resolved_areas *s = &r->areas;
     size_t cells = (size_t)r->image.width * (size_t)r->image.height;
     if (!s->made) {
         BST_TRY(make(ctx, r));
     }
+    s->faint = blurred ? FAINT : 0.0;
     if (cells > s->second_capacity) {
         free(s->second);
         s->second = malloc(cells * sizeof *s->second);
@@ -97,7 +107,7 @@ static bst_status look_from_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
         l->near[v] = origin_m * ((origin_m - depth_m) / depth_m);
     }
     for (int f = 0; f < sat->facet_count; f++) {
-        bst_vec3 from = a->pose->vertices[sat->corner[sat->facets[f].first]];
+        bst_vec3 from = a->pose->vertices[s->net.vertex[s->net.corner[s->net.first[f]]]];
         l->facing[f] = bst_vec3_dot(a->pose->normals[f], bst_vec3_sub(a->eye_m, from)) > 0.0;
     }
     l->facing[sat->facet_count] = 0;
@@ -238,6 +248,30 @@ static double add_facet(const bst_resolved_adding *a, int facet, const light_vie
     return 0.0;
 }
 
+/* Adds the edges of whole facets. */
+static void add_edges(bst_resolved_areas *s) {
+    int count = 0;
+    for (int e = 0; e < s->net.edge_count; e++) {
+        const bst_net_edge *edge = &s->net.edges[e];
+        s->steps[count] = e;
+        count += s->even[edge->left] != s->even[edge->right];
+    }
+    for (int n = 0; n < count; n++) {
+        const bst_net_edge *edge = &s->net.edges[s->steps[n]];
+        double left = s->even[edge->left], right = s->even[edge->right], step = left - right;
+        bst_point2 a = s->eye.at[edge->a], b = s->eye.at[edge->b];
+        if (n + AHEAD < count) {
+            const bst_net_edge *later = &s->net.edges[s->steps[n + AHEAD]];
+            bst_area_sums_expect(&s->sums, s->eye.at[later->a], s->eye.at[later->b]);
+        }
+        if (fabs(step) < s->faint * (left < right ? left : right)) {
+            bst_area_sums_faint_edge(&s->sums, a, b, step);
+        } else {
+            bst_area_sums_edge(&s->sums, a, b, step);
+        }
+    }
+}
+
 bst_status bst_resolved_add_areas(bst_ctx *ctx, const bst_resolved_adding *a, double weight) {
     bst_resolved_areas *s = &a->r->areas;
     const bst_satellite *sat = a->r->satellite;
@@ -257,12 +291,6 @@ bst_status bst_resolved_add_areas(bst_ctx *ctx, const bst_resolved_adding *a, do
         s->even[f] = s->eye.facing[f] ? add_facet(a, f, views, weight) : 0.0;
     }
     s->even[sat->facet_count] = 0.0;
-    for (int e = 0; e < s->net.edge_count; e++) {
-        const bst_net_edge *edge = &s->net.edges[e];
-        double step = s->even[edge->left] - s->even[edge->right];
-        if (step != 0.0) {
-            bst_area_sums_edge(&s->sums, s->eye.at[edge->a], s->eye.at[edge->b], step);
-        }
-    }
+    add_edges(s);
     return BST_OK;
 }

@@ -29,7 +29,9 @@ typedef struct bst_resolved_areas {
     double *even;                      /* by facet: light without shadows, per cell */
     double *from[BST_RESOLVED_LIGHTS]; /* by facet: of each light */
     uint8_t *wanted;                   /* by facet */
-    bst_resolved_second *second;       /* of the image's cells */
+    int *steps;                        /* edges at which the light of whole facets changes */
+    double faint; /* difference of light, over that light, of which an edge is faint */
+    bst_resolved_second *second; /* of the image's cells */
     size_t second_capacity;
     bool made;
 } bst_resolved_areas;

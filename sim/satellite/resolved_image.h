@@ -101,8 +101,12 @@ bst_status bst_resolved_add(bst_ctx *ctx, bst_resolved *resolved, bst_satellite_
 /* True if the functions below draw a model as bst_resolved_add does: it has no curved surfaces. */
 bool bst_resolved_may_add_light(const bst_satellite *satellite);
 
-/* Starts to sum the light of poses, after bst_resolved_begin. BST_ERR_MEMORY. */
-bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *resolved) BST_MUST_CHECK;
+/* Starts to sum the light of poses, after bst_resolved_begin. BST_ERR_MEMORY.
+ *
+ * Given:     blurred  there are so many poses that they blur the edges between facets of almost the
+ *                     same light, whose second moments are then left out */
+bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *resolved,
+                                    bool blurred) BST_MUST_CHECK;
 
 /* Adds the light of a pose to these sums, as bst_resolved_add but fast for models of many facets,
  * with second moments and without cover and parts. `light` is not NULL. BST_ERR_MEMORY. */

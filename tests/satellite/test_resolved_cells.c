@@ -84,7 +84,7 @@ static double compare(bst_test_model *m, bst_vec3 eye, bst_vec3 sun, double scal
     }
     bst_assert_ok(&ctx, bst_resolved_add(&ctx, r[0], m->pose, &view, &light, 1.0, NULL));
     assert_true(bst_resolved_may_add_light(m->satellite));
-    bst_assert_ok(&ctx, bst_resolved_begin_light(&ctx, r[1]));
+    bst_assert_ok(&ctx, bst_resolved_begin_light(&ctx, r[1], false));
     bst_assert_ok(&ctx, bst_resolved_add_light(&ctx, r[1], m->pose, &view, &light, 1.0));
     bst_resolved_end_light(r[1], scale_rad);
     const bst_resolved_image *image = bst_resolved_image_of(r[0]);

@@ -186,7 +186,7 @@ static void test_light(void **state) {
             bst_assert_ok(&ctx, bst_resolved_add(&ctx, r[n], m.pose, &view, &light, 1.0, NULL));
             continue;
         }
-        bst_assert_ok(&ctx, bst_resolved_begin_light(&ctx, r[n]));
+        bst_assert_ok(&ctx, bst_resolved_begin_light(&ctx, r[n], false));
         bst_assert_ok(&ctx, bst_resolved_add_light(&ctx, r[n], m.pose, &view, &light, 0.5));
     }
     bst_resolved_join_light(r[1], r[2]);
@@ -224,7 +224,7 @@ static void test_second_moments(void **state) {
     for (int n = 0; n < 2; n++) {
         bst_assert_ok(&ctx, bst_resolved_create(&ctx, m.satellite, &r[n]));
         bst_assert_ok(&ctx, bst_resolved_begin(&ctx, r[n], low, high, n == 0 ? 1.0 : 1.0 / FINE));
-        bst_assert_ok(&ctx, bst_resolved_begin_light(&ctx, r[n]));
+        bst_assert_ok(&ctx, bst_resolved_begin_light(&ctx, r[n], false));
         bst_assert_ok(&ctx, bst_resolved_add_light(&ctx, r[n], m.pose, &view, &light, 1.0));
         bst_resolved_end_light(r[n], view.scale_rad);
     }

@@ -1,0 +1,224 @@
+/* Facets of a rigid model that others cross: found once, in a grid of cubes. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/satellite/facet_net.h"
+
+/* Distances over the model's radius that are none. */
+static const double SAME = 2e-6;
+
+enum { CUBES_MAX = 64 };
+
+/* Box of a facet, m. */
+typedef struct box {
+    double low[3], high[3];
+} box;
+
+/* Work memory: facets by cube. */
+typedef struct cubes {
+    box *boxes; /* by facet */
+    int *first; /* [across^3 + 1] */
+    int *facets;
+    int *seen; /* by facet: the last one that it was compared with */
+    int across;
+    double from[3], per_m[3];
+} cubes;
+
+static bst_vec3 corner_of(const bst_facet_net *net, int corner) {
+    return net->satellite->vertices[net->vertex[net->corner[corner]]];
+}
+
+static box box_of(const bst_facet_net *net, int facet, double margin) {
+    box b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (int i = net->first[facet]; i < net->first[facet + 1]; i++) {
+        bst_vec3 p = corner_of(net, i);
+        const double at[3] = {p.x, p.y, p.z};
+        for (int k = 0; k < 3; k++) {
+            b.low[k] = fmin(b.low[k], at[k] - margin);
+            b.high[k] = fmax(b.high[k], at[k] + margin);
+        }
+    }
+    return b;
+}
+
+/* Cubes of a box: first and last one along each axis. */
+static void range_of(const cubes *c, const box *b, int from[3], int to[3]) {
+    for (int k = 0; k < 3; k++) {
+        from[k] = (int)fmin(fmax((b->low[k] - c->from[k]) * c->per_m[k], 0.0), c->across - 1);
+        to[k] = (int)fmin(fmax((b->high[k] - c->from[k]) * c->per_m[k], 0.0), c->across - 1);
+    }
+}
+
+/* Counts the facets of each cube, or with `fill` enters them. */
+static void enter(const bst_facet_net *net, cubes *c, bool fill) {
+    for (int f = 0; f < net->satellite->facet_count; f++) {
+        int from[3], to[3];
+        range_of(c, &c->boxes[f], from, to);
+        for (int z = from[2]; z <= to[2]; z++) {
+            for (int y = from[1]; y <= to[1]; y++) {
+                for (int x = from[0]; x <= to[0]; x++) {
+                    int at = (z * c->across + y) * c->across + x;
+                    if (fill) {
+                        c->facets[c->first[at]++] = f;
+                    } else {
+                        c->first[at + 1]++;
+                    }
+                }
+            }
+        }
+    }
+}
+
+static bst_status fill_cubes(bst_ctx *ctx, const bst_facet_net *net, cubes *c) {
+    size_t facets = (size_t)net->satellite->facet_count;
+    box all = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    c->across = (int)fmin(fmax(cbrt((double)facets), 1.0), CUBES_MAX);
+    size_t count = (size_t)c->across * (size_t)c->across * (size_t)c->across;
+    c->boxes = calloc(facets + 1, sizeof *c->boxes);
+    c->first = calloc(count + 1, sizeof *c->first);
+    c->seen = calloc(facets + 1, sizeof *c->seen);
+    if (!c->boxes || !c->first || !c->seen) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the places of %zu facets", facets);
+    }
+    for (size_t f = 0; f < facets; f++) {
+        c->boxes[f] = box_of(net, (int)f, SAME * net->satellite->radius_m);
+        for (int k = 0; k < 3; k++) {
+            all.low[k] = fmin(all.low[k], c->boxes[f].low[k]);
+            all.high[k] = fmax(all.high[k], c->boxes[f].high[k]);
+        }
+    }
+    for (int k = 0; k < 3; k++) {
+        c->from[k] = all.low[k];
+        c->per_m[k] = c->across / fmax(all.high[k] - all.low[k], 1e-300);
+    }
+    enter(net, c, false);
+    for (size_t i = 0; i < count; i++) {
+        c->first[i + 1] += c->first[i];
+    }
+    c->facets = calloc((size_t)c->first[count] + 1, sizeof *c->facets);
+    if (!c->facets) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the places of %zu facets", facets);
+    }
+    enter(net, c, true);
+    /* filling moved the first facet of each cube to that of the next one */
+    memmove(c->first + 1, c->first, count * sizeof *c->first);
+    c->first[0] = 0;
+    return BST_OK;
+}
+
+/* How one facet lies about the plane of another one. */
+typedef enum side { ON_ONE_SIDE, IN_THE_PLANE, ON_BOTH_SIDES } side;
+
+static double height_of(const bst_facet_net *net, int plane, bst_vec3 p) {
+    return bst_vec3_dot(net->satellite->facets[plane].normal,
+                        bst_vec3_sub(p, corner_of(net, net->first[plane])));
+}
+
+static side side_of(const bst_facet_net *net, int plane, int facet) {
+    double same = SAME * net->satellite->radius_m, least = INFINITY, most = -INFINITY;
+    for (int i = net->first[facet]; i < net->first[facet + 1]; i++) {
+        double height = height_of(net, plane, corner_of(net, i));
+        least = fmin(least, height);
+        most = fmax(most, height);
+    }
+    return least >= -same && most <= same   ? IN_THE_PLANE
+           : least >= -same || most <= same ? ON_ONE_SIDE
+                                            : ON_BOTH_SIDES;
+}
+
+/* True if a place in its plane is within a facet. */
+static bool is_within(const bst_facet_net *net, int facet, bst_vec3 p) {
+    double same = SAME * net->satellite->radius_m;
+    int first = net->first[facet], end = net->first[facet + 1];
+    for (int i = first; i < end; i++) {
+        bst_vec3 a = corner_of(net, i),
+                 along = bst_vec3_sub(corner_of(net, i + 1 < end ? i + 1 : first), a);
+        bst_vec3 in = bst_vec3_cross(net->satellite->facets[facet].normal, along);
+        if (bst_vec3_dot(in, bst_vec3_sub(p, a)) < -same * bst_vec3_norm(along)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* True if an edge of a facet goes through another one; edges at a common vertex do not. */
+static bool goes_through(const bst_facet_net *net, int facet, int other) {
+    int first = net->first[facet], end = net->first[facet + 1];
+    for (int i = first; i < end; i++) {
+        bst_vec3 a = corner_of(net, i), b = corner_of(net, i + 1 < end ? i + 1 : first);
+        double from = height_of(net, other, a), to = height_of(net, other, b);
+        bool common = false;
+        for (int k = net->first[other]; k < net->first[other + 1]; k++) {
+            common = common || net->corner[k] == net->corner[i] ||
+                     net->corner[k] == net->corner[i + 1 < end ? i + 1 : first];
+        }
+        if (!common && from * to < 0.0 &&
+            is_within(net, other, bst_vec3_axpy(a, from / (from - to), bst_vec3_sub(b, a)))) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* True if two facets may cross, or lie in one plane. */
+static bool may_cross(const bst_facet_net *net, int f, int g) {
+    side of_g = side_of(net, f, g);
+    if (of_g != ON_BOTH_SIDES) {
+        return of_g == IN_THE_PLANE;
+    }
+    return side_of(net, g, f) == ON_BOTH_SIDES &&
+           (goes_through(net, f, g) || goes_through(net, g, f));
+}
+
+static bool boxes_meet(const box *a, const box *b) {
+    for (int k = 0; k < 3; k++) {
+        if (a->low[k] > b->high[k] || b->low[k] > a->high[k]) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* True if no other facet crosses it. */
+static bool is_apart(const bst_facet_net *net, cubes *c, int f) {
+    int from[3], to[3];
+    range_of(c, &c->boxes[f], from, to);
+    for (int z = from[2]; z <= to[2]; z++) {
+        for (int y = from[1]; y <= to[1]; y++) {
+            for (int x = from[0]; x <= to[0]; x++) {
+                int at = (z * c->across + y) * c->across + x;
+                for (int n = c->first[at]; n < c->first[at + 1]; n++) {
+                    int g = c->facets[n];
+                    if (g == f || c->seen[g] == f + 1) {
+                        continue;
+                    }
+                    c->seen[g] = f + 1;
+                    if (boxes_meet(&c->boxes[f], &c->boxes[g]) && may_cross(net, f, g)) {
+                        return false;
+                    }
+                }
+            }
+        }
+    }
+    return true;
+}
+
+bst_status bst_facet_net_find_apart(bst_ctx *ctx, bst_facet_net *net) {
+    const bst_satellite *s = net->satellite;
+    cubes c = {.across = 0};
+    for (int f = 1; f < s->facet_count; f++) {
+        if (s->facets[f].joint != s->facets[0].joint) {
+            return BST_OK;
+        }
+    }
+    bst_status status = fill_cubes(ctx, net, &c);
+    for (int f = 0; f < s->facet_count && status == BST_OK; f++) {
+        net->apart[f] = is_apart(net, &c, f);
+    }
+    free(c.boxes);
+    free(c.first);
+    free(c.facets);
+    free(c.seen);
+    return status;
+}

@@ -1,0 +1,280 @@
+/* What others hide of a facet in a view. */
+#include <math.h>
+#include <string.h>
+
+#include "sim/satellite/facet_layers_internal.h"
+#include "sim/satellite/polygon_cut.h"
+
+/* Areas of facets in a view, in cells, below that are none. */
+static const double LEAST_AREA = 1e-9;
+
+static void make_outline(const bst_facet_layers *l, int facet, bst_layers_outline *o) {
+    const int *corner = l->net->corner + l->net->first[facet];
+    int count = l->net->first[facet + 1] - l->net->first[facet];
+    o->count = count;
+    o->low[0] = o->low[1] = o->least = INFINITY;
+    o->high[0] = o->high[1] = o->most = -INFINITY;
+    for (int i = 0; i < count; i++) {
+        int v = corner[count - 1 - i];
+        bst_point2 p = l->at[v];
+        double near = l->near[v];
+        o->p[i] = p;
+        o->low[0] = p.x < o->low[0] ? p.x : o->low[0];
+        o->low[1] = p.y < o->low[1] ? p.y : o->low[1];
+        o->high[0] = p.x > o->high[0] ? p.x : o->high[0];
+        o->high[1] = p.y > o->high[1] ? p.y : o->high[1];
+        o->least = near < o->least ? near : o->least;
+        o->most = near > o->most ? near : o->most;
+    }
+}
+
+bool bst_facet_layers_plane(const bst_facet_layers *l, int facet, double out[3]) {
+    const int *corner = l->net->corner + l->net->first[facet];
+    int count = l->net->first[facet + 1] - l->net->first[facet];
+    bst_point2 o = l->at[corner[0]];
+    double most = 0.0, z0 = l->near[corner[0]];
+    for (int i = 2; i < count; i++) {
+        bst_point2 a = l->at[corner[i - 1]], b = l->at[corner[i]];
+        double area = (a.x - o.x) * (b.y - o.y) - (b.x - o.x) * (a.y - o.y);
+        if (fabs(area) > fabs(most)) {
+            double za = l->near[corner[i - 1]] - z0, zb = l->near[corner[i]] - z0;
+            most = area;
+            out[1] = (za * (b.y - o.y) - zb * (a.y - o.y)) / area;
+            out[2] = (zb * (a.x - o.x) - za * (b.x - o.x)) / area;
+            out[0] = z0 - out[1] * o.x - out[2] * o.y;
+        }
+    }
+    return fabs(most) > LEAST_AREA;
+}
+
+/* True if the boxes of two facets share cells. */
+static bool boxes_meet(const bst_layers_box *a, const bst_layers_box *b) {
+    return a->low[0] < b->high[0] && b->low[0] < a->high[0] && a->low[1] < b->high[1] &&
+           b->low[1] < a->high[1];
+}
+
+/* The part of a polygon, [room 2 * BST_LAYERS_CORNERS_MAX], where c[0] + c[1] x + c[2] y >= 0. */
+static int keep(bst_point2 *p, int count, const double c[3]) {
+    bst_point2 out[2 * BST_LAYERS_CORNERS_MAX];
+    int n = 0;
+    for (int i = 0; i < count; i++) {
+        bst_point2 a = p[i], b = p[i + 1 < count ? i + 1 : 0];
+        double da = c[0] + c[1] * a.x + c[2] * a.y, db = c[0] + c[1] * b.x + c[2] * b.y;
+        if (da >= 0.0 && n < 2 * BST_LAYERS_CORNERS_MAX) {
+            out[n++] = a;
+        }
+        if ((da < 0.0) != (db < 0.0) && n < 2 * BST_LAYERS_CORNERS_MAX) {
+            double t = da / (da - db);
+            out[n++] = (bst_point2){a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)};
+        }
+    }
+    memcpy(p, out, (size_t)n * sizeof *out);
+    return n >= 3 ? n : 0;
+}
+
+/* What a facet hides of another one: the part where it is nearer, of their intersection or of all
+ * of it.
+ *
+ * Given:     own, own_plane  the facet behind
+ * Returned:  number of corners in to[2 * BST_LAYERS_CORNERS_MAX] */
+static int hidden_part(const bst_facet_layers *l, int facet, int behind,
+                       const bst_layers_outline *own, const double own_plane[3], bst_point2 *to) {
+    bst_layers_outline other;
+    bst_point2 work[2 * BST_LAYERS_CORNERS_MAX];
+    double c[3], least = INFINITY, most = -INFINITY;
+    make_outline(l, facet, &other);
+    if (bst_polygon_is_separate(own->p, own->count, other.p, other.count) ||
+        !bst_facet_layers_plane(l, facet, c)) {
+        return 0;
+    }
+    if (other.least > own->most) { /* all of it that is before the facet */
+        memcpy(to, other.p, (size_t)other.count * sizeof *to);
+        return other.count;
+    }
+    int n = bst_polygon_intersection(other.p, other.count, own->p, own->count, work, to);
+    if (n < 3) {
+        return 0;
+    }
+    for (int i = 0; i < 3; i++) {
+        c[i] -= own_plane[i];
+    }
+    for (int i = 0; i < n; i++) {
+        double d = c[0] + c[1] * to[i].x + c[2] * to[i].y;
+        least = d < least ? d : least;
+        most = d > most ? d : most;
+    }
+    if (most <= l->same) { /* behind, or in the same plane: then the first one is seen */
+        return least >= -l->same && facet < behind ? n : 0;
+    }
+    return least >= -l->same ? n : keep(to, n, c);
+}
+
+/* Number of vertices that two facets share. */
+static int shared_vertices(const bst_facet_net *net, int f, int g) {
+    int shared = 0;
+    for (int i = net->first[f]; i < net->first[f + 1]; i++) {
+        for (int k = net->first[g]; k < net->first[g + 1]; k++) {
+            shared += net->corner[i] == net->corner[k];
+        }
+    }
+    return shared;
+}
+
+/* True if a facet covers a place; its border does. */
+static bool covers(const bst_facet_layers *l, int facet, bst_point2 p) {
+    static const double ROUNDING = 1e-12;
+    const int *corner = l->net->corner + l->net->first[facet];
+    int count = l->net->first[facet + 1] - l->net->first[facet];
+    for (int i = 0; i < count; i++) {
+        bst_point2 a = l->at[corner[i]], b = l->at[corner[i + 1 < count ? i + 1 : 0]];
+        if ((b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x) > ROUNDING) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* What of a facet is seen that no border crosses: all of it, or nothing. */
+typedef enum seen_part { SEEN_ALL, SEEN_NOTHING, SEEN_UNKNOWN } seen_part;
+
+/* True if another facet, as near as `own` somewhere, overlaps it: their planes may cross.
+ * Neighbours at an edge lie on both of its sides unless one covers the middle of the other. */
+static bool may_cross(const bst_facet_layers *l, int facet, int own_facet,
+                      const bst_layers_outline *own, bst_point2 middle) {
+    if (shared_vertices(l->net, facet, own_facet) > 1) {
+        return covers(l, facet, middle);
+    }
+    bst_layers_outline other;
+    make_outline(l, facet, &other);
+    return !bst_polygon_is_separate(own->p, own->count, other.p, other.count);
+}
+
+static bst_point2 middle_of(const bst_layers_outline *o) {
+    bst_point2 middle = {0.0, 0.0};
+    for (int i = 0; i < o->count; i++) {
+        middle.x += o->p[i].x / o->count;
+        middle.y += o->p[i].y / o->count;
+    }
+    return middle;
+}
+
+/* Finds it at the middle of a facet that no other one crosses. Unknown: one is as near, or the
+ * middle is off the grid. */
+static seen_part look_at_middle(const bst_facet_layers *l, const bst_layers_box *box,
+                                const bst_layers_outline *own, const double plane[3]) {
+    bst_point2 p = middle_of(own);
+    if (!(p.x >= 0.0 && p.y >= 0.0 && p.x < l->width && p.y < l->height)) {
+        return SEEN_UNKNOWN;
+    }
+    int bin = (int)p.y / BST_LAYERS_BIN * l->bins_x + (int)p.x / BST_LAYERS_BIN;
+    const bst_layers_box *b = &l->entries[l->bin_first[bin]];
+    const bst_layers_box *end = &l->entries[l->bin_first[bin + 1]];
+    double near = plane[0] + plane[1] * p.x + plane[2] * p.y;
+    for (; b < end && b->nearest <= box->farthest; b++) {
+        double other[3];
+        if (b->facet == box->facet || (double)b->low[0] > p.x || (double)b->high[0] < p.x ||
+            (double)b->low[1] > p.y || (double)b->high[1] < p.y || !covers(l, b->facet, p)) {
+            continue;
+        }
+        if (b->farthest < box->nearest) {
+            return SEEN_NOTHING;
+        }
+        if (bst_facet_layers_plane(l, b->facet, other)) {
+            double before = other[0] + other[1] * p.x + other[2] * p.y - near;
+            if (before >= -l->same) {
+                return before > l->same ? SEEN_NOTHING : SEEN_UNKNOWN;
+            }
+        }
+    }
+    return SEEN_ALL;
+}
+
+/* Finds it of a facet that others may cross. Unknown: one does, perhaps. */
+static seen_part look_at_all(const bst_facet_layers *l, const bst_layers_box *box,
+                             const bst_layers_outline *own) {
+    int at[4];
+    bst_point2 middle = middle_of(own);
+    seen_part seen = SEEN_ALL;
+    bst_layers_range(l, box, BST_LAYERS_BIN, at);
+    for (int j = at[2]; j <= at[3]; j++) {
+        for (int i = j * l->bins_x + at[0]; i <= j * l->bins_x + at[1]; i++) {
+            const bst_layers_box *b = &l->entries[l->bin_first[i]];
+            const bst_layers_box *end = &l->entries[l->bin_first[i + 1]];
+            for (; b < end && b->nearest <= box->farthest; b++) {
+                if (!boxes_meet(b, box) || b->facet == box->facet) {
+                    continue;
+                }
+                if (b->farthest >= box->nearest) {
+                    if (may_cross(l, b->facet, box->facet, own, middle)) {
+                        return SEEN_UNKNOWN;
+                    }
+                } else if (seen == SEEN_ALL && covers(l, b->facet, middle)) {
+                    seen = SEEN_NOTHING;
+                }
+            }
+        }
+    }
+    return seen;
+}
+
+/* What is seen of a facet, if no border that may hide a part of it crosses it. */
+static seen_part look_within_borders(const bst_facet_layers *l, const bst_layers_box *box,
+                                     const bst_layers_outline *own, const double plane[3]) {
+    if (l->doubtful[box->facet] >= BST_LAYERS_AT_BORDER) {
+        bst_layers_cross cross = bst_facet_borders_cross(l, box, own, plane);
+        if (cross == BST_LAYERS_CROSS_BEFORE) {
+            return SEEN_UNKNOWN;
+        }
+        if (cross == BST_LAYERS_CROSS_NONE && bst_facet_borders_layers(l, own) == 1) {
+            return SEEN_ALL;
+        }
+    }
+    return l->net->apart[box->facet] ? look_at_middle(l, box, own, plane)
+                                     : look_at_all(l, box, own);
+}
+
+bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {
+    bst_layers_outline own;
+    double plane[3];
+    bool whole = true;
+    int at[4];
+    const bst_layers_box *box = &l->boxes[facet];
+    if (!bst_facet_layers_plane(l, facet, plane)) {
+        return true;
+    }
+    make_outline(l, facet, &own);
+    seen_part seen = look_within_borders(l, box, &own, plane);
+    l->clip.piece_count = 0;
+    if (seen != SEEN_UNKNOWN) {
+        return seen == SEEN_ALL;
+    }
+    bst_layers_range(l, box, BST_LAYERS_BIN, at);
+    l->stamp++;
+    l->seen[facet] = l->stamp;
+    for (int n = 0; n < (at[1] - at[0] + 1) * (at[3] - at[2] + 1); n++) {
+        int columns = at[1] - at[0] + 1;
+        int bin = (at[2] + n / columns) * l->bins_x + at[0] + n % columns;
+        const bst_layers_box *b = &l->entries[l->bin_first[bin]];
+        const bst_layers_box *end = &l->entries[l->bin_first[bin + 1]];
+        for (; b < end && b->nearest <= box->farthest; b++) {
+            bst_point2 part[2 * BST_LAYERS_CORNERS_MAX];
+            if (!boxes_meet(b, box) || l->seen[b->facet] == l->stamp) {
+                continue;
+            }
+            l->seen[b->facet] = l->stamp;
+            int corners = hidden_part(l, b->facet, facet, &own, plane, part);
+            if (corners < 3) {
+                continue;
+            }
+            if (whole) {
+                bst_polygon_clip_start(&l->clip, own.p, own.count);
+                whole = false;
+            }
+            bst_polygon_clip_subtract(&l->clip, part, corners, false);
+            if (bst_polygon_clip_is_empty(&l->clip)) {
+                return false;
+            }
+        }
+    }
+    return whole;
+}

@@ -1,0 +1,171 @@
+/* Light of meshes by areas, whose facets hide and shade each other, against cells by cuts. */
+#include <stdlib.h>
+#include <unistd.h>
+
+#include "sim/satellite/resolved_image.h"
+#include "tests/satellite/satellite_support.h"
+
+enum { AROUND = 24, UP = 17 };
+
+/* A sphere of 1 m with deep bumps, as OBJ; `sunk`: a triangle cuts through it. */
+static bst_satellite *bumpy_sphere(bool sunk) {
+    bst_ctx ctx = {0};
+    bst_satellite *satellite = NULL;
+    char path[BST_TEST_PATH];
+    int first = (UP - 1) * AROUND;
+    bst_test_template(path, "mesh");
+    int file = mkstemp(path); /* the name is ours: with the suffix, too */
+    assert_true(file >= 0);
+    close(file);
+    remove(path);
+    strcat(path, ".obj");
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    for (int k = 1; k < UP; k++) {
+        for (int i = 0; i < AROUND; i++) {
+            double a = 2.0 * BST_PI * i / AROUND, b = BST_PI * (k / (double)UP - 0.5);
+            double r = 0.7 + 0.25 * cos(5.0 * a) * cos(b) + 0.05 * sin(7.0 * b);
+            fprintf(f, "v %.9f %.9f %.9f\n", r * cos(b) * cos(a), r * cos(b) * sin(a), r * sin(b));
+        }
+    }
+    fprintf(f, "v 0 0 -0.7\nv 0 0 0.7\n");
+    for (int i = 0; i < AROUND; i++) {
+        int n = (i + 1) % AROUND, last = first - AROUND;
+        fprintf(f, "f %d %d %d\nf %d %d %d\n", n + 1, i + 1, first + 1, last + i + 1, last + n + 1,
+                first + 2);
+        for (int k = 0; k + 2 < UP; k++) {
+            int low = k * AROUND + 1, high = low + AROUND;
+            fprintf(f, "f %d %d %d\nf %d %d %d\n", low + i, low + n, high + n, low + i, high + n,
+                    high + i);
+        }
+    }
+    if (sunk) {
+        fprintf(f, "v 0.2 -1.4 0.1\nv 0.9 1.3 -0.5\nv -0.6 0.9 1.2\nf %d %d %d\n", first + 3,
+                first + 4, first + 5);
+    }
+    assert_int_equal(fclose(f), 0);
+    bst_assert_ok(&ctx, bst_satellite_load(&ctx, path, &satellite));
+    unlink(path);
+    return satellite;
+}
+
+/* An image by cuts, by areas, or by areas of blurred poses. */
+typedef enum way { BY_CUTS, BY_AREAS, BY_BLURRED_AREAS } way;
+
+static bst_resolved *draw(bst_satellite_pose *pose, const bst_resolved_view *view,
+                          const bst_resolved_light *light, way by) {
+    bst_ctx ctx = {0};
+    bst_resolved *r = NULL;
+    double low[2], high[2];
+    assert_true(bst_resolved_box(pose, view, low, high));
+    bst_assert_ok(&ctx, bst_resolved_create(&ctx, pose->satellite, &r));
+    bst_assert_ok(&ctx, bst_resolved_begin(&ctx, r, low, high, 1.0));
+    if (by == BY_CUTS) {
+        bst_assert_ok(&ctx, bst_resolved_add(&ctx, r, pose, view, light, 1.0, NULL));
+        return r;
+    }
+    bst_assert_ok(&ctx, bst_resolved_begin_light(&ctx, r, by == BY_BLURRED_AREAS));
+    bst_assert_ok(&ctx, bst_resolved_add_light(&ctx, r, pose, view, light, 1.0));
+    bst_resolved_end_light(r, view->scale_rad);
+    return r;
+}
+
+/* Largest difference of light and first moments, over the light of the brightest cell. */
+static double difference(const bst_resolved_image *a, const bst_resolved_image *b) {
+    double worst = 0.0, brightest = 0.0;
+    assert_int_equal(a->width, b->width);
+    assert_int_equal(a->height, b->height);
+    for (int i = 0; i < a->width * a->height; i++) {
+        const bst_resolved_cell *c = &a->cells[i], *d = &b->cells[i];
+        brightest = fmax(brightest, (double)c->light);
+        worst = fmax(worst, fabs((double)c->light - (double)d->light));
+        worst = fmax(worst, fabs((double)c->moment_x - (double)d->moment_x));
+        worst = fmax(worst, fabs((double)c->moment_y - (double)d->moment_y));
+    }
+    assert_true(brightest > 0.0);
+    return worst / brightest;
+}
+
+/* Draws a mesh from several sides. Returned: largest difference of light by areas from that by
+ * cuts. */
+static double compare_sides(bst_satellite *satellite) {
+    bst_ctx ctx = {0};
+    bst_satellite_pose *pose;
+    bst_resolved_gain gain[1] = {{.sun = 1.0}};
+    double worst = 0.0;
+    bst_assert_ok(&ctx, bst_satellite_pose_create(&ctx, satellite, &pose));
+    assert_true(bst_resolved_may_add_light(satellite));
+    for (int n = 0; n < 4; n++) {
+        double a = 0.4 + 1.7 * n;
+        bst_vec3 from = {cos(a), sin(a), 0.3 * n - 0.5};
+        bst_vec3 sun = {cos(a + 1.1), sin(a + 1.1), 0.4 - 0.2 * n};
+        bst_resolved_light light = {.sun = bst_vec3_unit(sun), .gain = gain};
+        bst_resolved_view view = {bst_quat_look(bst_vec3_scale(from, -1.0), (bst_vec3){0, 0, 1}),
+                                  {0, 0, 20.0},
+                                  0.0025 + 0.001 * n};
+        bst_resolved *cuts = draw(pose, &view, &light, BY_CUTS);
+        bst_resolved *areas = draw(pose, &view, &light, BY_AREAS);
+        worst = fmax(worst, difference(bst_resolved_image_of(cuts), bst_resolved_image_of(areas)));
+        bst_resolved_free(cuts);
+        bst_resolved_free(areas);
+    }
+    bst_satellite_pose_free(pose);
+    return worst;
+}
+
+/* Bumps hide and shade each other: facets that a border crosses, and others that are whole or
+ * hidden as their middle is. */
+static void test_bumps(void **state) {
+    (void)state;
+    bst_satellite *satellite = bumpy_sphere(false);
+    /* both are exact; the light of cells by cuts is stored and summed in single precision */
+    bst_assert_close(compare_sides(satellite), 0.0, 1e-5);
+    bst_satellite_free(satellite);
+}
+
+/* Where a triangle goes through other facets there is no border, but the planes cross. */
+static void test_facets_through_others(void **state) {
+    (void)state;
+    bst_satellite *satellite = bumpy_sphere(true);
+    bst_assert_close(compare_sides(satellite), 0.0, 1e-5);
+    bst_satellite_free(satellite);
+}
+
+/* Edges between facets of almost the same light change light and first moments not at all, second
+ * ones by 0.016 of the difference of their light at most, which is a tenth of it. */
+static void test_faint_edges(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_satellite *satellite = bumpy_sphere(false);
+    bst_satellite_pose *pose;
+    bst_resolved_gain gain[1] = {{.sun = 1.0}};
+    bst_resolved_light light = {.sun = bst_vec3_unit((bst_vec3){0.3, 0.2, 1.0}), .gain = gain};
+    bst_resolved_view view = {
+        bst_quat_look((bst_vec3){0, 0, -1.0}, (bst_vec3){1, 0, 0}), {0, 0, 20.0}, 0.001};
+    bst_assert_ok(&ctx, bst_satellite_pose_create(&ctx, satellite, &pose));
+    bst_resolved *all = draw(pose, &view, &light, BY_AREAS);
+    bst_resolved *faint = draw(pose, &view, &light, BY_BLURRED_AREAS);
+    const bst_resolved_image *a = bst_resolved_image_of(all), *b = bst_resolved_image_of(faint);
+    double worst = 0.0, brightest = 0.0;
+    /* sums in another order, rounded to single precision */
+    bst_assert_close(difference(a, b), 0.0, 1e-6);
+    for (int i = 0; i < a->width * a->height; i++) {
+        brightest = fmax(brightest, (double)a->cells[i].light);
+        worst = fmax(worst, fabs((double)a->second[i].xx - (double)b->second[i].xx));
+        worst = fmax(worst, fabs((double)a->second[i].yy - (double)b->second[i].yy));
+    }
+    assert_true(worst > 1e-6 * brightest); /* there are such edges */
+    /* four edges at most cross most cells */
+    bst_assert_close(worst / brightest, 0.0, 4.0 * 0.0016);
+    bst_resolved_free(all);
+    bst_resolved_free(faint);
+    bst_satellite_pose_free(pose);
+    bst_satellite_free(satellite);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bumps),
+                                       cmocka_unit_test(test_facets_through_others),
+                                       cmocka_unit_test(test_faint_edges)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
