@@ -1,7 +1,8 @@
 /* Detector in stages, for effects across pixels: blooming along columns, frame transfer under
  * light, binning. An image holds the light of all rows; charge replaces it and is read out from
  * there. One work-item per row, or per 64 columns; surplus work-items of the last group do nothing,
- * so that the groups of all frames have one size. Options: TAIL (read_tail.cl). */
+ * so that the groups of all frames have one size. Options: TAIL (read_tail.cl); MULTIPLY (a
+ * multiplication register). */
 
 /* image: [light_height][light_stride] floats, from column p.tiles_x0 and row p.light_y0 of the
  * sensor. */
@@ -25,7 +26,7 @@ INLINE void store_chunk(global float *to, chunk c) {
  * columns. */
 READOUT_GROUP kernel void bst_detector_transfer(bst_kernel_frame_params p, global float *image,
                                   global const float *gain) {
-    detector_maps maps = {gain, 0, 0, 0, 0};
+    detector_maps maps = {gain, 0, 0, 0, 0, 0};
     int x = (int)get_global_id(0) * 64;
     if (x >= p.light_stride) {
         return;
@@ -55,8 +56,9 @@ READOUT_GROUP kernel void bst_detector_transfer(bst_kernel_frame_params p, globa
 
 /* Replaces the light of every pixel by its charge. One work-item per row. */
 READOUT_GROUP kernel void bst_detector_charge(bst_kernel_frame_params p, global float *image, global const float *gain,
-                                global const float *dark, global const float *overlay) {
-    detector_maps maps = {gain, dark, overlay, 0, 0};
+                                global const float *dark, global const float *overlay,
+                                global const float *readout) {
+    detector_maps maps = {gain, dark, overlay, 0, 0, readout};
     int row = p.light_y0 + (int)get_global_id(0);
     if (row >= p.light_y0 + p.light_height) {
         return;
@@ -119,13 +121,60 @@ READOUT_GROUP kernel void bst_detector_bloom(bst_kernel_frame_params p, global f
     }
 }
 
+#ifdef MULTIPLY
+/* Gamma deviates of the shapes n, whole numbers of electrons, where `active`: squeeze-free rejection
+ * (Marsaglia and Tsang 2000, ACM TOMS 26, 363), accepted with more than 95 % each turn. */
+INLINE lanes gamma_turn(lanes n, lanes_uint words_u, lanes z, lanes_int *accepted) {
+    lanes d = n - 1.0f / 3, t = 1.0f + z / sqrt(9.0f * d);
+    lanes v = t * t * t;
+    lanes log_u = -0.5f * log_radius2(words_u);
+    lanes safe = fmax(v, 1e-20f);
+    *accepted = MASK((t > 0.0f) & (log_u < fma(z * 0.5f, z, d - d * v + d * log(safe))));
+    return d * v;
+}
+
+/* Charge behind a multiplication register, over its gain: the mean stays, the variance of n
+ * electrons is n (1 - 1 / gain), their law a gamma distribution of shape n (Basden, Haniff and
+ * Mackay 2003, MNRAS 345, 985). Fractions of an electron, which traps leave, are rounded at
+ * random. */
+INLINE chunk multiply_chunk(bst_kernel_frame_params p, uint counter, chunk q) {
+    lanes n[4] = {q.a, q.b, q.c, q.d}, out[4];
+    lanes_int open[4];
+    chunk_words first = chunk_random(p, counter, STREAM_MULTIPLY);
+    lanes_uint round_words[4] = {first.a, first.b, first.c, first.d};
+    KEEP_LOOP
+    for (int v = 0; v < 4; v++) {
+        lanes whole = floor(n[v]), u = to_lanes(round_words[v]) * 0x1p-32f;
+        n[v] = fmax(whole + select((lanes)0.0f, (lanes)1.0f, MASK(u < n[v] - whole)), 0.0f);
+        out[v] = (lanes)0.0f;
+        open[v] = MASK(n[v] > 0.0f);
+    }
+    for (uint turn = 0u; turn < 64u && any_of(open[0] | open[1] | open[2] | open[3]); turn++) {
+        chunk z = chunk_normal(chunk_random(p, counter, STREAM_MULTIPLY + 1u + 2u * turn));
+        chunk_words w = chunk_random(p, counter, STREAM_MULTIPLY + 2u + 2u * turn);
+        lanes normal[4] = {z.a, z.b, z.c, z.d};
+        lanes_uint words[4] = {w.a, w.b, w.c, w.d};
+        KEEP_LOOP
+        for (int v = 0; v < 4; v++) {
+            lanes_int good;
+            lanes drawn = gamma_turn(fmax(n[v], 1.0f), words[v], normal[v], &good);
+            good &= open[v];
+            out[v] = select(out[v], fma(drawn - n[v], (lanes)p.multiply_rms, n[v]), good);
+            open[v] &= ~good;
+        }
+    }
+    chunk e = {out[0], out[1], out[2], out[3]};
+    return e;
+}
+#endif
+
 /* Reads charge as digital numbers: p.binning x p.binning pixels are summed before they are read.
  * frame: [window_height][window_width], both after binning. saturated: pixels per row. One
  * work-item per frame row. */
 READOUT_GROUP kernel void bst_detector_read(bst_kernel_frame_params p, global const float *image, global ushort *frame,
                               global int *saturated, global const float *offsets,
                               global const ushort *codes, global uchar *flags) {
-    detector_maps maps = {0, 0, 0, offsets, codes};
+    detector_maps maps = {0, 0, 0, offsets, codes, 0};
     int y = (int)get_global_id(0), b = p.binning;
     if (y >= p.window_height) {
         return;
@@ -163,6 +212,9 @@ READOUT_GROUP kernel void bst_detector_read(bst_kernel_frame_params p, global co
         chunk q = {vload16(0, sums), vload16(1, sums), vload16(2, sums), vload16(3, sums)};
         chunk_flags brim = {vload16(0, brims), vload16(1, brims), vload16(2, brims),
                             vload16(3, brims)};
+#ifdef MULTIPLY
+        q = multiply_chunk(p, counter, q);
+#endif
         chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
         e.a = read_out(p, q.a, z.a);
         e.b = read_out(p, q.b, z.b);

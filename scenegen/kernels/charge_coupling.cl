@@ -1,0 +1,56 @@
+/* Effects of pixels and outputs on each other. One work-item per row. */
+
+/* Charge that a neighbour's charge n moves into a pixel of charge q. */
+INLINE float16 inflow(bst_kernel_coupling_params p, float16 q, float16 n) {
+    return (n - q) * fma((float16)(0.5f * p.shift), n + q, (float16)p.coupling);
+}
+
+/* Coupling of neighbours, and borders that move away from charge: from -> to. The sum of the charge
+ * stays; borders of the sensor let nothing through. */
+__attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_detector_neighbours(
+    bst_kernel_coupling_params p, global const float *from, global float *to) {
+    const int16 lane = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    int y = (int)get_global_id(0);
+    if (y >= p.height) {
+        return;
+    }
+    global const float *row = from + (size_t)y * p.stride;
+    global const float *below = y > 0 ? row - p.stride : row;
+    global const float *above = y + 1 < p.height ? row + p.stride : row;
+    float before = row[0];
+    for (int x = 0; x < p.width; x += 16) {
+        float16 q = vload16(0, row + x);
+        float after = x + 16 < p.width ? row[x + 16] : q.sf;
+        float16 left = (float16)(before, q.s01234567, q.s89ab, q.scd, q.se);
+        float16 right = (float16)(q.s12345678, q.s9abc, q.sde, q.sf, after);
+        right = select(right, q, lane + x + 1 >= p.width);
+        float16 sum = inflow(p, q, left) + inflow(p, q, right) + inflow(p, q, vload16(0, below + x)) +
+                      inflow(p, q, vload16(0, above + x));
+        vstore16(fmax(q + sum, 0.0f), 0, to + (size_t)y * p.stride + x);
+        before = q.sf;
+    }
+}
+
+/* Crosstalk: each output shows a share of what the others read at the same time. */
+__attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_detector_crosstalk(
+    bst_kernel_coupling_params p, global float *image) {
+    int y = (int)get_global_id(0), part = p.width / p.outputs;
+    if (y >= p.height) {
+        return;
+    }
+    global float *row = image + (size_t)y * p.stride;
+    for (int i = 0; i < part; i++) {
+        float sum = 0.0f;
+        for (int pass = 0; pass < 2; pass++) {
+            for (int o = 0; o < p.outputs; o++) {
+                int column = o * part + (p.mirrored && (o & 1) ? part - 1 - i : i);
+                float q = row[column];
+                if (pass == 0) {
+                    sum += q;
+                } else {
+                    row[column] = fma(p.crosstalk, sum - q, q);
+                }
+            }
+        }
+    }
+}
