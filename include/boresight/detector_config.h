@@ -28,7 +28,7 @@ typedef struct bst_detector_quantisation_config {
 } bst_detector_quantisation_config;
 
 /* Pixels at the edges of the frame: without light (shielded), or that no pixel of the sensor
- * belongs to (overscan). Column 0 and row 0 are read first. */
+ * belongs to (overscan). */
 typedef struct bst_detector_edges_config {
     int64_t left, right, bottom, top; /* columns, columns, rows, rows */
 } bst_detector_edges_config;
@@ -50,8 +50,14 @@ enum { BST_TRAP_SPECIES = 3 };
 typedef struct bst_detector_traps_config {
     double traps_per_px[BST_TRAP_SPECIES]; /* 0: no such species */
     double release_px[BST_TRAP_SPECIES];   /* time constant, in transfers by a pixel */
-    double fill_exponent; /* share of the traps that a packet meets: (charge / full well)^this */
+    double fill_exponent; /* traps that a packet meets grow with its charge to this power */
+    double reference_e;   /* charge of a packet that meets traps_per_px */
 } bst_detector_traps_config;
+
+/* Side of the frame that is read first. */
+typedef struct bst_detector_output_config {
+    bool right, top; /* the last column, the last row; otherwise column 0, row 0 */
+} bst_detector_output_config;
 
 /* Outputs that read equal parts of the rows at the same time. */
 typedef struct bst_detector_crosstalk_config {
@@ -76,9 +82,10 @@ typedef struct bst_detector_config {
     int32_t saturation; /* BST_WELL_... */
     double frame_transfer_s;
     double row_time_s; /* rolling shutter */
+    bst_detector_output_config output;
     double readout_s;  /* time of the read-out, in which packets gather dark current */
     double clock_induced_e;
-    double offset_noise_e, offset_drift_dn_per_frame;
+    double offset_noise_e, offset_drift_dn_per_frame, flicker_noise_e;
     bst_detector_edges_config shielded, overscan;
     bst_detector_pick_up_config pick_up;
     bst_detector_glow_config glow;

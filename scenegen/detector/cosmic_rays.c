@@ -44,7 +44,7 @@ void bst_cosmic_rays_free(bst_cosmic_rays *hits) {
 
 /* Adds a charge deposit to a pixel. */
 static bst_status add_pixel(bst_ctx *ctx, bst_cosmic_rays *h, int x, int y, double electrons) {
-    if (x < h->overscan.left || y < 0 || x >= h->width - h->overscan.right ||
+    if (x < h->overscan.left || y < h->overscan.bottom || x >= h->width - h->overscan.right ||
         y >= h->height - h->overscan.top || !(electrons > 0.0)) {
         return BST_OK;
     }

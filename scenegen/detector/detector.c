@@ -49,7 +49,7 @@ bool bst_detector_is_staged(const bst_detector *detector) {
 
 /* True if offsets are new in every frame. */
 static bool has_frame_offsets(const bst_detector_config *d) {
-    return d->row_noise_e > 0.0 || d->offset_noise_e > 0.0 || d->offset_drift_dn_per_frame != 0.0 ||
+    return d->row_noise_e > 0.0 || d->flicker_noise_e > 0.0 || d->offset_noise_e > 0.0 || d->offset_drift_dn_per_frame != 0.0 ||
            d->pick_up.amplitude_e > 0.0;
 }
 
@@ -342,6 +342,29 @@ static void draw_rows(void *user, int begin, int end) {
     }
 }
 
+/* Time constants of the 1/f noise, in rows, each four times the one before: in between their sum
+ * falls as 1/f within 6 % (Lorentzians of equal variance; Milotti 2002, arXiv physics/0204033). */
+enum { FLICKER_TERMS = 6 };
+
+/* Adds 1/f noise of the level to rows: first-order Markov processes that are stationary from row 0
+ * on. */
+static void add_flicker(const rows_to_draw *rows, double rms, bst_rng_key key) {
+    double state[FLICKER_TERMS] = {0}, decay[FLICKER_TERMS], share = rms / sqrt(FLICKER_TERMS);
+    for (int k = 0; k < FLICKER_TERMS; k++) {
+        decay[k] = exp(-1.0 / pow(4.0, k));
+    }
+    for (int y = 0; y < rows->height; y++) {
+        double sum = 0.0;
+        for (int k = 0; k < FLICKER_TERMS; k++) {
+            uint64_t draw = (uint64_t)y * FLICKER_TERMS + (uint64_t)k;
+            double z = bst_rng_normal(key, rows->exposure, draw);
+            state[k] = y == 0 ? z : decay[k] * state[k] + sqrt(1.0 - decay[k] * decay[k]) * z;
+            sum += state[k];
+        }
+        rows->sum[y] += (float)(share * sum);
+    }
+}
+
 /* Draws and uploads level and row offsets of an exposure, and the pick-up by row. */
 static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage, uint64_t run,
                              int64_t exposure_id) {
@@ -371,6 +394,10 @@ static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *sta
                                                     : bst_rng_uniform(level, rows.exposure, 1);
     }
     bst_parallel_for(d->pool, (int)height, AT_ONCE, draw_rows, &rows);
+    if (c->flicker_noise_e > 0.0) {
+        add_flicker(&rows, c->flicker_noise_e * per_e,
+                    bst_rng_make_key(run, 0, "detector", "flicker"));
+    }
     cl_mem sent;
     BST_TRY(bst_upload_ring_put(ctx, stage, BST_STAGE_ROWS, sum, bytes, &sent));
     return bst_device_check(

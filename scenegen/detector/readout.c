@@ -179,12 +179,15 @@ static bst_status enqueue_traps(bst_ctx *ctx, bst_readout *r, int kernel,
     const bst_detector_config *d = &r->camera.detector;
     const bst_detector_traps_config *t = kernel == PARALLEL ? &d->parallel_traps : &d->serial_traps;
     bst_kernel_trap_params q = {
-        .width = p->light_stride, .height = p->light_height, .stride = p->light_stride};
+        .width = kernel == PARALLEL ? p->light_stride : p->sensor_width,
+        .height = p->light_height,
+        .stride = p->light_stride,
+        .backwards = kernel == PARALLEL ? d->output.top : d->output.right};
     q.exponent = (float)t->fill_exponent;
     for (int i = 0; i < BST_TRAP_SPECIES; i++) {
         if (t->traps_per_px[i] > 0.0) {
-            double full = pow(r->camera.full_well_e, t->fill_exponent);
-            q.density[q.kinds] = (float)(t->traps_per_px[i] / full);
+            double reference = pow(t->reference_e, t->fill_exponent);
+            q.density[q.kinds] = (float)(t->traps_per_px[i] / reference);
             q.release[q.kinds++] = (float)-expm1(-1.0 / t->release_px[i]);
         }
     }

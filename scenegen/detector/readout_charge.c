@@ -33,11 +33,13 @@ bst_status bst_readout_charge_map(bst_ctx *ctx, const bst_camera *camera, bst_rn
     double *passed = calloc((size_t)width, sizeof *passed); /* dark current of the rows below */
     bst_status status = passed ? dark_currents(ctx, camera, key, stride, map)
                                : bst_fail(ctx, BST_ERR_MEMORY, "no memory for a row of charge");
-    for (int y = 0; status == BST_OK && y < height; y++) {
+    for (int n = 0; status == BST_OK && n < height; n++) {
+        int y = d->output.top ? height - 1 - n : n;
+        bool real = y >= d->overscan.bottom && y < height - d->overscan.top;
         float *row = map + (size_t)y * (size_t)stride;
         for (int x = 0; x < width; x++) {
             double dark = (double)row[x], e = row_s * passed[x] + d->clock_induced_e;
-            if (d->glow.peak_e > 0.0 && y < height - d->overscan.top) {
+            if (d->glow.peak_e > 0.0 && real) {
                 double away_px = hypot(x - d->glow.x_px, y - d->glow.y_px);
                 e += d->glow.peak_e * exp(-away_px / d->glow.scale_px);
             }

@@ -15,7 +15,8 @@ bool bst_readout_charge_is_on(const bst_detector_config *d);
  *            stride  floats per row of the map, >= width
  * Returned:  map     [height][stride] e-; columns of the overscan have none
  * Errors:    as bst_fixed_pattern_noise_dark; BST_ERR_MEMORY
- * Notes:     A packet of row y passes rows y - 1 to 0 for readout_s / height each. */
+ * Notes:     A packet of row y passes rows y - 1 to 0 for readout_s / height each, or those above
+ *            with output.top. */
 bst_status bst_readout_charge_map(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
                                   int stride, float *map) BST_MUST_CHECK;
 

@@ -29,7 +29,7 @@ INLINE float16 pass_traps(bst_kernel_trap_params p, float transfers, float16 q, 
     return q;
 }
 
-/* Transfers along columns, to row 0. */
+/* Transfers along columns. */
 __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_detector_parallel(
     bst_kernel_trap_params p, global float *image) {
     int x = (int)get_global_id(0) * 16;
@@ -40,13 +40,14 @@ __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_d
     for (int k = 0; k < BST_TRAP_KINDS; k++) {
         held[k] = (float16)0.0f;
     }
-    for (int y = 0; y < p.height; y++) {
+    for (int n = 0; n < p.height; n++) {
+        int y = p.backwards ? p.height - 1 - n : n;
         global float16 *at = (global float16 *)(image + (size_t)y * p.stride + x);
-        *at = pass_traps(p, (float)(y + 1), *at, held);
+        *at = pass_traps(p, (float)(n + 1), *at, held);
     }
 }
 
-/* Transfers along rows, to column 0. */
+/* Transfers along rows. */
 __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_detector_serial(
     bst_kernel_trap_params p, global float *image) {
     int y = (int)get_global_id(0) * 16, rows = min(p.height - y, 16);
@@ -57,22 +58,25 @@ __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_d
     for (int k = 0; k < BST_TRAP_KINDS; k++) {
         held[k] = (float16)0.0f;
     }
-    for (int x = 0; x < p.width; x += 16) {
-        float block[16][16]; /* [column][row] */
+    for (int n = 0; n < p.width; n += 16) {
+        /* of a last block of fewer columns the others, beyond the end, are read as 0 */
+        int columns = min(p.width - n, 16), first = p.backwards ? p.width - 1 - n : n;
+        int step = p.backwards ? -1 : 1;
+        float block[16][16]; /* [transfer][row] */
         for (int r = 0; r < 16; r++) {
-            global const float *row = image + (size_t)(y + min(r, rows - 1)) * p.stride + x;
+            global const float *row = image + (size_t)(y + min(r, rows - 1)) * p.stride + first;
             for (int c = 0; c < 16; c++) {
-                block[c][r] = row[c];
+                block[c][r] = c < columns ? row[c * step] : 0.0f;
             }
         }
         for (int c = 0; c < 16; c++) {
             float16 q = vload16(0, block[c]);
-            vstore16(pass_traps(p, (float)(x + c + 1), q, held), 0, block[c]);
+            vstore16(pass_traps(p, (float)(n + c + 1), q, held), 0, block[c]);
         }
         for (int r = 0; r < rows; r++) {
-            global float *row = image + (size_t)(y + r) * p.stride + x;
-            for (int c = 0; c < 16; c++) {
-                row[c] = block[c][r];
+            global float *row = image + (size_t)(y + r) * p.stride + first;
+            for (int c = 0; c < columns; c++) {
+                row[c * step] = block[c][r];
             }
         }
     }

@@ -136,10 +136,11 @@ typedef struct bst_kernel_frame_params {
 #define BST_TRAP_KINDS 3
 /* Traps on the way of charge packets (kernels/charge_transfer.cl). */
 typedef struct bst_kernel_trap_params {
-    int width, height, stride; /* of the image, whose row 0 and column 0 are read first */
+    int width, height, stride; /* of the image */
+    int backwards;             /* the last row or column is read first */
     int kinds;                 /* species with traps */
     float exponent;
-    float density[BST_TRAP_KINDS]; /* traps in a pixel over full well to the power `exponent` */
+    float density[BST_TRAP_KINDS]; /* traps in a pixel over reference charge to `exponent` */
     float release[BST_TRAP_KINDS]; /* share released in the time of one transfer */
 } bst_kernel_trap_params;
 

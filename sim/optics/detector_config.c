@@ -40,7 +40,7 @@ static const bst_config_desc quantisation_table[] = {
     BST_CONFIG_END,
 };
 
-static const bst_config_desc shielded_table[] = {
+static const bst_config_desc edges_table[] = {
     BST_INT(bst_detector_edges_config, left, "px", 0, 65536, "0", "Columns from column 0 on."),
     BST_INT(bst_detector_edges_config, right, "px", 0, 65536, "0", "Columns up to the last one."),
     BST_INT(bst_detector_edges_config, bottom, "px", 0, 65536, "0", "Rows from row 0 on."),
@@ -48,13 +48,9 @@ static const bst_config_desc shielded_table[] = {
     BST_CONFIG_END,
 };
 
-static const bst_config_desc overscan_table[] = {
-    BST_INT(bst_detector_edges_config, left, "px", 0, 65536, "0",
-            "Columns that are read before the sensor's (prescan)."),
-    BST_INT(bst_detector_edges_config, right, "px", 0, 65536, "0",
-            "Columns that are read after them; traps of the rows leave charge there."),
-    BST_INT(bst_detector_edges_config, top, "px", 0, 65536, "0",
-            "Rows that are read after the sensor's; they gather dark current during read-out."),
+static const bst_config_desc output_table[] = {
+    BST_BOOL(bst_detector_output_config, right, "false", "Rows are read from the last column on."),
+    BST_BOOL(bst_detector_output_config, top, "false", "The last row is read first."),
     BST_CONFIG_END,
 };
 
@@ -81,11 +77,13 @@ static const bst_config_desc glow_table[] = {
 
 static const bst_config_desc traps_table[] = {
     BST_REALS(bst_detector_traps_config, traps_per_px, "", 0, 1e5, "[0, 0, 0]",
-              "Traps of three species in each pixel that a packet of full_well_e meets."),
+              "Traps of three species in each pixel that a packet of reference_e meets."),
     BST_REALS(bst_detector_traps_config, release_px, "px", 0.01, 1e6, "[1, 1, 1]",
               "Their time constants of release, in transfers by one pixel."),
     BST_REAL(bst_detector_traps_config, fill_exponent, "", 0, 1, "0.5",
-             "Share of the traps that a packet meets: (charge / full_well_e) to this power."),
+             "The traps that a packet meets grow with its charge to this power."),
+    BST_REAL(bst_detector_traps_config, reference_e, "e", 1, 1e7, "10000",
+             "Charge of a packet that meets traps_per_px."),
     BST_CONFIG_END,
 };
 
@@ -152,27 +150,33 @@ const bst_config_desc bst_detector_table[] = {
         "Rolling shutter: each row of the window is exposed so much later than the row before; "
         "below 0: from the last row on. The exposure's times are those of the window's middle "
         "row. 0: all rows at once."),
+    BST_OBJECT(bst_detector_config, output, output_table, "{}",
+               "Where frames are read: at column 0, row 0 first, unless given."),
     BST_REAL(bst_detector_config, readout_s, "s", 0, 1e4, "0",
-             "Time of the read-out of the whole sensor, row 0 first: charge gathers the dark current "
-             "of the rows that it passes."),
+             "Time of the read-out of the whole sensor: charge gathers the dark current of the rows "
+             "that it passes."),
     BST_REAL(bst_detector_config, clock_induced_e, "e", 0, 1e4, "0",
              "Mean charge that clocking leaves in each pixel of a frame (Poisson)."),
     BST_REAL(bst_detector_config, offset_noise_e, "e", 0, 1e5, "0",
              "Level of the whole frame, new in every frame, RMS."),
     BST_REAL(bst_detector_config, offset_drift_dn_per_frame, "DN", -1e4, 1e4, "0",
              "Growth of offset_dn with each frame, from the run's first one on."),
-    BST_OBJECT(bst_detector_config, shielded, shielded_table, "{}",
+    BST_REAL(bst_detector_config, flicker_noise_e, "e", 0, 1e5, "0",
+             "1/f noise of the level from row to row, RMS: equal power in each factor of 4 from a "
+             "period of some rows to one of several thousand."),
+    BST_OBJECT(bst_detector_config, shielded, edges_table, "{}",
                "Edges of the frame that light does not reach; they have dark current."),
-    BST_OBJECT(bst_detector_config, overscan, overscan_table, "{}",
+    BST_OBJECT(bst_detector_config, overscan, edges_table, "{}",
                "Edges of the frame that are no pixels of the sensor: they have no charge of their "
-               "own. width_px and height_px include them."),
+               "own, but that which traps release; rows also gather dark current during read-out. "
+               "width_px and height_px include them."),
     BST_OBJECT(bst_detector_config, pick_up, pick_up_table, "{}",
                "Coherent pattern noise: a sine along the rows."),
     BST_OBJECT(bst_detector_config, glow, glow_table, "{}", "Light of the output amplifier."),
     BST_OBJECT(bst_detector_config, parallel_traps, traps_table, "{}",
-               "Charge-transfer inefficiency along columns, towards row 0."),
+               "Charge-transfer inefficiency along columns, towards the row that is read first."),
     BST_OBJECT(bst_detector_config, serial_traps, traps_table, "{}",
-               "Charge-transfer inefficiency along rows, towards column 0."),
+               "Charge-transfer inefficiency along rows, towards the output."),
     BST_REAL(bst_detector_config, em_gain, "", 1, 1e5, "1",
              "Gain of an electron-multiplying register. All charge, read_noise_e and gain_e_per_dn "
              "are those before it; it adds the noise of multiplication."),

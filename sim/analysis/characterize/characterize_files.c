@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "sim/analysis/characterize/characterize.h"
+#include "sim/analysis/characterize/trap_fit.h"
 #include "sim/cli/print_json.h"
 #include "sim/core/compare.h"
 #include "sim/core/json_number.h"
@@ -16,6 +17,8 @@
 /* Statistics below this many standard errors are 0, also where the scenario that is extended has
  * another value. */
 static const double LEAST_SIGNIFICANCE = 2.0;
+/* Least significance of a charge trail for which traps are written. */
+static const double CERTAIN_TRAIL = 5.0;
 
 enum { HISTOGRAM_BINS = 200 };
 
@@ -42,7 +45,63 @@ static double value_given(const writer *w, int i) {
     if (isnan(e->sigma)) { /* of an unknown error: neither significant nor 0 */
         return NAN;
     }
-    return e->value > LEAST_SIGNIFICANCE * e->sigma ? e->value : 0.0;
+    return fabs(e->value) > LEAST_SIGNIFICANCE * e->sigma ? e->value : 0.0;
+}
+
+/* Traps of the detector model that leave the trails along columns or rows.
+ *
+ * Returned:  false: there is no certain trail */
+static bool traps_of(const writer *w, bool parallel, bst_detector_traps_config *out, double *rms) {
+    const bst_sensor_figures *f = w->figures;
+    const bst_sensor_estimate *e = parallel ? &f->trail.parallel : &f->trail.serial;
+    if (!(e->value > CERTAIN_TRAIL * e->sigma)) {
+        return false;
+    }
+    bst_trap_fit_input input = {.gain_e_per_dn = f->figures[BST_SENSOR_GAIN].value,
+                                .background_e = f->trap_background_e,
+                                .transfers = (parallel ? f->height : f->width) / 2};
+    *rms = bst_trap_fit(&f->trail, parallel, &input, out);
+    return true;
+}
+
+/* Traps as keys of the detector. */
+static cJSON *traps_json(const bst_detector_traps_config *t) {
+    cJSON *node = cJSON_CreateObject();
+    cJSON_AddItemToObject(node, "traps_per_px",
+                          cJSON_CreateDoubleArray(t->traps_per_px, BST_TRAP_SPECIES));
+    cJSON_AddItemToObject(node, "release_px",
+                          cJSON_CreateDoubleArray(t->release_px, BST_TRAP_SPECIES));
+    cJSON_AddNumberToObject(node, "fill_exponent", t->fill_exponent);
+    cJSON_AddNumberToObject(node, "reference_e", t->reference_e);
+    return node;
+}
+
+/* Adds a key of the detector to a scenario's `set`; takes the value over. */
+static void set_detector(const writer *w, cJSON *set, const char *key, cJSON *value) {
+    char pointer[512];
+    snprintf(pointer, sizeof pointer, "%.400s/detector/%s", w->request->camera, key);
+    cJSON_AddItemToObject(set, pointer, value);
+}
+
+/* Adds traps, and the output's side that trails or the ramp of the read-out give. */
+static void set_transfer(const writer *w, cJSON *set) {
+    const bst_sensor_figures *f = w->figures;
+    bst_detector_traps_config traps;
+    double rms;
+    bool ramp = isfinite(f->figures[BST_SENSOR_READOUT].value);
+    bool top = ramp && f->figures[BST_SENSOR_RAMP].value < 0.0;
+    if (traps_of(w, true, &traps, &rms) && (!ramp || top == !f->trail.parallel_up)) {
+        top = !f->trail.parallel_up;
+        ramp = true;
+        set_detector(w, set, "parallel_traps", traps_json(&traps));
+    }
+    if (ramp) {
+        set_detector(w, set, "output/top", cJSON_CreateBool(top));
+    }
+    if (traps_of(w, false, &traps, &rms)) {
+        set_detector(w, set, "serial_traps", traps_json(&traps));
+        set_detector(w, set, "output/right", cJSON_CreateBool(!f->trail.serial_right));
+    }
 }
 
 /* The scenario that changes a camera; NULL: out of memory. */
@@ -65,6 +124,7 @@ static cJSON *detector_json(const writer *w) {
             bst_json_add_number(set, pointer, value);
         }
     }
+    set_transfer(w, set);
     if (w->request->maps && w->figures->dark_map) {
         snprintf(pointer, sizeof pointer, "%.400s/detector/dark_map", w->request->camera);
         cJSON_AddStringToObject(set, pointer, "dark_map.fits");
@@ -76,7 +136,8 @@ static cJSON *detector_json(const writer *w) {
     return root;
 }
 
-static void add_trail(cJSON *root, const bst_charge_trail *t) {
+static void add_trail(cJSON *root, const writer *w) {
+    const bst_charge_trail *t = &w->figures->trail;
     static const char *const sides[BST_TRAIL_SIDES] = {"rows_above", "rows_below", "columns_right",
                                                        "columns_left"};
     cJSON *node = cJSON_AddObjectToObject(root, "charge_trail");
@@ -100,6 +161,15 @@ static void add_trail(cJSON *root, const bst_charge_trail *t) {
         cJSON *list = cJSON_AddArrayToObject(node, sides[side]);
         for (int k = 0; k < BST_TRAIL_PIXELS; k++) {
             cJSON_AddItemToArray(list, cJSON_CreateNumber(t->profile[side][k]));
+        }
+    }
+    for (int parallel = 0; parallel < 2; parallel++) {
+        bst_detector_traps_config traps;
+        double rms;
+        if (traps_of(w, parallel, &traps, &rms)) {
+            cJSON *fitted = traps_json(&traps);
+            cJSON_AddNumberToObject(fitted, "misfit_rms", rms);
+            cJSON_AddItemToObject(node, parallel ? "parallel_traps" : "serial_traps", fitted);
         }
     }
 }
@@ -136,7 +206,7 @@ static cJSON *report_json(const writer *w) {
         snprintf(key, sizeof key, "%g", bst_sensor_percentiles[i]);
         bst_json_add_number(percentiles, key, f->percentiles_e_per_s[i]);
     }
-    add_trail(root, &f->trail);
+    add_trail(root, w);
     return root;
 }
 

@@ -17,6 +17,8 @@ static const double PI = 3.14159265358979323846;
 static const float CLIP = 6.0F;
 /* Standard deviations of the continuum that make a line certain. */
 static const double CERTAIN = 7.0;
+/* Share of the power at the frequency that has one phase from row to row; noise has 1 / sqrt(rows). */
+static const double COHERENT = 0.5;
 
 /* Clips rows at CLIP robust standard deviations. */
 static bst_status clip_rows(bst_ctx *ctx, float *rows, size_t count) {
@@ -116,6 +118,40 @@ static double refine(const float *rows, int width, int from, int to, double low,
     return 0.5 * (low + high);
 }
 
+/* Growth of the phase from row to row, from groups of rows: the angle of the mean product of a row's
+ * Fourier sum with the conjugate one of the row before. */
+static bst_sensor_estimate row_phase(const float *rows, int width, int height, double cycles_px) {
+    double sum_re[GROUPS] = {0}, sum_im[GROUPS] = {0}, re = 0.0, im = 0.0, power = 0.0;
+    double turns[GROUPS], before[2] = {0.0, 0.0};
+    for (int y = 0; y < height; y++) {
+        double now[2] = {0.0, 0.0};
+        for (int x = 0; x < width; x++) {
+            double angle = 2.0 * PI * cycles_px * x, v = rows[(size_t)y * (size_t)width + (size_t)x];
+            now[0] += v * cos(angle);
+            now[1] -= v * sin(angle);
+        }
+        int g = (int)((int64_t)y * GROUPS / height);
+        sum_re[g] += now[0] * before[0] + now[1] * before[1];
+        sum_im[g] += now[1] * before[0] - now[0] * before[1];
+        power += now[0] * now[0] + now[1] * now[1];
+        memcpy(before, now, sizeof before);
+    }
+    for (int g = 0; g < GROUPS; g++) {
+        re += sum_re[g];
+        im += sum_im[g];
+    }
+    if (!(hypot(re, im) > COHERENT * power)) {
+        return (bst_sensor_estimate){NAN, NAN};
+    }
+    double mean = atan2(im, re); /* the groups' angles about it do not wrap */
+    for (int g = 0; g < GROUPS; g++) {
+        double c = sum_re[g] * cos(mean) + sum_im[g] * sin(mean);
+        double s = sum_im[g] * cos(mean) - sum_re[g] * sin(mean);
+        turns[g] = (mean + atan2(s, c)) / (2.0 * PI);
+    }
+    return bst_mean_estimate(turns, GROUPS);
+}
+
 /* Frequency and amplitude of the line, from groups of rows. */
 static void measure(const float *rows, int width, int height, int peak, bst_pick_up_line *out) {
     double frequency[GROUPS], amplitude[GROUPS];
@@ -140,6 +176,7 @@ static void measure(const float *rows, int width, int height, int peak, bst_pick
         amplitude[g] = 2.0 * sqrt(fmax(power, 0.0)) / width;
     }
     out->frequency = bst_mean_estimate(frequency, GROUPS);
+    out->phase = row_phase(rows, width, height, out->frequency.value);
     out->amplitude = bst_mean_estimate(amplitude, GROUPS);
 }
 
@@ -148,6 +185,7 @@ bst_status bst_pick_up_line_find(bst_ctx *ctx, float *rows, int width, int heigh
     *out = (bst_pick_up_line){.bins = width / 2,
                               .frequency = {NAN, NAN},
                               .amplitude = {NAN, NAN},
+                              .phase = {NAN, NAN},
                               .least_ratio = 1.0 + CERTAIN / sqrt(height)};
     BST_TRY(clip_rows(ctx, rows, (size_t)width * (size_t)height));
     double *power = malloc((size_t)out->bins * sizeof *power);

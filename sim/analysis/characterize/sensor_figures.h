@@ -25,8 +25,10 @@ typedef enum bst_sensor_figure {
     BST_SENSOR_DEAD_FRACTION,
     BST_SENSOR_BAD_COLUMNS,
     BST_SENSOR_RAMP,
+    BST_SENSOR_READOUT,
     BST_SENSOR_LINE_FREQUENCY,
     BST_SENSOR_LINE_AMPLITUDE,
+    BST_SENSOR_LINE_PHASE,
     BST_SENSOR_PARALLEL_TRAIL,
     BST_SENSOR_SERIAL_TRAIL,
     BST_SENSOR_FIGURES
@@ -52,6 +54,7 @@ typedef struct bst_sensor_figures {
     int64_t hot_found;
     double hot_limit_e_per_s;
     bst_charge_trail trail;
+    double trap_background_e; /* charge of the pixels about hot ones, middle row */
     bst_pick_up_line line;
     float *dark_map; /* [height][width] e-/s; NULL: none */
     float *prnu_map; /* [height][width] relative to 1; NULL: none */
