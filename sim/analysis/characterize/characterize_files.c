@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "sim/analysis/characterize/characterize.h"
-#include "sim/analysis/characterize/trap_fit.h"
 #include "sim/cli/print_json.h"
 #include "sim/core/compare.h"
 #include "sim/core/json_number.h"
@@ -17,8 +16,6 @@
 /* Statistics below this many standard errors are 0, also where the scenario that is extended has
  * another value. */
 static const double LEAST_SIGNIFICANCE = 2.0;
-/* Least significance of a charge trail for which traps are written. */
-static const double CERTAIN_TRAIL = 5.0;
 
 enum { HISTOGRAM_BINS = 200 };
 
@@ -28,6 +25,22 @@ typedef struct writer {
     const bst_sensor_stacks *stacks;
     const bst_sensor_figures *figures;
 } writer;
+
+/* Read noise without what other keys add to the differences that it was measured by: pick-up, and
+ * shot noise of the charge that bias frames gather during read-out. */
+static double white_noise_e(const bst_sensor_figures *f) {
+    double v = f->figures[BST_SENSOR_READ_NOISE].value, line = f->figures[BST_SENSOR_LINE_AMPLITUDE].value;
+    double ramp_e = fabs(f->figures[BST_SENSOR_RAMP].value) * f->figures[BST_SENSOR_GAIN].value;
+    double rest = v * v;
+    if (isfinite(line)) { /* the mean square of a sine, or of its differences of neighbours */
+        double turn = cos(2.0 * M_PI * f->figures[BST_SENSOR_LINE_FREQUENCY].value);
+        rest -= 0.5 * line * line * (f->noise_of_pairs ? 1.0 : 1.0 - turn);
+    }
+    if (isfinite(ramp_e) && f->noise_of_pairs) {
+        rest -= 0.5 * ramp_e;
+    }
+    return sqrt(fmax(rest, 0.0));
+}
 
 /* Value of a figure in detector.json; NAN: left out, as statistics that maps replace with --maps.
  */
@@ -39,6 +52,9 @@ static double value_given(const writer *w, int i) {
     if (!key || !isfinite(e->value) || (w->request->maps && mapped)) {
         return NAN;
     }
+    if (i == BST_SENSOR_READ_NOISE) {
+        return white_noise_e(w->figures);
+    }
     if (strncmp(key, "detector/", 9) != 0) {
         return fmax(e->value, 0.0);
     }
@@ -46,22 +62,6 @@ static double value_given(const writer *w, int i) {
         return NAN;
     }
     return fabs(e->value) > LEAST_SIGNIFICANCE * e->sigma ? e->value : 0.0;
-}
-
-/* Traps of the detector model that leave the trails along columns or rows.
- *
- * Returned:  false: there is no certain trail */
-static bool traps_of(const writer *w, bool parallel, bst_detector_traps_config *out, double *rms) {
-    const bst_sensor_figures *f = w->figures;
-    const bst_sensor_estimate *e = parallel ? &f->trail.parallel : &f->trail.serial;
-    if (!(e->value > CERTAIN_TRAIL * e->sigma)) {
-        return false;
-    }
-    bst_trap_fit_input input = {.gain_e_per_dn = f->figures[BST_SENSOR_GAIN].value,
-                                .background_e = f->trap_background_e,
-                                .transfers = (parallel ? f->height : f->width) / 2};
-    *rms = bst_trap_fit(&f->trail, parallel, &input, out);
-    return true;
 }
 
 /* Traps as keys of the detector. */
@@ -86,21 +86,16 @@ static void set_detector(const writer *w, cJSON *set, const char *key, cJSON *va
 /* Adds traps, and the output's side that trails or the ramp of the read-out give. */
 static void set_transfer(const writer *w, cJSON *set) {
     const bst_sensor_figures *f = w->figures;
-    bst_detector_traps_config traps;
-    double rms;
-    bool ramp = isfinite(f->figures[BST_SENSOR_READOUT].value);
-    bool top = ramp && f->figures[BST_SENSOR_RAMP].value < 0.0;
-    if (traps_of(w, true, &traps, &rms) && (!ramp || top == !f->trail.parallel_up)) {
-        top = !f->trail.parallel_up;
-        ramp = true;
-        set_detector(w, set, "parallel_traps", traps_json(&traps));
+    bool parallel = bst_detector_has_traps(&f->traps.parallel);
+    if (parallel) {
+        set_detector(w, set, "parallel_traps", traps_json(&f->traps.parallel));
     }
-    if (ramp) {
-        set_detector(w, set, "output/top", cJSON_CreateBool(top));
+    if (parallel || isfinite(f->figures[BST_SENSOR_READOUT].value)) {
+        set_detector(w, set, "output/top", cJSON_CreateBool(f->traps.top));
     }
-    if (traps_of(w, false, &traps, &rms)) {
-        set_detector(w, set, "serial_traps", traps_json(&traps));
-        set_detector(w, set, "output/right", cJSON_CreateBool(!f->trail.serial_right));
+    if (bst_detector_has_traps(&f->traps.serial)) {
+        set_detector(w, set, "serial_traps", traps_json(&f->traps.serial));
+        set_detector(w, set, "output/right", cJSON_CreateBool(f->traps.right));
     }
 }
 
@@ -163,13 +158,13 @@ static void add_trail(cJSON *root, const writer *w) {
             cJSON_AddItemToArray(list, cJSON_CreateNumber(t->profile[side][k]));
         }
     }
-    for (int parallel = 0; parallel < 2; parallel++) {
-        bst_detector_traps_config traps;
-        double rms;
-        if (traps_of(w, parallel, &traps, &rms)) {
-            cJSON *fitted = traps_json(&traps);
-            cJSON_AddNumberToObject(fitted, "misfit_rms", rms);
-            cJSON_AddItemToObject(node, parallel ? "parallel_traps" : "serial_traps", fitted);
+    const bst_detector_traps_config *const fitted[2] = {&w->figures->traps.parallel,
+                                                        &w->figures->traps.serial};
+    for (int i = 0; i < 2; i++) {
+        if (bst_detector_has_traps(fitted[i])) {
+            cJSON *traps = traps_json(fitted[i]);
+            cJSON_AddNumberToObject(traps, "misfit_rms", w->figures->trap_misfit[i]);
+            cJSON_AddItemToObject(node, i == 0 ? "parallel_traps" : "serial_traps", traps);
         }
     }
 }

@@ -12,7 +12,7 @@ static const double CORE_REACH = 3.5, HOT_REACH = 4.5;
 
 /* Tolerances of the logarithms of the shares: those of the percentiles times the slopes of a heavy
  * tail above the median (2) and of the core's edge below it. */
-static const double TOLERANCES[BST_SENSOR_PERCENTILES] = {0.35, 0.2, 0.08, 0.1, 0.1, 0.2, 0.2, 0.3};
+static const double TOLERANCES[BST_SENSOR_PERCENTILES] = {0.3, 0.15, 0.06, 0.06, 0.06, 0.2, 0.2, 0.4};
 static const double MOST_MISSED = 3.0;
 
 /* What the cost function needs. */

@@ -118,38 +118,64 @@ static double refine(const float *rows, int width, int from, int to, double low,
     return 0.5 * (low + high);
 }
 
-/* Growth of the phase from row to row, from groups of rows: the angle of the mean product of a row's
- * Fourier sum with the conjugate one of the row before. */
-static bst_sensor_estimate row_phase(const float *rows, int width, int height, double cycles_px) {
-    double sum_re[GROUPS] = {0}, sum_im[GROUPS] = {0}, re = 0.0, im = 0.0, power = 0.0;
-    double turns[GROUPS], before[2] = {0.0, 0.0};
-    for (int y = 0; y < height; y++) {
-        double now[2] = {0.0, 0.0};
-        for (int x = 0; x < width; x++) {
-            double angle = 2.0 * PI * cycles_px * x, v = rows[(size_t)y * (size_t)width + (size_t)x];
-            now[0] += v * cos(angle);
-            now[1] -= v * sin(angle);
+/* Frequency at which the Fourier sums of rows add up best, cycles per row in [-1/2, 1/2). sums: real
+ * and imaginary parts by row. Returns its share of the power. */
+static double best_growth(const double *sums, int rows, double *cycles) {
+    double best = -1.0, power = 0.0, around[3] = {0.0, 0.0, 0.0}, last = 0.0, before = 0.0;
+    int steps = 4 * rows;
+    for (int y = 0; y < rows; y++) {
+        power += sums[2 * y] * sums[2 * y] + sums[2 * y + 1] * sums[2 * y + 1];
+    }
+    for (int k = -steps / 2; k <= steps / 2; k++) { /* one step beyond, for the parabola */
+        double turn[2] = {cos(2.0 * PI * k / steps), -sin(2.0 * PI * k / steps)};
+        double re = 0.0, im = 0.0, c = 1.0, s = 0.0;
+        for (int y = 0; y < rows; y++) {
+            re += sums[2 * y] * c - sums[2 * y + 1] * s;
+            im += sums[2 * y] * s + sums[2 * y + 1] * c;
+            double next = c * turn[0] - s * turn[1];
+            s = c * turn[1] + s * turn[0];
+            c = next;
         }
-        int g = (int)((int64_t)y * GROUPS / height);
-        sum_re[g] += now[0] * before[0] + now[1] * before[1];
-        sum_im[g] += now[1] * before[0] - now[0] * before[1];
-        power += now[0] * now[0] + now[1] * now[1];
-        memcpy(before, now, sizeof before);
+        double now = re * re + im * im;
+        if (last > best && k > -steps / 2) {
+            best = last;
+            *cycles = (k - 1.0) / steps;
+            around[0] = before;
+            around[1] = last;
+            around[2] = now;
+        }
+        before = last;
+        last = now;
     }
-    for (int g = 0; g < GROUPS; g++) {
-        re += sum_re[g];
-        im += sum_im[g];
+    double bend = around[0] - 2.0 * around[1] + around[2];
+    *cycles += bend < 0.0 ? 0.5 * (around[0] - around[2]) / bend / steps : 0.0;
+    return power > 0.0 ? best / (rows * power) : 0.0;
+}
+
+/* Growth of the phase from row to row, with the scatter of groups of rows; NAN if the rows are not
+ * coherent. */
+static bst_sensor_estimate row_phase(const float *rows, int width, int height, double cycles_px) {
+    bst_sensor_estimate out = {NAN, NAN};
+    double groups[GROUPS], value;
+    double *sums = calloc(2 * (size_t)height, sizeof *sums);
+    for (int x = 0; sums && x < width; x++) {
+        double c = cos(2.0 * PI * cycles_px * x), s = -sin(2.0 * PI * cycles_px * x);
+        for (int y = 0; y < height; y++) {
+            double v = (double)rows[(size_t)y * (size_t)width + (size_t)x];
+            sums[2 * y] += v * c;
+            sums[2 * y + 1] += v * s;
+        }
     }
-    if (!(hypot(re, im) > COHERENT * power)) {
-        return (bst_sensor_estimate){NAN, NAN};
+    if (sums && best_growth(sums, height, &value) > COHERENT) {
+        for (int g = 0; g < GROUPS; g++) {
+            int from = g * height / GROUPS, to = (g + 1) * height / GROUPS;
+            best_growth(sums + 2 * from, to - from, &groups[g]);
+            groups[g] = value + remainder(groups[g] - value, 1.0);
+        }
+        out = (bst_sensor_estimate){value, bst_mean_estimate(groups, GROUPS).sigma};
     }
-    double mean = atan2(im, re); /* the groups' angles about it do not wrap */
-    for (int g = 0; g < GROUPS; g++) {
-        double c = sum_re[g] * cos(mean) + sum_im[g] * sin(mean);
-        double s = sum_im[g] * cos(mean) - sum_re[g] * sin(mean);
-        turns[g] = (mean + atan2(s, c)) / (2.0 * PI);
-    }
-    return bst_mean_estimate(turns, GROUPS);
+    free(sums);
+    return out;
 }
 
 /* Frequency and amplitude of the line, from groups of rows. */
