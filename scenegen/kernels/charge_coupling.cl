@@ -31,26 +31,57 @@ __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_d
     }
 }
 
+/* 16 pixels that an output reads from its i-th on. */
+INLINE float16 load_output(bst_kernel_coupling_params p, global const float *row, int output, int i) {
+    int part = p.width / p.outputs;
+    if (p.mirrored && (output & 1)) {
+        return vload16(0, row + (output + 1) * part - 16 - i).sfedcba9876543210;
+    }
+    return vload16(0, row + output * part + i);
+}
+
+INLINE void store_output(bst_kernel_coupling_params p, global float *row, int output, int i,
+                         float16 q) {
+    int part = p.width / p.outputs;
+    if (p.mirrored && (output & 1)) {
+        vstore16(q.sfedcba9876543210, 0, row + (output + 1) * part - 16 - i);
+    } else {
+        vstore16(q, 0, row + output * part + i);
+    }
+}
+
+/* Column of the i-th pixel that an output reads. */
+INLINE int column_of(bst_kernel_coupling_params p, int output, int i) {
+    int part = p.width / p.outputs;
+    return output * part + (p.mirrored && (output & 1) ? part - 1 - i : i);
+}
+
 /* Crosstalk: each output shows a share of what the others read at the same time. */
 __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_detector_crosstalk(
     bst_kernel_coupling_params p, global float *image) {
-    int y = (int)get_global_id(0), part = p.width / p.outputs;
+    int y = (int)get_global_id(0), part = p.width / p.outputs, i = 0;
     if (y >= p.height) {
         return;
     }
     global float *row = image + (size_t)y * p.stride;
-    for (int i = 0; i < part; i++) {
+    for (; i + 16 <= part; i += 16) {
+        float16 sum = (float16)0.0f;
+        for (int o = 0; o < p.outputs; o++) {
+            sum += load_output(p, row, o, i);
+        }
+        for (int o = 0; o < p.outputs; o++) {
+            float16 q = load_output(p, row, o, i);
+            store_output(p, row, o, i, fma((float16)p.crosstalk, sum - q, q));
+        }
+    }
+    for (; i < part; i++) {
         float sum = 0.0f;
-        for (int pass = 0; pass < 2; pass++) {
-            for (int o = 0; o < p.outputs; o++) {
-                int column = o * part + (p.mirrored && (o & 1) ? part - 1 - i : i);
-                float q = row[column];
-                if (pass == 0) {
-                    sum += q;
-                } else {
-                    row[column] = fma(p.crosstalk, sum - q, q);
-                }
-            }
+        for (int o = 0; o < p.outputs; o++) {
+            sum += row[column_of(p, o, i)];
+        }
+        for (int o = 0; o < p.outputs; o++) {
+            global float *q = row + column_of(p, o, i);
+            *q = fma(p.crosstalk, sum - *q, *q);
         }
     }
 }

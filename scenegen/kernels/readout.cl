@@ -122,49 +122,48 @@ READOUT_GROUP kernel void bst_detector_bloom(bst_kernel_frame_params p, global f
 }
 
 #ifdef MULTIPLY
-/* Gamma deviates of the shapes n, whole numbers of electrons, where `active`: squeeze-free rejection
- * (Marsaglia and Tsang 2000, ACM TOMS 26, 363), accepted with more than 95 % each turn. */
-INLINE lanes gamma_turn(lanes n, lanes_uint words_u, lanes z, lanes_int *accepted) {
-    lanes d = n - 1.0f / 3, t = 1.0f + z / sqrt(9.0f * d);
-    lanes v = t * t * t;
-    lanes log_u = -0.5f * log_radius2(words_u);
-    lanes safe = fmax(v, 1e-20f);
-    *accepted = MASK((t > 0.0f) & (log_u < fma(z * 0.5f, z, d - d * v + d * log(safe))));
+/* One turn for gamma deviates of the shapes n, whole numbers from 1 on: rejection without a squeeze
+ * (Marsaglia and Tsang 2000, ACM TOMS 26, 363), accepted with more than 95 %. */
+INLINE lanes gamma_turn(lanes n, lanes_uint word, lanes z, lanes_int *accepted) {
+    lanes d = n - 1.0f / 3, t = fma(z * (1.0f / 3), inverse_root(d), (lanes)1.0f);
+    lanes v = t * t * t, log_u2 = -log_radius2(word); /* twice the logarithm of a uniform number */
+    lanes safe = clamp(v, 1e-6f, 100.0f);
+    lanes log_v2 = 2.0f * log(safe);
+    *accepted = MASK((v > 1e-6f) & (log_u2 < fma(z, z, d * (2.0f - 2.0f * v + log_v2))));
     return d * v;
 }
 
-/* Charge behind a multiplication register, over its gain: the mean stays, the variance of n
- * electrons is n (1 - 1 / gain), their law a gamma distribution of shape n (Basden, Haniff and
- * Mackay 2003, MNRAS 345, 985). Fractions of an electron, which traps leave, are rounded at
- * random. */
-INLINE chunk multiply_chunk(bst_kernel_frame_params p, uint counter, chunk q) {
-    lanes n[4] = {q.a, q.b, q.c, q.d}, out[4];
-    lanes_int open[4];
-    chunk_words first = chunk_random(p, counter, STREAM_MULTIPLY);
-    lanes_uint round_words[4] = {first.a, first.b, first.c, first.d};
-    KEEP_LOOP
-    for (int v = 0; v < 4; v++) {
-        lanes whole = floor(n[v]), u = to_lanes(round_words[v]) * 0x1p-32f;
-        n[v] = fmax(whole + select((lanes)0.0f, (lanes)1.0f, MASK(u < n[v] - whole)), 0.0f);
-        out[v] = (lanes)0.0f;
-        open[v] = MASK(n[v] > 0.0f);
-    }
-    for (uint turn = 0u; turn < 64u && any_of(open[0] | open[1] | open[2] | open[3]); turn++) {
-        chunk z = chunk_normal(chunk_random(p, counter, STREAM_MULTIPLY + 1u + 2u * turn));
-        chunk_words w = chunk_random(p, counter, STREAM_MULTIPLY + 2u + 2u * turn);
-        lanes normal[4] = {z.a, z.b, z.c, z.d};
-        lanes_uint words[4] = {w.a, w.b, w.c, w.d};
-        KEEP_LOOP
-        for (int v = 0; v < 4; v++) {
-            lanes_int good;
-            lanes drawn = gamma_turn(fmax(n[v], 1.0f), words[v], normal[v], &good);
-            good &= open[v];
-            out[v] = select(out[v], fma(drawn - n[v], (lanes)p.multiply_rms, n[v]), good);
-            open[v] &= ~good;
+/* Charge of 16 pixels behind a multiplication register, over its gain: the mean stays, the variance
+ * of n electrons is n (1 - 1 / gain), their law a gamma distribution of shape n (Basden, Haniff and
+ * Mackay 2003, MNRAS 345, 985). Fractions of an electron, which traps leave, are rounded at random.
+ * stream: of the first turn; later ones have every fourth from there on. */
+static lanes multiply_charge(bst_kernel_frame_params p, uint counter, uint stream, lanes q) {
+    lanes_uint w0, w1, w2, w3;
+    philox_lanes(p, counter, stream, &w0, &w1, &w2, &w3);
+    lanes whole = floor(q), u = to_lanes(w3) * 0x1p-32f, out = (lanes)0.0f;
+    lanes n = fmax(whole + select((lanes)0.0f, (lanes)1.0f, MASK(u < q - whole)), 0.0f);
+    lanes_int open = MASK(n > 0.0f);
+    for (uint turn = 0u; any_of(open) && turn < 64u; turn++) {
+        lanes z, unused;
+        lanes_int good;
+        if (turn > 0u) {
+            philox_lanes(p, counter, stream + 4u * turn, &w0, &w1, &w2, &w3);
         }
+        normal_lanes(w0, w1, &z, &unused);
+        lanes drawn = gamma_turn(fmax(n, 1.0f), w2, z, &good);
+        good &= open;
+        out = select(out, fma(drawn - n, (lanes)p.multiply_rms, n), good);
+        open &= ~good;
     }
-    chunk e = {out[0], out[1], out[2], out[3]};
-    return e;
+    return out;
+}
+
+INLINE chunk multiply_chunk(bst_kernel_frame_params p, uint counter, chunk q) {
+    q.a = multiply_charge(p, counter, STREAM_MULTIPLY, q.a);
+    q.b = multiply_charge(p, counter, STREAM_MULTIPLY + 1u, q.b);
+    q.c = multiply_charge(p, counter, STREAM_MULTIPLY + 2u, q.c);
+    q.d = multiply_charge(p, counter, STREAM_MULTIPLY + 3u, q.d);
+    return q;
 }
 #endif
 

@@ -178,32 +178,48 @@ static bst_sensor_estimate row_phase(const float *rows, int width, int height, d
     return out;
 }
 
+/* Amplitude of a line in rows [from, to): its power less that of the continuum beside it. */
+static double amplitude_in(const float *rows, int width, int from, int to, double f) {
+    double beside = 0.0;
+    int samples = 0;
+    for (int k = -16; k < 16; k++) {
+        /* spectra of real rows fold at 0 and 1/2: near an end a sample would be the line */
+        double sample = fabs(f + (k + 0.5) / width);
+        sample = fmin(sample, 1.0 - sample);
+        if ((k < -8 || k >= 8) && fabs(sample - f) * width >= LINE_BINS) {
+            beside += power_at(rows, width, from, to, sample);
+            samples++;
+        }
+    }
+    double power = power_at(rows, width, from, to, f) - beside / samples;
+    return 2.0 * sqrt(fmax(power, 0.0)) / width;
+}
+
 /* Frequency and amplitude of the line, from groups of rows. */
 static void measure(const float *rows, int width, int height, int peak, bst_pick_up_line *out) {
     double frequency[GROUPS], amplitude[GROUPS];
     for (int g = 0; g < GROUPS; g++) {
         int from = (int)((int64_t)g * height / GROUPS),
             to = (int)((int64_t)(g + 1) * height / GROUPS);
-        double f = refine(rows, width, from, to, (peak - 1.0) / width, (peak + 1.0) / width);
-        /* the continuum beside the line, outside its side lobes */
-        double beside = 0.0;
-        int samples = 0;
-        for (int k = -16; k < 16; k++) {
-            /* spectra of real rows fold at 0 and 1/2: near an end a sample would be the line */
-            double sample = fabs(f + (k + 0.5) / width);
-            sample = fmin(sample, 1.0 - sample);
-            if ((k < -8 || k >= 8) && fabs(sample - f) * width >= LINE_BINS) {
-                beside += power_at(rows, width, from, to, sample);
-                samples++;
-            }
-        }
-        double power = power_at(rows, width, from, to, f) - beside / samples;
-        frequency[g] = f;
-        amplitude[g] = 2.0 * sqrt(fmax(power, 0.0)) / width;
+        frequency[g] = refine(rows, width, from, to, (peak - 1.0) / width, (peak + 1.0) / width);
+        amplitude[g] = amplitude_in(rows, width, from, to, frequency[g]);
     }
     out->frequency = bst_mean_estimate(frequency, GROUPS);
     out->phase = row_phase(rows, width, height, out->frequency.value);
     out->amplitude = bst_mean_estimate(amplitude, GROUPS);
+}
+
+bst_status bst_pick_up_line_amplitude(bst_ctx *ctx, float *rows, int width, int height,
+                                      bst_pick_up_line *line) {
+    double amplitude[GROUPS];
+    BST_TRY(clip_rows(ctx, rows, (size_t)width * (size_t)height));
+    for (int g = 0; g < GROUPS; g++) {
+        int from = (int)((int64_t)g * height / GROUPS),
+            to = (int)((int64_t)(g + 1) * height / GROUPS);
+        amplitude[g] = amplitude_in(rows, width, from, to, line->frequency.value);
+    }
+    line->amplitude = bst_mean_estimate(amplitude, GROUPS);
+    return BST_OK;
 }
 
 bst_status bst_pick_up_line_find(bst_ctx *ctx, float *rows, int width, int height,

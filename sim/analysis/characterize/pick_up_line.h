@@ -32,4 +32,13 @@ typedef struct bst_pick_up_line {
 bst_status bst_pick_up_line_find(bst_ctx *ctx, float *rows, int width, int height,
                                  bst_pick_up_line *out) BST_MUST_CHECK;
 
+/* Measures the amplitude of a line that was found in other rows.
+ *
+ * Given:     rows  as for bst_pick_up_line_find
+ *            line  its frequency
+ * Returned:  line->amplitude
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_pick_up_line_amplitude(bst_ctx *ctx, float *rows, int width, int height,
+                                      bst_pick_up_line *line) BST_MUST_CHECK;
+
 #endif

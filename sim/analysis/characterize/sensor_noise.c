@@ -166,14 +166,14 @@ static void measure_level(const bst_frame_stack *bias, float *scratch, bst_senso
     out->method[BST_SENSOR_OFFSET_DRIFT] = "line through the levels of the bias frames";
 }
 
-/* Last frame without the levels of its rows and columns. Its difference from the mean of all frames
- * would lack pick-up of equal phases. */
-static void level_rows(const bst_frame_stack *s, float *rows, float *scratch) {
+/* Last frame, or its difference from the mean of all, without the levels of its rows and columns.
+ * The difference lacks fixed patterns, but also pick-up of equal phases. */
+static void level_rows(const bst_frame_stack *s, bool difference, float *rows, float *scratch) {
     size_t width = (size_t)s->width;
     for (int y = 0; y < s->height; y++) {
         size_t at = (size_t)y * width;
         for (size_t x = 0; x < width; x++) {
-            rows[at + x] = s->last[at + x];
+            rows[at + x] = s->last[at + x] - (difference ? s->mean[at + x] : 0.0F);
             scratch[x] = rows[at + x];
         }
         float level = (float)bst_clipped_moments_of(scratch, width, CLIP).mean;
@@ -200,8 +200,17 @@ static bst_status measure_line(bst_ctx *ctx, const bst_frame_stack *s, float *sc
     if (!rows) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
     }
-    level_rows(s, rows, scratch);
+    level_rows(s, s->count > 1, rows, scratch);
     bst_status status = bst_pick_up_line_find(ctx, rows, s->width, s->height, &out->line);
+    if (status == BST_OK && s->count > 1) {
+        level_rows(s, false, rows, scratch);
+        if (out->line.found) {
+            status = bst_pick_up_line_amplitude(ctx, rows, s->width, s->height, &out->line);
+        } else {
+            free(out->line.power);
+            status = bst_pick_up_line_find(ctx, rows, s->width, s->height, &out->line);
+        }
+    }
     free(rows);
     BST_TRY(status);
     out->figures[BST_SENSOR_LINE_FREQUENCY] = out->line.frequency;
