@@ -81,7 +81,7 @@ typedef struct bst_render_request {
     int count;
     /* expected electrons per sensor pixel: sky and dark current of the exposure */
     double background_e;
-    double dark_e;       /* dark current part of it (replaced by a dark map, if there is one) */
+    double dark_e; /* dark current part of it (replaced by a dark map, if there is one) */
     /* varying background per sensor pixel, added to background_e; NULL: none. Only if
      * bst_skylight_may_vary. It covers the window, and its whole columns if charge or light moves
      * along them (bst_detector_config_whole_columns) */

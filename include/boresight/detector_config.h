@@ -83,7 +83,7 @@ typedef struct bst_detector_config {
     double frame_transfer_s;
     double row_time_s; /* rolling shutter */
     bst_detector_output_config output;
-    double readout_s;  /* time of the read-out, in which packets gather dark current */
+    double readout_s; /* time of the read-out, in which packets gather dark current */
     double clock_induced_e;
     double offset_noise_e, offset_drift_dn_per_frame, flicker_noise_e;
     bst_detector_edges_config shielded, overscan;

@@ -49,8 +49,8 @@ bool bst_detector_is_staged(const bst_detector *detector) {
 
 /* True if offsets are new in every frame. */
 static bool has_frame_offsets(const bst_detector_config *d) {
-    return d->row_noise_e > 0.0 || d->flicker_noise_e > 0.0 || d->offset_noise_e > 0.0 || d->offset_drift_dn_per_frame != 0.0 ||
-           d->pick_up.amplitude_e > 0.0;
+    return d->row_noise_e > 0.0 || d->flicker_noise_e > 0.0 || d->offset_noise_e > 0.0 ||
+           d->offset_drift_dn_per_frame != 0.0 || d->pick_up.amplitude_e > 0.0;
 }
 
 static bool has_offsets(const bst_detector_config *d) {
@@ -71,7 +71,8 @@ static bool has_tail(const bst_camera *c) {
 }
 
 const char *bst_detector_tail_options(const bst_camera *camera) {
-    static const char *const options[2][2] = {{"", " -DMULTIPLY"}, {" -DTAIL", " -DTAIL -DMULTIPLY"}};
+    static const char *const options[2][2] = {{"", " -DMULTIPLY"},
+                                              {" -DTAIL", " -DTAIL -DMULTIPLY"}};
     return options[has_tail(camera)][multiplies(camera)];
 }
 
@@ -86,8 +87,7 @@ static int effects_of(const bst_detector *detector) {
            (detector->offsets ? BST_EFFECT_OFFSETS : 0) | (detector->codes ? BST_EFFECT_CODES : 0) |
            (d->saturation == BST_WELL_BLOOM ? BST_EFFECT_BLOOM : 0) |
            (d->frame_transfer_s > 0.0 ? BST_EFFECT_TRANSFER : 0) |
-           (detector->flags ? BST_EFFECT_FLAGS : 0) |
-           (detector->readout ? BST_EFFECT_READOUT : 0) |
+           (detector->flags ? BST_EFFECT_FLAGS : 0) | (detector->readout ? BST_EFFECT_READOUT : 0) |
            (d->pick_up.amplitude_e > 0.0 ? BST_EFFECT_PICK_UP : 0);
 }
 
@@ -321,8 +321,8 @@ typedef struct rows_to_draw {
     const float *fixed;
     float *sum; /* then the pick-up's amplitudes by row */
     int height;
-    double rms, level; /* DN */
-    double amplitude;  /* of the pick-up, DN */
+    double rms, level;           /* DN */
+    double amplitude;            /* of the pick-up, DN */
     double phase, phase_per_row; /* turns */
     bst_rng_key key;
     uint64_t exposure;
@@ -400,11 +400,10 @@ static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *sta
     }
     cl_mem sent;
     BST_TRY(bst_upload_ring_put(ctx, stage, BST_STAGE_ROWS, sum, bytes, &sent));
-    return bst_device_check(
-        ctx,
-        clEnqueueCopyBuffer(d->queue, sent, d->offsets, 0, first * sizeof(float), bytes, 0, NULL,
-                            NULL),
-        "sending the rows' offsets");
+    return bst_device_check(ctx,
+                            clEnqueueCopyBuffer(d->queue, sent, d->offsets, 0,
+                                                first * sizeof(float), bytes, 0, NULL, NULL),
+                            "sending the rows' offsets");
 }
 
 bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage,

@@ -47,8 +47,7 @@ bool bst_fixed_pattern_noise_has_gain(const bst_camera *camera) {
 bool bst_fixed_pattern_noise_has_dark(const bst_camera *camera) {
     const bst_detector_config *d = &camera->detector;
     return (d->dsnu_rms > 0.0 && camera->dark_current_e_per_s > 0.0) || d->dark_map[0] ||
-           d->hot_fraction > 0.0 ||
-           (has_edges(&d->overscan) && camera->dark_current_e_per_s > 0.0);
+           d->hot_fraction > 0.0 || (has_edges(&d->overscan) && camera->dark_current_e_per_s > 0.0);
 }
 
 /* Loads a FITS map of the sensor's size, finite and not negative, scaled by `factor`. */

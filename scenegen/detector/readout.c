@@ -47,10 +47,10 @@ static bool needs_over(const bst_readout *r) {
 }
 
 bst_status bst_readout_prepare(bst_ctx *ctx, bst_readout *r) {
-    static const char *const names[KERNELS] = {
-        "bst_detector_transfer",   "bst_detector_charge",   "bst_detector_bloom",
-        "bst_detector_read",       "bst_detector_neighbours", "bst_detector_parallel",
-        "bst_detector_serial",     "bst_detector_crosstalk"};
+    static const char *const names[KERNELS] = {"bst_detector_transfer",   "bst_detector_charge",
+                                               "bst_detector_bloom",      "bst_detector_read",
+                                               "bst_detector_neighbours", "bst_detector_parallel",
+                                               "bst_detector_serial",     "bst_detector_crosstalk"};
     static const bst_device_kernel_source *const staged[] = {
         &bst_kernel_scene_shared, &bst_kernel_lanes,    &bst_kernel_random,   &bst_kernel_chunk,
         &bst_kernel_read_tail,    &bst_kernel_detector, &bst_kernel_store_dn, &bst_kernel_readout};
@@ -61,12 +61,11 @@ bst_status bst_readout_prepare(bst_ctx *ctx, bst_readout *r) {
     snprintf(options, sizeof options, "-cl-std=CL1.2%s", bst_detector_tail_options(&r->camera));
     for (int i = 0; i < KERNELS; i++) {
         if (wanted(r, i) && !r->kernels[i]) {
-            BST_TRY(i <= READ ? bst_scene_kernel(ctx, r->device, staged,
-                                                 sizeof staged / sizeof *staged, options, names[i],
-                                                 &r->kernels[i])
-                              : bst_scene_kernel(ctx, r->device, moving,
-                                                 sizeof moving / sizeof *moving, "-cl-std=CL1.2",
-                                                 names[i], &r->kernels[i]));
+            BST_TRY(i <= READ
+                        ? bst_scene_kernel(ctx, r->device, staged, sizeof staged / sizeof *staged,
+                                           options, names[i], &r->kernels[i])
+                        : bst_scene_kernel(ctx, r->device, moving, sizeof moving / sizeof *moving,
+                                           "-cl-std=CL1.2", names[i], &r->kernels[i]));
         }
     }
     return BST_OK;
@@ -163,7 +162,8 @@ static bst_status enqueue_kernel(bst_ctx *ctx, bst_readout *r, int kernel, argum
                                  size_t items) {
     cl_kernel k = r->kernels[kernel];
     const size_t local = BST_READOUT_GROUP, global = (items + local - 1) / local * local;
-    BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 0, a.bytes, a.params), "setting a kernel argument"));
+    BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 0, a.bytes, a.params),
+                             "setting a kernel argument"));
     for (cl_uint i = 0; i < a.count; i++) {
         BST_TRY(bst_device_check(ctx, clSetKernelArg(k, i + 1, sizeof(cl_mem), &a.buffers[i]),
                                  "setting a kernel argument"));
@@ -178,11 +178,10 @@ static bst_status enqueue_traps(bst_ctx *ctx, bst_readout *r, int kernel,
                                 const bst_kernel_frame_params *p) {
     const bst_detector_config *d = &r->camera.detector;
     const bst_detector_traps_config *t = kernel == PARALLEL ? &d->parallel_traps : &d->serial_traps;
-    bst_kernel_trap_params q = {
-        .width = kernel == PARALLEL ? p->light_stride : p->sensor_width,
-        .height = p->light_height,
-        .stride = p->light_stride,
-        .backwards = kernel == PARALLEL ? d->output.top : d->output.right};
+    bst_kernel_trap_params q = {.width = kernel == PARALLEL ? p->light_stride : p->sensor_width,
+                                .height = p->light_height,
+                                .stride = p->light_stride,
+                                .backwards = kernel == PARALLEL ? d->output.top : d->output.right};
     q.exponent = (float)t->fill_exponent;
     for (int i = 0; i < BST_TRAP_SPECIES; i++) {
         if (t->traps_per_px[i] > 0.0) {
@@ -205,9 +204,8 @@ static bst_kernel_coupling_params coupling_params(const bst_kernel_frame_params 
 }
 
 /* Borders that charge moves, or coupling of neighbours; afterwards r->image has the result. */
-static bst_status enqueue_neighbours(bst_ctx *ctx, bst_readout *r,
-                                     const bst_kernel_frame_params *p, double shift,
-                                     double coupling) {
+static bst_status enqueue_neighbours(bst_ctx *ctx, bst_readout *r, const bst_kernel_frame_params *p,
+                                     double shift, double coupling) {
     if (!(shift > 0.0) && !(coupling > 0.0)) {
         return BST_OK;
     }

@@ -147,11 +147,11 @@ typedef struct bst_kernel_trap_params {
 /* Effects between pixels of an image (kernels/charge_coupling.cl). */
 typedef struct bst_kernel_coupling_params {
     int width, height, stride;
-    float coupling;      /* share that each of the four neighbours takes over */
-    float shift;         /* of the border between two pixels, px per electron */
-    int outputs;         /* crosstalk: equal parts of a row */
-    int mirrored;        /* every second part is read from its last column on */
-    float crosstalk;     /* share of each other output */
+    float coupling;  /* share that each of the four neighbours takes over */
+    float shift;     /* of the border between two pixels, px per electron */
+    int outputs;     /* crosstalk: equal parts of a row */
+    int mirrored;    /* every second part is read from its last column on */
+    float crosstalk; /* share of each other output */
 } bst_kernel_coupling_params;
 
 /* Record of one source for the node kernel. */

@@ -152,9 +152,10 @@ const bst_config_desc bst_detector_table[] = {
         "row. 0: all rows at once."),
     BST_OBJECT(bst_detector_config, output, output_table, "{}",
                "Where frames are read: at column 0, row 0 first, unless given."),
-    BST_REAL(bst_detector_config, readout_s, "s", 0, 1e4, "0",
-             "Time of the read-out of the whole sensor: charge gathers the dark current of the rows "
-             "that it passes."),
+    BST_REAL(
+        bst_detector_config, readout_s, "s", 0, 1e4, "0",
+        "Time of the read-out of the whole sensor: charge gathers the dark current of the rows "
+        "that it passes."),
     BST_REAL(bst_detector_config, clock_induced_e, "e", 0, 1e4, "0",
              "Mean charge that clocking leaves in each pixel of a frame (Poisson)."),
     BST_REAL(bst_detector_config, offset_noise_e, "e", 0, 1e5, "0",

@@ -90,8 +90,8 @@ static void assert_poisson(fixture *f, const double *mean) {
     bst_assert_close(excess, 0.0, 4.0 * sqrt(all));
 }
 
-/* A packet gathers the dark current of the rows that it passes, for the time of a row each; glow and
- * clock-induced charge come on top; edges have neither light nor, in the overscan, charge. */
+/* A packet gathers the dark current of the rows that it passes, for the time of a row each; glow
+ * and clock-induced charge come on top; edges have neither light nor, in the overscan, charge. */
 static void charge_is_gathered_outside_the_exposure(void **state) {
     static double mean[PIXELS];
     static float dark[PIXELS];
@@ -107,15 +107,15 @@ static void charge_is_gathered_outside_the_exposure(void **state) {
                   80.0 * exp(-hypot(x + 4.0, y - 10.0) / 30.0);
     }
     assert_poisson(f, mean);
-    bst_assert_close(bst_camera_readout_e(&f->camera), 40.0 * 1.5 * (SIDE - 1.0) / SIDE + 5.0, 1e-9);
+    bst_assert_close(bst_camera_readout_e(&f->camera), 40.0 * 1.5 * (SIDE - 1.0) / SIDE + 5.0,
+                     1e-9);
 
     d->hot_fraction = 0.01;
     d->hot_median_e_per_s = 1000.0;
     d->shielded = (bst_detector_edges_config){6, 7, 8, 9};
     d->overscan = (bst_detector_edges_config){3, 4, 0, 5};
     make(f);
-    bst_assert_ok(&f->ctx,
-                  bst_fixed_pattern_noise_dark(&f->ctx, &f->camera, PATTERN, SIDE, dark));
+    bst_assert_ok(&f->ctx, bst_fixed_pattern_noise_dark(&f->ctx, &f->camera, PATTERN, SIDE, dark));
     for (int x = 0; x < SIDE; x++) {
         double passed = 0.0;
         for (int y = 0; y < SIDE; y++) {
@@ -124,8 +124,8 @@ static void charge_is_gathered_outside_the_exposure(void **state) {
             double rate = (double)dark[y * SIDE + x];
             assert_true(rate == 0.0 ? !(column && row) : column && row);
             double glow = row ? 80.0 * exp(-hypot(x + 4.0, y - 10.0) / 30.0) : 0.0;
-            mean[y * SIDE + x] = (lit ? 60.0 : 0.0) + 0.5 * rate +
-                                 (column ? passed * 3.0 / SIDE + 5.0 + glow : 0.0);
+            mean[y * SIDE + x] =
+                (lit ? 60.0 : 0.0) + 0.5 * rate + (column ? passed * 3.0 / SIDE + 5.0 + glow : 0.0);
             passed += rate;
         }
     }
@@ -222,7 +222,8 @@ static void pass_traps(double *image, const bst_detector_traps_config *t, bool c
         for (int i = 0; i < SIDE; i++) {
             double *q = &image[line * across + (backwards ? SIDE - 1 - i : i) * along];
             for (int k = 0; k < BST_TRAP_SPECIES; k++) {
-                double met = (i + 1) * t->traps_per_px[k] * pow(*q / t->reference_e, t->fill_exponent);
+                double met =
+                    (i + 1) * t->traps_per_px[k] * pow(*q / t->reference_e, t->fill_exponent);
                 double caught = *q > 0.01 ? fmax((met - held[k]) / (met / *q + 1.0), 0.0) : 0.0;
                 double released = (held[k] + caught) * (1.0 - exp(-1.0 / t->release_px[k]));
                 held[k] += caught - released;
@@ -379,7 +380,8 @@ static void charge_is_multiplied(void **state) {
     for (int i = 0; i < PIXELS; i++) {
         if (frame[i] > 0.0) { /* a step of the number of electrons: zero ones */
             double p = multiplied_below(frame[i], 4.0);
-            distance = fmax(distance, fmax(fabs(p - (i + 1.0) / PIXELS), fabs(p - i / (double)PIXELS)));
+            distance =
+                fmax(distance, fmax(fabs(p - (i + 1.0) / PIXELS), fabs(p - i / (double)PIXELS)));
         }
     }
     /* exceeded once in 10,000 times; steps of 0.002 e- in a density of at most 0.2 per e- */

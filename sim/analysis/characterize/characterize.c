@@ -69,7 +69,7 @@ const bst_sensor_figure_name bst_sensor_figure_names[BST_SENSOR_FIGURES] = {
     [BST_SENSOR_READ_NOISE] = {"read_noise_e", "e-", "read_noise_e"},
     [BST_SENSOR_OFFSET] = {"offset_dn", "DN", "offset_dn"},
     [BST_SENSOR_OFFSET_DRIFT] = {"offset_drift_dn_per_frame", "DN",
-                                  "detector/offset_drift_dn_per_frame"},
+                                 "detector/offset_drift_dn_per_frame"},
     [BST_SENSOR_ROW_NOISE] = {"row_noise_e", "e-", "detector/row_noise_e"},
     [BST_SENSOR_COLUMN_OFFSET] = {"column_offset_rms_e", "e-", "detector/column_offset_rms_e"},
     [BST_SENSOR_ROW_OFFSET] = {"row_offset_rms_e", "e-", "detector/row_offset_rms_e"},

@@ -29,7 +29,8 @@ typedef struct writer {
 /* Read noise without what other keys add to the differences that it was measured by: pick-up, and
  * shot noise of the charge that bias frames gather during read-out. */
 static double white_noise_e(const bst_sensor_figures *f) {
-    double v = f->figures[BST_SENSOR_READ_NOISE].value, line = f->figures[BST_SENSOR_LINE_AMPLITUDE].value;
+    double v = f->figures[BST_SENSOR_READ_NOISE].value,
+           line = f->figures[BST_SENSOR_LINE_AMPLITUDE].value;
     double ramp_e = fabs(f->figures[BST_SENSOR_RAMP].value) * f->figures[BST_SENSOR_GAIN].value;
     double rest = v * v;
     if (isfinite(line)) { /* the mean square of a sine, or of its differences of neighbours */

@@ -12,7 +12,8 @@ static const double CORE_REACH = 3.5, HOT_REACH = 4.5;
 
 /* Tolerances of the logarithms of the shares: those of the percentiles times the slopes of a heavy
  * tail above the median (2) and of the core's edge below it. */
-static const double TOLERANCES[BST_SENSOR_PERCENTILES] = {0.3, 0.15, 0.06, 0.06, 0.06, 0.2, 0.2, 0.4};
+static const double TOLERANCES[BST_SENSOR_PERCENTILES] = {0.3,  0.15, 0.06, 0.06,
+                                                          0.06, 0.2,  0.2,  0.4};
 static const double MOST_MISSED = 3.0;
 
 /* What the cost function needs. */
@@ -94,9 +95,10 @@ bool bst_dark_distribution_fit(const double percentiles[BST_SENSOR_PERCENTILES],
     for (int i = 0; i < (start ? 1 : 2); i++) {
         const bst_dark_distribution *s = start ? start : &starts[i];
         double x[5] = {log(s->dark), log(s->dsnu),
-                       log(s->hot_fraction / fmax(1.0 - s->hot_fraction, 1e-6)),
-                       log(s->hot_median), log(s->hot_spread_dex)};
-        double cost = bst_simplex_search(cost_of, &f, 5, x, step, start ? MOST_TURNS / 3 : MOST_TURNS);
+                       log(s->hot_fraction / fmax(1.0 - s->hot_fraction, 1e-6)), log(s->hot_median),
+                       log(s->hot_spread_dex)};
+        double cost =
+            bst_simplex_search(cost_of, &f, 5, x, step, start ? MOST_TURNS / 3 : MOST_TURNS);
         if (cost < best) {
             best = cost;
             *out = of_parameters(x);

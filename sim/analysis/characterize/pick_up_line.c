@@ -17,7 +17,8 @@ static const double PI = 3.14159265358979323846;
 static const float CLIP = 6.0F;
 /* Standard deviations of the continuum that make a line certain. */
 static const double CERTAIN = 7.0;
-/* Share of the power at the frequency that has one phase from row to row; noise has 1 / sqrt(rows). */
+/* Share of the power at the frequency that has one phase from row to row; noise has 1 / sqrt(rows).
+ */
 static const double COHERENT = 0.5;
 
 /* Clips rows at CLIP robust standard deviations. */
@@ -118,8 +119,8 @@ static double refine(const float *rows, int width, int from, int to, double low,
     return 0.5 * (low + high);
 }
 
-/* Frequency at which the Fourier sums of rows add up best, cycles per row in [-1/2, 1/2). sums: real
- * and imaginary parts by row. Returns its share of the power. */
+/* Frequency at which the Fourier sums of rows add up best, cycles per row in [-1/2, 1/2). sums:
+ * real and imaginary parts by row. Returns its share of the power. */
 static double best_growth(const double *sums, int rows, double *cycles) {
     double best = -1.0, power = 0.0, around[3] = {0.0, 0.0, 0.0}, last = 0.0, before = 0.0;
     int steps = 4 * rows;

@@ -1,5 +1,5 @@
-/* Coherent pick-up: a sine along the rows, of one frequency, and a phase that grows equally from row
- * to row or is any in each. */
+/* Coherent pick-up: a sine along the rows, of one frequency, and a phase that grows equally from
+ * row to row or is any in each. */
 #ifndef BST_ANALYSIS_CHARACTERIZE_PICK_UP_LINE_H
 #define BST_ANALYSIS_CHARACTERIZE_PICK_UP_LINE_H
 

@@ -260,11 +260,11 @@ static void fit_distribution(dark_signal *d, double per_s) {
                                                BST_SENSOR_HOT_SPREAD};
     double line = out->figures[BST_SENSOR_LINE_AMPLITUDE].value; /* still in DN, as the noise */
     line = isfinite(line) ? 0.5 * line * line / d->stacks->dark.count : 0.0;
-    double ramp = 0.5 * fabs(out->figures[BST_SENSOR_RAMP].value) / out->figures[BST_SENSOR_GAIN].value;
+    double ramp =
+        0.5 * fabs(out->figures[BST_SENSOR_RAMP].value) / out->figures[BST_SENSOR_GAIN].value;
     ramp = isfinite(ramp) ? ramp : 0.0;
-    const bst_dark_noise noise = {
-        (d->noise + line + ramp / d->stacks->dark.count) * per_s * per_s,
-        d->stacks->dark.exposure_s * d->stacks->dark.count};
+    const bst_dark_noise noise = {(d->noise + line + ramp / d->stacks->dark.count) * per_s * per_s,
+                                  d->stacks->dark.exposure_s * d->stacks->dark.count};
     bst_dark_distribution all, part;
     double percentiles[BST_SENSOR_PERCENTILES];
     percentiles_of(d, per_s, 0, 1, percentiles);
@@ -286,8 +286,9 @@ static void fit_distribution(dark_signal *d, double per_s) {
     for (int i = 0; i < VALUES; i++) {
         out->figures[figures[i]] =
             (bst_sensor_estimate){values[i], bst_mean_estimate(groups[i], GROUPS).sigma};
-        out->method[figures[i]] = "law of all pixels, fitted to the percentiles: hot pixels are not "
-                                  "separate from the others";
+        out->method[figures[i]] =
+            "law of all pixels, fitted to the percentiles: hot pixels are not "
+            "separate from the others";
     }
 }
 
@@ -355,8 +356,9 @@ static void fit_traps(dark_signal *d, double median) {
     bst_sensor_figures *out = d->out;
     double ramp = fabs(out->figures[BST_SENSOR_RAMP].value);
     double gain = out->figures[BST_SENSOR_GAIN].value;
-    bst_trap_fit_input input = {.gain_e_per_dn = gain,
-                                .background_e = gain * (median + (isfinite(ramp) ? 0.5 * ramp : 0.0))};
+    bst_trap_fit_input input = {
+        .gain_e_per_dn = gain,
+        .background_e = gain * (median + (isfinite(ramp) ? 0.5 * ramp : 0.0))};
     const bst_sensor_estimate *parallel = &out->trail.parallel, *serial = &out->trail.serial;
     bool ramp_up = !(out->figures[BST_SENSOR_RAMP].value < 0.0);
     out->traps.top = !ramp_up;
@@ -454,9 +456,9 @@ bst_status bst_sensor_measure_dark(bst_ctx *ctx, const bst_sensor_stacks *s,
     dark_signal d = {.stacks = s, .out = out};
     out->dark_map = d.map = malloc(pixels * sizeof *d.map);
     d.scratch = malloc(pixels * sizeof *d.scratch);
-    bst_status status =
-        d.map && d.scratch ? measure_all(ctx, &d)
-                           : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
+    bst_status status = d.map && d.scratch
+                            ? measure_all(ctx, &d)
+                            : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
     free(d.scratch);
     return status;
 }

@@ -56,8 +56,8 @@ typedef struct bst_sensor_figures {
     int64_t hot_found;
     double hot_limit_e_per_s;
     bst_charge_trail trail;
-    bst_trap_model traps;                  /* that leave the trails; none if they are not certain */
-    double trap_misfit[2];                 /* RMS of parallel and serial ones, shares of charge */
+    bst_trap_model traps;  /* that leave the trails; none if they are not certain */
+    double trap_misfit[2]; /* RMS of parallel and serial ones, shares of charge */
     bst_pick_up_line line;
     float *dark_map; /* [height][width] e-/s; NULL: none */
     float *prnu_map; /* [height][width] relative to 1; NULL: none */

@@ -48,7 +48,8 @@ static void noise_of_neighbours(const float *pixels, int width, int height, bool
 /* Subtracts a line through values with a certain slope. Returns its rise from the first to the last
  * value; NAN: none. */
 static bst_sensor_estimate subtract_line(double *values, int count) {
-    double middle = 0.5 * (count - 1), sxx = middle * (count + 1) * count / 6.0, b = 0.0, rest = 0.0;
+    double middle = 0.5 * (count - 1), sxx = middle * (count + 1) * count / 6.0, b = 0.0,
+           rest = 0.0;
     double mean = 0.0;
     for (int i = 0; i < count; i++) {
         mean += values[i] / count;
@@ -124,9 +125,8 @@ static void measure_level(const bst_frame_stack *bias, float *scratch, bst_senso
         bias->pairs > 0 ? bst_mean_estimate(bias->variance, BST_STACK_BLOCKS).value : 0.0;
     double row = bias->pairs > 0 ? fmax(bias->row_variance, 0.0) : 0.0;
     bst_sensor_estimate ramp = {NAN, NAN};
-    bst_sensor_estimate column =
-        offsets_of(bias->mean, bias->width, bias->height, true, pixel / n / bias->height, scratch,
-                   NULL);
+    bst_sensor_estimate column = offsets_of(bias->mean, bias->width, bias->height, true,
+                                            pixel / n / bias->height, scratch, NULL);
     bst_sensor_estimate fixed_row = offsets_of(bias->mean, bias->width, bias->height, false,
                                                pixel / n / bias->width + row / n, scratch, &ramp);
     if (isfinite(ramp.value)) { /* the level is that of the row that is read first */

@@ -47,11 +47,10 @@ static void model_trail(const bst_detector_traps_config *t, const bst_trap_fit_i
 
 /* Traps of the parameters: logarithms of densities and times, logit of the exponent. */
 static bst_detector_traps_config of_parameters(const double *x) {
-    return (bst_detector_traps_config){
-        .traps_per_px = {exp(x[0]), exp(x[1]), 0.0},
-        .release_px = {0.05 + exp(x[2]), 0.05 + exp(x[3]), 1.0},
-        .fill_exponent = 1.0 / (1.0 + exp(-x[4])),
-        .reference_e = REFERENCE_E};
+    return (bst_detector_traps_config){.traps_per_px = {exp(x[0]), exp(x[1]), 0.0},
+                                       .release_px = {0.05 + exp(x[2]), 0.05 + exp(x[3]), 1.0},
+                                       .fill_exponent = 1.0 / (1.0 + exp(-x[4])),
+                                       .reference_e = REFERENCE_E};
 }
 
 /* Squares of the differences of profile and sums, with weights (callback: cost), or without. */
