@@ -190,9 +190,8 @@ static bst_status enqueue_traps(bst_ctx *ctx, bst_readout *r, int kernel,
             q.release[q.kinds++] = (float)-expm1(-1.0 / t->release_px[i]);
         }
     }
-    size_t length = (size_t)(kernel == PARALLEL ? q.stride : q.height);
-    return enqueue_kernel(ctx, r, kernel, (arguments){&q, sizeof q, &r->image, 1},
-                          (length + 15) / 16);
+    size_t items = kernel == PARALLEL ? (size_t)q.stride / 64 : ((size_t)q.height + 15) / 16;
+    return enqueue_kernel(ctx, r, kernel, (arguments){&q, sizeof q, &r->image, 1}, items);
 }
 
 /* Parameters of the effects between pixels, without any. */
@@ -219,7 +218,7 @@ static bst_status enqueue_neighbours(bst_ctx *ctx, bst_readout *r, const bst_ker
     return BST_OK;
 }
 
-/* From collected charge to that which reaches the output. */
+/* From collected charge to the charge at the output. */
 static bst_status move_charge(bst_ctx *ctx, bst_readout *r, const bst_kernel_frame_params *p) {
     const bst_detector_config *d = &r->camera.detector;
     BST_TRY(enqueue_neighbours(ctx, r, p, d->brighter_fatter_per_e, 0.0));

@@ -17,17 +17,20 @@ __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_d
     global const float *row = from + (size_t)y * p.stride;
     global const float *below = y > 0 ? row - p.stride : row;
     global const float *above = y + 1 < p.height ? row + p.stride : row;
-    float before = row[0];
     for (int x = 0; x < p.width; x += 16) {
-        float16 q = vload16(0, row + x);
-        float after = x + 16 < p.width ? row[x + 16] : q.sf;
-        float16 left = (float16)(before, q.s01234567, q.s89ab, q.scd, q.se);
-        float16 right = (float16)(q.s12345678, q.s9abc, q.sde, q.sf, after);
-        right = select(right, q, lane + x + 1 >= p.width);
-        float16 sum = inflow(p, q, left) + inflow(p, q, right) + inflow(p, q, vload16(0, below + x)) +
-                      inflow(p, q, vload16(0, above + x));
+        float16 q = vload16(0, row + x), left, right;
+        if (x > 0 && x + 16 < p.width) {
+            left = vload16(0, row + x - 1);
+            right = vload16(0, row + x + 1);
+        } else {
+            left = (float16)(x > 0 ? row[x - 1] : q.s0, q.s01234567, q.s89ab, q.scd, q.se);
+            right = (float16)(q.s12345678, q.s9abc, q.sde, q.sf, q.sf);
+            right.sf = x + 16 < p.width ? row[x + 16] : q.sf;
+            right = select(right, q, lane + x + 1 >= p.width);
+        }
+        float16 down = vload16(0, below + x), up = vload16(0, above + x);
+        float16 sum = (inflow(p, q, left) + inflow(p, q, right)) + (inflow(p, q, down) + inflow(p, q, up));
         vstore16(fmax(q + sum, 0.0f), 0, to + (size_t)y * p.stride + x);
-        before = q.sf;
     }
 }
 

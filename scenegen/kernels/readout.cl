@@ -135,34 +135,38 @@ INLINE lanes gamma_turn(lanes n, lanes_uint word, lanes z, lanes_int *accepted) 
 
 /* Charge of 16 pixels behind a multiplication register, over its gain: the mean stays, the variance
  * of n electrons is n (1 - 1 / gain), their law a gamma distribution of shape n (Basden, Haniff and
- * Mackay 2003, MNRAS 345, 985). Fractions of an electron, which traps leave, are rounded at random.
- * stream: of the first turn; later ones have every fourth from there on. */
-static lanes multiply_charge(bst_kernel_frame_params p, uint counter, uint stream, lanes q) {
-    lanes_uint w0, w1, w2, w3;
-    philox_lanes(p, counter, stream, &w0, &w1, &w2, &w3);
-    lanes whole = floor(q), u = to_lanes(w3) * 0x1p-32f, out = (lanes)0.0f;
+ * Mackay 2003, MNRAS 345, 985). Fractions of an electron, which traps leave, are rounded at random,
+ * by the low bits of the first word. word, z: of the first turn; stream: of the second, later ones
+ * have every fourth from there on. */
+static lanes multiply_charge(bst_kernel_frame_params p, uint counter, uint stream, lanes_uint word,
+                             lanes z, lanes q) {
+    lanes whole = floor(q), u = to_lanes(word & 0xFFFFu) * 0x1p-16f, out = (lanes)0.0f;
     lanes n = fmax(whole + select((lanes)0.0f, (lanes)1.0f, MASK(u < q - whole)), 0.0f);
     lanes_int open = MASK(n > 0.0f);
     for (uint turn = 0u; any_of(open) && turn < 64u; turn++) {
-        lanes z, unused;
         lanes_int good;
-        if (turn > 0u) {
-            philox_lanes(p, counter, stream + 4u * turn, &w0, &w1, &w2, &w3);
-        }
-        normal_lanes(w0, w1, &z, &unused);
-        lanes drawn = gamma_turn(fmax(n, 1.0f), w2, z, &good);
+        lanes drawn = gamma_turn(fmax(n, 1.0f), word, z, &good);
         good &= open;
         out = select(out, fma(drawn - n, (lanes)p.multiply_rms, n), good);
         open &= ~good;
+        if (any_of(open)) {
+            lanes_uint w0, w1, unused;
+            lanes other;
+            philox_lanes(p, counter, stream + 4u * turn, &w0, &w1, &word, &unused);
+            normal_lanes(w0, w1, &z, &other);
+        }
     }
     return out;
 }
 
 INLINE chunk multiply_chunk(bst_kernel_frame_params p, uint counter, chunk q) {
-    q.a = multiply_charge(p, counter, STREAM_MULTIPLY, q.a);
-    q.b = multiply_charge(p, counter, STREAM_MULTIPLY + 1u, q.b);
-    q.c = multiply_charge(p, counter, STREAM_MULTIPLY + 2u, q.c);
-    q.d = multiply_charge(p, counter, STREAM_MULTIPLY + 3u, q.d);
+    chunk z = chunk_normal(chunk_random(p, counter, STREAM_MULTIPLY));
+    chunk_words w = chunk_random(p, counter, STREAM_MULTIPLY + 1u);
+    const uint next = STREAM_MULTIPLY + 2u;
+    q.a = multiply_charge(p, counter, next, w.a, z.a, q.a);
+    q.b = multiply_charge(p, counter, next + 1u, w.b, z.b, q.b);
+    q.c = multiply_charge(p, counter, next + 2u, w.c, z.c, q.c);
+    q.d = multiply_charge(p, counter, next + 3u, w.d, z.d, q.d);
     return q;
 }
 #endif

@@ -169,7 +169,7 @@ const bst_config_desc bst_detector_table[] = {
                "Edges of the frame that light does not reach; they have dark current."),
     BST_OBJECT(bst_detector_config, overscan, edges_table, "{}",
                "Edges of the frame that are no pixels of the sensor: they have no charge of their "
-               "own, but that which traps release; rows also gather dark current during read-out. "
+               "own, but traps release some there; rows also gather dark current during read-out. "
                "width_px and height_px include them."),
     BST_OBJECT(bst_detector_config, pick_up, pick_up_table, "{}",
                "Coherent pattern noise: a sine along the rows."),

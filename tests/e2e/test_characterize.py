@@ -113,7 +113,7 @@ class Characterize(unittest.TestCase):
                 self.assertAlmostEqual(found["value"], value, delta=found["high_95"] - found["low_95"], msg=(seed, key))
                 self.assertLess(found["high_95"] - found["low_95"], (0.5 if key == "readout_s" else 0.2) * abs(value), (seed, key))
             self.assertIs(given["detector/output/top"], True)
-            # density and time of fast traps cannot be told apart: the charge that they defer by a pixel or more, of a
+            # density and time of fast traps cannot be separated: the charge that they defer by a pixel or more, of a
             # packet of 10,000 e-. Some 150 hot pixels, whose charges differ threefold: 20 %; the exponent is hardly determined
             found = given["detector/parallel_traps"]
             deferred = sum(n * math.exp(-1 / t) for n, t in zip(found["traps_per_px"], found["release_px"]))
