@@ -212,8 +212,9 @@ void bst_generator_set_filters(bst_generator *g) {
     const bst_detector_config *d = &g->camera->detector;
     double variance = g->noise_e * g->noise_e;
     double columns = column_share(g, variance);
-    double rows =
-        (d->row_offset_rms_e * d->row_offset_rms_e + d->row_noise_e * d->row_noise_e) / variance;
+    double rows = (d->row_offset_rms_e * d->row_offset_rms_e + d->row_noise_e * d->row_noise_e +
+                   d->flicker_noise_e * d->flicker_noise_e) /
+                  variance;
     /* the alarm rate is not defined for offsets alone */
     g->white_share = fmax(1.0 - columns - rows, 0.05);
     for (int k = 0; k < 2; k++) {

@@ -186,7 +186,8 @@ static void set_noise(bst_generator *g, const bst_generator_frame *f) {
     double variance =
         level + c->read_noise_e * c->read_noise_e + c->gain_e_per_dn * c->gain_e_per_dn / 12.0 +
         d->row_noise_e * d->row_noise_e + d->row_offset_rms_e * d->row_offset_rms_e +
-        bst_generator_column_variance(g) +
+        d->flicker_noise_e * d->flicker_noise_e +
+        0.5 * d->pick_up.amplitude_e * d->pick_up.amplitude_e + bst_generator_column_variance(g) +
         d->telegraph_noise_fraction * d->telegraph_noise_rms_e * d->telegraph_noise_rms_e +
         level * level * d->prnu_rms * d->prnu_rms / added + added * uneven_dark * uneven_dark;
     g->background_e = level;

@@ -427,14 +427,15 @@ static bst_status process_exposure(scenegen *s, struct bst_step *step, const bst
     BST_TRY(bst_field_query(ctx, s->field, &track, e->start_tick, e->end_tick, s->tick_rate_hz,
                             e->window, &s->options, truth, &sources, &count));
     const struct bst_skylight_map *map = bst_field_background(s->field);
+    double dark_e = truth->dark_e - bst_camera_readout_e(s->camera); /* the detector adds that */
     bst_render_request request = {
         .window = e->window,
         .track = &track,
         .sources = sources,
         .count = count,
-        .background_e = (map ? 0.0 : truth->background_e) + truth->dark_e,
+        .background_e = (map ? 0.0 : truth->background_e) + dark_e,
         .background = map,
-        .dark_e = truth->dark_e,
+        .dark_e = dark_e,
         .row_time_s = s->camera->detector.row_time_s,
         .exposure_s = (double)(e->end_tick - e->start_tick) / (double)s->tick_rate_hz,
         .binning = e->binning,

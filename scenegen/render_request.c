@@ -29,6 +29,10 @@ static bst_window light_window(const bst_camera *camera, bst_window w) {
         w.y0 = 0;
         w.height = (int)camera->height_px;
     }
+    if (bst_detector_config_whole_sensor(&camera->detector)) {
+        w.x0 = 0;
+        w.width = (int)camera->width_px;
+    }
     return w;
 }
 

@@ -108,7 +108,7 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r) {
 
 bst_status bst_renderer_prepare(bst_ctx *ctx, bst_renderer *r) {
     BST_TRY(bst_scene_boxes_prepare(ctx, &r->boxes));
-    if (!bst_detector_whole_columns(r->detector)) {
+    if (!bst_detector_is_staged(r->detector)) {
         return build_frame(ctx, r);
     }
     BST_TRY(build_expected(ctx, r));
@@ -509,7 +509,7 @@ bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_r
     BST_TRY(bst_frame_pool_take(ctx, r->pool, request->window.width / binning,
                                 request->window.height / binning, &frame, &buffer));
     double exposure_s = bst_render_exposure_s(request);
-    bool staged = binning > 1 || bst_detector_whole_columns(r->detector);
+    bool staged = binning > 1 || bst_detector_is_staged(r->detector);
     bst_status status = staged ? BST_OK : build_frame(ctx, r);
     if (status == BST_OK) {
         status = begin_set(ctx, r);

@@ -79,8 +79,9 @@ typedef struct bst_render_request {
     double exposure_s; /* row exposure with row_time_s */
     const bst_scene_source *sources;
     int count;
-    double background_e; /* expected electrons per sensor pixel: sky and dark current */
-    double dark_e;       /* dark current part of it (replaced by a dark map, if there is one) */
+    /* expected electrons per sensor pixel: sky and dark current of the exposure */
+    double background_e;
+    double dark_e; /* dark current part of it (replaced by a dark map, if there is one) */
     /* varying background per sensor pixel, added to background_e; NULL: none. Only if
      * bst_skylight_may_vary. It covers the window, and its whole columns if charge or light moves
      * along them (bst_detector_config_whole_columns) */

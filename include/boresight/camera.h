@@ -275,6 +275,9 @@ double bst_camera_optics_e_per_s(const bst_camera *c);
 double bst_camera_background_e_per_s(const bst_camera *c);
 /* Mean dark current of a pixel at the detector's temperature, e-/s, without hot pixels and maps. */
 double bst_camera_dark_e_per_s(const bst_camera *c);
+/* Mean charge of a pixel that is gathered outside the exposure, e-: dark current during read-out
+ * and clock-induced charge, without hot pixels, maps and glow. */
+double bst_camera_readout_e(const bst_camera *c);
 
 #pragma GCC visibility pop
 

@@ -27,6 +27,45 @@ typedef struct bst_detector_quantisation_config {
     bool expand;     /* the frame has the mean converter number of each code instead of the code */
 } bst_detector_quantisation_config;
 
+/* Pixels at the edges of the frame: without light (shielded), or that no pixel of the sensor
+ * belongs to (overscan). */
+typedef struct bst_detector_edges_config {
+    int64_t left, right, bottom, top; /* columns, columns, rows, rows */
+} bst_detector_edges_config;
+
+/* Coherent pick-up: a sine in the order in which pixels are read. */
+typedef struct bst_detector_pick_up_config {
+    double amplitude_e, cycles_per_px, cycles_per_row;
+    double phase_deg; /* of pixel (0, 0); NAN: random in each frame */
+} bst_detector_pick_up_config;
+
+/* Light of the output amplifier, exp(-distance / scale). */
+typedef struct bst_detector_glow_config {
+    double peak_e; /* at the amplifier, per frame */
+    double scale_px, x_px, y_px;
+} bst_detector_glow_config;
+
+enum { BST_TRAP_SPECIES = 3 };
+/* Traps that charge packets pass on their way along columns or rows. */
+typedef struct bst_detector_traps_config {
+    double traps_per_px[BST_TRAP_SPECIES]; /* 0: no such species */
+    double release_px[BST_TRAP_SPECIES];   /* time constant, in transfers by a pixel */
+    double fill_exponent; /* traps that a packet meets grow with its charge to this power */
+    double reference_e;   /* charge of a packet that meets traps_per_px */
+} bst_detector_traps_config;
+
+/* Side of the frame that is read first. */
+typedef struct bst_detector_output_config {
+    bool right, top; /* the last column, the last row; otherwise column 0, row 0 */
+} bst_detector_output_config;
+
+/* Outputs that read equal parts of the rows at the same time. */
+typedef struct bst_detector_crosstalk_config {
+    int64_t outputs;
+    double coupling; /* share of an output's charge that each other output shows */
+    bool mirrored;   /* neighbouring parts are read in opposite directions */
+} bst_detector_crosstalk_config;
+
 typedef struct bst_detector_config {
     double temperature_c, reference_temperature_c, dark_doubling_k;
     double prnu_rms;
@@ -43,6 +82,17 @@ typedef struct bst_detector_config {
     int32_t saturation; /* BST_WELL_... */
     double frame_transfer_s;
     double row_time_s; /* rolling shutter */
+    bst_detector_output_config output;
+    double readout_s; /* time of the read-out, in which packets gather dark current */
+    double clock_induced_e;
+    double offset_noise_e, offset_drift_dn_per_frame, flicker_noise_e;
+    bst_detector_edges_config shielded, overscan;
+    bst_detector_pick_up_config pick_up;
+    bst_detector_glow_config glow;
+    bst_detector_traps_config parallel_traps, serial_traps;
+    double em_gain; /* 1 or less: no multiplication register */
+    double interpixel_coupling, brighter_fatter_per_e;
+    bst_detector_crosstalk_config crosstalk;
     bst_detector_cosmic_ray_config cosmic_rays;
     bst_detector_quantisation_config quantisation;
 } bst_detector_config;
@@ -53,13 +103,27 @@ extern const bst_config_desc bst_detector_table[];
  * dark_doubling_k; 1 for a block of zeros. */
 double bst_detector_dark_factor(const bst_detector_config *d);
 
-/* True if rendering needs whole columns of the sensor, because of blooming or frame transfer. */
+/* True if rendering needs whole columns of the sensor, because charge or light moves along them:
+ * blooming, frame transfer, traps, and effects that need the whole sensor. */
 bool bst_detector_config_whole_columns(const bst_detector_config *d);
+/* True if rendering needs the whole sensor, because charge also moves along rows, or pixels change
+ * their neighbours: traps of the serial register, crosstalk, coupling, brighter-fatter effect. */
+bool bst_detector_config_whole_sensor(const bst_detector_config *d);
+
+/* True if a direction has traps. */
+bool bst_detector_has_traps(const bst_detector_traps_config *t);
 
 /* Checks for effects that exclude each other.
  *
- * Errors:    BST_ERR_CONFIG, with the key: a rolling shutter beside frame transfer or blooming */
+ * Errors:    BST_ERR_CONFIG, with the key: a rolling shutter beside frame transfer, blooming or
+ *            traps of the columns */
 bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d) BST_MUST_CHECK;
+/* Checks edges and outputs against the size of the frame.
+ *
+ * Errors:    BST_ERR_CONFIG, with the key: no pixel is left between the edges, or the outputs do
+ *            not share the columns equally */
+bst_status bst_detector_config_check_size(bst_ctx *ctx, const bst_detector_config *d,
+                                          int64_t width_px, int64_t height_px) BST_MUST_CHECK;
 
 /* Rolling shutter: time from the exposure of a window's middle row to that of its first or last
  * row, s.

@@ -11,6 +11,7 @@ enum { MOST_HITS = 1000000, REACH = 20 };
 struct bst_cosmic_rays {
     bst_detector_cosmic_ray_config config;
     int width, height, stride;
+    bst_detector_edges_config overscan;
     bst_cosmic_rays_pixel *pixels;
     int count, capacity;
 };
@@ -30,6 +31,10 @@ bst_status bst_cosmic_rays_create(bst_ctx *ctx, const bst_detector_cosmic_ray_co
     return BST_OK;
 }
 
+void bst_cosmic_rays_set_overscan(bst_cosmic_rays *hits, const bst_detector_edges_config *edges) {
+    hits->overscan = *edges;
+}
+
 void bst_cosmic_rays_free(bst_cosmic_rays *hits) {
     if (hits) {
         free(hits->pixels);
@@ -39,7 +44,8 @@ void bst_cosmic_rays_free(bst_cosmic_rays *hits) {
 
 /* Adds a charge deposit to a pixel. */
 static bst_status add_pixel(bst_ctx *ctx, bst_cosmic_rays *h, int x, int y, double electrons) {
-    if (x < 0 || y < 0 || x >= h->width || y >= h->height || !(electrons > 0.0)) {
+    if (x < h->overscan.left || y < h->overscan.bottom || x >= h->width - h->overscan.right ||
+        y >= h->height - h->overscan.top || !(electrons > 0.0)) {
         return BST_OK;
     }
     if (h->count == h->capacity) {

@@ -28,6 +28,8 @@ typedef struct bst_cosmic_rays bst_cosmic_rays;
 bst_status bst_cosmic_rays_create(bst_ctx *ctx, const bst_detector_cosmic_ray_config *config,
                                   int width, int height, int stride,
                                   bst_cosmic_rays **out) BST_MUST_CHECK;
+/* Excludes edges of the frame that are no pixels of the sensor. */
+void bst_cosmic_rays_set_overscan(bst_cosmic_rays *hits, const bst_detector_edges_config *edges);
 /* Frees a generator of radiation hits; NULL is allowed. */
 void bst_cosmic_rays_free(bst_cosmic_rays *hits);
 

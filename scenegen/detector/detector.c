@@ -8,6 +8,7 @@
 
 #include "bst_scenegen_kernels.h"
 #include "scenegen/detector/fixed_pattern_noise.h"
+#include "scenegen/detector/readout_charge.h"
 #include "scenegen/kernels/scene_shared.h"
 #include "scenegen/scene_kernels.h"
 
@@ -18,12 +19,14 @@ struct bst_detector {
     int stride;         /* of the maps: sensor width rounded up to chunks of 64 */
     cl_context context;
     cl_command_queue queue;
-    cl_mem gain, dark, overlay, offsets, codes, flags;
+    cl_mem gain, dark, overlay, offsets, codes, flags, readout;
     cl_mem deposits; /* of the current frame; lent */
     cl_kernel deposit_kernel;
     bst_cosmic_rays *hits;
     bst_cosmic_rays_summary summary;
-    float *rows; /* row offsets, fixed and of the frame, DN: [2][height] */
+    /* DN: fixed row offsets; those of the frame, and its pick-up by row: amplitudes of the cosines
+     * and sines of the columns: [4][height] */
+    float *rows;
 };
 
 double bst_detector_near_full_e(double full_well_e) {
@@ -34,12 +37,24 @@ bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name)
     return bst_rng_make_key(camera->detector.fixed_pattern_seed, 0, name, "pattern");
 }
 
-bool bst_detector_whole_columns(const bst_detector *detector) {
-    return bst_detector_config_whole_columns(&detector->camera.detector);
+/* True if the camera multiplies charge before it is read. */
+static bool multiplies(const bst_camera *c) {
+    return c->detector.em_gain > 1.0;
+}
+
+bool bst_detector_is_staged(const bst_detector *detector) {
+    return bst_detector_config_whole_columns(&detector->camera.detector) ||
+           multiplies(&detector->camera);
+}
+
+/* True if offsets are new in every frame. */
+static bool has_frame_offsets(const bst_detector_config *d) {
+    return d->row_noise_e > 0.0 || d->flicker_noise_e > 0.0 || d->offset_noise_e > 0.0 ||
+           d->offset_drift_dn_per_frame != 0.0 || d->pick_up.amplitude_e > 0.0;
 }
 
 static bool has_offsets(const bst_detector_config *d) {
-    return d->column_offset_rms_e > 0.0 || d->row_offset_rms_e > 0.0 || d->row_noise_e > 0.0;
+    return d->column_offset_rms_e > 0.0 || d->row_offset_rms_e > 0.0 || has_frame_offsets(d);
 }
 
 /* True if the amplifier's nonlinearity changes the read noise's share of the variance by more than
@@ -56,7 +71,9 @@ static bool has_tail(const bst_camera *c) {
 }
 
 const char *bst_detector_tail_options(const bst_camera *camera) {
-    return has_tail(camera) ? " -DTAIL" : "";
+    static const char *const options[2][2] = {{"", " -DMULTIPLY"},
+                                              {" -DTAIL", " -DTAIL -DMULTIPLY"}};
+    return options[has_tail(camera)][multiplies(camera)];
 }
 
 /* BST_EFFECT_... of the camera. */
@@ -70,7 +87,8 @@ static int effects_of(const bst_detector *detector) {
            (detector->offsets ? BST_EFFECT_OFFSETS : 0) | (detector->codes ? BST_EFFECT_CODES : 0) |
            (d->saturation == BST_WELL_BLOOM ? BST_EFFECT_BLOOM : 0) |
            (d->frame_transfer_s > 0.0 ? BST_EFFECT_TRANSFER : 0) |
-           (detector->flags ? BST_EFFECT_FLAGS : 0);
+           (detector->flags ? BST_EFFECT_FLAGS : 0) | (detector->readout ? BST_EFFECT_READOUT : 0) |
+           (d->pick_up.amplitude_e > 0.0 ? BST_EFFECT_PICK_UP : 0);
 }
 
 void bst_detector_options(const bst_detector *detector, bool shared, char *text, size_t bytes) {
@@ -103,6 +121,8 @@ void bst_detector_params(const bst_detector *detector, bst_kernel_frame_params *
         p->tail_rms_e = (float)d->telegraph_noise_rms_e;
     }
     p->transfer_row_s = (float)(d->frame_transfer_s / (double)c->height_px);
+    p->offsets_rows = detector->stride * (d->pick_up.amplitude_e > 0.0 ? 3 : 1);
+    p->multiply_rms = multiplies(c) ? (float)sqrt(1.0 - 1.0 / d->em_gain) : 0.0f;
 }
 
 static bst_status make_buffer(bst_ctx *ctx, bst_detector *d, size_t bytes, const void *data,
@@ -128,17 +148,24 @@ static bst_status make_map(bst_ctx *ctx, bst_detector *d,
     return status;
 }
 
-/* Fixed column and row offsets on the device. */
+/* Fixed column and row offsets on the device, and the waves of the pick-up by column. */
 static bst_status make_offsets(bst_ctx *ctx, bst_detector *d) {
-    size_t height = (size_t)d->camera.height_px, count = (size_t)d->stride + height;
+    bool pick_up = d->camera.detector.pick_up.amplitude_e > 0.0;
+    size_t height = (size_t)d->camera.height_px, stride = (size_t)d->stride;
+    size_t first = stride * (pick_up ? 3 : 1), count = first + height * (pick_up ? 3 : 1);
     float *offsets = calloc(count, sizeof *offsets);
-    d->rows = calloc(2 * height, sizeof *d->rows);
+    d->rows = calloc(4 * height, sizeof *d->rows);
     bst_status status = BST_ERR_MEMORY;
     if (offsets && d->rows) {
+        for (size_t x = 0; pick_up && x < stride; x++) {
+            double turns = d->camera.detector.pick_up.cycles_per_px * (double)x;
+            offsets[stride + x] = (float)cos(2.0 * BST_PI * turns);
+            offsets[2 * stride + x] = (float)sin(2.0 * BST_PI * turns);
+        }
         bst_fixed_pattern_noise_offsets(&d->camera, d->pattern, "columns", (int)d->camera.width_px,
                                         offsets);
         bst_fixed_pattern_noise_offsets(&d->camera, d->pattern, "rows", (int)height, d->rows);
-        memcpy(offsets + d->stride, d->rows, height * sizeof *offsets);
+        memcpy(offsets + first, d->rows, height * sizeof *offsets);
         status = make_buffer(ctx, d, count * sizeof *offsets, offsets, &d->offsets);
     } else {
         status = bst_fail(ctx, status, "no memory for the offsets of columns and rows");
@@ -169,6 +196,9 @@ static bst_status make_all(bst_ctx *ctx, bst_device *device, bst_detector *d) {
     if (bst_fixed_pattern_noise_has_dark(&d->camera)) {
         BST_TRY(make_map(ctx, d, bst_fixed_pattern_noise_dark, &d->dark));
     }
+    if (bst_readout_charge_is_on(c)) {
+        BST_TRY(make_map(ctx, d, bst_readout_charge_map, &d->readout));
+    }
     if (has_offsets(c)) {
         BST_TRY(make_offsets(ctx, d));
     }
@@ -179,6 +209,7 @@ static bst_status make_all(bst_ctx *ctx, bst_device *device, bst_detector *d) {
         BST_TRY(make_map(ctx, d, NULL, &d->overlay));
         BST_TRY(bst_cosmic_rays_create(ctx, &c->cosmic_rays, (int)d->camera.width_px,
                                        (int)d->camera.height_px, d->stride, &d->hits));
+        bst_cosmic_rays_set_overscan(d->hits, &c->overscan);
         static const bst_device_kernel_source *const sources[] = {&bst_kernel_scene_shared,
                                                                   &bst_kernel_cosmic_rays};
         BST_TRY(bst_scene_kernel(ctx, device, sources, 2, "-cl-std=CL1.2", "bst_detector_deposit",
@@ -216,7 +247,7 @@ void bst_detector_free(bst_detector *d) {
     if (!d) {
         return;
     }
-    cl_mem buffers[] = {d->gain, d->dark, d->overlay, d->offsets, d->codes, d->flags};
+    cl_mem buffers[] = {d->gain, d->dark, d->overlay, d->offsets, d->codes, d->flags, d->readout};
     for (size_t i = 0; i < sizeof buffers / sizeof *buffers; i++) {
         if (buffers[i]) {
             clReleaseMemObject(buffers[i]);
@@ -250,6 +281,7 @@ void bst_detector_buffers(const bst_detector *d, cl_mem out[BST_DETECTOR_BUFFERS
     out[3] = d->offsets;
     out[4] = d->codes;
     out[5] = d->flags;
+    out[6] = d->readout;
 }
 
 /* Adds the exposure's cosmic-ray deposits to the overlay (sign 1), or sets their pixels to 0 (sign
@@ -287,8 +319,11 @@ static bst_status begin_hits(bst_ctx *ctx, bst_detector *d, bst_upload_ring *sta
 /* Row offsets of an exposure that threads draw. */
 typedef struct rows_to_draw {
     const float *fixed;
-    float *sum;
-    double rms;
+    float *sum; /* then the pick-up's amplitudes by row */
+    int height;
+    double rms, level;           /* DN */
+    double amplitude;            /* of the pick-up, DN */
+    double phase, phase_per_row; /* turns */
     bst_rng_key key;
     uint64_t exposure;
 } rows_to_draw;
@@ -297,27 +332,78 @@ typedef struct rows_to_draw {
 static void draw_rows(void *user, int begin, int end) {
     const rows_to_draw *all = user;
     for (int y = begin; y < end; y++) {
-        double z = bst_rng_normal(all->key, all->exposure, (uint64_t)y);
-        all->sum[y] = all->fixed[y] + (float)(all->rms * z);
+        double z = all->rms > 0.0 ? bst_rng_normal(all->key, all->exposure, (uint64_t)y) : 0.0;
+        all->sum[y] = all->fixed[y] + (float)(all->level + all->rms * z);
+        if (all->amplitude > 0.0) {
+            double angle = 2.0 * BST_PI * (all->phase + all->phase_per_row * y);
+            all->sum[all->height + y] = (float)(all->amplitude * sin(angle));
+            all->sum[2 * all->height + y] = (float)(all->amplitude * cos(angle));
+        }
     }
 }
 
-/* Draws and uploads the row offsets of an exposure. */
-static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage, bst_rng_key key,
+/* Time constants of the 1/f noise, in rows, each four times the one before: in between their sum
+ * falls as 1/f within 6 % (Lorentzians of equal variance; Milotti 2002, arXiv physics/0204033). */
+enum { FLICKER_TERMS = 6 };
+
+/* Adds 1/f noise of the level to rows: first-order Markov processes that are stationary from row 0
+ * on. */
+static void add_flicker(const rows_to_draw *rows, double rms, bst_rng_key key) {
+    double state[FLICKER_TERMS] = {0}, decay[FLICKER_TERMS], share = rms / sqrt(FLICKER_TERMS);
+    for (int k = 0; k < FLICKER_TERMS; k++) {
+        decay[k] = exp(-1.0 / pow(4.0, k));
+    }
+    for (int y = 0; y < rows->height; y++) {
+        double sum = 0.0;
+        for (int k = 0; k < FLICKER_TERMS; k++) {
+            uint64_t draw = (uint64_t)y * FLICKER_TERMS + (uint64_t)k;
+            double z = bst_rng_normal(key, rows->exposure, draw);
+            state[k] = y == 0 ? z : decay[k] * state[k] + sqrt(1.0 - decay[k] * decay[k]) * z;
+            sum += state[k];
+        }
+        rows->sum[y] += (float)(share * sum);
+    }
+}
+
+/* Draws and uploads level and row offsets of an exposure, and the pick-up by row. */
+static bst_status begin_rows(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage, uint64_t run,
                              int64_t exposure_id) {
-    size_t height = (size_t)d->camera.height_px, bytes = height * sizeof(float);
+    const bst_detector_config *c = &d->camera.detector;
+    double per_e = 1.0 / d->camera.gain_e_per_dn;
+    size_t height = (size_t)d->camera.height_px;
+    size_t first = (size_t)d->stride, bytes = height * sizeof(float);
     float *sum = d->rows + height;
     enum { AT_ONCE = 512 };
-    rows_to_draw rows = {d->rows, sum, d->camera.detector.row_noise_e / d->camera.gain_e_per_dn,
-                         key, (uint64_t)exposure_id};
+    rows_to_draw rows = {.fixed = d->rows,
+                         .sum = sum,
+                         .height = (int)height,
+                         .rms = c->row_noise_e / d->camera.gain_e_per_dn,
+                         .level = c->offset_drift_dn_per_frame * (double)exposure_id,
+                         .key = bst_rng_make_key(run, 0, "detector", "row_noise"),
+                         .exposure = (uint64_t)exposure_id};
+    bst_rng_key level = bst_rng_make_key(run, 0, "detector", "level");
+    if (c->offset_noise_e > 0.0) {
+        rows.level += c->offset_noise_e * per_e * bst_rng_normal(level, rows.exposure, 0);
+    }
+    if (c->pick_up.amplitude_e > 0.0) {
+        first *= 3;
+        bytes *= 3;
+        rows.amplitude = c->pick_up.amplitude_e * per_e;
+        rows.phase_per_row = c->pick_up.cycles_per_row;
+        rows.phase = isfinite(c->pick_up.phase_deg) ? c->pick_up.phase_deg / 360.0
+                                                    : bst_rng_uniform(level, rows.exposure, 1);
+    }
     bst_parallel_for(d->pool, (int)height, AT_ONCE, draw_rows, &rows);
+    if (c->flicker_noise_e > 0.0) {
+        add_flicker(&rows, c->flicker_noise_e * per_e,
+                    bst_rng_make_key(run, 0, "detector", "flicker"));
+    }
     cl_mem sent;
     BST_TRY(bst_upload_ring_put(ctx, stage, BST_STAGE_ROWS, sum, bytes, &sent));
-    return bst_device_check(
-        ctx,
-        clEnqueueCopyBuffer(d->queue, sent, d->offsets, 0, (size_t)d->stride * sizeof(float), bytes,
-                            0, NULL, NULL),
-        "sending the rows' offsets");
+    return bst_device_check(ctx,
+                            clEnqueueCopyBuffer(d->queue, sent, d->offsets, 0,
+                                                first * sizeof(float), bytes, 0, NULL, NULL),
+                            "sending the rows' offsets");
 }
 
 bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage,
@@ -330,9 +416,8 @@ bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_upload_ring *st
         BST_TRY(begin_hits(ctx, d, stage, bst_rng_make_key(run, 0, "detector", "hits"), exposure_id,
                            exposure_s + c->cosmic_rays.readout_s));
     }
-    if (c->row_noise_e > 0.0) {
-        BST_TRY(begin_rows(ctx, d, stage, bst_rng_make_key(run, 0, "detector", "row_noise"),
-                           exposure_id));
+    if (has_frame_offsets(c)) {
+        BST_TRY(begin_rows(ctx, d, stage, run, exposure_id));
     }
     return BST_OK;
 }

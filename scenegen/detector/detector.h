@@ -13,7 +13,7 @@
 #include "sim/core/parallel.h"
 #include "sim/device/device.h"
 
-enum { BST_DETECTOR_BUFFERS = 6 };
+enum { BST_DETECTOR_BUFFERS = 7 };
 
 typedef struct bst_detector bst_detector;
 
@@ -47,15 +47,17 @@ bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name)
  *   read noise >= 0.75 e-   means from 30 e- on, to 1/sigma^4
  *   below                   never: single electrons are resolved */
 void bst_detector_options(const bst_detector *detector, bool shared, char *text, size_t bytes);
-/* Build options of kernels/read_tail.cl, each preceded by a space. */
+/* Build options of kernels/read_tail.cl and of a multiplication register, each preceded by a
+ * space. */
 const char *bst_detector_tail_options(const bst_camera *camera);
 /* Sets the detector's parameters of the kernels, from `effects` on. */
 void bst_detector_params(const bst_detector *detector, bst_kernel_frame_params *params);
 
-/* True if a frame needs the light of whole columns (blooming, frame transfer). */
-bool bst_detector_whole_columns(const bst_detector *detector);
+/* True if frames pass the staged read-out (readout.h): effects between pixels, multiplication of
+ * charge. */
+bool bst_detector_is_staged(const bst_detector *detector);
 
-/* Prepares the per-exposure effects: cosmic rays and row offsets. */
+/* Prepares the per-exposure effects: cosmic rays, level, row offsets, phases of the pick-up. */
 bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *detector, bst_upload_ring *stage,
                               bst_rng_key key, int64_t exposure_id,
                               double exposure_s) BST_MUST_CHECK;
@@ -67,7 +69,7 @@ bst_status bst_detector_end(bst_ctx *ctx, bst_detector *detector) BST_MUST_CHECK
 bst_cosmic_rays_summary bst_detector_hits(const bst_detector *detector);
 
 /* Kernel buffers, NULL if the effect is off: gain, dark, overlay, offsets,
- * codes, saturation flags of the frame. */
+ * codes, saturation flags of the frame, charge gathered outside the exposure. */
 void bst_detector_buffers(const bst_detector *detector, cl_mem out[BST_DETECTOR_BUFFERS]);
 
 /* Enables saturation flags. Call it before bst_detector_params and bst_detector_options. */

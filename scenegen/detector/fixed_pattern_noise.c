@@ -21,15 +21,33 @@ enum {
     DRAW_ROW_OFFSET
 };
 
+static bool has_edges(const bst_detector_edges_config *e) {
+    return e->left > 0 || e->right > 0 || e->bottom > 0 || e->top > 0;
+}
+
+/* Sets the pixels at the edges of a map to 0. */
+static void clear_edges(const bst_camera *camera, const bst_detector_edges_config *e, int stride,
+                        float *map) {
+    for (int y = 0; y < camera->height_px; y++) {
+        bool row = y < e->bottom || y >= camera->height_px - e->top;
+        for (int x = 0; x < camera->width_px; x++) {
+            if (row || x < e->left || x >= camera->width_px - e->right) {
+                map[(size_t)y * (size_t)stride + (size_t)x] = 0.0f;
+            }
+        }
+    }
+}
+
 bool bst_fixed_pattern_noise_has_gain(const bst_camera *camera) {
     const bst_detector_config *d = &camera->detector;
-    return d->prnu_rms > 0.0 || d->prnu_map[0] || d->dead_fraction > 0.0 || d->bad_columns > 0;
+    return d->prnu_rms > 0.0 || d->prnu_map[0] || d->dead_fraction > 0.0 || d->bad_columns > 0 ||
+           has_edges(&d->shielded) || has_edges(&d->overscan);
 }
 
 bool bst_fixed_pattern_noise_has_dark(const bst_camera *camera) {
     const bst_detector_config *d = &camera->detector;
     return (d->dsnu_rms > 0.0 && camera->dark_current_e_per_s > 0.0) || d->dark_map[0] ||
-           d->hot_fraction > 0.0;
+           d->hot_fraction > 0.0 || (has_edges(&d->overscan) && camera->dark_current_e_per_s > 0.0);
 }
 
 /* Loads a FITS map of the sensor's size, finite and not negative, scaled by `factor`. */
@@ -90,6 +108,8 @@ bst_status bst_fixed_pattern_noise_gain(bst_ctx *ctx, const bst_camera *camera, 
             gain[(size_t)y * (size_t)stride + (size_t)x] = 0.0f;
         }
     }
+    clear_edges(camera, &d->shielded, stride, gain);
+    clear_edges(camera, &d->overscan, stride, gain);
     return BST_OK;
 }
 
@@ -118,6 +138,7 @@ bst_status bst_fixed_pattern_noise_dark(bst_ctx *ctx, const bst_camera *camera, 
             }
         }
     }
+    clear_edges(camera, &d->overscan, stride, dark);
     return BST_OK;
 }
 

@@ -7,19 +7,20 @@
 #include "boresight/camera.h"
 #include "boresight/rng.h"
 
-/* True if pixels differ in response: PRNU, a map, dead pixels or bad columns. */
+/* True if pixels differ in response: PRNU, a map, dead pixels, bad columns, shielded edges or
+ * overscan. */
 bool bst_fixed_pattern_noise_has_gain(const bst_camera *camera);
-/* True if pixels differ in dark current: DSNU, a map, or hot pixels. */
+/* True if pixels differ in dark current: DSNU, a map, hot pixels, or overscan. */
 bool bst_fixed_pattern_noise_has_dark(const bst_camera *camera);
 
 /* Pixel response map (PRNU), [height][stride], stride >= width: 1 + prnu_rms z, at least 0, or
- * prnu_map; 0 in dead pixels and bad columns. */
+ * prnu_map; 0 in dead pixels, bad columns, shielded edges and overscan. */
 bst_status bst_fixed_pattern_noise_gain(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
                                         int stride, float *gain) BST_MUST_CHECK;
 
 /* Dark current map (DSNU) at the detector's temperature, e-/s, [height][stride]: log-normal with
  * mean dark_current_e_per_s and relative RMS dsnu_rms, or dark_map; plus hot pixels, log-normal
- * about their median. */
+ * about their median; 0 in the overscan. */
 bst_status bst_fixed_pattern_noise_dark(bst_ctx *ctx, const bst_camera *camera, bst_rng_key key,
                                         int stride, float *dark) BST_MUST_CHECK;
 

@@ -1,13 +1,14 @@
 #include "scenegen/detector/readout.h"
 
 #include <assert.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "bst_scenegen_kernels.h"
 #include "scenegen/scene_kernels.h"
 
-enum { TRANSFER, CHARGE, BLOOM, READ, KERNELS };
+enum { TRANSFER, CHARGE, BLOOM, READ, NEIGHBOURS, PARALLEL, SERIAL, CROSSTALK, KERNELS };
 
 struct bst_readout {
     bst_camera camera;
@@ -22,22 +23,49 @@ struct bst_readout {
 /* True if the camera needs a kernel of the staged read-out. */
 static bool wanted(const bst_readout *r, int kernel) {
     const bst_detector_config *d = &r->camera.detector;
-    return kernel == TRANSFER ? d->frame_transfer_s > 0.0
-                              : kernel != BLOOM || d->saturation == BST_WELL_BLOOM;
+    switch (kernel) {
+        case TRANSFER:
+            return d->frame_transfer_s > 0.0;
+        case BLOOM:
+            return d->saturation == BST_WELL_BLOOM;
+        case NEIGHBOURS:
+            return d->interpixel_coupling > 0.0 || d->brighter_fatter_per_e > 0.0;
+        case PARALLEL:
+            return bst_detector_has_traps(&d->parallel_traps);
+        case SERIAL:
+            return bst_detector_has_traps(&d->serial_traps);
+        case CROSSTALK:
+            return d->crosstalk.outputs > 1 && d->crosstalk.coupling != 0.0;
+        default:
+            return true;
+    }
+}
+
+/* True if a step needs a second image. */
+static bool needs_over(const bst_readout *r) {
+    return wanted(r, BLOOM) || wanted(r, NEIGHBOURS);
 }
 
 bst_status bst_readout_prepare(bst_ctx *ctx, bst_readout *r) {
-    static const char *const names[KERNELS] = {"bst_detector_transfer", "bst_detector_charge",
-                                               "bst_detector_bloom", "bst_detector_read"};
-    static const bst_device_kernel_source *const sources[] = {
+    static const char *const names[KERNELS] = {"bst_detector_transfer",   "bst_detector_charge",
+                                               "bst_detector_bloom",      "bst_detector_read",
+                                               "bst_detector_neighbours", "bst_detector_parallel",
+                                               "bst_detector_serial",     "bst_detector_crosstalk"};
+    static const bst_device_kernel_source *const staged[] = {
         &bst_kernel_scene_shared, &bst_kernel_lanes,    &bst_kernel_random,   &bst_kernel_chunk,
         &bst_kernel_read_tail,    &bst_kernel_detector, &bst_kernel_store_dn, &bst_kernel_readout};
+    static const bst_device_kernel_source *const moving[] = {
+        &bst_kernel_scene_shared, &bst_kernel_lanes, &bst_kernel_charge_transfer,
+        &bst_kernel_charge_coupling};
     char options[64];
     snprintf(options, sizeof options, "-cl-std=CL1.2%s", bst_detector_tail_options(&r->camera));
     for (int i = 0; i < KERNELS; i++) {
         if (wanted(r, i) && !r->kernels[i]) {
-            BST_TRY(bst_scene_kernel(ctx, r->device, sources, sizeof sources / sizeof *sources,
-                                     options, names[i], &r->kernels[i]));
+            BST_TRY(i <= READ
+                        ? bst_scene_kernel(ctx, r->device, staged, sizeof staged / sizeof *staged,
+                                           options, names[i], &r->kernels[i])
+                        : bst_scene_kernel(ctx, r->device, moving, sizeof moving / sizeof *moving,
+                                           "-cl-std=CL1.2", names[i], &r->kernels[i]));
         }
     }
     return BST_OK;
@@ -85,7 +113,11 @@ bst_window bst_readout_light_window(const bst_readout *r, bst_window window) {
     bst_window light = window;
     light.x0 = window.x0 / 64 * 64;
     light.width = window.x0 + window.width - light.x0;
-    if (wanted(r, TRANSFER) || wanted(r, BLOOM)) {
+    if (bst_detector_config_whole_sensor(&r->camera.detector)) {
+        light.x0 = 0;
+        light.width = (int)r->camera.width_px;
+    }
+    if (bst_detector_config_whole_columns(&r->camera.detector)) {
         light.y0 = 0;
         light.height = (int)r->camera.height_px;
     }
@@ -103,7 +135,7 @@ bst_status bst_readout_image(bst_ctx *ctx, bst_readout *r, bst_window light, cl_
     size_t bytes = (size_t)*stride * (size_t)light.height * sizeof(float);
     if (bytes > r->bytes) {
         cl_mem *buffers[2] = {&r->image, &r->over};
-        for (int i = 0; i < (wanted(r, BLOOM) ? 2 : 1); i++) {
+        for (int i = 0; i < (needs_over(r) ? 2 : 1); i++) {
             if (*buffers[i]) {
                 clReleaseMemObject(*buffers[i]);
             }
@@ -117,20 +149,99 @@ bst_status bst_readout_image(bst_ctx *ctx, bst_readout *r, bst_window light, cl_
     return BST_OK;
 }
 
-/* Enqueues a kernel whose arguments are the frame parameters and buffers. */
-static bst_status enqueue_kernel(bst_ctx *ctx, bst_readout *r, int kernel,
-                                 const bst_kernel_frame_params *p, const cl_mem *buffers,
-                                 cl_uint count, size_t items) {
+/* Arguments of a kernel: parameters, and then buffers. */
+typedef struct arguments {
+    const void *params;
+    size_t bytes;
+    const cl_mem *buffers;
+    cl_uint count;
+} arguments;
+
+/* Enqueues a kernel with a number of work-items. */
+static bst_status enqueue_kernel(bst_ctx *ctx, bst_readout *r, int kernel, arguments a,
+                                 size_t items) {
     cl_kernel k = r->kernels[kernel];
     const size_t local = BST_READOUT_GROUP, global = (items + local - 1) / local * local;
-    BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 0, sizeof *p, p), "setting a kernel argument"));
-    for (cl_uint i = 0; i < count; i++) {
-        BST_TRY(bst_device_check(ctx, clSetKernelArg(k, i + 1, sizeof(cl_mem), &buffers[i]),
+    BST_TRY(bst_device_check(ctx, clSetKernelArg(k, 0, a.bytes, a.params),
+                             "setting a kernel argument"));
+    for (cl_uint i = 0; i < a.count; i++) {
+        BST_TRY(bst_device_check(ctx, clSetKernelArg(k, i + 1, sizeof(cl_mem), &a.buffers[i]),
                                  "setting a kernel argument"));
     }
     return bst_device_check(
         ctx, clEnqueueNDRangeKernel(r->queue, k, 1, NULL, &global, &local, 0, NULL, NULL),
         "reading a frame out");
+}
+
+/* Traps of one direction, for an image of `p`. */
+static bst_status enqueue_traps(bst_ctx *ctx, bst_readout *r, int kernel,
+                                const bst_kernel_frame_params *p) {
+    const bst_detector_config *d = &r->camera.detector;
+    const bst_detector_traps_config *t = kernel == PARALLEL ? &d->parallel_traps : &d->serial_traps;
+    bst_kernel_trap_params q = {.width = kernel == PARALLEL ? p->light_stride : p->sensor_width,
+                                .height = p->light_height,
+                                .stride = p->light_stride,
+                                .backwards = kernel == PARALLEL ? d->output.top : d->output.right};
+    q.exponent = (float)t->fill_exponent;
+    for (int i = 0; i < BST_TRAP_SPECIES; i++) {
+        if (t->traps_per_px[i] > 0.0) {
+            double reference = pow(t->reference_e, t->fill_exponent);
+            q.density[q.kinds] = (float)(t->traps_per_px[i] / reference);
+            q.release[q.kinds++] = (float)-expm1(-1.0 / t->release_px[i]);
+        }
+    }
+    size_t items = kernel == PARALLEL ? (size_t)q.stride / 64 : ((size_t)q.height + 15) / 16;
+    return enqueue_kernel(ctx, r, kernel, (arguments){&q, sizeof q, &r->image, 1}, items);
+}
+
+/* Parameters of the effects between pixels, without any. */
+static bst_kernel_coupling_params coupling_params(const bst_kernel_frame_params *p) {
+    return (bst_kernel_coupling_params){.width = p->sensor_width,
+                                        .height = p->light_height,
+                                        .stride = p->light_stride,
+                                        .outputs = 1};
+}
+
+/* Borders that charge moves, or coupling of neighbours; afterwards r->image has the result. */
+static bst_status enqueue_neighbours(bst_ctx *ctx, bst_readout *r, const bst_kernel_frame_params *p,
+                                     double shift, double coupling) {
+    if (!(shift > 0.0) && !(coupling > 0.0)) {
+        return BST_OK;
+    }
+    bst_kernel_coupling_params q = coupling_params(p);
+    q.shift = (float)shift;
+    q.coupling = (float)coupling;
+    cl_mem b[] = {r->image, r->over};
+    BST_TRY(enqueue_kernel(ctx, r, NEIGHBOURS, (arguments){&q, sizeof q, b, 2}, (size_t)q.height));
+    r->image = b[1];
+    r->over = b[0];
+    return BST_OK;
+}
+
+/* From collected charge to the charge at the output. */
+static bst_status move_charge(bst_ctx *ctx, bst_readout *r, const bst_kernel_frame_params *p) {
+    const bst_detector_config *d = &r->camera.detector;
+    BST_TRY(enqueue_neighbours(ctx, r, p, d->brighter_fatter_per_e, 0.0));
+    if (wanted(r, BLOOM)) {
+        cl_mem b[] = {r->image, r->over};
+        BST_TRY(enqueue_kernel(ctx, r, BLOOM, (arguments){p, sizeof *p, b, 2},
+                               (size_t)p->light_stride / 16));
+    }
+    for (int kernel = PARALLEL; kernel <= SERIAL; kernel++) {
+        if (wanted(r, kernel)) {
+            BST_TRY(enqueue_traps(ctx, r, kernel, p));
+        }
+    }
+    BST_TRY(enqueue_neighbours(ctx, r, p, 0.0, d->interpixel_coupling));
+    if (wanted(r, CROSSTALK)) {
+        bst_kernel_coupling_params q = coupling_params(p);
+        q.outputs = (int)d->crosstalk.outputs;
+        q.mirrored = d->crosstalk.mirrored;
+        q.crosstalk = (float)d->crosstalk.coupling;
+        BST_TRY(enqueue_kernel(ctx, r, CROSSTALK, (arguments){&q, sizeof q, &r->image, 1},
+                               (size_t)q.height));
+    }
+    return BST_OK;
 }
 
 bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *detector,
@@ -152,15 +263,13 @@ bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *det
     size_t columns = (size_t)p.light_stride, rows = (size_t)p.light_height;
     if (wanted(r, TRANSFER)) {
         cl_mem b[] = {r->image, maps[0]};
-        BST_TRY(enqueue_kernel(ctx, r, TRANSFER, &p, b, 2, columns / 64));
+        BST_TRY(enqueue_kernel(ctx, r, TRANSFER, (arguments){&p, sizeof p, b, 2}, columns / 64));
     }
-    cl_mem charge[] = {r->image, maps[0], maps[1], maps[2]};
-    BST_TRY(enqueue_kernel(ctx, r, CHARGE, &p, charge, 4, rows));
-    if (wanted(r, BLOOM)) {
-        cl_mem b[] = {r->image, r->over};
-        BST_TRY(enqueue_kernel(ctx, r, BLOOM, &p, b, 2, columns / 16));
-    }
+    cl_mem charge[] = {r->image, maps[0], maps[1], maps[2], maps[6]};
+    BST_TRY(enqueue_kernel(ctx, r, CHARGE, (arguments){&p, sizeof p, charge, 5}, rows));
+    BST_TRY(move_charge(ctx, r, &p));
     p.per_full_well /= (float)(binning * binning);
     cl_mem read[] = {r->image, frame, saturated, maps[3], maps[4], maps[5]};
-    return enqueue_kernel(ctx, r, READ, &p, read, 6, (size_t)p.window_height);
+    return enqueue_kernel(ctx, r, READ, (arguments){&p, sizeof p, read, 6},
+                          (size_t)p.window_height);
 }

@@ -1,5 +1,6 @@
-/* Staged read-out (kernels/readout.cl) for blooming, frame transfer and binning: from an image of
- * the sources' light to the frame. */
+/* Staged read-out (kernels/readout.cl, charge_transfer.cl, charge_coupling.cl) for effects between
+ * pixels, multiplication of charge, and binning: from an image of the sources' light to the frame.
+ */
 #ifndef BST_SCENEGEN_DETECTOR_READOUT_H
 #define BST_SCENEGEN_DETECTOR_READOUT_H
 
@@ -24,7 +25,7 @@ bst_status bst_readout_prepare(bst_ctx *ctx, bst_readout *readout) BST_MUST_CHEC
 void bst_readout_free(bst_readout *readout);
 
 /* Part of the sensor whose light a frame of `window` needs: whole columns if charge or light moves
- * along them. */
+ * along them, all of it if also along rows. */
 bst_window bst_readout_light_window(const bst_readout *readout, bst_window window);
 
 /* Image of light for a window of bst_readout_light_window.

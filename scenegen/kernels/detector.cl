@@ -10,10 +10,14 @@
 
 /* gain, dark (e-/s), overlay (e-): [sensor rows][p.maps_stride], a multiple of 64. The overlay's
  * pixels are followed by a mark per chunk of 64, non-zero if one of them has charge.
- * offsets (DN): columns [p.maps_stride], then rows. */
+ * offsets (DN): columns [p.maps_stride]; with pick-up its cosines and sines by column
+ * [p.maps_stride] each; at p.offsets_rows the rows [p.maps_rows]; with pick-up its amplitudes by
+ * row of the cosines and of the sines [p.maps_rows] each. readout (e-): gathered outside the
+ * exposure, as gain. */
 typedef struct detector_maps {
     global const float *gain, *dark, *overlay, *offsets;
     global const ushort *codes;
+    global const float *readout;
 } detector_maps;
 
 /* Means from here on use the expansion of the Poisson quantile, smaller ones the exact search. At
@@ -126,7 +130,27 @@ INLINE chunk add_dark(bst_kernel_frame_params p, detector_maps maps, size_t map,
         m.c += p.dark_e;
         m.d += p.dark_e;
     }
+    if (HAS(p, BST_EFFECT_READOUT)) {
+        chunk readout = load_chunk(maps.readout + map);
+        m.a += readout.a;
+        m.b += readout.b;
+        m.c += readout.c;
+        m.d += readout.d;
+    }
     return m;
+}
+
+/* Adds coherent pick-up to the offsets of a chunk. */
+INLINE chunk add_pick_up(bst_kernel_frame_params p, detector_maps maps, int row, int column, chunk o) {
+    chunk c = load_chunk(maps.offsets + p.maps_stride + column);
+    chunk s = load_chunk(maps.offsets + 2 * p.maps_stride + column);
+    lanes of_c = (lanes)maps.offsets[p.offsets_rows + p.maps_rows + row];
+    lanes of_s = (lanes)maps.offsets[p.offsets_rows + 2 * p.maps_rows + row];
+    o.a = fma(c.a, of_c, fma(s.a, of_s, o.a));
+    o.b = fma(c.b, of_c, fma(s.b, of_s, o.b));
+    o.c = fma(c.c, of_c, fma(s.c, of_s, o.c));
+    o.d = fma(c.d, of_c, fma(s.d, of_s, o.d));
+    return o;
 }
 
 /* Converts electrons to digital numbers plus one half, before clipping to the converter's range.
@@ -136,12 +160,15 @@ INLINE chunk convert_chunk(bst_kernel_frame_params p, detector_maps maps, int ro
     chunk dn;
     chunk o = {offset, offset, offset, offset};
     if (HAS(p, BST_EFFECT_OFFSETS)) {
-        offset = (lanes)(p.offset_dn + 0.5f + maps.offsets[p.maps_stride + row]);
+        offset = (lanes)(p.offset_dn + 0.5f + maps.offsets[p.offsets_rows + row]);
         o = load_chunk(maps.offsets + column);
         o.a += offset;
         o.b += offset;
         o.c += offset;
         o.d += offset;
+        if (HAS(p, BST_EFFECT_PICK_UP)) {
+            o = add_pick_up(p, maps, row, column, o);
+        }
     }
     dn.a = fma(e.a, g, o.a);
     dn.b = fma(e.b, g, o.b);

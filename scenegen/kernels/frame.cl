@@ -22,6 +22,9 @@ INLINE void fetch_maps(bst_kernel_frame_params p, detector_maps maps, int row, i
         if (HAS(p, BST_EFFECT_DARK)) {
             FETCH_LINE(maps.dark, first + x);
         }
+        if (HAS(p, BST_EFFECT_READOUT)) {
+            FETCH_LINE(maps.readout, first + x);
+        }
     }
 }
 
@@ -33,7 +36,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     global const float *light, global const float *background, global ushort *frame,
     global int *saturated, global const float *gain, global const float *dark,
     global const float *overlay, global const float *offsets, global const ushort *codes,
-    global uchar *flags) {
+    global uchar *flags, global const float *readout) {
     local float sums[GROUP][(TILE_H + BST_SPARE_ROWS) * STRIDE] __attribute__((aligned(64)));
     int tile = (int)get_global_id(0);
     if (tile >= p.tiles_x * p.tiles_y) {
@@ -46,7 +49,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) kernel void bst_scene_frame(
     dark_law unlit = dark_law_of(p, steps);
     near_law near = near_law_of(p);
     tail_block tails[TILE_W / 64];
-    detector_maps maps = {gain, dark, overlay, offsets, codes};
+    detector_maps maps = {gain, dark, overlay, offsets, codes, readout};
     uint chunks_per_row = (uint)(p.sensor_width + 63) / 64u;
     int16 full_count = (int16)0;
     for (int y = 0; y < t.rows; y++) {

@@ -8,7 +8,7 @@ __attribute__((reqd_work_group_size(BST_ROW_LANES *TILE_H, 1, 1))) kernel void b
     global const float *light, global const float *background, global ushort *frame,
     global int *saturated, global const float *gain, global const float *dark,
     global const float *overlay, global const float *offsets, global const ushort *codes,
-    global uchar *flags) {
+    global uchar *flags, global const float *readout) {
     local gather_room room;
     local tail_rows tails;
     local int full;
@@ -23,7 +23,7 @@ __attribute__((reqd_work_group_size(BST_ROW_LANES *TILE_H, 1, 1))) kernel void b
     DRAW_TAIL_ROWS(p, t, &tails);
     barrier(CLK_LOCAL_MEM_FENCE);
     if (l.inside) {
-        detector_maps maps = {gain, dark, overlay, offsets, codes};
+        detector_maps maps = {gain, dark, overlay, offsets, codes, readout};
         uint chunks_per_row = (uint)(p.sensor_width + 63) / 64u;
         uint counter = ((uint)l.y * chunks_per_row + (uint)t.x / 64u) * 16u + (uint)(l.x - t.x);
         size_t map = (size_t)l.y * p.maps_stride + t.x;

@@ -87,7 +87,7 @@ INLINE dark_law dark_law_of(bst_kernel_frame_params p, uint *steps) {
     dark.mean = (p.background_e - p.dark_e) + p.dark_e; /* as the sum of the two below */
     lanes mean = (lanes)dark.mean;
     dark.law = noise_law_of(p, mean);
-    int shared = !HAS(p, BST_EFFECT_GAIN | BST_EFFECT_DARK);
+    int shared = !HAS(p, BST_EFFECT_GAIN | BST_EFFECT_DARK | BST_EFFECT_READOUT);
     dark.single = shared && !any_of(needs_two(p, mean));
     dark.steps = 0;
     if (shared && p.single_from > 0.0f && dark.mean < POISSON_SWITCH &&

@@ -1,7 +1,8 @@
 /* Detector in stages, for effects across pixels: blooming along columns, frame transfer under
  * light, binning. An image holds the light of all rows; charge replaces it and is read out from
  * there. One work-item per row, or per 64 columns; surplus work-items of the last group do nothing,
- * so that the groups of all frames have one size. Options: TAIL (read_tail.cl). */
+ * so that the groups of all frames have one size. Options: TAIL (read_tail.cl); MULTIPLY (a
+ * multiplication register). */
 
 /* image: [light_height][light_stride] floats, from column p.tiles_x0 and row p.light_y0 of the
  * sensor. */
@@ -25,7 +26,7 @@ INLINE void store_chunk(global float *to, chunk c) {
  * columns. */
 READOUT_GROUP kernel void bst_detector_transfer(bst_kernel_frame_params p, global float *image,
                                   global const float *gain) {
-    detector_maps maps = {gain, 0, 0, 0, 0};
+    detector_maps maps = {gain, 0, 0, 0, 0, 0};
     int x = (int)get_global_id(0) * 64;
     if (x >= p.light_stride) {
         return;
@@ -55,8 +56,9 @@ READOUT_GROUP kernel void bst_detector_transfer(bst_kernel_frame_params p, globa
 
 /* Replaces the light of every pixel by its charge. One work-item per row. */
 READOUT_GROUP kernel void bst_detector_charge(bst_kernel_frame_params p, global float *image, global const float *gain,
-                                global const float *dark, global const float *overlay) {
-    detector_maps maps = {gain, dark, overlay, 0, 0};
+                                global const float *dark, global const float *overlay,
+                                global const float *readout) {
+    detector_maps maps = {gain, dark, overlay, 0, 0, readout};
     int row = p.light_y0 + (int)get_global_id(0);
     if (row >= p.light_y0 + p.light_height) {
         return;
@@ -119,13 +121,73 @@ READOUT_GROUP kernel void bst_detector_bloom(bst_kernel_frame_params p, global f
     }
 }
 
+#ifdef MULTIPLY
+/* Twice the natural logarithm of v > 0, as log_radius2. */
+INLINE lanes log_square(lanes v) {
+    lanes_int bits = as_lanes_int(v) - 0x3F3504F3; /* sqrt(1/2) */
+    lanes m = as_lanes((bits & 0x007FFFFF) + 0x3F3504F3);
+    lanes s = (m - 1.0f) / (m + 1.0f), q = s * s;
+    lanes series = fma(q, fma(q, fma(q, (lanes)(4.0f / 7), (lanes)(4.0f / 5)), (lanes)(4.0f / 3)),
+                       (lanes)4.0f);
+    return fma(to_lanes(bits >> 23), (lanes)1.38629436f, s * series);
+}
+
+/* One turn for gamma deviates of the shapes n, whole numbers from 1 on: rejection without a squeeze
+ * (Marsaglia and Tsang 2000, ACM TOMS 26, 363), accepted with more than 95 %. */
+INLINE lanes gamma_turn(lanes n, lanes_uint word, lanes z, lanes_int *accepted) {
+    lanes d = n - 1.0f / 3, t = fma(z * (1.0f / 3), inverse_root(d), (lanes)1.0f);
+    lanes v = t * t * t, log_u2 = -log_radius2(word); /* twice the logarithm of a uniform number */
+    lanes safe = clamp(v, 1e-6f, 100.0f);
+    lanes log_v2 = log_square(safe);
+    *accepted = MASK((v > 1e-6f) & (log_u2 < fma(z, z, d * (2.0f - 2.0f * v + log_v2))));
+    return d * v;
+}
+
+/* Charge of 16 pixels behind a multiplication register, over its gain: the mean stays, the variance
+ * of n electrons is n (1 - 1 / gain), their law a gamma distribution of shape n (Basden, Haniff and
+ * Mackay 2003, MNRAS 345, 985). Fractions of an electron, which traps leave, are rounded at random,
+ * by the low bits of the first word. word, z: of the first turn; stream: of the second, later ones
+ * have every fourth from there on. */
+static lanes multiply_charge(bst_kernel_frame_params p, uint counter, uint stream, lanes_uint word,
+                             lanes z, lanes q) {
+    lanes whole = floor(q), u = to_lanes(word & 0xFFFFu) * 0x1p-16f, out = (lanes)0.0f;
+    lanes n = fmax(whole + select((lanes)0.0f, (lanes)1.0f, MASK(u < q - whole)), 0.0f);
+    lanes_int open = MASK(n > 0.0f);
+    for (uint turn = 0u; any_of(open) && turn < 64u; turn++) {
+        lanes_int good;
+        lanes drawn = gamma_turn(fmax(n, 1.0f), word, z, &good);
+        good &= open;
+        out = select(out, fma(drawn - n, (lanes)p.multiply_rms, n), good);
+        open &= ~good;
+        if (any_of(open)) {
+            lanes_uint w0, w1, unused;
+            lanes other;
+            philox_lanes(p, counter, stream + 4u * turn, &w0, &w1, &word, &unused);
+            normal_lanes(w0, w1, &z, &other);
+        }
+    }
+    return out;
+}
+
+INLINE chunk multiply_chunk(bst_kernel_frame_params p, uint counter, chunk q) {
+    chunk z = chunk_normal(chunk_random(p, counter, STREAM_MULTIPLY));
+    chunk_words w = chunk_random(p, counter, STREAM_MULTIPLY + 1u);
+    const uint next = STREAM_MULTIPLY + 2u;
+    q.a = multiply_charge(p, counter, next, w.a, z.a, q.a);
+    q.b = multiply_charge(p, counter, next + 1u, w.b, z.b, q.b);
+    q.c = multiply_charge(p, counter, next + 2u, w.c, z.c, q.c);
+    q.d = multiply_charge(p, counter, next + 3u, w.d, z.d, q.d);
+    return q;
+}
+#endif
+
 /* Reads charge as digital numbers: p.binning x p.binning pixels are summed before they are read.
  * frame: [window_height][window_width], both after binning. saturated: pixels per row. One
  * work-item per frame row. */
 READOUT_GROUP kernel void bst_detector_read(bst_kernel_frame_params p, global const float *image, global ushort *frame,
                               global int *saturated, global const float *offsets,
                               global const ushort *codes, global uchar *flags) {
-    detector_maps maps = {0, 0, 0, offsets, codes};
+    detector_maps maps = {0, 0, 0, offsets, codes, 0};
     int y = (int)get_global_id(0), b = p.binning;
     if (y >= p.window_height) {
         return;
@@ -163,6 +225,9 @@ READOUT_GROUP kernel void bst_detector_read(bst_kernel_frame_params p, global co
         chunk q = {vload16(0, sums), vload16(1, sums), vload16(2, sums), vload16(3, sums)};
         chunk_flags brim = {vload16(0, brims), vload16(1, brims), vload16(2, brims),
                             vload16(3, brims)};
+#ifdef MULTIPLY
+        q = multiply_chunk(p, counter, q);
+#endif
         chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
         e.a = read_out(p, q.a, z.a);
         e.b = read_out(p, q.b, z.b);

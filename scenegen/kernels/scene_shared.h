@@ -53,7 +53,8 @@
 
 /* Effects of a camera's detector: response per pixel, dark current per pixel, charge in addition to
  * light (cosmic rays), nonlinearity, offsets of columns and rows, table of output codes, blooming,
- * light during the transfer; and whether saturation flags are stored. */
+ * light during the transfer; whether saturation flags are stored; charge gathered outside the
+ * exposure, coherent pick-up. */
 #define BST_EFFECT_GAIN 1
 #define BST_EFFECT_DARK 2
 #define BST_EFFECT_OVERLAY 4
@@ -63,6 +64,8 @@
 #define BST_EFFECT_BLOOM 64
 #define BST_EFFECT_TRANSFER 128
 #define BST_EFFECT_FLAGS 256
+#define BST_EFFECT_READOUT 512
+#define BST_EFFECT_PICK_UP 1024
 
 /* Laws of bst_kernel_vignetting_params: none; the fourth power of the cosine of the field angle,
  * 1 / (1 + v1 s)^2; a polynomial, 1 + v1 s + v2 s^2 + v3 s^3. s: squared distance from the centre.
@@ -126,7 +129,30 @@ typedef struct bst_kernel_frame_params {
     float bend1, bend2, bend3;  /* nonlinearity, by the share of the full well */
     float tail_gap, tail_rms_e; /* read noise's tail (read_tail.cl) */
     float transfer_row_s;       /* transfer time per row */
+    int offsets_rows;           /* first row offset in the buffer of offsets */
+    float multiply_rms;         /* spread of the multiplication: sqrt(1 - 1 / gain) */
 } bst_kernel_frame_params;
+
+#define BST_TRAP_KINDS 3
+/* Traps on the way of charge packets (kernels/charge_transfer.cl). */
+typedef struct bst_kernel_trap_params {
+    int width, height, stride; /* of the image */
+    int backwards;             /* the last row or column is read first */
+    int kinds;                 /* species with traps */
+    float exponent;
+    float density[BST_TRAP_KINDS]; /* traps in a pixel over reference charge to `exponent` */
+    float release[BST_TRAP_KINDS]; /* share released in the time of one transfer */
+} bst_kernel_trap_params;
+
+/* Effects between pixels of an image (kernels/charge_coupling.cl). */
+typedef struct bst_kernel_coupling_params {
+    int width, height, stride;
+    float coupling;  /* share that each of the four neighbours takes over */
+    float shift;     /* of the border between two pixels, px per electron */
+    int outputs;     /* crosstalk: equal parts of a row */
+    int mirrored;    /* every second part is read from its last column on */
+    float crosstalk; /* share of each other output */
+} bst_kernel_coupling_params;
 
 /* Record of one source for the node kernel. */
 typedef struct bst_kernel_source_record {

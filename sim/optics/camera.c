@@ -143,3 +143,9 @@ double bst_camera_background_e_per_s(const bst_camera *c) {
 double bst_camera_dark_e_per_s(const bst_camera *c) {
     return c->dark_current_e_per_s * bst_detector_dark_factor(&c->detector);
 }
+
+double bst_camera_readout_e(const bst_camera *c) {
+    const bst_detector_config *d = &c->detector;
+    double passed = 0.5 * (1.0 - 1.0 / (double)c->height_px); /* mean share of the rows */
+    return d->readout_s * passed * bst_camera_dark_e_per_s(c) + d->clock_induced_e;
+}

@@ -40,6 +40,63 @@ static const bst_config_desc quantisation_table[] = {
     BST_CONFIG_END,
 };
 
+static const bst_config_desc edges_table[] = {
+    BST_INT(bst_detector_edges_config, left, "px", 0, 65536, "0", "Columns from column 0 on."),
+    BST_INT(bst_detector_edges_config, right, "px", 0, 65536, "0", "Columns up to the last one."),
+    BST_INT(bst_detector_edges_config, bottom, "px", 0, 65536, "0", "Rows from row 0 on."),
+    BST_INT(bst_detector_edges_config, top, "px", 0, 65536, "0", "Rows up to the last one."),
+    BST_CONFIG_END,
+};
+
+static const bst_config_desc output_table[] = {
+    BST_BOOL(bst_detector_output_config, right, "false", "Rows are read from the last column on."),
+    BST_BOOL(bst_detector_output_config, top, "false", "The last row is read first."),
+    BST_CONFIG_END,
+};
+
+static const bst_config_desc pick_up_table[] = {
+    BST_REAL(bst_detector_pick_up_config, amplitude_e, "e", 0, 1e6, "0", "Amplitude of the sine."),
+    BST_REAL(bst_detector_pick_up_config, cycles_per_px, "1/px", -0.5, 0.5, "0",
+             "Frequency along a row; 0.5: alternating columns."),
+    BST_REAL(bst_detector_pick_up_config, cycles_per_row, "1/px", -0.5, 0.5, "0",
+             "Phase from row to row, in cycles."),
+    BST_OPEN_REAL(bst_detector_pick_up_config, phase_deg, "deg", -360, 360,
+                  "Phase at pixel (0, 0); null: random in each frame."),
+    BST_CONFIG_END,
+};
+
+static const bst_config_desc glow_table[] = {
+    BST_REAL(bst_detector_glow_config, peak_e, "e", 0, 1e6, "0",
+             "Mean charge of a frame at the amplifier."),
+    BST_REAL(bst_detector_glow_config, scale_px, "px", 1, 1e5, "100",
+             "Distance in which it falls by the factor e."),
+    BST_REAL(bst_detector_glow_config, x_px, "px", -1e5, 1e5, "0", "Amplifier's column."),
+    BST_REAL(bst_detector_glow_config, y_px, "px", -1e5, 1e5, "0", "Amplifier's row."),
+    BST_CONFIG_END,
+};
+
+static const bst_config_desc traps_table[] = {
+    BST_REALS(bst_detector_traps_config, traps_per_px, "", 0, 1e5, "[0, 0, 0]",
+              "Traps of three species in each pixel that a packet of reference_e meets."),
+    BST_REALS(bst_detector_traps_config, release_px, "px", 0.01, 1e6, "[1, 1, 1]",
+              "Their time constants of release, in transfers by one pixel."),
+    BST_REAL(bst_detector_traps_config, fill_exponent, "", 0, 1, "0.5",
+             "The traps that a packet meets grow with its charge to this power."),
+    BST_REAL(bst_detector_traps_config, reference_e, "e", 1, 1e7, "10000",
+             "Charge of a packet that meets traps_per_px."),
+    BST_CONFIG_END,
+};
+
+static const bst_config_desc crosstalk_table[] = {
+    BST_INT(bst_detector_crosstalk_config, outputs, "", 1, 64, "1",
+            "Outputs that read equal numbers of columns at the same time."),
+    BST_REAL(bst_detector_crosstalk_config, coupling, "", -0.1, 0.1, "0",
+             "Share of the charge of each other output that an output shows."),
+    BST_BOOL(bst_detector_crosstalk_config, mirrored, "true",
+             "Every second output reads from its last column on."),
+    BST_CONFIG_END,
+};
+
 const bst_config_desc bst_detector_table[] = {
     BST_REAL(bst_detector_config, temperature_c, "degC", -273.15, 200, "20",
              "Temperature of the detector."),
@@ -93,6 +150,44 @@ const bst_config_desc bst_detector_table[] = {
         "Rolling shutter: each row of the window is exposed so much later than the row before; "
         "below 0: from the last row on. The exposure's times are those of the window's middle "
         "row. 0: all rows at once."),
+    BST_OBJECT(bst_detector_config, output, output_table, "{}",
+               "Where frames are read: at column 0, row 0 first, unless given."),
+    BST_REAL(
+        bst_detector_config, readout_s, "s", 0, 1e4, "0",
+        "Time of the read-out of the whole sensor: charge gathers the dark current of the rows "
+        "that it passes."),
+    BST_REAL(bst_detector_config, clock_induced_e, "e", 0, 1e4, "0",
+             "Mean charge that clocking leaves in each pixel of a frame (Poisson)."),
+    BST_REAL(bst_detector_config, offset_noise_e, "e", 0, 1e5, "0",
+             "Level of the whole frame, new in every frame, RMS."),
+    BST_REAL(bst_detector_config, offset_drift_dn_per_frame, "DN", -1e4, 1e4, "0",
+             "Growth of offset_dn with each frame, from the run's first one on."),
+    BST_REAL(bst_detector_config, flicker_noise_e, "e", 0, 1e5, "0",
+             "1/f noise of the level from row to row, RMS: equal power in each factor of 4 from a "
+             "period of some rows to one of several thousand."),
+    BST_OBJECT(bst_detector_config, shielded, edges_table, "{}",
+               "Edges of the frame that light does not reach; they have dark current."),
+    BST_OBJECT(bst_detector_config, overscan, edges_table, "{}",
+               "Edges of the frame that are no pixels of the sensor: they have no charge of their "
+               "own, but traps release some there; rows also gather dark current during read-out. "
+               "width_px and height_px include them."),
+    BST_OBJECT(bst_detector_config, pick_up, pick_up_table, "{}",
+               "Coherent pattern noise: a sine along the rows."),
+    BST_OBJECT(bst_detector_config, glow, glow_table, "{}", "Light of the output amplifier."),
+    BST_OBJECT(bst_detector_config, parallel_traps, traps_table, "{}",
+               "Charge-transfer inefficiency along columns, towards the row that is read first."),
+    BST_OBJECT(bst_detector_config, serial_traps, traps_table, "{}",
+               "Charge-transfer inefficiency along rows, towards the output."),
+    BST_REAL(bst_detector_config, em_gain, "", 1, 1e5, "1",
+             "Gain of an electron-multiplying register. All charge, read_noise_e and gain_e_per_dn "
+             "are those before it; it adds the noise of multiplication."),
+    BST_REAL(bst_detector_config, interpixel_coupling, "", 0, 0.2, "0",
+             "Share of a pixel's charge that each of its four neighbours shows instead."),
+    BST_REAL(bst_detector_config, brighter_fatter_per_e, "1/e", 0, 1e-5, "0",
+             "Shift of the border of two pixels per electron of difference between their charges, "
+             "px."),
+    BST_OBJECT(bst_detector_config, crosstalk, crosstalk_table, "{}",
+               "Signal that outputs take over from each other."),
     BST_OBJECT(bst_detector_config, cosmic_rays, cosmic_ray_table, "{}", "Radiation hits."),
     BST_FORMER("hits", "cosmic_rays"),
     BST_OBJECT(bst_detector_config, quantisation, quantisation_table, "{}",
@@ -108,7 +203,23 @@ double bst_detector_dark_factor(const bst_detector_config *d) {
 }
 
 bool bst_detector_config_whole_columns(const bst_detector_config *d) {
-    return d->saturation == BST_WELL_BLOOM || d->frame_transfer_s > 0.0;
+    return d->saturation == BST_WELL_BLOOM || d->frame_transfer_s > 0.0 ||
+           bst_detector_has_traps(&d->parallel_traps) || bst_detector_config_whole_sensor(d);
+}
+
+bool bst_detector_config_whole_sensor(const bst_detector_config *d) {
+    return bst_detector_has_traps(&d->serial_traps) || d->interpixel_coupling > 0.0 ||
+           d->brighter_fatter_per_e > 0.0 ||
+           (d->crosstalk.outputs > 1 && d->crosstalk.coupling != 0.0);
+}
+
+bool bst_detector_has_traps(const bst_detector_traps_config *t) {
+    for (int i = 0; i < BST_TRAP_SPECIES; i++) {
+        if (t->traps_per_px[i] > 0.0) {
+            return true;
+        }
+    }
+    return false;
 }
 
 bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d) {
@@ -117,7 +228,31 @@ bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d)
             ctx, BST_ERR_CONFIG,
             "row_time_s: a rolling shutter goes neither with frame_transfer_s nor with "
             "the saturation \"bloom\": charge that runs along columns belongs to sensors "
-            "that expose all rows at once; set one of them to its default");
+            "that expose all rows at once; nor with traps, coupling of pixels, "
+            "brighter_fatter_per_e or crosstalk; set one of them to its default");
+    }
+    return BST_OK;
+}
+
+bst_status bst_detector_config_check_size(bst_ctx *ctx, const bst_detector_config *d,
+                                          int64_t width_px, int64_t height_px) {
+    const bst_detector_edges_config *const edges[] = {&d->shielded, &d->overscan};
+    const char *const names[] = {"shielded", "overscan"};
+    for (int i = 0; i < 2; i++) {
+        int64_t columns = edges[i]->left + edges[i]->right, rows = edges[i]->bottom + edges[i]->top;
+        if (columns >= width_px || rows >= height_px) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "%s: %lld columns and %lld rows leave nothing of %lld x %lld pixels; "
+                            "width_px and height_px include them",
+                            names[i], (long long)columns, (long long)rows, (long long)width_px,
+                            (long long)height_px);
+        }
+    }
+    if (d->crosstalk.outputs > 1 && width_px % d->crosstalk.outputs != 0) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "crosstalk/outputs: %lld outputs do not share %lld columns equally; "
+                        "allowed are divisors of width_px",
+                        (long long)d->crosstalk.outputs, (long long)width_px);
     }
     return BST_OK;
 }

@@ -26,6 +26,23 @@ typedef struct writer {
     const bst_sensor_figures *figures;
 } writer;
 
+/* Read noise without what other keys add to the differences that it was measured by: pick-up, and
+ * shot noise of the charge that bias frames gather during read-out. */
+static double white_noise_e(const bst_sensor_figures *f) {
+    double v = f->figures[BST_SENSOR_READ_NOISE].value,
+           line = f->figures[BST_SENSOR_LINE_AMPLITUDE].value;
+    double ramp_e = fabs(f->figures[BST_SENSOR_RAMP].value) * f->figures[BST_SENSOR_GAIN].value;
+    double rest = v * v;
+    if (isfinite(line)) { /* the mean square of a sine, or of its differences of neighbours */
+        double turn = cos(2.0 * M_PI * f->figures[BST_SENSOR_LINE_FREQUENCY].value);
+        rest -= 0.5 * line * line * (f->noise_of_pairs ? 1.0 : 1.0 - turn);
+    }
+    if (isfinite(ramp_e) && f->noise_of_pairs) {
+        rest -= 0.5 * ramp_e;
+    }
+    return sqrt(fmax(rest, 0.0));
+}
+
 /* Value of a figure in detector.json; NAN: left out, as statistics that maps replace with --maps.
  */
 static double value_given(const writer *w, int i) {
@@ -36,13 +53,51 @@ static double value_given(const writer *w, int i) {
     if (!key || !isfinite(e->value) || (w->request->maps && mapped)) {
         return NAN;
     }
+    if (i == BST_SENSOR_READ_NOISE) {
+        return white_noise_e(w->figures);
+    }
     if (strncmp(key, "detector/", 9) != 0) {
         return fmax(e->value, 0.0);
     }
     if (isnan(e->sigma)) { /* of an unknown error: neither significant nor 0 */
         return NAN;
     }
-    return e->value > LEAST_SIGNIFICANCE * e->sigma ? e->value : 0.0;
+    return fabs(e->value) > LEAST_SIGNIFICANCE * e->sigma ? e->value : 0.0;
+}
+
+/* Traps as keys of the detector. */
+static cJSON *traps_json(const bst_detector_traps_config *t) {
+    cJSON *node = cJSON_CreateObject();
+    cJSON_AddItemToObject(node, "traps_per_px",
+                          cJSON_CreateDoubleArray(t->traps_per_px, BST_TRAP_SPECIES));
+    cJSON_AddItemToObject(node, "release_px",
+                          cJSON_CreateDoubleArray(t->release_px, BST_TRAP_SPECIES));
+    cJSON_AddNumberToObject(node, "fill_exponent", t->fill_exponent);
+    cJSON_AddNumberToObject(node, "reference_e", t->reference_e);
+    return node;
+}
+
+/* Adds a key of the detector to a scenario's `set`; takes the value over. */
+static void set_detector(const writer *w, cJSON *set, const char *key, cJSON *value) {
+    char pointer[512];
+    snprintf(pointer, sizeof pointer, "%.400s/detector/%s", w->request->camera, key);
+    cJSON_AddItemToObject(set, pointer, value);
+}
+
+/* Adds traps, and the output's side that trails or the ramp of the read-out give. */
+static void set_transfer(const writer *w, cJSON *set) {
+    const bst_sensor_figures *f = w->figures;
+    bool parallel = bst_detector_has_traps(&f->traps.parallel);
+    if (parallel) {
+        set_detector(w, set, "parallel_traps", traps_json(&f->traps.parallel));
+    }
+    if (parallel || isfinite(f->figures[BST_SENSOR_READOUT].value)) {
+        set_detector(w, set, "output/top", cJSON_CreateBool(f->traps.top));
+    }
+    if (bst_detector_has_traps(&f->traps.serial)) {
+        set_detector(w, set, "serial_traps", traps_json(&f->traps.serial));
+        set_detector(w, set, "output/right", cJSON_CreateBool(f->traps.right));
+    }
 }
 
 /* The scenario that changes a camera; NULL: out of memory. */
@@ -65,6 +120,7 @@ static cJSON *detector_json(const writer *w) {
             bst_json_add_number(set, pointer, value);
         }
     }
+    set_transfer(w, set);
     if (w->request->maps && w->figures->dark_map) {
         snprintf(pointer, sizeof pointer, "%.400s/detector/dark_map", w->request->camera);
         cJSON_AddStringToObject(set, pointer, "dark_map.fits");
@@ -76,7 +132,8 @@ static cJSON *detector_json(const writer *w) {
     return root;
 }
 
-static void add_trail(cJSON *root, const bst_charge_trail *t) {
+static void add_trail(cJSON *root, const writer *w) {
+    const bst_charge_trail *t = &w->figures->trail;
     static const char *const sides[BST_TRAIL_SIDES] = {"rows_above", "rows_below", "columns_right",
                                                        "columns_left"};
     cJSON *node = cJSON_AddObjectToObject(root, "charge_trail");
@@ -100,6 +157,15 @@ static void add_trail(cJSON *root, const bst_charge_trail *t) {
         cJSON *list = cJSON_AddArrayToObject(node, sides[side]);
         for (int k = 0; k < BST_TRAIL_PIXELS; k++) {
             cJSON_AddItemToArray(list, cJSON_CreateNumber(t->profile[side][k]));
+        }
+    }
+    const bst_detector_traps_config *const fitted[2] = {&w->figures->traps.parallel,
+                                                        &w->figures->traps.serial};
+    for (int i = 0; i < 2; i++) {
+        if (bst_detector_has_traps(fitted[i])) {
+            cJSON *traps = traps_json(fitted[i]);
+            cJSON_AddNumberToObject(traps, "misfit_rms", w->figures->trap_misfit[i]);
+            cJSON_AddItemToObject(node, i == 0 ? "parallel_traps" : "serial_traps", traps);
         }
     }
 }
@@ -136,7 +202,7 @@ static cJSON *report_json(const writer *w) {
         snprintf(key, sizeof key, "%g", bst_sensor_percentiles[i]);
         bst_json_add_number(percentiles, key, f->percentiles_e_per_s[i]);
     }
-    add_trail(root, &f->trail);
+    add_trail(root, w);
     return root;
 }
 

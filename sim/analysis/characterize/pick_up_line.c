@@ -17,6 +17,9 @@ static const double PI = 3.14159265358979323846;
 static const float CLIP = 6.0F;
 /* Standard deviations of the continuum that make a line certain. */
 static const double CERTAIN = 7.0;
+/* Share of the power at the frequency that has one phase from row to row; noise has 1 / sqrt(rows).
+ */
+static const double COHERENT = 0.5;
 
 /* Clips rows at CLIP robust standard deviations. */
 static bst_status clip_rows(bst_ctx *ctx, float *rows, size_t count) {
@@ -116,31 +119,108 @@ static double refine(const float *rows, int width, int from, int to, double low,
     return 0.5 * (low + high);
 }
 
+/* Frequency at which the Fourier sums of rows add up best, cycles per row in [-1/2, 1/2). sums:
+ * real and imaginary parts by row. Returns its share of the power. */
+static double best_growth(const double *sums, int rows, double *cycles) {
+    double best = -1.0, power = 0.0, around[3] = {0.0, 0.0, 0.0}, last = 0.0, before = 0.0;
+    int steps = 4 * rows;
+    for (int y = 0; y < rows; y++) {
+        power += sums[2 * y] * sums[2 * y] + sums[2 * y + 1] * sums[2 * y + 1];
+    }
+    for (int k = -steps / 2; k <= steps / 2; k++) { /* one step beyond, for the parabola */
+        double turn[2] = {cos(2.0 * PI * k / steps), -sin(2.0 * PI * k / steps)};
+        double re = 0.0, im = 0.0, c = 1.0, s = 0.0;
+        for (int y = 0; y < rows; y++) {
+            re += sums[2 * y] * c - sums[2 * y + 1] * s;
+            im += sums[2 * y] * s + sums[2 * y + 1] * c;
+            double next = c * turn[0] - s * turn[1];
+            s = c * turn[1] + s * turn[0];
+            c = next;
+        }
+        double now = re * re + im * im;
+        if (last > best && k > -steps / 2) {
+            best = last;
+            *cycles = (k - 1.0) / steps;
+            around[0] = before;
+            around[1] = last;
+            around[2] = now;
+        }
+        before = last;
+        last = now;
+    }
+    double bend = around[0] - 2.0 * around[1] + around[2];
+    *cycles += bend < 0.0 ? 0.5 * (around[0] - around[2]) / bend / steps : 0.0;
+    return power > 0.0 ? best / (rows * power) : 0.0;
+}
+
+/* Growth of the phase from row to row, with the scatter of groups of rows; NAN if the rows are not
+ * coherent. */
+static bst_sensor_estimate row_phase(const float *rows, int width, int height, double cycles_px) {
+    bst_sensor_estimate out = {NAN, NAN};
+    double groups[GROUPS], value;
+    double *sums = calloc(2 * (size_t)height, sizeof *sums);
+    for (int x = 0; sums && x < width; x++) {
+        double c = cos(2.0 * PI * cycles_px * x), s = -sin(2.0 * PI * cycles_px * x);
+        for (int y = 0; y < height; y++) {
+            double v = (double)rows[(size_t)y * (size_t)width + (size_t)x];
+            sums[2 * y] += v * c;
+            sums[2 * y + 1] += v * s;
+        }
+    }
+    if (sums && best_growth(sums, height, &value) > COHERENT) {
+        for (int g = 0; g < GROUPS; g++) {
+            int from = g * height / GROUPS, to = (g + 1) * height / GROUPS;
+            best_growth(sums + 2 * from, to - from, &groups[g]);
+            groups[g] = value + remainder(groups[g] - value, 1.0);
+        }
+        out = (bst_sensor_estimate){value, bst_mean_estimate(groups, GROUPS).sigma};
+    }
+    free(sums);
+    return out;
+}
+
+/* Amplitude of a line in rows [from, to): its power less that of the continuum beside it. */
+static double amplitude_in(const float *rows, int width, int from, int to, double f) {
+    double beside = 0.0;
+    int samples = 0;
+    for (int k = -16; k < 16; k++) {
+        /* spectra of real rows fold at 0 and 1/2: near an end a sample would be the line */
+        double sample = fabs(f + (k + 0.5) / width);
+        sample = fmin(sample, 1.0 - sample);
+        if ((k < -8 || k >= 8) && fabs(sample - f) * width >= LINE_BINS) {
+            beside += power_at(rows, width, from, to, sample);
+            samples++;
+        }
+    }
+    double power = power_at(rows, width, from, to, f) - beside / samples;
+    return 2.0 * sqrt(fmax(power, 0.0)) / width;
+}
+
 /* Frequency and amplitude of the line, from groups of rows. */
 static void measure(const float *rows, int width, int height, int peak, bst_pick_up_line *out) {
     double frequency[GROUPS], amplitude[GROUPS];
     for (int g = 0; g < GROUPS; g++) {
         int from = (int)((int64_t)g * height / GROUPS),
             to = (int)((int64_t)(g + 1) * height / GROUPS);
-        double f = refine(rows, width, from, to, (peak - 1.0) / width, (peak + 1.0) / width);
-        /* the continuum beside the line, outside its side lobes */
-        double beside = 0.0;
-        int samples = 0;
-        for (int k = -16; k < 16; k++) {
-            /* spectra of real rows fold at 0 and 1/2: near an end a sample would be the line */
-            double sample = fabs(f + (k + 0.5) / width);
-            sample = fmin(sample, 1.0 - sample);
-            if ((k < -8 || k >= 8) && fabs(sample - f) * width >= LINE_BINS) {
-                beside += power_at(rows, width, from, to, sample);
-                samples++;
-            }
-        }
-        double power = power_at(rows, width, from, to, f) - beside / samples;
-        frequency[g] = f;
-        amplitude[g] = 2.0 * sqrt(fmax(power, 0.0)) / width;
+        frequency[g] = refine(rows, width, from, to, (peak - 1.0) / width, (peak + 1.0) / width);
+        amplitude[g] = amplitude_in(rows, width, from, to, frequency[g]);
     }
     out->frequency = bst_mean_estimate(frequency, GROUPS);
+    out->phase = row_phase(rows, width, height, out->frequency.value);
     out->amplitude = bst_mean_estimate(amplitude, GROUPS);
+}
+
+bst_status bst_pick_up_line_amplitude(bst_ctx *ctx, float *rows, int width, int height,
+                                      bst_pick_up_line *line) {
+    double amplitude[GROUPS];
+    BST_TRY(clip_rows(ctx, rows, (size_t)width * (size_t)height));
+    for (int g = 0; g < GROUPS; g++) {
+        int from = (int)((int64_t)g * height / GROUPS),
+            to = (int)((int64_t)(g + 1) * height / GROUPS);
+        amplitude[g] = amplitude_in(rows, width, from, to, line->frequency.value);
+    }
+    line->amplitude = bst_mean_estimate(amplitude, GROUPS);
+    return BST_OK;
 }
 
 bst_status bst_pick_up_line_find(bst_ctx *ctx, float *rows, int width, int height,
@@ -148,6 +228,7 @@ bst_status bst_pick_up_line_find(bst_ctx *ctx, float *rows, int width, int heigh
     *out = (bst_pick_up_line){.bins = width / 2,
                               .frequency = {NAN, NAN},
                               .amplitude = {NAN, NAN},
+                              .phase = {NAN, NAN},
                               .least_ratio = 1.0 + CERTAIN / sqrt(height)};
     BST_TRY(clip_rows(ctx, rows, (size_t)width * (size_t)height));
     double *power = malloc((size_t)out->bins * sizeof *power);

@@ -1,4 +1,5 @@
-/* Coherent pick-up: a sine along the rows, of one frequency and any phase in each row. */
+/* Coherent pick-up: a sine along the rows, of one frequency, and a phase that grows equally from
+ * row to row or is any in each. */
 #ifndef BST_ANALYSIS_CHARACTERIZE_PICK_UP_LINE_H
 #define BST_ANALYSIS_CHARACTERIZE_PICK_UP_LINE_H
 
@@ -16,6 +17,7 @@ typedef struct bst_pick_up_line {
     bool found;
     bst_sensor_estimate frequency; /* cycles/px */
     bst_sensor_estimate amplitude; /* half of peak to peak, in the unit of the rows */
+    bst_sensor_estimate phase;     /* growth from row to row, cycles; NAN: not coherent */
 } bst_pick_up_line;
 
 /* Finds the line.
@@ -29,5 +31,14 @@ typedef struct bst_pick_up_line {
  * Reference: Welch 1967, with a Hann window and rows as segments */
 bst_status bst_pick_up_line_find(bst_ctx *ctx, float *rows, int width, int height,
                                  bst_pick_up_line *out) BST_MUST_CHECK;
+
+/* Measures the amplitude of a line that was found in other rows.
+ *
+ * Given:     rows  as for bst_pick_up_line_find
+ *            line  its frequency
+ * Returned:  line->amplitude
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_pick_up_line_amplitude(bst_ctx *ctx, float *rows, int width, int height,
+                                      bst_pick_up_line *line) BST_MUST_CHECK;
 
 #endif

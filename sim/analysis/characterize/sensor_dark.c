@@ -3,7 +3,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/analysis/characterize/dark_distribution.h"
 #include "sim/analysis/characterize/sensor_figures.h"
+#include "sim/analysis/characterize/trap_fit.h"
 #include "sim/core/compare.h"
 
 /* Clipping of the dark current's core: hot pixels are beyond it. */
@@ -15,6 +17,8 @@ static const double CERTAIN = 5.0;
 /* Charge of hot pixels whose trails are measured, in half distances of the 16th and the 84th
  * percentile, which hot pixels do not widen. */
 static const double TRAIL = 20.0;
+/* Hot pixels from which on their law is sought. */
+enum { LEAST_HOT = 20 };
 /* Hot pixels lie beyond this quantile of the core's lognormal law, in standard deviations: of a
  * million pixels 0.3 that are not hot. */
 static const double HOT = 5.0;
@@ -139,6 +143,9 @@ static void measure_ramp(dark_signal *d) {
     bst_sensor_estimate slope;
     fit_ramp(d, &slope);
     int rows = out->height - 1;
+    if (isfinite(out->figures[BST_SENSOR_RAMP].value)) { /* subtracted with the bias frames */
+        return;
+    }
     if (!(fabs(slope.value) > CERTAIN * slope.sigma) || fabs(slope.value) * rows < 0.5) {
         out->method[BST_SENSOR_RAMP] = "none: the line through the rows has no certain slope";
         return;
@@ -154,6 +161,45 @@ static void measure_ramp(dark_signal *d) {
                 (float)(slope.value * (y - first));
         }
     }
+}
+
+/* Time of the read-out: the ramp over the dark current that packets pass in the time of a row, that
+ * of a typical column with its hot pixels. */
+static void measure_readout(dark_signal *d) {
+    bst_sensor_figures *out = d->out;
+    int width = out->width, height = out->height, known = 0;
+    double *columns = malloc((size_t)width * sizeof *columns);
+    out->method[BST_SENSOR_READOUT] = "none: no ramp over the rows";
+    const bst_sensor_estimate *ramp = &out->figures[BST_SENSOR_RAMP];
+    for (int x = 0; columns && isfinite(ramp->value) && x < width; x++) {
+        double sum = 0.0, n = 0.0;
+        for (int y = 0; y < height; y++) {
+            float v = d->map[(size_t)y * (size_t)width + (size_t)x];
+            sum += isnan(v) ? 0.0 : (double)v;
+            n += !isnan(v);
+        }
+        if (n > 0.5 * height) {
+            columns[known++] = sum / n;
+        }
+    }
+    if (known >= BST_STACK_BLOCKS) {
+        double parts[8];
+        for (int k = 0; k < 8; k++) {
+            int from = k * known / 8, to = (k + 1) * known / 8;
+            qsort(columns + from, (size_t)(to - from), sizeof *columns, bst_compare_doubles);
+            parts[k] = columns[(from + to) / 2];
+        }
+        qsort(columns, (size_t)known, sizeof *columns, bst_compare_doubles);
+        double typical = columns[known / 2], relative = bst_mean_estimate(parts, 8).sigma / typical;
+        double slope = fabs(ramp->value) / (height - 1);
+        double value = slope * height * d->stacks->dark.exposure_s / typical;
+        if (typical > 0.0 && relative < 0.2) {
+            out->figures[BST_SENSOR_READOUT] =
+                (bst_sensor_estimate){value, value * hypot(relative, ramp->sigma / ramp->value)};
+            out->method[BST_SENSOR_READOUT] = "ramp over the mean dark current of a typical column";
+        }
+    }
+    free(columns);
 }
 
 /* Mean and spread of the core, and the limit above which pixels are hot. */
@@ -183,24 +229,74 @@ static bst_clipped_moments measure_core(dark_signal *d, double per_s) {
     return core;
 }
 
-/* Median and other percentiles of the map. */
-static void measure_percentiles(dark_signal *d, double per_s) {
-    bst_sensor_figures *out = d->out;
-    size_t pixels = (size_t)out->width * (size_t)out->height, n = 0;
-    for (size_t i = 0; i < pixels; i++) {
-        if (!isnan(d->map[i])) {
-            d->scratch[n++] = d->map[i];
+/* Percentiles of the pixels of every step-th row from `first` on; returns the number of pixels,
+ * sorted in d->scratch. */
+static size_t percentiles_of(dark_signal *d, double per_s, int first, int step,
+                             double percentiles[BST_SENSOR_PERCENTILES]) {
+    size_t width = (size_t)d->out->width, n = 0;
+    for (int y = first; y < d->out->height; y += step) {
+        for (size_t x = 0; x < width; x++) {
+            float v = d->map[(size_t)y * width + x];
+            if (!isnan(v)) {
+                d->scratch[n++] = v;
+            }
         }
     }
     bst_sort_floats(d->scratch, n);
     for (int i = 0; i < BST_SENSOR_PERCENTILES && n > 0; i++) {
         size_t at = (size_t)(bst_sensor_percentiles[i] / 100.0 * (double)(n - 1) + 0.5);
-        out->percentiles_e_per_s[i] = d->scratch[at] * per_s;
+        percentiles[i] = d->scratch[at] * per_s;
     }
-    /* standard error of a median: sqrt(pi / 2) of that of a mean; the core's as above */
-    bst_sensor_estimate *median = &out->figures[BST_SENSOR_DARK_MEDIAN];
-    median->value = bst_sorted_median(d->scratch, n) * per_s;
-    median->sigma = 1.2533 * out->figures[BST_SENSOR_DARK].sigma;
+    return n;
+}
+
+/* Fits the detector's law of the dark currents if hot pixels are there but not separate: values of
+ * all pixels, errors from four groups of rows. */
+static void fit_distribution(dark_signal *d, double per_s) {
+    enum { GROUPS = 4, VALUES = 5 };
+    bst_sensor_figures *out = d->out;
+    const bst_sensor_figure figures[VALUES] = {BST_SENSOR_DARK, BST_SENSOR_DSNU,
+                                               BST_SENSOR_HOT_FRACTION, BST_SENSOR_HOT_MEDIAN,
+                                               BST_SENSOR_HOT_SPREAD};
+    double line = out->figures[BST_SENSOR_LINE_AMPLITUDE].value; /* still in DN, as the noise */
+    line = isfinite(line) ? 0.5 * line * line / d->stacks->dark.count : 0.0;
+    double ramp =
+        0.5 * fabs(out->figures[BST_SENSOR_RAMP].value) / out->figures[BST_SENSOR_GAIN].value;
+    ramp = isfinite(ramp) ? ramp : 0.0;
+    const bst_dark_noise noise = {(d->noise + line + ramp / d->stacks->dark.count) * per_s * per_s,
+                                  d->stacks->dark.exposure_s * d->stacks->dark.count};
+    bst_dark_distribution all, part;
+    double percentiles[BST_SENSOR_PERCENTILES];
+    percentiles_of(d, per_s, 0, 1, percentiles);
+    if (!bst_dark_distribution_fit(percentiles, &noise, NULL, &all)) {
+        return;
+    }
+    const double values[VALUES] = {all.dark, all.dsnu, all.hot_fraction, all.hot_median,
+                                   all.hot_spread_dex};
+    double groups[VALUES][GROUPS];
+    for (int g = 0; g < GROUPS; g++) {
+        percentiles_of(d, per_s, g, GROUPS, percentiles);
+        bst_dark_distribution_fit(percentiles, &noise, &all, &part);
+        const double found[VALUES] = {part.dark, part.dsnu, part.hot_fraction, part.hot_median,
+                                      part.hot_spread_dex};
+        for (int i = 0; i < VALUES; i++) {
+            groups[i][g] = found[i];
+        }
+    }
+    for (int i = 0; i < VALUES; i++) {
+        out->figures[figures[i]] =
+            (bst_sensor_estimate){values[i], bst_mean_estimate(groups[i], GROUPS).sigma};
+        out->method[figures[i]] =
+            "law of all pixels, fitted to the percentiles: hot pixels are not "
+            "separate from the others";
+    }
+}
+
+/* Median and other percentiles of the map, as it was read. */
+static void measure_percentiles(dark_signal *d, double per_s) {
+    bst_sensor_figures *out = d->out;
+    size_t n = percentiles_of(d, per_s, 0, 1, out->percentiles_e_per_s);
+    out->figures[BST_SENSOR_DARK_MEDIAN].value = bst_sorted_median(d->scratch, n) * per_s;
     out->method[BST_SENSOR_DARK_MEDIAN] = "median of all pixels that gather dark current";
 }
 
@@ -231,8 +327,15 @@ static void measure_hot(dark_signal *d, const bst_clipped_moments *core, double 
                             "below the limit";
     out->method[BST_SENSOR_HOT_FRACTION] = out->method[BST_SENSOR_HOT_MEDIAN] =
         out->method[BST_SENSOR_HOT_SPREAD] = how;
-    double median = out->percentiles_e_per_s[2] / per_s;
-    double spread = 0.5 * (out->percentiles_e_per_s[3] - out->percentiles_e_per_s[1]) / per_s;
+}
+
+/* Charge that trails hot pixels. Returns the median signal, DN. */
+static double measure_trail(dark_signal *d) {
+    bst_sensor_figures *out = d->out;
+    size_t pixels = (size_t)out->width * (size_t)out->height;
+    double percentiles[BST_SENSOR_PERCENTILES];
+    percentiles_of(d, 1.0, 0, 1, percentiles);
+    double median = percentiles[2], spread = 0.5 * (percentiles[3] - percentiles[1]);
     for (size_t i = 0; i < pixels; i++) {
         d->scratch[i] = d->map[i] - (float)median;
     }
@@ -245,6 +348,60 @@ static void measure_hot(dark_signal *d, const bst_clipped_moments *core, double 
         isfinite(out->trail.parallel.value)
             ? "median profile behind hot pixels less the one before them, 5 px"
             : "not determined: fewer than 50 isolated hot pixels of 20 standard deviations";
+    return median;
+}
+
+/* Fits traps to certain trails. */
+static void fit_traps(dark_signal *d, double median) {
+    bst_sensor_figures *out = d->out;
+    double ramp = fabs(out->figures[BST_SENSOR_RAMP].value);
+    double gain = out->figures[BST_SENSOR_GAIN].value;
+    bst_trap_fit_input input = {
+        .gain_e_per_dn = gain,
+        .background_e = gain * (median + (isfinite(ramp) ? 0.5 * ramp : 0.0))};
+    const bst_sensor_estimate *parallel = &out->trail.parallel, *serial = &out->trail.serial;
+    bool ramp_up = !(out->figures[BST_SENSOR_RAMP].value < 0.0);
+    out->traps.top = !ramp_up;
+    if (parallel->value > CERTAIN * parallel->sigma &&
+        (!isfinite(ramp) || ramp_up == out->trail.parallel_up)) {
+        out->traps.top = !out->trail.parallel_up;
+        input.transfers = out->height / 2;
+        out->trap_misfit[0] = bst_trap_fit(&out->trail, true, &input, &out->traps.parallel);
+    }
+    if (serial->value > CERTAIN * serial->sigma) {
+        out->traps.right = !out->trail.serial_right;
+        input.transfers = out->width / 2;
+        out->trap_misfit[1] = bst_trap_fit(&out->trail, false, &input, &out->traps.serial);
+    }
+}
+
+/* Takes the charge that traps deferred back to its pixels. */
+static bst_status correct_transfer(bst_ctx *ctx, dark_signal *d) {
+    bst_sensor_figures *out = d->out;
+    size_t width = (size_t)out->width, pixels = width * (size_t)out->height;
+    float gain = (float)out->figures[BST_SENSOR_GAIN].value;
+    if (!bst_detector_has_traps(&out->traps.parallel) &&
+        !bst_detector_has_traps(&out->traps.serial)) {
+        return BST_OK;
+    }
+    float *image = malloc(3 * pixels * sizeof *image);
+    if (!image) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
+    }
+    double ramp = out->figures[BST_SENSOR_RAMP].value / (out->height - 1);
+    ramp = isfinite(ramp) ? ramp : 0.0;
+    int first = ramp < 0.0 ? out->height - 1 : 0;
+    for (size_t i = 0; i < pixels; i++) {
+        float e = gain * (d->map[i] + (float)(ramp * ((int)(i / width) - first)));
+        image[i] = isnan(e) ? 0.0F : e;
+        d->scratch[i] = image[i];
+    }
+    bst_trap_model_undo(&out->traps, out->width, out->height, image, image + pixels);
+    for (size_t i = 0; i < pixels; i++) {
+        d->map[i] += (image[i] - d->scratch[i]) / gain;
+    }
+    free(image);
+    return BST_OK;
 }
 
 /* Temporal variance of the map without the dark's shot noise. */
@@ -257,20 +414,29 @@ static double map_noise(const dark_signal *d) {
     return one / dark->count + (bias->count > 0 ? one / bias->count : 0.0);
 }
 
-static void measure_all(dark_signal *d) {
+static bst_status measure_all(bst_ctx *ctx, dark_signal *d) {
     bst_sensor_figures *out = d->out;
     double per_s = out->figures[BST_SENSOR_GAIN].value / d->stacks->dark.exposure_s;
     subtract_level(d);
     exclude_shielded(d);
     measure_ramp(d);
     d->noise = map_noise(d);
-    bst_clipped_moments core = measure_core(d, per_s);
     measure_percentiles(d, per_s);
+    fit_traps(d, measure_trail(d));
+    BST_TRY(correct_transfer(ctx, d));
+    bst_clipped_moments core = measure_core(d, per_s);
+    /* standard error of a median: sqrt(pi / 2) of that of a mean; the core's as above */
+    out->figures[BST_SENSOR_DARK_MEDIAN].sigma = 1.2533 * out->figures[BST_SENSOR_DARK].sigma;
+    measure_readout(d);
     measure_hot(d, &core, per_s);
+    if (out->hot_found >= LEAST_HOT && !isfinite(out->figures[BST_SENSOR_HOT_MEDIAN].value)) {
+        fit_distribution(d, per_s);
+    }
     size_t pixels = (size_t)out->width * (size_t)out->height;
     for (size_t i = 0; i < pixels; i++) {
         d->map[i] *= (float)per_s;
     }
+    return BST_OK;
 }
 
 bst_status bst_sensor_measure_dark(bst_ctx *ctx, const bst_sensor_stacks *s,
@@ -279,18 +445,20 @@ bst_status bst_sensor_measure_dark(bst_ctx *ctx, const bst_sensor_stacks *s,
         for (int i = BST_SENSOR_DARK; i <= BST_SENSOR_HOT_SPREAD; i++) {
             out->method[i] = "not determined: needs darks, and bias frames or an overscan";
         }
-        out->method[BST_SENSOR_RAMP] = out->method[BST_SENSOR_PARALLEL_TRAIL] =
+        out->method[BST_SENSOR_READOUT] = out->method[BST_SENSOR_PARALLEL_TRAIL] =
             out->method[BST_SENSOR_SERIAL_TRAIL] = out->method[BST_SENSOR_DARK];
+        if (!isfinite(out->figures[BST_SENSOR_RAMP].value)) {
+            out->method[BST_SENSOR_RAMP] = out->method[BST_SENSOR_DARK];
+        }
         return BST_OK;
     }
     size_t pixels = (size_t)out->width * (size_t)out->height;
     dark_signal d = {.stacks = s, .out = out};
     out->dark_map = d.map = malloc(pixels * sizeof *d.map);
     d.scratch = malloc(pixels * sizeof *d.scratch);
-    if (d.map && d.scratch) {
-        measure_all(&d);
-    }
+    bst_status status = d.map && d.scratch
+                            ? measure_all(ctx, &d)
+                            : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
     free(d.scratch);
-    return d.map && d.scratch ? BST_OK
-                              : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
+    return status;
 }

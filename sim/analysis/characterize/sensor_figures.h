@@ -5,6 +5,7 @@
 #include "sim/analysis/characterize/frame_stack.h"
 #include "sim/analysis/characterize/hot_pixels.h"
 #include "sim/analysis/characterize/pick_up_line.h"
+#include "sim/analysis/characterize/trap_correction.h"
 
 /* Quantities, in the order of the report. */
 typedef enum bst_sensor_figure {
@@ -25,8 +26,10 @@ typedef enum bst_sensor_figure {
     BST_SENSOR_DEAD_FRACTION,
     BST_SENSOR_BAD_COLUMNS,
     BST_SENSOR_RAMP,
+    BST_SENSOR_READOUT,
     BST_SENSOR_LINE_FREQUENCY,
     BST_SENSOR_LINE_AMPLITUDE,
+    BST_SENSOR_LINE_PHASE,
     BST_SENSOR_PARALLEL_TRAIL,
     BST_SENSOR_SERIAL_TRAIL,
     BST_SENSOR_FIGURES
@@ -46,12 +49,15 @@ typedef struct bst_sensor_figures {
     bst_sensor_estimate figures[BST_SENSOR_FIGURES];
     const char *method[BST_SENSOR_FIGURES]; /* how it was found, or why it was not; static text */
     bool gain_of_header;
+    bool noise_of_pairs; /* read noise by differences of frames, otherwise of neighbours */
     int width, height;
     int shielded_columns; /* columns of the image that gather no dark current */
     double percentiles_e_per_s[BST_SENSOR_PERCENTILES]; /* of the dark current; NAN: no dark */
     int64_t hot_found;
     double hot_limit_e_per_s;
     bst_charge_trail trail;
+    bst_trap_model traps;  /* that leave the trails; none if they are not certain */
+    double trap_misfit[2]; /* RMS of parallel and serial ones, shares of charge */
     bst_pick_up_line line;
     float *dark_map; /* [height][width] e-/s; NULL: none */
     float *prnu_map; /* [height][width] relative to 1; NULL: none */

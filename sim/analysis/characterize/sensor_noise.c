@@ -7,6 +7,8 @@
 /* Variance of rounding to whole numbers, DN^2. */
 static const double ROUNDING = 1.0 / 12.0;
 static const double CLIP = 5.0;
+/* Least significance of a ramp over the rows. */
+static const double CERTAIN = 5.0;
 
 /* Read noise by pairs of bias frames. */
 static void noise_of_pairs(const bst_frame_stack *bias, bst_sensor_figures *out) {
@@ -43,9 +45,34 @@ static void noise_of_neighbours(const float *pixels, int width, int height, bool
     out->figures[BST_SENSOR_READ_NOISE] = bst_root_estimate(v);
 }
 
-/* Mean of each column or row of a map, clipped, and the variance among them. */
+/* Subtracts a line through values with a certain slope. Returns its rise from the first to the last
+ * value; NAN: none. */
+static bst_sensor_estimate subtract_line(double *values, int count) {
+    double middle = 0.5 * (count - 1), sxx = middle * (count + 1) * count / 6.0, b = 0.0,
+           rest = 0.0;
+    double mean = 0.0;
+    for (int i = 0; i < count; i++) {
+        mean += values[i] / count;
+        b += (i - middle) * values[i] / sxx;
+    }
+    for (int i = 0; i < count; i++) {
+        double r = values[i] - mean - b * (i - middle);
+        rest += r * r / (count - 2);
+    }
+    double sigma = sqrt(rest / sxx);
+    if (!(fabs(b) > CERTAIN * sigma) || fabs(b) * (count - 1) < 0.5) {
+        return (bst_sensor_estimate){NAN, NAN};
+    }
+    for (int i = 0; i < count; i++) {
+        values[i] -= b * (i - middle);
+    }
+    return (bst_sensor_estimate){b * (count - 1), sigma * (count - 1)};
+}
+
+/* Mean of each column or row of a map, clipped, and the variance among them; of rows, the ramp is
+ * not part of it. */
 static bst_sensor_estimate offsets_of(const float *map, int width, int height, bool columns,
-                                      double noise, float *scratch) {
+                                      double noise, float *scratch, bst_sensor_estimate *ramp) {
     int lines = columns ? width : height, along = columns ? height : width;
     size_t step = columns ? (size_t)width : 1, next = columns ? 1 : (size_t)width;
     double *means = malloc((size_t)lines * sizeof *means);
@@ -60,12 +87,33 @@ static bst_sensor_estimate offsets_of(const float *map, int width, int height, b
         means[i] = bst_clipped_moments_of(scratch, (size_t)along, CLIP).mean;
         mean += means[i] / lines;
     }
+    if (ramp) {
+        *ramp = subtract_line(means, lines);
+    }
     for (int i = 0; i < lines; i++) {
         variance += (means[i] - mean) * (means[i] - mean) / (lines - 1);
     }
     free(means);
     return bst_root_estimate(
         (bst_sensor_estimate){variance - noise, sqrt(2.0 / (lines - 1)) * variance});
+}
+
+/* Standard error of the level from blocks of a frame without its ramp. */
+static double offset_error(const float *mean, int width, int height, double ramp, float *scratch) {
+    double parts[BST_STACK_BLOCKS];
+    for (int k = 0; k < BST_STACK_BLOCKS; k++) {
+        int from = (int)((int64_t)k * height / BST_STACK_BLOCKS);
+        int to = (int)((int64_t)(k + 1) * height / BST_STACK_BLOCKS);
+        size_t n = 0;
+        for (int y = from; y < to; y++) {
+            for (int x = 0; x < width; x++) {
+                double line = ramp * y / (height - 1.0);
+                scratch[n++] = mean[(size_t)y * (size_t)width + (size_t)x] - (float)line;
+            }
+        }
+        parts[k] = bst_clipped_moments_of(scratch, n, CLIP).mean;
+    }
+    return bst_mean_estimate(parts, BST_STACK_BLOCKS).sigma;
 }
 
 /* Level of the bias frames, its drift, and fixed offsets of columns and rows. */
@@ -76,10 +124,17 @@ static void measure_level(const bst_frame_stack *bias, float *scratch, bst_senso
     double pixel =
         bias->pairs > 0 ? bst_mean_estimate(bias->variance, BST_STACK_BLOCKS).value : 0.0;
     double row = bias->pairs > 0 ? fmax(bias->row_variance, 0.0) : 0.0;
-    bst_sensor_estimate column =
-        offsets_of(bias->mean, bias->width, bias->height, true, pixel / n / bias->height, scratch);
+    bst_sensor_estimate ramp = {NAN, NAN};
+    bst_sensor_estimate column = offsets_of(bias->mean, bias->width, bias->height, true,
+                                            pixel / n / bias->height, scratch, NULL);
     bst_sensor_estimate fixed_row = offsets_of(bias->mean, bias->width, bias->height, false,
-                                               pixel / n / bias->width + row / n, scratch);
+                                               pixel / n / bias->width + row / n, scratch, &ramp);
+    if (isfinite(ramp.value)) { /* the level is that of the row that is read first */
+        out->figures[BST_SENSOR_RAMP] = ramp;
+        out->method[BST_SENSOR_RAMP] = "line through the rows of the mean bias frame";
+        level.value -= 0.5 * fabs(ramp.value);
+        level.sigma = offset_error(bias->mean, bias->width, bias->height, ramp.value, scratch);
+    }
     if (bias->pairs > 0) {
         out->figures[BST_SENSOR_COLUMN_OFFSET] = column;
         out->figures[BST_SENSOR_ROW_OFFSET] = fixed_row;
@@ -111,15 +166,14 @@ static void measure_level(const bst_frame_stack *bias, float *scratch, bst_senso
     out->method[BST_SENSOR_OFFSET_DRIFT] = "line through the levels of the bias frames";
 }
 
-/* Last frame without the levels of its rows and of the columns of all frames. */
-static void level_rows(const bst_frame_stack *s, float *rows, float *scratch) {
+/* Last frame, or its difference from the mean of all, without the levels of its rows and columns.
+ * The difference lacks fixed patterns, but also pick-up of equal phases. */
+static void level_rows(const bst_frame_stack *s, bool difference, float *rows, float *scratch) {
     size_t width = (size_t)s->width;
-    float share = s->count > 1 ? sqrtf((float)s->count / (float)(s->count - 1)) : 1.0F;
     for (int y = 0; y < s->height; y++) {
         size_t at = (size_t)y * width;
         for (size_t x = 0; x < width; x++) {
-            rows[at + x] =
-                s->count > 1 ? share * (s->last[at + x] - s->mean[at + x]) : s->last[at + x];
+            rows[at + x] = s->last[at + x] - (difference ? s->mean[at + x] : 0.0F);
             scratch[x] = rows[at + x];
         }
         float level = (float)bst_clipped_moments_of(scratch, width, CLIP).mean;
@@ -127,7 +181,7 @@ static void level_rows(const bst_frame_stack *s, float *rows, float *scratch) {
             rows[at + x] -= level;
         }
     }
-    for (size_t x = 0; x < width && s->count == 1; x++) {
+    for (size_t x = 0; x < width; x++) {
         for (int y = 0; y < s->height; y++) {
             scratch[y] = rows[(size_t)y * width + x];
         }
@@ -146,8 +200,17 @@ static bst_status measure_line(bst_ctx *ctx, const bst_frame_stack *s, float *sc
     if (!rows) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
     }
-    level_rows(s, rows, scratch);
+    level_rows(s, s->count > 1, rows, scratch);
     bst_status status = bst_pick_up_line_find(ctx, rows, s->width, s->height, &out->line);
+    if (status == BST_OK && s->count > 1) {
+        level_rows(s, false, rows, scratch);
+        if (out->line.found) {
+            status = bst_pick_up_line_amplitude(ctx, rows, s->width, s->height, &out->line);
+        } else {
+            free(out->line.power);
+            status = bst_pick_up_line_find(ctx, rows, s->width, s->height, &out->line);
+        }
+    }
     free(rows);
     BST_TRY(status);
     out->figures[BST_SENSOR_LINE_FREQUENCY] = out->line.frequency;
@@ -155,6 +218,11 @@ static bst_status measure_line(bst_ctx *ctx, const bst_frame_stack *s, float *sc
     const char *how = out->line.found ? "mean spectrum of the rows"
                                       : "none: no line above 7 standard deviations of the spectrum";
     out->method[BST_SENSOR_LINE_FREQUENCY] = out->method[BST_SENSOR_LINE_AMPLITUDE] = how;
+    out->figures[BST_SENSOR_LINE_PHASE] = out->line.phase;
+    out->method[BST_SENSOR_LINE_PHASE] =
+        out->line.found && isnan(out->line.phase.value)
+            ? "none: less than half of the line's power has one phase from row to row"
+            : how;
     return BST_OK;
 }
 
@@ -168,6 +236,7 @@ bst_status bst_sensor_measure_noise(bst_ctx *ctx, const bst_sensor_stacks *s,
     }
     if (s->bias.pairs > 0) {
         noise_of_pairs(&s->bias, out);
+        out->noise_of_pairs = true;
     } else if (s->dark.count > 0 && s->dark.overscan_width > 1) {
         noise_of_neighbours(s->dark.overscan, s->dark.overscan_width, s->dark.height,
                             s->dark.integer, scratch, out);

@@ -80,7 +80,9 @@ static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
                                        s->file, i, k);
             }
             bool image = bst_camera_prepare(ctx, camera) == BST_OK;
-            if (!image || bst_detector_config_check(ctx, &camera->detector) != BST_OK) {
+            if (!image || bst_detector_config_check(ctx, &camera->detector) != BST_OK ||
+                bst_detector_config_check_size(ctx, &camera->detector, camera->width_px,
+                                               camera->height_px) != BST_OK) {
                 return bst_fail_prefix(ctx, BST_ERR_CONFIG,
                                        "%s: /observers/%d/sensors/%d/camera/%s", s->file, i, k,
                                        image ? "detector" : "distortion");

@@ -317,7 +317,7 @@ static void fill_header(const bst_field *field, const query *q, bst_truth *truth
     truth->boresight_x_px = bst_camera_centre_x(camera);
     truth->boresight_y_px = bst_camera_centre_y(camera);
     truth->background_e = bst_camera_background_e_per_s(camera) * q->exposure_s;
-    truth->dark_e = bst_camera_dark_e_per_s(camera) * q->exposure_s;
+    truth->dark_e = bst_camera_dark_e_per_s(camera) * q->exposure_s + bst_camera_readout_e(camera);
 }
 
 /* Computes the cone of directions that contains the window. */
@@ -361,6 +361,10 @@ static bst_status find_background(bst_ctx *ctx, bst_field *field, const query *q
         if (bst_detector_config_whole_columns(&camera->detector)) {
             lit.y0 = 0;
             lit.height = (int)camera->height_px;
+        }
+        if (bst_detector_config_whole_sensor(&camera->detector)) {
+            lit.x0 = 0;
+            lit.width = (int)camera->width_px;
         }
         BST_TRY(bst_skylight_make(ctx, field->skylight, &around, lit, &field->map));
         truth->background_e = bst_skylight_at(field->map, window.x0 + 0.5 * (window.width - 1),

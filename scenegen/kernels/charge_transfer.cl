@@ -1,0 +1,117 @@
+/* Charge-transfer inefficiency: traps capture charge of the packets that pass them and release it
+ * into later ones (Short et al. 2013, MNRAS 430, 3078, equations 23 and 24, with a capture that is
+ * much faster than a transfer). A packet of q electrons that is transferred n times meets n density
+ * q^exponent traps; all of these share one state, so that the cost is that of one pass over the
+ * pixels. One work-item per 64 columns or 16 rows. */
+
+/* Charge of packets and traps below this, e-, is neither captured nor followed. */
+#define TRAP_LEAST 0.01f
+
+/* 2^x for |x| < 126, to 2e-7: a polynomial for the fraction (Taylor's, by Horner), the exponent's
+ * bits for the rest. */
+INLINE float16 power_of_two(float16 x) {
+    float16 whole = rint(x), f = (x - whole) * 0.69314718f;
+    float16 y = fma(f, fma(f, fma(f, fma(f, fma(f, (float16)(1.0f / 720), (float16)(1.0f / 120)),
+                                         (float16)(1.0f / 24)),
+                                  (float16)(1.0f / 6)),
+                           (float16)0.5f),
+                    (float16)1.0f);
+    y = fma(f, y, (float16)1.0f);
+    return as_float16(as_int16(y) + (convert_int16(whole) << 23));
+}
+
+/* Logarithm to base 2 of v > 0: exponent, and 2 atanh(s), s = (m - 1) / (m + 1), of the mantissa m in
+ * [sqrt(1/2), sqrt(2)); the series' first neglected term is 1e-8. */
+INLINE float16 log_two(float16 v) {
+    int16 bits = as_int16(v) - 0x3F3504F3, exponent = bits >> 23;
+    float16 m = as_float16((bits & 0x007FFFFF) + 0x3F3504F3);
+    float16 s = (m - 1.0f) / (m + 1.0f), q = s * s;
+    float16 series = fma(q, fma(q, fma(q, (float16)(2.0f / 7), (float16)(2.0f / 5)), (float16)(2.0f / 3)),
+                         (float16)2.0f);
+    return fma(s * series, (float16)1.44269504f, convert_float16(exponent));
+}
+
+/* A packet of 16 columns or rows on its way to the output. held: charge in the traps. */
+INLINE float16 pass_traps(bst_kernel_trap_params p, float transfers, float16 q, float16 *held) {
+    for (int k = 0; k < p.kinds; k++) {
+        float16 least = fmax(q, TRAP_LEAST);
+        float16 g = transfers * p.density[k] * power_of_two((p.exponent - 1.0f) * log_two(least));
+        float16 caught = fmax(fma(g, q, -held[k]) / (g + 1.0f), 0.0f);
+        caught = select((float16)0.0f, caught, q > TRAP_LEAST);
+        held[k] += caught;
+        float16 released = held[k] * p.release[k];
+        held[k] -= released;
+        q += released - caught;
+    }
+    return q;
+}
+
+/* True if a packet or its traps hold charge worth following. */
+INLINE int has_charge(bst_kernel_trap_params p, float16 q, const float16 *held) {
+    for (int k = 0; k < p.kinds; k++) {
+        q = fmax(q, held[k]);
+    }
+    return any_of(q > TRAP_LEAST);
+}
+
+/* Transfers along columns. Four vectors side by side: each waits for its own packet before. */
+__attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_detector_parallel(
+    bst_kernel_trap_params p, global float *image) {
+    int x = (int)get_global_id(0) * 64;
+    if (x >= p.stride) {
+        return;
+    }
+    float16 held[4][BST_TRAP_KINDS];
+    for (int k = 0; k < BST_TRAP_KINDS; k++) {
+        held[0][k] = held[1][k] = held[2][k] = held[3][k] = (float16)0.0f;
+    }
+    for (int n = 0; n < p.height; n++) {
+        int y = p.backwards ? p.height - 1 - n : n;
+        global float16 *at = (global float16 *)(image + (size_t)y * p.stride + x);
+        float16 q[4] = {at[0], at[1], at[2], at[3]};
+        if (has_charge(p, q[0], held[0]) | has_charge(p, q[1], held[1]) |
+            has_charge(p, q[2], held[2]) | has_charge(p, q[3], held[3])) {
+            at[0] = pass_traps(p, (float)(n + 1), q[0], held[0]);
+            at[1] = pass_traps(p, (float)(n + 1), q[1], held[1]);
+            at[2] = pass_traps(p, (float)(n + 1), q[2], held[2]);
+            at[3] = pass_traps(p, (float)(n + 1), q[3], held[3]);
+        }
+    }
+}
+
+/* Transfers along rows. */
+__attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_detector_serial(
+    bst_kernel_trap_params p, global float *image) {
+    int y = (int)get_global_id(0) * 16, rows = min(p.height - y, 16);
+    if (rows <= 0) {
+        return;
+    }
+    float16 held[BST_TRAP_KINDS];
+    for (int k = 0; k < BST_TRAP_KINDS; k++) {
+        held[k] = (float16)0.0f;
+    }
+    for (int n = 0; n < p.width; n += 16) {
+        /* of a last block of fewer columns the others, beyond the end, are read as 0 */
+        int columns = min(p.width - n, 16), first = p.backwards ? p.width - 1 - n : n;
+        int step = p.backwards ? -1 : 1;
+        float block[16][16]; /* [transfer][row] */
+        for (int r = 0; r < 16; r++) {
+            global const float *row = image + (size_t)(y + min(r, rows - 1)) * p.stride + first;
+            for (int c = 0; c < 16; c++) {
+                block[c][r] = c < columns ? row[c * step] : 0.0f;
+            }
+        }
+        for (int c = 0; c < 16; c++) {
+            float16 q = vload16(0, block[c]);
+            if (has_charge(p, q, held)) {
+                vstore16(pass_traps(p, (float)(n + c + 1), q, held), 0, block[c]);
+            }
+        }
+        for (int r = 0; r < rows; r++) {
+            global float *row = image + (size_t)(y + r) * p.stride + first;
+            for (int c = 0; c < columns; c++) {
+                row[c * step] = block[c][r];
+            }
+        }
+    }
+}
