@@ -131,6 +131,34 @@ static int brightest_of(const measuring *m) {
     return best;
 }
 
+/* Value between the samples, at (x, y) samples. */
+static double between(const measuring *m, double x, double y) {
+    int i = (int)floor(x), j = (int)floor(y);
+    double u = x - i, v = y - j, sum = 0.0;
+    for (int k = 0; k < 4; k++) {
+        int at = ((j + k / 2 + SIDE) % SIDE) * SIDE + (i + k % 2 + SIDE) % SIDE;
+        sum += (k % 2 ? u : 1.0 - u) * (k / 2 ? v : 1.0 - v) * (double)m->room[at][0];
+    }
+    return sum;
+}
+
+/* Lowers the light beside the peak to that of a field node, whose image is in the room. */
+static void add_light(const measuring *m, double sigma_px, bst_psf_sensitivity *out) {
+    int top = brightest_of(m);
+    double x = top % SIDE, y = top / SIDE, per = 1.0 / (double)m->room[top][0];
+    double step = SIDE * m->step * sigma_px / BST_LIGHT_PER; /* samples */
+    for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
+        double angle = d * BST_PI / BST_NODE_DIRECTIONS, least = 1.0;
+        double dx = step * cos(angle), dy = step * sin(angle);
+        for (int n = 0; n < BST_LIGHT_STEPS; n++) {
+            double before = n * step < SIDE / 2 ? between(m, x - n * dx, y - n * dy) : 0.0;
+            double after = n * step < SIDE / 2 ? between(m, x + n * dx, y + n * dy) : 0.0;
+            least = fmin(least, fmax(fmin(before, after) * per, 0.0));
+            out->light[d][n] = fmin(out->light[d][n], least);
+        }
+    }
+}
+
 /* Raises the sensitivities to those of a field node. */
 static void measure_node(measuring *m, const bst_psf *psf, int node, double sigma_px,
                          bst_psf_sensitivity *out) {
@@ -140,6 +168,7 @@ static void measure_node(measuring *m, const bst_psf *psf, int node, double sigm
     }
     make_images(m, 0.0, 0.0, (const int[2]){0, 2});
     double peak = greatest_near(m, brightest_of(m), 0);
+    add_light(m, sigma_px, out);
     for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
         double angle = d * BST_PI / BST_NODE_DIRECTIONS, *part = out->part[d];
         make_images(m, angle, SMOOTHED * square, (const int[2]){0, 2});
@@ -160,6 +189,9 @@ bst_status bst_psf_sensitivity_measure(bst_ctx *ctx, const bst_psf *psf, double 
     assert(psf && cutoff > 0.0 && sigma_px > 0.0 && out);
     measuring *m = calloc(1, sizeof *m);
     *out = (bst_psf_sensitivity){.part = {{0.0}}};
+    for (int k = 0; k < BST_NODE_DIRECTIONS * BST_LIGHT_STEPS; k++) {
+        out->light[k / BST_LIGHT_STEPS][k % BST_LIGHT_STEPS] = 1.0;
+    }
     bst_status status = BST_OK;
     if (m) {
         m->step = 2.0 * cutoff / LATTICE;

@@ -15,6 +15,9 @@ typedef struct bst_psf_sensitivity {
     /* the same of order 4 and 6 in the image of a streak of equal groups of nodes, by the groups
      * per px, BST_ROW_STEPS of them up to most_per_px */
     double row[BST_NODE_DIRECTIONS][BST_ROW_STEPS][2], most_per_px;
+    /* least light up to n / BST_LIGHT_PER sigma from the peak along the direction, to either side,
+     * over that of the peak */
+    double light[BST_NODE_DIRECTIONS][BST_LIGHT_STEPS];
     /* in pixels of a brightness class: greatest derivative, and greatest derivative over the square
      * root of light, both over those of the brightest pixel */
     double flank[BST_LIGHT_CLASSES], noisy[BST_LIGHT_CLASSES];

@@ -32,6 +32,7 @@ bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_path
         aim.direction_part = s->sensitivity->part;
         aim.row_part = s->sensitivity->row;
         aim.most_per_px = s->sensitivity->most_per_px;
+        aim.light_part = s->sensitivity->light;
         aim.turns = turns;
         aim.unlike_rad = (turns ? asin(more / (2.0 + more)) : 0.0) + distorted;
     }

@@ -180,12 +180,12 @@ static void set_kernel(const bst_smear_maker *m, const group *g, const bst_smear
 
 /* Raises the list's errors to those of a rule for a group with this axis; returns its predicted
  * error. Of the missed moment's error, either bound holds: the smoothed sum of the moduli, or the
- * greatest derivative of a group and of a row of groups. */
+ * smoothed greatest derivative of a group, and that of a row of groups. */
 static double raise_error(const bst_smear_maker *m, const double axis[3], const bst_smear_rule *r) {
     bst_smear_node_list *list = m->list;
     double part[BST_NODE_SCALES];
-    bst_smear_missed_parts(m, r, part);
     bst_smear_direction_parts along = bst_smear_find_direction_parts(m, axis, r->nodes);
+    bst_smear_missed_parts(m, &along, r, part);
     double square = 1.0 / (1 << (BST_NODE_SCALES - 2));
     for (int k = 0; k < BST_NODE_SCALES; k++, square *= 2.0) {
         double fourth = square * square;
@@ -194,8 +194,9 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
         double higher = (r->error - r->missed - r->fixed) * low;
         double missed = r->missed * (r->nodes == 3 ? fourth * square : fourth);
         double bound = fixed + higher + missed;
-        if (along.missed < part[k]) {
-            part[k] = fmin(bst_smear_row_part(m, &along, r, sqrt(square)), part[k]);
+        if (along.missed < 1.0) { /* the length of a group smooths in any direction */
+            double one = along.missed * part[k];
+            part[k] = fmin(bst_smear_row_part(m, &along, r, sqrt(square), one), part[k]);
         }
         double predicted = along.second * fixed + along.higher * higher + part[k] * missed;
         list->error[k] = bound > list->error[k] ? bound : list->error[k];
@@ -324,6 +325,7 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
         .direction_part = aim->direction_part,
         .row_part = aim->row_part,
         .most_per_px = aim->most_per_px,
+        .light_part = aim->light_part,
         .turns = aim->turns,
         .unlike_rad = aim->unlike_rad,
         /* mean over the boresight and four corners: full scale, and 1 / wide^2 across */

@@ -51,6 +51,10 @@ typedef struct bst_smear_node_list {
 /* Directions for which the PSF's derivatives are known: pi d / BST_NODE_DIRECTIONS from x. */
 enum { BST_NODE_DIRECTIONS = 12, BST_ROW_STEPS = 32 };
 
+/* Distances from a PSF's peak for which its light is known: BST_LIGHT_STEPS of 1 / BST_LIGHT_PER
+ * sigma. */
+enum { BST_LIGHT_STEPS = 49, BST_LIGHT_PER = 8 };
+
 /* Requirements of the nodes. */
 typedef struct bst_smear_node_aim {
     double psf_sigma_px;
@@ -75,6 +79,8 @@ typedef struct bst_smear_node_aim {
     /* with it, along a row of equal groups: order 4 and 6 by groups per px, up to most_per_px */
     const double (*row_part)[BST_ROW_STEPS][2]; /* [BST_NODE_DIRECTIONS] */
     double most_per_px;
+    /* with it, least light up to a distance from the PSF's peak, over that of the peak */
+    const double (*light_part)[BST_LIGHT_STEPS]; /* [BST_NODE_DIRECTIONS] */
     bool turns;
     double unlike_rad;
 } bst_smear_node_aim;

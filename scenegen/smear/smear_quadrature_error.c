@@ -65,11 +65,11 @@ bst_smear_direction_parts bst_smear_find_direction_parts(const bst_smear_maker *
 }
 
 double bst_smear_row_part(const bst_smear_maker *m, const bst_smear_direction_parts *parts,
-                          const bst_smear_rule *r, double scale) {
+                          const bst_smear_rule *r, double scale, double one) {
     if (!m->direction_part || r->nodes < 2) {
-        return parts->missed;
+        return one;
     }
-    double low = r->node[0], high = r->node[0], worst = parts->missed;
+    double low = r->node[0], high = r->node[0], worst = one;
     for (int i = 1; i < r->nodes; i++) {
         low = fmin(low, r->node[i]);
         high = fmax(high, r->node[i]);

@@ -19,8 +19,9 @@ typedef struct bst_smear_maker {
     double wide_field; /* as in bst_smear_node_aim */
     double curvature;
     double binned_variance, further_variance, pixel_part[3];
-    const double (*direction_part)[3]; /* this and the next four as in bst_smear_node_aim */
+    const double (*direction_part)[3]; /* this and the next five as in bst_smear_node_aim */
     const double (*row_part)[BST_ROW_STEPS][2];
+    const double (*light_part)[BST_LIGHT_STEPS];
     double most_per_px;
     bool turns;
     double unlike_rad;
@@ -77,11 +78,6 @@ void bst_smear_set_kernel(const bst_smear_moments *g, const double high[2], bst_
 /* Largest variance of that kernel, px^2. */
 double bst_smear_most_kernel(const bst_smear_rule *r);
 
-/* Parts of the missed moment's error that remain if the image moves by 2^((k - BST_NODE_SCALES + 2)
- * / 2) of the path: below 1 for groups as long as the PSF is wide. */
-void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_rule *r,
-                            double part[BST_NODE_SCALES]);
-
 /* Parts of a rule's errors that the PSF's derivatives along the group's axis leave of the bound,
  * which takes those of the direction in which the PSF is narrowest. */
 typedef struct bst_smear_direction_parts {
@@ -89,13 +85,21 @@ typedef struct bst_smear_direction_parts {
     bool in_range[BST_NODE_DIRECTIONS]; /* directions in which the image may move */
 } bst_smear_direction_parts;
 
+/* Parts of the missed moment's error that remain if the image moves by 2^((k - BST_NODE_SCALES + 2)
+ * / 2) of the path: below 1 for groups as long as the PSF is wide.
+ *
+ * Given:     along  directions in which the image may move */
+void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_direction_parts *along,
+                            const bst_smear_rule *r, double part[BST_NODE_SCALES]);
+
 /* Parts of the errors of a rule of `nodes` nodes for a group with this axis: 1 without the PSF's
  * derivatives. */
 bst_smear_direction_parts bst_smear_find_direction_parts(const bst_smear_maker *m,
                                                          const double axis[3], int nodes);
-/* The part of `missed` in a row of such groups, if the image moves by `scale` of the path. */
+/* The part of `missed` in a row of such groups, if the image moves by `scale` of the path. one:
+ * that of a group alone, below which it is not. */
 double bst_smear_row_part(const bst_smear_maker *m, const bst_smear_direction_parts *parts,
-                          const bst_smear_rule *r, double scale);
+                          const bst_smear_rule *r, double scale, double one);
 
 /* Replaces *best by the rule with the fewest nodes that meets the tolerance, otherwise by the best
  * of three nodes. Rules with an error beyond `limit` are ignored. */

@@ -330,34 +330,77 @@ static double neighbours_part(double v) {
     return 1.0 + 0.08 * fmin(fmax((0.2 - v) / 0.08, 0.0), 1.0);
 }
 
-void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_rule *r,
-                            double part[BST_NODE_SCALES]) {
+/* Least light at a distance from a point's peak, over that of the peak. */
+static double light_at(const bst_smear_maker *m, const bst_smear_direction_parts *along,
+                       double distance_px) {
+    double at = distance_px * BST_LIGHT_PER / sqrt(m->variance), least = 1.0;
+    if (!(at < BST_LIGHT_STEPS - 1)) {
+        return 0.0;
+    }
+    int n = (int)at;
+    for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
+        if (along->in_range[d]) {
+            const double *light = m->light_part[d] + n;
+            least = fmin(least, light[0] + (at - n) * (light[1] - light[0]));
+        }
+    }
+    return least;
+}
+
+/* Light that the nodes of a group have where others are, for images that move by the path or a part
+ * of it: that of a Gaussian as narrow as the PSF's derivatives require, or of the PSF, which is
+ * wider. */
+typedef struct node_light {
+    double distance_px[3][3], gaussian[3][3];
+} node_light;
+
+static void begin_light(const bst_smear_maker *m, const bst_smear_rule *r, double square,
+                        node_light *l) {
+    double lit = m->variance + m->binned_variance, bend = norm3(r->bend);
+    for (int i = 0; i < r->nodes; i++) {
+        for (int j = 0; j < i; j++) {
+            double x = r->node[i] - r->node[j], y = bend * (r->curve[i] - r->curve[j]);
+            double apart = square * (x * x + y * y);
+            l->gaussian[i][j] = exp(-0.5 * apart / lit);
+            l->distance_px[i][j] = m->light_part ? sqrt(apart) : 0.0;
+        }
+    }
+}
+
+/* Light of the brightest node; then the next scale, of twice the square. */
+static double next_peak(const bst_smear_maker *m, const bst_smear_direction_parts *along,
+                        const bst_smear_rule *r, node_light *l) {
+    double here[3] = {r->weight[0], r->weight[1], r->weight[2]};
+    for (int i = 0; i < r->nodes; i++) {
+        for (int j = 0; j < i; j++) {
+            double light = l->gaussian[i][j];
+            if (m->light_part) {
+                light = fmax(light, light_at(m, along, l->distance_px[i][j]));
+                l->distance_px[i][j] *= sqrt(2.0);
+            }
+            here[i] += r->weight[j] * light;
+            here[j] += r->weight[i] * light;
+            l->gaussian[i][j] *= l->gaussian[i][j];
+        }
+    }
+    return fmax(here[0], fmax(here[1], here[2]));
+}
+
+void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_direction_parts *along,
+                            const bst_smear_rule *r, double part[BST_NODE_SCALES]) {
     enum { LOWEST = 2 - BST_NODE_SCALES };
     double lit = m->variance + m->binned_variance, v = r->kernel / (lit + m->further_variance);
-    double light[3][3], square = exp2(LOWEST), bend = norm3(r->bend);
+    double square = exp2(LOWEST);
+    node_light light;
     for (int k = 0; k < BST_NODE_SCALES; k++) {
         part[k] = 1.0;
     }
     if (v < BST_LEAST_KERNEL) {
         return;
     }
-    for (int i = 0; i < r->nodes; i++) {
-        for (int j = 0; j < i; j++) {
-            double x = r->node[i] - r->node[j], y = bend * (r->curve[i] - r->curve[j]);
-            light[i][j] = light[j][i] = exp(-0.5 * square * (x * x + y * y) / lit);
-        }
-        light[i][i] = 1.0;
-    }
+    begin_light(m, r, square, &light);
     for (int k = 0; k < BST_NODE_SCALES; k++, square *= 2.0) {
-        double peak = 0.0, wide = 1.0 + square * v;
-        for (int i = 0; i < r->nodes; i++) {
-            double here = 0.0;
-            for (int j = 0; j < r->nodes; j++) {
-                here += r->weight[j] * light[i][j];
-                light[i][j] *= light[i][j]; /* of the next scale */
-            }
-            peak = fmax(peak, here);
-        }
+        double peak = next_peak(m, along, r, &light), wide = 1.0 + square * v;
         /* the greatest derivative of order 4 or 6, smoothed by K, over the group's own peak */
         double smooth = 1.0 / (wide * wide * sqrt(wide) * peak);
         smooth *= r->nodes == 3 ? neighbours_part(square * v) / wide : 1.0;

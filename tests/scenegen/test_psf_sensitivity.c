@@ -1,4 +1,4 @@
-/* Sensitivity of a PSF to nodes: against the closed form of an elongated Gaussian. */
+/* Sensitivity of a PSF to nodes: against the closed form of Gaussians. */
 #include <math.h>
 
 #include "boresight/vec.h"
@@ -70,9 +70,100 @@ static void rows_have_the_frequencies_of_a_comb(void **state) {
     bst_psf_free(psf);
 }
 
+/* The light beside the peak: exp(-r^2 / 2 variance) along each direction, and not above it. */
+static void light_falls_as_the_psf_does(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_camera camera;
+    bst_psf_sensitivity s;
+    bst_psf *psf = make_psf(&ctx, &camera);
+    bst_assert_ok(&ctx, bst_psf_sensitivity_measure(&ctx, psf, 0.9, SHORT_PX, &s));
+    double wide = LONG_PX * LONG_PX + 1.0 / 12.0, narrow = SHORT_PX * SHORT_PX + 1.0 / 12.0;
+    for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
+        double angle = d * BST_PI / BST_NODE_DIRECTIONS, c = cos(angle), n = sin(angle);
+        double inverse = c * c / wide + n * n / narrow;
+        for (int k = 0; k < BST_LIGHT_STEPS; k++) {
+            double r = SHORT_PX * k / BST_LIGHT_PER, light = exp(-0.5 * r * r * inverse);
+            /* chords of the samples lie below; the pixel is no Gaussian */
+            bst_assert_close(s.light[d][k], light - 0.01, 0.02);
+        }
+    }
+    bst_psf_free(psf);
+}
+
+/* A PSF of two Gaussians of equal peaks, sigma 1 and 3 px: derivatives are those of the narrow one,
+ * the light of a group is that of both. Along a uniform path at rest across, in one dimension. */
+static double two_gaussians(double x) {
+    return 0.5 * (exp(-0.5 * x * x) + exp(-x * x / 18.0));
+}
+
+/* Half the sums of the two Gaussians' derivatives of even order at their peak over that of one. */
+static double derivative(int order) {
+    return 0.5 * (1.0 + pow(3.0, -order));
+}
+
+/* Greatest error of nodes on a uniform path of `length` px, over the greatest light. */
+static double true_error(const bst_smear_node_list *nodes, double length) {
+    enum { STEPS = 400 };
+    double worst = 0.0, brightest = 0.0;
+    for (double x = -8.0; x <= 8.0; x += 0.05) {
+        double light = 0.0, by_nodes = 0.0;
+        for (int k = 0; k < STEPS; k++) {
+            light += two_gaussians(x - length * ((k + 0.5) / STEPS - 0.5)) / STEPS;
+        }
+        for (int n = 0; n < nodes->count; n++) {
+            by_nodes += nodes->items[n].weight * two_gaussians(x - nodes->items[n].p[0]);
+        }
+        worst = fmax(worst, fabs(by_nodes - light));
+        brightest = fmax(brightest, light);
+    }
+    return worst / brightest;
+}
+
+static void a_group_has_the_light_of_a_wide_psf(void **state) {
+    (void)state;
+    static double part[BST_NODE_DIRECTIONS][3], row[BST_NODE_DIRECTIONS][BST_ROW_STEPS][2];
+    static double light[BST_NODE_DIRECTIONS][BST_LIGHT_STEPS];
+    bst_ctx ctx = {0};
+    double sigma = pow(derivative(6), -1.0 / 6.0);
+    double smoothed = fmax(derivative(4) / derivative(6), derivative(6) / derivative(8));
+    for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
+        for (int k = 0; k < 3; k++) {
+            part[d][k] = 1.0;
+        }
+        for (int k = 0; k < BST_LIGHT_STEPS; k++) {
+            light[d][k] = two_gaussians(sigma * k / BST_LIGHT_PER);
+        }
+    }
+    for (double length = 2.5; length < 4.6; length += 0.5) {
+        const bst_smear_path_point path[2] = {{{-0.5 * length, 0.0, 0.0}, 0.0},
+                                              {{0.5 * length, 0.0, 0.0}, 1.0}};
+        bst_smear_node_aim aim = {.psf_sigma_px = sigma,
+                                  .tolerance = 0.2,
+                                  .further_variance = smoothed - sigma * sigma,
+                                  .direction_part = part,
+                                  .row_part = row,
+                                  .most_per_px = 1.0};
+        bst_smear_node_list before = {0}, now = {0};
+        bst_assert_ok(&ctx, bst_smear_nodes_from_path(&ctx, path, 2, &aim, &before));
+        aim.light_part = light;
+        bst_assert_ok(&ctx, bst_smear_nodes_from_path(&ctx, path, 2, &aim, &now));
+        double by_peak = before.predicted[BST_NODE_SCALES - 2],
+               predicted = now.predicted[BST_NODE_SCALES - 2], error = true_error(&now, length);
+        print_message("%.1f px, %d nodes: error %.5f, predicted %.5f, without the light %.5f\n",
+                      length, now.count, error, predicted, by_peak);
+        assert_int_equal(now.count, before.count);
+        assert_true(error <= predicted && predicted <= 0.97 * by_peak);
+        free(before.items);
+        free(now.items);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(derivatives_are_those_of_each_direction),
+        cmocka_unit_test(a_group_has_the_light_of_a_wide_psf),
+        cmocka_unit_test(light_falls_as_the_psf_does),
         cmocka_unit_test(rows_have_the_frequencies_of_a_comb),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
