@@ -17,6 +17,7 @@ static const bst_app_command commands[] = {
     {"export", bst_cmd_export, "frames, tables, orbits and observations of a run for others"},
     {"orbit", bst_cmd_orbit, "an orbit from the directions that a run measured"},
     {"process", bst_cmd_process, "frames of other programs through the onboard chain"},
+    {"twin", bst_cmd_twin, "a scenario that renders what a recorded frame shows"},
     {"solve", bst_cmd_solve, "where a frame looks, from its stars alone"},
     {"score", bst_cmd_score, "detections or tracks against truth or annotations"},
     {"challenge", bst_cmd_challenge, "random frames with hidden truth, for detectors to find"},

@@ -96,6 +96,11 @@ void bst_process_free(bst_process *p);
 void bst_process_observer(const bst_process_frame *frame, bst_vec3 *position_m,
                           bst_vec3 *velocity_mps);
 
+/* Observer's light at the middle of a frame, for apparent places. */
+bst_light bst_process_light(const bst_process_frame *frame);
+/* Julian year of a frame's start, for proper motions. */
+double bst_process_julian_year(const bst_process_frame *frame);
+
 /* Path of a file in the folder.
  *
  * Errors:    BST_ERR_ARGUMENT: too long */

@@ -1,0 +1,220 @@
+/* Steps of the fit of one frame. */
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/process/twin/twin_internal.h"
+#include "sim/core/compare.h"
+
+/* Coefficients of the path that are tried in turn, and length of the path per interval that is
+ * allowed at least, px. */
+static const int COEFFICIENTS[] = {4, 5, 7, 11, 19, 35, 67};
+enum { TRIED = sizeof COEFFICIENTS / sizeof *COEFFICIENTS, ROLL_MOST = 7 };
+static const double LEAST_INTERVAL_PX = 5.0;
+/* Loss by which a value of the path must improve the fit on average. */
+static const double GAIN_PER_VALUE = 2.0;
+/* Faintest stars that are added, in rounds. */
+static const double FIRST_SNR = 8.0, LAST_SNR = 5.0;
+/* MAD to standard deviation of a normal distribution. */
+static const double MAD_TO_SIGMA = 1.4826;
+/* Share of the full well from which a pixel is not used. */
+static const double FULL_SHARE = 0.95;
+/* A pixel with less light of stars than this, in standard deviations, is one of the background. */
+static const double DARK_SIGMA = 0.3;
+
+/* Reads the pixels as electrons. */
+static bst_status read_data(bst_ctx *ctx, bst_twin *t) {
+    bst_process *p = &t->process;
+    bst_recorded_frame r;
+    const float *pixels;
+    BST_TRY(bst_recorded_frames_select(ctx, p->recorded, t->frame->index, &p->options, &r));
+    BST_TRY(bst_recorded_frames_pixels(ctx, p->recorded, &p->options, &r, &pixels));
+    size_t count = (size_t)r.width * (size_t)r.height;
+    t->data_e = malloc(count * sizeof *t->data_e);
+    t->model.variance_e2 = malloc(count * sizeof *t->model.variance_e2);
+    t->model.stars = calloc(BST_TWIN_STARS, sizeof *t->model.stars);
+    if (!t->data_e || !t->model.variance_e2 || !t->model.stars) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %zu pixels", count);
+    }
+    const bst_keyword_values *v = &t->frame->values;
+    double offset = *p->map.bias_section ? 0.0 : v->offset_dn;
+    for (size_t i = 0; i < count; i++) {
+        double e = v->gain_e_per_dn * ((double)pixels[i] - offset);
+        t->data_e[i] = e < FULL_SHARE * v->full_well_e ? (float)e : NAN;
+    }
+    t->model.width = r.width;
+    t->model.height = r.height;
+    t->model.data_e = t->data_e;
+    t->read_noise_e = v->read_noise_e;
+    return BST_OK;
+}
+
+/* Median and standard deviation by the median deviation, of those values that are finite. */
+static bst_status robust(bst_ctx *ctx, const float *values, size_t count, double *median,
+                         double *sigma) {
+    float *kept = malloc((count + 1) * sizeof *kept);
+    size_t n = 0;
+    if (!kept) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", count);
+    }
+    for (size_t i = 0; i < count; i++) {
+        if (isfinite(values[i])) {
+            kept[n++] = values[i];
+        }
+    }
+    qsort(kept, n, sizeof *kept, bst_compare_floats);
+    *median = n > 0 ? (double)kept[n / 2] : 0.0;
+    for (size_t i = 0; i < n; i++) {
+        kept[i] = fabsf(kept[i] - (float)*median);
+    }
+    qsort(kept, n, sizeof *kept, bst_compare_floats);
+    *sigma = n > 0 ? MAD_TO_SIGMA * (double)kept[n / 2] : 0.0;
+    free(kept);
+    return BST_OK;
+}
+
+bst_status bst_twin_residual(bst_ctx *ctx, const bst_twin *t, float *residual) {
+    const bst_twin_model *m = &t->model;
+    BST_TRY(bst_twin_model_render(ctx, m, t->pool, residual));
+    for (int y = 0; y < m->height; y++) {
+        for (int x = 0; x < m->width; x++) {
+            size_t i = (size_t)y * (size_t)m->width + (size_t)x;
+            residual[i] = t->data_e[i] - residual[i] - (float)bst_twin_background(m, x, y);
+        }
+    }
+    return BST_OK;
+}
+
+/* Noise of the pixels without stars, from the residual there. */
+static bst_status measure_noise(bst_ctx *ctx, bst_twin *t) {
+    bst_twin_model *m = &t->model;
+    size_t count = (size_t)m->width * (size_t)m->height;
+    float *residual = malloc(count * sizeof *residual);
+    double median, sigma;
+    bst_status status =
+        residual ? bst_twin_model_render(ctx, m, t->pool, residual)
+                 : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", count);
+    for (size_t i = 0; i < count && status == BST_OK; i++) {
+        bool dark = (double)residual[i] < DARK_SIGMA * m->noise_e;
+        int x = (int)(i % (size_t)m->width), y = (int)(i / (size_t)m->width);
+        residual[i] = dark ? t->data_e[i] - residual[i] - (float)bst_twin_background(m, x, y) : NAN;
+    }
+    if (status == BST_OK) {
+        status = robust(ctx, residual, count, &median, &sigma);
+    }
+    if (status == BST_OK && sigma > 0.0) {
+        m->noise_e = sigma;
+    }
+    free(residual);
+    return status;
+}
+
+/* First path, PSF, background and noise. */
+static bst_status begin(bst_ctx *ctx, bst_twin *t) {
+    bst_twin_model *m = &t->model;
+    const bst_process_frame *f = t->frame;
+    bst_twin_attitude nodes[BST_PROCESS_NODES + 2];
+    int count = 0;
+    m->camera = (bst_camera){.width_px = m->width,
+                             .height_px = m->height,
+                             .pixel_scale_arcsec = t->process.scale_arcsec};
+    BST_TRY(bst_camera_prepare(ctx, &m->camera));
+    m->path = (bst_twin_path){.q_reference = f->q_middle, .count = {1, 1}};
+    for (; count < f->node_count; count++) {
+        nodes[count] = (bst_twin_attitude){f->nodes[count].share, f->nodes[count].q_cam_from_gcrf};
+    }
+    if (count >= COEFFICIENTS[0]) {
+        m->path.count[0] = COEFFICIENTS[1];
+        if (count > 2 * COEFFICIENTS[2]) {
+            m->path.count[0] = COEFFICIENTS[2];
+        }
+        if (!bst_twin_path_fit(&m->path, nodes, count)) {
+            return bst_fail(ctx, BST_ERR_NUMERIC, "%s: HDU %d: the streaks give no path", f->path,
+                            f->place.hdu);
+        }
+    }
+    m->psf = (bst_twin_psf){.sigma_px = 0.9, .ratio = 2.5, .wide = 0.1};
+    return robust(ctx, t->data_e, (size_t)m->width * (size_t)m->height, &m->background_e[0],
+                  &m->noise_e);
+}
+
+/* Fits all but the number of stars and coefficients. */
+static bst_status fit_all(bst_ctx *ctx, bst_twin *t, int iterations, double *loss) {
+    const bst_twin_freedom all = {.path = true,
+                                  .roll = t->model.path.count[0] > 1,
+                                  .scale = true,
+                                  .psf = true,
+                                  .iterations = iterations};
+    return bst_twin_model_fit(ctx, &t->model, &all, t->pool, loss);
+}
+
+/* Tries more coefficients of the path while they improve the fit by more than chance does. */
+static bst_status refine_path(bst_ctx *ctx, bst_twin *t, double *loss) {
+    bst_twin_model *m = &t->model;
+    bst_twin_star *stars = malloc(BST_TWIN_STARS * sizeof *stars);
+    bst_status status =
+        stars ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d stars", BST_TWIN_STARS);
+    for (int i = 0; i < TRIED && status == BST_OK; i++) {
+        int n = COEFFICIENTS[i], roll = n < ROLL_MOST ? n : ROLL_MOST;
+        int intervals = n - BST_TWIN_SUPPORT + 1;
+        if (n <= m->path.count[0] && roll <= m->path.count[1]) {
+            continue;
+        }
+        if (intervals > 1 && t->length_px / intervals < LEAST_INTERVAL_PX) {
+            break;
+        }
+        bst_twin_model before = *m;
+        double was = *loss;
+        memcpy(stars, m->stars, (size_t)m->count * sizeof *stars);
+        int values = bst_twin_path_values(&m->path);
+        if (!bst_twin_path_refine(&m->path, n > m->path.count[0] ? n : m->path.count[0], roll)) {
+            *m = before;
+            break;
+        }
+        status = fit_all(ctx, t, 6, loss);
+        int more = bst_twin_path_values(&m->path) - values;
+        if (status == BST_OK && was - *loss < GAIN_PER_VALUE * more) {
+            bst_twin_star *own = m->stars;
+            *m = before; /* variance_e2 is that of the refused fit; the next fit sets it */
+            memcpy(own, stars, (size_t)m->count * sizeof *stars);
+            *loss = was;
+            break;
+        }
+    }
+    free(stars);
+    return status;
+}
+
+/* One round: stars down to a signal-to-noise ratio, then all parameters. */
+static bst_status round_of_stars(bst_ctx *ctx, bst_twin *t, double least_snr, double *loss) {
+    int added;
+    BST_TRY(bst_twin_add_found(ctx, t, least_snr, &added));
+    BST_TRY(fit_all(ctx, t, 8, loss));
+    return measure_noise(ctx, t);
+}
+
+bst_status bst_twin_fit_frame(bst_ctx *ctx, bst_twin *t) {
+    static const bst_twin_freedom fluxes = {.iterations = 3};
+    double loss;
+    BST_TRY(read_data(ctx, t));
+    BST_TRY(begin(ctx, t));
+    t->length_px = bst_twin_path_length_px(&t->model);
+    BST_TRY(bst_twin_add_catalogue(ctx, t));
+    BST_TRY(bst_twin_model_fit(ctx, &t->model, &fluxes, t->pool, &loss));
+    BST_TRY(fit_all(ctx, t, 8, &loss));
+    BST_TRY(bst_twin_measure_photometry(ctx, t));
+    for (int i = 0; i < 2; i++) {
+        BST_TRY(round_of_stars(ctx, t, FIRST_SNR, &loss));
+    }
+    BST_TRY(fit_all(ctx, t, 8, &loss)); /* with the noise of now */
+    BST_TRY(refine_path(ctx, t, &loss));
+    t->length_px = bst_twin_path_length_px(&t->model);
+    BST_TRY(bst_twin_measure_photometry(ctx, t));
+    for (int i = 0; i < 2; i++) {
+        BST_TRY(round_of_stars(ctx, t, LAST_SNR, &loss));
+        bst_twin_remove_faint(t, LAST_SNR);
+    }
+    BST_TRY(fit_all(ctx, t, 8, &loss));
+    return bst_twin_measure_photometry(ctx, t);
+}
