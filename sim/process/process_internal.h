@@ -68,6 +68,15 @@ bst_status bst_process_survey(bst_ctx *ctx, bst_process *p, const char *const *p
  *
  * Errors:    those of the catalogue and the files; BST_ERR_MEMORY, BST_ERR_INTERRUPTED */
 bst_status bst_process_solve(bst_ctx *ctx, bst_process *p) BST_MUST_CHECK;
+/* Scenario that takes the frames from their files.
+ *
+ * Returned:  *out  JSON, which the caller deletes
+ * Errors:    those of bst_keyword_map_camera */
+bst_status bst_process_make_scenario(bst_ctx *ctx, const bst_process *p,
+                                     struct cJSON **out) BST_MUST_CHECK;
+/* Frame updates of its sensor: pointing and observer in each frame. The caller deletes the JSON;
+ * NULL: out of memory. */
+struct cJSON *bst_process_make_pointing(const bst_process *p);
 /* Writes input/ of the folder: scenario.json, pointing.json, keyword_map.json, frames.txt.
  *
  * Errors:    BST_ERR_IO, BST_ERR_MEMORY */

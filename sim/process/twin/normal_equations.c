@@ -5,9 +5,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Parts of the frame that are summed on their own, whatever the number of threads, and pixels of a
- * band of rows, whose derivatives are held at a time. */
-enum { PARTS = 8, BAND_PIXELS = 2048 };
+#include "sim/core/memory.h"
+
+/* Side of a tile, px, and parts of the frame whose tiles are summed on their own, whatever the
+ * number of threads. */
+enum { SIDE = 32, PARTS = 8 };
+
+/* Box of a star's light, px. */
+typedef struct box {
+    float x0, y0, x1, y1;
+} box;
 
 /* All that the parts of the frame share. */
 typedef struct evaluation {
@@ -15,20 +22,34 @@ typedef struct evaluation {
     const bst_twin_layout *layout;
     bst_twin_nodes nodes;
     bst_twin_place *places[2]; /* [star][node] of both quadratures */
-    float *rows;               /* [star][2] first and last row of its light */
+    box *boxes;                /* [star] */
+    double reach_px[2];
     float *stars_e;
     bst_twin_sums part[PARTS];
     bool sums, failed[PARTS];
 } evaluation;
 
-/* A band of rows. */
-typedef struct band {
-    int y0, y1;
-    double *light;      /* [y1 - y0][width] */
-    double *derivative; /* [pixel][parameter]; NULL: none */
-    double *column;     /* of the profiles along rows */
-    int *nonzero;
-} band;
+/* A node of a star that lights a tile. */
+typedef struct lit {
+    int star, component, node;
+} lit;
+
+/* A tile of the frame, and the parameters that its pixels depend on. */
+typedef struct tile {
+    int x0, y0, x1, y1;
+    double light[SIDE * SIDE];
+    lit *lits; /* [count] */
+    size_t count, room;
+    int *local;         /* [parameter] its place among those of the tile; -1: none */
+    int *global;        /* [used] the other way */
+    int used;
+    double *derivative; /* [pixel][used] */
+    size_t derivative_room;
+    double *matrix;     /* [used][used] */
+    size_t matrix_room;
+    double *gradient; /* [parameter], of the tile */
+    int *nonzero;     /* [parameter] */
+} tile;
 
 void bst_twin_layout_make(const bst_twin_model *m, const bst_twin_freedom *f,
                           bst_twin_layout *out) {
@@ -44,8 +65,10 @@ void bst_twin_layout_make(const bst_twin_model *m, const bst_twin_freedom *f,
     out->background = n;
     n += BST_TWIN_BACKGROUND;
     for (int i = 0; i < m->count; i++) {
-        bool moves = m->stars[i].found && f->path;
-        out->flux[i] = n++;
+        const bst_twin_star *s = &m->stars[i];
+        bool fitted = !(s->flux_e < f->least_snr * s->sigma_e);
+        bool moves = s->found && f->path && fitted;
+        out->flux[i] = fitted ? n++ : -1;
         out->place[i] = moves ? n : -1;
         n += moves ? 2 : 0;
     }
@@ -59,70 +82,69 @@ typedef struct pixel_part {
 } pixel_part;
 
 /* Adds the derivatives of a node's light to a pixel. */
-static void add_derivatives(const evaluation *e, int star, const bst_twin_node *n,
-                            const bst_twin_place *p, const pixel_part *v, double *row) {
+static void add_derivatives(const evaluation *e, const tile *t, const lit *n,
+                            const pixel_part *v, double *row) {
     const bst_twin_layout *l = e->layout;
-    double flux = e->model->stars[star].flux_e;
-    row[l->flux[star]] += v->value;
+    const bst_twin_node *node = &e->nodes.node[n->component][n->node];
+    const bst_twin_place *p = &e->places[n->component][(size_t)n->star *
+                                         (size_t)e->nodes.count[n->component] + (size_t)n->node];
+    double flux = e->model->stars[n->star].flux_e;
     for (int axis = 0; axis < 3; axis++) {
         if (l->angle[axis] < 0) {
             continue;
         }
         double d = flux * (v->x * (double)p->dx[axis] + v->y * (double)p->dy[axis]);
-        double *to = row + l->angle[axis] + n->first[axis == 2];
-        const double *b = n->basis[axis == 2];
-        int most = e->model->path.count[axis == 2] - n->first[axis == 2];
+        int first = node->first[axis == 2], most = e->model->path.count[axis == 2] - first;
+        const int *local = t->local + l->angle[axis] + first;
+        const double *b = node->basis[axis == 2];
         for (int k = 0; k < BST_TWIN_SUPPORT && k < most; k++) {
-            to[k] += b[k] * d;
+            row[local[k]] += b[k] * d;
         }
     }
     if (l->log_scale >= 0) {
         const bst_camera *c = &e->model->camera;
-        row[l->log_scale] += flux * (v->x * ((double)p->x_px - bst_camera_centre_x(c)) +
-                                     v->y * ((double)p->y_px - bst_camera_centre_y(c)));
+        row[t->local[l->log_scale]] += flux * (v->x * ((double)p->x_px - bst_camera_centre_x(c)) +
+                                               v->y * ((double)p->y_px - bst_camera_centre_y(c)));
     }
     for (int k = 0; k < BST_TWIN_PSF && l->psf >= 0; k++) {
-        row[l->psf + k] += flux * v->psf[k];
+        row[t->local[l->psf + k]] += flux * v->psf[k];
     }
-    if (l->place[star] >= 0) {
-        row[l->place[star]] += flux * v->x;
-        row[l->place[star] + 1] += flux * v->y;
+    if (l->flux[n->star] >= 0) {
+        row[t->local[l->flux[n->star]]] += v->value;
+    }
+    if (l->place[n->star] >= 0) {
+        double *to = row + t->local[l->place[n->star]];
+        to[0] += flux * v->x;
+        to[1] += flux * v->y;
     }
 }
 
-/* Adds one node of a star to a band. */
-static void add_node(const evaluation *e, int star, int component, int index, band *b) {
+/* Adds one node of a star to a tile. */
+static void add_node(const evaluation *e, const lit *n, tile *t) {
     const bst_twin_model *m = e->model;
-    const bst_twin_node *n = &e->nodes.node[component][index];
-    const bst_twin_place *p =
-        &e->places[component][(size_t)star * (size_t)e->nodes.count[component] + (size_t)index];
+    const bst_twin_place *p = &e->places[n->component][(size_t)n->star *
+                                         (size_t)e->nodes.count[n->component] + (size_t)n->node];
     bst_twin_profile x, y;
-    double sigma = bst_twin_sigma_px(&m->psf, component);
-    if ((double)p->x_px < -8.0 * sigma || (double)p->x_px > m->width + 8.0 * sigma) {
-        return;
-    }
-    bst_twin_profile_at((double)p->y_px, sigma, b->y0, b->y1, &y);
-    if (y.count == 0) {
-        return;
-    }
-    bst_twin_profile_at((double)p->x_px, sigma, 0, m->width, &x);
-    double share = bst_twin_share(&m->psf, component), sign = component == 0 ? -1.0 : 1.0;
-    double weight = n->weight, flux = m->stars[star].flux_e;
+    double sigma = bst_twin_sigma_px(&m->psf, n->component);
+    bst_twin_profile_at((double)p->y_px, sigma, t->y0, t->y1, &y);
+    bst_twin_profile_at((double)p->x_px, sigma, t->x0, t->x1, &x);
+    double share = bst_twin_share(&m->psf, n->component), sign = n->component == 0 ? -1.0 : 1.0;
+    double weight = e->nodes.node[n->component][n->node].weight;
+    double flux = m->stars[n->star].flux_e * share * weight;
     for (int j = 0; j < y.count; j++) {
-        size_t row = (size_t)(y.first + j - b->y0) * (size_t)m->width + (size_t)x.first;
+        size_t row = (size_t)(y.first + j - t->y0) * SIDE + (size_t)(x.first - t->x0);
         for (int i = 0; i < x.count; i++) {
+            t->light[row + (size_t)i] += flux * x.value[i] * y.value[j];
+        }
+        for (int i = 0; i < x.count && e->layout; i++) {
             double plain = weight * x.value[i] * y.value[j];
-            b->light[row + (size_t)i] += flux * share * plain;
-            if (b->derivative) {
-                double wider = weight * share *
-                               (x.width[i] * y.value[j] + x.value[i] * y.width[j]);
-                const pixel_part v = {share * plain,
-                                      weight * share * x.slope[i] * y.value[j],
-                                      weight * share * x.value[i] * y.slope[j],
-                                      {wider, component == 1 ? wider : 0.0, sign * plain}};
-                add_derivatives(e, star, n, p, &v,
-                                b->derivative + (row + (size_t)i) * (size_t)e->layout->count);
-            }
+            double wider =
+                weight * share * (x.width[i] * y.value[j] + x.value[i] * y.width[j]);
+            const pixel_part v = {share * plain,
+                                  weight * share * x.slope[i] * y.value[j],
+                                  weight * share * x.value[i] * y.slope[j],
+                                  {wider, n->component == 1 ? wider : 0.0, sign * plain}};
+            add_derivatives(e, t, n, &v, t->derivative + (row + (size_t)i) * (size_t)t->used);
         }
     }
 }
@@ -134,9 +156,9 @@ double bst_twin_background(const bst_twin_model *m, int x, int y) {
     return c[0] + c[1] * u + c[2] * v + c[3] * u * u + c[4] * u * v + c[5] * v * v;
 }
 
-/* Adds a pixel with its derivatives to the sums. */
-static void add_pixel(const evaluation *e, double residual, double variance, double *row,
-                      int *nonzero, bst_twin_sums *s) {
+/* Adds a pixel with its derivatives to the sums of the tile. */
+static void add_pixel(double residual, double variance, const double *row, tile *t,
+                      bst_twin_sums *s) {
     double u = fabs(residual) / sqrt(variance);
     bool out = u > BST_TWIN_HUBER;
     s->loss += out ? BST_TWIN_HUBER * (u - 0.5 * BST_TWIN_HUBER) : 0.5 * u * u;
@@ -144,87 +166,190 @@ static void add_pixel(const evaluation *e, double residual, double variance, dou
         return;
     }
     double w = (out ? BST_TWIN_HUBER / u : 1.0) / variance;
-    int count = 0, n = e->layout->count;
-    for (int i = 0; i < n; i++) {
+    int count = 0;
+    for (int i = 0; i < t->used; i++) {
         if (row[i] != 0.0) {
-            nonzero[count++] = i;
+            t->nonzero[count++] = i;
         }
     }
     for (int i = 0; i < count; i++) {
-        double d = w * row[nonzero[i]], *to = s->matrix + (size_t)nonzero[i] * (size_t)n;
-        s->gradient[nonzero[i]] += d * residual;
+        double d = w * row[t->nonzero[i]];
+        double *to = t->matrix + (size_t)t->nonzero[i] * (size_t)t->used;
+        t->gradient[t->nonzero[i]] += d * residual;
         for (int k = 0; k <= i; k++) {
-            to[nonzero[k]] += d * row[nonzero[k]];
+            to[t->nonzero[k]] += d * row[t->nonzero[k]];
         }
     }
 }
 
-/* Adds the pixels of a band. */
-static void add_band(const evaluation *e, band *b, bst_twin_sums *s) {
+/* Adds the pixels of a tile. */
+static void add_pixels(const evaluation *e, tile *t, bst_twin_sums *s) {
     const bst_twin_model *m = e->model;
-    for (int y = b->y0; y < b->y1; y++) {
+    for (int y = t->y0; y < t->y1; y++) {
         double v = m->height > 1 ? 2.0 * y / (m->height - 1) - 1.0 : 0.0;
-        for (int x = 0; x < m->width; x++) {
+        for (int x = t->x0; x < t->x1; x++) {
             size_t at = (size_t)y * (size_t)m->width + (size_t)x;
-            size_t here = (size_t)(y - b->y0) * (size_t)m->width + (size_t)x;
+            size_t here = (size_t)(y - t->y0) * SIDE + (size_t)(x - t->x0);
             double data = (double)m->data_e[at];
             if (e->stars_e) {
-                e->stars_e[at] = (float)b->light[here];
+                e->stars_e[at] = (float)t->light[here];
             }
             if (!e->sums || !isfinite(data)) {
                 continue;
             }
             double *row = NULL;
-            if (b->derivative) {
+            if (e->layout) {
                 double u = m->width > 1 ? 2.0 * x / (m->width - 1) - 1.0 : 0.0;
                 const double terms[BST_TWIN_BACKGROUND] = {1.0, u, v, u * u, u * v, v * v};
-                row = b->derivative + here * (size_t)e->layout->count;
-                memcpy(row + e->layout->background, terms, sizeof terms);
+                row = t->derivative + here * (size_t)t->used;
+                memcpy(row + t->local[e->layout->background], terms, sizeof terms);
             }
-            double residual = data - b->light[here] - bst_twin_background(m, x, y);
-            add_pixel(e, residual, (double)m->variance_e2[at], row, b->nonzero, s);
+            double residual = data - t->light[here] - bst_twin_background(m, x, y);
+            add_pixel(residual, (double)m->variance_e2[at], row, t, s);
         }
     }
 }
 
-/* Stars of a band. */
-static void add_stars(const evaluation *e, band *b) {
+/* Lists the nodes that light a tile; false: no memory. */
+static bool list_nodes(const evaluation *e, tile *t) {
+    t->count = 0;
     for (int star = 0; star < e->model->count; star++) {
-        if ((double)e->rows[2 * star] >= b->y1 || (double)e->rows[2 * star + 1] < b->y0) {
+        const box *b = &e->boxes[star];
+        if (b->x0 >= (float)t->x1 || b->x1 < (float)t->x0 || b->y0 >= (float)t->y1 ||
+            b->y1 < (float)t->y0) {
             continue;
         }
         for (int c = 0; c < 2; c++) {
-            bool none = c == 1 && e->model->psf.wide <= 0.0 && !b->derivative;
+            float reach = (float)e->reach_px[c];
+            const bst_twin_place *p = e->places[c] + (size_t)star * (size_t)e->nodes.count[c];
+            bool none = c == 1 && e->model->psf.wide <= 0.0 && !e->layout;
             for (int i = 0; i < e->nodes.count[c] && !none; i++) {
-                add_node(e, star, c, i, b);
+                if (p[i].x_px + reach < (float)t->x0 || p[i].x_px - reach > (float)t->x1 ||
+                    p[i].y_px + reach < (float)t->y0 || p[i].y_px - reach > (float)t->y1) {
+                    continue;
+                }
+                if (t->count == t->room) {
+                    size_t room = t->room > 0 ? 2 * t->room : 1024;
+                    lit *more = realloc(t->lits, room * sizeof *more);
+                    if (!more) {
+                        return false;
+                    }
+                    t->lits = more;
+                    t->room = room;
+                }
+                t->lits[t->count++] = (lit){star, c, i};
             }
         }
     }
+    return true;
+}
+
+/* Gives parameters a place among those of the tile. */
+static void use(tile *t, int first, int count) {
+    for (int i = first; i < first + count && first >= 0; i++) {
+        if (t->local[i] < 0) {
+            t->local[i] = t->used;
+            t->global[t->used++] = i;
+        }
+    }
+}
+
+/* Lists the parameters of a tile and clears their sums; false: no memory. */
+static bool list_parameters(const evaluation *e, tile *t) {
+    const bst_twin_layout *l = e->layout;
+    t->used = 0;
+    for (int i = 0; i < l->count; i++) {
+        t->local[i] = -1;
+    }
+    use(t, l->background, BST_TWIN_BACKGROUND);
+    use(t, l->log_scale, 1);
+    use(t, l->psf, BST_TWIN_PSF);
+    for (size_t i = 0; i < t->count; i++) {
+        const lit *n = &t->lits[i];
+        const bst_twin_node *node = &e->nodes.node[n->component][n->node];
+        use(t, l->flux[n->star], 1);
+        use(t, l->place[n->star], 2);
+        for (int axis = 0; axis < 3; axis++) {
+            int first = node->first[axis == 2], most = e->model->path.count[axis == 2] - first;
+            if (l->angle[axis] >= 0) {
+                use(t, l->angle[axis] + first, most < BST_TWIN_SUPPORT ? most : BST_TWIN_SUPPORT);
+            }
+        }
+    }
+    size_t n = (size_t)t->used;
+    bst_ctx quiet = {0};
+    if (bst_memory_grow(&quiet, "tile", (void **)&t->derivative, &t->derivative_room,
+                        SIDE * SIDE * n * sizeof *t->derivative) != BST_OK ||
+        bst_memory_grow(&quiet, "tile", (void **)&t->matrix, &t->matrix_room,
+                        n * n * sizeof *t->matrix) != BST_OK) {
+        return false;
+    }
+    memset(t->derivative, 0, SIDE * SIDE * n * sizeof *t->derivative);
+    memset(t->matrix, 0, n * n * sizeof *t->matrix);
+    memset(t->gradient, 0, n * sizeof *t->gradient);
+    return true;
+}
+
+/* Adds the sums of a tile to those of its part. */
+static void scatter(const evaluation *e, const tile *t, bst_twin_sums *s) {
+    size_t n = (size_t)e->layout->count;
+    for (int i = 0; i < t->used; i++) {
+        s->gradient[t->global[i]] += t->gradient[i];
+        for (int k = 0; k <= i; k++) {
+            int a = t->global[i], b = t->global[k];
+            s->matrix[(size_t)(a > b ? a : b) * n + (size_t)(a > b ? b : a)] +=
+                t->matrix[(size_t)i * (size_t)t->used + (size_t)k];
+        }
+    }
+}
+
+/* Evaluates a tile; false: no memory. */
+static bool evaluate_tile(const evaluation *e, tile *t, bst_twin_sums *s) {
+    memset(t->light, 0, sizeof t->light);
+    if (!list_nodes(e, t) || (e->layout && !list_parameters(e, t))) {
+        return false;
+    }
+    for (size_t i = 0; i < t->count; i++) {
+        add_node(e, &t->lits[i], t);
+    }
+    add_pixels(e, t, s);
+    if (e->layout) {
+        scatter(e, t, s);
+    }
+    return true;
 }
 
 /* A part of the frame. */
 static void evaluate_part(evaluation *e, int index) {
     const bst_twin_model *m = e->model;
-    size_t n = e->layout ? (size_t)e->layout->count : 0, width = (size_t)m->width;
-    int rows = BAND_PIXELS / m->width > 0 ? BAND_PIXELS / m->width : 1;
-    int y0 = index * m->height / PARTS, y1 = (index + 1) * m->height / PARTS;
-    band b = {.light = malloc((size_t)rows * width * sizeof *b.light),
-              .derivative = n ? malloc((size_t)rows * width * n * sizeof *b.derivative) : NULL,
-              .nonzero = malloc((n + 1) * sizeof *b.nonzero)};
-    e->failed[index] = !b.light || !b.nonzero || (n > 0 && !b.derivative);
-    for (int y = y0; y < y1 && !e->failed[index]; y += rows) {
-        b.y0 = y;
-        b.y1 = y + rows < y1 ? y + rows : y1;
-        memset(b.light, 0, (size_t)rows * width * sizeof *b.light);
-        if (b.derivative) {
-            memset(b.derivative, 0, (size_t)rows * width * n * sizeof *b.derivative);
-        }
-        add_stars(e, &b);
-        add_band(e, &b, &e->part[index]);
+    size_t n = e->layout ? (size_t)e->layout->count + 1 : 1;
+    int columns = (m->width + SIDE - 1) / SIDE, rows = (m->height + SIDE - 1) / SIDE;
+    tile *t = calloc(1, sizeof *t);
+    if (t) {
+        t->local = malloc(n * sizeof *t->local);
+        t->global = malloc(n * sizeof *t->global);
+        t->nonzero = malloc(n * sizeof *t->nonzero);
+        t->gradient = malloc(n * sizeof *t->gradient);
     }
-    free(b.light);
-    free(b.derivative);
-    free(b.nonzero);
+    e->failed[index] = !t || !t->local || !t->global || !t->nonzero || !t->gradient;
+    for (int i = index * rows * columns / PARTS;
+         i < (index + 1) * rows * columns / PARTS && !e->failed[index]; i++) {
+        t->x0 = i % columns * SIDE;
+        t->y0 = i / columns * SIDE;
+        t->x1 = t->x0 + SIDE < m->width ? t->x0 + SIDE : m->width;
+        t->y1 = t->y0 + SIDE < m->height ? t->y0 + SIDE : m->height;
+        e->failed[index] = !evaluate_tile(e, t, &e->part[index]);
+    }
+    if (t) {
+        free(t->local);
+        free(t->global);
+        free(t->nonzero);
+        free(t->gradient);
+        free(t->lits);
+        free(t->derivative);
+        free(t->matrix);
+    }
+    free(t);
 }
 
 static void evaluate_parts(void *user, int begin, int end) {
@@ -233,30 +358,32 @@ static void evaluate_parts(void *user, int begin, int end) {
     }
 }
 
-/* Places of all stars, and the rows of their light. */
+/* Places of all stars, and the boxes of their light. */
 static bst_status place_stars(bst_ctx *ctx, evaluation *e) {
     const bst_twin_model *m = e->model;
-    e->rows = malloc(((size_t)m->count + 1) * 2 * sizeof *e->rows);
+    e->boxes = malloc(((size_t)m->count + 1) * sizeof *e->boxes);
     for (int c = 0; c < 2; c++) {
         e->places[c] = malloc(((size_t)m->count + 1) * (size_t)e->nodes.count[c] *
                               sizeof *e->places[c]);
+        e->reach_px[c] = BST_TWIN_REACH * bst_twin_sigma_px(&m->psf, c) + 1.0;
     }
-    if (!e->rows || !e->places[0] || !e->places[1]) {
+    if (!e->boxes || !e->places[0] || !e->places[1]) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the paths of %d stars", m->count);
     }
-    float reach = (float)(5.0 * fmax(m->psf.sigma_px, bst_twin_sigma_px(&m->psf, 1)) + 2.0);
+    float reach = (float)fmax(e->reach_px[0], e->reach_px[1]);
     for (int s = 0; s < m->count; s++) {
-        float low = INFINITY, high = -INFINITY;
+        box *b = &e->boxes[s];
+        *b = (box){INFINITY, INFINITY, -INFINITY, -INFINITY};
         for (int c = 0; c < 2; c++) {
             bst_twin_place *p = e->places[c] + (size_t)s * (size_t)e->nodes.count[c];
             bst_twin_star_places(m, &e->nodes, c, m->stars[s].apparent, p);
             for (int i = 0; i < e->nodes.count[c]; i++) {
-                low = fminf(low, p[i].y_px);
-                high = fmaxf(high, p[i].y_px);
+                b->x0 = fminf(b->x0, p[i].x_px - reach);
+                b->y0 = fminf(b->y0, p[i].y_px - reach);
+                b->x1 = fmaxf(b->x1, p[i].x_px + reach);
+                b->y1 = fmaxf(b->y1, p[i].y_px + reach);
             }
         }
-        e->rows[2 * s] = low - reach;
-        e->rows[2 * s + 1] = high + reach;
     }
     return BST_OK;
 }
@@ -303,7 +430,7 @@ bst_status bst_twin_evaluate(bst_ctx *ctx, const bst_twin_model *m, const bst_tw
     if (status == BST_OK) {
         bst_parallel_for(pool, PARTS, 1, evaluate_parts, &e);
         for (int i = 0; i < PARTS && status == BST_OK; i++) {
-            status = e.failed[i] ? bst_fail(ctx, BST_ERR_MEMORY, "no memory for rows of a fit")
+            status = e.failed[i] ? bst_fail(ctx, BST_ERR_MEMORY, "no memory for the pixels of a fit")
                                  : BST_OK;
         }
         if (status == BST_OK && sums) {
@@ -316,7 +443,7 @@ bst_status bst_twin_evaluate(bst_ctx *ctx, const bst_twin_model *m, const bst_tw
     }
     free(e.places[0]);
     free(e.places[1]);
-    free(e.rows);
+    free(e.boxes);
     bst_twin_nodes_free(&e.nodes);
     return status;
 }

@@ -1,4 +1,4 @@
-/* Normal equations of a model's fit, summed over the pixels in bands of rows. */
+/* Normal equations of a model's fit, summed over the pixels tile by tile. */
 #ifndef BST_PROCESS_TWIN_NORMAL_EQUATIONS_H
 #define BST_PROCESS_TWIN_NORMAL_EQUATIONS_H
 
@@ -11,7 +11,7 @@ typedef struct bst_twin_layout {
     int angle[3];   /* first coefficient of x, y, z */
     int log_scale;  /* ln of the focal length in pixels */
     int psf, background;
-    int flux[BST_TWIN_STARS];
+    int flux[BST_TWIN_STARS];  /* of a star */
     int place[BST_TWIN_STARS]; /* x of the star's image; y follows */
     int count;
 } bst_twin_layout;

@@ -9,8 +9,6 @@ static const double STEP_PX[2] = {2.0, 5.0};
 /* Nodes and weights of Gauss's rule on 0 to 1 (Abramowitz and Stegun, table 25.4, n = 3). */
 static const double GAUSS_T[3] = {0.1127016653792583, 0.5, 0.8872983346207417};
 static const double GAUSS_W[3] = {5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
-/* Half width of the Gaussian that is drawn, in standard deviations. */
-static const double REACH = 4.5;
 /* A place that no pixel is near. */
 static const float FAR_PX = -1e6F;
 
@@ -85,7 +83,7 @@ void bst_twin_star_places(const bst_twin_model *m, const bst_twin_nodes *nodes, 
 }
 
 void bst_twin_profile_at(double x_px, double sigma_px, int low, int high, bst_twin_profile *out) {
-    double reach = REACH * sigma_px + 0.5, scale = 1.0 / (sigma_px * sqrt(2.0));
+    double reach = BST_TWIN_REACH * sigma_px + 0.5, scale = 1.0 / (sigma_px * sqrt(2.0));
     double density = 1.0 / (sigma_px * sqrt(2.0 * BST_PI));
     int first = (int)fmax(ceil(x_px - reach), low), last = (int)fmin(floor(x_px + reach), high - 1);
     out->first = first;

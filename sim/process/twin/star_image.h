@@ -48,12 +48,15 @@ typedef struct bst_twin_profile {
     double width[BST_TWIN_PROFILE];   /* by the logarithm of sigma_px */
 } bst_twin_profile;
 
-/* Profile of a Gaussian at x_px on pixels from `low` to below `high`, to 4.5 sigma_px. */
+/* Half width of the Gaussian that is drawn, standard deviations. */
+#define BST_TWIN_REACH 4.5
+
+/* Profile of a Gaussian at x_px on pixels from `low` to below `high`, to BST_TWIN_REACH sigma_px. */
 void bst_twin_profile_at(double x_px, double sigma_px, int low, int high, bst_twin_profile *out);
 
 /* Standard deviation of a Gaussian of the PSF, 0 narrow, 1 wide. */
 static inline double bst_twin_sigma_px(const bst_twin_psf *psf, int component) {
-    return component == 0 ? psf->sigma_px : psf->sigma_px * psf->ratio;
+    return component == 0 ? psf->sigma_px : bst_twin_psf_wide_px(psf);
 }
 /* Share of a Gaussian in the light. */
 static inline double bst_twin_share(const bst_twin_psf *psf, int component) {

@@ -148,11 +148,39 @@ static bst_status set_stem(bst_ctx *ctx, bst_twin *t) {
     return BST_OK;
 }
 
+/* Checks the files beside the scenario as its own path is checked. */
+static bst_status check_outputs(bst_ctx *ctx, const bst_twin *t, const char *const *paths,
+                                int count) {
+    static const char *const endings[] = {"_path.json",   "_psf.fits",    "_stars.bin", "_run",
+                                          "_report.json", "_report.html", "_report.png"};
+    enum { FILES = sizeof endings / sizeof *endings };
+    char names[FILES][4096];
+    const char *targets[FILES];
+    bst_option table[FILES + 1] = {{.name = NULL}};
+    bool given[FILES + 1] = {false};
+    BST_TRY(bst_outputs_refuse_earlier(ctx, t->request->out, t->request->overwrite));
+    for (int i = 0; i < FILES; i++) {
+        bst_twin_file(t, endings[i], names[i]);
+        BST_TRY(bst_outputs_refuse_earlier(ctx, names[i], t->request->overwrite));
+        targets[i] = names[i];
+        given[i] = true;
+        table[i] = (bst_option){.name = "out",
+                                .kind = BST_OPTION_TEXT,
+                                .target = &targets[i],
+                                .path = strcmp(endings[i], "_run") == 0 ? BST_PATH_OUTPUT_FOLDER
+                                                                        : BST_PATH_OUTPUT};
+    }
+    return bst_outputs_check(ctx, table, given, count, (char *const *)(uintptr_t)paths);
+}
+
 bst_status bst_twin_make(bst_ctx *ctx, const bst_twin_request *request, const char *const *paths,
                          int count) {
     assert(request && request->map && request->out && paths && count > 0);
     bst_twin t = {.request = request};
     bst_status status = set_stem(ctx, &t);
+    if (status == BST_OK) {
+        status = check_outputs(ctx, &t, paths, count);
+    }
     if (status == BST_OK) {
         status = bst_parallel_create(ctx, (int)request->threads, &t.pool);
     }
@@ -162,15 +190,14 @@ bst_status bst_twin_make(bst_ctx *ctx, const bst_twin_request *request, const ch
     if (status == BST_OK) {
         status = bst_twin_fit_frame(ctx, &t);
     }
+    bst_twin_camera camera = {.spectrum = NULL};
     if (status == BST_OK) {
-        const bst_twin_model *m = &t.model;
-        printf("psf %g %g %g scale %.5f noise %g stars %d+%d coef %d length %g\n", m->psf.sigma_px, m->psf.ratio,
-               m->psf.wide, m->camera.pixel_scale_arcsec, m->noise_e, t.catalogue_stars,
-               m->count - t.catalogue_stars, m->path.count[0], bst_twin_path_length_px(m));
-        printf("zp %g colour %g scatter %g (%d) bright %g (%d)\n", t.photometry.zero_point_mag,
-               t.photometry.colour_mag, t.photometry.scatter_mag, t.photometry.stars,
-               t.photometry.bright_mag, t.photometry.bright);
+        status = bst_twin_write(ctx, &t, &camera);
     }
+    if (status == BST_OK) {
+        status = bst_twin_report(ctx, &t, &camera);
+    }
+    bst_band_free(camera.spectrum);
     twin_free(&t);
     return status;
 }

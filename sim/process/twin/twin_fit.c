@@ -15,9 +15,13 @@ static const double LEAST_INTERVAL_PX = 5.0;
 /* Loss by which a value of the path must improve the fit on average. */
 static const double GAIN_PER_VALUE = 2.0;
 /* Faintest stars that are added, in rounds. */
-static const double FIRST_SNR = 8.0, LAST_SNR = 5.0;
-/* MAD to standard deviation of a normal distribution. */
-static const double MAD_TO_SIGMA = 1.4826;
+static const double ROUND_SNR[] = {20.0, 8.0, 5.5};
+enum { ROUNDS = 3 };
+/* Stars that count for the number of coefficients of the path. */
+static const double PATH_SNR = 15.0;
+/* Limit and rounds of the clipping that measures the noise. */
+static const double CLIP = 4.0;
+enum { CLIPS = 8 };
 /* Share of the full well from which a pixel is not used. */
 static const double FULL_SHARE = 0.95;
 /* A pixel with less light of stars than this, in standard deviations, is one of the background. */
@@ -50,8 +54,9 @@ static bst_status read_data(bst_ctx *ctx, bst_twin *t) {
     return BST_OK;
 }
 
-/* Median and standard deviation by the median deviation, of those values that are finite. */
-static bst_status robust(bst_ctx *ctx, const float *values, size_t count, double *median,
+/* Mean and standard deviation of those values that are finite, without those beyond CLIP standard
+ * deviations of the others. Begins with the median and the median deviation. */
+static bst_status robust(bst_ctx *ctx, const float *values, size_t count, double *mean,
                          double *sigma) {
     float *kept = malloc((count + 1) * sizeof *kept);
     size_t n = 0;
@@ -64,12 +69,25 @@ static bst_status robust(bst_ctx *ctx, const float *values, size_t count, double
         }
     }
     qsort(kept, n, sizeof *kept, bst_compare_floats);
-    *median = n > 0 ? (double)kept[n / 2] : 0.0;
-    for (size_t i = 0; i < n; i++) {
-        kept[i] = fabsf(kept[i] - (float)*median);
+    *mean = n > 0 ? (double)kept[n / 2] : 0.0;
+    double low = n > 0 ? *mean - (double)kept[n / 6] : 0.0; /* 0.97 sigma */
+    *sigma = fmax(low, 1e-3);
+    for (int round = 0; round < CLIPS; round++) {
+        double sum = 0.0, sum2 = 0.0, in = 0.0;
+        for (size_t i = 0; i < n; i++) {
+            double d = (double)kept[i] - *mean;
+            if (fabs(d) < CLIP * *sigma) {
+                sum += d;
+                sum2 += d * d;
+                in += 1.0;
+            }
+        }
+        if (in < 2.0) {
+            break;
+        }
+        *mean += sum / in;
+        *sigma = sqrt(fmax(sum2 / in - sum * sum / (in * in), 1e-6));
     }
-    qsort(kept, n, sizeof *kept, bst_compare_floats);
-    *sigma = n > 0 ? MAD_TO_SIGMA * (double)kept[n / 2] : 0.0;
     free(kept);
     return BST_OK;
 }
@@ -91,7 +109,7 @@ static bst_status measure_noise(bst_ctx *ctx, bst_twin *t) {
     bst_twin_model *m = &t->model;
     size_t count = (size_t)m->width * (size_t)m->height;
     float *residual = malloc(count * sizeof *residual);
-    double median, sigma;
+    double mean, sigma;
     bst_status status =
         residual ? bst_twin_model_render(ctx, m, t->pool, residual)
                  : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", count);
@@ -101,7 +119,7 @@ static bst_status measure_noise(bst_ctx *ctx, bst_twin *t) {
         residual[i] = dark ? t->data_e[i] - residual[i] - (float)bst_twin_background(m, x, y) : NAN;
     }
     if (status == BST_OK) {
-        status = robust(ctx, residual, count, &median, &sigma);
+        status = robust(ctx, residual, count, &mean, &sigma);
     }
     if (status == BST_OK && sigma > 0.0) {
         m->noise_e = sigma;
@@ -139,14 +157,20 @@ static bst_status begin(bst_ctx *ctx, bst_twin *t) {
                   &m->noise_e);
 }
 
+#include <stdio.h>
+#include <time.h>
 /* Fits all but the number of stars and coefficients. */
-static bst_status fit_all(bst_ctx *ctx, bst_twin *t, int iterations, double *loss) {
+static bst_status fit_all(bst_ctx *ctx, bst_twin *t, double least_snr, int iterations,
+                          double *loss) {
     const bst_twin_freedom all = {.path = true,
                                   .roll = t->model.path.count[0] > 1,
                                   .scale = true,
                                   .psf = true,
+                                  .least_snr = least_snr,
                                   .iterations = iterations};
-    return bst_twin_model_fit(ctx, &t->model, &all, t->pool, loss);
+    bst_status status = bst_twin_model_fit(ctx, &t->model, &all, t->pool, loss);
+    if (getenv("BST_TWIN_DEBUG")) fprintf(stderr, "%.1f s: %d stars, %d coef, loss %.1f noise %.2f psf %.3f %.2f %.3f scale %.4f\n", (double)clock()/CLOCKS_PER_SEC, t->model.count, t->model.path.count[0], *loss, t->model.noise_e, t->model.psf.sigma_px, t->model.psf.ratio, t->model.psf.wide, t->model.camera.pixel_scale_arcsec);
+    return status;
 }
 
 /* Tries more coefficients of the path while they improve the fit by more than chance does. */
@@ -172,7 +196,7 @@ static bst_status refine_path(bst_ctx *ctx, bst_twin *t, double *loss) {
             *m = before;
             break;
         }
-        status = fit_all(ctx, t, 6, loss);
+        status = fit_all(ctx, t, PATH_SNR, 6, loss);
         int more = bst_twin_path_values(&m->path) - values;
         if (status == BST_OK && was - *loss < GAIN_PER_VALUE * more) {
             bst_twin_star *own = m->stars;
@@ -187,10 +211,11 @@ static bst_status refine_path(bst_ctx *ctx, bst_twin *t, double *loss) {
 }
 
 /* One round: stars down to a signal-to-noise ratio, then all parameters. */
-static bst_status round_of_stars(bst_ctx *ctx, bst_twin *t, double least_snr, double *loss) {
+static bst_status add_stars(bst_ctx *ctx, bst_twin *t, double least_snr, double *loss) {
     int added;
     BST_TRY(bst_twin_add_found(ctx, t, least_snr, &added));
-    BST_TRY(fit_all(ctx, t, 8, loss));
+    BST_TRY(fit_all(ctx, t, 0.0, 4, loss));
+    bst_twin_remove_faint(t, least_snr);
     return measure_noise(ctx, t);
 }
 
@@ -202,19 +227,14 @@ bst_status bst_twin_fit_frame(bst_ctx *ctx, bst_twin *t) {
     t->length_px = bst_twin_path_length_px(&t->model);
     BST_TRY(bst_twin_add_catalogue(ctx, t));
     BST_TRY(bst_twin_model_fit(ctx, &t->model, &fluxes, t->pool, &loss));
-    BST_TRY(fit_all(ctx, t, 8, &loss));
-    BST_TRY(bst_twin_measure_photometry(ctx, t));
-    for (int i = 0; i < 2; i++) {
-        BST_TRY(round_of_stars(ctx, t, FIRST_SNR, &loss));
+    BST_TRY(fit_all(ctx, t, 0.0, 8, &loss));
+    for (int i = 0; i < ROUNDS; i++) {
+        BST_TRY(bst_twin_measure_photometry(ctx, t));
+        BST_TRY(add_stars(ctx, t, ROUND_SNR[i], &loss));
+        BST_TRY(fit_all(ctx, t, PATH_SNR, 6, &loss)); /* with the noise of now */
+        BST_TRY(refine_path(ctx, t, &loss));
+        t->length_px = bst_twin_path_length_px(&t->model);
     }
-    BST_TRY(fit_all(ctx, t, 8, &loss)); /* with the noise of now */
-    BST_TRY(refine_path(ctx, t, &loss));
-    t->length_px = bst_twin_path_length_px(&t->model);
-    BST_TRY(bst_twin_measure_photometry(ctx, t));
-    for (int i = 0; i < 2; i++) {
-        BST_TRY(round_of_stars(ctx, t, LAST_SNR, &loss));
-        bst_twin_remove_faint(t, LAST_SNR);
-    }
-    BST_TRY(fit_all(ctx, t, 8, &loss));
+    BST_TRY(fit_all(ctx, t, 0.0, 4, &loss));
     return bst_twin_measure_photometry(ctx, t);
 }

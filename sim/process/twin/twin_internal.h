@@ -3,6 +3,7 @@
 #define BST_PROCESS_TWIN_TWIN_INTERNAL_H
 
 #include "sim/process/twin/twin.h"
+#include "sim/optics/band.h"
 #include "sim/process/twin/twin_model.h"
 #include "sim/process/process_internal.h"
 
@@ -11,7 +12,6 @@
 typedef struct bst_twin_photometry {
     int stars;                         /* that gave it */
     double zero_point_mag, colour_mag; /* m = zero point - 2.5 log10(e-/s) + colour (B-V - 0.65) */
-    double tilt;          /* of the band's response, per 100 nm; NAN: the V band */
     double scatter_mag;   /* standard deviation of the stars used, after clipping */
     double bright_mag;    /* the same of those with V < BST_TWIN_BRIGHT_V; NAN: fewer than 3 */
     int bright;
@@ -66,5 +66,59 @@ bst_status bst_twin_residual(bst_ctx *ctx, const bst_twin *twin, float *residual
  *
  * Errors:    those of bst_band_create */
 bst_status bst_twin_measure_photometry(bst_ctx *ctx, bst_twin *twin) BST_MUST_CHECK;
+
+/* What the scenario's camera has. */
+typedef struct bst_twin_camera {
+    bst_band_config band;
+    bst_optics_response_point response[32];
+    int points;                     /* of the response; 0: the V band */
+    double background_e;            /* per pixel and exposure where the fitted background is 0 */
+    double read_noise_e;
+    double photon_flux_v0_per_s_m2; /* of the V band */
+    double aperture_m, throughput, quantum_efficiency;
+    bst_band *spectrum; /* NULL: the V band */
+    double rate_v0;     /* electrons per second of a star of V = 0 and B-V of the Sun */
+} bst_twin_camera;
+
+/* Chooses band, throughput, noise and background of the camera, so that the scenario's frame has
+ * the zero point, colour term, noise and background of the recorded one.
+ *
+ * Given:     camera_json  of the scenario, changed accordingly
+ * Ownership: free out->spectrum with bst_band_free
+ * Errors:    those of bst_band_create */
+bst_status bst_twin_make_camera(bst_ctx *ctx, const bst_twin *twin, struct cJSON *camera_json,
+                                bst_twin_camera *out) BST_MUST_CHECK;
+
+/* Writes scenario, path, PSF and stars.
+ *
+ * Errors:    those of the outputs */
+bst_status bst_twin_write(bst_ctx *ctx, const bst_twin *twin, bst_twin_camera *camera) BST_MUST_CHECK;
+/* Writes the star catalogue of the twin.
+ *
+ * Errors:    those of the catalogues */
+bst_status bst_twin_write_stars(bst_ctx *ctx, const bst_twin *twin, const bst_twin_camera *camera,
+                                const char *path) BST_MUST_CHECK;
+
+/* Residual figures of the rendered twin. */
+typedef struct bst_twin_figures {
+    double chi2, chi2_streaks;                 /* per pixel, by the measured noise */
+    double chi2_clipped, chi2_streaks_clipped; /* without pixels beyond 5 sigma */
+    double chi2_header;   /* by the header's read noise and the background's shot noise */
+    int64_t pixels, streak_pixels, outliers;   /* outliers: beyond 5 sigma */
+    double explained;          /* share of the frame's variance, noise included */
+    double explained_clipped;  /* the same without outliers and noise */
+    double explained_streaks;  /* on streaks, noise included */
+    double explained_catalogue; /* as explained_clipped, by the catalogue's stars alone */
+    double across_px, along_px; /* RMS of the catalogue's streaks off the path */
+    int streaks;
+} bst_twin_figures;
+
+/* Runs the scenario, compares its frame with the recorded one, and writes the report.
+ *
+ * Errors:    those of the run and the outputs */
+bst_status bst_twin_report(bst_ctx *ctx, bst_twin *twin, const bst_twin_camera *camera) BST_MUST_CHECK;
+
+/* Name of a file of the twin: the scenario's without .json, and an ending. */
+void bst_twin_file(const bst_twin *twin, const char *ending, char path[4096]);
 
 #endif

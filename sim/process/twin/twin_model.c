@@ -19,7 +19,7 @@ static const double USUAL_RATIO = 2.5, RATIO_SIGMA = 0.4, PLACE_SIGMA_PX = 3.0;
 static const double LEAST_SIGMA_PX = 0.25, MOST_SIGMA_PX = 4.0, LEAST_RATIO = 1.3,
                     MOST_RATIO = 6.0, MOST_WIDE = 0.8, MOST_WIDE_SIGMA_PX = 6.5;
 /* Improvement of the loss that ends a fit. */
-static const double LEAST_GAIN = 0.05;
+static const double LEAST_GAIN = 0.5;
 
 bst_status bst_twin_model_render(bst_ctx *ctx, const bst_twin_model *m, bst_parallel *pool,
                                  float *stars_e) {
@@ -78,7 +78,7 @@ static double add_priors(const bst_twin_model *m, const bst_twin_layout *l, bst_
     }
     for (int i = 0; i < m->count; i++) {
         const bst_twin_star *star = &m->stars[i];
-        if (star->expected_e > 0.0) { /* within a factor: matters for blends and at the edge */
+        if (star->expected_e > 0.0 && l->flux[i] >= 0) { /* within a factor: matters for blends and at the edge */
             double off = (star->flux_e - star->expected_e) / star->expected_e;
             size_t at = (size_t)l->flux[i];
             loss += 0.5 * off * off;
@@ -102,7 +102,8 @@ static double within(double value, double low, double high) {
 /* Changes the model by a step of the parameters. */
 static void apply(bst_twin_model *m, const bst_twin_layout *l, const double *step) {
     for (int i = 0; i < m->count; i++) {
-        m->stars[i].flux_e += step[l->flux[i]];
+        m->stars[i].flux_e += l->flux[i] >= 0 ? step[l->flux[i]] : 0.0;
+        m->stars[i].flux_e = fmax(m->stars[i].flux_e, 0.0); /* of two that are one streak */
         if (l->place[i] >= 0) {
             bst_twin_star_shift(m, &m->stars[i], within(step[l->place[i]], -2.0, 2.0),
                                 within(step[l->place[i] + 1], -2.0, 2.0));
@@ -213,6 +214,9 @@ static void set_sigmas(bst_twin_model *m, fit *f) {
     f->damping = 1e-9;
     bool solved = solve(f);
     for (int i = 0; i < m->count; i++) {
+        if (f->layout.flux[i] < 0) {
+            continue;
+        }
         memset(f->step, 0, (size_t)n * sizeof *f->step);
         f->step[f->layout.flux[i]] = 1.0;
         if (solved) {

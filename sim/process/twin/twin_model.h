@@ -29,6 +29,13 @@ typedef struct bst_twin_psf {
     double wide;     /* share of the wide one */
 } bst_twin_psf;
 
+/* Width of the wide Gaussian, px. */
+static inline double bst_twin_psf_wide_px(const bst_twin_psf *psf) {
+    return psf->sigma_px * psf->ratio;
+}
+/* Samples of its file per pixel. */
+#define BST_TWIN_OVERSAMPLING 5.0
+
 /* A frame and its model. Background: c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2 with u, v from -1
  * to 1 over columns and rows, as the scenario's block `background` has it. */
 typedef struct bst_twin_model {
@@ -58,6 +65,7 @@ double bst_twin_background(const bst_twin_model *model, int x, int y);
 /* What a fit may change. */
 typedef struct bst_twin_freedom {
     bool path, roll, scale, psf; /* besides background and fluxes, which are always fitted */
+    double least_snr;            /* stars whose flux_e is below this many sigma_e stay as they are */
     int iterations;
 } bst_twin_freedom;
 
@@ -93,8 +101,10 @@ typedef struct bst_twin_offset {
 /* Measures the displacement of a star.
  *
  * Given:     residual_e  [height][width] frame minus model with background
- * Returned:  false: the pixels do not determine it */
-bool bst_twin_star_offset(const bst_twin_model *model, const bst_twin_star *star,
-                          const float *residual_e, bst_twin_offset *out);
+ * Returned:  *measured  false: the pixels do not determine it, or it is 2 px or more
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_twin_star_offset(bst_ctx *ctx, const bst_twin_model *model,
+                                const bst_twin_star *star, const float *residual_e,
+                                bst_twin_offset *out, bool *measured) BST_MUST_CHECK;
 
 #endif

@@ -6,11 +6,11 @@
 #include "sim/core/compare.h"
 
 /* Stars that count: signal-to-noise ratio, and share of the light on the frame. */
-static const double LEAST_SNR = 10.0, LEAST_INSIDE = 0.3;
+static const double LEAST_SNR = 10.0, LEAST_INSIDE = 0.15;
 /* Stars further off than this are left out, standard deviations by the median deviation. */
 static const double CLIP = 3.0;
 /* Colour term that is expected beforehand: standard deviation, and that of a star's magnitude. */
-static const double COLOUR_SIGMA = 0.3, STAR_SIGMA = 0.2;
+static const double COLOUR_SIGMA = 1.0, STAR_SIGMA = 0.2;
 static const double SOLAR_B_MINUS_V = 0.65, MAD_TO_SIGMA = 1.4826;
 
 /* A star of the catalogue that was measured. */
