@@ -40,12 +40,12 @@ typedef struct tile {
     double light[SIDE * SIDE];
     lit *lits; /* [count] */
     size_t count, room;
-    int *local;         /* [parameter] its place among those of the tile; -1: none */
-    int *global;        /* [used] the other way */
+    int *local;  /* [parameter] its place among those of the tile; -1: none */
+    int *global; /* [used] the other way */
     int used;
     double *derivative; /* [pixel][used] */
     size_t derivative_room;
-    double *matrix;     /* [used][used] */
+    double *matrix; /* [used][used] */
     size_t matrix_room;
     double *gradient; /* [parameter], of the tile */
     int *nonzero;     /* [parameter] */
@@ -82,12 +82,13 @@ typedef struct pixel_part {
 } pixel_part;
 
 /* Adds the derivatives of a node's light to a pixel. */
-static void add_derivatives(const evaluation *e, const tile *t, const lit *n,
-                            const pixel_part *v, double *row) {
+static void add_derivatives(const evaluation *e, const tile *t, const lit *n, const pixel_part *v,
+                            double *row) {
     const bst_twin_layout *l = e->layout;
     const bst_twin_node *node = &e->nodes.node[n->component][n->node];
-    const bst_twin_place *p = &e->places[n->component][(size_t)n->star *
-                                         (size_t)e->nodes.count[n->component] + (size_t)n->node];
+    const bst_twin_place *p =
+        &e->places[n->component]
+                  [(size_t)n->star * (size_t)e->nodes.count[n->component] + (size_t)n->node];
     double flux = e->model->stars[n->star].flux_e;
     for (int axis = 0; axis < 3; axis++) {
         if (l->angle[axis] < 0) {
@@ -122,8 +123,9 @@ static void add_derivatives(const evaluation *e, const tile *t, const lit *n,
 /* Adds one node of a star to a tile. */
 static void add_node(const evaluation *e, const lit *n, tile *t) {
     const bst_twin_model *m = e->model;
-    const bst_twin_place *p = &e->places[n->component][(size_t)n->star *
-                                         (size_t)e->nodes.count[n->component] + (size_t)n->node];
+    const bst_twin_place *p =
+        &e->places[n->component]
+                  [(size_t)n->star * (size_t)e->nodes.count[n->component] + (size_t)n->node];
     bst_twin_profile x, y;
     double sigma = bst_twin_sigma_px(&m->psf, n->component);
     bst_twin_profile_at((double)p->y_px, sigma, t->y0, t->y1, &y);
@@ -138,8 +140,7 @@ static void add_node(const evaluation *e, const lit *n, tile *t) {
         }
         for (int i = 0; i < x.count && e->layout; i++) {
             double plain = weight * x.value[i] * y.value[j];
-            double wider =
-                weight * share * (x.width[i] * y.value[j] + x.value[i] * y.width[j]);
+            double wider = weight * share * (x.width[i] * y.value[j] + x.value[i] * y.width[j]);
             const pixel_part v = {share * plain,
                                   weight * share * x.slope[i] * y.value[j],
                                   weight * share * x.value[i] * y.slope[j],
@@ -363,8 +364,8 @@ static bst_status place_stars(bst_ctx *ctx, evaluation *e) {
     const bst_twin_model *m = e->model;
     e->boxes = malloc(((size_t)m->count + 1) * sizeof *e->boxes);
     for (int c = 0; c < 2; c++) {
-        e->places[c] = malloc(((size_t)m->count + 1) * (size_t)e->nodes.count[c] *
-                              sizeof *e->places[c]);
+        e->places[c] =
+            malloc(((size_t)m->count + 1) * (size_t)e->nodes.count[c] * sizeof *e->places[c]);
         e->reach_px[c] = BST_TWIN_REACH * bst_twin_sigma_px(&m->psf, c) + 1.0;
     }
     if (!e->boxes || !e->places[0] || !e->places[1]) {
@@ -430,8 +431,9 @@ bst_status bst_twin_evaluate(bst_ctx *ctx, const bst_twin_model *m, const bst_tw
     if (status == BST_OK) {
         bst_parallel_for(pool, PARTS, 1, evaluate_parts, &e);
         for (int i = 0; i < PARTS && status == BST_OK; i++) {
-            status = e.failed[i] ? bst_fail(ctx, BST_ERR_MEMORY, "no memory for the pixels of a fit")
-                                 : BST_OK;
+            status = e.failed[i]
+                         ? bst_fail(ctx, BST_ERR_MEMORY, "no memory for the pixels of a fit")
+                         : BST_OK;
         }
         if (status == BST_OK && sums) {
             sum_parts(&e, sums);

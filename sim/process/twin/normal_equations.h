@@ -8,8 +8,8 @@ enum { BST_TWIN_PSF = 3 /* ln sigma_px, ln ratio, wide */ };
 
 /* Places of the parameters in the vector; -1: not fitted. */
 typedef struct bst_twin_layout {
-    int angle[3];   /* first coefficient of x, y, z */
-    int log_scale;  /* ln of the focal length in pixels */
+    int angle[3];  /* first coefficient of x, y, z */
+    int log_scale; /* ln of the focal length in pixels */
     int psf, background;
     int flux[BST_TWIN_STARS];  /* of a star */
     int place[BST_TWIN_STARS]; /* x of the star's image; y follows */

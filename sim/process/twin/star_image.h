@@ -8,7 +8,7 @@
 typedef struct bst_twin_node {
     double t, weight; /* weights sum to 1 */
     bst_quat q_cam_from_gcrf;
-    int first[2];                        /* splines of x and y; of z */
+    int first[2]; /* splines of x and y; of z */
     double basis[2][BST_TWIN_SUPPORT];
 } bst_twin_node;
 
@@ -29,8 +29,8 @@ void bst_twin_nodes_free(bst_twin_nodes *nodes);
 
 /* Place of a star at a node, and its derivatives. */
 typedef struct bst_twin_place {
-    float x_px, y_px;         /* far outside if it is not in front of the camera */
-    float dx[3], dy[3];       /* by rotation about the camera's axes, px/rad */
+    float x_px, y_px;   /* far outside if it is not in front of the camera */
+    float dx[3], dy[3]; /* by rotation about the camera's axes, px/rad */
 } bst_twin_place;
 
 /* Places of a star at the nodes of a quadrature.
@@ -42,16 +42,17 @@ void bst_twin_star_places(const bst_twin_model *model, const bst_twin_nodes *nod
 /* Gaussian with standard deviation sigma_px, integrated over pixels in a row. */
 enum { BST_TWIN_PROFILE = 64 };
 typedef struct bst_twin_profile {
-    int first, count;                 /* pixels */
+    int first, count; /* pixels */
     double value[BST_TWIN_PROFILE];
-    double slope[BST_TWIN_PROFILE];   /* by the place, 1/px */
-    double width[BST_TWIN_PROFILE];   /* by the logarithm of sigma_px */
+    double slope[BST_TWIN_PROFILE]; /* by the place, 1/px */
+    double width[BST_TWIN_PROFILE]; /* by the logarithm of sigma_px */
 } bst_twin_profile;
 
 /* Half width of the Gaussian that is drawn, standard deviations. */
 #define BST_TWIN_REACH 4.5
 
-/* Profile of a Gaussian at x_px on pixels from `low` to below `high`, to BST_TWIN_REACH sigma_px. */
+/* Profile of a Gaussian at x_px on pixels from `low` to below `high`, to BST_TWIN_REACH sigma_px.
+ */
 void bst_twin_profile_at(double x_px, double sigma_px, int low, int high, bst_twin_profile *out);
 
 /* Standard deviation of a Gaussian of the PSF, 0 narrow, 1 wide. */

@@ -6,9 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/process/twin/twin_internal.h"
 #include "sim/cli/load.h"
 #include "sim/cli/outputs.h"
+#include "sim/process/twin/twin_internal.h"
 
 #define Q bst_twin_request
 #define FIELD(member) .offset = offsetof(bst_twin_request, member)
@@ -107,8 +107,10 @@ static bst_status solve(bst_ctx *ctx, bst_twin *t, const char *const *paths, int
     p->request = &t->process_request;
     BST_TRY(bst_process_survey(ctx, p, paths, count));
     if (q->frame > p->count) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "--frame %lld: %d frames were given (allowed: 1 "
-                        "to %d)", (long long)q->frame, p->count, p->count);
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--frame %lld: %d frames were given (allowed: 1 "
+                        "to %d)",
+                        (long long)q->frame, p->count, p->count);
     }
     BST_TRY(bst_process_solve(ctx, p));
     for (int i = 0; i < p->count && !t->frame; i++) {
@@ -142,7 +144,8 @@ static bst_status set_stem(bst_ctx *ctx, bst_twin *t) {
     if (length < 6 || length > 3900 || strcmp(out + length - 5, ".json") != 0) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "--out %.300s: the scenario's name must end in .json (allowed: up to 3900 "
-                        "bytes)", out);
+                        "bytes)",
+                        out);
     }
     snprintf(t->stem, sizeof t->stem, "%.*s", (int)length - 5, out);
     return BST_OK;
@@ -164,11 +167,11 @@ static bst_status check_outputs(bst_ctx *ctx, const bst_twin *t, const char *con
         BST_TRY(bst_outputs_refuse_earlier(ctx, names[i], t->request->overwrite));
         targets[i] = names[i];
         given[i] = true;
-        table[i] = (bst_option){.name = "out",
-                                .kind = BST_OPTION_TEXT,
-                                .target = &targets[i],
-                                .path = strcmp(endings[i], "_run") == 0 ? BST_PATH_OUTPUT_FOLDER
-                                                                        : BST_PATH_OUTPUT};
+        table[i] = (bst_option){
+            .name = "out",
+            .kind = BST_OPTION_TEXT,
+            .target = &targets[i],
+            .path = strcmp(endings[i], "_run") == 0 ? BST_PATH_OUTPUT_FOLDER : BST_PATH_OUTPUT};
     }
     return bst_outputs_check(ctx, table, given, count, (char *const *)(uintptr_t)paths);
 }

@@ -33,9 +33,8 @@ static bst_status make_band(bst_ctx *ctx, bst_twin_camera *c, double tilt) {
         c->response[i].value = round(1e6 * c->response[i].value / most) * 1e-6;
     }
     c->points = POINTS;
-    c->band = (bst_band_config){.preset = BST_BAND_SILICON,
-                                .response = {c->response, POINTS},
-                                .optics_beam_factor = 1.0};
+    c->band = (bst_band_config){
+        .preset = BST_BAND_SILICON, .response = {c->response, POINTS}, .optics_beam_factor = 1.0};
     bst_band_free(c->spectrum);
     c->spectrum = NULL;
     return bst_band_create(ctx, &c->band, "", &c->spectrum);
@@ -79,11 +78,10 @@ static void choose_throughput(const bst_twin *t, const cJSON *json, bst_twin_cam
     c->aperture_m = number_of(json, "aperture_m", 0.1);
     c->throughput = number_of(json, "throughput", 0.8);
     c->quantum_efficiency = number_of(json, "quantum_efficiency", 0.8);
-    double area = 0.25 * BST_PI * c->aperture_m * c->aperture_m *
-                  (1.0 - number_of(json, "obscuration", 0.0));
+    double area =
+        0.25 * BST_PI * c->aperture_m * c->aperture_m * (1.0 - number_of(json, "obscuration", 0.0));
     if (!c->spectrum) {
-        c->photon_flux_v0_per_s_m2 =
-            c->rate_v0 / (area * c->throughput * c->quantum_efficiency);
+        c->photon_flux_v0_per_s_m2 = c->rate_v0 / (area * c->throughput * c->quantum_efficiency);
         return;
     }
     double share = c->rate_v0 / (area * bst_band_star(c->spectrum, SOLAR_B_MINUS_V));
@@ -160,8 +158,9 @@ bst_status bst_twin_make_camera(bst_ctx *ctx, const bst_twin *t, cJSON *json,
     BST_TRY(choose_band(ctx, t, out));
     choose_throughput(t, json, out);
     choose_background(t, number_of(json, "gain_e_per_dn", 1.0), out);
-    static const char *const replaced[] = {"band", "rotation_deg", "boresight_offset_px",
-                                           "distortion", "photon_flux_v0_per_s_m2", "detector"};
+    static const char *const replaced[] = {
+        "band",    "rotation_deg", "boresight_offset_px", "distortion", "photon_flux_v0_per_s_m2",
+        "detector"};
     for (size_t i = 0; i < sizeof replaced / sizeof *replaced; i++) {
         cJSON_DeleteItemFromObjectCaseSensitive(json, replaced[i]);
     }

@@ -28,8 +28,8 @@ static bst_star_values values_of(bst_vec3 icrs, double v_mag, double b_minus_v, 
 static double v_of(const bst_twin *t, const bst_twin_camera *c, const bst_twin_star *s) {
     double rate = s->flux_e / t->frame->values.exposure_s, v = -2.5 * log10(rate / c->rate_v0);
     if (c->spectrum) {
-        v += 2.5 * log10(bst_band_star(c->spectrum, s->b_minus_v) /
-                         bst_band_star(c->spectrum, NAN));
+        v +=
+            2.5 * log10(bst_band_star(c->spectrum, s->b_minus_v) / bst_band_star(c->spectrum, NAN));
     }
     return fmin(fmax(v, -2.9), 29.9);
 }
@@ -95,8 +95,8 @@ static bst_status add_others(bst_ctx *ctx, const bst_twin *t, const bst_star_pat
 bst_status bst_twin_write_stars(bst_ctx *ctx, const bst_twin *t, const bst_twin_camera *c,
                                 const char *path) {
     double ra, dec, own = bst_camera_half_diagonal_rad(&t->model.camera);
-    bst_vec3_to_radec(
-        bst_quat_rotate(bst_quat_conj(t->frame->q_middle), (bst_vec3){0, 0, 1}), &ra, &dec);
+    bst_vec3_to_radec(bst_quat_rotate(bst_quat_conj(t->frame->q_middle), (bst_vec3){0, 0, 1}), &ra,
+                      &dec);
     ra = ra < 0.0 ? ra + 2.0 * BST_PI : ra;
     double radius = fmin(fmax(LEAST_RADIUS_RAD, TIMES_FIELD * own), BST_PI);
     const bst_star_patch patch = {ra / BST_DEG_RAD, dec / BST_DEG_RAD, radius / BST_DEG_RAD,

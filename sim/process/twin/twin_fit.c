@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/process/twin/twin_internal.h"
 #include "sim/core/compare.h"
+#include "sim/process/twin/twin_internal.h"
 
 /* Coefficients of the path that are tried in turn, and length of the path per interval that is
  * allowed at least, px. */
@@ -22,7 +22,9 @@ static const double PATH_SNR = 15.0;
 /* Limit and rounds of the clipping that measures the noise. */
 static const double CLIP = 4.0;
 enum { CLIPS = 8 };
-/* Share of the full well from which a pixel is not used. */
+/* Largest count of 16 bits. */
+static const double LARGEST_DN = 65535.0;
+/* Share of the full well or the largest count from which a pixel is not used. */
 static const double FULL_SHARE = 0.95;
 /* A pixel with less light of stars than this, in standard deviations, is one of the background. */
 static const double DARK_SIGMA = 0.3;
@@ -45,7 +47,9 @@ static bst_status read_data(bst_ctx *ctx, bst_twin *t) {
     double offset = *p->map.bias_section ? 0.0 : v->offset_dn;
     for (size_t i = 0; i < count; i++) {
         double e = v->gain_e_per_dn * ((double)pixels[i] - offset);
-        t->data_e[i] = e < FULL_SHARE * v->full_well_e ? (float)e : NAN;
+        double count_dn = p->map.pedestal_dn + p->map.dn_per_unit * (double)pixels[i];
+        bool full = e > FULL_SHARE * v->full_well_e || count_dn > FULL_SHARE * LARGEST_DN;
+        t->data_e[i] = full ? NAN : (float)e;
     }
     t->model.width = r.width;
     t->model.height = r.height;
@@ -110,9 +114,8 @@ static bst_status measure_noise(bst_ctx *ctx, bst_twin *t) {
     size_t count = (size_t)m->width * (size_t)m->height;
     float *residual = malloc(count * sizeof *residual);
     double mean, sigma;
-    bst_status status =
-        residual ? bst_twin_model_render(ctx, m, t->pool, residual)
-                 : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", count);
+    bst_status status = residual ? bst_twin_model_render(ctx, m, t->pool, residual)
+                                 : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", count);
     for (size_t i = 0; i < count && status == BST_OK; i++) {
         bool dark = (double)residual[i] < DARK_SIGMA * m->noise_e;
         int x = (int)(i % (size_t)m->width), y = (int)(i / (size_t)m->width);
@@ -157,8 +160,6 @@ static bst_status begin(bst_ctx *ctx, bst_twin *t) {
                   &m->noise_e);
 }
 
-#include <stdio.h>
-#include <time.h>
 /* Fits all but the number of stars and coefficients. */
 static bst_status fit_all(bst_ctx *ctx, bst_twin *t, double least_snr, int iterations,
                           double *loss) {
@@ -168,9 +169,7 @@ static bst_status fit_all(bst_ctx *ctx, bst_twin *t, double least_snr, int itera
                                   .psf = true,
                                   .least_snr = least_snr,
                                   .iterations = iterations};
-    bst_status status = bst_twin_model_fit(ctx, &t->model, &all, t->pool, loss);
-    if (getenv("BST_TWIN_DEBUG")) fprintf(stderr, "%.1f s: %d stars, %d coef, loss %.1f noise %.2f psf %.3f %.2f %.3f scale %.4f\n", (double)clock()/CLOCKS_PER_SEC, t->model.count, t->model.path.count[0], *loss, t->model.noise_e, t->model.psf.sigma_px, t->model.psf.ratio, t->model.psf.wide, t->model.camera.pixel_scale_arcsec);
-    return status;
+    return bst_twin_model_fit(ctx, &t->model, &all, t->pool, loss);
 }
 
 /* Tries more coefficients of the path while they improve the fit by more than chance does. */
@@ -182,7 +181,7 @@ static bst_status refine_path(bst_ctx *ctx, bst_twin *t, double *loss) {
     for (int i = 0; i < TRIED && status == BST_OK; i++) {
         int n = COEFFICIENTS[i], roll = n < ROLL_MOST ? n : ROLL_MOST;
         int intervals = n - BST_TWIN_SUPPORT + 1;
-        if (n <= m->path.count[0] && roll <= m->path.count[1]) {
+        if (m->path.count[0] == 1 || (n <= m->path.count[0] && roll <= m->path.count[1])) {
             continue;
         }
         if (intervals > 1 && t->length_px / intervals < LEAST_INTERVAL_PX) {
@@ -210,6 +209,55 @@ static bst_status refine_path(bst_ctx *ctx, bst_twin *t, double *loss) {
     return status;
 }
 
+/* A motion of the points: linear in time, this long at first. */
+static const double SEED_PX = 1.5;
+enum { DIRECTIONS = 4 };
+
+/* The image of a point does not change with a small motion in first order, so that the fit does not
+ * find the direction by itself: begins with some directions, and takes the best one. */
+static bst_status seed_motion(bst_ctx *ctx, bst_twin *t, double *loss) {
+    bst_twin_model *m = &t->model, before = *m, best = *m;
+    size_t bytes = BST_TWIN_STARS * sizeof *m->stars;
+    bst_twin_star *kept = malloc(2 * bytes), *best_stars = kept ? kept + BST_TWIN_STARS : NULL;
+    bst_status status =
+        kept ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d stars", BST_TWIN_STARS);
+    double least = *loss - GAIN_PER_VALUE * (bst_twin_path_values(&m->path) + COEFFICIENTS[0]);
+    if (status == BST_OK) {
+        memcpy(kept, m->stars, bytes);
+        memcpy(best_stars, m->stars, bytes);
+    }
+    for (int d = 0; d < DIRECTIONS && status == BST_OK; d++) {
+        double angle = BST_PI * d / DIRECTIONS, now;
+        double half = 0.5 * SEED_PX * bst_camera_scale_rad(&m->camera);
+        bst_twin_star *own = m->stars;
+        *m = before;
+        m->stars = own;
+        memcpy(m->stars, kept, bytes);
+        if (!bst_twin_path_refine(&m->path, COEFFICIENTS[0], COEFFICIENTS[0])) {
+            break;
+        }
+        for (int k = 0; k < COEFFICIENTS[0]; k++) {
+            double u = 2.0 * k / (COEFFICIENTS[0] - 1) - 1.0;
+            m->path.coefficients[0][k] -= half * u * sin(angle);
+            m->path.coefficients[1][k] += half * u * cos(angle);
+        }
+        status = fit_all(ctx, t, PATH_SNR, 4, &now);
+        if (status == BST_OK && now < least) {
+            least = *loss = now;
+            best = *m;
+            memcpy(best_stars, m->stars, bytes);
+        }
+    }
+    if (status == BST_OK) {
+        bst_twin_star *own = m->stars;
+        *m = best;
+        m->stars = own;
+        memcpy(m->stars, best_stars, bytes);
+    }
+    free(kept);
+    return status;
+}
+
 /* One round: stars down to a signal-to-noise ratio, then all parameters. */
 static bst_status add_stars(bst_ctx *ctx, bst_twin *t, double least_snr, double *loss) {
     int added;
@@ -225,9 +273,14 @@ bst_status bst_twin_fit_frame(bst_ctx *ctx, bst_twin *t) {
     BST_TRY(read_data(ctx, t));
     BST_TRY(begin(ctx, t));
     t->length_px = bst_twin_path_length_px(&t->model);
+    t->direction_known = t->process.direction_known && t->frame->node_count > 1;
     BST_TRY(bst_twin_add_catalogue(ctx, t));
     BST_TRY(bst_twin_model_fit(ctx, &t->model, &fluxes, t->pool, &loss));
     BST_TRY(fit_all(ctx, t, 0.0, 8, &loss));
+    if (t->model.path.count[0] == 1) {
+        BST_TRY(seed_motion(ctx, t, &loss));
+        t->length_px = bst_twin_path_length_px(&t->model);
+    }
     for (int i = 0; i < ROUNDS; i++) {
         BST_TRY(bst_twin_measure_photometry(ctx, t));
         BST_TRY(add_stars(ctx, t, ROUND_SNR[i], &loss));

@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/process/twin/normal_equations.h"
 #include "sim/cli/stop_signals.h"
 #include "sim/core/cholesky.h"
+#include "sim/process/twin/normal_equations.h"
 
 /* Error of the PSF's form, as a share of a pixel's starlight: keeps a few bright streaks from
  * outweighing all others. */
@@ -16,8 +16,8 @@ static const double FORM_ERROR = 0.02;
  * deviation; of a found star's place, px. */
 static const double USUAL_RATIO = 2.5, RATIO_SIGMA = 0.4, PLACE_SIGMA_PX = 3.0;
 /* Limits of the PSF. */
-static const double LEAST_SIGMA_PX = 0.25, MOST_SIGMA_PX = 4.0, LEAST_RATIO = 1.3,
-                    MOST_RATIO = 6.0, MOST_WIDE = 0.8, MOST_WIDE_SIGMA_PX = 6.5;
+static const double LEAST_SIGMA_PX = 0.25, MOST_SIGMA_PX = 4.0, LEAST_RATIO = 1.3, MOST_RATIO = 6.0,
+                    MOST_WIDE = 0.8, MOST_WIDE_SIGMA_PX = 6.5;
 /* Improvement of the loss that ends a fit. */
 static const double LEAST_GAIN = 0.5;
 
@@ -78,7 +78,8 @@ static double add_priors(const bst_twin_model *m, const bst_twin_layout *l, bst_
     }
     for (int i = 0; i < m->count; i++) {
         const bst_twin_star *star = &m->stars[i];
-        if (star->expected_e > 0.0 && l->flux[i] >= 0) { /* within a factor: matters for blends and at the edge */
+        if (star->expected_e > 0.0 &&
+            l->flux[i] >= 0) { /* within a factor: matters for blends and at the edge */
             double off = (star->flux_e - star->expected_e) / star->expected_e;
             size_t at = (size_t)l->flux[i];
             loss += 0.5 * off * off;
@@ -185,8 +186,8 @@ static bool solve(fit *f) {
 }
 
 /* Tries steps until one improves the loss. *gain 0: none does. */
-static bst_status improve(bst_ctx *ctx, bst_twin_model *m, fit *f, bst_parallel *pool,
-                          double *loss, double *gain) {
+static bst_status improve(bst_ctx *ctx, bst_twin_model *m, fit *f, bst_parallel *pool, double *loss,
+                          double *gain) {
     *gain = 0.0;
     for (int tries = 0; tries < 8; tries++) {
         if (solve(f)) {

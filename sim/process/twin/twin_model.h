@@ -4,19 +4,19 @@
 #define BST_PROCESS_TWIN_TWIN_MODEL_H
 
 #include "boresight/camera.h"
-#include "sim/process/twin/twin_path.h"
 #include "sim/core/parallel.h"
+#include "sim/process/twin/twin_path.h"
 
-enum { BST_TWIN_BACKGROUND = 6, BST_TWIN_STARS = 600 };
+enum { BST_TWIN_BACKGROUND = 6, BST_TWIN_STARS = 800 };
 
 /* A star. */
 typedef struct bst_twin_star {
-    bst_vec3 apparent; /* unit, GCRF axes */
-    double flux_e;     /* of the exposure; fitted */
-    double sigma_e;    /* standard deviation of flux_e; NAN: not determined */
-    double expected_e; /* by the catalogue and the zero point; NAN: unknown */
-    bool found;        /* in no catalogue: its place is fitted too */
-    bst_vec3 icrs;     /* catalogue place at the frame's date; unset for a found star */
+    bst_vec3 apparent;       /* unit, GCRF axes */
+    double flux_e;           /* of the exposure; fitted */
+    double sigma_e;          /* standard deviation of flux_e; NAN: not determined */
+    double expected_e;       /* by the catalogue and the zero point; NAN: unknown */
+    bool found;              /* in no catalogue: its place is fitted too */
+    bst_vec3 icrs;           /* catalogue place at the frame's date; unset for a found star */
     double v_mag, b_minus_v; /* NAN: unknown */
     uint32_t id;
     double inside; /* share of its light on the frame, by its path */
@@ -65,7 +65,7 @@ double bst_twin_background(const bst_twin_model *model, int x, int y);
 /* What a fit may change. */
 typedef struct bst_twin_freedom {
     bool path, roll, scale, psf; /* besides background and fluxes, which are always fitted */
-    double least_snr;            /* stars whose flux_e is below this many sigma_e stay as they are */
+    double least_snr; /* stars whose flux_e is below this many sigma_e stay as they are */
     int iterations;
 } bst_twin_freedom;
 

@@ -23,8 +23,9 @@ static void add_node(const bst_twin_model *m, const bst_twin_place *p, const dou
     for (int j = 0; j < y.count; j++) {
         for (int i = 0; i < x.count; i++) {
             double gx = weight * x.slope[i] * y.value[j], gy = weight * x.value[i] * y.slope[j];
-            double *to = derivative + ((size_t)(y.first + j) * (size_t)m->width +
-                                       (size_t)(x.first + i)) * UNKNOWNS;
+            double *to =
+                derivative +
+                ((size_t)(y.first + j) * (size_t)m->width + (size_t)(x.first + i)) * UNKNOWNS;
             to[0] += gy * direction[0] - gx * direction[1];
             to[1] += gx * direction[0] + gy * direction[1];
             to[2] += weight * x.value[i] * y.value[j];

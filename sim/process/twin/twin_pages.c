@@ -73,7 +73,7 @@ static void add_fit(cJSON *root, const bst_twin *t) {
     bst_json_add_number(fit, "pixel_scale_arcsec", m->camera.pixel_scale_arcsec);
     bst_json_add_number(fit, "path_length_px", bst_twin_path_length_px(m));
     cJSON_AddNumberToObject(fit, "path_coefficients", bst_twin_path_values(&m->path));
-    cJSON_AddBoolToObject(fit, "direction_known", t->process.direction_known);
+    cJSON_AddBoolToObject(fit, "direction_known", t->direction_known);
     bst_json_add_number(fit, "psf_sigma_px", m->psf.sigma_px);
     bst_json_add_number(fit, "psf_wide_sigma_px", bst_twin_psf_wide_px(&m->psf));
     bst_json_add_number(fit, "psf_wide_share", m->psf.wide);
@@ -182,9 +182,10 @@ static bst_status write_page(bst_ctx *ctx, const bst_twin *t, const cJSON *root)
     BST_TRY(bst_draft_open(ctx, path, &draft));
     FILE *out = draft.stream;
     const char *slash = strrchr(picture, '/');
-    fprintf(out, "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Twin"
-                 "</title>\n<style>body{font-family:sans-serif;margin:2em}td{padding:0 1em}"
-                 "img{max-width:100%%}</style></head><body>\n<h1>Twin of ");
+    fprintf(out,
+            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Twin"
+            "</title>\n<style>body{font-family:sans-serif;margin:2em}td{padding:0 1em}"
+            "img{max-width:100%%}</style></head><body>\n<h1>Twin of ");
     bst_html_format(out, "%s", t->frame->path);
     fprintf(out, ", HDU %d</h1>\n<p><img alt=\"recorded, twin, residual\" src=\"",
             t->frame->place.hdu);
@@ -201,7 +202,7 @@ static void print(const bst_twin *t, const bst_twin_figures *f) {
     const bst_twin_model *m = &t->model;
     printf("path       %.1f px, %d values%s\n", bst_twin_path_length_px(m),
            bst_twin_path_values(&m->path),
-           t->process.direction_known ? "" : "; which end came first is not known");
+           t->direction_known ? "" : "; which end came first is not known");
     printf("scale      %.5f arcsec/px; PSF sigma %.3f px, %.0f %% in a Gaussian of %.2f px\n",
            m->camera.pixel_scale_arcsec, m->psf.sigma_px, 100.0 * m->psf.wide,
            bst_twin_psf_wide_px(&m->psf));
@@ -216,10 +217,10 @@ static void print(const bst_twin *t, const bst_twin_figures *f) {
     printf("chi2       %.3f per pixel, %.3f on streaks; without %" PRId64
            " outliers %.3f and %.3f\n",
            f->chi2, f->chi2_streaks, f->outliers, f->chi2_clipped, f->chi2_streaks_clipped);
-    printf("explained  %.2f %% of the light's variance (by the catalogue %.2f %%), %.2f %% on "
-           "streaks with noise\n",
-           100.0 * f->explained_clipped, 100.0 * f->explained_catalogue,
-           100.0 * f->explained_streaks);
+    printf(
+        "explained  %.2f %% of the light's variance (by the catalogue %.2f %%), %.2f %% on "
+        "streaks with noise\n",
+        100.0 * f->explained_clipped, 100.0 * f->explained_catalogue, 100.0 * f->explained_streaks);
     fflush(stdout);
 }
 

@@ -22,7 +22,8 @@ int bst_twin_basis(int count, double t, double value[BST_TWIN_SUPPORT]) {
     for (int k = 1; k <= d; k++) { /* degree k from degree k - 1 */
         double saved = 0.0;
         for (int r = 0; r < k; r++) {
-            double right = knot(count, d, at + d + r + 1), left = knot(count, d, at + d + 1 + r - k);
+            double right = knot(count, d, at + d + r + 1),
+                   left = knot(count, d, at + d + 1 + r - k);
             double part = right > left ? value[r] / (right - left) : 0.0;
             value[r] = saved + (right - t) * part;
             saved = (t - left) * part;

@@ -13,7 +13,7 @@ enum { BST_TWIN_COEFFICIENTS = 68, BST_TWIN_SUPPORT = 4 };
  * Rotations about x and y move the stars, rotation about z (the boresight) turns them. */
 typedef struct bst_twin_path {
     bst_quat q_reference;
-    int count[2]; /* coefficients of x and y; of z */
+    int count[2];                                  /* coefficients of x and y; of z */
     double coefficients[3][BST_TWIN_COEFFICIENTS]; /* rad */
 } bst_twin_path;
 

@@ -2,8 +2,8 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "sim/process/twin/twin_internal.h"
 #include "sim/core/compare.h"
+#include "sim/process/twin/twin_internal.h"
 
 /* Stars that count: signal-to-noise ratio, and share of the light on the frame. */
 static const double LEAST_SNR = 10.0, LEAST_INSIDE = 0.15;
@@ -42,8 +42,8 @@ static double probable_colour(const bst_twin_star *s) {
 
 /* Weight of a star's magnitude. */
 static double weight_of(const bst_twin_star *s) {
-    double v = v_sigma(s->v_mag), colour = COLOUR_ERRORS * v * COLOUR_SPREAD /
-                                           hypot(COLOUR_ERRORS * v, COLOUR_SPREAD);
+    double v = v_sigma(s->v_mag),
+           colour = COLOUR_ERRORS * v * COLOUR_SPREAD / hypot(COLOUR_ERRORS * v, COLOUR_SPREAD);
     /* a colour term of 0.5 is usual of silicon without a filter */
     return 1.0 / (STAR_SIGMA * STAR_SIGMA + v * v + 0.25 * colour * colour);
 }
@@ -56,8 +56,8 @@ static int collect(const bst_twin *t, measured *out) {
             continue;
         }
         double rate = s->flux_e / fmax(t->frame->values.exposure_s, 1e-9);
-        out[n++] = (measured){s->v_mag + 2.5 * log10(rate),
-                              probable_colour(s), s->v_mag, weight_of(s), false};
+        out[n++] = (measured){s->v_mag + 2.5 * log10(rate), probable_colour(s), s->v_mag,
+                              weight_of(s), false};
     }
     return n;
 }
@@ -114,15 +114,16 @@ static void clip(measured *m, int n, double *work, bst_twin_photometry *p) {
 /* Standard deviation of those that are in and brighter than a magnitude. */
 static double scatter(const measured *m, int n, double v_limit, const bst_twin_photometry *p,
                       int *used) {
-    double sum = 0.0;
+    double sum = 0.0, sum2 = 0.0;
     *used = 0;
     for (int i = 0; i < n; i++) {
         if (!m[i].out && m[i].v_mag < v_limit) {
-            sum += off(&m[i], p) * off(&m[i], p);
+            sum += off(&m[i], p);
+            sum2 += off(&m[i], p) * off(&m[i], p);
             ++*used;
         }
     }
-    return *used > 2 ? sqrt(sum / (*used - 1)) : NAN;
+    return *used > 2 ? sqrt(fmax(sum2 - sum * sum / *used, 0.0) / (*used - 1)) : NAN;
 }
 
 bst_status bst_twin_measure_photometry(bst_ctx *ctx, bst_twin *t) {
@@ -143,8 +144,7 @@ bst_status bst_twin_measure_photometry(bst_ctx *ctx, bst_twin *t) {
     for (int i = 0; i < t->model.count && isfinite(p->zero_point_mag); i++) {
         bst_twin_star *s = &t->model.stars[i];
         double mag = s->v_mag - p->zero_point_mag - p->colour_mag * probable_colour(s);
-        s->expected_e =
-            s->found ? NAN : t->frame->values.exposure_s * pow(10.0, -0.4 * mag);
+        s->expected_e = s->found ? NAN : t->frame->values.exposure_s * pow(10.0, -0.4 * mag);
     }
     free(m);
     free(work);

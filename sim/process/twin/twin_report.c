@@ -30,9 +30,8 @@ static bst_status run_scenario(bst_ctx *ctx, const bst_twin *t) {
     bst_twin_file(t, "_run", out);
     const bst_simulation_options options = {
         .device = q->device, .threads = (int)q->threads, .parallel = true};
-    const bst_run_request request = {.out = out,
-                                     .overwrite = q->overwrite,
-                                     .progress = !q->quiet && isatty(STDERR_FILENO)};
+    const bst_run_request request = {
+        .out = out, .overwrite = q->overwrite, .progress = !q->quiet && isatty(STDERR_FILENO)};
     bst_load_options load = BST_LOAD_DEFAULTS;
     return bst_check_run_file(ctx, q->out, load, NULL, &options, &request);
 }
@@ -81,7 +80,7 @@ static bst_status read_frames(bst_ctx *ctx, const bst_twin *t, const bst_twin_ca
 /* A frame of the picture. */
 typedef struct panel {
     const char *title;
-    const float *values; /* NULL: values2 alone */
+    const float *values;          /* NULL: values2 alone */
     const float *minus, *divide2; /* (values - minus) / sqrt(divide2); NULL: none */
     double low, high;
 } panel;

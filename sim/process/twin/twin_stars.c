@@ -4,12 +4,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/process/twin/twin_internal.h"
 #include "sim/astro/bodies.h"
 #include "sim/catalogue/stars.h"
+#include "sim/process/twin/twin_internal.h"
 
 /* Room of a query; most stars of the catalogue and most found ones. */
-enum { QUERY = 1 << 16, CATALOGUE_MOST = 300, FOUND_MOST = BST_TWIN_STARS - CATALOGUE_MOST };
+enum { QUERY = 1 << 16, CATALOGUE_MOST = 500, FOUND_MOST = BST_TWIN_STARS - CATALOGUE_MOST };
 /* Faintest star of the catalogue that is fitted, signal-to-noise ratio by the zero point. */
 static const double CATALOGUE_SNR = 2.0;
 /* Least share of a star's light on the frame. */
@@ -80,8 +80,7 @@ bst_status bst_twin_add_catalogue(bst_ctx *ctx, bst_twin *t) {
     }
     bst_status status = bst_stars_open(ctx, t->process_request.catalogue, &catalogue);
     if (status == BST_OK) {
-        bst_vec3 ahead =
-            bst_quat_rotate(bst_quat_conj(t->frame->q_middle), (bst_vec3){0, 0, 1});
+        bst_vec3 ahead = bst_quat_rotate(bst_quat_conj(t->frame->q_middle), (bst_vec3){0, 0, 1});
         double radius = bst_camera_half_diagonal_rad(camera) +
                         (t->length_px + 20.0) * bst_camera_scale_rad(camera) + 1e-3;
         status = bst_stars_query(ctx, catalogue, ahead, fmin(radius, BST_PI), 30.0, t->julian_year,
@@ -148,8 +147,8 @@ static bool add_detection(bst_twin *t, const bst_detection *d, const double (*pl
                           .found = true,
                           .v_mag = NAN,
                           .b_minus_v = NAN};
-    star.apparent = bst_vec3_unit(
-        bst_quat_rotate(back, bst_camera_unproject(&m->camera, d->x_px, d->y_px)));
+    star.apparent =
+        bst_vec3_unit(bst_quat_rotate(back, bst_camera_unproject(&m->camera, d->x_px, d->y_px)));
     for (int i = 0; i < 2; i++) { /* that was the place at half the time */
         mean_place(m, star.apparent, mean);
         bst_twin_star_shift(m, &star, d->x_px - mean[0], d->y_px - mean[1]);
@@ -170,8 +169,8 @@ static bst_status search(bst_ctx *ctx, bst_twin *t, const float *residual, doubl
     double(*places)[2] = malloc(BST_TWIN_STARS * sizeof *places);
     bst_streak_finder *finder = NULL;
     bst_common_streak streaks = {.count = 0};
-    bst_status status = path && places ? BST_OK
-                                       : bst_fail(ctx, BST_ERR_MEMORY, "no memory for a path");
+    bst_status status =
+        path && places ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for a path");
     bool moving = status == BST_OK && make_path(t, path);
     const bst_common_streak_options options = {.max_sources = FOUND_MOST,
                                                .least_snr = least_snr,
@@ -182,9 +181,9 @@ static bst_status search(bst_ctx *ctx, bst_twin *t, const float *residual, doubl
         status = bst_streak_finder_create(ctx, residual, m->width, m->height, &options, &finder);
     }
     if (status == BST_OK) {
-        status = moving ? bst_streak_finder_follow(ctx, finder, path, least_snr, LEAST_INSIDE,
-                                                   &streaks)
-                        : bst_streak_finder_find(ctx, finder, BST_STREAK_FINDER_POINT, &streaks);
+        status =
+            moving ? bst_streak_finder_follow(ctx, finder, path, least_snr, LEAST_INSIDE, &streaks)
+                   : bst_streak_finder_find(ctx, finder, BST_STREAK_FINDER_POINT, &streaks);
     }
     for (int i = 0; i < m->count && status == BST_OK; i++) {
         mean_place(m, m->stars[i].apparent, places[i]);

@@ -42,9 +42,9 @@ static bst_status change_scenario(bst_ctx *ctx, const bst_twin *t, cJSON *root,
     cJSON *scenegen = cJSON_CreateObject(), *record = item(root, "record");
     replace_text(root, "name", name_of(t, "", path));
     replace_text(root, "description", "Twin of a recorded frame: written by boresight twin.");
-    replace_text(item(root, "world"), "star_catalogue",
-                 t->request->catalogue_only ? t->request->catalogue
-                                            : name_of(t, "_stars.bin", path));
+    replace_text(
+        item(root, "world"), "star_catalogue",
+        t->request->catalogue_only ? t->request->catalogue : name_of(t, "_stars.bin", path));
     const char *pointing = name_of(t, "_path.json", path);
     replace_text(item(observer, "orbit"), "states_file", pointing);
     replace_text(sensor, "frame_updates_file", pointing);
