@@ -112,9 +112,8 @@ static int help(int argc, char **argv, const bst_app_command *more) {
         fprintf(stderr, "boresight: help takes one command (found also \"%.80s\")\n", argv[3]);
         return BST_EXIT_USAGE;
     }
-    char name[32], option[] = "--help";
-    snprintf(name, sizeof name, "%s", found->name);
-    char *words[] = {name, option, NULL};
+    char option[] = "--help";
+    char *words[] = {argv[2], option, NULL};
     return bst_cli_run_with_stack(found->run, 2, words);
 }
 

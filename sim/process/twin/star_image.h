@@ -25,6 +25,7 @@ typedef struct bst_twin_nodes {
  * Ownership: free with bst_twin_nodes_free */
 bst_status bst_twin_nodes_create(bst_ctx *ctx, const bst_twin_model *model,
                                  bst_twin_nodes *out) BST_MUST_CHECK;
+/* Frees the quadratures and clears the struct, which belongs to the caller. */
 void bst_twin_nodes_free(bst_twin_nodes *nodes);
 
 /* Place of a star at a node, and its derivatives. */

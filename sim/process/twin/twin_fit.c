@@ -96,18 +96,6 @@ static bst_status robust(bst_ctx *ctx, const float *values, size_t count, double
     return BST_OK;
 }
 
-bst_status bst_twin_residual(bst_ctx *ctx, const bst_twin *t, float *residual) {
-    const bst_twin_model *m = &t->model;
-    BST_TRY(bst_twin_model_render(ctx, m, t->pool, residual));
-    for (int y = 0; y < m->height; y++) {
-        for (int x = 0; x < m->width; x++) {
-            size_t i = (size_t)y * (size_t)m->width + (size_t)x;
-            residual[i] = t->data_e[i] - residual[i] - (float)bst_twin_background(m, x, y);
-        }
-    }
-    return BST_OK;
-}
-
 /* Noise of the pixels without stars, from the residual there. */
 static bst_status measure_noise(bst_ctx *ctx, bst_twin *t) {
     bst_twin_model *m = &t->model;

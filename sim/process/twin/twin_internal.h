@@ -2,6 +2,8 @@
 #ifndef BST_PROCESS_TWIN_TWIN_INTERNAL_H
 #define BST_PROCESS_TWIN_TWIN_INTERNAL_H
 
+#include <stdio.h>
+
 #include "sim/optics/band.h"
 #include "sim/process/process_internal.h"
 #include "sim/process/twin/twin.h"
@@ -36,6 +38,11 @@ typedef struct bst_twin {
     char stem[4096];     /* of the output files */
 } bst_twin;
 
+/* Name of a file of the twin: the scenario's without .json, and an ending. */
+static inline void bst_twin_file(const bst_twin *twin, const char *ending, char path[4096]) {
+    snprintf(path, 4096, "%.4000s%s", twin->stem, ending);
+}
+
 /* Fits model and path to the frame.
  *
  * Given:     twin->process solved, twin->frame one with an attitude
@@ -56,12 +63,6 @@ bst_status bst_twin_add_found(bst_ctx *ctx, bst_twin *twin, double least_snr,
                               int *added) BST_MUST_CHECK;
 /* Removes found stars below a signal-to-noise ratio. Returns how many. */
 int bst_twin_remove_faint(bst_twin *twin, double least_snr);
-
-/* Residual of the frame: data minus model.
- *
- * Returned:  residual_e  [height][width], NAN where the frame has no value
- * Errors:    BST_ERR_MEMORY */
-bst_status bst_twin_residual(bst_ctx *ctx, const bst_twin *twin, float *residual_e) BST_MUST_CHECK;
 
 /* Zero point and band from the fitted stars of the catalogue; sets their expected_e.
  *
@@ -120,8 +121,5 @@ typedef struct bst_twin_figures {
  * Errors:    those of the run and the outputs */
 bst_status bst_twin_report(bst_ctx *ctx, bst_twin *twin,
                            const bst_twin_camera *camera) BST_MUST_CHECK;
-
-/* Name of a file of the twin: the scenario's without .json, and an ending. */
-void bst_twin_file(const bst_twin *twin, const char *ending, char path[4096]);
 
 #endif

@@ -26,6 +26,18 @@ bst_status bst_twin_model_render(bst_ctx *ctx, const bst_twin_model *m, bst_para
     return bst_twin_evaluate(ctx, m, NULL, pool, stars_e, NULL);
 }
 
+bst_status bst_twin_model_residual(bst_ctx *ctx, const bst_twin_model *m, bst_parallel *pool,
+                                   float *residual) {
+    BST_TRY(bst_twin_model_render(ctx, m, pool, residual));
+    for (int y = 0; y < m->height; y++) {
+        for (int x = 0; x < m->width; x++) {
+            size_t i = (size_t)y * (size_t)m->width + (size_t)x;
+            residual[i] = m->data_e[i] - residual[i] - (float)bst_twin_background(m, x, y);
+        }
+    }
+    return BST_OK;
+}
+
 int bst_twin_path_values(const bst_twin_path *path) {
     return 2 * path->count[0] + path->count[1];
 }

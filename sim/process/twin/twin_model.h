@@ -59,6 +59,13 @@ typedef struct bst_twin_model {
 bst_status bst_twin_model_render(bst_ctx *ctx, const bst_twin_model *model, bst_parallel *pool,
                                  float *stars_e) BST_MUST_CHECK;
 
+/* Residual of the frame: data minus model.
+ *
+ * Returned:  residual_e  [height][width], NAN where the frame has no value
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_twin_model_residual(bst_ctx *ctx, const bst_twin_model *model, bst_parallel *pool,
+                                   float *residual_e) BST_MUST_CHECK;
+
 /* Background at a pixel, e-. */
 double bst_twin_background(const bst_twin_model *model, int x, int y);
 

@@ -208,7 +208,7 @@ bst_status bst_twin_add_found(bst_ctx *ctx, bst_twin *t, double least_snr, int *
     if (!residual) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", count);
     }
-    bst_status status = bst_twin_residual(ctx, t, residual);
+    bst_status status = bst_twin_model_residual(ctx, &t->model, t->pool, residual);
     if (status == BST_OK) {
         status = search(ctx, t, residual, least_snr, added);
     }

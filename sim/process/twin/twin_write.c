@@ -13,10 +13,6 @@
 /* Attitudes of the exposure in the file of the path. */
 enum { NODES = 257 };
 
-void bst_twin_file(const bst_twin *t, const char *ending, char path[4096]) {
-    snprintf(path, 4096, "%.4000s%s", t->stem, ending);
-}
-
 /* Name of a file beside the scenario. */
 static const char *name_of(const bst_twin *t, const char *ending, char path[4096]) {
     bst_twin_file(t, ending, path);
