@@ -26,6 +26,7 @@ typedef struct bst_process_frame {
     int64_t start_tick, exposure_ticks; /* after the first frame's start */
     bool has_header_attitude;
     bst_quat q_header; /* by the header's WCS */
+    double rate_trend; /* bst_keyword_rate_trend */
     /* of the stars */
     bool solved, points;
     bst_quat q_middle; /* at the middle of the streaks */

@@ -198,6 +198,38 @@ static bst_vec3 turn_between(bst_quat from, bst_quat to) {
     return bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from)));
 }
 
+/* Trends of the speed that are too small to tell directions apart. */
+static const double LEAST_TREND = 0.05;
+
+/* Change of the speed along the nodes, as bst_keyword_rate_trend has it. */
+static double path_trend(const bst_process_frame *f) {
+    double w = 0.0, t = 0.0, v = 0.0, tt = 0.0, tv = 0.0;
+    for (int k = 1; k < f->node_count; k++) {
+        const bst_process_node *a = &f->nodes[k - 1], *b = &f->nodes[k];
+        double dt = b->share - a->share, middle = 0.5 * (a->share + b->share);
+        double turn = bst_vec3_norm(turn_between(a->q_cam_from_gcrf, b->q_cam_from_gcrf));
+        w += dt;
+        t += dt * middle;
+        v += turn;
+        tt += dt * middle * middle;
+        tv += turn * middle;
+    }
+    return (tv - t * v / w) / (tt - t * t / w) / (v / w);
+}
+
+/* Orders the nodes of a frame so that its speed changes as the header's history says; false: it
+ * does not tell. */
+static bool orient_by_rates(bst_process_frame *f) {
+    double along = path_trend(f);
+    if (!(fabs(f->rate_trend) > LEAST_TREND && fabs(along) > LEAST_TREND)) {
+        return false;
+    }
+    if (f->rate_trend * along < 0.0) {
+        reverse(f);
+    }
+    return true;
+}
+
 /* Orders the nodes of a frame so that the camera turns as it does to the next or from the previous
  * solved frame; false: there is no other. */
 static bool orient(const bst_process *p, int i) {
@@ -208,8 +240,11 @@ static bool orient(const bst_process *p, int i) {
                 : i - k >= 0 && p->frames[i - k].solved     ? i - k
                                                             : -1;
     }
-    if (other < 0 || f->node_count < 2) {
-        return f->node_count < 2;
+    if (f->node_count < 2) {
+        return true;
+    }
+    if (other < 0) {
+        return orient_by_rates(f);
     }
     bst_vec3 own =
         turn_between(f->nodes[0].q_cam_from_gcrf, f->nodes[f->node_count - 1].q_cam_from_gcrf);

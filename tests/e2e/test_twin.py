@@ -175,6 +175,7 @@ class Twin(unittest.TestCase):
         runs.need_full_catalogue()
         call_well("twin", NEOSSAT, "--map", "neossat", "--out", self.folder + "/neossat.json", "--quiet", timeout=1800)
         figures = self.report("neossat")["figures"]
+        self.assertTrue(self.report("neossat")["fit"]["direction_known"])  # of its rate_history
         self.assertLess(figures["streaks_across_rms_px"], 0.1)
         self.assertLess(figures["streaks_along_rms_px"], 0.35)
         self.assertLess(figures["photometry_scatter_bright_mag"], 0.2)

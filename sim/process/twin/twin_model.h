@@ -7,7 +7,7 @@
 #include "sim/core/parallel.h"
 #include "sim/process/twin/twin_path.h"
 
-enum { BST_TWIN_BACKGROUND = 6, BST_TWIN_STARS = 800 };
+enum { BST_TWIN_BACKGROUND = 6, BST_TWIN_STARS = 1600 };
 
 /* A star. */
 typedef struct bst_twin_star {

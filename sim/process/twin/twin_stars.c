@@ -9,7 +9,7 @@
 #include "sim/process/twin/twin_internal.h"
 
 /* Room of a query; most stars of the catalogue and most found ones. */
-enum { QUERY = 1 << 16, CATALOGUE_MOST = 500, FOUND_MOST = BST_TWIN_STARS - CATALOGUE_MOST };
+enum { QUERY = 1 << 16, CATALOGUE_MOST = 1200, FOUND_MOST = BST_TWIN_STARS - CATALOGUE_MOST };
 /* Faintest star of the catalogue that is fitted, signal-to-noise ratio by the zero point. */
 static const double CATALOGUE_SNR = 2.0;
 /* Least share of a star's light on the frame. */
