@@ -142,10 +142,12 @@ class Twin(unittest.TestCase):
 
     @unittest.skipUnless(FULL, "only with --full")
     def test_random_frames(self):
-        """50 frames with hidden paths."""
+        """50 frames with hidden paths, in directions that the Earth does not hide."""
         runs.need_full_catalogue()
-        errors, chi2 = [], []
-        for seed in range(50):
+        errors, chi2, unsolved = [], [], 0
+        for seed in range(200):
+            if len(errors) + unsolved == 50:
+                break
             rng = numpy.random.default_rng(seed)
             folder = os.path.join(self.folder, str(seed))
             os.mkdir(folder)
@@ -157,14 +159,17 @@ class Twin(unittest.TestCase):
             call_well("run", write_scenario(folder, path, camera, "default"), "--quiet", "--out", folder + "/run", timeout=600)
             found = call("twin", folder + "/run", "--map", "boresight", "--v-limit", "10.5", "--quiet",
                          "--out", folder + "/twin.json", timeout=1800)
+            if "give no attitude (0 detections" in found.stderr:  # the Earth is in front
+                continue
             if "give no attitude" in found.stderr:  # of the solver, which has tests of its own
                 print(f"{seed}: no attitude")
+                unsolved += 1
                 continue
             self.assertEqual((found.returncode, found.stderr), (0, ""))
             errors.append(path_error_px(folder, "twin", path, scale_rad))
             chi2.append(self.report(f"{seed}/twin")["figures"]["chi2_per_pixel_by_header_noise"])
             print(f"{seed}: path {errors[-1]:.4f} px, chi2 {chi2[-1]:.4f}", flush=True)
-        self.assertGreaterEqual(len(errors), 45)
+        self.assertLessEqual(unsolved, 5)
         print(f"path: median {numpy.median(errors):.4f}, largest {max(errors):.4f} px; chi2 {min(chi2):.4f} to {max(chi2):.4f}")
         self.assertLess(numpy.median(errors), 0.03)
         self.assertLess(numpy.abs(numpy.array(chi2) - 1).max(), 0.02)
