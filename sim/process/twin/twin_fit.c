@@ -13,7 +13,7 @@ static const int COEFFICIENTS[] = {4, 5, 7, 11, 19, 35, 67};
 enum { TRIED = sizeof COEFFICIENTS / sizeof *COEFFICIENTS, ROLL_MOST = 7 };
 static const double LEAST_INTERVAL_PX = 5.0;
 /* Loss by which a value of the path must improve the fit on average. */
-static const double GAIN_PER_VALUE = 2.0;
+static const double GAIN_PER_VALUE = 1.0;
 /* Faintest stars that are added, in rounds. */
 static const double ROUND_SNR[] = {20.0, 8.0, 5.5};
 enum { ROUNDS = 3 };
@@ -26,6 +26,9 @@ enum { CLIPS = 8 };
 static const double LARGEST_DN = 65535.0;
 /* Share of the full well or the largest count from which a pixel is not used. */
 static const double FULL_SHARE = 0.95;
+/* Error of the PSF's form at first and at most, as a share of a pixel's light, and light of the
+ * pixels that tell it, standard deviations. */
+static const double FIRST_FORM_ERROR = 0.02, MOST_FORM_ERROR = 0.1, BRIGHT_SIGMA = 5.0;
 /* A pixel with less light of stars than this, in standard deviations, is one of the background. */
 static const double DARK_SIGMA = 0.3;
 
@@ -96,7 +99,25 @@ static bst_status robust(bst_ctx *ctx, const float *values, size_t count, double
     return BST_OK;
 }
 
-/* Noise of the pixels without stars, from the residual there. */
+/* Error of the PSF's form: what residuals of bright pixels have beyond noise and shot noise. */
+static void measure_form(bst_twin *t, const float *light) {
+    bst_twin_model *m = &t->model;
+    double excess = 0.0, light2 = 0.0;
+    for (size_t i = 0; i < (size_t)m->width * (size_t)m->height; i++) {
+        int x = (int)(i % (size_t)m->width), y = (int)(i / (size_t)m->width);
+        double stars = (double)light[i];
+        double r = (double)t->data_e[i] - stars - bst_twin_background(m, x, y);
+        double variance = m->noise_e * m->noise_e + fmax(stars, 0.0);
+        double most = variance + MOST_FORM_ERROR * MOST_FORM_ERROR * stars * stars;
+        if (isfinite(r) && stars > BRIGHT_SIGMA * m->noise_e && r * r < CLIP * CLIP * most) {
+            excess += r * r - variance;
+            light2 += stars * stars;
+        }
+    }
+    m->form_error = light2 > 0.0 ? fmin(sqrt(fmax(excess, 0.0) / light2), MOST_FORM_ERROR) : 0.0;
+}
+
+/* Noise of the pixels without stars, from the residual there, and error of the PSF's form. */
 static bst_status measure_noise(bst_ctx *ctx, bst_twin *t) {
     bst_twin_model *m = &t->model;
     size_t count = (size_t)m->width * (size_t)m->height;
@@ -104,6 +125,9 @@ static bst_status measure_noise(bst_ctx *ctx, bst_twin *t) {
     double mean, sigma;
     bst_status status = residual ? bst_twin_model_render(ctx, m, t->pool, residual)
                                  : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", count);
+    if (status == BST_OK) {
+        measure_form(t, residual);
+    }
     for (size_t i = 0; i < count && status == BST_OK; i++) {
         bool dark = (double)residual[i] < DARK_SIGMA * m->noise_e;
         int x = (int)(i % (size_t)m->width), y = (int)(i / (size_t)m->width);
@@ -143,6 +167,7 @@ static bst_status begin(bst_ctx *ctx, bst_twin *t) {
                             f->place.hdu);
         }
     }
+    m->form_error = FIRST_FORM_ERROR;
     m->psf = (bst_twin_psf){.sigma_px = 0.9, .ratio = 2.5, .wide = 0.1};
     return robust(ctx, t->data_e, (size_t)m->width * (size_t)m->height, &m->background_e[0],
                   &m->noise_e);

@@ -9,9 +9,6 @@
 #include "sim/core/cholesky.h"
 #include "sim/process/twin/normal_equations.h"
 
-/* Error of the PSF's form, as a share of a pixel's starlight: keeps a few bright streaks from
- * outweighing all others. */
-static const double FORM_ERROR = 0.02;
 /* A priori: width of the wide Gaussian over that of the narrow one, its logarithm's standard
  * deviation; of a found star's place, px. */
 static const double USUAL_RATIO = 2.5, RATIO_SIGMA = 0.4, PLACE_SIGMA_PX = 3.0;
@@ -69,7 +66,7 @@ static bst_status set_variances(bst_ctx *ctx, bst_twin_model *m, bst_parallel *p
     size_t pixels = (size_t)m->width * (size_t)m->height;
     BST_TRY(bst_twin_model_render(ctx, m, pool, m->variance_e2));
     for (size_t i = 0; i < pixels; i++) {
-        double light = fmax((double)m->variance_e2[i], 0.0), form = FORM_ERROR * light;
+        double light = fmax((double)m->variance_e2[i], 0.0), form = m->form_error * light;
         m->variance_e2[i] = (float)(m->noise_e * m->noise_e + light + form * form);
     }
     return BST_OK;

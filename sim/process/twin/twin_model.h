@@ -48,7 +48,9 @@ typedef struct bst_twin_model {
     int width, height;
     const float *data_e; /* [height][width] electrons; NAN: no value */
     double noise_e;      /* of a pixel without stars, standard deviation */
-    float *variance_e2;  /* [height][width] of the latest fit */
+    double form_error;  /* of the PSF, as a share of a pixel's starlight: keeps a few bright streaks
+                           from outweighing all others */
+    float *variance_e2; /* [height][width] of the latest fit */
 } bst_twin_model;
 
 /* Electrons of a frame by the model.
@@ -79,7 +81,7 @@ typedef struct bst_twin_freedom {
 /* Fits the model to the frame by Levenberg and Marquardt's method with Huber's loss at 4 sigma.
  *
  * All parameters are fitted jointly. The variance of a pixel is noise_e^2 plus the light of the
- * stars by the model, and 2 % of that light for the PSF's form; it is kept during the call.
+ * stars by the model, and form_error of that light squared; it is kept during the call.
  *
  * Returned:  model      fitted; sigma_e of the stars
  *            *loss      sum over the pixels; half of chi squared without outliers
