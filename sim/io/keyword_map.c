@@ -79,7 +79,7 @@ const bst_config_desc bst_keyword_map_table[] = {
     BST_OBJECT(bst_keyword_map, observer_velocity_gcrf_mps, vector_table, "{}",
                "Its velocity, for aberration."),
     BST_OBJECT(bst_keyword_map, rate_history, history_table, "{}",
-               "History of the camera's rate of turn: tells which end of a streak came first."),
+               "History of the camera's rate of turn: gives the end of a streak that came first."),
     BST_ENUM(bst_keyword_map, attitude, attitudes, "\"none\"",
              "wcs: frames whose stars give no attitude take the header's TAN WCS."),
     BST_STRING(bst_keyword_map, image_section, "\"\"",
