@@ -35,6 +35,8 @@ int bst_cmd_report(int argc, char **argv);
 int bst_cmd_orbit(int argc, char **argv);
 /* boresight process: recorded frames through the onboard chain. */
 int bst_cmd_process(int argc, char **argv);
+/* boresight twin: a scenario that renders what a recorded frame shows. */
+int bst_cmd_twin(int argc, char **argv);
 /* boresight solve: attitude of a FITS frame; argv[0] is "solve". Returns the exit code. */
 int bst_cmd_solve(int argc, char **argv);
 /* boresight score: detections or tracks against truth. */

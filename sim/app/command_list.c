@@ -17,6 +17,7 @@ static const bst_app_command commands[] = {
     {"export", bst_cmd_export, "frames, tables, orbits and observations of a run for others"},
     {"orbit", bst_cmd_orbit, "an orbit from the directions that a run measured"},
     {"process", bst_cmd_process, "frames of other programs through the onboard chain"},
+    {"twin", bst_cmd_twin, "a scenario that renders what a recorded frame shows"},
     {"solve", bst_cmd_solve, "where a frame looks, from its stars alone"},
     {"score", bst_cmd_score, "detections or tracks against truth or annotations"},
     {"challenge", bst_cmd_challenge, "random frames with hidden truth, for detectors to find"},
@@ -111,9 +112,8 @@ static int help(int argc, char **argv, const bst_app_command *more) {
         fprintf(stderr, "boresight: help takes one command (found also \"%.80s\")\n", argv[3]);
         return BST_EXIT_USAGE;
     }
-    char name[32], option[] = "--help";
-    snprintf(name, sizeof name, "%s", found->name);
-    char *words[] = {name, option, NULL};
+    char option[] = "--help";
+    char *words[] = {argv[2], option, NULL};
     return bst_cli_run_with_stack(found->run, 2, words);
 }
 

@@ -12,6 +12,8 @@
 #include "sim/core/subprocess.h"
 
 #define ROWS_PER_PROGRESS 20000
+/* V to which a catalogue of one field is complete over the whole sky */
+#define BRIGHTER_THAN_ALL (-2.0)
 
 typedef struct import_star {
     bst_star_record record;
@@ -297,6 +299,26 @@ static bst_status write_catalogue(bst_ctx *ctx, import_list *list,
     BST_TRY(build_image(ctx, list, &options->subset, &image, &bytes));
     bst_status status = write_atomically(ctx, out_path, image, bytes);
     free(image);
+    return status;
+}
+
+bst_status bst_star_write(bst_ctx *ctx, const bst_star_values *values, size_t count,
+                          const bst_star_patch *complete, const char *out_path) {
+    import_list list = {0};
+    bst_star_import_options options = {.subset = {.v_limit = BRIGHTER_THAN_ALL, .patch_count = 1}};
+    bst_status status = BST_OK;
+    options.subset.patches[0] = *complete;
+    for (size_t i = 0; i < count && status == BST_OK; i++) {
+        bst_star_record record;
+        status = bst_star_pack(ctx, &values[i], &record);
+        if (status == BST_OK) {
+            status = append(ctx, &list, &record, values[i].id >> 16);
+        }
+    }
+    if (status == BST_OK) {
+        status = write_catalogue(ctx, &list, &options, out_path);
+    }
+    free(list.stars);
     return status;
 }
 

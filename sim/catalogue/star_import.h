@@ -62,4 +62,12 @@ bst_status bst_star_import_tarball(bst_ctx *ctx, const char *tarball_path,
                                    const bst_star_import_options *options, const char *out_path,
                                    long long *stars_written) BST_MUST_CHECK;
 
+/* Writes a catalogue of given stars, under a temporary name that is renamed when complete.
+ *
+ * Given:     values, count  1 or more; each star stands in the sky cell that its identity names
+ *            complete       cap in which the catalogue is complete, and to which V
+ * Errors:    BST_ERR_RANGE as bst_star_pack; BST_ERR_IO, BST_ERR_MEMORY */
+bst_status bst_star_write(bst_ctx *ctx, const bst_star_values *values, size_t count,
+                          const bst_star_patch *complete, const char *out_path) BST_MUST_CHECK;
+
 #endif

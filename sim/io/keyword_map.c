@@ -41,6 +41,15 @@ static const bst_config_desc vector_table[] = {
     BST_OBJECT(bst_keyword_vector, y, number_table, "{}", "Second component."),
     BST_OBJECT(bst_keyword_vector, z, number_table, "{}", "Third component."), BST_CONFIG_END};
 
+static const bst_config_desc history_table[] = {
+    BST_STRING(
+        bst_keyword_history, time, "\"\"",
+        "Keywords of the times, s after the start of the exposure, as DELT_###: # stands for "
+        "a digit of the entry's index, from 0."),
+    BST_STRING(bst_keyword_history, rate, "\"\"",
+               "Keywords of the rates, one to three numbers each, in any unit."),
+    BST_CONFIG_END};
+
 const bst_config_desc bst_keyword_map_table[] = {
     {.key = "boresight_keyword_map",
      .type = BST_CONFIG_INT,
@@ -69,6 +78,8 @@ const bst_config_desc bst_keyword_map_table[] = {
                "Observer at mid-exposure, geocentric GCRF."),
     BST_OBJECT(bst_keyword_map, observer_velocity_gcrf_mps, vector_table, "{}",
                "Its velocity, for aberration."),
+    BST_OBJECT(bst_keyword_map, rate_history, history_table, "{}",
+               "History of the camera's rate of turn: gives the end of a streak that came first."),
     BST_ENUM(bst_keyword_map, attitude, attitudes, "\"none\"",
              "wcs: frames whose stars give no attitude take the header's TAN WCS."),
     BST_STRING(bst_keyword_map, image_section, "\"\"",

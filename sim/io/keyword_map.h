@@ -32,6 +32,12 @@ typedef struct bst_keyword_vector {
     bst_keyword_number x, y, z;
 } bst_keyword_vector;
 
+/* Keywords of a history of rates of turn; # stands for a digit of its index, from 0. */
+typedef struct bst_keyword_history {
+    char time[BST_KEYWORD_TEXT]; /* s after the start of the exposure; "": no history */
+    char rate[BST_KEYWORD_TEXT]; /* one to three numbers, any unit */
+} bst_keyword_history;
+
 enum { BST_KEYWORD_NO_ATTITUDE, BST_KEYWORD_WCS };
 
 typedef struct bst_keyword_map {
@@ -41,6 +47,7 @@ typedef struct bst_keyword_map {
     bst_keyword_number exposure_s, gain_e_per_dn, read_noise_e, offset_dn, full_well_e,
         pixel_scale_arcsec, exposure_id;
     bst_keyword_vector observer_position_gcrf_m, observer_velocity_gcrf_mps;
+    bst_keyword_history rate_history;
     int32_t attitude;                     /* BST_KEYWORD_NO_ATTITUDE, _WCS */
     char image_section[BST_KEYWORD_TEXT]; /* keyword; "": the whole image */
     char bias_section[BST_KEYWORD_TEXT];  /* keyword; "": no overscan is subtracted */
@@ -93,6 +100,15 @@ bst_status bst_keyword_map_read(bst_ctx *ctx, const bst_keyword_map *map, bst_fi
  *            image */
 bst_status bst_keyword_section(bst_ctx *ctx, const char *keyword, bst_fits_source *source,
                                const bst_fits_source_frame *frame, int box[4]) BST_MUST_CHECK;
+
+/* Change of the rate of turn during the exposure by the header's history.
+ *
+ * Returned:  *trend  slope of the rate's length against time, times the exposure, over its mean;
+ *                    NAN: no history, or fewer than 4 entries within the exposure
+ * Errors:    BST_ERR_FORMAT with file, HDU and keyword: an entry is no number */
+bst_status bst_keyword_rate_trend(bst_ctx *ctx, const bst_keyword_map *map, bst_fits_source *source,
+                                  const bst_fits_source_frame *frame, double exposure_s,
+                                  double *trend) BST_MUST_CHECK;
 
 /* Attitude by the TAN WCS of a header (CRPIXn, CRVALn, and CDi_j or CDELTn with CROTA2).
  *

@@ -54,6 +54,77 @@ static bool number_of(char *text, double *out) {
     return end != text && *end == '\0' && isfinite(*out);
 }
 
+/* Most entries of a history of rates, and the least that give a trend. */
+enum { HISTORY_MOST = 10000, HISTORY_LEAST = 4 };
+
+/* Keyword of an entry: the digits of its index in place of the last #'s. False: it has none. */
+static bool entry_keyword(const char *pattern, int index, char out[BST_KEYWORD_TEXT]) {
+    snprintf(out, BST_KEYWORD_TEXT, "%s", pattern);
+    char *last = strrchr(out, '#');
+    int left = index;
+    bool any = last != NULL;
+    for (char *c = last; c && c >= out && *c == '#'; c--) {
+        *c = (char)('0' + left % 10);
+        left /= 10;
+    }
+    return any && left == 0;
+}
+
+/* Length of a vector of one to three numbers in text. */
+static bool length_of(const char *text, double *out) {
+    double sum2 = 0.0;
+    int n = 0;
+    for (const char *at = text; n < 3; n++) {
+        char *end;
+        double value = strtod(at, &end);
+        if (end == at || !isfinite(value)) {
+            break;
+        }
+        sum2 += value * value;
+        at = end + strspn(end, " ,;");
+    }
+    *out = sqrt(sum2);
+    return n > 0;
+}
+
+bst_status bst_keyword_rate_trend(bst_ctx *ctx, const bst_keyword_map *map, bst_fits_source *source,
+                                  const bst_fits_source_frame *frame, double exposure_s,
+                                  double *trend) {
+    const reading r = {ctx, map, source, frame};
+    double n = 0.0, t = 0.0, v = 0.0, tt = 0.0, tv = 0.0;
+    *trend = NAN;
+    for (int i = 0; i < HISTORY_MOST && *map->rate_history.time; i++) {
+        char keyword[BST_KEYWORD_TEXT], text[BST_FITS_SOURCE_TEXT];
+        double time, rate;
+        if (!entry_keyword(map->rate_history.time, i, keyword) ||
+            !bst_fits_source_text(source, keyword, text)) {
+            break;
+        }
+        if (!number_of(text, &time)) {
+            return wrong(&r, keyword, "rate_history.time", "is no number");
+        }
+        if (!entry_keyword(map->rate_history.rate, i, keyword) ||
+            !bst_fits_source_text(source, keyword, text)) {
+            break;
+        }
+        if (!length_of(text, &rate)) {
+            return wrong(&r, keyword, "rate_history.rate", "is no number");
+        }
+        if (time >= 0.0 && time <= exposure_s) {
+            n += 1.0;
+            t += time;
+            v += rate;
+            tt += time * time;
+            tv += time * rate;
+        }
+    }
+    double spread = tt - t * t / n;
+    if (n >= HISTORY_LEAST && spread > 0.0 && v > 0.0) {
+        *trend = (tv - t * v / n) / spread * exposure_s / (v / n);
+    }
+    return BST_OK;
+}
+
 /* A value that is required, within [least, most]. */
 typedef struct range {
     const char *key;

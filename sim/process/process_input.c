@@ -152,8 +152,7 @@ static void put_observer(cJSON *object, const bst_process_frame *f) {
     }
 }
 
-/* pointing.json: the frame updates of the sensor. */
-static cJSON *make_pointing(const bst_process *p) {
+cJSON *bst_process_make_pointing(const bst_process *p) {
     cJSON *root = cJSON_CreateObject();
     cJSON_AddNumberToObject(root, "boresight_frame_updates", 1);
     cJSON *frames = cJSON_AddArrayToObject(root, "frames");
@@ -291,7 +290,9 @@ static cJSON *make_observer(const bst_process *p, cJSON *camera) {
     return observer;
 }
 
-static cJSON *make_scenario(const bst_process *p, cJSON *camera) {
+bst_status bst_process_make_scenario(bst_ctx *ctx, const bst_process *p, cJSON **out) {
+    cJSON *camera;
+    BST_TRY(make_camera(ctx, p, &camera));
     char epoch[40], name[64];
     const bst_process_frame *last = &p->frames[p->count - 1];
     cJSON *root = cJSON_CreateObject();
@@ -311,7 +312,8 @@ static cJSON *make_scenario(const bst_process *p, cJSON *camera) {
     /* attitudes for the path of the streaks in pictures */
     double exposure_s = fmax(seconds(p->frames[0].exposure_ticks), 1e-3);
     put_number(record, "telemetry_hz", fmin(fmax(ceil(PATH_SAMPLES / exposure_s), 1.0), 100.0));
-    return root;
+    *out = root;
+    return BST_OK;
 }
 
 /* frames.txt: the files in the order of their frames. */
@@ -348,13 +350,13 @@ static cJSON *make_map(const bst_process *p) {
 
 bst_status bst_process_write_input(bst_ctx *ctx, const bst_process *p) {
     char folder[4096];
-    cJSON *camera;
+    cJSON *scenario;
     BST_TRY(bst_process_path(ctx, p, "input", folder));
     BST_TRY(bst_folder_make(ctx, folder));
-    BST_TRY(make_camera(ctx, p, &camera));
-    bst_status status = write_json(ctx, p, "input/scenario.json", make_scenario(p, camera));
+    BST_TRY(bst_process_make_scenario(ctx, p, &scenario));
+    bst_status status = write_json(ctx, p, "input/scenario.json", scenario);
     if (status == BST_OK) {
-        status = write_json(ctx, p, "input/pointing.json", make_pointing(p));
+        status = write_json(ctx, p, "input/pointing.json", bst_process_make_pointing(p));
     }
     if (status == BST_OK) {
         status = write_json(ctx, p, "input/keyword_map.json", make_map(p));

@@ -26,6 +26,7 @@ typedef struct bst_process_frame {
     int64_t start_tick, exposure_ticks; /* after the first frame's start */
     bool has_header_attitude;
     bst_quat q_header; /* by the header's WCS */
+    double rate_trend; /* bst_keyword_rate_trend */
     /* of the stars */
     bool solved, points;
     bst_quat q_middle; /* at the middle of the streaks */
@@ -68,6 +69,15 @@ bst_status bst_process_survey(bst_ctx *ctx, bst_process *p, const char *const *p
  *
  * Errors:    those of the catalogue and the files; BST_ERR_MEMORY, BST_ERR_INTERRUPTED */
 bst_status bst_process_solve(bst_ctx *ctx, bst_process *p) BST_MUST_CHECK;
+/* Scenario that takes the frames from their files.
+ *
+ * Returned:  *out  JSON, which the caller deletes
+ * Errors:    those of bst_keyword_map_camera */
+bst_status bst_process_make_scenario(bst_ctx *ctx, const bst_process *p,
+                                     struct cJSON **out) BST_MUST_CHECK;
+/* Frame updates of its sensor: pointing and observer in each frame. The caller deletes the JSON;
+ * NULL: out of memory. */
+struct cJSON *bst_process_make_pointing(const bst_process *p);
 /* Writes input/ of the folder: scenario.json, pointing.json, keyword_map.json, frames.txt.
  *
  * Errors:    BST_ERR_IO, BST_ERR_MEMORY */
@@ -95,6 +105,11 @@ void bst_process_free(bst_process *p);
  * Returned:  position_m, velocity_mps  geocentric, GCRF axes */
 void bst_process_observer(const bst_process_frame *frame, bst_vec3 *position_m,
                           bst_vec3 *velocity_mps);
+
+/* Observer's light at the middle of a frame, for apparent places. */
+bst_light bst_process_light(const bst_process_frame *frame);
+/* Julian year of a frame's start, for proper motions. */
+double bst_process_julian_year(const bst_process_frame *frame);
 
 /* Path of a file in the folder.
  *

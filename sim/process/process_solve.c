@@ -30,9 +30,9 @@ static void close_solver(solver *s) {
     bst_stars_close(s->stars);
 }
 
-static double julian_year(bst_time t) {
+double bst_process_julian_year(const bst_process_frame *f) {
     double tt1, tt2;
-    bst_time_tt(t, &tt1, &tt2);
+    bst_time_tt(f->values.start, &tt1, &tt2);
     return 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25;
 }
 
@@ -46,7 +46,7 @@ static bst_status open_solver(bst_ctx *ctx, const bst_process *p, solver *s) {
         .width_px = p->width, .height_px = p->height, .pixel_scale_arcsec = p->scale_arcsec};
     BST_TRY(bst_camera_prepare(ctx, &s->camera));
     BST_TRY(bst_stars_open(ctx, p->request->catalogue, &s->stars));
-    double year = julian_year(p->frames[0].values.start);
+    double year = bst_process_julian_year(&p->frames[0]);
     const bst_star_patterns_options options = {
         2.0 * atan(0.5 * least * bst_camera_scale_rad(&s->camera)), v_limit_of(p), year};
     BST_TRY(bst_star_patterns_create(ctx, s->stars, &options, &s->patterns));
@@ -55,8 +55,7 @@ static bst_status open_solver(bst_ctx *ctx, const bst_process *p, solver *s) {
                                     BST_PLATE_SOLVE_STARS, &s->lost);
 }
 
-/* Observer's light at the middle of a frame. */
-static bst_light light_of(const bst_process_frame *f) {
+bst_light bst_process_light(const bst_process_frame *f) {
     bst_bodies bodies;
     bst_vec3 position, velocity;
     bst_process_observer(f, &position, &velocity);
@@ -116,7 +115,7 @@ static bst_status solve_frame(bst_ctx *ctx, bst_process *p, solver *s, bst_proce
     const float *pixels;
     BST_TRY(bst_recorded_frames_select(ctx, p->recorded, f->index, &p->options, &r));
     BST_TRY(bst_recorded_frames_pixels(ctx, p->recorded, &p->options, &r, &pixels));
-    const bst_light light = light_of(f);
+    const bst_light light = bst_process_light(f);
     const bst_plate_solve_options options = {.scale_tolerance = p->request->scale_tolerance,
                                              .v_limit = v_limit_of(p),
                                              .least_snr = p->request->least_snr,
@@ -199,6 +198,38 @@ static bst_vec3 turn_between(bst_quat from, bst_quat to) {
     return bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from)));
 }
 
+/* Trends of the speed that are too small to tell directions apart. */
+static const double LEAST_TREND = 0.05;
+
+/* Change of the speed along the nodes, as bst_keyword_rate_trend has it. */
+static double path_trend(const bst_process_frame *f) {
+    double w = 0.0, t = 0.0, v = 0.0, tt = 0.0, tv = 0.0;
+    for (int k = 1; k < f->node_count; k++) {
+        const bst_process_node *a = &f->nodes[k - 1], *b = &f->nodes[k];
+        double dt = b->share - a->share, middle = 0.5 * (a->share + b->share);
+        double turn = bst_vec3_norm(turn_between(a->q_cam_from_gcrf, b->q_cam_from_gcrf));
+        w += dt;
+        t += dt * middle;
+        v += turn;
+        tt += dt * middle * middle;
+        tv += turn * middle;
+    }
+    return (tv - t * v / w) / (tt - t * t / w) / (v / w);
+}
+
+/* Orders the nodes of a frame so that its speed changes as the header's history says; false: it
+ * does not tell. */
+static bool orient_by_rates(bst_process_frame *f) {
+    double along = path_trend(f);
+    if (!(fabs(f->rate_trend) > LEAST_TREND && fabs(along) > LEAST_TREND)) {
+        return false;
+    }
+    if (f->rate_trend * along < 0.0) {
+        reverse(f);
+    }
+    return true;
+}
+
 /* Orders the nodes of a frame so that the camera turns as it does to the next or from the previous
  * solved frame; false: there is no other. */
 static bool orient(const bst_process *p, int i) {
@@ -209,8 +240,11 @@ static bool orient(const bst_process *p, int i) {
                 : i - k >= 0 && p->frames[i - k].solved     ? i - k
                                                             : -1;
     }
-    if (other < 0 || f->node_count < 2) {
-        return f->node_count < 2;
+    if (f->node_count < 2) {
+        return true;
+    }
+    if (other < 0) {
+        return orient_by_rates(f);
     }
     bst_vec3 own =
         turn_between(f->nodes[0].q_cam_from_gcrf, f->nodes[f->node_count - 1].q_cam_from_gcrf);
@@ -247,7 +281,7 @@ bst_status bst_process_solve(bst_ctx *ctx, bst_process *p) {
         f->has_header_attitude = f->has_header_attitude &&
                                  p->options.flip_rows == (p->request->flip == BST_PROCESS_FLIP_YES);
         if (f->has_header_attitude) {
-            const bst_light light = light_of(f);
+            const bst_light light = bst_process_light(f);
             aberrate_header(f, &light);
         }
         p->direction_known = orient(p, i) && p->direction_known;

@@ -29,6 +29,7 @@ class Outputs(unittest.TestCase):
              "new": ["--observer-tle", "{elements}"],
              "lightcurve": ["{scenario}", "--duration", "0"], "turntable": ["{satellite}"],
              "study": ["{study}"], "process": ["{run}", "--map", "boresight"],
+             "twin": ["{run}", "--map", "boresight"],
              "challenge": ["1"],
              "characterize": ["--map", "boresight", "--bias", "{run}/frames.fits"],
              "score": ["{run}", "--truth", "{run}"], "pd": ["{scenario}", "--trials", "1"]}

@@ -465,6 +465,44 @@ static void test_files(void **state) {
     end(&f);
 }
 
+/* A rate that grows from 3 to 5 in an exposure of 4 s. */
+static void test_rate_trend(void **state) {
+    (void)state;
+    fixture f = begin("history.fits");
+    bst_keyword_map map;
+    bst_fits_source *s;
+    bst_fits_source_frame frame;
+    double trend;
+    load_map(&f,
+             "{\"boresight_keyword_map\": 1, \"rate_history\": {\"time\": \"T_##\", \"rate\": "
+             "\"V_##\"}}",
+             &map);
+    begin_image(&f, true, 8, 1, 1, 0);
+    for (int i = 0; i < 7; i++) { /* times -1 to 5: the first and the last are outside */
+        card(&f, "T_%02d    = %20.1f", i, i - 1.0);
+        card(&f, "V_%02d    = '%g 0 0'", i, i == 0 ? 90.0 : 3.0 + 0.5 * (i - 1));
+    }
+    card(&f, "A_00    = %20.1f", 6.0);
+    card(&f, "B_00    = 'fast'");
+    end_header(&f);
+    put(&f, "x", 1);
+    pad(&f, 0);
+    save(&f, f.count);
+    bst_assert_ok(&f.ctx, bst_fits_source_open(&f.ctx, f.path, &s));
+    bst_assert_ok(&f.ctx, bst_fits_source_select(&f.ctx, s, 0, &frame));
+    bst_assert_ok(&f.ctx, bst_keyword_rate_trend(&f.ctx, &map, s, &frame, 4.0, &trend));
+    bst_assert_close(trend, 0.5 * 4.0 / 4.0, 1e-12); /* slope times exposure over the mean */
+    snprintf(map.rate_history.time, sizeof map.rate_history.time, "T_#"); /* T_0 is not there */
+    bst_assert_ok(&f.ctx, bst_keyword_rate_trend(&f.ctx, &map, s, &frame, 4.0, &trend));
+    assert_true(isnan(trend));
+    snprintf(map.rate_history.time, sizeof map.rate_history.time, "A_##");
+    snprintf(map.rate_history.rate, sizeof map.rate_history.rate, "B_##");
+    assert_int_equal(bst_keyword_rate_trend(&f.ctx, &map, s, &frame, 4.0, &trend), BST_ERR_FORMAT);
+    assert_non_null(strstr(f.ctx.message, "HDU 1: B_00 (rate_history.rate of the map"));
+    bst_fits_source_close(s);
+    end(&f);
+}
+
 /* The WCS of a header gives the attitude that shows the sky so: a camera at RA 90, Dec 0 with rows
  * to the south and columns to the west. */
 static void test_wcs(void **state) {
@@ -508,6 +546,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test(test_cube_table), cmocka_unit_test(test_messages),
         cmocka_unit_test(test_truncated),  cmocka_unit_test(test_mutations),
         cmocka_unit_test(test_files),      cmocka_unit_test(test_wcs),
+        cmocka_unit_test(test_rate_trend),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,197 @@
+#!/usr/bin/env python3
+"""boresight twin: the hidden path of a simulated frame is found again, and the twin renders it.
+
+Usage, from the repository root:
+    /usr/bin/python3 tests/e2e/test_twin.py BORESIGHT           one frame, and what is refused
+    /usr/bin/python3 tests/e2e/test_twin.py BORESIGHT --full    50 random frames; needs the full catalogue
+
+The frame of NEOSSat is no part of the project. Where the environment variable BORESIGHT_NEOSSAT
+names a folder with NEOS_SCI_2024239174545_cord.fits, it gets a twin too (about 70 s of processor time).
+"""
+import json
+import os
+import sys
+import unittest
+
+import numpy
+from astropy.io import fits
+
+import runs
+from runs import call, call_well
+
+FULL = "--full" in sys.argv and not sys.argv.remove("--full")
+SENSOR = "/observers/0/sensors/0/"
+NEOSSAT = os.path.join(os.environ.get("BORESIGHT_NEOSSAT", ""), "NEOS_SCI_2024239174545_cord.fits")
+EXPOSURE_S = 5.0
+SAMPLES = 101
+
+
+def product(p, q):
+    """Hamilton product of quaternions [..., 4], scalar last."""
+    a, b = p[..., :3], q[..., :3]
+    return numpy.concatenate((p[..., 3:] * b + q[..., 3:] * a + numpy.cross(a, b),
+                              p[..., 3:] * q[..., 3:] - (a * b).sum(-1, keepdims=True)), -1)
+
+
+def rotation(vector):
+    """Quaternions of rotation vectors [..., 3] that are not 0."""
+    angle = numpy.linalg.norm(vector, axis=-1, keepdims=True)
+    return numpy.concatenate((numpy.sin(angle / 2) * vector / angle, numpy.cos(angle / 2)), -1)
+
+
+def attitudes(rng, q_middle, length_px, scale_rad):
+    """A curved path of uneven speed, with a roll of up to 1 mrad: [SAMPLES, 4]."""
+    u = numpy.linspace(0, 1, SAMPLES)
+    angle, bend, faster = rng.uniform(0, 2 * numpy.pi), rng.uniform(-0.2, 0.2), rng.uniform(-0.3, 0.3)
+    along = length_px * (u - 0.5 + faster * (u * u - u))
+    across = bend * length_px * (4 * (u - 0.5) ** 2 - 0.33) + 0.5 * numpy.sin(2 * numpy.pi * u + angle)
+    x = along * numpy.cos(angle) - across * numpy.sin(angle)
+    y = along * numpy.sin(angle) + across * numpy.cos(angle)
+    turn = numpy.stack((-y * scale_rad, x * scale_rad, rng.uniform(-1e-3, 1e-3) * (u - 0.501)), -1)
+    return product(rotation(turn), numpy.broadcast_to(q_middle, (SAMPLES, 4)))
+
+
+def write_scenario(folder, path, camera, catalogue):
+    """A frame of a camera whose line of sight follows `path`."""
+    pointing = [{"time_s": EXPOSURE_S * i / (SAMPLES - 1), "q_cam_from_gcrf": q.tolist()} for i, q in enumerate(path)]
+    with open(os.path.join(folder, "path.json"), "w", encoding="utf-8") as file:
+        json.dump({"boresight_frame_updates": 1,
+                   "frames": [{"frame": 0, "exposure_s": EXPOSURE_S, "period_s": EXPOSURE_S + 2, "pointing": pointing}]}, file)
+    sets = {SENSOR + "frame_updates_file": "path.json", SENSOR + "exposure/exposure_s": EXPOSURE_S,
+            SENSOR + "exposure/period_s": EXPOSURE_S + 2,
+            SENSOR + "modules": {"gimbal": {"type": "scripted", "platform": {"history_s": 20, "telemetry_history_s": 24}},
+                                 "scenegen": {"type": "opencl"}},
+            "/record": {"frames": "extensions"}, "/duration_s": EXPOSURE_S + 1, "/world/star_catalogue": catalogue}
+    sets.update({SENSOR + "camera/" + key: value for key, value in camera.items()})
+    scenario = os.path.join(folder, "scenario.json")
+    with open(scenario, "w", encoding="utf-8") as file:
+        json.dump({"extends": os.path.abspath(runs.STARE), "set": sets}, file)
+    return scenario
+
+
+def path_error_px(folder, name, path, scale_rad):
+    """RMS distance between two paths at equal times. The frame does not tell which end came first."""
+    with open(os.path.join(folder, name + "_path.json"), encoding="utf-8") as file:
+        nodes = json.load(file)["frames"][0]["pointing"]
+    found = numpy.array([node["q_cam_from_gcrf"] for node in nodes])
+    at = numpy.array([node["time_s"] for node in nodes]) / EXPOSURE_S * (SAMPLES - 1)
+    errors = []
+    for true in (path, path[::-1]):
+        q = numpy.stack([numpy.interp(at, numpy.arange(SAMPLES), true[:, k]) for k in range(4)], -1)
+        off = product(found, q * [-1, -1, -1, 1])
+        errors.append(numpy.sqrt(((2 * off[:, :2] * numpy.sign(off[:, 3:])) ** 2).sum(-1).mean()) / scale_rad)
+    return min(errors)
+
+
+class Twin(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        """A frame of 4.3 degrees beside Orion with streaks of 16 px."""
+        cls.folder = runs.scratch()
+        rng = numpy.random.default_rng(5)
+        cls.scale_rad = numpy.radians(120 / 3600)
+        # boresight at RA 91, Dec -6: from the axes of the camera, z ahead
+        ra, dec = numpy.radians((91.0, -6.0))
+        middle = product(rotation(numpy.array([dec - numpy.pi / 2, 0, 0])),
+                         rotation(numpy.array([0, 0, -ra - numpy.pi / 2])))
+        cls.path = attitudes(rng, middle, 16.0, cls.scale_rad)
+        camera = {"width_px": 128, "height_px": 128, "pixel_scale_arcsec": 120, "aperture_m": 0.04, "psf_fwhm_px": 2.2,
+                  "full_well_e": 1e6, "gain_e_per_dn": 4}
+        scenario = write_scenario(cls.folder, cls.path, camera, "embedded")
+        cls.made = os.path.join(cls.folder, "run")
+        runs.run(scenario, cls.made)
+        cls.words = ("twin", cls.made, "--map", "boresight", "--v-limit", "6.5", "--least-snr", "8", "--catalogue",
+                     "embedded", "--quiet", "--threads", "1")
+
+    def report(self, name):
+        with open(os.path.join(self.folder, name + "_report.json"), encoding="utf-8") as file:
+            return json.load(file)
+
+    def test_hidden_path_is_found_and_the_twin_renders_the_frame(self):
+        out = os.path.join(self.folder, "twin.json")
+        said = call_well(*self.words, "--out", out, timeout=600)
+        self.assertIn("which end came first is not known", said)
+        # the issue asks for 0.03 px of frames with 100 stars; this one has the embedded catalogue's
+        self.assertLess(path_error_px(self.folder, "twin", self.path, self.scale_rad), 0.03)
+        report = self.report("twin")
+        # chi squared of 16,384 pixels: standard deviation 0.011
+        self.assertAlmostEqual(report["figures"]["chi2_per_pixel_by_header_noise"], 1.0, delta=0.04)
+        self.assertGreater(report["figures"]["explained_variance_of_light"], 0.98)
+        stars = [s for s in report["stars"] if s["in_catalogue"] and s["share_on_frame"] == 1]
+        self.assertGreater(len(stars), 10)
+        # what the twin's own run shows is the recorded frame with other noise
+        with fits.open(self.made + "/frames.fits") as a, fits.open(self.folder + "/twin_run/frames.fits") as b:
+            difference = 4.0 * (a[1].data.astype(float) - b[1].data)
+        background = numpy.abs(difference - numpy.median(difference)) < 5 * report["fit"]["noise_e"]
+        self.assertAlmostEqual(difference[background].std() / (numpy.sqrt(2) * report["fit"]["noise_e"]), 1.0, delta=0.1)
+        for name in ("_report.html", "_report.png", "_stars.bin", "_psf.fits"):
+            self.assertGreater(os.path.getsize(self.folder + "/twin" + name), 0, name)
+        self.refuses_to_replace(out)
+
+    def refuses_to_replace(self, out):
+        os.remove(out)
+        again = call(*self.words, "--out", out)
+        self.assertEqual(again.returncode, 1)
+        self.assertIn("twin_path.json: is there already", again.stderr)
+        frame = os.path.join(self.folder, "x_psf.fits")
+        with open(frame, "wb") as file:
+            file.write(b"SIMPLE")
+        own = call("twin", frame, "--map", "boresight", "--overwrite", "--out", self.folder + "/x.json")
+        self.assertEqual(own.returncode, 1)
+        self.assertIn("x_psf.fits, which is read", own.stderr)
+
+    @unittest.skipUnless(FULL, "only with --full")
+    def test_random_frames(self):
+        """50 frames with hidden paths, in directions that the Earth does not hide."""
+        runs.need_full_catalogue()
+        errors, chi2, unsolved = [], [], 0
+        for seed in range(200):
+            if len(errors) + unsolved == 50:
+                break
+            rng = numpy.random.default_rng(seed)
+            folder = os.path.join(self.folder, str(seed))
+            os.mkdir(folder)
+            scale_rad = numpy.radians(20 / 3600)
+            q = rng.normal(size=4)
+            path = attitudes(rng, q / numpy.linalg.norm(q), rng.uniform(30, 90), scale_rad)
+            camera = {"width_px": 300, "height_px": 300, "pixel_scale_arcsec": 20, "aperture_m": 0.12,
+                      "psf_fwhm_px": rng.uniform(1.8, 2.6), "full_well_e": 1e6, "gain_e_per_dn": 4}
+            call_well("run", write_scenario(folder, path, camera, "default"), "--quiet", "--out", folder + "/run", timeout=600)
+            found = call("twin", folder + "/run", "--map", "boresight", "--v-limit", "10.5", "--quiet",
+                         "--out", folder + "/twin.json", timeout=1800)
+            if "give no attitude (0 detections" in found.stderr:  # the Earth is in front
+                continue
+            if "give no attitude" in found.stderr:  # of the solver, which has tests of its own
+                print(f"{seed}: no attitude")
+                unsolved += 1
+                continue
+            self.assertEqual((found.returncode, found.stderr), (0, ""))
+            errors.append(path_error_px(folder, "twin", path, scale_rad))
+            chi2.append(self.report(f"{seed}/twin")["figures"]["chi2_per_pixel_by_header_noise"])
+            print(f"{seed}: path {errors[-1]:.4f} px, chi2 {chi2[-1]:.4f}", flush=True)
+        self.assertLessEqual(unsolved, 5)
+        print(f"path: median {numpy.median(errors):.4f}, largest {max(errors):.4f} px; chi2 {min(chi2):.4f} to {max(chi2):.4f}")
+        self.assertLess(numpy.median(errors), 0.03)
+        self.assertLess(numpy.abs(numpy.array(chi2) - 1).max(), 0.02)
+
+    @unittest.skipUnless(os.path.exists(NEOSSAT), "BORESIGHT_NEOSSAT names no folder with the frame")
+    def test_neossat(self):
+        """The science frame; limits are those of issue 26, pixels beyond 5 sigma left out of chi squared."""
+        runs.need_full_catalogue()
+        call_well("twin", NEOSSAT, "--map", "neossat", "--out", self.folder + "/neossat.json", "--quiet", timeout=1800)
+        figures = self.report("neossat")["figures"]
+        self.assertTrue(self.report("neossat")["fit"]["direction_known"])  # of its rate_history
+        self.assertLess(figures["streaks_across_rms_px"], 0.1)
+        self.assertLess(figures["streaks_along_rms_px"], 0.35)
+        self.assertLess(figures["photometry_scatter_bright_mag"], 0.2)
+        self.assertLess(figures["chi2_per_pixel_without_outliers"], 1.3)
+        self.assertLess(figures["chi2_per_pixel_on_streaks"], 1.7)
+        self.assertGreater(figures["explained_variance_of_light"], 0.98)
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()
