@@ -277,25 +277,6 @@ static bst_status add_recorded_wcs(bst_ctx *ctx, const bst_view_run *run, const 
     return status;
 }
 
-/* Names of the objects, for their numbers in the truth. */
-static void add_names(const bst_view_run *run, cJSON *node) {
-    bst_ctx ignored = {0};
-    bst_io_rows *rows;
-    bool more;
-    cJSON *names = cJSON_AddObjectToObject(node, "names");
-    char sql[80];
-    snprintf(sql, sizeof sql, "SELECT id, name FROM objects LIMIT %d", MARKS_MOST);
-    if (bst_io_rows_open(&ignored, run->reader, sql, 0, 0, &rows) != BST_OK) {
-        return;
-    }
-    while (bst_io_rows_next(&ignored, rows, &more) == BST_OK && more) {
-        char id[24];
-        snprintf(id, sizeof id, "%lld", (long long)bst_io_rows_int(rows, 0));
-        cJSON_AddStringToObject(names, id, bst_io_rows_text(rows, 1));
-    }
-    bst_io_rows_close(rows);
-}
-
 /* Adds the UTC of a time of the run. */
 static void add_utc(const bst_view_run *run, double time_s, cJSON *node) {
     bst_time epoch;
@@ -324,7 +305,6 @@ static bst_status describe_frame(bst_ctx *ctx, bst_view_run *run, bst_view_senso
     if (!cJSON_HasObjectItem(node, "wcs")) {
         BST_TRY(add_recorded_wcs(ctx, run, s, f, node));
     }
-    add_names(run, node);
     const exposure_range now = {f->id, f->id};
     BST_TRY(add_rows(ctx, run, s, f, truth, now, add_truth, cJSON_AddArrayToObject(node, "truth")));
     BST_TRY(add_rows(ctx, run, s, f, detections, now, add_detection,

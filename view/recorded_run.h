@@ -48,6 +48,11 @@ bst_status bst_view_run_describe(bst_ctx *ctx, bst_view_run *run, cJSON **out) B
 bst_status bst_view_run_modes(bst_ctx *ctx, bst_view_run *run, int64_t sensor,
                               cJSON **out) BST_MUST_CHECK;
 
+/* Names of the objects by their numbers in truth and tracks: {"names": {"0": "ASTRA 1N"}}.
+ *
+ * Errors:    those of bst_run_reader_open, while the run is in progress */
+bst_status bst_view_run_names(bst_ctx *ctx, bst_view_run *run, cJSON **out) BST_MUST_CHECK;
+
 /* Lists the first BST_VIEW_EVENTS events: {"total": N, "events": [{time_s, source, kind, text}]}.
  *
  * Errors:    BST_ERR_FORMAT: damaged tables */

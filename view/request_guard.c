@@ -77,11 +77,15 @@ int bst_view_guard(const bst_view_request *request, const char *token,
     if (!has_token(path, token) || path[BST_VIEW_TOKEN_DIGITS] != '/') {
         return BST_HTTP_FORBIDDEN;
     }
-    if (strcmp(request->method, "GET") != 0 && strcmp(request->method, "HEAD") != 0) {
+    bool post = strcmp(request->method, "POST") == 0;
+    if (!post && strcmp(request->method, "GET") != 0 && strcmp(request->method, "HEAD") != 0) {
         return BST_HTTP_BAD_METHOD;
     }
-    if (request->body_bytes > 0) {
+    if (request->body_bytes > (post ? BST_VIEW_BODY_BYTES : 0)) {
         return BST_HTTP_TOO_LARGE;
+    }
+    if (post && !request->origin) {
+        return BST_HTTP_FORBIDDEN;
     }
     if (!copy_route(path + BST_VIEW_TOKEN_DIGITS + 1, route)) {
         route[0] = '\0';

@@ -30,12 +30,14 @@ static const char help_text[] =
 
 /* Serves a run until a signal asks for the end. */
 static bst_status serve(bst_ctx *ctx, const char *folder, int port, bool browser) {
-    bst_view_run *run;
+    bst_view_subject *subject;
     bst_view_server *server;
     char url[BST_VIEW_URL_BYTES];
-    BST_TRY(bst_view_run_open(ctx, folder, &run));
+    int64_t number;
+    BST_TRY(bst_view_subject_create(ctx, &subject));
+    bst_status status = bst_view_subject_open(ctx, subject, folder, &number);
     bst_stop_catch_signals();
-    bst_status status = bst_view_server_start(ctx, run, port, url, &server);
+    status = status == BST_OK ? bst_view_server_start(ctx, subject, port, url, &server) : status;
     if (status == BST_OK) {
         printf("%s\nCtrl-C ends it.\n", url);
         fflush(stdout);
@@ -47,7 +49,7 @@ static bst_status serve(bst_ctx *ctx, const char *folder, int port, bool browser
         }
         bst_view_server_stop(server);
     }
-    bst_view_run_close(run);
+    bst_view_subject_free(subject);
     return status;
 }
 

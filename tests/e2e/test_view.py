@@ -206,7 +206,7 @@ class View(Checks):
         described = self.viewer.json("api/run")
         self.assertEqual(described["name"], "<b>run")
         self.assertEqual(described["sensors"][0]["target"], HOSTILE)
-        self.assertEqual(self.viewer.json("api/frame?sensor=0&frame=1")["names"]["0"], HOSTILE)
+        self.assertEqual(self.viewer.json("api/names")["names"]["0"], HOSTILE)
         page, headers = self.viewer.get("")
         self.assertNotIn(b"<b>run", page)
         policy = headers["Content-Security-Policy"]
@@ -243,7 +243,11 @@ class View(Checks):
                      "api/../../x", "./api/run", "api/run/", "API/RUN", "api//run", "manifest.json"):
             self.assertEqual(status("/{token}/" + path), 404, path)
         for method in ("POST", "PUT", "DELETE", "OPTIONS", "TRACE", "CONNECT", "PROPFIND", "x"):
-            self.assertIn(status(method=method), (0, 400, 405, 501), method)
+            self.assertIn(status(method=method), (0, 400, 405, 501) if method != "POST" else (403,), method)
+        own = "Origin: http://127.0.0.1:{port}\r\n"
+        for path in ("/{token}/api/run", "/{token}/", "/{token}/app.js"):
+            self.assertEqual(status(path, method="POST", more=own + "Content-Length: 0\r\n"), 405, path)
+        self.assertEqual(status(method="POST", more=own + "Content-Length: 99999999\r\n"), 413)
         self.assertEqual(status(more="Content-Length: 5\r\n"), 413)
         self.assertEqual(status(more="Transfer-Encoding: chunked\r\n"), 413)
         self.assertEqual(status("/{token}/ws", more="Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"

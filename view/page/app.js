@@ -1,6 +1,7 @@
 // The page: loads a run, and moves frame, plots and events together.
 import { getJson, getNumbers, getPixels } from './api.js';
 import { FrameView } from './frame_view.js';
+import { Panels } from './panels.js';
 import { Plots, shortNumber } from './plots.js';
 
 /** Numbers of a frame in the list (view/recorded_run.h). */
@@ -35,12 +36,14 @@ class App {
     this.cache = new Map();
     this.playing = false;
     this.events = [];
+    this.names = {};
+    this.panels = new Panels(element('tabs'), element('main'), this);
     this.listen();
   }
 
   async start() {
     const query = new URLSearchParams(location.hash.slice(1));
-    this.run = await getJson('run');
+    [this.run, { names: this.names }] = await Promise.all([getJson('run'), getJson('names')]);
     this.describeRun();
     await this.openSensor(Number(query.get('sensor')) || 0, Number(query.get('frame')) || 0);
     const [x, y, scale] = (query.get('at') || '').split(',').map(Number);
@@ -196,6 +199,7 @@ class App {
     const [image, details] = await Promise.all([
       kept ? getPixels(sensor, frame) : null, getJson('frame', { sensor, frame }),
     ]);
+    details.names = this.names;
     entry.bytes = image ? image.data.byteLength : 1000;
     return { image, details, why: dropped ? 'This frame was dropped.' : 'The pixels of this frame were not kept.' };
   }
@@ -318,7 +322,7 @@ class App {
 
   onKey(event) {
     const target = event.target, view = this.frameView;
-    if (event.ctrlKey || event.altKey || event.metaKey || element('keys').open) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || element('keys').open || !this.panels.frameShown) return;
     if (target instanceof HTMLSelectElement || (target instanceof HTMLInputElement && target.type === 'number')) return;
     if (event.key === ' ' && (target instanceof HTMLButtonElement || target instanceof HTMLInputElement)) return;
     const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
