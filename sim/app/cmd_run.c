@@ -8,6 +8,7 @@
 #include "sim/cli/load.h"
 #include "sim/cli/stop_signals.h"
 #include "sim/run/run_link.h"
+#include "sim/run/run_parts.h"
 #include "sim/run/run_scenario.h"
 
 static const char help_text[] =
@@ -67,6 +68,36 @@ static bst_status run_loaded(bst_ctx *ctx, run_request *r, const bst_json *json,
     bst_run_link_end(sim, status, ctx->message);
     bst_simulation_free(sim);
     bst_run_restored_free(request.restored);
+    return status;
+}
+
+/* Runs a scenario that changes on the way. */
+static bst_status run_changes(bst_ctx *ctx, run_request *r, const char *path,
+                              const bst_scenario *scenario) {
+    char default_out[128];
+    bst_run_parts *parts;
+    snprintf(default_out, sizeof default_out, "runs/%s", scenario->name);
+    if (r->saving.restore || r->saving.save_every_s > 0.0 || r->replay) {
+        bst_status status = bst_fail(ctx, BST_ERR_ARGUMENT,
+                                     "--restore, --save-every and --replay: a scenario with "
+                                     "/changes runs from its start to its end");
+        fprintf(stderr, "boresight: %s\n", ctx->message);
+        return status;
+    }
+    const bst_run_request request = {.out = r->out ? r->out : default_out,
+                                     .overwrite = r->overwrite,
+                                     .force = r->force,
+                                     .progress = !r->quiet && isatty(STDERR_FILENO),
+                                     .print = true,
+                                     .saving = &r->saving};
+    bst_status status = bst_run_parts_open(ctx, path, &r->load, &r->simulation, &parts);
+    if (status == BST_OK) {
+        status = bst_run_parts_all(ctx, parts, &request);
+        bst_run_parts_free(parts);
+    }
+    if (status != BST_OK) {
+        fprintf(stderr, "boresight: %s\n", ctx->message);
+    }
     return status;
 }
 
@@ -142,7 +173,8 @@ int bst_cmd_run(int argc, char **argv) {
         return BST_EXIT_FAILED;
     }
     bst_stop_catch_signals();
-    bst_status status = run_loaded(&ctx, &r, json, &scenario);
+    bst_status status = scenario.changes.count > 0 ? run_changes(&ctx, &r, argv[1], &scenario)
+                                                   : run_loaded(&ctx, &r, json, &scenario);
     bst_scenario_free(&scenario);
     bst_json_free(json);
     return bst_command_line_exit_code(status);

@@ -49,6 +49,15 @@ bst_status bst_run_restored_read(bst_ctx *ctx, const bst_scenario *scenario,
                                  const bst_run_saving *saving, const char *out, bool replay,
                                  bst_simulation_options *options,
                                  bst_run_restored **restored) BST_MUST_CHECK;
+/* Begins from a state that bst_run_steering.saved has got. The scenario may have changed.
+ *
+ * Given:     bytes     [size] outlives *restored
+ *            options   as bst_run_restored_read
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *restored with bst_run_restored_free */
+bst_status bst_run_restored_take(bst_ctx *ctx, const void *bytes, size_t size,
+                                 bst_simulation_options *options,
+                                 bst_run_restored **restored) BST_MUST_CHECK;
 /* Frees a saved state; NULL is allowed. */
 void bst_run_restored_free(bst_run_restored *restored);
 
