@@ -1,6 +1,23 @@
 #include "view/routes.h"
 
+#include <stdlib.h>
 #include <string.h>
+
+/* What the page is for: {"live": true}. */
+static bst_status get_session(bst_ctx *ctx, bst_view_exchange *x) {
+    (void)ctx;
+    x->json = cJSON_CreateObject();
+    cJSON_AddBoolToObject(x->json, "live", x->live != NULL);
+    return BST_OK;
+}
+
+/* The scenario of the live run at its present time. */
+static bst_status get_scenario(bst_ctx *ctx, bst_view_exchange *x) {
+    char *text = x->live ? bst_view_live_scenario(x->live) : NULL;
+    x->json = text ? cJSON_Parse(text) : NULL;
+    free(text);
+    return x->json ? BST_OK : bst_fail(ctx, BST_ERR_NOT_FOUND, "there is no live run");
+}
 
 static bst_status get_run(bst_ctx *ctx, bst_view_exchange *x) {
     bst_view_run *run;
@@ -59,10 +76,11 @@ static bst_status get_plot(bst_ctx *ctx, bst_view_exchange *x) {
 }
 
 static const bst_view_route routes[] = {
-    {"api/run", false, get_run},       {"api/refresh", false, get_refreshed},
-    {"api/events", false, get_events}, {"api/modes", false, get_modes},
-    {"api/names", false, get_names},   {"api/frames", false, get_frames},
-    {"api/frame", false, get_frame},   {"api/pixels", false, get_pixels},
+    {"api/session", false, get_session}, {"api/scenario", false, get_scenario},
+    {"api/run", false, get_run},         {"api/refresh", false, get_refreshed},
+    {"api/events", false, get_events},   {"api/modes", false, get_modes},
+    {"api/names", false, get_names},     {"api/frames", false, get_frames},
+    {"api/frame", false, get_frame},     {"api/pixels", false, get_pixels},
     {"api/plot", false, get_plot}};
 enum { ROUTES = sizeof routes / sizeof *routes };
 

@@ -3,12 +3,14 @@
 #ifndef BST_VIEW_ROUTES_H
 #define BST_VIEW_ROUTES_H
 
+#include "view/live_run.h"
 #include "view/request_guard.h"
 #include "view/subject.h"
 
 /* What a request for data asks for and gets. */
 typedef struct bst_view_exchange {
     bst_view_subject *subject;
+    bst_view_live *live; /* NULL: none */
     int64_t run, sensor, frame, columns;
     double from_s, to_s;
     char panel[32];

@@ -10,6 +10,7 @@
 
 #include <civetweb.h>
 
+#include "view/live_socket.h"
 #include "view/page_files.h"
 #include "view/request_guard.h"
 #include "view/routes.h"
@@ -19,6 +20,8 @@
 #define SERVED_CONNECTIONS "192"
 /* A peer that sends or takes nothing for so long loses its connection, ms. */
 #define IDLE_MS "1500"
+/* The same for a WebSocket, whose client asks again after each answer. */
+#define SOCKET_IDLE_MS "20000"
 /* Longest head of a request, bytes. */
 #define REQUEST_BYTES "8192"
 /* Bytes that are handed to the system at a time: IDLE_MS is counted for each. */
@@ -29,6 +32,8 @@ enum { ANSWERS_MOST = 12 };
 struct bst_view_server {
     struct mg_context *http;
     bst_view_subject *subject;
+    bst_view_live *live;     /* NULL: none */
+    bst_view_socket *socket; /* of `live` */
     char token[BST_VIEW_TOKEN_DIGITS + 1];
     pthread_mutex_t lock; /* of `answers` */
     int answers;
@@ -167,7 +172,7 @@ static int answer_data(struct mg_connection *peer, bst_view_server *server,
                        const bst_view_route *route, bool head_only) {
     const struct mg_request_info *info = mg_get_request_info(peer);
     bst_ctx ctx = {0};
-    bst_view_exchange x = {.subject = server->subject};
+    bst_view_exchange x = {.subject = server->subject, .live = server->live};
     answer a = refusal(BST_HTTP_BAD_REQUEST);
     char *text = NULL, *body = route->post ? read_body(peer, info->content_length) : NULL;
     x.body = body;
@@ -247,6 +252,11 @@ static int on_request(struct mg_connection *peer) {
         send_answer(peer, &a, head_only);
         return status;
     }
+    int upgrades;
+    if (server->live && strcmp(route, "live") == 0 && request.origin &&
+        header_of(info, "Upgrade", &upgrades)) {
+        return 0; /* the library goes on with its WebSocket */
+    }
     const bst_view_route *data = bst_view_route_find(route);
     if ((data && data->post) != (strcmp(request.method, "POST") == 0)) {
         answer a = refusal(BST_HTTP_BAD_METHOD);
@@ -297,8 +307,8 @@ static bst_status draw_token(bst_ctx *ctx, char token[BST_VIEW_TOKEN_DIGITS + 1]
     return BST_OK;
 }
 
-bst_status bst_view_server_start(bst_ctx *ctx, bst_view_subject *subject, int port,
-                                 char url[BST_VIEW_URL_BYTES], bst_view_server **out) {
+bst_status bst_view_server_start(bst_ctx *ctx, bst_view_subject *subject, bst_view_live *live,
+                                 int port, char url[BST_VIEW_URL_BYTES], bst_view_server **out) {
     bst_view_server *server = calloc(1, sizeof *server);
     char ports[32];
     *out = NULL;
@@ -307,6 +317,7 @@ bst_status bst_view_server_start(bst_ctx *ctx, bst_view_subject *subject, int po
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the server");
     }
     server->subject = subject;
+    server->live = live;
     bst_status status = draw_token(ctx, server->token);
     snprintf(ports, sizeof ports, "127.0.0.1:%d", port);
     const char *options[] = {"listening_ports",
@@ -327,6 +338,8 @@ bst_status bst_view_server_start(bst_ctx *ctx, bst_view_subject *subject, int po
                              "512",
                              "connection_queue",
                              "512",
+                             "websocket_timeout_ms",
+                             SOCKET_IDLE_MS,
                              "enable_directory_listing",
                              "no",
                              "access_control_list",
@@ -351,6 +364,15 @@ bst_status bst_view_server_start(bst_ctx *ctx, bst_view_subject *subject, int po
         bst_view_server_stop(server);
         return status;
     }
+    if (live) {
+        char uri[BST_VIEW_TOKEN_DIGITS + 16];
+        snprintf(uri, sizeof uri, "/%s/live", server->token);
+        status = bst_view_socket_open(ctx, server->http, uri, live, &server->socket);
+        if (status != BST_OK) {
+            bst_view_server_stop(server);
+            return status;
+        }
+    }
     snprintf(url, BST_VIEW_URL_BYTES, "http://127.0.0.1:%d/%s/", opened.port, server->token);
     *out = server;
     return BST_OK;
@@ -363,6 +385,7 @@ void bst_view_server_stop(bst_view_server *server) {
     if (server->http) {
         mg_stop(server->http);
     }
+    bst_view_socket_free(server->socket);
     pthread_mutex_destroy(&server->lock);
     free(server);
 }

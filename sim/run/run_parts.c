@@ -269,7 +269,7 @@ bst_status bst_run_parts_all(bst_ctx *ctx, bst_run_parts *parts, const bst_run_r
     own_changes own = {.parts = parts, .outer = given->steering};
     const bst_run_steering steering = {
         &own, next_change, keep_state,
-        given->steering && given->steering->message ? pass_message : NULL};
+        given->steering && given->steering->message ? pass_message : NULL, false};
     bst_run_request request = *given;
     bst_run_part part = {.state = NULL};
     bst_status status;

@@ -167,7 +167,7 @@ static bool interrupted(void *user, int64_t tick) {
     bst_run_execution *run = user;
     show_progress(run, tick, false);
     run->cut = run->most_s > 0.0 && bst_wall_seconds() - run->started > run->most_s;
-    return run->cut || bst_stop_requested();
+    return run->cut || (!(run->steering && run->steering->stops) && bst_stop_requested());
 }
 
 /* Prints losses and counters of the run. */

@@ -27,6 +27,7 @@ typedef struct bst_run_steering {
     /* A message was published that the run uses; as bst_sim_observer. Frames have their pixels. */
     bst_status (*message)(void *user, bst_ctx *ctx, int sensor, const char *channel,
                           const void *payload, int64_t tick);
+    bool stops; /* `next` looks for stop requests: they do not interrupt a step */
 } bst_run_steering;
 
 typedef struct bst_run_request {
