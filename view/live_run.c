@@ -29,6 +29,15 @@ static void wait_command(bst_view_live *live, double wait_s) {
     pthread_cond_timedwait(&live->commanded, &live->lock, &until);
 }
 
+/* Says of the run's folder whether it is being written. Call it with the lock held. */
+static void set_written(bst_view_live *live, bool written) {
+    bst_ctx ignored = {0};
+    bst_view_run *run;
+    if (bst_view_subject_run(&ignored, live->subject, live->run, &run) == BST_OK) {
+        bst_view_run_set_written(run, written);
+    }
+}
+
 /* ------------------------------------------------------------------ pace */
 
 /* Counts the frames that steps wait for, and measures the speed. */
@@ -186,6 +195,7 @@ static void on_saved(void *user, int64_t tick, void *bytes, size_t size) {
             snprintf(live->message, sizeof live->message, "%s", live->ctx.message);
             live->run = -1;
         }
+        set_written(live, true);
     }
     pthread_mutex_unlock(&live->lock);
     bst_view_feed_wake(live->feed);
@@ -234,6 +244,7 @@ static bst_status begin_branch(bst_ctx *ctx, bst_view_live *live) {
     live->run = -1;
     live->ended = false;
     bst_status status = bst_view_subject_open(ctx, live->subject, partial, &live->run);
+    set_written(live, true);
     pthread_mutex_unlock(&live->lock);
     return status;
 }
@@ -265,6 +276,7 @@ static bool wait_branch(bst_view_live *live) {
     bool branch = false;
     pthread_mutex_lock(&live->lock);
     live->ended = live->paused = true;
+    set_written(live, false);
     if (live->until_tick >= bst_run_parts_scenario(live->parts)->duration_ticks) {
         live->tick = bst_run_parts_scenario(live->parts)->duration_ticks;
     }
@@ -390,6 +402,7 @@ cJSON *bst_view_live_state(bst_view_live *live) {
     cJSON_AddNumberToObject(node, "time_s", (double)live->tick / live->tick_rate_hz);
     cJSON_AddNumberToObject(node, "duration_s", live->duration_s);
     cJSON_AddBoolToObject(node, "paused", live->paused);
+    cJSON_AddNumberToObject(node, "steps", (double)live->steps);
     cJSON_AddBoolToObject(node, "ended", live->ended);
     cJSON_AddNumberToObject(node, "rate", live->rate);
     cJSON_AddNumberToObject(node, "speed", live->paused ? 0.0 : live->speed);

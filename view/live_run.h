@@ -40,7 +40,7 @@ bst_view_feed *bst_view_live_feed(bst_view_live *live);
  * Returned:  false: unknown, or too many are waiting */
 bool bst_view_live_command(bst_view_live *live, const cJSON *command);
 
-/* State of the run: {time_s, duration_s, paused, rate, speed, ended, run, message, changes,
+/* State of the run: {time_s, duration_s, paused, steps, rate, speed, ended, run, message, changes,
  * states: [{id, time_s, why}]}. Any thread; delete it with cJSON_Delete. */
 cJSON *bst_view_live_state(bst_view_live *live);
 

@@ -96,7 +96,7 @@ static bool is_in_progress(bst_view_run *run) {
         cJSON_GetObjectItemCaseSensitive(bst_run_reader_manifest(run->reader), "complete");
     bool ending = run->running && state == BST_RUN_KILLED && cJSON_IsTrue(complete);
     run->endings = ending ? run->endings + 1 : 0;
-    return state == BST_RUN_RUNNING || (ending && run->endings <= ENDINGS_MOST);
+    return run->written || state == BST_RUN_RUNNING || (ending && run->endings <= ENDINGS_MOST);
 }
 
 /* Reads which sensors the run has, and whether it is in progress. */
@@ -149,6 +149,17 @@ bst_status bst_view_run_open(bst_ctx *ctx, const char *path, bst_view_run **out)
     }
     *out = run;
     return BST_OK;
+}
+
+void bst_view_run_set_written(bst_view_run *run, bool written) {
+    pthread_mutex_lock(&run->lock);
+    run->written = written;
+    if (written) { /* its tables stay closed from now on */
+        run->running = true;
+        bst_run_reader_close(run->reader);
+        run->reader = NULL;
+    }
+    pthread_mutex_unlock(&run->lock);
 }
 
 bst_status bst_view_run_refresh(bst_ctx *ctx, bst_view_run *run) {

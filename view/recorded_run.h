@@ -36,6 +36,10 @@ void bst_view_run_close(bst_view_run *run);
  * Errors:    those of bst_view_run_open */
 bst_status bst_view_run_refresh(bst_ctx *ctx, bst_view_run *run) BST_MUST_CHECK;
 
+/* Says whether this process writes the run: it then counts as in progress, also between its parts.
+ */
+void bst_view_run_set_written(bst_view_run *run, bool written);
+
 /* Describes the run: name, state, problems, figures, sensors with their panels.
  *
  * Errors:    those of bst_run_reader_open, while the run is in progress; BST_ERR_MEMORY
