@@ -23,7 +23,7 @@ static const char *word_of(const cJSON *command) {
 
 bool bst_view_live_command(bst_view_live *live, const cJSON *command) {
     bool taken = false;
-    if (!word_of(command)) {
+    if (!word_of(command) || !live->parts) {
         return false;
     }
     pthread_mutex_lock(&live->lock);

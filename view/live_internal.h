@@ -20,7 +20,8 @@ typedef struct bst_view_state {
 struct bst_view_live {
     pthread_mutex_t lock; /* of all below but `parts`, which the stepping thread alone uses */
     pthread_cond_t commanded;
-    bst_run_parts *parts;
+    bst_run_parts *parts; /* NULL: somebody else steps the run */
+    bst_run_steering steering;
     bst_view_subject *subject;
     bst_view_feed *feed;
     bst_ctx ctx; /* for messages of commands */
@@ -43,7 +44,8 @@ struct bst_view_live {
     /* where it is */
     int64_t tick, until_tick, speed_tick; /* until_tick: of the last advance */
     double speed_s, speed;                /* x real time, over about a second */
-    bool stepping, ended, branching;
+    bool ended, branching;
+    bool opened;                     /* a watched run's folder */
     bool part_begun;                 /* the part has begun to step */
     int64_t go_to;                   /* id of the state to go to; 0: none */
     char message[BST_MESSAGE_BYTES]; /* of the last command; "": it was obeyed */

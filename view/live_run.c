@@ -139,6 +139,31 @@ static bst_run_action next(void *user, int64_t tick, int64_t *until_tick) {
     return action;
 }
 
+/* Opens the run's folder for the page, once it exists. Call it with the lock held. */
+static void open_folder(bst_view_live *live) {
+    char partial[sizeof live->out + 16];
+    snprintf(partial, sizeof partial, "%s.partial", live->out);
+    if (bst_view_subject_open(&live->ctx, live->subject, partial, &live->run) != BST_OK) {
+        snprintf(live->message, sizeof live->message, "%s", live->ctx.message);
+        live->run = -1;
+    }
+    set_written(live, true);
+}
+
+/* Takes a message of a run that somebody else steps. */
+static bst_status on_watched(void *user, bst_ctx *ctx, int sensor, const char *channel,
+                             const void *payload, int64_t tick) {
+    bst_view_live *live = user;
+    __atomic_store_n(&live->tick, tick, __ATOMIC_RELAXED);
+    if (!live->opened) { /* only this thread comes here */
+        live->opened = true;
+        pthread_mutex_lock(&live->lock);
+        open_folder(live);
+        pthread_mutex_unlock(&live->lock);
+    }
+    return bst_view_feed_message(live->feed, ctx, sensor, channel, payload, tick);
+}
+
 static bst_status on_message(void *user, bst_ctx *ctx, int sensor, const char *channel,
                              const void *payload, int64_t tick) {
     bst_view_live *live = user;
@@ -189,13 +214,7 @@ static void on_saved(void *user, int64_t tick, void *bytes, size_t size) {
     live->saved_s = bst_wall_seconds();
     live->asked_s = live->saved_s;
     if (live->run < 0) {
-        char partial[sizeof live->out + 16];
-        snprintf(partial, sizeof partial, "%s.partial", live->out);
-        if (bst_view_subject_open(&live->ctx, live->subject, partial, &live->run) != BST_OK) {
-            snprintf(live->message, sizeof live->message, "%s", live->ctx.message);
-            live->run = -1;
-        }
-        set_written(live, true);
+        open_folder(live);
     }
     pthread_mutex_unlock(&live->lock);
     bst_view_feed_wake(live->feed);
@@ -330,9 +349,9 @@ bst_status bst_view_live_go(bst_ctx *ctx, bst_view_live *live, bool overwrite) {
 
 /* ------------------------------------------------------------------ what others see */
 
-bst_status bst_view_live_create(bst_ctx *ctx, bst_run_parts *parts, bst_view_subject *subject,
-                                const char *out, bst_view_live **out_live) {
-    const bst_scenario *scenario = bst_run_parts_scenario(parts);
+/* Prepares what both kinds of live runs have. */
+static bst_status create(bst_ctx *ctx, const bst_scenario *scenario, bst_view_subject *subject,
+                         const char *out, bst_view_live **out_live) {
     bst_view_live *live = calloc(1, sizeof *live);
     pthread_condattr_t clock;
     *out_live = NULL;
@@ -344,19 +363,10 @@ bst_status bst_view_live_create(bst_ctx *ctx, bst_run_parts *parts, bst_view_sub
     pthread_cond_init(&live->commanded, &clock);
     pthread_condattr_destroy(&clock);
     bst_ctx_init(&live->ctx, NULL, NULL, BST_LOG_ERROR);
-    const bst_observer_config *observers = scenario->observers.items;
-    const bst_sensor_config *sensors = observers[0].sensors.items;
-    live->parts = parts;
     live->subject = subject;
     live->run = -1;
-    live->paused = true;
     live->tick_rate_hz = (double)scenario->tick_rate_hz;
     live->duration_s = scenario->duration_s;
-    live->period_ticks = (int64_t)ceil(
-        fmax(sensors[0].exposure.period_s, sensors[0].exposure.exposure_s) * live->tick_rate_hz);
-    live->counted = bst_scenario_module(scenario, 0, 0, "tracker")   ? BST_CHANNEL_TRACKS
-                    : bst_scenario_module(scenario, 0, 0, "imgproc") ? BST_CHANNEL_DETECTIONS
-                                                                     : BST_CHANNEL_TRUTH;
     bst_status status = bst_view_feed_create(ctx, scenario, &live->feed);
     if (status == BST_OK && snprintf(live->out, sizeof live->out, "%s", out) >= 4000) {
         status = bst_fail(ctx, BST_ERR_ARGUMENT, "%.200s...: the path is too long", out);
@@ -367,6 +377,36 @@ bst_status bst_view_live_create(bst_ctx *ctx, bst_run_parts *parts, bst_view_sub
     }
     *out_live = live;
     return BST_OK;
+}
+
+bst_status bst_view_live_create(bst_ctx *ctx, bst_run_parts *parts, bst_view_subject *subject,
+                                const char *out, bst_view_live **out_live) {
+    const bst_scenario *scenario = bst_run_parts_scenario(parts);
+    const bst_observer_config *observers = scenario->observers.items;
+    const bst_exposure_config *exposure =
+        &((const bst_sensor_config *)observers[0].sensors.items)->exposure;
+    BST_TRY(create(ctx, scenario, subject, out, out_live));
+    bst_view_live *live = *out_live;
+    live->parts = parts;
+    live->paused = true;
+    live->period_ticks =
+        (int64_t)ceil(fmax(exposure->period_s, exposure->exposure_s) * live->tick_rate_hz);
+    live->counted = bst_scenario_module(scenario, 0, 0, "tracker")   ? BST_CHANNEL_TRACKS
+                    : bst_scenario_module(scenario, 0, 0, "imgproc") ? BST_CHANNEL_DETECTIONS
+                                                                     : BST_CHANNEL_TRUTH;
+    return BST_OK;
+}
+
+bst_status bst_view_live_watch(bst_ctx *ctx, const bst_scenario *scenario,
+                               bst_view_subject *subject, const char *out,
+                               bst_view_live **out_live) {
+    BST_TRY(create(ctx, scenario, subject, out, out_live));
+    (*out_live)->steering = (bst_run_steering){.user = *out_live, .message = on_watched};
+    return BST_OK;
+}
+
+const bst_run_steering *bst_view_live_steering(bst_view_live *live) {
+    return &live->steering;
 }
 
 void bst_view_live_free(bst_view_live *live) {
@@ -399,7 +439,9 @@ char *bst_view_live_scenario(bst_view_live *live) {
 cJSON *bst_view_live_state(bst_view_live *live) {
     cJSON *node = cJSON_CreateObject();
     pthread_mutex_lock(&live->lock);
-    cJSON_AddNumberToObject(node, "time_s", (double)live->tick / live->tick_rate_hz);
+    const int64_t tick = __atomic_load_n(&live->tick, __ATOMIC_RELAXED);
+    cJSON_AddNumberToObject(node, "time_s", (double)tick / live->tick_rate_hz);
+    cJSON_AddBoolToObject(node, "steered", live->parts != NULL);
     cJSON_AddNumberToObject(node, "duration_s", live->duration_s);
     cJSON_AddBoolToObject(node, "paused", live->paused);
     cJSON_AddNumberToObject(node, "steps", (double)live->steps);

@@ -18,6 +18,16 @@ typedef struct bst_view_live bst_view_live;
  * Ownership: free *out_live with bst_view_live_free; `parts` and `subject` outlive it */
 bst_status bst_view_live_create(bst_ctx *ctx, bst_run_parts *parts, bst_view_subject *subject,
                                 const char *out, bst_view_live **out_live) BST_MUST_CHECK;
+/* Prepares to watch a run that somebody else steps: its page has no controls.
+ *
+ * Given:     as bst_view_live_create; the scenario is not kept
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out_live with bst_view_live_free, after the run */
+bst_status bst_view_live_watch(bst_ctx *ctx, const bst_scenario *scenario,
+                               bst_view_subject *subject, const char *out,
+                               bst_view_live **out_live) BST_MUST_CHECK;
+/* What bst_run_request.steering of a watched run is; it belongs to the live run. */
+const bst_run_steering *bst_view_live_steering(bst_view_live *live);
 /* Frees a live run; NULL is allowed. */
 void bst_view_live_free(bst_view_live *live);
 
@@ -41,7 +51,7 @@ bst_view_feed *bst_view_live_feed(bst_view_live *live);
 bool bst_view_live_command(bst_view_live *live, const cJSON *command);
 
 /* State of the run: {time_s, duration_s, paused, steps, rate, speed, ended, run, message, changes,
- * states: [{id, time_s, why}]}. Any thread; delete it with cJSON_Delete. */
+ * steered, states: [{id, time_s, why}]}. Any thread; delete it with cJSON_Delete. */
 cJSON *bst_view_live_state(bst_view_live *live);
 
 /* The scenario's text at the time of the run; free it with free. Any thread. NULL: none yet.

@@ -10,6 +10,8 @@
 #include "sim/run/run_link.h"
 #include "sim/run/run_parts.h"
 #include "sim/run/run_scenario.h"
+#include "view/browser.h"
+#include "view/server.h"
 
 static const char help_text[] =
     "usage: boresight run SCENARIO.json [options]\n"
@@ -31,7 +33,8 @@ typedef struct run_request {
     bst_run_saving saving;
     const char *out, *replay;
     int64_t threads;
-    bool help, overwrite, quiet, serial, force;
+    bool help, overwrite, quiet, serial, force, view;
+    const bst_run_steering *steering; /* of the page that watches; NULL: none */
 } run_request;
 
 /* Creates the simulation and runs it. */
@@ -59,7 +62,8 @@ static bst_status run_loaded(bst_ctx *ctx, run_request *r, const bst_json *json,
                                .force = r->force,
                                .progress = !r->quiet && isatty(STDERR_FILENO),
                                .print = true,
-                               .saving = &r->saving};
+                               .saving = &r->saving,
+                               .steering = r->steering};
     bst_simulation *sim = NULL;
     bst_status status = create_and_run(ctx, r, json, scenario, &sim, &request);
     if (status != BST_OK) {
@@ -89,7 +93,8 @@ static bst_status run_changes(bst_ctx *ctx, run_request *r, const char *path,
                                      .force = r->force,
                                      .progress = !r->quiet && isatty(STDERR_FILENO),
                                      .print = true,
-                                     .saving = &r->saving};
+                                     .saving = &r->saving,
+                                     .steering = r->steering};
     bst_status status = bst_run_parts_open(ctx, path, &r->load, &r->simulation, &parts);
     if (status == BST_OK) {
         status = bst_run_parts_all(ctx, parts, &request);
@@ -98,6 +103,42 @@ static bst_status run_changes(bst_ctx *ctx, run_request *r, const char *path,
     if (status != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
     }
+    return status;
+}
+
+/* Runs a scenario that is read. */
+static bst_status run_any(bst_ctx *ctx, run_request *r, const char *path, const bst_json *json,
+                          const bst_scenario *scenario) {
+    return scenario->changes.count > 0 ? run_changes(ctx, r, path, scenario)
+                                       : run_loaded(ctx, r, json, scenario);
+}
+
+/* Runs a scenario with a page that shows it until its end. */
+static bst_status run_viewed(bst_ctx *ctx, run_request *r, const char *path, const bst_json *json,
+                             const bst_scenario *scenario) {
+    char default_out[128], url[BST_VIEW_URL_BYTES];
+    bst_view_subject *subject;
+    bst_view_live *live = NULL;
+    bst_view_server *server = NULL;
+    snprintf(default_out, sizeof default_out, "runs/%s", scenario->name);
+    BST_TRY(bst_view_subject_create(ctx, &subject));
+    bst_status status =
+        bst_view_live_watch(ctx, scenario, subject, r->out ? r->out : default_out, &live);
+    if (status == BST_OK) {
+        status = bst_view_server_start(ctx, subject, live, 0, url, &server);
+    }
+    if (status == BST_OK) {
+        printf("%s\n", url);
+        fflush(stdout);
+        bst_view_open_browser(url);
+        r->steering = bst_view_live_steering(live);
+        status = run_any(ctx, r, path, json, scenario);
+    } else {
+        fprintf(stderr, "boresight: %s\n", ctx->message);
+    }
+    bst_view_server_stop(server);
+    bst_view_live_free(live);
+    bst_view_subject_free(subject);
     return status;
 }
 
@@ -132,6 +173,10 @@ static const bst_option OPTIONS[] = {
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(run_request, serial),
      .doc = "do not process and record beside the simulation; the results are the same"},
+    {.name = "view",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(run_request, view),
+     .doc = "show the run in the browser until its end, at an address that is printed"},
     {.name = "quiet",
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(run_request, quiet),
@@ -173,8 +218,8 @@ int bst_cmd_run(int argc, char **argv) {
         return BST_EXIT_FAILED;
     }
     bst_stop_catch_signals();
-    bst_status status = scenario.changes.count > 0 ? run_changes(&ctx, &r, argv[1], &scenario)
-                                                   : run_loaded(&ctx, &r, json, &scenario);
+    bst_status status = r.view ? run_viewed(&ctx, &r, argv[1], json, &scenario)
+                               : run_any(&ctx, &r, argv[1], json, &scenario);
     bst_scenario_free(&scenario);
     bst_json_free(json);
     return bst_command_line_exit_code(status);

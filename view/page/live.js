@@ -93,6 +93,7 @@ export class Live {
     const all = { ...details, names: app.names, target: target ? Number(target[0]) : -1, tracks: details.tracks.concat(earlier) };
     app.frameView.show(pixels, all, details.dropped ? 'This frame was dropped.' : 'This run has no pixels.');
     element('position').textContent = `exposure ${details.exposure_id} · ${details.time_s.toFixed(2)} s · ${details.utc.replace('T', ' ').replace('Z', '')} UTC`;
+    element('slider').value = element('slider').max;
     app.plots.follow(details.time_s);
     this.shown++;
     document.dispatchEvent(new CustomEvent('liveframe', { detail: details.exposure_id }));
@@ -150,12 +151,13 @@ export class Live {
   describe(before, problem) {
     const { state } = this;
     const steers = this.controller && !state.ended;
+    element('live').classList.toggle('watched', !state.steered);
     element('live-time').textContent = `${state.time_s.toFixed(2)} / ${state.duration_s} s · ${
-      state.ended ? 'complete' : state.paused ? 'paused' : `${state.speed.toFixed(1)} × real time`}`;
+      state.ended ? 'complete' : state.paused ? 'paused' : !state.steered ? 'running' : `${state.speed.toFixed(1)} × real time`}`;
     element('live-run').textContent = this.running() ? 'Pause' : 'Run';
     for (const id of ['live-run', 'live-step', 'live-rate', 'live-save', 'live-rewind', 'live-change', 'live-end']) element(id).disabled = !steers;
     element('live-branch').disabled = !this.controller;
-    this.say(problem || state.message || (this.controller ? '' : 'Another page controls this run.'));
+    this.say(problem || state.message || (this.controller || !state.steered ? '' : 'Another page controls this run.'));
     element('change-problem').textContent = problem || state.message;
     const states = JSON.stringify(state.states);
     if (states !== this.states) {
