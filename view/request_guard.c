@@ -152,7 +152,9 @@ bool bst_view_query_real(const char *query, const char *name, double *value) {
     return true;
 }
 
-bool bst_view_query_word(const char *query, const char *name, char *word, size_t bytes) {
+/* Reads a value that has certain characters only. */
+static bool query_text(const char *query, const char *name, const char *allowed, char *word,
+                       size_t bytes) {
     char text[VALUE_BYTES];
     bool found;
     if (!find_value(query, name, text, &found)) {
@@ -162,10 +164,19 @@ bool bst_view_query_word(const char *query, const char *name, char *word, size_t
     if (!found) {
         return true;
     }
-    if (length == 0 || length >= bytes ||
-        strspn(text, "abcdefghijklmnopqrstuvwxyz0123456789_") != length) {
+    if (length == 0 || length >= bytes || strspn(text, allowed) != length) {
         return false;
     }
     memcpy(word, text, length + 1);
     return true;
+}
+
+bool bst_view_query_word(const char *query, const char *name, char *word, size_t bytes) {
+    return query_text(query, name, "abcdefghijklmnopqrstuvwxyz0123456789_", word, bytes);
+}
+
+bool bst_view_query_name(const char *query, const char *name, char *word, size_t bytes) {
+    static const char allowed[] =
+        "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
+    return query_text(query, name, allowed, word, bytes) && word[0] != '.';
 }

@@ -67,4 +67,7 @@ bool bst_view_query_real(const char *query, const char *name, double *value);
  * Given:     bytes  room at `word`, with the zero byte */
 bool bst_view_query_word(const char *query, const char *name, char *word, size_t bytes);
 
+/* Reads a name of a query: letters, digits, "_", "-" and ".", not first, as bst_view_query_word. */
+bool bst_view_query_name(const char *query, const char *name, char *word, size_t bytes);
+
 #endif

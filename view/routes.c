@@ -3,11 +3,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What the page is for: {"live": true}. */
+#include "view/start_routes.h"
+
+/* What the page is for: {"live": true, "runs": number of open ones}. */
 static bst_status get_session(bst_ctx *ctx, bst_view_exchange *x) {
     (void)ctx;
     x->json = cJSON_CreateObject();
     cJSON_AddBoolToObject(x->json, "live", x->live != NULL);
+    cJSON_AddNumberToObject(x->json, "runs", (double)bst_view_subject_count(x->subject));
     return BST_OK;
 }
 
@@ -75,13 +78,21 @@ static bst_status get_plot(bst_ctx *ctx, bst_view_exchange *x) {
     return bst_view_run_plot(ctx, run, &plot, &x->bytes);
 }
 
-static const bst_view_route routes[] = {
-    {"api/session", false, get_session}, {"api/scenario", false, get_scenario},
-    {"api/run", false, get_run},         {"api/refresh", false, get_refreshed},
-    {"api/events", false, get_events},   {"api/modes", false, get_modes},
-    {"api/names", false, get_names},     {"api/frames", false, get_frames},
-    {"api/frame", false, get_frame},     {"api/pixels", false, get_pixels},
-    {"api/plot", false, get_plot}};
+static const bst_view_route routes[] = {{"api/session", false, get_session},
+                                        {"api/scenario", false, get_scenario},
+                                        {"api/start", false, bst_view_get_start},
+                                        {"api/picture", false, bst_view_get_picture},
+                                        {"api/open", true, bst_view_post_open},
+                                        {"api/launch", true, bst_view_post_launch},
+                                        {"api/run", false, get_run},
+                                        {"api/refresh", false, get_refreshed},
+                                        {"api/events", false, get_events},
+                                        {"api/modes", false, get_modes},
+                                        {"api/names", false, get_names},
+                                        {"api/frames", false, get_frames},
+                                        {"api/frame", false, get_frame},
+                                        {"api/pixels", false, get_pixels},
+                                        {"api/plot", false, get_plot}};
 enum { ROUTES = sizeof routes / sizeof *routes };
 
 const bst_view_route *bst_view_route_find(const char *path) {
@@ -98,6 +109,7 @@ bool bst_view_exchange_read(const char *query, bst_view_exchange *x) {
     x->columns = 1000;
     x->to_s = 1.0;
     return bst_view_query_int(query, "run", 0, most, &x->run) &&
+           bst_view_query_name(query, "name", x->name, sizeof x->name) &&
            bst_view_query_int(query, "sensor", 0, most, &x->sensor) &&
            bst_view_query_int(query, "frame", 0, most, &x->frame) &&
            bst_view_query_int(query, "columns", 1, BST_VIEW_COLUMNS, &x->columns) &&

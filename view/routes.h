@@ -14,9 +14,11 @@ typedef struct bst_view_exchange {
     int64_t run, sensor, frame, columns;
     double from_s, to_s;
     char panel[32];
+    char name[64];        /* of a run in runs/ */
     const char *body;     /* of POST: text that ends with a zero byte; else NULL */
     cJSON *json;          /* the answer; NULL: `bytes` */
     bst_view_bytes bytes; /* the answer */
+    const char *type;     /* media type of `bytes`; NULL: plain bytes */
 } bst_view_exchange;
 
 typedef struct bst_view_route {

@@ -186,7 +186,7 @@ static int answer_data(struct mg_connection *peer, bst_view_server *server,
         } else if (text) {
             a = (answer){BST_HTTP_OK, "application/json; charset=utf-8", text, strlen(text), 0, 0};
         } else {
-            a = (answer){BST_HTTP_OK,   "application/octet-stream",
+            a = (answer){BST_HTTP_OK,   x.type ? x.type : "application/octet-stream",
                          x.bytes.data,  x.bytes.bytes,
                          x.bytes.width, x.bytes.height};
         }

@@ -8,6 +8,7 @@
 enum { RUNS_MOST = 64 };
 
 struct bst_view_subject {
+    bst_view_launcher *launcher;
     pthread_mutex_t lock; /* of all below */
     int runs;
     bst_view_run *run[RUNS_MOST];
@@ -21,6 +22,11 @@ bst_status bst_view_subject_create(bst_ctx *ctx, bst_view_subject **out) {
         free(subject);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the viewer");
     }
+    bst_status status = bst_view_launcher_create(ctx, &subject->launcher);
+    if (status != BST_OK) {
+        bst_view_subject_free(subject);
+        return status;
+    }
     *out = subject;
     return BST_OK;
 }
@@ -31,9 +37,21 @@ void bst_view_subject_free(bst_view_subject *subject) {
             bst_view_run_close(subject->run[i]);
             free(subject->path[i]);
         }
+        bst_view_launcher_free(subject->launcher);
         pthread_mutex_destroy(&subject->lock);
         free(subject);
     }
+}
+
+bst_view_launcher *bst_view_subject_launcher(bst_view_subject *subject) {
+    return subject->launcher;
+}
+
+int64_t bst_view_subject_count(bst_view_subject *subject) {
+    pthread_mutex_lock(&subject->lock);
+    const int64_t count = subject->runs;
+    pthread_mutex_unlock(&subject->lock);
+    return count;
 }
 
 /* Opens a folder as the next run. Call it with the lock held. */

@@ -2,6 +2,7 @@
 #ifndef BST_VIEW_SUBJECT_H
 #define BST_VIEW_SUBJECT_H
 
+#include "view/launch.h"
 #include "view/recorded_run.h"
 
 typedef struct bst_view_subject bst_view_subject;
@@ -20,6 +21,11 @@ void bst_view_subject_free(bst_view_subject *subject);
  * Errors:    those of bst_view_run_open; BST_ERR_STATE: too many runs are open */
 bst_status bst_view_subject_open(bst_ctx *ctx, bst_view_subject *subject, const char *path,
                                  int64_t *number) BST_MUST_CHECK;
+
+/* Number of runs that are open. */
+int64_t bst_view_subject_count(bst_view_subject *subject);
+/* What starts live runs from the page; it belongs to the subject. */
+bst_view_launcher *bst_view_subject_launcher(bst_view_subject *subject);
 
 /* A run by its number. It stays open as long as the subject.
  *

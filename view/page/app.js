@@ -45,6 +45,12 @@ class App {
   async start() {
     const query = new URLSearchParams(location.hash.slice(1));
     const session = await getJson('session');
+    const address = new URLSearchParams(location.search);
+    if (address.has('start') || (!session.live && session.runs === 0)) {
+      const { showStart } = await import('./start.js');
+      await showStart();
+      return;
+    }
     if (session.live) {
       const { Live } = await import('./live.js');
       this.live = new Live(this);
