@@ -149,6 +149,7 @@ static void set_pace(bst_view_live *live, const cJSON *command, const char *word
     }
     live->frames_then = __atomic_load_n(&live->frames, __ATOMIC_RELAXED);
     live->chunk_ticks = live->period_ticks;
+    bst_view_feed_set_every(live->feed, live->steps > 0);
     bst_view_live_anchor(live);
 }
 
@@ -159,6 +160,7 @@ bool bst_view_live_obey(bst_view_live *live, int64_t tick, bst_run_action *actio
     memmove(live->commands, live->commands + 1,
             (size_t)--live->command_count * sizeof *live->commands);
     live->message[0] = '\0';
+    live->obeyed++;
     if (strcmp(word, "set") == 0 || strcmp(word, "burn") == 0) {
         acts = !live->ended &&
                (*word == 's'

@@ -43,6 +43,7 @@ struct bst_view_feed {
     pthread_cond_t changed;
     int64_t wakes;
     bool watched; /* by somebody, at any time; read without the lock */
+    bool every;   /* each frame is kept */
     double tick_rate_hz;
     bst_time epoch;
     int sensors;
@@ -135,7 +136,7 @@ static waiting_exposure *find(feed_sensor *s, int64_t id) {
  * no room. NULL: the last one was copied just before. */
 static waiting_exposure *place_of(bst_view_feed *feed, feed_sensor *s, int64_t id) {
     waiting_exposure *place = find(s, id);
-    if (place || bst_wall_seconds() - s->copied_at < INTERVAL_S) {
+    if (place || (!feed->every && bst_wall_seconds() - s->copied_at < INTERVAL_S)) {
         return place;
     }
     for (int k = 0; k < WAITING; k++) {
@@ -323,6 +324,12 @@ void bst_view_feed_wake(bst_view_feed *feed) {
     pthread_mutex_lock(&feed->lock);
     feed->wakes++;
     pthread_cond_broadcast(&feed->changed);
+    pthread_mutex_unlock(&feed->lock);
+}
+
+void bst_view_feed_set_every(bst_view_feed *feed, bool every) {
+    pthread_mutex_lock(&feed->lock);
+    feed->every = every;
     pthread_mutex_unlock(&feed->lock);
 }
 

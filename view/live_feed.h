@@ -37,6 +37,8 @@ bst_status bst_view_feed_message(void *feed, bst_ctx *ctx, int sensor, const cha
  * Returned:  *out    the caller frees json and pixels; sequence 0: none newer, or no such sensor */
 void bst_view_feed_get(bst_view_feed *feed, int64_t sensor, int64_t after, double wait_s,
                        bst_view_live_frame *out);
+/* Says whether every frame is kept, as in single steps; else those that a screen can show. */
+void bst_view_feed_set_every(bst_view_feed *feed, bool every);
 /* Forgets exposures that are not complete: the run goes on from another time. */
 void bst_view_feed_restart(bst_view_feed *feed);
 /* Ends the waiting of all callers, as the state of the run has changed. */

@@ -32,6 +32,7 @@ struct bst_view_live {
     const char *counted;  /* channel that ends a frame of the first sensor */
     cJSON *commands[BST_VIEW_LIVE_COMMANDS];
     int command_count;
+    int64_t obeyed; /* commands so far */
     /* how it goes on */
     bool paused, settled; /* settled: the state at the pause is saved */
     double rate;          /* x real time; 0: flat out */

@@ -316,6 +316,7 @@ static bool wait_branch(bst_view_live *live) {
 /* Takes back a change with which the run could not begin its next part. */
 static bst_status take_back(bst_ctx *ctx, bst_view_live *live, int made) {
     pthread_mutex_lock(&live->lock);
+    live->made = made;
     snprintf(live->message, sizeof live->message, "the run cannot go on with this change: %.800s",
              ctx->message);
     pthread_mutex_unlock(&live->lock);
@@ -450,6 +451,7 @@ cJSON *bst_view_live_state(bst_view_live *live) {
     cJSON_AddNumberToObject(node, "speed", live->paused ? 0.0 : live->speed);
     cJSON_AddNumberToObject(node, "run", (double)live->run);
     cJSON_AddNumberToObject(node, "changes", live->made);
+    cJSON_AddNumberToObject(node, "obeyed", (double)live->obeyed);
     cJSON_AddStringToObject(node, "message", live->message);
     cJSON *states = cJSON_AddArrayToObject(node, "states");
     for (int i = 0; i < live->state_count; i++) {

@@ -50,8 +50,9 @@ bst_view_feed *bst_view_live_feed(bst_view_live *live);
  * Returned:  false: unknown, or too many are waiting */
 bool bst_view_live_command(bst_view_live *live, const cJSON *command);
 
-/* State of the run: {time_s, duration_s, paused, steps, rate, speed, ended, run, message, changes,
- * steered, states: [{id, time_s, why}]}. Any thread; delete it with cJSON_Delete. */
+/* State of the run: {time_s, duration_s, paused, steps, rate, speed, ended, run, steered, changes,
+ * obeyed: number of commands, message: of the last one, states: [{id, time_s, why}]}. Any thread;
+ * delete it with cJSON_Delete. */
 cJSON *bst_view_live_state(bst_view_live *live);
 
 /* The scenario's text at the time of the run; free it with free. Any thread. NULL: none yet.

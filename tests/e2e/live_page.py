@@ -73,8 +73,11 @@ class Socket:
         return answer, pixels.reshape(answer["height"], answer["width"]) if pixels.size else None
 
     def state(self, until=None, command=None):
-        """State of the run after a command, once it fits a condition."""
-        answer = self.ask(command)[0]
-        while until and not until(answer["state"]):
-            answer = self.ask()[0]
-        return answer["state"]
+        """State of the run after a command was obeyed, once it fits a condition."""
+        state = self.ask()[0]["state"]
+        obeyed = state["obeyed"]
+        if command:
+            state = self.ask(command)[0]["state"]
+        while (command and state["obeyed"] == obeyed) or (until and not until(state)):
+            state = self.ask()[0]["state"]
+        return state

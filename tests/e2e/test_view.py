@@ -41,15 +41,17 @@ class Viewer:
     """A running `boresight view`."""
     running = []  # to be ended where a test failed
 
-    def __init__(self, folder, *words):
-        self.process = subprocess.Popen([runs.BORESIGHT, "view", folder, "--no-browser", *words],
-                                        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    def __init__(self, folder, *words, command=None, cwd=None):
+        """Of a folder or a scenario; `command`: all words of the command instead."""
+        words = command or ["view", *([folder] if folder else []), "--no-browser", *words]
+        self.process = subprocess.Popen([runs.BORESIGHT, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                        cwd=cwd)
         self.running.append(self.process)
         self.url = self.process.stdout.readline().strip()
         match = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/([0-9a-f]{32})/", self.url)
         if not match:
             raise AssertionError((self.url, self.process.communicate()[1]))
-        self.rest = self.process.stdout.readline()
+        self.rest = "" if command else self.process.stdout.readline()
         self.port, self.token = int(match.group(1)), match.group(2)
 
     def end(self):
@@ -72,7 +74,7 @@ class Viewer:
         peer = socket.socket()
         if receive_bytes:
             peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_bytes)
-        peer.settimeout(60)
+        peer.settimeout(30)
         peer.connect(("127.0.0.1", self.port))
         return peer
 
