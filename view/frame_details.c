@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "sim/core/json_number.h"
+#include "view/json_list.h"
 #include "view/recorded_run.h"
 #include "view/recorded_run_internal.h"
 
@@ -185,12 +186,6 @@ static void add_place(cJSON *node, const bst_io_rows *rows, int column,
                         (bst_io_rows_real(rows, column + 1) - f->y0_px + 0.5) / f->binning - 0.5);
 }
 
-static cJSON *add_object(cJSON *list) {
-    cJSON *node = cJSON_CreateObject();
-    cJSON_AddItemToArray(list, node);
-    return node;
-}
-
 static const char *const truth[2] = {
     "truth", "kind, id, norad, in_field, x_centroid_px, y_centroid_px, v_mag, snr"};
 
@@ -198,7 +193,7 @@ static void add_truth(cJSON *list, const bst_io_rows *rows, const bst_view_expos
     if (bst_io_rows_int(rows, 4) != 1) {
         return;
     }
-    cJSON *node = add_object(list);
+    cJSON *node = bst_view_add_object(list);
     cJSON_AddStringToObject(node, "kind", bst_io_rows_text(rows, 1));
     cJSON_AddNumberToObject(node, "id", (double)bst_io_rows_int(rows, 2));
     cJSON_AddNumberToObject(node, "norad", (double)bst_io_rows_int(rows, 3));
@@ -213,7 +208,7 @@ static const char *const detections[2] = {
     " angle_deg, v_mag"};
 
 static void add_detection(cJSON *list, const bst_io_rows *rows, const bst_view_exposure *f) {
-    cJSON *node = add_object(list);
+    cJSON *node = bst_view_add_object(list);
     const double per_area = 1.0 / (f->binning * f->binning);
     cJSON_AddStringToObject(node, "label", bst_io_rows_text(rows, 1));
     cJSON_AddNumberToObject(node, "star_id", (double)bst_io_rows_int(rows, 2));
@@ -234,7 +229,7 @@ static const char *const tracks[2] = {
     " v_mag"};
 
 static void add_track(cJSON *list, const bst_io_rows *rows, const bst_view_exposure *f) {
-    cJSON *node = add_object(list);
+    cJSON *node = bst_view_add_object(list);
     cJSON_AddBoolToObject(node, "now", bst_io_rows_int(rows, 0) == f->id);
     cJSON_AddNumberToObject(node, "id", (double)bst_io_rows_int(rows, 1));
     cJSON_AddStringToObject(node, "status", bst_io_rows_text(rows, 2));

@@ -42,7 +42,7 @@ struct bst_view_feed {
     pthread_mutex_t lock; /* of all below */
     pthread_cond_t changed;
     int64_t wakes;
-    bool watched; /* by somebody, at any time; read without the lock */
+    bool watched; /* a client has asked for a frame; read without the lock */
     bool every;   /* each frame is kept */
     double tick_rate_hz;
     bst_time epoch;

@@ -20,7 +20,7 @@ typedef struct bst_view_state {
 struct bst_view_live {
     pthread_mutex_t lock; /* of all below but `parts`, which the stepping thread alone uses */
     pthread_cond_t commanded;
-    bst_run_parts *parts; /* NULL: somebody else steps the run */
+    bst_run_parts *parts; /* NULL: another caller steps the run */
     bst_run_steering steering;
     bst_view_subject *subject;
     bst_view_feed *feed;

@@ -6,6 +6,7 @@
 #include "sim/core/json_number.h"
 #include "sim/engine/recorder/recorder.h"
 #include "sim/io/wcs.h"
+#include "view/json_list.h"
 
 /* Marks of one kind that are sent. */
 enum { MARKS_MOST = 5000 };
@@ -19,12 +20,6 @@ static void add_place(cJSON *node, double x_px, double y_px, const bst_frame_mes
     const double binning = binning_of(frame);
     bst_json_add_number(node, "x", (x_px - frame->window.x0 + 0.5) / binning - 0.5);
     bst_json_add_number(node, "y", (y_px - frame->window.y0 + 0.5) / binning - 0.5);
-}
-
-static cJSON *add_object(cJSON *list) {
-    cJSON *node = cJSON_CreateObject();
-    cJSON_AddItemToArray(list, node);
-    return node;
 }
 
 static void add_wcs(cJSON *node, const bst_truth *truth, const bst_frame_message *frame,
@@ -57,7 +52,7 @@ void bst_view_add_live_truth(cJSON *node, const bst_truth *truth, const bst_fram
         if (!(item->flags & BST_TRUTH_IN_FIELD)) {
             continue;
         }
-        cJSON *mark = add_object(list);
+        cJSON *mark = bst_view_add_object(list);
         cJSON_AddStringToObject(mark, "kind", item->kind == BST_SOURCE_STAR ? "star" : "object");
         cJSON_AddNumberToObject(mark, "id", item->id);
         cJSON_AddNumberToObject(mark, "norad", item->norad);
@@ -74,7 +69,7 @@ void bst_view_add_live_detections(cJSON *node, const bst_detections *detections,
     const double binning = binning_of(frame), per_area = 1.0 / (binning * binning);
     for (int i = 0; i < detections->count && i < MARKS_MOST; i++) {
         const bst_detection *d = &detections->items[i];
-        cJSON *mark = add_object(list);
+        cJSON *mark = bst_view_add_object(list);
         cJSON_AddStringToObject(mark, "label", bst_recorder_label_name(d->label));
         cJSON_AddNumberToObject(mark, "star_id", d->star_id);
         add_place(mark, d->x_px, d->y_px, frame);
@@ -96,7 +91,7 @@ void bst_view_add_live_tracks(cJSON *node, const bst_tracks *tracks,
         const bst_track *t = &tracks->items[i];
         double ra, dec;
         bst_vec3_to_radec(t->direction_gcrf, &ra, &dec);
-        cJSON *mark = add_object(list);
+        cJSON *mark = bst_view_add_object(list);
         cJSON_AddTrueToObject(mark, "now");
         cJSON_AddNumberToObject(mark, "id", (double)t->id);
         cJSON_AddStringToObject(mark, "status", bst_recorder_track_status_name(t->status));

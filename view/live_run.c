@@ -86,7 +86,7 @@ static int64_t allowed_tick(bst_view_live *live) {
     return live->tick + live->chunk_ticks;
 }
 
-/* True if a state is due that nobody asks for: at a pause, and now and then. */
+/* True if a state is due without a command: at a pause, and now and then. */
 static bool save_is_due(bst_view_live *live) {
     const bst_view_state *last =
         live->state_count > 0 ? &live->states[live->state_count - 1] : NULL;
@@ -150,7 +150,7 @@ static void open_folder(bst_view_live *live) {
     set_written(live, true);
 }
 
-/* Takes a message of a run that somebody else steps. */
+/* Takes a message of a run that another caller steps. */
 static bst_status on_watched(void *user, bst_ctx *ctx, int sensor, const char *channel,
                              const void *payload, int64_t tick) {
     bst_view_live *live = user;

@@ -18,7 +18,7 @@ typedef struct bst_view_live bst_view_live;
  * Ownership: free *out_live with bst_view_live_free; `parts` and `subject` outlive it */
 bst_status bst_view_live_create(bst_ctx *ctx, bst_run_parts *parts, bst_view_subject *subject,
                                 const char *out, bst_view_live **out_live) BST_MUST_CHECK;
-/* Prepares to watch a run that somebody else steps: its page has no controls.
+/* Prepares to watch a run that another caller steps: its page has no controls.
  *
  * Given:     as bst_view_live_create; the scenario is not kept
  * Errors:    BST_ERR_MEMORY

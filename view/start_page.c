@@ -47,10 +47,6 @@ static bool join(const char *folder, const char *name, char *path, size_t bytes)
     return length >= 0 && (size_t)length < bytes;
 }
 
-static int by_name(const struct dirent **a, const struct dirent **b) {
-    return strcmp((*a)->d_name, (*b)->d_name);
-}
-
 static int is_json(const struct dirent *entry) {
     const char *dot = strrchr(entry->d_name, '.');
     return is_name(entry->d_name) && dot && strcmp(dot, ".json") == 0;
@@ -81,7 +77,7 @@ static void list_scenarios(cJSON *list) {
     char folder[4096];
     struct dirent **entries;
     bst_cli_shipped_file("scenarios", folder, sizeof folder);
-    int count = scandir(folder, &entries, is_json, by_name);
+    int count = scandir(folder, &entries, is_json, alphasort);
     for (int i = 0; i < count; i++) {
         if (i < ENTRIES_MOST) {
             add_scenario(folder, entries[i]->d_name, list);
@@ -135,7 +131,7 @@ static void add_run(const listed_folder *run, cJSON *list) {
 
 static void list_runs(cJSON *list) {
     struct dirent **entries;
-    int count = scandir(runs_folder, &entries, is_listed, by_name), kept = 0;
+    int count = scandir(runs_folder, &entries, is_listed, alphasort), kept = 0;
     listed_folder *folders = count > 0 ? calloc((size_t)count, sizeof *folders) : NULL;
     for (int i = 0; i < count; i++) {
         char path[512];

@@ -10,37 +10,36 @@
 #include "sim/run/run_link.h"
 #include "sim/run/run_parts.h"
 #include "sim/run/run_scenario.h"
-#include "view/browser.h"
-#include "view/server.h"
+#include "view/attach.h"
 
 static const char help_text[] =
     "usage: boresight run SCENARIO.json [options]\n"
-    "\n"
-    "Runs a scenario and writes its results to a folder: frames.fits (opens in ds9), run.sqlite\n"
+    "\nRuns a scenario and writes its results to a folder: frames.fits (opens in ds9), run.sqlite\n"
     "(truth, detections, tracks, commands, telemetry, events), manifest.json, quicklook.png,\n"
     "pointing.png. While it runs the folder is called OUT.partial. Ctrl-C closes the run "
     "properly,\n"
-    "a second one ends it at once.\n"
-    "\n"
+    "a second one ends it at once.\n\n"
     "  boresight run scenarios/neossat_geo_track.json --out runs/demo\n"
     "  boresight run scenarios/neossat_geo_track.json --duration 60 --set /record/frames=none\n"
-    "\n"
-    "options:\n";
+    "\noptions:\n";
 
 typedef struct run_request {
     bst_load_options load;
     bst_simulation_options simulation;
     bst_run_saving saving;
-    const char *out, *replay;
+    const char *path, *out, *replay;
     int64_t threads;
     bool help, overwrite, quiet, serial, force, view;
-    const bst_run_steering *steering; /* of the page that watches; NULL: none */
 } run_request;
 
 /* Creates the simulation and runs it. */
 static bst_status create_and_run(bst_ctx *ctx, run_request *r, const bst_json *json,
                                  const bst_scenario *scenario, bst_simulation **sim,
                                  bst_run_request *request) {
+    if (scenario->changes.count > 0) {
+        return bst_run_parts_file(ctx, r->path, &r->load, &r->simulation, bst_check_rules_apply,
+                                  request);
+    }
     BST_TRY(bst_run_restored_read(ctx, scenario, &r->saving, request->out, r->replay != NULL,
                                   &r->simulation, &request->restored));
     bst_status status = bst_simulation_create(ctx, scenario, &r->simulation, sim);
@@ -62,103 +61,26 @@ static bst_status run_loaded(bst_ctx *ctx, run_request *r, const bst_json *json,
                                .force = r->force,
                                .progress = !r->quiet && isatty(STDERR_FILENO),
                                .print = true,
-                               .saving = &r->saving,
-                               .steering = r->steering};
+                               .saving = &r->saving};
     bst_simulation *sim = NULL;
-    bst_status status = create_and_run(ctx, r, json, scenario, &sim, &request);
+    bst_view_attached *page = NULL;
+    bst_status status = r->view ? bst_view_attach(ctx, scenario, request.out, &page) : BST_OK;
+    request.steering = bst_view_attached_steering(page);
+    status = status == BST_OK ? create_and_run(ctx, r, json, scenario, &sim, &request) : status;
     if (status != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
     }
     bst_run_link_end(sim, status, ctx->message);
     bst_simulation_free(sim);
     bst_run_restored_free(request.restored);
-    return status;
-}
-
-/* Runs a scenario that changes on the way. */
-static bst_status run_changes(bst_ctx *ctx, run_request *r, const char *path,
-                              const bst_scenario *scenario) {
-    char default_out[128];
-    bst_run_parts *parts;
-    snprintf(default_out, sizeof default_out, "runs/%s", scenario->name);
-    if (r->saving.restore || r->saving.save_every_s > 0.0 || r->replay) {
-        bst_status status = bst_fail(ctx, BST_ERR_ARGUMENT,
-                                     "--restore, --save-every and --replay: a scenario with "
-                                     "/changes runs from its start to its end");
-        fprintf(stderr, "boresight: %s\n", ctx->message);
-        return status;
-    }
-    const bst_run_request request = {.out = r->out ? r->out : default_out,
-                                     .overwrite = r->overwrite,
-                                     .force = r->force,
-                                     .progress = !r->quiet && isatty(STDERR_FILENO),
-                                     .print = true,
-                                     .saving = &r->saving,
-                                     .steering = r->steering};
-    bst_status status = bst_run_parts_open(ctx, path, &r->load, &r->simulation, &parts);
-    if (status == BST_OK) {
-        status = bst_run_parts_all(ctx, parts, &request);
-        bst_run_parts_free(parts);
-    }
-    if (status != BST_OK) {
-        fprintf(stderr, "boresight: %s\n", ctx->message);
-    }
-    return status;
-}
-
-/* Runs a scenario that is read. */
-static bst_status run_any(bst_ctx *ctx, run_request *r, const char *path, const bst_json *json,
-                          const bst_scenario *scenario) {
-    return scenario->changes.count > 0 ? run_changes(ctx, r, path, scenario)
-                                       : run_loaded(ctx, r, json, scenario);
-}
-
-/* Runs a scenario with a page that shows it until its end. */
-static bst_status run_viewed(bst_ctx *ctx, run_request *r, const char *path, const bst_json *json,
-                             const bst_scenario *scenario) {
-    char default_out[128], url[BST_VIEW_URL_BYTES];
-    bst_view_subject *subject;
-    bst_view_live *live = NULL;
-    bst_view_server *server = NULL;
-    snprintf(default_out, sizeof default_out, "runs/%s", scenario->name);
-    BST_TRY(bst_view_subject_create(ctx, &subject));
-    bst_status status =
-        bst_view_live_watch(ctx, scenario, subject, r->out ? r->out : default_out, &live);
-    if (status == BST_OK) {
-        status = bst_view_server_start(ctx, subject, live, 0, url, &server);
-    }
-    if (status == BST_OK) {
-        printf("%s\n", url);
-        fflush(stdout);
-        bst_view_open_browser(url);
-        r->steering = bst_view_live_steering(live);
-        status = run_any(ctx, r, path, json, scenario);
-    } else {
-        fprintf(stderr, "boresight: %s\n", ctx->message);
-    }
-    bst_view_server_stop(server);
-    bst_view_live_free(live);
-    bst_view_subject_free(subject);
+    bst_view_detach(page);
     return status;
 }
 
 #define FIELD(member) .offset = offsetof(run_request, member)
 
 static const bst_option OPTIONS[] = {
-    {.name = "out",
-     .kind = BST_OPTION_TEXT,
-     .offset = offsetof(run_request, out),
-     .path = BST_PATH_OUTPUT_FOLDER,
-     .argument = "FOLDER",
-     .doc = "where the results go (default runs/NAME)"},
-    {.name = "overwrite",
-     .kind = BST_OPTION_FLAG,
-     .offset = offsetof(run_request, overwrite),
-     .doc = "replace an earlier run there"},
-    {.name = "force",
-     .kind = BST_OPTION_FLAG,
-     .offset = offsetof(run_request, force),
-     .doc = "start although the frames will take more space than is free"},
+    BST_RUN_FOLDER_OPTIONS_AT(FIELD, out, overwrite, force),
     BST_RUN_SAVING_OPTIONS_AT(FIELD, saving),
     BST_LINK_OPTIONS_AT(FIELD, load),
     {.name = "replay",
@@ -218,8 +140,8 @@ int bst_cmd_run(int argc, char **argv) {
         return BST_EXIT_FAILED;
     }
     bst_stop_catch_signals();
-    bst_status status = r.view ? run_viewed(&ctx, &r, argv[1], json, &scenario)
-                               : run_any(&ctx, &r, argv[1], json, &scenario);
+    r.path = argv[1];
+    bst_status status = run_loaded(&ctx, &r, json, &scenario);
     bst_scenario_free(&scenario);
     bst_json_free(json);
     return bst_command_line_exit_code(status);

@@ -5,7 +5,6 @@
 
 #include <cjson/cJSON.h>
 
-#include "sim/analysis/check/scenario_rules.h"
 #include "sim/cli/plugins.h"
 #include "sim/link/link.h"
 
@@ -13,7 +12,7 @@ struct bst_run_parts {
     bst_json *json;        /* the scenario at time 0, with the list of changes */
     bst_scenario scenario; /* of json */
     bst_simulation_options options;
-    bool checked; /* the rules of the scenario were checked */
+    bst_run_check check; /* NULL: done, or none */
 };
 
 static int change_count(const bst_run_parts *parts) {
@@ -68,13 +67,15 @@ static bst_status check_changes(bst_ctx *ctx, const bst_json *json, const bst_sc
 }
 
 bst_status bst_run_parts_open(bst_ctx *ctx, const char *path, const bst_load_options *load,
-                              const bst_simulation_options *options, bst_run_parts **out) {
+                              const bst_simulation_options *options, bst_run_check check,
+                              bst_run_parts **out) {
     bst_run_parts *parts = calloc(1, sizeof *parts);
     *out = NULL;
     if (!parts) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a run");
     }
     parts->options = *options;
+    parts->check = check;
     parts->options.changes_made = true;
     bst_status status = bst_load_scenario(ctx, path, load, &parts->json, &parts->scenario);
     if (status == BST_OK && *parts->scenario.link.address) {
@@ -194,9 +195,9 @@ static bst_status run_read(bst_ctx *ctx, bst_run_parts *parts, const bst_scenari
     ctx->log_level = part->state ? BST_LOG_ERROR : level; /* the first part has said it */
     bst_status status = bst_simulation_create(ctx, scenario, &options, &sim);
     ctx->log_level = level;
-    if (status == BST_OK && !parts->checked) {
-        status = bst_check_rules_apply(ctx, scenario, sim);
-        parts->checked = status == BST_OK;
+    if (status == BST_OK && parts->check) {
+        status = parts->check(ctx, scenario, sim);
+        parts->check = NULL;
     }
     if (status == BST_OK) {
         request->part_ended = &part->ended;
@@ -285,5 +286,20 @@ bst_status bst_run_parts_all(bst_ctx *ctx, bst_run_parts *parts, const bst_run_r
         free((void *)part.state);
     } while (status == BST_ERR_INTERRUPTED && part.ended);
     free(own.state);
+    return status;
+}
+
+bst_status bst_run_parts_file(bst_ctx *ctx, const char *path, const bst_load_options *load,
+                              const bst_simulation_options *options, bst_run_check check,
+                              const bst_run_request *request) {
+    bst_run_parts *parts;
+    if (options->replay || request->saving->restore || request->saving->save_every_s > 0.0) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--restore, --save-every and --replay: a scenario with /changes runs from "
+                        "its start to its end");
+    }
+    BST_TRY(bst_run_parts_open(ctx, path, load, options, check, &parts));
+    bst_status status = bst_run_parts_all(ctx, parts, request);
+    bst_run_parts_free(parts);
     return status;
 }

@@ -9,14 +9,19 @@
 
 typedef struct bst_run_parts bst_run_parts;
 
+/* Checks the simulation of a scenario before its run begins. */
+typedef bst_status (*bst_run_check)(bst_ctx *ctx, const bst_scenario *scenario,
+                                    const bst_simulation *simulation);
+
 /* Reads a scenario whose changes are to be made.
  *
  * Given:     path, load  as bst_load_scenario; not kept
+ *            check       called once; NULL: nothing is checked
  *            options     of the simulations; device, threads, parallel and pace are used
  * Errors:    those of bst_load_scenario, also for the scenario after each of its changes
  * Ownership: free *out with bst_run_parts_free */
 bst_status bst_run_parts_open(bst_ctx *ctx, const char *path, const bst_load_options *load,
-                              const bst_simulation_options *options,
+                              const bst_simulation_options *options, bst_run_check check,
                               bst_run_parts **out) BST_MUST_CHECK;
 /* Frees the scenarios of a run in parts; NULL is allowed. */
 void bst_run_parts_free(bst_run_parts *parts);
@@ -65,5 +70,12 @@ bst_status bst_run_parts_run(bst_ctx *ctx, bst_run_parts *parts, bst_run_part *p
  * Errors:    those of bst_run_scenario */
 bst_status bst_run_parts_all(bst_ctx *ctx, bst_run_parts *parts,
                              const bst_run_request *request) BST_MUST_CHECK;
+
+/* Runs a scenario file with its own changes: bst_run_parts_open and bst_run_parts_all.
+ *
+ * Errors:    also BST_ERR_ARGUMENT: request->saving restores or saves a state */
+bst_status bst_run_parts_file(bst_ctx *ctx, const char *path, const bst_load_options *load,
+                              const bst_simulation_options *options, bst_run_check check,
+                              const bst_run_request *request) BST_MUST_CHECK;
 
 #endif

@@ -11,6 +11,23 @@ typedef struct bst_run_saving {
     const char *restore; /* file of the state to begin from; NULL: the start */
 } bst_run_saving;
 
+/* Option entries for the folder of a run: const char *out, bool overwrite_ and force_. */
+#define BST_RUN_FOLDER_OPTIONS_AT(PLACE, out_, overwrite_, force_)           \
+    {.name = "out",                                                          \
+     .kind = BST_OPTION_TEXT,                                                \
+     PLACE(out_),                                                            \
+     .path = BST_PATH_OUTPUT_FOLDER,                                         \
+     .argument = "FOLDER",                                                   \
+     .doc = "where the results go (default runs/NAME)"},                     \
+        {.name = "overwrite",                                                \
+         .kind = BST_OPTION_FLAG,                                            \
+         PLACE(overwrite_),                                                  \
+         .doc = "replace an earlier run there"},                             \
+    {                                                                        \
+        .name = "force", .kind = BST_OPTION_FLAG, PLACE(force_),             \
+        .doc = "start although the frames will take more space than is free" \
+    }
+
 /* Option entries that fill a bst_run_saving; PLACE as in BST_LOAD_OPTIONS_AT. */
 #define BST_RUN_SAVING_OPTIONS_AT(PLACE, saving)                                                   \
     {.name = "until",                                                                              \
