@@ -11,6 +11,10 @@
 /* Longest list of exposures; a day of 100 frames a second has 8.6 million. */
 static const size_t EXPOSURES_MOST = 10000000;
 
+/* Work of all queries of a request, steps of SQLite: some 20 s. A panel of a day at 1 Hz needs 3e7.
+ */
+static const int64_t STEPS_MOST = INT64_C(2000000000);
+
 /* Looks at a run that is about to end, after which it was killed. */
 enum { ENDINGS_MOST = 5 };
 
@@ -116,7 +120,11 @@ static bst_status read_sensors(bst_ctx *ctx, bst_view_run *run) {
 
 bst_status bst_view_lock(bst_ctx *ctx, bst_view_run *run) {
     pthread_mutex_lock(&run->lock);
-    return run->reader ? BST_OK : open_reader(ctx, run);
+    bst_status status = run->reader ? BST_OK : open_reader(ctx, run);
+    if (status == BST_OK) {
+        bst_run_reader_allow(run->reader, STEPS_MOST);
+    }
+    return status;
 }
 
 void bst_view_unlock(bst_view_run *run) {
