@@ -5,12 +5,22 @@
 
 #include "view/start_routes.h"
 
-/* What the page is for: {"live": true, "runs": number of open ones}. */
+/* What the page is for: {"live": true, "runs": number of open ones, "run": as api/run, "names": as
+ * api/names}, the last two if the run is open: all that a page needs at first. */
 static bst_status get_session(bst_ctx *ctx, bst_view_exchange *x) {
-    (void)ctx;
+    bst_view_run *run;
+    cJSON *described = NULL, *names = NULL;
     x->json = cJSON_CreateObject();
     cJSON_AddBoolToObject(x->json, "live", x->live != NULL);
     cJSON_AddNumberToObject(x->json, "runs", (double)bst_view_subject_count(x->subject));
+    if (bst_view_subject_run(ctx, x->subject, x->run, &run) != BST_OK) {
+        return BST_OK;
+    }
+    BST_TRY(bst_view_run_describe(ctx, run, &described));
+    cJSON_AddItemToObject(x->json, "run", described);
+    BST_TRY(bst_view_run_names(ctx, run, &names));
+    cJSON_AddItemToObject(x->json, "names", cJSON_DetachItemFromObject(names, "names"));
+    cJSON_Delete(names);
     return BST_OK;
 }
 

@@ -217,6 +217,7 @@ class Start(unittest.TestCase):
         self.assertIn("neossat_geo_track.json", [one["file"] for one in listed["scenarios"]])
         self.assertNotIn("boresight.schema.json", [one["file"] for one in listed["scenarios"]])
         self.assertEqual(viewer.json("api/session"), {"live": False, "runs": 0})
+        self.assertEqual(viewer.status("/{token}/api/run"), 404)
         with open(folder + "/runs/one/quicklook.png", "wb") as file:
             file.write(b"\x89PNG")
         self.assertEqual(viewer.get("api/picture?name=one")[0], b"\x89PNG")
@@ -234,6 +235,7 @@ class Start(unittest.TestCase):
         self.assertEqual(post("api/launch", {"scenario": "../scenarios/neossat_geo_track.json"}), 404)
         self.assertEqual(post("api/open", {"run": "one"}), {"run": 0})
         self.assertEqual(viewer.json("api/run?run=0")["name"], "one")
+        self.assertEqual(viewer.json("api/session")["run"], viewer.json("api/run"))
         self.assertEqual(viewer.end()[0], 0)
 
 

@@ -56,7 +56,8 @@ class App {
       this.live = new Live(this);
       await this.live.start();
     }
-    [this.run, { names: this.names }] = await Promise.all([getJson('run'), getJson('names')]);
+    if (session.run && !this.live) [this.run, this.names] = [session.run, session.names];
+    else [this.run, { names: this.names }] = await Promise.all([getJson('run'), getJson('names')]);
     this.describeRun();
     await this.openSensor(Number(query.get('sensor')) || 0, Number(query.get('frame')) || 0);
     const [x, y, scale] = (query.get('at') || '').split(',').map(Number);
@@ -181,6 +182,7 @@ class App {
         const loaded = await this.load(next);
         this.current = next;
         this.frameView.show(loaded.image, loaded.details, loaded.why);
+        this.firstShown = this.firstShown || performance.now(); // ms since the page was asked for
         this.describePosition(loaded.details);
         this.plots.setCursor(this.timeOf(next));
         this.markEvent();

@@ -91,7 +91,7 @@ export class Live {
     if (!sensor || !this.newest) return;
     const target = Object.entries(app.names).find(([, name]) => name === sensor.target);
     const all = { ...details, names: app.names, target: target ? Number(target[0]) : -1, tracks: details.tracks.concat(earlier) };
-    app.frameView.show(pixels, all, details.dropped ? 'This frame was dropped.' : 'This run has no pixels.');
+    app.frameView.show(pixels, all, details.dropped ? 'This frame was dropped.' : 'This run has no pixels.', !this.state.paused);
     element('position').textContent = `exposure ${details.exposure_id} · ${details.time_s.toFixed(2)} s · ${details.utc.replace('T', ' ').replace('Z', '')} UTC`;
     element('slider').value = element('slider').max;
     app.plots.follow(details.time_s);
