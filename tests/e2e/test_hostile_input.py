@@ -137,7 +137,7 @@ LINES = [
     (("view", RUN, "--port", "65536"), 2, "--port 65536: give an integer from 0 to 65535"),
     (("view", RUN, RUN), 2, "one folder of a run, one scenario file, or none is expected, 2 were given"),
     (("view", F), 1, "is not the folder of a run"),
-    (("view", F + "/file"), 1, "file: is not a folder; give the folder of a run"),
+    (("view", F + "/file"), 1, "file:1:1: this is not valid JSON"),
     (("process", F + "/none.fits", "--map", "neossat", "--out", OUT), 1, "none.fits: cannot be opened"),
     (("process", T, "--map", "neossat", "--out", OUT), 1, "track.json: does not begin as a FITS file"),
     (("process", RUN, "--map", "nix", "--out", OUT), 1, "--map nix: there is no such keyword map .allowed: "),
