@@ -8,7 +8,7 @@ const SCALE_LEAST = 0.02, SCALE_MOST = 128;
 /** From this scale on, pixels show their values. */
 const VALUE_SCALE = 34;
 /** Least time between two statistics of live frames, ms. */
-const STATISTICS_MS = 250;
+const STATISTICS_MS = 1000;
 const NUMBER = new Intl.NumberFormat('en', { maximumFractionDigits: 1 });
 
 /** An element by its id. @param {string} id */

@@ -193,6 +193,9 @@ function prepare(canvas) {
   return { context, width, height };
 }
 
+/** Least time between two drawings of the plots of a live run, ms: they take longer than its frames. */
+const FOLLOW_MS = 1000;
+
 export class Plots {
   /** @param {(time: number) => void} seek goes to the frame of a time */
   constructor(seek) {
@@ -280,7 +283,7 @@ export class Plots {
     this.cursor = time;
     if (time > this.all.to) this.all = { from: this.all.from, to: time };
     if (all) this.range = { from: this.range.from, to: this.all.to };
-    if (performance.now() - this.followed < 250) return;
+    if (performance.now() - this.followed < FOLLOW_MS) return;
     this.followed = performance.now();
     element('range').textContent = `${shortNumber(this.range.from)} to ${shortNumber(this.range.to)} s`;
     this.draw();
