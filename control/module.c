@@ -185,8 +185,13 @@ static bst_status step(void *self, struct bst_step *s) {
 
 static bst_status archive_control(void *self, bst_archive *archive) {
     module *m = self;
+    const bst_control_config *config = &m->control.config;
+    double set[2] = {config->exposure_s, config->period_s}; /* by the saved state's scenario */
     bst_knowledge_view_archive(m->view, archive);
+    BST_ARCHIVE(archive, set);
     bst_archive_bool(archive, &m->sensor_told);
+    const bool same = set[0] == config->exposure_s && set[1] == config->period_s;
+    m->sensor_told = m->sensor_told && same;
     m->exposures_told = (int)bst_archive_integer(archive, m->exposures_told, 0,
                                                  m->control.config.exposure_schedule.count);
     return bst_control_archive(&m->control, archive);

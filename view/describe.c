@@ -11,6 +11,8 @@
 
 /* Changes of the mode that are listed. */
 enum { MODES_MOST = 20000 };
+/* Names of objects that are sent. */
+enum { NAMES_MOST = 5000 };
 
 /* Copies a member of the manifest that the page shows. */
 static void copy(cJSON *to, const cJSON *manifest, const char *key) {
@@ -154,6 +156,36 @@ bst_status bst_view_run_events(bst_ctx *ctx, bst_view_run *run, cJSON **out) {
     *out = cJSON_CreateObject();
     bst_status status = bst_view_lock(ctx, run);
     status = status == BST_OK ? list_events(ctx, run, *out) : status;
+    bst_view_unlock(run);
+    return bst_view_keep(status, out);
+}
+
+/* ------------------------------------------------------------------ names */
+
+/* Names of the objects, for their numbers in the truth. */
+static void add_names(const bst_view_run *run, cJSON *names) {
+    bst_ctx ignored = {0};
+    bst_io_rows *rows;
+    bool more;
+    char sql[80];
+    snprintf(sql, sizeof sql, "SELECT id, name FROM objects LIMIT %d", NAMES_MOST);
+    if (bst_io_rows_open(&ignored, run->reader, sql, 0, 0, &rows) != BST_OK) {
+        return;
+    }
+    while (bst_io_rows_next(&ignored, rows, &more) == BST_OK && more) {
+        char id[24];
+        snprintf(id, sizeof id, "%lld", (long long)bst_io_rows_int(rows, 0));
+        cJSON_AddStringToObject(names, id, bst_io_rows_text(rows, 1));
+    }
+    bst_io_rows_close(rows);
+}
+
+bst_status bst_view_run_names(bst_ctx *ctx, bst_view_run *run, cJSON **out) {
+    *out = cJSON_CreateObject();
+    bst_status status = bst_view_lock(ctx, run);
+    if (status == BST_OK) {
+        add_names(run, cJSON_AddObjectToObject(*out, "names"));
+    }
     bst_view_unlock(run);
     return bst_view_keep(status, out);
 }

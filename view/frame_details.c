@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "sim/core/json_number.h"
+#include "view/json_list.h"
 #include "view/recorded_run.h"
 #include "view/recorded_run_internal.h"
 
@@ -185,12 +186,6 @@ static void add_place(cJSON *node, const bst_io_rows *rows, int column,
                         (bst_io_rows_real(rows, column + 1) - f->y0_px + 0.5) / f->binning - 0.5);
 }
 
-static cJSON *add_object(cJSON *list) {
-    cJSON *node = cJSON_CreateObject();
-    cJSON_AddItemToArray(list, node);
-    return node;
-}
-
 static const char *const truth[2] = {
     "truth", "kind, id, norad, in_field, x_centroid_px, y_centroid_px, v_mag, snr"};
 
@@ -198,7 +193,7 @@ static void add_truth(cJSON *list, const bst_io_rows *rows, const bst_view_expos
     if (bst_io_rows_int(rows, 4) != 1) {
         return;
     }
-    cJSON *node = add_object(list);
+    cJSON *node = bst_view_add_object(list);
     cJSON_AddStringToObject(node, "kind", bst_io_rows_text(rows, 1));
     cJSON_AddNumberToObject(node, "id", (double)bst_io_rows_int(rows, 2));
     cJSON_AddNumberToObject(node, "norad", (double)bst_io_rows_int(rows, 3));
@@ -213,7 +208,7 @@ static const char *const detections[2] = {
     " angle_deg, v_mag"};
 
 static void add_detection(cJSON *list, const bst_io_rows *rows, const bst_view_exposure *f) {
-    cJSON *node = add_object(list);
+    cJSON *node = bst_view_add_object(list);
     const double per_area = 1.0 / (f->binning * f->binning);
     cJSON_AddStringToObject(node, "label", bst_io_rows_text(rows, 1));
     cJSON_AddNumberToObject(node, "star_id", (double)bst_io_rows_int(rows, 2));
@@ -234,7 +229,7 @@ static const char *const tracks[2] = {
     " v_mag"};
 
 static void add_track(cJSON *list, const bst_io_rows *rows, const bst_view_exposure *f) {
-    cJSON *node = add_object(list);
+    cJSON *node = bst_view_add_object(list);
     cJSON_AddBoolToObject(node, "now", bst_io_rows_int(rows, 0) == f->id);
     cJSON_AddNumberToObject(node, "id", (double)bst_io_rows_int(rows, 1));
     cJSON_AddStringToObject(node, "status", bst_io_rows_text(rows, 2));
@@ -277,25 +272,6 @@ static bst_status add_recorded_wcs(bst_ctx *ctx, const bst_view_run *run, const 
     return status;
 }
 
-/* Names of the objects, for their numbers in the truth. */
-static void add_names(const bst_view_run *run, cJSON *node) {
-    bst_ctx ignored = {0};
-    bst_io_rows *rows;
-    bool more;
-    cJSON *names = cJSON_AddObjectToObject(node, "names");
-    char sql[80];
-    snprintf(sql, sizeof sql, "SELECT id, name FROM objects LIMIT %d", MARKS_MOST);
-    if (bst_io_rows_open(&ignored, run->reader, sql, 0, 0, &rows) != BST_OK) {
-        return;
-    }
-    while (bst_io_rows_next(&ignored, rows, &more) == BST_OK && more) {
-        char id[24];
-        snprintf(id, sizeof id, "%lld", (long long)bst_io_rows_int(rows, 0));
-        cJSON_AddStringToObject(names, id, bst_io_rows_text(rows, 1));
-    }
-    bst_io_rows_close(rows);
-}
-
 /* Adds the UTC of a time of the run. */
 static void add_utc(const bst_view_run *run, double time_s, cJSON *node) {
     bst_time epoch;
@@ -324,7 +300,6 @@ static bst_status describe_frame(bst_ctx *ctx, bst_view_run *run, bst_view_senso
     if (!cJSON_HasObjectItem(node, "wcs")) {
         BST_TRY(add_recorded_wcs(ctx, run, s, f, node));
     }
-    add_names(run, node);
     const exposure_range now = {f->id, f->id};
     BST_TRY(add_rows(ctx, run, s, f, truth, now, add_truth, cJSON_AddArrayToObject(node, "truth")));
     BST_TRY(add_rows(ctx, run, s, f, detections, now, add_detection,

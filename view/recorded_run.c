@@ -11,6 +11,10 @@
 /* Longest list of exposures; a day of 100 frames a second has 8.6 million. */
 static const size_t EXPOSURES_MOST = 10000000;
 
+/* Work of all queries of a request, steps of SQLite: some 20 s. A panel of a day at 1 Hz needs 3e7.
+ */
+static const int64_t STEPS_MOST = INT64_C(2000000000);
+
 /* Looks at a run that is about to end, after which it was killed. */
 enum { ENDINGS_MOST = 5 };
 
@@ -96,7 +100,7 @@ static bool is_in_progress(bst_view_run *run) {
         cJSON_GetObjectItemCaseSensitive(bst_run_reader_manifest(run->reader), "complete");
     bool ending = run->running && state == BST_RUN_KILLED && cJSON_IsTrue(complete);
     run->endings = ending ? run->endings + 1 : 0;
-    return state == BST_RUN_RUNNING || (ending && run->endings <= ENDINGS_MOST);
+    return run->written || state == BST_RUN_RUNNING || (ending && run->endings <= ENDINGS_MOST);
 }
 
 /* Reads which sensors the run has, and whether it is in progress. */
@@ -116,7 +120,11 @@ static bst_status read_sensors(bst_ctx *ctx, bst_view_run *run) {
 
 bst_status bst_view_lock(bst_ctx *ctx, bst_view_run *run) {
     pthread_mutex_lock(&run->lock);
-    return run->reader ? BST_OK : open_reader(ctx, run);
+    bst_status status = run->reader ? BST_OK : open_reader(ctx, run);
+    if (status == BST_OK) {
+        bst_run_reader_allow(run->reader, STEPS_MOST);
+    }
+    return status;
 }
 
 void bst_view_unlock(bst_view_run *run) {
@@ -149,6 +157,17 @@ bst_status bst_view_run_open(bst_ctx *ctx, const char *path, bst_view_run **out)
     }
     *out = run;
     return BST_OK;
+}
+
+void bst_view_run_set_written(bst_view_run *run, bool written) {
+    pthread_mutex_lock(&run->lock);
+    run->written = written;
+    if (written) { /* its tables stay closed from now on */
+        run->running = true;
+        bst_run_reader_close(run->reader);
+        run->reader = NULL;
+    }
+    pthread_mutex_unlock(&run->lock);
 }
 
 bst_status bst_view_run_refresh(bst_ctx *ctx, bst_view_run *run) {

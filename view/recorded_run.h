@@ -36,6 +36,10 @@ void bst_view_run_close(bst_view_run *run);
  * Errors:    those of bst_view_run_open */
 bst_status bst_view_run_refresh(bst_ctx *ctx, bst_view_run *run) BST_MUST_CHECK;
 
+/* Says whether this process writes the run: it then counts as in progress, also between its parts.
+ */
+void bst_view_run_set_written(bst_view_run *run, bool written);
+
 /* Describes the run: name, state, problems, figures, sensors with their panels.
  *
  * Errors:    those of bst_run_reader_open, while the run is in progress; BST_ERR_MEMORY
@@ -47,6 +51,11 @@ bst_status bst_view_run_describe(bst_ctx *ctx, bst_view_run *run, cJSON **out) B
  * Errors:    BST_ERR_NOT_FOUND: no such sensor; BST_ERR_FORMAT: damaged tables */
 bst_status bst_view_run_modes(bst_ctx *ctx, bst_view_run *run, int64_t sensor,
                               cJSON **out) BST_MUST_CHECK;
+
+/* Names of the objects by their numbers in truth and tracks: {"names": {"0": "ASTRA 1N"}}.
+ *
+ * Errors:    those of bst_run_reader_open, while the run is in progress */
+bst_status bst_view_run_names(bst_ctx *ctx, bst_view_run *run, cJSON **out) BST_MUST_CHECK;
 
 /* Lists the first BST_VIEW_EVENTS events: {"total": N, "events": [{time_s, source, kind, text}]}.
  *

@@ -46,6 +46,7 @@ struct bst_view_run {
     pthread_mutex_t lock;   /* of everything below: readers of tables and files are not shared */
     char path[4096];        /* of the folder, as it was given */
     bst_run_reader *reader; /* NULL between calls while the run is in progress */
+    bool written;           /* by this process, now */
     bool running;           /* it was in progress when its sensors were read */
     int endings;            /* looks in a row at which it was about to end */
     int sensors;

@@ -77,11 +77,15 @@ int bst_view_guard(const bst_view_request *request, const char *token,
     if (!has_token(path, token) || path[BST_VIEW_TOKEN_DIGITS] != '/') {
         return BST_HTTP_FORBIDDEN;
     }
-    if (strcmp(request->method, "GET") != 0 && strcmp(request->method, "HEAD") != 0) {
+    bool post = strcmp(request->method, "POST") == 0;
+    if (!post && strcmp(request->method, "GET") != 0 && strcmp(request->method, "HEAD") != 0) {
         return BST_HTTP_BAD_METHOD;
     }
-    if (request->body_bytes > 0) {
+    if (request->body_bytes > (post ? BST_VIEW_BODY_BYTES : 0)) {
         return BST_HTTP_TOO_LARGE;
+    }
+    if (post && !request->origin) {
+        return BST_HTTP_FORBIDDEN;
     }
     if (!copy_route(path + BST_VIEW_TOKEN_DIGITS + 1, route)) {
         route[0] = '\0';
@@ -148,7 +152,9 @@ bool bst_view_query_real(const char *query, const char *name, double *value) {
     return true;
 }
 
-bool bst_view_query_word(const char *query, const char *name, char *word, size_t bytes) {
+/* Reads a value that has certain characters only. */
+static bool query_text(const char *query, const char *name, const char *allowed, char *word,
+                       size_t bytes) {
     char text[VALUE_BYTES];
     bool found;
     if (!find_value(query, name, text, &found)) {
@@ -158,10 +164,19 @@ bool bst_view_query_word(const char *query, const char *name, char *word, size_t
     if (!found) {
         return true;
     }
-    if (length == 0 || length >= bytes ||
-        strspn(text, "abcdefghijklmnopqrstuvwxyz0123456789_") != length) {
+    if (length == 0 || length >= bytes || strspn(text, allowed) != length) {
         return false;
     }
     memcpy(word, text, length + 1);
     return true;
+}
+
+bool bst_view_query_word(const char *query, const char *name, char *word, size_t bytes) {
+    return query_text(query, name, "abcdefghijklmnopqrstuvwxyz0123456789_", word, bytes);
+}
+
+bool bst_view_query_name(const char *query, const char *name, char *word, size_t bytes) {
+    static const char allowed[] =
+        "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
+    return query_text(query, name, allowed, word, bytes) && word[0] != '.';
 }

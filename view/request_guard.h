@@ -11,6 +11,8 @@
 enum { BST_VIEW_TOKEN_DIGITS = 32 };
 /* Room for a route with the zero byte. */
 enum { BST_VIEW_ROUTE_BYTES = 64 };
+/* Longest body of a POST: a scenario's text. */
+enum { BST_VIEW_BODY_BYTES = 4 << 20 };
 
 /* Statuses of HTTP that the viewer uses (RFC 9110, section 15). */
 enum {
@@ -29,7 +31,7 @@ typedef struct bst_view_request {
     const char *method, *target; /* target: path and query, not decoded */
     const char *host, *origin;
     int hosts, origins; /* number of these headers */
-    int64_t body_bytes; /* of Content-Length; 0 or less: none */
+    int64_t body_bytes; /* of Content-Length; 0 or less: none; INT64_MAX: unknown */
 } bst_view_request;
 
 /* Checks a request and finds its route, the path behind "/TOKEN/".
@@ -40,7 +42,9 @@ typedef struct bst_view_request {
  *            status of HTTP: BST_HTTP_OK, or why the request is refused
  * Notes:     Host must name the loopback interface: a name that an attacker's DNS points there is
  *            refused. The port may be any, as `ssh -L` changes it. Origin must be that of Host, or
- *            missing: browsers send it with every request of a foreign page's script. The time of
+ *            missing: browsers send it with every request of a foreign page's script, and with
+ *            every POST, which needs it. Only POST has a body, of at most BST_VIEW_BODY_BYTES. The
+ *            time of
  *            the comparison does not depend on how many digits of the token are right. */
 int bst_view_guard(const bst_view_request *request, const char *token,
                    char route[BST_VIEW_ROUTE_BYTES]);
@@ -62,5 +66,8 @@ bool bst_view_query_real(const char *query, const char *name, double *value);
  *
  * Given:     bytes  room at `word`, with the zero byte */
 bool bst_view_query_word(const char *query, const char *name, char *word, size_t bytes);
+
+/* Reads a name of a query: letters, digits, "_", "-" and ".", not first, as bst_view_query_word. */
+bool bst_view_query_name(const char *query, const char *name, char *word, size_t bytes);
 
 #endif

@@ -10,14 +10,18 @@
 
 #include <civetweb.h>
 
+#include "view/live_socket.h"
 #include "view/page_files.h"
 #include "view/request_guard.h"
+#include "view/routes.h"
 
 /* Connections that are served at the same time; further ones wait in the queue of the system. A
  * page uses up to 6. Most of the memory of a thread is never touched. */
 #define SERVED_CONNECTIONS "192"
 /* A peer that sends or takes nothing for so long loses its connection, ms. */
 #define IDLE_MS "1500"
+/* The same for a WebSocket, whose client asks again after each answer. */
+#define SOCKET_IDLE_MS "20000"
 /* Longest head of a request, bytes. */
 #define REQUEST_BYTES "8192"
 /* Bytes that are handed to the system at a time: IDLE_MS is counted for each. */
@@ -27,7 +31,9 @@ enum { ANSWERS_MOST = 12 };
 
 struct bst_view_server {
     struct mg_context *http;
-    bst_view_run *run;
+    bst_view_subject *subject;
+    bst_view_live *live;     /* NULL: none */
+    bst_view_socket *socket; /* of `live` */
     char token[BST_VIEW_TOKEN_DIGITS + 1];
     pthread_mutex_t lock; /* of `answers` */
     int answers;
@@ -144,101 +150,53 @@ static answer page_file(const char *route) {
 
 /* ------------------------------------------------------------------ data */
 
-/* What a request for data asks for and gets. */
-typedef struct data_request {
-    int64_t sensor, frame, columns;
-    double from_s, to_s;
-    char panel[32];
-    cJSON *json;
-    bst_view_bytes bytes;
-} data_request;
-
-static bool read_query(const char *query, data_request *r) {
-    const int64_t most = INT64_C(1) << 40;
-    return bst_view_query_int(query, "sensor", 0, most, &r->sensor) &&
-           bst_view_query_int(query, "frame", 0, most, &r->frame) &&
-           bst_view_query_int(query, "columns", 1, BST_VIEW_COLUMNS, &r->columns) &&
-           bst_view_query_real(query, "from", &r->from_s) &&
-           bst_view_query_real(query, "to", &r->to_s) &&
-           bst_view_query_word(query, "panel", r->panel, sizeof r->panel);
+/* Reads the body of a request. NULL: it is longer than allowed, or ends early. */
+static char *read_body(struct mg_connection *peer, int64_t bytes) {
+    char *body = bytes >= 0 && bytes <= BST_VIEW_BODY_BYTES ? malloc((size_t)bytes + 1) : NULL;
+    for (int64_t got = 0; body && got < bytes;) {
+        int n = mg_read(peer, body + got, (size_t)(bytes - got));
+        if (n <= 0) {
+            free(body);
+            return NULL;
+        }
+        got += n;
+    }
+    if (body) {
+        body[bytes] = '\0';
+    }
+    return body;
 }
 
-static bst_status get_run(bst_ctx *ctx, bst_view_run *run, data_request *r) {
-    return bst_view_run_describe(ctx, run, &r->json);
-}
-
-static bst_status get_refreshed(bst_ctx *ctx, bst_view_run *run, data_request *r) {
-    BST_TRY(bst_view_run_refresh(ctx, run));
-    return bst_view_run_describe(ctx, run, &r->json);
-}
-
-static bst_status get_events(bst_ctx *ctx, bst_view_run *run, data_request *r) {
-    return bst_view_run_events(ctx, run, &r->json);
-}
-
-static bst_status get_modes(bst_ctx *ctx, bst_view_run *run, data_request *r) {
-    return bst_view_run_modes(ctx, run, r->sensor, &r->json);
-}
-
-static bst_status get_frames(bst_ctx *ctx, bst_view_run *run, data_request *r) {
-    return bst_view_run_frames(ctx, run, r->sensor, &r->bytes);
-}
-
-static bst_status get_frame(bst_ctx *ctx, bst_view_run *run, data_request *r) {
-    return bst_view_run_frame(ctx, run, r->sensor, r->frame, &r->json);
-}
-
-static bst_status get_pixels(bst_ctx *ctx, bst_view_run *run, data_request *r) {
-    return bst_view_run_pixels(ctx, run, r->sensor, r->frame, &r->bytes);
-}
-
-static bst_status get_plot(bst_ctx *ctx, bst_view_run *run, data_request *r) {
-    const bst_view_plot plot = {r->sensor, r->panel, r->from_s, r->to_s, (int)r->columns};
-    return bst_view_run_plot(ctx, run, &plot, &r->bytes);
-}
-
-static const struct {
-    const char *route;
-    bst_status (*get)(bst_ctx *ctx, bst_view_run *run, data_request *r);
-} data_routes[] = {{"api/run", get_run},       {"api/refresh", get_refreshed},
-                   {"api/events", get_events}, {"api/modes", get_modes},
-                   {"api/frames", get_frames}, {"api/frame", get_frame},
-                   {"api/pixels", get_pixels}, {"api/plot", get_plot}};
-enum { DATA_ROUTES = sizeof data_routes / sizeof *data_routes };
-
-static int status_of(bst_status status) {
-    return status == BST_OK              ? BST_HTTP_OK
-           : status == BST_ERR_NOT_FOUND ? BST_HTTP_NOT_FOUND
-           : status == BST_ERR_ARGUMENT  ? BST_HTTP_BAD_REQUEST
-                                         : BST_HTTP_FAILED;
-}
-
-/* Answers a request for data with what the run has. */
-static void answer_data(struct mg_connection *peer, bst_view_server *server, int route,
-                        const char *query, bool head_only) {
+/* Answers a request for data. */
+static int answer_data(struct mg_connection *peer, bst_view_server *server,
+                       const bst_view_route *route, bool head_only) {
+    const struct mg_request_info *info = mg_get_request_info(peer);
     bst_ctx ctx = {0};
-    data_request r = {.columns = 1000, .to_s = 1.0};
+    bst_view_exchange x = {.subject = server->subject, .live = server->live};
     answer a = refusal(BST_HTTP_BAD_REQUEST);
-    char *text = NULL;
-    if (read_query(query, &r)) {
-        bst_status status = data_routes[route].get(&ctx, server->run, &r);
-        text = r.json ? cJSON_PrintUnformatted(r.json) : NULL;
-        if (status != BST_OK) {
-            a = text_answer(status_of(status), ctx.message);
-        } else if (r.json && !text) {
+    char *text = NULL, *body = route->post ? read_body(peer, info->content_length) : NULL;
+    x.body = body;
+    if (bst_view_exchange_read(info->query_string, &x) && (body || !route->post)) {
+        int status = bst_view_route_call(&ctx, route, &x);
+        text = x.json ? cJSON_PrintUnformatted(x.json) : NULL;
+        if (status != BST_HTTP_OK) {
+            a = text_answer(status, ctx.message);
+        } else if (x.json && !text) {
             a = refusal(BST_HTTP_FAILED);
         } else if (text) {
             a = (answer){BST_HTTP_OK, "application/json; charset=utf-8", text, strlen(text), 0, 0};
         } else {
-            a = (answer){BST_HTTP_OK,   "application/octet-stream",
-                         r.bytes.data,  r.bytes.bytes,
-                         r.bytes.width, r.bytes.height};
+            a = (answer){BST_HTTP_OK,   x.type ? x.type : "application/octet-stream",
+                         x.bytes.data,  x.bytes.bytes,
+                         x.bytes.width, x.bytes.height};
         }
     }
-    cJSON_Delete(r.json);
+    cJSON_Delete(x.json);
     send_answer(peer, &a, head_only);
     cJSON_free(text);
-    free(r.bytes.data);
+    free(x.bytes.data);
+    free(body);
+    return a.status;
 }
 
 /* Counts the answers in memory. False: there are too many. */
@@ -281,8 +239,9 @@ static int on_request(struct mg_connection *peer) {
     request.host = header_of(info, "Host", &request.hosts);
     request.origin = header_of(info, "Origin", &request.origins);
     const char *length = header_of(info, "Content-Length", &lengths);
-    if (header_of(info, "Transfer-Encoding", &coded) || (length && strcmp(length, "0") != 0)) {
-        request.body_bytes = 1; /* a body, or one of unknown length */
+    request.body_bytes = length ? info->content_length : 0;
+    if (header_of(info, "Transfer-Encoding", &coded) || lengths > 1) {
+        request.body_bytes = INT64_MAX; /* of unknown length */
     }
     /* headers beyond the library's list are not seen */
     int status = info->num_headers < MG_MAX_HEADERS ? bst_view_guard(&request, server->token, route)
@@ -293,17 +252,26 @@ static int on_request(struct mg_connection *peer) {
         send_answer(peer, &a, head_only);
         return status;
     }
-    for (int i = 0; i < DATA_ROUTES; i++) {
-        if (strcmp(route, data_routes[i].route) == 0) {
-            if (!begin_answer(server)) {
-                answer busy = refusal(BST_HTTP_BUSY);
-                send_answer(peer, &busy, head_only);
-                return BST_HTTP_BUSY;
-            }
-            answer_data(peer, server, i, info->query_string, head_only);
-            end_answer(server);
-            return BST_HTTP_OK;
+    int upgrades;
+    if (server->live && strcmp(route, "live") == 0 && request.origin &&
+        header_of(info, "Upgrade", &upgrades)) {
+        return 0; /* the library goes on with its WebSocket */
+    }
+    const bst_view_route *data = bst_view_route_find(route);
+    if ((data && data->post) != (strcmp(request.method, "POST") == 0)) {
+        answer a = refusal(BST_HTTP_BAD_METHOD);
+        send_answer(peer, &a, head_only);
+        return BST_HTTP_BAD_METHOD;
+    }
+    if (data) {
+        if (!begin_answer(server)) {
+            answer busy = refusal(BST_HTTP_BUSY);
+            send_answer(peer, &busy, head_only);
+            return BST_HTTP_BUSY;
         }
+        status = answer_data(peer, server, data, head_only);
+        end_answer(server);
+        return status;
     }
     answer a = page_file(route);
     send_answer(peer, &a, head_only);
@@ -339,8 +307,8 @@ static bst_status draw_token(bst_ctx *ctx, char token[BST_VIEW_TOKEN_DIGITS + 1]
     return BST_OK;
 }
 
-bst_status bst_view_server_start(bst_ctx *ctx, bst_view_run *run, int port,
-                                 char url[BST_VIEW_URL_BYTES], bst_view_server **out) {
+bst_status bst_view_server_start(bst_ctx *ctx, bst_view_subject *subject, bst_view_live *live,
+                                 int port, char url[BST_VIEW_URL_BYTES], bst_view_server **out) {
     bst_view_server *server = calloc(1, sizeof *server);
     char ports[32];
     *out = NULL;
@@ -348,7 +316,8 @@ bst_status bst_view_server_start(bst_ctx *ctx, bst_view_run *run, int port,
         free(server);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the server");
     }
-    server->run = run;
+    server->subject = subject;
+    server->live = live;
     bst_status status = draw_token(ctx, server->token);
     snprintf(ports, sizeof ports, "127.0.0.1:%d", port);
     const char *options[] = {"listening_ports",
@@ -369,6 +338,8 @@ bst_status bst_view_server_start(bst_ctx *ctx, bst_view_run *run, int port,
                              "512",
                              "connection_queue",
                              "512",
+                             "websocket_timeout_ms",
+                             SOCKET_IDLE_MS,
                              "enable_directory_listing",
                              "no",
                              "access_control_list",
@@ -393,6 +364,15 @@ bst_status bst_view_server_start(bst_ctx *ctx, bst_view_run *run, int port,
         bst_view_server_stop(server);
         return status;
     }
+    if (live) {
+        char uri[BST_VIEW_TOKEN_DIGITS + 16];
+        snprintf(uri, sizeof uri, "/%s/live", server->token);
+        status = bst_view_socket_open(ctx, server->http, uri, live, &server->socket);
+        if (status != BST_OK) {
+            bst_view_server_stop(server);
+            return status;
+        }
+    }
     snprintf(url, BST_VIEW_URL_BYTES, "http://127.0.0.1:%d/%s/", opened.port, server->token);
     *out = server;
     return BST_OK;
@@ -405,6 +385,7 @@ void bst_view_server_stop(bst_view_server *server) {
     if (server->http) {
         mg_stop(server->http);
     }
+    bst_view_socket_free(server->socket);
     pthread_mutex_destroy(&server->lock);
     free(server);
 }

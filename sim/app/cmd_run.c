@@ -8,35 +8,38 @@
 #include "sim/cli/load.h"
 #include "sim/cli/stop_signals.h"
 #include "sim/run/run_link.h"
+#include "sim/run/run_parts.h"
 #include "sim/run/run_scenario.h"
+#include "view/attach.h"
 
 static const char help_text[] =
     "usage: boresight run SCENARIO.json [options]\n"
-    "\n"
-    "Runs a scenario and writes its results to a folder: frames.fits (opens in ds9), run.sqlite\n"
+    "\nRuns a scenario and writes its results to a folder: frames.fits (opens in ds9), run.sqlite\n"
     "(truth, detections, tracks, commands, telemetry, events), manifest.json, quicklook.png,\n"
     "pointing.png. While it runs the folder is called OUT.partial. Ctrl-C closes the run "
     "properly,\n"
-    "a second one ends it at once.\n"
-    "\n"
+    "a second one ends it at once.\n\n"
     "  boresight run scenarios/neossat_geo_track.json --out runs/demo\n"
     "  boresight run scenarios/neossat_geo_track.json --duration 60 --set /record/frames=none\n"
-    "\n"
-    "options:\n";
+    "\noptions:\n";
 
 typedef struct run_request {
     bst_load_options load;
     bst_simulation_options simulation;
     bst_run_saving saving;
-    const char *out, *replay;
+    const char *path, *out, *replay;
     int64_t threads;
-    bool help, overwrite, quiet, serial, force;
+    bool help, overwrite, quiet, serial, force, view;
 } run_request;
 
 /* Creates the simulation and runs it. */
 static bst_status create_and_run(bst_ctx *ctx, run_request *r, const bst_json *json,
                                  const bst_scenario *scenario, bst_simulation **sim,
                                  bst_run_request *request) {
+    if (scenario->changes.count > 0) {
+        return bst_run_parts_file(ctx, r->path, &r->load, &r->simulation, bst_check_rules_apply,
+                                  request);
+    }
     BST_TRY(bst_run_restored_read(ctx, scenario, &r->saving, request->out, r->replay != NULL,
                                   &r->simulation, &request->restored));
     bst_status status = bst_simulation_create(ctx, scenario, &r->simulation, sim);
@@ -60,33 +63,24 @@ static bst_status run_loaded(bst_ctx *ctx, run_request *r, const bst_json *json,
                                .print = true,
                                .saving = &r->saving};
     bst_simulation *sim = NULL;
-    bst_status status = create_and_run(ctx, r, json, scenario, &sim, &request);
+    bst_view_attached *page = NULL;
+    bst_status status = r->view ? bst_view_attach(ctx, scenario, request.out, &page) : BST_OK;
+    request.steering = bst_view_attached_steering(page);
+    status = status == BST_OK ? create_and_run(ctx, r, json, scenario, &sim, &request) : status;
     if (status != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
     }
     bst_run_link_end(sim, status, ctx->message);
     bst_simulation_free(sim);
     bst_run_restored_free(request.restored);
+    bst_view_detach(page);
     return status;
 }
 
 #define FIELD(member) .offset = offsetof(run_request, member)
 
 static const bst_option OPTIONS[] = {
-    {.name = "out",
-     .kind = BST_OPTION_TEXT,
-     .offset = offsetof(run_request, out),
-     .path = BST_PATH_OUTPUT_FOLDER,
-     .argument = "FOLDER",
-     .doc = "where the results go (default runs/NAME)"},
-    {.name = "overwrite",
-     .kind = BST_OPTION_FLAG,
-     .offset = offsetof(run_request, overwrite),
-     .doc = "replace an earlier run there"},
-    {.name = "force",
-     .kind = BST_OPTION_FLAG,
-     .offset = offsetof(run_request, force),
-     .doc = "start although the frames will take more space than is free"},
+    BST_RUN_FOLDER_OPTIONS_AT(FIELD, out, overwrite, force),
     BST_RUN_SAVING_OPTIONS_AT(FIELD, saving),
     BST_LINK_OPTIONS_AT(FIELD, load),
     {.name = "replay",
@@ -101,6 +95,10 @@ static const bst_option OPTIONS[] = {
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(run_request, serial),
      .doc = "do not process and record beside the simulation; the results are the same"},
+    {.name = "view",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(run_request, view),
+     .doc = "show the run in the browser until its end, at an address that is printed"},
     {.name = "quiet",
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(run_request, quiet),
@@ -142,6 +140,7 @@ int bst_cmd_run(int argc, char **argv) {
         return BST_EXIT_FAILED;
     }
     bst_stop_catch_signals();
+    r.path = argv[1];
     bst_status status = run_loaded(&ctx, &r, json, &scenario);
     bst_scenario_free(&scenario);
     bst_json_free(json);

@@ -1,85 +1,85 @@
-/* boresight view: shows a run in the browser. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <time.h>
-
+/* boresight view: shows a run in the browser, recorded or live. */
+#include "sim/analysis/check/scenario_rules.h"
 #include "sim/app/app.h"
 #include "sim/cli/command_line.h"
-#include "sim/cli/stop_signals.h"
-#include "view/browser.h"
-#include "view/server.h"
+#include "view/session.h"
 
 static const char help_text[] =
-    "usage: boresight view RUN [options]\n"
+    "usage: boresight view [RUN | SCENARIO.json] [options]\n"
     "\n"
-    "Shows the folder of a run in the browser: frames with truth, detections and tracks, plots "
-    "over "
-    "time, events.\n"
+    "Shows a run in the browser: frames with truth, detections and tracks, plots over time, "
+    "events.\n"
+    "\n"
+    "  boresight view runs/demo                           plays a recorded run back\n"
+    "  boresight view scenarios/neossat_geo_track.json    runs it live: pause, step, change, "
+    "rewind, branch\n"
+    "  boresight view                                     shipped scenarios and the runs in runs/\n"
+    "\n"
     "The page comes from this program and needs no network. It is for this machine only, and only "
     "for those who\n"
     "have the address that is printed. Folders of interrupted and killed runs are shown, too; "
     "nothing in them is\n"
-    "changed. Ctrl-C ends it.\n"
+    "changed. A live run is recorded with its changes: boresight run repeats it from the "
+    "scenario.json of its folder.\n"
+    "Ctrl-C ends it.\n"
     "\n"
-    "  boresight view runs/demo\n"
-    "  boresight view runs/demo --no-browser --port 8080\n"
-    "\n"
-    "Exit code: 0; 1 when the folder is not a run's, or the port is in use; 2 wrong usage.\n"
+    "Exit code: 0; 1 when the folder is not a run's, the scenario cannot run, or the port is in "
+    "use; 2 wrong usage.\n"
     "\n"
     "options:\n";
 
-/* Serves a run until a signal asks for the end. */
-static bst_status serve(bst_ctx *ctx, const char *folder, int port, bool browser) {
-    bst_view_run *run;
-    bst_view_server *server;
-    char url[BST_VIEW_URL_BYTES];
-    BST_TRY(bst_view_run_open(ctx, folder, &run));
-    bst_stop_catch_signals();
-    bst_status status = bst_view_server_start(ctx, run, port, url, &server);
-    if (status == BST_OK) {
-        printf("%s\nCtrl-C ends it.\n", url);
-        fflush(stdout);
-        if (browser) {
-            bst_view_open_browser(url);
-        }
-        while (!bst_stop_requested()) {
-            nanosleep(&(struct timespec){.tv_nsec = 200000000}, NULL);
-        }
-        bst_view_server_stop(server);
-    }
-    bst_view_run_close(run);
-    return status;
-}
+#define FIELD(member) .offset = offsetof(bst_view_session, member)
+
+static const bst_option OPTIONS[] = {
+    {.name = "no-browser",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(bst_view_session, no_browser),
+     .doc = "only print the address"},
+    {.name = "port",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(bst_view_session, port),
+     .argument = "N",
+     .doc = "TCP port on 127.0.0.1 (default 0: any free one)",
+     .minimum = 0,
+     .maximum = 65535},
+    {.name = "out",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(bst_view_session, out),
+     .path = BST_PATH_OUTPUT_FOLDER,
+     .argument = "FOLDER",
+     .doc = "live: where the run is recorded (default runs/NAME-live, with a free number)"},
+    {.name = "overwrite",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(bst_view_session, overwrite),
+     .doc = "live: replace an earlier run there"},
+    BST_LOAD_OPTIONS_AT(FIELD, load),
+    BST_DEVICE_OPTIONS_AT(FIELD, device, threads),
+    {.name = "help",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(bst_view_session, help),
+     .doc = "print this"},
+    {.name = NULL},
+};
 
 int bst_cmd_view(int argc, char **argv) {
-    bool help = false, no_browser = false;
-    int64_t port = 0;
-    const bst_option table[] = {
-        {.name = "no-browser",
-         .kind = BST_OPTION_FLAG,
-         .target = &no_browser,
-         .doc = "only print the address"},
-        {.name = "port",
-         .kind = BST_OPTION_INT,
-         .target = &port,
-         .argument = "N",
-         .doc = "TCP port on 127.0.0.1 (default 0: any free one)",
-         .minimum = 0,
-         .maximum = 65535},
-        {.name = "help", .kind = BST_OPTION_FLAG, .target = &help, .doc = "print this"},
-        {.name = NULL},
-    };
+    bst_view_session r = {.load = BST_LOAD_DEFAULTS, .check = bst_check_rules_apply};
+    bst_option table[sizeof OPTIONS / sizeof *OPTIONS];
+    bst_options_bind(OPTIONS, &r, table);
     bst_ctx ctx;
     bst_ctx_init(&ctx, bst_cli_log, NULL, BST_LOG_WARNING);
-    const bst_command_line line = {"view", help_text, table, &help};
+    const bst_command_line line = {"view", help_text, table, &r.help};
     int arguments = 0, code = BST_EXIT_OK;
     if (!bst_command_line_read(&ctx, &line, argc, argv, &arguments, &code)) {
         return code;
     }
-    if (arguments != 1) {
-        bst_fail(&ctx, BST_ERR_ARGUMENT, "one folder of a run is expected, %d were given",
+    if (arguments > 1) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT,
+                 "one folder of a run, one scenario file, or none is expected, %d were given",
                  arguments);
         return bst_options_misuse(&ctx, "view");
     }
-    return bst_command_line_end(&ctx, serve(&ctx, argv[1], (int)port, !no_browser));
+    if (bst_load_check(&ctx, &r.load, table) != BST_OK) {
+        return bst_options_misuse(&ctx, "view");
+    }
+    return bst_command_line_end(&ctx, bst_view_serve(&ctx, &r, arguments == 1 ? argv[1] : NULL));
 }

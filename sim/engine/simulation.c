@@ -316,6 +316,12 @@ static bst_status take_shared(bst_ctx *ctx, const bst_scenario *scenario,
 /* Takes what is shared and creates the module instances of the simulation. */
 static bst_status build(bst_ctx *ctx, const bst_scenario *scenario,
                         const bst_simulation_options *options, bst_simulation *sim) {
+    if (scenario->changes.count > 0 && !options->changes_made && !options->never_steps) {
+        return bst_fail(
+            ctx, BST_ERR_CONFIG,
+            "/changes: only boresight run and boresight view make changes during a run: "
+            "leave them out here");
+    }
     sim->run = options->other_run ? options->run : (uint64_t)scenario->run;
     sim->never_steps = options->never_steps;
     BST_TRY(take_shared(ctx, scenario, options, sim));

@@ -20,8 +20,9 @@ typedef struct bst_simulation_options {
     /* world, knowledge and device of this scenario (sim/engine/shared_model.h), which must outlive
      * the simulation; NULL: the simulation creates its own, with `device` and `threads` */
     const struct bst_shared_model *shared;
-    bool never_steps; /* it is only looked at: kernels are not compiled */
-    bool other_run;   /* `run` replaces the scenario's number of the run */
+    bool never_steps;  /* it is only looked at: kernels are not compiled */
+    bool changes_made; /* the caller makes the scenario's `changes`; false: they are refused */
+    bool other_run;    /* `run` replaces the scenario's number of the run */
     uint64_t run;
     /* NULL, or restores a state after the modules are created and before the engine gets its
      * threads */

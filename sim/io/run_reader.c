@@ -21,6 +21,7 @@ struct bst_run_reader {
     char folder[BST_RUN_PATH_BYTES];
     bst_run_state state;
     bst_json *manifest, *scenario;
+    int64_t steps_left;   /* of bst_run_reader_allow */
     const char *database; /* file name in the folder; a literal */
     sqlite3 *db;
     bool has_epoch;
@@ -366,7 +367,30 @@ bool bst_run_reader_has_tables(const bst_run_reader *reader) {
     return reader->db != NULL;
 }
 
+/* Steps of SQLite between two looks at the limit. */
+enum { STEPS_AT_A_TIME = 10000 };
+
+/* Counts the work of queries; 1 ends the one in progress. */
+static int count_steps(void *user) {
+    bst_run_reader *reader = user;
+    reader->steps_left -= STEPS_AT_A_TIME;
+    return reader->steps_left < 0;
+}
+
+void bst_run_reader_allow(bst_run_reader *reader, int64_t steps) {
+    reader->steps_left = steps;
+    if (reader->db) {
+        sqlite3_progress_handler(reader->db, steps > 0 ? STEPS_AT_A_TIME : 0,
+                                 steps > 0 ? count_steps : NULL, reader);
+    }
+}
+
 static bst_status fail_sql(bst_ctx *ctx, const bst_run_reader *reader) {
+    if (sqlite3_errcode(reader->db) == SQLITE_INTERRUPT) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "%s/%s: a query takes too long: the tables are not as a run writes them",
+                        reader->folder, reader->database);
+    }
     return bst_fail(ctx, BST_ERR_FORMAT, "%s/%s: %s", reader->folder, reader->database,
                     sqlite3_errmsg(reader->db));
 }

@@ -60,6 +60,12 @@ bool bst_run_reader_epoch(const bst_run_reader *reader, bst_time *epoch);
 bst_status bst_run_reader_file(bst_ctx *ctx, const bst_run_reader *reader, const char *name,
                                char *buffer, size_t bytes) BST_MUST_CHECK;
 
+/* Limits the work of all queries from now on until the next call, so that tables of others cannot
+ * keep the program busy for ever. A query beyond it fails with BST_ERR_FORMAT.
+ *
+ * Given:     steps  of SQLite's virtual machine, about 1e8 in a second; 0: no limit */
+void bst_run_reader_allow(bst_run_reader *reader, int64_t steps);
+
 /* A query on the run's tables, row by row, in constant memory. */
 typedef struct bst_io_rows bst_io_rows;
 

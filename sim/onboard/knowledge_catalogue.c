@@ -107,13 +107,31 @@ bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int ob
 
 bool bst_knowledge_view_task(bst_knowledge_view *view, const bst_task *task) {
     if (!task || task->id == view->task.id) {
-        return false;
+        const bool changed = view->cue_changed && !view->tasked;
+        view->cue_changed = false;
+        return changed;
     }
     view->task = *task;
     view->tasked = task->object >= 0 && task->object < view->knowledge->world->object_count;
     view->any_checked = false;
     memset(view->knots, 0, sizeof view->knots);
     return true;
+}
+
+/* Archives what the scenario's cue is, and forgets what was computed for another one. */
+static void archive_own_cue(bst_knowledge_view *view, bst_archive *archive) {
+    const bst_knowledge *k = view->knowledge;
+    const int64_t own = k->world->observers[k->observer].sensors[k->sensor].cue_object;
+    const bst_quat own_error = view->cue_error;
+    int64_t object = own;
+    bst_quat error = own_error;
+    BST_ARCHIVE(archive, object);
+    BST_ARCHIVE(archive, error);
+    view->cue_changed = object != own || memcmp(&error, &own_error, sizeof error) != 0;
+    if (view->cue_changed) {
+        view->any_checked = false;
+        memset(view->knots, 0, sizeof view->knots);
+    }
 }
 
 void bst_knowledge_view_archive(bst_knowledge_view *view, bst_archive *archive) {
@@ -135,4 +153,5 @@ void bst_knowledge_view_archive(bst_knowledge_view *view, bst_archive *archive) 
     bst_archive_bool(archive, &view->any_checked);
     bst_archive_bool(archive, &view->smooth);
     BST_ARCHIVE(archive, view->cued);
+    archive_own_cue(view, archive);
 }

@@ -35,8 +35,9 @@ struct bst_knowledge_view {
     int64_t checked;
     bool any_checked, smooth;
     bst_vec3 cued[BST_QUINTIC_POINTS];
-    bst_task task; /* latest task */
-    bool tasked;   /* the task's object is the cue, without cue error */
+    bst_task task;    /* latest task */
+    bool tasked;      /* the task's object is the cue, without cue error */
+    bool cue_changed; /* since the state was saved: the view was not asked yet */
 };
 
 /* Onboard time, and the estimated observer state. */

@@ -25,7 +25,8 @@ double bst_run_simulated_s(const bst_run_execution *run) {
 
 bst_run_pixels bst_run_pixels_of(const bst_run_execution *run, const bst_run_sensor_watch *sensor) {
     return (bst_run_pixels){
-        .recorded = run->recorder && run->scenario->record.frames != BST_RECORD_NO_FRAMES,
+        .recorded = (run->recorder && run->scenario->record.frames != BST_RECORD_NO_FRAMES) ||
+                    (run->steering && run->steering->message),
         .pictured = sensor->pictures != NULL,
         .duration_ticks = run->end_tick};
 }

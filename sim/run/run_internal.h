@@ -41,7 +41,10 @@ typedef struct bst_run_execution {
     int64_t save_ticks;           /* between saved states; 0: none is saved */
     double most_s;                /* limit of stepping time; 0: none */
     bool cut;                     /* the limit was reached */
-    bst_run_sightings *sightings; /* NULL: not requested */
+    const bst_run_request *request;
+    const bst_run_steering *steering; /* NULL: none */
+    bool part_ended;                  /* by BST_RUN_PART */
+    bst_run_sightings *sightings;     /* NULL: not requested */
     bool progress;
     double earlier_s;      /* wall time of stepping before start_tick, since begin_tick */
     double started, shown; /* wall seconds */

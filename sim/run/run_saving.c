@@ -1,5 +1,6 @@
 #include "sim/run/run_saving.h"
 
+#include <assert.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,7 +16,8 @@
 
 struct bst_run_restored {
     const char *path;
-    char *bytes;
+    const char *bytes;
+    char *own; /* `bytes` of a file; else NULL */
     size_t size;
     bst_state_head head;
     bst_archive *archive; /* of the recording, after the simulation is restored */
@@ -34,7 +36,7 @@ static bst_status restore(bst_ctx *ctx, bst_simulation *sim, void *user) {
 void bst_run_restored_free(bst_run_restored *r) {
     if (r) {
         bst_archive_free(r->archive);
-        free(r->bytes);
+        free(r->own);
         free(r);
     }
 }
@@ -83,7 +85,8 @@ static bst_status read_state(bst_ctx *ctx, const bst_scenario *scenario, const c
                              bst_run_restored *r) {
     char digest[BST_SHA256_TEXT];
     BST_TRY(bst_scenario_digest(ctx, scenario, digest));
-    BST_TRY(bst_state_file_read(ctx, r->path, &r->bytes, &r->size));
+    BST_TRY(bst_state_file_read(ctx, r->path, &r->own, &r->size));
+    r->bytes = r->own;
     bst_status status = bst_state_head_read(ctx, r->bytes, r->size, digest, &r->head);
     if (status == BST_OK) {
         status = check_state(ctx, scenario, out, r);
@@ -131,6 +134,24 @@ bst_status bst_run_restored_read(bst_ctx *ctx, const bst_scenario *scenario,
         bst_run_restored_free(r);
         return status;
     }
+    options->restore = restore;
+    options->restore_user = r;
+    *restored = r;
+    return BST_OK;
+}
+
+bst_status bst_run_restored_take(bst_ctx *ctx, const void *bytes, size_t size,
+                                 bst_simulation_options *options, bst_run_restored **restored) {
+    bst_run_restored *r = calloc(1, sizeof *r);
+    *restored = NULL;
+    if (!r) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a saved state");
+    }
+    assert(size >= sizeof r->head);
+    r->path = "the state of the run";
+    r->bytes = bytes;
+    r->size = size;
+    memcpy(&r->head, bytes, sizeof r->head);
     options->restore = restore;
     options->restore_user = r;
     *restored = r;
@@ -296,19 +317,27 @@ bst_status bst_run_resume(bst_run_execution *run, bst_run_restored *restored) {
 
 /* ---- stepping ---- */
 
-/* Saves the state of simulation and recording. `tick`: modules due earlier have stepped. */
-static bst_status save(bst_run_execution *run, bst_ctx *ctx, int64_t tick) {
-    char digest[BST_SHA256_TEXT], path[4200];
-    void *bytes;
-    size_t size;
-    BST_TRY(bst_run_file(ctx, run->store, BST_RUN_STATE, path, sizeof path));
+/* Saves the state of simulation and recording to memory. `tick`: modules due earlier have stepped.
+ */
+static bst_status save_bytes(bst_run_execution *run, bst_ctx *ctx, int64_t tick, void **bytes,
+                             size_t *size) {
+    char digest[BST_SHA256_TEXT];
     BST_TRY(bst_scenario_digest(ctx, run->scenario, digest));
     const bst_state_origin origin = {.digest = digest,
                                      .seed = run->scenario->seed,
                                      .tick = tick,
                                      .recording = archive_recording,
                                      .user = run};
-    BST_TRY(bst_simulation_save(ctx, run->sim, &origin, &bytes, &size));
+    return bst_simulation_save(ctx, run->sim, &origin, bytes, size);
+}
+
+/* Saves the state to the run's folder. */
+static bst_status save(bst_run_execution *run, bst_ctx *ctx, int64_t tick) {
+    char path[4200];
+    void *bytes;
+    size_t size;
+    BST_TRY(bst_run_file(ctx, run->store, BST_RUN_STATE, path, sizeof path));
+    BST_TRY(save_bytes(run, ctx, tick, &bytes, &size));
     bst_status status = bst_state_file_write(ctx, path, bytes, size);
     free(bytes);
     return status;
@@ -329,8 +358,51 @@ static void save_interrupted(bst_run_execution *run) {
     (void)status; /* that of the run already */
 }
 
+/* Steps as the steering says. */
+static bst_status advance_steered(bst_run_execution *run) {
+    const bst_run_steering *steering = run->steering;
+    bst_engine *engine = bst_simulation_engine(run->sim);
+    bst_status status = BST_OK;
+    int64_t tick = run->start_tick;
+    while (status == BST_OK && tick < run->end_tick) {
+        int64_t until = run->end_tick;
+        bst_run_action action = steering->next(steering->user, tick, &until);
+        if (action == BST_RUN_END) {
+            run->end_tick = tick;
+        } else if (action == BST_RUN_ADVANCE) {
+            until = until < run->end_tick ? until : run->end_tick;
+            status = bst_engine_advance(run->ctx, engine, until);
+            tick = until;
+        } else {
+            void *bytes;
+            size_t size;
+            status = save_bytes(run, run->ctx, tick, &bytes, &size);
+            if (status == BST_OK) {
+                steering->saved(steering->user, tick, bytes, size);
+                run->part_ended = action == BST_RUN_PART;
+            }
+            if (run->part_ended) {
+                return bst_fail(run->ctx, BST_ERR_INTERRUPTED, "a part of the run has ended");
+            }
+        }
+    }
+    if (status != BST_OK && status != BST_ERR_INTERRUPTED) {
+        return status;
+    }
+    bst_ctx finishing = *run->ctx;
+    bst_status finished = bst_engine_finish(&finishing, engine);
+    if (finished != BST_OK) {
+        *run->ctx = finishing;
+        return finished;
+    }
+    return status;
+}
+
 bst_status bst_run_advance(bst_run_execution *run) {
     bst_engine *engine = bst_simulation_engine(run->sim);
+    if (run->steering && run->steering->next) {
+        return advance_steered(run);
+    }
     if (run->save_ticks == 0) {
         return bst_engine_run(run->ctx, engine, run->end_tick);
     }

@@ -11,6 +11,23 @@ typedef struct bst_run_saving {
     const char *restore; /* file of the state to begin from; NULL: the start */
 } bst_run_saving;
 
+/* Option entries for the folder of a run: const char *out, bool overwrite_ and force_. */
+#define BST_RUN_FOLDER_OPTIONS_AT(PLACE, out_, overwrite_, force_)           \
+    {.name = "out",                                                          \
+     .kind = BST_OPTION_TEXT,                                                \
+     PLACE(out_),                                                            \
+     .path = BST_PATH_OUTPUT_FOLDER,                                         \
+     .argument = "FOLDER",                                                   \
+     .doc = "where the results go (default runs/NAME)"},                     \
+        {.name = "overwrite",                                                \
+         .kind = BST_OPTION_FLAG,                                            \
+         PLACE(overwrite_),                                                  \
+         .doc = "replace an earlier run there"},                             \
+    {                                                                        \
+        .name = "force", .kind = BST_OPTION_FLAG, PLACE(force_),             \
+        .doc = "start although the frames will take more space than is free" \
+    }
+
 /* Option entries that fill a bst_run_saving; PLACE as in BST_LOAD_OPTIONS_AT. */
 #define BST_RUN_SAVING_OPTIONS_AT(PLACE, saving)                                                   \
     {.name = "until",                                                                              \
@@ -47,6 +64,15 @@ typedef struct bst_run_restored bst_run_restored;
  * Ownership: free *restored with bst_run_restored_free */
 bst_status bst_run_restored_read(bst_ctx *ctx, const bst_scenario *scenario,
                                  const bst_run_saving *saving, const char *out, bool replay,
+                                 bst_simulation_options *options,
+                                 bst_run_restored **restored) BST_MUST_CHECK;
+/* Begins from a state that bst_run_steering.saved has got. The scenario may have changed.
+ *
+ * Given:     bytes     [size] outlives *restored
+ *            options   as bst_run_restored_read
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *restored with bst_run_restored_free */
+bst_status bst_run_restored_take(bst_ctx *ctx, const void *bytes, size_t size,
                                  bst_simulation_options *options,
                                  bst_run_restored **restored) BST_MUST_CHECK;
 /* Frees a saved state; NULL is allowed. */

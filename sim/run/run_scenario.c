@@ -88,6 +88,11 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
                              const void *payload, int64_t tick) {
     bst_run_execution *run = user;
     bst_run_sensor_watch *sensor = find_sensor(run, scope);
+    const bst_run_steering *steering = run->steering;
+    if (steering && steering->message) {
+        BST_TRY(steering->message(steering->user, &run->hooks, (int)(sensor - run->sensors),
+                                  channel, payload, tick));
+    }
     if (run->recorder && bst_recorder_wants(run->recorder, channel)) {
         BST_TRY(bst_recorder_channel(&run->hooks, run->recorder, sensor->recorder_index, channel,
                                      payload, tick));
@@ -162,7 +167,7 @@ static bool interrupted(void *user, int64_t tick) {
     bst_run_execution *run = user;
     show_progress(run, tick, false);
     run->cut = run->most_s > 0.0 && bst_wall_seconds() - run->started > run->most_s;
-    return run->cut || bst_stop_requested();
+    return run->cut || (!(run->steering && run->steering->stops) && bst_stop_requested());
 }
 
 /* Prints losses and counters of the run. */
@@ -331,6 +336,9 @@ static bst_status step_through(bst_run_execution *run, double *wall) {
     const bst_engine_hooks hooks = {run, on_message, on_event, interrupted, wants, &run->hooks};
     bst_engine_set_hooks(engine, &hooks);
     BST_TRY(bst_run_pacing_begin(ctx, run->scenario, run->sim));
+    for (int i = 0; i < run->request->change_count; i++) {
+        BST_TRY(on_event(run, run->start_tick, "scenario", "change", run->request->changes[i].set));
+    }
     run->started = bst_wall_seconds();
     bst_status status = bst_run_advance(run);
     *wall = bst_run_wall_s(run);
@@ -338,7 +346,7 @@ static bst_status step_through(bst_run_execution *run, double *wall) {
     for (int i = 0; i < run->sensor_count; i++) {
         bst_loop_summary_finish(run->sensors[i].summary);
     }
-    show_progress(run, bst_engine_tick(engine), true);
+    show_progress(run, bst_engine_tick(engine), !run->part_ended);
     return status;
 }
 
@@ -357,6 +365,19 @@ static bst_status step_only(bst_run_execution *run, const bst_run_request *reque
     return bst_run_sightings_finish(run->ctx, run->sightings, bst_run_seconds(run));
 }
 
+/* Judges by the targets of changed cues, where the earlier part of the run had others. */
+static void take_targets(bst_run_execution *run) {
+    bool cue_changed = false;
+    for (int i = 0; i < run->request->change_count; i++) {
+        cue_changed = cue_changed || strstr(run->request->changes[i].set, "/cue");
+    }
+    for (int i = 0; cue_changed && i < run->sensor_count; i++) {
+        bst_run_sensor_watch *sensor = &run->sensors[i];
+        bst_loop_summary_retarget(sensor->summary, sensor->target);
+        bst_run_metrics_retarget(sensor->metrics, sensor->target);
+    }
+}
+
 /* Opens the folder of the run with its tables and the recorder. */
 static bst_status open_record(bst_run_execution *run, const bst_run_request *request) {
     bst_ctx *ctx = run->ctx;
@@ -365,7 +386,8 @@ static bst_status open_record(bst_run_execution *run, const bst_run_request *req
     BST_TRY(bst_run_check_space(ctx, run->scenario, request->out, request->force));
     BST_TRY(resumes ? bst_run_reopen(ctx, request->out, request->overwrite, &run->store)
                     : bst_run_create(ctx, request->out, request->overwrite, &run->store));
-    cJSON *echo = bst_scenario_echo(run->scenario);
+    cJSON *echo =
+        request->echo ? cJSON_Duplicate(request->echo, true) : bst_scenario_echo(run->scenario);
     bst_status status = echo ? bst_io_run_write_json(ctx, run->store, "scenario.json", echo)
                              : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the scenario");
     cJSON_Delete(echo);
@@ -374,6 +396,7 @@ static bst_status open_record(bst_run_execution *run, const bst_run_request *req
     BST_TRY(bst_run_sightings_create(ctx, world, &run->scenario->record,
                                      run->scenario->tick_rate_hz, run->store, &run->sightings));
     BST_TRY(resumes ? bst_run_resume(run, request->restored) : BST_OK);
+    take_targets(run);
     return bst_run_link_record(ctx, run->sim, bst_run_folder(run->store));
 }
 
@@ -384,7 +407,7 @@ static bst_status close_record(bst_run_execution *run, bool stepped, bst_status 
     bst_ctx *ctx = run->ctx;
     /* an error while closing must not replace the reason of the end */
     bst_ctx closing = *ctx;
-    if (stepped && (status == BST_OK || status == BST_ERR_INTERRUPTED)) {
+    if (stepped && !run->part_ended && (status == BST_OK || status == BST_ERR_INTERRUPTED)) {
         bst_status summed =
             bst_run_sightings_finish(&closing, run->sightings, bst_run_seconds(run));
         if (status == BST_OK && summed != BST_OK) {
@@ -401,7 +424,7 @@ static bst_status close_record(bst_run_execution *run, bool stepped, bst_status 
         *ctx = closing;
         status = closed;
     }
-    if (stepped) {
+    if (stepped && !run->part_ended) {
         bst_ctx after = *ctx;
         bst_status written = write_ending(run, wall, status, &after);
         if (status == BST_OK && written != BST_OK) {
@@ -452,8 +475,12 @@ static bst_status fill_report(bst_run_execution *run, double wall, double part,
 
 bst_status bst_run_scenario(bst_ctx *ctx, const bst_scenario *scenario, bst_simulation *sim,
                             const bst_run_request *request, bst_run_report *report) {
-    bst_run_execution run = {
-        .ctx = ctx, .scenario = scenario, .sim = sim, .progress = request->progress};
+    bst_run_execution run = {.ctx = ctx,
+                             .scenario = scenario,
+                             .sim = sim,
+                             .progress = request->progress,
+                             .request = request,
+                             .steering = request->steering};
     double wall = 0.0;
     bst_ctx_init(&run.hooks, ctx->log, ctx->log_user, ctx->log_level);
     pthread_mutex_init(&run.summing, NULL);
@@ -473,6 +500,9 @@ bst_status bst_run_scenario(bst_ctx *ctx, const bst_scenario *scenario, bst_simu
     if (status == BST_OK && report) {
         double part = run.cut ? bst_run_seconds(&run) / scenario->duration_s : 1.0;
         status = fill_report(&run, wall, part, report);
+    }
+    if (request->part_ended) {
+        *request->part_ended = run.part_ended;
     }
     free_run(&run);
     return status;

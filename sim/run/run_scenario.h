@@ -8,6 +8,28 @@
 #include "sim/eval/sightings.h"
 #include "sim/run/run_saving.h"
 
+/* What happens next between two steps. */
+typedef enum bst_run_action {
+    BST_RUN_ADVANCE = 0, /* step to `until_tick` */
+    BST_RUN_SAVE,        /* save the state, then ask again */
+    BST_RUN_PART,        /* save the state and end with BST_ERR_INTERRUPTED: another part follows */
+    BST_RUN_END,         /* the run is complete */
+} bst_run_action;
+
+/* Steers a run from outside, and sees its messages. Any function may be NULL. */
+typedef struct bst_run_steering {
+    void *user; /* first argument of the functions */
+    /* Called between two steps by the thread that steps; it may wait. Modules due before `tick`
+     * have stepped. *until_tick: later than `tick`. */
+    bst_run_action (*next)(void *user, int64_t tick, int64_t *until_tick);
+    /* A state was saved; the function owns `bytes` [size] (free). */
+    void (*saved)(void *user, int64_t tick, void *bytes, size_t size);
+    /* A message was published that the run uses; as bst_sim_observer. Frames have their pixels. */
+    bst_status (*message)(void *user, bst_ctx *ctx, int sensor, const char *channel,
+                          const void *payload, int64_t tick);
+    bool stops; /* `next` looks for stop requests: they do not interrupt a step */
+} bst_run_steering;
+
 typedef struct bst_run_request {
     const char *out;              /* output folder; NULL: nothing is written */
     bool overwrite;               /* replace an existing run */
@@ -18,6 +40,11 @@ typedef struct bst_run_request {
     double most_s;                /* > 0, without folder: limit of stepping time */
     const bst_run_saving *saving; /* NULL: the whole run, without saved states */
     bst_run_restored *restored;   /* state that the simulation has; NULL: the start */
+    const struct cJSON *echo;     /* scenario to write in place of the run's own; NULL: its own */
+    const bst_scenario_change *changes; /* [change_count] made at the start: recorded as events */
+    int change_count;
+    const bst_run_steering *steering; /* NULL: none */
+    bool *part_ended;                 /* returned if not NULL: ended by BST_RUN_PART */
 } bst_run_request;
 
 typedef struct bst_run_sensor_figures {

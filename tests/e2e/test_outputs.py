@@ -18,7 +18,7 @@ class Outputs(unittest.TestCase):
     """No output option of any command writes over what the command reads, over files of a run, or
     to a path that is a slip. The options are taken from --help, so that a new one is tested too."""
     # a command's other words: input first, {} is its path
-    WORDS = {"run": ["{scenario}", "--quiet", "--duration", "0"],
+    WORDS = {"run": ["{scenario}", "--quiet", "--duration", "0"], "view": ["{scenario}", "--no-browser"],
              "report": ["{run}"], "export": ["{run}", "--table", "csv"], "orbit": ["{run}"],
              "loop": ["{scenario}"], "serve": ["{scenario}", "--link", "ipc:///nowhere", "--as", "x"],
              "propagate": ["--elements", "{elements}", "--norad", "44801", "--start",

@@ -180,6 +180,43 @@ class Page(unittest.TestCase):
             self.assertEqual(page.evaluate("document.boresight.plots.cursor"), rows[nearest, 1])
 
 
+@unittest.skipUnless(chromium.PROGRAM, "there is no chromium")
+class LivePage(unittest.TestCase):
+    def test_live(self):
+        """Keys step and run it, the form changes it, the page shows the newest frame and then plays the run back."""
+        out = os.path.join(runs.scratch(), "live")
+        viewer = test_view.Viewer(runs.TRACK, "--out", out, "--duration", "12", "--set", "/world/star_catalogue=embedded")
+        live = "document.boresight.live"
+        with chromium.Chromium(1280, 720) as page:
+            page.command("Page.navigate", url=viewer.url)
+            page.wait_for(f"document.boresight && {live} && {live}.state && {live}.state.run === 0 && document.boresight.run")
+            page.key("n")
+            page.wait_for(f"{live}.shown === 1 && {live}.state.paused")
+            first = page.evaluate("Array.from(document.boresight.frameView.image.data.subarray(0, 5000))")
+            page.evaluate("document.getElementById('live-change').click()")
+            page.wait_for("document.getElementById('change-burn-along') !== null")
+            page.evaluate("""(() => {
+                document.querySelector('[data-pointer$="control/exposure_s"]').value = '0.25';
+                document.getElementById('change-burn-along').value = '30';
+                document.getElementById('change-apply').click();
+            })()""")
+            page.wait_for(f"{live}.state.changes === 2 && {live}.state.paused")
+            page.evaluate("document.getElementById('changes').close()")
+            page.evaluate("document.getElementById('live-rate').value = '0'")
+            page.key("r")
+            page.wait_for(f"{live}.state.ended && document.boresight.run.state === 'complete'")
+            page.key("Home")
+            page.wait_for(SHOWN + " === 0")
+            self.assertEqual(page.messages, [])
+        self.assertEqual(viewer.end()[0], 0)
+        with fits.open(out + "/frames.fits") as file:
+            self.assertEqual(first, file[1].data.ravel()[:5000].tolist())
+        with open(out + "/scenario.json", encoding="utf-8") as file:
+            changes = [change["set"] for change in json.load(file)["changes"]]
+        self.assertEqual([changes[0], changes[1].split("=")[0]],
+                         [runs.SENSOR + "/modules/control/exposure_s=0.25", "/world/objects/0/burns"])
+
+
 def tearDownModule():
     test_view.end_all()
 

@@ -324,11 +324,40 @@ static void queries_become_csv(void **state) {
     scratch_remove(&s);
 }
 
+/* A product of the table with itself: 50^3 rows. */
+static void long_queries_end(void **state) {
+    (void)state;
+    static const char product[] =
+        "SELECT count(*) FROM spots a, spots b, spots c WHERE a.tick > b.tick + c.tick";
+    scratch s;
+    scratch_make(&s);
+    bst_ctx ctx = {0};
+    char out[1100];
+    snprintf(out, sizeof out, "%s", scratch_path(&s, "run"));
+    bst_assert_ok(&ctx, bst_run_finish(&ctx, begin(&ctx, out, NULL)));
+    bst_run_reader *r = open_reader(out);
+    bst_io_rows *rows;
+    bool more;
+    bst_run_reader_allow(r, 100000);
+    bst_assert_ok(&ctx, bst_io_rows_open(&ctx, r, product, 0, 0, &rows));
+    assert_int_equal(bst_io_rows_next(&ctx, rows, &more), BST_ERR_FORMAT);
+    assert_non_null(strstr(ctx.message, "a query takes too long"));
+    bst_io_rows_close(rows);
+    /* what is left counts for all queries until the next call */
+    assert_int_equal(bst_run_reader_int(r, product, 0, -7), -7);
+    assert_int_equal(bst_run_reader_int(r, "SELECT count(*) FROM spots", 0, -7), 50);
+    bst_run_reader_allow(r, 0);
+    assert_int_equal(bst_run_reader_int(r, product, 0, -7), 0);
+    bst_run_reader_close(r);
+    scratch_remove(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_whole_run),
         cmocka_unit_test(what_became_of_it),
         cmocka_unit_test(folders_that_are_damaged),
+        cmocka_unit_test(long_queries_end),
         cmocka_unit_test(queries_become_csv),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -157,7 +157,7 @@ static void test_paths(void **state) {
 
 static void test_methods_and_bodies(void **state) {
     (void)state;
-    static const char *const methods[] = {"POST", "PUT", "DELETE", "OPTIONS", "get", "GETX", ""};
+    static const char *const methods[] = {"PUT", "DELETE", "OPTIONS", "get", "GETX", "post", ""};
     char route[BST_VIEW_ROUTE_BYTES];
     bst_view_request r = right;
     for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
@@ -166,6 +166,15 @@ static void test_methods_and_bodies(void **state) {
     }
     r = right;
     r.body_bytes = 1;
+    assert_int_equal(guard(r, route), BST_HTTP_TOO_LARGE);
+    r.method = "POST"; /* a form of a foreign page may lack an Origin */
+    assert_int_equal(guard(r, route), BST_HTTP_FORBIDDEN);
+    r.origin = "http://127.0.0.1:8080";
+    r.origins = 1;
+    assert_int_equal(guard(r, route), BST_HTTP_OK);
+    r.body_bytes = BST_VIEW_BODY_BYTES;
+    assert_int_equal(guard(r, route), BST_HTTP_OK);
+    r.body_bytes = BST_VIEW_BODY_BYTES + 1;
     assert_int_equal(guard(r, route), BST_HTTP_TOO_LARGE);
     r = right;
     r.method = NULL;

@@ -3,13 +3,16 @@
 /** The server refused or failed; the message is for the user. */
 export class ServerError extends Error {}
 
+/** Number of the run that the page shows: ?run=N in its address. */
+const RUN = new URLSearchParams(location.search).get('run') || '0';
+
 /**
  * @param {string} route below "api/"
  * @param {Record<string, string | number>} query
  * @param {AbortSignal} [signal]
  */
 async function get(route, query, signal) {
-  const words = new URLSearchParams();
+  const words = new URLSearchParams({ run: RUN });
   for (const [name, value] of Object.entries(query)) words.set(name, String(value));
   const response = await fetch(`api/${route}?${words}`, { signal, cache: 'no-store' });
   if (!response.ok) {
@@ -40,4 +43,11 @@ export async function getPixels(sensor, frame, signal = undefined) {
     height: Number(response.headers.get('X-Frame-Height')),
     data: new Uint16Array(await response.arrayBuffer()),
   };
+}
+
+/** Sends text to a route and gets JSON. @param {string} route @param {string} body */
+export async function post(route, body) {
+  const response = await fetch(`api/${route}?run=${RUN}`, { method: 'POST', body, cache: 'no-store' });
+  if (!response.ok) throw new ServerError((await response.text()) || `${response.status} ${response.statusText}`);
+  return response.json();
 }

@@ -1,6 +1,7 @@
 // The page: loads a run, and moves frame, plots and events together.
 import { getJson, getNumbers, getPixels } from './api.js';
 import { FrameView } from './frame_view.js';
+import { Panels } from './panels.js';
 import { Plots, shortNumber } from './plots.js';
 
 /** Numbers of a frame in the list (view/recorded_run.h). */
@@ -34,13 +35,29 @@ class App {
     this.busy = false;
     this.cache = new Map();
     this.playing = false;
+    this.live = null; // of a run that is steered here
     this.events = [];
+    this.names = {};
+    this.panels = new Panels(element('tabs'), element('main'), this);
     this.listen();
   }
 
   async start() {
     const query = new URLSearchParams(location.hash.slice(1));
-    this.run = await getJson('run');
+    const session = await getJson('session');
+    const address = new URLSearchParams(location.search);
+    if (address.has('start') || (!session.live && session.runs === 0)) {
+      const { showStart } = await import('./start.js');
+      await showStart();
+      return;
+    }
+    if (session.live) {
+      const { Live } = await import('./live.js');
+      this.live = new Live(this);
+      await this.live.start();
+    }
+    if (session.run && !this.live) [this.run, this.names] = [session.run, session.names];
+    else [this.run, { names: this.names }] = await Promise.all([getJson('run'), getJson('names')]);
     this.describeRun();
     await this.openSensor(Number(query.get('sensor')) || 0, Number(query.get('frame')) || 0);
     const [x, y, scale] = (query.get('at') || '').split(',').map(Number);
@@ -48,17 +65,21 @@ class App {
       Object.assign(this.frameView.view, { x, y, scale, fitted: false });
       this.frameView.redraw();
     }
-    if (this.run.state === RUNNING) this.follow();
+    if (this.live) this.live.follow(true);
+    if (this.inProgress()) this.follow();
   }
+
+  inProgress() { return this.run.state === RUNNING || Boolean(this.live && !this.live.over); }
 
   /** Asks for what was recorded since, while the run is in progress; stays at the end if it is there. */
   async follow() {
-    while (this.run.state === RUNNING) {
+    while (this.inProgress()) {
       await new Promise((done) => { setTimeout(done, REFRESH_MS); });
       try {
         const { sensor } = this, run = await getJson('refresh'), frames = await getNumbers('frames', { sensor });
-        const [modes, events] = await Promise.all([getModes(sensor), getJson('events')]);
+        const [modes, events, { names }] = await Promise.all([getModes(sensor), getJson('events'), getJson('names')]);
         if (sensor !== this.sensor) continue;
+        this.names = names;
         const atEnd = this.current === this.count - 1;
         this.run = run;
         this.describeRun();
@@ -69,7 +90,7 @@ class App {
         this.setFrames(frames);
         this.showEvents(events);
         this.plots.extend(run.sensors[sensor].panels, modes, this.events, this.lastTime(modes));
-        if (atEnd && this.count) await this.goTo(this.count - 1);
+        if (atEnd && this.count && !(this.live && this.live.newest)) await this.goTo(this.count - 1);
       } catch (error) {
         this.showProblems([`The run cannot be followed: ${error.message}`]);
       }
@@ -133,7 +154,7 @@ class App {
     this.setFrames(await getNumbers('frames', { sensor }));
     this.current = -1;
     if (this.count === 0) {
-      this.frameView.show(null, null, 'This sensor has no frames.');
+      this.frameView.show(null, null, this.live ? 'No frame yet. R runs, N steps a frame.' : 'This sensor has no frames.');
       element('position').textContent = 'no frames';
     } else {
       await this.goTo(Math.min(frame, this.count - 1)); // the picture first
@@ -152,6 +173,7 @@ class App {
   /** Shows a frame. Only one is loaded at a time; of those that are asked for meanwhile, the last. */
   async goTo(frame) {
     this.wanted = Math.min(this.count - 1, Math.max(0, frame));
+    if (this.live) this.live.follow(false);
     if (this.busy) return;
     this.busy = true;
     try {
@@ -160,6 +182,7 @@ class App {
         const loaded = await this.load(next);
         this.current = next;
         this.frameView.show(loaded.image, loaded.details, loaded.why);
+        this.firstShown = this.firstShown || performance.now(); // ms since the page was asked for
         this.describePosition(loaded.details);
         this.plots.setCursor(this.timeOf(next));
         this.markEvent();
@@ -196,6 +219,7 @@ class App {
     const [image, details] = await Promise.all([
       kept ? getPixels(sensor, frame) : null, getJson('frame', { sensor, frame }),
     ]);
+    details.names = this.names;
     entry.bytes = image ? image.data.byteLength : 1000;
     return { image, details, why: dropped ? 'This frame was dropped.' : 'The pixels of this frame were not kept.' };
   }
@@ -318,8 +342,8 @@ class App {
 
   onKey(event) {
     const target = event.target, view = this.frameView;
-    if (event.ctrlKey || event.altKey || event.metaKey || element('keys').open) return;
-    if (target instanceof HTMLSelectElement || (target instanceof HTMLInputElement && target.type === 'number')) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || element('keys').open || element('changes').open || !this.panels.frameShown) return;
+    if (target instanceof HTMLSelectElement || (target instanceof HTMLInputElement && ['number', 'text'].includes(target.type))) return;
     if (event.key === ' ' && (target instanceof HTMLButtonElement || target instanceof HTMLInputElement)) return;
     const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
     const actions = {
@@ -329,6 +353,7 @@ class App {
       0: () => view.fit(), 1: () => view.zoomTo(1), w: () => view.pan(0, -60), a: () => view.pan(-60, 0), s: () => view.pan(0, 60), d: () => view.pan(60, 0),
       c: () => view.centreTarget(), m: () => view.toggleMarks(), '[': () => this.plots.zoom(0.5), ']': () => this.plots.zoom(2),
       '?': () => element('keys').showModal(),
+      r: () => this.live && this.live.toggle(), n: () => this.live && this.live.step(),
     };
     if (step && event.shiftKey) view.moveCursor(step[0], step[1]);
     else if (step && step[0] !== 0) this.goTo(this.wanted + step[0]);

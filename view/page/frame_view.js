@@ -7,6 +7,8 @@ import { formatDec, formatRa, pixelToSky } from './wcs.js';
 const SCALE_LEAST = 0.02, SCALE_MOST = 128;
 /** From this scale on, pixels show their values. */
 const VALUE_SCALE = 34;
+/** Least time between two statistics of live frames, ms. */
+const STATISTICS_MS = 1000;
 const NUMBER = new Intl.NumberFormat('en', { maximumFractionDigits: 1 });
 
 /** An element by its id. @param {string} id */
@@ -20,6 +22,7 @@ export class FrameView {
     this.painter = makePainter(this.canvas, new URLSearchParams(location.search).has('plain'));
     this.image = null;
     this.statistics = null;
+    this.counted = 0; // time of the statistics
     this.details = null;
     this.sorted = null;
     this.view = { x: 0, y: 0, scale: 1, fitted: true };
@@ -42,13 +45,17 @@ export class FrameView {
     this.view.fitted = true;
   }
 
-  /** @param {{width: number, height: number, data: Uint16Array} | null} image @param {any} details @param {string} why no pixels */
-  show(image, details, why) {
+  /** @param {{width: number, height: number, data: Uint16Array} | null} image @param {any} details @param {string} why no pixels
+   * @param {boolean} live one of many frames a second */
+  show(image, details, why, live = false) {
     const before = this.image;
+    // statistics of a million pixels take longer than drawing them
+    const counted = !live || performance.now() - this.counted > STATISTICS_MS;
+    if (counted) this.counted = performance.now();
     this.image = image;
     this.details = details;
     this.sorted = details ? sortMarks(details) : null;
-    this.statistics = image ? describePixels(image.data) : null;
+    if (counted || !image || !this.statistics) this.statistics = image ? describePixels(image.data) : null;
     element('no-pixels').hidden = Boolean(image);
     element('no-pixels').textContent = image ? '' : why;
     if (image && !this.painter.fits(image)) this.usePlain();
@@ -58,7 +65,7 @@ export class FrameView {
     for (const kind of KINDS) {
       element(`count-${kind.name}`).textContent = this.sorted ? String(this.sorted[kind.name].length) : '';
     }
-    this.drawHistogram();
+    if (counted) this.drawHistogram();
     this.redraw();
   }
 

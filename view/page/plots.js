@@ -193,6 +193,9 @@ function prepare(canvas) {
   return { context, width, height };
 }
 
+/** Least time between two drawings of the plots of a live run, ms: they take longer than its frames. */
+const FOLLOW_MS = 1000;
+
 export class Plots {
   /** @param {(time: number) => void} seek goes to the frame of a time */
   constructor(seek) {
@@ -202,6 +205,7 @@ export class Plots {
     this.events = [];
     this.all = this.range = { from: 0, to: 1 };
     this.cursor = 0;
+    this.followed = 0; // when `follow` has drawn
     this.sensor = 0;
     this.drag = null;
     this.request = null;
@@ -271,6 +275,18 @@ export class Plots {
     const { from, to } = this.range;
     if (time < from || time > to) this.setRange(time - (to - from) / 2, time + (to - from) / 2);
     else this.draw();
+  }
+
+  /** The newest time of a live run: the cursor, drawn some times a second. */
+  follow(time) {
+    const all = this.range.to === this.all.to;
+    this.cursor = time;
+    if (time > this.all.to) this.all = { from: this.all.from, to: time };
+    if (all) this.range = { from: this.range.from, to: this.all.to };
+    if (performance.now() - this.followed < FOLLOW_MS) return;
+    this.followed = performance.now();
+    element('range').textContent = `${shortNumber(this.range.from)} to ${shortNumber(this.range.to)} s`;
+    this.draw();
   }
 
   draw() {

@@ -3,6 +3,7 @@
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "sim/engine/kernel/engine_internal.h"
 #include "sim/messages/message_invariants.h"
@@ -15,6 +16,9 @@ enum { PORT_COMMAND, PORT_EXPOSURE };
 typedef struct exposure_clock {
     int64_t tick_rate_hz;
     int64_t exposure_ticks, period_ticks;
+    struct {
+        int64_t exposure_ticks, period_ticks, binning;
+    } set;                        /* by the scenario */
     bst_window full, own, window; /* of the sensor, of the scenario, of the current exposure */
     int binning;
     double pixel_scale_arcsec; /* 0: the camera's scale */
@@ -173,6 +177,9 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
         free(clock);
         return status;
     }
+    clock->set.exposure_ticks = clock->exposure_ticks;
+    clock->set.period_ticks = clock->period_ticks;
+    clock->set.binning = clock->binning;
     double cycle_s = (double)cycle_of(clock) / (double)env->tick_rate_hz, longest_s;
     if (updates) {
         bst_frame_updates_limits(updates, camera, c, &longest_s, &cycle_s);
@@ -288,9 +295,28 @@ static bst_status step(void *self, struct bst_step *step) {
     }
 }
 
+/* Settings that the scenario has changed since the state was saved hold from the next exposure on.
+ */
+static void take_changes(exposure_clock *clock, const exposure_clock *saved) {
+    if (saved->set.exposure_ticks != clock->set.exposure_ticks) {
+        clock->exposure_ticks = clock->set.exposure_ticks;
+    }
+    if (saved->set.period_ticks != clock->set.period_ticks) {
+        clock->period_ticks = clock->set.period_ticks;
+    }
+    if (saved->set.binning != clock->set.binning) {
+        clock->binning = (int)clock->set.binning;
+    }
+    if (memcmp(&saved->own, &clock->own, sizeof saved->own) != 0) {
+        clock->window = clock->own;
+    }
+}
+
 /* Module interface: archives the settings in force and the exposure in progress. */
 static bst_status archive(void *self, bst_archive *archive) {
-    exposure_clock *clock = self;
+    exposure_clock *clock = self, saved = *clock;
+    BST_ARCHIVE(archive, saved.set);
+    BST_ARCHIVE(archive, saved.own);
     BST_ARCHIVE(archive, clock->exposure_ticks);
     BST_ARCHIVE(archive, clock->period_ticks);
     BST_ARCHIVE(archive, clock->window);
@@ -302,6 +328,9 @@ static bst_status archive(void *self, bst_archive *archive) {
     BST_ARCHIVE(archive, clock->next_start_tick);
     bst_archive_bool(archive, &clock->open);
     bst_frame_cursor_archive(&clock->updates, archive);
+    if (bst_archive_is_restoring(archive)) {
+        take_changes(clock, &saved);
+    }
     return BST_OK;
 }
 

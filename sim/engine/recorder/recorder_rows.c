@@ -250,7 +250,7 @@ bst_status bst_recorder_los_rows(bst_ctx *ctx, bst_recorder *recorder, int senso
     return append(ctx, recorder, BST_TABLE_LOS_TRUTH, &r);
 }
 
-static const char *label_name(int32_t label) {
+const char *bst_recorder_label_name(int32_t label) {
     switch (label) {
         case BST_LABEL_STAR:
             return "star";
@@ -315,7 +315,7 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
         put_int(&r, d->exposure_id);
         put_real(&r, mid_s);
         put_int(&r, i);
-        put_text(&r, label_name(item->label));
+        put_text(&r, bst_recorder_label_name(item->label));
         put_int(&r, item->star_id);
         put_real(&r, item->x_px);
         put_real(&r, item->y_px);
@@ -346,7 +346,7 @@ bst_status bst_recorder_detection_rows(bst_ctx *ctx, bst_recorder *recorder, int
     return BST_OK;
 }
 
-static const char *track_status_name(int32_t status) {
+const char *bst_recorder_track_status_name(int32_t status) {
     return status == BST_TRACK_CONFIRMED  ? "confirmed"
            : status == BST_TRACK_COASTING ? "coasting"
                                           : "tentative";
@@ -365,7 +365,7 @@ static bst_status track_row(bst_ctx *ctx, bst_recorder *recorder, int sensor, co
     put_int(&r, t->tick);
     put_real(&r, seconds(recorder, t->tick));
     put_int(&r, k->id);
-    put_text(&r, track_status_name(k->status));
+    put_text(&r, bst_recorder_track_status_name(k->status));
     put_flag(&r, k->target_of_interest);
     put_real(&r, ra * DEG);
     put_real(&r, dec * DEG);

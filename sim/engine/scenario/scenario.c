@@ -15,6 +15,16 @@
 
 enum { FORMAT_VERSION = 1 };
 
+static const bst_config_desc change_table[] = {
+    BST_REAL(bst_scenario_change, time_s, "s", 0, 1e9, NULL,
+             "Time of the change after the epoch, a whole number of ticks."),
+    BST_STRING(
+        bst_scenario_change, set, NULL,
+        "What changes, as --set takes it: \"/observers/0/sensors/0/exposure/exposure_s=0.2\"; "
+        "below /world or /observers."),
+    BST_CONFIG_END,
+};
+
 const bst_config_desc bst_scenario_table[] = {
     {.key = "boresight",
      .type = BST_CONFIG_INT,
@@ -55,6 +65,9 @@ const bst_config_desc bst_scenario_table[] = {
                "Where other programs connect that play modules of type \"external\"."),
     BST_OBJECT(bst_scenario, pacing, bst_pacing_config_table, "{}",
                "How simulated time goes by the wall clock in boresight run."),
+    BST_LIST(bst_scenario, changes, bst_scenario_change, change_table, 0, 10000, "[]",
+             "Changes of this scenario while its run goes on, in the order of time; boresight view "
+             "writes those that are made by hand. Only boresight run and view make them."),
     BST_CONFIG_END,
 };
 
@@ -165,6 +178,35 @@ static bst_status check_extended(bst_ctx *ctx, const bst_json *json) {
                                   "there is nothing that it changes", "only beside \"extends\"");
 }
 
+/* Checks the times and the form of the changes. */
+static bst_status check_changes(bst_ctx *ctx, bst_scenario *s) {
+    bst_scenario_change *changes = s->changes.items;
+    for (int i = 0; i < s->changes.count; i++) {
+        bst_scenario_change *c = &changes[i];
+        bst_status status = bst_seconds_to_ticks(ctx, s->tick_rate_hz, c->time_s, &c->tick);
+        if (status == BST_OK) {
+            status = bst_json_check_assignment(ctx, c->set);
+        }
+        if (status == BST_OK && strncmp(c->set, "/world/", 7) != 0 &&
+            strncmp(c->set, "/observers/", 11) != 0) {
+            status = bst_fail(ctx, BST_ERR_CONFIG,
+                              "set: \"%.200s\" cannot change during a run (allowed: keys below "
+                              "/world and /observers)",
+                              c->set);
+        }
+        if (status == BST_OK && i > 0 && c->tick < c[-1].tick) {
+            status = bst_fail(ctx, BST_ERR_CONFIG,
+                              "time_s: %.9g s is before that of the change before (%.9g s): put "
+                              "them in the order of time",
+                              c->time_s, c[-1].time_s);
+        }
+        if (status != BST_OK) {
+            return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /changes/%d", s->file, i);
+        }
+    }
+    return BST_OK;
+}
+
 static bst_status read_scenario(bst_ctx *ctx, const bst_json *json,
                                 const bst_scenario_registry *registry, bst_scenario *out) {
     memset(out, 0, sizeof *out);
@@ -186,6 +228,7 @@ static bst_status read_scenario(bst_ctx *ctx, const bst_json *json,
     if (bst_recorder_config_check(ctx, &out->record) != BST_OK) {
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s", out->file);
     }
+    BST_TRY(check_changes(ctx, out));
     BST_TRY(prepare_cameras(ctx, out));
     BST_TRY(resolve_states(ctx, out));
     BST_TRY(check_names(ctx, out));

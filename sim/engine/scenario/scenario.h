@@ -48,6 +48,13 @@ typedef struct bst_scenario_module_config {
     bool plugin; /* its block names a plug-in */
 } bst_scenario_module_config;
 
+/* A change of the scenario while its run goes on. */
+typedef struct bst_scenario_change {
+    double time_s;
+    char set[1024]; /* "/json/pointer=value" */
+    int64_t tick;   /* of time_s */
+} bst_scenario_change;
+
 typedef struct bst_scenario {
     int64_t format; /* "boresight": version of the scenario format */
     char name[64];
@@ -61,6 +68,7 @@ typedef struct bst_scenario {
     bst_recorder_config record;
     bst_link_config link;
     bst_pacing_config pacing;
+    bst_config_list changes; /* bst_scenario_change, in the order of time */
     /* set by bst_scenario_read, not by the configuration table */
     char file[512];     /* name for messages */
     char base_dir[512]; /* base folder of relative paths */

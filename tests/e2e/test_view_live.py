@@ -1,0 +1,267 @@
+#!/usr/bin/env python3
+"""Live runs of `boresight view SCENARIO.json` and `boresight run --view` over their WebSocket: steps, changes that are
+recorded and repeat, rewinding, branches, spectators, and what is refused.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_view_live.py BORESIGHT [--full]
+--full: with images, whose pixels equal the file's; takes some ten times as long.
+"""
+import json
+import os
+import sqlite3
+import subprocess
+import sys
+import unittest
+import urllib.error
+import urllib.request
+
+import numpy
+
+import live_page
+import runs
+import test_view
+
+FULL = "--full" in sys.argv[1:]
+if FULL:
+    sys.argv.remove("--full")
+SETS = ["--set", "/world/star_catalogue=embedded"] + ([] if FULL else ["--set", runs.GENERATOR])
+CONTROL = runs.SENSOR + "/modules/control"
+
+
+def tables(folder):
+    """Rows of all tables of a run."""
+    with sqlite3.connect(f"file:{folder}/run.sqlite?mode=ro", uri=True) as database:
+        names = [name for name, in database.execute("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY name")]
+        found = {name: database.execute(f'SELECT * FROM "{name}"').fetchall() for name in names}
+    database.close()
+    return found
+
+
+class Tables(unittest.TestCase):
+    def assert_equal(self, one, other, but=()):
+        first, second = tables(one), tables(other)
+        self.assertEqual(first.keys(), second.keys())
+        for name, rows in first.items():
+            if name not in but:
+                self.assertEqual(rows, second[name], name)
+        self.assertGreater(len(first["truth"]), 0)
+
+
+class Live(Tables):
+    def setUp(self):
+        self.folder = runs.scratch()
+        self.out = os.path.join(self.folder, "run")
+        self.viewer = test_view.Viewer(runs.TRACK, "--out", self.out, "--duration", "26", "--threads", "1", *SETS)
+        self.page = live_page.Socket(self.viewer)
+        self.assertEqual(self.page.status, 101)
+
+    def tearDown(self):
+        self.page.close()
+
+    def command(self, until=None, **command):
+        """State after a command, once it fits a condition."""
+        return self.page.state(until, command)
+
+    def run_to(self, time_s):
+        """Frame by frame until a time."""
+        state = self.page.state()
+        while state["time_s"] < time_s:
+            state = self.command(lambda now: now["paused"] and not now["steps"], do="step", frames=1)
+        return state
+
+    def test_changes_repeat(self):
+        """A run with changes by hand, and the repetition of its scenario.json: equal tables. A branch from before the changes
+        is a run without them; one that was rewound has those that were made after."""
+        state = self.page.state(lambda now: now["run"] == 0)
+        self.assertTrue(state["paused"])
+        self.assertEqual([one["why"] for one in state["states"]], ["start"])
+        frames = state = self.command(lambda now: now["paused"] and now["time_s"] > 0, do="step", frames=1)
+        self.assertLess(frames["time_s"], 1.5)
+        self.command(lambda now: now["time_s"] >= 3, do="run", rate=20)
+        state = self.command(lambda now: now["paused"] and now["states"][-1]["time_s"] == now["time_s"], do="pause")
+        early = state["states"][-1]["id"]
+        state = self.command(lambda now: now["changes"] == 1, do="set", set=f"{CONTROL}/exposure_s=0.25")
+        self.assertEqual(state["message"], "")
+        self.command(lambda now: now["changes"] == 2, do="burn", object="INMARSAT GX5", dv_rtn_mps=[0, 40, 0])
+        for bad in ("/duration_s=3", f"{CONTROL}/exposure_s=-1", "nothing", f"{runs.SENSOR}/cue/object=nobody"):
+            state = self.command(lambda now: now["message"], do="set", set=bad)
+            self.assertEqual(state["changes"], 2, bad)
+        state = self.command(lambda now: now["message"], do="burn", object="nobody", dv_rtn_mps=[0, 0, 1])
+        self.assertIn("name", state["message"])
+        # modules of other names: what was saved does not fit, so the change is taken back
+        state = self.command(lambda now: now["message"], do="set", set='/observers/0/name="other"')
+        self.assertIn("cannot go on with this change", state["message"])
+        self.assertEqual(state["changes"], 2)
+        late = self.run_to(state["time_s"] + 2)["time_s"]
+        state = self.command(lambda now: now["time_s"] < late, do="rewind", state=state["states"][-1]["id"])
+        self.assertEqual((state["changes"], state["paused"]), (2, True))
+        self.command(lambda now: now["ended"], do="run", rate=0)
+        self.assertEqual(self.viewer.json("api/refresh")["state"], "complete")
+        state = self.command(lambda now: now["run"] == 1, do="branch", state=early)
+        self.assertEqual(state["changes"], 0)
+        self.assertEqual(self.viewer.json("api/refresh?run=1")["state"], "still running")
+        self.command(lambda now: now["ended"], do="run", rate=0)
+        self.assertEqual(self.viewer.json("api/refresh?run=1")["name"], "run-2")
+        self.assertEqual(self.viewer.end()[0], 0)
+
+        with open(self.out + "/scenario.json", encoding="utf-8") as file:
+            self.assertEqual(len(json.load(file)["changes"]), 2)
+        self.assertEqual([row[4] for row in tables(self.out)["events"] if row[3] == "change"][0], f"{CONTROL}/exposure_s=0.25")
+        exposures = {round(end - start) for start, end in ((row[2], row[3]) for row in tables(self.out)["exposures"])}
+        self.assertEqual(exposures, {1500, 3000})
+        again, plain = os.path.join(self.folder, "again"), os.path.join(self.folder, "plain")
+        runs.run(self.out + "/scenario.json", again)
+        self.assert_equal(self.out, again)
+        runs.run(runs.TRACK, plain, *SETS[3::2], duration=26)
+        self.assert_equal(self.out + "-2", plain)
+        if FULL:
+            for one, other in ((self.out, again), (self.out + "-2", plain)):
+                with open(one + "/frames.fits", "rb") as first, open(other + "/frames.fits", "rb") as second:
+                    self.assertEqual(first.read(), second.read())
+
+    def test_frames_and_spectators(self):
+        """What is shown is what is recorded; a second page sees it and has no control until the first one is gone."""
+        shown = []
+        self.page.state(lambda now: now["run"] == 0)
+        self.page.ask()  # watched from now on
+        while len(shown) < 3:
+            answer, pixels = self.page.ask({"do": "step", "frames": 1})
+            while not answer["sequence"]:
+                answer, pixels = self.page.ask()
+            shown.append((answer["frame"], pixels))
+        spectator = live_page.Socket(self.viewer)
+        answer, pixels = spectator.ask({"do": "end"})
+        self.assertEqual((answer["controller"], answer["problem"]), (False, "another page controls the run"))
+        self.assertEqual(answer["frame"], shown[-1][0])
+        self.page.close()
+        while not answer["controller"]:
+            answer, _ = spectator.ask(take=True)
+        answer, _ = spectator.ask({"do": "dance"})
+        self.assertIn("no command", answer["problem"])
+        spectator.state(lambda now: now["ended"], {"do": "end"})
+        self.assertEqual(self.viewer.end()[0], 0)
+        rows = tables(self.out)
+        self.assertGreaterEqual(len(rows["exposures"]), 3)
+        for frame, pixels in shown:
+            number = frame["exposure_id"]
+            found = [row for row in rows["detections"] if row[1] == number]
+            self.assertEqual(len(frame["detections"]), len(found))
+            # 1e-9 px: rounding of the shift to pixels of the frame
+            numpy.testing.assert_allclose([mark["x"] for mark in frame["detections"]], [row[6] for row in found], rtol=0, atol=1e-9)
+            self.assertEqual(pixels is not None, FULL)
+            if FULL:
+                from astropy.io import fits  # takes half a second
+                with fits.open(self.out + "/frames.fits") as file:
+                    self.assertTrue(numpy.array_equal(file[1 + number].data, pixels))
+
+    def test_refused(self):
+        """Foreign pages, wrong tokens, malformed and giant messages, too many clients: the run goes on."""
+        for words, status in (({"origin": "http://evil.example"}, 403), ({"origin": None}, 404), ({"host": "evil.example"}, 403),
+                              ({"path": "/{token}/live/"}, 404), ({"path": "/" + "0" * 32 + "/live"}, 403)):
+            page = live_page.Socket(self.viewer, **words)
+            self.assertEqual(page.status, status, words)
+            page.close()
+        self.assertEqual(self.viewer.status("/{token}/live"), 404)
+        for data, opcode in ((b"{", 0x81), (b"[]", 0x81), (b"\xff\xfe", 0x81), (b"{}" + b" " * 9000, 0x81), (b"{}", 0x82), (b"{}", 0x01)):
+            page = live_page.Socket(self.viewer)
+            with self.assertRaises((ConnectionError, TimeoutError)):
+                page.peer.settimeout(5)
+                page.send(data, opcode)
+                while page.receive()[0] not in (8,):
+                    pass
+                raise ConnectionError
+            page.close()
+        giant = live_page.Socket(self.viewer)
+        giant.peer.sendall(b"\x81\xff" + (1 << 62).to_bytes(8, "big") + bytes(4096))
+        many = [live_page.Socket(self.viewer) for _ in range(60)]
+        self.assertLess(sum(page.status == 101 for page in many), 50)
+        state = self.command(lambda now: now["paused"] and now["time_s"] > 0, do="step", frames=1)
+        self.assertGreater(state["time_s"], 0)
+        for page in many + [giant]:
+            page.close()
+        self.assertEqual(self.viewer.end()[0], 0)
+
+
+class Watched(Tables):
+    def test_run_with_a_page(self):
+        """`run --view`: the run is the same with a page as without."""
+        folder = runs.scratch()
+        sets = [runs.GENERATOR] if not FULL else []
+        words = runs.command(runs.TRACK, folder + "/seen", *sets, duration=25)[1:]
+        viewer = test_view.Viewer(None, command=[*words, "--view"])
+        page, frames = live_page.Socket(viewer), 0
+        self.assertEqual(page.status, 101)
+        try:
+            while True:
+                answer, _ = page.ask({"do": "pause"})
+                self.assertIn("problem", answer)
+                frames += answer["sequence"] > 0
+        except (ConnectionError, TimeoutError):
+            pass
+        self.assertEqual(viewer.process.wait(60), 0)
+        viewer.process.communicate()
+        runs.run(runs.TRACK, folder + "/plain", *sets, duration=25)
+        self.assertGreater(frames, 0)
+        self.assert_equal(folder + "/seen", folder + "/plain")
+
+
+class Start(unittest.TestCase):
+    def test_start_page(self):
+        """Runs of runs/ and shipped scenarios; a run is opened by its name and by no path."""
+        folder = runs.scratch()
+        os.mkdir(folder + "/runs")
+        runs.run(runs.TRACK, folder + "/runs/one", runs.GENERATOR, duration=1)
+        os.mkdir(folder + "/runs/empty")
+        viewer = test_view.Viewer(None, cwd=folder)
+        listed = viewer.json("api/start")
+        self.assertEqual([(one["name"], one["state"]) for one in listed["runs"]], [("one", "complete")])
+        self.assertIn("neossat_geo_track.json", [one["file"] for one in listed["scenarios"]])
+        self.assertNotIn("boresight.schema.json", [one["file"] for one in listed["scenarios"]])
+        self.assertEqual(viewer.json("api/session"), {"live": False, "runs": 0})
+        self.assertEqual(viewer.status("/{token}/api/run"), 404)
+        with open(folder + "/runs/one/quicklook.png", "wb") as file:
+            file.write(b"\x89PNG")
+        self.assertEqual(viewer.get("api/picture?name=one")[0], b"\x89PNG")
+
+        def post(route, body):
+            request = urllib.request.Request(viewer.url + route, json.dumps(body).encode(),
+                                             {"Origin": f"http://127.0.0.1:{viewer.port}"}, method="POST")
+            try:
+                with urllib.request.urlopen(request, timeout=60) as answer:
+                    return json.load(answer)
+            except urllib.error.HTTPError as error:
+                return error.code
+        for name in ("../runs/one", "/etc", ".", "..", "", "empty", "no"):
+            self.assertEqual(post("api/open", {"run": name}), 404, name)
+        self.assertEqual(post("api/launch", {"scenario": "../scenarios/neossat_geo_track.json"}), 404)
+        self.assertEqual(post("api/open", {"run": "one"}), {"run": 0})
+        self.assertEqual(viewer.json("api/run?run=0")["name"], "one")
+        self.assertEqual(viewer.json("api/session")["run"], viewer.json("api/run"))
+        self.assertEqual(viewer.end()[0], 0)
+
+
+class Scenarios(unittest.TestCase):
+    def test_only_run_makes_changes(self):
+        """A scenario with changes is refused where they are not made, and where they are wrong."""
+        path = os.path.join(runs.scratch(), "changes.json")
+
+        def with_changes(*changes):
+            with open(path, "w", encoding="utf-8") as file:
+                json.dump({"extends": os.path.abspath(runs.TRACK), "changes": [{"time_s": t, "set": s} for t, s in changes]}, file)
+            return subprocess.run(runs.command(path, runs.scratch() + "/x", runs.GENERATOR, duration=2), capture_output=True,
+                                  text=True, check=False)
+        ends = {((1, "/seed=3"),): "/changes/0: set: \"/seed=3\" cannot change during a run",
+                ((1, "/world/objects/0/area_m2=1"), (0.5, "/world/objects/0/area_m2=2")): "put them in the order of time",
+                ((1, "/world/objects/0/area_m2=-1"),): "after /changes/0",
+                ((1e-5, "/world/objects/0/area_m2=1"),): "no whole number of ticks"}
+        for changes, message in ends.items():
+            result = with_changes(*changes)
+            self.assertEqual(result.returncode, 1)
+            self.assertIn(message, result.stderr)
+
+
+def tearDownModule():
+    test_view.end_all()
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,26 @@
+/* WebSocket of a live run. A client asks, and gets one binary message for each text that it sends:
+ * the length of a JSON text (32 bits), the text {state, frame, controller, sequence}, and the
+ * pixels of the frame, if it is newer than the client's. So at most one message is in flight per
+ * client, and a slow one waits for itself alone. */
+#ifndef BST_VIEW_LIVE_SOCKET_H
+#define BST_VIEW_LIVE_SOCKET_H
+
+#include <civetweb.h>
+
+#include "view/live_run.h"
+
+typedef struct bst_view_socket bst_view_socket;
+
+/* Accepts WebSockets at an address of a server.
+ *
+ * Given:     http  outlives the socket; its function begin_request has checked the request
+ *            uri   path of the address
+ *            live  outlives the socket
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_view_socket_free, after the server has stopped */
+bst_status bst_view_socket_open(bst_ctx *ctx, struct mg_context *http, const char *uri,
+                                bst_view_live *live, bst_view_socket **out) BST_MUST_CHECK;
+/* Frees what belongs to a socket; NULL is allowed. */
+void bst_view_socket_free(bst_view_socket *socket);
+
+#endif

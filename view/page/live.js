@@ -1,0 +1,208 @@
+// A run that is steered from the page: its WebSocket, its newest frame, its controls.
+import { getJson } from './api.js';
+import { changeFields, changesOf } from './changes.js';
+
+/** Exposures whose track positions are drawn as trails, as those of recorded runs. */
+const TRAIL_EXPOSURES = 40;
+/** Rates that are offered, times real time; 0: flat out. */
+const RATES = [0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 0];
+/** Time before another attempt to connect, ms. */
+const RETRY_MS = 1000;
+
+const element = (id) => document.getElementById(id);
+
+export class Live {
+  /** @param {any} app */
+  constructor(app) {
+    this.app = app;
+    this.state = null;
+    this.controller = false;
+    this.sequence = 0;
+    this.newest = true; // the page shows the newest frame
+    this.trail = [];
+    this.queue = []; // commands that wait for the answer before
+    this.shown = 0; // frames
+    this.over = false; // the run has ended, and the page knows its end
+    this.ready = null;
+    this.first = new Promise((done) => { this.ready = done; });
+    this.makeControls();
+  }
+
+  /** Connects, and waits until the run has a folder. */
+  async start() {
+    this.connect();
+    await this.first;
+    element('live').hidden = false;
+  }
+
+  // ---------------------------------------------------------------- WebSocket
+
+  connect() {
+    const address = new URL('live', location.href);
+    address.protocol = 'ws:';
+    this.socket = new WebSocket(address);
+    this.socket.binaryType = 'arraybuffer';
+    this.socket.addEventListener('open', () => this.ask());
+    this.socket.addEventListener('message', (event) => this.take(event.data));
+    this.socket.addEventListener('close', () => {
+      if (this.state && !this.state.ended) this.say('The run cannot be reached. Is "boresight view" still running?');
+      setTimeout(() => this.connect(), RETRY_MS);
+    });
+  }
+
+  /** One request, which gets one answer. */
+  ask() {
+    const asked = { sensor: this.app.sensor, after: this.sequence, take: true };
+    if (this.queue.length > 0) asked.command = this.queue.shift();
+    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(asked));
+  }
+
+  /** @param {object} command see view/live_run.h */
+  command(command) {
+    if (this.queue.length < 8) this.queue.push(command);
+  }
+
+  /** @param {ArrayBuffer} data */
+  take(data) {
+    const length = new DataView(data).getUint32(0, true);
+    const answer = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
+    const before = this.state;
+    this.state = answer.state;
+    this.controller = answer.controller;
+    if (answer.sequence) {
+      this.sequence = answer.sequence;
+      const { width, height } = answer;
+      const pixels = width > 0 ? { width, height, data: new Uint16Array(data, 4 + length, width * height) } : null;
+      this.takeFrame(answer.frame, pixels);
+    }
+    this.describe(before, answer.problem);
+    if (this.state.run >= 0) this.ready();
+    // the answer is drawn before the next one is asked for
+    if (document.hidden) setTimeout(() => this.ask(), 200);
+    else requestAnimationFrame(() => this.ask());
+  }
+
+  takeFrame(details, pixels) {
+    const { app } = this, sensor = app.run && app.run.sensors[app.sensor];
+    if (this.trail.length && details.exposure_id <= this.trail[this.trail.length - 1].id) this.trail = [];
+    const earlier = this.trail.flatMap((one) => one.tracks);
+    this.trail.push({ id: details.exposure_id, tracks: details.tracks.map((track) => ({ ...track, now: false })) });
+    if (this.trail.length > TRAIL_EXPOSURES) this.trail.shift();
+    if (!sensor || !this.newest) return;
+    const target = Object.entries(app.names).find(([, name]) => name === sensor.target);
+    const all = { ...details, names: app.names, target: target ? Number(target[0]) : -1, tracks: details.tracks.concat(earlier) };
+    app.frameView.show(pixels, all, details.dropped ? 'This frame was dropped.' : 'This run has no pixels.', !this.state.paused);
+    element('position').textContent = `exposure ${details.exposure_id} · ${details.time_s.toFixed(2)} s · ${details.utc.replace('T', ' ').replace('Z', '')} UTC`;
+    element('slider').value = element('slider').max;
+    app.plots.follow(details.time_s);
+    this.shown++;
+    document.dispatchEvent(new CustomEvent('liveframe', { detail: details.exposure_id }));
+  }
+
+  // ---------------------------------------------------------------- controls
+
+  makeControls() {
+    element('live-rate').replaceChildren(...RATES.map((rate) => {
+      const option = document.createElement('option');
+      option.value = String(rate);
+      option.textContent = rate > 0 ? `${rate} ×` : 'flat out';
+      return option;
+    }));
+    element('live-rate').value = '10';
+    const on = (id, act) => element(id).addEventListener('click', act);
+    on('live-run', () => this.toggle());
+    on('live-step', () => this.step());
+    on('live-newest', () => this.follow(!this.newest));
+    on('live-save', () => this.command({ do: 'save' }));
+    on('live-rewind', () => this.command({ do: 'rewind', state: Number(element('live-states').value) }));
+    on('live-branch', () => this.command({ do: 'branch', state: Number(element('live-states').value) }));
+    on('live-end', () => this.command({ do: 'end' }));
+    on('live-change', () => this.openChanges());
+    on('change-apply', () => this.applyChanges());
+    element('live-rate').addEventListener('change', () => { if (this.running()) this.run(); });
+  }
+
+  run() {
+    this.follow(true);
+    this.command({ do: 'run', rate: Number(element('live-rate').value) });
+  }
+
+  running() { return Boolean(this.state && !this.state.paused && this.state.steps === 0); }
+
+  toggle() {
+    if (this.running()) this.command({ do: 'pause' });
+    else this.run();
+  }
+
+  step() {
+    this.follow(true);
+    this.command({ do: 'step', frames: 1 });
+  }
+
+  /** @param {boolean} newest show the newest frame, not one that was recorded before */
+  follow(newest) {
+    if (newest && !this.newest) this.sequence = 0; // show it again
+    this.newest = newest;
+    element('live-newest').setAttribute('aria-pressed', String(newest));
+  }
+
+  say(text) { element('live-message').textContent = text; }
+
+  describe(before, problem) {
+    const { state } = this;
+    const steers = this.controller && !state.ended;
+    element('live').classList.toggle('watched', !state.steered);
+    element('live-time').textContent = `${state.time_s.toFixed(2)} / ${state.duration_s} s · ${
+      state.ended ? 'complete' : state.paused ? 'paused' : !state.steered ? 'running' : `${state.speed.toFixed(1)} × real time`}`;
+    element('live-run').textContent = this.running() ? 'Pause' : 'Run';
+    for (const id of ['live-run', 'live-step', 'live-rate', 'live-save', 'live-rewind', 'live-change', 'live-end']) element(id).disabled = !steers;
+    element('live-branch').disabled = !this.controller;
+    this.say(problem || state.message || (this.controller || !state.steered ? '' : 'Another page controls this run.'));
+    element('change-problem').textContent = problem || state.message;
+    const states = JSON.stringify(state.states);
+    if (states !== this.states) {
+      this.states = states;
+      const chosen = element('live-states').value;
+      element('live-states').replaceChildren(...state.states.slice().reverse().map((one) => {
+        const option = document.createElement('option');
+        option.value = String(one.id);
+        option.textContent = `${one.time_s.toFixed(2)} s, ${one.why}`;
+        return option;
+      }));
+      if (state.states.some((one) => String(one.id) === chosen)) element('live-states').value = chosen;
+    }
+    if (before && before.run !== state.run && before.run >= 0 && state.run >= 0) { // a branch
+      const query = new URLSearchParams(location.search);
+      query.set('run', String(state.run));
+      location.search = query.toString();
+    }
+    if (state.ended && this.app.run && this.app.run.state !== 'still running') this.over = true;
+    if (before && state.time_s < before.time_s - 1e-9) { // rewound: what came later is recorded anew
+      this.trail = [];
+      this.app.cache.clear();
+      this.app.current = -1;
+    }
+  }
+
+  // ---------------------------------------------------------------- changes
+
+  async openChanges() {
+    this.scenario = await getJson('scenario');
+    changeFields(element('change-fields'), this.scenario, this.app.sensor);
+    element('change-problem').textContent = '';
+    element('changes').showModal();
+  }
+
+  async applyChanges() {
+    const commands = changesOf(element('change-fields'), this.scenario);
+    const free = element('change-set').value.trim();
+    if (free) commands.push({ do: 'set', set: free });
+    if (commands.length === 0) element('change-problem').textContent = 'Nothing differs.';
+    for (const command of commands) this.command(command);
+    element('change-set').value = '';
+    setTimeout(async () => {
+      this.scenario = await getJson('scenario');
+      changeFields(element('change-fields'), this.scenario, this.app.sensor);
+    }, 600);
+  }
+}

@@ -1,0 +1,61 @@
+// The panels of the page, of which one is shown. Frame is part of index.html; others are modules that are loaded when
+// they are opened first. A module exports `open(box, app)`: it fills `box` and may return { shown(), hidden() }.
+
+/** A new panel is a line here. @type {{ name: string, title: string, module?: string }[]} */
+const PANELS = [
+  { name: 'frame', title: 'Frame' },
+];
+
+export class Panels {
+  /** @param {HTMLElement} bar @param {HTMLElement} area beside which panels are put @param {object} app */
+  constructor(bar, area, app) {
+    this.bar = bar;
+    this.app = app;
+    this.boxes = new Map([['frame', { box: area, panel: {} }]]);
+    this.current = 'frame';
+    bar.hidden = PANELS.length < 2;
+    bar.replaceChildren(...PANELS.map(({ name, title }) => {
+      const tab = document.createElement('button');
+      tab.type = 'button';
+      tab.id = `tab-${name}`;
+      tab.textContent = title;
+      tab.setAttribute('role', 'tab');
+      tab.setAttribute('aria-selected', String(name === this.current));
+      tab.addEventListener('click', () => this.show(name));
+      return tab;
+    }));
+  }
+
+  /** True if keys belong to the frame. */
+  get frameShown() { return this.current === 'frame'; }
+
+  /** @param {string} name of a panel */
+  async show(name) {
+    const wanted = PANELS.find((panel) => panel.name === name);
+    if (!wanted || name === this.current) return;
+    const before = this.boxes.get(this.current);
+    if (!this.boxes.has(name)) this.boxes.set(name, this.make(wanted));
+    const { box } = this.boxes.get(name);
+    before.box.hidden = true;
+    box.hidden = false;
+    this.current = name;
+    for (const tab of this.bar.children) tab.setAttribute('aria-selected', String(tab.id === `tab-${name}`));
+    const { ready, panel } = this.boxes.get(name);
+    if (before.panel.hidden) before.panel.hidden();
+    await ready;
+    const opened = this.boxes.get(name).panel || panel;
+    if (this.current === name && opened.shown) opened.shown();
+  }
+
+  make({ name, title, module }) {
+    const box = document.createElement('main'), made = { box, panel: {}, ready: null };
+    box.className = 'panel';
+    box.id = `panel-${name}`;
+    box.setAttribute('role', 'tabpanel');
+    box.setAttribute('aria-label', title);
+    this.boxes.get('frame').box.after(box);
+    made.ready = import(module).then((loaded) => loaded.open(box, this.app)).then((panel) => { made.panel = panel || {}; })
+      .catch((error) => { box.textContent = `This panel cannot be shown: ${error.message}`; });
+    return made;
+  }
+}

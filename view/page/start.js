@@ -1,0 +1,73 @@
+// The start page: runs of the folder runs/, and the scenarios that come with the program.
+import { getJson, post } from './api.js';
+
+const element = (id) => document.getElementById(id);
+
+function card(title, words, picture, act) {
+  const button = document.createElement('button'), box = document.createElement('span'), head = document.createElement('strong');
+  button.type = 'button';
+  button.className = 'card';
+  box.className = 'words';
+  head.textContent = title;
+  head.dir = 'auto';
+  if (picture) {
+    const image = document.createElement('img');
+    image.src = picture;
+    image.alt = '';
+    image.loading = 'lazy';
+    button.append(image);
+  }
+  box.append(head, ...words.filter(Boolean).map((text) => {
+    const line = document.createElement('p');
+    line.textContent = text;
+    line.dir = 'auto';
+    return line;
+  }));
+  button.append(box);
+  button.addEventListener('click', async () => {
+    button.disabled = true;
+    try {
+      await act();
+    } catch (error) {
+      element('problems').hidden = false;
+      element('problems').textContent = `${title}: ${error.message}`;
+    }
+    button.disabled = false;
+  });
+  return button;
+}
+
+function section(title, hint, cards) {
+  const head = document.createElement('h2'), text = document.createElement('p'), box = document.createElement('div');
+  head.textContent = title;
+  text.textContent = hint;
+  text.className = 'hint';
+  box.className = 'cards';
+  box.append(...cards);
+  return [head, text, box];
+}
+
+function age(seconds) {
+  const minutes = (Date.now() / 1000 - seconds) / 60;
+  if (minutes < 60) return `${Math.max(0, Math.round(minutes))} min ago`;
+  return minutes < 2880 ? `${Math.round(minutes / 60)} h ago` : `${Math.round(minutes / 1440)} days ago`;
+}
+
+export async function showStart() {
+  const { runs, scenarios } = await getJson('start'), box = element('start');
+  for (const part of [element('main'), document.querySelector('footer'), document.querySelector('.run')]) part.hidden = true;
+  document.title = 'Boresight';
+  const ofRuns = runs.map((run) => card(run.name, [run.scenario, `${run.state}, ${age(run.modified_s)}`],
+    run.picture && /^[\w-][\w.-]*$/.test(run.name) ? `api/picture?name=${encodeURIComponent(run.name)}` : '', async () => {
+      const { run: number } = await post('open', JSON.stringify({ run: run.name }));
+      location.search = `?run=${number}`;
+    }));
+  const ofScenarios = scenarios.map(({ file, description }) => card(file.replace(/\.json$/, ''), [description], '', async () => {
+    const { url } = await post('launch', JSON.stringify({ scenario: file }));
+    location.href = url;
+  }));
+  box.replaceChildren(...(runs.length ? section('Runs', 'In the folder runs/, the newest first. Click one to play it back.', ofRuns) : []),
+    ...section('Scenarios', 'Click one to run it live: pause it, step it, change it. It is recorded in runs/.', ofScenarios));
+  box.hidden = false;
+  document.dispatchEvent(new CustomEvent('startshown'));
+}
