@@ -7,6 +7,7 @@
 
 #include "sim/io/fits_reader.h"
 #include "sim/io/fits_source.h"
+#include "sim/run/run_observations.h"
 #include "sim/run/run_sensors.h"
 #include "view/decimate.h"
 #include "view/recorded_run.h"
@@ -52,7 +53,8 @@ struct bst_view_run {
     int sensors;
     bst_view_sensor sensor[BST_EXPORT_SENSORS];
     uint64_t requests;
-    size_t samples; /* held by all lines */
+    size_t samples;       /* held by all lines */
+    bst_run_scene *scene; /* its world; NULL: not made (view/space.c) */
 };
 
 /* Begins a call: locks the run and opens its tables if they are not open. End it with

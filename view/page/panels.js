@@ -4,6 +4,8 @@
 /** A new panel is a line here. @type {{ name: string, title: string, module?: string }[]} */
 const PANELS = [
   { name: 'frame', title: 'Frame' },
+  { name: 'space', title: 'Space', module: './space.js' },
+  { name: 'editor', title: 'Editor', module: './editor.js' },
 ];
 
 export class Panels {
