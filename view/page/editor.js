@@ -12,7 +12,7 @@ const FIRST = 'neossat_geo_track.json';
 
 const LAYOUT = `
 <div class="bar editor-bar">
-  <label class="inline">Scenario <input id="editor-file" list="editor-files" size="30" spellcheck="false"></label><datalist id="editor-files"></datalist>
+  <label class="inline">Scenario <input id="editor-file" list="editor-files" size="28" spellcheck="false"></label><datalist id="editor-files"></datalist>
   <button id="editor-open" type="button">Open</button>
   <label class="inline">Search <input id="editor-search" type="search" size="15" placeholder="key or words"></label>
   <label class="inline">Show <select id="editor-shown"><option value="all">all keys</option><option value="given">not default</option><option value="changed">changed</option></select></label>
@@ -20,6 +20,7 @@ const LAYOUT = `
   <label class="inline">Save as <input id="editor-name" size="18" spellcheck="false" value="my_scenario.json"></label>
   <label class="inline"><input id="editor-overwrite" type="checkbox">Replace</label>
   <button id="editor-save" type="button">Save</button>
+  <button id="editor-run" type="button">Save and run</button>
 </div>
 <p id="editor-message" class="editor-message" role="status"></p>
 <section class="editor-form" id="editor-form" aria-label="Keys of the scenario" tabindex="-1"></section>
@@ -56,6 +57,7 @@ export class Editor {
     element('editor-search').addEventListener('input', drawAgain);
     element('editor-shown').addEventListener('change', drawAgain);
     element('editor-save').addEventListener('click', () => this.save());
+    element('editor-run').addEventListener('click', () => this.run());
     element('editor-small').addEventListener('change', () => this.writeText());
     element('editor-text').addEventListener('input', () => this.readText());
   }
@@ -204,13 +206,29 @@ export class Editor {
     }
   }
 
+  /** Saves, and opens a page on which the scenario runs live. */
+  async run() {
+    const file = await this.save();
+    if (!file) return;
+    try {
+      this.say(`${file} is starting …`);
+      const { url } = await post('editor/run', JSON.stringify({ file }));
+      location.href = url;
+    } catch (error) {
+      this.say(error.message);
+    }
+  }
+
+  /** @returns {Promise<string>} name of the file; "": not saved */
   async save() {
     try {
       const request = { file: element('editor-name').value.trim(), text: `${element('editor-text').value}\n`, overwrite: element('editor-overwrite').checked };
       const { file } = await post('editor/save', JSON.stringify(request));
       this.say(`Saved: ${this.folder}/${file}. Run it: boresight run ${file}`);
+      return file;
     } catch (error) {
       this.say(error.message);
+      return '';
     }
   }
 }
