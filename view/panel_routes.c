@@ -5,6 +5,7 @@
 #include "view/editor.h"
 #include "view/launch.h"
 #include "view/space.h"
+#include "view/why.h"
 
 static bst_status schema_route(bst_ctx *ctx, bst_view_exchange *x) {
     return bst_view_editor_schema(ctx, &x->json);
@@ -63,4 +64,5 @@ const bst_view_route bst_view_panel_routes[] = {
     {"api/space/states", false, bst_view_route_space_states},
     {"api/space/poses", false, bst_view_route_space_poses},
     {"api/space/coast", false, bst_view_route_space_coast},
+    {"api/why", false, bst_view_route_why},
     {NULL, false, NULL}};

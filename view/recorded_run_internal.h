@@ -73,6 +73,17 @@ void bst_view_unlock(bst_view_run *run);
 bst_status bst_view_find_sensor(bst_ctx *ctx, bst_view_run *run, int64_t number,
                                 bst_view_sensor **out) BST_MUST_CHECK;
 
+/* Rows of a table from the first of an exposure on.
+ *
+ * Given:     sensor    row of the table sensors
+ *            columns   that are read behind exposure_id
+ *            exposure  number of the exposure
+ * Errors:    those of bst_io_rows_open: not recorded
+ * Ownership: close *out with bst_io_rows_close */
+bst_status bst_view_open_from(bst_ctx *ctx, const bst_view_run *run, int64_t sensor,
+                              const char *table, const char *columns, int64_t exposure,
+                              bst_io_rows **out) BST_MUST_CHECK;
+
 /* Ends a description: deletes it after an error, *out is then NULL. Returns the status. */
 bst_status bst_view_keep(bst_status status, cJSON **out);
 

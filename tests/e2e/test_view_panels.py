@@ -178,6 +178,19 @@ class Server(unittest.TestCase):
                 self.editor.get("api/space/" + route)
             self.assertEqual(caught.exception.code, refused, route)
 
+    def test_why(self):
+        """The short exposures leave the target below the threshold, with the SNR of the tables."""
+        found = self.editor.json("api/why?frame=1")
+        with sqlite3.connect(os.path.join(self.made, "run.sqlite")) as tables:
+            snr, threshold = tables.execute("""SELECT snr, threshold_snr FROM truth JOIN detection_frames USING (sensor, exposure_id)
+                WHERE kind != 'star' AND exposure_id = 1""").fetchone()
+        self.assertLess(snr, threshold)
+        self.assertEqual((found["target"], found["frame"]), ("INMARSAT GX5", {"kind": "faint", "text": f"SNR {snr:.1f} is below the threshold of {threshold:.1f}"}))
+        self.assertEqual([(one["first"], one["last"], one["kind"]) for one in found["spans"]], [(0, 2, "faint")])
+        with self.assertRaises(urllib.error.HTTPError) as caught:
+            self.editor.get("api/why?frame=99")
+        self.assertEqual(caught.exception.code, 404)
+
     def test_refused(self):
         self.assertEqual(self.editor.post("check", file="x")[0], 400)
         path = "/{token}/api/editor/save"

@@ -240,6 +240,12 @@ class Page(unittest.TestCase):
             page.wait_for("Math.abs(document.boresight.timeOf(document.boresight.current) - 3) < 1.1")
             page.evaluate("document.boresight.goTo(0)")
             page.wait_for("document.space.time === document.boresight.timeOf(0)")
+            # why: at the end of the second frame it is detected
+            self.click(page, "tab-why")
+            page.evaluate("document.boresight.goTo(1)")
+            page.wait_for("document.querySelector('.why-text')?.textContent.startsWith('Detected ')")
+            self.assertEqual(page.evaluate("document.querySelectorAll('.why-list li.now').length"), 1)
+            self.click(page, "tab-space")
             # 30 pictures a second leave 33 ms of the page's thread for each
             task = lambda: {one["name"]: one["value"] for one in page.command("Performance.getMetrics")["metrics"]}["TaskDuration"]
             page.evaluate("document.space.step = -1; document.space.goTo(1, false)")

@@ -5,6 +5,7 @@
 const PANELS = [
   { name: 'frame', title: 'Frame' },
   { name: 'space', title: 'Space', module: './space.js' },
+  { name: 'why', title: 'Why', module: './why.js' },
   { name: 'editor', title: 'Editor', module: './editor.js' },
 ];
 
