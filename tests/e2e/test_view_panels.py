@@ -88,7 +88,7 @@ class Server(unittest.TestCase):
         self.assertEqual(found["problems"], [{"kind": "error", "pointer": PSF, "text": "out of range (found 60; allowed: a number from 0.3 to 50 px)"}])
         found = self.check('{"extends":\n 3,}')["problems"]
         self.assertEqual([(one["kind"], one["line"], one["column"]) for one in found], [("error", 2, 4)])
-        found = self.check({"extends": base, "epoch_utc": "2022-10-01T00:00:00Z"})
+        found = self.check({"extends": base, "epoch_utc": "2022-10-01T00:00:00Z", "duration_s": 60})
         self.assertTrue(found["good"])
         self.assertEqual((found["problems"][0]["kind"], found["problems"][0]["pointer"]), ("warning", "/epoch_utc"))
         # text that is looked at loads no code
@@ -124,8 +124,9 @@ class Server(unittest.TestCase):
         self.assertEqual(self.editor.post("save", file="mine.json", text=text), (200, {"file": "mine.json"}))
         self.assertEqual(self.editor.post("save", file="mine.json", text="{}")[0], 400)
         self.assertEqual(self.saved(), text)
+        short = ("--duration", "60")
         # its own reading is that of --set
-        self.assertEqual(resolved("mine.json", folder=self.folder), resolved(base, "--set", f"{PSF}=3"))
+        self.assertEqual(resolved("mine.json", *short, folder=self.folder), resolved(base, "--set", f"{PSF}=3", *short))
         os.symlink(self.made + "/manifest.json", os.path.join(self.folder, "link.json"))
         before = test_view.digests(self.made)
         self.editor.post("save", file="link.json", text=text, overwrite=True)
