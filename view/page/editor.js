@@ -12,15 +12,15 @@ const FIRST = 'neossat_geo_track.json';
 
 const LAYOUT = `
 <div class="bar editor-bar">
-  <label class="inline">Scenario <input id="editor-file" list="editor-files" size="28" spellcheck="false"></label><datalist id="editor-files"></datalist>
+  <label class="inline">Scenario <input id="editor-file" list="editor-files" size="24" spellcheck="false"></label><datalist id="editor-files"></datalist>
   <button id="editor-open" type="button">Open</button>
-  <label class="inline">Search <input id="editor-search" type="search" size="15" placeholder="key or words"></label>
+  <label class="inline">Search <input id="editor-search" type="search" size="12" placeholder="key or words"></label>
   <label class="inline">Show <select id="editor-shown"><option value="all">all keys</option><option value="given">not default</option><option value="changed">changed</option></select></label>
   <span class="gap"></span>
-  <label class="inline">Save as <input id="editor-name" size="18" spellcheck="false" value="my_scenario.json"></label>
+  <label class="inline">Save as <input id="editor-name" size="15" spellcheck="false" value="my_scenario.json"></label>
   <label class="inline"><input id="editor-overwrite" type="checkbox">Replace</label>
   <button id="editor-save" type="button">Save</button>
-  <button id="editor-run" type="button">Save and run</button>
+  <button id="editor-run" type="button" aria-label="Save and run">Run</button>
 </div>
 <p id="editor-message" class="editor-message" role="status"></p>
 <section class="editor-form" id="editor-form" aria-label="Keys of the scenario" tabindex="-1"></section>
