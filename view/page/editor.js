@@ -10,28 +10,6 @@ const CHECK_AFTER_MS = 350;
 /** The file that is opened first, where it is there. */
 const FIRST = 'neossat_geo_track.json';
 
-const LAYOUT = `
-<div class="bar editor-bar">
-  <label class="inline">Scenario <input id="editor-file" list="editor-files" size="24" spellcheck="false"></label><datalist id="editor-files"></datalist>
-  <button id="editor-open" type="button">Open</button>
-  <label class="inline">Search <input id="editor-search" type="search" size="12" placeholder="key or words"></label>
-  <label class="inline">Show <select id="editor-shown"><option value="all">all keys</option><option value="given">not default</option><option value="changed">changed</option></select></label>
-  <span class="gap"></span>
-  <label class="inline">Save as <input id="editor-name" size="15" spellcheck="false" value="my_scenario.json"></label>
-  <label class="inline"><input id="editor-overwrite" type="checkbox">Replace</label>
-  <button id="editor-save" type="button">Save</button>
-  <button id="editor-run" type="button" aria-label="Save and run">Run</button>
-</div>
-<p id="editor-message" class="editor-message" role="status"></p>
-<section class="editor-form" id="editor-form" aria-label="Keys of the scenario" tabindex="-1"></section>
-<section class="editor-side">
-  <div class="editor-problems" id="editor-problems" role="status" aria-label="Result of the check"></div>
-  <div class="bar"><h2 id="editor-text-title">Text</h2><label class="inline"><input id="editor-small" type="checkbox" checked>Only what differs from the file</label></div>
-  <textarea id="editor-text" spellcheck="false" aria-labelledby="editor-text-title" wrap="off"></textarea>
-  <div class="bar"><h2>What the numbers mean</h2></div>
-  <div id="editor-figures" class="editor-figures" aria-label="Figures of the scenario"></div>
-</section>`;
-
 const element = (id) => document.getElementById(id);
 
 export class Editor {
@@ -238,7 +216,7 @@ export async function open(box) {
   const style = make('link', { rel: 'stylesheet', href: 'editor.css' });
   document.head.append(style);
   box.classList.add('editor');
-  box.innerHTML = LAYOUT; // constant
+  box.append(document.getElementById('layout-editor').content.cloneNode(true));
   const editor = new Editor(await getJson('editor/schema'));
   document.editor = editor; // for tests of the page
   await editor.start();

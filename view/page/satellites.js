@@ -2,15 +2,6 @@
 import { post } from './api.js';
 import { make } from './editor_form.js';
 
-const LAYOUT = `
-<h2 id="satellite-title">Satellite or TLE</h2>
-<label>Name or catalogue number <input id="satellite-find" type="search" autocomplete="off" spellcheck="false"></label>
-<p id="satellite-count" class="doc" role="status"></p>
-<ul id="satellite-list" aria-label="Satellites"></ul>
-<label>Or paste an element set, with its name above it or without <textarea id="satellite-tle" rows="3" spellcheck="false" wrap="off"></textarea></label>
-<p id="satellite-problem" class="problem" role="alert"></p>
-<div class="tools"><button id="satellite-use" type="button">Use the element set</button><button id="satellite-close" type="button">Close</button></div>`;
-
 /** Reads an element set. @returns {{ name: string, line1: string, line2: string } | null} */
 export function readTle(text) {
   const lines = text.split('\n').map((line) => line.trimEnd()).filter(Boolean);
@@ -24,7 +15,7 @@ export class SatelliteDialog {
   constructor(chosen) {
     this.chosen = chosen;
     this.dialog = make('dialog', { className: 'satellites' });
-    this.dialog.innerHTML = LAYOUT; // constant
+    this.dialog.append(document.getElementById('layout-satellites').content.cloneNode(true));
     this.dialog.setAttribute('aria-labelledby', 'satellite-title');
     document.body.append(this.dialog);
     const element = (id) => this.dialog.querySelector(`#${id}`);

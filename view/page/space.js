@@ -14,24 +14,6 @@ const FAR = 400;
 /** Bodies whose orbits and names are drawn. */
 const NAMED_MOST = 40;
 
-const LAYOUT = `
-<div class="bar space-bar">
-  <label class="inline">Follow <select id="space-follow"></select></label>
-  <button id="space-through" type="button" aria-pressed="false">Through the telescope</button>
-  <label class="inline"><input id="space-orbits" type="checkbox" checked>Orbits</label>
-  <label class="inline"><input id="space-fields" type="checkbox" checked>Fields of view</label>
-  <label class="inline"><input id="space-names" type="checkbox" checked>Names</label>
-  <label class="inline"><input id="space-shadow" type="checkbox">Earth's shadow</label>
-  <span class="gap"></span>
-  <label class="inline">Time <input id="space-time" type="range" min="0" max="1" step="any" value="0"></label>
-  <output id="space-clock"></output>
-</div>
-<div class="space-stage" id="space-stage">
-  <canvas id="space-image" aria-hidden="true"></canvas>
-  <canvas id="space-overlay" tabindex="0" role="application" aria-label="View of space. Arrow keys turn it, plus and minus zoom, comma and full stop step through time." aria-describedby="space-readout"></canvas>
-</div>
-<div id="space-readout" class="readout" aria-live="off"></div>`;
-
 const element = (id) => document.getElementById(id);
 const km = (radii) => `${Math.round(radii * math.EARTH_M / 1000).toLocaleString('en')} km`;
 
@@ -329,7 +311,7 @@ export class SpaceView {
 export async function open(box, app) {
   document.head.append(make('link', { rel: 'stylesheet', href: 'space.css' }));
   box.classList.add('space');
-  box.innerHTML = LAYOUT; // constant
+  box.append(document.getElementById('layout-space').content.cloneNode(true));
   const view = new SpaceView(app, await getJson('space/scene'));
   view.poses = await Promise.all(view.scene.sensors.map((_, sensor) => getNumbers('space/poses', { sensor })));
   view.painter.setCoast(math.coastSegments(await getBytes('space/coast')));
