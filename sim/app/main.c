@@ -2,6 +2,7 @@
 #include <stddef.h>
 
 #include "sim/app/app.h"
+#include "view/attach.h"
 
 int main(int argc, char **argv) {
     static const bst_app_command more[] = {
@@ -9,6 +10,9 @@ int main(int argc, char **argv) {
         {"bench", bst_cmd_bench, "measure speed and error"},
         {NULL, NULL, NULL},
     };
+    static const bst_app_viewer viewer = {bst_view_attach, bst_view_attached_steering,
+                                          bst_view_detach};
+    bst_app_page = &viewer;
     signal(SIGXFSZ, SIG_IGN); /* a write beyond a limit on file sizes then returns an error */
     return bst_app_run(argc, argv, more);
 }
