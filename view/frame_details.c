@@ -111,11 +111,11 @@ static void add_header(bst_view_run *run, bst_view_sensor *s, int64_t fits_index
 
 /* ------------------------------------------------------------------ rows of an exposure */
 
-/* Rows of a table from the first of an exposure on. Rows of a sensor are in the order of exposures,
- * so that bisection finds it: the tables have no index, and a day has millions of rows. */
-static bst_status open_from(bst_ctx *ctx, const bst_view_run *run, int64_t sensor,
-                            const char *table, const char *columns, int64_t exposure,
-                            bst_io_rows **out) {
+/* Rows of a sensor are in the order of exposures, so that bisection finds it: the tables have no
+ * index, and a day has millions of rows. */
+bst_status bst_view_open_from(bst_ctx *ctx, const bst_view_run *run, int64_t sensor,
+                              const char *table, const char *columns, int64_t exposure,
+                              bst_io_rows **out) {
     char probe[160], most[80], query[700];
     snprintf(most, sizeof most, "SELECT max(rowid) FROM %s", table);
     snprintf(probe, sizeof probe,
@@ -162,8 +162,8 @@ static bst_status add_rows(bst_ctx *ctx, const bst_view_run *run, const bst_view
     bool more;
     bst_status status;
     int count = cJSON_GetArraySize(list);
-    if (open_from(&ignored, run, s->sensor.index, table[0], table[1], range.first, &rows) !=
-        BST_OK) {
+    if (bst_view_open_from(&ignored, run, s->sensor.index, table[0], table[1], range.first,
+                           &rows) != BST_OK) {
         return BST_OK;
     }
     while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more &&
@@ -250,10 +250,11 @@ static bst_status add_recorded_wcs(bst_ctx *ctx, const bst_view_run *run, const 
     bst_ctx ignored = {0};
     bool more;
     double value[8];
-    if (open_from(&ignored, run, s->sensor.index, "frames",
-                  "crpix1, crpix2, crval1_deg, crval2_deg, cd1_1_deg, cd1_2_deg, cd2_1_deg,"
-                  " cd2_2_deg",
-                  frame->id, &rows) != BST_OK) {
+    if (bst_view_open_from(
+            &ignored, run, s->sensor.index, "frames",
+            "crpix1, crpix2, crval1_deg, crval2_deg, cd1_1_deg, cd1_2_deg, cd2_1_deg,"
+            " cd2_2_deg",
+            frame->id, &rows) != BST_OK) {
         return BST_OK;
     }
     bst_status status = bst_io_rows_next(ctx, rows, &more);

@@ -184,6 +184,10 @@ void bst_view_run_close(bst_view_run *run) {
     if (run) {
         forget_sensors(run);
         bst_run_reader_close(run->reader);
+        if (run->scene) {
+            bst_run_scene_close(run->scene);
+            free(run->scene);
+        }
         pthread_mutex_destroy(&run->lock);
         free(run);
     }

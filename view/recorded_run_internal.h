@@ -7,6 +7,7 @@
 
 #include "sim/io/fits_reader.h"
 #include "sim/io/fits_source.h"
+#include "sim/run/run_observations.h"
 #include "sim/run/run_sensors.h"
 #include "view/decimate.h"
 #include "view/recorded_run.h"
@@ -52,7 +53,8 @@ struct bst_view_run {
     int sensors;
     bst_view_sensor sensor[BST_EXPORT_SENSORS];
     uint64_t requests;
-    size_t samples; /* held by all lines */
+    size_t samples;       /* held by all lines */
+    bst_run_scene *scene; /* its world; NULL: not made (view/space.c) */
 };
 
 /* Begins a call: locks the run and opens its tables if they are not open. End it with
@@ -70,6 +72,17 @@ void bst_view_unlock(bst_view_run *run);
  * Errors:    BST_ERR_NOT_FOUND; BST_ERR_MEMORY; BST_ERR_FORMAT: damaged tables */
 bst_status bst_view_find_sensor(bst_ctx *ctx, bst_view_run *run, int64_t number,
                                 bst_view_sensor **out) BST_MUST_CHECK;
+
+/* Rows of a table from the first of an exposure on.
+ *
+ * Given:     sensor    row of the table sensors
+ *            columns   that are read behind exposure_id
+ *            exposure  number of the exposure
+ * Errors:    those of bst_io_rows_open: not recorded
+ * Ownership: close *out with bst_io_rows_close */
+bst_status bst_view_open_from(bst_ctx *ctx, const bst_view_run *run, int64_t sensor,
+                              const char *table, const char *columns, int64_t exposure,
+                              bst_io_rows **out) BST_MUST_CHECK;
 
 /* Ends a description: deletes it after an error, *out is then NULL. Returns the status. */
 bst_status bst_view_keep(bst_status status, cJSON **out);

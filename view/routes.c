@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "view/panel_routes.h"
 #include "view/start_routes.h"
 
 /* What the page is for: {"live": true, "runs": number of open ones, "run": as api/run, "names": as
@@ -109,6 +110,11 @@ const bst_view_route *bst_view_route_find(const char *path) {
     for (int i = 0; i < ROUTES; i++) {
         if (strcmp(path, routes[i].path) == 0) {
             return &routes[i];
+        }
+    }
+    for (const bst_view_route *route = bst_view_panel_routes; route->path; route++) {
+        if (strcmp(path, route->path) == 0) {
+            return route;
         }
     }
     return NULL;

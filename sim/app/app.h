@@ -21,6 +21,29 @@ typedef struct bst_app_command {
  * Returned:  exit status (sim/cli/cli.h) */
 int bst_app_run(int argc, char **argv, const bst_app_command *more);
 
+struct bst_view_attached;
+struct bst_run_steering;
+
+/* What `boresight run --view` uses (view/attach.h). */
+typedef struct bst_app_viewer {
+    bst_status (*attach)(bst_ctx *ctx, const bst_scenario *scenario, const char *out,
+                         struct bst_view_attached **attached);
+    const struct bst_run_steering *(*steering)(const struct bst_view_attached *attached);
+    void (*detach)(struct bst_view_attached *attached);
+} bst_app_viewer;
+
+/* Viewer of the program; NULL in libboresight, which has none. Set it before bst_app_run. */
+extern const bst_app_viewer *bst_app_page;
+
+/* Opens a page of a run that is about to begin, as bst_view_attach.
+ *
+ * Errors:    BST_ERR_ARGUMENT: there is no viewer; those of bst_view_attach
+ * Ownership: end it with bst_app_close_page */
+bst_status bst_app_open_page(bst_ctx *ctx, const bst_scenario *scenario, const char *out,
+                             struct bst_view_attached **page) BST_MUST_CHECK;
+/* Closes a page; NULL is allowed. */
+void bst_app_close_page(struct bst_view_attached *page);
+
 /* boresight new: writes a scenario for an observer and a target. */
 int bst_cmd_new(int argc, char **argv);
 /* boresight run: runs a scenario and records it. */

@@ -1,6 +1,8 @@
 /* boresight check: validates a scenario and prints it with every default. */
 #include <stdio.h>
+#include <string.h>
 
+#include "sim/analysis/check/check_figures.h"
 #include "sim/analysis/check/scenario_rules.h"
 #include "sim/app/app.h"
 #include "sim/cli/command_line.h"
@@ -14,12 +16,33 @@ static const char help_text[] =
     "its modules, and\n"
     "prints the scenario with every default written out. Warns of what a scenario hardly "
     "means (--rules\n"
-    "lists it). Nothing is written to disk.\n\n"
+    "lists it). Nothing is written to disk but what --figures names. - in place of the file: the "
+    "standard input,\n"
+    "whose files are relative to the current folder.\n\n"
     "  boresight check scenarios/neossat_geo_track.json --set "
     "/duration_s=60\n\noptions:\n";
 
+/* Applies the rules, then prints the scenario, or its figures where they are asked for. */
+static int report(bst_ctx *ctx, const bst_scenario *scenario, const bst_simulation *sim,
+                  const char *figures, bool quiet) {
+    ctx->log_level = BST_LOG_WARNING;
+    bst_status status = bst_check_rules_apply(ctx, scenario, sim);
+    if (status == BST_OK && figures) {
+        cJSON *node;
+        status = bst_check_figures(ctx, scenario, sim, &node);
+        status = status == BST_OK ? bst_cli_write_json(ctx, figures, node) : status;
+        quiet |= strcmp(figures, "-") == 0;
+    }
+    if (status != BST_OK) {
+        fprintf(stderr, "boresight: %s\n", ctx->message);
+        return BST_EXIT_FAILED;
+    }
+    return quiet ? BST_EXIT_OK : bst_cli_print_json(bst_scenario_echo(scenario));
+}
+
 int bst_cmd_check(int argc, char **argv) {
     bool help = false, quiet = false, list_rules = false;
+    const char *figures = NULL;
     bst_load_options load = BST_LOAD_DEFAULTS;
     const bst_option table[] = {
         BST_LOAD_OPTIONS(load),
@@ -27,6 +50,13 @@ int bst_cmd_check(int argc, char **argv) {
          .kind = BST_OPTION_FLAG,
          .target = &list_rules,
          .doc = "list what check and run warn of, and stop"},
+        {.name = "figures",
+         .kind = BST_OPTION_TEXT,
+         .target = &figures,
+         .path = BST_PATH_OUTPUT,
+         .argument = "FILE",
+         .doc = "write limiting magnitudes, SNR of the targets and disk space as JSON; - prints "
+                "them in place of the scenario"},
         {.name = "quiet",
          .kind = BST_OPTION_FLAG,
          .target = &quiet,
@@ -65,13 +95,7 @@ int bst_cmd_check(int argc, char **argv) {
         fprintf(stderr, "boresight: %s\n", ctx.message);
         code = BST_EXIT_FAILED;
     } else {
-        ctx.log_level = BST_LOG_WARNING;
-        if (bst_check_rules_apply(&ctx, &scenario, sim) != BST_OK) {
-            fprintf(stderr, "boresight: %s\n", ctx.message);
-            code = BST_EXIT_FAILED;
-        } else {
-            code = quiet ? BST_EXIT_OK : bst_cli_print_json(bst_scenario_echo(&scenario));
-        }
+        code = report(&ctx, &scenario, sim, figures, quiet);
     }
     bst_simulation_free(sim);
     bst_scenario_free(&scenario);

@@ -10,7 +10,6 @@
 #include "sim/run/run_link.h"
 #include "sim/run/run_parts.h"
 #include "sim/run/run_scenario.h"
-#include "view/attach.h"
 
 static const char help_text[] =
     "usage: boresight run SCENARIO.json [options]\n"
@@ -63,9 +62,9 @@ static bst_status run_loaded(bst_ctx *ctx, run_request *r, const bst_json *json,
                                .print = true,
                                .saving = &r->saving};
     bst_simulation *sim = NULL;
-    bst_view_attached *page = NULL;
-    bst_status status = r->view ? bst_view_attach(ctx, scenario, request.out, &page) : BST_OK;
-    request.steering = bst_view_attached_steering(page);
+    struct bst_view_attached *page = NULL;
+    bst_status status = r->view ? bst_app_open_page(ctx, scenario, request.out, &page) : BST_OK;
+    request.steering = page ? bst_app_page->steering(page) : NULL;
     status = status == BST_OK ? create_and_run(ctx, r, json, scenario, &sim, &request) : status;
     if (status != BST_OK) {
         fprintf(stderr, "boresight: %s\n", ctx->message);
@@ -73,7 +72,7 @@ static bst_status run_loaded(bst_ctx *ctx, run_request *r, const bst_json *json,
     bst_run_link_end(sim, status, ctx->message);
     bst_simulation_free(sim);
     bst_run_restored_free(request.restored);
-    bst_view_detach(page);
+    bst_app_close_page(page);
     return status;
 }
 

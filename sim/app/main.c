@@ -2,6 +2,7 @@
 #include <stddef.h>
 
 #include "sim/app/app.h"
+#include "view/attach.h"
 
 int main(int argc, char **argv) {
     static const bst_app_command more[] = {
@@ -10,6 +11,9 @@ int main(int argc, char **argv) {
         {"version", bst_cmd_version, "versions of the program, its libraries and the machine"},
         {NULL, NULL, NULL},
     };
+    static const bst_app_viewer viewer = {bst_view_attach, bst_view_attached_steering,
+                                          bst_view_detach};
+    bst_app_page = &viewer;
     signal(SIGXFSZ, SIG_IGN); /* a write beyond a limit on file sizes then returns an error */
     return bst_app_run(argc, argv, more);
 }

@@ -70,3 +70,18 @@ int bst_program_run(int argc, char **argv, int output, int errors) {
     pthread_mutex_unlock(&running);
     return code;
 }
+
+const bst_app_viewer *bst_app_page = NULL;
+
+bst_status bst_app_open_page(bst_ctx *ctx, const bst_scenario *scenario, const char *out,
+                             struct bst_view_attached **page) {
+    return bst_app_page
+               ? bst_app_page->attach(ctx, scenario, out, page)
+               : bst_fail(ctx, BST_ERR_ARGUMENT, "--view: only the program boresight has a viewer");
+}
+
+void bst_app_close_page(struct bst_view_attached *page) {
+    if (page) {
+        bst_app_page->detach(page);
+    }
+}

@@ -11,8 +11,13 @@
 #include "sim/cli/cli.h"
 #include "sim/cli/outputs.h"
 #include "sim/cli/plugins.h"
+#include "sim/core/file.h"
+#include "sim/core/former_names.h"
 #include "sim/link/external.h"
 #include "sim/registry/registry.h"
+
+/* Longest scenario on the standard input; that of files. */
+enum { INPUT_BYTES = 64 << 20 };
 
 /* Makes a module external: changes its type; keeps keys that are common to all modules or define
  * how frames are commanded. */
@@ -175,9 +180,44 @@ static bst_status spare_inputs(bst_ctx *ctx, const bst_option *table, const bst_
     return status;
 }
 
+/* Reads a scenario from the standard input, as a file of the current folder. */
+static bst_status load_standard_input(bst_ctx *ctx, bst_json **json) {
+    static const char name[] = "standard input";
+    size_t room = 65536, bytes = 0;
+    char *text = malloc(room + 1);
+    while (text && (bytes += fread(text + bytes, 1, room - bytes, stdin)) == room &&
+           room < INPUT_BYTES) {
+        char *longer = realloc(text, 2 * room + 1);
+        if (!longer) {
+            free(text);
+        }
+        text = longer;
+        room *= 2;
+    }
+    bst_status status = BST_OK;
+    if (!text) {
+        status = bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", name);
+    } else if (ferror(stdin)) {
+        status = bst_fail(ctx, BST_ERR_IO, "%s: cannot be read", name);
+    } else if (bytes == room) {
+        status = bst_fail(ctx, BST_ERR_FORMAT, "%s: is longer than %d MiB; give a scenario file",
+                          name, INPUT_BYTES >> 20);
+    } else {
+        text[bytes] = '\0';
+        status = bst_file_check_text(ctx, name, text, bytes);
+    }
+    status = status == BST_OK
+                 ? bst_json_parse_described(ctx, name, text, bst_registry_tables(), json)
+                 : status;
+    free(text);
+    return status;
+}
+
 static bst_status load(bst_ctx *ctx, const char *path, const bst_load_options *options,
                        bst_json **json, bst_scenario *out) {
-    BST_TRY(bst_json_load_described(ctx, path, bst_registry_tables(), json));
+    BST_TRY(strcmp(path, "-") == 0
+                ? load_standard_input(ctx, json)
+                : bst_json_load_described(ctx, path, bst_registry_tables(), json));
     bst_status status = apply(ctx, options, *json);
     if (status == BST_OK) {
         status = bst_plugins_scenario_read(ctx, *json, out);

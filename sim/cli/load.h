@@ -101,9 +101,9 @@ bst_status bst_load_check(bst_ctx *ctx, bst_load_options *options,
 bst_status bst_load_check_sensor(bst_ctx *ctx, const bst_scenario *scenario,
                                  const char *name) BST_MUST_CHECK;
 
-/* Loads `path`, applies the options and reads the scenario. *json must live as long as the
- * scenario; free both. BST_ERR_ARGUMENT also if an output of the command is an input file of the
- * scenario. */
+/* Loads `path` ("-": the standard input, as a file of the current folder), applies the options and
+ * reads the scenario. *json must live as long as the scenario; free both. BST_ERR_ARGUMENT also if
+ * an output of the command is an input file of the scenario. */
 bst_status bst_load_scenario(bst_ctx *ctx, const char *path, const bst_load_options *options,
                              bst_json **json, bst_scenario *out) BST_MUST_CHECK;
 

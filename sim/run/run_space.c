@@ -7,24 +7,32 @@
 /* smaller runs are not reported */
 #define WORTH_SAYING_BYTES 1e8
 
-/* Bytes of all frames and planes, without tables. */
-static double frame_bytes(const bst_scenario *scenario) {
-    const bst_observer_config *observers = scenario->observers.items;
+double bst_run_sensor_frames(const bst_scenario *scenario, const bst_sensor_config *sensor) {
+    const bst_exposure_config *e = &sensor->exposure;
+    return fmax(floor((scenario->duration_s - e->first_s) / e->period_s), 0.0);
+}
+
+double bst_run_sensor_bytes(const bst_scenario *scenario, const bst_sensor_config *sensor) {
     const bst_recorder_config *record = &scenario->record;
     /* Rice compresses noise of a few DN to about half */
-    double bytes = 0.0, per_pixel = record->frames == BST_RECORD_NO_FRAMES ? 0.0
-                                    : bst_recorder_compresses(record)      ? 1.0
-                                                                           : 2.0;
+    double per_pixel = record->frames == BST_RECORD_NO_FRAMES ? 0.0
+                       : bst_recorder_compresses(record)      ? 1.0
+                                                              : 2.0;
     for (uint32_t planes = record->planes; planes; planes &= planes - 1) {
         per_pixel += planes == UINT32_C(1) << BST_PLANE_SATURATION ? 1.0 : 4.0;
     }
+    return bst_run_sensor_frames(scenario, sensor) * per_pixel * (double)sensor->camera.width_px *
+           (double)sensor->camera.height_px;
+}
+
+/* Bytes of all frames and planes, without tables. */
+static double frame_bytes(const bst_scenario *scenario) {
+    const bst_observer_config *observers = scenario->observers.items;
+    double bytes = 0.0;
     for (int i = 0; i < scenario->observers.count; i++) {
         const bst_sensor_config *sensors = observers[i].sensors.items;
         for (int s = 0; s < observers[i].sensors.count; s++) {
-            const bst_exposure_config *e = &sensors[s].exposure;
-            double frames = floor((scenario->duration_s - e->first_s) / e->period_s);
-            bytes += fmax(frames, 0.0) * per_pixel * (double)sensors[s].camera.width_px *
-                     (double)sensors[s].camera.height_px;
+            bytes += bst_run_sensor_bytes(scenario, &sensors[s]);
         }
     }
     return bytes;

@@ -160,6 +160,7 @@ LINES = [
     (("challenge", "x", "--out", OUT), 2, "one seed is expected, such as 42 or 0x2A"),
     (("challenge", "-1", "--out", OUT), 2, "unknown option -1|one seed is expected"),
     (("challenge", "1", "--out", OUT, "--sequences", "0"), 2, "--sequences 0: give an integer from 1"),
+    (("check", T, "--figures", F), 2, "--figures .*: is a folder; give the name of a file in it"),
     (("loop", T, "--plot", F + "/x.gif"), 2, "x.gif: the name says neither PNG nor SVG"),
     (("loop", T, "--sensor", "nix"), 1, r"--sensor nix: .*track.json has no such sensor \(allowed: neossat/tel"),
     (("lightcurve", T, "--object", "nix"), 1, "--object nix: the scenario has no such object"),

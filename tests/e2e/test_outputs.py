@@ -20,7 +20,7 @@ class Outputs(unittest.TestCase):
     # a command's other words: input first, {} is its path
     WORDS = {"run": ["{scenario}", "--quiet", "--duration", "0"], "view": ["{scenario}", "--no-browser"],
              "report": ["{run}"], "export": ["{run}", "--table", "csv"], "orbit": ["{run}"],
-             "loop": ["{scenario}"], "serve": ["{scenario}", "--link", "ipc:///nowhere", "--as", "x"],
+             "loop": ["{scenario}"], "check": ["{scenario}"], "serve": ["{scenario}", "--link", "ipc:///nowhere", "--as", "x"],
              "propagate": ["--elements", "{elements}", "--norad", "44801", "--start",
                            "2022-06-16T22:00:00Z", "--stop", "2022-06-16T22:00:00Z", "--step", "1"],
              "calframes": ["{scenario}", "--bias", "1", "--dark", "0", "--flat", "0"],

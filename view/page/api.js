@@ -27,6 +27,11 @@ export async function getJson(route, query = {}, signal = undefined) {
   return (await get(route, query, signal)).json();
 }
 
+/** @param {string} route */
+export async function getBytes(route) {
+  return (await get(route, {}, undefined)).arrayBuffer();
+}
+
 /** 64-bit floating-point numbers. @param {string} route @param {Record<string, string | number>} query */
 export async function getNumbers(route, query, signal = undefined) {
   return new Float64Array(await (await get(route, query, signal)).arrayBuffer());

@@ -4,6 +4,9 @@
 /** A new panel is a line here. @type {{ name: string, title: string, module?: string }[]} */
 const PANELS = [
   { name: 'frame', title: 'Frame' },
+  { name: 'space', title: 'Space', module: './space.js' },
+  { name: 'why', title: 'Why', module: './why.js' },
+  { name: 'editor', title: 'Editor', module: './editor.js' },
 ];
 
 export class Panels {
@@ -24,6 +27,15 @@ export class Panels {
       tab.addEventListener('click', () => this.show(name));
       return tab;
     }));
+  }
+
+  /** Puts the start page in the place of the frame; without a run there is no space. @param {HTMLElement} start */
+  withoutRun(start) {
+    this.boxes.get('frame').box = start;
+    for (const tab of this.bar.children) {
+      if (tab.id === 'tab-frame') tab.textContent = 'Start';
+      tab.hidden = !['tab-frame', 'tab-editor'].includes(tab.id);
+    }
   }
 
   /** True if keys belong to the frame. */
@@ -53,7 +65,7 @@ export class Panels {
     box.id = `panel-${name}`;
     box.setAttribute('role', 'tabpanel');
     box.setAttribute('aria-label', title);
-    this.boxes.get('frame').box.after(box);
+    document.getElementById('main').after(box);
     made.ready = import(module).then((loaded) => loaded.open(box, this.app)).then((panel) => { made.panel = panel || {}; })
       .catch((error) => { box.textContent = `This panel cannot be shown: ${error.message}`; });
     return made;

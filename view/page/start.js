@@ -66,6 +66,9 @@ export async function showStart() {
     const { url } = await post('launch', JSON.stringify({ scenario: file }));
     location.href = url;
   }));
+  const { panels } = document.boresight;
+  panels.withoutRun(box);
+  ofScenarios.unshift(card('New scenario', ['Change one of these in a form, with your own satellites and telescope, and save it as a file of your own.'], '', () => panels.show('editor')));
   box.replaceChildren(...(runs.length ? section('Runs', 'In the folder runs/, the newest first. Click one to play it back.', ofRuns) : []),
     ...section('Scenarios', 'Click one to run it live: pause it, step it, change it. It is recorded in runs/.', ofScenarios));
   box.hidden = false;

@@ -1,0 +1,210 @@
+#!/usr/bin/env python3
+"""Editor and space of `boresight view`: their side of the program, over the network interface.
+
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_view_panels.py BORESIGHT
+"""
+import json
+import math
+import os
+import sqlite3
+import unittest
+import urllib.error
+import urllib.request
+
+import numpy
+
+import runs
+import test_view
+
+ROOT = os.getcwd()
+# the target moves by 0.7 px then: nearly a source at rest, of which the figures are
+SHORT = runs.SENSOR + "/exposure/exposure_s=0.04"
+PSF = runs.SENSOR + "/camera/psf_fwhm_px"
+
+
+class Editor(test_view.Viewer):
+    """A running `boresight view` in a folder of its own, asked as the page asks."""
+
+    def __init__(self, run, folder):
+        os.chdir(folder)
+        try:
+            super().__init__(run)
+        finally:
+            os.chdir(ROOT)
+
+    def post(self, route, **body):
+        """Status and answer: JSON, or the text of a refusal."""
+        request = urllib.request.Request(f"{self.url}api/editor/{route}", json.dumps(body).encode(),
+                                         {"Origin": self.url[:self.url.index("/", 7)]})
+        try:
+            with urllib.request.urlopen(request, timeout=60) as answer:
+                return answer.status, json.load(answer)
+        except urllib.error.HTTPError as error:
+            return error.code, error.read().decode()
+
+    def well(self, route, **body):
+        status, answer = self.post(route, **body)
+        if status != 200:
+            raise AssertionError((route, status, answer))
+        return answer
+
+
+def resolved(*words, folder="."):
+    """The scenario as `boresight check` prints it."""
+    return json.loads(runs.call("check", *words, cwd=folder).stdout)
+
+
+class Server(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.made, cls.folder = os.path.join(runs.scratch(), "run"), os.path.realpath(runs.scratch())
+        runs.run(runs.STARE, cls.made, runs.NO_FRAMES, runs.GENERATOR, SHORT, duration=3)
+        cls.editor = Editor(cls.made, cls.folder)
+        cls.base = os.path.join(ROOT, "scenarios")
+
+    @classmethod
+    def tearDownClass(cls):
+        assert cls.editor.end()[0] == 0
+
+    def check(self, text):
+        return self.editor.well("check", text=text if isinstance(text, str) else json.dumps(text))
+
+    def saved(self):
+        with open(os.path.join(self.folder, "mine.json"), encoding="utf-8") as file:
+            return file.read()
+
+    def test_schema_and_list(self):
+        self.assertEqual(self.editor.json("api/editor/schema"), json.loads(runs.call_well("schema")))
+        listed = self.editor.json("api/editor/list")
+        shipped = {name for name in os.listdir("scenarios") if name.endswith(".json") and "schema" not in name}
+        self.assertEqual({os.path.basename(one["file"]) for one in listed["files"] if one["shipped"]}, shipped)
+        self.assertEqual(listed["folder"], self.folder)
+
+    def test_problems_are_where_they_are(self):
+        """The program's own words, with pointer or line."""
+        base = os.path.join(self.base, "day_generator.json")
+        found = self.check({"extends": base, "set": {PSF: 60}})
+        self.assertEqual((found["good"], found["figures"]), (False, None))
+        self.assertEqual(found["problems"], [{"kind": "error", "pointer": PSF, "text": "out of range (found 60; allowed: a number from 0.3 to 50 px)"}])
+        found = self.check('{"extends":\n 3,}')["problems"]
+        self.assertEqual([(one["kind"], one["line"], one["column"]) for one in found], [("error", 2, 4)])
+        found = self.check({"extends": base, "epoch_utc": "2022-10-01T00:00:00Z", "duration_s": 60})
+        self.assertTrue(found["good"])
+        self.assertEqual((found["problems"][0]["kind"], found["problems"][0]["pointer"]), ("warning", "/epoch_utc"))
+        # text that is looked at loads no code
+        found = self.check({"extends": base, "set": {runs.SENSOR + "/modules/tracker": {"plugin": "x.so"}}})["problems"]
+        self.assertIn("--no-plugins", found[0]["text"])
+
+    def test_figures(self):
+        """SNR of the target as the run recorded it; loops as `boresight loop` has them."""
+        base = os.path.join(self.base, "neossat_geo_stare.json")
+        text = {"extends": base, "set": {runs.GENERATOR.split("=")[0]: "generator", SHORT.split("=")[0]: 0.04}}
+        sensor = self.check(text)["figures"]["sensors"][0]
+        with sqlite3.connect(os.path.join(self.made, "run.sqlite")) as tables:
+            snr, magnitude, range_m = tables.execute("SELECT snr, v_mag, range_m FROM truth WHERE kind != 'star' ORDER BY mid_s").fetchone()
+        state = sensor["target"]["states"][0]
+        self.assertAlmostEqual(state["v_mag"], magnitude, delta=0.01)  # within 2 s
+        self.assertAlmostEqual(state["range_m"] / range_m, 1, delta=1e-3)
+        # the figure is averaged over the places in a pixel: for a PSF of 2 px at most 3 % off
+        self.assertAlmostEqual(state["snr"] / snr, 1, delta=0.06)
+        # a source at the limit has SNR 5 by the law of magnitudes
+        self.assertAlmostEqual(sensor["v_mag_at_snr_5"], state["v_mag"] + 2.5 * math.log10(state["snr"] / 5), delta=1e-9)
+        loops = self.editor.well("loops", text=json.dumps(text))["loops"]
+        self.assertEqual(loops, json.loads(runs.call_well("loop", base, "--json", "-", "--set", runs.GENERATOR, "--set", SHORT)))
+
+    def test_save(self):
+        """Only into the folder, whole, and over nothing that is there unless asked."""
+        base = os.path.join(self.base, "day_generator.json")
+        text = json.dumps({"extends": base, "set": {PSF: 3}})
+        for name in ("../x.json", "/tmp/x.json", "x.txt", ".json", "", "a/b.json", "a\nb.json"):
+            self.assertEqual(self.editor.post("save", file=name, text=text)[0], 400, name)
+        for wrong in ("", "[]", "{", '{"extends": "mine.json"}'):
+            self.assertEqual(self.editor.post("save", file="mine.json", text=wrong)[0], 400, wrong)
+        self.assertEqual(os.listdir(self.folder), [])
+        self.assertEqual(self.editor.post("save", file="mine.json", text=text), (200, {"file": "mine.json"}))
+        self.assertEqual(self.editor.post("save", file="mine.json", text="{}")[0], 400)
+        self.assertEqual(self.saved(), text)
+        short = ("--duration", "60")
+        # its own reading is that of --set
+        self.assertEqual(resolved("mine.json", *short, folder=self.folder), resolved(base, "--set", f"{PSF}=3", *short))
+        os.symlink(self.made + "/manifest.json", os.path.join(self.folder, "link.json"))
+        before = test_view.digests(self.made)
+        self.editor.post("save", file="link.json", text=text, overwrite=True)
+        self.assertEqual(test_view.digests(self.made), before)
+        opened = self.editor.well("open", file="mine.json")
+        self.assertEqual((opened["file"], opened["text"], opened["document"]["observers"][0]["sensors"][0]["camera"]["psf_fwhm_px"]), ("mine.json", text, 3))
+        self.assertEqual(self.editor.post("save", file="mine.json", text=text.replace("3}", "4}"), overwrite=True)[0], 200)
+        self.assertIn("4}", self.saved())
+
+    def test_paths_of_an_opened_file_hold_in_the_folder(self):
+        """A list of the small file replaces that of a file of another folder, with files of its own."""
+        opened = self.editor.well("open", file=os.path.join(self.base, "knowledge/clock.json"))
+        found = self.check({"extends": opened["file"], "world": opened["document"]["world"], "observers": opened["document"]["observers"]})
+        self.assertEqual((found["good"], found["problems"]), (True, []))
+        self.assertEqual(self.editor.post("open", file="nowhere.json")[0], 404)
+
+    def test_satellites(self):
+        found = self.editor.well("satellites", find="inmarsat gx")
+        self.assertTrue(found["total"] >= 1 and all("INMARSAT GX" in one["name"] for one in found["satellites"]))
+        one, = self.editor.well("satellites", find="44801")["satellites"]  # though it is in both files
+        with open("scenarios/catalogue_2022-06.tle", encoding="utf-8") as file:
+            self.assertIn(one["line2"], file.read())
+        self.assertEqual(self.editor.well("satellites", find="no such name")["total"], 0)
+
+    def test_places_in_space(self):
+        """States as the tables have them: observer, range to the target, Sun; attitudes."""
+        scene = self.editor.json("api/space/scene")
+        sensor, = scene["sensors"]
+        self.assertEqual((scene["observers"], scene["objects"], sensor["observer"], sensor["object"]), (["neossat"], ["INMARSAT GX5"], 0, 0))
+        half = math.tan(math.radians(512 * 3 / 3600))  # to the corner of the outermost pixel
+        for (x, y, z), signs in zip(sensor["corners"], ((-1, -1), (1, -1), (1, 1), (-1, 1))):
+            numpy.testing.assert_allclose((x / z, y / z), numpy.multiply(signs, half), rtol=1e-4)  # a tangent plane's scale
+        with sqlite3.connect(os.path.join(self.made, "run.sqlite")) as tables:
+            columns = ("mid_s, observer_gcrf_x_m, observer_gcrf_y_m, observer_gcrf_z_m, sun_x_m, sun_y_m, sun_z_m, q_cam_from_gcrf_mid_x, "
+                       "q_cam_from_gcrf_mid_y, q_cam_from_gcrf_mid_z, q_cam_from_gcrf_mid_w, range_m")
+            rows = numpy.array(tables.execute(f"SELECT {columns} FROM exposures JOIN truth USING (exposure_id, mid_s) WHERE kind != 'star'").fetchall())
+        poses = self.editor.numbers("api/space/poses?sensor=0").reshape(-1, 5)
+        self.assertTrue(numpy.array_equal(poses, rows[:, [0, 7, 8, 9, 10]]))
+        for row in rows:
+            states = self.editor.numbers(f"api/space/states?from={row[0]!r}")
+            eye, target = states[15:18], states[21:24]
+            # 1e-6 m: rounding; the range is to where the object was when its light left: 40,000 km are 0.14 s at 3 km/s
+            numpy.testing.assert_allclose(eye, row[1:4], rtol=0, atol=1e-6)
+            self.assertAlmostEqual(math.dist(eye, target), row[11], delta=1000)
+            self.assertLess(math.degrees(math.acos(numpy.dot(states[:3], row[4:7]) / math.hypot(*states[:3]) / math.hypot(*row[4:7]))), 0.01)
+            turn = states[6:15].reshape(3, 3)
+            numpy.testing.assert_allclose(turn @ turn.T, numpy.eye(3), rtol=0, atol=1e-12)
+        for refused, route in ((400, "states?from=-1"), (400, "states?from=1e300"), (404, "poses?sensor=7"), (404, "scene?run=9")):
+            with self.assertRaises(urllib.error.HTTPError) as caught:
+                self.editor.get("api/space/" + route)
+            self.assertEqual(caught.exception.code, refused, route)
+
+    def test_why(self):
+        """The short exposures leave the target below the threshold, with the SNR of the tables."""
+        found = self.editor.json("api/why?frame=1")
+        with sqlite3.connect(os.path.join(self.made, "run.sqlite")) as tables:
+            snr, threshold = tables.execute("""SELECT snr, threshold_snr FROM truth JOIN detection_frames USING (sensor, exposure_id)
+                WHERE kind != 'star' AND exposure_id = 1""").fetchone()
+        self.assertLess(snr, threshold)
+        self.assertEqual((found["target"], found["frame"]), ("INMARSAT GX5", {"kind": "faint", "text": f"SNR {snr:.1f} is below the threshold of {threshold:.1f}"}))
+        self.assertEqual([(one["first"], one["last"], one["kind"]) for one in found["spans"]], [(0, 2, "faint")])
+        with self.assertRaises(urllib.error.HTTPError) as caught:
+            self.editor.get("api/why?frame=99")
+        self.assertEqual(caught.exception.code, 404)
+
+    def test_refused(self):
+        self.assertEqual(self.editor.post("check", file="x")[0], 400)
+        path = "/{token}/api/editor/save"
+        origin = "Origin: http://127.0.0.1:{port}\r\n"
+        self.assertEqual(self.editor.status(path, "GET"), 405)
+        self.assertEqual(self.editor.status(path, "POST", more=origin + "Content-Length: 99999999\r\n"), 413)
+        self.assertEqual(self.editor.status(path, "POST", more="Origin: http://evil.example\r\nContent-Length: 0\r\n"), 403)
+        self.assertEqual(self.editor.status(path, "POST", more=origin + "Content-Length: 0\r\n"), 400)
+
+
+def tearDownModule():
+    test_view.end_all()
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,77 @@
+// Unit tests of the space view's mathematics. Run by node's test runner: node --test tests/view/page_space.test.mjs
+import assert from 'node:assert/strict';
+import test from 'node:test';
+import * as math from '../../view/page/space_math.js';
+
+const MU = 3.986004418e14 / math.EARTH_M ** 3; // Earth radii, seconds
+
+/** State on a circular orbit of radius r, inclined by 0.9 rad, at angle a. */
+function circular(r, a) {
+  const v = Math.sqrt(MU / r), c = Math.cos(0.9), s = Math.sin(0.9);
+  return [[r * Math.cos(a), r * c * Math.sin(a), r * s * Math.sin(a)], [-v * Math.sin(a), v * c * Math.cos(a), v * s * Math.cos(a)]];
+}
+
+const near = (a, b, tolerance, text) => a.forEach((value, k) => assert.ok(Math.abs(value - b[k]) <= tolerance, `${text}: ${a} for ${b}`));
+
+test('cubics between states each minute', () => {
+  const r = 1.05, rate = Math.sqrt(MU / r ** 3), [p0, v0] = circular(r, 0.3), [p1, v1] = circular(r, 0.3 + 60 * rate);
+  for (const u of [0, 0.25, 0.5, 1]) {
+    const [p, v] = circular(r, 0.3 + 60 * u * rate);
+    // h^4 r'''' / 384 for a cubic of Hermite: 0.4 m
+    near(math.between(p0, v0, p1, v1, 60, u), p, 0.5 / math.EARTH_M, 'place');
+    near(math.rateBetween(p0, v0, p1, v1, 60, u), v, 0.1 / math.EARTH_M, 'velocity'); // its derivative: 0.04 m/s
+  }
+});
+
+test('the orbit of a state', () => {
+  const [p, v] = circular(2, 1), ring = math.orbitPoints(p, v, 64);
+  for (let k = 0; k < ring.length; k += 3) near([math.length(ring.slice(k, k + 3))], [2], 1e-6, 'radius'); // float32
+  // perigee 2, speed of e = 0.5: apogee 6; a point of the ellipse has the two distances' sum 2 a = 8 from the foci
+  const fast = math.scaled(v, Math.sqrt(1.5)), points = math.orbitPoints(p, fast, 64), other = math.scaled(math.unit(p), -4);
+  for (let k = 0; k < points.length; k += 3) {
+    const at = [...points.slice(k, k + 3)];
+    near([math.length(at) + math.length(math.add(at, other, -1))], [8], 1e-5, 'ellipse');
+  }
+  assert.ok(math.orbitPoints(p, math.scaled(v, 2), 64).every((value) => Math.abs(value) <= 100.1)); // open
+  assert.equal(math.orbitPoints([NaN, 0, 0], v).length, 0);
+  assert.equal(math.orbitPoints(p, math.scaled(p, 0.001)).length, 0); // falls: no plane
+});
+
+test('what the Earth hides', () => {
+  assert.ok(math.hidden([2, 0, 0], [-2, 0, 0]));
+  assert.ok(!math.hidden([2, 0, 0], [0, 2, 0])); // passes at sqrt 2
+  assert.ok(!math.hidden([2, 0, 0], [5, 0.1, 0])); // the Earth is behind
+});
+
+test('directions of the camera', () => {
+  // q_cam_from_gcrf of a turn by 90 degrees about z: the camera's x is GCRF's -y
+  const h = Math.SQRT1_2;
+  near(math.turnedBack([0, 0, h, h], [1, 0, 0]), [0, -1, 0], 1e-12, 'turned back');
+  // a point ahead is in the middle, one to the right on the right; one behind has no place
+  const matrix = math.product(math.perspective(1, 2, 0.1, 100), math.looking([1, 0, 0], [0, 0, 1]));
+  const middle = math.onScreen(matrix, [5, 0, 0], 200, 100), right = math.onScreen(matrix, [5, -1, 1], 200, 100);
+  near([middle.x, middle.y], [100, 50], 1e-9, 'middle');
+  assert.ok(right.x > 100 && right.y < 50);
+  assert.equal(math.onScreen(matrix, [-5, 0, 0], 200, 100), null);
+});
+
+test('coastlines of a shapefile', () => {
+  const file = new ArrayBuffer(100 + 8 + 44 + 8 + 80), view = new DataView(file);
+  view.setUint32(104, (44 + 8 + 80) / 2);
+  view.setInt32(108, 5, true);
+  view.setUint32(144, 2, true); // parts: points 0 to 2, 3 and 4
+  view.setUint32(148, 5, true);
+  view.setUint32(156, 3, true);
+  [[0, 0], [90, 0], [0, 90], [180, 0], [0, -90]].forEach(([x, y], k) => {
+    view.setFloat64(160 + 16 * k, x, true);
+    view.setFloat64(168 + 16 * k, y, true);
+  });
+  const found = math.coastSegments(file);
+  near([...found], [1, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 1, -1, 0, 0, 0, 0, -1], 1e-6, 'segments');
+  for (const bytes of [0, 99, 130, file.byteLength - 1]) assert.equal(math.coastSegments(file.slice(0, bytes)).length, 0); // cut
+  view.setUint32(148, 0xffffffff, true);
+  assert.equal(math.coastSegments(file).length, 0);
+  // turned with the Earth: a quarter turn takes longitude 0 to 90 degrees
+  const matrix = math.earthMatrix(new Float64Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]), [0, 0, 0], [0, 1, 0, -1, 0, 0, 0, 0, 1], 1);
+  near([matrix[0], matrix[1], matrix[2]], [0, 1, 0], 1e-12, 'Greenwich');
+});

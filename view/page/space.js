@@ -1,0 +1,326 @@
+// The panel of space: Earth, orbits, observers with their fields of view, targets, Sun and Moon at the time of the frame.
+import { getBytes, getJson, getNumbers } from './api.js';
+import { make } from './editor_form.js';
+import { SpacePainter } from './space_gl.js';
+import * as math from './space_math.js';
+
+/** Numbers of an answer (view/space.h). */
+const HEAD = 15, BODY = 6, POSE = 5;
+/** Time between two states of the bodies, s; between them they move on cubics (0.4 m from the lowest orbits). */
+const STEP_S = 60;
+/** Places of Sun and Moon in the picture, Earth radii: the Sun is at its direction only. */
+const SUN_AT = 170;
+const FAR = 400;
+/** Bodies whose orbits and names are drawn. */
+const NAMED_MOST = 40;
+
+const element = (id) => document.getElementById(id);
+const km = (radii) => `${Math.round(radii * math.EARTH_M / 1000).toLocaleString('en')} km`;
+
+export class SpaceView {
+  constructor(app, scene) {
+    this.app = app;
+    this.scene = scene;
+    this.names = [...scene.observers, ...scene.objects];
+    this.camera = { azimuth: 0.6, elevation: 0.35, distance: 18 };
+    this.time = 0;
+    this.steps = new Map(); // states by number of the step
+    this.poses = [];
+    this.shown = false;
+    this.through = false;
+    this.targets = new Set(scene.sensors.map((sensor) => sensor.object).filter((k) => k >= 0).map((k) => k + scene.observers.length));
+    this.painter = new SpacePainter(element('space-image'));
+    this.overlay = element('space-overlay');
+    this.fillControls();
+    this.listen();
+  }
+
+  fillControls() {
+    const list = ['Earth', ...this.named().map((k) => this.names[k])], values = ['-1', ...this.named().map(String)];
+    element('space-follow').replaceChildren(...list.map((name, k) => make('option', { value: values[k], textContent: name, dir: 'auto' })));
+    element('space-time').max = String(this.scene.span_s || 1);
+    if (this.scene.total > this.scene.objects.length) element('space-stage').title = `The first ${this.scene.objects.length} of ${this.scene.total} objects are shown.`;
+  }
+
+  /** Bodies with name and orbit: observers, targets, then objects as far as there is room. */
+  named() {
+    const few = [...this.scene.observers.keys(), ...this.targets];
+    for (let k = this.scene.observers.length; k < this.names.length && this.names.length <= NAMED_MOST; k++) if (!this.targets.has(k)) few.push(k);
+    return few.slice(0, NAMED_MOST);
+  }
+
+  listen() {
+    const redraw = () => this.draw();
+    for (const id of ['space-orbits', 'space-fields', 'space-names', 'space-shadow']) element(id).addEventListener('change', redraw);
+    element('space-follow').addEventListener('change', () => this.setThrough(false));
+    element('space-through').addEventListener('click', () => this.setThrough(!this.through));
+    element('space-time').addEventListener('input', () => this.goTo(Number(element('space-time').value), true));
+    document.addEventListener('frameshown', () => { if (this.shown) this.follow(); });
+    new ResizeObserver(redraw).observe(element('space-stage'));
+    this.overlay.addEventListener('pointerdown', (event) => {
+      this.drag = { x: event.clientX, y: event.clientY };
+      this.overlay.setPointerCapture(event.pointerId);
+    });
+    this.overlay.addEventListener('pointermove', (event) => {
+      if (!this.drag) return;
+      this.turn((this.drag.x - event.clientX) * 0.006, (event.clientY - this.drag.y) * 0.006);
+      this.drag = { x: event.clientX, y: event.clientY };
+    });
+    this.overlay.addEventListener('pointerup', () => { this.drag = null; });
+    this.overlay.addEventListener('wheel', (event) => {
+      event.preventDefault();
+      this.zoom(Math.exp(event.deltaY * 0.0012));
+    }, { passive: false });
+    this.overlay.addEventListener('keydown', (event) => this.onKey(event));
+  }
+
+  onKey(event) {
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    const step = this.scene.span_s / 100;
+    const actions = {
+      ArrowLeft: () => this.turn(-0.1, 0), ArrowRight: () => this.turn(0.1, 0), ArrowUp: () => this.turn(0, 0.1), ArrowDown: () => this.turn(0, -0.1),
+      '+': () => this.zoom(0.8), '=': () => this.zoom(0.8), '-': () => this.zoom(1.25), ',': () => this.goTo(this.time - step, true), '.': () => this.goTo(this.time + step, true),
+      f: () => element('space-follow').focus(), t: () => this.setThrough(!this.through),
+    };
+    if (!actions[event.key]) return;
+    actions[event.key]();
+    event.preventDefault();
+  }
+
+  turn(azimuth, elevation) {
+    this.camera.azimuth += azimuth;
+    this.camera.elevation = Math.min(1.5, Math.max(-1.5, this.camera.elevation + elevation));
+    this.draw();
+  }
+
+  zoom(by) {
+    this.camera.distance = Math.min(200, Math.max(0.002, this.camera.distance * by));
+    this.draw();
+  }
+
+  setThrough(on) {
+    this.through = on;
+    element('space-through').setAttribute('aria-pressed', String(on));
+    const followed = Number(element('space-follow').value);
+    if (!on) this.camera.distance = followed < 0 ? 18 : Math.min(this.camera.distance, 4);
+    this.draw();
+  }
+
+  // ---------------------------------------------------------------- time
+
+  /** Takes the time of the frame that is shown. */
+  follow() {
+    const { app } = this;
+    return this.goTo(app.current >= 0 ? app.timeOf(app.current) : this.time, false);
+  }
+
+  /** Goes to a time. @param {boolean} frames the frames follow */
+  async goTo(time, frames) {
+    this.time = Math.min(this.scene.span_s, Math.max(0, time));
+    element('space-time').value = String(this.time);
+    element('space-clock').textContent = `${this.time.toFixed(1)} s`;
+    if (frames && this.app.count) this.app.seek(this.time);
+    if (this.loading) return;
+    this.loading = true;
+    try {
+      for (let step = -1; step !== this.stepNow();) { // the time may have gone on meanwhile
+        step = this.stepNow();
+        const states = await Promise.all([this.statesOf(step), this.statesOf(step + 1)]);
+        if (step === this.stepNow()) this.setStates(step, ...states);
+      }
+    } catch (error) {
+      element('space-readout').textContent = `The bodies cannot be shown: ${error.message}`;
+    } finally {
+      this.loading = false;
+    }
+    this.draw();
+  }
+
+  stepNow() { return Math.floor(this.time / STEP_S); }
+
+  statesOf(step) {
+    if (!this.steps.has(step)) {
+      if (this.steps.size > 8) this.steps.delete(this.steps.keys().next().value);
+      const states = getNumbers('space/states', { from: step * STEP_S });
+      states.catch(() => this.steps.delete(step));
+      this.steps.set(step, states);
+    }
+    return this.steps.get(step);
+  }
+
+  /** Takes the states at both ends of a step, in Earth radii. */
+  setStates(step, before, after) {
+    if (this.step === step) return;
+    const bodies = new Float32Array(13 * this.names.length);
+    for (let k = 0; k < this.names.length; k++) {
+      for (let i = 0; i < BODY; i++) {
+        const at = HEAD + BODY * k + i;
+        bodies[13 * k + i] = before[at] / math.EARTH_M;
+        bodies[13 * k + BODY + i] = after[at] / math.EARTH_M;
+      }
+      bodies[13 * k + 12] = k < this.scene.observers.length || this.targets.has(k) ? 1 : 0;
+    }
+    this.painter.setBodies(bodies);
+    Object.assign(this, { step, before, after, orbitsAt: NaN });
+  }
+
+  /** Place of a body now, Earth radii; NaN: it has none. */
+  placeOf(body) {
+    const of = (states, from) => [0, 1, 2].map((i) => states[HEAD + BODY * body + from + i] / math.EARTH_M);
+    return math.between(of(this.before, 0), of(this.before, 3), of(this.after, 0), of(this.after, 3), STEP_S, this.share());
+  }
+
+  velocityOf(body) {
+    const of = (states, from) => [0, 1, 2].map((i) => states[HEAD + BODY * body + from + i] / math.EARTH_M);
+    return math.rateBetween(of(this.before, 0), of(this.before, 3), of(this.after, 0), of(this.after, 3), STEP_S, this.share());
+  }
+
+  share() { return Math.min(1, Math.max(0, this.time / STEP_S - this.step)); }
+
+  /** Attitude of a sensor's camera at the exposure nearest to the time; null: none. */
+  poseOf(sensor) {
+    const poses = this.poses[sensor];
+    if (!poses || poses.length === 0) return null;
+    let low = 0, high = poses.length / POSE - 1;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (poses[POSE * middle] < this.time) low = middle + 1; else high = middle;
+    }
+    if (low > 0 && this.time - poses[POSE * (low - 1)] < poses[POSE * low] - this.time) low--;
+    return poses.slice(POSE * low + 1, POSE * low + 5);
+  }
+
+  // ---------------------------------------------------------------- picture
+
+  /** Camera: eye and matrix of points relative to it. */
+  view(width, height) {
+    const followed = Number(element('space-follow').value), centre = followed < 0 ? [0, 0, 0] : this.placeOf(followed);
+    const sensor = this.scene.sensors[this.app.sensor], pose = this.through && sensor && sensor.corners ? this.poseOf(this.app.sensor) : null;
+    if (pose) {
+      const [first, , , last] = sensor.corners, forward = math.turnedBack(pose, [0, 0, 1]), up = math.turnedBack(pose, math.add(first, last, -1));
+      const field = Math.min(2, Math.max(3 * math.length(math.add(first, last, -1)), 0.002));
+      return { eye: this.placeOf(sensor.observer), matrix: math.product(math.perspective(field, width / height, 1e-3, FAR), math.looking(forward, up)) };
+    }
+    const { azimuth, elevation, distance } = this.camera;
+    const back = [Math.cos(elevation) * Math.cos(azimuth), Math.cos(elevation) * Math.sin(azimuth), Math.sin(elevation)];
+    const eye = math.add(centre.some(Number.isNaN) ? [0, 0, 0] : centre, back, followed < 0 ? Math.max(distance, 1.05) : distance);
+    return { eye, matrix: math.product(math.perspective(0.75, width / height, Math.max(1e-4, 0.01 * distance), FAR), math.looking(math.scaled(back, -1), [0, 0, 1])) };
+  }
+
+  draw() {
+    const stage = element('space-stage'), width = stage.clientWidth, height = stage.clientHeight;
+    if (!this.shown || !this.before || width === 0) return;
+    const ratio = window.devicePixelRatio || 1, { eye, matrix } = this.view(width, height), { painter } = this;
+    const sun = math.unit([...this.before.slice(0, 3)]), moon = math.scaled([...this.before.slice(3, 6)], 1 / math.EARTH_M);
+    painter.begin(Math.round(width * ratio), Math.round(height * ratio), matrix, eye);
+    const earth = [...this.before.slice(6, 15)];
+    painter.drawEarth(sun, earth);
+    painter.drawCoast(math.earthMatrix(matrix, eye, earth, 1.0015), [0.78, 0.84, 0.72, 1]);
+    painter.draw('points', [...math.scaled(sun, SUN_AT)], [1, 0.86, 0.35, 1]);
+    painter.draw('points', moon, [0.8, 0.82, 0.85, 1]);
+    painter.drawBodies(this.share(), STEP_S, 3 * ratio, [0.62, 0.7, 0.78, 1], [0.9, 0.62, 0, 1]);
+    if (element('space-orbits').checked) this.drawOrbits();
+    if (element('space-fields').checked) this.drawFields();
+    if (element('space-shadow').checked) this.drawShadow(sun);
+    this.drawNames(matrix, eye, width, height, ratio, { sun: math.scaled(sun, SUN_AT), moon });
+    this.describe(moon);
+  }
+
+  drawOrbits() {
+    if (this.orbitsAt !== this.time) { // not for each turn of the camera
+      this.orbits = this.named().map((body) => ({ body, points: math.orbitPoints(this.placeOf(body), this.velocityOf(body)) }));
+      this.orbitsAt = this.time;
+    }
+    for (const { body, points } of this.orbits) {
+      const observer = body < this.scene.observers.length;
+      this.painter.draw('strip', points, observer ? [0.34, 0.71, 0.91, 0.8] : [0.9, 0.62, 0, 0.75]);
+    }
+  }
+
+  /** Fields of view as pyramids that end at the target, and lines of sight. */
+  drawFields() {
+    this.scene.sensors.forEach((sensor, number) => {
+      const q = this.poseOf(number);
+      if (!sensor.corners) return;
+      const eye = this.placeOf(sensor.observer), target = sensor.object >= 0 ? this.placeOf(sensor.object + this.scene.observers.length) : null;
+      const range = target ? math.length(math.add(target, eye, -1)) : 6;
+      if (target) this.painter.draw('lines', [...eye, ...target], math.hidden(eye, target) ? [0.84, 0.37, 0, 1] : [0.18, 0.78, 0.61, 0.9]);
+      if (!q || !(range > 0)) return;
+      const corners = sensor.corners.map((ray) => math.add(eye, math.turnedBack(q, ray), range));
+      const sides = corners.flatMap((corner, k) => [...eye, ...corner, ...corners[(k + 1) % 4]]);
+      this.painter.draw('triangles', sides, [0.34, 0.71, 0.91, 0.2]);
+      this.painter.draw('lines', corners.flatMap((corner, k) => [...eye, ...corner, ...corner, ...corners[(k + 1) % 4]]), [0.34, 0.71, 0.91, 0.7]);
+    });
+  }
+
+  /** The umbra, as a cone of lines to 12 Earth radii: it ends at 217. */
+  drawShadow(sun) {
+    const x = math.across(sun), y = math.cross(sun, x), far = 12, narrow = 1 - far / 217, lines = [];
+    const at = (angle, radius, back) => math.add(math.add(math.scaled(x, radius * Math.cos(angle)), y, radius * Math.sin(angle)), sun, -back);
+    for (let k = 0; k < 48; k++) {
+      const a = Math.PI * k / 24, b = Math.PI * (k + 1) / 24;
+      if (k % 2 === 0) lines.push(...at(a, 1, 0), ...at(a, narrow, far));
+      lines.push(...at(a, narrow, far), ...at(b, narrow, far));
+    }
+    this.painter.draw('lines', lines, [0.6, 0.65, 0.75, 0.45]);
+  }
+
+  drawNames(matrix, eye, width, height, ratio, bodies) {
+    const context = this.overlay.getContext('2d');
+    Object.assign(this.overlay, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
+    context.scale(ratio, ratio);
+    if (!element('space-names').checked) return;
+    context.font = '12px system-ui, sans-serif';
+    context.textBaseline = 'middle';
+    const write = (name, place, colour) => {
+      const at = math.onScreen(matrix, math.add(place, eye, -1), width, height);
+      if (!at || at.x < 0 || at.y < 0 || at.x > width || at.y > height) return;
+      context.fillStyle = colour;
+      context.fillText(name, at.x + 8, at.y);
+    };
+    for (const body of this.named()) {
+      const place = this.placeOf(body);
+      if (!place.some(Number.isNaN) && !math.hidden(eye, place)) write(this.names[body], place, body < this.scene.observers.length ? '#8fd0f5' : '#f0b95a');
+    }
+    if (!math.hidden(eye, bodies.sun)) write('Sun', bodies.sun, '#ffe08a');
+    if (!math.hidden(eye, bodies.moon)) write('Moon', bodies.moon, '#d3d8de');
+  }
+
+  /** The geometry of the sensor's target in words. */
+  describe(moon) {
+    const sensor = this.scene.sensors[this.app.sensor], parts = [];
+    const pair = (key, text) => parts.push(make('span', {}, make('span', { className: 'key', textContent: key }), text));
+    if (sensor && sensor.observer >= 0) {
+      const eye = this.placeOf(sensor.observer), sun = math.unit([...this.before.slice(0, 3)]);
+      pair(this.scene.observers[sensor.observer], `${km(math.length(eye) - 1)} high`);
+      if (sensor.object >= 0) {
+        const target = this.placeOf(sensor.object + this.scene.observers.length), way = math.add(target, eye, -1);
+        const degrees = (a, b) => `${(Math.acos(Math.min(1, Math.max(-1, math.dot(math.unit(a), math.unit(b))))) * 180 / Math.PI).toFixed(1)}°`;
+        pair(this.scene.objects[sensor.object], math.hidden(eye, target) ? 'behind the Earth' : 'in view');
+        pair('Range', km(math.length(way)));
+        pair('Sun from the line of sight', degrees(way, sun));
+        pair('Moon', degrees(way, math.add(moon, eye, -1)));
+        pair('Phase angle', degrees(sun, math.scaled(way, -1)));
+      }
+    }
+    element('space-readout').replaceChildren(...parts);
+  }
+}
+
+/** Opens the panel. @param {HTMLElement} box @param {any} app */
+export async function open(box, app) {
+  document.head.append(make('link', { rel: 'stylesheet', href: 'space.css' }));
+  box.classList.add('space');
+  box.append(document.getElementById('layout-space').content.cloneNode(true));
+  const view = new SpaceView(app, await getJson('space/scene'));
+  view.poses = await Promise.all(view.scene.sensors.map((_, sensor) => getNumbers('space/poses', { sensor })));
+  view.painter.setCoast(math.coastSegments(await getBytes('space/coast')));
+  document.space = view; // for tests of the page
+  return {
+    shown() {
+      view.shown = true;
+      view.follow();
+    },
+    hidden() { view.shown = false; },
+  };
+}

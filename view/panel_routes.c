@@ -1,0 +1,68 @@
+#include "view/panel_routes.h"
+
+#include "sim/core/json_member.h"
+#include "sim/core/text.h"
+#include "view/editor.h"
+#include "view/launch.h"
+#include "view/space.h"
+#include "view/why.h"
+
+static bst_status schema_route(bst_ctx *ctx, bst_view_exchange *x) {
+    return bst_view_editor_schema(ctx, &x->json);
+}
+
+static bst_status list_route(bst_ctx *ctx, bst_view_exchange *x) {
+    return bst_view_editor_list(ctx, &x->json);
+}
+
+static bst_status open_route(bst_ctx *ctx, bst_view_exchange *x) {
+    return bst_view_editor_open(ctx, x->body, &x->json);
+}
+
+static bst_status check_route(bst_ctx *ctx, bst_view_exchange *x) {
+    return bst_view_editor_check(ctx, x->body, &x->json);
+}
+
+static bst_status loops_route(bst_ctx *ctx, bst_view_exchange *x) {
+    return bst_view_editor_loops(ctx, x->body, &x->json);
+}
+
+static bst_status satellites_route(bst_ctx *ctx, bst_view_exchange *x) {
+    return bst_view_editor_satellites(ctx, x->body, &x->json);
+}
+
+static bst_status save_route(bst_ctx *ctx, bst_view_exchange *x) {
+    return bst_view_editor_save(ctx, x->body, &x->json);
+}
+
+/* POST {"file": NAME.json}: starts a scenario of the working folder live; {"url": address}. */
+static bst_status run_route(bst_ctx *ctx, bst_view_exchange *x) {
+    char url[BST_VIEW_LAUNCH_URL_BYTES];
+    cJSON *root = cJSON_Parse(x->body);
+    const char *file = bst_json_member_text(root, "file", "");
+    bst_status status =
+        bst_text_is_file_name(file)
+            ? bst_view_launch(ctx, bst_view_subject_launcher(x->subject), file, url)
+            : bst_fail(ctx, BST_ERR_ARGUMENT, "\"%.100s\" is no file of this folder", file);
+    cJSON_Delete(root);
+    BST_TRY(status);
+    x->json = cJSON_CreateObject();
+    cJSON_AddStringToObject(x->json, "url", url);
+    return BST_OK;
+}
+
+const bst_view_route bst_view_panel_routes[] = {
+    {"api/editor/schema", false, schema_route},
+    {"api/editor/list", false, list_route},
+    {"api/editor/open", true, open_route},
+    {"api/editor/check", true, check_route},
+    {"api/editor/loops", true, loops_route},
+    {"api/editor/satellites", true, satellites_route},
+    {"api/editor/save", true, save_route},
+    {"api/editor/run", true, run_route},
+    {"api/space/scene", false, bst_view_route_space_scene},
+    {"api/space/states", false, bst_view_route_space_states},
+    {"api/space/poses", false, bst_view_route_space_poses},
+    {"api/space/coast", false, bst_view_route_space_coast},
+    {"api/why", false, bst_view_route_why},
+    {NULL, false, NULL}};
