@@ -175,4 +175,7 @@ const bst_config_desc bst_tracker_config_table[] = {
     BST_REAL(C, target_margin, "", 0, 1e3, "2",
              "Log-likelihood by which the best candidate for the target must lead the second ..."),
     BST_INT(C, target_margin_hits, "", 2, 10000, "8", "... unless it has this many hits."),
+    BST_INT(C, smoothing_lag_frames, "", 0, 60, "0",
+            "Table tracks_smoothed has each track's states given so many later frames; 0: it is "
+            "empty. Not with motion orbit."),
     BST_CONFIG_END};

@@ -16,6 +16,7 @@ enum {
     PORT_TASK,
     PORT_TRACKS,
     PORT_PREDICTIONS,
+    PORT_SMOOTHED,
     PORT_COUNT
 };
 
@@ -26,6 +27,7 @@ static const bst_port ports[PORT_COUNT] = {
     [PORT_TASK] = {BST_CHANNEL_TASK, BST_PORT_IN, BST_PORT_OPTIONAL | BST_PORT_FEEDBACK, 0.0, 0},
     [PORT_TRACKS] = {BST_CHANNEL_TRACKS, BST_PORT_OUT, 0, 0.0, 256},
     [PORT_PREDICTIONS] = {BST_CHANNEL_PREDICTIONS, BST_PORT_OUT, 0, 0.0, 256},
+    [PORT_SMOOTHED] = {BST_CHANNEL_TRACKS_SMOOTHED, BST_PORT_OUT, 0, 0.0, 0},
 };
 
 typedef struct tracker_module {
@@ -103,6 +105,7 @@ static bst_status create(const bst_module_env *env, const void *config, bst_filt
     }
     bst_env_set_capacity(env, PORT_TRACKS, (int)c->max_tracks);
     bst_env_set_capacity(env, PORT_PREDICTIONS, (int)c->max_tracks);
+    bst_env_set_capacity(env, PORT_SMOOTHED, bst_tracker_smoothed_room(c));
     *self = m;
     return BST_OK;
 }
@@ -159,6 +162,14 @@ static void publish_events(struct bst_step *step, const bst_tracker *tracker) {
                            bst_vec3_norm(e->rate_gcrf_radps) / BST_ARCSEC_RAD, e->v_mag);
         }
     }
+}
+
+/* Publishes the smoothed tracks of an earlier frame. */
+static void publish_smoothed(const tracker_module *m, struct bst_step *step) {
+    int room;
+    bst_tracks_smoothed *out = bst_step_write(step, PORT_SMOOTHED, &room);
+    bst_tracker_smoothed(m->tracker, out, room);
+    assert(bst_tracks_smoothed_are_valid(out, room));
 }
 
 /* False for an attitude of zeros, which means that it is not known. */
@@ -223,6 +234,9 @@ static bst_status process_detections(tracker_module *m, struct bst_step *step,
         bst_tracker_step(m->tracker, &input, tracks, track_room, predictions, prediction_room);
     assert(bst_tracks_are_valid(tracks, track_room));
     assert(bst_predictions_are_valid(predictions, prediction_room));
+    if (bst_tracker_has_smoothed(m->tracker)) {
+        publish_smoothed(m, step);
+    }
     if (outcome == BST_TRACKER_NO_ATTITUDE) {
         bst_step_count(step, "tracker_no_attitude");
     }

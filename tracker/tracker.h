@@ -42,6 +42,7 @@ typedef struct bst_tracker_config {
     int64_t max_merged_frames, max_telemetry_rejections;
     double telemetry_gate_chi2, target_max_chi2, target_margin;
     int64_t target_margin_hits;
+    int64_t smoothing_lag_frames;
 } bst_tracker_config;
 
 extern const bst_config_desc bst_tracker_config_table[];
@@ -145,6 +146,17 @@ bool bst_tracker_may_start_orbit(const bst_tracker *tracker);
 bst_tracker_outcome bst_tracker_step(bst_tracker *tracker, const bst_tracker_input *input,
                                      bst_tracks *tracks, int track_capacity,
                                      bst_predictions *predictions, int prediction_capacity);
+
+/* Number of smoothed tracks of a frame that there is room for: a deleted track has states for the
+ * frames of the lag that remain. */
+int bst_tracker_smoothed_room(const bst_tracker_config *config);
+
+/* True if there is a frame that lies smoothing_lag_frames before the latest one; false with 0. */
+bool bst_tracker_has_smoothed(const bst_tracker *tracker);
+
+/* Writes the smoothed tracks of that frame, which exists; tracks beyond the capacity are counted
+ * in `lost`. */
+void bst_tracker_smoothed(const bst_tracker *tracker, bst_tracks_smoothed *out, int capacity);
 
 /* Announces a new cue from the next frame on: no track is the target until it fits the new cue. */
 void bst_tracker_retarget(bst_tracker *tracker);

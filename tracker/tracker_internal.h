@@ -6,6 +6,7 @@
 #include "tracker/attitude/attitude.h"
 #include "tracker/attitude/attitude_error.h"
 #include "tracker/attitude/attitude_shared.h"
+#include "tracker/mtt/smoother.h"
 #include "tracker/target.h"
 #include "tracker/tracker.h"
 
@@ -35,6 +36,7 @@ struct bst_tracker {
         max_attitude_sigma_rad;
     int max_detections;
     bst_mtt *mtt;
+    bst_smoother *smoother; /* NULL: no smoothing */
     cached_star *cache;
     bst_attitude_star *stars;
     bst_mtt_detection *detections;

@@ -25,6 +25,7 @@
 #include "boresight/messages/sensor_command.h"
 #include "boresight/messages/task.h"
 #include "boresight/messages/tracks.h"
+#include "boresight/messages/tracks_smoothed.h"
 #include "boresight/messages/truth.h"
 #include "boresight/messages/window.h"
 
