@@ -142,6 +142,9 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
     bst_status status = t->cache && t->stars && t->detections && t->events
                             ? bst_mtt_create(ctx, &mtt, &t->mtt)
                             : bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
+    if (status == BST_OK) {
+        status = bst_tracker_identity_create(ctx, config, t);
+    }
     if (status == BST_OK && config->smoothing_lag_frames > 0) {
         status = bst_smoother_create(ctx, bst_tracker_smoothed_room(config),
                                      (int)config->smoothing_lag_frames, &t->smoother);
@@ -160,6 +163,7 @@ void bst_tracker_free(bst_tracker *t) {
     }
     bst_mtt_free(t->mtt);
     bst_smoother_free(t->smoother);
+    free(t->identity);
     bst_pages_free(t->cache);
     bst_pages_free(t->stars);
     bst_pages_free(t->detections);
@@ -181,6 +185,16 @@ bst_status bst_tracker_archive(bst_tracker *t, bst_archive *archive) {
     BST_ARCHIVE(archive, t->last_tick);
     if (bst_archive_is_restoring(archive)) {
         t->event_count = 0;
+    }
+    if (t->identity) {
+        BST_ARCHIVE(archive, *t->identity);
+        BST_ARCHIVE(archive, t->identified_s);
+        if (t->identity->tracks < 0 || t->identity->tracks > BST_IDENTITY_TRACKS ||
+            t->identity->objects < 0 || t->identity->objects > BST_IDENTITY_OBJECTS) {
+            t->identity->tracks = 0;
+            return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                            "the saved state of the tracker's identities is damaged");
+        }
     }
     if (t->smoother) {
         BST_TRY(bst_smoother_archive(t->smoother, archive));
@@ -503,6 +517,10 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
         }
     }
     t->attitude_was_lost = !attitude.usable;
+    t->identified = false;
+    if (t->identity && input->near && attitude.usable) {
+        bst_tracker_identify(t, input, seconds, frame.boresight, &view.cue);
+    }
     choose_target(t, &view.cue, seconds);
     if (t->smoother) {
         const bst_smoother_frame now = {d->exposure_id, tick, seconds, t->target.id};
@@ -518,6 +536,10 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     t->last_exposure_id = d->exposure_id;
     t->last_tick = tick;
     return attitude.usable ? BST_TRACKER_USED : BST_TRACKER_NO_ATTITUDE;
+}
+
+const bst_identity *bst_tracker_identity(const bst_tracker *t) {
+    return t->identified ? t->identity : NULL;
 }
 
 void bst_tracker_retarget(bst_tracker *t) {

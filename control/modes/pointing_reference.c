@@ -132,6 +132,10 @@ bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, boo
             *direction = offset_by(d, c->search_x_gcrf, c->search.tile[c->search_step]);
             return BST_OK;
         }
+        case BST_MODE_LOST:
+            *valid = c->rest_valid;
+            *direction = c->rest_gcrf;
+            return BST_OK;
         case BST_MODE_STARE:
             *valid = c->stare_valid;
             *direction = c->stare_gcrf;

@@ -146,6 +146,15 @@ bool bst_tracks_are_valid(const bst_tracks *t, int capacity) {
     return valid;
 }
 
+bool bst_track_identities_are_valid(const bst_track_identities *t, int capacity) {
+    bool valid = is_count(t->count, t->lost, capacity);
+    for (int i = 0; valid && i < t->count; i++) {
+        valid = t->items[i].track_id >= 1 && t->items[i].object >= -2 &&
+                bst_is_share(t->items[i].probability);
+    }
+    return valid;
+}
+
 bool bst_tracks_smoothed_are_valid(const bst_tracks_smoothed *t, int capacity) {
     bool valid = is_count(t->count, t->lost, capacity);
     for (int i = 0; valid && i < t->count; i++) {

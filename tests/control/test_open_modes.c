@@ -523,6 +523,7 @@ static void nothing_is_commanded_without_an_attitude(void **state) {
     bst_control_config config = defaults();
     config.attitude = 1;
     config.lost_after_frames = 3;
+    config.lost_hold = false;
     rig_open(&r, &config, BST_REGION_NONE);
     const bst_quat error = bst_quat_from_rotvec((bst_vec3){0.3, 2.0, -1.0});
     int searched = 0;
@@ -560,8 +561,55 @@ static void nothing_is_commanded_without_an_attitude(void **state) {
     rig_close(&r);
 }
 
+/* While it is lost the boresight is held at rest, wherever the telemetry puts it, with the error of
+ * attitude that control believed before forgotten; where it cannot be held, at a new place. */
+static void the_boresight_is_held_while_lost(void **state) {
+    (void)state;
+    rig r;
+    bst_control_config config = defaults();
+    config.lost_after_frames = 2;
+    config.strategy = BST_CONTROL_FIXED;
+    config.fixed_direction[0] = 1.0;
+    rig_open(&r, &config, BST_REGION_NONE);
+    bst_vec3 held = {0, 0, 0};
+    const bst_vec3 body_rate = {0.0, 0.0, 0.2 * BST_DEG_RAD}; /* rad/s, of a mount that is stuck */
+    int lost = 0, places = 0;
+    for (int64_t t = 0; t < 20000; t += 50) {
+        bool stuck = t >= 8000;
+        r.tracks->attitude = (bst_attitude_fix){.valid = t < 3000, .tick = t - 400};
+        r.tracks->attitude.q_cam_from_gcrf = r.q_cam;
+        r.tracks->attitude.error_cam_rad = (bst_vec3){0.0, 1e-3, 0.0};
+        if (stuck) {
+            r.commanded = false; /* the rig's gimbal does not follow */
+            r.q_cam =
+                bst_quat_look(bst_quat_rotate(bst_quat_from_rotvec(bst_vec3_scale(body_rate, 0.05)),
+                                              boresight(&r)),
+                              r.image_x);
+        }
+        step(&r, t, t % 1000 == 500);
+        if (r.status.mode != BST_MODE_LOST) {
+            continue;
+        }
+        assert_true(r.commanded);
+        assert_true(bst_vec3_norm(r.command.rate_gcrf_radps) < 1e-12); /* rounding */
+        bool anew = lost++ == 0 || bst_vec3_angle(r.command.direction_gcrf, held) > 1e-9;
+        if (getenv("DBG") && anew) printf("t %d off %g\n", (int)t, bst_vec3_angle(r.command.direction_gcrf, boresight(&r)));
+        if (anew) { /* where the boresight is */
+            if (!getenv("DBG")) assert_true(bst_vec3_angle(r.command.direction_gcrf, boresight(&r)) < 1e-9);
+            held = r.command.direction_gcrf;
+            places++;
+        }
+        assert_true(bst_vec3_angle(held, boresight(&r)) < 1.02 * BST_DEG_RAD);
+    }
+    /* 2.4 degrees in 12 s: it is given up twice */
+    assert_true(lost > 200);
+    assert_int_equal(places, 3);
+    rig_close(&r);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_boresight_is_held_while_lost),
         cmocka_unit_test(a_direction_is_held_among_the_stars),
         cmocka_unit_test(a_direction_is_held_in_the_body),
         cmocka_unit_test(the_scan_goes_to_and_fro),

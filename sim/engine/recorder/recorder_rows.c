@@ -451,6 +451,31 @@ bst_status bst_recorder_smoothed_rows(bst_ctx *ctx, bst_recorder *recorder, int 
     return BST_OK;
 }
 
+bst_status bst_recorder_identity_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                                      const void *payload, int64_t written_tick) {
+    (void)written_tick;
+    const bst_track_identities *t = payload;
+    for (int i = 0; i < t->count; i++) {
+        const bst_track_identity *k = &t->items[i];
+        bool known = recorder->world && k->object >= 0 &&
+                     k->object < bst_world_object_count(recorder->world);
+        const bst_world_object_info *info =
+            known ? bst_world_object(recorder->world, k->object) : NULL;
+        row r = {.count = 0};
+        put_int(&r, sensor);
+        put_int(&r, t->exposure_id);
+        put_int(&r, t->tick);
+        put_real(&r, seconds(recorder, t->tick));
+        put_int(&r, k->track_id);
+        put_int(&r, k->object);
+        put_text(&r, info ? info->name : NULL);
+        put_int(&r, info ? info->norad : 0);
+        put_real(&r, k->probability);
+        BST_TRY(append(ctx, recorder, BST_TABLE_TRACK_IDENTITIES, &r));
+    }
+    return BST_OK;
+}
+
 bst_status bst_recorder_los_command_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
                                          const void *payload, int64_t written_tick) {
     const bst_los_command *c = payload;

@@ -250,6 +250,19 @@ static const bst_io_column track_columns[] = {
     REAL("y_px", "px", "latest detection, whole sensor"),
     INT("uncorrelated", "", "1: confirmed, and neither the target nor what the cue expects"),
 };
+static const bst_io_column identity_columns[] = {
+    SENSOR,
+    EXPOSURE,
+    TICK,
+    TIME,
+    INT("track_id", "", "as in tracks"),
+    INT("object", "",
+        "index in the scenario: id in truth; -1: none of the catalogue; -2: what the cue means, "
+        "without a catalogue object"),
+    TEXT("name", "its name; NULL: none"),
+    INT("norad", "", "its catalogue number, 0: none"),
+    REAL("probability", "", "that the track is of this object; those below 0.001 are left out"),
+};
 static const bst_io_column smoothed_columns[] = {
     SENSOR,
     EXPOSURE,
@@ -466,6 +479,9 @@ static const table_spec specs[BST_TABLE_COUNT] = {
     [BST_TABLE_CAMERA_CALIBRATION] =
         SPEC("camera_calibration", calibration_columns,
              "Geometry of the camera as image processing has learned it from stars."),
+    [BST_TABLE_TRACK_IDENTITIES] =
+        SPEC("track_identities", identity_columns,
+             "Probabilities of confirmed tracks over the objects of the onboard catalogue."),
     [BST_TABLE_TRACKS_SMOOTHED] =
         SPEC("tracks_smoothed", smoothed_columns,
              "Tracks of each frame given later frames too (tracker, smoothing_lag_frames)."),
@@ -499,6 +515,7 @@ static bool wanted(const bst_recorder *recorder, bst_recorder_table table) {
         case BST_TABLE_TRACK_FRAMES:
         case BST_TABLE_TRACKS:
         case BST_TABLE_TRACKS_SMOOTHED:
+        case BST_TABLE_TRACK_IDENTITIES:
             return config->tracks;
         case BST_TABLE_LOS_COMMANDS:
         case BST_TABLE_SENSOR_COMMANDS:
