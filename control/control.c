@@ -301,9 +301,7 @@ static void choose_rest(bst_control *c) {
     if (c->rest_valid && bst_vec3_angle(boresight, c->rest_gcrf) <= LOST_LAG_RAD) {
         return;
     }
-    /* geometric direction, to first order of the aberration */
-    bst_vec3 shift = bst_vec3_sub(bst_control_apparent(c, boresight), boresight);
-    c->rest_gcrf = bst_vec3_unit(bst_vec3_sub(boresight, shift));
+    c->rest_gcrf = boresight;
     c->rest_valid = true;
     bst_control_forget_aims(c);
 }

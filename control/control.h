@@ -199,7 +199,7 @@ typedef struct bst_control {
     bst_quat q_body_from_gcrf;
     int64_t body_tick;
     bst_vec3 body_rate_radps;
-    bst_vec3 rest_gcrf; /* direction held in BST_MODE_LOST, in the axes of the telemetry */
+    bst_vec3 rest_gcrf; /* apparent direction held in BST_MODE_LOST, in the telemetry's axes */
     bool rest_valid;
     bst_vec3 stare_gcrf;
     bool stare_valid;

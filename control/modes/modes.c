@@ -168,7 +168,6 @@ void bst_control_watch_attitude(bst_control *c, int64_t tick, const bst_attitude
     if (c->mode != BST_MODE_LOST && c->config.lost_after_frames > 0 &&
         c->frames_without_attitude >= c->config.lost_after_frames) {
         c->frames_without_attitude = 0;
-        c->pointing_error.started = false; /* it may be what misled the identification */
         bst_control_enter(c, BST_MODE_LOST, tick, "no attitude from stars");
     }
 }
