@@ -56,16 +56,17 @@ static void compare(bst_tracker *t, const bst_tracker_input *input, bst_vec3 bor
     bst_identity_match(&t->identity_params, all, tracks, objects, count, t->identity);
 }
 
-void bst_tracker_identify(bst_tracker *t, const bst_tracker_input *input, double seconds,
-                          bst_vec3 boresight, bst_target_cue *cue) {
+void bst_tracker_identify(bst_tracker *t, const bst_tracker_input *input, bool usable,
+                          const bst_mtt_frame *frame, bst_target_cue *cue) {
     int count;
+    double seconds = frame->seconds;
     const bst_mtt_track *tracks = bst_mtt_tracks(t->mtt, &count);
     bool undecided = t->target.id == 0 || t->target.ambiguous;
     bool due = undecided || seconds - t->identified_s >= t->identity_period_s;
     cue->object = input->cue_object >= 0 ? input->cue_object : BST_IDENTITY_CUE;
-    t->identified = due && any_track(tracks, count);
+    t->identified = usable && due && any_track(tracks, count);
     if (t->identified) {
-        compare(t, input, boresight, cue);
+        compare(t, input, frame->boresight, cue);
         t->identified_s = seconds;
     }
     if (cue->valid && !cue->in_region && seconds - t->identified_s < t->identity_period_s) {

@@ -13,12 +13,6 @@ typedef struct group {
     int track[BST_IDENTITY_TRACKS], object[BST_IDENTITY_OBJECTS];
 } group;
 
-double bst_identity_scale(const bst_target_cue *cue, const bst_mtt_track *track) {
-    bool bright = isfinite(cue->v_mag) && isfinite(cue->v_mag_sigma) && isfinite(track->v_mag);
-    /* without a magnitude the density is that of direction and rate, over BRIGHTNESS_MAG mag */
-    return pow(2.0 * BST_PI, bright ? -2.5 : -2.0) / (bright ? 1.0 : BST_IDENTITY_MAG);
-}
-
 /* Likelihood ratio of a track being of an object against being of an unknown one, times the odds
  * that the object has a track. */
 static double weight_of(const bst_identity_params *params, const bst_mtt_track *track,
@@ -151,19 +145,4 @@ void bst_identity_match(const bst_identity_params *params, const bst_mtt_track *
         }
         out->unknown[t] = 1.0 / sum;
     }
-}
-
-double bst_identity_log_unexplained(const bst_identity *identity, int64_t track_id,
-                                    int32_t object) {
-    for (int t = 0; t < identity->tracks; t++) {
-        if (identity->track_id[t] != track_id) {
-            continue;
-        }
-        double others = 0.0; /* relative to unknown */
-        for (int o = 0; o < identity->objects; o++) {
-            others += identity->object[o] == object ? 0.0 : identity->probability[t][o];
-        }
-        return -log1p(others / fmax(identity->unknown[t], 1e-300));
-    }
-    return 0.0;
 }

@@ -455,6 +455,12 @@ static bst_target_cue target_cue(const bst_tracker_cue *cue) {
                             .belt_eye = cue->belt_eye};
 }
 
+static void smooth(bst_tracker *t, const bst_smoother_frame *frame) {
+    if (t->smoother) {
+        bst_smoother_step(t->smoother, frame, t->mtt);
+    }
+}
+
 bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *input,
                                      bst_tracks *tracks, int track_capacity,
                                      bst_predictions *predictions, int prediction_capacity) {
@@ -517,15 +523,11 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
         }
     }
     t->attitude_was_lost = !attitude.usable;
-    t->identified = false;
-    if (t->identity && input->near && attitude.usable) {
-        bst_tracker_identify(t, input, seconds, frame.boresight, &view.cue);
+    if (t->identity && input->near) {
+        bst_tracker_identify(t, input, attitude.usable, &frame, &view.cue);
     }
     choose_target(t, &view.cue, seconds);
-    if (t->smoother) {
-        const bst_smoother_frame now = {d->exposure_id, tick, seconds, t->target.id};
-        bst_smoother_step(t->smoother, &now, t->mtt);
-    }
+    smooth(t, &(bst_smoother_frame){d->exposure_id, tick, seconds, t->target.id});
     write_tracks(t, d, &attitude.fix, &view.cue, detections_lost, tracks, track_capacity);
     write_predictions(
         t, attitude.fix.tick,

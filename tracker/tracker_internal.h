@@ -119,8 +119,10 @@ void bst_tracker_find_attitude(bst_tracker *t, const bst_tracker_input *input,
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_tracker_identity_create(bst_ctx *ctx, const bst_tracker_config *config,
                                        bst_tracker *t) BST_MUST_CHECK;
-/* Compares the tracks with the catalogue, if it is time, and sets the cue's comparison. */
-void bst_tracker_identify(bst_tracker *t, const bst_tracker_input *input, double seconds,
-                          bst_vec3 boresight, bst_target_cue *cue);
+/* Compares the tracks with the catalogue, if it is time, and sets the cue's comparison.
+ *
+ * Given:     usable  the frame has an attitude */
+void bst_tracker_identify(bst_tracker *t, const bst_tracker_input *input, bool usable,
+                          const bst_mtt_frame *frame, bst_target_cue *cue);
 
 #endif

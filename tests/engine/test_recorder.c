@@ -196,6 +196,16 @@ static void send_all(bst_ctx *ctx, bst_recorder *recorder) {
     memcpy(smoothed->items[0].covariance, t->items[0].covariance, sizeof t->items[0].covariance);
     send(ctx, recorder, BST_CHANNEL_TRACKS_SMOOTHED, smoothed, 4000);
     free(smoothed);
+    bst_track_identities *identities =
+        calloc(1, sizeof *identities + 2 * sizeof(bst_track_identity));
+    assert_non_null(identities);
+    identities->exposure_id = 4;
+    identities->tick = 1500;
+    identities->count = 2;
+    identities->items[0] = (bst_track_identity){9, 0, 0.75};
+    identities->items[1] = (bst_track_identity){9, -1, 0.25};
+    send(ctx, recorder, BST_CHANNEL_TRACK_IDENTITIES, identities, 4000);
+    free(identities);
     free(d);
     free(t);
     const bst_los_command los = {.tick = 5000, .direction_gcrf = {0, 1, 0}};
@@ -303,6 +313,11 @@ static void test_tables(void **state) {
                   "s.rate_east_arcsec_per_s = t.rate_east_arcsec_per_s AND "
                   "s.cov_d1_r2_rad2ps = 4 AND s.cov_r2_r2_rad2ps2 = 10",
                   0.125);
+        assert_is(db,
+                  "SELECT sum(probability) FROM track_identities WHERE track_id = 9 AND time_s = "
+                  "0.25 AND exposure_id = 4 AND (object = 0 OR (object = -1 AND name IS NULL AND "
+                  "norad = 0))",
+                  1.0);
         bst_assert_close(number(db, "SELECT attitude_error_x_arcsec FROM track_frames"), 1.0,
                          1e-12);
         assert_is(db, "SELECT ra_deg FROM los_commands WHERE written_tick = 4800", 90.0);
