@@ -30,13 +30,18 @@ const bst_config_desc bst_control_config_table[] = {
     BST_REAL(C, scan_rate_arcsec_per_s, "arcsec/s", -36000, 36000, "60",
              "strategy scan: rate along the middle of the cue's region, from its first end to the "
              "second and back; negative: from the second end on."),
-    BST_ENUM(
-        C, attitude, attitudes, "\"telemetry\"",
-        "Attitude at the start. unknown: nothing is commanded (mode lost) until the tracker has "
-        "an attitude from stars; with imgproc/attitude unknown."),
+    BST_ENUM(C, attitude, attitudes, "\"telemetry\"",
+             "Attitude at the start. unknown: mode lost until the tracker has an attitude from "
+             "stars; with "
+             "imgproc/attitude unknown."),
     BST_INT(C, lost_after_frames, "frames", 0, 1000000, "0",
             "After so many frames in a row without an attitude from stars, with the servo settled, "
-            "nothing is commanded until there is one again; 0: never."),
+            "the mode is lost until there is one again; 0: never."),
+    BST_BOOL(
+        C, lost_hold, "true",
+        "Mode lost: the line of sight is held at rest by the telemetry, whose error in attitude "
+        "does not matter for that, so that the stars of a turning spacecraft become points. "
+        "false: nothing is commanded."),
     BST_REAL(C, exposure_s, "s", 0, 3600, "0",
              "Exposure time asked of the sensor; 0 leaves the sensor's own."),
     BST_REAL(C, period_s, "s", 0, 3600, "0",

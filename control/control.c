@@ -7,6 +7,8 @@
  * against changes of the line-of-sight rate. */
 #define RATE_HALF_S 0.25
 #define BODY_RATE_SMOOTH_S 2.0
+/* The held direction of mode lost is given up when the boresight is farther from it. */
+#define LOST_LAG_RAD (1.0 * BST_DEG_RAD)
 
 /* Direction of the aim for guidance (callback). */
 static bst_status guidance_aim(void *user, bst_ctx *ctx, int64_t tick, bool *valid,
@@ -146,6 +148,10 @@ static void archive_mode(bst_control *c, bst_archive *archive) {
     BST_ARCHIVE(archive, c->newest_id);
     BST_ARCHIVE(archive, c->frame_tick);
     BST_ARCHIVE(archive, c->frame_interval_ticks);
+    if (bst_control_may_be_lost(c)) {
+        BST_ARCHIVE(archive, c->rest_gcrf);
+        bst_archive_bool(archive, &c->rest_valid);
+    }
     BST_ARCHIVE(archive, c->stare_gcrf);
     bst_archive_bool(archive, &c->stare_valid);
 }
@@ -280,12 +286,33 @@ static bst_status check_arrival(bst_ctx *ctx, bst_control *c, bool *arrived, dou
     return BST_OK;
 }
 
+/* Sets the direction that is held in mode lost: that of the boresight by telemetry, and a new one
+ * where the mount does not reach the old one or is slower than the body. */
+static void choose_rest(bst_control *c) {
+    if (c->mode != BST_MODE_LOST || !c->config.lost_hold) {
+        c->rest_valid = false;
+        return;
+    }
+    if (!c->pointing_valid || !c->nav_valid) {
+        return;
+    }
+    bst_vec3 boresight =
+        bst_quat_rotate(bst_quat_conj(c->pointing.q_cam_from_gcrf), (bst_vec3){0.0, 0.0, 1.0});
+    if (c->rest_valid && bst_vec3_angle(boresight, c->rest_gcrf) <= LOST_LAG_RAD) {
+        return;
+    }
+    c->rest_gcrf = boresight;
+    c->rest_valid = true;
+    bst_control_forget_aims(c);
+}
+
 bst_status bst_control_update(bst_ctx *ctx, bst_control *c, int64_t tick, bool *commanded,
                               bst_los_command *command, bst_control_status *status) {
     assert(c && commanded && command && status && tick >= 0);
     if (c->mode == BST_MODE_IDLE) {
         BST_TRY(bst_control_start(ctx, c, tick));
     }
+    choose_rest(c);
     bool arrived;
     BST_TRY(check_arrival(ctx, c, &arrived, status->aim_error_px));
     BST_TRY(bst_control_advance(ctx, c, tick, arrived));

@@ -67,6 +67,7 @@ typedef struct bst_control_config {
     double reacquire_coast_s, reacquire_extent_deg;
     int32_t attitude;          /* at the start, 0: by telemetry, 1: unknown */
     int64_t lost_after_frames; /* without an attitude from stars, in a row; 0: never lost */
+    bool lost_hold;            /* the line of sight is held at rest meanwhile */
     bst_guidance_config guidance;
 } bst_control_config;
 
@@ -198,6 +199,8 @@ typedef struct bst_control {
     bst_quat q_body_from_gcrf;
     int64_t body_tick;
     bst_vec3 body_rate_radps;
+    bst_vec3 rest_gcrf; /* apparent direction held in BST_MODE_LOST, in the telemetry's axes */
+    bool rest_valid;
     bst_vec3 stare_gcrf;
     bool stare_valid;
     bst_guidance guidance;

@@ -175,4 +175,16 @@ const bst_config_desc bst_tracker_config_table[] = {
     BST_REAL(C, target_margin, "", 0, 1e3, "2",
              "Log-likelihood by which the best candidate for the target must lead the second ..."),
     BST_INT(C, target_margin_hits, "", 2, 10000, "8", "... unless it has this many hits."),
+    BST_INT(C, smoothing_lag_frames, "", 0, 60, "0",
+            "Table tracks_smoothed has each track's states given so many later frames; 0: it is "
+            "empty. Not with motion orbit."),
+    BST_REAL(C, identity_period_s, "s", 0, 1e9, "10",
+             "Tracks are compared with the onboard catalogue this often, and in each frame without "
+             "a certain target; 0: never."),
+    BST_REAL(C, catalogue_sigma_m, "m", 1, 1e9, "5000",
+             "Standard deviation per axis of the catalogue's objects, across the line of sight."),
+    BST_REAL(C, catalogue_sigma_mps, "m/s", 1e-3, 1e6, "1", "The same of their velocities."),
+    BST_REAL(C, catalogue_mag_sigma, "mag", 0.01, 100, "1", "The same of their magnitudes."),
+    BST_REAL(C, uncatalogued_per_field, "", 1e-9, 1e6, "0.1",
+             "Believed mean number of objects in a field that the catalogue lacks."),
     BST_CONFIG_END};

@@ -7,6 +7,7 @@
 #include "sim/messages/message_invariants.h"
 #include "sim/onboard/knowledge.h"
 #include "tracker/attitude/photocentre.h"
+#include "tracker/catalogue.h"
 #include "tracker/tracker.h"
 
 enum {
@@ -16,6 +17,8 @@ enum {
     PORT_TASK,
     PORT_TRACKS,
     PORT_PREDICTIONS,
+    PORT_SMOOTHED,
+    PORT_IDENTITIES,
     PORT_COUNT
 };
 
@@ -26,7 +29,14 @@ static const bst_port ports[PORT_COUNT] = {
     [PORT_TASK] = {BST_CHANNEL_TASK, BST_PORT_IN, BST_PORT_OPTIONAL | BST_PORT_FEEDBACK, 0.0, 0},
     [PORT_TRACKS] = {BST_CHANNEL_TRACKS, BST_PORT_OUT, 0, 0.0, 256},
     [PORT_PREDICTIONS] = {BST_CHANNEL_PREDICTIONS, BST_PORT_OUT, 0, 0.0, 256},
+    [PORT_IDENTITIES] = {BST_CHANNEL_TRACK_IDENTITIES, BST_PORT_OUT, 0, 0.0, 0},
+    [PORT_SMOOTHED] = {BST_CHANNEL_TRACKS_SMOOTHED, BST_PORT_OUT, 0, 0.0, 0},
 };
+
+/* Room for probabilities: four objects for each track of a comparison. */
+enum { MOST_IDENTITIES = 4 * BST_IDENTITY_TRACKS };
+/* Probabilities below this are not published. */
+static const double LEAST_PROBABILITY = 1e-3;
 
 typedef struct tracker_module {
     bst_tracker *tracker;
@@ -35,6 +45,7 @@ typedef struct tracker_module {
     double julian_year, blend_rad;
     double tick_rate_hz;
     bool orbits;
+    bst_tracker_catalogue *catalogue; /* NULL: tracks are not compared with it */
 } tracker_module;
 
 /* Largest magnitude difference of a companion that affects a star's photocentre. */
@@ -70,6 +81,7 @@ static void destroy(void *self) {
     tracker_module *m = self;
     if (m) {
         bst_tracker_free(m->tracker);
+        bst_tracker_catalogue_free(m->catalogue);
         bst_knowledge_view_free(m->view);
         free(m);
     }
@@ -97,12 +109,17 @@ static bst_status create(const bst_module_env *env, const void *config, bst_filt
         status = bst_tracker_create(env->ctx, c, bst_knowledge_camera(env->knowledge),
                                     env->tick_rate_hz, find_star, m, &m->tracker);
     }
+    if (status == BST_OK && c->identity_period_s > 0.0) {
+        status = bst_tracker_catalogue_create(env->ctx, c, env->knowledge, m->view, &m->catalogue);
+    }
     if (status != BST_OK) {
         destroy(m);
         return status;
     }
     bst_env_set_capacity(env, PORT_TRACKS, (int)c->max_tracks);
     bst_env_set_capacity(env, PORT_PREDICTIONS, (int)c->max_tracks);
+    bst_env_set_capacity(env, PORT_IDENTITIES, m->catalogue ? MOST_IDENTITIES : 0);
+    bst_env_set_capacity(env, PORT_SMOOTHED, bst_tracker_smoothed_room(c));
     *self = m;
     return BST_OK;
 }
@@ -161,6 +178,44 @@ static void publish_events(struct bst_step *step, const bst_tracker *tracker) {
     }
 }
 
+/* Adds the probability of a track's identity, if it is not negligible. */
+static void add_identity(bst_track_identities *out, int room, int64_t track_id, int32_t object,
+                         double probability) {
+    if (probability < LEAST_PROBABILITY) {
+        return;
+    }
+    if (out->count < room) {
+        out->items[out->count++] = (bst_track_identity){track_id, object, probability};
+    } else {
+        out->lost++;
+    }
+}
+
+/* Publishes the comparison of the tracks with the catalogue. */
+static void publish_identities(const tracker_module *m, struct bst_step *step,
+                               const bst_tracks *tracks) {
+    int room;
+    const bst_identity *identity = bst_tracker_identity(m->tracker);
+    bst_track_identities *out = bst_step_write(step, PORT_IDENTITIES, &room);
+    *out = (bst_track_identities){.exposure_id = tracks->exposure_id, .tick = tracks->tick};
+    for (int t = 0; t < identity->tracks; t++) {
+        int64_t id = identity->track_id[t];
+        for (int o = 0; o < identity->objects; o++) {
+            add_identity(out, room, id, identity->object[o], identity->probability[t][o]);
+        }
+        add_identity(out, room, id, BST_IDENTITY_UNKNOWN, identity->unknown[t]);
+    }
+    assert(bst_track_identities_are_valid(out, room));
+}
+
+/* Publishes the smoothed tracks of an earlier frame. */
+static void publish_smoothed(const tracker_module *m, struct bst_step *step) {
+    int room;
+    bst_tracks_smoothed *out = bst_step_write(step, PORT_SMOOTHED, &room);
+    bst_tracker_smoothed(m->tracker, out, room);
+    assert(bst_tracks_smoothed_are_valid(out, room));
+}
+
 /* False for an attitude of zeros, which means that it is not known. */
 static bool is_known(bst_quat q) {
     return q.x != 0.0 || q.y != 0.0 || q.z != 0.0 || q.w != 0.0;
@@ -216,6 +271,11 @@ static bst_status process_detections(tracker_module *m, struct bst_step *step,
         BST_TRY(bst_knowledge_cue_range_at(bst_step_ctx(step), m->view, seconds, &known,
                                            &input.cue.range_m, &input.cue.range_rate_mps));
     }
+    if (m->catalogue) {
+        input.near = bst_tracker_catalogue_near;
+        input.near_user = m->catalogue;
+        input.cue_object = bst_tracker_catalogue_set(m->catalogue, seconds);
+    }
     int track_room, prediction_room;
     bst_tracks *tracks = bst_step_write(step, PORT_TRACKS, &track_room);
     bst_predictions *predictions = bst_step_write(step, PORT_PREDICTIONS, &prediction_room);
@@ -223,6 +283,12 @@ static bst_status process_detections(tracker_module *m, struct bst_step *step,
         bst_tracker_step(m->tracker, &input, tracks, track_room, predictions, prediction_room);
     assert(bst_tracks_are_valid(tracks, track_room));
     assert(bst_predictions_are_valid(predictions, prediction_room));
+    if (bst_tracker_identity(m->tracker)) {
+        publish_identities(m, step, tracks);
+    }
+    if (bst_tracker_has_smoothed(m->tracker)) {
+        publish_smoothed(m, step);
+    }
     if (outcome == BST_TRACKER_NO_ATTITUDE) {
         bst_step_count(step, "tracker_no_attitude");
     }

@@ -1,8 +1,11 @@
 #include "tracker/target.h"
 
+#include <assert.h>
+
+#include "tracker/identity.h"
+
 /* Adds x^T P^-1 x and ln det P of a 2-vector to a target misfit; INFINITY for an invalid P or a
  * misfit beyond `limit`. */
-#include <assert.h>
 static void add2(bst_target_fit *fit, const double x[2], double p11, double p12, double p22,
                  double limit) {
     double det = p11 * p22 - p12 * p12;
@@ -157,6 +160,7 @@ typedef struct candidates {
     double lowest, lowest_chi2;         /* chi2 + log_det of the best; its chi2 */
     double next;                        /* chi2 + log_det of the second */
     double sum;                         /* of all likelihoods over that of the best */
+    bool seen; /* the best is likelier than that the cue's object has no track */
 } candidates;
 
 /* Compares all tracks with the cue.
@@ -172,6 +176,9 @@ static candidates compare(const bst_target_params *params, const bst_target_cue 
             fit.chi2 = distance2 <= params->dormant_gate_chi2 ? fit.chi2 + distance2 : INFINITY;
         }
         double misfit = fit.chi2 + fit.log_det;
+        if (cue->identity && misfit < INFINITY) {
+            misfit -= 2.0 * bst_identity_log_unexplained(cue->identity, tracks[i].id, cue->object);
+        }
         if (!(misfit < INFINITY)) {
             continue;
         }
@@ -189,6 +196,12 @@ static candidates compare(const bst_target_params *params, const bst_target_cue 
                 c.next = misfit;
             }
         }
+    }
+    c.seen = true;
+    if (cue->identity && c.best && !memory) { /* the memory says that it has a track */
+        double unseen = cue->unseen_weight * exp(0.5 * c.lowest);
+        c.seen = unseen <= 1.0;
+        c.sum += unseen;
     }
     return c;
 }
@@ -302,7 +315,7 @@ void bst_target_step(bst_target *target, const bst_target_params *params, const 
         bst_sky_predict(&memory, seconds - target->memory_seconds, params->memory_noise_rad2ps3);
     }
     candidates c = compare(params, cue, bound ? &memory : NULL, tracks, count);
-    if (is_mature(params, &c) &&
+    if (is_mature(params, &c) && c.seen &&
         (0.5 * (c.next - c.lowest) >= params->margin || c.best->hits >= params->margin_hits)) {
         const bst_target before = *target;
         take_target(target, params, cue, seconds, &c);

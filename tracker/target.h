@@ -27,6 +27,9 @@ typedef struct bst_target_params {
     double memory_noise_rad2ps3; /* power spectral density of the acceleration of a lost target */
 } bst_target_params;
 
+struct bst_identity;
+typedef struct bst_identity bst_identity; /* identity.h */
+
 /* The onboard cue: predicted direction, rate and brightness of the target. */
 typedef struct bst_target_cue {
     bool valid;
@@ -37,6 +40,12 @@ typedef struct bst_target_cue {
      * belt_eye */
     bool in_region;
     bst_belt_eye belt_eye;
+    /* comparison of the tracks with the catalogue; NULL: none. A track that another object explains
+     * is the less likely to be of the cue's. */
+    const bst_identity *identity;
+    int32_t object; /* the cue's in that comparison */
+    /* weight of the hypothesis that the cue's object has no track, as exp(-(chi2 + log_det) / 2) */
+    double unseen_weight;
 } bst_target_cue;
 
 /* Rate that a valid cue expects in a direction, rad/s, perpendicular to it. */
@@ -103,11 +112,13 @@ bool bst_target_is_expected(const bst_target_params *params, const bst_target_cu
  *            freely, within the gate of its filter. Otherwise a track is chosen by the cue and,
  *            after a loss, by the lost target's prediction. Without a cue no new target is chosen.
  *            Of several tracks that fit the cue, each has the probability
- *            exp(-(chi2 + log_det)/2) over the sum of all. While the target's is not certain, it is
- *            ambiguous, and another track replaces it as soon as that one is certain. After
- *            frames with shared detections, and when a new track fits the cue, the identity is open
- *            again, unless the target has manoeuvred away from the cue. An ambiguity does not end
- *            because the other track does: the probability stays for max_dormant_s. */
+ *            exp(-(chi2 + log_det)/2) over the sum of all; with a comparison with the catalogue
+ *            times the odds that no other object explains the track, and the sum includes
+ *            unseen_weight, which no chosen track may be below. While the target's is not certain,
+ * it is ambiguous, and another track replaces it as soon as that one is certain. After frames with
+ * shared detections, and when a new track fits the cue, the identity is open again, unless the
+ * target has manoeuvred away from the cue. An ambiguity does not end because the other track does:
+ * the probability stays for max_dormant_s. */
 void bst_target_step(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
                      double seconds, const bst_mtt_track *tracks, int count);
 

@@ -98,6 +98,7 @@ static void make_params(bst_tracker *t, const bst_tracker_config *c, bst_mtt_par
         .feed_forward_rad = c->cue_acceleration_radius_deg * BST_DEG_RAD,
         .star_rate_radps = arcsec(c->stationary_rate_arcsec_per_s),
         .motion_chi2 = c->motion_chi2,
+        .keep_priors = c->smoothing_lag_frames > 0,
         .max_stationary_tracks = (int)c->max_stationary_tracks};
 }
 
@@ -114,6 +115,12 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "tracker: confirm_frames (%lld) must not be less than confirm_hits (%lld)",
                         (long long)config->confirm_frames, (long long)config->confirm_hits);
+    }
+    if (config->smoothing_lag_frames > 0 && config->motion == 1) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "tracker: smoothing_lag_frames (%lld) does not go with motion \"orbit\"; "
+                        "give motion \"constant_rate\", or smoothing_lag_frames 0",
+                        (long long)config->smoothing_lag_frames);
     }
     bst_tracker *t = bst_pages_zero(1, sizeof *t);
     if (!t) {
@@ -135,6 +142,13 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
     bst_status status = t->cache && t->stars && t->detections && t->events
                             ? bst_mtt_create(ctx, &mtt, &t->mtt)
                             : bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
+    if (status == BST_OK) {
+        status = bst_tracker_identity_create(ctx, config, t);
+    }
+    if (status == BST_OK && config->smoothing_lag_frames > 0) {
+        status = bst_smoother_create(ctx, bst_tracker_smoothed_room(config),
+                                     (int)config->smoothing_lag_frames, &t->smoother);
+    }
     if (status != BST_OK) {
         bst_tracker_free(t);
         return status;
@@ -148,6 +162,8 @@ void bst_tracker_free(bst_tracker *t) {
         return;
     }
     bst_mtt_free(t->mtt);
+    bst_smoother_free(t->smoother);
+    free(t->identity);
     bst_pages_free(t->cache);
     bst_pages_free(t->stars);
     bst_pages_free(t->detections);
@@ -169,6 +185,19 @@ bst_status bst_tracker_archive(bst_tracker *t, bst_archive *archive) {
     BST_ARCHIVE(archive, t->last_tick);
     if (bst_archive_is_restoring(archive)) {
         t->event_count = 0;
+    }
+    if (t->identity) {
+        BST_ARCHIVE(archive, *t->identity);
+        BST_ARCHIVE(archive, t->identified_s);
+        if (t->identity->tracks < 0 || t->identity->tracks > BST_IDENTITY_TRACKS ||
+            t->identity->objects < 0 || t->identity->objects > BST_IDENTITY_OBJECTS) {
+            t->identity->tracks = 0;
+            return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                            "the saved state of the tracker's identities is damaged");
+        }
+    }
+    if (t->smoother) {
+        BST_TRY(bst_smoother_archive(t->smoother, archive));
     }
     return bst_mtt_archive(t->mtt, archive);
 }
@@ -426,6 +455,12 @@ static bst_target_cue target_cue(const bst_tracker_cue *cue) {
                             .belt_eye = cue->belt_eye};
 }
 
+static void smooth(bst_tracker *t, const bst_smoother_frame *frame) {
+    if (t->smoother) {
+        bst_smoother_step(t->smoother, frame, t->mtt);
+    }
+}
+
 bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *input,
                                      bst_tracks *tracks, int track_capacity,
                                      bst_predictions *predictions, int prediction_capacity) {
@@ -488,7 +523,11 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
         }
     }
     t->attitude_was_lost = !attitude.usable;
+    if (t->identity && input->near) {
+        bst_tracker_identify(t, input, attitude.usable, &frame, &view.cue);
+    }
     choose_target(t, &view.cue, seconds);
+    smooth(t, &(bst_smoother_frame){d->exposure_id, tick, seconds, t->target.id});
     write_tracks(t, d, &attitude.fix, &view.cue, detections_lost, tracks, track_capacity);
     write_predictions(
         t, attitude.fix.tick,
@@ -501,7 +540,46 @@ bst_tracker_outcome bst_tracker_step(bst_tracker *t, const bst_tracker_input *in
     return attitude.usable ? BST_TRACKER_USED : BST_TRACKER_NO_ATTITUDE;
 }
 
+const bst_identity *bst_tracker_identity(const bst_tracker *t) {
+    return t->identified ? t->identity : NULL;
+}
+
 void bst_tracker_retarget(bst_tracker *t) {
     t->target = (bst_target){.id = 0};
     t->cue_before.valid = false; /* the change of the cue is no motion of a track */
+}
+
+int bst_tracker_smoothed_room(const bst_tracker_config *config) {
+    return config->smoothing_lag_frames > 0 ? 2 * (int)config->max_tracks : 0;
+}
+
+bool bst_tracker_has_smoothed(const bst_tracker *t) {
+    bst_smoother_frame frame;
+    const bst_smoothed *states;
+    int count, lost;
+    return t->smoother && bst_smoother_get(t->smoother, &frame, &states, &count, &lost);
+}
+
+void bst_tracker_smoothed(const bst_tracker *t, bst_tracks_smoothed *out, int capacity) {
+    assert(t && bst_tracker_has_smoothed(t) && out && capacity >= 0);
+    bst_smoother_frame frame = {0};
+    const bst_smoothed *states;
+    int count, lost;
+    bst_smoother_get(t->smoother, &frame, &states, &count, &lost);
+    *out =
+        (bst_tracks_smoothed){.exposure_id = frame.exposure_id, .tick = frame.tick, .lost = lost};
+    for (int i = 0; i < count; i++) {
+        if (out->count == capacity) {
+            out->lost++;
+            continue;
+        }
+        bst_track_smoothed *item = &out->items[out->count++];
+        *item = (bst_track_smoothed){.id = states[i].id,
+                                     .status = (int32_t)states[i].status,
+                                     .target_of_interest = states[i].id == frame.target_id,
+                                     .later_frames = states[i].later_frames,
+                                     .direction_gcrf = states[i].state.direction,
+                                     .rate_gcrf_radps = states[i].state.rate_radps};
+        memcpy(item->covariance, states[i].state.covariance, sizeof item->covariance);
+    }
 }

@@ -11,6 +11,7 @@
 #include "boresight/config.h"
 #include "boresight/messages.h"
 #include "sim/astro/belt.h"
+#include "tracker/identity.h"
 #include "tracker/mtt/filter.h"
 
 /* Values of a scenario's tracker block; bst_tracker_config_table describes each. */
@@ -42,6 +43,9 @@ typedef struct bst_tracker_config {
     int64_t max_merged_frames, max_telemetry_rejections;
     double telemetry_gate_chi2, target_max_chi2, target_margin;
     int64_t target_margin_hits;
+    int64_t smoothing_lag_frames;
+    double identity_period_s, catalogue_sigma_m, catalogue_sigma_mps, catalogue_mag_sigma,
+        uncatalogued_per_field;
 } bst_tracker_config;
 
 extern const bst_config_desc bst_tracker_config_table[];
@@ -64,6 +68,14 @@ typedef struct bst_tracker_cue {
     bst_belt_eye belt_eye;
 } bst_tracker_cue;
 
+/* Finds catalogue objects near a direction, other than the cue's, at mid-exposure.
+ *
+ * Given:     user           as in the input
+ *            half_angle_rad of a cone about `axis`
+ * Returned:  number of objects in `out`, at most `room` */
+typedef int (*bst_tracker_near_fn)(void *user, bst_vec3 axis, double half_angle_rad,
+                                   bst_identity_object *out, int room);
+
 typedef struct bst_tracker_input {
     const bst_detections *detections;
     const bst_nav_telemetry *nav; /* required */
@@ -74,6 +86,9 @@ typedef struct bst_tracker_input {
     const bst_quat *q_telemetry_mid;
     /* cue at mid-exposure */
     bst_tracker_cue cue;
+    bst_tracker_near_fn near; /* NULL: no catalogue */
+    void *near_user;
+    int32_t cue_object; /* index in the catalogue; negative: none */
 } bst_tracker_input;
 
 typedef enum bst_tracker_event_kind {
@@ -145,6 +160,21 @@ bool bst_tracker_may_start_orbit(const bst_tracker *tracker);
 bst_tracker_outcome bst_tracker_step(bst_tracker *tracker, const bst_tracker_input *input,
                                      bst_tracks *tracks, int track_capacity,
                                      bst_predictions *predictions, int prediction_capacity);
+
+/* Number of smoothed tracks of a frame that there is room for: a deleted track has states for the
+ * frames of the lag that remain. */
+int bst_tracker_smoothed_room(const bst_tracker_config *config);
+
+/* True if there is a frame that lies smoothing_lag_frames before the latest one; false with 0. */
+bool bst_tracker_has_smoothed(const bst_tracker *tracker);
+
+/* Writes the smoothed tracks of that frame, which exists; tracks beyond the capacity are counted
+ * in `lost`. */
+void bst_tracker_smoothed(const bst_tracker *tracker, bst_tracks_smoothed *out, int capacity);
+
+/* Probabilities over the catalogue's objects, if the tracks were compared with it in the latest
+ * processed frame; else NULL. Valid until the next step. */
+const bst_identity *bst_tracker_identity(const bst_tracker *tracker);
 
 /* Announces a new cue from the next frame on: no track is the target until it fits the new cue. */
 void bst_tracker_retarget(bst_tracker *tracker);

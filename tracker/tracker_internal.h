@@ -6,6 +6,7 @@
 #include "tracker/attitude/attitude.h"
 #include "tracker/attitude/attitude_error.h"
 #include "tracker/attitude/attitude_shared.h"
+#include "tracker/mtt/smoother.h"
 #include "tracker/target.h"
 #include "tracker/tracker.h"
 
@@ -35,6 +36,12 @@ struct bst_tracker {
         max_attitude_sigma_rad;
     int max_detections;
     bst_mtt *mtt;
+    double identity_period_s; /* 0: never */
+    bst_identity_params identity_params;
+    bst_identity *identity; /* latest comparison; NULL: none are made */
+    double identified_s;    /* its time */
+    bool identified;        /* in the latest frame */
+    bst_smoother *smoother; /* NULL: no smoothing */
     cached_star *cache;
     bst_attitude_star *stars;
     bst_mtt_detection *detections;
@@ -104,5 +111,18 @@ bst_quat bst_tracker_refer(const bst_tracker *t, bst_quat q_telemetry);
 void bst_tracker_find_attitude(bst_tracker *t, const bst_tracker_input *input,
                                const bst_light *light, int64_t tick, double dt_s,
                                bst_tracker_attitude *out);
+
+/* ---- identify.c ---- */
+
+/* Sets the parameters of comparisons with the catalogue; allocates their memory.
+ *
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_tracker_identity_create(bst_ctx *ctx, const bst_tracker_config *config,
+                                       bst_tracker *t) BST_MUST_CHECK;
+/* Compares the tracks with the catalogue, if it is time, and sets the cue's comparison.
+ *
+ * Given:     usable  the frame has an attitude */
+void bst_tracker_identify(bst_tracker *t, const bst_tracker_input *input, bool usable,
+                          const bst_mtt_frame *frame, bst_target_cue *cue);
 
 #endif

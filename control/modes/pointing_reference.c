@@ -132,6 +132,10 @@ bst_status bst_control_aim(bst_ctx *ctx, const bst_control *c, int64_t tick, boo
             *direction = offset_by(d, c->search_x_gcrf, c->search.tile[c->search_step]);
             return BST_OK;
         }
+        case BST_MODE_LOST:
+            *valid = c->rest_valid;
+            *direction = c->rest_gcrf;
+            return BST_OK;
         case BST_MODE_STARE:
             *valid = c->stare_valid;
             *direction = c->stare_gcrf;
@@ -204,7 +208,8 @@ static bst_status work_out(bst_ctx *ctx, const bst_control *c, int64_t tick,
     bool valid;
     bst_vec3 d = {0.0, 0.0, 0.0};
     BST_TRY(bst_control_aim(ctx, c, tick, &valid, &d));
-    if (valid && !held_in_body(c)) { /* otherwise the star directions do not matter */
+    /* otherwise the star directions do not matter */
+    if (valid && !held_in_body(c) && c->mode != BST_MODE_LOST) {
         bst_light_aberration aberration = aberration_at(c, tick);
         bst_quat error = bst_control_correction_at(c, tick);
         d = bst_quat_rotate(error, bst_light_aberration_apply(&aberration, d));

@@ -24,7 +24,9 @@
 #include "boresight/messages/predictions.h"
 #include "boresight/messages/sensor_command.h"
 #include "boresight/messages/task.h"
+#include "boresight/messages/track_identities.h"
 #include "boresight/messages/tracks.h"
+#include "boresight/messages/tracks_smoothed.h"
 #include "boresight/messages/truth.h"
 #include "boresight/messages/window.h"
 

@@ -6,8 +6,8 @@
 #include "sim/eval/frame_scores.h"
 #include "sim/eval/growing.h"
 
-/* frames whose truth is kept for late messages: 1 s of latency at 60 Hz */
-enum { WAITING = 64 };
+/* frames whose truth is kept for late messages: 1 s of latency at 60 Hz, and the smoother's lag */
+enum { WAITING = 128 };
 
 /* Threshold of a detector that states none, SNR. */
 static const double USUAL_THRESHOLD_SNR = 5.0;
@@ -25,6 +25,7 @@ typedef struct known_frame {
     double mid_tick;
     bst_quat q_cam_from_gcrf;
     bst_light light;
+    double track_error2_px2; /* of the track of interest, squared; NAN: none, or another object's */
     known_object *objects;
     int count, room;
 } known_frame;
@@ -43,7 +44,8 @@ struct bst_run_metrics {
     uint8_t *objects; /* [objects of the world] bit 0: seen, bit 1: tracked */
     int object_count;
     bst_error_statistics track_error;
-    double threshold_snr; /* of the latest detections that state one */
+    double smoothed2_px2, filtered2_px2; /* sums of squares over smoothed_frames */
+    double threshold_snr;                /* of the latest detections that state one */
     bst_frame_scores *scores;
     bst_scored_object *scored; /* work space of a frame */
     int scored_room;
@@ -105,6 +107,7 @@ static bool archive_frame(known_frame *f, bst_archive *archive, int most) {
     BST_ARCHIVE(archive, f->mid_tick);
     BST_ARCHIVE(archive, f->q_cam_from_gcrf);
     BST_ARCHIVE(archive, f->light);
+    BST_ARCHIVE(archive, f->track_error2_px2);
     f->count = bst_archive_count(archive, f->count, most);
     if (bst_archive_is_restoring(archive) && f->count > f->room) {
         if (!make_room((void **)&f->objects, f->count, sizeof *f->objects)) {
@@ -144,12 +147,14 @@ bst_status bst_run_metrics_archive(bst_run_metrics *m, bst_archive *archive) {
     bst_archive_bytes(archive, m->tracks, (size_t)m->track_count * sizeof *m->tracks);
     bst_archive_bytes(archive, m->objects, (size_t)m->object_count);
     bst_error_statistics_archive(&m->track_error, archive);
+    BST_ARCHIVE(archive, m->smoothed2_px2);
+    BST_ARCHIVE(archive, m->filtered2_px2);
     BST_ARCHIVE(archive, m->figures);
     BST_ARCHIVE(archive, m->threshold_snr);
     return bst_frame_scores_archive(m->scores, archive);
 }
 
-static const known_frame *find_frame(const bst_run_metrics *m, int64_t exposure_id) {
+static known_frame *find_frame(bst_run_metrics *m, int64_t exposure_id) {
     for (int i = 0; i < WAITING; i++) {
         if (m->frames[i].exposure_id == exposure_id) {
             return &m->frames[i];
@@ -173,6 +178,7 @@ bst_status bst_run_metrics_truth(bst_ctx *ctx, bst_run_metrics *m, const bst_tru
     f->mid_tick = 0.5 * (double)(truth->start_tick + truth->end_tick);
     f->q_cam_from_gcrf = truth->q_cam_from_gcrf_mid;
     f->light = (bst_light){.velocity_mps = truth->velocity_bary_mps, .sun_m = truth->sun_m};
+    f->track_error2_px2 = NAN;
     f->count = 0;
     for (int i = 0; i < truth->count; i++) {
         const bst_truth_item *item = &truth->items[i];
@@ -280,7 +286,7 @@ static bst_status score_tracks(bst_ctx *ctx, bst_run_metrics *m, const known_fra
 }
 
 bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *m, const bst_tracks *tracks) {
-    const known_frame *f = find_frame(m, tracks->exposure_id);
+    known_frame *f = find_frame(m, tracks->exposure_id);
     double scale = bst_camera_scale_rad(&m->camera);
     bst_run_losses *lost = &m->figures.losses;
     lost->tracks += tracks->lost;
@@ -303,6 +309,7 @@ bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *m, const bst_tr
             if (t->target_of_interest && (int)object->id == m->target &&
                 px <= BST_RIGHT_TARGET_PX) {
                 add_track_error(m, t->direction_gcrf, object->direction, scale);
+                f->track_error2_px2 = px * px;
             }
         }
         bool near = least_px <= BST_RIGHT_TARGET_PX;
@@ -319,6 +326,26 @@ bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *m, const bst_tr
         }
     }
     return f ? score_tracks(ctx, m, f, tracks) : BST_OK;
+}
+
+void bst_run_metrics_smoothed(bst_run_metrics *m, const bst_tracks_smoothed *tracks) {
+    const known_frame *f = find_frame(m, tracks->exposure_id);
+    double scale = bst_camera_scale_rad(&m->camera);
+    if (!f || !isfinite(f->track_error2_px2)) {
+        return; /* the filtered state is another object's */
+    }
+    for (int i = 0; i < tracks->count; i++) {
+        for (int o = 0; tracks->items[i].target_of_interest && o < f->count; o++) {
+            if ((int)f->objects[o].id == m->target) {
+                double px =
+                    bst_vec3_angle(tracks->items[i].direction_gcrf, f->objects[o].direction) /
+                    scale;
+                m->smoothed2_px2 += px * px;
+                m->filtered2_px2 += f->track_error2_px2;
+                m->figures.smoothed_frames++;
+            }
+        }
+    }
 }
 
 void bst_run_metrics_frame(bst_run_metrics *m, const bst_loop_frame *frame) {
@@ -339,6 +366,9 @@ void bst_run_metrics_figures(const bst_run_metrics *m, bst_run_metric_figures *o
     out->track_median_px = bst_error_statistics_quantile(&m->track_error, 0.5);
     out->track_p95_px = bst_error_statistics_quantile(&m->track_error, 0.95);
     out->track_max_px = bst_error_statistics_largest(&m->track_error);
+    double smoothed = (double)out->smoothed_frames;
+    out->smoothed_rms_px = smoothed > 0.0 ? sqrt(m->smoothed2_px2 / smoothed) : NAN;
+    out->smoothed_filtered_rms_px = smoothed > 0.0 ? sqrt(m->filtered2_px2 / smoothed) : NAN;
     bst_track_figures scores;
     bst_frame_scores_figures(m->scores, &scores);
     double scale = bst_camera_scale_rad(&m->camera);

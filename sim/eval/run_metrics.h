@@ -30,6 +30,10 @@ typedef struct bst_run_metric_figures {
      * frames with tracks, and the target in the field and in track; NAN without any */
     int64_t track_frames;
     double track_rms_px, track_median_px, track_p95_px, track_max_px;
+    /* the same of its smoothed states (channel tracks_smoothed), as far as there are any, and of
+     * the tracker's own in these frames; NAN without any */
+    int64_t smoothed_frames;
+    double smoothed_rms_px, smoothed_filtered_rms_px;
     /* confirmed tracks by identity; false: no object nearby in most of its frames */
     int64_t tracks, false_tracks;
     /* of all confirmed tracks against all objects in the field (frame_scores.h); NAN without any */
@@ -68,6 +72,8 @@ void bst_run_metrics_detections(bst_run_metrics *metrics, const bst_detections *
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *metrics,
                                   const bst_tracks *tracks) BST_MUST_CHECK;
+/* Adds the error of the smoothed track of interest. */
+void bst_run_metrics_smoothed(bst_run_metrics *metrics, const bst_tracks_smoothed *tracks);
 /* Counts a frame, evaluated by the loop summary, with the target in the field. */
 void bst_run_metrics_frame(bst_run_metrics *metrics, const bst_loop_frame *frame);
 /* Changes the true target of the metrics; -1: none. */

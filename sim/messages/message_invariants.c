@@ -146,6 +146,28 @@ bool bst_tracks_are_valid(const bst_tracks *t, int capacity) {
     return valid;
 }
 
+bool bst_track_identities_are_valid(const bst_track_identities *t, int capacity) {
+    bool valid = is_count(t->count, t->lost, capacity);
+    for (int i = 0; valid && i < t->count; i++) {
+        valid = t->items[i].track_id >= 1 && t->items[i].object >= -2 &&
+                bst_is_share(t->items[i].probability);
+    }
+    return valid;
+}
+
+bool bst_tracks_smoothed_are_valid(const bst_tracks_smoothed *t, int capacity) {
+    bool valid = is_count(t->count, t->lost, capacity);
+    for (int i = 0; valid && i < t->count; i++) {
+        const bst_track_smoothed *item = &t->items[i];
+        valid = item->id >= 1 && item->status >= BST_TRACK_TENTATIVE &&
+                item->status <= BST_TRACK_COASTING && item->later_frames >= 0 &&
+                bst_is_unit_vec3(item->direction_gcrf, BST_UNIT_TOLERANCE) &&
+                bst_is_finite_vec3(item->rate_gcrf_radps) &&
+                bst_is_covariance(&item->covariance[0][0], 4);
+    }
+    return valid;
+}
+
 bool bst_predictions_are_valid(const bst_predictions *p, int capacity) {
     bool valid = is_count(p->count, p->lost, capacity) &&
                  (!p->attitude_valid || (bst_is_finite_vec3(p->attitude_error_cam_rad) &&

@@ -37,6 +37,10 @@ bool bst_detections_are_valid(const bst_detections *detections, int capacity);
 /* Tracks after a frame: at most `capacity`, in unit directions, with finite covariances whose
  * diagonals are not negative, identities of 1 or more, and a fix with a unit attitude. */
 bool bst_tracks_are_valid(const bst_tracks *tracks, int capacity);
+/* Identities of tracks: at most `capacity`, probabilities in 0 to 1. */
+bool bst_track_identities_are_valid(const bst_track_identities *identities, int capacity);
+/* Smoothed tracks of a frame: as bst_tracks_are_valid. */
+bool bst_tracks_smoothed_are_valid(const bst_tracks_smoothed *tracks, int capacity);
 /* Predictions: at most `capacity`, in unit directions, with standard deviations of 0 or more. */
 bool bst_predictions_are_valid(const bst_predictions *predictions, int capacity);
 /* The true scene of an exposure: at most `capacity` items, shares of the field in 0 to 1, unit

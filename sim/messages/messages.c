@@ -27,6 +27,12 @@ static int count_predictions(const void *payload) {
 static int count_tracks(const void *payload) {
     return ((const bst_tracks *)payload)->count;
 }
+static int count_identities(const void *payload) {
+    return ((const bst_track_identities *)payload)->count;
+}
+static int count_smoothed(const void *payload) {
+    return ((const bst_tracks_smoothed *)payload)->count;
+}
 
 #define HEADER_ONLY(name, kind, header) \
     { name, kind, sizeof(header), 0, false, NULL, NULL, false, NULL }
@@ -52,6 +58,10 @@ static const bst_channel_type types[] = {
     WITH_ITEMS(BST_CHANNEL_PREDICTIONS, BST_CHANNEL_LATEST, bst_predictions, bst_prediction,
                count_predictions),
     WITH_ITEMS(BST_CHANNEL_TRACKS, BST_CHANNEL_QUEUE, bst_tracks, bst_track, count_tracks),
+    WITH_ITEMS(BST_CHANNEL_TRACK_IDENTITIES, BST_CHANNEL_QUEUE, bst_track_identities,
+               bst_track_identity, count_identities),
+    WITH_ITEMS(BST_CHANNEL_TRACKS_SMOOTHED, BST_CHANNEL_QUEUE, bst_tracks_smoothed,
+               bst_track_smoothed, count_smoothed),
     HEADER_ONLY(BST_CHANNEL_CONTROL_STATUS, BST_CHANNEL_LATEST, bst_control_status),
     HEADER_ONLY(BST_CHANNEL_TASK, BST_CHANNEL_LATEST, bst_task),
 };
@@ -76,6 +86,8 @@ const char *bst_channel_writers(const char *name) {
         {BST_CHANNEL_DETECTIONS, "imgproc or obsgen"},
         {BST_CHANNEL_PREDICTIONS, "tracker"},
         {BST_CHANNEL_TRACKS, "tracker"},
+        {BST_CHANNEL_TRACK_IDENTITIES, "tracker"},
+        {BST_CHANNEL_TRACKS_SMOOTHED, "tracker"},
         {BST_CHANNEL_LOS_COMMAND, "control"},
         {BST_CHANNEL_SENSOR_COMMAND, "control"},
         {BST_CHANNEL_CONTROL_STATUS, "control"},

@@ -121,6 +121,14 @@ bool bst_knowledge_apsides(bst_knowledge_view *view, int object, double *perigee
  * orbit. */
 double bst_knowledge_places(const bst_knowledge *knowledge, double seconds, double *x_m,
                             double *y_m, double *z_m);
+/* Objects that may be in a cone of apparent directions at `seconds`: all that are, and few others.
+ *
+ * Returned:  *count  in `indices`, ascending; room for all objects is needed */
+bst_status bst_knowledge_near(bst_ctx *ctx, bst_knowledge_view *view, double seconds, bst_vec3 axis,
+                              double half_angle_rad, int *indices, int *count) BST_MUST_CHECK;
+/* Index of the cue's object: that of the task, or that of the sensor's own cue; -1: the cue is a
+ * direction or a region. */
+int bst_knowledge_cue_object(const bst_knowledge_view *view);
 /* Observer state by onboard navigation, and Sun and Moon at the onboard clock's time. */
 bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                 bst_world_state *eye, bst_bodies *bodies) BST_MUST_CHECK;

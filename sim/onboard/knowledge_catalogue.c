@@ -54,6 +54,26 @@ double bst_knowledge_places(const bst_knowledge *k, double seconds, double *x_m,
     return t;
 }
 
+bst_status bst_knowledge_near(bst_ctx *ctx, bst_knowledge_view *view, double seconds, bst_vec3 axis,
+                              double half_angle_rad, int *indices, int *count) {
+    double t;
+    bst_world_state eye;
+    BST_TRY(bst_onboard_nav_eye(ctx, view, seconds, &t, &eye));
+    const bst_ephemeris_cone cone = {
+        .apex_m = eye.position_m, .axis = axis, .half_angle_rad = half_angle_rad};
+    *count = bst_ephemeris_near(view->knowledge->world->ephemeris, t, &cone, indices);
+    return BST_OK;
+}
+
+int bst_knowledge_cue_object(const bst_knowledge_view *view) {
+    const world_sensor *sensor = &view->knowledge->world->observers[view->knowledge->observer]
+                                      .sensors[view->knowledge->sensor];
+    if (view->tasked) {
+        return view->task.object;
+    }
+    return sensor->config.cue.region.kind == BST_REGION_NONE ? sensor->cue_object : -1;
+}
+
 bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                 bst_world_state *eye, bst_bodies *bodies) {
     double t;

@@ -122,6 +122,7 @@ typedef struct bst_report_sensor {
     int64_t bad_pixels;      /* learned by image processing until the end */
     int64_t track_frames;    /* frames with track errors in the summary; 0: none */
     double track_rms_px, track_median_px, track_p95_px, track_max_px;
+    double smoothed_rms_px, smoothed_filtered_rms_px; /* NAN: no smoothed tracks */
     /* all tracks against all objects, from the summary; 0 and NAN: none */
     int64_t scored_frames, id_switches, ghosts;
     double gospa_px, ospa2_px, track_purity;

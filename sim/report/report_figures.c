@@ -83,6 +83,8 @@ static void take_summary(bst_report_sensor *s, const cJSON *summary) {
                  {"track_median_px", &s->track_median_px},
                  {"track_p95_px", &s->track_p95_px},
                  {"track_max_px", &s->track_max_px},
+                 {"smoothed_rms_px", &s->smoothed_rms_px},
+                 {"smoothed_filtered_rms_px", &s->smoothed_filtered_rms_px},
                  {"gospa_px", &s->gospa_px},
                  {"ospa2_px", &s->ospa2_px},
                  {"track_purity", &s->track_purity}};
@@ -126,6 +128,7 @@ void bst_report_judge(bst_report_sensor *s, const cJSON *summary) {
     s->real_time_factor = NAN;
     s->track_frames = s->scored_frames = s->id_switches = s->ghosts = 0;
     s->gospa_px = s->ospa2_px = s->track_purity = NAN;
+    s->smoothed_rms_px = s->smoothed_filtered_rms_px = NAN;
     s->track_rms_px = s->track_median_px = s->track_p95_px = s->track_max_px = NAN;
     mark(s);
     for (size_t i = 0; tally && i < s->count; i++) {

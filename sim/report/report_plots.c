@@ -311,7 +311,7 @@ static void plot_track(const bst_report_drawing *d) {
     bst_chart_legend(d->out, BST_KEY_LINE, BST_CHART_RED, "sigma that the tracker states");
     fputs("</ul>\n", d->out);
     const bst_report_sensor *s = d->sensor;
-    char text[200], caption[500] = TRACK_ERROR;
+    char text[200], caption[700] = TRACK_ERROR;
     if (s->track_frames > 0) {
         describe(text, s->track_rms_px, s->track_median_px, s->track_p95_px, NAN, s->track_max_px,
                  "px");
@@ -320,6 +320,14 @@ static void plot_track(const bst_report_drawing *d) {
                              " processed frames with the target in the field "
                              "and in track: %s of %.4g arcsec.",
                  s->track_frames, text, s->pixel_scale_arcsec);
+    }
+    size_t used = strlen(caption);
+    if (isfinite(s->smoothed_rms_px)) {
+        snprintf(
+            caption + used, sizeof caption - used,
+            " Smoothed with later frames (table tracks_smoothed): RMS %.3g px; without, in the "
+            "same frames: %.3g px.",
+            s->smoothed_rms_px, s->smoothed_filtered_rms_px);
     }
     bst_report_page_figure_end(d->out, caption);
 }

@@ -70,7 +70,9 @@ static bst_status judge(bst_run_execution *run, bst_run_sensor_watch *sensor, co
         bst_loop_summary_tracks(sensor->summary, payload, tick);
         return bst_run_metrics_tracks(&run->hooks, sensor->metrics, payload);
     }
-    if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0) {
+    if (strcmp(channel, BST_CHANNEL_TRACKS_SMOOTHED) == 0) {
+        bst_run_metrics_smoothed(sensor->metrics, payload);
+    } else if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0) {
         bst_run_metrics_detections(sensor->metrics, payload);
     } else if (strcmp(channel, BST_CHANNEL_CONTROL_STATUS) == 0) {
         bst_loop_summary_status(sensor->summary, payload);

@@ -45,6 +45,11 @@ cJSON *bst_run_summary_json(const bst_run_sensor_figures *figures, double real_t
     bst_json_add_number(node, "track_median_px", m->track_median_px);
     bst_json_add_number(node, "track_p95_px", m->track_p95_px);
     bst_json_add_number(node, "track_max_px", m->track_max_px);
+    if (m->smoothed_frames > 0) {
+        add_count(node, "smoothed_frames", m->smoothed_frames);
+        bst_json_add_number(node, "smoothed_rms_px", m->smoothed_rms_px);
+        bst_json_add_number(node, "smoothed_filtered_rms_px", m->smoothed_filtered_rms_px);
+    }
     add_count(node, "tracks", m->tracks);
     add_count(node, "false_tracks", m->false_tracks);
     add_count(node, "scored_frames", m->scored_frames);
@@ -78,6 +83,11 @@ void bst_run_summary_print(const bst_run_sensor_figures *figures) {
                       "% of visible frames since then in track");
     bst_run_print_row("pointing RMS", "%.3f", f->pointing_rms_px, "px");
     bst_run_print_row("pointing 99th percentile", "%.3f", f->pointing_p99_px, "px");
+    if (figures->metrics.smoothed_frames > 0) {
+        bst_run_print_row("track RMS, smoothed", "%.4f", figures->metrics.smoothed_rms_px, "px");
+        bst_run_print_row("  filtered, same frames", "%.4f",
+                          figures->metrics.smoothed_filtered_rms_px, "px");
+    }
     if (figures->metrics.bad_pixels > 0) {
         bst_run_print_row("bad pixels learned", "%.0f", (double)figures->metrics.bad_pixels, "");
     }

@@ -1,160 +1,6 @@
 /* Modes beside the main loop: fixed, scan, the search of a region, coasting, cues that jump or end,
  * and a search that gives up. */
-#include <stdlib.h>
-
-#include "control/control.h"
-#include "sim/onboard/knowledge.h"
-#include "tests/test_support.h"
-
-#define TICKS 1000
-#define PX (3.0 * BST_ARCSEC_RAD)
-#define FIELD (1024 * PX)
-#define DRIFT (15.0 * BST_ARCSEC_RAD) /* of the region's places, rad/s */
-
-typedef struct rig {
-    bst_ctx ctx;
-    bst_control control;
-    bool cue_valid;
-    double cue_jump_rad, jump_s, cue_end_s;
-    bst_quat region_turn; /* of the region on the sky */
-    bst_tracks *tracks;
-    bst_pointing_telemetry *telemetry;
-    bst_los_command command;
-    bst_control_status status;
-    bool commanded;
-    bst_quat q_body, q_cam;
-    bst_vec3 image_x; /* about which way the image's x axis points */
-} rig;
-
-static bst_status cue_direction_at(void *user, bst_ctx *ctx, double seconds, bool *valid,
-                                   bst_vec3 *direction) {
-    (void)ctx;
-    const rig *r = user;
-    double a = 50.0 * BST_ARCSEC_RAD * seconds + (seconds >= r->jump_s ? r->cue_jump_rad : 0.0);
-    *valid = r->cue_valid && seconds < r->cue_end_s;
-    *direction = (bst_vec3){cos(a), sin(a), 0.0};
-    return BST_OK;
-}
-
-static bst_status cue_at(void *user, bst_ctx *ctx, double seconds, bst_onboard_cue *out) {
-    bool valid;
-    bst_vec3 d;
-    BST_TRY(cue_direction_at(user, ctx, seconds, &valid, &d));
-    double rate = 50.0 * BST_ARCSEC_RAD;
-    *out = (bst_onboard_cue){.valid = valid,
-                             .direction_gcrf = d,
-                             .rate_gcrf_radps = {-rate * d.y, rate * d.x, 0.0},
-                             .sigma_rad = 0.3 * BST_DEG_RAD,
-                             .rate_sigma_radps = 0.3 * BST_ARCSEC_RAD,
-                             .v_mag = 13.0,
-                             .v_mag_sigma = 0.5};
-    return BST_OK;
-}
-
-/* Along the equator, which drifts eastwards among the stars. */
-static bst_status region_at(void *user, bst_ctx *ctx, double seconds, double along_rad,
-                            double across_rad, bst_vec3 *direction) {
-    (void)ctx;
-    const rig *r = user;
-    double a = along_rad + (r->control.env.region.kind == BST_REGION_ARC ? 0.0 : DRIFT * seconds);
-    bst_vec3 d = {cos(across_rad) * cos(a), cos(across_rad) * sin(a), sin(across_rad)};
-    *direction = bst_quat_rotate(r->region_turn, d);
-    return BST_OK;
-}
-
-/* From the Earth's centre the belt moves as the Earth turns: here by DRIFT about z. */
-static bst_status belt_eye_at(void *user, bst_ctx *ctx, double seconds, bool *known,
-                              bst_belt_eye *eye) {
-    (void)ctx;
-    (void)seconds;
-    const rig *r = user;
-    *known = r->control.env.region.kind != BST_REGION_NONE;
-    *eye = (bst_belt_eye){.earth_radps = bst_quat_rotate(r->region_turn, (bst_vec3){0, 0, DRIFT})};
-    return BST_OK;
-}
-
-static bst_control_config defaults(void) {
-    bst_ctx ctx = {0};
-    bst_control_config config;
-    bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_control_config_table, &config));
-    config.exposure_s = 0.5;
-    config.dwell_frames = 2;
-    config.command_latency_s = 0.0;
-    return config;
-}
-
-static bst_status rig_try(rig *r, const bst_control_config *config, const bst_region *region) {
-    r->tracks = calloc(1, sizeof *r->tracks + 4 * sizeof(bst_track));
-    r->telemetry = calloc(1, sizeof *r->telemetry + sizeof(bst_pointing_sample));
-    assert_true(r->tracks && r->telemetry);
-    r->q_body = r->q_cam = BST_QUAT_IDENTITY;
-    bst_control_env env = {.tick_rate_hz = TICKS,
-                           .pixel_rad = PX,
-                           .width_px = 1024,
-                           .height_px = 1024,
-                           .cue_at = cue_at,
-                           .cue_direction_at = cue_direction_at,
-                           .region = *region,
-                           .region_at = region_at,
-                           .belt_eye_at = belt_eye_at,
-                           .cue_user = r};
-    return bst_control_init(&r->ctx, &r->control, config, &env);
-}
-
-static void rig_open(rig *r, const bst_control_config *config, int region) {
-    memset(r, 0, sizeof *r);
-    r->cue_valid = true;
-    r->jump_s = r->cue_end_s = INFINITY;
-    r->region_turn = BST_QUAT_IDENTITY;
-    r->image_x = (bst_vec3){0, 1, 0};
-    bst_assert_ok(&r->ctx, rig_try(r, config,
-                                   &(bst_region){.kind = region,
-                                                 .half_length_rad = 3.0 * BST_DEG_RAD,
-                                                 .half_width_rad = 1.0 * BST_DEG_RAD}));
-}
-
-static void rig_close(rig *r) {
-    free(r->tracks);
-    free(r->telemetry);
-}
-
-/* A gimbal that is at its command, at once. */
-static void step(rig *r, int64_t tick, bool frame) {
-    bst_nav_telemetry nav = {.tick = tick, .sun_m = {1.5e11, 0, 0}};
-    if (r->commanded) {
-        double dt = (double)(tick - r->command.tick) / TICKS;
-        r->q_cam = bst_quat_look(
-            bst_vec3_axpy(r->command.direction_gcrf, dt, r->command.rate_gcrf_radps), r->image_x);
-    }
-    r->telemetry->written = r->telemetry->capacity = 1;
-    r->telemetry->settled = true;
-    r->telemetry->q_body_from_gcrf = r->q_body;
-    r->telemetry->items[0] = (bst_pointing_sample){.tick = tick, .q_cam_from_gcrf = r->q_cam};
-    bst_control_telemetry(&r->control, r->telemetry, &nav);
-    r->control.transition_count = 0;
-    if (frame) {
-        r->tracks->tick = tick - 400;
-        bst_assert_ok(&r->ctx, bst_control_observe(&r->ctx, &r->control, tick, r->tracks));
-    }
-    bst_assert_ok(&r->ctx, bst_control_update(&r->ctx, &r->control, tick, &r->commanded,
-                                              &r->command, &r->status));
-}
-
-static bst_vec3 boresight(const rig *r) {
-    return bst_quat_rotate(bst_quat_conj(r->q_cam), (bst_vec3){0, 0, 1});
-}
-
-static void put_target(rig *r, bst_vec3 d, bst_vec3 rate, int hidden) {
-    r->tracks->count = 1;
-    r->tracks->target_id = 1;
-    r->tracks->items[0] = (bst_track){.id = 1,
-                                      .status = hidden ? BST_TRACK_COASTING : BST_TRACK_CONFIRMED,
-                                      .hits = 9,
-                                      .score = 20.0,
-                                      .hidden = hidden,
-                                      .direction_gcrf = d,
-                                      .rate_gcrf_radps = rate};
-}
+#include "tests/control/open_rig.h"
 
 static void a_direction_is_held_among_the_stars(void **state) {
     (void)state;
@@ -523,6 +369,7 @@ static void nothing_is_commanded_without_an_attitude(void **state) {
     bst_control_config config = defaults();
     config.attitude = 1;
     config.lost_after_frames = 3;
+    config.lost_hold = false;
     rig_open(&r, &config, BST_REGION_NONE);
     const bst_quat error = bst_quat_from_rotvec((bst_vec3){0.3, 2.0, -1.0});
     int searched = 0;
@@ -560,8 +407,55 @@ static void nothing_is_commanded_without_an_attitude(void **state) {
     rig_close(&r);
 }
 
+/* While it is lost the boresight is held at rest where the telemetry has it, without the error of
+ * attitude that control believed before; where it cannot be held, at a new place. */
+static void the_boresight_is_held_while_lost(void **state) {
+    (void)state;
+    rig r;
+    bst_control_config config = defaults();
+    config.lost_after_frames = 2;
+    config.strategy = BST_CONTROL_FIXED;
+    config.fixed_direction[0] = 1.0;
+    config.fixed_direction[2] = 0.0;
+    rig_open(&r, &config, BST_REGION_NONE);
+    bst_vec3 held = {0, 0, 0};
+    const bst_vec3 body_rate = {0.0, 0.0, 0.2 * BST_DEG_RAD}; /* rad/s, of a mount that is stuck */
+    int lost = 0, places = 0;
+    for (int64_t t = 0; t < 20000; t += 50) {
+        bool stuck = t >= 8000;
+        r.tracks->attitude = (bst_attitude_fix){.valid = t < 3000, .tick = t - 400};
+        r.tracks->attitude.q_cam_from_gcrf = r.q_cam;
+        r.tracks->attitude.error_cam_rad = (bst_vec3){0.0, 1e-3, 0.0};
+        if (stuck) {
+            r.commanded = false; /* the rig's gimbal does not follow */
+            r.q_cam =
+                bst_quat_look(bst_quat_rotate(bst_quat_from_rotvec(bst_vec3_scale(body_rate, 0.05)),
+                                              boresight(&r)),
+                              r.image_x);
+        }
+        step(&r, t, t % 1000 == 500);
+        if (r.status.mode != BST_MODE_LOST) {
+            continue;
+        }
+        assert_true(r.commanded);
+        assert_true(bst_vec3_norm(r.command.rate_gcrf_radps) < 1e-12); /* rounding */
+        bool anew = lost++ == 0 || bst_vec3_angle(r.command.direction_gcrf, held) > 1e-9;
+        if (anew) { /* where the boresight is */
+            assert_true(bst_vec3_angle(r.command.direction_gcrf, boresight(&r)) < 1e-9);
+            held = r.command.direction_gcrf;
+            places++;
+        }
+        assert_true(bst_vec3_angle(held, boresight(&r)) < 1.02 * BST_DEG_RAD);
+    }
+    /* 2.4 degrees in 12 s: it is given up twice */
+    assert_true(lost > 200);
+    assert_int_equal(places, 3);
+    rig_close(&r);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_boresight_is_held_while_lost),
         cmocka_unit_test(a_direction_is_held_among_the_stars),
         cmocka_unit_test(a_direction_is_held_in_the_body),
         cmocka_unit_test(the_scan_goes_to_and_fro),

@@ -182,6 +182,10 @@ static void channels_by_name(void **state) {
         {"detections", sizeof(bst_detections), sizeof(bst_detection), BST_CHANNEL_QUEUE, false},
         {"predictions", sizeof(bst_predictions), sizeof(bst_prediction), BST_CHANNEL_LATEST, false},
         {"tracks", sizeof(bst_tracks), sizeof(bst_track), BST_CHANNEL_QUEUE, false},
+        {"tracks_smoothed", sizeof(bst_tracks_smoothed), sizeof(bst_track_smoothed),
+         BST_CHANNEL_QUEUE, false},
+        {"track_identities", sizeof(bst_track_identities), sizeof(bst_track_identity),
+         BST_CHANNEL_QUEUE, false},
         {"control_status", sizeof(bst_control_status), 0, BST_CHANNEL_LATEST, false},
         {"frame", sizeof(bst_frame_message), 0, BST_CHANNEL_QUEUE, false},
         {"task", sizeof(bst_task), 0, BST_CHANNEL_LATEST, false},
@@ -200,12 +204,16 @@ static void channels_by_name(void **state) {
                 bst_detections detections;
                 bst_predictions predictions;
                 bst_tracks tracks;
+                bst_tracks_smoothed smoothed;
+                bst_track_identities identities;
             } m;
             memset(&m, 0, sizeof m);
             *(i == 3   ? &m.truth.count
               : i == 4 ? &m.detections.count
               : i == 5 ? &m.predictions.count
-                       : &m.tracks.count) = 17;
+              : i == 6 ? &m.tracks.count
+              : i == 7 ? &m.smoothed.count
+                       : &m.identities.count) = 17;
             assert_int_equal(t->count(&m), 17);
         }
         assert_true((t->count != NULL) == (cases[i].item > 0 && !cases[i].extended));

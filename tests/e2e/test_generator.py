@@ -64,6 +64,18 @@ class Generator(unittest.TestCase):
             else:
                 self.assertLess(sum(n > 0 for n in stars), 3, (name, stars))
 
+    def test_a_tumbling_spacecraft_finds_its_attitude(self):
+        """0.6 degrees per second: streaks of 360 px, until control holds the line of sight at rest."""
+        modules = runs.SENSOR + "/modules/"
+        craft = modules + "gimbal/platform/spacecraft/"
+        for hold, times in (("true", 1), ("false", 0)):
+            out = os.path.join(self.folder, "tumbling_" + hold)
+            runs.run("scenarios/rigid_spacecraft.json", out, craft + "initial_rate_degps=[0.3,-0.5,0.2]",
+                     craft + "initial_attitude_error_deg=[60,-80,40]", modules + "imgproc/attitude=unknown",
+                     modules + "control/attitude=unknown", modules + "control/lost_hold=" + hold, duration=5)
+            found = runs.database(out).execute("SELECT time_s FROM events WHERE kind = 'attitude_found'").fetchall()
+            self.assertEqual(len(found), times, hold)
+
     def test_truth_is_that_of_the_image(self):
         truths = []
         for source in ("image", "generator"):

@@ -183,6 +183,29 @@ static void send_all(bst_ctx *ctx, bst_recorder *recorder) {
                            4 * BST_ARCSEC_RAD)),
         .covariance = {{1, 2, 3, 4}, {2, 5, 6, 7}, {3, 6, 8, 9}, {4, 7, 9, 10}}};
     send(ctx, recorder, BST_CHANNEL_TRACKS, t, 4000);
+    bst_tracks_smoothed *smoothed = calloc(1, sizeof *smoothed + sizeof(bst_track_smoothed));
+    assert_non_null(smoothed);
+    smoothed->exposure_id = 3;
+    smoothed->tick = 750;
+    smoothed->count = 1;
+    smoothed->items[0] = (bst_track_smoothed){.id = 9,
+                                              .status = BST_TRACK_COASTING,
+                                              .later_frames = 1,
+                                              .direction_gcrf = t->items[0].direction_gcrf,
+                                              .rate_gcrf_radps = t->items[0].rate_gcrf_radps};
+    memcpy(smoothed->items[0].covariance, t->items[0].covariance, sizeof t->items[0].covariance);
+    send(ctx, recorder, BST_CHANNEL_TRACKS_SMOOTHED, smoothed, 4000);
+    free(smoothed);
+    bst_track_identities *identities =
+        calloc(1, sizeof *identities + 2 * sizeof(bst_track_identity));
+    assert_non_null(identities);
+    identities->exposure_id = 4;
+    identities->tick = 1500;
+    identities->count = 2;
+    identities->items[0] = (bst_track_identity){9, 0, 0.75};
+    identities->items[1] = (bst_track_identity){9, -1, 0.25};
+    send(ctx, recorder, BST_CHANNEL_TRACK_IDENTITIES, identities, 4000);
+    free(identities);
     free(d);
     free(t);
     const bst_los_command los = {.tick = 5000, .direction_gcrf = {0, 1, 0}};
@@ -283,6 +306,18 @@ static void test_tables(void **state) {
                   "cov_r1_r1_rad2ps2, cov_r1_r2_rad2ps2, cov_r2_r2_rad2ps2) = "
                   "(1, 2, 5, 3, 4, 6, 7, 8, 9, 10)",
                   1);
+        assert_is(db,
+                  "SELECT s.time_s FROM tracks_smoothed s JOIN tracks t USING (track_id) WHERE "
+                  "s.exposure_id = 3 AND s.status = 'coasting' AND s.later_frames = 1 AND "
+                  "s.target_of_interest = 0 AND s.ra_deg = t.ra_deg AND s.dec_deg = t.dec_deg AND "
+                  "s.rate_east_arcsec_per_s = t.rate_east_arcsec_per_s AND "
+                  "s.cov_d1_r2_rad2ps = 4 AND s.cov_r2_r2_rad2ps2 = 10",
+                  0.125);
+        assert_is(db,
+                  "SELECT sum(probability) FROM track_identities WHERE track_id = 9 AND time_s = "
+                  "0.25 AND exposure_id = 4 AND (object = 0 OR (object = -1 AND name IS NULL AND "
+                  "norad = 0))",
+                  1.0);
         bst_assert_close(number(db, "SELECT attitude_error_x_arcsec FROM track_frames"), 1.0,
                          1e-12);
         assert_is(db, "SELECT ra_deg FROM los_commands WHERE written_tick = 4800", 90.0);

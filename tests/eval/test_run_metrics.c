@@ -231,10 +231,10 @@ static void frames_and_objects(void **state) {
     assert_int_equal(m.objects_seen, 1);
     assert_int_equal(m.objects_tracked, 0);
     assert_int_equal(m.bad_pixels, 17);
-    for (int i = 0; i < 70; i++) { /* frame 8 and those before are forgotten */
+    for (int i = 0; i < 134; i++) { /* frame 8 and those before are forgotten */
         show_truth(f, 200 + i, OBJECTS, BST_TRUTH_IN_FIELD, 10);
     }
-    show_detections(f, 205, 100, 300); /* 64 frames are kept: 206 to 269 */
+    show_detections(f, 205, 100, 300); /* 128 frames are kept: 206 to 333 */
     show_track(f, 205, 1, BST_TRACK_CONFIRMED, true, beside(1, 0, 0.5));
     bst_run_metrics_figures(f->metrics, &m);
     assert_int_equal(m.detected_frames, 0);
@@ -330,6 +330,41 @@ static void score(fixture *f, int64_t id, const bst_track *tracks, int count) {
     bst_assert_ok(&f->ctx, bst_run_metrics_tracks(&f->ctx, f->metrics, f->tracks));
 }
 
+static void show_smoothed(fixture *f, int64_t exposure, bool of_interest, bst_vec3 direction) {
+    bst_tracks_smoothed *t = calloc(1, sizeof *t + 2 * sizeof(bst_track_smoothed));
+    assert_non_null(t);
+    t->exposure_id = exposure;
+    t->count = 2;
+    t->items[0] = (bst_track_smoothed){.id = 3, .direction_gcrf = beside(1, 4, 0)};
+    t->items[1] = (bst_track_smoothed){
+        .id = 7, .target_of_interest = of_interest, .direction_gcrf = direction};
+    bst_run_metrics_smoothed(f->metrics, t);
+    free(t);
+}
+
+/* Smoothed states come many frames later. Those of frames without the target's own track, of
+ * frames that nobody remembers, and of other tracks do not count. */
+static void smoothed_errors(void **state) {
+    fixture *f = *state;
+    enum { LAG = 60 };
+    for (int i = 0; i < 3 + LAG; i++) {
+        show_truth(f, i, OBJECTS, BST_TRUTH_IN_FIELD, 10);
+        show_track(f, i, 7, BST_TRACK_CONFIRMED, true,
+                   i == 2 ? beside(2, 0, 0.1) : beside(1, 0, i == 0 ? 0.9 : 1.2));
+    }
+    show_smoothed(f, 0, true, beside(1, 0.3, 0));
+    show_smoothed(f, 1, true, beside(1, 0, -0.4));
+    show_smoothed(f, 2, true, beside(2, 0, 0.1));
+    show_smoothed(f, 3, false, beside(1, 0, 3));
+    show_smoothed(f, 999, true, beside(1, 0, 3));
+    bst_run_metric_figures m;
+    bst_run_metrics_figures(f->metrics, &m);
+    assert_int_equal(m.smoothed_frames, 2);
+    /* as in track_errors */
+    bst_assert_close(m.smoothed_rms_px, sqrt((0.09 + 0.16) / 2), 1e-8);
+    bst_assert_close(m.smoothed_filtered_rms_px, sqrt((0.81 + 1.44) / 2), 1e-8);
+}
+
 /* First frame: track 1 is 1 px from object 0, object 1 is missed, track 2 is false; track 3 on an
  * object that is too faint, 4 outside the sensor, 5 hidden and 6 tentative do not count. Second
  * frame: both objects have exact tracks, object 0 one of another number. */
@@ -367,6 +402,7 @@ static void all_tracks_and_all_objects(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test_setup_teardown(smoothed_errors, set_up, tear_down),
         cmocka_unit_test_setup_teardown(track_errors, set_up, tear_down),
         cmocka_unit_test_setup_teardown(false_tracks, set_up, tear_down),
         cmocka_unit_test_setup_teardown(detected_fraction, set_up, tear_down),

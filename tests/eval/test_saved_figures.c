@@ -146,6 +146,15 @@ static void give(bst_ctx *ctx, parts *p, int step) {
         if (sensor == 0) {
             bst_run_metrics_detections(p->metrics, m.found);
             bst_assert_ok(ctx, bst_run_metrics_tracks(ctx, p->metrics, m.tracks));
+            bst_tracks_smoothed *smoothed =
+                calloc(1, sizeof *smoothed + sizeof(bst_track_smoothed));
+            assert_non_null(smoothed);
+            smoothed->exposure_id = m.tracks->exposure_id;
+            smoothed->count = m.tracks->count > 0;
+            smoothed->items[0] = (bst_track_smoothed){
+                .target_of_interest = true, .direction_gcrf = m.tracks->items[0].direction_gcrf};
+            bst_run_metrics_smoothed(p->metrics, smoothed);
+            free(smoothed);
             bst_loop_summary_tracks(p->loop, m.tracks, m.tracks->tick + 1800);
         }
     }
@@ -217,6 +226,9 @@ static void expect_same(const outcome *a, const outcome *b) {
     SAME("%.17g", metrics.track_rms_px);
     SAME("%.17g", metrics.track_median_px);
     SAME("%.17g", metrics.track_max_px);
+    COUNT(metrics.smoothed_frames);
+    SAME("%.17g", metrics.smoothed_rms_px);
+    SAME("%.17g", metrics.smoothed_filtered_rms_px);
     COUNT(metrics.tracks);
     COUNT(metrics.false_tracks);
     COUNT(metrics.scored_frames);

@@ -93,6 +93,43 @@ static void first_places_of_all(void **state) {
     drop(&s);
 }
 
+/* The objects in a cone are among those that are found; the cue's object is the task's, if any. */
+static void objects_near_a_direction(void **state) {
+    (void)state;
+    scene s = make("");
+    bst_assert_ok(&s.ctx, bst_world_prepare(&s.ctx, s.world, 1));
+    int indices[OBJECTS], count, in_cone = 0, found = 0;
+    const double t = 37.0, half = 0.3;
+    bst_world_sight at;
+    bst_assert_ok(&s.ctx, bst_knowledge_sight_at(&s.ctx, s.onboard, OBJECT_GX5, t, &at));
+    bst_assert_ok(&s.ctx,
+                  bst_knowledge_near(&s.ctx, s.onboard, t, at.apparent, half, indices, &count));
+    for (int i = 0; i < OBJECTS; i++) {
+        bst_world_sight other;
+        bool listed = false;
+        for (int k = 0; k < count; k++) {
+            assert_true(k == 0 || indices[k] > indices[k - 1]);
+            listed = listed || indices[k] == i;
+        }
+        bst_ctx quiet = {0};
+        if (i != SELF && bst_knowledge_sight_at(&quiet, s.onboard, i, t, &other) == BST_OK &&
+            bst_vec3_angle(other.apparent, at.apparent) <= half) {
+            in_cone++;
+            found += listed;
+        }
+    }
+    assert_true(in_cone >= 1);
+    assert_int_equal(found, in_cone);
+    int own = bst_knowledge_cue_object(s.onboard);
+    const bst_task task = {.id = 3, .object = ELLIPSE};
+    assert_true(bst_knowledge_view_task(s.onboard, &task));
+    assert_int_equal(bst_knowledge_cue_object(s.onboard), ELLIPSE);
+    const bst_task no_object = {.id = 4, .object = -1};
+    assert_true(bst_knowledge_view_task(s.onboard, &no_object));
+    assert_int_equal(bst_knowledge_cue_object(s.onboard), own);
+    drop(&s);
+}
+
 static void expect_same(const bst_world_sight *a, const bst_world_sight *b) {
     /* the truth's ephemeris is right to millimetres, of thousands of kilometres */
     bst_assert_close(test_distance(a->geometric, b->geometric), 0, 2e-9);
@@ -232,6 +269,7 @@ static void each_observer_is_itself(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(orbits_by_their_apsides),
+        cmocka_unit_test(objects_near_a_direction),
         cmocka_unit_test(first_places_of_all),
         cmocka_unit_test(sights_by_a_fast_clock),
         cmocka_unit_test(sights_from_where_it_believes_to_be),

@@ -32,6 +32,9 @@ static void every_key(void **state) {
                     .track_median_px = 17.5,
                     .track_p95_px = 18.5,
                     .track_max_px = 19.5,
+                    .smoothed_frames = 32,
+                    .smoothed_rms_px = 33.5,
+                    .smoothed_filtered_rms_px = 34.5,
                     .tracks = 20,
                     .false_tracks = 21,
                     .scored_frames = 27,
@@ -67,6 +70,9 @@ static void every_key(void **state) {
                 {"track_median_px", 17.5},
                 {"track_p95_px", 18.5},
                 {"track_max_px", 19.5},
+                {"smoothed_frames", 32},
+                {"smoothed_rms_px", 33.5},
+                {"smoothed_filtered_rms_px", 34.5},
                 {"tracks", 20},
                 {"false_tracks", 21},
                 {"scored_frames", 27},
@@ -92,7 +98,17 @@ static void every_key(void **state) {
     cJSON_Delete(node);
 }
 
+static void no_smoother_no_keys(void **state) {
+    (void)state;
+    const bst_run_sensor_figures figures = {.metrics = {.smoothed_rms_px = NAN}};
+    cJSON *node = bst_run_summary_json(&figures, 1.0);
+    assert_null(cJSON_GetObjectItem(node, "smoothed_frames"));
+    assert_null(cJSON_GetObjectItem(node, "smoothed_rms_px"));
+    cJSON_Delete(node);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(every_key)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(every_key),
+                                       cmocka_unit_test(no_smoother_no_keys)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

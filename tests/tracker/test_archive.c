@@ -35,6 +35,7 @@ static bst_tracker *make_tracker(world *w, const variant *v) {
     config.motion = v->orbits;
     config.max_coast_s = 20.0; /* the lost target is stored */
     config.max_misses = 8;
+    config.smoothing_lag_frames = v->orbits ? 0 : 6;
     config.drift_noise_arcsec_per_s15 = v->drifts ? 100.0 : config.drift_noise_arcsec_per_s15;
     bst_assert_ok(&ctx,
                   bst_tracker_create(&ctx, &config, &camera, RATE_HZ, find_star, w, &tracker));
@@ -93,6 +94,16 @@ static void compare_frame(const world *w, bst_tracker *whole, bst_tracker *resto
                      bst_tracker_step(restored, &input, tracks, TRACKS, predictions, TRACKS));
     assert_memory_equal(tracks, w->tracks, track_bytes);
     assert_memory_equal(predictions, w->predictions, prediction_bytes);
+    static bst_tracks_smoothed *smoothed[2];
+    const size_t smoothed_bytes = sizeof **smoothed + TRACKS * sizeof(bst_track_smoothed);
+    for (int i = 0; i < 2 && bst_tracker_has_smoothed(whole); i++) {
+        smoothed[i] = smoothed[i] ? smoothed[i] : calloc(1, smoothed_bytes);
+        assert_non_null(smoothed[i]);
+        memset(smoothed[i], 0, smoothed_bytes);
+        assert_true(bst_tracker_has_smoothed(restored));
+        bst_tracker_smoothed(i == 0 ? whole : restored, smoothed[i], TRACKS);
+    }
+    assert_true(!smoothed[0] || memcmp(smoothed[0], smoothed[1], smoothed_bytes) == 0);
     int count, other;
     const bst_tracker_event *events = bst_tracker_events(whole, &count);
     const bst_tracker_event *others = bst_tracker_events(restored, &other);

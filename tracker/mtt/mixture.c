@@ -16,18 +16,6 @@ typedef struct component {
     double x[4], p[4][4];
 } component;
 
-/* Difference b - a of the means in the tangent axes at a: direction, then rate. */
-static void difference(const bst_sky_state *a, const bst_sky_state *b, double out[4]) {
-    bst_tangent axes = bst_tangent_at(a->direction);
-    bst_vec3 step = bst_tangent_log(a->direction, b->direction);
-    bst_vec3 rate =
-        bst_vec3_sub(bst_tangent_carry(b->direction, a->direction, b->rate_radps), a->rate_radps);
-    out[0] = bst_vec3_dot(step, axes.e1);
-    out[1] = bst_vec3_dot(step, axes.e2);
-    out[2] = bst_vec3_dot(rate, axes.e1);
-    out[3] = bst_vec3_dot(rate, axes.e2);
-}
-
 void bst_sky_shift_by(bst_sky_state *state, const double x[4]) {
     bst_tangent axes = bst_tangent_at(state->direction);
     bst_sky_shift(state, bst_tangent_vector(&axes, x[0], x[1]),
@@ -38,7 +26,7 @@ void bst_sky_shift_by(bst_sky_state *state, const double x[4]) {
 static void to_component(const bst_sky_state *base, const bst_sky_state *state, double weight,
                          component *out) {
     out->weight = weight;
-    difference(base, state, out->x);
+    bst_sky_difference(base, state, out->x);
     bst_sky_turn_covariance(state, base->direction, out->p);
 }
 

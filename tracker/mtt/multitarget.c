@@ -7,7 +7,6 @@
 
 #include "tracker/mtt/multitarget_internal.h"
 
-/* Checks the parameters of the multi-target tracker. */
 /* Two tracks are of one object if their states agree to the 99 % quantile of chi-square with 4
  * degrees of freedom, 13.277. NEAR_COSINE, 4.5 mrad, only spares the comparison: a pair at that
  * distance agrees only with a standard deviation of 4.5 mrad / sqrt(2 SAME_CHI2) = 180 arcsec,
@@ -20,6 +19,7 @@ static const double CLUTTER_GAIN = 0.1;
  * the first it needs M hits (M of N); its score and chi-square have the second and the third. */
 enum { TENTATIVE_WINDOWS = 3 };
 
+/* Checks the parameters of the multi-target tracker. */
 static bst_status check(bst_ctx *ctx, const bst_mtt_params *p) {
     if (p->max_tracks < 1 || p->max_detections < 1 || p->confirm_hits < 2 ||
         p->confirm_frames < p->confirm_hits || p->max_stationary_tracks < 0 ||
@@ -72,6 +72,7 @@ static void lay_out(bst_mtt *m) {
     BST_ARENA_TAKE(a, m->shared, nt);
     BST_ARENA_TAKE(a, m->observable, nt);
     BST_ARENA_TAKE(a, m->departed_chi2, nt);
+    BST_ARENA_TAKE(a, m->priors, p->keep_priors ? nt : 0);
     if (p->association == BST_MTT_PMB) {
         bst_mtt_joint_lay_out(&m->joint, (int)nt, p->max_detections, a);
     }
@@ -123,61 +124,6 @@ void bst_mtt_free(bst_mtt *m) {
     bst_arena_free(&m->arena);
     bst_assignment_free(m->assignment);
     free(m);
-}
-
-/* True if the numbers of a track by which arrays are accessed are in range. */
-static bool is_intact(const bst_mtt_track *track) {
-    return (unsigned)track->status <= BST_TRACK_COASTING &&
-           (unsigned)track->sight <= BST_MTT_EARTH && track->models.count >= 0 &&
-           track->models.count <= BST_FILTER_COMPONENTS && track->innovation_count >= 0 &&
-           track->brightness_count >= 0;
-}
-
-/* Saves or restores tracks. */
-static bst_status archive_tracks(bst_mtt_track *tracks, int *count, int capacity,
-                                 bst_archive *archive) {
-    *count = bst_archive_count(archive, *count, capacity);
-    bst_archive_bytes(archive, tracks, (size_t)*count * sizeof *tracks);
-    for (int t = 0; t < *count; t++) {
-        if (!is_intact(&tracks[t])) {
-            return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
-                            "the saved state of the tracker is damaged at track %d", t);
-        }
-    }
-    return BST_OK;
-}
-
-/* The arrays per track and detection that are not named here are the work space of one frame. */
-bst_status bst_mtt_archive(bst_mtt *m, bst_archive *archive) {
-    int most = m->params.max_tracks + m->params.max_stationary_tracks;
-    BST_TRY(archive_tracks(m->tracks, &m->track_count, most, archive));
-    BST_TRY(archive_tracks(m->memory, &m->memory_count, m->params.max_dormant_tracks, archive));
-    m->rest_count = bst_archive_count(archive, m->rest_count, m->params.max_stationary_tracks);
-    m->sleepers = bst_archive_count(archive, m->sleepers, most);
-    BST_ARCHIVE(archive, m->next_id);
-    BST_ARCHIVE(archive, m->seconds);
-    bst_archive_bool(archive, &m->started);
-    bst_archive_bool(archive, &m->cue_lag_valid);
-    BST_ARCHIVE(archive, m->cue_lag_radps2);
-    BST_ARCHIVE(archive, m->undetected);
-    BST_ARCHIVE(archive, m->boresight);
-    BST_ARCHIVE(archive, m->bad_pixels);
-    BST_ARCHIVE(archive, m->charged);
-    BST_ARCHIVE(archive, m->clutter);
-    BST_ARCHIVE(archive, m->clutter_density);
-    BST_ARCHIVE(archive, m->alarms);
-    BST_ARCHIVE(archive, m->alarm_frames);
-    BST_ARCHIVE(archive, m->alarm_density);
-    BST_ARCHIVE(archive, m->lost);
-    bst_mtt_pool_archive(&m->now, m->params.max_detections, archive);
-    m->history_count = bst_archive_count(archive, m->history_count, BST_MTT_HISTORY);
-    for (int h = 0; h < BST_MTT_HISTORY; h++) {
-        bst_mtt_pool_archive(&m->history[h], m->params.max_detections, archive);
-    }
-    if (bst_archive_is_restoring(archive)) {
-        m->event_count = 0;
-    }
-    return BST_OK;
 }
 
 /* Appends a track event of this frame. */
@@ -523,6 +469,14 @@ static void store_unused(bst_mtt *m) {
     }
 }
 
+/* Keeps the predicted states, as the update of this frame uses them. */
+static void note_priors(bst_mtt *m) {
+    m->prior_count = m->params.keep_priors ? m->track_count : 0;
+    for (int t = 0; t < m->prior_count; t++) {
+        m->priors[t] = (bst_mtt_prior){m->tracks[t].id, m->tracks[t].state};
+    }
+}
+
 void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     assert(m && frame && frame->count >= 0 && (frame->detections || frame->count == 0));
     assert(!m->started || frame->seconds > m->seconds);
@@ -535,6 +489,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
     m->clutter_density = fmax(m->clutter, floor) / m->params.field_sr;
     m->alarm_density = fmax(m->alarms, floor) / m->params.field_sr;
     bst_mtt_associate(m, frame->partial);
+    note_priors(m);
     int unused = 0;
     for (int t = 0; t < m->track_count; t++) {
         m->tracks[t].last_chi2 = -1.0;
@@ -556,6 +511,7 @@ void bst_mtt_step(bst_mtt *m, const bst_mtt_frame *frame) {
 void bst_mtt_skip(bst_mtt *m, const bst_mtt_frame *frame) {
     assert(m && frame && (!m->started || frame->seconds > m->seconds));
     predict_tracks(m, frame);
+    note_priors(m);
     m->now.count = 0;
     for (int t = 0; t < m->track_count; t++) {
         m->observable[t] = m->tracks[t].may_miss = false;
@@ -577,6 +533,11 @@ const bst_mtt_track *bst_mtt_find(const bst_mtt *m, int64_t id) {
         }
     }
     return NULL;
+}
+
+const bst_mtt_prior *bst_mtt_priors(const bst_mtt *m, int *count) {
+    *count = m->prior_count;
+    return m->priors;
 }
 
 const bst_mtt_event *bst_mtt_events(const bst_mtt *m, int *count) {

@@ -84,6 +84,7 @@ typedef struct bst_mtt_params {
     double max_dormant_s;         /* time that they are kept, s */
     double max_dormant_sigma_rad; /* and while the 1 sigma of their direction is below this */
     double dormant_gate_chi2;     /* largest misfit of direction and rate, 4 degrees of freedom */
+    bool keep_priors;             /* bst_mtt_priors has them */
 } bst_mtt_params;
 
 #define BST_MTT_EVENT_WINDOW 16
@@ -172,6 +173,12 @@ typedef struct bst_mtt_track {
     double manoeuvre_end_s;                 /* the filter assumes a detected manoeuvre until then */
 } bst_mtt_track;
 
+/* Predicted state of a track, before the update of a frame. */
+typedef struct bst_mtt_prior {
+    int64_t id; /* of the track before the frame */
+    bst_sky_state state;
+} bst_mtt_prior;
+
 /* Input of one frame. */
 typedef struct bst_mtt_frame {
     int64_t tick;   /* mid-exposure */
@@ -251,6 +258,9 @@ void bst_mtt_skip(bst_mtt *mtt, const bst_mtt_frame *frame);
 const bst_mtt_track *bst_mtt_tracks(const bst_mtt *mtt, int *count);
 /* Track with an identity; NULL if there is none. It belongs to the tracker. */
 const bst_mtt_track *bst_mtt_find(const bst_mtt *mtt, int64_t id);
+/* Predicted states of the latest frame in the order of its tracks, those that it deleted included;
+ * none unless the parameter keep_priors is set. Valid until the next step. */
+const bst_mtt_prior *bst_mtt_priors(const bst_mtt *mtt, int *count);
 /* Track events of the latest frame; valid until the next step. */
 const bst_mtt_event *bst_mtt_events(const bst_mtt *mtt, int *count);
 /* Stored (deleted) tracks predicted to the latest frame; valid until the next step. */

@@ -86,6 +86,8 @@ struct bst_mtt {
     bst_mtt_sharing *shared;
     bool *observable;
     bst_mtt_joint joint;   /* BST_MTT_PMB only */
+    bst_mtt_prior *priors; /* keep_priors only */
+    int prior_count;
     double *departed_chi2; /* chi-square of a manoeuvre detected in this frame with the wider gate;
                               0: none */
 };

@@ -5,8 +5,8 @@
 
 #include "sim/core/invariant.h"
 
-/* Rotates both 2 x 2 blocks of the covariance to axes turned by (c, s). */
-static void rotate_blocks(double p[4][4], double c, double s) {
+/* Rotates the rows, direction and rate, to axes turned by (c, s). */
+static void rotate_rows(double p[4][4], double c, double s) {
     for (int j = 0; j < 4; j++) {
         for (int b = 0; b < 4; b += 2) {
             double x = p[b][j], y = p[b + 1][j];
@@ -14,6 +14,11 @@ static void rotate_blocks(double p[4][4], double c, double s) {
             p[b + 1][j] = -s * x + c * y;
         }
     }
+}
+
+/* Rotates both 2 x 2 blocks of the covariance to axes turned by (c, s). */
+static void rotate_blocks(double p[4][4], double c, double s) {
+    rotate_rows(p, c, s);
     for (int i = 0; i < 4; i++) {
         for (int b = 0; b < 4; b += 2) {
             double x = p[i][b], y = p[i][b + 1];
@@ -59,40 +64,56 @@ void bst_sky_add_noise(bst_sky_state *state, double dt_s, double noise_rad2ps3) 
     }
 }
 
-void bst_sky_predict(bst_sky_state *state, double dt_s, double noise_rad2ps3) {
-    assert(state && isfinite(dt_s) && noise_rad2ps3 >= 0.0);
-    assert(bst_is_unit_vec3(state->direction, BST_UNIT_TOLERANCE));
+/* Motion along a great circle over a time. */
+typedef struct motion {
+    double f[4][4];                 /* transition in the axes along and across the motion */
+    double c0, s0;                  /* from the tangent axes at the start to those */
+    double c1, s1;                  /* from those to the tangent axes at the end */
+    bst_vec3 direction, rate_radps; /* at the end */
+} motion;
+
+static motion motion_of(const bst_sky_state *state, double dt_s) {
     bst_vec3 d0 = state->direction, r0 = state->rate_radps;
     double speed = bst_vec3_norm(r0);
     double angle = speed * dt_s;
     double sinc = fabs(angle) > 1e-4 ? sin(angle) / angle : 1.0 - angle * angle / 6.0;
-    double(*p)[4] = state->covariance;
-    double f[4][4] = {{1, 0, dt_s, 0},
+    motion m = {.f = {{1, 0, dt_s, 0},
                       {0, cos(angle), 0, dt_s * sinc},
                       {0, 0, 1, 0},
-                      {0, -speed * sin(angle), 0, cos(angle)}};
-    bst_tangent axes0 = bst_tangent_at(d0);
-    /* axes along and across the motion */
-    double c = 1.0, s = 0.0;
+                      {0, -speed * sin(angle), 0, cos(angle)}},
+                .c0 = 1.0,
+                .c1 = 1.0,
+                .direction = d0,
+                .rate_radps = r0};
     if (speed > 0.0) {
-        c = bst_vec3_dot(r0, axes0.e1) / speed;
-        s = bst_vec3_dot(r0, axes0.e2) / speed;
-    }
-    rotate_blocks(p, c, s);
-    congruence(f, p);
-    bst_sky_add_noise(state, dt_s, noise_rad2ps3);
-    if (speed > 0.0) {
+        bst_tangent axes0 = bst_tangent_at(d0);
         bst_vec3 along = bst_vec3_scale(r0, 1.0 / speed);
-        bst_vec3 d1 =
+        m.c0 = bst_vec3_dot(r0, axes0.e1) / speed;
+        m.s0 = bst_vec3_dot(r0, axes0.e2) / speed;
+        m.direction =
             bst_vec3_unit(bst_vec3_axpy(bst_vec3_scale(d0, cos(angle)), sin(angle), along));
         bst_vec3 along1 = bst_tangent_project(
-            d1, bst_vec3_axpy(bst_vec3_scale(along, cos(angle)), -sin(angle), d0));
+            m.direction, bst_vec3_axpy(bst_vec3_scale(along, cos(angle)), -sin(angle), d0));
         along1 = bst_vec3_unit(along1);
-        bst_tangent axes1 = bst_tangent_at(d1);
-        state->direction = d1;
-        state->rate_radps = bst_vec3_scale(along1, speed);
-        rotate_blocks(p, bst_vec3_dot(along1, axes1.e1), -bst_vec3_dot(along1, axes1.e2));
+        bst_tangent axes1 = bst_tangent_at(m.direction);
+        m.rate_radps = bst_vec3_scale(along1, speed);
+        m.c1 = bst_vec3_dot(along1, axes1.e1);
+        m.s1 = -bst_vec3_dot(along1, axes1.e2);
     }
+    return m;
+}
+
+void bst_sky_predict(bst_sky_state *state, double dt_s, double noise_rad2ps3) {
+    assert(state && isfinite(dt_s) && noise_rad2ps3 >= 0.0);
+    assert(bst_is_unit_vec3(state->direction, BST_UNIT_TOLERANCE));
+    double(*p)[4] = state->covariance;
+    motion m = motion_of(state, dt_s);
+    rotate_blocks(p, m.c0, m.s0);
+    congruence(m.f, p);
+    bst_sky_add_noise(state, dt_s, noise_rad2ps3);
+    rotate_blocks(p, m.c1, m.s1);
+    state->direction = m.direction;
+    state->rate_radps = m.rate_radps;
     symmetrise(p);
 }
 
@@ -201,9 +222,8 @@ void bst_sky_turn_covariance(const bst_sky_state *state, bst_vec3 direction, dou
     rotate_blocks(out, c, s);
 }
 
-/* Quadratic form x^T P^-1 x by Cholesky; INFINITY if P is not positive definite. */
-static double quadratic_inverse(double p[4][4], const double x[4]) {
-    double y[4], sum = 0.0;
+/* Cholesky factor of P in its lower triangle; false if P is not positive definite. */
+static bool factorise(double p[4][4]) {
     for (int i = 0; i < 4; i++) {
         for (int j = 0; j <= i; j++) {
             double v = p[i][j];
@@ -212,13 +232,24 @@ static double quadratic_inverse(double p[4][4], const double x[4]) {
             }
             if (i == j) {
                 if (!(v > 0.0)) {
-                    return INFINITY;
+                    return false;
                 }
                 p[i][i] = sqrt(v);
             } else {
                 p[i][j] = v / p[j][j];
             }
         }
+    }
+    return true;
+}
+
+/* Quadratic form x^T P^-1 x by Cholesky; INFINITY if P is not positive definite. */
+static double quadratic_inverse(double p[4][4], const double x[4]) {
+    double y[4], sum = 0.0;
+    if (!factorise(p)) {
+        return INFINITY;
+    }
+    for (int i = 0; i < 4; i++) {
         double v = x[i];
         for (int k = 0; k < i; k++) {
             v -= p[i][k] * y[k];
@@ -227,6 +258,17 @@ static double quadratic_inverse(double p[4][4], const double x[4]) {
         sum += y[i] * y[i];
     }
     return sum;
+}
+
+void bst_sky_difference(const bst_sky_state *a, const bst_sky_state *b, double out[4]) {
+    bst_tangent axes = bst_tangent_at(a->direction);
+    bst_vec3 step = bst_tangent_log(a->direction, b->direction);
+    bst_vec3 rate =
+        bst_vec3_sub(bst_tangent_carry(b->direction, a->direction, b->rate_radps), a->rate_radps);
+    out[0] = bst_vec3_dot(step, axes.e1);
+    out[1] = bst_vec3_dot(step, axes.e2);
+    out[2] = bst_vec3_dot(rate, axes.e1);
+    out[3] = bst_vec3_dot(rate, axes.e2);
 }
 
 double bst_sky_distance2(const bst_sky_state *a, const bst_sky_state *b) {
@@ -243,11 +285,85 @@ double bst_sky_distance2(const bst_sky_state *a, const bst_sky_state *b) {
             p[i][j] += a->covariance[i][j];
         }
     }
-    bst_tangent axes = bst_tangent_at(a->direction);
-    bst_vec3 dd = bst_tangent_log(a->direction, b->direction);
-    bst_vec3 dr =
-        bst_vec3_sub(bst_tangent_carry(b->direction, a->direction, b->rate_radps), a->rate_radps);
-    double x[4] = {bst_vec3_dot(dd, axes.e1), bst_vec3_dot(dd, axes.e2), bst_vec3_dot(dr, axes.e1),
-                   bst_vec3_dot(dr, axes.e2)};
+    double x[4];
+    bst_sky_difference(a, b, x);
     return quadratic_inverse(p, x);
+}
+
+/* Gain of the smoother: filtered P F^T (predicted P)^-1, from differences in the tangent axes of
+ * the predicted state to those of the filtered one. False if the predicted covariance is not
+ * positive definite. */
+static bool smoother_gain(const bst_sky_state *filtered, double dt_s,
+                          const bst_sky_state *predicted, double gain[4][4]) {
+    motion m = motion_of(filtered, dt_s);
+    double moved[4][4], p[4][4], l[4][4]; /* moved: F P, rows at the end of the motion */
+    memcpy(p, filtered->covariance, sizeof p);
+    rotate_rows(p, m.c0, m.s0);
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            moved[i][j] = m.f[i][0] * p[0][j] + m.f[i][1] * p[1][j] + m.f[i][2] * p[2][j] +
+                          m.f[i][3] * p[3][j];
+        }
+    }
+    rotate_rows(moved, m.c1, m.s1);
+    bst_tangent from = bst_tangent_at(m.direction), to = bst_tangent_at(predicted->direction);
+    double c, s;
+    bst_tangent_turn(m.direction, &from, predicted->direction, &to, &c, &s);
+    rotate_rows(moved, c, s);
+    memcpy(l, predicted->covariance, sizeof l);
+    if (!factorise(l)) {
+        return false;
+    }
+    for (int j = 0; j < 4; j++) {
+        double y[4];
+        for (int i = 0; i < 4; i++) {
+            y[i] = moved[i][j];
+            for (int k = 0; k < i; k++) {
+                y[i] -= l[i][k] * y[k];
+            }
+            y[i] /= l[i][i];
+        }
+        for (int i = 3; i >= 0; i--) {
+            for (int k = i + 1; k < 4; k++) {
+                y[i] -= l[k][i] * y[k];
+            }
+            y[i] /= l[i][i];
+            gain[j][i] = y[i];
+        }
+    }
+    return true;
+}
+
+bool bst_sky_smooth(const bst_sky_state *filtered, double dt_s, const bst_sky_state *predicted,
+                    const bst_sky_state *next, bst_sky_state *out) {
+    assert(filtered && predicted && next && out && dt_s > 0.0);
+    double gain[4][4], change[4][4], x[4], delta[4] = {0}, check[4][4];
+    *out = *filtered;
+    if (!smoother_gain(filtered, dt_s, predicted, gain)) {
+        return false;
+    }
+    bst_sky_difference(predicted, next, x);
+    bst_sky_turn_covariance(next, predicted->direction, change);
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            change[i][j] -= predicted->covariance[i][j];
+            delta[i] += gain[i][j] * x[j];
+        }
+    }
+    congruence(gain, change);
+    for (int i = 0; i < 4; i++) {
+        for (int j = 0; j < 4; j++) {
+            out->covariance[i][j] += change[i][j];
+        }
+    }
+    symmetrise(out->covariance);
+    memcpy(check, out->covariance, sizeof check);
+    if (!factorise(check)) {
+        *out = *filtered;
+        return false;
+    }
+    bst_tangent axes = bst_tangent_at(filtered->direction);
+    bst_sky_shift(out, bst_tangent_vector(&axes, delta[0], delta[1]),
+                  bst_tangent_vector(&axes, delta[2], delta[3]));
+    return true;
 }

@@ -60,6 +60,23 @@ void bst_sky_update(bst_sky_state *state, const bst_sky_innovation *innovation);
 void bst_sky_from_pair(const bst_sky_measurement *first, const bst_sky_measurement *second,
                        double dt_s, double noise_rad2ps3, bst_sky_state *out);
 
+/* Difference b - a of two means in the tangent axes at a: direction, then rate. */
+void bst_sky_difference(const bst_sky_state *a, const bst_sky_state *b, double out[4]);
+
+/* One step of the Rauch-Tung-Striebel smoother: the state at a time given all later measurements.
+ *
+ * Given:     filtered   state given the measurements up to its time
+ *            dt_s       time to the next state, > 0
+ *            predicted  prediction of the next state that its update used, known shifts and all
+ *                       process noise included
+ *            next       the next state, smoothed
+ * Returned:  false if a covariance is not positive definite; then *out is the filtered state
+ * Notes:     process noise enters through `predicted` alone. For a mixture the moments of all its
+ *            components together give the best linear smoother, because they share the transition.
+ * Reference: Rauch, Tung and Striebel 1965; Bar-Shalom, Li and Kirubarajan 2001, section 8.6 */
+bool bst_sky_smooth(const bst_sky_state *filtered, double dt_s, const bst_sky_state *predicted,
+                    const bst_sky_state *next, bst_sky_state *out);
+
 /* Mahalanobis distance (a - b)^T (Pa + Pb)^-1 (a - b) over direction and rate, 4 degrees of
  * freedom. INFINITY if the sum of covariances is not positive definite or the directions are more
  * than 0.2 rad apart. */

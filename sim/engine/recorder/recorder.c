@@ -103,6 +103,8 @@ static const channel_rows channels[] = {
     {BST_CHANNEL_LOS_HISTORY, BST_TABLE_LOS_TRUTH, bst_recorder_los_rows},
     {BST_CHANNEL_DETECTIONS, BST_TABLE_DETECTIONS, bst_recorder_detection_rows},
     {BST_CHANNEL_TRACKS, BST_TABLE_TRACKS, bst_recorder_track_rows},
+    {BST_CHANNEL_TRACKS_SMOOTHED, BST_TABLE_TRACKS_SMOOTHED, bst_recorder_smoothed_rows},
+    {BST_CHANNEL_TRACK_IDENTITIES, BST_TABLE_TRACK_IDENTITIES, bst_recorder_identity_rows},
     {BST_CHANNEL_LOS_COMMAND, BST_TABLE_LOS_COMMANDS, bst_recorder_los_command_rows},
     {BST_CHANNEL_SENSOR_COMMAND, BST_TABLE_SENSOR_COMMANDS, bst_recorder_sensor_command_rows},
     {BST_CHANNEL_POINTING_TELEMETRY, BST_TABLE_POINTING, bst_recorder_pointing_rows},

@@ -30,6 +30,8 @@ typedef enum bst_recorder_table {
     BST_TABLE_EXTENDED,
     BST_TABLE_PARTS,
     BST_TABLE_CAMERA_CALIBRATION,
+    BST_TABLE_TRACKS_SMOOTHED,
+    BST_TABLE_TRACK_IDENTITIES,
     BST_TABLE_COUNT
 } bst_recorder_table;
 
@@ -137,6 +139,8 @@ BST_RECORDER_ROWS(bst_recorder_truth_rows);
 BST_RECORDER_ROWS(bst_recorder_los_rows);
 BST_RECORDER_ROWS(bst_recorder_detection_rows);
 BST_RECORDER_ROWS(bst_recorder_track_rows);
+BST_RECORDER_ROWS(bst_recorder_smoothed_rows);
+BST_RECORDER_ROWS(bst_recorder_identity_rows);
 BST_RECORDER_ROWS(bst_recorder_los_command_rows);
 BST_RECORDER_ROWS(bst_recorder_sensor_command_rows);
 BST_RECORDER_ROWS(bst_recorder_pointing_rows);

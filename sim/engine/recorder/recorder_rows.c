@@ -352,13 +352,31 @@ const char *bst_recorder_track_status_name(int32_t status) {
                                           : "tentative";
 }
 
+/* Puts direction, rate and covariance of a track. */
+static void put_state(row *r, bst_vec3 direction, bst_vec3 rate, const double p[4][4]) {
+    double ra, dec;
+    bst_vec3_to_radec(direction, &ra, &dec);
+    bst_vec3 east = {-sin(ra), cos(ra), 0.0};
+    bst_vec3 north = bst_vec3_cross(direction, east);
+    put_real(r, ra * DEG);
+    put_real(r, dec * DEG);
+    put_real(r, bst_vec3_dot(rate, east) * ARCSEC);
+    put_real(r, bst_vec3_dot(rate, north) * ARCSEC);
+    put_real(r, p[0][0]);
+    put_real(r, p[0][1]);
+    put_real(r, p[1][1]);
+    put_real(r, p[0][2]);
+    put_real(r, p[0][3]);
+    put_real(r, p[1][2]);
+    put_real(r, p[1][3]);
+    put_real(r, p[2][2]);
+    put_real(r, p[2][3]);
+    put_real(r, p[3][3]);
+}
+
 /* Writes a track to the table tracks. */
 static bst_status track_row(bst_ctx *ctx, bst_recorder *recorder, int sensor, const bst_tracks *t,
                             const bst_track *k) {
-    double ra, dec;
-    bst_vec3_to_radec(k->direction_gcrf, &ra, &dec);
-    bst_vec3 east = {-sin(ra), cos(ra), 0.0};
-    bst_vec3 north = bst_vec3_cross(k->direction_gcrf, east);
     row r = {.count = 0};
     put_int(&r, sensor);
     put_int(&r, t->exposure_id);
@@ -367,20 +385,7 @@ static bst_status track_row(bst_ctx *ctx, bst_recorder *recorder, int sensor, co
     put_int(&r, k->id);
     put_text(&r, bst_recorder_track_status_name(k->status));
     put_flag(&r, k->target_of_interest);
-    put_real(&r, ra * DEG);
-    put_real(&r, dec * DEG);
-    put_real(&r, bst_vec3_dot(k->rate_gcrf_radps, east) * ARCSEC);
-    put_real(&r, bst_vec3_dot(k->rate_gcrf_radps, north) * ARCSEC);
-    put_real(&r, k->covariance[0][0]);
-    put_real(&r, k->covariance[0][1]);
-    put_real(&r, k->covariance[1][1]);
-    put_real(&r, k->covariance[0][2]);
-    put_real(&r, k->covariance[0][3]);
-    put_real(&r, k->covariance[1][2]);
-    put_real(&r, k->covariance[1][3]);
-    put_real(&r, k->covariance[2][2]);
-    put_real(&r, k->covariance[2][3]);
-    put_real(&r, k->covariance[3][3]);
+    put_state(&r, k->direction_gcrf, k->rate_gcrf_radps, k->covariance);
     put_real(&r, k->v_mag);
     put_real(&r, k->snr);
     put_real(&r, k->score);
@@ -421,6 +426,52 @@ bst_status bst_recorder_track_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
     BST_TRY(append(ctx, recorder, BST_TABLE_TRACK_FRAMES, &r));
     for (int i = 0; i < t->count; i++) {
         BST_TRY(track_row(ctx, recorder, sensor, t, &t->items[i]));
+    }
+    return BST_OK;
+}
+
+bst_status bst_recorder_smoothed_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                                      const void *payload, int64_t written_tick) {
+    (void)written_tick;
+    const bst_tracks_smoothed *t = payload;
+    for (int i = 0; i < t->count; i++) {
+        const bst_track_smoothed *k = &t->items[i];
+        row r = {.count = 0};
+        put_int(&r, sensor);
+        put_int(&r, t->exposure_id);
+        put_int(&r, t->tick);
+        put_real(&r, seconds(recorder, t->tick));
+        put_int(&r, k->id);
+        put_text(&r, track_status_name(k->status));
+        put_flag(&r, k->target_of_interest);
+        put_int(&r, k->later_frames);
+        put_state(&r, k->direction_gcrf, k->rate_gcrf_radps, k->covariance);
+        BST_TRY(append(ctx, recorder, BST_TABLE_TRACKS_SMOOTHED, &r));
+    }
+    return BST_OK;
+}
+
+bst_status bst_recorder_identity_rows(bst_ctx *ctx, bst_recorder *recorder, int sensor,
+                                      const void *payload, int64_t written_tick) {
+    (void)written_tick;
+    const bst_track_identities *t = payload;
+    for (int i = 0; i < t->count; i++) {
+        const bst_track_identity *k = &t->items[i];
+        bool known = recorder->world && k->object >= 0 &&
+                     k->object < bst_world_object_count(recorder->world);
+        const bst_world_object_info *info =
+            known ? bst_world_object(recorder->world, k->object) : NULL;
+        row r = {.count = 0};
+        put_int(&r, sensor);
+        put_int(&r, t->exposure_id);
+        put_int(&r, t->tick);
+        put_real(&r, seconds(recorder, t->tick));
+        put_int(&r, k->track_id);
+        put_int(&r, k->object);
+        put_text(&r, info ? info->name : NULL);
+        put_int(&r, info ? info->norad : 0);
+        put_real(&r, k->probability);
+        BST_TRY(append(ctx, recorder, BST_TABLE_TRACK_IDENTITIES, &r));
     }
     return BST_OK;
 }

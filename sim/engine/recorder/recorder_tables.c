@@ -19,6 +19,22 @@
     REAL(name "_x_" tail, unit, doc), REAL(name "_y_" tail, unit, doc), \
         REAL(name "_z_" tail, unit, doc)
 
+/* State of a track and its covariance. */
+#define STATE_COLUMNS                                                                             \
+    REAL("ra_deg", "deg", "ICRS, geometric with light time"), REAL("dec_deg", "deg", "ICRS"),     \
+        REAL("rate_east_arcsec_per_s", "arcsec/s", "rate along e1 (east)"),                       \
+        REAL("rate_north_arcsec_per_s", "arcsec/s", "rate along e2 (north)"),                     \
+        REAL("cov_d1_d1_rad2", "rad^2", "covariance of direction (d) and rate (r) along e1, e2"), \
+        REAL("cov_d1_d2_rad2", "rad^2", "covariance"),                                            \
+        REAL("cov_d2_d2_rad2", "rad^2", "covariance"),                                            \
+        REAL("cov_d1_r1_rad2ps", "rad^2/s", "covariance"),                                        \
+        REAL("cov_d1_r2_rad2ps", "rad^2/s", "covariance"),                                        \
+        REAL("cov_d2_r1_rad2ps", "rad^2/s", "covariance"),                                        \
+        REAL("cov_d2_r2_rad2ps", "rad^2/s", "covariance"),                                        \
+        REAL("cov_r1_r1_rad2ps2", "rad^2/s^2", "covariance"),                                     \
+        REAL("cov_r1_r2_rad2ps2", "rad^2/s^2", "covariance"),                                     \
+        REAL("cov_r2_r2_rad2ps2", "rad^2/s^2", "covariance")
+
 static const bst_io_column run_columns[] = {
     TEXT("program", "what made the run"),
     TEXT("epoch_utc", "UTC of tick 0"),
@@ -222,20 +238,7 @@ static const bst_io_column track_columns[] = {
     INT("track_id", "", "never reused"),
     TEXT("status", "tentative, confirmed or coasting"),
     INT("target_of_interest", "", "1: the target"),
-    REAL("ra_deg", "deg", "ICRS, geometric with light time"),
-    REAL("dec_deg", "deg", "ICRS"),
-    REAL("rate_east_arcsec_per_s", "arcsec/s", "rate along e1 (east)"),
-    REAL("rate_north_arcsec_per_s", "arcsec/s", "rate along e2 (north)"),
-    REAL("cov_d1_d1_rad2", "rad^2", "covariance of direction (d) and rate (r) along e1, e2"),
-    REAL("cov_d1_d2_rad2", "rad^2", "covariance"),
-    REAL("cov_d2_d2_rad2", "rad^2", "covariance"),
-    REAL("cov_d1_r1_rad2ps", "rad^2/s", "covariance"),
-    REAL("cov_d1_r2_rad2ps", "rad^2/s", "covariance"),
-    REAL("cov_d2_r1_rad2ps", "rad^2/s", "covariance"),
-    REAL("cov_d2_r2_rad2ps", "rad^2/s", "covariance"),
-    REAL("cov_r1_r1_rad2ps2", "rad^2/s^2", "covariance"),
-    REAL("cov_r1_r2_rad2ps2", "rad^2/s^2", "covariance"),
-    REAL("cov_r2_r2_rad2ps2", "rad^2/s^2", "covariance"),
+    STATE_COLUMNS,
     REAL("v_mag", "mag", "brightness"),
     REAL("snr", "", "of the latest detection"),
     REAL("score", "", "log-likelihood ratio of an object against chance pairings"),
@@ -246,6 +249,30 @@ static const bst_io_column track_columns[] = {
     REAL("x_px", "px", "latest detection, whole sensor"),
     REAL("y_px", "px", "latest detection, whole sensor"),
     INT("uncorrelated", "", "1: confirmed, and neither the target nor what the cue expects"),
+};
+static const bst_io_column identity_columns[] = {
+    SENSOR,
+    EXPOSURE,
+    TICK,
+    TIME,
+    INT("track_id", "", "as in tracks"),
+    INT("object", "",
+        "index in the scenario: id in truth; -1: none of the catalogue; -2: what the cue means, "
+        "without a catalogue object"),
+    TEXT("name", "its name; NULL: none"),
+    INT("norad", "", "its catalogue number, 0: none"),
+    REAL("probability", "", "that the track is of this object; those below 0.001 are left out"),
+};
+static const bst_io_column smoothed_columns[] = {
+    SENSOR,
+    EXPOSURE,
+    TICK,
+    TIME,
+    INT("track_id", "", "as in tracks"),
+    TEXT("status", "in that frame: tentative, confirmed or coasting"),
+    INT("target_of_interest", "", "1: the target in that frame"),
+    INT("later_frames", "", "frames after it that contribute"),
+    STATE_COLUMNS,
 };
 static const bst_io_column los_command_columns[] = {
     SENSOR,
@@ -452,6 +479,12 @@ static const table_spec specs[BST_TABLE_COUNT] = {
     [BST_TABLE_CAMERA_CALIBRATION] =
         SPEC("camera_calibration", calibration_columns,
              "Geometry of the camera as image processing has learned it from stars."),
+    [BST_TABLE_TRACK_IDENTITIES] =
+        SPEC("track_identities", identity_columns,
+             "Probabilities of confirmed tracks over the objects of the onboard catalogue."),
+    [BST_TABLE_TRACKS_SMOOTHED] =
+        SPEC("tracks_smoothed", smoothed_columns,
+             "Tracks of each frame given later frames too (tracker, smoothing_lag_frames)."),
     [BST_TABLE_PARTS] = SPEC("parts", part_columns, "Parts of the objects with a shape."),
 };
 
@@ -481,6 +514,8 @@ static bool wanted(const bst_recorder *recorder, bst_recorder_table table) {
             return config->detections;
         case BST_TABLE_TRACK_FRAMES:
         case BST_TABLE_TRACKS:
+        case BST_TABLE_TRACKS_SMOOTHED:
+        case BST_TABLE_TRACK_IDENTITIES:
             return config->tracks;
         case BST_TABLE_LOS_COMMANDS:
         case BST_TABLE_SENSOR_COMMANDS:

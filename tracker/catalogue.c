@@ -1,0 +1,102 @@
+#include "tracker/catalogue.h"
+
+#include <assert.h>
+#include <stdlib.h>
+
+#include "sim/core/arena.h"
+
+struct bst_tracker_catalogue {
+    bst_arena arena;
+    const bst_knowledge *knowledge;
+    bst_knowledge_view *view;
+    double sigma_m, sigma_mps, mag_sigma;
+    double seconds;
+    int32_t cue_object;
+    int *near; /* [number of objects] */
+};
+
+static void lay_out(bst_tracker_catalogue *c) {
+    BST_ARENA_TAKE(&c->arena, c->near, (size_t)bst_knowledge_object_count(c->knowledge) + 1);
+}
+
+bst_status bst_tracker_catalogue_create(bst_ctx *ctx, const bst_tracker_config *config,
+                                        const bst_knowledge *knowledge, bst_knowledge_view *view,
+                                        bst_tracker_catalogue **out) {
+    assert(config && knowledge && view && out);
+    *out = NULL;
+    bst_tracker_catalogue *c = calloc(1, sizeof *c);
+    if (!c) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
+    }
+    *c = (bst_tracker_catalogue){.knowledge = knowledge,
+                                 .view = view,
+                                 .sigma_m = config->catalogue_sigma_m,
+                                 .sigma_mps = config->catalogue_sigma_mps,
+                                 .mag_sigma = config->catalogue_mag_sigma,
+                                 .cue_object = -1};
+    lay_out(c);
+    bst_status status = bst_arena_alloc(ctx, &c->arena, "the tracker's view of the catalogue");
+    if (status != BST_OK) {
+        free(c);
+        return status;
+    }
+    lay_out(c);
+    *out = c;
+    return BST_OK;
+}
+
+void bst_tracker_catalogue_free(bst_tracker_catalogue *c) {
+    if (c) {
+        bst_arena_free(&c->arena);
+        free(c);
+    }
+}
+
+int32_t bst_tracker_catalogue_set(bst_tracker_catalogue *c, double seconds) {
+    c->seconds = seconds;
+    c->cue_object = bst_knowledge_cue_object(c->view);
+    return c->cue_object;
+}
+
+/* Predicts an object; false if it cannot be seen. */
+static bool predict(const bst_tracker_catalogue *c, int object, bst_identity_object *out) {
+    const double h = 0.5; /* s, of the central difference */
+    bst_ctx quiet = {0};  /* after the end of an orbit there is no direction: no error here */
+    bst_world_sight sight[3];
+    for (int i = 0; i < 3; i++) {
+        if (bst_knowledge_sight_at(&quiet, c->view, object, c->seconds + (i - 1) * h, &sight[i]) !=
+            BST_OK) {
+            return false;
+        }
+    }
+    const bst_world_sight *now = &sight[1];
+    bool bright = isfinite(now->v_mag);
+    *out = (bst_identity_object){
+        .object = object,
+        .direction = now->geometric,
+        .rate_radps = bst_vec3_scale(bst_vec3_sub(sight[2].geometric, sight[0].geometric), 0.5 / h),
+        .sigma_rad = c->sigma_m / now->range_m,
+        .rate_sigma_radps = c->sigma_mps / now->range_m,
+        .v_mag = bright ? now->v_mag : 0.0,
+        .v_mag_sigma = bright ? c->mag_sigma : INFINITY};
+    return !now->occulted && now->sunlit_fraction > 0.0;
+}
+
+int bst_tracker_catalogue_near(void *user, bst_vec3 axis, double half_angle_rad,
+                               bst_identity_object *out, int room) {
+    bst_tracker_catalogue *c = user;
+    int near = 0, count = 0;
+    bst_ctx quiet = {0};
+    if (bst_knowledge_near(&quiet, c->view, c->seconds, axis, half_angle_rad, c->near, &near) !=
+        BST_OK) {
+        return 0;
+    }
+    for (int i = 0; i < near && count < room; i++) {
+        if (c->near[i] == c->cue_object || bst_knowledge_is_itself(c->knowledge, c->near[i]) ||
+            !predict(c, c->near[i], &out[count])) {
+            continue;
+        }
+        count += bst_vec3_angle(out[count].direction, axis) <= half_angle_rad;
+    }
+    return count;
+}

@@ -1,0 +1,79 @@
+/* When tracks are compared with the catalogue, and with which objects. */
+#include <stdlib.h>
+
+#include "tracker/tracker_internal.h"
+
+/* Objects so far outside the field may be of tracks in it. */
+static const double MOST_MARGIN_RAD = BST_DEG_RAD;
+
+bst_status bst_tracker_identity_create(bst_ctx *ctx, const bst_tracker_config *config,
+                                       bst_tracker *t) {
+    t->identity_period_s = config->identity_period_s;
+    if (!(config->identity_period_s > 0.0)) {
+        return BST_OK;
+    }
+    double scale = bst_camera_scale_rad(&t->camera);
+    double field_sr = (double)t->camera.width_px * (double)t->camera.height_px * scale * scale;
+    double rate = config->max_rate_arcsec_per_s * BST_ARCSEC_RAD;
+    t->identity_params = (bst_identity_params){
+        .unknown_density = config->uncatalogued_per_field /
+                           (field_sr * BST_PI * fmax(rate * rate, 1e-20) * BST_IDENTITY_MAG),
+        .detection_probability = config->detection_probability,
+        .fit = t->target_params};
+    t->identity = calloc(1, sizeof *t->identity);
+    t->identified_s = -INFINITY;
+    return t->identity ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
+}
+
+/* True if there is a confirmed track that moves. */
+static bool any_track(const bst_mtt_track *tracks, int count) {
+    bool any = false;
+    for (int i = 0; i < count && !any; i++) {
+        any = tracks[i].status != BST_TRACK_TENTATIVE && !tracks[i].at_rest && !tracks[i].star;
+    }
+    return any;
+}
+
+/* Compares all tracks with the catalogue and the cue. */
+static void compare(bst_tracker *t, const bst_tracker_input *input, bst_vec3 boresight,
+                    const bst_target_cue *cue) {
+    bst_identity_object objects[BST_IDENTITY_OBJECTS];
+    int count = 0, tracks;
+    if (cue->valid && !cue->in_region) {
+        objects[count++] = (bst_identity_object){.object = cue->object,
+                                                 .direction = cue->direction,
+                                                 .rate_radps = cue->rate_radps,
+                                                 .sigma_rad = cue->sigma_rad,
+                                                 .rate_sigma_radps = cue->rate_sigma_radps,
+                                                 .v_mag = cue->v_mag,
+                                                 .v_mag_sigma = cue->v_mag_sigma};
+    }
+    double half = 0.5 * bst_camera_scale_rad(&t->camera) *
+                  hypot((double)t->camera.width_px, (double)t->camera.height_px);
+    count += input->near(input->near_user, boresight, fmin(half + MOST_MARGIN_RAD, 0.5 * BST_PI),
+                         objects + count, BST_IDENTITY_OBJECTS - count);
+    const bst_mtt_track *all = bst_mtt_tracks(t->mtt, &tracks);
+    bst_identity_match(&t->identity_params, all, tracks, objects, count, t->identity);
+}
+
+void bst_tracker_identify(bst_tracker *t, const bst_tracker_input *input, bool usable,
+                          const bst_mtt_frame *frame, bst_target_cue *cue) {
+    int count;
+    double seconds = frame->seconds;
+    const bst_mtt_track *tracks = bst_mtt_tracks(t->mtt, &count);
+    bool undecided = t->target.id == 0 || t->target.ambiguous;
+    bool due = undecided || seconds - t->identified_s >= t->identity_period_s;
+    cue->object = input->cue_object >= 0 ? input->cue_object : BST_IDENTITY_CUE;
+    t->identified = usable && due && any_track(tracks, count);
+    if (t->identified) {
+        compare(t, input, frame->boresight, cue);
+        t->identified_s = seconds;
+    }
+    if (cue->valid && !cue->in_region && seconds - t->identified_s < t->identity_period_s) {
+        const bst_identity_params *p = &t->identity_params;
+        const bst_mtt_track bright = {.v_mag = cue->v_mag};
+        cue->identity = t->identity;
+        cue->unseen_weight = (1.0 - p->detection_probability) / p->detection_probability *
+                             p->unknown_density / bst_identity_scale(cue, &bright);
+    }
+}
