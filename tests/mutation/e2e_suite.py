@@ -5,12 +5,13 @@ import re
 # first match holds; names without "e2e_"
 CONCERNED = [
     (r"sim/export/export_boxes", "boxes"),
+    (r"sim/export/mask_labels", "boxes satnet inspection"),
     (r"sim/export/export_satnet", "satnet boxes"),
     (r"sim/export/(video|export_views)|sim/io/frame_picture", "film skewed_exports export"),
     (r"sim/app/cmd_propagate|sim/export/(export_states|propagate)", "propagate"),
     (r"sim/app/cmd_export|sim/export/|sim/io/(oem|czml|tdm|csv)|sim/run/run_observations", "skewed_exports export boxes satnet"),
     (r"sim/report/report_sightings", "report"),
-    (r"sim/study_kinds/(cubes|study_labels)", "cube_parts study"),
+    (r"sim/study_kinds/(cubes|study_labels|study_card)", "cube_parts study"),
     (r"sim/report/report_study|sim/studies|sim/study_kinds|sim/app/cmd_study", "study_files report_study study"),
     (r"sim/app/cmd_info|sim/report/report_info|sim/io/(manifest|run_)", "info figures"),
     (r"sim/app/cmd_report|sim/report/|sim/io/(chart|html)", "figures report skewed_exports"),
@@ -27,6 +28,7 @@ CONCERNED = [
     (r"sim/app/cmd_characterize|sim/analysis/characterize", "characterize"),
     (r"sim/app/cmd_(process|solve)|sim/process|sim/analysis/solve|sim/io/keyword", "solve recorded detections characterize"),
     (r"sim/app/cmd_(lightcurve|turntable)|sim/analysis/shape", "shapes"),
+    (r"imgproc/(extended|module)", "inspection main_job detections"),
     (r"obsgen/", "generator seeds discrimination"),
     (r"view/", "view"),
     (r"sim/app/(main|cmd_)|sim/cli|sim/core/(json|config)", "command_line hostile_input outputs"),

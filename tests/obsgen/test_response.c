@@ -202,6 +202,18 @@ static void wings_keep_their_light_when_widened(void **state) {
     bst_response base;
     bst_response_set(&base, &sharp, &filter, 1, 255.5, 255.5);
     /* the last two are wider than the tables, which are stretched there */
+    /* the fitted PSF's slope and curvature are those of its values, within each piece of its table
+     */
+    const double h = 1e-3;
+    for (double r = 0.03; r < 12.0; r += 0.29) {
+        double slope, curvature, off[2];
+        double middle = bst_response_model_share(&base, r, &slope, &curvature);
+        double less = bst_response_model_share(&base, r - h, &off[0], &off[1]);
+        double more = bst_response_model_share(&base, r + h, &off[0], &off[1]);
+        bst_assert_close((more - less) / (2.0 * h), slope,
+                         1e-5); /* h^2 times the third derivative */
+        bst_assert_close((more - 2.0 * middle + less) / (h * h), curvature, 1e-3);
+    }
     const double jitter_px[] = {0.2, 0.6, 0.95, 1.4, 3.0, 5.0};
     for (int k = 0; k < 6; k++) {
         const double v = jitter_px[k] * jitter_px[k];

@@ -105,6 +105,13 @@ static void the_ends_of_all_scales(void **state) {
     l = lit(1e9, 1);
     bst_assert_close(glow_of(&c, &l).v_mag,
                      bst_world_lambert_sphere_v_mag(4, 0.25, 1, 1e9, BST_AU_M), 1e-12);
+    /* near by, the solid angle of a sphere: 2 pi (1 - cos) of its radius as seen */
+    for (double range = 1.3; range < 100.0; range *= 2.0) {
+        l = lit(range, 1);
+        double radius = asin(sqrt(4 / pi) / range);
+        bst_assert_close(glow_of(&c, &l).emission_sr / (0.8 * 2 * pi * (1 - cos(radius))), 1,
+                         1e-8); /* rounding of places 7000 km from the origin */
+    }
     /* from inside, of a speck, and out of nothing: numbers */
     l = lit(0.5, 1);
     assert_true(glow_of(&c, &l).v_mag < 100); /* a number */
