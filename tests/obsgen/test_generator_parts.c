@@ -565,41 +565,11 @@ static void one_scene_in_many_ways(void **state) {
     }
 }
 
-/* Light of a Gaussian whose middle is beyond one side of the frame, or two: share and centroid of
- * its part on the frame, by sums. */
-static void light_cut_by_the_edges(void **state) {
-    (void)state;
-    bst_generator *g = make(0.9);
-    const double places[][2] = {{-1.4, 30.0}, {90.3, 30.0},  {40.0, -0.9}, {40.0, 71.2},
-                                {-0.7, 70.1}, {91.0, -1.25}, {40.0, 30.0}};
-    const double step = 0.01;
-    for (size_t k = 0; k < sizeof places / sizeof *places; k++) {
-        generator_source cut = {.x = places[k][0], .y = places[k][1], .flux_e = 7.0};
-        bst_generator_cut_light(g, &cut);
-        double share = 1.0, want[2];
-        for (int axis = 0; axis < 2; axis++) {
-            double at = places[k][axis], last = (axis ? g->height : g->width) - 0.5;
-            double sum = 0.0, first = 0.0;
-            for (double u = -0.5 + 0.5 * step; u < last; u += step) {
-                double w = exp(-0.5 * pow((u - at) / g->total_sigma, 2.0)) * step;
-                sum += w;
-                first += w * u;
-            }
-            bool beyond = at < -0.5 || at > last;
-            share *= beyond ? sum / (g->total_sigma * sqrt(2.0 * BST_PI)) : 1.0;
-            want[axis] = beyond ? first / sum : at;
-        }
-        bst_assert_close(cut.flux_e / (7.0 * share), 1.0, 2e-4); /* steps */
-        bst_assert_close(cut.x, want[0], 2e-4);
-        bst_assert_close(cut.y, want[1], 2e-4);
-    }
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(widths_of_shapes),       cmocka_unit_test(errors_of_false_alarms),
         cmocka_unit_test(merged_stars),           cmocka_unit_test(noise_of_the_moment),
-        cmocka_unit_test(one_scene_in_many_ways), cmocka_unit_test(light_cut_by_the_edges),
+        cmocka_unit_test(one_scene_in_many_ways),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
