@@ -128,7 +128,7 @@ static void measured_as_claimed(void **state) {
 }
 
 /* Streaks of 40 px along each side of the frame, 7 px inside, are whole; those across the side,
- * with the middle 12 px inside, are cut. */
+ * with the middle 12 px inside, are cut; also where a point grew into the streak (the last). */
 static void streaks_that_the_frame_cuts(void **state) {
     (void)state;
     enum { SIDE = 256, LENGTH = 40 };
@@ -137,22 +137,23 @@ static void streaks_that_the_frame_cuts(void **state) {
     bst_imgproc *ip = open_search(&ctx, &s, SIDE, 1.0);
     bst_detections *d = synthetic_detections(2048);
     bst_imgproc_frame frame = synthetic_frame(&s);
-    const double places[7][2] = {{90, 7},          {90, SIDE - 8}, {7, 90},         {SIDE - 8, 90},
-                                 {190, SIDE - 13}, {12, 190},      {SIDE - 13, 190}};
+    const double places[8][2] = {{90, 7},          {90, SIDE - 8}, {7, 90},          {SIDE - 8, 90},
+                                 {190, SIDE - 13}, {12, 190},      {SIDE - 13, 190}, {190, 12}};
     synthetic_clear(&s);
-    for (int k = 0; k < 7; k++) {
-        bool flat = k < 2 || k > 4;
+    for (int k = 0; k < 8; k++) {
+        bool flat = k < 2 || k == 5 || k == 6;
         synthetic_add(&s, places[k][0], places[k][1],
                       40.0 * synthetic_noise(&s) / synthetic_norm(&s, 128.0, 128.0, LENGTH, 0.0),
                       flat ? LENGTH : 0.0, flat ? 0.0 : LENGTH);
     }
     synthetic_expose(&s, bst_rng_make_key(9, 0, "test", "cut"), 1);
     bst_assert_ok(&ctx, bst_imgproc_detect(&ctx, ip, &frame, NULL, d, 2048));
-    for (int k = 0; k < 7; k++) {
+    for (int k = 0; k < 8; k++) {
         int n = synthetic_nearest(d, places[k][0], places[k][1], k < 4 ? 2.0 : 8.0);
         assert_true(n >= 0 && (d->items[n].flags & BST_DETECTION_STREAK));
         assert_int_equal((d->items[n].flags & BST_DETECTION_EDGE) != 0, k >= 4);
     }
+    assert_int_equal(d->count, 8); /* each is found once */
     free(d);
     bst_imgproc_free(ip);
     synthetic_free(&s);
