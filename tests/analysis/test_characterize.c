@@ -133,6 +133,13 @@ static void law_of_hot_pixels(void **state) {
         /* curvature by differences of 2 % of the deviation */
         bst_assert_close(hot.median.sigma / (hot.median.value * log(10.0)) / sigma_m, 1.0, 0.02);
         bst_assert_close(hot.spread_dex.sigma / sigma_s, 1.0, 0.02);
+        /* fraction n / (pixels share): 1 / n by counting, and the slope of ln share by mean and
+         * deviation with the covariance of both */
+        double slope = exp(-0.5 * cuts[k] * cuts[k]) / sqrt(2.0 * BST_PI) / share;
+        double by_fit =
+            slope * slope / det * (f[2] - 2.0 * cuts[k] * f[1] + cuts[k] * cuts[k] * f[0]);
+        double relative = hot.fraction.sigma / hot.fraction.value;
+        bst_assert_close(relative / sqrt((1.0 + by_fit) / found), 1.0, 0.02);
     }
     test_free(excess);
 }
