@@ -432,6 +432,7 @@ static void locate_candidates(bst_imgproc *ip, const part *p, bst_detections *ou
     if (p->search) {
         bst_streak_locate(&ip->streaks, &ip->view, &ip->candidates, p->false_alarms, &ip->locator);
     }
+    bst_locate_join_streaks(&ip->locator, &ip->view);
     for (int i = 0; i < ip->locator.count; i++) {
         if (ip->locator.found[i].dropped) {
             continue;

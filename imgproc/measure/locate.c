@@ -238,20 +238,11 @@ static void flag_edge(const bst_locate_frame *f, bst_imgproc_found *found) {
     }
 }
 
-/* Sets flags and label after the fit. Light beyond the edge fits with any flux, so a source fitted
- * outside the frame falls back to the filter's peak and becomes an ARTEFACT. */
-static void set_flags(const bst_locate_frame *f, bst_imgproc_found *found) {
-    const bst_imgproc_source *s = &found->source;
-    bool outside = s->shape.x_px < -0.5 || s->shape.y_px < -0.5 || s->shape.x_px > f->width - 0.5 ||
-                   s->shape.y_px > f->height - 0.5;
-    if (outside) {
-        use_filter_peak(f, found);
-        found->snr = (double)found->peak_snr;
-        found->flags |= BST_DETECTION_EDGE;
-    }
+/* Flags a source whose light is cut by the frame's edge or falls on full pixels. */
+static void flag_light(const bst_locate_frame *f, bst_imgproc_found *found) {
     flag_edge(f, found);
-    double half_x, half_y, x = s->shape.x_px, y = s->shape.y_px;
-    half_extent(f, &s->shape, &half_x, &half_y);
+    double half_x, half_y, x = found->source.shape.x_px, y = found->source.shape.y_px;
+    half_extent(f, &found->source.shape, &half_x, &half_y);
     int x0 = (int)fmax(x - half_x - 1.0, 0.0), x1 = (int)fmin(x + half_x + 1.0, f->width - 1.0);
     int y0 = (int)fmax(y - half_y - 1.0, 0.0), y1 = (int)fmin(y + half_y + 1.0, f->height - 1.0);
     for (int j = y0; j <= y1; j++) {
@@ -261,9 +252,45 @@ static void set_flags(const bst_locate_frame *f, bst_imgproc_found *found) {
             }
         }
     }
-    if (outside || !s->fitted) {
-        found->label = BST_LABEL_ARTEFACT;
-        found->label_probability = 0.9;
+}
+
+/* True if a fit ended outside the frame. */
+static bool is_outside(const bst_locate_frame *f, const bst_imgproc_shape *s) {
+    return s->x_px < -0.5 || s->y_px < -0.5 || s->x_px > f->width - 0.5 ||
+           s->y_px > f->height - 0.5;
+}
+
+/* Labels a source that its fit does not vouch for. */
+static void label_artefact(bst_imgproc_found *found) {
+    found->label = BST_LABEL_ARTEFACT;
+    found->label_probability = 0.9;
+}
+
+/* Sets flags and label after the fit. Light beyond the edge fits with any flux, so a source fitted
+ * outside the frame falls back to the filter's peak and becomes an ARTEFACT. */
+static void set_flags(const bst_locate_frame *f, bst_imgproc_found *found) {
+    bool outside = is_outside(f, &found->source.shape);
+    if (outside) {
+        use_filter_peak(f, found);
+        found->snr = (double)found->peak_snr;
+        found->flags |= BST_DETECTION_EDGE;
+    }
+    flag_light(f, found);
+    if (outside || !found->source.fitted) {
+        label_artefact(found);
+    }
+}
+
+/* Fits an elongated point again as a streak of its own, whose light reaches further: up to the
+ * frame's edge, or to full pixels. */
+static void fit_own_streak(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
+    bst_source_moments_own_streak(w, i, found);
+    found->own_streak = found->streak;
+    if (found->own_streak) {
+        flag_light(w->f, found);
+        if (is_outside(w->f, &found->source.shape)) {
+            label_artefact(found);
+        }
     }
 }
 
@@ -390,7 +417,7 @@ static void finish_source(const bst_imgproc_worker *w, int i, bst_imgproc_found 
     bool alone = !(found->flags & (BST_DETECTION_BLEND | BST_DETECTION_EDGE));
     if (alone && !found->rough && !found->streak && found->label == BST_LABEL_UNKNOWN &&
         found->snr >= BST_EXTENT_SNR) {
-        bst_source_moments_own_streak(w, i, found);
+        fit_own_streak(w, i, found);
     }
     bst_source_moments_measure(w, i, found, 0.0);
     if (found->streak ||
@@ -489,6 +516,31 @@ void bst_locate_again(bst_imgproc_locator *l, const bst_locate_frame *f, int i) 
     if (found.source.fitted) {
         finish_source(&w, i, &found);
         l->found[i] = found;
+    }
+}
+
+/* True if two streaks are fits of the same light: one line, and more than half of it shared. */
+static bool is_same_streak(const bst_locate_frame *f, const bst_imgproc_shape *a,
+                           const bst_imgproc_shape *b) {
+    double length = fmax(hypot(a->dx_px, a->dy_px), 1e-6);
+    double c = a->dx_px / length, s = a->dy_px / length;
+    double ex = b->x_px - a->x_px, ey = b->y_px - a->y_px;
+    double across = fabs(c * ey - s * ex), end = 0.5 * fabs(c * b->dy_px - s * b->dx_px);
+    double along = fabs(c * ex + s * ey);
+    /* two lines within the FWHM are one to the fit */
+    double apart = BST_FWHM_PER_SIGMA * f->sigma_px;
+    return along < 0.5 * fmin(length, hypot(b->dx_px, b->dy_px)) && across < apart && end < apart;
+}
+
+void bst_locate_join_streaks(bst_imgproc_locator *l, const bst_locate_frame *f) {
+    assert(l && f);
+    for (int i = 1; i < l->count; i++) {
+        bst_imgproc_found *fainter = &l->found[i];
+        for (int k = 0; fainter->own_streak && !fainter->dropped && k < i; k++) {
+            const bst_imgproc_found *o = &l->found[k];
+            fainter->dropped = o->own_streak && !o->dropped &&
+                               is_same_streak(f, &o->source.shape, &fainter->source.shape);
+        }
     }
 }
 

@@ -24,8 +24,9 @@ typedef struct bst_imgproc_found {
     double noise_e; /* background noise at the source */
     double snr;     /* relative to background noise */
     double length_px, width_px, angle_rad;
-    unsigned flags; /* BST_DETECTION_... */
-    bool streak;    /* the fitted shape is not a point */
+    unsigned flags;  /* BST_DETECTION_... */
+    bool streak;     /* the fitted shape is not a point */
+    bool own_streak; /* a point that was fitted again as a streak */
     bool dropped;
     bool bleed;               /* its charge blooms along columns: blooming.h */
     double bleed_e, bleed_px; /* with bleed: total charge, and width of the saturated columns */
@@ -145,6 +146,10 @@ void bst_locate(bst_imgproc_locator *locator, const bst_locate_frame *frame,
 
 /* Prepares PSF profiles and sharpness test for the frame, as bst_locate does first. */
 void bst_locate_prepare(bst_imgproc_locator *locator, const bst_locate_frame *frame);
+
+/* Drops streaks that grew from other points of a brighter one's light. After a search for streaks,
+ * which joins most of them with a fit of its own. */
+void bst_locate_join_streaks(bst_imgproc_locator *locator, const bst_locate_frame *frame);
 
 /* Fits source i of the latest frame if only the matched filter located it. */
 void bst_locate_again(bst_imgproc_locator *locator, const bst_locate_frame *frame, int i);

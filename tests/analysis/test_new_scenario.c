@@ -212,6 +212,50 @@ static bst_vec3 place_of(const bst_sgp4 *sgp4, const bst_elements *e, bst_time t
     return (bst_vec3){1e3 * r[0], 1e3 * r[1], 1e3 * r[2]};
 }
 
+/* Angle from the Earth's limb in place of the true one, rad; 0: the true one. */
+static double limb_rad;
+
+double __real_bst_astro_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst_vec3 direction);
+double __wrap_bst_astro_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst_vec3 direction);
+
+double __wrap_bst_astro_earth_limb_angle(bst_vec3 position_m, bst_vec3 pole, bst_vec3 direction) {
+    return limb_rad > 0.0 ? limb_rad
+                          : __real_bst_astro_earth_limb_angle(position_m, pole, direction);
+}
+
+/* A field is taken whose corner, half a diagonal away, is 0.15 degrees off the limb, and not one
+ * whose corner is nearer. */
+static void test_corners_keep_off_the_limb(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_new_request q = {.aperture_m = 0.15,
+                         .name = "search",
+                         .observer_label = "eye",
+                         .start = "2022-06-16T12:00:00Z"};
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "o", "39089", &q.observer));
+    bst_assert_ok(&ctx, bst_new_satellite_find(&ctx, "t", "44801", &q.target));
+    judged j[3] = {{.count = 0}};
+    bst_new_scene none;
+    double corner = 0.0;
+    for (int k = 0; k < 3; k++) {
+        limb_rad = k == 0 ? 0.5 : corner * (k == 1 ? 1.001 : 0.999);
+        assert_int_equal(bst_new_scene_find(&ctx, &q, refuse, &j[k], &none), BST_ERR_NOT_FOUND);
+        assert_true(j[k].count > 0);
+        const bst_new_scene *s = &j[0].scenes[0];
+        corner = s->side_px * s->pixel_arcsec * BST_ARCSEC_RAD / sqrt(2.0) + 0.15 * BST_DEG_RAD;
+    }
+    limb_rad = 0.0;
+    int same[3] = {0};
+    for (int k = 1; k < 3; k++) {
+        for (int i = 0; i < j[k].count; i++) {
+            same[k] += j[k].scenes[i].side_px == j[0].scenes[0].side_px &&
+                       j[k].scenes[i].pixel_arcsec == j[0].scenes[0].pixel_arcsec;
+        }
+    }
+    assert_true(same[1] > 0);
+    assert_int_equal(same[2], 0);
+}
+
 /* The scenes found in two days: range, rate and angle from the limb over the run by SGP4 in TEME
  * alone (light time and aberration: 30 arcsec; the Earth as a sphere: 0.2 degrees), magnitudes in
  * their order, and the costs ascending. */
@@ -277,6 +321,7 @@ static void test_scenes_are_as_seen(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_plain_names),
+        cmocka_unit_test(test_corners_keep_off_the_limb),
         cmocka_unit_test(test_scenes_are_as_seen),
         cmocka_unit_test(test_satellites_are_found),
         cmocka_unit_test(test_satellites_are_refused),

@@ -98,6 +98,10 @@ def first_part(parts, eye, ways):
     return number
 
 
+# the frames of `labels`: not square, so that no width stands for a height
+WIDTH, HEIGHT = 512, 440
+
+
 def check_parts(out, coco):
     """The plane of parts against rays through the pixels, and the parts of COCO against the plane."""
     with open(SCENARIO, encoding="utf-8") as file:
@@ -108,11 +112,11 @@ def check_parts(out, coco):
                       " s.q_body_from_gcrf_w, e.q_cam_from_gcrf_mid_x, e.q_cam_from_gcrf_mid_y, e.q_cam_from_gcrf_mid_z,"
                       " e.q_cam_from_gcrf_mid_w, f.fits_index FROM shapes s JOIN exposures e USING (sensor, exposure_id)"
                       " JOIN frames f USING (sensor, exposure_id)")
-    row_, column = np.mgrid[0:512, 0:512]
+    row_, column = np.mgrid[0:HEIGHT, 0:WIDTH]
     scale = 120 * np.pi / 648000
 
     def direction(x, y):
-        return np.stack([(x - 255.5) * scale, (y - 255.5) * scale, np.ones_like(x, float)], axis=-1)
+        return np.stack([(x - (WIDTH - 1) / 2) * scale, (y - (HEIGHT - 1) / 2) * scale, np.ones_like(x, float)], axis=-1)
 
     with open(os.path.join(coco, "annotations.json"), encoding="utf-8") as file:
         boxes = [a["shape"]["parts"] for a in json.load(file)["annotations"] if a["category_id"] == 1]
@@ -160,7 +164,7 @@ def check_stars(out):
             for x, y in rows(out, "SELECT t.x_mid_px, t.y_mid_px FROM truth t WHERE t.kind = 'star' AND t.occulted = 0"
                                   f" AND t.exposure_id = {mask.header['FRAMEID']} AND t.in_field = 1"):
                 column, row = round(x), round(y)
-                if 1 <= row < 511 and 1 <= column < 511:
+                if 1 <= row < HEIGHT - 1 and 1 <= column < WIDTH - 1:
                     assert not mask.data[row - 1:row + 2, column - 1:column + 2].all()
     assert hidden >= 5 and len(covered) >= 5 and max(covered) < 1e-9, (hidden, covered)
 
@@ -168,7 +172,8 @@ def check_stars(out):
 def labels(program, folder):
     """Truth and labels of the target at 60 m against its pixels: centroid of light, box, masks, COCO and SatNet."""
     out = os.path.join(folder, "labels")
-    run(program, out, 7, {**NEAR, "/duration_s": 24, "/observers/0/orbit/offset_rtn_m": [0, -60, 0],
+    run(program, out, 7, {**NEAR, "/observers/0/sensors/0/camera/width_px": WIDTH,
+                          "/observers/0/sensors/0/camera/height_px": HEIGHT, "/duration_s": 24, "/observers/0/orbit/offset_rtn_m": [0, -60, 0],
                           "/observers/0/burns": [], "/observers/0/sensors/0/exposure/exposure_s": 3e-5,
                           "/observers/0/sensors/0/modules/control/exposure_schedule": [],
                           "/record": {"frames": "extensions", "planes": ["stars", "segmentation", "parts"]}})
@@ -180,6 +185,10 @@ def labels(program, folder):
                       " s.y1_px, s.size_px, f.fits_index, t.x_chief_px, t.range_m FROM shapes s"
                       " JOIN frames f USING (sensor, exposure_id) JOIN truth t USING (sensor, exposure_id, item)")
     assert len(truth) >= 8
+    light = np.array(rows(out, "SELECT d.v_mag - t.v_mag, d.flux_e / t.electrons FROM extended_targets e JOIN detections d USING"
+                               " (sensor, exposure_id, item) JOIN truth t ON t.exposure_id = e.exposure_id AND t.kind = 'object'"))
+    # one part in a hundred: what the threshold of the silhouette adds and leaves out
+    assert len(light) >= 8 and np.abs(light - [0.0, 1.0]).max() < 0.02, light
     with open(os.path.join(coco, "annotations.json"), encoding="utf-8") as file:
         boxes = [a for a in json.load(file)["annotations"] if a["category_id"] == 1]
     assert len(boxes) == len(truth)
@@ -205,11 +214,12 @@ def labels(program, folder):
     # the same parts as COCO's, in fractions of the image
     for ours, theirs in zip(target["shape"]["parts"], boxes[0]["shape"]["parts"], strict=True):
         assert [ours[k] for k in ("name", "number", "area")] == [theirs[k] for k in ("name", "number", "area")]
-        assert np.allclose(512 * np.array(ours["bbox"]), theirs["bbox"], rtol=0, atol=1e-9)
+        assert np.allclose([WIDTH, HEIGHT] * 2 * np.array(ours["bbox"]), theirs["bbox"], rtol=0, atol=1e-9)
         for polygon, px in zip(ours["segmentation"], theirs["segmentation"], strict=True):
-            assert np.allclose(512 * np.array(polygon), px, rtol=0, atol=1e-9)
+            assert np.allclose([WIDTH, HEIGHT] * np.reshape(polygon, (-1, 2)), np.reshape(px, (-1, 2)), rtol=0, atol=1e-9)
     assert len(target["shape"]["parts"]) >= 2
-    assert abs(target["shape"]["x_centre_of_mass"] * 512 - truth[0][2] - 0.5) < 1e-6
+    assert abs(target["shape"]["x_centre_of_mass"] * WIDTH - truth[0][2] - 0.5) < 1e-6
+    assert abs(target["shape"]["y_centre_of_mass"] * HEIGHT - truth[0][3] - 0.5) < 1e-6
     assert abs(np.linalg.norm(target["shape"]["q_body_from_gcrf"]) - 1.0) < 1e-9
 
 

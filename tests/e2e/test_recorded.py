@@ -110,6 +110,39 @@ class Recorded(unittest.TestCase):
                 # 30 stars, rms 0.03 px; the rest is the pixel scale, common to all frames
                 self.assertLess(numpy.abs(found - places).max(), 0.1)
 
+    def product(self, folder, name):
+        with open(os.path.join(folder, "products", name), encoding="utf-8") as file:
+            return list(csv.DictReader(file))
+
+    def compare_light(self, curves):
+        """Magnitudes and electrons of the stars against those that were drawn; the zero point comes from the stars."""
+        true = {row[:2]: row[2:] for row in rows(self.made, "SELECT exposure_id, id, v_mag, electrons, x_centroid_px,"
+                                                 " y_centroid_px FROM truth WHERE kind = 'star' AND in_field = 1")}
+        pairs = [(row, true[int(row["frame"]), int(row["id"])]) for row in curves if row["source"] == "star"
+                 and float(row["snr"]) > 50 and (int(row["frame"]), int(row["id"])) in true]
+        self.assertGreater(len(pairs), 20)
+        off = numpy.array([[float(row["v_mag"]) - t[0], 2.5 * numpy.log10(float(row["flux_e"]) / t[1]),
+                            float(row["x_px"]) - t[2], float(row["y_px"]) - t[3]] for row, t in pairs])
+        # the PSF of the map is not the camera's: some hundredths; light is measured for a PSF of the map's width
+        self.assertLess(numpy.abs(numpy.median(off[:, 0])), 0.03)
+        self.assertLess(numpy.abs(numpy.median(off[:, 1])), 0.1)
+        self.assertLess(numpy.abs(numpy.median(off[:, 2:], axis=0)).max(), 0.03)
+
+    def compare_attitudes(self, attitudes):
+        """Middle of the frames and angle of their rows against the WCS of the truth, but for the first, as in compare_wcs."""
+        with fits.open(os.path.join(self.made, "frames.fits")) as file:
+            self.assertEqual(len(attitudes), len(file) - 1)
+            for row, hdu in list(zip(attitudes, file[1:]))[1:]:
+                self.assertEqual(float(row["exposure_s"]), hdu.header["EXPTIME"])
+                self.assertEqual(row["start_utc"][:22], hdu.header["DATE-OBS"][:22])
+                # the middle and one pixel nearer to the first row
+                (ra, up_ra), (dec, up_dec) = WCS(hdu.header).all_pix2world([149.5, 149.5], [149.5, 148.5], 0)
+                angle = numpy.degrees(numpy.arctan2((up_ra - ra) * numpy.cos(numpy.radians(dec)), up_dec - dec))
+                off = [(float(row["ra_deg"]) - ra) * numpy.cos(numpy.radians(dec)), float(row["dec_deg"]) - dec]
+                # aberration, of which the catalogue's places are free: 20.5 + 5.2 arcsec; 0.2 px
+                self.assertLess(numpy.hypot(*off), 26 / 3600 + 0.2 / 30)
+                self.assertLess(abs((float(row["position_angle_deg"]) - angle + 180) % 360 - 180), 0.1)
+
     def test_process(self):
         out = self.path("processed")
         said = call_well("process", self.made, "--map", "boresight", "--out", out, *SOLVE, timeout=900)
@@ -122,9 +155,10 @@ class Recorded(unittest.TestCase):
         for name in ("report.html", "products/attitudes.csv", "products/light_curves.csv",
                      "products/paths.csv", "input/scenario.json"):
             self.assertTrue(os.path.getsize(os.path.join(out, name)) > 0, name)
-        with open(os.path.join(out, "products", "light_curves.csv"), encoding="utf-8") as file:
-            stars = {row["id"] for row in csv.DictReader(file) if row["source"] == "star"}
-        self.assertEqual(stars, {str(star) for _, star in ours})
+        curves = self.product(out, "light_curves.csv")
+        self.assertEqual({row["id"] for row in curves if row["source"] == "star"}, {str(star) for _, star in ours})
+        self.compare_light(curves)
+        self.compare_attitudes(self.product(out, "attitudes.csv"))
         again = call("process", self.made, "--map", "boresight", "--out", out, *SOLVE, timeout=900)
         self.assertEqual(again.returncode, 1)
         self.assertIn("--overwrite", again.stderr)

@@ -504,19 +504,22 @@ class Cubes(unittest.TestCase):
                          os.path.getsize(os.path.join(self.out, "MaskFiles", "000002.fits")))
 
     def test_parts_and_card(self):
-        listed = []
-        card = json.loads(self.read("card.json"))
+        listed, card = [], json.loads(self.read("card.json"))
         for part, name in enumerate(("train", "val", "test")):
             lines = self.read(name + ".txt").decode().split("\n")[:-1]
             listed += lines
-            of = [r["run"] for r in rows(self.out) if int(r["part"]) == part]
-            self.assertEqual([int(line[11:17]) for line in lines], [int(r) for r in of])
-        self.assertEqual(sorted(listed),
-                         [f"ImageFiles/{i:06}.fits Annotations/{i:06}.json" for i in range(5)])
-        self.assertEqual(sum(card["split"].values()), 5)
-        self.assertEqual(card["counts"]["frames"], sum(int(r["frames"]) for r in rows(self.out)))
-        self.assertEqual(card["varied"][0]["least"],
-                         min(float(r["read_noise_e"]) for r in rows(self.out)))
+            self.assertEqual([int(line[11:17]) for line in lines], [int(r["run"]) for r in rows(self.out) if int(r["part"]) == part])
+        self.assertEqual(sorted(listed), [f"ImageFiles/{i:06}.fits Annotations/{i:06}.json" for i in range(5)])
+        parts = [int(r["part"]) for r in rows(self.out)]
+        self.assertEqual(card["split"], {name: parts.count(k) for k, name in enumerate(("train", "validation", "test"))})
+        frames = [frame for i in range(5) for frame in json.loads(self.read("Annotations", f"{i:06}.json"))["data"]["frames"]]
+        classes = [item["class_name"] for frame in frames for item in frame["objects"]]
+        self.assertEqual(card["counts"], {
+            "sequences": 5, "failed": 0, "frames": len(frames), "satellite_labels": classes.count("Satellite"),
+            "star_labels": classes.count("Star"), "bytes": sum(len(self.read("ImageFiles", f"{i:06}.fits")) for i in range(5))})
+        noise, varied = [float(r["read_noise_e"]) for r in rows(self.out)], card["varied"][0]
+        self.assertEqual((varied["least"], varied["greatest"]), (min(noise), max(noise)))
+        self.assertAlmostEqual(varied["mean"], sum(noise) / 5, delta=1e-12)
 
     def test_what_is_gone_is_made_again(self):
         before = self.read("ImageFiles", "000003.fits"), self.read("runs.csv")

@@ -115,23 +115,45 @@ class Checks(unittest.TestCase):
         return rows
 
     def check_marks(self, viewer, folder, frame):
-        """Marks of a frame are the rows of its exposure, in pixels of its window."""
+        """Marks of a frame are the rows of its exposure, in its own pixels: a binned pixel is the mean of its pixels'
+        places, and a length is shorter by the binning, an area by its square."""
         found = viewer.json(f"api/frame?sensor=0&frame={frame}")
+        columns = {"truth": "kind, id, norad, v_mag, snr, x_centroid_px, y_centroid_px",
+                   "detections": "label, star_id, flux_e, snr, angle_deg, v_mag, x_px, y_px, length_px, cov_xx_px2, cov_xy_px2,"
+                                 " cov_yy_px2",
+                   "tracks": "exposure_id, track_id, status, target_of_interest, snr, ra_deg, dec_deg, misses_in_row, v_mag,"
+                             " x_px, y_px"}
+        keys = {"truth": "kind id norad v_mag snr x y", "tracks": "now id status target snr ra_deg dec_deg misses v_mag x y",
+                "detections": "label star_id flux_e snr angle_deg v_mag x y length xx xy yy"}
         with sqlite3.connect(os.path.join(folder, "run.sqlite")) as tables:
-            corner = tables.execute("SELECT x0_px, y0_px FROM frames WHERE exposure_id = ?", (frame,)).fetchone()
-            truth = tables.execute("SELECT id, x_centroid_px, y_centroid_px FROM truth WHERE exposure_id = ? AND in_field = 1",
-                                   (frame,)).fetchall()
-            detections = tables.execute("SELECT x_px, y_px, cov_xx_px2, cov_xy_px2, cov_yy_px2, label FROM detections"
-                                        " WHERE exposure_id = ?", (frame,)).fetchall()
-        self.assertGreater(len(detections), 0)
-        self.assertEqual([mark["id"] for mark in found["truth"]], [row[0] for row in truth])
-        self.assertEqual([mark["label"] for mark in found["detections"]], [row[5] for row in detections])
-        # 1e-9 px: differences of numbers below 1e4 in double precision, printed with 15 digits or more
-        numpy.testing.assert_allclose([[mark["x"], mark["y"]] for mark in found["truth"]],
-                                      [[row[1] - corner[0], row[2] - corner[1]] for row in truth], rtol=0, atol=1e-9)
-        numpy.testing.assert_allclose([[mark[key] for key in ("x", "y", "xx", "xy", "yy")] for mark in found["detections"]],
-                                      [[row[0] - corner[0], row[1] - corner[1], *row[2:5]] for row in detections],
-                                      rtol=1e-12, atol=1e-9)
+            x0, y0, binning = tables.execute("SELECT x0_px, y0_px, binning FROM frames WHERE exposure_id = ?",
+                                             (frame,)).fetchone()
+            for name, listed in columns.items():
+                # the tracks of the 40 exposures before are the trail, behind those of the frame
+                which = "BETWEEN max(0, ?1 - 40) AND ?1 ORDER BY exposure_id < ?1" if name == "tracks" else \
+                    "= ?1 AND in_field = 1" if name == "truth" else "= ?1"
+                rows = tables.execute(f"SELECT {listed} FROM {name} WHERE exposure_id {which}, rowid"
+                                      if name == "tracks" else
+                                      f"SELECT {listed} FROM {name} WHERE exposure_id {which}", (frame,)).fetchall()
+                names = keys[name].split()
+                self.assertEqual(len(found[name]), len(rows), name)
+                for mark, row in zip(found[name], rows):
+                    expected = dict(zip(names, row))
+                    expected["x"] = (expected["x"] - x0 - (binning - 1) / 2) / binning
+                    expected["y"] = (expected["y"] - y0 - (binning - 1) / 2) / binning
+                    for key, power in (("length", 1), ("xx", 2), ("xy", 2), ("yy", 2)):
+                        if expected.get(key) is not None:
+                            expected[key] /= binning**power
+                    if name == "tracks":
+                        expected["now"] = expected["now"] == frame
+                        expected["target"] = expected["target"] == 1
+                    for key in names:
+                        if isinstance(expected[key], float):
+                            # differences of numbers below 1e4 in double precision, printed with 15 digits or more
+                            numpy.testing.assert_allclose(mark[key], expected[key], rtol=1e-12, atol=1e-9, err_msg=f"{name} {key}")
+                        else:
+                            self.assertEqual(mark[key], expected[key], (name, key))
+        self.assertGreater(len(found["detections"]), 0)
 
 
 class View(Checks):
@@ -182,6 +204,18 @@ class View(Checks):
     def test_marks(self):
         for frame in range(3):
             self.check_marks(self.viewer, self.made, frame)
+
+    def test_marks_of_a_binned_window(self):
+        """The same tables with a window off the corner, binned by 3, and with lengths and slanting errors."""
+        made = os.path.join(runs.scratch(), "binned")
+        shutil.copytree(self.made, made)
+        with sqlite3.connect(made + "/run.sqlite") as tables:
+            tables.execute("UPDATE frames SET x0_px = 37, y0_px = 182, binning = 3")
+            tables.execute("UPDATE detections SET length_px = 7.5, angle_deg = 31.0, cov_xy_px2 = 0.4 * cov_yy_px2")
+        viewer = Viewer(made)
+        self.assertEqual(viewer.json("api/frame?sensor=0&frame=2")["binning"], 3)
+        self.check_marks(viewer, made, 2)
+        self.assertEqual(viewer.end()[0], 0)
 
     def test_plots_modes_events(self):
         described = self.viewer.json("api/run")

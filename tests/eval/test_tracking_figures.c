@@ -471,8 +471,36 @@ static void ospa2_by_hand(void **state) {
     assert_int_equal(bst_ospa2_create(&ctx, &empty, &ospa2), BST_ERR_ARGUMENT);
 }
 
+/* Distances that change from frame to frame: each frame of the window has its own, also where the
+ * window has gone round several times. One object and one track, which meets it in two of three
+ * frames. */
+static void ospa2_of_changing_distances(void **state) {
+    (void)state;
+    enum { FRAMES = 23, WINDOW = 5 };
+    bst_ctx ctx = {0};
+    bst_ospa2 *ospa2;
+    const bst_ospa2_params params = {WINDOW, 1.0, 2.0};
+    bst_assert_ok(&ctx, bst_ospa2_create(&ctx, &params, &ospa2));
+    const int64_t object = 7, track = 4;
+    double distance[FRAMES];
+    for (int k = 0; k < FRAMES; k++) {
+        double value, sum = 0.0;
+        int frames = k + 1 < WINDOW ? k + 1 : WINDOW;
+        distance[k] = k % 3 == 2 ? 1.0 : 0.03 * k; /* 1: the cutoff */
+        const bst_gospa_pair pair = {0, 0, distance[k]};
+        const bst_ospa2_input frame = {&object, 1, &track, 1, &pair, k % 3 == 2 ? 0 : 1};
+        bst_assert_ok(&ctx, bst_ospa2_frame(&ctx, ospa2, &frame, &value));
+        for (int n = k; n > k - frames; n--) {
+            sum += distance[n];
+        }
+        bst_assert_close(value, sum / frames, 1e-14); /* rounding of five terms */
+    }
+    bst_ospa2_free(ospa2);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(ospa2_by_hand),
+                                       cmocka_unit_test(ospa2_of_changing_distances),
                                        cmocka_unit_test(bound_of_two_correlated_measurements),
                                        cmocka_unit_test(bound_of_a_step_with_everything),
                                        cmocka_unit_test(fewer_runs_have_wider_bounds),

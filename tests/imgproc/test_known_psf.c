@@ -193,6 +193,20 @@ static void images_are_those_of_the_place_in_the_field(void **state) {
         bst_assert_ok(&ctx, bst_psf_image(&ctx, psf, n, 0.0, PER_PX, REACH_PX,
                                           image + (size_t)n * IMAGE * IMAGE));
     }
+    /* least squares of a Gaussian's flux to the mean image of the field */
+    double both = 0.0, gauss = 0.0, root = known->sigma_px * sqrt(2.0);
+    for (int i = 0; i < 19 * 19; i++) {
+        int x = i % 19 - 9, y = i / 19 - 9;
+        double p = 0.0, g = 0.25 * (erf((x + 0.5) / root) - erf((x - 0.5) / root)) *
+                            (erf((y + 0.5) / root) - erf((y - 0.5) / root));
+        for (int n = 0; n < 4; n++) {
+            p += 0.25 *
+                 image[(n * IMAGE + (y + REACH_PX) * PER_PX) * IMAGE + (x + REACH_PX) * PER_PX];
+        }
+        both += p * g;
+        gauss += g * g;
+    }
+    bst_assert_close(known->like_flux, both / gauss, 0.003); /* the decomposition: 1e-4 of energy */
     rendered *got = open_rendered(known);
     bst_source_profiles_on(&got->profiles, 0.0, 0.0, 1);
     bst_source_profiles_set(&got->profiles, &got->psf, known->sigma_px);

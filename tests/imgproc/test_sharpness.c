@@ -91,6 +91,25 @@ static void add_track(synthetic *s, double x, double y, double length, double an
     }
 }
 
+/* Direction of the principal axis of the noise-free charge within 7 px of a place; the background
+ * is that of the pixel in the corner. */
+static double axis_of(const synthetic *s, double x, double y) {
+    double sum[6] = {0.0};
+    int u = (int)floor(x + 0.5), v = (int)floor(y + 0.5);
+    for (int j = -7; j <= 7; j++) {
+        for (int i = -7; i <= 7; i++) {
+            double q = (double)(s->mean_e[(v + j) * s->width + u + i] - s->mean_e[0]);
+            const double term[6] = {q, q * i, q * j, q * i * i, q * i * j, q * j * j};
+            for (int k = 0; k < 6; k++) {
+                sum[k] += term[k];
+            }
+        }
+    }
+    double mx = sum[1] / sum[0], my = sum[2] / sum[0];
+    return 0.5 * atan2(2.0 * (sum[4] / sum[0] - mx * my),
+                       sum[3] / sum[0] - mx * mx - sum[5] / sum[0] + my * my);
+}
+
 /* Hits as a detector of 13 um pixels and 15 um depth sees them, 1125 e- and more, and tracks up to
  * 10 px; single pixels from an SNR of 9 on. At least 95 % are found out, and nearly all that are
  * one pixel or long: 300 of each, of which a share of 0.97 has a standard deviation of 0.01. */
@@ -102,7 +121,8 @@ static void charge_is_not_light(void **state) {
     for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
         const double *p = cases[c];
         field f = make(p[0]);
-        int found = 0, charge = 0;
+        int found = 0, charge = 0, axes = 0;
+        double turned = 0.0;
         for (int i = 0; i < 3; i++) {
             synthetic_clear(&f.s);
             for (int k = 0; k < GRID * GRID; k++) {
@@ -118,11 +138,19 @@ static void charge_is_not_light(void **state) {
                 if (n >= 0) {
                     found++;
                     charge += charge_label(f.d->items[n].label);
+                    if (f.d->items[n].length_px > 5.0f && charge_label(f.d->items[n].label)) {
+                        axes++;
+                        turned += fabs(sin((double)f.d->items[n].angle_rad -
+                                           axis_of(&f.s, place(&f, i, k, 0), place(&f, i, k, 1))));
+                    }
                 }
             }
         }
         assert_true(found >= 150);
         assert_true(charge >= 0.95 * found);
+        assert_true(axes >= (p[1] > 9.0 ? 50 : 0));
+        /* half a pixel of charge within the noise of a track of 6 px or more: 0.1; of 50: 0.01 */
+        assert_true(turned <= 0.01 * axes);
         end(&f);
     }
 }

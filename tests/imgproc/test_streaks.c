@@ -127,6 +127,38 @@ static void measured_as_claimed(void **state) {
     }
 }
 
+/* Streaks of 40 px along each side of the frame, 7 px inside, are whole; those across the side,
+ * with the middle 12 px inside, are cut; also where a point grew into the streak (the last). */
+static void streaks_that_the_frame_cuts(void **state) {
+    (void)state;
+    enum { SIDE = 256, LENGTH = 40 };
+    bst_ctx ctx = {0};
+    synthetic s;
+    bst_imgproc *ip = open_search(&ctx, &s, SIDE, 1.0);
+    bst_detections *d = synthetic_detections(2048);
+    bst_imgproc_frame frame = synthetic_frame(&s);
+    const double places[8][2] = {{90, 7},          {90, SIDE - 8}, {7, 90},          {SIDE - 8, 90},
+                                 {190, SIDE - 13}, {12, 190},      {SIDE - 13, 190}, {190, 12}};
+    synthetic_clear(&s);
+    for (int k = 0; k < 8; k++) {
+        bool flat = k < 2 || k == 5 || k == 6;
+        synthetic_add(&s, places[k][0], places[k][1],
+                      40.0 * synthetic_noise(&s) / synthetic_norm(&s, 128.0, 128.0, LENGTH, 0.0),
+                      flat ? LENGTH : 0.0, flat ? 0.0 : LENGTH);
+    }
+    synthetic_expose(&s, bst_rng_make_key(9, 0, "test", "cut"), 1);
+    bst_assert_ok(&ctx, bst_imgproc_detect(&ctx, ip, &frame, NULL, d, 2048));
+    for (int k = 0; k < 8; k++) {
+        int n = synthetic_nearest(d, places[k][0], places[k][1], k < 4 ? 2.0 : 8.0);
+        assert_true(n >= 0 && (d->items[n].flags & BST_DETECTION_STREAK));
+        assert_int_equal((d->items[n].flags & BST_DETECTION_EDGE) != 0, k >= 4);
+    }
+    assert_int_equal(d->count, 8); /* each is found once */
+    free(d);
+    bst_imgproc_free(ip);
+    synthetic_free(&s);
+}
+
 /* Noise alone; 512 x 512 px at 4 per frame asked for, in 40 frames: 160 +- 13 lines. 25 %: twice
  * that and the law's own 10 %. The same lines with one thread and with two. */
 static void false_alarms_as_requested(void **state) {
@@ -296,9 +328,13 @@ static void small_windows(void **state) {
 int main(int argc, char **argv) {
     loss_frames = argc > 1 && strcmp(argv[1], "slow") == 0 ? 40 : loss_frames;
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(loss_within_its_bound),     cmocka_unit_test(measured_as_claimed),
-        cmocka_unit_test(false_alarms_as_requested), cmocka_unit_test(stars_are_no_streaks),
-        cmocka_unit_test(charge_is_no_streak),       cmocka_unit_test(small_windows),
+        cmocka_unit_test(streaks_that_the_frame_cuts),
+        cmocka_unit_test(loss_within_its_bound),
+        cmocka_unit_test(measured_as_claimed),
+        cmocka_unit_test(false_alarms_as_requested),
+        cmocka_unit_test(stars_are_no_streaks),
+        cmocka_unit_test(charge_is_no_streak),
+        cmocka_unit_test(small_windows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

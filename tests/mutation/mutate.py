@@ -49,7 +49,7 @@ import time
 from build_files import Judges, listed_tests, run
 from quick_tree import QuickTree
 
-FOLDERS = ["sim", "scenegen", "gimbal", "imgproc", "tracker", "control", "obsgen"]
+FOLDERS = ["sim", "scenegen", "gimbal", "imgproc", "tracker", "control", "obsgen", "view"]
 AXES = [(r"\.x\b", ".y"), (r"\.y\b", ".x"), (r"\.z\b", ".y"), (r"\[0\]", "[1]"), (r"\[1\]", "[0]"), (r"\[2\]", "[1]"),
         (r"\b(\w+)_x\b", r"\1_y"), (r"\b(\w+)_y\b", r"\1_x"), (r"\bx_px\b", "y_px"), (r"\by_px\b", "x_px"),
         (r"\bnx\b", "ny"), (r"\bny\b", "nx")]

@@ -75,6 +75,12 @@ static void measure(bench *b, double mean[3], double *scatter) {
         b->truth->exposure_id = i;
         bst_generator_measure_motion(&b->g, &b->frame);
         double dx = b->g.fit_path.dx - b->g.star_path.dx, dy = b->g.fit_path.dy - b->g.star_path.dy;
+        /* the streaks that are fitted follow what is measured, on either axis */
+        const bst_streak_model fitted = bst_generator_streak_model(&b->g);
+        bst_assert_close(fitted.path.dx, b->g.fit_path.dx, 0.0);
+        bst_assert_close(fitted.path.dy, b->g.fit_path.dy, 0.0);
+        bst_assert_close(fitted.bend.dx, b->g.fit_bend_x, 0.0);
+        bst_assert_close(fitted.bend.dy, b->g.fit_bend_y, 0.0);
         double bx = b->g.fit_bend_x - b->g.bend_x, by = b->g.fit_bend_y - b->g.bend_y;
         sum[0] += dx * c + dy * s;
         sum[1] += dy * c - dx * s;

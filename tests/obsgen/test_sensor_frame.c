@@ -1,5 +1,6 @@
 /* The generator where frames are cut, binned, smeared or noisy in rows and columns, and where the
  * filter was made for another PSF: against numbers that the test makes itself. */
+#include "obsgen/generator_internal.h"
 #include "sim/optics/column_level.h"
 #include "tests/obsgen/generator_scene.h"
 
@@ -519,6 +520,40 @@ static void a_plain_image_is_as_sharp_as_it_says(void **state) {
     }
 }
 
+/* Light of a Gaussian whose middle is beyond one side of the frame, or two: share and centroid of
+ * its part on the frame, by sums. */
+static void light_cut_by_the_edges(void **state) {
+    (void)state;
+    bst_generator *g = test_calloc(1, sizeof *g);
+    g->width = 90;
+    g->height = 70;
+    g->total_sigma = 0.95;
+    const double places[][2] = {{-1.4, 30.0}, {90.3, 30.0},  {40.0, -0.9}, {40.0, 71.2},
+                                {-0.7, 70.1}, {91.0, -1.25}, {40.0, 30.0}};
+    const double step = 0.01;
+    for (size_t k = 0; k < sizeof places / sizeof *places; k++) {
+        generator_source cut = {.x = places[k][0], .y = places[k][1], .flux_e = 7.0};
+        bst_generator_cut_light(g, &cut);
+        double share = 1.0, want[2];
+        for (int axis = 0; axis < 2; axis++) {
+            double at = places[k][axis], last = (axis ? g->height : g->width) - 0.5;
+            double sum = 0.0, first = 0.0;
+            for (double u = -0.5 + 0.5 * step; u < last; u += step) {
+                double w = exp(-0.5 * pow((u - at) / g->total_sigma, 2.0)) * step;
+                sum += w;
+                first += w * u;
+            }
+            bool beyond = at < -0.5 || at > last;
+            share *= beyond ? sum / (g->total_sigma * sqrt(2.0 * BST_PI)) : 1.0;
+            want[axis] = beyond ? first / sum : at;
+        }
+        bst_assert_close(cut.flux_e / (7.0 * share), 1.0, 2e-4); /* steps */
+        bst_assert_close(cut.x, want[0], 2e-4);
+        bst_assert_close(cut.y, want[1], 2e-4);
+    }
+    test_free(g);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_plain_image_is_as_sharp_as_it_says),
@@ -531,6 +566,7 @@ int main(void) {
         cmocka_unit_test(levelled_columns_are_even),
         cmocka_unit_test(smeared_frames_place_objects_between_pixels),
         cmocka_unit_test(what_is_fitted_as_a_point_has_the_bend),
+        cmocka_unit_test(light_cut_by_the_edges),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,5 @@
 /* The light of long streaks as it is added up, against sums over all places in double precision. */
-#include "obsgen/streak/streak_light.h"
+#include "obsgen/streak/streak_path.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -132,11 +132,74 @@ static void light_falls_as_a_gaussian(void **state) {
     bst_assert_close((double)light[BST_STREAK_LANES - 1], exp(-80.0), 2e-5 * exp(-80.0));
 }
 
+/* Stars move by 40 px in x, an object from `from` to `to`, on a frame of 200 x 160 px: its places
+ * lie on its own line, with its own ends. */
+static void expect_own_way(double dx, double dy) {
+    bst_ctx ctx;
+    bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
+    enum { NODES = 41 };
+    static bst_star_trail_node route[BST_ROUTE_NODES], way[BST_ROUTE_NODES];
+    static bst_streak_ways ways;
+    double x[NODES], y[NODES], own_x[NODES], own_y[NODES];
+    for (int k = 0; k < NODES; k++) {
+        x[k] = 40.0 * ((double)k / (NODES - 1) - 0.5);
+        y[k] = 0.0;
+    }
+    generator_source object = {
+        .x = 90.25, .y = 70.5, .path = {.dx = dx, .dy = dy}, .amplitude = 9.0};
+    bst_generator g = {.width = 200,
+                       .height = 160,
+                       .cross_sigma = 1.2,
+                       .path = {x, y, NODES},
+                       .path_x = x,
+                       .path_y = y,
+                       .object_x = own_x,
+                       .object_y = own_y,
+                       .route = route,
+                       .way = way,
+                       .route_top = 1.0,
+                       .route_box = {-20.0, 20.0, 0.0, 0.0},
+                       .whole_path = {.dx = 40.0},
+                       .sources = &object};
+    g.route_count = bst_star_trail_lay(&g.path, g.cross_sigma, route);
+    const bst_streak_limits limits = {.beyond = 4, .seen = 0.01, .lit = 0.02, .dense = 1e9};
+    bst_streak_light l = {0};
+    bst_streak_light_begin(&l, g.width, g.height, false);
+    bst_streak_ways_begin(&ways, &g, &limits);
+    assert_int_equal(bst_streak_ways_add(&ctx, &ways, &g, 0, &l), BST_OK);
+    double least = INFINITY, most = -INFINITY;
+    bool by_row = fabs(dy) > fabs(dx);
+    double along0 = by_row ? object.y : object.x, across0 = by_row ? object.x : object.y;
+    double slope = by_row ? dx / dy : dy / dx, length = fabs(by_row ? dy : dx);
+    for (int i = 0; i < l.run_count; i++) {
+        assert_true(l.runs[i].by_row == by_row);
+        for (int k = 0; k < l.runs[i].count; k++) {
+            const bst_streak_place *p = &l.places[l.runs[i].first + (size_t)k];
+            bst_assert_close(p->middle + (double)p->off, across0 + slope * (p->at - along0), 1e-5);
+            least = fmin(least, p->at);
+            most = fmax(most, p->at);
+        }
+    }
+    bst_assert_close(0.5 * (least + most), along0, 1.0);
+    /* the trail's light reaches beyond its ends by a few of its widths */
+    assert_true(most - least > length - 1.5 && most - least < length + 12.0 * g.cross_sigma);
+    bst_streak_light_free(&l);
+}
+
+static void objects_keep_their_own_way(void **state) {
+    (void)state;
+    expect_own_way(10.0, 30.0);
+    expect_own_way(10.0, -30.0);
+    expect_own_way(-36.0, 24.0);
+    expect_own_way(60.0, 12.0);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(light_is_that_of_all_runs),
         cmocka_unit_test(all_widths_agree),
         cmocka_unit_test(light_falls_as_a_gaussian),
+        cmocka_unit_test(objects_keep_their_own_way),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -61,6 +61,14 @@ static void the_truth_by_default(void **state) {
                         sizeof(bst_camera));
     bst_world_state a = believed(&s, 77), b = truth(&s, 77);
     assert_memory_equal(&a, &b, sizeof a);
+    /* between whole seconds the velocity is interpolated: differences of places 0.1 s apart, 1e-3
+     * m of rounding; a tenth of a second is 0.8 m/s */
+    for (double t = 59.37; t < 64.0; t += 1.37) {
+        bst_vec3 way = bst_vec3_sub(truth(&s, t + 0.05).position_m, truth(&s, t - 0.05).position_m);
+        a = believed(&s, t);
+        bst_vec3 off = bst_vec3_sub(a.velocity_mps, bst_vec3_scale(way, 10.0));
+        bst_assert_close(bst_vec3_norm(off), 0.0, 0.05);
+    }
     double oversampling;
     assert_string_equal(bst_knowledge_psf_file(s.knowledge, &oversampling), "");
     drop(&s);

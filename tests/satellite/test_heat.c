@@ -141,6 +141,37 @@ static bool rise(void *user, bst_satellite_pose *pose, double seconds, bst_heat_
     return true;
 }
 
+/* Sunlight that grows by 0.05 W/m^2 each second. */
+static bool brighten(void *user, bst_satellite_pose *pose, double seconds,
+                     bst_heat_environment *out) {
+    sunrise always = {.at_s = -INFINITY};
+    (void)user;
+    (void)rise(&always, pose, seconds, out);
+    out->sunlight_wpm2 = 0.05 * seconds;
+    return true;
+}
+
+/* A load that grows evenly, against C dT/dt = load - emissivity sigma T^4 in steps of 1 s. Within a
+ * step of 60 s the history takes the load as even too, so that half a step of delay (1 K) shows. */
+static void a_history_follows_a_growing_load(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_test_model m = open_model(PLATE(", \"heat_capacity_j_per_m2_k\": 4000"));
+    bst_heat_history *h;
+    bst_assert_ok(&ctx, bst_heat_history_create(&ctx, m.satellite, &h));
+    double kelvin = 300.0;
+    for (int t = 2000; t <= 24000; t++) {
+        if (t >= 22000 && t % 420 == 0) {
+            bst_assert_close(bst_heat_history_at(h, m.pose, t, brighten, NULL)[0], kelvin, 0.02);
+        }
+        double load = 0.7 * 237 * 0.81 + 0.6 * 0.05 * (t + 0.5);
+        double half = kelvin + 0.5 * (load - 0.7 * SIGMA * pow(kelvin, 4)) / 4000;
+        kelvin += (load - 0.7 * SIGMA * pow(half, 4)) / 4000;
+    }
+    bst_heat_history_free(h);
+    bst_test_model_close(&m);
+}
+
 /* The step response: from one steady state to the other, in the order of time and in any other. */
 static void a_history_has_its_time_constant(void **state) {
     (void)state;
@@ -214,6 +245,7 @@ int main(void) {
         cmocka_unit_test(the_earth_heats_by_its_infrared),
         cmocka_unit_test(a_surface_cools_by_its_closed_form),
         cmocka_unit_test(a_history_has_its_time_constant),
+        cmocka_unit_test(a_history_follows_a_growing_load),
         cmocka_unit_test(emission_keeps_its_moments),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,6 +1,7 @@
 /* What a Gaussian PSF asks of stamps and of the Fourier path: closed forms by the error function,
  * and sums over a fine grid of frequencies by numpy. No device. */
 #include "scenegen/fourier/fourier_grid.h"
+#include "scenegen/smear/smear_internal.h"
 #include "scenegen/stamp/stamp.h"
 #include "tests/test_support.h"
 
@@ -40,6 +41,29 @@ static void stamps_of_a_gaussian(void **state) {
     assert_true(whole.tail[3] == 0.0 && whole.kept[0] == 1.0);
     assert_true(bst_stamp_excess(&whole, 2) == 0.0);
     assert_int_equal(bst_stamp_radius(&whole, 1e9, 1e-9, 20), 1);
+}
+
+/* Errors of a point at rest in a frame of 9 electrons of noise squared, without a tolerance of its
+ * nodes: what the stamp adds and cuts off, in electrons of the peak. */
+static void light_beside_a_stamp(void **state) {
+    (void)state;
+    bst_smear s = {.sigma_px = SIGMA, .place_parts = 0x1p22, .binning = 2};
+    s.dark_variance_e2 = 9.0;
+    s.last_read_e = 400.0;
+    s.last_peak_e = 120.0;
+    bst_stamp_init(&s.stamp, SIGMA, false);
+    for (int r = 1; r < 4; r++) {
+        const bst_smear_drawn d = {.radius = r, .error = 0.01, .predicted = 0.004};
+        bst_smear_set_error(&s, &d);
+        double kept = primitive(r + 1.5, SIGMA) - primitive(r + 0.5, SIGMA);
+        double tail = share(r + 0.5, r + 1.5, SIGMA) / share(-0.5, 0.5, SIGMA);
+        const bst_error_budget_source *e = &s.last_error;
+        bst_assert_close((double)e->peak_e, 400.0, 0.0);
+        bst_assert_close((double)e->excess_e, 400.0 * (1.0 / (kept * kept) - 1.0),
+                         0.16 / (SIGMA * SIGMA) / pow(kept, 3));
+        bst_assert_close((double)e->border_e, 120.0 * 2.0 * tail, 1e-4);
+        assert_true((double)e->nodes_e > 400.0 * 0.01 && e->predicted_e < e->nodes_e);
+    }
 }
 
 /* The least radius at which neither a pixel beyond nor what the stamp takes from there is over the
@@ -148,6 +172,7 @@ static void the_band_of_a_gaussian(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(stamps_of_a_gaussian),
+        cmocka_unit_test(light_beside_a_stamp),
         cmocka_unit_test(radii_keep_the_limit),
         cmocka_unit_test(the_band_of_a_gaussian),
     };

@@ -1,5 +1,6 @@
 /* Attitude from stars against its bound, with wrong identities, and where it must say no. */
 #include "boresight/rng.h"
+#include "sim/core/symmetric.h"
 #include "tests/test_support.h"
 #include "tracker/attitude/attitude.h"
 #include "tracker/attitude/attitude_error.h"
@@ -132,6 +133,71 @@ static void exact_without_noise(void **state) {
     bst_vec3 e = bst_quat_to_rotvec(bst_quat_mul(out.q_cam_from_gcrf, bst_quat_conj(s->q_true)));
     /* pixels of 1.5e-5 rad hold 1e-13 of themselves; roll has 450 px of lever */
     bst_assert_close(bst_vec3_norm(e), 0.0, 1e-13);
+}
+
+/* Stars whose errors slant, each in its own direction, four times as large along it as across. At
+ * the solution the slope of chi-square by each axis is zero, and the covariance is the inverse of
+ * half its curvature: (sum of J^T C^-1 J)^-1, with J by turning the camera a little. */
+static void slanting_errors_have_their_weight(void **state) {
+    (void)state;
+    enum { N = 9 };
+    scene *s = make_scene(8, N, 0, 900.0);
+    double c_inverse[N][2][2];
+    for (int i = 0; i < N; i++) {
+        double c = cos(0.7 * i + 0.3), n = sin(0.7 * i + 0.3), along = 0.16,
+               across = 0.01; /* px^2 */
+        s->stars[i].cov_xx = along * c * c + across * n * n;
+        s->stars[i].cov_xy = (along - across) * c * n;
+        s->stars[i].cov_yy = along * n * n + across * c * c;
+        c_inverse[i][0][0] = c * c / along + n * n / across;
+        c_inverse[i][0][1] = c_inverse[i][1][0] = c * n / along - c * n / across;
+        c_inverse[i][1][1] = n * n / along + c * c / across;
+        s->stars[i].x_px += 0.2 * c * sin(2.0 * i);
+        s->stars[i].y_px += 0.2 * n * sin(2.0 * i);
+    }
+    bst_attitude_solution out;
+    bst_attitude_solve(&camera, &params, s->q_true, s->stars, N, &out);
+    assert_true(out.valid && out.stars_used == N);
+    bst_assert_close(out.excess_px, 0.0, 0.0);
+    double half_curve[3][3] = {{0.0}}, slope[3] = {0.0}, want[3][3];
+    const double h = 1e-5; /* rad: 0.7 px */
+    for (int i = 0; i < N; i++) {
+        double j[2][3], at[2];
+        for (int k = 0; k < 7; k++) {
+            double turn[3] = {0.0}, x, y;
+            turn[k / 2 % 3] = k == 6 ? 0.0 : k % 2 ? h : -h;
+            bst_quat q = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){turn[0], turn[1], turn[2]}),
+                                      out.q_cam_from_gcrf);
+            assert_true(
+                bst_camera_project(&camera, bst_quat_rotate(q, s->stars[i].apparent_gcrf), &x, &y));
+            if (k == 6) {
+                at[0] = s->stars[i].x_px - x;
+                at[1] = s->stars[i].y_px - y;
+            } else if (k % 2 == 0) {
+                j[0][k / 2] = -x / (2.0 * h);
+                j[1][k / 2] = -y / (2.0 * h);
+            } else {
+                j[0][k / 2] += x / (2.0 * h);
+                j[1][k / 2] += y / (2.0 * h);
+            }
+        }
+        for (int k = 0; k < 12; k++) { /* rows a and b of the products */
+            int a = k / 4 % 3, m = k % 4 / 2, n = k % 2;
+            slope[a] += j[m][a] * c_inverse[i][m][n] * at[n];
+            for (int b = 0; b < 3; b++) {
+                half_curve[a][b] += j[m][a] * c_inverse[i][m][n] * j[n][b];
+            }
+        }
+    }
+    assert_true(bst_symmetric_invert(3, half_curve[0], want[0]));
+    for (int a = 0; a < 3; a++) {
+        /* a slope that would move the solution by a thousandth of its standard deviation */
+        bst_assert_close(slope[a] * sqrt(want[a][a]), 0.0, 1e-3);
+        for (int b = 0; b < 3; b++) {
+            bst_assert_close(out.covariance[a][b], want[a][b],
+                             1e-6 * sqrt(want[a][a] * want[b][b]));
+        }
+    }
 }
 
 /* Rotation and 10 % of distortion in the corner change nothing in how well the attitude is known.
@@ -360,6 +426,7 @@ static void telemetry_error_is_followed(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(error_meets_the_bound),
                                        cmocka_unit_test(exact_without_noise),
+                                       cmocka_unit_test(slanting_errors_have_their_weight),
                                        cmocka_unit_test(distorted_cameras_are_as_good),
                                        cmocka_unit_test(thousands_of_stars),
                                        cmocka_unit_test(optimistic_variances),

@@ -217,6 +217,11 @@ static void observed_sky_starts_fewer_tracks(void **state) {
     /* 1e-9: after 30 frames the beginning has 0.096^30 of its share */
     bst_assert_close(odds_after(30, 0.0) / first / ratio, 1.0, 1e-9);
     bst_assert_close(odds_after(30, 3000 * AS) / first, 1.0, 1e-9);
+    /* one alarm a frame in the field; the second detection may lie within 120 arcsec/s * 1 s and
+     * three standard deviations of both places, two axes each. Undetected: see above */
+    double reach = 120.0 * AS + 3.0 * sqrt(4.0 * SIGMA * SIGMA), field = 3000 * AS * 3000 * AS;
+    double objects = first * BST_PI * reach * reach / field / (pd * pd);
+    bst_assert_close(objects, 0.3, 1e-9);
 }
 
 int main(void) {

@@ -249,8 +249,78 @@ static void a_tracks_covariance_by_differences(void **state) {
     }
 }
 
+/* Adds the outer product of half the difference of two vectors. */
+static void add_square(const double *a, const double *b, int n, double *sum) {
+    for (int i = 0; i < n * n; i++) {
+        sum[i] += 0.25 * (a[i / n] - b[i / n]) * (a[i % n] - b[i % n]);
+    }
+}
+
+/* Errors on one or two lines through the state, v v^T + w w^T, slanting to every axis: an hour
+ * later, and in the sky, they are on the lines through what becomes of the states at their ends. */
+static void errors_along_lines_of_states(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const double line[2][6] = {{300.0, -500.0, 200.0, 0.11, 0.07, -0.09},
+                               {-150.0, 90.0, 400.0, -0.03, 0.12, 0.05}};
+    const bst_od_motion motion = {0};
+    const bst_od_state orbit = geo(), eye = leo_eye();
+    const bst_od_observer observer = {0.0, eye.position_m, eye.velocity_mps, EARTH};
+    for (int lines = 1; lines <= 2; lines++) {
+        double p[6][6] = {{0.0}}, later[6][6], slope[4][6], sky[4][4];
+        double want_later[6][6] = {{0.0}}, want_sky[4][4] = {{0.0}};
+        bst_od_state then;
+        bst_od_sight sight;
+        for (int i = 0; i < 36; i++) {
+            for (int n = 0; n < lines; n++) {
+                p[i / 6][i % 6] += line[n][i / 6] * line[n][i % 6];
+            }
+        }
+        bst_assert_ok(&ctx, bst_od_propagate(&ctx, &motion, &orbit, (const double(*)[6])p,
+                                             orbit.time_s + 3600.0, &then, later));
+        bst_od_project(&orbit, (const double(*)[6])p, &observer, &sight, slope, sky);
+        bst_tangent axes = bst_tangent_at(sight.direction);
+        for (int n = 0; n < lines; n++) {
+            double end[2][6], seen[2][4];
+            for (int side = 0; side < 2; side++) {
+                bst_od_state at = orbit, moved;
+                bst_od_path *path;
+                bst_od_sight to;
+                for (int k = 0; k < 6; k++) {
+                    at = displaced(&at, k, side ? -line[n][k] : line[n][k]);
+                }
+                bst_assert_ok(&ctx, bst_od_path_create(&ctx, &motion, &at, &path));
+                bst_assert_ok(&ctx, bst_od_path_state(&ctx, path, orbit.time_s + 3600.0, &moved));
+                bst_od_path_free(path);
+                const double six[6] = {moved.position_m.x,   moved.position_m.y,
+                                       moved.position_m.z,   moved.velocity_mps.x,
+                                       moved.velocity_mps.y, moved.velocity_mps.z};
+                memcpy(end[side], six, sizeof six);
+                bst_od_see(&at, &observer, &to);
+                const double four[4] = {
+                    bst_vec3_dot(axes.e1, to.direction), bst_vec3_dot(axes.e2, to.direction),
+                    bst_vec3_dot(axes.e1, to.rate_radps), bst_vec3_dot(axes.e2, to.rate_radps)};
+                memcpy(seen[side], four, sizeof four);
+            }
+            add_square(end[0], end[1], 6, want_later[0]);
+            add_square(seen[0], seen[1], 4, want_sky[0]);
+        }
+        for (int i = 0; i < 6; i++) {
+            for (int k = 0; k < 6; k++) { /* curvature: (500 m / 42 000 km)^2, and rounding */
+                bst_assert_close(later[i][k], want_later[i][k],
+                                 1e-6 * sqrt(want_later[i][i] * want_later[k][k]));
+                if (i < 4 && k < 4) {
+                    bst_assert_close(sky[i][k], want_sky[i][k],
+                                     1e-6 * sqrt(want_sky[i][i] * want_sky[k][k]));
+                }
+            }
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(errors_along_lines_of_states),
         cmocka_unit_test(full_covariances_by_brute_force),
         cmocka_unit_test(a_tracks_covariance_by_differences),
     };

@@ -91,7 +91,6 @@ static void the_ends_of_all_scales(void **state) {
     bst_brightness_config c = plain();
     bst_scene_lighting l = lit(4e7, pi);
     assert_true(glow_of(&c, &l).v_mag > 50); /* phase 180 */
-    l = lit(4e7, 1);
     l.area_m2 = 0;
     bst_scene_glow g = glow_of(&c, &l);
     assert_true(isinf(g.v_mag));
@@ -105,9 +104,14 @@ static void the_ends_of_all_scales(void **state) {
     l = lit(1e9, 1);
     bst_assert_close(glow_of(&c, &l).v_mag,
                      bst_world_lambert_sphere_v_mag(4, 0.25, 1, 1e9, BST_AU_M), 1e-12);
+    for (double r = 1.3; r < 100.0; r *= 2.0) { /* near by; places 7000 km away are rounded */
+        double sphere_sr = 2 * pi * (1 - cos(asin(sqrt(4 / pi) / r)));
+        l = lit(r, 1);
+        bst_assert_close(glow_of(&c, &l).emission_sr / (0.8 * sphere_sr), 1, 1e-8);
+    }
     /* from inside, of a speck, and out of nothing: numbers */
     l = lit(0.5, 1);
-    assert_true(glow_of(&c, &l).v_mag < 100); /* a number */
+    assert_true(glow_of(&c, &l).v_mag < 100);
     bst_brightness_at(NULL, &l, &g);
     bst_assert_close(g.emission_sr, 0, 0);
 }

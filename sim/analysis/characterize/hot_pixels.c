@@ -97,8 +97,11 @@ bst_hot_pixels bst_hot_pixels_fit(const float *excess, size_t count, double limi
     }
     double z = (h.cut - m) / s, density = exp(-0.5 * z * z) / sqrt(2.0 * acos(-1.0));
     double by_m = density / s / share, by_s = density * z / s / share; /* d ln share */
-    double relative2 = (1.0 - share) / (n * share) + 1.0 / n + by_m * by_m * covariance[0] +
-                       2.0 * by_m * by_s * covariance[1] + by_s * by_s * covariance[2];
+    /* fraction n / (pixels share): n is of a Poisson law, and its logarithm has the variance 1 / n;
+     * the fit's errors are independent of it, as the law of the values above a limit is not changed
+     * by their number */
+    double relative2 = 1.0 / n + by_m * by_m * covariance[0] + 2.0 * by_m * by_s * covariance[1] +
+                       by_s * by_s * covariance[2];
     out.fraction.value = n / share / (double)pixels;
     out.fraction.sigma = out.fraction.value * sqrt(relative2);
     out.median.value = pow(10.0, m);
