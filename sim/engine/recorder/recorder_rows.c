@@ -442,7 +442,7 @@ bst_status bst_recorder_smoothed_rows(bst_ctx *ctx, bst_recorder *recorder, int 
         put_int(&r, t->tick);
         put_real(&r, seconds(recorder, t->tick));
         put_int(&r, k->id);
-        put_text(&r, track_status_name(k->status));
+        put_text(&r, bst_recorder_track_status_name(k->status));
         put_flag(&r, k->target_of_interest);
         put_int(&r, k->later_frames);
         put_state(&r, k->direction_gcrf, k->rate_gcrf_radps, k->covariance);
