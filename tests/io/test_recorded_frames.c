@@ -2,105 +2,9 @@
  * what is expected does not come from the library that reads.
  *
  * test_io_recorded_frames [mutations=N]: damaged files beyond the usual 2000 */
-#include <stdarg.h>
-
-#include "sim/io/recorded_frames.h"
-#include "tests/io/scratch.h"
+#include "tests/io/written_fits.h"
 
 static long mutations = 2000;
-
-typedef struct fixture {
-    bst_ctx ctx;
-    scratch place;
-    char path[600];
-    uint8_t *bytes; /* of the file */
-    size_t count, room;
-} fixture;
-
-static fixture begin(const char *name) {
-    fixture f = {.count = 0};
-    scratch_make(&f.place);
-    snprintf(f.path, sizeof f.path, "%s/%s", f.place.folder, name);
-    return f;
-}
-
-static void end(fixture *f) {
-    free(f->bytes);
-    scratch_remove(&f->place);
-}
-
-static void put(fixture *f, const void *bytes, size_t count) {
-    if (f->count + count > f->room) {
-        f->room = 2 * (f->count + count);
-        f->bytes = realloc(f->bytes, f->room);
-        assert_non_null(f->bytes);
-    }
-    memcpy(f->bytes + f->count, bytes, count);
-    f->count += count;
-}
-
-static void card(fixture *f, const char *format, ...) {
-    char text[200], line[81];
-    va_list list;
-    va_start(list, format);
-    vsnprintf(text, sizeof text, format, list);
-    va_end(list);
-    snprintf(line, sizeof line, "%-80.80s", text);
-    put(f, line, 80);
-}
-
-static void pad(fixture *f, char with) {
-    while (f->count % 2880 != 0) {
-        put(f, &with, 1);
-    }
-}
-
-/* Cards up to NAXISn of an image. */
-static void begin_image(fixture *f, bool primary, int bitpix, int nx, int ny, int planes) {
-    card(f, primary ? "SIMPLE  =                    T" : "XTENSION= 'IMAGE   '");
-    card(f, "BITPIX  = %20d", bitpix);
-    card(f, "NAXIS   = %20d", planes > 0 ? 3 : 2);
-    card(f, "NAXIS1  = %20d", nx);
-    card(f, "NAXIS2  = %20d", ny);
-    if (planes > 0) {
-        card(f, "NAXIS3  = %20d", planes);
-    }
-    if (!primary) {
-        card(f, "PCOUNT  =                    0");
-        card(f, "GCOUNT  =                    1");
-    }
-}
-
-static void end_header(fixture *f) {
-    card(f, "END");
-    pad(f, ' ');
-}
-
-static void big_endian(fixture *f, uint64_t value, int width) {
-    for (int i = width - 1; i >= 0; i--) {
-        uint8_t byte = (uint8_t)(value >> (8 * i));
-        put(f, &byte, 1);
-    }
-}
-
-static void real32(fixture *f, float value) {
-    uint32_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    big_endian(f, bits, 4);
-}
-
-static void real64(fixture *f, double value) {
-    uint64_t bits;
-    memcpy(&bits, &value, sizeof bits);
-    big_endian(f, bits, 8);
-}
-
-static void save(const fixture *f, size_t count) {
-    FILE *file = fopen(f->path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(f->bytes, 1, count, file), count);
-    fclose(file);
-}
 
 /* Reads the pixels of a frame of the file. */
 static void pixels_of(fixture *f, int64_t index, int width, int height, float *pixels) {
@@ -178,16 +82,6 @@ static const char map_text[] =
     " \"y\": {\"keyword\": \"POS[2]|POSY\"}, \"z\": {\"value\": 7}},"
     " \"image_section\": \"TRIMSEC\", \"bias_section\": \"BIASSEC\", \"pedestal_dn\": 10,"
     " \"dn_per_unit\": 2}";
-
-static void load_map(fixture *f, const char *text, bst_keyword_map *map) {
-    char path[700];
-    snprintf(path, sizeof path, "%s.json", f->path);
-    FILE *file = fopen(path, "w");
-    assert_non_null(file);
-    fputs(text, file);
-    fclose(file);
-    bst_assert_ok(&f->ctx, bst_keyword_map_load(&f->ctx, path, map));
-}
 
 /* Cards that the map above asks for. */
 static void mapped_cards(fixture *f, const char *exptime, const char *date, const char *trim) {
@@ -503,103 +397,6 @@ static void test_rate_trend(void **state) {
     end(&f);
 }
 
-/* The WCS of a header gives the attitude that shows the sky so: a camera at RA 90, Dec 0 with rows
- * to the south and columns to the west. */
-static void test_wcs(void **state) {
-    (void)state;
-    for (int flip = 0; flip < 2; flip++) {
-        fixture f = begin("wcs.fits");
-        begin_image(&f, true, 8, 3, 3, 0);
-        card(&f, "CRPIX1  =                   2.");
-        card(&f, "CRPIX2  =                   2.");
-        card(&f, "CRVAL1  =                  90.");
-        card(&f, "CRVAL2  =                   0.");
-        card(&f, "CDELT1  =               -0.001");
-        card(&f, "CDELT2  = %20.3f", flip ? 0.001 : -0.001);
-        end_header(&f);
-        put(&f, "123456789", 9);
-        save(&f, f.count);
-        bst_fits_source *s;
-        bst_fits_source_frame frame;
-        bst_quat q;
-        double scale;
-        bst_assert_ok(&f.ctx, bst_fits_source_open(&f.ctx, f.path, &s));
-        bst_assert_ok(&f.ctx, bst_fits_source_select(&f.ctx, s, 0, &frame));
-        assert_false(bst_keyword_wcs(s, &frame, !flip, &q, &scale)); /* mirrored */
-        assert_true(bst_keyword_wcs(s, &frame, flip, &q, &scale));
-        bst_assert_close(scale, 3.6, 1e-12);                   /* rounding */
-        bst_vec3 z = bst_quat_rotate(q, (bst_vec3){0, 1, 0});  /* RA 90 */
-        bst_vec3 y = bst_quat_rotate(q, (bst_vec3){0, 0, -1}); /* south */
-        bst_assert_close(z.z, 1.0, 1e-12);
-        bst_assert_close(y.y, 1.0, 1e-9); /* a pixel to the right is 1.7e-5 rad away */
-        bst_fits_source_close(s);
-        end(&f);
-    }
-}
-
-/* Direction at a pixel of a header's WCS, first pixel 1: standard coordinates (xi, eta), deg, of
- * the plane that touches the sphere at CRVAL = (ra, dec) (Calabretta and Greisen 2002,
- * section 5.1). */
-static bst_vec3 in_the_sky(const double cd[2][2], double x_px, double y_px, double ra, double dec) {
-    double xi = (cd[0][0] * x_px + cd[0][1] * y_px) * BST_DEG_RAD;
-    double eta = (cd[1][0] * x_px + cd[1][1] * y_px) * BST_DEG_RAD;
-    bst_vec3 east = {-sin(ra), cos(ra), 0.0},
-             north = {-sin(dec) * cos(ra), -sin(dec) * sin(ra), cos(dec)};
-    bst_vec3 at = {cos(dec) * cos(ra), cos(dec) * sin(ra), sin(dec)};
-    return bst_vec3_unit(bst_vec3_axpy(bst_vec3_axpy(at, xi, east), eta, north));
-}
-
-/* The same far from the equator, turned, with pixels that are not square and a reference outside
- * the frame, as a matrix and as scales with an angle: the middle of the frame and its right edge
- * are where the header says. */
-static void test_turned_wcs(void **state) {
-    (void)state;
-    enum { WIDTH = 7, HEIGHT = 5 };
-    const double ra = 213.0, dec = 52.0, angle = 31.0 * BST_DEG_RAD, dx = -0.002, dy = -0.0021;
-    /* rotation of the axes, after the scales */
-    const double cd[2][2] = {{dx * cos(angle), -dy * sin(angle)},
-                             {dx * sin(angle), dy * cos(angle)}};
-    for (int matrix = 0; matrix < 2; matrix++) {
-        fixture f = begin("turned.fits");
-        begin_image(&f, true, 8, WIDTH, HEIGHT, 0);
-        card(&f, "CRPIX1  = %20.3f", -3.25);
-        card(&f, "CRPIX2  = %20.3f", 11.5);
-        card(&f, "CRVAL1  = %20.3f", ra);
-        card(&f, "CRVAL2  = %20.3f", dec);
-        if (matrix) {
-            card(&f, "CD1_1   = %20.13E", cd[0][0]);
-            card(&f, "CD1_2   = %20.13E", cd[0][1]);
-            card(&f, "CD2_1   = %20.13E", cd[1][0]);
-            card(&f, "CD2_2   = %20.13E", cd[1][1]);
-        } else {
-            card(&f, "CDELT1  = %20.4f", dx);
-            card(&f, "CDELT2  = %20.4f", dy);
-            card(&f, "CROTA2  = %20.4f", angle / BST_DEG_RAD);
-        }
-        end_header(&f);
-        put(&f, "12345678901234567890123456789012345", WIDTH * HEIGHT);
-        save(&f, f.count);
-        bst_fits_source *s;
-        bst_fits_source_frame frame;
-        bst_quat q;
-        double scale;
-        bst_assert_ok(&f.ctx, bst_fits_source_open(&f.ctx, f.path, &s));
-        bst_assert_ok(&f.ctx, bst_fits_source_select(&f.ctx, s, 0, &frame));
-        assert_true(bst_keyword_wcs(s, &frame, false, &q, &scale));
-        bst_assert_close(scale, 3600.0 * sqrt(dx * dy), 1e-9); /* 13 digits */
-        double x = 4.0 + 3.25, y = 3.0 - 11.5;                 /* the middle, from CRPIX */
-        bst_vec3 z = in_the_sky(cd, x, y, ra * BST_DEG_RAD, dec * BST_DEG_RAD);
-        bst_vec3 right = in_the_sky(cd, x + 3.0, y, ra * BST_DEG_RAD, dec * BST_DEG_RAD);
-        bst_vec3 seen = bst_quat_rotate(q, z), edge = bst_quat_rotate(q, right);
-        bst_assert_close(bst_vec3_angle(seen, (bst_vec3){0, 0, 1}), 0.0, 1e-10); /* 13 digits */
-        bst_assert_close(edge.x, bst_vec3_angle(z, right), 1e-10);
-        bst_assert_close(edge.y, 0.0,
-                         1e-8); /* 1.1e-4 rad from the axis: the plane's bend is 1e-8 */
-        bst_fits_source_close(s);
-        end(&f);
-    }
-}
-
 int main(int argc, char **argv) {
     for (int i = 1; i < argc; i++) {
         (void)sscanf(argv[i], "mutations=%ld", &mutations);
@@ -608,9 +405,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test(test_pixels),     cmocka_unit_test(test_keywords_and_sections),
         cmocka_unit_test(test_cube_table), cmocka_unit_test(test_messages),
         cmocka_unit_test(test_truncated),  cmocka_unit_test(test_mutations),
-        cmocka_unit_test(test_files),      cmocka_unit_test(test_wcs),
-        cmocka_unit_test(test_rate_trend),
-        cmocka_unit_test(test_turned_wcs),
+        cmocka_unit_test(test_files),      cmocka_unit_test(test_rate_trend),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
