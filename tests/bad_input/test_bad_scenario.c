@@ -118,7 +118,7 @@ static void exact_messages(void **state) {
     refuse("/zzz=60",
            "/zzz: unknown key (allowed: boresight, extends, set, name, epoch_utc, duration_s, "
            "tick_rate_hz, seed, "
-           "run, world, observers, tasking, record, link, pacing)");
+           "run, world, observers, tasking, record, link, pacing, changes)");
     refuse("/duration_s=NaN",
            "/duration_s: wrong type (found \"NaN\"; allowed: a number from 0 to 1000000000 s)");
     refuse("/duration_s=-1",
