@@ -60,6 +60,8 @@ static const bst_port tracker_ports[] = {
     {BST_CHANNEL_NAV_TELEMETRY, BST_PORT_IN, 0, 0.0, 0},
     {BST_CHANNEL_TRACKS, BST_PORT_OUT, 0, 0.0, 256},
     {BST_CHANNEL_PREDICTIONS, BST_PORT_OUT, 0, 0.0, 256},
+    {BST_CHANNEL_TRACK_IDENTITIES, BST_PORT_OUT, 0, 0.0, 256},
+    {BST_CHANNEL_TRACKS_SMOOTHED, BST_PORT_OUT, 0, 0.0, 256},
 };
 
 static const bst_port control_ports[] = {

@@ -27,11 +27,12 @@ static bool may_give(const char *role, bst_link_type type) {
         const char *role;
         bst_link_type type;
     } given[] = {
-        {"imgproc", BST_LINK_DETECTIONS},     {"tracker", BST_LINK_TRACKS},
-        {"tracker", BST_LINK_PREDICTIONS},    {"control", BST_LINK_LOS_COMMAND},
-        {"control", BST_LINK_SENSOR_COMMAND}, {"control", BST_LINK_CONTROL_STATUS},
-        {"gimbal", BST_LINK_POINTING},        {"gimbal", BST_LINK_TARGET_STATES},
-        {"gimbal", BST_LINK_SENSOR_COMMAND},  {"gimbal", BST_LINK_TARGET_ATTITUDES},
+        {"imgproc", BST_LINK_DETECTIONS},      {"tracker", BST_LINK_TRACKS},
+        {"tracker", BST_LINK_PREDICTIONS},     {"tracker", BST_LINK_TRACK_IDENTITIES},
+        {"tracker", BST_LINK_TRACKS_SMOOTHED}, {"control", BST_LINK_LOS_COMMAND},
+        {"control", BST_LINK_SENSOR_COMMAND},  {"control", BST_LINK_CONTROL_STATUS},
+        {"gimbal", BST_LINK_POINTING},         {"gimbal", BST_LINK_TARGET_STATES},
+        {"gimbal", BST_LINK_SENSOR_COMMAND},   {"gimbal", BST_LINK_TARGET_ATTITUDES},
     };
     for (size_t i = 0; i < sizeof given / sizeof *given; i++) {
         if (given[i].type == type && strcmp(given[i].role, role) == 0) {

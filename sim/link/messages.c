@@ -339,6 +339,37 @@ static const bst_wire_field track_items[] = {
         "0 not, 1 in shadow, 2 behind the Earth, 3 awaited, 4 too dim."),
     END};
 
+static const bst_wire_field track_identities[] = {
+    NUMBER(bst_track_identities, exposure_id, 0, "Of the frame."),
+    TICK(bst_track_identities, tick, "Mid-exposure."), COUNT(bst_track_identities, "Items."),
+    INT(bst_track_identities, lost, 0, MANY, "", "Further items, for which there was no room."),
+    END};
+
+static const bst_wire_field identity_items[] = {
+    NUMBER(bst_track_identity, track_id, 1, "As in `tracks`."),
+    INT(bst_track_identity, object, -2, MANY, "",
+        "Index in the catalogue; -1: none of its objects; -2: what the cue means, if the catalogue "
+        "lacks it."),
+    BOUNDED(bst_track_identity, probability, 0, 1, "", "That the track is this object."), END};
+
+static const bst_wire_field tracks_smoothed[] = {
+    NUMBER(bst_tracks_smoothed, exposure_id, 0, "Of the earlier frame."),
+    TICK(bst_tracks_smoothed, tick, "Of validity: its mid-exposure."),
+    COUNT(bst_tracks_smoothed, "Items."),
+    INT(bst_tracks_smoothed, lost, 0, MANY, "", "Further tracks, for which there was no room."),
+    END};
+
+static const bst_wire_field smoothed_items[] = {
+    NUMBER(bst_track_smoothed, id, 1, "As in `tracks`."),
+    INT(bst_track_smoothed, status, 0, 2, "",
+        "In that frame: 0 tentative, 1 confirmed, 2 coasting."),
+    BOOLEAN(bst_track_smoothed, target_of_interest, "In that frame."),
+    INT(bst_track_smoothed, later_frames, 0, MANY, "", "Later frames that contribute."),
+    DIRECTION(bst_track_smoothed, direction_gcrf, "Geometric."),
+    VECTOR(bst_track_smoothed, rate_gcrf_radps, "rad/s", "Its rate, perpendicular to it."),
+    REALS(bst_track_smoothed, covariance, 16, "rad2, rad2/s, rad2/s2", "As in `tracks`."),
+    END};
+
 static const bst_wire_field los_command[] = {
     TICK(bst_los_command, tick, "Of reference."),
     DIRECTION(bst_los_command, direction_gcrf, "Where the boresight shall be: apparent."),
@@ -452,6 +483,13 @@ static const bst_wire_message messages[BST_LINK_TYPES] = {
               prediction_items, 65536, "The tracker's help for image processing of later frames."),
     [BST_LINK_TRACKS] = ITEMS("tracks", BOTH, bst_tracks, items, tracks, bst_track, track_items,
                               16384, "The tracker's state after a frame."),
+    [BST_LINK_TRACK_IDENTITIES] =
+        ITEMS("track_identities", PEER, bst_track_identities, items, track_identities,
+              bst_track_identity, identity_items, 16384,
+              "Probabilities of tracks over the objects of the onboard catalogue."),
+    [BST_LINK_TRACKS_SMOOTHED] = ITEMS(
+        "tracks_smoothed", PEER, bst_tracks_smoothed, items, tracks_smoothed, bst_track_smoothed,
+        smoothed_items, 16384, "States of tracks in an earlier frame, given the later frames too."),
     [BST_LINK_LOS_COMMAND] = RECORD("los_command", BOTH, bst_los_command, los_command,
                                     "Where the boresight shall be, as the onboard attitude "
                                     "knowledge sees it."),

@@ -157,9 +157,9 @@ static void find_ports(bst_link_host *host) {
     for (int p = 0; p < desc->port_count && p < MOST_PORTS; p++) {
         const bst_port *port = &desc->ports[p];
         bst_link_type type = bst_external_type(port->channel);
-        if (port->direction == BST_PORT_OUT) {
+        if (port->direction == BST_PORT_OUT && type != BST_LINK_TYPES) {
             host->outputs[host->output_count++] = (bst_link_output){.type = type};
-        } else if (type != BST_LINK_TYPES) {
+        } else if (port->direction != BST_PORT_OUT && type != BST_LINK_TYPES) {
             bool items = bst_channel_type_find(port->channel)->item_bytes > 0;
             host->types[host->source.port_count] = type;
             host->ports[host->source.port_count++] =

@@ -5,7 +5,7 @@ from typing import Any, Dict, List
 
 import numpy as np
 
-VERSION = 6
+VERSION = 7
 
 # Members of each message's record, then of its items: name:type, x for an array. A test compares
 # them with docs/reference/icd.md.
@@ -101,6 +101,15 @@ _TABLES = {
         "id:i8 status:i4 target_of_interest:i4 direction_gcrf:f8x3 rate_gcrf_radps:f8x3 "
         "covariance:f8x16 v_mag:f8 snr:f8 score:f8 hits:i4 misses_in_row:i4 first_tick:i8 "
         "last_update_tick:i8 x_px:f8 y_px:f8 uncorrelated:i4 hidden:i4",
+    ),
+    "track_identities": (
+        "exposure_id:i8 tick:i8 count:i4 lost:i4",
+        "track_id:i8 object:i4 probability:f8",
+    ),
+    "tracks_smoothed": (
+        "exposure_id:i8 tick:i8 count:i4 lost:i4",
+        "id:i8 status:i4 target_of_interest:i4 later_frames:i4 direction_gcrf:f8x3 "
+        "rate_gcrf_radps:f8x3 covariance:f8x16",
     ),
     "los_command": (
         "tick:i8 direction_gcrf:f8x3 rate_gcrf_radps:f8x3 accel_gcrf_radps2:f8x3 "
