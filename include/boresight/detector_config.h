@@ -120,8 +120,8 @@ bool bst_detector_has_traps(const bst_detector_traps_config *t);
 bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d) BST_MUST_CHECK;
 /* Checks edges and outputs against the size of the frame.
  *
- * Errors:    BST_ERR_CONFIG, with the key: no pixel is left between shielded and overscan edges, or the outputs do
- *            not share the columns equally */
+ * Errors:    BST_ERR_CONFIG, with the key: no pixel is left between shielded and overscan edges, or
+ *            the outputs do not share the columns equally */
 bst_status bst_detector_config_check_size(bst_ctx *ctx, const bst_detector_config *d,
                                           int64_t width_px, int64_t height_px) BST_MUST_CHECK;
 
