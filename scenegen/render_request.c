@@ -23,19 +23,6 @@ bst_status bst_render_camera_check(bst_ctx *ctx, const bst_camera *c) {
     return BST_OK;
 }
 
-/* Pixels whose light a frame of a window needs. */
-static bst_window light_window(const bst_camera *camera, bst_window w) {
-    if (bst_detector_config_whole_columns(&camera->detector)) {
-        w.y0 = 0;
-        w.height = (int)camera->height_px;
-    }
-    if (bst_detector_config_whole_sensor(&camera->detector)) {
-        w.x0 = 0;
-        w.width = (int)camera->width_px;
-    }
-    return w;
-}
-
 static bool covers(const bst_skylight_map *map, bst_window w) {
     return w.x0 >= map->x0_px && w.y0 >= map->y0_px &&
            w.x0 + w.width - 1 <= map->x0_px + (map->columns - 1) * map->step_px &&
@@ -75,7 +62,7 @@ bst_status bst_render_request_check(bst_ctx *ctx, const bst_camera *camera,
                         "a request has a map of the background, but the camera's background is the "
                         "same all over the sensor (bst_skylight_may_vary)");
     }
-    if (q->background && !covers(q->background, light_window(camera, w))) {
+    if (q->background && !covers(q->background, bst_detector_light_window(camera, w))) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "a request's map of the background does not cover its window, or that "
                         "window's whole columns where charge runs along them");

@@ -278,6 +278,15 @@ double bst_camera_dark_e_per_s(const bst_camera *c);
 /* Mean charge of a pixel that is gathered outside the exposure, e-: dark current during read-out
  * and clock-induced charge, without hot pixels, maps and glow. */
 double bst_camera_readout_e(const bst_camera *c);
+/* Mean dark signal of a pixel in a frame, e-: dark current of the exposure and what
+ * bst_camera_readout_e gives. */
+double bst_camera_dark_e(const bst_camera *c, double exposure_s);
+/* Variance of multiplied charge over that of the charge itself: 2 - 1 / em_gain; 1 without a
+ * multiplication register. */
+double bst_camera_excess_noise(const bst_camera *c);
+/* Noise of a pixel, e-: shot noise of a sky of sky_e and of the dark signal, as multiplied, and
+ * read noise. */
+double bst_camera_noise_e(const bst_camera *c, double sky_e, double exposure_s);
 
 #pragma GCC visibility pop
 

@@ -115,13 +115,13 @@ bool bst_detector_has_traps(const bst_detector_traps_config *t);
 
 /* Checks for effects that exclude each other.
  *
- * Errors:    BST_ERR_CONFIG, with the key: a rolling shutter beside frame transfer, blooming or
- *            traps of the columns */
+ * Errors:    BST_ERR_CONFIG, with the key: a rolling shutter beside effects that need whole columns
+ *            (bst_detector_config_whole_columns); traps along rows beside several outputs */
 bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d) BST_MUST_CHECK;
 /* Checks edges and outputs against the size of the frame.
  *
- * Errors:    BST_ERR_CONFIG, with the key: no pixel is left between the edges, or the outputs do
- *            not share the columns equally */
+ * Errors:    BST_ERR_CONFIG, with the key: no pixel is left between shielded and overscan edges, or
+ *            the outputs do not share the columns equally */
 bst_status bst_detector_config_check_size(bst_ctx *ctx, const bst_detector_config *d,
                                           int64_t width_px, int64_t height_px) BST_MUST_CHECK;
 

@@ -42,6 +42,18 @@ static bool multiplies(const bst_camera *c) {
     return c->detector.em_gain > 1.0;
 }
 
+bst_window bst_detector_light_window(const bst_camera *camera, bst_window window) {
+    if (bst_detector_config_whole_columns(&camera->detector)) {
+        window.y0 = 0;
+        window.height = (int)camera->height_px;
+    }
+    if (bst_detector_config_whole_sensor(&camera->detector)) {
+        window.x0 = 0;
+        window.width = (int)camera->width_px;
+    }
+    return window;
+}
+
 bool bst_detector_is_staged(const bst_detector *detector) {
     return bst_detector_config_whole_columns(&detector->camera.detector) ||
            multiplies(&detector->camera);

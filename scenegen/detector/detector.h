@@ -6,6 +6,7 @@
 #include <stddef.h>
 
 #include "boresight/camera.h"
+#include "boresight/messages.h"
 #include "boresight/rng.h"
 #include "scenegen/detector/cosmic_rays.h"
 #include "scenegen/kernels/scene_shared.h"
@@ -52,6 +53,10 @@ void bst_detector_options(const bst_detector *detector, bool shared, char *text,
 const char *bst_detector_tail_options(const bst_camera *camera);
 /* Sets the detector's parameters of the kernels, from `effects` on. */
 void bst_detector_params(const bst_detector *detector, bst_kernel_frame_params *params);
+
+/* Part of the sensor whose light a frame of `window` needs: whole columns if charge or light moves
+ * along them, all of it if also along rows. */
+bst_window bst_detector_light_window(const bst_camera *camera, bst_window window);
 
 /* True if frames pass the staged read-out (readout.h): effects between pixels, multiplication of
  * charge. */

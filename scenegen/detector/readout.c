@@ -8,7 +8,7 @@
 #include "bst_scenegen_kernels.h"
 #include "scenegen/scene_kernels.h"
 
-enum { TRANSFER, CHARGE, BLOOM, READ, NEIGHBOURS, PARALLEL, SERIAL, CROSSTALK, KERNELS };
+enum { TRANSFER, CHARGE, BLOOM, MARK, READ, NEIGHBOURS, PARALLEL, SERIAL, CROSSTALK, KERNELS };
 
 struct bst_readout {
     bst_camera camera;
@@ -16,7 +16,7 @@ struct bst_readout {
     cl_context context;
     cl_command_queue queue;
     cl_kernel kernels[KERNELS];
-    cl_mem image, over;
+    cl_mem image, over, full;
     size_t bytes;
 };
 
@@ -36,6 +36,9 @@ static bool wanted(const bst_readout *r, int kernel) {
             return bst_detector_has_traps(&d->serial_traps);
         case CROSSTALK:
             return d->crosstalk.outputs > 1 && d->crosstalk.coupling != 0.0;
+        case MARK: /* charge may change after it was limited to the full well */
+            return bst_detector_has_traps(&d->parallel_traps) ||
+                   bst_detector_config_whole_sensor(d);
         default:
             return true;
     }
@@ -47,10 +50,10 @@ static bool needs_over(const bst_readout *r) {
 }
 
 bst_status bst_readout_prepare(bst_ctx *ctx, bst_readout *r) {
-    static const char *const names[KERNELS] = {"bst_detector_transfer",   "bst_detector_charge",
-                                               "bst_detector_bloom",      "bst_detector_read",
-                                               "bst_detector_neighbours", "bst_detector_parallel",
-                                               "bst_detector_serial",     "bst_detector_crosstalk"};
+    static const char *const names[KERNELS] = {
+        "bst_detector_transfer", "bst_detector_charge", "bst_detector_bloom",
+        "bst_detector_mark",     "bst_detector_read",   "bst_detector_neighbours",
+        "bst_detector_parallel", "bst_detector_serial", "bst_detector_crosstalk"};
     static const bst_device_kernel_source *const staged[] = {
         &bst_kernel_scene_shared, &bst_kernel_lanes,    &bst_kernel_random,   &bst_kernel_chunk,
         &bst_kernel_read_tail,    &bst_kernel_detector, &bst_kernel_store_dn, &bst_kernel_readout};
@@ -104,23 +107,19 @@ void bst_readout_free(bst_readout *r) {
     if (r->over) {
         clReleaseMemObject(r->over);
     }
+    if (r->full) {
+        clReleaseMemObject(r->full);
+    }
     clReleaseCommandQueue(r->queue);
     clReleaseContext(r->context);
     free(r);
 }
 
 bst_window bst_readout_light_window(const bst_readout *r, bst_window window) {
-    bst_window light = window;
-    light.x0 = window.x0 / 64 * 64;
-    light.width = window.x0 + window.width - light.x0;
-    if (bst_detector_config_whole_sensor(&r->camera.detector)) {
-        light.x0 = 0;
-        light.width = (int)r->camera.width_px;
-    }
-    if (bst_detector_config_whole_columns(&r->camera.detector)) {
-        light.y0 = 0;
-        light.height = (int)r->camera.height_px;
-    }
+    bst_window light = bst_detector_light_window(&r->camera, window);
+    int beyond = light.x0 % 64; /* images start at whole chunks */
+    light.x0 -= beyond;
+    light.width += beyond;
     return light;
 }
 
@@ -134,14 +133,18 @@ bst_status bst_readout_image(bst_ctx *ctx, bst_readout *r, bst_window light, cl_
     *stride = stride_of(light.width);
     size_t bytes = (size_t)*stride * (size_t)light.height * sizeof(float);
     if (bytes > r->bytes) {
-        cl_mem *buffers[2] = {&r->image, &r->over};
-        for (int i = 0; i < (needs_over(r) ? 2 : 1); i++) {
+        cl_mem *buffers[3] = {&r->image, &r->over, &r->full};
+        const size_t room[3] = {bytes, needs_over(r) ? bytes : 0,
+                                wanted(r, MARK) ? bytes / sizeof(float) : 0};
+        for (int i = 0; i < 3; i++) {
             if (*buffers[i]) {
                 clReleaseMemObject(*buffers[i]);
             }
             *buffers[i] = NULL;
-            BST_TRY(bst_device_buffer(ctx, r->context, bytes, NULL, "allocating an image of charge",
-                                      buffers[i]));
+            if (room[i] > 0) {
+                BST_TRY(bst_device_buffer(ctx, r->context, room[i], NULL,
+                                          "allocating an image of charge", buffers[i]));
+            }
         }
         r->bytes = bytes;
     }
@@ -195,8 +198,14 @@ static bst_status enqueue_traps(bst_ctx *ctx, bst_readout *r, int kernel,
 }
 
 /* Parameters of the effects between pixels, without any. */
-static bst_kernel_coupling_params coupling_params(const bst_kernel_frame_params *p) {
+static bst_kernel_coupling_params coupling_params(const bst_readout *r,
+                                                  const bst_kernel_frame_params *p) {
+    const bst_detector_edges_config *edges = &r->camera.detector.overscan;
     return (bst_kernel_coupling_params){.width = p->sensor_width,
+                                        .x0 = (int)edges->left,
+                                        .x1 = p->sensor_width - (int)edges->right,
+                                        .y0 = p->real_y0,
+                                        .y1 = p->real_y1,
                                         .height = p->light_height,
                                         .stride = p->light_stride,
                                         .outputs = 1};
@@ -208,7 +217,7 @@ static bst_status enqueue_neighbours(bst_ctx *ctx, bst_readout *r, const bst_ker
     if (!(shift > 0.0) && !(coupling > 0.0)) {
         return BST_OK;
     }
-    bst_kernel_coupling_params q = coupling_params(p);
+    bst_kernel_coupling_params q = coupling_params(r, p);
     q.shift = (float)shift;
     q.coupling = (float)coupling;
     cl_mem b[] = {r->image, r->over};
@@ -227,6 +236,11 @@ static bst_status move_charge(bst_ctx *ctx, bst_readout *r, const bst_kernel_fra
         BST_TRY(enqueue_kernel(ctx, r, BLOOM, (arguments){p, sizeof *p, b, 2},
                                (size_t)p->light_stride / 16));
     }
+    if (wanted(r, MARK)) {
+        cl_mem b[] = {r->image, r->full};
+        BST_TRY(
+            enqueue_kernel(ctx, r, MARK, (arguments){p, sizeof *p, b, 2}, (size_t)p->light_height));
+    }
     for (int kernel = PARALLEL; kernel <= SERIAL; kernel++) {
         if (wanted(r, kernel)) {
             BST_TRY(enqueue_traps(ctx, r, kernel, p));
@@ -234,7 +248,7 @@ static bst_status move_charge(bst_ctx *ctx, bst_readout *r, const bst_kernel_fra
     }
     BST_TRY(enqueue_neighbours(ctx, r, p, 0.0, d->interpixel_coupling));
     if (wanted(r, CROSSTALK)) {
-        bst_kernel_coupling_params q = coupling_params(p);
+        bst_kernel_coupling_params q = coupling_params(r, p);
         q.outputs = (int)d->crosstalk.outputs;
         q.mirrored = d->crosstalk.mirrored;
         q.crosstalk = (float)d->crosstalk.coupling;
@@ -257,6 +271,9 @@ bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *det
     p.light_y0 = light.y0;
     p.light_height = light.height;
     p.light_stride = stride_of(light.width);
+    p.real_y0 = (int)r->camera.detector.overscan.bottom;
+    p.real_y1 = (int)(r->camera.height_px - r->camera.detector.overscan.top);
+    p.effects |= wanted(r, MARK) ? BST_EFFECT_MARKS : 0;
     p.binning = binning;
     p.window_width = window.width / binning;
     p.window_height = window.height / binning;
@@ -269,7 +286,7 @@ bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *det
     BST_TRY(enqueue_kernel(ctx, r, CHARGE, (arguments){&p, sizeof p, charge, 5}, rows));
     BST_TRY(move_charge(ctx, r, &p));
     p.per_full_well /= (float)(binning * binning);
-    cl_mem read[] = {r->image, frame, saturated, maps[3], maps[4], maps[5]};
-    return enqueue_kernel(ctx, r, READ, (arguments){&p, sizeof p, read, 6},
+    cl_mem read[] = {r->image, frame, saturated, maps[3], maps[4], maps[5], r->full};
+    return enqueue_kernel(ctx, r, READ, (arguments){&p, sizeof p, read, 7},
                           (size_t)p.window_height);
 }

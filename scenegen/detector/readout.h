@@ -24,8 +24,7 @@ bst_status bst_readout_prepare(bst_ctx *ctx, bst_readout *readout) BST_MUST_CHEC
 /* Frees a read-out with its kernels and buffers on the device; NULL is allowed. */
 void bst_readout_free(bst_readout *readout);
 
-/* Part of the sensor whose light a frame of `window` needs: whole columns if charge or light moves
- * along them, all of it if also along rows. */
+/* bst_detector_light_window from a multiple of 64 columns on. */
 bst_window bst_readout_light_window(const bst_readout *readout, bst_window window);
 
 /* Image of light for a window of bst_readout_light_window.

@@ -1,12 +1,14 @@
 /* Effects of pixels and outputs on each other. One work-item per row. */
 
-/* Charge that a neighbour's charge n moves into a pixel of charge q. */
+/* Charge that a neighbour's charge n moves into a pixel of charge q; the neighbour loses the same. A
+ * border moves by a quarter of a pixel at most: four of them take no more than a pixel has. */
 INLINE float16 inflow(bst_kernel_coupling_params p, float16 q, float16 n) {
-    return (n - q) * fma((float16)(0.5f * p.shift), n + q, (float16)p.coupling);
+    float16 moved_px = clamp(p.shift * (n - q), -0.25f, 0.25f);
+    return fma(0.5f * moved_px, n + q, p.coupling * (n - q));
 }
 
 /* Coupling of neighbours, and borders that move away from charge: from -> to. The sum of the charge
- * stays; borders of the sensor let nothing through. */
+ * stays; borders of the sensor and its overscan let nothing through. */
 __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_detector_neighbours(
     bst_kernel_coupling_params p, global const float *from, global float *to) {
     const int16 lane = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
@@ -15,8 +17,9 @@ __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_d
         return;
     }
     global const float *row = from + (size_t)y * p.stride;
-    global const float *below = y > 0 ? row - p.stride : row;
-    global const float *above = y + 1 < p.height ? row + p.stride : row;
+    int real = y >= p.y0 && y < p.y1;
+    global const float *below = real && y > p.y0 ? row - p.stride : row;
+    global const float *above = real && y + 1 < p.y1 ? row + p.stride : row;
     for (int x = 0; x < p.width; x += 16) {
         float16 q = vload16(0, row + x), left, right;
         if (x > 0 && x + 16 < p.width) {
@@ -26,11 +29,14 @@ __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_d
             left = (float16)(x > 0 ? row[x - 1] : q.s0, q.s01234567, q.s89ab, q.scd, q.se);
             right = (float16)(q.s12345678, q.s9abc, q.sde, q.sf, q.sf);
             right.sf = x + 16 < p.width ? row[x + 16] : q.sf;
-            right = select(right, q, lane + x + 1 >= p.width);
         }
+        int16 column = lane + x;
+        left = select(left, q, column <= p.x0);
+        right = select(right, q, column + 1 >= p.x1);
         float16 down = vload16(0, below + x), up = vload16(0, above + x);
         float16 sum = (inflow(p, q, left) + inflow(p, q, right)) + (inflow(p, q, down) + inflow(p, q, up));
-        vstore16(fmax(q + sum, 0.0f), 0, to + (size_t)y * p.stride + x);
+        int16 changes = column >= p.x0 & column < p.x1 & (int16)-real;
+        vstore16(select(q, fmax(q + sum, 0.0f), changes), 0, to + (size_t)y * p.stride + x);
     }
 }
 

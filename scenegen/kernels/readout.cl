@@ -93,8 +93,8 @@ READOUT_GROUP kernel void bst_detector_charge(bst_kernel_frame_params p, global 
 }
 
 /* Blooming: charge above the full well leaves a pixel in halves up and down its column and fills
- * the next pixels; what reaches the column's end is lost. `over`: work column of moving charge. One
- * work-item per 16 columns. */
+ * the next pixels; what reaches the column's end is lost, in front of the overscan. `over`: work
+ * column of moving charge. One work-item per 16 columns. */
 READOUT_GROUP kernel void bst_detector_bloom(bst_kernel_frame_params p, global float *image, global float *over) {
     int x = (int)get_global_id(0) * 16;
     if (x >= p.light_stride) {
@@ -106,18 +106,36 @@ READOUT_GROUP kernel void bst_detector_bloom(bst_kernel_frame_params p, global f
         global float16 *half_at = (global float16 *)(over + (size_t)y * p.light_stride + x);
         float16 q = *at, excess = 0.5f * fmax(q - full, 0.0f);
         q = fmin(q, full);
+        if (y < p.real_y0 || y >= p.real_y1) {
+            *at = q;
+            continue;
+        }
         float16 take = fmin(full - q, carry);
         *at = q + take;
         *half_at = excess;
         carry = carry - take + excess;
     }
     carry = (float16)0.0f;
-    for (int y = p.light_height - 1; y >= 0; y--) {
+    for (int y = p.real_y1 - 1; y >= p.real_y0; y--) {
         global float16 *at = (global float16 *)(image + (size_t)y * p.light_stride + x);
         global float16 *half_at = (global float16 *)(over + (size_t)y * p.light_stride + x);
         float16 q = *at, take = fmin(full - q, carry);
         *at = q + take;
         carry = carry - take + *half_at;
+    }
+}
+
+/* Marks the pixels at full well, for effects that change their charge before it is read. full: as
+ * image. One work-item per row. */
+READOUT_GROUP kernel void bst_detector_mark(bst_kernel_frame_params p, global const float *image, global uchar *full) {
+    int y = (int)get_global_id(0);
+    if (y >= p.light_height) {
+        return;
+    }
+    for (int x = 0; x < p.light_stride; x += 16) {
+        size_t at = (size_t)y * p.light_stride + x;
+        int16 mark = vload16(0, image + at) >= p.full_well_e;
+        vstore16(convert_uchar16(mark & 1), 0, full + at);
     }
 }
 
@@ -182,18 +200,18 @@ INLINE chunk multiply_chunk(bst_kernel_frame_params p, uint counter, chunk q) {
 #endif
 
 /* Reads charge as digital numbers: p.binning x p.binning pixels are summed before they are read.
- * frame: [window_height][window_width], both after binning. saturated: pixels per row. One
- * work-item per frame row. */
+ * frame: [window_height][window_width], both after binning. saturated: pixels per row. full: of
+ * bst_detector_mark, with BST_EFFECT_MARKS. One work-item per frame row. */
 READOUT_GROUP kernel void bst_detector_read(bst_kernel_frame_params p, global const float *image, global ushort *frame,
                               global int *saturated, global const float *offsets,
-                              global const ushort *codes, global uchar *flags) {
+                              global const ushort *codes, global uchar *flags,
+                              global const uchar *full) {
     detector_maps maps = {0, 0, 0, offsets, codes, 0};
     int y = (int)get_global_id(0), b = p.binning;
     if (y >= p.window_height) {
         return;
     }
     int row = p.window_y0 + y * b;
-    global const float *line = image + (size_t)(row - p.light_y0) * p.light_stride;
     global ushort *out = frame + (size_t)y * p.window_width;
     global uchar *marks =
         HAS(p, BST_EFFECT_FLAGS) ? flags + (size_t)y * p.window_width : 0;
@@ -209,12 +227,13 @@ READOUT_GROUP kernel void bst_detector_read(bst_kernel_frame_params p, global co
             float sum = 0.0f;
             int brim = 0;
             if (column >= 0 && column < p.window_width) {
-                global const float *at = line + p.window_x0 - p.tiles_x0 + column * b;
+                size_t first_at = (size_t)(row - p.light_y0) * p.light_stride + p.window_x0 -
+                                  p.tiles_x0 + column * b;
                 for (int v = 0; v < b; v++) {
                     for (int u = 0; u < b; u++) {
-                        float q = at[(size_t)v * p.light_stride + u];
-                        sum += q;
-                        brim |= q >= p.full_well_e;
+                        size_t at = first_at + (size_t)v * p.light_stride + u;
+                        sum += image[at];
+                        brim |= HAS(p, BST_EFFECT_MARKS) ? full[at] : image[at] >= p.full_well_e;
                     }
                 }
             }

@@ -66,6 +66,7 @@
 #define BST_EFFECT_FLAGS 256
 #define BST_EFFECT_READOUT 512
 #define BST_EFFECT_PICK_UP 1024
+#define BST_EFFECT_MARKS 2048 /* pixels at full well are marked before charge moves on */
 
 /* Laws of bst_kernel_vignetting_params: none; the fourth power of the cosine of the field angle,
  * 1 / (1 + v1 s)^2; a polynomial, 1 + v1 s + v2 s^2 + v3 s^3. s: squared distance from the centre.
@@ -118,7 +119,8 @@ typedef struct bst_kernel_frame_params {
     int light_first, light_pitch; /* of the Fourier path's image, floats */
     int image_stride;             /* of the image of expected electrons, floats */
     int light_y0, light_height,
-        light_stride; /* image that is read out: first sensor row, rows, floats per row */
+        light_stride;     /* image that is read out: first sensor row, rows, floats per row */
+    int real_y0, real_y1; /* its rows that are no overscan: first, and behind the last */
     int binning;
     int map_step, map_x0, map_y0, map_columns, map_rows; /* of the background map, if it varies */
     bst_kernel_node_params nodes;
@@ -147,11 +149,12 @@ typedef struct bst_kernel_trap_params {
 /* Effects between pixels of an image (kernels/charge_coupling.cl). */
 typedef struct bst_kernel_coupling_params {
     int width, height, stride;
-    float coupling;  /* share that each of the four neighbours takes over */
-    float shift;     /* of the border between two pixels, px per electron */
-    int outputs;     /* crosstalk: equal parts of a row */
-    int mirrored;    /* every second part is read from its last column on */
-    float crosstalk; /* share of each other output */
+    int x0, x1, y0, y1; /* real pixels: first column and row, and those behind the last */
+    float coupling;     /* share that each of the four neighbours takes over */
+    float shift;        /* of the border between two pixels, px per electron */
+    int outputs;        /* crosstalk: equal parts of a row */
+    int mirrored;       /* every second part is read from its last column on */
+    float crosstalk;    /* share of each other output */
 } bst_kernel_coupling_params;
 
 /* Record of one source for the node kernel. */

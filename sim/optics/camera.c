@@ -149,3 +149,16 @@ double bst_camera_readout_e(const bst_camera *c) {
     double passed = 0.5 * (1.0 - 1.0 / (double)c->height_px); /* mean share of the rows */
     return d->readout_s * passed * bst_camera_dark_e_per_s(c) + d->clock_induced_e;
 }
+
+double bst_camera_dark_e(const bst_camera *c, double exposure_s) {
+    return bst_camera_dark_e_per_s(c) * exposure_s + bst_camera_readout_e(c);
+}
+
+double bst_camera_excess_noise(const bst_camera *c) {
+    return c->detector.em_gain > 1.0 ? 2.0 - 1.0 / c->detector.em_gain : 1.0;
+}
+
+double bst_camera_noise_e(const bst_camera *c, double sky_e, double exposure_s) {
+    double shot_e2 = bst_camera_excess_noise(c) * (sky_e + bst_camera_dark_e(c, exposure_s));
+    return sqrt(shot_e2 + c->read_noise_e * c->read_noise_e);
+}

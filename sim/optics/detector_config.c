@@ -141,7 +141,8 @@ const bst_config_desc bst_detector_table[] = {
     BST_REALS(bst_detector_config, nonlinearity, "", -1, 1, "[0, 0, 0]",
               "c of the read charge q (1 + c1 u + c2 u^2 + c3 u^3), u = q / full_well_e."),
     BST_ENUM(bst_detector_config, saturation, wells, "\"clip\"",
-             "Charge above the full well is lost (clip) or flows along its column (bloom)."),
+             "Charge above the full well is lost (clip) or flows along its column (bloom; not with "
+             "row_time_s)."),
     BST_FORMER("full_well", "saturation"),
     BST_REAL(bst_detector_config, frame_transfer_s, "s", 0, 100, "0",
              "Time of the transfer of a whole frame under light; 0: none."),
@@ -149,7 +150,8 @@ const bst_config_desc bst_detector_table[] = {
         bst_detector_config, row_time_s, "s", -1, 1, "0",
         "Rolling shutter: each row of the window is exposed so much later than the row before; "
         "below 0: from the last row on. The exposure's times are those of the window's middle "
-        "row. 0: all rows at once."),
+        "row. 0: all rows at once. Not with frame_transfer_s, saturation bloom, traps, "
+        "interpixel_coupling, brighter_fatter_per_e or crosstalk."),
     BST_OBJECT(bst_detector_config, output, output_table, "{}",
                "Where frames are read: at column 0, row 0 first, unless given."),
     BST_REAL(
@@ -177,7 +179,8 @@ const bst_config_desc bst_detector_table[] = {
     BST_OBJECT(bst_detector_config, parallel_traps, traps_table, "{}",
                "Charge-transfer inefficiency along columns, towards the row that is read first."),
     BST_OBJECT(bst_detector_config, serial_traps, traps_table, "{}",
-               "Charge-transfer inefficiency along rows, towards the output."),
+               "Charge-transfer inefficiency along rows, towards the output; not with several "
+               "outputs of crosstalk."),
     BST_REAL(bst_detector_config, em_gain, "", 1, 1e5, "1",
              "Gain of an electron-multiplying register. All charge, read_noise_e and gain_e_per_dn "
              "are those before it; it adds the noise of multiplication."),
@@ -231,15 +234,27 @@ bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d)
             "that expose all rows at once; nor with traps, coupling of pixels, "
             "brighter_fatter_per_e or crosstalk; set one of them to its default");
     }
+    if (bst_detector_has_traps(&d->serial_traps) && d->crosstalk.outputs > 1) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "serial_traps: traps along rows are those of one output, but "
+                        "crosstalk/outputs is %lld; set outputs to 1 or traps_per_px to 0",
+                        (long long)d->crosstalk.outputs);
+    }
     return BST_OK;
 }
 
 bst_status bst_detector_config_check_size(bst_ctx *ctx, const bst_detector_config *d,
                                           int64_t width_px, int64_t height_px) {
-    const bst_detector_edges_config *const edges[] = {&d->shielded, &d->overscan};
-    const char *const names[] = {"shielded", "overscan"};
-    for (int i = 0; i < 2; i++) {
-        int64_t columns = edges[i]->left + edges[i]->right, rows = edges[i]->bottom + edges[i]->top;
+    const bst_detector_edges_config s = d->shielded, o = d->overscan;
+    const bst_detector_edges_config edges[] = {
+        s,
+        o,
+        /* both are counted from the frame's edge on */
+        {s.left > o.left ? s.left : o.left, s.right > o.right ? s.right : o.right,
+         s.bottom > o.bottom ? s.bottom : o.bottom, s.top > o.top ? s.top : o.top}};
+    const char *const names[] = {"shielded", "overscan", "shielded and overscan together"};
+    for (int i = 0; i < 3; i++) {
+        int64_t columns = edges[i].left + edges[i].right, rows = edges[i].bottom + edges[i].top;
         if (columns >= width_px || rows >= height_px) {
             return bst_fail(ctx, BST_ERR_CONFIG,
                             "%s: %lld columns and %lld rows leave nothing of %lld x %lld pixels; "

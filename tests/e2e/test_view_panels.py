@@ -109,6 +109,12 @@ class Server(unittest.TestCase):
         self.assertAlmostEqual(state["snr"] / snr, 1, delta=0.06)
         # a source at the limit has SNR 5 by the law of magnitudes
         self.assertAlmostEqual(sensor["v_mag_at_snr_5"], state["v_mag"] + 2.5 * math.log10(state["snr"] / 5), delta=1e-9)
+        # charge of the read-out and the noise of multiplication count
+        noisy = {"clock_induced_e": 5, "em_gain": 4}
+        more = self.check({**text, "set": {**text["set"], runs.SENSOR + "/camera/detector": noisy}})["figures"]["sensors"][0]
+        self.assertAlmostEqual(more["dark_e"], sensor["dark_e"] + 5, delta=1e-9)
+        read2 = sensor["noise_e"]**2 - sensor["sky_e"] - sensor["dark_e"]
+        self.assertAlmostEqual(more["noise_e"]**2, 1.75 * (more["sky_e"] + more["dark_e"]) + read2, delta=1e-6)
         loops = self.editor.well("loops", text=json.dumps(text))["loops"]
         self.assertEqual(loops, json.loads(runs.call_well("loop", base, "--json", "-", "--set", runs.GENERATOR, "--set", SHORT)))
 

@@ -350,6 +350,67 @@ static void pixels_and_outputs_couple(void **state) {
     assert_frame(f, 1, want);
 }
 
+/* Asserts that a frame's overscan is empty; returns the charge of the frame. */
+static double charge_of(fixture *f, int64_t id, double *frame) {
+    const bst_detector_edges_config *o = &f->camera.detector.overscan;
+    double sum = 0.0;
+    make(f);
+    expose(f, id, frame);
+    for (int i = 0; i < PIXELS; i++) {
+        int x = i % SIDE, y = i / SIDE;
+        bool real = x >= o->left && x < SIDE - o->right && y >= o->bottom && y < SIDE - o->top;
+        assert_true(real || frame[i] == 0.0);
+        sum += frame[i];
+    }
+    return sum;
+}
+
+/* Charge of a star far above the full well, whose borders would move by several pixels, is kept;
+ * neither neighbours nor blooming reach the overscan. */
+static void charge_is_kept_and_stays_out_of_the_overscan(void **state) {
+    static double frame[PIXELS];
+    fixture *f = open_with(state, 5000.0, 0.0);
+    bst_detector_config *d = &f->camera.detector;
+    f->camera.full_well_e = 60000.0;
+    d->saturation = BST_WELL_BLOOM;
+    d->overscan = (bst_detector_edges_config){16, 5, 3, 10};
+    bst_scene_source star = scene_star(&f->camera, 100.3, 90.4, 2.0 * 3e6);
+    f->request.sources = &star;
+    f->request.count = 1;
+    double plain = charge_of(f, 3, frame);
+    d->brighter_fatter_per_e = 5e-6;
+    /* rounding of two frames, 5 sigma; floats of 3e8 e- */
+    double rounding = 5.0 * sqrt(2.0 * PIXELS / 12.0) + 20.0;
+    bst_assert_close(charge_of(f, 3, frame), plain, rounding);
+    d->interpixel_coupling = 0.02;
+    bst_assert_close(charge_of(f, 3, frame), plain, rounding);
+    star = scene_star(&f->camera, 100.3, 175.4, 2.0 * 2e8); /* runs to both ends of its columns */
+    (void)charge_of(f, 3, frame);
+    assert_true(frame[3 * SIDE + 100] > 55000.0 && frame[(SIDE - 11) * SIDE + 100] > 55000.0);
+}
+
+/* What counts is the charge that was collected: traps take some from full pixels and give some to
+ * others. */
+static void saturation_is_that_of_collected_charge(void **state) {
+    static double frame[PIXELS];
+    fixture *f = open_with(state, 900.0, 0.0);
+    bst_detector_config *d = &f->camera.detector;
+    f->camera.full_well_e = 1000.0;
+    for (int well = BST_WELL_CLIP; well <= BST_WELL_BLOOM; well++) {
+        long long found[2];
+        d->saturation = well;
+        for (int traps = 0; traps < 2; traps++) {
+            d->parallel_traps = (bst_detector_traps_config){
+                {traps ? 2.0 : 0.0, 0.0, 0.0}, {5.0, 1.0, 1.0}, 0.5, 1000.0};
+            make(f);
+            expose(f, 6, frame);
+            bst_assert_ok(&f->ctx, bst_renderer_saturated(&f->ctx, f->renderer, &found[traps]));
+        }
+        assert_true(found[0] > 3);
+        assert_int_equal(found[1], found[0]);
+    }
+}
+
 static int ascending(const void *a, const void *b) {
     double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
@@ -401,6 +462,11 @@ static void charge_is_multiplied(void **state) {
     double want = 20000.0 * (2.0 - 1.0 / 4.0) + 1.0 / 12.0;
     bst_assert_close(mean, 20000.0, 4.0 * sqrt(want / PIXELS));
     bst_assert_close(var, want, 4.0 * want * sqrt(2.0 / PIXELS));
+    f->camera.read_noise_e = 3.0;
+    f->camera.dark_current_e_per_s = 10.0;
+    f->camera.detector.clock_induced_e = 2.0;
+    bst_assert_close(bst_camera_dark_e(&f->camera, 0.5), 7.0, 1e-12);
+    bst_assert_close(bst_camera_noise_e(&f->camera, 100.0, 0.5), sqrt(107.0 * 1.75 + 9.0), 1e-12);
 }
 
 static void edges_and_outputs_fit_the_frame(void **state) {
@@ -410,6 +476,12 @@ static void edges_and_outputs_fit_the_frame(void **state) {
     assert_non_null(strstr(f->ctx.message, "shielded: 100 columns and 0 rows leave nothing"));
     d = (bst_detector_config){.overscan = {0, 0, 0, 50}};
     assert_int_equal(bst_detector_config_check_size(&f->ctx, &d, 100, 50), BST_ERR_CONFIG);
+    d = (bst_detector_config){.shielded = {60, 0, 0, 0}, .overscan = {0, 40, 0, 0}};
+    assert_int_equal(bst_detector_config_check_size(&f->ctx, &d, 100, 50), BST_ERR_CONFIG);
+    assert_non_null(strstr(f->ctx.message, "shielded and overscan together: 100 columns"));
+    d.overscan.right = 39;
+    d.overscan.left = 60; /* the same columns */
+    bst_assert_ok(&f->ctx, bst_detector_config_check_size(&f->ctx, &d, 100, 50));
     d = (bst_detector_config){.crosstalk = {3, 0.01, true}};
     assert_int_equal(bst_detector_config_check_size(&f->ctx, &d, 100, 50), BST_ERR_CONFIG);
     assert_non_null(strstr(f->ctx.message, "crosstalk/outputs: 3 outputs"));
@@ -418,6 +490,11 @@ static void edges_and_outputs_fit_the_frame(void **state) {
     d = (bst_detector_config){.row_time_s = 1e-4, .parallel_traps = {{1.0}, {1.0}, 0.5}};
     assert_int_equal(bst_detector_config_check(&f->ctx, &d), BST_ERR_CONFIG);
     assert_non_null(strstr(f->ctx.message, "traps"));
+    d = (bst_detector_config){.serial_traps = {{1.0}, {1.0}, 0.5}, .crosstalk = {2, 0.0, true}};
+    assert_int_equal(bst_detector_config_check(&f->ctx, &d), BST_ERR_CONFIG);
+    assert_non_null(strstr(f->ctx.message, "serial_traps"));
+    d.crosstalk.outputs = 1;
+    bst_assert_ok(&f->ctx, bst_detector_config_check(&f->ctx, &d));
 }
 
 static int open_device(void **state) {
@@ -441,6 +518,8 @@ int main(void) {
         cmocka_unit_test(rows_have_flicker_noise),
         cmocka_unit_test(traps_defer_charge),
         cmocka_unit_test(pixels_and_outputs_couple),
+        cmocka_unit_test(charge_is_kept_and_stays_out_of_the_overscan),
+        cmocka_unit_test(saturation_is_that_of_collected_charge),
         cmocka_unit_test(charge_is_multiplied),
         cmocka_unit_test(edges_and_outputs_fit_the_frame),
     };

@@ -42,8 +42,8 @@ static bst_status find_noise(bst_ctx *ctx, const bst_camera *c, double exposure_
     double sharpness;
     out->exposure_s = exposure_s;
     out->sky_e = bst_camera_background_e_per_s(c) * exposure_s;
-    out->dark_e = bst_camera_dark_e_per_s(c) * exposure_s;
-    out->noise_e = sqrt(out->sky_e + out->dark_e + c->read_noise_e * c->read_noise_e);
+    out->dark_e = bst_camera_dark_e(c, exposure_s);
+    out->noise_e = bst_camera_noise_e(c, out->sky_e, exposure_s);
     BST_TRY(bst_psf_create(ctx, c, &psf));
     out->fwhm_px = bst_psf_equivalent_fwhm_px(psf, bst_camera_centre_x(c), bst_camera_centre_y(c));
     bst_psf_free(psf);

@@ -40,7 +40,9 @@ static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_eval_match_
                                     .dy_px = place->dy_px,
                                     .sigma_px = s->sigma_px,
                                     .flux_e = target->flux_e};
-    bst_eval_bound_noise noise = {target->noise_e, true};
+    /* multiplication enlarges all variances, own light included, by one factor */
+    double excess = bst_camera_excess_noise(&s->camera);
+    bst_eval_bound_noise noise = {target->noise_e / sqrt(excess), true};
     bst_location_bound bound;
     double along[2];
     if (s->image) {
@@ -51,7 +53,8 @@ static bst_status add_bound(bst_ctx *ctx, const runner *r, const bst_eval_match_
     bst_location_bound_along(&bound, place->dx_px, place->dy_px, along);
     /* the mean of n frames has 1 / n of the variance; the position at their end also has that of
      * the rate, 3 (n - 1) / (n + 1) of it */
-    double n = bst_pd_scene_stacked(s), share = 1.0 / n, end = (4.0 * n - 2.0) / (n * (n + 1.0));
+    double n = bst_pd_scene_stacked(s), share = excess / n,
+           end = excess * (4.0 * n - 2.0) / (n * (n + 1.0));
     tally->bound_square[0] += end * along[0];
     tally->bound_square[1] += end * along[1];
     tally->flux_bound_square += share * bound.covariance[BST_BOUND_FLUX][BST_BOUND_FLUX] /

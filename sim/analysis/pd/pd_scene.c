@@ -64,7 +64,7 @@ static bst_status read_psf(bst_ctx *ctx, bst_pd_scene *s) {
 /* Noise of a pixel without source. */
 static double noise_at(const bst_pd_scene *s, double x_px, double y_px) {
     double sky_e = s->sky ? bst_pd_sky_e(s->sky, x_px, y_px) : s->sky_e;
-    return sqrt(sky_e + s->dark_e + s->camera.read_noise_e * s->camera.read_noise_e);
+    return bst_camera_noise_e(&s->camera, sky_e, s->exposure_s);
 }
 
 /* Evaluates the scenario's sky for its level at the boresight. */
@@ -112,7 +112,7 @@ static bst_status set_camera(bst_ctx *ctx, bst_pd_scene *s) {
     }
     s->sky_e = s->options.background_e >= 0.0 ? s->options.background_e
                                               : bst_camera_background_e_per_s(c) * s->exposure_s;
-    s->dark_e = bst_camera_dark_e_per_s(c) * s->exposure_s;
+    s->dark_e = bst_camera_dark_e(c, s->exposure_s);
     if (s->options.stars) {
         BST_TRY(open_sky(ctx, s));
     }
@@ -478,15 +478,16 @@ bst_status bst_pd_scene_set(bst_ctx *ctx, bst_pd_scene *s, int64_t number, bool 
         BST_TRY(add_stars(ctx, s, stars, count, drawn, f));
     }
     const struct bst_skylight_map *map = s->sky ? bst_pd_sky_map(s->sky) : NULL;
+    double dark_e = s->dark_e - bst_camera_readout_e(&s->camera); /* the detector adds that */
     double sky_e = map ? 0.0 : s->sky ? bst_pd_sky_e(s->sky, 0.0, 0.0) : s->sky_e;
     f->request = (bst_render_request){
         .window = {0, 0, (int)s->camera.width_px, (int)s->camera.height_px},
         .track = &f->track,
         .sources = f->sources,
         .count = drawn + count,
-        .background_e = sky_e + s->dark_e,
+        .background_e = sky_e + dark_e,
         .background = map,
-        .dark_e = s->dark_e,
+        .dark_e = dark_e,
         .key =
             bst_rng_make_key(seed, run, s->name, targets ? "pd noise" : "pd noise without targets"),
         .exposure_id = number};

@@ -317,7 +317,7 @@ static void fill_header(const bst_field *field, const query *q, bst_truth *truth
     truth->boresight_x_px = bst_camera_centre_x(camera);
     truth->boresight_y_px = bst_camera_centre_y(camera);
     truth->background_e = bst_camera_background_e_per_s(camera) * q->exposure_s;
-    truth->dark_e = bst_camera_dark_e_per_s(camera) * q->exposure_s + bst_camera_readout_e(camera);
+    truth->dark_e = bst_camera_dark_e(camera, q->exposure_s);
 }
 
 /* Computes the cone of directions that contains the window. */
