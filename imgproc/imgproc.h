@@ -160,7 +160,8 @@ const struct bst_pixel_shows *bst_imgproc_shows(const bst_imgproc *ip);
 
 /* Fits detection `index` of the latest bst_imgproc_detect if only the matched filter located it
  * (see max_fits). All its fields but label, label_probability and star_id are updated; the
- * magnitude uses zero_point. Detections in windows are always fitted. */
+ * magnitude uses zero_point. One whose fit fails, shows no light but that of charge, or grows into
+ * a streak that is detected already stays as it is. Detections in windows are always fitted. */
 void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index,
                         const bst_optics_zero_point *zero_point);
 

@@ -552,12 +552,11 @@ void bst_imgproc_refine(bst_imgproc *ip, bst_detections *detections, int index,
     if (ip->windowed || ip->followed_sigma_e > 0.0) {
         return;
     }
-    const bst_imgproc_found *found = &ip->locator.found[ip->order[index]];
-    if (!found->rough) {
+    int source = ip->order[index];
+    if (!bst_locate_again(&ip->locator, &ip->view, source)) {
         return;
     }
-    bst_locate_again(&ip->locator, &ip->view, ip->order[index]);
-    bst_detection fitted = report(ip, &ip->view, found), before = *item;
+    bst_detection fitted = report(ip, &ip->view, &ip->locator.found[source]), before = *item;
     bst_photometry_correct(zero_point, &fitted);
     fitted.label = before.label;
     fitted.label_probability = before.label_probability;

@@ -503,23 +503,8 @@ void bst_locate(bst_imgproc_locator *l, const bst_locate_frame *f,
     process_group(l, f, 0, l->count, finish_source);
 }
 
-void bst_locate_again(bst_imgproc_locator *l, const bst_locate_frame *f, int i) {
-    assert(l && f && i >= 0 && i < l->count);
-    bst_imgproc_worker w = {l, f, &l->fits[0]};
-    bst_imgproc_found found = l->found[i];
-    if (!found.rough || found.dropped) {
-        return;
-    }
-    found.rough = false;
-    found.flags = 0;
-    first_fit(&w, i, &found);
-    if (found.source.fitted) {
-        finish_source(&w, i, &found);
-        l->found[i] = found;
-    }
-}
-
-/* True if two streaks are fits of the same light: one line, and more than half of it shared. */
+/* True if two streaks are fits of the same light: one line, of which they share more
+ * than half of the shorter one. */
 static bool is_same_streak(const bst_locate_frame *f, const bst_imgproc_shape *a,
                            const bst_imgproc_shape *b) {
     double length = fmax(hypot(a->dx_px, a->dy_px), 1e-6);
@@ -529,7 +514,43 @@ static bool is_same_streak(const bst_locate_frame *f, const bst_imgproc_shape *a
     double along = fabs(c * ex + s * ey);
     /* two lines within the FWHM are one to the fit */
     double apart = BST_FWHM_PER_SIGMA * f->sigma_px;
-    return along < 0.5 * fmin(length, hypot(b->dx_px, b->dy_px)) && across < apart && end < apart;
+    /* they share (length + other) / 2 - along, more than half of the shorter one */
+    double longer = fmax(length, hypot(b->dx_px, b->dy_px));
+    return along < 0.5 * longer && across < apart && end < apart;
+}
+
+/* True if another source of the frame is a streak of the same light. */
+static bool is_found_already(const bst_imgproc_locator *l, const bst_locate_frame *f, int i,
+                             const bst_imgproc_shape *streak) {
+    for (int k = 0; k < l->count; k++) {
+        const bst_imgproc_found *o = &l->found[k];
+        if (k != i && o->streak && !o->dropped && is_same_streak(f, &o->source.shape, streak)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+bool bst_locate_again(bst_imgproc_locator *l, const bst_locate_frame *f, int i) {
+    assert(l && f && i >= 0 && i < l->count);
+    bst_imgproc_worker w = {l, f, &l->fits[0]};
+    bst_imgproc_found found = l->found[i];
+    if (!found.rough || found.dropped) {
+        return false;
+    }
+    found.rough = false;
+    found.flags = 0;
+    first_fit(&w, i, &found);
+    if (!found.source.fitted) {
+        return false;
+    }
+    finish_source(&w, i, &found);
+    /* streaks were joined before: this one would be a second detection of one */
+    if (found.dropped || (found.own_streak && is_found_already(l, f, i, &found.source.shape))) {
+        return false;
+    }
+    l->found[i] = found;
+    return true;
 }
 
 void bst_locate_join_streaks(bst_imgproc_locator *l, const bst_locate_frame *f) {

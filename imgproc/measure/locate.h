@@ -151,8 +151,12 @@ void bst_locate_prepare(bst_imgproc_locator *locator, const bst_locate_frame *fr
  * which joins most of them with a fit of its own. */
 void bst_locate_join_streaks(bst_imgproc_locator *locator, const bst_locate_frame *frame);
 
-/* Fits source i of the latest frame if only the matched filter located it. */
-void bst_locate_again(bst_imgproc_locator *locator, const bst_locate_frame *frame, int i);
+/* Fits source i of the latest frame if only the matched filter located it. The source stays as it
+ * is if the fit fails, shows no light but that of charge, or grows into a streak that is found
+ * already.
+ *
+ * Returned:  whether the source is now the fitted one */
+bool bst_locate_again(bst_imgproc_locator *locator, const bst_locate_frame *frame, int i);
 
 /* Locates candidates without fits: at the filter's maximum, to a pixel, with the filter's flux. For
  * frames in which stars moved further than is modelled. */

@@ -112,7 +112,7 @@ static inline void add_in_row(const row *r, const double x[2], const double y[2]
         add_right(r, -1, 0.5 * (y[0] + y[1]), y[1] - y[0], light * (y[1] - y[0]));
         return;
     }
-    int first = (int)low;
+    int first = low > 0.0 ? (int)low : 0; /* low is of any size below 0 */
     if (low >= 0.0 && high < first + 1.0) {
         add_part(r, first, x[0] - first - 0.5, y[0], x[1] - first - 0.5, y[1], light);
         return;
@@ -164,7 +164,9 @@ void bst_area_sums_expect(const bst_area_sums *s, bst_point2 a, bst_point2 b) {
 #if defined(__GNUC__)
     double low = a.y < b.y ? a.y : b.y, high = a.y < b.y ? b.y : a.y;
     double slope = high > low ? (b.x - a.x) / (b.y - a.y) : 0.0;
-    int first = low > 0.0 ? (int)low : 0, end = high < s->height ? (int)high + 1 : s->height;
+    /* as double: an edge of a body nearby may be further away than an int reaches */
+    int first = (int)fmin(fmax(low, 0.0), s->height);
+    int end = (int)fmin(fmax(high + 1.0, 0.0), s->height);
     for (int j = first; j < end; j++) {
         double x = a.x + (j + 0.5 - a.y) * slope;
         if (x > 0.0 && x < s->width) {

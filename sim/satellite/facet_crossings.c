@@ -127,38 +127,47 @@ static side side_of(const bst_facet_net *net, int plane, int facet) {
                                             : ON_BOTH_SIDES;
 }
 
-/* True if a place in its plane is within a facet. */
-static bool is_within(const bst_facet_net *net, int facet, bst_vec3 p) {
-    double same = SAME * net->satellite->radius_m;
-    int first = net->first[facet], end = net->first[facet + 1];
-    for (int i = first; i < end; i++) {
-        bst_vec3 a = corner_of(net, i),
-                 along = bst_vec3_sub(corner_of(net, i + 1 < end ? i + 1 : first), a);
-        bst_vec3 in = bst_vec3_cross(net->satellite->facets[facet].normal, along);
-        if (bst_vec3_dot(in, bst_vec3_sub(p, a)) < -same * bst_vec3_norm(along)) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* True if an edge of a facet goes through another one; edges at a common vertex do not. */
-static bool goes_through(const bst_facet_net *net, int facet, int other) {
-    int first = net->first[facet], end = net->first[facet + 1];
-    for (int i = first; i < end; i++) {
-        bst_vec3 a = corner_of(net, i), b = corner_of(net, i + 1 < end ? i + 1 : first);
-        double from = height_of(net, other, a), to = height_of(net, other, b);
-        bool common = false;
-        for (int k = net->first[other]; k < net->first[other + 1]; k++) {
-            common = common || net->corner[k] == net->corner[i] ||
-                     net->corner[k] == net->corner[i + 1 < end ? i + 1 : first];
-        }
-        if (!common && from * to < 0.0 &&
-            is_within(net, other, bst_vec3_axpy(a, from / (from - to), bst_vec3_sub(b, a)))) {
+static bool has_corner(const bst_facet_net *net, int facet, int corner) {
+    for (int i = net->first[facet]; i < net->first[facet + 1]; i++) {
+        if (net->corner[i] == net->corner[corner]) {
             return true;
         }
     }
     return false;
+}
+
+/* The part of a convex facet within the plane of another one: from where to where on the line of
+ * both planes, m. A corner of both is in the plane exactly; one on the plane counts as above it, so
+ * that the border changes sides twice. */
+static void span_in_plane(const bst_facet_net *net, int plane, int facet, bst_vec3 line,
+                          double span[2]) {
+    int first = net->first[facet], end = net->first[facet + 1];
+    span[0] = INFINITY;
+    span[1] = -INFINITY;
+    bst_vec3 a = corner_of(net, end - 1);
+    double from = has_corner(net, plane, end - 1) ? 0.0 : height_of(net, plane, a);
+    for (int i = first; i < end; i++) {
+        bst_vec3 b = corner_of(net, i);
+        double to = has_corner(net, plane, i) ? 0.0 : height_of(net, plane, b);
+        if ((from < 0.0) != (to < 0.0)) {
+            bst_vec3 at = bst_vec3_axpy(a, from / (from - to), bst_vec3_sub(b, a));
+            span[0] = fmin(span[0], bst_vec3_dot(line, at));
+            span[1] = fmax(span[1], bst_vec3_dot(line, at));
+        }
+        a = b;
+        from = to;
+    }
+}
+
+/* True if two facets, each on both sides of the other's plane, share a part of the line of both
+ * planes (Moeller 1997, J. Graphics Tools 2(2), 25). A common corner alone is none. */
+static bool share_a_line(const bst_facet_net *net, int f, int g) {
+    const bst_facet *facets = net->satellite->facets;
+    bst_vec3 line = bst_vec3_unit(bst_vec3_cross(facets[f].normal, facets[g].normal));
+    double of_f[2], of_g[2];
+    span_in_plane(net, g, f, line, of_f);
+    span_in_plane(net, f, g, line, of_g);
+    return fmin(of_f[1], of_g[1]) - fmax(of_f[0], of_g[0]) > SAME * net->satellite->radius_m;
 }
 
 /* True if two facets may cross, or lie in one plane. */
@@ -167,8 +176,7 @@ static bool may_cross(const bst_facet_net *net, int f, int g) {
     if (of_g != ON_BOTH_SIDES) {
         return of_g == IN_THE_PLANE;
     }
-    return side_of(net, g, f) == ON_BOTH_SIDES &&
-           (goes_through(net, f, g) || goes_through(net, g, f));
+    return side_of(net, g, f) == ON_BOTH_SIDES && share_a_line(net, f, g);
 }
 
 static bool boxes_meet(const box *a, const box *b) {

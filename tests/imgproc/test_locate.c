@@ -2,6 +2,7 @@
  * windows, frames that are not square. */
 #include <stdlib.h>
 
+#include "imgproc/measure/locate.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 
@@ -206,6 +207,38 @@ static void saturated_pixels_within_the_light(void **state) {
     }
 }
 
+/* Streaks on one line are one if they share more than half of the shorter one: a streak of 40 px
+ * about the origin and one of 10 px share half of it with the middles 20 px apart, two of 40 px
+ * with those 20 px apart too; one of 10 and one of 20 px with those 10 px apart. */
+static void streaks_of_the_same_light(void **state) {
+    (void)state;
+    static const struct {
+        double first_px, second_px, along_px, across_px;
+        bool same;
+    } of[] = {{40, 10, 19.9, 0, true},  {40, 10, 20.1, 0, false}, {10, 40, 19.9, 0, true},
+              {10, 40, 20.1, 0, false}, {40, 40, 19.9, 0, true},  {40, 40, 20.1, 0, false},
+              {20, 10, 9.9, 0, true},   {20, 10, 10.1, 0, false}, {40, 10, 10, 3, false}};
+    for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+        bst_imgproc_found found[2] = {{.streak = true, .own_streak = true},
+                                      {.streak = true, .own_streak = true}};
+        /* along (3, 4) / 5 */
+        found[0].source.shape = (bst_imgproc_shape){
+            .x_px = 50, .y_px = 50, .dx_px = 0.6 * of[i].first_px, .dy_px = 0.8 * of[i].first_px};
+        found[1].source.shape =
+            (bst_imgproc_shape){.x_px = 50 + 0.6 * of[i].along_px - 0.8 * of[i].across_px,
+                                .y_px = 50 + 0.8 * of[i].along_px + 0.6 * of[i].across_px,
+                                .dx_px = -0.6 * of[i].second_px,
+                                .dy_px = -0.8 * of[i].second_px};
+        bst_imgproc_locator locator = {.found = found, .count = 2};
+        bst_locate_frame frame = {.sigma_px = 1.0};
+        bst_locate_join_streaks(&locator, &frame);
+        assert_false(found[0].dropped);
+        if (found[1].dropped != of[i].same) {
+            fail_msg("streaks %zu: %s", i, of[i].same ? "two" : "one");
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(edges_in_x_and_y),
@@ -213,6 +246,7 @@ int main(void) {
         cmocka_unit_test(what_lies_outside_is_known_to_a_pixel),
         cmocka_unit_test(binned_window_of_streaks),
         cmocka_unit_test(saturated_pixels_within_the_light),
+        cmocka_unit_test(streaks_of_the_same_light),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

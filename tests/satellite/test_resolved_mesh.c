@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "sim/satellite/facet_net.h"
 #include "sim/satellite/resolved_image.h"
 #include "tests/satellite/satellite_support.h"
 
@@ -131,6 +132,99 @@ static void test_facets_through_others(void **state) {
     bst_satellite_free(satellite);
 }
 
+/* Two facets: the corners of each, m. */
+typedef struct two_facets {
+    int count[2];
+    bst_vec3 p[8];
+    bool apart;
+} two_facets;
+
+static bool are_apart(const two_facets *t) {
+    bst_ctx ctx = {0};
+    bst_facet_net net;
+    bst_vec3 vertices[8];
+    int joint[8], corner[8], first[2] = {0, t->count[0]};
+    bst_facet facets[2];
+    bst_satellite s = {.vertices = vertices,
+                       .vertex_joint = joint,
+                       .corner = corner,
+                       .facets = facets,
+                       .vertex_count = t->count[0] + t->count[1],
+                       .corner_count = t->count[0] + t->count[1],
+                       .facet_count = 2,
+                       .radius_m = 5.0};
+    for (int i = 0; i < s.vertex_count; i++) {
+        vertices[i] = t->p[i];
+        corner[i] = i;
+        joint[i] = -1;
+    }
+    for (int f = 0; f < 2; f++) {
+        const bst_vec3 *p = &t->p[first[f]];
+        facets[f] = (bst_facet){.first = first[f], .count = t->count[f], .joint = -1};
+        facets[f].normal =
+            bst_vec3_unit(bst_vec3_cross(bst_vec3_sub(p[1], p[0]), bst_vec3_sub(p[2], p[1])));
+    }
+    bst_assert_ok(&ctx, bst_facet_net_make(&ctx, &s, &net));
+    bool apart[2] = {net.apart[0], net.apart[1]};
+    bst_facet_net_free(&net);
+    assert_int_equal(apart[0], apart[1]);
+    return apart[0];
+}
+
+/* Facets that go through each other, also where they do so from corner to corner: no edge goes
+ * through a facet between its ends. Those that only touch, or whose planes cross beside them, are
+ * apart. */
+static void test_crossing_facets(void **state) {
+    (void)state;
+    static const two_facets of[] = {
+        /* a diamond through a panel that holds two of its corners, or one, or none */
+        {{4, 4},
+         {{1, 0, 0},
+          {0, 0, 1},
+          {-1, 0, 0},
+          {0, 0, -3},
+          {3, 3, 0},
+          {-3, 3, 0},
+          {-3, -3, 0},
+          {3, -3, 0}},
+         false},
+        {{4, 4},
+         {{1, 0, 0},
+          {0, 0, 1},
+          {-1, 0, 0},
+          {0, 0, -3},
+          {3, 3, 0},
+          {0, 3, 0},
+          {0, -3, 0},
+          {3, -3, 0}},
+         false},
+        {{4, 4},
+         {{3, 0, 0},
+          {0, 0, 1},
+          {-3, 0, 0},
+          {0, 0, -3},
+          {1, 1, 0},
+          {-1, 1, 0},
+          {-1, -1, 0},
+          {1, -1, 0}},
+         false},
+        /* triangles that share the line between a corner of each */
+        {{3, 3}, {{0, 0, 0}, {2, 0, -1}, {2, 0, 1}, {1, 0, 0}, {-1, 1, 0}, {-1, -1, 0}}, false},
+        /* from a common corner along the same line */
+        {{3, 3}, {{0, 0, 0}, {2, 0, -1}, {2, 0, 1}, {0, 0, 0}, {1, -1, 0}, {1, 1, 0}}, false},
+        /* to opposite sides of a common corner, and of two beside each other */
+        {{3, 3}, {{0, 0, 0}, {2, 0, -1}, {2, 0, 1}, {0, 0, 0}, {-1, 1, 0}, {-1, -1, 0}}, true},
+        {{3, 3}, {{1, 0, 0}, {2, 0, -1}, {2, 0, 1}, {0, 0, 0}, {-1, 1, 0}, {-1, -1, 0}}, true},
+        /* a panel on a panel */
+        {{3, 3}, {{0, 0, 0}, {2, 0, 0}, {2, 0, 1}, {3, 3, 0}, {-3, 3, 0}, {-3, -3, 0}}, true},
+    };
+    for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+        if (are_apart(&of[i]) != of[i].apart) {
+            fail_msg("facets %zu: found %s", i, of[i].apart ? "crossing" : "apart");
+        }
+    }
+}
+
 /* Edges between facets of almost the same light change light and first moments not at all, second
  * ones by 0.016 of the difference of their light at most, which is a tenth of it. */
 static void test_faint_edges(void **state) {
@@ -164,8 +258,8 @@ static void test_faint_edges(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bumps),
-                                       cmocka_unit_test(test_facets_through_others),
-                                       cmocka_unit_test(test_faint_edges)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_bumps), cmocka_unit_test(test_facets_through_others),
+        cmocka_unit_test(test_crossing_facets), cmocka_unit_test(test_faint_edges)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
