@@ -147,8 +147,9 @@ static void archive_own_cue(bst_knowledge_view *view, bst_archive *archive) {
     bst_quat error = own_error;
     BST_ARCHIVE(archive, object);
     BST_ARCHIVE(archive, error);
-    view->cue_changed = object != own || memcmp(&error, &own_error, sizeof error) != 0;
-    if (view->cue_changed) {
+    bst_archive_bool(archive, &view->cue_changed);
+    if (object != own || memcmp(&error, &own_error, sizeof error) != 0) {
+        view->cue_changed = true;
         view->any_checked = false;
         memset(view->knots, 0, sizeof view->knots);
     }
