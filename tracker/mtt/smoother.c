@@ -156,18 +156,19 @@ static void extend_chains(bst_smoother *s, int64_t frame, const bst_mtt *mtt) {
 
 /* Smoothed state of a chain in a frame, from its last one backwards. */
 static void smooth_chain(const bst_smoother *s, const chain *c, int64_t frame, bst_smoothed *out) {
-    int64_t frames = s->lag + 1;
+    int64_t frames = s->lag + 1, from = c->last;
     bst_sky_state state = entry_of(s, c, c->last)->state;
     for (int64_t f = c->last - 1; f >= frame; f--) {
         bst_sky_state next = state;
         double dt = s->info[(f + 1) % frames].seconds - s->info[f % frames].seconds;
-        /* if that fails, the later frames do not count */
-        (void)bst_sky_smooth(&entry_of(s, c, f)->state, dt, &entry_of(s, c, f + 1)->prior, &next,
-                             &state);
+        if (!bst_sky_smooth(&entry_of(s, c, f)->state, dt, &entry_of(s, c, f + 1)->prior, &next,
+                            &state)) {
+            from = f; /* the later frames do not count */
+        }
     }
     *out = (bst_smoothed){.id = c->id,
                           .status = (bst_track_status)entry_of(s, c, frame)->status,
-                          .later_frames = (int)(c->last - frame),
+                          .later_frames = (int)(from - frame),
                           .state = state};
 }
 
