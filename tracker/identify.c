@@ -34,13 +34,19 @@ static bool any_track(const bst_mtt_track *tracks, int count) {
     return any;
 }
 
-/* Compares all tracks with the catalogue and the cue. */
+/* True if the cue names an object of the catalogue, whose rivals the other objects are. What a cue
+ * without an object means may be any of them: then none is a rival. */
+static bool is_named(const bst_tracker_input *input, const bst_target_cue *cue) {
+    return cue->valid && !cue->in_region && input->cue_object >= 0;
+}
+
+/* Compares all tracks with the catalogue; the cue stands for the object that it names. */
 static void compare(bst_tracker *t, const bst_tracker_input *input, bst_vec3 boresight,
                     const bst_target_cue *cue) {
     bst_identity_object objects[BST_IDENTITY_OBJECTS];
     int count = 0, tracks;
-    if (cue->valid && !cue->in_region) {
-        objects[count++] = (bst_identity_object){.object = cue->object,
+    if (is_named(input, cue)) {
+        objects[count++] = (bst_identity_object){.object = input->cue_object,
                                                  .direction = cue->direction,
                                                  .rate_radps = cue->rate_radps,
                                                  .sigma_rad = cue->sigma_rad,
@@ -63,17 +69,16 @@ void bst_tracker_identify(bst_tracker *t, const bst_tracker_input *input, bool u
     const bst_mtt_track *tracks = bst_mtt_tracks(t->mtt, &count);
     bool undecided = t->target.id == 0 || t->target.ambiguous;
     bool due = undecided || seconds - t->identified_s >= t->identity_period_s;
-    cue->object = input->cue_object >= 0 ? input->cue_object : BST_IDENTITY_CUE;
     t->identified = usable && due && any_track(tracks, count);
     if (t->identified) {
         compare(t, input, frame->boresight, cue);
         t->identified_s = seconds;
     }
-    if (cue->valid && !cue->in_region && seconds - t->identified_s < t->identity_period_s) {
+    if (is_named(input, cue) && seconds - t->identified_s < t->identity_period_s) {
         const bst_identity_params *p = &t->identity_params;
-        const bst_mtt_track bright = {.v_mag = cue->v_mag};
+        cue->object = input->cue_object;
         cue->identity = t->identity;
-        cue->unseen_weight = (1.0 - p->detection_probability) / p->detection_probability *
-                             p->unknown_density / bst_identity_scale(cue, &bright);
+        cue->unseen_density =
+            (1.0 - p->detection_probability) / p->detection_probability * p->unknown_density;
     }
 }

@@ -7,14 +7,12 @@
 /* Most objects and tracks of one comparison. */
 #define BST_IDENTITY_OBJECTS 64
 #define BST_IDENTITY_TRACKS 64
-/* Index of the cue's object among the objects when it is not in the catalogue. */
-#define BST_IDENTITY_CUE (-2)
 /* Index of objects that the catalogue lacks. */
 #define BST_IDENTITY_UNKNOWN (-1)
 
 /* An object that a track may be of, as predicted on board. */
 typedef struct bst_identity_object {
-    int32_t object; /* index in the catalogue, or BST_IDENTITY_CUE */
+    int32_t object; /* index in the catalogue */
     bst_vec3 direction, rate_radps;
     double sigma_rad, rate_sigma_radps; /* 1 sigma per axis */
     double v_mag, v_mag_sigma;          /* sigma INFINITY: brightness unknown */

@@ -242,7 +242,7 @@ static void the_target_is_what_nothing_else_explains(void **unused) {
     bst_identity_match(&p, tracks, 2, objects, 2, &identity);
     cue.identity = &identity;
     cue.object = 5;
-    cue.unseen_weight = p.unknown_density / 9.0 / bst_identity_scale(&cue, &tracks[0]);
+    cue.unseen_density = p.unknown_density / 9.0;
     bst_target by_catalogue = {.id = 0};
     bst_target_step(&by_catalogue, &choice, &cue, 1.0, tracks, 2);
     assert_int_equal(by_catalogue.id, 1);
