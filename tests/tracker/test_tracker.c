@@ -404,11 +404,12 @@ typedef struct catalogued {
 } catalogued;
 
 /* The catalogue: the target alone, where it is. */
-static int find_target(void *user, bst_vec3 axis, double half_angle_rad, bst_identity_object *out,
-                       int room) {
+static int find_target(void *user, const bst_tracker_search *search, bst_identity_object *out,
+                       int room, int *left_out) {
     const catalogued *c = user;
     bst_vec3 direction = target_direction(c->w, c->t, false);
-    assert_true(room >= 1 && bst_vec3_angle(axis, direction) < half_angle_rad);
+    assert_true(room >= 1 && bst_vec3_angle(search->axis, direction) < search->half_angle_rad);
+    *left_out = 0;
     out[0] = (bst_identity_object){.object = 4,
                                    .direction = direction,
                                    .rate_radps = target_rate(c->w, c->t, false),

@@ -81,7 +81,7 @@ static bool is_intact(const bst_smoother *s, const chain *c) {
     return intact || c->id == 0;
 }
 
-bst_status bst_smoother_archive(bst_smoother *s, bst_archive *archive) {
+static bst_status archive_chains(bst_smoother *s, bst_archive *archive) {
     size_t frames = (size_t)s->lag + 1;
     s->frames = bst_archive_integer(archive, s->frames, 0, INT64_MAX / 2);
     bst_archive_bytes(archive, s->info, frames * sizeof *s->info);
@@ -100,6 +100,22 @@ bst_status bst_smoother_archive(bst_smoother *s, bst_archive *archive) {
         s->count = s->lost = 0;
     }
     return BST_OK;
+}
+
+bst_status bst_smoother_archive(bst_smoother *s, int tracks, bst_archive *archive) {
+    int lag = s ? s->lag : 0;
+    int saved_lag = (int)bst_archive_integer(archive, lag, 0, BST_SMOOTHER_MAX_LAG);
+    if (saved_lag == 0) {
+        return BST_OK;
+    }
+    if (s && saved_lag == lag) {
+        return archive_chains(s, archive);
+    }
+    bst_smoother *dropped;
+    BST_TRY(bst_smoother_create(bst_archive_ctx(archive), tracks, saved_lag, &dropped));
+    bst_status status = archive_chains(dropped, archive);
+    bst_smoother_free(dropped);
+    return status;
 }
 
 /* Chain to which a frame of a track belongs; NULL: there is no room.
