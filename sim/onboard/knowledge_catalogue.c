@@ -65,15 +65,6 @@ bst_status bst_knowledge_near(bst_ctx *ctx, bst_knowledge_view *view, double sec
     return BST_OK;
 }
 
-int bst_knowledge_cue_object(const bst_knowledge_view *view) {
-    const world_sensor *sensor = &view->knowledge->world->observers[view->knowledge->observer]
-                                      .sensors[view->knowledge->sensor];
-    if (view->tasked) {
-        return view->task.object;
-    }
-    return sensor->config.cue.region.kind == BST_REGION_NONE ? sensor->cue_object : -1;
-}
-
 bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                 bst_world_state *eye, bst_bodies *bodies) {
     double t;
