@@ -21,8 +21,8 @@ typedef struct bst_target_params {
     int min_hits;
     double margin;   /* log-likelihood margin of the best candidate over the second ... */
     int margin_hits; /* ... unless it has this many hits */
-    double
-        max_dormant_s; /* time for which a lost target's prediction restricts the next choice, s */
+    /* time for which a lost target's prediction restricts the next choice, s */
+    double max_dormant_s;
     double dormant_gate_chi2;    /* its largest misfit, 4 degrees of freedom */
     double memory_noise_rad2ps3; /* power spectral density of the acceleration of a lost target */
 } bst_target_params;
