@@ -32,8 +32,7 @@ const bst_config_desc bst_control_config_table[] = {
              "second and back; negative: from the second end on."),
     BST_ENUM(C, attitude, attitudes, "\"telemetry\"",
              "Attitude at the start. unknown: mode lost until the tracker has an attitude from "
-             "stars; with "
-             "imgproc/attitude unknown."),
+             "stars; with imgproc/attitude unknown."),
     BST_INT(C, lost_after_frames, "frames", 0, 1000000, "0",
             "After so many frames in a row without an attitude from stars, with the servo settled, "
             "the mode is lost until there is one again; 0: never."),

@@ -397,7 +397,8 @@ static void set_attitude(const obsgen *o, struct bst_step *step, const bst_expos
         out->q_cam_from_gcrf = bst_quat_unit(bst_quat_mul(error, motion.q_cam_from_gcrf));
     }
     if (bst_obsgen_lost_enabled(&o->lost)) {
-        /* the tracker's correction is one of small angles */
+        /* the tracker's correction is one of small angles; the error is one of the inertial axes:
+         * on the right */
         *locked = *oriented && o->lost.known;
         out->q_cam_from_gcrf =
             *locked ? bst_quat_unit(bst_quat_mul(motion.q_cam_from_gcrf, o->lost.error))

@@ -12,7 +12,8 @@ struct bst_tracker_catalogue {
     double sigma_m, sigma_mps, mag_sigma;
     double seconds;
     int32_t cue_object;
-    int *near; /* [number of objects] */
+    bool failed; /* the latest search */
+    int *near;   /* [number of objects] */
 };
 
 static void lay_out(bst_tracker_catalogue *c) {
@@ -54,6 +55,7 @@ void bst_tracker_catalogue_free(bst_tracker_catalogue *c) {
 
 int32_t bst_tracker_catalogue_set(bst_tracker_catalogue *c, double seconds) {
     c->seconds = seconds;
+    c->failed = false;
     c->cue_object = bst_knowledge_cue_object(c->view);
     return c->cue_object;
 }
@@ -82,21 +84,55 @@ static bool predict(const bst_tracker_catalogue *c, int object, bst_identity_obj
     return !now->occulted && now->sunlit_fraction > 0.0;
 }
 
-int bst_tracker_catalogue_near(void *user, bst_vec3 axis, double half_angle_rad,
-                               bst_identity_object *out, int room) {
+/* Angle of a direction to the nearest track of a search, without any to its axis. */
+static double nearness(const bst_tracker_search *search, bst_vec3 direction) {
+    double least = search->track_count > 0 ? INFINITY : bst_vec3_angle(direction, search->axis);
+    for (int i = 0; i < search->track_count; i++) {
+        least = fmin(least, bst_vec3_angle(direction, search->tracks[i]));
+    }
+    return least;
+}
+
+int bst_tracker_catalogue_near(void *user, const bst_tracker_search *search,
+                               bst_identity_object *out, int room, int *left_out) {
     bst_tracker_catalogue *c = user;
+    assert(room >= 1 && room <= BST_IDENTITY_OBJECTS);
+    double off[BST_IDENTITY_OBJECTS];
     int near = 0, count = 0;
     bst_ctx quiet = {0};
-    if (bst_knowledge_near(&quiet, c->view, c->seconds, axis, half_angle_rad, c->near, &near) !=
-        BST_OK) {
-        return 0;
+    *left_out = 0;
+    c->failed = bst_knowledge_near(&quiet, c->view, c->seconds, search->axis,
+                                   search->half_angle_rad, c->near, &near) != BST_OK;
+    if (c->failed) {
+        return -1;
     }
-    for (int i = 0; i < near && count < room; i++) {
+    for (int i = 0; i < near; i++) {
+        bst_identity_object object;
         if (c->near[i] == c->cue_object || bst_knowledge_is_itself(c->knowledge, c->near[i]) ||
-            !predict(c, c->near[i], &out[count])) {
+            !predict(c, c->near[i], &object) ||
+            bst_vec3_angle(object.direction, search->axis) > search->half_angle_rad) {
             continue;
         }
-        count += bst_vec3_angle(out[count].direction, axis) <= half_angle_rad;
+        int at = count;
+        double this_off = nearness(search, object.direction);
+        if (count == room) {
+            ++*left_out;
+            at = 0;
+            for (int k = 1; k < room; k++) {
+                at = off[k] > off[at] ? k : at;
+            }
+            if (this_off >= off[at]) {
+                continue;
+            }
+        } else {
+            count++;
+        }
+        out[at] = object;
+        off[at] = this_off;
     }
     return count;
+}
+
+bool bst_tracker_catalogue_failed(const bst_tracker_catalogue *c) {
+    return c->failed;
 }

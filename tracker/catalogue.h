@@ -23,7 +23,9 @@ int32_t bst_tracker_catalogue_set(bst_tracker_catalogue *catalogue, double secon
 
 /* Finds objects: a bst_tracker_near_fn whose user is the catalogue. Left out are the spacecraft
  * itself, objects behind the Earth, in its umbra, and those without an orbit. */
-int bst_tracker_catalogue_near(void *user, bst_vec3 axis, double half_angle_rad,
-                               bst_identity_object *out, int room);
+int bst_tracker_catalogue_near(void *user, const bst_tracker_search *search,
+                               bst_identity_object *out, int room, int *left_out);
+/* True if a search since the time was set found no place of the spacecraft. */
+bool bst_tracker_catalogue_failed(const bst_tracker_catalogue *catalogue);
 
 #endif

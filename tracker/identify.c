@@ -25,6 +25,31 @@ bst_status bst_tracker_identity_create(bst_ctx *ctx, const bst_tracker_config *c
     return t->identity ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "tracker: out of memory");
 }
 
+bst_status bst_tracker_identity_archive(bst_tracker *t, bst_archive *archive) {
+    bool saved = t->identity != NULL;
+    bst_identity unused = {.tracks = 0};
+    double unused_s = 0.0;
+    bst_archive_bool(archive, &saved);
+    if (!saved) {
+        t->identified_s = -INFINITY;
+        return BST_OK;
+    }
+    bst_identity *identity = t->identity ? t->identity : &unused;
+    BST_ARCHIVE(archive, *identity);
+    if (t->identity) {
+        BST_ARCHIVE(archive, t->identified_s);
+    } else {
+        BST_ARCHIVE(archive, unused_s);
+    }
+    if (identity->tracks < 0 || identity->tracks > BST_IDENTITY_TRACKS || identity->objects < 0 ||
+        identity->objects > BST_IDENTITY_OBJECTS) {
+        identity->tracks = 0;
+        return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                        "the saved state of the tracker's identities is damaged");
+    }
+    return BST_OK;
+}
+
 /* True if there is a confirmed track that moves. */
 static bool any_track(const bst_mtt_track *tracks, int count) {
     bool any = false;
@@ -34,13 +59,21 @@ static bool any_track(const bst_mtt_track *tracks, int count) {
     return any;
 }
 
-/* Compares all tracks with the catalogue and the cue. */
-static void compare(bst_tracker *t, const bst_tracker_input *input, bst_vec3 boresight,
+/* True if the cue names an object of the catalogue, whose rivals the other objects are. What a cue
+ * without an object means may be any of them: then none is a rival. */
+static bool is_named(const bst_tracker_input *input, const bst_target_cue *cue) {
+    return cue->valid && !cue->in_region && input->cue_object >= 0;
+}
+
+/* Compares all tracks with the catalogue; the cue stands for the object that it names. Returns
+ * false if the catalogue does not answer. */
+static bool compare(bst_tracker *t, const bst_tracker_input *input, bst_vec3 boresight,
                     const bst_target_cue *cue) {
     bst_identity_object objects[BST_IDENTITY_OBJECTS];
-    int count = 0, tracks;
-    if (cue->valid && !cue->in_region) {
-        objects[count++] = (bst_identity_object){.object = cue->object,
+    bst_vec3 directions[BST_IDENTITY_TRACKS];
+    int count = 0, tracks, left_out = 0;
+    if (is_named(input, cue)) {
+        objects[count++] = (bst_identity_object){.object = input->cue_object,
                                                  .direction = cue->direction,
                                                  .rate_radps = cue->rate_radps,
                                                  .sigma_rad = cue->sigma_rad,
@@ -50,10 +83,23 @@ static void compare(bst_tracker *t, const bst_tracker_input *input, bst_vec3 bor
     }
     double half = 0.5 * bst_camera_scale_rad(&t->camera) *
                   hypot((double)t->camera.width_px, (double)t->camera.height_px);
-    count += input->near(input->near_user, boresight, fmin(half + MOST_MARGIN_RAD, 0.5 * BST_PI),
-                         objects + count, BST_IDENTITY_OBJECTS - count);
     const bst_mtt_track *all = bst_mtt_tracks(t->mtt, &tracks);
-    bst_identity_match(&t->identity_params, all, tracks, objects, count, t->identity);
+    bst_tracker_search search = {.axis = boresight,
+                                 .half_angle_rad = fmin(half + MOST_MARGIN_RAD, 0.5 * BST_PI),
+                                 .tracks = directions};
+    for (int i = 0; i < tracks && search.track_count < BST_IDENTITY_TRACKS; i++) {
+        if (bst_identity_compares(&t->identity_params, &all[i])) {
+            directions[search.track_count++] = all[i].state.direction;
+        }
+    }
+    int found = input->near(input->near_user, &search, objects + count,
+                            BST_IDENTITY_OBJECTS - count, &left_out);
+    if (found < 0) {
+        return false;
+    }
+    bst_identity_match(&t->identity_params, all, tracks, objects, count + found, t->identity);
+    t->identity->left_out += left_out;
+    return true;
 }
 
 void bst_tracker_identify(bst_tracker *t, const bst_tracker_input *input, bool usable,
@@ -63,17 +109,16 @@ void bst_tracker_identify(bst_tracker *t, const bst_tracker_input *input, bool u
     const bst_mtt_track *tracks = bst_mtt_tracks(t->mtt, &count);
     bool undecided = t->target.id == 0 || t->target.ambiguous;
     bool due = undecided || seconds - t->identified_s >= t->identity_period_s;
-    cue->object = input->cue_object >= 0 ? input->cue_object : BST_IDENTITY_CUE;
-    t->identified = usable && due && any_track(tracks, count);
+    t->identified =
+        usable && due && any_track(tracks, count) && compare(t, input, frame->boresight, cue);
     if (t->identified) {
-        compare(t, input, frame->boresight, cue);
         t->identified_s = seconds;
     }
-    if (cue->valid && !cue->in_region && seconds - t->identified_s < t->identity_period_s) {
+    if (is_named(input, cue) && seconds - t->identified_s < t->identity_period_s) {
         const bst_identity_params *p = &t->identity_params;
-        const bst_mtt_track bright = {.v_mag = cue->v_mag};
+        cue->object = input->cue_object;
         cue->identity = t->identity;
-        cue->unseen_weight = (1.0 - p->detection_probability) / p->detection_probability *
-                             p->unknown_density / bst_identity_scale(cue, &bright);
+        cue->unseen_density =
+            (1.0 - p->detection_probability) / p->detection_probability * p->unknown_density;
     }
 }

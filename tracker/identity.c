@@ -13,6 +13,12 @@ typedef struct group {
     int track[BST_IDENTITY_TRACKS], object[BST_IDENTITY_OBJECTS];
 } group;
 
+/* Rows are divided by a power of two above 1 + their largest weight, which changes no digit of a
+ * probability, so that products of many rows stay in range: the share of an unknown object is then
+ * at least 2^-LEAST_EXPONENT, and 2^-960 over the tracks of a group. */
+enum { LEAST_EXPONENT = 60 };
+static const double MOST_WEIGHT = 1e300;
+
 /* Likelihood ratio of a track being of an object against being of an unknown one, times the odds
  * that the object has a track. */
 static double weight_of(const bst_identity_params *params, const bst_mtt_track *track,
@@ -29,12 +35,31 @@ static double weight_of(const bst_identity_params *params, const bst_mtt_track *
         return 0.0;
     }
     double odds = params->detection_probability / (1.0 - params->detection_probability);
-    return odds * exp(-0.5 * (fit.chi2 + fit.log_det)) * bst_identity_scale(&as_cue, track) /
-           params->unknown_density;
+    return fmin(odds * exp(-0.5 * (fit.chi2 + fit.log_det)) * bst_identity_scale(&as_cue, track) /
+                    params->unknown_density,
+                MOST_WEIGHT);
 }
 
-/* True if a track takes part in a comparison. */
-static bool is_compared(const bst_identity_params *params, const bst_mtt_track *track) {
+/* Scales a track's weights; `unknown` becomes that of an unknown object on the same scale. */
+static void scale_row(bst_identity *m, int t) {
+    double most = 0.0;
+    int exponent;
+    for (int o = 0; o < m->objects; o++) {
+        most = fmax(most, m->probability[t][o]);
+    }
+    (void)frexp(1.0 + most, &exponent);
+    for (int o = 0; o < m->objects; o++) {
+        m->probability[t][o] = ldexp(m->probability[t][o], -exponent);
+    }
+    m->unknown[t] = ldexp(1.0, -(exponent < LEAST_EXPONENT ? exponent : LEAST_EXPONENT));
+}
+
+/* True if a track may be of an object. */
+static bool may_be(const bst_identity *m, int t, int o) {
+    return m->probability[t][o] > LEAST_WEIGHT * m->unknown[t];
+}
+
+bool bst_identity_compares(const bst_identity_params *params, const bst_mtt_track *track) {
     double limit = params->fit.max_rate_sigma_radps;
     return track->status != BST_TRACK_TENTATIVE && !track->at_rest && !track->star &&
            track->state.covariance[2][2] <= limit * limit &&
@@ -48,13 +73,13 @@ static void collect(const bst_identity *m, int first, bool *track_seen, bool *ob
     track_seen[first] = true;
     for (int i = 0; i < g->tracks; i++) {
         for (int o = 0; o < m->objects; o++) {
-            if (object_seen[o] || !(m->probability[g->track[i]][o] > LEAST_WEIGHT)) {
+            if (object_seen[o] || !may_be(m, g->track[i], o)) {
                 continue;
             }
             object_seen[o] = true;
             g->object[g->objects++] = o;
             for (int t = 0; t < m->tracks; t++) {
-                if (!track_seen[t] && m->probability[t][o] > LEAST_WEIGHT) {
+                if (!track_seen[t] && may_be(m, t, o)) {
                     track_seen[t] = true;
                     g->track[g->tracks++] = t;
                 }
@@ -75,19 +100,20 @@ static void enumerate(bst_identity *m, const group *g) {
     for (int t = g->tracks - 1; t >= 0; t--) {
         const double *w = m->probability[g->track[t]];
         for (int s = 0; s < sets; s++) {
-            after[t][s] = after[t + 1][s];
+            after[t][s] = m->unknown[g->track[t]] * after[t + 1][s];
             for (int o = 0; o < g->objects; o++) {
                 after[t][s] += s >> o & 1 ? 0.0 : w[g->object[o]] * after[t + 1][s | 1 << o];
             }
         }
     }
     for (int t = 0; t < g->tracks; t++) {
-        double *w = m->probability[g->track[t]], sum[GROUP_OBJECTS] = {0}, none = 0.0;
+        double *w = m->probability[g->track[t]], *unknown = &m->unknown[g->track[t]];
+        double sum[GROUP_OBJECTS] = {0}, none = 0.0;
         const double *now = before[t % 2];
         double *next = before[(t + 1) % 2];
         for (int s = 0; s < sets; s++) {
-            next[s] = now[s];
-            none += now[s] * after[t + 1][s];
+            next[s] = now[s] * *unknown;
+            none += next[s] * after[t + 1][s];
         }
         for (int s = 0; s < sets; s++) {
             for (int o = 0; now[s] > 0.0 && o < g->objects; o++) {
@@ -101,6 +127,7 @@ static void enumerate(bst_identity *m, const group *g) {
         for (int o = 0; o < g->objects; o++) {
             w[g->object[o]] = sum[o] / none;
         }
+        *unknown = 1.0;
     }
 }
 
@@ -111,13 +138,17 @@ void bst_identity_match(const bst_identity_params *params, const bst_mtt_track *
     assert(params && (tracks || track_count == 0) && out);
     assert(object_count >= 0 && object_count <= BST_IDENTITY_OBJECTS);
     assert(params->unknown_density > 0.0);
-    out->tracks = 0;
+    out->tracks = out->left_out = 0;
     out->objects = object_count;
     for (int o = 0; o < object_count; o++) {
         out->object[o] = objects[o].object;
     }
-    for (int i = 0; i < track_count && out->tracks < BST_IDENTITY_TRACKS; i++) {
-        if (!is_compared(params, &tracks[i])) {
+    for (int i = 0; i < track_count; i++) {
+        if (!bst_identity_compares(params, &tracks[i])) {
+            continue;
+        }
+        if (out->tracks == BST_IDENTITY_TRACKS) {
+            out->left_out++;
             continue;
         }
         int t = out->tracks++;
@@ -125,6 +156,7 @@ void bst_identity_match(const bst_identity_params *params, const bst_mtt_track *
         for (int o = 0; o < object_count; o++) {
             out->probability[t][o] = weight_of(params, &tracks[i], &objects[o]);
         }
+        scale_row(out, t);
     }
     for (int t = 0; t < out->tracks; t++) {
         group g;
@@ -136,13 +168,13 @@ void bst_identity_match(const bst_identity_params *params, const bst_mtt_track *
         }
     }
     for (int t = 0; t < out->tracks; t++) {
-        double sum = 1.0;
+        double sum = out->unknown[t];
         for (int o = 0; o < object_count; o++) {
             sum += out->probability[t][o];
         }
         for (int o = 0; o < object_count; o++) {
             out->probability[t][o] /= sum;
         }
-        out->unknown[t] = 1.0 / sum;
+        out->unknown[t] /= sum;
     }
 }

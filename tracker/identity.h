@@ -7,14 +7,12 @@
 /* Most objects and tracks of one comparison. */
 #define BST_IDENTITY_OBJECTS 64
 #define BST_IDENTITY_TRACKS 64
-/* Index of the cue's object among the objects when it is not in the catalogue. */
-#define BST_IDENTITY_CUE (-2)
 /* Index of objects that the catalogue lacks. */
 #define BST_IDENTITY_UNKNOWN (-1)
 
 /* An object that a track may be of, as predicted on board. */
 typedef struct bst_identity_object {
-    int32_t object; /* index in the catalogue, or BST_IDENTITY_CUE */
+    int32_t object; /* index in the catalogue */
     bst_vec3 direction, rate_radps;
     double sigma_rad, rate_sigma_radps; /* 1 sigma per axis */
     double v_mag, v_mag_sigma;          /* sigma INFINITY: brightness unknown */
@@ -33,7 +31,8 @@ struct bst_identity {
     int64_t track_id[BST_IDENTITY_TRACKS];
     int32_t object[BST_IDENTITY_OBJECTS];
     double probability[BST_IDENTITY_TRACKS][BST_IDENTITY_OBJECTS];
-    double unknown[BST_IDENTITY_TRACKS]; /* that it is of no object of the catalogue */
+    double unknown[BST_IDENTITY_TRACKS]; /* that it is of no object of the comparison */
+    int left_out;                        /* tracks and objects without room */
 };
 
 /* Brightness over which objects are spread if an object's or a track's is unknown, mag. */
@@ -42,6 +41,9 @@ struct bst_identity {
 /* Factor from exp(-(chi2 + log_det) / 2) of bst_target_misfit to a density per sr, (rad/s)^2 and
  * mag. */
 double bst_identity_scale(const bst_target_cue *cue, const bst_mtt_track *track);
+
+/* True if a track takes part in a comparison: confirmed, moving, and of known rate. */
+bool bst_identity_compares(const bst_identity_params *params, const bst_mtt_track *track);
 
 /* Compares confirmed tracks with objects: each track is of at most one object, or of an unknown
  * one, and each object has at most one track.

@@ -3,7 +3,7 @@
 
 double bst_identity_scale(const bst_target_cue *cue, const bst_mtt_track *track) {
     bool bright = isfinite(cue->v_mag) && isfinite(cue->v_mag_sigma) && isfinite(track->v_mag);
-    /* without a magnitude the density is that of direction and rate, over BRIGHTNESS_MAG mag */
+    /* without a magnitude the density is that of direction and rate, over BST_IDENTITY_MAG mag */
     return pow(2.0 * BST_PI, bright ? -2.5 : -2.0) / (bright ? 1.0 : BST_IDENTITY_MAG);
 }
 

@@ -33,8 +33,8 @@ static const bst_port ports[PORT_COUNT] = {
     [PORT_SMOOTHED] = {BST_CHANNEL_TRACKS_SMOOTHED, BST_PORT_OUT, 0, 0.0, 0},
 };
 
-/* Room for probabilities: four objects for each track of a comparison. */
-enum { MOST_IDENTITIES = 4 * BST_IDENTITY_TRACKS };
+/* Most probabilities of a track: of each object, and of none. */
+enum { TRACK_IDENTITIES = BST_IDENTITY_OBJECTS + 1 };
 /* Probabilities below this are not published. */
 static const double LEAST_PROBABILITY = 1e-3;
 
@@ -118,7 +118,8 @@ static bst_status create(const bst_module_env *env, const void *config, bst_filt
     }
     bst_env_set_capacity(env, PORT_TRACKS, (int)c->max_tracks);
     bst_env_set_capacity(env, PORT_PREDICTIONS, (int)c->max_tracks);
-    bst_env_set_capacity(env, PORT_IDENTITIES, m->catalogue ? MOST_IDENTITIES : 0);
+    int compared = c->max_tracks < BST_IDENTITY_TRACKS ? (int)c->max_tracks : BST_IDENTITY_TRACKS;
+    bst_env_set_capacity(env, PORT_IDENTITIES, m->catalogue ? compared * TRACK_IDENTITIES : 0);
     bst_env_set_capacity(env, PORT_SMOOTHED, bst_tracker_smoothed_room(c));
     *self = m;
     return BST_OK;
@@ -197,7 +198,8 @@ static void publish_identities(const tracker_module *m, struct bst_step *step,
     int room;
     const bst_identity *identity = bst_tracker_identity(m->tracker);
     bst_track_identities *out = bst_step_write(step, PORT_IDENTITIES, &room);
-    *out = (bst_track_identities){.exposure_id = tracks->exposure_id, .tick = tracks->tick};
+    *out = (bst_track_identities){
+        .exposure_id = tracks->exposure_id, .tick = tracks->tick, .lost = identity->left_out};
     for (int t = 0; t < identity->tracks; t++) {
         int64_t id = identity->track_id[t];
         for (int o = 0; o < identity->objects; o++) {
@@ -285,6 +287,9 @@ static bst_status process_detections(tracker_module *m, struct bst_step *step,
     assert(bst_predictions_are_valid(predictions, prediction_room));
     if (bst_tracker_identity(m->tracker)) {
         publish_identities(m, step, tracks);
+    }
+    if (m->catalogue && bst_tracker_catalogue_failed(m->catalogue)) {
+        bst_step_count(step, "tracker_no_catalogue");
     }
     if (bst_tracker_has_smoothed(m->tracker)) {
         publish_smoothed(m, step);

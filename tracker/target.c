@@ -199,7 +199,7 @@ static candidates compare(const bst_target_params *params, const bst_target_cue 
     }
     c.seen = true;
     if (cue->identity && c.best && !memory) { /* the memory says that it has a track */
-        double unseen = cue->unseen_weight * exp(0.5 * c.lowest);
+        double unseen = cue->unseen_density / bst_identity_scale(cue, c.best) * exp(0.5 * c.lowest);
         c.seen = unseen <= 1.0;
         c.sum += unseen;
     }

@@ -21,8 +21,8 @@ typedef struct bst_target_params {
     int min_hits;
     double margin;   /* log-likelihood margin of the best candidate over the second ... */
     int margin_hits; /* ... unless it has this many hits */
-    double
-        max_dormant_s; /* time for which a lost target's prediction restricts the next choice, s */
+    /* time for which a lost target's prediction restricts the next choice, s */
+    double max_dormant_s;
     double dormant_gate_chi2;    /* its largest misfit, 4 degrees of freedom */
     double memory_noise_rad2ps3; /* power spectral density of the acceleration of a lost target */
 } bst_target_params;
@@ -44,8 +44,8 @@ typedef struct bst_target_cue {
      * is the less likely to be of the cue's. */
     const bst_identity *identity;
     int32_t object; /* the cue's in that comparison */
-    /* weight of the hypothesis that the cue's object has no track, as exp(-(chi2 + log_det) / 2) */
-    double unseen_weight;
+    /* density, as of bst_identity_scale, that stands for the cue's object having no track */
+    double unseen_density;
 } bst_target_cue;
 
 /* Rate that a valid cue expects in a direction, rad/s, perpendicular to it. */
@@ -114,11 +114,12 @@ bool bst_target_is_expected(const bst_target_params *params, const bst_target_cu
  *            Of several tracks that fit the cue, each has the probability
  *            exp(-(chi2 + log_det)/2) over the sum of all; with a comparison with the catalogue
  *            times the odds that no other object explains the track, and the sum includes
- *            unseen_weight, which no chosen track may be below. While the target's is not certain,
- * it is ambiguous, and another track replaces it as soon as that one is certain. After frames with
- * shared detections, and when a new track fits the cue, the identity is open again, unless the
- * target has manoeuvred away from the cue. An ambiguity does not end because the other track does:
- * the probability stays for max_dormant_s. */
+ *            that of no track, which no chosen track may be below. While the target's is not
+ *            certain, it is ambiguous, and another track replaces it as soon as that one is
+ *            certain. After frames with shared detections, and when a new track fits the cue, the
+ *            identity is open again, unless the target has manoeuvred away from the cue. An
+ *            ambiguity does not end because the other track does: the probability stays for
+ *            max_dormant_s. */
 void bst_target_step(bst_target *target, const bst_target_params *params, const bst_target_cue *cue,
                      double seconds, const bst_mtt_track *tracks, int count);
 

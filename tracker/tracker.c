@@ -145,9 +145,10 @@ bst_status bst_tracker_create(bst_ctx *ctx, const bst_tracker_config *config,
     if (status == BST_OK) {
         status = bst_tracker_identity_create(ctx, config, t);
     }
+    t->smoother_room = 2 * (int)config->max_tracks;
     if (status == BST_OK && config->smoothing_lag_frames > 0) {
-        status = bst_smoother_create(ctx, bst_tracker_smoothed_room(config),
-                                     (int)config->smoothing_lag_frames, &t->smoother);
+        status = bst_smoother_create(ctx, t->smoother_room, (int)config->smoothing_lag_frames,
+                                     &t->smoother);
     }
     if (status != BST_OK) {
         bst_tracker_free(t);
@@ -186,19 +187,8 @@ bst_status bst_tracker_archive(bst_tracker *t, bst_archive *archive) {
     if (bst_archive_is_restoring(archive)) {
         t->event_count = 0;
     }
-    if (t->identity) {
-        BST_ARCHIVE(archive, *t->identity);
-        BST_ARCHIVE(archive, t->identified_s);
-        if (t->identity->tracks < 0 || t->identity->tracks > BST_IDENTITY_TRACKS ||
-            t->identity->objects < 0 || t->identity->objects > BST_IDENTITY_OBJECTS) {
-            t->identity->tracks = 0;
-            return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
-                            "the saved state of the tracker's identities is damaged");
-        }
-    }
-    if (t->smoother) {
-        BST_TRY(bst_smoother_archive(t->smoother, archive));
-    }
+    BST_TRY(bst_tracker_identity_archive(t, archive));
+    BST_TRY(bst_smoother_archive(t->smoother, t->smoother_room, archive));
     return bst_mtt_archive(t->mtt, archive);
 }
 

@@ -68,13 +68,23 @@ typedef struct bst_tracker_cue {
     bst_belt_eye belt_eye;
 } bst_tracker_cue;
 
+/* A search for catalogue objects in a cone. */
+typedef struct bst_tracker_search {
+    bst_vec3 axis;
+    double half_angle_rad;
+    const bst_vec3 *tracks; /* [track_count] directions of the tracks that are compared */
+    int track_count;
+} bst_tracker_search;
+
 /* Finds catalogue objects near a direction, other than the cue's, at mid-exposure.
  *
- * Given:     user           as in the input
- *            half_angle_rad of a cone about `axis`
- * Returned:  number of objects in `out`, at most `room` */
-typedef int (*bst_tracker_near_fn)(void *user, bst_vec3 axis, double half_angle_rad,
-                                   bst_identity_object *out, int room);
+ * Given:     user      as in the input
+ *            room      of `out`, at most BST_IDENTITY_OBJECTS
+ * Returned:  number of objects in `out`, at most `room`: those nearest to a track, without any
+ *            to the axis; negative: the search has failed
+ *            *left_out number of objects in the cone without room */
+typedef int (*bst_tracker_near_fn)(void *user, const bst_tracker_search *search,
+                                   bst_identity_object *out, int room, int *left_out);
 
 typedef struct bst_tracker_input {
     const bst_detections *detections;

@@ -42,6 +42,7 @@ struct bst_tracker {
     double identified_s;    /* its time */
     bool identified;        /* in the latest frame */
     bst_smoother *smoother; /* NULL: no smoothing */
+    int smoother_room;      /* also without one */
     cached_star *cache;
     bst_attitude_star *stars;
     bst_mtt_detection *detections;
@@ -119,6 +120,11 @@ void bst_tracker_find_attitude(bst_tracker *t, const bst_tracker_input *input,
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_tracker_identity_create(bst_ctx *ctx, const bst_tracker_config *config,
                                        bst_tracker *t) BST_MUST_CHECK;
+/* Saves or restores the latest comparison. A change during a run may switch comparisons on or off:
+ * then they begin anew, or what was saved is dropped.
+ *
+ * Errors:    BST_ERR_FORMAT */
+bst_status bst_tracker_identity_archive(bst_tracker *t, bst_archive *archive) BST_MUST_CHECK;
 /* Compares the tracks with the catalogue, if it is time, and sets the cue's comparison.
  *
  * Given:     usable  the frame has an attitude */

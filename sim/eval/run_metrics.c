@@ -328,7 +328,14 @@ bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *m, const bst_tr
     return f ? score_tracks(ctx, m, f, tracks) : BST_OK;
 }
 
+void bst_run_metrics_identities(bst_run_metrics *m, const bst_track_identities *identities) {
+    m->figures.losses.identities += identities->lost;
+    m->figures.losses.identity_frames += identities->lost > 0;
+}
+
 void bst_run_metrics_smoothed(bst_run_metrics *m, const bst_tracks_smoothed *tracks) {
+    m->figures.losses.smoothed_tracks += tracks->lost;
+    m->figures.losses.smoothed_track_frames += tracks->lost > 0;
     const known_frame *f = find_frame(m, tracks->exposure_id);
     double scale = bst_camera_scale_rad(&m->camera);
     if (!f || !isfinite(f->track_error2_px2)) {

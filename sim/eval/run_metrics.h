@@ -14,9 +14,11 @@ typedef struct bst_run_losses {
     int64_t frames;                       /* of the sensor */
     int64_t detections, detection_frames; /* detections beyond the capacity of their message */
     int64_t tracks, track_frames;         /* tracks beyond the capacity */
-    int64_t truth, truth_frames;          /* sources beyond the capacity */
-    int64_t dropped_frames;               /* lost between camera and image processing */
-    int64_t no_stars_frames;              /* processed frames without an identified star */
+    int64_t smoothed_tracks, smoothed_track_frames; /* tracks without room in the smoother */
+    int64_t identities, identity_frames;            /* tracks and objects left out of comparisons */
+    int64_t truth, truth_frames;                    /* sources beyond the capacity */
+    int64_t dropped_frames;                         /* lost between camera and image processing */
+    int64_t no_stars_frames;    /* processed frames without an identified star */
     int64_t no_attitude_frames; /* frames that the tracker processed without a stellar attitude */
     int64_t earth_frames, moon_frames, sun_frames; /* partly covered by the disc of that body */
 } bst_run_losses;
@@ -74,6 +76,8 @@ bst_status bst_run_metrics_tracks(bst_ctx *ctx, bst_run_metrics *metrics,
                                   const bst_tracks *tracks) BST_MUST_CHECK;
 /* Adds the error of the smoothed track of interest. */
 void bst_run_metrics_smoothed(bst_run_metrics *metrics, const bst_tracks_smoothed *tracks);
+/* Counts what comparisons with the catalogue left out. */
+void bst_run_metrics_identities(bst_run_metrics *metrics, const bst_track_identities *identities);
 /* Counts a frame, evaluated by the loop summary, with the target in the field. */
 void bst_run_metrics_frame(bst_run_metrics *metrics, const bst_loop_frame *frame);
 /* Changes the true target of the metrics; -1: none. */

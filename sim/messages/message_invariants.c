@@ -149,7 +149,7 @@ bool bst_tracks_are_valid(const bst_tracks *t, int capacity) {
 bool bst_track_identities_are_valid(const bst_track_identities *t, int capacity) {
     bool valid = is_count(t->count, t->lost, capacity);
     for (int i = 0; valid && i < t->count; i++) {
-        valid = t->items[i].track_id >= 1 && t->items[i].object >= -2 &&
+        valid = t->items[i].track_id >= 1 && t->items[i].object >= -1 &&
                 bst_is_share(t->items[i].probability);
     }
     return valid;

@@ -324,16 +324,21 @@ bst_status bst_knowledge_belt_eye_at(bst_ctx *ctx, bst_knowledge_view *view, dou
     return BST_OK;
 }
 
+int bst_knowledge_cue_object(const bst_knowledge_view *view) {
+    const world_sensor *sensor = sensor_of(view->knowledge);
+    if (view->tasked) {
+        return view->task.object;
+    }
+    return sensor->config.cue.region.kind == BST_REGION_NONE ? sensor->cue_object : -1;
+}
+
 bst_status bst_knowledge_cue_range_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                       bool *known, double *range_m, double *range_rate_mps) {
     const bst_knowledge *k = view->knowledge;
     const double h = 0.5;
     double range[3];
     *range_m = *range_rate_mps = 0.0;
-    const world_sensor *sensor = sensor_of(k);
-    int object = view->tasked                                        ? view->task.object
-                 : sensor->config.cue.region.kind == BST_REGION_NONE ? sensor->cue_object
-                                                                     : -1;
+    int object = bst_knowledge_cue_object(view);
     *known = object >= 0;
     for (int i = 0; *known && i < 3; i++) {
         double t;

@@ -65,15 +65,6 @@ bst_status bst_knowledge_near(bst_ctx *ctx, bst_knowledge_view *view, double sec
     return BST_OK;
 }
 
-int bst_knowledge_cue_object(const bst_knowledge_view *view) {
-    const world_sensor *sensor = &view->knowledge->world->observers[view->knowledge->observer]
-                                      .sensors[view->knowledge->sensor];
-    if (view->tasked) {
-        return view->task.object;
-    }
-    return sensor->config.cue.region.kind == BST_REGION_NONE ? sensor->cue_object : -1;
-}
-
 bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                 bst_world_state *eye, bst_bodies *bodies) {
     double t;
@@ -147,8 +138,9 @@ static void archive_own_cue(bst_knowledge_view *view, bst_archive *archive) {
     bst_quat error = own_error;
     BST_ARCHIVE(archive, object);
     BST_ARCHIVE(archive, error);
-    view->cue_changed = object != own || memcmp(&error, &own_error, sizeof error) != 0;
-    if (view->cue_changed) {
+    bst_archive_bool(archive, &view->cue_changed);
+    if (object != own || memcmp(&error, &own_error, sizeof error) != 0) {
+        view->cue_changed = true;
         view->any_checked = false;
         memset(view->knots, 0, sizeof view->knots);
     }

@@ -20,6 +20,9 @@ typedef struct kind {
 
 #define AT(member) offsetof(bst_run_losses, member)
 
+/* The tables do not have it: an interrupted run without a manifest shows none. */
+#define NOT_RECORDED "SELECT 0, 0 WHERE ?1 >= 0"
+
 static const kind kinds[] = {
     {"detections", "detection_frames", AT(detections), AT(detection_frames), BST_SEVERITY_PROBLEM,
      "cut to imgproc's capacity", "detection", "detections",
@@ -27,6 +30,11 @@ static const kind kinds[] = {
     {"tracks", "track_frames", AT(tracks), AT(track_frames), BST_SEVERITY_PROBLEM,
      "cut to the room for tracks", "track", "tracks",
      "SELECT sum(lost), sum(lost > 0) FROM track_frames WHERE sensor = ?1"},
+    {"smoothed_tracks", "smoothed_track_frames", AT(smoothed_tracks), AT(smoothed_track_frames),
+     BST_SEVERITY_PROBLEM, "cut to the room for smoothed tracks", "track", "tracks", NOT_RECORDED},
+    {"identities", "identity_frames", AT(identities), AT(identity_frames), BST_SEVERITY_WARNING,
+     "left out of comparisons with the catalogue (64 tracks, 64 objects)", "track or object",
+     "tracks or objects", NOT_RECORDED},
     {"truth", "truth_frames", AT(truth), AT(truth_frames), BST_SEVERITY_WARNING,
      "cut to truth_capacity, labels are missing", "source of the truth", "sources of the truth",
      "SELECT sum(lost), sum(lost > 0) FROM exposures WHERE sensor = ?1"},
@@ -97,6 +105,9 @@ void bst_run_losses_report_counter(const char *name, int64_t count, bst_run_loss
          "times"},
         {"tracker_no_navigation", BST_SEVERITY_WARNING, "no navigation telemetry", "frame",
          "frames"},
+        {"tracker_no_catalogue", BST_SEVERITY_WARNING,
+         "tracks were not compared with the catalogue: the spacecraft's place is not known",
+         "frame", "frames"},
         {"tracker_frame_ignored", BST_SEVERITY_WARNING, "came to the tracker twice or out of order",
          "frame", "frames"},
         {"sensor_command_ignored", BST_SEVERITY_WARNING, "ignored", "command to a sensor",

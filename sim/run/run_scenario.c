@@ -72,6 +72,8 @@ static bst_status judge(bst_run_execution *run, bst_run_sensor_watch *sensor, co
     }
     if (strcmp(channel, BST_CHANNEL_TRACKS_SMOOTHED) == 0) {
         bst_run_metrics_smoothed(sensor->metrics, payload);
+    } else if (strcmp(channel, BST_CHANNEL_TRACK_IDENTITIES) == 0) {
+        bst_run_metrics_identities(sensor->metrics, payload);
     } else if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0) {
         bst_run_metrics_detections(sensor->metrics, payload);
     } else if (strcmp(channel, BST_CHANNEL_CONTROL_STATUS) == 0) {

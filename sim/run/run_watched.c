@@ -20,9 +20,9 @@ void bst_run_watch(bst_run_watched *w, const bst_recorder *recorder, const char 
                    const bst_run_pixels *pixels) {
     static const char *const telemetry[] = {BST_CHANNEL_LOS_HISTORY, BST_CHANNEL_POINTING_TELEMETRY,
                                             BST_CHANNEL_MOUNT_STATUS, BST_CHANNEL_NAV_TELEMETRY};
-    static const char *const judged[] = {BST_CHANNEL_TRUTH, BST_CHANNEL_DETECTIONS,
-                                         BST_CHANNEL_TRACKS, BST_CHANNEL_TRACKS_SMOOTHED,
-                                         BST_CHANNEL_TASK};
+    static const char *const judged[] = {
+        BST_CHANNEL_TRUTH,           BST_CHANNEL_DETECTIONS,       BST_CHANNEL_TRACKS,
+        BST_CHANNEL_TRACKS_SMOOTHED, BST_CHANNEL_TRACK_IDENTITIES, BST_CHANNEL_TASK};
     *w = (bst_run_watched){.recorded = recorder && bst_recorder_wants(recorder, channel),
                            .last = -1,
                            .mode = -1,
@@ -35,7 +35,7 @@ void bst_run_watch(bst_run_watched *w, const bst_recorder *recorder, const char 
     } else if (is_one_of(channel, telemetry, 4)) {
         w->kind = w->recorded ? BST_WATCH_TELEMETRY : BST_WATCH_NONE;
     } else {
-        w->kind = w->recorded || is_one_of(channel, judged, 5) ? BST_WATCH_ALL : BST_WATCH_NONE;
+        w->kind = w->recorded || is_one_of(channel, judged, 6) ? BST_WATCH_ALL : BST_WATCH_NONE;
     }
 }
 

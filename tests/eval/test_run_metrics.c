@@ -335,6 +335,7 @@ static void show_smoothed(fixture *f, int64_t exposure, bool of_interest, bst_ve
     assert_non_null(t);
     t->exposure_id = exposure;
     t->count = 2;
+    t->lost = exposure == 999 ? 5 : 0;
     t->items[0] = (bst_track_smoothed){.id = 3, .direction_gcrf = beside(1, 4, 0)};
     t->items[1] = (bst_track_smoothed){
         .id = 7, .target_of_interest = of_interest, .direction_gcrf = direction};
@@ -357,12 +358,19 @@ static void smoothed_errors(void **state) {
     show_smoothed(f, 2, true, beside(2, 0, 0.1));
     show_smoothed(f, 3, false, beside(1, 0, 3));
     show_smoothed(f, 999, true, beside(1, 0, 3));
+    const bst_track_identities whole = {.exposure_id = 1}, cut = {.exposure_id = 2, .lost = 3};
+    bst_run_metrics_identities(f->metrics, &whole);
+    bst_run_metrics_identities(f->metrics, &cut);
     bst_run_metric_figures m;
     bst_run_metrics_figures(f->metrics, &m);
     assert_int_equal(m.smoothed_frames, 2);
     /* as in track_errors */
     bst_assert_close(m.smoothed_rms_px, sqrt((0.09 + 0.16) / 2), 1e-8);
     bst_assert_close(m.smoothed_filtered_rms_px, sqrt((0.81 + 1.44) / 2), 1e-8);
+    assert_int_equal(m.losses.smoothed_tracks, 5);
+    assert_int_equal(m.losses.smoothed_track_frames, 1);
+    assert_int_equal(m.losses.identities, 3);
+    assert_int_equal(m.losses.identity_frames, 1);
 }
 
 /* First frame: track 1 is 1 px from object 0, object 1 is missed, track 2 is false; track 3 on an

@@ -2,6 +2,8 @@
  * the spacecraft believes to be; and what a world says of their orbits. */
 #include "sim/onboard/knowledge.h"
 #include "tests/world/world_support.h"
+#include "tracker/catalogue.h"
+#include "tracker/identity.h"
 
 #define GX5 "{\"name\": \"GX5\", " TEST_GX5 "}"
 #define KEPLER(name, at, e, more)                                                        \
@@ -127,6 +129,42 @@ static void objects_near_a_direction(void **state) {
     const bst_task no_object = {.id = 4, .object = -1};
     assert_true(bst_knowledge_view_task(s.onboard, &no_object));
     assert_int_equal(bst_knowledge_cue_object(s.onboard), own);
+    drop(&s);
+}
+
+/* With room for one object the tracker gets the one nearest to a track, and the number of those
+ * that are left out. */
+static void the_objects_nearest_to_tracks(void **state) {
+    (void)state;
+    scene s = make("");
+    bst_tracker_config config;
+    bst_tracker_catalogue *catalogue;
+    bst_assert_ok(&s.ctx, bst_config_defaults(&s.ctx, bst_tracker_config_table, &config));
+    bst_assert_ok(&s.ctx, bst_world_prepare(&s.ctx, s.world, 1));
+    bst_assert_ok(
+        &s.ctx, bst_tracker_catalogue_create(&s.ctx, &config, s.knowledge, s.onboard, &catalogue));
+    const double t = 37.0;
+    assert_int_equal(bst_tracker_catalogue_set(catalogue, t), -1);
+    static const int both[2] = {OBJECT_GX5, BESIDE_GX5};
+    bst_world_sight at[2];
+    for (int i = 0; i < 2; i++) {
+        bst_assert_ok(&s.ctx, bst_knowledge_sight_at(&s.ctx, s.onboard, both[i], t, &at[i]));
+    }
+    for (int i = 0; i < 3; i++) {
+        int left_out;
+        bst_identity_object found[2];
+        const bst_tracker_search search = {.axis = at[0].geometric,
+                                           .half_angle_rad = 1e-3,
+                                           .tracks = &at[i % 2].geometric,
+                                           .track_count = i < 2};
+        assert_int_equal(bst_tracker_catalogue_near(catalogue, &search, found, 2, &left_out), 2);
+        assert_int_equal(left_out, 0);
+        assert_int_equal(bst_tracker_catalogue_near(catalogue, &search, found, 1, &left_out), 1);
+        assert_int_equal(left_out, 1);
+        assert_int_equal(found[0].object, both[i % 2]);
+    }
+    assert_false(bst_tracker_catalogue_failed(catalogue));
+    bst_tracker_catalogue_free(catalogue);
     drop(&s);
 }
 
@@ -270,6 +308,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(orbits_by_their_apsides),
         cmocka_unit_test(objects_near_a_direction),
+        cmocka_unit_test(the_objects_nearest_to_tracks),
         cmocka_unit_test(first_places_of_all),
         cmocka_unit_test(sights_by_a_fast_clock),
         cmocka_unit_test(sights_from_where_it_believes_to_be),

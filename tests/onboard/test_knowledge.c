@@ -1,6 +1,7 @@
 /* What the onboard side knows otherwise than it is, against its effect by theory. */
 #include "sim/onboard/knowledge.h"
 
+#include "sim/onboard/knowledge_internal.h"
 #include "sim/optics/psf.h"
 #include "tests/archive_support.h"
 #include "tests/world/world_support.h"
@@ -297,6 +298,24 @@ static bst_status archive_view(void *view, bst_archive *archive) {
     return BST_OK;
 }
 
+/* That the scenario's cue has changed is known until the view is asked, also if the state is saved
+ * before that. */
+static void a_changed_cue_is_saved(void **state) {
+    (void)state;
+    scene s = make("");
+    s.kview->cue_changed = true;
+    bst_knowledge_view *other;
+    bst_assert_ok(&s.ctx, bst_knowledge_view_create(&s.ctx, s.knowledge, &other));
+    test_saved saved = test_save(archive_view, s.kview);
+    bst_assert_ok(&s.ctx, test_restore(&s.ctx, archive_view, other, saved));
+    free(saved.bytes);
+    assert_true(bst_knowledge_view_task(s.kview, NULL));
+    assert_true(bst_knowledge_view_task(other, NULL));
+    assert_false(bst_knowledge_view_task(other, NULL));
+    bst_knowledge_view_free(other);
+    drop(&s);
+}
+
 /* A view that has a task, restored into a new one: the same cue to the bit. */
 static void a_view_is_saved_and_restored(void **state) {
     (void)state;
@@ -357,6 +376,7 @@ int main(void) {
         cmocka_unit_test(the_onboard_psf_is_a_gaussian),
         cmocka_unit_test(the_camera_may_be_known_wrongly),
         cmocka_unit_test(stars_are_dropped_and_displaced),
+        cmocka_unit_test(a_changed_cue_is_saved),
         cmocka_unit_test(a_view_is_saved_and_restored),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -278,6 +278,47 @@ static void damage_is_refused_or_another_state(void **state) {
     world_close(&w);
 }
 
+/* Smoothing and comparisons with the catalogue may change during a run: what was saved of them is
+ * dropped, and the tracks go on. */
+static void settings_that_change(void **state) {
+    (void)state;
+    static const struct {
+        int64_t lag;
+        double period_s;
+    } settings[] = {{6, 10.0}, {0, 0.0}, {3, 10.0}, {6, 0.0}};
+    enum { SETTINGS = sizeof settings / sizeof *settings };
+    static const options sky = {.sigma_px = 0.1, .pd = 0.99, .false_alarms = 1, .frames = 12};
+    static world w;
+    bst_ctx ctx = {0};
+    bst_tracker *trackers[SETTINGS];
+    world_open(&w, 5, &sky);
+    for (int i = 0; i < SETTINGS; i++) {
+        bst_tracker_config config;
+        bst_assert_ok(&ctx, bst_config_defaults(&ctx, bst_tracker_config_table, &config));
+        config.smoothing_lag_frames = settings[i].lag;
+        config.identity_period_s = settings[i].period_s;
+        bst_assert_ok(
+            &ctx, bst_tracker_create(&ctx, &config, &camera, RATE_HZ, find_star, &w, &trackers[i]));
+    }
+    for (int k = 0; k < sky.frames; k++) {
+        (void)expose(&w, k);
+        bst_tracker_input input = make_input(&w, k);
+        (void)bst_tracker_step(trackers[0], &input, w.tracks, TRACKS, w.predictions, TRACKS);
+    }
+    assert_true(w.tracks->target_id != 0);
+    for (int i = 0; i < SETTINGS; i++) { /* around: each into the next one */
+        bst_tracker *to = trackers[(i + 1) % SETTINGS];
+        test_saved saved = test_save(archive_tracker, trackers[i]);
+        bst_assert_ok(&ctx, test_restore(&ctx, archive_tracker, to, saved));
+        free(saved.bytes);
+        assert_int_equal(to->target.id, w.tracks->target_id);
+    }
+    for (int i = 0; i < SETTINGS; i++) {
+        bst_tracker_free(trackers[i]);
+    }
+    world_close(&w);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(extended_filter),
@@ -286,6 +327,7 @@ int main(void) {
         cmocka_unit_test(orbits),
         cmocka_unit_test(lost_attitude),
         cmocka_unit_test(into_a_used_tracker),
+        cmocka_unit_test(settings_that_change),
         cmocka_unit_test(damage_is_refused_or_another_state),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -242,7 +242,7 @@ static void the_target_is_what_nothing_else_explains(void **unused) {
     bst_identity_match(&p, tracks, 2, objects, 2, &identity);
     cue.identity = &identity;
     cue.object = 5;
-    cue.unseen_weight = p.unknown_density / 9.0 / bst_identity_scale(&cue, &tracks[0]);
+    cue.unseen_density = p.unknown_density / 9.0;
     bst_target by_catalogue = {.id = 0};
     bst_target_step(&by_catalogue, &choice, &cue, 1.0, tracks, 2);
     assert_int_equal(by_catalogue.id, 1);
@@ -258,10 +258,63 @@ static void the_target_is_what_nothing_else_explains(void **unused) {
     assert_int_equal(none.id, 0);
 }
 
+/* Tracks of one place, and objects there of which each is very much likelier than an unknown one:
+ * the sums of products stay in range, and each track is as likely of each of the objects. */
+static void extreme_weights(void **unused) {
+    (void)unused;
+    static bst_identity identity;
+    enum { EQUAL = 9, ALIKE = 12 };
+    source s = {bst_rng_make_key(1, 3, "test", "extreme"), 0};
+    const state at = {{0.0, 0.0}, {5.0, 3.0}, 12.0};
+    bst_mtt_track tracks[ALIKE];
+    bst_identity_object objects[EQUAL];
+    for (int t = 0; t < ALIKE; t++) {
+        tracks[t] = t > 0 ? tracks[0] : track_of(&s, 1, &at);
+        tracks[t].id = t + 1;
+    }
+    for (int o = 0; o < EQUAL; o++) {
+        objects[o] = object_of(o, &at);
+    }
+    bst_identity_params p = params();
+    for (double density = 1.0; density >= 1e-290; density *= 1e-29) {
+        p.unknown_density = density;
+        bst_identity_match(&p, tracks, ALIKE, objects, EQUAL, &identity);
+        for (int t = 0; t < ALIKE; t++) {
+            /* all objects have tracks: nine of twelve */
+            bst_assert_close(identity.unknown[t], 0.25, 1e-6);
+            for (int o = 0; o < EQUAL; o++) {
+                bst_assert_close(identity.probability[t][o], 1.0 / ALIKE, 1e-6);
+            }
+        }
+    }
+}
+
+/* What has no room is counted. */
+static void tracks_without_room(void **unused) {
+    (void)unused;
+    static bst_identity identity;
+    static bst_mtt_track tracks[BST_IDENTITY_TRACKS + 3];
+    source s = {bst_rng_make_key(1, 3, "test", "room"), 0};
+    const state at = {{0.0, 0.0}, {5.0, 3.0}, 12.0};
+    for (int t = 0; t < BST_IDENTITY_TRACKS + 3; t++) {
+        tracks[t] = track_of(&s, t + 1, &at);
+    }
+    tracks[0].at_rest = true;
+    const bst_identity_object object = object_of(0, &at);
+    const bst_identity_params p = params();
+    bst_identity_match(&p, tracks, BST_IDENTITY_TRACKS + 3, &object, 1, &identity);
+    assert_int_equal(identity.tracks, BST_IDENTITY_TRACKS);
+    assert_int_equal(identity.left_out, 2);
+    bst_identity_match(&p, tracks, 3, &object, 1, &identity);
+    assert_int_equal(identity.left_out, 0);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(probabilities_are_reliable),
                                        cmocka_unit_test(closed_form),
                                        cmocka_unit_test(an_object_has_one_track),
+                                       cmocka_unit_test(extreme_weights),
+                                       cmocka_unit_test(tracks_without_room),
                                        cmocka_unit_test(the_target_is_what_nothing_else_explains)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

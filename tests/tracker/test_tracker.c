@@ -1,5 +1,6 @@
 /* The whole tracker on simulated detections of the main scenario. */
 #include "tests/tracker/moving_sky.h"
+#include "tracker/identity.h"
 
 typedef struct result {
     int used, in_track, wrong, first_target_frame;
@@ -397,6 +398,57 @@ static void late_navigation(void **state) {
     world_close(&w);
 }
 
+typedef struct catalogued {
+    const world *w;
+    double t;
+} catalogued;
+
+/* The catalogue: the target alone, where it is. */
+static int find_target(void *user, const bst_tracker_search *search, bst_identity_object *out,
+                       int room, int *left_out) {
+    const catalogued *c = user;
+    bst_vec3 direction = target_direction(c->w, c->t, false);
+    assert_true(room >= 1 && bst_vec3_angle(search->axis, direction) < search->half_angle_rad);
+    *left_out = 0;
+    out[0] = (bst_identity_object){.object = 4,
+                                   .direction = direction,
+                                   .rate_radps = target_rate(c->w, c->t, false),
+                                   .sigma_rad = 20 * AS,
+                                   .rate_sigma_radps = 0.1 * AS,
+                                   .v_mag = 13,
+                                   .v_mag_sigma = 1};
+    return 1;
+}
+
+/* What a cue means that names no object may be in the catalogue: that is no rival of the cue, and
+ * the track has its identity. */
+static void a_cue_without_an_object(void **state) {
+    (void)state;
+    static world w;
+    world_open(&w, 3, &plain);
+    double probability = 0.0;
+    for (int k = 0; k < 40; k++) {
+        (void)expose(&w, k);
+        bst_tracker_input input = make_input(&w, k);
+        catalogued c = {&w, k};
+        input.near = find_target;
+        input.near_user = &c;
+        input.cue_object = -1;
+        (void)bst_tracker_step(w.tracker, &input, w.tracks, 256, w.predictions, 256);
+        const bst_identity *identity = bst_tracker_identity(w.tracker);
+        for (int t = 0; identity && t < identity->tracks; t++) {
+            if (identity->track_id[t] == w.tracks->target_id) {
+                assert_int_equal(identity->objects, 1);
+                assert_int_equal(identity->object[0], 4);
+                probability = identity->probability[t][0];
+            }
+        }
+    }
+    assert_true(w.tracks->target_id != 0);
+    assert_true(probability > 0.9);
+    world_close(&w);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(main_scenario),
                                        cmocka_unit_test(dropped_frames),
@@ -411,6 +463,7 @@ int main(void) {
                                        cmocka_unit_test(vague_detections),
                                        cmocka_unit_test(telemetry_wrong_by_any_angle),
                                        cmocka_unit_test(predictions_hold),
-                                       cmocka_unit_test(late_navigation)};
+                                       cmocka_unit_test(late_navigation),
+                                       cmocka_unit_test(a_cue_without_an_object)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

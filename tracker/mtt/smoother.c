@@ -81,7 +81,7 @@ static bool is_intact(const bst_smoother *s, const chain *c) {
     return intact || c->id == 0;
 }
 
-bst_status bst_smoother_archive(bst_smoother *s, bst_archive *archive) {
+static bst_status archive_chains(bst_smoother *s, bst_archive *archive) {
     size_t frames = (size_t)s->lag + 1;
     s->frames = bst_archive_integer(archive, s->frames, 0, INT64_MAX / 2);
     bst_archive_bytes(archive, s->info, frames * sizeof *s->info);
@@ -100,6 +100,22 @@ bst_status bst_smoother_archive(bst_smoother *s, bst_archive *archive) {
         s->count = s->lost = 0;
     }
     return BST_OK;
+}
+
+bst_status bst_smoother_archive(bst_smoother *s, int tracks, bst_archive *archive) {
+    int lag = s ? s->lag : 0;
+    int saved_lag = (int)bst_archive_integer(archive, lag, 0, BST_SMOOTHER_MAX_LAG);
+    if (saved_lag == 0) {
+        return BST_OK;
+    }
+    if (s && saved_lag == lag) {
+        return archive_chains(s, archive);
+    }
+    bst_smoother *dropped;
+    BST_TRY(bst_smoother_create(bst_archive_ctx(archive), tracks, saved_lag, &dropped));
+    bst_status status = archive_chains(dropped, archive);
+    bst_smoother_free(dropped);
+    return status;
 }
 
 /* Chain to which a frame of a track belongs; NULL: there is no room.
@@ -156,18 +172,19 @@ static void extend_chains(bst_smoother *s, int64_t frame, const bst_mtt *mtt) {
 
 /* Smoothed state of a chain in a frame, from its last one backwards. */
 static void smooth_chain(const bst_smoother *s, const chain *c, int64_t frame, bst_smoothed *out) {
-    int64_t frames = s->lag + 1;
+    int64_t frames = s->lag + 1, from = c->last;
     bst_sky_state state = entry_of(s, c, c->last)->state;
     for (int64_t f = c->last - 1; f >= frame; f--) {
         bst_sky_state next = state;
         double dt = s->info[(f + 1) % frames].seconds - s->info[f % frames].seconds;
-        /* if that fails, the later frames do not count */
-        (void)bst_sky_smooth(&entry_of(s, c, f)->state, dt, &entry_of(s, c, f + 1)->prior, &next,
-                             &state);
+        if (!bst_sky_smooth(&entry_of(s, c, f)->state, dt, &entry_of(s, c, f + 1)->prior, &next,
+                            &state)) {
+            from = f; /* the later frames do not count */
+        }
     }
     *out = (bst_smoothed){.id = c->id,
                           .status = (bst_track_status)entry_of(s, c, frame)->status,
-                          .later_frames = (int)(c->last - frame),
+                          .later_frames = (int)(from - frame),
                           .state = state};
 }
 

@@ -34,10 +34,14 @@ bst_status bst_smoother_create(bst_ctx *ctx, int tracks, int lag_frames,
 /* Frees a smoother; NULL is allowed. */
 void bst_smoother_free(bst_smoother *smoother);
 
-/* Saves or restores the smoother.
+/* Saves or restores the smoother. What one of another lag saved, before a change during a run, is
+ * dropped: the smoother begins anew.
  *
- * Errors:    BST_ERR_FORMAT for damaged tracks */
-bst_status bst_smoother_archive(bst_smoother *smoother, bst_archive *archive) BST_MUST_CHECK;
+ * Given:     smoother  NULL: no smoothing
+ *            tracks    room of the smoother, or of the one that was saved
+ * Errors:    BST_ERR_FORMAT for damaged tracks, BST_ERR_MEMORY */
+bst_status bst_smoother_archive(bst_smoother *smoother, int tracks,
+                                bst_archive *archive) BST_MUST_CHECK;
 
 /* Adds the state of the multi-target tracker after a frame; its parameter keep_priors is set.
  *

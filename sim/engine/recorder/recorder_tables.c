@@ -256,9 +256,7 @@ static const bst_io_column identity_columns[] = {
     TICK,
     TIME,
     INT("track_id", "", "as in tracks"),
-    INT("object", "",
-        "index in the scenario: id in truth; -1: none of the catalogue; -2: what the cue means, "
-        "without a catalogue object"),
+    INT("object", "", "index in the scenario: id in truth; -1: none of the catalogue"),
     TEXT("name", "its name; NULL: none"),
     INT("norad", "", "its catalogue number, 0: none"),
     REAL("probability", "", "that the track is of this object; those below 0.001 are left out"),
