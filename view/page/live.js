@@ -25,7 +25,8 @@ export class Live {
     this.sequence = 0;
     this.newest = true; // the page shows the newest frame
     this.trail = [];
-    this.queue = []; // commands that wait for the answer before
+    this.queue = []; // commands that wait until the one before is obeyed
+    this.sentAt = -1; // commands that the run had obeyed when the last one was sent; -1: none is awaited
     this.refusal = { text: '', until: 0 }; // of the last command that was not taken
     this.shown = 0; // frames
     this.over = false; // the run has ended, and the page knows its end
@@ -48,7 +49,7 @@ export class Live {
     address.protocol = 'ws:';
     this.socket = new WebSocket(address);
     this.socket.binaryType = 'arraybuffer';
-    this.socket.addEventListener('open', () => this.ask());
+    this.socket.addEventListener('open', () => { this.sentAt = -1; this.ask(); });
     this.socket.addEventListener('message', (event) => this.take(event.data));
     this.socket.addEventListener('close', () => {
       if (this.state && !this.state.ended) this.say('The run cannot be reached. Is "boresight view" still running?');
@@ -59,10 +60,13 @@ export class Live {
   /** One request, which gets one answer. */
   ask() {
     const asked = { sensor: this.app.sensor, after: this.sequence, take: true };
-    if (this.queue.length > 0) [asked.command] = this.queue;
+    const next = this.state && this.state.obeyed === this.sentAt ? undefined : this.queue[0];
+    if (next) asked.command = next;
     if (this.socket.readyState !== WebSocket.OPEN) return; // the next connection asks
     this.socket.send(JSON.stringify(asked));
+    if (!next) return;
     this.queue.shift();
+    this.sentAt = this.state ? this.state.obeyed : -1;
   }
 
   /**
@@ -73,12 +77,13 @@ export class Live {
     const bytes = Math.max(0, ...commands.map((one) => new TextEncoder().encode(JSON.stringify(one)).length));
     let why = '';
     if (bytes > COMMAND_BYTES) why = `Not done: the command has ${bytes} bytes (allowed: ${COMMAND_BYTES}).`;
-    else if (this.queue.length + commands.length > QUEUE_MOST) why = `Not done: ${this.queue.length} commands still wait (allowed: ${QUEUE_MOST}). Try again.`;
+    else if (this.queue.length + commands.length > QUEUE_MOST) why = `Not done: ${this.queue.length + commands.length} commands would wait (allowed: ${QUEUE_MOST}).`;
     if (why) {
       this.refusal = { text: why, until: performance.now() + REFUSAL_MS };
       this.say(why);
       element('change-problem').textContent = why;
     } else {
+      this.refusal.until = 0;
       this.queue.push(...commands);
     }
     return !why;
@@ -97,6 +102,7 @@ export class Live {
       const pixels = width > 0 ? { width, height, data: new Uint16Array(data, 4 + length, width * height) } : null;
       this.takeFrame(answer.frame, pixels);
     }
+    if (answer.problem) this.sentAt = -1; // refused: it does not count
     this.describe(before, answer.problem);
     if (this.state.run >= 0) this.ready();
     // the answer is drawn before the next one is asked for
