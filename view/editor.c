@@ -14,9 +14,9 @@
 #include "sim/core/draft.h"
 #include "sim/core/file.h"
 #include "sim/core/json_member.h"
-#include "sim/core/text.h"
 #include "view/child_command.h"
 #include "view/editor_internal.h"
+#include "view/scenario_list.h"
 
 /* Processor time of a check, s: of the shipped scenarios the longest takes 1 s. */
 enum { CHECK_LIMIT_S = 10 };
@@ -158,16 +158,22 @@ static void add_problems(char *messages, cJSON *list) {
     }
 }
 
-bst_status bst_view_editor_check(bst_ctx *ctx, const char *body, cJSON **out) {
-    static const char *const words[] = {"check", "-", "--figures", "-", NULL};
+/* Runs a command on the text of a body. */
+static bst_status run_on_text(bst_ctx *ctx, const char *const *words, const char *body,
+                              bst_view_child_result *child) {
     bst_json *request;
     const char *text;
-    bst_view_child_result child;
     BST_TRY(bst_view_editor_body(ctx, body, "text", &request, &text));
     bst_status status =
-        bst_view_child_run(ctx, words, ".", text, strlen(text), CHECK_LIMIT_S, &child);
+        bst_view_child_run(ctx, words, ".", text, strlen(text), CHECK_LIMIT_S, child);
     bst_json_free(request);
-    BST_TRY(status);
+    return status;
+}
+
+bst_status bst_view_editor_check(bst_ctx *ctx, const char *body, cJSON **out) {
+    static const char *const words[] = {"check", "-", "--figures", "-", NULL};
+    bst_view_child_result child;
+    BST_TRY(run_on_text(ctx, words, body, &child));
     *out = cJSON_CreateObject();
     cJSON_AddBoolToObject(*out, "good", child.exit_code == 0);
     cJSON *problems = cJSON_AddArrayToObject(*out, "problems");
@@ -188,14 +194,8 @@ bst_status bst_view_editor_check(bst_ctx *ctx, const char *body, cJSON **out) {
 
 bst_status bst_view_editor_loops(bst_ctx *ctx, const char *body, cJSON **out) {
     static const char *const words[] = {"loop", "-", "--json", "-", NULL};
-    bst_json *request;
-    const char *text;
     bst_view_child_result child;
-    BST_TRY(bst_view_editor_body(ctx, body, "text", &request, &text));
-    bst_status status =
-        bst_view_child_run(ctx, words, ".", text, strlen(text), CHECK_LIMIT_S, &child);
-    bst_json_free(request);
-    BST_TRY(status);
+    BST_TRY(run_on_text(ctx, words, body, &child));
     *out = cJSON_CreateObject();
     cJSON *loops = child.exit_code == 0 ? cJSON_Parse(child.output) : NULL;
     cJSON_AddItemToObject(*out, "loops", loops ? loops : cJSON_CreateNull());
@@ -215,7 +215,6 @@ bst_status bst_view_editor_loops(bst_ctx *ctx, const char *body, cJSON **out) {
 /* Checks name and text of a file that is to be saved. */
 static bst_status check_saved(bst_ctx *ctx, const char *name, const char *text, char *const *base,
                               bool overwrite) {
-    static const char ending[] = ".json";
     const char *const target = name;
     const bst_option table[] = {{.name = "file",
                                  .kind = BST_OPTION_TEXT,
@@ -224,13 +223,11 @@ static bst_status check_saved(bst_ctx *ctx, const char *name, const char *text, 
                                  .argument = "FILE"},
                                 {.name = NULL}};
     const bool given[] = {true};
-    size_t length = strlen(name);
     bst_json *json;
-    if (!bst_text_is_file_name(name) || length < sizeof ending ||
-        strcmp(name + length - (sizeof ending - 1), ending) != 0) {
+    if (!bst_view_is_scenario_name(name)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "\"%.100s\" is no name for a scenario (allowed: a name without folder that "
-                        "ends with .json)",
+                        "ends with .json and does not begin with \".\" or \"-\")",
                         name);
     }
     if (bst_json_parse(ctx, name, text, strlen(text), &json) != BST_OK) {

@@ -8,8 +8,8 @@
 
 #include "boresight/status.h"
 
-/* Scenario files that are listed, and satellites that are found. */
-enum { BST_VIEW_EDITOR_FILES = 400, BST_VIEW_EDITOR_SATELLITES = 40 };
+/* Satellites that are found. */
+enum { BST_VIEW_EDITOR_SATELLITES = 40 };
 
 /* JSON Schema of scenarios, with the modules that come with Boresight.
  *
@@ -34,10 +34,10 @@ bst_status bst_view_editor_open(bst_ctx *ctx, const char *body, cJSON **out) BST
 /* Checks a text as `boresight check` does, as a file of the working folder.
  *
  * Given:     body  {"text": TEXT}
- * Returned:  *out  {good, problems: [{kind, pointer, line, column, text}], figures}. kind: "error"
- * or "warning"; pointer: JSON pointer or ""; line, column: from 1, or 0; figures: of `boresight
- * check --figures`, null for a wrong text Errors:    BST_ERR_ARGUMENT: bad body; those of
- * bst_view_child_run */
+ * Returned:  *out  {good, problems: [{kind, pointer, line, column, text}], figures}
+ *                  kind: "error" or "warning"; pointer: JSON pointer or ""; line, column: from 1,
+ *                  or 0; figures: of `boresight check --figures`, null for a wrong text
+ * Errors:    BST_ERR_ARGUMENT: bad body; those of bst_view_child_run */
 bst_status bst_view_editor_check(bst_ctx *ctx, const char *body, cJSON **out) BST_MUST_CHECK;
 
 /* Margins of the control loops of a text: {loops}, of `boresight loop --json`, or null with the
@@ -56,9 +56,9 @@ bst_status bst_view_editor_satellites(bst_ctx *ctx, const char *body, cJSON **ou
  *
  * Given:     body  {"file": NAME.json, "text": TEXT, "overwrite": true}
  * Returned:  *out  {file}: its path
- * Errors:    BST_ERR_ARGUMENT: bad body, a name with a folder, a text that is no JSON object, a
- * file that is there without overwrite, that the text extends, or that bst_outputs_check refuses;
- * BST_ERR_IO */
+ * Errors:    BST_ERR_ARGUMENT: bad body, a name that bst_view_is_scenario_name refuses, a text that
+ * is no JSON object, a file that is there without overwrite, that the text extends, or that
+ * bst_outputs_check refuses; BST_ERR_IO */
 bst_status bst_view_editor_save(bst_ctx *ctx, const char *body, cJSON **out) BST_MUST_CHECK;
 
 #endif

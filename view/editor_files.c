@@ -1,7 +1,6 @@
 #define _XOPEN_SOURCE 700 /* realpath */
 /* Scenario files and element sets that the editor offers. */
 #include <ctype.h>
-#include <dirent.h>
 #include <errno.h>
 #include <limits.h>
 #include <stdio.h>
@@ -13,56 +12,12 @@
 #include "sim/astro/elements.h"
 #include "sim/astro/tle.h"
 #include "sim/cli/shipped.h"
-#include "sim/core/file.h"
 #include "sim/core/json_member.h"
 #include "view/editor.h"
 #include "view/editor_internal.h"
-
-/* Longest file that is looked at for the list, bytes. */
-enum { LISTED_BYTES = 1 << 20 };
+#include "view/scenario_list.h"
 
 /* ------------------------------------------------------------------ scenarios */
-
-/* Adds a file if it is a scenario: an object with "boresight", or one that extends another. */
-static void add_file(const char *path, bool shipped, cJSON *list) {
-    bst_ctx ignored = {0};
-    char *text = NULL;
-    size_t bytes;
-    if (bst_file_read(&ignored, path, LISTED_BYTES, "a scenario", &text, &bytes) != BST_OK) {
-        return;
-    }
-    cJSON *root = cJSON_ParseWithLength(text, bytes);
-    if (bst_json_member(root, "boresight") || bst_json_member(root, "extends")) {
-        cJSON *node = cJSON_CreateObject();
-        cJSON_AddItemToArray(list, node);
-        cJSON_AddStringToObject(node, "file", path);
-        cJSON_AddStringToObject(node, "name", bst_json_member_text(root, "name", ""));
-        cJSON_AddStringToObject(node, "description", bst_json_member_text(root, "description", ""));
-        cJSON_AddBoolToObject(node, "shipped", shipped);
-    }
-    cJSON_Delete(root);
-    free(text);
-}
-
-static int is_json(const struct dirent *entry) {
-    size_t length = strlen(entry->d_name);
-    return length > 5 && strcmp(entry->d_name + length - 5, ".json") == 0;
-}
-
-/* Adds the scenarios of a folder, by name. `prefix`: of their paths. */
-static void add_folder(const char *folder, const char *prefix, bool shipped, cJSON *list) {
-    struct dirent **entries = NULL;
-    int count = scandir(folder, &entries, is_json, alphasort);
-    for (int i = 0; i < count; i++) {
-        char path[PATH_MAX];
-        int n = snprintf(path, sizeof path, "%s%s", prefix, entries[i]->d_name);
-        if (n > 0 && (size_t)n < sizeof path && cJSON_GetArraySize(list) < BST_VIEW_EDITOR_FILES) {
-            add_file(path, shipped, list);
-        }
-        free(entries[i]);
-    }
-    free(entries);
-}
 
 static bool is_same_folder(const char *a, const char *b) {
     struct stat one, two;
@@ -83,12 +38,12 @@ bst_status bst_view_editor_list(bst_ctx *ctx, cJSON **out) {
         snprintf(shipped, sizeof shipped, "scenarios");
     }
     snprintf(prefix, sizeof prefix, "%s/", shipped);
-    add_folder(".", "", false, list);
+    bst_view_scenarios_add(".", "", false, list);
     if (is_same_folder("scenarios", shipped)) {
-        add_folder("scenarios", "scenarios/", true, list);
+        bst_view_scenarios_add("scenarios", "scenarios/", true, list);
     } else {
-        add_folder("scenarios", "scenarios/", false, list);
-        add_folder(shipped, prefix, true, list);
+        bst_view_scenarios_add("scenarios", "scenarios/", false, list);
+        bst_view_scenarios_add(shipped, prefix, true, list);
     }
     return BST_OK;
 }

@@ -20,10 +20,10 @@ void bst_view_launcher_free(bst_view_launcher *launcher);
 
 /* Starts a viewer of a scenario.
  *
- * Given:     scenario  file
- * Returned:  url       address of its page
- * Errors:    BST_ERR_STATE: too many run; BST_ERR_IO; BST_ERR_CONFIG: the scenario cannot run, the
- *            reason is on standard error */
+ * Given:     scenario  file; does not begin with "-"
+ * Returned:  url       address of its page: begins with "http://127.0.0.1:"
+ * Errors:    BST_ERR_STATE: too many run; BST_ERR_IO; BST_ERR_CONFIG: the scenario cannot run, with
+ *            the viewer's own reason, or is not ready in time; the viewer has ended then */
 bst_status bst_view_launch(bst_ctx *ctx, bst_view_launcher *launcher, const char *scenario,
                            char url[BST_VIEW_LAUNCH_URL_BYTES]) BST_MUST_CHECK;
 

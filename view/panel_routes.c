@@ -1,10 +1,13 @@
 #include "view/panel_routes.h"
 
+#include <stdio.h>
+#include <sys/stat.h>
+
 #include "sim/core/json_member.h"
-#include "sim/core/text.h"
 #include "view/editor.h"
-#include "view/launch.h"
+#include "view/scenario_list.h"
 #include "view/space.h"
+#include "view/start_routes.h"
 #include "view/why.h"
 
 static bst_status schema_route(bst_ctx *ctx, bst_view_exchange *x) {
@@ -37,18 +40,21 @@ static bst_status save_route(bst_ctx *ctx, bst_view_exchange *x) {
 
 /* POST {"file": NAME.json}: starts a scenario of the working folder live; {"url": address}. */
 static bst_status run_route(bst_ctx *ctx, bst_view_exchange *x) {
-    char url[BST_VIEW_LAUNCH_URL_BYTES];
+    char path[300]; /* with "./" a name is no option of the command */
+    struct stat found;
     cJSON *root = cJSON_Parse(x->body);
     const char *file = bst_json_member_text(root, "file", "");
-    bst_status status =
-        bst_text_is_file_name(file)
-            ? bst_view_launch(ctx, bst_view_subject_launcher(x->subject), file, url)
-            : bst_fail(ctx, BST_ERR_ARGUMENT, "\"%.100s\" is no file of this folder", file);
+    snprintf(path, sizeof path, "./%s", file);
+    bst_status status = BST_OK;
+    if (!bst_view_is_scenario_name(file) || stat(path, &found) != 0 || !S_ISREG(found.st_mode)) {
+        status = bst_fail(ctx, BST_ERR_ARGUMENT,
+                          "\"%.100s\" is no scenario of this folder (allowed: the name of a file "
+                          "that ends with .json)",
+                          file);
+    }
     cJSON_Delete(root);
     BST_TRY(status);
-    x->json = cJSON_CreateObject();
-    cJSON_AddStringToObject(x->json, "url", url);
-    return BST_OK;
+    return bst_view_launch_answer(ctx, x, path);
 }
 
 const bst_view_route bst_view_panel_routes[] = {

@@ -312,7 +312,8 @@ static bst_status open_pixels(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *
 static bst_status list_exposures(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s) {
     bst_ctx problem = {0};
     bst_status status = open_pixels(&problem, run, s);
-    if (status != BST_OK && s->sensor.file[0]) {
+    /* a run that is being written has no frames before its first exposure ends */
+    if (status != BST_OK && s->sensor.file[0] && !run->running) {
         bst_run_reader_note_problem(run->reader, "%s", problem.message);
     }
     const int tables = sizeof exposure_tables / sizeof *exposure_tables;

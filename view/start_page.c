@@ -6,40 +6,22 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "sim/cli/shipped.h"
+#include "sim/core/file.h"
 #include "sim/core/json_member.h"
+#include "sim/core/text.h"
 #include "sim/io/run_files.h"
 #include "sim/io/run_reader.h"
+#include "view/scenario_list.h"
 
 /* Runs that are listed, and entries of a folder that are looked at. */
 enum { RUNS_LISTED = 24, ENTRIES_MOST = 4096 };
-/* Longest scenario and picture that are read, bytes. */
-static const long FILE_BYTES = 16L << 20;
+/* Longest picture that is read, bytes. */
+enum { PICTURE_BYTES = 16 << 20 };
 
 static const char runs_folder[] = "runs";
-
-/* Reads a whole file; NULL: none, or too long. Free it. */
-static char *read_file(const char *path, size_t *bytes) {
-    FILE *file = fopen(path, "rb");
-    char *text = NULL;
-    long size = file && fseek(file, 0, SEEK_END) == 0 ? ftell(file) : -1;
-    if (size >= 0 && size <= FILE_BYTES && fseek(file, 0, SEEK_SET) == 0) {
-        text = malloc((size_t)size + 1);
-        *bytes = text ? fread(text, 1, (size_t)size, file) : 0;
-        if (text) {
-            text[*bytes] = '\0';
-        }
-    }
-    if (file) {
-        fclose(file);
-    }
-    return text;
-}
-
-static bool is_name(const char *name) {
-    return name[0] && name[0] != '.' && !strchr(name, '/');
-}
 
 /* Path of an entry; false: too long. */
 static bool join(const char *folder, const char *name, char *path, size_t bytes) {
@@ -47,46 +29,14 @@ static bool join(const char *folder, const char *name, char *path, size_t bytes)
     return length >= 0 && (size_t)length < bytes;
 }
 
-static int is_json(const struct dirent *entry) {
-    const char *dot = strrchr(entry->d_name, '.');
-    return is_name(entry->d_name) && dot && strcmp(dot, ".json") == 0;
-}
-
 static int is_listed(const struct dirent *entry) {
-    return is_name(entry->d_name);
-}
-
-/* Adds a scenario file; schemas and other JSON files are left out. */
-static void add_scenario(const char *folder, const char *name, cJSON *list) {
-    char path[4400];
-    size_t bytes;
-    char *text = join(folder, name, path, sizeof path) ? read_file(path, &bytes) : NULL;
-    cJSON *root = text ? cJSON_Parse(text) : NULL;
-    if (bst_json_member(root, "boresight") || bst_json_member(root, "extends")) {
-        cJSON *node = cJSON_CreateObject();
-        const char *description = cJSON_GetStringValue(bst_json_member(root, "description"));
-        cJSON_AddStringToObject(node, "file", name);
-        cJSON_AddStringToObject(node, "description", description ? description : "");
-        cJSON_AddItemToArray(list, node);
-    }
-    cJSON_Delete(root);
-    free(text);
+    return bst_text_is_file_name(entry->d_name);
 }
 
 static void list_scenarios(cJSON *list) {
     char folder[4096];
-    struct dirent **entries;
     bst_cli_shipped_file("scenarios", folder, sizeof folder);
-    int count = scandir(folder, &entries, is_json, alphasort);
-    for (int i = 0; i < count; i++) {
-        if (i < ENTRIES_MOST) {
-            add_scenario(folder, entries[i]->d_name, list);
-        }
-        free(entries[i]);
-    }
-    if (count >= 0) {
-        free(entries);
-    }
+    bst_view_scenarios_add(folder, "", true, list);
 }
 
 /* A run of the folder. */
@@ -161,6 +111,8 @@ bst_status bst_view_start_list(bst_ctx *ctx, cJSON **out) {
     if (!*out) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the start page");
     }
+    char folder[4096];
+    cJSON_AddStringToObject(*out, "folder", getcwd(folder, sizeof folder) ? folder : ".");
     list_scenarios(cJSON_AddArrayToObject(*out, "scenarios"));
     list_runs(cJSON_AddArrayToObject(*out, "runs"));
     return BST_OK;
@@ -170,15 +122,16 @@ bst_status bst_view_start_scenario(bst_ctx *ctx, const char *name, char *path, s
     char folder[4096];
     struct stat found;
     bst_cli_shipped_file("scenarios", folder, sizeof folder);
-    if (is_name(name) && join(folder, name, path, bytes) && stat(path, &found) == 0 &&
-        S_ISREG(found.st_mode)) {
+    if (bst_view_is_scenario_name(name) && join(folder, name, path, bytes) &&
+        stat(path, &found) == 0 && S_ISREG(found.st_mode)) {
         return BST_OK;
     }
     return bst_fail(ctx, BST_ERR_NOT_FOUND, "there is no shipped scenario of this name");
 }
 
 bst_status bst_view_start_run(bst_ctx *ctx, const char *name, char *path, size_t bytes) {
-    if (is_name(name) && join(runs_folder, name, path, bytes) && bst_io_folder_is_run(path)) {
+    if (bst_text_is_file_name(name) && join(runs_folder, name, path, bytes) &&
+        bst_io_folder_is_run(path)) {
         return BST_OK;
     }
     return bst_fail(ctx, BST_ERR_NOT_FOUND, "there is no run of this name in runs/");
@@ -187,7 +140,11 @@ bst_status bst_view_start_run(bst_ctx *ctx, const char *name, char *path, size_t
 bst_status bst_view_start_picture(bst_ctx *ctx, const char *name, bst_view_bytes *out) {
     char folder[512], path[600];
     BST_TRY(bst_view_start_run(ctx, name, folder, sizeof folder));
-    out->data =
-        join(folder, "quicklook.png", path, sizeof path) ? read_file(path, &out->bytes) : NULL;
-    return out->data ? BST_OK : bst_fail(ctx, BST_ERR_NOT_FOUND, "the run has no picture");
+    char *data = NULL;
+    if (!join(folder, "quicklook.png", path, sizeof path) ||
+        bst_file_read(ctx, path, PICTURE_BYTES, "a picture", &data, &out->bytes) != BST_OK) {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND, "the run has no picture");
+    }
+    out->data = data;
+    return BST_OK;
 }

@@ -4,8 +4,8 @@
 
 #include "view/subject.h"
 
-/* Lists scenarios and the newest runs: {"scenarios": [{file, description}], "runs": [{name, state,
- * scenario, ended, modified_s, picture}]}.
+/* Lists scenarios and the newest runs: {"folder": working folder, "scenarios": as
+ * bst_view_scenarios_add, "runs": [{name, state, scenario, ended, modified_s, picture}]}.
  *
  * Errors:    BST_ERR_MEMORY
  * Ownership: free *out with cJSON_Delete */

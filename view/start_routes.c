@@ -33,15 +33,20 @@ bst_status bst_view_post_open(bst_ctx *ctx, bst_view_exchange *x) {
     return BST_OK;
 }
 
+bst_status bst_view_launch_answer(bst_ctx *ctx, bst_view_exchange *x, const char *path) {
+    char url[BST_VIEW_LAUNCH_URL_BYTES];
+    BST_TRY(bst_view_launch(ctx, bst_view_subject_launcher(x->subject), path, url));
+    x->json = cJSON_CreateObject();
+    cJSON_AddStringToObject(x->json, "url", url);
+    return BST_OK;
+}
+
 bst_status bst_view_post_launch(bst_ctx *ctx, bst_view_exchange *x) {
-    char path[4400], url[BST_VIEW_LAUNCH_URL_BYTES];
+    char path[4400];
     cJSON *root;
     bst_status status =
         bst_view_start_scenario(ctx, member_of(x, "scenario", &root), path, sizeof path);
     cJSON_Delete(root);
     BST_TRY(status);
-    BST_TRY(bst_view_launch(ctx, bst_view_subject_launcher(x->subject), path, url));
-    x->json = cJSON_CreateObject();
-    cJSON_AddStringToObject(x->json, "url", url);
-    return BST_OK;
+    return bst_view_launch_answer(ctx, x, path);
 }

@@ -13,5 +13,7 @@ bst_status bst_view_post_open(bst_ctx *ctx, bst_view_exchange *x);
 /* POST {"scenario": FILE}: starts a shipped scenario live; {"url": address of its page}. Errors as
  * bst_view_launch. */
 bst_status bst_view_post_launch(bst_ctx *ctx, bst_view_exchange *x);
+/* Starts a scenario file live; the answer as that of bst_view_post_launch. */
+bst_status bst_view_launch_answer(bst_ctx *ctx, bst_view_exchange *x, const char *path);
 
 #endif

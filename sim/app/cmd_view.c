@@ -1,4 +1,6 @@
 /* boresight view: shows a run in the browser, recorded or live. */
+#include <sys/stat.h>
+
 #include "sim/analysis/check/scenario_rules.h"
 #include "sim/app/app.h"
 #include "sim/cli/command_line.h"
@@ -61,6 +63,35 @@ static const bst_option OPTIONS[] = {
     {.name = NULL},
 };
 
+/* Refuses options of a live run for what is no scenario. */
+static bst_status check_use(bst_ctx *ctx, const bst_view_session *r, const char *path) {
+    struct stat found;
+    if (path && (stat(path, &found) != 0 || !S_ISDIR(found.st_mode))) {
+        return BST_OK;
+    }
+    const struct {
+        const char *name;
+        bool given;
+    } of[] = {{"out", r->out},
+              {"overwrite", r->overwrite},
+              {"set", r->load.set.count > 0},
+              {"seed", r->load.seed},
+              {"duration", r->load.duration_s >= 0},
+              {"run-number", r->load.run >= 0},
+              {"device", r->device},
+              {"threads", r->threads > 0}};
+    for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+        if (of[i].given) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "--%s is for a live run, and %s: give a SCENARIO.json, or leave --%s "
+                            "away",
+                            of[i].name, path ? "a recorded one was given" : "no file was given",
+                            of[i].name);
+        }
+    }
+    return BST_OK;
+}
+
 int bst_cmd_view(int argc, char **argv) {
     bst_view_session r = {.load = BST_LOAD_DEFAULTS, .check = bst_check_rules_apply};
     bst_option table[sizeof OPTIONS / sizeof *OPTIONS];
@@ -78,8 +109,9 @@ int bst_cmd_view(int argc, char **argv) {
                  arguments);
         return bst_options_misuse(&ctx, "view");
     }
-    if (bst_load_check(&ctx, &r.load, table) != BST_OK) {
+    const char *path = arguments == 1 ? argv[1] : NULL;
+    if (check_use(&ctx, &r, path) != BST_OK || bst_load_check(&ctx, &r.load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "view");
     }
-    return bst_command_line_end(&ctx, bst_view_serve(&ctx, &r, arguments == 1 ? argv[1] : NULL));
+    return bst_command_line_end(&ctx, bst_view_serve(&ctx, &r, path));
 }

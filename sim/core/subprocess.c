@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <signal.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,9 +39,12 @@ static bool make_pipe(int ends[2]) {
            fcntl(ends[1], F_SETFD, FD_CLOEXEC) == 0;
 }
 
-static bst_status start(bst_ctx *ctx, const char *const argv[], const char *directory,
-                        bool want_input, bool want_output, const char *error_path,
-                        bst_subprocess *out) {
+/* How a child is started: bits. */
+enum { WANT_INPUT = 1, WANT_OUTPUT = 2, OWN_GROUP = 4 };
+
+static bst_status start(bst_ctx *ctx, const char *const argv[], const char *directory, int how,
+                        const char *error_path, bst_subprocess *out) {
+    const bool want_input = how & WANT_INPUT, want_output = how & WANT_OUTPUT;
     int input[2] = {-1, -1};
     int output[2] = {-1, -1};
     int report[2] = {-1, -1}; /* carries errno if exec fails; closes if it succeeds */
@@ -51,6 +55,9 @@ static bst_status start(bst_ctx *ctx, const char *const argv[], const char *dire
     }
     pid_t pid = fork();
     if (pid == 0) {
+        if (how & OWN_GROUP) {
+            setpgid(0, 0);
+        }
         run_child(argv, directory, input[0], output[1], error_path, report[1]);
     }
     if (pid < 0) {
@@ -108,12 +115,23 @@ failed:;
 
 bst_status bst_subprocess_start(bst_ctx *ctx, const char *const argv[], const char *directory,
                                 bool want_output, const char *error_path, bst_subprocess *out) {
-    return start(ctx, argv, directory, false, want_output, error_path, out);
+    return start(ctx, argv, directory, want_output ? WANT_OUTPUT : 0, error_path, out);
+}
+
+bst_status bst_subprocess_start_group(bst_ctx *ctx, const char *const argv[], const char *directory,
+                                      const char *error_path, bst_subprocess *out) {
+    return start(ctx, argv, directory, WANT_OUTPUT | OWN_GROUP, error_path, out);
+}
+
+void bst_subprocess_kill(const bst_subprocess *child) {
+    if (child->pid > 0) {
+        kill(-child->pid, SIGKILL);
+    }
 }
 
 bst_status bst_subprocess_start_fed(bst_ctx *ctx, const char *const argv[], const char *error_path,
                                     bst_subprocess *out) {
-    return start(ctx, argv, NULL, true, false, error_path, out);
+    return start(ctx, argv, NULL, WANT_INPUT, error_path, out);
 }
 
 static int exit_code_of(int wait_status) {

@@ -22,6 +22,15 @@ bst_status bst_subprocess_start(bst_ctx *ctx, const char *const argv[], const ch
                                 bool want_output, const char *error_path,
                                 bst_subprocess *out) BST_MUST_CHECK;
 
+/* Starts as bst_subprocess_start with want_output, as the leader of a group of processes:
+ * bst_subprocess_kill reaches what the child has started, and Ctrl-C in a terminal does not reach
+ * it. */
+bst_status bst_subprocess_start_group(bst_ctx *ctx, const char *const argv[], const char *directory,
+                                      const char *error_path, bst_subprocess *out) BST_MUST_CHECK;
+
+/* Kills the group of a child of bst_subprocess_start_group; bst_subprocess_wait is still needed. */
+void bst_subprocess_kill(const bst_subprocess *child);
+
 /* Starts a child in the current directory with child->input connected to its standard input; its
  * standard output is discarded. Ignore SIGPIPE: the child may end early. */
 bst_status bst_subprocess_start_fed(bst_ctx *ctx, const char *const argv[], const char *error_path,

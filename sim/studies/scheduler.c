@@ -4,6 +4,8 @@
 #include <errno.h>
 #include <limits.h>
 #include <math.h>
+#include <poll.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,6 +19,7 @@ enum {
     PATH_BYTES = 4096,
     COMMAND_BYTES = 16384,
     JOB_BYTES = 128,
+    LINE_BYTES = 1024,
     JOBS_A_CALL = 200 /* names in one call of poll or cancel: 25 KiB, far below ARG_MAX */
 };
 
@@ -34,6 +37,8 @@ const bst_config_desc bst_scheduler_table[] = {
              "Time after which a job that poll does not name is lost."),
     BST_REAL(bst_scheduler, patience_s, "s", 1, 86400, "900",
              "Time that the commands may fail before the study stops."),
+    BST_REAL(bst_scheduler, call_s, "s", 1, 86400, "300",
+             "Time after which a command that has not ended is killed; it has failed then."),
     BST_CONFIG_END};
 
 bst_status bst_scheduler_load(bst_ctx *ctx, const char *path, bst_scheduler *out) {
@@ -97,18 +102,82 @@ static command_call call_of(const char *command) {
     return (command_call){.argv = {"sh", "-c", command, "boresight"}, .count = 4};
 }
 
-/* Executes a command to its end. */
+/* Gives a call's user the lines of a text of *bytes bytes; an unfinished last line stays, unless
+ * `all` is set or it fills the text. */
+static void take_lines(const command_call *call, char text[LINE_BYTES], size_t *bytes, bool all) {
+    char *begin = text, *const end = text + *bytes;
+    while (begin < end) {
+        char *stop = memchr(begin, '\n', (size_t)(end - begin));
+        if (!stop && !all && !(begin == text && *bytes == LINE_BYTES - 1)) {
+            break;
+        }
+        stop = stop ? stop : end;
+        *stop = '\0';
+        if (call->take) {
+            call->take(call->user, begin);
+        }
+        begin = stop < end ? stop + 1 : end;
+    }
+    *bytes = (size_t)(end - begin);
+    memmove(text, begin, *bytes);
+}
+
+/* Reads the output of a command to its end. False: it has not ended at the wall time until_s. */
+static bool read_output(const command_call *call, int output, double until_s) {
+    char text[LINE_BYTES];
+    size_t bytes = 0;
+    struct pollfd wait = {.fd = output, .events = POLLIN};
+    for (;;) {
+        const double left_s = until_s - bst_wall_seconds();
+        if (left_s <= 0) {
+            return false;
+        }
+        if (poll(&wait, 1, (int)fmin(1000, 1e3 * left_s + 1)) <= 0) {
+            continue;
+        }
+        const ssize_t got = read(output, text + bytes, LINE_BYTES - 1 - bytes);
+        if (got <= 0) {
+            if (got < 0 && errno == EINTR) {
+                continue;
+            }
+            take_lines(call, text, &bytes, true);
+            return true;
+        }
+        bytes += (size_t)got;
+        take_lines(call, text, &bytes, false);
+    }
+}
+
+/* Waits for a command that has closed its output. False: it has not ended at until_s. */
+static bool wait_for(bst_subprocess *child, double until_s, int *code) {
+    const struct timespec pause = {.tv_nsec = 1000000};
+    while (!bst_subprocess_poll(child, code)) {
+        if (bst_wall_seconds() > until_s) {
+            return false;
+        }
+        nanosleep(&pause, NULL);
+    }
+    return true;
+}
+
+/* Executes a command to its end, or kills it after its time, which is a failure. */
 static bst_status execute(bst_ctx *ctx, const scheduler_executor *s, command_call *call) {
     bst_subprocess child;
-    BST_TRY(bst_subprocess_start(ctx, call->argv, s->folder, true, s->errors, &child));
-    char line[1024];
-    while (fgets(line, sizeof line, child.output)) {
-        if (call->take) {
-            call->take(call->user, line);
-        }
+    BST_TRY(bst_subprocess_start_group(ctx, call->argv, s->folder, s->errors, &child));
+    const double until_s = bst_wall_seconds() + s->scheduler.call_s;
+    const bool ended =
+        read_output(call, fileno(child.output), until_s) && wait_for(&child, until_s, &call->code);
+    if (ended) {
+        fclose(child.output);
+        read_errors(s, call->said);
+        return BST_OK;
     }
+    bst_subprocess_kill(&child);
     call->code = bst_subprocess_wait(&child);
+    call->code = call->code ? call->code : 128 + SIGKILL;
     read_errors(s, call->said);
+    snprintf(call->said, sizeof call->said, "it was killed after call_s, %g s",
+             s->scheduler.call_s);
     return BST_OK;
 }
 

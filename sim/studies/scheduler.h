@@ -16,6 +16,7 @@ typedef struct bst_scheduler {
     char cancel[4096];  /* "$@": names of jobs */
     int64_t queue_size; /* maximum jobs in the queue */
     double poll_s, grace_s, patience_s;
+    double call_s; /* time that a command may take */
 } bst_scheduler;
 
 extern const bst_config_desc bst_scheduler_table[];

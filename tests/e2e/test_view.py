@@ -343,6 +343,11 @@ class View(Checks):
             fcntl.flock(lock, fcntl.LOCK_EX)
             viewer = Viewer(final + ".partial")
         self.assertEqual(viewer.json("api/refresh")["state"], "still running")
+        frames, = glob.glob(final + ".partial/*.fits")
+        os.rename(frames, frames + ".later")  # before the first exposure: no problem of the run
+        self.assertEqual(viewer.json("api/refresh")["problems"], [])
+        self.assertEqual(viewer.numbers("api/frames?sensor=0").size % 5, 0)
+        os.rename(frames + ".later", frames)
         os.remove(final + ".partial/lock")
         os.rename(final + ".partial", final)
         self.assertEqual(viewer.json("api/refresh")["state"], "complete")
@@ -371,6 +376,14 @@ class View(Checks):
         self.assertGreater(viewer.numbers("api/plot?sensor=0&panel=pointing_error&from=0&to=10&columns=100")[0], 0)
         self.assertLess(time.monotonic(), begin + 30)  # a join of all has 800 million rows
         self.assertEqual(viewer.end()[0], 0)
+
+    def test_options_of_a_live_run(self):
+        """They are refused where no scenario runs, not left unused."""
+        for path in ([], [self.made]):
+            for words in (["--out", "x"], ["--overwrite"], ["--device", "x"], ["--threads", "1"], ["--set", "/seed=1"]):
+                result = subprocess.run([runs.BORESIGHT, "view", *path, "--no-browser", *words], capture_output=True, text=True, check=False, timeout=30)
+                self.assertEqual(result.returncode, 2, words)
+                self.assertIn(f"{words[0]} is for a live run", result.stderr)
 
     def test_port_in_use(self):
         result = runs.call("view", self.made, "--no-browser", "--port", str(self.viewer.port))

@@ -3,9 +3,11 @@
 
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_view_panels.py BORESIGHT
 """
+import glob
 import json
 import math
 import os
+import shutil
 import sqlite3
 import unittest
 import urllib.error
@@ -122,7 +124,7 @@ class Server(unittest.TestCase):
         """Only into the folder, whole, and over nothing that is there unless asked."""
         base = os.path.join(self.base, "day_generator.json")
         text = json.dumps({"extends": base, "set": {PSF: 3}})
-        for name in ("../x.json", "/tmp/x.json", "x.txt", ".json", "", "a/b.json", "a\nb.json"):
+        for name in ("../x.json", "/tmp/x.json", "x.txt", ".json", "", "a/b.json", "a\nb.json", "--overwrite.json"):
             self.assertEqual(self.editor.post("save", file=name, text=text)[0], 400, name)
         for wrong in ("", "[]", "{", '{"extends": "mine.json"}'):
             self.assertEqual(self.editor.post("save", file="mine.json", text=wrong)[0], 400, wrong)
@@ -141,6 +143,33 @@ class Server(unittest.TestCase):
         self.assertEqual((opened["file"], opened["text"], opened["document"]["observers"][0]["sensors"][0]["camera"]["psf_fwhm_px"]), ("mine.json", text, 3))
         self.assertEqual(self.editor.post("save", file="mine.json", text=text.replace("3}", "4}"), overwrite=True)[0], 200)
         self.assertIn("4}", self.saved())
+
+    def test_run_starts_only_scenarios(self):
+        """No option of the command, no folder, no other file; the reason of a scenario that cannot run comes back."""
+        folder = runs.scratch()
+        os.mkdir(folder + "/folder.json")
+        with open(folder + "/bad.json", "w", encoding="utf-8") as file:
+            json.dump({"extends": os.path.join(self.base, "day_generator.json"), "set": {PSF: 60}}, file)
+        shutil.copy(folder + "/bad.json", folder + "/--help.json")
+        editor = Editor(None, folder)
+        for name in ("--help", "--port=99999", "--help.json", "folder.json", "nowhere.json", "../bad.json", "", "bad"):
+            status, answer = editor.post("run", file=name)
+            self.assertEqual(status, 400, name)
+            self.assertIn("is no scenario of this folder", answer)
+        status, answer = editor.post("run", file="bad.json")
+        self.assertEqual(status, 500)
+        self.assertIn(PSF + ": out of range (found 60", answer)
+        for name in glob.glob(f"/proc/{editor.process.pid}/task/*/children"):
+            with open(name, encoding="ascii") as children:
+                self.assertEqual(children.read(), "")
+        listed = [os.path.basename(one["file"]) for one in editor.json("api/editor/list")["files"]]
+        self.assertEqual(listed[:2], ["bad.json", "neossat_geo_track.json"])
+        start = editor.json("api/start")
+        self.assertEqual(start["folder"], os.path.realpath(folder))
+        scenarios = start["scenarios"]
+        self.assertEqual(scenarios[0]["file"], "neossat_geo_track.json")
+        self.assertEqual([one["file"] for one in scenarios if not one["description"]], [])
+        self.assertEqual(editor.end()[0], 0)
 
     def test_paths_of_an_opened_file_hold_in_the_folder(self):
         """A list of the small file replaces that of a file of another folder, with files of its own."""

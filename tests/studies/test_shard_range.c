@@ -44,6 +44,8 @@ static void test_numbers_of_the_environment(void **state) {
         const char *name, *value, *other, *start;
         int64_t part;
     } of[] = {{"SGE_TASK_ID", "undefined", NULL, NULL, 0},
+              {"LSB_JOBINDEX", "0", NULL, NULL, 0},
+              {"LSB_JOBINDEX", "5", NULL, NULL, 0},
               {"LSB_JOBINDEX", "2", NULL, NULL, 2},
               {"SGE_TASK_ID", "7", "SGE_TASK_FIRST", "5", 3},
               {"SLURM_ARRAY_TASK_ID", "12", "SLURM_ARRAY_TASK_MIN", "11", 2},
@@ -63,7 +65,10 @@ static void test_numbers_of_the_environment(void **state) {
         }
         bst_status status = bst_study_shard_range(&ctx, "env/4", 40, &job, &exact);
         if (of[i].part == 0) {
+            char value[64];
+            snprintf(value, sizeof value, "%s=%s", of[i].name, of[i].value);
             assert_int_equal(status, BST_ERR_ARGUMENT);
+            assert_non_null(strstr(ctx.message, i < 2 ? "BORESIGHT_SHARD_INDEX" : value));
         } else {
             bst_assert_ok(&ctx, status);
             assert_false(exact);

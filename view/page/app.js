@@ -110,11 +110,14 @@ class App {
 
   describeRun() {
     const { run } = this, summary = run.manifest.summary || {};
-    document.title = `${run.name} – Boresight`;
-    element('run-name').textContent = run.name;
+    const steered = Boolean(this.live && this.live.state.steered && !this.live.over);
+    const name = steered ? run.name.replace(/\.partial$/, '') : run.name; // it gets this name at its end
+    const state = steered && run.state === RUNNING ? 'live' : run.state;
+    document.title = `${name} – Boresight`;
+    element('run-name').textContent = name;
     element('run-name').title = run.manifest.scenario || '';
-    element('run-state').textContent = run.state;
-    element('run-state').classList.toggle('bad', run.state !== 'complete');
+    element('run-state').textContent = state;
+    element('run-state').classList.toggle('bad', state !== 'complete' && state !== 'live');
     const figures = [
       ['Final mode', summary.final_mode], ['Pointing RMS', summary.pointing_rms_px, ' px'],
       ['Custody', summary.custody === undefined || summary.custody === null ? undefined : 100 * summary.custody, ' %'],
@@ -154,7 +157,7 @@ class App {
     this.setFrames(await getNumbers('frames', { sensor }));
     this.current = -1;
     if (this.count === 0) {
-      this.frameView.show(null, null, this.live ? 'No frame yet. R runs, N steps a frame.' : 'This sensor has no frames.');
+      this.frameView.show(null, null, this.live ? this.live.waiting() : 'This sensor has no frames.');
       element('position').textContent = 'no frames';
     } else {
       await this.goTo(Math.min(frame, this.count - 1)); // the picture first

@@ -57,6 +57,7 @@ export class FrameView {
     this.sorted = details ? sortMarks(details) : null;
     if (counted || !image || !this.statistics) this.statistics = image ? describePixels(image.data) : null;
     element('no-pixels').hidden = Boolean(image);
+    element('no-pixels').classList.toggle('first', !image && !details);
     element('no-pixels').textContent = image ? '' : why;
     if (image && !this.painter.fits(image)) this.usePlain();
     if (image && !this.limits) this.findLimits();

@@ -1,11 +1,16 @@
 // A run that is steered from the page: its WebSocket, its newest frame, its controls.
 import { getJson } from './api.js';
 import { changeFields, changesOf } from './changes.js';
+import { shortNumber } from './plots.js';
 
 /** Exposures whose track positions are drawn as trails, as those of recorded runs. */
 const TRAIL_EXPOSURES = 40;
 /** Rates that are offered, times real time; 0: flat out. */
 const RATES = [0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 0];
+/** Commands that wait at most, and the longest one, bytes: the program takes 8192 bytes a message. */
+const QUEUE_MOST = 64, COMMAND_BYTES = 8000;
+/** Time that a command which was not taken is named, ms. */
+const REFUSAL_MS = 6000;
 /** Time before another attempt to connect, ms. */
 const RETRY_MS = 1000;
 
@@ -20,7 +25,9 @@ export class Live {
     this.sequence = 0;
     this.newest = true; // the page shows the newest frame
     this.trail = [];
-    this.queue = []; // commands that wait for the answer before
+    this.queue = []; // commands that wait until the one before is obeyed
+    this.sentAt = -1; // commands that the run had obeyed when the last one was sent; -1: none is awaited
+    this.refusal = { text: '', until: 0 }; // of the last command that was not taken
     this.shown = 0; // frames
     this.over = false; // the run has ended, and the page knows its end
     this.ready = null;
@@ -42,7 +49,7 @@ export class Live {
     address.protocol = 'ws:';
     this.socket = new WebSocket(address);
     this.socket.binaryType = 'arraybuffer';
-    this.socket.addEventListener('open', () => this.ask());
+    this.socket.addEventListener('open', () => { this.sentAt = -1; this.ask(); });
     this.socket.addEventListener('message', (event) => this.take(event.data));
     this.socket.addEventListener('close', () => {
       if (this.state && !this.state.ended) this.say('The run cannot be reached. Is "boresight view" still running?');
@@ -53,13 +60,33 @@ export class Live {
   /** One request, which gets one answer. */
   ask() {
     const asked = { sensor: this.app.sensor, after: this.sequence, take: true };
-    if (this.queue.length > 0) asked.command = this.queue.shift();
-    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(asked));
+    const next = this.state && this.state.obeyed === this.sentAt ? undefined : this.queue[0];
+    if (next) asked.command = next;
+    if (this.socket.readyState !== WebSocket.OPEN) return; // the next connection asks
+    this.socket.send(JSON.stringify(asked));
+    if (!next) return;
+    this.queue.shift();
+    this.sentAt = this.state ? this.state.obeyed : -1;
   }
 
-  /** @param {object} command see view/live_run.h */
-  command(command) {
-    if (this.queue.length < 8) this.queue.push(command);
+  /**
+   * Takes commands, all or none; false: none, and the page says why.
+   * @param {...object} commands see view/live_run.h
+   */
+  command(...commands) {
+    const bytes = Math.max(0, ...commands.map((one) => new TextEncoder().encode(JSON.stringify(one)).length));
+    let why = '';
+    if (bytes > COMMAND_BYTES) why = `Not done: the command has ${bytes} bytes (allowed: ${COMMAND_BYTES}).`;
+    else if (this.queue.length + commands.length > QUEUE_MOST) why = `Not done: ${this.queue.length + commands.length} commands would wait (allowed: ${QUEUE_MOST}).`;
+    if (why) {
+      this.refusal = { text: why, until: performance.now() + REFUSAL_MS };
+      this.say(why);
+      element('change-problem').textContent = why;
+    } else {
+      this.refusal.until = 0;
+      this.queue.push(...commands);
+    }
+    return !why;
   }
 
   /** @param {ArrayBuffer} data */
@@ -75,6 +102,7 @@ export class Live {
       const pixels = width > 0 ? { width, height, data: new Uint16Array(data, 4 + length, width * height) } : null;
       this.takeFrame(answer.frame, pixels);
     }
+    if (answer.problem) this.sentAt = -1; // refused: it does not count
     this.describe(before, answer.problem);
     if (this.state.run >= 0) this.ready();
     // the answer is drawn before the next one is asked for
@@ -157,8 +185,11 @@ export class Live {
     element('live-run').textContent = this.running() ? 'Pause' : 'Run';
     for (const id of ['live-run', 'live-step', 'live-rate', 'live-save', 'live-rewind', 'live-change', 'live-end']) element(id).disabled = !steers;
     element('live-branch').disabled = !this.controller;
-    this.say(problem || state.message || (this.controller || !state.steered ? '' : 'Another page controls this run.'));
-    element('change-problem').textContent = problem || state.message;
+    const refusal = performance.now() < this.refusal.until ? this.refusal.text : '';
+    this.say(refusal || problem || state.message || (this.controller || !state.steered ? '' : 'Another page controls this run.'));
+    element('change-problem').textContent = refusal || problem || state.message;
+    if (before && state.obeyed > before.obeyed && this.queue.length === 0 && element('changes').open) this.fillChanges();
+    if (this.shown === 0 && this.app.count === 0) element('no-pixels').textContent = this.waiting();
     const states = JSON.stringify(state.states);
     if (states !== this.states) {
       this.states = states;
@@ -186,9 +217,20 @@ export class Live {
 
   // ---------------------------------------------------------------- changes
 
-  async openChanges() {
+  /** What stands in the place of the first frame. */
+  waiting() {
+    const { state } = this;
+    if (state.ended) return 'The run has ended without a frame.';
+    return state.paused && state.steps === 0 ? `Paused at ${shortNumber(state.time_s)} s – Run (R)` : 'No frame yet';
+  }
+
+  async fillChanges() {
     this.scenario = await getJson('scenario');
     changeFields(element('change-fields'), this.scenario, this.app.sensor);
+  }
+
+  async openChanges() {
+    await this.fillChanges();
     element('change-problem').textContent = '';
     element('changes').showModal();
   }
@@ -198,11 +240,6 @@ export class Live {
     const free = element('change-set').value.trim();
     if (free) commands.push({ do: 'set', set: free });
     if (commands.length === 0) element('change-problem').textContent = 'Nothing differs.';
-    for (const command of commands) this.command(command);
-    element('change-set').value = '';
-    setTimeout(async () => {
-      this.scenario = await getJson('scenario');
-      changeFields(element('change-fields'), this.scenario, this.app.sensor);
-    }, 600);
+    else if (this.command(...commands)) element('change-set').value = ''; // the fields are filled once they are obeyed
   }
 }

@@ -54,7 +54,7 @@ function age(seconds) {
 }
 
 export async function showStart() {
-  const { runs, scenarios } = await getJson('start'), box = element('start');
+  const { folder, runs, scenarios } = await getJson('start'), box = element('start');
   for (const part of [element('main'), document.querySelector('footer'), document.querySelector('.run')]) part.hidden = true;
   document.title = 'Boresight';
   const ofRuns = runs.map((run) => card(run.name, [run.scenario, `${run.state}, ${age(run.modified_s)}`],
@@ -68,9 +68,9 @@ export async function showStart() {
   }));
   const { panels } = document.boresight;
   panels.withoutRun(box);
-  ofScenarios.unshift(card('New scenario', ['Change one of these in a form, with your own satellites and telescope, and save it as a file of your own.'], '', () => panels.show('editor')));
-  box.replaceChildren(...(runs.length ? section('Runs', 'In the folder runs/, the newest first. Click one to play it back.', ofRuns) : []),
-    ...section('Scenarios', 'Click one to run it live: pause it, step it, change it. It is recorded in runs/.', ofScenarios));
+  ofScenarios.splice(1, 0, card('New scenario', ['Change one of these in a form, with your own satellites and telescope, and save it as a file of your own.'], '', () => panels.show('editor')));
+  box.replaceChildren(...(runs.length ? section('Runs', `In ${folder}/runs, the newest first. Click one to play it back.`, ofRuns) : []),
+    ...section('Scenarios', `Click one to run it live: pause it, step it, change it. It is recorded in ${folder}/runs; scenarios of your own are kept in ${folder}.`, ofScenarios));
   box.hidden = false;
   document.dispatchEvent(new CustomEvent('startshown'));
 }

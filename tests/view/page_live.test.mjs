@@ -1,0 +1,51 @@
+// Unit tests of the commands of a live run, with a socket and a page that only take notes. Run by node's test runner:
+//   node --test tests/view/page_live.test.mjs
+import assert from 'node:assert/strict';
+import test from 'node:test';
+
+const texts = {};
+const node = (id) => ({ set textContent(text) { texts[id] = text; } });
+Object.assign(globalThis, { location: { search: '' }, document: { getElementById: node }, WebSocket: { OPEN: 1 } });
+const { Live } = await import('../../view/page/live.js');
+
+/** A live run without its controls. */
+function live() {
+  const sent = [];
+  const one = Object.assign(Object.create(Live.prototype), {
+    app: { sensor: 0 }, sequence: 0, queue: [], sentAt: -1, refusal: { text: '', until: 0 }, state: { obeyed: 0, time_s: 0, steps: 0, paused: true },
+    socket: { readyState: 1, send: (text) => sent.push(JSON.parse(text).command) },
+  });
+  return { one, sent };
+}
+
+test('a command waits for a connection, and for the one before', () => {
+  const { one, sent } = live();
+  assert.ok(one.command({ do: 'run' }, { do: 'pause' }));
+  one.socket.readyState = 3;
+  one.ask();
+  assert.equal(one.queue.length, 2); // nothing is lost
+  one.socket.readyState = 1;
+  one.ask();
+  one.ask();
+  one.state.obeyed++;
+  one.ask();
+  assert.deepEqual(sent, [{ do: 'run' }, undefined, { do: 'pause' }]);
+  assert.equal(one.queue.length, 0);
+});
+
+test('what is not taken is said', () => {
+  const { one } = live();
+  assert.ok(!one.command({ do: 'set', set: 'ä'.repeat(5000) }));
+  assert.match(texts['live-message'], /has 100\d\d bytes \(allowed: 8000\)/);
+  assert.ok(one.command(...Array(60).fill({ do: 'save' })));
+  assert.ok(!one.command(...Array(5).fill({ do: 'step' })));
+  assert.match(texts['change-problem'], /65 commands would wait \(allowed: 64\)/);
+  assert.equal(one.queue.length, 60);
+});
+
+test('before the first frame', () => {
+  const { one } = live();
+  assert.equal(one.waiting(), 'Paused at 0 s – Run (R)');
+  one.state.paused = false;
+  assert.equal(one.waiting(), 'No frame yet');
+});
