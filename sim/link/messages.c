@@ -347,9 +347,8 @@ static const bst_wire_field track_identities[] = {
 
 static const bst_wire_field identity_items[] = {
     NUMBER(bst_track_identity, track_id, 1, "As in `tracks`."),
-    INT(bst_track_identity, object, -2, MANY, "",
-        "Index in the catalogue; -1: none of its objects; -2: what the cue means, if the catalogue "
-        "lacks it."),
+    INT(bst_track_identity, object, -1, MANY, "",
+        "Index in the catalogue; -1: none of its objects."),
     BOUNDED(bst_track_identity, probability, 0, 1, "", "That the track is this object."), END};
 
 static const bst_wire_field tracks_smoothed[] = {
