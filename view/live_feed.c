@@ -322,7 +322,7 @@ void bst_view_feed_get(bst_view_feed *feed, int64_t sensor, int64_t after, doubl
     while (s->ready.sequence <= after && feed->wakes == wakes &&
            pthread_cond_timedwait(&feed->changed, &feed->lock, &until) == 0) {
     }
-    if (s->ready.sequence > after) {
+    if (s->ready.json && s->ready.sequence > after) {
         copy_frame(&s->ready, out);
     }
     pthread_mutex_unlock(&feed->lock);

@@ -165,6 +165,11 @@ class Live(Tables):
         self.assertEqual(state["time_s"], oldest["time_s"])
         self.command(lambda now: now["ended"], do="end")
         self.assertEqual(self.viewer.end()[0], 0)
+        # two at a time take two folders, which are there when the address is
+        pair = [test_view.Viewer(os.path.abspath(runs.TRACK), "--threads", "1", *SETS, cwd=self.folder) for _ in range(2)]
+        names = sorted(os.listdir(self.folder + "/runs"))
+        self.assertEqual([one.end()[0] for one in pair], [0, 0])
+        self.assertEqual([name.split("-live")[-1] for name in names], ["-2.partial", ".partial"])
         # no address where there will be no page
         result = subprocess.run([runs.BORESIGHT, "view", runs.TRACK, "--no-browser", "--out", self.out, *SETS], capture_output=True,
                                 text=True, check=False)
@@ -181,6 +186,14 @@ class Live(Tables):
             while not answer["sequence"]:
                 answer, pixels = self.page.ask()
             shown.append((answer["frame"], pixels))
+        # the newest frames follow a change of the camera
+        self.assertEqual(shown[-1][0]["gain_e_per_dn"], 1.6)
+        self.command(lambda now: now["changes"] == 1, do="set", set=f"{runs.SENSOR}/camera/gain_e_per_dn=3.25")
+        answer, pixels = self.page.ask({"do": "step", "frames": 1})
+        while not answer["sequence"]:
+            answer, pixels = self.page.ask()
+        self.assertEqual(answer["frame"]["gain_e_per_dn"], 3.25)
+        shown.append((answer["frame"], pixels))
         spectator = live_page.Socket(self.viewer)
         answer, pixels = spectator.ask({"do": "end"})
         self.assertEqual((answer["controller"], answer["problem"]), (False, "another page controls the run"))
@@ -223,6 +236,10 @@ class Live(Tables):
                     pass
                 raise ConnectionError
             page.close()
+        for number in (1e300, -1e300):
+            state = self.command(lambda now: now["message"], do="rewind", state=number)
+            self.assertIn("no such saved state", state["message"])
+            self.page.ask(after=number)
         giant = live_page.Socket(self.viewer)
         giant.peer.sendall(b"\x81\xff" + (1 << 62).to_bytes(8, "big") + bytes(4096))
         many = [live_page.Socket(self.viewer) for _ in range(60)]
