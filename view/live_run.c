@@ -286,6 +286,7 @@ static bst_status take_state(bst_ctx *ctx, bst_view_live *live, bst_view_state *
     live->go_to = 0;
     live->branching = false;
     live->tick = out->tick;
+    live->made = out->made;
     pthread_mutex_unlock(&live->lock);
     return back ? bst_run_parts_cut(ctx, live->parts, out->made) : BST_OK;
 }
@@ -312,6 +313,11 @@ static bst_status begin_branch(bst_ctx *ctx, bst_view_live *live) {
         memcpy(live->out, name, strlen(name) + 1);
         live->run = run;
         live->ended = false;
+        const bst_view_state *to = bst_view_live_find(live, live->go_to);
+        if (to) { /* the page sees the branch where it begins */
+            live->tick = to->tick;
+            live->made = to->made;
+        }
         set_written(live, true);
     }
     pthread_mutex_unlock(&live->lock);
