@@ -70,11 +70,9 @@ static bst_status create_lock(bst_ctx *ctx, const char *folder) {
     return BST_OK;
 }
 
-bst_status bst_view_copy_run(bst_ctx *ctx, const char *from, const char *to) {
+/* Copies the run's files into a folder that is there. */
+static bst_status copy_files(bst_ctx *ctx, const char *from, const char *to) {
     bst_status status = BST_OK;
-    if (mkdir(to, 0777) != 0) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be created: %s", to, strerror(errno));
-    }
     DIR *folder = opendir(from);
     if (!folder) {
         return fail(ctx, from);
@@ -94,4 +92,29 @@ bst_status bst_view_copy_run(bst_ctx *ctx, const char *from, const char *to) {
     }
     closedir(folder);
     return status == BST_OK ? create_lock(ctx, to) : status;
+}
+
+bst_status bst_view_copy_run(bst_ctx *ctx, const char *from, const char *to) {
+    if (mkdir(to, 0777) != 0) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be created: %s", to, strerror(errno));
+    }
+    bst_status status = copy_files(ctx, from, to);
+    if (status != BST_OK) {
+        bst_view_remove_copy(to);
+    }
+    return status;
+}
+
+void bst_view_remove_copy(const char *folder) {
+    DIR *list = opendir(folder);
+    if (!list) {
+        return;
+    }
+    for (struct dirent *entry; (entry = readdir(list));) {
+        if (entry->d_name[0] != '.' && bst_run_owns(entry->d_name)) {
+            unlinkat(dirfd(list), entry->d_name, 0);
+        }
+    }
+    closedir(list);
+    rmdir(folder);
 }

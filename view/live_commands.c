@@ -123,7 +123,8 @@ static bool burn(bst_view_live *live, int64_t tick, const cJSON *command) {
 
 /* Goes to a saved state: in this run, or in a branch. */
 static bool go_to(bst_view_live *live, const cJSON *command, bool branch) {
-    const bst_view_state *state = bst_view_live_find(live, (int64_t)number_of(command, "state", 0));
+    const bst_view_state *state =
+        bst_view_live_find(live, bst_json_whole(bst_json_member(command, "state"), 0));
     if (!state) {
         refuse(live, "there is no such saved state");
         return false;

@@ -50,6 +50,18 @@ struct bst_view_feed {
     feed_sensor sensor[];
 };
 
+/* Takes the cameras of a scenario. */
+static void take_cameras(bst_view_feed *feed, const bst_scenario *scenario) {
+    const bst_observer_config *observers = scenario->observers.items;
+    int count = 0;
+    for (int o = 0; o < scenario->observers.count; o++) {
+        const bst_sensor_config *sensors = observers[o].sensors.items;
+        for (int s = 0; s < observers[o].sensors.count && count < feed->sensors; s++) {
+            feed->sensor[count++].camera = sensors[s].camera;
+        }
+    }
+}
+
 bst_status bst_view_feed_create(bst_ctx *ctx, const bst_scenario *scenario, bst_view_feed **out) {
     const bst_observer_config *observers = scenario->observers.items;
     int count = 0;
@@ -68,12 +80,8 @@ bst_status bst_view_feed_create(bst_ctx *ctx, const bst_scenario *scenario, bst_
     pthread_condattr_destroy(&clock);
     feed->tick_rate_hz = (double)scenario->tick_rate_hz;
     feed->epoch = scenario->epoch;
-    for (int o = 0; o < scenario->observers.count; o++) {
-        const bst_sensor_config *sensors = observers[o].sensors.items;
-        for (int s = 0; s < observers[o].sensors.count; s++) {
-            feed->sensor[feed->sensors++].camera = sensors[s].camera;
-        }
-    }
+    feed->sensors = count;
+    take_cameras(feed, scenario);
     *out = feed;
     return BST_OK;
 }
@@ -314,7 +322,7 @@ void bst_view_feed_get(bst_view_feed *feed, int64_t sensor, int64_t after, doubl
     while (s->ready.sequence <= after && feed->wakes == wakes &&
            pthread_cond_timedwait(&feed->changed, &feed->lock, &until) == 0) {
     }
-    if (s->ready.sequence > after) {
+    if (s->ready.json && s->ready.sequence > after) {
         copy_frame(&s->ready, out);
     }
     pthread_mutex_unlock(&feed->lock);
@@ -333,8 +341,9 @@ void bst_view_feed_set_every(bst_view_feed *feed, bool every) {
     pthread_mutex_unlock(&feed->lock);
 }
 
-void bst_view_feed_restart(bst_view_feed *feed) {
+void bst_view_feed_restart(bst_view_feed *feed, const bst_scenario *scenario) {
     pthread_mutex_lock(&feed->lock);
+    take_cameras(feed, scenario);
     for (int i = 0; i < feed->sensors; i++) {
         for (int k = 0; k < WAITING; k++) {
             empty(&feed->sensor[i].waiting[k]);

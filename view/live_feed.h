@@ -39,8 +39,9 @@ void bst_view_feed_get(bst_view_feed *feed, int64_t sensor, int64_t after, doubl
                        bst_view_live_frame *out);
 /* Says whether every frame is kept, as in single steps; else those that a screen can show. */
 void bst_view_feed_set_every(bst_view_feed *feed, bool every);
-/* Forgets exposures that are not complete: the run goes on from another time. */
-void bst_view_feed_restart(bst_view_feed *feed);
+/* Forgets exposures that are not complete: the run goes on from another time, with the cameras of
+ * this scenario. */
+void bst_view_feed_restart(bst_view_feed *feed, const bst_scenario *scenario);
 /* Ends the waiting of all callers, as the state of the run has changed. */
 void bst_view_feed_wake(bst_view_feed *feed);
 

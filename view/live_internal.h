@@ -46,8 +46,10 @@ struct bst_view_live {
     int64_t tick, until_tick, speed_tick; /* until_tick: of the last advance */
     double speed_s, speed;                /* x real time, over about a second */
     bool ended, branching;
-    bool opened;                     /* a watched run's folder */
-    bool part_begun;                 /* the part has begun to step */
+    bool opened;               /* a watched run's folder */
+    bool part_begun;           /* the part has begun to step */
+    void (*begun)(void *user); /* called when the first part has begun; NULL: it was */
+    void *begun_user;
     int64_t go_to;                   /* id of the state to go to; 0: none */
     char message[BST_MESSAGE_BYTES]; /* of the last command; "": it was obeyed */
     char *scenario;                  /* text at the time of the run */

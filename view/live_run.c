@@ -9,8 +9,10 @@
 
 #include "sim/cli/stop_signals.h"
 #include "sim/core/wall_clock.h"
+#include "sim/io/run_files.h"
 #include "view/folder_copy.h"
 #include "view/live_internal.h"
+#include "view/space.h"
 
 /* Wall time between two looks at commands while it runs flat out, s: a command waits so long at
  * most, and a look costs about a millisecond. */
@@ -103,15 +105,37 @@ static bool save_is_due(bst_view_live *live) {
     return false;
 }
 
+/* The part has begun: its simulation is there, and its folder has the scenario. */
+static void begin_part(bst_view_live *live) {
+    bst_ctx ignored = {0};
+    bst_view_run *run;
+    live->part_begun = true;
+    if (bst_view_subject_run(&ignored, live->subject, live->run, &run) == BST_OK) {
+        bst_view_space_forget(run);
+    }
+    if (live->begun) {
+        live->begun(live->begun_user);
+        live->begun = NULL;
+    }
+}
+
 static bst_run_action next(void *user, int64_t tick, int64_t *until_tick) {
     bst_view_live *live = user;
     bst_run_action action = BST_RUN_ADVANCE;
     pthread_mutex_lock(&live->lock);
     live->tick = tick;
-    live->part_begun = true;
+    if (!live->part_begun) {
+        begin_part(live);
+    }
     for (look(live);;) {
+        int64_t most = INT64_MAX;
         if (bst_stop_requested()) {
             action = BST_RUN_END;
+            break;
+        }
+        if (bst_run_parts_due(live->parts, live->made, tick, &most)) {
+            live->why = "change";
+            action = BST_RUN_PART;
             break;
         }
         if (live->command_count > 0) {
@@ -127,7 +151,8 @@ static bst_run_action next(void *user, int64_t tick, int64_t *until_tick) {
             break;
         }
         if (!live->paused) {
-            *until_tick = live->until_tick = allowed_tick(live);
+            const int64_t allowed = allowed_tick(live);
+            *until_tick = live->until_tick = allowed < most ? allowed : most;
             action = BST_RUN_ADVANCE;
             if (*until_tick > tick) {
                 break;
@@ -183,19 +208,31 @@ static void drop_state(bst_view_live *live, int index) {
             (size_t)(--live->state_count - index) * sizeof live->states[0]);
 }
 
-/* Makes room for another state: the first, the last and those that were asked for stay longest. */
+/* State that goes first: the first, the last and those that were asked for stay longest, and the
+ * one to go to stays. 0: none. */
+static int choose_victim(const bst_view_live *live) {
+    int second = 0;
+    for (int i = 1; i < live->state_count; i++) {
+        if (live->states[i].id == live->go_to) {
+            continue;
+        }
+        if (strcmp(live->states[i].why, "saved") != 0) {
+            return i;
+        }
+        second = second > 0 ? second : i;
+    }
+    return second;
+}
+
+/* Makes room for another state. */
 static void make_room(bst_view_live *live, size_t bytes) {
     size_t held = bytes;
+    int victim;
     for (int i = 0; i < live->state_count; i++) {
         held += live->states[i].size;
     }
-    while (live->state_count > 1 &&
-           (live->state_count == BST_VIEW_LIVE_STATES || held > STATE_BYTES)) {
-        int victim = 1;
-        while (victim < live->state_count && strcmp(live->states[victim].why, "saved") == 0) {
-            victim++;
-        }
-        victim = victim < live->state_count ? victim : 1;
+    while ((live->state_count == BST_VIEW_LIVE_STATES || held > STATE_BYTES) &&
+           (victim = choose_victim(live)) > 0) {
         held -= live->states[victim].size;
         drop_state(live, victim);
     }
@@ -204,13 +241,17 @@ static void make_room(bst_view_live *live, size_t bytes) {
 static void on_saved(void *user, int64_t tick, void *bytes, size_t size) {
     bst_view_live *live = user;
     pthread_mutex_lock(&live->lock);
-    make_room(live, size);
-    live->states[live->state_count++] = (bst_view_state){.id = ++live->next_id,
-                                                         .tick = tick,
-                                                         .bytes = bytes,
-                                                         .size = size,
-                                                         .made = live->made,
-                                                         .why = live->why};
+    if (live->go_to > 0) { /* it goes back: what is after that state is dropped anyway */
+        free(bytes);
+    } else {
+        make_room(live, size);
+        live->states[live->state_count++] = (bst_view_state){.id = ++live->next_id,
+                                                             .tick = tick,
+                                                             .bytes = bytes,
+                                                             .size = size,
+                                                             .made = live->made,
+                                                             .why = live->why};
+    }
     live->saved_s = bst_wall_seconds();
     live->asked_s = live->saved_s;
     if (live->run < 0) {
@@ -220,12 +261,18 @@ static void on_saved(void *user, int64_t tick, void *bytes, size_t size) {
     bst_view_feed_wake(live->feed);
 }
 
-/* Drops the states after the one to go to, and the changes that were made after it. Returns it. */
+/* Drops the states after the one to go to, and the changes by hand that were made after it. Returns
+ * it; the last one if none is to go to. */
 static bst_status take_state(bst_ctx *ctx, bst_view_live *live, bst_view_state *out) {
     pthread_mutex_lock(&live->lock);
     int keep = live->state_count;
-    while (live->go_to > 0 && keep > 1 && live->states[keep - 1].id != live->go_to) {
-        keep--;
+    if (live->go_to > 0 && bst_view_live_find(live, live->go_to)) {
+        while (live->states[keep - 1].id != live->go_to) {
+            keep--;
+        }
+    } else if (live->go_to > 0) {
+        snprintf(live->message, sizeof live->message,
+                 "that state is no longer kept: the run is at the last one that is");
     }
     while (live->state_count > keep) {
         drop_state(live, live->state_count - 1);
@@ -239,6 +286,7 @@ static bst_status take_state(bst_ctx *ctx, bst_view_live *live, bst_view_state *
     live->go_to = 0;
     live->branching = false;
     live->tick = out->tick;
+    live->made = out->made;
     pthread_mutex_unlock(&live->lock);
     return back ? bst_run_parts_cut(ctx, live->parts, out->made) : BST_OK;
 }
@@ -259,20 +307,38 @@ static bst_status begin_branch(bst_ctx *ctx, bst_view_live *live) {
     }
     BST_TRY(bst_view_copy_run(ctx, live->out, partial));
     pthread_mutex_lock(&live->lock);
-    memcpy(live->out, name, strlen(name) + 1);
-    live->run = -1;
-    live->ended = false;
-    bst_status status = bst_view_subject_open(ctx, live->subject, partial, &live->run);
-    set_written(live, true);
+    int64_t run;
+    bst_status status = bst_view_subject_open(ctx, live->subject, partial, &run);
+    if (status == BST_OK) {
+        memcpy(live->out, name, strlen(name) + 1);
+        live->run = run;
+        live->ended = false;
+        const bst_view_state *to = bst_view_live_find(live, live->go_to);
+        if (to) { /* the page sees the branch where it begins */
+            live->tick = to->tick;
+            live->made = to->made;
+        }
+        set_written(live, true);
+    }
     pthread_mutex_unlock(&live->lock);
+    if (status != BST_OK) {
+        bst_view_remove_copy(partial);
+    }
     return status;
 }
 
-/* Keeps the text of the scenario for the page. */
+/* Keeps the text of the scenario for the page, and its cameras for the newest frames. */
 static void keep_scenario(bst_view_live *live, int64_t tick) {
-    cJSON *document = bst_run_parts_document(live->parts, tick);
-    char *text = document ? cJSON_PrintUnformatted(document) : NULL;
-    cJSON_Delete(document);
+    bst_ctx ignored = {0};
+    bst_json *document;
+    bst_scenario changed;
+    char *text = NULL;
+    if (bst_run_parts_changed(&ignored, live->parts, tick, &document, &changed) == BST_OK) {
+        text = cJSON_PrintUnformatted(bst_json_root(document));
+        bst_view_feed_restart(live->feed, &changed);
+        bst_scenario_free(&changed);
+        bst_json_free(document);
+    }
     pthread_mutex_lock(&live->lock);
     cJSON_free(live->scenario);
     live->scenario = text;
@@ -286,11 +352,10 @@ static void keep_scenario(bst_view_live *live, int64_t tick) {
     bst_view_live_anchor(live);
     live->chunk_ticks = live->period_ticks;
     pthread_mutex_unlock(&live->lock);
-    bst_view_feed_restart(live->feed);
 }
 
 /* Waits until a branch is asked for. False: the viewer ends. */
-static bool wait_branch(bst_view_live *live) {
+static bool wait_asked(bst_view_live *live) {
     bst_run_action action;
     bool branch = false;
     pthread_mutex_lock(&live->lock);
@@ -313,6 +378,22 @@ static bool wait_branch(bst_view_live *live) {
     return branch;
 }
 
+/* Waits for a branch, unless one is asked for, and begins it. False: the viewer ends. A branch that
+ * cannot be made is a message: the run stays. */
+static bool wait_branch(bst_ctx *ctx, bst_view_live *live) {
+    while (live->branching || wait_asked(live)) {
+        if (begin_branch(ctx, live) == BST_OK) {
+            return true;
+        }
+        pthread_mutex_lock(&live->lock);
+        snprintf(live->message, sizeof live->message, "there is no branch: %.900s", ctx->message);
+        live->go_to = 0;
+        live->branching = false;
+        pthread_mutex_unlock(&live->lock);
+    }
+    return false;
+}
+
 /* Takes back a change with which the run could not begin its next part. */
 static bst_status take_back(bst_ctx *ctx, bst_view_live *live, int made) {
     pthread_mutex_lock(&live->lock);
@@ -323,10 +404,13 @@ static bst_status take_back(bst_ctx *ctx, bst_view_live *live, int made) {
     return bst_run_parts_cut(ctx, live->parts, made);
 }
 
-bst_status bst_view_live_go(bst_ctx *ctx, bst_view_live *live, bool overwrite) {
+bst_status bst_view_live_go(bst_ctx *ctx, bst_view_live *live, bool overwrite,
+                            void (*begun)(void *user), void *user) {
     const bst_run_steering steering = {live, next, on_saved, on_message, true};
     bst_view_state from = {.tick = 0};
     bst_status status;
+    live->begun = begun;
+    live->begun_user = user;
     for (;;) {
         char out[sizeof live->out];
         snprintf(out, sizeof out, "%s", live->out);
@@ -334,13 +418,12 @@ bst_status bst_view_live_go(bst_ctx *ctx, bst_view_live *live, bool overwrite) {
         bst_run_part part = {from.bytes, from.size, from.tick, from.made, false};
         keep_scenario(live, part.tick);
         status = bst_run_parts_run(ctx, live->parts, &part, &request);
-        const int changes = bst_run_parts_scenario(live->parts)->changes.count;
+        const bool changed = bst_run_parts_by_hand(live->parts, from.made) > 0;
         if (status == BST_ERR_INTERRUPTED && part.ended) {
             BST_TRY(take_state(ctx, live, &from));
-        } else if (status != BST_OK && !live->part_begun && from.bytes && changes > from.made) {
+        } else if (status != BST_OK && !live->part_begun && from.bytes && changed) {
             BST_TRY(take_back(ctx, live, from.made));
-        } else if (status == BST_OK && (live->branching || wait_branch(live))) {
-            BST_TRY(begin_branch(ctx, live));
+        } else if (status == BST_OK && wait_branch(ctx, live)) {
             BST_TRY(take_state(ctx, live, &from));
         } else {
             return status;
@@ -369,7 +452,8 @@ static bst_status create(bst_ctx *ctx, const bst_scenario *scenario, bst_view_su
     live->tick_rate_hz = (double)scenario->tick_rate_hz;
     live->duration_s = scenario->duration_s;
     bst_status status = bst_view_feed_create(ctx, scenario, &live->feed);
-    if (status == BST_OK && snprintf(live->out, sizeof live->out, "%s", out) >= 4000) {
+    const int length = (int)bst_run_folder_length(out);
+    if (status == BST_OK && snprintf(live->out, sizeof live->out, "%.*s", length, out) >= 4000) {
         status = bst_fail(ctx, BST_ERR_ARGUMENT, "%.200s...: the path is too long", out);
     }
     if (status != BST_OK) {

@@ -34,8 +34,10 @@ void bst_view_live_free(bst_view_live *live);
 /* Runs it, in the calling thread, until a signal or a command ends it. It is paused at first.
  *
  * Given:     overwrite  replace an earlier run
+ *            begun      called with `user` once simulation and folder are there
  * Errors:    those of bst_run_parts_run: the run has failed */
-bst_status bst_view_live_go(bst_ctx *ctx, bst_view_live *live, bool overwrite) BST_MUST_CHECK;
+bst_status bst_view_live_go(bst_ctx *ctx, bst_view_live *live, bool overwrite,
+                            void (*begun)(void *user), void *user) BST_MUST_CHECK;
 
 /* Newest frames of the run; they belong to it. */
 bst_view_feed *bst_view_live_feed(bst_view_live *live);

@@ -88,7 +88,7 @@ static bool answer(bst_view_socket *socket, struct mg_connection *peer, const cJ
     bst_view_live_frame frame = {.sequence = 0};
     if (cJSON_IsNumber(sensor) && cJSON_IsNumber(after)) {
         bst_view_feed_get(bst_view_live_feed(socket->live), sensor->valueint,
-                          (int64_t)after->valuedouble, WAIT_S, &frame);
+                          bst_json_whole(after, 0), WAIT_S, &frame);
     }
     cJSON *node = cJSON_CreateObject();
     cJSON_AddItemToObject(node, "state", bst_view_live_state(socket->live));

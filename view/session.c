@@ -1,10 +1,14 @@
 #include "view/session.h"
 
+#include <errno.h>
 #include <stdio.h>
+#include <string.h>
 #include <sys/stat.h>
 #include <time.h>
+#include <unistd.h>
 
 #include "sim/cli/stop_signals.h"
+#include "sim/core/folder.h"
 #include "view/browser.h"
 #include "view/server.h"
 
@@ -39,40 +43,69 @@ static bst_status serve_run(bst_ctx *ctx, const bst_view_session *r, bst_view_su
     return BST_OK;
 }
 
-/* A folder in runs/ that does not exist yet. */
-static void choose_folder(const bst_scenario *scenario, char *out, size_t bytes) {
+/* A folder in runs/ that does not exist yet. Its .partial folder is made, empty, so that no other
+ * process chooses it; the run takes its place. */
+static bst_status choose_folder(bst_ctx *ctx, const bst_scenario *scenario, char out[160],
+                                char partial[200]) {
     struct stat found;
-    char partial[200];
-    int number = 1;
-    do {
-        int length = snprintf(out, bytes, "runs/%s-live", scenario->name);
-        if (number > 1 && length > 0 && (size_t)length < bytes) {
-            snprintf(out + length, bytes - (size_t)length, "-%d", number);
+    BST_TRY(bst_folder_make(ctx, "runs"));
+    for (int number = 1;; number++) {
+        if (number == 1) {
+            snprintf(out, 160, "runs/%s-live", scenario->name);
+        } else {
+            snprintf(out, 160, "runs/%s-live-%d", scenario->name, number);
         }
-        snprintf(partial, sizeof partial, "%s.partial", out);
-        number++;
-    } while (stat(out, &found) == 0 || stat(partial, &found) == 0);
+        snprintf(partial, 200, "%.160s.partial", out);
+        if (mkdir(partial, 0777) == 0) {
+            if (stat(out, &found) != 0) {
+                return BST_OK;
+            }
+            rmdir(partial);
+        } else if (errno != EEXIST) {
+            return bst_fail(ctx, BST_ERR_IO, "%s: cannot be created: %s", partial, strerror(errno));
+        }
+    }
+}
+
+/* A page whose address is not printed yet. */
+typedef struct waiting_page {
+    const bst_view_session *session;
+    char url[BST_VIEW_URL_BYTES];
+} waiting_page;
+
+static void announce_page(void *user) {
+    const waiting_page *page = user;
+    announce(page->session, page->url);
+}
+
+/* Runs a scenario into a folder, steered from the page. */
+static bst_status go_live_in(bst_ctx *ctx, const bst_view_session *r, bst_run_parts *parts,
+                             bst_view_subject *subject, const char *out) {
+    bst_view_live *live;
+    bst_view_server *server;
+    waiting_page page = {.session = r};
+    BST_TRY(bst_view_live_create(ctx, parts, subject, out, &live));
+    bst_status status = bst_view_server_start(ctx, subject, live, (int)r->port, page.url, &server);
+    if (status == BST_OK) {
+        status = bst_view_live_go(ctx, live, r->overwrite, announce_page, &page);
+        bst_view_server_stop(server);
+    }
+    bst_view_live_free(live);
+    return status;
 }
 
 /* Runs a scenario that is read, steered from the page. */
 static bst_status go_live(bst_ctx *ctx, const bst_view_session *r, bst_run_parts *parts,
                           bst_view_subject *subject) {
-    bst_view_live *live;
-    bst_view_server *server;
-    char url[BST_VIEW_URL_BYTES], chosen[160];
-    const char *out = r->out;
-    if (!out) {
-        choose_folder(bst_run_parts_scenario(parts), chosen, sizeof chosen);
-        out = chosen;
+    char out[160], partial[200];
+    if (r->out) {
+        return go_live_in(ctx, r, parts, subject, r->out);
     }
-    BST_TRY(bst_view_live_create(ctx, parts, subject, out, &live));
-    bst_status status = bst_view_server_start(ctx, subject, live, (int)r->port, url, &server);
-    if (status == BST_OK) {
-        announce(r, url);
-        status = bst_view_live_go(ctx, live, r->overwrite);
-        bst_view_server_stop(server);
+    BST_TRY(choose_folder(ctx, bst_run_parts_scenario(parts), out, partial));
+    bst_status status = go_live_in(ctx, r, parts, subject, out);
+    if (status != BST_OK) {
+        rmdir(partial); /* if no run has filled it */
     }
-    bst_view_live_free(live);
     return status;
 }
 

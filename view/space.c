@@ -36,6 +36,16 @@ static bst_status open_scene(bst_ctx *ctx, bst_view_run *run) {
     return BST_OK;
 }
 
+void bst_view_space_forget(bst_view_run *run) {
+    pthread_mutex_lock(&run->lock);
+    if (run->scene) {
+        bst_run_scene_close(run->scene);
+        free(run->scene);
+        run->scene = NULL;
+    }
+    pthread_mutex_unlock(&run->lock);
+}
+
 /* Calls an answer with the run locked and its world there. */
 static bst_status with_scene(bst_ctx *ctx, bst_view_exchange *x,
                              bst_status (*answer)(bst_ctx *, bst_view_run *, bst_view_exchange *)) {

@@ -26,7 +26,7 @@ typedef struct run_request {
     bst_load_options load;
     bst_simulation_options simulation;
     bst_run_saving saving;
-    const char *path, *out, *replay;
+    const char *out, *replay;
     int64_t threads;
     bool help, overwrite, quiet, serial, force, view;
 } run_request;
@@ -36,8 +36,7 @@ static bst_status create_and_run(bst_ctx *ctx, run_request *r, const bst_json *j
                                  const bst_scenario *scenario, bst_simulation **sim,
                                  bst_run_request *request) {
     if (scenario->changes.count > 0) {
-        return bst_run_parts_file(ctx, r->path, &r->load, &r->simulation, bst_check_rules_apply,
-                                  request);
+        return bst_run_parts_read(ctx, json, &r->simulation, bst_check_rules_apply, request);
     }
     BST_TRY(bst_run_restored_read(ctx, scenario, &r->saving, request->out, r->replay != NULL,
                                   &r->simulation, &request->restored));
@@ -139,7 +138,6 @@ int bst_cmd_run(int argc, char **argv) {
         return BST_EXIT_FAILED;
     }
     bst_stop_catch_signals();
-    r.path = argv[1];
     bst_status status = run_loaded(&ctx, &r, json, &scenario);
     bst_scenario_free(&scenario);
     bst_json_free(json);

@@ -9,7 +9,6 @@
 
 #include <cjson/cJSON.h>
 
-#include "sim/cli/plugins.h"
 #include "sim/cli/progress.h"
 #include "sim/core/compare.h"
 #include "sim/core/text.h"
@@ -368,12 +367,9 @@ static bst_status orbits_of(bst_ctx *ctx, const bst_export *e, const bst_scenari
 }
 
 static bst_status export_orbits(bst_ctx *ctx, const bst_export *e, bool believed) {
-    char path[4096];
     bst_json *json;
     bst_scenario scenario;
-    BST_TRY(bst_run_reader_file(ctx, e->run, "scenario.json", path, sizeof path));
-    BST_TRY(bst_json_load(ctx, path, &json));
-    bst_status status = bst_plugins_recorded_read(ctx, json, &scenario);
+    bst_status status = bst_run_recorded_scenario(ctx, e->run, &json, &scenario);
     if (status == BST_OK) {
         status = orbits_of(ctx, e, &scenario, believed);
     }

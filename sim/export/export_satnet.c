@@ -8,7 +8,6 @@
 #include <cjson/cJSON.h>
 
 #include "boresight/version.h"
-#include "sim/cli/plugins.h"
 #include "sim/cli/progress.h"
 #include "sim/core/compare.h"
 #include "sim/core/fnv.h"
@@ -21,6 +20,7 @@
 #include "sim/io/draft_file.h"
 #include "sim/io/fits_frames.h"
 #include "sim/io/fits_reader.h"
+#include "sim/run/run_observations.h"
 #include "sim/world/frame_updates.h"
 
 enum { PARTS = 3 };
@@ -460,14 +460,11 @@ static bst_status export_with_parts(bst_ctx *ctx, job *j) {
 }
 
 bst_status bst_export_satnet(bst_ctx *ctx, const bst_export *e) {
-    char path[4096];
     bst_json *json;
     bst_scenario scenario;
     job j = {.e = e, .scenario = &scenario};
     BST_TRY(make_folders(ctx, e->satnet));
-    BST_TRY(bst_run_reader_file(ctx, e->run, "scenario.json", path, sizeof path));
-    BST_TRY(bst_json_load(ctx, path, &json));
-    bst_status status = bst_plugins_recorded_read(ctx, json, &scenario);
+    bst_status status = bst_run_recorded_scenario(ctx, e->run, &json, &scenario);
     if (status == BST_OK) {
         j.mask = scenario.record.planes & UINT32_C(1) << BST_PLANE_SEGMENTATION;
         status = e->split ? export_with_parts(ctx, &j) : export_all(ctx, &j);

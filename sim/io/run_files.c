@@ -62,6 +62,14 @@ static bool matches(const char *const *patterns, const char *name) {
     return false;
 }
 
+size_t bst_run_folder_length(const char *path) {
+    size_t length = strlen(path);
+    while (length > 1 && path[length - 1] == '/') {
+        length--;
+    }
+    return length;
+}
+
 bool bst_run_owns(const char *name) {
     return matches(run_names, name);
 }

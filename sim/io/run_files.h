@@ -3,6 +3,7 @@
 #define BST_IO_RUN_FILES_H
 
 #include <stdbool.h>
+#include <stddef.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -10,6 +11,9 @@ extern "C" {
 
 /* page that "boresight report" writes into the folder of a run or study */
 #define BST_RUN_PAGE "report.html"
+
+/* Length of a folder's path without the slashes at its end; "/" has 1. */
+size_t bst_run_folder_length(const char *path);
 
 /* True if a run writes files of this name (without folder): tables, manifest, scenario, frames,
  * planes, pictures, recorded packets, lock, and their drafts. */

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "boresight/config.h"
+#include "sim/io/run_files.h"
 #include "sim/io/run_internal.h"
 
 enum { MAX_PROBLEMS = 16 };
@@ -239,10 +240,7 @@ static bool is_ours(const bst_json *manifest) {
 
 bst_status bst_run_reader_open(bst_ctx *ctx, const char *path, bst_run_reader **out) {
     *out = NULL;
-    size_t length = strlen(path);
-    while (length > 1 && path[length - 1] == '/') {
-        length--;
-    }
+    size_t length = bst_run_folder_length(path);
     if (length == 0 || length > BST_RUN_PATH_BYTES - 256) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "'%.80s' is not a path of a folder", path);
     }
@@ -292,10 +290,7 @@ bst_status bst_run_reader_open(bst_ctx *ctx, const char *path, bst_run_reader **
 
 bst_status bst_run_reader_open_study(bst_ctx *ctx, const char *path, bst_run_reader **out) {
     *out = NULL;
-    size_t length = strlen(path);
-    while (length > 1 && path[length - 1] == '/') {
-        length--;
-    }
+    size_t length = bst_run_folder_length(path);
     if (length == 0 || length > BST_RUN_PATH_BYTES - 256) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "'%.80s' is not a path of a folder", path);
     }

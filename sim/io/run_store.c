@@ -229,10 +229,7 @@ static bst_status check_out(bst_ctx *ctx, const bst_run *run) {
 static bst_status name_run(bst_ctx *ctx, const char *out_path, bool overwrite, bst_run **out) {
     assert(out_path && out);
     *out = NULL;
-    size_t length = out_path ? strlen(out_path) : 0;
-    while (length > 1 && out_path[length - 1] == '/') {
-        length--;
-    }
+    size_t length = out_path ? bst_run_folder_length(out_path) : 0;
     const char *last = out_path;
     for (size_t i = 0; i < length; i++) {
         last = out_path[i] == '/' ? out_path + i + 1 : last;

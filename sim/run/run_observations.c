@@ -18,12 +18,42 @@ void bst_run_creation_date(char text[32]) {
     strftime(text, 32, "%Y-%m-%dT%H:%M:%S", &utc);
 }
 
-bst_status bst_run_scene_open(bst_ctx *ctx, const bst_run_reader *run, bst_run_scene *out) {
+/* Makes the changes of a recorded scenario in its text. */
+static bst_status make_changes(bst_ctx *ctx, bst_json *json, const bst_scenario *scenario) {
+    const bst_scenario_change *changes = scenario->changes.items;
+    for (int i = 0; i < scenario->changes.count; i++) {
+        if (bst_json_set(ctx, json, changes[i].set) != BST_OK) {
+            return bst_fail_prefix(ctx, BST_ERR_FORMAT, "/changes/%d", i);
+        }
+        if (strstr(changes[i].set, "orbit") || strstr(changes[i].set, "external_states")) {
+            bst_log(ctx, BST_LOG_WARNING,
+                    "%s: /changes/%d gives another orbit at %g s; that orbit is used for earlier "
+                    "times too",
+                    scenario->file, i, changes[i].time_s);
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_run_recorded_scenario(bst_ctx *ctx, const bst_run_reader *run, bst_json **json,
+                                     bst_scenario *out) {
     char path[4096];
-    *out = (bst_run_scene){.run = run};
+    *json = NULL;
+    *out = (bst_scenario){.format = 0};
     BST_TRY(bst_run_reader_file(ctx, run, "scenario.json", path, sizeof path));
-    BST_TRY(bst_json_load(ctx, path, &out->json));
-    BST_TRY(bst_plugins_recorded_read(ctx, out->json, &out->scenario));
+    BST_TRY(bst_json_load(ctx, path, json));
+    BST_TRY(bst_plugins_recorded_read(ctx, *json, out));
+    if (out->changes.count > 0) {
+        BST_TRY(make_changes(ctx, *json, out));
+        bst_scenario_free(out);
+        BST_TRY(bst_plugins_recorded_read(ctx, *json, out));
+    }
+    return BST_OK;
+}
+
+bst_status bst_run_scene_open(bst_ctx *ctx, const bst_run_reader *run, bst_run_scene *out) {
+    *out = (bst_run_scene){.run = run};
+    BST_TRY(bst_run_recorded_scenario(ctx, run, &out->json, &out->scenario));
     /* directions do not need stars */
     bst_world_config config = out->scenario.world;
     config.faint_stars = BST_FAINT_NONE;
@@ -59,7 +89,8 @@ bst_status bst_run_scene_find(bst_ctx *ctx, const bst_run_scene *scene,
         }
     }
     return bst_fail(ctx, BST_ERR_FORMAT, "%s: scenario.json has no sensor %s/%s",
-                    bst_run_reader_folder(scene->run), sensor->observer, sensor->name);
+                    scene->run ? bst_run_reader_folder(scene->run) : scene->scenario.file,
+                    sensor->observer, sensor->name);
 }
 
 static const char query[] =

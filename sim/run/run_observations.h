@@ -8,9 +8,18 @@
 #include "sim/world/world.h"
 #include "tracker/orbit/orbit_fit.h"
 
-/* World of a recorded run, recomputed from its scenario.json. */
+/* Reads the scenario of a recorded run after all of its changes.
+ *
+ * Errors:    BST_ERR_FORMAT and others: it cannot be read
+ * Notes:     a burn that was added is in the scenario with its time. Another orbit holds for
+ * earlier times too, which a warning says Ownership: free both results, also after an error; *json
+ * outlives *out */
+bst_status bst_run_recorded_scenario(bst_ctx *ctx, const bst_run_reader *run,
+                                     struct bst_json **json, bst_scenario *out) BST_MUST_CHECK;
+
+/* World of a recorded run, recomputed from its scenario.json with all changes. */
 typedef struct bst_run_scene {
-    const bst_run_reader *run; /* borrowed */
+    const bst_run_reader *run; /* borrowed; NULL: closed */
     struct bst_json *json;
     bst_scenario scenario;
     bst_world *world;

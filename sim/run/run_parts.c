@@ -13,6 +13,7 @@ struct bst_run_parts {
     bst_scenario scenario; /* of json */
     bst_simulation_options options;
     bst_run_check check; /* NULL: done, or none */
+    bool *by_hand;       /* [changes]: it was added; NULL: none was */
 };
 
 static int change_count(const bst_run_parts *parts) {
@@ -66,29 +67,58 @@ static bst_status check_changes(bst_ctx *ctx, const bst_json *json, const bst_sc
     return BST_OK;
 }
 
-bst_status bst_run_parts_open(bst_ctx *ctx, const char *path, const bst_load_options *load,
-                              const bst_simulation_options *options, bst_run_check check,
-                              bst_run_parts **out) {
+/* Reads parts->json, which may be NULL. Frees the parts after an error, also an earlier one. */
+static bst_status read_parts(bst_ctx *ctx, bst_status status, const char *name,
+                             bst_run_parts *parts) {
+    if (status == BST_OK && *parts->scenario.link.address) {
+        status = bst_fail(ctx, BST_ERR_ARGUMENT,
+                          "%s: modules of other programs (/link) cannot be saved, which a run with "
+                          "changes needs",
+                          name);
+    }
+    status = status == BST_OK ? check_changes(ctx, parts->json, &parts->scenario, 0) : status;
+    if (status != BST_OK) {
+        bst_run_parts_free(parts);
+    }
+    return status;
+}
+
+static bst_status make_parts(bst_ctx *ctx, const bst_simulation_options *options,
+                             bst_run_check check, bst_run_parts **out) {
     bst_run_parts *parts = calloc(1, sizeof *parts);
-    *out = NULL;
     if (!parts) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a run");
     }
     parts->options = *options;
     parts->check = check;
     parts->options.changes_made = true;
+    *out = parts;
+    return BST_OK;
+}
+
+bst_status bst_run_parts_open(bst_ctx *ctx, const char *path, const bst_load_options *load,
+                              const bst_simulation_options *options, bst_run_check check,
+                              bst_run_parts **out) {
+    bst_run_parts *parts = NULL;
+    *out = NULL;
+    BST_TRY(make_parts(ctx, options, check, &parts));
     bst_status status = bst_load_scenario(ctx, path, load, &parts->json, &parts->scenario);
-    if (status == BST_OK && *parts->scenario.link.address) {
-        status = bst_fail(ctx, BST_ERR_ARGUMENT,
-                          "%s: modules of other programs (/link) cannot be saved, which a run with "
-                          "changes needs",
-                          path);
+    BST_TRY(read_parts(ctx, status, path, parts));
+    *out = parts;
+    return BST_OK;
+}
+
+/* Prepares the parts of a scenario that is read already. */
+static bst_status open_read(bst_ctx *ctx, const bst_json *json,
+                            const bst_simulation_options *options, bst_run_check check,
+                            bst_run_parts **out) {
+    bst_run_parts *parts = NULL;
+    BST_TRY(make_parts(ctx, options, check, &parts));
+    bst_status status = bst_json_copy(ctx, json, &parts->json);
+    if (status == BST_OK) {
+        status = bst_plugins_scenario_read(ctx, parts->json, &parts->scenario);
     }
-    status = status == BST_OK ? check_changes(ctx, parts->json, &parts->scenario, 0) : status;
-    if (status != BST_OK) {
-        bst_run_parts_free(parts);
-        return status;
-    }
+    BST_TRY(read_parts(ctx, status, parts->scenario.file, parts));
     *out = parts;
     return BST_OK;
 }
@@ -99,6 +129,7 @@ void bst_run_parts_free(bst_run_parts *parts) {
             bst_scenario_free(&parts->scenario);
         }
         bst_json_free(parts->json);
+        free(parts->by_hand);
         free(parts);
     }
 }
@@ -128,9 +159,15 @@ cJSON *bst_run_parts_document(const bst_run_parts *parts, int64_t tick) {
     return copy;
 }
 
-/* Gives the scenario another list of changes, if it can be read with it. The function owns `list`.
- */
-static bst_status replace_changes(bst_ctx *ctx, bst_run_parts *parts, cJSON *list) {
+bst_status bst_run_parts_changed(bst_ctx *ctx, const bst_run_parts *parts, int64_t tick,
+                                 bst_json **document, bst_scenario *scenario) {
+    return read_changed(ctx, parts->json, changes_of(parts), changes_until(parts, tick), document,
+                        scenario);
+}
+
+/* Gives the scenario another list of changes, if it can be read with those from number `first` on.
+ * The function owns `list`. */
+static bst_status replace_changes(bst_ctx *ctx, bst_run_parts *parts, cJSON *list, int first) {
     bst_json *json;
     bst_scenario scenario;
     bst_status status = bst_json_copy(ctx, parts->json, &json);
@@ -141,8 +178,7 @@ static bst_status replace_changes(bst_ctx *ctx, bst_run_parts *parts, cJSON *lis
     status = bst_json_assign(ctx, json, "/changes", list);
     if (status == BST_OK) {
         status = bst_plugins_scenario_read(ctx, json, &scenario);
-        status =
-            status == BST_OK ? check_changes(ctx, json, &scenario, change_count(parts)) : status;
+        status = status == BST_OK ? check_changes(ctx, json, &scenario, first) : status;
         if (status != BST_OK) {
             bst_scenario_free(&scenario);
         }
@@ -158,29 +194,86 @@ static bst_status replace_changes(bst_ctx *ctx, bst_run_parts *parts, cJSON *lis
     return BST_OK;
 }
 
-/* List of the first `count` changes. */
-static cJSON *list_changes(const bst_run_parts *parts, int count) {
+static bool is_by_hand(const bst_run_parts *parts, int change) {
+    return parts->by_hand && parts->by_hand[change];
+}
+
+int bst_run_parts_by_hand(const bst_run_parts *parts, int from) {
+    int count = 0;
+    for (int i = from; i < change_count(parts); i++) {
+        count += is_by_hand(parts, i);
+    }
+    return count;
+}
+
+static cJSON *describe_change(double time_s, const char *set) {
+    cJSON *node = cJSON_CreateObject();
+    cJSON_AddNumberToObject(node, "time_s", time_s);
+    cJSON_AddStringToObject(node, "set", set);
+    return node;
+}
+
+/* List of the changes, but those by hand from number `keep` on. */
+static cJSON *list_changes(const bst_run_parts *parts, int keep) {
     cJSON *list = cJSON_CreateArray();
-    for (int i = 0; i < count; i++) {
-        cJSON *node = cJSON_CreateObject();
-        cJSON_AddNumberToObject(node, "time_s", changes_of(parts)[i].time_s);
-        cJSON_AddStringToObject(node, "set", changes_of(parts)[i].set);
-        cJSON_AddItemToArray(list, node);
+    for (int i = 0; i < change_count(parts); i++) {
+        if (i < keep || !is_by_hand(parts, i)) {
+            const bst_scenario_change *change = &changes_of(parts)[i];
+            cJSON_AddItemToArray(list, describe_change(change->time_s, change->set));
+        }
     }
     return list;
 }
 
 bst_status bst_run_parts_change(bst_ctx *ctx, bst_run_parts *parts, int64_t tick, const char *set) {
-    cJSON *list = list_changes(parts, change_count(parts)), *node = cJSON_CreateObject();
-    cJSON_AddNumberToObject(node, "time_s", (double)tick / (double)parts->scenario.tick_rate_hz);
-    cJSON_AddStringToObject(node, "set", set);
-    cJSON_AddItemToArray(list, node);
-    return replace_changes(ctx, parts, list);
+    const int count = change_count(parts), at = changes_until(parts, tick);
+    bool *by_hand = calloc((size_t)count + 1, sizeof *by_hand);
+    if (!by_hand) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a change");
+    }
+    for (int i = 0; i < count; i++) {
+        by_hand[i < at ? i : i + 1] = is_by_hand(parts, i);
+    }
+    by_hand[at] = true;
+    cJSON *list = list_changes(parts, count);
+    cJSON *node = describe_change((double)tick / (double)parts->scenario.tick_rate_hz, set);
+    if (at < count) {
+        cJSON_InsertItemInArray(list, at, node);
+    } else {
+        cJSON_AddItemToArray(list, node);
+    }
+    bst_status status = replace_changes(ctx, parts, list, at);
+    if (status == BST_OK) {
+        bool *before = parts->by_hand;
+        parts->by_hand = by_hand;
+        by_hand = before;
+    }
+    free(by_hand);
+    return status;
 }
 
 bst_status bst_run_parts_cut(bst_ctx *ctx, bst_run_parts *parts, int keep) {
-    return keep < change_count(parts) ? replace_changes(ctx, parts, list_changes(parts, keep))
-                                      : BST_OK;
+    const int count = change_count(parts);
+    int kept = 0;
+    if (bst_run_parts_by_hand(parts, keep) == 0) {
+        return BST_OK;
+    }
+    BST_TRY(replace_changes(ctx, parts, list_changes(parts, keep), count));
+    for (int i = 0; i < count; i++) {
+        if (i < keep || !parts->by_hand[i]) {
+            parts->by_hand[kept++] = parts->by_hand[i];
+        }
+    }
+    return BST_OK;
+}
+
+bool bst_run_parts_due(const bst_run_parts *parts, int made, int64_t tick, int64_t *until_tick) {
+    if (made >= change_count(parts)) {
+        return false;
+    }
+    const int64_t next = changes_of(parts)[made].tick;
+    *until_tick = next < *until_tick ? next : *until_tick;
+    return next <= tick;
 }
 
 /* Steps a part whose scenario is read. */
@@ -244,12 +337,8 @@ typedef struct own_changes {
 
 static bst_run_action next_change(void *user, int64_t tick, int64_t *until_tick) {
     const own_changes *own = user;
-    if (own->made == change_count(own->parts)) {
-        return BST_RUN_ADVANCE;
-    }
-    const int64_t next = changes_of(own->parts)[own->made].tick;
-    *until_tick = next;
-    return next > tick ? BST_RUN_ADVANCE : BST_RUN_PART;
+    return bst_run_parts_due(own->parts, own->made, tick, until_tick) ? BST_RUN_PART
+                                                                      : BST_RUN_ADVANCE;
 }
 
 static void keep_state(void *user, int64_t tick, void *bytes, size_t size) {
@@ -289,7 +378,7 @@ bst_status bst_run_parts_all(bst_ctx *ctx, bst_run_parts *parts, const bst_run_r
     return status;
 }
 
-bst_status bst_run_parts_file(bst_ctx *ctx, const char *path, const bst_load_options *load,
+bst_status bst_run_parts_read(bst_ctx *ctx, const bst_json *json,
                               const bst_simulation_options *options, bst_run_check check,
                               const bst_run_request *request) {
     bst_run_parts *parts;
@@ -298,7 +387,7 @@ bst_status bst_run_parts_file(bst_ctx *ctx, const char *path, const bst_load_opt
                         "--restore, --save-every and --replay: a scenario with /changes runs from "
                         "its start to its end");
     }
-    BST_TRY(bst_run_parts_open(ctx, path, load, options, check, &parts));
+    BST_TRY(open_read(ctx, json, options, check, &parts));
     bst_status status = bst_run_parts_all(ctx, parts, request);
     bst_run_parts_free(parts);
     return status;

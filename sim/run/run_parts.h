@@ -33,18 +33,35 @@ const bst_scenario *bst_run_parts_scenario(const bst_run_parts *parts);
  * memory, or a change that cannot be made. */
 struct cJSON *bst_run_parts_document(const bst_run_parts *parts, int64_t tick);
 
-/* Adds a change after those that are there.
+/* Reads the scenario after the changes up to a tick.
  *
- * Given:     tick  not earlier than that of the last change
+ * Errors:    those of bst_load_scenario
+ * Ownership: free both results; *document outlives *scenario */
+bst_status bst_run_parts_changed(bst_ctx *ctx, const bst_run_parts *parts, int64_t tick,
+                                 bst_json **document, bst_scenario *scenario) BST_MUST_CHECK;
+
+/* Adds a change by hand after those up to its time.
+ *
+ * Given:     tick  the present one of the run
  *            set   "/json/pointer=value"
  * Errors:    BST_ERR_CONFIG, BST_ERR_ARGUMENT and others: the change, or the scenario after it, is
  *            not allowed; then nothing is added */
 bst_status bst_run_parts_change(bst_ctx *ctx, bst_run_parts *parts, int64_t tick,
                                 const char *set) BST_MUST_CHECK;
-/* Removes the changes from number `keep` on.
+/* Removes the changes by hand from number `keep` on; those of the scenario stay.
  *
  * Errors:    BST_ERR_MEMORY and those of bst_load_scenario */
 bst_status bst_run_parts_cut(bst_ctx *ctx, bst_run_parts *parts, int keep) BST_MUST_CHECK;
+
+/* Number of changes by hand from number `from` on. */
+int bst_run_parts_by_hand(const bst_run_parts *parts, int from);
+/* Bounds a step by the next change.
+ *
+ * Given:     made        changes that are made
+ *            until_tick  end of the step
+ * Returned:  *until_tick  not later than the next change
+ *            true: that change is due, so the part ends here */
+bool bst_run_parts_due(const bst_run_parts *parts, int made, int64_t tick, int64_t *until_tick);
 
 /* Where a part begins. */
 typedef struct bst_run_part {
@@ -71,10 +88,11 @@ bst_status bst_run_parts_run(bst_ctx *ctx, bst_run_parts *parts, bst_run_part *p
 bst_status bst_run_parts_all(bst_ctx *ctx, bst_run_parts *parts,
                              const bst_run_request *request) BST_MUST_CHECK;
 
-/* Runs a scenario file with its own changes: bst_run_parts_open and bst_run_parts_all.
+/* Runs a scenario that is read, with its own changes, as bst_run_parts_all.
  *
+ * Given:     json  copied; the rest as bst_run_parts_open
  * Errors:    also BST_ERR_ARGUMENT: request->saving restores or saves a state */
-bst_status bst_run_parts_file(bst_ctx *ctx, const char *path, const bst_load_options *load,
+bst_status bst_run_parts_read(bst_ctx *ctx, const bst_json *json,
                               const bst_simulation_options *options, bst_run_check check,
                               const bst_run_request *request) BST_MUST_CHECK;
 

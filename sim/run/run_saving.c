@@ -12,6 +12,7 @@
 
 #include "boresight/state.h"
 #include "sim/engine/simulation_state.h"
+#include "sim/io/run_files.h"
 #include "sim/run/run_internal.h"
 
 struct bst_run_restored {
@@ -45,10 +46,7 @@ void bst_run_restored_free(bst_run_restored *r) {
 static bst_status check_folder(bst_ctx *ctx, const char *path, const char *out) {
     char expected[4200];
     struct stat given, there;
-    size_t length = strlen(out);
-    while (length > 1 && out[length - 1] == '/') {
-        length--;
-    }
+    size_t length = bst_run_folder_length(out);
     snprintf(expected, sizeof expected, "%.*s.partial/" BST_RUN_STATE, (int)length, out);
     if (stat(path, &given) == 0 && stat(expected, &there) == 0 && given.st_ino == there.st_ino &&
         given.st_dev == there.st_dev) {

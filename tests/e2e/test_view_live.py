@@ -111,12 +111,70 @@ class Live(Tables):
         again, plain = os.path.join(self.folder, "again"), os.path.join(self.folder, "plain")
         runs.run(self.out + "/scenario.json", again)
         self.assert_equal(self.out, again)
+        self.live_equals_run()
         runs.run(runs.TRACK, plain, *SETS[3::2], duration=26)
         self.assert_equal(self.out + "-2", plain)
         if FULL:
             for one, other in ((self.out, again), (self.out + "-2", plain)):
                 with open(one + "/frames.fits", "rb") as first, open(other + "/frames.fits", "rb") as second:
                     self.assertEqual(first.read(), second.read())
+
+    def live_equals_run(self):
+        """A scenario with changes of its own, live: they are made, and rewinding leaves them. The folder's name ends in "/"."""
+        out = os.path.join(self.folder, "live")
+        self.page.close()
+        self.viewer = test_view.Viewer(self.out + "/scenario.json", "--out", out + "//", "--threads", "1")
+        self.page = live_page.Socket(self.viewer)
+        state = self.page.state(lambda now: now["run"] == 0)
+        start = state["states"][0]["id"]
+        early = self.command(lambda now: now["changes"] == 2, do="run", rate=20)["time_s"]
+        state = self.command(lambda now: now["time_s"] < early, do="rewind", state=start)
+        self.assertEqual((state["changes"], state["time_s"]), (0, 0))
+        # a change by hand before them, which rewinding takes back
+        self.command(lambda now: now["changes"] == 1, do="set", set=f"{CONTROL}/exposure_s=0.3")
+        self.command(lambda now: now["changes"] == 0, do="rewind", state=start)
+        self.command(lambda now: now["ended"], do="run", rate=0)
+        self.assertEqual(self.viewer.end()[0], 0)
+        self.assert_equal(self.out, out)
+        with open(self.out + "/scenario.json", encoding="utf-8") as one, open(out + "/scenario.json", encoding="utf-8") as other:
+            self.assertEqual(json.load(one)["changes"], json.load(other)["changes"])
+
+    def test_states_and_branches(self):
+        """The run goes back to the oldest state when there is no room for another one. A branch that fails is a message."""
+        self.page.state(lambda now: now["run"] == 0)
+        state = self.run_to(1)
+        while len(state["states"]) < 24:
+            count = len(state["states"])
+            state = self.command(lambda now, count=count: len(now["states"]) > count, do="save")
+        oldest = state["states"][1]
+        self.run_to(oldest["time_s"] + 1)
+        state = self.page.state()
+        oldest = state["states"][1]
+        self.assertGreater(oldest["time_s"], 0)
+        state = self.command(lambda now: now["paused"] and now["time_s"] == oldest["time_s"], do="rewind", state=oldest["id"])
+        self.assertIn(oldest["id"], [one["id"] for one in state["states"]])
+        self.command(lambda now: now["ended"], do="end")
+        tables_file = self.out + "/run.sqlite"
+        os.rename(tables_file, tables_file + ".kept")
+        os.symlink(tables_file + ".kept", tables_file)
+        state = self.command(lambda now: now["message"], do="branch", state=oldest["id"])
+        self.assertIn("there is no branch: ", state["message"])
+        self.assertEqual((state["ended"], os.path.exists(self.out + "-2.partial")), (True, False))
+        os.rename(tables_file + ".kept", tables_file)
+        state = self.command(lambda now: now["run"] == 1, do="branch", state=oldest["id"])
+        self.assertEqual(state["time_s"], oldest["time_s"])
+        self.command(lambda now: now["ended"], do="end")
+        self.assertEqual(self.viewer.end()[0], 0)
+        # two at a time take two folders, which are there when the address is
+        pair = [test_view.Viewer(os.path.abspath(runs.TRACK), "--threads", "1", *SETS, cwd=self.folder) for _ in range(2)]
+        names = sorted(os.listdir(self.folder + "/runs"))
+        self.assertEqual([one.end()[0] for one in pair], [0, 0])
+        self.assertEqual([name.split("-live")[-1] for name in names], ["-2.partial", ".partial"])
+        # no address where there will be no page
+        result = subprocess.run([runs.BORESIGHT, "view", runs.TRACK, "--no-browser", "--out", self.out, *SETS], capture_output=True,
+                                text=True, check=False)
+        self.assertEqual((result.returncode, result.stdout), (1, ""))
+        self.assertIn("exists already", result.stderr)
 
     def test_frames_and_spectators(self):
         """What is shown is what is recorded; a second page sees it and has no control until the first one is gone."""
@@ -128,6 +186,14 @@ class Live(Tables):
             while not answer["sequence"]:
                 answer, pixels = self.page.ask()
             shown.append((answer["frame"], pixels))
+        # the newest frames follow a change of the camera
+        self.assertEqual(shown[-1][0]["gain_e_per_dn"], 1.6)
+        self.command(lambda now: now["changes"] == 1, do="set", set=f"{runs.SENSOR}/camera/gain_e_per_dn=3.25")
+        answer, pixels = self.page.ask({"do": "step", "frames": 1})
+        while not answer["sequence"]:
+            answer, pixels = self.page.ask()
+        self.assertEqual(answer["frame"]["gain_e_per_dn"], 3.25)
+        shown.append((answer["frame"], pixels))
         spectator = live_page.Socket(self.viewer)
         answer, pixels = spectator.ask({"do": "end"})
         self.assertEqual((answer["controller"], answer["problem"]), (False, "another page controls the run"))
@@ -170,6 +236,10 @@ class Live(Tables):
                     pass
                 raise ConnectionError
             page.close()
+        for number in (1e300, -1e300):
+            state = self.command(lambda now: now["message"], do="rewind", state=number)
+            self.assertIn("no such saved state", state["message"])
+            self.page.ask(after=number)
         giant = live_page.Socket(self.viewer)
         giant.peer.sendall(b"\x81\xff" + (1 << 62).to_bytes(8, "big") + bytes(4096))
         many = [live_page.Socket(self.viewer) for _ in range(60)]
@@ -257,6 +327,24 @@ class Scenarios(unittest.TestCase):
             result = with_changes(*changes)
             self.assertEqual(result.returncode, 1)
             self.assertIn(message, result.stderr)
+
+    def test_changes_of_the_standard_input(self):
+        """A scenario with changes that is piped is read once; its orbits are exported with the burn that was added."""
+        folder = runs.scratch()
+        changes = [{"time_s": 1, "set": '/world/objects/0/burns=[{"time_s": 2, "dv_rtn_mps": [0, 40, 0]}]'}]
+        with open(runs.TRACK, encoding="utf-8") as file:
+            text = json.load(file)
+        for name, more in (("changed", {"changes": changes}), ("plain", {})):
+            result = subprocess.run(runs.command("-", f"{folder}/{name}", runs.GENERATOR, duration=60), text=True, check=False,
+                                    input=json.dumps({**text, **more}), cwd=os.path.dirname(runs.TRACK), capture_output=True)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            runs.export(f"{folder}/{name}", "--orbits", "oem", "--objects", "INMARSAT GX5")
+        states = []
+        for name in ("changed", "plain"):
+            with open(f"{folder}/{name}.export/orbits.oem", encoding="utf-8") as file:
+                states.append([line for line in file if line.startswith("20")])
+        self.assertEqual(states[0][0], states[1][0])
+        self.assertNotEqual(states[0][-1], states[1][-1])
 
 
 def tearDownModule():
