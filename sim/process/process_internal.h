@@ -25,8 +25,8 @@ typedef struct bst_process_frame {
     bst_keyword_values values;
     int64_t start_tick, exposure_ticks; /* after the first frame's start */
     bool has_header_attitude;
-    bst_quat q_header; /* by the header's WCS */
-    double rate_trend; /* bst_keyword_rate_trend */
+    bst_quat q_header;                   /* by the header's WCS */
+    double rate_trend, rate_trend_sigma; /* bst_keyword_rate_trend */
     /* of the stars */
     bool solved, points;
     bst_quat q_middle; /* at the middle of the streaks */

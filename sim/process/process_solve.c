@@ -200,6 +200,8 @@ static bst_vec3 turn_between(bst_quat from, bst_quat to) {
 
 /* Trends of the speed that are too small to tell directions apart. */
 static const double LEAST_TREND = 0.05;
+/* Least standard errors of the header's trend. */
+static const double CERTAIN = 3.0;
 
 /* Change of the speed along the nodes, as bst_keyword_rate_trend has it. */
 static double path_trend(const bst_process_frame *f) {
@@ -221,7 +223,8 @@ static double path_trend(const bst_process_frame *f) {
  * does not tell. */
 static bool orient_by_rates(bst_process_frame *f) {
     double along = path_trend(f);
-    if (!(fabs(f->rate_trend) > LEAST_TREND && fabs(along) > LEAST_TREND)) {
+    if (!(fabs(f->rate_trend) > fmax(LEAST_TREND, CERTAIN * f->rate_trend_sigma) &&
+          fabs(along) > LEAST_TREND)) {
         return false;
     }
     if (f->rate_trend * along < 0.0) {
