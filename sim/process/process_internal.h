@@ -59,6 +59,13 @@ typedef struct bst_process {
 
 enum { BST_PROCESS_TICK_RATE_HZ = 10000 };
 
+/* Turns the order of a frame's nodes: the star moved from the right end to the left one. */
+void bst_process_reverse(bst_process_frame *f);
+/* Orders the nodes of a frame so that its speed changes as the header's history says.
+ *
+ * Returned:  false: the history has no trend of three standard errors, or the path none */
+bool bst_process_orient_by_rates(bst_process_frame *f);
+
 /* Reads the map and all headers.
  *
  * Errors:    those of bst_keyword_map_load and bst_recorded_frames_open; BST_ERR_ARGUMENT with
