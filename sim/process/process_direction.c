@@ -3,6 +3,10 @@
 
 #include "sim/process/process_internal.h"
 
+bst_vec3 bst_process_turn(bst_quat from, bst_quat to) {
+    return bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from)));
+}
+
 void bst_process_reverse(bst_process_frame *f) {
     f->reversed = !f->reversed;
     for (int i = 0, k = f->node_count - 1; i <= k; i++, k--) {
@@ -10,11 +14,6 @@ void bst_process_reverse(bst_process_frame *f) {
         f->nodes[i] = (bst_process_node){1.0 - f->nodes[k].share, f->nodes[k].q_cam_from_gcrf};
         f->nodes[k] = (bst_process_node){1.0 - left.share, left.q_cam_from_gcrf};
     }
-}
-
-/* Turn of the camera from one attitude to another. */
-static bst_vec3 turn_between(bst_quat from, bst_quat to) {
-    return bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from)));
 }
 
 /* Trends of the speed that are too small to tell directions apart. */
@@ -28,7 +27,7 @@ static double path_trend(const bst_process_frame *f) {
     for (int k = 1; k < f->node_count; k++) {
         const bst_process_node *a = &f->nodes[k - 1], *b = &f->nodes[k];
         double dt = b->share - a->share, middle = 0.5 * (a->share + b->share);
-        double turn = bst_vec3_norm(turn_between(a->q_cam_from_gcrf, b->q_cam_from_gcrf));
+        double turn = bst_vec3_norm(bst_process_turn(a->q_cam_from_gcrf, b->q_cam_from_gcrf));
         w += dt;
         t += dt * middle;
         v += turn;

@@ -59,6 +59,8 @@ typedef struct bst_process {
 
 enum { BST_PROCESS_TICK_RATE_HZ = 10000 };
 
+/* Turn of the camera from one attitude to another, rotation vector, rad. */
+bst_vec3 bst_process_turn(bst_quat from, bst_quat to);
 /* Turns the order of a frame's nodes: the star moved from the right end to the left one. */
 void bst_process_reverse(bst_process_frame *f);
 /* Orders the nodes of a frame so that its speed changes as the header's history says.

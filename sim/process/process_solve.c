@@ -183,11 +183,6 @@ static bst_status take_medians(bst_ctx *ctx, bst_process *p) {
     return BST_OK;
 }
 
-/* Turn of the camera from one attitude to another. */
-static bst_vec3 turn_between(bst_quat from, bst_quat to) {
-    return bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from)));
-}
-
 /* Orders the nodes of a frame so that the camera turns as it does to the next or from the previous
  * solved frame; false: there is no other. */
 static bool orient(const bst_process *p, int i) {
@@ -205,8 +200,8 @@ static bool orient(const bst_process *p, int i) {
         return bst_process_orient_by_rates(f);
     }
     bst_vec3 own =
-        turn_between(f->nodes[0].q_cam_from_gcrf, f->nodes[f->node_count - 1].q_cam_from_gcrf);
-    bst_vec3 way = turn_between(f->q_middle, p->frames[other].q_middle);
+        bst_process_turn(f->nodes[0].q_cam_from_gcrf, f->nodes[f->node_count - 1].q_cam_from_gcrf);
+    bst_vec3 way = bst_process_turn(f->q_middle, p->frames[other].q_middle);
     if (bst_vec3_dot(own, way) * (other > i ? 1.0 : -1.0) < 0.0) {
         bst_process_reverse(f);
     }

@@ -18,10 +18,10 @@ static void nodes_follow_the_rates(void **state) {
     (void)state;
     bst_process_node made[NODES], nodes[NODES];
     make(made);
-    /* trend and standard error of the header; whether it tells, and whether it turns the order */
+    /* trend and standard error of the header; whether it decides, and whether it turns the order */
     const struct {
         double trend, sigma;
-        bool tells, turns;
+        bool decides, turns;
     } cases[] = {{0.4, 0.01, true, false},
                  {-0.4, 0.01, true, true},
                  {-0.4, 0.2, false, false},
@@ -33,7 +33,7 @@ static void nodes_follow_the_rates(void **state) {
                                .node_count = NODES,
                                .rate_trend = cases[c].trend,
                                .rate_trend_sigma = cases[c].sigma};
-        assert_int_equal(bst_process_orient_by_rates(&f), cases[c].tells);
+        assert_int_equal(bst_process_orient_by_rates(&f), cases[c].decides);
         assert_int_equal(f.reversed, cases[c].turns);
         for (int i = 0; i < NODES; i++) {
             int k = cases[c].turns ? NODES - 1 - i : i;
