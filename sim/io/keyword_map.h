@@ -104,11 +104,13 @@ bst_status bst_keyword_section(bst_ctx *ctx, const char *keyword, bst_fits_sourc
 /* Change of the rate of turn during the exposure by the header's history.
  *
  * Returned:  *trend  slope of the rate's length against time, times the exposure, over its mean;
- *                    NAN: no history, or fewer than 4 entries within the exposure
- * Errors:    BST_ERR_FORMAT with file, HDU and keyword: an entry is no number */
-bst_status bst_keyword_rate_trend(bst_ctx *ctx, const bst_keyword_map *map, bst_fits_source *source,
-                                  const bst_fits_source_frame *frame, double exposure_s,
-                                  double *trend) BST_MUST_CHECK;
+ *                    NAN: no history, fewer than 4 entries within the exposure, or an entry is no
+ *                    number, with a warning that says which
+ *            *sigma  standard error by the scatter of the rates about the line
+ */
+void bst_keyword_rate_trend(bst_ctx *ctx, const bst_keyword_map *map, bst_fits_source *source,
+                            const bst_fits_source_frame *frame, double exposure_s, double *trend,
+                            double *sigma);
 
 /* Attitude by the TAN WCS of a header (CRPIXn, CRVALn, and CDi_j or CDELTn with CROTA2).
  *

@@ -87,12 +87,19 @@ static bool length_of(const char *text, double *out) {
     return n > 0;
 }
 
-bst_status bst_keyword_rate_trend(bst_ctx *ctx, const bst_keyword_map *map, bst_fits_source *source,
-                                  const bst_fits_source_frame *frame, double exposure_s,
-                                  double *trend) {
+/* A history that cannot be read is none: it is a hint. */
+static void warn_of_history(const reading *r, const char *keyword, const char *key) {
+    bst_log(r->ctx, BST_LOG_WARNING,
+            "%.400s: HDU %d: %s (%s of the map %s): is no number: the history is not used",
+            bst_fits_source_path(r->source), r->frame->hdu, keyword, key, r->map->name);
+}
+
+void bst_keyword_rate_trend(bst_ctx *ctx, const bst_keyword_map *map, bst_fits_source *source,
+                            const bst_fits_source_frame *frame, double exposure_s, double *trend,
+                            double *sigma) {
     const reading r = {ctx, map, source, frame};
-    double n = 0.0, t = 0.0, v = 0.0, tt = 0.0, tv = 0.0;
-    *trend = NAN;
+    double n = 0.0, t = 0.0, v = 0.0, tt = 0.0, tv = 0.0, vv = 0.0;
+    *trend = *sigma = NAN;
     for (int i = 0; i < HISTORY_MOST && *map->rate_history.time; i++) {
         char keyword[BST_KEYWORD_TEXT], text[BST_FITS_SOURCE_TEXT];
         double time, rate;
@@ -101,14 +108,16 @@ bst_status bst_keyword_rate_trend(bst_ctx *ctx, const bst_keyword_map *map, bst_
             break;
         }
         if (!number_of(text, &time)) {
-            return wrong(&r, keyword, "rate_history.time", "is no number");
+            warn_of_history(&r, keyword, "rate_history.time");
+            return;
         }
         if (!entry_keyword(map->rate_history.rate, i, keyword) ||
             !bst_fits_source_text(source, keyword, text)) {
             break;
         }
         if (!length_of(text, &rate)) {
-            return wrong(&r, keyword, "rate_history.rate", "is no number");
+            warn_of_history(&r, keyword, "rate_history.rate");
+            return;
         }
         if (time >= 0.0 && time <= exposure_s) {
             n += 1.0;
@@ -116,13 +125,16 @@ bst_status bst_keyword_rate_trend(bst_ctx *ctx, const bst_keyword_map *map, bst_
             v += rate;
             tt += time * time;
             tv += time * rate;
+            vv += rate * rate;
         }
     }
     double spread = tt - t * t / n;
     if (n >= HISTORY_LEAST && spread > 0.0 && v > 0.0) {
-        *trend = (tv - t * v / n) / spread * exposure_s / (v / n);
+        double slope = (tv - t * v / n) / spread, per = exposure_s / (v / n);
+        double rest = fmax(vv - v * v / n - slope * slope * spread, 0.0);
+        *trend = slope * per;
+        *sigma = sqrt(rest / (n - 2.0) / spread) * per;
     }
-    return BST_OK;
 }
 
 /* A value that is required, within [least, most]. */

@@ -25,8 +25,8 @@ typedef struct bst_process_frame {
     bst_keyword_values values;
     int64_t start_tick, exposure_ticks; /* after the first frame's start */
     bool has_header_attitude;
-    bst_quat q_header; /* by the header's WCS */
-    double rate_trend; /* bst_keyword_rate_trend */
+    bst_quat q_header;                   /* by the header's WCS */
+    double rate_trend, rate_trend_sigma; /* bst_keyword_rate_trend */
     /* of the stars */
     bool solved, points;
     bst_quat q_middle; /* at the middle of the streaks */
@@ -58,6 +58,15 @@ typedef struct bst_process {
 } bst_process;
 
 enum { BST_PROCESS_TICK_RATE_HZ = 10000 };
+
+/* Turn of the camera from one attitude to another, rotation vector, rad. */
+bst_vec3 bst_process_turn(bst_quat from, bst_quat to);
+/* Turns the order of a frame's nodes: the star moved from the right end to the left one. */
+void bst_process_reverse(bst_process_frame *f);
+/* Orders the nodes of a frame so that its speed changes as the header's history says.
+ *
+ * Returned:  false: the history has no trend of three standard errors, or the path none */
+bool bst_process_orient_by_rates(bst_process_frame *f);
 
 /* Reads the map and all headers.
  *

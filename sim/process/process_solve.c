@@ -183,53 +183,6 @@ static bst_status take_medians(bst_ctx *ctx, bst_process *p) {
     return BST_OK;
 }
 
-/* Turns the order of the nodes: the star moved from the right end to the left one. */
-static void reverse(bst_process_frame *f) {
-    f->reversed = !f->reversed;
-    for (int i = 0, k = f->node_count - 1; i <= k; i++, k--) {
-        bst_process_node left = f->nodes[i];
-        f->nodes[i] = (bst_process_node){1.0 - f->nodes[k].share, f->nodes[k].q_cam_from_gcrf};
-        f->nodes[k] = (bst_process_node){1.0 - left.share, left.q_cam_from_gcrf};
-    }
-}
-
-/* Turn of the camera from one attitude to another. */
-static bst_vec3 turn_between(bst_quat from, bst_quat to) {
-    return bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from)));
-}
-
-/* Trends of the speed that are too small to tell directions apart. */
-static const double LEAST_TREND = 0.05;
-
-/* Change of the speed along the nodes, as bst_keyword_rate_trend has it. */
-static double path_trend(const bst_process_frame *f) {
-    double w = 0.0, t = 0.0, v = 0.0, tt = 0.0, tv = 0.0;
-    for (int k = 1; k < f->node_count; k++) {
-        const bst_process_node *a = &f->nodes[k - 1], *b = &f->nodes[k];
-        double dt = b->share - a->share, middle = 0.5 * (a->share + b->share);
-        double turn = bst_vec3_norm(turn_between(a->q_cam_from_gcrf, b->q_cam_from_gcrf));
-        w += dt;
-        t += dt * middle;
-        v += turn;
-        tt += dt * middle * middle;
-        tv += turn * middle;
-    }
-    return (tv - t * v / w) / (tt - t * t / w) / (v / w);
-}
-
-/* Orders the nodes of a frame so that its speed changes as the header's history says; false: it
- * does not tell. */
-static bool orient_by_rates(bst_process_frame *f) {
-    double along = path_trend(f);
-    if (!(fabs(f->rate_trend) > LEAST_TREND && fabs(along) > LEAST_TREND)) {
-        return false;
-    }
-    if (f->rate_trend * along < 0.0) {
-        reverse(f);
-    }
-    return true;
-}
-
 /* Orders the nodes of a frame so that the camera turns as it does to the next or from the previous
  * solved frame; false: there is no other. */
 static bool orient(const bst_process *p, int i) {
@@ -244,13 +197,13 @@ static bool orient(const bst_process *p, int i) {
         return true;
     }
     if (other < 0) {
-        return orient_by_rates(f);
+        return bst_process_orient_by_rates(f);
     }
     bst_vec3 own =
-        turn_between(f->nodes[0].q_cam_from_gcrf, f->nodes[f->node_count - 1].q_cam_from_gcrf);
-    bst_vec3 way = turn_between(f->q_middle, p->frames[other].q_middle);
+        bst_process_turn(f->nodes[0].q_cam_from_gcrf, f->nodes[f->node_count - 1].q_cam_from_gcrf);
+    bst_vec3 way = bst_process_turn(f->q_middle, p->frames[other].q_middle);
     if (bst_vec3_dot(own, way) * (other > i ? 1.0 : -1.0) < 0.0) {
-        reverse(f);
+        bst_process_reverse(f);
     }
     return true;
 }

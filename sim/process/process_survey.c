@@ -52,8 +52,9 @@ static bst_status read_frame(bst_ctx *ctx, bst_process *p, int64_t index, bst_pr
     f->has_header_attitude = p->map.attitude == BST_KEYWORD_WCS &&
                              bst_keyword_wcs(bst_recorded_frames_source(p->recorded), &r.place,
                                              p->options.flip_rows, &f->q_header, &scale);
-    return bst_keyword_rate_trend(ctx, &p->map, bst_recorded_frames_source(p->recorded), &r.place,
-                                  r.values.exposure_s, &f->rate_trend);
+    bst_keyword_rate_trend(ctx, &p->map, bst_recorded_frames_source(p->recorded), &r.place,
+                           r.values.exposure_s, &f->rate_trend, &f->rate_trend_sigma);
+    return BST_OK;
 }
 
 static int by_start(const void *a, const void *b) {

@@ -82,6 +82,38 @@ static void sine_along_the_rows(void **state) {
     test_free(rows);
 }
 
+/* Rows whose phase grows by half a cycle alternate; the parabola needs the place on the other side
+ * of the end of the range, and with it the phase at the first pixel is found. */
+static void phase_of_a_locked_line(void **state) {
+    (void)state;
+    enum { WIDTH = 256, HEIGHT = 64, LAGS = 16 };
+    bst_ctx ctx = {0};
+    float *rows = test_calloc((size_t)WIDTH * HEIGHT, sizeof *rows);
+    const double growth[3] = {-0.5 + 0.0009, 0.5 - 0.0009, -0.31};
+    for (int k = 0; k < 3; k++) {
+        bst_rng_key key = bst_rng_make_key(3, (uint64_t)k, "test", "phase");
+        for (int i = 0; i < WIDTH * HEIGHT; i++) {
+            double turns = 0.1703 * (i % WIDTH) + growth[k] * (i / WIDTH) + 130.0 / 360.0;
+            rows[i] = (float)(5.0 * sin(2.0 * BST_PI * turns) +
+                              0.1 * bst_rng_normal(key, (uint64_t)i, 0));
+        }
+        bst_pick_up_line line;
+        bst_assert_ok(&ctx, bst_pick_up_line_find(&ctx, rows, WIDTH, HEIGHT, &line));
+        /* a parabola through steps of a quarter of a cycle per frame: 2 % of a step */
+        bst_assert_close(remainder(line.phase.value - growth[k], 1.0), 0.0, 0.02 / (4 * HEIGHT));
+        assert_true(line.phase.value >= -0.5 && line.phase.value < 0.5);
+        /* the above from the middle to the corner 0.9 deg; as much by the frequency */
+        bst_assert_close(bst_pick_up_line_phase_deg(rows, WIDTH, HEIGHT, &line), 130.0, 1.8);
+        free(line.power);
+    }
+    double covariance[LAGS];
+    for (int k = 1; k <= LAGS; k++) {
+        covariance[k - 1] = 3.0 * cos(2.0 * BST_PI * 0.1703 * k);
+    }
+    bst_assert_close(bst_pick_up_line_power(covariance, LAGS, 0.1703), 3.0, 1e-12);
+    test_free(rows);
+}
+
 /* Distance z below which a share of the normal distribution lies, by bisection. */
 static double normal_quantile(double share) {
     double low = -9.0, high = 9.0;
@@ -190,6 +222,7 @@ int main(void) {
         cmocka_unit_test(spread_of_whole_and_broken_numbers),
         cmocka_unit_test(outliers_are_left_out),
         cmocka_unit_test(sine_along_the_rows),
+        cmocka_unit_test(phase_of_a_locked_line),
         cmocka_unit_test(law_of_hot_pixels),
         cmocka_unit_test(charge_behind_hot_pixels),
     };

@@ -20,7 +20,7 @@ import numpy as np
 from astropy.io import fits
 
 import runs
-from runs import call
+from runs import call, call_well
 
 FULL = "--full" in sys.argv
 if FULL:
@@ -121,6 +121,27 @@ class Characterize(unittest.TestCase):
             self.assertAlmostEqual(found["fill_exponent"], 0.5, delta=0.4, msg=(seed, found))
             # without pick-up and the shot noise of the ramp: 5 %
             self.assertAlmostEqual(given["read_noise_e"] / draw(seed)[0]["read_noise_e"], 1, delta=0.08, msg=seed)
+
+    def test_read_noise_beside_pick_up(self):
+        """A line of one phase cancels in the differences of pairs, others do not: 8 e- of read noise in both."""
+        for phase in ("40", "null"):
+            folder = runs.scratch()
+            line = {"amplitude_e": "8", "cycles_per_px": "0.17", "cycles_per_row": "-0.31", "phase_deg": phase}
+            sets = {"width_px": "160", "height_px": "128", **{"detector/pick_up/" + key: value for key, value in line.items()}}
+            call_well("calframes", runs.STARE, "--out", folder + "/cal", "--bias", "4", "--dark", "0", "--flat", "0",
+                      "--set", "/world/star_catalogue=embedded",
+                      *(word for key, value in sets.items() for word in ("--set", f"{CAMERA}{key}={value}")))
+            call_well("characterize", "--map", "boresight", "--bias", folder + "/cal/neossat_telescope_bias.fits",
+                      "--out", folder + "/out", "--camera", "/camera")
+            with open(folder + "/out/detector.json", encoding="utf-8") as file:
+                given = json.load(file)["set"]
+            # 20,480 pixels in two pairs: 0.35 % of the noise and as much of the line's power; five standard errors
+            self.assertAlmostEqual(given["/camera/read_noise_e"], 8, delta=0.2, msg=phase)
+            self.assertAlmostEqual(given["/camera/detector/pick_up/amplitude_e"], 8, delta=0.6, msg=phase)
+            self.assertEqual("/camera/detector/pick_up/phase_deg" in given, phase != "null")
+            if phase != "null":
+                # the phase at the first pixel, by frequencies that are right to 1e-3 of a bin
+                self.assertAlmostEqual(given["/camera/detector/pick_up/phase_deg"], 40, delta=4)
 
     def test_what_frames_do_not_say_is_not_written(self):
         """Bias frames alone: no dark current, no response, and the gain of the header."""

@@ -126,6 +126,14 @@ class Twin(unittest.TestCase):
         self.assertAlmostEqual(difference[background].std() / (numpy.sqrt(2) * report["fit"]["noise_e"]), 1.0, delta=0.1)
         for name in ("_report.html", "_report.png", "_stars.bin", "_psf.fits"):
             self.assertGreater(os.path.getsize(self.folder + "/twin" + name), 0, name)
+        self.assertTrue(report["streaks_fit"])
+        self.assertIs(type(report["fit"]["converged"]), bool)
+        # the level of 12,000 pixels without stars is that of the recorded frame
+        self.assertEqual(report["camera"]["pedestal_dn"], 0)
+        self.assertAlmostEqual(report["camera"]["level_rendered_minus_recorded_dn"], 0,
+                               delta=5 * report["fit"]["noise_e"] / 4 / numpy.sqrt(12000 / 2))
+        # what the embedded catalogue has about the frame is not complete to V 11
+        self.assertNotIn("V 11", call_well("stars", "info", self.folder + "/twin_stars.bin"))
         self.refuses_to_replace(out)
 
     def refuses_to_replace(self, out):

@@ -366,7 +366,8 @@ static void test_rate_trend(void **state) {
     bst_keyword_map map;
     bst_fits_source *s;
     bst_fits_source_frame frame;
-    double trend;
+    double trend, sigma;
+    const double uneven[7] = {9.0, 1.0, 1.0, 2.0, 3.0, 1.0, 9.0};
     load_map(&f,
              "{\"boresight_keyword_map\": 1, \"rate_history\": {\"time\": \"T_##\", \"rate\": "
              "\"V_##\"}}",
@@ -375,6 +376,7 @@ static void test_rate_trend(void **state) {
     for (int i = 0; i < 7; i++) { /* times -1 to 5: the first and the last are outside */
         card(&f, "T_%02d    = %20.1f", i, i - 1.0);
         card(&f, "V_%02d    = '%g 0 0'", i, i == 0 ? 90.0 : 3.0 + 0.5 * (i - 1));
+        card(&f, "W_%02d    = %20.1f", i, uneven[i]);
     }
     card(&f, "A_00    = %20.1f", 6.0);
     card(&f, "B_00    = 'fast'");
@@ -384,15 +386,24 @@ static void test_rate_trend(void **state) {
     save(&f, f.count);
     bst_assert_ok(&f.ctx, bst_fits_source_open(&f.ctx, f.path, &s));
     bst_assert_ok(&f.ctx, bst_fits_source_select(&f.ctx, s, 0, &frame));
-    bst_assert_ok(&f.ctx, bst_keyword_rate_trend(&f.ctx, &map, s, &frame, 4.0, &trend));
+    bst_keyword_rate_trend(&f.ctx, &map, s, &frame, 4.0, &trend, &sigma);
     bst_assert_close(trend, 0.5 * 4.0 / 4.0, 1e-12); /* slope times exposure over the mean */
+    bst_assert_close(sigma, 0.0, 1e-7);              /* a root of rounding errors */
+    snprintf(map.rate_history.rate, sizeof map.rate_history.rate, "W_##");
+    bst_keyword_rate_trend(&f.ctx, &map, s, &frame, 4.0, &trend, &sigma);
+    /* the rates 1, 1, 2, 3, 1 at 0 to 4 s: slope 0.2, rest 16 - 64/5 - 0.4 = 2.8 with 3 degrees
+     * of freedom, spread 10, mean 1.6 */
+    bst_assert_close(trend, 0.2 * 4.0 / 1.6, 1e-12);
+    bst_assert_close(sigma, sqrt(2.8 / 3.0 / 10.0) * 4.0 / 1.6, 1e-12);
     snprintf(map.rate_history.time, sizeof map.rate_history.time, "T_#"); /* T_0 is not there */
-    bst_assert_ok(&f.ctx, bst_keyword_rate_trend(&f.ctx, &map, s, &frame, 4.0, &trend));
+    bst_keyword_rate_trend(&f.ctx, &map, s, &frame, 4.0, &trend, &sigma);
     assert_true(isnan(trend));
+    assert_int_equal(f.ctx.warnings, 0);
     snprintf(map.rate_history.time, sizeof map.rate_history.time, "A_##");
     snprintf(map.rate_history.rate, sizeof map.rate_history.rate, "B_##");
-    assert_int_equal(bst_keyword_rate_trend(&f.ctx, &map, s, &frame, 4.0, &trend), BST_ERR_FORMAT);
-    assert_non_null(strstr(f.ctx.message, "HDU 1: B_00 (rate_history.rate of the map"));
+    bst_keyword_rate_trend(&f.ctx, &map, s, &frame, 4.0, &trend, &sigma);
+    assert_true(isnan(trend) && isnan(sigma)); /* a hint that cannot be read is none */
+    assert_int_equal(f.ctx.warnings, 1);
     bst_fits_source_close(s);
     end(&f);
 }

@@ -31,11 +31,13 @@ typedef struct writer {
 static double white_noise_e(const bst_sensor_figures *f) {
     double v = f->figures[BST_SENSOR_READ_NOISE].value,
            line = f->figures[BST_SENSOR_LINE_AMPLITUDE].value;
-    double ramp_e = fabs(f->figures[BST_SENSOR_RAMP].value) * f->figures[BST_SENSOR_GAIN].value;
-    double rest = v * v;
-    if (isfinite(line)) { /* the mean square of a sine, or of its differences of neighbours */
+    double gain = f->figures[BST_SENSOR_GAIN].value, rest = v * v;
+    double ramp_e = fabs(f->figures[BST_SENSOR_RAMP].value) * gain;
+    if (isfinite(line) && f->noise_of_pairs) { /* a line of one phase in all frames cancels */
+        rest -= isfinite(f->line.pair_power) ? f->line.pair_power * gain * gain : 0.0;
+    } else if (isfinite(line)) { /* the mean square of a sine's differences of neighbours */
         double turn = cos(2.0 * M_PI * f->figures[BST_SENSOR_LINE_FREQUENCY].value);
-        rest -= 0.5 * line * line * (f->noise_of_pairs ? 1.0 : 1.0 - turn);
+        rest -= 0.5 * line * line * (1.0 - turn);
     }
     if (isfinite(ramp_e) && f->noise_of_pairs) {
         rest -= 0.5 * ramp_e;
@@ -121,6 +123,9 @@ static cJSON *detector_json(const writer *w) {
         }
     }
     set_transfer(w, set);
+    if (w->figures->line.locked && isfinite(w->figures->line.phase_deg)) {
+        set_detector(w, set, "pick_up/phase_deg", cJSON_CreateNumber(w->figures->line.phase_deg));
+    }
     if (w->request->maps && w->figures->dark_map) {
         snprintf(pointer, sizeof pointer, "%.400s/detector/dark_map", w->request->camera);
         cJSON_AddStringToObject(set, pointer, "dark_map.fits");
@@ -201,6 +206,13 @@ static cJSON *report_json(const writer *w) {
         char key[16];
         snprintf(key, sizeof key, "%g", bst_sensor_percentiles[i]);
         bst_json_add_number(percentiles, key, f->percentiles_e_per_s[i]);
+    }
+    if (f->line.found) {
+        cJSON *line = cJSON_AddObjectToObject(root, "pick_up");
+        cJSON_AddBoolToObject(line, "locked", f->line.locked);
+        bst_json_add_number(line, "phase_deg", f->line.phase_deg);
+        double power_e2 = f->line.pair_power * pow(f->figures[BST_SENSOR_GAIN].value, 2.0);
+        bst_json_add_number(line, "power_in_pairs_e2", power_e2);
     }
     add_trail(root, w);
     return root;

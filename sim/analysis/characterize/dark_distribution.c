@@ -15,6 +15,8 @@ static const double CORE_REACH = 3.5, HOT_REACH = 4.5;
 static const double TOLERANCES[BST_SENSOR_PERCENTILES] = {0.3,  0.15, 0.06, 0.06,
                                                           0.06, 0.2,  0.2,  0.4};
 static const double MOST_MISSED = 3.0;
+/* Cost of parameters without a value. */
+static const double UNDEFINED = 1e12;
 
 /* What the cost function needs. */
 typedef struct fit {
@@ -81,13 +83,19 @@ static double cost_of(const void *user, const double *x) {
         double missed = missed_by(user, &d, i);
         sum += missed * missed;
     }
-    return sum;
+    return isfinite(sum) ? sum : UNDEFINED;
 }
 
 bool bst_dark_distribution_fit(const double percentiles[BST_SENSOR_PERCENTILES],
                                const bst_dark_noise *noise, const bst_dark_distribution *start,
                                bst_dark_distribution *out) {
     const fit f = {percentiles, noise};
+    *out = (bst_dark_distribution){NAN, NAN, NAN, NAN, NAN};
+    for (int i = 0; i < BST_SENSOR_PERCENTILES; i++) {
+        if (!isfinite(percentiles[i])) {
+            return false;
+        }
+    }
     double p16 = fmax(percentiles[1], 1e-6), p50 = fmax(percentiles[2], 1e-6), best = INFINITY;
     const bst_dark_distribution starts[2] = {{p16, 0.1, 0.8, 0.35 * p50, 0.6},
                                              {0.9 * p50, 0.2, 0.3, 0.8 * p50, 0.5}};

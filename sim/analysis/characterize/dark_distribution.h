@@ -27,8 +27,9 @@ double bst_dark_distribution_below(const bst_dark_distribution *d, const bst_dar
  *
  * Given:     percentiles  at bst_sensor_percentiles, e-/s
  *            start        used if not NULL; otherwise two starts are compared
- * Returned:  false: a percentile is missed by more than three tolerances (5 % up to the 95th, 10 %
- *            to 15 % above)
+ * Returned:  *out; NAN without a finite percentile
+ *            false: a percentile is not finite or is missed by more than three tolerances (5 % up
+ *            to the 95th, 10 % to 15 % above)
  * Notes:     The shares beyond the percentiles are compared, by their logarithms. */
 bool bst_dark_distribution_fit(const double percentiles[BST_SENSOR_PERCENTILES],
                                const bst_dark_noise *noise, const bst_dark_distribution *start,

@@ -102,6 +102,23 @@ static int block_edge(int index, int length) {
     return (int)((int64_t)index * length / BST_STACK_SIDE);
 }
 
+/* Adds the covariance along a row between two frames, outliers left out. White noise has none: it
+ * is that of pick-up. d: scratch, [width] */
+static void add_covariance(bst_frame_stack *s, const float *a, const float *b,
+                           const bst_clipped_moments *m, float *d) {
+    for (int x = 0; x < s->width; x++) {
+        double v = (double)b[x] - (double)a[x];
+        d[x] = v >= m->low && v <= m->high ? (float)(v - m->mean) : 0.0F;
+    }
+    for (int lag = 1; lag <= BST_STACK_LAGS; lag++) {
+        double sum = 0.0;
+        for (int x = lag; x < s->width; x++) {
+            sum += (double)(d[x] * d[x - lag]);
+        }
+        s->covariance[lag - 1] += 0.5 * sum / (s->width - lag) / s->height;
+    }
+}
+
 /* Adds the variance between two frames: rows are levelled, so that noise common to a row is
  * separate. */
 static void add_pair(reduction *r) {
@@ -115,6 +132,7 @@ static void add_pair(reduction *r) {
         }
         bst_clipped_moments m = bst_clipped_moments_of(r->scratch, width, CLIP);
         r->rows[y] = m.mean;
+        add_covariance(s, a, b, &m, r->scratch);
         within += m.variance / (double)width / s->height;
         mean += m.mean / s->height;
     }
@@ -214,6 +232,9 @@ static bst_status reduce(bst_ctx *ctx, reduction *r, const char *const *paths, i
     }
     for (int k = 0; k < BST_STACK_BLOCKS && s->pairs > 0; k++) {
         s->variance[k] /= s->pairs;
+    }
+    for (int k = 0; k < BST_STACK_LAGS && s->pairs > 0; k++) {
+        s->covariance[k] /= s->pairs;
     }
     s->row_variance = s->pairs > 0 ? s->row_variance / s->pairs : NAN;
     return BST_OK;

@@ -8,6 +8,8 @@
 
 /* Blocks per side: statistics are taken in 8 x 8 blocks, whose scatter gives the uncertainty. */
 enum { BST_STACK_SIDE = 8, BST_STACK_BLOCKS = BST_STACK_SIDE * BST_STACK_SIDE };
+/* Distances along a row of which a stack has the covariance, px. */
+enum { BST_STACK_LAGS = 16 };
 
 /* Frames of one kind. Values are DN. */
 typedef struct bst_frame_stack {
@@ -21,6 +23,7 @@ typedef struct bst_frame_stack {
     int pairs;                         /* of successive frames, each frame in one */
     double variance[BST_STACK_BLOCKS]; /* of a pixel between frames, mean of the pairs */
     double row_variance;               /* of the mean of a row between frames, in excess */
+    double covariance[BST_STACK_LAGS]; /* of pixels 1, 2, ... apart in a row between frames */
     int overscan_width;                /* 0: none */
     float *overscan;                   /* [height][overscan_width] of the last frame */
 } bst_frame_stack;

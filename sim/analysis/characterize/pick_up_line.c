@@ -127,7 +127,7 @@ static double best_growth(const double *sums, int rows, double *cycles) {
     for (int y = 0; y < rows; y++) {
         power += sums[2 * y] * sums[2 * y] + sums[2 * y + 1] * sums[2 * y + 1];
     }
-    for (int k = -steps / 2; k <= steps / 2; k++) { /* one step beyond, for the parabola */
+    for (int k = -steps / 2 - 1; k <= steps / 2; k++) { /* a step beyond, for the parabola */
         double turn[2] = {cos(2.0 * PI * k / steps), -sin(2.0 * PI * k / steps)};
         double re = 0.0, im = 0.0, c = 1.0, s = 0.0;
         for (int y = 0; y < rows; y++) {
@@ -150,6 +150,7 @@ static double best_growth(const double *sums, int rows, double *cycles) {
     }
     double bend = around[0] - 2.0 * around[1] + around[2];
     *cycles += bend < 0.0 ? 0.5 * (around[0] - around[2]) / bend / steps : 0.0;
+    *cycles -= floor(*cycles + 0.5);
     return power > 0.0 ? best / (rows * power) : 0.0;
 }
 
@@ -223,12 +224,38 @@ bst_status bst_pick_up_line_amplitude(bst_ctx *ctx, float *rows, int width, int 
     return BST_OK;
 }
 
+double bst_pick_up_line_phase_deg(const float *rows, int width, int height,
+                                  const bst_pick_up_line *line) {
+    double re = 0.0, im = 0.0;
+    for (int y = 0; y < height; y++) {
+        for (int x = 0; x < width; x++) {
+            double v = (double)rows[(size_t)y * (size_t)width + (size_t)x];
+            double turns = line->frequency.value * x + line->phase.value * y;
+            re += v * sin(2.0 * PI * turns);
+            im += v * cos(2.0 * PI * turns);
+        }
+    }
+    return isnan(line->phase.value) ? NAN : atan2(im, re) * 180.0 / PI;
+}
+
+double bst_pick_up_line_power(const double *covariance, int lags, double cycles_px) {
+    double sum = 0.0, norm = 0.0;
+    for (int k = 1; k <= lags; k++) { /* least squares */
+        double c = cos(2.0 * PI * cycles_px * k);
+        sum += covariance[k - 1] * c;
+        norm += c * c;
+    }
+    return norm > 0.0 ? fmax(sum / norm, 0.0) : 0.0;
+}
+
 bst_status bst_pick_up_line_find(bst_ctx *ctx, float *rows, int width, int height,
                                  bst_pick_up_line *out) {
     *out = (bst_pick_up_line){.bins = width / 2,
                               .frequency = {NAN, NAN},
                               .amplitude = {NAN, NAN},
                               .phase = {NAN, NAN},
+                              .phase_deg = NAN,
+                              .pair_power = NAN,
                               .least_ratio = 1.0 + CERTAIN / sqrt(height)};
     BST_TRY(clip_rows(ctx, rows, (size_t)width * (size_t)height));
     double *power = malloc((size_t)out->bins * sizeof *power);

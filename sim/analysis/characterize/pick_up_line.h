@@ -18,6 +18,9 @@ typedef struct bst_pick_up_line {
     bst_sensor_estimate frequency; /* cycles/px */
     bst_sensor_estimate amplitude; /* half of peak to peak, in the unit of the rows */
     bst_sensor_estimate phase;     /* growth from row to row, cycles; NAN: not coherent */
+    bool locked;                   /* of one phase in all frames: cancels in their differences */
+    double phase_deg;              /* of pixel (0, 0), if locked and coherent; otherwise NAN */
+    double pair_power; /* mean square in differences of pairs, half of it; NAN: no pairs */
 } bst_pick_up_line;
 
 /* Finds the line.
@@ -40,5 +43,17 @@ bst_status bst_pick_up_line_find(bst_ctx *ctx, float *rows, int width, int heigh
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_pick_up_line_amplitude(bst_ctx *ctx, float *rows, int width, int height,
                                       bst_pick_up_line *line) BST_MUST_CHECK;
+
+/* Phase of a line at pixel (0, 0), as the detector's key pick_up/phase_deg has it.
+ *
+ * Given:     rows  as for bst_pick_up_line_find
+ *            line  its frequency and growth from row to row
+ * Returned:  -180 to 180 deg; NAN: the rows are not coherent */
+double bst_pick_up_line_phase_deg(const float *rows, int width, int height,
+                                  const bst_pick_up_line *line);
+
+/* Mean square of a sine by the covariance of pixels 1, 2, ... `lags` apart, to which white noise
+ * does not add; not below 0. */
+double bst_pick_up_line_power(const double *covariance, int lags, double cycles_px);
 
 #endif

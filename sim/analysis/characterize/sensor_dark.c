@@ -17,6 +17,8 @@ static const double CERTAIN = 5.0;
 /* Charge of hot pixels whose trails are measured, in half distances of the 16th and the 84th
  * percentile, which hot pixels do not widen. */
 static const double TRAIL = 20.0;
+/* Largest RMS misfit of traps, share of the trail: below 0.12 on real and simulated darks. */
+static const double MOST_MISFIT = 0.3;
 /* Hot pixels from which on their law is sought. */
 enum { LEAST_HOT = 20 };
 /* Hot pixels lie beyond this quantile of the core's lognormal law, in standard deviations: of a
@@ -230,7 +232,7 @@ static bst_clipped_moments measure_core(dark_signal *d, double per_s) {
 }
 
 /* Percentiles of the pixels of every step-th row from `first` on; returns the number of pixels,
- * sorted in d->scratch. */
+ * sorted in d->scratch. NAN: none has a value. */
 static size_t percentiles_of(dark_signal *d, double per_s, int first, int step,
                              double percentiles[BST_SENSOR_PERCENTILES]) {
     size_t width = (size_t)d->out->width, n = 0;
@@ -243,23 +245,24 @@ static size_t percentiles_of(dark_signal *d, double per_s, int first, int step,
         }
     }
     bst_sort_floats(d->scratch, n);
-    for (int i = 0; i < BST_SENSOR_PERCENTILES && n > 0; i++) {
-        size_t at = (size_t)(bst_sensor_percentiles[i] / 100.0 * (double)(n - 1) + 0.5);
-        percentiles[i] = d->scratch[at] * per_s;
+    for (int i = 0; i < BST_SENSOR_PERCENTILES; i++) {
+        size_t at = (size_t)(bst_sensor_percentiles[i] / 100.0 * ((double)n - 1.0) + 0.5);
+        percentiles[i] = n > 0 ? d->scratch[at] * per_s : NAN;
     }
     return n;
 }
 
 /* Fits the detector's law of the dark currents if hot pixels are there but not separate: values of
- * all pixels, errors from four groups of rows. */
+ * all pixels, errors from four groups of rows, of which three must have such a law. */
 static void fit_distribution(dark_signal *d, double per_s) {
-    enum { GROUPS = 4, VALUES = 5 };
+    enum { GROUPS = 4, LEAST_GROUPS = 3, VALUES = 5 };
     bst_sensor_figures *out = d->out;
     const bst_sensor_figure figures[VALUES] = {BST_SENSOR_DARK, BST_SENSOR_DSNU,
                                                BST_SENSOR_HOT_FRACTION, BST_SENSOR_HOT_MEDIAN,
                                                BST_SENSOR_HOT_SPREAD};
     double line = out->figures[BST_SENSOR_LINE_AMPLITUDE].value; /* still in DN, as the noise */
-    line = isfinite(line) ? 0.5 * line * line / d->stacks->dark.count : 0.0;
+    /* the read noise of pairs has it */
+    line = isfinite(line) && !out->noise_of_pairs ? 0.5 * line * line / d->stacks->dark.count : 0.0;
     double ramp =
         0.5 * fabs(out->figures[BST_SENSOR_RAMP].value) / out->figures[BST_SENSOR_GAIN].value;
     ramp = isfinite(ramp) ? ramp : 0.0;
@@ -274,18 +277,21 @@ static void fit_distribution(dark_signal *d, double per_s) {
     const double values[VALUES] = {all.dark, all.dsnu, all.hot_fraction, all.hot_median,
                                    all.hot_spread_dex};
     double groups[VALUES][GROUPS];
+    int fitted = 0;
     for (int g = 0; g < GROUPS; g++) {
         percentiles_of(d, per_s, g, GROUPS, percentiles);
-        bst_dark_distribution_fit(percentiles, &noise, &all, &part);
+        bool good = bst_dark_distribution_fit(percentiles, &noise, &all, &part);
+        fitted += good;
         const double found[VALUES] = {part.dark, part.dsnu, part.hot_fraction, part.hot_median,
                                       part.hot_spread_dex};
         for (int i = 0; i < VALUES; i++) {
-            groups[i][g] = found[i];
+            groups[i][g] = good ? found[i] : NAN;
         }
     }
     for (int i = 0; i < VALUES; i++) {
+        double sigma = bst_mean_estimate(groups[i], GROUPS).sigma;
         out->figures[figures[i]] =
-            (bst_sensor_estimate){values[i], bst_mean_estimate(groups[i], GROUPS).sigma};
+            (bst_sensor_estimate){values[i], fitted >= LEAST_GROUPS ? sigma : NAN};
         out->method[figures[i]] =
             "law of all pixels, fitted to the percentiles: hot pixels are not "
             "separate from the others";
@@ -351,6 +357,17 @@ static double measure_trail(dark_signal *d) {
     return median;
 }
 
+/* Leaves out traps that do not give the trail. */
+static void judge_traps(bst_sensor_figures *out, double misfit, bst_sensor_figure trail,
+                        bst_detector_traps_config *traps) {
+    if (!(misfit <= MOST_MISFIT * out->figures[trail].value)) {
+        *traps = (bst_detector_traps_config){.traps_per_px = {0.0}};
+        out->method[trail] =
+            "median profile behind hot pixels less the one before them, 5 px; "
+            "traps left out: those fitted miss it by more than 30 %";
+    }
+}
+
 /* Fits traps to certain trails. */
 static void fit_traps(dark_signal *d, double median) {
     bst_sensor_figures *out = d->out;
@@ -367,11 +384,13 @@ static void fit_traps(dark_signal *d, double median) {
         out->traps.top = !out->trail.parallel_up;
         input.transfers = out->height / 2;
         out->trap_misfit[0] = bst_trap_fit(&out->trail, true, &input, &out->traps.parallel);
+        judge_traps(out, out->trap_misfit[0], BST_SENSOR_PARALLEL_TRAIL, &out->traps.parallel);
     }
     if (serial->value > CERTAIN * serial->sigma) {
         out->traps.right = !out->trail.serial_right;
         input.transfers = out->width / 2;
         out->trap_misfit[1] = bst_trap_fit(&out->trail, false, &input, &out->traps.serial);
+        judge_traps(out, out->trap_misfit[1], BST_SENSOR_SERIAL_TRAIL, &out->traps.serial);
     }
 }
 

@@ -206,9 +206,17 @@ static bst_status measure_line(bst_ctx *ctx, const bst_frame_stack *s, float *sc
         level_rows(s, false, rows, scratch);
         if (out->line.found) {
             status = bst_pick_up_line_amplitude(ctx, rows, s->width, s->height, &out->line);
-        } else {
+        } else { /* what the differences lack has one phase in all frames */
             free(out->line.power);
             status = bst_pick_up_line_find(ctx, rows, s->width, s->height, &out->line);
+            out->line.locked = status == BST_OK && out->line.found;
+        }
+        if (out->line.locked) {
+            out->line.phase_deg = bst_pick_up_line_phase_deg(rows, s->width, s->height, &out->line);
+        }
+        if (status == BST_OK && out->line.found && s->pairs > 0) {
+            out->line.pair_power =
+                bst_pick_up_line_power(s->covariance, BST_STACK_LAGS, out->line.frequency.value);
         }
     }
     free(rows);

@@ -6,8 +6,8 @@
 enum { TURNS = 3 };
 static const float LEAST_E = 0.01F;
 
-/* One line of pixels, the one that is read first at `q`. */
-static void pass_line(const bst_detector_traps_config *t, int count, int64_t step, float *q) {
+void bst_trap_pass_line(const bst_detector_traps_config *t, int first, int count, int64_t step,
+                        float *q) {
     float held[BST_TRAP_SPECIES] = {0}, density[BST_TRAP_SPECIES], release[BST_TRAP_SPECIES];
     int kinds = 0;
     for (int k = 0; k < BST_TRAP_SPECIES; k++) {
@@ -20,7 +20,7 @@ static void pass_line(const bst_detector_traps_config *t, int count, int64_t ste
     for (int i = 0; i < count; i++, q += step) {
         for (int k = 0; k < kinds; k++) {
             if (*q > LEAST_E) {
-                float g = (float)(i + 1) * density[k] * powf(*q, exponent);
+                float g = (float)(first + i > 1 ? first + i : 1) * density[k] * powf(*q, exponent);
                 float caught = fmaxf((g * *q - held[k]) / (g + 1.0F), 0.0F);
                 held[k] += caught;
                 *q -= caught;
@@ -36,11 +36,12 @@ void bst_trap_model_pass(const bst_trap_model *m, int width, int height, float *
     int64_t down = m->top ? -(int64_t)width : width;
     float *first = m->top ? image + (int64_t)width * (height - 1) : image;
     for (int x = 0; x < width && bst_detector_has_traps(&m->parallel); x++) {
-        pass_line(&m->parallel, height, down, first + x);
+        bst_trap_pass_line(&m->parallel, 1, height, down, first + x);
     }
     for (int y = 0; y < height && bst_detector_has_traps(&m->serial); y++) {
         float *row = image + (int64_t)width * y;
-        pass_line(&m->serial, width, m->right ? -1 : 1, m->right ? row + width - 1 : row);
+        bst_trap_pass_line(&m->serial, 1, width, m->right ? -1 : 1,
+                           m->right ? row + width - 1 : row);
     }
 }
 

@@ -3,6 +3,7 @@
 #define BST_ANALYSIS_CHARACTERIZE_TRAP_CORRECTION_H
 
 #include <stdbool.h>
+#include <stdint.h>
 
 #include "boresight/detector_config.h"
 
@@ -11,6 +12,15 @@ typedef struct bst_trap_model {
     bst_detector_traps_config parallel, serial;
     bool top, right;
 } bst_trap_model;
+
+/* Moves the charge of one line of pixels to the output, as kernels/charge_transfer.cl.
+ *
+ * Given:     first  transfers of the pixel at q, which is read first; the next ones have one more
+ *            step   from a pixel to the next in q
+ *            q      electrons, changed
+ * Reference: Short et al. 2013, MNRAS 430, 3078 */
+void bst_trap_pass_line(const bst_detector_traps_config *traps, int first, int count, int64_t step,
+                        float *q);
 
 /* Moves the charge of an image to the output, as kernels/charge_transfer.cl.
  *

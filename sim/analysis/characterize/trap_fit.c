@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "sim/analysis/characterize/simplex_search.h"
+#include "sim/analysis/characterize/trap_correction.h"
 
 /* Pixels before the hot one, in which traps reach their state in the background; starts of the
  * search; reference charge of the result. */
@@ -20,28 +21,18 @@ typedef struct fit {
     double charge_e[BST_TRAIL_CLASSES], sums[BST_TRAIL_CLASSES], median_e;
 } fit;
 
-/* Trail of a hot pixel: shares of its charge, both over the background (Short et al. 2013, MNRAS
- * 430, 3078). */
+/* Trail of a hot pixel: shares of its charge, both over the background. */
 static void model_trail(const bst_detector_traps_config *t, const bst_trap_fit_input *input,
                         double charge_e, double *trail) {
-    double held[2] = {0.0, 0.0}, hot = 0.0;
-    for (int i = -BEFORE; i <= BST_TRAIL_PIXELS; i++) {
-        double q = input->background_e + (i == 0 ? charge_e : 0.0);
-        for (int k = 0; k < 2; k++) {
-            double met = fmax(input->transfers + i, 1.0) * t->traps_per_px[k] *
-                         pow(fmax(q, 0.01) / t->reference_e, t->fill_exponent);
-            double caught = q > 0.01 ? fmax((met - held[k]) / (met / q + 1.0), 0.0) : 0.0;
-            double released = (held[k] + caught) * -expm1(-1.0 / t->release_px[k]);
-            held[k] += caught - released;
-            q += released - caught;
-        }
-        if (i == -1) { /* the level about the hot pixel */
-            hot = -q;
-        } else if (i == 0) {
-            hot += q;
-        } else if (i > 0) {
-            trail[i - 1] = (q - input->background_e) / hot;
-        }
+    enum { PIXELS = BEFORE + 1 + BST_TRAIL_PIXELS };
+    float line[PIXELS];
+    for (int i = 0; i < PIXELS; i++) {
+        line[i] = (float)(input->background_e + (i == BEFORE ? charge_e : 0.0));
+    }
+    bst_trap_pass_line(t, input->transfers - BEFORE, PIXELS, 1, line);
+    const float *hot = line + BEFORE; /* over the level before it */
+    for (int k = 1; k <= BST_TRAIL_PIXELS; k++) {
+        trail[k - 1] = ((double)hot[k] - input->background_e) / (double)(hot[0] - hot[-1]);
     }
 }
 

@@ -1,6 +1,7 @@
 /* The camera of the twin: band and throughput by the stars, background and noise by the pixels. */
 #include <cjson/cJSON.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "sim/core/json_number.h"
@@ -62,6 +63,9 @@ static bst_status choose_band(bst_ctx *ctx, const bst_twin *t, bst_twin_camera *
 
 static double number_of(const cJSON *c, const char *key, double fallback) {
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(c, key);
+    if (cJSON_IsRaw(item)) { /* as bst_process_make_scenario writes numbers */
+        return strtod(item->valuestring, NULL);
+    }
     return cJSON_IsNumber(item) ? item->valuedouble : fallback;
 }
 
@@ -71,10 +75,18 @@ static void replace_number(cJSON *c, const char *key, double value) {
 }
 
 /* Throughput by the zero point; what is above 1 makes the aperture larger. */
-static void choose_throughput(const bst_twin *t, const cJSON *json, bst_twin_camera *c) {
+static bst_status choose_throughput(bst_ctx *ctx, const bst_twin *t, const cJSON *json,
+                                    bst_twin_camera *c) {
     double zero = isfinite(t->photometry.zero_point_mag) ? t->photometry.zero_point_mag
                                                          : t->process.zero_point_mag;
-    c->rate_v0 = pow(10.0, 0.4 * (isfinite(zero) ? zero : 20.0));
+    if (!isfinite(zero)) {
+        return bst_fail(ctx, BST_ERR_NUMERIC,
+                        "%s: HDU %d: none of the %d catalogue stars on the frame gives a zero "
+                        "point; give --catalogue with stars of known brightness there, or a "
+                        "fainter --v-limit",
+                        t->frame->path, t->frame->place.hdu, t->catalogue_stars);
+    }
+    c->rate_v0 = pow(10.0, 0.4 * zero);
     c->aperture_m = number_of(json, "aperture_m", 0.1);
     c->throughput = number_of(json, "throughput", 0.8);
     c->quantum_efficiency = number_of(json, "quantum_efficiency", 0.8);
@@ -82,7 +94,7 @@ static void choose_throughput(const bst_twin *t, const cJSON *json, bst_twin_cam
         0.25 * BST_PI * c->aperture_m * c->aperture_m * (1.0 - number_of(json, "obscuration", 0.0));
     if (!c->spectrum) {
         c->photon_flux_v0_per_s_m2 = c->rate_v0 / (area * c->throughput * c->quantum_efficiency);
-        return;
+        return BST_OK;
     }
     double share = c->rate_v0 / (area * bst_band_star(c->spectrum, SOLAR_B_MINUS_V));
     if (share > 1.0) {
@@ -91,6 +103,7 @@ static void choose_throughput(const bst_twin *t, const cJSON *json, bst_twin_cam
     }
     c->quantum_efficiency = fmax(c->quantum_efficiency, share);
     c->throughput = share / c->quantum_efficiency;
+    return BST_OK;
 }
 
 /* Least value of the fitted background on the frame. */
@@ -106,17 +119,24 @@ static double least_background(const bst_twin_model *m) {
 
 /* Electrons behind the background: what the noise has beyond the read noise; at least as many as
  * the background varies by. */
-static void choose_background(const bst_twin *t, double gain, bst_twin_camera *c) {
+static void choose_background(bst_ctx *ctx, const bst_twin *t, double gain, bst_twin_camera *c) {
     const bst_twin_model *m = &t->model;
     double noise2 = m->noise_e * m->noise_e - gain * gain / 12.0; /* less quantisation */
     double shot = noise2 - t->read_noise_e * t->read_noise_e, mean = m->background_e[0];
     double level = fmax(shot, mean - least_background(m) + 1.0);
     c->background_e = level - mean;
     c->read_noise_e = sqrt(fmax(noise2 - level, 0.0));
+    if (level > noise2) {
+        bst_log(ctx, BST_LOG_WARNING,
+                "%s: HDU %d: the background varies by %.6g e-, whose shot noise is more than the "
+                "measured noise of %.6g e-: the twin has no read noise, and more noise than the "
+                "frame; check gain and offset of the map",
+                t->frame->path, t->frame->place.hdu, mean - least_background(m), m->noise_e);
+    }
 }
 
 /* Keys of the background: all light of the sky is in stray_e_per_s. */
-static void put_background(const bst_twin *t, cJSON *json, const bst_twin_camera *c) {
+static void put_background(const bst_twin *t, cJSON *json, bst_twin_camera *c) {
     const bst_twin_model *m = &t->model;
     double exposure_s = t->frame->values.exposure_s;
     cJSON_DeleteItemFromObjectCaseSensitive(json, "background");
@@ -133,8 +153,11 @@ static void put_background(const bst_twin *t, cJSON *json, const bst_twin_camera
     replace_number(json, "dark_current_e_per_s", 0.0);
     replace_number(json, "read_noise_e", c->read_noise_e);
     double gain = number_of(json, "gain_e_per_dn", 1.0);
-    double offset = number_of(json, "offset_dn", 0.0) - c->background_e / gain;
+    c->recorded_offset_dn = number_of(json, "offset_dn", 0.0);
+    /* offsets below 0 are none: the rest is a pedestal, which scenario and report state */
+    double offset = c->recorded_offset_dn - c->background_e / gain;
     replace_number(json, "offset_dn", fmax(offset, 0.0));
+    c->pedestal_dn = fmax(-offset, 0.0);
 }
 
 /* Keys of the PSF. */
@@ -156,8 +179,8 @@ bst_status bst_twin_make_camera(bst_ctx *ctx, const bst_twin *t, cJSON *json,
     char path[4096];
     *out = (bst_twin_camera){.spectrum = NULL};
     BST_TRY(choose_band(ctx, t, out));
-    choose_throughput(t, json, out);
-    choose_background(t, number_of(json, "gain_e_per_dn", 1.0), out);
+    BST_TRY(choose_throughput(ctx, t, json, out));
+    choose_background(ctx, t, number_of(json, "gain_e_per_dn", 1.0), out);
     static const char *const replaced[] = {
         "band",    "rotation_deg", "boresight_offset_px", "distortion", "photon_flux_v0_per_s_m2",
         "detector"};

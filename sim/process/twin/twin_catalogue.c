@@ -3,7 +3,6 @@
 #include <stdlib.h>
 
 #include "sim/catalogue/star_import.h"
-#include "sim/catalogue/stars.h"
 #include "sim/process/twin/twin_internal.h"
 
 /* Radius about the frame that has stars, rad, and times the frame's own. */
@@ -12,7 +11,6 @@ static const double LEAST_RADIUS_RAD = 3.0 * BST_DEG_RAD, TIMES_FIELD = 3.0;
 static const double V_PER_COLOUR = 0.090, B_MINUS_V_PER_COLOUR = 0.850;
 /* BT-VT of stars without a colour. */
 static const double USUAL_COLOUR = 0.7;
-enum { QUERY = 1 << 18 };
 
 /* A record from place, magnitude and colour. */
 static bst_star_values values_of(bst_vec3 icrs, double v_mag, double b_minus_v, uint32_t id) {
@@ -59,57 +57,49 @@ static int add_fitted(const bst_twin *t, const bst_twin_camera *c, bst_star_valu
 }
 
 /* Adds the catalogue's other stars about the frame. */
-static bst_status add_others(bst_ctx *ctx, const bst_twin *t, const bst_star_patch *patch,
-                             bst_star_values *out, int *count) {
-    bst_stars *catalogue;
+static void add_others(const bst_twin *t, const bst_star *stars, int found, bst_star_values *out,
+                       int *count) {
     uint32_t fitted[BST_TWIN_STARS];
-    int found = 0, known = 0;
-    bst_star *stars = malloc(QUERY * sizeof *stars);
-    if (!stars) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d stars", QUERY);
-    }
+    int known = 0;
     for (int i = 0; i < t->model.count; i++) {
         if (!t->model.stars[i].found) {
             fitted[known++] = t->model.stars[i].id;
         }
     }
     qsort(fitted, (size_t)known, sizeof *fitted, by_id);
-    bst_status status = bst_stars_open(ctx, t->process_request.catalogue, &catalogue);
-    if (status == BST_OK) {
-        bst_vec3 ahead =
-            bst_vec3_from_radec(patch->ra_deg * BST_DEG_RAD, patch->dec_deg * BST_DEG_RAD);
-        status = bst_stars_query(ctx, catalogue, ahead, patch->radius_deg * BST_DEG_RAD, 30.0,
-                                 t->julian_year, stars, QUERY, &found);
-        bst_stars_close(catalogue);
-    }
-    for (int i = 0; i < found && i < QUERY && status == BST_OK; i++) {
+    for (int i = 0; i < found; i++) {
         const bst_star *s = &stars[i];
         if (!bsearch(&s->id, fitted, (size_t)known, sizeof *fitted, by_id)) {
             out[(*count)++] = values_of(s->icrs, (double)s->v_mag, (double)s->b_minus_v, s->id);
         }
     }
-    free(stars);
-    return status;
 }
 
 bst_status bst_twin_write_stars(bst_ctx *ctx, const bst_twin *t, const bst_twin_camera *c,
                                 const char *path) {
     double ra, dec, own = bst_camera_half_diagonal_rad(&t->model.camera);
-    bst_vec3_to_radec(bst_quat_rotate(bst_quat_conj(t->frame->q_middle), (bst_vec3){0, 0, 1}), &ra,
-                      &dec);
+    bst_vec3 ahead = bst_quat_rotate(bst_quat_conj(t->frame->q_middle), (bst_vec3){0, 0, 1});
+    bst_stars *catalogue;
+    bst_star *others;
+    int found, count;
+    bst_vec3_to_radec(ahead, &ra, &dec);
     ra = ra < 0.0 ? ra + 2.0 * BST_PI : ra;
     double radius = fmin(fmax(LEAST_RADIUS_RAD, TIMES_FIELD * own), BST_PI);
+    BST_TRY(bst_stars_open(ctx, t->process_request.catalogue, &catalogue));
+    bst_status status = bst_twin_query_stars(ctx, t, catalogue, ahead, radius, &others, &found);
     const bst_star_patch patch = {ra / BST_DEG_RAD, dec / BST_DEG_RAD, radius / BST_DEG_RAD,
-                                  BST_STAR_TYCHO2_COMPLETE_V};
-    bst_star_values *values = malloc((QUERY + BST_TWIN_STARS) * sizeof *values);
+                                  bst_stars_complete_to(catalogue, ahead, radius)};
+    bst_stars_close(catalogue);
+    BST_TRY(status);
+    bst_star_values *values = malloc(((size_t)found + BST_TWIN_STARS) * sizeof *values);
     if (!values) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d stars", QUERY);
+        free(others);
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d stars", found);
     }
-    int count = add_fitted(t, c, values);
-    bst_status status = add_others(ctx, t, &patch, values, &count);
-    if (status == BST_OK) {
-        status = bst_star_write(ctx, values, (size_t)count, &patch, path);
-    }
+    count = add_fitted(t, c, values);
+    add_others(t, others, found, values, &count);
+    status = bst_star_write(ctx, values, (size_t)count, &patch, path);
     free(values);
+    free(others);
     return status;
 }

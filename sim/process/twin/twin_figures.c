@@ -125,6 +125,7 @@ bst_status bst_twin_figures_compute(bst_ctx *ctx, const bst_twin *t, const bst_t
     out->pixels = all.count;
     out->streak_pixels = streaks.count;
     out->outliers = all.count - clipped.count;
+    out->streak_outliers = streaks.count - streaks_clipped.count;
     out->chi2 = mean_chi2(&all);
     out->chi2_streaks = mean_chi2(&streaks);
     out->chi2_clipped = mean_chi2(&clipped);

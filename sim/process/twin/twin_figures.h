@@ -9,6 +9,7 @@ typedef struct bst_twin_frames {
     float *stars_e, *background_e; /* of the twin, without noise; background as in data_e */
     float *residual_e;             /* data_e minus both; NAN: no value */
     float *variance_e2;            /* measured noise and the shot noise of the stars */
+    double level_dn;               /* of the twin's dark pixels over the recorded ones */
 } bst_twin_frames;
 
 /* Computes the figures.
@@ -21,7 +22,7 @@ bst_status bst_twin_figures_compute(bst_ctx *ctx, const bst_twin *twin,
 /* Writes the report, and prints it.
  *
  * Errors:    those of the outputs */
-bst_status bst_twin_write_report(bst_ctx *ctx, const bst_twin *twin,
+bst_status bst_twin_write_report(bst_ctx *ctx, const bst_twin *twin, const bst_twin_camera *camera,
                                  const bst_twin_figures *figures,
                                  const bst_twin_frames *frames) BST_MUST_CHECK;
 

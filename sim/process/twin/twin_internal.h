@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 
+#include "sim/catalogue/stars.h"
 #include "sim/optics/band.h"
 #include "sim/process/process_internal.h"
 #include "sim/process/twin/twin.h"
@@ -73,8 +74,10 @@ bst_status bst_twin_measure_photometry(bst_ctx *ctx, bst_twin *twin) BST_MUST_CH
 typedef struct bst_twin_camera {
     bst_band_config band;
     bst_optics_response_point response[32];
-    int points;          /* of the response; 0: the V band */
-    double background_e; /* per pixel and exposure where the fitted background is 0 */
+    int points;                /* of the response; 0: the V band */
+    double background_e;       /* per pixel and exposure where the fitted background is 0 */
+    double recorded_offset_dn; /* level of a pixel without light by header or map */
+    double pedestal_dn;        /* by which the twin's level is above the recorded one */
     double read_noise_e;
     double photon_flux_v0_per_s_m2; /* of the V band */
     double aperture_m, throughput, quantum_efficiency;
@@ -87,7 +90,7 @@ typedef struct bst_twin_camera {
  *
  * Given:     camera_json  of the scenario, changed accordingly
  * Ownership: free out->spectrum with bst_band_free
- * Errors:    those of bst_band_create */
+ * Errors:    those of bst_band_create; BST_ERR_NUMERIC: no zero point */
 bst_status bst_twin_make_camera(bst_ctx *ctx, const bst_twin *twin, struct cJSON *camera_json,
                                 bst_twin_camera *out) BST_MUST_CHECK;
 
@@ -96,6 +99,15 @@ bst_status bst_twin_make_camera(bst_ctx *ctx, const bst_twin *twin, struct cJSON
  * Errors:    those of the outputs */
 bst_status bst_twin_write(bst_ctx *ctx, const bst_twin *twin,
                           bst_twin_camera *camera) BST_MUST_CHECK;
+/* Queries all stars of an open catalogue within a cone, at the frame's date.
+ *
+ * Given:     centre  unit, ICRS
+ * Ownership: free(*out)
+ * Errors:    those of the catalogue; BST_ERR_MEMORY */
+bst_status bst_twin_query_stars(bst_ctx *ctx, const bst_twin *twin, const bst_stars *catalogue,
+                                bst_vec3 centre, double radius_rad, bst_star **out,
+                                int *count) BST_MUST_CHECK;
+
 /* Writes the star catalogue of the twin.
  *
  * Errors:    those of the catalogues */
@@ -107,10 +119,10 @@ typedef struct bst_twin_figures {
     double chi2, chi2_streaks;                 /* per pixel, by the measured noise */
     double chi2_clipped, chi2_streaks_clipped; /* without pixels beyond 5 sigma */
     double chi2_header; /* by the header's read noise and the background's shot noise */
-    int64_t pixels, streak_pixels, outliers; /* outliers: beyond 5 sigma */
-    double explained;                        /* share of the frame's variance, noise included */
-    double explained_clipped;                /* the same without outliers and noise */
-    double explained_streaks;                /* on streaks, noise included */
+    int64_t pixels, streak_pixels, outliers, streak_outliers; /* outliers: beyond 5 sigma */
+    double explained;           /* share of the frame's variance, noise included */
+    double explained_clipped;   /* the same without outliers and noise */
+    double explained_streaks;   /* on streaks, noise included */
     double explained_catalogue; /* as explained_clipped, by the catalogue's stars alone */
     double across_px, along_px; /* RMS of the catalogue's streaks off the path */
     int streaks;

@@ -240,6 +240,7 @@ static void set_sigmas(bst_twin_model *m, fit *f) {
 static bst_status iterate(bst_ctx *ctx, bst_twin_model *m, fit *f, int iterations,
                           bst_parallel *pool, double *loss) {
     BST_TRY(set_variances(ctx, m, pool));
+    m->converged = false;
     for (int i = 0; i <= iterations; i++) {
         double gain;
         if (bst_stop_requested()) {
@@ -252,6 +253,7 @@ static bst_status iterate(bst_ctx *ctx, bst_twin_model *m, fit *f, int iteration
         }
         BST_TRY(improve(ctx, m, f, pool, loss, &gain));
         if (gain < LEAST_GAIN) {
+            m->converged = true;
             break;
         }
     }

@@ -51,6 +51,7 @@ typedef struct bst_twin_model {
     double form_error;  /* of the PSF, as a share of a pixel's starlight: keeps a few bright streaks
                            from outweighing all others */
     float *variance_e2; /* [height][width] of the latest fit */
+    bool converged;     /* the latest fit ended because it improved no more */
 } bst_twin_model;
 
 /* Electrons of a frame by the model.

@@ -20,6 +20,9 @@ static const double ODD_MAG = 0.75;
 /* Chi squared per pixel on streaks, without outliers, of a path that is right: below 1.3 on real
  * and simulated frames, 2.2 where the solver took the ends of streaks for points. */
 static const double MOST_CHI2 = 1.8;
+/* Least pixels on streaks that tell it, and the largest share of them beyond 5 sigma. */
+enum { LEAST_PIXELS = 50 };
+static const double MOST_OUTLIERS = 0.05;
 
 /* A pixel that the twin does not explain. */
 typedef struct outlier {
@@ -78,6 +81,7 @@ static void add_fit(cJSON *root, const bst_twin *t) {
     bst_json_add_number(fit, "path_length_px", bst_twin_path_length_px(m));
     cJSON_AddNumberToObject(fit, "path_coefficients", bst_twin_path_values(&m->path));
     cJSON_AddBoolToObject(fit, "direction_known", t->direction_known);
+    cJSON_AddBoolToObject(fit, "converged", m->converged);
     bst_json_add_number(fit, "psf_sigma_px", m->psf.sigma_px);
     bst_json_add_number(fit, "psf_wide_sigma_px", bst_twin_psf_wide_px(&m->psf));
     bst_json_add_number(fit, "psf_wide_share", m->psf.wide);
@@ -90,7 +94,9 @@ static void add_fit(cJSON *root, const bst_twin *t) {
 
 /* True if the streaks are those of the frame: a wrong path leaves more than an odd PSF does. */
 static bool fits(const bst_twin_figures *f) {
-    return !(f->chi2_streaks_clipped > MOST_CHI2);
+    return f->streak_pixels >= LEAST_PIXELS && isfinite(f->chi2_streaks_clipped) &&
+           f->chi2_streaks_clipped <= MOST_CHI2 &&
+           (double)f->streak_outliers <= MOST_OUTLIERS * (double)f->streak_pixels;
 }
 
 static void add_figures(cJSON *root, const bst_twin *t, const bst_twin_figures *f) {
@@ -115,6 +121,16 @@ static void add_figures(cJSON *root, const bst_twin *t, const bst_twin_figures *
     cJSON_AddNumberToObject(node, "photometry_stars_bright", t->photometry.bright);
     cJSON_AddNumberToObject(node, "pixels", (double)f->pixels);
     cJSON_AddNumberToObject(node, "pixels_on_streaks", (double)f->streak_pixels);
+    cJSON_AddNumberToObject(node, "pixels_on_streaks_beyond_5_sigma", (double)f->streak_outliers);
+}
+
+/* What the scenario's camera has in place of what the frame does not tell. */
+static void add_camera(cJSON *root, const bst_twin_camera *c, const bst_twin_frames *frames) {
+    cJSON *node = cJSON_AddObjectToObject(root, "camera");
+    bst_json_add_number(node, "read_noise_e", c->read_noise_e);
+    bst_json_add_number(node, "background_behind_e", c->background_e);
+    bst_json_add_number(node, "pedestal_dn", c->pedestal_dn);
+    bst_json_add_number(node, "level_rendered_minus_recorded_dn", frames->level_dn);
 }
 
 static void add_stars(cJSON *root, const bst_twin *t) {
@@ -203,12 +219,13 @@ static bst_status write_page(bst_ctx *ctx, const bst_twin *t, const cJSON *root)
     fprintf(out, "\"></p>\n");
     write_table(out, root, "figures");
     write_table(out, root, "fit");
+    write_table(out, root, "camera");
     write_table(out, root, "missing");
     fprintf(out, "</body></html>\n");
     return bst_draft_close(ctx, &draft, BST_OK);
 }
 
-static void print(const bst_twin *t, const bst_twin_figures *f) {
+static void print(const bst_twin *t, const bst_twin_camera *camera, const bst_twin_figures *f) {
     const bst_twin_model *m = &t->model;
     printf("path       %.1f px, %d values%s\n", bst_twin_path_length_px(m),
            bst_twin_path_values(&m->path),
@@ -233,21 +250,30 @@ static void print(const bst_twin *t, const bst_twin_figures *f) {
         100.0 * f->explained_clipped, 100.0 * f->explained_catalogue, 100.0 * f->explained_streaks);
     if (!fits(f)) {
         printf(
-            "warning    the streaks of the twin are not those of the frame: chi2 on streaks is "
-            "above %g; look at %s_report.png\n",
-            MOST_CHI2, t->stem);
+            "warning    the streaks of the twin are not those of the frame: chi2 on streaks is not "
+            "below %g without outliers, or more than %g %% of %" PRId64
+            " pixels there are outliers, or these are fewer than %d; look at %s_report.png\n",
+            MOST_CHI2, 100.0 * MOST_OUTLIERS, f->streak_pixels, LEAST_PIXELS, t->stem);
+    }
+    if (camera->pedestal_dn > 0.0) {
+        printf("note       the twin's level is %.6g DN above the recorded one: its offset is 0\n",
+               camera->pedestal_dn);
+    }
+    if (!m->converged) {
+        printf("note       the last fit ended at its limit of iterations\n");
     }
     fflush(stdout);
 }
 
-bst_status bst_twin_write_report(bst_ctx *ctx, const bst_twin *t, const bst_twin_figures *f,
-                                 const bst_twin_frames *frames) {
+bst_status bst_twin_write_report(bst_ctx *ctx, const bst_twin *t, const bst_twin_camera *camera,
+                                 const bst_twin_figures *f, const bst_twin_frames *frames) {
     char path[4096];
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "frame", t->frame->path);
     cJSON_AddNumberToObject(root, "hdu", t->frame->place.hdu);
     add_figures(root, t, f);
     add_fit(root, t);
+    add_camera(root, camera, frames);
     add_missing(root, t, f, frames);
     bst_status status = write_page(ctx, t, root);
     if (status != BST_OK) {
@@ -255,7 +281,7 @@ bst_status bst_twin_write_report(bst_ctx *ctx, const bst_twin *t, const bst_twin
         return status;
     }
     add_stars(root, t);
-    print(t, f);
+    print(t, camera, f);
     bst_twin_file(t, "_report.json", path);
     return bst_cli_write_json(ctx, path, root);
 }

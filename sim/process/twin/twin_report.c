@@ -142,8 +142,8 @@ static bst_status write_picture(bst_ctx *ctx, const bst_twin *t, const bst_twin_
 }
 
 /* The twin's frame with noise, electrons as data_e has them. */
-static bst_status read_twin(bst_ctx *ctx, const bst_twin *t, const bst_twin_frames *f,
-                            float **out) {
+static bst_status read_twin(bst_ctx *ctx, const bst_twin *t, const bst_twin_camera *camera,
+                            bst_twin_frames *f, float **out) {
     char path[4096];
     bst_fits_source *source;
     bst_fits_source_frame place;
@@ -157,14 +157,23 @@ static bst_status read_twin(bst_ctx *ctx, const bst_twin *t, const bst_twin_fram
         status = bst_fits_source_pixels(ctx, source, *out);
     }
     bst_fits_source_close(source);
-    double mean = 0.0, gain = t->frame->values.gain_e_per_dn / t->process.map.dn_per_unit;
+    double mean = 0.0, dark = 0.0, recorded = 0.0, n = 0.0,
+           gain = t->frame->values.gain_e_per_dn / t->process.map.dn_per_unit;
     for (size_t i = 0; i < pixels && status == BST_OK; i++) {
         (*out)[i] *= (float)gain;
-        mean += (double)((*out)[i] - f->stars_e[i] - f->background_e[i]) / (double)pixels;
+        double level = (double)((*out)[i] - f->stars_e[i] - f->background_e[i]);
+        double r = (double)f->residual_e[i];
+        mean += level / (double)pixels;
+        if (r * r < 25.0 * (double)f->variance_e2[i] && (double)f->stars_e[i] < t->model.noise_e) {
+            dark += level;
+            recorded += r;
+            n += 1.0;
+        }
     }
     for (size_t i = 0; i < pixels && status == BST_OK; i++) {
         (*out)[i] -= (float)mean; /* offset, and the electrons behind the background */
     }
+    f->level_dn = (dark - recorded) / n / gain - camera->recorded_offset_dn;
     return status;
 }
 
@@ -177,7 +186,7 @@ bst_status bst_twin_report(bst_ctx *ctx, bst_twin *t, const bst_twin_camera *cam
         status = read_frames(ctx, t, camera, &f);
     }
     if (status == BST_OK) {
-        status = read_twin(ctx, t, &f, &twin_e);
+        status = read_twin(ctx, t, camera, &f, &twin_e);
     }
     if (status == BST_OK) {
         status = bst_twin_figures_compute(ctx, t, &f, &figures);
@@ -186,7 +195,7 @@ bst_status bst_twin_report(bst_ctx *ctx, bst_twin *t, const bst_twin_camera *cam
         status = write_picture(ctx, t, &f, twin_e);
     }
     if (status == BST_OK) {
-        status = bst_twin_write_report(ctx, t, &figures, &f);
+        status = bst_twin_write_report(ctx, t, camera, &figures, &f);
     }
     free(twin_e);
     frames_free(&f);

@@ -8,8 +8,10 @@
 #include "sim/catalogue/stars.h"
 #include "sim/process/twin/twin_internal.h"
 
-/* Room of a query; most stars of the catalogue and most found ones. */
-enum { QUERY = 1 << 16, CATALOGUE_MOST = 1200, FOUND_MOST = BST_TWIN_STARS - CATALOGUE_MOST };
+/* Most stars of the catalogue and most found ones. */
+enum { CATALOGUE_MOST = 1200, FOUND_MOST = BST_TWIN_STARS - CATALOGUE_MOST };
+/* V of queries for all stars. */
+static const double FAINTEST = 30.0;
 /* Faintest star of the catalogue that is fitted, signal-to-noise ratio by the zero point. */
 static const double CATALOGUE_SNR = 2.0;
 /* Least share of a star's light on the frame. */
@@ -70,30 +72,44 @@ static void add_sorted(bst_twin *t, const bst_star *stars, int count) {
     t->catalogue_stars = m->count;
 }
 
+bst_status bst_twin_query_stars(bst_ctx *ctx, const bst_twin *t, const bst_stars *catalogue,
+                                bst_vec3 centre, double radius_rad, bst_star **out, int *count) {
+    double radius = fmin(radius_rad, BST_PI);
+    int all;
+    *out = NULL;
+    *count = 0;
+    BST_TRY(
+        bst_stars_query(ctx, catalogue, centre, radius, FAINTEST, t->julian_year, NULL, 0, &all));
+    bst_star *stars = malloc(((size_t)all + 1) * sizeof *stars);
+    if (!stars) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d stars", all);
+    }
+    bst_status status = bst_stars_query(ctx, catalogue, centre, radius, FAINTEST, t->julian_year,
+                                        stars, all, count);
+    if (status != BST_OK) {
+        free(stars);
+        return status;
+    }
+    *out = stars;
+    return BST_OK;
+}
+
 bst_status bst_twin_add_catalogue(bst_ctx *ctx, bst_twin *t) {
     bst_stars *catalogue;
     const bst_camera *camera = &t->model.camera;
-    bst_star *found = malloc(QUERY * sizeof *found);
-    int count = 0;
-    if (!found) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d stars", QUERY);
-    }
-    bst_status status = bst_stars_open(ctx, t->process_request.catalogue, &catalogue);
-    if (status == BST_OK) {
-        bst_vec3 ahead = bst_quat_rotate(bst_quat_conj(t->frame->q_middle), (bst_vec3){0, 0, 1});
-        double radius = bst_camera_half_diagonal_rad(camera) +
-                        (t->length_px + 20.0) * bst_camera_scale_rad(camera) + 1e-3;
-        status = bst_stars_query(ctx, catalogue, ahead, fmin(radius, BST_PI), 30.0, t->julian_year,
-                                 found, QUERY, &count);
-        bst_stars_close(catalogue);
-    }
-    if (status == BST_OK) {
-        count = count < QUERY ? count : QUERY;
-        qsort(found, (size_t)count, sizeof *found, brighter_first);
-        add_sorted(t, found, count);
-    }
+    bst_star *found;
+    int count;
+    bst_vec3 ahead = bst_quat_rotate(bst_quat_conj(t->frame->q_middle), (bst_vec3){0, 0, 1});
+    double radius = bst_camera_half_diagonal_rad(camera) +
+                    (t->length_px + 20.0) * bst_camera_scale_rad(camera) + 1e-3;
+    BST_TRY(bst_stars_open(ctx, t->process_request.catalogue, &catalogue));
+    bst_status status = bst_twin_query_stars(ctx, t, catalogue, ahead, radius, &found, &count);
+    bst_stars_close(catalogue);
+    BST_TRY(status);
+    qsort(found, (size_t)count, sizeof *found, brighter_first);
+    add_sorted(t, found, count);
     free(found);
-    return status;
+    return BST_OK;
 }
 
 /* The path of a star at the frame's middle, as the matched filter takes it. */

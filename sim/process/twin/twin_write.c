@@ -1,4 +1,5 @@
 /* Files of the twin: scenario, path, PSF. */
+#define _XOPEN_SOURCE 700 /* realpath */
 #include <assert.h>
 #include <cjson/cJSON.h>
 #include <math.h>
@@ -29,6 +30,25 @@ static cJSON *item(cJSON *object, const char *key) {
     return cJSON_GetObjectItemCaseSensitive(object, key);
 }
 
+/* The catalogue as the scenario names it: scenarios take relative paths from their own folder. */
+static void name_catalogue(const bst_twin *t, char path[4096]) {
+    const char *name = t->request->catalogue;
+    bool word = strcmp(name, "embedded") == 0 || strcmp(name, "default") == 0;
+    char *whole = word ? NULL : realpath(name, NULL);
+    snprintf(path, 4096, "%s", whole ? whole : name);
+    free(whole);
+}
+
+/* Removes the stars of an earlier twin, unless they are the catalogue of this one. */
+static void remove_stars(const bst_twin *t, const char *path) {
+    char *stars = realpath(path, NULL), *used = realpath(t->request->catalogue, NULL);
+    if (stars && !(used && strcmp(stars, used) == 0)) {
+        (void)remove(path); /* what is left over harms nothing but the reader */
+    }
+    free(stars);
+    free(used);
+}
+
 /* Turns the scenario of the recorded frame into one that renders it. */
 static bst_status change_scenario(bst_ctx *ctx, const bst_twin *t, cJSON *root,
                                   bst_twin_camera *camera) {
@@ -38,9 +58,10 @@ static bst_status change_scenario(bst_ctx *ctx, const bst_twin *t, cJSON *root,
     cJSON *scenegen = cJSON_CreateObject(), *record = item(root, "record");
     replace_text(root, "name", name_of(t, "", path));
     replace_text(root, "description", "Twin of a recorded frame: written by boresight twin.");
-    replace_text(
-        item(root, "world"), "star_catalogue",
-        t->request->catalogue_only ? t->request->catalogue : name_of(t, "_stars.bin", path));
+    char catalogue[4096];
+    name_catalogue(t, catalogue);
+    replace_text(item(root, "world"), "star_catalogue",
+                 t->request->catalogue_only ? catalogue : name_of(t, "_stars.bin", path));
     const char *pointing = name_of(t, "_path.json", path);
     replace_text(item(observer, "orbit"), "states_file", pointing);
     replace_text(sensor, "frame_updates_file", pointing);
@@ -50,7 +71,15 @@ static bst_status change_scenario(bst_ctx *ctx, const bst_twin *t, cJSON *root,
     cJSON *planes = cJSON_AddArrayToObject(record, "planes");
     cJSON_AddItemToArray(planes, cJSON_CreateString("stars"));
     cJSON_AddItemToArray(planes, cJSON_CreateString("background"));
-    return bst_twin_make_camera(ctx, t, item(sensor, "camera"), camera);
+    BST_TRY(bst_twin_make_camera(ctx, t, item(sensor, "camera"), camera));
+    if (camera->pedestal_dn > 0.0) {
+        snprintf(path, sizeof path,
+                 "Twin of a recorded frame: written by boresight twin. Its level is %.6g DN above "
+                 "the recorded one.",
+                 camera->pedestal_dn);
+        replace_text(root, "description", path);
+    }
+    return BST_OK;
 }
 
 /* The frame alone, with the fitted path as its attitudes. */
@@ -114,8 +143,10 @@ bst_status bst_twin_write(bst_ctx *ctx, const bst_twin *t, bst_twin_camera *came
     if (status == BST_OK) {
         status = write_psf(ctx, t);
     }
-    if (status == BST_OK && !t->request->catalogue_only) {
-        bst_twin_file(t, "_stars.bin", path);
+    bst_twin_file(t, "_stars.bin", path);
+    if (t->request->catalogue_only) {
+        remove_stars(t, path);
+    } else if (status == BST_OK) {
         status = bst_twin_write_stars(ctx, t, camera, path);
     }
     if (status != BST_OK) {
