@@ -8,8 +8,8 @@
 /* What the command line asks for. */
 typedef struct bst_study_request {
     const char *out, *shard, *site, *scheduler, *device; /* these options; NULL: not given */
-    int64_t workers, cores, shard_runs;      /* 0: not given */
-    int64_t emit;                            /* number of a run; -1: not given */
+    int64_t workers, cores, shard_runs;                  /* 0: not given */
+    int64_t emit;                                        /* number of a run; -1: not given */
     bool resume, gather, dry_run, quiet, schema, help, unpinned, slurm;
     char **parts; /* folders that --gather reads */
     int part_count;
