@@ -193,7 +193,7 @@ LINES = [
     (("new", OUT + ".json", "--observer-tle", ELEMENTS + ":x"), 1, '"x" is no catalogue number .allowed: '),
     (("new", OUT + ".json", "--pixel-scale", "3", "--focal-length", "1"), 2, "give one of them"),
     (("stars", "info", "--json"), 2, "unknown option --json"),
-    (("version", "x"), 2, "no argument is expected"),
+    (("version", "x"), 2, "x. is not expected here"),
     (("schema", "--plugin", F + "/file"), 1, "cannot be loaded"),
     (("link-keys", "--out", F + "/file"), 1, "file: cannot be made: File exists"),
 ]
