@@ -281,13 +281,13 @@ static void set_flags(const bst_locate_frame *f, bst_imgproc_found *found) {
     }
 }
 
-/* Fits an elongated point again as a streak of its own, whose light reaches further: up to the
- * frame's edge, or to full pixels. */
+/* Fits an elongated point again as a streak of its own, whose light may reach the frame's edge.
+ * Full pixels on its way do not make it saturated: a spike of a bright star ends in the star. */
 static void fit_own_streak(const bst_imgproc_worker *w, int i, bst_imgproc_found *found) {
     bst_source_moments_own_streak(w, i, found);
     found->own_streak = found->streak;
     if (found->own_streak) {
-        flag_light(w->f, found);
+        flag_edge(w->f, found);
         if (is_outside(w->f, &found->source.shape)) {
             label_artefact(found);
         }
