@@ -297,7 +297,7 @@ static bst_status write_plot(bst_ctx *ctx, const writer *w) {
     return bst_plot_end(ctx, &plot, NULL);
 }
 
-/* Removes maps and plot of an earlier run, so that none stays beside another report. */
+/* Removes maps and plot of an earlier run, which would not belong to the new report. */
 static void remove_earlier(const bst_characterize_request *request) {
     static const char *const names[] = {"dark_map.fits", "prnu_map.fits", "plot.png"};
     char path[4096 + 32];
