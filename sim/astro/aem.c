@@ -9,8 +9,8 @@
 #include <strings.h>
 
 #include "sim/astro/ccsds_time.h"
-#include "sim/astro/text_internal.h"
 #include "sim/core/file.h"
+#include "sim/core/text_reader.h"
 
 enum { ROWS_MAX = 4000000, WORD_BYTES = 64 };
 

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "sim/astro/text_internal.h"
+#include "sim/core/text_reader.h"
 
 #define GPS_BEHIND_TAI_S 19.0
 

@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "sim/astro/text_internal.h"
 #include "sim/core/file.h"
+#include "sim/core/text_reader.h"
 
 #define MAX_FILE_BYTES ((uint64_t)16 << 20)
 

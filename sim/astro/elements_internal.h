@@ -3,7 +3,7 @@
 #define BST_ASTRO_ELEMENTS_INTERNAL_H
 
 #include "sim/astro/elements.h"
-#include "sim/astro/text_internal.h"
+#include "sim/core/text_reader.h"
 
 typedef struct bst_elements_reader {
     bst_text_source source;

@@ -6,9 +6,9 @@
 
 #include "sim/astro/ccsds_time.h"
 #include "sim/astro/interpolate.h"
-#include "sim/astro/text_internal.h"
 #include "sim/core/file.h"
 #include "sim/core/text.h"
+#include "sim/core/text_reader.h"
 
 #define MAX_FILE_BYTES ((uint64_t)128 << 20)
 #define SLACK_S 1e-6

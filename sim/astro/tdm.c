@@ -9,8 +9,8 @@
 
 #include "boresight/vec.h"
 #include "sim/astro/ccsds_time.h"
-#include "sim/astro/text_internal.h"
 #include "sim/core/file.h"
+#include "sim/core/text_reader.h"
 
 #define MAX_FILE_BYTES ((uint64_t)256 << 20)
 

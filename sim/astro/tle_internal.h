@@ -2,8 +2,8 @@
 #ifndef BST_ASTRO_TLE_INTERNAL_H
 #define BST_ASTRO_TLE_INTERNAL_H
 
-#include "sim/astro/text_internal.h"
 #include "sim/astro/tle.h"
+#include "sim/core/text_reader.h"
 
 /* Parses a set as bst_tle_parse; the name stays empty. */
 bst_status bst_tle_parse_set(const bst_text_source *source, const bst_text_line *line1,

@@ -4,8 +4,8 @@
 #include "sim/catalogue/star_index.h"
 #include "sim/catalogue/stars.h"
 
-/* Tycho-2 has 98 % of the stars at V 11 and 76 % at 11.5: a catalogue made from it is complete at
- * most to this limit, whatever its patches state. */
+/* Tycho-2 has 98 % of the stars at V 11 and 76 % at 11.5: a catalogue made from it alone is
+ * complete at most to this limit, whatever its patches state. */
 #define SOURCE_COMPLETE_V 11.0
 
 #define DEG2_PER_SR (1.0 / (BST_DEG_RAD * BST_DEG_RAD))
@@ -193,7 +193,8 @@ bst_status bst_faint_sky_create(bst_ctx *ctx, const bst_stars *stars, uint64_t s
     }
     bst_stars_info info;
     bst_stars_get_info(stars, &info);
-    sky->complete_to_v = fmin(info.complete_to_v_mag, SOURCE_COMPLETE_V);
+    const double most_v = bst_stars_records(stars)->sources ? INFINITY : SOURCE_COMPLETE_V;
+    sky->complete_to_v = fmin(info.complete_to_v_mag, most_v);
     sky->patch_count = info.patches;
     sky->patches = calloc((size_t)info.patches + 1, sizeof *sky->patches);
     bst_status status =
@@ -203,7 +204,7 @@ bst_status bst_faint_sky_create(bst_ctx *ctx, const bst_stars *stars, uint64_t s
         faint_patch *p = &sky->patches[i];
         bst_stars_patch(stars, i, &p->centre, &p->radius_rad, &p->complete_to_v);
         p->cos_radius = cos(p->radius_rad);
-        p->complete_to_v = fmin(p->complete_to_v, SOURCE_COMPLETE_V);
+        p->complete_to_v = fmin(p->complete_to_v, most_v);
     }
     if (status == BST_OK) {
         status = weigh(ctx, sky, bst_stars_records(stars));

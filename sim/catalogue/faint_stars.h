@@ -14,7 +14,7 @@
 /* faintest magnitude of single statistical stars, V */
 #define BST_FAINT_LIMIT_V 21
 
-/* identity bit of statistical stars; identities of Tycho-2 are below 2^30 */
+/* identity bit of statistical stars; identities of a catalogue's stars are below it */
 #define BST_FAINT_ID_BIT 0x80000000u
 
 /* default seed of the statistical stars */
@@ -28,7 +28,7 @@ typedef struct bst_faint_stars bst_faint_stars;
 
 /* Creates the statistical sky that completes `stars` (borrowed for the call).
  *
- * Notes:     Where the catalogue is complete (at most to V 11, Tycho-2's limit) there
+ * Notes:     Where the catalogue is complete (Tycho-2 alone: at most to V 11) there
  *            are no statistical stars. Beyond, a statistical star is kept with probability 1 -
  *            catalogue / table, at least 0, by zone of the sky (432 of 95 square degrees, and each
  *            patch of the catalogue) and quarter of a magnitude: catalogue and statistical stars

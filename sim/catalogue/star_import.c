@@ -7,24 +7,12 @@
 #include <unistd.h>
 
 #include "sim/catalogue/bright_stars.h"
-#include "sim/core/draft.h"
+#include "sim/catalogue/star_list.h"
+#include "sim/catalogue/stars.h"
 #include "sim/core/file.h"
 #include "sim/core/subprocess.h"
 
 #define ROWS_PER_PROGRESS 20000
-/* V to which a catalogue of one field is complete over the whole sky */
-#define BRIGHTER_THAN_ALL (-2.0)
-
-typedef struct import_star {
-    bst_star_record record;
-    uint32_t cell;
-    int32_t v;
-} import_star;
-
-typedef struct import_list {
-    import_star *stars;
-    size_t count, room;
-} import_list;
 
 bst_star_import_options bst_star_import_all(void) {
     bst_star_import_options o = {0};
@@ -108,23 +96,8 @@ static bool keeps(const bst_star_subset *subset, const bst_star_record *record) 
     return false;
 }
 
-static bst_status append(bst_ctx *ctx, import_list *list, const bst_star_record *record,
-                         uint32_t cell) {
-    if (list->count == list->room) {
-        size_t room = list->room ? 2 * list->room : 1 << 14;
-        import_star *grown = realloc(list->stars, room * sizeof *grown);
-        if (!grown) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %zu stars", room);
-        }
-        list->stars = grown;
-        list->room = room;
-    }
-    list->stars[list->count++] = (import_star){*record, cell, bst_star_record_v(record)};
-    return BST_OK;
-}
-
 static bst_status read_rows(bst_ctx *ctx, FILE *rows, const bst_star_import_options *options,
-                            import_list *list) {
+                            bst_star_list *list) {
     char line[512];
     long long count = 0;
     while (fgets(line, sizeof line, rows)) {
@@ -143,7 +116,7 @@ static bst_status read_rows(bst_ctx *ctx, FILE *rows, const bst_star_import_opti
             status = bst_star_pack(ctx, &values, &record);
         }
         if (status == BST_OK && keeps(&options->subset, &record)) {
-            status = append(ctx, list, &record, values.id >> 16);
+            status = bst_star_list_add(ctx, list, &record, values.id >> 16);
         }
         if (status != BST_OK) {
             return bst_fail_prefix(ctx, status, "Tycho-2 row %lld", count);
@@ -168,166 +141,58 @@ static bst_status read_rows(bst_ctx *ctx, FILE *rows, const bst_star_import_opti
     return BST_OK;
 }
 
-static int compare_u32(uint32_t a, uint32_t b) {
-    return (a > b) - (a < b);
-}
-
-/* Sorts stars by cell, brightest first, ties by identity; position last, so that the order is
- * total. */
-static int compare_stars(const void *pa, const void *pb) {
-    const import_star *a = pa, *b = pb;
-    int c = compare_u32(a->cell, b->cell);
-    if (c == 0) {
-        c = (a->v > b->v) - (a->v < b->v);
-    }
-    if (c == 0) {
-        c = compare_u32(a->record.tyc_vt & 0xFFFFu, b->record.tyc_vt & 0xFFFFu);
-    }
-    if (c == 0) {
-        c = compare_u32(a->record.ra, b->record.ra);
-    }
-    return c ? c : compare_u32((uint32_t)a->record.dec, (uint32_t)b->record.dec);
-}
-
-/* Computes the cap around stars first to first + count - 1 of *cell. */
-static void bound_cell(const import_star *stars, bst_star_cell *cell) {
-    bst_vec3 sum = {0.0, 0.0, 0.0};
-    for (uint32_t i = 0; i < cell->count; i++) {
-        sum = bst_vec3_add(sum, bst_star_record_direction(&stars[i].record, 0.0));
-    }
-    bst_vec3 centre = bst_vec3_unit(sum);
-    double radius = 0.0, motion = 0.0;
-    for (uint32_t i = 0; i < cell->count; i++) {
-        const bst_star_record *r = &stars[i].record;
-        bst_vec3 now = bst_star_record_direction(r, 0.0);
-        radius = fmax(radius, bst_vec3_angle(centre, now));
-        /* proper motion is the tangent of the angle moved in a year */
-        motion = fmax(motion, tan(bst_vec3_angle(now, bst_star_record_direction(r, 1.0))));
-    }
-    cell->centre[0] = (float)centre.x;
-    cell->centre[1] = (float)centre.y;
-    cell->centre[2] = (float)centre.z;
-    /* margin for rounding to float */
-    cell->radius_rad = (float)(radius + 1e-6);
-    cell->pm_max_radpyr = (float)(motion * (1.0 + 1e-6));
-}
-
-/* Builds the catalogue file in memory; the caller frees *out. */
-static bst_status build_image(bst_ctx *ctx, const import_list *list, const bst_star_subset *subset,
-                              unsigned char **out, size_t *out_bytes) {
-    size_t patch_bytes = (size_t)subset->patch_count * sizeof(bst_star_patch);
-    size_t cell_bytes = BST_STAR_CELLS * sizeof(bst_star_cell);
-    size_t bytes =
-        sizeof(bst_star_header) + patch_bytes + cell_bytes + list->count * sizeof(bst_star_record);
-    unsigned char *image = calloc(1, bytes);
-    bst_star_cell *cells = calloc(BST_STAR_CELLS, sizeof *cells);
-    if (!image || !cells) {
-        free(image);
-        free(cells);
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a catalogue of %zu bytes", bytes);
-    }
-    unsigned char *records = image + bytes - list->count * sizeof(bst_star_record);
-    for (size_t i = 0; i < list->count; i++) {
-        cells[list->stars[i].cell].count++;
-        memcpy(records + i * sizeof(bst_star_record), &list->stars[i].record,
-               sizeof(bst_star_record));
-    }
-    uint32_t next = 0;
-    for (uint32_t c = 0; c < BST_STAR_CELLS; c++) {
-        cells[c].first = next;
-        bound_cell(list->stars + next, &cells[c]);
-        next += cells[c].count;
-    }
-    bst_star_header header = {0};
-    memcpy(header.magic, BST_STAR_MAGIC, sizeof header.magic);
-    header.endian = BST_STAR_ENDIAN;
-    header.version = BST_STAR_VERSION;
-    header.file_bytes = bytes;
-    header.star_count = list->count;
-    header.cell_count = BST_STAR_CELLS;
-    header.patch_count = (uint32_t)subset->patch_count;
-    header.complete_to_v_mag = fmin(subset->v_limit, BST_STAR_TYCHO2_COMPLETE_V);
-    snprintf(header.source, sizeof header.source, "%s", BST_STAR_TYCHO2_SOURCE);
-    memcpy(image, &header, sizeof header);
-    memcpy(image + sizeof header, subset->patches, patch_bytes);
-    memcpy(image + sizeof header + patch_bytes, cells, cell_bytes);
-    free(cells);
-    size_t skip = offsetof(bst_star_header, checksum) + sizeof header.checksum;
-    header.checksum = bst_star_checksum(image + skip, bytes - skip);
-    memcpy(image, &header, sizeof header);
-    *out = image;
-    *out_bytes = bytes;
-    return BST_OK;
-}
-
-static bst_status write_atomically(bst_ctx *ctx, const char *path, const void *data, size_t bytes) {
-    char temporary[4160];
-    int fd;
-    BST_TRY(bst_draft_make(ctx, path, temporary, sizeof temporary, &fd));
-    FILE *f = fdopen(fd, "wb");
-    if (!f) {
-        close(fd);
-        unlink(temporary);
-        return bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", path);
-    }
-    bool ok = fwrite(data, 1, bytes, f) == bytes && fflush(f) == 0 && fsync(fileno(f)) == 0;
-    int why = errno;
-    if (fclose(f) != 0 && ok) {
-        ok = false;
-        why = errno;
-    }
-    if (ok && rename(temporary, path) != 0) {
-        ok = false;
-        why = errno;
-    }
-    if (!ok) {
-        unlink(temporary);
-        return bst_fail(ctx, BST_ERR_IO, "cannot write %s: %s", path, strerror(why));
+/* Adds those of the stars that are of Tycho-2, or of a table. */
+static bst_status add_values(bst_ctx *ctx, const bst_star_values *values, size_t count, bool tycho2,
+                             bst_star_list *list) {
+    for (size_t i = 0; i < count; i++) {
+        if ((values[i].id < BST_STAR_TABLE_ID) == tycho2) {
+            bst_star_record record;
+            BST_TRY(bst_star_pack(ctx, &values[i], &record));
+            BST_TRY(bst_star_list_add(ctx, list, &record,
+                                      tycho2 ? values[i].id >> 16 : BST_STAR_CELLS));
+        }
     }
     return BST_OK;
-}
-
-/* Sorts, indexes and writes the imported stars. */
-static bst_status write_catalogue(bst_ctx *ctx, import_list *list,
-                                  const bst_star_import_options *options, const char *out_path) {
-    if (list->count == 0) {
-        return bst_fail(ctx, BST_ERR_FORMAT, "no stars to write to %s", out_path);
-    }
-    qsort(list->stars, list->count, sizeof *list->stars, compare_stars);
-    unsigned char *image = NULL;
-    size_t bytes = 0;
-    BST_TRY(build_image(ctx, list, &options->subset, &image, &bytes));
-    bst_status status = write_atomically(ctx, out_path, image, bytes);
-    free(image);
-    return status;
 }
 
 bst_status bst_star_write(bst_ctx *ctx, const bst_star_values *values, size_t count,
                           const bst_star_patch *complete, const char *out_path) {
-    import_list list = {0};
-    bst_star_import_options options = {.subset = {.v_limit = BRIGHTER_THAN_ALL, .patch_count = 1}};
-    bst_status status = BST_OK;
-    options.subset.patches[0] = *complete;
-    for (size_t i = 0; i < count && status == BST_OK; i++) {
-        bst_star_record record;
-        status = bst_star_pack(ctx, &values[i], &record);
-        if (status == BST_OK) {
-            status = append(ctx, &list, &record, values[i].id >> 16);
-        }
+    bst_star_list list = {0};
+    bst_star_head head = {.complete_to_v_mag = BST_STAR_BRIGHTER_THAN_ALL, .patch_count = 1};
+    head.patches[0] = *complete;
+    snprintf(head.source, sizeof head.source, "%s", BST_STAR_TYCHO2_SOURCE);
+    bst_status status = add_values(ctx, values, count, true, &list);
+    const size_t tycho2 = list.count;
+    if (status == BST_OK) {
+        status = add_values(ctx, values, count, false, &list);
+    }
+    if (status == BST_OK && list.count > tycho2) {
+        status = bst_star_list_divide(ctx, &list, tycho2);
     }
     if (status == BST_OK) {
-        status = write_catalogue(ctx, &list, &options, out_path);
+        status = bst_star_list_write(ctx, &list, &head, out_path);
     }
     free(list.stars);
     return status;
 }
 
+/* Writes the stars that were read. */
+static bst_status write_rows(bst_ctx *ctx, bst_star_list *list,
+                             const bst_star_import_options *options, const char *out_path) {
+    bst_star_head head = {
+        .complete_to_v_mag = fmin(options->subset.v_limit, BST_STAR_TYCHO2_COMPLETE_V),
+        .patch_count = options->subset.patch_count};
+    memcpy(head.patches, options->subset.patches, sizeof head.patches);
+    snprintf(head.source, sizeof head.source, "%s", BST_STAR_TYCHO2_SOURCE);
+    return bst_star_list_write(ctx, list, &head, out_path);
+}
+
 bst_status bst_star_import_rows(bst_ctx *ctx, FILE *rows, const bst_star_import_options *options,
                                 const char *out_path, long long *stars_written) {
-    import_list list = {0};
+    bst_star_list list = {0};
     bst_status status = read_rows(ctx, rows, options, &list);
     if (status == BST_OK) {
-        status = write_catalogue(ctx, &list, options, out_path);
+        status = write_rows(ctx, &list, options, out_path);
     }
     if (stars_written) {
         *stars_written = status == BST_OK ? (long long)list.count : 0;
@@ -351,7 +216,7 @@ bst_status bst_star_import_tarball(bst_ctx *ctx, const char *tarball_path,
                           "--wildcards", "*suppl_1.dat", "*tyc2.dat.*", NULL};
     bst_subprocess tar;
     BST_TRY(bst_subprocess_start(ctx, argv, NULL, true, NULL, &tar));
-    import_list list = {0};
+    bst_star_list list = {0};
     bst_status status = read_rows(ctx, tar.output, options, &list);
     int code = bst_subprocess_wait(&tar);
     /* a reader that stops early closes tar's pipe: then report the reader's error */
@@ -363,7 +228,7 @@ bst_status bst_star_import_tarball(bst_ctx *ctx, const char *tarball_path,
                           tarball_path, code);
     }
     if (status == BST_OK) {
-        status = write_catalogue(ctx, &list, options, out_path);
+        status = write_rows(ctx, &list, options, out_path);
     }
     if (status == BST_OK && stars_written) {
         *stars_written = (long long)list.count;

@@ -64,7 +64,8 @@ bst_status bst_star_import_tarball(bst_ctx *ctx, const char *tarball_path,
 
 /* Writes a catalogue of given stars, under a temporary name that is renamed when complete.
  *
- * Given:     values, count  1 or more; each star stands in the sky cell that its identity names
+ * Given:     values, count  1 or more; a star of Tycho-2 stands in the sky cell that its identity
+ *                           names; stars of a table (BST_STAR_TABLE_ID and more) are numbered anew
  *            complete       cap in which the catalogue is complete, and to which V
  * Errors:    BST_ERR_RANGE as bst_star_pack; BST_ERR_IO, BST_ERR_MEMORY */
 bst_status bst_star_write(bst_ctx *ctx, const bst_star_values *values, size_t count,

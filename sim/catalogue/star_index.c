@@ -5,6 +5,8 @@
 #include <stdbool.h>
 #include <string.h>
 
+#include "sim/catalogue/stars.h"
+
 #define REMEDY "run `boresight stars fetch` to make it again"
 
 static const double TURN_PER_UNIT = 1.0 / 4294967296.0;
@@ -52,6 +54,28 @@ bst_vec3 bst_star_record_direction(const bst_star_record *r, double years) {
                   sin_dec + north * cos_dec};
     /* u and mu are perpendicular: |u + t mu| needs no sum of squares of p */
     return bst_vec3_scale(p, 1.0 / sqrt(1.0 + east * east + north * north));
+}
+
+void bst_star_move_epoch(bst_star_values *v, double years) {
+    const double unit = 1e-4 * BST_ARCSEC_RAD;
+    double sa = sin(v->ra_rad), ca = cos(v->ra_rad);
+    double sd = sin(v->dec_rad), cd = cos(v->dec_rad);
+    bst_vec3 u = {cd * ca, cd * sa, sd};
+    bst_vec3 motion =
+        bst_vec3_add(bst_vec3_scale((bst_vec3){-sa, ca, 0.0}, v->pm_ra_cosdec * unit),
+                     bst_vec3_scale((bst_vec3){-sd * ca, -sd * sa, cd}, v->pm_dec * unit));
+    bst_vec3 moved = bst_vec3_axpy(u, years, motion);
+    double length = bst_vec3_norm(moved);
+    u = bst_vec3_scale(moved, 1.0 / length);
+    /* d/dt of (u + t mu) / |u + t mu| */
+    motion = bst_vec3_scale(bst_vec3_axpy(motion, -bst_vec3_dot(u, motion), u), 1.0 / length);
+    bst_vec3_to_radec(u, &v->ra_rad, &v->dec_rad);
+    sa = sin(v->ra_rad);
+    ca = cos(v->ra_rad);
+    sd = sin(v->dec_rad);
+    cd = cos(v->dec_rad);
+    v->pm_ra_cosdec = (int)lround(bst_vec3_dot(motion, (bst_vec3){-sa, ca, 0.0}) / unit);
+    v->pm_dec = (int)lround(bst_vec3_dot(motion, (bst_vec3){-sd * ca, -sd * sa, cd}) / unit);
 }
 
 uint64_t bst_star_checksum(const void *data, size_t bytes) {
@@ -113,6 +137,11 @@ static bst_status check_cells(bst_ctx *ctx, const char *label, const bst_star_vi
     return BST_OK;
 }
 
+static bst_status damaged_header(bst_ctx *ctx, const char *label) {
+    return bst_fail(ctx, BST_ERR_FORMAT,
+                    "star catalogue %s is damaged (numbers in the header): " REMEDY, label);
+}
+
 bst_status bst_star_view_init(bst_ctx *ctx, const char *label, const void *data, uint64_t bytes,
                               bst_star_view *out) {
     const bst_star_header *h = data;
@@ -133,11 +162,11 @@ bst_status bst_star_view_init(bst_ctx *ctx, const char *label, const void *data,
                         "order: " REMEDY,
                         label);
     }
-    if (h->version != BST_STAR_VERSION) {
+    if (h->version != BST_STAR_VERSION && h->version != BST_STAR_TABLE_VERSION) {
         return bst_fail(ctx, BST_ERR_FORMAT,
                         "star catalogue %s has format version %" PRIu32
-                        ", this program reads %u: " REMEDY,
-                        label, h->version, BST_STAR_VERSION);
+                        ", this program reads %u and %u: " REMEDY,
+                        label, h->version, BST_STAR_VERSION, BST_STAR_TABLE_VERSION);
     }
     if (bytes != h->file_bytes) {
         return bst_fail(ctx, BST_ERR_FORMAT,
@@ -153,18 +182,28 @@ bst_status bst_star_view_init(bst_ctx *ctx, const char *label, const void *data,
                         ", expected %016" PRIx64 "): " REMEDY,
                         label, sum, h->checksum);
     }
-    if (h->cell_count != BST_STAR_CELLS || h->patch_count > BST_STAR_PATCHES_MAX ||
-        h->star_count > UINT32_MAX || !isfinite(h->complete_to_v_mag) ||
-        bytes != sizeof *h + h->patch_count * sizeof(bst_star_patch) +
-                     h->cell_count * sizeof(bst_star_cell) +
-                     h->star_count * sizeof(bst_star_record)) {
-        return bst_fail(ctx, BST_ERR_FORMAT,
-                        "star catalogue %s is damaged (numbers in the header): " REMEDY, label);
+    uint64_t whole = sizeof *h + h->patch_count * (uint64_t)sizeof(bst_star_patch) +
+                     h->cell_count * (uint64_t)sizeof(bst_star_cell);
+    bool counts_fit = h->patch_count <= BST_STAR_PATCHES_MAX && h->star_count <= UINT32_MAX &&
+                      h->cell_count >= BST_STAR_CELLS && h->cell_count <= BST_STAR_CELLS_MAX &&
+                      (h->cell_count == BST_STAR_CELLS || h->version == BST_STAR_TABLE_VERSION);
+    whole += h->star_count * (uint64_t)sizeof(bst_star_record);
+    if (!counts_fit || !isfinite(h->complete_to_v_mag) || bytes < whole) {
+        return damaged_header(ctx, label);
     }
     out->header = h;
     out->patches = (const bst_star_patch *)(h + 1);
     out->cells = (const bst_star_cell *)(out->patches + h->patch_count);
     out->records = (const bst_star_record *)(out->cells + h->cell_count);
     BST_TRY(check_patches(ctx, label, out));
-    return check_cells(ctx, label, out);
+    BST_TRY(check_cells(ctx, label, out));
+    const bst_star_cell *last = &out->cells[BST_STAR_CELLS - 1];
+    out->tycho2_count = last->first + last->count;
+    uint64_t table = h->star_count - out->tycho2_count;
+    if (bytes != whole + table * sizeof(int64_t) || table > BST_STAR_TABLE_IDS) {
+        return damaged_header(ctx, label);
+    }
+    out->sources =
+        h->version == BST_STAR_TABLE_VERSION ? (const unsigned char *)data + whole : NULL;
+    return BST_OK;
 }

@@ -1,9 +1,11 @@
-/* File format of the star catalogue, for mapped files, the embedded catalogue and the importer.
+/* File format of the star catalogue, for mapped files, the embedded catalogue and the importers.
  *
- * header | patches | cells | records, in the byte order of the machine that wrote it (checked). The
- * sky cells are the 9,537 regions of the Guide Star Catalog that Tycho-2 numbers its stars by
- * (TYC1), so a star's identity names its cell. Each cell stores the cap that contains its stars,
- * which are sorted brightest first. */
+ * header | patches | cells | records | sources, in the byte order of the machine that wrote it
+ * (checked). The first sky cells are the 9,537 regions of the Guide Star Catalog that Tycho-2
+ * numbers its stars by (TYC1), so a star's identity names its cell. Cells after them, in files of
+ * version 2 only, hold the stars of a user's table, numbered in the order of their records; their
+ * sources are the table's own identities. Each cell stores the cap that contains its stars, which
+ * are sorted brightest first. */
 #ifndef BST_CATALOGUE_STAR_INDEX_H
 #define BST_CATALOGUE_STAR_INDEX_H
 
@@ -14,8 +16,10 @@
 
 #define BST_STAR_MAGIC "BSTSTARS"
 #define BST_STAR_ENDIAN 0x01020304u
-#define BST_STAR_VERSION 1u
-#define BST_STAR_CELLS 9538u /* one per TYC1, 1 to 9537; cell 0 is empty */
+#define BST_STAR_VERSION 1u       /* stars of Tycho-2 only */
+#define BST_STAR_TABLE_VERSION 2u /* also stars of a table */
+#define BST_STAR_CELLS 9538u      /* one per TYC1, 1 to 9537; cell 0 is empty */
+#define BST_STAR_CELLS_MAX (1u << 22)
 #define BST_STAR_PATCHES_MAX 64u
 #define BST_STAR_EPOCH_YEAR 2000.0 /* Julian year of the stored positions */
 
@@ -82,9 +86,16 @@ typedef struct bst_star_values {
 typedef struct bst_star_view {
     const bst_star_header *header;
     const bst_star_patch *patches;
-    const bst_star_cell *cells;
+    const bst_star_cell *cells; /* header->cell_count */
     const bst_star_record *records;
+    const unsigned char *sources; /* int64_t for each star of a table, not aligned; NULL: none */
+    uint32_t tycho2_count;        /* stars of Tycho-2; those of a table follow */
 } bst_star_view;
+
+/* Brings position and proper motion to another epoch, on a straight line.
+ *
+ * Given:     years  from the epoch of *values to the wanted one */
+void bst_star_move_epoch(bst_star_values *values, double years);
 
 /* Packs one star into a record. BST_ERR_RANGE: a value exceeds its field (VT -3 to 62 mag, BT-VT -4
  * to 12 mag, proper motion up to 13.1 arcsec/yr per axis). */

@@ -108,29 +108,6 @@ static void read_magnitudes(row_reader *r, int bt_first, int vt_first, bst_star_
     out->vt_mmag = has_vt ? (int)vt : (int)bt - ASSUMED_COLOUR_MMAG;
 }
 
-/* Propagates position and proper motion by `years` on a straight line. */
-static void move_epoch(bst_star_values *v, double years) {
-    const double unit = 1e-4 * BST_ARCSEC_RAD;
-    double sa = sin(v->ra_rad), ca = cos(v->ra_rad);
-    double sd = sin(v->dec_rad), cd = cos(v->dec_rad);
-    bst_vec3 u = {cd * ca, cd * sa, sd};
-    bst_vec3 motion =
-        bst_vec3_add(bst_vec3_scale((bst_vec3){-sa, ca, 0.0}, v->pm_ra_cosdec * unit),
-                     bst_vec3_scale((bst_vec3){-sd * ca, -sd * sa, cd}, v->pm_dec * unit));
-    bst_vec3 moved = bst_vec3_axpy(u, years, motion);
-    double length = bst_vec3_norm(moved);
-    u = bst_vec3_scale(moved, 1.0 / length);
-    /* d/dt of (u + t mu) / |u + t mu| */
-    motion = bst_vec3_scale(bst_vec3_axpy(motion, -bst_vec3_dot(u, motion), u), 1.0 / length);
-    bst_vec3_to_radec(u, &v->ra_rad, &v->dec_rad);
-    sa = sin(v->ra_rad);
-    ca = cos(v->ra_rad);
-    sd = sin(v->dec_rad);
-    cd = cos(v->dec_rad);
-    v->pm_ra_cosdec = (int)lround(bst_vec3_dot(motion, (bst_vec3){-sa, ca, 0.0}) / unit);
-    v->pm_dec = (int)lround(bst_vec3_dot(motion, (bst_vec3){-sd * ca, -sd * sa, cd}) / unit);
-}
-
 bst_status bst_star_parse_row(bst_ctx *ctx, const char *row, size_t bytes, bst_star_values *out) {
     memset(out, 0, sizeof *out);
     if (bytes != MAIN_BYTES && bytes != SUPPLEMENT_BYTES) {
@@ -156,7 +133,7 @@ bst_status bst_star_parse_row(bst_ctx *ctx, const char *row, size_t bytes, bst_s
             double epoch = 1990.0 + 0.005 * (double)(need_fixed(&r, 179, 182, 2) +
                                                      need_fixed(&r, 184, 187, 2));
             if (read_motion(&r, out) && r.status == BST_OK) {
-                move_epoch(out, BST_STAR_EPOCH_YEAR - epoch);
+                bst_star_move_epoch(out, BST_STAR_EPOCH_YEAR - epoch);
             }
         } else {
             read_position(&r, 16, 29, out);
@@ -167,7 +144,7 @@ bst_status bst_star_parse_row(bst_ctx *ctx, const char *row, size_t bytes, bst_s
         read_position(&r, 16, 29, out);
         read_magnitudes(&r, 84, 97, out);
         if (read_motion(&r, out) && r.status == BST_OK) {
-            move_epoch(out, BST_STAR_EPOCH_YEAR - SUPPLEMENT_EPOCH_YEAR);
+            bst_star_move_epoch(out, BST_STAR_EPOCH_YEAR - SUPPLEMENT_EPOCH_YEAR);
         }
     }
     return r.status;

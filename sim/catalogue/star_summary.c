@@ -1,5 +1,8 @@
 #include "sim/catalogue/star_summary.h"
 
+#include <inttypes.h>
+#include <math.h>
+
 #include "sim/catalogue/star_import.h"
 
 bst_status bst_stars_print_summary(bst_ctx *ctx, const bst_stars *stars, FILE *stream) {
@@ -8,25 +11,58 @@ bst_status bst_stars_print_summary(bst_ctx *ctx, const bst_stars *stars, FILE *s
     fprintf(stream, "source    %s\n", i.source);
     fprintf(stream, "path      %s\n", i.embedded ? "(in the program)" : i.path);
     fprintf(stream, "stars     %lld\n", i.count);
+    if (i.table_count > 0) {
+        fprintf(stream, "          %lld of them are not in Tycho-2\n", i.table_count);
+    }
     fprintf(stream, "complete  to V %.1f over the whole sky%s\n", i.complete_to_v_mag,
-            i.complete_to_v_mag == BST_STAR_TYCHO2_COMPLETE_V ? " (98 % of the stars there)" : "");
+            i.complete_to_v_mag == BST_STAR_TYCHO2_COMPLETE_V && i.table_count == 0
+                ? " (98 % of the stars there)"
+                : "");
     for (int p = 0; p < i.patches; p++) {
         bst_vec3 centre;
         double radius, v, ra, dec;
         bst_stars_patch(stars, p, &centre, &radius, &v);
         bst_vec3_to_radec(centre, &ra, &dec);
-        fprintf(stream,
-                "          all of Tycho-2 to V %.1f within %.1f deg of RA %.4f Dec %+.4f deg\n", v,
-                radius / BST_DEG_RAD, ra / BST_DEG_RAD, dec / BST_DEG_RAD);
+        fprintf(stream, "          %s to V %.1f within %.1f deg of RA %.4f Dec %+.4f deg\n",
+                i.table_count > 0 ? "all stars" : "all of Tycho-2", v, radius / BST_DEG_RAD,
+                ra / BST_DEG_RAD, dec / BST_DEG_RAD);
     }
     fprintf(stream, "counts    V <=       stars\n");
-    for (int v = 0, count = 0; v <= 15 && count < i.count; v++) {
+    for (int v = 0, count = 0; v <= 21 && count < i.count; v++) {
         BST_TRY(bst_stars_query(ctx, stars, (bst_vec3){0.0, 0.0, 1.0}, BST_PI, (double)v,
                                 BST_STAR_EPOCH_YEAR, NULL, 0, &count));
         fprintf(stream, "          %4d  %10d\n", v, count);
     }
+    if (i.table_count > 0) {
+        fprintf(stream, "licence   of the table's stars: your table's\n");
+    }
     fprintf(
         stream,
         "licence   Tycho-2 (Hog et al. 2000): BSD-2-Clause, as Debian's package tycho2 states\n");
+    return BST_OK;
+}
+
+bst_status bst_stars_print_star(bst_ctx *ctx, const bst_stars *stars, uint32_t id, FILE *stream) {
+    bst_star star;
+    BST_TRY(bst_stars_find(ctx, stars, id, BST_STAR_EPOCH_YEAR, &star));
+    double ra, dec;
+    bst_vec3_to_radec(star.icrs, &ra, &dec);
+    if (id < BST_STAR_TABLE_ID) {
+        unsigned tyc1, tyc2, tyc3;
+        bst_star_id_split(id, &tyc1, &tyc2, &tyc3);
+        fprintf(stream, "identity  %" PRIu32 ", TYC %u-%u-%u\n", id, tyc1, tyc2, tyc3);
+    } else {
+        fprintf(stream, "identity  %" PRIu32 "\n", id);
+    }
+    int64_t source = bst_stars_source(stars, id);
+    if (source != 0) {
+        fprintf(stream, "source    %" PRId64 "\n", source);
+    }
+    fprintf(stream, "place     RA %.7f Dec %+.7f deg, ICRS, J2000\n", ra / BST_DEG_RAD,
+            dec / BST_DEG_RAD);
+    fprintf(stream, "V         %.3f\n", (double)star.v_mag);
+    if (isfinite(star.b_minus_v)) {
+        fprintf(stream, "B-V       %.3f\n", (double)star.b_minus_v);
+    }
     return BST_OK;
 }

@@ -2,6 +2,7 @@
 
 #include <assert.h>
 #include <errno.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +14,7 @@
 #include "sim/catalogue/star_index.h"
 #include "sim/core/file.h"
 
-#define MAX_FILE_BYTES ((uint64_t)1 << 30)
+#define MAX_FILE_BYTES ((uint64_t)1 << 33)
 
 /* Defined in stars_embedded.S. */
 extern const unsigned char bst_stars_embedded_begin[];
@@ -25,26 +26,31 @@ typedef struct cell_group {
     double centre[3], radius, pm_max_radpyr;
 } cell_group;
 
-enum { GROUP = 32, GROUPS = (BST_STAR_CELLS + GROUP - 1) / GROUP };
+enum { GROUP = 32 };
 
 struct bst_stars {
     bst_star_view view;
-    cell_group groups[GROUPS];
-    void *mapping; /* NULL: embedded */
+    cell_group *groups; /* one per GROUP cells; shared as the mapping is */
+    void *mapping;      /* NULL: embedded */
     size_t mapping_bytes;
     char path[512];
-    bool borrowed; /* another catalogue owns the mapping */
+    bool borrowed; /* another catalogue owns the mapping and the groups */
     bool altered;
     bst_star_errors_config errors;
     bst_rng_key key;
 };
 
 /* Computes centre and radius that enclose each group of star cells. */
-static void group_cells(bst_stars *s) {
-    for (uint32_t g = 0; g < GROUPS; g++) {
+static bst_status group_cells(bst_ctx *ctx, bst_stars *s) {
+    const uint32_t cells = s->view.header->cell_count;
+    s->groups = calloc(cells / GROUP + 1, sizeof *s->groups);
+    if (!s->groups) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the star catalogue");
+    }
+    for (uint32_t g = 0; g * GROUP < cells; g++) {
         cell_group *group = &s->groups[g];
         uint32_t first = g * GROUP, last = first + GROUP;
-        uint32_t end = last < BST_STAR_CELLS ? last : BST_STAR_CELLS;
+        uint32_t end = last < cells ? last : cells;
         *group = (cell_group){.radius = -1.0}; /* no stars */
         int filled = 0;
         for (uint32_t c = first; c < end; c++) {
@@ -69,6 +75,14 @@ static void group_cells(bst_stars *s) {
             }
         }
     }
+    return BST_OK;
+}
+
+/* Identity of the star of a record in cell c. */
+static uint32_t identity(const bst_star_view *view, uint32_t c, const bst_star_record *r) {
+    return c < BST_STAR_CELLS
+               ? c << 16 | (r->tyc_vt & 0xFFFFu)
+               : BST_STAR_TABLE_ID + (uint32_t)(r - view->records) - view->tycho2_count;
 }
 
 /* limit of normal deviates, in sigma: Box-Muller with 53 bits ends at 8.6 */
@@ -200,11 +214,13 @@ bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) {
     if (status == BST_OK) {
         status = s->path[0] ? open_file(ctx, s->path, s) : open_embedded(ctx, s);
     }
+    if (status == BST_OK) {
+        status = group_cells(ctx, s);
+    }
     if (status != BST_OK) {
         bst_stars_close(s);
         return status;
     }
-    group_cells(s);
     if (use_default && !s->mapping) {
         bst_log(ctx, BST_LOG_WARNING,
                 "the full star catalogue is not there: using the stars embedded in the program "
@@ -217,8 +233,11 @@ bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) {
 }
 
 void bst_stars_close(bst_stars *stars) {
-    if (stars && stars->mapping && !stars->borrowed) {
-        munmap(stars->mapping, stars->mapping_bytes);
+    if (stars && !stars->borrowed) {
+        free(stars->groups);
+        if (stars->mapping) {
+            munmap(stars->mapping, stars->mapping_bytes);
+        }
     }
     free(stars);
 }
@@ -234,6 +253,7 @@ void bst_stars_get_info(const bst_stars *stars, bst_stars_info *out) {
     }
     snprintf(out->path, sizeof out->path, "%s", stars->path);
     out->count = (long long)h->star_count;
+    out->table_count = (long long)h->star_count - stars->view.tycho2_count;
     out->complete_to_v_mag = h->complete_to_v_mag;
     out->patches = (int)h->patch_count;
 }
@@ -292,13 +312,13 @@ static radec_box box_around(bst_vec3 centre, double radius_rad) {
 #define MOST_WRONG_MAG 0.5
 
 /* Unpacks a star. True: its magnitudes are from the table of bright stars. */
-static bool unpack(const bst_star_record *r, uint32_t tyc1, bst_vec3 direction, bst_star *out) {
+static bool unpack(const bst_star_record *r, uint32_t id, bst_vec3 direction, bst_star *out) {
     int colour = (int)(r->pm_ra_colour & 0x3FFFu) - BST_STAR_COLOUR_OFFSET;
     out->icrs = direction;
     out->v_mag = (float)(bst_star_record_v(r) / 1e5);
     /* B-V = 0.850 (BT-VT): Tycho-2 ReadMe, note 7. */
     out->b_minus_v = r->pm_dec_flags & BST_STAR_NO_COLOUR ? NAN : (float)(0.850 * colour / 1000.0);
-    out->id = tyc1 << 16 | (r->tyc_vt & 0xFFFFu);
+    out->id = id;
     /* a file may have been imported without the table */
     return (double)out->v_mag < BST_BRIGHT_STARS_V &&
            bst_bright_star(out->id, &out->v_mag, &out->b_minus_v);
@@ -344,7 +364,7 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
                        ? MOST_SIGMAS * stars->errors.position_error_sigma_arcsec * BST_ARCSEC_RAD
                        : 0.0;
     int found = 0;
-    for (uint32_t c = 0; c < BST_STAR_CELLS; c++) {
+    for (uint32_t c = 0; c < stars->view.header->cell_count; c++) {
         if (c % GROUP == 0 &&
             !may_reach(&stars->groups[c / GROUP], centre, radius_rad + slack, fabs(years))) {
             c += GROUP - 1;
@@ -373,7 +393,8 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
                 continue;
             }
             bst_vec3 direction = bst_star_record_direction(r, years);
-            if (stars->altered && !alter(stars, c << 16 | (r->tyc_vt & 0xFFFFu), &direction)) {
+            const uint32_t id = identity(&stars->view, c, r);
+            if (stars->altered && !alter(stars, id, &direction)) {
                 continue;
             }
             d = bst_vec3_sub(direction, centre);
@@ -381,7 +402,7 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
             if (bst_vec3_dot(d, d) > chord2) {
                 continue;
             }
-            bool published = unpack(r, c, direction, &star);
+            bool published = unpack(r, id, direction, &star);
             if (published ? (double)star.v_mag > v_limit : v_mag > v_limit) {
                 continue;
             }
@@ -399,26 +420,51 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
     return BST_OK;
 }
 
+/* Record of a star; NULL: not in the catalogue. */
+static const bst_star_record *find_record(const bst_star_view *view, uint32_t id) {
+    if (id >= BST_STAR_TABLE_ID) {
+        uint64_t index = (uint64_t)(id - BST_STAR_TABLE_ID) + view->tycho2_count;
+        return id - BST_STAR_TABLE_ID < BST_STAR_TABLE_IDS && index < view->header->star_count
+                   ? &view->records[index]
+                   : NULL;
+    }
+    if (id >> 16 >= BST_STAR_CELLS) {
+        return NULL;
+    }
+    const bst_star_cell *cell = &view->cells[id >> 16];
+    for (uint32_t i = 0; i < cell->count; i++) {
+        if ((view->records[cell->first + i].tyc_vt & 0xFFFFu) == (id & 0xFFFFu)) {
+            return &view->records[cell->first + i];
+        }
+    }
+    return NULL;
+}
+
 bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, double julian_year,
                           bst_star *out) {
-    uint32_t c = id >> 16;
-    if (c < BST_STAR_CELLS && isfinite(julian_year)) {
-        const bst_star_cell *cell = &stars->view.cells[c];
-        for (uint32_t i = 0; i < cell->count; i++) {
-            const bst_star_record *r = &stars->view.records[cell->first + i];
-            if ((r->tyc_vt & 0xFFFFu) == (id & 0xFFFFu)) {
-                bst_vec3 direction =
-                    bst_star_record_direction(r, julian_year - BST_STAR_EPOCH_YEAR);
-                if (stars->altered && !alter(stars, id, &direction)) {
-                    break;
-                }
-                (void)unpack(r, c, direction, out);
-                return BST_OK;
-            }
+    const bst_star_record *r = isfinite(julian_year) ? find_record(&stars->view, id) : NULL;
+    if (r) {
+        bst_vec3 direction = bst_star_record_direction(r, julian_year - BST_STAR_EPOCH_YEAR);
+        if (!stars->altered || alter(stars, id, &direction)) {
+            (void)unpack(r, id, direction, out);
+            return BST_OK;
         }
+    }
+    if (id >= BST_STAR_TABLE_ID) {
+        return bst_fail(ctx, BST_ERR_NOT_FOUND, "star %" PRIu32 " is not in the catalogue", id);
     }
     unsigned tyc1, tyc2, tyc3;
     bst_star_id_split(id, &tyc1, &tyc2, &tyc3);
     return bst_fail(ctx, BST_ERR_NOT_FOUND, "star TYC %u-%u-%u is not in the catalogue", tyc1, tyc2,
                     tyc3);
+}
+
+int64_t bst_stars_source(const bst_stars *stars, uint32_t id) {
+    const bst_star_view *view = &stars->view;
+    int64_t source = 0;
+    if (id >= BST_STAR_TABLE_ID && view->sources && find_record(view, id)) {
+        memcpy(&source, view->sources + (size_t)(id - BST_STAR_TABLE_ID) * sizeof source,
+               sizeof source);
+    }
+    return source;
 }

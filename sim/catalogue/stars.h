@@ -14,8 +14,12 @@ typedef struct bst_star {
     bst_vec3 icrs;   /* unit vector, ICRS, barycentric, at the query's epoch */
     float v_mag;     /* Johnson V */
     float b_minus_v; /* Johnson B-V; NAN: unknown */
-    uint32_t id;     /* Tycho-2 identity, see bst_star_id_make */
+    uint32_t id;     /* Tycho-2 identity, see bst_star_id_make; or BST_STAR_TABLE_ID and more */
 } bst_star;
+
+/* Identities of stars of a user's table: this and the star's number in the catalogue, from 0. */
+#define BST_STAR_TABLE_ID 0x40000000u
+#define BST_STAR_TABLE_IDS 0x40000000u
 
 /* Tycho-2 identity TYC tyc1-tyc2-tyc3 in 30 bits, and back. Tycho-2 itself gives 254 identities to
  * both components of a double star (one in its main table, one in supplement 1). */
@@ -37,6 +41,7 @@ typedef struct bst_stars_info {
     long long count;          /* stars */
     double complete_to_v_mag; /* of the whole sky */
     int patches;              /* caps with fainter stars, see bst_stars_patch */
+    long long table_count;    /* of them, stars of a user's table that Tycho-2 lacks */
     bool embedded;
 } bst_stars_info;
 
@@ -87,6 +92,10 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
 /* Finds a star by identity (the brighter one if two share it); BST_ERR_NOT_FOUND. */
 bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, double julian_year,
                           bst_star *out) BST_MUST_CHECK;
+
+/* The table's own identity of a star (Gaia's source_id, for example); 0: the star is not of a
+ * table, or the table has none. */
+int64_t bst_stars_source(const bst_stars *stars, uint32_t id);
 
 /* Errors of the onboard star catalogue; the error of a star follows from its identity and the
  * seed. */

@@ -137,7 +137,7 @@ static const bst_wire_field truth[] = {
 
 static const bst_wire_field truth_items[] = {
     INT(bst_truth_item, kind, 0, 1, "", "0 star, 1 object."),
-    BITS(bst_truth_item, id, "Star: Tycho-2 identity or statistical (bit 31); object: its index."),
+    BITS(bst_truth_item, id, "Star: identity in the catalogue or statistical (bit 31); object: its index."),
     INT(bst_truth_item, norad, -MANY, MANY, "", "Object: catalogue number, else 0."),
     BITS(bst_truth_item, flags, "1 in the field, 2 occulted, 4 saturated."),
     ANY(bst_truth_item, x_start_px, "px",
@@ -256,7 +256,7 @@ static const bst_wire_field detection_items[] = {
     ANY(bst_detection, v_mag_sigma, "mag", "1 sigma of it; infinite without light."),
     BITS(bst_detection, flags,
          "1 saturated, 2 edge, 4 streak, 8 blend, 16 stack, 32 bloom, 64 extended."),
-    BITS(bst_detection, star_id, "Tycho-2 identity, 0 when none."),
+    BITS(bst_detection, star_id, "Identity in the star catalogue, 0 when none."),
     INT(bst_detection, label, 0, 5, "",
         "0 unknown, 1 star, 2 object, 3 artefact, 4 hot pixel, 5 radiation hit."),
     BOUNDED(bst_detection, label_probability, 0, 1, "", "That the label is right."),

@@ -49,7 +49,7 @@ typedef struct bst_detection {
     double v_mag;                          /* from flux and zero point */
     double v_mag_sigma; /* of the flux's noise and the zero point; INFINITY without light */
     uint32_t flags;
-    uint32_t star_id;         /* Tycho-2 identity, 0 when none */
+    uint32_t star_id;         /* identity in the star catalogue, 0 when none */
     int32_t label;            /* bst_label */
     double label_probability; /* that the label is right, 0 to 1; 0 where the label is UNKNOWN */
     double rate_x_pxps,

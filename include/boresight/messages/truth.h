@@ -20,7 +20,7 @@ enum {
 /* One source of the true scene. Pixels are full-sensor coordinates; NAN where behind the camera. */
 typedef struct bst_truth_item {
     int32_t kind;  /* bst_source_kind */
-    uint32_t id;   /* star: Tycho-2 identity, or statistical (bit 31); object: index in the world */
+    uint32_t id;   /* star: identity in the catalogue, or statistical (bit 31); object: index in the world */
     int32_t norad; /* object: catalogue number, else 0 */
     uint32_t flags;
     double x_start_px, y_start_px, x_mid_px, y_mid_px, x_end_px, y_end_px;

@@ -44,7 +44,7 @@ struct bst_scene_source_body;
 /* A source whose light may reach the window. */
 typedef struct bst_scene_source {
     int32_t kind; /* bst_source_kind */
-    uint32_t id;  /* star: Tycho-2 identity, or statistical (bit 31); object: index in the world */
+    uint32_t id;  /* star: identity in the catalogue, or statistical (bit 31); object: index in the world */
     bst_vec3 apparent_mid;               /* at mid-exposure, GCRF axes, unit */
     const bst_scene_source_path *path;   /* NULL: at rest; owned by the creator of the source */
     const bst_scene_source_rate *rate;   /* NULL: constant; owned by the creator */

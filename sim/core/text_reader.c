@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/astro/text_internal.h"
+#include "sim/core/text_reader.h"
 
 bst_status bst_text_fail_memory(const bst_text_source *source, const char *what) {
     return bst_fail(source->ctx, BST_ERR_MEMORY, "%.400s: no memory for its %s", source->name,

@@ -1,7 +1,7 @@
 /* Functions shared by readers of text files: lines, words, numbers, fields, and messages with line
  * numbers. */
-#ifndef BST_ASTRO_TEXT_INTERNAL_H
-#define BST_ASTRO_TEXT_INTERNAL_H
+#ifndef BST_CORE_TEXT_READER_H
+#define BST_CORE_TEXT_READER_H
 
 #include <stdbool.h>
 #include <stddef.h>

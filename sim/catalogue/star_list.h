@@ -1,0 +1,51 @@
+/* Stars in memory that become a catalogue file. */
+#ifndef BST_CATALOGUE_STAR_LIST_H
+#define BST_CATALOGUE_STAR_LIST_H
+
+#include <stddef.h>
+
+#include "boresight/status.h"
+#include "sim/catalogue/star_index.h"
+
+/* V to which a catalogue of one field is complete over the whole sky */
+#define BST_STAR_BRIGHTER_THAN_ALL (-2.0)
+
+typedef struct bst_star_entry {
+    bst_star_record record;
+    uint32_t cell;
+    int32_t v;      /* bst_star_record_v */
+    int64_t source; /* identity in a user's table; 0: none */
+} bst_star_entry;
+
+typedef struct bst_star_list {
+    bst_star_entry *stars; /* freed by the caller */
+    size_t count, room;
+    uint32_t cells; /* all cells if stars of a table are among them, else 0 */
+} bst_star_list;
+
+/* What a catalogue says about itself. */
+typedef struct bst_star_head {
+    char source[40];
+    double complete_to_v_mag;
+    int patch_count;
+    bst_star_patch patches[BST_STAR_PATCHES_MAX];
+} bst_star_head;
+
+/* Adds a star of Tycho-2 in its cell (TYC1). BST_ERR_MEMORY. */
+bst_status bst_star_list_add(bst_ctx *ctx, bst_star_list *list, const bst_star_record *record,
+                             uint32_t cell) BST_MUST_CHECK;
+
+/* Divides the stars of a table, from list->stars[first] on, into cells of neighbours and orders
+ * them by cell. Cells are triangles of the hierarchical triangular mesh (Kunszt, Szalay and Thakar
+ * 2001, in Mining the Sky, 631), each cut into four while it holds more than 512 stars, 14 times
+ * at most. Sets list->cells. BST_ERR_RANGE: more cells than a file may have. */
+bst_status bst_star_list_divide(bst_ctx *ctx, bst_star_list *list, size_t first) BST_MUST_CHECK;
+
+/* Orders the stars by cell, brightest first, and writes the catalogue file, under a temporary name
+ * that is renamed when complete.
+ *
+ * Errors:    BST_ERR_FORMAT: no stars; BST_ERR_IO, BST_ERR_MEMORY */
+bst_status bst_star_list_write(bst_ctx *ctx, bst_star_list *list, const bst_star_head *head,
+                               const char *out_path) BST_MUST_CHECK;
+
+#endif

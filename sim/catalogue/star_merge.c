@@ -1,0 +1,272 @@
+#include "sim/catalogue/star_merge.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/catalogue/bright_stars.h"
+#include "sim/catalogue/star_list.h"
+#include "sim/catalogue/stars.h"
+
+enum { ROWS_PER_PROGRESS = 20000, NEIGHBOURS = 64 };
+
+/* largest distance and difference in V of one star in two catalogues */
+static const double SAME_RAD = 1.5 * BST_ARCSEC_RAD, SAME_MAG = 1.5;
+/* the base is searched for stars up to this V: Tycho-2 ends there, with errors of half a mag */
+static const double FAINTEST_TYCHO2 = 15.5;
+/* mean epoch of Tycho-2's observed positions */
+static const double OBSERVED_YEAR = 1991.5;
+/* magnitudes have this colour if the table has none, as Tycho-2's rows do */
+static const int USUAL_COLOUR_MMAG = 700;
+
+/* The star of the table that a star of the base is; distance INFINITY: none. */
+typedef struct same_star {
+    size_t entry;
+    double distance_rad;
+} same_star;
+
+typedef struct merge {
+    const bst_star_merge_request *request;
+    bst_stars *base; /* NULL: none */
+    bst_star_list list;
+    size_t base_count; /* first entries of the list, in the order of the base's records */
+    same_star *same;   /* of each star of the base */
+} merge;
+
+/* ---------------------------------------------------------------- the base */
+
+/* Copies the base's stars to the list. */
+static bst_status take_base(bst_ctx *ctx, merge *m) {
+    const bst_star_view *view = bst_stars_records(m->base);
+    for (uint32_t c = 0; c < view->header->cell_count; c++) {
+        for (uint32_t i = 0; i < view->cells[c].count; i++) {
+            BST_TRY(bst_star_list_add(ctx, &m->list, &view->records[view->cells[c].first + i], c));
+        }
+    }
+    m->base_count = m->list.count;
+    for (size_t i = view->tycho2_count; i < m->base_count; i++) {
+        m->list.stars[i].source =
+            bst_stars_source(m->base, BST_STAR_TABLE_ID + (uint32_t)(i - view->tycho2_count));
+    }
+    m->same = malloc(m->base_count * sizeof *m->same);
+    if (!m->same) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %zu stars", m->base_count);
+    }
+    for (size_t i = 0; i < m->base_count; i++) {
+        m->same[i] = (same_star){0, INFINITY};
+    }
+    return BST_OK;
+}
+
+/* Record of a star that a query of the base has found: the nearest one with its identity. */
+static size_t base_record(const merge *m, const bst_star *star) {
+    const bst_star_view *view = bst_stars_records(m->base);
+    if (star->id >= BST_STAR_TABLE_ID) {
+        return star->id - BST_STAR_TABLE_ID + view->tycho2_count;
+    }
+    const bst_star_cell *cell = &view->cells[star->id >> 16];
+    size_t best = cell->first;
+    double nearest = INFINITY;
+    for (uint32_t i = 0; i < cell->count; i++) {
+        const bst_star_record *r = &view->records[cell->first + i];
+        bst_vec3 d = bst_vec3_sub(bst_star_record_direction(r, 0.0), star->icrs);
+        if ((r->tyc_vt & 0xFFFFu) == (star->id & 0xFFFFu) && bst_vec3_dot(d, d) < nearest) {
+            nearest = bst_vec3_dot(d, d);
+            best = cell->first + i;
+        }
+    }
+    return best;
+}
+
+/* Searches the base around a direction for the star of an entry; only stars without motion if
+ * `at_rest`. */
+static bst_status search(bst_ctx *ctx, const merge *m, bst_vec3 at, double v, bool at_rest,
+                         size_t *record, double *distance) {
+    bst_star found[NEIGHBOURS];
+    int count;
+    BST_TRY(bst_stars_query(ctx, m->base, at, SAME_RAD, v + SAME_MAG, BST_STAR_EPOCH_YEAR, found,
+                            NEIGHBOURS, &count));
+    for (int i = 0; i < count && i < NEIGHBOURS; i++) {
+        double away = bst_vec3_norm(bst_vec3_sub(found[i].icrs, at));
+        size_t r = base_record(m, &found[i]);
+        const bst_star_record *base = &m->list.stars[r].record;
+        bool rests = (base->pm_ra_colour | base->pm_dec_flags) >> 14 == 0;
+        if (away < *distance && fabs((double)found[i].v_mag - v) <= SAME_MAG &&
+            (!at_rest || rests)) {
+            *distance = away;
+            *record = r;
+        }
+    }
+    return BST_OK;
+}
+
+/* Notes an entry as a star of the base if it is one and nearer than others. */
+static bst_status match(bst_ctx *ctx, merge *m, size_t entry) {
+    const bst_star_entry *star = &m->list.stars[entry];
+    double v = star->v / 1e5, distance = INFINITY;
+    bool tables = bst_stars_records(m->base)->sources != NULL;
+    if (v > FAINTEST_TYCHO2 && !tables) {
+        return BST_OK;
+    }
+    size_t record = 0;
+    bst_vec3 now = bst_star_record_direction(&star->record, 0.0);
+    BST_TRY(search(ctx, m, now, v, false, &record, &distance));
+    bst_vec3 then = bst_star_record_direction(&star->record, OBSERVED_YEAR - BST_STAR_EPOCH_YEAR);
+    if (bst_vec3_norm(bst_vec3_sub(now, then)) > 0.1 * SAME_RAD) {
+        BST_TRY(search(ctx, m, then, v, true, &record, &distance));
+    }
+    if (distance < INFINITY && distance < m->same[record].distance_rad) {
+        m->same[record] = (same_star){entry, distance};
+    }
+    return BST_OK;
+}
+
+/* ---------------------------------------------------------------- the table */
+
+/* Adds a row to the list. */
+static bst_status add_row(bst_ctx *ctx, merge *m, const bst_star_table_row *row) {
+    bst_star_values v = {.ra_rad = row->ra_deg * BST_DEG_RAD,
+                         .dec_rad = row->dec_deg * BST_DEG_RAD,
+                         .pm_ra_cosdec = (int)lround(10.0 * row->pm_ra_cosdec_masyr),
+                         .pm_dec = (int)lround(10.0 * row->pm_dec_masyr),
+                         .has_colour = isfinite(row->b_minus_v)};
+    v.colour_mmag = v.has_colour ? (int)lround(1000.0 / 0.850 * row->b_minus_v) : USUAL_COLOUR_MMAG;
+    v.vt_mmag = (int)lround(1000.0 * row->v_mag + 0.090 * v.colour_mmag);
+    bst_star_move_epoch(&v, BST_STAR_EPOCH_YEAR - row->epoch_year);
+    bst_star_record record;
+    BST_TRY(bst_star_pack(ctx, &v, &record));
+    BST_TRY(bst_star_list_add(ctx, &m->list, &record, BST_STAR_CELLS));
+    m->list.stars[m->list.count - 1].source = row->source;
+    return BST_OK;
+}
+
+static bst_status read_table(bst_ctx *ctx, merge *m, bst_star_table *table,
+                             bst_star_merge_counts *counts) {
+    const bst_star_merge_request *q = m->request;
+    for (bool end = false; !end;) {
+        bst_star_table_row row;
+        BST_TRY(bst_star_table_next(ctx, table, &row, &end));
+        bst_star_table_counts(table, &counts->rows, &counts->skipped);
+        if (!end) {
+            bst_status status = add_row(ctx, m, &row);
+            if (status == BST_OK && m->base) {
+                status = match(ctx, m, m->list.count - 1);
+            }
+            if (status != BST_OK) {
+                return bst_fail_prefix(ctx, status, "%s: row %lld", q->table,
+                                       (long long)counts->rows);
+            }
+        }
+        if (q->progress && (end || counts->rows % ROWS_PER_PROGRESS == 0)) {
+            q->progress(q->progress_user, "importing", counts->rows, end ? counts->rows : 0);
+        }
+    }
+    return BST_OK;
+}
+
+/* Gives the base's stars what the table says of them, and takes those rows out of the list. */
+static void unite(merge *m, bst_star_merge_counts *counts) {
+    bst_star_entry *stars = m->list.stars;
+    enum { TAKEN = UINT32_MAX };
+    for (size_t i = 0; i < m->base_count; i++) {
+        if (m->same[i].distance_rad == INFINITY) {
+            continue;
+        }
+        bst_star_entry *from = &stars[m->same[i].entry], *to = &stars[i];
+        from->cell = TAKEN;
+        counts->same++;
+        if (to->v / 1e5 < BST_BRIGHT_STARS_V) {
+            continue;
+        }
+        bst_star_record r = from->record;
+        r.tyc_vt = (r.tyc_vt & 0xFFFF0000u) | (to->record.tyc_vt & 0xFFFFu);
+        if (r.pm_dec_flags & BST_STAR_NO_COLOUR) {
+            r.pm_ra_colour = (r.pm_ra_colour & ~0x3FFFu) | (to->record.pm_ra_colour & 0x3FFFu);
+            r.pm_dec_flags = (r.pm_dec_flags & ~0x3FFFu) | (to->record.pm_dec_flags & 0x3FFFu);
+        }
+        *to = (bst_star_entry){r, to->cell, bst_star_record_v(&r),
+                               to->cell < BST_STAR_CELLS ? 0 : from->source};
+    }
+    size_t kept = m->base_count;
+    for (size_t i = m->base_count; i < m->list.count; i++) {
+        if (stars[i].cell != TAKEN) {
+            stars[kept++] = stars[i];
+        }
+    }
+    m->list.count = kept;
+}
+
+/* ---------------------------------------------------------------- the catalogue */
+
+/* Completeness of the base, as far as its stars reach, and that of the table. */
+static bst_status make_head(bst_ctx *ctx, const merge *m, bst_star_head *head) {
+    const bst_star_merge_request *q = m->request;
+    *head = (bst_star_head){.complete_to_v_mag = BST_STAR_BRIGHTER_THAN_ALL};
+    snprintf(head->source, sizeof head->source, "%s", m->base ? "Tycho-2 and a table" : "a table");
+    if (m->base) {
+        const bst_star_view *view = bst_stars_records(m->base);
+        /* patches of Tycho-2 alone say which of its stars are there, not that all stars are */
+        const double most = view->sources ? INFINITY : BST_STAR_TYCHO2_COMPLETE_V;
+        head->complete_to_v_mag = fmin(view->header->complete_to_v_mag, most);
+        head->patch_count = (int)view->header->patch_count;
+        for (int i = 0; i < head->patch_count; i++) {
+            head->patches[i] = view->patches[i];
+            head->patches[i].v_mag = fmin(head->patches[i].v_mag, most);
+        }
+    }
+    if (isnan(q->complete_to_v_mag)) {
+        return BST_OK;
+    }
+    if (!q->has_cone) {
+        head->complete_to_v_mag = fmax(head->complete_to_v_mag, q->complete_to_v_mag);
+        return BST_OK;
+    }
+    if (head->patch_count == (int)BST_STAR_PATCHES_MAX) {
+        return bst_fail(ctx, BST_ERR_RANGE, "the base catalogue has %u cones already, no more fit",
+                        BST_STAR_PATCHES_MAX);
+    }
+    head->patches[head->patch_count] = q->cone;
+    head->patches[head->patch_count++].v_mag = q->complete_to_v_mag;
+    return BST_OK;
+}
+
+static bst_status write_stars(bst_ctx *ctx, merge *m) {
+    bst_star_head head;
+    BST_TRY(make_head(ctx, m, &head));
+    /* stars of Tycho-2 come first */
+    size_t tycho2 = m->base ? bst_stars_records(m->base)->tycho2_count : 0;
+    BST_TRY(bst_star_list_divide(ctx, &m->list, tycho2));
+    if (m->list.count - tycho2 > BST_STAR_TABLE_IDS) {
+        return bst_fail(ctx, BST_ERR_RANGE, "%zu stars are more than a catalogue holds (%u)",
+                        m->list.count - tycho2, BST_STAR_TABLE_IDS);
+    }
+    return bst_star_list_write(ctx, &m->list, &head, m->request->out);
+}
+
+bst_status bst_star_merge(bst_ctx *ctx, const bst_star_merge_request *request,
+                          bst_star_merge_counts *counts) {
+    merge m = {.request = request};
+    bst_star_table *table = NULL;
+    *counts = (bst_star_merge_counts){0};
+    bst_status status = bst_star_table_open(ctx, request->table, &request->options, &table);
+    if (status == BST_OK && request->base) {
+        status = bst_stars_open(ctx, request->base, &m.base);
+        if (status == BST_OK) {
+            status = take_base(ctx, &m);
+        }
+        counts->base = (int64_t)m.base_count;
+    }
+    if (status == BST_OK) {
+        status = read_table(ctx, &m, table, counts);
+    }
+    if (status == BST_OK) {
+        unite(&m, counts);
+        status = write_stars(ctx, &m);
+        counts->written = (int64_t)m.list.count;
+    }
+    bst_star_table_close(table);
+    bst_stars_close(m.base);
+    free(m.same);
+    free(m.list.stars);
+    return status;
+}

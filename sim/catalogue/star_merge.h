@@ -1,0 +1,38 @@
+/* Makes a star catalogue of a user's table, with the stars of another catalogue. */
+#ifndef BST_CATALOGUE_STAR_MERGE_H
+#define BST_CATALOGUE_STAR_MERGE_H
+
+#include "sim/catalogue/star_import.h"
+#include "sim/catalogue/star_table.h"
+
+typedef struct bst_star_merge_request {
+    const char *table; /* see bst_star_table_open */
+    bst_star_table_options options;
+    const char *base;              /* catalogue to add to, as in bst_stars_open; NULL: none */
+    double complete_to_v_mag;      /* of the table; NAN: it makes nothing complete */
+    bool has_cone;                 /* complete within `cone` only, else over the whole sky */
+    bst_star_patch cone;           /* its magnitude is not used */
+    const char *out;               /* file to write */
+    bst_star_progress_fn progress; /* may be NULL */
+    void *progress_user;
+} bst_star_merge_request;
+
+typedef struct bst_star_merge_counts {
+    int64_t rows, skipped; /* of the table; skipped: without position or magnitude */
+    int64_t base;          /* stars of the base */
+    int64_t same;          /* rows that are stars of the base */
+    int64_t written;       /* stars in all */
+} bst_star_merge_counts;
+
+/* Imports a table. A row is a star of the base if they are less than 1.5 arcsec apart at J2000 (or,
+ * for a star of Tycho-2 without a proper motion, at 1991.5) and differ in V by at most 1.5 mag; of
+ * several the nearest counts. Such a star keeps its identity and takes position, motion and
+ * magnitudes from the table, unless it is brighter than V 4, where the base is kept.
+ *
+ * Notes:     Parallax and radial velocity are not used, as in bst_stars_query
+ * Errors:    those of bst_star_table_open, bst_star_table_next, bst_stars_open and
+ *            bst_star_list_write; BST_ERR_RANGE: a star does not fit into a record, or too many */
+bst_status bst_star_merge(bst_ctx *ctx, const bst_star_merge_request *request,
+                          bst_star_merge_counts *counts) BST_MUST_CHECK;
+
+#endif

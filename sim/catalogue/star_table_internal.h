@@ -1,0 +1,80 @@
+/* Columns of a table of stars, and the two kinds of files that have them. Names of columns are in
+ * star_table_columns.c. */
+#ifndef BST_CATALOGUE_STAR_TABLE_INTERNAL_H
+#define BST_CATALOGUE_STAR_TABLE_INTERNAL_H
+
+#include <fitsio.h>
+#include <stdio.h>
+
+#include "sim/catalogue/star_table.h"
+#include "sim/core/subprocess.h"
+
+typedef enum bst_star_quantity {
+    BST_STAR_RA,
+    BST_STAR_DEC,
+    BST_STAR_EPOCH,
+    BST_STAR_PM_RA,
+    BST_STAR_PM_DEC,
+    BST_STAR_G,
+    BST_STAR_BP_RP,
+    BST_STAR_BP,
+    BST_STAR_RP,
+    BST_STAR_V,
+    BST_STAR_B_MINUS_V,
+    BST_STAR_B,
+    BST_STAR_ELECTRONS,
+    BST_STAR_QUANTITIES
+} bst_star_quantity;
+
+/* Names of the column of identities, and of each quantity, divided by blanks, in small letters. */
+extern const char bst_star_source_names[];
+extern const char *const bst_star_quantity_names[BST_STAR_QUANTITIES];
+
+/* True if `names` holds the word `name` of `length` bytes, in any case. */
+bool bst_star_name_is(const char *names, const char *name, size_t length);
+
+enum { BST_STAR_TABLE_COLUMNS = 1024, BST_STAR_TABLE_LINE = 1 << 16 };
+
+struct bst_star_table {
+    bst_star_table_options options;
+    char path[512];
+    int source_column;                  /* from 0; -1: none */
+    int column[BST_STAR_QUANTITIES];    /* the same */
+    char name[BST_STAR_QUANTITIES][72]; /* of the column, for messages */
+    int64_t rows, skipped;
+    /* text */
+    FILE *text; /* NULL: FITS */
+    bst_subprocess unzip;
+    bool unzips;
+    char *line, *scratch;
+    int line_number;
+    /* FITS */
+    fitsfile *fits;
+    int64_t fits_rows;
+    double *block[BST_STAR_QUANTITIES]; /* values of the rows from block_first on */
+    int64_t *block_source;
+    int64_t block_first, block_count;
+};
+
+/* Opens a text file, unpacked by gzip if `gzip`, and finds its columns. BST_ERR_FORMAT, BST_ERR_IO,
+ * BST_ERR_MEMORY. */
+bst_status bst_star_text_open(bst_ctx *ctx, bst_star_table *table, bool gzip) BST_MUST_CHECK;
+
+/* Reads the next row of a text file.
+ *
+ * Returned:  *source  the identity; 0: none, or no number
+ *            value    the numbers; NAN: no column or no value
+ *            *end     true: there is no row, nothing else is set
+ * Errors:    BST_ERR_FORMAT with file, line, column and text */
+bst_status bst_star_text_next(bst_ctx *ctx, bst_star_table *table, int64_t *source,
+                              double value[BST_STAR_QUANTITIES], bool *end) BST_MUST_CHECK;
+
+/* Opens a FITS file and finds the columns of its first binary table. BST_ERR_FORMAT,
+ * BST_ERR_MEMORY. */
+bst_status bst_star_fits_open(bst_ctx *ctx, bst_star_table *table) BST_MUST_CHECK;
+
+/* Reads the next row of a FITS table, as bst_star_text_next. */
+bst_status bst_star_fits_next(bst_ctx *ctx, bst_star_table *table, int64_t *source,
+                              double value[BST_STAR_QUANTITIES], bool *end) BST_MUST_CHECK;
+
+#endif

@@ -1,0 +1,115 @@
+"""A user's table of stars as a catalogue: each kind of file gives the same bytes, stars stand where astropy's proper
+motion puts them, and a run draws, identifies and names them."""
+import gzip
+import os
+import re
+import unittest
+import warnings
+
+import astropy.units as u
+import numpy as np
+from astropy.coordinates import SkyCoord
+from astropy.table import Table
+from astropy.time import Time
+
+import runs
+
+STARE = ("scenarios/neossat_geo_stare.json", "--seed", "5")
+
+
+def table_of(ra, dec, g, rng):
+    n = len(ra)
+    return Table({"source_id": 4000000000000000000 + np.arange(n, dtype=np.int64), "ra": ra, "dec": dec,
+                  "ref_epoch": np.full(n, 2016.0), "pmra": rng.normal(0, 300, n), "pmdec": rng.normal(0, 300, n),
+                  "phot_g_mean_mag": g, "bp_rp": rng.uniform(-0.2, 2.8, n)})
+
+
+class StarTable(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = runs.scratch()
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def load(self, table, out, *words):
+        return runs.call_well("stars", "import", self.path(table), "--out", self.path(out), *words)
+
+    def test_kinds_and_places(self):
+        rng = np.random.default_rng(7)
+        n = 3000
+        ra, dec = rng.uniform(0, 360, n), np.degrees(np.arcsin(rng.uniform(-1, 1, n)))
+        table = table_of(ra, dec, rng.uniform(5, 20, n), rng)
+        table.write(self.path("t.csv"))
+        table.write(self.path("t.ecsv"), delimiter=",")
+        table.write(self.path("t.fits"))
+        with open(self.path("t.csv"), "rb") as plain, gzip.open(self.path("t.csv.gz"), "wb") as packed:
+            packed.write(plain.read())
+        images = []
+        for kind in ("csv", "csv.gz", "ecsv", "fits"):
+            self.load("t." + kind, kind + ".stars", "--base", "none")
+            with open(self.path(kind + ".stars"), "rb") as file:
+                images.append(file.read())
+        self.assertTrue(all(image == images[0] for image in images))
+        # identities count the records; G - V by the published relation, evaluated here from its text
+        then = SkyCoord(ra * u.deg, dec * u.deg, pm_ra_cosdec=table["pmra"] * u.mas / u.yr,
+                        pm_dec=table["pmdec"] * u.mas / u.yr, obstime=Time(2016.0, format="jyear"))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # stars without a distance
+            moved = then.apply_space_motion(new_obstime=Time(2000.0, format="jyear"))
+        for number in (0, 1, 700, 1500, 2222, n - 1):
+            text = runs.call_well("stars", "info", self.path("csv.stars"), str(2**30 + number))
+            i = int(re.search(r"source +(\d+)", text)[1]) - 4000000000000000000
+            place = re.search(r"RA (\S+) Dec (\S+) deg", text)
+            found = SkyCoord(float(place[1]) * u.deg, float(place[2]) * u.deg)
+            # motions are rounded to 0.1 mas/yr, places to 0.3 mas, and printed to 0.36 mas
+            self.assertLess(found.separation(SkyCoord(moved[i].ra, moved[i].dec)).mas, 2.0)
+            v = float(re.search(r"V +(\S+)", text)[1])
+            x = table["bp_rp"][i]
+            self.assertAlmostEqual(table["phot_g_mean_mag"][i] - v,
+                                   np.polyval([0.01426, -0.2156, 0.01424, -0.02704], x), delta=2e-3)
+
+    def test_run(self):
+        out = self.path("stare")
+        runs.run(STARE[0], out, duration=4)
+        with runs.database(out) as rows:
+            ra, dec = rows.execute("SELECT boresight_ra_deg, boresight_dec_deg FROM exposures LIMIT 1").fetchone()
+        rng = np.random.default_rng(8)
+        n = 400
+        table = table_of(ra + rng.uniform(-1, 1, n) / np.cos(np.radians(dec)), dec + rng.uniform(-1, 1, n),
+                         rng.uniform(7, 11, n), rng)
+        table["pmra"] = table["pmdec"] = 0.0
+        table.write(self.path("field.csv"))
+        self.load("field.csv", "field.stars", "--base", "none", "--complete-to", "11",
+                  "--cone", f"{ra:.4f},{dec:.4f},1")
+        runs.run(STARE[0], out + "2", f"/world/star_catalogue={self.path('field.stars')}", duration=4)
+        with runs.database(out + "2") as rows:
+            found = rows.execute("SELECT d.star_id, t.id, d.x_px - t.x_centroid_px, d.y_px - t.y_centroid_px FROM detections d "
+                                 "JOIN truth t ON t.exposure_id = d.exposure_id AND t.id = d.star_id AND t.kind = 'star' "
+                                 "WHERE d.star_id > 0").fetchall()
+            alone = rows.execute("SELECT count(*) FROM detections WHERE star_id > 0").fetchone()[0]
+        self.assertGreater(len(found), 30)
+        self.assertEqual(len(found), alone)
+        self.assertTrue(all(2**30 <= row[0] < 2**30 + n for row in found))
+        self.assertLess(np.median(np.hypot([row[2] for row in found], [row[3] for row in found])), 0.3)
+
+    def test_usage(self):
+        with open(self.path("bad.csv"), "w", encoding="ascii") as file:
+            file.write("ra,dec,ref_epoch,v\n1,2,2016,5\n")
+        for words, message in [
+                ((), "a table needs --out FILE"),
+                (("--out", self.path("x"), "--cone", "1,2,3"), "--cone has no effect without --complete-to"),
+                (("--out", self.path("x"), "--complete-to", "9", "--cone", "1,2"), "--cone 1,2: give RA,DEC,RADIUS"),
+                (("--out", self.path("x"), "--subset", self.path("bad.csv")), "--subset is for Tycho-2's archive"),
+                (("--out", self.path("bad.csv")), "bad.csv")]:
+            result = runs.call("stars", "import", self.path("bad.csv"), *words)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertIn(message, result.stderr)
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()
