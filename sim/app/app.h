@@ -98,6 +98,8 @@ int bst_cmd_version(int argc, char **argv);
 int bst_cmd_view(int argc, char **argv);
 /* boresight pd: measures the probability of detection of a sensor. */
 int bst_cmd_pd(int argc, char **argv);
+/* boresight calibrate-camera: measures a camera from the identified stars of a run. */
+int bst_cmd_calibrate_camera(int argc, char **argv);
 /* boresight calibrate-obsgen: fits the observation generator to rendered images. */
 int bst_cmd_calibrate_obsgen(int argc, char **argv);
 /* boresight study: runs a study, or one of its shards. */

@@ -33,6 +33,7 @@ static const bst_app_command commands[] = {
     {"propagate", bst_cmd_propagate, "positions and velocities from two-line element sets"},
     {"calframes", bst_cmd_calframes, "bias, dark and flat frames of a scenario's sensors"},
     {"characterize", bst_cmd_characterize, "a sensor from its own bias, dark and flat frames"},
+    {"calibrate-camera", bst_cmd_calibrate_camera, "a camera from the stars of its own frames"},
     {"calibrate-obsgen", bst_cmd_calibrate_obsgen, "fit the observation generator to images"},
     {"study", bst_cmd_study, "many runs of varied scenarios, as tables"},
     {"pd", bst_cmd_pd, "measure detection, false alarms and location against theory"},
@@ -44,8 +45,7 @@ static void usage(FILE *stream, const bst_app_command *more) {
             "\n"
             "usage: boresight [--plugin FILE]... [--no-plugins] COMMAND [options]\n"
             "       boresight help [COMMAND]\n"
-            "\n"
-            "commands:\n");
+            "\ncommands:\n");
     for (size_t i = 0; i < sizeof commands / sizeof *commands; i++) {
         fprintf(stream, "  %-16s %s\n", commands[i].name, commands[i].doc);
     }

@@ -31,13 +31,14 @@ class Outputs(unittest.TestCase):
              "study": ["{study}"], "process": ["{run}", "--map", "boresight"],
              "twin": ["{run}", "--map", "boresight"],
              "challenge": ["1"],
+             "calibrate-camera": ["{run}"],
              "characterize": ["--map", "boresight", "--bias", "{run}/frames.fits"],
              "score": ["{run}", "--truth", "{run}"], "pd": ["{scenario}", "--trials", "1"]}
     # options that name what is read
     INPUTS = {("run", "replay"), ("run", "restore"), ("run", "link-keys"), ("serve", "link-keys"),
               ("schema", "plugin"), ("orbit", "observer"), ("propagate", "elements"), ("propagate", "tle"), ("propagate", "eop"),
               ("calibrate-obsgen", "calibration"), ("bench", "tle"), ("bench", "scenario"),
-              ("characterize", "bias"), ("characterize", "dark"), ("characterize", "flat"), ("characterize", "extends"),
+              ("calibrate-camera", "extends"), ("characterize", "bias"), ("characterize", "dark"), ("characterize", "flat"), ("characterize", "extends"),
               ("score", "truth"), ("study", "site"), ("study", "scheduler"), ("lightcurve", "satellite"), ("lightcurve", "elements")}
 
     @classmethod

@@ -26,7 +26,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes) {
     bst_status status = bst_star_table_open(&ctx, path, &options, &table);
     FUZZ_CHECK_REASON(ctx, status);
     bool end = status != BST_OK;
-    /* a FITS header can promise any number of rows; they are read in blocks */
+    /* a FITS header can state any number of rows; they are read in blocks */
     for (int rows = 0; !end && rows < 20000; rows++) {
         bst_star_table_row row;
         status = bst_star_table_next(&ctx, table, &row, &end);

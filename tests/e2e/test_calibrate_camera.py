@@ -1,0 +1,60 @@
+"""boresight calibrate-camera: the camera of a run comes back from its own frames, and makes a scenario."""
+import csv
+import json
+import os
+import unittest
+
+import numpy as np
+
+import runs
+
+SENSOR = runs.SENSOR + "/camera"
+TRUE = {"pixel_scale_arcsec": 3.01, "k1": -3.0, "k2": 0.0, "p1": 0.01, "p2": -0.02}
+
+
+class Camera(unittest.TestCase):
+    def test_run(self):
+        out = runs.scratch()
+        run, made = os.path.join(out, "run"), os.path.join(out, "camera")
+        words = [f"{SENSOR}/{'' if key.startswith('pixel') else 'distortion/'}{key}={value}" for key, value in TRUE.items()]
+        runs.run(runs.STARE, run, *words, duration=15)
+        said = runs.call_well("calibrate-camera", run, "--out", made, "--extends", runs.STARE)
+        self.assertIn("zero point", said)
+        with open(os.path.join(made, "report.json"), encoding="utf-8") as file:
+            report = json.load(file)
+        for key, value in TRUE.items():
+            found = report["geometry"][key]
+            self.assertLess(abs(found["value"] - value), 4.5 * found["standard_error"], key)
+        self.assertLess(report["geometry"]["corner_sigma_px"], 0.1)
+        # the frames are smeared a little, which the width contains
+        self.assertAlmostEqual(report["psf"]["fwhm_px"]["value"], 2.02, delta=0.05)
+        # electrons/s of V 0: flux of the band, aperture, optics and detector; the same for all colours
+        light = report["photometry"]
+        scene = json.loads(runs.call("check", runs.STARE).stdout)["observers"][0]["sensors"][0]["camera"]
+        rate = (scene["photon_flux_v0_per_s_m2"] * np.pi / 4 * scene["aperture_m"]**2 * (1 - scene["obscuration"])
+                * scene["throughput"] * scene["quantum_efficiency"])
+        self.assertLess(abs(light["zero_point_mag"]["value"] - 2.5 * np.log10(rate)),
+                        4.5 * light["zero_point_mag"]["standard_error"])
+        self.assertLess(abs(light["colour_term"]["value"]), 4.5 * light["colour_term"]["standard_error"])
+        with open(os.path.join(made, "stars.csv"), encoding="utf-8", newline="") as file:
+            rows = [row for row in csv.DictReader(file) if row["left_x_px"]]
+        self.assertEqual(len(rows), report["geometry"]["stars"])
+        left = np.array([[float(row["left_x_px"]), float(row["left_y_px"])] for row in rows])
+        self.assertAlmostEqual(np.sqrt(np.mean(left**2)), report["geometry"]["rms_px"], delta=1e-4)
+        # camera.json is a scenario
+        result = runs.call("check", os.path.join(made, "camera.json"))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        camera = json.loads(result.stdout)["observers"][0]["sensors"][0]["camera"]
+        self.assertEqual(camera["pixel_scale_arcsec"], report["geometry"]["pixel_scale_arcsec"]["value"])
+        self.assertEqual(camera["psf_fwhm_px"], report["psf"]["fwhm_px"]["value"])
+        result = runs.call("calibrate-camera", run, "--out", made)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("--overwrite", result.stderr)
+
+
+def tearDownModule():
+    runs.clean()
+
+
+if __name__ == "__main__":
+    unittest.main()
