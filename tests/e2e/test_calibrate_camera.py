@@ -47,6 +47,13 @@ class Camera(unittest.TestCase):
         camera = json.loads(result.stdout)["observers"][0]["sensors"][0]["camera"]
         self.assertEqual(camera["pixel_scale_arcsec"], report["geometry"]["pixel_scale_arcsec"]["value"])
         self.assertEqual(camera["psf_fwhm_px"], report["psf"]["fwhm_px"]["value"])
+        # frames in extensions, not a cube
+        runs.run(runs.STARE, run + "2", "/record/frames=extensions", duration=3)
+        self.assertIn("FWHM", runs.call_well("calibrate-camera", run + "2", "--out", made + "2"))
+        runs.run(runs.STARE, run + "3", f"{SENSOR}/aperture_m=0.001", duration=1)
+        result = runs.call("calibrate-camera", run + "3", "--out", made + "3")
+        self.assertEqual((result.returncode, os.path.exists(made + "3")), (1, False))
+        self.assertIn("0 identified stars in 0 frames do not determine", result.stderr)
         result = runs.call("calibrate-camera", run, "--out", made)
         self.assertEqual(result.returncode, 1)
         self.assertIn("--overwrite", result.stderr)

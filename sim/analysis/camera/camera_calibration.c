@@ -55,12 +55,13 @@ typedef struct reading {
     bst_run_reader *run;
     bst_run_scene scene;
     bst_run_sensor sensor;
-    bst_camera camera; /* of the scenario: start of the fit */
+    bst_camera camera;    /* of the scenario: start of the fit */
+    bst_stars *catalogue; /* by which the run identified them */
     double julian_year;
     bst_camera_fit_star *stars;
-    int64_t *exposures, *fits_index; /* fits_index -1: not for the width */
-    int *window;                     /* first column and row of the frame, two a star */
-    int count, room, frames;
+    int64_t *exposures, *fits_index;  /* fits_index -1: not for the width */
+    int *window;                      /* first column and row of the frame, two a star */
+    int count, room, frames, unknown; /* unknown: stars that the catalogue does not have */
 } reading;
 
 /* Identified stars that are neither saturated nor cut nor merged, of frames with an attitude from
@@ -107,9 +108,10 @@ static bst_status add_star(bst_ctx *ctx, reading *d, const bst_io_rows *r) {
     bst_star star;
     bst_ctx quiet;
     bst_ctx_init(&quiet, NULL, NULL, BST_LOG_ERROR);
-    if (bst_stars_find(&quiet, bst_world_stars(d->scene.world), (uint32_t)bst_io_rows_int(r, 1),
-                       d->julian_year, &star) != BST_OK) {
-        return BST_OK; /* identified with the knowledge of another catalogue */
+    if (bst_stars_find(&quiet, d->catalogue, (uint32_t)bst_io_rows_int(r, 1), d->julian_year,
+                       &star) != BST_OK) {
+        d->unknown++;
+        return BST_OK;
     }
     BST_TRY(make_room(ctx, d));
     const int i = d->count++;
@@ -159,6 +161,9 @@ static bst_status read_run(bst_ctx *ctx, const bst_camera_calibration_request *q
     const bst_sensor_config *config = observers[observer].sensors.items;
     d->camera = config[sensor].camera;
     BST_TRY(bst_camera_prepare(ctx, &d->camera));
+    const char *own = config[sensor].knowledge.star_catalogue;
+    BST_TRY(
+        bst_stars_open(ctx, *own ? own : d->scene.scenario.world.star_catalogue, &d->catalogue));
     double tt1, tt2;
     bst_time_tt(d->scene.scenario.epoch, &tt1, &tt2);
     d->julian_year = 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25;
@@ -172,6 +177,12 @@ static bst_status read_run(bst_ctx *ctx, const bst_camera_calibration_request *q
         }
     }
     bst_io_rows_close(rows);
+    if (status == BST_OK && d->unknown > 0) {
+        bst_log(ctx, BST_LOG_WARNING,
+                "%d of %d identified stars are not in the star catalogue now: is it another one "
+                "than that of the run?",
+                d->unknown, d->unknown + d->count);
+    }
     return status;
 }
 
@@ -242,6 +253,7 @@ static bst_status measure_widths(bst_ctx *ctx, const reading *d, bst_camera_widt
     static double fwhm[MOST_WIDTHS];
     static int ninth[MOST_WIDTHS];
     int count = 0;
+    const bool cube = bst_fits_reader_info(reader)->cube;
     int64_t loaded = -1;
     bst_fits_read_frame frame = {0};
     bst_status status = BST_OK;
@@ -257,7 +269,8 @@ static bst_status measure_widths(bst_ctx *ctx, const reading *d, bst_camera_widt
             continue;
         }
         if (d->fits_index[i] != loaded) {
-            status = bst_fits_reader_frame(ctx, reader, d->fits_index[i], &frame);
+            /* extensions count from 1, planes of a cube from 0 */
+            status = bst_fits_reader_frame(ctx, reader, d->fits_index[i] - !cube, &frame);
             loaded = d->fits_index[i];
         }
         if (status == BST_OK && width_of(&frame, &d->stars[i], &d->window[2 * i], &fwhm[count])) {
@@ -339,6 +352,7 @@ bst_status bst_camera_calibration_run(bst_ctx *ctx, const bst_camera_calibration
         status = calibrate(ctx, q, &d, out);
         status = status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "%s", run);
     }
+    bst_stars_close(d.catalogue);
     bst_run_scene_close(&d.scene);
     bst_run_reader_close(d.run);
     free(d.stars);

@@ -392,7 +392,7 @@ static void report(const geometry *g, bst_camera_geometry_fit *out) {
 bst_status bst_camera_fit_geometry(bst_ctx *ctx, const bst_camera *start,
                                    bst_camera_fit_star *stars, int count, int frames,
                                    bst_camera_geometry_fit *out) {
-    assert(start && stars && out && count >= 0 && frames >= 0);
+    assert(start && (stars || count == 0) && out && count >= 0 && frames >= 0);
     geometry g = {.start = start,
                   .stars = stars,
                   .count = count,
