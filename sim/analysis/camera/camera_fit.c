@@ -294,7 +294,7 @@ static void cluster(gradient *all, int count, int size, double *covariance) {
         clusters++;
     }
     if (clusters <= size) {
-        return; /* the stars' own errors cannot be told from the parameters */
+        return; /* the stars' own errors and the parameters are not separable */
     }
     const double factor = clusters / (double)(clusters - size);
     for (int k = 0; k < size; k++) {

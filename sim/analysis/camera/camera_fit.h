@@ -32,10 +32,10 @@ typedef struct bst_camera_geometry_fit {
 } bst_camera_geometry_fit;
 
 /* Fits scale and distortion, and each frame's attitude, to all stars by least squares. Stars more
- * than 4.5 sigma off are left out; the scatter is that which makes chi squared its expectation.
+ * than 4.5 sigma off are left out; the scatter makes chi squared its expectation.
  *
  * Given:     start  camera near the true one, prepared; its rotation and offset are kept, as they
- *                   cannot be told from the attitudes
+ *                   are not separable from the attitudes
  *            stars  [count]; their `left` are set
  *            frames number of frames; those with fewer than 4 stars are not used
  * Errors:    BST_ERR_RANGE: too few stars, or they do not determine the camera; BST_ERR_MEMORY
