@@ -143,18 +143,20 @@ static void fill_up(corners *c) {
     }
 }
 
-/* Values of a half plane at the corners. Returned: below 0 if one of them is. */
-BST_CLONES_256 static int64_t values_at(const corners *c, bst_half_plane s, double *value) {
-    int64_t sign[BLOCK] = {0}; /* bits of all values, of which the highest is the sign */
+/* Values of a half plane at the corners. Returned: how many of them are below 0. */
+static inline int values_at(const corners *c, bst_half_plane s, double *value) {
+    uint64_t below[BLOCK] = {0};
     for (int i = 0; i < c->count; i += BLOCK) {
         for (int k = 0; k < BLOCK; k++) {
-            int64_t bits;
+            uint64_t bits; /* of which the highest is the sign */
             value[i + k] = s.u * c->x[i + k] + s.v * c->y[i + k] + s.w;
             memcpy(&bits, &value[i + k], sizeof bits);
-            sign[k] |= bits;
+            below[k] += bits >> 63;
         }
     }
-    return sign[0] | sign[1] | sign[2] | sign[3];
+    int copies = (BLOCK - c->count % BLOCK) % BLOCK;
+    int found = (int)(below[0] + below[1] + below[2] + below[3]);
+    return found - (signbit(value[c->count - 1]) ? copies : 0);
 }
 
 /* Cuts a polygon by the values of a half plane at its corners. There is room for `room` of them, at
@@ -181,6 +183,121 @@ static void cut_by(const corners *from, const double *value, int room, corners *
     if (to->count > 0) {
         fill_up(to);
     }
+}
+
+static int before(int i, int count) {
+    return i > 0 ? i - 1 : count - 1;
+}
+
+static int after(int i, int count) {
+    return i + 1 < count ? i + 1 : 0;
+}
+
+/* Corners that follow each other, all of those outside of a half plane, with its values at the ends
+ * and at the corners beside them. */
+typedef struct outside {
+    int first, last, count;
+    double before, at_first, at_last, after;
+} outside;
+
+/* Where a side from corner i to the next one crosses the border of a half plane. */
+static bst_point2 crossing_of(const corners *c, int i, double value, double next) {
+    int k = after(i, c->count);
+    double t = value / (value - next);
+    return (bst_point2){c->x[i] + t * (c->x[k] - c->x[i]), c->y[i] + t * (c->y[k] - c->y[i])};
+}
+
+/* Moves the corners from one on to another place. */
+static void move(corners *c, int from, int end, int to) {
+    size_t count = (size_t)(end - from);
+    if (from != to) {
+        memmove(c->x + to, c->x + from, count * sizeof *c->x);
+        memmove(c->y + to, c->y + from, count * sizeof *c->y);
+    }
+}
+
+/* Cuts the corners outside of a half plane off. Returned: the last new one. */
+static int cut_off(corners *c, const outside *o) {
+    bst_point2 by[2];
+    int count = 0, n = c->count, first = o->first;
+    if (o->before > 0.0) {
+        by[count++] = crossing_of(c, before(o->first, n), o->before, o->at_first);
+    }
+    if (o->after > 0.0) {
+        by[count++] = crossing_of(c, o->last, o->at_last, o->after);
+    }
+    if (o->first <= o->last) {
+        move(c, o->last + 1, n, first + count);
+    } else { /* over the end of the list */
+        move(c, o->last + 1, o->first, 0);
+        first = o->first - o->last - 1;
+    }
+    for (int i = 0; i < count; i++) {
+        c->x[first + i] = by[i].x;
+        c->y[first + i] = by[i].y;
+    }
+    c->count = n - o->count + count;
+    c->count = c->count >= 3 ? c->count : 0;
+    if (c->count > 0) {
+        fill_up(c);
+    }
+    return first + count - 1;
+}
+
+static double value_at(const corners *c, bst_half_plane s, int i) {
+    return s.u * c->x[i] + s.v * c->y[i] + s.w;
+}
+
+/* Finds the corners outside of a half plane about one of them. */
+static outside outside_about(const corners *c, bst_half_plane s, int at, double value) {
+    int n = c->count;
+    outside o = {.first = at, .last = at, .count = 1, .at_first = value, .at_last = value};
+    while (o.after = value_at(c, s, after(o.last, n)), o.after < 0.0 && o.count < n) {
+        o.last = after(o.last, n);
+        o.at_last = o.after;
+        o.count++;
+    }
+    while (o.before = value_at(c, s, before(o.first, n)), o.before < 0.0 && o.count < n) {
+        o.first = before(o.first, n);
+        o.at_first = o.before;
+        o.count++;
+    }
+    return o;
+}
+
+/* Keeps what a polygon has in a half plane.
+ *
+ * Given:     room   see cut_by
+ *            *at    a corner that may be outside: sides of a convex set come in order, so that each
+ *                   cuts near the last one
+ *            spare  work memory
+ * Returned:  *at    likewise for the next one
+ *            false: nothing was removed */
+static inline bool keep_side(corners *c, bst_half_plane s, int room, int *at, corners *spare) {
+    double value[CORNERS];
+    int i = *at < c->count ? *at : 0, count = -1; /* outside; -1: unknown */
+    if (!(value_at(c, s, i) < 0.0)) {
+        count = values_at(c, s, value);
+        if (count == 0) {
+            return false;
+        }
+        for (i = 0; i < c->count && !(value[i] < 0.0); i++) {
+        }
+        if (i == c->count) { /* all of these are -0 */
+            return true;
+        }
+    }
+    const outside o = outside_about(c, s, i, value_at(c, s, i));
+    if (o.count == c->count) {
+        c->count = 0;
+    } else if ((count < 0 || count == o.count) && c->count + 2 - o.count <= room) {
+        *at = cut_off(c, &o);
+    } else { /* concave by rounding */
+        (void)values_at(c, s, value);
+        cut_by(c, value, room, spare);
+        *c = *spare;
+    }
+    return true;
 }
 
 /* Lowest and highest coordinates of a polygon. */
@@ -225,36 +342,30 @@ static int may_cut(const bounds *b, const bst_half_plane *sides, int side_count,
 }
 
 /* As bst_polygon_keep, with the polygon's bounds. */
-static int keep(const bst_point2 *p, int count, const bounds *within, const bst_half_plane *sides,
-                int side_count, bst_point2 *out, bool *cut) {
-    corners both[2], *from = &both[0], *to = &both[1];
+BST_CLONES_256 static int keep(const bst_point2 *p, int count, const bounds *within,
+                               const bst_half_plane *sides, int side_count, bst_point2 *out,
+                               bool *cut) {
+    corners left, spare;
     int indices[CORNERS], room = count + side_count;
-    double value[CORNERS];
     assert(count > 0 && room <= CORNERS / 2);
     int wanted = may_cut(within, sides, side_count, indices);
     *cut = wanted == BST_HALF_PLANES_APART;
     if (*cut) {
         return 0;
     }
-    from->count = count;
+    left.count = count;
     for (int i = 0; i < count; i++) {
-        from->x[i] = p[i].x;
-        from->y[i] = p[i].y;
+        left.x[i] = p[i].x;
+        left.y[i] = p[i].y;
     }
-    fill_up(from);
-    for (int i = 0; i < wanted && from->count > 0; i++) {
-        if (values_at(from, sides[indices[i]], value) < 0) {
-            cut_by(from, value, room, to);
-            corners *other = from;
-            from = to;
-            to = other;
-            *cut = true;
-        }
+    fill_up(&left);
+    for (int i = 0, at = 0; i < wanted && left.count > 0; i++) {
+        *cut |= keep_side(&left, sides[indices[i]], room, &at, &spare);
     }
-    for (int i = 0; i < from->count; i++) {
-        out[i] = (bst_point2){from->x[i], from->y[i]};
+    for (int i = 0; i < left.count; i++) {
+        out[i] = (bst_point2){left.x[i], left.y[i]};
     }
-    return from->count;
+    return left.count;
 }
 
 int bst_polygon_keep(const bst_point2 *p, int count, const bst_half_plane *sides, int side_count,
