@@ -81,10 +81,9 @@ static void add_sunlight(bst_satellite_pose *p, const bst_satellite_light *l, in
  * by side. */
 static bool are_alike(const bst_curved *a, const bst_curved *b) {
     return a->material == b->material && a->joint == b->joint && a->sphere == b->sphere &&
-           a->side == b->side && a->radius_m == b->radius_m &&
-           a->top_radius_m == b->top_radius_m && a->length_m == b->length_m &&
-           memcmp(&a->x, &b->x, sizeof a->x) == 0 && memcmp(&a->y, &b->y, sizeof a->y) == 0 &&
-           memcmp(&a->z, &b->z, sizeof a->z) == 0;
+           a->side == b->side && a->radius_m == b->radius_m && a->top_radius_m == b->top_radius_m &&
+           a->length_m == b->length_m && memcmp(&a->x, &b->x, sizeof a->x) == 0 &&
+           memcmp(&a->y, &b->y, sizeof a->y) == 0 && memcmp(&a->z, &b->z, sizeof a->z) == 0;
 }
 
 /* Light of a curved surface without shadows, m^2/sr. */
