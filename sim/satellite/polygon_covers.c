@@ -81,33 +81,38 @@ int bst_half_planes_of(const bst_point2 *p, int count, bst_half_planes *sides) {
     return blocks;
 }
 
-/* Lowest and highest value that each half plane has in a box. */
-BST_CLONES_256 static void extremes_in_box(const bst_half_planes *sides, int blocks,
-                                           const double bounds[4], double *low, double *high) {
+/* Lowest value that each half plane has in a box. Returned: the least of their highest ones. */
+BST_CLONES_256 static double extremes_in_box(const bst_half_planes *sides, int blocks,
+                                             const double bounds[4], double *low) {
     double x = 0.5 * (bounds[0] + bounds[1]), y = 0.5 * (bounds[2] + bounds[3]);
     double half_x = 0.5 * (bounds[1] - bounds[0]), half_y = 0.5 * (bounds[3] - bounds[2]);
+    double least[BST_HALF_PLANES];
+    for (int k = 0; k < BST_HALF_PLANES; k++) {
+        least[k] = INFINITY;
+    }
     for (int b = 0; b < blocks; b++) {
         for (int k = 0; k < BST_HALF_PLANES; k++) {
             double u = sides[b].u[k], v = sides[b].v[k];
             double middle = u * x + v * y + sides[b].w[k];
-            double reach = fabs(u) * half_x + fabs(v) * half_y;
+            double reach = fabs(u) * half_x + fabs(v) * half_y, high = middle + reach;
             low[BST_HALF_PLANES * b + k] = middle - reach;
-            high[BST_HALF_PLANES * b + k] = middle + reach;
+            least[k] = high < least[k] ? high : least[k];
         }
     }
+    double two[2] = {least[0] < least[1] ? least[0] : least[1],
+                     least[2] < least[3] ? least[2] : least[3]};
+    return two[0] < two[1] ? two[0] : two[1];
 }
 
 int bst_half_planes_crossing(const bst_half_planes *sides, int blocks, const bst_point2 *p,
                              int count, const double bounds[4], int *indices) {
     double low[BST_POLYGON_CORNERS_MAX + BST_HALF_PLANES];
-    double high[BST_POLYGON_CORNERS_MAX + BST_HALF_PLANES];
     int found = 0, n = BST_HALF_PLANES * blocks;
     assert(n < BST_POLYGON_CORNERS_MAX + BST_HALF_PLANES);
-    extremes_in_box(sides, blocks, bounds, low, high);
+    if (extremes_in_box(sides, blocks, bounds, low) <= 0.0) {
+        return BST_HALF_PLANES_APART;
+    }
     for (int i = 0; i < n; i++) {
-        if (high[i] <= 0.0) {
-            return BST_HALF_PLANES_APART;
-        }
         if (low[i] >= 0.0) {
             continue;
         }
