@@ -23,8 +23,9 @@ enum { INTERSECTIONS_MAX = 200 };
 
 bst_status bst_polygon_covers_create(bst_ctx *ctx, bst_polygon_covers *covers) {
     *covers = (bst_polygon_covers){.sides = malloc(SIDES * sizeof *covers->sides),
-                                   .work = malloc(WORK * sizeof *covers->work)};
-    if (!covers->sides || !covers->work) {
+                                   .work = malloc(WORK * sizeof *covers->work),
+                                   .corners = malloc(SIDES * sizeof *covers->corners)};
+    if (!covers->sides || !covers->work || !covers->corners) {
         bst_polygon_covers_free(covers);
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the shadows of a satellite");
     }
@@ -34,11 +35,20 @@ bst_status bst_polygon_covers_create(bst_ctx *ctx, bst_polygon_covers *covers) {
 void bst_polygon_covers_free(bst_polygon_covers *covers) {
     free(covers->sides);
     free(covers->work);
+    free(covers->corners);
     *covers = (bst_polygon_covers){0};
 }
 
 void bst_polygon_covers_clear(bst_polygon_covers *covers) {
-    covers->count = covers->pending = 0;
+    covers->count = 0;
+    bst_polygon_covers_restart(covers);
+}
+
+void bst_polygon_covers_restart(bst_polygon_covers *covers) {
+    covers->pending = 0;
+    if (covers->count < BST_POLYGON_COVERS_MAX) {
+        covers->corner_first[covers->count + 1] = covers->corner_first[covers->count];
+    }
 }
 
 bool bst_polygon_covers_add(bst_polygon_covers *covers, bst_half_plane side) {
@@ -51,13 +61,23 @@ bool bst_polygon_covers_add(bst_polygon_covers *covers, bst_half_plane side) {
     return true;
 }
 
+bst_point2 *bst_polygon_covers_corners(bst_polygon_covers *covers, int count) {
+    int i = covers->count, first = covers->corner_first[i];
+    if (i >= BST_POLYGON_COVERS_MAX || first + count > SIDES) {
+        return NULL;
+    }
+    covers->corner_first[i + 1] = first + count;
+    covers->corner_sides[i] = covers->pending;
+    return covers->corners + first;
+}
+
 bool bst_polygon_covers_end(bst_polygon_covers *covers) {
     if (covers->count >= BST_POLYGON_COVERS_MAX) {
         return false;
     }
     covers->first[covers->count + 1] = covers->first[covers->count] + covers->pending;
     covers->count++;
-    covers->pending = 0;
+    bst_polygon_covers_restart(covers);
     return true;
 }
 
@@ -346,27 +366,50 @@ static int may_cut(const bounds *b, const bst_half_plane *sides, int side_count,
     return found;
 }
 
-/* As bst_polygon_keep, with the polygon's bounds. */
+/* Corners of a set, and how many of its first sides are those of them; count 0: unknown. */
+typedef struct set_corners {
+    const bst_point2 *points;
+    int count, sides;
+} set_corners;
+
+static void start(corners *to, const bst_point2 *p, int count) {
+    to->count = count;
+    for (int i = 0; i < count; i++) {
+        to->x[i] = p[i].x;
+        to->y[i] = p[i].y;
+    }
+    fill_up(to);
+}
+
+/* As bst_polygon_keep, with the polygon's bounds.
+ *
+ * Given:     set  of the half planes: if more of them than corners of the polygon matter, the set
+ *                 is cut by the polygon */
 BST_CLONES_256 static int keep(const bst_point2 *p, int count, const bounds *within,
-                               const bst_half_plane *sides, int side_count, bst_point2 *out,
-                               bool *cut) {
+                               const bst_half_plane *sides, int side_count, const set_corners *set,
+                               bst_point2 *out, bool *cut) {
+    enum { MANY = 2 }; /* by the time of light curves: below that, cutting the polygon is faster */
     corners left, spare;
-    int indices[CORNERS], room = count + side_count;
+    int indices[CORNERS], room = count + side_count + set->count, at = 0;
     assert(count > 0 && room <= CORNERS / 2);
     int wanted = may_cut(within, sides, side_count, indices);
     *cut = wanted == BST_HALF_PLANES_APART;
     if (*cut) {
         return 0;
     }
-    left.count = count;
-    for (int i = 0; i < count; i++) {
-        left.x[i] = p[i].x;
-        left.y[i] = p[i].y;
+    bool swap = set->count > 0 && wanted > MANY * count;
+    start(&left, swap ? set->points : p, swap ? set->count : count);
+    for (int i = 0; i < wanted && left.count > 0; i++) {
+        if (!swap || indices[i] >= set->sides) {
+            *cut |= keep_side(&left, sides[indices[i]], room, &at, &spare);
+        }
     }
-    fill_up(&left);
-    for (int i = 0, at = 0; i < wanted && left.count > 0; i++) {
-        *cut |= keep_side(&left, sides[indices[i]], room, &at, &spare);
+    for (int i = 0; i < count && left.count > 0 && swap; i++) {
+        bst_point2 a = p[i], b = p[after(i, count)], way = {b.x - a.x, b.y - a.y};
+        const bst_half_plane side = {-way.y, way.x, way.y * a.x - way.x * a.y};
+        (void)keep_side(&left, side, room, &at, &spare);
     }
+    *cut |= swap; /* a set that covers all leaves an area of rounding */
     for (int i = 0; i < left.count; i++) {
         out[i] = (bst_point2){left.x[i], left.y[i]};
     }
@@ -377,7 +420,8 @@ int bst_polygon_keep(const bst_point2 *p, int count, const bst_half_plane *sides
                      bst_point2 *out, bool *cut) {
     assert(count > 0);
     const bounds within = bounds_of(p, count);
-    return keep(p, count, &within, sides, side_count, out, cut);
+    const set_corners none = {NULL, 0, 0};
+    return keep(p, count, &within, sides, side_count, &none, out, cut);
 }
 
 /* A sum of areas in progress. */
@@ -396,7 +440,11 @@ static double uncovered(sum *s, const bst_point2 *p, int count, const bounds *wi
     int start = s->used;
     for (int i = 0; i < covers; i++) {
         const bst_half_plane *sides = s->covers->sides + s->covers->first[i];
-        int side_count = s->covers->first[i + 1] - s->covers->first[i], room = count + side_count;
+        int side_count = s->covers->first[i + 1] - s->covers->first[i];
+        const set_corners set = {s->covers->corners + s->covers->corner_first[i],
+                                 s->covers->corner_first[i + 1] - s->covers->corner_first[i],
+                                 s->covers->corner_sides[i]};
+        int room = count + side_count + set.count;
         if (off & 1U << i) {
             continue;
         }
@@ -406,7 +454,7 @@ static double uncovered(sum *s, const bst_point2 *p, int count, const bounds *wi
         }
         bst_point2 *out = s->covers->work + start;
         bool cut;
-        int n = keep(p, count, within, sides, side_count, out, &cut);
+        int n = keep(p, count, within, sides, side_count, &set, out, &cut);
         if (!cut) {
             return 0.0; /* the set covers all */
         }
