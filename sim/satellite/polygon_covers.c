@@ -366,11 +366,13 @@ static int may_cut(const bounds *b, const bst_half_plane *sides, int side_count,
     return found;
 }
 
-/* Corners of a set, and how many of its first sides are those of them; count 0: unknown. */
-typedef struct set_corners {
-    const bst_point2 *points;
-    int count, sides;
-} set_corners;
+/* A convex set of half planes. The first corner_sides of them may be those of known corners. */
+typedef struct convex_set {
+    const bst_half_plane *sides;
+    int side_count;
+    const bst_point2 *corners;
+    int corner_count, corner_sides; /* corner_count 0: unknown */
+} convex_set;
 
 static void start(corners *to, const bst_point2 *p, int count) {
     to->count = count;
@@ -381,27 +383,24 @@ static void start(corners *to, const bst_point2 *p, int count) {
     fill_up(to);
 }
 
-/* As bst_polygon_keep, with the polygon's bounds.
- *
- * Given:     set  of the half planes: if more of them than corners of the polygon matter, the set
- *                 is cut by the polygon */
+/* As bst_polygon_keep, with the polygon's bounds. If many more of the set's half planes matter than
+ * the polygon has corners, the set is cut by the polygon. */
 BST_CLONES_256 static int keep(const bst_point2 *p, int count, const bounds *within,
-                               const bst_half_plane *sides, int side_count, const set_corners *set,
-                               bst_point2 *out, bool *cut) {
+                               const convex_set *set, bst_point2 *out, bool *cut) {
     enum { MANY = 2 }; /* by the time of light curves: below that, cutting the polygon is faster */
     corners left, spare;
-    int indices[CORNERS], room = count + side_count + set->count, at = 0;
+    int indices[CORNERS], room = count + set->side_count + set->corner_count, at = 0;
     assert(count > 0 && room <= CORNERS / 2);
-    int wanted = may_cut(within, sides, side_count, indices);
+    int wanted = may_cut(within, set->sides, set->side_count, indices);
     *cut = wanted == BST_HALF_PLANES_APART;
     if (*cut) {
         return 0;
     }
-    bool swap = set->count > 0 && wanted > MANY * count;
-    start(&left, swap ? set->points : p, swap ? set->count : count);
+    bool swap = set->corner_count > 0 && wanted > MANY * count;
+    start(&left, swap ? set->corners : p, swap ? set->corner_count : count);
     for (int i = 0; i < wanted && left.count > 0; i++) {
-        if (!swap || indices[i] >= set->sides) {
-            *cut |= keep_side(&left, sides[indices[i]], room, &at, &spare);
+        if (!swap || indices[i] >= set->corner_sides) {
+            *cut |= keep_side(&left, set->sides[indices[i]], room, &at, &spare);
         }
     }
     for (int i = 0; i < count && left.count > 0 && swap; i++) {
@@ -420,8 +419,8 @@ int bst_polygon_keep(const bst_point2 *p, int count, const bst_half_plane *sides
                      bst_point2 *out, bool *cut) {
     assert(count > 0);
     const bounds within = bounds_of(p, count);
-    const set_corners none = {NULL, 0, 0};
-    return keep(p, count, &within, sides, side_count, &none, out, cut);
+    const convex_set set = {sides, side_count, NULL, 0, 0};
+    return keep(p, count, &within, &set, out, cut);
 }
 
 /* A sum of areas in progress. */
@@ -439,12 +438,12 @@ static double uncovered(sum *s, const bst_point2 *p, int count, const bounds *wi
     bounds parts[BST_POLYGON_COVERS_MAX]; /* of the intersections with the sets so far */
     int start = s->used;
     for (int i = 0; i < covers; i++) {
-        const bst_half_plane *sides = s->covers->sides + s->covers->first[i];
-        int side_count = s->covers->first[i + 1] - s->covers->first[i];
-        const set_corners set = {s->covers->corners + s->covers->corner_first[i],
-                                 s->covers->corner_first[i + 1] - s->covers->corner_first[i],
-                                 s->covers->corner_sides[i]};
-        int room = count + side_count + set.count;
+        const bst_polygon_covers *all = s->covers;
+        const convex_set set = {all->sides + all->first[i], all->first[i + 1] - all->first[i],
+                                all->corners + all->corner_first[i],
+                                all->corner_first[i + 1] - all->corner_first[i],
+                                all->corner_sides[i]};
+        int room = count + set.side_count + set.corner_count;
         if (off & 1U << i) {
             continue;
         }
@@ -454,7 +453,7 @@ static double uncovered(sum *s, const bst_point2 *p, int count, const bounds *wi
         }
         bst_point2 *out = s->covers->work + start;
         bool cut;
-        int n = keep(p, count, within, sides, side_count, &set, out, &cut);
+        int n = keep(p, count, within, &set, out, &cut);
         if (!cut) {
             return 0.0; /* the set covers all */
         }
