@@ -241,7 +241,7 @@ static void move(corners *c, int from, int end, int to) {
     }
 }
 
-/* Cuts the corners outside of a half plane off. Returned: the last new one. */
+/* Cuts the corners outside of a half plane off. Returned: the last new one, or one beside it. */
 static int cut_off(corners *c, const outside *o) {
     bst_point2 by[2];
     int count = 0, n = c->count, first = o->first;
@@ -266,7 +266,7 @@ static int cut_off(corners *c, const outside *o) {
     if (c->count > 0) {
         fill_up(c);
     }
-    return first + count - 1;
+    return first + count > 0 ? first + count - 1 : 0;
 }
 
 static double value_at(const corners *c, bst_half_plane s, int i) {

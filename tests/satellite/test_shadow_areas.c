@@ -66,6 +66,12 @@ static void squares_have_closed_forms(void **state) {
     assert_int_equal(bst_polygon_place_of(b, 4, whole, 4), BST_POLYGON_CROSSING);
     const bst_point2 beside[] = SQUARE(4.5, 0.0, 1.0);
     assert_int_equal(bst_polygon_place_of(beside, 4, whole, 4), BST_POLYGON_APART);
+    /* through two corners, which stay, and cut the first one off; then x >= 1 */
+    bst_polygon_covers_clear(&covers);
+    assert_true(bst_polygon_covers_add(&covers, (bst_half_plane){1.0, 1.0, -4.0}));
+    assert_true(bst_polygon_covers_add(&covers, (bst_half_plane){1.0, 0.0, -1.0}));
+    assert_true(bst_polygon_covers_end(&covers));
+    bst_assert_close(bst_polygon_uncovered_area(&covers, whole, 4), 8.5, 1e-14);
     bst_polygon_covers_free(&covers);
 }
 
