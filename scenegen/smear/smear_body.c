@@ -256,22 +256,76 @@ static bst_status find_factor(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
     return BST_OK;
 }
 
+/* Largest turn between poses of which the boxes are found, rad, if the body has no joints, is
+ * BOX_RANGE radii away or more, and its range changes by BOX_RANGE_CHANGE at most: between them a
+ * place is off the line by 1 / 8 of the square of the turn, of the radius. */
+#define BOX_TURN_RAD 0.28
+#define BOX_ROOM 0.01
+#define BOX_RANGE 20.0
+#define BOX_RANGE_CHANGE 0.01
+
+/* True if the boxes of some poses tell those of the others. */
+static bool may_skip_boxes(const bst_smear *s, const bst_scene_source *source,
+                           const bst_body_times *t) {
+    const bst_satellite *satellite = source->body->satellite;
+    double least_m = INFINITY, most_m = 0.0;
+    for (int k = 0; k < t->count; k++) {
+        bst_resolved_view view;
+        pose_at(s, source, t->u[k], NULL, &view, NULL, NULL);
+        least_m = fmin(least_m, view.origin_m.z);
+        most_m = fmax(most_m, view.origin_m.z);
+    }
+    return satellite->joint_count == 0 && least_m >= BOX_RANGE * satellite->radius_m &&
+           most_m <= (1.0 + BOX_RANGE_CHANGE) * least_m;
+}
+
 /* Box of the image over all poses; false: a pose has none, or all are off the sensor. */
 static bool find_box(const bst_smear *s, const bst_smear_body *b, const bst_scene_source *source,
                      const bst_body_times *t, double low[2], double high[2]) {
+    bool skip = t->count > 2 && may_skip_boxes(s, source, t);
+    double room = skip ? BOX_ROOM * bst_smear_radius_px(s, source) : 0.0, turn = 0.0;
+    /* of the body about the image of its origin, in all poses so far; and of the origin */
+    double about[2][2] = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
+    double origin[2][2] = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
+    bst_resolved_view view = {.scale_rad = 0.0}, next;
     low[0] = low[1] = INFINITY;
     high[0] = high[1] = -INFINITY;
+    pose_at(s, source, t->u[0], NULL, &next, NULL, NULL);
     for (int k = 0; k < t->count; k++) {
-        double from[2], to[2];
-        bst_resolved_view view;
-        pose_at(s, source, t->u[k], b->pose, &view, NULL, NULL);
-        if (!bst_resolved_box(b->pose, &view, from, to)) {
-            return false;
+        view = next;
+        double step = 0.0;
+        if (k + 1 < t->count) {
+            pose_at(s, source, t->u[k + 1], NULL, &next, NULL, NULL);
+            bst_quat d =
+                bst_quat_mul(next.q_image_from_body, bst_quat_conj(view.q_image_from_body));
+            step = bst_vec3_norm(bst_quat_to_rotvec(d));
+        }
+        double per_m = 1.0 / (view.origin_m.z * view.scale_rad);
+        const double at[2] = {view.origin_m.x * per_m, view.origin_m.y * per_m};
+        bool ends = k == 0 || k + 1 == t->count;
+        if (!skip || ends || turn + step > BOX_TURN_RAD) {
+            double from[2], to[2];
+            pose_at(s, source, t->u[k], b->pose, &view, NULL, NULL);
+            if (!bst_resolved_box(b->pose, &view, from, to)) {
+                return false;
+            }
+            for (int i = 0; i < 2; i++) {
+                about[0][i] = fmin(about[0][i], from[i] - at[i] - room);
+                about[1][i] = fmax(about[1][i], to[i] - at[i] + room);
+                low[i] = fmin(low[i], from[i]);
+                high[i] = fmax(high[i], to[i]);
+            }
+            turn = 0.0;
         }
         for (int i = 0; i < 2; i++) {
-            low[i] = fmin(low[i], from[i]);
-            high[i] = fmax(high[i], to[i]);
+            origin[0][i] = fmin(origin[0][i], at[i]);
+            origin[1][i] = fmax(origin[1][i], at[i]);
         }
+        turn += step;
+    }
+    for (int i = 0; i < 2 && skip; i++) {
+        low[i] = origin[0][i] + about[0][i];
+        high[i] = origin[1][i] + about[1][i];
     }
     return true;
 }

@@ -101,6 +101,16 @@ static inline void add_across(const row *r, const double x[2], const double y[2]
     }
 }
 
+/* The same for two neighbouring cells, from column i on: most edges cross no more. */
+static inline void add_to_two(const row *r, int i, const double x[2], const double y[2],
+                              double slope, double light) {
+    double border = i + 1.0, y_border = y[0] + (border - x[0]) * slope;
+    int from = x[1] > x[0] ? i : i + 1, to = x[1] > x[0] ? i + 1 : i;
+    y_border = y_border < y[0] ? y[0] : y_border > y[1] ? y[1] : y_border;
+    add_part(r, from, x[0] - from - 0.5, y[0], border - from - 0.5, y_border, light);
+    add_part(r, to, border - to - 0.5, y_border, x[1] - to - 0.5, y[1], light);
+}
+
 /* Adds an edge within a row of cells. */
 static inline void add_in_row(const row *r, const double x[2], const double y[2], double slope,
                               double light) {
@@ -115,6 +125,10 @@ static inline void add_in_row(const row *r, const double x[2], const double y[2]
     int first = low > 0.0 ? (int)low : 0; /* low is of any size below 0 */
     if (low >= 0.0 && high < first + 1.0) {
         add_part(r, first, x[0] - first - 0.5, y[0], x[1] - first - 0.5, y[1], light);
+        return;
+    }
+    if (low >= 0.0 && high < first + 2.0 && first + 1 < r->width) {
+        add_to_two(r, first, x, y, slope, light);
         return;
     }
     add_across(r, x, y, slope, light);

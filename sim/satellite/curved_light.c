@@ -102,10 +102,63 @@ static void add_zeros(breaks *b, wave w, double from) {
     }
 }
 
+/* A wave as level + x cos(azimuth) + y sin(azimuth). */
+typedef struct plain_wave {
+    double level, x, y;
+} plain_wave;
+
+static plain_wave plain_wave_of(const bst_curved *c, bst_vec3 d, double radial, double axial) {
+    return (plain_wave){axial * bst_vec3_dot(d, c->z), radial * bst_vec3_dot(d, c->x),
+                        radial * bst_vec3_dot(d, c->y)};
+}
+
+/* Adds the zeros of a wave, in [0, 2 pi). Returned: false if it is nowhere above 0. */
+static bool add_plain_zeros(breaks *b, plain_wave w) {
+    double height = hypot(w.x, w.y);
+    if (fabs(w.level) < height) {
+        add_zeros(b, (wave){w.level, height, atan2(w.y, w.x)}, 0.0);
+    }
+    return w.level + height > 0.0;
+}
+
+/* Integral of the product of two waves from azimuth 0 to one with that cosine and sine. */
+static double product_to(plain_wave a, plain_wave b, double azimuth, double c, double s) {
+    return (a.level * b.level + 0.5 * (a.x * b.x + a.y * b.y)) * azimuth +
+           a.level * (b.x * s + b.y * (1.0 - c)) + b.level * (a.x * s + a.y * (1.0 - c)) +
+           0.5 * ((a.x * b.x - a.y * b.y) * s * c + (a.x * b.y + a.y * b.x) * s * s);
+}
+
+/* By Lambert's law: the integral over the azimuths that are lit and in sight is elementary. */
+static double lambert_cone_light(const bst_curved *c, double diffuse, double radial, double axial,
+                                 bst_vec3 sun, bst_vec3 observer) {
+    plain_wave in = plain_wave_of(c, sun, radial, axial);
+    plain_wave out = plain_wave_of(c, observer, radial, axial);
+    breaks b = {{0.0, 2.0 * BST_PI}, 2};
+    if (!add_plain_zeros(&b, in) || !add_plain_zeros(&b, out)) {
+        return 0.0;
+    }
+    sort(&b);
+    double sum = 0.0;
+    for (int p = 0; p + 1 < b.count; p++) {
+        double from = b.at[p], to = b.at[p + 1], middle = 0.5 * (from + to);
+        double cm = cos(middle), sm = sin(middle);
+        if (in.level + in.x * cm + in.y * sm > 0.0 && out.level + out.x * cm + out.y * sm > 0.0) {
+            sum += product_to(in, out, to, cos(to), sin(to)) -
+                   product_to(in, out, from, cos(from), sin(from));
+        }
+    }
+    return diffuse / BST_PI * sum;
+}
+
+/* Light of a cylinder or cone. */
 static double cone_light(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun,
                          bst_vec3 observer) {
     double rise = c->top_radius_m - c->radius_m, slant = hypot(rise, c->length_m), sum = 0.0;
     double radial = c->side * c->length_m / slant, axial = -c->side * rise / slant;
+    double area = 0.5 * slant * (c->radius_m + c->top_radius_m); /* by azimuth */
+    if (brdf->model == BST_BRDF_LAMBERT) {
+        return area * lambert_cone_light(c, brdf->diffuse, radial, axial, sun, observer);
+    }
     double cosine = bst_vec3_dot(sun, observer), lobe = bst_brdf_lobe_rad(brdf);
     wave in = wave_of(c, sun, radial, axial), out = wave_of(c, observer, radial, axial);
     wave half = wave_of(c, bst_vec3_add(sun, observer), radial, axial);
@@ -140,7 +193,7 @@ static double cone_light(const bst_curved *c, const bst_brdf *brdf, bst_vec3 sun
             }
         }
     }
-    return 0.5 * slant * (c->radius_m + c->top_radius_m) * sum;
+    return area * sum;
 }
 
 double bst_curved_light(const bst_curved *curved, const bst_brdf *brdf, bst_vec3 sun,

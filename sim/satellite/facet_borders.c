@@ -125,9 +125,8 @@ static bool is_behind(const bst_facet_layers *l, const bst_layers_border *b, con
 
 bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *l, const bst_layers_box *box,
                                          const bst_layers_outline *own, const double plane[3]) {
-    int at[4];
+    const int *at = l->bins[box->facet];
     bst_layers_cross found = BST_LAYERS_CROSS_NONE;
-    bst_layers_range(l, box, BST_LAYERS_BIN, at);
     for (int j = at[2]; j <= at[3]; j++) {
         int first = l->border_first[j * l->bins_x + at[0]];
         int end = l->border_first[j * l->bins_x + at[1] + 1];

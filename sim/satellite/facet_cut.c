@@ -72,21 +72,72 @@ static int keep(bst_point2 *p, int count, const double c[3]) {
     return n >= 3 ? n : 0;
 }
 
+/* The sides of a facet in the view, counter-clockwise: from a corner along a way. */
+typedef struct outline_sides {
+    bst_point2 from[BST_LAYERS_CORNERS_MAX], way[BST_LAYERS_CORNERS_MAX];
+} outline_sides;
+
+/* Length of a side over the extent of its facet below which it has no direction. */
+static const double TINY = 1e-12;
+
+static void make_sides(const bst_layers_outline *o, outline_sides *out) {
+    double tiny = TINY * (o->high[0] - o->low[0] + o->high[1] - o->low[1]);
+    for (int i = 0; i < o->count; i++) {
+        bst_point2 a = o->p[i], b = o->p[i + 1 < o->count ? i + 1 : 0];
+        bst_point2 way = {b.x - a.x, b.y - a.y};
+        bool any = fabs(way.x) > tiny || fabs(way.y) > tiny;
+        out->from[i] = a;
+        out->way[i] = any ? way : (bst_point2){NAN, NAN}; /* separates nothing */
+    }
+}
+
+/* How far a place is to the left of a line, times the length of its part. */
+static inline double left_of(bst_point2 from, bst_point2 way, bst_point2 p) {
+    return way.x * (p.y - from.y) - way.y * (p.x - from.x);
+}
+
+/* True if a side of one of two facets has the other one on its outside: they do not overlap. */
+static bool is_beside(const bst_facet_layers *l, int facet, const bst_layers_outline *own,
+                      const outline_sides *sides) {
+    const int *corner = l->net->corner + l->net->first[facet];
+    int count = l->net->first[facet + 1] - l->net->first[facet];
+    for (int i = 0; i < own->count; i++) {
+        bool outside = !isnan(sides->way[i].x);
+        for (int k = 0; k < count && outside; k++) {
+            outside = left_of(sides->from[i], sides->way[i], l->at[corner[k]]) <= 0.0;
+        }
+        if (outside) {
+            return true;
+        }
+    }
+    for (int i = count - 1, last = 0; i >= 0; last = i--) { /* corners are clockwise */
+        bst_point2 a = l->at[corner[last]], b = l->at[corner[i]], way = {b.x - a.x, b.y - a.y};
+        bool outside = way.x != 0.0 || way.y != 0.0;
+        for (int k = 0; k < own->count && outside; k++) {
+            outside = left_of(a, way, own->p[k]) <= 0.0;
+        }
+        if (outside) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* What a facet hides of another one: the part where it is nearer, of their intersection or of all
  * of it.
  *
- * Given:     own, own_plane  the facet behind
+ * Given:     own, sides, own_plane  the facet behind
  * Returned:  number of corners in to[2 * BST_LAYERS_CORNERS_MAX] */
 static int hidden_part(const bst_facet_layers *l, int facet, int behind,
-                       const bst_layers_outline *own, const double own_plane[3], bst_point2 *to) {
+                       const bst_layers_outline *own, const outline_sides *sides,
+                       const double own_plane[3], bst_point2 *to) {
     bst_layers_outline other;
     bst_point2 work[2 * BST_LAYERS_CORNERS_MAX];
     double c[3], least = INFINITY, most = -INFINITY;
-    make_outline(l, facet, &other);
-    if (bst_polygon_is_separate(own->p, own->count, other.p, other.count) ||
-        !bst_facet_layers_plane(l, facet, c)) {
+    if (is_beside(l, facet, own, sides) || !bst_facet_layers_plane(l, facet, c)) {
         return 0;
     }
+    make_outline(l, facet, &other);
     if (other.least > own->most) { /* all of it that is before the facet */
         memcpy(to, other.p, (size_t)other.count * sizeof *to);
         return other.count;
@@ -192,10 +243,9 @@ static seen_part look_at_middle(const bst_facet_layers *l, const bst_layers_box 
 /* Finds it of a facet that others may cross. Unknown: one does, perhaps. */
 static seen_part look_at_all(const bst_facet_layers *l, const bst_layers_box *box,
                              const bst_layers_outline *own) {
-    int at[4];
+    const int *at = l->bins[box->facet];
     bst_point2 middle = middle_of(own);
     seen_part seen = SEEN_ALL;
-    bst_layers_range(l, box, BST_LAYERS_BIN, at);
     for (int j = at[2]; j <= at[3]; j++) {
         for (int i = j * l->bins_x + at[0]; i <= j * l->bins_x + at[1]; i++) {
             const bst_layers_box *b = &l->entries[l->bin_first[i]];
@@ -235,9 +285,10 @@ static seen_part look_within_borders(const bst_facet_layers *l, const bst_layers
 
 bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {
     bst_layers_outline own;
+    outline_sides sides;
     double plane[3];
     bool whole = true;
-    int at[4];
+    const int *at = l->bins[facet];
     const bst_layers_box *box = &l->boxes[facet];
     if (!bst_facet_layers_plane(l, facet, plane)) {
         return true;
@@ -248,7 +299,7 @@ bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {
     if (seen != SEEN_UNKNOWN) {
         return seen == SEEN_ALL;
     }
-    bst_layers_range(l, box, BST_LAYERS_BIN, at);
+    make_sides(&own, &sides);
     l->stamp++;
     l->seen[facet] = l->stamp;
     for (int n = 0; n < (at[1] - at[0] + 1) * (at[3] - at[2] + 1); n++) {
@@ -262,7 +313,7 @@ bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {
                 continue;
             }
             l->seen[b->facet] = l->stamp;
-            int corners = hidden_part(l, b->facet, facet, &own, plane, part);
+            int corners = hidden_part(l, b->facet, facet, &own, &sides, plane, part);
             if (corners < 3) {
                 continue;
             }

@@ -8,7 +8,7 @@
 enum { LEVELS = 4096 };
 
 /* Width about borders that counts as theirs, in cells: they may cross another one there. */
-static const double MARGIN = 1.0;
+static const double MARGIN = 0.01;
 
 void bst_facet_layers_free(bst_facet_layers *l) {
     free(l->at);
@@ -17,6 +17,7 @@ void bst_facet_layers_free(bst_facet_layers *l) {
     free(l->doubtful);
     free(l->crowded);
     free(l->boxes);
+    free(l->bins);
     free(l->order);
     free(l->crossings);
     free(l->sorted);
@@ -44,11 +45,12 @@ static bst_status reserve_facets(bst_ctx *ctx, bst_facet_layers *l, const bst_fa
     l->facing = calloc(facets, sizeof *l->facing);
     l->doubtful = calloc(facets, sizeof *l->doubtful);
     l->boxes = calloc(facets, sizeof *l->boxes);
+    l->bins = calloc(facets, sizeof *l->bins);
     l->order = calloc(facets, sizeof *l->order);
     l->seen = calloc(facets, sizeof *l->seen);
     l->chosen = calloc(facets, sizeof *l->chosen);
-    if (!l->at || !l->near || !l->facing || !l->doubtful || !l->boxes || !l->order || !l->seen ||
-        !l->chosen) {
+    if (!l->at || !l->near || !l->facing || !l->doubtful || !l->boxes || !l->bins || !l->order ||
+        !l->seen || !l->chosen) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the view of %d facets",
                         net->satellite->facet_count);
     }
@@ -172,14 +174,26 @@ static bst_status sort_crossings(bst_ctx *ctx, bst_facet_layers *l) {
     return BST_OK;
 }
 
+/* Sets bytes, of which there are often few. */
+static inline void set_bytes(uint8_t *bytes, int count, uint8_t as) {
+    enum { FEW = 8 };
+    if (count > FEW) {
+        memset(bytes, as, (size_t)count);
+        return;
+    }
+    for (int i = 0; i < count; i++) {
+        bytes[i] = as;
+    }
+}
+
 /* Marks the cells of a row from one place to another, and their bins. */
-static void mark(bst_facet_layers *l, int row, double from, double to, int as) {
+static void mark(bst_facet_layers *l, int row, double from, double to, uint8_t as) {
     int first = bst_layers_cell_of(from, l->width), end = bst_layers_cell_of(to, l->width);
     uint8_t *bins = l->marked + row / BST_LAYERS_BIN * l->bins_x;
-    memset(l->crowded + (size_t)row * (size_t)l->width + first, as, (size_t)(end - first + 1));
+    set_bytes(l->crowded + (size_t)row * (size_t)l->width + first, end - first + 1, as);
     first /= BST_LAYERS_BIN;
     end /= BST_LAYERS_BIN;
-    memset(bins + first, 1, (size_t)(end - first + 1));
+    set_bytes(bins + first, end - first + 1, 1);
 }
 
 /* Counts the layers along the rows: marks cells of several, and sets `outside` of the borders. */
@@ -287,15 +301,17 @@ static void make_boxes(bst_facet_layers *l) {
                                        f,
                                        (uint16_t)((l->level_from - near - l->same) * l->level_per),
                                        (uint16_t)((l->level_from - far + l->same) * l->level_per)};
-        l->order[l->order_count] = f;
-        l->order_count += off ? 0 : 1;
+        if (!off) {
+            bst_layers_range(l, &l->boxes[f], BST_LAYERS_BIN, l->bins[f]);
+            l->order[l->order_count++] = f;
+        }
     }
 }
 
-/* True if one of the bins of a box is marked. */
-static bool any_bin(const bst_facet_layers *l, const bst_layers_box *b, const uint8_t *marks) {
-    int at[4], found = 0;
-    bst_layers_range(l, b, BST_LAYERS_BIN, at);
+/* True if one of the bins of a facet is marked. */
+static bool any_bin(const bst_facet_layers *l, int facet, const uint8_t *marks) {
+    const int *at = l->bins[facet];
+    int found = 0;
     for (int j = at[2]; j <= at[3]; j++) {
         for (int i = at[0]; i <= at[1]; i++) {
             found |= marks[j * l->bins_x + i];
@@ -308,10 +324,9 @@ static bool any_bin(const bst_facet_layers *l, const bst_layers_box *b, const ui
 static void order_facets(bst_facet_layers *l) {
     int first[LEVELS + 1] = {0}, count = 0;
     for (int n = 0; n < l->order_count; n++) {
-        const bst_layers_box *b = &l->boxes[l->order[n]];
-        if (any_bin(l, b, l->needed)) {
+        if (any_bin(l, l->order[n], l->needed)) {
             l->chosen[count++] = l->order[n];
-            first[b->nearest + 1]++;
+            first[l->boxes[l->order[n]].nearest + 1]++;
         }
     }
     for (int i = 0; i < LEVELS; i++) {
@@ -336,12 +351,13 @@ static int marks_of(const bst_facet_layers *l, const bst_layers_box *b) {
     return marks;
 }
 
-/* Marks the bins of a box. */
-static void need_bins(bst_facet_layers *l, const bst_layers_box *b) {
-    int at[4];
-    bst_layers_range(l, b, BST_LAYERS_BIN, at);
+/* Marks the bins of a facet: few, for which calls of memset would take longer. */
+static void need_bins(bst_facet_layers *l, int facet) {
+    const int *at = l->bins[facet];
     for (int j = at[2]; j <= at[3]; j++) {
-        memset(l->needed + j * l->bins_x + at[0], 1, (size_t)(at[1] - at[0] + 1));
+        for (int i = at[0]; i <= at[1]; i++) {
+            l->needed[j * l->bins_x + i] = 1;
+        }
     }
 }
 
@@ -349,8 +365,7 @@ static void need_bins(bst_facet_layers *l, const bst_layers_box *b) {
 static void enter(bst_facet_layers *l, bool fill) {
     for (int n = 0; n < l->order_count; n++) {
         const bst_layers_box *b = &l->boxes[l->order[n]];
-        int at[4];
-        bst_layers_range(l, b, BST_LAYERS_BIN, at);
+        const int *at = l->bins[l->order[n]];
         for (int j = at[2]; j <= at[3]; j++) {
             for (int i = j * l->bins_x + at[0]; i <= j * l->bins_x + at[1]; i++) {
                 if (l->needed[i] && fill) {
@@ -398,12 +413,11 @@ bst_status bst_facet_layers_find(bst_ctx *ctx, bst_facet_layers *l, const uint8_
     memset(l->doubtful, 0, (size_t)l->net->satellite->facet_count);
     for (int n = 0; n < l->order_count; n++) {
         int f = l->order[n];
-        const bst_layers_box *b = &l->boxes[f];
-        if (wanted[f] && any_bin(l, b, l->marked)) {
-            l->doubtful[f] = (uint8_t)marks_of(l, b);
+        if (wanted[f] && any_bin(l, f, l->marked)) {
+            l->doubtful[f] = (uint8_t)marks_of(l, &l->boxes[f]);
         }
         if (l->doubtful[f]) {
-            need_bins(l, b);
+            need_bins(l, f);
             any = true;
         }
     }

@@ -48,6 +48,8 @@ typedef struct bst_facet_layers {
     /* work memory */
     uint8_t *crowded;               /* by cell: something may be hidden there */
     bst_layers_box *boxes;          /* by facet that faces the view */
+    int (*bins)[4];                 /* likewise: first and last column, first and last row of its
+                                       bins */
     int *order;                     /* facets that face the view; of those in the bins that are
                                        needed, the nearest first */
     int *chosen;                    /* facets in these bins */

@@ -59,7 +59,7 @@ static void add_sunlight(bst_satellite_pose *p, const bst_satellite_light *l, in
     const bst_facet *f = &p->satellite->facets[index];
     bst_vec3 n = p->normals[index];
     double in = bst_vec3_dot(n, l->sun), out = bst_vec3_dot(n, l->observer);
-    if (!(in > 1e-9) || !(out > 1e-9)) {
+    if (!((in > 1e-9) & (out > 1e-9))) { /* one branch: neither comparison is likely */
         return;
     }
     double area = bst_pose_unshadowed_area(p, index, 2);
@@ -77,30 +77,53 @@ static void add_sunlight(bst_satellite_pose *p, const bst_satellite_light *l, in
     s->sun[f->material] += area * last->light;
 }
 
+/* True if two curved surfaces have the same light without shadows: the same form and material, side
+ * by side. */
+static bool are_alike(const bst_curved *a, const bst_curved *b) {
+    return a->material == b->material && a->joint == b->joint && a->sphere == b->sphere &&
+           a->side == b->side && a->radius_m == b->radius_m && a->top_radius_m == b->top_radius_m &&
+           a->length_m == b->length_m && memcmp(&a->x, &b->x, sizeof a->x) == 0 &&
+           memcmp(&a->y, &b->y, sizeof a->y) == 0 && memcmp(&a->z, &b->z, sizeof a->z) == 0;
+}
+
+/* Light of a curved surface without shadows, m^2/sr. */
+static double light_of_curved(const bst_satellite_pose *p, const bst_satellite_light *l,
+                              const bst_sun_disc *disc, const bst_curved *c) {
+    const bst_material *m = &p->satellite->materials[c->material];
+    int nodes = bst_sun_disc_nodes(m, disc);
+    double sum = 0.0;
+    for (int k = 0; k < nodes; k++) {
+        bst_vec3 sun = nodes == 1 ? disc->centre : disc->direction[k];
+        bst_vec3 observer = l->observer;
+        if (c->joint >= 0) {
+            sun = bst_mat3_transpose_mul_vec(&p->rotation[c->joint], sun);
+            observer = bst_mat3_transpose_mul_vec(&p->rotation[c->joint], observer);
+        }
+        sum += (nodes == 1 ? 1.0 : disc->weight[k]) * bst_curved_light(c, &m->brdf, sun, observer);
+    }
+    return m->scale * sum;
+}
+
 /* Adds the curved surfaces: exact without shadows, times the free part of their facets. Returned:
  * estimate of the error. */
 static double add_curved(const bst_satellite_pose *p, const bst_satellite_light *l, sums *s) {
     const bst_satellite *sat = p->satellite;
-    double error = 0.0, share[CURVED_MAX];
+    const bst_curved *last = NULL; /* of which the light is known */
+    double error = 0.0, sum = 0.0, share[CURVED_MAX];
     if (s->lost) {
         share_of_curved(p, l, s, share);
     }
     for (int i = 0; i < sat->curved_count && i < CURVED_MAX; i++) {
         const bst_curved *c = &sat->curved[i];
         const bst_material *m = &sat->materials[c->material];
-        double free = !s->lost ? 1.0 : share[i] > 1e-12 ? share[i] : 0.0, sum = 0.0;
-        int nodes = free > 0.0 ? bst_sun_disc_nodes(m, &s->disc) : 0;
-        for (int k = 0; k < nodes; k++) {
-            bst_vec3 sun = nodes == 1 ? s->disc.centre : s->disc.direction[k];
-            bst_vec3 observer = l->observer;
-            if (c->joint >= 0) {
-                sun = bst_mat3_transpose_mul_vec(&p->rotation[c->joint], sun);
-                observer = bst_mat3_transpose_mul_vec(&p->rotation[c->joint], observer);
-            }
-            sum += (nodes == 1 ? 1.0 : s->disc.weight[k]) *
-                   bst_curved_light(c, &m->brdf, sun, observer);
+        double free = !s->lost ? 1.0 : share[i];
+        if (!(free > 1e-12)) {
+            continue;
         }
-        sum *= m->scale;
+        if (!last || !are_alike(last, c)) {
+            sum = light_of_curved(p, l, &s->disc, c);
+            last = c;
+        }
         s->sun[c->material] += free * sum;
         /* the shadow's border is that of facets, and the lobe may be on either side of it */
         double lobe = fmin(bst_brdf_lobe_rad(&m->brdf), 1.0);

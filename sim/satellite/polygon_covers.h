@@ -23,6 +23,10 @@ typedef struct bst_half_planes {
 typedef struct bst_polygon_covers {
     bst_half_plane *sides;
     bst_point2 *work;
+    bst_point2 *corners; /* of sets that have them: see bst_polygon_covers_corners */
+    int corner_first[BST_POLYGON_COVERS_MAX + 1]; /* likewise, as `first` */
+    int corner_sides[BST_POLYGON_COVERS_MAX +
+                     1];                   /* by set: sides of the polygon of these corners */
     int first[BST_POLYGON_COVERS_MAX + 1]; /* sides of set i: sides[first[i]] to sides[first[i + 1]
                                               - 1]; first[0] is 0 */
     int count;
@@ -37,8 +41,15 @@ void bst_polygon_covers_free(bst_polygon_covers *covers);
 
 /* Empties the list. */
 void bst_polygon_covers_clear(bst_polygon_covers *covers);
+/* Starts the next set again, if something was added to it. */
+void bst_polygon_covers_restart(bst_polygon_covers *covers);
 /* Adds a side to the next set of the list. False: there is no room. */
 bool bst_polygon_covers_add(bst_polygon_covers *covers, bst_half_plane side);
+/* Room for the corners, counter-clockwise, of a convex polygon that is the intersection of the
+ * sides of the next set so far, within any polygon of which the area is wanted: a set of many sides
+ * then costs less, because it is cut by the few sides of that. To be filled before
+ * bst_polygon_covers_end. NULL: there is none, which changes no area. */
+bst_point2 *bst_polygon_covers_corners(bst_polygon_covers *covers, int count);
 /* Ends the set that bst_polygon_covers_add began. False: the list is full. */
 bool bst_polygon_covers_end(bst_polygon_covers *covers);
 

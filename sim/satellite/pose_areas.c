@@ -47,6 +47,28 @@ static void add_sides(bst_satellite_pose *p, bst_pose_target *t, const bst_half_
     }
 }
 
+/* Sides of a silhouette that cross a facet from which on its corners are worth moving. */
+enum { MANY_SIDES = 12 };
+
+/* Gives the next cover the corners of a silhouette, in the coordinates of the facet. */
+static void add_corners(bst_satellite_pose *p, const bst_pose_target *t, int view, int occluder) {
+    static const double EDGE_ON = 1e-6; /* area over that of the square of its sides */
+    bst_point2 a = t->seen[0], b = t->seen[p->plane_corner[t->facet][0]],
+               c = t->seen[p->plane_corner[t->facet][1]];
+    double bx = b.x - a.x, by = b.y - a.y, cx = c.x - a.x, cy = c.y - a.y, area = bx * cy - by * cx;
+    const bst_point2 *outline;
+    int count = bst_pose_outline(p, view, occluder, &outline);
+    if (!(area > EDGE_ON * (bx * bx + by * by + cx * cx + cy * cy))) {
+        return;
+    }
+    bst_point2 *to = bst_polygon_covers_corners(&p->covers, count);
+    double per_area = 1.0 / area;
+    for (int i = 0; i < count && to; i++) {
+        double x = outline[i].x - a.x, y = outline[i].y - a.y;
+        to[i] = (bst_point2){(x * cy - y * cx) * per_area, (bx * y - by * x) * per_area};
+    }
+}
+
 /* Limits the next cover to what is behind a face of an occluder that faces the light.
  *
  * Given:     q, n  a point and the normal of the face
@@ -148,10 +170,13 @@ void bst_pose_area_subtract(bst_satellite_pose *p, bst_pose_target *t, int view,
     if (t->whole) {
         start(p, t);
     }
-    p->covers.pending = 0;
+    bst_polygon_covers_restart(&p->covers);
     add_sides(p, t, sides, crossing, count);
+    if (count >= MANY_SIDES && (front || by_faces)) {
+        add_corners(p, t, view, occluder);
+    }
     if (by_faces && !add_faces(p, t, v, o)) {
-        p->covers.pending = 0;
+        bst_polygon_covers_restart(&p->covers);
         return;
     }
     if (p->covers.pending == 0) {

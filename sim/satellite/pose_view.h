@@ -10,10 +10,11 @@ static inline int bst_pose_cell(const bst_pose_view *v, int axis, double x) {
     return c < 1.0 ? 0 : c >= v->cells ? v->cells - 1 : (int)c;
 }
 
-/* True if an occluder may hide a part of a facet, by the bounds of both. */
+/* True if an occluder may hide a part of a facet, by the bounds of both. One branch for all
+ * comparisons: none of them is likely. */
 static inline bool bst_pose_may_hide(const double occluder[6], const double facet[6]) {
-    return occluder[0] < facet[1] && occluder[1] > facet[0] && occluder[2] < facet[3] &&
-           occluder[3] > facet[2] && occluder[5] > facet[4];
+    return (occluder[0] < facet[1]) & (occluder[1] > facet[0]) & (occluder[2] < facet[3]) &
+           (occluder[3] > facet[2]) & (occluder[5] > facet[4]);
 }
 
 /* Empty bounds. */

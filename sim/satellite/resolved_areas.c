@@ -94,7 +94,7 @@ void bst_resolved_end_light(bst_resolved *r, double scale_rad) {
 }
 
 /* Places the vertices in the image and finds the facets that face the observer. */
-static bst_status look_from_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
+static bst_status face_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
     bst_resolved_areas *s = &a->r->areas;
     const bst_satellite *sat = a->r->satellite;
     bst_facet_layers *l = &s->eye;
@@ -111,7 +111,7 @@ static bst_status look_from_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
         l->facing[f] = bst_vec3_dot(a->pose->normals[f], bst_vec3_sub(a->eye_m, from)) > 0.0;
     }
     l->facing[sat->facet_count] = 0;
-    return bst_facet_layers_find(ctx, l, l->facing);
+    return BST_OK;
 }
 
 /* Light of the facets that face the observer, if nothing hides them from it. */
@@ -134,6 +134,19 @@ static void shade(const bst_resolved_adding *a) {
         s->from[0][f] = light.sun;
         s->from[1][f] = light.earth;
     }
+}
+
+/* Finds the facets with light that others may hide from the observer. */
+static bst_status look_from_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
+    bst_resolved_areas *s = &a->r->areas;
+    for (int f = 0; f < a->r->satellite->facet_count; f++) {
+        double light = s->even[f];
+        for (int n = 0; n < BST_RESOLVED_LIGHTS; n++) {
+            light += s->from[n][f];
+        }
+        s->wanted[f] = s->eye.facing[f] && light > 0.0;
+    }
+    return bst_facet_layers_find(ctx, &s->eye, s->wanted);
 }
 
 /* View from a light: a place in the body frame is at middle + per_m times its x and y. */
@@ -276,8 +289,9 @@ bst_status bst_resolved_add_areas(bst_ctx *ctx, const bst_resolved_adding *a, do
     bst_resolved_areas *s = &a->r->areas;
     const bst_satellite *sat = a->r->satellite;
     light_view views[BST_RESOLVED_LIGHTS];
-    BST_TRY(look_from_eye(ctx, a));
+    BST_TRY(face_eye(ctx, a));
     shade(a);
+    BST_TRY(look_from_eye(ctx, a));
     views[0] = light_view_of(a, a->light->sun);
     BST_TRY(look_from_light(ctx, a, 0, &views[0]));
     if (a->earth) {

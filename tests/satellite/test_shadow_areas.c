@@ -66,6 +66,12 @@ static void squares_have_closed_forms(void **state) {
     assert_int_equal(bst_polygon_place_of(b, 4, whole, 4), BST_POLYGON_CROSSING);
     const bst_point2 beside[] = SQUARE(4.5, 0.0, 1.0);
     assert_int_equal(bst_polygon_place_of(beside, 4, whole, 4), BST_POLYGON_APART);
+    /* through two corners, which stay, and cut the first one off; then x >= 1 */
+    bst_polygon_covers_clear(&covers);
+    assert_true(bst_polygon_covers_add(&covers, (bst_half_plane){1.0, 1.0, -4.0}));
+    assert_true(bst_polygon_covers_add(&covers, (bst_half_plane){1.0, 0.0, -1.0}));
+    assert_true(bst_polygon_covers_end(&covers));
+    bst_assert_close(bst_polygon_uncovered_area(&covers, whole, 4), 8.5, 1e-14);
     bst_polygon_covers_free(&covers);
 }
 
@@ -101,6 +107,68 @@ static void intersections_agree_with_pieces(void **state) {
     assert_true(given_up > 0 && given_up < 1000);
     bst_polygon_covers_free(&covers);
     bst_polygon_clip_free(&clip);
+}
+
+/* Adds a polygon of many corners that another half plane cuts, with its corners or without. */
+static void add_round(bst_polygon_covers *covers, const bst_point2 *points, int count,
+                      bst_half_plane cut, bool with_corners) {
+    bst_half_planes blocks[16];
+    assert_true(bst_half_planes_of(points, count, blocks) <= 16);
+    for (int i = 0; i < count; i++) {
+        const bst_half_planes *b = &blocks[i / BST_HALF_PLANES];
+        int k = i % BST_HALF_PLANES;
+        assert_true(bst_polygon_covers_add(covers, (bst_half_plane){b->u[k], b->v[k], b->w[k]}));
+    }
+    bst_point2 *to = with_corners ? bst_polygon_covers_corners(covers, count) : NULL;
+    assert_true(to || !with_corners);
+    for (int i = 0; i < count && to; i++) {
+        to[i] = points[i];
+    }
+    assert_true(bst_polygon_covers_add(covers, cut));
+}
+
+/* Sets of many sides are cut by the polygon, if their corners are known, in place of the other way
+ * round. */
+static void corners_of_sets_change_no_area(void **state) {
+    enum { CORNERS = 48, SETS = 3 };
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_polygon_covers with, without;
+    bst_assert_ok(&ctx, bst_polygon_covers_create(&ctx, &with));
+    bst_assert_ok(&ctx, bst_polygon_covers_create(&ctx, &without));
+    uint64_t random = 6;
+    int partial = 0;
+    for (int i = 0; i < 500; i++) {
+        bst_point2 whole[20], round[CORNERS], other[CORNERS];
+        int n = random_polygon(&random, whole);
+        bst_polygon_covers_clear(&with);
+        bst_polygon_covers_clear(&without);
+        for (int set = 0; set < SETS; set++) {
+            double x = 2.0 * bst_test_uniform(&random), y = 2.0 * bst_test_uniform(&random);
+            double radius = 0.1 + 0.6 * bst_test_uniform(&random);
+            double angle = 2.0 * BST_PI * bst_test_uniform(&random);
+            for (int k = 0; k < CORNERS; k++) {
+                double a = 2.0 * BST_PI * k / CORNERS + angle;
+                round[k] = (bst_point2){x + radius * cos(a), y + 0.7 * radius * sin(a)};
+                other[k] = (bst_point2){round[k].x + 0.5, round[k].y};
+            }
+            const bst_half_plane cut = {cos(angle), sin(angle),
+                                        0.3 * radius - x * cos(angle) - y * sin(angle)};
+            add_round(&with, other, CORNERS, cut, true);
+            bst_polygon_covers_restart(&with); /* forgets the corners, too */
+            add_round(&with, round, CORNERS, cut, set != 1);
+            add_round(&without, round, CORNERS, cut, false);
+            assert_true(bst_polygon_covers_end(&with));
+            assert_true(bst_polygon_covers_end(&without));
+        }
+        double area = bst_polygon_uncovered_area(&with, whole, n);
+        /* sums of a few areas about 1 */
+        bst_assert_close(area, bst_polygon_uncovered_area(&without, whole, n), 1e-13);
+        partial += area > 1e-9 && area < bst_polygon_area(whole, n) - 1e-9;
+    }
+    assert_true(partial > 200);
+    bst_polygon_covers_free(&with);
+    bst_polygon_covers_free(&without);
 }
 
 /* Half planes that do not cross a polygon do not change the area. */
@@ -265,6 +333,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(squares_have_closed_forms),
         cmocka_unit_test(intersections_agree_with_pieces),
+        cmocka_unit_test(corners_of_sets_change_no_area),
         cmocka_unit_test(crossing_sides_suffice),
         cmocka_unit_test(areas_agree_with_pieces),
         cmocka_unit_test(many_corners_hide_a_whole_facet),

@@ -431,6 +431,41 @@ static void test_joint_at_a_burn(void **state) {
     assert_true(before > 300.0);
 }
 
+/* A beam that turns about the line of sight keeps its light, up to its ends: of many poses, few
+ * tell how far the image reaches. */
+static void test_turning_beam(void **state) {
+    enum { TIMES = 17 };
+    fixture *f = *state;
+    bst_camera camera = small_camera();
+    static const char beam[] =
+        MATERIAL "\"kind\": \"plate\", \"size_m\": [3.4, 0.1, 0], \"material\": \"m\"}]}";
+    static float images[2][SIDE * SIDE];
+    const double place[2] = {63.2, 64.45}, sun[3] = {0.0, 0.0, 1.0};
+    double sum[2] = {0.0}, ends[2] = {0.0};
+    bst_quat q = bst_quat_from_rotvec((bst_vec3){BST_PI, 0.0, 0.0});
+    scene s;
+    make_scene(&s, &camera, beam, q, place, sun, 1e4);
+    for (int n = 0; n < 2; n++) { /* at rest, turning by 2 rad */
+        bst_render_stats stats;
+        s.body.times = n == 0 ? 1 : TIMES;
+        for (int k = 0; k < s.body.times; k++) {
+            bst_vec3 turn = {0.0, 0.0, n == 0 ? 0.0 : 0.4 + 2.0 * k / (TIMES - 1)};
+            s.body.q_body_from_gcrf[k] = bst_quat_conj(bst_quat_mul(bst_quat_from_rotvec(turn), q));
+        }
+        draw(f, &camera, &s.source, images[n], &stats);
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            double x = i % SIDE - place[0], y = (double)(i / SIDE) - place[1];
+            sum[n] += (double)images[n][i];
+            ends[n] += hypot(x, y) > 0.85 * 1.7 * PX_PER_M ? (double)images[n][i] : 0.0;
+        }
+    }
+    /* solid angles differ by the cosine of the angle from the axis, 0.1 degrees */
+    bst_assert_close(sum[1], sum[0], 1e-3 * sum[0]);
+    assert_true(ends[0] > 0.1 * sum[0]);
+    bst_assert_close(ends[1], ends[0], 2e-3 * sum[0]); /* pixels on the circle */
+    bst_test_model_close(&s.model);
+}
+
 /* A plate covers a star from mid-exposure on: its trail is that of the first half. */
 static void test_star_behind_a_plate(void **state) {
     fixture *f = *state;
@@ -474,8 +509,8 @@ static void test_star_behind_a_plate(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_hand_over), cmocka_unit_test(test_boxes),
-        cmocka_unit_test(test_joint_at_a_burn), cmocka_unit_test(test_star_behind_a_plate),
-        cmocka_unit_test(test_sphere_and_cylinder)};
+        cmocka_unit_test(test_hand_over),           cmocka_unit_test(test_boxes),
+        cmocka_unit_test(test_turning_beam),        cmocka_unit_test(test_joint_at_a_burn),
+        cmocka_unit_test(test_star_behind_a_plate), cmocka_unit_test(test_sphere_and_cylinder)};
     return cmocka_run_group_tests(tests, open_device, close_device);
 }
