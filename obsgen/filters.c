@@ -227,7 +227,8 @@ void bst_generator_set_filters(bst_generator *g) {
                        : fmax(bst_threshold_quantile(g->threshold, &weights, &law), g->threshold);
         filter->variance = output_variance(g, &paths[k], columns, rows);
         double share = lengths[k] > g->filter_sigma ? LINE_SHOT : POINT_SHOT;
-        filter->shot = share * bst_crlb_table_norm(&g->bound, lengths[k]) / g->noise_e;
+        filter->shot = share * bst_camera_excess_noise(g->camera) *
+                       bst_crlb_table_norm(&g->bound, lengths[k]) / g->noise_e;
         if (!(g->streak > 0.0)) {
             g->filters[1] = g->filters[0];
             break;

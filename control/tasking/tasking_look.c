@@ -175,8 +175,8 @@ bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int 
 void bst_tasking_noise(bst_tasking_sensor *s) {
     const bst_camera *camera = bst_knowledge_camera(s->knowledge);
     double sigma2 = bst_camera_psf_sigma_px(camera) * bst_camera_psf_sigma_px(camera) + 1.0 / 12.0;
-    double light = bst_camera_background_e_per_s(camera) + bst_camera_dark_e_per_s(camera);
-    s->noise_e = sqrt(light * s->exposure_s + camera->read_noise_e * camera->read_noise_e);
+    s->noise_e = bst_camera_noise_e(camera, bst_camera_background_e_per_s(camera) * s->exposure_s,
+                                    s->exposure_s);
     s->pixels = 1.0 / bst_optics_image_squared(sqrt(sigma2), sqrt(sigma2), 0.0);
 }
 

@@ -20,14 +20,15 @@ static const uint64_t BEND_ERROR = (uint64_t)1 << 55;
 static double snr2_of_stars(const bst_generator *g, const bst_truth *t) {
     double best[MOST_STARS] = {0.0}, sum = 0.0;
     double read_e = g->camera->read_noise_e, added = (double)g->binning * g->binning;
-    double variance = added * (t->background_e + t->dark_e) + read_e * read_e;
+    double excess = bst_camera_excess_noise(g->camera);
+    double variance = excess * added * (t->background_e + t->dark_e) + read_e * read_e;
     double norm = bst_crlb_table_norm(&g->bound, g->streak);
     for (int i = 0; i < t->count; i++) {
         const bst_truth_item *item = &t->items[i];
         bool used = item->kind == BST_SOURCE_STAR && item->snr > LEAST_SNR &&
                     (item->flags & BST_TRUTH_IN_FIELD) && !(item->flags & BST_TRUTH_SATURATED);
         /* the brightest pixel of a long line is sqrt(2) sum p^2 of its light */
-        double own = sqrt(2.0) * item->electrons * norm * norm / fmax(variance, 1e-6);
+        double own = excess * sqrt(2.0) * item->electrons * norm * norm / fmax(variance, 1e-6);
         double snr2 = item->snr * item->snr / (1.0 + own);
         if (!used || snr2 <= best[MOST_STARS - 1]) {
             continue;

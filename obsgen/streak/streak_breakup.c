@@ -279,7 +279,8 @@ static void set_alarms(bst_generator *g) {
     struct generator_streaks *w = g->streaks;
     /* the squared filter averages a line's electrons over 1 / (sqrt(3 pi) S) px; they equal output
      * times pixel noise */
-    w->shot = 1.0 / (sqrt(3.0 * BST_PI) * g->total_sigma * g->noise_e);
+    w->shot =
+        bst_camera_excess_noise(g->camera) / (sqrt(3.0 * BST_PI) * g->total_sigma * g->noise_e);
     if (w->maxima_sigma != g->filter_sigma) {
         for (int i = 0; i < OUTPUTS; i++) {
             w->log_maxima[i] = log(bst_matched_pixel_maxima(g->filter_sigma, 1.0 + i / 8.0));

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 #include "bst_scenegen_kernels.h"
+#include "scenegen/detector/multiplication.h"
 #include "scenegen/scene_kernels.h"
 
 enum { TRANSFER, CHARGE, BLOOM, MARK, READ, NEIGHBOURS, PARALLEL, SERIAL, CROSSTALK, KERNELS };
@@ -17,6 +18,7 @@ struct bst_readout {
     cl_command_queue queue;
     cl_kernel kernels[KERNELS];
     cl_mem image, over, full;
+    cl_mem multiplication; /* table of the register, NULL without one */
     size_t bytes;
 };
 
@@ -60,6 +62,13 @@ bst_status bst_readout_prepare(bst_ctx *ctx, bst_readout *r) {
     static const bst_device_kernel_source *const moving[] = {
         &bst_kernel_scene_shared, &bst_kernel_lanes, &bst_kernel_charge_transfer,
         &bst_kernel_charge_coupling};
+    if (r->camera.detector.em_gain > 1.0 && !r->multiplication) {
+        float table[BST_MULTIPLICATION_FLOATS];
+        bst_multiplication_table(table);
+        BST_TRY(bst_device_buffer(ctx, r->context, sizeof table, table,
+                                  "allocating the table of the multiplication register",
+                                  &r->multiplication));
+    }
     char options[64];
     snprintf(options, sizeof options, "-cl-std=CL1.2%s", bst_detector_tail_options(&r->camera));
     for (int i = 0; i < KERNELS; i++) {
@@ -109,6 +118,9 @@ void bst_readout_free(bst_readout *r) {
     }
     if (r->full) {
         clReleaseMemObject(r->full);
+    }
+    if (r->multiplication) {
+        clReleaseMemObject(r->multiplication);
     }
     clReleaseCommandQueue(r->queue);
     clReleaseContext(r->context);
@@ -286,7 +298,8 @@ bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *det
     BST_TRY(enqueue_kernel(ctx, r, CHARGE, (arguments){&p, sizeof p, charge, 5}, rows));
     BST_TRY(move_charge(ctx, r, &p));
     p.per_full_well /= (float)(binning * binning);
-    cl_mem read[] = {r->image, frame, saturated, maps[3], maps[4], maps[5], r->full};
-    return enqueue_kernel(ctx, r, READ, (arguments){&p, sizeof p, read, 7},
+    cl_mem read[] = {r->image, frame,   saturated, maps[3],
+                     maps[4],  maps[5], r->full,   r->multiplication};
+    return enqueue_kernel(ctx, r, READ, (arguments){&p, sizeof p, read, 8},
                           (size_t)p.window_height);
 }

@@ -3,8 +3,20 @@
 /* Charge that a neighbour's charge n moves into a pixel of charge q; the neighbour loses the same. A
  * border moves by a quarter of a pixel at most: four of them take no more than a pixel has. */
 INLINE float16 inflow(bst_kernel_coupling_params p, float16 q, float16 n) {
-    float16 moved_px = clamp(p.shift * (n - q), -0.25f, 0.25f);
+    float16 moved_px = p.shift * (n - q); /* comparisons, because clamp() also handles NaN */
+    moved_px = moved_px > 0.25f ? 0.25f : moved_px;
+    moved_px = moved_px < -0.25f ? -0.25f : moved_px;
     return fma(0.5f * moved_px, n + q, p.coupling * (n - q));
+}
+
+/* What 16 pixels gain from their four neighbours. */
+INLINE float16 gain_of(bst_kernel_coupling_params p, float16 q, float16 left, float16 right, float16 down,
+                       float16 up) {
+    if (p.shift == 0.0f) { /* the same without products with 0 */
+        return p.coupling * (left - q) + p.coupling * (right - q) +
+               (p.coupling * (down - q) + p.coupling * (up - q));
+    }
+    return (inflow(p, q, left) + inflow(p, q, right)) + (inflow(p, q, down) + inflow(p, q, up));
 }
 
 /* Coupling of neighbours, and borders that move away from charge: from -> to. The sum of the charge
@@ -22,6 +34,13 @@ __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_d
     global const float *above = real && y + 1 < p.y1 ? row + p.stride : row;
     for (int x = 0; x < p.width; x += 16) {
         float16 q = vload16(0, row + x), left, right;
+        if (real && x > p.x0 && x + 16 < p.x1) { /* with all neighbours */
+            float16 sum = gain_of(p, q, vload16(0, row + x - 1), vload16(0, row + x + 1),
+                                  vload16(0, below + x), vload16(0, above + x));
+            sum += q;
+            vstore16(sum > 0.0f ? sum : 0.0f, 0, to + (size_t)y * p.stride + x);
+            continue;
+        }
         if (x > 0 && x + 16 < p.width) {
             left = vload16(0, row + x - 1);
             right = vload16(0, row + x + 1);
@@ -34,7 +53,7 @@ __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_d
         left = select(left, q, column <= p.x0);
         right = select(right, q, column + 1 >= p.x1);
         float16 down = vload16(0, below + x), up = vload16(0, above + x);
-        float16 sum = (inflow(p, q, left) + inflow(p, q, right)) + (inflow(p, q, down) + inflow(p, q, up));
+        float16 sum = gain_of(p, q, left, right, down, up);
         int16 changes = column >= p.x0 & column < p.x1 & (int16)-real;
         vstore16(select(q, fmax(q + sum, 0.0f), changes), 0, to + (size_t)y * p.stride + x);
     }

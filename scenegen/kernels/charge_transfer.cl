@@ -10,14 +10,15 @@
 /* 2^x for |x| < 126, to 2e-7: a polynomial for the fraction (Taylor's, by Horner), the exponent's
  * bits for the rest. */
 INLINE float16 power_of_two(float16 x) {
-    float16 whole = rint(x), f = (x - whole) * 0.69314718f;
+    float16 shifted = x + 12582912.0f; /* 1.5 x 2^23: rounds to whole numbers */
+    float16 f = (x - (shifted - 12582912.0f)) * 0.69314718f;
     float16 y = fma(f, fma(f, fma(f, fma(f, fma(f, (float16)(1.0f / 720), (float16)(1.0f / 120)),
                                          (float16)(1.0f / 24)),
                                   (float16)(1.0f / 6)),
                            (float16)0.5f),
                     (float16)1.0f);
     y = fma(f, y, (float16)1.0f);
-    return as_float16(as_int16(y) + (convert_int16(whole) << 23));
+    return as_float16(as_int16(y) + (as_int16(shifted) << 23));
 }
 
 /* Logarithm to base 2 of v > 0: exponent, and 2 atanh(s), s = (m - 1) / (m + 1), of the mantissa m in
@@ -33,11 +34,15 @@ INLINE float16 log_two(float16 v) {
 
 /* A packet of 16 columns or rows on its way to the output. held: charge in the traps. */
 INLINE float16 pass_traps(bst_kernel_trap_params p, float transfers, float16 q, float16 *held) {
-    for (int k = 0; k < p.kinds; k++) {
-        float16 least = fmax(q, TRAP_LEAST);
+#pragma unroll
+    for (int k = 0; k < BST_TRAP_KINDS; k++) {
+        if (k >= p.kinds) { /* unrolled, so that the traps stay in registers */
+            break;
+        }
+        float16 least = q > TRAP_LEAST ? q : TRAP_LEAST;
         float16 g = transfers * p.density[k] * power_of_two((p.exponent - 1.0f) * log_two(least));
-        float16 caught = fmax(fma(g, q, -held[k]) / (g + 1.0f), 0.0f);
-        caught = select((float16)0.0f, caught, q > TRAP_LEAST);
+        float16 caught = fma(g, q, -held[k]) / (g + 1.0f);
+        caught = select((float16)0.0f, caught, (q > TRAP_LEAST) & (caught > 0.0f));
         held[k] += caught;
         float16 released = held[k] * p.release[k];
         held[k] -= released;
@@ -48,8 +53,9 @@ INLINE float16 pass_traps(bst_kernel_trap_params p, float transfers, float16 q, 
 
 /* True if a packet or its traps hold charge worth following. */
 INLINE int has_charge(bst_kernel_trap_params p, float16 q, const float16 *held) {
-    for (int k = 0; k < p.kinds; k++) {
-        q = fmax(q, held[k]);
+#pragma unroll
+    for (int k = 0; k < BST_TRAP_KINDS; k++) { /* those of absent kinds are empty */
+        q = q > held[k] ? q : held[k];
     }
     return any_of(q > TRAP_LEAST);
 }

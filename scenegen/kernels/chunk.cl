@@ -21,7 +21,7 @@ typedef struct chunk_flags {
 #define STREAM_POISSON 1u
 #define STREAM_POISSON_NORMAL 2u
 #define STREAM_TAIL 3u
-#define STREAM_MULTIPLY 4u /* and all from here on */
+#define STREAM_MULTIPLY 4u
 
 INLINE chunk load_chunk(global const float *from) {
     global const lanes *v = (global const lanes *)from;

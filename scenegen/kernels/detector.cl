@@ -31,27 +31,34 @@ INLINE lanes first_chance(lanes mean) {
     return exp(-fmin(mean, POISSON_SWITCH)) * (0x1p32f * (1.0f - 2e-6f));
 }
 
+/* convert_uint of 0 <= p < 2^32, by the signed conversion that processors have. */
+INLINE lanes_uint chance_of(lanes p) {
+    lanes_int high = MASK(p >= 0x1p31f);
+    lanes_int low = to_lanes_int(p - select((lanes)0.0f, (lanes)0x1p31f, high));
+    return as_lanes_uint(low) + (as_lanes_uint(high) & 0x80000000u);
+}
+
 /* Poisson deviates of mean < POISSON_SWITCH by sequential search of the distribution (Devroye 1986,
  * III.2), in integers, all lanes in step; lanes outside `wanted` give 0. The words left over by
  * rounding (2e-6 of them) give the mean. */
 INLINE lanes poisson_search(lanes mean, lanes_uint word, lanes_int wanted) {
-    lanes count = (lanes)0.0f, p = first_chance(mean);
-    lanes_uint rest = word;
-    lanes_int active = wanted;
-    for (int k = 0; any_of(active) && k < 200;) {
+    lanes p = first_chance(mean);
+    /* numbers with the sign bit flipped: signed comparisons are those of the unsigned numbers */
+    lanes_int sum = as_lanes_int((lanes_uint)0x80000000u), above = as_lanes_int(word ^ 0x80000000u);
+    lanes_int active = wanted, count = (lanes_int)0, left = (lanes_int)0;
+    for (int k = 0; any_of(active & ~left) && k < 200;) {
+        lanes_uint chance = (lanes_uint)0u;
         for (int step = 0; step < 4; step++) { /* finished lanes ignore surplus steps */
-            lanes_uint chance = to_lanes_uint(p);
-            active &= as_lanes_int(MASK(rest > chance));
-            lanes_int end = MASK((chance == 0u) & (mean < (float)k));
-            count = select(count, floor(mean), active & end);
-            active &= ~end;
+            chance = chance_of(p);
+            sum += as_lanes_int(chance);
+            active &= MASK(above > sum);
+            count -= active;
             k++;
-            rest = select(rest, rest - chance, as_lanes_uint(active));
-            count = select(count, (lanes)(float)k, active);
             p *= mean * (1.0f / (float)k);
         }
+        left = MASK(chance == 0u) & MASK(mean < (float)(k - 1));
     }
-    return count;
+    return select(to_lanes(count), floor(mean), active & left);
 }
 
 /* Poisson deviates of mean >= POISSON_SWITCH from a standard normal: the floor of the

@@ -54,6 +54,33 @@ READOUT_GROUP kernel void bst_detector_transfer(bst_kernel_frame_params p, globa
     }
 }
 
+/* Charges of a chunk of given means, as draw_charge gives them, from the random words that they need:
+ * one for each small mean, a normal deviate for the others. */
+INLINE void draw_charges(bst_kernel_frame_params p, uint counter, const lanes *mean, lanes *drawn) {
+    lanes least = fmin(fmin(mean[0], mean[1]), fmin(mean[2], mean[3]));
+    lanes most = fmax(fmax(mean[0], mean[1]), fmax(mean[2], mean[3]));
+    int few = any_of(MASK(least < POISSON_SWITCH)), many = any_of(MASK(most >= POISSON_SWITCH));
+    if (many) {
+        chunk n = chunk_normal(chunk_random(p, counter, STREAM_POISSON_NORMAL));
+        drawn[0] = poisson_expand(mean[0], n.a);
+        drawn[1] = poisson_expand(mean[1], n.b);
+        drawn[2] = poisson_expand(mean[2], n.c);
+        drawn[3] = poisson_expand(mean[3], n.d);
+    }
+    if (few) {
+        chunk_words words = chunk_random(p, counter, STREAM_POISSON);
+        lanes_uint w[4] = {words.a, words.b, words.c, words.d};
+        KEEP_LOOP
+        for (int v = 0; v < 4; v++) {
+            lanes_int small = MASK(mean[v] < POISSON_SWITCH);
+            if (any_of(small)) {
+                lanes found = poisson_search(mean[v], w[v], small);
+                drawn[v] = many ? select(drawn[v], found, small) : found;
+            }
+        }
+    }
+}
+
 /* Replaces the light of every pixel by its charge. One work-item per row. */
 READOUT_GROUP kernel void bst_detector_charge(bst_kernel_frame_params p, global float *image, global const float *gain,
                                 global const float *dark, global const float *overlay,
@@ -73,15 +100,12 @@ READOUT_GROUP kernel void bst_detector_charge(bst_kernel_frame_params p, global 
             m = expected_chunk(p, maps, map, m);
         }
         m = add_dark(p, maps, map, m);
-        chunk_words w = chunk_random(p, counter, STREAM_POISSON);
-        chunk n = chunk_normal(chunk_random(p, counter, STREAM_POISSON_NORMAL));
-        float16 mean[4] = {m.a, m.b, m.c, m.d}, normal[4] = {n.a, n.b, n.c, n.d}, drawn[4];
-        uint16 words[4] = {w.a, w.b, w.c, w.d};
+        lanes mean[4] = {m.a, m.b, m.c, m.d}, drawn[4];
+        draw_charges(p, counter, mean, drawn);
         KEEP_LOOP
         for (int v = 0; v < 4; v++) {
-            drawn[v] = draw_charge(mean[v], words[v], normal[v], (int16)-1);
             if (HAS(p, BST_EFFECT_OVERLAY)) {
-                drawn[v] += ((global const float16 *)(overlay + map))[v];
+                drawn[v] += ((global const lanes *)(overlay + map))[v];
             }
             if (!HAS(p, BST_EFFECT_BLOOM)) {
                 drawn[v] = fmin(drawn[v], p.full_well_e);
@@ -101,27 +125,40 @@ READOUT_GROUP kernel void bst_detector_bloom(bst_kernel_frame_params p, global f
         return;
     }
     float16 carry = (float16)0.0f, full = (float16)p.full_well_e;
+    int first = p.light_height; /* row of the first excess; most columns have none */
     for (int y = 0; y < p.light_height; y++) { /* towards larger y */
         global float16 *at = (global float16 *)(image + (size_t)y * p.light_stride + x);
-        global float16 *half_at = (global float16 *)(over + (size_t)y * p.light_stride + x);
-        float16 q = *at, excess = 0.5f * fmax(q - full, 0.0f);
+        float16 q = *at;
+        if (first == p.light_height && !any_of(q > full)) {
+            continue;
+        }
+        float16 excess = 0.5f * fmax(q - full, 0.0f);
         q = fmin(q, full);
         if (y < p.real_y0 || y >= p.real_y1) {
             *at = q;
             continue;
         }
+        first = min(first, y);
         float16 take = fmin(full - q, carry);
         *at = q + take;
-        *half_at = excess;
+        *(global float16 *)(over + (size_t)y * p.light_stride + x) = excess;
         carry = carry - take + excess;
+    }
+    if (first == p.light_height) {
+        return;
     }
     carry = (float16)0.0f;
     for (int y = p.real_y1 - 1; y >= p.real_y0; y--) {
+        if (y < first && !any_of(carry > 0.0f)) {
+            break;
+        }
         global float16 *at = (global float16 *)(image + (size_t)y * p.light_stride + x);
-        global float16 *half_at = (global float16 *)(over + (size_t)y * p.light_stride + x);
         float16 q = *at, take = fmin(full - q, carry);
         *at = q + take;
-        carry = carry - take + *half_at;
+        carry -= take;
+        if (y >= first) {
+            carry += *(global const float16 *)(over + (size_t)y * p.light_stride + x);
+        }
     }
 }
 
@@ -140,72 +177,120 @@ READOUT_GROUP kernel void bst_detector_mark(bst_kernel_frame_params p, global co
 }
 
 #ifdef MULTIPLY
-/* Twice the natural logarithm of v > 0, as log_radius2. */
-INLINE lanes log_square(lanes v) {
-    lanes_int bits = as_lanes_int(v) - 0x3F3504F3; /* sqrt(1/2) */
-    lanes m = as_lanes((bits & 0x007FFFFF) + 0x3F3504F3);
-    lanes s = (m - 1.0f) / (m + 1.0f), q = s * s;
-    lanes series = fma(q, fma(q, fma(q, (lanes)(4.0f / 7), (lanes)(4.0f / 5)), (lanes)(4.0f / 3)),
-                       (lanes)4.0f);
-    return fma(to_lanes(bits >> 23), (lanes)1.38629436f, s * series);
+/* Quantile of the gamma distribution of shape n at that of the normal one, z: Cornish and Fisher's
+ * expansion to n^(-3/2) (Abramowitz and Stegun 26.2.49 with the cumulants n (r - 1)!). */
+INLINE lanes gamma_expand(lanes n, lanes z) {
+    lanes a = inverse_root(n), q = z * z;
+    lanes c1 = z * fma(q, (lanes)(1.0f / 36), (lanes)(-7.0f / 36));
+    lanes c2 = fma(q, fma(q, (lanes)(-3.0f / 810), (lanes)(-7.0f / 810)), (lanes)(16.0f / 810));
+    lanes c3 = z * fma(q, fma(q, (lanes)(9.0f / 38880), (lanes)(256.0f / 38880)),
+                       (lanes)(-433.0f / 38880));
+    lanes rest = fma(a, fma(a, fma(a, c3, c2), c1), fma(q, (lanes)(1.0f / 3), (lanes)(-1.0f / 3)));
+    return n + fma(n * a, z, rest);
 }
 
-/* One turn for gamma deviates of the shapes n, whole numbers from 1 on: rejection without a squeeze
- * (Marsaglia and Tsang 2000, ACM TOMS 26, 363), accepted with more than 95 %. */
-INLINE lanes gamma_turn(lanes n, lanes_uint word, lanes z, lanes_int *accepted) {
-    lanes d = n - 1.0f / 3, t = fma(z * (1.0f / 3), inverse_root(d), (lanes)1.0f);
-    lanes v = t * t * t, log_u2 = -log_radius2(word); /* twice the logarithm of a uniform number */
-    lanes safe = clamp(v, 1e-6f, 100.0f);
-    lanes log_v2 = log_square(safe);
-    *accepted = MASK((v > 1e-6f) & (log_u2 < fma(z, z, d * (2.0f - 2.0f * v + log_v2))));
-    return d * v;
+/* What the expansion lacks of the quantiles of few electrons, by linear interpolation in the table
+ * of multiplication.h. */
+INLINE lanes gamma_lacks(global const float *table, lanes n, lanes z) {
+    const float per_step = BST_MULTIPLY_STEPS / (2.0f * BST_MULTIPLY_REACH);
+    lanes at = fma(z, (lanes)per_step, (lanes)(0.5f * BST_MULTIPLY_STEPS));
+    lanes_int step = to_lanes_int(at);
+    lanes_int row = to_lanes_int(fmin(n, (float)BST_MULTIPLY_FEW)) - 1;
+    int places[16];
+    float low[16], high[16];
+    vstore16(row * (BST_MULTIPLY_STEPS + 1) + step, 0, places);
+    for (int i = 0; i < 16; i++) {
+        low[i] = table[places[i]];
+        high[i] = table[places[i] + 1];
+    }
+    lanes a = vload16(0, low), b = vload16(0, high);
+    return fma(at - to_lanes(step), b - a, a);
 }
 
 /* Charge of 16 pixels behind a multiplication register, over its gain: the mean stays, the variance
  * of n electrons is n (1 - 1 / gain), their law a gamma distribution of shape n (Basden, Haniff and
  * Mackay 2003, MNRAS 345, 985). Fractions of an electron, which traps leave, are rounded at random,
- * by the low bits of the first word. word, z: of the first turn; stream: of the second, later ones
- * have every fourth from there on. */
-static lanes multiply_charge(bst_kernel_frame_params p, uint counter, uint stream, lanes_uint word,
+ * by the low bits of a word that gave z: these change z by less than 1e-4. */
+INLINE lanes multiply_charge(bst_kernel_frame_params p, global const float *table, lanes_uint word,
                              lanes z, lanes q) {
-    lanes whole = floor(q), u = to_lanes(word & 0xFFFFu) * 0x1p-16f, out = (lanes)0.0f;
+    lanes whole = floor(q), u = to_lanes(as_lanes_int(word & 0xFFFFu)) * 0x1p-16f;
     lanes n = fmax(whole + select((lanes)0.0f, (lanes)1.0f, MASK(u < q - whole)), 0.0f);
-    lanes_int open = MASK(n > 0.0f);
-    for (uint turn = 0u; any_of(open) && turn < 64u; turn++) {
-        lanes_int good;
-        lanes drawn = gamma_turn(fmax(n, 1.0f), word, z, &good);
-        good &= open;
-        out = select(out, fma(drawn - n, (lanes)p.multiply_rms, n), good);
-        open &= ~good;
-        if (any_of(open)) {
-            lanes_uint w0, w1, unused;
-            lanes other;
-            philox_lanes(p, counter, stream + 4u * turn, &w0, &w1, &word, &unused);
-            normal_lanes(w0, w1, &z, &other);
-        }
+    lanes some = fmax(n, 1.0f), x = gamma_expand(some, z);
+    if (any_of(MASK(n < (float)BST_MULTIPLY_FEW))) {
+        x += gamma_lacks(table, some, z);
     }
-    return out;
+    return select((lanes)0.0f, fma(fmax(x, 0.0f) - n, (lanes)p.multiply_rms, n), MASK(n > 0.0f));
 }
 
-INLINE chunk multiply_chunk(bst_kernel_frame_params p, uint counter, chunk q) {
-    chunk z = chunk_normal(chunk_random(p, counter, STREAM_MULTIPLY));
-    chunk_words w = chunk_random(p, counter, STREAM_MULTIPLY + 1u);
-    const uint next = STREAM_MULTIPLY + 2u;
-    q.a = multiply_charge(p, counter, next, w.a, z.a, q.a);
-    q.b = multiply_charge(p, counter, next + 1u, w.b, z.b, q.b);
-    q.c = multiply_charge(p, counter, next + 2u, w.c, z.c, q.c);
-    q.d = multiply_charge(p, counter, next + 3u, w.d, z.d, q.d);
-    return q;
+INLINE chunk multiply_chunk(bst_kernel_frame_params p, global const float *table, uint counter,
+                            chunk q) {
+    chunk_words w = chunk_random(p, counter, STREAM_MULTIPLY);
+    chunk z = chunk_normal(w);
+    lanes_uint word[4] = {w.a, w.b, w.c, w.d};
+    lanes normal[4] = {z.a, z.b, z.c, z.d}, out[4] = {q.a, q.b, q.c, q.d};
+    KEEP_LOOP
+    for (int v = 0; v < 4; v++) {
+        out[v] = multiply_charge(p, table, word[v], normal[v], out[v]);
+    }
+    chunk multiplied = {out[0], out[1], out[2], out[3]};
+    return multiplied;
 }
 #endif
 
+/* A chunk of charge that is read, and which of its pixels are full. column: of its first pixel, in
+ * the window after binning; pixels outside the window are empty. */
+INLINE chunk gather_charge(bst_kernel_frame_params p, global const float *image,
+                           global const uchar *full, int row, int column, chunk_flags *brim) {
+    int b = p.binning;
+    long from = (long)(row - p.light_y0) * p.light_stride + p.window_x0 - p.tiles_x0 + column * b;
+    if (b == 1 && column >= 0 && column + 64 <= p.window_width) {
+        global const float *at = image + from;
+        chunk q = {vload16(0, at), vload16(1, at), vload16(2, at), vload16(3, at)};
+        if (HAS(p, BST_EFFECT_MARKS)) {
+            brim->a = -convert_int16(vload16(0, full + from));
+            brim->b = -convert_int16(vload16(1, full + from));
+            brim->c = -convert_int16(vload16(2, full + from));
+            brim->d = -convert_int16(vload16(3, full + from));
+        } else {
+            brim->a = q.a >= p.full_well_e;
+            brim->b = q.b >= p.full_well_e;
+            brim->c = q.c >= p.full_well_e;
+            brim->d = q.d >= p.full_well_e;
+        }
+        return q;
+    }
+    float sums[64];
+    int brims[64];
+    for (int i = 0; i < 64; i++) {
+        float sum = 0.0f;
+        int full_wells = 0;
+        if (column + i >= 0 && column + i < p.window_width) {
+            for (int v = 0; v < b; v++) {
+                for (int u = 0; u < b; u++) {
+                    size_t at = (size_t)(from + i * b) + (size_t)v * p.light_stride + u;
+                    sum += image[at];
+                    full_wells |= HAS(p, BST_EFFECT_MARKS) ? full[at] : image[at] >= p.full_well_e;
+                }
+            }
+        }
+        sums[i] = sum;
+        brims[i] = -full_wells;
+    }
+    chunk q = {vload16(0, sums), vload16(1, sums), vload16(2, sums), vload16(3, sums)};
+    brim->a = vload16(0, brims);
+    brim->b = vload16(1, brims);
+    brim->c = vload16(2, brims);
+    brim->d = vload16(3, brims);
+    return q;
+}
+
 /* Reads charge as digital numbers: p.binning x p.binning pixels are summed before they are read.
  * frame: [window_height][window_width], both after binning. saturated: pixels per row. full: of
- * bst_detector_mark, with BST_EFFECT_MARKS. One work-item per frame row. */
+ * bst_detector_mark, with BST_EFFECT_MARKS. table: of multiply_chunk. One work-item per frame row. */
 READOUT_GROUP kernel void bst_detector_read(bst_kernel_frame_params p, global const float *image, global ushort *frame,
                               global int *saturated, global const float *offsets,
                               global const ushort *codes, global uchar *flags,
-                              global const uchar *full) {
+                              global const uchar *full, global const float *table) {
     detector_maps maps = {0, 0, 0, offsets, codes, 0};
     int y = (int)get_global_id(0), b = p.binning;
     if (y >= p.window_height) {
@@ -220,32 +305,11 @@ READOUT_GROUP kernel void bst_detector_read(bst_kernel_frame_params p, global co
     int16 full_count = (int16)0;
     tail_block tail;
     for (int x = 0; x < skip + p.window_width; x += 64) {
-        float sums[64];
-        int brims[64];
-        for (int i = 0; i < 64; i++) {
-            int column = x + i - skip;
-            float sum = 0.0f;
-            int brim = 0;
-            if (column >= 0 && column < p.window_width) {
-                size_t first_at = (size_t)(row - p.light_y0) * p.light_stride + p.window_x0 -
-                                  p.tiles_x0 + column * b;
-                for (int v = 0; v < b; v++) {
-                    for (int u = 0; u < b; u++) {
-                        size_t at = first_at + (size_t)v * p.light_stride + u;
-                        sum += image[at];
-                        brim |= HAS(p, BST_EFFECT_MARKS) ? full[at] : image[at] >= p.full_well_e;
-                    }
-                }
-            }
-            sums[i] = sum;
-            brims[i] = -brim;
-        }
+        chunk_flags brim;
+        chunk q = gather_charge(p, image, full, row, x - skip, &brim);
         uint counter = counter_of(row / b, first + x, p.sensor_width / b);
-        chunk q = {vload16(0, sums), vload16(1, sums), vload16(2, sums), vload16(3, sums)};
-        chunk_flags brim = {vload16(0, brims), vload16(1, brims), vload16(2, brims),
-                            vload16(3, brims)};
 #ifdef MULTIPLY
-        q = multiply_chunk(p, counter, q);
+        q = multiply_chunk(p, table, counter, q);
 #endif
         chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
         e.a = read_out(p, q.a, z.a);

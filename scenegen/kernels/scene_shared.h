@@ -34,6 +34,11 @@
 #define BST_HIT_GROUP 64
 /* Work-items of a work-group of the staged read-out. */
 #define BST_READOUT_GROUP 64
+/* Multiplication register (multiplication.h): fewer electrons than this have a row in its table each,
+ * the others share an empty one; each has so many steps from -reach to reach standard deviations. */
+#define BST_MULTIPLY_FEW 16
+#define BST_MULTIPLY_STEPS 448
+#define BST_MULTIPLY_REACH 7.0f
 /* Widths in the Fourier path's table: (n / BST_WIDTHS)^2 BST_WIDEST of the PSF variance, n from 0
  * to BST_WIDTHS. Between them it is interpolated linearly in the variance. A Gaussian's peak varies
  * as the inverse square root, so each axis has a relative error of 3/8 w / BST_WIDTHS^2 / (1 + w)^2

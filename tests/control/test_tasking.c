@@ -1,5 +1,5 @@
 /* The rule that gives sensors their targets, on a small catalogue. */
-#include "control/tasking/tasking.h"
+#include "control/tasking/tasking_internal.h"
 #include "sim/onboard/knowledge.h"
 #include "tests/archive_support.h"
 #include "tests/world/world_support.h"
@@ -181,6 +181,14 @@ static void noise_and_snr_are_the_cameras(void **state) {
     double electrons = 0.5 * v0 * pow(10.0, -0.4 * seen.sight.v_mag);
     /* the object's light is of the Sun's colour, as the magnitude is */
     bst_assert_close(seen.snr, electrons / sqrt(noise2 * pixels), 1e-3 * seen.snr);
+
+    /* a multiplication register, and dark current gathered while the frame is read */
+    bst_detector_config *d = &((bst_camera *)c)->detector;
+    d->em_gain = 4.0;
+    d->clock_induced_e = 3.0;
+    bst_tasking_noise(&f.tasking.sensors[0]);
+    noise2 = 1.75 * (0.5 * (sky + 0.5) + 3.0) + c->read_noise_e * c->read_noise_e;
+    bst_assert_close(f.tasking.sensors[0].noise_e, sqrt(noise2), 1e-9); /* rounding */
     tear_down(&f);
 }
 

@@ -345,6 +345,26 @@ static void close_sources_are_one(void **state) {
     close_scene(&s);
 }
 
+/* A multiplication register doubles the shot noise of the sky but for 1 / gain; read noise is that
+ * before it. */
+static void multiplication_adds_to_the_noise(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    s.truth->background_e = 30.0;
+    s.truth->dark_e = 6.0;
+    double found[2];
+    for (int on = 0; on < 2; on++) {
+        s.camera.detector.em_gain = on ? 50.0 : 1.0;
+        start(&s);
+        found[on] = run(&s, 1).noise_e;
+    }
+    double quiet = 64.0 + 1.6 * 1.6 / 12.0; /* read noise, rounding */
+    double ratio = ((2.0 - 1.0 / 50.0) * 36.0 + quiet) / (36.0 + quiet);
+    bst_assert_close(found[1] / found[0], sqrt(ratio), 1e-9); /* rounding */
+    close_scene(&s);
+}
+
 /* Every part of a pixel's variance by itself, binned two by two: what is added before the read-out
  * grows with the pixels, what the read-out adds does not. */
 static void a_pixels_noise_is_the_sum_of_its_parts(void **state) {
@@ -579,6 +599,7 @@ int main(void) {
         cmocka_unit_test(draws_depend_on_names_alone),
         cmocka_unit_test(close_sources_are_one),
         cmocka_unit_test(a_pixels_noise_is_the_sum_of_its_parts),
+        cmocka_unit_test(multiplication_adds_to_the_noise),
         cmocka_unit_test(light_below_the_clip_is_background),
         cmocka_unit_test(room_is_for_the_brightest),
     };

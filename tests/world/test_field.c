@@ -230,6 +230,25 @@ static void snr_is_that_of_the_smeared_image(void **state) {
     free_scene(&s);
 }
 
+/* The noise of a multiplication register counts. */
+static void snr_falls_with_multiplied_noise(void **state) {
+    (void)state;
+    scene s = make_scene_in(test_world(
+        "{\"world\": {\"star_catalogue\": \"embedded\", \"objects\": [" GX5
+        "]}, \"observers\": [{\"name\": \"neossat\", " TEST_NEOSSAT
+        ", \"sensors\": [{\"cue\": {\"object\": \"GX5\"}, \"camera\": {\"pixel_scale_arcsec\": 3, "
+        "\"aperture_m\": 0.15, \"read_noise_e\": 1, \"background_mag_arcsec2\": 19, "
+        "\"detector\": {\"em_gain\": 5}}}]}]}"));
+    fill(&s, 0, 0, 0, 0);
+    query(&s, 3000, full);
+    double variance = 1.8 * (s.truth.background_e + s.truth.dark_e) + 1.0;
+    assert_true(s.truth.background_e > 5.0 && s.count > 3);
+    for (int i = 0; i < s.count; i += 1 + s.count / 4) {
+        expect_snr(&s, &s.sources[i], variance, 0.02); /* as above */
+    }
+    free_scene(&s);
+}
+
 /* A line of sight that moves by some px and swings across in half waves. */
 static void snr_of_bent_streaks(void **state) {
     (void)state;
@@ -584,6 +603,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(mean_places_are_those_of_the_light),
         cmocka_unit_test(snr_is_that_of_the_smeared_image),
+        cmocka_unit_test(snr_falls_with_multiplied_noise),
         cmocka_unit_test(snr_of_bent_streaks),
         cmocka_unit_test(truth_follows_the_optics),
         cmocka_unit_test(no_star_is_missed),

@@ -161,7 +161,8 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
         bst_field_background_e(field, header, image.x_mean, image.y_mean) + header->dark_e;
     /* binned pixels are read once; their sum is the image blurred by a wider box */
     double added = (double)binning * binning, widened = (added - 1.0) / 12.0;
-    double variance = dark + camera->read_noise_e * camera->read_noise_e / added;
+    double variance = bst_camera_excess_noise(camera) * dark +
+                      camera->read_noise_e * camera->read_noise_e / added;
     double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
     double along, across;
     double sharp = bst_image_blur(camera, source, &image, out->x_end_px - out->x_start_px,
