@@ -50,6 +50,15 @@ export async function getPixels(sensor, frame, signal = undefined) {
   };
 }
 
+/** Adds a style sheet of the page. @param {string} file */
+export function addStyle(file) {
+  const link = document.createElement('link');
+  link.rel = 'stylesheet';
+  link.href = file;
+  document.head.append(link);
+  return new Promise((done) => { link.onload = link.onerror = done; });
+}
+
 /** Sends text to a route and gets JSON. @param {string} route @param {string} body */
 export async function post(route, body) {
   const response = await fetch(`api/${route}?run=${RUN}`, { method: 'POST', body, cache: 'no-store' });

@@ -51,6 +51,7 @@ class App {
       await showStart();
       return;
     }
+    if (session.exported) this.describeExport(session.exported);
     if (session.live) {
       const { Live } = await import('./live.js');
       this.live = new Live(this);
@@ -67,6 +68,17 @@ class App {
     }
     if (this.live) this.live.follow(true);
     if (this.inProgress()) this.follow();
+  }
+
+  /** A page that is one file, without a program: what of the run it has. */
+  describeExport({ space, sensors }) {
+    const parts = sensors.map(({ rows, total, binning }) => `${rows.length} of ${total} frames${binning > 1 ? `, ${binning} × ${binning} pixels binned` : ''}`);
+    element('exported').hidden = false;
+    element('exported').textContent = parts.length > 1 ? 'copy' : parts[0];
+    element('exported').title = `This page is a copy of a part of the run, made by "boresight export --page". Sensors: ${parts.join('; ')}. ` +
+      'Plots show all exposures. "boresight view" shows the whole run.';
+    document.querySelector('h1 a').removeAttribute('href'); // there is no start page
+    this.panels.keep(['frame', 'why', ...(space ? ['space'] : [])]);
   }
 
   inProgress() { return this.run.state === RUNNING || Boolean(this.live && !this.live.over); }

@@ -32,10 +32,15 @@ export class Panels {
   /** Puts the start page in the place of the frame; without a run there is no space. @param {HTMLElement} start */
   withoutRun(start) {
     this.boxes.get('frame').box = start;
+    this.keep(['frame', 'editor']);
     for (const tab of this.bar.children) {
       if (tab.id === 'tab-frame') tab.textContent = 'Start';
-      tab.hidden = !['tab-frame', 'tab-editor'].includes(tab.id);
     }
+  }
+
+  /** Hides all other panels. @param {string[]} names */
+  keep(names) {
+    for (const tab of this.bar.children) tab.hidden = !names.includes(tab.id.replace('tab-', ''));
   }
 
   /** True if keys belong to the frame. */
