@@ -46,6 +46,12 @@ class App {
     const query = new URLSearchParams(location.hash.slice(1));
     const session = await getJson('session');
     const address = new URLSearchParams(location.search);
+    this.ofStudy = Boolean(session.study);
+    if (session.study && (address.has('start') || !address.has('run'))) {
+      const { showStudy } = await import('./study.js');
+      await showStudy();
+      return;
+    }
     if (address.has('start') || (!session.live && session.runs === 0)) {
       const { showStart } = await import('./start.js');
       await showStart();
@@ -353,6 +359,7 @@ class App {
     document.documentElement.dataset.theme = name;
     this.plots.draw();
     this.frameView.drawHistogram();
+    document.dispatchEvent(new CustomEvent('themechanged'));
   }
 
   onKey(event) {

@@ -6,6 +6,7 @@ const PANELS = [
   { name: 'frame', title: 'Frame' },
   { name: 'space', title: 'Space', module: './space.js' },
   { name: 'why', title: 'Why', module: './why.js' },
+  { name: 'compare', title: 'Compare', module: './compare.js' },
   { name: 'editor', title: 'Editor', module: './editor.js' },
 ];
 
@@ -30,11 +31,11 @@ export class Panels {
   }
 
   /** Puts the start page in the place of the frame; without a run there is no space. @param {HTMLElement} start */
-  withoutRun(start) {
+  withoutRun(start, title = 'Start') {
     this.boxes.get('frame').box = start;
     this.keep(['frame', 'editor']);
     for (const tab of this.bar.children) {
-      if (tab.id === 'tab-frame') tab.textContent = 'Start';
+      if (tab.id === 'tab-frame') tab.textContent = title;
     }
   }
 
