@@ -50,6 +50,7 @@ class Side {
     this.stage = make('div', { className: 'compare-stage' }, this.canvas, this.overlay);
     this.box = make('figure', { className: 'compare-side' }, this.caption, this.stage);
     this.overlay.setAttribute('role', 'img');
+    this.overlay.setAttribute('aria-label', `Frame of run ${letter}`);
     this.canvas.setAttribute('aria-hidden', 'true');
     this.letter = letter;
     this.painter = makePainter(this.canvas, true);

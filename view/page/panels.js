@@ -23,8 +23,7 @@ export class Panels {
       tab.type = 'button';
       tab.id = `tab-${name}`;
       tab.textContent = title;
-      tab.setAttribute('role', 'tab');
-      tab.setAttribute('aria-selected', String(name === this.current));
+      if (name === this.current) tab.setAttribute('aria-current', 'page');
       tab.addEventListener('click', () => this.show(name));
       return tab;
     }));
@@ -57,7 +56,10 @@ export class Panels {
     before.box.hidden = true;
     box.hidden = false;
     this.current = name;
-    for (const tab of this.bar.children) tab.setAttribute('aria-selected', String(tab.id === `tab-${name}`));
+    for (const tab of this.bar.children) {
+      if (tab.id === `tab-${name}`) tab.setAttribute('aria-current', 'page');
+      else tab.removeAttribute('aria-current');
+    }
     const { ready, panel } = this.boxes.get(name);
     if (before.panel.hidden) before.panel.hidden();
     await ready;
@@ -69,7 +71,6 @@ export class Panels {
     const box = document.createElement('main'), made = { box, panel: {}, ready: null };
     box.className = 'panel';
     box.id = `panel-${name}`;
-    box.setAttribute('role', 'tabpanel');
     box.setAttribute('aria-label', title);
     document.getElementById('main').after(box);
     made.ready = import(module).then((loaded) => loaded.open(box, this.app)).then((panel) => { made.panel = panel || {}; })

@@ -74,7 +74,7 @@ class Panel {
     this.scaleButton.type = 'button';
     this.scaleButton.textContent = 'log';
     this.scaleButton.setAttribute('aria-pressed', String(this.log));
-    this.scaleButton.setAttribute('aria-label', `Logarithmic axis of ${info.title}`);
+    this.scaleButton.setAttribute('aria-label', `log: logarithmic axis of ${info.title}`);
     this.scaleButton.addEventListener('click', () => {
       this.log = !this.log;
       this.scaleButton.setAttribute('aria-pressed', String(this.log));
