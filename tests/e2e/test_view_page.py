@@ -92,7 +92,7 @@ class Page(unittest.TestCase):
     def test_every_pixel_and_overlay(self):
         """Read back from the graphics processor: all 16 bits. Marks are where the tables say, on the screen."""
         with chromium.Chromium(1280, 720) as page:
-            self.open(page, 20)
+            self.open(page, 20, "?webgl")
             self.assertEqual(page.evaluate("document.boresight.frameView.painter.constructor.name"), "WebglPainter")
             self.assertTrue(numpy.array_equal(self.shown_pixels(page), self.files[21].data))
             page.key("ArrowRight")
@@ -130,7 +130,8 @@ class Page(unittest.TestCase):
             return grey;
         })()"""
         with chromium.Chromium(1280, 720) as page:
-            for more, painter in (("", "WebglPainter"), ("?plain", "CanvasPainter")):
+            # Chromium's WebGL is software here, for which the page would choose the 2D canvas
+            for more, painter in (("?webgl", "WebglPainter"), ("?plain", "CanvasPainter"), ("", "CanvasPainter")):
                 self.open(page, 20, more)
                 self.assertEqual(page.evaluate("document.boresight.frameView.painter.constructor.name"), painter)
                 part = self.files[21].data[490:510, 490:510].astype(float)

@@ -19,7 +19,8 @@ export class FrameView {
     this.stage = element('stage');
     this.canvas = element('image');
     this.overlay = element('overlay');
-    this.painter = makePainter(this.canvas, new URLSearchParams(location.search).has('plain'));
+    const address = new URLSearchParams(location.search);
+    this.painter = makePainter(this.canvas, address.has('plain'), address.has('webgl'));
     this.image = null;
     this.statistics = null;
     this.counted = 0; // time of the statistics
