@@ -14,6 +14,8 @@ const PLAY_MS = 90;
 /** State of a run in progress (bst_run_state_name), and time between two looks at its folder, ms. */
 const RUNNING = 'still running';
 const REFRESH_MS = 2000;
+/** Share of the time that the looks may take at most: the run's tables grow, and are read by the program that writes them. */
+const REFRESH_SHARE = 0.05;
 
 const element = (id) => document.getElementById(id);
 
@@ -91,8 +93,10 @@ class App {
 
   /** Asks for what was recorded since, while the run is in progress; stays at the end if it is there. */
   async follow() {
-    while (this.inProgress()) {
-      await new Promise((done) => { setTimeout(done, REFRESH_MS); });
+    for (let took = 0; this.inProgress();) {
+      const wait = Math.max(REFRESH_MS, took / REFRESH_SHARE);
+      await new Promise((done) => { setTimeout(done, wait); });
+      const begin = performance.now();
       try {
         const { sensor } = this, run = await getJson('refresh'), frames = await getNumbers('frames', { sensor });
         const [modes, events, { names }] = await Promise.all([getModes(sensor), getJson('events'), getJson('names')]);
@@ -109,9 +113,11 @@ class App {
         this.showEvents(events);
         this.plots.extend(run.sensors[sensor].panels, modes, this.events, this.lastTime(modes));
         if (atEnd && this.count && !(this.live && this.live.newest)) await this.goTo(this.count - 1);
+        await this.plots.reloading;
       } catch (error) {
         this.showProblems([`The run cannot be followed: ${error.message}`]);
       }
+      took = performance.now() - begin;
     }
   }
 
