@@ -297,7 +297,7 @@ class Start(unittest.TestCase):
         self.assertEqual([(one["name"], one["state"]) for one in listed["runs"]], [("one", "complete")])
         self.assertIn("neossat_geo_track.json", [one["file"] for one in listed["scenarios"]])
         self.assertNotIn("boresight.schema.json", [one["file"] for one in listed["scenarios"]])
-        self.assertEqual(viewer.json("api/session"), {"live": False, "runs": 0})
+        self.assertEqual(viewer.json("api/session"), {"live": False, "study": False, "runs": 0})
         self.assertEqual(viewer.status("/{token}/api/run"), 404)
         with open(folder + "/runs/one/quicklook.png", "wb") as file:
             file.write(b"\x89PNG")
