@@ -6,11 +6,14 @@
 #include <string.h>
 
 #include "sim/core/json_member.h"
+#include "view/pixel_bins.h"
 
 /* Longest message of a client, bytes. */
 enum { MESSAGE_BYTES = 8192 };
 /* Clients at the same time: each has a thread of the server. */
 enum { CLIENTS_MOST = 48 };
+/* Largest bins of pixels that a client may ask for. */
+enum { BINNING_MOST = 64 };
 /* Longest time that an answer waits for a newer frame, s. Commands of the client wait as long. */
 static const double WAIT_S = 0.1;
 
@@ -60,6 +63,20 @@ static bool controls(bst_view_socket *socket, const struct mg_connection *peer, 
     return controller;
 }
 
+/* Reduces the pixels to bins, if a client asks for them: its screen has fewer pixels. */
+static void bin_frame(bst_view_live_frame *frame, const cJSON *asked, cJSON *node) {
+    const int64_t wanted = bst_json_whole(bst_json_member(asked, "binning"), 1);
+    bst_view_bytes pixels = {.data = frame->pixels, .width = frame->width, .height = frame->height};
+    bst_view_bin_pixels(&pixels, wanted > 1 && wanted <= BINNING_MOST ? (int)wanted : 1);
+    if (pixels.binning > 1) {
+        cJSON_AddNumberToObject(node, "binning", pixels.binning);
+        cJSON_AddNumberToObject(node, "frame_width", pixels.frame_width);
+        cJSON_AddNumberToObject(node, "frame_height", pixels.frame_height);
+        frame->width = pixels.width;
+        frame->height = pixels.height;
+    }
+}
+
 /* Builds the answer; NULL: out of memory. */
 static char *make_answer(cJSON *node, const bst_view_live_frame *frame, size_t *bytes) {
     char *text = cJSON_PrintUnformatted(node);
@@ -94,6 +111,7 @@ static bool answer(bst_view_socket *socket, struct mg_connection *peer, const cJ
     cJSON_AddItemToObject(node, "state", bst_view_live_state(socket->live));
     cJSON_AddBoolToObject(node, "controller", controller);
     cJSON_AddNumberToObject(node, "sequence", (double)frame.sequence);
+    bin_frame(&frame, asked, node);
     cJSON_AddNumberToObject(node, "width", frame.width);
     cJSON_AddNumberToObject(node, "height", frame.height);
     cJSON_AddItemToObject(node, "frame", frame.json ? cJSON_CreateRaw(frame.json) : NULL);
@@ -110,8 +128,8 @@ static bool answer(bst_view_socket *socket, struct mg_connection *peer, const cJ
     return sent;
 }
 
-/* A text of a client: {"sensor": N, "after": SEQUENCE, "take": true, "command": {...}}; all may be
- * left out. Anything else ends its connection. */
+/* A text of a client: {"sensor": N, "after": SEQUENCE, "take": true, "binning": N, "command":
+ * {...}}; all may be left out. Anything else ends its connection. */
 static int on_text(bst_view_socket *socket, struct mg_connection *peer, const char *data,
                    size_t bytes) {
     cJSON *asked = cJSON_ParseWithLength(data, bytes);

@@ -8,6 +8,7 @@
 #include "view/scenario_list.h"
 #include "view/space.h"
 #include "view/start_routes.h"
+#include "view/study_view.h"
 #include "view/why.h"
 
 static bst_status schema_route(bst_ctx *ctx, bst_view_exchange *x) {
@@ -70,5 +71,8 @@ const bst_view_route bst_view_panel_routes[] = {
     {"api/space/states", false, bst_view_route_space_states},
     {"api/space/poses", false, bst_view_route_space_poses},
     {"api/space/coast", false, bst_view_route_space_coast},
+    {"api/study", false, bst_view_route_study},
+    {"api/study/open", true, bst_view_route_study_open},
+    {"api/runs", false, bst_view_route_runs},
     {"api/why", false, bst_view_route_why},
     {NULL, false, NULL}};

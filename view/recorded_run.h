@@ -15,6 +15,8 @@ typedef struct bst_view_bytes {
     void *data; /* malloc; NULL: none */
     size_t bytes;
     int width, height; /* of pixels; 0: something else */
+    int binning;       /* pixels of the frame along a side of one of these; 0: not binned */
+    int frame_width, frame_height; /* of the frame, if binned */
 } bst_view_bytes;
 
 /* Numbers of a frame in the list of frames, all 64-bit floating point. */

@@ -6,13 +6,14 @@
 #include "view/panel_routes.h"
 #include "view/start_routes.h"
 
-/* What the page is for: {"live": true, "runs": number of open ones, "run": as api/run, "names": as
+/* What the page is for: {"live": true, "study": false, "runs": number of open ones, "run": as api/run, "names": as
  * api/names}, the last two if the run is open: all that a page needs at first. */
 static bst_status get_session(bst_ctx *ctx, bst_view_exchange *x) {
     bst_view_run *run;
     cJSON *described = NULL, *names = NULL;
     x->json = cJSON_CreateObject();
     cJSON_AddBoolToObject(x->json, "live", x->live != NULL);
+    cJSON_AddBoolToObject(x->json, "study", bst_view_subject_study(x->subject) != NULL);
     cJSON_AddNumberToObject(x->json, "runs", (double)bst_view_subject_count(x->subject));
     if (bst_view_subject_run(ctx, x->subject, x->run, &run) != BST_OK) {
         return BST_OK;

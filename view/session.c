@@ -11,6 +11,7 @@
 #include "sim/core/folder.h"
 #include "view/browser.h"
 #include "view/server.h"
+#include "view/study_view.h"
 
 /* Prints the address and opens a browser there. */
 static void announce(const bst_view_session *r, const char *url) {
@@ -27,14 +28,23 @@ static void wait_for_stop(void) {
     }
 }
 
-/* Serves a recorded run until a signal asks for the end. */
+/* Opens the folder of a run or a study. */
+static bst_status open_folder(bst_ctx *ctx, bst_view_subject *subject, const char *folder) {
+    int64_t number;
+    return bst_view_is_study(folder) ? bst_view_subject_set_study(ctx, subject, folder)
+                                     : bst_view_subject_open(ctx, subject, folder, &number);
+}
+
+/* Serves recorded runs until a signal asks for the end. */
 static bst_status serve_run(bst_ctx *ctx, const bst_view_session *r, bst_view_subject *subject,
                             const char *folder) {
     bst_view_server *server;
     char url[BST_VIEW_URL_BYTES];
-    int64_t number;
-    if (folder) {
-        BST_TRY(bst_view_subject_open(ctx, subject, folder, &number));
+    const char *const folders[] = {folder, r->other};
+    for (int i = 0; i < 2; i++) {
+        if (folders[i]) {
+            BST_TRY(open_folder(ctx, subject, folders[i]));
+        }
     }
     BST_TRY(bst_view_server_start(ctx, subject, NULL, (int)r->port, url, &server));
     announce(r, url);

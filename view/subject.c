@@ -9,6 +9,7 @@ enum { RUNS_MOST = 64 };
 
 struct bst_view_subject {
     bst_view_launcher *launcher;
+    char *study;          /* its folder; NULL: none */
     pthread_mutex_t lock; /* of all below */
     int runs;
     bst_view_run *run[RUNS_MOST];
@@ -39,12 +40,29 @@ void bst_view_subject_free(bst_view_subject *subject) {
         }
         bst_view_launcher_free(subject->launcher);
         pthread_mutex_destroy(&subject->lock);
+        free(subject->study);
         free(subject);
     }
 }
 
 bst_view_launcher *bst_view_subject_launcher(bst_view_subject *subject) {
     return subject->launcher;
+}
+
+bst_status bst_view_subject_set_study(bst_ctx *ctx, bst_view_subject *subject, const char *folder) {
+    subject->study = strdup(folder);
+    return subject->study ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a study");
+}
+
+const char *bst_view_subject_study(const bst_view_subject *subject) {
+    return subject->study;
+}
+
+const char *bst_view_subject_path(bst_view_subject *subject, int64_t number) {
+    pthread_mutex_lock(&subject->lock);
+    const char *path = number >= 0 && number < subject->runs ? subject->path[number] : "";
+    pthread_mutex_unlock(&subject->lock);
+    return path;
 }
 
 int64_t bst_view_subject_count(bst_view_subject *subject) {

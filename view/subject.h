@@ -22,6 +22,18 @@ void bst_view_subject_free(bst_view_subject *subject);
 bst_status bst_view_subject_open(bst_ctx *ctx, bst_view_subject *subject, const char *path,
                                  int64_t *number) BST_MUST_CHECK;
 
+/* Shows a study: its folder, which the subject copies.
+ *
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_view_subject_set_study(bst_ctx *ctx, bst_view_subject *subject,
+                                      const char *folder) BST_MUST_CHECK;
+/* Folder of the study that is shown; NULL: none. Set before the server starts, so without a lock.
+ */
+const char *bst_view_subject_study(const bst_view_subject *subject);
+
+/* Path of an open run as it was given; it belongs to the subject. "" for a number that is none. */
+const char *bst_view_subject_path(bst_view_subject *subject, int64_t number);
+
 /* Number of runs that are open. */
 int64_t bst_view_subject_count(bst_view_subject *subject);
 /* What starts live runs from the page; it belongs to the subject. */

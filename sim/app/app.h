@@ -24,12 +24,15 @@ int bst_app_run(int argc, char **argv, const bst_app_command *more);
 struct bst_view_attached;
 struct bst_run_steering;
 
-/* What `boresight run --view` uses (view/attach.h). */
+struct bst_view_page_request; /* view/page_export.h */
+
+/* What `boresight run --view` (view/attach.h) and `boresight export --page` use. */
 typedef struct bst_app_viewer {
     bst_status (*attach)(bst_ctx *ctx, const bst_scenario *scenario, const char *out,
                          struct bst_view_attached **attached);
     const struct bst_run_steering *(*steering)(const struct bst_view_attached *attached);
     void (*detach)(struct bst_view_attached *attached);
+    bst_status (*export_page)(bst_ctx *ctx, const struct bst_view_page_request *request);
 } bst_app_viewer;
 
 /* Viewer of the program; NULL in libboresight, which has none. Set it before bst_app_run. */

@@ -7,12 +7,14 @@
 #include "view/session.h"
 
 static const char help_text[] =
-    "usage: boresight view [RUN | SCENARIO.json] [options]\n"
+    "usage: boresight view [RUN [RUN] | STUDY | SCENARIO.json] [options]\n"
     "\n"
     "Shows a run in the browser: frames with truth, detections and tracks, plots over time, "
     "events.\n"
     "\n"
     "  boresight view runs/demo                           plays a recorded run back\n"
+    "  boresight view runs/demo runs/other                compares two runs\n"
+    "  boresight view runs/study                          compares the runs of a study\n"
     "  boresight view scenarios/neossat_geo_track.json    runs it live: pause, step, change, "
     "rewind, branch\n"
     "  boresight view                                     shipped scenarios and the runs in runs/\n"
@@ -92,6 +94,11 @@ static bst_status check_use(bst_ctx *ctx, const bst_view_session *r, const char 
     return BST_OK;
 }
 
+static bool is_file(const char *path) {
+    struct stat found;
+    return stat(path, &found) == 0 && S_ISREG(found.st_mode);
+}
+
 int bst_cmd_view(int argc, char **argv) {
     bst_view_session r = {.load = BST_LOAD_DEFAULTS, .check = bst_check_rules_apply};
     bst_option table[sizeof OPTIONS / sizeof *OPTIONS];
@@ -103,13 +110,15 @@ int bst_cmd_view(int argc, char **argv) {
     if (!bst_command_line_read(&ctx, &line, argc, argv, &arguments, &code)) {
         return code;
     }
-    if (arguments > 1) {
+    const char *path = arguments > 0 ? argv[1] : NULL;
+    r.other = arguments > 1 ? argv[2] : NULL;
+    if (arguments > 2 || (r.other && (is_file(path) || is_file(r.other)))) {
         bst_fail(&ctx, BST_ERR_ARGUMENT,
-                 "one folder of a run, one scenario file, or none is expected, %d were given",
+                 "one or two folders of runs, the folder of a study, one scenario file, or none is "
+                 "expected, %d were given",
                  arguments);
         return bst_options_misuse(&ctx, "view");
     }
-    const char *path = arguments == 1 ? argv[1] : NULL;
     if (check_use(&ctx, &r, path) != BST_OK || bst_load_check(&ctx, &r.load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "view");
     }

@@ -3,6 +3,7 @@
 
 #include "sim/app/app.h"
 #include "view/attach.h"
+#include "view/page_export.h"
 
 int main(int argc, char **argv) {
     static const bst_app_command more[] = {
@@ -12,7 +13,7 @@ int main(int argc, char **argv) {
         {NULL, NULL, NULL},
     };
     static const bst_app_viewer viewer = {bst_view_attach, bst_view_attached_steering,
-                                          bst_view_detach};
+                                          bst_view_detach, bst_view_page_export};
     bst_app_page = &viewer;
     signal(SIGXFSZ, SIG_IGN); /* a write beyond a limit on file sizes then returns an error */
     return bst_app_run(argc, argv, more);

@@ -47,8 +47,10 @@ typedef struct bst_export {
 enum { BST_EXPORT_NOT = -1 };
 typedef struct bst_export_parts {
     bst_export e;
-    const char *out;    /* folder; NULL: RUN.export */
-    const char *tables; /* "a,b"; NULL: all */
+    const char *out;      /* folder; NULL: RUN.export */
+    const char *page;     /* file of one page; NULL: none (written by the viewer) */
+    double page_limit_mb; /* of that file */
+    const char *tables;   /* "a,b"; NULL: all */
     int frames, table, orbits,
         observations; /* frames: pictures 0, video 1; table: csv; orbits: oem 0, czml 1;
                          observations: bst_export_observation_format */

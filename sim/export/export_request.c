@@ -54,6 +54,21 @@ const bst_option bst_export_options[] = {
      .argument = "16|8",
      .doc = "coco, yolo: images of the counts as they are (16, default), or of grey levels, each "
             "frame's own (8)"},
+    {.name = "page",
+     .kind = BST_OPTION_TEXT,
+     .offset = offsetof(bst_export_request, parts.page),
+     .path = BST_PATH_OUTPUT,
+     .argument = "FILE",
+     .doc = "one HTML file of the run that opens anywhere without a program: frames binned, with "
+            "marks, plots, reasons, space"},
+    {.name = "page-limit",
+     .needs = "page",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(bst_export_request, parts.page_limit_mb),
+     .argument = "MB",
+     .doc = "page: largest size (default 20): every second frame is left out until it fits",
+     .minimum = 1,
+     .maximum = 1000},
     {.name = "out",
      .kind = BST_OPTION_TEXT,
      .offset = offsetof(bst_export_request, parts.out),
@@ -67,7 +82,7 @@ const bst_option bst_export_options[] = {
      .argument = "NAME",
      .doc = "frames and observations of this sensor only: name or observer/name"},
     {.name = "first",
-     .needs = "frames|satnet|coco|yolo",
+     .needs = "frames|satnet|coco|yolo|page",
      .kind = BST_OPTION_INT,
      .offset = offsetof(bst_export_request, parts.e.first),
      .argument = "N",
@@ -75,7 +90,7 @@ const bst_option bst_export_options[] = {
      .minimum = 0,
      .maximum = 9e15},
     {.name = "last",
-     .needs = "frames|satnet|coco|yolo",
+     .needs = "frames|satnet|coco|yolo|page",
      .kind = BST_OPTION_INT,
      .offset = offsetof(bst_export_request, parts.e.last),
      .argument = "N",
@@ -83,7 +98,7 @@ const bst_option bst_export_options[] = {
      .minimum = 0,
      .maximum = 9e15},
     {.name = "every",
-     .needs = "frames|satnet|coco|yolo",
+     .needs = "frames|satnet|coco|yolo|page",
      .kind = BST_OPTION_INT,
      .offset = offsetof(bst_export_request, parts.e.every),
      .argument = "N",
@@ -102,11 +117,11 @@ const bst_option bst_export_options[] = {
      .argument = "run|frame",
      .doc = "grey levels: the same for all frames, or each frame's own (default run)"},
     {.name = "size",
-     .needs = "frames",
+     .needs = "frames|page",
      .kind = BST_OPTION_INT,
      .offset = offsetof(bst_export_request, parts.e.longest_side),
      .argument = "PX",
-     .doc = "longest side of the pictures (default as the frames are; never enlarged)",
+     .doc = "longest side of the pictures (default as the frames are, page: 640; never enlarged)",
      .minimum = 16,
      .maximum = 16384},
     {.name = "fps",
@@ -182,11 +197,12 @@ bst_status bst_export_request_settle(bst_ctx *ctx, bst_export_request *r) {
     if (e->frame_rate > 0.0 && r->parts.frames != 1) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "--fps has no effect without --frames mp4");
     }
-    if (!bst_export_into_folder(&r->parts) && !e->satnet && !e->coco && !e->yolo) {
+    if (!bst_export_into_folder(&r->parts) && !e->satnet && !e->coco && !e->yolo &&
+        !r->parts.page) {
         return bst_fail(
             ctx, BST_ERR_ARGUMENT,
             "nothing to export: add --frames, --table, --orbits, --observations, --satnet, "
-            "--coco or --yolo");
+            "--coco, --yolo or --page");
     }
     e->film = r->parts.frames == 1;
     e->frame_rate = e->frame_rate > 0.0 ? e->frame_rate : 10.0;

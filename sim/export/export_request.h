@@ -17,6 +17,7 @@ typedef struct bst_export_request {
     {                                                                                              \
         .parts =                                                                                   \
         {.e = {.last = INT64_C(9007199254740992), .every = 1, .box_px = 20.0, .star_limit = 10.0}, \
+         .page_limit_mb = 20.0,                                                                    \
          .frames = BST_EXPORT_NOT,                                                                 \
          .table = BST_EXPORT_NOT,                                                                  \
          .orbits = BST_EXPORT_NOT,                                                                 \

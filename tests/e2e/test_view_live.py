@@ -194,6 +194,17 @@ class Live(Tables):
             answer, pixels = self.page.ask()
         self.assertEqual(answer["frame"]["gain_e_per_dn"], 3.25)
         shown.append((answer["frame"], pixels))
+        for n in (2, 3, 1, 0, 65, -1e300, 1e300):  # a page with fewer pixels asks for means of n x n; other numbers are none
+            again, means = self.page.ask(after=0, binning=n)
+            self.assertEqual(again["frame"], answer["frame"])
+            if FULL and n in (2, 3):
+                size = -(-1024 // n)
+                self.assertEqual((again["binning"], again["frame_width"], means.shape), (n, 1024, (size, size)))
+                whole = 1024 // n
+                blocks = pixels[:whole * n, :whole * n].astype(int).reshape(whole, n, whole, n).sum(axis=(1, 3))
+                self.assertTrue(numpy.array_equal(means[:whole, :whole], (2 * blocks + n * n) // (2 * n * n)))
+            elif FULL:
+                self.assertTrue(numpy.array_equal(means, pixels))
         spectator = live_page.Socket(self.viewer)
         answer, pixels = spectator.ask({"do": "end"})
         self.assertEqual((answer["controller"], answer["problem"]), (False, "another page controls the run"))
@@ -286,7 +297,7 @@ class Start(unittest.TestCase):
         self.assertEqual([(one["name"], one["state"]) for one in listed["runs"]], [("one", "complete")])
         self.assertIn("neossat_geo_track.json", [one["file"] for one in listed["scenarios"]])
         self.assertNotIn("boresight.schema.json", [one["file"] for one in listed["scenarios"]])
-        self.assertEqual(viewer.json("api/session"), {"live": False, "runs": 0})
+        self.assertEqual(viewer.json("api/session"), {"live": False, "study": False, "runs": 0})
         self.assertEqual(viewer.status("/{token}/api/run"), 404)
         with open(folder + "/runs/one/quicklook.png", "wb") as file:
             file.write(b"\x89PNG")

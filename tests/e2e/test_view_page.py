@@ -92,7 +92,7 @@ class Page(unittest.TestCase):
     def test_every_pixel_and_overlay(self):
         """Read back from the graphics processor: all 16 bits. Marks are where the tables say, on the screen."""
         with chromium.Chromium(1280, 720) as page:
-            self.open(page, 20)
+            self.open(page, 20, "?webgl")
             self.assertEqual(page.evaluate("document.boresight.frameView.painter.constructor.name"), "WebglPainter")
             self.assertTrue(numpy.array_equal(self.shown_pixels(page), self.files[21].data))
             page.key("ArrowRight")
@@ -130,7 +130,8 @@ class Page(unittest.TestCase):
             return grey;
         })()"""
         with chromium.Chromium(1280, 720) as page:
-            for more, painter in (("", "WebglPainter"), ("?plain", "CanvasPainter")):
+            # Chromium's WebGL is software here, for which the page would choose the 2D canvas
+            for more, painter in (("?webgl", "WebglPainter"), ("?plain", "CanvasPainter"), ("", "CanvasPainter")):
                 self.open(page, 20, more)
                 self.assertEqual(page.evaluate("document.boresight.frameView.painter.constructor.name"), painter)
                 part = self.files[21].data[490:510, 490:510].astype(float)
@@ -167,6 +168,44 @@ class Page(unittest.TestCase):
                 !(one.getAttribute('aria-label') || one.textContent.trim() || (one.labels && one.labels.length))).map((one) => one.outerHTML)""")
             self.assertEqual(nameless, [])
             self.assertEqual(page.messages, [])
+
+    def test_exported_page(self):
+        """One file from file://, without a server: binned pixels, marks in their places, plots of all exposures, names as text;
+        frames are left out until it fits."""
+        page_file, small = (os.path.join(runs.scratch(), name) for name in ("run.html", "small.html"))
+        self.assertIn("24 of 24 frames, 2 x 2", runs.call_well("export", self.made, "--page", page_file))
+        runs.call_well("export", self.made, "--page", small, "--page-limit", "2")
+        self.assertLess(os.path.getsize(small), 2e6)
+        self.assertLess(os.path.getsize(page_file), 20e6)
+        with chromium.Chromium(1280, 720) as page:
+            page.command("Page.navigate", url="file://" + page_file.replace("<", "%3C"))
+            page.wait_for(SHOWN + " === 0 && document.boresight.plots.panels.every((panel) => panel.lines.length > 0)")
+            self.assertEqual(page.evaluate("document.boresight.count"), 24)
+            page.key("End")
+            page.wait_for(SHOWN + " === 23")
+            shown = page.evaluate("(() => { const i = document.boresight.frameView.image; return [i.width, i.height, i.frameWidth, ...i.data]; })()")
+            blocks = self.files[24].data.astype(int).reshape(512, 2, 512, 2).sum(axis=(1, 3))
+            self.assertEqual(shown, [512, 512, 1024, *((blocks + 2) // 4).ravel().tolist()])
+            at = page.evaluate("""(() => {
+                const view = document.boresight.frameView, target = view.sorted.target[0], at = view.toScreen(target.x, target.y);
+                return [target.text, at.x - view.stage.clientWidth / 2 - (target.x - 511.5) * view.view.scale];
+            })()""")
+            self.assertEqual(at[0], test_view.HOSTILE)
+            self.assertAlmostEqual(at[1], 0, delta=1e-6)
+            samples = page.evaluate("document.boresight.plots.panels.find((p) => p.info.name === 'detections').lines[0].map((p) => p.high)")
+            numbers = self.viewer.numbers("api/plot?sensor=0&panel=detections&from=0&to=100&columns=2000")
+            self.assertEqual(samples, numbers[1:1 + 3 * int(numbers[0])].reshape(-1, 3)[:, 2].tolist())
+            page.evaluate("document.getElementById('tab-why').click()")
+            page.wait_for("document.querySelectorAll('.why-list li').length > 1")
+            page.evaluate("document.getElementById('tab-space').click()")
+            page.wait_for("document.space && document.space.after && document.getElementById('space-readout').textContent.includes('km')")
+            self.assertEqual(page.evaluate("document.space.overlay.clientHeight > 400"), True)
+            self.assertEqual(page.evaluate("document.querySelectorAll('b:not(.value b), a[href]').length"), 0)
+            self.assertEqual(page.messages, [])
+            page.command("Page.navigate", url="file://" + small)
+            page.wait_for(SHOWN + " === 0")
+            self.assertIn("of 24 frames", page.evaluate("document.getElementById('exported').textContent"))
+            self.assertLess(page.evaluate("document.boresight.count"), 24)
 
     def test_events_and_plots_move_the_frame(self):
         with chromium.Chromium(1280, 720) as page:

@@ -49,3 +49,20 @@ test('before the first frame', () => {
   one.state.paused = false;
   assert.equal(one.waiting(), 'No frame yet');
 });
+
+test('while a run goes on, pixels that the screen cannot show are binned; they are asked for again when it pauses', () => {
+  const { one } = live(), asked = [];
+  Object.assign(one, { newest: true, socket: { readyState: 1, send: (text) => asked.push(JSON.parse(text)) }, sequence: 7 });
+  globalThis.devicePixelRatio = 1;
+  one.app.frameView = { view: { scale: 0.499 }, image: { binning: 2 } };
+  one.state = { obeyed: 0, paused: false, steps: 0 };
+  one.ask();
+  one.app.frameView.view.scale = 3;
+  one.ask();
+  one.app.frameView.view.scale = 0.25;
+  one.state.paused = true;
+  one.ask();
+  one.app.frameView.image = { binning: 1 };
+  one.ask();
+  assert.deepEqual(asked.map(({ binning, after }) => [binning, after]), [[2, 7], [1, 0], [1, 0], [1, 7]]);
+});

@@ -40,14 +40,24 @@ export async function getNumbers(route, query, signal = undefined) {
 /**
  * Pixels of a frame, [height][width], 16 bits.
  * @param {number} sensor @param {number} frame @param {AbortSignal} [signal]
+ * @param {number | string} [run] another one than the page's
  */
-export async function getPixels(sensor, frame, signal = undefined) {
-  const response = await get('pixels', { sensor, frame }, signal);
+export async function getPixels(sensor, frame, signal = undefined, run = RUN) {
+  const response = await get('pixels', { sensor, frame, run }, signal);
   return {
     width: Number(response.headers.get('X-Frame-Width')),
     height: Number(response.headers.get('X-Frame-Height')),
     data: new Uint16Array(await response.arrayBuffer()),
   };
+}
+
+/** Adds a style sheet of the page. @param {string} file */
+export function addStyle(file) {
+  const link = document.createElement('link');
+  link.rel = 'stylesheet';
+  link.href = file;
+  document.head.append(link);
+  return new Promise((done) => { link.onload = link.onerror = done; });
 }
 
 /** Sends text to a route and gets JSON. @param {string} route @param {string} body */

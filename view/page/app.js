@@ -14,6 +14,8 @@ const PLAY_MS = 90;
 /** State of a run in progress (bst_run_state_name), and time between two looks at its folder, ms. */
 const RUNNING = 'still running';
 const REFRESH_MS = 2000;
+/** Share of the time that the looks may take at most: the run's tables grow, and are read by the program that writes them. */
+const REFRESH_SHARE = 0.05;
 
 const element = (id) => document.getElementById(id);
 
@@ -46,11 +48,18 @@ class App {
     const query = new URLSearchParams(location.hash.slice(1));
     const session = await getJson('session');
     const address = new URLSearchParams(location.search);
+    this.ofStudy = Boolean(session.study);
+    if (session.study && (address.has('start') || !address.has('run'))) {
+      const { showStudy } = await import('./study.js');
+      await showStudy();
+      return;
+    }
     if (address.has('start') || (!session.live && session.runs === 0)) {
       const { showStart } = await import('./start.js');
       await showStart();
       return;
     }
+    if (session.exported) this.describeExport(session.exported);
     if (session.live) {
       const { Live } = await import('./live.js');
       this.live = new Live(this);
@@ -69,12 +78,25 @@ class App {
     if (this.inProgress()) this.follow();
   }
 
+  /** A page that is one file, without a program: what of the run it has. */
+  describeExport({ space, sensors }) {
+    const parts = sensors.map(({ rows, total, binning }) => `${rows.length} of ${total} frames${binning > 1 ? `, ${binning} × ${binning} pixels binned` : ''}`);
+    element('exported').hidden = false;
+    element('exported').textContent = parts.length > 1 ? 'copy' : parts[0];
+    element('exported').title = `This page is a copy of a part of the run, made by "boresight export --page". Sensors: ${parts.join('; ')}. ` +
+      'Plots show all exposures. "boresight view" shows the whole run.';
+    document.querySelector('h1 a').removeAttribute('href'); // there is no start page
+    this.panels.keep(['frame', 'why', ...(space ? ['space'] : [])]);
+  }
+
   inProgress() { return this.run.state === RUNNING || Boolean(this.live && !this.live.over); }
 
   /** Asks for what was recorded since, while the run is in progress; stays at the end if it is there. */
   async follow() {
-    while (this.inProgress()) {
-      await new Promise((done) => { setTimeout(done, REFRESH_MS); });
+    for (let took = 0; this.inProgress();) {
+      const wait = Math.max(REFRESH_MS, took / REFRESH_SHARE);
+      await new Promise((done) => { setTimeout(done, wait); });
+      const begin = performance.now();
       try {
         const { sensor } = this, run = await getJson('refresh'), frames = await getNumbers('frames', { sensor });
         const [modes, events, { names }] = await Promise.all([getModes(sensor), getJson('events'), getJson('names')]);
@@ -91,9 +113,11 @@ class App {
         this.showEvents(events);
         this.plots.extend(run.sensors[sensor].panels, modes, this.events, this.lastTime(modes));
         if (atEnd && this.count && !(this.live && this.live.newest)) await this.goTo(this.count - 1);
+        await this.plots.reloading;
       } catch (error) {
         this.showProblems([`The run cannot be followed: ${error.message}`]);
       }
+      took = performance.now() - begin;
     }
   }
 
@@ -341,6 +365,7 @@ class App {
     document.documentElement.dataset.theme = name;
     this.plots.draw();
     this.frameView.drawHistogram();
+    document.dispatchEvent(new CustomEvent('themechanged'));
   }
 
   onKey(event) {

@@ -1,5 +1,5 @@
 // The editor panel: the form, the text beside it, problems and figures that the program finds, saving.
-import { getJson, post } from './api.js';
+import { addStyle, getJson, post } from './api.js';
 import { EditorForm, make } from './editor_form.js';
 import { showFigures } from './editor_figures.js';
 import { SatelliteDialog } from './satellites.js';
@@ -213,8 +213,7 @@ export class Editor {
 
 /** Opens the panel. @param {HTMLElement} box */
 export async function open(box) {
-  const style = make('link', { rel: 'stylesheet', href: 'editor.css' });
-  document.head.append(style);
+  await addStyle('editor.css');
   box.classList.add('editor');
   box.append(document.getElementById('layout-editor').content.cloneNode(true));
   const editor = new Editor(await getJson('editor/schema'));

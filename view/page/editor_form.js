@@ -140,8 +140,8 @@ export class EditorForm {
   objectParts(schema, pointer) {
     const value = valueAt(this.editor.root(), pointer), parts = [], tools = make('div', { className: 'tools' });
     if (schema.oneOf) tools.append(this.alternatives(schema, pointer, value));
-    if ('tle_line1' in (schema.properties || {})) tools.append(button('Satellite or TLE…', 'Choose a satellite, or paste a TLE', () => this.editor.satellites(pointer)));
-    if (value !== undefined && !/\/\d+$/.test(pointer)) tools.append(button('Default', `Remove what is given of ${pointer}`, () => this.editor.set(pointer, undefined, true), 'quiet'));
+    if ('tle_line1' in (schema.properties || {})) tools.append(button('Satellite or TLE…', 'Satellite or TLE…: choose a satellite, or paste a TLE', () => this.editor.satellites(pointer)));
+    if (value !== undefined && !/\/\d+$/.test(pointer)) tools.append(button('Default', `Default: remove what is given of ${pointer}`, () => this.editor.set(pointer, undefined, true), 'quiet'));
     if (tools.childElementCount > 0) parts.push(tools);
     if (schema.oneOf && value === undefined) return parts; // such a module is not there
     return [...parts, ...this.parts(schema, pointer)];

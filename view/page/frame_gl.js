@@ -135,54 +135,89 @@ class WebglPainter {
   }
 }
 
+/** Ranges of the image's pixels that lie below each pixel of the screen along an axis; empty outside the image. */
+function rangesOf(count, centre, scale, size) {
+  const from = new Int32Array(count), to = new Int32Array(count), reach = scale >= 1 ? 0 : 0.5 / scale;
+  for (let k = 0; k < count; k++) {
+    const place = (k + 0.5 - count / 2) / scale + centre + 0.5;
+    if (!(place >= 0 && place < size)) continue;
+    from[k] = reach ? Math.max(0, Math.floor(place - reach + 0.5)) : Math.floor(place);
+    to[k] = Math.max(from[k] + 1, reach ? Math.min(size, Math.floor(place + reach + 0.5)) : 0);
+  }
+  return { from, to };
+}
+
 class CanvasPainter {
   constructor(canvas) {
     this.canvas = canvas;
-    this.context = canvas.getContext('2d');
+    this.context = canvas.getContext('2d', { willReadFrequently: true }); // in memory: it is filled from there
     this.held = null;
+    this.out = null;
+    this.greys = { key: '', colours: new Uint32Array(65536) };
   }
 
   fits() { return true; }
 
+  /** Colours of all values, as words of the picture. @param {Drawing} d */
+  coloursOf(d) {
+    const key = [d.black, d.white, d.soft, d.invert].join();
+    if (this.greys.key !== key) {
+      this.greys.key = key;
+      for (let value = 0; value < 65536; value++) this.greys.colours[value] = 0xff000000 | Math.round(255 * greyOf(value, d)) * 0x010101;
+    }
+    return this.greys.colours;
+  }
+
   draw(image, d) {
     const { width, height } = this.canvas;
     this.held = image;
-    this.context.clearRect(0, 0, width, height);
-    if (!image || width === 0 || height === 0) return;
-    const out = this.context.createImageData(width, height), grey = new Uint8Array(65536);
-    for (let value = 0; value < 65536; value++) grey[value] = Math.round(255 * greyOf(value, d));
-    const reach = d.scale >= 1 ? 0 : 0.5 / d.scale;
+    if (!image || width === 0 || height === 0) {
+      this.context.clearRect(0, 0, width, height);
+      return;
+    }
+    if (!this.out || this.out.width !== width || this.out.height !== height) {
+      this.out = this.context.createImageData(width, height);
+      this.words = new Uint32Array(this.out.data.buffer);
+    }
+    const colours = this.coloursOf(d), { words } = this, { data } = image;
+    const columns = rangesOf(width, d.centreX, d.scale, image.width), rows = rangesOf(height, d.centreY, d.scale, image.height);
+    words.fill(0);
     for (let y = 0, k = 0; y < height; y++) {
-      const fy = (y + 0.5 - height / 2) / d.scale + d.centreY + 0.5;
-      for (let x = 0; x < width; x++, k += 4) {
-        const fx = (x + 0.5 - width / 2) / d.scale + d.centreX + 0.5;
-        if (fx < 0 || fy < 0 || fx >= image.width || fy >= image.height) continue;
-        out.data[k] = out.data[k + 1] = out.data[k + 2] = grey[Math.round(CanvasPainter.mean(image, fx, fy, reach))];
-        out.data[k + 3] = 255;
+      const ay = rows.from[y], by = rows.to[y], skipY = Math.max(1, (by - ay) >> 2);
+      if (by === 0) { k += width; continue; }
+      for (let x = 0; x < width; x++, k++) {
+        const ax = columns.from[x], bx = columns.to[x];
+        if (bx === 0) continue;
+        if (bx - ax === 1 && by - ay === 1) {
+          words[k] = colours[data[ay * image.width + ax]];
+          continue;
+        }
+        const skipX = Math.max(1, (bx - ax) >> 2);
+        let sum = 0, count = 0;
+        for (let j = ay; j < by; j += skipY) {
+          for (let i = ax; i < bx; i += skipX) { sum += data[j * image.width + i]; count++; }
+        }
+        words[k] = colours[Math.round(sum / count)];
       }
     }
-    this.context.putImageData(out, 0, 0);
-  }
-
-  static mean(image, x, y, reach) {
-    if (reach === 0) return image.data[Math.floor(y) * image.width + Math.floor(x)];
-    const ax = Math.max(0, Math.floor(x - reach + 0.5)), ay = Math.max(0, Math.floor(y - reach + 0.5));
-    const bx = Math.max(ax + 1, Math.min(image.width, Math.floor(x + reach + 0.5)));
-    const by = Math.max(ay + 1, Math.min(image.height, Math.floor(y + reach + 0.5)));
-    const skip = Math.max(1, Math.floor((bx - ax) / 4));
-    let sum = 0, count = 0;
-    for (let j = ay; j < by; j += skip) {
-      for (let i = ax; i < bx; i += skip) { sum += image.data[j * image.width + i]; count++; }
-    }
-    return sum / count;
+    this.context.putImageData(this.out, 0, 0);
   }
 
   readBack() { return this.held ? this.held.data : null; }
 }
 
-/** A painter for a canvas. @param {HTMLCanvasElement} canvas @param {boolean} plain without WebGL */
-export function makePainter(canvas, plain) {
-  const gl = plain ? null : canvas.getContext('webgl2', { antialias: false, alpha: true, premultipliedAlpha: true });
+/** True if WebGL is computed by the processor: filling a 2D canvas takes less time then. */
+function isSoftware() {
+  const gl = document.createElement('canvas').getContext('webgl2'), more = gl && gl.getExtension('WEBGL_debug_renderer_info');
+  const name = more ? String(gl.getParameter(more.UNMASKED_RENDERER_WEBGL)) : '';
+  const lose = gl && gl.getExtension('WEBGL_lose_context');
+  if (lose) lose.loseContext();
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
+
+/** A painter for a canvas. @param {HTMLCanvasElement} canvas @param {boolean} plain without WebGL @param {boolean} [forced] with it, also where it is software */
+export function makePainter(canvas, plain, forced = false) {
+  const gl = plain || (!forced && isSoftware()) ? null : canvas.getContext('webgl2', { antialias: false, alpha: true, premultipliedAlpha: true });
   if (!gl) return new CanvasPainter(canvas);
   const painter = new WebglPainter(canvas, gl);
   canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());

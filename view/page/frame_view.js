@@ -19,13 +19,15 @@ export class FrameView {
     this.stage = element('stage');
     this.canvas = element('image');
     this.overlay = element('overlay');
-    this.painter = makePainter(this.canvas, new URLSearchParams(location.search).has('plain'));
+    const address = new URLSearchParams(location.search);
+    this.painter = makePainter(this.canvas, address.has('plain'), address.has('webgl'));
     this.image = null;
     this.statistics = null;
     this.counted = 0; // time of the statistics
     this.details = null;
     this.sorted = null;
     this.view = { x: 0, y: 0, scale: 1, fitted: true };
+    this.fittedSize = { width: 0, height: 0 }; // of the frame for which the zoom was chosen
     this.limits = null;
     this.cursor = null;
     this.shown = Object.fromEntries(KINDS.map((kind) => [kind.name, kind.shown]));
@@ -48,7 +50,6 @@ export class FrameView {
   /** @param {{width: number, height: number, data: Uint16Array} | null} image @param {any} details @param {string} why no pixels
    * @param {boolean} live one of many frames a second */
   show(image, details, why, live = false) {
-    const before = this.image;
     // statistics of a million pixels take longer than drawing them
     const counted = !live || performance.now() - this.counted > STATISTICS_MS;
     if (counted) this.counted = performance.now();
@@ -61,7 +62,9 @@ export class FrameView {
     element('no-pixels').textContent = image ? '' : why;
     if (image && !this.painter.fits(image)) this.usePlain();
     if (image && !this.limits) this.findLimits();
-    if (image && (!before || before.width !== image.width || before.height !== image.height)) this.view.fitted = true;
+    const size = this.frameSize();
+    if (image && (this.fittedSize.width !== size.width || this.fittedSize.height !== size.height)) this.view.fitted = true;
+    if (image) this.fittedSize = size;
     if (this.view.fitted) this.fit();
     for (const kind of KINDS) {
       element(`count-${kind.name}`).textContent = this.sorted ? String(this.sorted[kind.name].length) : '';
@@ -90,7 +93,8 @@ export class FrameView {
     const ratio = devicePixelRatio || 1, law = element('law').value, limits = this.limits || { black: 0, white: 65535 };
     const sigma = this.statistics ? this.statistics.sigma : 1;
     return {
-      centreX: this.view.x, centreY: this.view.y, scale: this.view.scale * ratio,
+      centreX: (this.view.x + 0.5) / this.binning() - 0.5, centreY: (this.view.y + 0.5) / this.binning() - 0.5,
+      scale: this.view.scale * ratio * this.binning(),
       black: limits.black, white: Math.max(limits.white, limits.black + 1),
       soft: law === 'asinh' ? 3 * sigma : 0, invert: element('invert').checked,
     };
@@ -123,8 +127,13 @@ export class FrameView {
   }
 
   frameSize() {
-    return this.image || { width: this.sensorWidth || 1024, height: this.sensorHeight || 1024 };
+    const { image } = this;
+    if (!image) return { width: this.sensorWidth || 1024, height: this.sensorHeight || 1024 };
+    return { width: image.frameWidth || image.width, height: image.frameHeight || image.height };
   }
+
+  /** Pixels of the frame along a side of one of the image. */
+  binning() { return (this.image && this.image.binning) || 1; }
 
   fit() {
     const { width, height } = this.size(), frame = this.frameSize();
@@ -181,7 +190,7 @@ export class FrameView {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
     if (!this.image) this.drawOutline(context);
-    if (this.view.scale >= VALUE_SCALE && this.image) this.drawValues(context);
+    if (this.view.scale * this.binning() >= VALUE_SCALE && this.image) this.drawValues(context);
     const wcs = this.details && this.details.wcs;
     if (this.sorted) {
       drawMarks(context, this.sorted, wcs, { toScreen: (x, y) => this.toScreen(x, y), scale: this.view.scale, width, height, shown: this.shown });
@@ -205,17 +214,18 @@ export class FrameView {
 
   drawValues(context) {
     const { width, height } = this.size(), a = this.toFrame(0, 0), b = this.toFrame(width, height), image = this.image;
-    context.font = `${Math.min(13, Math.round(this.view.scale / 3.6))}px system-ui, sans-serif`;
+    const n = this.binning(), side = this.view.scale * n, first = (at) => Math.max(0, Math.floor((at + 0.5) / n));
+    context.font = `${Math.min(13, Math.round(side / 3.6))}px system-ui, sans-serif`;
     context.textAlign = 'center';
     context.textBaseline = 'middle';
-    for (let y = Math.max(0, Math.round(a.y)); y <= Math.min(image.height - 1, Math.round(b.y)); y++) {
-      for (let x = Math.max(0, Math.round(a.x)); x <= Math.min(image.width - 1, Math.round(b.x)); x++) {
-        const at = this.toScreen(x, y), text = String(image.data[y * image.width + x]);
+    for (let y = first(a.y); y <= Math.min(image.height - 1, first(b.y)); y++) {
+      for (let x = first(a.x); x <= Math.min(image.width - 1, first(b.x)); x++) {
+        const at = this.toScreen((x + 0.5) * n - 0.5, (y + 0.5) * n - 0.5), text = String(image.data[y * image.width + x]);
         context.lineWidth = 2.5;
         context.strokeStyle = 'rgb(0 0 0 / 70%)';
-        context.strokeText(text, at.x, at.y + 0.32 * this.view.scale);
+        context.strokeText(text, at.x, at.y + 0.32 * side);
         context.fillStyle = '#ffffff';
-        context.fillText(text, at.x, at.y + 0.32 * this.view.scale);
+        context.fillText(text, at.x, at.y + 0.32 * side);
       }
     }
     context.textAlign = 'start';
@@ -251,9 +261,10 @@ export class FrameView {
     if (place) {
       const x = Math.round(place.x), y = Math.round(place.y);
       parts.push(['Pixel', this.cursor.exact ? `${place.x.toFixed(1)}, ${place.y.toFixed(1)}` : `${x}, ${y}`]);
-      if (image && x >= 0 && y >= 0 && x < image.width && y < image.height) {
-        const dn = image.data[y * image.width + x], d = this.details;
-        parts.push(['Value', `${dn} DN`]);
+      const frame = this.frameSize(), n = this.binning();
+      if (image && x >= 0 && y >= 0 && x < frame.width && y < frame.height) {
+        const dn = image.data[Math.floor(y / n) * image.width + Math.floor(x / n)], d = this.details;
+        parts.push(['Value', n > 1 ? `${dn} DN (mean of ${n} × ${n})` : `${dn} DN`]);
         if (d && Number.isFinite(d.gain_e_per_dn)) {
           parts.push(['Charge', `${NUMBER.format((dn - (d.offset_dn || 0)) * d.gain_e_per_dn)} e−`]);
         }

@@ -57,9 +57,19 @@ export class Live {
     });
   }
 
+  /** Pixels of a frame along one pixel of the screen while it runs; 1: each can be seen, or looked at. */
+  binning() {
+    const { frameView } = this.app;
+    if (!frameView || !this.state || this.state.paused || this.state.steps > 0) return 1;
+    return Math.max(1, Math.floor(1.02 / (frameView.view.scale * (devicePixelRatio || 1))));
+  }
+
   /** One request, which gets one answer. */
   ask() {
-    const asked = { sensor: this.app.sensor, after: this.sequence, take: true };
+    const binning = this.binning(), { image } = this.app.frameView || {};
+    // pixels that were binned are asked for again when they can be seen
+    const finer = this.newest && image && image.binning > binning;
+    const asked = { sensor: this.app.sensor, after: finer ? 0 : this.sequence, take: true, binning };
     const next = this.state && this.state.obeyed === this.sentAt ? undefined : this.queue[0];
     if (next) asked.command = next;
     if (this.socket.readyState !== WebSocket.OPEN) return; // the next connection asks
@@ -99,7 +109,8 @@ export class Live {
     if (answer.sequence) {
       this.sequence = answer.sequence;
       const { width, height } = answer;
-      const pixels = width > 0 ? { width, height, data: new Uint16Array(data, 4 + length, width * height) } : null;
+      const pixels = width > 0 ? { width, height, data: new Uint16Array(data, 4 + length, width * height), binning: answer.binning || 1,
+        frameWidth: answer.frame_width || width, frameHeight: answer.frame_height || height } : null;
       this.takeFrame(answer.frame, pixels);
     }
     if (answer.problem) this.sentAt = -1; // refused: it does not count
@@ -112,6 +123,8 @@ export class Live {
 
   takeFrame(details, pixels) {
     const { app } = this, sensor = app.run && app.run.sensors[app.sensor];
+    const again = this.trail.length > 0 && details.exposure_id === this.trail[this.trail.length - 1].id; // with finer pixels
+    if (again) this.trail.pop();
     if (this.trail.length && details.exposure_id <= this.trail[this.trail.length - 1].id) this.trail = [];
     const earlier = this.trail.flatMap((one) => one.tracks);
     this.trail.push({ id: details.exposure_id, tracks: details.tracks.map((track) => ({ ...track, now: false })) });
@@ -123,7 +136,7 @@ export class Live {
     element('position').textContent = `exposure ${details.exposure_id} · ${details.time_s.toFixed(2)} s · ${details.utc.replace('T', ' ').replace('Z', '')} UTC`;
     element('slider').value = element('slider').max;
     app.plots.follow(details.time_s);
-    this.shown++;
+    if (!again) this.shown++;
     document.dispatchEvent(new CustomEvent('liveframe', { detail: details.exposure_id }));
   }
 

@@ -6,6 +6,7 @@ const PANELS = [
   { name: 'frame', title: 'Frame' },
   { name: 'space', title: 'Space', module: './space.js' },
   { name: 'why', title: 'Why', module: './why.js' },
+  { name: 'compare', title: 'Compare', module: './compare.js' },
   { name: 'editor', title: 'Editor', module: './editor.js' },
 ];
 
@@ -22,20 +23,24 @@ export class Panels {
       tab.type = 'button';
       tab.id = `tab-${name}`;
       tab.textContent = title;
-      tab.setAttribute('role', 'tab');
-      tab.setAttribute('aria-selected', String(name === this.current));
+      if (name === this.current) tab.setAttribute('aria-current', 'page');
       tab.addEventListener('click', () => this.show(name));
       return tab;
     }));
   }
 
   /** Puts the start page in the place of the frame; without a run there is no space. @param {HTMLElement} start */
-  withoutRun(start) {
+  withoutRun(start, title = 'Start') {
     this.boxes.get('frame').box = start;
+    this.keep(['frame', 'editor']);
     for (const tab of this.bar.children) {
-      if (tab.id === 'tab-frame') tab.textContent = 'Start';
-      tab.hidden = !['tab-frame', 'tab-editor'].includes(tab.id);
+      if (tab.id === 'tab-frame') tab.textContent = title;
     }
+  }
+
+  /** Hides all other panels. @param {string[]} names */
+  keep(names) {
+    for (const tab of this.bar.children) tab.hidden = !names.includes(tab.id.replace('tab-', ''));
   }
 
   /** True if keys belong to the frame. */
@@ -51,7 +56,10 @@ export class Panels {
     before.box.hidden = true;
     box.hidden = false;
     this.current = name;
-    for (const tab of this.bar.children) tab.setAttribute('aria-selected', String(tab.id === `tab-${name}`));
+    for (const tab of this.bar.children) {
+      if (tab.id === `tab-${name}`) tab.setAttribute('aria-current', 'page');
+      else tab.removeAttribute('aria-current');
+    }
     const { ready, panel } = this.boxes.get(name);
     if (before.panel.hidden) before.panel.hidden();
     await ready;
@@ -63,7 +71,6 @@ export class Panels {
     const box = document.createElement('main'), made = { box, panel: {}, ready: null };
     box.className = 'panel';
     box.id = `panel-${name}`;
-    box.setAttribute('role', 'tabpanel');
     box.setAttribute('aria-label', title);
     document.getElementById('main').after(box);
     made.ready = import(module).then((loaded) => loaded.open(box, this.app)).then((panel) => { made.panel = panel || {}; })

@@ -74,7 +74,7 @@ class Panel {
     this.scaleButton.type = 'button';
     this.scaleButton.textContent = 'log';
     this.scaleButton.setAttribute('aria-pressed', String(this.log));
-    this.scaleButton.setAttribute('aria-label', `Logarithmic axis of ${info.title}`);
+    this.scaleButton.setAttribute('aria-label', `log: logarithmic axis of ${info.title}`);
     this.scaleButton.addEventListener('click', () => {
       this.log = !this.log;
       this.scaleButton.setAttribute('aria-pressed', String(this.log));
@@ -209,6 +209,7 @@ export class Plots {
     this.sensor = 0;
     this.drag = null;
     this.request = null;
+    this.reloading = Promise.resolve(); // the lines of the range that is shown
     this.listen(element('modes'));
     new ResizeObserver(() => { this.draw(); this.reload(); }).observe(element('panels'));
     element('time-in').addEventListener('click', () => this.zoom(0.5));
@@ -247,7 +248,7 @@ export class Plots {
     this.range = { from: Math.max(this.all.from, from), to: Math.min(this.all.to, to) };
     element('range').textContent = `${shortNumber(this.range.from)} to ${shortNumber(this.range.to)} s`;
     this.draw();
-    this.reload();
+    this.reloading = this.reload();
   }
 
   zoom(factor, centre = this.cursor) {

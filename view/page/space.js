@@ -1,5 +1,5 @@
 // The panel of space: Earth, orbits, observers with their fields of view, targets, Sun and Moon at the time of the frame.
-import { getBytes, getJson, getNumbers } from './api.js';
+import { addStyle, getBytes, getJson, getNumbers } from './api.js';
 import { make } from './editor_form.js';
 import { SpacePainter } from './space_gl.js';
 import * as math from './space_math.js';
@@ -309,7 +309,7 @@ export class SpaceView {
 
 /** Opens the panel. @param {HTMLElement} box @param {any} app */
 export async function open(box, app) {
-  document.head.append(make('link', { rel: 'stylesheet', href: 'space.css' }));
+  await addStyle('space.css');
   box.classList.add('space');
   box.append(document.getElementById('layout-space').content.cloneNode(true));
   const view = new SpaceView(app, await getJson('space/scene'));

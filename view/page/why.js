@@ -1,5 +1,5 @@
 // The panel that says why the target was detected in a frame, or not.
-import { getJson } from './api.js';
+import { addStyle, getJson } from './api.js';
 import { make } from './editor_form.js';
 
 /** Reasons in words for the list; shapes beside them, so that colour is not the only difference. */
@@ -11,7 +11,7 @@ const TITLES = {
 
 /** Opens the panel. @param {HTMLElement} box @param {any} app */
 export async function open(box, app) {
-  document.head.append(make('link', { rel: 'stylesheet', href: 'why.css' }));
+  await addStyle('why.css');
   box.classList.add('why');
   const head = make('h2', { dir: 'auto' }), text = make('p', { className: 'why-text', dir: 'auto' }), list = make('ol', { className: 'why-list' });
   text.setAttribute('role', 'status');

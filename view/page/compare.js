@@ -1,0 +1,309 @@
+// Two runs beside each other or one over the other: frames at the same time, plots, and the difference of their figures.
+import { addStyle, getJson, getNumbers, getPixels, post } from './api.js';
+import { make } from './editor_form.js';
+import { makePainter } from './frame_gl.js';
+import { drawMarks, KINDS, sortMarks } from './marks.js';
+import { readLines, shortNumber, ticksOf } from './plots.js';
+import { describePixels, limitsOf } from './statistics.js';
+
+const NUMBERS = 5;
+const LEFT = 62, RIGHT = 10, TOP = 8, BOTTOM = 18;
+
+/** Numbers of a summary with their paths, as the table has them. @param {any} node @returns {Map<string, number>} */
+export function figuresOf(node, path = '', found = new Map()) {
+  for (const [key, value] of Object.entries(node || {})) {
+    const name = path ? `${path} / ${key}` : key;
+    if (typeof value === 'number') found.set(name, value);
+    else if (typeof value === 'boolean') found.set(name, Number(value));
+    else if (value && typeof value === 'object') figuresOf(value, name, found);
+  }
+  return found;
+}
+
+/** Rows of both runs' figures: {name, a, b}; NaN: a run has none. */
+export function differences(one, other) {
+  const a = figuresOf(one), b = figuresOf(other);
+  return [...new Set([...a.keys(), ...b.keys()])].map((name) => ({ name, a: a.get(name) ?? NaN, b: b.get(name) ?? NaN }));
+}
+
+/** Index of the frame whose middle is nearest to a time; -1: there are none. @param {Float64Array} frames */
+export function nearestFrame(frames, time) {
+  const count = frames.length / NUMBERS;
+  let low = 0, high = count - 1;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (frames[NUMBERS * middle + 1] < time) low = middle + 1; else high = middle;
+  }
+  if (low > 0 && time - frames[NUMBERS * (low - 1) + 1] < frames[NUMBERS * low + 1] - time) low--;
+  return count ? low : -1;
+}
+
+/** Names that differ: base names of folders, or the whole paths where these are equal. */
+function shortName(path) { return path.replace(/\/+$/, '').split('/').pop() || path; }
+
+/** A frame of one of the runs. */
+class Side {
+  constructor(letter) {
+    this.canvas = make('canvas');
+    this.overlay = make('canvas');
+    this.caption = make('figcaption', { dir: 'auto' });
+    this.stage = make('div', { className: 'compare-stage' }, this.canvas, this.overlay);
+    this.box = make('figure', { className: 'compare-side' }, this.caption, this.stage);
+    this.overlay.setAttribute('role', 'img');
+    this.overlay.setAttribute('aria-label', `Frame of run ${letter}`);
+    this.canvas.setAttribute('aria-hidden', 'true');
+    this.letter = letter;
+    this.painter = makePainter(this.canvas, true);
+    this.image = this.details = this.limits = null;
+    this.soft = 0;
+  }
+
+  async load(run, name, sensor, target, frames, names, frame) {
+    this.run = run;
+    this.image = this.details = null;
+    if (frame >= 0) {
+      const kept = frames[NUMBERS * frame + 3] >= 0;
+      [this.image, this.details] = await Promise.all([kept ? getPixels(sensor, frame, undefined, run) : null, getJson('frame', { sensor, frame, run })]);
+      Object.assign(this.details, { names, target });
+    }
+    if (this.image && !this.limits) {
+      const statistics = describePixels(this.image.data);
+      this.limits = limitsOf('asinh', this.image.data, statistics);
+      this.soft = 3 * statistics.sigma;
+    }
+    const text = frame >= 0 ? `${name}: frame ${frame + 1}, ${frames[NUMBERS * frame + 1].toFixed(2)} s` : `${name}: no frames`;
+    this.caption.textContent = `${this.letter}  ${text}`;
+    this.overlay.setAttribute('aria-label', `Frame of run ${this.letter}, ${text}`);
+  }
+
+  /** @param {{black: number, white: number} | null} limits of both runs */
+  draw(limits, soft) {
+    const ratio = devicePixelRatio || 1, width = this.stage.clientWidth, height = this.stage.clientHeight;
+    for (const canvas of [this.canvas, this.overlay]) {
+      canvas.width = Math.max(1, Math.round(width * ratio));
+      canvas.height = Math.max(1, Math.round(height * ratio));
+    }
+    const { image, details } = this, context = this.overlay.getContext('2d');
+    const frame = image || { width: 1024, height: 1024 }, scale = Math.min(width / frame.width, height / frame.height);
+    const centre = { x: (frame.width - 1) / 2, y: (frame.height - 1) / 2 };
+    this.painter.draw(image, { centreX: centre.x, centreY: centre.y, scale: scale * ratio, black: limits ? limits.black : 0,
+      white: limits ? limits.white : 65535, soft, invert: false });
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    if (!details) return;
+    const toScreen = (x, y) => ({ x: (x - centre.x) * scale + width / 2, y: (y - centre.y) * scale + height / 2 });
+    drawMarks(context, sortMarks(details), details.wcs, { toScreen, scale, width, height, shown: Object.fromEntries(KINDS.map((kind) => [kind.name, kind.shown])) });
+  }
+}
+
+class Comparison {
+  constructor(box, app) {
+    this.app = app;
+    this.other = -1;
+    this.shown = false;
+    this.sides = [new Side('A'), new Side('B')];
+    this.choice = make('select');
+    this.how = make('select', {}, ...[['beside', 'side by side'], ['over', 'one over the other']].map(([value, text]) => make('option', { value, textContent: text })));
+    this.blend = make('input', { type: 'range', min: '0', max: '1', step: '0.05', value: '0.5' });
+    this.blendLabel = make('label', { className: 'inline', hidden: true }, 'A ', this.blend, ' B');
+    this.message = make('output', { className: 'hint' });
+    this.message.setAttribute('role', 'status');
+    this.stages = make('div', { className: 'compare-frames' }, ...this.sides.map((side) => side.box));
+    this.table = make('table', { className: 'study-table' });
+    this.plots = make('div', { className: 'compare-plots' });
+    const region = (title, ...children) => {
+      const one = make('section', { className: 'compare-part', tabIndex: 0 }, ...children);
+      one.setAttribute('aria-label', title);
+      return one;
+    };
+    box.append(make('div', { className: 'bar' }, make('label', { className: 'inline' }, 'Compare with ', this.choice), make('label', { className: 'inline' }, 'Frames ', this.how), this.blendLabel, this.message),
+      this.stages, make('div', { className: 'compare-lower' }, region('Plots of both runs', this.plots), region('Figures of both runs', this.table)));
+    this.choice.addEventListener('change', () => this.choose());
+    this.how.addEventListener('change', () => this.arrange());
+    this.blend.addEventListener('input', () => this.arrange());
+    document.addEventListener('frameshown', () => this.follow());
+    document.addEventListener('themechanged', () => this.drawPlots());
+    new ResizeObserver(() => this.draw()).observe(this.stages);
+  }
+
+  async list() {
+    const { open, runs } = await getJson('runs'), own = Number(new URLSearchParams(location.search).get('run') || 0);
+    const listed = new Set(open.map((run) => run.name.replace(/\/+$/, '')));
+    const values = [...open.filter((run) => run.number !== own).map((run) => [String(run.number), run.name]),
+      ...runs.filter((name) => !listed.has(`runs/${name}`)).map((name) => [`runs/${name}`, `runs/${name}`])];
+    values.push(...(await this.ofStudy(new Set(open.map((run) => run.number !== own && shortName(run.name))))));
+    this.choice.replaceChildren(...values.map(([value, textContent]) => make('option', { value, textContent })));
+    if (values.length) await this.choose();
+    else this.message.textContent = 'There is no other run: give two folders, or keep runs in runs/.';
+  }
+
+  /** Runs of the study that are not open yet. @param {Set<string>} open their names */
+  async ofStudy(open) {
+    if (!this.app.ofStudy) return [];
+    const { runs } = await getJson('study'), own = shortName(this.app.run.name);
+    const nameOf = (run) => String(run.run).padStart(6, '0');
+    return runs.filter((run) => run.folder && nameOf(run) !== own && !open.has(nameOf(run))).map((run) => [`study/${run.run}`, `run ${run.run} of the study`]);
+  }
+
+  async choose() {
+    const { value } = this.choice;
+    try {
+      if (value.startsWith('study/')) this.other = (await post('study/open', JSON.stringify({ number: Number(value.slice(6)) }))).run;
+      else if (value.startsWith('runs/')) this.other = (await post('open', JSON.stringify({ run: value.slice(5) }))).run;
+      else this.other = Number(value);
+      const run = this.other, [described, { names }] = await Promise.all([getJson('run', { run }), getJson('names', { run })]);
+      const sensor = Math.min(this.app.sensor, described.sensors.length - 1);
+      this.b = { described, names, sensor, frames: await getNumbers('frames', { sensor, run }) };
+      this.message.textContent = '';
+      this.fillTable();
+      await Promise.all([this.follow(), this.loadPlots()]);
+    } catch (error) {
+      this.message.textContent = `This run cannot be compared: ${error.message}`;
+    }
+  }
+
+  // ---------------------------------------------------------------- frames
+
+  /** Shows the frames at the time of the page's frame. */
+  async follow() {
+    const { app, b } = this;
+    if (!this.shown || !b || app.current < 0 || this.busy) return;
+    this.busy = true;
+    const own = Number(new URLSearchParams(location.search).get('run') || 0);
+    const targetOf = (described, sensor, names) => Number((Object.entries(names).find(([, name]) => name === described.sensors[sensor].target) || [-1])[0]);
+    try {
+      for (let at = -1; at !== app.current;) { // it may have gone on meanwhile
+        at = app.current;
+        await Promise.all([
+          this.sides[0].load(own, app.run.name, app.sensor, targetOf(app.run, app.sensor, app.names), app.frames, app.names, at),
+          this.sides[1].load(this.other, b.described.name, b.sensor, targetOf(b.described, b.sensor, b.names), b.frames, b.names, nearestFrame(b.frames, app.timeOf(at))),
+        ]);
+        this.draw();
+        this.drawPlots();
+      }
+    } catch (error) {
+      this.message.textContent = error.message;
+    } finally {
+      this.busy = false;
+    }
+  }
+
+  arrange() {
+    const over = this.how.value === 'over';
+    this.stages.classList.toggle('over', over);
+    this.blendLabel.hidden = !over;
+    this.sides[1].stage.style.opacity = over ? this.blend.value : '1';
+    this.draw();
+  }
+
+  /** Both have the stretch of the first, so that they can be compared. */
+  draw() {
+    const first = this.sides.find((side) => side.limits);
+    for (const side of this.sides) side.draw(first ? first.limits : null, first ? first.soft : 0);
+  }
+
+  // ---------------------------------------------------------------- figures
+
+  fillTable() {
+    const summaries = [this.app.run, this.b.described].map(({ manifest }) => ({ ...manifest.summary, warnings: manifest.warnings, wall_time_s: manifest.wall_time_s }));
+    const rows = differences(...summaries).map(({ name, a, b }) => {
+      const row = make('tr', { className: a === b ? '' : 'differs' }, make('th', { scope: 'row', dir: 'auto', textContent: name.replace(/_/g, ' ') }));
+      for (const value of [a, b, b - a]) row.append(make('td', { textContent: shortNumber(value) }));
+      return row;
+    });
+    const head = make('tr', {}, ...['Figure', `A ${shortName(this.app.run.name)}`, `B ${shortName(this.b.described.name)}`, 'B − A'].map((textContent) => make('th', { scope: 'col', dir: 'auto', textContent })));
+    this.table.replaceChildren(make('thead', {}, head), make('tbody', {}, ...rows));
+  }
+
+  // ---------------------------------------------------------------- plots
+
+  async loadPlots() {
+    const { app, b } = this, own = app.run.sensors[app.sensor].panels, others = b.described.sensors[b.sensor].panels;
+    const end = (frames) => (frames.length ? frames[frames.length - NUMBERS + 1] : 1);
+    const range = { from: 0, to: Math.max(end(app.frames), end(b.frames)), columns: 600 };
+    this.range = range;
+    this.panels = [];
+    for (const info of own.filter((panel) => others.some((other) => other.name === panel.name))) {
+      const ask = async (sensor, run) => readLines(await getNumbers('plot', { sensor, panel: info.name, ...range, ...(run >= 0 ? { run } : {}) }), info.lines.length);
+      const [a, c] = await Promise.all([ask(app.sensor, -1), ask(b.sensor, this.other)]), canvas = make('canvas');
+      canvas.setAttribute('role', 'img');
+      canvas.setAttribute('aria-label', `${info.title}: run A as full lines, run B as broken ones`);
+      this.panels.push({ info, lines: [a, c], canvas });
+    }
+    this.plots.replaceChildren(...this.panels.map(({ info, canvas }) => {
+      const title = make('h3', { textContent: info.title + (info.unit ? ` [${info.unit}]` : '') });
+      const key = make('span', { className: 'hint', textContent: ` ${info.lines.join(', ')}; A ——, B – –` });
+      title.append(key);
+      return make('div', { className: 'compare-plot' }, title, canvas);
+    }));
+    this.drawPlots();
+  }
+
+  drawPlots() {
+    for (const panel of this.panels || []) this.drawPlot(panel);
+  }
+
+  drawPlot({ info, lines, canvas }) {
+    const ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight, context = canvas.getContext('2d');
+    const style = getComputedStyle(document.documentElement), colour = (name) => style.getPropertyValue(name).trim();
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const log = info.name === 'pointing_error', scaled = (value) => (log ? Math.log10(Math.max(value, 1e-6)) : value);
+    const all = lines.flat(2).filter((point) => Number.isFinite(point.low) && (!log || point.low > 0));
+    if (all.length === 0) return;
+    let low = Infinity, high = -Infinity;
+    for (const point of all) {
+      low = Math.min(low, scaled(point.low));
+      high = Math.max(high, scaled(point.high));
+    }
+    const pad = 0.06 * (high - low) || 1, { from, to } = this.range;
+    const toX = (time) => LEFT + (time - from) / (to - from) * (width - LEFT - RIGHT);
+    const toY = (value) => height - BOTTOM - (scaled(value) - low + pad) / (high - low + 2 * pad) * (height - TOP - BOTTOM);
+    context.font = '11px system-ui, sans-serif';
+    context.fillStyle = colour('--faint');
+    context.strokeStyle = colour('--grid');
+    context.textAlign = 'right';
+    for (const tick of ticksOf(low - pad, high + pad, 3)) {
+      const value = log ? 10 ** tick : tick, y = Math.round(toY(value)) + 0.5;
+      context.beginPath(); context.moveTo(LEFT, y); context.lineTo(width - RIGHT, y); context.stroke();
+      context.fillText(shortNumber(value), LEFT - 6, y + 4);
+    }
+    context.textAlign = 'center';
+    for (const tick of ticksOf(from, to, Math.max(2, width / 110))) context.fillText(shortNumber(tick), toX(tick), height - 4);
+    lines.forEach((own, side) => own.forEach((points, k) => {
+      context.strokeStyle = colour(`--line-${k % 3}`);
+      context.lineWidth = 1.5;
+      context.setLineDash(side ? [5, 4] : []);
+      context.beginPath();
+      let down = false;
+      for (const point of points) {
+        if (!Number.isFinite(point.low) || (log && point.low <= 0)) { down = false; continue; }
+        if (down) context.lineTo(toX(point.time), toY(point.low)); else context.moveTo(toX(point.time), toY(point.low));
+        if (point.high !== point.low) context.lineTo(toX(point.time), toY(point.high));
+        down = true;
+      }
+      context.stroke();
+    }));
+    context.setLineDash([]);
+    const x = Math.round(toX(this.app.timeOf(Math.max(0, this.app.current)))) + 0.5;
+    context.strokeStyle = colour('--cursor');
+    context.lineWidth = 1;
+    context.beginPath(); context.moveTo(x, 0); context.lineTo(x, height - BOTTOM); context.stroke();
+  }
+}
+
+/** Opens the panel. @param {HTMLElement} box @param {any} app */
+export async function open(box, app) {
+  await addStyle('compare.css');
+  box.classList.add('compare');
+  const comparison = new Comparison(box, app);
+  document.comparison = comparison; // for tests of the page
+  return {
+    async shown() {
+      comparison.shown = true;
+      if (!comparison.b) await comparison.list();
+      else await comparison.follow();
+    },
+    hidden() { comparison.shown = false; },
+  };
+}

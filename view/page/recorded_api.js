@@ -1,0 +1,89 @@
+// In the place of api.js in a page of `boresight export --page`: answers that the page holds, each in an element with the
+// request as its key, compressed (zlib), in base64.
+
+/** The page does not have it; the message is for the user. */
+export class ServerError extends Error {}
+
+/** @type {Map<string, HTMLElement>} */
+const held = new Map([...document.querySelectorAll('script[data-key]')].map((one) => [one.dataset.key, one]));
+/** What the page holds of the run: {space, sensors: [{rows, total, every, binning}]}. */
+let about = null;
+
+/** Key of a request: its names in the order of the alphabet. */
+function keyOf(route, query) {
+  const words = Object.keys(query).sort().map((name) => `${name}=${query[name]}`);
+  return words.length ? `${route}?${words.join('&')}` : route;
+}
+
+/** @returns {Promise<ArrayBuffer>} what an element holds */
+async function unpack(one) {
+  const text = atob(one.textContent), packed = new Uint8Array(text.length);
+  for (let i = 0; i < text.length; i++) packed[i] = text.charCodeAt(i);
+  return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'))).arrayBuffer();
+}
+
+async function get(route, query) {
+  const one = held.get(keyOf(route, query));
+  if (!one) throw new ServerError('this page does not have it: ask "boresight view" for the whole run');
+  return unpack(one);
+}
+
+/** Spans of frames in the numbers of this page's frames; those without a frame here are left out. */
+function spansHere(spans, rows) {
+  const from = (row) => { // first frame here that is not before a row of the run
+    let low = 0, high = rows.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (rows[middle] < row) low = middle + 1; else high = middle;
+    }
+    return low;
+  };
+  return spans.map((span) => ({ ...span, first: from(span.first), last: from(span.last + 1) - 1 })).filter((span) => span.first <= span.last);
+}
+
+/** @param {string} route @param {Record<string, string | number>} [query] */
+export async function getJson(route, query = {}) {
+  const answer = JSON.parse(new TextDecoder().decode(await get(route, query)));
+  if (route === 'session') about = answer.exported;
+  if (route === 'why' && answer.spans) answer.spans = spansHere(answer.spans, about.sensors[query.sensor].rows);
+  return answer;
+}
+
+/** @param {string} route */
+export async function getBytes(route) { return get(route, {}); }
+
+/** 64-bit floating-point numbers. @param {string} route @param {Record<string, string | number>} query */
+export async function getNumbers(route, query) {
+  if (route === 'plot') return plotPart(new Float64Array(await get(route, { sensor: query.sensor, panel: query.panel })), query);
+  return new Float64Array(await get(route, query));
+}
+
+/** The extents of a plot's lines in a range of time, and those beside it. */
+function plotPart(numbers, { from, to }) {
+  const found = [];
+  for (let at = 0; at < numbers.length;) {
+    const count = numbers[at++], place = found.push(0) - 1, end = at + 3 * count;
+    for (let k = at; k < end; k += 3) {
+      const before = k + 3 < end && numbers[k + 3] < from, after = k > at && numbers[k - 3] > to;
+      if (before || after) continue;
+      found.push(numbers[k], numbers[k + 1], numbers[k + 2]);
+      found[place]++;
+    }
+    at = end;
+  }
+  return Float64Array.from(found);
+}
+
+/** Pixels of a frame: means of `binning` x `binning`. @param {number} sensor @param {number} frame */
+export async function getPixels(sensor, frame) {
+  const one = held.get(keyOf('pixels', { frame, sensor })), bytes = new Uint8Array(await get('pixels', { frame, sensor }));
+  const { width, height, binning, frame: size } = one.dataset, count = bytes.length / 2, data = new Uint16Array(count);
+  for (let i = 0; i < count; i++) data[i] = bytes[i] | bytes[count + i] << 8;
+  const [frameWidth, frameHeight] = size.split(',').map(Number);
+  return { width: Number(width), height: Number(height), data, binning: Number(binning), frameWidth, frameHeight };
+}
+
+/** The styles are in the page. */
+export async function addStyle() {}
+
+export async function post() { throw new ServerError('this page has no program behind it'); }
