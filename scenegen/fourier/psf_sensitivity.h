@@ -18,17 +18,19 @@ typedef struct bst_psf_sensitivity {
     /* least light up to n / BST_LIGHT_PER sigma from the peak along the direction, to either side,
      * over that of the peak */
     double light[BST_NODE_DIRECTIONS][BST_LIGHT_STEPS];
-    /* in pixels of a brightness class: greatest derivative, and greatest derivative over the square
-     * root of light, both over those of the brightest pixel */
-    double flank[BST_LIGHT_CLASSES], noisy[BST_LIGHT_CLASSES];
+    bst_light_flank flank[BST_FLANKS]; /* of the derivatives */
 } bst_psf_sensitivity;
 
-/* Measures the derivatives of a PSF over all its field nodes, in pixels that are not binned.
+/* Mean of exp(2 pi i f x) over `binning` pixels in a row, about their centre. */
+double bst_psf_binned(double f, int binning);
+
+/* Measures the derivatives of a PSF over all its field nodes, in read-out pixels of `binning` by
+ * `binning` of the sensor's. Peak and light are those of such pixels.
  *
  * Given:     cutoff    highest frequency, cycles/px
  *            sigma_px  of the Gaussian
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_psf_sensitivity_measure(bst_ctx *ctx, const bst_psf *psf, double cutoff,
-                                       double sigma_px, bst_psf_sensitivity *out) BST_MUST_CHECK;
+                                       double sigma_px, int binning, bst_psf_sensitivity *out) BST_MUST_CHECK;
 
 #endif

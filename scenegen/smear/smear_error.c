@@ -1,6 +1,8 @@
 /* Image error of a source from the errors of its nodes. */
 #include <math.h>
+#include <stdlib.h>
 
+#include "scenegen/smear/gaussian_flank.h"
 #include "scenegen/smear/smear_internal.h"
 
 enum { MAX_TAPS = BST_PLACE_TAPS };
@@ -47,19 +49,52 @@ double bst_smear_single_error(const bst_smear *s, double peak_e, double from_bor
                 peak_e / sqrt(s->dark_variance_e2));
 }
 
-/* Error of the worst pixel, in its sigma, of a source whose greatest error is that of its peak:
- * beside the peak there is less noise, but not always less error. */
-static double flank_of(const bst_smear *s, double peak_e, double bound) {
-    const bst_psf_sensitivity *psf = s->sensitivity;
-    double worst = 0.0, light_e = peak_e, sigma_e = sqrt(peak_e + s->dark_variance_e2);
-    if (!psf) {
-        return bound;
+bst_status bst_smear_find_sensitivity(bst_ctx *ctx, bst_smear *s) {
+    int n = (s->binning < BST_PIXEL_PARTS ? s->binning : BST_PIXEL_PARTS) - 1;
+    s->sensitivity = s->options.sensitivity;
+    if (s->sensitivity && n > 0 && !s->binned[n]) {
+        bst_psf_sensitivity *measured = malloc(sizeof *measured);
+        if (!measured) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the derivatives of a PSF");
+        }
+        bst_status status = bst_psf_sensitivity_measure(
+            ctx, s->options.psf, s->options.cutoff, s->options.node_sigma_px, n + 1, measured);
+        if (status != BST_OK) {
+            free(measured);
+            return status;
+        }
+        s->binned[n] = measured;
     }
+    if (!s->sensitivity && !s->gaussian_flanks[n]) {
+        bst_light_flank *flanks = malloc(BST_FLANKS * sizeof *flanks);
+        if (!flanks) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the errors beside a PSF's peak");
+        }
+        double streak = s->sigma_px * BST_STREAK_SIGMAS;
+        bst_gaussian_flank_measure(s->sigma_px, n + 1, 0.0, &flanks[BST_FLANK_POINT]);
+        bst_gaussian_flank_measure(s->sigma_px, n + 1, streak * streak / 12.0,
+                                   &flanks[BST_FLANK_STREAK]);
+        s->gaussian_flanks[n] = flanks;
+    }
+    s->sensitivity = s->sensitivity && n > 0 ? s->binned[n] : s->sensitivity;
+    s->flanks = s->sensitivity ? s->sensitivity->flank : s->gaussian_flanks[n];
+    return BST_OK;
+}
+
+/* Error of the worst pixel, in its sigma, of a source whose greatest error is that of its peak:
+ * beside the peak there is less noise, but not always less error. Along a path there is more light
+ * than beside a point. bound: of a Gaussian much wider than its pixels. */
+static double flank_of(const bst_smear *s, const bst_smear_drawn *d, double bound) {
+    double extent_px = hypot(d->high[0] - d->low[0], d->high[1] - d->low[1]);
+    bool streak = extent_px >= BST_STREAK_SIGMAS * s->sigma_px;
+    const bst_light_flank *flank = &s->flanks[streak ? BST_FLANK_STREAK : BST_FLANK_POINT];
+    double peak_e = s->last_read_e, light_e = peak_e, sigma_e = sqrt(peak_e + s->dark_variance_e2);
+    double worst = s->sensitivity ? 0.0 : bound;
     for (int k = 0; k < BST_LIGHT_CLASSES; k++) {
         double less_e = k + 1 < BST_LIGHT_CLASSES ? 0.5 * light_e : 0.0;
-        double dim = psf->flank[k] / sqrt(less_e + s->dark_variance_e2);
+        double dim = flank->error[k] / sqrt(less_e + s->dark_variance_e2);
         double lit = k + 1 < BST_LIGHT_CLASSES
-                         ? psf->noisy[k] / sqrt(peak_e + s->dark_variance_e2 * peak_e / light_e)
+                         ? flank->noisy[k] / sqrt(peak_e + s->dark_variance_e2 * peak_e / light_e)
                          : INFINITY;
         worst = fmax(worst, sigma_e * fmin(dim, lit));
         light_e = less_e;
@@ -88,7 +123,7 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
         .y_px = (float)d->y,
         .peak_e = (float)peak_e,
         .nodes_e = (float)((flank * error + rounded) * peak_e + s->poses_sigma * sigma_e),
-        .predicted_e = (float)((flank_of(s, peak_e, flank) * predicted + rounded) * peak_e +
+        .predicted_e = (float)((flank_of(s, d, flank) * predicted + rounded) * peak_e +
                                s->poses_sigma * sigma_e),
         .shared_e = (float)(shared * sigma_e),
         .excess_e = (float)(lost * peak_e),

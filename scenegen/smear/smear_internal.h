@@ -61,6 +61,11 @@ struct bst_smear {
     int binning, sources;
     double pixel_part[3];                   /* as in bst_smear_node_aim */
     const bst_psf_sensitivity *sensitivity; /* of the frame; NULL: as of the Gaussian */
+    const bst_light_flank *flanks;          /* [BST_FLANKS] of the frame */
+    /* those of binnings used so far, by binning - 1, NULL: none. Without a sensitivity of the PSF
+     * the flanks of the Gaussian. */
+    bst_psf_sensitivity *binned[BST_PIXEL_PARTS];
+    bst_light_flank *gaussian_flanks[BST_PIXEL_PARTS];
     double aim;                             /* share of the tolerance */
     double grid_per_px;                     /* least grid samples per px of the frame */
     bst_quat q_reference;
@@ -218,6 +223,10 @@ typedef struct bst_smear_drawn {
     int radius;             /* of the stamp */
     bool moving;
 } bst_smear_drawn;
+
+/* Finds the PSF's sensitivity to nodes in the frame's read-out pixels, and its flanks. Errors:
+ * BST_ERR_MEMORY. */
+bst_status bst_smear_find_sensitivity(bst_ctx *ctx, bst_smear *s) BST_MUST_CHECK;
 
 /* Sets last_error of that source's image, wherever it falls. */
 void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d);
