@@ -24,7 +24,9 @@ typedef struct measuring {
     bst_fft *inverse;
     double step; /* of the frequencies, cycles/px */
     double otf[LATTICE * LATTICE][2];
-    float light[BST_FLANKS][SIDE * SIDE]; /* over the peak: of the point, and of a path */
+    /* over the peak: of the point, and of a path; one over its square root */
+    float light[BST_FLANKS][SIDE * SIDE], quiet[BST_FLANKS][SIDE * SIDE];
+    bst_light_flank flank[BST_FLANKS][BST_NODE_DIRECTIONS][3];
 } measuring;
 
 /* At frequencies of whole cycles per px the limit: its sign does not matter to a modulus, but to
@@ -79,9 +81,10 @@ static double greatest_near(const measuring *m, int k, int part) {
     return here + more;
 }
 
-/* Raises the sensitivities to those of one derivative of a field node. */
-static void add_derivative(const measuring *m, int part, double gaussian, double *most,
+/* Raises the sensitivities to those of one derivative of a field node, along direction d. */
+static void add_derivative(measuring *m, int part, double gaussian, int d, int order,
                            bst_psf_sensitivity *out) {
+    double *most = &out->part[d][order];
     double top = 0.0;
     int greatest = 0;
     for (int k = 0; k < SIDE * SIDE; k++) {
@@ -94,7 +97,8 @@ static void add_derivative(const measuring *m, int part, double gaussian, double
     for (int k = 0; k < SIDE * SIDE; k++) {
         double value = fabs((double)m->room[k][part]) * per;
         for (int f = 0; f < BST_FLANKS; f++) {
-            bst_light_flank_raise(&out->flank[f], (double)m->light[f][k], value);
+            bst_light_flank_raise(&m->flank[f][d][order], (double)m->light[f][k], value,
+                                  value * (double)m->quiet[f][k]);
         }
     }
 }
@@ -170,6 +174,7 @@ static void keep_light(measuring *m, int flank) {
     float top = m->room[brightest_of(m)][0];
     for (int k = 0; k < SIDE * SIDE; k++) {
         m->light[flank][k] = m->room[k][0] / top;
+        m->quiet[flank][k] = 1.0F / sqrtf(fmaxf(m->light[flank][k], 1e-12F));
     }
 }
 
@@ -189,14 +194,22 @@ static void measure_node(measuring *m, const bst_psf *psf, int node, double sigm
     keep_light(m, BST_FLANK_POINT);
     add_light(m, sigma_px, out);
     for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
-        double angle = d * BST_PI / BST_NODE_DIRECTIONS, *part = out->part[d];
+        double angle = d * BST_PI / BST_NODE_DIRECTIONS;
         make_images(m, angle, SMOOTHED * square, (const int[2]){0, 2});
         keep_light(m, BST_FLANK_STREAK);
-        add_derivative(m, 1, GAUSSIAN[0] * peak / square, &part[0], out);
+        add_derivative(m, 1, GAUSSIAN[0] * peak / square, d, 0, out);
         make_images(m, angle, 0.0, (const int[2]){4, 6});
-        add_derivative(m, 0, GAUSSIAN[1] * peak / (square * square), &part[1], out);
-        add_derivative(m, 1, GAUSSIAN[2] * peak / (square * square * square), &part[2], out);
+        add_derivative(m, 0, GAUSSIAN[1] * peak / (square * square), d, 1, out);
+        add_derivative(m, 1, GAUSSIAN[2] * peak / (square * square * square), d, 2, out);
         add_row(m, angle, sigma_px, out->row[d]);
+    }
+}
+
+static void make_curves(const measuring *m, bst_psf_sensitivity *out) {
+    for (int k = 0; k < BST_FLANKS * BST_NODE_DIRECTIONS * 3; k++) {
+        int f = k / (3 * BST_NODE_DIRECTIONS), d = k / 3 % BST_NODE_DIRECTIONS, order = k % 3;
+        bst_flank_curve_make(&m->flank[f][d][order], &out->flank[f][d][order]);
+        bst_flank_curve_raise(&out->any_flank[f], &out->flank[f][d][order]);
     }
 }
 
@@ -222,6 +235,9 @@ bst_status bst_psf_sensitivity_measure(bst_ctx *ctx, const bst_psf *psf, double 
     }
     for (int n = 0; status == BST_OK && n < bst_psf_nodes(psf); n++) {
         measure_node(m, psf, n, sigma_px, binning, out);
+    }
+    if (status == BST_OK) {
+        make_curves(m, out);
     }
     if (m) {
         bst_fft_free(m->inverse);

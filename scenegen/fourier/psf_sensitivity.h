@@ -4,7 +4,7 @@
 #define BST_SCENEGEN_FOURIER_PSF_SENSITIVITY_H
 
 #include "boresight/status.h"
-#include "scenegen/light_classes.h"
+#include "scenegen/light_flank.h"
 #include "scenegen/smear/smear_quadrature.h"
 #include "sim/optics/psf.h"
 
@@ -18,7 +18,8 @@ typedef struct bst_psf_sensitivity {
     /* least light up to n / BST_LIGHT_PER sigma from the peak along the direction, to either side,
      * over that of the peak */
     double light[BST_NODE_DIRECTIONS][BST_LIGHT_STEPS];
-    bst_light_flank flank[BST_FLANKS]; /* of the derivatives */
+    /* of the derivatives of order 2, 4 and 6 along each direction; the greatest of all */
+    bst_flank_curve flank[BST_FLANKS][BST_NODE_DIRECTIONS][3], any_flank[BST_FLANKS];
 } bst_psf_sensitivity;
 
 /* Mean of exp(2 pi i f x) over `binning` pixels in a row, about their centre. */

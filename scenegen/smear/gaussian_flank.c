@@ -58,7 +58,7 @@ void bst_gaussian_flank_measure(double sigma_px, int binning, double smoothed_px
     axis_means image, light;
     find_means(half, step, &image);
     find_means(half / wide, step / wide, &light);
-    bst_light_flank_clear(out);
+    *out = (bst_light_flank){.error = {0.0}};
     double peak = light.at[STEPS][0] * image.at[STEPS][0];
     for (int o = 0; o < (int)(sizeof orders / sizeof *orders); o++) {
         double top = 0.0;
@@ -74,7 +74,8 @@ void bst_gaussian_flank_measure(double sigma_px, int binning, double smoothed_px
                 }
                 double e = derivative(image.at[i], image.at[j], orders[o], c, s);
                 double share = light.at[i][0] * image.at[j][0] / peak;
-                bst_light_flank_raise(out, share, fabs(e) / top);
+                double error = fabs(e) / top;
+                bst_light_flank_raise(out, share, error, error / sqrt(fmax(share, 1e-12)));
             }
         }
     }

@@ -3,7 +3,7 @@
 #ifndef BST_SCENEGEN_SMEAR_GAUSSIAN_FLANK_H
 #define BST_SCENEGEN_SMEAR_GAUSSIAN_FLANK_H
 
-#include "scenegen/light_classes.h"
+#include "scenegen/light_flank.h"
 
 /* Measures the derivatives of order 2, 3, 4 and 6 of a point's image, along the pixels' rows and at
  * two angles to them, over the greatest along the rows, by the light of the pixel.

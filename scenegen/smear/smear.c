@@ -529,7 +529,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
                              .travel_px = travel_px,
                              .error = error,
                              .predicted = predicted,
-
+                             .level = used,
+                             .scale = cell ? cell->scale : 1.0,
                              .radius = radius,
                              .moving = moving};
     memcpy(drawn.low, low, sizeof low);

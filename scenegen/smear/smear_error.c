@@ -66,40 +66,48 @@ bst_status bst_smear_find_sensitivity(bst_ctx *ctx, bst_smear *s) {
         s->binned[n] = measured;
     }
     if (!s->sensitivity && !s->gaussian_flanks[n]) {
-        bst_light_flank *flanks = malloc(BST_FLANKS * sizeof *flanks);
-        if (!flanks) {
+        bst_flank_curve *curves = malloc(BST_FLANKS * sizeof *curves);
+        if (!curves) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the errors beside a PSF's peak");
         }
-        double streak = s->sigma_px * BST_STREAK_SIGMAS;
-        bst_gaussian_flank_measure(s->sigma_px, n + 1, 0.0, &flanks[BST_FLANK_POINT]);
-        bst_gaussian_flank_measure(s->sigma_px, n + 1, streak * streak / 12.0,
-                                   &flanks[BST_FLANK_STREAK]);
-        s->gaussian_flanks[n] = flanks;
+        for (int f = 0; f < BST_FLANKS; f++) {
+            double streak = f == BST_FLANK_STREAK ? s->sigma_px * BST_STREAK_SIGMAS : 0.0;
+            bst_light_flank flank;
+            bst_gaussian_flank_measure(s->sigma_px, n + 1, streak * streak / 12.0, &flank);
+            bst_flank_curve_make(&flank, &curves[f]);
+        }
+        s->gaussian_flanks[n] = curves;
     }
     s->sensitivity = s->sensitivity && n > 0 ? s->binned[n] : s->sensitivity;
-    s->flanks = s->sensitivity ? s->sensitivity->flank : s->gaussian_flanks[n];
+    s->flanks = s->sensitivity ? s->sensitivity->any_flank : s->gaussian_flanks[n];
     return BST_OK;
+}
+
+/* Part of a source's predicted error that is not of its nodes' missed highest moments. */
+static double higher_part(const bst_smear *s, const bst_smear_drawn *d) {
+    double nodes = d->predicted - d->level->predicted_profile, square = d->scale * d->scale;
+    int k = BST_NODE_SCALES - 2;
+    for (; k > 0 && square < 1.0; k--, square *= 2.0) {
+    }
+    return s->sensitivity && d->predicted > 0.0
+               ? 1.0 - (1.0 - d->level->higher_part[k]) * fmax(nodes, 0.0) / d->predicted
+               : 1.0;
 }
 
 /* Error of the worst pixel, in its sigma, of a source whose greatest error is that of its peak:
  * beside the peak there is less noise, but not always less error. Along a path there is more light
  * than beside a point. bound: of a Gaussian much wider than its pixels. */
 static double flank_of(const bst_smear *s, const bst_smear_drawn *d, double bound) {
-    double extent_px = hypot(d->high[0] - d->low[0], d->high[1] - d->low[1]);
-    bool streak = extent_px >= BST_STREAK_SIGMAS * s->sigma_px;
-    const bst_light_flank *flank = &s->flanks[streak ? BST_FLANK_STREAK : BST_FLANK_POINT];
-    double peak_e = s->last_read_e, light_e = peak_e, sigma_e = sqrt(peak_e + s->dark_variance_e2);
-    double worst = s->sensitivity ? 0.0 : bound;
-    for (int k = 0; k < BST_LIGHT_CLASSES; k++) {
-        double less_e = k + 1 < BST_LIGHT_CLASSES ? 0.5 * light_e : 0.0;
-        double dim = flank->error[k] / sqrt(less_e + s->dark_variance_e2);
-        double lit = k + 1 < BST_LIGHT_CLASSES
-                         ? flank->noisy[k] / sqrt(peak_e + s->dark_variance_e2 * peak_e / light_e)
-                         : INFINITY;
-        worst = fmax(worst, sigma_e * fmin(dim, lit));
-        light_e = less_e;
+    double wide = d->high[0] - d->low[0], high = d->high[1] - d->low[1],
+           streak = BST_STREAK_SIGMAS * s->sigma_px;
+    int f = wide * wide + high * high >= streak * streak ? BST_FLANK_STREAK : BST_FLANK_POINT;
+    double light = s->last_read_e / s->dark_variance_e2;
+    double any = bst_flank_curve_at(&s->flanks[f], light), part = higher_part(s, d);
+    if (!s->sensitivity) {
+        return fmax(any, bound);
     }
-    return worst;
+    return part < 1.0 ? part * any + (1.0 - part) * bst_flank_curve_at(&d->level->flank[f], light)
+                      : any;
 }
 
 /* Sets the image errors of a source at (x, y), wherever it falls. */

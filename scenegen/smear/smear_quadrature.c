@@ -187,6 +187,7 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
     bst_smear_direction_parts along = bst_smear_find_direction_parts(m, axis, r->nodes);
     bst_smear_missed_parts(m, &along, r, part);
     double square = 1.0 / (1 << (BST_NODE_SCALES - 2));
+    bool row = false;
     for (int k = 0; k < BST_NODE_SCALES; k++, square *= 2.0) {
         double fourth = square * square;
         double low = square * (square > 1.0 ? sqrt(square) : 1.0);
@@ -196,12 +197,21 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
         double bound = fixed + higher + missed;
         if (along.missed < 1.0) { /* the length of a group smooths in any direction */
             double one = along.missed * part[k];
-            part[k] = fmin(bst_smear_row_part(m, &along, r, sqrt(square), one), part[k]);
+            double many = bst_smear_row_part(m, &along, r, sqrt(square), one);
+            row = row || many > one;
+            part[k] = fmin(many, part[k]);
         }
-        double predicted = along.second * fixed + along.higher * higher + part[k] * missed;
+        double rest = along.second * fixed + along.higher * higher;
+        double predicted = rest + part[k] * missed;
+        list->higher[k] = rest > list->higher[k] ? rest : list->higher[k];
         list->error[k] = bound > list->error[k] ? bound : list->error[k];
         list->predicted[k] = predicted > list->predicted[k] ? predicted : list->predicted[k];
     }
+    for (int d = 0; d < BST_NODE_DIRECTIONS && m->direction_part; d++) {
+        list->directions |= along.in_range[d] || row ? 1U << d : 0U;
+    }
+    /* a row has a pattern of its own */
+    list->orders |= row ? 7U << 1 : r->nodes > 1 ? 1U << r->nodes : 0U;
     return along.second * r->fixed + along.higher * (r->error - r->missed - r->fixed) +
            part[BST_NODE_SCALES - 2] * r->missed;
 }

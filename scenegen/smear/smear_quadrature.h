@@ -43,6 +43,11 @@ typedef struct bst_smear_node_list {
     /* the same of the predicted error: at most the bound, which takes the greatest derivative of
      * the PSF for the whole length of a group */
     double predicted[BST_NODE_SCALES];
+    /* what is predicted without the missed highest moments, which are derivatives of the image of
+     * order 2 n along the groups: bits n of `orders`, d of `directions`; both 0 if the PSF's
+     * derivatives are not known by direction */
+    double higher[BST_NODE_SCALES];
+    unsigned orders, directions;
 } bst_smear_node_list;
 
 /* Largest widening of a node, PSF variances. */
