@@ -1,5 +1,5 @@
-/* Errors of nodes beside the peak of a point's image, where there is less noise, but not always less
- * error. */
+/* Errors of nodes beside the peak of a point's image, where there is less noise, but not always
+ * less error. */
 #ifndef BST_SCENEGEN_LIGHT_FLANK_H
 #define BST_SCENEGEN_LIGHT_FLANK_H
 

@@ -141,8 +141,6 @@ static bst_status open_psf(bst_ctx *ctx, bst_device *device, bst_renderer *r,
     smear->share_sigma_px = bst_fourier_render_band(r->fourier)->share_sigma_px;
     smear->grid_per_px = bst_fourier_render_density(r->fourier, false);
     smear->sensitivity = &bst_fourier_render_band(r->fourier)->sensitivity;
-    smear->psf = r->psf;
-    smear->cutoff = bst_fourier_render_band(r->fourier)->cutoff;
     memcpy(smear->pixel_part, bst_fourier_render_band(r->fourier)->pixel_part,
            sizeof smear->pixel_part);
     return BST_OK;

@@ -89,7 +89,8 @@ static void measure_parts(const bst_psf *psf, int node, const double peak_px[2],
             w2[d] = w * w;
         }
         for (int b = 0; b < BST_PIXEL_PARTS; b++) {
-            double mean = bst_psf_binned(fx, b + 1) * bst_psf_binned(fy, b + 1), m = size * fabs(mean);
+            double mean = bst_psf_binned(fx, b + 1) * bst_psf_binned(fy, b + 1),
+                   m = size * fabs(mean);
             top[b] += mean * light;
             for (int d = 0; d < DIRECTIONS; d++) {
                 along[b][d][0] += w2[d] * m;

@@ -44,8 +44,16 @@ static float *room_at(const measuring *m, int i, int j) {
     return m->room[((j - LATTICE / 2 + SIDE) % SIDE) * SIDE + (i - LATTICE / 2 + SIDE) % SIDE];
 }
 
+static double power_of(double x, int n) {
+    double power = 1.0;
+    for (; n > 0; n--) {
+        power *= x;
+    }
+    return power;
+}
+
 /* Images of two derivatives of even order along a direction, as the real and the imaginary part:
- * both are real. Order 0: the PSF, smoothed along the direction. */
+ * both are real. The first is smoothed along the direction, the second if both are derivatives. */
 static void make_images(measuring *m, double angle, double smoothed_px2, const int order[2]) {
     memset(m->room, 0, sizeof *m->room * SIDE * SIDE);
     for (int k = 0; k < LATTICE * LATTICE; k++) {
@@ -55,7 +63,8 @@ static void make_images(measuring *m, double angle, double smoothed_px2, const i
         }
         double w = 2.0 * BST_PI * (frequency(m, i) * cos(angle) + frequency(m, j) * sin(angle));
         double w2 = w * w, smooth = exp(-0.5 * smoothed_px2 * w2);
-        double a = order[0] > 0 ? pow(w2, 0.5 * order[0]) : smooth, b = pow(w2, 0.5 * order[1]);
+        double a = smooth * power_of(w2, order[0] / 2), b = power_of(w2, order[1] / 2);
+        b *= order[0] > 0 ? smooth : 1.0;
         const double *v = m->otf[k];
         float *z = room_at(m, i, j);
         z[0] = (float)(a * v[0] - b * v[1]);
@@ -178,6 +187,23 @@ static void keep_light(measuring *m, int flank) {
     }
 }
 
+/* Raises the greatest smoothed derivatives along a direction. */
+static void add_smoothed(measuring *m, double angle, double peak, double sigma_px,
+                         double smooth[BST_SMOOTH_STEPS][2]) {
+    double square = sigma_px * sigma_px, fourth = square * square;
+    for (int n = 1; n < BST_SMOOTH_STEPS; n++) {
+        make_images(m, angle, n * square / BST_SMOOTH_PER, (const int[2]){4, 6});
+        for (int part = 0; part < 2; part++) {
+            int greatest = 0;
+            for (int k = 0; k < SIDE * SIDE; k++) {
+                greatest = fabsf(m->room[k][part]) > fabsf(m->room[greatest][part]) ? k : greatest;
+            }
+            double unit = GAUSSIAN[part + 1] * peak / (part == 0 ? fourth : fourth * square);
+            smooth[n][part] = fmax(smooth[n][part], greatest_near(m, greatest, part) / unit);
+        }
+    }
+}
+
 /* Raises the sensitivities to those of a field node. */
 static void measure_node(measuring *m, const bst_psf *psf, int node, double sigma_px, int binning,
                          bst_psf_sensitivity *out) {
@@ -201,6 +227,8 @@ static void measure_node(measuring *m, const bst_psf *psf, int node, double sigm
         make_images(m, angle, 0.0, (const int[2]){4, 6});
         add_derivative(m, 0, GAUSSIAN[1] * peak / (square * square), d, 1, out);
         add_derivative(m, 1, GAUSSIAN[2] * peak / (square * square * square), d, 2, out);
+        add_smoothed(m, angle, peak, sigma_px, out->smooth[d]);
+        memcpy(out->smooth[d][0], &out->part[d][1], sizeof out->smooth[d][0]);
         add_row(m, angle, sigma_px, out->row[d]);
     }
 }
@@ -217,7 +245,7 @@ bst_status bst_psf_sensitivity_measure(bst_ctx *ctx, const bst_psf *psf, double 
                                        double sigma_px, int binning, bst_psf_sensitivity *out) {
     assert(psf && cutoff > 0.0 && sigma_px > 0.0 && binning > 0 && out);
     measuring *m = calloc(1, sizeof *m);
-    *out = (bst_psf_sensitivity){.part = {{0.0}}};
+    *out = (bst_psf_sensitivity){.psf = psf, .cutoff = cutoff};
     for (int k = 0; k < BST_NODE_DIRECTIONS * BST_LIGHT_STEPS; k++) {
         out->light[k / BST_LIGHT_STEPS][k % BST_LIGHT_STEPS] = 1.0;
     }

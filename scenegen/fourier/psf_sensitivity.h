@@ -9,9 +9,14 @@
 #include "sim/optics/psf.h"
 
 typedef struct bst_psf_sensitivity {
+    const bst_psf *psf; /* lent */
+    double cutoff;      /* highest frequency, cycles/px */
     /* greatest derivatives of order 2, 4 and 6 along directions pi d / BST_NODE_DIRECTIONS from the
      * x axis, over the peak and those of a Gaussian of the sigma given */
     double part[BST_NODE_DIRECTIONS][3];
+    /* the same of order 4 and 6, smoothed along the direction by n / BST_SMOOTH_PER of the
+     * Gaussian's variance */
+    double smooth[BST_NODE_DIRECTIONS][BST_SMOOTH_STEPS][2];
     /* the same of order 4 and 6 in the image of a streak of equal groups of nodes, by the groups
      * per px, BST_ROW_STEPS of them up to most_per_px */
     double row[BST_NODE_DIRECTIONS][BST_ROW_STEPS][2], most_per_px;
@@ -32,6 +37,7 @@ double bst_psf_binned(double f, int binning);
  *            sigma_px  of the Gaussian
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_psf_sensitivity_measure(bst_ctx *ctx, const bst_psf *psf, double cutoff,
-                                       double sigma_px, int binning, bst_psf_sensitivity *out) BST_MUST_CHECK;
+                                       double sigma_px, int binning,
+                                       bst_psf_sensitivity *out) BST_MUST_CHECK;
 
 #endif

@@ -29,8 +29,8 @@ static void find_means(double half, double step, axis_means *out) {
         double at = (i - STEPS) * step, low[MOST_ORDER], high[MOST_ORDER];
         derivatives_of(at - half, low);
         derivatives_of(at + half, high);
-        out->at[i][0] = sqrt(0.5 * BST_PI) * (erf((at + half) / sqrt(2.0)) -
-                                              erf((at - half) / sqrt(2.0)));
+        out->at[i][0] =
+            sqrt(0.5 * BST_PI) * (erf((at + half) / sqrt(2.0)) - erf((at - half) / sqrt(2.0)));
         for (int n = 1; n <= MOST_ORDER; n++) {
             double sign = n % 2 == 1 ? 1.0 : -1.0;
             out->at[i][n] = sign * (high[n - 1] - low[n - 1]);

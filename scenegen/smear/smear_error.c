@@ -57,8 +57,9 @@ bst_status bst_smear_find_sensitivity(bst_ctx *ctx, bst_smear *s) {
         if (!measured) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the derivatives of a PSF");
         }
-        bst_status status = bst_psf_sensitivity_measure(
-            ctx, s->options.psf, s->options.cutoff, s->options.node_sigma_px, n + 1, measured);
+        bst_status status =
+            bst_psf_sensitivity_measure(ctx, s->sensitivity->psf, s->sensitivity->cutoff,
+                                        s->options.node_sigma_px, n + 1, measured);
         if (status != BST_OK) {
             free(measured);
             return status;

@@ -29,8 +29,8 @@ typedef struct bst_smear_level {
      * in the image is not that of the curves */
     double higher_part[BST_NODE_SCALES];
     bst_flank_curve flank[BST_FLANKS]; /* with the PSF's sensitivity */
-    bool alike;          /* predicted errors are the bounds: all groups are short */
-    double widening_px2; /* largest mean widening of the nodes at one place */
+    bool alike;                        /* predicted errors are the bounds: all groups are short */
+    double widening_px2;               /* largest mean widening of the nodes at one place */
 } bst_smear_level;
 
 /* A level computed ahead of its first use, on another thread. */
@@ -70,8 +70,8 @@ struct bst_smear {
      * the flanks of the Gaussian. */
     bst_psf_sensitivity *binned[BST_PIXEL_PARTS];
     bst_flank_curve *gaussian_flanks[BST_PIXEL_PARTS];
-    double aim;                             /* share of the tolerance */
-    double grid_per_px;                     /* least grid samples per px of the frame */
+    double aim;         /* share of the tolerance */
+    double grid_per_px; /* least grid samples per px of the frame */
     bst_quat q_reference;
     bst_quat *turn; /* attitude at each path point */
     int *parts;     /* straight parts of the path from each track sample */
@@ -226,7 +226,7 @@ typedef struct bst_smear_drawn {
     double predicted;       /* the same as predicted */
     const bst_smear_level *level;
     double scale; /* of its motion relative to the level's */
-    int radius;             /* of the stamp */
+    int radius;   /* of the stamp */
     bool moving;
 } bst_smear_drawn;
 

@@ -183,9 +183,9 @@ static void set_kernel(const bst_smear_maker *m, const group *g, const bst_smear
  * smoothed greatest derivative of a group, and that of a row of groups. */
 static double raise_error(const bst_smear_maker *m, const double axis[3], const bst_smear_rule *r) {
     bst_smear_node_list *list = m->list;
-    double part[BST_NODE_SCALES];
+    double part[BST_NODE_SCALES], one[BST_NODE_SCALES];
     bst_smear_direction_parts along = bst_smear_find_direction_parts(m, axis, r->nodes);
-    bst_smear_missed_parts(m, &along, r, part);
+    bst_smear_missed_parts(m, &along, r, part, one);
     double square = 1.0 / (1 << (BST_NODE_SCALES - 2));
     bool row = false;
     for (int k = 0; k < BST_NODE_SCALES; k++, square *= 2.0) {
@@ -195,10 +195,9 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
         double higher = (r->error - r->missed - r->fixed) * low;
         double missed = r->missed * (r->nodes == 3 ? fourth * square : fourth);
         double bound = fixed + higher + missed;
-        if (along.missed < 1.0) { /* the length of a group smooths in any direction */
-            double one = along.missed * part[k];
-            double many = bst_smear_row_part(m, &along, r, sqrt(square), one);
-            row = row || many > one;
+        if (one[k] < part[k]) {
+            double many = bst_smear_row_part(m, &along, r, sqrt(square), one[k]);
+            row = row || many > one[k];
             part[k] = fmin(many, part[k]);
         }
         double rest = along.second * fixed + along.higher * higher;
@@ -333,6 +332,7 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
         .binned_variance = aim->binned_variance,
         .further_variance = aim->further_variance,
         .direction_part = aim->direction_part,
+        .smooth_part = aim->smooth_part,
         .row_part = aim->row_part,
         .most_per_px = aim->most_per_px,
         .light_part = aim->light_part,
