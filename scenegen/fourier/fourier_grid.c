@@ -68,12 +68,6 @@ static bst_status invert(bst_ctx *ctx, bst_fft_complex_f32 *data, int n) {
     return BST_OK;
 }
 
-/* Mean of exp(2 pi i f x) over `binning` pixels in a row, about their centre. */
-static double binned(double f, int binning) {
-    double s = sin(BST_PI * f);
-    return fabs(s) < 1e-9 ? 1.0 : sin(BST_PI * binning * f) / (binning * s);
-}
-
 /* Raises out->pixel_part to the values of a field node, for all binnings relative to none. The
  * derivatives are bounded by sums of moduli, and the peak from below by pixels about the PSF's
  * peak. */
@@ -95,7 +89,8 @@ static void measure_parts(const bst_psf *psf, int node, const double peak_px[2],
             w2[d] = w * w;
         }
         for (int b = 0; b < BST_PIXEL_PARTS; b++) {
-            double mean = binned(fx, b + 1) * binned(fy, b + 1), m = size * fabs(mean);
+            double mean = bst_psf_binned(fx, b + 1) * bst_psf_binned(fy, b + 1),
+                   m = size * fabs(mean);
             top[b] += mean * light;
             for (int d = 0; d < DIRECTIONS; d++) {
                 along[b][d][0] += w2[d] * m;
@@ -259,7 +254,7 @@ bst_status bst_fourier_band_measure(bst_ctx *ctx, const bst_psf *psf, double tol
         status = measure_reach(ctx, psf, room, out);
     }
     if (status == BST_OK) {
-        status = bst_psf_sensitivity_measure(ctx, psf, out->cutoff, out->node_sigma_px,
+        status = bst_psf_sensitivity_measure(ctx, psf, out->cutoff, out->node_sigma_px, 1,
                                              &out->sensitivity);
     }
     bst_fft_array_free(room);

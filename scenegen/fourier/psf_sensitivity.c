@@ -17,15 +17,24 @@ static const double GAUSSIAN[3] = {1.0, 3.0, 15.0};
 
 /* The light that a derivative falls on is that of a path: smoothed along it at least as by a group
  * of nodes, 2.5 sigma long. Variance of that length, in sigma squared. */
-#define SMOOTHED (2.5 * 2.5 / 12.0)
+#define SMOOTHED (BST_STREAK_SIGMAS * BST_STREAK_SIGMAS / 12.0)
 
 typedef struct measuring {
     bst_fft_complex_f32 *room; /* [SIDE][SIDE] */
     bst_fft *inverse;
     double step; /* of the frequencies, cycles/px */
     double otf[LATTICE * LATTICE][2];
-    float light[SIDE * SIDE]; /* over the peak */
+    /* over the peak: of the point, and of a path; one over its square root */
+    float light[BST_FLANKS][SIDE * SIDE], quiet[BST_FLANKS][SIDE * SIDE];
+    bst_light_flank flank[BST_FLANKS][BST_NODE_DIRECTIONS][3];
 } measuring;
+
+/* At frequencies of whole cycles per px the limit: its sign does not matter to a modulus, but to
+ * an image: (-1)^(f (binning - 1)). */
+double bst_psf_binned(double f, int binning) {
+    double s = sin(BST_PI * f), whole = cos(BST_PI * (binning - 1) * f);
+    return fabs(s) < 1e-9 ? whole : sin(BST_PI * binning * f) / (binning * s);
+}
 
 static double frequency(const measuring *m, int i) {
     return (i - LATTICE / 2) * m->step;
@@ -35,8 +44,16 @@ static float *room_at(const measuring *m, int i, int j) {
     return m->room[((j - LATTICE / 2 + SIDE) % SIDE) * SIDE + (i - LATTICE / 2 + SIDE) % SIDE];
 }
 
+static double power_of(double x, int n) {
+    double power = 1.0;
+    for (; n > 0; n--) {
+        power *= x;
+    }
+    return power;
+}
+
 /* Images of two derivatives of even order along a direction, as the real and the imaginary part:
- * both are real. Order 0: the PSF, smoothed along the direction. */
+ * both are real. The first is smoothed along the direction, the second if both are derivatives. */
 static void make_images(measuring *m, double angle, double smoothed_px2, const int order[2]) {
     memset(m->room, 0, sizeof *m->room * SIDE * SIDE);
     for (int k = 0; k < LATTICE * LATTICE; k++) {
@@ -46,7 +63,8 @@ static void make_images(measuring *m, double angle, double smoothed_px2, const i
         }
         double w = 2.0 * BST_PI * (frequency(m, i) * cos(angle) + frequency(m, j) * sin(angle));
         double w2 = w * w, smooth = exp(-0.5 * smoothed_px2 * w2);
-        double a = order[0] > 0 ? pow(w2, 0.5 * order[0]) : smooth, b = pow(w2, 0.5 * order[1]);
+        double a = smooth * power_of(w2, order[0] / 2), b = power_of(w2, order[1] / 2);
+        b *= order[0] > 0 ? smooth : 1.0;
         const double *v = m->otf[k];
         float *z = room_at(m, i, j);
         z[0] = (float)(a * v[0] - b * v[1]);
@@ -72,24 +90,25 @@ static double greatest_near(const measuring *m, int k, int part) {
     return here + more;
 }
 
-/* Raises the sensitivities to those of one derivative of a field node. */
-static void add_derivative(const measuring *m, int part, double gaussian, double *most,
+/* Raises the sensitivities to those of one derivative of a field node, along direction d. */
+static void add_derivative(measuring *m, int part, double gaussian, int d, int order,
                            bst_psf_sensitivity *out) {
-    double top = 0.0, at[BST_LIGHT_CLASSES] = {0.0}, noisy[BST_LIGHT_CLASSES] = {0.0};
+    double *most = &out->part[d][order];
+    double top = 0.0;
     int greatest = 0;
     for (int k = 0; k < SIDE * SIDE; k++) {
         double value = fabs((double)m->room[k][part]);
-        int class = bst_light_class((double)m->light[k]);
-        at[class] = fmax(at[class], value);
-        noisy[class] = fmax(noisy[class], value / sqrt(fmax((double)m->light[k], 1e-12)));
         greatest = value > top ? k : greatest;
         top = fmax(top, value);
     }
     *most = fmax(*most, greatest_near(m, greatest, part) / gaussian);
     double per = 1.0 / fmax(top, 1e-30);
-    for (int c = 0; c < BST_LIGHT_CLASSES; c++) {
-        out->flank[c] = fmax(out->flank[c], at[c] * per);
-        out->noisy[c] = fmax(out->noisy[c], noisy[c] * per);
+    for (int k = 0; k < SIDE * SIDE; k++) {
+        double value = fabs((double)m->room[k][part]) * per;
+        for (int f = 0; f < BST_FLANKS; f++) {
+            bst_light_flank_raise(&m->flank[f][d][order], (double)m->light[f][k], value,
+                                  value * (double)m->quiet[f][k]);
+        }
     }
 }
 
@@ -159,36 +178,74 @@ static void add_light(const measuring *m, double sigma_px, bst_psf_sensitivity *
     }
 }
 
+/* Keeps the image in the room, over its peak, as light. */
+static void keep_light(measuring *m, int flank) {
+    float top = m->room[brightest_of(m)][0];
+    for (int k = 0; k < SIDE * SIDE; k++) {
+        m->light[flank][k] = m->room[k][0] / top;
+        m->quiet[flank][k] = 1.0F / sqrtf(fmaxf(m->light[flank][k], 1e-12F));
+    }
+}
+
+/* Raises the greatest smoothed derivatives along a direction. */
+static void add_smoothed(measuring *m, double angle, double peak, double sigma_px,
+                         double smooth[BST_SMOOTH_STEPS][2]) {
+    double square = sigma_px * sigma_px, fourth = square * square;
+    for (int n = 1; n < BST_SMOOTH_STEPS; n++) {
+        make_images(m, angle, n * square / BST_SMOOTH_PER, (const int[2]){4, 6});
+        for (int part = 0; part < 2; part++) {
+            int greatest = 0;
+            for (int k = 0; k < SIDE * SIDE; k++) {
+                greatest = fabsf(m->room[k][part]) > fabsf(m->room[greatest][part]) ? k : greatest;
+            }
+            double unit = GAUSSIAN[part + 1] * peak / (part == 0 ? fourth : fourth * square);
+            smooth[n][part] = fmax(smooth[n][part], greatest_near(m, greatest, part) / unit);
+        }
+    }
+}
+
 /* Raises the sensitivities to those of a field node. */
-static void measure_node(measuring *m, const bst_psf *psf, int node, double sigma_px,
+static void measure_node(measuring *m, const bst_psf *psf, int node, double sigma_px, int binning,
                          bst_psf_sensitivity *out) {
     double square = sigma_px * sigma_px;
     for (int k = 0; k < LATTICE * LATTICE; k++) {
-        bst_psf_otf(psf, node, frequency(m, k % LATTICE), frequency(m, k / LATTICE), m->otf[k]);
+        double fx = frequency(m, k % LATTICE), fy = frequency(m, k / LATTICE);
+        double mean = bst_psf_binned(fx, binning) * bst_psf_binned(fy, binning);
+        bst_psf_otf(psf, node, fx, fy, m->otf[k]);
+        m->otf[k][0] *= mean;
+        m->otf[k][1] *= mean;
     }
     make_images(m, 0.0, 0.0, (const int[2]){0, 2});
     double peak = greatest_near(m, brightest_of(m), 0);
+    keep_light(m, BST_FLANK_POINT);
     add_light(m, sigma_px, out);
     for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
-        double angle = d * BST_PI / BST_NODE_DIRECTIONS, *part = out->part[d];
+        double angle = d * BST_PI / BST_NODE_DIRECTIONS;
         make_images(m, angle, SMOOTHED * square, (const int[2]){0, 2});
-        float top = m->room[brightest_of(m)][0];
-        for (int k = 0; k < SIDE * SIDE; k++) {
-            m->light[k] = m->room[k][0] / top;
-        }
-        add_derivative(m, 1, GAUSSIAN[0] * peak / square, &part[0], out);
+        keep_light(m, BST_FLANK_STREAK);
+        add_derivative(m, 1, GAUSSIAN[0] * peak / square, d, 0, out);
         make_images(m, angle, 0.0, (const int[2]){4, 6});
-        add_derivative(m, 0, GAUSSIAN[1] * peak / (square * square), &part[1], out);
-        add_derivative(m, 1, GAUSSIAN[2] * peak / (square * square * square), &part[2], out);
+        add_derivative(m, 0, GAUSSIAN[1] * peak / (square * square), d, 1, out);
+        add_derivative(m, 1, GAUSSIAN[2] * peak / (square * square * square), d, 2, out);
+        add_smoothed(m, angle, peak, sigma_px, out->smooth[d]);
+        memcpy(out->smooth[d][0], &out->part[d][1], sizeof out->smooth[d][0]);
         add_row(m, angle, sigma_px, out->row[d]);
     }
 }
 
+static void make_curves(const measuring *m, bst_psf_sensitivity *out) {
+    for (int k = 0; k < BST_FLANKS * BST_NODE_DIRECTIONS * 3; k++) {
+        int f = k / (3 * BST_NODE_DIRECTIONS), d = k / 3 % BST_NODE_DIRECTIONS, order = k % 3;
+        bst_flank_curve_make(&m->flank[f][d][order], &out->flank[f][d][order]);
+        bst_flank_curve_raise(&out->any_flank[f], &out->flank[f][d][order]);
+    }
+}
+
 bst_status bst_psf_sensitivity_measure(bst_ctx *ctx, const bst_psf *psf, double cutoff,
-                                       double sigma_px, bst_psf_sensitivity *out) {
-    assert(psf && cutoff > 0.0 && sigma_px > 0.0 && out);
+                                       double sigma_px, int binning, bst_psf_sensitivity *out) {
+    assert(psf && cutoff > 0.0 && sigma_px > 0.0 && binning > 0 && out);
     measuring *m = calloc(1, sizeof *m);
-    *out = (bst_psf_sensitivity){.part = {{0.0}}};
+    *out = (bst_psf_sensitivity){.psf = psf, .cutoff = cutoff};
     for (int k = 0; k < BST_NODE_DIRECTIONS * BST_LIGHT_STEPS; k++) {
         out->light[k / BST_LIGHT_STEPS][k % BST_LIGHT_STEPS] = 1.0;
     }
@@ -205,7 +262,10 @@ bst_status bst_psf_sensitivity_measure(bst_ctx *ctx, const bst_psf *psf, double 
             bst_fft_create_f32(ctx, BST_FFT_INVERSE, SIDE, SIDE, *m->room, *m->room, &m->inverse);
     }
     for (int n = 0; status == BST_OK && n < bst_psf_nodes(psf); n++) {
-        measure_node(m, psf, n, sigma_px, out);
+        measure_node(m, psf, n, sigma_px, binning, out);
+    }
+    if (status == BST_OK) {
+        make_curves(m, out);
     }
     if (m) {
         bst_fft_free(m->inverse);

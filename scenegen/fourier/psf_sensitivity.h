@@ -4,31 +4,40 @@
 #define BST_SCENEGEN_FOURIER_PSF_SENSITIVITY_H
 
 #include "boresight/status.h"
-#include "scenegen/light_classes.h"
+#include "scenegen/light_flank.h"
 #include "scenegen/smear/smear_quadrature.h"
 #include "sim/optics/psf.h"
 
 typedef struct bst_psf_sensitivity {
+    const bst_psf *psf; /* lent */
+    double cutoff;      /* highest frequency, cycles/px */
     /* greatest derivatives of order 2, 4 and 6 along directions pi d / BST_NODE_DIRECTIONS from the
      * x axis, over the peak and those of a Gaussian of the sigma given */
     double part[BST_NODE_DIRECTIONS][3];
+    /* the same of order 4 and 6, smoothed along the direction by n / BST_SMOOTH_PER of the
+     * Gaussian's variance */
+    double smooth[BST_NODE_DIRECTIONS][BST_SMOOTH_STEPS][2];
     /* the same of order 4 and 6 in the image of a streak of equal groups of nodes, by the groups
      * per px, BST_ROW_STEPS of them up to most_per_px */
     double row[BST_NODE_DIRECTIONS][BST_ROW_STEPS][2], most_per_px;
     /* least light up to n / BST_LIGHT_PER sigma from the peak along the direction, to either side,
      * over that of the peak */
     double light[BST_NODE_DIRECTIONS][BST_LIGHT_STEPS];
-    /* in pixels of a brightness class: greatest derivative, and greatest derivative over the square
-     * root of light, both over those of the brightest pixel */
-    double flank[BST_LIGHT_CLASSES], noisy[BST_LIGHT_CLASSES];
+    /* of the derivatives of order 2, 4 and 6 along each direction; the greatest of all */
+    bst_flank_curve flank[BST_FLANKS][BST_NODE_DIRECTIONS][3], any_flank[BST_FLANKS];
 } bst_psf_sensitivity;
 
-/* Measures the derivatives of a PSF over all its field nodes, in pixels that are not binned.
+/* Mean of exp(2 pi i f x) over `binning` pixels in a row, about their centre. */
+double bst_psf_binned(double f, int binning);
+
+/* Measures the derivatives of a PSF over all its field nodes, in read-out pixels of `binning` by
+ * `binning` of the sensor's. Peak and light are those of such pixels.
  *
  * Given:     cutoff    highest frequency, cycles/px
  *            sigma_px  of the Gaussian
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_psf_sensitivity_measure(bst_ctx *ctx, const bst_psf *psf, double cutoff,
-                                       double sigma_px, bst_psf_sensitivity *out) BST_MUST_CHECK;
+                                       double sigma_px, int binning,
+                                       bst_psf_sensitivity *out) BST_MUST_CHECK;
 
 #endif

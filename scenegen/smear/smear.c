@@ -81,6 +81,10 @@ void bst_smear_free(bst_smear *s) {
         free(s->table);
         bst_smear_free_ahead(s);
         bst_motion_map_free(s->map);
+        for (int n = 0; n < BST_PIXEL_PARTS; n++) {
+            free(s->binned[n]);
+            free(s->gaussian_flanks[n]);
+        }
         free(s);
     }
 }
@@ -280,7 +284,7 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
     } else {
         bst_smear_find_pixel_parts(s->sigma_px, s->binning, s->pixel_part);
     }
-    s->sensitivity = s->binning == 1 ? s->options.sensitivity : NULL;
+    BST_TRY(bst_smear_find_sensitivity(ctx, s));
     bst_smear_clear_ahead(s);
     s->sources = frame->sources;
     s->aim = frame->aim > 0.0 ? frame->aim : 1.0;
@@ -525,7 +529,8 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
                              .travel_px = travel_px,
                              .error = error,
                              .predicted = predicted,
-
+                             .level = used,
+                             .scale = cell ? cell->scale : 1.0,
                              .radius = radius,
                              .moving = moving};
     memcpy(drawn.low, low, sizeof low);

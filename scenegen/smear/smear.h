@@ -36,7 +36,7 @@ typedef struct bst_smear_options {
     double grid_per_px;           /* least grid samples per px */
     double pixel_part[BST_PIXEL_PARTS]
                      [3]; /* of the PSF as in bst_smear_node_aim, by binning from 1 on */
-    const bst_psf_sensitivity *sensitivity; /* of that PSF, lent; NULL: unknown */
+    const bst_psf_sensitivity *sensitivity; /* of that PSF, unbinned, lent; NULL: unknown */
     double widest;      /* largest node widening, PSF variances; 0: as much as nodes allow */
     bst_parallel *pool; /* threads that share the work; lent; NULL: the caller's alone */
     int body_threads;   /* without a pool: for bodies that turn; 0: one per processor */

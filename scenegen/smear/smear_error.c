@@ -1,6 +1,8 @@
 /* Image error of a source from the errors of its nodes. */
 #include <math.h>
+#include <stdlib.h>
 
+#include "scenegen/smear/gaussian_flank.h"
 #include "scenegen/smear/smear_internal.h"
 
 enum { MAX_TAPS = BST_PLACE_TAPS };
@@ -47,24 +49,66 @@ double bst_smear_single_error(const bst_smear *s, double peak_e, double from_bor
                 peak_e / sqrt(s->dark_variance_e2));
 }
 
+bst_status bst_smear_find_sensitivity(bst_ctx *ctx, bst_smear *s) {
+    int n = (s->binning < BST_PIXEL_PARTS ? s->binning : BST_PIXEL_PARTS) - 1;
+    s->sensitivity = s->options.sensitivity;
+    if (s->sensitivity && n > 0 && !s->binned[n]) {
+        bst_psf_sensitivity *measured = malloc(sizeof *measured);
+        if (!measured) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the derivatives of a PSF");
+        }
+        bst_status status =
+            bst_psf_sensitivity_measure(ctx, s->sensitivity->psf, s->sensitivity->cutoff,
+                                        s->options.node_sigma_px, n + 1, measured);
+        if (status != BST_OK) {
+            free(measured);
+            return status;
+        }
+        s->binned[n] = measured;
+    }
+    if (!s->sensitivity && !s->gaussian_flanks[n]) {
+        bst_flank_curve *curves = malloc(BST_FLANKS * sizeof *curves);
+        if (!curves) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the errors beside a PSF's peak");
+        }
+        for (int f = 0; f < BST_FLANKS; f++) {
+            double streak = f == BST_FLANK_STREAK ? s->sigma_px * BST_STREAK_SIGMAS : 0.0;
+            bst_light_flank flank;
+            bst_gaussian_flank_measure(s->sigma_px, n + 1, streak * streak / 12.0, &flank);
+            bst_flank_curve_make(&flank, &curves[f]);
+        }
+        s->gaussian_flanks[n] = curves;
+    }
+    s->sensitivity = s->sensitivity && n > 0 ? s->binned[n] : s->sensitivity;
+    s->flanks = s->sensitivity ? s->sensitivity->any_flank : s->gaussian_flanks[n];
+    return BST_OK;
+}
+
+/* Part of a source's predicted error that is not of its nodes' missed highest moments. */
+static double higher_part(const bst_smear *s, const bst_smear_drawn *d) {
+    double nodes = d->predicted - d->level->predicted_profile, square = d->scale * d->scale;
+    int k = BST_NODE_SCALES - 2;
+    for (; k > 0 && square < 1.0; k--, square *= 2.0) {
+    }
+    return s->sensitivity && d->predicted > 0.0
+               ? 1.0 - (1.0 - d->level->higher_part[k]) * fmax(nodes, 0.0) / d->predicted
+               : 1.0;
+}
+
 /* Error of the worst pixel, in its sigma, of a source whose greatest error is that of its peak:
- * beside the peak there is less noise, but not always less error. */
-static double flank_of(const bst_smear *s, double peak_e, double bound) {
-    const bst_psf_sensitivity *psf = s->sensitivity;
-    double worst = 0.0, light_e = peak_e, sigma_e = sqrt(peak_e + s->dark_variance_e2);
-    if (!psf) {
-        return bound;
+ * beside the peak there is less noise, but not always less error. Along a path there is more light
+ * than beside a point. bound: of a Gaussian much wider than its pixels. */
+static double flank_of(const bst_smear *s, const bst_smear_drawn *d, double bound) {
+    double wide = d->high[0] - d->low[0], high = d->high[1] - d->low[1],
+           streak = BST_STREAK_SIGMAS * s->sigma_px;
+    int f = wide * wide + high * high >= streak * streak ? BST_FLANK_STREAK : BST_FLANK_POINT;
+    double light = s->last_read_e / s->dark_variance_e2;
+    double any = bst_flank_curve_at(&s->flanks[f], light), part = higher_part(s, d);
+    if (!s->sensitivity) {
+        return fmax(any, bound);
     }
-    for (int k = 0; k < BST_LIGHT_CLASSES; k++) {
-        double less_e = k + 1 < BST_LIGHT_CLASSES ? 0.5 * light_e : 0.0;
-        double dim = psf->flank[k] / sqrt(less_e + s->dark_variance_e2);
-        double lit = k + 1 < BST_LIGHT_CLASSES
-                         ? psf->noisy[k] / sqrt(peak_e + s->dark_variance_e2 * peak_e / light_e)
-                         : INFINITY;
-        worst = fmax(worst, sigma_e * fmin(dim, lit));
-        light_e = less_e;
-    }
-    return worst;
+    return part < 1.0 ? part * any + (1.0 - part) * bst_flank_curve_at(&d->level->flank[f], light)
+                      : any;
 }
 
 /* Sets the image errors of a source at (x, y), wherever it falls. */
@@ -88,7 +132,7 @@ void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d) {
         .y_px = (float)d->y,
         .peak_e = (float)peak_e,
         .nodes_e = (float)((flank * error + rounded) * peak_e + s->poses_sigma * sigma_e),
-        .predicted_e = (float)((flank_of(s, peak_e, flank) * predicted + rounded) * peak_e +
+        .predicted_e = (float)((flank_of(s, d, flank) * predicted + rounded) * peak_e +
                                s->poses_sigma * sigma_e),
         .shared_e = (float)(shared * sigma_e),
         .excess_e = (float)(lost * peak_e),

@@ -25,8 +25,12 @@ typedef struct bst_smear_level {
      * bst_smear_nodes_error, their bound and what is predicted, and of profiles */
     double error[BST_NODE_SCALES], predicted[BST_NODE_SCALES];
     double profile_error, predicted_profile;
-    bool alike;          /* predicted errors are the bounds: all groups are short */
-    double widening_px2; /* largest mean widening of the nodes at one place */
+    /* part of the nodes' predicted error, at each motion scale and all larger ones, whose pattern
+     * in the image is not that of the curves */
+    double higher_part[BST_NODE_SCALES];
+    bst_flank_curve flank[BST_FLANKS]; /* with the PSF's sensitivity */
+    bool alike;                        /* predicted errors are the bounds: all groups are short */
+    double widening_px2;               /* largest mean widening of the nodes at one place */
 } bst_smear_level;
 
 /* A level computed ahead of its first use, on another thread. */
@@ -61,8 +65,13 @@ struct bst_smear {
     int binning, sources;
     double pixel_part[3];                   /* as in bst_smear_node_aim */
     const bst_psf_sensitivity *sensitivity; /* of the frame; NULL: as of the Gaussian */
-    double aim;                             /* share of the tolerance */
-    double grid_per_px;                     /* least grid samples per px of the frame */
+    const bst_flank_curve *flanks;          /* [BST_FLANKS] of the frame, for any derivative */
+    /* those of binnings used so far, by binning - 1, NULL: none. Without a sensitivity of the PSF
+     * the flanks of the Gaussian. */
+    bst_psf_sensitivity *binned[BST_PIXEL_PARTS];
+    bst_flank_curve *gaussian_flanks[BST_PIXEL_PARTS];
+    double aim;         /* share of the tolerance */
+    double grid_per_px; /* least grid samples per px of the frame */
     bst_quat q_reference;
     bst_quat *turn; /* attitude at each path point */
     int *parts;     /* straight parts of the path from each track sample */
@@ -215,9 +224,15 @@ typedef struct bst_smear_drawn {
     double low[2], high[2]; /* box of its positions relative to (x, y) */
     double error;           /* bound of its nodes and profiles, relative to the peak */
     double predicted;       /* the same as predicted */
-    int radius;             /* of the stamp */
+    const bst_smear_level *level;
+    double scale; /* of its motion relative to the level's */
+    int radius;   /* of the stamp */
     bool moving;
 } bst_smear_drawn;
+
+/* Finds the PSF's sensitivity to nodes in the frame's read-out pixels, and its flanks. Errors:
+ * BST_ERR_MEMORY. */
+bst_status bst_smear_find_sensitivity(bst_ctx *ctx, bst_smear *s) BST_MUST_CHECK;
 
 /* Sets last_error of that source's image, wherever it falls. */
 void bst_smear_set_error(bst_smear *s, const bst_smear_drawn *d);

@@ -183,10 +183,11 @@ static void set_kernel(const bst_smear_maker *m, const group *g, const bst_smear
  * smoothed greatest derivative of a group, and that of a row of groups. */
 static double raise_error(const bst_smear_maker *m, const double axis[3], const bst_smear_rule *r) {
     bst_smear_node_list *list = m->list;
-    double part[BST_NODE_SCALES];
+    double part[BST_NODE_SCALES], one[BST_NODE_SCALES];
     bst_smear_direction_parts along = bst_smear_find_direction_parts(m, axis, r->nodes);
-    bst_smear_missed_parts(m, &along, r, part);
+    bst_smear_missed_parts(m, &along, r, part, one);
     double square = 1.0 / (1 << (BST_NODE_SCALES - 2));
+    bool row = false;
     for (int k = 0; k < BST_NODE_SCALES; k++, square *= 2.0) {
         double fourth = square * square;
         double low = square * (square > 1.0 ? sqrt(square) : 1.0);
@@ -194,14 +195,22 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
         double higher = (r->error - r->missed - r->fixed) * low;
         double missed = r->missed * (r->nodes == 3 ? fourth * square : fourth);
         double bound = fixed + higher + missed;
-        if (along.missed < 1.0) { /* the length of a group smooths in any direction */
-            double one = along.missed * part[k];
-            part[k] = fmin(bst_smear_row_part(m, &along, r, sqrt(square), one), part[k]);
+        if (one[k] < part[k]) {
+            double many = bst_smear_row_part(m, &along, r, sqrt(square), one[k]);
+            row = row || many > one[k];
+            part[k] = fmin(many, part[k]);
         }
-        double predicted = along.second * fixed + along.higher * higher + part[k] * missed;
+        double rest = along.second * fixed + along.higher * higher;
+        double predicted = rest + part[k] * missed;
+        list->higher[k] = rest > list->higher[k] ? rest : list->higher[k];
         list->error[k] = bound > list->error[k] ? bound : list->error[k];
         list->predicted[k] = predicted > list->predicted[k] ? predicted : list->predicted[k];
     }
+    for (int d = 0; d < BST_NODE_DIRECTIONS && m->direction_part; d++) {
+        list->directions |= along.in_range[d] || row ? 1U << d : 0U;
+    }
+    /* a row has a pattern of its own */
+    list->orders |= row ? 7U << 1 : r->nodes > 1 ? 1U << r->nodes : 0U;
     return along.second * r->fixed + along.higher * (r->error - r->missed - r->fixed) +
            part[BST_NODE_SCALES - 2] * r->missed;
 }
@@ -323,6 +332,7 @@ bst_status bst_smear_nodes_from_path(bst_ctx *ctx, const bst_smear_path_point *p
         .binned_variance = aim->binned_variance,
         .further_variance = aim->further_variance,
         .direction_part = aim->direction_part,
+        .smooth_part = aim->smooth_part,
         .row_part = aim->row_part,
         .most_per_px = aim->most_per_px,
         .light_part = aim->light_part,

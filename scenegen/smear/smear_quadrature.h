@@ -43,6 +43,11 @@ typedef struct bst_smear_node_list {
     /* the same of the predicted error: at most the bound, which takes the greatest derivative of
      * the PSF for the whole length of a group */
     double predicted[BST_NODE_SCALES];
+    /* what is predicted without the missed highest moments, which are derivatives of the image of
+     * order 2 n along the groups: bits n of `orders`, d of `directions`; both 0 if the PSF's
+     * derivatives are not known by direction */
+    double higher[BST_NODE_SCALES];
+    unsigned orders, directions;
 } bst_smear_node_list;
 
 /* Largest widening of a node, PSF variances. */
@@ -50,6 +55,10 @@ typedef struct bst_smear_node_list {
 
 /* Directions for which the PSF's derivatives are known: pi d / BST_NODE_DIRECTIONS from x. */
 enum { BST_NODE_DIRECTIONS = 12, BST_ROW_STEPS = 32 };
+
+/* Smoothing for which its derivatives are known: variances of n / BST_SMOOTH_PER of that of the
+ * Gaussian, along the direction. */
+enum { BST_SMOOTH_STEPS = 5, BST_SMOOTH_PER = 10 };
 
 /* Distances from a PSF's peak for which its light is known: BST_LIGHT_STEPS of 1 / BST_LIGHT_PER
  * sigma. */
@@ -76,6 +85,8 @@ typedef struct bst_smear_node_aim {
      * axis. unlike_rad: how far the image's direction may differ from that at the boresight,
      * besides by roll */
     const double (*direction_part)[3]; /* [BST_NODE_DIRECTIONS] */
+    /* with it, of order 4 and 6 with smoothing; NULL: as a Gaussian loses by it */
+    const double (*smooth_part)[BST_SMOOTH_STEPS][2]; /* [BST_NODE_DIRECTIONS] */
     /* with it, along a row of equal groups: order 4 and 6 by groups per px, up to most_per_px */
     const double (*row_part)[BST_ROW_STEPS][2]; /* [BST_NODE_DIRECTIONS] */
     double most_per_px;

@@ -105,6 +105,8 @@ void bst_smear_nodes_clear(bst_smear_node_list *list) {
     list->count = 0;
     memset(list->error, 0, sizeof list->error);
     memset(list->predicted, 0, sizeof list->predicted);
+    memset(list->higher, 0, sizeof list->higher);
+    list->orders = list->directions = 0U;
 }
 
 void bst_smear_nodes_parts(const bst_smear_node *nodes, int count, double psf_sigma_px,

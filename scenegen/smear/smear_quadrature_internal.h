@@ -19,7 +19,8 @@ typedef struct bst_smear_maker {
     double wide_field; /* as in bst_smear_node_aim */
     double curvature;
     double binned_variance, further_variance, pixel_part[3];
-    const double (*direction_part)[3]; /* this and the next five as in bst_smear_node_aim */
+    const double (*direction_part)[3]; /* this and the next six as in bst_smear_node_aim */
+    const double (*smooth_part)[BST_SMOOTH_STEPS][2];
     const double (*row_part)[BST_ROW_STEPS][2];
     const double (*light_part)[BST_LIGHT_STEPS];
     double most_per_px;
@@ -88,9 +89,12 @@ typedef struct bst_smear_direction_parts {
 /* Parts of the missed moment's error that remain if the image moves by 2^((k - BST_NODE_SCALES + 2)
  * / 2) of the path: below 1 for groups as long as the PSF is wide.
  *
- * Given:     along  directions in which the image may move */
+ * Given:     along  directions in which the image may move
+ * Returned:  part   in any direction
+ *            one    of a group alone in those directions, at most `part` */
 void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_direction_parts *along,
-                            const bst_smear_rule *r, double part[BST_NODE_SCALES]);
+                            const bst_smear_rule *r, double part[BST_NODE_SCALES],
+                            double one[BST_NODE_SCALES]);
 
 /* Parts of the errors of a rule of `nodes` nodes for a group with this axis: 1 without the PSF's
  * derivatives. */

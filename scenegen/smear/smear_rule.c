@@ -386,14 +386,33 @@ static double next_peak(const bst_smear_maker *m, const bst_smear_direction_part
     return fmax(here[0], fmax(here[1], here[2]));
 }
 
+/* Greatest derivative of a rule's order in the directions of a group, smoothed by a variance over
+ * that of the PSF, over the bound. Chords of a convex function are above it. */
+static double smoothed_part(const bst_smear_maker *m, const bst_smear_direction_parts *along,
+                            const bst_smear_rule *r, double variance) {
+    double at = variance * BST_SMOOTH_PER, worst = 0.0;
+    int n = (int)fmin(at, BST_SMOOTH_STEPS - 2.0);
+    double part = fmin(at - n, 1.0);
+    for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
+        if (along->in_range[d]) {
+            const double low = m->smooth_part[d][n][r->nodes - 2],
+                         high = m->smooth_part[d][n + 1][r->nodes - 2];
+            worst = fmax(worst, low + part * (high - low));
+        }
+    }
+    return worst / m->pixel_part[r->nodes - 1];
+}
+
 void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_direction_parts *along,
-                            const bst_smear_rule *r, double part[BST_NODE_SCALES]) {
+                            const bst_smear_rule *r, double part[BST_NODE_SCALES],
+                            double one[BST_NODE_SCALES]) {
     enum { LOWEST = 2 - BST_NODE_SCALES };
     double lit = m->variance + m->binned_variance, v = r->kernel / (lit + m->further_variance);
     double square = exp2(LOWEST);
     node_light light;
     for (int k = 0; k < BST_NODE_SCALES; k++) {
         part[k] = 1.0;
+        one[k] = along->missed;
     }
     if (v < BST_LEAST_KERNEL) {
         return;
@@ -401,10 +420,16 @@ void bst_smear_missed_parts(const bst_smear_maker *m, const bst_smear_direction_
     begin_light(m, r, square, &light);
     for (int k = 0; k < BST_NODE_SCALES; k++, square *= 2.0) {
         double peak = next_peak(m, along, r, &light), wide = 1.0 + square * v;
+        double next_to = r->nodes == 3 ? neighbours_part(square * v) : 1.0;
         /* the greatest derivative of order 4 or 6, smoothed by K, over the group's own peak */
         double smooth = 1.0 / (wide * wide * sqrt(wide) * peak);
-        smooth *= r->nodes == 3 ? neighbours_part(square * v) / wide : 1.0;
+        smooth *= r->nodes == 3 ? next_to / wide : 1.0;
         part[k] = fmin(smooth, 1.0);
+        one[k] *= part[k];
+        if (m->smooth_part && r->nodes > 1) {
+            double alone = smoothed_part(m, along, r, square * r->kernel / m->variance);
+            one[k] = fmin(one[k], alone * next_to / peak);
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 
 #include "boresight/vec.h"
 #include "scenegen/fourier/psf_sensitivity.h"
+#include "scenegen/smear/gaussian_flank.h"
 #include "tests/scenegen/scene_support.h"
 #include "tests/test_support.h"
 
@@ -32,7 +33,7 @@ static void derivatives_are_those_of_each_direction(void **state) {
     bst_camera camera;
     bst_psf_sensitivity s;
     bst_psf *psf = make_psf(&ctx, &camera);
-    bst_assert_ok(&ctx, bst_psf_sensitivity_measure(&ctx, psf, 0.9, SHORT_PX, &s));
+    bst_assert_ok(&ctx, bst_psf_sensitivity_measure(&ctx, psf, 0.9, SHORT_PX, 1, &s));
     /* pixels add a twelfth to either variance */
     double wide = LONG_PX * LONG_PX + 1.0 / 12.0, narrow = SHORT_PX * SHORT_PX + 1.0 / 12.0;
     for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
@@ -45,10 +46,43 @@ static void derivatives_are_those_of_each_direction(void **state) {
         }
     }
     /* the derivative is greatest where the light is, and no pixel without light has much of it */
-    assert_true(s.flank[0] > 0.99);
-    assert_true(s.noisy[0] > 0.99 && s.noisy[0] < 1.3);
-    assert_true(s.flank[12] < 0.05);
+    for (int k = 0; k < BST_FLANK_STEPS; k++) { /* the last show the border of the samples */
+        double any = (double)s.any_flank[BST_FLANK_STREAK].at[k];
+        assert_true(any > 0.98 && (any < 1.3 || k > 80));
+        assert_true((double)s.any_flank[BST_FLANK_POINT].at[k] > any - 0.01);
+        assert_true((double)s.flank[BST_FLANK_STREAK][3][2].at[k] <= any);
+    }
     bst_psf_free(psf);
+}
+
+/* A bright point much wider than its pixels: the greatest |He_n(u)| exp(-u^2 / 4) over the greatest
+ * |He_n(u)| exp(-u^2 / 2), He_n the Hermite polynomials of order 2, 3, 4 and 6. */
+static void errors_beside_a_gaussian_are_those_of_hermite_functions(void **state) {
+    (void)state;
+    double peak[4] = {0.0}, beside[4] = {0.0}, expected = 0.0;
+    for (double u = 0.0; u < 6.0; u += 1e-3) {
+        double v = u * u, light = exp(-0.5 * v);
+        const double he[4] = {v - 1.0, u * (v - 3.0), (v - 6.0) * v + 3.0,
+                              ((v - 15.0) * v + 45.0) * v - 15.0};
+        for (int k = 0; k < 4; k++) {
+            peak[k] = fmax(peak[k], fabs(he[k]) * light);
+            beside[k] = fmax(beside[k], fabs(he[k]) * sqrt(light));
+        }
+    }
+    for (int k = 0; k < 4; k++) {
+        expected = fmax(expected, beside[k] / peak[k]);
+    }
+    bst_light_flank flank;
+    bst_flank_curve curve;
+    bst_gaussian_flank_measure(50.0, 1, 0.0, &flank);
+    bst_flank_curve_make(&flank, &curve);
+    /* places are 0.14 sigma apart */
+    bst_assert_close(bst_flank_curve_at(&curve, 1e5), expected, 0.03 * expected);
+    bst_assert_close(bst_flank_curve_at(&curve, 1e-3), 1.0, 0.02); /* dark: that of the peak */
+    /* in a pixel of 2.8 sigma, the next one has a fifth of the light and as much error */
+    bst_gaussian_flank_measure(0.36, 1, 0.0, &flank);
+    bst_flank_curve_make(&flank, &curve);
+    assert_true(bst_flank_curve_at(&curve, 1e4) > 1.5);
 }
 
 /* A row of groups of length L: 2 w^6 exp(-w^2 variance / 2) sigma^6 / 15 times the kernel's part,
@@ -59,7 +93,7 @@ static void rows_have_the_frequencies_of_a_comb(void **state) {
     bst_camera camera;
     bst_psf_sensitivity s;
     bst_psf *psf = make_psf(&ctx, &camera);
-    bst_assert_ok(&ctx, bst_psf_sensitivity_measure(&ctx, psf, 0.9, SHORT_PX, &s));
+    bst_assert_ok(&ctx, bst_psf_sensitivity_measure(&ctx, psf, 0.9, SHORT_PX, 1, &s));
     double variance = LONG_PX * LONG_PX + 1.0 / 12.0;
     for (int b = 2; b <= 8; b++) { /* along x, the direction 0 */
         double w = 2.0 * BST_PI * b * s.most_per_px / BST_ROW_STEPS,
@@ -77,7 +111,7 @@ static void light_falls_as_the_psf_does(void **state) {
     bst_camera camera;
     bst_psf_sensitivity s;
     bst_psf *psf = make_psf(&ctx, &camera);
-    bst_assert_ok(&ctx, bst_psf_sensitivity_measure(&ctx, psf, 0.9, SHORT_PX, &s));
+    bst_assert_ok(&ctx, bst_psf_sensitivity_measure(&ctx, psf, 0.9, SHORT_PX, 1, &s));
     double wide = LONG_PX * LONG_PX + 1.0 / 12.0, narrow = SHORT_PX * SHORT_PX + 1.0 / 12.0;
     for (int d = 0; d < BST_NODE_DIRECTIONS; d++) {
         double angle = d * BST_PI / BST_NODE_DIRECTIONS, c = cos(angle), n = sin(angle);
@@ -164,6 +198,7 @@ int main(void) {
         cmocka_unit_test(derivatives_are_those_of_each_direction),
         cmocka_unit_test(a_group_has_the_light_of_a_wide_psf),
         cmocka_unit_test(light_falls_as_the_psf_does),
+        cmocka_unit_test(errors_beside_a_gaussian_are_those_of_hermite_functions),
         cmocka_unit_test(rows_have_the_frequencies_of_a_comb),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

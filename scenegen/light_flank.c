@@ -1,0 +1,47 @@
+#include "scenegen/light_flank.h"
+
+#include <assert.h>
+#include <math.h>
+
+/* Light of a step over the dark variance: octaves of equal steps, so that frexp finds them. */
+static double light_of(int step) {
+    double octave = ldexp(1.0, BST_FLANK_FIRST + step / BST_FLANK_PARTS);
+    return octave * (1.0 + (double)(step % BST_FLANK_PARTS) / BST_FLANK_PARTS);
+}
+
+void bst_flank_curve_make(const bst_light_flank *flank, bst_flank_curve *out) {
+    for (int n = 0; n < BST_FLANK_STEPS; n++) {
+        double worst = 0.0, peak = light_of(n), light = peak;
+        for (int k = 0; k < BST_LIGHT_CLASSES; k++) {
+            bool last = k + 1 == BST_LIGHT_CLASSES;
+            double less = last ? 0.0 : 0.5 * light;
+            double dim = flank->error[k] / sqrt(less + 1.0);
+            double lit = last ? INFINITY : flank->noisy[k] / sqrt(peak + peak / light);
+            worst = fmax(worst, fmin(dim, lit));
+            light = less;
+        }
+        out->at[n] = (float)(worst * sqrt(peak + 1.0));
+    }
+}
+
+void bst_flank_curve_raise(bst_flank_curve *curve, const bst_flank_curve *other) {
+    for (int n = 0; n < BST_FLANK_STEPS; n++) {
+        curve->at[n] = other->at[n] > curve->at[n] ? other->at[n] : curve->at[n];
+    }
+}
+
+double bst_flank_curve_at(const bst_flank_curve *curve, double light) {
+    int exponent;
+    assert(light >= 0.0);
+    double part = 2.0 * frexp(light, &exponent) - 1.0; /* light = 2^(exponent - 1) (1 + part) */
+    double at = BST_FLANK_PARTS * (exponent - 1 - BST_FLANK_FIRST + part);
+    if (!(at > 0.0) || light == 0.0) {
+        return (double)curve->at[0];
+    }
+    if (at >= BST_FLANK_STEPS - 1) {
+        return (double)curve->at[BST_FLANK_STEPS - 1];
+    }
+    int n = (int)at;
+    double low = (double)curve->at[n], high = (double)curve->at[n + 1];
+    return low + (at - n) * (high - low);
+}
