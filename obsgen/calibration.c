@@ -1,7 +1,5 @@
 #include "obsgen/calibration.h"
 
-#include <math.h>
-
 #include <assert.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,6 +7,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "obsgen/model/place_error.h"
 #include "sim/core/invariant.h"
 #include "sim/io/manifest.h"
 
@@ -73,11 +72,11 @@ void bst_obsgen_calibration_theory(bst_obsgen_calibration *out) {
                                     .slope = 1.0,
                                     .false_alarm_factor = 1.0,
                                     .false_alarm_steepness = 1.0,
-                                    .across_factor = {1, 1, 1, 1, 1, 1},
                                     .along_factor = {1, 1, 1, 1, 1, 1},
                                     .blend_distance_factor = 1.0,
                                     .star_id_probability = 1.0,
                                     .cosmic_ray_flag_probability = 1.0};
+    memcpy(out->across_factor, bst_place_error_core, sizeof out->across_factor);
 }
 
 bst_status bst_obsgen_calibration_read(bst_ctx *ctx, const char *path,

@@ -1,11 +1,15 @@
 #include <math.h>
 
 #include "obsgen/generator_internal.h"
+#include "obsgen/model/place_error.h"
 
 /* SNR above which size and own streak of a source are measured. */
 static const double MOMENTS_SNR = 10.0;
 /* Lower limit of the visible share used for errors. */
 static const double LEAST_SEEN = 0.02;
+/* Draws of a point's error until its maximum exceeds the threshold, and their number's place in
+ * that of the random stream. */
+enum { POINT_TRIALS = 8, TRIAL_BITS = 52 };
 
 double bst_generator_saturation_e(const bst_generator *g) {
     const bst_camera *c = g->camera;
@@ -94,6 +98,23 @@ bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
     return s->other * s->amplitude + bst_generator_other_noise(g, s) > s->amplitude + s->noise;
 }
 
+/* Draws the position error of a point, in standard deviations of the linear fit: that of a maximum
+ * of the output that exceeds the threshold. */
+static void draw_point_error(const bst_generator *g, const generator_source *s, double snr,
+                             double error[2]) {
+    double spread = fmax(s->spread, 1e-3), threshold = g->filters[0].threshold;
+    double level = fmax(snr + s->spread * s->noise, threshold - 1.0 / snr), output = 0.0;
+    for (int trial = 0; trial < POINT_TRIALS && output <= threshold; trial++) {
+        uint64_t first = (uint64_t)trial << TRIAL_BITS | s->name * GENERATOR_DRAWS;
+        double h[3] = {0.0, 0.0,
+                       bst_rng_normal(g->key, (uint64_t)g->exposure_id, first + GENERATOR_TWIST)};
+        bst_rng_normal2(g->key, (uint64_t)g->exposure_id, first + GENERATOR_CURVATURE, h);
+        bst_rng_normal2(g->key, (uint64_t)g->exposure_id, first + GENERATOR_PLACE, error);
+        /* own shot noise is part of the noise at the source */
+        output = spread * bst_place_error_bend(snr / spread, level / spread, h, error);
+    }
+}
+
 /* Position with error and covariance, along and across the path. */
 static void measure_place(const bst_generator *g, const generator_source *s,
                           const generator_blend *b, const bst_crlb_table_at *truth,
@@ -105,8 +126,16 @@ static void measure_place(const bst_generator *g, const generator_source *s,
         length > 1.0 ? bst_obsgen_between(bst_obsgen_snrs, cal->along_factor, BST_OBSGEN_SNRS, snr)
                      : across;
     double error[2];
-    bst_rng_normal2(g->key, (uint64_t)g->exposure_id, s->name * GENERATOR_DRAWS + GENERATOR_PLACE,
-                    error);
+    if (!b->drawn && length <= 1.0 && snr < BST_PLACE_ERROR_MOST_SNR) {
+        double core =
+            bst_obsgen_between(bst_obsgen_snrs, bst_place_error_core, BST_OBSGEN_SNRS, snr);
+        draw_point_error(g, s, snr, error);
+        across /= core;
+        along /= core;
+    } else {
+        bst_rng_normal2(g->key, (uint64_t)g->exposure_id,
+                        s->name * GENERATOR_DRAWS + GENERATOR_PLACE, error);
+    }
     /* light off the frame carries no information; the position along a streak comes from its ends
      */
     double widen_along =

@@ -20,40 +20,70 @@ static const double CORE_SIGMAS = 4.0;
 /* Share of a known PSF's sum of squares that the kernel of image processing may lose by its radius
  * (imgproc/detect/filter_kernel.c). */
 static const double RADIUS_SHARE = 1e-3;
+/* Reach of a PSF that image processing knows, in its equivalent FWHM, and limits of it, sensor px
+ * (imgproc/detect/known_psf.c). */
+static const double REACH_FWHM = 2.2, LEAST_REACH_PX = 7.0, MOST_REACH_PX = 46.0;
 
-/* Pixels about a source: half side of the patch, reach of the filter's kernel. */
+/* Pixels about a source: half side of the patch, and of the light under its kernels. */
 enum {
     RADIUS = 22,
-    KERNEL = 9,
     SIDE = 2 * RADIUS + 1,
-    WIDE = SIDE + 2 * KERNEL,
     MOST_MAXIMA = 256,
-    MOST_RADIUS = 15, /* BST_FILTER_MAX_RADIUS */
-    PER_PX = 3,       /* of the table of outputs */
+    MOST_RADIUS = 15,
+    MOST_SHIFT = 7, /* of the point outputs that the streak filter sums: half a streak */
+    POINTS = SIDE + 2 * MOST_SHIFT,
+    WIDE = POINTS + 2 * MOST_RADIUS,
+    MOST_TAPS = 2 * (2 * MOST_SHIFT + 1),
+    MOST_NODES = 32, /* of a source's path */
+    PER_PX = 3,      /* of the table of outputs */
     DISTANCES = BST_FALLOFF_DISTANCES / BST_FALLOFF_PER_PX * PER_PX
 };
 _Static_assert(WIDE *WIDE <= 1 << PIXEL_BITS, "a pixel has its own number");
+/* Longer streaks have no wing alarms: box and streak would exceed the patch. */
+static const double MOST_STREAK_PX = 2.0 * MOST_SHIFT - 1.0;
 
-/* Output of the point filter by distance from a source, relative to that at it, and share of the
- * source's light on a pixel, averaged with the squares of the kernel: its shot noise in the output.
- */
+/* Weighted shift of point outputs, px. */
+typedef struct tap {
+    int x, y;
+    float weight;
+} tap;
+
+/* The filters of image processing, and the point filter's output by distance from a source at rest,
+ * per electron over the pixel noise. */
 typedef struct outputs {
-    float at[DISTANCES], light[DISTANCES];
+    float kernel[MOST_RADIUS + 1][MOST_RADIUS + 1]; /* unit sum of squares; [|y|][|x|] */
+    int radius;
+    double sum; /* of the kernel */
+    float at[DISTANCES];
     double end_px; /* last distance */
+    /* streak filter: sum of shifted point outputs, of unit noise; none in frames without */
+    tap taps[MOST_TAPS];
+    int tap_count, shift; /* shift: largest, px */
+    double tap_sum;       /* of the weights */
 } outputs;
+
+/* Place on a source's path, frame px. */
+typedef struct path_node {
+    double x, y;
+} path_node;
 
 /* A source and the frame in which it has wings. */
 typedef struct winged {
     const bst_generator *g;
     const generator_source *s;
     const outputs *outputs;
-    double norm; /* sqrt(sum k^2) of the point filter's image k of unit sum */
+    path_node nodes[MOST_NODES]; /* equal shares of its light */
+    int node_count;
 } winged;
 
-/* Output of the filter about a source, SNR as image processing measures it. */
+/* Outputs of the filters about a source, SNR as image processing measures it, and the light of its
+ * wings on the pixels. */
 typedef struct patch {
-    int x0, y0; /* frame pixel of the first */
-    float output[SIDE][SIDE], light[SIDE][SIDE];
+    int x0, y0; /* frame pixel of the first output */
+    float light[WIDE][WIDE], pixels[WIDE][WIDE];
+    float point[POINTS][POINTS]; /* before the background is subtracted */
+    float output[SIDE][SIDE];    /* larger one of the filters */
+    bool streak[SIDE][SIDE];     /* it is that of the streak filter */
 } patch;
 
 typedef struct maximum {
@@ -61,52 +91,117 @@ typedef struct maximum {
     float snr;
 } maximum;
 
-/* Half side of the filter's square kernel, px, and the fitted PSF on it. */
-static int set_kernel(const bst_response *r, float kernel[MOST_RADIUS + 1][MOST_RADIUS + 1]) {
+/* Half side to which image processing knows the PSF, read-out px. */
+static int known_reach(const bst_generator *g) {
+    const bst_obsgen_image_width *w = &g->response.filter;
+    double fwhm =
+        g->binning * BST_FWHM_PER_SIGMA * sqrt(fmax(w->across_px * w->along_px - 1.0 / 12.0, 0.0));
+    double reach = fmin(fmax(ceil(REACH_FWHM * fwhm), LEAST_REACH_PX), MOST_REACH_PX);
+    return (int)fmin(ceil(reach / g->binning), MOST_RADIUS);
+}
+
+/* Sets the filter's kernel: the fitted PSF on a square. A square one pixel too wide has twice the
+ * output on a wing, because its rim has light of the star's core. */
+static void set_kernel(const bst_generator *g, outputs *out) {
     double square[MOST_RADIUS + 1] = {0.0}; /* sum of squares within each half side */
-    for (int v = 0; v <= MOST_RADIUS; v++) {
-        for (int u = 0; u <= MOST_RADIUS; u++) {
+    int reach = known_reach(g);
+    for (int v = 0; v <= reach; v++) {
+        for (int u = 0; u <= reach; u++) {
             double slope, curvature,
-                share = bst_response_model_share(r, hypot(u, v), &slope, &curvature);
-            kernel[v][u] = (float)share;
+                share = bst_response_model_share(&g->response, hypot(u, v), &slope, &curvature);
+            out->kernel[v][u] = (float)share;
             square[u > v ? u : v] += share * share * (u > 0 ? 2.0 : 1.0) * (v > 0 ? 2.0 : 1.0);
         }
     }
-    double all = 0.0, inside = 0.0;
-    for (int k = 0; k <= MOST_RADIUS; k++) {
+    double all = 0.0, inside = square[0];
+    for (int k = 0; k <= reach; k++) {
         all += square[k];
     }
-    int radius = 0;
-    while (radius < MOST_RADIUS && !((inside += square[radius]) >= (1.0 - RADIUS_SHARE) * all)) {
-        radius++;
+    for (out->radius = 0; out->radius < reach && inside < (1.0 - RADIUS_SHARE) * all;) {
+        inside += square[++out->radius];
     }
-    return radius;
+    out->sum = 0.0;
+    for (int v = 0; v <= out->radius; v++) {
+        for (int u = 0; u <= out->radius; u++) {
+            out->kernel[v][u] /= (float)sqrt(inside);
+            out->sum += (double)out->kernel[v][u] * (u > 0 ? 2.0 : 1.0) * (v > 0 ? 2.0 : 1.0);
+        }
+    }
 }
 
 /* Computes the outputs: sums of kernel and image over the kernel's pixels, in the mean of the
  * directions along the pixels and across them. */
-static void set_outputs(const bst_response *r, outputs *out) {
-    float kernel[MOST_RADIUS + 1][MOST_RADIUS + 1];
-    int radius = set_kernel(r, kernel);
+static void set_outputs(const bst_generator *g, outputs *out) {
+    const bst_response *r = &g->response;
+    set_kernel(g, out);
+    int radius = out->radius;
     out->end_px = (DISTANCES - 1.0) / PER_PX / r->image_scale - radius;
     for (int n = 0; n < DISTANCES; n++) {
-        double away = (double)n / PER_PX, sum = 0.0, light = 0.0, squares = 0.0;
+        double away = (double)n / PER_PX, sum = 0.0;
         for (int turned = 0; turned < 2 && away <= out->end_px + 1.0; turned++) {
             double x = turned ? sqrt(0.5) * away : away, y = turned ? x : 0.0;
             for (int v = -radius; v <= radius; v++) {
                 for (int u = -radius; u <= radius; u++) {
-                    double weight = (double)kernel[abs(v)][abs(u)];
-                    double share = bst_response_image_share(r, hypot(x - u, y - v));
-                    sum += weight * share;
-                    light += weight * weight * share;
-                    squares += weight * weight;
+                    sum += (double)out->kernel[abs(v)][abs(u)] *
+                           bst_response_image_share(r, hypot(x - u, y - v));
                 }
             }
         }
-        out->light[n] = (float)(squares > 0.0 ? light / squares : 0.0);
-        out->at[n] = (float)(n == 0 ? sum : sum / (double)out->at[0]);
+        out->at[n] = (float)(0.5 * sum);
     }
-    out->at[0] = 1.0f;
+}
+
+/* Covariance of the point filter's noise at two pixels. */
+static double point_covariance(const outputs *f, int x, int y) {
+    int r = f->radius;
+    double sum = 0.0;
+    for (int v = -r; v <= r; v++) {
+        for (int u = -r; u <= r; u++) {
+            int i = abs(u + x), j = abs(v + y);
+            sum += i <= r && j <= r ? (double)(f->kernel[abs(v)][abs(u)] * f->kernel[j][i]) : 0.0;
+        }
+    }
+    return sum;
+}
+
+/* Sets the shifts of the streak filter as image processing lays them out: one place per pixel along
+ * the longer axis, shared by the two nearest pixels across (imgproc/detect/filter_kernel.c). */
+static void set_taps(const bst_generator *g, outputs *out) {
+    out->tap_count = out->shift = 0;
+    out->tap_sum = 0.0;
+    double dx = 0.5 * round(2.0 * g->star_path.dx), dy = 0.5 * round(2.0 * g->star_path.dy);
+    bool along_x = fabs(dx) >= fabs(dy);
+    double major = along_x ? dx : dy, minor = along_x ? dy : dx, half = 0.5 * fabs(major);
+    if (!(g->streak > 0.0) || half == 0.0) {
+        return;
+    }
+    for (int j = -(int)ceil(half + 0.5); j <= (int)ceil(half + 0.5); j++) {
+        double lo = fmax(j - 0.5, -half), hi = fmin(j + 0.5, half);
+        double across = 0.5 * (lo + hi) * minor / major, base = floor(across);
+        for (int k = 0; k < 2 && hi > lo; k++) {
+            double weight = (hi - lo) * (k ? across - base : 1.0 - across + base);
+            int m = (int)base + k;
+            if (weight > 0.0) {
+                assert(out->tap_count < MOST_TAPS && abs(j) <= MOST_SHIFT && abs(m) <= MOST_SHIFT);
+                out->taps[out->tap_count++] =
+                    (tap){along_x ? j : m, along_x ? m : j, (float)weight};
+                out->shift = abs(j) > out->shift ? abs(j) : out->shift;
+                out->shift = abs(m) > out->shift ? abs(m) : out->shift;
+            }
+        }
+    }
+    double variance = 0.0;
+    for (int a = 0; a < out->tap_count; a++) {
+        for (int b = 0; b < out->tap_count; b++) {
+            const tap *p = &out->taps[a], *q = &out->taps[b];
+            variance +=
+                (double)(p->weight * q->weight) * point_covariance(out, p->x - q->x, p->y - q->y);
+        }
+    }
+    for (int a = 0; a < out->tap_count; a++) {
+        out->taps[a].weight /= (float)sqrt(variance);
+        out->tap_sum += (double)out->taps[a].weight;
+    }
 }
 
 /* Farthest distance of the table of outputs, px. */
@@ -121,9 +216,9 @@ static double table_at(const float table[DISTANCES], double distance_px) {
     return (double)table[i] + (at - i) * ((double)table[i + 1] - (double)table[i]);
 }
 
-/* Filter output caused by a source at a distance within the table. */
+/* Output of the point filter caused by a source at rest at a distance within the table. */
 static double wing_output(const winged *w, double distance_px) {
-    return w->s->amplitude * table_at(w->outputs->at, distance_px);
+    return w->s->flux_e / w->g->noise_e * table_at(w->outputs->at, distance_px);
 }
 
 /* Wing light per pixel, in pixel noises (callback). Beyond the table wings decrease with the third
@@ -141,18 +236,46 @@ static double nearest_px(const bst_generator *g) {
     return ceil(6.0 * g->fitted_sigma + g->streak) + 2.5;
 }
 
+/* Lays out a source's path: uniform, or the true one if that is far from uniform. */
+static void set_nodes(winged *w) {
+    const bst_generator *g = w->g;
+    const generator_source *s = w->s;
+    if (g->uneven) {
+        bst_star_trail_path path = bst_generator_object_path(g, s);
+        w->node_count = path.count < MOST_NODES ? path.count : MOST_NODES;
+        for (int k = 0; k < w->node_count; k++) {
+            int at = (int)((k + 0.5) / w->node_count * path.count);
+            w->nodes[k] = (path_node){s->x + g->object_x[at], s->y + g->object_y[at]};
+        }
+        return;
+    }
+    w->node_count = (int)fmin(fmax(ceil(s->length), 1.0), MOST_NODES);
+    for (int k = 0; k < w->node_count; k++) {
+        double u = (k + 0.5) / w->node_count - 0.5;
+        w->nodes[k] = (path_node){s->x + u * s->path.dx, s->y + u * s->path.dy};
+    }
+}
+
+/* Distance of a pixel from a source's path, px. */
+static double path_distance(const winged *w, double x, double y) {
+    double least = INFINITY;
+    for (int k = 0; k < w->node_count; k++) {
+        least = fmin(least, hypot(x - w->nodes[k].x, y - w->nodes[k].y));
+    }
+    return least;
+}
+
 static bool has_wings(const winged *w) {
     double from = nearest_px(w->g);
     return w->s->found && table_end_px(w) > from && wing_output(w, from) >= LEAST_WING;
 }
 
 /* Adds the wings of all bright sources to the background by mesh; *any: false if there are none. */
-static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, const outputs *table, double norm,
-                               bool *any) {
+static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, const outputs *table, bool *any) {
     *any = false;
     for (int i = 0; i < g->source_count; i++) {
         const generator_source *s = &g->sources[i];
-        winged w = {g, s, table, norm};
+        winged w = {.g = g, .s = s, .outputs = table};
         if (!has_wings(&w)) {
             continue;
         }
@@ -172,59 +295,100 @@ static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, const outputs *ta
     return BST_OK;
 }
 
-/* Draws noise with the correlation of the filter's output: white noise under a Gaussian kernel. */
-static void draw_noise(const bst_generator *g, const generator_source *s, float out[SIDE][SIDE]) {
-    float kernel[2 * KERNEL + 1], sum = 0.0f, rows[WIDE][SIDE];
-    double sigma = g->response.maxima_sigma_px;
-    for (int i = 0; i <= 2 * KERNEL; i++) {
-        double at = (i - KERNEL) / sigma;
-        kernel[i] = (float)exp(-0.5 * at * at);
-        sum += kernel[i] * kernel[i];
-    }
-    uint64_t first = WING_ALARM | s->name << PIXEL_BITS;
-    for (int j = 0; j < WIDE; j++) {
-        float white[WIDE];
-        for (int i = 0; i < WIDE; i++) {
-            white[i] = (float)bst_rng_normal(g->key, (uint64_t)g->exposure_id,
-                                             first + (uint64_t)(j * WIDE + i));
-        }
-        for (int i = 0; i < SIDE; i++) {
-            rows[j][i] = 0.0f;
-            for (int k = 0; k <= 2 * KERNEL; k++) {
-                rows[j][i] += kernel[k] * white[i + k] / sum;
+/* Share of the noise variance of a dark pixel that is of counted electrons. */
+static double counted_share(const bst_generator *g) {
+    const bst_camera *c = g->camera;
+    double normal = c->read_noise_e * c->read_noise_e + c->gain_e_per_dn * c->gain_e_per_dn / 12.0;
+    return fmax(1.0 - normal / (g->noise_e * g->noise_e), 0.0);
+}
+
+/* Noise with the second and third moments of counted and normal electrons, in noises of a dark
+ * pixel (Cornish-Fisher): alarms are rare, and the threshold allows for the skewness.
+ *
+ * Given:     light    in the same unit
+ *            counted  see counted_share
+ *            z        standard normal */
+static double skewed_noise(const bst_generator *g, double light, double counted, double z) {
+    double variance = 1.0 + light / g->noise_e;
+    double third = (counted + light / g->noise_e) / g->noise_e;
+    return sqrt(variance) * z + third / (6.0 * variance) * (z * z - 1.0);
+}
+
+/* Draws the pixels under the filters of a patch, in pixel noises: light of the source, its shot
+ * noise, noise of the background. */
+static void draw_pixels(const winged *w, patch *p) {
+    const bst_generator *g = w->g;
+    int before = w->outputs->radius + w->outputs->shift, side = SIDE + 2 * before;
+    uint64_t first = WING_ALARM | w->s->name << PIXEL_BITS;
+    double counted = counted_share(g);
+    for (int j = 0; j < side; j++) {
+        for (int i = 0; i < side; i++) {
+            double x = p->x0 + i - before, y = p->y0 + j - before, light = 0.0;
+            for (int k = 0; k < w->node_count; k++) {
+                light += wing_light(w, hypot(x - w->nodes[k].x, y - w->nodes[k].y));
             }
+            light /= w->node_count;
+            double z =
+                bst_rng_normal(g->key, (uint64_t)g->exposure_id, first + (uint64_t)(j * WIDE + i));
+            p->light[j][i] = (float)light;
+            p->pixels[j][i] = (float)(light + skewed_noise(g, light, counted, z));
         }
     }
-    for (int j = 0; j < SIDE; j++) {
-        for (int i = 0; i < SIDE; i++) {
-            out[j][i] = 0.0f;
-        }
-        for (int k = 0; k <= 2 * KERNEL; k++) {
-            for (int i = 0; i < SIDE; i++) {
-                out[j][i] += kernel[k] * rows[j + k][i];
+}
+
+/* Sum of pixels under the point filter for `count` outputs of a row. */
+static void filter_row(const outputs *f, float pixels[WIDE][WIDE], int x, int y, int count,
+                       float *out) {
+    int r = f->radius;
+    for (int i = 0; i < count; i++) {
+        out[i] = 0.0f;
+    }
+    for (int v = 0; v <= 2 * r; v++) {
+        for (int u = 0; u <= 2 * r; u++) {
+            float weight = f->kernel[abs(v - r)][abs(u - r)];
+            const float *from = &pixels[y + v][x + u];
+            for (int i = 0; i < count; i++) {
+                out[i] += weight * from[i];
             }
         }
     }
 }
 
-/* Sets the filter's output about a source: wing light less the background of the mesh, and noise,
- * both over the noise that image processing measures. */
+/* Sets the outputs about a source less the background of the mesh, over the noise that image
+ * processing measures. */
 static void set_patch(const winged *w, patch *p) {
     const bst_generator *g = w->g;
+    const outputs *f = w->outputs;
+    int shift = f->shift, side = SIDE + 2 * shift;
     p->x0 = (int)lround(w->s->x) - RADIUS;
     p->y0 = (int)lround(w->s->y) - RADIUS;
-    draw_noise(g, w->s, p->output);
+    draw_pixels(w, p);
+    for (int j = 0; j < side; j++) {
+        filter_row(f, p->pixels, 0, j, side, p->point[j]);
+    }
     for (int j = 0; j < SIDE; j++) {
         for (int i = 0; i < SIDE; i++) {
-            double x = p->x0 + i, y = p->y0 + j, r = hypot(x - w->s->x, y - w->s->y), level, noise;
-            bst_local_sky_at(&g->wing_sky, x, y, &level, &noise);
-            double away = fmin(r, table_end_px(w)), raw = wing_output(w, away);
-            double own = sqrt(1.0 + w->s->flux_e * table_at(w->outputs->light, away) /
-                                        (g->noise_e * g->noise_e));
-            p->light[j][i] = (float)((raw - level / w->norm) / noise);
-            p->output[j][i] = p->light[j][i] + (float)(own / noise) * p->output[j][i];
+            double level, noise;
+            bst_local_sky_at(&g->wing_sky, p->x0 + i, p->y0 + j, &level, &noise);
+            double point = (double)p->point[j + shift][i + shift] - f->sum * level, streak = 0.0;
+            for (int k = 0; k < f->tap_count; k++) {
+                const tap *t = &f->taps[k];
+                streak += (double)(t->weight * p->point[j + shift + t->y][i + shift + t->x]);
+            }
+            streak -= f->tap_sum * f->sum * level;
+            p->streak[j][i] = f->tap_count > 0 && streak > point;
+            p->output[j][i] = (float)((p->streak[j][i] ? streak : point) / noise);
         }
     }
+}
+
+/* Output of the point filter at a pixel of the patch by the wings' light alone. */
+static double light_output(const winged *w, patch *p, int i, int j) {
+    double level, noise;
+    float sum;
+    bst_local_sky_at(&w->g->wing_sky, p->x0 + i, p->y0 + j, &level, &noise);
+    filter_row(w->outputs, p->light, i + w->outputs->shift, j + w->outputs->shift, 1, &sum);
+    return ((double)sum - w->outputs->sum * level) / noise;
 }
 
 /* Finds the local maxima of a patch above a level; returns their number. */
@@ -285,24 +449,28 @@ static double rise(float left, float middle, float right) {
 
 /* Keeps the false alarms on the wings of one source: maxima above the threshold that no ridge
  * connects to a higher one, such as the source. */
-static void draw_about(bst_generator *g, const winged *w) {
+static void draw_about(bst_generator *g, winged *w) {
     patch p;
     maximum found[MOST_MAXIMA];
+    set_nodes(w);
     set_patch(w, &p);
     int count = find_maxima(&p, bst_generator_looks_from(g), found);
     double core = CORE_SIGMAS * g->fitted_sigma;
     for (int k = 0; k < count; k++) {
         int i = found[k].x, j = found[k].y, x = p.x0 + i, y = p.y0 + j;
+        bool streak = p.streak[j][i];
         double snr = (double)found[k].snr +
                      rise(p.output[j][i - 1], found[k].snr, p.output[j][i + 1]) +
                      rise(p.output[j - 1][i], found[k].snr, p.output[j + 1][i]);
-        if (snr <= g->filters[0].threshold || (double)p.light[j][i] < LEAST_WING || x < 0 ||
-            y < 0 || x >= g->width || y >= g->height || hypot(x - w->s->x, y - w->s->y) < core ||
-            is_connected(g, &p, found, count, k)) {
+        if (snr <= g->filters[streak].threshold || x < 0 || y < 0 || x >= g->width ||
+            y >= g->height || path_distance(w, x, y) < core ||
+            light_output(w, &p, i, j) < LEAST_WING || is_connected(g, &p, found, count, k)) {
             continue;
         }
-        bst_obsgen_generated item = {.detection = bst_false_alarms_point(g, x, y, snr, 0.0),
-                                     .item = -1};
+        bst_obsgen_generated item = {
+            .detection = bst_false_alarms_point(g, x, y, snr, streak ? g->streak : 0.0),
+            .item = -1,
+            .drawn = streak};
         item.detection.label = BST_LABEL_ARTEFACT;
         bst_generator_keep(g, &item);
     }
@@ -311,26 +479,29 @@ static void draw_about(bst_generator *g, const winged *w) {
 /* False if no source is bright enough for wings: without its wings the kernel's output is at most
  * that of the whole filter. Saves the table of outputs. */
 static bool may_have_wings(const bst_generator *g) {
-    double most = 0.0, from = nearest_px(g);
+    double most_e = 0.0, from = nearest_px(g);
     for (int i = 0; i < g->source_count; i++) {
         const generator_source *s = &g->sources[i];
-        most = fmax(most, s->found ? s->amplitude : 0.0);
+        most_e = fmax(most_e, s->found ? s->flux_e : 0.0);
     }
-    return most * bst_response_falloff(&g->response, from, 0.0, 0.0) >= LEAST_WING;
+    return most_e / g->noise_e * bst_crlb_table_norm(&g->bound, 0.0) *
+               bst_response_falloff(&g->response, from, 0.0, 0.0) >=
+           LEAST_WING;
 }
 
 bst_status bst_wing_alarms_draw(bst_ctx *ctx, bst_generator *g) {
     assert(ctx && g);
-    if (!g->response.falloff.tabulated || g->smeared || !may_have_wings(g)) {
+    if (!g->response.falloff.tabulated || g->smeared || g->streak > MOST_STREAK_PX ||
+        !may_have_wings(g)) {
         return BST_OK;
     }
-    double norm = bst_crlb_table_norm(&g->bound, 0.0) * g->norm_ratio[0];
     outputs table;
     bool any;
-    set_outputs(&g->response, &table);
-    BST_TRY(set_wing_sky(ctx, g, &table, norm, &any));
+    set_outputs(g, &table);
+    set_taps(g, &table);
+    BST_TRY(set_wing_sky(ctx, g, &table, &any));
     for (int i = 0; i < g->source_count && any; i++) {
-        winged w = {g, &g->sources[i], &table, norm};
+        winged w = {.g = g, .s = &g->sources[i], .outputs = &table};
         if (has_wings(&w)) {
             draw_about(g, &w);
         }
