@@ -119,8 +119,8 @@ static void noise_decides_at_the_limit(void **state) {
      * that of the maxima; the pixels beside it have 3 more */
     double light2 = exp(-4.0 / (4.0 * 0.945 * 0.945)), light4 = exp(-16.0 / (4.0 * 0.945 * 0.945));
     double near = exp(-4.0 / (4.0 * FILTER * FILTER)), far = exp(-16.0 / (4.0 * FILTER * FILTER));
-    double limit = 10.0 + 14.0 * light4 - 3.0, z = (limit - 24.0 * light2) /
-                                                   sqrt(1.0 - 2.0 * near * near / (1.0 + far));
+    double limit = 10.0 + 14.0 * light4 - 3.0,
+           z = (limit - 24.0 * light2) / sqrt(1.0 - 2.0 * near * near / (1.0 + far));
     double share = 0.5 * erfc(-z / sqrt(2.0));
     assert_true(share > 0.15 && share < 0.3);
     assert_int_equal(without, 0);

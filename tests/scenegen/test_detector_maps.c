@@ -19,16 +19,14 @@ static void charge_is_gathered_on_the_way_to_the_output(void **state) {
     bst_ctx ctx = {0};
     for (int pass = 0; pass < 4; pass++) {
         bool top = pass % 2, even = pass < 2;
-        bst_camera c = {.width_px = WIDTH,
-                        .height_px = HEIGHT,
-                        .dark_current_e_per_s = 7.0,
-                        .detector = {.readout_s = 3.0,
-                                     .clock_induced_e = 1.5,
-                                     .glow = {.peak_e = 80.0,
-                                              .scale_px = 30.0,
-                                              .x_px = -4.0,
-                                              .y_px = 10.0},
-                                     .output = {.top = top}}};
+        bst_camera c = {
+            .width_px = WIDTH,
+            .height_px = HEIGHT,
+            .dark_current_e_per_s = 7.0,
+            .detector = {.readout_s = 3.0,
+                         .clock_induced_e = 1.5,
+                         .glow = {.peak_e = 80.0, .scale_px = 30.0, .x_px = -4.0, .y_px = 10.0},
+                         .output = {.top = top}}};
         if (!even) {
             c.detector.dsnu_rms = 0.4;
             c.detector.overscan = (bst_detector_edges_config){6, 3, 2, 5};
@@ -42,8 +40,8 @@ static void charge_is_gathered_on_the_way_to_the_output(void **state) {
             for (int x = 0; x < WIDTH; x++) {
                 double want = 1.5;
                 for (int passed = top ? y + 1 : 0; passed < (top ? HEIGHT : y); passed++) {
-                    double rate = even ? bst_camera_dark_e_per_s(&c)
-                                       : (double)dark[passed * STRIDE + x];
+                    double rate =
+                        even ? bst_camera_dark_e_per_s(&c) : (double)dark[passed * STRIDE + x];
                     want += rate * 3.0 / HEIGHT;
                 }
                 bool row = y >= o->bottom && y < HEIGHT - o->top;
@@ -61,11 +59,10 @@ static void response_of_pixels(void **state) {
     (void)state;
     static float gain[STRIDE * HEIGHT];
     bst_ctx ctx = {0};
-    bst_camera c = {.width_px = WIDTH,
-                    .height_px = HEIGHT,
-                    .detector = {.prnu_rms = 0.03,
-                                 .shielded = {4, 0, 1, 2},
-                                 .overscan = {0, 7, 0, 3}}};
+    bst_camera c = {
+        .width_px = WIDTH,
+        .height_px = HEIGHT,
+        .detector = {.prnu_rms = 0.03, .shielded = {4, 0, 1, 2}, .overscan = {0, 7, 0, 3}}};
     bst_assert_ok(&ctx, bst_fixed_pattern_noise_gain(&ctx, &c, KEY, STRIDE, gain));
     double sum = 0.0, square = 0.0, beside = 0.0, n = 0.0;
     for (int y = 0; y < HEIGHT; y++) {
@@ -117,7 +114,8 @@ static void codes_of_a_square_root_law(void **state) {
     (void)state;
     static uint16_t codes[65536];
     bst_ctx ctx = {0};
-    bst_camera c = {.bits = 12, .detector.quantisation = {.model = BST_QUANTISE_SQUARE_ROOT, .bits = 7}};
+    bst_camera c = {.bits = 12,
+                    .detector.quantisation = {.model = BST_QUANTISE_SQUARE_ROOT, .bits = 7}};
     bst_assert_ok(&ctx, bst_fixed_pattern_noise_codes(&ctx, &c, codes));
     for (int dn = 0; dn < 4096; dn++) {
         assert_int_equal(codes[dn], lround(127.0 * sqrt(dn / 4095.0)));

@@ -71,16 +71,15 @@ static void tracks_are_in_pixels_of_the_frame(void **state) {
     bst_tracks *t = calloc(1, sizeof *t + sizeof t->items[0]);
     double ra = 200.0 * BST_PI / 180.0, dec = -35.0 * BST_PI / 180.0;
     t->count = 1;
-    t->items[0] =
-        (bst_track){.id = 12,
-                    .status = BST_TRACK_COASTING,
-                    .target_of_interest = true,
-                    .direction_gcrf = {cos(ra) * cos(dec), sin(ra) * cos(dec), sin(dec)},
-                    .v_mag = 9.5,
-                    .snr = 7.5,
-                    .misses_in_row = 4,
-                    .x_px = 200.0,
-                    .y_px = 150.0};
+    t->items[0] = (bst_track){.id = 12,
+                              .status = BST_TRACK_COASTING,
+                              .target_of_interest = true,
+                              .direction_gcrf = {cos(ra) * cos(dec), sin(ra) * cos(dec), sin(dec)},
+                              .v_mag = 9.5,
+                              .snr = 7.5,
+                              .misses_in_row = 4,
+                              .x_px = 200.0,
+                              .y_px = 150.0};
     cJSON *node = cJSON_CreateObject();
     bst_view_add_live_tracks(node, t, &frame);
     const cJSON *mark = cJSON_GetObjectItem(node, "tracks")->child;
@@ -135,8 +134,8 @@ static void truth_and_wcs_agree(void **state) {
     static const char *const keys[3] = {"crpix", "crval_deg", "cd_deg"};
     for (int i = 0; i < 8; i++) {
         int k = i < 4 ? i / 2 : 2;
-        n[i] = cJSON_GetArrayItem(cJSON_GetObjectItem(w, keys[k]), i < 4 ? i % 2 : i - 4)
-                   ->valuedouble;
+        n[i] =
+            cJSON_GetArrayItem(cJSON_GetObjectItem(w, keys[k]), i < 4 ? i % 2 : i - 4)->valuedouble;
     }
     /* tangent plane at crval: xi and eta of the star, back through cd */
     double rad = BST_PI / 180.0, ra0 = n[2] * rad, dec0 = n[3] * rad;

@@ -64,24 +64,25 @@ static void make_tables(run_tables *t) {
         " y_end_px REAL, v_mag REAL, snr REAL, sunlit_fraction REAL, mid_s REAL);",
         RATE);
     run_tables_sql(
-        t, "CREATE TABLE detection_frames (sensor INT, exposure_id INT, mid_s REAL,"
-           " start_tick INT, end_tick INT, written_tick INT, detections INT, stars_identified INT,"
-           " background_e REAL, noise_e REAL, threshold_snr REAL, lost INT);"
-           "CREATE TABLE detections (sensor INT, exposure_id INT, label TEXT, star_id INT,"
-           " x_px REAL, y_px REAL, cov_xx_px2 REAL, cov_xy_px2 REAL, cov_yy_px2 REAL, flux_e REAL,"
-           " snr REAL, length_px REAL, angle_deg REAL, v_mag REAL, blend INT);"
-           "CREATE TABLE tracks (sensor INT, exposure_id INT, time_s REAL, track_id INT,"
-           " status TEXT, target_of_interest INT, x_px REAL, y_px REAL, snr REAL, ra_deg REAL,"
-           " dec_deg REAL, misses_in_row INT, v_mag REAL, cov_d1_d1_rad2 REAL,"
-           " cov_d2_d2_rad2 REAL);"
-           "CREATE TABLE track_frames (sensor INT, exposure_id INT, time_s REAL, tick INT,"
-           " written_tick INT, attitude_error_x_arcsec REAL, attitude_error_y_arcsec REAL,"
-           " attitude_error_z_arcsec REAL);"
-           "CREATE TABLE control (sensor INT, time_s REAL, mode TEXT, aim_error_x_px REAL,"
-           " aim_error_y_px REAL);"
-           "CREATE TABLE pointing (sensor INT, time_s REAL, axis_outer_deg REAL,"
-           " axis_inner_deg REAL);"
-           "CREATE TABLE events (time_s REAL, source TEXT, kind TEXT, text TEXT);");
+        t,
+        "CREATE TABLE detection_frames (sensor INT, exposure_id INT, mid_s REAL,"
+        " start_tick INT, end_tick INT, written_tick INT, detections INT, stars_identified INT,"
+        " background_e REAL, noise_e REAL, threshold_snr REAL, lost INT);"
+        "CREATE TABLE detections (sensor INT, exposure_id INT, label TEXT, star_id INT,"
+        " x_px REAL, y_px REAL, cov_xx_px2 REAL, cov_xy_px2 REAL, cov_yy_px2 REAL, flux_e REAL,"
+        " snr REAL, length_px REAL, angle_deg REAL, v_mag REAL, blend INT);"
+        "CREATE TABLE tracks (sensor INT, exposure_id INT, time_s REAL, track_id INT,"
+        " status TEXT, target_of_interest INT, x_px REAL, y_px REAL, snr REAL, ra_deg REAL,"
+        " dec_deg REAL, misses_in_row INT, v_mag REAL, cov_d1_d1_rad2 REAL,"
+        " cov_d2_d2_rad2 REAL);"
+        "CREATE TABLE track_frames (sensor INT, exposure_id INT, time_s REAL, tick INT,"
+        " written_tick INT, attitude_error_x_arcsec REAL, attitude_error_y_arcsec REAL,"
+        " attitude_error_z_arcsec REAL);"
+        "CREATE TABLE control (sensor INT, time_s REAL, mode TEXT, aim_error_x_px REAL,"
+        " aim_error_y_px REAL);"
+        "CREATE TABLE pointing (sensor INT, time_s REAL, axis_outer_deg REAL,"
+        " axis_inner_deg REAL);"
+        "CREATE TABLE events (time_s REAL, source TEXT, kind TEXT, text TEXT);");
 }
 
 /* Rows of one exposure: those of the other sensor have other values. */
@@ -107,13 +108,15 @@ static void add_rows(run_tables *t, int i, int sensor, double more) {
                    "0,0,9.5,3.0,1.0,%.17g), (%d,%d,'object',3,0,1,0,0,400,300,400,300,0,0,0,0,"
                    "9.5,3.0,1.0,%.17g)",
                    sensor, id, x + 40.0, y, x + 40.0, y + 3.0, at, sensor, id, at);
+    run_tables_sql(
+        t,
+        "INSERT INTO truth VALUES (%d,%d,'star',77,0,1,0,0,%.17g,%.17g,%.17g,%.17g,0,0,0,"
+        "0,7.25,30.0,1.0,%.17g), (%d,%d,'star',78,0,0,0,0,-5,-6,-5,-6,0,0,0,0,"
+        "9.5,3.0,1.0,%.17g)",
+        sensor, id, x - 3.0, y + 15.0, x - 3.0, y + 15.0, at, sensor, id, at);
     run_tables_sql(t,
-                   "INSERT INTO truth VALUES (%d,%d,'star',77,0,1,0,0,%.17g,%.17g,%.17g,%.17g,0,0,0,"
-                   "0,7.25,30.0,1.0,%.17g), (%d,%d,'star',78,0,0,0,0,-5,-6,-5,-6,0,0,0,0,"
-                   "9.5,3.0,1.0,%.17g)",
-                   sensor, id, x - 3.0, y + 15.0, x - 3.0, y + 15.0, at, sensor, id, at);
-    run_tables_sql(t, "INSERT INTO detection_frames VALUES (%d,%d,%.17g,%d,%d,%d,%d,%d,%.17g,%.17g,"
-                      "%.17g,%d)",
+                   "INSERT INTO detection_frames VALUES (%d,%d,%.17g,%d,%d,%d,%d,%d,%.17g,%.17g,"
+                   "%.17g,%d)",
                    sensor, id, at, 100 * i, 100 * i + 30, 100 * i + 30 + 5 * i, 20 + i, 7 + i,
                    50.5 + i, 7.5 - 0.1 * i, 5.25, i);
     run_tables_sql(t,
@@ -270,8 +273,8 @@ static void check_frame(const fixture *f, int i) {
     }
 
     const cJSON *wcs = member(node, "wcs");
-    const double want[3][4] = {{i + 0.25, i + 3.75}, {30.5 + i, -40.5 - i},
-                               {1e-3, i + 1.0, -2e-3, i + 2.5}};
+    const double want[3][4] = {
+        {i + 0.25, i + 3.75}, {30.5 + i, -40.5 - i}, {1e-3, i + 1.0, -2e-3, i + 2.5}};
     static const char *const keys[3] = {"crpix", "crval_deg", "cd_deg"};
     for (int k = 0; k < 3; k++) {
         for (int n = 0; n < (k < 2 ? 2 : 4); n++) {
@@ -418,8 +421,8 @@ static void reasons_have_the_facts_of_the_tables(void **state) {
     bst_assert_close(facts.near_px, away, 1e-9);
     assert_int_equal(facts.near_track, 9);
     assert_true(facts.near_coasts);
-    bst_assert_close(facts.near_sigma,
-                     away / sqrt(4e-10 / (scale * scale) + 0.5 * (0.18 + 0.36)), 1e-9);
+    bst_assert_close(facts.near_sigma, away / sqrt(4e-10 / (scale * scale) + 0.5 * (0.18 + 0.36)),
+                     1e-9);
 }
 
 int main(void) {
