@@ -12,7 +12,8 @@ typedef struct bst_star_path {
     int count;
     double place[BST_STAR_PATH_ROOM][2]; /* px, for a star at the frame's middle */
     double light[BST_STAR_PATH_ROOM];    /* of a sample, mean 1 over the path */
-    double ends[2][2];                   /* where the light ends; the one further left first */
+    double ends[2][2];                   /* where the light ends; the one further left first, of a
+                                            known motion the one that came first */
     double margin[2]; /* logarithm of the likelihood of each end over that of ends elsewhere: see
                          bst_star_path_refine */
     double centre[2]; /* px, of the frame */

@@ -8,7 +8,7 @@ import e2e_suite
 # folders whose tests have names of their own: the rest of a path names its tests (tracker/… → tracker_…)
 UNIT_TESTS = {f"sim/{name}": name for name in (
     "core", "messages", "dynamics", "astro", "device", "catalogue", "optics", "world", "onboard", "io", "link",
-    "engine", "eval", "studies", "satellite", "api", "registry", "cli", "run", "analysis", "export", "report", "study_kinds", "bench")}
+    "engine", "eval", "studies", "satellite", "api", "registry", "cli", "run", "analysis", "process", "export", "report", "study_kinds", "bench")}
 UNIT_TESTS["sim/app"] = "app|bad_input"
 UNIT_TESTS["sim/onboard"] = "onboard|world_cue"  # the cue as the spacecraft and the world have it
 

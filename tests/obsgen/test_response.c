@@ -300,8 +300,84 @@ static void products_turn_with_the_paths(void **state) {
     }
 }
 
+/* Mean over all directions of the image of a point at a distance: a Gaussian over a pixel. */
+static double share_at(double distance, double sigma) {
+    enum { WAYS = 48 };
+    double sum = 0.0;
+    for (int k = 0; k < WAYS; k++) {
+        double angle = 2.0 * BST_PI * (k + 0.3) / WAYS;
+        sum += pixel_share(distance * cos(angle), sigma) *
+               pixel_share(distance * sin(angle), sigma) / WAYS;
+    }
+    return sum;
+}
+
+/* The same of the product with another image, by its own sum over pixels and phases. */
+static double product_at(double distance, double p, double q) {
+    enum { WAYS = 24, PHASES = 6, REACH = 9 };
+    double sum = 0.0;
+    for (int k = 0; k < WAYS; k++) {
+        double angle = 0.5 * BST_PI * (k + 0.3) / WAYS;
+        const double by[2] = {distance * cos(angle), distance * sin(angle)};
+        double both = 1.0;
+        for (int axis = 0; axis < 2; axis++) {
+            double one = 0.0;
+            for (int n = 0; n < PHASES; n++) {
+                double at = (n + 0.5) / PHASES - 0.5;
+                for (int x = -REACH; x <= REACH; x++) {
+                    one += pixel_share(x - at, p) * pixel_share(x - at - by[axis], q) / PHASES;
+                }
+            }
+            both *= one;
+        }
+        sum += both / WAYS;
+    }
+    return sum;
+}
+
+/* Images of a point by the source and by the filter, which differ, in binned pixels, and widened
+ * ones; their widths and the falloff of their product. */
+static void images_of_a_point_have_their_values(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_camera camera = {.width_px = 64,
+                         .height_px = 48,
+                         .pixel_scale_arcsec = 2.0,
+                         .aperture_m = 0.1,
+                         .psf_fwhm_px = 2.8};
+    const double sigma = 2.8 / 2.3548200450309493, more = 0.9, wide = hypot(sigma, more);
+    bst_psf *psf;
+    bst_assert_ok(&ctx, bst_psf_create(&ctx, &camera, &psf));
+    const bst_response_side source = {psf, more}, filter = {psf, 0.0};
+    for (int b = 1; b <= 2; b++) {
+        bst_response r;
+        bst_response_set(&r, &source, &filter, b, 31.5, 23.5);
+        bst_response widened = bst_response_widened(&r, 0.7);
+        const double after = sqrt(wide * wide / b / b + 0.7);
+        const double peak = product_at(0.0, wide / b, sigma / b);
+        for (double d = 0.0; d < 5.0; d += 0.37) {
+            double slope, curvature;
+            /* cubic pieces of tables in single precision */
+            bst_assert_close(bst_response_model_share(&r, d, &slope, &curvature),
+                             share_at(d, sigma / b), 2e-4);
+            bst_assert_close(bst_response_image_share(&r, d), share_at(d, wide / b), 2e-4);
+            bst_assert_close(bst_response_image_share(&widened, d), share_at(d, after), 4e-4);
+            /* linear ones */
+            bst_assert_close(bst_response_falloff(&r, d, 0.0, 0.0),
+                             product_at(d, wide / b, sigma / b) / peak, 4e-3);
+        }
+        bst_assert_close(r.nearest_sigma_px, sigma / b, 1e-3);
+        /* curvature of the filter's product with itself: by differences */
+        double h = 0.25, same = product_at(0.0, sigma / b, sigma / b),
+               curve = 2.0 * (same - product_at(h, sigma / b, sigma / b)) / (h * h) / same;
+        bst_assert_close(r.maxima_sigma_px, sqrt(0.5 / curve), 0.015 * r.maxima_sigma_px);
+    }
+    bst_psf_free(psf);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(images_of_a_point_have_their_values),
         cmocka_unit_test(binned_pixels_have_their_own_products),
         cmocka_unit_test(products_turn_with_the_paths),
         cmocka_unit_test(gaussians_of_other_widths_lose_by_their_product),
