@@ -124,6 +124,16 @@ class ReportTables:
                 self.assertTrue(inside <= number <= about, (low, high, number))
                 counted += number
             self.assertEqual(counted, len(errors))
+            # the curve: as many frames as there are, about the median, as wide as the inner 68 %
+            curve = np.array(bars.lines["c3"])
+            at = np.array([bars.value("x", x) for x in curve[:, 0]])
+            high = np.array([bars.value("y", y) for y in curve[:, 1]])
+            area = np.sum((high[1:] + high[:-1]) / 2 * np.diff(at))
+            self.assertAlmostEqual(area / (len(errors) * (bars.value("x", width) - bars.value("x", 0))), 1, delta=0.03)
+            mean = np.sum(high * at) / np.sum(high)
+            self.assertAlmostEqual(mean, np.median(errors[:, k]), delta=0.02)
+            inner = np.subtract(*np.percentile(errors[:, k], [84.13, 15.87])) / 2
+            self.assertAlmostEqual(np.sqrt(np.sum(high * (at - mean) ** 2) / np.sum(high)) / inner, 1, delta=0.2)
             mean, rms = errors[:, k].mean(), np.sqrt(np.mean(errors[:, k] ** 2))
             found = re.findall(r"Mean (-?[\d.]+) px, RMS ([\d.]+) px; the curve is normal", self.page.text)[k]
             self.close(np.array(found, float), [mean, rms], 0.00051)
@@ -141,6 +151,11 @@ class ReportTables:
         self.check_line(chart, "c0", times, off)
         self.check_line(chart, "c3", times, sigma)
         self.check_line(self.chart("Normalised error squared"), "c0", times, nees)
+        # of those with a detection, the curve is chi-square with 2 degrees of freedom
+        bars, own = self.chart("NEES of the track"), sum(t["last_update_tick"] == t["tick"] for _, t in pairs)
+        curve, width = np.array(bars.lines["c3"]), bars.value("x", bars.bars[0][1]) - bars.value("x", 0)
+        self.check_line(bars, "c3", [bars.value("x", x) for x in curve[:, 0]],
+                        [own * width * 0.5 * np.exp(-0.5 * bars.value("x", x)) for x in curve[:, 0]], 1.5)
 
     def test_page_light_and_sky(self):
         frames, in_field = self.frames.list, [f for f in self.frames.list if f["field"]]
