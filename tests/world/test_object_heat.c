@@ -94,6 +94,27 @@ static void faces_of_a_box(void **state) {
     tear_down(&f);
 }
 
+/* A grey surface has the Sun's colours, whatever the band; half of the Sun is half of the light. */
+static void colours_of_a_grey_box(void **state) {
+    (void)state;
+    fixture f = set_up();
+    bst_scene_glow glow[2];
+    f.config.earthshine = false;
+    for (int k = 0; k < 2; k++) {
+        const bst_scene_lighting l = {.object_m = {2.1e7, -1.7e7, 1.1e7},
+                                      .eye_m = {3e7, -1e7, 4e7},
+                                      .sun_m = {0.6 * BST_AU_M, 0.7 * BST_AU_M, -0.5 * BST_AU_M},
+                                      .sunlit_fraction = k ? 0.5 : 1.0};
+        bst_object_shape_glow(f.shape, f.pose, &f.config, &l, (bst_vec3){1500, 2500, -700},
+                              &glow[k]);
+        for (int c = 0; c < BST_SUNLIGHT_COLOURS; c++) {
+            bst_assert_close(glow[k].redness[c], 1.0, 1e-9);
+        }
+    }
+    bst_assert_close(glow[1].v_mag - glow[0].v_mag, 2.5 * log10(2.0), 1e-9);
+    tear_down(&f);
+}
+
 /* The Earth's light goes with its albedo and the Sun's distance from the Earth, not from the body;
  * it warms the side that looks at the lit half. */
 static void light_of_the_earth(void **state) {
@@ -147,6 +168,7 @@ static void light_of_the_earth(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(faces_of_a_box),
+        cmocka_unit_test(colours_of_a_grey_box),
         cmocka_unit_test(light_of_the_earth),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
