@@ -23,6 +23,23 @@ static calibrate_trial draw_trial(bst_rng_key key, uint64_t n, double length, do
     return t;
 }
 
+/* The gain with the largest log-likelihood of a slope's trials, tried one by one; no trial counts
+ * for less than 1e-4. */
+static double best_of_all(const calibrate_trial *t, int count, double slope) {
+    double best = -INFINITY, gain = 0.0;
+    for (double g = 0.8; g < 1.2; g += 0.001) {
+        double sum = 0.0;
+        for (int i = 0; i < count; i++) {
+            double snr = bst_obsgen_peak((double)t[i].amplitude, g);
+            double z = slope * (snr - 5.0) / sqrt(1.1 + 0.05 * snr);
+            sum += log(fmax(0.5 * erfc((t[i].detected ? -z : z) / sqrt(2.0)), 1e-4));
+        }
+        gain = sum > best ? g : gain;
+        best = fmax(best, sum);
+    }
+    return gain;
+}
+
 static void laws_come_back(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -85,6 +102,9 @@ static void laws_come_back(void **state) {
     bst_assert_close(out.slope, 1.1, 0.1);
     bst_assert_close(out.gain[0], 0.92, 0.035);
     bst_assert_close(out.gain[2], 1.04, 0.035);
+    /* a step of the trial, and a flat summit */
+    bst_assert_close(out.gain[0], best_of_all(trials, TRIALS, out.slope), 0.002);
+    bst_assert_close(out.gain[2], best_of_all(trials + TRIALS, TRIALS, out.slope), 0.002);
     /* lengths without data: as the nearest with data, the shorter one first */
     bst_assert_close(out.gain[1], out.gain[0], 0.0);
     for (int n = 3; n < BST_OBSGEN_LENGTHS; n++) {

@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include "sim/analysis/new/new_scenario.h"
+#include "sim/analysis/new/reference_sensor.h"
 #include "sim/analysis/new/satellite_lookup.h"
 #include "sim/analysis/new/scenario_template.h"
 #include "sim/analysis/new/sensor_design.h"
@@ -138,6 +139,26 @@ static void test_period_and_exposure(void **state) {
     /* the faintest target needs the whole period, a fainter one has no exposure */
     bst_new_scene s = {.period_s = 1.0, .pixel_arcsec = 3.0, .faintest_v_mag = 12.0};
     assert_true(bst_new_exposure_s(&q, &s, 12.0) > 0.0);
+    /* what limits it: stars that move 6 px; half of a full well in the brightest pixel, a fifth of
+     * the light of 1/4 pi d^2 of the pupil; half of the period; 5 ms at least. Rounded up to two
+     * digits of whole milliseconds */
+    double per_s =
+        BST_NEW_FLUX_V0 * BST_PI * 0.075 * 0.075 * BST_NEW_THROUGHPUT * BST_NEW_QUANTUM_EFFICIENCY;
+    for (int k = 0; k < 4; k++) {
+        const double v_mag = k == 1 ? 3.0 : 8.0;
+        bst_new_scene limited = {.period_s = 1.6,
+                                 .pixel_arcsec = 4.0,
+                                 .rate_arcsec_per_s = k == 0   ? 130.0
+                                                      : k == 3 ? 20000.0
+                                                               : 1.0,
+                                 .faintest_v_mag = v_mag};
+        const double wanted[] = {6.0 * 4.0 / 130.0,
+                                 0.5 * BST_NEW_FULL_WELL_E * 5.0 / (per_s * pow(10, -0.4 * 3.0)),
+                                 0.8, 0.005};
+        double found = bst_new_exposure_s(&q, &limited, v_mag);
+        double unit = fmax(pow(10.0, floor(log10(wanted[k])) - 1.0), 1e-3);
+        assert_true(found >= wanted[k] - 1e-9 && found < wanted[k] + unit);
+    }
     s.faintest_v_mag = 16.0;
     assert_true(bst_new_snr(0.15, 3.0, 16.0, 0.5) < 12.0);
     assert_true(bst_new_exposure_s(&q, &s, 16.0) == 0.0);

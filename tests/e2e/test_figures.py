@@ -15,6 +15,7 @@ import unittest
 import figures
 import runs
 from figure_checks import FigureChecks
+from report_tables import Chart
 from test_report import Page
 
 CATALOGUE, GX5, EPOCH = "scenarios/catalogue_2022-06.tle", 44801, "2022-06-16T22:10:00Z"
@@ -59,6 +60,7 @@ class Figures(FigureChecks, unittest.TestCase):
         shares = [(float(m[1]) / 100, int(m[2])) for m in shares if m]
         self.assertGreater(len(shares), 3)
         self.assertTrue(all(0 < share < 1 for share, _ in shares))
+        self.check_minutes(out, page)
         # without its summary, as of a run that was killed, the page comes to the same
         os.remove(out + "/report.html")
         with open(out + "/manifest.json", encoding="utf-8") as file:
@@ -70,6 +72,35 @@ class Figures(FigureChecks, unittest.TestCase):
         self.near(cards["custody"], 100 * mine["custody"], 4)
         self.near(cards["time to acquire"], mine["time_to_acquire_s"], 4)
         self.near(cards["pointing RMS"], mine["pointing_rms_px"])
+
+    def check_minutes(self, out, page):
+        """Bars and curves of a page whose axis is in minutes: where they are, and what their titles say in seconds."""
+        svg = {part.get("aria-label"): part for part in page.root.iter("svg") if part.get("aria-label")}
+        modes = next(part for label, part in svg.items() if label.startswith("Timeline of the mode"))
+        axis, seen = Chart(modes), []
+        for bar in modes.iter("rect"):
+            found = bar.find("title") is not None and re.match(
+                r"([a-z]+): (?:[\d.]+ % of \d+ frames from )?([\d.e+]+) s to ([\d.e+]+) s$", bar.find("title").text)
+            if found:
+                seen.append((found[1], float(found[2]), float(found[3])))
+                for k in (0, 1):
+                    end = 60 * axis.value("x", float(bar.get("x")) + k * float(bar.get("width")))
+                    self.assertLess(abs(end - seen[-1][1 + k]), 1.0, found[0])
+        with runs.database(out) as tables:
+            changes = [(row["time_s"], row["text"].split(" -> ")[1].split(":")[0]) for row in
+                       tables.execute("SELECT time_s, text FROM events WHERE kind = 'mode' ORDER BY time_s")]
+            first, last = tables.execute("SELECT min(mid_s), max(mid_s) FROM exposures").fetchone()
+        checked = 0
+        for (start, mode), (end, _) in zip(changes, changes[1:]):
+            if end - start > 15:  # shorter ones are less than a few px wide
+                checked += 1
+                self.assertTrue(any(word == mode and abs(a - start) < 0.2 and abs(b - end) < 0.2 for word, a, b in seen),
+                                (mode, start, end, seen))
+        self.assertGreater(checked, 2)
+        axis = Chart(next(part for label, part in svg.items() if label.startswith("Detections per frame")))
+        places = [60 * axis.value("x", x) for x, _ in axis.lines["c0"]]
+        self.assertLess(abs(places[0] - first), 2.0)
+        self.assertLess(abs(places[-1] - last), 5.0)
 
     def test_clean(self):
         out, summary, mine = self.play(-110, 240, 3, *CLEAN)

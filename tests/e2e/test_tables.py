@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Every column of run.sqlite, the manifest's sums and the keys of frames.fits against numbers that are worked out here with
-numpy, ERFA, sgp4 and astropy from the scenario alone, or from columns that another part of the program filled.
+"""Every column of run.sqlite, the manifest's sums, the keys of frames.fits and the curves of the report against numbers that
+are worked out here with numpy, ERFA, sgp4 and astropy from the scenario alone, or from columns that another part of the program filled.
 
 The scene (skewed_scene.py) has no symmetry; its frames are a window off the corner, binned by 2.
 
@@ -17,12 +17,13 @@ import optics
 import runs
 from loop_tables import LoopTables
 from optics import ARCSEC, angle, columns, multiply, quaternion, rotate, turn_between, unit
+from report_tables import ReportTables
 from skewed_run import SkewedRun
 from skewed_scene import CAMERA, DURATION_S, NAV_GROWTH_MPS, NAV_RTN_M, NAV_RTN_MPS, NORAD, TELEMETRY_HZ, TICKS
 from truth_tables import TruthTables
 
 
-class Tables(SkewedRun, TruthTables, LoopTables):
+class Tables(SkewedRun, TruthTables, LoopTables, ReportTables):
     # ---------------------------------------------------------------- the run and its sensors
 
     def test_run_and_sensors(self):
@@ -241,7 +242,7 @@ class Generated(Tables):
     """What differs where the observation generator takes the place of images."""
     SOURCE = "generator"
     test_frames_and_headers = test_pixels = test_mount_and_pointing = test_navigation = test_line_of_sight = None
-    test_places_of_sources = test_light_of_sources = test_units_are_those_of_the_names = None
+    test_places_of_sources = test_light_of_sources = test_units_are_those_of_the_names = test_page_frames = None
 
 
 def tearDownModule():

@@ -117,6 +117,26 @@ static void what_is_not_reached_is_not_reported(void **state) {
                      1e-9); /* order of summation */
 }
 
+/* Half a step beyond the points that are neither sure nor hopeless, and no further. */
+static void half_a_step_beyond(void **state) {
+    (void)state;
+    const int64_t trials = 1000000;
+    bst_pd_point points[8];
+    int count = 0;
+    for (double u = -1.0; u <= 1.01; u += 0.5) {
+        double pd = bst_eval_normal_tail(-1.1 * u);
+        points[count++] = (bst_pd_point){6.0 + u, trials, (int64_t)llround(pd * (double)trials)};
+    }
+    points[count++] = (bst_pd_point){12.0, trials, trials};
+    points[count++] = (bst_pd_point){1.0, trials, 0};
+    for (int side = -1; side <= 1; side += 2) {
+        double near = side * 1.23, far = side * 1.28; /* the end is at 1 + 0.5 / 2 */
+        bst_pd_needed needed = bst_pd_snr_at(points, count, 0.0, bst_eval_normal_tail(-1.1 * near));
+        bst_assert_close(needed.snr, 6.0 + near, 1e-4);
+        assert_true(isnan(bst_pd_snr_at(points, count, 0.0, bst_eval_normal_tail(-1.1 * far)).snr));
+    }
+}
+
 /* Counts whose probit is 1.1 u - 0.06 u^2, u = snr - 6, which three terms fit exactly. The
  * deviation is what the trials' scatter makes of the place found, by moving each point's count in
  * turn. */
@@ -176,6 +196,7 @@ int main(void) {
         cmocka_unit_test(chance_is_taken_off),
         cmocka_unit_test(the_deviation_is_as_stated),
         cmocka_unit_test(what_is_not_reached_is_not_reported),
+        cmocka_unit_test(half_a_step_beyond),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,7 +14,7 @@ CONCERNED = [
     (r"sim/study_kinds/(cubes|study_labels|study_card)", "cube_parts study"),
     (r"sim/report/report_study|sim/studies|sim/study_kinds|sim/app/cmd_study", "study_files report_study study"),
     (r"sim/app/cmd_info|sim/report/report_info|sim/io/(manifest|run_)", "info figures"),
-    (r"sim/app/cmd_report|sim/report/|sim/io/(chart|html)", "figures report skewed_exports"),
+    (r"sim/app/cmd_report|sim/report/|sim/io/(chart|html)", "figures tables report skewed_exports"),
     (r"sim/app/cmd_orbit|sim/analysis/orbit|sim/run/track_files|sim/io/omm", "orbit orbit_files"),
     (r"sim/app/cmd_loop|sim/analysis/loop", "loop"),
     (r"sim/app/cmd_calframes|sim/analysis/calibration/calibration_frames", "calframes"),

@@ -237,6 +237,9 @@ static void outline_and_light_of_a_box(void **state) {
     /* light of each face by the cosines towards Sun and eye and its distance; the face in the image
      * is a parallelogram of edges a, b with second moments (a a' + b b') / 12 */
     double light = 0.0, sum[2] = {0.0, 0.0}, square[3] = {0.0, 0.0, 0.0};
+    enum { CELLS = 14 };
+    static double dots[6 * CELLS * CELLS][3]; /* of the lit faces: px and light */
+    int count = 0;
     bst_vec3 sight = bst_quat_rotate(q, look);
     double scale = 1.0 / (500.0 * bst_camera_scale_rad(&camera));
     for (int f = 0; f < 6; f++) {
@@ -268,6 +271,12 @@ static void outline_and_light_of_a_box(void **state) {
         square[0] += w * (c[0] * c[0] + (a[0] * a[0] + b[0] * b[0]) / 12.0);
         square[1] += w * (c[0] * c[1] + (a[0] * a[1] + b[0] * b[1]) / 12.0);
         square[2] += w * (c[1] * c[1] + (a[1] * a[1] + b[1] * b[1]) / 12.0);
+        for (int k = 0; k < CELLS * CELLS; k++, count++) {
+            double u = (k % CELLS + 0.5) / CELLS - 0.5, v = ((k / CELLS) + 0.5) / CELLS - 0.5;
+            dots[count][0] = c[0] + u * a[0] + v * b[0];
+            dots[count][1] = c[1] + u * a[1] + v * b[1];
+            dots[count][2] = w;
+        }
     }
     assert_true(light > 0.0);
     double x = sum[0] / light, y = sum[1] / light;
@@ -281,6 +290,18 @@ static void outline_and_light_of_a_box(void **state) {
     bst_assert_close(truth->items[1].x_centroid_px, 420.0 + s->x_light_px - s->x_px, 1e-9);
     bst_assert_close(truth->items[1].y_centroid_px, 131.0 + s->y_light_px - s->y_px, 1e-9);
     assert_true(s->snr_ratio < 0.7);
+    /* root of the sum of its squared light, of a point's: Gaussians of the PSF and the pixel that
+     * overlap in pairs */
+    double sigma2 = pow(bst_camera_psf_sigma_px(&camera), 2.0) + 1.0 / 12.0, pairs = 0.0, all = 0.0;
+    for (int i = 0; i < count; i++) {
+        all += dots[i][2];
+        for (int k = 0; k < count; k++) {
+            double dx = dots[i][0] - dots[k][0], dy = dots[i][1] - dots[k][1];
+            pairs += dots[i][2] * dots[k][2] * exp(-(dx * dx + dy * dy) / (4.0 * sigma2));
+        }
+    }
+    /* its grid is of half a sigma */
+    bst_assert_close(s->snr_ratio / (sqrt(pairs) / all), 1.0, 0.03);
     bst_assert_close(truth->items[1].snr, 50.0 * s->snr_ratio, 1e-9);
     bst_shape_truth_free(&work);
     free(truth);
