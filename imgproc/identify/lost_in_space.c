@@ -9,7 +9,9 @@
 #include "imgproc/measure/heapsort.h"
 #include "sim/core/arena.h"
 
-enum { MOST_PREDICTED = 512, MOST_CANDIDATES = 64, PASSES = 5 };
+enum { MOST_PREDICTED = 512, MOST_CANDIDATES = 64, PASSES = 5, PATH_STEPS = 32 };
+/* Patterns that are looked at for each one that is verified. */
+enum { PATTERNS_PER_CANDIDATE = 8 };
 
 /* Centroid error beyond a detection's own covariance (catalogue, distortion), px. */
 static const double SYSTEMATIC_PX = 0.1;
@@ -28,6 +30,12 @@ static const double FIRST_LOG_CHANCE = -4.6; /* 1 % */
 static const double BRIGHTEST_V = -2.0;
 /* Least share of the predicted stars that a right attitude matches over the whole field. */
 static const double LEAST_SHARE = 0.35;
+/* Largest chi-square of four stars about the attitude and scale that fit them best, of four degrees
+ * of freedom: above it by chance once in 10^5. The error is added to that of each place: distortion
+ * and neighbours. */
+static const double MOST_CHI_SQUARED = 28.5, QUAD_PX = 0.3;
+/* Least share of a streak inside the window, for a star to be predicted. */
+static const double LEAST_INSIDE = 0.25;
 /* Error of a quad's own scale. */
 static const double SCALE_MARGIN = 3e-3;
 
@@ -166,9 +174,41 @@ typedef struct attempt {
     const bst_lost_in_space_frame *frame;
     double area_px2, side_px; /* of the window; its shorter side */
     double most_r2;           /* greatest tangent radius^2 in the window */
+    double reach_px;          /* of a star's path from its place */
 } attempt;
 
-/* Predicts the catalogue stars in the window. */
+static bool is_inside(const attempt *a, double x_px, double y_px) {
+    const bst_window w = a->frame->window;
+    return x_px >= w.x0 && x_px <= w.x0 + w.width - 1 && y_px >= w.y0 &&
+           y_px <= w.y0 + w.height - 1;
+}
+
+/* What the window's borders cost a star, mag, at most 0: the SNR of a streak falls with the root of
+ * its share inside. */
+static double loss_mag(const attempt *a, double x_px, double y_px) {
+    const bst_star_path *p = a->frame->path;
+    const bst_window w = a->frame->window;
+    if (!p) {
+        return is_inside(a, x_px, y_px) ? 0.0 : -HUGE_VAL;
+    }
+    if (x_px - a->reach_px >= w.x0 && x_px + a->reach_px <= w.x0 + w.width - 1 &&
+        y_px - a->reach_px >= w.y0 && y_px + a->reach_px <= w.y0 + w.height - 1) {
+        return 0.0;
+    }
+    double m[3], inside = 0.0, all = 0.0;
+    const int step = 1 + p->count / PATH_STEPS;
+    bst_star_path_map(p, x_px, y_px, m);
+    for (int k = 0; k < p->count; k += step) {
+        const double *u = p->place[k];
+        all += p->light[k];
+        inside += is_inside(a, x_px + m[0] * u[0] + m[1] * u[1], y_px + m[1] * u[0] + m[2] * u[1])
+                      ? p->light[k]
+                      : 0.0;
+    }
+    return inside >= LEAST_INSIDE * all ? 1.25 * log10(inside / all) : -HUGE_VAL;
+}
+
+/* Predicts the catalogue stars that the window shows. */
 static bst_status predict(const attempt *a, const bst_star_fit *fit, int *count) {
     bst_lost_in_space *s = a->s;
     const bst_window w = a->frame->window;
@@ -181,6 +221,7 @@ static bst_status predict(const attempt *a, const bst_star_fit *fit, int *count)
         radius = fmax(radius, bst_vec3_angle(centre, corner));
     }
     radius *= 1.0 + a->options->scale_tolerance;
+    radius += a->reach_px * bst_camera_scale_rad(s->camera);
     bst_vec3 direction = bst_light_catalogue_star(
         a->frame->light, bst_quat_rotate(bst_quat_conj(fit->q_cam_from_gcrf), centre));
     int total = 0;
@@ -196,8 +237,8 @@ static bst_status predict(const attempt *a, const bst_star_fit *fit, int *count)
     for (int i = 0; i < total && i < MOST_PREDICTED; i++) {
         bst_star_fit_pair *e = &s->expected[*count];
         e->gcrf = bst_light_apparent_star(a->frame->light, s->found[i].icrs);
-        if (bst_star_fit_project(fit, s->camera, e->gcrf, &e->x_px, &e->y_px) && e->x_px >= w.x0 &&
-            e->x_px <= w.x0 + w.width - 1 && e->y_px >= w.y0 && e->y_px <= w.y0 + w.height - 1) {
+        if (bst_star_fit_project(fit, s->camera, e->gcrf, &e->x_px, &e->y_px) &&
+            (double)s->found[i].v_mag <= a->frame->v_limit + loss_mag(a, e->x_px, e->y_px)) {
             ++*count;
         }
     }
@@ -288,9 +329,10 @@ static bst_status try_pattern(const attempt *a, const bst_star_fit_pair pairs[4]
     const double limit = a->options->scale_tolerance;
     if (!bst_star_fit_start(a->s->camera, pairs, ratio, &fit) ||
         !bst_star_fit_refine(a->s->camera, pairs, 4, &fit) ||
-        fabs(fit.scale - 1.0) > limit + SCALE_MARGIN) {
+        fabs(fit.scale - 1.0) > limit + SCALE_MARGIN || fit.chi_squared > MOST_CHI_SQUARED) {
         return BST_OK;
     }
+    out->candidates++;
     /* the quad's own error grows with the distance from it */
     double tolerance = fmin(FIRST_PX + extrapolation_px, MOST_FIRST_PX);
     double area_px2;
@@ -362,8 +404,10 @@ static bst_status try_form(const attempt *a, const bst_star_quad *quad, const in
         for (int i = 0; i < 4; i++) {
             pairs[i] = pair_of(&a->s->sources[star[quad->order[i]]],
                                bst_light_apparent_star(a->frame->light, found[k].icrs[i]));
+            pairs[i].cov_xx += QUAD_PX * QUAD_PX;
+            pairs[i].cov_yy += QUAD_PX * QUAD_PX;
         }
-        out->candidates++;
+        out->patterns++;
         BST_TRY(try_pattern(a, pairs, extrapolation_px, found[k].size_ratio, out));
     }
     return BST_OK;
@@ -403,11 +447,18 @@ static void measure_window(attempt *a) {
                                           w.y0 + (i / 2 ? w.height - 1 : 0));
         a->most_r2 = fmax(a->most_r2, (v.x * v.x + v.y * v.y) / (v.z * v.z));
     }
+    const bst_star_path *path = a->frame->path;
+    for (int k = 0; path && k < path->count; k++) {
+        /* the map of the path grows with the tangent radius */
+        double reach = hypot(path->place[k][0], path->place[k][1]) * (1.0 + a->most_r2);
+        a->reach_px = fmax(a->reach_px, reach);
+    }
 }
 
 /* True until the frame is solved or enough has been tried. */
 static bool searching(const attempt *a, const bst_lost_in_space_result *out) {
-    return !out->solved && out->candidates < a->options->max_candidates;
+    return !out->solved && out->candidates < a->options->max_candidates &&
+           out->patterns / PATTERNS_PER_CANDIDATE < a->options->max_candidates;
 }
 
 bst_status bst_lost_in_space_solve(bst_ctx *ctx, bst_lost_in_space *lost,

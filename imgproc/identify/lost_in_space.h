@@ -5,13 +5,14 @@
 #include "boresight/camera.h"
 #include "boresight/messages.h"
 #include "imgproc/identify/star_patterns.h"
+#include "imgproc/streak/star_path.h"
 #include "sim/astro/bodies.h"
 
 typedef struct bst_lost_in_space_options {
     double scale_tolerance; /* largest relative error of the camera's pixel scale, 0 to 0.1 */
     double false_rate;      /* accepted probability of a wrong attitude of a frame, by chance */
     int max_stars;          /* brightest detections that form quads, 4 to 60 */
-    int max_candidates;     /* patterns that are tried at most, > 0 */
+    int max_candidates;     /* patterns that are verified at most, > 0 */
 } bst_lost_in_space_options;
 
 /* Usual options: 5 % in scale, 1e-7, 40 stars, 5000 patterns: a frame that can be solved takes a
@@ -39,8 +40,10 @@ typedef struct bst_lost_in_space_frame {
     const bst_detection *items; /* only those labelled UNKNOWN or STAR take part */
     int count;
     bst_window window; /* of the detections */
-    double v_limit;    /* faintest star that is surely detected */
+    double v_limit;    /* faintest star that is surely detected, wholly inside the window */
     const bst_light *light;
+    const bst_star_path *path; /* of all stars; NULL: they are points. Detections are places of its
+                                  origin, also outside the window. */
 } bst_lost_in_space_frame;
 
 typedef struct bst_lost_in_space_result {
@@ -48,9 +51,10 @@ typedef struct bst_lost_in_space_result {
     bst_quat q_cam_from_gcrf;
     double scale; /* true pixel scale over the camera's */
     int predicted, matched;
-    double rms_px;     /* residual per axis of the matched stars */
-    double log_chance; /* natural logarithm of the chance of such a match under the null model */
-    int quads, candidates;   /* tried; patterns that agreed with one */
+    double rms_px;       /* residual per axis of the matched stars */
+    double log_chance;   /* natural logarithm of the chance of such a match under the null model */
+    int quads, patterns; /* tried; patterns whose code agreed with one */
+    int candidates;      /* of these, patterns whose four stars fit one attitude and scale */
     double least_log_chance; /* over all candidates, of log_chance plus the logarithm of the number
                                 of candidates so far, accepted or not; at most 0 */
 } bst_lost_in_space_result;
@@ -58,10 +62,10 @@ typedef struct bst_lost_in_space_result {
 /* Identifies the stars of a frame without an attitude.
  *
  * Quads of detections, the brightest first, are looked up among the patterns. A pattern that agrees
- * gives attitude and scale; the catalogue's stars are then predicted, and those with a detection
- * nearby are counted. The attitude is accepted if chance would match as many stars with less
- * probability than options.false_rate, divided by the number of patterns tried so far. Attitude and
- * scale are last fitted to all matched stars by least squares.
+ * gives attitude and scale; if its four stars fit them, the catalogue's stars are predicted, and
+ * those with a detection nearby are counted. The attitude is accepted if chance would match as many
+ * stars with less probability than options.false_rate, divided by the number of patterns tried so
+ * far. Attitude and scale are last fitted to all matched stars by least squares.
  *
  * Errors:    those of the catalogue
  * Notes:     a mirrored frame is not solved, by its patterns' handedness

@@ -28,11 +28,9 @@ static bst_status solve_middles(attempt *a, int candidates, bst_lost_in_space_re
     bst_lost_in_space_options options = BST_LOST_IN_SPACE_USUAL;
     options.scale_tolerance = a->options->scale_tolerance;
     options.max_candidates = candidates;
-    const bst_lost_in_space_frame frame = {a->streak.items,
-                                           a->streak.count,
-                                           {0, 0, a->width, a->height},
-                                           a->options->v_limit,
-                                           a->options->light};
+    const bst_lost_in_space_frame frame = {
+        a->streak.items,     a->streak.count,   {0, 0, a->width, a->height},
+        a->options->v_limit, a->options->light, NULL};
     return bst_lost_in_space_solve(a->ctx, a->lost, &options, &frame, out);
 }
 

@@ -44,10 +44,15 @@ bool bst_star_fit_start(const bst_camera *camera, const bst_star_fit_pair pairs[
     return true;
 }
 
-/* Adds a star to the normal equations; adds its squared residuals, px^2. False: behind. */
+/* Sums of the squared residuals of a fit: px^2, and by the covariances. */
+typedef struct residuals {
+    double square, chi_squared;
+} residuals;
+
+/* Adds a star to the normal equations and the sums. False: behind. */
 static bool add_star(const bst_camera *camera, const bst_star_fit_pair *pair,
                      const bst_star_fit *fit, double m[PARAMETERS][PARAMETERS],
-                     double g[PARAMETERS], double *square) {
+                     double g[PARAMETERS], residuals *sum) {
     bst_vec3 v = bst_camera_unproject(camera, pair->x_px, pair->y_px);
     bst_vec3 u = bst_quat_rotate(fit->q_cam_from_gcrf, pair->gcrf);
     if (!(u.z > 0.0)) {
@@ -62,7 +67,8 @@ static bool add_star(const bst_camera *camera, const bst_star_fit_pair *pair,
     const double j[2][PARAMETERS] = {{-a * b / f, (1.0 + a * a) / f, -b / f, -a / f},
                                      {(-1.0 - b * b) / f, a * b / f, a / f, -b / f}};
     const double r[2] = {(v.x / v.z - a / f) / unit, (v.y / v.z - b / f) / unit};
-    *square += r[0] * r[0] + r[1] * r[1];
+    sum->square += r[0] * r[0] + r[1] * r[1];
+    sum->chi_squared += w[0][0] * r[0] * r[0] + 2.0 * w[0][1] * r[0] * r[1] + w[1][1] * r[1] * r[1];
     for (int p = 0; p < PARAMETERS; p++) {
         /* the parameter's derivatives, weighted */
         const double a0 = (w[0][0] * j[0][p] + w[1][0] * j[1][p]) / unit;
@@ -81,13 +87,15 @@ bool bst_star_fit_refine(const bst_camera *camera, const bst_star_fit_pair *pair
     bst_star_fit now = *fit;
     for (int pass = 0; pass <= ITERATIONS; pass++) {
         double m[PARAMETERS][PARAMETERS] = {{0}}, inverse[PARAMETERS][PARAMETERS];
-        double g[PARAMETERS] = {0}, step[PARAMETERS] = {0}, square = 0.0;
+        double g[PARAMETERS] = {0}, step[PARAMETERS] = {0};
+        residuals sum = {0.0, 0.0};
         for (int i = 0; i < count; i++) {
-            if (!add_star(camera, &pairs[i], &now, m, g, &square)) {
+            if (!add_star(camera, &pairs[i], &now, m, g, &sum)) {
                 return false;
             }
         }
-        now.rms_px = sqrt(square / fmax(2.0 * count, 1.0));
+        now.rms_px = sqrt(sum.square / fmax(2.0 * count, 1.0));
+        now.chi_squared = sum.chi_squared;
         if (pass == ITERATIONS) {
             break;
         }

@@ -16,7 +16,8 @@ typedef struct bst_star_fit_pair {
 typedef struct bst_star_fit {
     bst_quat q_cam_from_gcrf;
     double scale;
-    double rms_px; /* residual per axis, of bst_star_fit_refine */
+    double rms_px;      /* residual per axis, of bst_star_fit_refine */
+    double chi_squared; /* of its residuals, by the pairs' covariances */
 } bst_star_fit;
 
 /* Attitude from two stars of given scale.

@@ -7,6 +7,7 @@
 
 #include "boresight/vec.h"
 #include "imgproc/streak/common_streak_internal.h"
+#include "imgproc/streak/value_of_rank.h"
 
 /* LINE_HALF: samples of a line on either side of a pixel, LINE_STEP px apart. */
 enum { LINE_HALF = 5, LINE_STEP = 2, LINE_REACH = 11, DIRECTIONS = 16 };
@@ -45,12 +46,7 @@ static const double WHOLE = 0.97;
 typedef bst_streak_shape shape;
 typedef bst_streak_finder finder;
 
-static int ascending(const void *a, const void *b) {
-    float d = *(const float *)a - *(const float *)b;
-    return (d > 0.0f) - (d < 0.0f);
-}
-
-/* Median of the values that are not NAN; sorts them. */
+/* Median of the values that are not NAN; reorders them. */
 static float median(float *values, int count) {
     int kept = 0;
     for (int i = 0; i < count; i++) {
@@ -58,8 +54,7 @@ static float median(float *values, int count) {
             values[kept++] = values[i];
         }
     }
-    qsort(values, (size_t)kept, sizeof *values, ascending);
-    return kept > 0 ? values[kept / 2] : 0.0f;
+    return kept > 0 ? bst_value_of_rank(values, kept, kept / 2) : 0.0f;
 }
 
 /* Removes the medians of columns and rows and divides by the noise. */

@@ -112,7 +112,18 @@ static void filter_block(bst_path_filter *f, const bst_star_path_image *image, i
     const int y1 = by + BLOCK < f->height ? by + BLOCK : f->height;
     float light[BLOCK][BLOCK] = {{0}}, squares[BLOCK][BLOCK] = {{0}};
     double m[3];
+    float all = 0.0f;  /* squared light of the whole path */
+    bool whole = true; /* all samples of all places are inside */
     bst_star_path_map(p, bx + 0.5 * BLOCK - f->margin, by + 0.5 * BLOCK - f->margin, m);
+    for (int k = 0; k < p->count; k++) {
+        double u = p->place[k][0], v = p->place[k][1];
+        int dx = (int)lround(m[0] * u + m[1] * v) - f->margin;
+        int dy = (int)lround(m[1] * u + m[2] * v) - f->margin;
+        float w = (float)p->light[k];
+        all += w * w;
+        whole = whole && bx + dx >= 0 && x1 + dx <= image->width && by + dy >= 0 &&
+                y1 + dy <= image->height;
+    }
     for (int k = 0; k < p->count; k++) {
         double u = p->place[k][0], v = p->place[k][1];
         int dx = (int)lround(m[0] * u + m[1] * v) - f->margin;
@@ -123,13 +134,15 @@ static void filter_block(bst_path_filter *f, const bst_star_path_image *image, i
             const float *row = &image->values[(y + dy) * image->width + dx];
             for (int x = from; x < to; x++) {
                 light[y - by][x - bx] += w * row[x];
+            }
+            for (int x = from; x < to && !whole; x++) {
                 squares[y - by][x - bx] += w2;
             }
         }
     }
     for (int y = by; y < y1; y++) {
         for (int x = bx; x < x1; x++) {
-            double share = (double)squares[y - by][x - bx] / f->squares;
+            double share = (double)(whole ? all : squares[y - by][x - bx]) / f->squares;
             f->response[y * f->width + x] = light[y - by][x - bx];
             f->per_noise[y * f->width + x] =
                 share < f->least_inside ? 0.0f
