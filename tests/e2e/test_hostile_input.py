@@ -135,7 +135,7 @@ LINES = [
     (("solve", T, "--scale", "3", "--utc", "2024-08-26T17:45:45Z"), 1, "track.json"),
     (("solve", T, "--scale", "0", "--utc", "2024-08-26T17:45:45Z"), 2, "--scale 0: give a number from"),
     (("view", RUN, "--port", "65536"), 2, "--port 65536: give an integer from 0 to 65535"),
-    (("view", RUN, RUN), 2, "one folder of a run, one scenario file, or none is expected, 2 were given"),
+    (("view", RUN, RUN, RUN), 2, "3 were given"),
     (("view", F), 1, "is not the folder of a run"),
     (("view", F + "/file"), 1, "file:1:1: this is not valid JSON"),
     (("process", F + "/none.fits", "--map", "neossat", "--out", OUT), 1, "none.fits: cannot be opened"),

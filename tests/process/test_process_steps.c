@@ -261,7 +261,7 @@ static void rates_tell_which_end_came_first(void **state) {
         bst_assert_close(first.x, trial == 1 ? -last : quarter, 1e-12);
         bst_assert_close(nodes[1].share, 0.25, 1e-15);
     }
-    /* a camera that turns evenly tells nothing */
+    /* a camera that turns evenly has no trend to see */
     bst_process_node even[3];
     bst_process_frame f = {.nodes = even, .node_count = 3, .rate_trend = 0.3};
     for (int k = 0; k < 3; k++) {
