@@ -22,7 +22,7 @@ static const char help_text[] =
     "options:\n";
 
 int bst_cmd_calibrate_camera(int argc, char **argv) {
-    bst_camera_calibration_request q = BST_CAMERA_CALIBRATION_DEFAULTS;
+    bst_camera_calibration_request q = {0};
     bst_option options[BST_OPTIONS_MAX];
     bst_options_bind(bst_camera_calibration_options, &q, options);
     bst_ctx ctx;

@@ -20,7 +20,8 @@ bst_status bst_star_list_add(bst_ctx *ctx, bst_star_list *list, const bst_star_r
         list->stars = grown;
         list->room = room;
     }
-    list->stars[list->count++] = (bst_star_entry){*record, cell, bst_star_record_v(record), 0};
+    list->stars[list->count++] =
+        (bst_star_entry){*record, cell, bst_star_record_v(record), 0.0F, 0};
     return BST_OK;
 }
 
@@ -102,6 +103,10 @@ static void divide(bst_star_entry *stars, size_t first, size_t end, int left, ui
 
 bst_status bst_star_list_divide(bst_ctx *ctx, bst_star_list *list, size_t first) {
     bst_star_entry *stars = list->stars;
+    list->cells = BST_STAR_CELLS;
+    if (first >= list->count) {
+        return BST_OK;
+    }
     for (size_t i = first; i < list->count; i++) {
         stars[i].cell = triangle_of(bst_star_record_direction(&stars[i].record, 0.0));
     }

@@ -13,8 +13,9 @@
 typedef struct bst_star_entry {
     bst_star_record record;
     uint32_t cell;
-    int32_t v;      /* bst_star_record_v */
-    int64_t source; /* identity in a user's table; 0: none */
+    int32_t v;       /* bst_star_record_v */
+    float rest_year; /* of a place whose motion is unknown; 0: it is at J2000 */
+    int64_t source;  /* identity in a user's table; 0: none */
 } bst_star_entry;
 
 typedef struct bst_star_list {

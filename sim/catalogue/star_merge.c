@@ -58,8 +58,9 @@ static bst_status take_base(bst_ctx *ctx, merge *m) {
     return BST_OK;
 }
 
-/* Record of a star that a query of the base has found: the nearest one with its identity. */
-static size_t base_record(const merge *m, const bst_star *star) {
+/* Record of a star that a query of the base has found, `years` after J2000: the nearest one with
+ * its identity. */
+static size_t base_record(const merge *m, const bst_star *star, double years) {
     const bst_star_view *view = bst_stars_records(m->base);
     if (star->id >= BST_STAR_TABLE_ID) {
         return star->id - BST_STAR_TABLE_ID + view->tycho2_count;
@@ -69,7 +70,7 @@ static size_t base_record(const merge *m, const bst_star *star) {
     double nearest = INFINITY;
     for (uint32_t i = 0; i < cell->count; i++) {
         const bst_star_record *r = &view->records[cell->first + i];
-        bst_vec3 d = bst_vec3_sub(bst_star_record_direction(r, 0.0), star->icrs);
+        bst_vec3 d = bst_vec3_sub(bst_star_record_direction(r, years), star->icrs);
         if ((r->tyc_vt & 0xFFFFu) == (star->id & 0xFFFFu) && bst_vec3_dot(d, d) < nearest) {
             nearest = bst_vec3_dot(d, d);
             best = cell->first + i;
@@ -78,45 +79,73 @@ static size_t base_record(const merge *m, const bst_star *star) {
     return best;
 }
 
-/* Searches the base around a direction for the star of an entry; only stars without motion if
+/* Stars of the base that an entry may be. */
+typedef struct candidates {
+    size_t record[2 * NEIGHBOURS];
+    double distance_rad[2 * NEIGHBOURS];
+    int count;
+} candidates;
+
+/* Adds the stars of the base that are near a direction in a year; only those without motion if
  * `at_rest`. */
-static bst_status search(bst_ctx *ctx, const merge *m, bst_vec3 at, double v, bool at_rest,
-                         size_t *record, double *distance) {
+static bst_status search(bst_ctx *ctx, const merge *m, bst_vec3 at, double year, double v,
+                         bool at_rest, candidates *out) {
     bst_star found[NEIGHBOURS];
     int count;
-    BST_TRY(bst_stars_query(ctx, m->base, at, SAME_RAD, v + SAME_MAG, BST_STAR_EPOCH_YEAR, found,
-                            NEIGHBOURS, &count));
+    BST_TRY(
+        bst_stars_query(ctx, m->base, at, SAME_RAD, v + SAME_MAG, year, found, NEIGHBOURS, &count));
     for (int i = 0; i < count && i < NEIGHBOURS; i++) {
-        double away = bst_vec3_norm(bst_vec3_sub(found[i].icrs, at));
-        size_t r = base_record(m, &found[i]);
+        size_t r = base_record(m, &found[i], year - BST_STAR_EPOCH_YEAR);
         const bst_star_record *base = &m->list.stars[r].record;
         bool rests = (base->pm_ra_colour | base->pm_dec_flags) >> 14 == 0;
-        if (away < *distance && fabs((double)found[i].v_mag - v) <= SAME_MAG &&
-            (!at_rest || rests)) {
-            *distance = away;
-            *record = r;
+        if (fabs((double)found[i].v_mag - v) <= SAME_MAG && (!at_rest || rests)) {
+            out->record[out->count] = r;
+            out->distance_rad[out->count++] = bst_vec3_norm(bst_vec3_sub(found[i].icrs, at));
         }
     }
     return BST_OK;
 }
 
-/* Notes an entry as a star of the base if it is one and nearer than others. */
-static bst_status match(bst_ctx *ctx, merge *m, size_t entry) {
-    const bst_star_entry *star = &m->list.stars[entry];
-    double v = star->v / 1e5, distance = INFINITY;
-    bool tables = bst_stars_records(m->base)->sources != NULL;
-    if (v > FAINTEST_TYCHO2 && !tables) {
+/* Finds the stars of the base that an entry may be. */
+static bst_status find_candidates(bst_ctx *ctx, const merge *m, const bst_star_entry *star,
+                                  candidates *out) {
+    const double v = star->v / 1e5;
+    out->count = 0;
+    if (v > FAINTEST_TYCHO2 && !bst_stars_records(m->base)->sources) {
         return BST_OK;
     }
-    size_t record = 0;
     bst_vec3 now = bst_star_record_direction(&star->record, 0.0);
-    BST_TRY(search(ctx, m, now, v, false, &record, &distance));
-    bst_vec3 then = bst_star_record_direction(&star->record, OBSERVED_YEAR - BST_STAR_EPOCH_YEAR);
-    if (bst_vec3_norm(bst_vec3_sub(now, then)) > 0.1 * SAME_RAD) {
-        BST_TRY(search(ctx, m, then, v, true, &record, &distance));
+    if (star->rest_year > 0.0F) { /* compared where the base's stars were then */
+        return search(ctx, m, now, (double)star->rest_year, v, false, out);
     }
-    if (distance < INFINITY && distance < m->same[record].distance_rad) {
-        m->same[record] = (same_star){entry, distance};
+    BST_TRY(search(ctx, m, now, BST_STAR_EPOCH_YEAR, v, false, out));
+    bst_vec3 then = bst_star_record_direction(&star->record, OBSERVED_YEAR - BST_STAR_EPOCH_YEAR);
+    return bst_vec3_norm(bst_vec3_sub(now, then)) > 0.1 * SAME_RAD
+               ? search(ctx, m, then, BST_STAR_EPOCH_YEAR, v, true, out)
+               : BST_OK;
+}
+
+/* Gives an entry the nearest star of the base to which no other is nearer; one that loses its star
+ * looks for another. Distances only fall, so it ends. */
+static bst_status match(bst_ctx *ctx, merge *m, size_t entry) {
+    for (bool looks = true; looks;) {
+        candidates c;
+        BST_TRY(find_candidates(ctx, m, &m->list.stars[entry], &c));
+        int best = -1;
+        for (int i = 0; i < c.count; i++) {
+            if (c.distance_rad[i] < m->same[c.record[i]].distance_rad &&
+                (best < 0 || c.distance_rad[i] < c.distance_rad[best])) {
+                best = i;
+            }
+        }
+        looks = false;
+        if (best >= 0) {
+            same_star *same = &m->same[c.record[best]];
+            const same_star loser = *same;
+            *same = (same_star){entry, c.distance_rad[best]};
+            looks = loser.distance_rad < INFINITY;
+            entry = loser.entry;
+        }
     }
     return BST_OK;
 }
@@ -132,11 +161,14 @@ static bst_status add_row(bst_ctx *ctx, merge *m, const bst_star_table_row *row)
                          .has_colour = isfinite(row->b_minus_v)};
     v.colour_mmag = v.has_colour ? (int)lround(1000.0 / 0.850 * row->b_minus_v) : USUAL_COLOUR_MMAG;
     v.vt_mmag = (int)lround(1000.0 * row->v_mag + 0.090 * v.colour_mmag);
-    bst_star_move_epoch(&v, BST_STAR_EPOCH_YEAR - row->epoch_year);
+    if (row->has_motion) {
+        bst_star_move_epoch(&v, BST_STAR_EPOCH_YEAR - row->epoch_year);
+    }
     bst_star_record record;
     BST_TRY(bst_star_pack(ctx, &v, &record));
     BST_TRY(bst_star_list_add(ctx, &m->list, &record, BST_STAR_CELLS));
     m->list.stars[m->list.count - 1].source = row->source;
+    m->list.stars[m->list.count - 1].rest_year = row->has_motion ? 0.0F : (float)row->epoch_year;
     return BST_OK;
 }
 
@@ -148,6 +180,7 @@ static bst_status read_table(bst_ctx *ctx, merge *m, bst_star_table *table,
         BST_TRY(bst_star_table_next(ctx, table, &row, &end));
         bst_star_table_counts(table, &counts->rows, &counts->skipped);
         if (!end) {
+            counts->at_rest += !row.has_motion;
             bst_status status = add_row(ctx, m, &row);
             if (status == BST_OK && m->base) {
                 status = match(ctx, m, m->list.count - 1);
@@ -179,13 +212,24 @@ static void unite(merge *m, bst_star_merge_counts *counts) {
             continue;
         }
         bst_star_record r = from->record;
-        r.tyc_vt = (r.tyc_vt & 0xFFFF0000u) | (to->record.tyc_vt & 0xFFFFu);
-        if (r.pm_dec_flags & BST_STAR_NO_COLOUR) {
-            r.pm_ra_colour = (r.pm_ra_colour & ~0x3FFFu) | (to->record.pm_ra_colour & 0x3FFFu);
+        const uint32_t identity = to->record.tyc_vt & 0xFFFFu;
+        if (r.pm_dec_flags & BST_STAR_NO_COLOUR) { /* the base's colour, with the table's V */
+            const uint32_t colour = to->record.pm_ra_colour & 0x3FFFu;
+            const double vt_mmag = from->v / 100.0 + 0.090 * ((int)colour - BST_STAR_COLOUR_OFFSET);
+            r.pm_ra_colour = (r.pm_ra_colour & ~0x3FFFu) | colour;
             r.pm_dec_flags = (r.pm_dec_flags & ~0x3FFFu) | (to->record.pm_dec_flags & 0x3FFFu);
+            r.tyc_vt = (uint32_t)(lround(vt_mmag) + BST_STAR_VT_OFFSET) << 16;
         }
-        *to = (bst_star_entry){r, to->cell, bst_star_record_v(&r),
-                               to->cell < BST_STAR_CELLS ? 0 : from->source};
+        r.tyc_vt = (r.tyc_vt & 0xFFFF0000u) | identity;
+        if (from->rest_year > 0.0F) { /* place and motion stay the base's */
+            r.ra = to->record.ra;
+            r.dec = to->record.dec;
+            r.pm_ra_colour = (r.pm_ra_colour & 0x3FFFu) | (to->record.pm_ra_colour & ~0x3FFFu);
+            r.pm_dec_flags = (r.pm_dec_flags & 0x3FFFu) | (to->record.pm_dec_flags & ~0x3FFFu);
+        }
+        const int64_t source = from->source != 0 ? from->source : to->source;
+        *to = (bst_star_entry){r, to->cell, bst_star_record_v(&r), 0.0F,
+                               to->cell < BST_STAR_CELLS ? 0 : source};
     }
     size_t kept = m->base_count;
     for (size_t i = m->base_count; i < m->list.count; i++) {
@@ -202,9 +246,11 @@ static void unite(merge *m, bst_star_merge_counts *counts) {
 static bst_status make_head(bst_ctx *ctx, const merge *m, bst_star_head *head) {
     const bst_star_merge_request *q = m->request;
     *head = (bst_star_head){.complete_to_v_mag = BST_STAR_BRIGHTER_THAN_ALL};
-    snprintf(head->source, sizeof head->source, "%s", m->base ? "Tycho-2 and a table" : "a table");
+    snprintf(head->source, sizeof head->source, "a table");
     if (m->base) {
         const bst_star_view *view = bst_stars_records(m->base);
+        snprintf(head->source, sizeof head->source, "%s",
+                 view->tycho2_count > 0 ? "Tycho-2 and a table" : "tables");
         /* patches of Tycho-2 alone say which of its stars are there, not that all stars are */
         const double most = view->sources ? INFINITY : BST_STAR_TYCHO2_COMPLETE_V;
         head->complete_to_v_mag = fmin(view->header->complete_to_v_mag, most);

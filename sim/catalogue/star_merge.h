@@ -21,13 +21,16 @@ typedef struct bst_star_merge_counts {
     int64_t rows, skipped; /* of the table; skipped: without position or magnitude */
     int64_t base;          /* stars of the base */
     int64_t same;          /* rows that are stars of the base */
+    int64_t at_rest;       /* rows with a star but without a proper motion */
     int64_t written;       /* stars in all */
 } bst_star_merge_counts;
 
 /* Imports a table. A row is a star of the base if they are less than 1.5 arcsec apart at J2000 (or,
  * for a star of Tycho-2 without a proper motion, at 1991.5) and differ in V by at most 1.5 mag; of
- * several the nearest counts. Such a star keeps its identity and takes position, motion and
- * magnitudes from the table, unless it is brighter than V 4, where the base is kept.
+ * several the nearest counts, and a row that a nearer one displaces takes the next. Such a star
+ * keeps its identity and takes position, motion and magnitudes from the table, unless it is
+ * brighter than V 4, where the base is kept. A row without a proper motion is compared at its own
+ * epoch, and the base keeps position and motion.
  *
  * Notes:     Parallax and radial velocity are not used, as in bst_stars_query
  * Errors:    those of bst_star_table_open, bst_star_table_next, bst_stars_open and

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "sim/catalogue/star_import.h"
+#include "sim/catalogue/star_list.h"
 
 bst_status bst_stars_print_summary(bst_ctx *ctx, const bst_stars *stars, FILE *stream) {
     bst_stars_info i;
@@ -12,12 +13,16 @@ bst_status bst_stars_print_summary(bst_ctx *ctx, const bst_stars *stars, FILE *s
     fprintf(stream, "path      %s\n", i.embedded ? "(in the program)" : i.path);
     fprintf(stream, "stars     %lld\n", i.count);
     if (i.table_count > 0) {
-        fprintf(stream, "          %lld of them are not in Tycho-2\n", i.table_count);
+        fprintf(stream, "          %lld of them from a table\n", i.table_count);
     }
-    fprintf(stream, "complete  to V %.1f over the whole sky%s\n", i.complete_to_v_mag,
-            i.complete_to_v_mag == BST_STAR_TYCHO2_COMPLETE_V && i.table_count == 0
-                ? " (98 % of the stars there)"
-                : "");
+    if (i.complete_to_v_mag > BST_STAR_BRIGHTER_THAN_ALL) {
+        fprintf(stream, "complete  to V %.1f over the whole sky%s\n", i.complete_to_v_mag,
+                i.complete_to_v_mag == BST_STAR_TYCHO2_COMPLETE_V && i.table_count == 0
+                    ? " (98 % of the stars there)"
+                    : "");
+    } else {
+        fputs("complete  nothing is stated for the whole sky\n", stream);
+    }
     for (int p = 0; p < i.patches; p++) {
         bst_vec3 centre;
         double radius, v, ra, dec;
@@ -36,9 +41,12 @@ bst_status bst_stars_print_summary(bst_ctx *ctx, const bst_stars *stars, FILE *s
     if (i.table_count > 0) {
         fprintf(stream, "licence   of the table's stars: your table's\n");
     }
-    fprintf(
-        stream,
-        "licence   Tycho-2 (Hog et al. 2000): BSD-2-Clause, as Debian's package tycho2 states\n");
+    if (i.count > i.table_count) {
+        fputs(
+            "licence   Tycho-2 (Hog et al. 2000): BSD-2-Clause, as Debian's package tycho2 "
+            "states\n",
+            stream);
+    }
     return BST_OK;
 }
 

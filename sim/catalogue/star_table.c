@@ -76,6 +76,12 @@ static bst_status check_columns(bst_ctx *ctx, const bst_star_table *t) {
                         "%s: column %s needs --zero-point, the V of a star of 1 electron/s",
                         t->path, t->name[BST_STAR_ELECTRONS]);
     }
+    if ((c[BST_STAR_PM_RA] < 0) != (c[BST_STAR_PM_DEC] < 0)) {
+        const bst_star_quantity lacks = c[BST_STAR_PM_RA] < 0 ? BST_STAR_PM_RA : BST_STAR_PM_DEC;
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "%s: has one column of proper motion only; the other may be named %s",
+                        t->path, bst_star_quantity_names[lacks]);
+    }
     if (c[BST_STAR_EPOCH] < 0 && isnan(t->options.epoch_year)) {
         return bst_fail(ctx, BST_ERR_FORMAT,
                         "%s: has no column of epochs (allowed names: %s); give --epoch, the Julian "
@@ -181,6 +187,7 @@ bst_status bst_star_table_next(bst_ctx *ctx, bst_star_table *t, bst_star_table_r
         row->ra_deg = v[BST_STAR_RA];
         row->dec_deg = v[BST_STAR_DEC];
         if (!isnan(v[BST_STAR_PM_RA]) && !isnan(v[BST_STAR_PM_DEC])) {
+            row->has_motion = true;
             row->pm_ra_cosdec_masyr = v[BST_STAR_PM_RA];
             row->pm_dec_masyr = v[BST_STAR_PM_DEC];
             BST_TRY(check_range(ctx, t, BST_STAR_PM_RA, row->pm_ra_cosdec_masyr, -13e3, 13e3));
@@ -219,5 +226,6 @@ void bst_star_table_close(bst_star_table *t) {
     free(t->block_source);
     free(t->line);
     free(t->scratch);
+    free(t->units);
     free(t);
 }

@@ -19,7 +19,8 @@ typedef struct bst_star_table_row {
     int64_t source;                          /* the table's identity; 0: none */
     double ra_deg, dec_deg;                  /* ICRS, at the epoch */
     double epoch_year;                       /* Julian year */
-    double pm_ra_cosdec_masyr, pm_dec_masyr; /* 0: unknown */
+    double pm_ra_cosdec_masyr, pm_dec_masyr; /* 0 where unknown */
+    bool has_motion;                         /* false: unknown */
     double v_mag, b_minus_v;                 /* Johnson; b_minus_v NAN: unknown */
 } bst_star_table_row;
 

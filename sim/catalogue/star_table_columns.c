@@ -1,4 +1,5 @@
 /* Names by which the columns of a table of stars are found. */
+#include <ctype.h>
 #include <string.h>
 #include <strings.h>
 
@@ -30,4 +31,37 @@ bool bst_star_name_is(const char *names, const char *name, size_t length) {
         word += n + (word[n] == ' ');
     }
     return false;
+}
+
+/* Units of a quantity, without blanks, in small letters; "": not checked. */
+static const char *units_of(bst_star_quantity q) {
+    switch (q) {
+        case BST_STAR_RA:
+        case BST_STAR_DEC:
+            return "deg degree degrees";
+        case BST_STAR_EPOCH:
+            return "yr year a jyear";
+        case BST_STAR_PM_RA:
+        case BST_STAR_PM_DEC:
+            return "mas/yr mas/year mas.yr**-1 mas.yr-1 masyr-1 masyr**-1 mas/a";
+        default:
+            return "";
+    }
+}
+
+bst_status bst_star_unit_check(bst_ctx *ctx, const bst_star_table *t, bst_star_quantity q,
+                               const char *unit, size_t length) {
+    char plain[40];
+    size_t n = 0;
+    for (size_t i = 0; i < length && n + 1 < sizeof plain; i++) {
+        if (!isspace((unsigned char)unit[i])) {
+            plain[n++] = unit[i];
+        }
+    }
+    const char *allowed = units_of(q);
+    if (n == 0 || !*allowed || bst_star_name_is(allowed, plain, n)) {
+        return BST_OK;
+    }
+    return bst_fail(ctx, BST_ERR_FORMAT, "%s: column %s: unit \"%.*s\"; allowed: %s", t->path,
+                    t->name[q], (int)length, unit, allowed);
 }

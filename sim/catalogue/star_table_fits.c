@@ -26,8 +26,10 @@ static bst_status find_columns(bst_ctx *ctx, bst_star_table *t) {
         fits_read_key_str(t->fits, key, name, NULL, &none);
         fits_get_coltype(t->fits, c, &type, &repeat, NULL, &code);
         const size_t length = strlen(name);
-        const bool number = repeat == 1 && (type == TDOUBLE || type == TFLOAT || type == TLONG ||
-                                            type == TLONGLONG || type == TSHORT || type == TBYTE);
+        const bool number =
+            repeat == 1 && (type == TDOUBLE || type == TFLOAT || type == TLONG || type == TULONG ||
+                            type == TLONGLONG || type == TULONGLONG || type == TSHORT ||
+                            type == TUSHORT || type == TBYTE || type == TSBYTE);
         if (t->source_column < 0 && number && type != TDOUBLE && type != TFLOAT &&
             bst_star_name_is(bst_star_source_names, name, length)) {
             t->source_column = c - 1;
@@ -35,12 +37,19 @@ static bst_status find_columns(bst_ctx *ctx, bst_star_table *t) {
         for (int q = 0; q < BST_STAR_QUANTITIES; q++) {
             if (t->column[q] < 0 && bst_star_name_is(bst_star_quantity_names[q], name, length)) {
                 if (!number) {
-                    return bst_fail(ctx, BST_ERR_FORMAT,
-                                    "%s: column %s does not hold one number in each row", t->path,
-                                    name);
+                    return bst_fail(
+                        ctx, BST_ERR_FORMAT,
+                        "%s: column %s does not hold one number in each row, or of a type "
+                        "that is not read",
+                        t->path, name);
                 }
+                char unit[FLEN_VALUE] = "";
                 t->column[q] = c - 1;
                 snprintf(t->name[q], sizeof t->name[q], "%s", name);
+                fits_make_keyn("TUNIT", c, key, &code);
+                none = 0;
+                fits_read_key_str(t->fits, key, unit, NULL, &none);
+                BST_TRY(bst_star_unit_check(ctx, t, (bst_star_quantity)q, unit, strlen(unit)));
             }
         }
     }
@@ -97,8 +106,11 @@ static bst_status read_block(bst_ctx *ctx, bst_star_table *t) {
         }
         fits_read_col(t->fits, TLONGLONG, t->source_column + 1, t->block_first + 1, 1,
                       t->block_count, &none, values, &any, &code);
+        /* beyond 63 bits: no identity, as names */
+        const bool fits = code != NUM_OVERFLOW;
+        code = fits ? code : 0;
         for (int64_t i = 0; i < t->block_count && code == 0; i++) {
-            t->block_source[i] = values[i];
+            t->block_source[i] = fits ? values[i] : 0;
         }
         free(values);
     }

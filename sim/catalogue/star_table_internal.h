@@ -30,10 +30,23 @@ typedef enum bst_star_quantity {
 extern const char bst_star_source_names[];
 extern const char *const bst_star_quantity_names[BST_STAR_QUANTITIES];
 
+/* Checks the unit of a column of the table.
+ *
+ * Given:     unit  [length] "": not stated, taken as the right one
+ * Errors:    BST_ERR_FORMAT with file, column, unit and those allowed */
+bst_status bst_star_unit_check(bst_ctx *ctx, const bst_star_table *table,
+                               bst_star_quantity quantity, const char *unit,
+                               size_t length) BST_MUST_CHECK;
+
 /* True if `names` holds the word `name` of `length` bytes, in any case. */
 bool bst_star_name_is(const char *names, const char *name, size_t length);
 
 enum { BST_STAR_TABLE_COLUMNS = 1024, BST_STAR_TABLE_LINE = 1 << 16 };
+
+/* Unit of a column, from the head of an ECSV file. */
+typedef struct bst_star_column_unit {
+    char name[72], unit[40];
+} bst_star_column_unit;
 
 struct bst_star_table {
     bst_star_table_options options;
@@ -47,7 +60,10 @@ struct bst_star_table {
     bst_subprocess unzip;
     bool unzips;
     char *line, *scratch;
-    int line_number;
+    int line_number, fields; /* fields: columns of the line of names */
+    bool ecsv, blanks;       /* blanks divide the columns */
+    bst_star_column_unit *units;
+    int unit_count;
     /* FITS */
     fitsfile *fits;
     int64_t fits_rows;

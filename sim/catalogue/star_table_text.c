@@ -9,6 +9,40 @@
 #include "sim/core/file.h"
 #include "sim/core/text_reader.h"
 
+/* Takes what the head of an ECSV file says: that it is one, what divides its columns, their units.
+ */
+static bst_status read_comment(bst_ctx *ctx, bst_star_table *t, const char *text) {
+    if (strstr(text, "%ECSV")) {
+        t->ecsv = t->blanks = true;
+    } else if (strstr(text, "delimiter:") && strchr(text, ',')) {
+        t->blanks = false;
+    }
+    const char *name = strstr(text, "name: "), *unit = strstr(text, "unit: ");
+    if (t->ecsv && name && unit && t->unit_count < BST_STAR_TABLE_COLUMNS) {
+        if (!t->units) {
+            t->units = calloc(BST_STAR_TABLE_COLUMNS, sizeof *t->units);
+        }
+        if (!t->units) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory", t->path);
+        }
+        bst_star_column_unit *one = &t->units[t->unit_count++];
+        name += 6;
+        unit += 6;
+        snprintf(one->name, sizeof one->name, "%.*s", (int)strcspn(name, ",}"), name);
+        snprintf(one->unit, sizeof one->unit, "%.*s", (int)strcspn(unit, ",}"), unit);
+    }
+    return BST_OK;
+}
+
+/* Makes commas of the blanks that divide a line, outside quotation marks. */
+static void divide_by_commas(char *text) {
+    bool quoted = false;
+    for (; *text; text++) {
+        quoted = quoted != (*text == '"');
+        *text = *text == ' ' && !quoted ? ',' : *text;
+    }
+}
+
 /* Reads the next line that is no comment and not empty; false: end of the file. */
 static bst_status next_line(bst_ctx *ctx, bst_star_table *t, bst_text_line *line, bool *end) {
     *end = false;
@@ -20,14 +54,21 @@ static bst_status next_line(bst_ctx *ctx, bst_star_table *t, bst_text_line *line
                             t->line_number, BST_STAR_TABLE_LINE - 2);
         }
         BST_TRY(bst_file_check_text(ctx, t->path, t->line, length));
-        const char *text = t->line;
+        char *text = t->line;
         if (t->line_number == 1 && strncmp(text, "\xEF\xBB\xBF", 3) == 0) {
             text += 3; /* byte order mark */
         }
         *line = (bst_text_line){text, strlen(text), t->line_number};
         bst_text_trim_end(line);
         if (line->length > 0 && line->text[0] != '#') {
+            text[line->length] = '\0';
+            if (t->blanks) {
+                divide_by_commas(text);
+            }
             return BST_OK;
+        }
+        if (line->length > 0 && t->fields == 0) {
+            BST_TRY(read_comment(ctx, t, text));
         }
     }
     *end = true;
@@ -52,12 +93,26 @@ static bst_status next_line(bst_ctx *ctx, bst_star_table *t, bst_text_line *line
 static bst_status split(bst_ctx *ctx, const bst_star_table *t, const bst_text_line *line,
                         bst_text_span fields[BST_STAR_TABLE_COLUMNS], int *count) {
     *count = bst_text_split_csv(line, t->scratch, fields, BST_STAR_TABLE_COLUMNS);
+    if (t->fields > 0 && *count >= 0 && *count != t->fields) {
+        return bst_fail(ctx, BST_ERR_FORMAT, "%s:%d: %d fields, but %d names of columns", t->path,
+                        line->number, *count, t->fields);
+    }
     if (*count >= 0 && *count <= BST_STAR_TABLE_COLUMNS) {
         return BST_OK;
     }
     return bst_fail(
         ctx, BST_ERR_FORMAT, "%s:%d: %s", t->path, line->number,
         *count < 0 ? "a quotation mark has no end, or text after it" : "more than 1024 columns");
+}
+
+/* Checks the unit that the head of the file has for a column. */
+static bst_status check_unit(bst_ctx *ctx, const bst_star_table *t, bst_star_quantity q) {
+    for (int i = 0; i < t->unit_count; i++) {
+        if (strcmp(t->units[i].name, t->name[q]) == 0) {
+            return bst_star_unit_check(ctx, t, q, t->units[i].unit, strlen(t->units[i].unit));
+        }
+    }
+    return BST_OK;
 }
 
 bst_status bst_star_text_open(bst_ctx *ctx, bst_star_table *t, bool gzip) {
@@ -87,6 +142,7 @@ bst_status bst_star_text_open(bst_ctx *ctx, bst_star_table *t, bool gzip) {
     bst_text_span fields[BST_STAR_TABLE_COLUMNS];
     int count;
     BST_TRY(split(ctx, t, &line, fields, &count));
+    t->fields = count;
     for (int i = 0; i < count; i++) {
         if (t->source_column < 0 &&
             bst_star_name_is(bst_star_source_names, fields[i].text, fields[i].length)) {
@@ -97,6 +153,7 @@ bst_status bst_star_text_open(bst_ctx *ctx, bst_star_table *t, bool gzip) {
                 bst_star_name_is(bst_star_quantity_names[q], fields[i].text, fields[i].length)) {
                 t->column[q] = i;
                 bst_text_copy(fields[i], t->name[q], sizeof t->name[q]);
+                BST_TRY(check_unit(ctx, t, (bst_star_quantity)q));
             }
         }
     }

@@ -4,10 +4,12 @@
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "sim/catalogue/star_install.h"
 #include "sim/catalogue/star_merge.h"
 #include "sim/cli/catalogue_progress.h"
+#include "sim/core/file.h"
 
 #define OFFSET(field) offsetof(bst_stars_import_request, field)
 
@@ -70,18 +72,18 @@ bst_stars_import_request bst_stars_import_defaults(void) {
         .epoch_year = NAN, .zero_point_mag = NAN, .complete_to_v_mag = NAN};
 }
 
-/* Checks whether a file begins as Debian's archive of Tycho-2 does (xz); files that cannot be read
- * count by their names. */
-static bool is_archive(const char *path) {
+/* Checks whether a file begins as Debian's archive of Tycho-2 does (xz). */
+static bst_status is_archive(bst_ctx *ctx, const char *path, bool *yes) {
     static const unsigned char magic[6] = {0xFD, '7', 'z', 'X', 'Z', 0};
     unsigned char head[6] = {0};
-    FILE *file = fopen(path, "rb");
-    if (!file) {
-        return strstr(path, ".tar") != NULL;
-    }
-    size_t got = fread(head, 1, sizeof head, file);
-    fclose(file);
-    return got == sizeof head && memcmp(head, magic, sizeof magic) == 0;
+    int fd;
+    uint64_t bytes;
+    BST_TRY(bst_file_open(ctx, path, UINT64_C(1) << 40,
+                          "a table of stars, or Debian's tycho2_2.orig.tar.xz", &fd, &bytes));
+    *yes = read(fd, head, sizeof head) == (ssize_t)sizeof head &&
+           memcmp(head, magic, sizeof magic) == 0;
+    close(fd);
+    return BST_OK;
 }
 
 static bst_status import_archive(bst_ctx *ctx, const bst_stars_import_request *q,
@@ -152,6 +154,10 @@ static bst_status import_table(bst_ctx *ctx, const bst_stars_import_request *q, 
         printf("%s: %lld stars: %lld of the base, of which the table has %lld, and %lld more\n",
                q->out, (long long)n.written, (long long)n.base, (long long)n.same,
                (long long)(n.written - n.base));
+        if (n.at_rest > 0) {
+            printf("%lld rows have no proper motion: their stars stay where they were\n",
+                   (long long)n.at_rest);
+        }
         if (n.skipped > 0) {
             printf("%lld of %lld rows have no position or no magnitude and were left out\n",
                    (long long)n.skipped, (long long)n.rows);
@@ -161,5 +167,7 @@ static bst_status import_table(bst_ctx *ctx, const bst_stars_import_request *q, 
 }
 
 bst_status bst_stars_import(bst_ctx *ctx, const bst_stars_import_request *q, const char *file) {
-    return is_archive(file) ? import_archive(ctx, q, file) : import_table(ctx, q, file);
+    bool archive = false;
+    BST_TRY(is_archive(ctx, file, &archive));
+    return archive ? import_archive(ctx, q, file) : import_table(ctx, q, file);
 }

@@ -139,9 +139,9 @@ static void test_exact_places(void **state) {
     bst_assert_close(fit.distortion.k2, truth.distortion.k2, 2e2);
     bst_assert_close(fit.distortion.p1, truth.distortion.p1, 1e-5);
     bst_assert_close(fit.distortion.p2, truth.distortion.p2, 1e-5);
-    assert_int_equal(fit.left_out, 2);
+    assert_int_equal(fit.rejected, 2);
     assert_int_equal(fit.frames, FRAMES);
-    assert_true(isnan(f.stars[17].left_x_px) && isnan(f.stars[200].left_y_px));
+    assert_true(isnan(f.stars[17].residual_x_px) && isnan(f.stars[200].residual_y_px));
     assert_true(fit.rms_px < 2e-4 && fit.corner_sigma_px < 2e-3);
 }
 
@@ -213,7 +213,7 @@ static void test_photometry(void **state) {
         bst_camera_photometry_fit fit;
         bst_assert_ok(&ctx, bst_camera_fit_photometry(&ctx, stars, ALL, &fit));
         assert_int_equal(fit.stars, ALL - 3);
-        assert_int_equal(fit.left_out, 1);
+        assert_int_equal(fit.rejected, 1);
         bst_assert_close(fit.scatter_mag, 0.05, 0.025);
         zero2 += pow((fit.zero_point_mag - 21.0) / fit.zero_point_sigma_mag, 2.0) / SEEDS;
         colour2 += pow((fit.colour_term - 0.15) / fit.colour_term_sigma, 2.0) / SEEDS;

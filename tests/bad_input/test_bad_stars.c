@@ -26,7 +26,7 @@ static const bad_reader catalogue = {
     read_stars,
     "a star catalogue: `boresight stars fetch` makes the full one, and \"embedded\" names the one "
     "in the program",
-    "star catalogue: ", 1 << 30};
+    "star catalogue: ", (uint64_t)1 << 33};
 static const bad_reader subset = {read_subset, "a file with lines \"sky V\" and \"cone ...\"", "",
                                   1 << 20};
 static const bad_reader tarball = {read_tarball, "Debian's tycho2_2.orig.tar.xz", "", 1 << 30};

@@ -281,6 +281,52 @@ static void test_completeness(void **state) {
     bst_stars_close(stars);
 }
 
+/* Two stars of the base 1 arcsec apart, and two rows that are both nearest to the first: the
+ * farther row is the second star. Rows without colour or motion: the base's stay, with the table's
+ * V. */
+static void test_rows_share_out_the_base(void **state) {
+    files *f = *state;
+    const double c = cos(20.0 * BST_DEG_RAD);
+    const bst_star_values base[] = {
+        {10.0 * BST_DEG_RAD, 20.0 * BST_DEG_RAD, 0, 0, 9000, 2000, 1, bst_star_id_make(1000, 1, 1)},
+        {(10.0 + 1.0 * ARCSEC_DEG / c) * BST_DEG_RAD, 20.0 * BST_DEG_RAD, 0, 0, 9000, 0, 1,
+         bst_star_id_make(1000, 2, 1)},
+        /* 0.3 arcsec a year to the north */
+        {12.0 * BST_DEG_RAD, 20.0 * BST_DEG_RAD, 0, 3000, 9000, 500, 1,
+         bst_star_id_make(1000, 3, 1)},
+    };
+    const bst_star_patch all = {0.0, 0.0, 180.0, 9.0};
+    bst_assert_ok(&f->ctx, bst_star_write(&f->ctx, base, 3, &all, f->base));
+    FILE *file = fopen(f->table, "w");
+    assert_non_null(file);
+    fputs("ra,dec,ref_epoch,v_mag,b_minus_v\n", file);
+    fprintf(file, "%.10f,20,2016,9.1,\n", 10.0 + 0.4 * ARCSEC_DEG / c);
+    fprintf(file, "%.10f,20,2016,8.95,\n", 10.0 + 0.1 * ARCSEC_DEG / c);
+    fprintf(file, "12,%.10f,2016,8.8,0.3\n", 20.0 + 16 * 0.3 * ARCSEC_DEG);
+    assert_int_equal(fclose(file), 0);
+    bst_star_merge_request q = request_of(f);
+    bst_star_merge_counts n;
+    q.base = f->base;
+    bst_assert_ok(&f->ctx, bst_star_merge(&f->ctx, &q, &n));
+    assert_int_equal(n.written, 3);
+    assert_int_equal(n.same, 3);
+    assert_int_equal(n.at_rest, 3);
+    bst_stars *stars = open_stars(f, f->out);
+    bst_star one;
+    bst_assert_ok(&f->ctx, bst_stars_find(&f->ctx, stars, base[0].id, 2000.0, &one));
+    bst_assert_close((double)one.v_mag, 8.95, 1e-3);
+    bst_assert_close((double)one.b_minus_v, 1.7, 1e-3);
+    bst_assert_ok(&f->ctx, bst_stars_find(&f->ctx, stars, base[1].id, 2000.0, &one));
+    bst_assert_close((double)one.v_mag, 9.1, 1e-3);
+    bst_assert_ok(&f->ctx, bst_stars_find(&f->ctx, stars, base[2].id, 2016.0, &one));
+    bst_assert_close((double)one.v_mag, 8.8, 1e-3);
+    bst_assert_close((double)one.b_minus_v, 0.3, 1e-3);
+    bst_vec3 there =
+        bst_vec3_from_radec(12.0 * BST_DEG_RAD, (20.0 + 16 * 0.3 * ARCSEC_DEG) * BST_DEG_RAD);
+    assert_true(bst_vec3_angle(one.icrs, there) < 0.002 * BST_ARCSEC_RAD);
+    bst_stars_close(stars);
+}
+
 /* ---------------------------------------------------------------- magnitudes */
 
 static double magnitude_of(files *f, const char *head, const char *row, double zero_point,
@@ -347,6 +393,10 @@ static void test_bad_tables(void **state) {
         {"ra,dec,epoch,v,pmra,pmdec\n1,2,2000,5,0,13001\n", "column pmdec: 13001 is outside"},
         {"ra,dec,epoch,v\n1,2,2000,\"5\n", ":2: a quotation mark has no end"},
         {"ra,dec,epoch,v\n,,,\n", "no stars to write"},
+        {"ra,dec,epoch,v\n1,2,2000\n", ":2: 3 fields, but 4 names of columns"},
+        {"ra,dec,epoch,v,pmra\n", "one column of proper motion only; the other may be named pmdec"},
+        {"# %ECSV 1.0\n# - {name: ra, unit: rad, datatype: float64}\nra dec epoch v\n1 2 2000 5\n",
+         "column ra: unit \"rad\"; allowed: deg"},
         {"<?xml version=\"1.0\"?>\n<VOTABLE>", "a VOTable, which is not read"},
         {"SIMPLE  =                    T", "cannot be opened"},
     };
@@ -370,6 +420,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_queries_find_each_star_once, setup, teardown),
         cmocka_unit_test_setup_teardown(test_stars_of_both_are_united, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_rows_share_out_the_base, setup, teardown),
         cmocka_unit_test_setup_teardown(test_completeness, setup, teardown),
         cmocka_unit_test_setup_teardown(test_magnitudes, setup, teardown),
         cmocka_unit_test_setup_teardown(test_bad_tables, setup, teardown),

@@ -37,16 +37,16 @@ class Camera(unittest.TestCase):
                         4.5 * light["zero_point_mag"]["standard_error"])
         self.assertLess(abs(light["colour_term"]["value"]), 4.5 * light["colour_term"]["standard_error"])
         with open(os.path.join(made, "stars.csv"), encoding="utf-8", newline="") as file:
-            rows = [row for row in csv.DictReader(file) if row["left_x_px"]]
+            rows = [row for row in csv.DictReader(file) if row["residual_x_px"]]
         self.assertEqual(len(rows), report["geometry"]["stars"])
-        left = np.array([[float(row["left_x_px"]), float(row["left_y_px"])] for row in rows])
+        left = np.array([[float(row["residual_x_px"]), float(row["residual_y_px"])] for row in rows])
         self.assertAlmostEqual(np.sqrt(np.mean(left**2)), report["geometry"]["rms_px"], delta=1e-4)
         # camera.json is a scenario
         result = runs.call("check", os.path.join(made, "camera.json"))
         self.assertEqual(result.returncode, 0, result.stderr)
         camera = json.loads(result.stdout)["observers"][0]["sensors"][0]["camera"]
         self.assertEqual(camera["pixel_scale_arcsec"], report["geometry"]["pixel_scale_arcsec"]["value"])
-        self.assertEqual(camera["psf_fwhm_px"], report["psf"]["fwhm_px"]["value"])
+        self.assertEqual(camera["distortion"]["k2"], report["geometry"]["k2"]["value"])
         # frames in extensions, not a cube
         runs.run(runs.STARE, run + "2", "/record/frames=extensions", duration=3)
         self.assertIn("FWHM", runs.call_well("calibrate-camera", run + "2", "--out", made + "2"))
@@ -54,6 +54,8 @@ class Camera(unittest.TestCase):
         result = runs.call("calibrate-camera", run + "3", "--out", made + "3")
         self.assertEqual((result.returncode, os.path.exists(made + "3")), (1, False))
         self.assertIn("0 identified stars in 0 frames do not determine", result.stderr)
+        result = runs.call("calibrate-camera", run, "--out", made + "4", "--camera", "/nonsense")
+        self.assertIn("/nonsense: no place of a camera", result.stderr)
         result = runs.call("calibrate-camera", run, "--out", made)
         self.assertEqual(result.returncode, 1)
         self.assertIn("--overwrite", result.stderr)

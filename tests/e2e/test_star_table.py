@@ -41,16 +41,22 @@ class StarTable(unittest.TestCase):
         ra, dec = rng.uniform(0, 360, n), np.degrees(np.arcsin(rng.uniform(-1, 1, n)))
         table = table_of(ra, dec, rng.uniform(5, 20, n), rng)
         table.write(self.path("t.csv"))
+        table["ra"].unit, table["pmra"].unit = "deg", "mas / yr"
         table.write(self.path("t.ecsv"), delimiter=",")
+        table.write(self.path("blanks.ecsv"))
         table.write(self.path("t.fits"))
         with open(self.path("t.csv"), "rb") as plain, gzip.open(self.path("t.csv.gz"), "wb") as packed:
             packed.write(plain.read())
         images = []
-        for kind in ("csv", "csv.gz", "ecsv", "fits"):
-            self.load("t." + kind, kind + ".stars", "--base", "none")
+        for kind in ("t.csv", "t.csv.gz", "t.ecsv", "t.fits", "blanks.ecsv"):
+            self.load(kind, kind + ".stars", "--base", "none")
             with open(self.path(kind + ".stars"), "rb") as file:
                 images.append(file.read())
         self.assertTrue(all(image == images[0] for image in images))
+        table["dec"].unit = "rad"
+        table.write(self.path("rad.fits"))
+        result = runs.call("stars", "import", self.path("rad.fits"), "--out", self.path("x"))
+        self.assertIn('column dec: unit "rad"; allowed: deg', result.stderr)
         # identities count the records; G - V by the published relation, evaluated here from its text
         then = SkyCoord(ra * u.deg, dec * u.deg, pm_ra_cosdec=table["pmra"] * u.mas / u.yr,
                         pm_dec=table["pmdec"] * u.mas / u.yr, obstime=Time(2016.0, format="jyear"))
@@ -58,7 +64,7 @@ class StarTable(unittest.TestCase):
             warnings.simplefilter("ignore")  # stars without a distance
             moved = then.apply_space_motion(new_obstime=Time(2000.0, format="jyear"))
         for number in (0, 1, 700, 1500, 2222, n - 1):
-            text = runs.call_well("stars", "info", self.path("csv.stars"), str(2**30 + number))
+            text = runs.call_well("stars", "info", self.path("t.csv.stars"), str(2**30 + number))
             i = int(re.search(r"source +(\d+)", text)[1]) - 4000000000000000000
             place = re.search(r"RA (\S+) Dec (\S+) deg", text)
             found = SkyCoord(float(place[1]) * u.deg, float(place[2]) * u.deg)

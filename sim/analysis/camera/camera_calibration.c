@@ -36,7 +36,7 @@ const bst_option bst_camera_calibration_options[] = {
      .kind = BST_OPTION_TEXT,
      .offset = offsetof(Q, camera),
      .argument = "POINTER",
-     .doc = "place of the camera in that scenario (default /observers/0/sensors/0/camera)"},
+     .doc = "place of the camera in that scenario (default: as in the run's)"},
     {.name = "overwrite",
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(Q, overwrite),
@@ -56,6 +56,7 @@ typedef struct reading {
     bst_run_scene scene;
     bst_run_sensor sensor;
     bst_camera camera;    /* of the scenario: start of the fit */
+    char pointer[64];     /* place of the camera in the scenario */
     bst_stars *catalogue; /* by which the run identified them */
     double julian_year;
     bst_camera_fit_star *stars;
@@ -160,6 +161,7 @@ static bst_status read_run(bst_ctx *ctx, const bst_camera_calibration_request *q
     const bst_observer_config *observers = d->scene.scenario.observers.items;
     const bst_sensor_config *config = observers[observer].sensors.items;
     d->camera = config[sensor].camera;
+    snprintf(d->pointer, sizeof d->pointer, "/observers/%d/sensors/%d/camera", observer, sensor);
     BST_TRY(bst_camera_prepare(ctx, &d->camera));
     const char *own = config[sensor].knowledge.star_catalogue;
     BST_TRY(
@@ -297,14 +299,14 @@ static void print_figures(FILE *out, const bst_camera_figures *f) {
     const bst_camera_geometry_fit *g = &f->geometry;
     const bst_camera_distortion *k = &g->distortion, *s = &g->distortion_sigma;
     fprintf(out, "stars            %d in %d frames, %d left out\n", g->stars, g->frames,
-            g->left_out);
+            g->rejected);
     fprintf(out, "pixel scale      %.6f +- %.6f arcsec\n", g->pixel_scale_arcsec,
             g->pixel_scale_sigma_arcsec);
     fprintf(out, "k1, k2           %.5g +- %.2g, %.5g +- %.2g\n", k->k1, s->k1, k->k2, s->k2);
     fprintf(out, "p1, p2           %.5g +- %.2g, %.5g +- %.2g\n", k->p1, s->p1, k->p2, s->p2);
     fprintf(out, "                 the map in the field's corner +- %.4f px\n", g->corner_sigma_px);
     fprintf(out,
-            "left             %.4f px RMS an axis, %.4f px of it beyond the centroids' noise\n",
+            "residuals        %.4f px RMS an axis, %.4f px of it beyond the centroids' noise\n",
             g->rms_px, g->scatter_px);
     if (f->widths.stars > 0) {
         fprintf(out, "FWHM             %.3f +- %.3f px, Gaussian, %d stars\n", f->widths.fwhm_px,
@@ -317,7 +319,7 @@ static void print_figures(FILE *out, const bst_camera_figures *f) {
         fprintf(out, "colour term      %.4f +- %.4f mag per mag of B-V\n", p->colour_term,
                 p->colour_term_sigma);
         fprintf(out, "scatter          %.4f mag beyond the noise, %d stars, %d left out\n",
-                p->scatter_mag, p->stars, p->left_out);
+                p->scatter_mag, p->stars, p->rejected);
     }
 }
 
@@ -336,8 +338,24 @@ static bst_status calibrate(bst_ctx *ctx, const bst_camera_calibration_request *
         BST_TRY(measure_widths(ctx, d, &f.widths));
     }
     BST_TRY(bst_folder_make(ctx, q->out));
-    BST_TRY(bst_camera_calibration_write(ctx, q, &d->camera, &f, d->stars, d->exposures, d->count));
+    bst_camera_calibration_request where = *q;
+    where.camera = q->camera ? q->camera : d->pointer;
+    BST_TRY(bst_camera_calibration_write(ctx, &where, &d->camera, &f, d->stars, d->exposures,
+                                         d->count));
     print_figures(out, &f);
+    return BST_OK;
+}
+
+/* Checks that --camera can be a camera's place. */
+static bst_status check_pointer(bst_ctx *ctx, const char *pointer) {
+    int observer, sensor, end = 0;
+    if (pointer &&
+        (sscanf(pointer, "/observers/%4d/sensors/%4d/camera%n", &observer, &sensor, &end) != 2 ||
+         end == 0 || pointer[end] != '\0')) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "--camera %s: no place of a camera, such as /observers/0/sensors/1/camera",
+                        pointer);
+    }
     return BST_OK;
 }
 
@@ -346,6 +364,7 @@ bst_status bst_camera_calibration_run(bst_ctx *ctx, const bst_camera_calibration
     char path[4096];
     snprintf(path, sizeof path, "%.4000s/camera.json", q->out);
     BST_TRY(bst_outputs_refuse_earlier(ctx, path, q->overwrite));
+    BST_TRY(check_pointer(ctx, q->camera));
     reading d = {0};
     bst_status status = read_run(ctx, q, run, &d);
     if (status == BST_OK) {

@@ -8,13 +8,9 @@
 #include "sim/cli/options.h"
 
 typedef struct bst_camera_calibration_request {
-    const char *out, *extends, *camera, *sensor;
+    const char *out, *extends, *camera, *sensor; /* camera NULL: the place that the run has */
     bool overwrite, help;
 } bst_camera_calibration_request;
-
-/* Request without any option given. */
-#define BST_CAMERA_CALIBRATION_DEFAULTS \
-    { .camera = "/observers/0/sensors/0/camera" }
 
 /* Table of the options, with offsets in a request. */
 extern const bst_option bst_camera_calibration_options[];

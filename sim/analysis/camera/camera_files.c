@@ -10,10 +10,8 @@
 #include "sim/io/draft_file.h"
 #include "sim/io/plot.h"
 
-/* Arrows of the plot are this many times as long as what is left of the star's place. */
+/* Arrows of the plot are this many times as long as the residual. */
 static const double ARROWS = 500.0;
-/* Coefficients below this many standard errors are written as 0. */
-static const double LEAST_SIGNIFICANCE = 2.0;
 
 typedef struct writer {
     const bst_camera_calibration_request *request;
@@ -33,7 +31,7 @@ static void set_camera(const writer *w, cJSON *set, const char *key, double valu
 /* The scenario that changes a camera; NULL: out of memory. */
 static cJSON *camera_json(const writer *w) {
     const bst_camera_geometry_fit *g = &w->figures->geometry;
-    const bst_camera_distortion *d = &g->distortion, *s = &g->distortion_sigma;
+    const bst_camera_distortion *d = &g->distortion;
     cJSON *root = cJSON_CreateObject();
     cJSON_AddNumberToObject(root, "boresight", 1);
     if (w->request->extends) {
@@ -43,20 +41,11 @@ static cJSON *camera_json(const writer *w) {
     }
     cJSON *set = cJSON_AddObjectToObject(root, "set");
     set_camera(w, set, "pixel_scale_arcsec", g->pixel_scale_arcsec);
-    const struct {
-        const char *key;
-        double value, sigma;
-    } terms[] = {{"distortion/k1", d->k1, s->k1},
-                 {"distortion/k2", d->k2, s->k2},
-                 {"distortion/p1", d->p1, s->p1},
-                 {"distortion/p2", d->p2, s->p2}};
-    for (size_t i = 0; i < sizeof terms / sizeof *terms; i++) {
-        const bool counts = fabs(terms[i].value) > LEAST_SIGNIFICANCE * terms[i].sigma;
-        set_camera(w, set, terms[i].key, counts ? terms[i].value : 0.0);
-    }
-    if (w->start->optics.psf == BST_PSF_GAUSSIAN && w->figures->widths.stars > 0) {
-        set_camera(w, set, "psf_fwhm_px", w->figures->widths.fwhm_px);
-    }
+    /* all terms: their errors are correlated, and one alone left out would spoil the map */
+    set_camera(w, set, "distortion/k1", d->k1);
+    set_camera(w, set, "distortion/k2", d->k2);
+    set_camera(w, set, "distortion/p1", d->p1);
+    set_camera(w, set, "distortion/p2", d->p2);
     return root;
 }
 
@@ -74,7 +63,7 @@ static cJSON *report_json(const writer *w) {
     cJSON *root = cJSON_CreateObject();
     cJSON *geometry = cJSON_AddObjectToObject(root, "geometry");
     cJSON_AddNumberToObject(geometry, "stars", g->stars);
-    cJSON_AddNumberToObject(geometry, "left_out", g->left_out);
+    cJSON_AddNumberToObject(geometry, "rejected", g->rejected);
     cJSON_AddNumberToObject(geometry, "frames", g->frames);
     add_value(geometry, "pixel_scale_arcsec", g->pixel_scale_arcsec, g->pixel_scale_sigma_arcsec);
     add_value(geometry, "k1", g->distortion.k1, g->distortion_sigma.k1);
@@ -98,7 +87,7 @@ static cJSON *report_json(const writer *w) {
     if (p->stars > 0) {
         cJSON *light = cJSON_AddObjectToObject(root, "photometry");
         cJSON_AddNumberToObject(light, "stars", p->stars);
-        cJSON_AddNumberToObject(light, "left_out", p->left_out);
+        cJSON_AddNumberToObject(light, "rejected", p->rejected);
         add_value(light, "zero_point_mag", p->zero_point_mag, p->zero_point_sigma_mag);
         add_value(light, "colour_term", p->colour_term, p->colour_term_sigma);
         bst_json_add_number(light, "scatter_mag", p->scatter_mag);
@@ -112,33 +101,39 @@ static bst_status write_json(bst_ctx *ctx, const writer *w, const char *name, cJ
     return bst_cli_write_json(ctx, path, node);
 }
 
-/* Writes each star with what is left of its place. */
+/* Writes each star with its residual. */
 static bst_status write_stars(bst_ctx *ctx, const writer *w) {
     char path[4096 + 32];
     bst_draft draft;
     snprintf(path, sizeof path, "%s/stars.csv", w->request->out);
     BST_TRY(bst_draft_open(ctx, path, &draft));
-    fputs("exposure_id,star_id,x_px,y_px,left_x_px,left_y_px,v_mag,b_minus_v,electrons_per_s\r\n",
-          draft.stream);
+    fputs(
+        "exposure_id,star_id,x_px,y_px,residual_x_px,residual_y_px,v_mag,b_minus_v,electrons_per_"
+        "s\r\n",
+        draft.stream);
     for (int i = 0; i < w->count; i++) {
         const bst_camera_fit_star *s = &w->stars[i];
         fprintf(draft.stream, "%lld,%lld,%.4f,%.4f,", (long long)w->exposures[i], (long long)s->id,
                 s->x_px, s->y_px);
-        if (isnan(s->left_x_px)) {
+        if (isnan(s->residual_x_px)) {
             fputs(",,", draft.stream);
         } else {
-            fprintf(draft.stream, "%.5f,%.5f,", s->left_x_px, s->left_y_px);
+            fprintf(draft.stream, "%.5f,%.5f,", s->residual_x_px, s->residual_y_px);
         }
         fprintf(draft.stream, "%.3f,", s->v_mag);
         if (isfinite(s->b_minus_v)) {
             fprintf(draft.stream, "%.3f", s->b_minus_v);
         }
-        fprintf(draft.stream, ",%.6g\r\n", s->rate_e_per_s);
+        fputc(',', draft.stream);
+        if (isfinite(s->rate_e_per_s)) {
+            fprintf(draft.stream, "%.6g", s->rate_e_per_s);
+        }
+        fputs("\r\n", draft.stream);
     }
     return bst_draft_close(ctx, &draft, BST_OK);
 }
 
-/* Plots what is left of the places over the field, and magnitudes against light. */
+/* Plots the residuals over the field, and magnitudes against light. */
 static bst_status plot(bst_ctx *ctx, const writer *w) {
     char path[4096 + 32];
     bst_plot p;
@@ -147,9 +142,9 @@ static bst_status plot(bst_ctx *ctx, const writer *w) {
     fputs("$left << EOD\n", p.script);
     for (int i = 0; i < w->count; i++) {
         const bst_camera_fit_star *s = &w->stars[i];
-        if (!isnan(s->left_x_px)) {
-            fprintf(p.script, "%.2f %.2f %.4f %.4f\n", s->x_px, s->y_px, ARROWS * s->left_x_px,
-                    ARROWS * s->left_y_px);
+        if (!isnan(s->residual_x_px)) {
+            fprintf(p.script, "%.2f %.2f %.4f %.4f\n", s->x_px, s->y_px, ARROWS * s->residual_x_px,
+                    ARROWS * s->residual_y_px);
         }
     }
     fputs("EOD\n$light << EOD\n", p.script);

@@ -14,6 +14,8 @@ enum { SIZE = BST_CAMERA_FIT_SIZE, ALL = SIZE + 3, ITERATIONS = 8, ROUNDS = 4, L
 static const double STEP = 1e-6;
 /* Distance, in sigma, of stars that are left out. */
 static const double MOST_SIGMAS = 4.5;
+/* Largest last step of the parameters, in standard errors. */
+static const double MOST_STEP = 0.1;
 /* Largest 1 sigma of the map in the corner, px, that counts as determined. */
 static const double DETERMINED_PX = 100.0;
 
@@ -28,6 +30,7 @@ typedef struct geometry {
     double covariance[SIZE][SIZE];
     double chi2;
     int used, degrees;
+    double last_step; /* of the parameters, in standard errors */
 } geometry;
 
 /* Camera with parameters x; false if it folds the image. */
@@ -105,12 +108,12 @@ static bool terms_of(const geometry *g, const bst_camera cameras[1 + SIZE],
 static double add_star(const geometry *g, const bst_camera cameras[1 + SIZE], double gate,
                        bst_camera_fit_star *s, normal *n) {
     star_terms t;
-    s->left_x_px = s->left_y_px = NAN;
+    s->residual_x_px = s->residual_y_px = NAN;
     if (!terms_of(g, cameras, s, &t) || !(t.chi2 <= pow(gate, 2.0))) {
         return 0.0;
     }
-    s->left_x_px = t.left[0];
-    s->left_y_px = t.left[1];
+    s->residual_x_px = t.left[0];
+    s->residual_y_px = t.left[1];
     for (int i = 0; i < ALL; i++) {
         n->b[i] += t.b[i];
         for (int k = 0; k < ALL; k++) {
@@ -219,7 +222,7 @@ static bool iterate(geometry *g, double gate, frame_solution *solutions) {
             g->degrees += 2 * n.used - 3;
         } else {
             for (int i = first; i < star; i++) {
-                g->stars[i].left_x_px = g->stars[i].left_y_px = NAN;
+                g->stars[i].residual_x_px = g->stars[i].residual_y_px = NAN;
             }
         }
     }
@@ -232,12 +235,14 @@ static bool iterate(geometry *g, double gate, frame_solution *solutions) {
             step[i] += g->covariance[i][k] * b[k];
         }
         g->x[i] += step[i];
+        g->last_step = fmax(i == 0 ? 0.0 : g->last_step, fabs(step[i]) / sqrt(g->covariance[i][i]));
     }
     turn(g, solutions, step);
     return true;
 }
 
-/* Iterates with the scatter that makes chi squared its expectation. */
+/* Iterates with the scatter that makes chi squared its expectation. False: not determined, or not
+ * at rest at the end. */
 static bool solve(geometry *g, frame_solution *solutions) {
     double gate = INFINITY; /* with a wrong scale all stars are far off */
     g->scatter2 = 1.0;
@@ -249,7 +254,7 @@ static bool solve(geometry *g, frame_solution *solutions) {
             /* at the optimum chi2 falls about as 1 / (mean covariance + scatter2) */
             double mean = 0.0;
             for (int i = 0; i < g->count; i++) {
-                if (!isnan(g->stars[i].left_x_px)) {
+                if (!isnan(g->stars[i].residual_x_px)) {
                     mean += 0.5 * (g->stars[i].cov_xx + g->stars[i].cov_yy) / g->used;
                 }
             }
@@ -258,7 +263,7 @@ static bool solve(geometry *g, frame_solution *solutions) {
         }
         gate = MOST_SIGMAS;
     }
-    return true;
+    return g->last_step < MOST_STEP;
 }
 
 /* A star's part of the gradient, for sums over the frames of each star. */
@@ -326,7 +331,7 @@ static bool estimate_covariance(geometry *g, const frame_solution *solutions) {
         const bst_camera_fit_star *s = &g->stars[i];
         const frame_solution *f = &solutions[s->frame];
         star_terms t;
-        if (isnan(s->left_x_px) || !f->used || !terms_of(g, cameras, s, &t)) {
+        if (isnan(s->residual_x_px) || !f->used || !terms_of(g, cameras, s, &t)) {
             continue;
         }
         gradient *one = &all[used++];
@@ -376,12 +381,13 @@ static void report(const geometry *g, bst_camera_geometry_fit *out) {
         .corner_sigma_px = corner_sigma(g),
         .scatter_px = sqrt(g->scatter2),
         .stars = g->used,
-        .left_out = g->count - g->used};
+        .rejected = g->count - g->used};
     int last = -1;
     for (int i = 0; i < g->count; i++) {
         const bst_camera_fit_star *s = &g->stars[i];
-        if (!isnan(s->left_x_px)) {
-            out->rms_px += (pow(s->left_x_px, 2.0) + pow(s->left_y_px, 2.0)) / (2.0 * g->used);
+        if (!isnan(s->residual_x_px)) {
+            out->rms_px +=
+                (pow(s->residual_x_px, 2.0) + pow(s->residual_y_px, 2.0)) / (2.0 * g->used);
             out->frames += s->frame != last;
             last = s->frame;
         }
@@ -497,7 +503,7 @@ bst_status bst_camera_fit_photometry(bst_ctx *ctx, const bst_camera_fit_star *st
                                            .colour_term_sigma = sqrt(covariance[3]),
                                            .scatter_mag = sqrt(scatter2),
                                            .stars = f.used,
-                                           .left_out = given - f.used};
+                                           .rejected = given - f.used};
     }
     free(all);
     return BST_OK;

@@ -16,7 +16,8 @@ typedef struct bst_camera_fit_star {
     double cov_xx, cov_xy, cov_yy; /* px^2 */
     double v_mag, b_minus_v;       /* of the catalogue; b_minus_v NAN: unknown */
     double rate_e_per_s, rate_sigma_e_per_s; /* NAN: no photometry of this star */
-    double left_x_px, left_y_px; /* set by the fit: measured minus computed; NAN: left out */
+    double residual_x_px,
+        residual_y_px; /* set by the fit: measured minus computed; NAN: rejected */
 } bst_camera_fit_star;
 
 /* The camera's parameters: scale ratio - 1, k1, k2, p1, p2. */
@@ -28,7 +29,7 @@ typedef struct bst_camera_geometry_fit {
     double corner_sigma_px; /* 1 sigma of the camera's map in the corner of the field */
     double scatter_px;      /* of a star's place per axis beyond its covariance */
     double rms_px;          /* of what is left, per axis */
-    int stars, left_out, frames;
+    int stars, rejected, frames;
 } bst_camera_geometry_fit;
 
 /* Fits scale and distortion, and each frame's attitude, to all stars by least squares. Stars more
@@ -51,7 +52,7 @@ typedef struct bst_camera_photometry_fit {
     double zero_point_mag, zero_point_sigma_mag; /* V of a star with B-V = 0 and 1 electron/s */
     double colour_term, colour_term_sigma;       /* mag per mag of B-V */
     double scatter_mag;                          /* beyond the noise of the light */
-    int stars, left_out;
+    int stars, rejected;
 } bst_camera_photometry_fit;
 
 /* Fits V = zero_point - 2.5 log10(rate) + colour_term (B-V) to the stars with photometry and a
