@@ -58,8 +58,8 @@ class StarTable(unittest.TestCase):
         result = runs.call("stars", "import", self.path("rad.fits"), "--out", self.path("x"))
         self.assertIn('column dec: unit "rad"; allowed: deg', result.stderr)
         # identities count the records; G - V by the published relation, evaluated here from its text
-        then = SkyCoord(ra * u.deg, dec * u.deg, pm_ra_cosdec=table["pmra"] * u.mas / u.yr,
-                        pm_dec=table["pmdec"] * u.mas / u.yr, obstime=Time(2016.0, format="jyear"))
+        then = SkyCoord(ra * u.deg, dec * u.deg, pm_ra_cosdec=np.array(table["pmra"]) * u.mas / u.yr,
+                        pm_dec=np.array(table["pmdec"]) * u.mas / u.yr, obstime=Time(2016.0, format="jyear"))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # stars without a distance
             moved = then.apply_space_motion(new_obstime=Time(2000.0, format="jyear"))
