@@ -122,7 +122,7 @@ LINES = [
     (("info", RUN, "x"), 2, "one folder of a run is expected, 2 were given"),
     (("report", RUN, "--out", F + "/pipe"), 2, "is not a regular file; give another path"),
     (("export", RUN, "--table", "csv", "--out", OUT, "--every", "2"), 2,
-     "--every has no effect without --frames, --satnet, --coco or --yolo"),
+     "--every has no effect without --frames, --satnet, --coco, --yolo or --page"),
     (("export", RUN, "--table", "csv", "--out", OUT, "--sensor", "nix"), 2, "--sensor has no effect"),
     (("export", RUN, "--table", "csv", "--out", OUT, "--star-limit", "3"), 2, "without --satnet, --coco or"),
     (("export", RUN, "--frames", "png", "--out", OUT, "--fps", "5"), 2, "no effect without --frames mp4"),
