@@ -168,6 +168,10 @@ static bst_status import_table(bst_ctx *ctx, const bst_stars_import_request *q, 
 
 bst_status bst_stars_import(bst_ctx *ctx, const bst_stars_import_request *q, const char *file) {
     bool archive = false;
+    if (q->subset) { /* wrong ones are refused before the archive is looked for */
+        bst_star_subset ignored;
+        BST_TRY(bst_star_subset_read(ctx, q->subset, &ignored));
+    }
     BST_TRY(is_archive(ctx, file, &archive));
     return archive ? import_archive(ctx, q, file) : import_table(ctx, q, file);
 }

@@ -471,7 +471,7 @@ class Exported(unittest.TestCase):
     def test_misuse(self):
         self.fails(2, "one folder of a run is expected, 0 were given")
         self.fails(2, "nothing to export: add --frames, --table, --orbits, --observations, "
-                      "--satnet, --coco or --yolo", self.made)
+                      "--satnet, --coco, --yolo or --page", self.made)
         self.fails(2, "--frames gif: give one of png|mp4", self.made, "--frames", "gif")
         self.fails(2, "--every 0: give an integer from 1", self.made, "--every", "0")
         out = self.out()

@@ -102,11 +102,13 @@ class StarTable(unittest.TestCase):
     def test_usage(self):
         with open(self.path("bad.csv"), "w", encoding="ascii") as file:
             file.write("ra,dec,ref_epoch,v\n1,2,2016,5\n")
+        with open(self.path("sky.txt"), "w", encoding="ascii") as file:
+            file.write("sky 9\n")
         for words, message in [
                 ((), "a table needs --out FILE"),
                 (("--out", self.path("x"), "--cone", "1,2,3"), "--cone has no effect without --complete-to"),
                 (("--out", self.path("x"), "--complete-to", "9", "--cone", "1,2"), "--cone 1,2: give RA,DEC,RADIUS"),
-                (("--out", self.path("x"), "--subset", self.path("bad.csv")), "--subset is for Tycho-2's archive"),
+                (("--out", self.path("x"), "--subset", self.path("sky.txt")), "--subset is for Tycho-2's archive"),
                 (("--out", self.path("bad.csv")), "bad.csv")]:
             result = runs.call("stars", "import", self.path("bad.csv"), *words)
             self.assertEqual(result.returncode, 2, result.stderr)
