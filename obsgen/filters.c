@@ -4,6 +4,7 @@
 
 #include "boresight/vec.h"
 #include "obsgen/generator_internal.h"
+#include "obsgen/model/wing_alarms.h"
 #include "sim/core/threshold_statistics.h"
 #include "sim/optics/column_level.h"
 
@@ -182,7 +183,9 @@ static bst_threshold_noise noise_law(const bst_generator *g) {
     if (normal < 1.0) {
         counted = fmax(counted, fmin(g->background_e, variance));
     }
-    return (bst_threshold_noise){g->noise_e, counted, gain};
+    /* multiplied electrons are as skewed as Poisson charges of so many electrons each */
+    double charge = bst_wing_alarms_cube(g->excess) / g->excess;
+    return (bst_threshold_noise){g->noise_e / charge, counted / (charge * charge), gain / charge};
 }
 
 /* True if image processing subtracts a level per column in this frame. */
@@ -204,7 +207,7 @@ static double column_share(const bst_generator *g, double variance) {
 
 void bst_generator_set_filters(bst_generator *g) {
     /* peak of a Gaussian over its sqrt(sum p^2) */
-    g->fit_light = 1.0 / (sqrt(BST_PI) * g->cross_sigma * g->noise_e * g->noise_e);
+    g->fit_light = g->excess / (sqrt(BST_PI) * g->cross_sigma * g->noise_e * g->noise_e);
     set_threshold(g);
     const bst_obsgen_path_px paths[2] = {{0.0, 0.0}, g->star_path};
     const double lengths[2] = {0.0, g->streak};

@@ -184,8 +184,9 @@ static void set_noise(bst_generator *g, const bst_generator_frame *f) {
     double added = (double)g->binning * g->binning;
     double level = (f->truth->background_e + f->truth->dark_e) * added;
     double uneven_dark = f->truth->dark_e * d->dsnu_rms;
+    g->excess = bst_camera_excess_noise(c);
     double variance =
-        bst_camera_excess_noise(c) * level + c->read_noise_e * c->read_noise_e +
+        g->excess * level + c->read_noise_e * c->read_noise_e +
         c->gain_e_per_dn * c->gain_e_per_dn / 12.0 + d->row_noise_e * d->row_noise_e +
         d->row_offset_rms_e * d->row_offset_rms_e + d->flicker_noise_e * d->flicker_noise_e +
         0.5 * d->pick_up.amplitude_e * d->pick_up.amplitude_e + bst_generator_column_variance(g) +

@@ -77,7 +77,8 @@ struct bst_generator {
     bst_generator_filter filters[2]; /* for points, for star streaks */
     double shared_noise;             /* correlation of the two filters' noise */
     double white_share; /* share of the noise variance that is independent between pixels */
-    double fit_light;   /* brightest pixel over noise variance, per sqrt(sum p^2) and electron */
+    /* shot noise of the brightest pixel over noise variance, per sqrt(sum p^2) and electron */
+    double fit_light;
     bst_obsgen_path_px straight_path; /* nearest straight path to the true one */
     /* width of the images relative to the fitted ones, by deviations of the path */
     double widening;
@@ -104,6 +105,7 @@ struct bst_generator {
     bst_streak_centroid_error *centroid_error; /* for `streak`, once needed */
     bool smeared;
     double background_e, noise_e, threshold, streak_share;
+    double excess;       /* variance of shot noise per electron: bst_camera_excess_noise */
     double open_share;   /* open-sky share of a crowded frame; 1: not crowded */
     double dark_noise_e; /* noise without the sources' light */
     /* background_bias_e: excess of the estimated background */

@@ -79,14 +79,14 @@ static double mismatch_factor(const double image[2], const double model[2]) {
 /* Cramer-Rao bound of an image widened by the path's deviation from the fitted path. */
 static bst_crlb_table_at bound_of_image(const bst_generator *g, double flux_e, double length) {
     const bst_crlb_table *bound = g->image_bound ? g->image_bound : &g->bound;
-    return bst_crlb_table_wider(bound, flux_e, g->noise_e, length, g->widening);
+    return bst_crlb_table_wider(bound, flux_e, g->noise_e, length, g->widening, g->excess);
 }
 
 /* Cramer-Rao bound of the fitted image. */
 static bst_crlb_table_at bound_of_model(const bst_generator *g, double flux_e, double length) {
-    return g->onboard_bound
-               ? bst_crlb_table_of(g->onboard_bound, flux_e, g->noise_e, length)
-               : bst_crlb_table_wider(&g->bound, flux_e, g->noise_e, length, g->known_width);
+    const bst_crlb_table *bound = g->onboard_bound ? g->onboard_bound : &g->bound;
+    double wider = g->onboard_bound ? 1.0 : g->known_width;
+    return bst_crlb_table_wider(bound, flux_e, g->noise_e, length, wider, g->excess);
 }
 
 bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,

@@ -163,6 +163,7 @@ typedef struct significance_test {
     const float *column_noise; /* noise of each column, see bst_locate_frame */
     double threshold;
     double normal_variance; /* variance of a pixel without shot noise, e-^2 */
+    double charge_e;        /* see bst_imgproc_charge */
 } significance_test;
 
 /* True if a peak of the filter output is significant in noise of the given skewness. */
@@ -184,7 +185,10 @@ static bool is_significant(const void *user, const bst_candidate *c) {
         /* an ADC step wider than the read noise: the shot noise is then that of the level */
         counted = fmax(counted, fmin(level_e, variance));
     }
-    bst_threshold_noise noise = {noise_e, counted, g->ip->camera.gain_e_per_dn};
+    /* multiplied electrons are as skewed as Poisson charges of so many electrons each */
+    const double charge = g->charge_e;
+    bst_threshold_noise noise = {noise_e / charge, counted / (charge * charge),
+                                 g->ip->camera.gain_e_per_dn / charge};
     double point = bst_filter_peak(f, g->ip->electrons, noise_e, false, c->x, c->y);
     if (exceeds(point, g, &f->point_weights, &noise)) {
         return true;
@@ -316,6 +320,7 @@ static void set_frame_view(bst_imgproc *ip, const bst_imgproc_frame *frame,
                                   .background = &ip->background,
                                   .filter = &ip->filter,
                                   .column_noise = column_noise,
+                                  .excess = bst_camera_excess_noise(&ip->camera),
                                   .sigma_px = sigma,
                                   .motion = motion ? &ip->motion : NULL,
                                   .camera = &ip->camera,
@@ -401,8 +406,9 @@ static void find_candidates(bst_imgproc *ip, const bst_imgproc_frame *frame,
     }
     double look = interpolation_threshold(ip, threshold);
     const float *column_noise = columns ? columns->noise + first_column : NULL;
-    significance_test noise = {ip, column_noise, threshold, read_variance};
-    double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE;
+    double charge = bst_imgproc_charge(bst_camera_excess_noise(&ip->camera));
+    significance_test noise = {ip, column_noise, threshold, read_variance, charge};
+    double certain = ip->smeared ? threshold : threshold + CERTAIN_ABOVE * charge;
     const bst_candidates_criteria criteria = {(int)ceil(6.0 * sigma + hypot(dx, dy)) + 2,
                                               (float)look, (float)certain, is_significant, &noise};
     bst_candidates_find(&ip->candidates, pool, &ip->filter, &criteria);

@@ -2,6 +2,8 @@
 #ifndef BST_IMGPROC_DETECT_DETECT_INTERNAL_H
 #define BST_IMGPROC_DETECT_DETECT_INTERNAL_H
 
+#include <math.h>
+
 #include "imgproc/calibrate/calibrate_pixels.h"
 #include "imgproc/calibrate/pixel_learner.h"
 #include "imgproc/extended/silhouette.h"
@@ -61,5 +63,16 @@ void bst_imgproc_begin_shows(bst_imgproc *ip);
 /* Adds the bad-pixel evidence of a searched frame, or of a window of it. */
 void bst_imgproc_add_shows(bst_imgproc *ip, const bst_imgproc_frame *frame,
                            const bst_imgproc_frame *whole);
+
+/* Electrons of a Poisson charge that is as skewed as electrons after a multiplication register:
+ * third cumulant over the second of what one becomes, 1 + p (e - 1), p^2 = excess - 1, e
+ * exponential.
+ *
+ * Given:     excess     bst_camera_excess_noise, 1 or more
+ * Reference: Basden, Haniff & Mackay 2003, MNRAS 345, 985 (law of the register) */
+static inline double bst_imgproc_charge(double excess) {
+    double p = sqrt(excess - 1.0);
+    return (1.0 + p * p * (3.0 + 2.0 * p)) / excess;
+}
 
 #endif

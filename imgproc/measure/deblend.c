@@ -132,7 +132,7 @@ bool bst_deblend_fit(const bst_imgproc_worker *w, int i, bst_imgproc_found *foun
         copies[k] = *c.free[k];
         free_sources[k] = &copies[k];
     }
-    bst_fit_data data = {f->signal, f->width, f->height, found->noise_e};
+    bst_fit_data data = {f->signal, f->width, f->height, found->noise_e, f->excess};
     bst_fit_request request = {
         .data = &data,
         .stamp = stamp,

@@ -125,7 +125,7 @@ static double accumulate(bst_fit *fit, const bst_fit_request *r, equations *e) {
                .fixed = fit->fixed,
                .valid = fit->valid,
                .n = plane_of(stamp),
-               .noise2 = (float)(r->data->noise_e * r->data->noise_e)};
+               .noise2 = (float)(r->data->noise_e * r->data->noise_e / r->data->excess)};
     for (int s = 0; s < count; s++) {
         t.model[s] = render(fit, stamp, r->free[s], s);
         t.flux[s] = (float)r->free[s]->flux_e;
@@ -134,14 +134,16 @@ static double accumulate(bst_fit *fit, const bst_fit_request *r, equations *e) {
     float sums[(MAX_SUMS + 1) * BST_LANES];
     BST_SIMD_PICK(sum_terms)(&t, count, e->free_width, sums);
     const float *at = sums;
+    /* the kernels weight by 1 / (noise2 + m): excess times the weight */
+    const double scale = 1.0 / r->data->excess;
     for (int p = 0; p < e->parameters; p++) {
         for (int q = 0; q <= p; q++, at += BST_LANES) {
-            e->a[p][q] = bst_simd_layout_sum(at);
+            e->a[p][q] = scale * bst_simd_layout_sum(at);
         }
-        e->g[p] = bst_simd_layout_sum(at);
+        e->g[p] = scale * bst_simd_layout_sum(at);
         at += BST_LANES;
     }
-    return bst_simd_layout_sum(at);
+    return scale * bst_simd_layout_sum(at);
 }
 
 static double clamp(double v, double lo, double hi) {

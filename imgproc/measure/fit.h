@@ -26,6 +26,7 @@ typedef struct bst_fit_data {
     const float *signal; /* [height][width], electrons above background, see background.h */
     int width, height;
     double noise_e; /* of the background, at the source */
+    double excess;  /* variance of a source's shot noise per electron: bst_camera_excess_noise */
 } bst_fit_data;
 
 /* Work space of the fit; the planes are [height][width rounded up to lanes] of a stamp. */
@@ -67,8 +68,8 @@ typedef struct bst_fit_request {
     double limit_px; /* largest shift of a centre */
 } bst_fit_request;
 
-/* Gauss-Newton fit of sources that minimises sum (d - m)^2 / (noise^2 + m). The variance is from
- * the current model (quasi-likelihood, equal to maximum likelihood to first order).
+/* Gauss-Newton fit of sources that minimises sum (d - m)^2 / (noise^2 + excess m). The variance is
+ * from the current model (quasi-likelihood, equal to maximum likelihood to first order).
  *
  * Centres stay within limit_px of their start. Saturated and bad pixels are excluded. The first
  * source's covariance is the inverse Fisher matrix including its neighbours' uncertainty.

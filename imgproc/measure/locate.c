@@ -217,7 +217,7 @@ static void use_filter_peak(const bst_locate_frame *f, bst_imgproc_found *found)
     found->source.cov_xx = found->source.cov_yy = 1.0;
     found->source.cov_xy = 0.0;
     double sigma = found->noise_e / bst_locate_norm(f, found->streak);
-    found->source.flux_variance = sigma * sigma + found->source.flux_e;
+    found->source.flux_variance = sigma * sigma + f->excess * found->source.flux_e;
 }
 
 /* Half width and height of a source's light, px. */

@@ -84,7 +84,8 @@ typedef struct bst_locate_frame {
     /* least signal of a saturated pixel; 0 if a saturated pixel may hold charge that bloomed from
      * its neighbours */
     double full_e;
-    double sigma_px;                 /* of the PSF, in this frame's pixels */
+    double excess;   /* variance of shot noise per electron: bst_camera_excess_noise */
+    double sigma_px; /* of the PSF, in this frame's pixels */
     const bst_camera_motion *motion; /* NULL: stars are points */
     const bst_camera *camera;
     double origin_x_px, origin_y_px, binning; /* full-sensor = origin + binning * frame pixel */

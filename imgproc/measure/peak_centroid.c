@@ -87,11 +87,11 @@ void bst_peak_centroid_place(const bst_imgproc_worker *w, int i, bst_imgproc_fou
     bst_imgproc_source *s = &found->source;
     const bst_imgproc_peak_law *law = &w->l->law[found->streak ? 1 : 0];
     double noise2 = found->noise_e * found->noise_e, flux = fmax(s->flux_e, 1e-3 * found->noise_e);
-    double scale = noise2 / (flux * flux) + law->photons / flux;
+    double excess = w->f->excess, scale = noise2 / (flux * flux) + excess * law->photons / flux;
     s->cov_xx = scale * law->xx + law->floor_px2;
     s->cov_xy = scale * law->xy;
     s->cov_yy = scale * law->yy + law->floor_px2;
-    s->flux_variance = (noise2 + law->flux_photons * flux) / law->norm2;
+    s->flux_variance = (noise2 + excess * law->flux_photons * flux) / law->norm2;
     s->fitted = true;
     found->rough = true;
     check_neighbours(w, i, found);

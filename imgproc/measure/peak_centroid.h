@@ -6,8 +6,9 @@
 
 /* Error law of filter-peak centroids for a source shape.
  *
- * A source of flux F in noise s has position covariance (s^2 / F^2 + photons / F) (xx, xy, yy) +
- * floor_px2 and flux variance (s^2 + flux_photons F) / norm2.
+ * A source of flux F in noise s, with shot noise of variance `excess` per electron, has position
+ * covariance (s^2 / F^2 + excess photons / F) (xx, xy, yy) + floor_px2 and flux variance (s^2 +
+ * excess flux_photons F) / norm2.
  *
  * Notes:     p is the PSF's share in a pixel, S = sum grad p grad p^T. To first order the peak of
  *            the output sum p d, for pixels d of variance s^2 + F p, has the covariance S^-1 sum

@@ -41,7 +41,7 @@ bool bst_source_moments_measure(const bst_imgproc_worker *w, int i, bst_imgproc_
         for (int k = 0; k < c.fixed_count; k++) {
             others[count++] = c.fixed[k];
         }
-        bst_fit_data data = {f->signal, f->width, f->height, found->noise_e};
+        bst_fit_data data = {f->signal, f->width, f->height, found->noise_e, f->excess};
         double d[3];
         if (bst_fit_moments(w->fit, &data, &stamp, &found->source, others, count, d)) {
             /* subtract the pixel's own variance */

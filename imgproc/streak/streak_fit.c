@@ -69,7 +69,7 @@ static double evaluate_streak(bst_streak_fit *fit, const bst_fit_data *data,
             if (!excluded[k] && row[i] > BST_PIXEL_NONE) {
                 double total = s->flux_e * (share[k] + s->widening_px2 * by_v[k]);
                 double r = (double)row[i] - total;
-                chi += r * r / (noise2 + fmax(total, 0.0));
+                chi += r * r / (noise2 + data->excess * fmax(total, 0.0));
             }
         }
     }
@@ -102,7 +102,7 @@ static void accumulate_streak(bst_streak_fit *fit, const bst_fit_data *data,
             }
             double model = share[k] + s->widening_px2 * by_v[k];
             double total = s->flux_e * model;
-            double weight = 1.0 / (noise2 + fmax(total, 0.0));
+            double weight = 1.0 / (noise2 + data->excess * fmax(total, 0.0));
             double r = (double)row[i] - total;
             double d[PARAMETERS] = {s->flux_e * by_x[k], s->flux_e * by_y[k],
                                     s->flux_e * (along_x[k] - share[k]) / PATH_STEP_PX,

@@ -173,7 +173,7 @@ static void measure_streak(bst_streak_locator *l, const bst_locate_frame *f,
     s->flux_e = line->snr * out->noise_e / norm;
     double reach = fmax(3.0, ceil(3.6 * f->sigma_px)) + 0.1 * length + beyond_px;
     *stamp = bst_fit_stamp(s, reach, l->fit.max_side, f->width, f->height);
-    bst_fit_data data = {f->signal, f->width, f->height, out->noise_e};
+    bst_fit_data data = {f->signal, f->width, f->height, out->noise_e, f->excess};
     mask_other_sources(l, f, found, count, stamp);
     result->fitted = bst_streak_fit_run(&l->fit, &data, stamp, l->excluded, s, &norm);
     if (!result->fitted) {

@@ -222,8 +222,9 @@ static void draw_streak_position(const bst_generator *g, const generator_source 
     const bst_obsgen_calibration *cal = &g->calibration;
     /* of the image that the true path widens; output and noise fall off between its width and that
      * of the filters */
-    bst_crlb_table_at bound = bst_crlb_table_wider(g->image_bound ? g->image_bound : &g->bound,
-                                                   s->flux_e, g->noise_e, s->length, g->widening);
+    bst_crlb_table_at bound =
+        bst_crlb_table_wider(g->image_bound ? g->image_bound : &g->bound, s->flux_e, g->noise_e,
+                             s->length, g->widening, g->excess);
     const double sigma = g->cross_sigma;
     /* below UNLIFTED_SNR the factors already include the selection by noise, which is simulated
      * here */

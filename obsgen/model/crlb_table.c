@@ -190,11 +190,15 @@ bst_crlb_table_at bst_crlb_table_of(const bst_crlb_table *b, double flux_e, doub
 }
 
 bst_crlb_table_at bst_crlb_table_wider(const bst_crlb_table *bound, double flux_e, double noise_e,
-                                       double length_px, double wider) {
-    /* equivalent to larger pixels with the noise of as many more of them */
-    bst_crlb_table_at b = bst_crlb_table_of(bound, flux_e, noise_e * wider, length_px / wider);
-    b.var_along_px2 *= wider * wider;
-    b.var_across_px2 *= wider * wider;
+                                       double length_px, double wider, double excess) {
+    assert(wider > 0.0 && excess >= 1.0);
+    /* equivalent to larger pixels with the noise of as many more of them; the variance of a pixel,
+     * v + excess F p, is excess times that of plain shot noise over v / excess */
+    bst_crlb_table_at b =
+        bst_crlb_table_of(bound, flux_e, noise_e * wider / sqrt(excess), length_px / wider);
+    b.var_along_px2 *= wider * wider * excess;
+    b.var_across_px2 *= wider * wider * excess;
+    b.flux_variance *= excess;
     b.norm /= wider;
     return b;
 }

@@ -32,9 +32,12 @@ typedef struct bst_crlb_table_at {
 /* Lower bound at flux_e > 0 in noise_e > 0 (sqrt v) for a streak of length_px. */
 bst_crlb_table_at bst_crlb_table_of(const bst_crlb_table *bound, double flux_e, double noise_e,
                                     double length_px);
-/* Lower bound for a Gaussian `wider` times as wide as the table's, pixel width included. */
+/* Lower bound for a Gaussian `wider` times as wide as the table's, pixel width included.
+ *
+ * Given:     excess  variance of the source's shot noise per electron: 1, up to 2 with a
+ *                    multiplication register (bst_camera_excess_noise) */
 bst_crlb_table_at bst_crlb_table_wider(const bst_crlb_table *bound, double flux_e, double noise_e,
-                                       double length_px, double wider);
+                                       double length_px, double wider, double excess);
 
 /* bst_crlb_table_of, member `norm` only.
  *

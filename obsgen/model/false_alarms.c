@@ -28,7 +28,8 @@ bst_detection bst_false_alarms_point(const bst_generator *g, double x, double y,
     bst_detection d = {0};
     double norm = bst_crlb_table_norm(&g->bound, length), b = g->binning;
     d.flux_e = snr * g->noise_e / norm;
-    bst_crlb_table_at bound = bst_crlb_table_of(&g->bound, d.flux_e, g->noise_e, length);
+    bst_crlb_table_at bound =
+        bst_crlb_table_wider(&g->bound, d.flux_e, g->noise_e, length, 1.0, g->excess);
     double c = length > 0.0 ? g->star_path.dx / g->streak : 1.0;
     double s = length > 0.0 ? g->star_path.dy / g->streak : 0.0;
     double a2 = bound.var_along_px2 * b * b, b2 = bound.var_across_px2 * b * b;

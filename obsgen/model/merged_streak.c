@@ -70,7 +70,7 @@ static double fit_as_point(const bst_generator *g, const generator_source *s,
             points[i].flux /= s->flux_e;
         }
         double peak_e = s->flux_e / (2.0 * BST_PI * model),
-               light = peak_e / (g->noise_e * g->noise_e);
+               light = g->excess * peak_e / (g->noise_e * g->noise_e);
         double saturated = s->saturated ? fmax(bst_generator_saturation_e(g), 1.0) / peak_e : 0.0;
         bst_path_point_fit fit =
             bst_path_fit_points(points, used, sqrt(image), g->filter_sigma, light, saturated);
@@ -103,7 +103,7 @@ static double moment_noise(const bst_generator *g, double flux_e, double window,
     double sum = flux_e * sqrt(window / (window + moment) * window / (window + across));
     double light = flux_e * sqrt(half / (half + moment) * half / (half + across));
     double variance = g->noise_e * g->noise_e * BST_PI * window * spread_of_square(half, windowed) +
-                      light * spread_of_square(inside, windowed);
+                      g->excess * light * spread_of_square(inside, windowed);
     double gain = moment / windowed;
     return gain * gain * sqrt(variance) / sum;
 }
@@ -166,7 +166,7 @@ static double fit_psf(const bst_generator *g, const generator_source *s,
         .reach_px = reach,
         .sigma_px = g->fitted_sigma,
         .limit_px = LIMIT_PX + g->fitted_sigma,
-        .noise_e = g->noise_e,
+        .noise_e = g->noise_e / sqrt(g->excess),
         .saturated_e = s->saturated ? fmax(bst_generator_saturation_e(g), 1.0) : 0.0};
     bst_path_point_fit fit = bst_psf_fit_points(&g->response, points, used, start, &frame);
     at->x = s->x + fit.x_px;

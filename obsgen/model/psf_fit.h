@@ -9,10 +9,10 @@
 
 /* Pixels and noise of a fit. */
 typedef struct bst_psf_fit_frame {
-    double reach_px;    /* half side of the fitted stamp */
-    double sigma_px;    /* Gaussian nearest to the fitted PSF, without the pixel */
-    double limit_px;    /* largest move along an axis */
-    double noise_e;     /* of a pixel without the sources' light */
+    double reach_px; /* half side of the fitted stamp */
+    double sigma_px; /* Gaussian nearest to the fitted PSF, without the pixel */
+    double limit_px; /* largest move along an axis */
+    double noise_e;  /* of a pixel without the sources' light, over the root of the excess noise */
     double saturated_e; /* light of a pixel from which on it is left out; 0: none is */
 } bst_psf_fit_frame;
 

@@ -290,7 +290,7 @@ static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, const outputs *ta
         bst_local_sky_add_wings(&g->wing_sky, s->x, s->y, reach, wing_light, &w);
     }
     if (*any) {
-        bst_local_sky_settle_wings(&g->wing_sky, 1.0 / g->noise_e);
+        bst_local_sky_settle_wings(&g->wing_sky, g->excess / g->noise_e);
     }
     return BST_OK;
 }
@@ -302,15 +302,15 @@ static double counted_share(const bst_generator *g) {
     return fmax(1.0 - normal / (g->noise_e * g->noise_e), 0.0);
 }
 
-/* Noise with the second and third moments of counted and normal electrons, in noises of a dark
- * pixel (Cornish-Fisher): alarms are rare, and the threshold allows for the skewness.
- *
- * Given:     light    in the same unit
- *            counted  see counted_share
- *            z        standard normal */
-static double skewed_noise(const bst_generator *g, double light, double counted, double z) {
-    double variance = 1.0 + light / g->noise_e;
-    double third = (counted + light / g->noise_e) / g->noise_e;
+double bst_wing_alarms_cube(double excess) {
+    double part = sqrt(excess - 1.0);
+    return 1.0 + part * part * (3.0 + 2.0 * part);
+}
+
+double bst_wing_alarms_noise(const bst_wing_noise *noise, double light, double z) {
+    double shot = light / noise->noise_e, cube = bst_wing_alarms_cube(noise->excess);
+    double variance = 1.0 + noise->excess * shot;
+    double third = (cube / noise->excess * noise->counted + cube * shot) / noise->noise_e;
     return sqrt(variance) * z + third / (6.0 * variance) * (z * z - 1.0);
 }
 
@@ -320,7 +320,7 @@ static void draw_pixels(const winged *w, patch *p) {
     const bst_generator *g = w->g;
     int before = w->outputs->radius + w->outputs->shift, side = SIDE + 2 * before;
     uint64_t first = WING_ALARM | w->s->name << PIXEL_BITS;
-    double counted = counted_share(g);
+    const bst_wing_noise noise = {g->noise_e, counted_share(g), g->excess};
     for (int j = 0; j < side; j++) {
         for (int i = 0; i < side; i++) {
             double x = p->x0 + i - before, y = p->y0 + j - before, light = 0.0;
@@ -331,7 +331,7 @@ static void draw_pixels(const winged *w, patch *p) {
             double z =
                 bst_rng_normal(g->key, (uint64_t)g->exposure_id, first + (uint64_t)(j * WIDE + i));
             p->light[j][i] = (float)light;
-            p->pixels[j][i] = (float)(light + skewed_noise(g, light, counted, z));
+            p->pixels[j][i] = (float)(light + bst_wing_alarms_noise(&noise, light, z));
         }
     }
 }

@@ -54,7 +54,7 @@ static bool leads(const bst_generator *g, const generator_source *s, double lead
 double bst_generator_streak_light(const bst_generator *g, double flux_e) {
     /* the brightest pixel of a long line is sqrt(2) sum p^2 of its light */
     double norm = bst_crlb_table_norm(&g->bound, g->streak);
-    return sqrt(2.0) * flux_e * norm * norm / (g->noise_e * g->noise_e);
+    return sqrt(2.0) * g->excess * flux_e * norm * norm / (g->noise_e * g->noise_e);
 }
 
 /* Lead of a point's fit for a star on an uneven path. */

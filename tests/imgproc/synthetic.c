@@ -117,12 +117,34 @@ static double poisson(double mean, double normal) {
     return k;
 }
 
+/* Electrons after a multiplication register, over its gain: 1 + sqrt(1 - 1 / gain) (e - 1) of each,
+ * e exponential (Basden, Haniff & Mackay 2003, MNRAS 345, 985); the sum of more than a few by the
+ * cube root (Wilson & Hilferty 1931, PNAS 17, 684). */
+static double multiplied(double electrons, double gain, bst_rng_key key, uint64_t frame,
+                         uint64_t pixel) {
+    enum { FEW = 8 };
+    const uint64_t first = (uint64_t)1 << 40 | pixel * FEW;
+    double sum = 0.0;
+    if (electrons > FEW) {
+        double z = bst_rng_normal(key, frame, first), third = 1.0 / (9.0 * electrons);
+        sum = electrons * pow(1.0 - third + z * sqrt(third), 3.0);
+    } else {
+        for (int i = 0; i < (int)electrons; i++) {
+            sum -= log(bst_rng_uniform(key, frame, first + (uint64_t)i));
+        }
+    }
+    return electrons + sqrt(1.0 - 1.0 / gain) * (sum - electrons);
+}
+
 void synthetic_expose(synthetic *s, bst_rng_key key, uint64_t frame) {
     double top = ldexp(1.0, (int)s->camera.bits) - 1.0;
     for (int i = 0; i < s->width * s->height; i++) {
         double z[2];
         bst_rng_normal2(key, frame, (uint64_t)i, z);
         double e = poisson(s->mean_e[i], z[1]);
+        if (s->camera.detector.em_gain > 1.0) {
+            e = multiplied(e, s->camera.detector.em_gain, key, frame, (uint64_t)i);
+        }
         e = fmin(e, s->camera.full_well_e) + s->read_e * z[0];
         double dn = floor(s->camera.offset_dn + e / s->camera.gain_e_per_dn + 0.5);
         s->pixels[i] = (uint16_t)fmin(fmax(dn, 0.0), top);
@@ -141,8 +163,9 @@ double synthetic_norm(const synthetic *s, double x, double y, double dx, double 
 }
 
 double synthetic_noise(const synthetic *s) {
-    double gain = s->camera.gain_e_per_dn;
-    return sqrt(s->sky_e + s->read_e * s->read_e + gain * gain / 12.0);
+    double gain = s->camera.gain_e_per_dn, em_gain = s->camera.detector.em_gain;
+    double excess = em_gain > 1.0 ? 2.0 - 1.0 / em_gain : 1.0;
+    return sqrt(excess * s->sky_e + s->read_e * s->read_e + gain * gain / 12.0);
 }
 
 void synthetic_bound(const synthetic *s, double x, double y, double flux_e, double dx, double dy,

@@ -23,12 +23,13 @@ void synthetic_clear(synthetic *s);
 /* Adds a source: a Gaussian drawn uniformly along (dx, dy) about (x, y), integrated over pixels, by
  * 400 midpoints (one for a point). */
 void synthetic_add(synthetic *s, double x, double y, double flux_e, double dx, double dy);
-/* Poisson, read noise, gain, offset, quantisation and clipping. */
+/* Poisson, multiplication (detector.em_gain), read noise, gain, offset, quantisation and clipping.
+ */
 void synthetic_expose(synthetic *s, bst_rng_key key, uint64_t frame);
 
 /* Matched-filter norm sqrt(sum p^2) of the source's image at unit flux. */
 double synthetic_norm(const synthetic *s, double x, double y, double dx, double dy);
-/* Noise of a background pixel, electrons: sky, read noise and quantisation. */
+/* Noise of a background pixel, electrons: sky, multiplication, read noise and quantisation. */
 double synthetic_noise(const synthetic *s);
 /* Cramer-Rao bound of x and y (covariance xx, xy, yy) with unknown flux, the source's own shot
  * noise included, by numerical derivatives of the image. */

@@ -105,6 +105,26 @@ static void wrong_skies_are_not_solved(void **state) {
     }
 }
 
+/* Places with errors along a streak leave room for codes that agree by chance: of such patterns,
+ * those whose four stars do not fit one attitude and scale are no candidates. */
+static void patterns_must_fit_their_four_stars(void **state) {
+    scene *s = *state;
+    int patterns = 0, candidates = 0;
+    for (uint64_t i = 0; i < 4; i++) {
+        bst_random_sky_options o = usual();
+        o.streak_px = 800.0;
+        o.scrambled = true;
+        bst_random_sky_draw(&o, s->sky, s->onboard, 28, i, &s->drawn);
+        solve(s, s->drawn.count);
+        assert_false(s->result.solved);
+        patterns += s->result.patterns;
+        candidates += s->result.candidates;
+    }
+    print_message("%d patterns agree, %d fit\n", patterns, candidates);
+    assert_true(patterns > 1000);
+    assert_true(candidates < 0.1 * patterns);
+}
+
 /* Places with long, slanting errors in a window off the corner: the stars that are predicted are
  * those of the window, and those that match are those within three sigma by their covariance. */
 static void streaks_in_a_window(void **state) {
@@ -390,6 +410,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(random_fields_are_solved),
         cmocka_unit_test(wrong_skies_are_not_solved),
+        cmocka_unit_test(patterns_must_fit_their_four_stars),
         cmocka_unit_test(streaks_in_a_window),
         cmocka_unit_test(poles),
         cmocka_unit_test(stars_of_one_brightness),

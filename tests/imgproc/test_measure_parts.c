@@ -67,7 +67,7 @@ static void open_bench(bench *b) {
         .threads = 1, .capacity = MOST, .max_width = WIDTH, .max_height = HEIGHT, .max_side = 64};
     memset(b, 0, sizeof *b);
     bst_assert_ok(&ctx, bst_imgproc_locator_create(&ctx, NULL, &limits, &b->l));
-    b->f = (bst_locate_frame){.width = WIDTH, .height = HEIGHT, .sigma_px = 0.9};
+    b->f = (bst_locate_frame){.width = WIDTH, .height = HEIGHT, .excess = 1.0, .sigma_px = 0.9};
 }
 
 /* Sources with stamps that share pixels: free if centred on the stamp, else fixed, brightest first.
@@ -298,7 +298,8 @@ static void light_about_charge(void **state) {
     enum { W = 20, H = 16 };
     float signal[W * H];
     const double sigma = 0.9, cx = 9.3, cy = 7.8;
-    const bst_locate_frame f = {.signal = signal, .width = W, .height = H, .sigma_px = sigma};
+    const bst_locate_frame f = {
+        .signal = signal, .width = W, .height = H, .excess = 1.0, .sigma_px = sigma};
     bst_imgproc_found found = {
         .noise_e = 4, .peak_x = 9, .peak_y = 8, .charge = {.x_px = cx, .y_px = cy}};
     uint64_t seed = 4;
@@ -411,7 +412,7 @@ static void moments_of_a_gaussian(void **state) {
             .shape = {.x_px = x0, .y_px = y0, .dx_px = 4.0, .dy_px = 1.5, .sigma_px = 0.9},
             .flux_e = 9000.0};
         bst_imgproc_stamp stamp = {.x0 = 46, .y0 = 27, .width = 31, .height = 28};
-        bst_fit_data data = {image, WIDTH, HEIGHT, 5.0};
+        bst_fit_data data = {image, WIDTH, HEIGHT, 5.0, 1.0};
         double m[3];
         assert_true(bst_fit_moments(&b.l.fits[0], &data, &stamp, &source, NULL, 0, m));
         for (int i = 0; i < 3; i++) {
@@ -470,7 +471,7 @@ static void moments_under_the_window(void **state) {
                                                      .sigma_px = 0.9},
                                            .widening_px2 = cases[k].widening,
                                            .flux_e = 9000.0};
-        bst_fit_data data = {image, WIDTH, HEIGHT, 5.0};
+        bst_fit_data data = {image, WIDTH, HEIGHT, 5.0, 1.0};
         assert_true(bst_fit_moments(&b.l.fits[0], &data, &stamp, &source, NULL, 0, out));
         for (int i = 0; i < 3; i++) {
             bst_assert_close(out[i], asked[i], 5e-3);

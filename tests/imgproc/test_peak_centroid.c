@@ -20,11 +20,14 @@ typedef struct scene {
     double x[PER_FRAME], y[PER_FRAME];
 } scene;
 
+static double em_gain; /* of the sensor; 0: no multiplication */
+
 static void open(scene *c, double dx, double dy, double snr, int max_fits, int threads) {
     *c = (scene){.key = bst_rng_make_key(21, 0, "test", "tops"), .dx = dx, .dy = dy};
     synthetic_init(&c->s, SIDE * SPACING + 28, SIDE * SPACING + 28);
     c->s.config.max_fits = max_fits;
     c->s.config.threads = threads;
+    c->s.camera.detector.em_gain = em_gain;
     c->ip = synthetic_processor(&c->ctx, &c->s);
     c->d = synthetic_detections(2048);
     c->motion = synthetic_motion(&c->s, dx, dy);
@@ -93,6 +96,16 @@ static void tops_are_as_good_as_they_say(void **state) {
         assert_true(ratio < 1.1 + 0.08);
         close(&c);
     }
+    /* with plain shot noise chi2 is 2.72 */
+    scene c;
+    double chi2, ratio;
+    em_gain = 200.0;
+    open(&c, 0, 0, 100, 1, 1);
+    measure(&c, false, &chi2, &ratio);
+    print_message("         multiplied: chi2 %.2f\n", chi2);
+    bst_assert_close(chi2, 2.0, 0.35 + 0.33);
+    close(&c);
+    em_gain = 0.0;
 }
 
 /* A refined one is what it would have been with all fitted, but for what neighbours that are not

@@ -104,7 +104,7 @@ static void parameters_and_covariance_of_exact_light(void **state) {
     fixture *f = *state;
     const double noise_e = 12.0;
     const bst_imgproc_stamp stamp = {0, 0, WIDTH, HEIGHT};
-    const bst_fit_data data = {f->signal, WIDTH, HEIGHT, noise_e};
+    const bst_fit_data data = {f->signal, WIDTH, HEIGHT, noise_e, 1.0};
     for (size_t n = 0; n < 2 * sizeof cases / sizeof *cases; n++) {
         const double *p = cases[n / 2];
         light_of(p, f->light);
@@ -140,20 +140,19 @@ static void parameters_and_covariance_of_exact_light(void **state) {
 }
 
 /* Drawn noise: errors of place and flux are as stated in the mean of many, and chi-square is as
- * many as there are pixels. */
-static void errors_are_as_stated(void **state) {
-    fixture *f = *state;
+ * many as there are pixels; `excess` is the variance of shot noise per electron. */
+static void expect_errors_as_stated(fixture *f, double excess) {
     enum { RUNS = 150 };
     const double noise_e = 12.0, *p = cases[0];
     const bst_imgproc_stamp stamp = {0, 0, WIDTH, HEIGHT};
-    const bst_fit_data data = {f->signal, WIDTH, HEIGHT, noise_e};
+    const bst_fit_data data = {f->signal, WIDTH, HEIGHT, noise_e, excess};
     const bst_rng_key key = bst_rng_make_key(9, 0, "test", "streak_fit");
     double place = 0.0, flux = 0.0, chi = 0.0;
     light_of(p, f->light);
     memset(f->left_out, 0, sizeof f->left_out);
     for (uint64_t run = 0; run < RUNS; run++) {
         for (int i = 0; i < PIXELS; i++) {
-            double sigma = sqrt(noise_e * noise_e + f->light[i]);
+            double sigma = sqrt(noise_e * noise_e + excess * f->light[i]);
             f->signal[i] = (float)(f->light[i] + sigma * bst_rng_normal(key, run, (uint64_t)i));
         }
         bst_imgproc_source s = near_source(p);
@@ -171,12 +170,17 @@ static void errors_are_as_stated(void **state) {
     bst_assert_close(chi / (PIXELS - 5), 1.0, 4.0 * sqrt(2.0 / RUNS / PIXELS));
 }
 
+static void errors_are_as_stated(void **state) {
+    expect_errors_as_stated(*state, 1.0);
+    expect_errors_as_stated(*state, 1.98); /* a register of gain 50 */
+}
+
 /* A point does not determine a path's direction. */
 static void a_point_is_no_streak(void **state) {
     fixture *f = *state;
     const double point[PARAMETERS] = {30.3, 24.8, 0.0, 0.0, 6000.0};
     const bst_imgproc_stamp stamp = {0, 0, WIDTH, HEIGHT};
-    const bst_fit_data data = {f->signal, WIDTH, HEIGHT, 12.0};
+    const bst_fit_data data = {f->signal, WIDTH, HEIGHT, 12.0, 1.0};
     light_of(point, f->light);
     memset(f->left_out, 0, sizeof f->left_out);
     for (int i = 0; i < PIXELS; i++) {

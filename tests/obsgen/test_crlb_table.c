@@ -26,7 +26,7 @@ static void closed_forms_of_a_point(void **state) {
 }
 
 /* Fisher information of a streak along x by a plain sum, mean over places in the pixel. */
-static void sums(double sigma, double length, double flux, double v, double out[3]) {
+static void sums(double sigma, double length, double flux, double v, double excess, double out[3]) {
     enum { PARTS = 150, PHASES = 3 };
     out[0] = out[1] = out[2] = 0.0;
     double s = sigma * sqrt(2.0), h = 1e-4;
@@ -51,7 +51,7 @@ static void sums(double sigma, double length, double flux, double v, double out[
                         }
                     }
                 }
-                double w = 1.0 / (v + flux * p[0]);
+                double w = 1.0 / (v + excess * flux * p[0]);
                 double dx = flux * (p[1] - p[2]) / (2 * h), dy = flux * (p[3] - p[4]) / (2 * h);
                 out[0] += w * dx * dx / (PHASES * PHASES);
                 out[1] += w * dy * dy / (PHASES * PHASES);
@@ -70,7 +70,7 @@ static void streaks_are_those_of_a_sum(void **state) {
     for (int l = 0; l < 3; l++) {
         for (int f = 0; f < 2; f++) {
             double info[3];
-            sums(sigma, lengths[l], fluxes[f], noise * noise, info);
+            sums(sigma, lengths[l], fluxes[f], noise * noise, 1.0, info);
             bst_crlb_table_at at = bst_crlb_table_of(&b, fluxes[f], noise, lengths[l]);
             /* straight lines between lengths a factor of two apart: 5 % of a variance, 2.5 % of an
              * error */
@@ -79,6 +79,32 @@ static void streaks_are_those_of_a_sum(void **state) {
             bst_assert_close(at.flux_variance * info[2], 1.0, 0.05);
         }
     }
+}
+
+/* Shot noise of a multiplied source: the excess counts where light decides, and nowhere else. */
+static void multiplied_light_has_its_own_bound(void **state) {
+    (void)state;
+    bst_crlb_table b;
+    const double sigma = 0.85, noise = 8.0, excess = 1.98;
+    bst_crlb_table_init(&b, sigma);
+    const double fluxes[] = {150.0, 20000.0};
+    for (int f = 0; f < 2; f++) {
+        double info[3];
+        sums(sigma, 3.0, fluxes[f], noise * noise, excess, info);
+        bst_crlb_table_at at = bst_crlb_table_wider(&b, fluxes[f], noise, 3.0, 1.0, excess);
+        /* tolerances as above */
+        bst_assert_close(at.var_along_px2 * info[0], 1.0, 0.06);
+        bst_assert_close(at.var_across_px2 * info[1], 1.0, 0.05);
+        bst_assert_close(at.flux_variance * info[2], 1.0, 0.05);
+    }
+    const double bright = 1e9, s2 = sigma * sigma + 1.0 / 12.0;
+    bst_crlb_table_at at = bst_crlb_table_wider(&b, bright, noise, 0.0, 1.0, excess);
+    bst_crlb_table_at plain = bst_crlb_table_of(&b, bright, noise, 0.0);
+    bst_assert_close(at.flux_variance, excess * bright, 0.02 * excess * bright);
+    bst_assert_close(at.var_along_px2 / plain.var_along_px2, excess, 1e-6 * excess);
+    /* the pixel is as wide as the image */
+    bst_assert_close(at.var_along_px2, excess * s2 / bright, 0.1 * excess * s2 / bright);
+    bst_assert_close(at.norm, plain.norm, 0.0);
 }
 
 /* A wider image has the bound of that width, and is not the narrow one with a factor: by shot noise
@@ -92,7 +118,8 @@ static void a_wider_image_has_its_own_bound(void **state) {
     const double lengths[] = {0.0, 4.0}, fluxes[] = {150.0, 3000.0, 1e6};
     for (int l = 0; l < 2; l++) {
         for (int f = 0; f < 3; f++) {
-            bst_crlb_table_at a = bst_crlb_table_wider(&narrow, fluxes[f], 8.0, lengths[l], wider);
+            bst_crlb_table_at a =
+                bst_crlb_table_wider(&narrow, fluxes[f], 8.0, lengths[l], wider, 1.0);
             bst_crlb_table_at b = bst_crlb_table_of(&wide, fluxes[f], 8.0, lengths[l]);
             /* pixels are as wide as the narrow image and lengths stand a factor of two apart */
             bst_assert_close(a.var_along_px2 / b.var_along_px2, 1.0, 0.06);
@@ -124,6 +151,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(closed_forms_of_a_point),
         cmocka_unit_test(streaks_are_those_of_a_sum),
+        cmocka_unit_test(multiplied_light_has_its_own_bound),
         cmocka_unit_test(a_wider_image_has_its_own_bound),
         cmocka_unit_test(long_streaks_and_wide_psfs_stay_finite),
     };

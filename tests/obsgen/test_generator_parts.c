@@ -20,6 +20,7 @@ static bst_generator *make(double sigma) {
                          .exposure_s = 0.8,
                          .electrons_per_s_v0 = 1e9,
                          .noise_e = 5.0,
+                         .excess = 1.0,
                          .sigma = sigma,
                          .total_sigma = sqrt(sigma * sigma + 1.0 / 12.0),
                          .fitted_sigma = sigma};

@@ -15,15 +15,17 @@ enum { IMAGE_SIDE = 2 * REACH + 1 };
 /* Camera and stars of a case. */
 typedef struct kind {
     double jitter_px, flux_e, sky_e, read_e, gain_e_per_dn, q, diffusion_px, obscuration;
-    int streak_px; /* along x */
+    int streak_px;  /* along x */
+    double em_gain; /* 0: no multiplication */
 } kind;
 
 /* Faint wings on a noisy sky; a core so wide and a noise so low that alarms crowd on the rings just
  * outside of the search box, where a kernel of image processing has light of the core on its rim;
- * streaks, whose rings are smeared. */
-static const kind kinds[] = {{0.95, 2.4e5, 50.0, 8.0, 2.0, 1.39, 0.0, 0.0, 0},
-                             {0.0, 26870.0, 3.36, 2.7, 0.87, 2.22, 0.2, 0.18, 0},
-                             {0.0, 1.0e5, 5.0, 3.7, 0.62, 1.52, 0.12, 0.067, 6}};
+ * streaks, whose rings are smeared; rings of multiplied electrons. */
+static const kind kinds[] = {{0.95, 2.4e5, 50.0, 8.0, 2.0, 1.39, 0.0, 0.0, 0, 0.0},
+                             {0.0, 26870.0, 3.36, 2.7, 0.87, 2.22, 0.2, 0.18, 0, 0.0},
+                             {0.0, 1.0e5, 5.0, 3.7, 0.62, 1.52, 0.12, 0.067, 6, 0.0},
+                             {0.0, 8.0e4, 50.0, 2.7, 0.87, 2.22, 0.2, 0.18, 0, 100.0}};
 
 typedef struct setup {
     kind kind;
@@ -110,6 +112,7 @@ static void open_setup(setup *s, const kind *k) {
     s->pixels.read_e = s->pixels.camera.read_noise_e = k->read_e;
     s->pixels.camera.gain_e_per_dn = k->gain_e_per_dn;
     s->pixels.camera.obscuration = k->obscuration;
+    s->pixels.camera.detector.em_gain = k->em_gain;
     s->pixels.config.false_alarms_per_frame = 1.0;
     s->pixels.config.jitter_px = s->kind.jitter_px;
     s->pixels.camera.optics = (bst_optics_config){.psf = BST_PSF_DIFFRACTION,
@@ -156,11 +159,11 @@ static void count(const setup *s, double about[2]) {
 }
 
 /* Counts the alarms of images and generator, about stars and elsewhere. */
-static void compare(const kind *k, double image[2], double generated[2]) {
+static void compare(const kind *k, int frames, double image[2], double generated[2]) {
     setup s;
     open_setup(&s, k);
     const bst_rng_key key = bst_rng_make_key(4, 0, "test", "wing pixels");
-    for (int f = 0; f < FRAMES; f++) {
+    for (int f = 0; f < frames; f++) {
         synthetic_expose(&s.pixels, key, (uint64_t)f);
         bst_imgproc_frame pixels = synthetic_frame(&s.pixels);
         bst_camera_motion motion = synthetic_motion(&s.pixels, k->streak_px, 0.0);
@@ -186,7 +189,7 @@ static void compare(const kind *k, double image[2], double generated[2]) {
 static void wings_make_as_many_alarms_as_in_images(void **state) {
     (void)state;
     double image[2] = {0.0, 0.0}, generated[2] = {0.0, 0.0};
-    compare(&kinds[0], image, generated);
+    compare(&kinds[0], FRAMES, image, generated);
     /* 100 frames: 186 and 168 about stars, 68 and 68 elsewhere; three deviations of two counts */
     bst_assert_close(generated[0], image[0], 3.0 * sqrt(2.0 * 217.0 / 120.0 * FRAMES));
     bst_assert_close(generated[1], image[1], 3.0 * sqrt(2.0 * 82.0 / 120.0 * FRAMES));
@@ -195,7 +198,7 @@ static void wings_make_as_many_alarms_as_in_images(void **state) {
 static void rings_make_as_many_alarms_as_in_images(void **state) {
     (void)state;
     double image[2] = {0.0, 0.0}, generated[2] = {0.0, 0.0};
-    compare(&kinds[1], image, generated);
+    compare(&kinds[1], FRAMES, image, generated);
     /* 100 frames: 2474 and 2302; without the skewness of counted electrons 2206, with a kernel one
      * pixel too wide and normal noise 1875 */
     bst_assert_close(generated[0] / image[0], 1.0, 0.17);
@@ -204,9 +207,17 @@ static void rings_make_as_many_alarms_as_in_images(void **state) {
 static void rings_of_streaks_make_as_many_alarms_as_in_images(void **state) {
     (void)state;
     double image[2] = {0.0, 0.0}, generated[2] = {0.0, 0.0};
-    compare(&kinds[2], image, generated);
+    compare(&kinds[2], FRAMES, image, generated);
     /* 100 frames: 58 and 75; wings of points at the stars' means: 177 */
     bst_assert_close(generated[0], image[0], 3.0 * sqrt(58.0 / 100.0 * FRAMES));
+}
+
+static void multiplied_rings_make_as_many_alarms_as_in_images(void **state) {
+    (void)state;
+    double image[2] = {0.0, 0.0}, generated[2] = {0.0, 0.0};
+    compare(&kinds[3], 2 * FRAMES, image, generated);
+    /* 20 frames: 375 and 319; with plain shot noise 262 */
+    bst_assert_close(generated[0] / image[0], 1.0, 0.17);
 }
 
 int main(void) {
@@ -214,6 +225,7 @@ int main(void) {
         cmocka_unit_test(wings_make_as_many_alarms_as_in_images),
         cmocka_unit_test(rings_make_as_many_alarms_as_in_images),
         cmocka_unit_test(rings_of_streaks_make_as_many_alarms_as_in_images),
+        cmocka_unit_test(multiplied_rings_make_as_many_alarms_as_in_images),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
