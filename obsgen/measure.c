@@ -103,7 +103,8 @@ bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
 static void draw_point_error(const bst_generator *g, const generator_source *s, double snr,
                              double error[2]) {
     double spread = fmax(s->spread, 1e-3), threshold = g->filters[0].threshold;
-    double level = fmax(snr + s->spread * s->noise, threshold - 1.0 / snr), output = 0.0;
+    snr = fmax(snr, 1.0); /* below, the maximum is one of the noise alone */
+    double level = fmax(fmax(snr + s->spread * s->noise, threshold - 1.0 / snr), 0.1), output = 0.0;
     for (int trial = 0; trial < POINT_TRIALS && output <= threshold; trial++) {
         uint64_t first = (uint64_t)trial << TRIAL_BITS | s->name * GENERATOR_DRAWS;
         double h[3] = {0.0, 0.0,

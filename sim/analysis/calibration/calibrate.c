@@ -117,7 +117,8 @@ typedef struct common_error {
 /* Weight of a star in the common centroid error: inverse Cramér-Rao variance. */
 static double place_weight(const bst_calibration_fitter *c, const bst_truth_item *t,
                            double noise_e) {
-    bst_crlb_table_at at = bst_crlb_table_of(&c->bound, t->electrons, noise_e, length_of(t));
+    bst_crlb_table_at at = bst_crlb_table_wider(&c->bound, t->electrons, noise_e, length_of(t), 1.0,
+                                                bst_camera_excess_noise(c->path.camera));
     return 1.0 / (at.var_along_px2 + at.var_across_px2 + 1e-4);
 }
 
@@ -134,7 +135,8 @@ static void add_place(bst_calibration_fitter *c, const bst_truth_item *t, const 
            dy = (d->y_px - t->y_centroid_px - common->y) * free_part;
     double cosine = length > 0.0 ? (t->x_end_px - t->x_start_px) / length : 1.0;
     double sine = length > 0.0 ? (t->y_end_px - t->y_start_px) / length : 0.0;
-    bst_crlb_table_at at = bst_crlb_table_of(&c->bound, t->electrons, noise_e, length);
+    bst_crlb_table_at at = bst_crlb_table_wider(&c->bound, t->electrons, noise_e, length, 1.0,
+                                                bst_camera_excess_noise(c->path.camera));
     double along = dx * cosine + dy * sine, across = dy * cosine - dx * sine;
     int node = snr_node(t->electrons * at.norm / noise_e);
     const double squares[2] = {along * along / at.var_along_px2,
