@@ -422,6 +422,7 @@ static bst_status write_all_frames(bst_ctx *ctx, page_export *e) {
         const double share = 0.95 * (limit - (double)ftell(e->out)) / (e->sensors - i);
         bst_progress progress;
         bst_progress_start(&progress, e->request->file, "frames", e->sensor[i].asked);
+        progress.off = !progress.terminal;
         bst_status status = take_frames(ctx, e, i, share > 1.0 ? (size_t)share : 1, &progress);
         bst_progress_end(&progress);
         BST_TRY(status);
