@@ -9,12 +9,10 @@
 
 /* Names of the modules in the import map begin so: a data: address has no folder. */
 #define PREFIX "boresight/"
-/* Scripts and styles of the file; text of the run is data, and becomes text of the page. */
-#define NONCE "nonce=\"page\""
 /* Scripts of this file and the modules that they import; no connection anywhere. */
-static const char policy[] =
+static const char policy[] = /* twice the nonce of its scripts and styles */
     "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src "
-    "'nonce-page' 'strict-dynamic'; style-src 'nonce-page'; img-src data:; base-uri 'none'; "
+    "'nonce-%s' 'strict-dynamic'; style-src 'nonce-%s'; img-src data:; base-uri 'none'; "
     "form-action 'none'\">\n";
 
 static const bst_view_page_file *find(const char *name) {
@@ -61,8 +59,8 @@ static bst_status write_module(bst_ctx *ctx, FILE *out, const bst_view_page_file
     return BST_OK;
 }
 
-static bst_status write_modules(bst_ctx *ctx, FILE *out) {
-    fputs("<script type=\"importmap\" " NONCE ">{\"imports\": {", out);
+static bst_status write_modules(bst_ctx *ctx, FILE *out, const char *nonce) {
+    fprintf(out, "<script type=\"importmap\" nonce=\"%s\">{\"imports\": {", nonce);
     bool first = true;
     for (const bst_view_page_file *file = bst_view_page_files; file->name; file++) {
         if (!ends_with(file->name, ".js") || strcmp(file->name, "recorded_api.js") == 0) {
@@ -80,9 +78,9 @@ static bst_status write_modules(bst_ctx *ctx, FILE *out) {
 
 /* Style sheets go into one element, those of panels behind that of the page, as where they are
  * loaded. */
-static void write_styles(FILE *out) {
+static void write_styles(FILE *out, const char *nonce) {
     const bst_view_page_file *first = find("style.css");
-    fputs("<style " NONCE ">\n", out);
+    fprintf(out, "<style nonce=\"%s\">\n", nonce);
     fwrite(first->data, 1, first->bytes, out);
     for (const bst_view_page_file *file = bst_view_page_files; file->name; file++) {
         if (ends_with(file->name, ".css") && file != first) {
@@ -112,7 +110,7 @@ static bool begins(const char *line, size_t bytes, const char *with) {
     return bytes >= n && memcmp(line, with, n) == 0;
 }
 
-bst_status bst_view_bundle_begin(bst_ctx *ctx, FILE *out) {
+bst_status bst_view_bundle_begin(bst_ctx *ctx, FILE *out, const char *nonce) {
     const bst_view_page_file *page = find("index.html");
     const char *line = page->data, *end = page->data + page->bytes;
     while (line < end) {
@@ -122,14 +120,14 @@ bst_status bst_view_bundle_begin(bst_ctx *ctx, FILE *out) {
             break;
         }
         if (begins(line, bytes, "<link rel=\"stylesheet\"")) {
-            write_styles(out);
+            write_styles(out, nonce);
         } else if (begins(line, bytes, "<script ")) {
-            BST_TRY(write_modules(ctx, out));
+            BST_TRY(write_modules(ctx, out, nonce));
         } else if (!begins(line, bytes, "<link rel=\"modulepreload\"")) {
             write_line(out, line, bytes);
         }
         if (begins(line, bytes, "<meta charset")) {
-            fputs(policy, out);
+            fprintf(out, policy, nonce, nonce);
         }
         line += bytes;
     }
@@ -152,10 +150,11 @@ void bst_view_bundle_add(FILE *out, const char *key, const bst_view_bytes *packe
     fputs("</script>\n", out);
 }
 
-void bst_view_bundle_end(FILE *out) {
-    fputs("<script type=\"module\" " NONCE ">import '" PREFIX
-          "app.js';</script>\n</body>\n</html>\n",
-          out);
+void bst_view_bundle_end(FILE *out, const char *nonce) {
+    fprintf(out,
+            "<script type=\"module\" nonce=\"%s\">import '" PREFIX
+            "app.js';</script>\n</body>\n</html>\n",
+            nonce);
 }
 
 size_t bst_view_bundle_size(const bst_view_bytes *packed) {

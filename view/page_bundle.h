@@ -10,8 +10,9 @@
  * import each other by an import map of data: addresses; module api.js is replaced by
  * recorded_api.js. The content security policy allows only these scripts, and no connection.
  *
+ * Given:     nonce  of the file's own scripts and styles: letters and digits
  * Errors:    BST_ERR_MEMORY; those of the stream are left there */
-bst_status bst_view_bundle_begin(bst_ctx *ctx, FILE *out) BST_MUST_CHECK;
+bst_status bst_view_bundle_begin(bst_ctx *ctx, FILE *out, const char *nonce) BST_MUST_CHECK;
 
 /* Writes an element with what the program answered to a request.
  *
@@ -23,7 +24,7 @@ bst_status bst_view_bundle_begin(bst_ctx *ctx, FILE *out) BST_MUST_CHECK;
 void bst_view_bundle_add(FILE *out, const char *key, const bst_view_bytes *packed);
 
 /* Writes the end of the file: the script that starts the page. */
-void bst_view_bundle_end(FILE *out);
+void bst_view_bundle_end(FILE *out, const char *nonce);
 
 /* Bytes that an element with a key of 40 bytes takes in the file. */
 size_t bst_view_bundle_size(const bst_view_bytes *packed);

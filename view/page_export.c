@@ -5,14 +5,18 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/cli/progress.h"
 #include "sim/cli/stop_signals.h"
 #include "sim/core/json_member.h"
+#include "sim/core/sha256.h"
 #include "sim/io/draft_file.h"
 #include "sim/run/run_sensors.h"
 #include "view/page_bundle.h"
+#include "view/page_paths.h"
 #include "view/pixel_bins.h"
 #include "view/routes.h"
 #include "view/space.h"
+#include "view/why.h"
 
 /* Columns of a plot: it can be zoomed to so many extents of its lines. */
 enum { COLUMNS = 2000 };
@@ -20,6 +24,8 @@ enum { COLUMNS = 2000 };
 enum { SPACE_STEP_S = 60 };
 /* Share of the limit that the skies may take before they are compressed. */
 static const double SPACE_SHARE = 0.2;
+/* Exposures whose reasons are asked for in one call: its queries have a limit of work. */
+enum { WHY_CHUNK = 500 };
 /* What the page shows of a frame. */
 enum { FRAME, WHY, PIXELS, PARTS };
 
@@ -33,6 +39,7 @@ typedef struct kept_sensor {
     size_t count, bytes; /* bytes: of their elements */
     int64_t every;       /* of the frames that were asked for, every N-th is kept */
     int64_t asked;       /* frames that were asked for */
+    int64_t done;        /* of them, looked at so far */
     int binning;         /* pixels along a side of a bin */
     double *list;        /* as api/frames */
     size_t listed;
@@ -121,17 +128,30 @@ static void thin(kept_sensor *s) {
     s->every *= 2;
 }
 
+/* Records the reason of a frame alone: spans of frames are written once. */
+static bst_status record_reason(bst_ctx *ctx, const page_export *e, int number, int64_t row,
+                                bst_view_bytes *packed) {
+    bst_view_exchange x = {.subject = e->subject, .sensor = number, .frame = row};
+    bst_status status = bst_view_why(ctx, &x, row, row);
+    if (status == BST_OK) {
+        cJSON_DeleteItemFromObjectCaseSensitive(x.json, "spans");
+        status = pack_json(ctx, x.json, packed);
+    }
+    cJSON_Delete(x.json);
+    return status;
+}
+
 static bst_status take_frame(bst_ctx *ctx, const page_export *e, int number, int64_t row,
                              kept_frame *frame) {
     const kept_sensor *s = &e->sensor[number];
-    static const char *const paths[] = {"api/frame", "api/why", "api/pixels"};
+    bst_view_exchange x = {.sensor = number, .frame = row}, of_pixels = x;
     *frame = (kept_frame){.row = row};
-    bst_status status = BST_OK;
-    for (int k = 0; k < PARTS && status == BST_OK; k++) {
-        bst_view_exchange x = {.sensor = number, .frame = row};
-        if (k != PIXELS || s->list[row * BST_VIEW_FRAME_NUMBERS + 3] >= 0) {
-            status = record(ctx, e, paths[k], &x, s->binning, &frame->part[k]);
-        }
+    bst_status status = record(ctx, e, "api/frame", &x, 1, &frame->part[FRAME]);
+    if (status == BST_OK) {
+        status = record_reason(ctx, e, number, row, &frame->part[WHY]);
+    }
+    if (status == BST_OK && s->list[row * BST_VIEW_FRAME_NUMBERS + 3] >= 0) {
+        status = record(ctx, e, "api/pixels", &of_pixels, s->binning, &frame->part[PIXELS]);
     }
     if (status != BST_OK) {
         free_frame(frame);
@@ -143,14 +163,15 @@ static bool is_asked(const bst_view_page_request *r, int64_t exposure) {
     return exposure >= r->first && exposure <= r->last && (exposure - r->first) % r->every == 0;
 }
 
-static bst_status take_frames(bst_ctx *ctx, page_export *e, int number, size_t limit) {
+static bst_status take_frames(bst_ctx *ctx, page_export *e, int number, size_t limit,
+                              bst_progress *progress) {
     kept_sensor *s = &e->sensor[number];
-    s->every = 1;
     for (size_t row = 0; row < s->listed; row++) {
         if (!is_asked(e->request, (int64_t)s->list[row * BST_VIEW_FRAME_NUMBERS])) {
             continue;
         }
-        if (s->asked++ % s->every != 0) {
+        bst_progress_update(progress, s->done);
+        if (s->done++ % s->every != 0) {
             continue;
         }
         if (bst_stop_requested()) {
@@ -184,6 +205,10 @@ static bst_status open_sensor(bst_ctx *ctx, page_export *e, int number, const cJ
     BST_TRY(ask(ctx, e, "api/frames", &x));
     s->list = x.bytes.data;
     s->listed = x.bytes.bytes / (BST_VIEW_FRAME_NUMBERS * sizeof(double));
+    s->every = 1;
+    for (size_t row = 0; row < s->listed; row++) {
+        s->asked += is_asked(e->request, (int64_t)s->list[row * BST_VIEW_FRAME_NUMBERS]);
+    }
     s->frames = calloc(s->listed + 1, sizeof *s->frames);
     return s->frames ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a page");
 }
@@ -224,9 +249,61 @@ static double last_time(const kept_sensor *s) {
     return s->listed > 0 ? s->list[(s->listed - 1) * BST_VIEW_FRAME_NUMBERS + 1] : 1.0;
 }
 
+/* Moves the spans of a chunk of exposures behind those before it; the first one may continue the
+ * last. */
+static void join_spans(cJSON *spans, cJSON *chunk) {
+    cJSON *next;
+    while ((next = cJSON_DetachItemFromArray(chunk, 0))) {
+        cJSON *last = cJSON_GetArrayItem(spans, cJSON_GetArraySize(spans) - 1);
+        if (last && strcmp(bst_json_member_text(last, "kind", ""),
+                           bst_json_member_text(next, "kind", "")) == 0) {
+            cJSON_SetNumberValue(cJSON_GetObjectItemCaseSensitive(last, "last"),
+                                 bst_json_member(next, "last")->valuedouble);
+            cJSON_Delete(next);
+        } else {
+            cJSON_AddItemToArray(spans, next);
+        }
+    }
+}
+
+/* Collects the spans of frames with the same reason, of all exposures of a sensor. */
+static bst_status collect_spans(bst_ctx *ctx, const page_export *e, int number, cJSON *spans) {
+    const int64_t listed = (int64_t)e->sensor[number].listed;
+    for (int64_t row = 0; row < listed; row += WHY_CHUNK) {
+        bst_view_exchange x = {.subject = e->subject, .sensor = number, .frame = row};
+        bst_status status = bst_stop_requested() ? bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted")
+                                                 : bst_view_why(ctx, &x, row, row + WHY_CHUNK - 1);
+        if (status == BST_OK) {
+            join_spans(spans, cJSON_GetObjectItemCaseSensitive(x.json, "spans"));
+        }
+        cJSON_Delete(x.json);
+        BST_TRY(status);
+    }
+    return BST_OK;
+}
+
+/* Writes them: {"around": N, "spans": [...]}; the page shows those of N exposures before and after
+ * its frame. */
+static bst_status write_spans(bst_ctx *ctx, const page_export *e, int number) {
+    char key[40];
+    bst_view_bytes packed = {.data = NULL};
+    cJSON *out = cJSON_CreateObject();
+    cJSON_AddNumberToObject(out, "around", BST_VIEW_WHY_AROUND);
+    bst_status status = collect_spans(ctx, e, number, cJSON_AddArrayToObject(out, "spans"));
+    status = status == BST_OK ? pack_json(ctx, out, &packed) : status;
+    cJSON_Delete(out);
+    if (status == BST_OK) {
+        snprintf(key, sizeof key, "spans?sensor=%d", number);
+        bst_view_bundle_add(e->out, key, &packed);
+        free(packed.data);
+    }
+    return status;
+}
+
 static bst_status write_sensor(bst_ctx *ctx, const page_export *e, int number,
                                const cJSON *described) {
     char key[120];
+    BST_TRY(write_spans(ctx, e, number));
     snprintf(key, sizeof key, "modes?sensor=%d", number);
     BST_TRY(add(ctx, e, "api/modes", key, (bst_view_exchange){.sensor = number}));
     const cJSON *panel;
@@ -304,30 +381,98 @@ static bst_status write_session(bst_ctx *ctx, const page_export *e, bool space, 
     return BST_OK;
 }
 
+/* Refuses a range without a frame, if the run has some. */
+static bst_status check_range(bst_ctx *ctx, const page_export *e) {
+    const bst_view_page_request *r = e->request;
+    double first = INFINITY, last = -INFINITY;
+    int64_t asked = 0;
+    for (int i = 0; i < e->sensors; i++) {
+        const kept_sensor *s = &e->sensor[i];
+        asked += s->asked;
+        if (s->listed > 0) {
+            first = fmin(first, s->list[0]);
+            last = fmax(last, s->list[(s->listed - 1) * BST_VIEW_FRAME_NUMBERS]);
+        }
+    }
+    if (asked > 0 || !(last >= first)) {
+        return BST_OK;
+    }
+    char end[40] = "the end";
+    if (r->last <= INT64_C(9000000000000000)) { /* else it is the default */
+        snprintf(end, sizeof end, "--last %lld", (long long)r->last);
+    }
+    return bst_fail(
+        ctx, BST_ERR_RANGE,
+        "%s: there is no frame from --first %lld to %s with --every %lld: exposures have "
+        "the numbers %.0f to %.0f",
+        r->run, (long long)r->first, end, (long long)r->every, first, last);
+}
+
+/* Writes the frames of all sensors into what is left of the limit. */
+static bst_status write_all_frames(bst_ctx *ctx, page_export *e) {
+    const double limit = e->request->limit_bytes, used = (double)ftell(e->out);
+    if (used >= limit) {
+        return bst_fail(ctx, BST_ERR_RANGE,
+                        "%s: page, plots and events take %.1f MB without a frame (allowed by "
+                        "--page-limit: %.1f MB): raise --page-limit",
+                        e->request->file, used * 1e-6, limit * 1e-6);
+    }
+    for (int i = 0; i < e->sensors; i++) {
+        /* the rest of the share: their list, rows and the end */
+        const double share = 0.95 * (limit - (double)ftell(e->out)) / (e->sensors - i);
+        bst_progress progress;
+        bst_progress_start(&progress, e->request->file, "frames", e->sensor[i].asked);
+        progress.off = !progress.terminal;
+        bst_status status = take_frames(ctx, e, i, share > 1.0 ? (size_t)share : 1, &progress);
+        bst_progress_end(&progress);
+        BST_TRY(status);
+        BST_TRY(write_frames(ctx, e, i));
+    }
+    return BST_OK;
+}
+
+/* The same for the same run: a file that is written again has the same bytes. */
+static bst_status make_nonce(bst_ctx *ctx, const cJSON *session, char nonce[BST_SHA256_TEXT]) {
+    char *text = cJSON_PrintUnformatted(session);
+    if (!text) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a page");
+    }
+    bst_sha256_text(text, strlen(text), nonce);
+    free(text);
+    return BST_OK;
+}
+
 /* Writes the whole page. */
 static bst_status write_page(bst_ctx *ctx, page_export *e, cJSON *session) {
-    const cJSON *sensors = bst_json_member(bst_json_member(session, "run"), "sensors"), *described;
+    const cJSON *described;
+    char nonce[BST_SHA256_TEXT];
     bool space;
-    BST_TRY(bst_view_bundle_begin(ctx, e->out));
+    cJSON *run = cJSON_GetObjectItemCaseSensitive(session, "run");
+    bst_view_cut_path(cJSON_GetObjectItemCaseSensitive(run, "problems"), e->request->run);
+    bst_view_cut_path(cJSON_GetObjectItemCaseSensitive(run, "manifest"), e->request->run);
+    const cJSON *sensors = bst_json_member(run, "sensors");
+    BST_TRY(make_nonce(ctx, session, nonce));
+    BST_TRY(bst_view_bundle_begin(ctx, e->out, nonce));
     cJSON_ArrayForEach(described, sensors) {
         BST_TRY(open_sensor(ctx, e, e->sensors++, described));
     }
+    BST_TRY(check_range(ctx, e));
     int number = 0;
     cJSON_ArrayForEach(described, sensors) {
         BST_TRY(write_sensor(ctx, e, number++, described));
     }
     BST_TRY(add(ctx, e, "api/events", "events", (bst_view_exchange){.sensor = 0}));
     BST_TRY(write_space(ctx, e, &space));
-    const double left = e->request->limit_bytes - (double)ftell(e->out);
-    for (int i = 0; i < e->sensors; i++) {
-        /* the rest of the file: their list, rows and the end */
-        const double share = 0.95 * left / e->sensors;
-        BST_TRY(take_frames(ctx, e, i, share > 1.0 ? (size_t)share : 1));
-        BST_TRY(write_frames(ctx, e, i));
-    }
+    BST_TRY(write_all_frames(ctx, e));
     BST_TRY(write_session(ctx, e, space, session));
-    bst_view_bundle_end(e->out);
-    return BST_OK;
+    bst_view_bundle_end(e->out, nonce);
+    const double bytes = (double)ftell(e->out);
+    return bytes <= e->request->limit_bytes
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_RANGE,
+                          "%s: the page takes %.1f MB (allowed by --page-limit: %.1f MB): raise "
+                          "--page-limit or lower --size",
+                          e->request->file, bytes * 1e-6, e->request->limit_bytes * 1e-6);
 }
 
 /* Says what the file holds. */
@@ -337,8 +482,9 @@ static void announce(const page_export *e, double bytes) {
         const kept_sensor *s = &e->sensor[i];
         printf("  sensor %d: %zu of %zu frames", i, s->count, s->listed);
         if (s->every > 1) {
-            printf(" (every %lld of those asked for, for the limit of %.1f MB)",
-                   (long long)s->every, e->request->limit_bytes * 1e-6);
+            printf(" (every %lld%s of the frames asked for, for the limit of %.1f MB)",
+                   (long long)s->every, s->every % 10 == 2 && s->every % 100 != 12 ? "nd" : "th",
+                   e->request->limit_bytes * 1e-6);
         }
         printf(s->binning > 1 ? ", %d x %d pixels binned into one\n" : "\n", s->binning,
                s->binning);

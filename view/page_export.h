@@ -22,10 +22,12 @@ enum { BST_VIEW_PAGE_SIDE_PX = 640 };
 /* Writes a page that needs no server and no network: frames whose pixels are binned (mean of n x
  * n), marks, reasons, plots, events and space. If the frames do not fit into the limit, every
  * second one of them is left out, until they do; what is left out stands on the page and is
- * printed. The plots are of all exposures, as minimum and maximum of each of their columns.
+ * printed. Paths of the run's folder are left out. The plots are of all exposures, as minimum and
+ * maximum of each of their columns.
  *
  * Errors:    those of bst_view_run_open and of reading the run; BST_ERR_IO: the file cannot be
- *            written; BST_ERR_RANGE: the limit does not hold a single frame; BST_ERR_INTERRUPTED */
+ *            written; BST_ERR_RANGE: the limit does not hold the page with a single frame of
+ *            each sensor, or the run has no frame in the range; BST_ERR_INTERRUPTED */
 bst_status bst_view_page_export(bst_ctx *ctx, const bst_view_page_request *request) BST_MUST_CHECK;
 
 #endif

@@ -50,6 +50,7 @@ bst_view_launcher *bst_view_subject_launcher(bst_view_subject *subject) {
 }
 
 bst_status bst_view_subject_set_study(bst_ctx *ctx, bst_view_subject *subject, const char *folder) {
+    free(subject->study);
     subject->study = strdup(folder);
     return subject->study ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a study");
 }
@@ -75,8 +76,11 @@ int64_t bst_view_subject_count(bst_view_subject *subject) {
 /* Opens a folder as the next run. Call it with the lock held. */
 static bst_status add_run(bst_ctx *ctx, bst_view_subject *subject, const char *path) {
     if (subject->runs == RUNS_MOST) {
-        return bst_fail(ctx, BST_ERR_STATE,
-                        "%d runs are open, which is the limit: start the viewer again", RUNS_MOST);
+        return bst_fail(
+            ctx, BST_ERR_STATE,
+            "%d runs are open, which a viewer has at most: end this one (Ctrl-C) and start it "
+            "again",
+            RUNS_MOST);
     }
     char *copy = strdup(path);
     bst_status status = copy ? bst_view_run_open(ctx, path, &subject->run[subject->runs])

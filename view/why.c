@@ -249,12 +249,10 @@ static bst_status explain(bst_ctx *ctx, tables *t, const bst_view_exposure *e, s
 
 /* ------------------------------------------------------------------ frames */
 
-/* Adds the frame's reason, and spans of frames with the same one. */
-static bst_status add_reasons(bst_ctx *ctx, tables *t, int64_t frame, source *room, cJSON *out) {
+/* Adds the frame's reason, and spans of frames with the same one, from first to last. */
+static bst_status add_reasons(bst_ctx *ctx, tables *t, int64_t frame, int64_t first, int64_t last,
+                              source *room, cJSON *out) {
     const bst_view_sensor *s = t->sensor;
-    int64_t first = frame > BST_VIEW_WHY_AROUND ? frame - BST_VIEW_WHY_AROUND : 0;
-    int64_t last = frame + BST_VIEW_WHY_AROUND < (int64_t)s->count ? frame + BST_VIEW_WHY_AROUND
-                                                                   : (int64_t)s->count - 1;
     const char *before = "";
     cJSON *span = NULL, *spans = cJSON_CreateArray();
     cJSON_AddItemToObject(out, "spans", spans);
@@ -282,7 +280,8 @@ static bst_status add_reasons(bst_ctx *ctx, tables *t, int64_t frame, source *ro
     return BST_OK;
 }
 
-static bst_status answer(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) {
+static bst_status answer(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x, int64_t first,
+                         int64_t last) {
     bst_view_sensor *s;
     BST_TRY(bst_view_find_sensor(ctx, run, x->sensor, &s));
     if (x->frame >= (int64_t)s->count) {
@@ -296,18 +295,24 @@ static bst_status answer(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) 
     cJSON_AddStringToObject(x->json, "target", s->sensor.target);
     tables t = {.run = run, .sensor = s};
     source *room = calloc(SOURCES_MOST, sizeof *room);
-    bst_status status = room ? add_reasons(ctx, &t, x->frame, room, x->json)
+    first = first > 0 ? first : 0;
+    last = last < (int64_t)s->count ? last : (int64_t)s->count - 1;
+    bst_status status = room ? add_reasons(ctx, &t, x->frame, first, last, room, x->json)
                              : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the truth");
     close_tables(&t);
     free(room);
     return status;
 }
 
-bst_status bst_view_route_why(bst_ctx *ctx, bst_view_exchange *x) {
+bst_status bst_view_why(bst_ctx *ctx, bst_view_exchange *x, int64_t first, int64_t last) {
     bst_view_run *run;
     BST_TRY(bst_view_subject_run(ctx, x->subject, x->run, &run));
     bst_status status = bst_view_lock(ctx, run);
-    status = status == BST_OK ? answer(ctx, run, x) : status;
+    status = status == BST_OK ? answer(ctx, run, x, first, last) : status;
     bst_view_unlock(run);
     return status;
+}
+
+bst_status bst_view_route_why(bst_ctx *ctx, bst_view_exchange *x) {
+    return bst_view_why(ctx, x, x->frame - BST_VIEW_WHY_AROUND, x->frame + BST_VIEW_WHY_AROUND);
 }

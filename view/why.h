@@ -39,11 +39,16 @@ typedef struct bst_view_why_facts {
  * "chance" */
 const char *bst_view_why_reason(const bst_view_why_facts *facts, char *text, size_t bytes);
 
-/* Reasons for the exposures around x->frame: {target, frame: {kind, text}, spans: [{first, last,
- * kind, text}]}. first, last: frames of the list; text: of the first one. target: null without one.
+/* Reasons for exposures first to last of the list, as far as there are any: {target, frame: {kind,
+ * text}, spans: [{first, last, kind, text}]}. first, last: frames of the list; text: of the first
+ * one. frame: the reason of x->frame, if it is among them. target: null without one.
  *
  * Returned:  x->json
  * Errors:    BST_ERR_NOT_FOUND: no such sensor or frame; BST_ERR_FORMAT: damaged tables */
+bst_status bst_view_why(bst_ctx *ctx, bst_view_exchange *x, int64_t first,
+                        int64_t last) BST_MUST_CHECK;
+
+/* The route: bst_view_why for BST_VIEW_WHY_AROUND exposures before and after x->frame. */
 bst_status bst_view_route_why(bst_ctx *ctx, bst_view_exchange *x) BST_MUST_CHECK;
 
 #endif

@@ -7,6 +7,7 @@
 #include <sqlite3.h>
 #include <stdio.h>
 #include <unistd.h>
+#include <zlib.h>
 #include <zmq.h>
 #include <opencv2/core/version.hpp>
 
@@ -51,6 +52,7 @@ static cJSON *libraries(void) {
     cJSON_AddStringToObject(out, "ZeroMQ", text);
     cJSON_AddStringToObject(out, "cJSON", cJSON_Version());
     cJSON_AddStringToObject(out, "libpng", png_get_libpng_ver(NULL));
+    cJSON_AddStringToObject(out, "zlib", zlibVersion());
     cJSON_AddStringToObject(out, "civetweb", mg_version());
     return out;
 }

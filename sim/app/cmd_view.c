@@ -5,6 +5,7 @@
 #include "sim/app/app.h"
 #include "sim/cli/command_line.h"
 #include "view/session.h"
+#include "view/study_view.h"
 
 static const char help_text[] =
     "usage: boresight view [RUN [RUN] | STUDY | SCENARIO.json] [options]\n"
@@ -99,6 +100,20 @@ static bool is_file(const char *path) {
     return stat(path, &found) == 0 && S_ISREG(found.st_mode);
 }
 
+/* Refuses a scenario file or a study beside another path. */
+static bst_status check_pair(bst_ctx *ctx, const char *path, const char *other) {
+    const char *const both[] = {path, other};
+    for (int i = 0; i < 2 && other; i++) {
+        if (is_file(both[i]) || bst_view_is_study(both[i])) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "%s is %s, which is shown alone: two folders of runs can be compared",
+                            both[i],
+                            is_file(both[i]) ? "a scenario file" : "the folder of a study");
+        }
+    }
+    return BST_OK;
+}
+
 int bst_cmd_view(int argc, char **argv) {
     bst_view_session r = {.load = BST_LOAD_DEFAULTS, .check = bst_check_rules_apply};
     bst_option table[sizeof OPTIONS / sizeof *OPTIONS];
@@ -112,14 +127,15 @@ int bst_cmd_view(int argc, char **argv) {
     }
     const char *path = arguments > 0 ? argv[1] : NULL;
     r.other = arguments > 1 ? argv[2] : NULL;
-    if (arguments > 2 || (r.other && (is_file(path) || is_file(r.other)))) {
+    if (arguments > 2) {
         bst_fail(&ctx, BST_ERR_ARGUMENT,
                  "one or two folders of runs, the folder of a study, one scenario file, or none is "
                  "expected, %d were given",
                  arguments);
         return bst_options_misuse(&ctx, "view");
     }
-    if (check_use(&ctx, &r, path) != BST_OK || bst_load_check(&ctx, &r.load, table) != BST_OK) {
+    if (check_pair(&ctx, path, r.other) != BST_OK || check_use(&ctx, &r, path) != BST_OK ||
+        bst_load_check(&ctx, &r.load, table) != BST_OK) {
         return bst_options_misuse(&ctx, "view");
     }
     return bst_command_line_end(&ctx, bst_view_serve(&ctx, &r, path));

@@ -88,10 +88,13 @@ class Compared(unittest.TestCase):
         self.assertEqual([viewer.json(f"api/run?run={k}")["name"] for k in range(2)], ["000000", "000001"])
         self.assertEqual(viewer.status("/{token}/api/study"), 404)
         self.assertEqual(viewer.end()[0], 0)
-        for words in ((*self.pair, self.pair[0]), (self.pair[0], runs.STARE), (runs.STARE, self.pair[0])):
+        alone = " is the folder of a study, which is shown alone"
+        for words, text in (((*self.pair, self.pair[0]), "one or two folders of runs"), ((self.pair[0], runs.STARE), runs.STARE + " is a scenario file"),
+                            ((runs.STARE, self.pair[0]), runs.STARE + " is a scenario file"), ((self.pair[0], self.study), self.study + alone),
+                            ((self.study, self.pair[0]), self.study + alone), ((self.study, self.study), self.study + alone)):
             result = runs.call("view", "--no-browser", *words)
             self.assertEqual(result.returncode, 2, words)
-            self.assertIn("one or two folders of runs", result.stderr)
+            self.assertIn(text, result.stderr)
 
     @unittest.skipUnless(PAGE and chromium.PROGRAM, "without --page, or there is no chromium")
     def test_page_of_a_study(self):

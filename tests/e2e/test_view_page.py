@@ -57,6 +57,25 @@ class Running(unittest.TestCase):
         self.assertEqual(viewer.end()[0], 0)
 
 
+    @unittest.skipUnless(chromium.PROGRAM, "there is no chromium")
+    def test_exported_while_in_progress(self):
+        """The page says that the run was in progress, and asks nobody for more."""
+        out, page_file = (os.path.join(runs.scratch(), name) for name in ("run", "run.html"))
+        process = subprocess.Popen(runs.command(runs.STARE, out, "/pacing/mode=realtime", duration=8), stdout=subprocess.DEVNULL)
+        while not os.path.exists(out + ".partial/frames.fits"):
+            self.assertIsNone(process.poll())
+            time.sleep(0.05)
+        result = runs.call("export", out + ".partial", "--page", page_file)
+        self.assertEqual((result.returncode, process.wait(60)), (0, 0), result.stderr)
+        with chromium.Chromium(1280, 720) as page:
+            page.command("Page.navigate", url="file://" + page_file)
+            page.wait_for("document.boresight && document.getElementById('run-state').textContent")
+            time.sleep(2.5)  # looks at a folder are 2 s apart
+            self.assertEqual(page.evaluate("[document.getElementById('run-state').textContent, document.getElementById('problems').textContent]"),
+                             ["still running when exported", ""])
+            self.assertEqual(page.messages, [])
+
+
 @unittest.skipUnless(chromium.PROGRAM, "there is no chromium")
 class Page(unittest.TestCase):
     @classmethod

@@ -3,15 +3,18 @@
 
 Usage, from the repository root: /usr/bin/python3 tests/e2e/test_view_panels.py BORESIGHT
 """
+import base64
 import glob
 import json
 import math
 import os
+import re
 import shutil
 import sqlite3
 import unittest
 import urllib.error
 import urllib.request
+import zlib
 
 import numpy
 
@@ -54,6 +57,13 @@ class Editor(test_view.Viewer):
 def resolved(*words, folder="."):
     """The scenario as `boresight check` prints it."""
     return json.loads(runs.call("check", *words, cwd=folder).stdout)
+
+
+def elements(page):
+    """What the elements of an exported page hold, by their keys."""
+    with open(page, encoding="utf-8") as file:
+        return {key.replace("&amp;", "&"): zlib.decompress(base64.b64decode(data))
+                for key, data in re.findall(r'<script type="text/plain" data-key="([^"]*)"[^>]*>([^<]*)</script>', file.read())}
 
 
 class Server(unittest.TestCase):
@@ -226,6 +236,48 @@ class Server(unittest.TestCase):
         with self.assertRaises(urllib.error.HTTPError) as caught:
             self.editor.get("api/why?frame=99")
         self.assertEqual(caught.exception.code, 404)
+
+    def test_exported_reasons(self):
+        """A page has the reason of each frame, and the spans of all of them once; it is the same bytes when it is written again."""
+        page, again = (os.path.join(runs.scratch(), name) for name in ("a.html", "b.html"))
+        for file in (page, again):
+            runs.call_well("export", self.made, "--page", file)
+        with open(page, "rb") as one, open(again, "rb") as other:
+            self.assertEqual(one.read(), other.read())
+        found, asked = elements(page), self.editor.json("api/why?frame=1")
+        self.assertEqual(json.loads(found["spans?sensor=0"]), {"around": 200, "spans": asked.pop("spans")})
+        self.assertEqual(json.loads(found["why?frame=1&sensor=0"]), asked)
+
+    def test_exported_paths(self):
+        """What is wrong with a folder stands in its page, without the place of the folder."""
+        folder = os.path.realpath(runs.scratch())
+        left = os.path.join(folder, "left")
+        shutil.copytree(self.made, left)
+        for name in ("manifest.json", "frames.fits"):
+            with open(os.path.join(left, name), "w", encoding="utf-8") as file:
+                file.write("damaged")
+        page = os.path.join(folder, "left.html")
+        self.assertEqual(runs.call("export", left, "--page", page).returncode, 0)
+        found = elements(page)
+        self.assertTrue(any("left/" in problem for problem in json.loads(found["session"])["run"]["problems"]), found["session"])
+        self.assertEqual([key for key, data in found.items() if folder.encode() in data], [])
+
+    def test_export_refused(self):
+        """No frame in the range, and a limit that the page exceeds without a frame."""
+        page, full = (os.path.join(runs.scratch(), name) for name in ("refused.html", "full"))
+        shutil.copytree(self.made, full)
+        with sqlite3.connect(os.path.join(full, "run.sqlite")) as tables:
+            row = tables.execute("SELECT * FROM events LIMIT 1")
+            names, values = [one[0] for one in row.description], list(row.fetchone())
+            texts = [values[:names.index("text")] + [os.urandom(500).hex()] + values[names.index("text") + 1:] for _ in range(1900)]
+            tables.executemany(f"INSERT INTO events VALUES ({', '.join('?' * len(names))})", texts)
+        for folder, words, text in ((self.made, ("--first", "7"), "no frame from --first 7 to the end with --every 1: exposures have the numbers 0 to 2"),
+                                    (self.made, ("--first", "5", "--last", "6"), "no frame from --first 5 to --last 6"),
+                                    (full, ("--page-limit", "1"), "page, plots and events take")):
+            result = runs.call("export", folder, "--page", page, *words)
+            self.assertEqual(result.returncode, 1, words)
+            self.assertIn(text, result.stderr)
+            self.assertFalse(os.path.exists(page))
 
     def test_refused(self):
         self.assertEqual(self.editor.post("check", file="x")[0], 400)

@@ -7,9 +7,9 @@ Object.assign(globalThis, { location: { search: '' }, document: { getElementById
 const { differences, figuresOf, nearestFrame } = await import('../../view/page/compare.js');
 const { meansOf, placesOf, sorted } = await import('../../view/page/study.js');
 
-test('figures are the numbers of a summary, also of its parts', () => {
+test('figures are the numbers and texts of a summary, also of its parts', () => {
   assert.deepEqual([...figuresOf({ frames: 3, mode: 'track', sensors: [{ rms: 0.5 }], ok: true, none: null })],
-    [['frames', 3], ['sensors / 0 / rms', 0.5], ['ok', 1]]);
+    [['frames', 3], ['mode', 'track'], ['sensors / 0 / rms', 0.5], ['ok', 1]]);
 });
 
 test('a figure that only one run has is there, without a number for the other', () => {

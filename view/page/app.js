@@ -75,11 +75,12 @@ class App {
       this.frameView.redraw();
     }
     if (this.live) this.live.follow(true);
-    if (this.inProgress()) this.follow();
+    if (!session.exported && this.inProgress()) this.follow();
   }
 
   /** A page that is one file, without a program: what of the run it has. */
   describeExport({ space, sensors }) {
+    this.exported = true;
     const parts = sensors.map(({ rows, total, binning }) => `${rows.length} of ${total} frames${binning > 1 ? `, ${binning} × ${binning} pixels binned` : ''}`);
     element('exported').hidden = false;
     element('exported').textContent = parts.length > 1 ? 'copy' : parts[0];
@@ -136,7 +137,7 @@ class App {
     const { run } = this, summary = run.manifest.summary || {};
     const steered = Boolean(this.live && this.live.state.steered && !this.live.over);
     const name = steered ? run.name.replace(/\.partial$/, '') : run.name; // it gets this name at its end
-    const state = steered && run.state === RUNNING ? 'live' : run.state;
+    const state = steered && run.state === RUNNING ? 'live' : this.exported && run.state === RUNNING ? `${RUNNING} when exported` : run.state;
     document.title = `${name} – Boresight`;
     element('run-name').textContent = name;
     element('run-name').title = run.manifest.scenario || '';

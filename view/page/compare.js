@@ -9,11 +9,14 @@ import { describePixels, limitsOf } from './statistics.js';
 const NUMBERS = 5;
 const LEFT = 62, RIGHT = 10, TOP = 8, BOTTOM = 18;
 
-/** Numbers of a summary with their paths, as the table has them. @param {any} node @returns {Map<string, number>} */
+/** Figures that are the machine's, not the run's: they differ between any two runs. */
+const OF_MACHINE = new Set(['wall_time_s', 'real_time_factor']);
+
+/** Numbers and texts of a summary with their paths, as the table has them. @param {any} node @returns {Map<string, number | string>} */
 export function figuresOf(node, path = '', found = new Map()) {
   for (const [key, value] of Object.entries(node || {})) {
     const name = path ? `${path} / ${key}` : key;
-    if (typeof value === 'number') found.set(name, value);
+    if (typeof value === 'number' || typeof value === 'string') found.set(name, value);
     else if (typeof value === 'boolean') found.set(name, Number(value));
     else if (value && typeof value === 'object') figuresOf(value, name, found);
   }
@@ -24,6 +27,22 @@ export function figuresOf(node, path = '', found = new Map()) {
 export function differences(one, other) {
   const a = figuresOf(one), b = figuresOf(other);
   return [...new Set([...a.keys(), ...b.keys()])].map((name) => ({ name, a: a.get(name) ?? NaN, b: b.get(name) ?? NaN }));
+}
+
+/** Cells of a row of the table: a, b, their difference; and whether it is emphasised. */
+export function rowOf({ name, a, b }) {
+  const isText = typeof a === 'string' || typeof b === 'string', equal = Object.is(a, b);
+  const text = (value) => (typeof value === 'string' ? value : shortNumber(value));
+  return { cells: [text(a), text(b), isText ? (equal ? '' : 'differs') : shortNumber(b - a)], differs: !equal && !OF_MACHINE.has(name.split(' / ').pop()) };
+}
+
+const nameOfSensor = ({ observer, name }) => `${observer || ''}/${name || ''}`;
+
+/** The sensor of a run that is compared with another run's: that with the same name, or else that with the same number, or the last.
+ * @param {any} sensor @param {any[]} sensors of the other run @param {number} number @returns {{number: number, same: boolean}} number -1: there are none */
+export function matchSensor(sensor, sensors, number) {
+  const found = sensors.findIndex((one) => nameOfSensor(one) === nameOfSensor(sensor));
+  return found >= 0 ? { number: found, same: true } : { number: Math.min(number, sensors.length - 1), same: false };
 }
 
 /** Index of the frame whose middle is nearest to a time; -1: there are none. @param {Float64Array} frames */
@@ -58,8 +77,17 @@ class Side {
     this.soft = 0;
   }
 
-  async load(run, name, sensor, target, frames, names, frame) {
-    this.run = run;
+  /** Shows nothing. @param {string} text */
+  clear(text) {
+    this.image = this.details = this.limits = null;
+    this.caption.textContent = `${this.letter}  ${text}`;
+    this.overlay.setAttribute('aria-label', `Frame of run ${this.letter}, ${text}`);
+  }
+
+  /** @param {{run: number, name: string, sensor: number, sensorName: string, target: number, frames: Float64Array, names: any}} source @param {number} frame -1: none */
+  async load({ run, name, sensor, sensorName, target, frames, names }, frame) {
+    if (this.run !== run || this.sensor !== sensor) this.limits = null;
+    [this.run, this.sensor] = [run, sensor];
     this.image = this.details = null;
     if (frame >= 0) {
       const kept = frames[NUMBERS * frame + 3] >= 0;
@@ -71,7 +99,7 @@ class Side {
       this.limits = limitsOf('asinh', this.image.data, statistics);
       this.soft = 3 * statistics.sigma;
     }
-    const text = frame >= 0 ? `${name}: frame ${frame + 1}, ${frames[NUMBERS * frame + 1].toFixed(2)} s` : `${name}: no frames`;
+    const text = frame >= 0 ? `${name}, ${sensorName}: frame ${frame + 1}, ${frames[NUMBERS * frame + 1].toFixed(2)} s` : `${name}, ${sensorName}: no frames`;
     this.caption.textContent = `${this.letter}  ${text}`;
     this.overlay.setAttribute('aria-label', `Frame of run ${this.letter}, ${text}`);
   }
@@ -95,10 +123,12 @@ class Side {
   }
 }
 
-class Comparison {
+export class Comparison {
   constructor(box, app) {
     this.app = app;
-    this.other = -1;
+    this.turn = 0; // number of the newest choice: answers to earlier ones are dropped
+    this.asked = -1; // sensor of the page at that choice
+    this.b = null; // what is compared: {run, own, described, names, sensor, frames}; own: sensor of the page
     this.shown = false;
     this.sides = [new Side('A'), new Side('B')];
     this.choice = make('select');
@@ -144,39 +174,68 @@ class Comparison {
     return runs.filter((run) => run.folder && nameOf(run) !== own && !open.has(nameOf(run))).map((run) => [`study/${run.run}`, `run ${run.run} of the study`]);
   }
 
+  /** Number of the run that the list names; opens it if it is not open. @param {string} value */
+  async openRun(value) {
+    if (value.startsWith('study/')) return (await post('study/open', JSON.stringify({ number: Number(value.slice(6)) }))).run;
+    if (value.startsWith('runs/')) return (await post('open', JSON.stringify({ run: value.slice(5) }))).run;
+    return Number(value);
+  }
+
+  /** Compares with the run of the list. Of choices in quick succession only the last one is shown. */
   async choose() {
-    const { value } = this.choice;
+    const turn = ++this.turn, { app } = this, own = this.asked = app.sensor;
     try {
-      if (value.startsWith('study/')) this.other = (await post('study/open', JSON.stringify({ number: Number(value.slice(6)) }))).run;
-      else if (value.startsWith('runs/')) this.other = (await post('open', JSON.stringify({ run: value.slice(5) }))).run;
-      else this.other = Number(value);
-      const run = this.other, [described, { names }] = await Promise.all([getJson('run', { run }), getJson('names', { run })]);
-      const sensor = Math.min(this.app.sensor, described.sensors.length - 1);
-      this.b = { described, names, sensor, frames: await getNumbers('frames', { sensor, run }) };
-      this.message.textContent = '';
+      if (!app.run.sensors[own]) throw new Error('the run of this page has no sensors');
+      const run = await this.openRun(this.choice.value), [described, { names }] = await Promise.all([getJson('run', { run }), getJson('names', { run })]);
+      const { number: sensor, same } = matchSensor(app.run.sensors[own], described.sensors, own);
+      if (sensor < 0) throw new Error('it has no sensors');
+      const frames = await getNumbers('frames', { sensor, run });
+      if (turn !== this.turn) return;
+      this.b = { run, own, described, names, sensor, frames };
+      this.message.textContent = same ? '' : `B has no sensor ${nameOfSensor(app.run.sensors[own])}: its sensor ${nameOfSensor(described.sensors[sensor])} is shown.`;
       this.fillTable();
-      await Promise.all([this.follow(), this.loadPlots()]);
+      await Promise.all([this.follow(), this.loadPlots(turn)]);
     } catch (error) {
+      if (turn !== this.turn) return;
+      this.b = null;
+      this.panels = [];
+      this.table.replaceChildren();
+      this.plots.replaceChildren();
+      this.sides[1].clear('no run');
+      this.draw();
       this.message.textContent = `This run cannot be compared: ${error.message}`;
     }
   }
 
   // ---------------------------------------------------------------- frames
 
+  /** What a side shows. @param {number} run @param {any} described @param {number} sensor @param {Float64Array} frames @param {any} names */
+  static source(run, described, sensor, frames, names) {
+    const target = Number((Object.entries(names).find(([, name]) => name === described.sensors[sensor].target) || [-1])[0]);
+    return { run, name: described.name, sensor, sensorName: nameOfSensor(described.sensors[sensor]), target, frames, names };
+  }
+
   /** Shows the frames at the time of the page's frame. */
   async follow() {
-    const { app, b } = this;
-    if (!this.shown || !b || app.current < 0 || this.busy) return;
+    const { app } = this;
+    if (!this.shown || app.current < 0) return;
+    if (this.turn > 0 && this.asked !== app.sensor) { // the page shows another sensor now
+      await this.choose();
+      return;
+    }
+    if (!this.b || this.busy) return;
     this.busy = true;
     const own = Number(new URLSearchParams(location.search).get('run') || 0);
-    const targetOf = (described, sensor, names) => Number((Object.entries(names).find(([, name]) => name === described.sensors[sensor].target) || [-1])[0]);
     try {
-      for (let at = -1; at !== app.current;) { // it may have gone on meanwhile
+      for (let at = -1, b = null; this.b && app.current >= 0 && (at !== app.current || b !== this.b);) { // page or choice may have gone on meanwhile
         at = app.current;
+        b = this.b;
+        if (b.own !== app.sensor) break; // the choice for the new sensor is on its way, and calls again
         await Promise.all([
-          this.sides[0].load(own, app.run.name, app.sensor, targetOf(app.run, app.sensor, app.names), app.frames, app.names, at),
-          this.sides[1].load(this.other, b.described.name, b.sensor, targetOf(b.described, b.sensor, b.names), b.frames, b.names, nearestFrame(b.frames, app.timeOf(at))),
+          this.sides[0].load(Comparison.source(own, app.run, app.sensor, app.frames, app.names), at),
+          this.sides[1].load(Comparison.source(b.run, b.described, b.sensor, b.frames, b.names), nearestFrame(b.frames, app.timeOf(at))),
         ]);
+        if (!this.b) this.sides[1].clear('no run'); // a choice failed meanwhile
         this.draw();
         this.drawPlots();
       }
@@ -205,33 +264,37 @@ class Comparison {
 
   fillTable() {
     const summaries = [this.app.run, this.b.described].map(({ manifest }) => ({ ...manifest.summary, warnings: manifest.warnings, wall_time_s: manifest.wall_time_s }));
-    const rows = differences(...summaries).map(({ name, a, b }) => {
-      const row = make('tr', { className: a === b ? '' : 'differs' }, make('th', { scope: 'row', dir: 'auto', textContent: name.replace(/_/g, ' ') }));
-      for (const value of [a, b, b - a]) row.append(make('td', { textContent: shortNumber(value) }));
+    const rows = differences(...summaries).map((figure) => {
+      const { cells, differs } = rowOf(figure);
+      const row = make('tr', { className: differs ? 'differs' : '' }, make('th', { scope: 'row', dir: 'auto', textContent: figure.name.replace(/_/g, ' ') }));
+      for (const textContent of cells) row.append(make('td', { dir: 'auto', textContent }));
       return row;
     });
+    const caption = make('caption', { className: 'hint', textContent: 'Figures of the runs\' summaries: of the whole runs, whatever sensor is shown.' });
     const head = make('tr', {}, ...['Figure', `A ${shortName(this.app.run.name)}`, `B ${shortName(this.b.described.name)}`, 'B − A'].map((textContent) => make('th', { scope: 'col', dir: 'auto', textContent })));
-    this.table.replaceChildren(make('thead', {}, head), make('tbody', {}, ...rows));
+    this.table.replaceChildren(caption, make('thead', {}, head), make('tbody', {}, ...rows));
   }
 
   // ---------------------------------------------------------------- plots
 
-  async loadPlots() {
-    const { app, b } = this, own = app.run.sensors[app.sensor].panels, others = b.described.sensors[b.sensor].panels;
+  async loadPlots(turn) {
+    const { app, b } = this, own = app.run.sensors[b.own].panels, others = b.described.sensors[b.sensor].panels;
     const end = (frames) => (frames.length ? frames[frames.length - NUMBERS + 1] : 1);
-    const range = { from: 0, to: Math.max(end(app.frames), end(b.frames)), columns: 600 };
-    this.range = range;
-    this.panels = [];
+    const range = { from: 0, to: Math.max(end(app.frames), end(b.frames)), columns: 600 }, panels = [];
     for (const info of own.filter((panel) => others.some((other) => other.name === panel.name))) {
       const ask = async (sensor, run) => readLines(await getNumbers('plot', { sensor, panel: info.name, ...range, ...(run >= 0 ? { run } : {}) }), info.lines.length);
-      const [a, c] = await Promise.all([ask(app.sensor, -1), ask(b.sensor, this.other)]), canvas = make('canvas');
+      const [a, c] = await Promise.all([ask(b.own, -1), ask(b.sensor, b.run)]), canvas = make('canvas');
+      if (turn !== this.turn) return;
       canvas.setAttribute('role', 'img');
       canvas.setAttribute('aria-label', `${info.title}: run A as full lines, run B as broken ones`);
-      this.panels.push({ info, lines: [a, c], canvas });
+      panels.push({ info, lines: [a, c], canvas });
     }
-    this.plots.replaceChildren(...this.panels.map(({ info, canvas }) => {
+    this.range = range;
+    this.panels = panels;
+    const swatch = (k, more) => make('i', { className: `swatch swatch-${k % 3} ${more}` });
+    this.plots.replaceChildren(...panels.map(({ info, canvas }) => {
       const title = make('h3', { textContent: info.title + (info.unit ? ` [${info.unit}]` : '') });
-      const key = make('span', { className: 'hint', textContent: ` ${info.lines.join(', ')}; A ——, B – –` });
+      const key = make('span', { className: 'hint compare-key' }, ...info.lines.map((name, k) => make('span', {}, `${name}: A `, swatch(k, ''), ' B ', swatch(k, 'broken'))));
       title.append(key);
       return make('div', { className: 'compare-plot' }, title, canvas);
     }));
@@ -301,7 +364,7 @@ export async function open(box, app) {
   return {
     async shown() {
       comparison.shown = true;
-      if (!comparison.b) await comparison.list();
+      if (comparison.turn === 0) await comparison.list();
       else await comparison.follow();
     },
     hidden() { comparison.shown = false; },

@@ -41,11 +41,21 @@ function spansHere(spans, rows) {
   return spans.map((span) => ({ ...span, first: from(span.first), last: from(span.last + 1) - 1 })).filter((span) => span.first <= span.last);
 }
 
+/** Spans of all exposures of a sensor: an element for all frames. @type {Map<number, Promise<{around: number, spans: any[]}>>} */
+const spansOf = new Map();
+
+/** Spans of the exposures around a frame of this page, in its numbers. @param {number} sensor @param {number} frame */
+async function spansAround(sensor, frame) {
+  if (!spansOf.has(sensor)) spansOf.set(sensor, getJson('spans', { sensor }));
+  const { around, spans } = await spansOf.get(sensor), { rows } = about.sensors[sensor], first = rows[frame] - around, last = rows[frame] + around;
+  return spansHere(spans.filter((span) => span.last >= first && span.first <= last).map((span) => ({ ...span, first: Math.max(span.first, first), last: Math.min(span.last, last) })), rows);
+}
+
 /** @param {string} route @param {Record<string, string | number>} [query] */
 export async function getJson(route, query = {}) {
   const answer = JSON.parse(new TextDecoder().decode(await get(route, query)));
   if (route === 'session') about = answer.exported;
-  if (route === 'why' && answer.spans) answer.spans = spansHere(answer.spans, about.sensors[query.sensor].rows);
+  if (route === 'why' && answer.target) answer.spans = await spansAround(query.sensor, query.frame);
   return answer;
 }
 
