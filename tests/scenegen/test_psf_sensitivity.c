@@ -95,9 +95,9 @@ static void errors_beside_a_gaussian_are_those_of_hermite_functions(void **state
     assert_true(bst_flank_curve_at(&curve, 1e4) > 1.5);
 }
 
-/* Between its steps and beyond its end a curve is no less than the error itself, and no more than 4
- * % above: a step of a quarter of an octave, in which the error grows by at most 1.118, has 3 % at
- * a bend. */
+/* Between its steps and beyond its end a curve is no less than the error itself, and between them
+ * no more than 6 % above: from one to the next it grows by 1.25^(1/2) at most, in any place
+ * between. */
 static void curves_are_bounds_between_steps(void **state) {
     (void)state;
     bst_rng_key key = bst_rng_make_key(4, 0, "flank", "curve");
@@ -122,7 +122,7 @@ static void curves_are_bounds_between_steps(void **state) {
             }
             double at = bst_flank_curve_at(&curve, peak);
             assert_true(at >= worst * (1.0 - 1e-6)); /* kept as float */
-            assert_true(at <= worst * 1.04 || peak > 0x1p26);
+            assert_true(at <= worst * 1.06 || peak > 0x1p26);
         }
     }
 }
