@@ -38,10 +38,9 @@ double bst_flank_curve_at(const bst_flank_curve *curve, double light) {
     if (!(at > 0.0) || light == 0.0) {
         return (double)curve->at[0];
     }
-    if (at >= BST_FLANK_STEPS - 1) {
-        return (double)curve->at[BST_FLANK_STEPS - 1];
-    }
-    int n = (int)at;
-    double low = (double)curve->at[n], high = (double)curve->at[n + 1];
-    return low + (at - n) * (high - low);
+    /* the error grows with the light, at most as sqrt(light + 1), in each term of
+     * bst_flank_curve_make */
+    int n = at < BST_FLANK_STEPS - 1 ? (int)at : BST_FLANK_STEPS - 1;
+    double grown = (double)curve->at[n] * sqrt((light + 1.0) / (light_of(n) + 1.0));
+    return n + 1 < BST_FLANK_STEPS ? fmin(grown, (double)curve->at[n + 1]) : grown;
 }

@@ -45,7 +45,8 @@ void bst_flank_curve_make(const bst_light_flank *flank, bst_flank_curve *out);
 /* Raises a curve to another. */
 void bst_flank_curve_raise(bst_flank_curve *curve, const bst_flank_curve *other);
 
-/* Value of a curve for a peak of `light` times the dark variance. */
+/* Value of a curve for a peak of `light` times the dark variance: at least that of the flank, also
+ * between the steps and beyond the last one. */
 double bst_flank_curve_at(const bst_flank_curve *curve, double light);
 
 #endif

@@ -60,6 +60,9 @@ INLINE void draw_charges(bst_kernel_frame_params p, uint counter, const lanes *m
     lanes least = fmin(fmin(mean[0], mean[1]), fmin(mean[2], mean[3]));
     lanes most = fmax(fmax(mean[0], mean[1]), fmax(mean[2], mean[3]));
     int few = any_of(MASK(least < POISSON_SWITCH)), many = any_of(MASK(most >= POISSON_SWITCH));
+    for (int v = 0; v < 4; v++) {
+        drawn[v] = (lanes)0.0f;
+    }
     if (many) {
         chunk n = chunk_normal(chunk_random(p, counter, STREAM_POISSON_NORMAL));
         drawn[0] = poisson_expand(mean[0], n.a);
@@ -209,8 +212,9 @@ INLINE lanes gamma_lacks(global const float *table, lanes n, lanes z) {
 
 /* Charge of 16 pixels behind a multiplication register, over its gain: the mean stays, the variance
  * of n electrons is n (1 - 1 / gain), their law a gamma distribution of shape n (Basden, Haniff and
- * Mackay 2003, MNRAS 345, 985). Fractions of an electron, which traps leave, are rounded at random,
- * by the low bits of a word that gave z: these change z by less than 1e-4. */
+ * Mackay 2003, MNRAS 345, 985). Fractions of an electron, which traps, coupling, brighter-fatter and
+ * crosstalk leave, are rounded at random by the low 16 bits of a word that gave z. These bits change
+ * z by up to 6e-4 as bits of the angle, and by more in the tails as bits of the radius. */
 INLINE lanes multiply_charge(bst_kernel_frame_params p, global const float *table, lanes_uint word,
                              lanes z, lanes q) {
     lanes whole = floor(q), u = to_lanes(as_lanes_int(word & 0xFFFFu)) * 0x1p-16f;

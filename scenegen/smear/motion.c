@@ -3,6 +3,7 @@
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "boresight/vec.h"
 
@@ -102,4 +103,53 @@ double bst_smear_nodes_peak_share(const bst_smear_node *nodes, int count, double
     }
     double line = erf(0.5 / (psf_sigma_px * sqrt(2.0)));
     return best * line * line;
+}
+
+/* Where a straight part of a path, which begins within a ball, leaves it. Returned: share of the
+ * part, 2 if its end is within too. */
+static double leaves_ball(const double a[3], const double b[3], const double centre[3],
+                          double reach) {
+    double dd = 0.0, da = 0.0, aa = 0.0;
+    for (int i = 0; i < 3; i++) {
+        double d = b[i] - a[i], from = a[i] - centre[i];
+        dd += d * d;
+        da += d * from;
+        aa += from * from;
+    }
+    double free = reach * reach - aa; /* |a + t d - centre|^2 = reach^2 */
+    return !(dd + 2.0 * da > free) ? 2.0 : (sqrt(fmax(da * da + dd * free, 0.0)) - da) / dd;
+}
+
+/* Most light of the pieces into which a path is cut where it is `reach` away from the piece's first
+ * point. */
+static double most_light(const bst_smear_path_point *path, int count, double reach) {
+    double most = 0.0, begun = path[0].s, centre[3];
+    memcpy(centre, path[0].p, sizeof centre);
+    for (int k = 1; k < count; k++) {
+        const bst_smear_path_point *a = &path[k - 1], *b = &path[k];
+        double t = leaves_ball(a->p, b->p, centre, reach), light = b->s - a->s, length = 0.0;
+        if (t > 1.0) {
+            continue;
+        }
+        most = fmax(most, a->s + t * light - begun);
+        for (int i = 0; i < 3; i++) {
+            length += (b->p[i] - a->p[i]) * (b->p[i] - a->p[i]);
+        }
+        double piece = reach / sqrt(length), whole = floor((1.0 - t) / piece);
+        if (whole > 0.0) {
+            most = fmax(most, piece * light);
+            t = fmin(t + whole * piece, 1.0);
+        }
+        for (int i = 0; i < 3; i++) {
+            centre[i] = a->p[i] + t * (b->p[i] - a->p[i]);
+        }
+        begun = a->s + t * light;
+    }
+    return fmax(most, path[count - 1].s - begun);
+}
+
+bool bst_motion_rests(const bst_smear_path_point *path, int count, double reach_px) {
+    double light = most_light(path, count, reach_px);
+    return most_light(path, count, 0.25 * reach_px) > 0.6 * light ||
+           light > 0.6 * most_light(path, count, 4.0 * reach_px);
 }

@@ -21,6 +21,15 @@ double bst_motion_spread_px(const bst_smear_path_point *path, int count, double 
 void bst_motion_to_shift(bst_smear_path_point *point, double scale_rad, double stretch,
                          double roll_px);
 
+/* Returns true if a path rests: if a piece of it within reach_px / 4, or reach_px, has more than
+ * 0.6 of the light of any piece within four times as much. Of a long uniform motion it has a
+ * quarter. A path that reverses, and a uniform one of less than 1.7 reach_px, may count as rests.
+ *
+ * Given:     path  [count] in the order of time, count >= 1
+ * Notes:     Pieces follow each other in time: a jitter of more than reach_px / 4 may hide a rest.
+ */
+bool bst_motion_rests(const bst_smear_path_point *path, int count, double reach_px);
+
 /* Appends `parts` >= 1 nodes of equal weight at the midpoints of equal parts of the path's time;
  * count >= 2. Errors: BST_ERR_MEMORY. */
 bst_status bst_motion_midpoints(bst_ctx *ctx, const bst_smear_path_point *path, int count,

@@ -119,6 +119,11 @@ static void pose_at(const bst_smear *s, const bst_scene_source *source, double u
     }
 }
 
+/* Angle of the rotation from one attitude to another. */
+static double turn_between(bst_quat from, bst_quat to) {
+    return bst_vec3_norm(bst_quat_to_rotvec(bst_quat_mul(to, bst_quat_conj(from))));
+}
+
 /* Image motion in the exposure, px: of the body's origin, and of its parts by rotation. */
 static void measure(const bst_smear *s, const bst_scene_source *source, double *moved_px,
                     double *turned_px) {
@@ -128,9 +133,7 @@ static void measure(const bst_smear *s, const bst_scene_source *source, double *
     for (int k = 0; k <= PATH_TIMES; k++) {
         pose_at(s, source, (double)k / PATH_TIMES, NULL, &view, NULL, NULL);
         if (k > 0) {
-            bst_quat d =
-                bst_quat_mul(view.q_image_from_body, bst_quat_conj(before.q_image_from_body));
-            turn += bst_vec3_norm(bst_quat_to_rotvec(d));
+            turn += turn_between(before.q_image_from_body, view.q_image_from_body);
             double f = 1.0 / view.scale_rad;
             *moved_px +=
                 f *
@@ -257,9 +260,12 @@ static bst_status find_factor(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
 }
 
 /* Largest turn between poses of which the boxes are found, rad, if the body has no joints, is
- * BOX_RANGE radii away or more, and its range changes by BOX_RANGE_CHANGE at most: between them a
- * place is off the line by 1 / 8 of the square of the turn, of the radius. */
-#define BOX_TURN_RAD 0.28
+ * BOX_RANGE radii away or more, and its range changes by BOX_RANGE_CHANGE at most. Between them a
+ * place is off the line by 1 / 8 of the square of the turn, of the radius. Where the least turn
+ * from one to the other is BOX_DIRECT of the path or more, the path is off it by sqrt(1 -
+ * BOX_DIRECT^2) / 2 of its length. Both together are BOX_ROOM at most. */
+#define BOX_TURN_RAD 0.25
+#define BOX_DIRECT 0.9999
 #define BOX_ROOM 0.01
 #define BOX_RANGE 20.0
 #define BOX_RANGE_CHANGE 0.01
@@ -288,23 +294,24 @@ static bool find_box(const bst_smear *s, const bst_smear_body *b, const bst_scen
     double about[2][2] = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
     double origin[2][2] = {{INFINITY, INFINITY}, {-INFINITY, -INFINITY}};
     bst_resolved_view view = {.scale_rad = 0.0}, next;
+    bst_quat measured = {0.0, 0.0, 0.0, 1.0};
     low[0] = low[1] = INFINITY;
     high[0] = high[1] = -INFINITY;
     pose_at(s, source, t->u[0], NULL, &next, NULL, NULL);
     for (int k = 0; k < t->count; k++) {
         view = next;
-        double step = 0.0;
+        double step = 0.0, direct = 0.0; /* direct: from the last pose measured to the next one */
         if (k + 1 < t->count) {
             pose_at(s, source, t->u[k + 1], NULL, &next, NULL, NULL);
-            bst_quat d =
-                bst_quat_mul(next.q_image_from_body, bst_quat_conj(view.q_image_from_body));
-            step = bst_vec3_norm(bst_quat_to_rotvec(d));
+            step = turn_between(view.q_image_from_body, next.q_image_from_body);
+            direct = turn_between(measured, next.q_image_from_body);
         }
         double per_m = 1.0 / (view.origin_m.z * view.scale_rad);
         const double at[2] = {view.origin_m.x * per_m, view.origin_m.y * per_m};
         bool ends = k == 0 || k + 1 == t->count;
-        if (!skip || ends || turn + step > BOX_TURN_RAD) {
+        if (!skip || ends || turn + step > BOX_TURN_RAD || direct < BOX_DIRECT * (turn + step)) {
             double from[2], to[2];
+            measured = view.q_image_from_body;
             pose_at(s, source, t->u[k], b->pose, &view, NULL, NULL);
             if (!bst_resolved_box(b->pose, &view, from, to)) {
                 return false;

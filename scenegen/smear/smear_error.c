@@ -97,11 +97,13 @@ static double higher_part(const bst_smear *s, const bst_smear_drawn *d) {
 
 /* Error of the worst pixel, in its sigma, of a source whose greatest error is that of its peak:
  * beside the peak there is less noise, but not always less error. Along a path there is more light
- * than beside a point. bound: of a Gaussian much wider than its pixels. */
+ * than beside a point, where the path rests as a point. bound: of a Gaussian much wider than its
+ * pixels. */
 static double flank_of(const bst_smear *s, const bst_smear_drawn *d, double bound) {
     double wide = d->high[0] - d->low[0], high = d->high[1] - d->low[1],
            streak = BST_STREAK_SIGMAS * s->sigma_px;
-    int f = wide * wide + high * high >= streak * streak ? BST_FLANK_STREAK : BST_FLANK_POINT;
+    bool moves = wide * wide + high * high >= streak * streak && !d->level->rests;
+    int f = moves ? BST_FLANK_STREAK : BST_FLANK_POINT;
     double light = s->last_read_e / s->dark_variance_e2;
     double any = bst_flank_curve_at(&s->flanks[f], light), part = higher_part(s, d);
     if (!s->sensitivity) {

@@ -29,6 +29,7 @@ typedef struct bst_smear_level {
      * in the image is not that of the curves */
     double higher_part[BST_NODE_SCALES];
     bst_flank_curve flank[BST_FLANKS]; /* with the PSF's sensitivity */
+    bool rests;                        /* as of bst_smear_node_list */
     bool alike;                        /* predicted errors are the bounds: all groups are short */
     double widening_px2;               /* largest mean widening of the nodes at one place */
 } bst_smear_level;

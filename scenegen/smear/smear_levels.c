@@ -14,6 +14,7 @@ bst_status bst_smear_path_nodes(bst_ctx *ctx, bst_smear *s, const bst_smear_path
     if (parts > 0.0) {
         return bst_motion_midpoints(ctx, path, count, (int)parts, &s->nodes);
     }
+    s->nodes.rests |= bst_motion_rests(path, count, BST_STREAK_SIGMAS * s->sigma_px);
     double further = s->options.smoothed_variance_px2 - s->sigma_px * s->sigma_px;
     if (!(s->options.node_sigma_px > 0.0)) { /* another PSF contains the pixel */
         further = 1.0 / 12.0;
@@ -125,7 +126,7 @@ static void set_flanks(const bst_smear *s, const bst_smear_node_list *list, bst_
  * BST_TABLE_ROWS. */
 static void describe_nodes(const bst_smear *s, const bst_smear_node_list *list, to_table column,
                            float *table, bst_smear_level *out) {
-    *out = (bst_smear_level){.blocks = blocks_of(list)};
+    *out = (bst_smear_level){.blocks = blocks_of(list), .rests = list->rests};
     double widest = set_profile_error(s, list, out);
     double part[BST_NODE_PARTS];
     bst_smear_nodes_parts(list->items, list->count, s->sigma_px, s->options.node_sigma_px > 0.0,

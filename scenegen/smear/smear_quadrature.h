@@ -48,6 +48,7 @@ typedef struct bst_smear_node_list {
      * derivatives are not known by direction */
     double higher[BST_NODE_SCALES];
     unsigned orders, directions;
+    bool rests; /* a path of the nodes rests somewhere (bst_motion_rests) */
 } bst_smear_node_list;
 
 /* Largest widening of a node, PSF variances. */

@@ -107,6 +107,7 @@ void bst_smear_nodes_clear(bst_smear_node_list *list) {
     memset(list->predicted, 0, sizeof list->predicted);
     memset(list->higher, 0, sizeof list->higher);
     list->orders = list->directions = 0U;
+    list->rests = false;
 }
 
 void bst_smear_nodes_parts(const bst_smear_node *nodes, int count, double psf_sigma_px,

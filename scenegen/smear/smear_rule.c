@@ -387,7 +387,8 @@ static double next_peak(const bst_smear_maker *m, const bst_smear_direction_part
 }
 
 /* Greatest derivative of a rule's order in the directions of a group, smoothed by a variance over
- * that of the PSF, over the bound. Chords of a convex function are above it. */
+ * that of the PSF, over the bound. Chords are above it where the OTF has one sign: it is
+ * then a sum of exp(-w^2 variance / 2) over frequencies, which is convex. */
 static double smoothed_part(const bst_smear_maker *m, const bst_smear_direction_parts *along,
                             const bst_smear_rule *r, double variance) {
     double at = variance * BST_SMOOTH_PER, worst = 0.0;

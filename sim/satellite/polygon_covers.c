@@ -403,8 +403,14 @@ BST_CLONES_256 static int keep(const bst_point2 *p, int count, const bounds *wit
             *cut |= keep_side(&left, set->sides[indices[i]], room, &at, &spare);
         }
     }
+    /* two corners of one place but for rounding, as a cut through a corner leaves them, have no
+     * side between them */
+    double tiny = TINY * (within->high[0] - within->low[0] + within->high[1] - within->low[1]);
     for (int i = 0; i < count && left.count > 0 && swap; i++) {
         bst_point2 a = p[i], b = p[after(i, count)], way = {b.x - a.x, b.y - a.y};
+        if (!(fabs(way.x) > tiny || fabs(way.y) > tiny)) {
+            continue;
+        }
         const bst_half_plane side = {-way.y, way.x, way.y * a.x - way.x * a.y};
         (void)keep_side(&left, side, room, &at, &spare);
     }

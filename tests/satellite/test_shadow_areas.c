@@ -171,6 +171,60 @@ static void corners_of_sets_change_no_area(void **state) {
     bst_polygon_covers_free(&without);
 }
 
+/* A cut through a corner leaves two corners within rounding, with a side of a random direction,
+ * which must not cut the set that is cut by the polygon. */
+static void cuts_through_corners_change_no_area(void **state) {
+    enum { CORNERS = 48 };
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_polygon_covers covers[2]; /* with and without corners */
+    bst_assert_ok(&ctx, bst_polygon_covers_create(&ctx, &covers[0]));
+    bst_assert_ok(&ctx, bst_polygon_covers_create(&ctx, &covers[1]));
+    uint64_t random = 7;
+    int partial = 0;
+    for (int i = 0; i < 10000; i++) {
+        bst_point2 whole[3], round[CORNERS], middle = {0.0, 0.0};
+        double turn = 2.0 * BST_PI * bst_test_uniform(&random), area[2];
+        for (int k = 0; k < 3; k++) {
+            double a = turn + 2.0 * BST_PI * (k + 0.6 * bst_test_uniform(&random)) / 3.0;
+            whole[k] = (bst_point2){0.5 + cos(a), 0.3 + sin(a)};
+            middle.x += whole[k].x / 3.0;
+            middle.y += whole[k].y / 3.0;
+        }
+        double x = 0.2 + 0.6 * bst_test_uniform(&random), y = 0.6 * bst_test_uniform(&random);
+        double radius = 0.3 + 1.2 * bst_test_uniform(&random);
+        double angle = 2.0 * BST_PI * bst_test_uniform(&random);
+        for (int k = 0; k < CORNERS; k++) {
+            double a = 2.0 * BST_PI * k / CORNERS + angle;
+            round[k] = (bst_point2){x + radius * cos(a), y + 0.7 * radius * sin(a)};
+        }
+        const bst_point2 corner = whole[i % 3];
+        double tilt = 0.4 * (bst_test_uniform(&random) - 0.5), cut = 2.0 * BST_PI * tilt / 0.4;
+        double dx = middle.x - corner.x, dy = middle.y - corner.y, length = 0.3 + tilt + 0.2;
+        double u = dx * cos(tilt) - dy * sin(tilt), v = dx * sin(tilt) + dy * cos(tilt);
+        const bst_point2 from = {corner.x - length * v, corner.y + length * u};
+        double ex = corner.x - from.x, ey = corner.y - from.y;
+        const bst_half_plane through = {-ey, ex, ey * from.x - ex * from.y};
+        const bst_half_plane across = {cos(cut), sin(cut),
+                                       0.2 - cos(cut) * middle.x - sin(cut) * middle.y};
+        for (int k = 0; k < 2; k++) {
+            bst_polygon_covers_clear(&covers[k]);
+            add_round(&covers[k], round, CORNERS, across, k == 0);
+            assert_true(bst_polygon_covers_end(&covers[k]));
+            assert_true(bst_polygon_covers_add(&covers[k], through));
+            assert_true(bst_polygon_covers_add(&covers[k], across));
+            assert_true(bst_polygon_covers_end(&covers[k]));
+            area[k] = bst_polygon_uncovered_area(&covers[k], whole, 3);
+        }
+        /* half planes of coordinates about 1; a side that is left out is below 1e-12 long */
+        bst_assert_close(area[0], area[1], 1e-9);
+        partial += area[0] > 1e-9 && area[0] < bst_polygon_area(whole, 3) - 1e-9;
+    }
+    assert_true(partial > 5000);
+    bst_polygon_covers_free(&covers[0]);
+    bst_polygon_covers_free(&covers[1]);
+}
+
 /* Half planes that do not cross a polygon do not change the area. */
 static void crossing_sides_suffice(void **state) {
     (void)state;
@@ -334,6 +388,7 @@ int main(void) {
         cmocka_unit_test(squares_have_closed_forms),
         cmocka_unit_test(intersections_agree_with_pieces),
         cmocka_unit_test(corners_of_sets_change_no_area),
+        cmocka_unit_test(cuts_through_corners_change_no_area),
         cmocka_unit_test(crossing_sides_suffice),
         cmocka_unit_test(areas_agree_with_pieces),
         cmocka_unit_test(many_corners_hide_a_whole_facet),

@@ -469,6 +469,47 @@ static void charge_is_multiplied(void **state) {
     bst_assert_close(bst_camera_noise_e(&f->camera, 100.0, 0.5), sqrt(107.0 * 1.75 + 9.0), 1e-12);
 }
 
+/* Variance of rounding a charge at random of which a pixel's neighbours, by Poisson counts of the
+ * same mean, give `share` of the difference. */
+static double rounding_variance(double mean, double share) {
+    double sum = 0.0, own = exp(-mean);
+    for (int n = 0; n < 80; n++, own *= mean / n) {
+        double near = exp(-4.0 * mean);
+        for (int m = 0; m < 250; m++, near *= 4.0 * mean / m) {
+            double q = share * (m - 4.0 * n), part = q - floor(q);
+            sum += own * near * part * (1.0 - part);
+        }
+    }
+    return sum;
+}
+
+/* Charge with fractions of an electron about BST_MULTIPLY_FEW, where the table of the register's
+ * law ends. */
+static void fractions_of_electrons_are_multiplied(void **state) {
+    static double frame[PIXELS];
+    const double mean_e = 15.5, share = 0.02, own = 1.0 - 4.0 * share;
+    fixture *f = open_with(state, mean_e, 0.0);
+    f->camera.gain_e_per_dn = 0.002;
+    f->camera.detector.em_gain = 1e5;
+    f->camera.detector.interpixel_coupling = share;
+    make(f);
+    expose(f, 0, frame);
+    double mean = 0.0, var = 0.0;
+    for (int i = 0; i < PIXELS; i++) {
+        mean += frame[i] / PIXELS;
+    }
+    for (int i = 0; i < PIXELS; i++) {
+        var += (frame[i] - mean) * (frame[i] - mean) / PIXELS;
+    }
+    /* of what neighbours share, of rounding, of the register; edges are 2 % of the pixels, by less
+     * than 0.1 e-^2 each */
+    double want = mean_e * (own * own + 4.0 * share * share) + rounding_variance(mean_e, share) +
+                  mean_e * (1.0 - 1e-5);
+    bst_assert_close(mean, mean_e, 4.0 * sqrt(2.0 * mean_e / PIXELS));
+    /* the fourth moment is 3.4 times the square of the variance */
+    bst_assert_close(var, want, 4.0 * want * sqrt(2.4 / PIXELS) + 0.002);
+}
+
 static void edges_and_outputs_fit_the_frame(void **state) {
     fixture *f = *state;
     bst_detector_config d = {.shielded = {60, 40, 0, 0}};
@@ -521,6 +562,7 @@ int main(void) {
         cmocka_unit_test(charge_is_kept_and_stays_out_of_the_overscan),
         cmocka_unit_test(saturation_is_that_of_collected_charge),
         cmocka_unit_test(charge_is_multiplied),
+        cmocka_unit_test(fractions_of_electrons_are_multiplied),
         cmocka_unit_test(edges_and_outputs_fit_the_frame),
     };
     return cmocka_run_group_tests(tests, open_device, close_device);

@@ -150,6 +150,27 @@ static void motion_that_reverses(void **state) {
     scene_track_free(&t);
 }
 
+/* Two stares with a drift, and a jump without light: two points are no streak, with less light
+ * beside them. */
+static void two_stares_of_a_bright_star(void **state) {
+    const double fwhm_px[] = {0.84, 1.2}, drift_sigmas[] = {0.6, 1.06, 2.4};
+    double time_s[] = {0.0, 0.25 - 1e-7, 0.25 + 1e-7, 0.5};
+    bst_quat q[4];
+    const bst_los_track track = {4, time_s, q};
+    for (int n = 0; n < 6; n++) {
+        double drift = drift_sigmas[n % 3] * fwhm_px[n / 3] / 2.3548;
+        const double tilt_px[] = {0.0, drift, 20.5 + drift, 20.5 + 2.0 * drift};
+        for (int k = 0; k < 4; k++) {
+            q[k] = bst_quat_from_rotvec((bst_vec3){tilt_px[k] * 3.0 * BST_ARCSEC_RAD, 0.0, 0.0});
+        }
+        hard_case c = make_case(&track, NULL, 1);
+        c.camera.psf_fwhm_px = fwhm_px[n / 3];
+        bst_scene_source star = scene_star(&c.camera, 80.0 + 0.25 * n, 64.0, 3e5);
+        c.sources = &star;
+        assert_true(check(*state, &c) > 1e5);
+    }
+}
+
 static void a_star_that_enters_through_a_corner(void **state) {
     bst_camera camera = scene_camera(160, 128);
     /* 100 px along the diagonal through pixel (0, 0) */
@@ -412,6 +433,7 @@ int main(void) {
         cmocka_unit_test(a_full_turn_about_the_boresight),
         cmocka_unit_test(a_full_turn_across_the_sky),
         cmocka_unit_test(motion_that_reverses),
+        cmocka_unit_test(two_stares_of_a_bright_star),
         cmocka_unit_test(a_star_that_enters_through_a_corner),
         cmocka_unit_test(narrow_and_wide_psf),
         cmocka_unit_test(one_pixel_and_no_star),

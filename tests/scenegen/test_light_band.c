@@ -1,6 +1,7 @@
 /* What a Gaussian PSF asks of stamps and of the Fourier path: closed forms by the error function,
  * and sums over a fine grid of frequencies by numpy. No device. */
 #include "scenegen/fourier/fourier_grid.h"
+#include "scenegen/smear/gaussian_flank.h"
 #include "scenegen/smear/smear_internal.h"
 #include "scenegen/stamp/stamp.h"
 #include "tests/test_support.h"
@@ -52,8 +53,27 @@ static void light_beside_a_stamp(void **state) {
     s.last_read_e = 400.0;
     s.last_peak_e = 120.0;
     bst_stamp_init(&s.stamp, SIGMA, false);
-    for (int r = 1; r < 4; r++) {
-        const bst_smear_drawn d = {.radius = r, .error = 0.01, .predicted = 0.004};
+    bst_flank_curve curves[BST_FLANKS];
+    bst_light_flank beside;
+    for (int f = 0; f < BST_FLANKS; f++) {
+        double streak = f == BST_FLANK_STREAK ? SIGMA * BST_STREAK_SIGMAS : 0.0;
+        bst_gaussian_flank_measure(SIGMA, 2, streak * streak / 12.0, &beside);
+        bst_flank_curve_make(&beside, &curves[f]);
+    }
+    s.flanks = curves;
+    /* noise at 0.76 of the peak's light, and beside the peak */
+    double flank = sqrt((400.0 + 9.0) / (0.76 * 400.0 + 9.0));
+    double point = fmax(bst_flank_curve_at(&curves[BST_FLANK_POINT], 400.0 / 9.0), flank);
+    double along = fmax(bst_flank_curve_at(&curves[BST_FLANK_STREAK], 400.0 / 9.0), flank);
+    assert_true(along < point);
+    for (int n = 0; n < 9; n++) {
+        int r = 1 + n % 3; /* at rest, along a path, along one that rests */
+        const bst_smear_level level = {.rests = n >= 6};
+        const bst_smear_drawn d = {.radius = r,
+                                   .error = 0.01,
+                                   .predicted = 0.004,
+                                   .level = &level,
+                                   .high = {n < 3 ? 0.0 : 3.0 * SIGMA, 0.0}};
         bst_smear_set_error(&s, &d);
         double kept = primitive(r + 1.5, SIGMA) - primitive(r + 0.5, SIGMA);
         double tail = share(r + 0.5, r + 1.5, SIGMA) / share(-0.5, 0.5, SIGMA);
@@ -62,7 +82,10 @@ static void light_beside_a_stamp(void **state) {
         bst_assert_close((double)e->excess_e, 400.0 * (1.0 / (kept * kept) - 1.0),
                          0.16 / (SIGMA * SIGMA) / pow(kept, 3));
         bst_assert_close((double)e->border_e, 120.0 * 2.0 * tail, 1e-4);
-        assert_true((double)e->nodes_e > 400.0 * 0.01 && e->predicted_e < e->nodes_e);
+        /* positions in steps of 2^-22 px and sums in float */
+        bst_assert_close((double)e->nodes_e, 400.0 * flank * 0.01, 1e-3);
+        double there = n >= 3 && n < 6 ? along : point;
+        bst_assert_close((double)e->predicted_e, 400.0 * there * 0.004, 1e-3);
     }
 }
 

@@ -109,6 +109,30 @@ static void midpoints_of_equal_parts(void **state) {
     free(list.items);
 }
 
+/* Moves of some px by shares of the light, one after the other: does the path rest, by 2.5 px? */
+static void paths_that_rest(void **state) {
+    (void)state;
+    static const struct {
+        double px[4], light[4];
+        bool rests;
+    } cases[] = {{{3.0, 3.0, 3.0, 3.0}, {0.25, 0.25, 0.25, 0.25}, false},
+                 {{100.0, 100.0, 100.0, 1e3}, {0.08, 0.08, 0.08, 0.76}, false},
+                 {{0.0, 10.0, 0.0, 0.0}, {0.5, 0.0, 0.25, 0.25}, true},
+                 {{1.5, 10.0, 1.0, 0.5}, {0.5, 0.01, 0.24, 0.25}, true},
+                 {{500.0, 0.01, 500.0, 1.0}, {0.49, 0.02, 0.489, 0.001}, true},
+                 {{0.3, 3.0, 0.2, 0.1}, {0.5, 0.0, 0.3, 0.2}, true}};
+    for (size_t n = 0; n < sizeof cases / sizeof *cases; n++) {
+        bst_smear_path_point path[5] = {{{7.0, -3.0, 0.0}, 0.0}};
+        for (int k = 0; k < 4; k++) {
+            path[k + 1] = path[k];
+            path[k + 1].p[0] += 0.6 * cases[n].px[k];
+            path[k + 1].p[1] += 0.8 * cases[n].px[k];
+            path[k + 1].s += cases[n].light[k];
+        }
+        assert_int_equal(bst_motion_rests(path, 5, 2.5), cases[n].rests);
+    }
+}
+
 /* Brightness 1 until 0.4 of the exposure, up to 1.8 at 0.6, down to 0.4 at its end. */
 static void stretches_end_at_knots_and_follow_the_brightness(void **state) {
     (void)state;
@@ -391,6 +415,7 @@ int main(void) {
         cmocka_unit_test(a_rotation_becomes_the_shift_of_the_boresight),
         cmocka_unit_test(corner_stars_move_otherwise_by_as_much),
         cmocka_unit_test(midpoints_of_equal_parts),
+        cmocka_unit_test(paths_that_rest),
         cmocka_unit_test(stretches_end_at_knots_and_follow_the_brightness),
         cmocka_unit_test(the_main_axis_of_a_matrix),
         cmocka_unit_test(errors_between_scales),

@@ -466,6 +466,38 @@ static void test_turning_beam(void **state) {
     bst_test_model_close(&s.model);
 }
 
+/* A camera that rolls by 0.14 rad and back: the beam at the turning point, where the last pose that
+ * is like the first one is far off in the path. */
+static void test_camera_that_swings(void **state) {
+    enum { SAMPLES = 101 };
+    fixture *f = *state;
+    bst_camera camera = small_camera();
+    static const char beam[] =
+        MATERIAL "\"kind\": \"plate\", \"size_m\": [5.0, 0.3, 0], \"material\": \"m\"}]}";
+    static float images[2][SIDE * SIDE];
+    const double place[2] = {63.5, 63.5}, sun[3] = {0.0, 0.0, 1.0};
+    double sum[2] = {0.0}, time_s[SAMPLES];
+    bst_quat attitudes[SAMPLES];
+    scene s;
+    make_scene(&s, &camera, beam, bst_quat_from_rotvec((bst_vec3){BST_PI, 0.0, 0.0}), place, sun,
+               1e4);
+    for (int n = 0; n < 2; n++) { /* at rest, swinging */
+        bst_render_stats stats;
+        for (int k = 0; k < SAMPLES; k++) {
+            double u = (double)k / (SAMPLES - 1), swing = n * 0.07 * (1.0 - cos(2.0 * BST_PI * u));
+            time_s[k] = u;
+            attitudes[k] = bst_quat_from_rotvec((bst_vec3){0.0, 0.0, swing});
+        }
+        const bst_los_track track = {SAMPLES, time_s, attitudes};
+        draw_along(f, &camera, &track, &s.source, images[n], &stats);
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            sum[n] += (double)images[n][i];
+        }
+    }
+    bst_assert_close(sum[1], sum[0], 1e-3 * sum[0]); /* as of the turning beam */
+    bst_test_model_close(&s.model);
+}
+
 /* A plate covers a star from mid-exposure on: its trail is that of the first half. */
 static void test_star_behind_a_plate(void **state) {
     fixture *f = *state;
@@ -509,8 +541,9 @@ static void test_star_behind_a_plate(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_hand_over),           cmocka_unit_test(test_boxes),
-        cmocka_unit_test(test_turning_beam),        cmocka_unit_test(test_joint_at_a_burn),
-        cmocka_unit_test(test_star_behind_a_plate), cmocka_unit_test(test_sphere_and_cylinder)};
+        cmocka_unit_test(test_hand_over),          cmocka_unit_test(test_boxes),
+        cmocka_unit_test(test_camera_that_swings), cmocka_unit_test(test_turning_beam),
+        cmocka_unit_test(test_joint_at_a_burn),    cmocka_unit_test(test_star_behind_a_plate),
+        cmocka_unit_test(test_sphere_and_cylinder)};
     return cmocka_run_group_tests(tests, open_device, close_device);
 }
