@@ -5,7 +5,7 @@
 #include <cjson/cJSON.h>
 
 /* Cuts the path up to the folder of the run out of all texts of a JSON value, in place:
- * "/home/me/runs/demo/frames.fits: cannot be opened" becomes "demo/frames.fits: cannot be opened".
+ * "/some/one/runs/demo/frames.fits: cannot be opened" becomes "demo/frames.fits: cannot be opened".
  *
  * Given:     node    with its children; NULL is allowed
  *            folder  of the run, as it was given; its absolute path is cut, too */

@@ -24,22 +24,22 @@ static void expect(const char *folder, const char *text, const char *cut) {
 
 static void test_paths_are_cut(void **state) {
     (void)state;
-    expect("/home/me/x", "/home/me/x/frames.fits: cannot be opened",
+    expect("/some/one/x", "/some/one/x/frames.fits: cannot be opened",
            "x/frames.fits: cannot be opened");
-    expect("/home/me/x.partial//", "'/home/me/x.partial' and /home/me/x/run.sqlite",
+    expect("/some/one/x.partial//", "'/some/one/x.partial' and /some/one/x/run.sqlite",
            "'x.partial' and x/run.sqlite");
     expect("runs/x", "runs/x/frames.fits", "x/frames.fits");
-    expect("/home/me/x", "/home/me/home/me/x", "home/me/x");
+    expect("/some/one/x", "/some/one/some/one/x", "some/one/x");
 }
 
 static void test_other_texts_stay(void **state) {
     (void)state;
-    expect("/home/me/x", "/data/home/me/x: no such file", "/data/home/me/x: no such file");
+    expect("/some/one/x", "/data/some/one/x: no such file", "/data/some/one/x: no such file");
     expect("runs/x", "other_runs/x, 3/4 of /tmp/runs/x", "other_runs/x, 3/4 of /tmp/runs/x");
     expect("x", "a/x and x/frames.fits", "a/x and x/frames.fits");
     expect("/x", "/usr/share/x", "/usr/share/x");
     expect("", "a/x", "a/x");
-    bst_view_cut_path(NULL, "/home/me/x");
+    bst_view_cut_path(NULL, "/some/one/x");
 }
 
 /* A folder that is named from the working directory stands with its whole path in messages. */

@@ -203,7 +203,6 @@ bst_status bst_engine_step_tick(bst_ctx *ctx, bst_engine *engine, bst_heap *heap
 
 /* Steps all due module instances up to a tick. */
 static bst_status run_until(bst_ctx *ctx, bst_engine *engine, int64_t until_tick) {
-    double asked = bst_wall_seconds();
     int since_clock = 0;
     const bool by_clock = bst_pacing_by_clock(engine);
     engine->paused = false;
@@ -225,8 +224,8 @@ static bst_status run_until(bst_ctx *ctx, bst_engine *engine, int64_t until_tick
         if (engine->hooks.interrupted && (++since_clock >= 256 || long_step)) {
             since_clock = 0;
             double now = bst_wall_seconds();
-            if (now - asked > 0.02) {
-                asked = now;
+            if (now - engine->asked_s > 0.02) {
+                engine->asked_s = now;
                 if (engine->hooks.interrupted(engine->hooks.user, tick)) {
                     return bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted at %.3f s",
                                     (double)tick / (double)engine->tick_rate_hz);

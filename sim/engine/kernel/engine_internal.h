@@ -133,6 +133,8 @@ struct bst_engine {
     bst_heap heap; /* of all instances; unused with an executor */
     int *place;    /* [instance] index in its heap */
     bst_engine_hooks hooks;
+    double
+        asked_s; /* wall time of the last call of hooks.interrupted, also of an earlier advance */
     int64_t tick;
     bool loaded;
     bool paused;       /* an observer has asked for the end of bst_engine_advance */

@@ -147,11 +147,10 @@ static void interrupt(bst_executor *x) {
 /* The calling thread works until the run is complete, and polls for interrupts every 20 ms. */
 static void work_to_end(bst_executor *x) {
     const bst_engine_hooks *hooks = &x->engine->hooks;
-    double asked = bst_wall_seconds();
     while (!finished(x)) {
         double now = bst_wall_seconds();
-        if (hooks->interrupted && !x->interrupted && now - asked > 0.02) {
-            asked = now;
+        if (hooks->interrupted && !x->interrupted && now - x->engine->asked_s > 0.02) {
+            x->engine->asked_s = now;
             int64_t tick = x->engine->tick;
             pthread_mutex_unlock(&x->lock);
             bool interrupted = hooks->interrupted(hooks->user, tick);
