@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "sim/core/folder.h"
+#include "sim/io/draft_file.h"
 #include "sim/io/run_files.h"
 #include "sim/io/run_internal.h"
 
@@ -316,6 +317,7 @@ bst_status bst_run_reopen(bst_ctx *ctx, const char *out_path, bool overwrite, bs
         status = lock_again(ctx, run);
     }
     if (status == BST_OK) {
+        bst_draft_sweep(run->folder); /* of a killed run; the lock is held */
         status = bst_run_open_database(ctx, run);
     }
     if (status != BST_OK) {
