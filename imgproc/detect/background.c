@@ -8,6 +8,7 @@
 #include "imgproc/detect/row_kernels.h"
 #include "imgproc/detect/simd_layout.h"
 #include "imgproc/detect/truncated_moments.h"
+#include "imgproc/value_of_rank.h"
 #include "sim/core/pages.h"
 
 /* least pixel noise, in ADC steps: the quantisation noise 1 / sqrt(12) */
@@ -72,37 +73,6 @@ void bst_background_free(bst_background *b) {
     bst_pages_free(b->bands);
     free(b->lent);
     *b = (bst_background){0};
-}
-
-/* The k-th smallest of `values`, which are reordered (Hoare's quickselect, median of three). */
-static float select_kth(float *values, int count, int k) {
-    int lo = 0, hi = count - 1;
-    while (lo < hi) {
-        float a = values[lo], b = values[lo + (hi - lo) / 2], c = values[hi];
-        float pivot = a < b ? (b < c ? b : (a < c ? c : a)) : (a < c ? a : (b < c ? c : b));
-        int i = lo, j = hi;
-        while (i <= j) {
-            while (values[i] < pivot) {
-                i++;
-            }
-            while (values[j] > pivot) {
-                j--;
-            }
-            if (i <= j) {
-                float swap = values[i];
-                values[i++] = values[j];
-                values[j--] = swap;
-            }
-        }
-        if (k <= j) {
-            hi = j;
-        } else if (k >= i) {
-            lo = i;
-        } else {
-            break;
-        }
-    }
-    return values[k];
 }
 
 /* The pixels of one mesh of the background. */
@@ -318,7 +288,7 @@ static void smooth_meshes(bst_background *b, float *values, bool of_noise) {
 /* Median of a map over all meshes. */
 static float median_of(bst_background *b, const float *values, int count) {
     memcpy(b->scratch, values, (size_t)count * sizeof(float));
-    return select_kth(b->scratch, count, count / 2);
+    return bst_value_of_rank(b->scratch, count, count / 2);
 }
 
 /* Slope of the level along one axis, e- per mesh: the smaller one-sided difference, 0 if the signs
@@ -423,14 +393,14 @@ static void fill_gaps(bst_background *b, float step_e) {
         }
     }
     if (kept > 0) {
-        b->median_level = select_kth(b->scratch, kept, kept / 2);
+        b->median_level = bst_value_of_rank(b->scratch, kept, kept / 2);
         kept = 0;
         for (int k = 0; k < count; k++) {
             if (b->noise[k] > 0.0f) {
                 b->scratch[kept++] = b->noise[k];
             }
         }
-        b->median_noise = select_kth(b->scratch, kept, kept / 2);
+        b->median_noise = bst_value_of_rank(b->scratch, kept, kept / 2);
     }
     for (int k = 0; k < count; k++) {
         if (!(b->noise[k] > 0.0f)) {

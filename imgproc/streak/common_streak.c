@@ -7,7 +7,7 @@
 
 #include "boresight/vec.h"
 #include "imgproc/streak/common_streak_internal.h"
-#include "imgproc/streak/value_of_rank.h"
+#include "imgproc/value_of_rank.h"
 
 /* LINE_HALF: samples of a line on either side of a pixel, LINE_STEP px apart. */
 enum { LINE_HALF = 5, LINE_STEP = 2, LINE_REACH = 11, DIRECTIONS = 16 };

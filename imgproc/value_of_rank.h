@@ -1,6 +1,6 @@
 /* Selection by rank: medians without sorting. */
-#ifndef BST_IMGPROC_STREAK_VALUE_OF_RANK_H
-#define BST_IMGPROC_STREAK_VALUE_OF_RANK_H
+#ifndef BST_IMGPROC_VALUE_OF_RANK_H
+#define BST_IMGPROC_VALUE_OF_RANK_H
 
 /* The value that would be at place k in ascending order.
  *
@@ -10,7 +10,9 @@
 static inline float bst_value_of_rank(float *values, int count, int k) {
     int low = 0, high = count - 1;
     while (low < high) {
-        float pivot = values[low + (high - low) / 2];
+        /* median of three */
+        float a = values[low], b = values[low + (high - low) / 2], c = values[high];
+        float pivot = a < b ? (b < c ? b : (a < c ? c : a)) : (a < c ? a : (b < c ? c : b));
         int i = low, j = high;
         while (i <= j) {
             while (values[i] < pivot) {
