@@ -107,12 +107,10 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r) {
 }
 
 bst_status bst_renderer_prepare(bst_ctx *ctx, bst_renderer *r) {
-    BST_TRY(bst_scene_boxes_prepare(ctx, &r->boxes));
-    if (!bst_detector_is_staged(r->detector)) {
-        return build_frame(ctx, r);
-    }
-    BST_TRY(build_expected(ctx, r));
-    return bst_readout_prepare(ctx, r->readout);
+    const bool staged = bst_detector_is_staged(r->detector);
+    BST_TRY(staged ? build_expected(ctx, r) : build_frame(ctx, r));
+    BST_TRY(bst_scene_boxes_prepare(ctx, &r->boxes, staged ? r->expected_kernel : r->frame_kernel));
+    return staged ? bst_readout_prepare(ctx, r->readout) : BST_OK;
 }
 
 static bst_status grow(bst_ctx *ctx, bst_renderer *r, bst_device_array *g, size_t bytes) {
@@ -304,7 +302,7 @@ static bst_status make_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_requ
 }
 
 /* Uploads sources and tables and enqueues the kernel of their boxes. */
-static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r) {
+static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r, cl_kernel tile_kernel) {
     const bst_scene_plan *plan = &r->plan;
     int table_blocks;
     const float *table = bst_smear_table(r->smear, &table_blocks);
@@ -322,7 +320,8 @@ static bst_status enqueue_nodes(bst_ctx *ctx, bst_renderer *r) {
                                          .blocks = plan->blocks,
                                          .boxes = plan->boxes,
                                          .sources = r->sources,
-                                         .table = r->table};
+                                         .table = r->table,
+                                         .tile_kernel = tile_kernel};
     return bst_scene_boxes_enqueue(ctx, &r->boxes, r->queue, &input);
 }
 
@@ -369,7 +368,7 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
     }
     bst_kernel_frame_params p =
         bst_render_params(&r->fixed, &r->camera, &r->options, q, r->plan.count);
-    BST_TRY(enqueue_nodes(ctx, r));
+    BST_TRY(enqueue_nodes(ctx, r, to->kernel));
     p.blocks = r->plan.blocks;
     p.image_stride = to->stride > 0 ? to->stride : p.image_stride;
     p.background_e = to->light_only ? 0.0f : p.background_e;

@@ -3,18 +3,25 @@
 #include "scenegen/scene_plan.h"
 
 bst_scene_boxes bst_scene_boxes_init(bst_device *device, bst_scene_form form, uint64_t most_bytes) {
-    return (bst_scene_boxes){.of_blocks = form.lanes && !form.fourier,
+    return (bst_scene_boxes){.form = form,
                              .device = device,
                              .context = bst_device_context(device),
                              .most_bytes = most_bytes};
 }
 
-bst_status bst_scene_boxes_prepare(bst_ctx *ctx, bst_scene_boxes *b) {
+/* Boxes of all blocks, for the search by work-groups (kernels/gather.cl). */
+static bool are_of_blocks(const bst_scene_boxes *b) {
+    return b->form.lanes && !b->form.fourier;
+}
+
+bst_status bst_scene_boxes_prepare(bst_ctx *ctx, bst_scene_boxes *b, cl_kernel tile_kernel) {
     if (b->kernel) {
         return BST_OK;
     }
-    return b->of_blocks ? bst_scene_blocks_kernel(ctx, b->device, &b->kernel)
-                        : bst_scene_nodes_kernel(ctx, b->device, &b->kernel);
+    if (are_of_blocks(b)) {
+        return bst_scene_blocks_kernel(ctx, b->device, &b->kernel);
+    }
+    return bst_scene_nodes_kernel(ctx, b->device, b->form, tile_kernel, &b->kernel);
 }
 
 void bst_scene_boxes_clear(bst_scene_boxes *b) {
@@ -62,8 +69,8 @@ static bst_status enqueue_blocks(bst_ctx *ctx, bst_scene_boxes *b, cl_command_qu
 
 bst_status bst_scene_boxes_enqueue(bst_ctx *ctx, bst_scene_boxes *b, cl_command_queue queue,
                                    const bst_scene_boxes_input *in) {
-    BST_TRY(bst_scene_boxes_prepare(ctx, b));
-    if (b->of_blocks) {
+    BST_TRY(bst_scene_boxes_prepare(ctx, b, in->tile_kernel));
+    if (are_of_blocks(b)) {
         return enqueue_blocks(ctx, b, queue, in);
     }
     size_t groups = groups_of((size_t)in->count), bytes_of_group = BST_BLOCK * BST_BOX_BYTES;

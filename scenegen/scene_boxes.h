@@ -8,7 +8,7 @@
 #include "scenegen/scene_kernels.h"
 
 typedef struct bst_scene_boxes {
-    bool of_blocks; /* of all blocks, for the search by work-groups (kernels/gather.cl) */
+    bst_scene_form form;
     bst_device *device;
     cl_context context;
     uint64_t most_bytes; /* largest buffer of the device */
@@ -22,8 +22,12 @@ typedef struct bst_scene_boxes {
  *            most_bytes  largest buffer of the device
  * Returned:  to be cleared with bst_scene_boxes_clear */
 bst_scene_boxes bst_scene_boxes_init(bst_device *device, bst_scene_form form, uint64_t most_bytes);
-/* Builds the kernel, if it is not there yet. Errors: as bst_device_build. */
-bst_status bst_scene_boxes_prepare(bst_ctx *ctx, bst_scene_boxes *boxes) BST_MUST_CHECK;
+/* Builds the kernel, if it is not there yet.
+ *
+ * Given:     tile_kernel  of the tiles, which find their nodes by the boxes
+ * Errors:    as bst_device_build */
+bst_status bst_scene_boxes_prepare(bst_ctx *ctx, bst_scene_boxes *boxes,
+                                   cl_kernel tile_kernel) BST_MUST_CHECK;
 /* Releases kernel and buffers. */
 void bst_scene_boxes_clear(bst_scene_boxes *boxes);
 
@@ -32,6 +36,7 @@ typedef struct bst_scene_boxes_input {
     const bst_kernel_node_params *nodes;
     int count, blocks, boxes; /* of bst_scene_plan */
     cl_mem sources, table;
+    cl_kernel tile_kernel;
 } bst_scene_boxes_input;
 
 /* Enqueues the kernel, built if it is not there yet, with room for its results.

@@ -24,11 +24,27 @@ bst_status bst_scene_kernel_arguments(bst_ctx *ctx, cl_kernel kernel, const void
     return BST_OK;
 }
 
-bst_status bst_scene_nodes_kernel(bst_ctx *ctx, bst_device *device, cl_kernel *out) {
+static bool holds_boxes(bst_scene_form form) {
+    return !form.lanes && !form.fourier;
+}
+
+bst_status bst_scene_nodes_kernel(bst_ctx *ctx, bst_device *device, bst_scene_form form,
+                                  cl_kernel tile_kernel, cl_kernel *out) {
     static const bst_device_kernel_source *const sources[] = {
         &bst_kernel_scene_shared, &bst_kernel_lanes, &bst_kernel_nodes, &bst_kernel_node_boxes};
-    return bst_scene_kernel(ctx, device, sources, sizeof sources / sizeof *sources, "-cl-std=CL1.2",
-                            "bst_scene_nodes", out);
+    static const char name[] = "bst_scene_nodes";
+    if (!holds_boxes(form)) {
+        return bst_scene_kernel(ctx, device, sources, sizeof sources / sizeof *sources,
+                                "-cl-std=CL1.2", name, out);
+    }
+    cl_program program;
+    BST_TRY(bst_device_check(
+        ctx,
+        clGetKernelInfo(tile_kernel, CL_KERNEL_PROGRAM, sizeof program, (void *)&program, NULL),
+        "asking for the program of the tiles"));
+    cl_int code;
+    *out = clCreateKernel(program, name, &code);
+    return bst_device_check(ctx, code, name);
 }
 
 bst_status bst_scene_blocks_kernel(bst_ctx *ctx, bst_device *device, cl_kernel *out) {
@@ -66,7 +82,11 @@ static program light_sources(bst_scene_form form) {
     if (form.lanes) {
         ADD(&p, &bst_kernel_random, &bst_kernel_chunk);
     }
-    ADD(&p, &bst_kernel_nodes, &bst_kernel_profiles);
+    ADD(&p, &bst_kernel_nodes);
+    if (holds_boxes(form)) {
+        ADD(&p, &bst_kernel_node_boxes);
+    }
+    ADD(&p, &bst_kernel_profiles);
     if (!form.lanes) {
         ADD(&p, &bst_kernel_block_search, &bst_kernel_splat, &bst_kernel_light);
     }

@@ -25,9 +25,6 @@ bst_status bst_scene_kernel(bst_ctx *ctx, bst_device *device,
 bst_status bst_scene_kernel_arguments(bst_ctx *ctx, cl_kernel kernel, const void *const *values,
                                       const size_t *bytes, int count) BST_MUST_CHECK;
 
-/* Kernel of the boxes of nodes (kernels/node_boxes.cl). Errors: as bst_device_build. */
-bst_status bst_scene_nodes_kernel(bst_ctx *ctx, bst_device *device, cl_kernel *out) BST_MUST_CHECK;
-
 /* Kernel of the boxes of all blocks, for tiles that a work-group renders (kernels/block_boxes.cl).
  * Errors: as bst_device_build */
 bst_status bst_scene_blocks_kernel(bst_ctx *ctx, bst_device *device, cl_kernel *out) BST_MUST_CHECK;
@@ -37,6 +34,15 @@ typedef struct bst_scene_form {
     bool lanes;   /* a work-group for each tile, otherwise one work-item */
     bool fourier; /* the light is an image */
 } bst_scene_form;
+
+/* Kernel of the boxes of nodes (kernels/node_boxes.cl): of the program of the tiles' kernel where
+ * each work-item renders a tile from nodes, because another program would cost its start 60 ms of
+ * processor time (PoCL 3.1 reads its headers for each).
+ *
+ * Given:     tile_kernel  of bst_scene_expected_kernel or bst_scene_frame_kernel
+ * Errors:    as bst_device_build */
+bst_status bst_scene_nodes_kernel(bst_ctx *ctx, bst_device *device, bst_scene_form form,
+                                  cl_kernel tile_kernel, cl_kernel *out) BST_MUST_CHECK;
 
 /* Kernel of noise-free images (kernels/expected.cl or lane_expected.cl).
  *

@@ -9,6 +9,7 @@
 #ifndef BST_CATALOGUE_STAR_INDEX_H
 #define BST_CATALOGUE_STAR_INDEX_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "boresight/status.h"
@@ -116,11 +117,11 @@ bst_vec3 bst_star_record_direction(const bst_star_record *r, double years);
  * change within one 8-byte word. */
 uint64_t bst_star_checksum(const void *data, size_t bytes);
 
-/* Verifies a catalogue of `bytes` bytes (aligned to 8) and points *out into it. `label`: name for
- * messages. BST_ERR_FORMAT: foreign, other version or byte order, truncated or damaged; the message
- * states how to recreate it. */
+/* Checks a catalogue of `bytes` bytes (aligned to 8) and points *out into it. `label`: name for
+ * messages; `sum`: compare the checksum, which reads all of it. BST_ERR_FORMAT: foreign, other
+ * version or byte order, truncated or damaged; the message states how to recreate it. */
 bst_status bst_star_view_init(bst_ctx *ctx, const char *label, const void *data, uint64_t bytes,
-                              bst_star_view *out) BST_MUST_CHECK;
+                              bool sum, bst_star_view *out) BST_MUST_CHECK;
 
 struct bst_stars;
 /* Cells and records of a catalogue, borrowed. */

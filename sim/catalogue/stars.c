@@ -163,7 +163,7 @@ static bst_status open_file(bst_ctx *ctx, const char *path, bst_stars *s) {
     if (bytes < 8) {
         /* an empty file cannot be mapped; a zero header causes the message for a foreign file */
         uint64_t none = 0;
-        status = bst_star_view_init(ctx, path, &none, sizeof none, &s->view);
+        status = bst_star_view_init(ctx, path, &none, sizeof none, true, &s->view);
     } else {
         s->mapping_bytes = (size_t)bytes;
         void *p = mmap(NULL, s->mapping_bytes, PROT_READ, MAP_PRIVATE, fd, 0);
@@ -171,7 +171,7 @@ static bst_status open_file(bst_ctx *ctx, const char *path, bst_stars *s) {
             status = bst_fail(ctx, BST_ERR_IO, "star catalogue %s: %s", path, strerror(errno));
         } else {
             s->mapping = p;
-            status = bst_star_view_init(ctx, path, p, s->mapping_bytes, &s->view);
+            status = bst_star_view_init(ctx, path, p, s->mapping_bytes, true, &s->view);
         }
     }
     close(fd);
@@ -181,7 +181,7 @@ static bst_status open_file(bst_ctx *ctx, const char *path, bst_stars *s) {
 static bst_status open_embedded(bst_ctx *ctx, bst_stars *s) {
     size_t bytes = (size_t)(bst_stars_embedded_end - bst_stars_embedded_begin);
     return bst_star_view_init(ctx, "embedded in the program", bst_stars_embedded_begin, bytes,
-                              &s->view);
+                              false, &s->view);
 }
 
 bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) {

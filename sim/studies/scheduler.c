@@ -14,6 +14,7 @@
 
 #include "sim/core/subprocess.h"
 #include "sim/core/wall_clock.h"
+#include "sim/studies/shell_word.h"
 
 enum {
     PATH_BYTES = 4096,
@@ -444,26 +445,17 @@ static void scheduler_close(void *self) {
 /* Quotes the words of a command line for the shell, each followed by a blank. */
 static bst_status quote_program(bst_ctx *ctx, const char *const program[],
                                 char out[COMMAND_BYTES]) {
-    size_t n = 0;
-    for (; *program; program++) {
-        size_t left = COMMAND_BYTES - n;
-        if (4 * strlen(*program) + 4 > left) {
-            return bst_fail(ctx, BST_ERR_ARGUMENT, "the command line of a shard is too long");
-        }
-        out[n++] = '\'';
-        for (const char *c = *program; *c; c++) {
-            if (*c == '\'') {
-                memcpy(out + n, "'\\''", 4);
-                n += 4;
-            } else {
-                out[n++] = *c;
-            }
-        }
-        out[n++] = '\'';
-        out[n++] = ' ';
+    FILE *text = fmemopen(out, COMMAND_BYTES, "w");
+    for (; text && *program; program++) {
+        bst_put_shell_word(text, *program);
+        fputc(' ', text);
     }
-    out[n] = '\0';
-    return BST_OK;
+    bool whole = text && fputc('\0', text) == '\0' && fflush(text) == 0 && !ferror(text);
+    if (text) {
+        fclose(text);
+    }
+    return whole ? BST_OK
+                 : bst_fail(ctx, BST_ERR_ARGUMENT, "the command line of a shard is too long");
 }
 
 static bst_status prepare(bst_ctx *ctx, scheduler_executor *s, const char *study_folder,

@@ -6,6 +6,7 @@
 
 #include "sim/core/subprocess.h"
 #include "sim/core/wall_clock.h"
+#include "sim/studies/shell_word.h"
 #include "sim/studies/slurm_internal.h"
 
 enum { MOST_WORDS = 96 };
@@ -99,19 +100,6 @@ static bst_status write_table(bst_ctx *ctx, const bst_slurm *s, const char *path
                 : bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", path, strerror(errno));
 }
 
-/* Writes a word with shell quoting. */
-static void quote(FILE *out, const char *word) {
-    fputc('\'', out);
-    for (; *word; word++) {
-        if (*word == '\'') {
-            fputs("'\\''", out);
-        } else {
-            fputc(*word, out);
-        }
-    }
-    fputc('\'', out);
-}
-
 /* Writes the script of a batch: a task finds its shard in the table, runs it, and writes its exit
  * code. The script receives the signals that end the shard, and survives them. */
 static bst_status write_script(bst_ctx *ctx, const bst_slurm *s, const char *path,
@@ -122,19 +110,19 @@ static bst_status write_script(bst_ctx *ctx, const bst_slurm *s, const char *pat
             "#!/bin/sh\n# One task: the shard in line SLURM_ARRAY_TASK_ID + 1 of the table.\n"
             "trap : INT TERM\ncd ",
             file);
-        quote(file, s->folder);
+        bst_put_shell_word(file, s->folder);
         fputs(" || exit 1\nset -- $(sed -n \"$((SLURM_ARRAY_TASK_ID + 1))p\" ", file);
-        quote(file, table);
+        bst_put_shell_word(file, table);
         fputs(")\nended=", file);
-        quote(file, s->token);
+        bst_put_shell_word(file, s->token);
         fputs("-ended-$1 runs=$2\n", file);
         if (s->site.setup[0]) {
             fputs(". ", file);
-            quote(file, s->site.setup);
+            bst_put_shell_word(file, s->site.setup);
             fputc('\n', file);
         }
         for (char **word = s->program; *word; word++) {
-            quote(file, *word);
+            bst_put_shell_word(file, *word);
             fputc(' ', file);
         }
         fputs(

@@ -81,7 +81,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes) {
     bst_ctx ctx;
     bst_star_view view;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
-    bst_status status = bst_star_view_init(&ctx, "input", image, image_bytes, &view);
+    bst_status status = bst_star_view_init(&ctx, "input", image, image_bytes, true, &view);
     if ((status == BST_OK) != (ctx.message[0] == '\0')) {
         abort(); /* a failure without its reason, or a reason without a failure */
     }
