@@ -1,17 +1,21 @@
 """`boresight pd` from outside: its figures agree with one another and with formulae worked out here,
 the detector is near its bounds, results repeat, wrong calls are explained.
 
-Usage, from the repository root: /usr/bin/python3 tests/e2e/test_pd.py BORESIGHT
+Usage, from the repository root: /usr/bin/python3 tests/e2e/test_pd.py BORESIGHT [--full]
 """
 import json
 import os
 import statistics
+import sys
 import unittest
 
 import numpy as np
 
 import runs
 
+FULL = "--full" in sys.argv
+if FULL:
+    sys.argv.remove("--full")
 NORMAL = statistics.NormalDist()
 
 
@@ -135,6 +139,7 @@ class Measured(unittest.TestCase):
             self.assertLess(p["centroid_rms_across_px"], 0.5)
         self.assertIsNone(out["loss_db_pd50"])  # Pd is above a half all over
 
+    @unittest.skipUnless(FULL, "slow")
     def test_a_psf_that_is_known_is_used(self):
         """A telescope's PSF, with aberrations that differ over the field: what is reported of positions
         and light is true, and a Gaussian of the same noise-equivalent area is not."""
