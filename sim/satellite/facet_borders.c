@@ -92,14 +92,14 @@ bst_status bst_facet_borders_enter(bst_ctx *ctx, bst_facet_layers *l) {
     return BST_OK;
 }
 
-/* Part of a border within a facet, from t[0] to t[1] along it. False: it only touches the facet. */
-static bool part_within(const bst_layers_outline *o, const bst_layers_border *b, double t[2]) {
+bool bst_facet_borders_part(const bst_point2 *p, int count, bst_point2 a, bst_point2 b,
+                            double t[2]) {
     double least = INFINITY, most = -INFINITY;
     t[0] = 0.0;
     t[1] = 1.0;
-    for (int i = 0, last = o->count - 1; i < o->count; last = i++) {
-        double from = bst_point2_left_of(o->p[last], o->p[i], b->a),
-               to = bst_point2_left_of(o->p[last], o->p[i], b->b);
+    for (int i = 0, last = count - 1; i < count; last = i++) {
+        double from = bst_point2_left_of(p[last], p[i], a),
+               to = bst_point2_left_of(p[last], p[i], b);
         if (from <= 0.0 && to <= 0.0) {
             return false;
         }
@@ -108,7 +108,7 @@ static bool part_within(const bst_layers_outline *o, const bst_layers_border *b,
         } else if (to < 0.0) {
             t[1] = fmin(t[1], from / (from - to));
         }
-        double side = bst_point2_left_of(b->a, b->b, o->p[i]);
+        double side = bst_point2_left_of(a, b, p[i]);
         least = side < least ? side : least;
         most = side > most ? side : most;
     }
@@ -123,6 +123,12 @@ static bool is_behind(const bst_facet_layers *l, const bst_layers_border *b, con
     return near < plane[0] + plane[1] * x + plane[2] * y - l->same;
 }
 
+/* True if two boxes share a place, or touch. */
+static bool boxes_meet(const bst_layers_box *a, const bst_layers_box *b) {
+    return a->low[0] <= b->high[0] && b->low[0] <= a->high[0] && a->low[1] <= b->high[1] &&
+           b->low[1] <= a->high[1];
+}
+
 bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *l, const bst_layers_box *box,
                                          const bst_layers_outline *own, const double plane[3]) {
     const int *at = l->bins[box->facet];
@@ -133,9 +139,8 @@ bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *l, const bst_la
         for (int n = first; n < end; n++) {
             const bst_layers_border *b = &l->borders[l->border_entries[n]];
             double t[2];
-            if (b->box.low[0] > box->high[0] || b->box.high[0] < box->low[0] ||
-                b->box.low[1] > box->high[1] || b->box.high[1] < box->low[1] ||
-                !part_within(own, b, t)) {
+            if (!boxes_meet(&b->box, box) ||
+                !bst_facet_borders_part(own->p, own->count, b->a, b->b, t)) {
                 continue;
             }
             if (!is_behind(l, b, plane, t[0]) || !is_behind(l, b, plane, t[1])) {
@@ -145,6 +150,36 @@ bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *l, const bst_la
         }
     }
     return found;
+}
+
+int bst_facet_borders_before(const bst_facet_layers *l, const bst_layers_box *box,
+                             const bst_layers_outline *own, const double plane[3], int *out,
+                             int room) {
+    const int *at = l->bins[box->facet];
+    int count = 0;
+    for (int j = at[2]; j <= at[3]; j++) {
+        int first = l->border_first[j * l->bins_x + at[0]];
+        int end = l->border_first[j * l->bins_x + at[1] + 1];
+        for (int n = first; n < end; n++) {
+            int entry = l->border_entries[n], k = 0;
+            const bst_layers_border *b = &l->borders[entry];
+            double t[2];
+            if (!boxes_meet(&b->box, box) ||
+                !bst_facet_borders_part(own->p, own->count, b->a, b->b, t) ||
+                (is_behind(l, b, plane, t[0]) && is_behind(l, b, plane, t[1]))) {
+                continue;
+            }
+            while (k < count && out[k] != entry) {
+                k++;
+            }
+            if (k == room) {
+                return -1;
+            }
+            out[k] = entry;
+            count = k == count ? count + 1 : count;
+        }
+    }
+    return count;
 }
 
 /* Middle of a facet's chord at a height. False: it has none. */

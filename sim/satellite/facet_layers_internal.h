@@ -52,6 +52,38 @@ bst_status bst_facet_borders_enter(bst_ctx *ctx, bst_facet_layers *layers) BST_M
 bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *layers, const bst_layers_box *box,
                                          const bst_layers_outline *own, const double plane[3]);
 
+/* Part of a border a-b within a convex polygon, counter-clockwise, from t[0] to t[1] along it. False:
+ * it only touches the polygon. */
+bool bst_facet_borders_part(const bst_point2 *points, int count, bst_point2 a, bst_point2 b,
+                            double t[2]);
+
+/* Lists the borders across the inside of a facet that may hide a part of it, each once.
+ *
+ * Given:     own, plane  see bst_facet_borders_cross
+ * Returned:  out[room]; their number is the return value; below 0: there are more */
+int bst_facet_borders_before(const bst_facet_layers *layers, const bst_layers_box *box,
+                             const bst_layers_outline *own, const double plane[3], int *out,
+                             int room);
+
+/* What of a facet is seen. */
+typedef enum bst_layers_seen {
+    BST_LAYERS_SEEN_ALL,
+    BST_LAYERS_SEEN_NOTHING,
+    BST_LAYERS_SEEN_PIECES, /* those in layers->clip */
+    BST_LAYERS_SEEN_UNKNOWN
+} bst_layers_seen;
+
+/* Finds whether a place of a facet is seen. Unknown: another facet is as near, or the place is off
+ * the grid. */
+bst_layers_seen bst_facet_layers_look(const bst_facet_layers *layers, const bst_layers_box *box,
+                                      const double plane[3], bst_point2 place);
+/* True if a facet covers a place; its border does. */
+bool bst_facet_layers_covers(const bst_facet_layers *layers, int facet, bst_point2 place);
+/* Splits a facet that no other one crosses along the borders before it (facet_split.c). Unknown: too
+ * many of them, or see above. */
+bst_layers_seen bst_facet_layers_split(bst_facet_layers *layers, const bst_layers_box *box,
+                                       const bst_layers_outline *own, const double plane[3]);
+
 /* Number of layers at a place within a facet; below 0: it reaches the middle of no row. */
 int bst_facet_borders_layers(const bst_facet_layers *layers, const bst_layers_outline *own);
 
