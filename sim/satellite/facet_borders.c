@@ -9,6 +9,10 @@
 /* Shortest chord of a facet, in cells, of which the middle is within it beyond rounding. */
 static const double LEAST_CHORD = 1e-6;
 
+/* Distance from a line, times the length of a side, below which a place touches it beyond rounding,
+ * cells^2. */
+static const double TOUCHING = 1e-7;
+
 static bst_layers_border border_of(const bst_facet_layers *l, const bst_net_edge *edge,
                                    int layers) {
     bst_point2 a = l->at[edge->a], b = l->at[edge->b];
@@ -92,8 +96,8 @@ bst_status bst_facet_borders_enter(bst_ctx *ctx, bst_facet_layers *l) {
     return BST_OK;
 }
 
-bool bst_facet_borders_part(const bst_point2 *p, int count, bst_point2 a, bst_point2 b,
-                            double t[2]) {
+bst_layers_place bst_facet_borders_part(const bst_point2 *p, int count, bst_point2 a, bst_point2 b,
+                                        double t[2]) {
     double least = INFINITY, most = -INFINITY;
     t[0] = 0.0;
     t[1] = 1.0;
@@ -101,18 +105,23 @@ bool bst_facet_borders_part(const bst_point2 *p, int count, bst_point2 a, bst_po
         double from = bst_point2_left_of(p[last], p[i], a),
                to = bst_point2_left_of(p[last], p[i], b);
         if (from <= 0.0 && to <= 0.0) {
-            return false;
+            return from < -TOUCHING && to < -TOUCHING ? BST_LAYERS_PLACE_APART
+                                                      : BST_LAYERS_PLACE_TOUCHING;
         }
         if (from < 0.0) {
-            t[0] = fmax(t[0], from / (from - to));
+            double at = from / (from - to);
+            t[0] = at > t[0] ? at : t[0];
         } else if (to < 0.0) {
-            t[1] = fmin(t[1], from / (from - to));
+            double at = from / (from - to);
+            t[1] = at < t[1] ? at : t[1];
         }
         double side = bst_point2_left_of(a, b, p[i]);
         least = side < least ? side : least;
         most = side > most ? side : most;
     }
-    return least < 0.0 && most > 0.0;
+    return least < 0.0 && most > 0.0              ? BST_LAYERS_PLACE_CROSSING
+           : least > TOUCHING || most < -TOUCHING ? BST_LAYERS_PLACE_APART
+                                                  : BST_LAYERS_PLACE_TOUCHING;
 }
 
 /* True if a border is behind the plane of a facet at a place t along it. */
@@ -139,14 +148,16 @@ bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *l, const bst_la
         for (int n = first; n < end; n++) {
             const bst_layers_border *b = &l->borders[l->border_entries[n]];
             double t[2];
-            if (!boxes_meet(&b->box, box) ||
-                !bst_facet_borders_part(own->p, own->count, b->a, b->b, t)) {
+            if (!boxes_meet(&b->box, box)) {
                 continue;
             }
-            if (!is_behind(l, b, plane, t[0]) || !is_behind(l, b, plane, t[1])) {
+            bst_layers_place place = bst_facet_borders_part(own->p, own->count, b->a, b->b, t);
+            if (place == BST_LAYERS_PLACE_TOUCHING) {
+                found = BST_LAYERS_CROSS_TOUCHING;
+            } else if (place == BST_LAYERS_PLACE_CROSSING &&
+                       (!is_behind(l, b, plane, t[0]) || !is_behind(l, b, plane, t[1]))) {
                 return BST_LAYERS_CROSS_BEFORE;
             }
-            found = BST_LAYERS_CROSS_BEHIND;
         }
     }
     return found;
@@ -165,7 +176,8 @@ int bst_facet_borders_before(const bst_facet_layers *l, const bst_layers_box *bo
             const bst_layers_border *b = &l->borders[entry];
             double t[2];
             if (!boxes_meet(&b->box, box) ||
-                !bst_facet_borders_part(own->p, own->count, b->a, b->b, t) ||
+                bst_facet_borders_part(own->p, own->count, b->a, b->b, t) !=
+                    BST_LAYERS_PLACE_CROSSING ||
                 (is_behind(l, b, plane, t[0]) && is_behind(l, b, plane, t[1]))) {
                 continue;
             }

@@ -194,7 +194,7 @@ static bst_point2 middle_of(const bst_layers_outline *o) {
 
 /* Finds it of a facet that others may cross. Unknown: one does, perhaps. */
 static bst_layers_seen look_at_all(const bst_facet_layers *l, const bst_layers_box *box,
-                             const bst_layers_outline *own) {
+                                   const bst_layers_outline *own) {
     const int *at = l->bins[box->facet];
     bst_point2 middle = middle_of(own);
     bst_layers_seen seen = BST_LAYERS_SEEN_ALL;
@@ -210,7 +210,8 @@ static bst_layers_seen look_at_all(const bst_facet_layers *l, const bst_layers_b
                     if (may_cross(l, b->facet, box->facet, own, middle)) {
                         return BST_LAYERS_SEEN_UNKNOWN;
                     }
-                } else if (seen == BST_LAYERS_SEEN_ALL && bst_facet_layers_covers(l, b->facet, middle)) {
+                } else if (seen == BST_LAYERS_SEEN_ALL &&
+                           bst_facet_layers_covers(l, b->facet, middle)) {
                     seen = BST_LAYERS_SEEN_NOTHING;
                 }
             }
@@ -219,22 +220,49 @@ static bst_layers_seen look_at_all(const bst_facet_layers *l, const bst_layers_b
     return seen;
 }
 
-/* What is seen of a facet. Unknown: borders that may hide a part of it cross it, and others may cross
- * it, too. */
-static bst_layers_seen look_within_borders(bst_facet_layers *l, const bst_layers_box *box,
-                                     const bst_layers_outline *own, const double plane[3]) {
-    if (l->doubtful[box->facet] >= BST_LAYERS_AT_BORDER) {
-        bst_layers_cross cross = bst_facet_borders_cross(l, box, own, plane);
-        if (cross == BST_LAYERS_CROSS_BEFORE) {
-            return l->net->apart[box->facet] ? bst_facet_layers_split(l, box, own, plane)
-                                             : BST_LAYERS_SEEN_UNKNOWN;
-        }
-        if (cross == BST_LAYERS_CROSS_NONE && bst_facet_borders_layers(l, own) == 1) {
-            return BST_LAYERS_SEEN_ALL;
+/* What is seen of a facet without borders before it is what is seen of its neighbours of that kind:
+ * finds one of which that is known. */
+static bst_layers_seen look_beside(const bst_facet_layers *l, int facet) {
+    for (int i = l->net->first[facet]; i < l->net->first[facet + 1]; i++) {
+        uint8_t known = l->known[l->net->beside[i]];
+        if (known) {
+            return known == BST_LAYERS_KNOWN_ALL ? BST_LAYERS_SEEN_ALL : BST_LAYERS_SEEN_NOTHING;
         }
     }
-    return l->net->apart[box->facet] ? bst_facet_layers_look(l, box, plane, middle_of(own))
-                                     : look_at_all(l, box, own);
+    return BST_LAYERS_SEEN_UNKNOWN;
+}
+
+/* What is seen of a facet. Unknown: borders that may hide a part of it cross it, and others may
+ * cross it, too. */
+static bst_layers_seen look_within_borders(bst_facet_layers *l, const bst_layers_box *box,
+                                           const bst_layers_outline *own, const double plane[3]) {
+    bst_layers_cross cross = BST_LAYERS_CROSS_NONE;
+    bst_layers_seen seen = BST_LAYERS_SEEN_UNKNOWN;
+    uint8_t apart = l->net->apart[box->facet];
+    bool border = l->doubtful[box->facet] >= BST_LAYERS_AT_BORDER;
+    if (border) {
+        cross = bst_facet_borders_cross(l, box, own, plane);
+        if (cross == BST_LAYERS_CROSS_BEFORE) {
+            return apart ? bst_facet_layers_split(l, box, own, plane) : seen;
+        }
+    }
+    bool clear = cross == BST_LAYERS_CROSS_NONE && apart == BST_NET_FREE &&
+                 bst_facet_layers_is_within(l, box);
+    if (clear) {
+        seen = look_beside(l, box->facet);
+    }
+    if (seen == BST_LAYERS_SEEN_UNKNOWN && border && bst_facet_borders_layers(l, own) == 1) {
+        seen = BST_LAYERS_SEEN_ALL;
+    }
+    if (seen == BST_LAYERS_SEEN_UNKNOWN) {
+        seen =
+            apart ? bst_facet_layers_look(l, box, plane, middle_of(own)) : look_at_all(l, box, own);
+    }
+    if (clear && seen != BST_LAYERS_SEEN_UNKNOWN) {
+        l->known[box->facet] =
+            seen == BST_LAYERS_SEEN_ALL ? BST_LAYERS_KNOWN_ALL : BST_LAYERS_KNOWN_NOTHING;
+    }
+    return seen;
 }
 
 bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {

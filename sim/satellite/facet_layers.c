@@ -15,6 +15,7 @@ void bst_facet_layers_free(bst_facet_layers *l) {
     free(l->near);
     free(l->facing);
     free(l->doubtful);
+    free(l->known);
     free(l->crowded);
     free(l->boxes);
     free(l->bins);
@@ -44,13 +45,14 @@ static bst_status reserve_facets(bst_ctx *ctx, bst_facet_layers *l, const bst_fa
     l->near = calloc(vertices, sizeof *l->near);
     l->facing = calloc(facets, sizeof *l->facing);
     l->doubtful = calloc(facets, sizeof *l->doubtful);
+    l->known = calloc(facets, sizeof *l->known);
     l->boxes = calloc(facets, sizeof *l->boxes);
     l->bins = calloc(facets, sizeof *l->bins);
     l->order = calloc(facets, sizeof *l->order);
     l->seen = calloc(facets, sizeof *l->seen);
     l->chosen = calloc(facets, sizeof *l->chosen);
-    if (!l->at || !l->near || !l->facing || !l->doubtful || !l->boxes || !l->bins || !l->order ||
-        !l->seen || !l->chosen) {
+    if (!l->at || !l->near || !l->facing || !l->doubtful || !l->known || !l->boxes || !l->bins ||
+        !l->order || !l->seen || !l->chosen) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the view of %d facets",
                         net->satellite->facet_count);
     }
@@ -411,6 +413,7 @@ bst_status bst_facet_layers_find(bst_ctx *ctx, bst_facet_layers *l, const uint8_
     make_boxes(l);
     memset(l->needed, 0, (size_t)l->bins_x * (size_t)l->bins_y);
     memset(l->doubtful, 0, (size_t)l->net->satellite->facet_count);
+    memset(l->known, 0, (size_t)l->net->satellite->facet_count);
     for (int n = 0; n < l->order_count; n++) {
         int f = l->order[n];
         if (wanted[f] && any_bin(l, f, l->marked)) {
@@ -419,6 +422,9 @@ bst_status bst_facet_layers_find(bst_ctx *ctx, bst_facet_layers *l, const uint8_
         if (l->doubtful[f]) {
             need_bins(l, f);
             any = true;
+        } else if (wanted[f] && l->net->apart[f] == BST_NET_FREE &&
+                   bst_facet_layers_is_within(l, &l->boxes[f])) {
+            l->known[f] = BST_LAYERS_KNOWN_ALL;
         }
     }
     if (any) {

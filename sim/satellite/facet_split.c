@@ -1,5 +1,5 @@
-/* What is seen of a facet that borders of nearer layers cross, but no other facet: it is split along
- * these borders, and each cell is seen as a whole or not at all. */
+/* What is seen of a facet that borders of nearer layers cross, but no other facet: it is split
+ * along these borders, and each cell is seen as a whole or not at all. */
 #include <math.h>
 #include <string.h>
 
@@ -87,7 +87,7 @@ static bool split(cell *c, bst_point2 a, bst_point2 b, double tiny, cell *other)
     double t[2], from[CORNERS_MAX];
     cell left = {.count = 0};
     other->count = 0;
-    if (!bst_facet_borders_part(c->p, c->count, a, b, t)) {
+    if (bst_facet_borders_part(c->p, c->count, a, b, t) != BST_LAYERS_PLACE_CROSSING) {
         return true;
     }
     if (c->count + 2 > CORNERS_MAX) {
@@ -136,7 +136,8 @@ bst_layers_seen bst_facet_layers_split(bst_facet_layers *l, const bst_layers_box
     for (int n = 0; n < crossing; n++) {
         const bst_layers_border *border = &l->borders[borders[n]];
         for (int i = 0, end = count; i < end; i++) {
-            if (count == CELLS_MAX || !split(&cells[i], border->a, border->b, tiny, &cells[count])) {
+            if (count == CELLS_MAX ||
+                !split(&cells[i], border->a, border->b, tiny, &cells[count])) {
                 return BST_LAYERS_SEEN_UNKNOWN;
             }
             count += cells[count].count > 0;
