@@ -29,12 +29,6 @@ typedef enum bst_layers_cross {
  * touches it. */
 enum { BST_LAYERS_KNOWN_ALL = 1, BST_LAYERS_KNOWN_NOTHING = 2 };
 
-/* True if all of a box is on the grid. */
-static inline bool bst_facet_layers_is_within(const bst_facet_layers *l, const bst_layers_box *b) {
-    return b->low[0] >= 0.0F && b->low[1] >= 0.0F && b->high[0] < (float)l->width &&
-           b->high[1] < (float)l->height;
-}
-
 /* Column or row of a coordinate, within the grid. */
 static inline int bst_layers_cell_of(double x, int count) {
     return x > 0.0 ? (x < count ? (int)x : count - 1) : 0;
