@@ -21,11 +21,20 @@ enum { BST_RESOLVED_LIGHTS = 2 };
 /* Differences of depth over the satellite's radius that are none. */
 #define BST_RESOLVED_SAME 2e-6
 
+/* Plane of a facet, body frame: normal . place = offset_m. */
+typedef struct bst_resolved_plane {
+    bst_vec3 normal;
+    double offset_m;
+} bst_resolved_plane;
+
 /* Work memory of light by exact areas (resolved_areas.c): zero-initialise. */
 typedef struct bst_resolved_areas {
     bst_facet_net net;
     bst_facet_layers eye, lit[BST_RESOLVED_LIGHTS];
     bst_area_sums sums;
+    bst_resolved_plane *planes;        /* by facet, of the current pose */
+    bst_vec3 *middles;                 /* likewise: means of the corners, body frame */
+    bool placed;                       /* they are those of all poses: the model has no joints */
     double *even;                      /* by facet: light without shadows, per cell */
     double *from[BST_RESOLVED_LIGHTS]; /* by facet: of each light */
     uint8_t *wanted;                   /* by facet */
