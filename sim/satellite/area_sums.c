@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/pages.h"
+
 /* Light below that share of the brightest cell is rounding. */
 static const double LEAST = 1e-9;
 
@@ -20,8 +22,8 @@ bst_status bst_area_sums_begin(bst_ctx *ctx, bst_area_sums *s, int width, int he
     if (need > s->capacity) {
         free(s->cells);
         free(s->second);
-        s->cells = malloc(need * sizeof *s->cells);
-        s->second = malloc(need * sizeof *s->second);
+        s->cells = bst_pages_alloc(need * sizeof *s->cells);
+        s->second = bst_pages_alloc(need * sizeof *s->second);
         s->capacity = s->cells && s->second ? need : 0;
         if (s->capacity == 0) {
             return bst_fail(ctx, BST_ERR_MEMORY, "no memory for an image of %d x %d cells", width,
@@ -134,6 +136,41 @@ static inline void add_in_row(const row *r, const double x[2], const double y[2]
     add_across(r, x, y, slope, light);
 }
 
+/* Adds an edge of which both ends are on the grid, a.y < b.y: from one cell to the next, without
+ * branches that depend on where it leaves a cell. */
+static inline void add_edge_within(bst_area_sums *s, bst_point2 a, bst_point2 b, double light,
+                                   bool second) {
+    double slope = (b.x - a.x) / (b.y - a.y), steep = (b.y - a.y) / (b.x - a.x);
+    int i = (int)a.x, j = (int)a.y, along = b.x < a.x ? -1 : 1;
+    int columns = ((int)b.x - i) * along, rows = (int)b.y - j;
+    size_t stride = (size_t)s->width + 1, first = (size_t)j * stride + 1;
+    row r = {s->cells + first, second ? s->second + first : NULL, s->width};
+    double x = a.x, y = a.y, border = along > 0 ? i + 1.0 : i;
+    /* y where the next column begins, and the next row */
+    double at_column = columns > 0 ? a.y + (border - a.x) * steep : INFINITY;
+    double at_row = rows > 0 ? j + 1.0 : INFINITY;
+    for (int left = columns + rows; left > 0; left--) {
+        bool down = at_row <= at_column;
+        double y_next = down ? at_row : at_column;
+        double x_next = down ? a.x + (at_row - a.y) * slope : border;
+        y_next = y_next < y ? y : y_next > b.y ? b.y : y_next; /* by rounding */
+        add_part(&r, i, x - i - 0.5, y - j - 0.5, x_next - i - 0.5, y_next - j - 0.5, light);
+        x = x_next;
+        y = y_next;
+        size_t step = down ? stride : 0;
+        r.cells += step;
+        r.second += second ? step : 0;
+        j += down;
+        i += down ? 0 : along;
+        border += down ? 0.0 : along;
+        columns -= !down;
+        rows -= down;
+        at_row = rows > 0 ? j + 1.0 : INFINITY;
+        at_column = columns > 0 ? a.y + (border - a.x) * steep : INFINITY;
+    }
+    add_part(&r, i, x - i - 0.5, y - j - 0.5, b.x - i - 0.5, b.y - j - 0.5, light);
+}
+
 static inline void add_edge(bst_area_sums *s, bst_point2 a, bst_point2 b, double light,
                             bool second) {
     if (b.y < a.y) {
@@ -143,6 +180,11 @@ static inline void add_edge(bst_area_sums *s, bst_point2 a, bst_point2 b, double
         light = -light;
     }
     if (!(b.y > 0.0) || !(a.y < s->height) || a.y == b.y) {
+        return;
+    }
+    double low = a.x < b.x ? a.x : b.x, high = a.x < b.x ? b.x : a.x;
+    if (low >= 0.0 && high < s->width && a.y >= 0.0 && b.y < s->height) {
+        add_edge_within(s, a, b, light, second);
         return;
     }
     double slope = (b.x - a.x) / (b.y - a.y), steep = (b.y - a.y) / (b.x - a.x);
@@ -172,26 +214,6 @@ void bst_area_sums_edge(bst_area_sums *s, bst_point2 a, bst_point2 b, double lig
 
 void bst_area_sums_faint_edge(bst_area_sums *s, bst_point2 a, bst_point2 b, double light) {
     add_edge(s, a, b, light, false);
-}
-
-void bst_area_sums_expect(const bst_area_sums *s, bst_point2 a, bst_point2 b) {
-#if defined(__GNUC__)
-    double low = a.y < b.y ? a.y : b.y, high = a.y < b.y ? b.y : a.y;
-    double slope = high > low ? (b.x - a.x) / (b.y - a.y) : 0.0;
-    /* as double: an edge of a body nearby may be further away than an int reaches */
-    int first = (int)fmin(fmax(low, 0.0), s->height);
-    int end = (int)fmin(fmax(high + 1.0, 0.0), s->height);
-    for (int j = first; j < end; j++) {
-        double x = a.x + (j + 0.5 - a.y) * slope;
-        if (x > 0.0 && x < s->width) {
-            __builtin_prefetch(s->cells + (size_t)j * ((size_t)s->width + 1) + (size_t)x, 1);
-        }
-    }
-#else
-    (void)s;
-    (void)a;
-    (void)b;
-#endif
 }
 
 void bst_area_sums_polygon(bst_area_sums *s, const bst_point2 *p, int count, double light) {

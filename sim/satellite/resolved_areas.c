@@ -13,9 +13,6 @@ enum { LIGHT_CELLS_MIN = 32, LIGHT_CELLS_MAX = 1024 };
  * more poses than a few blur the image. */
 static const double FAINT = 0.1;
 
-/* Edges between reading the cells of one and adding it. */
-enum { AHEAD = 8 };
-
 /* Cosine of incidence of the earthlight's centroid below which it casts no shadow. */
 static const double EARTH_LOW = 0.05;
 
@@ -284,10 +281,6 @@ static void add_edges(bst_resolved_areas *s) {
         const bst_net_edge *edge = &s->net.edges[s->steps[n]];
         double left = s->even[edge->left], right = s->even[edge->right], step = left - right;
         bst_point2 a = s->eye.at[edge->a], b = s->eye.at[edge->b];
-        if (n + AHEAD < count) {
-            const bst_net_edge *later = &s->net.edges[s->steps[n + AHEAD]];
-            bst_area_sums_expect(&s->sums, s->eye.at[later->a], s->eye.at[later->b]);
-        }
         if (fabs(step) < s->faint * (left < right ? left : right)) {
             bst_area_sums_faint_edge(&s->sums, a, b, step);
         } else {
