@@ -13,6 +13,10 @@ enum { LIGHT_CELLS_MIN = 32, LIGHT_CELLS_MAX = 1024 };
  * more poses than a few blur the image. */
 static const double FAINT = 0.1;
 
+/* Edges of a pose that are added before those of the next one: of a part of the body that meets so
+ * few cells that they stay in fast memory. */
+enum { EDGES = 512 };
+
 /* Cosine of incidence of the earthlight's centroid below which it casts no shadow. */
 static const double EARTH_LOW = 0.05;
 
@@ -28,7 +32,10 @@ void bst_resolved_areas_free(bst_resolved_areas *s) {
     free(s->middles);
     free(s->even);
     free(s->wanted);
-    free(s->steps);
+    for (int k = 0; k < BST_RESOLVED_KEPT; k++) {
+        free(s->kept[k].at);
+        free(s->kept[k].even);
+    }
     free(s->second);
     *s = (bst_resolved_areas){.made = false};
 }
@@ -55,8 +62,12 @@ static bst_status make(bst_ctx *ctx, bst_resolved *r) {
     s->middles = calloc(facets, sizeof *s->middles);
     s->even = calloc(facets, sizeof *s->even);
     s->wanted = calloc(facets, sizeof *s->wanted);
-    s->steps = calloc((size_t)s->net.edge_count + 1, sizeof *s->steps);
-    s->made = s->planes && s->middles && s->even && s->wanted && s->steps;
+    s->made = s->planes && s->middles && s->even && s->wanted;
+    for (int k = 0; k < BST_RESOLVED_KEPT; k++) {
+        s->kept[k].at = calloc((size_t)s->net.vertex_count + 1, sizeof *s->kept[k].at);
+        s->kept[k].even = calloc(facets, sizeof *s->kept[k].even);
+        s->made = s->made && s->kept[k].at && s->kept[k].even;
+    }
     for (int n = 0; n < BST_RESOLVED_LIGHTS; n++) {
         s->from[n] = calloc(facets, sizeof *s->from[n]);
         s->made = s->made && s->from[n];
@@ -73,6 +84,7 @@ bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *r, bool blurred)
         BST_TRY(make(ctx, r));
     }
     s->faint = blurred ? FAINT : 0.0;
+    s->kept_count = 0;
     if (cells > s->second_capacity) {
         free(s->second);
         s->second = malloc(cells * sizeof *s->second);
@@ -83,15 +95,6 @@ bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *r, bool blurred)
         }
     }
     return bst_area_sums_begin(ctx, &r->areas.sums, r->image.width, r->image.height);
-}
-
-void bst_resolved_join_light(bst_resolved *to, const bst_resolved *from) {
-    bst_area_sums_add(&to->areas.sums, &from->areas.sums);
-}
-
-void bst_resolved_end_light(bst_resolved *r, double scale_rad) {
-    r->image.second = r->areas.second;
-    bst_area_sums_finish(&r->areas.sums, r->image.cell_px * scale_rad, &r->image);
 }
 
 /* Finds planes and middles of the facets. */
@@ -269,24 +272,59 @@ static double add_facet(const bst_resolved_adding *a, int facet, const light_vie
     return 0.0;
 }
 
-/* Adds the edges of whole facets. */
-static void add_edges(bst_resolved_areas *s) {
-    int count = 0;
-    for (int e = 0; e < s->net.edge_count; e++) {
+/* Adds some edges of the whole facets of a pose. */
+static void add_edges(bst_resolved_areas *s, const bst_resolved_kept *kept, int first, int end) {
+    int steps[EDGES], count = 0; /* those at which the light changes */
+    for (int e = first; e < end; e++) {
         const bst_net_edge *edge = &s->net.edges[e];
-        s->steps[count] = e;
-        count += s->even[edge->left] != s->even[edge->right];
+        steps[count] = e;
+        count += kept->even[edge->left] != kept->even[edge->right];
     }
     for (int n = 0; n < count; n++) {
-        const bst_net_edge *edge = &s->net.edges[s->steps[n]];
-        double left = s->even[edge->left], right = s->even[edge->right], step = left - right;
-        bst_point2 a = s->eye.at[edge->a], b = s->eye.at[edge->b];
+        const bst_net_edge *edge = &s->net.edges[steps[n]];
+        double left = kept->even[edge->left], right = kept->even[edge->right], step = left - right;
+        bst_point2 a = kept->at[edge->a], b = kept->at[edge->b];
         if (fabs(step) < s->faint * (left < right ? left : right)) {
             bst_area_sums_faint_edge(&s->sums, a, b, step);
         } else {
             bst_area_sums_edge(&s->sums, a, b, step);
         }
     }
+}
+
+/* Adds the edges of all poses that are kept. */
+static void add_kept(bst_resolved_areas *s) {
+    for (int e = 0; e < s->net.edge_count && s->kept_count > 0; e += EDGES) {
+        int end = e + EDGES < s->net.edge_count ? e + EDGES : s->net.edge_count;
+        for (int k = 0; k < s->kept_count; k++) {
+            add_edges(s, &s->kept[k], e, end);
+        }
+    }
+    s->kept_count = 0;
+}
+
+/* Keeps the places and the light of a pose, in exchange for other memory. */
+static void keep(bst_resolved_areas *s) {
+    bst_resolved_kept *to = &s->kept[s->kept_count++];
+    bst_resolved_kept now = {s->eye.at, s->even};
+    s->eye.at = to->at;
+    s->even = to->even;
+    *to = now;
+    if (s->kept_count == BST_RESOLVED_KEPT) {
+        add_kept(s);
+    }
+}
+
+void bst_resolved_join_light(bst_resolved *to, bst_resolved *from) {
+    add_kept(&to->areas);
+    add_kept(&from->areas);
+    bst_area_sums_add(&to->areas.sums, &from->areas.sums);
+}
+
+void bst_resolved_end_light(bst_resolved *r, double scale_rad) {
+    add_kept(&r->areas);
+    r->image.second = r->areas.second;
+    bst_area_sums_finish(&r->areas.sums, r->image.cell_px * scale_rad, &r->image);
 }
 
 bst_status bst_resolved_add_areas(bst_ctx *ctx, const bst_resolved_adding *a, double weight) {
@@ -310,6 +348,6 @@ bst_status bst_resolved_add_areas(bst_ctx *ctx, const bst_resolved_adding *a, do
         s->even[f] = s->eye.facing[f] ? add_facet(a, f, views, weight) : 0.0;
     }
     s->even[sat->facet_count] = 0.0;
-    add_edges(s);
+    keep(s);
     return BST_OK;
 }
