@@ -136,39 +136,96 @@ static inline void add_in_row(const row *r, const double x[2], const double y[2]
     add_across(r, x, y, slope, light);
 }
 
-/* Adds an edge of which both ends are on the grid, a.y < b.y: from one cell to the next, without
- * branches that depend on where it leaves a cell. */
+/* Two numbers, and four sums of a cell: row_y, light, x and y. */
+typedef double pair __attribute__((vector_size(16)));
+typedef float pair_f __attribute__((vector_size(8)));
+typedef float sums4 __attribute__((vector_size(16)));
+
+static inline void add_sums(bst_area_cell *c, sums4 more, double dy) {
+    sums4 sums;
+    memcpy(&sums, &c->row_y, sizeof sums);
+    sums += more;
+    memcpy(&c->row_y, &sums, sizeof sums);
+    c->row_light += dy;
+}
+
+/* Two parts of an edge at once, as add_part: of cell `at` and of cell `next`, with coordinates from
+ * their centres. `second` is NULL without second moments. */
+static inline void add_parts(bst_area_cell *cells, bst_area_second *second, size_t at, size_t next,
+                             pair x0, pair y0, pair x1, pair y1, double light) {
+    pair x = 0.5 * (x0 + x1), y = 0.5 * (y0 + y1), wide = x1 - x0, high = y1 - y0;
+    pair dy = light * high, x2 = wide * wide * (1.0 / 12.0), right = 0.5 - x;
+    pair xy = wide * high * (1.0 / 12.0), across = 0.5 * (0.25 - x * x - x2);
+    pair_f row_y = __builtin_convertvector(dy * y, pair_f);
+    pair_f own = __builtin_convertvector(dy * right, pair_f);
+    pair_f to_x = __builtin_convertvector(dy * across, pair_f);
+    pair_f to_y = __builtin_convertvector(dy * (y * right - xy), pair_f);
+    add_sums(&cells[at], (sums4){row_y[0], own[0], to_x[0], to_y[0]}, dy[0]);
+    add_sums(&cells[next], (sums4){row_y[1], own[1], to_x[1], to_y[1]}, dy[1]);
+    if (second) {
+        pair yy = y * y + (high * high - 1.0) * (1.0 / 12.0), even = right * (1.0 / 12.0);
+        pair row_yy = dy * yy, to_xy = dy * (y * across - x * xy);
+        pair to_xx = dy * ((1.0 / 3.0) * (0.125 - x * (x * x + 3.0 * x2)) - even);
+        pair to_yy = dy * (yy * right - 2.0 * y * xy);
+        for (int k = 0; k < 2; k++) {
+            bst_area_second *q = &second[k == 0 ? at : next];
+            q->row_yy += (float)row_yy[k];
+            q->xx += (float)to_xx[k];
+            q->xy += (float)to_xy[k];
+            q->yy += (float)to_yy[k];
+        }
+    }
+}
+
+/* Adds an edge, a.y < b.y, that stays within the grid without its last column and row. Without
+ * branches that depend on where it leaves a cell: in each row a steep edge meets at most two cells,
+ * as a flat one does in each column; without the second one its part there has no length.
+ *
+ * Given:     along  1: to the right; -1: to the left */
 static inline void add_edge_within(bst_area_sums *s, bst_point2 a, bst_point2 b, double light,
-                                   bool second) {
-    double slope = (b.x - a.x) / (b.y - a.y), steep = (b.y - a.y) / (b.x - a.x);
-    int i = (int)a.x, j = (int)a.y, along = b.x < a.x ? -1 : 1;
-    int columns = ((int)b.x - i) * along, rows = (int)b.y - j;
-    size_t stride = (size_t)s->width + 1, first = (size_t)j * stride + 1;
-    row r = {s->cells + first, second ? s->second + first : NULL, s->width};
-    double x = a.x, y = a.y, border = along > 0 ? i + 1.0 : i;
-    /* y where the next column begins, and the next row */
-    double at_column = columns > 0 ? a.y + (border - a.x) * steep : INFINITY;
-    double at_row = rows > 0 ? j + 1.0 : INFINITY;
-    for (int left = columns + rows; left > 0; left--) {
-        bool down = at_row <= at_column;
-        double y_next = down ? at_row : at_column;
-        double x_next = down ? a.x + (at_row - a.y) * slope : border;
+                                   bool second, int along) {
+    double wide = b.x - a.x, high = b.y - a.y, slope = wide / high, steep = high / wide;
+    size_t stride = (size_t)s->width + 1, step = along > 0 ? 1 : SIZE_MAX;
+    int i = (int)a.x, j = (int)a.y;
+    double x = a.x, y = a.y;
+    if (along * wide <= high) {
+        for (int rows = (int)b.y - j; rows >= 0; rows--, j++) {
+            double y_next = rows > 0 ? j + 1.0 : b.y;
+            double x_next = rows > 0 ? a.x + (y_next - a.y) * slope : b.x;
+            i = (int)x;
+            double side = along > 0 ? i + 1.0 : i;
+            side = along > 0 ? (side < x_next ? side : x_next) : (side > x_next ? side : x_next);
+            double y_side = wide != 0.0 ? y + (side - x) * steep : y_next;
+            y_side = y_side < y_next ? y_side : y_next;
+            pair cx = {i + 0.5, i + along + 0.5};
+            double cy = j + 0.5;
+            size_t at = (size_t)j * stride + (size_t)i + 1;
+            add_parts(s->cells, second ? s->second : NULL, at, at + step, (pair){x, side} - cx,
+                      (pair){y, y_side} - cy, (pair){side, x_next} - cx,
+                      (pair){y_side, y_next} - cy, light);
+            x = x_next;
+            y = y_next;
+        }
+        return;
+    }
+    for (int columns = ((int)b.x - i) * along; columns >= 0; columns--, i += along) {
+        double x_next = columns > 0 ? (along > 0 ? i + 1.0 : i) : b.x;
+        double y_next = columns > 0 ? a.y + (x_next - a.x) * steep : b.y;
         y_next = y_next < y ? y : y_next > b.y ? b.y : y_next; /* by rounding */
-        add_part(&r, i, x - i - 0.5, y - j - 0.5, x_next - i - 0.5, y_next - j - 0.5, light);
+        j = (int)y;
+        double side = j + 1.0 < y_next ? j + 1.0 : y_next;
+        double x_side = x + (side - y) * slope;
+        x_side =
+            along > 0 ? (x_side < x_next ? x_side : x_next) : (x_side > x_next ? x_side : x_next);
+        pair cy = {j + 0.5, j + 1.5};
+        double cx = i + 0.5;
+        size_t at = (size_t)j * stride + (size_t)i + 1;
+        add_parts(s->cells, second ? s->second : NULL, at, at + stride, (pair){x, x_side} - cx,
+                  (pair){y, side} - cy, (pair){x_side, x_next} - cx, (pair){side, y_next} - cy,
+                  light);
         x = x_next;
         y = y_next;
-        size_t step = down ? stride : 0;
-        r.cells += step;
-        r.second += second ? step : 0;
-        j += down;
-        i += down ? 0 : along;
-        border += down ? 0.0 : along;
-        columns -= !down;
-        rows -= down;
-        at_row = rows > 0 ? j + 1.0 : INFINITY;
-        at_column = columns > 0 ? a.y + (border - a.x) * steep : INFINITY;
     }
-    add_part(&r, i, x - i - 0.5, y - j - 0.5, b.x - i - 0.5, b.y - j - 0.5, light);
 }
 
 static inline void add_edge(bst_area_sums *s, bst_point2 a, bst_point2 b, double light,
@@ -183,8 +240,12 @@ static inline void add_edge(bst_area_sums *s, bst_point2 a, bst_point2 b, double
         return;
     }
     double low = a.x < b.x ? a.x : b.x, high = a.x < b.x ? b.x : a.x;
-    if (low >= 0.0 && high < s->width && a.y >= 0.0 && b.y < s->height) {
-        add_edge_within(s, a, b, light, second);
+    if (low >= 1.0 && high < s->width - 1.0 && a.y >= 0.0 && b.y < s->height - 1.0) {
+        if (b.x >= a.x) {
+            add_edge_within(s, a, b, light, second, 1);
+        } else {
+            add_edge_within(s, a, b, light, second, -1);
+        }
         return;
     }
     double slope = (b.x - a.x) / (b.y - a.y), steep = (b.y - a.y) / (b.x - a.x);
