@@ -132,6 +132,13 @@ static bool is_behind(const bst_facet_layers *l, const bst_layers_border *b, con
     return near < plane[0] + plane[1] * x + plane[2] * y - l->same;
 }
 
+/* True if all of a border is farther than all of a facet. */
+static bool is_far_behind(const bst_facet_layers *l, const bst_layers_border *b,
+                          const bst_layers_outline *own) {
+    double least = own->least - l->same;
+    return b->near[0] < least && b->near[1] < least;
+}
+
 /* True if two boxes share a place, or touch. */
 static bool boxes_meet(const bst_layers_box *a, const bst_layers_box *b) {
     return a->low[0] <= b->high[0] && b->low[0] <= a->high[0] && a->low[1] <= b->high[1] &&
@@ -148,7 +155,7 @@ bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *l, const bst_la
         for (int n = first; n < end; n++) {
             const bst_layers_border *b = &l->borders[l->border_entries[n]];
             double t[2];
-            if (!boxes_meet(&b->box, box)) {
+            if (!boxes_meet(&b->box, box) || is_far_behind(l, b, own)) {
                 continue;
             }
             bst_layers_place place = bst_facet_borders_part(own->p, own->count, b->a, b->b, t);
@@ -175,7 +182,7 @@ int bst_facet_borders_before(const bst_facet_layers *l, const bst_layers_box *bo
             int entry = l->border_entries[n], k = 0;
             const bst_layers_border *b = &l->borders[entry];
             double t[2];
-            if (!boxes_meet(&b->box, box) ||
+            if (!boxes_meet(&b->box, box) || is_far_behind(l, b, own) ||
                 bst_facet_borders_part(own->p, own->count, b->a, b->b, t) !=
                     BST_LAYERS_PLACE_CROSSING ||
                 (is_behind(l, b, plane, t[0]) && is_behind(l, b, plane, t[1]))) {
