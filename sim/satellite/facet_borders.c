@@ -132,17 +132,49 @@ static bool is_behind(const bst_facet_layers *l, const bst_layers_border *b, con
     return near < plane[0] + plane[1] * x + plane[2] * y - l->same;
 }
 
+/* True if two boxes share a place, or touch. */
+static bool boxes_meet(const bst_layers_box *a, const bst_layers_box *b) {
+    return a->low[0] <= b->high[0] && b->low[0] <= a->high[0] && a->low[1] <= b->high[1] &&
+           b->low[1] <= a->high[1];
+}
+
+static bool is_same(bst_point2 p, bst_point2 q) {
+    return p.x == q.x && p.y == q.y;
+}
+
+/* True if two borders cross or touch elsewhere than in a common end. */
+static bool borders_meet(const bst_layers_border *p, const bst_layers_border *q) {
+    if (is_same(p->a, q->a) || is_same(p->a, q->b) || is_same(p->b, q->a) || is_same(p->b, q->b)) {
+        return false;
+    }
+    double a = bst_point2_left_of(p->a, p->b, q->a), b = bst_point2_left_of(p->a, p->b, q->b);
+    double c = bst_point2_left_of(q->a, q->b, p->a), d = bst_point2_left_of(q->a, q->b, p->b);
+    return !((a > 0.0 && b > 0.0) || (a < 0.0 && b < 0.0) || (c > 0.0 && d > 0.0) ||
+             (c < 0.0 && d < 0.0));
+}
+
+bool bst_facet_borders_meet(const bst_facet_layers *l, int border) {
+    const bst_layers_border *own = &l->borders[border];
+    int at[4];
+    bst_layers_range(l, &own->box, BST_LAYERS_BIN, at);
+    for (int j = at[2]; j <= at[3]; j++) {
+        int first = l->border_first[j * l->bins_x + at[0]];
+        int end = l->border_first[j * l->bins_x + at[1] + 1];
+        for (int n = first; n < end; n++) {
+            const bst_layers_border *b = &l->borders[l->border_entries[n]];
+            if (b != own && boxes_meet(&b->box, &own->box) && borders_meet(b, own)) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
 /* True if all of a border is farther than all of a facet. */
 static bool is_far_behind(const bst_facet_layers *l, const bst_layers_border *b,
                           const bst_layers_outline *own) {
     double least = own->least - l->same;
     return b->near[0] < least && b->near[1] < least;
-}
-
-/* True if two boxes share a place, or touch. */
-static bool boxes_meet(const bst_layers_box *a, const bst_layers_box *b) {
-    return a->low[0] <= b->high[0] && b->low[0] <= a->high[0] && a->low[1] <= b->high[1] &&
-           b->low[1] <= a->high[1];
 }
 
 bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *l, const bst_layers_box *box,
@@ -224,7 +256,7 @@ int bst_facet_borders_layers(const bst_facet_layers *l, const bst_layers_outline
         row = middle + (n == 1 ? -1 : n == 2 ? 1 : 0);
         double y = row + 0.5;
         found = row >= 0 && row < l->height && own->low[1] < y && own->high[1] > y &&
-                chord_middle(own, y, &x);
+                chord_middle(own, y, &x) && x >= 0.0 && x < l->width;
     }
     if (!found) {
         return -1;

@@ -198,6 +198,9 @@ static bst_layers_seen look_at_all(const bst_facet_layers *l, const bst_layers_b
     const int *at = l->bins[box->facet];
     bst_point2 middle = middle_of(own);
     bst_layers_seen seen = BST_LAYERS_SEEN_ALL;
+    if (!(middle.x >= 0.0 && middle.y >= 0.0 && middle.x < l->width && middle.y < l->height)) {
+        return BST_LAYERS_SEEN_UNKNOWN; /* borders off the grid are not known */
+    }
     for (int j = at[2]; j <= at[3]; j++) {
         for (int i = j * l->bins_x + at[0]; i <= j * l->bins_x + at[1]; i++) {
             const bst_layers_box *b = &l->entries[l->bin_first[i]];

@@ -259,9 +259,11 @@ static bst_status mark_cells(bst_ctx *ctx, bst_facet_layers *l) {
     }
     BST_TRY(sort_crossings(ctx, l));
     count_layers(l);
+    BST_TRY(bst_facet_borders_enter(ctx, l));
     for (int n = 0; n < l->border_count; n++) {
-        /* a border that crosses no middle of a row may have layers on both sides */
-        if (l->borders[n].outside != 0) {
+        /* a border that crosses no middle of a row, or another border, may have layers on both
+         * sides elsewhere */
+        if (l->borders[n].outside != 0 || bst_facet_borders_meet(l, n)) {
             mark_border(l, l->borders[n].a, l->borders[n].b);
         }
     }
@@ -465,7 +467,6 @@ bst_status bst_facet_layers_find(bst_ctx *ctx, bst_facet_layers *l, const uint8_
         }
     }
     if (any) {
-        BST_TRY(bst_facet_borders_enter(ctx, l));
         BST_TRY(fill_bins(ctx, l));
     }
     return BST_OK;

@@ -56,6 +56,10 @@ bst_status bst_facet_borders_enter(bst_ctx *ctx, bst_facet_layers *layers) BST_M
 bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *layers, const bst_layers_box *box,
                                          const bst_layers_outline *own, const double plane[3]);
 
+/* True if a border crosses or touches another one elsewhere than in a common end: the number of
+ * layers on its sides changes there. */
+bool bst_facet_borders_meet(const bst_facet_layers *layers, int border);
+
 /* How a border is about a convex polygon: it touches it, at most, if it is neither apart nor
  * crosses it. */
 typedef enum bst_layers_place {
