@@ -64,12 +64,19 @@ static bst_satellite *bumpy_sphere(bool sunk) {
 /* An image by cuts, by areas, or by areas of blurred poses. */
 typedef enum way { BY_CUTS, BY_AREAS, BY_BLURRED_AREAS } way;
 
-static bst_resolved *draw(bst_satellite_pose *pose, const bst_resolved_view *view,
-                          const bst_resolved_light *light, way by) {
+/* Draws the image without a share of its width and height at the low sides, and half of that at the
+ * others. */
+static bst_resolved *draw_within(bst_satellite_pose *pose, const bst_resolved_view *view,
+                                 const bst_resolved_light *light, way by, double left_out) {
     bst_ctx ctx = {0};
     bst_resolved *r = NULL;
     double low[2], high[2];
     assert_true(bst_resolved_box(pose, view, low, high));
+    for (int i = 0; i < 2; i++) {
+        double across = high[i] - low[i];
+        low[i] += left_out * across;
+        high[i] -= 0.5 * left_out * across;
+    }
     bst_assert_ok(&ctx, bst_resolved_create(&ctx, pose->satellite, &r));
     bst_assert_ok(&ctx, bst_resolved_begin(&ctx, r, low, high, 1.0));
     if (by == BY_CUTS) {
@@ -80,6 +87,11 @@ static bst_resolved *draw(bst_satellite_pose *pose, const bst_resolved_view *vie
     bst_assert_ok(&ctx, bst_resolved_add_light(&ctx, r, pose, view, light, 1.0));
     bst_resolved_end_light(r, view->scale_rad);
     return r;
+}
+
+static bst_resolved *draw(bst_satellite_pose *pose, const bst_resolved_view *view,
+                          const bst_resolved_light *light, way by) {
+    return draw_within(pose, view, light, by, 0.0);
 }
 
 /* Largest difference of light and first moments, over the light of the brightest cell. */
@@ -100,7 +112,7 @@ static double difference(const bst_resolved_image *a, const bst_resolved_image *
 
 /* Draws a mesh from several sides. Returned: largest difference of light by areas from that by
  * cuts. */
-static double compare_sides(bst_satellite *satellite) {
+static double compare_sides(bst_satellite *satellite, double left_out) {
     bst_ctx ctx = {0};
     bst_satellite_pose *pose;
     bst_resolved_gain gain[1] = {{.sun = 1.0}};
@@ -115,8 +127,8 @@ static double compare_sides(bst_satellite *satellite) {
         bst_resolved_view view = {bst_quat_look(bst_vec3_scale(from, -1.0), (bst_vec3){0, 0, 1}),
                                   {0, 0, 20.0},
                                   0.0025 + 0.001 * n};
-        bst_resolved *cuts = draw(pose, &view, &light, BY_CUTS);
-        bst_resolved *areas = draw(pose, &view, &light, BY_AREAS);
+        bst_resolved *cuts = draw_within(pose, &view, &light, BY_CUTS, left_out);
+        bst_resolved *areas = draw_within(pose, &view, &light, BY_AREAS, left_out);
         worst = fmax(worst, difference(bst_resolved_image_of(cuts), bst_resolved_image_of(areas)));
         bst_resolved_free(cuts);
         bst_resolved_free(areas);
@@ -131,7 +143,72 @@ static void test_bumps(void **state) {
     (void)state;
     bst_satellite *satellite = bumpy_sphere(false);
     /* both are exact; the light of cells by cuts is stored and summed in single precision */
-    bst_assert_close(compare_sides(satellite), 0.0, 1e-5);
+    bst_assert_close(compare_sides(satellite, 0.0), 0.0, 1e-5);
+    bst_satellite_free(satellite);
+}
+
+/* Facets partly beside the image: borders there do not tell what is hidden within it. */
+static void test_beside_the_image(void **state) {
+    (void)state;
+    bst_satellite *satellite = bumpy_sphere(false);
+    for (int n = 0; n < 4; n++) {
+        bst_assert_close(compare_sides(satellite, 0.11 + 0.06 * n), 0.0, 1e-5); /* see above */
+    }
+    bst_satellite_free(satellite);
+    satellite = bumpy_sphere(true);
+    for (int n = 0; n < 4; n++) {
+        bst_assert_close(compare_sides(satellite, 0.11 + 0.06 * n), 0.0, 1e-5);
+    }
+    bst_satellite_free(satellite);
+}
+
+/* Writes two rings through each other. */
+static void write_rings(FILE *f) {
+    enum { LONG = 30, ROUND = 12 };
+    for (int n = 0; n < 2 * LONG * ROUND; n++) {
+        int k = n % (LONG * ROUND);
+        double a = 2.0 * BST_PI * (k / ROUND) / LONG, b = 2.0 * BST_PI * (k % ROUND) / ROUND;
+        double r = 1.0 + 0.3 * cos(b), x = r * cos(a), y = r * sin(a), z = 0.3 * sin(b);
+        fprintf(f, "v %.9f %.9f %.9f\n", n == k ? x : x + 1.0, n == k ? y : z, n == k ? z : y);
+    }
+    for (int n = 0; n < 2 * LONG * ROUND; n++) {
+        int base = n / (LONG * ROUND) * LONG * ROUND + 1, k = n % (LONG * ROUND);
+        int i = k / ROUND, next = (i + 1) % LONG, j = k % ROUND, up = (j + 1) % ROUND;
+        int a = base + i * ROUND + j, b = base + next * ROUND + j, c = base + next * ROUND + up;
+        int d = base + i * ROUND + up;
+        if (base == 1) {
+            fprintf(f, "f %d %d %d\nf %d %d %d\n", a, b, c, a, c, d);
+        } else { /* mirrored */
+            fprintf(f, "f %d %d %d\nf %d %d %d\n", c, b, a, d, c, a);
+        }
+    }
+}
+
+/* A border leaves what is behind it between the middles of two rows: beside one of its ends there
+ * is a second layer, at the middle of the row there is none. */
+static void test_border_across_border(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_satellite *satellite = load_mesh(write_rings);
+    bst_satellite_pose *pose;
+    bst_resolved_gain gain[1] = {{.sun = 1.0}};
+    bst_resolved_light light = {.sun = {0.0, 0.0, 1.0}, .gain = gain};
+    bst_assert_ok(&ctx, bst_satellite_pose_create(&ctx, satellite, &pose));
+    double range_m = 30.0 * satellite->radius_m;
+    for (int n = 0; n < 12; n++) {
+        bst_vec3 from = bst_vec3_unit((bst_vec3){-0.639, 0.499 + 0.004 * n, 0.586});
+        bst_resolved_view view = {
+            bst_quat_look(bst_vec3_scale(from, -1.0), (bst_vec3){0.1, 0.2, 0.97}),
+            {0, 0, range_m},
+            2.0 / 30.0 / 140.0};
+        bst_resolved *cuts = draw(pose, &view, &light, BY_CUTS);
+        bst_resolved *areas = draw(pose, &view, &light, BY_AREAS);
+        bst_assert_close(difference(bst_resolved_image_of(cuts), bst_resolved_image_of(areas)), 0.0,
+                         1e-5);
+        bst_resolved_free(cuts);
+        bst_resolved_free(areas);
+    }
+    bst_satellite_pose_free(pose);
     bst_satellite_free(satellite);
 }
 
@@ -139,7 +216,7 @@ static void test_bumps(void **state) {
 static void test_facets_through_others(void **state) {
     (void)state;
     bst_satellite *satellite = bumpy_sphere(true);
-    bst_assert_close(compare_sides(satellite), 0.0, 1e-5);
+    bst_assert_close(compare_sides(satellite, 0.0), 0.0, 1e-5);
     bst_satellite_free(satellite);
 }
 
@@ -333,9 +410,12 @@ static void test_faint_edges(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_bumps), cmocka_unit_test(test_facets_through_others),
-        cmocka_unit_test(test_plane_along_edges), cmocka_unit_test(test_crossing_facets),
-        cmocka_unit_test(test_faint_edges)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bumps),
+                                       cmocka_unit_test(test_facets_through_others),
+                                       cmocka_unit_test(test_plane_along_edges),
+                                       cmocka_unit_test(test_beside_the_image),
+                                       cmocka_unit_test(test_border_across_border),
+                                       cmocka_unit_test(test_crossing_facets),
+                                       cmocka_unit_test(test_faint_edges)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
