@@ -149,11 +149,15 @@ static inline void add_sums(bst_area_cell *c, sums4 more, double dy) {
     c->row_light += dy;
 }
 
-/* Two parts of an edge at once, as add_part: of cell `at` and of cell `next`, with coordinates from
- * their centres. `second` is NULL without second moments. */
+/* Two parts of an edge, from (x0, y0) to (x1, y1) from the centres of their cells. */
+typedef struct parts {
+    pair x0, y0, x1, y1;
+} parts;
+
+/* Adds them at once, as add_part: to cell `at` and to cell `next`. `second`: see row. */
 static inline void add_parts(bst_area_cell *cells, bst_area_second *second, size_t at, size_t next,
-                             pair x0, pair y0, pair x1, pair y1, double light) {
-    pair x = 0.5 * (x0 + x1), y = 0.5 * (y0 + y1), wide = x1 - x0, high = y1 - y0;
+                             parts p, double light) {
+    pair x = 0.5 * (p.x0 + p.x1), y = 0.5 * (p.y0 + p.y1), wide = p.x1 - p.x0, high = p.y1 - p.y0;
     pair dy = light * high, x2 = wide * wide * (1.0 / 12.0), right = 0.5 - x;
     pair xy = wide * high * (1.0 / 12.0), across = 0.5 * (0.25 - x * x - x2);
     pair_f row_y = __builtin_convertvector(dy * y, pair_f);
@@ -200,9 +204,9 @@ static inline void add_edge_within(bst_area_sums *s, bst_point2 a, bst_point2 b,
             pair cx = {i + 0.5, i + along + 0.5};
             double cy = j + 0.5;
             size_t at = (size_t)j * stride + (size_t)i + 1;
-            add_parts(s->cells, second ? s->second : NULL, at, at + step, (pair){x, side} - cx,
-                      (pair){y, y_side} - cy, (pair){side, x_next} - cx,
-                      (pair){y_side, y_next} - cy, light);
+            const parts both = {(pair){x, side} - cx, (pair){y, y_side} - cy,
+                                (pair){side, x_next} - cx, (pair){y_side, y_next} - cy};
+            add_parts(s->cells, second ? s->second : NULL, at, at + step, both, light);
             x = x_next;
             y = y_next;
         }
@@ -220,9 +224,9 @@ static inline void add_edge_within(bst_area_sums *s, bst_point2 a, bst_point2 b,
         pair cy = {j + 0.5, j + 1.5};
         double cx = i + 0.5;
         size_t at = (size_t)j * stride + (size_t)i + 1;
-        add_parts(s->cells, second ? s->second : NULL, at, at + stride, (pair){x, x_side} - cx,
-                  (pair){y, side} - cy, (pair){x_side, x_next} - cx, (pair){side, y_next} - cy,
-                  light);
+        const parts both = {(pair){x, x_side} - cx, (pair){y, side} - cy,
+                            (pair){x_side, x_next} - cx, (pair){side, y_next} - cy};
+        add_parts(s->cells, second ? s->second : NULL, at, at + stride, both, light);
         x = x_next;
         y = y_next;
     }

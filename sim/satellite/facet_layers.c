@@ -10,6 +10,9 @@ enum { LEVELS = 4096 };
 /* Width about borders that counts as theirs, in cells: they may cross another one there. */
 static const double MARGIN = 0.01;
 
+/* Areas of facets in a view, in cells, below that are none. */
+static const double LEAST_AREA = 1e-9;
+
 void bst_facet_layers_free(bst_facet_layers *l) {
     free(l->at);
     free(l->near);
@@ -470,4 +473,23 @@ bst_status bst_facet_layers_find(bst_ctx *ctx, bst_facet_layers *l, const uint8_
         BST_TRY(fill_bins(ctx, l));
     }
     return BST_OK;
+}
+
+bool bst_facet_layers_plane(const bst_facet_layers *l, int facet, double out[3]) {
+    const int *corner = l->net->corner + l->net->first[facet];
+    int count = l->net->first[facet + 1] - l->net->first[facet];
+    bst_point2 o = l->at[corner[0]];
+    double most = 0.0, z0 = l->near[corner[0]];
+    for (int i = 2; i < count; i++) {
+        bst_point2 a = l->at[corner[i - 1]], b = l->at[corner[i]];
+        double area = (a.x - o.x) * (b.y - o.y) - (b.x - o.x) * (a.y - o.y);
+        if (fabs(area) > fabs(most)) {
+            double za = l->near[corner[i - 1]] - z0, zb = l->near[corner[i]] - z0;
+            most = area;
+            out[1] = (za * (b.y - o.y) - zb * (a.y - o.y)) / area;
+            out[2] = (zb * (a.x - o.x) - za * (b.x - o.x)) / area;
+            out[0] = z0 - out[1] * o.x - out[2] * o.y;
+        }
+    }
+    return fabs(most) > LEAST_AREA;
 }
