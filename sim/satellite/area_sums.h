@@ -43,9 +43,6 @@ void bst_area_sums_edge(bst_area_sums *sums, bst_point2 a, bst_point2 b, double 
  * difference d of their light, those of a cell are wrong by at most 0.016 d. */
 void bst_area_sums_faint_edge(bst_area_sums *sums, bst_point2 a, bst_point2 b, double light);
 
-/* Reads the cells of an edge that is added soon ahead of time. */
-void bst_area_sums_expect(const bst_area_sums *sums, bst_point2 a, bst_point2 b);
-
 /* Adds a polygon, counter-clockwise. */
 void bst_area_sums_polygon(bst_area_sums *sums, const bst_point2 *corners, int count, double light);
 

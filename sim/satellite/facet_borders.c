@@ -9,6 +9,10 @@
 /* Shortest chord of a facet, in cells, of which the middle is within it beyond rounding. */
 static const double LEAST_CHORD = 1e-6;
 
+/* Distance from a line, times the length of a side, below which a place touches it beyond rounding,
+ * cells^2. */
+static const double TOUCHING = 1e-7;
+
 static bst_layers_border border_of(const bst_facet_layers *l, const bst_net_edge *edge,
                                    int layers) {
     bst_point2 a = l->at[edge->a], b = l->at[edge->b];
@@ -92,27 +96,32 @@ bst_status bst_facet_borders_enter(bst_ctx *ctx, bst_facet_layers *l) {
     return BST_OK;
 }
 
-/* Part of a border within a facet, from t[0] to t[1] along it. False: it only touches the facet. */
-static bool part_within(const bst_layers_outline *o, const bst_layers_border *b, double t[2]) {
+bst_layers_place bst_facet_borders_part(const bst_point2 *p, int count, bst_point2 a, bst_point2 b,
+                                        double t[2]) {
     double least = INFINITY, most = -INFINITY;
     t[0] = 0.0;
     t[1] = 1.0;
-    for (int i = 0, last = o->count - 1; i < o->count; last = i++) {
-        double from = bst_point2_left_of(o->p[last], o->p[i], b->a),
-               to = bst_point2_left_of(o->p[last], o->p[i], b->b);
+    for (int i = 0, last = count - 1; i < count; last = i++) {
+        double from = bst_point2_left_of(p[last], p[i], a),
+               to = bst_point2_left_of(p[last], p[i], b);
         if (from <= 0.0 && to <= 0.0) {
-            return false;
+            return from < -TOUCHING && to < -TOUCHING ? BST_LAYERS_PLACE_APART
+                                                      : BST_LAYERS_PLACE_TOUCHING;
         }
         if (from < 0.0) {
-            t[0] = fmax(t[0], from / (from - to));
+            double at = from / (from - to);
+            t[0] = at > t[0] ? at : t[0];
         } else if (to < 0.0) {
-            t[1] = fmin(t[1], from / (from - to));
+            double at = from / (from - to);
+            t[1] = at < t[1] ? at : t[1];
         }
-        double side = bst_point2_left_of(b->a, b->b, o->p[i]);
+        double side = bst_point2_left_of(a, b, p[i]);
         least = side < least ? side : least;
         most = side > most ? side : most;
     }
-    return least < 0.0 && most > 0.0;
+    return least < 0.0 && most > 0.0              ? BST_LAYERS_PLACE_CROSSING
+           : least > TOUCHING || most < -TOUCHING ? BST_LAYERS_PLACE_APART
+                                                  : BST_LAYERS_PLACE_TOUCHING;
 }
 
 /* True if a border is behind the plane of a facet at a place t along it. */
@@ -121,6 +130,51 @@ static bool is_behind(const bst_facet_layers *l, const bst_layers_border *b, con
     double x = b->a.x + t * (b->b.x - b->a.x), y = b->a.y + t * (b->b.y - b->a.y);
     double near = b->near[0] + t * (b->near[1] - b->near[0]);
     return near < plane[0] + plane[1] * x + plane[2] * y - l->same;
+}
+
+/* True if two boxes share a place, or touch. */
+static bool boxes_meet(const bst_layers_box *a, const bst_layers_box *b) {
+    return a->low[0] <= b->high[0] && b->low[0] <= a->high[0] && a->low[1] <= b->high[1] &&
+           b->low[1] <= a->high[1];
+}
+
+static bool is_same(bst_point2 p, bst_point2 q) {
+    return p.x == q.x && p.y == q.y;
+}
+
+/* True if two borders cross or touch elsewhere than in a common end. */
+static bool borders_meet(const bst_layers_border *p, const bst_layers_border *q) {
+    if (is_same(p->a, q->a) || is_same(p->a, q->b) || is_same(p->b, q->a) || is_same(p->b, q->b)) {
+        return false;
+    }
+    double a = bst_point2_left_of(p->a, p->b, q->a), b = bst_point2_left_of(p->a, p->b, q->b);
+    double c = bst_point2_left_of(q->a, q->b, p->a), d = bst_point2_left_of(q->a, q->b, p->b);
+    return !((a > 0.0 && b > 0.0) || (a < 0.0 && b < 0.0) || (c > 0.0 && d > 0.0) ||
+             (c < 0.0 && d < 0.0));
+}
+
+bool bst_facet_borders_meet(const bst_facet_layers *l, int border) {
+    const bst_layers_border *own = &l->borders[border];
+    int at[4];
+    bst_layers_range(l, &own->box, BST_LAYERS_BIN, at);
+    for (int j = at[2]; j <= at[3]; j++) {
+        int first = l->border_first[j * l->bins_x + at[0]];
+        int end = l->border_first[j * l->bins_x + at[1] + 1];
+        for (int n = first; n < end; n++) {
+            const bst_layers_border *b = &l->borders[l->border_entries[n]];
+            if (b != own && boxes_meet(&b->box, &own->box) && borders_meet(b, own)) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+/* True if all of a border is farther than all of a facet. */
+static bool is_far_behind(const bst_facet_layers *l, const bst_layers_border *b,
+                          const bst_layers_outline *own) {
+    double least = own->least - l->same;
+    return b->near[0] < least && b->near[1] < least;
 }
 
 bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *l, const bst_layers_box *box,
@@ -133,18 +187,50 @@ bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *l, const bst_la
         for (int n = first; n < end; n++) {
             const bst_layers_border *b = &l->borders[l->border_entries[n]];
             double t[2];
-            if (b->box.low[0] > box->high[0] || b->box.high[0] < box->low[0] ||
-                b->box.low[1] > box->high[1] || b->box.high[1] < box->low[1] ||
-                !part_within(own, b, t)) {
+            if (!boxes_meet(&b->box, box) || is_far_behind(l, b, own)) {
                 continue;
             }
-            if (!is_behind(l, b, plane, t[0]) || !is_behind(l, b, plane, t[1])) {
+            bst_layers_place place = bst_facet_borders_part(own->p, own->count, b->a, b->b, t);
+            if (place == BST_LAYERS_PLACE_TOUCHING) {
+                found = BST_LAYERS_CROSS_TOUCHING;
+            } else if (place == BST_LAYERS_PLACE_CROSSING &&
+                       (!is_behind(l, b, plane, t[0]) || !is_behind(l, b, plane, t[1]))) {
                 return BST_LAYERS_CROSS_BEFORE;
             }
-            found = BST_LAYERS_CROSS_BEHIND;
         }
     }
     return found;
+}
+
+int bst_facet_borders_before(const bst_facet_layers *l, const bst_layers_box *box,
+                             const bst_layers_outline *own, const double plane[3], int *out,
+                             int room) {
+    const int *at = l->bins[box->facet];
+    int count = 0;
+    for (int j = at[2]; j <= at[3]; j++) {
+        int first = l->border_first[j * l->bins_x + at[0]];
+        int end = l->border_first[j * l->bins_x + at[1] + 1];
+        for (int n = first; n < end; n++) {
+            int entry = l->border_entries[n], k = 0;
+            const bst_layers_border *b = &l->borders[entry];
+            double t[2];
+            if (!boxes_meet(&b->box, box) || is_far_behind(l, b, own) ||
+                bst_facet_borders_part(own->p, own->count, b->a, b->b, t) !=
+                    BST_LAYERS_PLACE_CROSSING ||
+                (is_behind(l, b, plane, t[0]) && is_behind(l, b, plane, t[1]))) {
+                continue;
+            }
+            while (k < count && out[k] != entry) {
+                k++;
+            }
+            if (k == room) {
+                return -1;
+            }
+            out[k] = entry;
+            count = k == count ? count + 1 : count;
+        }
+    }
+    return count;
 }
 
 /* Middle of a facet's chord at a height. False: it has none. */
@@ -170,7 +256,7 @@ int bst_facet_borders_layers(const bst_facet_layers *l, const bst_layers_outline
         row = middle + (n == 1 ? -1 : n == 2 ? 1 : 0);
         double y = row + 0.5;
         found = row >= 0 && row < l->height && own->low[1] < y && own->high[1] > y &&
-                chord_middle(own, y, &x);
+                chord_middle(own, y, &x) && x >= 0.0 && x < l->width;
     }
     if (!found) {
         return -1;

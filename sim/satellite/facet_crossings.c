@@ -179,6 +179,26 @@ static bool may_cross(const bst_facet_net *net, int f, int g) {
     return side_of(net, g, f) == ON_BOTH_SIDES && share_a_line(net, f, g);
 }
 
+/* Number of corners that two facets share. */
+static int shared_corners(const bst_facet_net *net, int f, int g) {
+    int shared = 0;
+    for (int i = net->first[f]; i < net->first[f + 1]; i++) {
+        shared += has_corner(net, g, i);
+    }
+    return shared;
+}
+
+/* True if a side of a facet may lie in another one that does not cross it: both of its corners are
+ * in the plane of that, and it is not a side of both. */
+static bool may_touch(const bst_facet_net *net, int facet, int plane) {
+    double same = SAME * net->satellite->radius_m;
+    int in_plane = 0;
+    for (int i = net->first[facet]; i < net->first[facet + 1]; i++) {
+        in_plane += fabs(height_of(net, plane, corner_of(net, i))) <= same;
+    }
+    return in_plane >= 2 && shared_corners(net, facet, plane) < 2;
+}
+
 static bool boxes_meet(const box *a, const box *b) {
     for (int k = 0; k < 3; k++) {
         if (a->low[k] > b->high[k] || b->low[k] > a->high[k]) {
@@ -188,9 +208,10 @@ static bool boxes_meet(const box *a, const box *b) {
     return true;
 }
 
-/* True if no other facet crosses it. */
-static bool is_apart(const bst_facet_net *net, cubes *c, int f) {
+/* Whether others cross or touch a facet: a value of `apart`. */
+static uint8_t find_apart(const bst_facet_net *net, cubes *c, int f) {
     int from[3], to[3];
+    uint8_t apart = BST_NET_FREE;
     range_of(c, &c->boxes[f], from, to);
     for (int z = from[2]; z <= to[2]; z++) {
         for (int y = from[1]; y <= to[1]; y++) {
@@ -202,14 +223,18 @@ static bool is_apart(const bst_facet_net *net, cubes *c, int f) {
                         continue;
                     }
                     c->seen[g] = f + 1;
-                    if (boxes_meet(&c->boxes[f], &c->boxes[g]) && may_cross(net, f, g)) {
-                        return false;
+                    if (!boxes_meet(&c->boxes[f], &c->boxes[g])) {
+                        continue;
                     }
+                    if (may_cross(net, f, g)) {
+                        return 0;
+                    }
+                    apart = apart == BST_NET_FREE && may_touch(net, f, g) ? BST_NET_APART : apart;
                 }
             }
         }
     }
-    return true;
+    return apart;
 }
 
 bst_status bst_facet_net_find_apart(bst_ctx *ctx, bst_facet_net *net) {
@@ -222,7 +247,7 @@ bst_status bst_facet_net_find_apart(bst_ctx *ctx, bst_facet_net *net) {
     }
     bst_status status = fill_cubes(ctx, net, &c);
     for (int f = 0; f < s->facet_count && status == BST_OK; f++) {
-        net->apart[f] = is_apart(net, &c, f);
+        net->apart[f] = find_apart(net, &c, f);
     }
     free(c.boxes);
     free(c.first);

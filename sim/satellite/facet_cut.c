@@ -5,9 +5,6 @@
 #include "sim/satellite/facet_layers_internal.h"
 #include "sim/satellite/polygon_cut.h"
 
-/* Areas of facets in a view, in cells, below that are none. */
-static const double LEAST_AREA = 1e-9;
-
 static void make_outline(const bst_facet_layers *l, int facet, bst_layers_outline *o) {
     const int *corner = l->net->corner + l->net->first[facet];
     int count = l->net->first[facet + 1] - l->net->first[facet];
@@ -26,25 +23,6 @@ static void make_outline(const bst_facet_layers *l, int facet, bst_layers_outlin
         o->least = near < o->least ? near : o->least;
         o->most = near > o->most ? near : o->most;
     }
-}
-
-bool bst_facet_layers_plane(const bst_facet_layers *l, int facet, double out[3]) {
-    const int *corner = l->net->corner + l->net->first[facet];
-    int count = l->net->first[facet + 1] - l->net->first[facet];
-    bst_point2 o = l->at[corner[0]];
-    double most = 0.0, z0 = l->near[corner[0]];
-    for (int i = 2; i < count; i++) {
-        bst_point2 a = l->at[corner[i - 1]], b = l->at[corner[i]];
-        double area = (a.x - o.x) * (b.y - o.y) - (b.x - o.x) * (a.y - o.y);
-        if (fabs(area) > fabs(most)) {
-            double za = l->near[corner[i - 1]] - z0, zb = l->near[corner[i]] - z0;
-            most = area;
-            out[1] = (za * (b.y - o.y) - zb * (a.y - o.y)) / area;
-            out[2] = (zb * (a.x - o.x) - za * (b.x - o.x)) / area;
-            out[0] = z0 - out[1] * o.x - out[2] * o.y;
-        }
-    }
-    return fabs(most) > LEAST_AREA;
 }
 
 /* True if the boxes of two facets share cells. */
@@ -171,29 +149,12 @@ static int shared_vertices(const bst_facet_net *net, int f, int g) {
     return shared;
 }
 
-/* True if a facet covers a place; its border does. */
-static bool covers(const bst_facet_layers *l, int facet, bst_point2 p) {
-    static const double ROUNDING = 1e-12;
-    const int *corner = l->net->corner + l->net->first[facet];
-    int count = l->net->first[facet + 1] - l->net->first[facet];
-    for (int i = 0; i < count; i++) {
-        bst_point2 a = l->at[corner[i]], b = l->at[corner[i + 1 < count ? i + 1 : 0]];
-        if ((b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x) > ROUNDING) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* What of a facet is seen that no border crosses: all of it, or nothing. */
-typedef enum seen_part { SEEN_ALL, SEEN_NOTHING, SEEN_UNKNOWN } seen_part;
-
 /* True if another facet, as near as `own` somewhere, overlaps it: their planes may cross.
  * Neighbours at an edge lie on both of its sides unless one covers the middle of the other. */
 static bool may_cross(const bst_facet_layers *l, int facet, int own_facet,
                       const bst_layers_outline *own, bst_point2 middle) {
     if (shared_vertices(l->net, facet, own_facet) > 1) {
-        return covers(l, facet, middle);
+        return bst_facet_layers_covers(l, facet, middle);
     }
     bst_layers_outline other;
     make_outline(l, facet, &other);
@@ -209,43 +170,15 @@ static bst_point2 middle_of(const bst_layers_outline *o) {
     return middle;
 }
 
-/* Finds it at the middle of a facet that no other one crosses. Unknown: one is as near, or the
- * middle is off the grid. */
-static seen_part look_at_middle(const bst_facet_layers *l, const bst_layers_box *box,
-                                const bst_layers_outline *own, const double plane[3]) {
-    bst_point2 p = middle_of(own);
-    if (!(p.x >= 0.0 && p.y >= 0.0 && p.x < l->width && p.y < l->height)) {
-        return SEEN_UNKNOWN;
-    }
-    int bin = (int)p.y / BST_LAYERS_BIN * l->bins_x + (int)p.x / BST_LAYERS_BIN;
-    const bst_layers_box *b = &l->entries[l->bin_first[bin]];
-    const bst_layers_box *end = &l->entries[l->bin_first[bin + 1]];
-    double near = plane[0] + plane[1] * p.x + plane[2] * p.y;
-    for (; b < end && b->nearest <= box->farthest; b++) {
-        double other[3];
-        if (b->facet == box->facet || (double)b->low[0] > p.x || (double)b->high[0] < p.x ||
-            (double)b->low[1] > p.y || (double)b->high[1] < p.y || !covers(l, b->facet, p)) {
-            continue;
-        }
-        if (b->farthest < box->nearest) {
-            return SEEN_NOTHING;
-        }
-        if (bst_facet_layers_plane(l, b->facet, other)) {
-            double before = other[0] + other[1] * p.x + other[2] * p.y - near;
-            if (before >= -l->same) {
-                return before > l->same ? SEEN_NOTHING : SEEN_UNKNOWN;
-            }
-        }
-    }
-    return SEEN_ALL;
-}
-
 /* Finds it of a facet that others may cross. Unknown: one does, perhaps. */
-static seen_part look_at_all(const bst_facet_layers *l, const bst_layers_box *box,
-                             const bst_layers_outline *own) {
+static bst_layers_seen look_at_all(const bst_facet_layers *l, const bst_layers_box *box,
+                                   const bst_layers_outline *own) {
     const int *at = l->bins[box->facet];
     bst_point2 middle = middle_of(own);
-    seen_part seen = SEEN_ALL;
+    bst_layers_seen seen = BST_LAYERS_SEEN_ALL;
+    if (!(middle.x >= 0.0 && middle.y >= 0.0 && middle.x < l->width && middle.y < l->height)) {
+        return BST_LAYERS_SEEN_UNKNOWN; /* borders off the grid are not known */
+    }
     for (int j = at[2]; j <= at[3]; j++) {
         for (int i = j * l->bins_x + at[0]; i <= j * l->bins_x + at[1]; i++) {
             const bst_layers_box *b = &l->entries[l->bin_first[i]];
@@ -256,10 +189,11 @@ static seen_part look_at_all(const bst_facet_layers *l, const bst_layers_box *bo
                 }
                 if (b->farthest >= box->nearest) {
                     if (may_cross(l, b->facet, box->facet, own, middle)) {
-                        return SEEN_UNKNOWN;
+                        return BST_LAYERS_SEEN_UNKNOWN;
                     }
-                } else if (seen == SEEN_ALL && covers(l, b->facet, middle)) {
-                    seen = SEEN_NOTHING;
+                } else if (seen == BST_LAYERS_SEEN_ALL &&
+                           bst_facet_layers_covers(l, b->facet, middle)) {
+                    seen = BST_LAYERS_SEEN_NOTHING;
                 }
             }
         }
@@ -267,20 +201,48 @@ static seen_part look_at_all(const bst_facet_layers *l, const bst_layers_box *bo
     return seen;
 }
 
-/* What is seen of a facet, if no border that may hide a part of it crosses it. */
-static seen_part look_within_borders(const bst_facet_layers *l, const bst_layers_box *box,
-                                     const bst_layers_outline *own, const double plane[3]) {
-    if (l->doubtful[box->facet] >= BST_LAYERS_AT_BORDER) {
-        bst_layers_cross cross = bst_facet_borders_cross(l, box, own, plane);
-        if (cross == BST_LAYERS_CROSS_BEFORE) {
-            return SEEN_UNKNOWN;
-        }
-        if (cross == BST_LAYERS_CROSS_NONE && bst_facet_borders_layers(l, own) == 1) {
-            return SEEN_ALL;
+/* What is seen of a facet without borders before it is what is seen of its neighbours of that kind:
+ * finds one of which that is known. */
+static bst_layers_seen look_beside(const bst_facet_layers *l, int facet) {
+    for (int i = l->net->first[facet]; i < l->net->first[facet + 1]; i++) {
+        uint8_t known = l->known[l->net->beside[i]];
+        if (known) {
+            return known == BST_LAYERS_KNOWN_ALL ? BST_LAYERS_SEEN_ALL : BST_LAYERS_SEEN_NOTHING;
         }
     }
-    return l->net->apart[box->facet] ? look_at_middle(l, box, own, plane)
-                                     : look_at_all(l, box, own);
+    return BST_LAYERS_SEEN_UNKNOWN;
+}
+
+/* What is seen of a facet. Unknown: borders that may hide a part of it cross it, and others may
+ * cross it, too. */
+static bst_layers_seen look_within_borders(bst_facet_layers *l, const bst_layers_box *box,
+                                           const bst_layers_outline *own, const double plane[3]) {
+    bst_layers_cross cross = BST_LAYERS_CROSS_NONE;
+    bst_layers_seen seen = BST_LAYERS_SEEN_UNKNOWN;
+    uint8_t apart = l->net->apart[box->facet];
+    bool border = l->doubtful[box->facet] >= BST_LAYERS_AT_BORDER;
+    if (border) {
+        cross = bst_facet_borders_cross(l, box, own, plane);
+        if (cross == BST_LAYERS_CROSS_BEFORE) {
+            return apart ? bst_facet_layers_split(l, box, own, plane) : seen;
+        }
+    }
+    bool clear = cross == BST_LAYERS_CROSS_NONE && apart == BST_NET_FREE && l->within[box->facet];
+    if (clear) {
+        seen = look_beside(l, box->facet);
+    }
+    if (seen == BST_LAYERS_SEEN_UNKNOWN && border && bst_facet_borders_layers(l, own) == 1) {
+        seen = BST_LAYERS_SEEN_ALL;
+    }
+    if (seen == BST_LAYERS_SEEN_UNKNOWN) {
+        seen =
+            apart ? bst_facet_layers_look(l, box, plane, middle_of(own)) : look_at_all(l, box, own);
+    }
+    if (clear && seen != BST_LAYERS_SEEN_UNKNOWN) {
+        l->known[box->facet] =
+            seen == BST_LAYERS_SEEN_ALL ? BST_LAYERS_KNOWN_ALL : BST_LAYERS_KNOWN_NOTHING;
+    }
+    return seen;
 }
 
 bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {
@@ -294,10 +256,10 @@ bool bst_facet_layers_cut(bst_facet_layers *l, int facet) {
         return true;
     }
     make_outline(l, facet, &own);
-    seen_part seen = look_within_borders(l, box, &own, plane);
     l->clip.piece_count = 0;
-    if (seen != SEEN_UNKNOWN) {
-        return seen == SEEN_ALL;
+    bst_layers_seen seen = look_within_borders(l, box, &own, plane);
+    if (seen != BST_LAYERS_SEEN_UNKNOWN) {
+        return seen == BST_LAYERS_SEEN_ALL;
     }
     make_sides(&own, &sides);
     l->stamp++;

@@ -10,12 +10,18 @@ enum { LEVELS = 4096 };
 /* Width about borders that counts as theirs, in cells: they may cross another one there. */
 static const double MARGIN = 0.01;
 
+/* Areas of facets in a view, in cells, below that are none. */
+static const double LEAST_AREA = 1e-9;
+
 void bst_facet_layers_free(bst_facet_layers *l) {
     free(l->at);
     free(l->near);
     free(l->facing);
     free(l->doubtful);
+    free(l->known);
     free(l->crowded);
+    free(l->vertex_bins);
+    free(l->within);
     free(l->boxes);
     free(l->bins);
     free(l->order);
@@ -44,13 +50,16 @@ static bst_status reserve_facets(bst_ctx *ctx, bst_facet_layers *l, const bst_fa
     l->near = calloc(vertices, sizeof *l->near);
     l->facing = calloc(facets, sizeof *l->facing);
     l->doubtful = calloc(facets, sizeof *l->doubtful);
+    l->known = calloc(facets, sizeof *l->known);
+    l->vertex_bins = calloc(vertices, sizeof *l->vertex_bins);
+    l->within = calloc(facets, sizeof *l->within);
     l->boxes = calloc(facets, sizeof *l->boxes);
     l->bins = calloc(facets, sizeof *l->bins);
     l->order = calloc(facets, sizeof *l->order);
     l->seen = calloc(facets, sizeof *l->seen);
     l->chosen = calloc(facets, sizeof *l->chosen);
-    if (!l->at || !l->near || !l->facing || !l->doubtful || !l->boxes || !l->bins || !l->order ||
-        !l->seen || !l->chosen) {
+    if (!l->at || !l->near || !l->facing || !l->doubtful || !l->known || !l->vertex_bins ||
+        !l->within || !l->boxes || !l->bins || !l->order || !l->seen || !l->chosen) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the view of %d facets",
                         net->satellite->facet_count);
     }
@@ -253,19 +262,53 @@ static bst_status mark_cells(bst_ctx *ctx, bst_facet_layers *l) {
     }
     BST_TRY(sort_crossings(ctx, l));
     count_layers(l);
+    BST_TRY(bst_facet_borders_enter(ctx, l));
     for (int n = 0; n < l->border_count; n++) {
-        /* a border that crosses no middle of a row may have layers on both sides */
-        if (l->borders[n].outside != 0) {
+        /* a border that crosses no middle of a row, or another border, may have layers on both
+         * sides elsewhere */
+        if (l->borders[n].outside != 0 || bst_facet_borders_meet(l, n)) {
             mark_border(l, l->borders[n].a, l->borders[n].b);
         }
     }
     return BST_OK;
 }
 
-/* Finds the range of nearness. */
-static void find_levels(bst_facet_layers *l) {
-    double least = INFINITY, most = -INFINITY;
+/* Finds the box of a facet. */
+static void make_box(bst_facet_layers *l, int f) {
+    const int *corner = l->net->corner + l->net->first[f];
+    const int *end = l->net->corner + l->net->first[f + 1];
+    bst_point2 low = l->at[corner[0]], high = low;
+    double near = l->near[corner[0]], far = near;
+    for (corner++; corner < end; corner++) {
+        bst_point2 p = l->at[*corner];
+        double z = l->near[*corner];
+        low.x = p.x < low.x ? p.x : low.x;
+        low.y = p.y < low.y ? p.y : low.y;
+        high.x = p.x > high.x ? p.x : high.x;
+        high.y = p.y > high.y ? p.y : high.y;
+        near = z > near ? z : near;
+        far = z < far ? z : far;
+    }
+    l->boxes[f] = (bst_layers_box){{(float)low.x, (float)low.y},
+                                   {(float)high.x, (float)high.y},
+                                   f,
+                                   (uint16_t)((l->level_from - near - l->same) * l->level_per),
+                                   (uint16_t)((l->level_from - far + l->same) * l->level_per)};
+}
+
+/* Sides of the grid that a vertex is beyond. */
+enum { OFF_LEFT = 1, OFF_RIGHT = 2, OFF_UP = 4, OFF_DOWN = 8 };
+
+/* Finds the bins of the vertices, and the range of nearness. */
+static void place_vertices(bst_facet_layers *l) {
+    double least = INFINITY, most = -INFINITY, width = l->width, height = l->height;
     for (int v = 0; v < l->net->vertex_count; v++) {
+        bst_point2 p = l->at[v];
+        l->vertex_bins[v] =
+            (bst_layers_bin_of){bst_layers_cell_of(p.x, l->width) / BST_LAYERS_BIN,
+                                bst_layers_cell_of(p.y, l->height) / BST_LAYERS_BIN,
+                                (p.x >= 0.0 ? 0 : OFF_LEFT) | (p.x < width ? 0 : OFF_RIGHT) |
+                                    (p.y >= 0.0 ? 0 : OFF_UP) | (p.y < height ? 0 : OFF_DOWN)};
         least = l->near[v] < least ? l->near[v] : least;
         most = l->near[v] > most ? l->near[v] : most;
     }
@@ -273,8 +316,9 @@ static void find_levels(bst_facet_layers *l) {
     l->level_per = (LEVELS - 1) / fmax(most - least + 2.0 * l->same, 1e-300);
 }
 
-/* Finds the boxes of the facets that face the view, and lists those that are not off the grid. */
-static void make_boxes(bst_facet_layers *l) {
+/* Finds the bins of the facets that face the view, lists those that are not off the grid, and notes
+ * which are within it. */
+static void find_bins(bst_facet_layers *l) {
     int facets = l->net->satellite->facet_count;
     l->order_count = 0;
     for (int f = 0; f < facets; f++) {
@@ -283,26 +327,23 @@ static void make_boxes(bst_facet_layers *l) {
         }
         const int *corner = l->net->corner + l->net->first[f];
         const int *end = l->net->corner + l->net->first[f + 1];
-        bst_point2 low = l->at[corner[0]], high = low;
-        double near = l->near[corner[0]], far = near;
+        bst_layers_bin_of low = l->vertex_bins[*corner], high = low;
+        int any = low.off, all = low.off;
         for (corner++; corner < end; corner++) {
-            bst_point2 p = l->at[*corner];
-            double z = l->near[*corner];
-            low.x = p.x < low.x ? p.x : low.x;
-            low.y = p.y < low.y ? p.y : low.y;
-            high.x = p.x > high.x ? p.x : high.x;
-            high.y = p.y > high.y ? p.y : high.y;
-            near = z > near ? z : near;
-            far = z < far ? z : far;
+            bst_layers_bin_of b = l->vertex_bins[*corner];
+            low.x = b.x < low.x ? b.x : low.x;
+            low.y = b.y < low.y ? b.y : low.y;
+            high.x = b.x > high.x ? b.x : high.x;
+            high.y = b.y > high.y ? b.y : high.y;
+            any |= b.off;
+            all &= b.off;
         }
-        bool off = !(high.x >= 0.0 && high.y >= 0.0 && low.x < l->width && low.y < l->height);
-        l->boxes[f] = (bst_layers_box){{(float)low.x, (float)low.y},
-                                       {off ? -1.0F : (float)high.x, (float)high.y},
-                                       f,
-                                       (uint16_t)((l->level_from - near - l->same) * l->level_per),
-                                       (uint16_t)((l->level_from - far + l->same) * l->level_per)};
-        if (!off) {
-            bst_layers_range(l, &l->boxes[f], BST_LAYERS_BIN, l->bins[f]);
+        if (!all) {
+            l->bins[f][0] = low.x;
+            l->bins[f][1] = high.x;
+            l->bins[f][2] = low.y;
+            l->bins[f][3] = high.y;
+            l->within[f] = any == 0;
             l->order[l->order_count++] = f;
         }
     }
@@ -325,6 +366,9 @@ static void order_facets(bst_facet_layers *l) {
     int first[LEVELS + 1] = {0}, count = 0;
     for (int n = 0; n < l->order_count; n++) {
         if (any_bin(l, l->order[n], l->needed)) {
+            if (!l->doubtful[l->order[n]]) {
+                make_box(l, l->order[n]);
+            }
             l->chosen[count++] = l->order[n];
             first[l->boxes[l->order[n]].nearest + 1]++;
         }
@@ -407,23 +451,45 @@ static bst_status fill_bins(bst_ctx *ctx, bst_facet_layers *l) {
 bst_status bst_facet_layers_find(bst_ctx *ctx, bst_facet_layers *l, const uint8_t *wanted) {
     bool any = false;
     BST_TRY(mark_cells(ctx, l));
-    find_levels(l);
-    make_boxes(l);
+    place_vertices(l);
+    find_bins(l);
     memset(l->needed, 0, (size_t)l->bins_x * (size_t)l->bins_y);
     memset(l->doubtful, 0, (size_t)l->net->satellite->facet_count);
+    memset(l->known, 0, (size_t)l->net->satellite->facet_count);
     for (int n = 0; n < l->order_count; n++) {
         int f = l->order[n];
         if (wanted[f] && any_bin(l, f, l->marked)) {
+            make_box(l, f);
             l->doubtful[f] = (uint8_t)marks_of(l, &l->boxes[f]);
         }
         if (l->doubtful[f]) {
             need_bins(l, f);
             any = true;
+        } else if (wanted[f] && l->net->apart[f] == BST_NET_FREE && l->within[f]) {
+            l->known[f] = BST_LAYERS_KNOWN_ALL;
         }
     }
     if (any) {
-        BST_TRY(bst_facet_borders_enter(ctx, l));
         BST_TRY(fill_bins(ctx, l));
     }
     return BST_OK;
+}
+
+bool bst_facet_layers_plane(const bst_facet_layers *l, int facet, double out[3]) {
+    const int *corner = l->net->corner + l->net->first[facet];
+    int count = l->net->first[facet + 1] - l->net->first[facet];
+    bst_point2 o = l->at[corner[0]];
+    double most = 0.0, z0 = l->near[corner[0]];
+    for (int i = 2; i < count; i++) {
+        bst_point2 a = l->at[corner[i - 1]], b = l->at[corner[i]];
+        double area = (a.x - o.x) * (b.y - o.y) - (b.x - o.x) * (a.y - o.y);
+        if (fabs(area) > fabs(most)) {
+            double za = l->near[corner[i - 1]] - z0, zb = l->near[corner[i]] - z0;
+            most = area;
+            out[1] = (za * (b.y - o.y) - zb * (a.y - o.y)) / area;
+            out[2] = (zb * (a.x - o.x) - za * (b.x - o.x)) / area;
+            out[0] = z0 - out[1] * o.x - out[2] * o.y;
+        }
+    }
+    return fabs(most) > LEAST_AREA;
 }

@@ -17,6 +17,11 @@ typedef struct bst_layers_box {
     uint16_t nearest, farthest;
 } bst_layers_box;
 
+/* Bin of a vertex, within the grid; off: sides of the grid that it is beyond, as bits. */
+typedef struct bst_layers_bin_of {
+    int x, y, off;
+} bst_layers_bin_of;
+
 /* Where the border of a layer crosses the middle of a row. */
 typedef struct bst_layers_crossing {
     double x;
@@ -46,13 +51,16 @@ typedef struct bst_facet_layers {
     uint8_t
         *doubtful; /* by facet: others may hide it; 1: all or nothing, but for planes that cross */
     /* work memory */
-    uint8_t *crowded;               /* by cell: something may be hidden there */
-    bst_layers_box *boxes;          /* by facet that faces the view */
-    int (*bins)[4];                 /* likewise: first and last column, first and last row of its
-                                       bins */
-    int *order;                     /* facets that face the view; of those in the bins that are
-                                       needed, the nearest first */
-    int *chosen;                    /* facets in these bins */
+    uint8_t *within;                /* by facet in `order`: all of it is on the grid */
+    bst_layers_bin_of *vertex_bins; /* by vertex of the net */
+    uint8_t *known;        /* by facet: what is seen of it, and 0 for one more; see facet_cut.c */
+    uint8_t *crowded;      /* by cell: something may be hidden there */
+    bst_layers_box *boxes; /* by facet that faces the view, of those that are looked at */
+    int (*bins)[4];        /* likewise: first and last column, first and last row of its
+                              bins */
+    int *order;            /* facets that face the view; of those in the bins that are
+                              needed, the nearest first */
+    int *chosen;           /* facets in these bins */
     bst_layers_crossing *crossings; /* of borders with the middles of rows, in order */
     bst_layers_crossing *sorted;    /* room for them */
     int *row_first;                 /* [height + 1] */

@@ -18,12 +18,16 @@ typedef struct bst_layers_outline {
     double low[2], high[2], least, most; /* box, and nearness of the corners */
 } bst_layers_outline;
 
-/* Whether borders of layers cross a facet. */
+/* How borders of layers are about a facet. Those behind it that cross it do not count. */
 typedef enum bst_layers_cross {
     BST_LAYERS_CROSS_NONE,
-    BST_LAYERS_CROSS_BEHIND, /* all that do are behind it */
-    BST_LAYERS_CROSS_BEFORE  /* some may be nearer */
+    BST_LAYERS_CROSS_TOUCHING,
+    BST_LAYERS_CROSS_BEFORE /* some cross it and may be nearer */
 } bst_layers_cross;
+
+/* Values of `known`: nothing hides any of the facet, or others hide all of it; no border before it
+ * touches it. */
+enum { BST_LAYERS_KNOWN_ALL = 1, BST_LAYERS_KNOWN_NOTHING = 2 };
 
 /* Column or row of a coordinate, within the grid. */
 static inline int bst_layers_cell_of(double x, int count) {
@@ -46,11 +50,55 @@ bst_status bst_facet_borders_list(bst_ctx *ctx, bst_facet_layers *layers) BST_MU
 /* Enters them in the bins. BST_ERR_MEMORY. */
 bst_status bst_facet_borders_enter(bst_ctx *ctx, bst_facet_layers *layers) BST_MUST_CHECK;
 
-/* Finds whether a border crosses the inside of a facet. One that touches it does not.
+/* Finds whether a border crosses the inside of a facet.
  *
  * Given:     own, plane  of the facet, see bst_facet_layers_plane */
 bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *layers, const bst_layers_box *box,
                                          const bst_layers_outline *own, const double plane[3]);
+
+/* True if a border crosses or touches another one elsewhere than in a common end: the number of
+ * layers on its sides changes there. */
+bool bst_facet_borders_meet(const bst_facet_layers *layers, int border);
+
+/* How a border is about a convex polygon: it touches it, at most, if it is neither apart nor
+ * crosses it. */
+typedef enum bst_layers_place {
+    BST_LAYERS_PLACE_APART,
+    BST_LAYERS_PLACE_TOUCHING,
+    BST_LAYERS_PLACE_CROSSING
+} bst_layers_place;
+
+/* Finds the part of a border a-b within a polygon, counter-clockwise: from t[0] to t[1] along it,
+ * if it crosses it. */
+bst_layers_place bst_facet_borders_part(const bst_point2 *points, int count, bst_point2 a,
+                                        bst_point2 b, double t[2]);
+
+/* Lists the borders across the inside of a facet that may hide a part of it, each once.
+ *
+ * Given:     own, plane  see bst_facet_borders_cross
+ * Returned:  out[room]; their number is the return value; below 0: there are more */
+int bst_facet_borders_before(const bst_facet_layers *layers, const bst_layers_box *box,
+                             const bst_layers_outline *own, const double plane[3], int *out,
+                             int room);
+
+/* What of a facet is seen. */
+typedef enum bst_layers_seen {
+    BST_LAYERS_SEEN_ALL,
+    BST_LAYERS_SEEN_NOTHING,
+    BST_LAYERS_SEEN_PIECES, /* those in layers->clip */
+    BST_LAYERS_SEEN_UNKNOWN
+} bst_layers_seen;
+
+/* Finds whether a place of a facet is seen. Unknown: another facet is as near, or the place is off
+ * the grid. */
+bst_layers_seen bst_facet_layers_look(const bst_facet_layers *layers, const bst_layers_box *box,
+                                      const double plane[3], bst_point2 place);
+/* True if a facet covers a place; its border does. */
+bool bst_facet_layers_covers(const bst_facet_layers *layers, int facet, bst_point2 place);
+/* Splits a facet that no other one crosses along the borders before it (facet_split.c). Unknown:
+ * too many of them, or see above. */
+bst_layers_seen bst_facet_layers_split(bst_facet_layers *layers, const bst_layers_box *box,
+                                       const bst_layers_outline *own, const double plane[3]);
 
 /* Number of layers at a place within a facet; below 0: it reaches the middle of no row. */
 int bst_facet_borders_layers(const bst_facet_layers *layers, const bst_layers_outline *own);

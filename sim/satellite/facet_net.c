@@ -8,6 +8,7 @@ void bst_facet_net_free(bst_facet_net *net) {
     free(net->vertex);
     free(net->first);
     free(net->corner);
+    free(net->beside);
     free(net->edges);
     free(net->apart);
     *net = (bst_facet_net){.vertex_count = 0};
@@ -148,6 +149,10 @@ static void join(const bst_satellite *s, work *w, bst_facet_net *net) {
             end++;
         }
         pair_sides(net, w, w->sides + i, end - i);
+        for (int k = i; k < end; k++) {
+            int partner = end - i == 2 ? w->partner[w->sides[k].index] : -1;
+            net->beside[w->sides[k].index] = partner < 0 ? s->facet_count : w->facet[partner];
+        }
         i = end;
     }
     for (int i = 0; i < s->corner_count; i++) {
@@ -165,6 +170,7 @@ bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *s, bst_facet_ne
                            .vertex = calloc(vertices, sizeof *out->vertex),
                            .first = calloc((size_t)s->facet_count + 1, sizeof *out->first),
                            .corner = calloc(corners, sizeof *out->corner),
+                           .beside = calloc(corners, sizeof *out->beside),
                            .edges = calloc(corners, sizeof *out->edges),
                            .apart = calloc((size_t)s->facet_count + 1, sizeof *out->apart)};
     work w = {.placed = calloc(vertices, sizeof *w.placed),
@@ -174,8 +180,8 @@ bst_status bst_facet_net_make(bst_ctx *ctx, const bst_satellite *s, bst_facet_ne
               .partner = calloc(corners, sizeof *w.partner),
               .sides = calloc(corners, sizeof *w.sides)};
     bst_status status = BST_OK;
-    if (!out->vertex || !out->first || !out->corner || !out->edges || !out->apart || !w.placed ||
-        !w.first || !w.number || !w.facet || !w.partner || !w.sides) {
+    if (!out->vertex || !out->first || !out->corner || !out->beside || !out->edges || !out->apart ||
+        !w.placed || !w.first || !w.number || !w.facet || !w.partner || !w.sides) {
         status =
             bst_fail(ctx, BST_ERR_MEMORY, "no memory for the edges of %d facets", s->facet_count);
     } else {

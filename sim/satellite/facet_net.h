@@ -11,6 +11,9 @@ typedef struct bst_net_edge {
     int a, b, left, right;
 } bst_net_edge;
 
+/* Values of `apart`. */
+enum { BST_NET_APART = 1, BST_NET_FREE = 2 };
+
 /* Vertices of the same place and joint are one. Edges are in the order of their facets. */
 typedef struct bst_facet_net {
     const bst_satellite *satellite;
@@ -18,9 +21,11 @@ typedef struct bst_facet_net {
     int *first;  /* [facet_count + 1] by facet: its first corner; those of facets follow one another
                   */
     int *corner; /* vertices of the net */
+    int *beside; /* by corner: facet on the other side of the edge to the next corner, if no third
+                    one has that edge; else the number of facets */
     bst_net_edge *edges;
-    uint8_t
-        *apart; /* by facet: no other one crosses it or lies in its plane beside it, in any pose */
+    uint8_t *apart; /* by facet, in any pose: BST_NET_APART: no other one crosses it or lies in its
+                       plane beside it; BST_NET_FREE: nor has one of its sides, but those of both */
     int vertex_count, edge_count;
 } bst_facet_net;
 

@@ -13,8 +13,9 @@ enum { LIGHT_CELLS_MIN = 32, LIGHT_CELLS_MAX = 1024 };
  * more poses than a few blur the image. */
 static const double FAINT = 0.1;
 
-/* Edges between reading the cells of one and adding it. */
-enum { AHEAD = 8 };
+/* Edges of a pose that are added before those of the next one: of a part of the body that meets so
+ * few cells that they stay in fast memory. */
+enum { EDGES = 512 };
 
 /* Cosine of incidence of the earthlight's centroid below which it casts no shadow. */
 static const double EARTH_LOW = 0.05;
@@ -27,9 +28,14 @@ void bst_resolved_areas_free(bst_resolved_areas *s) {
         bst_facet_layers_free(&s->lit[n]);
         free(s->from[n]);
     }
+    free(s->planes);
+    free(s->middles);
     free(s->even);
     free(s->wanted);
-    free(s->steps);
+    for (int k = 0; k < BST_RESOLVED_KEPT; k++) {
+        free(s->kept[k].at);
+        free(s->kept[k].even);
+    }
     free(s->second);
     *s = (bst_resolved_areas){.made = false};
 }
@@ -52,10 +58,16 @@ static bst_status make(bst_ctx *ctx, bst_resolved *r) {
     size_t facets = (size_t)r->satellite->facet_count + 1;
     bst_resolved_areas_free(s);
     BST_TRY(bst_facet_net_make(ctx, r->satellite, &s->net));
+    s->planes = calloc(facets, sizeof *s->planes);
+    s->middles = calloc(facets, sizeof *s->middles);
     s->even = calloc(facets, sizeof *s->even);
     s->wanted = calloc(facets, sizeof *s->wanted);
-    s->steps = calloc((size_t)s->net.edge_count + 1, sizeof *s->steps);
-    s->made = s->even && s->wanted && s->steps;
+    s->made = s->planes && s->middles && s->even && s->wanted;
+    for (int k = 0; k < BST_RESOLVED_KEPT; k++) {
+        s->kept[k].at = calloc((size_t)s->net.vertex_count + 1, sizeof *s->kept[k].at);
+        s->kept[k].even = calloc(facets, sizeof *s->kept[k].even);
+        s->made = s->made && s->kept[k].at && s->kept[k].even;
+    }
     for (int n = 0; n < BST_RESOLVED_LIGHTS; n++) {
         s->from[n] = calloc(facets, sizeof *s->from[n]);
         s->made = s->made && s->from[n];
@@ -72,6 +84,7 @@ bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *r, bool blurred)
         BST_TRY(make(ctx, r));
     }
     s->faint = blurred ? FAINT : 0.0;
+    s->kept_count = 0;
     if (cells > s->second_capacity) {
         free(s->second);
         s->second = malloc(cells * sizeof *s->second);
@@ -84,13 +97,23 @@ bst_status bst_resolved_begin_light(bst_ctx *ctx, bst_resolved *r, bool blurred)
     return bst_area_sums_begin(ctx, &r->areas.sums, r->image.width, r->image.height);
 }
 
-void bst_resolved_join_light(bst_resolved *to, const bst_resolved *from) {
-    bst_area_sums_add(&to->areas.sums, &from->areas.sums);
-}
-
-void bst_resolved_end_light(bst_resolved *r, double scale_rad) {
-    r->image.second = r->areas.second;
-    bst_area_sums_finish(&r->areas.sums, r->image.cell_px * scale_rad, &r->image);
+/* Finds planes and middles of the facets. */
+static void place_facets(const bst_resolved_adding *a) {
+    bst_resolved_areas *s = &a->r->areas;
+    const bst_satellite *sat = a->r->satellite;
+    for (int f = 0; f < sat->facet_count && !s->placed; f++) {
+        const int *corner = s->net.corner + s->net.first[f];
+        int count = s->net.first[f + 1] - s->net.first[f];
+        bst_vec3 normal = a->pose->normals[f], middle = {0};
+        for (int i = 0; i < count; i++) {
+            middle =
+                bst_vec3_axpy(middle, 1.0 / count, a->pose->vertices[s->net.vertex[corner[i]]]);
+        }
+        bst_vec3 from = a->pose->vertices[s->net.vertex[corner[0]]];
+        s->planes[f] = (bst_resolved_plane){normal, bst_vec3_dot(normal, from)};
+        s->middles[f] = middle;
+    }
+    s->placed = sat->joint_count == 0;
 }
 
 /* Places the vertices in the image and finds the facets that face the observer. */
@@ -107,46 +130,34 @@ static bst_status face_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
         l->near[v] = origin_m * ((origin_m - depth_m) / depth_m);
     }
     for (int f = 0; f < sat->facet_count; f++) {
-        bst_vec3 from = a->pose->vertices[s->net.vertex[s->net.corner[s->net.first[f]]]];
-        l->facing[f] = bst_vec3_dot(a->pose->normals[f], bst_vec3_sub(a->eye_m, from)) > 0.0;
+        l->facing[f] = bst_vec3_dot(s->planes[f].normal, a->eye_m) > s->planes[f].offset_m;
     }
     l->facing[sat->facet_count] = 0;
     return BST_OK;
 }
 
-/* Light of the facets that face the observer, if nothing hides them from it. */
+/* Light of the facets that face the observer, if nothing hides them from it. Those with light are
+ * wanted. */
 static void shade(const bst_resolved_adding *a) {
     bst_resolved_areas *s = &a->r->areas;
     const bst_satellite *sat = a->r->satellite;
     for (int f = 0; f < sat->facet_count; f++) {
+        s->wanted[f] = 0;
         if (!s->eye.facing[f]) {
             continue;
         }
-        const bst_facet *facet = &sat->facets[f];
-        bst_vec3 middle = {0};
-        for (int i = 0; i < facet->count; i++) {
-            middle = bst_vec3_axpy(middle, 1.0 / facet->count,
-                                   a->pose->vertices[sat->corner[facet->first + i]]);
+        bst_vec3 normal = s->planes[f].normal;
+        bst_resolved_shading light = {0.0, 0.0, 0.0, {0.0, 0.0}};
+        int material = sat->facets[f].material;
+        if (bst_vec3_dot(normal, a->light->sun) > 0.0 || a->earth ||
+            a->light->gain[material].emission > 0.0) {
+            light = bst_resolved_shade(a, material, s->middles[f], normal);
         }
-        bst_resolved_shading light =
-            bst_resolved_shade(a, facet->material, middle, a->pose->normals[f]);
         s->even[f] = light.uniform;
         s->from[0][f] = light.sun;
         s->from[1][f] = light.earth;
+        s->wanted[f] = light.uniform + light.sun + light.earth > 0.0;
     }
-}
-
-/* Finds the facets with light that others may hide from the observer. */
-static bst_status look_from_eye(bst_ctx *ctx, const bst_resolved_adding *a) {
-    bst_resolved_areas *s = &a->r->areas;
-    for (int f = 0; f < a->r->satellite->facet_count; f++) {
-        double light = s->even[f];
-        for (int n = 0; n < BST_RESOLVED_LIGHTS; n++) {
-            light += s->from[n][f];
-        }
-        s->wanted[f] = s->eye.facing[f] && light > 0.0;
-    }
-    return bst_facet_layers_find(ctx, &s->eye, s->wanted);
 }
 
 /* View from a light: a place in the body frame is at middle + per_m times its x and y. */
@@ -185,7 +196,7 @@ static bst_status look_from_light(bst_ctx *ctx, const bst_resolved_adding *a, in
         l->near[i] = bst_vec3_dot(p, v->z);
     }
     for (int f = 0; f < sat->facet_count; f++) {
-        double in = bst_vec3_dot(a->pose->normals[f], v->z);
+        double in = bst_vec3_dot(s->planes[f].normal, v->z);
         l->facing[f] = in > 0.0;
         s->wanted[f] = in > least && s->eye.facing[f] && s->from[n][f] > 0.0;
     }
@@ -261,22 +272,18 @@ static double add_facet(const bst_resolved_adding *a, int facet, const light_vie
     return 0.0;
 }
 
-/* Adds the edges of whole facets. */
-static void add_edges(bst_resolved_areas *s) {
-    int count = 0;
-    for (int e = 0; e < s->net.edge_count; e++) {
+/* Adds some edges of the whole facets of a pose. */
+static void add_edges(bst_resolved_areas *s, const bst_resolved_kept *kept, int first, int end) {
+    int steps[EDGES], count = 0; /* those at which the light changes */
+    for (int e = first; e < end; e++) {
         const bst_net_edge *edge = &s->net.edges[e];
-        s->steps[count] = e;
-        count += s->even[edge->left] != s->even[edge->right];
+        steps[count] = e;
+        count += kept->even[edge->left] != kept->even[edge->right];
     }
     for (int n = 0; n < count; n++) {
-        const bst_net_edge *edge = &s->net.edges[s->steps[n]];
-        double left = s->even[edge->left], right = s->even[edge->right], step = left - right;
-        bst_point2 a = s->eye.at[edge->a], b = s->eye.at[edge->b];
-        if (n + AHEAD < count) {
-            const bst_net_edge *later = &s->net.edges[s->steps[n + AHEAD]];
-            bst_area_sums_expect(&s->sums, s->eye.at[later->a], s->eye.at[later->b]);
-        }
+        const bst_net_edge *edge = &s->net.edges[steps[n]];
+        double left = kept->even[edge->left], right = kept->even[edge->right], step = left - right;
+        bst_point2 a = kept->at[edge->a], b = kept->at[edge->b];
         if (fabs(step) < s->faint * (left < right ? left : right)) {
             bst_area_sums_faint_edge(&s->sums, a, b, step);
         } else {
@@ -285,13 +292,49 @@ static void add_edges(bst_resolved_areas *s) {
     }
 }
 
+/* Adds the edges of all poses that are kept. */
+static void add_kept(bst_resolved_areas *s) {
+    for (int e = 0; e < s->net.edge_count && s->kept_count > 0; e += EDGES) {
+        int end = e + EDGES < s->net.edge_count ? e + EDGES : s->net.edge_count;
+        for (int k = 0; k < s->kept_count; k++) {
+            add_edges(s, &s->kept[k], e, end);
+        }
+    }
+    s->kept_count = 0;
+}
+
+/* Keeps the places and the light of a pose, in exchange for other memory. */
+static void keep(bst_resolved_areas *s) {
+    bst_resolved_kept *to = &s->kept[s->kept_count++];
+    bst_resolved_kept now = {s->eye.at, s->even};
+    s->eye.at = to->at;
+    s->even = to->even;
+    *to = now;
+    if (s->kept_count == BST_RESOLVED_KEPT) {
+        add_kept(s);
+    }
+}
+
+void bst_resolved_join_light(bst_resolved *to, bst_resolved *from) {
+    add_kept(&to->areas);
+    add_kept(&from->areas);
+    bst_area_sums_add(&to->areas.sums, &from->areas.sums);
+}
+
+void bst_resolved_end_light(bst_resolved *r, double scale_rad) {
+    add_kept(&r->areas);
+    r->image.second = r->areas.second;
+    bst_area_sums_finish(&r->areas.sums, r->image.cell_px * scale_rad, &r->image);
+}
+
 bst_status bst_resolved_add_areas(bst_ctx *ctx, const bst_resolved_adding *a, double weight) {
     bst_resolved_areas *s = &a->r->areas;
     const bst_satellite *sat = a->r->satellite;
     light_view views[BST_RESOLVED_LIGHTS];
+    place_facets(a);
     BST_TRY(face_eye(ctx, a));
     shade(a);
-    BST_TRY(look_from_eye(ctx, a));
+    BST_TRY(bst_facet_layers_find(ctx, &s->eye, s->wanted));
     views[0] = light_view_of(a, a->light->sun);
     BST_TRY(look_from_light(ctx, a, 0, &views[0]));
     if (a->earth) {
@@ -305,6 +348,6 @@ bst_status bst_resolved_add_areas(bst_ctx *ctx, const bst_resolved_adding *a, do
         s->even[f] = s->eye.facing[f] ? add_facet(a, f, views, weight) : 0.0;
     }
     s->even[sat->facet_count] = 0.0;
-    add_edges(s);
+    keep(s);
     return BST_OK;
 }

@@ -21,15 +21,35 @@ enum { BST_RESOLVED_LIGHTS = 2 };
 /* Differences of depth over the satellite's radius that are none. */
 #define BST_RESOLVED_SAME 2e-6
 
+/* Plane of a facet, body frame: normal . place = offset_m. */
+typedef struct bst_resolved_plane {
+    bst_vec3 normal;
+    double offset_m;
+} bst_resolved_plane;
+
+/* Poses of which the edges are added together: the cells that an edge meets in one of them are
+ * still in fast memory for the next one. */
+enum { BST_RESOLVED_KEPT = 4 };
+
+/* A pose of which the edges are not yet added. */
+typedef struct bst_resolved_kept {
+    bst_point2 *at; /* by vertex of the net: place in the image */
+    double *even;   /* by facet, and 0 for one more: light per cell of whole facets */
+} bst_resolved_kept;
+
 /* Work memory of light by exact areas (resolved_areas.c): zero-initialise. */
 typedef struct bst_resolved_areas {
     bst_facet_net net;
     bst_facet_layers eye, lit[BST_RESOLVED_LIGHTS];
     bst_area_sums sums;
+    bst_resolved_plane *planes;        /* by facet, of the current pose */
+    bst_vec3 *middles;                 /* likewise: means of the corners, body frame */
+    bool placed;                       /* they are those of all poses: the model has no joints */
     double *even;                      /* by facet: light without shadows, per cell */
     double *from[BST_RESOLVED_LIGHTS]; /* by facet: of each light */
     uint8_t *wanted;                   /* by facet */
-    int *steps;                        /* edges at which the light of whole facets changes */
+    bst_resolved_kept kept[BST_RESOLVED_KEPT];
+    int kept_count;
     double faint; /* difference of light, over that light, of which an edge is faint */
     bst_resolved_second *second; /* of the image's cells */
     size_t second_capacity;

@@ -115,7 +115,7 @@ bst_status bst_resolved_add_light(bst_ctx *ctx, bst_resolved *resolved, bst_sate
                                   double weight) BST_MUST_CHECK;
 
 /* Adds the sums of another image that began with the same box and cells. */
-void bst_resolved_join_light(bst_resolved *to, const bst_resolved *from);
+void bst_resolved_join_light(bst_resolved *to, bst_resolved *from);
 
 /* Sets the light of the image, with its moments, to the sums.
  *
