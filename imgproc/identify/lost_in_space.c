@@ -31,9 +31,10 @@ static const double BRIGHTEST_V = -2.0;
 /* Least share of the predicted stars that a right attitude matches over the whole field. */
 static const double LEAST_SHARE = 0.35;
 /* Largest chi-square of four stars about the attitude and scale that fit them best, of four degrees
- * of freedom: above it by chance once in 10^5. The error is added to that of each place: distortion
- * and neighbours. */
-static const double MOST_CHI_SQUARED = 28.5, QUAD_PX = 0.3;
+ * of freedom: a right quad is above it once in 100 times, and most frames have several. A candidate
+ * by chance has a chi-square below c with a probability that grows with c^2. The error is added to
+ * that of each place: distortion and neighbours. */
+static const double MOST_CHI_SQUARED = 13.3, QUAD_PX = 0.3;
 /* Least share of a streak inside the window, for a star to be predicted. */
 static const double LEAST_INSIDE = 0.25;
 /* Error of a quad's own scale. */

@@ -15,9 +15,9 @@ typedef struct bst_lost_in_space_options {
     int max_candidates;     /* patterns that are verified at most, > 0 */
 } bst_lost_in_space_options;
 
-/* Usual options: 5 % in scale, 1e-7, 40 stars, 5000 patterns: a frame that can be solved takes a
+/* Usual options: 5 % in scale, 1e-6, 40 stars, 5000 patterns: a frame that can be solved takes a
  * few hundred at most (tests/imgproc/lost_in_space_rates.c). */
-#define BST_LOST_IN_SPACE_USUAL ((bst_lost_in_space_options){0.05, 1e-7, 40, 5000})
+#define BST_LOST_IN_SPACE_USUAL ((bst_lost_in_space_options){0.05, 1e-6, 40, 5000})
 
 /* Work space for one camera and catalogue. */
 typedef struct bst_lost_in_space bst_lost_in_space;

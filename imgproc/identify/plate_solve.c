@@ -2,8 +2,11 @@
 
 #include <assert.h>
 #include <math.h>
+#include <stdlib.h>
 
-enum { SHAPES = 8, PASSES = 4 };
+/* Shapes that are measured: FIRST_SHAPES of whole sources, and if none gives an attitude more, of
+ * whole and cut ones. The best TRIES paths are tried. */
+enum { FIRST_SHAPES = 3, SHAPES = 6, CUT_SHAPES = 4, TRIES = 4, PASSES = 4 };
 /* Candidates of a frame of points: most are solved by the first, and pieces of streaks are not. */
 enum { POINT_CANDIDATES = 3000 };
 /* Ends nearer to each other than this are one: the stars are points. */
@@ -12,6 +15,9 @@ static const double POINT_PX = 4.0;
 static const double SAME_PX = 1.5;
 /* Least log-likelihood of a streak's ends over that of ends elsewhere: one wrong in 3000. */
 static const double LEAST_MARGIN = 8.0;
+/* Logarithm of the chance of the best candidate below which the frame may be solved by a better
+ * path. */
+static const double NEARLY = -8.0;
 
 /* A frame that is being solved. */
 typedef struct attempt {
@@ -20,6 +26,7 @@ typedef struct attempt {
     const bst_plate_solve_options *options;
     bst_streak_finder *finder;
     bst_common_streak streak;
+    bst_star_path best; /* whose ends are the most certain */
     int width, height;
 } attempt;
 
@@ -30,7 +37,7 @@ static bst_status solve_middles(attempt *a, int candidates, bst_lost_in_space_re
     options.max_candidates = candidates;
     const bst_lost_in_space_frame frame = {
         a->streak.items,     a->streak.count,   {0, 0, a->width, a->height},
-        a->options->v_limit, a->options->light, NULL};
+        a->options->v_limit, a->options->light, bst_streak_finder_path(a->finder)};
     return bst_lost_in_space_solve(a->ctx, a->lost, &options, &frame, out);
 }
 
@@ -38,29 +45,54 @@ static double length_px(const bst_common_streak *s) {
     return hypot(s->ends[1].x_px - s->ends[0].x_px, s->ends[1].y_px - s->ends[0].y_px);
 }
 
+/* Solves the frame by a path: finds its stars and tries their middles. */
+static bst_status solve_path(attempt *a, const bst_star_path *path, int candidates,
+                             bst_lost_in_space_result *out) {
+    BST_TRY(bst_streak_finder_search(a->ctx, a->finder, path, &a->streak));
+    return solve_middles(a, candidates, out);
+}
+
 /* Measures the path on the identified stars and solves again, until the streak keeps its length.
- * Ends that are not certain then may lie in the light of other stars, with the middle of the
- * exposure in the wrong place: such a frame is not solved. */
+ * The path whose ends are the most certain is then taken. If no ends are certain they may lie in
+ * the light of other stars, with the middle of the exposure in the wrong place: such a frame is not
+ * solved. */
 static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
-    for (int pass = 0; pass < PASSES; pass++) {
+    double most = a->streak.ends_margin;
+    bool settled = false, last = true; /* last: the best path is that of the latest pass */
+    a->best = *bst_streak_finder_path(a->finder);
+    for (int pass = 0; pass < PASSES && out->solved && !settled; pass++) {
         bool chosen[BST_PLATE_SOLVE_STARS];
-        bst_lost_in_space_result again;
         double before = length_px(&a->streak);
         for (int i = 0; i < a->streak.count; i++) {
             chosen[i] = bst_lost_in_space_matched(a->lost, i);
         }
         BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
-        BST_TRY(solve_middles(a, BST_LOST_IN_SPACE_USUAL.max_candidates, &again));
-        *out = again;
-        if (!again.solved) {
-            return BST_OK;
-        }
-        if (fabs(length_px(&a->streak) - before) < SAME_PX) {
-            out->solved = a->streak.ends_margin > LEAST_MARGIN;
-            return BST_OK;
+        BST_TRY(solve_middles(a, BST_LOST_IN_SPACE_USUAL.max_candidates, out));
+        settled = fabs(length_px(&a->streak) - before) < SAME_PX;
+        double margin = a->streak.ends_margin;
+        last = out->solved && (margin > most || (settled && margin > LEAST_MARGIN));
+        if (last) {
+            most = margin;
+            a->best = *bst_streak_finder_path(a->finder);
         }
     }
-    out->solved = false;
+    if (most <= LEAST_MARGIN) {
+        out->solved = false;
+        return BST_OK;
+    }
+    return last ? BST_OK : solve_path(a, &a->best, BST_LOST_IN_SPACE_USUAL.max_candidates, out);
+}
+
+/* Measures the path on the brightest stars once more, if the frame is nearly solved. */
+static bst_status try_again(attempt *a, int candidates, bst_lost_in_space_result *out) {
+    for (int pass = 0; pass < PASSES && !out->solved && out->least_log_chance < NEARLY; pass++) {
+        bool chosen[BST_PLATE_SOLVE_STARS];
+        for (int i = 0; i < a->streak.count; i++) {
+            chosen[i] = true;
+        }
+        BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
+        BST_TRY(solve_middles(a, candidates, out));
+    }
     return BST_OK;
 }
 
@@ -92,26 +124,115 @@ static void list_matched(const attempt *a, bst_plate_solve_result *out) {
     }
 }
 
-static bst_status try_shapes(attempt *a, bst_plate_solve_result *out) {
-    int shapes = bst_streak_finder_shapes(a->finder);
-    int shape = shapes > 0 ? BST_STREAK_FINDER_POINT : 0;
-    for (; shape < shapes && shape < SHAPES && !out->attitude.solved; shape++) {
-        bool point = shape == BST_STREAK_FINDER_POINT;
-        BST_TRY(bst_streak_finder_find(a->ctx, a->finder, shape, &a->streak));
-        BST_TRY(solve_middles(a, point ? POINT_CANDIDATES : BST_LOST_IN_SPACE_USUAL.max_candidates,
-                              &out->attitude));
-        out->points = length_px(&a->streak) < POINT_PX;
-        if (out->attitude.solved && !out->points) {
-            BST_TRY(improve(a, &out->attitude));
+/* A path that the frame suggests. */
+typedef struct choice {
+    bst_star_path path;
+    double quality;
+    bool tried;
+} choice;
+
+/* The best paths so far, the best first. */
+typedef struct choices {
+    choice items[TRIES];
+    int count;
+} choices;
+
+/* Adds a path to those to try. */
+static void add_choice(choices *c, const bst_star_path *path, double quality) {
+    int at = c->count < TRIES ? c->count++ : TRIES;
+    for (; at > 0 && c->items[at - 1].quality < quality; at--) {
+        if (at < TRIES) {
+            c->items[at] = c->items[at - 1];
         }
-        out->stars = a->streak.count;
-        out->ends_margin = a->streak.ends_margin;
-        out->ends[0] = a->streak.ends[0];
-        out->ends[1] = a->streak.ends[1];
-        out->path = *bst_streak_finder_path(a->finder);
-        list_matched(a, out);
+    }
+    if (at < TRIES) {
+        c->items[at] = (choice){*path, quality, false};
+    }
+}
+
+/* Measures the paths of shapes from one on: at most so many of whole and of cut sources. Those that
+ * have been measured cost little. */
+static bst_status measure_shapes(attempt *a, int from, int most_whole, int most_cut, choices *c) {
+    const int shapes = bst_streak_finder_shapes(a->finder);
+    int whole = 0, cut = 0;
+    for (int i = from; i < shapes; i++) {
+        bst_star_path path;
+        double quality;
+        bool is_cut = i >= 0 && bst_streak_finder_is_cut(a->finder, i);
+        if (is_cut ? cut >= most_cut : whole >= most_whole) {
+            continue;
+        }
+        BST_TRY(bst_streak_finder_measure(a->ctx, a->finder, i, &path, &quality));
+        if (quality > 0.0) {
+            whole += !is_cut;
+            cut += is_cut;
+            add_choice(c, &path, quality);
+        }
     }
     return BST_OK;
+}
+
+/* Solves the frame by one path. */
+static bst_status try_choice(attempt *a, choice *c, bst_plate_solve_result *out) {
+    const int candidates =
+        c->path.count == 1 ? POINT_CANDIDATES : BST_LOST_IN_SPACE_USUAL.max_candidates;
+    c->tried = true;
+    BST_TRY(solve_path(a, &c->path, candidates, &out->attitude));
+    out->points = length_px(&a->streak) < POINT_PX;
+    if (!out->points) {
+        BST_TRY(try_again(a, candidates, &out->attitude));
+    }
+    if (out->attitude.solved && !out->points) {
+        BST_TRY(improve(a, &out->attitude));
+    }
+    out->stars = a->streak.count;
+    out->ends_margin = a->streak.ends_margin;
+    out->ends[0] = a->streak.ends[0];
+    out->ends[1] = a->streak.ends[1];
+    out->path = *bst_streak_finder_path(a->finder);
+    list_matched(a, out);
+    return BST_OK;
+}
+
+static bst_status try_choices(attempt *a, choices *c, bst_plate_solve_result *out) {
+    for (int i = 0; i < c->count && !out->attitude.solved; i++) {
+        if (!c->items[i].tried) {
+            BST_TRY(try_choice(a, &c->items[i], out));
+        }
+    }
+    return BST_OK;
+}
+
+/* True if the best path needs no comparison with those of more shapes: a streak that fits better
+ * than a point and has certain ends, or a point if the first shape is one, too. */
+static bool is_clear(const choices *c) {
+    const bst_star_path *best = &c->items[0].path;
+    if (c->count < 2) {
+        return false;
+    }
+    return best->count > 1 ? fmin(best->margin[0], best->margin[1]) > LEAST_MARGIN
+                           : c->items[1].path.count == 1;
+}
+
+static bst_status try_shapes(attempt *a, bst_plate_solve_result *out) {
+    choices *c = calloc(1, sizeof *c);
+    if (!c) {
+        return bst_fail(a->ctx, BST_ERR_MEMORY, "no memory for the streaks of a frame");
+    }
+    bst_status status = measure_shapes(a, BST_STREAK_FINDER_POINT, 2, 0, c); /* and the point */
+    if (status == BST_OK && is_clear(c)) {
+        status = try_choice(a, &c->items[0], out);
+    }
+    if (status == BST_OK && !out->attitude.solved) {
+        status = measure_shapes(a, 1, FIRST_SHAPES - 1, 0, c);
+        status = status == BST_OK ? try_choices(a, c, out) : status;
+    }
+    if (status == BST_OK && !out->attitude.solved) {
+        status = measure_shapes(a, 0, SHAPES, CUT_SHAPES, c);
+        status = status == BST_OK ? try_choices(a, c, out) : status;
+    }
+    free(c);
+    return status;
 }
 
 bst_status bst_plate_solve(bst_ctx *ctx, bst_lost_in_space *lost,

@@ -35,8 +35,8 @@ typedef struct bst_plate_solve_result {
 
 /* Solves a frame.
  *
- * The stars are taken for points first. Of the common streaks that the frame suggests the first
- * that gives an attitude is used. The path is then measured on the identified stars, and the frame
+ * The paths that the frame suggests, among them that of points, are tried from the one on that its
+ * brightest stars fit best. The path is then measured on the identified stars, and the frame
  * is solved again with it.
  *
  * Given:     lost    for BST_PLATE_SOLVE_STARS detections

@@ -10,8 +10,9 @@
 #include "imgproc/value_of_rank.h"
 
 /* LINE_HALF: samples of a line on either side of a pixel, LINE_STEP px apart. */
-enum { LINE_HALF = 5, LINE_STEP = 2, LINE_REACH = 11, DIRECTIONS = 16 };
-enum { MOST_REACH = 12, EDGE_PX = 2, LEAST_PIXELS = 6, REFINING_STARS = 15, LEVELS = 8 };
+enum { LINE_HALF = 5, LINE_STEP = 2, DIRECTIONS = 16, LINE_REACH = BST_STREAK_LINE_REACH };
+enum { MOST_REACH = 12, REFINING_STARS = 15 };
+enum { OVERLAP = 12 }; /* samples on either side: MOST_PSF_SIGMA_PX six times over */
 
 /* Negative pixels below this are bad, sigma. */
 static const float LEAST_SIGMA = -5.0f;
@@ -22,19 +23,15 @@ static const float HOT_SIGMA = 8.0f, HOT_SHARE = 0.2f, NEIGHBOUR_SIGMA = 2.0f;
 static const double USUAL_PSF_SIGMA_PX = 1.0;
 /* Widest PSF: three standard deviations fit into MOST_REACH. */
 static const double MOST_PSF_SIGMA_PX = 4.0;
-/* A source begins at a pixel above SEED and has those above GROW, in units of the line filter's
- * noise; brighter ones begin at GROW times powers of two. */
-static const float SEED = 6.5f, GROW = 4.0f;
-/* Sizes of sources that agree: to AGREE_PX and this share. */
-static const double AGREE_PX = 4.0, AGREE_SHARE = 0.08;
-/* Length that is added to sources in their rank, px: points count too. */
-static const double SHORT_PX = 10.0;
-/* Pixels of a source by which its size is measured, sigma. */
-static const float LEAST_SAMPLE = 3.0f;
 /* A source this near to a brighter one, and fainter by this share, is what its subtraction left. */
 static const double GHOST_PX = 15.0, GHOST_SHARE = 0.25;
 /* Points brighter than BRIGHT_SNR leave residuals up to GHOST_PX, fainter ones up to CLOSE_PX. */
 static const double BRIGHT_SNR = 100.0, CLOSE_PX = 5.0;
+/* Share of the quality of a source's own path that a refined one keeps: its ends, by all stars, are
+ * more accurate, unless crowded stars have moved them to wrong places. */
+static const double LEAST_REFINED = 0.9;
+/* Ends of paths that are the same, px. */
+static const double SAME_ENDS_PX = 3.0;
 /* Least SNR of the stars that refine the path. */
 static const double REFINING_SNR = 15.0;
 /* Least share of the path inside the frame, by its squared light, for a star whose middle is too.
@@ -43,7 +40,6 @@ static const double USUAL_INSIDE = 0.25;
 /* Share of the path inside the frame from which on a streak is whole. */
 static const double WHOLE = 0.97;
 
-typedef bst_streak_shape shape;
 typedef bst_streak_finder finder;
 
 /* Median of the values that are not NAN; reorders them. */
@@ -174,113 +170,16 @@ static void filter_lines(finder *f) {
     }
 }
 
-/* Collects the connected pixels of a source above a level. */
-static shape flood(finder *f, float level, int from, int number) {
-    const int w = f->width, h = f->height;
-    shape out = {.from = from, .level = level, .x0 = w, .y0 = h};
-    f->count = 0;
-    f->stack[f->count++] = from;
-    f->label[from] = number;
-    for (int next = 0; next < f->count; next++) {
-        int i = f->stack[next], x = i % w, y = i / w;
-        out.sum += (double)f->smooth[i];
-        if (f->smooth[i] > LEAST_SAMPLE) { /* the lines reach beyond the source */
-            out.x0 = x < out.x0 ? x : out.x0;
-            out.x1 = x > out.x1 ? x : out.x1;
-            out.y0 = y < out.y0 ? y : out.y0;
-            out.y1 = y > out.y1 ? y : out.y1;
-        }
-        for (int k = 0; k < 9; k++) {
-            int u = x + k % 3 - 1, v = y + k / 3 - 1;
-            if (u >= 0 && v >= 0 && u < w && v < h && f->label[v * w + u] != number &&
-                f->lines[v * w + u] > level) {
-                f->label[v * w + u] = number;
-                f->stack[f->count++] = v * w + u;
-            }
-        }
-    }
-    return out;
-}
-
-static bool agree(int a, int b) {
-    return abs(a - b) <= AGREE_PX + AGREE_SHARE * (a > b ? a : b);
-}
-
-/* True for two sources at the same place: one source at two levels. */
-static bool same_place(const shape *a, const shape *b) {
-    return abs(a->x0 - b->x0) + abs(a->x1 - b->x1) + abs(a->y0 - b->y0) + abs(a->y1 - b->y1) <
-           4.0 * AGREE_PX;
-}
-
-/* Adds a source to the list; a full list loses its faintest. */
-static int add_shape(shape *list, int count, const shape *found) {
-    for (int i = 0; i < count; i++) {
-        if (same_place(&list[i], found)) {
-            return count;
-        }
-    }
-    int at = count < BST_STREAK_SHAPES ? count++ : BST_STREAK_SHAPES;
-    for (; at > 0 && list[at - 1].sum < found->sum; at--) {
-        if (at < BST_STREAK_SHAPES) {
-            list[at] = list[at - 1];
-        }
-    }
-    if (at < BST_STREAK_SHAPES) {
-        list[at] = *found;
-    }
-    return count;
-}
-
-/* Orders shapes: long ones that many others agree with first, then the brightest. */
-static int by_rank(const void *a, const void *b) {
-    const shape *s = a, *t = b;
-    if (s->rank != t->rank) {
-        return s->rank > t->rank ? -1 : 1;
-    }
-    return s->sum != t->sum ? (s->sum > t->sum ? -1 : 1) : s->from - t->from;
-}
-
-/* Lists the sources that lie wholly inside the frame, at several levels, by rank; returns their
- * number. */
-static int list_shapes(finder *f, shape out[BST_STREAK_SHAPES]) {
-    int count = 0, number = 0;
-    memset(f->label, 0, (size_t)f->width * (size_t)f->height * sizeof *f->label);
-    for (int l = LEVELS - 1; l >= 0; l--) {
-        float level = GROW * (float)(1 << l), seed = l > 0 ? level : SEED;
-        int first = number;
-        for (int i = 0; i < f->width * f->height; i++) {
-            if (f->lines[i] <= seed || f->label[i] > first) {
-                continue;
-            }
-            shape found = flood(f, level, i, ++number);
-            if (f->count >= LEAST_PIXELS && found.x0 > EDGE_PX && found.y0 > EDGE_PX &&
-                found.x1 < f->width - 1 - EDGE_PX && found.y1 < f->height - 1 - EDGE_PX) {
-                count = add_shape(out, count, &found);
-            }
-        }
-    }
-    for (int i = 0; i < count; i++) {
-        int width = out[i].x1 - out[i].x0, height = out[i].y1 - out[i].y0, agreeing = 0;
-        for (int k = 0; k < count; k++) {
-            agreeing += k != i && agree(width, out[k].x1 - out[k].x0) &&
-                        agree(height, out[k].y1 - out[k].y0);
-        }
-        out[i].rank = agreeing * (hypot(width, height) + SHORT_PX);
-    }
-    qsort(out, (size_t)count, sizeof *out, by_rank);
-    return count;
-}
-
 static bst_star_path_image image_of(const finder *f) {
     return (bst_star_path_image){f->smooth, f->width, f->height};
 }
 
 /* Makes the path of a shape. */
-static bool fit_shape(finder *f, const shape *s) {
+static bool fit_shape(finder *f, const bst_streak_shape *s) {
     const bst_star_path_image image = image_of(f);
     double x, y;
     memset(f->label, 0, (size_t)f->width * (size_t)f->height * sizeof *f->label);
-    flood(f, s->level, s->from, 1);
+    bst_streak_finder_flood(f, s->level, s->from, 1);
     return bst_star_path_fit(&f->path, &image, f->stack, f->count, &x, &y);
 }
 
@@ -301,7 +200,8 @@ typedef struct wanted {
     double least_snr;
     int most;
     double least_inside; /* share of the path */
-    bool outside;        /* also stars whose place is outside the frame; no points */
+    bool outside;        /* also stars whose place is outside the frame */
+    bool no_points;      /* removes points from the image */
 } wanted;
 
 /* Finds the stars one after the other; those that are not kept are subtracted, too. */
@@ -311,16 +211,18 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
     bst_path_filter *filter;
     BST_TRY(
         bst_path_filter_create(ctx, &f->path, &image, f->psf_sigma_px, q->least_inside, &filter));
+    const bool point = f->path.count == 1;
     out->items = f->items;
     out->count = 0;
+    memset(f->scratch, 0, (size_t)f->width * (size_t)f->height * sizeof *f->scratch);
     /* bright points leave many rings; a peak of theirs costs little */
-    const int tries = (f->path.count == 1 || q->outside ? 20 : 2) * most;
+    const int tries = (point || q->outside ? 20 : 2) * most;
     for (int i = 0; i < tries && out->count < most; i++) {
         bst_path_filter_peak peak;
         if (!bst_path_filter_highest(filter, &peak) || peak.snr < q->least_snr) {
             break;
         }
-        if (q->outside && bst_streak_finder_remove_point(f, filter, &peak)) {
+        if (q->no_points && bst_streak_finder_remove_point(f, filter, &peak)) {
             continue;
         }
         bst_detection d = {.x_px = peak.x_px,
@@ -334,15 +236,20 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
                            .flags = peak.inside < WHOLE ? BST_DETECTION_EDGE : 0};
         bool inside = q->outside || (d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= f->width - 1 &&
                                      d.y_px <= f->height - 1);
-        bool left = q->outside ? bst_streak_finder_is_covered(f, &peak) : is_ghost(out, &d);
+        bool left = (!q->no_points && is_ghost(out, &d)) ||
+                    (!point && bst_streak_finder_is_covered(f, &peak));
+        if (!point && !q->no_points && q->outside && bst_streak_finder_is_uneven(f, &peak)) {
+            bst_path_filter_leave_out(filter, &peak, CLOSE_PX);
+            continue;
+        }
         if (inside && peak.whole && !left) {
             f->items[out->count++] = d;
-            if (q->outside) {
+            if (!point) {
                 bst_streak_finder_cover(f, &peak);
             }
         }
         bst_path_filter_subtract(filter, &peak);
-        if (f->path.count == 1) {
+        if (point) {
             bst_path_filter_leave_out(filter, &peak, peak.snr > BRIGHT_SNR ? GHOST_PX : CLOSE_PX);
         }
     }
@@ -350,15 +257,25 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
     return BST_OK;
 }
 
+/* Value of a sample inside a streak of unit amplitude: the convolved samples overlap. */
+static double overlap(const finder *f) {
+    double sum = 0.0, step = BST_STAR_PATH_STEP_PX / f->psf_sigma_px;
+    for (int k = -OVERLAP; k <= OVERLAP; k++) {
+        sum += exp(-0.25 * k * k * step * step);
+    }
+    return sum;
+}
+
 /* Improves the path by stars. */
 static void refine_path(finder *f, const bst_common_streak *found, const bool *chosen) {
     const bst_star_path_image image = image_of(f);
     bst_star_path_star stars[REFINING_STARS];
+    const double light = overlap(f);
     int count = 0;
     for (int i = 0; i < found->count && count < REFINING_STARS; i++) {
         if (!chosen || chosen[i]) {
             stars[count++] = (bst_star_path_star){found->items[i].x_px, found->items[i].y_px,
-                                                  found->items[i].flux_e / f->sigma};
+                                                  found->items[i].flux_e / f->sigma * light};
         }
     }
     bst_star_path_refine(&f->path, &image, stars, count);
@@ -371,25 +288,101 @@ static bst_status find_all(bst_ctx *ctx, finder *f, bst_common_streak *out) {
     for (int e = 0; e < 2; e++) {
         out->ends[e] = (bst_common_streak_point){f->path.ends[e][0], f->path.ends[e][1]};
     }
-    const wanted all = {f->options.least_snr, f->options.max_sources, USUAL_INSIDE, false};
+    const wanted all = {f->options.least_snr, f->options.max_sources, USUAL_INSIDE,
+                        f->path.count > 1, false};
     return find_stars(ctx, f, &all, out);
+}
+
+/* How well the brightest stars fit the path: the sum of their squared SNR, each with half the
+ * weight of a brighter one. A path that is too short makes two stars of one, and one that is too
+ * long takes in noise. */
+static double fit_quality(const bst_common_streak *s) {
+    double sum = 0.0, weight = 1.0;
+    for (int i = 0; i < s->count && i < REFINING_STARS; i++) {
+        sum += weight * s->items[i].snr * s->items[i].snr;
+        weight *= 0.5;
+    }
+    return sum;
+}
+
+/* True if a path of the same ends has been measured. */
+static bool is_known(finder *f) {
+    const bst_star_path *p = &f->path;
+    for (int i = 0; i < f->measured_count; i++) {
+        double most = 0.0;
+        for (int k = 0; k < 4; k++) {
+            most = fmax(most, fabs(f->measured[i][k] - p->ends[k / 2][k % 2]));
+        }
+        if (most < SAME_ENDS_PX) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Notes the ends of a path that has been measured. */
+static void note_path(finder *f, const bst_star_path *path) {
+    if (f->measured_count < BST_STREAK_SHAPES) {
+        memcpy(f->measured[f->measured_count++], path->ends, sizeof f->measured[0]);
+    }
+}
+
+bst_status bst_streak_finder_measure(bst_ctx *ctx, bst_streak_finder *f, int index,
+                                     bst_star_path *path, double *quality) {
+    assert(f && path && quality && index >= BST_STREAK_FINDER_POINT && index < f->shape_count);
+    bst_common_streak found;
+    const wanted bright = {REFINING_SNR, REFINING_STARS, USUAL_INSIDE, false, false};
+    *quality = 0.0;
+    if (index == BST_STREAK_FINDER_POINT) {
+        bst_star_path_point(&f->path);
+        BST_TRY(find_stars(ctx, f, &bright, &found));
+        *quality = fit_quality(&found);
+        *path = f->path;
+        return BST_OK;
+    }
+    if (!fit_shape(f, &f->shapes[index]) || is_known(f)) {
+        return BST_OK;
+    }
+    note_path(f, &f->path);
+    *path = f->path;
+    path->margin[0] = path->margin[1] = 0.0; /* one source may end in another's light */
+    BST_TRY(find_stars(ctx, f, &bright, &found));
+    *quality = fit_quality(&found);
+    refine_path(f, &found, NULL);
+    BST_TRY(find_stars(ctx, f, &bright, &found));
+    double refined = fit_quality(&found);
+    if (refined > LEAST_REFINED * *quality) {
+        *quality = refined;
+        *path = f->path;
+        note_path(f, path);
+    }
+    return BST_OK;
+}
+
+bst_status bst_streak_finder_search(bst_ctx *ctx, bst_streak_finder *f, const bst_star_path *path,
+                                    bst_common_streak *out) {
+    assert(f && path && out);
+    *out = (bst_common_streak){.items = f->items};
+    f->path = *path;
+    return find_all(ctx, f, out);
 }
 
 bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *f, int index,
                                   bst_common_streak *out) {
-    assert(f && out && index >= BST_STREAK_FINDER_POINT && index < f->shape_count);
+    assert(f && out);
     *out = (bst_common_streak){.items = f->items};
     if (index == BST_STREAK_FINDER_POINT) {
         bst_star_path_point(&f->path);
         return find_all(ctx, f, out);
     }
-    if (!fit_shape(f, &f->shapes[index])) {
+    double quality;
+    bst_star_path path;
+    f->measured_count = 0;
+    BST_TRY(bst_streak_finder_measure(ctx, f, index, &path, &quality));
+    if (!(quality > 0.0)) {
         return BST_OK;
     }
-    const wanted bright = {REFINING_SNR, REFINING_STARS, USUAL_INSIDE, false};
-    BST_TRY(find_stars(ctx, f, &bright, out));
-    refine_path(f, out, NULL);
-    return find_all(ctx, f, out);
+    return bst_streak_finder_search(ctx, f, &path, out);
 }
 
 bst_status bst_streak_finder_repeat(bst_ctx *ctx, bst_streak_finder *f, const bool *chosen,
@@ -408,12 +401,11 @@ bst_status bst_streak_finder_follow(bst_ctx *ctx, bst_streak_finder *f, const bs
     assert(f && f->options.known_path && path && path->count > 0 && least_snr > 0.0 &&
            least_inside > 0.0 && out);
     f->path = *path;
-    memset(f->lines, 0, (size_t)f->width * (size_t)f->height * sizeof *f->lines);
     *out = (bst_common_streak){.items = f->items, .sigma = f->sigma};
     for (int e = 0; e < 2; e++) {
         out->ends[e] = (bst_common_streak_point){f->path.ends[e][0], f->path.ends[e][1]};
     }
-    const wanted all = {least_snr, f->options.max_sources, least_inside, true};
+    const wanted all = {least_snr, f->options.max_sources, least_inside, true, true};
     BST_TRY(find_stars(ctx, f, &all, out));
     /* The convolution with the PSF keeps a line's light per pixel of its length. The amplitude is
      * that of one sample; its neighbours overlap it. */
@@ -475,7 +467,7 @@ bst_status bst_streak_finder_create(bst_ctx *ctx, const float *pixels, int width
                                             : USUAL_PSF_SIGMA_PX);
     if (!options->known_path) {
         filter_lines(f);
-        f->shape_count = list_shapes(f, f->shapes);
+        f->shape_count = bst_streak_finder_list_shapes(f, f->shapes);
     }
     *out = f;
     return BST_OK;

@@ -35,8 +35,8 @@ typedef struct bst_streak_finder bst_streak_finder;
 
 /* Lists the shapes of a frame.
  *
- * Short lines of many directions show streaks that single pixels do not. Connected sources that lie
- * wholly inside the frame are candidates, first those of a size that several have.
+ * Short lines of many directions show streaks that single pixels do not. Connected sources are
+ * candidates, first those of a size that several have, last those that the frame cuts.
  *
  * Given:     pixels  [height][width]; NAN: no value; not needed after the call
  * Errors:    BST_ERR_MEMORY
@@ -51,16 +51,34 @@ enum { BST_STREAK_FINDER_POINT = -1 };
 /* Number of shapes of sources. */
 int bst_streak_finder_shapes(const bst_streak_finder *finder);
 
-/* Finds the stars by one shape.
+/* True for the shape of a source that the frame may cut. */
+bool bst_streak_finder_is_cut(const bst_streak_finder *finder, int index);
+
+/* Measures the path that one shape suggests.
  *
  * The centre line of the source is the path; it may be curved and of uneven brightness. A matched
- * filter along the path gives the stars, one after the other: the highest maximum is subtracted
- * (Hogbom 1974, A&AS 15, 417). The brightest stars then give a better path, and the search is
- * repeated. Streaks that the frame cuts off are found if their middle is inside.
+ * filter along the path gives the brightest stars, one after the other: the highest maximum is
+ * subtracted (Hogbom 1974, A&AS 15, 417). They then give a better path.
  *
- * Given:     index  BST_STREAK_FINDER_POINT, or 0 to bst_streak_finder_shapes - 1
- * Returned:  *out   valid until the next call with the same finder
+ * Given:     index    BST_STREAK_FINDER_POINT, or 0 to bst_streak_finder_shapes - 1
+ * Returned:  path     the path
+ *            quality  how well the brightest stars fit it: the best path of a frame has the
+ *                     greatest; 0: no path, or one that has been measured before
  * Errors:    BST_ERR_MEMORY */
+bst_status bst_streak_finder_measure(bst_ctx *ctx, bst_streak_finder *finder, int index,
+                                     bst_star_path *path, double *quality) BST_MUST_CHECK;
+
+/* Finds all stars by a path, also those whose middle is outside the frame.
+ *
+ * Given:     path  copied; from bst_streak_finder_measure
+ * Returned:  *out  valid until the next call with the same finder
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_streak_finder_search(bst_ctx *ctx, bst_streak_finder *finder,
+                                    const bst_star_path *path,
+                                    bst_common_streak *out) BST_MUST_CHECK;
+
+/* Finds all stars by the path that one shape suggests: bst_streak_finder_measure and
+ * bst_streak_finder_search. */
 bst_status bst_streak_finder_find(bst_ctx *ctx, bst_streak_finder *finder, int index,
                                   bst_common_streak *out) BST_MUST_CHECK;
 

@@ -5,7 +5,8 @@
 #include "imgproc/streak/common_streak.h"
 #include "imgproc/streak/path_filter.h"
 
-enum { BST_STREAK_SHAPES = 64 };
+/* BST_STREAK_LINE_REACH: furthest sample of the line filter, px. */
+enum { BST_STREAK_SHAPES = 64, BST_STREAK_LINE_REACH = 11 };
 
 /* A connected source. */
 typedef struct bst_streak_shape {
@@ -18,10 +19,10 @@ typedef struct bst_streak_shape {
 struct bst_streak_finder {
     int width, height;
     double sigma, psf_sigma_px;
-    float *image;  /* background removed, in units of `sigma` */
-    float *smooth; /* convolved with the PSF, of unit noise */
-    float *lines;  /* line filter's output */
-    float *scratch;
+    float *image;   /* background removed, in units of `sigma` */
+    float *smooth;  /* convolved with the PSF, of unit noise */
+    float *lines;   /* line filter's output */
+    float *scratch; /* amplitude of the brightest star found about each pixel */
     int *label, *stack;
     int count; /* pixels on the stack: those of the latest source */
     bst_star_path path;
@@ -29,17 +30,31 @@ struct bst_streak_finder {
     bst_detection *items; /* [max_sources + REFINING_STARS] */
     bst_streak_shape shapes[BST_STREAK_SHAPES];
     int shape_count;
+    double measured[BST_STREAK_SHAPES][4]; /* ends of the paths that have been measured */
+    int measured_count;
 };
 
+/* Collects the connected pixels of a source above a level, in finder->stack.
+ *
+ * Given:     from    its first pixel
+ *            number  label for its pixels */
+bst_streak_shape bst_streak_finder_flood(bst_streak_finder *finder, float level, int from,
+                                         int number);
+/* Lists the sources at several levels, by rank; returns their number. */
+int bst_streak_finder_list_shapes(bst_streak_finder *finder,
+                                  bst_streak_shape out[BST_STREAK_SHAPES]);
 /* Removes the point source that makes a peak of the filter: light that is at one place of the path
  * only. Returns false if the light is spread along the path. */
 bool bst_streak_finder_remove_point(bst_streak_finder *finder, bst_path_filter *filter,
                                     const bst_path_filter_peak *peak);
-/* Notes the amplitude of a star around its path, in finder->lines. */
+/* Notes the amplitude of a star around its path, in finder->scratch. */
 void bst_streak_finder_cover(bst_streak_finder *finder, const bst_path_filter_peak *peak);
 /* True if most of a peak's path lies on those of much brighter stars: what their subtraction left.
  */
 bool bst_streak_finder_is_covered(const bst_streak_finder *finder,
                                   const bst_path_filter_peak *peak);
+/* True for a peak without light of its own over most of its path: what the subtraction of a bright
+ * star left beyond its ends. Places on the paths of much brighter stars are not looked at. */
+bool bst_streak_finder_is_uneven(const bst_streak_finder *finder, const bst_path_filter_peak *peak);
 
 #endif

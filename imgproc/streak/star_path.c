@@ -154,6 +154,13 @@ static double rival_end(const draft *d, int from, int end, int step) {
     return best - own;
 }
 
+/* Distance from a lit sample towards a dark one at which the light has fallen to half, samples. */
+static double half_light(const draft *d, double level, int lit, int dark) {
+    double from = d->light[lit] / level;
+    double to = dark >= 0 && dark < d->count ? d->light[dark] / level : 0.0;
+    return from > to ? fmax(fmin((from - 0.5) / (from - to), 1.0), 0.0) : 0.0;
+}
+
 /* First and last sample of the path, with fractions: the most likely ends, which are those of the
  * stretch with the greatest sum of evidence. */
 static void find_ends(const draft *d, double level, double ends[2], double margin[2]) {
@@ -173,11 +180,8 @@ static void find_ends(const draft *d, double level, double ends[2], double margi
     }
     margin[0] = -rival_end(d, last, first, -1);
     margin[1] = -rival_end(d, first, last, 1);
-    /* the samples next to the ends may be partly lit */
-    double before = first > 0 ? d->light[first - 1] / level : 0.0;
-    double after = last < d->count - 1 ? d->light[last + 1] / level : 0.0;
-    ends[0] = first - fmax(fmin(before, 0.5), 0.0);
-    ends[1] = last + fmax(fmin(after, 0.5), 0.0);
+    ends[0] = first - half_light(d, level, first, first - 1);
+    ends[1] = last + half_light(d, level, last, last + 1);
 }
 
 static void point_at(const draft *d, double k, double *x, double *y) {
@@ -216,14 +220,29 @@ static double level_of(const draft *d) {
     return fmax(sorted[d->count * 2 / 3], 1e-9);
 }
 
+/* Light of a sample of the path between ends: the mean nearby, without the samples next to the
+ * ends, which the PSF has dimmed; and of a sample that an end divides the part inside. */
+static double light_inside(const draft *d, const double ends[2], double level, int k) {
+    double sum = 0.0;
+    int n = 0;
+    for (int j = k - 2; j <= k + 2; j++) {
+        if (j >= ends[0] + 1.0 && j <= ends[1] - 1.0) {
+            sum += d->light[j];
+            n++;
+        }
+    }
+    double from = fmax(ends[0], k - 0.5), to = fmin(ends[1], k + 0.5);
+    return fmax(n > 0 ? sum / n : level, 0.05 * level) * fmax(to - from, 0.05);
+}
+
 /* Cuts a draft at its ends and sets the path from it; the map is that of the middle's place.
  *
  * Returned:  x_px, y_px  place of the middle */
 static void finish(bst_star_path *path, draft *d, double *x_px, double *y_px) {
-    double light[BST_STAR_PATH_ROOM], m[3], ends[2], level = level_of(d);
-    smooth(d->light, light, d->count);
+    double m[3], ends[2], level = level_of(d);
     find_ends(d, level, ends, path->margin);
-    int first = (int)ceil(ends[0]), last = (int)floor(ends[1]);
+    int first = (int)fmax(ceil(ends[0] - 0.5), 0.0);
+    int last = (int)fmin(floor(ends[1] + 0.5), d->count - 1.0);
     point_at(d, 0.5 * (first + last), x_px, y_px);
     bst_star_path_map(path, *x_px, *y_px, m);
     double det = m[0] * m[2] - m[1] * m[1], sum = 0.0;
@@ -232,7 +251,7 @@ static void finish(bst_star_path *path, draft *d, double *x_px, double *y_px) {
         double u = d->x[first + k] - *x_px, v = d->y[first + k] - *y_px;
         path->place[k][0] = (m[2] * u - m[1] * v) / det;
         path->place[k][1] = (m[0] * v - m[1] * u) / det;
-        path->light[k] = fmax(light[first + k], 0.05 * level);
+        path->light[k] = light_inside(d, ends, level, first + k);
         sum += path->light[k];
     }
     for (int k = 0; k < path->count; k++) {

@@ -71,7 +71,8 @@ bool bst_star_path_of_motion(bst_star_path *path, const bst_star_path_node *node
 
 /* A star on the image. */
 typedef struct bst_star_path_star {
-    double x_px, y_px, amplitude;
+    double x_px, y_px;
+    double amplitude; /* of the image's values along its streak */
 } bst_star_path_star;
 
 /* Measures centre line and light of the path on the median of several stars, and its ends by the

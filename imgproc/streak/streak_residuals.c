@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "imgproc/streak/common_streak_internal.h"
+#include "imgproc/value_of_rank.h"
 #include "sim/core/compare.h"
 
 enum { CLIMB = 3 }; /* from a sample of a path to the pixel of a point source */
@@ -97,7 +98,7 @@ static int pixel_on_path(const finder *f, double x_px, double y_px, const double
     return inside ? (int)lround(y) * f->width + (int)lround(x) : -1;
 }
 
-/* Notes the amplitude of a star around its path, in f->lines. */
+/* Notes the amplitude of a star around its path, in f->scratch. */
 void bst_streak_finder_cover(finder *f, const bst_path_filter_peak *peak) {
     double m[3];
     int r = (int)ceil(COVER_SIGMA * f->psf_sigma_px);
@@ -107,7 +108,7 @@ void bst_streak_finder_cover(finder *f, const bst_path_filter_peak *peak) {
         int cx = at % f->width, cy = at / f->width;
         for (int y = cy - r > 0 ? cy - r : 0; at >= 0 && y <= cy + r && y < f->height; y++) {
             for (int x = cx - r > 0 ? cx - r : 0; x <= cx + r && x < f->width; x++) {
-                float *v = &f->lines[y * f->width + x];
+                float *v = &f->scratch[y * f->width + x];
                 *v = fmaxf(*v, (float)peak->amplitude);
             }
         }
@@ -123,7 +124,32 @@ bool bst_streak_finder_is_covered(const finder *f, const bst_path_filter_peak *p
     for (int k = 0; k < f->path.count; k++) {
         int at = pixel_on_path(f, peak->x_px, peak->y_px, m, k);
         inside += at >= 0;
-        covered += at >= 0 && peak->amplitude < COVERED_SHARE * (double)f->lines[at];
+        covered += at >= 0 && peak->amplitude < COVERED_SHARE * (double)f->scratch[at];
     }
     return 2 * covered > inside;
+}
+
+/* True for a peak without light of its own over most of its path: what the subtraction of a bright
+ * star left beyond its ends. Places on the paths of much brighter stars are not looked at. */
+bool bst_streak_finder_is_uneven(const finder *f, const bst_path_filter_peak *peak) {
+    const bst_star_path_image image = {f->smooth, f->width, f->height};
+    float values[BST_STAR_PATH_ROOM];
+    double m[3];
+    int free_places = 0;
+    bst_star_path_map(&f->path, peak->x_px, peak->y_px, m);
+    for (int k = 0; k < f->path.count; k++) {
+        const double *p = f->path.place[k];
+        int at = pixel_on_path(f, peak->x_px, peak->y_px, m, k);
+        if (at < 0 || peak->amplitude < COVERED_SHARE * (double)f->scratch[at]) {
+            continue;
+        }
+        double v = bst_star_path_image_at(&image, peak->x_px + m[0] * p[0] + m[1] * p[1],
+                                          peak->y_px + m[1] * p[0] + m[2] * p[1]);
+        values[free_places++] = (float)(v / fmax(f->path.light[k], LEAST_LIGHT));
+    }
+    if (free_places == 0) {
+        return false;
+    }
+    float middle = bst_value_of_rank(values, free_places, free_places / 2);
+    return (double)middle < EVEN_SHARE * peak->amplitude;
 }

@@ -32,7 +32,7 @@ static int by_value(const void *a, const void *b) {
 
 static void read_arguments(int argc, char **argv, arguments *a) {
     *a = (arguments){
-        .catalogue = "default", .fields = 100, .false_rate = 1e-7, .stars = 40, .kind = "sky"};
+        .catalogue = "default", .fields = 100, .false_rate = 1e-6, .stars = 40, .kind = "sky"};
     for (int i = 1; i < argc; i++) {
         struct {
             const char *name;

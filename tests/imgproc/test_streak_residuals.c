@@ -31,20 +31,20 @@ void __wrap_bst_path_filter_subtract_point(bst_path_filter *filter, double x_px,
     seen.amplitude = amplitude;
 }
 
-static float smooth[PIXELS], lines[PIXELS];
+static float smooth[PIXELS], cover[PIXELS];
 
 /* A path of 9 samples along (3, -1), 2 px apart, and an empty frame. */
 static bst_streak_finder *make(void) {
     static bst_streak_finder f;
     memset(&f, 0, sizeof f);
     memset(smooth, 0, sizeof smooth);
-    memset(lines, 0, sizeof lines);
+    memset(cover, 0, sizeof cover);
     memset(&seen, 0, sizeof seen);
     f.width = WIDTH;
     f.height = HEIGHT;
     f.psf_sigma_px = 1.0;
     f.smooth = smooth;
-    f.lines = lines;
+    f.scratch = cover;
     f.path.count = 9;
     for (int k = 0; k < 9; k++) {
         f.path.place[k][0] = 6.0 / sqrt(10.0) * (k - 4);
@@ -130,7 +130,7 @@ static void paths_of_bright_stars_cover(void **state) {
             y = (int)lround(22.0 + f->path.place[k][1]);
             near[1] = near[1] || (abs(i % WIDTH - x) <= 4 && abs(i / WIDTH - y) <= 4);
         }
-        bst_assert_close(lines[i], near[0] ? 100.0 : near[1] ? 60.0 : 0.0, 0.0);
+        bst_assert_close(cover[i], near[0] ? 100.0 : near[1] ? 60.0 : 0.0, 0.0);
     }
     /* a fifth of the light, and half of the path */
     const struct {
@@ -147,11 +147,47 @@ static void paths_of_bright_stars_cover(void **state) {
             int x = (int)lround(p.x_px + f->path.place[k][0]),
                 y = (int)lround(p.y_px + f->path.place[k][1]);
             inside++;
-            under += p.amplitude < 0.2 * (double)lines[y * WIDTH + x];
+            under += p.amplitude < 0.2 * (double)cover[y * WIDTH + x];
         }
         assert_int_equal(2 * under > inside, cases[n].covered);
         assert_int_equal(bst_streak_finder_is_covered(f, &p), cases[n].covered);
     }
+}
+
+/* Puts light at some samples of a peak's path. */
+static void put_along(const bst_streak_finder *f, const bst_path_filter_peak *peak, int from,
+                      int to, double light) {
+    for (int k = from; k < to; k++) {
+        put((int)lround(peak->x_px + f->path.place[k][0]),
+            (int)lround(peak->y_px + f->path.place[k][1]), light);
+    }
+}
+
+/* What is left of a bright star beyond its ends has no light of its own over most of its path. */
+static void peaks_beyond_the_ends(void **state) {
+    (void)state;
+    const bst_path_filter_peak peak = {.x_px = 42.0, .y_px = 30.0, .amplitude = 4.0};
+    bst_streak_finder *f = make();
+    put_along(f, &peak, 0, 9, 4.0);
+    assert_false(bst_streak_finder_is_uneven(f, &peak));
+    f = make();
+    put_along(f, &peak, 0, 3, 12.0); /* the same light in a third of the path */
+    assert_true(bst_streak_finder_is_uneven(f, &peak));
+    /* a bright star whose path holds the first half: only the rest counts */
+    const bst_path_filter_peak star = {
+        .x_px = 42.0 + f->path.place[0][0], .y_px = 30.0 + f->path.place[0][1], .amplitude = 100.0};
+    f = make();
+    bst_streak_finder_cover(f, &star);
+    put_along(f, &star, 0, 9, 100.0);
+    assert_true(bst_streak_finder_is_uneven(f, &peak));
+    put_along(f, &peak, 6, 9, 4.0);
+    assert_false(bst_streak_finder_is_uneven(f, &peak));
+    /* wholly on a bright star's path: bst_streak_finder_is_covered decides */
+    f = make();
+    const bst_path_filter_peak same = {.x_px = 42.0, .y_px = 30.0, .amplitude = 100.0};
+    bst_streak_finder_cover(f, &same);
+    assert_false(bst_streak_finder_is_uneven(f, &peak));
+    assert_true(bst_streak_finder_is_covered(f, &peak));
 }
 
 /* At the corners only what is on the frame is touched, and counts. */
@@ -160,8 +196,8 @@ static void edges_of_the_frame(void **state) {
     bst_streak_finder *f = make();
     const bst_path_filter_peak corner = {.x_px = 88.0, .y_px = 2.0, .amplitude = 30.0};
     bst_streak_finder_cover(f, &corner);
-    assert_true(lines[2 * WIDTH + 88] == 30.0F && lines[0] == 0.0F);
-    assert_true(lines[4 * WIDTH] == 0.0F && lines[WIDTH * 7] == 0.0F); /* no row wraps */
+    assert_true(cover[2 * WIDTH + 88] == 30.0F && cover[0] == 0.0F);
+    assert_true(cover[4 * WIDTH] == 0.0F && cover[WIDTH * 7] == 0.0F); /* no row wraps */
     const bst_path_filter_peak faint = {.x_px = 88.0, .y_px = 2.0, .amplitude = 5.0};
     assert_true(bst_streak_finder_is_covered(f, &faint));
     f = make();
@@ -176,6 +212,7 @@ int main(void) {
         cmocka_unit_test(a_point_on_the_path_is_removed),
         cmocka_unit_test(light_along_the_path_is_none),
         cmocka_unit_test(paths_of_bright_stars_cover),
+        cmocka_unit_test(peaks_beyond_the_ends),
         cmocka_unit_test(edges_of_the_frame),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
