@@ -8,7 +8,7 @@
 
 enum { WIDTH = 43, HEIGHT = 26, CELLS = WIDTH * HEIGHT, PIXELS = 20 };
 
-static const double cell = 0.25, sigma = 1.1;
+static double cell = 0.25, sigma = 1.1;
 
 static bst_resolved_cell cells[CELLS];
 static bst_resolved_second second[CELLS];
@@ -41,7 +41,7 @@ static bst_resolved_image make(int kind, bool with_second) {
     uint32_t s = 77;
     bst_resolved_image m = {.cell_px = cell,
                             .x0 = -27,
-                            .y0 = 5,
+                            .y0 = 6,
                             .width = WIDTH,
                             .height = HEIGHT,
                             .cells = cells,
@@ -116,8 +116,8 @@ static moments of_points(const bst_disc_points *points, double x0, double y0) {
     return m;
 }
 
-/* Most light on a square of 1 px (four cells, aligned with the boresight), and its light if all lay
- * there. */
+/* Most light on a square of four cells, aligned with the boresight, per pixel where it is smaller.
+ */
 static double peak_of(const bst_resolved_image *m) {
     double squares[16][24] = {{0}}, most = 0.0;
     for (int n = 0; n < CELLS; n++) {
@@ -125,7 +125,7 @@ static double peak_of(const bst_resolved_image *m) {
         squares[y][x] += (double)m->cells[n].light;
         most = fmax(most, squares[y][x]);
     }
-    return most;
+    return most * fmax(1.0, 1.0 / (16.0 * cell * cell));
 }
 
 static void moments_are_those_of_the_cells(void **state) {
@@ -133,6 +133,8 @@ static void moments_are_those_of_the_cells(void **state) {
     bst_ctx ctx = {0};
     bst_disc_points points = {0};
     for (int n = 0; n < KINDS * 2 * 2 * 4; n++) {
+        cell = n / KINDS / 2 % 2 ? 0.19 : 0.25;
+        sigma = n / KINDS % 2 ? 1.1 : 0.5; /* squares of up to 1.3 px, or of 1 px */
         const bst_resolved_image m = make(n % KINDS, n / KINDS % 2 == 0);
         bst_image_nodes_aim aim = {.sigma_px = sigma,
                                    .widest = 1.0,
@@ -180,6 +182,8 @@ static void image_is_that_of_the_cells(void **state) {
     static double sound[PIXELS * PIXELS], found[PIXELS * PIXELS];
     bst_ctx ctx = {0};
     bst_disc_points points = {0};
+    cell = 0.25;
+    sigma = 1.1;
     for (int n = 0; n < KINDS * 2; n++) {
         const bst_resolved_image m = make(n % KINDS, true);
         memset(sound, 0, sizeof sound);
@@ -195,7 +199,7 @@ static void image_is_that_of_the_cells(void **state) {
         for (int level = 0; level < 4; level++) {
             bst_image_nodes_aim aim = {.sigma_px = sigma,
                                        .widest = 0.5,
-                                       .electrons = 2e4,
+                                       .electrons = n % 2 ? 2e4 : 1e6,
                                        .dark_variance_e2 = 100.0,
                                        .tolerance_sigma = 0.01 * pow(10.0, level),
                                        .blurred = n >= KINDS,
@@ -215,7 +219,9 @@ static void image_is_that_of_the_cells(void **state) {
                 worst_e = fmax(worst_e, error_e);
                 worst = fmax(worst, error_e / sqrt(sound[i] * aim.electrons + 100.0));
             }
+            /* as large as allowed, or not smaller than one cell in two nodes */
             assert_true(worst <= aim.tolerance_sigma);
+            assert_true(worst >= (level == 0 ? 0.02 : 0.08) * aim.tolerance_sigma);
             /* the estimate is a bound, and no loose one */
             assert_true(level == 3 || worst_e <= result.error_e);
             assert_true(worst_e >= 0.06 * result.error_e);
