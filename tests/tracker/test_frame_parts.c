@@ -436,6 +436,42 @@ static void models_follow_their_likelihoods(void **state) {
     expect_flat(&s, &whole);
 }
 
+/* Uniform motion with white noise of the acceleration, arcsec^2/s^3. */
+static flat flat_later(const flat *at, double dt, double noise) {
+    flat out = *at;
+    for (int i = 0; i < 2; i++) {
+        out.x[i] += dt * at->x[i + 2];
+        for (int k = 0; k < 2; k++) {
+            const double q = i == k ? noise : 0.0;
+            out.p[i][k] = at->p[i][k] + dt * (at->p[i + 2][k] + at->p[i][k + 2]) +
+                          dt * dt * at->p[i + 2][k + 2] + q * dt * dt * dt / 3.0;
+            out.p[i][k + 2] = at->p[i][k + 2] + dt * at->p[i + 2][k + 2] + q * dt * dt / 2.0;
+            out.p[k + 2][i] = out.p[i][k + 2];
+            out.p[i + 2][k + 2] = at->p[i + 2][k + 2] + q * dt;
+        }
+    }
+    return out;
+}
+
+/* Both kinds of prediction of one Gaussian. */
+static void one_model_moves(void **state) {
+    (void)state;
+    flat own[2];
+    bst_filter_models models, none = {0};
+    bst_sky_state s;
+    start_models(own, &models, &s);
+    for (int unscented = 0; unscented < 2; unscented++) {
+        for (int m = 0; m < 2; m++) {
+            const bst_filter_params params = {.kind = unscented ? BST_FILTER_UKF : BST_FILTER_EKF,
+                                              .noise_rad2ps3 = 0.4 * AS * AS};
+            bst_sky_state one = of_flat(&own[m]);
+            bst_filter_predict(&params, 5.0, &one, &none);
+            const flat moved = flat_later(&own[m], 5.0, 0.4);
+            expect_flat(&one, &moved);
+        }
+    }
+}
+
 /* A chain of two states in continuous time mixes the models, each then moves with its own noise. */
 static void models_are_mixed_and_move(void **state) {
     (void)state;
@@ -465,18 +501,7 @@ static void models_are_mixed_and_move(void **state) {
         part[0].weight *= stay[0][m];
         part[1].weight *= stay[1][m];
         const flat at = mixture(part, 2);
-        moved[m] = at;
-        for (int i = 0; i < 2; i++) {
-            moved[m].x[i] += dt * at.x[i + 2];
-            for (int k = 0; k < 2; k++) {
-                const double q = i == k ? noise[m] : 0.0;
-                moved[m].p[i][k] = at.p[i][k] + dt * (at.p[i + 2][k] + at.p[i][k + 2]) +
-                                   dt * dt * at.p[i + 2][k + 2] + q * dt * dt * dt / 3.0;
-                moved[m].p[i][k + 2] = at.p[i][k + 2] + dt * at.p[i + 2][k + 2] + q * dt * dt / 2.0;
-                moved[m].p[k + 2][i] = moved[m].p[i][k + 2];
-                moved[m].p[i + 2][k + 2] = at.p[i + 2][k + 2] + q * dt;
-            }
-        }
+        moved[m] = flat_later(&at, dt, noise[m]);
         bst_assert_close(models.probability[m], moved[m].weight, 1e-5);
         expect_flat(&models.state[m], &moved[m]);
     }
@@ -488,6 +513,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(models_follow_their_likelihoods),
         cmocka_unit_test(models_are_mixed_and_move),
+        cmocka_unit_test(one_model_moves),
         cmocka_unit_test(cues_accelerate),
         cmocka_unit_test(tracks_share_it),
         cmocka_unit_test(light_of_an_orbit),
