@@ -61,10 +61,10 @@ class Generator(unittest.TestCase):
             self.assertEqual([e[0] < 1 for e in events], [True] * found, name)  # by the first frame
             for event in events:
                 said = [float(word) for word in re.findall(r"(?:RA|Dec|off by) (-?[0-9.]+)", event[1])]
-                true, told = (np.array(tuple(db.execute(f"SELECT {', '.join(q + '_' + k for k in 'xyzw')} FROM {table} "
+                true, stated = (np.array(tuple(db.execute(f"SELECT {', '.join(q + '_' + k for k in 'xyzw')} FROM {table} "
                                                         "ORDER BY exposure_id LIMIT 1").fetchone()))
                               for table, q in (("exposures", "q_cam_from_gcrf_mean"), ("detection_frames", "q_telemetry_from_gcrf")))
-                self.assertAlmostEqual(said[-1], np.degrees(2 * np.arccos(min(1, abs(true @ told)))), delta=0.02)
+                self.assertAlmostEqual(said[-1], np.degrees(2 * np.arccos(min(1, abs(true @ stated)))), delta=0.02)
                 place = db.execute("SELECT boresight_ra_deg, boresight_dec_deg FROM exposures ORDER BY exposure_id LIMIT 1")
                 for one, other in zip(said[:-1], place.fetchone()):  # images have it, the generator has not
                     self.assertAlmostEqual((one - other + 180) % 360 - 180, 0, delta=0.02)

@@ -328,14 +328,14 @@ static void test_correlated(void **state) {
     bst_assert_close(f.bias_radps.z, 3e-4 + changes[5], 1e-15);
 }
 
-/* After a warm-up with a gyro whose bias wanders by many of the filter's standard deviations,
+/* After a warm-up with a gyro whose bias walks by many of the filter's standard deviations,
  * attitude and bias at the epoch are those of the sensors, within the covariance: two unlike star
  * trackers, a slowly turning body. */
 static void warm_up_ends_at_the_epoch(void **state) {
     (void)state;
     enum { RUNS = 30 };
     const double arcsec = BST_ARCSEC_RAD;
-    double square[2] = {0.0, 0.0}, wandered = 0.0;
+    double square[2] = {0.0, 0.0}, walked = 0.0;
     for (uint64_t run = 0; run < RUNS; run++) {
         bst_spacecraft_gyro gyro = {.angle_walk = 0.5 * arcsec,
                                     .rate_walk = 0.2 * arcsec,
@@ -378,10 +378,10 @@ static void warm_up_ends_at_the_epoch(void **state) {
             for (int i = 0; i < 9; i++) {
                 square[part] += x[part][i / 3] * inverse[i] * x[part][i % 3] / (3.0 * RUNS);
             }
-            wandered += part ? gyro.rate_walk * sqrt(past.seconds) / sqrt(p[0]) / RUNS : 0.0;
+            walked += part ? gyro.rate_walk * sqrt(past.seconds) / sqrt(p[0]) / RUNS : 0.0;
         }
     }
-    assert_true(wandered > 5.0);
+    assert_true(walked > 5.0);
     for (int part = 0; part < 2; part++) { /* 90 degrees of freedom: four standard deviations */
         bst_assert_close(square[part], 1.0, 4.0 * sqrt(2.0 / 90.0));
     }
