@@ -9,7 +9,19 @@
 
 double bst_run_sensor_frames(const bst_scenario *scenario, const bst_sensor_config *sensor) {
     const bst_exposure_config *e = &sensor->exposure;
-    return fmax(floor((scenario->duration_s - e->first_s) / e->period_s), 0.0);
+    /* those that end before the run does; 1e-9: rounding */
+    double left_s = scenario->duration_s - e->first_s - e->exposure_s;
+    return fmax(ceil(left_s / e->period_s - 1e-9), 0.0);
+}
+
+/* Pixels of a frame: of its window, over its binning. */
+static double pixels_of(const bst_sensor_config *sensor) {
+    const bst_exposure_config *e = &sensor->exposure;
+    bool whole = e->window_px[2] == 0.0;
+    double width = whole ? (double)sensor->camera.width_px : e->window_px[2];
+    double height = whole ? (double)sensor->camera.height_px : e->window_px[3];
+    double binning = e->binning > 1 ? (double)e->binning : 1.0;
+    return floor(width / binning) * floor(height / binning);
 }
 
 double bst_run_sensor_bytes(const bst_scenario *scenario, const bst_sensor_config *sensor) {
@@ -18,11 +30,11 @@ double bst_run_sensor_bytes(const bst_scenario *scenario, const bst_sensor_confi
     double per_pixel = record->frames == BST_RECORD_NO_FRAMES ? 0.0
                        : bst_recorder_compresses(record)      ? 1.0
                                                               : 2.0;
-    for (uint32_t planes = record->planes; planes; planes &= planes - 1) {
-        per_pixel += planes == UINT32_C(1) << BST_PLANE_SATURATION ? 1.0 : 4.0;
+    for (int plane = 0; plane < BST_PLANE_COUNT; plane++) {
+        bool recorded = record->planes & UINT32_C(1) << plane;
+        per_pixel += !recorded ? 0.0 : plane == BST_PLANE_SATURATION ? 1.0 : 4.0;
     }
-    return bst_run_sensor_frames(scenario, sensor) * per_pixel * (double)sensor->camera.width_px *
-           (double)sensor->camera.height_px;
+    return bst_run_sensor_frames(scenario, sensor) * per_pixel * pixels_of(sensor);
 }
 
 /* Bytes of all frames and planes, without tables. */

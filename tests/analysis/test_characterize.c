@@ -3,6 +3,7 @@
 #include "boresight/vec.h"
 #include "sim/analysis/characterize/hot_pixels.h"
 #include "sim/analysis/characterize/pick_up_line.h"
+#include "sim/analysis/characterize/simplex_search.h"
 #include "tests/test_support.h"
 
 /* Normal quartile: deviations from the mean per standard deviation. */
@@ -217,8 +218,50 @@ static void charge_behind_hot_pixels(void **state) {
     test_free(map);
 }
 
+/* First points of a search and their number. */
+typedef struct bowl {
+    double first[4][3];
+    int count;
+} bowl;
+
+static double bowl_cost(const void *user, const double *x) {
+    bowl *b = (bowl *)(uintptr_t)user;
+    if (b->count < 4) {
+        memcpy(b->first[b->count], x, sizeof b->first[0]);
+    }
+    b->count++;
+    double u = x[0] - 3.0, v = (x[1] + 0.02) / 0.01, w = (x[2] - 400.0) / 100.0;
+    return 1.0 + u * u + v * v + w * w + 0.5 * u * v - 0.3 * v * w;
+}
+
+/* Coordinates of very different size: each begins with its own step, and the least place is found.
+ */
+static void search_with_a_simplex(void **state) {
+    (void)state;
+    bowl b = {.count = 0};
+    const double start[3] = {0.0, 0.0, 100.0}, step[3] = {0.5, 0.004, 60.0};
+    double x[3] = {0.0, 0.0, 100.0};
+    double least = bst_simplex_search(bowl_cost, &b, 3, x, step, 2000);
+    for (int i = 0; i < 4; i++) {
+        for (int k = 0; k < 3; k++) {
+            bst_assert_close(b.first[i][k], start[k] + (k == i - 1 ? step[k] : 0.0), 1e-12);
+        }
+    }
+    /* costs of all corners within 1e-6: places to about their root */
+    bst_assert_close(least, 1.0, 2e-6);
+    bst_assert_close(x[0], 3.0, 5e-3);
+    bst_assert_close(x[1], -0.02, 5e-5);
+    bst_assert_close(x[2], 400.0, 0.5);
+    assert_true(b.count < 400);
+    b.count = 0;
+    memcpy(x, start, sizeof x);
+    (void)bst_simplex_search(bowl_cost, &b, 3, x, step, 30);
+    assert_in_range(b.count, 30, 34); /* it ends in time: a shrink takes three more */
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(search_with_a_simplex),
         cmocka_unit_test(spread_of_whole_and_broken_numbers),
         cmocka_unit_test(outliers_are_left_out),
         cmocka_unit_test(sine_along_the_rows),

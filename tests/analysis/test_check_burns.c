@@ -1,9 +1,12 @@
 /* What `check` says of burns that a tracker cannot follow, against the velocity across the line of
- * sight and the limits of a filter with white noise of acceleration. */
+ * sight and the limits of a filter with white noise of acceleration; and its figures of sensors and
+ * targets, against the photons of a star, sums over pixels and the states of both bodies. */
+#include <cjson/cJSON.h>
 #include <string.h>
 
 #include "boresight/vec.h"
 #include "sim/analysis/check/check_burns.h"
+#include "sim/analysis/check/check_figures.h"
 #include "sim/cli/load.h"
 #include "sim/world/world.h"
 #include "tests/test_support.h"
@@ -134,7 +137,103 @@ static void limits_of_burns(void **state) {
     expect(ways[0], 3.0, TRACKER "event_window=0", 0.45 * 4.0, "arcsec/s");
 }
 
+static double number(const cJSON *node, const char *key) {
+    const cJSON *item = cJSON_GetObjectItemCaseSensitive(node, key);
+    if (!cJSON_IsNumber(item)) {
+        fail_msg("%s is no number", key);
+    }
+    return item->valuedouble;
+}
+
+/* Mean over the positions in a pixel of sum s^2, s the light of a Gaussian in each pixel. */
+static double sharpness(double sigma) {
+    double mean = 0.0;
+    for (int phase = 0; phase < 64; phase++) {
+        for (int i = -12; i <= 12; i++) {
+            double from = (i - 0.5 - (phase + 0.5) / 64.0) / sigma, to = from + 1.0 / sigma;
+            double s = 0.5 * (erf(to / sqrt(2.0)) - erf(from / sqrt(2.0)));
+            mean += s * s / 64.0;
+        }
+    }
+    return mean * mean; /* the same in y */
+}
+
+static void figures_of_sensor_and_target(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_load_options load = BST_LOAD_DEFAULTS;
+    bst_option none[] = {{.name = NULL}};
+    bst_json *json;
+    bst_scenario scenario;
+    bst_assert_ok(&ctx, bst_load_check(&ctx, &load, none));
+    const char *sets[] = {"/world/star_catalogue=embedded",
+                          "/duration_s=1000",
+                          "/observers/0/sensors/0/camera/height_px=512",
+                          "/observers/0/sensors/0/camera/obscuration=0.4",
+                          "/observers/0/sensors/0/exposure={\"exposure_s\": 0.8, \"period_s\": 3, "
+                          "\"first_s\": 10, \"binning\": 2, \"window_px\": [100, 50, 256, 128]}",
+                          "/record={\"frames\": \"extensions\", \"compression\": \"none\"}"};
+    for (size_t i = 0; i < sizeof sets / sizeof *sets; i++) {
+        load.set.items[load.set.count++] = sets[i];
+    }
+    bst_assert_ok(
+        &ctx, bst_load_scenario(&ctx, "scenarios/neossat_geo_stare.json", &load, &json, &scenario));
+    bst_assert_ok(&ctx, bst_world_create(&ctx, scenario.file, &scenario.world, &scenario.observers,
+                                         "", scenario.epoch, &made));
+    cJSON *root;
+    bst_assert_ok(&ctx, bst_check_figures(&ctx, &scenario, NULL, &root));
+    const cJSON *sensor = cJSON_GetObjectItem(root, "sensors")->child;
+    const cJSON *field = cJSON_GetObjectItem(sensor, "field_deg");
+    bst_assert_close(cJSON_GetArrayItem(field, 0)->valuedouble, 1024 * 3 / 3600.0, 1e-12);
+    bst_assert_close(cJSON_GetArrayItem(field, 1)->valuedouble, 512 * 3 / 3600.0, 1e-12);
+    bst_assert_close(number(sensor, "pixel_scale_arcsec"), 3.0, 1e-12);
+    /* frames that begin at 10, 13, ..., 997 s */
+    bst_assert_close(number(sensor, "frames"), 330, 0.0);
+    bst_assert_close(number(sensor, "frame_bytes"), 330.0 * 128 * 64 * 2, 0.0);
+    bst_assert_close(number(root, "frame_bytes"), 330.0 * 128 * 64 * 2, 0.0);
+    /* electrons per second of a star of V = 0 */
+    double v0 = 3.6e10 * BST_PI / 4.0 * 0.15 * 0.15 * (1.0 - 0.4) * 0.7 * 0.7;
+    double sky = v0 * pow(10.0, -0.4 * 22.0) * 9.0 * 0.8, dark = 0.5 * 0.8;
+    double noise = sqrt(sky + dark + 64.0), snr_per_e = sqrt(sharpness(2.0 / 2.35482)) / noise;
+    bst_assert_close(number(sensor, "sky_e"), sky, 1e-9 * sky);
+    bst_assert_close(number(sensor, "dark_e"), dark, 1e-12);
+    bst_assert_close(number(sensor, "noise_e"), noise, 1e-9);
+    bst_assert_close(number(sensor, "psf_fwhm_px"), 2.0, 1e-6);
+    /* four positions instead of all */
+    bst_assert_close(number(sensor, "v_mag_at_snr_5"), 2.5 * log10(v0 * 0.8 * snr_per_e / 5.0),
+                     2e-3);
+    bst_world_view *view;
+    bst_assert_ok(&ctx, bst_world_view_create(&ctx, made, &view));
+    const cJSON *target = cJSON_GetObjectItem(sensor, "target");
+    const cJSON *at = cJSON_GetObjectItem(target, "states")->child;
+    for (int i = 0; i < 3; i++, at = at->next) {
+        bst_world_state body[2], eye[2];
+        bst_vec3 line[2];
+        double time_s = 500.0 * i;
+        for (int k = 0; k < 2; k++) {
+            bst_assert_ok(&ctx, bst_world_view_object_state(&ctx, view, 0, time_s + k, &body[k]));
+            bst_assert_ok(&ctx, bst_world_view_observer_state(&ctx, view, 0, time_s + k, &eye[k]));
+            line[k] = bst_vec3_sub(body[k].position_m, eye[k].position_m);
+        }
+        double range = bst_vec3_norm(line[0]), v = number(at, "v_mag");
+        bst_assert_close(number(at, "time_s"), time_s, 0.0);
+        bst_assert_close(number(at, "range_m"), range, 2e-5 * range); /* light time */
+        double rate = bst_vec3_angle(line[0], line[1]) / BST_ARCSEC_RAD;
+        bst_assert_close(number(at, "rate_arcsec_per_s"), rate, 2e-4 * rate + 1e-3);
+        double snr = v0 * 0.8 * pow(10.0, -0.4 * v) * snr_per_e;
+        bst_assert_close(number(at, "snr"), snr, 2e-3 * snr);
+        bst_assert_close(number(at, "sunlit_fraction"), 1.0, 0.0);
+    }
+    assert_null(at);
+    cJSON_Delete(root);
+    bst_world_view_free(view);
+    bst_world_free(made);
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(limits_of_burns)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(limits_of_burns),
+                                       cmocka_unit_test(figures_of_sensor_and_target)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,8 +1,12 @@
 /* Figures of a sensor from frames that are reduced already: noise, level with ramp and drift,
  * offsets, gain and response, each by sums of its own; the sensor is no square. */
+#include <cjson/cJSON.h>
+
 #include "boresight/rng.h"
 #include "boresight/vec.h"
+#include "sim/analysis/characterize/characterize.h"
 #include "sim/analysis/characterize/sensor_figures.h"
+#include "tests/io/scratch.h"
 #include "tests/test_support.h"
 
 enum { WIDTH = 96, HEIGHT = 72, PIXELS = WIDTH * HEIGHT, BIASES = 10, FLATS = 8 };
@@ -231,11 +235,161 @@ static void dead_pixels_and_columns(void **state) {
     bst_sensor_figures_free(&f);
 }
 
+static cJSON *read_json(scratch *s, const char *name) {
+    static char text[65536];
+    FILE *file = fopen(scratch_path(s, name), "r");
+    assert_non_null(file);
+    text[fread(text, 1, sizeof text - 1, file)] = '\0';
+    fclose(file);
+    cJSON *root = cJSON_Parse(text);
+    assert_non_null(root);
+    return root;
+}
+
+/* Number at a path of keys, of which the last may be that of an array's element; NAN: null. */
+static double at(const cJSON *node, const char *const *keys) {
+    for (; *keys; keys++) {
+        const cJSON *next = cJSON_IsArray(node) ? cJSON_GetArrayItem(node, atoi(*keys))
+                                                : cJSON_GetObjectItemCaseSensitive(node, *keys);
+        if (!next) {
+            fail_msg("there is no %s", *keys);
+        }
+        node = next;
+    }
+    return cJSON_IsNull(node) ? NAN : cJSON_IsBool(node) ? cJSON_IsTrue(node) : node->valuedouble;
+}
+#define AT(node, ...) at(node, (const char *const[]){__VA_ARGS__, NULL})
+#define CAMERA "/observers/1/sensors/2/camera"
+#define OF(set, key) cJSON_GetObjectItemCaseSensitive(set, CAMERA "/" key)
+
+/* Figures that all differ; every third is not significant, the ramp is negative. */
+static bst_sensor_figures written_figures(void) {
+    bst_sensor_figures f = {.width = 3,
+                            .height = 2,
+                            .shielded_columns = 7,
+                            .hot_found = 321,
+                            .hot_limit_e_per_s = 45.5,
+                            .trap_misfit = {0.011, 0.022}};
+    for (int i = 0; i < BST_SENSOR_FIGURES; i++) {
+        f.figures[i].value = 10.0 + i;
+        f.figures[i].sigma = i % 3 == 2 ? 0.51 * f.figures[i].value : 0.49 * f.figures[i].value;
+        f.method[i] = "as the test has it";
+    }
+    f.figures[BST_SENSOR_READ_NOISE].value = 30.0;
+    f.figures[BST_SENSOR_GAIN].value = 2.5;
+    f.figures[BST_SENSOR_LINE_FREQUENCY].value = 0.13;
+    f.figures[BST_SENSOR_RAMP].value = -40.0;
+    f.figures[BST_SENSOR_DSNU].sigma = NAN;
+    f.figures[BST_SENSOR_PRNU].value = NAN;
+    for (int i = 0; i < BST_SENSOR_PERCENTILES; i++) {
+        f.percentiles_e_per_s[i] = NAN; /* no plot */
+    }
+    f.line = (bst_pick_up_line){.found = true, .phase_deg = 77.0, .pair_power = 3.0};
+    f.trail = (bst_charge_trail){.used = 60, .parallel = {0.1, 0.01}, .serial_right = true};
+    for (int c = 0; c < BST_TRAIL_CLASSES; c++) {
+        f.trail.class_charge[c] = 100.0 + c;
+        f.trail.class_parallel[c] = 0.1 + 0.01 * c;
+        f.trail.class_serial[c] = 0.2 + 0.01 * c;
+        for (int k = 0; k < BST_TRAIL_PIXELS; k++) {
+            f.trail.profile[c][k] = c + 0.1 * k;
+        }
+    }
+    f.traps = (bst_trap_model){.parallel = {{1, 2, 3}, {4, 5, 6}, 0.5, 1e4},
+                               .serial = {{7, 8, 9}, {1.5, 2.5, 3.5}, 0.25, 2e4},
+                               .right = true};
+    return f;
+}
+
+/* Both files of the figures: intervals, what is not significant, and the noise that stays as read
+ * noise when pick-up and the charge of the read-out have keys of their own. */
+static void files_of_the_figures(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    scratch s;
+    scratch_make(&s);
+    const bst_characterize_request request = {.out = s.folder, .camera = CAMERA};
+    bst_sensor_stacks stacks = {
+        .bias = {.count = 4}, .dark = {.count = 5, .exposure_s = 12.5}, .flat = {.count = 6}};
+    bst_sensor_figures f = written_figures();
+    for (int pairs = 0; pairs < 2; pairs++) {
+        f.noise_of_pairs = pairs;
+        f.line.locked = pairs;
+        bst_assert_ok(&ctx, bst_characterize_write(&ctx, &request, &stacks, &f));
+        cJSON *root = read_json(&s, "detector.json");
+        const cJSON *set = cJSON_GetObjectItem(root, "set");
+        double line = f.figures[BST_SENSOR_LINE_AMPLITUDE].value, sum = 0.0;
+        for (int k = 0; k < 1000; k++) { /* half of the mean square of differences of neighbours */
+            double d =
+                line * (sin(2.0 * BST_PI * (0.13 + k / 1000.0)) - sin(2.0 * BST_PI * k / 1000.0));
+            sum += 0.5 * d * d / 1000.0;
+        }
+        /* pairs: the line's power in DN^2, and shot noise of 0 to 100 e- over the rows */
+        double rest = pairs ? 900.0 - 3.0 * 2.5 * 2.5 - 50.0 : 900.0 - sum;
+        bst_assert_close(OF(set, "read_noise_e")->valuedouble, sqrt(rest), 1e-9);
+        bst_assert_close(OF(set, "offset_dn")->valuedouble, 12.0, 0.0); /* not of the detector */
+        bst_assert_close(OF(set, "dark_current_e_per_s")->valuedouble, 17.0, 0.0);
+        bst_assert_close(OF(set, "detector/row_noise_e")->valuedouble, 14.0 * (4 % 3 != 2), 0.0);
+        bst_assert_close(OF(set, "detector/column_offset_rms_e")->valuedouble, 0.0, 0.0);
+        bst_assert_close(OF(set, "detector/hot_median_e_per_s")->valuedouble, 0.0, 0.0);
+        bst_assert_close(OF(set, "detector/hot_spread_dex")->valuedouble, 22.0, 0.0);
+        assert_null(OF(set, "detector/dsnu_rms")); /* of an unknown error */
+        assert_null(OF(set, "detector/prnu_rms"));
+        assert_true(cJSON_IsFalse(OF(set, "detector/output/top")));
+        assert_true(cJSON_IsTrue(OF(set, "detector/output/right")));
+        bst_assert_close(AT(OF(set, "detector/parallel_traps"), "release_px", "2"), 6.0, 0.0);
+        bst_assert_close(AT(OF(set, "detector/serial_traps"), "traps_per_px", "1"), 8.0, 0.0);
+        bst_assert_close(AT(OF(set, "detector/serial_traps"), "fill_exponent"), 0.25, 0.0);
+        const cJSON *phase = OF(set, "detector/pick_up/phase_deg");
+        assert_true(pairs ? phase && phase->valuedouble == 77.0 : !phase);
+        cJSON_Delete(root);
+    }
+    cJSON *report = read_json(&s, "report.json");
+    bst_assert_close(AT(report, "frames", "bias"), 4, 0.0);
+    bst_assert_close(AT(report, "frames", "dark"), 5, 0.0);
+    bst_assert_close(AT(report, "frames", "flat"), 6, 0.0);
+    bst_assert_close(AT(report, "frames", "dark_exposure_s"), 12.5, 0.0);
+    for (int i = 0; i < BST_SENSOR_FIGURES; i++) {
+        const bst_sensor_estimate *e = &f.figures[i];
+        const char *key = bst_sensor_figure_names[i].key;
+        if (isfinite(e->value) && isfinite(e->sigma)) {
+            bst_assert_close(AT(report, "figures", key, "value"), e->value, 0.0);
+            bst_assert_close(AT(report, "figures", key, "standard_error"), e->sigma, 1e-12);
+            /* Student's t with 20 degrees of freedom: 2.086 */
+            bst_assert_close(AT(report, "figures", key, "low_95"), e->value - 2.086 * e->sigma,
+                             5e-3 * e->sigma);
+            bst_assert_close(AT(report, "figures", key, "high_95"), e->value + 2.086 * e->sigma,
+                             5e-3 * e->sigma);
+        }
+    }
+    bst_assert_close(AT(report, "shielded_columns"), 7, 0.0);
+    bst_assert_close(AT(report, "hot_pixels"), 321, 0.0);
+    bst_assert_close(AT(report, "pick_up", "power_in_pairs_e2"), 3.0 * 6.25, 1e-12);
+    static const char *const sides[] = {"rows_above", "rows_below", "columns_right",
+                                        "columns_left"};
+    const cJSON *trail = cJSON_GetObjectItem(report, "charge_trail");
+    assert_string_equal(cJSON_GetObjectItem(trail, "parallel_direction")->valuestring,
+                        "rows_below");
+    assert_string_equal(cJSON_GetObjectItem(trail, "serial_direction")->valuestring,
+                        "columns_right");
+    for (int c = 0; c < BST_TRAIL_CLASSES; c++) {
+        const char index[2] = {(char)('0' + c), '\0'};
+        bst_assert_close(AT(trail, "by_charge", index, "charge_dn"), 100.0 + c, 0.0);
+        bst_assert_close(AT(trail, "by_charge", index, "parallel"), 0.1 + 0.01 * c, 1e-12);
+        bst_assert_close(AT(trail, "by_charge", index, "serial"), 0.2 + 0.01 * c, 1e-12);
+        bst_assert_close(AT(trail, sides[c], "3"), c + 0.3, 1e-12);
+    }
+    bst_assert_close(AT(trail, "parallel_traps", "misfit_rms"), 0.011, 0.0);
+    bst_assert_close(AT(trail, "serial_traps", "misfit_rms"), 0.022, 0.0);
+    cJSON_Delete(report);
+    scratch_remove(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(noise_and_level),
         cmocka_unit_test(gain_and_response),
         cmocka_unit_test(dead_pixels_and_columns),
+        cmocka_unit_test(files_of_the_figures),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

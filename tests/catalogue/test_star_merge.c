@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "sim/catalogue/star_merge.h"
+#include "sim/catalogue/star_table_internal.h"
 #include "sim/catalogue/stars.h"
 
 #define ARCSEC_DEG (1.0 / 3600.0)
@@ -416,8 +417,51 @@ static void test_bad_tables(void **state) {
     assert_int_equal(bst_star_merge(&f->ctx, &q, &n), BST_ERR_NOT_FOUND);
 }
 
+/* Names of columns in the archives' tables (Gaia's archive, VizieR's I/355, and our own) are found,
+ * in any case, and no name means two quantities. */
+static void test_names_of_columns(void **state) {
+    (void)state;
+    static const struct {
+        const char *name;
+        bst_star_quantity quantity;
+    } known[] = {{"ra", BST_STAR_RA},
+                 {"RA_ICRS", BST_STAR_RA},
+                 {"DE_ICRS", BST_STAR_DEC},
+                 {"dec_deg", BST_STAR_DEC},
+                 {"ref_epoch", BST_STAR_EPOCH},
+                 {"pmRA", BST_STAR_PM_RA},
+                 {"pmDE", BST_STAR_PM_DEC},
+                 {"pmdec", BST_STAR_PM_DEC},
+                 {"phot_g_mean_mag", BST_STAR_G},
+                 {"Gmag", BST_STAR_G},
+                 {"bp_rp", BST_STAR_BP_RP},
+                 {"BP-RP", BST_STAR_BP_RP},
+                 {"phot_bp_mean_mag", BST_STAR_BP},
+                 {"BPmag", BST_STAR_BP},
+                 {"bp", BST_STAR_BP},
+                 {"phot_rp_mean_mag", BST_STAR_RP},
+                 {"RPmag", BST_STAR_RP},
+                 {"Vmag", BST_STAR_V},
+                 {"V", BST_STAR_V},
+                 {"B-V", BST_STAR_B_MINUS_V},
+                 {"b_minus_v", BST_STAR_B_MINUS_V},
+                 {"Bmag", BST_STAR_B},
+                 {"b", BST_STAR_B},
+                 {"electrons_per_s", BST_STAR_ELECTRONS}};
+    for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+        for (int q = 0; q < BST_STAR_QUANTITIES; q++) {
+            bool found =
+                bst_star_name_is(bst_star_quantity_names[q], known[i].name, strlen(known[i].name));
+            if (found != (q == (int)known[i].quantity)) {
+                fail_msg("%s is%s quantity %d", known[i].name, found ? "" : " not", q);
+            }
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_names_of_columns),
         cmocka_unit_test_setup_teardown(test_queries_find_each_star_once, setup, teardown),
         cmocka_unit_test_setup_teardown(test_stars_of_both_are_united, setup, teardown),
         cmocka_unit_test_setup_teardown(test_rows_share_out_the_base, setup, teardown),

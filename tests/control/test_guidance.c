@@ -384,6 +384,34 @@ static void slews_begin_at_the_axes(void **state) {
     }
 }
 
+/* The words of every event, with times and angles in degrees. */
+static void words_of_events(void **state) {
+    (void)state;
+    const char *why = bst_pointing_feasibility_reason(1);
+    const struct {
+        bst_guidance_event event;
+        const char *words; /* %s: the reason */
+    } cases[] = {
+        {{BST_GUIDANCE_UNREACHABLE, 1, 0, 32.5, 0}, "unreachable until 32.5 s: %s"},
+        {{BST_GUIDANCE_UNREACHABLE, 1, 0, INFINITY, 0},
+         "unreachable for as long as is looked ahead: %s"},
+        {{BST_GUIDANCE_REACHABLE, 1, 0, 0, 0}, "within reach again, no longer %s"},
+        {{BST_GUIDANCE_AHEAD, 1, 12.25, 40.75, 0}, "unreachable from 12.2 s until 40.8 s: %s"},
+        {{BST_GUIDANCE_LOSS, 1, 7, INFINITY, 0},
+         "will be lost from 7.0 s for as long as is looked ahead: %s"},
+        {{BST_GUIDANCE_DETOUR, 1, 0, 60, 0.5},
+         "slew round keep-out cones by 28.6 deg until 60.0 s"},
+        {{BST_GUIDANCE_ROLL, 1, 0, 0, 0.2}, "the body rolls by 11.5 deg, lest the target be %s"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char expected[300], text[300];
+        const char *at = strstr(cases[i].words, "%s");
+        int plain = at ? (int)(at - cases[i].words) : (int)strlen(cases[i].words);
+        snprintf(expected, sizeof expected, "%.*s%s", plain, cases[i].words, at ? why : "");
+        bst_guidance_describe(&cases[i].event, text, sizeof text);
+        assert_string_equal(text, expected);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_body_turns_on),
@@ -392,6 +420,7 @@ int main(void) {
         cmocka_unit_test(cones_of_the_sky),
         cmocka_unit_test(nothing_asked_nothing_changed),
         cmocka_unit_test(slews_of_least_time),
+        cmocka_unit_test(words_of_events),
         cmocka_unit_test(keeps_out_of_the_sun),
         cmocka_unit_test(occultation_ahead),
     };

@@ -47,9 +47,16 @@ class Camera(unittest.TestCase):
         camera = json.loads(result.stdout)["observers"][0]["sensors"][0]["camera"]
         self.assertEqual(camera["pixel_scale_arcsec"], report["geometry"]["pixel_scale_arcsec"]["value"])
         self.assertEqual(camera["distortion"]["k2"], report["geometry"]["k2"]["value"])
-        # frames in extensions, not a cube
-        runs.run(runs.STARE, run + "2", "/record/frames=extensions", duration=3)
+        for width in report["psf"]["fwhm_px_by_ninth"]:
+            self.assertAlmostEqual(width, 2.02, delta=0.1)
+        # frames in extensions, not a cube, of a window off the corner: the middle and the right of the middle row
+        runs.run(runs.STARE, run + "2", "/record/frames=extensions",
+                 f"{runs.SENSOR}/exposure/window_px=[345,345,660,330]", duration=3)
         self.assertIn("FWHM", runs.call_well("calibrate-camera", run + "2", "--out", made + "2"))
+        with open(os.path.join(made + "2", "report.json"), encoding="utf-8") as file:
+            widths = json.load(file)["psf"]["fwhm_px_by_ninth"]
+        self.assertEqual([i for i, width in enumerate(widths) if width is not None], [4, 5])
+        self.assertAlmostEqual(widths[4], 2.02, delta=0.1)
         runs.run(runs.STARE, run + "3", f"{SENSOR}/aperture_m=0.001", duration=1)
         result = runs.call("calibrate-camera", run + "3", "--out", made + "3")
         self.assertEqual((result.returncode, os.path.exists(made + "3")), (1, False))

@@ -5,7 +5,10 @@ Usage, from the repository root:
   /usr/bin/python3 tests/e2e/test_generator.py BORESIGHT
 """
 import os
+import re
 import unittest
+
+import numpy as np
 
 import runs
 
@@ -54,8 +57,17 @@ class Generator(unittest.TestCase):
             out = os.path.join(self.folder, name)
             runs.run(runs.TRACK, out, bias, *sets, duration=8)
             db = runs.database(out)
-            events = db.execute("SELECT time_s FROM events WHERE kind = 'attitude_found'").fetchall()
+            events = db.execute("SELECT time_s, text FROM events WHERE kind = 'attitude_found'").fetchall()
             self.assertEqual([e[0] < 1 for e in events], [True] * found, name)  # by the first frame
+            for event in events:
+                said = [float(word) for word in re.findall(r"(?:RA|Dec|off by) (-?[0-9.]+)", event[1])]
+                true, stated = (np.array(tuple(db.execute(f"SELECT {', '.join(q + '_' + k for k in 'xyzw')} FROM {table} "
+                                                        "ORDER BY exposure_id LIMIT 1").fetchone()))
+                              for table, q in (("exposures", "q_cam_from_gcrf_mean"), ("detection_frames", "q_telemetry_from_gcrf")))
+                self.assertAlmostEqual(said[-1], np.degrees(2 * np.arccos(min(1, abs(true @ stated)))), delta=0.02)
+                place = db.execute("SELECT boresight_ra_deg, boresight_dec_deg FROM exposures ORDER BY exposure_id LIMIT 1")
+                for one, other in zip(said[:-1], place.fetchone()):  # images have it, the generator has not
+                    self.assertAlmostEqual((one - other + 180) % 360 - 180, 0, delta=0.02)
             stars = [r[0] for r in db.execute("SELECT stars_identified FROM detection_frames ORDER BY exposure_id")]
             if found:
                 self.assertGreaterEqual(stars[0], 6, name)

@@ -51,6 +51,31 @@ class SkewedExports(unittest.TestCase):
         numbers = np.array(packet["position"]["cartesian"]).reshape(-1, 4)
         return numbers[:, 0], numbers[:, 1:]
 
+    def test_score_of_the_run(self):
+        """Pairs of the target with what was found, in binned pixels of the window."""
+        def places(table, columns, condition):
+            rows = self.db.execute(f"SELECT exposure_id, {columns} FROM {table} WHERE {condition}").fetchall()
+            return [(row[0], (np.array(row[1:3], float) - WINDOW[:2] + 0.5) / 2 - 0.5) for row in rows]
+        truth = places("truth JOIN exposures USING (sensor, exposure_id)", "x_centroid_px, y_centroid_px",
+                       "kind = 'object' AND in_field AND NOT occulted AND electrons > 0 AND NOT dropped")
+        for what, found in (("tracks", places("tracks", "x_px, y_px", "status = 'confirmed' AND misses_in_row = 0")),
+                            ("detections", places("detections", "x_px, y_px", "label = 'object'"))):
+            scored = json.loads(call_well("score", self.made, "--truth", self.made, "--what", what, "--resamples", "0",
+                                          "--json", "-"))
+            near = sorted((np.hypot(*(at - place)), i, k) for i, (e, place) in enumerate(truth)
+                          for k, (f, at) in enumerate(found) if e == f)
+            pairs, used = [], set()
+            for d, i, k in near:  # the two objects are far from each other: the nearest are the pairs
+                if d <= 5 and not {("truth", i), ("found", k)} & used:
+                    used |= {("truth", i), ("found", k)}
+                    pairs.append(d)
+            pairs = np.array(pairs)
+            self.assertGreater(len(pairs), 10, what)
+            self.assertEqual([scored[k] for k in ("truths", "found", "true_positives", "false_positives", "false_negatives")],
+                             [len(truth), len(found), len(pairs), len(found) - len(pairs), len(truth) - len(pairs)], what)
+            self.assertAlmostEqual(scored["figures"]["rms_px"]["value"], np.sqrt(np.mean(pairs**2)), delta=1e-6)
+            self.assertAlmostEqual(scored["figures"]["recall"]["value"], len(pairs) / len(truth), delta=1e-9)
+
     def test_orbits(self):
         with open(self.path("orbits.czml"), encoding="utf-8") as file:
             packets = {p["id"]: p for p in json.load(file)}

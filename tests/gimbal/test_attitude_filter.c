@@ -1,5 +1,6 @@
 #include "gimbal/spacecraft/attitude_filter.h"
 #include "gimbal/spacecraft/attitude_sensors.h"
+#include "gimbal/spacecraft/attitude_warm_up.h"
 #include "sim/core/symmetric.h"
 #include "tests/test_support.h"
 
@@ -327,11 +328,70 @@ static void test_correlated(void **state) {
     bst_assert_close(f.bias_radps.z, 3e-4 + changes[5], 1e-15);
 }
 
+/* After a warm-up with a gyro whose bias walks by many of the filter's standard deviations,
+ * attitude and bias at the epoch are those of the sensors, within the covariance: two unlike star
+ * trackers, a slowly turning body. */
+static void warm_up_ends_at_the_epoch(void **state) {
+    (void)state;
+    enum { RUNS = 30 };
+    const double arcsec = BST_ARCSEC_RAD;
+    double square[2] = {0.0, 0.0}, walked = 0.0;
+    for (uint64_t run = 0; run < RUNS; run++) {
+        bst_spacecraft_gyro gyro = {.angle_walk = 0.5 * arcsec,
+                                    .rate_walk = 0.2 * arcsec,
+                                    .response = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
+                                    .bias_radps = {40 * arcsec, -25 * arcsec, 60 * arcsec},
+                                    .dt_s = 0.1};
+        const bst_spacecraft_star_tracker trackers[2] = {
+            {.axis = {0, 0, 1},
+             .across = {1, 0, 0},
+             .sigma_rad = {5 * arcsec, 40 * arcsec},
+             .alignment = BST_QUAT_IDENTITY,
+             .key = bst_rng_make_key(3, run, "a", "tracker0")},
+            {.axis = {1, 0, 0},
+             .across = {0, 1, 0},
+             .sigma_rad = {8 * arcsec, 30 * arcsec},
+             .alignment = BST_QUAT_IDENTITY,
+             .key = bst_rng_make_key(3, run, "a", "tracker1")}};
+        const bst_attitude_past past = {
+            .seconds = 400.0,
+            .q_body_from_gcrf = bst_quat_unit((bst_quat){0.2, -0.4, 0.3, 0.8}),
+            .rate_radps = {1e-3, -4e-4, 7e-4},
+            .gyro = &gyro,
+            .trackers = 2,
+            .tracker = {&trackers[0], &trackers[1]},
+            .rate_hz = {2.0, 1.0},
+            .key = bst_rng_make_key(3, run, "a", "warm_up")};
+        bst_attitude_filter f;
+        bst_attitude_filter_init(&f, past.q_body_from_gcrf, 100 * arcsec, 100 * arcsec,
+                                 gyro.angle_walk, gyro.rate_walk);
+        bst_attitude_warm_up(&past, &f);
+        bst_vec3 e = bst_attitude_filter_error(past.q_body_from_gcrf, f.q_body_from_gcrf);
+        bst_vec3 b = bst_vec3_sub(f.bias_radps, gyro.bias_radps);
+        const double x[2][3] = {{e.x, e.y, e.z}, {b.x, b.y, b.z}};
+        for (int part = 0; part < 2; part++) {
+            double p[9], inverse[9];
+            for (int i = 0; i < 9; i++) {
+                p[i] = f.covariance[3 * part + i / 3][3 * part + i % 3];
+            }
+            assert_true(bst_symmetric_invert(3, p, inverse));
+            for (int i = 0; i < 9; i++) {
+                square[part] += x[part][i / 3] * inverse[i] * x[part][i % 3] / (3.0 * RUNS);
+            }
+            walked += part ? gyro.rate_walk * sqrt(past.seconds) / sqrt(p[0]) / RUNS : 0.0;
+        }
+    }
+    assert_true(walked > 5.0);
+    for (int part = 0; part < 2; part++) { /* 90 degrees of freedom: four standard deviations */
+        bst_assert_close(square[part], 1.0, 4.0 * sqrt(2.0 / 90.0));
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_correlated),    cmocka_unit_test(test_allan_deviation),
-        cmocka_unit_test(test_tracker_noise), cmocka_unit_test(test_tracker_blind),
-        cmocka_unit_test(test_steady_state),  cmocka_unit_test(test_a_million_updates),
-        cmocka_unit_test(test_consistency)};
+        cmocka_unit_test(warm_up_ends_at_the_epoch), cmocka_unit_test(test_correlated),
+        cmocka_unit_test(test_allan_deviation),      cmocka_unit_test(test_tracker_noise),
+        cmocka_unit_test(test_tracker_blind),        cmocka_unit_test(test_steady_state),
+        cmocka_unit_test(test_a_million_updates),    cmocka_unit_test(test_consistency)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -65,7 +65,10 @@ class Judges:
         return None
 
     def tests_for(self, path, suite):
-        """Names of the tests that judge a file: those of its folder, or those of the program."""
+        """Names of the tests that judge a file: those of its folder, those of the program, or first the ones and then the
+        others (ci)."""
+        if suite == "ci":
+            return self.tests_for(path, "unit") + self.tests_for(path, "e2e")
         if suite == "e2e":
             return e2e_suite.concerned(path, [n for n, (labels, _, _) in self.tests.items() if "e2e" in labels])
         top = "/".join(path.split("/")[:2])

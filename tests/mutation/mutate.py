@@ -18,6 +18,10 @@ see quick_tree.py.
 
 Rows of numbers, which are tables, hold no logic and get no bugs.
 
+The suite ci is the honest one: what ./dev test runs for a file, whatever the labels `heavy`, `vector`, `device` and
+`sanitized` say about the build in which it runs it; only `slow` tests are left out. With --skip or --budget a score is a
+lower bound. It leaves out what the sanitizers would notice.
+
 The unit suite judges a file by the unit and device tests of its own part of the tree: sim/world/orbit/… by world_…, tracker/… by
 tracker_…. The command line, sim/app, has few of those: its tests are the e2e suite. The unit suite therefore leaves
 sim/app out (--files still takes its files).
@@ -358,8 +362,9 @@ def main():
                         help="with --coverage: show the lines that no unit test of the folder executes, and end")
     parser.add_argument("--since", help="only files that changed since this git revision")
     parser.add_argument("--without", nargs="*", default=["bench_"], help="beginnings of file names to leave out")
-    parser.add_argument("--suite", choices=["unit", "e2e"], default="unit",
-                        help="which tests judge (default unit, which leaves sim/app out: its tests are the e2e suite)")
+    parser.add_argument("--suite", choices=["unit", "e2e", "ci"], default="unit",
+                        help="which tests judge (default unit, which leaves sim/app out: its tests are the e2e suite); ci: "
+                        "the unit tests, then the e2e ones that concern the file, as ./dev test runs both")
     parser.add_argument("--kinds", nargs="+", choices=sorted(OPERATORS) + ["statement"], metavar="KIND",
                         help=f"only bugs of these kinds: {', '.join(sorted(OPERATORS))}, statement")
     parser.add_argument("--count", type=int, default=30, help="bugs to plant (default 30)")

@@ -221,7 +221,8 @@ class QuickTree(build_files.Judges):
         if coverage:
             names = coverage.tests_of(name, line, names)
         names = [n for n in names if n not in self.unsound]
-        names = names if suite == "e2e" else self.in_order(name, names, text, line)  # those have their order
+        ordered = [n for n in names if "e2e" in self.tests[n][0]]  # those have their order
+        names = self.in_order(name, [n for n in names if n not in ordered], text, line) + ordered
         names = self.first_of_all(names)
         before = self.sound(self.target, name, text)
         after = self.compile(self.target, name, text[:at] + new + text[at + len(old):])

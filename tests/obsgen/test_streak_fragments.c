@@ -188,7 +188,44 @@ static void as_in_pixels(void **state) {
     close_scene(&s);
 }
 
+/* Trails that come in over an edge, from the middle of a source beyond it, are seen as those of
+ * sources within: over each edge, steep and flat, forwards and back. */
+static void trails_come_in_over_each_edge(void **state) {
+    (void)state;
+    for (int way = 0; way < 16; way++) {
+        scene s;
+        open_scene(&s);
+        start(&s);
+        s.frame.window.height = 700;
+        const bool steep = way & 4;
+        const double sign = way & 8 ? -1.0 : 1.0, dx = steep ? 8.0 : 120.0,
+                     dy = steep ? 120.0 : 8.0;
+        /* middles 25 px beyond the left or upper edge, the right or lower one */
+        const double out[2] = {-25.0, (steep ? 700.0 : SIDE) + 24.0};
+        const double at = out[way & 1], beside = way & 2 ? 90.0 : 600.0;
+        bst_truth_item *item =
+            add_source(&s, 1, steep ? beside : at, steep ? at : beside, electrons_of(&s, 8000.0));
+        s.frame.streak_dx_px = sign * dx;
+        s.frame.streak_dy_px = sign * dy;
+        item->x_start_px = item->x_mid_px - 0.5 * sign * dx;
+        item->x_end_px = item->x_mid_px + 0.5 * sign * dx;
+        item->y_start_px = item->y_mid_px - 0.5 * sign * dy;
+        item->y_end_px = item->y_mid_px + 0.5 * sign * dy;
+        bst_generator_result r = run(&s, way);
+        assert_true(r.smeared && r.count >= 1);
+        for (int i = 0; i < r.count; i++) {
+            const bst_detection *d = &r.items[i].detection;
+            double u = d->x_px - item->x_mid_px, v = d->y_px - item->y_mid_px;
+            double length = hypot(dx, dy);
+            assert_true(fabs(u * dx + v * dy) / length < 0.5 * length + 4.0);
+            assert_true(fabs(v * dx - u * dy) / length < 1.5);
+        }
+        close_scene(&s);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(as_in_pixels)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(trails_come_in_over_each_edge),
+                                       cmocka_unit_test(as_in_pixels)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

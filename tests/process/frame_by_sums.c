@@ -37,8 +37,7 @@ bst_twin_model bst_test_twin_model(bst_twin_star *stars, int count) {
     return m;
 }
 
-/* Part of a Gaussian in a pixel. */
-static double part(double sigma, double from_px) {
+double bst_test_gaussian_part(double sigma, double from_px) {
     double k = 1.0 / (sigma * sqrt(2.0));
     /* the light is drawn to 4.5 standard deviations and half a pixel */
     return fabs(from_px) > 4.5 * sigma + 0.5
@@ -56,12 +55,12 @@ void bst_test_add_star(const bst_twin_model *m, const bst_twin_star *s, double d
         double narrow = m->psf.sigma_px, wide = narrow * m->psf.ratio;
         double columns[BST_TEST_NX][2], rows[BST_TEST_NY][2];
         for (int j = 0; j < BST_TEST_NX; j++) {
-            columns[j][0] = (1.0 - m->psf.wide) * part(narrow, j - x - dx);
-            columns[j][1] = m->psf.wide * part(wide, j - x - dx);
+            columns[j][0] = (1.0 - m->psf.wide) * bst_test_gaussian_part(narrow, j - x - dx);
+            columns[j][1] = m->psf.wide * bst_test_gaussian_part(wide, j - x - dx);
         }
         for (int j = 0; j < BST_TEST_NY; j++) {
-            rows[j][0] = part(narrow, j - y - dy);
-            rows[j][1] = part(wide, j - y - dy);
+            rows[j][0] = bst_test_gaussian_part(narrow, j - y - dy);
+            rows[j][1] = bst_test_gaussian_part(wide, j - y - dy);
         }
         for (int j = 0; j < BST_TEST_PIXELS; j++) {
             const double *c = columns[j % BST_TEST_NX], *r = rows[j / BST_TEST_NX];

@@ -265,6 +265,54 @@ static void length_of_a_path_without_its_roll(void **state) {
     bst_assert_close(bst_twin_path_length_px(&m), 37.0, 1e-4); /* hypot(12, 35) */
 }
 
+/* Light of long frames, whose tiles lie far from one another along one axis. */
+static void light_reaches_all_tiles_of_long_frames(void **state) {
+    (void)state;
+    enum { LONG = 170, SHORT = 40 };
+    static float light[LONG * SHORT], data[LONG * SHORT], variance[LONG * SHORT];
+    static double sum[LONG * SHORT];
+    for (int tall = 0; tall < 2; tall++) {
+        bst_ctx ctx = {0};
+        bst_twin_star stars[3];
+        bst_twin_model m = bst_test_twin_model(stars, 3);
+        const int width = tall ? SHORT : LONG, height = tall ? LONG : SHORT;
+        m.width = width;
+        m.height = height;
+        m.data_e = data; /* not read: the light alone */
+        m.variance_e2 = variance;
+        m.camera.width_px = width;
+        m.camera.height_px = height;
+        bst_assert_ok(&ctx, bst_camera_prepare(&ctx, &m.camera));
+        bst_quat back = bst_quat_conj(bst_twin_path_attitude(&m.path, 0.5));
+        static const double places[][2] = {{150.0, 9.0}, {97.3, 30.2}, {14.0, 26.0}};
+        memset(sum, 0, sizeof sum);
+        for (int i = 0; i < 3; i++) {
+            bst_vec3 v = bst_camera_unproject(&m.camera, places[i][tall], places[i][!tall]);
+            stars[i].apparent = bst_quat_rotate(back, v);
+            for (int k = 0; k < 100; k++) {
+                double x, y, t = (k + 0.5) / 100, wide = m.psf.wide;
+                v = bst_quat_rotate(bst_twin_path_attitude(&m.path, t), stars[i].apparent);
+                assert_true(bst_camera_project(&m.camera, v, &x, &y));
+                for (int c = 0; c < 2; c++) {
+                    double sigma = m.psf.sigma_px * (c ? m.psf.ratio : 1.0);
+                    double e = stars[i].flux_e * (c ? wide : 1.0 - wide) / 100;
+                    for (int row = 0; row < height; row++) {
+                        double share = bst_test_gaussian_part(sigma, row - y);
+                        for (int col = 0; share > 0.0 && col < width; col++) {
+                            sum[row * width + col] +=
+                                e * share * bst_test_gaussian_part(sigma, col - x);
+                        }
+                    }
+                }
+            }
+        }
+        bst_assert_ok(&ctx, bst_twin_model_render(&ctx, &m, NULL, light));
+        for (int i = 0; i < LONG * SHORT; i++) {
+            bst_assert_close(light[i], sum[i], 5e-2); /* of up to 300 e-, as above */
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(profile_is_the_integral_of_a_gaussian),
@@ -273,6 +321,7 @@ int main(void) {
         cmocka_unit_test(normal_equations_are_sums_over_the_pixels),
         cmocka_unit_test(one_thread_or_many_and_derivatives_or_none),
         cmocka_unit_test(length_of_a_path_without_its_roll),
+        cmocka_unit_test(light_reaches_all_tiles_of_long_frames),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -128,7 +128,7 @@ static void make_rows(row rows[N]) {
         r->phase = 100 * draw(&s);
         r->in_field = i != 12;
         r->occulted = i == 13 || i == 14;
-        r->sunlit = i == 15 ? 0.0 : 1.0;
+        r->sunlit = i == 15 ? 0.0 : i == 16 ? 0.3 : 1.0; /* half shadow is no shadow */
         r->dropped = i == 4;
         r->detections = 30 + i;
         r->stars = 20 - i / 2;

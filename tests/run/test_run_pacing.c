@@ -116,7 +116,9 @@ static void peers(void **state) {
     }
 }
 
-/* Two sensors: 100 x 200 px each 0.5 s from 10 s on, and 1000 x 1000 px each 7 s. */
+/* Two sensors: 100 x 200 px each 0.5 s from 10 s on, of which the last exposure begins at 999.5 s,
+ * and every 7 s a window of 1801 x 1201 px, binned by 2, of which the last one ends at the end of
+ * the run and is not recorded. */
 static void room(void **state) {
     (void)state;
     bst_sensor_config sensors[2] = {0};
@@ -126,8 +128,10 @@ static void room(void **state) {
     sensors[0].camera.height_px = 200;
     sensors[0].exposure.first_s = 10;
     sensors[0].exposure.period_s = 0.5;
-    sensors[1].camera.width_px = sensors[1].camera.height_px = 1000;
-    sensors[1].exposure.period_s = 7;
+    sensors[0].exposure.exposure_s = 0.1;
+    sensors[1].camera.width_px = sensors[1].camera.height_px = 3000;
+    sensors[1].exposure = (bst_exposure_config){
+        .period_s = 7, .exposure_s = 6, .binning = 2, .window_px = {100, 50, 1801, 1201}};
     for (int i = 0; i < 2; i++) {
         observers[i].sensors.items = &sensors[i];
         observers[i].sensors.count = 1;
@@ -135,7 +139,7 @@ static void room(void **state) {
     s.observers.items = observers;
     s.observers.count = 2;
     s.record.frames = BST_RECORD_EXTENSIONS;
-    const double pixels = 1980.0 * 20000 + 142.0 * 1e6;
+    const double pixels = 1980.0 * 20000 + 142.0 * 900.0 * 600.0;
     const struct {
         bool compressed;
         uint32_t planes;
@@ -143,7 +147,8 @@ static void room(void **state) {
     } cases[] = {{false, 0, 2},
                  {false, 1u << BST_PLANE_SATURATION, 3},
                  {true, 0, 1},
-                 {true, (1u << BST_PLANE_SATURATION) | (1u << (BST_PLANE_SATURATION ? 0 : 1)), 6}};
+                 {true, (1u << BST_PLANE_SATURATION) | (1u << BST_PLANE_STARS), 6},
+                 {true, (1u << BST_PLANE_SATURATION) | (1u << BST_PLANE_PARTS), 6}};
     bst_ctx ctx;
     bst_ctx_init(&ctx, hear, NULL, BST_LOG_INFO);
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {

@@ -1,7 +1,8 @@
 /* Parts of a tracker's frame against numbers that are worked out here: the acceleration of a cue
  * far from the equator, the light of an object whose orbit is known, which earlier track a new one
- * continues. */
+ * continues, and the models of an IMM in a plane. */
 #include "tests/tracker/sky_bench.h"
+#include "tracker/mtt/filter.h"
 #include "tracker/mtt/multitarget_internal.h"
 #include "tracker/mtt/visibility.h"
 
@@ -291,11 +292,234 @@ static void stored_tracks_move(void **state) {
     bst_mtt_free(m);
 }
 
+/* A Gaussian in a plane: arcsec and arcsec/s. */
+typedef struct flat {
+    double weight, x[4], p[4][4];
+} flat;
+
+static const bst_vec3 flat_at = {0.6, -0.79, 0.1};
+
+static bst_sky_state of_flat(const flat *f) {
+    bst_vec3 at = bst_vec3_unit(flat_at);
+    bst_sky_state s = {.direction = place_at(at, f->x[0] * AS, f->x[1] * AS)};
+    bst_tangent axes = bst_tangent_at(s.direction);
+    s.rate_radps = bst_tangent_vector(&axes, f->x[2] * AS, f->x[3] * AS);
+    for (int i = 0; i < 16; i++) {
+        s.covariance[i / 4][i % 4] = f->p[i / 4][i % 4] * AS * AS;
+    }
+    return s;
+}
+
+static void expect_flat(const bst_sky_state *s, const flat *f) {
+    bst_vec3 at = bst_vec3_unit(flat_at), to = bst_tangent_log(at, s->direction);
+    bst_tangent axes = bst_tangent_at(at), own = bst_tangent_at(s->direction);
+    /* over a minute of arc the sky is a plane to 1e-4 */
+    bst_assert_close(bst_vec3_dot(to, axes.e1) / AS, f->x[0], 2e-3);
+    bst_assert_close(bst_vec3_dot(to, axes.e2) / AS, f->x[1], 2e-3);
+    bst_assert_close(bst_vec3_dot(s->rate_radps, own.e1) / AS, f->x[2], 1e-3);
+    bst_assert_close(bst_vec3_dot(s->rate_radps, own.e2) / AS, f->x[3], 1e-3);
+    for (int i = 0; i < 16; i++) {
+        double most = 1e-3 * sqrt(f->p[i / 4][i / 4] * f->p[i % 4][i % 4]);
+        bst_assert_close(s->covariance[i / 4][i % 4] / (AS * AS), f->p[i / 4][i % 4], most);
+    }
+}
+
+/* One Gaussian of the mean and the covariance of several. */
+static flat mixture(const flat *items, int count) {
+    flat out = {0};
+    for (int n = 0; n < count; n++) {
+        out.weight += items[n].weight;
+    }
+    for (int n = 0; n < count; n++) {
+        for (int i = 0; i < 4; i++) {
+            out.x[i] += items[n].weight / out.weight * items[n].x[i];
+        }
+    }
+    for (int n = 0; n < count; n++) {
+        for (int i = 0; i < 16; i++) {
+            int a = i / 4, b = i % 4;
+            double d = (items[n].x[a] - out.x[a]) * (items[n].x[b] - out.x[b]);
+            out.p[a][b] += items[n].weight / out.weight * (items[n].p[a][b] + d);
+        }
+    }
+    return out;
+}
+
+/* Kalman update with a place z of covariance r (11, 12, 22); the density of z is returned. */
+static double update(flat *f, const double z[2], const double r[3]) {
+    double s[3] = {f->p[0][0] + r[0], f->p[0][1] + r[1], f->p[1][1] + r[2]};
+    double det = s[0] * s[2] - s[1] * s[1], y[2] = {z[0] - f->x[0], z[1] - f->x[1]};
+    const double inverse[2][2] = {{s[2] / det, -s[1] / det}, {-s[1] / det, s[0] / det}};
+    double k[4][2], chi2 = 0.0, before[4][4];
+    memcpy(before, f->p, sizeof before);
+    for (int i = 0; i < 4; i++) {
+        for (int a = 0; a < 2; a++) {
+            k[i][a] = before[i][0] * inverse[0][a] + before[i][1] * inverse[1][a];
+        }
+        f->x[i] += k[i][0] * y[0] + k[i][1] * y[1];
+    }
+    for (int i = 0; i < 16; i++) {
+        f->p[i / 4][i % 4] -= k[i / 4][0] * before[0][i % 4] + k[i / 4][1] * before[1][i % 4];
+    }
+    for (int i = 0; i < 4; i++) {
+        chi2 += y[i / 2] * inverse[i / 2][i % 2] * y[i % 2];
+    }
+    return exp(-0.5 * chi2) / (2.0 * BST_PI * sqrt(det));
+}
+
+static void start_models(flat own[2], bst_filter_models *models, bst_sky_state *s) {
+    const flat both[2] = {{0.7,
+                           {3.0, -4.0, 0.5, -0.3},
+                           {{90, 20, 6, -3}, {20, 60, -2, 5}, {6, -2, 2, 0.4}, {-3, 5, 0.4, 3}}},
+                          {0.3,
+                           {-6.0, 9.0, -0.2, 0.9},
+                           {{150, -60, 9, 4}, {-60, 210, 3, -8}, {9, 3, 5, -1}, {4, -8, -1, 6}}}};
+    *models = (bst_filter_models){.count = 2};
+    for (int m = 0; m < 2; m++) {
+        own[m] = both[m];
+        models->state[m] = of_flat(&both[m]);
+        models->probability[m] = both[m].weight;
+    }
+    const flat whole = mixture(both, 2);
+    *s = of_flat(&whole);
+}
+
+/* Each model by its own likelihood of all detections and of none, the state as their mixture. */
+static void models_follow_their_likelihoods(void **state) {
+    (void)state;
+    const bst_filter_params params = {.kind = BST_FILTER_IMM};
+    bst_filter_models models;
+    bst_sky_state s;
+    flat own[2];
+    start_models(own, &models, &s);
+    const double z[2][2] = {{12.0, -9.0}, {-14.0, 16.0}}, r[2][3] = {{40, 15, 25}, {30, -12, 50}};
+    bst_sky_measurement measured[2];
+    for (int c = 0; c < 2; c++) {
+        const double as2 = AS * AS;
+        measured[c] =
+            (bst_sky_measurement){place_at(bst_vec3_unit(flat_at), z[c][0] * AS, z[c][1] * AS),
+                                  r[c][0] * as2, r[c][1] * as2, r[c][2] * as2};
+    }
+    const bst_filter_candidate candidates[2] = {{.measurement = &measured[0], .log_weight = -0.4},
+                                                {.measurement = &measured[1], .log_weight = 0.3}};
+    double density = 0.0, chi2 = INFINITY;
+    flat updated[2];
+    for (int m = 0; m < 2; m++) {
+        flat branch[3] = {own[m], own[m], own[m]};
+        branch[0].weight = 0.2; /* no detection */
+        for (int c = 0; c < 2; c++) {
+            double one = update(&branch[c + 1], z[c], r[c]);
+            branch[c + 1].weight = exp(candidates[c].log_weight) * 700.0 * one;
+            if (c == 0) { /* the first of them alone, below */
+                density += own[m].weight * one;
+                bst_sky_innovation i;
+                assert_true(bst_sky_innovate(&models.state[m], &measured[0], NULL, &i));
+                chi2 = fmin(chi2, i.chi2);
+            }
+        }
+        updated[m] = mixture(branch, 3);
+        updated[m].weight *= own[m].weight;
+    }
+    bst_filter_fit fit;
+    assert_true(bst_filter_evaluate(&params, &s, &models, &candidates[0], &fit));
+    bst_assert_close(fit.log_likelihood, log(density / (AS * AS)), 1e-3);
+    bst_assert_close(fit.chi2, chi2, 0.0);
+    const bst_filter_evidence evidence = {
+        .candidates = candidates, .count = 2, .miss_weight = 0.2, .hit_weight = 700.0 * AS * AS};
+    bst_filter_update(&params, &s, &models, &evidence, 1);
+    double sum = updated[0].weight + updated[1].weight;
+    for (int m = 0; m < 2; m++) {
+        bst_assert_close(models.probability[m], updated[m].weight / sum, 1e-3);
+        expect_flat(&models.state[m], &updated[m]);
+    }
+    const flat whole = mixture(updated, 2);
+    expect_flat(&s, &whole);
+}
+
+/* Uniform motion with white noise of the acceleration, arcsec^2/s^3. */
+static flat flat_later(const flat *at, double dt, double noise) {
+    flat out = *at;
+    for (int i = 0; i < 2; i++) {
+        out.x[i] += dt * at->x[i + 2];
+        for (int k = 0; k < 2; k++) {
+            const double q = i == k ? noise : 0.0;
+            out.p[i][k] = at->p[i][k] + dt * (at->p[i + 2][k] + at->p[i][k + 2]) +
+                          dt * dt * at->p[i + 2][k + 2] + q * dt * dt * dt / 3.0;
+            out.p[i][k + 2] = at->p[i][k + 2] + dt * at->p[i + 2][k + 2] + q * dt * dt / 2.0;
+            out.p[k + 2][i] = out.p[i][k + 2];
+            out.p[i + 2][k + 2] = at->p[i + 2][k + 2] + q * dt;
+        }
+    }
+    return out;
+}
+
+/* Both kinds of prediction of one Gaussian. */
+static void one_model_moves(void **state) {
+    (void)state;
+    flat own[2];
+    bst_filter_models models, none = {0};
+    bst_sky_state s;
+    start_models(own, &models, &s);
+    for (int unscented = 0; unscented < 2; unscented++) {
+        for (int m = 0; m < 2; m++) {
+            const bst_filter_params params = {.kind = unscented ? BST_FILTER_UKF : BST_FILTER_EKF,
+                                              .noise_rad2ps3 = 0.4 * AS * AS};
+            bst_sky_state one = of_flat(&own[m]);
+            bst_filter_predict(&params, 5.0, &one, &none);
+            const flat moved = flat_later(&own[m], 5.0, 0.4);
+            expect_flat(&one, &moved);
+        }
+    }
+}
+
+/* A chain of two states in continuous time mixes the models, each then moves with its own noise. */
+static void models_are_mixed_and_move(void **state) {
+    (void)state;
+    const double dt = 4.0, out_per_s = 1.0 / 30.0, back_per_s = 1.0 / 9.0;
+    const double noise[2] = {0.02, 0.3}; /* arcsec^2/s^3 */
+    const bst_filter_params params = {.kind = BST_FILTER_IMM,
+                                      .noise_rad2ps3 = noise[0] * AS * AS,
+                                      .manoeuvre_noise_rad2ps3 = noise[1] * AS * AS,
+                                      .quiescent_sojourn_s = 30.0,
+                                      .manoeuvre_sojourn_s = 9.0};
+    bst_filter_models models;
+    bst_sky_state s;
+    flat own[2], moved[2];
+    start_models(own, &models, &s);
+    bst_filter_predict(&params, dt, &s, &models);
+    /* the chain in small steps: from each state to each state */
+    double stay[2][2] = {{1.0, 0.0}, {0.0, 1.0}};
+    for (int n = 0; n < 100000; n++) {
+        for (int from = 0; from < 2; from++) {
+            double flow = (stay[from][0] * out_per_s - stay[from][1] * back_per_s) * dt / 100000;
+            stay[from][0] -= flow;
+            stay[from][1] += flow;
+        }
+    }
+    for (int m = 0; m < 2; m++) {
+        flat part[2] = {own[0], own[1]};
+        part[0].weight *= stay[0][m];
+        part[1].weight *= stay[1][m];
+        const flat at = mixture(part, 2);
+        moved[m] = flat_later(&at, dt, noise[m]);
+        bst_assert_close(models.probability[m], moved[m].weight, 1e-5);
+        expect_flat(&models.state[m], &moved[m]);
+    }
+    const flat whole = mixture(moved, 2);
+    expect_flat(&s, &whole);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(cues_accelerate),   cmocka_unit_test(tracks_share_it),
-        cmocka_unit_test(light_of_an_orbit), cmocka_unit_test(mean_of_the_light),
-        cmocka_unit_test(earlier_tracks),    cmocka_unit_test(stored_tracks_move),
+        cmocka_unit_test(models_follow_their_likelihoods),
+        cmocka_unit_test(models_are_mixed_and_move),
+        cmocka_unit_test(one_model_moves),
+        cmocka_unit_test(cues_accelerate),
+        cmocka_unit_test(tracks_share_it),
+        cmocka_unit_test(light_of_an_orbit),
+        cmocka_unit_test(mean_of_the_light),
+        cmocka_unit_test(earlier_tracks),
+        cmocka_unit_test(stored_tracks_move),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -98,6 +98,12 @@ static const struct {
              "}, {\"time_s\": 0, \"q_cam_from_gcrf\": " Q
              "}, {\"time_s\": 0.5, \"q_cam_from_gcrf\": " Q "}]}"),
      {"(frame 4)/pointing", "do not ascend", "", ""}},
+    {FILE_OF("{\"frame\": 4, \"pointing\": [{\"time_s\": 0.1, \"q_cam_from_gcrf\": " Q
+             "}, {\"time_s\": 0.5, \"q_cam_from_gcrf\": " Q "}]}"),
+     {"(frame 4)/pointing", "does not cover", "0.5 s", ""}},
+    {FILE_OF("{\"frame\": 4, \"pointing\": [{\"time_s\": 0, \"q_cam_from_gcrf\": " Q
+             "}, {\"time_s\": 0.6, \"q_cam_from_gcrf\": " Q "}]}"),
+     {"(frame 4)/pointing", "does not cover", "0.5 s", ""}},
     {FILE_OF("{\"frame\": 4, \"window_px\": [600, 0, 41, 10]}"),
      {"(frame 4)/window_px", "not a window", "640 x 480", ""}},
     {FILE_OF("{\"frame\": 4, \"window_px\": [0.5, 0, 41, 10]}"),

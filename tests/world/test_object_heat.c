@@ -112,6 +112,20 @@ static void colours_of_a_grey_box(void **state) {
         }
     }
     bst_assert_close(glow[1].v_mag - glow[0].v_mag, 2.5 * log10(2.0), 1e-9);
+    /* of all its sides: what is not emitted is reflected */
+    bst_assert_close(glow[0].thermal_reflection, 1.0 - EMISSIVITY, 1e-9);
+    /* a convex body's faces that are seen: emissivity times their projected area */
+    const bst_vec3 eye = {9e6, 7e6, 2.9e7};
+    bst_object_aspect aspect;
+    const bst_scene_lighting l = {.object_m = {2.1e7, -1.7e7, 1.1e7},
+                                  .eye_m = {3e7, -1e7, 4e7},
+                                  .sun_m = {0.6 * BST_AU_M, 0.7 * BST_AU_M, -0.5 * BST_AU_M}};
+    bst_object_shape_aspect(f.shape, &l, (bst_vec3){1500, 2500, -700}, &aspect);
+    bst_vec3 to = bst_quat_rotate(aspect.q_body_from_gcrf, bst_vec3_unit(eye));
+    double area = fabs(to.x) * SIDES[1] * SIDES[2] + fabs(to.y) * SIDES[0] * SIDES[2] +
+                  fabs(to.z) * SIDES[0] * SIDES[1];
+    bst_assert_close(glow[0].emission_sr, EMISSIVITY * area / bst_vec3_dot(eye, eye),
+                     1e-9 * glow[0].emission_sr);
     tear_down(&f);
 }
 
