@@ -217,12 +217,8 @@ static void charge_is_saved_and_handed_over(void **state) {
     /* nothing is left where it came from */
     expose(f, r, 1, dark, again);
     assert_memory_equal(again, fresh, sizeof next);
-    float below = -1.0f;
-    unsigned char *middle = (unsigned char *)saved.bytes + saved.size / 2 / 4 * 4;
-    memcpy(middle, &below, sizeof below);
-    memcpy(middle + 2, &below, sizeof below); /* whatever the alignment */
+    memset(saved.bytes + saved.size / 2, 0xBF, 16); /* -1.5 at any alignment */
     assert_int_equal(test_restore(&f->ctx, archive, other, saved), BST_ERR_FORMAT);
-    assert_non_null(strstr(f->ctx.message, "trapped charge of"));
     free(saved.bytes);
     bst_renderer_free(other);
     bst_renderer_free(r);
