@@ -183,10 +183,11 @@ static void stars_of_the_catalogue(void **state) {
  * the residual shows the end of their streak. Neither is a star that the catalogue lacks. */
 static void stars_beside_the_frame(void **state) {
     (void)state;
-    static float data[BST_TEST_PIXELS];
+    static float data[BST_TEST_PIXELS], variance[BST_TEST_PIXELS];
     bst_ctx ctx = {0};
     bst_twin t = make(2);
     int added;
+    t.model.variance_e2 = variance;
     double x, y, inside = 1.0, at = BST_TEST_NY - 6.0;
     t.model.data_e = data;
     t.catalogue_stars = 2;
