@@ -174,44 +174,6 @@ static void stars_of_the_catalogue(void **state) {
         assert_false(s->found);
     }
     assert_true(t.model.stars[0].inside < 0.9); /* at the edge */
-    assert_int_equal(t.beside_count, 1);
-    assert_int_equal(t.beside[0].id, 12);
-    free(t.beside);
-}
-
-/* Stars of the catalogue that the first path does not bring onto the frame: the path of now does, or
- * the residual shows the end of their streak. Neither is a star that the catalogue lacks. */
-static void stars_beside_the_frame(void **state) {
-    (void)state;
-    static float data[BST_TEST_PIXELS], variance[BST_TEST_PIXELS];
-    bst_ctx ctx = {0};
-    bst_twin t = make(2);
-    int added;
-    t.model.variance_e2 = variance;
-    double x, y, inside = 1.0, at = BST_TEST_NY - 6.0;
-    t.model.data_e = data;
-    t.catalogue_stars = 2;
-    t.beside = calloc(2, sizeof *t.beside);
-    t.beside_count = 2;
-    t.beside[0] = (bst_twin_star){.apparent = direction_of(&t, 20.0, 20.0), .id = 31};
-    for (; inside > 0.03; at += 0.1) {
-        t.beside[1] = (bst_twin_star){.apparent = direction_of(&t, 25.0, at), .id = 32};
-        inside = mean_of(&t, t.beside[1].apparent, &x, &y);
-    }
-    assert_true(inside > 0.0);
-    script.detections[0] = (bst_detection){.x_px = x + 2.0, .y_px = y - 1.5, .flux_e = 2e4};
-    script.found = 1;
-    bst_assert_ok(&ctx, bst_twin_add_found(&ctx, &t, 6.0, &added));
-    assert_int_equal(added, 1);
-    assert_int_equal(t.model.count, 4);
-    assert_int_equal(t.catalogue_stars, 4);
-    assert_int_equal(t.beside_count, 0);
-    assert_int_equal(t.model.stars[2].id, 31);
-    bst_assert_close(t.model.stars[2].inside, 1.0, 1e-9);
-    assert_int_equal(t.model.stars[3].id, 32);
-    assert_false(t.model.stars[3].found);
-    bst_assert_close(t.model.stars[3].inside, inside, 6e-3);
-    free(t.beside);
 }
 
 static void stars_of_the_residual(void **state) {
@@ -287,8 +249,23 @@ static void catalogue_of_the_twin(void **state) {
                                      .b_minus_v = -0.17F,
                                      .id = i == 1 ? 51 : (uint32_t)i + 70};
     }
+    /* beside the found star of 5 mag: one that is as bright is that star, a fainter one is not */
+    double x, y;
+    bst_quat q = bst_twin_path_attitude(&t.model.path, 0.5);
+    assert_true(
+        bst_camera_project(&t.model.camera, bst_quat_rotate(q, t.model.stars[2].apparent), &x, &y));
+    script.count = 6;
+    for (int i = 3; i < 6; i++) {
+        script.stars[i] = (bst_star){.icrs = direction_of(&t, x + (i == 5 ? 3.0 : 1.2), y - 1.0),
+                                     .v_mag = i == 4 ? 6.0F : 5.4F,
+                                     .b_minus_v = NAN,
+                                     .id = (uint32_t)i + 70};
+    }
     bst_assert_ok(&ctx, bst_twin_write_stars(&ctx, &t, &c, "out"));
-    assert_int_equal(script.written_count, 4);
+    assert_null(written(73));
+    assert_non_null(written(74));
+    assert_non_null(written(75));
+    assert_int_equal(script.written_count, 6);
     /* 2e5 e- a second: 5 mag; BT-VT = 1, V = VT - 0.09 */
     const bst_star_values *s = written(50);
     assert_non_null(s);
@@ -322,7 +299,6 @@ static void catalogue_of_the_twin(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(stars_of_the_catalogue),
-        cmocka_unit_test(stars_beside_the_frame),
         cmocka_unit_test(stars_of_the_residual),
         cmocka_unit_test(catalogue_of_the_twin),
     };

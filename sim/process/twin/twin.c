@@ -132,7 +132,6 @@ static bst_status solve(bst_ctx *ctx, bst_twin *t, const char *const *paths, int
 static void twin_free(bst_twin *t) {
     free(t->data_e);
     free(t->model.stars);
-    free(t->beside);
     free(t->model.variance_e2);
     bst_parallel_free(t->pool);
     bst_process_free(&t->process);

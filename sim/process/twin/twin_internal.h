@@ -35,10 +35,8 @@ typedef struct bst_twin {
     bool direction_known; /* which end of the path came first */
     bst_parallel *pool;
     bst_twin_photometry photometry;
-    int catalogue_stars;   /* of model.stars */
-    bst_twin_star *beside; /* [beside_count] of the catalogue, bright enough but not on the frame */
-    int beside_count;
-    char stem[4096]; /* of the output files */
+    int catalogue_stars; /* of model.stars, the first */
+    char stem[4096];     /* of the output files */
 } bst_twin;
 
 /* Name of a file of the twin: the scenario's without .json, and an ending. */
@@ -57,8 +55,7 @@ bst_status bst_twin_fit_frame(bst_ctx *ctx, bst_twin *twin) BST_MUST_CHECK;
  *
  * Errors:    those of the catalogue; BST_ERR_MEMORY */
 bst_status bst_twin_add_catalogue(bst_ctx *ctx, bst_twin *twin) BST_MUST_CHECK;
-/* Adds stars that the residual shows along the path and that are not in the model: those of the
- * catalogue that the path of now brings onto the frame, then others.
+/* Adds stars that the residual shows along the path and that are not in the model.
  *
  * Given:     least_snr  faintest
  * Returned:  *added     their number

@@ -45,8 +45,7 @@ static int brighter_first(const void *a, const void *b) {
     return (p->v_mag > q->v_mag) - (p->v_mag < q->v_mag);
 }
 
-/* Adds stars of a query that are sorted; those that are not on the frame to t->beside, which has
- * room for all. */
+/* Adds stars of a query that are sorted. */
 static void add_sorted(bst_twin *t, const bst_star *stars, int count) {
     bst_twin_model *m = &t->model;
     double zero = t->process.zero_point_mag, least = CATALOGUE_SNR * unit_snr_e(t);
@@ -68,8 +67,6 @@ static void add_sorted(bst_twin *t, const bst_star *stars, int count) {
         star.inside = share_inside(m, star.apparent);
         if (star.inside > LEAST_INSIDE) {
             m->stars[m->count++] = star;
-        } else {
-            t->beside[t->beside_count++] = star;
         }
     }
     t->catalogue_stars = m->count;
@@ -109,17 +106,10 @@ bst_status bst_twin_add_catalogue(bst_ctx *ctx, bst_twin *t) {
     bst_status status = bst_twin_query_stars(ctx, t, catalogue, ahead, radius, &found, &count);
     bst_stars_close(catalogue);
     BST_TRY(status);
-    free(t->beside);
-    t->beside = malloc(((size_t)count + 1) * sizeof *t->beside);
-    t->beside_count = 0;
-    if (t->beside) {
-        qsort(found, (size_t)count, sizeof *found, brighter_first);
-        add_sorted(t, found, count);
-    } else {
-        status = bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d stars", count);
-    }
+    qsort(found, (size_t)count, sizeof *found, brighter_first);
+    add_sorted(t, found, count);
     free(found);
-    return status;
+    return BST_OK;
 }
 
 /* The path of a star at the frame's middle, as the matched filter takes it. */
@@ -156,39 +146,9 @@ static void mean_place(const bst_twin_model *m, bst_vec3 apparent, double place[
     }
 }
 
-/* Moves a star from beside the frame to the model. */
-static void take_beside(bst_twin *t, int index) {
-    bst_twin_star star = t->beside[index];
-    star.inside = share_inside(&t->model, star.apparent);
-    t->beside[index] = t->beside[--t->beside_count];
-    t->model.stars[t->model.count++] = star;
-    t->catalogue_stars++;
-}
-
-/* Moves those stars from beside the frame to the model that the path of now brings onto it. */
-static int take_all_beside(bst_twin *t) {
-    int before = t->model.count;
-    for (int i = t->beside_count - 1; i >= 0 && t->catalogue_stars < CATALOGUE_MOST; i--) {
-        if (share_inside(&t->model, t->beside[i].apparent) > LEAST_INSIDE &&
-            t->model.count < BST_TWIN_STARS) {
-            take_beside(t, i);
-        }
-    }
-    return t->model.count - before;
-}
-
-/* Adds a detection unless it is the remnant of a star. One that is a star of the catalogue beside
- * the frame, whose streak reaches into it, has that star's place: else the twin would have both. */
+/* Adds a detection unless it is the remnant of a star. */
 static bool add_detection(bst_twin *t, const bst_detection *d, const double (*places)[2]) {
     bst_twin_model *m = &t->model;
-    for (int i = 0; i < t->beside_count; i++) {
-        double place[2];
-        mean_place(m, t->beside[i].apparent, place);
-        if (hypot(place[0] - d->x_px, place[1] - d->y_px) < REMNANT_PX) {
-            take_beside(t, i);
-            return true;
-        }
-    }
     for (int i = 0; i < m->count; i++) {
         if (hypot(places[i][0] - d->x_px, places[i][1] - d->y_px) < REMNANT_PX &&
             d->flux_e < REMNANT_SHARE * m->stars[i].flux_e) {
@@ -264,15 +224,7 @@ bst_status bst_twin_add_found(bst_ctx *ctx, bst_twin *t, double least_snr, int *
     if (!residual) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", count);
     }
-    static const bst_twin_freedom fluxes = {.iterations = 3};
-    double loss;
-    bst_status status = BST_OK;
-    if (take_all_beside(t) > 0) {
-        status = bst_twin_model_fit(ctx, &t->model, &fluxes, t->pool, &loss);
-    }
-    if (status == BST_OK) {
-        status = bst_twin_model_residual(ctx, &t->model, t->pool, residual);
-    }
+    bst_status status = bst_twin_model_residual(ctx, &t->model, t->pool, residual);
     if (status == BST_OK) {
         status = search(ctx, t, residual, least_snr, added);
     }
