@@ -10,23 +10,11 @@
 #include <strings.h>
 
 #include "sim/catalogue/star_table_internal.h"
+#include "sim/catalogue/votable_field.h"
 #include "sim/core/file.h"
 #include "sim/core/text_reader.h"
 
 enum { CHUNK = 1 << 16, MOST_DEPTH = 64, MOST_TAG = 1 << 20, CELL = 128 };
-
-/* Kinds of numbers, by the size in a binary row. */
-typedef enum datatype { BIT, BYTE, SHORT, INT, LONG, FLOAT, DOUBLE, OTHER } datatype;
-
-typedef struct field {
-    datatype type;
-    int quantity;   /* -1: none */
-    int size;       /* bytes of an element; BIT: 0 */
-    uint64_t fixed; /* elements of each item of an array, or all elements */
-    bool variable;  /* the row states the number of items */
-    bool has_null;
-    char null[40];
-} field;
 
 typedef struct star_row {
     int64_t source;
@@ -44,7 +32,7 @@ struct bst_star_votable {
     place place;
     int depth;
     long long fed;
-    field fields[BST_STAR_TABLE_COLUMNS];
+    bst_votable_field fields[BST_STAR_TABLE_COLUMNS];
     int field_count;
     bool wanted[BST_STAR_TABLE_COLUMNS];
     star_row row; /* that is being read */
@@ -101,60 +89,6 @@ static const char *attribute(const char **attributes, const char *name) {
 
 /* ---------------------------------------------------------------- fields */
 
-static datatype datatype_of(const char *text, int *size) {
-    static const struct {
-        const char *name;
-        datatype type;
-        int size;
-    } known[] = {
-        {"bit", BIT, 0},           {"unsignedByte", BYTE, 1},  {"short", SHORT, 2},
-        {"int", INT, 4},           {"long", LONG, 8},          {"float", FLOAT, 4},
-        {"double", DOUBLE, 8},     {"boolean", OTHER, 1},      {"char", OTHER, 1},
-        {"unicodeChar", OTHER, 2}, {"floatComplex", OTHER, 8}, {"doubleComplex", OTHER, 16}};
-    for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
-        if (strcmp(text, known[i].name) == 0) {
-            *size = known[i].size;
-            return known[i].type;
-        }
-    }
-    *size = -1;
-    return OTHER;
-}
-
-/* Reads an array's size: numbers divided by "x", the last one may be "*" or a limit before it.
- * False: it is none, or has more than 2^40 elements. */
-static bool read_size(const char *text, field *f) {
-    f->fixed = 1;
-    for (;;) {
-        if (*text == '*') {
-            f->variable = true;
-            return text[1] == '\0';
-        }
-        uint64_t n = 0;
-        const char *from = text;
-        for (; isdigit((unsigned char)*text) && n < UINT64_C(1) << 40; text++) {
-            n = 10 * n + (uint64_t)(*text - '0');
-        }
-        if (text == from || isdigit((unsigned char)*text)) {
-            return false;
-        }
-        if (text[0] == '*') { /* a limit: the row has the number itself */
-            f->variable = true;
-            return text[1] == '\0';
-        }
-        if (n == 0 || f->fixed > (UINT64_C(1) << 40) / n) {
-            return false;
-        }
-        f->fixed *= n;
-        if (*text == '\0') {
-            return true;
-        }
-        if (*text++ != 'x') {
-            return false;
-        }
-    }
-}
-
 static void add_field(bst_star_votable *v, const char **attributes) {
     bst_star_table *t = v->table;
     const char *name = attribute(attributes, "name"), *type = attribute(attributes, "datatype");
@@ -166,10 +100,10 @@ static void add_field(bst_star_votable *v, const char **attributes) {
         return;
     }
     const int index = v->field_count++;
-    field *f = &v->fields[index];
-    *f = (field){.quantity = -1, .fixed = 1};
-    f->type = datatype_of(type ? type : "", &f->size);
-    if (f->size < 0 || (size && !read_size(size, f))) {
+    bst_votable_field *f = &v->fields[index];
+    *f = (bst_votable_field){.quantity = -1, .fixed = 1};
+    f->type = bst_votable_datatype(type ? type : "", &f->size);
+    if (f->size < 0 || (size && !bst_votable_read_size(size, f))) {
         stop(v, bst_fail(v->ctx, BST_ERR_FORMAT,
                          "%s:%lu: column %.64s: datatype \"%.40s\" with arraysize \"%.40s\" is not "
                          "one of VOTable's",
@@ -177,8 +111,9 @@ static void add_field(bst_star_votable *v, const char **attributes) {
         return;
     }
     const size_t length = strlen(name);
-    const bool number = f->type != OTHER && f->type != BIT && f->fixed == 1 && !f->variable;
-    const bool whole = number && f->type != FLOAT && f->type != DOUBLE;
+    const bool number =
+        f->type != BST_VOTABLE_OTHER && f->type != BST_VOTABLE_BIT && f->fixed == 1 && !f->variable;
+    const bool whole = number && f->type != BST_VOTABLE_FLOAT && f->type != BST_VOTABLE_DOUBLE;
     if (t->source_column < 0 && whole && bst_star_name_is(bst_star_source_names, name, length)) {
         t->source_column = index;
         v->wanted[index] = true;
@@ -233,7 +168,7 @@ static void end_row(bst_star_votable *v) {
 
 /* Takes the text of a cell. */
 static void end_cell(bst_star_votable *v) {
-    const field *f = &v->fields[v->column];
+    const bst_votable_field *f = &v->fields[v->column];
     bst_star_table *t = v->table;
     char *text = v->cell;
     size_t length = v->cell_length;
@@ -263,39 +198,16 @@ static void end_cell(bst_star_votable *v) {
 
 /* ---------------------------------------------------------------- binary rows */
 
-/* Value of a number of the present item, of big-endian bytes; *whole: as an integer, 0: none. */
-static double number_of(const field *f, const unsigned char *bytes, int64_t *whole) {
-    uint64_t bits = 0;
-    for (int i = 0; i < f->size; i++) {
-        bits = bits << 8 | bytes[i];
-    }
-    *whole = 0;
-    if (f->type == FLOAT) {
-        float value;
-        uint32_t low = (uint32_t)bits;
-        memcpy(&value, &low, sizeof value);
-        return (double)value;
-    }
-    if (f->type == DOUBLE) {
-        double value;
-        memcpy(&value, &bits, sizeof value);
-        return value;
-    }
-    const int unused = 64 - 8 * f->size;
-    *whole = f->type == BYTE ? (int64_t)bits : (int64_t)(bits << unused) >> unused;
-    return (double)*whole;
-}
-
 static void take_item(bst_star_votable *v) {
-    const field *f = &v->fields[v->at];
+    const bst_votable_field *f = &v->fields[v->at];
     int64_t whole, none;
-    double value = number_of(f, v->item, &whole);
+    double value = bst_votable_number(f, v->item, &whole);
     const bst_text_span null = {f->null, strlen(f->null)};
     if (v->null_mask && v->mask[v->at / 8] & 0x80 >> v->at % 8) {
         return;
     }
-    if (f->has_null && f->type != FLOAT && f->type != DOUBLE && bst_star_source_read(null, &none) &&
-        none == whole) {
+    if (f->has_null && f->type != BST_VOTABLE_FLOAT && f->type != BST_VOTABLE_DOUBLE &&
+        bst_star_source_read(null, &none) && none == whole) {
         return;
     }
     if (v->at == v->table->source_column) {
@@ -304,11 +216,6 @@ static void take_item(bst_star_votable *v) {
     if (f->quantity >= 0) {
         v->row.value[f->quantity] = isfinite(value) ? value : NAN;
     }
-}
-
-/* Bytes of elements of an array. */
-static uint64_t bytes_of(const field *f, uint64_t elements) {
-    return f->type == BIT ? (elements + 7) / 8 : elements * (uint64_t)f->size;
 }
 
 /* Prepares the next field, or the next row after the last one. */
@@ -322,9 +229,9 @@ static void next_field(bst_star_votable *v) {
         begin_row(v);
     }
     if (v->at >= 0 && !v->wanted[v->at]) {
-        const field *f = &v->fields[v->at];
+        const bst_votable_field *f = &v->fields[v->at];
         v->counting = f->variable;
-        v->skip = f->variable ? 0 : bytes_of(f, f->fixed);
+        v->skip = f->variable ? 0 : bst_votable_bytes(f, f->fixed);
     }
 }
 
@@ -337,7 +244,7 @@ static void take_byte(bst_star_votable *v, unsigned char byte) {
         }
         return;
     }
-    const field *f = &v->fields[v->at];
+    const bst_votable_field *f = &v->fields[v->at];
     if (v->skip > 0) {
         if (--v->skip == 0) {
             next_field(v);
@@ -352,7 +259,7 @@ static void take_byte(bst_star_votable *v, unsigned char byte) {
         v->have = 0;
         /* 2^32 items of 2^40 elements would not be a file */
         const uint64_t elements = items * (f->fixed < UINT64_C(1) << 28 ? f->fixed : 0);
-        v->skip = bytes_of(f, elements);
+        v->skip = bst_votable_bytes(f, elements);
         if (v->skip == 0) {
             next_field(v);
         }
@@ -438,7 +345,7 @@ static void start_element(void *user, const char *full, const char **attributes)
         add_field(v, attributes);
     } else if (v->place == FIELDS && strcmp(name, "VALUES") == 0 && v->field_count > 0) {
         const char *null = attribute(attributes, "null");
-        field *f = &v->fields[v->field_count - 1];
+        bst_votable_field *f = &v->fields[v->field_count - 1];
         if (null && strlen(null) < sizeof f->null) {
             f->has_null = true;
             snprintf(f->null, sizeof f->null, "%s", null);
@@ -487,10 +394,10 @@ static void end_element(void *user, const char *full) {
             end_row(v);
         }
     } else if (v->place == STREAM && strcmp(name, "STREAM") == 0) {
-        const field *first = &v->fields[0];
+        const bst_votable_field *first = &v->fields[0];
         const bool none = v->null_mask || v->wanted[0] || first->variable;
         if (v->digits != 0 || v->at != (v->null_mask ? -1 : 0) || v->have != 0 ||
-            v->skip != (none ? 0 : bytes_of(first, first->fixed))) {
+            v->skip != (none ? 0 : bst_votable_bytes(first, first->fixed))) {
             fail_here(v, "the STREAM ends within a row");
         }
         v->place = AFTER;

@@ -10,8 +10,8 @@ static const double LEAST_RADIUS_RAD = 3.0 * BST_DEG_RAD, TIMES_FIELD = 3.0;
 /* Tycho-2's bands: V = VT - 0.090 (BT-VT), B-V = 0.850 (BT-VT) (its ReadMe, note 7). */
 static const double V_PER_COLOUR = 0.090, B_MINUS_V_PER_COLOUR = 0.850;
 /* A star of the catalogue so near to a found one, and so alike, is that star: its streak only
- * reaches into the frame, and the fit began without it. Of 29 such stars of hidden paths, all were
- * within 1.2 px and 0.15 mag (docs/results/twin.md). */
+ * reaches into the frame, and the fit began without it. Of 28 such stars of hidden paths, all were
+ * within 1.2 px and 15 % (docs/results/twin.md). */
 static const double SAME_PX = 2.0, SAME_MAG = 0.75;
 /* BT-VT of stars without a colour. */
 static const double USUAL_COLOUR = 0.7;
