@@ -126,6 +126,26 @@ static bst_status open_detector(bst_ctx *ctx, bst_device *device, bst_renderer *
     return r->options.saturation_flags ? bst_detector_keep_flags(ctx, r->detector) : BST_OK;
 }
 
+/* Share of the tolerance for the light of an image: half of it is for the bands of a rolling
+ * shutter, and the errors of a ramp's intervals add up. */
+static double tolerance_share(const bst_detector_config *d) {
+    int64_t intervals = d->ramp.reads - 1;
+    return d->row_time_s != 0.0 ? 0.5 : intervals > 1 ? 1.0 / (double)intervals : 1.0;
+}
+
+/* Creates the read intervals of a ramp, or the bands of a rolling shutter. */
+static bst_status open_parts(bst_ctx *ctx, const bst_camera *camera, bst_renderer *r) {
+    if (camera->detector.ramp.reads > 0) {
+        return bst_ramp_intervals_create(ctx, &r->intervals);
+    }
+    if (camera->detector.row_time_s == 0.0) {
+        return BST_OK;
+    }
+    double peak_px = r->fourier ? bst_fourier_render_band(r->fourier)->share_sigma_px
+                                : bst_camera_psf_sigma_px(camera);
+    return bst_rolling_create(ctx, camera, r->tolerance_sigma, peak_px, !r->fourier, &r->rolling);
+}
+
 bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                const bst_renderer_options *options, bst_renderer **out) {
     assert(device && camera && out);
@@ -147,13 +167,8 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
-    bool rolling = camera->detector.row_time_s != 0.0;
-    int intervals = (int)camera->detector.ramp.reads - 1;
-    /* half of the tolerance is for the rolling shutter's bands */
     bst_smear_options smear = {
-        .tolerance_sigma = r->options.tolerance_sigma * (rolling         ? 0.5
-                                                         : intervals > 1 ? 1.0 / intervals
-                                                                         : 1.0),
+        .tolerance_sigma = r->options.tolerance_sigma * tolerance_share(&camera->detector),
         .taps = r->taps,
         .motion = r->options.motion,
         .temporal_oversample = r->options.temporal_oversample,
@@ -193,14 +208,8 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     if (status == BST_OK) {
         status = bst_upload_ring_create(ctx, device, &r->stage);
     }
-    if (status == BST_OK && intervals > 0) {
-        status = bst_ramp_intervals_create(ctx, &r->intervals);
-    }
-    if (status == BST_OK && rolling) {
-        double peak_px =
-            r->fourier ? bst_fourier_render_band(r->fourier)->share_sigma_px : sigma_px;
-        status = bst_rolling_create(ctx, camera, smear.tolerance_sigma, peak_px, !r->fourier,
-                                    &r->rolling);
+    if (status == BST_OK) {
+        status = open_parts(ctx, camera, r);
     }
     if (status == BST_OK) {
         status = bst_frame_pool_create(ctx, device, (int)camera->width_px, (int)camera->height_px,
