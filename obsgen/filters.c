@@ -178,7 +178,8 @@ static void set_weights(const bst_generator *g, double length, bst_threshold_wei
 static bst_threshold_noise noise_law(const bst_generator *g) {
     const bst_camera *c = g->camera;
     double gain = c->gain_e_per_dn, variance = g->noise_e * g->noise_e;
-    double normal = c->read_noise_e * c->read_noise_e + gain * gain / 12.0;
+    double read_e = bst_camera_read_noise_e(c);
+    double normal = read_e * read_e + gain * gain / 12.0;
     double counted = fmax(variance - normal, 0.0);
     if (normal < 1.0) {
         counted = fmax(counted, fmin(g->background_e, variance));

@@ -86,8 +86,9 @@ double bst_generator_peak_e(double sigma_px, const bst_truth_item *item) {
 static double snr_factor(const bst_generator *g, const bst_generator_frame *f,
                          const bst_truth_item *item, const generator_source *s) {
     double level_e = f->truth->background_e + f->truth->dark_e;
+    double read_e = bst_camera_read_noise_e(g->camera);
     double v = (double)g->binning * g->binning * bst_camera_excess_noise(g->camera) * level_e +
-               g->camera->read_noise_e * g->camera->read_noise_e;
+               read_e * read_e;
     const bst_crlb_table *bound = g->image_bound ? g->image_bound : &g->bound;
     double plain = item->electrons * bst_crlb_table_norm(bound, s->length) / sqrt(fmax(v, 1e-6));
     bool known = item->snr > 0.0 && plain > 0.0;
@@ -184,11 +185,12 @@ static void set_noise(bst_generator *g, const bst_generator_frame *f) {
     double added = (double)g->binning * g->binning;
     double level = (f->truth->background_e + f->truth->dark_e) * added;
     double uneven_dark = f->truth->dark_e * d->dsnu_rms;
+    double read_e = bst_camera_read_noise_e(c);
     g->excess = bst_camera_excess_noise(c);
     double variance =
-        g->excess * level + c->read_noise_e * c->read_noise_e +
-        c->gain_e_per_dn * c->gain_e_per_dn / 12.0 + d->row_noise_e * d->row_noise_e +
-        d->row_offset_rms_e * d->row_offset_rms_e + d->flicker_noise_e * d->flicker_noise_e +
+        g->excess * level + read_e * read_e + c->gain_e_per_dn * c->gain_e_per_dn / 12.0 +
+        d->row_noise_e * d->row_noise_e + d->row_offset_rms_e * d->row_offset_rms_e +
+        d->flicker_noise_e * d->flicker_noise_e +
         0.5 * d->pick_up.amplitude_e * d->pick_up.amplitude_e + bst_generator_column_variance(g) +
         d->telegraph_noise_fraction * d->telegraph_noise_rms_e * d->telegraph_noise_rms_e +
         level * level * d->prnu_rms * d->prnu_rms / added + added * uneven_dark * uneven_dark;

@@ -15,7 +15,8 @@ double bst_generator_saturation_e(const bst_generator *g) {
     const bst_camera *c = g->camera;
     double converter_e = (ldexp(1.0, (int)c->bits) - 1.0 - c->offset_dn) * c->gain_e_per_dn;
     /* saturated from 98 % of the full well, as in imgproc/detect/detect.c */
-    return fmin(converter_e, 0.98 * c->full_well_e * g->binning * g->binning) - g->background_e;
+    return fmin(converter_e, 0.98 * bst_camera_full_e(c) * g->binning * g->binning) -
+           g->background_e;
 }
 
 /* Bias of a saturated star's streak: the saturated pixels, where the star moved least, are left out

@@ -275,6 +275,7 @@ static bst_status replace_renderer(bst_ctx *ctx, scenegen *s, const bst_camera *
         bst_psf_free(psf);
         return status;
     }
+    bst_renderer_inherit(renderer, s->renderer);
     bst_renderer_free(s->renderer);
     bst_psf_free(s->psf);
     s->renderer = renderer;
@@ -359,15 +360,20 @@ static bst_status archive_module(void *self, bst_archive *archive) {
                : BST_OK;
 }
 
-/* Renders and publishes the frame; a frame to be dropped is only planned. */
+/* Renders and publishes the frame; a frame to be dropped is only planned, or only rendered where
+ * its light changes later frames. */
 static bst_status render_frame(scenegen *s, struct bst_step *step, const bst_exposure *e,
                                const bst_render_request *request) {
     bst_ctx *ctx = bst_step_ctx(step);
-    if (e->dropped) {
+    if (e->dropped && !bst_detector_has_persistence(&s->camera->detector)) {
         return bst_renderer_plan(ctx, s->renderer, request);
     }
     bst_frame *frame;
     BST_TRY(bst_renderer_render(ctx, s->renderer, request, &frame));
+    if (e->dropped) {
+        bst_frame_release(frame);
+        return BST_OK;
+    }
     bst_frame_message *message = bst_step_write(step, PORT_FRAME, NULL);
     *message = (bst_frame_message){.frame = frame,
                                    .exposure_id = e->id,
@@ -411,6 +417,7 @@ static bst_status process_exposure(scenegen *s, struct bst_step *step, const bst
     int64_t lead =
         bst_detector_lead_ticks(&s->camera->detector, e->window.height, (double)s->tick_rate_hz);
     s->options.lead_s = (double)lead / (double)s->tick_rate_hz;
+    s->options.read_charge = true;
     bst_status status = bst_field_track(ctx, s->field, history, e->start_tick - lead,
                                         e->end_tick + lead, s->tick_rate_hz, &track);
     if (status != BST_OK) {
@@ -440,7 +447,8 @@ static bst_status process_exposure(scenegen *s, struct bst_step *step, const bst
         .exposure_s = (double)(e->end_tick - e->start_tick) / (double)s->tick_rate_hz,
         .binning = e->binning,
         .key = s->key,
-        .exposure_id = e->id};
+        .exposure_id = e->id,
+        .start_s = (double)e->start_tick / (double)s->tick_rate_hz};
     BST_TRY(render_frame(s, step, e, &request));
     describe_image(s, step, e, truth);
     /* while the device renders */

@@ -357,7 +357,7 @@ bst_status bst_plane_maker_render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer
         BST_TRY(
             bst_renderer_flags(ctx, renderer, (size_t)m->width * (size_t)m->height, m->saturation));
     }
-    m->read_noise_e = camera->read_noise_e;
+    m->read_noise_e = bst_camera_read_noise_e(camera);
     m->uneven = request->background != NULL;
     m->level = (float)(m->threshold_sigma * sqrt(least_e + m->read_noise_e * m->read_noise_e));
     int shapes = 0, stars = 0;

@@ -12,8 +12,10 @@
 #include "scenegen/device_array.h"
 #include "scenegen/fourier/fourier_render.h"
 #include "scenegen/frame_pool.h"
+#include "scenegen/ramp_intervals.h"
 #include "scenegen/reference.h"
 #include "scenegen/render_request.h"
+#include "scenegen/renderer_internal.h"
 #include "scenegen/saturation_count.h"
 #include "scenegen/scene_boxes.h"
 #include "scenegen/scene_kernels.h"
@@ -29,42 +31,6 @@
 
 enum { MAX_TAPS = BST_PLACE_TAPS };
 typedef bst_device_array growing;
-
-struct bst_renderer {
-    bst_camera camera;
-    bst_renderer_options options;
-    int taps, law_degree; /* of the stamps */
-    cl_context context;
-    cl_command_queue queue;
-    bst_device *device;
-    bst_kernel_frame_params fixed; /* parameters of the kernels that are the camera's */
-    char tile_options[256];        /* build options of the tile kernels */
-    cl_kernel frame_kernel, expected_kernel;
-    bst_scene_form form; /* of the tile kernels */
-    bst_scene_boxes boxes;
-    bst_psf *psf;
-    bst_fourier_render *fourier; /* NULL: Gaussian PSF, light from stamps */
-    bst_smear *smear;
-    bst_parallel *planners; /* for the planning, if the device leaves the processor idle */
-    bst_error_budget *budget;
-    bst_detector *detector;
-    bst_readout *readout;
-    bst_rolling *rolling; /* NULL: all rows are exposed simultaneously */
-    bst_frame_pool *pool;
-    cl_mem law; /* profile law of the stamps */
-    bst_upload_ring *stage;
-    cl_mem sources, shares, table; /* of the current frame; lent */
-    bst_device_array expected;
-    bst_scene_plan plan;   /* of the latest request, or of its latest band */
-    double *rolled_peak_e; /* of all sources, with the bands of a rolling shutter */
-    int rolled_capacity, set;
-    bst_saturation_count saturation;
-    bool rolled;            /* the latest request had a rolling shutter */
-    bool map;               /* the background differs between pixels */
-    uint64_t most_bytes;    /* largest buffer of the device */
-    double tolerance_sigma; /* without the share of the rolling shutter's bands */
-    bst_render_stats stats;
-};
 
 bst_renderer_options bst_renderer_default_options(void) {
     return (bst_renderer_options){.tolerance_sigma = 0.05, .pool_frames = 4};
@@ -94,8 +60,10 @@ static bst_status build_frame(bst_ctx *ctx, bst_renderer *r) {
     return bst_scene_frame_kernel(ctx, r->device, r->form, options, &r->frame_kernel);
 }
 
-/* Sets the parameters that are the camera's. */
-static bst_status build(bst_ctx *ctx, bst_renderer *r) {
+/* Sets the parameters that are the camera's.
+ *
+ * Given:     camera  with the noise of a single read */
+static bst_status build(bst_ctx *ctx, bst_renderer *r, const bst_camera *camera) {
     r->form = (bst_scene_form){.lanes = r->options.group == 0, .fourier = r->fourier != NULL};
     r->boxes = bst_scene_boxes_init(r->device, r->form, r->most_bytes);
     bst_scene_tile_options(&r->options, r->taps, r->law_degree, r->fourier != NULL, r->tile_options,
@@ -103,7 +71,7 @@ static bst_status build(bst_ctx *ctx, bst_renderer *r) {
     r->fixed.nodes = bst_scene_node_params(&r->camera, r->options.spatial_oversample);
     r->fixed.vignetting = bst_vignetting_params(&r->camera);
     bst_detector_params(r->detector, &r->fixed);
-    return bst_readout_create(ctx, r->device, &r->camera, &r->readout);
+    return bst_readout_create(ctx, r->device, camera, &r->readout);
 }
 
 bst_status bst_renderer_prepare(bst_ctx *ctx, bst_renderer *r) {
@@ -156,6 +124,26 @@ static bst_status open_detector(bst_ctx *ctx, bst_device *device, bst_renderer *
     return r->options.saturation_flags ? bst_detector_keep_flags(ctx, r->detector) : BST_OK;
 }
 
+/* Share of the tolerance for the light of an image: half of it is for the bands of a rolling
+ * shutter, and the errors of a ramp's intervals add up. */
+static double tolerance_share(const bst_detector_config *d) {
+    int64_t intervals = d->ramp.reads - 1;
+    return d->row_time_s != 0.0 ? 0.5 : intervals > 1 ? 1.0 / (double)intervals : 1.0;
+}
+
+/* Creates the read intervals of a ramp, or the bands of a rolling shutter. */
+static bst_status open_parts(bst_ctx *ctx, const bst_camera *camera, bst_renderer *r) {
+    if (camera->detector.ramp.reads > 0) {
+        return bst_ramp_intervals_create(ctx, &r->intervals);
+    }
+    if (camera->detector.row_time_s == 0.0) {
+        return BST_OK;
+    }
+    double peak_px = r->fourier ? bst_fourier_render_band(r->fourier)->share_sigma_px
+                                : bst_camera_psf_sigma_px(camera);
+    return bst_rolling_create(ctx, camera, r->tolerance_sigma, peak_px, !r->fourier, &r->rolling);
+}
+
 bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camera *camera,
                                const bst_renderer_options *options, bst_renderer **out) {
     assert(device && camera && out);
@@ -166,6 +154,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the renderer");
     }
     r->camera = *camera;
+    r->camera.read_noise_e = bst_camera_read_noise_e(camera); /* of a frame */
     r->options = options ? *options : bst_renderer_default_options();
     r->taps = taps_for(bst_camera_psf_sigma_px(camera));
     r->map = bst_skylight_may_vary(camera);
@@ -176,10 +165,8 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     r->queue = bst_device_queue(device);
     clRetainContext(r->context);
     clRetainCommandQueue(r->queue);
-    bool rolling = camera->detector.row_time_s != 0.0;
-    /* half of the tolerance is for the rolling shutter's bands */
     bst_smear_options smear = {
-        .tolerance_sigma = r->options.tolerance_sigma * (rolling ? 0.5 : 1.0),
+        .tolerance_sigma = r->options.tolerance_sigma * tolerance_share(&camera->detector),
         .taps = r->taps,
         .motion = r->options.motion,
         .temporal_oversample = r->options.temporal_oversample,
@@ -208,7 +195,7 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
         smear.law_widest = bst_profile_law_widest(sigma_px, r->law_degree);
     }
     if (status == BST_OK) {
-        status = build(ctx, r);
+        status = build(ctx, r, camera);
     }
     if (status == BST_OK) {
         status = bst_smear_create(ctx, camera, &smear, &r->smear);
@@ -219,11 +206,8 @@ bst_status bst_renderer_create(bst_ctx *ctx, bst_device *device, const bst_camer
     if (status == BST_OK) {
         status = bst_upload_ring_create(ctx, device, &r->stage);
     }
-    if (status == BST_OK && rolling) {
-        double peak_px =
-            r->fourier ? bst_fourier_render_band(r->fourier)->share_sigma_px : sigma_px;
-        status = bst_rolling_create(ctx, camera, smear.tolerance_sigma, peak_px, !r->fourier,
-                                    &r->rolling);
+    if (status == BST_OK) {
+        status = open_parts(ctx, camera, r);
     }
     if (status == BST_OK) {
         status = bst_frame_pool_create(ctx, device, (int)camera->width_px, (int)camera->height_px,
@@ -263,6 +247,7 @@ void bst_renderer_free(bst_renderer *r) {
     bst_psf_free(r->psf);
     bst_readout_free(r->readout);
     bst_rolling_free(r->rolling);
+    bst_ramp_intervals_free(r->intervals);
     bst_detector_free(r->detector);
     bst_parallel_free(r->planners);
     clReleaseCommandQueue(r->queue);
@@ -272,23 +257,10 @@ void bst_renderer_free(bst_renderer *r) {
     free(r);
 }
 
-bst_status bst_renderer_archive(bst_renderer *r, bst_archive *archive) {
-    assert(r && archive);
-    r->set = bst_upload_ring_archive(r->stage, archive);
-    return bst_saturation_count_archive(&r->saturation, r->stage, archive);
-}
-
-/* True if the errors of the chosen options can be predicted. */
-static bool is_error_predictable(const bst_renderer *r) {
-    const bst_renderer_options *o = &r->options;
-    return o->temporal_oversample <= 0 && o->spatial_oversample <= 0 &&
-           !(r->fourier && o->fft_taps == 4);
-}
-
 /* Chooses nodes and stamps of all sources: sets plan and stats. */
 static bst_status make_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q) {
     const bst_scene_plan_limits limits = {
-        .tolerance_sigma = is_error_predictable(r) ? r->tolerance_sigma : INFINITY,
+        .tolerance_sigma = bst_renderer_is_predictable(r) ? r->tolerance_sigma : INFINITY,
         .margin_px = bst_renderer_margin_px(r),
         .bytes = r->most_bytes,
         .nodes = r->options.max_nodes};
@@ -425,7 +397,7 @@ static bst_status enqueue_tiles(bst_ctx *ctx, bst_renderer *r, const bst_render_
 /* Enqueues an image at once, or band by band for a rolling shutter. */
 static bst_status enqueue_image(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                                 target to) {
-    r->rolled = q->row_time_s != 0.0;
+    r->rolled = r->summed = q->row_time_s != 0.0;
     if (to.kernel && to.kernel == r->frame_kernel) { /* room for the tiles of all bands */
         size_t across = (size_t)q->window.width / (size_t)r->options.tile_width + 2;
         size_t rows = (size_t)(r->rolled ? 1 : r->options.tile_height);
@@ -476,25 +448,54 @@ bst_status bst_renderer_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_req
     return enqueue_image(ctx, r, request, (target){.kernel = NULL});
 }
 
-/* Renders the light first, then the staged read-out for column effects and binning. */
-static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
-                                   int binning, cl_mem frame) {
+/* Renders the light that the staged read-out of a request needs. */
+static bst_status render_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q) {
     bst_render_request light = *q;
     cl_mem image;
     int stride;
     light.window = bst_readout_light_window(r->readout, q->window);
-    BST_TRY(build_expected(ctx, r));
     BST_TRY(bst_readout_image(ctx, r->readout, light.window, &image, &stride));
-    BST_TRY(enqueue_image(
+    return enqueue_image(
         ctx, r, &light,
-        (target){
-            .kernel = r->expected_kernel, .out = image, .stride = stride, .light_only = true}));
+        (target){.kernel = r->expected_kernel, .out = image, .stride = stride, .light_only = true});
+}
+
+/* Renders the intervals of a ramp, and sets the statistics of the whole exposure. */
+static bst_status render_ramp(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q) {
+    int intervals = (int)r->camera.detector.ramp.reads - 1;
+    bst_render_stats all = {.single_kernel = true};
+    for (int i = 0; i < intervals; i++) {
+        bst_render_request part;
+        BST_TRY(bst_ramp_interval(ctx, r->intervals, q, i, intervals, &part));
+        BST_TRY(bst_detector_interval(ctx, r->detector, r->stage, q->key, q->exposure_id, i,
+                                      bst_render_exposure_s(&part)));
+        BST_TRY(render_light(ctx, r, &part));
+        all.nodes += r->stats.nodes;
+        all.nodes_bounded = all.nodes_bounded || r->stats.nodes_bounded;
+        all.single_kernel = all.single_kernel && r->stats.single_kernel;
+        all.predicted_sigma += bst_error_budget_error_sigma(r->budget);
+        bst_kernel_frame_params p = bst_render_params(&r->fixed, &r->camera, &r->options, &part, 0);
+        BST_TRY(bst_readout_interval(ctx, r->readout, r->detector, &p, q->window, i, part.start_s));
+    }
+    BST_TRY(make_plan(ctx, r, q)); /* for bst_renderer_peak_e */
+    all.sources = r->stats.sources;
+    r->stats = all;
+    r->summed = true;
+    return BST_OK;
+}
+
+/* Renders the light first, then the staged read-out for column effects and binning. */
+static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
+                                   int binning, cl_mem frame) {
+    BST_TRY(build_expected(ctx, r));
+    BST_TRY(r->intervals ? render_ramp(ctx, r, q) : render_light(ctx, r, q));
     int rows = q->window.height / binning;
     cl_mem saturated;
     BST_TRY(saturated_room(ctx, r, (size_t)rows, &saturated));
     r->saturation.tiles[r->set] = rows;
     bst_kernel_frame_params p = bst_render_params(&r->fixed, &r->camera, &r->options, q, 0);
-    return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, frame, saturated);
+    return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, q->start_s, frame,
+                           saturated);
 }
 
 bst_status bst_renderer_render(bst_ctx *ctx, bst_renderer *r, const bst_render_request *request,
@@ -561,39 +562,4 @@ bst_status bst_renderer_render_noise_free(bst_ctx *ctx, bst_renderer *r,
         ctx,
         clEnqueueReadBuffer(r->queue, r->expected.buffer, CL_TRUE, 0, bytes, image, 0, NULL, NULL),
         "reading a noise-free image");
-}
-
-bst_status bst_renderer_saturated(bst_ctx *ctx, bst_renderer *r, long long *pixels) {
-    for (int i = 1; i <= BST_STAGE_SETS; i++) { /* the latest last */
-        BST_TRY(bst_saturation_count_frame(ctx, &r->saturation, r->stage,
-                                           (r->set + i) % BST_STAGE_SETS));
-    }
-    *pixels = r->saturation.pixels;
-    return BST_OK;
-}
-
-bst_status bst_renderer_flags(bst_ctx *ctx, bst_renderer *r, size_t pixels, uint8_t *out) {
-    return bst_detector_flags(ctx, r->detector, pixels, out);
-}
-
-long long bst_renderer_saturated_frames(const bst_renderer *r) {
-    return r->saturation.frames;
-}
-
-void bst_renderer_get_stats(const bst_renderer *r, bst_render_stats *out) {
-    *out = r->stats;
-    if (!r->rolled) {
-        out->predicted_sigma = bst_error_budget_error_sigma(r->budget);
-    }
-    out->predicted_sigma = is_error_predictable(r) ? out->predicted_sigma : NAN;
-    out->tolerance_missed = out->predicted_sigma > r->options.tolerance_sigma;
-}
-
-double bst_renderer_peak_e(const bst_renderer *r, int index) {
-    assert(r && index >= 0);
-    return r->rolled ? r->rolled_peak_e[index] : r->plan.peak_e[index];
-}
-
-int bst_renderer_margin_px(const bst_renderer *r) {
-    return r->fourier ? bst_fourier_render_margin_px(r->fourier) : r->taps / 2 + 1;
 }

@@ -63,10 +63,15 @@ bst_status bst_renderer_prepare(bst_ctx *ctx, bst_renderer *renderer) BST_MUST_C
 void bst_renderer_free(bst_renderer *renderer);
 
 /* Saves or restores what later frames depend on, or report: the counts of saturated frames, with
- * the frames in progress. Everything else follows from the camera, the options and each request.
+ * the frames in progress, and the charge that pixels keep (persistence). Everything else follows
+ * from the camera, the options and each request.
  *
  * Errors:    BST_ERR_DEVICE */
 bst_status bst_renderer_archive(bst_renderer *renderer, bst_archive *archive) BST_MUST_CHECK;
+
+/* Lets a renderer go on where another one of the same sensor ends: with the charge that its pixels
+ * keep. `before` must render nothing more. */
+void bst_renderer_inherit(bst_renderer *renderer, bst_renderer *before);
 
 /* One exposure to render. Pointers are lent for the call. */
 typedef struct bst_render_request {
@@ -91,6 +96,7 @@ typedef struct bst_render_request {
     int binning;
     bst_rng_key key;
     int64_t exposure_id;
+    double start_s; /* of the exposure, any epoch: pixels with persistence forget by it */
 } bst_render_request;
 
 /* Statistics of the latest rendering. */

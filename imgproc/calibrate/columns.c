@@ -74,10 +74,10 @@ static void median_column_levels(const measuring *m, int x0, int count, float *l
 /* Sigma-clips the rows of each column about `level`, DN, and replaces `level` by their mean. */
 static void clip_column_levels(const measuring *m, int x0, int count, float *level) {
     const bst_camera *c = m->camera;
+    const double read_e = bst_camera_read_noise_e(c);
     float limit[BLOCK], sum[BLOCK] = {0}, kept[BLOCK] = {0};
     for (int i = 0; i < count; i++) {
-        double variance = c->read_noise_e * c->read_noise_e +
-                          fmax(electrons(m, (double)level[i]), 0.0) +
+        double variance = read_e * read_e + fmax(electrons(m, (double)level[i]), 0.0) +
                           c->gain_e_per_dn * c->gain_e_per_dn / 12.0;
         /* one ADC step wider on either side, so that at least one digital value lies inside */
         limit[i] = (float)(CLIP_SIGMAS * sqrt(variance) / c->gain_e_per_dn + 1.0);
@@ -117,7 +117,7 @@ void bst_columns_measure(bst_columns *columns, bst_parallel *pool, const bst_cam
     assert(columns && camera && frame && frame->pixels);
     int b = frame->binning;
     measuring m = {columns, camera, frame, frame->window.width / b, frame->window.height / b};
-    double well = camera->full_well_e * b * b;
+    double well = bst_camera_full_e(camera) * b * b;
     columns->count = m.width;
     memset(columns->level_e, 0, (size_t)m.width * sizeof(float));
     if (m.height >= FIRST_ROWS) {
@@ -125,8 +125,8 @@ void bst_columns_measure(bst_columns *columns, bst_parallel *pool, const bst_cam
     }
     memcpy(columns->ordered, columns->level_e, (size_t)m.width * sizeof(float));
     columns->median_e = median_of(columns->ordered, m.width);
-    double quiet = camera->read_noise_e * camera->read_noise_e +
-                   fmax((double)columns->median_e, 0.0) +
+    double read_e = bst_camera_read_noise_e(camera);
+    double quiet = read_e * read_e + fmax((double)columns->median_e, 0.0) +
                    camera->gain_e_per_dn * camera->gain_e_per_dn / 12.0;
     bool smeared = camera->detector.frame_transfer_s > 0.0;
     for (int x = 0; x < m.width; x++) {

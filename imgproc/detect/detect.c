@@ -200,7 +200,7 @@ static bool is_significant(const void *user, const bst_candidate *c) {
 /* Digital number at which a pixel saturates: end of the ADC range or full well. */
 static int saturation_dn(const bst_imgproc *ip, const bst_imgproc_frame *frame) {
     double top = ldexp(1.0, frame->bits) - 1.0;
-    double well = ip->camera.full_well_e * frame->binning * frame->binning;
+    double well = bst_camera_full_e(&ip->camera) * frame->binning * frame->binning;
     double full = ip->camera.offset_dn + 0.98 * well / ip->camera.gain_e_per_dn;
     return (int)fmin(top, fmax(full, 1.0));
 }
@@ -367,7 +367,7 @@ static void find_candidates(bst_imgproc *ip, const bst_imgproc_frame *frame,
     const bst_calibrate_pixels *read = &masking.read;
     bst_row_gain by_gain;
     const bst_row_gain *plain = bst_calibrate_pixels_plain(read, &by_gain) ? &by_gain : NULL;
-    double gain = ip->camera.gain_e_per_dn, read_noise = ip->camera.read_noise_e;
+    double gain = ip->camera.gain_e_per_dn, read_noise = bst_camera_read_noise_e(&ip->camera);
     double read_variance = read_noise * read_noise + gain * gain / 12.0;
     bst_background_input ground = {bst_calibrate_pixels_read, read, gain,
                                    -ip->camera.offset_dn * gain, read_noise * read_noise};

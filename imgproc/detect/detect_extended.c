@@ -49,19 +49,20 @@ const uint8_t *bst_imgproc_find_silhouettes(bst_imgproc *ip, const bst_imgproc_f
                                             const bst_camera_motion *motion, double sigma_px,
                                             int saturated_dn) {
     const bst_camera *c = &ip->camera;
+    const double read_e = bst_camera_read_noise_e(c);
     const bst_calibrate_pixels read = {c, &ip->maps, ip->bad, frame, NULL, NULL, 0};
     const bst_window *w = &frame->window;
-    bst_silhouette_frame f = {.read = bst_calibrate_pixels_read,
-                              .user = &read,
-                              .raw = frame->pixels,
-                              .width = w->width / frame->binning,
-                              .height = w->height / frame->binning,
-                              .saturated_dn = saturated_dn,
-                              .full_e = (saturated_dn - c->offset_dn) * c->gain_e_per_dn,
-                              .read_variance_e2 = c->read_noise_e * c->read_noise_e +
-                                                  c->gain_e_per_dn * c->gain_e_per_dn / 12.0,
-                              .sigma_px = sigma_px,
-                              .wings = ip->known != NULL};
+    bst_silhouette_frame f = {
+        .read = bst_calibrate_pixels_read,
+        .user = &read,
+        .raw = frame->pixels,
+        .width = w->width / frame->binning,
+        .height = w->height / frame->binning,
+        .saturated_dn = saturated_dn,
+        .full_e = (saturated_dn - c->offset_dn) * c->gain_e_per_dn,
+        .read_variance_e2 = read_e * read_e + c->gain_e_per_dn * c->gain_e_per_dn / 12.0,
+        .sigma_px = sigma_px,
+        .wings = ip->known != NULL};
     if (motion) {
         bst_camera_motion_streak(motion, c, w->x0 + 0.5 * (w->width - 1),
                                  w->y0 + 0.5 * (w->height - 1), &f.streak_x_px, &f.streak_y_px);

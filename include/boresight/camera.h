@@ -281,9 +281,15 @@ double bst_camera_readout_e(const bst_camera *c);
 /* Mean dark signal of a pixel in a frame, e-: dark current of the exposure and what
  * bst_camera_readout_e gives. */
 double bst_camera_dark_e(const bst_camera *c, double exposure_s);
-/* Variance of multiplied charge over that of the charge itself: 2 - 1 / em_gain; 1 without a
- * multiplication register. */
+/* Variance of read charge over its mean: 2 - 1 / em_gain with a multiplication register (of the
+ * charge itself); with a ramp, whose line weighs the charge of its intervals, up to 1.2; else 1. */
 double bst_camera_excess_noise(const bst_camera *c);
+/* RMS of the read noise of a pixel in a frame, e-: read_noise_e, or that of the line through the
+ * reads of a ramp. */
+double bst_camera_read_noise_e(const bst_camera *c);
+/* Light of an exposure that fills a pixel's well before a frame shows that it is full, e-:
+ * full_well_e, with a ramp of N reads N - 1 times as much. */
+double bst_camera_full_e(const bst_camera *c);
 /* Noise of a pixel, e-: shot noise of a sky of sky_e and of the dark signal, as multiplied, and
  * read noise. */
 double bst_camera_noise_e(const bst_camera *c, double sky_e, double exposure_s);

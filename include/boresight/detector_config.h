@@ -54,6 +54,23 @@ typedef struct bst_detector_traps_config {
     double reference_e;   /* charge of a packet that meets traps_per_px */
 } bst_detector_traps_config;
 
+enum { BST_PERSISTENCE_SPECIES = 5 };
+/* Traps of a pixel that fill while it holds charge, and release it into later frames. */
+typedef struct bst_detector_persistence_config {
+    double trapped_share[BST_PERSISTENCE_SPECIES];   /* of the charge, after infinite time */
+    double time_constant_s[BST_PERSISTENCE_SPECIES]; /* of filling and of release */
+} bst_detector_persistence_config;
+
+/* Line through the reads of a ramp. */
+enum { BST_RAMP_SLOPE, BST_RAMP_LAST_MINUS_FIRST };
+enum { BST_RAMP_READS = 64 };
+/* Non-destructive reads during the exposure, whose line is the frame. */
+typedef struct bst_detector_ramp_config {
+    int64_t reads;          /* at equal distances, from the start to the end; 0: one at the end */
+    int32_t fit;            /* BST_RAMP_... */
+    double flicker_noise_e; /* 1/f noise of a pixel from read to read, RMS */
+} bst_detector_ramp_config;
+
 /* Side of the frame that is read first. */
 typedef struct bst_detector_output_config {
     bool right, top; /* the last column, the last row; otherwise column 0, row 0 */
@@ -90,6 +107,8 @@ typedef struct bst_detector_config {
     bst_detector_pick_up_config pick_up;
     bst_detector_glow_config glow;
     bst_detector_traps_config parallel_traps, serial_traps;
+    bst_detector_persistence_config persistence;
+    bst_detector_ramp_config ramp;
     double em_gain; /* 1 or less: no multiplication register */
     double interpixel_coupling, brighter_fatter_per_e;
     bst_detector_crosstalk_config crosstalk;
@@ -106,17 +125,22 @@ double bst_detector_dark_factor(const bst_detector_config *d);
 /* True if rendering needs whole columns of the sensor, because charge or light moves along them:
  * blooming, frame transfer, traps, and effects that need the whole sensor. */
 bool bst_detector_config_whole_columns(const bst_detector_config *d);
-/* True if rendering needs the whole sensor, because charge also moves along rows, or pixels change
- * their neighbours: traps of the serial register, crosstalk, coupling, brighter-fatter effect. */
+/* True if rendering needs the whole sensor, because charge also moves along rows, pixels change
+ * their neighbours, or all pixels have a memory: traps of the serial register, crosstalk, coupling,
+ * brighter-fatter effect, persistence. */
 bool bst_detector_config_whole_sensor(const bst_detector_config *d);
 
 /* True if a direction has traps. */
 bool bst_detector_has_traps(const bst_detector_traps_config *t);
+/* True if pixels keep charge of earlier frames. */
+bool bst_detector_has_persistence(const bst_detector_config *d);
 
 /* Checks for effects that exclude each other.
  *
  * Errors:    BST_ERR_CONFIG, with the key: a rolling shutter beside effects that need whole columns
- *            (bst_detector_config_whole_columns); traps along rows beside several outputs */
+ *            (bst_detector_config_whole_columns); traps along rows beside several outputs;
+ *            persistence that traps more than all charge; a ramp of one read, or beside effects of
+ *            a read-out that moves charge */
 bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d) BST_MUST_CHECK;
 /* Checks edges and outputs against the size of the frame.
  *

@@ -298,7 +298,8 @@ static bst_status set_wing_sky(bst_ctx *ctx, bst_generator *g, const outputs *ta
 /* Share of the noise variance of a dark pixel that is of counted electrons. */
 static double counted_share(const bst_generator *g) {
     const bst_camera *c = g->camera;
-    double normal = c->read_noise_e * c->read_noise_e + c->gain_e_per_dn * c->gain_e_per_dn / 12.0;
+    double read_e = bst_camera_read_noise_e(c);
+    double normal = read_e * read_e + c->gain_e_per_dn * c->gain_e_per_dn / 12.0;
     return fmax(1.0 - normal / (g->noise_e * g->noise_e), 0.0);
 }
 

@@ -19,7 +19,7 @@ static const uint64_t BEND_ERROR = (uint64_t)1 << 55;
  * brightest pixels. */
 static double snr2_of_stars(const bst_generator *g, const bst_truth *t) {
     double best[MOST_STARS] = {0.0}, sum = 0.0;
-    double read_e = g->camera->read_noise_e, added = (double)g->binning * g->binning;
+    double read_e = bst_camera_read_noise_e(g->camera), added = (double)g->binning * g->binning;
     double excess = bst_camera_excess_noise(g->camera);
     double variance = excess * added * (t->background_e + t->dark_e) + read_e * read_e;
     double norm = bst_crlb_table_norm(&g->bound, g->streak);

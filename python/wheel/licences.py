@@ -12,6 +12,7 @@ LICENCES = {
     "libcfitsio10t64": "CFITSIO",
     "libcjson1": "MIT",
     "liberfa1": "BSD-3-Clause",
+    "libexpat1": "MIT",
     "libgeographiclib23": "MIT",
     "libgeographiclib26": "MIT",
     "libmd0": "BSD-3-Clause AND BSD-2-Clause AND ISC AND Beerware",

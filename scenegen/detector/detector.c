@@ -56,7 +56,7 @@ bst_window bst_detector_light_window(const bst_camera *camera, bst_window window
 
 bool bst_detector_is_staged(const bst_detector *detector) {
     return bst_detector_config_whole_columns(&detector->camera.detector) ||
-           multiplies(&detector->camera);
+           detector->camera.detector.ramp.reads > 0 || multiplies(&detector->camera);
 }
 
 /* True if offsets are new in every frame. */
@@ -424,13 +424,32 @@ bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *d, bst_upload_ring *st
     const bst_detector_config *c = &d->camera.detector;
     uint64_t run = ((uint64_t)key.k[1] << 32) | key.k[0];
     d->summary = (bst_cosmic_rays_summary){0};
-    if (d->hits) {
+    if (d->hits && c->ramp.reads == 0) {
         BST_TRY(begin_hits(ctx, d, stage, bst_rng_make_key(run, 0, "detector", "hits"), exposure_id,
                            exposure_s + c->cosmic_rays.readout_s));
     }
     if (has_frame_offsets(c)) {
         BST_TRY(begin_rows(ctx, d, stage, run, exposure_id));
     }
+    return BST_OK;
+}
+
+bst_status bst_detector_interval(bst_ctx *ctx, bst_detector *d, bst_upload_ring *stage,
+                                 bst_rng_key key, int64_t exposure_id, int interval,
+                                 double interval_s) {
+    assert(d && stage && exposure_id >= 0 && interval >= 0 && interval_s >= 0.0);
+    if (!d->hits) {
+        return BST_OK;
+    }
+    bst_cosmic_rays_summary before = d->summary;
+    if (interval > 0) {
+        BST_TRY(deposit(ctx, d, 0.0f));
+    }
+    uint64_t run = ((uint64_t)key.k[1] << 32) | key.k[0];
+    BST_TRY(begin_hits(ctx, d, stage, bst_rng_make_key(run, (uint64_t)interval, "detector", "hits"),
+                       exposure_id, interval_s));
+    d->summary.tracks += before.tracks;
+    d->summary.electrons += before.electrons;
     return BST_OK;
 }
 

@@ -59,13 +59,19 @@ void bst_detector_params(const bst_detector *detector, bst_kernel_frame_params *
 bst_window bst_detector_light_window(const bst_camera *camera, bst_window window);
 
 /* True if frames pass the staged read-out (readout.h): effects between pixels, multiplication of
- * charge. */
+ * charge, ramps. */
 bool bst_detector_is_staged(const bst_detector *detector);
 
 /* Prepares the per-exposure effects: cosmic rays, level, row offsets, phases of the pick-up. */
 bst_status bst_detector_begin(bst_ctx *ctx, bst_detector *detector, bst_upload_ring *stage,
                               bst_rng_key key, int64_t exposure_id,
                               double exposure_s) BST_MUST_CHECK;
+/* Places the cosmic rays of an interval of a ramp in place of those of the interval before.
+ *
+ * Given:     interval    0, 1, ... */
+bst_status bst_detector_interval(bst_ctx *ctx, bst_detector *detector, bst_upload_ring *stage,
+                                 bst_rng_key key, int64_t exposure_id, int interval,
+                                 double interval_s) BST_MUST_CHECK;
 /* Removes the exposure's cosmic rays from the overlay. Call it after the frame's kernels are
  * enqueued. */
 bst_status bst_detector_end(bst_ctx *ctx, bst_detector *detector) BST_MUST_CHECK;

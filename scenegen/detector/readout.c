@@ -7,9 +7,25 @@
 
 #include "bst_scenegen_kernels.h"
 #include "scenegen/detector/multiplication.h"
+#include "scenegen/detector/persistence.h"
 #include "scenegen/scene_kernels.h"
+#include "sim/optics/ramp_fit.h"
 
-enum { TRANSFER, CHARGE, BLOOM, MARK, READ, NEIGHBOURS, PARALLEL, SERIAL, CROSSTALK, KERNELS };
+enum {
+    TRANSFER,
+    CHARGE,
+    BLOOM,
+    MARK,
+    READ,
+    PERSISTENCE,
+    RAMP,
+    RAMP_FIT,
+    NEIGHBOURS,
+    PARALLEL,
+    SERIAL,
+    CROSSTALK,
+    KERNELS
+};
 
 struct bst_readout {
     bst_camera camera;
@@ -20,6 +36,9 @@ struct bst_readout {
     cl_mem image, over, full;
     cl_mem multiplication; /* table of the register, NULL without one */
     size_t bytes;
+    bst_persistence persistence;
+    cl_mem planes, held;         /* of a ramp: kernels/ramp.cl, persistence.cl */
+    bst_kernel_ramp_params ramp; /* of the latest interval */
 };
 
 /* True if the camera needs a kernel of the staged read-out. */
@@ -30,6 +49,11 @@ static bool wanted(const bst_readout *r, int kernel) {
             return d->frame_transfer_s > 0.0;
         case BLOOM:
             return d->saturation == BST_WELL_BLOOM;
+        case PERSISTENCE:
+            return bst_detector_has_persistence(d);
+        case RAMP:
+        case RAMP_FIT:
+            return d->ramp.reads > 0;
         case NEIGHBOURS:
             return d->interpixel_coupling > 0.0 || d->brighter_fatter_per_e > 0.0;
         case PARALLEL:
@@ -39,8 +63,8 @@ static bool wanted(const bst_readout *r, int kernel) {
         case CROSSTALK:
             return d->crosstalk.outputs > 1 && d->crosstalk.coupling != 0.0;
         case MARK: /* charge may change after it was limited to the full well */
-            return bst_detector_has_traps(&d->parallel_traps) ||
-                   bst_detector_config_whole_sensor(d);
+            return bst_detector_has_traps(&d->parallel_traps) || wanted(r, RAMP) ||
+                   wanted(r, NEIGHBOURS) || wanted(r, SERIAL) || wanted(r, CROSSTALK);
         default:
             return true;
     }
@@ -53,12 +77,14 @@ static bool needs_over(const bst_readout *r) {
 
 bst_status bst_readout_prepare(bst_ctx *ctx, bst_readout *r) {
     static const char *const names[KERNELS] = {
-        "bst_detector_transfer", "bst_detector_charge", "bst_detector_bloom",
-        "bst_detector_mark",     "bst_detector_read",   "bst_detector_neighbours",
-        "bst_detector_parallel", "bst_detector_serial", "bst_detector_crosstalk"};
+        "bst_detector_transfer", "bst_detector_charge",   "bst_detector_bloom",
+        "bst_detector_mark",     "bst_detector_read",     "bst_detector_persistence",
+        "bst_detector_ramp",     "bst_detector_ramp_fit", "bst_detector_neighbours",
+        "bst_detector_parallel", "bst_detector_serial",   "bst_detector_crosstalk"};
     static const bst_device_kernel_source *const staged[] = {
         &bst_kernel_scene_shared, &bst_kernel_lanes,    &bst_kernel_random,   &bst_kernel_chunk,
-        &bst_kernel_read_tail,    &bst_kernel_detector, &bst_kernel_store_dn, &bst_kernel_readout};
+        &bst_kernel_read_tail,    &bst_kernel_detector, &bst_kernel_store_dn, &bst_kernel_readout,
+        &bst_kernel_persistence,  &bst_kernel_ramp};
     static const bst_device_kernel_source *const moving[] = {
         &bst_kernel_scene_shared, &bst_kernel_lanes, &bst_kernel_charge_transfer,
         &bst_kernel_charge_coupling};
@@ -70,12 +96,14 @@ bst_status bst_readout_prepare(bst_ctx *ctx, bst_readout *r) {
                                   &r->multiplication));
     }
     char options[64];
-    snprintf(options, sizeof options, "-cl-std=CL1.2%s", bst_detector_tail_options(&r->camera));
+    snprintf(options, sizeof options, "-cl-std=CL1.2%s%s", bst_detector_tail_options(&r->camera),
+             wanted(r, RAMP) ? " -DRAMP" : "");
     for (int i = 0; i < KERNELS; i++) {
         if (wanted(r, i) && !r->kernels[i]) {
-            BST_TRY(i <= READ
-                        ? bst_scene_kernel(ctx, r->device, staged, sizeof staged / sizeof *staged,
-                                           options, names[i], &r->kernels[i])
+            int sources = (int)(sizeof staged / sizeof *staged) - (i <= READ ? 2 : 0);
+            BST_TRY(i <= RAMP_FIT
+                        ? bst_scene_kernel(ctx, r->device, staged, sources, options, names[i],
+                                           &r->kernels[i])
                         : bst_scene_kernel(ctx, r->device, moving, sizeof moving / sizeof *moving,
                                            "-cl-std=CL1.2", names[i], &r->kernels[i]));
         }
@@ -122,6 +150,13 @@ void bst_readout_free(bst_readout *r) {
     if (r->multiplication) {
         clReleaseMemObject(r->multiplication);
     }
+    if (r->planes) {
+        clReleaseMemObject(r->planes);
+    }
+    if (r->held) {
+        clReleaseMemObject(r->held);
+    }
+    bst_persistence_clear(&r->persistence);
     clReleaseCommandQueue(r->queue);
     clReleaseContext(r->context);
     free(r);
@@ -135,6 +170,8 @@ bst_window bst_readout_light_window(const bst_readout *r, bst_window window) {
     return light;
 }
 
+enum { RAMP_PLANES = 4 }; /* of kernels/ramp.cl */
+
 /* Row stride of an image, floats. */
 static int stride_of(int width) {
     return (width + 63) / 64 * 64;
@@ -145,10 +182,13 @@ bst_status bst_readout_image(bst_ctx *ctx, bst_readout *r, bst_window light, cl_
     *stride = stride_of(light.width);
     size_t bytes = (size_t)*stride * (size_t)light.height * sizeof(float);
     if (bytes > r->bytes) {
-        cl_mem *buffers[3] = {&r->image, &r->over, &r->full};
-        const size_t room[3] = {bytes, needs_over(r) ? bytes : 0,
-                                wanted(r, MARK) ? bytes / sizeof(float) : 0};
-        for (int i = 0; i < 3; i++) {
+        enum { BUFFERS = 5 };
+        cl_mem *buffers[BUFFERS] = {&r->image, &r->over, &r->full, &r->planes, &r->held};
+        bool ramp = wanted(r, RAMP);
+        const size_t room[BUFFERS] = {
+            bytes, needs_over(r) ? bytes : 0, wanted(r, MARK) ? bytes / sizeof(float) : 0,
+            ramp ? RAMP_PLANES * bytes : 0, ramp && wanted(r, PERSISTENCE) ? bytes : 0};
+        for (int i = 0; i < BUFFERS; i++) {
             if (*buffers[i]) {
                 clReleaseMemObject(*buffers[i]);
             }
@@ -248,7 +288,7 @@ static bst_status move_charge(bst_ctx *ctx, bst_readout *r, const bst_kernel_fra
         BST_TRY(enqueue_kernel(ctx, r, BLOOM, (arguments){p, sizeof *p, b, 2},
                                (size_t)p->light_stride / 16));
     }
-    if (wanted(r, MARK)) {
+    if (wanted(r, MARK) && !wanted(r, RAMP)) {
         cl_mem b[] = {r->image, r->full};
         BST_TRY(
             enqueue_kernel(ctx, r, MARK, (arguments){p, sizeof *p, b, 2}, (size_t)p->light_height));
@@ -270,15 +310,33 @@ static bst_status move_charge(bst_ctx *ctx, bst_readout *r, const bst_kernel_fra
     return BST_OK;
 }
 
-bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *detector,
-                           const bst_kernel_frame_params *params, bst_window window, int binning,
-                           cl_mem frame, cl_mem saturated) {
-    assert(r && detector && params && window.width > 0 && window.height > 0);
-    BST_TRY(bst_readout_prepare(ctx, r));
-    bst_window light = bst_readout_light_window(r, window);
+/* Pixels whose traps are followed. */
+static size_t persistent_pixels(const bst_readout *r) {
+    return (size_t)stride_of((int)r->camera.width_px) * (size_t)r->camera.height_px;
+}
+
+/* Expected charge in place of light, and the traps after the exposure, or after an interval of a
+ * ramp. maps: of the detector. */
+static bst_status enqueue_persistence(bst_ctx *ctx, bst_readout *r, const cl_mem *maps,
+                                      double start_s, int interval, bst_kernel_frame_params *p) {
+    const bst_detector_config *d = &r->camera.detector;
+    BST_TRY(bst_persistence_prepare(ctx, &r->persistence, r->device, d, persistent_pixels(r)));
+    assert((size_t)p->light_stride * (size_t)p->light_height == persistent_pixels(r));
+    bst_kernel_persistence_params t = bst_persistence_begin(&r->persistence, d, p, start_s);
+    t.in_ramp = wanted(r, RAMP);
+    t.continues = interval > 0;
+    cl_mem b[] = {r->image, maps[0], maps[1], maps[2], maps[6], r->persistence.trapped, r->held};
+    BST_TRY(enqueue_kernel(ctx, r, PERSISTENCE, (arguments){&t, sizeof t, b, 7},
+                           (size_t)p->light_height));
+    p->effects |= BST_EFFECT_MEANS;
+    return BST_OK;
+}
+
+/* Parameters of a frame whose light covers a window. */
+static bst_kernel_frame_params light_params(const bst_readout *r,
+                                            const bst_kernel_frame_params *params,
+                                            bst_window light) {
     bst_kernel_frame_params p = *params;
-    cl_mem maps[BST_DETECTOR_BUFFERS];
-    bst_detector_buffers(detector, maps);
     p.tiles_x0 = light.x0;
     p.light_y0 = light.y0;
     p.light_height = light.height;
@@ -286,20 +344,84 @@ bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *det
     p.real_y0 = (int)r->camera.detector.overscan.bottom;
     p.real_y1 = (int)(r->camera.height_px - r->camera.detector.overscan.top);
     p.effects |= wanted(r, MARK) ? BST_EFFECT_MARKS : 0;
+    return p;
+}
+
+bst_status bst_readout_interval(bst_ctx *ctx, bst_readout *r, const bst_detector *detector,
+                                const bst_kernel_frame_params *params, bst_window window,
+                                int interval, double start_s) {
+    assert(r && detector && params && wanted(r, RAMP) && interval >= 0);
+    BST_TRY(bst_readout_prepare(ctx, r));
+    const bst_detector_ramp_config *ramp = &r->camera.detector.ramp;
+    bst_kernel_frame_params p = light_params(r, params, bst_readout_light_window(r, window));
+    cl_mem maps[BST_DETECTOR_BUFFERS];
+    bst_detector_buffers(detector, maps);
+    if (wanted(r, PERSISTENCE)) {
+        BST_TRY(enqueue_persistence(ctx, r, maps, start_s, interval, &p));
+    }
+    r->ramp.frame = p;
+    r->ramp.interval = interval;
+    r->ramp.reads = (int)ramp->reads;
+    r->ramp.last_minus_first = ramp->fit == BST_RAMP_LAST_MINUS_FIRST;
+    for (int used = 2; interval == 0 && used <= r->ramp.reads; used++) {
+        double noise_e = bst_ramp_noise_e(ramp, r->camera.read_noise_e, used);
+        r->ramp.variance[used] = (float)(noise_e * noise_e);
+    }
+    cl_mem b[] = {r->image, maps[0], maps[1], maps[2], r->planes};
+    return enqueue_kernel(ctx, r, RAMP, (arguments){&r->ramp, sizeof r->ramp, b, 5},
+                          (size_t)p.light_height);
+}
+
+/* Charge of a frame in place of its light. */
+static bst_status collect_charge(bst_ctx *ctx, bst_readout *r, const cl_mem *maps, double start_s,
+                                 bst_kernel_frame_params *p) {
+    size_t columns = (size_t)p->light_stride, rows = (size_t)p->light_height;
+    if (wanted(r, RAMP)) {
+        cl_mem b[] = {r->image, r->planes, r->full};
+        return enqueue_kernel(ctx, r, RAMP_FIT, (arguments){&r->ramp, sizeof r->ramp, b, 3}, rows);
+    }
+    if (wanted(r, TRANSFER)) {
+        cl_mem b[] = {r->image, maps[0]};
+        BST_TRY(enqueue_kernel(ctx, r, TRANSFER, (arguments){p, sizeof *p, b, 2}, columns / 64));
+    }
+    if (wanted(r, PERSISTENCE)) {
+        BST_TRY(enqueue_persistence(ctx, r, maps, start_s, 0, p));
+    }
+    cl_mem charge[] = {r->image, maps[0], maps[1], maps[2], maps[6]};
+    return enqueue_kernel(ctx, r, CHARGE, (arguments){p, sizeof *p, charge, 5}, rows);
+}
+
+bst_status bst_readout_archive(bst_readout *r, bst_archive *archive) {
+    assert(r && archive);
+    return wanted(r, PERSISTENCE)
+               ? bst_persistence_archive(&r->persistence, r->device, &r->camera.detector,
+                                         persistent_pixels(r), archive)
+               : BST_OK;
+}
+
+void bst_readout_inherit(bst_readout *r, bst_readout *before) {
+    assert(r && before && persistent_pixels(r) == persistent_pixels(before));
+    bst_persistence_clear(&r->persistence);
+    r->persistence = before->persistence;
+    before->persistence = (bst_persistence){0};
+}
+
+bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *detector,
+                           const bst_kernel_frame_params *params, bst_window window, int binning,
+                           double start_s, cl_mem frame, cl_mem saturated) {
+    assert(r && detector && params && window.width > 0 && window.height > 0);
+    BST_TRY(bst_readout_prepare(ctx, r));
+    bst_kernel_frame_params p = light_params(r, params, bst_readout_light_window(r, window));
+    cl_mem maps[BST_DETECTOR_BUFFERS];
+    bst_detector_buffers(detector, maps);
     p.binning = binning;
     p.window_width = window.width / binning;
     p.window_height = window.height / binning;
-    size_t columns = (size_t)p.light_stride, rows = (size_t)p.light_height;
-    if (wanted(r, TRANSFER)) {
-        cl_mem b[] = {r->image, maps[0]};
-        BST_TRY(enqueue_kernel(ctx, r, TRANSFER, (arguments){&p, sizeof p, b, 2}, columns / 64));
-    }
-    cl_mem charge[] = {r->image, maps[0], maps[1], maps[2], maps[6]};
-    BST_TRY(enqueue_kernel(ctx, r, CHARGE, (arguments){&p, sizeof p, charge, 5}, rows));
+    BST_TRY(collect_charge(ctx, r, maps, start_s, &p));
     BST_TRY(move_charge(ctx, r, &p));
     p.per_full_well /= (float)(binning * binning);
-    cl_mem read[] = {r->image, frame,   saturated, maps[3],
-                     maps[4],  maps[5], r->full,   r->multiplication};
+    cl_mem table = wanted(r, RAMP) ? r->planes : r->multiplication;
+    cl_mem read[] = {r->image, frame, saturated, maps[3], maps[4], maps[5], r->full, table};
     return enqueue_kernel(ctx, r, READ, (arguments){&p, sizeof p, read, 8},
                           (size_t)p.window_height);
 }

@@ -4,6 +4,7 @@
 #ifndef BST_SCENEGEN_DETECTOR_READOUT_H
 #define BST_SCENEGEN_DETECTOR_READOUT_H
 
+#include "boresight/archive.h"
 #include "boresight/messages.h"
 #include "scenegen/detector/detector.h"
 #include "scenegen/kernels/scene_shared.h"
@@ -33,13 +34,32 @@ bst_window bst_readout_light_window(const bst_readout *readout, bst_window windo
 bst_status bst_readout_image(bst_ctx *ctx, bst_readout *readout, bst_window light, cl_mem *image,
                              int *stride) BST_MUST_CHECK;
 
-/* Enqueues the read-out of a frame from the light image.
+/* Enqueues an interval of a ramp: its light, of the light image, becomes charge that is read. After
+ * the last one bst_readout_run makes the frame.
+ *
+ * Given:     params    of the interval
+ *            window    on the sensor, before binning
+ *            interval  0, 1, ...
+ *            start_s   start of the interval */
+bst_status bst_readout_interval(bst_ctx *ctx, bst_readout *readout, const bst_detector *detector,
+                                const bst_kernel_frame_params *params, bst_window window,
+                                int interval, double start_s) BST_MUST_CHECK;
+
+/* Enqueues the read-out of a frame from the light image, or from the intervals of a ramp.
  *
  * Given:     params     of the frame: window, exposure, noise
  *            window     on the sensor, before binning
+ *            start_s    start of the exposure, for persistence
  *            saturated  room for one int per frame row */
 bst_status bst_readout_run(bst_ctx *ctx, bst_readout *readout, const bst_detector *detector,
                            const bst_kernel_frame_params *params, bst_window window, int binning,
-                           cl_mem frame, cl_mem saturated) BST_MUST_CHECK;
+                           double start_s, cl_mem frame, cl_mem saturated) BST_MUST_CHECK;
+
+/* Saves or restores what pixels keep from frame to frame; nothing without persistence.
+ *
+ * Errors:    BST_ERR_DEVICE, BST_ERR_MEMORY, BST_ERR_FORMAT */
+bst_status bst_readout_archive(bst_readout *readout, bst_archive *archive) BST_MUST_CHECK;
+/* Takes over what pixels of the same sensor kept with another read-out, which keeps nothing. */
+void bst_readout_inherit(bst_readout *readout, bst_readout *before);
 
 #endif

@@ -2,7 +2,7 @@
  * light, binning. An image holds the light of all rows; charge replaces it and is read out from
  * there. One work-item per row, or per 64 columns; surplus work-items of the last group do nothing,
  * so that the groups of all frames have one size. Options: TAIL (read_tail.cl); MULTIPLY (a
- * multiplication register). */
+ * multiplication register); RAMP (charge is the line through several reads, ramp.cl). */
 
 /* image: [light_height][light_stride] floats, from column p.tiles_x0 and row p.light_y0 of the
  * sensor. */
@@ -99,16 +99,28 @@ READOUT_GROUP kernel void bst_detector_charge(bst_kernel_frame_params p, global 
         size_t map = (size_t)row * p.maps_stride + column;
         uint counter = counter_of(row, column, p.sensor_width);
         chunk m = load_chunk(line + x);
-        if (!HAS(p, BST_EFFECT_TRANSFER)) {
+        if (!HAS(p, BST_EFFECT_TRANSFER | BST_EFFECT_MEANS)) {
             m = expected_chunk(p, maps, map, m);
         }
-        m = add_dark(p, maps, map, m);
-        lanes mean[4] = {m.a, m.b, m.c, m.d}, drawn[4];
+        if (!HAS(p, BST_EFFECT_MEANS)) {
+            m = add_dark(p, maps, map, m);
+        }
+        lanes mean[4] = {m.a, m.b, m.c, m.d}, drawn[4], below[4];
+        if (HAS(p, BST_EFFECT_MEANS)) { /* a hit may fill more traps than its pixel has other charge */
+            KEEP_LOOP
+            for (int v = 0; v < 4; v++) {
+                below[v] = fmin(mean[v], 0.0f);
+                mean[v] = fmax(mean[v], 0.0f);
+            }
+        }
         draw_charges(p, counter, mean, drawn);
         KEEP_LOOP
         for (int v = 0; v < 4; v++) {
             if (HAS(p, BST_EFFECT_OVERLAY)) {
                 drawn[v] += ((global const lanes *)(overlay + map))[v];
+            }
+            if (HAS(p, BST_EFFECT_MEANS)) {
+                drawn[v] = fmax(drawn[v] + below[v], 0.0f);
             }
             if (!HAS(p, BST_EFFECT_BLOOM)) {
                 drawn[v] = fmin(drawn[v], p.full_well_e);
@@ -290,7 +302,8 @@ INLINE chunk gather_charge(bst_kernel_frame_params p, global const float *image,
 
 /* Reads charge as digital numbers: p.binning x p.binning pixels are summed before they are read.
  * frame: [window_height][window_width], both after binning. saturated: pixels per row. full: of
- * bst_detector_mark, with BST_EFFECT_MARKS. table: of multiply_chunk. One work-item per frame row. */
+ * bst_detector_mark, with BST_EFFECT_MARKS. table: of multiply_chunk, or with RAMP the variance of
+ * the read noise of each pixel, as image. One work-item per frame row. */
 READOUT_GROUP kernel void bst_detector_read(bst_kernel_frame_params p, global const float *image, global ushort *frame,
                               global int *saturated, global const float *offsets,
                               global const ushort *codes, global uchar *flags,
@@ -316,10 +329,19 @@ READOUT_GROUP kernel void bst_detector_read(bst_kernel_frame_params p, global co
         q = multiply_chunk(p, table, counter, q);
 #endif
         chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
+#ifdef RAMP
+        chunk_flags none;
+        chunk noise = gather_charge(p, table, full, row, x - skip, &none);
+        e.a = fma(sqrt(noise.a), z.a, q.a);
+        e.b = fma(sqrt(noise.b), z.b, q.b);
+        e.c = fma(sqrt(noise.c), z.c, q.c);
+        e.d = fma(sqrt(noise.d), z.d, q.d);
+#else
         e.a = read_out(p, q.a, z.a);
         e.b = read_out(p, q.b, z.b);
         e.c = read_out(p, q.c, z.c);
         e.d = read_out(p, q.d, z.d);
+#endif
         DRAW_TAIL(p, row / b, first + x, p.sensor_width / b, &tail);
         e = ADD_TAIL(&tail, row / b, e);
         chunk dn = convert_chunk(p, maps, row, first + x, e);

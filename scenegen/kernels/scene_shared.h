@@ -34,8 +34,9 @@
 #define BST_HIT_GROUP 64
 /* Work-items of a work-group of the staged read-out. */
 #define BST_READOUT_GROUP 64
-/* Multiplication register (multiplication.h): fewer electrons than this have a row in its table each,
- * the others share an empty one; each has so many steps from -reach to reach standard deviations. */
+/* Multiplication register (multiplication.h): fewer electrons than this have a row in its table
+ * each, the others share an empty one; each has so many steps from -reach to reach standard
+ * deviations. */
 #define BST_MULTIPLY_FEW 16
 #define BST_MULTIPLY_STEPS 448
 #define BST_MULTIPLY_REACH 7.0f
@@ -72,6 +73,7 @@
 #define BST_EFFECT_READOUT 512
 #define BST_EFFECT_PICK_UP 1024
 #define BST_EFFECT_MARKS 2048 /* pixels at full well are marked before charge moves on */
+#define BST_EFFECT_MEANS 4096 /* the image holds expected charge, dark current included */
 
 /* Laws of bst_kernel_vignetting_params: none; the fourth power of the cosine of the field angle,
  * 1 / (1 + v1 s)^2; a polynomial, 1 + v1 s + v2 s^2 + v3 s^3. s: squared distance from the centre.
@@ -150,6 +152,29 @@ typedef struct bst_kernel_trap_params {
     float density[BST_TRAP_KINDS]; /* traps in a pixel over reference charge to `exponent` */
     float release[BST_TRAP_KINDS]; /* share released in the time of one transfer */
 } bst_kernel_trap_params;
+
+#define BST_PERSISTENCE_KINDS 5
+/* Traps that keep charge from frame to frame (kernels/persistence.cl). */
+typedef struct bst_kernel_persistence_params {
+    bst_kernel_frame_params frame;
+    int kinds;                             /* species with traps */
+    int in_ramp;                           /* the image is the charge of an interval of a ramp */
+    int continues;                         /* not its first interval: the pixels hold charge */
+    float share[BST_PERSISTENCE_KINDS];    /* of the charge that they hold after a long time */
+    float gap[BST_PERSISTENCE_KINDS];      /* of their charge that stays between the exposures */
+    float stay[BST_PERSISTENCE_KINDS];     /* and during the exposure */
+    float fill[BST_PERSISTENCE_KINDS];     /* of `share` that a steady growth from 0 has filled */
+    float duration[BST_PERSISTENCE_KINDS]; /* of the exposure in time constants */
+} bst_kernel_persistence_params;
+
+/* A ramp of non-destructive reads (kernels/ramp.cl). */
+typedef struct bst_kernel_ramp_params {
+    bst_kernel_frame_params frame; /* of the interval */
+    int interval;                  /* 0, 1, ...: that before read interval + 1 */
+    int reads;
+    int last_minus_first; /* instead of the least-squares line */
+    float variance[65];   /* of the read noise, by the number of reads used, e-^2 */
+} bst_kernel_ramp_params;
 
 /* Effects between pixels of an image (kernels/charge_coupling.cl). */
 typedef struct bst_kernel_coupling_params {

@@ -58,7 +58,7 @@ static const char import_help[] =
     "usage: boresight stars import FILE [options]\n"
     "\n"
     "Makes a star catalogue of a table of stars, or of Tycho-2 (the file tycho2_2.orig.tar.xz).\n"
-    "A table is CSV or ECSV (also gzipped) or FITS, as Gaia's archive and VizieR deliver them:\n"
+    "A table is VOTable, CSV, ECSV or FITS, gzipped or not, as Gaia's archive and VizieR have it:\n"
     "ra, dec (degrees, ICRS), ref_epoch, pmra, pmdec (mas/yr), phot_g_mean_mag, bp_rp, source_id;\n"
     "or v_mag, b_minus_v; or electrons_per_s. Stars that the base has too are united.\n"
     "\n"

@@ -2,6 +2,7 @@
 #include <GeographicLib/Config.h>
 #include <civetweb.h>
 #include <erfaextra.h>
+#include <expat.h>
 #include <fitsio.h>
 #include <png.h>
 #include <sqlite3.h>
@@ -54,6 +55,9 @@ static cJSON *libraries(void) {
     cJSON_AddStringToObject(out, "libpng", png_get_libpng_ver(NULL));
     cJSON_AddStringToObject(out, "zlib", zlibVersion());
     cJSON_AddStringToObject(out, "civetweb", mg_version());
+    XML_Expat_Version expat = XML_ExpatVersionInfo();
+    snprintf(text, sizeof text, "%d.%d.%d", expat.major, expat.minor, expat.micro);
+    cJSON_AddStringToObject(out, "Expat", text);
     return out;
 }
 

@@ -91,28 +91,33 @@ static bst_status check_columns(bst_ctx *ctx, const bst_star_table *t) {
     return BST_OK;
 }
 
+/* True if a path ends with `end`, in any case. */
+static bool ends_with(const char *path, const char *end) {
+    size_t length = strlen(path), n = strlen(end);
+    return length > n && strcasecmp(path + length - n, end) == 0;
+}
+
 /* Opens a table by the first bytes of its file. */
 static bst_status open_kind(bst_ctx *ctx, bst_star_table *t) {
     int fd;
     uint64_t bytes;
     BST_TRY(bst_file_open(ctx, t->path, UINT64_C(1) << 40,
-                          "a table of stars (CSV, ECSV, both also gzipped, or FITS)", &fd, &bytes));
+                          "a table of stars (CSV, ECSV, VOTable, all also gzipped, or FITS)", &fd,
+                          &bytes));
     unsigned char head[512] = {0};
     ssize_t got = read(fd, head, sizeof head - 1);
     close(fd);
     const char *text = (const char *)head;
-    size_t path_length = strlen(t->path);
     bool gzip = got > 2 && head[0] == 0x1F && head[1] == 0x8B;
-    bool gzipped_fits =
-        gzip && path_length > 8 && strcasecmp(t->path + path_length - 8, ".fits.gz") == 0;
-    if (gzipped_fits || strncmp(text, "SIMPLE  =", 9) == 0) {
+    if ((gzip && ends_with(t->path, ".fits.gz")) || strncmp(text, "SIMPLE  =", 9) == 0) {
         return bst_star_fits_open(ctx, t);
     }
     if (strncmp(text, "<?xml", 5) == 0 || strstr(text, "<VOTABLE")) {
-        return bst_fail(ctx, BST_ERR_FORMAT,
-                        "%s: a VOTable, which is not read; make a FITS table of it, for example "
-                        "by astropy: Table.read(\"x.vot\").write(\"x.fits\")",
-                        t->path);
+        return bst_star_votable_open(ctx, t, false);
+    }
+    if (gzip && (ends_with(t->path, ".vot.gz") || ends_with(t->path, ".xml.gz") ||
+                 ends_with(t->path, ".votable.gz"))) {
+        return bst_star_votable_open(ctx, t, true);
     }
     return bst_star_text_open(ctx, t, gzip);
 }
@@ -167,8 +172,9 @@ bst_status bst_star_table_next(bst_ctx *ctx, bst_star_table *t, bst_star_table_r
     for (;;) {
         double v[BST_STAR_QUANTITIES];
         *row = (bst_star_table_row){0};
-        BST_TRY(t->text ? bst_star_text_next(ctx, t, &row->source, v, end)
-                        : bst_star_fits_next(ctx, t, &row->source, v, end));
+        BST_TRY(t->votable ? bst_star_votable_next(ctx, t, &row->source, v, end)
+                : t->text  ? bst_star_text_next(ctx, t, &row->source, v, end)
+                           : bst_star_fits_next(ctx, t, &row->source, v, end));
         if (*end) {
             return BST_OK;
         }
@@ -209,6 +215,7 @@ void bst_star_table_close(bst_star_table *t) {
     if (!t) {
         return;
     }
+    bst_star_votable_close(t);
     if (t->text && t->unzips) {
         /* an unread rest is no failure */
         (void)bst_subprocess_wait(&t->unzip);

@@ -8,6 +8,7 @@
 
 #include "sim/catalogue/star_table.h"
 #include "sim/core/subprocess.h"
+#include "sim/core/text_reader.h"
 
 typedef enum bst_star_quantity {
     BST_STAR_RA,
@@ -48,6 +49,8 @@ typedef struct bst_star_column_unit {
     char name[72], unit[40];
 } bst_star_column_unit;
 
+typedef struct bst_star_votable bst_star_votable;
+
 struct bst_star_table {
     bst_star_table_options options;
     char path[512];
@@ -56,7 +59,7 @@ struct bst_star_table {
     char name[BST_STAR_QUANTITIES][72]; /* of the column, for messages */
     int64_t rows, skipped;
     /* text */
-    FILE *text; /* NULL: FITS */
+    FILE *text; /* NULL: FITS, VOTable */
     bst_subprocess unzip;
     bool unzips;
     char *line, *scratch;
@@ -64,6 +67,7 @@ struct bst_star_table {
     bool ecsv, blanks;       /* blanks divide the columns */
     bst_star_column_unit *units;
     int unit_count;
+    struct bst_star_votable *votable; /* NULL: another kind */
     /* FITS */
     fitsfile *fits;
     int64_t fits_rows;
@@ -84,6 +88,24 @@ bst_status bst_star_text_open(bst_ctx *ctx, bst_star_table *table, bool gzip) BS
  * Errors:    BST_ERR_FORMAT with file, line, column and text */
 bst_status bst_star_text_next(bst_ctx *ctx, bst_star_table *table, int64_t *source,
                               double value[BST_STAR_QUANTITIES], bool *end) BST_MUST_CHECK;
+
+/* True if a field of text says that there is no value. */
+bool bst_star_field_is_empty(bst_text_span field);
+/* Reads a whole number; false: it is none, or beyond 63 bits. */
+bool bst_star_source_read(bst_text_span field, int64_t *source);
+
+/* Opens a VOTable, unpacked by gzip if `gzip`, and finds the columns of its first table.
+ *
+ * Errors:    BST_ERR_FORMAT with file, line and what is allowed: also for document types and links
+ *            to other files, which are not followed; BST_ERR_IO, BST_ERR_MEMORY */
+bst_status bst_star_votable_open(bst_ctx *ctx, bst_star_table *table, bool gzip) BST_MUST_CHECK;
+
+/* Reads the next row of a VOTable, as bst_star_text_next. */
+bst_status bst_star_votable_next(bst_ctx *ctx, bst_star_table *table, int64_t *source,
+                                 double value[BST_STAR_QUANTITIES], bool *end) BST_MUST_CHECK;
+
+/* Closes a VOTable; nothing if there is none. */
+void bst_star_votable_close(bst_star_table *table);
 
 /* Opens a FITS file and finds the columns of its first binary table. BST_ERR_FORMAT,
  * BST_ERR_MEMORY. */

@@ -160,8 +160,7 @@ bst_status bst_star_text_open(bst_ctx *ctx, bst_star_table *t, bool gzip) {
     return BST_OK;
 }
 
-/* True if a field says that there is no value. */
-static bool is_empty(bst_text_span field) {
+bool bst_star_field_is_empty(bst_text_span field) {
     static const char *const words[] = {"null", "nan", "--", "n/a", "none"};
     bool empty = field.length == 0;
     for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
@@ -171,8 +170,7 @@ static bool is_empty(bst_text_span field) {
     return empty;
 }
 
-/* Reads a whole number. */
-static bool read_source(bst_text_span field, int64_t *out) {
+bool bst_star_source_read(bst_text_span field, int64_t *out) {
     bool negative = field.length > 1 && field.text[0] == '-';
     int64_t value = 0;
     for (size_t i = negative; i < field.length; i++) {
@@ -205,7 +203,7 @@ bst_status bst_star_text_next(bst_ctx *ctx, bst_star_table *t, int64_t *source,
         value[q] = NAN;
         if (t->column[q] >= 0 && t->column[q] < count) {
             bst_text_span field = fields[t->column[q]];
-            if (!is_empty(field) && !bst_text_number(field, &value[q])) {
+            if (!bst_star_field_is_empty(field) && !bst_text_number(field, &value[q])) {
                 char problem[112];
                 snprintf(problem, sizeof problem, "bad number in column %s", t->name[q]);
                 return bst_text_fail_at(&where, &line, problem, field.text, field.length,
@@ -214,7 +212,7 @@ bst_status bst_star_text_next(bst_ctx *ctx, bst_star_table *t, int64_t *source,
         }
     }
     if (t->source_column >= 0 && t->source_column < count) {
-        (void)read_source(fields[t->source_column], source);
+        (void)bst_star_source_read(fields[t->source_column], source);
     }
     return BST_OK;
 }

@@ -29,7 +29,7 @@ static void put_int(fitsfile *file, const char *key, long long value, const char
 }
 
 double bst_fits_saturation_dn(const bst_camera *camera, int bits) {
-    double full = camera->offset_dn + camera->full_well_e / camera->gain_e_per_dn;
+    double full = camera->offset_dn + bst_camera_full_e(camera) / camera->gain_e_per_dn;
     return fmin(full, (double)((1 << bits) - 1));
 }
 
@@ -61,7 +61,7 @@ void bst_fits_put_run_keys(fitsfile *file, const bst_fits_names *names, int *cod
     put_text(file, "IMAGETYP", names->image_type, "kind of frame", code);
     fits_write_key_str(file, "BUNIT", "adu", "unit of the pixel values", code);
     put_real(file, "GAIN", c->gain_e_per_dn, "[e-/adu] electrons per count", code);
-    put_real(file, "RDNOISE", c->read_noise_e, "[e-] read noise, 1 sigma", code);
+    put_real(file, "RDNOISE", bst_camera_read_noise_e(c), "[e-] read noise, 1 sigma", code);
     put_real(file, "OFFSET", c->offset_dn, "[adu] value of a pixel without charge", code);
     put_real(file, "SATURATE", bst_fits_saturation_dn(c, (int)c->bits),
              "[adu] full well or end of the converter", code);
@@ -160,7 +160,8 @@ void bst_fits_put_frame_keys(fitsfile *file, const bst_fits_names *names,
     fits_write_key_str(file, "BUNIT", "adu", "unit of the pixel values", code);
     put_int(file, "BITS", frame->bits, "[bit] of the converter", code);
     put_real(file, "GAIN", names->camera.gain_e_per_dn, "[e-/adu] electrons per count", code);
-    put_real(file, "RDNOISE", names->camera.read_noise_e, "[e-] read noise, 1 sigma", code);
+    put_real(file, "RDNOISE", bst_camera_read_noise_e(&names->camera), "[e-] read noise, 1 sigma",
+             code);
     put_real(file, "OFFSET", names->camera.offset_dn, "[adu] value of a pixel without charge",
              code);
     put_real(file, "ZEROPNT", zero_point_mag(&names->camera),

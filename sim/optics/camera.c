@@ -1,5 +1,6 @@
 #include "boresight/camera.h"
 #include "sim/optics/band.h"
+#include "sim/optics/ramp_fit.h"
 
 #define DISTORTION(k, doc) BST_REAL(bst_camera_distortion, k, "", -1e30, 1e30, "0", doc)
 const bst_config_desc bst_distortion_config[] = {
@@ -155,10 +156,25 @@ double bst_camera_dark_e(const bst_camera *c, double exposure_s) {
 }
 
 double bst_camera_excess_noise(const bst_camera *c) {
+    if (c->detector.ramp.reads > 0) {
+        return bst_ramp_excess(&c->detector.ramp);
+    }
     return c->detector.em_gain > 1.0 ? 2.0 - 1.0 / c->detector.em_gain : 1.0;
+}
+
+double bst_camera_read_noise_e(const bst_camera *c) {
+    const bst_detector_ramp_config *ramp = &c->detector.ramp;
+    return ramp->reads > 0 ? bst_ramp_noise_e(ramp, c->read_noise_e, (int)ramp->reads)
+                           : c->read_noise_e;
+}
+
+double bst_camera_full_e(const bst_camera *c) {
+    int64_t reads = c->detector.ramp.reads;
+    return reads > 0 ? c->full_well_e * (double)(reads - 1) : c->full_well_e;
 }
 
 double bst_camera_noise_e(const bst_camera *c, double sky_e, double exposure_s) {
     double shot_e2 = bst_camera_excess_noise(c) * (sky_e + bst_camera_dark_e(c, exposure_s));
-    return sqrt(shot_e2 + c->read_noise_e * c->read_noise_e);
+    double read_e = bst_camera_read_noise_e(c);
+    return sqrt(shot_e2 + read_e * read_e);
 }

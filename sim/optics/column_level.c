@@ -11,7 +11,7 @@ const char *const bst_column_level_words[] = {"auto", "on", "off", NULL};
 
 bool bst_column_level_wanted(int choice, const bst_camera *camera) {
     const bst_detector_config *d = &camera->detector;
-    bool uneven =
-        d->frame_transfer_s > 0.0 || d->column_offset_rms_e > OFFSET_SHARE * camera->read_noise_e;
+    bool uneven = d->frame_transfer_s > 0.0 ||
+                  d->column_offset_rms_e > OFFSET_SHARE * bst_camera_read_noise_e(camera);
     return choice == BST_COLUMN_LEVEL_ON || (choice == BST_COLUMN_LEVEL_AUTO && uneven);
 }

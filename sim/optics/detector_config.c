@@ -3,6 +3,7 @@
 #include <math.h>
 
 static const char *const wells[] = {"clip", "bloom", NULL};
+static const char *const fits[] = {"slope", "last_minus_first", NULL};
 static const char *const quantisers[] = {"uniform", "square_root", "table", NULL};
 
 static const bst_config_desc cosmic_ray_table[] = {
@@ -87,6 +88,29 @@ static const bst_config_desc traps_table[] = {
     BST_CONFIG_END,
 };
 
+static const bst_config_desc persistence_table[] = {
+    BST_REALS(bst_detector_persistence_config, trapped_share, "", 0, 1, "[0, 0, 0, 0, 0]",
+              "Share of a pixel's charge that traps of five species hold after a long time; "
+              "together at most 1."),
+    BST_REALS(bst_detector_persistence_config, time_constant_s, "s", 1e-6, 1e9,
+              "[1, 10, 100, 1000, 10000]", "Their time constants of filling and of release."),
+    BST_CONFIG_END,
+};
+
+static const bst_config_desc ramp_table[] = {
+    BST_INT(bst_detector_ramp_config, reads, "", 0, BST_RAMP_READS, "0",
+            "Non-destructive reads at equal distances, the first at the start of the exposure, the "
+            "last at its end; 2 or more. 0: one read at the end."),
+    BST_ENUM(bst_detector_ramp_config, fit, fits, "\"slope\"",
+             "Frame: signal of the least-squares line through the reads below full_well_e (slope), "
+             "or the last of them minus the first."),
+    BST_REAL(bst_detector_ramp_config, flicker_noise_e, "e", 0, 1e5, "0",
+             "1/f noise of each pixel from read to read, RMS: equal power in each factor of 4 from "
+             "a period of some reads to one of several thousand. Beside it each read has "
+             "read_noise_e."),
+    BST_CONFIG_END,
+};
+
 static const bst_config_desc crosstalk_table[] = {
     BST_INT(bst_detector_crosstalk_config, outputs, "", 1, 64, "1",
             "Outputs that read equal numbers of columns at the same time."),
@@ -151,7 +175,7 @@ const bst_config_desc bst_detector_table[] = {
         "Rolling shutter: each row of the window is exposed so much later than the row before; "
         "below 0: from the last row on. The exposure's times are those of the window's middle "
         "row. 0: all rows at once. Not with frame_transfer_s, saturation bloom, traps, "
-        "interpixel_coupling, brighter_fatter_per_e or crosstalk."),
+        "interpixel_coupling, brighter_fatter_per_e, crosstalk or persistence."),
     BST_OBJECT(bst_detector_config, output, output_table, "{}",
                "Where frames are read: at column 0, row 0 first, unless given."),
     BST_REAL(
@@ -181,6 +205,13 @@ const bst_config_desc bst_detector_table[] = {
     BST_OBJECT(bst_detector_config, serial_traps, traps_table, "{}",
                "Charge-transfer inefficiency along rows, towards the output; not with several "
                "outputs of crosstalk."),
+    BST_OBJECT(bst_detector_config, persistence, persistence_table, "{}",
+               "Charge that pixels keep and release into later frames; not with row_time_s."),
+    BST_OBJECT(bst_detector_config, ramp, ramp_table, "{}",
+               "Up-the-ramp sampling of infrared arrays: a line is fitted to several reads of each "
+               "exposure. Not with effects of moving charge (bloom, traps, frame_transfer_s, "
+               "readout_s, clock_induced_e, glow, em_gain), row_time_s, brighter_fatter_per_e or "
+               "telegraph noise."),
     BST_REAL(bst_detector_config, em_gain, "", 1, 1e5, "1",
              "Gain of an electron-multiplying register. All charge, read_noise_e and gain_e_per_dn "
              "are those before it; it adds the noise of multiplication."),
@@ -212,7 +243,7 @@ bool bst_detector_config_whole_columns(const bst_detector_config *d) {
 
 bool bst_detector_config_whole_sensor(const bst_detector_config *d) {
     return bst_detector_has_traps(&d->serial_traps) || d->interpixel_coupling > 0.0 ||
-           d->brighter_fatter_per_e > 0.0 ||
+           d->brighter_fatter_per_e > 0.0 || bst_detector_has_persistence(d) ||
            (d->crosstalk.outputs > 1 && d->crosstalk.coupling != 0.0);
 }
 
@@ -225,6 +256,51 @@ bool bst_detector_has_traps(const bst_detector_traps_config *t) {
     return false;
 }
 
+bool bst_detector_has_persistence(const bst_detector_config *d) {
+    for (int i = 0; i < BST_PERSISTENCE_SPECIES; i++) {
+        if (d->persistence.trapped_share[i] > 0.0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* A ramp against what excludes it. */
+static bst_status check_ramp(bst_ctx *ctx, const bst_detector_config *d) {
+    if (d->ramp.reads == 0) {
+        return BST_OK;
+    }
+    if (d->ramp.reads == 1) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "ramp/reads: 1 read gives no slope; allowed are 0 (no ramp) and 2 to %d",
+                        BST_RAMP_READS);
+    }
+    const struct {
+        bool on;
+        const char *key;
+    } others[] = {{d->row_time_s != 0.0, "row_time_s"},
+                  {d->frame_transfer_s > 0.0, "frame_transfer_s"},
+                  {d->saturation == BST_WELL_BLOOM, "saturation \"bloom\""},
+                  {bst_detector_has_traps(&d->parallel_traps), "parallel_traps"},
+                  {bst_detector_has_traps(&d->serial_traps), "serial_traps"},
+                  {d->brighter_fatter_per_e > 0.0, "brighter_fatter_per_e"},
+                  {d->em_gain > 1.0, "em_gain"},
+                  {d->readout_s > 0.0, "readout_s"},
+                  {d->clock_induced_e > 0.0, "clock_induced_e"},
+                  {d->glow.peak_e > 0.0, "glow"},
+                  {d->cosmic_rays.readout_s > 0.0, "cosmic_rays/readout_s"},
+                  {d->telegraph_noise_fraction > 0.0, "telegraph_noise_fraction"}};
+    for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
+        if (others[i].on) {
+            return bst_fail(ctx, BST_ERR_CONFIG,
+                            "ramp/reads: %lld non-destructive reads go not with %s; set one of "
+                            "them to its default",
+                            (long long)d->ramp.reads, others[i].key);
+        }
+    }
+    return BST_OK;
+}
+
 bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d) {
     if (d->row_time_s != 0.0 && bst_detector_config_whole_columns(d)) {
         return bst_fail(
@@ -232,7 +308,18 @@ bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d)
             "row_time_s: a rolling shutter goes neither with frame_transfer_s nor with "
             "the saturation \"bloom\": charge that runs along columns belongs to sensors "
             "that expose all rows at once; nor with traps, coupling of pixels, "
-            "brighter_fatter_per_e or crosstalk; set one of them to its default");
+            "brighter_fatter_per_e, crosstalk or persistence; set one of them to its default");
+    }
+    BST_TRY(check_ramp(ctx, d));
+    double trapped = 0.0;
+    for (int i = 0; i < BST_PERSISTENCE_SPECIES; i++) {
+        trapped += d->persistence.trapped_share[i];
+    }
+    if (trapped > 1.0 + 1e-9) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "persistence/trapped_share: all species together trap %g of the charge, "
+                        "but at most 1 is there; give smaller shares",
+                        trapped);
     }
     if (bst_detector_has_traps(&d->serial_traps) && d->crosstalk.outputs > 1) {
         return bst_fail(ctx, BST_ERR_CONFIG,

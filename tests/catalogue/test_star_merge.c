@@ -398,7 +398,68 @@ static void test_bad_tables(void **state) {
         {"ra,dec,epoch,v,pmra\n", "one column of proper motion only; the other may be named pmdec"},
         {"# %ECSV 1.0\n# - {name: ra, unit: rad, datatype: float64}\nra dec epoch v\n1 2 2000 5\n",
          "column ra: unit \"rad\"; allowed: deg"},
-        {"<?xml version=\"1.0\"?>\n<VOTABLE>", "a VOTable, which is not read"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE>", "is no XML: no element found"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE></VOTABLE>", "has no TABLE with FIELDs"},
+        {"<?xml version=\"1.0\"?>\n<!DOCTYPE VOTABLE [<!ENTITY a \"b\">]><VOTABLE>&a;</VOTABLE>",
+         "a document type declaration is not allowed"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
+         "datatype=\"degrees\"/>",
+         "column ra: datatype \"degrees\" with arraysize \"\" is not"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
+         "datatype=\"int\" arraysize=\"2x0\"/>",
+         "with arraysize \"2x0\" is not"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
+         "datatype=\"char\" arraysize=\"*\"/>",
+         "column ra does not hold one number"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
+         "datatype=\"float\" unit=\"rad\"/>",
+         "column ra: unit \"rad\"; allowed: deg"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
+         "datatype=\"double\" unit=\"deg\"/><FIELD name=\"dec\" "
+         "datatype=\"double\"/></TABLE></RESOURCE></VOTABLE>",
+         "has no column of magnitudes"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
+         "datatype=\"double\" unit=\"deg\"/><FIELD name=\"dec\" datatype=\"double\"/><FIELD "
+         "name=\"V\" datatype=\"float\"/><FIELD name=\"epoch\" "
+         "datatype=\"short\"/><DATA><TABLEDATA><TR><TD>1</TD></TR>",
+         "a row has fewer cells than"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
+         "datatype=\"double\" unit=\"deg\"/><FIELD name=\"dec\" datatype=\"double\"/><FIELD "
+         "name=\"V\" datatype=\"float\"/><FIELD name=\"epoch\" "
+         "datatype=\"short\"/><DATA><TABLEDATA><TR><TD>1</TD><TD>2</TD><TD/><TD/><TD/></TR>",
+         "a row has more cells than"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
+         "datatype=\"double\" unit=\"deg\"/><FIELD name=\"dec\" datatype=\"double\"/><FIELD "
+         "name=\"V\" datatype=\"float\"/><FIELD name=\"epoch\" "
+         "datatype=\"short\"/><DATA><TABLEDATA><TR><TD>1</TD><TD>two</TD>",
+         "row 1: bad number in column dec: \"two\""},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
+         "datatype=\"double\" unit=\"deg\"/><FIELD name=\"dec\" datatype=\"double\"/><FIELD "
+         "name=\"V\" datatype=\"float\"/><FIELD name=\"epoch\" "
+         "datatype=\"short\"/><DATA><BINARY2><STREAM encoding=\"base64\">A*==</STREAM>",
+         "the STREAM is not base64"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
+         "datatype=\"double\" unit=\"deg\"/><FIELD name=\"dec\" datatype=\"double\"/><FIELD "
+         "name=\"V\" datatype=\"float\"/><FIELD name=\"epoch\" "
+         "datatype=\"short\"/><DATA><BINARY2><STREAM encoding=\"base64\">AAAA</STREAM>",
+         "the STREAM ends within a row"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
+         "datatype=\"double\" unit=\"deg\"/><FIELD name=\"dec\" datatype=\"double\"/><FIELD "
+         "name=\"V\" datatype=\"float\"/><FIELD name=\"epoch\" "
+         "datatype=\"short\"/><DATA><BINARY><STREAM encoding=\"gzip\"/>",
+         "another encoding than base64"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
+         "datatype=\"double\" unit=\"deg\"/><FIELD name=\"dec\" datatype=\"double\"/><FIELD "
+         "name=\"V\" datatype=\"float\"/><FIELD name=\"epoch\" "
+         "datatype=\"short\"/><DATA><BINARY2><STREAM href=\"file:///etc/passwd\" "
+         "encoding=\"base64\"/>",
+         "refers to another file by href"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
+         "datatype=\"double\" unit=\"deg\"/><FIELD name=\"dec\" datatype=\"double\"/><FIELD "
+         "name=\"V\" datatype=\"float\"/><FIELD name=\"epoch\" datatype=\"short\"/><DATA><FITS>",
+         "its rows are a FITS file"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE><INFO name=\"QUERY_STATUS\" value=\"ERROR\"/>",
+         "the query that made it has failed"},
         {"SIMPLE  =                    T", "cannot be opened"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {

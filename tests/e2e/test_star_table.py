@@ -9,7 +9,7 @@ import warnings
 import astropy.units as u
 import numpy as np
 from astropy.coordinates import SkyCoord
-from astropy.table import Table
+from astropy.table import MaskedColumn, Table
 from astropy.time import Time
 
 import runs
@@ -48,7 +48,21 @@ class StarTable(unittest.TestCase):
         with open(self.path("t.csv"), "rb") as plain, gzip.open(self.path("t.csv.gz"), "wb") as packed:
             packed.write(plain.read())
         images = []
-        for kind in ("t.csv", "t.csv.gz", "t.ecsv", "t.fits", "blanks.ecsv"):
+        # columns beside ours: strings of any length, arrays, flags, complex numbers, values that are missing
+        wide = table.copy()
+        wide.add_column([f"star {'x' * (i % 5)}" for i in range(n)], name="designation", index=0)
+        wide.add_column(rng.normal(size=(n, 3)).astype(np.float32), name="xp", index=2)
+        wide["flag"], wide["spectrum"] = rng.uniform(size=n) < 0.5, rng.normal(size=n) + 1j
+        for form in ("binary", "tabledata", "binary2"):
+            if form == "binary2":  # has a mask of missing values
+                wide["radial_velocity"] = MaskedColumn(rng.normal(size=n), mask=np.arange(n) % 7 == 0)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of names without a unit
+                wide.write(self.path(form + ".vot"), format="votable", tabledata_format=form)
+        with open(self.path("binary2.vot"), "rb") as plain, gzip.open(self.path("b.vot.gz"), "wb") as packed:
+            packed.write(plain.read())
+        for kind in ("t.csv", "t.csv.gz", "t.ecsv", "t.fits", "blanks.ecsv", "tabledata.vot", "binary.vot", "binary2.vot",
+                     "b.vot.gz"):
             self.load(kind, kind + ".stars", "--base", "none")
             with open(self.path(kind + ".stars"), "rb") as file:
                 images.append(file.read())

@@ -249,8 +249,23 @@ static void catalogue_of_the_twin(void **state) {
                                      .b_minus_v = -0.17F,
                                      .id = i == 1 ? 51 : (uint32_t)i + 70};
     }
+    /* beside the found star of 5 mag: one that is as bright is that star, a fainter one is not */
+    double x, y;
+    bst_quat q = bst_twin_path_attitude(&t.model.path, 0.5);
+    assert_true(
+        bst_camera_project(&t.model.camera, bst_quat_rotate(q, t.model.stars[2].apparent), &x, &y));
+    script.count = 6;
+    for (int i = 3; i < 6; i++) {
+        script.stars[i] = (bst_star){.icrs = direction_of(&t, x + (i == 5 ? 3.0 : 1.2), y - 1.0),
+                                     .v_mag = i == 4 ? 6.0F : 5.4F,
+                                     .b_minus_v = NAN,
+                                     .id = (uint32_t)i + 70};
+    }
     bst_assert_ok(&ctx, bst_twin_write_stars(&ctx, &t, &c, "out"));
-    assert_int_equal(script.written_count, 4);
+    assert_null(written(73));
+    assert_non_null(written(74));
+    assert_non_null(written(75));
+    assert_int_equal(script.written_count, 6);
     /* 2e5 e- a second: 5 mag; BT-VT = 1, V = VT - 0.09 */
     const bst_star_values *s = written(50);
     assert_non_null(s);

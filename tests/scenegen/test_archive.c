@@ -192,6 +192,7 @@ static void any_exposure(void **state) {
           "{\"name\": \"cam\", \"camera\": {\"width_px\": 512, \"height_px\": 512, "
           "\"pixel_scale_arcsec\": 12, \"aperture_m\": 0.15, \"full_well_e\": 3e4, "
           "\"detector\": {\"saturation\": \"bloom\", \"row_noise_e\": 3, "
+          "\"persistence\": {\"trapped_share\": [0.1, 0, 0.2, 0, 0]}, "
           "\"cosmic_rays\": {\"rate_per_cm2_s\": 40}}, "
           "\"background\": {\"gradient_e_per_s\": [20, -10], \"stray_e_per_s\": 40}}}",
           shots, 6);

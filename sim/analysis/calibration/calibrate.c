@@ -258,7 +258,8 @@ static bst_status add_star(bst_ctx *ctx, bst_calibration_fitter *c, const bst_tr
     const bst_detections *detections = f->detections;
     const bst_generator_result *theory = f->theory;
     const bst_camera *camera = c->path.camera;
-    double plain = sqrt(f->dark_e + camera->read_noise_e * camera->read_noise_e);
+    double read_e = bst_camera_read_noise_e(camera);
+    double plain = sqrt(f->dark_e + read_e * read_e);
     /* the excess of its background is missing in the filter output */
     double missing = (detections->background_e - theory->background_e) /
                      (bst_crlb_table_norm(&c->bound, length_of(t)) * detections->noise_e);

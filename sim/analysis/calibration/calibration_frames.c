@@ -33,11 +33,11 @@ typedef struct job {
     bst_device *device;
     bst_renderer *renderer;
     char name[160]; /* observer/sensor */
+    double start_s; /* of the next frame: all follow one another after 1 s, for persistence */
 } job;
 
 /* Renders and writes one bias, dark or flat frame. */
-static bst_status write_frame(bst_ctx *ctx, const job *j, const series *s, int64_t i,
-                              bst_fits *fits) {
+static bst_status write_frame(bst_ctx *ctx, job *j, const series *s, int64_t i, bst_fits *fits) {
     const bst_camera *camera = &j->sensor->camera;
     double time_s[2] = {0.0, s->exposure_s};
     bst_quat q[2] = {BST_QUAT_IDENTITY, BST_QUAT_IDENTITY};
@@ -49,7 +49,9 @@ static bst_status write_frame(bst_ctx *ctx, const job *j, const series *s, int64
         .background_e = s->level_e + dark_e,
         .dark_e = dark_e,
         .key = bst_rng_make_key(j->scenario->seed, (uint64_t)j->scenario->run, j->name, s->type),
-        .exposure_id = i};
+        .exposure_id = i,
+        .start_s = j->start_s};
+    j->start_s += s->exposure_s + 1.0;
     bst_frame *frame;
     const uint16_t *pixels;
     BST_TRY(bst_renderer_render(ctx, j->renderer, &request, &frame));
@@ -83,7 +85,7 @@ static bst_status draft_of(bst_ctx *ctx, const char *path, char *draft, size_t b
 }
 
 /* Writes the FITS file of one series: bias, dark or flat. */
-static bst_status write_series(bst_ctx *ctx, const job *j, const series *s) {
+static bst_status write_series(bst_ctx *ctx, job *j, const series *s) {
     if (s->count == 0) {
         return BST_OK;
     }

@@ -9,6 +9,10 @@
 static const double LEAST_RADIUS_RAD = 3.0 * BST_DEG_RAD, TIMES_FIELD = 3.0;
 /* Tycho-2's bands: V = VT - 0.090 (BT-VT), B-V = 0.850 (BT-VT) (its ReadMe, note 7). */
 static const double V_PER_COLOUR = 0.090, B_MINUS_V_PER_COLOUR = 0.850;
+/* A star of the catalogue so near to a found one, and so alike, is that star: its streak only
+ * reaches into the frame, and the fit began without it. Of 28 such stars of hidden paths, all were
+ * within 1.2 px and 15 % (docs/results/twin.md). */
+static const double SAME_PX = 2.0, SAME_MAG = 0.75;
 /* BT-VT of stars without a colour. */
 static const double USUAL_COLOUR = 0.7;
 
@@ -56,9 +60,24 @@ static int add_fitted(const bst_twin *t, const bst_twin_camera *c, bst_star_valu
     return n;
 }
 
+/* True if a star of the catalogue is one that the residual showed. */
+static bool was_found(const bst_twin *t, const bst_twin_camera *c, const bst_star *s) {
+    const double apart = SAME_PX * bst_camera_scale_rad(&t->model.camera);
+    const bst_vec3 apparent = bst_light_apparent_star(&t->light, s->icrs);
+    for (int i = 0; i < t->model.count; i++) {
+        const bst_twin_star *f = &t->model.stars[i];
+        if (f->found && f->flux_e > 0.0 &&
+            bst_vec3_norm(bst_vec3_sub(f->apparent, apparent)) < apart &&
+            fabs(v_of(t, c, f) - (double)s->v_mag) < SAME_MAG) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Adds the catalogue's other stars about the frame. */
-static void add_others(const bst_twin *t, const bst_star *stars, int found, bst_star_values *out,
-                       int *count) {
+static void add_others(const bst_twin *t, const bst_twin_camera *c, const bst_star *stars,
+                       int found, bst_star_values *out, int *count) {
     uint32_t fitted[BST_TWIN_STARS];
     int known = 0;
     for (int i = 0; i < t->model.count; i++) {
@@ -69,7 +88,7 @@ static void add_others(const bst_twin *t, const bst_star *stars, int found, bst_
     qsort(fitted, (size_t)known, sizeof *fitted, by_id);
     for (int i = 0; i < found; i++) {
         const bst_star *s = &stars[i];
-        if (!bsearch(&s->id, fitted, (size_t)known, sizeof *fitted, by_id)) {
+        if (!bsearch(&s->id, fitted, (size_t)known, sizeof *fitted, by_id) && !was_found(t, c, s)) {
             out[(*count)++] = values_of(s->icrs, (double)s->v_mag, (double)s->b_minus_v, s->id);
         }
     }
@@ -97,7 +116,7 @@ bst_status bst_twin_write_stars(bst_ctx *ctx, const bst_twin *t, const bst_twin_
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d stars", found);
     }
     count = add_fitted(t, c, values);
-    add_others(t, others, found, values, &count);
+    add_others(t, c, others, found, values, &count);
     status = bst_star_write(ctx, values, (size_t)count, &patch, path);
     free(values);
     free(others);

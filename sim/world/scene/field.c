@@ -261,9 +261,9 @@ typedef struct query {
     bst_los_track own; /* track of the exposure alone */
     bst_quat mean;
     bst_window window;
-    double margin_px; /* around the window, including the motion during the exposure */
-    bst_vec3
-        centre; /* cone of directions that contains the window with its margin: axis, half angle */
+    bst_window lit;   /* part of the sensor whose sources count: the window, or more */
+    double margin_px; /* around `lit`, including the motion during the exposure */
+    bst_vec3 centre;  /* cone of directions that contains `lit` with its margin: axis, half angle */
     double radius;
     bst_world_state eye;
     bst_bodies bodies;
@@ -320,10 +320,23 @@ static void fill_header(const bst_field *field, const query *q, bst_truth *truth
     truth->dark_e = bst_camera_dark_e(camera, q->exposure_s);
 }
 
-/* Computes the cone of directions that contains the window. */
+/* Part of the sensor whose light reaches the pixels of a window before they are read. */
+static bst_window light_window(const bst_camera *camera, bst_window window) {
+    if (bst_detector_config_whole_columns(&camera->detector)) {
+        window.y0 = 0;
+        window.height = (int)camera->height_px;
+    }
+    if (bst_detector_config_whole_sensor(&camera->detector)) {
+        window.x0 = 0;
+        window.width = (int)camera->width_px;
+    }
+    return window;
+}
+
+/* Computes the cone of directions that contains the lit part of the sensor. */
 static void find_cone(const bst_field *field, query *q) {
     const bst_camera *camera = field->camera;
-    bst_window window = q->window;
+    bst_window window = q->lit;
     bst_vec3 centre_cam = bst_camera_unproject(camera, window.x0 + 0.5 * (window.width - 1),
                                                window.y0 + 0.5 * (window.height - 1));
     q->centre = bst_quat_rotate(bst_quat_conj(field->q_mid), centre_cam);
@@ -357,15 +370,7 @@ static bst_status find_background(bst_ctx *ctx, bst_field *field, const query *q
         around.q[k] = bst_los_track_attitude(&q->own, q->exposure_s * k / BST_DISC_PARTS);
     }
     if (bodies_in_field(camera, &around, window, truth) || bst_skylight_varies(camera)) {
-        bst_window lit = window;
-        if (bst_detector_config_whole_columns(&camera->detector)) {
-            lit.y0 = 0;
-            lit.height = (int)camera->height_px;
-        }
-        if (bst_detector_config_whole_sensor(&camera->detector)) {
-            lit.x0 = 0;
-            lit.width = (int)camera->width_px;
-        }
+        bst_window lit = light_window(camera, window);
         BST_TRY(bst_skylight_make(ctx, field->skylight, &around, lit, &field->map));
         truth->background_e = bst_skylight_at(field->map, window.x0 + 0.5 * (window.width - 1),
                                               window.y0 + 0.5 * (window.height - 1));
@@ -404,12 +409,12 @@ static bst_status query_stars(bst_ctx *ctx, bst_field *field, const query *q, do
     }
 }
 
-/* Makes the source of a star. False: its image does not touch the window. */
+/* Makes the source of a star. False: its image does not touch the lit part of the sensor. */
 static bool make_star(const bst_field *field, const query *q, const bst_star *star,
                       bst_scene_source *s) {
     const bst_camera *camera = field->camera;
     bst_vec3 apparent = bst_light_apparent_star(&q->light, star->icrs);
-    if (!near_window(field, field->q_mid, apparent, q->window, q->margin_px)) {
+    if (!near_window(field, field->q_mid, apparent, q->lit, q->margin_px)) {
         return false;
     }
     *s = (bst_scene_source){.kind = BST_SOURCE_STAR,
@@ -455,7 +460,7 @@ static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, i
                                             .camera = field->camera,
                                             .span = span,
                                             .q_mid = field->q_mid,
-                                            .window = q->window,
+                                            .window = q->lit,
                                             .margin_px = q->margin_px,
                                             .centre = q->centre,
                                             .radius = q->radius};
@@ -482,6 +487,7 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     query q = {.start_s = (double)start_tick / (double)tick_rate_hz,
                .end_s = (double)end_tick / (double)tick_rate_hz,
                .window = window,
+               .lit = options->read_charge ? light_window(field->camera, window) : window,
                .v_limit = options->v_limit,
                .faint_limit = fmin(options->v_limit, field->world->faint_limit_v_mag)};
     q.mid_s = 0.5 * (q.start_s + q.end_s);

@@ -44,7 +44,8 @@ struct bst_scene_source_body;
 /* A source whose light may reach the window. */
 typedef struct bst_scene_source {
     int32_t kind; /* bst_source_kind */
-    uint32_t id;  /* star: identity in the catalogue, or statistical (bit 31); object: index in the world */
+    uint32_t id;  /* star: identity in the catalogue, or statistical (bit 31); object: index in the
+                     world */
     bst_vec3 apparent_mid;               /* at mid-exposure, GCRF axes, unit */
     const bst_scene_source_path *path;   /* NULL: at rest; owned by the creator of the source */
     const bst_scene_source_rate *rate;   /* NULL: constant; owned by the creator */
@@ -148,6 +149,8 @@ typedef struct bst_field_options {
     double margin_px; /* margin around the window in which sources still count (PSF wings) */
     double lead_s;    /* rolling shutter: the track extends by this before and after the exposure of
                          the window's middle row */
+    bool read_charge; /* sources count that light any part of the sensor whose charge the read-out
+                         of the window depends on (bst_detector_config_whole_columns) */
 } bst_field_options;
 
 typedef struct bst_field

@@ -161,8 +161,8 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
         bst_field_background_e(field, header, image.x_mean, image.y_mean) + header->dark_e;
     /* binned pixels are read once; their sum is the image blurred by a wider box */
     double added = (double)binning * binning, widened = (added - 1.0) / 12.0;
-    double variance = bst_camera_excess_noise(camera) * dark +
-                      camera->read_noise_e * camera->read_noise_e / added;
+    double read_e = bst_camera_read_noise_e(camera);
+    double variance = bst_camera_excess_noise(camera) * dark + read_e * read_e / added;
     double length = hypot(out->x_end_px - out->x_start_px, out->y_end_px - out->y_start_px);
     double along, across;
     double sharp = bst_image_blur(camera, source, &image, out->x_end_px - out->x_start_px,
@@ -182,7 +182,8 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     /* peak of the image: point 1 / (2 pi sigma^2); long streak 1 / (sqrt(2 pi) sigma length) */
     double peak =
         out->electrons / (2.0 * BST_PI * across * hypot(along, length / sqrt(2.0 * BST_PI)));
-    if (peak + dark > camera->full_well_e && !source->body) { /* a body: bst_truth_list_fill */
+    if (peak + dark > bst_camera_full_e(camera) &&
+        !source->body) { /* a body: bst_truth_list_fill */
         out->flags |= BST_TRUTH_SATURATED;
     }
 }

@@ -101,7 +101,7 @@ static void flag_saturated(const bst_truth_list *list, const bst_truth_request *
             peak_e *= truth->shapes[shape].peak_ratio;
         }
         /* wells saturate before binning, the converter after it */
-        if (peak_e >= camera->full_well_e - dark_e ||
+        if (peak_e >= bst_camera_full_e(camera) - dark_e ||
             peak_e * binned_share(camera, binning, item) >= top_e - added * dark_e) {
             item->flags |= BST_TRUTH_SATURATED;
         }
