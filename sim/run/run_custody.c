@@ -133,7 +133,9 @@ static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, uint64_t seed)
         if (!elements) {
             continue;
         }
-        BST_TRY(bst_custody_orbit_init(ctx, elements, offset_s, &c->orbits[i]));
+        /* half the radius of a sphere as large as the object is catalogued */
+        double photocentre_m = 0.5 * sqrt(bst_world_object(c->world, i)->area_m2 / BST_PI);
+        BST_TRY(bst_custody_orbit_init(ctx, elements, offset_s, photocentre_m, &c->orbits[i]));
         for (int k = 0; k < BST_CUSTODY_STATE; k++) {
             normals[k] = bst_rng_normal(key, (uint64_t)i, (uint64_t)k);
         }

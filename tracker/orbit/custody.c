@@ -10,9 +10,9 @@
 
 enum { N = BST_CUSTODY_STATE, SETS = 2 * N + 1, MOST_ITERATIONS = 5 };
 #define DAY_S 86400.0
-/* Step of central differences, m: large against the rounding of SGP4 (1e-6 m), small against the
- * range of an object. */
-#define STEP_M 20.0
+/* Below this inclination SGP4's periodics are not smooth in its elements (Lyddane's, by Sun and
+ * Moon: 0.02 degrees), and differences are those of osculating elements. */
+#define LEAST_INCLINATION_RAD (0.2 * BST_DEG_RAD)
 /* Times about that of an observation at which positions give its velocity, s. */
 #define APART_S 8.0
 enum { PLACES = 5 };
@@ -20,7 +20,7 @@ enum { PLACES = 5 };
 /* ------------------------------------------------------------------ Elements */
 
 bst_status bst_custody_orbit_init(bst_ctx *ctx, const bst_elements *elements, double epoch_offset_s,
-                                  bst_custody_orbit *out) {
+                                  double photocentre_m, bst_custody_orbit *out) {
     double n = elements->mean_motion_radpmin / 60.0;
     if (!(n > 0.0 && elements->eccentricity < 1.0)) {
         return bst_fail(ctx, BST_ERR_NUMERIC,
@@ -29,7 +29,8 @@ bst_status bst_custody_orbit_init(bst_ctx *ctx, const bst_elements *elements, do
     }
     *out = (bst_custody_orbit){.elements = *elements,
                                .epoch_offset_s = epoch_offset_s,
-                               .a_m = cbrt(BST_EARTH_MU_M3PS2 / (n * n))};
+                               .a_m = cbrt(BST_EARTH_MU_M3PS2 / (n * n)),
+                               .photocentre_m = photocentre_m};
     return BST_OK;
 }
 
@@ -84,71 +85,136 @@ void bst_custody_age(const bst_custody_config *config, double time_s, bst_custod
 
 /* ------------------------------------------------------------------ Prediction */
 
-/* Element sets about a state: x itself, then x plus and minus a step in each component. */
+/* Least step of central differences, m, large against the rounding of SGP4 (1e-6 m). Otherwise it
+ * is the standard deviation of the component, so that a slope is the mean one over what is possible
+ * (Norgaard, Poulsen and Ravn, "New developments in state estimation for nonlinear systems",
+ * Automatica 36, 2000). */
+#define LEAST_STEP_M 20.0
+
+/* Motion at one time of the sets about a state: of x itself, then of x plus and minus a step in
+ * each component; TEME, m and m/s. */
 typedef struct bundle {
-    bst_sgp4 *sgp4[SETS];
+    bst_vec3 r[SETS], v[SETS];
+    double step_m[N];
 } bundle;
 
-static void free_bundle(bundle *b) {
-    for (int i = 0; i < SETS; i++) {
-        bst_sgp4_free(b->sgp4[i]);
+/* State x of a set of a bundle. */
+static void deviation(const double x[N], const bundle *b, int set, double y[N]) {
+    memcpy(y, x, N * sizeof *y);
+    if (set > 0) {
+        int k = (set - 1) / 2;
+        y[k] += set % 2 ? b->step_m[k] : -b->step_m[k];
     }
 }
 
-static bool make_bundle(const bst_custody_orbit *o, const double x[N], bundle *out) {
-    *out = (bundle){.sgp4 = {NULL}};
-    for (int i = 0; i < SETS; i++) {
-        bst_elements set;
+/* Position and its derivative, by the polynomial through five places. */
+static bool motion(const bst_sgp4 *sgp4, double seconds, bst_vec3 *r, bst_vec3 *v) {
+    const bst_sgp4 *sets[PLACES];
+    double minutes[PLACES];
+    bst_sgp4_state at[PLACES];
+    bst_vec3 p[PLACES];
+    for (int i = 0; i < PLACES; i++) {
+        sets[i] = sgp4;
+        minutes[i] = (seconds + APART_S * (i - PLACES / 2)) / 60.0;
+    }
+    bst_sgp4_propagate_many(sets, minutes, PLACES, at);
+    for (int i = 0; i < PLACES; i++) {
+        if (at[i].error != BST_SGP4_OK) {
+            return false;
+        }
+        const double *km = at[i].position_teme_km;
+        p[i] = (bst_vec3){1e3 * km[0], 1e3 * km[1], 1e3 * km[2]};
+    }
+    bst_vec3 near = bst_vec3_scale(bst_vec3_sub(p[3], p[1]), 8.0);
+    *v = bst_vec3_scale(bst_vec3_sub(near, bst_vec3_sub(p[4], p[0])), 1.0 / (12.0 * APART_S));
+    *r = p[PLACES / 2];
+    return true;
+}
+
+/* Motion on the elements that differ from the catalogued ones by x. */
+static bool sgp4_motion(const bst_custody_orbit *o, const double x[N], double time_s, bst_vec3 *r,
+                        bst_vec3 *v) {
+    bst_elements set;
+    bst_sgp4 *sgp4;
+    if (!elements_at(o, x, &set) ||
+        bst_sgp4_create(NULL, &set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &sgp4) != BST_OK) {
+        return false;
+    }
+    bool good = motion(sgp4, o->epoch_offset_s + time_s, r, v);
+    bst_sgp4_free(sgp4);
+    return good;
+}
+
+/* State of an ellipse with these elements about a point mass. */
+static void ellipse_state(const bst_elements *set, bst_vec3 *r, bst_vec3 *v) {
+    const double n = set->mean_motion_radpmin / 60.0, e = set->eccentricity;
+    const double a = cbrt(BST_EARTH_MU_M3PS2 / (n * n)), m = set->mean_anomaly_rad;
+    double anomaly = m + e * sin(m);
+    for (int i = 0; i < 20; i++) {
+        anomaly -= (anomaly - e * sin(anomaly) - m) / (1.0 - e * cos(anomaly));
+    }
+    const double c = cos(anomaly), s = sin(anomaly), root = sqrt(1.0 - e * e);
+    const double rate = n * a / (1.0 - e * c);
+    const double cw = cos(set->arg_perigee_rad), sw = sin(set->arg_perigee_rad);
+    const double co = cos(set->raan_rad), so = sin(set->raan_rad);
+    const double ci = cos(set->inclination_rad), si = sin(set->inclination_rad);
+    const bst_vec3 p = {co * cw - so * sw * ci, so * cw + co * sw * ci, sw * si};
+    const bst_vec3 q = {-co * sw - so * cw * ci, -so * sw + co * cw * ci, cw * si};
+    *r = bst_vec3_axpy(bst_vec3_scale(p, a * (c - e)), a * root * s, q);
+    *v = bst_vec3_axpy(bst_vec3_scale(p, -rate * s), rate * root * c, q);
+}
+
+/* Motion of an orbit near the equator: the catalogued one, whose osculating elements differ by x.
+ * What perturbations do to the difference, a thousandth of it in a revolution, is left out. */
+static bool near_equator_motion(const bst_custody_orbit *o, bst_vec3 cat_r, bst_vec3 cat_v,
+                                const double x[N], double time_s, bst_vec3 *r, bst_vec3 *v) {
+    const bst_astro_kepler_elements k =
+        bst_astro_kepler_elements_of(BST_EARTH_MU_M3PS2, cat_r, cat_v);
+    if (!(k.semi_major_axis_m > 0.0)) {
+        return false;
+    }
+    const double a = k.semi_major_axis_m;
+    const bst_custody_orbit osculating = {
+        .elements = {.mean_motion_radpmin = 60.0 * sqrt(BST_EARTH_MU_M3PS2 / a) / a,
+                     .eccentricity = k.eccentricity,
+                     .inclination_rad = k.inclination_rad,
+                     .raan_rad = k.raan_rad,
+                     .arg_perigee_rad = k.arg_perigee_rad,
+                     .mean_anomaly_rad = k.mean_anomaly_rad},
+        .epoch_offset_s = -time_s, /* its elements are those of time_s */
+        .a_m = o->a_m};
+    bst_elements set;
+    if (!elements_at(&osculating, x, &set)) {
+        return false;
+    }
+    ellipse_state(&set, r, v);
+    return true;
+}
+
+static bool make_bundle(const bst_custody_orbit *o, const double x[N], const double p[N][N],
+                        double time_s, bundle *out) {
+    bst_vec3 r = {0}, v = {0};
+    const double none[N] = {0.0};
+    const bool flat = o->elements.inclination_rad < LEAST_INCLINATION_RAD;
+    for (int k = 0; k < N; k++) {
+        out->step_m[k] = fmax(sqrt(p[k][k]), LEAST_STEP_M);
+    }
+    bool good = !flat || sgp4_motion(o, none, time_s, &r, &v);
+    for (int i = 0; good && i < SETS; i++) {
         double y[N];
-        memcpy(y, x, sizeof y);
-        if (i > 0) {
-            y[(i - 1) / 2] += i % 2 ? STEP_M : -STEP_M;
-        }
-        if (!elements_at(o, y, &set) ||
-            bst_sgp4_create(NULL, &set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &out->sgp4[i]) !=
-                BST_OK) {
-            free_bundle(out);
-            return false;
-        }
+        deviation(x, out, i, y);
+        good = flat ? near_equator_motion(o, r, v, y, time_s, &out->r[i], &out->v[i])
+                    : sgp4_motion(o, y, time_s, &out->r[i], &out->v[i]);
     }
-    return true;
-}
-
-/* Positions of the sets at APART_S times -2 to 2 about a time. */
-static bool propagate(const bst_custody_orbit *o, const bundle *b, double time_s,
-                      bst_sgp4_state out[SETS][PLACES]) {
-    const bst_sgp4 *sets[SETS * PLACES];
-    double minutes[SETS * PLACES];
-    for (int i = 0; i < SETS * PLACES; i++) {
-        sets[i] = b->sgp4[i / PLACES];
-        minutes[i] = (o->epoch_offset_s + time_s + APART_S * (i % PLACES - PLACES / 2)) / 60.0;
-    }
-    bst_sgp4_propagate_many(sets, minutes, SETS * PLACES, &out[0][0]);
-    for (int i = 0; i < SETS * PLACES; i++) {
-        if (out[i / PLACES][i % PLACES].error != BST_SGP4_OK) {
-            return false;
-        }
-    }
-    return true;
-}
-
-static bst_vec3 place_of(const bst_sgp4_state *s) {
-    const double *r = s->position_teme_km;
-    return (bst_vec3){1e3 * r[0], 1e3 * r[1], 1e3 * r[2]};
+    return good;
 }
 
 /* Direction and rate of a set from the observer, relative to the observed direction in its tangent
- * axes. The velocity is the derivative of the polynomial through five positions. */
-static void see(const bst_custody_observation *z, const bst_sgp4_state states[PLACES],
-                double out[4]) {
-    bst_vec3 far = bst_vec3_sub(place_of(&states[4]), place_of(&states[0]));
-    bst_vec3 near = bst_vec3_sub(place_of(&states[3]), place_of(&states[1]));
-    bst_vec3 v =
-        bst_vec3_scale(bst_vec3_axpy(bst_vec3_scale(near, 8.0), -1.0, far), 1.0 / (12.0 * APART_S));
-    const bst_od_state state = {
-        .time_s = z->observer.time_s,
-        .position_m = bst_mat3_mul_vec(&z->gcrf_from_teme, place_of(&states[2])),
-        .velocity_mps = bst_mat3_mul_vec(&z->gcrf_from_teme, v)};
+ * axes. */
+static void see(const bst_custody_observation *z, bst_vec3 r_teme, bst_vec3 v_teme, double out[4]) {
+    const bst_od_state state = {.time_s = z->observer.time_s,
+                                .position_m = bst_mat3_mul_vec(&z->gcrf_from_teme, r_teme),
+                                .velocity_mps = bst_mat3_mul_vec(&z->gcrf_from_teme, v_teme)};
     bst_od_sight sight;
     bst_od_see(&state, &z->observer, &sight);
     const bst_tangent axes = bst_tangent_at(z->direction);
@@ -160,32 +226,34 @@ static void see(const bst_custody_observation *z, const bst_sgp4_state states[PL
     out[3] = bst_vec3_dot(axes.e2, r);
 }
 
-/* Innovation and slope at a state. */
-static bool linearise(const bst_custody_orbit *o, const double x[N],
-                      const bst_custody_observation *z, bst_custody_prediction *out) {
+/* Innovation and slope at a state; *seen_as: the observation with the variance of the object's
+ * photocentre at the range of that state. */
+static bool linearise(const bst_custody_orbit *o, const double x[N], const double p[N][N],
+                      const bst_custody_observation *z, bst_custody_prediction *out,
+                      bst_custody_observation *seen_as) {
     bundle b;
-    bst_sgp4_state states[SETS][PLACES] = {0};
-    if (!make_bundle(o, x, &b)) {
+    if (!make_bundle(o, x, p, z->observer.time_s, &b)) {
         return false;
     }
-    bool good = propagate(o, &b, z->observer.time_s, states);
-    free_bundle(&b);
-    if (!good) {
-        return false;
-    }
+    const bst_vec3 line =
+        bst_vec3_sub(bst_mat3_mul_vec(&z->gcrf_from_teme, b.r[0]), z->observer.position_m);
+    const double spread = o->photocentre_m / bst_vec3_norm(line);
+    *seen_as = *z;
+    seen_as->covariance[0][0] += spread * spread;
+    seen_as->covariance[1][1] += spread * spread;
     const bst_tangent axes = bst_tangent_at(z->direction);
     double seen[4];
-    see(z, states[0], seen);
+    see(z, b.r[0], b.v[0], seen);
     out->innovation[0] = -seen[0];
     out->innovation[1] = -seen[1];
     out->innovation[2] = bst_vec3_dot(axes.e1, z->rate_radps) - seen[2];
     out->innovation[3] = bst_vec3_dot(axes.e2, z->rate_radps) - seen[3];
     for (int k = 0; k < N; k++) {
         double plus[4], minus[4];
-        see(z, states[1 + 2 * k], plus);
-        see(z, states[2 + 2 * k], minus);
+        see(z, b.r[1 + 2 * k], b.v[1 + 2 * k], plus);
+        see(z, b.r[2 + 2 * k], b.v[2 + 2 * k], minus);
         for (int i = 0; i < 4; i++) {
-            out->slope[i][k] = (plus[i] - minus[i]) / (2.0 * STEP_M);
+            out->slope[i][k] = (plus[i] - minus[i]) / (2.0 * b.step_m[k]);
         }
     }
     return true;
@@ -241,10 +309,11 @@ static void solve(const gain *g, const double y[4], double out[4]) {
 bool bst_custody_predict(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                          const bst_custody_observation *observation, bst_custody_prediction *out) {
     assert(orbit && filter && observation && out);
+    bst_custody_observation z;
     gain g;
     double w[4];
-    if (!linearise(orbit, filter->x, observation, out) ||
-        !make_gain(filter->p, out, observation, &g)) {
+    if (!linearise(orbit, filter->x, filter->p, observation, out, &z) ||
+        !make_gain(filter->p, out, &z, &g)) {
         return false;
     }
     solve(&g, out->innovation, w);
@@ -306,9 +375,11 @@ bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observ
     double x[N];
     memcpy(x, filter->x, sizeof x);
     bst_custody_prediction at;
+    bst_custody_observation z;
     gain g;
     for (int iteration = 0; iteration < MOST_ITERATIONS; iteration++) {
-        if (!linearise(orbit, x, observation, &at) || !make_gain(filter->p, &at, observation, &g)) {
+        if (!linearise(orbit, x, filter->p, observation, &at, &z) ||
+            !make_gain(filter->p, &at, &z, &g)) {
             return false;
         }
         /* x = x0 + K (y(x) - H (x0 - x)) */
@@ -333,29 +404,22 @@ bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observ
         }
     }
     memcpy(filter->x, x, sizeof x);
-    update_covariance(&g, &at, observation, filter->p);
+    update_covariance(&g, &at, &z, filter->p);
     return true;
 }
 
 bool bst_custody_place(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                        double time_s, bst_vec3 *position_teme_m, double *sigma_m) {
     bundle b;
-    bst_sgp4_state states[SETS][PLACES] = {0};
-    if (!make_bundle(orbit, filter->x, &b)) {
+    if (!make_bundle(orbit, filter->x, filter->p, time_s, &b)) {
         return false;
     }
-    bool good = propagate(orbit, &b, time_s, states);
-    free_bundle(&b);
-    if (!good) {
-        return false;
-    }
-    *position_teme_m = place_of(&states[0][PLACES / 2]);
+    *position_teme_m = b.r[0];
     bst_vec3 slope[N];
     double sum = 0.0;
     for (int k = 0; k < N; k++) {
-        slope[k] = bst_vec3_scale(bst_vec3_sub(place_of(&states[1 + 2 * k][PLACES / 2]),
-                                               place_of(&states[2 + 2 * k][PLACES / 2])),
-                                  1.0 / (2.0 * STEP_M));
+        slope[k] =
+            bst_vec3_scale(bst_vec3_sub(b.r[1 + 2 * k], b.r[2 + 2 * k]), 1.0 / (2.0 * b.step_m[k]));
     }
     for (int i = 0; i < N; i++) {
         for (int j = 0; j < N; j++) {

@@ -35,6 +35,9 @@ typedef struct bst_custody_orbit {
     bst_elements elements;
     double epoch_offset_s; /* time 0 minus the epoch of the elements */
     double a_m;            /* semi-major axis */
+    /* standard deviation of the photocentre from the centre of mass along each axis, m: of a sunlit
+     * sphere up to 0.59 radii (a Lambertian one, 3 pi / 16) */
+    double photocentre_m;
 } bst_custody_orbit;
 
 /* Filter of an object. */
@@ -67,7 +70,7 @@ typedef struct bst_custody_prediction {
  *
  * Errors:    BST_ERR_NUMERIC for elements that are no ellipse */
 bst_status bst_custody_orbit_init(bst_ctx *ctx, const bst_elements *elements, double epoch_offset_s,
-                                  bst_custody_orbit *out) BST_MUST_CHECK;
+                                  double photocentre_m, bst_custody_orbit *out) BST_MUST_CHECK;
 
 /* Starts a filter with the covariance of the catalogue. Its error is drawn from that covariance:
  * `normals` are standard normal deviates; NULL: none. */
