@@ -29,6 +29,8 @@ enum { LEAST_HITS = 5 };
 #define CANDIDATE_SIGMAS 6.0
 /* a track belongs to the object within this distance of it, as in sightings.c */
 #define TRACK_PX 5.0
+/* an object nearer than this is the observer's spacecraft itself, m */
+#define ITSELF_M 10.0
 
 /* A track that has not ended: its newest state with a detection. */
 typedef struct slot {
@@ -94,12 +96,13 @@ static const bst_io_column object_columns[] = {
     REAL("chi2_mean", "", "mean of the tracks' chi-square, 4 degrees of freedom each"),
 };
 
-static bst_io_value integer(int64_t value, bool known) {
+static bst_io_value whole_number(int64_t value, bool known) {
     return (bst_io_value){.type = BST_COLUMN_INT, .is_null = !known, .as.integer = value};
 }
 
-static bst_io_value real(double value) {
-    return (bst_io_value){.type = BST_COLUMN_REAL, .is_null = !isfinite(value), .as.real = value};
+static bst_io_value number(double value) {
+    bool known = isfinite(value);
+    return (bst_io_value){.type = BST_COLUMN_REAL, .is_null = !known, .as.real = value};
 }
 
 /* ---- making it ---- */
@@ -277,8 +280,8 @@ typedef struct match {
 } match;
 
 /* Finds the object that an observation belongs to by the catalogue, and by the truth. */
-static bst_status find_object(bst_ctx *ctx, bst_run_custody *c, int sensor,
-                              const bst_custody_observation *z, match *out) {
+static void find_object(bst_run_custody *c, int sensor, const bst_custody_observation *z,
+                        match *out) {
     *out =
         (match){.best = -1, .true_object = -1, .chi2 = NAN, .merit = INFINITY, .second = INFINITY};
     const double time_s = z->observer.time_s;
@@ -289,7 +292,8 @@ static bst_status find_object(bst_ctx *ctx, bst_run_custody *c, int sensor,
         bst_world_sight sight;
         bst_ctx quiet = {0}; /* an orbit that has ended is no error here */
         if (!may_be(c, i, z) ||
-            bst_world_view_sight_from(&quiet, c->view, &eye, i, time_s, &sight) != BST_OK) {
+            bst_world_view_sight_from(&quiet, c->view, &eye, i, time_s, &sight) != BST_OK ||
+            sight.range_m < ITSELF_M) {
             continue;
         }
         double away = bst_vec3_angle(sight.geometric, z->direction);
@@ -316,8 +320,6 @@ static bst_status find_object(bst_ctx *ctx, bst_run_custody *c, int sensor,
             out->second = fmin(out->second, merit);
         }
     }
-    (void)ctx;
-    return BST_OK;
 }
 
 /* Correlates a track that has ended, and updates its object. */
@@ -330,7 +332,7 @@ static bst_status end_track(bst_ctx *ctx, bst_run_custody *c, int sensor, slot *
     bst_custody_observation z;
     match m;
     BST_TRY(observe(ctx, c, sensor, &ended, &z));
-    BST_TRY(find_object(ctx, c, sensor, &z, &m));
+    find_object(c, sensor, &z, &m);
     bst_custody_figures *f = &c->figures;
     bool clear = m.best >= 0 && m.second > m.merit + LIKELIHOOD_MARGIN;
     bool updated = clear && bst_custody_update(&c->orbits[m.best], &z, &c->filters[m.best]);
@@ -353,15 +355,15 @@ static bst_status end_track(bst_ctx *ctx, bst_run_custody *c, int sensor, slot *
     if (!c->tracks) {
         return BST_OK;
     }
-    const bst_io_value row[] = {integer(sensor, true),
-                                integer(ended.id, true),
-                                real(z.observer.time_s),
-                                integer(ended.hits, true),
-                                integer(m.count, true),
-                                integer(m.best, updated),
-                                integer(m.true_object, m.true_object >= 0),
-                                real(m.chi2),
-                                real(nees)};
+    const bst_io_value row[] = {whole_number(sensor, true),
+                                whole_number(ended.id, true),
+                                number(z.observer.time_s),
+                                whole_number(ended.hits, true),
+                                whole_number(m.count, true),
+                                whole_number(m.best, updated),
+                                whole_number(m.true_object, m.true_object >= 0),
+                                number(m.chi2),
+                                number(nees)};
     return bst_io_table_append(ctx, c->tracks, row);
 }
 
@@ -433,17 +435,17 @@ static bst_status end_object(bst_ctx *ctx, bst_run_custody *c, int object, doubl
     if (!c->objects) {
         return BST_OK;
     }
-    const bst_io_value row[] = {integer(object, true),
+    const bst_io_value row[] = {whole_number(object, true),
                                 {.type = BST_COLUMN_TEXT, .as.text = info->name},
-                                integer(info->norad, true),
-                                integer(s->updates, true),
-                                integer(s->cross_tags, true),
-                                real(s->last_s),
-                                real(end_s - s->last_s),
-                                real(*sigma_m),
-                                real(error_m),
-                                real(*nees),
-                                real(s->updates > 0 ? s->chi2_sum / (double)s->updates : NAN)};
+                                whole_number(info->norad, true),
+                                whole_number(s->updates, true),
+                                whole_number(s->cross_tags, true),
+                                number(s->last_s),
+                                number(end_s - s->last_s),
+                                number(*sigma_m),
+                                number(error_m),
+                                number(*nees),
+                                number(s->updates > 0 ? s->chi2_sum / (double)s->updates : NAN)};
     return bst_io_table_append(ctx, c->objects, row);
 }
 

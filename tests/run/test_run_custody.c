@@ -15,12 +15,15 @@ static const bst_recorder_config record = {.custody = true,
                                            .custody_drift_m_per_day = 1500,
                                            .custody_within_m = 1000};
 
-/* Two objects: INMARSAT GX5, and MOLNIYA 3-8. */
+/* Three objects: INMARSAT GX5, MOLNIYA 3-8, and the observer's spacecraft, which is in every
+ * direction. */
 static bst_world *world_of_two(void) {
-    return test_world_with("{\"name\": \"A\", " TEST_GX5
-                           "}, {\"name\": \"B\", \"orbit\": {\"elements_file\": "
-                           "\"scenarios/catalogue_2022-06.tle\", \"norad\": 10455}}",
-                           "");
+    return test_world_with(
+        "{\"name\": \"A\", " TEST_GX5
+        "}, {\"name\": \"B\", \"orbit\": {\"elements_file\": "
+        "\"scenarios/catalogue_2022-06.tle\", \"norad\": 10455}}, {\"name\": \"own\", " TEST_NEOSSAT
+        "}",
+        "");
 }
 
 /* Tracks of a frame: of `object` with `hits` detections, `off_rad` beside it; object below 0: none.
@@ -80,7 +83,7 @@ static void tracks_update_their_objects(void **state) {
     take_all(&ctx, c, world);
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 1000.0));
     assert_true(bst_run_custody_figures(c, &f));
-    assert_true(f.objects == 2 && f.updated == 2);
+    assert_true(f.objects == 3 && f.updated == 2);
     assert_true(f.tracks == 4 && f.correlated == 3 && f.uncorrelated == 1);
     assert_true(f.ambiguous == 0 && f.cross_tags == 0);
     bst_assert_close(f.age_mean_s, 0.5 * (300.0 + 800.0), 1e-9);
