@@ -6,10 +6,10 @@
 #include <pthread.h>
 
 #include "sim/engine/recorder/recorder.h"
+#include "sim/run/run_custody.h"
 #include "sim/run/run_pictures.h"
 #include "sim/run/run_saving.h"
 #include "sim/run/run_scenario.h"
-#include "sim/run/run_custody.h"
 #include "sim/run/run_sightings.h"
 #include "sim/run/run_watched.h"
 
