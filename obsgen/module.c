@@ -173,6 +173,7 @@ static bst_status prepare(const bst_module_env *env, obsgen *o) {
     BST_TRY(bst_generator_reserve_streaks(env->ctx, o->generator, (int)o->world_camera->width_px,
                                           (int)o->world_camera->height_px));
     BST_TRY(bst_field_create(env->ctx, env->world, env->observer, env->sensor, &o->field));
+    bst_field_set_background_places_only(o->field);
     BST_TRY(bst_optics_photometer_create(env->ctx, (int)c->capacity, &o->photometer));
     bst_env_set_capacity(env, PORT_TRUTH, (int)c->truth_capacity);
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)c->capacity);

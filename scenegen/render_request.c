@@ -72,7 +72,7 @@ bst_status bst_render_request_check(bst_ctx *ctx, const bst_camera *camera,
 
 /* A zero background map, for requests without one. */
 static const float nothing[4];
-static const bst_skylight_map no_background = {1 << 16, 0, 0, 2, 2, nothing, 0.0};
+static const bst_skylight_map no_background = {1 << 16, 0, 0, 2, 2, nothing, 0.0, NULL};
 
 const bst_skylight_map *bst_render_background(const bst_render_request *q) {
     return q->background ? q->background : &no_background;

@@ -180,9 +180,34 @@ void bst_tasking_noise(bst_tasking_sensor *s) {
     s->pixels = 1.0 / bst_optics_image_squared(sqrt(sigma2), sqrt(sigma2), 0.0);
 }
 
+/* Visibility of a target from a sensor: the quick test by the table of positions, then the exact
+ * one. Without navigation telemetry there is no quick test. */
+static bst_status survey_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int object,
+                              double seconds, bst_tasking_why *why) {
+    const bst_tasking_sensor *s = &t->sensors[sensor];
+    const bst_vec3 place = {t->place_m[0][object], t->place_m[1][object], t->place_m[2][object]};
+    *why = BST_WHY_NOT;
+    if (bst_knowledge_is_itself(s->knowledge, object)) {
+        *why = BST_WHY_ITSELF;
+    } else if (bst_vec3_norm(place) == 0.0) {
+        *why = BST_WHY_NO_ORBIT;
+    } else if (s->nav_known && !isnan(place.x)) {
+        bst_vec3 direction;
+        *why = bst_tasking_glance(s, place, &direction);
+    }
+    if (*why == BST_WHY_NOT) {
+        bst_tasking_visibility seen;
+        BST_TRY(bst_tasking_look(ctx, t, sensor, object, seconds, &seen));
+        *why = seen.why;
+    }
+    return BST_OK;
+}
+
 bst_status bst_tasking_survey(bst_ctx *ctx, bst_tasking *t, double seconds,
                               bst_tasking_report *out) {
     *out = (bst_tasking_report){.targets = 0};
+    (void)bst_knowledge_places(t->sensors[0].knowledge, seconds, t->place_m[0], t->place_m[1],
+                               t->place_m[2]);
     for (int i = 0; i < t->object_count; i++) {
         if (t->line[i] < 0) {
             continue;
@@ -191,11 +216,10 @@ bst_status bst_tasking_survey(bst_ctx *ctx, bst_tasking *t, double seconds,
         out->seen += t->seen_s[i] >= 0.0;
         bst_tasking_why best = BST_WHY_COUNT;
         for (int s = 0; s < t->sensor_count && best != BST_WHY_NOT; s++) {
-            bst_tasking_visibility seen;
-            BST_TRY(bst_tasking_look(ctx, t, s, i, seconds, &seen));
+            bst_tasking_why why;
+            BST_TRY(survey_look(ctx, t, s, i, seconds, &why));
             /* the reason nearest to visibility */
-            best = seen.why == BST_WHY_NOT || best == BST_WHY_COUNT || seen.why > best ? seen.why
-                                                                                       : best;
+            best = why == BST_WHY_NOT || best == BST_WHY_COUNT || why > best ? why : best;
         }
         if (best == BST_WHY_NOT) {
             out->visible++;

@@ -5,8 +5,8 @@
  * would take long to integrate */
 #define MAX_MINUTES 1e9
 
-#define KEPLER_STEPS 10
-#define KEPLER_LONGEST_STEP 0.95
+#define KEPLER_STEPS BST_SGP4_KEPLER_STEPS
+#define KEPLER_LONGEST_STEP BST_SGP4_KEPLER_LONGEST_STEP
 
 void bst_sgp4_set_plane(const bst_sgp4_constants *k, double sin_i, double cos_i,
                         bst_sgp4_plane *plane) {

@@ -1,13 +1,12 @@
 /* SGP4's deep-space part: Sun, Moon and resonance with the geopotential (STR3 section 7, "SDP4";
  * HSG appendix B; numbers as in VCHK). */
-#include "sim/astro/sgp4_internal.h"
+#include "sim/astro/sgp4_lanes.h"
 
-#define EARTH_RATE_RADPMIN 4.37526908801129966e-3
+#define EARTH_RATE_RADPMIN BST_SGP4_EARTH_RATE_RADPMIN
 #define STEP_MIN 720.0
 /* below 3 degrees of inclination the luni-solar secular effect on the node is omitted */
 #define NODE_SECULAR_MIN_I 5.2359877e-2
-/* below 0.2 rad the periodics of node and perigee follow Lyddane (1963) */
-#define LYDDANE_I 0.2
+#define LYDDANE_I BST_SGP4_LYDDANE_I
 
 /* A perturbing body: orbit and strength. */
 typedef struct perturber {
@@ -316,7 +315,7 @@ static void step_resonance(const bst_sgp4_deep *d, double h, bst_sgp4_knot *k) {
 /* Integrates mean motion and resonance angle from the epoch to t by Taylor steps of 720 min. The
  * reference restarts at the epoch if time reverses; here the states are those of always doing so,
  * though whole steps that the memo has are not repeated. */
-static void integrate_resonance(const bst_sgp4 *s, double t, double *n_out, double *lambda_out) {
+double bst_sgp4_resonance_knot(const bst_sgp4 *s, double t, bst_sgp4_knot *out) {
     const bst_sgp4_deep *d = &s->deep;
     const double sign = t < 0.0 ? -1.0 : 1.0;
     const bst_sgp4_complex turn = {d->perigee_step.re, sign * d->perigee_step.im};
@@ -340,9 +339,8 @@ static void integrate_resonance(const bst_sgp4 *s, double t, double *n_out, doub
         }
         bst_sgp4_remember(d->memo, &k);
     }
-    step_resonance(d, sign * left, &k);
-    *n_out = k.n;
-    *lambda_out = k.lambda;
+    *out = k;
+    return sign * left;
 }
 
 double bst_sgp4_step_minutes(const bst_sgp4 *s) {
@@ -359,8 +357,11 @@ void bst_sgp4_deep_secular(const bst_sgp4 *s, double t, bst_sgp4_mean *x) {
     if (d->resonance == BST_SGP4_NOT_RESONANT) {
         return;
     }
-    double lambda;
-    integrate_resonance(s, t, &x->n, &lambda);
+    bst_sgp4_knot k;
+    double left = bst_sgp4_resonance_knot(s, t, &k);
+    step_resonance(d, left, &k);
+    x->n = k.n;
+    const double lambda = k.lambda;
     double sidereal = fmod(d->sidereal0 + t * EARTH_RATE_RADPMIN, BST_SGP4_TWO_PI);
     x->m = d->resonance == BST_SGP4_ONE_DAY ? lambda + sidereal - x->raan - x->argp
                                             : lambda + 2.0 * (sidereal - x->raan);

@@ -42,9 +42,7 @@ bst_astro_kepler_elements bst_astro_kepler_elements_of(double mu, bst_vec3 r, bs
     return k;
 }
 
-/* Converts the fit parameters to elements. x: mean motion (rad/min), e cos and e sin of the
- * longitude of perigee, tan(i/2) cos and sin of the node, mean longitude. False: not an ellipse. */
-static bool to_elements(const double x[ELEMENTS], bst_elements *out) {
+bool bst_sgp4_regular_elements(const double x[ELEMENTS], bst_elements *out) {
     double e = hypot(x[1], x[2]);
     double node = atan2(x[4], x[3]), perigee = atan2(x[2], x[1]), turn = 2.0 * BST_PI;
     if (!(e < 1.0) || !(x[0] > 0.0)) {
@@ -108,7 +106,8 @@ enum { MOST_PLACES = 256 };
 static bst_status fit(bst_ctx *ctx, const bst_sgp4_place *places, int count, double x[ELEMENTS],
                       bst_elements *elements, double *rms_m) {
     double here[3 * MOST_PLACES], slope[ELEMENTS][3 * MOST_PLACES], sum2, damping = 1e-6;
-    if (!to_elements(x, elements) || !differences(elements, places, count, here, &sum2)) {
+    if (!bst_sgp4_regular_elements(x, elements) ||
+        !differences(elements, places, count, here, &sum2)) {
         return bst_fail(ctx, BST_ERR_NUMERIC, "SGP4 has no orbit like this one to start from");
     }
     for (int iteration = 0; iteration < MAX_ITERATIONS; iteration++) {
@@ -118,11 +117,11 @@ static bst_status fit(bst_ctx *ctx, const bst_sgp4_place *places, int count, dou
             bst_elements near = *elements;
             memcpy(y, x, sizeof y);
             y[k] += step;
-            bool good =
-                to_elements(y, &near) && differences(&near, places, count, slope[k], &unused);
+            bool good = bst_sgp4_regular_elements(y, &near) &&
+                        differences(&near, places, count, slope[k], &unused);
             y[k] -= 2.0 * step;
-            good =
-                good && to_elements(y, &near) && differences(&near, places, count, other, &unused);
+            good = good && bst_sgp4_regular_elements(y, &near) &&
+                   differences(&near, places, count, other, &unused);
             if (!good) {
                 return bst_fail(ctx, BST_ERR_NUMERIC, "SGP4 has no orbit near this one");
             }
@@ -153,8 +152,8 @@ static bst_status fit(bst_ctx *ctx, const bst_sgp4_place *places, int count, dou
                 y[k] = x[k] + moved[k];
             }
             double trial[3 * MOST_PLACES];
-            if (to_elements(y, &next) && differences(&next, places, count, trial, &then) &&
-                then <= sum2) {
+            if (bst_sgp4_regular_elements(y, &next) &&
+                differences(&next, places, count, trial, &then) && then <= sum2) {
                 better = true;
                 memcpy(x, y, sizeof y);
                 memcpy(here, trial, sizeof here);
@@ -258,7 +257,7 @@ static bool newton(const double x[ELEMENTS], const bst_elements *elements, doubl
             bst_elements near = *elements;
             memcpy(y, x, sizeof y);
             y[k] += (s ? -1e-6 : 1e-6) * size[k];
-            if (!to_elements(y, &near) || !state_of(&near, time_s, side[s])) {
+            if (!bst_sgp4_regular_elements(y, &near) || !state_of(&near, time_s, side[s])) {
                 return false;
             }
         }
@@ -285,7 +284,7 @@ static bool newton(const double x[ELEMENTS], const bst_elements *elements, doubl
 static bool miss_of(const double x[ELEMENTS], double time_s, const double wanted[ELEMENTS],
                     bst_elements *elements, double miss[ELEMENTS], double *sum2) {
     double here[ELEMENTS];
-    if (!to_elements(x, elements) || !state_of(elements, time_s, here)) {
+    if (!bst_sgp4_regular_elements(x, elements) || !state_of(elements, time_s, here)) {
         return false;
     }
     *sum2 = 0.0;

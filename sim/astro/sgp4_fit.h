@@ -32,6 +32,11 @@ bst_status bst_sgp4_fit(bst_ctx *ctx, const bst_sgp4_place *places, int count,
 bst_status bst_sgp4_through(bst_ctx *ctx, bst_vec3 position_teme_m, bst_vec3 velocity_teme_mps,
                             bst_elements *elements) BST_MUST_CHECK;
 
+/* Sets the six mean elements of `out` from regular ones: mean motion (rad/min), e cos and e sin of
+ * the longitude of perigee, tan(i/2) cos and sin of the node, mean longitude (rad). False: not an
+ * ellipse; `out` is then as before. */
+bool bst_sgp4_regular_elements(const double x[6], bst_elements *out);
+
 /* Position (m) and its derivative (m/s) at minutes after the epoch, TEME of date, by differences of
  * SGP4 positions over +- 8 s. False: no SGP4 state. */
 bool bst_sgp4_motion(const bst_sgp4 *sgp4, double minutes, bst_vec3 *position_teme_m,

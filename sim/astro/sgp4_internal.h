@@ -16,6 +16,12 @@
 #include "sim/astro/sgp4.h"
 
 #define BST_SGP4_TWO_PI (2.0 * BST_PI)
+#define BST_SGP4_EARTH_RATE_RADPMIN 4.37526908801129966e-3
+/* below 0.2 rad the luni-solar periodics of node and perigee follow Lyddane (1963) */
+#define BST_SGP4_LYDDANE_I 0.2
+/* Newton's method for Kepler's equation */
+#define BST_SGP4_KEPLER_STEPS 10
+#define BST_SGP4_KEPLER_LONGEST_STEP 0.95
 
 typedef struct bst_sgp4_complex {
     double re, im;

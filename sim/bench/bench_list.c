@@ -4,6 +4,7 @@
 
 const bst_bench bst_bench_list[BST_BENCHES] = {
     {"sgp4", "SGP4, 1,000 satellites x 1,000 epochs of a week, one thread", bst_bench_sgp4},
+    {"sgp4_batch", "the same, eight states at a time", bst_bench_sgp4},
     {"numerical_leo", "a day of a numerical low orbit, all forces, from its state",
      bst_bench_numerical},
     {"star_cull", "catalogue query of a 1.5 degree field, file warm", bst_bench_star_cull},

@@ -6,7 +6,7 @@
 
 #include "sim/bench/bench.h"
 
-enum { BST_BENCHES = 44 };
+enum { BST_BENCHES = 45 };
 
 /* All benchmarks, in the order in which they run. */
 extern const bst_bench bst_bench_list[BST_BENCHES];

@@ -6,6 +6,7 @@
 #include <pthread.h>
 
 #include "sim/engine/recorder/recorder.h"
+#include "sim/run/run_custody.h"
 #include "sim/run/run_pictures.h"
 #include "sim/run/run_saving.h"
 #include "sim/run/run_scenario.h"
@@ -45,6 +46,7 @@ typedef struct bst_run_execution {
     const bst_run_steering *steering; /* NULL: none */
     bool part_ended;                  /* by BST_RUN_PART */
     bst_run_sightings *sightings;     /* NULL: not requested */
+    bst_run_custody *custody;         /* NULL: not requested */
     bool progress;
     double earlier_s;      /* wall time of stepping before start_tick, since begin_tick */
     double started, shown; /* wall seconds */

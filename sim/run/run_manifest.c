@@ -118,6 +118,7 @@ bst_status bst_run_write_manifest(const bst_run_execution *run, double wall, bst
         }
     }
     bst_run_sightings_add(run->sightings, root);
+    bst_run_custody_add(run->custody, root);
     bst_run_pacing_add(root, scenario, sim);
     cJSON_AddItemToObject(root, "summary", summary_of(&run->sensors[0], factor));
     bst_status status = bst_io_run_write_json(run->ctx, run->store, "manifest.json", root);

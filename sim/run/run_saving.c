@@ -254,7 +254,8 @@ static bst_status archive_recorder(bst_ctx *ctx, bst_run_execution *run, bst_arc
 
 static bst_status archive_sightings(bst_ctx *ctx, bst_run_execution *run, bst_archive *archive) {
     (void)ctx;
-    return bst_run_sightings_archive(run->sightings, archive);
+    BST_TRY(bst_run_sightings_archive(run->sightings, archive));
+    return bst_run_custody_archive(run->custody, archive);
 }
 
 /* Archives selection, evaluation and pictures of each sensor. */

@@ -106,6 +106,10 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
     }
     BST_TRY(bst_run_sightings_message(&run->hooks, run->sightings, (int)(sensor - run->sensors),
                                       channel, payload));
+    if (strcmp(channel, BST_CHANNEL_TRACKS) == 0) {
+        BST_TRY(bst_run_custody_tracks(&run->hooks, run->custody, (int)(sensor - run->sensors),
+                                       payload));
+    }
     pthread_mutex_lock(&run->summing);
     bst_status status = judge(run, sensor, channel, payload, tick);
     pthread_mutex_unlock(&run->summing);
@@ -200,6 +204,7 @@ static void print_table(const bst_run_execution *run, const char *out, double wa
         bst_run_summary_print(&figures);
     }
     bst_run_sightings_print(run->sightings);
+    bst_run_custody_print(run->custody);
     print_losses(run);
     bst_run_pacing_print(run->scenario, run->sim);
     bst_run_print_row("wall time", "%.2f", wall, "s");
@@ -301,6 +306,7 @@ static void free_run(bst_run_execution *run) {
     }
     free(run->sensors);
     bst_run_sightings_free(run->sightings);
+    bst_run_custody_free(run->custody);
     pthread_mutex_destroy(&run->summing);
 }
 
@@ -399,6 +405,8 @@ static bst_status open_record(bst_run_execution *run, const bst_run_request *req
     BST_TRY(open_recorder(run, world));
     BST_TRY(bst_run_sightings_create(ctx, world, &run->scenario->record,
                                      run->scenario->tick_rate_hz, run->store, &run->sightings));
+    BST_TRY(bst_run_custody_create(ctx, world, &run->scenario->record, run->scenario->tick_rate_hz,
+                                   run->scenario->seed, run->store, &run->custody));
     BST_TRY(resumes ? bst_run_resume(run, request->restored) : BST_OK);
     take_targets(run);
     return bst_run_link_record(ctx, run->sim, bst_run_folder(run->store));
@@ -414,6 +422,9 @@ static bst_status close_record(bst_run_execution *run, bool stepped, bst_status 
     if (stepped && !run->part_ended && (status == BST_OK || status == BST_ERR_INTERRUPTED)) {
         bst_status summed =
             bst_run_sightings_finish(&closing, run->sightings, bst_run_seconds(run));
+        summed = summed == BST_OK
+                     ? bst_run_custody_finish(&closing, run->custody, bst_run_seconds(run))
+                     : summed;
         if (status == BST_OK && summed != BST_OK) {
             *ctx = closing;
             status = summed;

@@ -310,6 +310,19 @@ bool bst_world_element_age(const bst_world *world, int body, double *seconds) {
     return orbit->source == BST_ORBIT_SGP4;
 }
 
+const bst_elements *bst_world_elements(const bst_world *world, int object, double *epoch_offset_s) {
+    assert(world && object >= 0 && object < world->object_count);
+    const bst_world_orbit *orbit = &world->objects[object].orbit;
+    *epoch_offset_s = orbit->epoch_offset_s;
+    bool alone = orbit->source == BST_ORBIT_SGP4 && orbit->burn_count == 0 && !orbit->external;
+    return alone ? &orbit->elements : NULL;
+}
+
+double bst_world_places(const bst_world *world, double seconds, double *x_m, double *y_m,
+                        double *z_m) {
+    return bst_ephemeris_places(world->ephemeris, seconds, x_m, y_m, z_m);
+}
+
 const bst_camera *bst_world_camera(const bst_world *world, int observer, int sensor) {
     assert(world && observer >= 0 && observer < bst_world_observer_count(world) && sensor >= 0);
     return &world->observers[observer].sensors[sensor].config.camera;

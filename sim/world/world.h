@@ -6,6 +6,7 @@
 #include "boresight/camera.h"
 #include "boresight/config.h"
 #include "sim/astro/bodies.h"
+#include "sim/astro/elements.h"
 #include "sim/astro/forces.h"
 #include "sim/catalogue/stars.h"
 #include "sim/world/scene/brightness.h"
@@ -58,6 +59,13 @@ int bst_world_first_part(const bst_world *world, int object);
 /* Age of the element set of a body at the scenario's epoch, s. Body: object index, or number of
  * objects + observer index. False: its orbit has no element set. */
 bool bst_world_element_age(const bst_world *world, int body, double *seconds);
+/* Element set of an object's orbit as catalogued, and the time from its epoch to that of the
+ * scenario, s. NULL: its orbit has no element set, or burns. */
+const bst_elements *bst_world_elements(const bst_world *world, int object, double *epoch_offset_s);
+/* Geocentric positions (GCRF, m) of all objects within 4 s of `seconds`, accurate to 1 km, as
+ * bst_ephemeris_places has them. */
+double bst_world_places(const bst_world *world, double seconds, double *x_m, double *y_m,
+                        double *z_m);
 /* Motion model of an object without its state: SGP4 with drag term, or force model. */
 typedef struct bst_world_motion_law {
     bool sgp4;                     /* motion by an element set */

@@ -27,6 +27,7 @@ typedef struct bst_world_orbit {
     bst_sgp4 *sgp4;
     double epoch_offset_s; /* scenario epoch minus element epoch */
     double bstar;          /* 1 / Earth radii */
+    bst_elements elements; /* mean elements of `sgp4` */
     /* relative: the reference orbit */
     const struct bst_world_orbit *reference;
     double at_s;

@@ -37,6 +37,39 @@ static void edges_are_drawn_pixel_by_pixel(void **state) {
     bst_world_free(world);
 }
 
+/* A map for places only has the same values as the whole one, at pixels and between them. */
+static void places_agree_with_the_whole_map(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = test_world(SKY_WORLD("300", "\"model\": \"sky\""));
+    bst_scene_surroundings around = look_down((bst_vec3){4.2164e7, 0, 0}, 0);
+    double to = asin(BST_EARTH_RADIUS_M / 4.2164e7);
+    for (int k = 0; k <= BST_DISC_PARTS; k++) {
+        around.q[k] = bst_quat_mul(bst_quat_from_rotvec((bst_vec3){0, -to, 0}), around.q[k]);
+    }
+    const bst_window window = {10, 20, 250, 240};
+    bst_skylight *a, *b;
+    const bst_skylight_map *whole = make(world, &around, window, &a), *places;
+    bst_assert_ok(&ctx, bst_skylight_create(&ctx, world, bst_world_camera(world, 0, 0), &b));
+    bst_skylight_set_places_only(b);
+    bst_assert_ok(&ctx, bst_skylight_make(&ctx, b, &around, window, &places));
+    assert_true(places->at_pixels != NULL && places->step_px > 1 && !whole->at_pixels);
+    double least = INFINITY, most = 0.0;
+    for (int i = 0; i < 4000; i++) {
+        /* outside of the window the border's value holds */
+        double x = 5.0 + (i * 37 % 2600) * 0.1, y = 15.0 + (i * 91 % 2500) * 0.1;
+        double e = bst_skylight_at(whole, x, y);
+        /* what the whole map's squares are interpolated to, in sigma of the noise or as a share */
+        bst_assert_close(bst_skylight_at(places, x, y), e, fmax(0.02 * sqrt(e), 4e-4 * e));
+        least = fmin(least, e);
+        most = fmax(most, e);
+    }
+    assert_true(most > 100 * least);
+    bst_skylight_free(a);
+    bst_skylight_free(b);
+    bst_world_free(world);
+}
+
 /* Largest difference of a map from every pixel's own value, over what is allowed: 0.02 sigma of the
  * value's photon noise, or 4e-4 of the value where that is more. */
 static double worst_pixel(bst_world *world, const bst_scene_surroundings *around) {
@@ -135,6 +168,7 @@ static void other_edges_are_right(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(edges_are_drawn_pixel_by_pixel),
+        cmocka_unit_test(places_agree_with_the_whole_map),
         cmocka_unit_test(interpolated_squares_are_right),
         cmocka_unit_test(other_edges_are_right),
     };

@@ -60,6 +60,21 @@ const bst_config_desc bst_record_config_table[] = {
     BST_REAL(bst_recorder_config, custody_timeout_s, "s", 0, 1e9, "21600",
              "sightings: an object counts as in custody for this long after each detection."),
     BST_FORMER("custody_s", "custody_timeout_s"),
+    BST_BOOL(bst_recorder_config, custody, "false",
+             "Custody of the catalogue: confirmed tracks of all sensors are correlated with the "
+             "catalogued objects, and update a filter of the mean elements of each."),
+    BST_REAL(bst_recorder_config, custody_sigma_m, "m", 1, 1e6, "500",
+             "custody: standard deviation of a catalogued orbit along the track, across it and in "
+             "height, at the epoch of its elements. The error is drawn from it."),
+    BST_REAL(bst_recorder_config, custody_drift_m_per_day, "m", 1, 1e7, "1500",
+             "custody: standard deviation of what a catalogued orbit errs more along the track "
+             "each day."),
+    BST_REAL(bst_recorder_config, custody_noise_m_per_day, "m", 0, 1e7, "0",
+             "custody: process noise, the standard deviation by which that drift changes in a day. "
+             "0 suits objects that move on their element sets."),
+    BST_REAL(bst_recorder_config, custody_within_m, "m", 1, 1e9, "1000",
+             "custody: an object is in custody if the standard deviation of its position is at "
+             "most this."),
     BST_REAL(bst_recorder_config, telemetry_hz, "Hz", 0.0, 1e6, "1",
              "Rate at which telemetry, control status and the true line of sight are kept; 0: "
              "not at all."),

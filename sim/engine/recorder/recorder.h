@@ -37,6 +37,8 @@ typedef struct bst_recorder_config {
     bool events;
     bool sightings; /* table `sightings`, written by the caller */
     double custody_timeout_s;
+    bool custody; /* tables `custody` and `custody_tracks`, written by the caller */
+    double custody_sigma_m, custody_drift_m_per_day, custody_noise_m_per_day, custody_within_m;
     double telemetry_hz;
 } bst_recorder_config;
 

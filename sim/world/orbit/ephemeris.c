@@ -126,15 +126,52 @@ static bst_vec3 place_at(const bst_world_orbit *orbit, const bst_mat3 *gcrf_from
                           1000.0);
 }
 
-static void make_missing_knots(bst_ephemeris *e, body *b, int64_t first, int64_t last) {
+/* Knots that are propagated together: a knot is the same whichever others it is computed with. */
+enum { KNOTS = 256 };
+typedef struct knot_list {
+    int count;
+    const bst_sgp4 *sgp4[KNOTS];
+    double minutes[KNOTS];
+    body *of[KNOTS];
+    int64_t knot[KNOTS];
+} knot_list;
+
+/* Computes the knots of a list and empties it. */
+static void fill_knots(bst_ephemeris *e, knot_list *list) {
+    bst_sgp4_state states[KNOTS];
+    bst_sgp4_propagate_many(list->sgp4, list->minutes, list->count, states);
+    for (int i = 0; i < list->count; i++) {
+        body *b = list->of[i];
+        const double *r = states[i].position_teme_km;
+        bst_vec3 p = {NAN, NAN, NAN};
+        if (states[i].error == BST_SGP4_OK) {
+            p = bst_vec3_scale(bst_mat3_mul_vec(rotation_at(e, b->step_class, list->knot[i]),
+                                                (bst_vec3){r[0], r[1], r[2]}),
+                               1000.0);
+        }
+        int slot = slot_of(list->knot[i], RING);
+        b->place_m[0][slot] = p.x;
+        b->place_m[1][slot] = p.y;
+        b->place_m[2][slot] = p.z;
+    }
+    list->count = 0;
+}
+
+/* Adds the missing ones of the knots first to last of a body to the list; they are in the ring once
+ * the list has been filled. */
+static void list_missing_knots(bst_ephemeris *e, body *b, int64_t first, int64_t last,
+                               knot_list *list) {
     for (int64_t k = first; k <= last; k++) {
         if (k < b->first || k > b->last) {
-            int slot = slot_of(k, RING);
-            bst_vec3 p = place_at(b->orbit, rotation_at(e, b->step_class, k),
-                                  (double)k * step_of(b->step_class));
-            b->place_m[0][slot] = p.x;
-            b->place_m[1][slot] = p.y;
-            b->place_m[2][slot] = p.z;
+            int i = list->count++;
+            double seconds = (double)k * step_of(b->step_class);
+            list->sgp4[i] = b->orbit->sgp4;
+            list->minutes[i] = (b->orbit->epoch_offset_s + seconds) / 60.0;
+            list->of[i] = b;
+            list->knot[i] = k;
+            if (list->count == KNOTS) {
+                fill_knots(e, list);
+            }
         }
     }
     if (first > b->last + 1 || last < b->first - 1) {
@@ -151,9 +188,12 @@ static void make_missing_knots(bst_ephemeris *e, body *b, int64_t first, int64_t
     }
 }
 
-static inline void make_knots(bst_ephemeris *e, body *b, int64_t first, int64_t last) {
+static void make_knots(bst_ephemeris *e, body *b, int64_t first, int64_t last) {
     if (first < b->first || last > b->last) {
-        make_missing_knots(e, b, first, last);
+        knot_list list;
+        list.count = 0;
+        list_missing_knots(e, b, first, last, &list);
+        fill_knots(e, &list);
     }
 }
 
@@ -266,15 +306,27 @@ static void sum_used_knots(const table_class *c, const body *b, double p[3]) {
 static void table_rows(void *user, int begin, int end) {
     const table_job *job = user;
     table *t = job->table;
+    knot_list missing;
+    missing.count = 0;
     for (int i = begin; i < end; i++) {
         body *b = &job->e->bodies[i];
+        if (b->orbit) {
+            const table_class *c = &job->classes[b->step_class];
+            int ahead = c->late + (double)(i % SHARES) / SHARES >= 1.0;
+            int64_t last = c->first + CHECKED - 1 + ahead;
+            if (c->first < b->first || last > b->last) {
+                list_missing_knots(job->e, b, c->first, last, &missing);
+            }
+        }
+    }
+    fill_knots(job->e, &missing);
+    for (int i = begin; i < end; i++) {
+        const body *b = &job->e->bodies[i];
         if (!b->orbit) {
             t->x_m[i] = t->y_m[i] = t->z_m[i] = NAN;
             continue;
         }
         const table_class *c = &job->classes[b->step_class];
-        int ahead = c->late + (double)(i % SHARES) / SHARES >= 1.0;
-        make_knots(job->e, b, c->first, c->first + CHECKED - 1 + ahead);
         double p[3] = {0};
         for (int slot = 0; slot < RING; slot++) {
             for (int j = 0; j < 3; j++) {
@@ -426,30 +478,6 @@ double bst_ephemeris_places(bst_ephemeris *e, double seconds, double *x_m, doubl
 }
 
 /* ---- making it ---- */
-
-/* Solves Kepler's equation for the eccentric anomaly, e < 1. */
-static double kepler(double m, double e) {
-    double x = m + e; /* start above the root: Newton's steps descend to it */
-    for (int i = 0; i < 20; i++) {
-        double step = (x - e * sin(x) - m) / (1.0 - e * cos(x));
-        x -= step;
-        if (fabs(step) < 1e-14) {
-            break;
-        }
-    }
-    return x;
-}
-
-/* Estimated interpolation error at the perigee of a two-body orbit, relative to the semi-major
- * axis. */
-static double perigee_error(double e, double radians_per_step) {
-    /* along the axis; across it the place is odd, and its tenth difference about perigee is 0 */
-    double p[POINTS + 1] = {0};
-    for (int j = 0; j <= POINTS / 2; j++) {
-        p[POINTS / 2 + j] = p[POINTS / 2 - j] = cos(kepler(j * radians_per_step, e));
-    }
-    return ERROR_OF_DIFFERENCE * fabs(tenth_difference(p));
-}
 
 /* The longest step between knots that is accurate at perigee, where the curvature is largest. */
 static int choose_class(const bst_ephemeris *e, const bst_world_orbit *orbit) {

@@ -20,6 +20,7 @@ bst_status bst_world_orbit_build_sgp4(const bst_world_builder *b, const bst_elem
     double uniform = (jd1 - set->epoch_utc_jd1 + (jd2 - set->epoch_utc_jd2)) * 86400.0;
     orbit->epoch_offset_s = seconds - round(seconds - uniform);
     orbit->bstar = set->bstar;
+    orbit->elements = *set;
     return bst_sgp4_create(b->ctx, set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &orbit->sgp4);
 }
 

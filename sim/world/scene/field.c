@@ -80,6 +80,12 @@ void bst_field_set_camera(bst_field *field, const bst_camera *camera) {
     }
 }
 
+void bst_field_set_background_places_only(bst_field *field) {
+    if (field->skylight) {
+        bst_skylight_set_places_only(field->skylight);
+    }
+}
+
 bst_status bst_field_track(bst_ctx *ctx, bst_field *field, const bst_los_history *history,
                            int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
                            bst_los_track *out) {

@@ -170,6 +170,10 @@ void bst_field_free(bst_field *field);
 /* Uses another camera from the next query on; the camera is borrowed. */
 void bst_field_set_camera(bst_field *field, const bst_camera *camera);
 
+/* From the next query on the background at an edge of the Earth or of another body is computed at
+ * the sources only: bst_field_background has no edges. For modules that render no frame. */
+void bst_field_set_background_places_only(bst_field *field);
+
 /* Extracts the attitude samples from start_tick to end_tick from the ring, interpolated at the
  * ends. `field` holds the track until the next call. BST_ERR_STATE if the ring does not cover the
  * exposure. A zero-length exposure gives two equal samples. */

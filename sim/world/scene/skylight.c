@@ -30,16 +30,6 @@ typedef struct cell_corner {
     bool day, night;
 } cell_corner;
 
-struct bst_skylight {
-    const bst_world *world;
-    const bst_camera *camera;
-    int step;
-    lattice stars, sky, nodes, pixels;
-    cell_corner *corners; /* two rows of `row_corners` */
-    int row_corners;
-    bst_skylight_map map;
-};
-
 /* State of computing the background map of one exposure. */
 typedef struct painter {
     const bst_skylight *b;
@@ -51,6 +41,21 @@ typedef struct painter {
     double even_e;        /* uniform background per pixel and second, after vignetting */
     double earth_e;       /* the Earth's own emission, per pixel and second */
 } painter;
+
+struct bst_skylight {
+    const bst_world *world;
+    const bst_camera *camera;
+    int step;
+    lattice stars, sky, nodes, pixels;
+    cell_corner *corners; /* two rows of `row_corners` */
+    int row_corners;
+    bst_skylight_map map;
+    bool places_only;
+    /* of the latest map, for places */
+    painter painter;
+    bst_scene_surroundings around;
+    bst_window window;
+};
 
 bool bst_skylight_varies(const bst_camera *camera) {
     const bst_background_config *c = &camera->background;
@@ -81,22 +86,6 @@ static float interpolate(const lattice *l, float x, float y) {
     const float *a = l->value + (size_t)j * (size_t)l->columns + (size_t)i, *b = a + l->columns;
     float left = a[0] + t * (b[0] - a[0]), right = a[1] + t * (b[1] - a[1]);
     return left + s * (right - left);
-}
-
-double bst_skylight_at(const bst_skylight_map *map, double x_px, double y_px) {
-    double x = fmin(fmax(x_px, map->x0_px), map->x0_px + (map->columns - 1.0) * map->step_px);
-    double y = fmin(fmax(y_px, map->y0_px), map->y0_px + (map->rows - 1.0) * map->step_px);
-    if (map->columns < 2 || map->rows < 2) {
-        size_t i = (size_t)(x - map->x0_px + 0.5), j = (size_t)(y - map->y0_px + 0.5);
-        return (double)map->e[j * (size_t)map->columns + i];
-    }
-    const lattice l = {.step = map->step_px,
-                       .x0 = map->x0_px,
-                       .y0 = map->y0_px,
-                       .columns = map->columns,
-                       .rows = map->rows,
-                       .value = (float *)(uintptr_t)map->e};
-    return (double)interpolate(&l, (float)x, (float)y);
 }
 
 bst_status bst_skylight_create(bst_ctx *ctx, const bst_world *world, const bst_camera *camera,
@@ -323,6 +312,40 @@ static float paint_pixel(const painter *p, int x, int y) {
     return paint(p, x, y, (double)interpolate(&p->b->sky, (float)x, (float)y));
 }
 
+/* Background at a position between pixels, from the four around it. */
+static double place_at(const bst_skylight *b, double x_px, double y_px) {
+    const bst_window *w = &b->window;
+    double x = fmin(fmax(x_px, w->x0), w->x0 + w->width - 1.0);
+    double y = fmin(fmax(y_px, w->y0), w->y0 + w->height - 1.0);
+    int i = (int)floor(x), j = (int)floor(y);
+    double s = x - i, t = y - j, sum = 0.0;
+    for (int k = 0; k < 4; k++) {
+        double weight = (k & 1 ? s : 1.0 - s) * (k >> 1 ? t : 1.0 - t);
+        sum += weight > 0.0 ? weight * (double)paint_pixel(&b->painter, i + (k & 1), j + (k >> 1))
+                            : 0.0;
+    }
+    return sum;
+}
+
+double bst_skylight_at(const bst_skylight_map *map, double x_px, double y_px) {
+    if (map->at_pixels) {
+        return place_at(map->at_pixels, x_px, y_px);
+    }
+    double x = fmin(fmax(x_px, map->x0_px), map->x0_px + (map->columns - 1.0) * map->step_px);
+    double y = fmin(fmax(y_px, map->y0_px), map->y0_px + (map->rows - 1.0) * map->step_px);
+    if (map->columns < 2 || map->rows < 2) {
+        size_t i = (size_t)(x - map->x0_px + 0.5), j = (size_t)(y - map->y0_px + 0.5);
+        return (double)map->e[j * (size_t)map->columns + i];
+    }
+    const lattice l = {.step = map->step_px,
+                       .x0 = map->x0_px,
+                       .y0 = map->y0_px,
+                       .columns = map->columns,
+                       .rows = map->rows,
+                       .value = (float *)(uintptr_t)map->e};
+    return (double)interpolate(&l, (float)x, (float)y);
+}
+
 /* Cuts a square into four. True: linear interpolation between its corners agrees with the
  * background at the five new corners to 0.01 sigma of its photon noise or 3e-5 of it. Within the
  * four squares the error is then about a quarter of that where the light is smooth, and up to a few
@@ -444,11 +467,18 @@ static void prepare(painter *p) {
     }
 }
 
+void bst_skylight_set_places_only(bst_skylight *b) {
+    b->places_only = true;
+}
+
 bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *b, const bst_scene_surroundings *around,
                              bst_window window, const bst_skylight_map **out) {
     assert(b && around && out && bst_window_is_valid(&window));
-    painter p = {.b = b, .around = around};
-    prepare(&p);
+    b->around = *around;
+    b->window = window;
+    b->painter = (painter){.b = b, .around = &b->around};
+    prepare(&b->painter);
+    const painter p = b->painter;
     BST_TRY(paint_sky(ctx, &p, b, window));
     BST_TRY(set_nodes(ctx, &b->nodes, b->step, window));
     lattice *n = &b->nodes;
@@ -461,13 +491,14 @@ bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *b, const bst_scene_surr
     }
     bool edge;
     BST_TRY(find_edge(ctx, &p, b, &edge));
-    if (edge) {
+    if (edge && !b->places_only) {
         BST_TRY(paint_pixels(ctx, &p, b, window));
         n = &b->pixels;
         n->x0 = window.x0;
         n->y0 = window.y0;
     }
-    b->map = (bst_skylight_map){n->step, n->x0, n->y0, n->columns, n->rows, n->value, INFINITY};
+    b->map = (bst_skylight_map){n->step, n->x0,    n->y0,    n->columns,
+                                n->rows, n->value, INFINITY, edge && b->places_only ? b : NULL};
     for (int i = 0; i < n->columns * n->rows; i++) {
         b->map.least_e = fmin(b->map.least_e, (double)n->value[i]);
     }

@@ -17,6 +17,9 @@ typedef struct bst_skylight_map {
     int columns, rows; /* at least 3 where the step is above 1 */
     const float *e;    /* [rows][columns] */
     double least_e;    /* smallest value of all nodes */
+    /* not NULL: an edge is in the window (x0_px, y0_px, columns, rows in steps), `e` misses it, and
+     * bst_skylight_at computes the pixels around a position itself */
+    const struct bst_skylight *at_pixels;
 } bst_skylight_map;
 
 /* Background at a position of the full sensor; constant beyond the border of the map. */
@@ -43,6 +46,10 @@ bst_status bst_skylight_create(bst_ctx *ctx, const bst_world *world, const bst_c
 void bst_skylight_free(bst_skylight *skylight); /* NULL allowed */
 /* Uses another camera with the same background and another scale from the next map on; borrowed. */
 void bst_skylight_set_camera(bst_skylight *skylight, const bst_camera *camera);
+
+/* From the next map on, pixels at an edge are computed by bst_skylight_at where they are asked for,
+ * instead of all of them by bst_skylight_make: for those who need few places of a map. */
+void bst_skylight_set_places_only(bst_skylight *skylight);
 
 /* Computes the background map of an exposure for a window. Nodes are 32 px apart, closer above 0.3
  * degrees, and 1 px apart if the edge of a disc, the terminator or the edge of the vignetting is on

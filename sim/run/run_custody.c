@@ -1,0 +1,543 @@
+#include "sim/run/run_custody.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cjson/cJSON.h>
+
+#include "boresight/rng.h"
+#include "sim/astro/sky_clock.h"
+#include "sim/core/json_number.h"
+#include "sim/eval/consistency.h"
+#include "sim/run/run_summary.h"
+#include "tracker/orbit/custody.h"
+
+/* tracks of a sensor at one time; more are left out */
+enum { SLOTS = 32 };
+/* detections that a track needs: with fewer its rate is that of the initiation */
+enum { LEAST_HITS = 5 };
+/* A track that has had no detection for this time has ended, s. */
+#define ENDED_S 30.0
+/* chi-square of an innovation, 4 degrees of freedom: beyond it are 2e-5 of the true ones */
+#define GATE 27.0
+/* A second object in the gate makes a track ambiguous unless it is e^7 times less likely. */
+#define LIKELIHOOD_MARGIN 14.0
+/* Positions are tabulated within 4 s and 1 km: distance of an object from the line of sight beyond
+ * which it is no candidate, m; and standard deviations of its own position. */
+#define TABLE_REACH_M (4.1 * 11500.0 + 1000.0)
+#define CANDIDATE_SIGMAS 6.0
+/* a track belongs to the object within this distance of it, as in sightings.c */
+#define TRACK_PX 5.0
+/* an object nearer than this is the observer's spacecraft itself, m */
+#define ITSELF_M 10.0
+
+/* A track that has not ended: its newest state with a detection. */
+typedef struct slot {
+    int64_t id; /* 0: free */
+    int64_t tick;
+    bst_vec3 direction, rate_radps;
+    double covariance[4][4];
+    int32_t hits;
+} slot;
+
+/* Score of an object. */
+typedef struct score {
+    int64_t updates, cross_tags;
+    double last_s, chi2_sum;
+} score;
+
+struct bst_run_custody {
+    const bst_world *world;
+    bst_world_view *view;
+    bst_sky_clock *clock;
+    bst_custody_config config;
+    double tick_rate_hz, within_m;
+    int object_count, sensor_count;
+    int *observer;             /* [sensor] */
+    double *pixel_rad;         /* [sensor] */
+    bst_custody_orbit *orbits; /* [object]; a_m 0: none */
+    bst_custody_filter *filters;
+    score *scores;
+    double *place_m[3]; /* [object] */
+    slot (*slots)[SLOTS];
+    bst_io_table *tracks, *objects;
+    bst_custody_figures figures;
+};
+
+#define INT(name, unit, doc) \
+    { name, BST_COLUMN_INT, unit, doc }
+#define REAL(name, unit, doc) \
+    { name, BST_COLUMN_REAL, unit, doc }
+
+static const bst_io_column track_columns[] = {
+    INT("sensor", "", "row of the table sensors"),
+    INT("track_id", "", "of the sensor's tracker"),
+    REAL("time_s", "s", "middle of the last exposure with a detection, since the epoch"),
+    INT("hits", "", "detections of the track"),
+    INT("candidates", "", "objects whose predicted direction and rate agree"),
+    INT("object", "", "object that the track updated: id in truth; NULL: none"),
+    INT("true_object", "", "object that the track belongs to; NULL: none"),
+    REAL("chi2", "", "of the nearest candidate, 4 degrees of freedom; NULL: none"),
+    REAL("nees", "", "error of the updated elements squared, by their covariance, 6 degrees"),
+};
+
+static const bst_io_column object_columns[] = {
+    INT("object", "", "index in the scenario: id in truth"),
+    {"name", BST_COLUMN_TEXT, "", "name of the object"},
+    INT("norad", "", "catalogue number, 0: none"),
+    INT("updates", "", "tracks that updated its orbit"),
+    INT("cross_tags", "", "of these, tracks of another object, or of none"),
+    REAL("last_s", "s", "last update; NULL: none"),
+    REAL("age_s", "s", "time from the last update to the end"),
+    REAL("sigma_m", "m", "standard deviation of the position at the end"),
+    REAL("error_m", "m", "error of the position at the end"),
+    REAL("nees", "", "error of the elements squared, by their covariance, 6 degrees of freedom"),
+    REAL("chi2_mean", "", "mean of the tracks' chi-square, 4 degrees of freedom each"),
+};
+
+static bst_io_value whole_number(int64_t value, bool known) {
+    return (bst_io_value){.type = BST_COLUMN_INT, .is_null = !known, .as.integer = value};
+}
+
+static bst_io_value number(double value) {
+    bool known = isfinite(value);
+    return (bst_io_value){.type = BST_COLUMN_REAL, .is_null = !known, .as.real = value};
+}
+
+/* ---- making it ---- */
+
+static bst_status allocate(bst_ctx *ctx, bst_run_custody *c) {
+    size_t n = (size_t)c->object_count + 1, sensors = (size_t)c->sensor_count + 1;
+    c->observer = calloc(sensors, sizeof *c->observer);
+    c->pixel_rad = calloc(sensors, sizeof *c->pixel_rad);
+    c->slots = calloc(sensors, sizeof *c->slots);
+    c->orbits = calloc(n, sizeof *c->orbits);
+    c->filters = calloc(n, sizeof *c->filters);
+    c->scores = calloc(n, sizeof *c->scores);
+    c->place_m[0] = calloc(3 * n, sizeof *c->place_m[0]);
+    if (!c->observer || !c->pixel_rad || !c->slots || !c->orbits || !c->filters || !c->scores ||
+        !c->place_m[0]) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the custody of %d objects",
+                        c->object_count);
+    }
+    c->place_m[1] = c->place_m[0] + n;
+    c->place_m[2] = c->place_m[1] + n;
+    return BST_OK;
+}
+
+/* Starts the filter of each object on an element set, with an error drawn from its covariance. */
+static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, uint64_t seed) {
+    bst_rng_key key = bst_rng_make_key(seed, 0, "custody", "catalogue");
+    for (int i = 0; i < c->object_count; i++) {
+        double offset_s, normals[BST_CUSTODY_STATE];
+        const bst_elements *elements = bst_world_elements(c->world, i, &offset_s);
+        c->scores[i].last_s = NAN;
+        if (!elements) {
+            continue;
+        }
+        /* half the radius of a sphere as large as the object is catalogued */
+        double photocentre_m = 0.5 * sqrt(bst_world_object(c->world, i)->area_m2 / BST_PI);
+        BST_TRY(bst_custody_orbit_init(ctx, elements, offset_s, photocentre_m, &c->orbits[i]));
+        for (int k = 0; k < BST_CUSTODY_STATE; k++) {
+            normals[k] = bst_rng_normal(key, (uint64_t)i, (uint64_t)k);
+        }
+        bst_custody_filter_init(&c->config, &c->orbits[i], normals, &c->filters[i]);
+        c->figures.objects++;
+    }
+    return c->figures.objects > 0
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_CONFIG,
+                          "/record/custody: no object of the world moves on an element set without "
+                          "burns; list some in /world/objects or /world/catalogues, or set it to "
+                          "false");
+}
+
+static bst_status make_tables(bst_ctx *ctx, bst_run_custody *c, bst_run *store) {
+    BST_TRY(bst_io_table_create(ctx, store, "custody_tracks",
+                                "Tracks that were correlated with the catalogue, as they ended.",
+                                track_columns, sizeof track_columns / sizeof *track_columns,
+                                &c->tracks));
+    return bst_io_table_create(ctx, store, "custody", "Orbits of the catalogue at the end.",
+                               object_columns, sizeof object_columns / sizeof *object_columns,
+                               &c->objects);
+}
+
+bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
+                                  const bst_recorder_config *record, int64_t tick_rate_hz,
+                                  uint64_t seed, bst_run *store, bst_run_custody **out) {
+    *out = NULL;
+    if (!record->custody) {
+        return BST_OK;
+    }
+    bst_run_custody *c = calloc(1, sizeof *c);
+    if (!c) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the custody of the catalogue");
+    }
+    c->world = world;
+    c->tick_rate_hz = (double)tick_rate_hz;
+    c->within_m = record->custody_within_m;
+    c->config = (bst_custody_config){.sigma_m = record->custody_sigma_m,
+                                     .drift_m_per_day = record->custody_drift_m_per_day,
+                                     .noise_m_per_day = record->custody_noise_m_per_day};
+    c->object_count = bst_world_object_count(world);
+    for (int i = 0; i < bst_world_observer_count(world); i++) {
+        c->sensor_count += bst_world_sensor_count(world, i);
+    }
+    bst_status status = allocate(ctx, c);
+    for (int i = 0, k = 0; status == BST_OK && i < bst_world_observer_count(world); i++) {
+        for (int s = 0; s < bst_world_sensor_count(world, i); s++, k++) {
+            c->observer[k] = i;
+            c->pixel_rad[k] = bst_camera_scale_rad(bst_world_camera(world, i, s));
+        }
+    }
+    status = status == BST_OK ? start_filters(ctx, c, seed) : status;
+    status = status == BST_OK ? bst_world_view_create(ctx, world, &c->view) : status;
+    status = status == BST_OK
+                 ? bst_sky_clock_create(ctx, bst_world_earth_orientation(world), &c->clock)
+                 : status;
+    status = status == BST_OK && store ? make_tables(ctx, c, store) : status;
+    if (status != BST_OK) {
+        bst_run_custody_free(c);
+        return status;
+    }
+    *out = c;
+    return BST_OK;
+}
+
+void bst_run_custody_free(bst_run_custody *c) {
+    if (c) {
+        bst_world_view_free(c->view);
+        bst_sky_clock_free(c->clock);
+        free(c->observer);
+        free(c->pixel_rad);
+        free(c->slots);
+        free(c->orbits);
+        free(c->filters);
+        free(c->scores);
+        free(c->place_m[0]);
+        free(c);
+    }
+}
+
+bst_status bst_run_custody_archive(bst_run_custody *c, bst_archive *archive) {
+    if (c) {
+        size_t n = (size_t)c->object_count;
+        bst_archive_bytes(archive, c->filters, n * sizeof *c->filters);
+        bst_archive_bytes(archive, c->scores, n * sizeof *c->scores);
+        bst_archive_bytes(archive, c->slots, (size_t)c->sensor_count * sizeof *c->slots);
+        BST_ARCHIVE(archive, c->figures);
+    }
+    return BST_OK;
+}
+
+/* ---- correlation ---- */
+
+/* Observation from a track that has ended. */
+static bst_status observe(bst_ctx *ctx, bst_run_custody *c, int sensor, const slot *track,
+                          bst_custody_observation *out) {
+    double time_s = (double)track->tick / c->tick_rate_hz;
+    bst_world_state eye;
+    bst_sky_rotation sky;
+    BST_TRY(bst_world_view_observer_state(ctx, c->view, c->observer[sensor], time_s, &eye));
+    BST_TRY(bst_sky_clock_at(ctx, c->clock, bst_world_time(c->world, time_s), &sky));
+    *out = (bst_custody_observation){.observer = {.time_s = time_s,
+                                                  .position_m = eye.position_m,
+                                                  .velocity_mps = eye.velocity_mps,
+                                                  .earth_bary_mps = sky.bodies.earth_bary_mps},
+                                     .gcrf_from_teme = sky.frames.gcrf_from_teme,
+                                     .direction = track->direction,
+                                     .rate_radps = track->rate_radps};
+    memcpy(out->covariance, track->covariance, sizeof out->covariance);
+    return BST_OK;
+}
+
+/* Whether the tabulated position of an object may be on the line of sight. */
+static bool may_be(const bst_run_custody *c, int object, const bst_custody_observation *z) {
+    const bst_vec3 place = {c->place_m[0][object], c->place_m[1][object], c->place_m[2][object]};
+    if (isnan(place.x)) {
+        return true;
+    }
+    bst_vec3 line = bst_vec3_sub(place, z->observer.position_m);
+    double along = bst_vec3_dot(line, z->direction);
+    double across2 = bst_vec3_dot(line, line) - along * along;
+    const bst_custody_filter *f = &c->filters[object];
+    double days = z->observer.time_s / 86400.0, variance = 0.0;
+    for (int k = BST_CUSTODY_ECC_X; k < BST_CUSTODY_STATE; k++) {
+        variance += f->p[k][k];
+    }
+    variance += days * (2.0 * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_ALONG] +
+                        days * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_DRIFT]);
+    double reach = TABLE_REACH_M + CANDIDATE_SIGMAS * sqrt(fmax(variance, 0.0));
+    return along > -reach && across2 < reach * reach;
+}
+
+/* Objects in the gate of an observation. */
+typedef struct match {
+    int count;                  /* in the gate */
+    int best, true_object;      /* -1: none */
+    double chi2, merit, second; /* of the best; merit: chi-square + log determinant */
+} match;
+
+/* Finds the object that an observation belongs to by the catalogue, and by the truth. */
+static void find_object(bst_run_custody *c, int sensor, const bst_custody_observation *z,
+                        match *out) {
+    *out =
+        (match){.best = -1, .true_object = -1, .chi2 = NAN, .merit = INFINITY, .second = INFINITY};
+    const double time_s = z->observer.time_s;
+    const bst_world_state eye = {z->observer.position_m, z->observer.velocity_mps};
+    double nearest = TRACK_PX * c->pixel_rad[sensor];
+    (void)bst_world_places(c->world, time_s, c->place_m[0], c->place_m[1], c->place_m[2]);
+    for (int i = 0; i < c->object_count; i++) {
+        bst_world_sight sight;
+        bst_ctx quiet = {0}; /* an orbit that has ended is no error here */
+        if (!may_be(c, i, z) ||
+            bst_world_view_sight_from(&quiet, c->view, &eye, i, time_s, &sight) != BST_OK ||
+            sight.range_m < ITSELF_M) {
+            continue;
+        }
+        double away = bst_vec3_angle(sight.geometric, z->direction);
+        if (away < nearest) {
+            nearest = away;
+            out->true_object = i;
+        }
+        bst_custody_prediction p;
+        if (!(c->orbits[i].a_m > 0.0)) {
+            continue;
+        }
+        bst_custody_age(&c->config, time_s, &c->filters[i]);
+        if (!bst_custody_predict(&c->orbits[i], &c->filters[i], z, &p) || !(p.chi2 < GATE)) {
+            continue;
+        }
+        double merit = p.chi2 + p.log_determinant;
+        out->count++;
+        if (merit < out->merit) {
+            out->second = out->merit;
+            out->merit = merit;
+            out->chi2 = p.chi2;
+            out->best = i;
+        } else {
+            out->second = fmin(out->second, merit);
+        }
+    }
+}
+
+/* Correlates a track that has ended, and updates its object. */
+static bst_status end_track(bst_ctx *ctx, bst_run_custody *c, int sensor, slot *track) {
+    const slot ended = *track;
+    track->id = 0;
+    if (ended.hits < LEAST_HITS) {
+        return BST_OK;
+    }
+    bst_custody_observation z;
+    match m;
+    BST_TRY(observe(ctx, c, sensor, &ended, &z));
+    find_object(c, sensor, &z, &m);
+    bst_custody_figures *f = &c->figures;
+    bool clear = m.best >= 0 && m.second > m.merit + LIKELIHOOD_MARGIN;
+    bool updated = clear && bst_custody_update(&c->orbits[m.best], &z, &c->filters[m.best]);
+    f->tracks++;
+    f->ambiguous += m.best >= 0 && !clear;
+    f->uncorrelated += m.best < 0;
+    double nees = NAN;
+    if (updated) {
+        score *s = &c->scores[m.best];
+        bool crossed = m.best != m.true_object;
+        f->correlated++;
+        f->cross_tags += crossed;
+        f->updated += s->updates == 0;
+        s->updates++;
+        s->cross_tags += crossed;
+        s->chi2_sum += m.chi2;
+        s->last_s = isnan(s->last_s) ? z.observer.time_s : fmax(s->last_s, z.observer.time_s);
+        nees = bst_custody_nees(&c->filters[m.best]);
+    }
+    if (!c->tracks) {
+        return BST_OK;
+    }
+    const bst_io_value row[] = {whole_number(sensor, true),
+                                whole_number(ended.id, true),
+                                number(z.observer.time_s),
+                                whole_number(ended.hits, true),
+                                whole_number(m.count, true),
+                                whole_number(m.best, updated),
+                                whole_number(m.true_object, m.true_object >= 0),
+                                number(m.chi2),
+                                number(nees)};
+    return bst_io_table_append(ctx, c->tracks, row);
+}
+
+bst_status bst_run_custody_tracks(bst_ctx *ctx, bst_run_custody *c, int sensor,
+                                  const bst_tracks *tracks) {
+    if (!c) {
+        return BST_OK;
+    }
+    slot *slots = c->slots[sensor];
+    for (int i = 0; i < tracks->count; i++) {
+        const bst_track *t = &tracks->items[i];
+        slot *own = NULL;
+        for (int k = 0; k < SLOTS; k++) {
+            own = slots[k].id == t->id || (slots[k].id == 0 && !own) ? &slots[k] : own;
+        }
+        bool new_state = t->status == BST_TRACK_CONFIRMED && t->misses_in_row == 0 &&
+                         t->hidden == BST_HIDDEN_NOT && tracks->attitude.valid;
+        if (own && new_state) {
+            *own = (slot){.id = t->id,
+                          .tick = tracks->tick,
+                          .direction = t->direction_gcrf,
+                          .rate_radps = t->rate_gcrf_radps,
+                          .hits = t->hits};
+            memcpy(own->covariance, t->covariance, sizeof own->covariance);
+        }
+    }
+    for (int k = 0; k < SLOTS; k++) {
+        bool listed = false;
+        for (int i = 0; i < tracks->count && !listed; i++) {
+            listed = tracks->items[i].id == slots[k].id;
+        }
+        double since_s = (double)(tracks->tick - slots[k].tick) / c->tick_rate_hz;
+        if (slots[k].id != 0 && (!listed || since_s > ENDED_S)) {
+            BST_TRY(end_track(ctx, c, sensor, &slots[k]));
+        }
+    }
+    return BST_OK;
+}
+
+/* ---- end ---- */
+
+static int compare(const void *a, const void *b) {
+    double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Value at a share of a sorted list; NAN: empty. */
+static double quantile(double *values, int count, double share) {
+    qsort(values, (size_t)count, sizeof *values, compare);
+    return count > 0 ? values[(int)(share * (count - 1))] : NAN;
+}
+
+/* Writes the row of an object and adds it to the figures. */
+static bst_status end_object(bst_ctx *ctx, bst_run_custody *c, int object, double end_s,
+                             double *sigma_m, double *nees) {
+    const bst_world_object_info *info = bst_world_object(c->world, object);
+    const score *s = &c->scores[object];
+    bst_custody_filter *f = &c->filters[object];
+    bst_vec3 place, truth;
+    bst_custody_filter exact = {.x = {0.0}};
+    double unused, error_m = NAN;
+    bst_custody_age(&c->config, end_s, f);
+    *nees = bst_custody_nees(f);
+    if (!bst_custody_place(&c->orbits[object], f, end_s, &place, sigma_m)) {
+        *sigma_m = NAN;
+    } else if (bst_custody_place(&c->orbits[object], &exact, end_s, &truth, &unused)) {
+        error_m = bst_vec3_norm(bst_vec3_sub(place, truth));
+    }
+    if (!c->objects) {
+        return BST_OK;
+    }
+    const bst_io_value row[] = {whole_number(object, true),
+                                {.type = BST_COLUMN_TEXT, .as.text = info->name},
+                                whole_number(info->norad, true),
+                                whole_number(s->updates, true),
+                                whole_number(s->cross_tags, true),
+                                number(s->last_s),
+                                number(end_s - s->last_s),
+                                number(*sigma_m),
+                                number(error_m),
+                                number(*nees),
+                                number(s->updates > 0 ? s->chi2_sum / (double)s->updates : NAN)};
+    return bst_io_table_append(ctx, c->objects, row);
+}
+
+bst_status bst_run_custody_finish(bst_ctx *ctx, bst_run_custody *c, double end_s) {
+    if (!c || !(end_s > 0.0)) {
+        return BST_OK;
+    }
+    for (int i = 0; i < c->sensor_count; i++) {
+        for (int k = 0; k < SLOTS; k++) {
+            if (c->slots[i][k].id != 0) {
+                BST_TRY(end_track(ctx, c, i, &c->slots[i][k]));
+            }
+        }
+    }
+    double *sigmas = c->place_m[0], *updated = c->place_m[1]; /* no longer needed */
+    int count = 0, updated_count = 0, nees_count = 0;
+    double age_sum = 0.0, nees_sum = 0.0;
+    bst_custody_figures *f = &c->figures;
+    f->in_custody = 0;
+    for (int i = 0; i < c->object_count; i++) {
+        double sigma, nees;
+        if (!(c->orbits[i].a_m > 0.0)) {
+            continue;
+        }
+        BST_TRY(end_object(ctx, c, i, end_s, &sigma, &nees));
+        if (isnan(sigma)) {
+            continue;
+        }
+        f->in_custody += sigma <= c->within_m;
+        sigmas[count++] = sigma;
+        if (c->scores[i].updates > 0) {
+            updated[updated_count++] = sigma;
+            age_sum += end_s - c->scores[i].last_s;
+            nees_sum += isnan(nees) ? 0.0 : nees;
+            nees_count += !isnan(nees);
+        }
+    }
+    f->age_mean_s = updated_count > 0 ? age_sum / updated_count : NAN;
+    f->sigma_median_m = quantile(sigmas, count, 0.5);
+    f->sigma_p90_m = quantile(sigmas, count, 0.9);
+    f->sigma_updated_median_m = quantile(updated, updated_count, 0.5);
+    f->nees_mean = nees_count > 0 ? nees_sum / nees_count : NAN;
+    double dof = (double)BST_CUSTODY_STATE * nees_count;
+    f->nees_low = nees_count > 0 ? bst_eval_chi2_quantile(0.025, dof) / nees_count : NAN;
+    f->nees_high = nees_count > 0 ? bst_eval_chi2_quantile(0.975, dof) / nees_count : NAN;
+    return BST_OK;
+}
+
+bool bst_run_custody_figures(const bst_run_custody *c, bst_custody_figures *out) {
+    *out = c ? c->figures : (bst_custody_figures){0};
+    return c != NULL;
+}
+
+void bst_run_custody_add(const bst_run_custody *c, cJSON *manifest) {
+    if (!c) {
+        return;
+    }
+    const bst_custody_figures *f = &c->figures;
+    cJSON *node = cJSON_AddObjectToObject(manifest, "custody");
+    cJSON_AddNumberToObject(node, "objects", (double)f->objects);
+    cJSON_AddNumberToObject(node, "updated", (double)f->updated);
+    cJSON_AddNumberToObject(node, "in_custody", (double)f->in_custody);
+    cJSON_AddNumberToObject(node, "tracks", (double)f->tracks);
+    cJSON_AddNumberToObject(node, "correlated", (double)f->correlated);
+    cJSON_AddNumberToObject(node, "ambiguous", (double)f->ambiguous);
+    cJSON_AddNumberToObject(node, "uncorrelated", (double)f->uncorrelated);
+    cJSON_AddNumberToObject(node, "cross_tags", (double)f->cross_tags);
+    bst_json_add_number(node, "age_mean_s", f->age_mean_s);
+    bst_json_add_number(node, "sigma_median_m", f->sigma_median_m);
+    bst_json_add_number(node, "sigma_p90_m", f->sigma_p90_m);
+    bst_json_add_number(node, "sigma_updated_median_m", f->sigma_updated_median_m);
+    bst_json_add_number(node, "nees_mean", f->nees_mean);
+    bst_json_add_number(node, "nees_low", f->nees_low);
+    bst_json_add_number(node, "nees_high", f->nees_high);
+}
+
+void bst_run_custody_print(const bst_run_custody *c) {
+    if (!c) {
+        return;
+    }
+    const bst_custody_figures *f = &c->figures;
+    printf("custody\n");
+    bst_run_print_row("objects", "%.0f", (double)f->objects, "");
+    bst_run_print_row("updated", "%.0f", (double)f->updated, "");
+    bst_run_print_row("in custody", "%.0f", (double)f->in_custody, "");
+    bst_run_print_row("tracks", "%.0f", (double)f->tracks, "");
+    bst_run_print_row("correlated", "%.0f", (double)f->correlated, "");
+    bst_run_print_row("ambiguous", "%.0f", (double)f->ambiguous, "");
+    bst_run_print_row("uncorrelated", "%.0f", (double)f->uncorrelated, "");
+    bst_run_print_row("cross-tags", "%.0f", (double)f->cross_tags, "");
+    bst_run_print_row("mean age", "%.0f", f->age_mean_s, "s");
+    bst_run_print_row("median uncertainty", "%.0f", f->sigma_median_m, "m");
+    bst_run_print_row("of updated objects", "%.0f", f->sigma_updated_median_m, "m");
+    bst_run_print_row("NEES of updated objects", "%.3f", f->nees_mean, "(6 if consistent)");
+}

@@ -1,0 +1,63 @@
+/* Custody of the catalogue in a run: tables custody and custody_tracks, and their summary. */
+#ifndef BST_RUN_RUN_CUSTODY_H
+#define BST_RUN_RUN_CUSTODY_H
+
+#include "boresight/archive.h"
+#include "boresight/messages.h"
+#include "sim/engine/recorder/recorder.h"
+#include "sim/io/run_store.h"
+#include "sim/world/world.h"
+
+struct cJSON;
+
+/* Filters of all objects on element sets; fed with one observation from each confirmed track, when
+ * it ends. The truth is used for the error that the catalogue begins with, which it lacks, and for
+ * scoring. Observers are where they are in truth: navigation errors are left out. */
+typedef struct bst_run_custody bst_run_custody;
+
+typedef struct bst_custody_figures {
+    int64_t objects;      /* with a filter */
+    int64_t updated;      /* by at least one track */
+    int64_t in_custody;   /* standard deviation of the position within record/custody_within_m */
+    int64_t tracks;       /* confirmed tracks with enough detections */
+    int64_t correlated;   /* with an object */
+    int64_t ambiguous;    /* with more than one object: not used */
+    int64_t uncorrelated; /* with none */
+    int64_t cross_tags;   /* correlated with another object than that of the truth */
+    double age_mean_s;    /* since the last update, of updated objects; NAN: none */
+    double sigma_median_m, sigma_p90_m; /* of the position at the end, of all objects */
+    double sigma_updated_median_m;      /* of updated objects; NAN: none */
+    double nees_mean;                   /* of updated objects at the end; NAN: none */
+    double nees_low, nees_high; /* within which the mean is with probability 0.95, if consistent */
+} bst_custody_figures;
+
+/* Creates the filters, and the tables in `store`, which must outlive them; NULL: figures only.
+ *
+ * Given:     seed  of the run: keys the errors of the catalogue
+ * Returned:  *out  NULL: custody is disabled
+ * Errors:    BST_ERR_CONFIG for a world without an object on an element set */
+bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
+                                  const bst_recorder_config *record, int64_t tick_rate_hz,
+                                  uint64_t seed, bst_run *store,
+                                  bst_run_custody **out) BST_MUST_CHECK;
+void bst_run_custody_free(bst_run_custody *custody); /* NULL allowed */
+
+/* Saves or restores the filters and the tracks that have not ended. NULL custody: nothing. */
+bst_status bst_run_custody_archive(bst_run_custody *custody, bst_archive *archive) BST_MUST_CHECK;
+
+/* Takes the tracks of a frame; `sensor`: index over all observers; `observer`: that of the sensor.
+ * NULL custody: nothing. */
+bst_status bst_run_custody_tracks(bst_ctx *ctx, bst_run_custody *custody, int sensor,
+                                  const bst_tracks *tracks) BST_MUST_CHECK;
+/* Ends all tracks and writes the table custody. */
+bst_status bst_run_custody_finish(bst_ctx *ctx, bst_run_custody *custody,
+                                  double end_s) BST_MUST_CHECK;
+
+/* Figures after bst_run_custody_finish; false and all zero: none. */
+bool bst_run_custody_figures(const bst_run_custody *custody, bst_custody_figures *out);
+/* Adds "custody" to the manifest. */
+void bst_run_custody_add(const bst_run_custody *custody, struct cJSON *manifest);
+/* Prints the figures to stdout. */
+void bst_run_custody_print(const bst_run_custody *custody);
+
+#endif

@@ -1,0 +1,196 @@
+/* Custody in a run: correlation of tracks, tables, figures, saved states. */
+#include <cjson/cJSON.h>
+
+#include "sim/core/archive.h"
+#include "sim/io/run_reader.h"
+#include "sim/run/run_custody.h"
+#include "tests/io/scratch.h"
+#include "tests/world/world_support.h"
+#include "tracker/mtt/tangent.h"
+
+enum { RATE = 10 };
+
+static const bst_recorder_config record = {.custody = true,
+                                           .custody_sigma_m = 500,
+                                           .custody_drift_m_per_day = 1500,
+                                           .custody_within_m = 1000};
+
+/* Three objects: INMARSAT GX5, MOLNIYA 3-8, and the observer's spacecraft, which is in every
+ * direction. */
+static bst_world *world_of_two(void) {
+    return test_world_with(
+        "{\"name\": \"A\", " TEST_GX5
+        "}, {\"name\": \"B\", \"orbit\": {\"elements_file\": "
+        "\"scenarios/catalogue_2022-06.tle\", \"norad\": 10455}}, {\"name\": \"own\", " TEST_NEOSSAT
+        "}",
+        "");
+}
+
+/* Tracks of a frame: of `object` with `hits` detections, `off_rad` beside it; object below 0: none.
+ */
+static void take(bst_ctx *ctx, bst_run_custody *c, const bst_world *world, int object, int64_t id,
+                 int hits, double seconds, double off_rad) {
+    bst_tracks *tracks = test_calloc(1, sizeof *tracks + sizeof tracks->items[0]);
+    *tracks = (bst_tracks){
+        .tick = (int64_t)(seconds * RATE), .attitude = {.valid = true}, .count = object >= 0};
+    if (object >= 0) {
+        bst_world_view *view;
+        bst_world_sight now, later;
+        bst_assert_ok(ctx, bst_world_view_create(ctx, world, &view));
+        bst_assert_ok(ctx, bst_world_view_sight(ctx, view, 0, object, seconds, &now));
+        bst_assert_ok(ctx, bst_world_view_sight(ctx, view, 0, object, seconds + 0.1, &later));
+        bst_world_view_free(view);
+        bst_tangent axes = bst_tangent_at(now.geometric);
+        bst_vec3 d = bst_tangent_exp(now.geometric, bst_tangent_vector(&axes, off_rad, 0.0));
+        bst_vec3 moved = bst_vec3_scale(bst_vec3_sub(later.geometric, now.geometric), 10.0);
+        tracks->items[0] = (bst_track){.id = id,
+                                       .status = BST_TRACK_CONFIRMED,
+                                       .direction_gcrf = d,
+                                       .rate_gcrf_radps = bst_tangent_project(d, moved),
+                                       .hits = hits};
+        for (int i = 0; i < 4; i++) {
+            double sigma = (i < 2 ? 0.5 : 0.05) * BST_ARCSEC_RAD;
+            tracks->items[0].covariance[i][i] = sigma * sigma;
+        }
+    }
+    bst_assert_ok(ctx, bst_run_custody_tracks(ctx, c, 0, tracks));
+    test_free(tracks);
+}
+
+/* Tracks of both objects at two times, one beside an object, and a short one. */
+static void take_all(bst_ctx *ctx, bst_run_custody *c, const bst_world *world) {
+    const double beside = 3.0 * BST_DEG_RAD;
+    take(ctx, c, world, 0, 1, 9, 100.0, 0.0);
+    take(ctx, c, world, -1, 0, 0, 110.0, 0.0); /* no longer listed: it has ended */
+    take(ctx, c, world, 1, 2, 5, 200.0, 0.0);
+    take(ctx, c, world, 0, 3, 9, 300.0, beside); /* ends 2 */
+    take(ctx, c, world, 0, 4, 4, 400.0, 0.0);    /* ends 3; too short itself */
+    take(ctx, c, world, 0, 5, 9, 700.0, 0.0);    /* goes on to the end */
+}
+
+static void tracks_update_their_objects(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    scratch place;
+    bst_run *store;
+    bst_run_custody *c, *plain;
+    bst_run_reader *run;
+    bst_custody_figures f;
+    bst_world *world = world_of_two();
+    scratch_make(&place);
+    bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&place, "run"), false, &store));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, store, &c));
+    take_all(&ctx, c, world);
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 1000.0));
+    assert_true(bst_run_custody_figures(c, &f));
+    assert_true(f.objects == 3 && f.updated == 2);
+    assert_true(f.tracks == 4 && f.correlated == 3 && f.uncorrelated == 1);
+    assert_true(f.ambiguous == 0 && f.cross_tags == 0);
+    bst_assert_close(f.age_mean_s, 0.5 * (300.0 + 800.0), 1e-9);
+    assert_true(f.nees_mean > 0.0 && f.nees_mean < 20.0 && f.nees_low < 6.0 && f.nees_high > 6.0);
+
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, NULL, &plain));
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, plain, 1000.0));
+    bst_custody_figures without;
+    (void)bst_run_custody_figures(plain, &without);
+    assert_true(without.updated == 0 && isnan(without.age_mean_s) && isnan(without.nees_mean));
+    assert_true(f.sigma_p90_m < 0.9 * without.sigma_p90_m);
+    bst_run_custody_free(plain);
+
+    cJSON *manifest = cJSON_CreateObject();
+    bst_run_custody_add(c, manifest);
+    const cJSON *node = cJSON_GetObjectItem(manifest, "custody");
+    const char *keys[] = {"objects",    "updated",        "in_custody",   "tracks",
+                          "correlated", "ambiguous",      "uncorrelated", "cross_tags",
+                          "age_mean_s", "sigma_median_m", "sigma_p90_m",  "sigma_updated_median_m",
+                          "nees_mean",  "nees_low",       "nees_high"};
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
+        assert_true(cJSON_IsNumber(cJSON_GetObjectItem(node, keys[i])));
+    }
+    cJSON_Delete(manifest);
+    bst_run_custody_free(c);
+    bst_assert_ok(&ctx, bst_run_seal(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_finish(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_reader_open(&ctx, scratch_path(&place, "run"), &run));
+    assert_int_equal(bst_run_reader_int(run, "SELECT count(*) FROM custody_tracks", 0, 0), 4);
+    assert_int_equal(bst_run_reader_int(run,
+                                        "SELECT count(*) FROM custody_tracks WHERE object = "
+                                        "true_object AND candidates = 1 AND chi2 < 27 AND nees > 0",
+                                        0, 0),
+                     3);
+    assert_int_equal(bst_run_reader_int(run,
+                                        "SELECT count(*) FROM custody_tracks WHERE track_id = 3 "
+                                        "AND object IS NULL AND true_object IS NULL AND hits = 9",
+                                        0, 0),
+                     1);
+    assert_int_equal(bst_run_reader_int(run,
+                                        "SELECT count(*) FROM custody WHERE object = 0 AND name = "
+                                        "'A' AND norad = 44801 AND updates = 2 AND last_s = 700 "
+                                        "AND age_s = 300 AND error_m < 4 * sigma_m",
+                                        0, 0),
+                     1);
+    bst_run_reader_close(run);
+    bst_world_free(world);
+    scratch_remove(&place);
+}
+
+/* A run that goes on from a saved state ends with the same figures. */
+static void saved_states_go_on(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    bst_run_custody *whole, *part;
+    bst_archive *saved, *read;
+    bst_custody_figures a, b;
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, NULL, &whole));
+    take(&ctx, whole, world, 1, 2, 9, 200.0, 0.0);
+    bst_assert_ok(&ctx, bst_archive_create(&ctx, &saved));
+    bst_assert_ok(&ctx, bst_run_custody_archive(whole, saved));
+    size_t size;
+    const void *bytes = bst_archive_data(saved, &size);
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 6, NULL, &part));
+    bst_assert_ok(&ctx, bst_archive_open(&ctx, bytes, size, &read));
+    bst_assert_ok(&ctx, bst_run_custody_archive(part, read));
+    bst_archive_free(read);
+    bst_archive_free(saved);
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, whole, 500.0));
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, part, 500.0));
+    (void)bst_run_custody_figures(whole, &a);
+    (void)bst_run_custody_figures(part, &b);
+    assert_true(a.updated == 1 && b.updated == 1 && a.nees_mean == b.nees_mean &&
+                a.sigma_p90_m == b.sigma_p90_m);
+    bst_run_custody_free(whole);
+    bst_run_custody_free(part);
+    bst_world_free(world);
+}
+
+static void off_and_without_objects(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_run_custody *c;
+    bst_custody_figures f;
+    bst_world *world = world_of_two();
+    const bst_recorder_config off = {.custody = false};
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &off, RATE, 5, NULL, &c));
+    assert_null(c);
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 10.0));
+    assert_false(bst_run_custody_figures(c, &f));
+    bst_run_custody_add(c, NULL);
+    bst_run_custody_free(c);
+    bst_world_free(world);
+    world = test_world_with("", "");
+    assert_int_equal(bst_run_custody_create(&ctx, world, &record, RATE, 5, NULL, &c),
+                     BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "/record/custody"));
+    assert_null(c);
+    bst_world_free(world);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(tracks_update_their_objects),
+        cmocka_unit_test(saved_states_go_on),
+        cmocka_unit_test(off_and_without_objects),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

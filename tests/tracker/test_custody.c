@@ -1,0 +1,197 @@
+/* Filters of catalogued orbits: on objects of the shipped catalogue, with observations that are
+ * drawn about their true directions. */
+#include "tracker/orbit/custody.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "boresight/rng.h"
+#include "sim/astro/sgp4_fit.h"
+#include "tests/test_support.h"
+#include "tracker/mtt/tangent.h"
+
+#define CATALOGUE "scenarios/objects_2022-06.tle"
+
+static const bst_mat3 same_axes = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+static const bst_custody_config config = {.sigma_m = 500, .drift_m_per_day = 1500};
+
+/* What an observer in a circular orbit of 1,000 km height measures of an object: 0.5 arcsec and
+ * 0.05 arcsec/s per axis. */
+static bool observe(const bst_sgp4 *sgp4, double offset_s, double time_s, bst_rng_key key,
+                    uint64_t number, bst_custody_observation *out) {
+    const double radius = 7.378e6, rate = sqrt(BST_EARTH_MU_M3PS2 / radius) / radius;
+    const double c = cos(rate * time_s), s = sin(rate * time_s);
+    const double sigma[4] = {0.5 * BST_ARCSEC_RAD, 0.5 * BST_ARCSEC_RAD, 0.05 * BST_ARCSEC_RAD,
+                             0.05 * BST_ARCSEC_RAD};
+    bst_od_state state = {.time_s = time_s};
+    bst_od_sight sight;
+    double noise[4];
+    *out = (bst_custody_observation){
+        .observer = {.time_s = time_s,
+                     .position_m = {radius * c, 0, radius * s},
+                     .velocity_mps = {-radius * rate * s, 0, radius * rate * c}},
+        .gcrf_from_teme = same_axes};
+    if (!bst_sgp4_motion(sgp4, (offset_s + time_s) / 60.0, &state.position_m,
+                         &state.velocity_mps)) {
+        return false;
+    }
+    bst_od_see(&state, &out->observer, &sight);
+    for (int i = 0; i < 4; i++) {
+        noise[i] = sigma[i] * bst_rng_normal(key, number, (uint64_t)i);
+        out->covariance[i][i] = sigma[i] * sigma[i];
+    }
+    bst_tangent axes = bst_tangent_at(sight.direction);
+    out->direction =
+        bst_tangent_exp(sight.direction, bst_tangent_vector(&axes, noise[0], noise[1]));
+    bst_vec3 turn = bst_tangent_vector(&axes, noise[2], noise[3]);
+    out->rate_radps =
+        bst_tangent_carry(sight.direction, out->direction, bst_vec3_add(sight.rate_radps, turn));
+    return true;
+}
+
+/* Errors are what the covariances say: before, at and after updates, near the equator too. */
+static void errors_agree_with_covariances(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_elements *sets = NULL;
+    int count = 0, used = 0, flat = 0, updates = 0;
+    const bst_elements_options options = {.skip_bad_sets = true};
+    bst_assert_ok(&ctx, bst_elements_load(&ctx, CATALOGUE, &options, &sets, &count));
+    bst_rng_key key = bst_rng_make_key(7, 0, "test", "custody");
+    double before = 0.0, innovations = 0.0, after = 0.0, sigma_before = 0.0, sigma_after = 0.0;
+    for (int i = 3; i < count; i += 29) {
+        bst_custody_orbit orbit;
+        bst_custody_filter filter;
+        bst_sgp4 *sgp4;
+        double normals[BST_CUSTODY_STATE];
+        const double offset_s = 3000.0 * (i % 50); /* elements up to two days old */
+        if (bst_sgp4_create(&ctx, &sets[i], BST_SGP4_WGS72, BST_SGP4_IMPROVED, &sgp4) != BST_OK) {
+            continue;
+        }
+        bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, &sets[i], offset_s, 0.0, &orbit));
+        for (int k = 0; k < BST_CUSTODY_STATE; k++) {
+            normals[k] = bst_rng_normal(key, (uint64_t)(1000000 + i), (uint64_t)k);
+        }
+        bst_custody_filter_init(&config, &orbit, normals, &filter);
+        double nees = bst_custody_nees(&filter), sigma;
+        bst_vec3 place;
+        bool good = bst_custody_place(&orbit, &filter, 20000.0, &place, &sigma);
+        sigma_before += good ? sigma : 0.0;
+        for (int k = 0; good && k < 4; k++) {
+            bst_custody_observation z;
+            bst_custody_prediction p;
+            good = observe(sgp4, offset_s, 5000.0 * (k + 1), key, (uint64_t)(8 * i + k), &z) &&
+                   bst_custody_predict(&orbit, &filter, &z, &p);
+            if (good) {
+                innovations += p.chi2;
+                updates++;
+                assert_true(bst_custody_update(&orbit, &z, &filter));
+            }
+        }
+        bst_sgp4_free(sgp4);
+        if (good) {
+            used++;
+            flat += sets[i].inclination_rad < 0.2 * BST_DEG_RAD;
+            before += nees;
+            after += bst_custody_nees(&filter);
+            assert_true(bst_custody_place(&orbit, &filter, 20000.0, &place, &sigma));
+            sigma_after += sigma;
+        }
+    }
+    free(sets);
+    print_message(
+        "%d objects, %d near the equator: NEES %.2f, %.2f; chi2 %.2f; sigma %.0f, %.0f m\n", used,
+        flat, before / used, after / used, innovations / updates, sigma_before / used,
+        sigma_after / used);
+    assert_true(used > 150 && flat > 8);
+    /* the means of chi-square of 6 and 4 degrees of freedom are within 4 sigma of 6 and 4 */
+    bst_assert_close(before / used, 6.0, 4.0 * sqrt(12.0 / used));
+    bst_assert_close(after / used, 6.0, 4.0 * sqrt(12.0 / used));
+    bst_assert_close(innovations / updates, 4.0, 4.0 * sqrt(8.0 / updates));
+    assert_true(sigma_after < 0.2 * sigma_before);
+}
+
+static bst_elements low_orbit(void) {
+    return (bst_elements){.norad = 5,
+                          .epoch_utc_jd1 = 2459746.5,
+                          .eccentricity = 0.01,
+                          .inclination_rad = 1.2,
+                          .raan_rad = 1.0,
+                          .arg_perigee_rad = 2.0,
+                          .mean_anomaly_rad = 0.5,
+                          .mean_motion_radpmin = 0.06};
+}
+
+/* Process noise leaves the place at its time as it is and spreads later ones. */
+static void noise_spreads_later_places(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const bst_elements set = low_orbit();
+    const bst_custody_config noisy = {.sigma_m = 10, .drift_m_per_day = 10, .noise_m_per_day = 800};
+    bst_custody_orbit orbit;
+    bst_custody_filter plain, aged;
+    bst_vec3 place;
+    double a, b;
+    bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, &set, 0.0, 0.0, &orbit));
+    bst_custody_filter_init(&noisy, &orbit, NULL, &plain);
+    aged = plain;
+    bst_custody_age(&noisy, 43200.0, &aged);
+    assert_true(bst_custody_place(&orbit, &plain, 43200.0, &place, &a));
+    assert_true(bst_custody_place(&orbit, &aged, 43200.0, &place, &b));
+    bst_assert_close(b, a, 0.05 * a); /* other perturbations on other mean motions */
+    assert_true(bst_custody_place(&orbit, &aged, 129600.0, &place, &b));
+    /* sqrt(1/2) of 800 m per day, a day later; 2 % for the radial part */
+    bst_assert_close(b, sqrt(0.5) * 800.0, 0.02 * 566.0);
+    bst_custody_filter again = aged;
+    bst_custody_age(&noisy, 40000.0, &again);
+    assert_memory_equal(&again, &aged, sizeof aged);
+}
+
+/* Another object is far outside of the gate; a photocentre of metres matters next to the object. */
+static void photocentre_and_strangers(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const bst_elements set = low_orbit();
+    bst_elements other = set;
+    other.mean_anomaly_rad += 0.01; /* 70 km ahead */
+    bst_sgp4 *sgp4;
+    bst_custody_orbit orbit, wide;
+    bst_custody_filter filter;
+    bst_custody_observation z;
+    bst_custody_prediction p, q;
+    bst_rng_key key = bst_rng_make_key(1, 0, "test", "custody");
+    bst_assert_ok(&ctx, bst_sgp4_create(&ctx, &other, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &sgp4));
+    assert_true(observe(sgp4, 0.0, 600.0, key, 0, &z));
+    bst_sgp4_free(sgp4);
+    bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, &set, 0.0, 0.0, &orbit));
+    bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, &set, 0.0, 1000.0, &wide));
+    bst_custody_filter_init(&config, &orbit, NULL, &filter);
+    assert_true(bst_custody_predict(&orbit, &filter, &z, &p));
+    assert_true(p.chi2 > 100.0);
+    assert_true(bst_custody_predict(&wide, &filter, &z, &q));
+    assert_true(q.chi2 < p.chi2 && q.covariance[0][0] > p.covariance[0][0]);
+    z.covariance[1][1] = 0.0; /* no error at all: nothing to weigh by */
+    bst_custody_filter unchanged = filter;
+    assert_false(bst_custody_update(&orbit, &z, &filter));
+    assert_memory_equal(&filter, &unchanged, sizeof filter);
+}
+
+static void refuses_what_is_no_ellipse(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_elements set = low_orbit();
+    bst_custody_orbit orbit;
+    set.mean_motion_radpmin = 0.0;
+    assert_int_equal(bst_custody_orbit_init(&ctx, &set, 0.0, 0.0, &orbit), BST_ERR_NUMERIC);
+    assert_non_null(strstr(ctx.message, "object 5"));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(errors_agree_with_covariances),
+        cmocka_unit_test(noise_spreads_later_places),
+        cmocka_unit_test(photocentre_and_strangers),
+        cmocka_unit_test(refuses_what_is_no_ellipse),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,103 @@
+/* Custody of a catalogue: an extended Kalman filter of the SGP4 mean elements of each object, fed
+ * with directions and rates of tracks. */
+#ifndef BST_TRACKER_ORBIT_CUSTODY_H
+#define BST_TRACKER_ORBIT_CUSTODY_H
+
+#include "sim/astro/elements.h"
+#include "tracker/orbit/orbit_motion.h"
+
+/* Components of a filter's state: differences from the catalogued elements, times what makes them
+ * distances, m. With a the semi-major axis:
+ *   DRIFT   a dn per day, n the mean motion: distance gained along the orbit in a day
+ *   ECC_X   2 a d(e cos(omega + Omega)),  ECC_Y  2 a d(e sin(omega + Omega))
+ *   PLANE_X 2 a cos^2(i/2) d(tan(i/2) cos Omega),  PLANE_Y the same with sin Omega
+ *   ALONG   a d(lambda), lambda the mean longitude at time 0
+ * Regular for circular and equatorial orbits, not at 180 degrees of inclination. */
+enum {
+    BST_CUSTODY_DRIFT,
+    BST_CUSTODY_ECC_X,
+    BST_CUSTODY_ECC_Y,
+    BST_CUSTODY_PLANE_X,
+    BST_CUSTODY_PLANE_Y,
+    BST_CUSTODY_ALONG,
+    BST_CUSTODY_STATE
+};
+
+typedef struct bst_custody_config {
+    double sigma_m;         /* of each component except DRIFT, at the epoch of the elements */
+    double drift_m_per_day; /* standard deviation of DRIFT */
+    /* process noise: standard deviation of DRIFT gained in a day, as a random walk */
+    double noise_m_per_day;
+} bst_custody_config;
+
+/* An object as catalogued; time 0 is the epoch of the run. */
+typedef struct bst_custody_orbit {
+    bst_elements elements;
+    double epoch_offset_s; /* time 0 minus the epoch of the elements */
+    double a_m;            /* semi-major axis */
+    /* standard deviation of the photocentre from the centre of mass along each axis, m: of a sunlit
+     * sphere up to 0.59 radii (a Lambertian one, 3 pi / 16) */
+    double photocentre_m;
+} bst_custody_orbit;
+
+/* Filter of an object. */
+typedef struct bst_custody_filter {
+    double x[BST_CUSTODY_STATE];                    /* m */
+    double p[BST_CUSTODY_STATE][BST_CUSTODY_STATE]; /* m^2 */
+    double noise_until_s;                           /* process noise is in `p` until this time */
+} bst_custody_filter;
+
+/* Direction and rate of a track: one observation, with errors of its own. */
+typedef struct bst_custody_observation {
+    bst_od_observer observer;
+    bst_mat3 gcrf_from_teme; /* at the time of the observer */
+    bst_vec3 direction;      /* unit, geometric, GCRF */
+    bst_vec3 rate_radps;     /* perpendicular to it */
+    double covariance[4][4]; /* d1, d2, r1, r2 in the tangent axes at the direction, as in bst_track
+                              */
+} bst_custody_observation;
+
+/* An observation as a filter predicts it. */
+typedef struct bst_custody_prediction {
+    double innovation[4]; /* observed minus predicted, in the tangent axes at the observation */
+    double slope[4][BST_CUSTODY_STATE];
+    double covariance[4][4]; /* of the innovation */
+    double chi2;             /* innovation' covariance^-1 innovation; 4 degrees of freedom */
+    double log_determinant;  /* of the covariance */
+} bst_custody_prediction;
+
+/* Sets the orbit of a catalogued object.
+ *
+ * Errors:    BST_ERR_NUMERIC for elements that are no ellipse */
+bst_status bst_custody_orbit_init(bst_ctx *ctx, const bst_elements *elements, double epoch_offset_s,
+                                  double photocentre_m, bst_custody_orbit *out) BST_MUST_CHECK;
+
+/* Starts a filter with the covariance of the catalogue. Its error is drawn from that covariance:
+ * `normals` are standard normal deviates; NULL: none. */
+void bst_custody_filter_init(const bst_custody_config *config, const bst_custody_orbit *orbit,
+                             const double normals[BST_CUSTODY_STATE], bst_custody_filter *out);
+
+/* Adds the process noise until `time_s`: a random walk of the mean motion, under which the place at
+ * that time stays. Earlier times change nothing. */
+void bst_custody_age(const bst_custody_config *config, double time_s, bst_custody_filter *filter);
+
+/* Predicts an observation. False: SGP4 has no state there, or the covariance is singular. */
+bool bst_custody_predict(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
+                         const bst_custody_observation *observation, bst_custody_prediction *out);
+
+/* Updates a filter with an observation of its object: iterated extended Kalman filter, Joseph's
+ * form (Bar-Shalom, Li and Kirubarajan, Estimation with applications to tracking and navigation,
+ * 2001, eq. 5.2.3-19 and ch. 10.5). False: as bst_custody_predict; the filter is as before. */
+bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observation *observation,
+                        bst_custody_filter *filter);
+
+/* Position (TEME, m) at `time_s`, and its standard deviation, the root of the sum over three axes.
+ * False: no state. */
+bool bst_custody_place(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
+                       double time_s, bst_vec3 *position_teme_m, double *sigma_m);
+
+/* Normalised estimation error squared against an object that moves on its catalogued elements; 6
+ * degrees of freedom. NAN: the covariance is singular. */
+double bst_custody_nees(const bst_custody_filter *filter);
+
+#endif
