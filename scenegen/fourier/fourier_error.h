@@ -24,6 +24,7 @@ bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst
 
 /* A point's light and noise. */
 typedef struct bst_fourier_point {
+    double electrons;        /* in all pixels */
     double peak_e;           /* light in its brightest pixel */
     double dark_variance_e2; /* noise variance of a dark pixel */
     double widening_px2;     /* of its nodes */

@@ -134,11 +134,16 @@ static bst_status make_fields(bst_ctx *ctx, bst_fourier_render *l) {
     return status;
 }
 
+/* Pixels between the image and its repetition: at least the margin. */
+static int pad_px(const bst_fourier_render *l) {
+    return l->margin + (l->margin < WRAP_PX ? l->margin : WRAP_PX);
+}
+
 /* Chooses the grid axes for a window of this size. */
 static void choose_axes(const bst_fourier_render *l, int quality, int width, int height,
                         bst_fourier_axis axis[2]) {
     /* smallest wrap-around distance of wings; nearer ones are not smooth */
-    int taps = l->options.taps, pad = l->margin + (l->margin < WRAP_PX ? l->margin : WRAP_PX);
+    int taps = l->options.taps, pad = pad_px(l);
     axis[0] =
         bst_fourier_axis_choose(&l->band[quality], 0, taps, width + pad, l->density[quality][0]);
     axis[1] =
@@ -275,10 +280,37 @@ int bst_fourier_render_spectra(const bst_fourier_render *l) {
     return l->nodes / l->field_nodes;
 }
 
+/* Errors of an OTF between its tabulated frequencies and of rounding, per electron and times the
+ * root of the pixels of the grid's period: noise in any pixel, of which this is the largest value.
+ * Measured: tests/scenegen/test_tolerance_sweep.c, very bright stars. */
+#define NOISE_OF_OTF 2.5e-6
+
+/* Error in any pixel of the image of a point: that noise, which goes with the root of the sum of
+ * squares of the image (Parseval), and far wings that re-enter the image. Those are corrected with
+ * light at the centres of cells of 16 samples, up to half a cell from its place; wings decrease as
+ * the third power of the distance. */
+static double everywhere_e(const bst_fourier_render *l, bool fine, bst_window window,
+                           const bst_fourier_point *point) {
+    static const double CELL = 16.0, AXES = 2.0, POWER = 3.0;
+    if (!(point->electrons > 0.0)) {
+        return 0.0;
+    }
+    const double *density = l->density[fine ? FINE : PLAIN];
+    int pad = pad_px(l);
+    double pixels = (double)(window.width + pad) * (window.height + pad);
+    double spread = fmin(point->peak_e / (l->band[PLAIN].peak * point->electrons), 1.0);
+    double near = (double)l->margin / pad, cell_px = CELL / fmin(density[0], density[1]);
+    double wings = l->band[PLAIN].beyond * near * near * near;
+    return point->electrons *
+           (NOISE_OF_OTF * sqrt(spread / pixels) + wings * AXES * POWER * 0.5 * cell_px / pad);
+}
+
 double bst_fourier_render_error_sigma(const bst_fourier_render *l, bool fine, bst_window window,
                                       const bst_fourier_point *point) {
     bool whole = window.width == l->camera.width_px && window.height == l->camera.height_px;
-    return bst_fourier_error_sigma(&l->error[fine ? FINE : PLAIN][whole], point);
+    const bst_fourier_error *error = &l->error[fine ? FINE : PLAIN][whole];
+    return bst_fourier_error_sigma(error, point) +
+           everywhere_e(l, fine, window, point) / sqrt(point->dark_variance_e2);
 }
 
 double bst_fourier_render_mixing_error(const bst_fourier_render *l) {
