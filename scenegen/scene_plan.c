@@ -234,8 +234,8 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
 
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera *camera,
                                bst_smear *smear, bst_error_budget *budget,
-                               const bst_fourier_render *fourier,
-                               const bst_scene_plan_limits *limits, const bst_render_request *q) {
+                               bst_fourier_render *fourier, const bst_scene_plan_limits *limits,
+                               const bst_render_request *q) {
     assert(p && camera && smear && budget && limits && q && q->count >= 0);
     double read = camera->read_noise_e, brightest = 0.0;
     bool coloured = fourier && bst_fourier_render_spectra(fourier) > 1;
@@ -256,6 +256,9 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
                              .list = q->sources,
                              .aim = first_aim(q)};
     BST_TRY(bst_smear_begin(ctx, smear, &frame));
+    if (fourier) {
+        BST_TRY(bst_fourier_render_begin(ctx, fourier, binning));
+    }
     planning m = {.smear = smear,
                   .budget = budget,
                   .fourier = fourier,

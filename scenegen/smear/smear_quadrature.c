@@ -201,7 +201,7 @@ static void set_kernel(const bst_smear_maker *m, const group *g, const bst_smear
  * straight parts of random speed. */
 #define EVEN_SPEEDS 2.0
 #define EVEN_WAY 0.8
-#define BESIDE_ANOTHER (0.66 / 0.55)
+#define BESIDE_ANOTHER 1.25 /* 0.66 over 0.55, and a margin */
 #define JUMP_SPEEDS 8.0
 #define BESIDE_A_JUMP 2.4
 
@@ -232,7 +232,7 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
             part[k] = fmin(many, part[k]);
         }
         double rest = jump * (along.second * fixed + along.higher * higher);
-        part[k] = jump > 1.0 ? jump * part[k] : fmin(beside * part[k], 1.0);
+        part[k] *= beside;
         double predicted = rest + part[k] * missed;
         list->higher[k] = rest > list->higher[k] ? rest : list->higher[k];
         list->error[k] = bound > list->error[k] ? bound : list->error[k];
