@@ -500,7 +500,7 @@ static void choose_parts(scene *s, int index, straight_parts *p, double *electro
  * beside the noise of the peak. */
 static void a_speed_that_jumps_is_within_its_prediction(void **state) {
     fixture *f = *state;
-    int cases = scenes >= SCENES_OF_A_SEED ? 600 : 20;
+    int cases = scenes >= SCENES_OF_A_SEED ? 600 : 12;
     double worst = INFINITY;
     for (int i = 0; i < cases; i++) {
         scene s = {.count = 1, .binning = 1, .tolerance_sigma = 0.05};
