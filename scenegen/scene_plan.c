@@ -61,6 +61,7 @@ typedef struct planning {
     const bst_fourier_render *fourier;
     const bst_render_request *request;
     double dark_e2;
+    double duration_s;
     double beyond; /* light per pixel from a source beyond the margin, s */
     int blocks;    /* largest number */
     int64_t max_nodes;
@@ -88,7 +89,8 @@ static bst_status add_error(bst_ctx *ctx, planning *m, const bst_scene_source *s
     if (m->fourier) { /* error of grid and widening, on dark pixels too */
         double presence = bst_smear_last_presence(m->smear),
                noise_e = sqrt((double)error.peak_e + m->dark_e2);
-        bst_fourier_point point = {.peak_e = bst_smear_last_read_e(m->smear),
+        bst_fourier_point point = {.electrons = source->electrons_per_s * m->duration_s,
+                                   .peak_e = bst_smear_last_read_e(m->smear),
                                    .dark_variance_e2 = m->dark_e2,
                                    .wings = presence < 1.0};
         bst_window window = m->request->window;
@@ -172,7 +174,7 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
      * levels of detail go by factors of two. GRID_SHARE: share of the tolerance above which a finer
      * grid pays. */
     static const double LESS = 0.97, GAIN = 0.98, MOST_STEP = 0.2, LEAST_STEP = 0.85,
-                        GRID_SHARE = 0.25, COARSER = 16.0, COARSEST = 1e9;
+                        GRID_SHARE = 0.25, IDLE_STEP = 0.6, COARSER = 16.0, COARSEST = 1e9;
     p->bounded = false;
     m->blocks = blocks_of(m->max_nodes, m->request->count, most_blocks);
     double aim = first_aim(m->request), before = INFINITY;
@@ -216,7 +218,8 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
             m->fine = true;
             bst_smear_refine_grid(m->smear, bst_fourier_render_density(m->fourier, true));
         } else {
-            aim *= fmin(fmax(LESS * tolerance / error, MOST_STEP), LEAST_STEP);
+            /* a round without a gain: the next one must reach another level */
+            aim *= fmin(fmax(LESS * tolerance / error, MOST_STEP), idle ? IDLE_STEP : LEAST_STEP);
         }
         bst_smear_restart(m->smear, aim);
         BST_TRY(plan_sources(ctx, p, m, &fits));
@@ -231,8 +234,8 @@ static bst_status plan_to_tolerance(bst_ctx *ctx, bst_scene_plan *p, planning *m
 
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera *camera,
                                bst_smear *smear, bst_error_budget *budget,
-                               const bst_fourier_render *fourier,
-                               const bst_scene_plan_limits *limits, const bst_render_request *q) {
+                               bst_fourier_render *fourier, const bst_scene_plan_limits *limits,
+                               const bst_render_request *q) {
     assert(p && camera && smear && budget && limits && q && q->count >= 0);
     double read = camera->read_noise_e, brightest = 0.0;
     bool coloured = fourier && bst_fourier_render_spectra(fourier) > 1;
@@ -253,12 +256,16 @@ bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *p, const bst_camera
                              .list = q->sources,
                              .aim = first_aim(q)};
     BST_TRY(bst_smear_begin(ctx, smear, &frame));
+    if (fourier) {
+        BST_TRY(bst_fourier_render_begin(ctx, fourier, binning));
+    }
     planning m = {.smear = smear,
                   .budget = budget,
                   .fourier = fourier,
                   .request = q,
                   .dark_e2 = dark_e2,
                   .max_nodes = limits->nodes > 0 ? limits->nodes : BST_SCENE_MOST_NODES,
+                  .duration_s = q->track->time_s[q->track->count - 1],
                   .beyond = fourier ? bst_fourier_render_band(fourier)->beyond * binning * binning *
                                           q->track->time_s[q->track->count - 1]
                                     : 0.0};

@@ -43,8 +43,7 @@ typedef struct bst_scene_plan_limits {
  *            most nodes */
 bst_status bst_scene_plan_make(bst_ctx *ctx, bst_scene_plan *plan, const bst_camera *camera,
                                bst_smear *smear, bst_error_budget *budget,
-                               const bst_fourier_render *fourier,
-                               const bst_scene_plan_limits *limits,
+                               bst_fourier_render *fourier, const bst_scene_plan_limits *limits,
                                const bst_render_request *request) BST_MUST_CHECK;
 
 /* Frees the memory of a plan. */

@@ -21,6 +21,7 @@ enum { WINGS = 7 };
 typedef struct lattice {
     const bst_psf *psf;
     double step, cutoff, alias[2][LATTICE];
+    double read[LATTICE];                       /* means over the side of a read-out pixel */
     double wide[2][LATTICE], ideal[2][LATTICE]; /* widening kernel, and the Gaussian that it fits */
     bst_fft_complex_f64 *room;                  /* [SIDE][SIDE] */
     bst_fft *inverse;
@@ -67,13 +68,20 @@ static void find_widening(lattice *l, const bst_fourier_axis *axis,
     }
 }
 
+static void find_read_means(lattice *l, int binning) {
+    for (int i = 0; i < LATTICE; i++) {
+        l->read[i] = bst_psf_binned(frequency(l, i), binning);
+    }
+}
+
 /* Renders one of the images of a field node by FFT. */
 static void make_image(lattice *l, int node, int what) {
     double area = l->step * l->step, *image = l->image + what * SIDE * SIDE;
     memset(l->room, 0, sizeof *l->room * SIDE * SIDE);
     for (int j = 0; j < LATTICE; j++) {
         for (int i = 0; i < LATTICE; i++) {
-            double v[2], fx = frequency(l, i), fy = frequency(l, j), f = area;
+            double v[2], fx = frequency(l, i), fy = frequency(l, j);
+            double f = area * l->read[i] * l->read[j];
             bool kept = hypot(fx, fy) <= l->cutoff;
             if (what != WHOLE && kept != (what != LOST)) {
                 continue;
@@ -99,15 +107,30 @@ static void make_image(lattice *l, int node, int what) {
  * (tests/scenegen/test_tolerance_sweep.c, scene 171). */
 #define SAFE 1.7
 
-/* Raises the errors of the brightness classes to those of a field node. */
-static void add_node_errors(lattice *l, int node, double peak, bst_fourier_error *out) {
+static double brightest_of(const lattice *l) {
     double top = 0.0;
-    for (int what = 0; what < IMAGES; what++) {
-        make_image(l, node, what);
-    }
     for (int i = 0; i < SIDE * SIDE; i++) {
         top = fmax(top, l->image[i]);
     }
+    return top;
+}
+
+/* Raises the errors of the brightness classes to those of a field node.
+ *
+ * Given:     peak  of the PSF in a pixel of the sensor */
+static void add_node_errors(lattice *l, int node, int binning, double peak,
+                            bst_fourier_error *out) {
+    if (binning > 1) { /* peak of a read-out pixel, as a mean */
+        find_read_means(l, 1);
+        make_image(l, node, WHOLE);
+        peak /= brightest_of(l);
+        find_read_means(l, binning);
+    }
+    for (int what = 0; what < IMAGES; what++) {
+        make_image(l, node, what);
+    }
+    double top = brightest_of(l);
+    peak *= binning > 1 ? top : 1.0;
     for (int i = 0; i < SIDE * SIDE; i++) {
         int k = bst_light_class(l->image[i] / top);
         const double *at = l->image + i;
@@ -120,9 +143,9 @@ static void add_node_errors(lattice *l, int node, double peak, bst_fourier_error
 }
 
 bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst_fourier_band *band,
-                                     const bst_fourier_axis axis[2], double widest_px2,
+                                     const bst_fourier_axis axis[2], int binning, double widest_px2,
                                      bst_fourier_error *out) {
-    assert(psf && band && axis && widest_px2 >= 0.0 && out);
+    assert(psf && band && axis && binning > 0 && widest_px2 >= 0.0 && out);
     lattice l = {.psf = psf,
                  .step = 2.0 * fmax(bst_psf_cutoff(psf), band->cutoff) / LATTICE,
                  .cutoff = band->cutoff,
@@ -138,8 +161,9 @@ bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst
             find_aliases(&l, &axis[a], a);
             find_widening(&l, &axis[a], &band->axis[a], widest_px2, a);
         }
+        find_read_means(&l, binning);
         for (int n = 0; n < bst_psf_nodes(psf); n++) {
-            add_node_errors(&l, n, band->peak, out);
+            add_node_errors(&l, n, binning, band->peak, out);
         }
     }
     bst_fft_free(l.inverse);

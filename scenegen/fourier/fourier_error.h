@@ -16,14 +16,16 @@ typedef struct bst_fourier_error {
 /* Measures the largest grid errors over all sub-sample positions and field nodes.
  *
  * Given:     axis        grid along x and y
+ *            binning     of read-out pixels, whose mean error is over the mean light of their peak
  *            widest_px2  largest widening of a node; 0: none
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_fourier_error_measure(bst_ctx *ctx, const bst_psf *psf, const bst_fourier_band *band,
-                                     const bst_fourier_axis axis[2], double widest_px2,
+                                     const bst_fourier_axis axis[2], int binning, double widest_px2,
                                      bst_fourier_error *out) BST_MUST_CHECK;
 
 /* A point's light and noise. */
 typedef struct bst_fourier_point {
+    double electrons;        /* in all pixels */
     double peak_e;           /* light in its brightest pixel */
     double dark_variance_e2; /* noise variance of a dark pixel */
     double widening_px2;     /* of its nodes */

@@ -43,8 +43,11 @@ struct bst_fourier_render {
     bst_fourier_render_options options;
     bst_fourier_band band[QUALITIES]; /* nodes are those of the plain one */
     double density[QUALITIES][2];
-    /* for any window, and for the whole sensor, whose grid is denser */
-    bst_fourier_error error[QUALITIES][2];
+    /* for any window, and for the whole sensor, whose grid is denser; by binning - 1, of those used
+     * so far */
+    bst_fourier_error error[BST_PIXEL_PARTS][QUALITIES][2];
+    bool measured[BST_PIXEL_PARTS];
+    int binning;   /* of the frame, at most BST_PIXEL_PARTS */
     double widest; /* largest node widening that the spreading kernel supports, in node variances */
     int margin;
     bst_parallel *pool;
@@ -134,41 +137,73 @@ static bst_status make_fields(bst_ctx *ctx, bst_fourier_render *l) {
     return status;
 }
 
+/* Pixels between the image and its repetition: at least the margin. */
+static int pad_px(const bst_fourier_render *l) {
+    return l->margin + (l->margin < WRAP_PX ? l->margin : WRAP_PX);
+}
+
 /* Chooses the grid axes for a window of this size. */
 static void choose_axes(const bst_fourier_render *l, int quality, int width, int height,
                         bst_fourier_axis axis[2]) {
     /* smallest wrap-around distance of wings; nearer ones are not smooth */
-    int taps = l->options.taps, pad = l->margin + (l->margin < WRAP_PX ? l->margin : WRAP_PX);
+    int taps = l->options.taps, pad = pad_px(l);
     axis[0] =
         bst_fourier_axis_choose(&l->band[quality], 0, taps, width + pad, l->density[quality][0]);
     axis[1] =
         bst_fourier_axis_choose(&l->band[quality], 1, taps, height + pad, l->density[quality][1]);
 }
 
-/* Sets densities and errors of a grid quality, and the supported widening. */
+/* Grid axes as sparse as any window's. */
+static void sparsest_axes(const bst_fourier_render *l, int quality, bst_fourier_axis axis[2]) {
+    for (int a = 0; a < 2; a++) {
+        bst_nufft_kernel spread = {.taps = l->options.taps};
+        double density = l->density[quality][a];
+        (void)bst_nufft_kernel_choose(&spread, &l->band[quality].axis[a], density);
+        axis[a] = (bst_fourier_axis){DENSITY_PX, (int)floor(DENSITY_PX * density), spread, 0.0};
+    }
+}
+
+/* Sets densities of a grid quality, and the supported widening. */
 static bst_status prepare_quality(bst_ctx *ctx, bst_fourier_render *l, int quality) {
     double tolerance = l->options.tolerance * (quality == FINE ? FINER : 1.0);
     bst_fourier_band *band = &l->band[quality];
     BST_TRY(bst_fourier_band_measure(ctx, l->psf, CUTOFF_SHARE * tolerance, band));
     l->margin = (l->band[PLAIN].reach_px + 15) / 16 * 16;
-    bst_fourier_axis axis[2]; /* as sparse as any window's */
+    bst_fourier_axis axis[2];
     for (int a = 0; a < 2; a++) {
-        bst_nufft_kernel spread = {.taps = l->options.taps};
+        l->density[quality][a] =
+            bst_fourier_density(band, a, l->options.taps, ALIAS_SHARE * tolerance);
+    }
+    sparsest_axes(l, quality, axis);
+    for (int a = 0; a < 2; a++) {
         bst_nufft_kernel_shape shape;
-        double density = bst_fourier_density(band, a, l->options.taps, ALIAS_SHARE * tolerance);
-        l->density[quality][a] = density;
-        (void)bst_nufft_kernel_choose(&spread, &band->axis[a], density);
-        axis[a] = (bst_fourier_axis){DENSITY_PX, (int)floor(DENSITY_PX * density), spread, 0.0};
-        double sigma = l->band[PLAIN].node_sigma_px * density;
-        while (bst_nufft_kernel_widen(&spread, &band->axis[a], density, l->widest * sigma * sigma,
-                                      &shape) > WIDEN_ERROR) {
+        double density = l->density[quality][a], sigma = l->band[PLAIN].node_sigma_px * density;
+        while (bst_nufft_kernel_widen(&axis[a].spread, &band->axis[a], density,
+                                      l->widest * sigma * sigma, &shape) > WIDEN_ERROR) {
             l->widest *= 0.8; /* step of the search: at most a fifth too narrow */
         }
     }
+    return BST_OK;
+}
+
+bst_status bst_fourier_render_begin(bst_ctx *ctx, bst_fourier_render *l, int binning) {
+    int n = (binning < BST_PIXEL_PARTS ? binning : BST_PIXEL_PARTS) - 1;
     double sigma_px = l->band[PLAIN].node_sigma_px, widest_px2 = l->widest * sigma_px * sigma_px;
-    BST_TRY(bst_fourier_error_measure(ctx, l->psf, band, axis, widest_px2, &l->error[quality][0]));
-    choose_axes(l, quality, (int)l->camera.width_px, (int)l->camera.height_px, axis);
-    return bst_fourier_error_measure(ctx, l->psf, band, axis, widest_px2, &l->error[quality][1]);
+    assert(binning > 0);
+    l->binning = n + 1;
+    for (int q = 0; q < QUALITIES && !l->measured[n]; q++) {
+        for (int whole = 0; whole < 2; whole++) {
+            bst_fourier_axis axis[2];
+            sparsest_axes(l, q, axis);
+            if (whole) {
+                choose_axes(l, q, (int)l->camera.width_px, (int)l->camera.height_px, axis);
+            }
+            BST_TRY(bst_fourier_error_measure(ctx, l->psf, &l->band[q], axis, n + 1, widest_px2,
+                                              &l->error[n][q][whole]));
+        }
+    }
+    l->measured[n] = true;
+    return BST_OK;
 }
 
 static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fourier_render *l) {
@@ -181,6 +216,7 @@ static bst_status prepare(bst_ctx *ctx, bst_device *device, bst_fourier_render *
     for (int q = 0; q < QUALITIES; q++) {
         BST_TRY(prepare_quality(ctx, l, q));
     }
+    BST_TRY(bst_fourier_render_begin(ctx, l, 1));
     return make_fields(ctx, l);
 }
 
@@ -275,10 +311,37 @@ int bst_fourier_render_spectra(const bst_fourier_render *l) {
     return l->nodes / l->field_nodes;
 }
 
+/* Errors of an OTF between its tabulated frequencies and of rounding, per electron and times the
+ * root of the pixels of the grid's period: noise in any pixel, of which this is the largest value.
+ * Measured: tests/scenegen/test_tolerance_sweep.c, very bright stars. */
+#define NOISE_OF_OTF 2.5e-6
+
+/* Error in any pixel of the image of a point: that noise, which goes with the root of the sum of
+ * squares of the image (Parseval), and far wings that re-enter the image. Those are corrected with
+ * light at the centres of cells of 16 samples, up to half a cell from its place; wings decrease as
+ * the third power of the distance. */
+static double everywhere_e(const bst_fourier_render *l, bool fine, bst_window window,
+                           const bst_fourier_point *point) {
+    static const double CELL = 16.0, AXES = 2.0, POWER = 3.0;
+    if (!(point->electrons > 0.0)) {
+        return 0.0;
+    }
+    const double *density = l->density[fine ? FINE : PLAIN];
+    int pad = pad_px(l);
+    double pixels = (double)(window.width + pad) * (window.height + pad);
+    double spread = fmin(point->peak_e / (l->band[PLAIN].peak * point->electrons), 1.0);
+    double near = (double)l->margin / pad, cell_px = CELL / fmin(density[0], density[1]);
+    double wings = l->band[PLAIN].beyond * near * near * near;
+    return point->electrons *
+           (NOISE_OF_OTF * sqrt(spread / pixels) + wings * AXES * POWER * 0.5 * cell_px / pad);
+}
+
 double bst_fourier_render_error_sigma(const bst_fourier_render *l, bool fine, bst_window window,
                                       const bst_fourier_point *point) {
     bool whole = window.width == l->camera.width_px && window.height == l->camera.height_px;
-    return bst_fourier_error_sigma(&l->error[fine ? FINE : PLAIN][whole], point);
+    const bst_fourier_error *error = &l->error[l->binning - 1][fine ? FINE : PLAIN][whole];
+    return bst_fourier_error_sigma(error, point) +
+           everywhere_e(l, fine, window, point) / sqrt(point->dark_variance_e2);
 }
 
 double bst_fourier_render_mixing_error(const bst_fourier_render *l) {

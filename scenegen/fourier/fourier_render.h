@@ -54,6 +54,11 @@ double bst_fourier_render_widest(const bst_fourier_render *light);
 /* Number of spectra of the PSF (bst_psf_spectra). */
 int bst_fourier_render_spectra(const bst_fourier_render *light);
 
+/* Begins a frame of read-out pixels of `binning` by `binning` of the sensor's, whose errors are
+ * measured at the first one. Errors: BST_ERR_MEMORY. */
+bst_status bst_fourier_render_begin(bst_ctx *ctx, bst_fourier_render *light,
+                                    int binning) BST_MUST_CHECK;
+
 /* Error bound of a source's image by grid, cut-off and widening kernel, in sigma of the worst pixel
  * (fourier_error.h).
  *

@@ -97,22 +97,34 @@ static void second_moments(const bst_smear_maker *m, const group *g, bst_smear_m
     }
 }
 
-/* With so many segments in a group the two-point rule suffices: its error of the fourth moment is 1
- * / segments^4. */
-enum { MANY_SEGMENTS = 6 };
+/* With so many segments in a group the two-point rule suffices for those whose squared length is at
+ * most a third of the group's spread, as in equal ones: its error of the fourth moment is 1 /
+ * segments^4. */
+enum { MANY_SEGMENTS = 6, SHORT_PART = 3 };
+
+/* Points of the Gauss-Legendre rule of a segment from a to b.
+ *
+ * Given:     many    the group has MANY_SEGMENTS
+ *            spread  of the group */
+static inline int points_of(const double a[3], const double b[3], bool many, double spread) {
+    double x = b[0] - a[0], y = b[1] - a[1], z = b[2] - a[2];
+    return many && (x * x + y * y + z * z) * SHORT_PART <= spread ? 2 : 4;
+}
+
+static double trace_of(const bst_smear_moments *t) {
+    return t->covariance[0][0] + t->covariance[1][1] + t->covariance[2][2];
+}
 
 /* Sets the principal axis and the higher moments about it. */
 static void high_moments(const bst_smear_maker *m, const group *g, bst_smear_moments *out) {
     double a[3], b[3], weight = 0.0;
     bst_smear_nodes_main_axis(out->covariance, out->axis);
-    int segments = 0;
-    while (segments < MANY_SEGMENTS && reaches(m, g, g->first + segments)) {
-        segments++;
-    }
-    int points = segments == MANY_SEGMENTS ? 2 : 4;
+    double spread = trace_of(out);
+    bool many = reaches(m, g, g->first + MANY_SEGMENTS - 1);
     for (int k = g->first; reaches(m, g, k); k++) {
         double w = clip(m, g, k, a, b);
-        for (int n = 0; n < points && w > 0.0; n++) {
+        int points = w > 0.0 ? points_of(a, b, many, spread) : 0;
+        for (int n = 0; n < points; n++) {
             double d[3], x = 0.0, part = w * bst_smear_gauss_weight[points - 1][n];
             for (int i = 0; i < 3; i++) {
                 d[i] = a[i] + bst_smear_gauss_place[points - 1][n] * (b[i] - a[i]) - out->mean[i];
@@ -128,6 +140,7 @@ static void high_moments(const bst_smear_maker *m, const group *g, bst_smear_mom
                 out->twist[i] += part * x * x * x * d[i];
             }
             double y2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            out->furthest2 = fmax(out->furthest2, x * x + y2);
             out->drift += part * x * y2;
             out->mixed += part * x * x * y2;
             for (int i = 0; i < 3; i++) {
@@ -158,10 +171,12 @@ static void set_kernel(const bst_smear_maker *m, const group *g, const bst_smear
     if (r->nodes < 2 || split || bst_smear_most_kernel(r) < BST_LEAST_KERNEL * m->variance) {
         return;
     }
-    int points = reaches(m, g, g->first + MANY_SEGMENTS) ? 2 : 4;
+    double spread = trace_of(t);
+    bool many = reaches(m, g, g->first + MANY_SEGMENTS - 1);
     for (int k = g->first; reaches(m, g, k); k++) {
         double w = clip(m, g, k, a, b);
-        for (int n = 0; n < points && w > 0.0; n++) {
+        int points = w > 0.0 ? points_of(a, b, many, spread) : 0;
+        for (int n = 0; n < points; n++) {
             double x = 0.0, part = w * bst_smear_gauss_weight[points - 1][n];
             for (int i = 0; i < 3; i++) {
                 double d = a[i] + bst_smear_gauss_place[points - 1][n] * (b[i] - a[i]) - t->mean[i];
@@ -178,15 +193,31 @@ static void set_kernel(const bst_smear_maker *m, const group *g, const bst_smear
     bst_smear_set_kernel(t, high, r);
 }
 
+/* Predicted errors of a group beside another one, over that alone. In an even row they nearly
+ * cancel. Beside one of another speed or direction both may have the same sign in between: the
+ * second extremum of a Gaussian's sixth derivative, 1.1 sigma from the first, is 0.66 of it, where
+ * the Gaussian has 0.55 of its peak's light. Beside a much higher or lower speed the fainter group
+ * lies in the flank of the brighter one's light: measured in tests/scenegen/test_tolerance_sweep.c,
+ * straight parts of random speed. */
+#define EVEN_SPEEDS 2.0
+#define EVEN_WAY 0.8
+#define BESIDE_ANOTHER 1.25 /* 0.66 over 0.55, and a margin */
+#define JUMP_SPEEDS 8.0
+#define BESIDE_A_JUMP 2.4
+
 /* Raises the list's errors to those of a rule for a group with this axis; returns its predicted
  * error. Of the missed moment's error, either bound holds: the smoothed sum of the moduli, or the
- * smoothed greatest derivative of a group, and that of a row of groups. */
-static double raise_error(const bst_smear_maker *m, const double axis[3], const bst_smear_rule *r) {
+ * smoothed greatest derivative of a group, and that of a row of groups.
+ *
+ * Given:     beside  the predicted error beside other groups, over that alone */
+static double raise_error(const bst_smear_maker *m, const double axis[3], const bst_smear_rule *r,
+                          double beside) {
     bst_smear_node_list *list = m->list;
     double part[BST_NODE_SCALES], one[BST_NODE_SCALES];
     bst_smear_direction_parts along = bst_smear_find_direction_parts(m, axis, r->nodes);
     bst_smear_missed_parts(m, &along, r, part, one);
-    double square = 1.0 / (1 << (BST_NODE_SCALES - 2));
+    double square = 1.0 / (1 << (BST_NODE_SCALES - 2)),
+           jump = beside < BESIDE_A_JUMP ? 1.0 : beside;
     bool row = false;
     for (int k = 0; k < BST_NODE_SCALES; k++, square *= 2.0) {
         double fourth = square * square;
@@ -200,7 +231,8 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
             row = row || many > one[k];
             part[k] = fmin(many, part[k]);
         }
-        double rest = along.second * fixed + along.higher * higher;
+        double rest = jump * (along.second * fixed + along.higher * higher);
+        part[k] *= beside;
         double predicted = rest + part[k] * missed;
         list->higher[k] = rest > list->higher[k] ? rest : list->higher[k];
         list->error[k] = bound > list->error[k] ? bound : list->error[k];
@@ -211,14 +243,41 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
     }
     /* a row has a pattern of its own */
     list->orders |= row ? 7U << 1 : r->nodes > 1 ? 1U << r->nodes : 0U;
-    return along.second * r->fixed + along.higher * (r->error - r->missed - r->fixed) +
+    return jump * (along.second * r->fixed + along.higher * (r->error - r->missed - r->fixed)) +
            part[BST_NODE_SCALES - 2] * r->missed;
 }
 
-static bst_status emit(bst_ctx *ctx, const bst_smear_maker *m, const bst_smear_moments *g,
+/* Compares a group with the last one, which it becomes. */
+static double beside_last(bst_smear_maker *m, const bst_smear_moments *g, double weight) {
+    bst_smear_last_group *last = &m->last;
+    double way2 = 0.0, length = sqrt(12.0 * g->along[2]), speed = length / weight;
+    double ratio = last->speed > 0.0 ? fmax(speed / last->speed, last->speed / speed) : 1.0;
+    for (int i = 0; i < 3; i++) {
+        way2 += (g->mean[i] - last->mean[i]) * (g->mean[i] - last->mean[i]);
+    }
+    double apart = 0.5 * EVEN_WAY * (length + last->length);
+    bool even = !(last->speed > 0.0) || (ratio < EVEN_SPEEDS && way2 > apart * apart);
+    memcpy(last->mean, g->mean, sizeof last->mean);
+    last->length = length;
+    last->speed = speed;
+    return !(ratio < JUMP_SPEEDS) ? BESIDE_A_JUMP : even ? 1.0 : BESIDE_ANOTHER;
+}
+
+static bst_status emit(bst_ctx *ctx, bst_smear_maker *m, const bst_smear_moments *g,
                        const bst_smear_rule *r, double weight) {
     bool split = r->pair[0] != 0.0 || r->pair[1] != 0.0 || r->pair[2] != 0.0;
-    const double error[2] = {r->error, raise_error(m, g->axis, r)};
+    double beside = beside_last(m, g, weight);
+    if (m->last.beside > 0.0 && beside > m->last.beside) {
+        double predicted = raise_error(m, m->last.axis, &m->last.rule, beside);
+        for (int n = m->last.first; n < m->list->count; n++) {
+            m->list->items[n].predicted = predicted;
+        }
+    }
+    m->last.beside = beside;
+    m->last.first = m->list->count;
+    m->last.rule = *r;
+    memcpy(m->last.axis, g->axis, sizeof m->last.axis);
+    const double error[2] = {r->error, raise_error(m, g->axis, r, beside)};
     for (int n = 0; n < r->nodes; n++) {
         for (int side = -1; side <= 1; side += 2) {
             double p[3];
@@ -251,17 +310,72 @@ static void adapt(bst_smear_maker *m, double error) {
     m->most = fmin(m->most * fmin(fmax(change, 0.4), 1.6), m->limit);
 }
 
-/* Replaces a group by nodes, or by two halves of its time if no rule is accurate enough. */
+/* Moves *late to the group's part from a path point on, which must lie within it. */
+static void split_at(group *g, group *late, int segment, double at) {
+    *late = (group){segment, at, g->to};
+    g->to = at;
+}
+
+/* Most splits of a group. */
+enum { MOST_DEPTH = 40 };
+
+/* Squared distance from the mean, over the largest spread of a group, beyond which light is
+ * searched for a tail: on a uniform path it is 3, or less. */
+#define TAIL_SPREADS 4.0
+/* Share of the group's time, less the share of its way, at a path point where the speed changes so
+ * much that the faster part is faint: beside a turning point it is at most 1 / 4. */
+#define TAIL_KNEE 0.35
+
+/* Finds the path point where a group's speed changes most, if part of its way is a long and faint
+ * tail. Errors of a group's quadrature lie along its whole way (Peano kernel), also far from its
+ * light, where there is less noise than at its peak: an interval of a composite rule must not
+ * contain a jump of the integrand.
+ *
+ * Returned:  segment that begins there; -1: there is no such tail */
+static int find_knee(const bst_smear_maker *m, const group *g, const bst_smear_moments *t) {
+    if (!(t->furthest2 > TAIL_SPREADS * m->limit)) {
+        return -1;
+    }
+    double a[3], b[3], way = 0.0, so_far = 0.0, most = TAIL_KNEE;
+    int knee = -1;
+    for (int round = 0; round < 2; round++) {
+        for (int k = g->first; reaches(m, g, k); k++) {
+            if (!(clip(m, g, k, a, b) > 0.0)) {
+                continue;
+            }
+            double share = (m->path[k].s - g->from) / (g->to - g->from);
+            double apart = fabs(share - so_far / way);
+            if (round > 0 && m->path[k].s > g->from && apart > most) {
+                most = apart;
+                knee = k;
+            }
+            double *to = round == 0 ? &way : &so_far;
+            *to += sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) +
+                        (b[2] - a[2]) * (b[2] - a[2]));
+        }
+    }
+    return knee;
+}
+
+/* Replaces a group by nodes, or by two parts of its time if no rule is accurate enough: its halves,
+ * or those before and after a jump of the speed. */
 static bst_status close_group(bst_ctx *ctx, bst_smear_maker *m, group g, int depth) {
+    group late;
     bst_smear_moments t;
     bst_smear_rule best = {.error = INFINITY}, r;
     second_moments(m, &g, &t);
-    double spread = t.covariance[0][0] + t.covariance[1][1] + t.covariance[2][2];
+    double spread = trace_of(&t);
     double weight = (g.to - g.from) / m->total;
     if (!(spread > 1e-12 * m->variance)) {
         return push(ctx, m->list, t.mean, weight, 0.0, (const double[2]){0.0, 0.0});
     }
     high_moments(m, &g, &t);
+    int knee = find_knee(m, &g, &t);
+    if (knee >= 0 && depth < MOST_DEPTH) {
+        split_at(&g, &late, knee, m->path[knee].s);
+        BST_TRY(close_group(ctx, m, g, depth + 1));
+        return close_group(ctx, m, late, depth + 1);
+    }
     bst_smear_choose_rule(m, &t, m->tolerance, &best);
     /* a round distribution does not become thinner by halving */
     if (best.error > m->tolerance && !m->widen && t.across > 0.2 * t.along[2]) {
@@ -273,14 +387,14 @@ static bst_status close_group(bst_ctx *ctx, bst_smear_maker *m, group g, int dep
     if (depth == 0 && best.nodes == 3) {
         adapt(m, best.error);
     }
-    if (best.error > m->tolerance && depth < 40 &&
+    if (best.error > m->tolerance && depth < MOST_DEPTH &&
         !(single_stretch(m, &g) && spread < 1e-6 * m->variance)) {
         double middle = 0.5 * (g.from + g.to);
-        group late = {g.first, middle, g.to};
-        while (m->path[late.first + 1].s <= middle) {
-            late.first++;
+        int segment = g.first;
+        while (m->path[segment + 1].s <= middle) {
+            segment++;
         }
-        g.to = middle;
+        split_at(&g, &late, segment, middle);
         BST_TRY(close_group(ctx, m, g, depth + 1));
         return close_group(ctx, m, late, depth + 1);
     }

@@ -6,6 +6,43 @@
 
 #include "scenegen/smear/smear_quadrature.h"
 
+/* Moments of a group about its mean: along the axis to sixth order, and across. */
+typedef struct bst_smear_moments {
+    double mean[3], axis[3];
+    double covariance[3][3];
+    double along[7];  /* E[x^k] */
+    double bend[3];   /* E[y x^2], y across the axis */
+    double twist[3];  /* E[y x^3] */
+    double drift;     /* E[x y^2] */
+    double mixed;     /* E[x^2 y^2] */
+    double lean[3];   /* E[y y^2] */
+    double across;    /* E[y^2] */
+    double furthest2; /* largest x^2 + y^2 of the points that the moments are from */
+} bst_smear_moments;
+
+/* Quadrature rule of a group: weighted nodes and error. */
+typedef struct bst_smear_rule {
+    int nodes;       /* 1 to 3 along the axis */
+    double widening; /* px^2 */
+    double pair[3];  /* half distance of the pair into which each node is split */
+    double node[3], weight[3];
+    double bend[3];  /* shift across the axis per unit of `curve` */
+    double curve[3]; /* second orthogonal polynomial at the nodes */
+    double error;    /* total */
+    double missed;   /* part: missed highest moment */
+    double kernel;   /* px^2: variance of the Peano kernel of the missed moment */
+    double fixed;    /* part: wrong widening of images that move by less than the path */
+} bst_smear_rule;
+
+/* The group whose nodes were appended last. */
+typedef struct bst_smear_last_group {
+    double mean[3], axis[3];
+    double length, speed; /* along its axis, px and px over its share of the exposure; 0: none */
+    double beside;        /* its predicted error beside others, over that alone; 0: none */
+    int first;            /* of its nodes in the list */
+    bst_smear_rule rule;
+} bst_smear_last_group;
+
 /* A path to be replaced by nodes, with its requirements. */
 typedef struct bst_smear_maker {
     const bst_smear_path_point *path;
@@ -29,34 +66,8 @@ typedef struct bst_smear_maker {
     double image_share; /* image variance per path variance, mean over the field */
     double most;        /* spread of the next group, px^2 */
     double limit;       /* of `most` */
+    bst_smear_last_group last;
 } bst_smear_maker;
-
-/* Moments of a group about its mean: along the axis to sixth order, and across. */
-typedef struct bst_smear_moments {
-    double mean[3], axis[3];
-    double covariance[3][3];
-    double along[7]; /* E[x^k] */
-    double bend[3];  /* E[y x^2], y across the axis */
-    double twist[3]; /* E[y x^3] */
-    double drift;    /* E[x y^2] */
-    double mixed;    /* E[x^2 y^2] */
-    double lean[3];  /* E[y y^2] */
-    double across;   /* E[y^2] */
-} bst_smear_moments;
-
-/* Quadrature rule of a group: weighted nodes and error. */
-typedef struct bst_smear_rule {
-    int nodes;       /* 1 to 3 along the axis */
-    double widening; /* px^2 */
-    double pair[3];  /* half distance of the pair into which each node is split */
-    double node[3], weight[3];
-    double bend[3];  /* shift across the axis per unit of `curve` */
-    double curve[3]; /* second orthogonal polynomial at the nodes */
-    double error;    /* total */
-    double missed;   /* part: missed highest moment */
-    double kernel;   /* px^2: variance of the Peano kernel of the missed moment */
-    double fixed;    /* part: wrong widening of images that move by less than the path */
-} bst_smear_rule;
 
 /* Direction of the largest eigenvalue of a symmetric positive semidefinite matrix; an intermediate
  * one for equal eigenvalues. */

@@ -262,7 +262,7 @@ static void errors_of_a_coarse_axis(void **state) {
         } reported = {.guard = {0.0}};
         const bst_fourier_axis both[2] = {axis ? fine : coarse, axis ? coarse : fine};
         bst_assert_ok(&ctx,
-                      bst_fourier_error_measure(&ctx, psf, &band, both, 0.0, &reported.error));
+                      bst_fourier_error_measure(&ctx, psf, &band, both, 1, 0.0, &reported.error));
         for (int k = 0; k < CLASSES; k++) {
             /* places in steps of 0.25 px, and the classes' borders between them */
             bst_assert_close(reported.error.most[k] / want[k], 1.1, 0.25);
@@ -356,7 +356,7 @@ static void errors_of_widened_nodes(void **state) {
     bst_assert_ok(&ctx, bst_fourier_band_measure(&ctx, psf, 1e-7, &band));
     const bst_fourier_axis axis[2] = {{.pixels = 160, .samples = 320, .spread = {6, 12.0}},
                                       {.pixels = 160, .samples = 352, .spread = {6, 12.0}}};
-    bst_assert_ok(&ctx, bst_fourier_error_measure(&ctx, psf, &band, axis, variance, &error));
+    bst_assert_ok(&ctx, bst_fourier_error_measure(&ctx, psf, &band, axis, 1, variance, &error));
     assert_true(error.widest_px2 == variance);
     static double light[2][PLACES][2], transforms[FREQUENCIES][2];
     for (int a = 0; a < 2; a++) {

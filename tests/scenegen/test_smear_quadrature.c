@@ -245,8 +245,65 @@ static void s_bends_and_reversals_are_predicted(void **state) {
             double error = short_path_error(path, COUNT, tolerance, &predicted);
             /* 2e-6: what the midpoints of the image that is taken for true miss */
             assert_true(error <= predicted + 2e-6);
-            assert_true(predicted <= tolerance);
+            /* groups of different speed may add up: BESIDE_ANOTHER in smear_quadrature.c */
+            assert_true(predicted <= 1.25 * tolerance);
         }
+    }
+}
+
+/* A straight path at even speed of short segments and a long one: its fourth moment is that of a
+ * uniform distribution, length^4 / 80. A two-point rule for the long one would miss a third. */
+static void unequal_segments_keep_their_moments(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    enum { SHORT = 8 };
+    bst_smear_path_point path[SHORT + 2];
+    bst_smear_node_list list = {0};
+    double length = sigma_px, sum[5] = {0.0};
+    for (int k = 0; k <= SHORT + 1; k++) {
+        double s = k <= SHORT ? 1e-3 * k : 1.0;
+        path[k] = (bst_smear_path_point){{length * s, 0.0, 0.0}, s};
+    }
+    bst_assert_ok(&ctx, make_nodes(&ctx, path, SHORT + 2, 1e-5, 0.0, &list));
+    assert_int_equal(list.count, 3);
+    for (int n = 0; n < list.count; n++) {
+        double x = list.items[n].p[0] - 0.5 * length;
+        for (int order = 0; order <= 4; order++) {
+            sum[order] += list.items[n].weight * pow(x, order);
+        }
+    }
+    bst_assert_close(sum[2], length * length / 12.0, 1e-9);
+    bst_assert_close(sum[4], pow(length, 4) / 80.0, 1e-9);
+    free(list.items);
+}
+
+/* A slow drift, and a fast jump with little light: the image is right in the noise of its own
+ * light, also where that is far below the peak. */
+static void a_jump_is_right_beside_the_peak(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    enum { SLOW = 4, FAST = 30, POINTS = SLOW + FAST + 1 };
+    bst_smear_path_point path[POINTS];
+    for (int trial = 0; trial < 4; trial++) {
+        double share = pow(10.0, -2.0 - trial), drift = 0.3;
+        double tolerance = 1e-4, worst = 0.0;
+        for (int k = 0; k < POINTS; k++) {
+            double slow = fmin((double)k / SLOW, 1.0), fast = fmax((double)(k - SLOW) / FAST, 0.0);
+            path[k] = (bst_smear_path_point){{(drift * slow + 4.0 * fast) * sigma_px, 0.0, 0.0},
+                                             (1.0 - share) * slow + share * fast};
+        }
+        bst_smear_node_list list = {0};
+        double peak = true_image(path, POINTS, 0.5 * drift * sigma_px, 0.0);
+        double dark = peak * 4e-5; /* a peak of 25,000 e- in noise of 1 e- */
+        bst_assert_ok(&ctx, make_nodes(&ctx, path, POINTS, tolerance, 1.0, &list));
+        for (double x = -4.0; x <= 10.0; x += 0.1) {
+            double image = true_image(path, POINTS, x * sigma_px, 0.0);
+            double error = fabs(node_image(&list, x * sigma_px, 0.0) - image);
+            worst = fmax(worst, error / sqrt((image + dark) * peak));
+        }
+        print_message("         share %g: %.6f, %d nodes\n", share, worst, list.count);
+        assert_true(worst <= tolerance);
+        free(list.items);
     }
 }
 
@@ -336,6 +393,8 @@ int main(void) {
         cmocka_unit_test(jitter_is_kept_to_the_tolerance),
         cmocka_unit_test(long_segments_are_cut_and_finer_levels_have_more),
         cmocka_unit_test(s_bends_and_reversals_are_predicted),
+        cmocka_unit_test(unequal_segments_keep_their_moments),
+        cmocka_unit_test(a_jump_is_right_beside_the_peak),
         cmocka_unit_test(no_duration_is_one_node),
         cmocka_unit_test(peak_shares),
     };
