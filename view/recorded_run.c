@@ -7,6 +7,7 @@
 
 #include "sim/core/memory.h"
 #include "view/recorded_run_internal.h"
+#include "view/thumbnails.h"
 
 /* Longest list of exposures; a day of 100 frames a second has 8.6 million. */
 static const size_t EXPOSURES_MOST = 10000000;
@@ -88,6 +89,8 @@ static void forget_sensors(bst_view_run *run) {
         }
         free(s->exposures);
     }
+    bst_view_thumbnails_free(run->thumbnails); /* a branch may have other frames */
+    run->thumbnails = NULL;
     run->sensors = 0;
     run->samples = 0;
 }
@@ -378,14 +381,19 @@ bst_status bst_view_run_frames(bst_ctx *ctx, bst_view_run *run, int64_t sensor,
     return status;
 }
 
-static bst_status copy_pixels(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t frame,
-                              bst_view_bytes *out) {
-    bst_fits_read_frame image;
+bst_status bst_view_read_frame(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t frame,
+                               bst_fits_read_frame *out) {
     if (frame < 0 || (uint64_t)frame >= s->count || s->exposures[frame].fits_index < 0) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "frame %lld is not kept", (long long)frame);
     }
     BST_TRY(open_pixels(ctx, run, s));
-    BST_TRY(bst_fits_reader_frame(ctx, s->pixels, s->exposures[frame].fits_index, &image));
+    return bst_fits_reader_frame(ctx, s->pixels, s->exposures[frame].fits_index, out);
+}
+
+static bst_status copy_pixels(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t frame,
+                              bst_view_bytes *out) {
+    bst_fits_read_frame image;
+    BST_TRY(bst_view_read_frame(ctx, run, s, frame, &image));
     out->bytes = (size_t)image.width * (size_t)image.height * sizeof *image.pixels;
     out->data = malloc(out->bytes + 1);
     if (!out->data) {

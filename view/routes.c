@@ -5,6 +5,7 @@
 
 #include "view/panel_routes.h"
 #include "view/start_routes.h"
+#include "view/thumbnails.h"
 
 /* What the page is for: {"live": true, "study": false, "runs": number of open ones, "run": as api/run, "names": as
  * api/names}, the last two if the run is open: all that a page needs at first. */
@@ -83,6 +84,12 @@ static bst_status get_pixels(bst_ctx *ctx, bst_view_exchange *x) {
     return bst_view_run_pixels(ctx, run, x->sensor, x->frame, &x->bytes);
 }
 
+static bst_status get_thumbnail(bst_ctx *ctx, bst_view_exchange *x) {
+    bst_view_run *run;
+    BST_TRY(bst_view_subject_run(ctx, x->subject, x->run, &run));
+    return bst_view_run_thumbnail(ctx, run, x->sensor, x->frame, &x->bytes);
+}
+
 static bst_status get_plot(bst_ctx *ctx, bst_view_exchange *x) {
     const bst_view_plot plot = {x->sensor, x->panel, x->from_s, x->to_s, (int)x->columns};
     bst_view_run *run;
@@ -104,6 +111,7 @@ static const bst_view_route routes[] = {{"api/session", false, get_session},
                                         {"api/frames", false, get_frames},
                                         {"api/frame", false, get_frame},
                                         {"api/pixels", false, get_pixels},
+                                        {"api/thumbnail", false, get_thumbnail},
                                         {"api/plot", false, get_plot}};
 enum { ROUTES = sizeof routes / sizeof *routes };
 

@@ -3,6 +3,7 @@ import { getJson, getNumbers, getPixels } from './api.js';
 import { FrameView } from './frame_view.js';
 import { Panels } from './panels.js';
 import { Plots, shortNumber } from './plots.js';
+import { Strip } from './strip.js';
 
 /** Numbers of a frame in the list (view/recorded_run.h). */
 const NUMBERS = 5;
@@ -40,6 +41,7 @@ class App {
     this.live = null; // of a run that is steered here
     this.events = [];
     this.names = {};
+    this.strip = new Strip(this);
     this.panels = new Panels(element('tabs'), element('main'), this);
     this.listen();
   }

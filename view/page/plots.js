@@ -249,6 +249,7 @@ export class Plots {
     element('range').textContent = `${shortNumber(this.range.from)} to ${shortNumber(this.range.to)} s`;
     this.draw();
     this.reloading = this.reload();
+    document.dispatchEvent(new CustomEvent('rangechanged'));
   }
 
   zoom(factor, centre = this.cursor) {

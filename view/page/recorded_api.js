@@ -93,6 +93,22 @@ export async function getPixels(sensor, frame) {
   return { width: Number(width), height: Number(height), data, binning: Number(binning), frameWidth, frameHeight };
 }
 
+/** Longest side of a small picture (BST_VIEW_THUMBNAIL_PX). */
+const THUMBNAIL_PX = 80;
+
+/** A small picture of a frame: peaks of bins of its pixels in this page. @param {number} sensor @param {number} frame */
+export async function getThumbnail(sensor, frame) {
+  const { width, height, data } = await getPixels(sensor, frame), n = Math.ceil(Math.max(width, height) / THUMBNAIL_PX);
+  const across = Math.ceil(width / n), peaks = new Uint16Array(across * Math.ceil(height / n));
+  for (let y = 0, k = 0; y < height; y++) {
+    for (let x = 0, row = across * Math.floor(y / n); x < width; x++, k++) {
+      const bin = row + Math.floor(x / n);
+      if (data[k] > peaks[bin]) peaks[bin] = data[k];
+    }
+  }
+  return { width: across, height: peaks.length / across, data: peaks };
+}
+
 /** The styles are in the page. */
 export async function addStyle() {}
 
