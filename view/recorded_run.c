@@ -95,6 +95,14 @@ static void forget_sensors(bst_view_run *run) {
     run->samples = 0;
 }
 
+static void close_scene(bst_view_run *run) {
+    if (run->scene) {
+        bst_run_scene_close(run->scene);
+        free(run->scene);
+        run->scene = NULL;
+    }
+}
+
 /* True while a process writes the run. A run that is about to end has a complete manifest but not
  * yet its final name; it looks as if it was killed. */
 static bool is_in_progress(bst_view_run *run) {
@@ -126,6 +134,10 @@ bst_status bst_view_lock(bst_ctx *ctx, bst_view_run *run) {
     bst_status status = run->reader ? BST_OK : open_reader(ctx, run);
     if (status == BST_OK) {
         bst_run_reader_allow(run->reader, STEPS_MOST);
+    }
+    if (status == BST_OK && run->suspended) {
+        status = read_sensors(ctx, run);
+        run->suspended = status != BST_OK;
     }
     return status;
 }
@@ -183,14 +195,27 @@ bst_status bst_view_run_refresh(bst_ctx *ctx, bst_view_run *run) {
     return status;
 }
 
+bool bst_view_run_suspend(bst_view_run *run) {
+    if (pthread_mutex_trylock(&run->lock) != 0) {
+        return false;
+    }
+    const bool can_suspend = !run->written;
+    if (can_suspend) {
+        forget_sensors(run);
+        bst_run_reader_close(run->reader);
+        run->reader = NULL;
+        close_scene(run);
+        run->suspended = true;
+    }
+    pthread_mutex_unlock(&run->lock);
+    return can_suspend;
+}
+
 void bst_view_run_close(bst_view_run *run) {
     if (run) {
         forget_sensors(run);
         bst_run_reader_close(run->reader);
-        if (run->scene) {
-            bst_run_scene_close(run->scene);
-            free(run->scene);
-        }
+        close_scene(run);
         pthread_mutex_destroy(&run->lock);
         free(run);
     }

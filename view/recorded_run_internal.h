@@ -49,12 +49,13 @@ struct bst_view_run {
     bst_run_reader *reader; /* NULL between calls while the run is in progress */
     bool written;           /* by this process, now */
     bool running;           /* it was in progress when its sensors were read */
+    bool suspended;         /* what was read about the sensors was freed */
     int endings;            /* looks in a row at which it was about to end */
     int sensors;
     bst_view_sensor sensor[BST_EXPORT_SENSORS];
     uint64_t requests;
-    size_t samples;       /* held by all lines */
-    bst_run_scene *scene; /* its world; NULL: not made (view/space.c) */
+    size_t samples;                         /* held by all lines */
+    bst_run_scene *scene;                   /* its world; NULL: not made (view/space.c) */
     struct bst_view_thumbnails *thumbnails; /* NULL: none (view/thumbnails.c) */
 };
 

@@ -7,8 +7,9 @@
 #include "view/start_routes.h"
 #include "view/thumbnails.h"
 
-/* What the page is for: {"live": true, "study": false, "runs": number of open ones, "run": as api/run, "names": as
- * api/names}, the last two if the run is open: all that a page needs at first. */
+/* What the page is for: {"live": true, "study": false, "runs": number of open ones, "run": as
+ * api/run, "names": as api/names}, the last two if the run is open: all that a page needs at first.
+ */
 static bst_status get_session(bst_ctx *ctx, bst_view_exchange *x) {
     bst_view_run *run;
     cJSON *described = NULL, *names = NULL;

@@ -56,7 +56,8 @@ static void test_means(void **state) {
 static void test_peaks(void **state) {
     (void)state;
     for (int n = 1; n <= 40; n++) {
-        uint16_t all[WIDTH * HEIGHT], row[WIDTH], found[WIDTH * HEIGHT], largest[WIDTH * HEIGHT] = {0};
+        uint16_t all[WIDTH * HEIGHT], row[WIDTH], found[WIDTH * HEIGHT],
+            largest[WIDTH * HEIGHT] = {0};
         const int across = (WIDTH + n - 1) / n, down = (HEIGHT + n - 1) / n;
         for (int i = 0; i < WIDTH * HEIGHT; i++) {
             all[i] = (uint16_t)((unsigned)i * 2654435761u >> 16);
