@@ -7,6 +7,7 @@
 #include "view/editor.h"
 #include "view/scenario_list.h"
 #include "view/space.h"
+#include "view/space_shapes.h"
 #include "view/start_routes.h"
 #include "view/study_view.h"
 #include "view/why.h"
@@ -70,6 +71,8 @@ const bst_view_route bst_view_panel_routes[] = {
     {"api/space/scene", false, bst_view_route_space_scene},
     {"api/space/states", false, bst_view_route_space_states},
     {"api/space/poses", false, bst_view_route_space_poses},
+    {"api/space/shape", false, bst_view_route_space_shape},
+    {"api/space/pose", false, bst_view_route_space_pose},
     {"api/space/coast", false, bst_view_route_space_coast},
     {"api/study", false, bst_view_route_study},
     {"api/study/open", true, bst_view_route_study_open},

@@ -138,6 +138,7 @@ bool bst_view_exchange_read(const char *query, bst_view_exchange *x) {
            bst_view_query_name(query, "name", x->name, sizeof x->name) &&
            bst_view_query_int(query, "sensor", 0, most, &x->sensor) &&
            bst_view_query_int(query, "frame", 0, most, &x->frame) &&
+           bst_view_query_int(query, "object", 0, most, &x->object) &&
            bst_view_query_int(query, "columns", 1, BST_VIEW_COLUMNS, &x->columns) &&
            bst_view_query_real(query, "from", &x->from_s) &&
            bst_view_query_real(query, "to", &x->to_s) &&

@@ -11,7 +11,7 @@
 typedef struct bst_view_exchange {
     bst_view_subject *subject;
     bst_view_live *live; /* NULL: none */
-    int64_t run, sensor, frame, columns;
+    int64_t run, sensor, frame, columns, object;
     double from_s, to_s;
     char panel[32];
     char name[64];        /* of a run in runs/ */

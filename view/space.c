@@ -9,6 +9,7 @@
 #include "sim/core/json_number.h"
 #include "sim/world/world_config.h"
 #include "view/recorded_run_internal.h"
+#include "view/space_shapes.h"
 
 /* Latest time that is asked for, s: the longest duration of a scenario. */
 static const double LATEST_S = 1e9;
@@ -46,9 +47,9 @@ void bst_view_space_forget(bst_view_run *run) {
     pthread_mutex_unlock(&run->lock);
 }
 
-/* Calls an answer with the run locked and its world there. */
-static bst_status with_scene(bst_ctx *ctx, bst_view_exchange *x,
-                             bst_status (*answer)(bst_ctx *, bst_view_run *, bst_view_exchange *)) {
+bst_status bst_view_with_scene(bst_ctx *ctx, bst_view_exchange *x,
+                               bst_status (*answer)(bst_ctx *, bst_view_run *,
+                                                    bst_view_exchange *)) {
     bst_view_run *run;
     BST_TRY(bst_view_subject_run(ctx, x->subject, x->run, &run));
     bst_status status = bst_view_lock(ctx, run);
@@ -113,11 +114,12 @@ static bst_status describe(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x
     for (int i = 0; i < run->sensors; i++) {
         add_sensor(run->scene, &run->sensor[i].sensor, sensors);
     }
+    bst_view_space_add_shapes(run, x->json);
     return BST_OK;
 }
 
 bst_status bst_view_route_space_scene(bst_ctx *ctx, bst_view_exchange *x) {
-    return with_scene(ctx, x, describe);
+    return bst_view_with_scene(ctx, x, describe);
 }
 
 /* ------------------------------------------------------------------ states */
@@ -139,14 +141,18 @@ static bst_status put_sky(bst_ctx *ctx, bst_world_view *view, double time_s, dou
     return BST_OK;
 }
 
+bst_status bst_view_space_check_time(bst_ctx *ctx, double from_s) {
+    return from_s >= 0.0 && from_s <= LATEST_S
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_ARGUMENT, "from: %g s is before or long after the run",
+                          from_s);
+}
+
 static bst_status states(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) {
     const bst_run_scene *scene = run->scene;
     int observers = bst_world_observer_count(scene->world), objects = listed_objects(scene->world);
     size_t count = BST_VIEW_SPACE_HEAD + (size_t)(observers + objects) * BST_VIEW_SPACE_BODY;
-    if (!(x->from_s >= 0.0 && x->from_s <= LATEST_S)) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "from: %g s is before or long after the run",
-                        x->from_s);
-    }
+    BST_TRY(bst_view_space_check_time(ctx, x->from_s));
     double *numbers = malloc(count * sizeof *numbers), *at = numbers;
     if (!numbers) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the states of %d bodies",
@@ -172,7 +178,7 @@ static bst_status states(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) 
 }
 
 bst_status bst_view_route_space_states(bst_ctx *ctx, bst_view_exchange *x) {
-    return with_scene(ctx, x, states);
+    return bst_view_with_scene(ctx, x, states);
 }
 
 /* ------------------------------------------------------------------ attitudes */
@@ -218,7 +224,7 @@ static bst_status poses(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) {
 }
 
 bst_status bst_view_route_space_poses(bst_ctx *ctx, bst_view_exchange *x) {
-    return with_scene(ctx, x, poses);
+    return bst_view_with_scene(ctx, x, poses);
 }
 
 /* ------------------------------------------------------------------ coastline */

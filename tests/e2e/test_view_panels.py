@@ -224,6 +224,44 @@ class Server(unittest.TestCase):
                 self.editor.get("api/space/" + route)
             self.assertEqual(caught.exception.code, refused, route)
 
+    def test_shapes_and_keep_out(self):
+        """Attitudes are those of the tables; facets of joints lie within the body's sphere; keep-out angles of the scenario."""
+        made = os.path.join(runs.scratch(), "shape")
+        guidance = runs.SENSOR + "/modules/control/guidance"
+        runs.run("scenarios/inspection.json", made, runs.NO_FRAMES, guidance + "/sun_keep_out_deg=30.5", guidance + "/earth_keep_out=true",
+                 '/world/objects/0/shape={"file": "satellites/gps_iif.json"}', duration=4)
+        viewer = Editor(made, self.folder)
+        scene = viewer.json("api/space/scene")
+        self.assertEqual(scene["sensors"][0]["keep_out"], {"sun_deg": 30.5, "moon_deg": 0, "earth": True, "earth_limb_deg": 0, "earth_limb_altitude_km": 100})
+        self.assertNotIn("keep_out", self.editor.json("api/space/scene")["sensors"][0])
+        shape, = scene["shapes"]
+        numbers = viewer.numbers("api/space/shape?object=0")
+        joints, count = int(numbers[0]), int(numbers[1])
+        triangles = numbers[2:].reshape(-1, 13)
+        self.assertEqual((shape["object"], shape["triangles"], len(triangles)), (0, count, count))
+        self.assertGreater(joints, 0)
+        self.assertEqual(set(triangles[:, 0]), set(range(-1, joints)) & set(triangles[:, 0]))
+        self.assertTrue(((triangles[:, 1:4] >= 0) & (triangles[:, 1:4] <= 1)).all())
+        with sqlite3.connect(os.path.join(made, "run.sqlite")) as tables:
+            rows = tables.execute("SELECT mid_s, q_body_from_gcrf_x, q_body_from_gcrf_y, q_body_from_gcrf_z, q_body_from_gcrf_w FROM shapes WHERE id = 0").fetchall()
+        self.assertGreater(len(rows), 0)
+        for time, *attitude in rows:
+            pose = viewer.numbers(f"api/space/pose?object=0&sensor=0&from={time!r}")
+            self.assertEqual((list(pose[:4]), pose[4], pose[5]), (attitude, 1, 1))
+            other = viewer.numbers(f"api/space/pose?object=0&sensor=0&from={time + 1e-5!r}")
+            self.assertEqual(other[5], 0)
+            # light time of 50 km is 0.2 ms, in which it turns by 6e-6 rad
+            self.assertGreater(abs(numpy.dot(other[:4], attitude)), 1 - 1e-9)
+            for joint, turn in enumerate(pose[6:].reshape(-1, 12)):
+                numpy.testing.assert_allclose(turn[:9].reshape(3, 3) @ turn[:9].reshape(3, 3).T, numpy.eye(3), rtol=0, atol=1e-12)
+                corners = triangles[triangles[:, 0] == joint][:, 4:].reshape(-1, 3) @ turn[:9].reshape(3, 3).T + turn[9:]
+                self.assertLessEqual(numpy.linalg.norm(corners, axis=1).max(initial=0), shape["radius_m"] * (1 + 1e-12))
+        for refused, route in ((404, "shape?object=1"), (404, "pose?object=7"), (400, "pose?object=0&from=-1"), (404, "pose?object=0&sensor=3"), (400, "shape?object=x")):
+            with self.assertRaises(urllib.error.HTTPError) as caught:
+                viewer.get("api/space/" + route)
+            self.assertEqual(caught.exception.code, refused, route)
+        self.assertEqual(viewer.end()[0], 0)
+
     def test_why(self):
         """The short exposures leave the target below the threshold, with the SNR of the tables."""
         found = self.editor.json("api/why?frame=1")
