@@ -81,7 +81,8 @@ int bst_view_guard(const bst_view_request *request, const char *token,
     if (!post && strcmp(request->method, "GET") != 0 && strcmp(request->method, "HEAD") != 0) {
         return BST_HTTP_BAD_METHOD;
     }
-    if (request->body_bytes > (post ? BST_VIEW_BODY_BYTES : 0)) {
+    const bool file = strcmp(path + BST_VIEW_TOKEN_DIGITS + 1, BST_VIEW_FILE_ROUTE) == 0;
+    if (request->body_bytes > (!post ? 0 : file ? BST_VIEW_FILE_BYTES : BST_VIEW_BODY_BYTES)) {
         return BST_HTTP_TOO_LARGE;
     }
     if (post && !request->origin) {

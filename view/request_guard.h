@@ -13,6 +13,9 @@ enum { BST_VIEW_TOKEN_DIGITS = 32 };
 enum { BST_VIEW_ROUTE_BYTES = 64 };
 /* Longest body of a POST: a scenario's text. */
 enum { BST_VIEW_BODY_BYTES = 4 << 20 };
+/* Route of files that are dropped onto the editor, and the longest one: a frame of 4096 x 4096. */
+#define BST_VIEW_FILE_ROUTE "api/editor/file"
+enum { BST_VIEW_FILE_BYTES = 40 << 20 };
 
 /* Statuses of HTTP that the viewer uses (RFC 9110, section 15). */
 enum {

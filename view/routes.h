@@ -16,6 +16,7 @@ typedef struct bst_view_exchange {
     char panel[32];
     char name[64];        /* of a run in runs/ */
     const char *body;     /* of POST: text that ends with a zero byte; else NULL */
+    size_t body_bytes;
     cJSON *json;          /* the answer; NULL: `bytes` */
     bst_view_bytes bytes; /* the answer */
     const char *type;     /* media type of `bytes`; NULL: plain bytes */

@@ -76,3 +76,10 @@ export async function post(route, body) {
   if (!response.ok) throw new ServerError((await response.text()) || `${response.status} ${response.statusText}`);
   return response.json();
 }
+
+/** Sends a file to a route and gets JSON. @param {string} route @param {string} name @param {Blob} file */
+export async function postFile(route, name, file) {
+  const response = await fetch(`api/${route}?run=${RUN}&name=${encodeURIComponent(name)}`, { method: 'POST', body: file, cache: 'no-store' });
+  if (!response.ok) throw new ServerError((await response.text()) || `${response.status} ${response.statusText}`);
+  return response.json();
+}

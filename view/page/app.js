@@ -18,6 +18,7 @@ const REFRESH_MS = 2000;
 /** Share of the time that the looks may take at most: the run's tables grow, and are read by the program that writes them. */
 const REFRESH_SHARE = 0.05;
 
+/** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 
 /** Changes of the mode. @param {number} sensor */
@@ -31,6 +32,7 @@ class App {
     this.plots = new Plots((time) => this.seek(time));
     this.run = null;
     this.sensor = 0;
+    /** @type {Float64Array} */
     this.frames = new Float64Array(0);
     this.count = 0;
     this.current = -1;

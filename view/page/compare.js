@@ -74,6 +74,7 @@ class Side {
     this.letter = letter;
     this.painter = makePainter(this.canvas, true);
     this.image = this.details = this.limits = null;
+    this.run = this.sensor = -1;
     this.soft = 0;
   }
 

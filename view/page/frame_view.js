@@ -11,7 +11,7 @@ const VALUE_SCALE = 34;
 const STATISTICS_MS = 1000;
 const NUMBER = new Intl.NumberFormat('en', { maximumFractionDigits: 1 });
 
-/** An element by its id. @param {string} id */
+/** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 
 export class FrameView {
@@ -21,7 +21,9 @@ export class FrameView {
     this.overlay = element('overlay');
     const address = new URLSearchParams(location.search);
     this.painter = makePainter(this.canvas, address.has('plain'), address.has('webgl'));
+    /** @type {{ width: number, height: number, data: Uint16Array, binning?: number, frameWidth?: number, frameHeight?: number } | null} */
     this.image = null;
+    this.sensorWidth = this.sensorHeight = 0; // 0: unknown
     this.statistics = null;
     this.counted = 0; // time of the statistics
     this.details = null;

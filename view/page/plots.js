@@ -9,6 +9,7 @@ const MODE_COLOURS = {
 };
 const OTHER_MODE = '#999933';
 
+/** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 
 /** Marks of an axis: round numbers, about `count` of them. */

@@ -1,6 +1,6 @@
 // The panel of space: Earth, orbits, observers with their fields of view, targets, Sun and Moon at the time of the frame.
 import { addStyle, getBytes, getJson, getNumbers } from './api.js';
-import { make } from './editor_form.js';
+import { layout, make } from './editor_form.js';
 import { clearance, conesOf, coneShape, drawCones } from './space_cones.js';
 import { SpacePainter } from './space_gl.js';
 import * as math from './space_math.js';
@@ -18,6 +18,7 @@ const NAMED_MOST = 40;
 /** Distance of a close-up, radii of the object. */
 const CLOSE_RADII = 6;
 
+/** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 const km = (radii) => `${Math.round(radii * math.EARTH_M / 1000).toLocaleString('en')} km`;
 
@@ -29,6 +30,12 @@ export class SpaceView {
     this.camera = { azimuth: 0.6, elevation: 0.35, distance: 18 };
     this.time = 0;
     this.steps = new Map(); // states by number of the step
+    this.step = NaN; // of the states that are shown
+    /** @type {Float64Array | null} */
+    this.before = null; // states at its begin and end
+    /** @type {Float64Array | null} */
+    this.after = null;
+    this.orbitsAt = NaN;
     this.poses = [];
     this.shown = false;
     this.through = false;
@@ -396,7 +403,7 @@ export class SpaceView {
 export async function open(box, app) {
   await addStyle('space.css');
   box.classList.add('space');
-  box.append(document.getElementById('layout-space').content.cloneNode(true));
+  box.append(layout('layout-space'));
   const view = new SpaceView(app, await getJson('space/scene'));
   view.poses = await Promise.all(view.scene.sensors.map((_, sensor) => getNumbers('space/poses', { sensor })));
   view.painter.setCoast(math.coastSegments(await getBytes('space/coast')));

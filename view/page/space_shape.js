@@ -58,7 +58,8 @@ export class ShapePass {
   constructor(painter, shapes, changed) {
     this.painter = painter;
     this.changed = changed;
-    this.shapes = new Map(shapes.map((one) => [one.object, { radius: one.radius_m, shape: null, pose: null, poseAt: NaN, buffer: null, asked: false }]));
+    /** @type {Map<number, { radius: number, shape: Float64Array | null, pose: Float64Array | null, poseAt: number, sensor: number, buffer: any, asked: boolean, problem: string }>} */
+    this.shapes = new Map(shapes.map((one) => [one.object, { radius: one.radius_m, shape: null, pose: null, poseAt: NaN, sensor: -1, buffer: null, asked: false, problem: '' }]));
     this.program = this.shapes.size ? painter.program(LIT, SURFACE) : null;
   }
 

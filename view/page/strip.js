@@ -10,6 +10,7 @@ const KEPT_MOST = 400;
 /** Pictures that are asked for at a time: the frame itself goes first. */
 const AT_A_TIME = 2;
 
+/** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 
 /**
@@ -128,7 +129,7 @@ export class Strip {
 
   draw(canvas, { width, height, data }) {
     Object.assign(canvas, { width, height });
-    canvas.getContext('2d').putImageData(new ImageData(greyOf(data), width, height), 0, 0);
+    canvas.getContext('2d').putImageData(new ImageData(/** @type {any} */ (greyOf(data)), width, height), 0, 0);
   }
 
   /** Place of the frame that is shown, or of the last one before it. */
