@@ -41,7 +41,7 @@ class Types(unittest.TestCase):
         runs.clean()
 
     def check(self, folder):
-        result = subprocess.run([self.tsc, "-p", folder], capture_output=True, text=True, timeout=300, check=False)
+        result = subprocess.run([self.tsc, "-p", folder], capture_output=True, text=True, timeout=800, check=False)
         return result.returncode, result.stdout + result.stderr
 
     def test_page(self):
