@@ -28,9 +28,10 @@ static bool begins(const char *data, size_t bytes, const char *with) {
     return bytes >= n && memcmp(data, with, n) == 0;
 }
 
-static bool ends_with(const char *name, const char *end) {
-    const size_t length = strlen(name), n = strlen(end);
-    return length >= n && strcmp(name + length - n, end) == 0;
+/* True for a file name with this extension. */
+static bool has_extension(const char *name, const char *extension) {
+    const char *dot = strrchr(name, '.');
+    return dot && strcmp(dot, extension) == 0;
 }
 
 /* ------------------------------------------------------------------ element sets */
@@ -142,7 +143,7 @@ static bst_status read_shape(bst_ctx *ctx, const char *name, const char *data, s
                              cJSON *out) {
     scratch_file file;
     bst_satellite *satellite = NULL;
-    if (!ends_with(name, ".glb") && !ends_with(name, ".gltf")) {
+    if (!has_extension(name, ".glb") && !has_extension(name, ".gltf")) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "%s: is a glTF file, whose name must end with .glb or .gltf", name);
     }
@@ -302,8 +303,8 @@ static bst_status look(bst_ctx *ctx, const char *name, const char *data, size_t 
     if (begins(data, bytes, "SIMPLE  =")) {
         return read_frame(ctx, name, data, bytes, out);
     }
-    if (begins(data, bytes, "glTF") || ends_with(name, ".glb") || ends_with(name, ".gltf") ||
-        is_gltf(data, bytes)) {
+    if (begins(data, bytes, "glTF") || has_extension(name, ".glb") ||
+        has_extension(name, ".gltf") || is_gltf(data, bytes)) {
         return read_shape(ctx, name, data, bytes, out);
     }
     if (bytes == 0 || memchr(data, 0, bytes)) {

@@ -7,7 +7,7 @@
 
 #include "sim/core/memory.h"
 #include "view/recorded_run_internal.h"
-#include "view/thumbnails.h"
+#include "view/thumbnail_store.h"
 
 /* Longest list of exposures; a day of 100 frames a second has 8.6 million. */
 static const size_t EXPOSURES_MOST = 10000000;

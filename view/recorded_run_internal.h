@@ -56,7 +56,7 @@ struct bst_view_run {
     uint64_t requests;
     size_t samples;                         /* held by all lines */
     bst_run_scene *scene;                   /* its world; NULL: not made (view/space.c) */
-    struct bst_view_thumbnails *thumbnails; /* NULL: none (view/thumbnails.c) */
+    struct bst_view_thumbnails *thumbnails; /* NULL: none (view/thumbnail_store.h) */
 };
 
 /* Begins a call: locks the run and opens its tables if they are not open. End it with

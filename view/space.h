@@ -13,19 +13,6 @@ enum {
     BST_VIEW_SPACE_POSE = 5        /* numbers of an attitude */
 };
 
-/* Forgets the world of a run: its scenario.json has changed. Any thread. */
-void bst_view_space_forget(bst_view_run *run);
-
-/* Calls an answer with the run locked and its world made.
- *
- * Errors:    those of bst_view_subject_run, bst_run_scene_open and of the answer */
-bst_status bst_view_with_scene(bst_ctx *ctx, bst_view_exchange *x,
-                               bst_status (*answer)(bst_ctx *, bst_view_run *,
-                                                    bst_view_exchange *)) BST_MUST_CHECK;
-
-/* BST_ERR_ARGUMENT: a time before the epoch or later than 1e9 s. */
-bst_status bst_view_space_check_time(bst_ctx *ctx, double from_s) BST_MUST_CHECK;
-
 /* What there is: {span_s, observers: [name], objects: [name], total, sensors: [{observer, name,
  * object, corners, keep_out}], shapes} (the last two: view/space_shapes.h). observer, object:
  * index; object -1: no target. corners: unit vectors in the camera's frame, of the first row from

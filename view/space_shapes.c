@@ -10,7 +10,7 @@
 #include "sim/satellite/pose.h"
 #include "sim/world/scene/object_shape.h"
 #include "view/recorded_run_internal.h"
-#include "view/space.h"
+#include "view/space_scene.h"
 
 /* Difference of times at which an attitude is that of an exposure, s. */
 static const double SAME_TIME_S = 1e-6;
@@ -91,13 +91,6 @@ static bst_status find_shape(bst_ctx *ctx, const bst_view_run *run, int64_t obje
                            (long long)object);
 }
 
-static double *put(double *at, bst_vec3 v) {
-    at[0] = v.x;
-    at[1] = v.y;
-    at[2] = v.z;
-    return at + 3;
-}
-
 static bst_status triangles(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) {
     const bst_object_shape *shape;
     BST_TRY(find_shape(ctx, run, x->object, &shape));
@@ -117,8 +110,8 @@ static bst_status triangles(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *
         for (int i = 2; i < facet->count; i++) {
             *at++ = facet->joint;
             bst_turntable_colour(&s->materials[facet->material], at);
-            at = put(at + 3, s->vertices[corner[0]]);
-            at = put(put(at, s->vertices[corner[i - 1]]), s->vertices[corner[i]]);
+            at = bst_view_put(at + 3, s->vertices[corner[0]]);
+            at = bst_view_put(bst_view_put(at, s->vertices[corner[i - 1]]), s->vertices[corner[i]]);
         }
     }
     return BST_OK;
@@ -222,13 +215,13 @@ static bst_status pose(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) {
     if (at) {
         const bst_quat q = was_recorded ? recorded : aspect.q_body_from_gcrf;
         x->bytes = (bst_view_bytes){.data = at, .bytes = numbers * sizeof *at};
-        at = put(at, (bst_vec3){q.x, q.y, q.z});
+        at = bst_view_put(at, (bst_vec3){q.x, q.y, q.z});
         *at++ = q.w;
         *at++ = lighting.sunlit_fraction;
         *at++ = was_recorded;
         for (int j = 0; j < joints; j++) {
             memcpy(at, turned->rotation[j].m, sizeof turned->rotation[j].m);
-            at = put(at + 9, turned->origin[j]);
+            at = bst_view_put(at + 9, turned->origin[j]);
         }
     }
     bst_satellite_pose_free(turned);

@@ -5,61 +5,13 @@
 
 #include "view/pixel_bins.h"
 #include "view/recorded_run_internal.h"
-
-/* A picture that is kept. */
-typedef struct thumbnail {
-    int64_t sensor, fits_index;
-    int width, height; /* 0: empty place */
-    uint16_t data[BST_VIEW_THUMBNAIL_PX * BST_VIEW_THUMBNAIL_PX];
-} thumbnail;
-
-struct bst_view_thumbnails {
-    int next; /* place of the next one */
-    thumbnail *kept[BST_VIEW_THUMBNAILS];
-};
-
-void bst_view_thumbnails_free(bst_view_thumbnails *thumbnails) {
-    for (int i = 0; thumbnails && i < BST_VIEW_THUMBNAILS; i++) {
-        free(thumbnails->kept[i]);
-    }
-    free(thumbnails);
-}
-
-static const thumbnail *find(const bst_view_thumbnails *all, int64_t sensor, int64_t fits_index) {
-    for (int i = 0; all && i < BST_VIEW_THUMBNAILS; i++) {
-        const thumbnail *one = all->kept[i];
-        if (one && one->sensor == sensor && one->fits_index == fits_index && one->width > 0) {
-            return one;
-        }
-    }
-    return NULL;
-}
-
-/* Place of a new picture: that of the oldest one. NULL: out of memory. */
-static thumbnail *place(bst_view_run *run) {
-    if (!run->thumbnails) {
-        run->thumbnails = calloc(1, sizeof *run->thumbnails);
-    }
-    bst_view_thumbnails *all = run->thumbnails;
-    if (!all) {
-        return NULL;
-    }
-    thumbnail **one = &all->kept[all->next];
-    if (!*one) {
-        *one = malloc(sizeof **one);
-    }
-    if (*one) {
-        (*one)->width = 0; /* until it is filled */
-        all->next = (all->next + 1) % BST_VIEW_THUMBNAILS;
-    }
-    return *one;
-}
+#include "view/thumbnail_store.h"
 
 static bst_status make(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t sensor,
-                       int64_t frame, const thumbnail **out) {
+                       int64_t frame, const bst_view_thumbnail **out) {
     bst_fits_read_frame image;
     BST_TRY(bst_view_read_frame(ctx, run, s, frame, &image));
-    thumbnail *one = place(run);
+    bst_view_thumbnail *one = bst_view_thumbnails_place(&run->thumbnails);
     const int longest = image.width > image.height ? image.width : image.height;
     const int n = (longest + BST_VIEW_THUMBNAIL_PX - 1) / BST_VIEW_THUMBNAIL_PX;
     uint16_t *row = one ? malloc((size_t)image.width * sizeof *row + 1) : NULL;
@@ -82,8 +34,9 @@ static bst_status copy(bst_ctx *ctx, bst_view_run *run, int64_t sensor, int64_t 
     bst_view_sensor *s;
     BST_TRY(bst_view_find_sensor(ctx, run, sensor, &s));
     const bool kept = frame >= 0 && (uint64_t)frame < s->count;
-    const thumbnail *one =
-        kept ? find(run->thumbnails, sensor, s->exposures[frame].fits_index) : NULL;
+    const bst_view_thumbnail *one =
+        kept ? bst_view_thumbnails_find(run->thumbnails, sensor, s->exposures[frame].fits_index)
+             : NULL;
     if (!one) {
         BST_TRY(make(ctx, run, s, sensor, frame, &one));
     }

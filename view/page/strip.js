@@ -116,12 +116,13 @@ export class Strip {
   cell(frame) {
     const { app } = this, cell = document.createElement('div'), canvas = document.createElement('canvas'), time = app.timeOf(frame);
     const state = app.frames[frame * NUMBERS + 4] === 1 ? 'dropped' : this.hasPixels(frame) ? '' : 'not kept';
+    const shortTime = `${time.toFixed(time < 1000 ? 1 : 0)} s`;
     cell.id = `strip-${frame}`;
     cell.dataset.frame = String(frame);
     cell.setAttribute('role', 'option');
-    cell.setAttribute('aria-label', `Frame ${frame + 1}, ${time.toFixed(2)} s${state ? `, ${state}` : ''}`);
+    cell.setAttribute('aria-label', `Frame ${frame + 1}, ${shortTime}${state ? `, ${state}` : ''}`);
     cell.title = `Frame ${frame + 1}, ${time.toFixed(2)} s`;
-    cell.append(canvas, state || `${time.toFixed(time < 1000 ? 1 : 0)} s`);
+    cell.append(canvas, state || shortTime);
     const picture = this.kept.get(this.keyOf(frame));
     if (picture) this.draw(canvas, picture);
     return cell;
