@@ -116,6 +116,7 @@ export class Strip {
   cell(frame) {
     const { app } = this, cell = document.createElement('div'), canvas = document.createElement('canvas'), time = app.timeOf(frame);
     const state = app.frames[frame * NUMBERS + 4] === 1 ? 'dropped' : this.hasPixels(frame) ? '' : 'not kept';
+    canvas.setAttribute('aria-hidden', 'true');
     const shortTime = `${time.toFixed(time < 1000 ? 1 : 0)} s`;
     cell.id = `strip-${frame}`;
     cell.dataset.frame = String(frame);
