@@ -12,7 +12,7 @@
 #include "sim/io/run_files.h"
 #include "view/folder_copy.h"
 #include "view/live_internal.h"
-#include "view/space.h"
+#include "view/space_scene.h"
 
 /* Wall time between two looks at commands while it runs flat out, s: a command waits so long at
  * most, and a look costs about a millisecond. */

@@ -5,8 +5,11 @@
 
 #include "sim/core/json_member.h"
 #include "view/editor.h"
+#include "view/editor_drop.h"
+#include "view/request_guard.h"
 #include "view/scenario_list.h"
 #include "view/space.h"
+#include "view/space_shapes.h"
 #include "view/start_routes.h"
 #include "view/study_view.h"
 #include "view/why.h"
@@ -33,6 +36,10 @@ static bst_status loops_route(bst_ctx *ctx, bst_view_exchange *x) {
 
 static bst_status satellites_route(bst_ctx *ctx, bst_view_exchange *x) {
     return bst_view_editor_satellites(ctx, x->body, &x->json);
+}
+
+static bst_status file_route(bst_ctx *ctx, bst_view_exchange *x) {
+    return bst_view_editor_drop(ctx, x->name, x->body, x->body_bytes, &x->json);
 }
 
 static bst_status save_route(bst_ctx *ctx, bst_view_exchange *x) {
@@ -65,11 +72,14 @@ const bst_view_route bst_view_panel_routes[] = {
     {"api/editor/check", true, check_route},
     {"api/editor/loops", true, loops_route},
     {"api/editor/satellites", true, satellites_route},
+    {BST_VIEW_FILE_ROUTE, true, file_route},
     {"api/editor/save", true, save_route},
     {"api/editor/run", true, run_route},
     {"api/space/scene", false, bst_view_route_space_scene},
     {"api/space/states", false, bst_view_route_space_states},
     {"api/space/poses", false, bst_view_route_space_poses},
+    {"api/space/shape", false, bst_view_route_space_shape},
+    {"api/space/pose", false, bst_view_route_space_pose},
     {"api/space/coast", false, bst_view_route_space_coast},
     {"api/study", false, bst_view_route_study},
     {"api/study/open", true, bst_view_route_study_open},

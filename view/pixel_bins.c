@@ -1,6 +1,6 @@
 #include "view/pixel_bins.h"
 
-#include <stdint.h>
+#include <string.h>
 
 /* Mean of the pixels of a bin. */
 static uint16_t mean_of(const uint16_t *data, int width, int height, int x0, int y0, int n) {
@@ -34,4 +34,26 @@ void bst_view_bin_pixels(bst_view_bytes *pixels, int n) {
     pixels->width = (width + n - 1) / n;
     pixels->height = (height + n - 1) / n;
     pixels->bytes = k * sizeof *data;
+}
+
+void bst_view_peak_pixels(const uint16_t *pixels, int width, int height, int n, uint16_t *row,
+                          uint16_t *out) {
+    for (int y = 0; y < height; y += n) {
+        const int rows = y + n < height ? n : height - y;
+        memcpy(row, pixels + (size_t)y * (size_t)width, (size_t)width * sizeof *row);
+        for (int j = 1; j < rows; j++) { /* along columns first: the compiler makes vectors of it */
+            const uint16_t *next = pixels + (size_t)(y + j) * (size_t)width;
+            for (int x = 0; x < width; x++) {
+                row[x] = next[x] > row[x] ? next[x] : row[x];
+            }
+        }
+        for (int x = 0; x < width; x += n) {
+            const int end = x + n < width ? x + n : width;
+            uint16_t peak = row[x];
+            for (int i = x + 1; i < end; i++) {
+                peak = row[i] > peak ? row[i] : peak;
+            }
+            *out++ = peak;
+        }
+    }
 }

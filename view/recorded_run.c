@@ -7,6 +7,7 @@
 
 #include "sim/core/memory.h"
 #include "view/recorded_run_internal.h"
+#include "view/thumbnail_store.h"
 
 /* Longest list of exposures; a day of 100 frames a second has 8.6 million. */
 static const size_t EXPOSURES_MOST = 10000000;
@@ -88,8 +89,18 @@ static void forget_sensors(bst_view_run *run) {
         }
         free(s->exposures);
     }
+    bst_view_thumbnails_free(run->thumbnails); /* a branch may have other frames */
+    run->thumbnails = NULL;
     run->sensors = 0;
     run->samples = 0;
+}
+
+static void close_scene(bst_view_run *run) {
+    if (run->scene) {
+        bst_run_scene_close(run->scene);
+        free(run->scene);
+        run->scene = NULL;
+    }
 }
 
 /* True while a process writes the run. A run that is about to end has a complete manifest but not
@@ -123,6 +134,10 @@ bst_status bst_view_lock(bst_ctx *ctx, bst_view_run *run) {
     bst_status status = run->reader ? BST_OK : open_reader(ctx, run);
     if (status == BST_OK) {
         bst_run_reader_allow(run->reader, STEPS_MOST);
+    }
+    if (status == BST_OK && run->suspended) {
+        status = read_sensors(ctx, run);
+        run->suspended = status != BST_OK;
     }
     return status;
 }
@@ -180,14 +195,27 @@ bst_status bst_view_run_refresh(bst_ctx *ctx, bst_view_run *run) {
     return status;
 }
 
+bool bst_view_run_suspend(bst_view_run *run) {
+    if (pthread_mutex_trylock(&run->lock) != 0) {
+        return false;
+    }
+    const bool can_suspend = !run->written;
+    if (can_suspend) {
+        forget_sensors(run);
+        bst_run_reader_close(run->reader);
+        run->reader = NULL;
+        close_scene(run);
+        run->suspended = true;
+    }
+    pthread_mutex_unlock(&run->lock);
+    return can_suspend;
+}
+
 void bst_view_run_close(bst_view_run *run) {
     if (run) {
         forget_sensors(run);
         bst_run_reader_close(run->reader);
-        if (run->scene) {
-            bst_run_scene_close(run->scene);
-            free(run->scene);
-        }
+        close_scene(run);
         pthread_mutex_destroy(&run->lock);
         free(run);
     }
@@ -378,14 +406,19 @@ bst_status bst_view_run_frames(bst_ctx *ctx, bst_view_run *run, int64_t sensor,
     return status;
 }
 
-static bst_status copy_pixels(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t frame,
-                              bst_view_bytes *out) {
-    bst_fits_read_frame image;
+bst_status bst_view_read_frame(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t frame,
+                               bst_fits_read_frame *out) {
     if (frame < 0 || (uint64_t)frame >= s->count || s->exposures[frame].fits_index < 0) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "frame %lld is not kept", (long long)frame);
     }
     BST_TRY(open_pixels(ctx, run, s));
-    BST_TRY(bst_fits_reader_frame(ctx, s->pixels, s->exposures[frame].fits_index, &image));
+    return bst_fits_reader_frame(ctx, s->pixels, s->exposures[frame].fits_index, out);
+}
+
+static bst_status copy_pixels(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t frame,
+                              bst_view_bytes *out) {
+    bst_fits_read_frame image;
+    BST_TRY(bst_view_read_frame(ctx, run, s, frame, &image));
     out->bytes = (size_t)image.width * (size_t)image.height * sizeof *image.pixels;
     out->data = malloc(out->bytes + 1);
     if (!out->data) {

@@ -38,6 +38,10 @@ void bst_view_run_close(bst_view_run *run);
  * Errors:    those of bst_view_run_open */
 bst_status bst_view_run_refresh(bst_ctx *ctx, bst_view_run *run) BST_MUST_CHECK;
 
+/* Closes the files of a run and frees what was read, until it is asked for again. False: a call is
+ * going on, or this process writes the run. */
+bool bst_view_run_suspend(bst_view_run *run);
+
 /* Says whether this process writes the run: it then counts as in progress, also between its parts.
  */
 void bst_view_run_set_written(bst_view_run *run, bool written);

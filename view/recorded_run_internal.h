@@ -49,12 +49,14 @@ struct bst_view_run {
     bst_run_reader *reader; /* NULL between calls while the run is in progress */
     bool written;           /* by this process, now */
     bool running;           /* it was in progress when its sensors were read */
+    bool suspended;         /* what was read about the sensors was freed */
     int endings;            /* looks in a row at which it was about to end */
     int sensors;
     bst_view_sensor sensor[BST_EXPORT_SENSORS];
     uint64_t requests;
-    size_t samples;       /* held by all lines */
-    bst_run_scene *scene; /* its world; NULL: not made (view/space.c) */
+    size_t samples;                         /* held by all lines */
+    bst_run_scene *scene;                   /* its world; NULL: not made (view/space.c) */
+    struct bst_view_thumbnails *thumbnails; /* NULL: none (view/thumbnail_store.h) */
 };
 
 /* Begins a call: locks the run and opens its tables if they are not open. End it with
@@ -72,6 +74,14 @@ void bst_view_unlock(bst_view_run *run);
  * Errors:    BST_ERR_NOT_FOUND; BST_ERR_MEMORY; BST_ERR_FORMAT: damaged tables */
 bst_status bst_view_find_sensor(bst_ctx *ctx, bst_view_run *run, int64_t number,
                                 bst_view_sensor **out) BST_MUST_CHECK;
+
+/* Reads the pixels of a frame. Call it with the lock held.
+ *
+ * Returned:  *out  belongs to the reader of the sensor, until its next frame
+ * Errors:    BST_ERR_NOT_FOUND: no such frame, or its pixels were not kept; those of
+ *            bst_fits_reader_frame */
+bst_status bst_view_read_frame(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t frame,
+                               bst_fits_read_frame *out) BST_MUST_CHECK;
 
 /* Rows of a table from the first of an exposure on.
  *

@@ -81,13 +81,16 @@ int bst_view_guard(const bst_view_request *request, const char *token,
     if (!post && strcmp(request->method, "GET") != 0 && strcmp(request->method, "HEAD") != 0) {
         return BST_HTTP_BAD_METHOD;
     }
-    if (request->body_bytes > (post ? BST_VIEW_BODY_BYTES : 0)) {
+    const char *rest = path + BST_VIEW_TOKEN_DIGITS + 1;
+    const bool file = strcspn(rest, "?") == sizeof BST_VIEW_FILE_ROUTE - 1 &&
+                      strncmp(rest, BST_VIEW_FILE_ROUTE, sizeof BST_VIEW_FILE_ROUTE - 1) == 0;
+    if (request->body_bytes > (!post ? 0 : file ? BST_VIEW_FILE_BYTES : BST_VIEW_BODY_BYTES)) {
         return BST_HTTP_TOO_LARGE;
     }
     if (post && !request->origin) {
         return BST_HTTP_FORBIDDEN;
     }
-    if (!copy_route(path + BST_VIEW_TOKEN_DIGITS + 1, route)) {
+    if (!copy_route(rest, route)) {
         route[0] = '\0';
         return BST_HTTP_NOT_FOUND;
     }

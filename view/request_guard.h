@@ -13,6 +13,9 @@ enum { BST_VIEW_TOKEN_DIGITS = 32 };
 enum { BST_VIEW_ROUTE_BYTES = 64 };
 /* Longest body of a POST: a scenario's text. */
 enum { BST_VIEW_BODY_BYTES = 4 << 20 };
+/* Route of files that are dropped onto the editor, and the longest one: a frame of 4096 x 4096. */
+#define BST_VIEW_FILE_ROUTE "api/editor/file"
+enum { BST_VIEW_FILE_BYTES = 40 << 20 };
 
 /* Statuses of HTTP that the viewer uses (RFC 9110, section 15). */
 enum {
@@ -43,9 +46,9 @@ typedef struct bst_view_request {
  * Notes:     Host must name the loopback interface: a name that an attacker's DNS points there is
  *            refused. The port may be any, as `ssh -L` changes it. Origin must be that of Host, or
  *            missing: browsers send it with every request of a foreign page's script, and with
- *            every POST, which needs it. Only POST has a body, of at most BST_VIEW_BODY_BYTES. The
- *            time of
- *            the comparison does not depend on how many digits of the token are right. */
+ *            every POST, which needs it. Only POST has a body, of at most BST_VIEW_BODY_BYTES
+ * (BST_VIEW_FILE_BYTES for BST_VIEW_FILE_ROUTE). The time of the comparison does not depend on how
+ * many digits of the token are right. */
 int bst_view_guard(const bst_view_request *request, const char *token,
                    char route[BST_VIEW_ROUTE_BYTES]);
 

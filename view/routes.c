@@ -5,9 +5,11 @@
 
 #include "view/panel_routes.h"
 #include "view/start_routes.h"
+#include "view/thumbnails.h"
 
-/* What the page is for: {"live": true, "study": false, "runs": number of open ones, "run": as api/run, "names": as
- * api/names}, the last two if the run is open: all that a page needs at first. */
+/* What the page is for: {"live": true, "study": false, "runs": number of open ones, "run": as
+ * api/run, "names": as api/names}, the last two if the run is open: all that a page needs at first.
+ */
 static bst_status get_session(bst_ctx *ctx, bst_view_exchange *x) {
     bst_view_run *run;
     cJSON *described = NULL, *names = NULL;
@@ -83,6 +85,12 @@ static bst_status get_pixels(bst_ctx *ctx, bst_view_exchange *x) {
     return bst_view_run_pixels(ctx, run, x->sensor, x->frame, &x->bytes);
 }
 
+static bst_status get_thumbnail(bst_ctx *ctx, bst_view_exchange *x) {
+    bst_view_run *run;
+    BST_TRY(bst_view_subject_run(ctx, x->subject, x->run, &run));
+    return bst_view_run_thumbnail(ctx, run, x->sensor, x->frame, &x->bytes);
+}
+
 static bst_status get_plot(bst_ctx *ctx, bst_view_exchange *x) {
     const bst_view_plot plot = {x->sensor, x->panel, x->from_s, x->to_s, (int)x->columns};
     bst_view_run *run;
@@ -104,6 +112,7 @@ static const bst_view_route routes[] = {{"api/session", false, get_session},
                                         {"api/frames", false, get_frames},
                                         {"api/frame", false, get_frame},
                                         {"api/pixels", false, get_pixels},
+                                        {"api/thumbnail", false, get_thumbnail},
                                         {"api/plot", false, get_plot}};
 enum { ROUTES = sizeof routes / sizeof *routes };
 
@@ -129,6 +138,7 @@ bool bst_view_exchange_read(const char *query, bst_view_exchange *x) {
            bst_view_query_name(query, "name", x->name, sizeof x->name) &&
            bst_view_query_int(query, "sensor", 0, most, &x->sensor) &&
            bst_view_query_int(query, "frame", 0, most, &x->frame) &&
+           bst_view_query_int(query, "object", 0, most, &x->object) &&
            bst_view_query_int(query, "columns", 1, BST_VIEW_COLUMNS, &x->columns) &&
            bst_view_query_real(query, "from", &x->from_s) &&
            bst_view_query_real(query, "to", &x->to_s) &&

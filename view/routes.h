@@ -11,11 +11,12 @@
 typedef struct bst_view_exchange {
     bst_view_subject *subject;
     bst_view_live *live; /* NULL: none */
-    int64_t run, sensor, frame, columns;
+    int64_t run, sensor, frame, columns, object;
     double from_s, to_s;
     char panel[32];
     char name[64];        /* of a run in runs/ */
     const char *body;     /* of POST: text that ends with a zero byte; else NULL */
+    size_t body_bytes;
     cJSON *json;          /* the answer; NULL: `bytes` */
     bst_view_bytes bytes; /* the answer */
     const char *type;     /* media type of `bytes`; NULL: plain bytes */

@@ -150,9 +150,9 @@ static answer page_file(const char *route) {
 
 /* ------------------------------------------------------------------ data */
 
-/* Reads the body of a request. NULL: it is longer than allowed, or ends early. */
+/* Reads the body of a request, whose length was checked. NULL: it ends early. */
 static char *read_body(struct mg_connection *peer, int64_t bytes) {
-    char *body = bytes >= 0 && bytes <= BST_VIEW_BODY_BYTES ? malloc((size_t)bytes + 1) : NULL;
+    char *body = bytes >= 0 ? malloc((size_t)bytes + 1) : NULL;
     for (int64_t got = 0; body && got < bytes;) {
         int n = mg_read(peer, body + got, (size_t)(bytes - got));
         if (n <= 0) {
@@ -176,6 +176,7 @@ static int answer_data(struct mg_connection *peer, bst_view_server *server,
     answer a = refusal(BST_HTTP_BAD_REQUEST);
     char *text = NULL, *body = route->post ? read_body(peer, info->content_length) : NULL;
     x.body = body;
+    x.body_bytes = body ? (size_t)info->content_length : 0;
     if (bst_view_exchange_read(info->query_string, &x) && (body || !route->post)) {
         int status = bst_view_route_call(&ctx, route, &x);
         text = x.json ? cJSON_PrintUnformatted(x.json) : NULL;

@@ -9,54 +9,11 @@
 #include "sim/core/json_number.h"
 #include "sim/world/world_config.h"
 #include "view/recorded_run_internal.h"
-
-/* Latest time that is asked for, s: the longest duration of a scenario. */
-static const double LATEST_S = 1e9;
+#include "view/space_scene.h"
+#include "view/space_shapes.h"
 
 /* Longest file of a coastline. */
 enum { COAST_BYTES = 16 << 20 };
-
-/* World of a run; made at its first use. Call it with the lock held. */
-static bst_status open_scene(bst_ctx *ctx, bst_view_run *run) {
-    if (run->scene) {
-        return BST_OK;
-    }
-    bst_run_scene *scene = calloc(1, sizeof *scene);
-    if (!scene) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the world of the run");
-    }
-    bst_status status = bst_run_scene_open(ctx, run->reader, scene);
-    scene->run = NULL; /* is closed between calls while the run is in progress */
-    if (status != BST_OK) {
-        bst_run_scene_close(scene);
-        free(scene);
-        return status;
-    }
-    run->scene = scene;
-    return BST_OK;
-}
-
-void bst_view_space_forget(bst_view_run *run) {
-    pthread_mutex_lock(&run->lock);
-    if (run->scene) {
-        bst_run_scene_close(run->scene);
-        free(run->scene);
-        run->scene = NULL;
-    }
-    pthread_mutex_unlock(&run->lock);
-}
-
-/* Calls an answer with the run locked and its world there. */
-static bst_status with_scene(bst_ctx *ctx, bst_view_exchange *x,
-                             bst_status (*answer)(bst_ctx *, bst_view_run *, bst_view_exchange *)) {
-    bst_view_run *run;
-    BST_TRY(bst_view_subject_run(ctx, x->subject, x->run, &run));
-    bst_status status = bst_view_lock(ctx, run);
-    status = status == BST_OK ? open_scene(ctx, run) : status;
-    status = status == BST_OK ? answer(ctx, run, x) : status;
-    bst_view_unlock(run);
-    return status;
-}
 
 static int listed_objects(const bst_world *world) {
     int count = bst_world_object_count(world),
@@ -113,28 +70,22 @@ static bst_status describe(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x
     for (int i = 0; i < run->sensors; i++) {
         add_sensor(run->scene, &run->sensor[i].sensor, sensors);
     }
+    bst_view_space_add_shapes(run, x->json);
     return BST_OK;
 }
 
 bst_status bst_view_route_space_scene(bst_ctx *ctx, bst_view_exchange *x) {
-    return with_scene(ctx, x, describe);
+    return bst_view_with_scene(ctx, x, describe);
 }
 
 /* ------------------------------------------------------------------ states */
-
-static double *put(double *at, bst_vec3 v) {
-    at[0] = v.x;
-    at[1] = v.y;
-    at[2] = v.z;
-    return at + 3;
-}
 
 static bst_status put_sky(bst_ctx *ctx, bst_world_view *view, double time_s, double *at) {
     bst_bodies bodies;
     bst_astro_earth_frames frames;
     BST_TRY(bst_world_view_bodies(ctx, view, time_s, &bodies));
     BST_TRY(bst_world_view_earth_frames(ctx, view, time_s, &frames));
-    at = put(put(at, bodies.sun_m), bodies.moon_m);
+    at = bst_view_put(bst_view_put(at, bodies.sun_m), bodies.moon_m);
     memcpy(at, frames.itrf_from_gcrf.m, sizeof frames.itrf_from_gcrf.m);
     return BST_OK;
 }
@@ -143,10 +94,7 @@ static bst_status states(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) 
     const bst_run_scene *scene = run->scene;
     int observers = bst_world_observer_count(scene->world), objects = listed_objects(scene->world);
     size_t count = BST_VIEW_SPACE_HEAD + (size_t)(observers + objects) * BST_VIEW_SPACE_BODY;
-    if (!(x->from_s >= 0.0 && x->from_s <= LATEST_S)) {
-        return bst_fail(ctx, BST_ERR_ARGUMENT, "from: %g s is before or long after the run",
-                        x->from_s);
-    }
+    BST_TRY(bst_view_space_check_time(ctx, x->from_s));
     double *numbers = malloc(count * sizeof *numbers), *at = numbers;
     if (!numbers) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the states of %d bodies",
@@ -166,13 +114,13 @@ static bst_status states(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) 
         if (status != BST_OK) {
             state.position_m = state.velocity_mps = (bst_vec3){NAN, NAN, NAN};
         }
-        at = put(put(at, state.position_m), state.velocity_mps);
+        at = bst_view_put(bst_view_put(at, state.position_m), state.velocity_mps);
     }
     return BST_OK;
 }
 
 bst_status bst_view_route_space_states(bst_ctx *ctx, bst_view_exchange *x) {
-    return with_scene(ctx, x, states);
+    return bst_view_with_scene(ctx, x, states);
 }
 
 /* ------------------------------------------------------------------ attitudes */
@@ -218,7 +166,7 @@ static bst_status poses(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) {
 }
 
 bst_status bst_view_route_space_poses(bst_ctx *ctx, bst_view_exchange *x) {
-    return with_scene(ctx, x, poses);
+    return bst_view_with_scene(ctx, x, poses);
 }
 
 /* ------------------------------------------------------------------ coastline */

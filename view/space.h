@@ -13,13 +13,11 @@ enum {
     BST_VIEW_SPACE_POSE = 5        /* numbers of an attitude */
 };
 
-/* Forgets the world of a run: its scenario.json has changed. Any thread. */
-void bst_view_space_forget(bst_view_run *run);
-
 /* What there is: {span_s, observers: [name], objects: [name], total, sensors: [{observer, name,
- * object, corners}]}. observer, object: index; object -1: no target. corners: unit vectors in the
- * camera's frame, of the first row from left to right, then of the last one from right to left.
- * total: objects of the run, of which the first are listed.
+ * object, corners, keep_out}], shapes} (the last two: view/space_shapes.h). observer, object:
+ * index; object -1: no target. corners: unit vectors in the camera's frame, of the first row from
+ * left to right, then of the last one from right to left. total: objects of the run, of which the
+ * first are listed.
  *
  * Returned:  x->json
  * Errors:    those of bst_run_scene_open */

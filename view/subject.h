@@ -1,4 +1,5 @@
-/* What a server shows: the runs that it has opened. */
+/* What a server shows: the runs that it has opened, any number of them. The files of those that
+ * were not asked for lately are closed. */
 #ifndef BST_VIEW_SUBJECT_H
 #define BST_VIEW_SUBJECT_H
 
@@ -18,7 +19,7 @@ void bst_view_subject_free(bst_view_subject *subject);
 /* Opens the folder of a run, or finds it if it is open.
  *
  * Returned:  *number  by which requests name the run, 0 for the first
- * Errors:    those of bst_view_run_open; BST_ERR_STATE: too many runs are open */
+ * Errors:    those of bst_view_run_open; BST_ERR_MEMORY */
 bst_status bst_view_subject_open(bst_ctx *ctx, bst_view_subject *subject, const char *path,
                                  int64_t *number) BST_MUST_CHECK;
 

@@ -201,6 +201,17 @@ class View(Checks):
                 self.viewer.get("api/pixels?sensor=0&frame=" + ("3", "-1", "x")[k])
             self.assertEqual(refused.exception.code, (404, 400, 400)[k])
 
+    def test_thumbnails(self):
+        """Peaks of 13 x 13 pixels, the same when they are asked for again."""
+        with fits.open(os.path.join(self.made, "frames.fits")) as file:
+            for frame in (0, 2, 0):
+                data, headers = self.viewer.get(f"api/thumbnail?sensor=0&frame={frame}")
+                peaks = numpy.maximum.reduceat(numpy.maximum.reduceat(file[1 + frame].data, range(0, 1024, 13), 0), range(0, 1024, 13), 1)
+                self.assertEqual((int(headers["X-Frame-Height"]), int(headers["X-Frame-Width"])), (79, 79))
+                self.assertTrue(numpy.array_equal(numpy.frombuffer(data, "<u2").reshape(79, 79), peaks))
+        for query, refused in (("frame=3", 404), ("frame=-1", 400), ("sensor=1", 404)):
+            self.assertEqual(self.viewer.status("/{token}/api/thumbnail?" + query), refused, query)
+
     def test_marks(self):
         for frame in range(3):
             self.check_marks(self.viewer, self.made, frame)

@@ -74,6 +74,12 @@ class Accessible(unittest.TestCase):
                 page.evaluate(f"document.getElementById('tab-{tab}').click()")
                 page.wait_for(f"!!({condition})")
                 self.look(page, f"{scheme} {tab}")
+            page.evaluate("document.editor.drop.take(new File([new Uint8Array(3)], 'a.bin'))")
+            page.wait_for("document.getElementById('editor-message').textContent.includes('no known kind')")
+            page.evaluate("""(() => { document.editor.drop.found = { kind: 'frame', offers: [{ text: 'Exposure time 1 s', from: 'EXPTIME', changes: [] }] };
+                document.editor.drop.show('a.fits'); })()""")
+            self.look(page, scheme + " dropped file")
+            page.evaluate("document.editor.drop.dialog.close()")
             viewer.end()
             viewer = test_view.Viewer(self.study)
             self.go(page, viewer, "document.study")

@@ -81,6 +81,24 @@ class Compared(unittest.TestCase):
         self.assertEqual(viewer.status("/{token}/api/study/open", method="POST", more="Content-Length: 2\r\n"), 403)
         self.assertEqual(viewer.end()[0], 0)
 
+    def test_many_runs(self):
+        """More runs than a viewer keeps open: each one answers, also those whose files were closed meanwhile."""
+        for k in range(2, 90):
+            os.symlink("000000", os.path.join(self.study, "runs", f"{k:06}"))
+        viewer = test_view.Viewer(self.study)
+        asked = ("frames?run=0", "plot?run=0&panel=detections&to=10", "run?run=0", "space/states?run=0&from=1")
+        self.assertEqual(post(viewer, "api/study/open", number=0)[0], 200)
+        first = [viewer.get("api/" + one)[0] for one in asked]
+        for k in range(2, 90):
+            self.assertEqual(post(viewer, "api/study/open", number=k), (200, {"run": k - 1}))
+            viewer.get(f"api/space/states?run={k - 1}&from=1")
+        self.assertLess(len(os.listdir(f"/proc/{viewer.process.pid}/fd")), 60)
+        self.assertEqual([viewer.get("api/" + one)[0] for one in asked], first)
+        self.assertEqual(viewer.json("api/run?run=88")["name"], "000089")
+        self.assertEqual(viewer.end()[0], 0)
+        for k in range(2, 90):
+            os.remove(os.path.join(self.study, "runs", f"{k:06}"))
+
     def test_two_runs(self):
         viewer = test_view.Viewer(self.pair[0], self.pair[1])
         listed = viewer.json("api/runs")["open"]

@@ -211,6 +211,7 @@ class Page(unittest.TestCase):
             })()""")
             self.assertEqual(at[0], test_view.HOSTILE)
             self.assertAlmostEqual(at[1], 0, delta=1e-6)
+            page.wait_for("document.boresight.strip.kept.size > 5")
             samples = page.evaluate("document.boresight.plots.panels.find((p) => p.info.name === 'detections').lines[0].map((p) => p.high)")
             numbers = self.viewer.numbers("api/plot?sensor=0&panel=detections&from=0&to=100&columns=2000")
             self.assertEqual(samples, numbers[1:1 + 3 * int(numbers[0])].reshape(-1, 3)[:, 2].tolist())
@@ -225,6 +226,32 @@ class Page(unittest.TestCase):
             page.wait_for(SHOWN + " === 0")
             self.assertIn("of 24 frames", page.evaluate("document.getElementById('exported').textContent"))
             self.assertLess(page.evaluate("document.boresight.count"), 24)
+
+    def test_film_strip(self):
+        """As many pictures as fit, of the time that the plots show; a click and the arrow keys go to their frames."""
+        frames = "document.boresight.strip.frames"
+        with chromium.Chromium(1280, 720) as page:
+            self.open(page, 0)
+            page.wait_for(f"{frames}.length > 5 && document.boresight.strip.kept.size === {frames}.length")
+            shown = page.evaluate(frames)
+            self.assertEqual((shown[0], shown[-1]), (0, 23))
+            width = page.evaluate("[document.getElementById('strip').scrollWidth, document.getElementById('strip').clientWidth]")
+            self.assertLessEqual(width[0], width[1])
+            sky = "(() => { const c = document.querySelector('#strip canvas'), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; return [c.width, Math.max(...d.filter((_, k) => k % 4 === 0))]; })()"
+            self.assertEqual(page.evaluate(sky), [79, 255])
+            page.evaluate(f"document.querySelector('[data-frame=\"{shown[3]}\"]').click()")
+            page.wait_for(f"{SHOWN} === {shown[3]} && document.querySelector('#strip [aria-selected=true]').dataset.frame === '{shown[3]}'")
+            page.evaluate("document.getElementById('strip').focus()")
+            for key, frame in (("ArrowRight", shown[4]), ("End", 23), ("ArrowLeft", shown[-2])):
+                page.key(key)
+                page.wait_for(f"{SHOWN} === {frame}")
+            page.evaluate("document.boresight.plots.setRange(4.9, 8.1)")
+            page.wait_for("document.boresight.strip.frames.length < 6")
+            times = self.viewer.numbers("api/frames?sensor=0").reshape(-1, 5)[:, 1]
+            self.assertEqual(page.evaluate(frames), numpy.flatnonzero((times >= 4.9) & (times <= 8.1)).tolist())
+            page.evaluate("document.getElementById('strip-shown').click()")
+            self.assertEqual(page.evaluate("document.getElementById('strip').hidden"), True)
+            self.assertEqual(page.messages, [])
 
     def test_events_and_plots_move_the_frame(self):
         with chromium.Chromium(1280, 720) as page:

@@ -5,6 +5,7 @@ Usage, from the repository root: /usr/bin/python3 tests/e2e/test_view_panels.py 
 """
 import base64
 import glob
+import io
 import json
 import math
 import os
@@ -17,6 +18,8 @@ import urllib.request
 import zlib
 
 import numpy
+from astropy.io import fits
+from astropy.wcs import WCS
 
 import runs
 import test_view
@@ -154,6 +157,98 @@ class Server(unittest.TestCase):
         self.assertEqual(self.editor.post("save", file="mine.json", text=text.replace("3}", "4}"), overwrite=True)[0], 200)
         self.assertIn("4}", self.saved())
 
+    def drop(self, name, data):
+        """Status and answer for a file."""
+        request = urllib.request.Request(f"{self.editor.url}api/editor/file?name={name}", data, {"Origin": self.editor.url[:self.editor.url.index("/", 7)]})
+        try:
+            with urllib.request.urlopen(request, timeout=60) as answer:
+                return answer.status, json.load(answer)
+        except urllib.error.HTTPError as error:
+            return error.code, error.read().decode()
+
+    def test_dropped_elements(self):
+        with open("scenarios/objects_2022-06.tle", "rb") as file:
+            lines = file.read().splitlines()
+        first = next(k for k, line in enumerate(lines) if line.startswith(b"1 "))
+        status, found = self.drop("one.txt", b"\n".join([b"0 MINE", *lines[first:first + 2]]))
+        self.assertEqual((status, found["kind"], found["total"]), (200, "elements", 1))
+        self.assertEqual(found["satellites"][0], {"name": "MINE", "norad": int(lines[first][2:7]), "line1": lines[first].decode(), "line2": lines[first + 1].decode()})
+        omm = {"OBJECT_NAME": "OTHER", "NORAD_CAT_ID": 44801, "EPOCH": "2022-06-16T12:00:00", "MEAN_MOTION": 1.0027, "ECCENTRICITY": 0.0002, "INCLINATION": 0.03,
+               "RA_OF_ASC_NODE": 80, "ARG_OF_PERICENTER": 170, "MEAN_ANOMALY": 5, "BSTAR": 0}
+        status, found = self.drop("omm.json", json.dumps(omm).encode())
+        self.assertEqual((status, found["satellites"][0]["name"]), (200, "OTHER"))
+        self.assertIn("22167.5", found["satellites"][0]["line1"])
+        with open("scenarios/catalogue_2022-06.tle", "rb") as file:
+            text = file.read()
+        status, found = self.drop("many.tle", text)
+        sets = sum(line.startswith(b"1 ") for line in text.splitlines())
+        self.assertEqual((found["total"], len(found["satellites"])), (sets, min(sets, 500)))
+        for name, data, words in (("a.tle", b"hello\n", "a.tle"), ("b.json", json.dumps({**omm, "ECCENTRICITY": 3}).encode(), "b.json: /ECCENTRICITY"),
+                                  ("c.txt", lines[first][:-1] + b"0\n" + lines[first + 1], "c.txt:1"), ("d.bin", b"\0\1\2", "d.bin: is of no known kind (allowed: element sets"),
+                                  ("e.tle", b"", "e.tle: is empty"), ("omm.xml", b"<?xml version='1.0'?><omm/>", "omm.xml"), ("-x.tle", lines[first], "is no name for a file")):
+            status, answer = self.drop(name, data)
+            self.assertEqual(status, 400, (name, answer))
+            self.assertIn(words, answer)
+        status = self.editor.status("/{token}/api/editor/file?name=f.tle", "POST", more=f"Content-Length: {41 << 20}\r\nOrigin: http://127.0.0.1:{{port}}\r\n")
+        self.assertEqual(status, 413)
+
+    def test_dropped_shape(self):
+        """A GLB becomes the shape of the target; it is kept in the folder, and replaces nothing."""
+        glb = os.path.join(runs.scratch(), "sat.glb")
+        runs.call_well("turntable", "scenarios/satellites/cubesat_3u.json", "--glb", glb)
+        with open(glb, "rb") as file:
+            data = file.read()
+        self.addCleanup(lambda: os.path.exists(os.path.join(self.folder, "sat.glb")) and os.remove(os.path.join(self.folder, "sat.glb")))
+        for bad, words in ((data[:200], "sat.glb"), (b"glTF" + b"\xff" * 100, "sat.glb"), (data[:len(data) // 2], "sat.glb")):
+            status, answer = self.drop("sat.glb", bad)
+            self.assertEqual(status, 400, answer)
+            self.assertTrue(answer.startswith(words), answer)
+            self.assertNotIn("/tmp", answer)
+        self.assertEqual(self.drop("sat.bin", data)[0], 400)
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "sat.glb")))
+        for _ in range(2):
+            status, found = self.drop("sat.glb", data)
+            self.assertEqual((status, found["kind"], found["file"], found["facets"] > 6, 0.1 < found["radius_m"] < 1), (200, "shape", "sat.glb", True, True))
+        with open(os.path.join(self.folder, "sat.glb"), "rb") as file:
+            self.assertEqual(file.read(), data)
+        target = "/world/objects/0"
+        text = {"extends": os.path.join(self.base, "neossat_geo_stare.json"), "set": {target + "/shape": {"file": "sat.glb"}, target + "/brightness/model": "shape",
+                runs.GENERATOR.split("=")[0]: "generator"}}
+        self.assertEqual([one for one in self.check(text)["problems"] if one["kind"] == "error"], [])
+        runs.call_well("turntable", "scenarios/satellites/cubesat_12u.json", "--glb", glb)
+        with open(glb, "rb") as file:
+            status, answer = self.drop("sat.glb", file.read())
+        self.assertEqual(status, 400)
+        self.assertIn("another file of this name is in the folder", answer)
+
+    def test_dropped_frame(self):
+        """Size, pointing of the middle, pixel scale, exposure and time of a FITS frame, as astropy has them."""
+        header = fits.Header()
+        header.update({"CTYPE1": "RA---TAN", "CTYPE2": "DEC--TAN", "CRPIX1": 11.0, "CRPIX2": 5.0, "CRVAL1": 359.99, "CRVAL2": -20.0, "CD1_1": -1e-3, "CD1_2": 2e-4,
+                       "CD2_1": 2e-4, "CD2_2": 1e-3, "EXPTIME": 1.25, "DATE-OBS": "2022-06-16T22:10:00.5", "GAIN": 2.5, "RDNOISE": -3.0})
+        buffer = io.BytesIO()
+        fits.PrimaryHDU(numpy.zeros((40, 64), "u2"), header).writeto(buffer)
+        status, found = self.drop("frame.fits", buffer.getvalue())
+        self.assertEqual((status, found["kind"]), (200, "frame"), found)
+        changes = {one["key"]: one["value"] for offer in found["offers"] for one in offer["changes"]}
+        direction = changes.pop("cue/direction_radec_deg")
+        expected = WCS(header).all_pix2world([[31.5, 19.5]], 0)[0]
+        numpy.testing.assert_allclose(direction, expected, rtol=0, atol=1e-9)
+        self.assertAlmostEqual(changes.pop("camera/pixel_scale_arcsec"), 3600 * math.sqrt(1e-6 + 4e-8), delta=1e-9)
+        # a read noise below 0 is none
+        self.assertEqual(changes, {"camera/width_px": 64, "camera/height_px": 40, "cue/object": "", "exposure/exposure_s": 1.25, "camera/gain_e_per_dn": 2.5,
+                                   "/epoch_utc": "2022-06-16T22:10:00.5Z"})
+        # a header without WCS offers the size
+        buffer = io.BytesIO()
+        fits.PrimaryHDU(numpy.zeros((4, 6), "f4")).writeto(buffer)
+        status, found = self.drop("plain.fits", buffer.getvalue())
+        self.assertEqual([offer["from"] for offer in found["offers"]], ["NAXIS1, NAXIS2"])
+        for bad in (buffer.getvalue()[:1000], buffer.getvalue()[:2880], b"SIMPLE  = " + b"x" * 5000):
+            status, answer = self.drop("bad.fits", bad)
+            self.assertEqual((status, answer[:8]), (400, "bad.fits"), answer)
+            self.assertNotIn("/tmp", answer)
+        self.assertEqual([name for name in os.listdir("/tmp") if name.startswith("boresight-drop-")], [])
+
     def test_run_starts_only_scenarios(self):
         """No option of the command, no folder, no other file; the reason of a scenario that cannot run comes back."""
         folder = runs.scratch()
@@ -223,6 +318,44 @@ class Server(unittest.TestCase):
             with self.assertRaises(urllib.error.HTTPError) as caught:
                 self.editor.get("api/space/" + route)
             self.assertEqual(caught.exception.code, refused, route)
+
+    def test_shapes_and_keep_out(self):
+        """Attitudes are those of the tables; facets of joints lie within the body's sphere; keep-out angles of the scenario."""
+        made = os.path.join(runs.scratch(), "shape")
+        guidance = runs.SENSOR + "/modules/control/guidance"
+        runs.run("scenarios/inspection.json", made, runs.NO_FRAMES, guidance + "/sun_keep_out_deg=30.5", guidance + "/earth_keep_out=true",
+                 '/world/objects/0/shape={"file": "satellites/gps_iif.json"}', duration=4)
+        viewer = Editor(made, self.folder)
+        scene = viewer.json("api/space/scene")
+        self.assertEqual(scene["sensors"][0]["keep_out"], {"sun_deg": 30.5, "moon_deg": 0, "earth": True, "earth_limb_deg": 0, "earth_limb_altitude_km": 100})
+        self.assertNotIn("keep_out", self.editor.json("api/space/scene")["sensors"][0])
+        shape, = scene["shapes"]
+        numbers = viewer.numbers("api/space/shape?object=0")
+        joints, count = int(numbers[0]), int(numbers[1])
+        triangles = numbers[2:].reshape(-1, 13)
+        self.assertEqual((shape["object"], shape["triangles"], len(triangles)), (0, count, count))
+        self.assertGreater(joints, 0)
+        self.assertEqual(set(triangles[:, 0]), set(range(-1, joints)) & set(triangles[:, 0]))
+        self.assertTrue(((triangles[:, 1:4] >= 0) & (triangles[:, 1:4] <= 1)).all())
+        with sqlite3.connect(os.path.join(made, "run.sqlite")) as tables:
+            rows = tables.execute("SELECT mid_s, q_body_from_gcrf_x, q_body_from_gcrf_y, q_body_from_gcrf_z, q_body_from_gcrf_w FROM shapes WHERE id = 0").fetchall()
+        self.assertGreater(len(rows), 0)
+        for time, *attitude in rows:
+            pose = viewer.numbers(f"api/space/pose?object=0&sensor=0&from={time!r}")
+            self.assertEqual((list(pose[:4]), pose[4], pose[5]), (attitude, 1, 1))
+            other = viewer.numbers(f"api/space/pose?object=0&sensor=0&from={time + 1e-5!r}")
+            self.assertEqual(other[5], 0)
+            # light time of 50 km is 0.2 ms, in which it turns by 6e-6 rad
+            self.assertGreater(abs(numpy.dot(other[:4], attitude)), 1 - 1e-9)
+            for joint, turn in enumerate(pose[6:].reshape(-1, 12)):
+                numpy.testing.assert_allclose(turn[:9].reshape(3, 3) @ turn[:9].reshape(3, 3).T, numpy.eye(3), rtol=0, atol=1e-12)
+                corners = triangles[triangles[:, 0] == joint][:, 4:].reshape(-1, 3) @ turn[:9].reshape(3, 3).T + turn[9:]
+                self.assertLessEqual(numpy.linalg.norm(corners, axis=1).max(initial=0), shape["radius_m"] * (1 + 1e-12))
+        for refused, route in ((404, "shape?object=1"), (404, "pose?object=7"), (400, "pose?object=0&from=-1"), (404, "pose?object=0&sensor=3"), (400, "shape?object=x")):
+            with self.assertRaises(urllib.error.HTTPError) as caught:
+                viewer.get("api/space/" + route)
+            self.assertEqual(caught.exception.code, refused, route)
+        self.assertEqual(viewer.end()[0], 0)
 
     def test_why(self):
         """The short exposures leave the target below the threshold, with the SNR of the tables."""

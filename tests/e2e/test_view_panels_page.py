@@ -192,6 +192,52 @@ class Page(unittest.TestCase):
             self.assertEqual(nameless, [])
             self.assertEqual(page.messages, [])
 
+    def test_dropped_file(self):
+        """A TLE that is dropped becomes the orbit of the target, under its name; a file of no known kind is named."""
+        with open("scenarios/objects_2022-06.tle", encoding="utf-8") as file:
+            lines = file.read().splitlines()
+        first = next(k for k, line in enumerate(lines) if line.startswith("1 "))
+        drop = """((name, text) => { const transfer = new DataTransfer(); transfer.items.add(new File([text], name));
+            document.getElementById('panel-editor').dispatchEvent(new DragEvent('drop', { dataTransfer: transfer, bubbles: true, cancelable: true })); })"""
+        with chromium.Chromium(1280, 800) as page:
+            self.open(page)
+            page.evaluate(f"{drop}('my sat.tle', {json.dumps(chr(10).join(['MINE', *lines[first:first + 2]]))})")
+            page.wait_for("document.querySelector('dialog.drop').open")
+            self.assertEqual(page.evaluate("[document.getElementById('drop-for').value, document.getElementById('drop-set-label').hidden]"), ["/world/objects/0", True])
+            page.evaluate("document.getElementById('drop-use').click()")
+            orbit = page.evaluate("[document.editor.root.world.objects[0].orbit, document.editor.root.world.objects[0].name]")
+            self.assertEqual(orbit, [{"source": "sgp4", "tle_line1": lines[first], "tle_line2": lines[first + 1]}, "MINE"])
+            page.evaluate(f"{drop}('x.bin', '\\u0000')")
+            page.wait_for("document.getElementById('editor-message').textContent.startsWith('x.bin: is of no known kind')")
+            page.evaluate("document.editor.drop.take({ name: 'big.fits', size: 1e9 })")
+            self.assertEqual(page.evaluate("document.getElementById('editor-message').textContent"), "big.fits: has 953.7 MiB (allowed: 40 MiB).")
+            self.assertEqual([text for text in page.messages if "400" not in text], [])  # of the refused file
+
+    def test_shape_and_keep_out(self):
+        """Close to an object with a shape its facets are drawn, lit by the Sun; cones are drawn for what the scenario keeps out."""
+        made = os.path.join(runs.scratch(), "shape")
+        runs.run("scenarios/inspection.json", made, runs.NO_FRAMES, runs.SENSOR + "/modules/control/guidance/sun_keep_out_deg=30", duration=4)
+        viewer = test_view_panels.Editor(made, self.folder)
+        bright = """(() => { const { painter } = document.space, { width, height } = painter.canvas, data = new Uint8Array(4 * width * height);
+            document.space.draw(); painter.gl.readPixels(0, 0, width, height, painter.gl.RGBA, painter.gl.UNSIGNED_BYTE, data);
+            let count = 0; for (let k = 0; k < data.length; k += 4) if (data[k] > 70 && data[k + 1] > 50) count++; return count; })()"""
+        with chromium.Chromium(1280, 800) as page:
+            page.command("Page.navigate", url=viewer.url)
+            page.wait_for("document.boresight && document.boresight.run && document.boresight.count > 0")
+            self.click(page, "tab-space")
+            page.wait_for("document.space && document.space.after && document.getElementById('space-readout').textContent.includes('keep-out of 30.0')")
+            cones = page.evaluate(bright)
+            page.evaluate("document.getElementById('space-keep-out').checked = false")
+            self.assertGreater(cones, page.evaluate(bright) + 100)  # lines of the cone
+            self.click(page, "space-close")
+            page.wait_for("[...document.space.shapes.shapes.values()][0].buffer && document.getElementById('space-readout').textContent.includes('Sunlight')")
+            self.assertGreater(page.evaluate(bright), 3000)  # 4.7 m across in 14 m: some 100 px
+            self.assertIn("as recorded in this frame", page.evaluate("document.getElementById('space-readout').textContent"))
+            self.click(page, "space-close")
+            self.assertEqual(page.evaluate("document.space.camera.distance"), 4)
+            self.assertEqual(page.messages, [])
+        self.assertEqual(viewer.end()[0], 0)
+
     def test_space(self):
         """Pixels of the picture are what the geometry says; time, camera and frames go together; 5,000 bodies."""
         made = os.path.join(runs.scratch(), "many")

@@ -75,3 +75,33 @@ test('coastlines of a shapefile', () => {
   const matrix = math.earthMatrix(new Float64Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]), [0, 0, 0], [0, 1, 0, -1, 0, 0, 0, 0, 1], 1);
   near([matrix[0], matrix[1], matrix[2]], [0, 1, 0], 1e-12, 'Greenwich');
 });
+
+test('keep-out cones: their half angles, and how far a direction is from what they keep away from', async () => {
+  const { clearance, conesOf, coneShape } = await import('../../view/page/space_cones.js');
+  const off = { sun_deg: 0, moon_deg: 0, earth: false, earth_limb_deg: 0, earth_limb_altitude_km: 100 };
+  assert.deepEqual(conesOf(off, [2, 0, 0], [0, 1, 0], [60, 0, 0]), []);
+  const cones = conesOf({ sun_deg: 40, moon_deg: 20, earth: true, earth_limb_deg: 10, earth_limb_altitude_km: 0 }, [2, 0, 0], [0, 5, 0], [60, 0, 0]);
+  assert.deepEqual(cones.map((one) => one.name), ['Sun', 'Moon', 'Earth']);
+  const degrees = cones.map((one) => one.angle * 180 / Math.PI);
+  [40, 20, 30 + 10].forEach((expected, k) => assert.ok(Math.abs(degrees[k] - expected) < 1e-9)); // the limb is asin(1/2) from the nadir
+  // 90 deg from the nadir is 60 deg from the limb
+  assert.ok(Math.abs(clearance(cones[2], [0, 0, 1]) * 180 / Math.PI - 60) < 1e-9);
+  assert.ok(Math.abs(clearance(cones[0], [0, 1, 0])) < 1e-9);
+  const { lines } = coneShape([2, 0, 0], cones[0]);
+  for (let k = 0; k < lines.length; k += 3) { // the apex, or a point of the rim
+    const along = [lines[k] - 2, lines[k + 1], lines[k + 2]], far = Math.hypot(...along);
+    assert.ok(far < 1e-12 || (Math.abs(far - 2.5) < 1e-9 && Math.abs(along[1] / far - Math.cos(cones[0].angle)) < 1e-9));
+  }
+});
+
+test('facets of a joint are turned and moved; their normals look outside', async () => {
+  Object.assign(globalThis, { location: { search: '' } });
+  const { bodyVertices } = await import('../../view/page/space_shape.js');
+  const corners = [0, 0, 0, 1, 0, 0, 0, 1, 0];
+  const shape = Float64Array.from([1, 2, -1, 0.5, 0.5, 0.5, ...corners, 0, 1, 0, 0, ...corners]);
+  // a quarter of a turn about x, then 5 m along z
+  const pose = Float64Array.from([0, 0, 0, 1, 1, 0, 1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 5]);
+  const found = bodyVertices(shape, pose);
+  assert.deepEqual([...found.slice(9, 18)], [1, 0, 0, 0, 0, 1, 0.5, 0.5, 0.5]);
+  assert.deepEqual([...found.slice(45, 54)], [0, 0, 6, 0, -1, 0, 1, 0, 0]);
+});

@@ -82,3 +82,15 @@ test('numbers and seeds as they are typed', () => {
   assert.deepEqual([schema.numberOf(open, ''), schema.numberOf(plain, ' '), schema.numberOf(plain, '1e400'), schema.numberOf(plain, '12x')], [null, undefined, '1e400', '12x']);
   assert.deepEqual([schema.textOf(root.properties.seed, '42'), schema.textOf(root.properties.seed, '0x2A'), schema.textOf(root.properties.name, '42')], [42, '0x2A', '42']);
 });
+
+test('places that can take what a dropped file has: the target first', async () => {
+  Object.assign(globalThis, { location: { search: '' } });
+  const { placesFor, plainName } = await import('../../view/page/editor_drop.js');
+  const root = { world: { objects: [{ name: 'A' }, { name: 'B' }] }, observers: [{ name: 'eye', sensors: [{ name: 'wide', cue: { object: 'B' } }, {}] }] };
+  const pointers = (kind) => placesFor(kind, root).map((one) => one.pointer);
+  assert.deepEqual(pointers('elements'), ['/world/objects/1', '/world/objects/0', '/observers/0']);
+  assert.deepEqual(pointers('shape'), ['/world/objects/1', '/world/objects/0']);
+  assert.deepEqual(pointers('frame'), ['/observers/0/sensors/0', '/observers/0/sensors/1']);
+  assert.deepEqual(placesFor('shape', {}), []);
+  assert.equal(plainName('../my sat (2).glb'), '_._my_sat__2_.glb');
+});

@@ -1,4 +1,4 @@
-/* Pixels reduced to the means of squares, against sums over all pixels. */
+/* Pixels reduced to the means or peaks of squares, against sums over all pixels. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -53,6 +53,22 @@ static void test_means(void **state) {
     }
 }
 
+static void test_peaks(void **state) {
+    (void)state;
+    for (int n = 1; n <= 40; n++) {
+        uint16_t all[WIDTH * HEIGHT], row[WIDTH], found[WIDTH * HEIGHT],
+            largest[WIDTH * HEIGHT] = {0};
+        const int across = (WIDTH + n - 1) / n, down = (HEIGHT + n - 1) / n;
+        for (int i = 0; i < WIDTH * HEIGHT; i++) {
+            all[i] = (uint16_t)((unsigned)i * 2654435761u >> 16);
+            uint16_t *bin = &largest[i / WIDTH / n * across + i % WIDTH / n];
+            *bin = all[i] > *bin ? all[i] : *bin;
+        }
+        bst_view_peak_pixels(all, WIDTH, HEIGHT, n, row, found);
+        assert_memory_equal(found, largest, sizeof *found * (size_t)(across * down));
+    }
+}
+
 /* What is no image stays as it is. */
 static void test_other_data(void **state) {
     (void)state;
@@ -64,7 +80,7 @@ static void test_other_data(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_means),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_means), cmocka_unit_test(test_peaks),
                                        cmocka_unit_test(test_other_data)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

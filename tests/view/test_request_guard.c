@@ -176,6 +176,14 @@ static void test_methods_and_bodies(void **state) {
     assert_int_equal(guard(r, route), BST_HTTP_OK);
     r.body_bytes = BST_VIEW_BODY_BYTES + 1;
     assert_int_equal(guard(r, route), BST_HTTP_TOO_LARGE);
+    r.target = "/" TOKEN "/" BST_VIEW_FILE_ROUTE "?name=a.fits";
+    r.body_bytes = BST_VIEW_FILE_BYTES;
+    assert_int_equal(guard(r, route), BST_HTTP_OK);
+    r.body_bytes = BST_VIEW_FILE_BYTES + 1;
+    assert_int_equal(guard(r, route), BST_HTTP_TOO_LARGE);
+    r.target = "/" TOKEN "/" BST_VIEW_FILE_ROUTE "s"; /* another route */
+    r.body_bytes = BST_VIEW_BODY_BYTES + 1;
+    assert_int_equal(guard(r, route), BST_HTTP_TOO_LARGE);
     r = right;
     r.method = NULL;
     assert_int_equal(guard(r, route), BST_HTTP_BAD_REQUEST);

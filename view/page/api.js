@@ -43,7 +43,17 @@ export async function getNumbers(route, query, signal = undefined) {
  * @param {number | string} [run] another one than the page's
  */
 export async function getPixels(sensor, frame, signal = undefined, run = RUN) {
-  const response = await get('pixels', { sensor, frame, run }, signal);
+  return getImage('pixels', { sensor, frame, run }, signal);
+}
+
+/** A small picture of a frame: peaks of its bins. @param {number} sensor @param {number} frame @param {AbortSignal} [signal] */
+export async function getThumbnail(sensor, frame, signal = undefined) {
+  return getImage('thumbnail', { sensor, frame }, signal);
+}
+
+/** @param {string} route @param {Record<string, string | number>} query @param {AbortSignal} [signal] */
+async function getImage(route, query, signal) {
+  const response = await get(route, query, signal);
   return {
     width: Number(response.headers.get('X-Frame-Width')),
     height: Number(response.headers.get('X-Frame-Height')),
@@ -63,6 +73,13 @@ export function addStyle(file) {
 /** Sends text to a route and gets JSON. @param {string} route @param {string} body */
 export async function post(route, body) {
   const response = await fetch(`api/${route}?run=${RUN}`, { method: 'POST', body, cache: 'no-store' });
+  if (!response.ok) throw new ServerError((await response.text()) || `${response.status} ${response.statusText}`);
+  return response.json();
+}
+
+/** Sends a file to a route and gets JSON. @param {string} route @param {string} name @param {Blob} file */
+export async function postFile(route, name, file) {
+  const response = await fetch(`api/${route}?run=${RUN}&name=${encodeURIComponent(name)}`, { method: 'POST', body: file, cache: 'no-store' });
   if (!response.ok) throw new ServerError((await response.text()) || `${response.status} ${response.statusText}`);
   return response.json();
 }

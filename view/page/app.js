@@ -3,6 +3,7 @@ import { getJson, getNumbers, getPixels } from './api.js';
 import { FrameView } from './frame_view.js';
 import { Panels } from './panels.js';
 import { Plots, shortNumber } from './plots.js';
+import { Strip } from './strip.js';
 
 /** Numbers of a frame in the list (view/recorded_run.h). */
 const NUMBERS = 5;
@@ -17,6 +18,7 @@ const REFRESH_MS = 2000;
 /** Share of the time that the looks may take at most: the run's tables grow, and are read by the program that writes them. */
 const REFRESH_SHARE = 0.05;
 
+/** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 
 /** Changes of the mode. @param {number} sensor */
@@ -30,6 +32,7 @@ class App {
     this.plots = new Plots((time) => this.seek(time));
     this.run = null;
     this.sensor = 0;
+    /** @type {Float64Array} */
     this.frames = new Float64Array(0);
     this.count = 0;
     this.current = -1;
@@ -40,6 +43,7 @@ class App {
     this.live = null; // of a run that is steered here
     this.events = [];
     this.names = {};
+    this.strip = new Strip(this);
     this.panels = new Panels(element('tabs'), element('main'), this);
     this.listen();
   }

@@ -86,12 +86,16 @@ export function changeFields(box, scenario, number) {
 /** Commands for what differs. @param {HTMLElement} box @param {any} scenario */
 export function changesOf(box, scenario) {
   const commands = [];
-  for (const field of box.querySelectorAll('[data-pointer]')) {
+  /** @type {(selector: string) => any} */
+  const part = (selector) => box.querySelector(selector);
+  /** @type {NodeListOf<HTMLInputElement | HTMLSelectElement>} */
+  const fields = box.querySelectorAll('[data-pointer]');
+  for (const field of fields) {
     if (field.value === field.dataset.before || field.value === '') continue;
     const text = field instanceof HTMLSelectElement ? JSON.stringify(field.value) : String(Number(field.value));
     commands.push({ do: 'set', set: `${field.dataset.pointer}=${text}` });
   }
-  const dv = ['radial', 'along', 'normal'].map((axis) => Number(box.querySelector(`#change-burn-${axis}`).value) || 0);
-  if (dv.some((part) => part !== 0)) commands.push({ do: 'burn', object: box.querySelector('#change-burn-object').value, dv_rtn_mps: dv });
+  const dv = ['radial', 'along', 'normal'].map((axis) => Number(part(`#change-burn-${axis}`).value) || 0);
+  if (dv.some((speed) => speed !== 0)) commands.push({ do: 'burn', object: part('#change-burn-object').value, dv_rtn_mps: dv });
   return commands;
 }

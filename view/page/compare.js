@@ -74,6 +74,7 @@ class Side {
     this.letter = letter;
     this.painter = makePainter(this.canvas, true);
     this.image = this.details = this.limits = null;
+    this.run = this.sensor = -1;
     this.soft = 0;
   }
 
@@ -293,7 +294,7 @@ export class Comparison {
     this.panels = panels;
     const swatch = (k, more) => make('i', { className: `swatch swatch-${k % 3} ${more}` });
     this.plots.replaceChildren(...panels.map(({ info, canvas }) => {
-      const title = make('h3', { textContent: info.title + (info.unit ? ` [${info.unit}]` : '') });
+      const title = make('h2', { textContent: info.title + (info.unit ? ` [${info.unit}]` : '') });
       const key = make('span', { className: 'hint compare-key' }, ...info.lines.map((name, k) => make('span', {}, `${name}: A `, swatch(k, ''), ' B ', swatch(k, 'broken'))));
       title.append(key);
       return make('div', { className: 'compare-plot' }, title, canvas);

@@ -1,6 +1,7 @@
 // The editor panel: the form, the text beside it, problems and figures that the program finds, saving.
 import { addStyle, getJson, post } from './api.js';
-import { EditorForm, make } from './editor_form.js';
+import { EditorForm, layout, make } from './editor_form.js';
+import { DropDialog } from './editor_drop.js';
 import { showFigures } from './editor_figures.js';
 import { SatelliteDialog } from './satellites.js';
 import { extended, putAt, removeAt, smallFile } from './scenario_values.js';
@@ -10,6 +11,7 @@ const CHECK_AFTER_MS = 350;
 /** The file that is opened first, where it is there. */
 const FIRST = 'neossat_geo_track.json';
 
+/** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 
 export class Editor {
@@ -24,6 +26,8 @@ export class Editor {
       set: (pointer, value, structure) => this.set(pointer, value, structure),
       satellites: (pointer) => this.satellites.ask(pointer),
     });
+    /** @type {DropDialog | null} */
+    this.drop = null;
     this.satellites = new SatelliteDialog((pointer, orbit, name) => this.setOrbit(pointer, orbit, name));
     this.listen();
   }
@@ -76,6 +80,13 @@ export class Editor {
     if (value === undefined) removeAt(this.root, pointer); else putAt(this.root, pointer, value);
     this.writeText();
     if (structure) this.draw();
+  }
+
+  /** Sets several values. @param {[string, any][]} changes pointer and value */
+  setAll(changes) {
+    for (const [pointer, value] of changes) putAt(this.root, pointer, value);
+    this.writeText();
+    this.draw();
   }
 
   setOrbit(pointer, orbit, name) {
@@ -215,8 +226,9 @@ export class Editor {
 export async function open(box) {
   await addStyle('editor.css');
   box.classList.add('editor');
-  box.append(document.getElementById('layout-editor').content.cloneNode(true));
+  box.append(layout('layout-editor'));
   const editor = new Editor(await getJson('editor/schema'));
+  editor.drop = new DropDialog(box, editor);
   document.editor = editor; // for tests of the page
   await editor.start();
   return {};

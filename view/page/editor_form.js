@@ -12,6 +12,13 @@ export function make(tag, properties = {}, ...children) {
   return one;
 }
 
+/** A copy of a template of index.html. @param {string} id */
+export function layout(id) {
+  const template = document.getElementById(id);
+  if (!(template instanceof HTMLTemplateElement)) throw new Error(`${id} is no template`);
+  return template.content.cloneNode(true);
+}
+
 const button = (text, name, act, className = '') => {
   const one = make('button', { type: 'button', textContent: text, className });
   one.setAttribute('aria-label', name);

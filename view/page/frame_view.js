@@ -11,7 +11,7 @@ const VALUE_SCALE = 34;
 const STATISTICS_MS = 1000;
 const NUMBER = new Intl.NumberFormat('en', { maximumFractionDigits: 1 });
 
-/** An element by its id. @param {string} id */
+/** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 
 export class FrameView {
@@ -21,7 +21,9 @@ export class FrameView {
     this.overlay = element('overlay');
     const address = new URLSearchParams(location.search);
     this.painter = makePainter(this.canvas, address.has('plain'), address.has('webgl'));
+    /** @type {{ width: number, height: number, data: Uint16Array, binning?: number, frameWidth?: number, frameHeight?: number } | null} */
     this.image = null;
+    this.sensorWidth = this.sensorHeight = 0; // 0: unknown
     this.statistics = null;
     this.counted = 0; // time of the statistics
     this.details = null;
@@ -237,10 +239,13 @@ export class FrameView {
     context.clearRect(0, 0, width, height);
     const s = this.statistics;
     if (!s || !this.limits) return;
-    const from = s.low - 0.02 * (s.bright - s.low), to = Math.max(s.bright, from + 10) * 1.0, bins = new Float64Array(width);
+    const from = s.low - 0.02 * (s.bright - s.low), to = Math.max(s.bright, from + 10) * 1.0, bins = new Float64Array(width), values = new Float64Array(width);
     for (let value = Math.max(0, Math.floor(from)); value <= Math.min(65535, to); value++) {
-      bins[Math.min(width - 1, Math.max(0, Math.floor((value - from) / (to - from) * width)))] += s.counts[value];
+      const x = Math.min(width - 1, Math.max(0, Math.floor((value - from) / (to - from) * width)));
+      bins[x] += s.counts[value];
+      values[x] += 1;
     }
+    values.forEach((count, x) => { if (count > 1 && x < width - 1) bins[x] /= count; }); // columns have one number more or less
     const most = Math.log1p(Math.max(...bins)), style = getComputedStyle(document.documentElement);
     context.fillStyle = style.getPropertyValue('--faint');
     bins.forEach((count, x) => {

@@ -14,6 +14,7 @@ const REFUSAL_MS = 6000;
 /** Time before another attempt to connect, ms. */
 const RETRY_MS = 1000;
 
+/** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 
 export class Live {

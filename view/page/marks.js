@@ -152,7 +152,7 @@ export function drawCompass(context, wcs, view) {
   context.font = '600 12px system-ui, sans-serif';
   context.textAlign = 'center';
   context.textBaseline = 'middle';
-  for (const [direction, text] of [[north, 'N'], [east, 'E']]) {
+  for (const { direction, text } of [{ direction: north, text: 'N' }, { direction: east, text: 'E' }]) {
     line(x, y, x + 26 * direction.x, y + 26 * direction.y);
     drawText(context, text, x + 37 * direction.x, y + 37 * direction.y, colour);
   }

@@ -15,6 +15,7 @@ export class Panels {
   constructor(bar, area, app) {
     this.bar = bar;
     this.app = app;
+    /** @type {Map<string, { box: HTMLElement, panel: any, ready?: Promise<void> | null }>} */
     this.boxes = new Map([['frame', { box: area, panel: {} }]]);
     this.current = 'frame';
     bar.hidden = PANELS.length < 2;
@@ -40,7 +41,9 @@ export class Panels {
 
   /** Hides all other panels. @param {string[]} names */
   keep(names) {
-    for (const tab of this.bar.children) tab.hidden = !names.includes(tab.id.replace('tab-', ''));
+    /** @type {NodeListOf<HTMLElement>} */
+    const tabs = this.bar.querySelectorAll('button');
+    for (const tab of tabs) tab.hidden = !names.includes(tab.id.replace('tab-', ''));
   }
 
   /** True if keys belong to the frame. */
@@ -67,8 +70,11 @@ export class Panels {
     if (this.current === name && opened.shown) opened.shown();
   }
 
+  /** @param {{ name: string, title: string, module?: string }} panel */
   make({ name, title, module }) {
-    const box = document.createElement('main'), made = { box, panel: {}, ready: null };
+    const box = document.createElement('main');
+    /** @type {{ box: HTMLElement, panel: any, ready?: Promise<void> | null }} */
+    const made = { box, panel: {}, ready: null };
     box.className = 'panel';
     box.id = `panel-${name}`;
     box.setAttribute('aria-label', title);

@@ -9,6 +9,7 @@ const MODE_COLOURS = {
 };
 const OTHER_MODE = '#999933';
 
+/** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 
 /** Marks of an axis: round numbers, about `count` of them. */
@@ -249,6 +250,7 @@ export class Plots {
     element('range').textContent = `${shortNumber(this.range.from)} to ${shortNumber(this.range.to)} s`;
     this.draw();
     this.reloading = this.reload();
+    document.dispatchEvent(new CustomEvent('rangechanged'));
   }
 
   zoom(factor, centre = this.cursor) {

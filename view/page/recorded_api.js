@@ -5,7 +5,7 @@
 export class ServerError extends Error {}
 
 /** @type {Map<string, HTMLElement>} */
-const held = new Map([...document.querySelectorAll('script[data-key]')].map((one) => [one.dataset.key, one]));
+const held = new Map([.../** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll('script[data-key]'))].map((one) => [one.dataset.key, one]));
 /** What the page holds of the run: {space, sensors: [{rows, total, every, binning}]}. */
 let about = null;
 
@@ -55,7 +55,7 @@ async function spansAround(sensor, frame) {
 export async function getJson(route, query = {}) {
   const answer = JSON.parse(new TextDecoder().decode(await get(route, query)));
   if (route === 'session') about = answer.exported;
-  if (route === 'why' && answer.target) answer.spans = await spansAround(query.sensor, query.frame);
+  if (route === 'why' && answer.target) answer.spans = await spansAround(Number(query.sensor), Number(query.frame));
   return answer;
 }
 
@@ -64,7 +64,7 @@ export async function getBytes(route) { return get(route, {}); }
 
 /** 64-bit floating-point numbers. @param {string} route @param {Record<string, string | number>} query */
 export async function getNumbers(route, query) {
-  if (route === 'plot') return plotPart(new Float64Array(await get(route, { sensor: query.sensor, panel: query.panel })), query);
+  if (route === 'plot') return plotPart(new Float64Array(await get(route, { sensor: query.sensor, panel: query.panel })), { from: Number(query.from), to: Number(query.to) });
   return new Float64Array(await get(route, query));
 }
 
@@ -93,7 +93,25 @@ export async function getPixels(sensor, frame) {
   return { width: Number(width), height: Number(height), data, binning: Number(binning), frameWidth, frameHeight };
 }
 
+/** Longest side of a small picture (BST_VIEW_THUMBNAIL_PX). */
+const THUMBNAIL_PX = 80;
+
+/** A small picture of a frame: peaks of bins of its pixels in this page. @param {number} sensor @param {number} frame */
+export async function getThumbnail(sensor, frame) {
+  const { width, height, data } = await getPixels(sensor, frame), n = Math.ceil(Math.max(width, height) / THUMBNAIL_PX);
+  const across = Math.ceil(width / n), peaks = new Uint16Array(across * Math.ceil(height / n));
+  for (let y = 0, k = 0; y < height; y++) {
+    for (let x = 0, row = across * Math.floor(y / n); x < width; x++, k++) {
+      const bin = row + Math.floor(x / n);
+      if (data[k] > peaks[bin]) peaks[bin] = data[k];
+    }
+  }
+  return { width: across, height: peaks.length / across, data: peaks };
+}
+
 /** The styles are in the page. */
 export async function addStyle() {}
+
+export async function postFile() { throw new ServerError('this page has no program behind it'); }
 
 export async function post() { throw new ServerError('this page has no program behind it'); }

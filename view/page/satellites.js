@@ -1,6 +1,6 @@
 // The dialog in which an orbit is chosen: a satellite of the catalogue by name, or a TLE that is pasted.
 import { post } from './api.js';
-import { make } from './editor_form.js';
+import { layout, make } from './editor_form.js';
 
 /** Reads an element set. @returns {{ name: string, line1: string, line2: string } | null} */
 export function readTle(text) {
@@ -15,7 +15,7 @@ export class SatelliteDialog {
   constructor(chosen) {
     this.chosen = chosen;
     this.dialog = make('dialog', { className: 'satellites' });
-    this.dialog.append(document.getElementById('layout-satellites').content.cloneNode(true));
+    this.dialog.append(layout('layout-satellites'));
     this.dialog.setAttribute('aria-labelledby', 'satellite-title');
     document.body.append(this.dialog);
     const element = (id) => this.dialog.querySelector(`#${id}`);

@@ -1,6 +1,6 @@
 // Values of a scenario: JSON pointers, and the small file that changes another one (docs/reference, "extends").
 
-/** @typedef {null | boolean | number | string | Json[] | { [key: string]: Json }} Json */
+/** @typedef {any} Json null, boolean, number, string, list or object of such values */
 
 const isObject = (value) => typeof value === 'object' && value !== null && !Array.isArray(value);
 

@@ -1,8 +1,10 @@
 // The panel of space: Earth, orbits, observers with their fields of view, targets, Sun and Moon at the time of the frame.
 import { addStyle, getBytes, getJson, getNumbers } from './api.js';
-import { make } from './editor_form.js';
+import { layout, make } from './editor_form.js';
+import { clearance, conesOf, coneShape, drawCones } from './space_cones.js';
 import { SpacePainter } from './space_gl.js';
 import * as math from './space_math.js';
+import { ShapePass } from './space_shape.js';
 
 /** Numbers of an answer (view/space.h). */
 const HEAD = 15, BODY = 6, POSE = 5;
@@ -13,7 +15,10 @@ const SUN_AT = 170;
 const FAR = 400;
 /** Bodies whose orbits and names are drawn. */
 const NAMED_MOST = 40;
+/** Distance of a close-up, radii of the object. */
+const CLOSE_RADII = 6;
 
+/** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 const km = (radii) => `${Math.round(radii * math.EARTH_M / 1000).toLocaleString('en')} km`;
 
@@ -25,11 +30,18 @@ export class SpaceView {
     this.camera = { azimuth: 0.6, elevation: 0.35, distance: 18 };
     this.time = 0;
     this.steps = new Map(); // states by number of the step
+    this.step = NaN; // of the states that are shown
+    /** @type {Float64Array | null} */
+    this.before = null; // states at its begin and end
+    /** @type {Float64Array | null} */
+    this.after = null;
+    this.orbitsAt = NaN;
     this.poses = [];
     this.shown = false;
     this.through = false;
     this.targets = new Set(scene.sensors.map((sensor) => sensor.object).filter((k) => k >= 0).map((k) => k + scene.observers.length));
     this.painter = new SpacePainter(element('space-image'));
+    this.shapes = new ShapePass(this.painter, app.exported ? [] : scene.shapes, () => this.draw());
     this.overlay = element('space-overlay');
     this.fillControls();
     this.listen();
@@ -38,6 +50,8 @@ export class SpaceView {
   fillControls() {
     const list = ['Earth', ...this.named().map((k) => this.names[k])], values = ['-1', ...this.named().map(String)];
     element('space-follow').replaceChildren(...list.map((name, k) => make('option', { value: values[k], textContent: name, dir: 'auto' })));
+    element('space-close').hidden = this.shapes.shapes.size === 0;
+    element('space-keep-out').parentElement.hidden = !this.scene.sensors.some((sensor) => sensor.keep_out);
     element('space-time').max = String(this.scene.span_s || 1);
     if (this.scene.total > this.scene.objects.length) element('space-stage').title = `The first ${this.scene.objects.length} of ${this.scene.total} objects are shown.`;
   }
@@ -51,8 +65,9 @@ export class SpaceView {
 
   listen() {
     const redraw = () => this.draw();
-    for (const id of ['space-orbits', 'space-fields', 'space-names', 'space-shadow']) element(id).addEventListener('change', redraw);
+    for (const id of ['space-orbits', 'space-fields', 'space-names', 'space-shadow', 'space-keep-out']) element(id).addEventListener('change', redraw);
     element('space-follow').addEventListener('change', () => this.setThrough(false));
+    element('space-close').addEventListener('click', () => this.setClose(!this.isClose()));
     element('space-through').addEventListener('click', () => this.setThrough(!this.through));
     element('space-time').addEventListener('input', () => this.goTo(Number(element('space-time').value), true));
     document.addEventListener('frameshown', () => { if (this.shown) this.follow(); });
@@ -80,7 +95,7 @@ export class SpaceView {
     const actions = {
       ArrowLeft: () => this.turn(-0.1, 0), ArrowRight: () => this.turn(0.1, 0), ArrowUp: () => this.turn(0, 0.1), ArrowDown: () => this.turn(0, -0.1),
       '+': () => this.zoom(0.8), '=': () => this.zoom(0.8), '-': () => this.zoom(1.25), ',': () => this.goTo(this.time - step, true), '.': () => this.goTo(this.time + step, true),
-      f: () => element('space-follow').focus(), t: () => this.setThrough(!this.through),
+      f: () => element('space-follow').focus(), t: () => this.setThrough(!this.through), z: () => this.setClose(!this.isClose()),
     };
     if (!actions[event.key]) return;
     actions[event.key]();
@@ -94,8 +109,35 @@ export class SpaceView {
   }
 
   zoom(by) {
-    this.camera.distance = Math.min(200, Math.max(0.002, this.camera.distance * by));
+    const least = 1.5 * this.shapes.radiusOf(this.followedObject()) || 0.002;
+    this.camera.distance = Math.min(200, Math.max(least, this.camera.distance * by));
     this.draw();
+  }
+
+  /** Index of the object in the middle; below 0: something else. */
+  followedObject() { return Number(element('space-follow').value) - this.scene.observers.length; }
+
+  isClose() {
+    const radius = this.shapes.radiusOf(this.followedObject());
+    return !this.through && radius > 0 && this.camera.distance < 100 * radius;
+  }
+
+  /** Goes near an object with a shape, the sensor's target first, or away from it. */
+  setClose(on) {
+    const sensor = this.scene.sensors[this.app.sensor], list = element('space-follow');
+    const [first] = [this.followedObject(), sensor ? sensor.object : -1, ...this.shapes.shapes.keys()].filter((object) => this.shapes.radiusOf(object) > 0);
+    if (first === undefined) return;
+    if (on) {
+      const value = String(first + this.scene.observers.length);
+      if (![...list.options].some((one) => one.value === value)) list.append(make('option', { value, textContent: this.scene.objects[first], dir: 'auto' }));
+      list.value = value;
+    }
+    this.camera.distance = on ? CLOSE_RADII * this.shapes.radiusOf(first) : 4;
+    if (on) { // its lit side, with the Sun beside the camera
+      const sun = math.unit([...this.before.slice(0, 3)]);
+      Object.assign(this.camera, { azimuth: Math.atan2(sun[1], sun[0]) + 0.7, elevation: Math.asin(sun[2]) + 0.3 });
+    }
+    this.setThrough(false);
   }
 
   setThrough(on) {
@@ -199,18 +241,25 @@ export class SpaceView {
     if (pose) {
       const [first, , , last] = sensor.corners, forward = math.turnedBack(pose, [0, 0, 1]), up = math.turnedBack(pose, math.add(first, last, -1));
       const field = Math.min(2, Math.max(3 * math.length(math.add(first, last, -1)), 0.002));
-      return { eye: this.placeOf(sensor.observer), matrix: math.product(math.perspective(field, width / height, 1e-3, FAR), math.looking(forward, up)) };
+      const turned = math.looking(forward, up), eye = this.placeOf(sensor.observer), near = Math.min(1e-3, 0.1 * this.rangeOf(sensor, eye));
+      return { eye, field, turned, matrix: math.product(math.perspective(field, width / height, near, FAR), turned) };
     }
     const { azimuth, elevation, distance } = this.camera;
     const back = [Math.cos(elevation) * Math.cos(azimuth), Math.cos(elevation) * Math.sin(azimuth), Math.sin(elevation)];
     const eye = math.add(centre.some(Number.isNaN) ? [0, 0, 0] : centre, back, followed < 0 ? Math.max(distance, 1.05) : distance);
-    return { eye, matrix: math.product(math.perspective(0.75, width / height, Math.max(1e-4, 0.01 * distance), FAR), math.looking(math.scaled(back, -1), [0, 0, 1])) };
+    const field = 0.75, turned = math.looking(math.scaled(back, -1), [0, 0, 1]);
+    return { eye, field, turned, matrix: math.product(math.perspective(field, width / height, Math.max(1e-4, 0.01 * distance), FAR), turned) };
+  }
+
+  /** Distance of a sensor's target, Earth radii. */
+  rangeOf(sensor, eye) {
+    return sensor.object >= 0 ? math.length(math.add(this.placeOf(sensor.object + this.scene.observers.length), eye, -1)) || 1 : 1;
   }
 
   draw() {
     const stage = element('space-stage'), width = stage.clientWidth, height = stage.clientHeight;
     if (!this.shown || !this.before || width === 0) return;
-    const ratio = window.devicePixelRatio || 1, { eye, matrix } = this.view(width, height), { painter } = this;
+    const ratio = window.devicePixelRatio || 1, camera = this.view(width, height), { eye, matrix } = camera, { painter } = this;
     const sun = math.unit([...this.before.slice(0, 3)]), moon = math.scaled([...this.before.slice(3, 6)], 1 / math.EARTH_M);
     painter.begin(Math.round(width * ratio), Math.round(height * ratio), matrix, eye);
     const earth = [...this.before.slice(6, 15)];
@@ -219,11 +268,33 @@ export class SpaceView {
     painter.draw('points', [...math.scaled(sun, SUN_AT)], [1, 0.86, 0.35, 1]);
     painter.draw('points', moon, [0.8, 0.82, 0.85, 1]);
     painter.drawBodies(this.share(), STEP_S, 3 * ratio, [0.62, 0.7, 0.78, 1], [0.9, 0.62, 0, 1]);
-    if (element('space-orbits').checked) this.drawOrbits();
-    if (element('space-fields').checked) this.drawFields();
+    const close = this.isClose(); // the shape alone, with what is far away
+    if (element('space-orbits').checked && !close) this.drawOrbits();
+    if (element('space-fields').checked && !close) this.drawFields();
     if (element('space-shadow').checked) this.drawShadow(sun);
-    this.drawNames(matrix, eye, width, height, ratio, { sun: math.scaled(sun, SUN_AT), moon });
-    this.describe(moon);
+    const cones = this.conesNow(sun, moon), shape = this.drawShape(sun, { ...camera, aspect: width / height }, cones);
+    element('space-close').setAttribute('aria-pressed', String(this.isClose()));
+    this.drawNames(matrix, eye, width, height, ratio, { sun: math.scaled(sun, SUN_AT), moon, cones, shape });
+    this.describe(moon, cones, shape);
+  }
+
+  /** What the page's sensor keeps away from. */
+  conesNow(sun, moon) {
+    const sensor = this.scene.sensors[this.app.sensor];
+    if (!sensor || !sensor.keep_out || sensor.observer < 0) return [];
+    const eye = this.placeOf(sensor.observer);
+    return eye.some(Number.isNaN) ? [] : conesOf(sensor.keep_out, eye, sun, moon);
+  }
+
+  /** Draws keep-out cones, then over all else the shape that is near. */
+  drawShape(sun, camera, cones) {
+    const sensor = this.scene.sensors[this.app.sensor], observer = sensor && sensor.observer >= 0 ? this.placeOf(sensor.observer) : null;
+    if (cones.length && !this.through && !this.isClose() && element('space-keep-out').checked) drawCones(this.painter, observer, cones);
+    const object = this.through && sensor ? sensor.object : this.followedObject();
+    if (!(this.shapes.radiusOf(object) > 0)) return null;
+    const place = this.placeOf(object + this.scene.observers.length);
+    const drawn = this.shapes.draw(object, { sensor: this.app.sensor, time: this.time, sun, place, observer: this.through ? null : observer }, camera);
+    return drawn && { ...drawn, object, place };
   }
 
   drawOrbits() {
@@ -278,16 +349,27 @@ export class SpaceView {
       context.fillStyle = colour;
       context.fillText(name, at.x + 8, at.y);
     };
-    for (const body of this.named()) {
+    const near = Boolean(bodies.shape && !this.through); // only what its lines are
+    for (const body of near ? [] : this.named()) {
       const place = this.placeOf(body);
       if (!place.some(Number.isNaN) && !math.hidden(eye, place)) write(this.names[body], place, body < this.scene.observers.length ? '#8fd0f5' : '#f0b95a');
+    }
+    if (near) {
+      const { ends, place, sunlit } = bodies.shape, sensor = this.scene.sensors[this.app.sensor];
+      write(sunlit > 0 ? 'Sun' : 'Sun, behind the Earth', math.add(place, ends.sun), '#ffe08a');
+      if (ends.eye) write(this.scene.observers[sensor.observer], math.add(place, ends.eye), '#8fd0f5');
+      return;
+    }
+    if (!this.through && element('space-keep-out').checked) {
+      const sensor = this.scene.sensors[this.app.sensor];
+      for (const cone of bodies.cones) write(`${cone.name} keep-out`, coneShape(this.placeOf(sensor.observer), cone).top, '#c8cfd6');
     }
     if (!math.hidden(eye, bodies.sun)) write('Sun', bodies.sun, '#ffe08a');
     if (!math.hidden(eye, bodies.moon)) write('Moon', bodies.moon, '#d3d8de');
   }
 
   /** The geometry of the sensor's target in words. */
-  describe(moon) {
+  describe(moon, cones, shape) {
     const sensor = this.scene.sensors[this.app.sensor], parts = [];
     const pair = (key, text) => parts.push(make('span', {}, make('span', { className: 'key', textContent: key }), text));
     if (sensor && sensor.observer >= 0) {
@@ -302,7 +384,17 @@ export class SpaceView {
         pair('Moon', degrees(way, math.add(moon, eye, -1)));
         pair('Phase angle', degrees(sun, math.scaled(way, -1)));
       }
+      const q = this.poseOf(this.app.sensor), boresight = q && math.turnedBack(q, [0, 0, 1]);
+      for (const cone of boresight ? cones : []) {
+        const angle = clearance(cone, boresight), degree = (value) => `${(value * 180 / Math.PI).toFixed(1)}°`;
+        pair(`Boresight from the ${cone.from}`, `${degree(angle)}, ${angle < cone.limit ? 'inside' : 'outside'} the keep-out of ${degree(cone.limit)}`);
+      }
     }
+    if (shape) {
+      pair('Sunlight', `${Math.round(100 * shape.sunlit)} %`);
+      pair('Attitude', shape.recorded ? 'as recorded in this frame' : 'of the scenario at this time');
+    }
+    for (const { problem } of this.shapes.shapes.values()) if (problem) pair('Shape', problem);
     element('space-readout').replaceChildren(...parts);
   }
 }
@@ -311,7 +403,7 @@ export class SpaceView {
 export async function open(box, app) {
   await addStyle('space.css');
   box.classList.add('space');
-  box.append(document.getElementById('layout-space').content.cloneNode(true));
+  box.append(layout('layout-space'));
   const view = new SpaceView(app, await getJson('space/scene'));
   view.poses = await Promise.all(view.scene.sensors.map((_, sensor) => getNumbers('space/poses', { sensor })));
   view.painter.setCoast(math.coastSegments(await getBytes('space/coast')));

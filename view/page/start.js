@@ -1,6 +1,7 @@
 // The start page: runs of the folder runs/, and the scenarios that come with the program.
 import { getJson, post } from './api.js';
 
+/** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 
 function card(title, words, picture, act) {

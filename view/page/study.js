@@ -3,6 +3,7 @@ import { addStyle, getJson, post } from './api.js';
 import { make } from './editor_form.js';
 import { shortNumber, ticksOf } from './plots.js';
 
+/** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 const LEFT = 64, RIGHT = 16, TOP = 12, BOTTOM = 40;
 /** Figures that the table begins with. */

@@ -46,15 +46,23 @@ static bst_status collect(bst_ctx *ctx, const bst_satellite_pose *p, triangles *
     return BST_OK;
 }
 
-/* Appends a material: base colour from the reflectances at 0.70, 0.55 and 0.40 um. */
-static void put_material(cJSON *list, const bst_material *m) {
+void bst_turntable_colour(const bst_material *m, double rgb[3]) {
     double seen = m->brdf.diffuse + m->brdf.specular + m->brdf.volume;
     double level = m->scale * (seen > 0.0 ? seen : bst_brdf_reflectance(&m->brdf, 0.7));
+    for (int k = 0; k < 3; k++) {
+        rgb[k] = fmin(level * m->colour[2 - k], 1.0);
+    }
+}
+
+/* Appends a material. */
+static void put_material(cJSON *list, const bst_material *m) {
+    double rgb[3];
+    bst_turntable_colour(m, rgb);
     cJSON *item = cJSON_CreateObject(),
           *pbr = cJSON_AddObjectToObject(item, "pbrMetallicRoughness");
     cJSON *colour = cJSON_AddArrayToObject(pbr, "baseColorFactor");
-    for (int k = 2; k >= 0; k--) {
-        cJSON_AddItemToArray(colour, cJSON_CreateNumber(fmin(level * m->colour[k], 1.0)));
+    for (int k = 0; k < 3; k++) {
+        cJSON_AddItemToArray(colour, cJSON_CreateNumber(rgb[k]));
     }
     cJSON_AddItemToArray(colour, cJSON_CreateNumber(1.0));
     cJSON_AddNumberToObject(pbr, "metallicFactor", m->brdf.specular > 0.3 ? 1.0 : 0.0);

@@ -14,6 +14,9 @@
 bst_status bst_turntable_draw(bst_ctx *ctx, const bst_satellite *satellite, const char *path,
                               int size_px) BST_MUST_CHECK;
 
+/* Colour of a material: its reflectances at 0.70, 0.55 and 0.40 um, 0 to 1. */
+void bst_turntable_colour(const bst_material *material, double rgb[3]);
+
 /* Writes the model as GLB (glTF 2.0, binary): all facets as triangles, by material, joints as in
  * bst_satellite_pose_create; y up, as glTF asks.
  *
