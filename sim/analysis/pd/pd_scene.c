@@ -64,7 +64,8 @@ static bst_status read_psf(bst_ctx *ctx, bst_pd_scene *s) {
 /* Noise of a pixel without source. */
 static double noise_at(const bst_pd_scene *s, double x_px, double y_px) {
     double sky_e = s->sky ? bst_pd_sky_e(s->sky, x_px, y_px) : s->sky_e;
-    return bst_camera_noise_e(&s->camera, sky_e, s->exposure_s);
+    double shot_e2 = bst_camera_excess_noise(&s->camera) * (sky_e + s->dark_e);
+    return sqrt(shot_e2 + s->camera.read_noise_e * s->camera.read_noise_e);
 }
 
 /* Evaluates the scenario's sky for its level at the boresight. */
