@@ -32,8 +32,7 @@ static double noise(unsigned *seed) {
 
 /* Fills 0.5 s: a straight way of (dx, dy) px, a roll, and jitter of rms px per axis, by the sum of
  * sines between 5 and 200 Hz. */
-static void fill(scene *s, double dx, double dy, double roll, double rms) {
-    unsigned seed = 7;
+static void fill_seeded(scene *s, double dx, double dy, double roll, double rms, unsigned seed) {
     double a[2][20], f[20], p[2][20];
     for (int k = 0; k < 20; k++) {
         f[k] = 5 + 195.0 * k / 19;
@@ -52,6 +51,10 @@ static void fill(scene *s, double dx, double dy, double roll, double rms) {
         }
         push(s->history, tick, turned(s->target, dx * u + j[0], dy * u + j[1], roll * u));
     }
+}
+
+static void fill(scene *s, double dx, double dy, double roll, double rms) {
+    fill_seeded(s, dx, dy, roll, rms, 7);
 }
 
 /* Where the source is at many instants of the exposure, with equal weights. */
@@ -176,6 +179,35 @@ static void snr_is_that_of_the_smeared_image(void **state) {
             expect_snr(&s, &s.sources[i], variance, 0.02);
         }
     }
+    free_scene(&s);
+}
+
+/* Streaks with strong jitter: their ends are places of the jitter, which is not the length. */
+static void snr_of_shaken_streaks(void **state) {
+    (void)state;
+    scene s = make_scene(GX5);
+    const double cases[][3] = {/* dx, dy, jitter rms px */ {8, 1, 1}, {2, 0, 0.7}, {0, 0, 1}};
+    double worst = 0.0;
+    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+        double sum = 0.0;
+        enum { SEEDS = 12 };
+        for (unsigned seed = 1; seed <= SEEDS; seed++) {
+            fill_seeded(&s, cases[c][0], cases[c][1], 0, cases[c][2], seed);
+            query(&s, 3000, full);
+            const bst_scene_source *source = &s.sources[0];
+            double variance = s.truth.background_e + s.truth.dark_e + 64;
+            int n = dense_track(&s, source, x_of, y_of);
+            double squared =
+                brute_squared_image(n, bst_camera_psf_sigma_px(bst_world_camera(s.world, 0, 0)));
+            bst_truth_item item;
+            bst_field_truth_item(s.field, &s.track, source, full, 1, &s.truth, &item);
+            double off = item.snr / (item.electrons * sqrt(squared / variance)) - 1.0;
+            sum += off / SEEDS;
+            worst = fmax(worst, fabs(off));
+        }
+        bst_assert_close(sum, 0, 0.02);
+    }
+    bst_assert_close(worst, 0, 0.05);
     free_scene(&s);
 }
 
@@ -496,6 +528,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(mean_places_are_those_of_the_light),
         cmocka_unit_test(snr_is_that_of_the_smeared_image),
+        cmocka_unit_test(snr_of_shaken_streaks),
         cmocka_unit_test(snr_falls_with_multiplied_noise),
         cmocka_unit_test(snr_of_bent_streaks),
         cmocka_unit_test(truth_follows_the_optics),

@@ -42,7 +42,7 @@ static void light_on_a_crooked_track(void **state) {
     static const double parts[][2] = {{0, 1}, {0.2, 0.7}, {0, 0.4}, {0.6, 1}};
     for (int p = 0; p < 8; p++) {
         const bst_scene_source *s = p < 4 ? &brighter : &steady;
-        double u0 = parts[p % 4][0], u1 = parts[p % 4][1], w = 0, m[5] = {0};
+        double u0 = parts[p % 4][0], u1 = parts[p % 4][1], w = 0, m[9] = {0};
         enum { N = 200000 };
         for (int i = 0; i < N; i++) {
             double u = u0 + (u1 - u0) * (i + 0.5) / N, r = p < 4 ? 0.5 + u : 1;
@@ -53,8 +53,13 @@ static void light_on_a_crooked_track(void **state) {
             m[2] += r * x * x;
             m[3] += r * x * y;
             m[4] += r * y * y;
+            double t = (i + 0.5) / N - 0.5;
+            m[5] += r * t;
+            m[6] += r * t * t;
+            m[7] += r * t * x;
+            m[8] += r * t * y;
         }
-        for (int i = 0; i < 5; i++) {
+        for (int i = 0; i < 9; i++) {
             m[i] /= w;
         }
         bst_scene_image_moments got = bst_scene_image_by_light(&camera, &track, s, u0, u1);
@@ -64,6 +69,10 @@ static void light_on_a_crooked_track(void **state) {
         bst_assert_close(got.xx, m[2] - m[0] * m[0], 0.08);
         bst_assert_close(got.xy, m[3] - m[0] * m[1], 0.08);
         bst_assert_close(got.yy, m[4] - m[1] * m[1], 0.08);
+        /* the straight path nearest to it */
+        double spread = m[6] - m[5] * m[5];
+        bst_assert_close(got.dx, (m[7] - m[5] * m[0]) / spread, 0.05);
+        bst_assert_close(got.dy, (m[8] - m[5] * m[1]) / spread, 0.05);
     }
 }
 
@@ -102,7 +111,7 @@ static void a_disc_moves_and_widens_the_image(void **state) {
         const bst_mat3 rows = {{{cross_x.x, cross_x.y, cross_x.z},
                                 {cross_y.x, cross_y.y, cross_y.z},
                                 {ahead.x, ahead.y, ahead.z}}};
-        bst_scene_image_moments m = {10, -7, 3, -2, 5};
+        bst_scene_image_moments m = {10, -7, 3, -2, 5, 0, 0};
         bst_scene_image_add_disc(&camera, bst_quat_from_mat3(&rows), &s, &m);
         /* 24 rings of 48 places on a radius of 20 px */
         bst_assert_close(m.x_mean, 10 + ex, 0.05);
@@ -111,7 +120,7 @@ static void a_disc_moves_and_widens_the_image(void **state) {
         bst_assert_close(m.xy, -2 + xy - ex * ey, 0.8);
         bst_assert_close(m.yy, 5 + yy - ey * ey, 0.8);
         /* behind the camera nothing changes */
-        bst_scene_image_moments same = {10, -7, 3, -2, 5};
+        bst_scene_image_moments same = {10, -7, 3, -2, 5, 0, 0};
         s.apparent_mid = bst_vec3_scale(ahead, -1);
         bst_scene_image_add_disc(&camera, bst_quat_from_mat3(&rows), &s, &same);
         assert_true(same.x_mean == 10 && same.y_mean == -7 && same.xx == 3 && same.yy == 5);
@@ -125,7 +134,7 @@ static void vignetting_moves_the_light(void **state) {
     camera.optics.vignetting.model = BST_VIGNETTING_POLYNOMIAL;
     camera.optics.vignetting.coefficients[0] = -0.5;
     const bst_scene_source s = {.apparent_mid = {0, 0, 1}};
-    const bst_scene_image_moments m = {330, 40, 9, -4, 6};
+    const bst_scene_image_moments m = {330, 40, 9, -4, 6, 0, 0};
     double half2 = 0.25 * (400.0 * 400 + 300.0 * 300), dx = 330 - 199.5, dy = 40 - 149.5;
     double v = 1 - 0.5 * (dx * dx + dy * dy) / half2;
     double gx = -dx / half2 / v, gy = -dy / half2 / v, psf = 4 / (8 * log(2.0));
@@ -137,7 +146,7 @@ static void vignetting_moves_the_light(void **state) {
     camera.optics.vignetting.model = BST_VIGNETTING_NONE;
     bst_scene_image_centroid(&camera, &s, &m, &x, &y);
     assert_true(x == 330 && y == 40);
-    const bst_scene_image_moments nowhere = {NAN, 40, 0, 0, 0};
+    const bst_scene_image_moments nowhere = {NAN, 40, 0, 0, 0, 0, 0};
     bst_scene_image_centroid(&camera, &s, &nowhere, &x, &y);
     assert_true(isnan(x) && y == 40);
 }

@@ -14,7 +14,7 @@ bst_scene_image_moments bst_scene_image_by_light(const bst_camera *camera,
     double duration = track->time_s[track->count - 1];
     int sample = 0;
     int count = 2 * track->count < 128 ? 128 : 2 * track->count < 2048 ? 2 * track->count : 2048;
-    double xx = 0.0, xy = 0.0, yy = 0.0;
+    double xx = 0.0, xy = 0.0, yy = 0.0, t = 0.0, tt = 0.0, tx = 0.0, ty = 0.0;
     for (int n = 0; n < count; n++) {
         double u = u0 + (u1 - u0) * ((n + 0.5) / count), x = NAN, y = NAN;
         double weight = (bst_scene_source_light(source, u0 + (u1 - u0) * ((n + 1.0) / count)) -
@@ -40,10 +40,16 @@ bst_scene_image_moments bst_scene_image_by_light(const bst_camera *camera,
         xx += weight * dx * dx;
         xy += weight * dx * dy;
         yy += weight * dy * dy;
+        double time = (n + 0.5) / count - 0.5;
+        t += weight * time;
+        tt += weight * time * time;
+        tx += weight * time * dx;
+        ty += weight * time * dy;
     }
-    double ex = m.xx, ey = m.xy;
-    return (bst_scene_image_moments){m.x_mean + ex, m.y_mean + ey, xx - ex * ex, xy - ex * ey,
-                                     yy - ey * ey};
+    double ex = m.xx, ey = m.xy, spread = fmax(tt - t * t, 1e-9); /* 1 / 12 of constant light */
+    return (bst_scene_image_moments){m.x_mean + ex,         m.y_mean + ey, xx - ex * ex,
+                                     xy - ex * ey,          yy - ey * ey,  (tx - t * ex) / spread,
+                                     (ty - t * ey) / spread};
 }
 
 void bst_scene_image_add_disc(const bst_camera *camera, bst_quat q_mid,
@@ -204,6 +210,35 @@ static double squared_light_of_path(const light_path *path, double v) {
     return total > 0.0 ? sum / (total * total) : NAN;
 }
 
+/* Variance that the bend of a path adds to that of its straight part, both axes: the bend is its
+ * part in 6 s^2 - 1/2, where s is the time from -1/2 to 1/2. */
+static double bend_variance(const light_path *path, const bst_scene_image_moments *m) {
+    double x = 0.0, y = 0.0, square = 0.0;
+    for (int k = 0; k <= path->count; k++) {
+        double s = (double)k / path->count - 0.5, bent = 6.0 * s * s - 0.5;
+        double weight = k == 0 || k == path->count ? 0.5 : 1.0;
+        x += weight * bent * (path->x[k] - m->x_mean - s * m->dx);
+        y += weight * bent * (path->y[k] - m->y_mean - s * m->dy);
+        square += weight * bent * bent;
+    }
+    return 0.2 * (x * x + y * y) / (square * square);
+}
+
+/* Variance of the light along the straight pieces of a path, both axes. */
+static double variance_of_path(const light_path *path) {
+    double total = 0.0, x = 0.0, y = 0.0, square = 0.0;
+    for (int k = 0; k < path->count; k++) {
+        double ax = path->x[k] - path->x[0], bx = path->x[k + 1] - path->x[0];
+        double ay = path->y[k] - path->y[0], by = path->y[k + 1] - path->y[0];
+        total += path->light[k];
+        x += 0.5 * path->light[k] * (ax + bx);
+        y += 0.5 * path->light[k] * (ay + by);
+        square +=
+            path->light[k] / 3.0 * (ax * ax + ax * bx + bx * bx + ay * ay + ay * by + by * by);
+    }
+    return (square - (x * x + y * y) / total) / total;
+}
+
 double bst_scene_image_squared_path(const bst_camera *camera, const bst_los_track *track,
                                     const bst_scene_source *source, const double u01[2],
                                     const bst_scene_image_moments *moments, double excess_px2,
@@ -211,19 +246,37 @@ double bst_scene_image_squared_path(const bst_camera *camera, const bst_los_trac
     enum { COARSE = 8, FEWEST = 20 };
     const double piece_px = 3.0;
     light_path path;
-    /* few positions suffice to detect strong jitter */
-    if (!path_in_pieces(camera, track, source, u01, COARSE, &path) ||
-        roughness(path.x, path.y, COARSE + 1) > 0.5 * excess_px2) {
+    /* few positions suffice to detect strong jitter about a straight streak: its noise in the bend
+     * of nine positions adds a ninth of its variance */
+    const double bent = 0.05, noise = 0.25;
+    if (!path_in_pieces(camera, track, source, u01, COARSE, &path)) {
+        return NAN;
+    }
+    if (roughness(path.x, path.y, COARSE + 1) > 0.5 * excess_px2 &&
+        bend_variance(&path, moments) < bent * variance_px2 + noise * excess_px2) {
         return NAN;
     }
     /* pieces of a straight path with these moments */
     double wanted = sqrt(12.0 * (moments->xx + moments->yy)) / piece_px;
     int count = wanted < FEWEST ? FEWEST : wanted < MOST_PIECES ? (int)wanted : MOST_PIECES;
-    if (!path_in_pieces(camera, track, source, u01, count, &path) ||
-        roughness(path.x, path.y, count + 1) > 0.5 * excess_px2) {
+    if (!path_in_pieces(camera, track, source, u01, count, &path)) {
         return NAN;
     }
+    double jitter = roughness(path.x, path.y, count + 1);
+    if (jitter > 0.25 * excess_px2) {
+        double missing = moments->xx + moments->yy - variance_of_path(&path);
+        variance_px2 += 0.5 * fmin(fmax(missing, 0.0), jitter);
+    }
     return squared_light_of_path(&path, variance_px2);
+}
+
+void bst_image_spread(double variance, const bst_scene_image_moments *m, double dx, double dy,
+                      double *along, double *across) {
+    double length = hypot(dx, dy);
+    double c = length > 0.0 ? dx / length : 1.0, s = length > 0.0 ? dy / length : 0.0;
+    double uu = m->xx * c * c + 2.0 * m->xy * c * s + m->yy * s * s;
+    *along = sqrt(variance + fmax(uu - length * length / 12.0, 0.0));
+    *across = sqrt(variance + fmax(m->xx + m->yy - uu, 0.0));
 }
 
 double bst_image_blur(const bst_camera *camera, const bst_scene_source *source,
@@ -234,10 +287,7 @@ double bst_image_blur(const bst_camera *camera, const bst_scene_source *source,
         psf = bst_psf_coloured_fwhm_px(camera->psf, source->colour, m->x_mean, m->y_mean) /
               BST_FWHM_PER_SIGMA;
     }
-    double variance = psf * psf + 1.0 / 12.0, length = hypot(dx, dy);
-    double c = length > 0.0 ? dx / length : 1.0, s = length > 0.0 ? dy / length : 0.0;
-    double uu = m->xx * c * c + 2.0 * m->xy * c * s + m->yy * s * s;
-    *along = sqrt(variance + fmax(uu - length * length / 12.0, 0.0));
-    *across = sqrt(variance + fmax(m->xx + m->yy - uu, 0.0));
+    double variance = psf * psf + 1.0 / 12.0;
+    bst_image_spread(variance, m, dx, dy, along, across);
     return variance;
 }

@@ -23,6 +23,10 @@ static bst_scene_image_moments smear_of(const bst_field *field, const bst_scene_
         m.xx += dx * dx / (BST_FIELD_SIGMA_POINTS - 1);
         m.xy += dx * dy / (BST_FIELD_SIGMA_POINTS - 1);
         m.yy += dy * dy / (BST_FIELD_SIGMA_POINTS - 1);
+        /* the exposure's time has the mean 1 / 2 and the variance 1 / 12 */
+        double time = 12.0 * (field->sigma_time[p] - 0.5) / (BST_FIELD_SIGMA_POINTS - 1);
+        m.dx += time * dx;
+        m.dy += time * dy;
     }
     return m;
 }
@@ -109,6 +113,29 @@ typedef struct image_width {
     double widened;       /* variance that binning adds */
 } image_width;
 
+/* The same of the straight streak nearest to the path, not of that between its ends: these are
+ * places of the jitter. */
+static image_width nearest_streak(const bst_scene_image_moments *image, const image_width *ends) {
+    image_width w = *ends;
+    w.length = hypot(image->dx, image->dy);
+    bst_image_spread(w.sharp, image, image->dx, image->dy, &w.along, &w.across);
+    return w;
+}
+
+/* Sum of squared pixel fractions of an image that jitter makes of a straight streak. */
+static double squared_light_shaken(const bst_camera *camera, const bst_scene_source *source,
+                                   const bst_scene_image_moments *image, bool plain,
+                                   const image_width *w) {
+    double along = w->along, across = w->across, widened = w->widened;
+    if (plain) {
+        return bst_optics_image_squared(sqrt(along * along + widened),
+                                        sqrt(across * across + widened), w->length);
+    }
+    double blurred = 0.5 * (along * along + across * across) - w->sharp + widened;
+    return bst_psf_squared_image(camera->psf, source->colour, image->x_mean, image->y_mean, blurred,
+                                 blurred, w->length);
+}
+
 /* Sum of squared pixel fractions of an image. `path`: moments without the source's disc. */
 static double squared_light(const bst_camera *camera, const bst_los_track *track,
                             const bst_scene_source *source, const double u[2],
@@ -126,7 +153,8 @@ static double squared_light(const bst_camera *camera, const bst_los_track *track
         square = bst_psf_squared_image(camera->psf, source->colour, image->x_mean, image->y_mean,
                                        blurred + widened, blurred + widened, drawn);
     }
-    double excess = along * along + across * across - 2.0 * sharp;
+    const image_width nearest = nearest_streak(image, w);
+    double excess = nearest.along * nearest.along + nearest.across * nearest.across - 2.0 * sharp;
     if (excess > BENT * (sharp + widened)) {
         /* the disc widens the path */
         double disc = 0.5 * fmax(image->xx + image->yy - path->xx - path->yy, 0.0);
@@ -134,6 +162,8 @@ static double squared_light(const bst_camera *camera, const bst_los_track *track
                                                     sharp + widened + disc);
         if (isfinite(exact)) {
             square = plain ? exact : square * exact / gauss;
+        } else {
+            square = squared_light_shaken(camera, source, image, plain, &nearest);
         }
     }
     return square;
