@@ -93,11 +93,12 @@ bst_status bst_persistence_archive(bst_persistence *p, bst_device *device,
     if (restoring) {
         const float *charge = copy;
         for (size_t i = 0; i < p->bytes / sizeof *charge; i++) {
-            if (!(charge[i] >= 0.0f && charge[i] < 1e9f)) {
+            double found_e = (double)charge[i];
+            if (!(found_e >= 0.0 && found_e < 1e9)) {
                 free(copy);
                 return bst_fail(ctx, BST_ERR_FORMAT,
                                 "the saved state has a trapped charge of %g e- (allowed: 0 to 1e9)",
-                                (double)charge[i]);
+                                found_e);
             }
         }
         status = bst_device_check(
