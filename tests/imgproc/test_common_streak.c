@@ -155,7 +155,7 @@ static void nothing_to_find(void **state) {
 /* A path of 1,002 samples is too long to be measured on several stars: its ends are not certain. */
 static void ends_of_a_long_path(void **state) {
     (void)state;
-    enum { WIDTH = 2100, HEIGHT = 110 };
+    enum { WIDTH = 2100, HEIGHT = 60 };
     static float pixels[WIDTH * HEIGHT];
     bst_ctx ctx = {0};
     bst_rng_key key = bst_rng_make_key(4, 0, "test", "noise");
@@ -163,7 +163,7 @@ static void ends_of_a_long_path(void **state) {
         pixels[i] = (float)bst_rng_normal(key, i, 0);
     }
     for (int x = 40; x < 2040; x++) {
-        double middle = 20.0 + 0.035 * x;
+        double middle = 14.0 + 0.015 * x;
         for (int y = (int)middle - 5; y <= (int)middle + 5; y++) {
             pixels[y * WIDTH + x] += (float)(20.0 * exp(-(y - middle) * (y - middle) / 1.8));
         }
