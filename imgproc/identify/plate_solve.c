@@ -26,7 +26,6 @@ typedef struct attempt {
     const bst_plate_solve_options *options;
     bst_streak_finder *finder;
     bst_common_streak streak;
-    bst_star_path best; /* whose ends are the most certain */
     int width, height;
 } attempt;
 
@@ -52,14 +51,11 @@ static bst_status solve_path(attempt *a, const bst_star_path *path, int candidat
     return solve_middles(a, candidates, out);
 }
 
-/* Measures the path on the identified stars and solves again, until the streak keeps its length.
- * The path whose ends are the most certain is then taken. If no ends are certain they may lie in
- * the light of other stars, with the middle of the exposure in the wrong place: such a frame is not
- * solved. */
+/* Measures the path on the identified stars and solves again, until the streak keeps its length. If
+ * it never does, or its ends are not certain then, they may lie in the light of other stars, with
+ * the middle of the exposure in the wrong place: such a frame is not solved. */
 static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
-    double most = a->streak.ends_margin;
-    bool settled = false, last = true; /* last: the best path is that of the latest pass */
-    a->best = *bst_streak_finder_path(a->finder);
+    bool settled = false;
     for (int pass = 0; pass < PASSES && out->solved && !settled; pass++) {
         bool chosen[BST_PLATE_SOLVE_STARS];
         double before = length_px(&a->streak);
@@ -69,18 +65,9 @@ static bst_status improve(attempt *a, bst_lost_in_space_result *out) {
         BST_TRY(bst_streak_finder_repeat(a->ctx, a->finder, chosen, &a->streak));
         BST_TRY(solve_middles(a, BST_LOST_IN_SPACE_USUAL.max_candidates, out));
         settled = fabs(length_px(&a->streak) - before) < SAME_PX;
-        double margin = a->streak.ends_margin;
-        last = out->solved && (margin > most || (settled && margin > LEAST_MARGIN));
-        if (last) {
-            most = margin;
-            a->best = *bst_streak_finder_path(a->finder);
-        }
     }
-    if (most <= LEAST_MARGIN) {
-        out->solved = false;
-        return BST_OK;
-    }
-    return last ? BST_OK : solve_path(a, &a->best, BST_LOST_IN_SPACE_USUAL.max_candidates, out);
+    out->solved = out->solved && settled && a->streak.ends_margin > LEAST_MARGIN;
+    return BST_OK;
 }
 
 /* Measures the path on the brightest stars once more, if the frame is nearly solved. */

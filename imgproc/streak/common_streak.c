@@ -344,8 +344,8 @@ bst_status bst_streak_finder_measure(bst_ctx *ctx, bst_streak_finder *f, int ind
         return BST_OK;
     }
     note_path(f, &f->path);
+    f->path.margin[0] = f->path.margin[1] = 0.0; /* one source may end in another's light */
     *path = f->path;
-    path->margin[0] = path->margin[1] = 0.0; /* one source may end in another's light */
     BST_TRY(find_stars(ctx, f, &bright, &found));
     *quality = fit_quality(&found);
     refine_path(f, &found, NULL);

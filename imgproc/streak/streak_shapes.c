@@ -106,7 +106,8 @@ int bst_streak_finder_list_shapes(finder *f, shape out[BST_STREAK_SHAPES]) {
                 continue;
             }
             shape found = bst_streak_finder_flood(f, level, i, ++number);
-            if (f->count >= LEAST_PIXELS) {
+            bool any = found.x1 >= found.x0; /* pixels that its size is measured by */
+            if (f->count >= LEAST_PIXELS && any) {
                 count = add_shape(out, count, &found);
             }
         }

@@ -180,6 +180,7 @@ static bool is_far_behind(const bst_facet_layers *l, const bst_layers_border *b,
 bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *l, const bst_layers_box *box,
                                          const bst_layers_outline *own, const double plane[3]) {
     const int *at = l->bins[box->facet];
+    const bool apart = l->net->apart[box->facet];
     bst_layers_cross found = BST_LAYERS_CROSS_NONE;
     for (int j = at[2]; j <= at[3]; j++) {
         int first = l->border_first[j * l->bins_x + at[0]];
@@ -187,15 +188,18 @@ bst_layers_cross bst_facet_borders_cross(const bst_facet_layers *l, const bst_la
         for (int n = first; n < end; n++) {
             const bst_layers_border *b = &l->borders[l->border_entries[n]];
             double t[2];
-            if (!boxes_meet(&b->box, box) || is_far_behind(l, b, own)) {
+            if (!boxes_meet(&b->box, box) ||
+                ((apart || found == BST_LAYERS_CROSS_BEHIND) && is_far_behind(l, b, own))) {
                 continue;
             }
             bst_layers_place place = bst_facet_borders_part(own->p, own->count, b->a, b->b, t);
-            if (place == BST_LAYERS_PLACE_TOUCHING) {
+            if (place == BST_LAYERS_PLACE_CROSSING) {
+                if (!is_behind(l, b, plane, t[0]) || !is_behind(l, b, plane, t[1])) {
+                    return BST_LAYERS_CROSS_BEFORE;
+                }
+                found = apart ? found : BST_LAYERS_CROSS_BEHIND;
+            } else if (place == BST_LAYERS_PLACE_TOUCHING && found == BST_LAYERS_CROSS_NONE) {
                 found = BST_LAYERS_CROSS_TOUCHING;
-            } else if (place == BST_LAYERS_PLACE_CROSSING &&
-                       (!is_behind(l, b, plane, t[0]) || !is_behind(l, b, plane, t[1]))) {
-                return BST_LAYERS_CROSS_BEFORE;
             }
         }
     }

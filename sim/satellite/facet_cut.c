@@ -201,9 +201,9 @@ static bst_layers_seen look_at_all(const bst_facet_layers *l, const bst_layers_b
     return seen;
 }
 
-/* What is seen of a facet without borders before it is what is seen of its neighbours of that kind:
- * finds one of which that is known. */
-static bst_layers_seen look_beside(const bst_facet_layers *l, int facet) {
+/* The visibility of a facet without borders before it is that of its neighbours of that kind: finds
+ * one whose visibility is known. */
+static bst_layers_seen visibility_of_neighbours(const bst_facet_layers *l, int facet) {
     for (int i = l->net->first[facet]; i < l->net->first[facet + 1]; i++) {
         uint8_t known = l->known[l->net->beside[i]];
         if (known) {
@@ -229,14 +229,17 @@ static bst_layers_seen look_within_borders(bst_facet_layers *l, const bst_layers
     }
     bool clear = cross == BST_LAYERS_CROSS_NONE && apart == BST_NET_FREE && l->within[box->facet];
     if (clear) {
-        seen = look_beside(l, box->facet);
+        seen = visibility_of_neighbours(l, box->facet);
     }
-    if (seen == BST_LAYERS_SEEN_UNKNOWN && border && bst_facet_borders_layers(l, own) == 1) {
+    /* a facet that crosses this one may hide a part of it at a place with one layer elsewhere; its
+     * borders then cross this one, perhaps behind it */
+    if (seen == BST_LAYERS_SEEN_UNKNOWN && border && cross != BST_LAYERS_CROSS_BEHIND &&
+        bst_facet_borders_layers(l, own) == 1) {
         seen = BST_LAYERS_SEEN_ALL;
     }
     if (seen == BST_LAYERS_SEEN_UNKNOWN) {
-        seen =
-            apart ? bst_facet_layers_look(l, box, plane, middle_of(own)) : look_at_all(l, box, own);
+        seen = apart ? bst_facet_layers_point_visibility(l, box, plane, middle_of(own))
+                     : look_at_all(l, box, own);
     }
     if (clear && seen != BST_LAYERS_SEEN_UNKNOWN) {
         l->known[box->facet] =

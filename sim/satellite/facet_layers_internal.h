@@ -18,11 +18,13 @@ typedef struct bst_layers_outline {
     double low[2], high[2], least, most; /* box, and nearness of the corners */
 } bst_layers_outline;
 
-/* How borders of layers are about a facet. Those behind it that cross it do not count. */
+/* How borders of layers are about a facet. */
 typedef enum bst_layers_cross {
     BST_LAYERS_CROSS_NONE,
     BST_LAYERS_CROSS_TOUCHING,
-    BST_LAYERS_CROSS_BEFORE /* some cross it and may be nearer */
+    BST_LAYERS_CROSS_BEHIND, /* some cross it, all of them behind it: not looked for if no other
+                                facet crosses it (`apart`) */
+    BST_LAYERS_CROSS_BEFORE  /* some cross it and may be nearer */
 } bst_layers_cross;
 
 /* Values of `known`: nothing hides any of the facet, or others hide all of it; no border before it
@@ -89,10 +91,11 @@ typedef enum bst_layers_seen {
     BST_LAYERS_SEEN_UNKNOWN
 } bst_layers_seen;
 
-/* Finds whether a place of a facet is seen. Unknown: another facet is as near, or the place is off
- * the grid. */
-bst_layers_seen bst_facet_layers_look(const bst_facet_layers *layers, const bst_layers_box *box,
-                                      const double plane[3], bst_point2 place);
+/* Finds the visibility of a place of a facet. Unknown: another facet is as near, or the place is
+ * off the grid. */
+bst_layers_seen bst_facet_layers_point_visibility(const bst_facet_layers *layers,
+                                                  const bst_layers_box *box, const double plane[3],
+                                                  bst_point2 place);
 /* True if a facet covers a place; its border does. */
 bool bst_facet_layers_covers(const bst_facet_layers *layers, int facet, bst_point2 place);
 /* Splits a facet that no other one crosses along the borders before it (facet_split.c). Unknown:

@@ -35,8 +35,9 @@ bool bst_facet_layers_covers(const bst_facet_layers *l, int facet, bst_point2 p)
     return covers(l, facet, p);
 }
 
-bst_layers_seen bst_facet_layers_look(const bst_facet_layers *l, const bst_layers_box *box,
-                                      const double plane[3], bst_point2 p) {
+bst_layers_seen bst_facet_layers_point_visibility(const bst_facet_layers *l,
+                                                  const bst_layers_box *box, const double plane[3],
+                                                  bst_point2 p) {
     if (!(p.x >= 0.0 && p.y >= 0.0 && p.x < l->width && p.y < l->height)) {
         return BST_LAYERS_SEEN_UNKNOWN;
     }
@@ -63,13 +64,17 @@ bst_layers_seen bst_facet_layers_look(const bst_facet_layers *l, const bst_layer
     return BST_LAYERS_SEEN_ALL;
 }
 
-/* Appends a corner that is not the one before it. */
-static void push(cell *to, bst_point2 p, double tiny) {
+/* Appends a corner that is not the one before it. False: there is no room. */
+static bool push(cell *to, bst_point2 p, double tiny) {
     if (to->count > 0 && fabs(to->p[to->count - 1].x - p.x) <= tiny &&
         fabs(to->p[to->count - 1].y - p.y) <= tiny) {
-        return;
+        return true;
+    }
+    if (to->count == CORNERS_MAX) {
+        return false;
     }
     to->p[to->count++] = p;
+    return true;
 }
 
 /* Closes a cell: its last corner is not its first one. */
@@ -90,26 +95,22 @@ static bool split(cell *c, bst_point2 a, bst_point2 b, double tiny, cell *other)
     if (bst_facet_borders_part(c->p, c->count, a, b, t) != BST_LAYERS_PLACE_CROSSING) {
         return true;
     }
-    if (c->count + 2 > CORNERS_MAX) {
-        return false;
-    }
     for (int i = 0; i < c->count; i++) {
         from[i] = bst_point2_left_of(a, b, c->p[i]);
     }
     for (int i = 0; i < c->count; i++) {
         int n = i + 1 < c->count ? i + 1 : 0;
-        if (from[i] >= 0.0) {
-            push(&left, c->p[i], tiny);
-        }
-        if (from[i] <= 0.0) {
-            push(other, c->p[i], tiny);
+        if ((from[i] >= 0.0 && !push(&left, c->p[i], tiny)) ||
+            (from[i] <= 0.0 && !push(other, c->p[i], tiny))) {
+            return false;
         }
         if ((from[i] < 0.0 && from[n] > 0.0) || (from[i] > 0.0 && from[n] < 0.0)) {
             double u = from[i] / (from[i] - from[n]);
             bst_point2 p = {c->p[i].x + u * (c->p[n].x - c->p[i].x),
                             c->p[i].y + u * (c->p[n].y - c->p[i].y)};
-            push(&left, p, tiny);
-            push(other, p, tiny);
+            if (!push(&left, p, tiny) || !push(other, p, tiny)) {
+                return false;
+            }
         }
     }
     close_cell(&left, tiny);
@@ -153,7 +154,7 @@ bst_layers_seen bst_facet_layers_split(bst_facet_layers *l, const bst_layers_box
             middle.x += c->p[k].x / c->count;
             middle.y += c->p[k].y / c->count;
         }
-        bst_layers_seen found = bst_facet_layers_look(l, box, plane, middle);
+        bst_layers_seen found = bst_facet_layers_point_visibility(l, box, plane, middle);
         if (found == BST_LAYERS_SEEN_UNKNOWN) {
             l->clip.piece_count = l->clip.point_count = 0;
             return found;

@@ -446,14 +446,15 @@ static void scheduler_close(void *self) {
 static bst_status quote_program(bst_ctx *ctx, const char *const program[],
                                 char out[COMMAND_BYTES]) {
     FILE *text = fmemopen(out, COMMAND_BYTES, "w");
-    for (; text && *program; program++) {
+    if (!text) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the command line of a shard");
+    }
+    for (; *program; program++) {
         bst_put_shell_word(text, *program);
         fputc(' ', text);
     }
-    bool whole = text && fputc('\0', text) == '\0' && fflush(text) == 0 && !ferror(text);
-    if (text) {
-        fclose(text);
-    }
+    bool whole = fputc('\0', text) == '\0' && fflush(text) == 0 && !ferror(text);
+    fclose(text);
     return whole ? BST_OK
                  : bst_fail(ctx, BST_ERR_ARGUMENT, "the command line of a shard is too long");
 }

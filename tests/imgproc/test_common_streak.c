@@ -152,12 +152,42 @@ static void nothing_to_find(void **state) {
     bst_streak_finder_free(finder);
 }
 
+/* A path of 1,002 samples is too long to be measured on several stars: its ends are not certain. */
+static void ends_of_a_long_path(void **state) {
+    (void)state;
+    enum { WIDTH = 2100, HEIGHT = 60 };
+    static float pixels[WIDTH * HEIGHT];
+    bst_ctx ctx = {0};
+    bst_rng_key key = bst_rng_make_key(4, 0, "test", "noise");
+    for (uint64_t i = 0; i < WIDTH * HEIGHT; i++) {
+        pixels[i] = (float)bst_rng_normal(key, i, 0);
+    }
+    for (int x = 40; x < 2040; x++) {
+        double middle = 14.0 + 0.015 * x;
+        for (int y = (int)middle - 5; y <= (int)middle + 5; y++) {
+            pixels[y * WIDTH + x] += (float)(20.0 * exp(-(y - middle) * (y - middle) / 1.8));
+        }
+    }
+    const bst_common_streak_options options = {.max_sources = 40, .least_snr = 15.0};
+    bst_streak_finder *finder;
+    bst_star_path found;
+    double quality;
+    bst_assert_ok(&ctx, bst_streak_finder_create(&ctx, pixels, WIDTH, HEIGHT, &options, &finder));
+    assert_true(bst_streak_finder_shapes(finder) >= 1);
+    bst_assert_ok(&ctx, bst_streak_finder_measure(&ctx, finder, 0, &found, &quality));
+    assert_true(quality > 0.0 && found.count > 1000);
+    bst_assert_close(found.margin[0], 0.0, 0.0);
+    bst_assert_close(found.margin[1], 0.0, 0.0);
+    bst_streak_finder_free(finder);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(points),
         cmocka_unit_test(curved_streaks),
         cmocka_unit_test(streaks_at_the_edge),
         cmocka_unit_test(nothing_to_find),
+        cmocka_unit_test(ends_of_a_long_path),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -207,6 +207,26 @@ static void edges_of_the_frame(void **state) {
     bst_assert_close(seen.y, 2.0, 0.0);
 }
 
+/* A faint source that only its lines show has no size, and is no candidate for the path. */
+static void sources_without_bright_pixels(void **state) {
+    (void)state;
+    static float lines[PIXELS];
+    static int label[PIXELS], stack[PIXELS];
+    bst_streak_shape shapes[BST_STREAK_SHAPES];
+    bst_streak_finder *f = make();
+    f->lines = lines;
+    f->label = label;
+    f->stack = stack;
+    for (int x = 20; x < 60; x++) {
+        lines[20 * WIDTH + x] = lines[40 * WIDTH + x] = 7.0F;
+        smooth[20 * WIDTH + x] = 2.9F;
+        smooth[40 * WIDTH + x] = 3.1F;
+    }
+    assert_int_equal(bst_streak_finder_list_shapes(f, shapes), 1);
+    assert_int_equal(shapes[0].x1 - shapes[0].x0, 39);
+    assert_int_equal(shapes[0].y0, 40);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_point_on_the_path_is_removed),
@@ -214,6 +234,7 @@ int main(void) {
         cmocka_unit_test(paths_of_bright_stars_cover),
         cmocka_unit_test(peaks_beyond_the_ends),
         cmocka_unit_test(edges_of_the_frame),
+        cmocka_unit_test(sources_without_bright_pixels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

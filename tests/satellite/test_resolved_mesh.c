@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include "sim/satellite/facet_layers.h"
 #include "sim/satellite/facet_net.h"
 #include "sim/satellite/resolved_image.h"
 #include "tests/satellite/satellite_support.h"
@@ -377,6 +378,46 @@ static void test_crossing_facets(void **state) {
     }
 }
 
+/* A triangle that a quadrilateral crosses along x = 14: what of it lies beyond is hidden, 24 of 216
+ * cells. At the triangle's middle there is one layer, and the only border across it, x = 12, is
+ * behind it. */
+static void test_hidden_by_crossing_facet(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const bst_point2 at[7] = {{2, 4}, {2, 28}, {20, 16}, {12, 2}, {12, 30}, {40, 30}, {40, 2}};
+    const double near[7] = {0, 0, 0, -2, -2, 26, 26};
+    int vertex[7] = {0, 1, 2, 3, 4, 5, 6}, first[3] = {0, 3, 7}, corner[7] = {0, 1, 2, 3, 4, 5, 6},
+        beside[7] = {2, 2, 2, 2, 2, 2, 2};
+    bst_net_edge edges[7];
+    for (int i = 0; i < 7; i++) {
+        edges[i] =
+            i < 3 ? (bst_net_edge){i, (i + 1) % 3, 0, 2} : (bst_net_edge){i, 3 + (i - 2) % 4, 1, 2};
+    }
+    uint8_t apart[3] = {0}, wanted[3] = {1, 1, 0};
+    const bst_satellite satellite = {.facet_count = 2, .radius_m = 30.0};
+    const bst_facet_net net = {.satellite = &satellite,
+                               .vertex = vertex,
+                               .first = first,
+                               .corner = corner,
+                               .beside = beside,
+                               .edges = edges,
+                               .apart = apart,
+                               .vertex_count = 7,
+                               .edge_count = 7};
+    bst_facet_layers layers = {0};
+    bst_assert_ok(&ctx, bst_facet_layers_begin(&ctx, &layers, &net, 48, 32));
+    memcpy(layers.at, at, sizeof at);
+    memcpy(layers.near, near, sizeof near);
+    layers.facing[0] = layers.facing[1] = 1;
+    layers.facing[2] = 0;
+    layers.same = 1e-5;
+    bst_assert_ok(&ctx, bst_facet_layers_find(&ctx, &layers, wanted));
+    assert_true(layers.doubtful[0]);
+    assert_false(bst_facet_layers_cut(&layers, 0));
+    bst_assert_close(bst_polygon_clip_area(&layers.clip), 192.0, 1e-9);
+    bst_facet_layers_free(&layers);
+}
+
 /* Edges between facets of almost the same light change light and first moments not at all, second
  * ones by 0.016 of the difference of their light at most, which is a tenth of it. */
 static void test_faint_edges(void **state) {
@@ -416,6 +457,7 @@ int main(void) {
                                        cmocka_unit_test(test_beside_the_image),
                                        cmocka_unit_test(test_border_across_border),
                                        cmocka_unit_test(test_crossing_facets),
+                                       cmocka_unit_test(test_hidden_by_crossing_facet),
                                        cmocka_unit_test(test_faint_edges)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,8 +13,8 @@ enum { N = BST_CUSTODY_STATE, SETS = 2 * N + 1, MOST_ITERATIONS = 5 };
 /* Below this inclination SGP4's periodics are not smooth in its elements (Lyddane's, by Sun and
  * Moon: 0.02 degrees), and differences are those of osculating elements. */
 #define LEAST_INCLINATION_RAD (0.2 * BST_DEG_RAD)
-/* Times about that of an observation at which positions give its velocity, s. */
-#define APART_S 8.0
+/* Step of the five-point difference of positions that gives the velocity, s. */
+#define DIFFERENCE_STEP_S 8.0
 enum { PLACES = 5 };
 
 /* ------------------------------------------------------------------ Elements */
@@ -115,7 +115,7 @@ static bool motion(const bst_sgp4 *sgp4, double seconds, bst_vec3 *r, bst_vec3 *
     bst_vec3 p[PLACES];
     for (int i = 0; i < PLACES; i++) {
         sets[i] = sgp4;
-        minutes[i] = (seconds + APART_S * (i - PLACES / 2)) / 60.0;
+        minutes[i] = (seconds + DIFFERENCE_STEP_S * (i - PLACES / 2)) / 60.0;
     }
     bst_sgp4_propagate_many(sets, minutes, PLACES, at);
     for (int i = 0; i < PLACES; i++) {
@@ -126,7 +126,8 @@ static bool motion(const bst_sgp4 *sgp4, double seconds, bst_vec3 *r, bst_vec3 *
         p[i] = (bst_vec3){1e3 * km[0], 1e3 * km[1], 1e3 * km[2]};
     }
     bst_vec3 near = bst_vec3_scale(bst_vec3_sub(p[3], p[1]), 8.0);
-    *v = bst_vec3_scale(bst_vec3_sub(near, bst_vec3_sub(p[4], p[0])), 1.0 / (12.0 * APART_S));
+    *v = bst_vec3_scale(bst_vec3_sub(near, bst_vec3_sub(p[4], p[0])),
+                        1.0 / (12.0 * DIFFERENCE_STEP_S));
     *r = p[PLACES / 2];
     return true;
 }
