@@ -416,7 +416,7 @@ static void test_nulls_of_votables(void **state) {
         /* of a PARAM, not of the FIELD before it */
         {"</FIELD><PARAM name=\"p\" datatype=\"int\" value=\"7\"><VALUES null=\"7\"/></PARAM>",
          cells, 0},
-        {"<VALUES null=\"9\"/></FIELD><PARAM name=\"p\" datatype=\"int\" value=\"7\">"
+        {"<VALUES null=\"8\"/></FIELD><PARAM name=\"p\" datatype=\"int\" value=\"7\">"
          "<VALUES null=\"7\"/></PARAM>",
          binary, 0},
         {"<VALUES null=\"7\"/></FIELD>", binary, 1},
