@@ -334,6 +334,7 @@ static void take_changes(exposure_clock *clock, const exposure_clock *saved) {
     if (saved->set.binning != clock->set.binning) {
         clock->binning = (int)clock->set.binning;
     }
+    clock->binning = clock->ramp ? 1 : clock->binning; /* commanded before there was a ramp */
     if (memcmp(&saved->own, &clock->own, sizeof saved->own) != 0) {
         clock->window = clock->own;
     }
