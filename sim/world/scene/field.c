@@ -268,6 +268,7 @@ typedef struct query {
     bst_quat mean;
     bst_window window;
     bst_window lit;           /* part of the sensor whose sources count: the window, or more */
+    bool wider;               /* it is more */
     double margin_px;         /* around `lit`, including the motion during the exposure */
     bst_scene_cone cone;      /* contains `lit` with its margin */
     bst_scene_cone near_cone; /* contains the window with its margin */
@@ -434,8 +435,9 @@ static bool make_star(const bst_field *field, const query *q, const bst_star *st
         .sunlit_fraction = NAN,
         .phase_rad = NAN,
         .range_m = INFINITY,
-        .outside = !(bst_vec3_angle(star->icrs, q->near_cone.axis) <= q->near_cone.radius &&
-                     near_window(field, field->q_mid, apparent, q->window, q->margin_px))};
+        .outside =
+            q->wider && !(bst_vec3_angle(star->icrs, q->near_cone.axis) <= q->near_cone.radius &&
+                          near_window(field, field->q_mid, apparent, q->window, q->margin_px))};
     bool coloured = camera->psf && bst_psf_spectra(camera->psf) > 1;
     if (coloured && !isnan(star->b_minus_v)) {
         bst_psf_colour(camera->psf, bst_optics_star_spectrum_k((double)star->b_minus_v), s->colour);
@@ -472,6 +474,7 @@ static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, i
                                             .q_mid = field->q_mid,
                                             .lit = q->lit,
                                             .window = q->window,
+                                            .wider = q->wider,
                                             .margin_px = q->margin_px,
                                             .cone = q->cone,
                                             .near_cone = q->near_cone};
@@ -509,7 +512,8 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     truth->end_tick = end_tick;
     fill_header(field, &q, truth);
     q.cone = find_cone(field, &q, q.lit);
-    q.near_cone = find_cone(field, &q, window);
+    q.wider = memcmp(&q.lit, &window, sizeof window) != 0;
+    q.near_cone = q.wider ? find_cone(field, &q, window) : q.cone;
     BST_TRY(find_background(ctx, field, &q, truth));
     BST_TRY(find_sources(ctx, field, &q, count));
     *sources = field->sources;

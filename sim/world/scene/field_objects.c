@@ -311,7 +311,7 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *q, int o
     if (!*there) {
         return BST_OK;
     }
-    out->outside = !path_touches(q, out, disc, q->window, &q->near_cone);
+    out->outside = q->wider && !path_touches(q, out, disc, q->window, &q->near_cone);
     course c = {q, object, &parts->path, &light};
     if (!mid.occulted && q->span.end_s > q->span.start_s &&
         sample_light(&c, &parts->rate, &out->electrons_per_s)) {

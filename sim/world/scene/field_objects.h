@@ -19,8 +19,9 @@ typedef struct bst_scene_object_query {
     bst_world_view_span span;
     bst_quat q_mid;    /* camera attitude at mid-exposure */
     bst_window lit;    /* part of the sensor whose sources count: the window, or more */
-    bst_window window; /* beside which a source is `outside` */
-    double margin_px;  /* around both, including the motion during the exposure */
+    bst_window window; /* beside which a source is `outside`, if `lit` is wider */
+    bool wider;
+    double margin_px;               /* around both, including the motion during the exposure */
     bst_scene_cone cone, near_cone; /* contain `lit` and the window with the margin */
 } bst_scene_object_query;
 
