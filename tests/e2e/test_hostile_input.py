@@ -121,7 +121,7 @@ LINES = [
     (("run", T, "--out", OUT, "--set", runs.SENSOR + '/camera/detector={"ramp": {"reads": 4}, "em_gain": 9}'), 1,
      "ramp/reads: 4 non-destructive reads cannot be combined with em_gain"),
     (("run", T, "--out", OUT, "--set", runs.SENSOR + '/camera/detector={"ramp": {"reads": 4}}', "--set",
-      runs.SENSOR + "/exposure/binning=2"), 1, "exposure/binning: 2, but the camera's detector/ramp reads each"),
+      runs.SENSOR + "/exposure/binning=2"), 1, "exposure: binning: 2, but the camera's detector/ramp reads each"),
     (("run", T, "--out", OUT, "--set", runs.SENSOR + '/camera/detector={"persistence": {"trapped_share": [1, 1, 0, 0, 0]}}'),
      1, "persistence/trapped_share: all species together trap 2 of"),
     (("run", T, "--out", OUT, "--set", "/extends=x.json"), 1, "/extends: the file that it names has not"),
