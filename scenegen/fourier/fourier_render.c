@@ -316,10 +316,12 @@ int bst_fourier_render_spectra(const bst_fourier_render *l) {
  * Measured: tests/scenegen/test_tolerance_sweep.c, very bright stars. */
 #define NOISE_OF_OTF 2.5e-6
 
-/* Error in any pixel of the image of a point: that noise, which goes with the root of the sum of
- * squares of the image (Parseval), and far wings that re-enter the image. Those are corrected with
- * light at the centres of cells of 16 samples, up to half a cell from its place; wings decrease as
- * the third power of the distance. */
+/* Error in any pixel of the frame of the image of a point: that noise, which goes with the root of
+ * the sum of squares of the image (Parseval), and far wings that re-enter the image. Those are
+ * corrected with light at the centres of cells of 16 samples, up to half a cell from its place;
+ * wings decrease as the third power of the distance. A binned pixel is a sum of b^2 pixels: smooth
+ * wings add up to b^2, independent noise to b; that of an OTF between its frequencies is taken for
+ * independent. */
 static double everywhere_e(const bst_fourier_render *l, bool fine, bst_window window,
                            const bst_fourier_point *point) {
     static const double CELL = 16.0, AXES = 2.0, POWER = 3.0;
@@ -332,8 +334,9 @@ static double everywhere_e(const bst_fourier_render *l, bool fine, bst_window wi
     double spread = fmin(point->peak_e / (l->band[PLAIN].peak * point->electrons), 1.0);
     double near = (double)l->margin / pad, cell_px = CELL / fmin(density[0], density[1]);
     double wings = l->band[PLAIN].beyond * near * near * near;
-    return point->electrons *
-           (NOISE_OF_OTF * sqrt(spread / pixels) + wings * AXES * POWER * 0.5 * cell_px / pad);
+    double b = (double)l->binning;
+    return point->electrons * (b * NOISE_OF_OTF * sqrt(spread / pixels) +
+                               b * b * wings * AXES * POWER * 0.5 * cell_px / pad);
 }
 
 double bst_fourier_render_error_sigma(const bst_fourier_render *l, bool fine, bst_window window,

@@ -1,6 +1,7 @@
 /* Non-destructive reads of an exposure: charge is collected interval by interval, and a line is
  * fitted to the reads at their ends. The read at the start is of empty pixels, so that the offset of
- * the reset drops out. Reads of a full well are not used. */
+ * the reset drops out. From the first read of a full well on none is used: traps may take charge from
+ * a full pixel, but the charge that it lost beforehand stays lost. */
 
 /* Values of each pixel during a ramp, planes of [light_height][light_stride] floats: charge, sum of
  * the reads, sum of number times read (or the latest read), number of reads that are used. */
@@ -44,14 +45,17 @@ READOUT_GROUP kernel void bst_detector_ramp(bst_kernel_ramp_params t, global con
                 drawn[v] += ((global const lanes *)(overlay + map))[v];
             }
             lanes q = fmin(fmax(before + drawn[v] + below[v], 0.0f), p.full_well_e);
-            lanes good = select((lanes)0.0f, (lanes)1.0f, MASK(q < p.full_well_e));
+            lanes count = first ? (lanes)1.0f : *used; /* of the reads before this one */
+            lanes good = select((lanes)0.0f, (lanes)1.0f,
+                                MASK(q < p.full_well_e) &
+                                    MASK(count == (lanes)(float)(t.interval + 1)));
             lanes read = good * respond(p, q), number = (lanes)(float)(t.interval + 1);
             *charge = q;
             *sum = (first ? (lanes)0.0f : *sum) + read;
             lanes old = first ? (lanes)0.0f : *moment;
             *moment = t.last_minus_first ? select(old, read, MASK(good > 0.0f))
                                          : fma(number, read, old);
-            *used = (first ? (lanes)1.0f : *used) + good;
+            *used = count + good;
         }
     }
 }
@@ -67,7 +71,7 @@ READOUT_GROUP kernel void bst_detector_ramp_fit(bst_kernel_ramp_params t, global
         return;
     }
     size_t plane = (size_t)p.light_height * p.light_stride;
-    float all = (float)(t.reads - 1), brim = respond(p, (lanes)p.full_well_e).s0 * all;
+    float all = (float)(t.reads - 1), full_e = respond(p, (lanes)p.full_well_e).s0 * all;
     for (int x = 0; x < p.light_stride; x += 16) {
         size_t at = (size_t)y * p.light_stride + x;
         float16 n = vload16(0, planes + 3 * plane + at), sum = vload16(0, planes + plane + at);
@@ -76,7 +80,7 @@ READOUT_GROUP kernel void bst_detector_ramp_fit(bst_kernel_ramp_params t, global
                             ? moment / (m - 1.0f)
                             : (moment - 0.5f * (m - 1.0f) * sum) * (12.0f / (m * (m * m - 1.0f)));
         int16 none = n < 1.5f;
-        vstore16(select(slope * all, (float16)brim, none), 0, image + at);
+        vstore16(select(slope * all, (float16)full_e, none), 0, image + at);
         vstore16(convert_uchar16(none & 1), 0, full + at);
         float v[16], count[16];
         vstore16(m, 0, count);

@@ -200,7 +200,7 @@ static void set_kernel(const bst_smear_maker *m, const group *g, const bst_smear
  * lies in the flank of the brighter one's light: measured in tests/scenegen/test_tolerance_sweep.c,
  * straight parts of random speed. */
 #define EVEN_SPEEDS 2.0
-#define EVEN_WAY 0.8
+#define EVEN_DISTANCE 0.8
 #define BESIDE_ANOTHER 1.25 /* 0.66 over 0.55, and a margin */
 #define JUMP_SPEEDS 8.0
 #define BESIDE_A_JUMP 2.4
@@ -250,29 +250,44 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
 /* Compares a group with the last one, which it becomes. */
 static double beside_last(bst_smear_maker *m, const bst_smear_moments *g, double weight) {
     bst_smear_last_group *last = &m->last;
-    double way2 = 0.0, length = sqrt(12.0 * g->along[2]), speed = length / weight;
-    double ratio = last->speed > 0.0 ? fmax(speed / last->speed, last->speed / speed) : 1.0;
+    double distance2 = 0.0, length = sqrt(12.0 * g->along[2]), speed = length / weight;
+    double ratio = last->rests         ? INFINITY
+                   : last->speed > 0.0 ? fmax(speed / last->speed, last->speed / speed)
+                                       : 1.0;
     for (int i = 0; i < 3; i++) {
-        way2 += (g->mean[i] - last->mean[i]) * (g->mean[i] - last->mean[i]);
+        distance2 += (g->mean[i] - last->mean[i]) * (g->mean[i] - last->mean[i]);
     }
-    double apart = 0.5 * EVEN_WAY * (length + last->length);
-    bool even = !(last->speed > 0.0) || (ratio < EVEN_SPEEDS && way2 > apart * apart);
+    double apart = 0.5 * EVEN_DISTANCE * (length + last->length);
+    bool even = !(last->speed > 0.0) || (ratio < EVEN_SPEEDS && distance2 > apart * apart);
     memcpy(last->mean, g->mean, sizeof last->mean);
     last->length = length;
     last->speed = speed;
+    last->rests = false;
     return !(ratio < JUMP_SPEEDS) ? BESIDE_A_JUMP : even ? 1.0 : BESIDE_ANOTHER;
+}
+
+/* Raises the predicted error of the last group to what it is beside the next one. */
+static void raise_last(bst_smear_maker *m, double beside) {
+    if (m->last.beside > 0.0 && beside > m->last.beside) {
+        double predicted = raise_error(m, m->last.axis, &m->last.rule, beside);
+        for (int n = m->last.first; n < m->last.end; n++) {
+            m->list->items[n].predicted = predicted;
+        }
+    }
+}
+
+/* Appends the node of a group at rest, which is exact. Groups beside it are beside a jump. */
+static bst_status emit_rest(bst_ctx *ctx, bst_smear_maker *m, const double mean[3], double weight) {
+    raise_last(m, BESIDE_A_JUMP);
+    m->last = (bst_smear_last_group){.rests = true};
+    return push(ctx, m->list, mean, weight, 0.0, (const double[2]){0.0, 0.0});
 }
 
 static bst_status emit(bst_ctx *ctx, bst_smear_maker *m, const bst_smear_moments *g,
                        const bst_smear_rule *r, double weight) {
     bool split = r->pair[0] != 0.0 || r->pair[1] != 0.0 || r->pair[2] != 0.0;
     double beside = beside_last(m, g, weight);
-    if (m->last.beside > 0.0 && beside > m->last.beside) {
-        double predicted = raise_error(m, m->last.axis, &m->last.rule, beside);
-        for (int n = m->last.first; n < m->list->count; n++) {
-            m->list->items[n].predicted = predicted;
-        }
-    }
+    raise_last(m, beside);
     m->last.beside = beside;
     m->last.first = m->list->count;
     m->last.rule = *r;
@@ -292,6 +307,7 @@ static bst_status emit(bst_ctx *ctx, bst_smear_maker *m, const bst_smear_moments
             }
         }
     }
+    m->last.end = m->list->count;
     return BST_OK;
 }
 
@@ -322,9 +338,9 @@ enum { MOST_DEPTH = 40 };
 /* Squared distance from the mean, over the largest spread of a group, beyond which light is
  * searched for a tail: on a uniform path it is 3, or less. */
 #define TAIL_SPREADS 4.0
-/* Share of the group's time, less the share of its way, at a path point where the speed changes so
- * much that the faster part is faint: beside a turning point it is at most 1 / 4. */
-#define TAIL_KNEE 0.35
+/* Share of the group's time, less the share of its length, at a path point where the speed changes
+ * so much that the faster part is faint: beside a turning point it is at most 1 / 4. */
+#define SPEED_CHANGE_SHARE 0.35
 
 /* Finds the path point where a group's speed changes most, if part of its way is a long and faint
  * tail. Errors of a group's quadrature lie along its whole way (Peano kernel), also far from its
@@ -332,12 +348,12 @@ enum { MOST_DEPTH = 40 };
  * contain a jump of the integrand.
  *
  * Returned:  segment that begins there; -1: there is no such tail */
-static int find_knee(const bst_smear_maker *m, const group *g, const bst_smear_moments *t) {
+static int find_speed_change(const bst_smear_maker *m, const group *g, const bst_smear_moments *t) {
     if (!(t->furthest2 > TAIL_SPREADS * m->limit)) {
         return -1;
     }
-    double a[3], b[3], way = 0.0, so_far = 0.0, most = TAIL_KNEE;
-    int knee = -1;
+    double a[3], b[3], way = 0.0, so_far = 0.0, most = SPEED_CHANGE_SHARE;
+    int change = -1;
     for (int round = 0; round < 2; round++) {
         for (int k = g->first; reaches(m, g, k); k++) {
             if (!(clip(m, g, k, a, b) > 0.0)) {
@@ -347,14 +363,14 @@ static int find_knee(const bst_smear_maker *m, const group *g, const bst_smear_m
             double apart = fabs(share - so_far / way);
             if (round > 0 && m->path[k].s > g->from && apart > most) {
                 most = apart;
-                knee = k;
+                change = k;
             }
             double *to = round == 0 ? &way : &so_far;
             *to += sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]) +
                         (b[2] - a[2]) * (b[2] - a[2]));
         }
     }
-    return knee;
+    return change;
 }
 
 /* Replaces a group by nodes, or by two parts of its time if no rule is accurate enough: its halves,
@@ -367,12 +383,12 @@ static bst_status close_group(bst_ctx *ctx, bst_smear_maker *m, group g, int dep
     double spread = trace_of(&t);
     double weight = (g.to - g.from) / m->total;
     if (!(spread > 1e-12 * m->variance)) {
-        return push(ctx, m->list, t.mean, weight, 0.0, (const double[2]){0.0, 0.0});
+        return emit_rest(ctx, m, t.mean, weight);
     }
     high_moments(m, &g, &t);
-    int knee = find_knee(m, &g, &t);
-    if (knee >= 0 && depth < MOST_DEPTH) {
-        split_at(&g, &late, knee, m->path[knee].s);
+    int change = find_speed_change(m, &g, &t);
+    if (change >= 0 && depth < MOST_DEPTH) {
+        split_at(&g, &late, change, m->path[change].s);
         BST_TRY(close_group(ctx, m, g, depth + 1));
         return close_group(ctx, m, late, depth + 1);
     }

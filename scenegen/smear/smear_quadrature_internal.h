@@ -38,8 +38,9 @@ typedef struct bst_smear_rule {
 typedef struct bst_smear_last_group {
     double mean[3], axis[3];
     double length, speed; /* along its axis, px and px over its share of the exposure; 0: none */
+    bool rests;           /* the path was at rest: one node without an error */
     double beside;        /* its predicted error beside others, over that alone; 0: none */
-    int first;            /* of its nodes in the list */
+    int first, end;       /* its nodes in the list: the first, and the one after the last */
     bst_smear_rule rule;
 } bst_smear_last_group;
 

@@ -100,9 +100,12 @@ static bst_status split(bst_ctx *ctx, const bst_star_table *t, const bst_text_li
     if (*count >= 0 && *count <= BST_STAR_TABLE_COLUMNS) {
         return BST_OK;
     }
-    return bst_fail(
-        ctx, BST_ERR_FORMAT, "%s:%d: %s", t->path, line->number,
-        *count < 0 ? "a quotation mark has no end, or text after it" : "more than 1024 columns");
+    if (*count < 0) {
+        return bst_fail(ctx, BST_ERR_FORMAT, "%s:%d: a quotation mark has no end, or text after it",
+                        t->path, line->number);
+    }
+    return bst_fail(ctx, BST_ERR_FORMAT, "%s:%d: more than %d columns", t->path, line->number,
+                    BST_STAR_TABLE_COLUMNS);
 }
 
 /* Checks the unit that the head of the file has for a column. */

@@ -16,6 +16,10 @@
 
 enum { CHUNK = 1 << 16, MOST_DEPTH = 64, MOST_TAG = 1 << 20, CELL = 128 };
 
+/* Most elements of an item of a variable array: bytes of 2^32 - 1 items, which is the most that a
+ * row can state, do not exceed 64 bits. */
+enum { MOST_ELEMENTS = (1 << 28) - 1 };
+
 typedef struct star_row {
     int64_t source;
     double value[BST_STAR_QUANTITIES];
@@ -34,6 +38,7 @@ struct bst_star_votable {
     long long fed;
     bst_votable_field fields[BST_STAR_TABLE_COLUMNS];
     int field_count;
+    bool in_field; /* a FIELD is open, not a PARAM or a GROUP */
     bool wanted[BST_STAR_TABLE_COLUMNS];
     star_row row; /* that is being read */
     long long row_number;
@@ -96,7 +101,8 @@ static void add_field(bst_star_votable *v, const char **attributes) {
     name = name ? name : attribute(attributes, "ID");
     name = name ? name : "";
     if (v->field_count == BST_STAR_TABLE_COLUMNS) {
-        fail_here(v, "more than 1024 columns");
+        stop(v, bst_fail(v->ctx, BST_ERR_FORMAT, "%s:%lu: more than %d columns", t->path,
+                         line_of(v), BST_STAR_TABLE_COLUMNS));
         return;
     }
     const int index = v->field_count++;
@@ -108,6 +114,13 @@ static void add_field(bst_star_votable *v, const char **attributes) {
                          "%s:%lu: column %.64s: datatype \"%.40s\" with arraysize \"%.40s\" is not "
                          "one of VOTable's",
                          t->path, line_of(v), name, type ? type : "", size ? size : ""));
+        return;
+    }
+    if (f->variable && f->fixed > MOST_ELEMENTS) {
+        stop(v, bst_fail(v->ctx, BST_ERR_FORMAT,
+                         "%s:%lu: column %.64s: arraysize \"%.40s\" has more than %d elements in "
+                         "each item; allowed: up to %d before the \"*\"",
+                         t->path, line_of(v), name, size, MOST_ELEMENTS, MOST_ELEMENTS));
         return;
     }
     const size_t length = strlen(name);
@@ -202,12 +215,11 @@ static void take_item(bst_star_votable *v) {
     const bst_votable_field *f = &v->fields[v->at];
     int64_t whole, none;
     double value = bst_votable_number(f, v->item, &whole);
-    const bst_text_span null = {f->null, strlen(f->null)};
     if (v->null_mask && v->mask[v->at / 8] & 0x80 >> v->at % 8) {
         return;
     }
     if (f->has_null && f->type != BST_VOTABLE_FLOAT && f->type != BST_VOTABLE_DOUBLE &&
-        bst_star_source_read(null, &none) && none == whole) {
+        bst_votable_read_integer(f->null, &none) && none == whole) {
         return;
     }
     if (v->at == v->table->source_column) {
@@ -257,9 +269,7 @@ static void take_byte(bst_star_votable *v, unsigned char byte) {
                                (uint64_t)v->item[2] << 8 | v->item[3];
         v->counting = false;
         v->have = 0;
-        /* 2^32 items of 2^40 elements would not be a file */
-        const uint64_t elements = items * (f->fixed < UINT64_C(1) << 28 ? f->fixed : 0);
-        v->skip = bst_votable_bytes(f, elements);
+        v->skip = bst_votable_bytes(f, items * f->fixed);
         if (v->skip == 0) {
             next_field(v);
         }
@@ -342,8 +352,9 @@ static void start_element(void *user, const char *full, const char **attributes)
     } else if (v->place == BEFORE && strcmp(name, "TABLE") == 0) {
         v->place = FIELDS;
     } else if (v->place == FIELDS && strcmp(name, "FIELD") == 0) {
+        v->in_field = true;
         add_field(v, attributes);
-    } else if (v->place == FIELDS && strcmp(name, "VALUES") == 0 && v->field_count > 0) {
+    } else if (v->place == FIELDS && strcmp(name, "VALUES") == 0 && v->in_field) {
         const char *null = attribute(attributes, "null");
         bst_votable_field *f = &v->fields[v->field_count - 1];
         if (null && strlen(null) < sizeof f->null) {
@@ -381,7 +392,9 @@ static void end_element(void *user, const char *full) {
     if (v->status != BST_OK) {
         return;
     }
-    if (v->place == CELLS && strcmp(name, "TD") == 0 && v->in_cell) {
+    if (v->place == FIELDS && strcmp(name, "FIELD") == 0) {
+        v->in_field = false;
+    } else if (v->place == CELLS && strcmp(name, "TD") == 0 && v->in_cell) {
         v->in_cell = false;
         if (v->wanted[v->column]) {
             end_cell(v);

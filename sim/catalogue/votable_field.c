@@ -1,6 +1,8 @@
 #include "sim/catalogue/votable_field.h"
 
 #include <ctype.h>
+#include <errno.h>
+#include <stdlib.h>
 #include <string.h>
 
 bst_votable_type bst_votable_datatype(const char *text, int *size) {
@@ -60,6 +62,17 @@ bool bst_votable_read_size(const char *text, bst_votable_field *f) {
             return false;
         }
     }
+}
+
+bool bst_votable_read_integer(const char *text, int64_t *value) {
+    const char *digits = text + strspn(text, " \t\r\n");
+    digits += *digits == '-' || *digits == '+';
+    /* not base 0, in which a leading 0 makes a number octal */
+    const int base = digits[0] == '0' && (digits[1] == 'x' || digits[1] == 'X') ? 16 : 10;
+    char *end;
+    errno = 0;
+    *value = strtoll(text, &end, base);
+    return end != text && errno == 0 && end[strspn(end, " \t\r\n")] == '\0';
 }
 
 uint64_t bst_votable_bytes(const bst_votable_field *f, uint64_t elements) {

@@ -37,6 +37,11 @@ bst_votable_type bst_votable_datatype(const char *text, int *size);
  * Returned:  false: it is none, or has more than 2^40 elements */
 bool bst_votable_read_size(const char *text, bst_votable_field *field);
 
+/* Reads an integer as VOTable has it (1.4, section 6): decimal, or hexadecimal after "0x".
+ *
+ * Returned:  false: it is none, or beyond 64 bits */
+bool bst_votable_read_integer(const char *text, int64_t *value);
+
 /* Bytes of elements of an array. */
 uint64_t bst_votable_bytes(const bst_votable_field *field, uint64_t elements);
 

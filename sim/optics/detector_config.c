@@ -100,10 +100,12 @@ static const bst_config_desc persistence_table[] = {
 static const bst_config_desc ramp_table[] = {
     BST_INT(bst_detector_ramp_config, reads, "", 0, BST_RAMP_READS, "0",
             "Non-destructive reads at equal distances, the first at the start of the exposure, the "
-            "last at its end; 2 or more. 0: one read at the end."),
-    BST_ENUM(bst_detector_ramp_config, fit, fits, "\"slope\"",
-             "Frame: signal of the least-squares line through the reads below full_well_e (slope), "
-             "or the last of them minus the first."),
+            "last at its end; 2 or more. 0: one read at the end. Frames of a ramp are not binned."),
+    BST_ENUM(
+        bst_detector_ramp_config, fit, fits, "\"slope\"",
+        "Frame: signal of the least-squares line through the reads before the first of full_well_e "
+        "(slope), "
+        "or the last of them minus the first."),
     BST_REAL(bst_detector_ramp_config, flicker_noise_e, "e", 0, 1e5, "0",
              "1/f noise of each pixel from read to read, RMS: equal power in each factor of 4 from "
              "a period of some reads to one of several thousand. Beside it each read has "
@@ -293,8 +295,8 @@ static bst_status check_ramp(bst_ctx *ctx, const bst_detector_config *d) {
     for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
         if (others[i].on) {
             return bst_fail(ctx, BST_ERR_CONFIG,
-                            "ramp/reads: %lld non-destructive reads go not with %s; set one of "
-                            "them to its default",
+                            "ramp/reads: %lld non-destructive reads cannot be combined with %s; "
+                            "set one of them to its default",
                             (long long)d->ramp.reads, others[i].key);
         }
     }

@@ -373,6 +373,68 @@ static void test_magnitudes(void **state) {
     bst_assert_close(magnitude_of(f, "electrons_per_s", "1000", 25.0, &colour), 17.5, 1e-12);
 }
 
+/* Rows that are read and those of them without position or magnitude, of a VOTable with integer
+ * magnitudes, whose null is given with the element VALUES. */
+static void count_rows(files *f, const char *values, const char *data, int64_t *rows,
+                       int64_t *skipped) {
+    char text[2048];
+    snprintf(text, sizeof text,
+             "<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE>"
+             "<FIELD name=\"ra\" datatype=\"short\" unit=\"deg\"/>"
+             "<FIELD name=\"dec\" datatype=\"short\"/>"
+             "<FIELD name=\"V\" datatype=\"long\">%s<DATA>%s</DATA></TABLE></RESOURCE></VOTABLE>",
+             values, data);
+    write_text(f->table, text);
+    const bst_star_table_options options = {.epoch_year = 2000.0, .zero_point_mag = NAN};
+    bst_star_table *table;
+    bool end = false;
+    bst_assert_ok(&f->ctx, bst_star_table_open(&f->ctx, f->table, &options, &table));
+    while (!end) {
+        bst_star_table_row row;
+        bst_assert_ok(&f->ctx, bst_star_table_next(&f->ctx, table, &row, &end));
+    }
+    bst_star_table_counts(table, rows, skipped);
+    bst_star_table_close(table);
+}
+
+static void test_nulls_of_votables(void **state) {
+    files *f = *state;
+    static const char cells[] =
+        "<TABLEDATA><TR><TD>1</TD><TD>2</TD><TD>7</TD></TR>"
+        "<TR><TD>1</TD><TD>2</TD><TD>9</TD></TR></TABLEDATA>";
+    /* the same, and a magnitude of -2^63 */
+    static const char binary[] =
+        "<BINARY><STREAM encoding=\"base64\">AAEAAgAAAAAAAAAHAAEAAgAAAAAAAAAJ</STREAM></BINARY>";
+    static const char lowest[] =
+        "<BINARY><STREAM encoding=\"base64\">AAEAAgAAAAAAAAAHAAEAAoAAAAAAAAAA</STREAM></BINARY>";
+    static const struct {
+        const char *values, *data;
+        int skipped;
+    } cases[] = {
+        {"</FIELD>", cells, 0},
+        {"<VALUES null=\"7\"/></FIELD>", cells, 1},
+        /* of a PARAM, not of the FIELD before it */
+        {"</FIELD><PARAM name=\"p\" datatype=\"int\" value=\"7\"><VALUES null=\"7\"/></PARAM>",
+         cells, 0},
+        {"<VALUES null=\"8\"/></FIELD><PARAM name=\"p\" datatype=\"int\" value=\"7\">"
+         "<VALUES null=\"7\"/></PARAM>",
+         binary, 0},
+        {"<VALUES null=\"7\"/></FIELD>", binary, 1},
+        {"<VALUES null=\"0x7\"/></FIELD>", binary, 1},
+        {"<VALUES null=\"7x\"/></FIELD>", binary, 0},
+        {"<VALUES null=\"-9223372036854775808\"/></FIELD>", lowest, 1},
+        {"<VALUES null=\"-0x8000000000000000\"/></FIELD>", lowest, 1},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        int64_t rows, skipped;
+        count_rows(f, cases[i].values, cases[i].data, &rows, &skipped);
+        assert_int_equal(rows, 2);
+        if (skipped != cases[i].skipped) {
+            fail_msg("case %zu: %lld rows skipped", i, (long long)skipped);
+        }
+    }
+}
+
 /* ---------------------------------------------------------------- bad tables */
 
 static void test_bad_tables(void **state) {
@@ -408,6 +470,9 @@ static void test_bad_tables(void **state) {
         {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
          "datatype=\"int\" arraysize=\"2x0\"/>",
          "with arraysize \"2x0\" is not"},
+        {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"n\" "
+         "datatype=\"char\" arraysize=\"268435456x*\"/>",
+         "column n: arraysize \"268435456x*\" has more than 268435455 elements in each item"},
         {"<?xml version=\"1.0\"?>\n<VOTABLE version=\"1.4\"><RESOURCE><TABLE><FIELD name=\"ra\" "
          "datatype=\"char\" arraysize=\"*\"/>",
          "column ra does not hold one number"},
@@ -528,6 +593,7 @@ int main(void) {
         cmocka_unit_test_setup_teardown(test_rows_share_out_the_base, setup, teardown),
         cmocka_unit_test_setup_teardown(test_completeness, setup, teardown),
         cmocka_unit_test_setup_teardown(test_magnitudes, setup, teardown),
+        cmocka_unit_test_setup_teardown(test_nulls_of_votables, setup, teardown),
         cmocka_unit_test_setup_teardown(test_bad_tables, setup, teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -9,6 +9,7 @@ import unittest
 
 import numpy as np
 from astropy.io import fits
+from astropy.time import Time
 
 import runs
 
@@ -67,6 +68,10 @@ class Calframes(unittest.TestCase):
             self.assertEqual(self.headers[kind]["IMAGETYP"], kind.upper())
             self.assertEqual(self.headers[kind]["EXPTIME"], exposure)
             self.assertEqual(len(self.stacks[kind]), 12)
+        # the series follow one another, each frame 1 s after the one before
+        first = {kind: Time(header["DATE-OBS"]) for kind, header in self.headers.items()}
+        self.assertAlmostEqual((first["dark"] - first["bias"]).sec, 12, places=3)
+        self.assertAlmostEqual((first["flat"] - first["dark"]).sec, 12 * 21, places=3)
 
     def test_bias_has_read_noise_and_columns(self):
         noise = (self.stacks["bias"][0] - self.stacks["bias"][1]).std() / np.sqrt(2) * self.gain

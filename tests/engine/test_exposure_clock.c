@@ -350,9 +350,22 @@ static void a_file_drives_the_frames(void **state) {
     unlink(path);
 }
 
-static void times_that_do_not_fit(void **state) {
+/* Frames of a ramp are not binned, also if control asks for it. */
+static void ramps_are_not_binned(void **state) {
+    (void)state;
+    train l;
+    run_camera(", \"detector\": {\"ramp\": {\"reads\": 4}}", "\"exposure_s\": 0.5, \"period_s\": 1",
+               "\"control\": {\"type\": \"commander\", \"exposure_s\": 0.25, \"binning\": 2}", "",
+               20000, &l);
+    assert_int_equal(l.count, 4);
+    assert_int_equal(l.items[2].end_tick - l.items[2].start_tick, 1500);
+    assert_int_equal(l.items[2].binning, 1);
+}
+
+static void settings_that_do_not_fit(void **state) {
     (void)state;
     static const char rolling[] = ", \"detector\": {\"row_time_s\": 1e-4}";
+    static const char ramp[] = ", \"detector\": {\"ramp\": {\"reads\": 4}}";
     static const struct {
         const char *camera, *exposure, *frames, *words;
     } cases[] = {
@@ -362,6 +375,10 @@ static void times_that_do_not_fit(void **state) {
          "dropped_burst_frames: 0.9 (allowed: 0, or 1 and more"},
         {rolling, "\"exposure_s\": 0.5, \"first_s\": 0.0235", NULL,
          "the first row is exposed 0.024 s before the middle one"},
+        {ramp, "\"binning\": 2", NULL,
+         "binning: 2, but the camera's detector/ramp reads each pixel"},
+        {ramp, NULL, "{\"frame\": 2}, {\"frame\": 4, \"binning\": 3}",
+         "/frames/1 (frame 4)/binning: 3, but the camera's detector/ramp reads each pixel"},
         {"", NULL, "{\"frame\": 4, \"exposure_s\": 0.00001}", "/frames/0 (frame 4)/exposure_s"},
         {"", NULL, "{\"frame\": 2}, {\"frame\": 4, \"period_s\": 1.00001}",
          "/frames/1 (frame 4)/period_s"},
@@ -468,7 +485,8 @@ int main(void) {
         cmocka_unit_test(rolling_shutters_take_their_time),
         cmocka_unit_test(scale_and_own_window),
         cmocka_unit_test(a_file_drives_the_frames),
-        cmocka_unit_test(times_that_do_not_fit),
+        cmocka_unit_test(ramps_are_not_binned),
+        cmocka_unit_test(settings_that_do_not_fit),
         cmocka_unit_test(dropped_frames_follow_the_seed),
         cmocka_unit_test(dropped_frames_come_in_bursts),
     };

@@ -102,6 +102,28 @@ static void a_straight_group_is_gauss_legendre(void **state) {
     free(list.items);
 }
 
+/* A path that moves, rests and moves faster: the node of the rest is exact, and groups beside it
+ * are beside a jump of the speed. */
+static void groups_beside_a_rest_have_a_larger_error(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const bst_smear_path_point path[] = {
+        {{0, 0, 0}, 0.0}, {{30, 0, 0}, 0.4}, {{30, 0, 0}, 0.7}, {{90, 0, 0}, 1.0}};
+    bst_smear_node_list list = {0};
+    bst_assert_ok(&ctx, make_nodes(&ctx, path, 4, 0.03, 0.0, &list));
+    int rest = 0;
+    for (int n = 0; n < list.count; n++) {
+        rest = list.items[n].weight > list.items[rest].weight ? n : rest;
+    }
+    bst_assert_close(list.items[rest].weight, 0.3, 1e-12);
+    assert_true(rest > 12 && rest < list.count - 12);
+    assert_true(list.items[rest].predicted == 0.0);
+    double before = list.items[rest - 12].predicted, after = list.items[rest + 12].predicted;
+    assert_true(list.items[rest - 1].predicted > 2.0 * before && before > 0.0);
+    assert_true(list.items[rest + 1].predicted > 2.0 * after && after > 0.0);
+    free(list.items);
+}
+
 static void long_segments_are_cut_and_finer_levels_have_more(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -390,6 +412,7 @@ int main(void) {
         cmocka_unit_test(long_groups_smooth_their_error),
         cmocka_unit_test(a_group_keeps_its_moments),
         cmocka_unit_test(a_straight_group_is_gauss_legendre),
+        cmocka_unit_test(groups_beside_a_rest_have_a_larger_error),
         cmocka_unit_test(jitter_is_kept_to_the_tolerance),
         cmocka_unit_test(long_segments_are_cut_and_finer_levels_have_more),
         cmocka_unit_test(s_bends_and_reversals_are_predicted),

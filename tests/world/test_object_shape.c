@@ -168,11 +168,11 @@ static void glints_are_neither_missed_nor_smeared(void **state) {
             .view = view,
             .camera = camera,
             .span = {0, 100, 100.5},
+            .lit = {0, 0, (int)camera->width_px, (int)camera->height_px},
             .window = {0, 0, (int)camera->width_px, (int)camera->height_px},
             .q_mid = {0, 0, 0, 1},
-            .centre = {0, 0, 1},
-            .margin_px = 1e9,
-            .radius = BST_PI};
+            .cone = {{0, 0, 1}, BST_PI},
+            .margin_px = 1e9};
         bst_scene_object_parts parts = {.body = NULL};
         bst_scene_source source;
         bool there;
@@ -180,7 +180,7 @@ static void glints_are_neither_missed_nor_smeared(void **state) {
         bst_scene_path_light light;
         bst_scene_source_path path;
         bst_assert_ok(&ctx, bst_world_view_path(&ctx, view, &query.span, 0, &path, &light, &mid));
-        query.centre = mid.apparent;
+        query.cone.axis = mid.apparent;
         query.q_mid = bst_quat_look(mid.apparent, (bst_vec3){0, 0, 1});
         bst_assert_ok(&ctx, bst_field_object(&ctx, &query, 0, &parts, &source, &there));
         assert_true(there && source.rate);

@@ -51,23 +51,22 @@ static bst_status write_frame(bst_ctx *ctx, job *j, const series *s, int64_t i, 
         .key = bst_rng_make_key(j->scenario->seed, (uint64_t)j->scenario->run, j->name, s->type),
         .exposure_id = i,
         .start_s = j->start_s};
-    j->start_s += s->exposure_s + 1.0;
     bst_frame *frame;
     const uint16_t *pixels;
     BST_TRY(bst_renderer_render(ctx, j->renderer, &request, &frame));
     bst_status status = bst_frame_map(frame, ctx, &pixels);
     if (status == BST_OK) {
-        bst_fits_frame head = {
-            .id = i,
-            .start = bst_time_add(j->scenario->epoch, (double)i * (s->exposure_s + 1.0)),
-            .exposure_s = s->exposure_s,
-            .window = request.window,
-            .binning = 1,
-            .bits = (int)camera->bits};
+        bst_fits_frame head = {.id = i,
+                               .start = bst_time_add(j->scenario->epoch, request.start_s),
+                               .exposure_s = s->exposure_s,
+                               .window = request.window,
+                               .binning = 1,
+                               .bits = (int)camera->bits};
         status = bst_fits_write(ctx, fits, &head, pixels, frame->width, frame->height, NULL);
         bst_frame_unmap(frame);
     }
     bst_frame_release(frame);
+    j->start_s += s->exposure_s + 1.0;
     return status;
 }
 

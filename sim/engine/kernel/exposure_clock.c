@@ -21,6 +21,7 @@ typedef struct exposure_clock {
     } set;                        /* by the scenario */
     bst_window full, own, window; /* of the sensor, of the scenario, of the current exposure */
     int binning;
+    bool ramp;                 /* the detector reads a ramp: frames are not binned */
     double pixel_scale_arcsec; /* 0: the camera's scale */
     bst_frame_cursor updates;  /* exposures from a file, frame by frame; updates NULL: none */
     double dropped_fraction;
@@ -88,6 +89,28 @@ static bst_status check_rows(const bst_module_env *env, const exposure_clock *cl
                             "the detector's row_time_s)",
                             bst_frame_updates_name(c.updates), (long long)c.frame, c.period_s,
                             c.exposure_s + 2.0 * lead_s);
+        }
+    }
+    return BST_OK;
+}
+
+/* Checks that no frame of a ramp is binned: pixels of a ramp are summed after they are read, each
+ * with the noise of its own line, which bst_camera_read_noise_e does not contain. */
+static bst_status check_ramp(const bst_module_env *env, const bst_exposure_config *c,
+                             const bst_frame_updates *updates) {
+    static const char why[] =
+        "the camera's detector/ramp reads each pixel by itself (allowed: 1, "
+        "or ramp/reads 0)";
+    if (c->binning > 1) {
+        return bst_fail(env->ctx, BST_ERR_CONFIG, "binning: %lld, but %s", (long long)c->binning,
+                        why);
+    }
+    for (int i = 0; updates && i < bst_frame_updates_count(updates); i++) {
+        const bst_frame_update *u = bst_frame_updates_item(updates, i);
+        if (u->binning > 1) {
+            return bst_fail(
+                env->ctx, BST_ERR_CONFIG, "%s: /frames/%d (frame %lld)/binning: %d, but %s",
+                bst_frame_updates_name(updates), i, (long long)u->frame, u->binning, why);
         }
     }
     return BST_OK;
@@ -161,6 +184,10 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     }
     const bst_frame_updates *updates =
         bst_world_frame_updates(env->world, env->observer, env->sensor);
+    clock->ramp = camera->detector.ramp.reads > 0;
+    if (status == BST_OK && clock->ramp) {
+        status = check_ramp(env, c, updates);
+    }
     if (status == BST_OK && updates) {
         status = check_updates(env, updates);
         clock->updates = bst_frame_cursor_begin(updates, camera, c, (double)env->tick_rate_hz);
@@ -220,7 +247,7 @@ static void latch(exposure_clock *clock, const bst_sensor_command *command) {
         int64_t period = commanded_ticks(clock, command->period_s);
         clock->period_ticks = period > 0 ? period : 1;
     }
-    if (command->binning > 0) {
+    if (command->binning > 0 && !clock->ramp) {
         clock->binning = command->binning;
     }
     if (command->pixel_scale_arcsec > 0.0) {
@@ -307,6 +334,7 @@ static void take_changes(exposure_clock *clock, const exposure_clock *saved) {
     if (saved->set.binning != clock->set.binning) {
         clock->binning = (int)clock->set.binning;
     }
+    clock->binning = clock->ramp ? 1 : clock->binning; /* commanded before there was a ramp */
     if (memcmp(&saved->own, &clock->own, sizeof saved->own) != 0) {
         clock->window = clock->own;
     }

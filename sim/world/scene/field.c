@@ -267,10 +267,11 @@ typedef struct query {
     bst_los_track own; /* track of the exposure alone */
     bst_quat mean;
     bst_window window;
-    bst_window lit;   /* part of the sensor whose sources count: the window, or more */
-    double margin_px; /* around `lit`, including the motion during the exposure */
-    bst_vec3 centre;  /* cone of directions that contains `lit` with its margin: axis, half angle */
-    double radius;
+    bst_window lit;           /* part of the sensor whose sources count: the window, or more */
+    bool wider;               /* it is more */
+    double margin_px;         /* around `lit`, including the motion during the exposure */
+    bst_scene_cone cone;      /* contains `lit` with its margin */
+    bst_scene_cone near_cone; /* contains the window with its margin */
     bst_world_state eye;
     bst_bodies bodies;
     bst_mat3 itrf_from_gcrf;
@@ -339,23 +340,24 @@ static bst_window light_window(const bst_camera *camera, bst_window window) {
     return window;
 }
 
-/* Computes the cone of directions that contains the lit part of the sensor. */
-static void find_cone(const bst_field *field, query *q) {
+/* Computes the cone of directions that contains a part of the sensor with its margin. */
+static bst_scene_cone find_cone(const bst_field *field, const query *q, bst_window window) {
     const bst_camera *camera = field->camera;
-    bst_window window = q->lit;
+    bst_scene_cone cone;
     bst_vec3 centre_cam = bst_camera_unproject(camera, window.x0 + 0.5 * (window.width - 1),
                                                window.y0 + 0.5 * (window.height - 1));
-    q->centre = bst_quat_rotate(bst_quat_conj(field->q_mid), centre_cam);
-    q->radius = APPARENT_SHIFT_RAD;
+    cone.axis = bst_quat_rotate(bst_quat_conj(field->q_mid), centre_cam);
+    cone.radius = APPARENT_SHIFT_RAD;
     if (camera->geometry.general) {
-        q->radius +=
+        cone.radius +=
             bst_camera_reach_rad(camera, centre_cam, window.x0 - q->margin_px,
                                  window.y0 - q->margin_px, window.x0 + window.width + q->margin_px,
                                  window.y0 + window.height + q->margin_px, q->margin_px);
     } else {
-        q->radius += atan(bst_camera_scale_rad(camera) *
-                          (0.5 * hypot(window.width, window.height) + sqrt(2.0) * q->margin_px));
+        cone.radius += atan(bst_camera_scale_rad(camera) *
+                            (0.5 * hypot(window.width, window.height) + sqrt(2.0) * q->margin_px));
     }
+    return cone;
 }
 
 /* Computes the background of the exposure: bright bodies, sky and stars that are not rendered. */
@@ -382,9 +384,9 @@ static bst_status find_background(bst_ctx *ctx, bst_field *field, const query *q
                                               window.y0 + 0.5 * (window.height - 1));
     } else if (field->faint) {
         double pixel_sr = bst_camera_scale_rad(camera) * bst_camera_scale_rad(camera);
-        truth->background_e +=
-            bst_faint_sky_undrawn(field->world->faint, q->centre, q->v_limit, q->faint_limit) *
-            pixel_sr * bst_camera_electrons_per_s(camera, 0.0) * q->exposure_s;
+        truth->background_e += bst_faint_sky_undrawn(field->world->faint, q->near_cone.axis,
+                                                     q->v_limit, q->faint_limit) *
+                               pixel_sr * bst_camera_electrons_per_s(camera, 0.0) * q->exposure_s;
     }
     return BST_OK;
 }
@@ -394,7 +396,7 @@ static bst_status query_stars(bst_ctx *ctx, bst_field *field, const query *q, do
                               int *count) {
     int known, drawn = 0;
     for (;;) {
-        BST_TRY(bst_stars_query(ctx, bst_world_stars(field->world), q->centre, q->radius,
+        BST_TRY(bst_stars_query(ctx, bst_world_stars(field->world), q->cone.axis, q->cone.radius,
                                 q->v_limit, julian_year, field->stars, field->star_capacity,
                                 &known));
         if (known > field->star_capacity) {
@@ -403,8 +405,8 @@ static bst_status query_stars(bst_ctx *ctx, bst_field *field, const query *q, do
         }
         if (field->faint) {
             int room = field->star_capacity - known;
-            BST_TRY(bst_faint_stars_query(ctx, field->faint, q->centre, q->radius, q->faint_limit,
-                                          field->stars + known, room, &drawn));
+            BST_TRY(bst_faint_stars_query(ctx, field->faint, q->cone.axis, q->cone.radius,
+                                          q->faint_limit, field->stars + known, room, &drawn));
             if (drawn > room) {
                 BST_TRY(reserve_stars(ctx, field, known + drawn + drawn / 4));
                 continue;
@@ -423,15 +425,19 @@ static bool make_star(const bst_field *field, const query *q, const bst_star *st
     if (!near_window(field, field->q_mid, apparent, q->lit, q->margin_px)) {
         return false;
     }
-    *s = (bst_scene_source){.kind = BST_SOURCE_STAR,
-                            .id = star->id,
-                            .apparent_mid = apparent,
-                            .electrons_per_s = bst_camera_star_electrons_per_s(
-                                camera, (double)star->v_mag, (double)star->b_minus_v),
-                            .v_mag = (double)star->v_mag,
-                            .sunlit_fraction = NAN,
-                            .phase_rad = NAN,
-                            .range_m = INFINITY};
+    *s = (bst_scene_source){
+        .kind = BST_SOURCE_STAR,
+        .id = star->id,
+        .apparent_mid = apparent,
+        .electrons_per_s =
+            bst_camera_star_electrons_per_s(camera, (double)star->v_mag, (double)star->b_minus_v),
+        .v_mag = (double)star->v_mag,
+        .sunlit_fraction = NAN,
+        .phase_rad = NAN,
+        .range_m = INFINITY,
+        .outside =
+            q->wider && !(bst_vec3_angle(star->icrs, q->near_cone.axis) <= q->near_cone.radius &&
+                          near_window(field, field->q_mid, apparent, q->window, q->margin_px))};
     bool coloured = camera->psf && bst_psf_spectra(camera->psf) > 1;
     if (coloured && !isnan(star->b_minus_v)) {
         bst_psf_colour(camera->psf, bst_optics_star_spectrum_k((double)star->b_minus_v), s->colour);
@@ -455,7 +461,7 @@ static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, i
     bst_time_tt(bst_world_time(field->world, q->mid_s), &tt1, &tt2);
     BST_TRY(query_stars(ctx, field, q, 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
     const bst_world_view_span span = {field->observer, q->start_s, q->end_s};
-    BST_TRY(bst_world_view_near(ctx, field->view, &span, q->centre, q->radius, field->near,
+    BST_TRY(bst_world_view_near(ctx, field->view, &span, q->cone.axis, q->cone.radius, field->near,
                                 &near_count));
     BST_TRY(reserve_sources(ctx, field, star_count + near_count));
     for (int i = 0; i < star_count; i++) {
@@ -466,10 +472,12 @@ static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, i
                                             .camera = field->camera,
                                             .span = span,
                                             .q_mid = field->q_mid,
-                                            .window = q->lit,
+                                            .lit = q->lit,
+                                            .window = q->window,
+                                            .wider = q->wider,
                                             .margin_px = q->margin_px,
-                                            .centre = q->centre,
-                                            .radius = q->radius};
+                                            .cone = q->cone,
+                                            .near_cone = q->near_cone};
     for (int i = 0, used = 0; i < near_count; i++) {
         bool there;
         if (is_self(field, field->near[i])) {
@@ -503,7 +511,9 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     truth->start_tick = start_tick;
     truth->end_tick = end_tick;
     fill_header(field, &q, truth);
-    find_cone(field, &q);
+    q.cone = find_cone(field, &q, q.lit);
+    q.wider = memcmp(&q.lit, &window, sizeof window) != 0;
+    q.near_cone = q.wider ? find_cone(field, &q, window) : q.cone;
     BST_TRY(find_background(ctx, field, &q, truth));
     BST_TRY(find_sources(ctx, field, &q, count));
     *sources = field->sources;

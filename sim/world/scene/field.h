@@ -59,6 +59,8 @@ typedef struct bst_scene_source {
     double ra_rad, dec_rad; /* as in bst_truth_item */
     double sunlit_fraction, phase_rad, range_m;
     bool occulted; /* behind the Earth, a star also behind a body: no light */
+    bool outside;  /* far from the window, which only charge that moves brings its light to:
+                      rendered, but not in the truth (bst_field_options.read_charge) */
 } bst_scene_source;
 
 /* Relative position of an object at time u in [0, 1] of the exposure: quartic through five

@@ -10,8 +10,10 @@
 /* instants of the exposure at which an object's light is sampled */
 enum { TIMES = 16 };
 
-/* Checks whether an object's image path touches the window. disc: its angular radius, rad. */
-static bool path_touches(const bst_scene_object_query *q, const bst_scene_source *s, double disc) {
+/* Checks whether an object's image path touches a part of the sensor, within the cone that contains
+ * it. disc: its angular radius, rad. */
+static bool path_touches(const bst_scene_object_query *q, const bst_scene_source *s, double disc,
+                         bst_window part, const bst_scene_cone *cone) {
     enum { PIECES = 8 };
     double disc_px = tan(disc) / bst_camera_scale_rad(q->camera) * bst_camera_stretch(q->camera);
     bst_vec3 at[PIECES + 1];
@@ -31,14 +33,14 @@ static bool path_touches(const bst_scene_object_query *q, const bst_scene_source
     }
     for (int k = 0; k < PIECES; k++) {
         double arc = bst_vec3_angle(at[k], at[k + 1]);
-        if (bst_vec3_angle(q->centre, at[k]) > q->radius + disc + 1.25 * arc) {
+        if (bst_vec3_angle(cone->axis, at[k]) > cone->radius + disc + 1.25 * arc) {
             continue;
         }
         double reach = q->margin_px + disc_px + bend;
-        if (fmax(x[k], x[k + 1]) >= q->window.x0 - reach &&
-            fmin(x[k], x[k + 1]) <= q->window.x0 + q->window.width - 1 + reach &&
-            fmax(y[k], y[k + 1]) >= q->window.y0 - reach &&
-            fmin(y[k], y[k + 1]) <= q->window.y0 + q->window.height - 1 + reach) {
+        if (fmax(x[k], x[k + 1]) >= part.x0 - reach &&
+            fmin(x[k], x[k + 1]) <= part.x0 + part.width - 1 + reach &&
+            fmax(y[k], y[k + 1]) >= part.y0 - reach &&
+            fmin(y[k], y[k + 1]) <= part.y0 + part.height - 1 + reach) {
             return true;
         }
     }
@@ -304,10 +306,12 @@ bst_status bst_field_object(bst_ctx *ctx, const bst_scene_object_query *q, int o
     const bst_world_object_info *info = bst_scene_view_object(q->view, object);
     double radius = info->shape ? info->shape->satellite->radius_m / mid.range_m
                                 : sqrt(info->area_m2 / BST_PI) / mid.range_m;
-    *there = path_touches(q, out, mid.glow.resolved && radius < 1.0 ? asin(radius) : 0.0);
+    double disc = mid.glow.resolved && radius < 1.0 ? asin(radius) : 0.0;
+    *there = path_touches(q, out, disc, q->lit, &q->cone);
     if (!*there) {
         return BST_OK;
     }
+    out->outside = q->wider && !path_touches(q, out, disc, q->window, &q->near_cone);
     course c = {q, object, &parts->path, &light};
     if (!mid.occulted && q->span.end_s > q->span.start_s &&
         sample_light(&c, &parts->rate, &out->electrons_per_s)) {

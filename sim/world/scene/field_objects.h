@@ -7,16 +7,22 @@
 #include "sim/world/scene/source_body.h"
 #include "sim/world/world_internal.h"
 
+/* A cone of directions: axis (unit, GCRF), half angle in rad. */
+typedef struct bst_scene_cone {
+    bst_vec3 axis;
+    double radius;
+} bst_scene_cone;
+
 typedef struct bst_scene_object_query {
     bst_world_view *view;
     const bst_camera *camera;
     bst_world_view_span span;
-    bst_quat q_mid; /* camera attitude at mid-exposure */
-    bst_window window;
-    double margin_px; /* around the window, including the motion during the exposure */
-    bst_vec3
-        centre; /* axis of the cone of directions (GCRF) that contains the window with its margin */
-    double radius; /* half angle of the cone, rad */
+    bst_quat q_mid;    /* camera attitude at mid-exposure */
+    bst_window lit;    /* part of the sensor whose sources count: the window, or more */
+    bst_window window; /* beside which a source is `outside`, if `lit` is wider */
+    bool wider;
+    double margin_px;               /* around both, including the motion during the exposure */
+    bst_scene_cone cone, near_cone; /* contain `lit` and the window with the margin */
 } bst_scene_object_query;
 
 /* Inputs of an object's brightness during an exposure. */

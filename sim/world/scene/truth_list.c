@@ -32,8 +32,8 @@ static int by_index(const void *a, const void *b) {
     return (p > q) - (p < q);
 }
 
-/* Selects the sources of the truth message if it has no room for all: objects, then the brightest
- * stars. */
+/* Selects the sources of the truth message: those near the window; if it has no room for all of
+ * them, objects, then the brightest stars. */
 static bst_status pick_sources(bst_ctx *ctx, bst_truth_list *list, const bst_scene_source *sources,
                                int count, int capacity) {
     if (count > list->capacity) {
@@ -44,12 +44,17 @@ static bst_status pick_sources(bst_ctx *ctx, bst_truth_list *list, const bst_sce
         list->picks = more;
         list->capacity = 2 * count;
     }
+    int n = 0;
     for (int i = 0; i < count; i++) {
-        list->picks[i] =
-            (pick){sources[i].electrons_per_s, i, sources[i].kind == BST_SOURCE_OBJECT};
+        if (!sources[i].outside) {
+            list->picks[n++] =
+                (pick){sources[i].electrons_per_s, i, sources[i].kind == BST_SOURCE_OBJECT};
+        }
     }
-    qsort(list->picks, (size_t)count, sizeof *list->picks, objects_then_brightest);
-    qsort(list->picks, (size_t)capacity, sizeof *list->picks, by_index);
+    if (n > capacity) {
+        qsort(list->picks, (size_t)n, sizeof *list->picks, objects_then_brightest);
+        qsort(list->picks, (size_t)capacity, sizeof *list->picks, by_index);
+    }
     return BST_OK;
 }
 
@@ -112,15 +117,20 @@ bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_tru
                                bst_truth *truth, int capacity, int *source_of) {
     assert(list && q && truth && capacity >= 0 && q->count >= 0);
     assert(q->sources || q->count == 0);
-    truth->count = q->count < capacity ? q->count : capacity;
-    truth->lost = q->count - truth->count;
-    if (truth->lost > 0) {
+    int near = 0;
+    for (int i = 0; i < q->count; i++) {
+        near += !q->sources[i].outside;
+    }
+    truth->count = near < capacity ? near : capacity;
+    truth->lost = near - truth->count;
+    bool all = truth->count == q->count;
+    if (!all) {
         BST_TRY(pick_sources(ctx, list, q->sources, q->count, capacity));
     }
     BST_TRY(reserve_indices(ctx, list, truth->count));
     int binning = q->binning > 1 ? q->binning : 1;
     for (int i = 0; i < truth->count; i++) {
-        int k = truth->lost > 0 ? list->picks[i].index : i;
+        int k = all ? i : list->picks[i].index;
         bst_field_truth_item(q->field, q->track, &q->sources[k], q->window, binning, truth,
                              &truth->items[i]);
         list->source_of[i] = k;

@@ -34,10 +34,10 @@ typedef struct bst_truth_request {
 } bst_truth_request;
 
 /* Fills items (room for `capacity`) and shapes of `truth` by bst_field_truth_item, after
- * bst_field_query has filled its header. Flags sources that saturate a pixel's well or, after
- * binning, the converter. If there is no room for all, objects and the brightest stars are kept in
- * source order; truth->lost counts the others. source_of (may be NULL): [capacity], the source
- * index of each item. BST_ERR_MEMORY. */
+ * bst_field_query has filled its header. Sources `outside` the window are left out. Flags sources
+ * that saturate a pixel's well or, after binning, the converter. If there is no room for all,
+ * objects and the brightest stars are kept in source order; truth->lost counts the others.
+ * source_of (may be NULL): [capacity], the source index of each item. BST_ERR_MEMORY. */
 bst_status bst_truth_list_fill(bst_ctx *ctx, bst_truth_list *list, const bst_truth_request *request,
                                bst_truth *truth, int capacity, int *source_of) BST_MUST_CHECK;
 
