@@ -10,7 +10,6 @@
 
 #include <civetweb.h>
 
-#include "sim/core/wall_clock.h"
 #include "view/live_socket.h"
 #include "view/page_files.h"
 #include "view/request_guard.h"
@@ -27,10 +26,6 @@
 #define REQUEST_BYTES "8192"
 /* Bytes that are handed to the system at a time: IDLE_MS is counted for each. */
 enum { PIECE_BYTES = 16384 };
-/* Time for a whole body, s, and more for each MiB: a slow one would keep its place among the
- * answers. */
-#define BODY_S 2.0
-#define BODY_S_PER_MIB 1.0
 /* Answers with data in memory at the same time. */
 enum { ANSWERS_MOST = 12 };
 
@@ -155,13 +150,12 @@ static answer page_file(const char *route) {
 
 /* ------------------------------------------------------------------ data */
 
-/* Reads the body of a request, whose length was checked. NULL: it ends early, or takes too long. */
+/* Reads the body of a request, whose length was checked. NULL: it ends early. */
 static char *read_body(struct mg_connection *peer, int64_t bytes) {
     char *body = bytes >= 0 ? malloc((size_t)bytes + 1) : NULL;
-    const double end = bst_wall_seconds() + BODY_S + BODY_S_PER_MIB * (double)bytes / 1048576.0;
     for (int64_t got = 0; body && got < bytes;) {
         int n = mg_read(peer, body + got, (size_t)(bytes - got));
-        if (n <= 0 || bst_wall_seconds() > end) {
+        if (n <= 0) {
             free(body);
             return NULL;
         }
