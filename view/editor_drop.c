@@ -4,9 +4,11 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -23,25 +25,37 @@
 /* Longest name of a file. */
 enum { NAME_BYTES = 64 };
 
+/* Values of JSON that are read: 80 bytes of memory each. */
+enum { JSON_VALUES = 2000000 };
+
+/* One file at a time: reading one takes memory. */
+static pthread_mutex_t reading = PTHREAD_MUTEX_INITIALIZER;
+
 static bool begins(const char *data, size_t bytes, const char *with) {
     const size_t n = strlen(with);
     return bytes >= n && memcmp(data, with, n) == 0;
 }
 
-/* True for a file name with this extension. */
+/* True for a file name with this extension, in letters of any case. */
 static bool has_extension(const char *name, const char *extension) {
     const char *dot = strrchr(name, '.');
-    return dot && strcmp(dot, extension) == 0;
+    return dot && strcasecmp(dot, extension) == 0;
 }
 
 /* ------------------------------------------------------------------ element sets */
 
+/* Adds a set as the lines of a TLE. A number that these cannot hold is 0 there, and the name of a
+ * set without one. */
 static bst_status add_set(bst_ctx *ctx, const bst_elements *set, cJSON *list) {
-    char line1[BST_TLE_CHARS + 1], line2[BST_TLE_CHARS + 1];
-    BST_TRY(bst_tle_format(ctx, set, line1, line2));
+    char line1[BST_TLE_CHARS + 1], line2[BST_TLE_CHARS + 1], number[16];
+    bst_elements lines = *set;
+    const bool fits = set->norad <= BST_TLE_NORAD_MOST;
+    lines.norad = fits ? set->norad : 0;
+    snprintf(number, sizeof number, "%d", set->norad);
+    BST_TRY(bst_tle_format(ctx, &lines, line1, line2));
     cJSON *node = cJSON_CreateObject();
     cJSON_AddItemToArray(list, node);
-    cJSON_AddStringToObject(node, "name", set->name);
+    cJSON_AddStringToObject(node, "name", fits || *set->name ? set->name : number);
     cJSON_AddNumberToObject(node, "norad", set->norad);
     cJSON_AddStringToObject(node, "line1", line1);
     cJSON_AddStringToObject(node, "line2", line2);
@@ -51,26 +65,28 @@ static bst_status add_set(bst_ctx *ctx, const bst_elements *set, cJSON *list) {
 static bst_status read_elements(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                                 cJSON *out) {
     bst_elements *sets = NULL;
-    int count = 0;
+    int count = 0, listed = 0, left_out = 0;
+    bst_ctx misfit = {0};
     BST_TRY(bst_elements_read_buffer(ctx, name, data, bytes, NULL, &sets, &count));
     cJSON_AddStringToObject(out, "kind", "elements");
     cJSON_AddNumberToObject(out, "total", count);
     cJSON *list = cJSON_AddArrayToObject(out, "satellites");
-    bst_status status = BST_OK;
-    for (int i = 0; i < count && i < BST_VIEW_DROP_SETS && status == BST_OK; i++) {
-        status = add_set(ctx, &sets[i], list);
-        status = status == BST_OK ? BST_OK : bst_fail_prefix(ctx, status, "%s", name);
+    for (int i = 0; i < count && listed < BST_VIEW_DROP_SETS; i++) {
+        const bool added = add_set(&misfit, &sets[i], list) == BST_OK;
+        listed += added;
+        left_out += !added;
     }
     free(sets);
-    return status;
+    cJSON_AddNumberToObject(out, "left_out", left_out);
+    return listed > 0 ? BST_OK : bst_fail(ctx, BST_ERR_ARGUMENT, "%s: %s", name, misfit.message);
 }
 
 /* ------------------------------------------------------------------ files for readers of files */
 
 /* A file with the name of the dropped one, in a folder of its own. */
 typedef struct scratch_file {
-    char folder[64];
-    char path[64 + NAME_BYTES + 2];
+    char folder[1024];
+    char path[1024 + NAME_BYTES + 2];
 } scratch_file;
 
 static void scratch_remove(scratch_file *file) {
@@ -85,7 +101,12 @@ static bool write_file(int fd, const char *data, size_t bytes) {
 
 static bst_status scratch_make(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                                scratch_file *out) {
-    snprintf(out->folder, sizeof out->folder, "/tmp/boresight-drop-XXXXXX");
+    const char *base = getenv("TMPDIR");
+    const int length = snprintf(out->folder, sizeof out->folder, "%s/boresight-drop-XXXXXX",
+                                base && *base ? base : "/tmp");
+    if (length < 0 || (size_t)length >= sizeof out->folder) {
+        return bst_fail(ctx, BST_ERR_IO, "TMPDIR: the path is too long");
+    }
     if (!mkdtemp(out->folder)) {
         return bst_fail(ctx, BST_ERR_IO, "%s: %s", out->folder, strerror(errno));
     }
@@ -131,11 +152,13 @@ static bst_status keep_file(bst_ctx *ctx, const char *name, const char *data, si
                                name);
     }
     BST_TRY(bst_draft_make(ctx, name, draft, sizeof draft, &fd));
-    if (write_file(fd, data, bytes) && rename(draft, name) == 0) {
-        return BST_OK;
-    }
+    /* link() replaces no file that has appeared meanwhile */
+    const bool good = write_file(fd, data, bytes) && link(draft, name) == 0;
     const int why = errno;
     unlink(draft);
+    if (good) {
+        return BST_OK;
+    }
     return bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", name, strerror(why));
 }
 
@@ -164,11 +187,13 @@ static bst_status read_shape(bst_ctx *ctx, const char *name, const char *data, s
 
 /* ------------------------------------------------------------------ frames */
 
-/* Adds something that the file says. Returns the list of its changes. */
-static cJSON *add_offer(cJSON *offers, const char *from, const char *text) {
+/* Adds something that the file says, which has no check mark if its meaning is unsure. Returns the
+ * list of its changes. */
+static cJSON *add_offer(cJSON *offers, const char *from, const char *text, bool unsure) {
     cJSON *offer = cJSON_CreateObject();
     cJSON_AddStringToObject(offer, "text", text);
     cJSON_AddStringToObject(offer, "from", from);
+    cJSON_AddBoolToObject(offer, "unsure", unsure);
     cJSON_AddItemToArray(offers, offer);
     return cJSON_AddArrayToObject(offer, "changes");
 }
@@ -204,7 +229,9 @@ static void offer_number(bst_fits_source *source, const char *const *names, cons
     char text[120];
     if (number_of(source, names, &value, &from) && value >= range[0] && value <= range[1]) {
         snprintf(text, sizeof text, what, value);
-        add_change(add_offer(offers, from, text), key, cJSON_CreateNumber(value));
+        /* GAIN is a setting without a unit in many headers */
+        const bool unsure = strcmp(from, "GAIN") == 0;
+        add_change(add_offer(offers, from, text, unsure), key, cJSON_CreateNumber(value));
     }
 }
 
@@ -223,12 +250,12 @@ static void offer_pointing(bst_fits_source *source, const bst_fits_source_frame 
                                  dec / BST_DEG_RAD};
     snprintf(text, sizeof text, "Cue to the middle of the frame: RA %.5f, Dec %.5f deg",
              direction[0], direction[1]);
-    cJSON *changes = add_offer(offers, "WCS", text);
+    cJSON *changes = add_offer(offers, "WCS", text, false);
     add_change(changes, "cue/direction_radec_deg", cJSON_CreateDoubleArray(direction, 2));
     add_change(changes, "cue/object", cJSON_CreateString(""));
     if (scale >= 0.001 && scale <= 600.0) {
         snprintf(text, sizeof text, "Pixel scale %.5g arcsec", scale);
-        add_change(add_offer(offers, "WCS", text), "camera/pixel_scale_arcsec",
+        add_change(add_offer(offers, "WCS", text, false), "camera/pixel_scale_arcsec",
                    cJSON_CreateNumber(scale));
     }
 }
@@ -247,18 +274,19 @@ static void offer_epoch(bst_fits_source *source, cJSON *offers) {
     }
     if (bst_time_from_utc(&ignored, date, &time) == BST_OK) {
         snprintf(text, sizeof text, "The scenario begins at the time of the frame: %s", date);
-        add_change(add_offer(offers, "DATE-OBS", text), "/epoch_utc", cJSON_CreateString(date));
+        add_change(add_offer(offers, "DATE-OBS", text, false), "/epoch_utc",
+                   cJSON_CreateString(date));
     }
 }
 
 static void offer_all(bst_fits_source *source, const bst_fits_source_frame *frame, cJSON *offers) {
     static const char *const exposure[] = {"EXPTIME", "EXPOSURE", ""},
-                             *const gain[] = {"GAIN", "EGAIN", ""},
+                             *const gain[] = {"EGAIN", "GAIN", ""},
                              *const noise[] = {"RDNOISE", "READNOIS", ""};
     char text[80];
     snprintf(text, sizeof text, "Sensor of %d x %d px", frame->width, frame->height);
     if (frame->width <= 16384 && frame->height <= 16384) {
-        cJSON *size = add_offer(offers, "NAXIS1, NAXIS2", text);
+        cJSON *size = add_offer(offers, "NAXIS1, NAXIS2", text, false);
         add_change(size, "camera/width_px", cJSON_CreateNumber(frame->width));
         add_change(size, "camera/height_px", cJSON_CreateNumber(frame->height));
     }
@@ -291,6 +319,22 @@ static bst_status read_frame(bst_ctx *ctx, const char *name, const char *data, s
 
 /* ------------------------------------------------------------------ any file */
 
+/* True for text that JSON can be, with more values than are read: each but the first one comes
+ * after one of these characters. */
+static bool has_many_values(const char *data, size_t bytes) {
+    size_t start = 0, values = 0;
+    while (start < bytes && strchr(" \t\r\n", data[start]) && data[start]) {
+        start++;
+    }
+    if (start == bytes || (data[start] != '{' && data[start] != '[')) {
+        return false;
+    }
+    for (size_t i = start; i < bytes; i++) {
+        values += data[i] == ',' || data[i] == '[' || data[i] == '{';
+    }
+    return values > JSON_VALUES;
+}
+
 /* True for JSON with a key "asset" at its root, as glTF has. */
 static bool is_gltf(const char *data, size_t bytes) {
     cJSON *root = cJSON_ParseWithLength(data, bytes);
@@ -302,6 +346,10 @@ static bool is_gltf(const char *data, size_t bytes) {
 static bst_status look(bst_ctx *ctx, const char *name, const char *data, size_t bytes, cJSON *out) {
     if (begins(data, bytes, "SIMPLE  =")) {
         return read_frame(ctx, name, data, bytes, out);
+    }
+    if (has_many_values(data, bytes)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT, "%s: has more values than are read (allowed: %d)",
+                        name, JSON_VALUES);
     }
     if (begins(data, bytes, "glTF") || has_extension(name, ".glb") ||
         has_extension(name, ".gltf") || is_gltf(data, bytes)) {
@@ -327,7 +375,9 @@ bst_status bst_view_editor_drop(bst_ctx *ctx, const char *name, const char *data
             name, NAME_BYTES);
     }
     *out = cJSON_CreateObject();
+    pthread_mutex_lock(&reading);
     bst_status status = look(ctx, name, data, bytes, *out);
+    pthread_mutex_unlock(&reading);
     return status == BST_OK || status == BST_ERR_IO || status == BST_ERR_MEMORY ? status
                                                                                 : BST_ERR_ARGUMENT;
 }

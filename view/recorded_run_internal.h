@@ -55,7 +55,7 @@ struct bst_view_run {
     bst_view_sensor sensor[BST_EXPORT_SENSORS];
     uint64_t requests;
     size_t samples;                         /* held by all lines */
-    bst_run_scene *scene;                   /* its world; NULL: not made (view/space.c) */
+    bst_run_scene *scene;                   /* its world; NULL: not made (view/space_scene.c) */
     struct bst_view_thumbnails *thumbnails; /* NULL: none (view/thumbnail_store.h) */
 };
 

@@ -47,8 +47,8 @@ typedef struct bst_view_request {
  *            refused. The port may be any, as `ssh -L` changes it. Origin must be that of Host, or
  *            missing: browsers send it with every request of a foreign page's script, and with
  *            every POST, which needs it. Only POST has a body, of at most BST_VIEW_BODY_BYTES
- * (BST_VIEW_FILE_BYTES for BST_VIEW_FILE_ROUTE). The time of the comparison does not depend on how
- * many digits of the token are right. */
+ *            (BST_VIEW_FILE_BYTES for BST_VIEW_FILE_ROUTE). The time of the comparison does not
+ *            depend on how many digits of the token are right. */
 int bst_view_guard(const bst_view_request *request, const char *token,
                    char route[BST_VIEW_ROUTE_BYTES]);
 

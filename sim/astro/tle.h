@@ -15,7 +15,10 @@
 bst_status bst_tle_parse(bst_ctx *ctx, const char *line1, const char *line2,
                          bst_elements *out) BST_MUST_CHECK;
 
-enum { BST_TLE_CHARS = 69 };
+enum {
+    BST_TLE_CHARS = 69,
+    BST_TLE_NORAD_MOST = 339999 /* greatest catalogue number of a TLE: Alpha-5 */
+};
 
 /* Writes one element set as its two lines, which bst_tle_parse reads.
  * Given: set (of any source; its name is not in the lines).

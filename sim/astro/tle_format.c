@@ -6,7 +6,7 @@
 #include "boresight/vec.h"
 #include "sim/astro/tle.h"
 
-enum { ALPHA5_FIRST = 100000, ALPHA5_END = 340000 };
+enum { ALPHA5_FIRST = 100000, ALPHA5_END = BST_TLE_NORAD_MOST + 1 };
 
 /* Appends the checksum: sum of digits modulo 10, a minus counts 1. */
 static void put_checksum(char *line) {

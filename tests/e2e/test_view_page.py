@@ -237,6 +237,10 @@ class Page(unittest.TestCase):
             self.assertEqual((shown[0], shown[-1]), (0, 23))
             width = page.evaluate("[document.getElementById('strip').scrollWidth, document.getElementById('strip').clientWidth]")
             self.assertLessEqual(width[0], width[1])
+            # fields of the stretch show the longest level of 16 bits whole
+            for name, value in (("black", "-65536"), ("white", "131072")):
+                wide = page.evaluate(f"(() => {{ const field = document.getElementById('{name}'), was = field.value; field.value = '{value}'; const found = [field.scrollWidth, field.clientWidth]; field.value = was; return found; }})()")
+                self.assertLessEqual(wide[0], wide[1], name)
             sky = "(() => { const c = document.querySelector('#strip canvas'), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; return [c.width, Math.max(...d.filter((_, k) => k % 4 === 0))]; })()"
             self.assertEqual(page.evaluate(sky), [79, 255])
             page.evaluate(f"document.querySelector('[data-frame=\"{shown[3]}\"]').click()")

@@ -12,6 +12,7 @@ import os
 import re
 import shutil
 import sqlite3
+import tempfile
 import unittest
 import urllib.error
 import urllib.request
@@ -60,6 +61,11 @@ class Editor(test_view.Viewer):
 def resolved(*words, folder="."):
     """The scenario as `boresight check` prints it."""
     return json.loads(runs.call("check", *words, cwd=folder).stdout)
+
+
+def scratch_folders():
+    """Folders of dropped files, of this user's viewers."""
+    return {name for name in os.listdir(tempfile.gettempdir()) if name.startswith("boresight-drop-")}
 
 
 def elements(page):
@@ -178,6 +184,14 @@ class Server(unittest.TestCase):
         status, found = self.drop("omm.json", json.dumps(omm).encode())
         self.assertEqual((status, found["satellites"][0]["name"]), (200, "OTHER"))
         self.assertIn("22167.5", found["satellites"][0]["line1"])
+        # a number that no TLE holds is 0 in the lines; what they cannot hold otherwise is left out
+        late = {**omm, "NORAD_CAT_ID": 799500002, "EPOCH": "2061-01-01T00:00:00"}
+        status, found = self.drop("new.json", json.dumps([omm, {**omm, "NORAD_CAT_ID": 340000}, {**omm, "NORAD_CAT_ID": 799500001, "OBJECT_NAME": ""}, late]).encode())
+        self.assertEqual((status, found["total"], found["left_out"], [one["name"] for one in found["satellites"]]), (200, 4, 1, ["OTHER", "OTHER", "799500001"]), found)
+        self.assertEqual([(one["norad"], one["line1"][2:7], one["line2"][2:7]) for one in found["satellites"]],
+                         [(44801, "44801", "44801"), (340000, "00000", "00000"), (799500001, "00000", "00000")])
+        status, answer = self.drop("late.json", json.dumps(late).encode())
+        self.assertEqual((status, answer[:10]), (400, "late.json:"), answer)
         with open("scenarios/catalogue_2022-06.tle", "rb") as file:
             text = file.read()
         status, found = self.drop("many.tle", text)
@@ -185,6 +199,7 @@ class Server(unittest.TestCase):
         self.assertEqual((found["total"], len(found["satellites"])), (sets, min(sets, 500)))
         for name, data, words in (("a.tle", b"hello\n", "a.tle"), ("b.json", json.dumps({**omm, "ECCENTRICITY": 3}).encode(), "b.json: /ECCENTRICITY"),
                                   ("c.txt", lines[first][:-1] + b"0\n" + lines[first + 1], "c.txt:1"), ("d.bin", b"\0\1\2", "d.bin: is of no known kind (allowed: element sets"),
+                                  ("f.json", b" [" + b"0," * 2000001 + b"0]", "f.json: has more values than are read (allowed: 2000000)"),
                                   ("e.tle", b"", "e.tle: is empty"), ("omm.xml", b"<?xml version='1.0'?><omm/>", "omm.xml"), ("-x.tle", lines[first], "is no name for a file")):
             status, answer = self.drop(name, data)
             self.assertEqual(status, 400, (name, answer))
@@ -205,6 +220,9 @@ class Server(unittest.TestCase):
             self.assertTrue(answer.startswith(words), answer)
             self.assertNotIn("/tmp", answer)
         self.assertEqual(self.drop("sat.bin", data)[0], 400)
+        status, found = self.drop("OTHER.GLB", data)
+        self.assertEqual((status, found["file"]), (200, "OTHER.GLB"), found)
+        os.remove(os.path.join(self.folder, "OTHER.GLB"))
         self.assertFalse(os.path.exists(os.path.join(self.folder, "sat.glb")))
         for _ in range(2):
             status, found = self.drop("sat.glb", data)
@@ -226,6 +244,7 @@ class Server(unittest.TestCase):
         header = fits.Header()
         header.update({"CTYPE1": "RA---TAN", "CTYPE2": "DEC--TAN", "CRPIX1": 11.0, "CRPIX2": 5.0, "CRVAL1": 359.99, "CRVAL2": -20.0, "CD1_1": -1e-3, "CD1_2": 2e-4,
                        "CD2_1": 2e-4, "CD2_2": 1e-3, "EXPTIME": 1.25, "DATE-OBS": "2022-06-16T22:10:00.5", "GAIN": 2.5, "RDNOISE": -3.0})
+        left = scratch_folders()
         buffer = io.BytesIO()
         fits.PrimaryHDU(numpy.zeros((40, 64), "u2"), header).writeto(buffer)
         status, found = self.drop("frame.fits", buffer.getvalue())
@@ -238,6 +257,14 @@ class Server(unittest.TestCase):
         # a read noise below 0 is none
         self.assertEqual(changes, {"camera/width_px": 64, "camera/height_px": 40, "cue/object": "", "exposure/exposure_s": 1.25, "camera/gain_e_per_dn": 2.5,
                                    "/epoch_utc": "2022-06-16T22:10:00.5Z"})
+        # GAIN can be a setting without a unit: no check mark, and not where EGAIN is
+        self.assertEqual([offer["from"] for offer in found["offers"] if offer["unsure"]], ["GAIN"])
+        header["EGAIN"] = 1.5
+        buffer = io.BytesIO()
+        fits.PrimaryHDU(numpy.zeros((40, 64), "u2"), header).writeto(buffer)
+        offers = [(offer["from"], offer["unsure"], one["value"]) for offer in self.drop("both.fits", buffer.getvalue())[1]["offers"]
+                  for one in offer["changes"] if one["key"] == "camera/gain_e_per_dn"]
+        self.assertEqual(offers, [("EGAIN", False, 1.5)])
         # a header without WCS offers the size
         buffer = io.BytesIO()
         fits.PrimaryHDU(numpy.zeros((4, 6), "f4")).writeto(buffer)
@@ -247,7 +274,7 @@ class Server(unittest.TestCase):
             status, answer = self.drop("bad.fits", bad)
             self.assertEqual((status, answer[:8]), (400, "bad.fits"), answer)
             self.assertNotIn("/tmp", answer)
-        self.assertEqual([name for name in os.listdir("/tmp") if name.startswith("boresight-drop-")], [])
+        self.assertEqual(scratch_folders() - left, set())
 
     def test_run_starts_only_scenarios(self):
         """No option of the command, no folder, no other file; the reason of a scenario that cannot run comes back."""

@@ -201,8 +201,16 @@ class Page(unittest.TestCase):
             document.getElementById('panel-editor').dispatchEvent(new DragEvent('drop', { dataTransfer: transfer, bubbles: true, cancelable: true })); })"""
         with chromium.Chromium(1280, 800) as page:
             self.open(page)
+            # beside the editor a file is neither taken nor opened by the browser
+            left = """(where => ['dragover', 'drop'].map((name) => { const transfer = new DataTransfer(); transfer.items.add(new File(['x'], 'left.tle'));
+                const event = new DragEvent(name, { dataTransfer: transfer, bubbles: true, cancelable: true }); document.querySelector(where).dispatchEvent(event); return event.defaultPrevented; }))"""
+            for where in ("header", "#tabs", "footer"):
+                self.assertEqual(page.evaluate(f"{left}('{where}')"), [True, True], where)
+            self.assertNotIn("left.tle", page.evaluate("document.getElementById('editor-message').textContent"))
             page.evaluate(f"{drop}('my sat.tle', {json.dumps(chr(10).join(['MINE', *lines[first:first + 2]]))})")
             page.wait_for("document.querySelector('dialog.drop').open")
+            self.assertEqual(page.evaluate(f"{left}('dialog.drop')"), [True, True])
+            self.assertEqual(page.evaluate("document.getElementById('drop-title').textContent"), "my sat.tle")
             self.assertEqual(page.evaluate("[document.getElementById('drop-for').value, document.getElementById('drop-set-label').hidden]"), ["/world/objects/0", True])
             page.evaluate("document.getElementById('drop-use').click()")
             orbit = page.evaluate("[document.editor.root.world.objects[0].orbit, document.editor.root.world.objects[0].name]")

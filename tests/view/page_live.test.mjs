@@ -66,3 +66,15 @@ test('while a run goes on, pixels that the screen cannot show are binned; they a
   one.ask();
   assert.deepEqual(asked.map(({ binning, after }) => [binning, after]), [[2, 7], [1, 0], [1, 0], [1, 7]]);
 });
+
+test('rewound: nothing of the discarded future is kept', () => {
+  const { one } = live(), element = document.getElementById, done = [];
+  document.getElementById = () => ({ classList: { toggle() {} } });
+  const state = { time_s: 2, duration_s: 9, obeyed: 0, run: 0, steps: 0, paused: true, steered: true, states: [], message: '' };
+  Object.assign(one, { state, states: '[]', shown: 1, trail: [1], app: { cache: { clear: () => done.push('cache') }, strip: { forget: () => done.push('strip') }, count: 3, current: 2 } });
+  one.describe({ ...state, time_s: 1 }, '');
+  assert.deepEqual([one.app.current, done], [2, []]);
+  one.describe({ ...state, time_s: 5 }, '');
+  assert.deepEqual([one.app.current, done, one.trail], [-1, ['cache', 'strip'], []]);
+  document.getElementById = element;
+});

@@ -87,6 +87,10 @@ test('keep-out cones: their half angles, and how far a direction is from what th
   // 90 deg from the nadir is 60 deg from the limb
   assert.ok(Math.abs(clearance(cones[2], [0, 0, 1]) * 180 / Math.PI - 60) < 1e-9);
   assert.ok(Math.abs(clearance(cones[0], [0, 1, 0])) < 1e-9);
+  // the whole sky is kept out, but for a millionth of a radian, as the program has it
+  const [wide] = conesOf({ ...off, earth: true, earth_limb_deg: 179 }, [1.001, 0, 0], [0, 1, 0], [60, 0, 0]);
+  assert.ok(Math.abs(wide.angle - Math.PI + 1e-6) < 1e-12);
+  assert.ok(Math.abs(clearance(wide, [0, 0, 1])) < 1e-9); // within the air: the limb is at 90 deg
   const { lines } = coneShape([2, 0, 0], cones[0]);
   for (let k = 0; k < lines.length; k += 3) { // the apex, or a point of the rim
     const along = [lines[k] - 2, lines[k + 1], lines[k + 2]], far = Math.hypot(...along);
@@ -104,4 +108,31 @@ test('facets of a joint are turned and moved; their normals look outside', async
   const found = bodyVertices(shape, pose);
   assert.deepEqual([...found.slice(9, 18)], [1, 0, 0, 0, 0, 1, 0.5, 0.5, 0.5]);
   assert.deepEqual([...found.slice(45, 54)], [0, 0, 6, 0, -1, 0, 1, 0, 0]);
+});
+
+test('a failed request for an attitude is made again at another time; an attitude counts as recorded at its own time only', async () => {
+  const { ShapePass } = await import('../../view/page/space_shape.js'), asked = [];
+  globalThis.fetch = async (address) => {
+    asked.push(String(address));
+    if (asked.length === 1) return { ok: false, status: 503, text: async () => 'busy' };
+    const numbers = String(address).includes('shape') ? [0, 0] : [0, 0, 0, 1, 1, 1];
+    return { ok: true, arrayBuffer: async () => Float64Array.from(numbers).buffer };
+  };
+  const gl = new Proxy({}, { get: () => () => {} }), program = { at: () => 0 };
+  const painter = { gl, program: () => program, buffer: () => ({ buffer: 0 }), use() {}, input() {}, draw() {} };
+  const pass = new ShapePass(painter, [{ object: 0, radius_m: 5 }], () => {}), one = pass.shapes.get(0);
+  const camera = { eye: [1, 1e-5, 0], field: 0.7, aspect: 1, turned: Float64Array.from({ length: 16 }, (_, k) => Number(k % 5 === 0)) };
+  const drawn = async (time) => {
+    const now = pass.draw(0, { sensor: 0, time, sun: [0, 1, 0], place: [1, 0, 0], observer: null }, camera);
+    await new Promise((done) => { setTimeout(done, 5); });
+    return now;
+  };
+  await drawn(1);
+  assert.equal(one.problem, 'busy');
+  await drawn(1);
+  assert.equal(asked.length, 1); // not again and again
+  await drawn(2);
+  assert.deepEqual([one.problem, one.poseAt], ['', 2]);
+  const now = await drawn(2), later = await drawn(3);
+  assert.deepEqual([now.recorded && now.current, later.current, (await drawn(3)).current], [true, false, true]);
 });

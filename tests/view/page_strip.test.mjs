@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import test from 'node:test';
 
 Object.assign(globalThis, { location: { search: '' } });
-const { chooseFrames, greyOf } = await import('../../view/page/strip.js');
+const { chooseFrames, greyOf, Strip } = await import('../../view/page/strip.js');
 
 test('frames are spread evenly from the first to the last one', () => {
   assert.deepEqual(chooseFrames(0, 3, 11, false), [0, 1, 2, 3]);
@@ -34,4 +34,24 @@ test('noise is dark and a point of light is bright', () => {
   const rest = Array.from({ length: 1000 }, (_, k) => grey[4 * k]).filter((_, k) => k !== 123);
   assert.ok(rest.reduce((sum, one) => sum + one, 0) / rest.length < 90);
   assert.deepEqual([...greyOf(new Uint16Array(9)).slice(0, 4)], [0, 0, 0, 255]); // a frame without light
+});
+
+test('after a rewind no picture of the discarded future is left, nor comes', async () => {
+  globalThis.fetch = () => new Promise((done) => { setTimeout(() => done({ ok: true, headers: new Map([['X-Frame-Width', '1'], ['X-Frame-Height', '1']]), arrayBuffer: async () => new ArrayBuffer(2) }), 5); });
+  const strip = Object.assign(Object.create(Strip.prototype), { kept: new Map(), box: { querySelector: () => null }, app: { sensor: 0, frames: [0, 1.5, 0.1, 0, 0, 1, 2.5, 0.1, 0, 0], timeOf: (k) => k + 1.5 } });
+  await strip.load([0], new AbortController().signal);
+  assert.equal(strip.kept.size, 1);
+  strip.request = new AbortController();
+  const loading = strip.load([1], strip.request.signal);
+  strip.forget();
+  await loading;
+  assert.equal(strip.kept.size, 0);
+});
+
+test('the list of frames is looked through once', () => {
+  let looks = 0;
+  const frames = { some: (test) => { looks++; return [0, 1, 1, -1, 0, 1, 2, 1, 0, 0].some(test); } }, strip = Object.assign(Object.create(Strip.prototype), { app: { frames }, looked: {} });
+  assert.deepEqual([strip.anyPixels(), strip.anyPixels(), looks], [true, true, 1]);
+  strip.app.frames = [0, 1, 1, -1, 0];
+  assert.equal(strip.anyPixels(), false);
 });

@@ -1,7 +1,7 @@
 // Two runs beside each other or one over the other: frames at the same time, plots, and the difference of their figures.
 import { addStyle, getJson, getNumbers, getPixels, post } from './api.js';
 import { make } from './editor_form.js';
-import { makePainter } from './frame_gl.js';
+import { makePainter, originOf } from './frame_gl.js';
 import { drawMarks, KINDS, sortMarks } from './marks.js';
 import { readLines, shortNumber, ticksOf } from './plots.js';
 import { describePixels, limitsOf } from './statistics.js';
@@ -107,19 +107,21 @@ class Side {
 
   /** @param {{black: number, white: number} | null} limits of both runs */
   draw(limits, soft) {
-    const ratio = devicePixelRatio || 1, width = this.stage.clientWidth, height = this.stage.clientHeight;
+    const ratio = devicePixelRatio || 1, whole = (side) => Math.max(1, Math.round(side * ratio)) / ratio; // pixels of the screen
+    const width = whole(this.stage.clientWidth), height = whole(this.stage.clientHeight);
     for (const canvas of [this.canvas, this.overlay]) {
-      canvas.width = Math.max(1, Math.round(width * ratio));
-      canvas.height = Math.max(1, Math.round(height * ratio));
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+      Object.assign(canvas.style, { width: `${width}px`, height: `${height}px` });
     }
     const { image, details } = this, context = this.overlay.getContext('2d');
     const frame = image || { width: 1024, height: 1024 }, scale = Math.min(width / frame.width, height / frame.height);
-    const centre = { x: (frame.width - 1) / 2, y: (frame.height - 1) / 2 };
-    this.painter.draw(image, { centreX: centre.x, centreY: centre.y, scale: scale * ratio, black: limits ? limits.black : 0,
+    const originX = originOf(this.canvas.width, (frame.width - 1) / 2, scale * ratio), originY = originOf(this.canvas.height, (frame.height - 1) / 2, scale * ratio);
+    this.painter.draw(image, { originX, originY, scale: scale * ratio, black: limits ? limits.black : 0,
       white: limits ? limits.white : 65535, soft, invert: false });
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     if (!details) return;
-    const toScreen = (x, y) => ({ x: (x - centre.x) * scale + width / 2, y: (y - centre.y) * scale + height / 2 });
+    const toScreen = (x, y) => ({ x: originX / ratio + (x + 0.5) * scale, y: originY / ratio + (y + 0.5) * scale });
     drawMarks(context, sortMarks(details), details.wcs, { toScreen, scale, width, height, shown: Object.fromEntries(KINDS.map((kind) => [kind.name, kind.shown])) });
   }
 }

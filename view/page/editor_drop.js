@@ -6,7 +6,7 @@ import { layout, make } from './editor_form.js';
 const FILE_BYTES = 40 * 2 ** 20;
 
 /** A name as the server takes it. @param {string} name */
-export const plainName = (name) => name.replace(/[^A-Za-z0-9_.-]/g, '_').replace(/^[.-]/, '_').slice(-60);
+export const plainName = (name) => name.replace(/[^A-Za-z0-9_.-]/g, '_').slice(-60).replace(/^[.-]/, '_');
 
 /**
  * Parts of a scenario that can take what a file has, by pointer.
@@ -25,10 +25,15 @@ export function placesFor(kind, root) {
   return places;
 }
 
+/** @param {DragEvent} event */
+const hasFiles = (event) => Boolean(event.dataTransfer) && [...event.dataTransfer.types].includes('Files');
+
 export class DropDialog {
   /** @param {HTMLElement} area onto which files are dropped @param {any} editor */
   constructor(area, editor) {
     this.editor = editor;
+    this.area = area;
+    this.reading = false;
     this.dialog = make('dialog', { className: 'satellites drop' });
     this.dialog.append(layout('layout-drop'));
     this.dialog.setAttribute('aria-labelledby', 'drop-title');
@@ -43,28 +48,41 @@ export class DropDialog {
       if (input.files.length) this.take(input.files[0]);
       input.value = '';
     });
-    area.addEventListener('dragover', (event) => {
-      if (![...event.dataTransfer.types].includes('Files')) return;
-      event.preventDefault();
-      area.classList.add('dropping');
-    });
+    // anywhere else the browser would leave the page for the file
+    for (const name of ['dragover', 'drop']) {
+      document.addEventListener(name, (/** @type {any} */ event) => {
+        if (!hasFiles(event)) return;
+        event.preventDefault();
+        if (!this.isFor(event)) event.dataTransfer.dropEffect = 'none';
+      });
+    }
+    area.addEventListener('dragover', (event) => { if (this.isFor(event)) area.classList.add('dropping'); });
     for (const name of ['dragleave', 'drop']) area.addEventListener(name, () => area.classList.remove('dropping'));
     area.addEventListener('drop', (event) => {
       const files = event.dataTransfer.files;
-      if (!files.length) return;
-      event.preventDefault();
+      if (!files.length || !this.isFor(event)) return;
       if (files.length > 1) this.editor.say(`${files.length} files were dropped (allowed: one).`);
       else this.take(files[0]);
     });
   }
 
+  /** True for a drag of files over the editor, while no dialog is open. @param {DragEvent} event */
+  isFor(event) {
+    return hasFiles(event) && this.area.contains(/** @type {Node} */ (event.target)) && !document.querySelector('dialog[open]');
+  }
+
   /** @param {File} file */
   async take(file) {
     const { editor } = this;
+    if (this.reading) {
+      editor.say(`${file.name}: another file is being read.`);
+      return;
+    }
     if (file.size > FILE_BYTES) {
       editor.say(`${file.name}: has ${(file.size / 2 ** 20).toFixed(1)} MiB (allowed: ${FILE_BYTES / 2 ** 20} MiB).`);
       return;
     }
+    this.reading = true;
     try {
       editor.say(`${file.name} is read …`);
       this.found = await postFile('editor/file', plainName(file.name), file);
@@ -73,13 +91,14 @@ export class DropDialog {
     } catch (error) {
       editor.say(error.message);
     }
+    this.reading = false;
   }
 
   show(name) {
     const { found } = this, places = placesFor(found.kind, this.editor.root), element = this.element;
     const many = found.satellites && found.satellites.length > 1;
     const what = {
-      elements: () => `${found.total} element ${found.total === 1 ? 'set' : 'sets'}${found.total > found.satellites.length ? `; the first ${found.satellites.length} are listed` : ''}.`,
+      elements: () => `${found.total} element ${found.total === 1 ? 'set' : 'sets'}${found.total - found.left_out > found.satellites.length ? `; the first ${found.satellites.length} are listed` : ''}${found.left_out ? `; ${found.left_out} that a TLE cannot hold left out` : ''}.`,
       shape: () => `A shape of ${found.parts} ${found.parts === 1 ? 'part' : 'parts'} and ${found.facets} facets, ${(2 * found.radius_m).toPrecision(3)} m across, now in the folder as ${found.file}.`,
       frame: () => 'A frame. What its header says:',
     }[found.kind]();
@@ -90,7 +109,7 @@ export class DropDialog {
     element('drop-for').replaceChildren(...places.map((one) => make('option', { value: one.pointer, textContent: one.name, dir: 'auto' })));
     element('drop-offers').hidden = found.kind !== 'frame';
     element('drop-offers').replaceChildren(...(found.offers || []).map((offer, k) => {
-      const box = make('input', { type: 'checkbox', checked: true, value: String(k) });
+      const box = make('input', { type: 'checkbox', checked: !offer.unsure, value: String(k) });
       return make('label', { className: 'inline' }, box, offer.text, make('span', { className: 'state', textContent: `(${offer.from})` }));
     }));
     element('drop-use').disabled = places.length === 0;

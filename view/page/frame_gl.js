@@ -1,11 +1,21 @@
 // Draws 16-bit pixels with a stretch: by WebGL2, or on a 2D canvas where there is none.
 
 /**
- * What is drawn where. `centre`: place on the frame at the middle of the canvas; `scale`: pixels of
- * the screen per pixel of the frame; `soft`: digital numbers, 0 for a linear stretch.
- * @typedef {{ centreX: number, centreY: number, scale: number, black: number, white: number,
+ * What is drawn where. `origin`: place on the canvas of the outer corner of pixel 0, 0; `scale`: pixels of
+ * the screen per pixel of the image; `soft`: digital numbers, 0 for a linear stretch.
+ * @typedef {{ originX: number, originY: number, scale: number, black: number, white: number,
  *   soft: number, invert: boolean }} Drawing
  */
+
+/**
+ * Place on a canvas of the outer edge of an image's pixel 0. Where a pixel of the image covers one of the screen or more, it
+ * is a whole pixel: else all edges of an image could lie on middles of the screen's pixels, and be drawn half a pixel off.
+ * @param {number} side of the canvas @param {number} centre place on the image at its middle @param {number} scale pixels of the screen per pixel of the image
+ */
+export function originOf(side, centre, scale) {
+  const origin = side / 2 - (centre + 0.5) * scale;
+  return scale >= 1 ? Math.round(origin) : origin;
+}
 
 const VERTEX = `#version 300 es
 void main() { // one triangle over the whole canvas
@@ -16,13 +26,13 @@ void main() { // one triangle over the whole canvas
 const FRAGMENT = `#version 300 es
 precision highp float; precision highp int; precision highp usampler2D;
 uniform usampler2D image;
-uniform vec2 size, canvas, centre;
+uniform vec2 size, canvas, origin;
 uniform float scale, black, white, soft;
 uniform bool invert;
 out vec4 colour;
 void main() {
   vec2 screen = vec2(gl_FragCoord.x, canvas.y - gl_FragCoord.y);
-  vec2 place = (screen - 0.5 * canvas) / scale + centre + 0.5; // pixel i covers i to i + 1
+  vec2 place = (screen - origin) / scale; // pixel i covers i to i + 1
   if (any(lessThan(place, vec2(0.0))) || any(greaterThanEqual(place, size))) {
     colour = vec4(0.0);
     return;
@@ -84,7 +94,7 @@ class WebglPainter {
     }
     gl.useProgram(program);
     this.places = {};
-    for (const name of ['size', 'canvas', 'centre', 'scale', 'black', 'white', 'soft', 'invert']) {
+    for (const name of ['size', 'canvas', 'origin', 'scale', 'black', 'white', 'soft', 'invert']) {
       this.places[name] = gl.getUniformLocation(program, name);
     }
     gl.bindVertexArray(gl.createVertexArray());
@@ -112,7 +122,7 @@ class WebglPainter {
     const at = this.places;
     gl.uniform2f(at.size, image.width, image.height);
     gl.uniform2f(at.canvas, canvas.width, canvas.height);
-    gl.uniform2f(at.centre, d.centreX, d.centreY);
+    gl.uniform2f(at.origin, d.originX, d.originY);
     for (const name of ['scale', 'black', 'white', 'soft']) gl.uniform1f(at[name], d[name]);
     gl.uniform1i(at.invert, d.invert ? 1 : 0);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
@@ -136,10 +146,10 @@ class WebglPainter {
 }
 
 /** Ranges of the image's pixels that lie below each pixel of the screen along an axis; empty outside the image. */
-function rangesOf(count, centre, scale, size) {
+function rangesOf(count, origin, scale, size) {
   const from = new Int32Array(count), to = new Int32Array(count), reach = scale >= 1 ? 0 : 0.5 / scale;
   for (let k = 0; k < count; k++) {
-    const place = (k + 0.5 - count / 2) / scale + centre + 0.5;
+    const place = (k + 0.5 - origin) / scale;
     if (!(place >= 0 && place < size)) continue;
     from[k] = reach ? Math.max(0, Math.floor(place - reach + 0.5)) : Math.floor(place);
     to[k] = Math.max(from[k] + 1, reach ? Math.min(size, Math.floor(place + reach + 0.5)) : 0);
@@ -180,7 +190,7 @@ class CanvasPainter {
       this.words = new Uint32Array(this.out.data.buffer);
     }
     const colours = this.coloursOf(d), { words } = this, { data } = image;
-    const columns = rangesOf(width, d.centreX, d.scale, image.width), rows = rangesOf(height, d.centreY, d.scale, image.height);
+    const columns = rangesOf(width, d.originX, d.scale, image.width), rows = rangesOf(height, d.originY, d.scale, image.height);
     words.fill(0);
     for (let y = 0, k = 0; y < height; y++) {
       const ay = rows.from[y], by = rows.to[y], skipY = Math.max(1, (by - ay) >> 2);

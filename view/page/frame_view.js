@@ -1,5 +1,5 @@
 // The picture of a frame: zoom, stretch, marks, the pixel under the cursor.
-import { makePainter } from './frame_gl.js';
+import { makePainter, originOf } from './frame_gl.js';
 import { drawCompass, drawMarks, drawShape, KINDS, sortMarks } from './marks.js';
 import { describePixels, limitsOf } from './statistics.js';
 import { formatDec, formatRa, pixelToSky } from './wcs.js';
@@ -92,11 +92,11 @@ export class FrameView {
   }
 
   drawing() {
-    const ratio = devicePixelRatio || 1, law = element('law').value, limits = this.limits || { black: 0, white: 65535 };
+    const law = element('law').value, limits = this.limits || { black: 0, white: 65535 };
     const sigma = this.statistics ? this.statistics.sigma : 1;
+    const { x, y, scale } = this.origin();
     return {
-      centreX: (this.view.x + 0.5) / this.binning() - 0.5, centreY: (this.view.y + 0.5) / this.binning() - 0.5,
-      scale: this.view.scale * ratio * this.binning(),
+      originX: x, originY: y, scale,
       black: limits.black, white: Math.max(limits.white, limits.black + 1),
       soft: law === 'asinh' ? 3 * sigma : 0, invert: element('invert').checked,
     };
@@ -104,28 +104,37 @@ export class FrameView {
 
   // ---------------------------------------------------------------- geometry
 
+  /** Size of the picture in px of the page: whole pixels of the screen. */
   size() {
-    return { width: this.stage.clientWidth, height: this.stage.clientHeight };
+    const ratio = devicePixelRatio || 1, whole = (side) => Math.max(1, Math.round(side * ratio)) / ratio;
+    return { width: whole(this.stage.clientWidth), height: whole(this.stage.clientHeight) };
+  }
+
+  /** Where the painter has the corner of the image, and its scale, in pixels of the screen. */
+  origin() {
+    const n = this.binning(), scale = this.view.scale * (devicePixelRatio || 1) * n, { width, height } = this.canvas;
+    return { x: originOf(width, (this.view.x + 0.5) / n - 0.5, scale), y: originOf(height, (this.view.y + 0.5) / n - 0.5, scale), scale };
   }
 
   resize() {
     const ratio = devicePixelRatio || 1, { width, height } = this.size();
     for (const canvas of [this.canvas, this.overlay]) {
-      canvas.width = Math.max(1, Math.round(width * ratio));
-      canvas.height = Math.max(1, Math.round(height * ratio));
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+      Object.assign(canvas.style, { width: `${width}px`, height: `${height}px` });
     }
     if (this.view.fitted) this.fit();
     this.redraw();
   }
 
   toScreen(x, y) {
-    const { width, height } = this.size();
-    return { x: (x - this.view.x) * this.view.scale + width / 2, y: (y - this.view.y) * this.view.scale + height / 2 };
+    const origin = this.origin(), ratio = devicePixelRatio || 1;
+    return { x: origin.x / ratio + (x + 0.5) * this.view.scale, y: origin.y / ratio + (y + 0.5) * this.view.scale };
   }
 
   toFrame(x, y) {
-    const { width, height } = this.size();
-    return { x: (x - width / 2) / this.view.scale + this.view.x, y: (y - height / 2) / this.view.scale + this.view.y };
+    const origin = this.origin(), ratio = devicePixelRatio || 1;
+    return { x: (x - origin.x / ratio) / this.view.scale - 0.5, y: (y - origin.y / ratio) / this.view.scale - 0.5 };
   }
 
   frameSize() {
@@ -148,13 +157,9 @@ export class FrameView {
 
   /** Zooms so that the place under (x, y) of the screen stays. */
   zoomTo(scale, x, y) {
-    const { width, height } = this.size();
-    const place = this.toFrame(x ?? width / 2, y ?? height / 2);
-    const next = Math.min(SCALE_MOST, Math.max(SCALE_LEAST, scale));
-    this.view = {
-      scale: next, fitted: false,
-      x: place.x - ((x ?? width / 2) - width / 2) / next, y: place.y - ((y ?? height / 2) - height / 2) / next,
-    };
+    const { width, height } = this.size(), dx = (x ?? width / 2) - width / 2, dy = (y ?? height / 2) - height / 2;
+    const next = Math.min(SCALE_MOST, Math.max(SCALE_LEAST, scale)), change = 1 / this.view.scale - 1 / next;
+    this.view = { scale: next, fitted: false, x: this.view.x + dx * change, y: this.view.y + dy * change };
     this.redraw();
   }
 

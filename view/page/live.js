@@ -225,6 +225,7 @@ export class Live {
     if (before && state.time_s < before.time_s - 1e-9) { // rewound: what came later is recorded anew
       this.trail = [];
       this.app.cache.clear();
+      this.app.strip.forget();
       this.app.current = -1;
     }
   }

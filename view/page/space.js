@@ -392,9 +392,9 @@ export class SpaceView {
     }
     if (shape) {
       pair('Sunlight', `${Math.round(100 * shape.sunlit)} %`);
-      pair('Attitude', shape.recorded ? 'as recorded in this frame' : 'of the scenario at this time');
+      pair('Attitude', !shape.current ? 'of another time, until it is loaded' : shape.recorded ? 'as recorded in this frame' : 'of the scenario at this time');
     }
-    for (const { problem } of this.shapes.shapes.values()) if (problem) pair('Shape', problem);
+    for (const { problem, problemAt } of this.shapes.shapes.values()) if (problem && problemAt === this.time) pair('Shape', problem);
     element('space-readout').replaceChildren(...parts);
   }
 }

@@ -5,10 +5,12 @@ import { add, across, cross, dot, EARTH_M, length, scaled, unit } from './space_
 const COLOURS = { Sun: [0.94, 0.78, 0.25], Moon: [0.75, 0.78, 0.82], Earth: [0.34, 0.62, 0.91] };
 /** Length of the cones of Sun and Moon, Earth radii. */
 const LONG = 2.5;
+/** Greatest half angle of the Earth's cone, rad (control/guidance/keep_out.c). */
+const WIDEST = Math.PI - 1e-6;
 
 /**
- * @typedef {{ name: string, axis: number[], angle: number, length: number, limit: number, from: string }} Cone
- * angle: half angle, rad; limit: what the scenario gives, rad, from the centre or the limb
+ * @typedef {{ name: string, axis: number[], angle: number, length: number, limit: number, body: number, from: string }} Cone
+ * angle: half angle, rad; limit: what the scenario gives, rad, from the centre or the limb; body: angle from the axis to there, rad
  */
 
 /**
@@ -19,19 +21,19 @@ const LONG = 2.5;
  */
 export function conesOf(keepOut, eye, sun, moon) {
   const rad = Math.PI / 180, cones = [], far = length(eye);
-  if (keepOut.sun_deg > 0) cones.push({ name: 'Sun', axis: unit(sun), angle: keepOut.sun_deg * rad, limit: keepOut.sun_deg * rad, length: LONG, from: 'Sun' });
-  if (keepOut.moon_deg > 0) cones.push({ name: 'Moon', axis: unit(add(moon, eye, -1)), angle: keepOut.moon_deg * rad, limit: keepOut.moon_deg * rad, length: LONG, from: 'Moon' });
+  if (keepOut.sun_deg > 0) cones.push({ name: 'Sun', axis: unit(sun), angle: keepOut.sun_deg * rad, limit: keepOut.sun_deg * rad, body: 0, length: LONG, from: 'Sun' });
+  if (keepOut.moon_deg > 0) cones.push({ name: 'Moon', axis: unit(add(moon, eye, -1)), angle: keepOut.moon_deg * rad, limit: keepOut.moon_deg * rad, body: 0, length: LONG, from: 'Moon' });
   if (keepOut.earth) {
     const radius = 1 + 1000 * keepOut.earth_limb_altitude_km / EARTH_M, limit = keepOut.earth_limb_deg * rad;
     const limb = radius < far ? Math.asin(radius / far) : Math.PI / 2;
-    cones.push({ name: 'Earth', axis: scaled(unit(eye), -1), angle: limb + limit, limit, length: Math.max(0.3, Math.sqrt(Math.max(0, far * far - 1))), from: 'Earth\'s limb' });
+    cones.push({ name: 'Earth', axis: scaled(unit(eye), -1), angle: Math.min(limb + limit, WIDEST), limit, body: limb, length: Math.max(0.3, Math.sqrt(Math.max(0, far * far - 1))), from: 'Earth\'s limb' });
   }
   return cones.filter((cone) => cone.angle > 0 && cone.angle < Math.PI);
 }
 
 /** Angle from a cone's body, as its limit is measured, rad. @param {Cone} cone @param {number[]} direction unit */
 export function clearance(cone, direction) {
-  return Math.acos(Math.min(1, Math.max(-1, dot(cone.axis, direction)))) - (cone.angle - cone.limit);
+  return Math.acos(Math.min(1, Math.max(-1, dot(cone.axis, direction)))) - cone.body;
 }
 
 /** Points of a cone: its rim, lines of its side, and triangles. @param {number[]} apex @param {Cone} cone */

@@ -58,8 +58,8 @@ export class ShapePass {
   constructor(painter, shapes, changed) {
     this.painter = painter;
     this.changed = changed;
-    /** @type {Map<number, { radius: number, shape: Float64Array | null, pose: Float64Array | null, poseAt: number, sensor: number, buffer: any, asked: boolean, problem: string }>} */
-    this.shapes = new Map(shapes.map((one) => [one.object, { radius: one.radius_m, shape: null, pose: null, poseAt: NaN, sensor: -1, buffer: null, asked: false, problem: '' }]));
+    /** @type {Map<number, { radius: number, shape: Float64Array | null, pose: Float64Array | null, poseAt: number, sensor: number, buffer: any, asked: boolean, problem: string, problemAt: number }>} */
+    this.shapes = new Map(shapes.map((one) => [one.object, { radius: one.radius_m, shape: null, pose: null, poseAt: NaN, sensor: -1, buffer: null, asked: false, problem: '', problemAt: NaN }]));
     this.program = this.shapes.size ? painter.program(LIT, SURFACE) : null;
   }
 
@@ -71,27 +71,30 @@ export class ShapePass {
 
   /** Asks for what is needed at a time; one request of an object at a time. */
   async ask(object, one, sensor, time) {
-    if (one.asked || one.problem) return;
+    if (one.asked || (one.problem && one.problemAt === time && one.sensor === sensor)) return;
     one.asked = true;
     try {
       one.shape = one.shape || await getNumbers('space/shape', { object });
       one.pose = await getNumbers('space/pose', { sensor, object, from: time });
       one.poseAt = time;
-      one.sensor = sensor;
+      one.problem = '';
       if (one.shape[0] > 0 || !one.buffer) { // joints move
         if (one.buffer) this.painter.gl.deleteBuffer(one.buffer.buffer);
         one.buffer = this.painter.buffer(bodyVertices(one.shape, one.pose));
       }
     } catch (error) {
-      one.problem = error.message; // said in the line below the picture
+      one.problem = error.message; // said in the line below the picture; asked for again at another time
+      one.problemAt = time;
+      one.poseAt = NaN;
     }
+    one.sensor = sensor;
     one.asked = false;
     this.changed();
   }
 
   /**
-   * Draws an object if the camera is near. @returns {{ sunlit: number, recorded: boolean, ends: { sun: number[], eye: number[] } } | null}
-   * ends: of the lines to Sun and observer, Earth radii from the body; null: it is a point, or not there yet
+   * Draws an object if the camera is near. @returns {{ sunlit: number, recorded: boolean, current: boolean, ends: { sun: number[], eye: number[] } } | null}
+   * current: the attitude is that of the time; ends: of the lines to Sun and observer, Earth radii from the body; null: it is a point, or not there yet
    * @param {number} object @param {{ sensor: number, time: number, sun: number[], place: number[], observer: number[] | null }} scene
    * @param {{ eye: number[], field: number, aspect: number, turned: Float64Array }} camera
    */
@@ -116,7 +119,7 @@ export class ShapePass {
     gl.enable(gl.CULL_FACE); // a facet is seen from its outside only
     gl.drawArrays(gl.TRIANGLES, 0, 3 * one.shape[1]);
     gl.disable(gl.CULL_FACE);
-    return { sunlit: one.pose[4], recorded: one.pose[5] === 1, ends: this.drawDirections(one, scene) };
+    return { sunlit: one.pose[4], recorded: one.pose[5] === 1, current: one.poseAt === scene.time && one.sensor === scene.sensor, ends: this.drawDirections(one, scene) };
   }
 
   /** The beam of the Sun that lights it, and the line to the observer. Lengths in m from the body. */

@@ -50,6 +50,8 @@ export class Strip {
     this.frames = []; // that are shown
     this.kept = new Map(); // pictures by sensor, exposure and its time
     this.request = null;
+    this.low = matchMedia('(max-height: 560px)'); // windows in which style.css hides the strip
+    this.looked = { frames: null, any: false }; // at which list of frames, and whether one has pixels
     this.box.addEventListener('click', (event) => {
       const cell = event.target instanceof Element && event.target.closest('[data-frame]');
       if (cell instanceof HTMLElement) this.app.goTo(Number(cell.dataset.frame));
@@ -71,9 +73,15 @@ export class Strip {
     return low;
   }
 
+  anyPixels() {
+    const { frames } = this.app;
+    if (this.looked.frames !== frames) this.looked = { frames, any: frames.some((value, k) => k % NUMBERS === 3 && value >= 0) };
+    return this.looked.any;
+  }
+
   choose() {
-    const { app } = this, shown = element('strip-shown');
-    if (!(shown instanceof HTMLInputElement && shown.checked) || app.count === 0 || !app.frames.some((value, k) => k % NUMBERS === 3 && value >= 0)) return [];
+    const { app } = this;
+    if (!element('strip-shown').checked || this.low.matches || app.count === 0 || !this.anyPixels()) return [];
     const { from, to } = app.plots.range, first = this.rowAt(from - 1e-9), last = this.rowAt(to + 1e-9) - 1;
     return chooseFrames(first, last, Math.floor((element('stage').clientWidth - 16) / CELL_PX), app.inProgress());
   }
@@ -90,6 +98,12 @@ export class Strip {
     this.request = new AbortController();
     const { signal } = this.request, wanted = this.frames.filter((frame) => this.hasPixels(frame) && !this.kept.has(this.keyOf(frame)));
     this.loading = Promise.all(Array.from({ length: AT_A_TIME }, () => this.load(wanted, signal)));
+  }
+
+  /** Drops all pictures: the run goes on from an earlier time. */
+  forget() {
+    if (this.request) this.request.abort();
+    this.kept.clear();
   }
 
   hasPixels(frame) { return this.app.frames[frame * NUMBERS + 3] >= 0; }
