@@ -8,6 +8,11 @@
  * position: Earth, keep-out cones and shadow. */
 bst_tasking_why bst_tasking_glance(const bst_tasking_sensor *sensor, bst_vec3 place_m,
                                    bst_vec3 *direction);
+/* Visibility of a target from a sensor, as bst_tasking_look has it. The table of positions
+ * `place_m` rejects first, with a margin for its error and for the age of the navigation message;
+ * where it does not decide, and without such a message, bst_tasking_look does. */
+bst_status bst_tasking_survey_look(bst_ctx *ctx, const bst_tasking *tasking, int sensor, int object,
+                                   double seconds, bst_tasking_why *why) BST_MUST_CHECK;
 /* Sets the sensor's pixel noise and noise-equivalent area. */
 void bst_tasking_noise(bst_tasking_sensor *sensor);
 

@@ -52,16 +52,16 @@ void bst_tasking_telemetry(bst_tasking *t, int sensor, const bst_nav_telemetry *
     }
 }
 
+static const bst_tasking_why zone_why[BST_ZONE_KINDS] = {
+    [BST_ZONE_SUN] = BST_WHY_SUN, [BST_ZONE_MOON] = BST_WHY_MOON, [BST_ZONE_EARTH] = BST_WHY_EARTH};
+
 static bst_tasking_why zone_reason(const bst_keep_out_zone *zones, const double *cosines, int count,
                                    bst_vec3 direction) {
-    static const bst_tasking_why reasons[BST_ZONE_KINDS] = {[BST_ZONE_SUN] = BST_WHY_SUN,
-                                                            [BST_ZONE_MOON] = BST_WHY_MOON,
-                                                            [BST_ZONE_EARTH] = BST_WHY_EARTH};
     bst_tasking_why why = BST_WHY_NOT;
     for (int i = 0; i < count; i++) {
         if (bst_vec3_dot(zones[i].axis, direction) > cosines[i] &&
-            (why == BST_WHY_NOT || reasons[zones[i].kind] < why)) {
-            why = reasons[zones[i].kind];
+            (why == BST_WHY_NOT || zone_why[zones[i].kind] < why)) {
+            why = zone_why[zones[i].kind];
         }
     }
     return why;
@@ -180,10 +180,57 @@ void bst_tasking_noise(bst_tasking_sensor *s) {
     s->pixels = 1.0 / bst_optics_image_squared(sqrt(sigma2), sqrt(sigma2), 0.0);
 }
 
-/* Visibility of a target from a sensor: the quick test by the table of positions, then the exact
- * one. Without navigation telemetry there is no quick test. */
-static bst_status survey_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int object,
-                              double seconds, bst_tasking_why *why) {
+/* Error of a tabulated position, m: 4 s at 11.2 km/s, the speed of escape at the ground, and 1 km.
+ */
+#define TABLE_ERROR_M (4.0 * 11200.0 + 1000.0)
+/* more than aberration and light time, rad */
+#define APPARENT_RAD 3e-4
+
+/* Reason that holds wherever the object is within the error of its tabulated position, and the
+ * spacecraft within its motion in `age_s` since the latest navigation message. BST_WHY_NOT: the
+ * table does not decide. */
+static bst_tasking_why sure_rejection(const bst_tasking_config *c, const bst_tasking_sensor *s,
+                                      bst_vec3 place_m, double age_s) {
+    const bst_vec3 line = bst_vec3_sub(place_m, s->nav.position_gcrf_m);
+    const double range = bst_vec3_norm(line), radius = bst_vec3_norm(s->nav.position_gcrf_m);
+    const double own_m = fabs(age_s) * bst_vec3_norm(s->nav.velocity_gcrf_mps);
+    const double error_m = TABLE_ERROR_M + own_m;
+    if (!(range > error_m)) {
+        return BST_WHY_NOT;
+    }
+    /* the limb of the Earth moves by up to four times the own motion over the radius */
+    const double margin = asin(error_m / range) + 4.0 * own_m / radius + APPARENT_RAD;
+    bst_tasking_why sure = BST_WHY_COUNT, unsure = BST_WHY_COUNT;
+    for (int i = 0; i < s->zone_count; i++) {
+        const double off = bst_vec3_angle(s->zones[i].axis, line) - s->zones[i].half_angle_rad;
+        const bst_tasking_why why = zone_why[s->zones[i].kind];
+        if (off < -margin && why < sure) {
+            sure = why;
+        } else if (fabs(off) <= margin && why < unsure) {
+            unsure = why;
+        }
+    }
+    if (sure != BST_WHY_COUNT || unsure != BST_WHY_COUNT) {
+        return sure < unsure ? sure : BST_WHY_NOT;
+    }
+    if (c->earth_limb_keep_out_deg < 0.0) {
+        return BST_WHY_NOT; /* it may be behind the Earth, outside of the zone */
+    }
+    /* in the shadow even if it is farther from the axis */
+    const bst_vec3 sun_m = bst_vec3_add(s->nav.sun_m, s->nav.position_gcrf_m);
+    const bst_vec3 axis = bst_vec3_unit(sun_m);
+    const bst_vec3 across = bst_vec3_axpy(place_m, -bst_vec3_dot(place_m, axis), axis);
+    const double across_m = bst_vec3_norm(across);
+    if (!(across_m > 0.0)) {
+        return BST_WHY_NOT;
+    }
+    const bst_vec3 outer = bst_vec3_axpy(place_m, TABLE_ERROR_M / across_m, across);
+    return bst_astro_sun_fraction(outer, sun_m, BST_EARTH_POLE_J2000) < 0.5 ? BST_WHY_SHADOW
+                                                                            : BST_WHY_NOT;
+}
+
+bst_status bst_tasking_survey_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int object,
+                                   double seconds, bst_tasking_why *why) {
     const bst_tasking_sensor *s = &t->sensors[sensor];
     const bst_vec3 place = {t->place_m[0][object], t->place_m[1][object], t->place_m[2][object]};
     *why = BST_WHY_NOT;
@@ -192,8 +239,8 @@ static bst_status survey_look(bst_ctx *ctx, const bst_tasking *t, int sensor, in
     } else if (bst_vec3_norm(place) == 0.0) {
         *why = BST_WHY_NO_ORBIT;
     } else if (s->nav_known && !isnan(place.x)) {
-        bst_vec3 direction;
-        *why = bst_tasking_glance(s, place, &direction);
+        *why =
+            sure_rejection(&t->config, s, place, seconds - (double)s->nav.tick / t->tick_rate_hz);
     }
     if (*why == BST_WHY_NOT) {
         bst_tasking_visibility seen;
@@ -217,7 +264,7 @@ bst_status bst_tasking_survey(bst_ctx *ctx, bst_tasking *t, double seconds,
         bst_tasking_why best = BST_WHY_COUNT;
         for (int s = 0; s < t->sensor_count && best != BST_WHY_NOT; s++) {
             bst_tasking_why why;
-            BST_TRY(survey_look(ctx, t, s, i, seconds, &why));
+            BST_TRY(bst_tasking_survey_look(ctx, t, s, i, seconds, &why));
             /* the reason nearest to visibility */
             best = why == BST_WHY_NOT || best == BST_WHY_COUNT || why > best ? why : best;
         }

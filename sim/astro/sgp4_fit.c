@@ -214,12 +214,20 @@ bool bst_sgp4_motion(const bst_sgp4 *sgp4, double minutes, bst_vec3 *r, bst_vec3
     const double h =
         4.0; /* time step, s: truncation 1e-7 m/s in low orbits, rounding 1e-8 m/s in high ones */
     static const double weight[5] = {1.0 / 12.0, -8.0 / 12.0, 0.0, 8.0 / 12.0, -1.0 / 12.0};
+    const bst_sgp4 *sets[5];
+    double times[5];
+    bst_sgp4_state at[5];
+    for (int i = 0; i < 5; i++) {
+        sets[i] = sgp4;
+        times[i] = minutes + (i - 2) * h / 60.0;
+    }
+    bst_sgp4_propagate_many(sets, times, 5, at);
     *v = (bst_vec3){0.0, 0.0, 0.0};
     for (int i = 0; i < 5; i++) {
-        double km[3], unused[3];
-        if (bst_sgp4_propagate(sgp4, minutes + (i - 2) * h / 60.0, km, unused) != BST_SGP4_OK) {
+        if (at[i].error != BST_SGP4_OK) {
             return false;
         }
+        const double *km = at[i].position_teme_km;
         const bst_vec3 place = bst_vec3_scale((bst_vec3){km[0], km[1], km[2]}, 1e3);
         *v = bst_vec3_axpy(*v, weight[i] / h, place);
         if (i == 2) {

@@ -11,14 +11,15 @@
 #include "sim/core/json_number.h"
 #include "sim/eval/consistency.h"
 #include "sim/run/run_summary.h"
+#include "sim/run/run_used_tracks.h"
 #include "tracker/orbit/custody.h"
 
 /* tracks of a sensor at one time; more are left out */
-enum { SLOTS = 32 };
+enum { SLOTS = 64 };
 /* detections that a track needs: with fewer its rate is that of the initiation */
 enum { LEAST_HITS = 5 };
-/* A track that has had no detection for this time has ended, s. */
-#define ENDED_S 30.0
+/* numbers that tell an element set from another */
+enum { IDENTITY = 10 };
 /* chi-square of an innovation, 4 degrees of freedom: beyond it are 2e-5 of the true ones */
 #define GATE 27.0
 /* A second object in the gate makes a track ambiguous unless it is e^7 times less likely. */
@@ -59,8 +60,9 @@ struct bst_run_custody {
     bst_custody_orbit *orbits; /* [object]; a_m 0: none */
     bst_custody_filter *filters;
     score *scores;
-    double *place_m[3]; /* [object] */
-    slot (*slots)[SLOTS];
+    double *place_m[3];        /* [object] */
+    slot (*slots)[SLOTS];      /* [sensor] */
+    bst_run_used_tracks *used; /* [sensor] */
     bst_io_table *tracks, *objects;
     bst_custody_figures figures;
 };
@@ -112,12 +114,13 @@ static bst_status allocate(bst_ctx *ctx, bst_run_custody *c) {
     c->observer = calloc(sensors, sizeof *c->observer);
     c->pixel_rad = calloc(sensors, sizeof *c->pixel_rad);
     c->slots = calloc(sensors, sizeof *c->slots);
+    c->used = calloc(sensors, sizeof *c->used);
     c->orbits = calloc(n, sizeof *c->orbits);
     c->filters = calloc(n, sizeof *c->filters);
     c->scores = calloc(n, sizeof *c->scores);
     c->place_m[0] = calloc(3 * n, sizeof *c->place_m[0]);
-    if (!c->observer || !c->pixel_rad || !c->slots || !c->orbits || !c->filters || !c->scores ||
-        !c->place_m[0]) {
+    if (!c->observer || !c->pixel_rad || !c->slots || !c->used || !c->orbits || !c->filters ||
+        !c->scores || !c->place_m[0]) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the custody of %d objects",
                         c->object_count);
     }
@@ -126,9 +129,10 @@ static bst_status allocate(bst_ctx *ctx, bst_run_custody *c) {
     return BST_OK;
 }
 
-/* Starts the filter of each object on an element set, with an error drawn from its covariance. */
-static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, uint64_t seed) {
-    bst_rng_key key = bst_rng_make_key(seed, 0, "custody", "catalogue");
+/* Starts the filter of each object on an element set, with an error drawn from its covariance: by
+ * catalogue number, or by name where that is 0, so that other objects do not change it. */
+static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, uint64_t seed, uint64_t run) {
+    const bst_rng_key by_number = bst_rng_make_key(seed, run, "custody", "catalogue");
     for (int i = 0; i < c->object_count; i++) {
         double offset_s, normals[BST_CUSTODY_STATE];
         const bst_elements *elements = bst_world_elements(c->world, i, &offset_s);
@@ -136,11 +140,18 @@ static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, uint64_t seed)
         if (!elements) {
             continue;
         }
+        const bst_world_object_info *info = bst_world_object(c->world, i);
         /* half the radius of a sphere as large as the object is catalogued */
-        double photocentre_m = 0.5 * sqrt(bst_world_object(c->world, i)->area_m2 / BST_PI);
-        BST_TRY(bst_custody_orbit_init(ctx, elements, offset_s, photocentre_m, &c->orbits[i]));
+        double photocentre_m = 0.5 * sqrt(info->area_m2 / BST_PI);
+        bst_status status =
+            bst_custody_orbit_init(ctx, elements, offset_s, photocentre_m, &c->orbits[i]);
+        if (status != BST_OK) {
+            return bst_fail_prefix(ctx, status, "/record/custody");
+        }
+        const bst_rng_key key =
+            info->norad > 0 ? by_number : bst_rng_make_key(seed, run, "custody", info->name);
         for (int k = 0; k < BST_CUSTODY_STATE; k++) {
-            normals[k] = bst_rng_normal(key, (uint64_t)i, (uint64_t)k);
+            normals[k] = bst_rng_normal(key, (uint64_t)info->norad, (uint64_t)k);
         }
         bst_custody_filter_init(&c->config, &c->orbits[i], normals, &c->filters[i]);
         c->figures.objects++;
@@ -165,7 +176,8 @@ static bst_status make_tables(bst_ctx *ctx, bst_run_custody *c, bst_run *store) 
 
 bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
                                   const bst_recorder_config *record, int64_t tick_rate_hz,
-                                  uint64_t seed, bst_run *store, bst_run_custody **out) {
+                                  uint64_t seed, uint64_t run, bst_run *store,
+                                  bst_run_custody **out) {
     *out = NULL;
     if (!record->custody) {
         return BST_OK;
@@ -191,7 +203,7 @@ bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
             c->pixel_rad[k] = bst_camera_scale_rad(bst_world_camera(world, i, s));
         }
     }
-    status = status == BST_OK ? start_filters(ctx, c, seed) : status;
+    status = status == BST_OK ? start_filters(ctx, c, seed, run) : status;
     status = status == BST_OK ? bst_world_view_create(ctx, world, &c->view) : status;
     status = status == BST_OK
                  ? bst_sky_clock_create(ctx, bst_world_earth_orientation(world), &c->clock)
@@ -211,6 +223,10 @@ void bst_run_custody_free(bst_run_custody *c) {
         bst_sky_clock_free(c->clock);
         free(c->observer);
         free(c->pixel_rad);
+        for (int i = 0; c->used && i < c->sensor_count; i++) {
+            bst_run_used_tracks_clear(&c->used[i]);
+        }
+        free(c->used);
         free(c->slots);
         free(c->orbits);
         free(c->filters);
@@ -220,14 +236,50 @@ void bst_run_custody_free(bst_run_custody *c) {
     }
 }
 
-bst_status bst_run_custody_archive(bst_run_custody *c, bst_archive *archive) {
-    if (c) {
-        size_t n = (size_t)c->object_count;
-        bst_archive_bytes(archive, c->filters, n * sizeof *c->filters);
-        bst_archive_bytes(archive, c->scores, n * sizeof *c->scores);
-        bst_archive_bytes(archive, c->slots, (size_t)c->sensor_count * sizeof *c->slots);
-        BST_ARCHIVE(archive, c->figures);
+/* Numbers of an object's element set; 0: it has no filter. */
+static void identity_of(const bst_custody_orbit *o, double out[IDENTITY]) {
+    const bst_elements *e = &o->elements;
+    const double numbers[IDENTITY] = {e->norad,
+                                      e->epoch_utc_jd1,
+                                      e->epoch_utc_jd2,
+                                      e->bstar,
+                                      e->inclination_rad,
+                                      e->raan_rad,
+                                      e->eccentricity,
+                                      e->arg_perigee_rad,
+                                      e->mean_anomaly_rad,
+                                      e->mean_motion_radpmin};
+    memcpy(out, numbers, sizeof numbers);
+}
+
+/* Archives an object. One that moves on another element set than in the saved state, or that had
+ * none there, keeps the filter that it starts with. */
+static void archive_object(bst_run_custody *c, int object, bst_archive *archive) {
+    double own[IDENTITY], saved[IDENTITY];
+    const bst_custody_filter start = c->filters[object];
+    identity_of(&c->orbits[object], own);
+    memcpy(saved, own, sizeof saved);
+    BST_ARCHIVE(archive, saved);
+    BST_ARCHIVE(archive, c->filters[object]);
+    BST_ARCHIVE(archive, c->scores[object]);
+    if (memcmp(saved, own, sizeof own) != 0) {
+        c->filters[object] = start;
+        c->scores[object] = (score){.last_s = NAN};
     }
+}
+
+bst_status bst_run_custody_archive(bst_run_custody *c, bst_archive *archive) {
+    if (!c) {
+        return BST_OK;
+    }
+    for (int i = 0; i < c->object_count; i++) {
+        archive_object(c, i, archive);
+    }
+    bst_archive_bytes(archive, c->slots, (size_t)c->sensor_count * sizeof *c->slots);
+    for (int i = 0; i < c->sensor_count; i++) {
+        BST_TRY(bst_run_used_tracks_archive(&c->used[i], archive));
+    }
+    BST_ARCHIVE(archive, c->figures);
     return BST_OK;
 }
 
@@ -263,11 +315,15 @@ static bool may_be(const bst_run_custody *c, int object, const bst_custody_obser
     double across2 = bst_vec3_dot(line, line) - along * along;
     const bst_custody_filter *f = &c->filters[object];
     double days = z->observer.time_s / 86400.0, variance = 0.0;
-    for (int k = BST_CUSTODY_ECC_X; k < BST_CUSTODY_STATE; k++) {
+    for (int k = BST_CUSTODY_ECC_X; k < BST_CUSTODY_ALONG; k++) {
         variance += f->p[k][k];
     }
-    variance += days * (2.0 * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_ALONG] +
-                        days * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_DRIFT]);
+    /* a mean anomaly moves the object most at perigee, by the speed there over the mean one */
+    double e = c->orbits[object].elements.eccentricity;
+    variance += (1.0 + e) / (1.0 - e) *
+                (f->p[BST_CUSTODY_ALONG][BST_CUSTODY_ALONG] +
+                 days * (2.0 * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_ALONG] +
+                         days * f->p[BST_CUSTODY_DRIFT][BST_CUSTODY_DRIFT]));
     double reach = TABLE_REACH_M + CANDIDATE_SIGMAS * sqrt(fmax(variance, 0.0));
     return along > -reach && across2 < reach * reach;
 }
@@ -305,7 +361,7 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
         if (!(c->orbits[i].a_m > 0.0)) {
             continue;
         }
-        bst_custody_age(&c->config, time_s, &c->filters[i]);
+        bst_custody_add_process_noise(&c->config, time_s, &c->filters[i]);
         if (!bst_custody_predict(&c->orbits[i], &c->filters[i], z, &p) || !(p.chi2 < GATE)) {
             continue;
         }
@@ -331,6 +387,7 @@ static bst_status end_track(bst_ctx *ctx, bst_run_custody *c, int sensor, slot *
     }
     bst_custody_observation z;
     match m;
+    BST_TRY(bst_run_used_tracks_add(ctx, &c->used[sensor], ended.id));
     BST_TRY(observe(ctx, c, sensor, &ended, &z));
     find_object(c, sensor, &z, &m);
     bst_custody_figures *f = &c->figures;
@@ -338,14 +395,13 @@ static bst_status end_track(bst_ctx *ctx, bst_run_custody *c, int sensor, slot *
     bool updated = clear && bst_custody_update(&c->orbits[m.best], &z, &c->filters[m.best]);
     f->tracks++;
     f->ambiguous += m.best >= 0 && !clear;
-    f->uncorrelated += m.best < 0;
+    f->uncorrelated += m.best < 0 || (clear && !updated);
     double nees = NAN;
     if (updated) {
         score *s = &c->scores[m.best];
         bool crossed = m.best != m.true_object;
         f->correlated++;
         f->cross_tags += crossed;
-        f->updated += s->updates == 0;
         s->updates++;
         s->cross_tags += crossed;
         s->chi2_sum += m.chi2;
@@ -381,7 +437,7 @@ bst_status bst_run_custody_tracks(bst_ctx *ctx, bst_run_custody *c, int sensor,
         }
         bool new_state = t->status == BST_TRACK_CONFIRMED && t->misses_in_row == 0 &&
                          t->hidden == BST_HIDDEN_NOT && tracks->attitude.valid;
-        if (own && new_state) {
+        if (own && new_state && !bst_run_used_tracks_has(&c->used[sensor], t->id)) {
             *own = (slot){.id = t->id,
                           .tick = tracks->tick,
                           .direction = t->direction_gcrf,
@@ -395,8 +451,7 @@ bst_status bst_run_custody_tracks(bst_ctx *ctx, bst_run_custody *c, int sensor,
         for (int i = 0; i < tracks->count && !listed; i++) {
             listed = tracks->items[i].id == slots[k].id;
         }
-        double since_s = (double)(tracks->tick - slots[k].tick) / c->tick_rate_hz;
-        if (slots[k].id != 0 && (!listed || since_s > ENDED_S)) {
+        if (slots[k].id != 0 && !listed) {
             BST_TRY(end_track(ctx, c, sensor, &slots[k]));
         }
     }
@@ -425,11 +480,11 @@ static bst_status end_object(bst_ctx *ctx, bst_run_custody *c, int object, doubl
     bst_vec3 place, truth;
     bst_custody_filter exact = {.x = {0.0}};
     double unused, error_m = NAN;
-    bst_custody_age(&c->config, end_s, f);
+    bst_custody_add_process_noise(&c->config, end_s, f);
     *nees = bst_custody_nees(f);
-    if (!bst_custody_place(&c->orbits[object], f, end_s, &place, sigma_m)) {
+    if (!bst_custody_predict_position(&c->orbits[object], f, end_s, &place, sigma_m)) {
         *sigma_m = NAN;
-    } else if (bst_custody_place(&c->orbits[object], &exact, end_s, &truth, &unused)) {
+    } else if (bst_custody_predict_position(&c->orbits[object], &exact, end_s, &truth, &unused)) {
         error_m = bst_vec3_norm(bst_vec3_sub(place, truth));
     }
     if (!c->objects) {
@@ -464,13 +519,14 @@ bst_status bst_run_custody_finish(bst_ctx *ctx, bst_run_custody *c, double end_s
     int count = 0, updated_count = 0, nees_count = 0;
     double age_sum = 0.0, nees_sum = 0.0;
     bst_custody_figures *f = &c->figures;
-    f->in_custody = 0;
+    f->in_custody = f->updated = 0;
     for (int i = 0; i < c->object_count; i++) {
         double sigma, nees;
         if (!(c->orbits[i].a_m > 0.0)) {
             continue;
         }
         BST_TRY(end_object(ctx, c, i, end_s, &sigma, &nees));
+        f->updated += c->scores[i].updates > 0;
         if (isnan(sigma)) {
             continue;
         }
@@ -483,6 +539,7 @@ bst_status bst_run_custody_finish(bst_ctx *ctx, bst_run_custody *c, double end_s
             nees_count += !isnan(nees);
         }
     }
+    f->objects = count;
     f->age_mean_s = updated_count > 0 ? age_sum / updated_count : NAN;
     f->sigma_median_m = quantile(sigmas, count, 0.5);
     f->sigma_p90_m = quantile(sigmas, count, 0.9);

@@ -11,18 +11,19 @@
 struct cJSON;
 
 /* Filters of all objects on element sets; fed with one observation from each confirmed track, when
- * it ends. The truth is used for the error that the catalogue begins with, which it lacks, and for
- * scoring. Observers are where they are in truth: navigation errors are left out. */
+ * the tracker no longer lists it. A track that the tracker resumes after that is not used again.
+ * The truth is used for the error that the catalogue begins with, which it lacks, and for scoring.
+ * Observers are where they are in truth: navigation errors are left out. */
 typedef struct bst_run_custody bst_run_custody;
 
 typedef struct bst_custody_figures {
-    int64_t objects;      /* with a filter */
+    int64_t objects;      /* with a filter and a position at the end */
     int64_t updated;      /* by at least one track */
     int64_t in_custody;   /* standard deviation of the position within record/custody_within_m */
     int64_t tracks;       /* confirmed tracks with enough detections */
     int64_t correlated;   /* with an object */
     int64_t ambiguous;    /* with more than one object: not used */
-    int64_t uncorrelated; /* with none */
+    int64_t uncorrelated; /* with none, or the filter has no state there */
     int64_t cross_tags;   /* correlated with another object than that of the truth */
     double age_mean_s;    /* since the last update, of updated objects; NAN: none */
     double sigma_median_m, sigma_p90_m; /* of the position at the end, of all objects */
@@ -33,16 +34,20 @@ typedef struct bst_custody_figures {
 
 /* Creates the filters, and the tables in `store`, which must outlive them; NULL: figures only.
  *
- * Given:     seed  of the run: keys the errors of the catalogue
+ * Given:     seed, run  of the scenario: they and each object's catalogue number (its name where
+ *                       that is 0) key the errors of the catalogue
  * Returned:  *out  NULL: custody is disabled
  * Errors:    BST_ERR_CONFIG for a world without an object on an element set */
 bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
                                   const bst_recorder_config *record, int64_t tick_rate_hz,
-                                  uint64_t seed, bst_run *store,
+                                  uint64_t seed, uint64_t run, bst_run *store,
                                   bst_run_custody **out) BST_MUST_CHECK;
 void bst_run_custody_free(bst_run_custody *custody); /* NULL allowed */
 
-/* Saves or restores the filters and the tracks that have not ended. NULL custody: nothing. */
+/* Saves or restores the filters, the tracks that have not ended and the ids of those used. Objects
+ * on another element set than in the saved state start anew. NULL custody: nothing.
+ *
+ * Errors:    BST_ERR_MEMORY */
 bst_status bst_run_custody_archive(bst_run_custody *custody, bst_archive *archive) BST_MUST_CHECK;
 
 /* Takes the tracks of a frame; `sensor`: index over all observers; `observer`: that of the sensor.

@@ -363,6 +363,12 @@ static bst_status step_through(bst_run_execution *run, double *wall) {
 /* Steps the simulation without writing. */
 static bst_status step_only(bst_run_execution *run, const bst_run_request *request, double *wall) {
     if (request->metrics) {
+        if (run->scenario->record.custody) {
+            return bst_fail(run->ctx, BST_ERR_CONFIG,
+                            "/record/custody: true (allowed: false in studies, which have no "
+                            "figures of it, except for runs that they keep; `boresight run` has "
+                            "them)");
+        }
         BST_TRY(bst_run_sightings_create(run->ctx, bst_simulation_world(run->sim),
                                          &run->scenario->record, run->scenario->tick_rate_hz, NULL,
                                          &run->sightings));
@@ -406,7 +412,8 @@ static bst_status open_record(bst_run_execution *run, const bst_run_request *req
     BST_TRY(bst_run_sightings_create(ctx, world, &run->scenario->record,
                                      run->scenario->tick_rate_hz, run->store, &run->sightings));
     BST_TRY(bst_run_custody_create(ctx, world, &run->scenario->record, run->scenario->tick_rate_hz,
-                                   run->scenario->seed, run->store, &run->custody));
+                                   run->scenario->seed, (uint64_t)run->scenario->run, run->store,
+                                   &run->custody));
     BST_TRY(resumes ? bst_run_resume(run, request->restored) : BST_OK);
     take_targets(run);
     return bst_run_link_record(ctx, run->sim, bst_run_folder(run->store));

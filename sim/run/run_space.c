@@ -9,9 +9,19 @@
 
 double bst_run_sensor_frames(const bst_scenario *scenario, const bst_sensor_config *sensor) {
     const bst_exposure_config *e = &sensor->exposure;
+    const bst_detector_config *detector = &sensor->camera.detector;
+    const double rate = (double)scenario->tick_rate_hz;
+    /* from the first row to the middle one of a rolling shutter; the cycle is the exposure clock's
+     */
+    double lead_s = 0.0;
+    if (detector->row_time_s != 0.0) {
+        lead_s =
+            (double)bst_detector_lead_ticks(detector, (int)sensor->camera.height_px, rate) / rate;
+    }
+    const double cycle_s = fmax(e->period_s, e->exposure_s + 2.0 * lead_s);
     /* those that end before the run does; 1e-9: rounding */
-    double left_s = scenario->duration_s - e->first_s - e->exposure_s;
-    return fmax(ceil(left_s / e->period_s - 1e-9), 0.0);
+    double left_s = scenario->duration_s - e->first_s - e->exposure_s - lead_s;
+    return fmax(ceil(left_s / cycle_s - 1e-9), 0.0);
 }
 
 /* Pixels of a frame: of its window, over its binning. */

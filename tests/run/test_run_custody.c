@@ -7,8 +7,20 @@
 #include "tests/io/scratch.h"
 #include "tests/world/world_support.h"
 #include "tracker/mtt/tangent.h"
+#include "tracker/orbit/custody.h"
 
 enum { RATE = 10 };
+
+static bool updates_fail;
+
+bool __real_bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observation *z,
+                               bst_custody_filter *filter);
+bool __wrap_bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observation *z,
+                               bst_custody_filter *filter);
+bool __wrap_bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observation *z,
+                               bst_custody_filter *filter) {
+    return !updates_fail && __real_bst_custody_update(orbit, z, filter);
+}
 
 static const bst_recorder_config record = {.custody = true,
                                            .custody_sigma_m = 500,
@@ -26,10 +38,10 @@ static bst_world *world_of_two(void) {
         "");
 }
 
-/* Tracks of a frame: of `object` with `hits` detections, `off_rad` beside it; object below 0: none.
- */
-static void take(bst_ctx *ctx, bst_run_custody *c, const bst_world *world, int object, int64_t id,
-                 int hits, double seconds, double off_rad) {
+/* Tracks of a frame: of `object` with `hits` detections, none in the last `misses` frames,
+ * `off_rad` beside it; object below 0: none. */
+static void take_track(bst_ctx *ctx, bst_run_custody *c, const bst_world *world, int object,
+                       int64_t id, int hits, int misses, double seconds, double off_rad) {
     bst_tracks *tracks = test_calloc(1, sizeof *tracks + sizeof tracks->items[0]);
     *tracks = (bst_tracks){
         .tick = (int64_t)(seconds * RATE), .attitude = {.valid = true}, .count = object >= 0};
@@ -47,7 +59,8 @@ static void take(bst_ctx *ctx, bst_run_custody *c, const bst_world *world, int o
                                        .status = BST_TRACK_CONFIRMED,
                                        .direction_gcrf = d,
                                        .rate_gcrf_radps = bst_tangent_project(d, moved),
-                                       .hits = hits};
+                                       .hits = hits,
+                                       .misses_in_row = misses};
         for (int i = 0; i < 4; i++) {
             double sigma = (i < 2 ? 0.5 : 0.05) * BST_ARCSEC_RAD;
             tracks->items[0].covariance[i][i] = sigma * sigma;
@@ -55,6 +68,34 @@ static void take(bst_ctx *ctx, bst_run_custody *c, const bst_world *world, int o
     }
     bst_assert_ok(ctx, bst_run_custody_tracks(ctx, c, 0, tracks));
     test_free(tracks);
+}
+
+static void take(bst_ctx *ctx, bst_run_custody *c, const bst_world *world, int object, int64_t id,
+                 int hits, double seconds, double off_rad) {
+    take_track(ctx, c, world, object, id, hits, 0, seconds, off_rad);
+}
+
+static int64_t tracks_of(const bst_run_custody *c) {
+    bst_custody_figures f;
+    assert_true(bst_run_custody_figures(c, &f));
+    return f.tracks;
+}
+
+/* Copies the state of a custody to another one. */
+static void copy_state(bst_ctx *ctx, bst_run_custody *from, bst_run_custody *to) {
+    bst_archive *saved, *read;
+    size_t size;
+    bst_assert_ok(ctx, bst_archive_create(ctx, &saved));
+    bst_assert_ok(ctx, bst_archive_begin(ctx, saved, "custody"));
+    bst_assert_ok(ctx, bst_run_custody_archive(from, saved));
+    bst_assert_ok(ctx, bst_archive_end(ctx, saved));
+    const void *bytes = bst_archive_data(saved, &size);
+    bst_assert_ok(ctx, bst_archive_open(ctx, bytes, size, &read));
+    bst_assert_ok(ctx, bst_archive_begin(ctx, read, "custody"));
+    bst_assert_ok(ctx, bst_run_custody_archive(to, read));
+    bst_assert_ok(ctx, bst_archive_end(ctx, read));
+    bst_archive_free(read);
+    bst_archive_free(saved);
 }
 
 /* Tracks of both objects at two times, one beside an object, and a short one. */
@@ -79,7 +120,7 @@ static void tracks_update_their_objects(void **state) {
     bst_world *world = world_of_two();
     scratch_make(&place);
     bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&place, "run"), false, &store));
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, store, &c));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, store, &c));
     take_all(&ctx, c, world);
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 1000.0));
     assert_true(bst_run_custody_figures(c, &f));
@@ -89,7 +130,7 @@ static void tracks_update_their_objects(void **state) {
     bst_assert_close(f.age_mean_s, 0.5 * (300.0 + 800.0), 1e-9);
     assert_true(f.nees_mean > 0.0 && f.nees_mean < 20.0 && f.nees_low < 6.0 && f.nees_high > 6.0);
 
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, NULL, &plain));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &plain));
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, plain, 1000.0));
     bst_custody_figures without;
     (void)bst_run_custody_figures(plain, &without);
@@ -140,19 +181,11 @@ static void saved_states_go_on(void **state) {
     bst_ctx ctx = {0};
     bst_world *world = world_of_two();
     bst_run_custody *whole, *part;
-    bst_archive *saved, *read;
     bst_custody_figures a, b;
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, NULL, &whole));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &whole));
     take(&ctx, whole, world, 1, 2, 9, 200.0, 0.0);
-    bst_assert_ok(&ctx, bst_archive_create(&ctx, &saved));
-    bst_assert_ok(&ctx, bst_run_custody_archive(whole, saved));
-    size_t size;
-    const void *bytes = bst_archive_data(saved, &size);
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 6, NULL, &part));
-    bst_assert_ok(&ctx, bst_archive_open(&ctx, bytes, size, &read));
-    bst_assert_ok(&ctx, bst_run_custody_archive(part, read));
-    bst_archive_free(read);
-    bst_archive_free(saved);
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 6, 0, NULL, &part));
+    copy_state(&ctx, whole, part);
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, whole, 500.0));
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, part, 500.0));
     (void)bst_run_custody_figures(whole, &a);
@@ -164,6 +197,120 @@ static void saved_states_go_on(void **state) {
     bst_world_free(world);
 }
 
+/* A track without detections goes on while it is listed; one that is resumed later, in a run that
+ * goes on from a saved state too, is not used again. */
+static void a_track_is_used_once(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    bst_run_custody *c, *later;
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &c));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &later));
+    take(&ctx, c, world, 0, 7, 9, 100.0, 0.0);
+    take_track(&ctx, c, world, 0, 7, 9, 40, 190.0, 0.0);
+    assert_int_equal(tracks_of(c), 0);
+    take(&ctx, c, world, 0, 7, 12, 200.0, 0.0);
+    take(&ctx, c, world, -1, 0, 0, 210.0, 0.0);
+    assert_int_equal(tracks_of(c), 1);
+    take(&ctx, c, world, 1, 3, 9, 220.0, 0.0); /* another one, with a smaller id */
+    take(&ctx, c, world, 0, 7, 15, 300.0, 0.0);
+    take(&ctx, c, world, -1, 0, 0, 310.0, 0.0);
+    assert_int_equal(tracks_of(c), 2);
+    copy_state(&ctx, c, later);
+    take(&ctx, later, world, 0, 7, 20, 400.0, 0.0);
+    take(&ctx, later, world, 1, 3, 20, 410.0, 0.0);
+    take(&ctx, later, world, 0, 8, 9, 420.0, 0.0); /* a new one */
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, later, 500.0));
+    assert_int_equal(tracks_of(later), 3);
+    bst_run_custody_free(c);
+    bst_run_custody_free(later);
+    bst_world_free(world);
+}
+
+/* An object on another element set than in the saved state starts anew, the others go on. */
+static void changed_objects_start_anew(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    bst_world *changed = test_world_with(
+        "{\"name\": \"A\", " TEST_GX5
+        "}, {\"name\": \"B\", \"orbit\": {\"elements_file\": "
+        "\"scenarios/catalogue_2022-06.tle\", \"norad\": 25544}}, {\"name\": \"own\", " TEST_NEOSSAT
+        "}",
+        "");
+    bst_run_custody *c, *later;
+    bst_custody_figures f;
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &c));
+    take(&ctx, c, world, 0, 1, 9, 100.0, 0.0);
+    take(&ctx, c, world, 1, 2, 9, 200.0, 0.0);
+    take(&ctx, c, world, -1, 0, 0, 210.0, 0.0);
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, changed, &record, RATE, 5, 0, NULL, &later));
+    copy_state(&ctx, c, later);
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, later, 500.0));
+    assert_true(bst_run_custody_figures(later, &f));
+    assert_true(f.objects == 3 && f.updated == 1 && f.correlated == 2);
+    bst_run_custody_free(c);
+    bst_run_custody_free(later);
+    bst_world_free(changed);
+    bst_world_free(world);
+}
+
+/* NEES of an object's elements at the start of a run. */
+static double first_nees(const bst_world *world, uint64_t number, const char *object) {
+    bst_ctx ctx = {0};
+    scratch place;
+    bst_run *store;
+    bst_run_custody *c;
+    bst_run_reader *run;
+    char query[128];
+    scratch_make(&place);
+    bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&place, "run"), false, &store));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, number, store, &c));
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 1.0));
+    bst_run_custody_free(c);
+    bst_assert_ok(&ctx, bst_run_seal(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_finish(&ctx, store));
+    bst_assert_ok(&ctx, bst_run_reader_open(&ctx, scratch_path(&place, "run"), &run));
+    snprintf(query, sizeof query,
+             "SELECT CAST(1e6 * nees AS INTEGER) FROM custody WHERE name = '%s'", object);
+    double nees = 1e-6 * (double)bst_run_reader_int(run, query, 0, -1);
+    bst_run_reader_close(run);
+    scratch_remove(&place);
+    return nees;
+}
+
+/* The error of an object depends on the run, not on the other objects. */
+static void errors_of_the_catalogue(void **state) {
+    (void)state;
+    bst_world *world = world_of_two();
+    bst_world *other = test_world_with(
+        "{\"name\": \"own\", " TEST_NEOSSAT "}, {\"name\": \"A\", " TEST_GX5 "}", "");
+    double nees = first_nees(world, 0, "A");
+    assert_true(nees > 0.0);
+    bst_assert_close(first_nees(other, 0, "A"), nees, 1e-9 * nees);
+    assert_true(fabs(first_nees(world, 1, "A") - nees) > 1e-3);
+    bst_world_free(other);
+    bst_world_free(world);
+}
+
+/* Every track is in one of the counts. */
+static void a_failed_update_is_counted(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    bst_run_custody *c;
+    bst_custody_figures f;
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &c));
+    take(&ctx, c, world, 0, 1, 9, 100.0, 0.0);
+    updates_fail = true;
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 500.0));
+    updates_fail = false;
+    assert_true(bst_run_custody_figures(c, &f));
+    assert_true(f.tracks == 1 && f.uncorrelated == 1 && f.correlated == 0 && f.ambiguous == 0);
+    bst_run_custody_free(c);
+    bst_world_free(world);
+}
+
 static void off_and_without_objects(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -171,7 +318,7 @@ static void off_and_without_objects(void **state) {
     bst_custody_figures f;
     bst_world *world = world_of_two();
     const bst_recorder_config off = {.custody = false};
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &off, RATE, 5, NULL, &c));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &off, RATE, 5, 0, NULL, &c));
     assert_null(c);
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 10.0));
     assert_false(bst_run_custody_figures(c, &f));
@@ -179,7 +326,7 @@ static void off_and_without_objects(void **state) {
     bst_run_custody_free(c);
     bst_world_free(world);
     world = test_world_with("", "");
-    assert_int_equal(bst_run_custody_create(&ctx, world, &record, RATE, 5, NULL, &c),
+    assert_int_equal(bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &c),
                      BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "/record/custody"));
     assert_null(c);
@@ -188,8 +335,9 @@ static void off_and_without_objects(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(tracks_update_their_objects),
-        cmocka_unit_test(saved_states_go_on),
+        cmocka_unit_test(tracks_update_their_objects), cmocka_unit_test(saved_states_go_on),
+        cmocka_unit_test(a_track_is_used_once),        cmocka_unit_test(changed_objects_start_anew),
+        cmocka_unit_test(errors_of_the_catalogue),     cmocka_unit_test(a_failed_update_is_counted),
         cmocka_unit_test(off_and_without_objects),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

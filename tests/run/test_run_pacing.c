@@ -179,10 +179,27 @@ static void room(void **state) {
     assert_string_equal(heard, "");
 }
 
+/* Frames come no faster than exposures and the rows of a rolling shutter allow. */
+static void frames_of_a_cycle(void **state) {
+    (void)state;
+    bst_scenario s = {.duration_s = 100, .tick_rate_hz = 1000};
+    bst_sensor_config sensor = {.exposure = {.period_s = 1, .exposure_s = 0.5}};
+    sensor.camera.width_px = sensor.camera.height_px = 1001;
+    assert_true(bst_run_sensor_frames(&s, &sensor) == 100);
+    sensor.exposure.exposure_s = 4; /* one after the other; the last one ends with the run */
+    assert_true(bst_run_sensor_frames(&s, &sensor) == 24);
+    sensor.camera.detector.row_time_s = -1e-3; /* 0.5 s before and after the middle row */
+    assert_true(bst_run_sensor_frames(&s, &sensor) == 20);
+    sensor.exposure.exposure_s = 0.5; /* cycles of 1.5 s, of which the last begins at 98 s */
+    sensor.exposure.first_s = 0.5;
+    assert_true(bst_run_sensor_frames(&s, &sensor) == 66);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(manifest),
         cmocka_unit_test(peers),
+        cmocka_unit_test(frames_of_a_cycle),
         cmocka_unit_test(room),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -75,7 +75,7 @@ static void errors_agree_with_covariances(void **state) {
         bst_custody_filter_init(&config, &orbit, normals, &filter);
         double nees = bst_custody_nees(&filter), sigma;
         bst_vec3 place;
-        bool good = bst_custody_place(&orbit, &filter, 20000.0, &place, &sigma);
+        bool good = bst_custody_predict_position(&orbit, &filter, 20000.0, &place, &sigma);
         sigma_before += good ? sigma : 0.0;
         for (int k = 0; good && k < 4; k++) {
             bst_custody_observation z;
@@ -94,7 +94,7 @@ static void errors_agree_with_covariances(void **state) {
             flat += sets[i].inclination_rad < 0.2 * BST_DEG_RAD;
             before += nees;
             after += bst_custody_nees(&filter);
-            assert_true(bst_custody_place(&orbit, &filter, 20000.0, &place, &sigma));
+            assert_true(bst_custody_predict_position(&orbit, &filter, 20000.0, &place, &sigma));
             sigma_after += sigma;
         }
     }
@@ -122,28 +122,40 @@ static bst_elements low_orbit(void) {
                           .mean_motion_radpmin = 0.06};
 }
 
-/* Process noise leaves the place at its time as it is and spreads later ones. */
-static void noise_spreads_later_places(void **state) {
+/* Process noise of half a day spreads the place then and later, in one step and in many. */
+static void noise_spreads_places(void **state) {
     (void)state;
     bst_ctx ctx = {0};
     const bst_elements set = low_orbit();
     const bst_custody_config noisy = {.sigma_m = 10, .drift_m_per_day = 10, .noise_m_per_day = 800};
     bst_custody_orbit orbit;
-    bst_custody_filter plain, aged;
+    bst_custody_filter plain, aged, steps;
     bst_vec3 place;
     double a, b;
     bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, &set, 0.0, 0.0, &orbit));
     bst_custody_filter_init(&noisy, &orbit, NULL, &plain);
-    aged = plain;
-    bst_custody_age(&noisy, 43200.0, &aged);
-    assert_true(bst_custody_place(&orbit, &plain, 43200.0, &place, &a));
-    assert_true(bst_custody_place(&orbit, &aged, 43200.0, &place, &b));
-    bst_assert_close(b, a, 0.05 * a); /* other perturbations on other mean motions */
-    assert_true(bst_custody_place(&orbit, &aged, 129600.0, &place, &b));
-    /* sqrt(1/2) of 800 m per day, a day later; 2 % for the radial part */
-    bst_assert_close(b, sqrt(0.5) * 800.0, 0.02 * 566.0);
+    aged = steps = plain;
+    bst_custody_add_process_noise(&noisy, 43200.0, &aged);
+    assert_true(bst_custody_predict_position(&orbit, &plain, 43200.0, &place, &a));
+    assert_true(bst_custody_predict_position(&orbit, &aged, 43200.0, &place, &b));
+    /* 800 m sqrt(T^3 / 3) after T = 1/2 day; 2 % for the radial part */
+    double spread = 800.0 * sqrt(0.125 / 3.0);
+    bst_assert_close(sqrt(b * b - a * a), spread, 0.02 * spread);
+    assert_true(bst_custody_predict_position(&orbit, &plain, 129600.0, &place, &a));
+    assert_true(bst_custody_predict_position(&orbit, &aged, 129600.0, &place, &b));
+    /* a day later: 800 m times the root of the integral of (1.5 - u)^2 from 0 to 1/2 */
+    spread = 800.0 * sqrt((1.5 * 1.5 * 1.5 - 1.0) / 3.0);
+    bst_assert_close(sqrt(b * b - a * a), spread, 0.02 * spread);
+    for (int i = 1; i <= 20; i++) {
+        bst_custody_add_process_noise(&noisy, 2160.0 * i, &steps);
+    }
+    for (int i = 0; i < BST_CUSTODY_STATE; i++) {
+        for (int k = 0; k < BST_CUSTODY_STATE; k++) {
+            bst_assert_close(steps.p[i][k], aged.p[i][k], 1e-6);
+        }
+    }
     bst_custody_filter again = aged;
-    bst_custody_age(&noisy, 40000.0, &again);
+    bst_custody_add_process_noise(&noisy, 40000.0, &again);
     assert_memory_equal(&again, &aged, sizeof aged);
 }
 
@@ -183,13 +195,17 @@ static void refuses_what_is_no_ellipse(void **state) {
     bst_custody_orbit orbit;
     set.mean_motion_radpmin = 0.0;
     assert_int_equal(bst_custody_orbit_init(&ctx, &set, 0.0, 0.0, &orbit), BST_ERR_NUMERIC);
-    assert_non_null(strstr(ctx.message, "object 5"));
+    assert_non_null(strstr(ctx.message, "(catalogue number 5): mean motion 0 rad/min"));
+    set = low_orbit();
+    set.eccentricity = 1.0;
+    assert_int_equal(bst_custody_orbit_init(&ctx, &set, 0.0, 0.0, &orbit), BST_ERR_NUMERIC);
+    assert_non_null(strstr(ctx.message, "eccentricities from 0 to below 1"));
 }
 
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(errors_agree_with_covariances),
-        cmocka_unit_test(noise_spreads_later_places),
+        cmocka_unit_test(noise_spreads_places),
         cmocka_unit_test(photocentre_and_strangers),
         cmocka_unit_test(refuses_what_is_no_ellipse),
     };

@@ -13,19 +13,19 @@ enum { N = BST_CUSTODY_STATE, SETS = 2 * N + 1, MOST_ITERATIONS = 5 };
 /* Below this inclination SGP4's periodics are not smooth in its elements (Lyddane's, by Sun and
  * Moon: 0.02 degrees), and differences are those of osculating elements. */
 #define LEAST_INCLINATION_RAD (0.2 * BST_DEG_RAD)
-/* Step of the five-point difference of positions that gives the velocity, s. */
-#define DIFFERENCE_STEP_S 8.0
-enum { PLACES = 5 };
 
 /* ------------------------------------------------------------------ Elements */
 
 bst_status bst_custody_orbit_init(bst_ctx *ctx, const bst_elements *elements, double epoch_offset_s,
                                   double photocentre_m, bst_custody_orbit *out) {
     double n = elements->mean_motion_radpmin / 60.0;
-    if (!(n > 0.0 && elements->eccentricity < 1.0)) {
+    if (!(n > 0.0 && elements->eccentricity >= 0.0 && elements->eccentricity < 1.0)) {
         return bst_fail(ctx, BST_ERR_NUMERIC,
-                        "object %d: mean motion %g rad/min and eccentricity %g are no ellipse",
-                        elements->norad, elements->mean_motion_radpmin, elements->eccentricity);
+                        "object \"%s\" (catalogue number %d): mean motion %g rad/min and "
+                        "eccentricity %g are no ellipse: allowed are mean motions above 0 and "
+                        "eccentricities from 0 to below 1",
+                        elements->name, elements->norad, elements->mean_motion_radpmin,
+                        elements->eccentricity);
     }
     *out = (bst_custody_orbit){.elements = *elements,
                                .epoch_offset_s = epoch_offset_s,
@@ -68,18 +68,22 @@ void bst_custody_filter_init(const bst_custody_config *config, const bst_custody
     out->x[BST_CUSTODY_ALONG] += out->x[BST_CUSTODY_DRIFT] * age;
 }
 
-void bst_custody_age(const bst_custody_config *config, double time_s, bst_custody_filter *filter) {
-    double days = (time_s - filter->noise_until_s) / DAY_S;
-    if (!(days > 0.0)) {
+void bst_custody_add_process_noise(const bst_custody_config *config, double time_s,
+                                   bst_custody_filter *filter) {
+    if (!(time_s > filter->noise_until_s)) {
         return;
     }
-    /* a change of the drift at time t changes the place at time 0 by minus t times it */
-    double q = config->noise_m_per_day * config->noise_m_per_day * days, back = -time_s / DAY_S;
+    /* A change dD of the drift at time u displaces the object by (s - u) dD at time s, which is
+     * the state's DRIFT + dD and ALONG - u dD. The sums over u of a random walk with variance
+     * `rate` per day are integrals of 1, -u and u^2. */
+    const double rate = config->noise_m_per_day * config->noise_m_per_day;
+    const double from = filter->noise_until_s / DAY_S, to = time_s / DAY_S;
+    const double cross = -rate * (to * to - from * from) / 2.0;
     double(*p)[N] = filter->p;
-    p[BST_CUSTODY_DRIFT][BST_CUSTODY_DRIFT] += q;
-    p[BST_CUSTODY_DRIFT][BST_CUSTODY_ALONG] += q * back;
-    p[BST_CUSTODY_ALONG][BST_CUSTODY_DRIFT] += q * back;
-    p[BST_CUSTODY_ALONG][BST_CUSTODY_ALONG] += q * back * back;
+    p[BST_CUSTODY_DRIFT][BST_CUSTODY_DRIFT] += rate * (to - from);
+    p[BST_CUSTODY_DRIFT][BST_CUSTODY_ALONG] += cross;
+    p[BST_CUSTODY_ALONG][BST_CUSTODY_DRIFT] += cross;
+    p[BST_CUSTODY_ALONG][BST_CUSTODY_ALONG] += rate * (to * to * to - from * from * from) / 3.0;
     filter->noise_until_s = time_s;
 }
 
@@ -107,31 +111,6 @@ static void deviation(const double x[N], const bundle *b, int set, double y[N]) 
     }
 }
 
-/* Position and its derivative, by the polynomial through five places. */
-static bool motion(const bst_sgp4 *sgp4, double seconds, bst_vec3 *r, bst_vec3 *v) {
-    const bst_sgp4 *sets[PLACES];
-    double minutes[PLACES];
-    bst_sgp4_state at[PLACES];
-    bst_vec3 p[PLACES];
-    for (int i = 0; i < PLACES; i++) {
-        sets[i] = sgp4;
-        minutes[i] = (seconds + DIFFERENCE_STEP_S * (i - PLACES / 2)) / 60.0;
-    }
-    bst_sgp4_propagate_many(sets, minutes, PLACES, at);
-    for (int i = 0; i < PLACES; i++) {
-        if (at[i].error != BST_SGP4_OK) {
-            return false;
-        }
-        const double *km = at[i].position_teme_km;
-        p[i] = (bst_vec3){1e3 * km[0], 1e3 * km[1], 1e3 * km[2]};
-    }
-    bst_vec3 near = bst_vec3_scale(bst_vec3_sub(p[3], p[1]), 8.0);
-    *v = bst_vec3_scale(bst_vec3_sub(near, bst_vec3_sub(p[4], p[0])),
-                        1.0 / (12.0 * DIFFERENCE_STEP_S));
-    *r = p[PLACES / 2];
-    return true;
-}
-
 /* Motion on the elements that differ from the catalogued ones by x. */
 static bool sgp4_motion(const bst_custody_orbit *o, const double x[N], double time_s, bst_vec3 *r,
                         bst_vec3 *v) {
@@ -141,7 +120,7 @@ static bool sgp4_motion(const bst_custody_orbit *o, const double x[N], double ti
         bst_sgp4_create(NULL, &set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &sgp4) != BST_OK) {
         return false;
     }
-    bool good = motion(sgp4, o->epoch_offset_s + time_s, r, v);
+    bool good = bst_sgp4_motion(sgp4, (o->epoch_offset_s + time_s) / 60.0, r, v);
     bst_sgp4_free(sgp4);
     return good;
 }
@@ -212,7 +191,8 @@ static bool make_bundle(const bst_custody_orbit *o, const double x[N], const dou
 
 /* Direction and rate of a set from the observer, relative to the observed direction in its tangent
  * axes. */
-static void see(const bst_custody_observation *z, bst_vec3 r_teme, bst_vec3 v_teme, double out[4]) {
+static void measurement(const bst_custody_observation *z, bst_vec3 r_teme, bst_vec3 v_teme,
+                        double out[4]) {
     const bst_od_state state = {.time_s = z->observer.time_s,
                                 .position_m = bst_mat3_mul_vec(&z->gcrf_from_teme, r_teme),
                                 .velocity_mps = bst_mat3_mul_vec(&z->gcrf_from_teme, v_teme)};
@@ -244,15 +224,15 @@ static bool linearise(const bst_custody_orbit *o, const double x[N], const doubl
     seen_as->covariance[1][1] += spread * spread;
     const bst_tangent axes = bst_tangent_at(z->direction);
     double seen[4];
-    see(z, b.r[0], b.v[0], seen);
+    measurement(z, b.r[0], b.v[0], seen);
     out->innovation[0] = -seen[0];
     out->innovation[1] = -seen[1];
     out->innovation[2] = bst_vec3_dot(axes.e1, z->rate_radps) - seen[2];
     out->innovation[3] = bst_vec3_dot(axes.e2, z->rate_radps) - seen[3];
     for (int k = 0; k < N; k++) {
         double plus[4], minus[4];
-        see(z, b.r[1 + 2 * k], b.v[1 + 2 * k], plus);
-        see(z, b.r[2 + 2 * k], b.v[2 + 2 * k], minus);
+        measurement(z, b.r[1 + 2 * k], b.v[1 + 2 * k], plus);
+        measurement(z, b.r[2 + 2 * k], b.v[2 + 2 * k], minus);
         for (int i = 0; i < 4; i++) {
             out->slope[i][k] = (plus[i] - minus[i]) / (2.0 * b.step_m[k]);
         }
@@ -409,8 +389,8 @@ bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observ
     return true;
 }
 
-bool bst_custody_place(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
-                       double time_s, bst_vec3 *position_teme_m, double *sigma_m) {
+bool bst_custody_predict_position(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
+                                  double time_s, bst_vec3 *position_teme_m, double *sigma_m) {
     bundle b;
     if (!make_bundle(orbit, filter->x, filter->p, time_s, &b)) {
         return false;

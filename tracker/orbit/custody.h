@@ -68,7 +68,8 @@ typedef struct bst_custody_prediction {
 
 /* Sets the orbit of a catalogued object.
  *
- * Errors:    BST_ERR_NUMERIC for elements that are no ellipse */
+ * Errors:    BST_ERR_NUMERIC for elements that are no ellipse: message with name, number and range
+ */
 bst_status bst_custody_orbit_init(bst_ctx *ctx, const bst_elements *elements, double epoch_offset_s,
                                   double photocentre_m, bst_custody_orbit *out) BST_MUST_CHECK;
 
@@ -77,9 +78,12 @@ bst_status bst_custody_orbit_init(bst_ctx *ctx, const bst_elements *elements, do
 void bst_custody_filter_init(const bst_custody_config *config, const bst_custody_orbit *orbit,
                              const double normals[BST_CUSTODY_STATE], bst_custody_filter *out);
 
-/* Adds the process noise until `time_s`: a random walk of the mean motion, under which the place at
- * that time stays. Earlier times change nothing. */
-void bst_custody_age(const bst_custody_config *config, double time_s, bst_custody_filter *filter);
+/* Adds the process noise until `time_s`: a random walk of the mean motion, which spreads places
+ * along the orbit. The sum does not depend on the number of steps. Earlier times change nothing.
+ * Reference: Bar-Shalom, Li and Kirubarajan (2001), ch. 6.2.2: white noise acceleration; here with
+ * the place at time 0 as state. */
+void bst_custody_add_process_noise(const bst_custody_config *config, double time_s,
+                                   bst_custody_filter *filter);
 
 /* Predicts an observation. False: SGP4 has no state there, or the covariance is singular. */
 bool bst_custody_predict(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
@@ -93,8 +97,8 @@ bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observ
 
 /* Position (TEME, m) at `time_s`, and its standard deviation, the root of the sum over three axes.
  * False: no state. */
-bool bst_custody_place(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
-                       double time_s, bst_vec3 *position_teme_m, double *sigma_m);
+bool bst_custody_predict_position(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
+                                  double time_s, bst_vec3 *position_teme_m, double *sigma_m);
 
 /* Normalised estimation error squared against an object that moves on its catalogued elements; 6
  * degrees of freedom. NAN: the covariance is singular. */
