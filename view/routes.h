@@ -14,8 +14,8 @@ typedef struct bst_view_exchange {
     int64_t run, sensor, frame, columns, object;
     double from_s, to_s;
     char panel[32];
-    char name[64];        /* of a run in runs/ */
-    const char *body;     /* of POST: text that ends with a zero byte; else NULL */
+    char name[64];    /* of a run in runs/ */
+    const char *body; /* of POST: text that ends with a zero byte; else NULL */
     size_t body_bytes;
     cJSON *json;          /* the answer; NULL: `bytes` */
     bst_view_bytes bytes; /* the answer */

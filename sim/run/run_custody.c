@@ -131,7 +131,8 @@ static bst_status allocate(bst_ctx *ctx, bst_run_custody *c) {
 
 /* Starts the filter of each object on an element set, with an error drawn from its covariance: by
  * catalogue number, or by name where that is 0, so that other objects do not change it. */
-static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, uint64_t seed, uint64_t run) {
+static bst_status start_filters(bst_ctx *ctx, bst_run_custody *c, const bst_scenario *scenario) {
+    const uint64_t seed = scenario->seed, run = (uint64_t)scenario->run;
     const bst_rng_key by_number = bst_rng_make_key(seed, run, "custody", "catalogue");
     for (int i = 0; i < c->object_count; i++) {
         double offset_s, normals[BST_CUSTODY_STATE];
@@ -175,9 +176,9 @@ static bst_status make_tables(bst_ctx *ctx, bst_run_custody *c, bst_run *store) 
 }
 
 bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
-                                  const bst_recorder_config *record, int64_t tick_rate_hz,
-                                  uint64_t seed, uint64_t run, bst_run *store,
+                                  const bst_scenario *scenario, bst_run *store,
                                   bst_run_custody **out) {
+    const bst_recorder_config *record = &scenario->record;
     *out = NULL;
     if (!record->custody) {
         return BST_OK;
@@ -187,11 +188,10 @@ bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the custody of the catalogue");
     }
     c->world = world;
-    c->tick_rate_hz = (double)tick_rate_hz;
+    c->tick_rate_hz = (double)scenario->tick_rate_hz;
     c->within_m = record->custody_within_m;
-    c->config = (bst_custody_config){.sigma_m = record->custody_sigma_m,
-                                     .drift_m_per_day = record->custody_drift_m_per_day,
-                                     .noise_m_per_day = record->custody_noise_m_per_day};
+    c->config = (bst_custody_config){record->custody_sigma_m, record->custody_drift_m_per_day,
+                                     record->custody_noise_m_per_day};
     c->object_count = bst_world_object_count(world);
     for (int i = 0; i < bst_world_observer_count(world); i++) {
         c->sensor_count += bst_world_sensor_count(world, i);
@@ -203,7 +203,7 @@ bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
             c->pixel_rad[k] = bst_camera_scale_rad(bst_world_camera(world, i, s));
         }
     }
-    status = status == BST_OK ? start_filters(ctx, c, seed, run) : status;
+    status = status == BST_OK ? start_filters(ctx, c, scenario) : status;
     status = status == BST_OK ? bst_world_view_create(ctx, world, &c->view) : status;
     status = status == BST_OK
                  ? bst_sky_clock_create(ctx, bst_world_earth_orientation(world), &c->clock)

@@ -4,7 +4,7 @@
 
 #include "boresight/archive.h"
 #include "boresight/messages.h"
-#include "sim/engine/recorder/recorder.h"
+#include "sim/engine/scenario/scenario.h"
 #include "sim/io/run_store.h"
 #include "sim/world/world.h"
 
@@ -34,13 +34,12 @@ typedef struct bst_custody_figures {
 
 /* Creates the filters, and the tables in `store`, which must outlive them; NULL: figures only.
  *
- * Given:     seed, run  of the scenario: they and each object's catalogue number (its name where
- *                       that is 0) key the errors of the catalogue
+ * Given:     scenario  its seed and run, with each object's catalogue number (its name where that
+ *                      is 0), key the errors of the catalogue; further its record and tick rate
  * Returned:  *out  NULL: custody is disabled
  * Errors:    BST_ERR_CONFIG for a world without an object on an element set */
 bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
-                                  const bst_recorder_config *record, int64_t tick_rate_hz,
-                                  uint64_t seed, uint64_t run, bst_run *store,
+                                  const bst_scenario *scenario, bst_run *store,
                                   bst_run_custody **out) BST_MUST_CHECK;
 void bst_run_custody_free(bst_run_custody *custody); /* NULL allowed */
 

@@ -411,9 +411,7 @@ static bst_status open_record(bst_run_execution *run, const bst_run_request *req
     BST_TRY(open_recorder(run, world));
     BST_TRY(bst_run_sightings_create(ctx, world, &run->scenario->record,
                                      run->scenario->tick_rate_hz, run->store, &run->sightings));
-    BST_TRY(bst_run_custody_create(ctx, world, &run->scenario->record, run->scenario->tick_rate_hz,
-                                   run->scenario->seed, (uint64_t)run->scenario->run, run->store,
-                                   &run->custody));
+    BST_TRY(bst_run_custody_create(ctx, world, run->scenario, run->store, &run->custody));
     BST_TRY(resumes ? bst_run_resume(run, request->restored) : BST_OK);
     take_targets(run);
     return bst_run_link_record(ctx, run->sim, bst_run_folder(run->store));

@@ -11,6 +11,7 @@ typedef struct bst_run_used_tracks {
     int count, room;
 } bst_run_used_tracks;
 
+/* True if the track of an id gave its observation. */
 bool bst_run_used_tracks_has(const bst_run_used_tracks *used, int64_t id);
 
 /* Adds an id that is not there yet.

@@ -76,15 +76,6 @@ class Whole(unittest.TestCase):
         again = study(self.out, "--resume")
         self.assertEqual(again.returncode, 0, again.stderr)
 
-    def test_custody_is_refused(self):
-        """A study has no figures of it."""
-        folder = runs.scratch()
-        path = write(folder, set={"/duration_s": 2, "/world/star_catalogue": "embedded",
-                                  "/record/custody": True}, sweeps=None, dispersions=None, replicates=1)
-        result = study(path, "--out", os.path.join(folder, "out"))
-        self.assertEqual(result.returncode, 4, result.stderr)
-        self.assertIn("/record/custody: true (allowed: false in studies", result.stdout + result.stderr)
-
     def test_one_worker_makes_the_same_tables(self):
         out = os.path.join(self.folder, "one")
         result = study(self.path, "--out", out, "--workers", "1", "--shard-runs", "5")

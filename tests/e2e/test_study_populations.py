@@ -32,6 +32,16 @@ POPULATIONS = [
                      {"path": "/orbit/state/inclination_deg", "from": 0, "to": 10}]}]
 
 
+class Custody(unittest.TestCase):
+    def test_studies_have_no_figures_of_it(self):
+        folder = runs.scratch()
+        path = write(folder, set={"/duration_s": 2, "/world/star_catalogue": "embedded", "/record/custody": True},
+                     sweeps=None, dispersions=None, replicates=1)
+        result = study(path, "--out", os.path.join(folder, "out"))
+        self.assertEqual(result.returncode, 4, result.stderr)
+        self.assertIn("/record/custody: true (allowed: false in studies", result.stdout + result.stderr)
+
+
 class Random(unittest.TestCase):
     @classmethod
     def setUpClass(cls):

@@ -22,10 +22,15 @@ bool __wrap_bst_custody_update(const bst_custody_orbit *orbit, const bst_custody
     return !updates_fail && __real_bst_custody_update(orbit, z, filter);
 }
 
-static const bst_recorder_config record = {.custody = true,
-                                           .custody_sigma_m = 500,
-                                           .custody_drift_m_per_day = 1500,
-                                           .custody_within_m = 1000};
+/* A scenario that records custody. */
+#define SCENARIO(seed_of_errors, run_number)                    \
+    ((bst_scenario){.seed = (seed_of_errors),                   \
+                    .run = (int64_t)(run_number),               \
+                    .tick_rate_hz = RATE,                       \
+                    .record = {.custody = true,                 \
+                               .custody_sigma_m = 500,          \
+                               .custody_drift_m_per_day = 1500, \
+                               .custody_within_m = 1000}})
 
 /* Three objects: INMARSAT GX5, MOLNIYA 3-8, and the observer's spacecraft, which is in every
  * direction. */
@@ -120,7 +125,7 @@ static void tracks_update_their_objects(void **state) {
     bst_world *world = world_of_two();
     scratch_make(&place);
     bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&place, "run"), false, &store));
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, store, &c));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), store, &c));
     take_all(&ctx, c, world);
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 1000.0));
     assert_true(bst_run_custody_figures(c, &f));
@@ -130,7 +135,7 @@ static void tracks_update_their_objects(void **state) {
     bst_assert_close(f.age_mean_s, 0.5 * (300.0 + 800.0), 1e-9);
     assert_true(f.nees_mean > 0.0 && f.nees_mean < 20.0 && f.nees_low < 6.0 && f.nees_high > 6.0);
 
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &plain));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &plain));
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, plain, 1000.0));
     bst_custody_figures without;
     (void)bst_run_custody_figures(plain, &without);
@@ -182,9 +187,9 @@ static void saved_states_go_on(void **state) {
     bst_world *world = world_of_two();
     bst_run_custody *whole, *part;
     bst_custody_figures a, b;
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &whole));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &whole));
     take(&ctx, whole, world, 1, 2, 9, 200.0, 0.0);
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 6, 0, NULL, &part));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(6, 0), NULL, &part));
     copy_state(&ctx, whole, part);
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, whole, 500.0));
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, part, 500.0));
@@ -204,8 +209,8 @@ static void a_track_is_used_once(void **state) {
     bst_ctx ctx = {0};
     bst_world *world = world_of_two();
     bst_run_custody *c, *later;
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &c));
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &later));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &c));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &later));
     take(&ctx, c, world, 0, 7, 9, 100.0, 0.0);
     take_track(&ctx, c, world, 0, 7, 9, 40, 190.0, 0.0);
     assert_int_equal(tracks_of(c), 0);
@@ -240,11 +245,11 @@ static void changed_objects_start_anew(void **state) {
         "");
     bst_run_custody *c, *later;
     bst_custody_figures f;
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &c));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &c));
     take(&ctx, c, world, 0, 1, 9, 100.0, 0.0);
     take(&ctx, c, world, 1, 2, 9, 200.0, 0.0);
     take(&ctx, c, world, -1, 0, 0, 210.0, 0.0);
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, changed, &record, RATE, 5, 0, NULL, &later));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, changed, &SCENARIO(5, 0), NULL, &later));
     copy_state(&ctx, c, later);
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, later, 500.0));
     assert_true(bst_run_custody_figures(later, &f));
@@ -265,7 +270,7 @@ static double first_nees(const bst_world *world, uint64_t number, const char *ob
     char query[128];
     scratch_make(&place);
     bst_assert_ok(&ctx, bst_run_create(&ctx, scratch_path(&place, "run"), false, &store));
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, number, store, &c));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, number), store, &c));
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 1.0));
     bst_run_custody_free(c);
     bst_assert_ok(&ctx, bst_run_seal(&ctx, store));
@@ -300,7 +305,7 @@ static void a_failed_update_is_counted(void **state) {
     bst_world *world = world_of_two();
     bst_run_custody *c;
     bst_custody_figures f;
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &c));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &c));
     take(&ctx, c, world, 0, 1, 9, 100.0, 0.0);
     updates_fail = true;
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 500.0));
@@ -317,8 +322,8 @@ static void off_and_without_objects(void **state) {
     bst_run_custody *c;
     bst_custody_figures f;
     bst_world *world = world_of_two();
-    const bst_recorder_config off = {.custody = false};
-    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &off, RATE, 5, 0, NULL, &c));
+    const bst_scenario off = {.record = {.custody = false}};
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &off, NULL, &c));
     assert_null(c);
     bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 10.0));
     assert_false(bst_run_custody_figures(c, &f));
@@ -326,7 +331,7 @@ static void off_and_without_objects(void **state) {
     bst_run_custody_free(c);
     bst_world_free(world);
     world = test_world_with("", "");
-    assert_int_equal(bst_run_custody_create(&ctx, world, &record, RATE, 5, 0, NULL, &c),
+    assert_int_equal(bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &c),
                      BST_ERR_CONFIG);
     assert_non_null(strstr(ctx.message, "/record/custody"));
     assert_null(c);
