@@ -143,7 +143,7 @@ class BrightStars(unittest.TestCase):
         detections of sources far from every spike, those of them that are artefacts."""
         out = f"{runs.scratch()}/spikes{seed}"
         runs.run("scenarios/diffraction.json", out, "/world/faint_stars=statistical",
-                 "/world/faint_limit_v_mag=13.5", seed=seed, duration=3 if FULL else 2, threads=2)
+                 "/world/faint_limit_v_mag=13.5", seed=seed, duration=3, threads=2)
         db = runs.database(out)
         spikes, alarms, real, lost = 0, 0, 0, 0
         angle = np.radians(self.VANES_DEG)
