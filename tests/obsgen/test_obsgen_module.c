@@ -99,6 +99,10 @@ WRAP(void, bst_field_set_camera, (bst_field * field, const bst_camera *camera)) 
     (void)camera;
 }
 
+WRAP(void, bst_field_set_background_places_only, (bst_field * field)) {
+    assert_null(field);
+}
+
 WRAP(bst_status, bst_field_track,
      (bst_ctx * ctx, bst_field *field, const bst_los_history *history, int64_t start_tick,
       int64_t end_tick, int64_t tick_rate_hz, bst_los_track *out)) {
