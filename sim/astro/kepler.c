@@ -111,3 +111,16 @@ bst_status bst_kepler_propagate(bst_ctx *ctx, double mu, bst_vec3 position_m, bs
     *position_out_m = r;
     return BST_OK;
 }
+
+double bst_kepler_eccentric_anomaly(double mean_anomaly_rad, double e) {
+    const double turn = remainder(mean_anomaly_rad, 2.0 * BST_PI), m = fabs(turn);
+    double x = m + e; /* start above the root: Newton's steps descend to it */
+    for (int i = 0; i < 20; i++) {
+        double step = (x - e * sin(x) - m) / (1.0 - e * cos(x));
+        x -= step;
+        if (fabs(step) < 1e-14) {
+            break;
+        }
+    }
+    return mean_anomaly_rad - turn + copysign(x, turn);
+}

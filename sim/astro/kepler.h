@@ -14,4 +14,8 @@ bst_status bst_kepler_propagate(bst_ctx *ctx, double mu, bst_vec3 position_m, bs
                                 double seconds, bst_vec3 *position_out_m,
                                 bst_vec3 *velocity_out_mps) BST_MUST_CHECK;
 
+/* Eccentric anomaly of a mean anomaly, in the same turn, by Kepler's equation; radians, 0 <= e < 1.
+ */
+double bst_kepler_eccentric_anomaly(double mean_anomaly_rad, double e);
+
 #endif

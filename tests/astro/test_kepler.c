@@ -186,8 +186,22 @@ static void what_is_no_orbit_is_refused(void **state) {
     assert_string_equal(ctx.message, "two-body motion from a rectilinear or non-finite state");
 }
 
+/* Kepler's equation holds, in every turn, up to nearly parabolic orbits. */
+static void eccentric_anomalies_solve_the_equation(void **state) {
+    (void)state;
+    const double e[] = {0.0, 1e-3, 0.3, 0.74, 0.97};
+    for (int k = 0; k < 5; k++) {
+        for (double m = -7.0; m < 14.0; m += 0.173) {
+            double x = bst_kepler_eccentric_anomaly(m, e[k]);
+            bst_assert_close(x - e[k] * sin(x), m, 1e-13 * 14.0);
+            bst_assert_close(x, m, e[k] + 1e-12);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(eccentric_anomalies_solve_the_equation),
         cmocka_unit_test(ellipses),
         cmocka_unit_test(open_orbits),
         cmocka_unit_test(nearly_parabolic_orbits),

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "sim/astro/kepler.h"
 #include "sim/astro/sgp4_fit.h"
 #include "sim/core/cholesky.h"
 #include "tracker/mtt/tangent.h"
@@ -128,11 +129,8 @@ static bool sgp4_motion(const bst_custody_orbit *o, const double x[N], double ti
 /* State of an ellipse with these elements about a point mass. */
 static void ellipse_state(const bst_elements *set, bst_vec3 *r, bst_vec3 *v) {
     const double n = set->mean_motion_radpmin / 60.0, e = set->eccentricity;
-    const double a = cbrt(BST_EARTH_MU_M3PS2 / (n * n)), m = set->mean_anomaly_rad;
-    double anomaly = m + e * sin(m);
-    for (int i = 0; i < 20; i++) {
-        anomaly -= (anomaly - e * sin(anomaly) - m) / (1.0 - e * cos(anomaly));
-    }
+    const double a = cbrt(BST_EARTH_MU_M3PS2 / (n * n));
+    const double anomaly = bst_kepler_eccentric_anomaly(set->mean_anomaly_rad, e);
     const double c = cos(anomaly), s = sin(anomaly), root = sqrt(1.0 - e * e);
     const double rate = n * a / (1.0 - e * c);
     const double cw = cos(set->arg_perigee_rad), sw = sin(set->arg_perigee_rad);

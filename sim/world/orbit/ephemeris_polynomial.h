@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdbool.h>
 
+#include "sim/astro/kepler.h"
 #include "sim/world/orbit/ephemeris.h"
 
 /* Knots of the interpolating polynomial, and knots for its error estimate: one more on either
@@ -56,26 +57,14 @@ static inline bool is_accurate(double p[3][CHECKED], double limit_m) {
     return ERROR_OF_DIFFERENCE * sqrt(a) <= limit_m && ERROR_OF_DIFFERENCE * sqrt(b) <= limit_m;
 }
 
-/* Solves Kepler's equation for the eccentric anomaly, e < 1. */
-static inline double kepler(double m, double e) {
-    double x = m + e; /* start above the root: Newton's steps descend to it */
-    for (int i = 0; i < 20; i++) {
-        double step = (x - e * sin(x) - m) / (1.0 - e * cos(x));
-        x -= step;
-        if (fabs(step) < 1e-14) {
-            break;
-        }
-    }
-    return x;
-}
-
 /* Estimated interpolation error at the perigee of a two-body orbit, relative to the semi-major
  * axis. */
 static inline double perigee_error(double e, double radians_per_step) {
     /* along the axis; across it the place is odd, and its tenth difference about perigee is 0 */
     double p[POINTS + 1] = {0};
     for (int j = 0; j <= POINTS / 2; j++) {
-        p[POINTS / 2 + j] = p[POINTS / 2 - j] = cos(kepler(j * radians_per_step, e));
+        p[POINTS / 2 + j] = p[POINTS / 2 - j] =
+            cos(bst_kepler_eccentric_anomaly(j * radians_per_step, e));
     }
     return ERROR_OF_DIFFERENCE * fabs(tenth_difference(p));
 }
