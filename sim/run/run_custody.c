@@ -7,17 +7,14 @@
 #include <cjson/cJSON.h>
 
 #include "boresight/rng.h"
-#include "sim/astro/sky_clock.h"
 #include "sim/core/json_number.h"
 #include "sim/eval/consistency.h"
+#include "sim/run/run_arcs.h"
 #include "sim/run/run_summary.h"
-#include "sim/run/run_used_tracks.h"
 #include "tracker/orbit/custody.h"
 
-/* tracks of a sensor at one time; more are left out */
-enum { SLOTS = 64 };
-/* detections that a track needs: with fewer its rate is that of the initiation */
-enum { LEAST_HITS = 5 };
+/* directions that an update needs: with fewer the tracker's state is better */
+enum { LEAST_DIRECTIONS = 3 };
 /* numbers that tell an element set from another */
 enum { IDENTITY = 10 };
 /* chi-square of an innovation, 4 degrees of freedom: beyond it are 2e-5 of the true ones */
@@ -33,15 +30,6 @@ enum { IDENTITY = 10 };
 /* an object nearer than this is the observer's spacecraft itself, m */
 #define ITSELF_M 10.0
 
-/* A track that has not ended: its newest state with a detection. */
-typedef struct slot {
-    int64_t id; /* 0: free */
-    int64_t tick;
-    bst_vec3 direction, rate_radps;
-    double covariance[4][4];
-    int32_t hits;
-} slot;
-
 /* Score of an object. */
 typedef struct score {
     int64_t updates, cross_tags;
@@ -51,7 +39,6 @@ typedef struct score {
 struct bst_run_custody {
     const bst_world *world;
     bst_world_view *view;
-    bst_sky_clock *clock;
     bst_custody_config config;
     double tick_rate_hz, within_m;
     int object_count, sensor_count;
@@ -60,9 +47,8 @@ struct bst_run_custody {
     bst_custody_orbit *orbits; /* [object]; a_m 0: none */
     bst_custody_filter *filters;
     score *scores;
-    double *place_m[3];        /* [object] */
-    slot (*slots)[SLOTS];      /* [sensor] */
-    bst_run_used_tracks *used; /* [sensor] */
+    double *place_m[3]; /* [object] */
+    bst_run_arcs *arcs;
     bst_io_table *tracks, *objects;
     bst_custody_figures figures;
 };
@@ -113,14 +99,12 @@ static bst_status allocate(bst_ctx *ctx, bst_run_custody *c) {
     size_t n = (size_t)c->object_count + 1, sensors = (size_t)c->sensor_count + 1;
     c->observer = calloc(sensors, sizeof *c->observer);
     c->pixel_rad = calloc(sensors, sizeof *c->pixel_rad);
-    c->slots = calloc(sensors, sizeof *c->slots);
-    c->used = calloc(sensors, sizeof *c->used);
     c->orbits = calloc(n, sizeof *c->orbits);
     c->filters = calloc(n, sizeof *c->filters);
     c->scores = calloc(n, sizeof *c->scores);
     c->place_m[0] = calloc(3 * n, sizeof *c->place_m[0]);
-    if (!c->observer || !c->pixel_rad || !c->slots || !c->used || !c->orbits || !c->filters ||
-        !c->scores || !c->place_m[0]) {
+    if (!c->observer || !c->pixel_rad || !c->orbits || !c->filters || !c->scores ||
+        !c->place_m[0]) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the custody of %d objects",
                         c->object_count);
     }
@@ -205,9 +189,7 @@ bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
     }
     status = status == BST_OK ? start_filters(ctx, c, scenario) : status;
     status = status == BST_OK ? bst_world_view_create(ctx, world, &c->view) : status;
-    status = status == BST_OK
-                 ? bst_sky_clock_create(ctx, bst_world_earth_orientation(world), &c->clock)
-                 : status;
+    status = status == BST_OK ? bst_run_arcs_create(ctx, world, c->tick_rate_hz, &c->arcs) : status;
     status = status == BST_OK && store ? make_tables(ctx, c, store) : status;
     if (status != BST_OK) {
         bst_run_custody_free(c);
@@ -220,14 +202,9 @@ bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
 void bst_run_custody_free(bst_run_custody *c) {
     if (c) {
         bst_world_view_free(c->view);
-        bst_sky_clock_free(c->clock);
+        bst_run_arcs_free(c->arcs);
         free(c->observer);
         free(c->pixel_rad);
-        for (int i = 0; c->used && i < c->sensor_count; i++) {
-            bst_run_used_tracks_clear(&c->used[i]);
-        }
-        free(c->used);
-        free(c->slots);
         free(c->orbits);
         free(c->filters);
         free(c->scores);
@@ -275,34 +252,12 @@ bst_status bst_run_custody_archive(bst_run_custody *c, bst_archive *archive) {
     for (int i = 0; i < c->object_count; i++) {
         archive_object(c, i, archive);
     }
-    bst_archive_bytes(archive, c->slots, (size_t)c->sensor_count * sizeof *c->slots);
-    for (int i = 0; i < c->sensor_count; i++) {
-        BST_TRY(bst_run_used_tracks_archive(&c->used[i], archive));
-    }
+    BST_TRY(bst_run_arcs_archive(c->arcs, archive));
     BST_ARCHIVE(archive, c->figures);
     return BST_OK;
 }
 
 /* ---- correlation ---- */
-
-/* Observation from a track that has ended. */
-static bst_status observe(bst_ctx *ctx, bst_run_custody *c, int sensor, const slot *track,
-                          bst_custody_observation *out) {
-    double time_s = (double)track->tick / c->tick_rate_hz;
-    bst_world_state eye;
-    bst_sky_rotation sky;
-    BST_TRY(bst_world_view_observer_state(ctx, c->view, c->observer[sensor], time_s, &eye));
-    BST_TRY(bst_sky_clock_at(ctx, c->clock, bst_world_time(c->world, time_s), &sky));
-    *out = (bst_custody_observation){.observer = {.time_s = time_s,
-                                                  .position_m = eye.position_m,
-                                                  .velocity_mps = eye.velocity_mps,
-                                                  .earth_bary_mps = sky.bodies.earth_bary_mps},
-                                     .gcrf_from_teme = sky.frames.gcrf_from_teme,
-                                     .direction = track->direction,
-                                     .rate_radps = track->rate_radps};
-    memcpy(out->covariance, track->covariance, sizeof out->covariance);
-    return BST_OK;
-}
 
 /* Whether the tabulated position of an object may be on the line of sight. */
 static bool may_be(const bst_run_custody *c, int object, const bst_custody_observation *z) {
@@ -378,21 +333,25 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
     }
 }
 
+/* Updates an object with the directions that were measured, which do not have the process noise of
+ * the tracker; with its last state where there are too few. */
+static bool update(const bst_custody_orbit *orbit, const bst_run_arc *arc,
+                   bst_custody_filter *filter) {
+    return arc->count < LEAST_DIRECTIONS
+               ? bst_custody_update(orbit, &arc->state, filter)
+               : bst_custody_update_directions(orbit, &arc->state.gcrf_from_teme, arc->directions,
+                                               arc->count, filter);
+}
+
 /* Correlates a track that has ended, and updates its object. */
-static bst_status end_track(bst_ctx *ctx, bst_run_custody *c, int sensor, slot *track) {
-    const slot ended = *track;
-    track->id = 0;
-    if (ended.hits < LEAST_HITS) {
-        return BST_OK;
-    }
-    bst_custody_observation z;
+static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_arc *arc) {
+    bst_run_custody *c = user;
+    const bst_custody_observation *z = &arc->state;
     match m;
-    BST_TRY(bst_run_used_tracks_add(ctx, &c->used[sensor], ended.id));
-    BST_TRY(observe(ctx, c, sensor, &ended, &z));
-    find_object(c, sensor, &z, &m);
+    find_object(c, sensor, z, &m);
     bst_custody_figures *f = &c->figures;
     bool clear = m.best >= 0 && m.second > m.merit + LIKELIHOOD_MARGIN;
-    bool updated = clear && bst_custody_update(&c->orbits[m.best], &z, &c->filters[m.best]);
+    bool updated = clear && update(&c->orbits[m.best], arc, &c->filters[m.best]);
     f->tracks++;
     f->ambiguous += m.best >= 0 && !clear;
     f->uncorrelated += m.best < 0 || (clear && !updated);
@@ -405,16 +364,16 @@ static bst_status end_track(bst_ctx *ctx, bst_run_custody *c, int sensor, slot *
         s->updates++;
         s->cross_tags += crossed;
         s->chi2_sum += m.chi2;
-        s->last_s = isnan(s->last_s) ? z.observer.time_s : fmax(s->last_s, z.observer.time_s);
+        s->last_s = isnan(s->last_s) ? z->observer.time_s : fmax(s->last_s, z->observer.time_s);
         nees = bst_custody_nees(&c->filters[m.best]);
     }
     if (!c->tracks) {
         return BST_OK;
     }
     const bst_io_value row[] = {whole_number(sensor, true),
-                                whole_number(ended.id, true),
-                                number(z.observer.time_s),
-                                whole_number(ended.hits, true),
+                                whole_number(arc->id, true),
+                                number(z->observer.time_s),
+                                whole_number(arc->hits, true),
                                 whole_number(m.count, true),
                                 whole_number(m.best, updated),
                                 whole_number(m.true_object, m.true_object >= 0),
@@ -423,39 +382,14 @@ static bst_status end_track(bst_ctx *ctx, bst_run_custody *c, int sensor, slot *
     return bst_io_table_append(ctx, c->tracks, row);
 }
 
+bst_status bst_run_custody_detections(bst_ctx *ctx, bst_run_custody *c, int sensor,
+                                      const bst_detections *detections) {
+    return c ? bst_run_arcs_detections(ctx, c->arcs, sensor, detections) : BST_OK;
+}
+
 bst_status bst_run_custody_tracks(bst_ctx *ctx, bst_run_custody *c, int sensor,
                                   const bst_tracks *tracks) {
-    if (!c) {
-        return BST_OK;
-    }
-    slot *slots = c->slots[sensor];
-    for (int i = 0; i < tracks->count; i++) {
-        const bst_track *t = &tracks->items[i];
-        slot *own = NULL;
-        for (int k = 0; k < SLOTS; k++) {
-            own = slots[k].id == t->id || (slots[k].id == 0 && !own) ? &slots[k] : own;
-        }
-        bool new_state = t->status == BST_TRACK_CONFIRMED && t->misses_in_row == 0 &&
-                         t->hidden == BST_HIDDEN_NOT && tracks->attitude.valid;
-        if (own && new_state && !bst_run_used_tracks_has(&c->used[sensor], t->id)) {
-            *own = (slot){.id = t->id,
-                          .tick = tracks->tick,
-                          .direction = t->direction_gcrf,
-                          .rate_radps = t->rate_gcrf_radps,
-                          .hits = t->hits};
-            memcpy(own->covariance, t->covariance, sizeof own->covariance);
-        }
-    }
-    for (int k = 0; k < SLOTS; k++) {
-        bool listed = false;
-        for (int i = 0; i < tracks->count && !listed; i++) {
-            listed = tracks->items[i].id == slots[k].id;
-        }
-        if (slots[k].id != 0 && !listed) {
-            BST_TRY(end_track(ctx, c, sensor, &slots[k]));
-        }
-    }
-    return BST_OK;
+    return c ? bst_run_arcs_tracks(ctx, c->arcs, sensor, tracks, take_arc, c) : BST_OK;
 }
 
 /* ---- end ---- */
@@ -478,13 +412,12 @@ static bst_status end_object(bst_ctx *ctx, bst_run_custody *c, int object, doubl
     const score *s = &c->scores[object];
     bst_custody_filter *f = &c->filters[object];
     bst_vec3 place, truth;
-    bst_custody_filter exact = {.x = {0.0}};
-    double unused, error_m = NAN;
+    double error_m = NAN;
     bst_custody_add_process_noise(&c->config, end_s, f);
     *nees = bst_custody_nees(f);
     if (!bst_custody_predict_position(&c->orbits[object], f, end_s, &place, sigma_m)) {
         *sigma_m = NAN;
-    } else if (bst_custody_predict_position(&c->orbits[object], &exact, end_s, &truth, &unused)) {
+    } else if (bst_custody_catalogued_position(&c->orbits[object], end_s, &truth)) {
         error_m = bst_vec3_norm(bst_vec3_sub(place, truth));
     }
     if (!c->objects) {
@@ -508,13 +441,7 @@ bst_status bst_run_custody_finish(bst_ctx *ctx, bst_run_custody *c, double end_s
     if (!c || !(end_s > 0.0)) {
         return BST_OK;
     }
-    for (int i = 0; i < c->sensor_count; i++) {
-        for (int k = 0; k < SLOTS; k++) {
-            if (c->slots[i][k].id != 0) {
-                BST_TRY(end_track(ctx, c, i, &c->slots[i][k]));
-            }
-        }
-    }
+    BST_TRY(bst_run_arcs_finish(ctx, c->arcs, take_arc, c));
     double *sigmas = c->place_m[0], *updated = c->place_m[1]; /* no longer needed */
     int count = 0, updated_count = 0, nees_count = 0;
     double age_sum = 0.0, nees_sum = 0.0;

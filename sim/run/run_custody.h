@@ -49,6 +49,10 @@ void bst_run_custody_free(bst_run_custody *custody); /* NULL allowed */
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_run_custody_archive(bst_run_custody *custody, bst_archive *archive) BST_MUST_CHECK;
 
+/* Takes the detections of a frame, whose centroids the tracks of this frame, which come later,
+ * refer to. NULL custody: nothing. Errors: BST_ERR_MEMORY */
+bst_status bst_run_custody_detections(bst_ctx *ctx, bst_run_custody *custody, int sensor,
+                                      const bst_detections *detections) BST_MUST_CHECK;
 /* Takes the tracks of a frame; `sensor`: index over all observers; `observer`: that of the sensor.
  * NULL custody: nothing. */
 bst_status bst_run_custody_tracks(bst_ctx *ctx, bst_run_custody *custody, int sensor,

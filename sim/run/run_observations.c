@@ -9,7 +9,7 @@
 #include "sim/astro/bodies.h"
 #include "sim/cli/plugins.h"
 #include "sim/onboard/knowledge.h"
-#include "tracker/mtt/tangent.h"
+#include "sim/run/run_directions.h"
 
 void bst_run_creation_date(char text[32]) {
     time_t now = time(NULL);
@@ -137,65 +137,37 @@ typedef struct gathering {
     bst_run_track track;
     bst_run_observation *items;
     int64_t capacity;
-    bst_vec3 boresight; /* of the latest observation */
-    double share;       /* common fraction of the attitude variance of consecutive frames, latest */
+    bst_quat attitude; /* of the latest observation */
+    double share;      /* common fraction of the attitude variance of consecutive frames, latest */
 } gathering;
 
-/* Computes the measured direction of a detection and its covariance from centroid and attitude
- * errors. */
-static void measure(const gathering *g, const bst_io_rows *rows, const bst_light *light,
-                    bst_od_observation *out) {
-    double x = bst_io_rows_real(rows, X_PX), y = bst_io_rows_real(rows, Y_PX);
-    bst_quat back = bst_quat_conj(bst_quat_unit(
-        (bst_quat){bst_io_rows_real(rows, ATTITUDE), bst_io_rows_real(rows, ATTITUDE + 1),
-                   bst_io_rows_real(rows, ATTITUDE + 2), bst_io_rows_real(rows, ATTITUDE + 3)}));
-    bst_vec3 v = bst_camera_unproject(g->camera, x, y), columns[5];
-    const bst_vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-    columns[0] = bst_vec3_sub(bst_camera_unproject(g->camera, x + 0.5, y),
-                              bst_camera_unproject(g->camera, x - 0.5, y));
-    columns[1] = bst_vec3_sub(bst_camera_unproject(g->camera, x, y + 0.5),
-                              bst_camera_unproject(g->camera, x, y - 0.5));
-    double c[5][5] = {{bst_io_rows_real(rows, COV_PX), bst_io_rows_real(rows, COV_PX + 1)},
-                      {bst_io_rows_real(rows, COV_PX + 1), bst_io_rows_real(rows, COV_PX + 2)}};
-    for (int i = 0; i < 3; i++) {
-        columns[2 + i] = bst_vec3_cross(unit[i], v);
-        double sigma = bst_io_rows_real(rows, SIGMA + i) * BST_ARCSEC_RAD;
-        c[2 + i][2 + i] = sigma * sigma;
-    }
-    out->direction = bst_light_unaberrate(light, bst_quat_rotate(back, v));
-    bst_tangent axes = bst_tangent_at(out->direction);
-    double j[2][5];
-    for (int i = 0; i < 5; i++) {
-        bst_vec3 column = bst_quat_rotate(back, columns[i]);
-        j[0][i] = bst_vec3_dot(column, axes.e1);
-        j[1][i] = bst_vec3_dot(column, axes.e2);
-    }
-    for (int axis = 0; axis < 2;
-         axis++) { /* errors about camera x and y; a first frame's are all common, see set_shared */
-        double sigma = bst_io_rows_real(rows, SIGMA + axis) * BST_ARCSEC_RAD;
-        out->shared_rad[0][axis] = j[0][2 + axis] * sigma;
-        out->shared_rad[1][axis] = j[1][2 + axis] * sigma;
-    }
-    for (int i = 0; i < 5; i++) {
-        for (int k = 0; k < 5; k++) {
-            out->cov_11 += j[0][i] * c[i][k] * j[0][k];
-            out->cov_12 += j[0][i] * c[i][k] * j[1][k];
-            out->cov_22 += j[1][i] * c[i][k] * j[1][k];
-        }
-    }
+/* Attitude from stars of a row. */
+static bst_attitude_fix attitude_of(const bst_io_rows *rows) {
+    return (bst_attitude_fix){
+        .valid = true,
+        .q_cam_from_gcrf = {bst_io_rows_real(rows, ATTITUDE), bst_io_rows_real(rows, ATTITUDE + 1),
+                            bst_io_rows_real(rows, ATTITUDE + 2),
+                            bst_io_rows_real(rows, ATTITUDE + 3)},
+        .sigma_rad = {bst_io_rows_real(rows, SIGMA) * BST_ARCSEC_RAD,
+                      bst_io_rows_real(rows, SIGMA + 1) * BST_ARCSEC_RAD,
+                      bst_io_rows_real(rows, SIGMA + 2) * BST_ARCSEC_RAD},
+        .shared = bst_io_rows_real(rows, SHARED)};
 }
 
-/* Decorrelation of attitude errors: stars leave the field as the camera rotates. Two fields at
- * distance d along a side s share the fraction 1 - d / s; the exponential used has the same
- * integral. */
-static double change_of_stars(gathering *g, const bst_io_rows *rows) {
-    const bst_camera *c = g->camera;
-    bst_vec3 before = g->boresight;
-    bst_quat q = {bst_io_rows_real(rows, ATTITUDE), bst_io_rows_real(rows, ATTITUDE + 1),
-                  bst_io_rows_real(rows, ATTITUDE + 2), bst_io_rows_real(rows, ATTITUDE + 3)};
-    g->boresight = bst_quat_rotate(bst_quat_conj(bst_quat_unit(q)), (bst_vec3){0.0, 0.0, 1.0});
-    double side = 0.5 * (double)(c->width_px + c->height_px) * bst_camera_scale_rad(c);
-    return g->track.count > 1 ? 2.0 * bst_vec3_angle(before, g->boresight) / side : 0.0;
+/* Sets the measured direction of a detection. */
+static void measure(gathering *g, const bst_io_rows *rows, const bst_light *light,
+                    bst_od_observation *out) {
+    const bst_attitude_fix attitude = attitude_of(rows);
+    const double cov_px2[3] = {bst_io_rows_real(rows, COV_PX), bst_io_rows_real(rows, COV_PX + 1),
+                               bst_io_rows_real(rows, COV_PX + 2)};
+    bst_run_measure_direction(g->camera, bst_io_rows_real(rows, X_PX), bst_io_rows_real(rows, Y_PX),
+                              cov_px2, &attitude, light, out);
+    if (g->track.count > 1) {
+        out->shared_change =
+            bst_run_change_of_stars(g->camera, g->attitude, attitude.q_cam_from_gcrf);
+    }
+    g->attitude = attitude.q_cam_from_gcrf;
+    g->share = attitude.shared;
 }
 
 /* Sets the common part of the attitude errors, as estimated by the last frame. */
@@ -245,8 +217,6 @@ static bst_status add(bst_ctx *ctx, gathering *g, const bst_io_rows *rows) {
     } else {
         bst_light light = bst_light_at(&bodies, eye.position_m, eye.velocity_mps);
         measure(g, rows, &light, &o->od);
-        o->od.shared_change = change_of_stars(g, rows);
-        g->share = bst_io_rows_real(rows, SHARED);
     }
     g->track.target = g->track.target || bst_io_rows_int(rows, TARGET) != 0;
     if (g->track.count == 1) {

@@ -106,7 +106,10 @@ static bst_status on_message(void *user, const char *scope, const char *channel,
     }
     BST_TRY(bst_run_sightings_message(&run->hooks, run->sightings, (int)(sensor - run->sensors),
                                       channel, payload));
-    if (strcmp(channel, BST_CHANNEL_TRACKS) == 0) {
+    if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0) {
+        BST_TRY(bst_run_custody_detections(&run->hooks, run->custody, (int)(sensor - run->sensors),
+                                           payload));
+    } else if (strcmp(channel, BST_CHANNEL_TRACKS) == 0) {
         BST_TRY(bst_run_custody_tracks(&run->hooks, run->custody, (int)(sensor - run->sensors),
                                        payload));
     }

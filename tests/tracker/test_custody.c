@@ -111,6 +111,86 @@ static void errors_agree_with_covariances(void **state) {
     assert_true(sigma_after < 0.2 * sigma_before);
 }
 
+/* Four directions of a pass of a minute with errors of 0.5 arcsec, and one of 2 arcsec that they
+ * share. */
+static bool observe_pass(const bst_sgp4 *sgp4, double offset_s, double time_s, bst_rng_key key,
+                         uint64_t number, bst_od_observation out[4]) {
+    const double own = 0.5 * BST_ARCSEC_RAD, shared = 2.0 * BST_ARCSEC_RAD;
+    double common[2] = {bst_rng_normal(key, number, 100), bst_rng_normal(key, number, 101)};
+    for (int i = 0; i < 4; i++) {
+        bst_custody_observation at;
+        if (!observe(sgp4, offset_s, time_s + 20.0 * i, key, 8 * number + (uint64_t)i, &at)) {
+            return false;
+        }
+        bst_tangent axes = bst_tangent_at(at.direction);
+        out[i] = (bst_od_observation){
+            .observer = at.observer,
+            .direction = bst_tangent_exp(
+                at.direction, bst_tangent_vector(&axes, shared * common[0], shared * common[1])),
+            .cov_11 = own * own + shared * shared,
+            .cov_22 = own * own + shared * shared,
+            .shared_rad = {{shared, 0.0}, {0.0, shared}}};
+    }
+    return true;
+}
+
+/* Mean NEES over draws of the error of an object after an update with a pass. */
+static double nees_of_passes(const bst_elements *set, double offset_s, int draws) {
+    bst_ctx ctx = {0};
+    bst_custody_orbit orbit;
+    bst_sgp4 *sgp4;
+    const bst_rng_key key = bst_rng_make_key(3, 0, "test", "passes");
+    double sum = 0.0;
+    bst_assert_ok(&ctx, bst_sgp4_create(&ctx, set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &sgp4));
+    bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, set, offset_s, 0.0, &orbit));
+    for (int i = 0; i < draws; i++) {
+        double normals[BST_CUSTODY_STATE];
+        bst_custody_filter filter;
+        bst_od_observation pass[4];
+        const uint64_t number = (uint64_t)(1000 * set->norad + i);
+        for (int k = 0; k < BST_CUSTODY_STATE; k++) {
+            normals[k] = bst_rng_normal(key, number, (uint64_t)(200 + k));
+        }
+        bst_custody_filter_init(&config, &orbit, normals, &filter);
+        assert_true(observe_pass(sgp4, offset_s, 200.0 * i, key, number, pass));
+        assert_true(bst_custody_update_directions(&orbit, &same_axes, pass, 4, &filter));
+        sum += bst_custody_nees(&filter);
+    }
+    bst_sgp4_free(sgp4);
+    return sum / draws;
+}
+
+/* Updates with directions leave the error that the covariance says: errors that directions share
+ * count, and so does the curvature where drag is strong (ACRUX 1, weeks before its decay; element
+ * sets of Starlinks that climb), where a filter without it had a mean NEES of 48 and 7.6 after one
+ * observation of direction and rate. */
+static void directions_and_strong_drag(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_elements *sets = NULL;
+    int count = 0;
+    enum { DRAWS = 120 };
+    const struct {
+        int norad;
+        double age_days; /* of the elements */
+    } objects[] = {{25544, 0.3}, {44801, 0.5}, {52135, 0.05}, {44369, 2.4}};
+    const bst_elements_options options = {.skip_bad_sets = true};
+    bst_assert_ok(&ctx, bst_elements_load(&ctx, CATALOGUE, &options, &sets, &count));
+    int found = 0;
+    for (int k = 0; k < 4; k++) {
+        for (int i = 0; i < count; i++) {
+            if (sets[i].norad == objects[k].norad) {
+                double nees = nees_of_passes(&sets[i], 86400.0 * objects[k].age_days, DRAWS);
+                print_message("%d: NEES %.2f\n", sets[i].norad, nees);
+                bst_assert_close(nees, 6.0, 4.0 * sqrt(12.0 / DRAWS));
+                found++;
+            }
+        }
+    }
+    assert_int_equal(found, 4);
+    free(sets);
+}
+
 static bst_elements low_orbit(void) {
     return (bst_elements){.norad = 5,
                           .epoch_utc_jd1 = 2459746.5,
@@ -205,6 +285,7 @@ static void refuses_what_is_no_ellipse(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(errors_agree_with_covariances),
+        cmocka_unit_test(directions_and_strong_drag),
         cmocka_unit_test(noise_spreads_places),
         cmocka_unit_test(photocentre_and_strangers),
         cmocka_unit_test(refuses_what_is_no_ellipse),

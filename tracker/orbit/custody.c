@@ -9,7 +9,12 @@
 #include "sim/core/cholesky.h"
 #include "tracker/mtt/tangent.h"
 
-enum { N = BST_CUSTODY_STATE, SETS = 2 * N + 1, MOST_ITERATIONS = 5 };
+enum {
+    N = BST_CUSTODY_STATE,
+    SETS = 2 * N + 1,
+    M = 2 * BST_CUSTODY_DIRECTIONS, /* most numbers of a measurement */
+    MOST_ITERATIONS = 5
+};
 #define DAY_S 86400.0
 /* Below this inclination SGP4's periodics are not smooth in its elements (Lyddane's, by Sun and
  * Moon: 0.02 degrees), and differences are those of osculating elements. */
@@ -88,43 +93,7 @@ void bst_custody_add_process_noise(const bst_custody_config *config, double time
     filter->noise_until_s = time_s;
 }
 
-/* ------------------------------------------------------------------ Prediction */
-
-/* Least step of central differences, m, large against the rounding of SGP4 (1e-6 m). Otherwise it
- * is the standard deviation of the component, so that a slope is the mean one over what is possible
- * (Norgaard, Poulsen and Ravn, "New developments in state estimation for nonlinear systems",
- * Automatica 36, 2000). */
-#define LEAST_STEP_M 20.0
-
-/* Motion at one time of the sets about a state: of x itself, then of x plus and minus a step in
- * each component; TEME, m and m/s. */
-typedef struct bundle {
-    bst_vec3 r[SETS], v[SETS];
-    double step_m[N];
-} bundle;
-
-/* State x of a set of a bundle. */
-static void deviation(const double x[N], const bundle *b, int set, double y[N]) {
-    memcpy(y, x, N * sizeof *y);
-    if (set > 0) {
-        int k = (set - 1) / 2;
-        y[k] += set % 2 ? b->step_m[k] : -b->step_m[k];
-    }
-}
-
-/* Motion on the elements that differ from the catalogued ones by x. */
-static bool sgp4_motion(const bst_custody_orbit *o, const double x[N], double time_s, bst_vec3 *r,
-                        bst_vec3 *v) {
-    bst_elements set;
-    bst_sgp4 *sgp4;
-    if (!elements_at(o, x, &set) ||
-        bst_sgp4_create(NULL, &set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &sgp4) != BST_OK) {
-        return false;
-    }
-    bool good = bst_sgp4_motion(sgp4, (o->epoch_offset_s + time_s) / 60.0, r, v);
-    bst_sgp4_free(sgp4);
-    return good;
-}
+/* ------------------------------------------------------------------ Motion */
 
 /* State of an ellipse with these elements about a point mass. */
 static void ellipse_state(const bst_elements *set, bst_vec3 *r, bst_vec3 *v) {
@@ -169,70 +138,182 @@ static bool near_equator_motion(const bst_custody_orbit *o, bst_vec3 cat_r, bst_
     return true;
 }
 
-static bool make_bundle(const bst_custody_orbit *o, const double x[N], const double p[N][N],
-                        double time_s, bundle *out) {
-    bst_vec3 r = {0}, v = {0};
-    const double none[N] = {0.0};
+/* States at some times on the elements that differ from the catalogued ones by x; TEME, m and m/s.
+ * False: there are none. */
+static bool motion(const bst_custody_orbit *o, const double x[N], int count, const double *time_s,
+                   bst_vec3 *r, bst_vec3 *v) {
     const bool flat = o->elements.inclination_rad < LEAST_INCLINATION_RAD;
-    for (int k = 0; k < N; k++) {
-        out->step_m[k] = fmax(sqrt(p[k][k]), LEAST_STEP_M);
+    bst_elements set = o->elements;
+    bst_sgp4 *sgp4;
+    if ((!flat && !elements_at(o, x, &set)) ||
+        bst_sgp4_create(NULL, &set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &sgp4) != BST_OK) {
+        return false;
     }
-    bool good = !flat || sgp4_motion(o, none, time_s, &r, &v);
-    for (int i = 0; good && i < SETS; i++) {
-        double y[N];
-        deviation(x, out, i, y);
-        good = flat ? near_equator_motion(o, r, v, y, time_s, &out->r[i], &out->v[i])
-                    : sgp4_motion(o, y, time_s, &out->r[i], &out->v[i]);
+    bool good = true;
+    for (int i = 0; good && i < count; i++) {
+        good = bst_sgp4_motion(sgp4, (o->epoch_offset_s + time_s[i]) / 60.0, &r[i], &v[i]) &&
+               (!flat || near_equator_motion(o, r[i], v[i], x, time_s[i], &r[i], &v[i]));
     }
+    bst_sgp4_free(sgp4);
     return good;
 }
 
-/* Direction and rate of a set from the observer, relative to the observed direction in its tangent
- * axes. */
-static void measurement(const bst_custody_observation *z, bst_vec3 r_teme, bst_vec3 v_teme,
-                        double out[4]) {
-    const bst_od_state state = {.time_s = z->observer.time_s,
-                                .position_m = bst_mat3_mul_vec(&z->gcrf_from_teme, r_teme),
-                                .velocity_mps = bst_mat3_mul_vec(&z->gcrf_from_teme, v_teme)};
-    bst_od_sight sight;
-    bst_od_see(&state, &z->observer, &sight);
-    const bst_tangent axes = bst_tangent_at(z->direction);
-    const bst_vec3 d = bst_tangent_log(z->direction, sight.direction);
-    const bst_vec3 r = bst_tangent_carry(sight.direction, z->direction, sight.rate_radps);
-    out[0] = bst_vec3_dot(axes.e1, d);
-    out[1] = bst_vec3_dot(axes.e2, d);
-    out[2] = bst_vec3_dot(axes.e1, r);
-    out[3] = bst_vec3_dot(axes.e2, r);
-}
+/* ------------------------------------------------------------------ Measurement */
 
-/* Innovation and slope at a state; *seen_as: the observation with the variance of the object's
- * photocentre at the range of that state. */
-static bool linearise(const bst_custody_orbit *o, const double x[N], const double p[N][N],
-                      const bst_custody_observation *z, bst_custody_prediction *out,
-                      bst_custody_observation *seen_as) {
-    bundle b;
-    if (!make_bundle(o, x, p, z->observer.time_s, &b)) {
+/* Distance of the states that a measurement is predicted for from the middle one, in standard
+ * deviations along the columns of the covariance's root: with its square 3, the kurtosis of a
+ * normal distribution, second differences give the second moments of a quadratic function exactly
+ * (Norgaard, Poulsen and Ravn, "New developments in state estimation for nonlinear systems",
+ * Automatica 36, 2000). */
+#define SPREAD 1.7320508075688772
+
+/* Lower triangular root of a covariance. False: it is singular. */
+static bool make_root(const double p[N][N], double root[N][N]) {
+    double unit[N];
+    for (int i = 0; i < N; i++) {
+        unit[i] = sqrt(p[i][i]);
+        for (int j = 0; j <= i; j++) {
+            root[i][j] = p[i][j] / (unit[i] * unit[j]);
+        }
+    }
+    if (!bst_cholesky_factor(&root[0][0], N, N, 1e-15)) {
         return false;
     }
-    const bst_vec3 line =
-        bst_vec3_sub(bst_mat3_mul_vec(&z->gcrf_from_teme, b.r[0]), z->observer.position_m);
-    const double spread = o->photocentre_m / bst_vec3_norm(line);
-    *seen_as = *z;
-    seen_as->covariance[0][0] += spread * spread;
-    seen_as->covariance[1][1] += spread * spread;
-    const bst_tangent axes = bst_tangent_at(z->direction);
-    double seen[4];
-    measurement(z, b.r[0], b.v[0], seen);
-    out->innovation[0] = -seen[0];
-    out->innovation[1] = -seen[1];
-    out->innovation[2] = bst_vec3_dot(axes.e1, z->rate_radps) - seen[2];
-    out->innovation[3] = bst_vec3_dot(axes.e2, z->rate_radps) - seen[3];
-    for (int k = 0; k < N; k++) {
-        double plus[4], minus[4];
-        measurement(z, b.r[1 + 2 * k], b.v[1 + 2 * k], plus);
-        measurement(z, b.r[2 + 2 * k], b.v[2 + 2 * k], minus);
+    for (int i = 0; i < N; i++) {
+        for (int j = 0; j < N; j++) {
+            root[i][j] = j <= i ? root[i][j] * unit[i] : 0.0;
+        }
+    }
+    return true;
+}
+
+/* What was measured: direction and rate of a track, or directions at some times. */
+typedef struct measurement {
+    int times, size; /* size: numbers in all */
+    double time_s[BST_CUSTODY_DIRECTIONS];
+    const bst_mat3 *gcrf_from_teme;
+    const bst_custody_observation *track; /* NULL: directions */
+    const bst_od_observation *directions;
+} measurement;
+
+/* What is measured less what is predicted for a state, in the tangent axes at the observed
+ * directions; range_m: to the object. False: no state. */
+static bool residuals(const bst_custody_orbit *o, const double x[N], const measurement *z,
+                      double out[M], double range_m[BST_CUSTODY_DIRECTIONS]) {
+    bst_vec3 r[BST_CUSTODY_DIRECTIONS], v[BST_CUSTODY_DIRECTIONS];
+    if (!motion(o, x, z->times, z->time_s, r, v)) {
+        return false;
+    }
+    for (int i = 0; i < z->times; i++) {
+        const bst_od_observer *eye = z->track ? &z->track->observer : &z->directions[i].observer;
+        const bst_vec3 seen = z->track ? z->track->direction : z->directions[i].direction;
+        const bst_od_state state = {.time_s = eye->time_s,
+                                    .position_m = bst_mat3_mul_vec(z->gcrf_from_teme, r[i]),
+                                    .velocity_mps = bst_mat3_mul_vec(z->gcrf_from_teme, v[i])};
+        bst_od_sight sight;
+        bst_od_see(&state, eye, &sight);
+        const bst_tangent axes = bst_tangent_at(seen);
+        const bst_vec3 d = bst_tangent_log(seen, sight.direction);
+        out[2 * i] = -bst_vec3_dot(axes.e1, d);
+        out[2 * i + 1] = -bst_vec3_dot(axes.e2, d);
+        range_m[i] = sight.range_m;
+        if (z->track) {
+            const bst_vec3 rate = bst_vec3_sub(
+                z->track->rate_radps, bst_tangent_carry(sight.direction, seen, sight.rate_radps));
+            out[2] = bst_vec3_dot(axes.e1, rate);
+            out[3] = bst_vec3_dot(axes.e2, rate);
+        }
+    }
+    return true;
+}
+
+/* Covariance of the measurement's errors, with that of the photocentre, which is the same for all
+ * directions of a pass. */
+static void noise(const bst_custody_orbit *o, const measurement *z,
+                  const double range_m[BST_CUSTODY_DIRECTIONS], double r[M][M]) {
+    if (z->track) {
+        const double spread = o->photocentre_m / range_m[0];
         for (int i = 0; i < 4; i++) {
-            out->slope[i][k] = (plus[i] - minus[i]) / (2.0 * b.step_m[k]);
+            memcpy(r[i], z->track->covariance[i], sizeof z->track->covariance[i]);
+        }
+        r[0][0] += spread * spread;
+        r[1][1] += spread * spread;
+        return;
+    }
+    for (int i = 0; i < z->times; i++) {
+        const bst_od_observation *a = &z->directions[i];
+        const bst_tangent axes = bst_tangent_at(a->direction);
+        const bst_vec3 ea[2] = {axes.e1, axes.e2};
+        double kept = 1.0;
+        for (int k = i; k < z->times; k++) {
+            const bst_od_observation *b = &z->directions[k];
+            const bst_tangent other = bst_tangent_at(b->direction);
+            const bst_vec3 eb[2] = {other.e1, other.e2};
+            const double spread2 = o->photocentre_m / range_m[i] * (o->photocentre_m / range_m[k]);
+            const double own[2][2] = {{a->cov_11, a->cov_12}, {a->cov_12, a->cov_22}};
+            kept *= k > i ? exp(-b->shared_change) : 1.0;
+            for (int p = 0; p < 2; p++) {
+                for (int q = 0; q < 2; q++) {
+                    double sum = k == i ? own[p][q]
+                                        : kept * (a->shared_rad[p][0] * b->shared_rad[q][0] +
+                                                  a->shared_rad[p][1] * b->shared_rad[q][1]);
+                    sum += spread2 * bst_vec3_dot(ea[p], eb[q]);
+                    r[2 * i + p][2 * k + q] = r[2 * k + q][2 * i + p] = sum;
+                }
+            }
+        }
+    }
+}
+
+/* A measurement as a linear function of the state. */
+typedef struct linear {
+    double y[M]; /* measured minus predicted, at the middle */
+    double slope[M][N];
+    double r[M][M]; /* covariance of errors, and of what the slope leaves of the curvature */
+} linear;
+
+/* Linear function over the states that the middle x and its covariance p allow. False: no state, or
+ * a covariance is singular. */
+static bool linearise(const bst_custody_orbit *o, const double x[N], const double p[N][N],
+                      const measurement *z, linear *out) {
+    double root[N][N], y[M], range_m[BST_CUSTODY_DIRECTIONS], unused[BST_CUSTODY_DIRECTIONS];
+    if (!make_root(p, root) || !residuals(o, x, z, y, range_m)) {
+        return false;
+    }
+    memcpy(out->y, y, sizeof y);
+    noise(o, z, range_m, out->r);
+    for (int i = 0; i < z->size; i++) {
+        if (!(out->r[i][i] > 0.0)) {
+            return false;
+        }
+    }
+    for (int k = 0; k < N; k++) {
+        double at[2][N], seen[2][M], bend[M];
+        for (int i = 0; i < N; i++) {
+            at[0][i] = x[i] + SPREAD * root[i][k];
+            at[1][i] = x[i] - SPREAD * root[i][k];
+        }
+        if (!residuals(o, at[0], z, seen[0], unused) || !residuals(o, at[1], z, seen[1], unused)) {
+            return false;
+        }
+        for (int i = 0; i < z->size; i++) {
+            out->slope[i][k] = (seen[1][i] - seen[0][i]) / (2.0 * SPREAD); /* for one column */
+            bend[i] = (seen[0][i] + seen[1][i] - 2.0 * y[i]) / (SPREAD * SPREAD);
+            out->y[i] += 0.5 * bend[i];
+        }
+        for (int i = 0; i < z->size; i++) {
+            for (int j = 0; j < z->size; j++) {
+                out->r[i][j] += 0.5 * bend[i] * bend[j];
+            }
+        }
+    }
+    /* slopes by columns are slope times root */
+    for (int i = 0; i < z->size; i++) {
+        for (int k = N - 1; k >= 0; k--) {
+            for (int j = k + 1; j < N; j++) {
+                out->slope[i][k] -= out->slope[i][j] * root[j][k];
+            }
+            out->slope[i][k] /= root[k][k];
         }
     }
     return true;
@@ -240,67 +321,75 @@ static bool linearise(const bst_custody_orbit *o, const double x[N], const doubl
 
 /* P H', H P H' + R and its Cholesky factor, in units in which R's diagonal is 1. */
 typedef struct gain {
-    double ph[N][4];
-    double s[4][4], l[4][4], unit[4];
+    int size;
+    double ph[N][M];
+    double s[M][M], l[M][M], unit[M];
 } gain;
 
-static bool make_gain(const double p[N][N], const bst_custody_prediction *at,
-                      const bst_custody_observation *z, gain *g) {
+static bool make_gain(const double p[N][N], const linear *at, int size, gain *g) {
+    g->size = size;
     for (int i = 0; i < N; i++) {
-        for (int j = 0; j < 4; j++) {
+        for (int j = 0; j < size; j++) {
             g->ph[i][j] = 0.0;
             for (int k = 0; k < N; k++) {
                 g->ph[i][j] += p[i][k] * at->slope[j][k];
             }
         }
     }
-    for (int i = 0; i < 4; i++) {
-        g->unit[i] = sqrt(z->covariance[i][i]);
-        if (!(g->unit[i] > 0.0)) {
-            return false;
-        }
-        for (int j = 0; j < 4; j++) {
-            g->s[i][j] = z->covariance[i][j];
+    for (int i = 0; i < size; i++) {
+        g->unit[i] = sqrt(at->r[i][i]);
+        for (int j = 0; j < size; j++) {
+            g->s[i][j] = at->r[i][j];
             for (int k = 0; k < N; k++) {
                 g->s[i][j] += at->slope[i][k] * g->ph[k][j];
             }
         }
     }
-    for (int i = 0; i < 4; i++) {
-        for (int j = 0; j < 4; j++) {
+    for (int i = 0; i < size; i++) {
+        for (int j = 0; j < size; j++) {
             g->l[i][j] = 0.5 * (g->s[i][j] + g->s[j][i]) / (g->unit[i] * g->unit[j]);
         }
     }
-    return bst_cholesky_factor(&g->l[0][0], 4, 4, 1e-14);
+    return bst_cholesky_factor(&g->l[0][0], M, size, 1e-14);
 }
 
 /* S^-1 y */
-static void solve(const gain *g, const double y[4], double out[4]) {
-    for (int i = 0; i < 4; i++) {
+static void solve(const gain *g, const double y[M], double out[M]) {
+    for (int i = 0; i < g->size; i++) {
         out[i] = y[i] / g->unit[i];
     }
-    bst_cholesky_solve(&g->l[0][0], 4, 4, out);
-    for (int i = 0; i < 4; i++) {
+    bst_cholesky_solve(&g->l[0][0], M, g->size, out);
+    for (int i = 0; i < g->size; i++) {
         out[i] /= g->unit[i];
     }
+}
+
+static measurement of_track(const bst_custody_observation *z) {
+    return (measurement){.times = 1,
+                         .size = 4,
+                         .time_s = {z->observer.time_s},
+                         .gcrf_from_teme = &z->gcrf_from_teme,
+                         .track = z};
 }
 
 bool bst_custody_predict(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                          const bst_custody_observation *observation, bst_custody_prediction *out) {
     assert(orbit && filter && observation && out);
-    bst_custody_observation z;
+    const measurement z = of_track(observation);
+    linear at;
     gain g;
-    double w[4];
-    if (!linearise(orbit, filter->x, filter->p, observation, out, &z) ||
-        !make_gain(filter->p, out, &z, &g)) {
+    double w[M];
+    if (!linearise(orbit, filter->x, filter->p, &z, &at) ||
+        !make_gain(filter->p, &at, z.size, &g)) {
         return false;
     }
-    solve(&g, out->innovation, w);
+    solve(&g, at.y, w);
     out->chi2 = out->log_determinant = 0.0;
-    for (int i = 0; i < 4; i++) {
-        out->chi2 += w[i] * out->innovation[i];
+    for (int i = 0; i < z.size; i++) {
+        out->chi2 += w[i] * at.y[i];
         out->log_determinant += 2.0 * log(g.l[i][i] * g.unit[i]);
-        memcpy(out->covariance[i], g.s[i], sizeof g.s[i]);
+        out->innovation[i] = at.y[i];
+        memcpy(out->covariance[i], g.s[i], sizeof out->covariance[i]);
     }
     return isfinite(out->chi2);
 }
@@ -308,15 +397,20 @@ bool bst_custody_predict(const bst_custody_orbit *orbit, const bst_custody_filte
 /* ------------------------------------------------------------------ Update */
 
 /* P = (1 - K H) P (1 - K H)' + K R K' with K = P H' S^-1. */
-static void update_covariance(const gain *g, const bst_custody_prediction *at,
-                              const bst_custody_observation *z, double p[N][N]) {
-    double k[N][4], left[N][N], half[N][N], out[N][N];
+static void update_covariance(const gain *g, const linear *at, double p[N][N]) {
+    double k[N][M], kr[N][M], left[N][N], half[N][N], out[N][N];
     for (int i = 0; i < N; i++) {
         solve(g, g->ph[i], k[i]);
         for (int j = 0; j < N; j++) {
             left[i][j] = i == j ? 1.0 : 0.0;
-            for (int a = 0; a < 4; a++) {
+            for (int a = 0; a < g->size; a++) {
                 left[i][j] -= k[i][a] * at->slope[a][j];
+            }
+        }
+        for (int a = 0; a < g->size; a++) {
+            kr[i][a] = 0.0;
+            for (int b = 0; b < g->size; b++) {
+                kr[i][a] += k[i][b] * at->r[b][a];
             }
         }
     }
@@ -334,10 +428,8 @@ static void update_covariance(const gain *g, const bst_custody_prediction *at,
             for (int a = 0; a < N; a++) {
                 out[i][j] += half[i][a] * left[j][a];
             }
-            for (int a = 0; a < 4; a++) {
-                for (int b = 0; b < 4; b++) {
-                    out[i][j] += k[i][a] * z->covariance[a][b] * k[j][b];
-                }
+            for (int a = 0; a < g->size; a++) {
+                out[i][j] += kr[i][a] * k[j][a];
             }
         }
     }
@@ -348,64 +440,95 @@ static void update_covariance(const gain *g, const bst_custody_prediction *at,
     }
 }
 
-bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observation *observation,
-                        bst_custody_filter *filter) {
-    assert(orbit && observation && filter);
-    double x[N];
-    memcpy(x, filter->x, sizeof x);
-    bst_custody_prediction at;
-    bst_custody_observation z;
-    gain g;
+static bool update(const bst_custody_orbit *o, const measurement *z, bst_custody_filter *filter) {
+    bst_custody_filter next = *filter;
     for (int iteration = 0; iteration < MOST_ITERATIONS; iteration++) {
-        if (!linearise(orbit, x, filter->p, observation, &at, &z) ||
-            !make_gain(filter->p, &at, &z, &g)) {
+        linear at;
+        gain g;
+        if (!linearise(o, next.x, next.p, z, &at) || !make_gain(filter->p, &at, z->size, &g)) {
             return false;
         }
         /* x = x0 + K (y(x) - H (x0 - x)) */
-        double y[4], w[4], moved = 0.0;
-        for (int i = 0; i < 4; i++) {
-            y[i] = at.innovation[i];
+        double y[M], w[M], moved = 0.0;
+        for (int i = 0; i < z->size; i++) {
+            y[i] = at.y[i];
             for (int k = 0; k < N; k++) {
-                y[i] -= at.slope[i][k] * (filter->x[k] - x[k]);
+                y[i] -= at.slope[i][k] * (filter->x[k] - next.x[k]);
             }
         }
         solve(&g, y, w);
+        memcpy(next.p, filter->p, sizeof next.p);
+        update_covariance(&g, &at, next.p);
         for (int k = 0; k < N; k++) {
-            double next = filter->x[k];
-            for (int i = 0; i < 4; i++) {
-                next += g.ph[k][i] * w[i];
+            double to = filter->x[k];
+            for (int i = 0; i < z->size; i++) {
+                to += g.ph[k][i] * w[i];
             }
-            moved = fmax(moved, fabs(next - x[k]) / sqrt(filter->p[k][k]));
-            x[k] = next;
+            moved = fmax(moved, fabs(to - next.x[k]) / sqrt(next.p[k][k]));
+            next.x[k] = to;
         }
-        if (moved < 1e-3) {
+        if (moved < 1e-2) {
             break;
         }
     }
-    memcpy(filter->x, x, sizeof x);
-    update_covariance(&g, &at, &z, filter->p);
+    *filter = next;
     return true;
+}
+
+bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observation *observation,
+                        bst_custody_filter *filter) {
+    assert(orbit && observation && filter);
+    const measurement z = of_track(observation);
+    return update(orbit, &z, filter);
+}
+
+bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat3 *gcrf_from_teme,
+                                   const bst_od_observation *directions, int count,
+                                   bst_custody_filter *filter) {
+    assert(orbit && gcrf_from_teme && directions && filter);
+    assert(count > 0 && count <= BST_CUSTODY_DIRECTIONS);
+    measurement z = {.times = count,
+                     .size = 2 * count,
+                     .gcrf_from_teme = gcrf_from_teme,
+                     .directions = directions};
+    for (int i = 0; i < count; i++) {
+        z.time_s[i] = directions[i].observer.time_s;
+    }
+    return update(orbit, &z, filter);
+}
+
+bool bst_custody_catalogued_position(const bst_custody_orbit *orbit, double time_s,
+                                     bst_vec3 *position_teme_m) {
+    const double none[N] = {0.0};
+    bst_vec3 v;
+    return motion(orbit, none, 1, &time_s, position_teme_m, &v);
 }
 
 bool bst_custody_predict_position(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                                   double time_s, bst_vec3 *position_teme_m, double *sigma_m) {
-    bundle b;
-    if (!make_bundle(orbit, filter->x, filter->p, time_s, &b)) {
+    double root[N][N], sum = 0.0;
+    bst_vec3 v;
+    if (!make_root(filter->p, root) || !motion(orbit, filter->x, 1, &time_s, position_teme_m, &v)) {
         return false;
     }
-    *position_teme_m = b.r[0];
-    bst_vec3 slope[N];
-    double sum = 0.0;
     for (int k = 0; k < N; k++) {
-        slope[k] =
-            bst_vec3_scale(bst_vec3_sub(b.r[1 + 2 * k], b.r[2 + 2 * k]), 1.0 / (2.0 * b.step_m[k]));
-    }
-    for (int i = 0; i < N; i++) {
-        for (int j = 0; j < N; j++) {
-            sum += filter->p[i][j] * bst_vec3_dot(slope[i], slope[j]);
+        double at[2][N];
+        bst_vec3 r[2];
+        for (int i = 0; i < N; i++) {
+            at[0][i] = filter->x[i] + SPREAD * root[i][k];
+            at[1][i] = filter->x[i] - SPREAD * root[i][k];
         }
+        if (!motion(orbit, at[0], 1, &time_s, &r[0], &v) ||
+            !motion(orbit, at[1], 1, &time_s, &r[1], &v)) {
+            return false;
+        }
+        const bst_vec3 slope = bst_vec3_scale(bst_vec3_sub(r[0], r[1]), 0.5 / SPREAD);
+        const bst_vec3 bend =
+            bst_vec3_scale(bst_vec3_axpy(bst_vec3_add(r[0], r[1]), -2.0, *position_teme_m),
+                           1.0 / (SPREAD * SPREAD));
+        sum += bst_vec3_dot(slope, slope) + 0.5 * bst_vec3_dot(bend, bend);
     }
-    *sigma_m = sqrt(fmax(sum, 0.0));
+    *sigma_m = sqrt(sum);
     return true;
 }
 

@@ -1,10 +1,10 @@
-/* Custody of a catalogue: an extended Kalman filter of the SGP4 mean elements of each object, fed
- * with directions and rates of tracks. */
+/* Custody of a catalogue: a Kalman filter of the SGP4 mean elements of each object, fed with
+ * directions and rates of tracks. */
 #ifndef BST_TRACKER_ORBIT_CUSTODY_H
 #define BST_TRACKER_ORBIT_CUSTODY_H
 
 #include "sim/astro/elements.h"
-#include "tracker/orbit/orbit_motion.h"
+#include "tracker/orbit/orbit_fit.h"
 
 /* Components of a filter's state: differences from the catalogued elements, times what makes them
  * distances, m. With a the semi-major axis:
@@ -22,6 +22,8 @@ enum {
     BST_CUSTODY_ALONG,
     BST_CUSTODY_STATE
 };
+
+enum { BST_CUSTODY_DIRECTIONS = 16 }; /* most of an update */
 
 typedef struct bst_custody_config {
     double sigma_m;         /* of each component except DRIFT, at the epoch of the elements */
@@ -59,8 +61,7 @@ typedef struct bst_custody_observation {
 
 /* An observation as a filter predicts it. */
 typedef struct bst_custody_prediction {
-    double innovation[4]; /* observed minus predicted, in the tangent axes at the observation */
-    double slope[4][BST_CUSTODY_STATE];
+    double innovation[4];    /* observed minus predicted, in the tangent axes at the observation */
     double covariance[4][4]; /* of the innovation */
     double chi2;             /* innovation' covariance^-1 innovation; 4 degrees of freedom */
     double log_determinant;  /* of the covariance */
@@ -85,18 +86,37 @@ void bst_custody_filter_init(const bst_custody_config *config, const bst_custody
 void bst_custody_add_process_noise(const bst_custody_config *config, double time_s,
                                    bst_custody_filter *filter);
 
-/* Predicts an observation. False: SGP4 has no state there, or the covariance is singular. */
+/* Predicts an observation, with the mean and the covariance of second order. False: SGP4 has no
+ * state there, or the covariance is singular. */
 bool bst_custody_predict(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                          const bst_custody_observation *observation, bst_custody_prediction *out);
 
-/* Updates a filter with an observation of its object: iterated extended Kalman filter, Joseph's
- * form (Bar-Shalom, Li and Kirubarajan, Estimation with applications to tracking and navigation,
- * 2001, eq. 5.2.3-19 and ch. 10.5). False: as bst_custody_predict; the filter is as before. */
+/* Updates a filter with an observation of its object. The observation is made linear over the
+ * states that are left after the update, again and again until these settle, and what a line leaves
+ * of its curvature counts as noise: iterated posterior linearisation (Garcia-Fernandez, Svensson,
+ * Morelande and Sarkka, "Posterior linearization filter: principles and implementation using sigma
+ * points", IEEE Transactions on Signal Processing 63, 2015), with second-order differences along
+ * the columns of the covariance's root (Norgaard, Poulsen and Ravn, Automatica 36, 2000); Joseph's
+ * form. Without the curvature, covariances of orbits with strong drag are too small. False: as
+ * bst_custody_predict; the filter is as before. */
 bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observation *observation,
                         bst_custody_filter *filter);
 
+/* The same with directions as they were measured, without rates: errors that they share count
+ * (bst_od_observation).
+ *
+ * Given:     count  1 to BST_CUSTODY_DIRECTIONS, in order of time; gcrf_from_teme: for all of them
+ */
+bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat3 *gcrf_from_teme,
+                                   const bst_od_observation *directions, int count,
+                                   bst_custody_filter *filter);
+
+/* Position (TEME, m) on the catalogued elements at `time_s`. False: no state. */
+bool bst_custody_catalogued_position(const bst_custody_orbit *orbit, double time_s,
+                                     bst_vec3 *position_teme_m);
+
 /* Position (TEME, m) at `time_s`, and its standard deviation, the root of the sum over three axes.
- * False: no state. */
+ * False: no state, or the covariance is singular. */
 bool bst_custody_predict_position(const bst_custody_orbit *orbit, const bst_custody_filter *filter,
                                   double time_s, bst_vec3 *position_teme_m, double *sigma_m);
 

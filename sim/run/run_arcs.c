@@ -1,0 +1,278 @@
+#include "sim/run/run_arcs.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "sim/astro/sky_clock.h"
+#include "sim/onboard/knowledge.h"
+#include "sim/run/run_directions.h"
+#include "sim/run/run_used_tracks.h"
+#include "sim/world/world_config.h"
+
+/* tracks of a sensor at one time; more are left out */
+enum { SLOTS = 64 };
+/* detections of an arc: with fewer its rate is that of the initiation */
+enum { LEAST_HITS = 5 };
+
+/* A track that has not ended. */
+typedef struct slot {
+    bst_run_arc arc; /* id 0: free; hits 0: not confirmed yet */
+    int64_t tick;    /* of the newest state with a detection */
+    int32_t seen;    /* directions that were measured, and of which every one of these is kept: */
+    int32_t every;
+    double shared; /* fraction of the attitude's variance that successive frames share */
+    bst_quat attitude[BST_CUSTODY_DIRECTIONS];
+} slot;
+
+typedef struct sensor {
+    int observer;
+    bst_knowledge *knowledge;
+    bst_run_centroids recent;
+    bst_run_used_tracks used;
+    slot slots[SLOTS];
+} sensor;
+
+struct bst_run_arcs {
+    const bst_world *world;
+    bst_world_view *view;
+    bst_sky_clock *clock;
+    double tick_rate_hz;
+    int count;
+    sensor *sensors;
+};
+
+static bst_status create_sensors(bst_ctx *ctx, bst_run_arcs *a) {
+    const int observers = bst_world_observer_count(a->world);
+    for (int i = 0; i < observers; i++) {
+        a->count += bst_world_sensor_count(a->world, i);
+    }
+    a->sensors = calloc((size_t)a->count + 1, sizeof *a->sensors);
+    if (!a->sensors) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the arcs of %d sensors", a->count);
+    }
+    for (int i = 0, k = 0; i < observers; i++) {
+        for (int s = 0; s < bst_world_sensor_count(a->world, i); s++, k++) {
+            a->sensors[k].observer = i;
+            BST_TRY(bst_knowledge_create(ctx, a->world, i, s, &a->sensors[k].knowledge));
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_run_arcs_create(bst_ctx *ctx, const bst_world *world, double tick_rate_hz,
+                               bst_run_arcs **out) {
+    *out = NULL;
+    bst_run_arcs *a = calloc(1, sizeof *a);
+    if (!a) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for arcs of tracks");
+    }
+    a->world = world;
+    a->tick_rate_hz = tick_rate_hz;
+    bst_status status = create_sensors(ctx, a);
+    status = status == BST_OK ? bst_world_view_create(ctx, world, &a->view) : status;
+    status = status == BST_OK
+                 ? bst_sky_clock_create(ctx, bst_world_earth_orientation(world), &a->clock)
+                 : status;
+    if (status != BST_OK) {
+        bst_run_arcs_free(a);
+        return status;
+    }
+    *out = a;
+    return BST_OK;
+}
+
+void bst_run_arcs_free(bst_run_arcs *a) {
+    if (a) {
+        for (int i = 0; a->sensors && i < a->count; i++) {
+            bst_knowledge_free(a->sensors[i].knowledge);
+            bst_run_centroids_clear(&a->sensors[i].recent);
+            bst_run_used_tracks_clear(&a->sensors[i].used);
+        }
+        free(a->sensors);
+        bst_world_view_free(a->view);
+        bst_sky_clock_free(a->clock);
+        free(a);
+    }
+}
+
+/* Archives the id of a slot, and the rest unless it is free. */
+static void archive_slot(slot *s, bst_archive *archive) {
+    BST_ARCHIVE(archive, s->arc.id);
+    if (s->arc.id != 0) {
+        BST_ARCHIVE(archive, *s);
+        s->arc.count = bst_archive_count(archive, s->arc.count, BST_CUSTODY_DIRECTIONS);
+        s->every = s->every > 1 ? s->every : 1;
+    }
+}
+
+bst_status bst_run_arcs_archive(bst_run_arcs *a, bst_archive *archive) {
+    for (int i = 0; i < a->count; i++) {
+        for (int k = 0; k < SLOTS; k++) {
+            archive_slot(&a->sensors[i].slots[k], archive);
+        }
+        BST_TRY(bst_run_centroids_archive(&a->sensors[i].recent, archive));
+        BST_TRY(bst_run_used_tracks_archive(&a->sensors[i].used, archive));
+    }
+    return BST_OK;
+}
+
+/* ------------------------------------------------------------------ Frames */
+
+/* Observer at a tick, with the orientation of TEME and the light that comes to it. */
+static bst_status observer_at(bst_ctx *ctx, bst_run_arcs *a, const sensor *s, int64_t tick,
+                              bst_od_observer *out, bst_mat3 *gcrf_from_teme, bst_light *light) {
+    const double time_s = (double)tick / a->tick_rate_hz;
+    bst_world_state eye;
+    bst_sky_rotation sky;
+    BST_TRY(bst_world_view_observer_state(ctx, a->view, s->observer, time_s, &eye));
+    BST_TRY(bst_sky_clock_at(ctx, a->clock, bst_world_time(a->world, time_s), &sky));
+    *out = (bst_od_observer){.time_s = time_s,
+                             .position_m = eye.position_m,
+                             .velocity_mps = eye.velocity_mps,
+                             .earth_bary_mps = sky.bodies.earth_bary_mps};
+    *gcrf_from_teme = sky.frames.gcrf_from_teme;
+    *light = bst_light_at(&sky.bodies, eye.position_m, eye.velocity_mps);
+    return BST_OK;
+}
+
+bst_status bst_run_arcs_detections(bst_ctx *ctx, bst_run_arcs *a, int index,
+                                   const bst_detections *detections) {
+    return bst_run_centroids_add(ctx, &a->sensors[index].recent, detections);
+}
+
+/* Adds the direction in which a track was measured in this frame. */
+static bst_status add_direction(bst_ctx *ctx, bst_run_arcs *a, const sensor *s,
+                                const bst_tracks *from, const bst_track *t, slot *own) {
+    bst_run_arc *arc = &own->arc;
+    const bst_run_centroid *centroid =
+        bst_run_centroids_find(&s->recent, from->exposure_id, t->x_px, t->y_px);
+    if (!centroid || own->seen++ % own->every != 0) {
+        return BST_OK;
+    }
+    if (arc->count == BST_CUSTODY_DIRECTIONS) {
+        own->every *= 2;
+        arc->count /= 2;
+        for (int i = 1; i < arc->count; i++) {
+            arc->directions[i] = arc->directions[2 * i];
+            own->attitude[i] = own->attitude[2 * i];
+        }
+        if ((own->seen - 1) % own->every != 0) {
+            return BST_OK;
+        }
+    }
+    bst_light light;
+    bst_mat3 unused;
+    bst_od_observation *z = &arc->directions[arc->count];
+    *z = (bst_od_observation){.cov_11 = 0.0};
+    BST_TRY(observer_at(ctx, a, s, from->tick, &z->observer, &unused, &light));
+    bst_run_measure_direction(bst_knowledge_camera(s->knowledge), t->x_px, t->y_px,
+                              centroid->cov_px2, &from->attitude, &light, z);
+    own->attitude[arc->count++] = from->attitude.q_cam_from_gcrf;
+    own->shared = from->attitude.shared;
+    return BST_OK;
+}
+
+/* The slot of a track; a free one; for a confirmed track one that is not confirmed. NULL: none. */
+static slot *slot_of(sensor *s, const bst_track *t) {
+    slot *out = NULL;
+    for (int k = 0; k < SLOTS; k++) {
+        slot *own = &s->slots[k];
+        if (own->arc.id == t->id) {
+            return own;
+        }
+        bool possible =
+            own->arc.id == 0 || (t->status == BST_TRACK_CONFIRMED && own->arc.hits == 0);
+        if (possible && (!out || (own->arc.id == 0 && out->arc.id != 0))) {
+            out = own;
+        }
+    }
+    return out;
+}
+
+/* Takes a track that was detected in this frame. */
+static bst_status take_track(bst_ctx *ctx, bst_run_arcs *a, sensor *s, const bst_tracks *from,
+                             const bst_track *t) {
+    slot *own = bst_run_used_tracks_has(&s->used, t->id) ? NULL : slot_of(s, t);
+    if (!own) {
+        return BST_OK;
+    }
+    if (own->arc.id != t->id) {
+        *own = (slot){.arc.id = t->id, .every = 1};
+    }
+    BST_TRY(add_direction(ctx, a, s, from, t, own));
+    if (t->status == BST_TRACK_CONFIRMED) {
+        own->tick = from->tick;
+        own->arc.hits = t->hits;
+        own->arc.state.direction = t->direction_gcrf;
+        own->arc.state.rate_radps = t->rate_gcrf_radps;
+        memcpy(own->arc.state.covariance, t->covariance, sizeof own->arc.state.covariance);
+    }
+    return BST_OK;
+}
+
+/* Ends a track: gives its arc if it was confirmed, and frees its slot. */
+static bst_status end_track(bst_ctx *ctx, bst_run_arcs *a, int index, slot *own,
+                            bst_run_arc_fn take, void *user) {
+    sensor *s = &a->sensors[index];
+    bst_run_arc *arc = &own->arc;
+    bst_light unused;
+    const int64_t id = arc->id;
+    if (arc->hits < LEAST_HITS) {
+        arc->id = 0;
+        return BST_OK;
+    }
+    BST_TRY(observer_at(ctx, a, s, own->tick, &arc->state.observer, &arc->state.gcrf_from_teme,
+                        &unused));
+    for (int i = 0; i < arc->count; i++) {
+        bst_od_observation *z = &arc->directions[i];
+        for (int k = 0; k < 4; k++) {
+            z->shared_rad[k / 2][k % 2] *= sqrt(own->shared);
+        }
+        if (i > 0) {
+            z->shared_change = bst_run_change_of_stars(bst_knowledge_camera(s->knowledge),
+                                                       own->attitude[i - 1], own->attitude[i]);
+        }
+    }
+    bst_status status = take(user, ctx, index, arc);
+    arc->id = 0;
+    return status == BST_OK ? bst_run_used_tracks_add(ctx, &s->used, id) : status;
+}
+
+/* Whether the tracker lists a track. */
+static bool is_listed(const bst_tracks *tracks, int64_t id) {
+    for (int i = 0; i < tracks->count; i++) {
+        if (tracks->items[i].id == id) {
+            return true;
+        }
+    }
+    return false;
+}
+
+bst_status bst_run_arcs_tracks(bst_ctx *ctx, bst_run_arcs *a, int index, const bst_tracks *tracks,
+                               bst_run_arc_fn take, void *user) {
+    sensor *s = &a->sensors[index];
+    for (int i = 0; i < tracks->count; i++) {
+        const bst_track *t = &tracks->items[i];
+        if (tracks->attitude.valid && t->misses_in_row == 0 && t->hidden == BST_HIDDEN_NOT) {
+            BST_TRY(take_track(ctx, a, s, tracks, t));
+        }
+    }
+    for (int k = 0; k < SLOTS; k++) {
+        if (s->slots[k].arc.id != 0 && !is_listed(tracks, s->slots[k].arc.id)) {
+            BST_TRY(end_track(ctx, a, index, &s->slots[k], take, user));
+        }
+    }
+    return BST_OK;
+}
+
+bst_status bst_run_arcs_finish(bst_ctx *ctx, bst_run_arcs *a, bst_run_arc_fn take, void *user) {
+    for (int i = 0; i < a->count; i++) {
+        for (int k = 0; k < SLOTS; k++) {
+            if (a->sensors[i].slots[k].arc.id != 0) {
+                BST_TRY(end_track(ctx, a, i, &a->sensors[i].slots[k], take, user));
+            }
+        }
+    }
+    return BST_OK;
+}

@@ -1,0 +1,119 @@
+#include "sim/run/run_directions.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "tracker/mtt/tangent.h"
+
+enum { MOST_CENTROIDS = 1 << 24 };
+
+void bst_run_measure_direction(const bst_camera *camera, double x_px, double y_px,
+                               const double cov_px2[3], const bst_attitude_fix *attitude,
+                               const bst_light *light, bst_od_observation *out) {
+    const bst_quat back = bst_quat_conj(bst_quat_unit(attitude->q_cam_from_gcrf));
+    const bst_vec3 v = bst_camera_unproject(camera, x_px, y_px);
+    const bst_vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    bst_vec3 columns[5];
+    columns[0] = bst_vec3_sub(bst_camera_unproject(camera, x_px + 0.5, y_px),
+                              bst_camera_unproject(camera, x_px - 0.5, y_px));
+    columns[1] = bst_vec3_sub(bst_camera_unproject(camera, x_px, y_px + 0.5),
+                              bst_camera_unproject(camera, x_px, y_px - 0.5));
+    double c[5][5] = {{cov_px2[0], cov_px2[1]}, {cov_px2[1], cov_px2[2]}};
+    for (int i = 0; i < 3; i++) {
+        columns[2 + i] = bst_vec3_cross(unit[i], v);
+        c[2 + i][2 + i] = attitude->sigma_rad[i] * attitude->sigma_rad[i];
+    }
+    out->direction = bst_light_unaberrate(light, bst_quat_rotate(back, v));
+    const bst_tangent axes = bst_tangent_at(out->direction);
+    double j[2][5];
+    for (int i = 0; i < 5; i++) {
+        bst_vec3 column = bst_quat_rotate(back, columns[i]);
+        j[0][i] = bst_vec3_dot(column, axes.e1);
+        j[1][i] = bst_vec3_dot(column, axes.e2);
+    }
+    for (int axis = 0; axis < 2; axis++) {
+        out->shared_rad[0][axis] = j[0][2 + axis] * attitude->sigma_rad[axis];
+        out->shared_rad[1][axis] = j[1][2 + axis] * attitude->sigma_rad[axis];
+    }
+    out->cov_11 = out->cov_12 = out->cov_22 = 0.0;
+    for (int i = 0; i < 5; i++) {
+        for (int k = 0; k < 5; k++) {
+            out->cov_11 += j[0][i] * c[i][k] * j[0][k];
+            out->cov_12 += j[0][i] * c[i][k] * j[1][k];
+            out->cov_22 += j[1][i] * c[i][k] * j[1][k];
+        }
+    }
+}
+
+double bst_run_change_of_stars(const bst_camera *camera, bst_quat q_cam_from_gcrf,
+                               bst_quat next_cam_from_gcrf) {
+    const bst_vec3 ahead = {0.0, 0.0, 1.0};
+    bst_vec3 before = bst_quat_rotate(bst_quat_conj(bst_quat_unit(q_cam_from_gcrf)), ahead);
+    bst_vec3 now = bst_quat_rotate(bst_quat_conj(bst_quat_unit(next_cam_from_gcrf)), ahead);
+    double side =
+        0.5 * (double)(camera->width_px + camera->height_px) * bst_camera_scale_rad(camera);
+    return 2.0 * bst_vec3_angle(before, now) / side;
+}
+
+/* Makes room for the centroids of a frame. */
+static bst_status make_room(bst_ctx *ctx, bst_run_centroids *c, int frame, int count) {
+    if (count > c->frames[frame].room) {
+        size_t size = (size_t)count * sizeof *c->frames[frame].items;
+        bst_run_centroid *items = realloc(c->frames[frame].items, size);
+        if (!items) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d centroids", count);
+        }
+        c->frames[frame].items = items;
+        c->frames[frame].room = count;
+    }
+    c->frames[frame].count = count;
+    return BST_OK;
+}
+
+bst_status bst_run_centroids_add(bst_ctx *ctx, bst_run_centroids *c, const bst_detections *d) {
+    const int frame = c->next;
+    BST_TRY(make_room(ctx, c, frame, d->count));
+    c->next = (frame + 1) % BST_RUN_CENTROID_FRAMES;
+    c->frames[frame].exposure_id = d->exposure_id;
+    for (int i = 0; i < d->count; i++) {
+        const bst_detection *from = &d->items[i];
+        c->frames[frame].items[i] =
+            (bst_run_centroid){from->x_px, from->y_px, {from->cov_xx, from->cov_xy, from->cov_yy}};
+    }
+    return BST_OK;
+}
+
+const bst_run_centroid *bst_run_centroids_find(const bst_run_centroids *c, int64_t exposure_id,
+                                               double x_px, double y_px) {
+    for (int i = 0; i < BST_RUN_CENTROID_FRAMES; i++) {
+        for (int k = 0; c->frames[i].exposure_id == exposure_id && k < c->frames[i].count; k++) {
+            const bst_run_centroid *item = &c->frames[i].items[k];
+            if (item->x_px == x_px && item->y_px == y_px) {
+                return item;
+            }
+        }
+    }
+    return NULL;
+}
+
+bst_status bst_run_centroids_archive(bst_run_centroids *c, bst_archive *archive) {
+    for (int i = 0; i < BST_RUN_CENTROID_FRAMES; i++) {
+        int count = bst_archive_count(archive, c->frames[i].count, MOST_CENTROIDS);
+        BST_TRY(make_room(bst_archive_ctx(archive), c, i, count));
+        BST_ARCHIVE(archive, c->frames[i].exposure_id);
+        if (count > 0) {
+            bst_archive_bytes(archive, c->frames[i].items,
+                              (size_t)count * sizeof *c->frames[i].items);
+        }
+    }
+    int next = bst_archive_count(archive, c->next, BST_RUN_CENTROID_FRAMES - 1);
+    c->next = next;
+    return BST_OK;
+}
+
+void bst_run_centroids_clear(bst_run_centroids *c) {
+    for (int i = 0; i < BST_RUN_CENTROID_FRAMES; i++) {
+        free(c->frames[i].items);
+    }
+    *c = (bst_run_centroids){.next = 0};
+}
