@@ -366,22 +366,18 @@ static bst_status step_through(bst_run_execution *run, double *wall) {
 /* Steps the simulation without writing. */
 static bst_status step_only(bst_run_execution *run, const bst_run_request *request, double *wall) {
     if (request->metrics) {
-        if (run->scenario->record.custody) {
-            return bst_fail(run->ctx, BST_ERR_CONFIG,
-                            "/record/custody: true (allowed: false in studies, which have no "
-                            "figures of it, except for runs that they keep; `boresight run` has "
-                            "them)");
-        }
-        BST_TRY(bst_run_sightings_create(run->ctx, bst_simulation_world(run->sim),
-                                         &run->scenario->record, run->scenario->tick_rate_hz, NULL,
-                                         &run->sightings));
+        const bst_world *world = bst_simulation_world(run->sim);
+        BST_TRY(bst_run_sightings_create(run->ctx, world, &run->scenario->record,
+                                         run->scenario->tick_rate_hz, NULL, &run->sightings));
+        BST_TRY(bst_run_custody_create(run->ctx, world, run->scenario, NULL, &run->custody));
     }
     run->most_s = request->most_s;
     bst_status status = step_through(run, wall);
     if (status != BST_OK && !(status == BST_ERR_INTERRUPTED && run->cut)) {
         return status;
     }
-    return bst_run_sightings_finish(run->ctx, run->sightings, bst_run_seconds(run));
+    BST_TRY(bst_run_sightings_finish(run->ctx, run->sightings, bst_run_seconds(run)));
+    return bst_run_custody_finish(run->ctx, run->custody, bst_run_seconds(run));
 }
 
 /* Judges by the targets of changed cues, where the earlier part of the run had others. */
@@ -488,6 +484,7 @@ static bst_status fill_report(bst_run_execution *run, double wall, double part,
     report->wall_s = wall;
     report->part = part;
     report->has_sightings = bst_run_sightings_figures(run->sightings, &report->sightings);
+    report->has_custody = bst_run_custody_figures(run->custody, &report->custody);
     for (int i = 0; i < run->sensor_count; i++) {
         const bst_run_sensor_watch *sensor = &run->sensors[i];
         bst_run_sensor_figures *f = &report->sensors[i];

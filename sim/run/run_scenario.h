@@ -6,6 +6,7 @@
 #include "sim/engine/simulation.h"
 #include "sim/eval/run_metrics.h"
 #include "sim/eval/sightings.h"
+#include "sim/run/run_custody.h"
 #include "sim/run/run_saving.h"
 
 /* What happens next between two steps. */
@@ -36,7 +37,7 @@ typedef struct bst_run_request {
     bool force;                   /* start even if the disk is too small for the frames */
     bool progress;                /* progress display on standard error */
     bool print;                   /* table of results on standard output */
-    bool metrics;                 /* without folder: compute sightings too */
+    bool metrics;                 /* without folder: compute sightings and custody too */
     double most_s;                /* > 0, without folder: limit of stepping time */
     const bst_run_saving *saving; /* NULL: the whole run, without saved states */
     bst_run_restored *restored;   /* state that the simulation has; NULL: the start */
@@ -60,6 +61,8 @@ typedef struct bst_run_report {
     double part;   /* fraction of the scenario's duration that was stepped; below 1 after most_s */
     bool has_sightings;              /* there are objects, and sightings are enabled */
     bst_sightings_figures sightings; /* if metrics are requested or there is a folder */
+    bool has_custody;                /* it is enabled; likewise */
+    bst_custody_figures custody;
 } bst_run_report;
 
 /* Runs a simulation of the scenario that has not been stepped since it was created or restored.

@@ -158,6 +158,15 @@ enum {
     OBJECT_CUSTODY_SEEN,
     PLACE_RMS_ARCSEC,
     TRACKS_RMS_ARCSEC,
+    CATALOGUE_UPDATED,
+    CATALOGUE_IN_CUSTODY,
+    CATALOGUE_TRACKS,
+    CATALOGUE_AMBIGUOUS,
+    CATALOGUE_CROSS_TAGS,
+    CATALOGUE_AGE,
+    CATALOGUE_SIGMA,
+    CATALOGUE_SIGMA_UPDATED,
+    CATALOGUE_NEES,
     ALL_METRICS
 };
 _Static_assert((int)ALL_METRICS <= (int)BST_STUDY_METRICS &&
@@ -253,7 +262,34 @@ static const bst_study_metric metrics[ALL_METRICS] = {
                           BST_METRIC_VALUE},
     [TRACKS_RMS_ARCSEC] = {"tracks_rms_arcsec", "arcsec",
                            "Confirmed tracks of all objects against the truth, RMS.",
-                           BST_METRIC_VALUE}};
+                           BST_METRIC_VALUE},
+    [CATALOGUE_UPDATED] = {"catalogue_updated", "",
+                           "Objects whose orbit a track updated (record.custody; so are all that "
+                           "follow).",
+                           BST_METRIC_VALUE},
+    [CATALOGUE_IN_CUSTODY] = {"catalogue_in_custody", "",
+                              "Objects with a standard deviation of the position within "
+                              "record.custody_within_m at the end.",
+                              BST_METRIC_VALUE},
+    [CATALOGUE_TRACKS] = {"catalogue_tracks", "", "Tracks that updated an orbit.",
+                          BST_METRIC_VALUE},
+    [CATALOGUE_AMBIGUOUS] = {"catalogue_ambiguous", "",
+                             "Tracks that agree with several objects: not used.", BST_METRIC_VALUE},
+    [CATALOGUE_CROSS_TAGS] = {"catalogue_cross_tags", "",
+                              "Tracks that updated another object than that of the truth.",
+                              BST_METRIC_VALUE},
+    [CATALOGUE_AGE] = {"catalogue_age_mean_s", "s",
+                       "Time since the last update of updated objects at the end, mean.",
+                       BST_METRIC_VALUE},
+    [CATALOGUE_SIGMA] = {"catalogue_sigma_median_m", "m",
+                         "Standard deviation of the position at the end, median of all objects.",
+                         BST_METRIC_VALUE},
+    [CATALOGUE_SIGMA_UPDATED] = {"catalogue_sigma_updated_median_m", "m",
+                                 "The same of updated objects.", BST_METRIC_VALUE},
+    [CATALOGUE_NEES] = {"catalogue_nees", "",
+                        "Error of updated orbits squared, by their covariance, mean; 6 degrees of "
+                        "freedom.",
+                        BST_METRIC_VALUE}};
 /* per sensor, if there are several */
 static const bst_study_metric series[METRICS + 1] = {
     METRIC_LIST, [METRICS] = {"sensor", "", "Number of the sensor.", BST_METRIC_KEY}};
@@ -310,6 +346,18 @@ static void fill_all(const bst_run_report *report, double *out) {
         out[OBJECT_CUSTODY_SEEN] = f->custody_fraction;
         out[PLACE_RMS_ARCSEC] = f->place_rms_arcsec;
         out[TRACKS_RMS_ARCSEC] = f->track_rms_arcsec;
+    }
+    if (report->has_custody) {
+        const bst_custody_figures *c = &report->custody;
+        out[CATALOGUE_UPDATED] = (double)c->updated;
+        out[CATALOGUE_IN_CUSTODY] = (double)c->in_custody;
+        out[CATALOGUE_TRACKS] = (double)c->correlated;
+        out[CATALOGUE_AMBIGUOUS] = (double)c->ambiguous;
+        out[CATALOGUE_CROSS_TAGS] = (double)c->cross_tags;
+        out[CATALOGUE_AGE] = c->age_mean_s;
+        out[CATALOGUE_SIGMA] = c->sigma_median_m;
+        out[CATALOGUE_SIGMA_UPDATED] = c->sigma_updated_median_m;
+        out[CATALOGUE_NEES] = c->nees_mean;
     }
 }
 

@@ -33,13 +33,31 @@ POPULATIONS = [
 
 
 class Custody(unittest.TestCase):
-    def test_studies_have_no_figures_of_it(self):
-        folder = runs.scratch()
-        path = write(folder, set={"/duration_s": 2, "/world/star_catalogue": "embedded", "/record/custody": True},
-                     sweeps=None, dispersions=None, replicates=1)
-        result = study(path, "--out", os.path.join(folder, "out"))
-        self.assertEqual(result.returncode, 4, result.stderr)
-        self.assertIn("/record/custody: true (allowed: false in studies", result.stdout + result.stderr)
+    """Figures of the catalogue's custody: those of the run itself, kept or not."""
+    def test_figures(self):
+        settings = {"/duration_s": 20, "/world/star_catalogue": "embedded", "/record/custody": True,
+                    "/observers/0/sensors/0/observation_source": "generator",
+                    "/observers/0/sensors/0/cue/offset_deg": 0}
+        figures = []
+        for keep in ("summary", "tables"):
+            folder = runs.scratch()
+            path = write(folder, set=settings, sweeps=None, dispersions=None, replicates=1, keep=keep)
+            out = os.path.join(folder, "out")
+            result = study(path, "--out", out)
+            self.assertEqual((result.returncode, result.stderr), (0, ""))
+            figures.append({k: v for k, v in rows(out)[0].items() if k.startswith("catalogue_")})
+        self.assertEqual(figures[0], figures[1])
+        manifests = [os.path.join(p, "manifest.json") for p, _, names in os.walk(out)
+                     if "manifest.json" in names and "run.sqlite" in names]
+        with open(manifests[0], encoding="utf-8") as file:
+            own = json.load(file)["custody"]
+        names = {"updated": "updated", "in_custody": "in_custody", "correlated": "tracks", "ambiguous": "ambiguous",
+                 "cross_tags": "cross_tags", "age_mean_s": "age_mean_s", "sigma_median_m": "sigma_median_m",
+                 "sigma_updated_median_m": "sigma_updated_median_m", "nees_mean": "nees"}
+        for key, name in names.items():
+            self.assertEqual(float(figures[0]["catalogue_" + name]), own[key], name)
+        self.assertEqual(len(figures[0]), len(names))
+        self.assertGreaterEqual(own["updated"], 1)
 
 
 class Random(unittest.TestCase):

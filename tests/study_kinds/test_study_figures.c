@@ -271,6 +271,20 @@ bst_status __wrap_bst_run_scenario(bst_ctx *ctx, const bst_scenario *scenario, b
                                                 .track_rms_arcsec = 0.6,
                                                 .tasks = 33,
                                                 .tasks_done = 29};
+    report->has_custody = true;
+    report->custody = (bst_custody_figures){.objects = 70,
+                                            .updated = 61,
+                                            .in_custody = 52,
+                                            .tracks = 99,
+                                            .correlated = 88,
+                                            .ambiguous = 8,
+                                            .uncorrelated = 3,
+                                            .cross_tags = 1,
+                                            .age_mean_s = 321.5,
+                                            .sigma_median_m = 951.5,
+                                            .sigma_p90_m = 1500.0,
+                                            .sigma_updated_median_m = 432.5,
+                                            .nees_mean = 6.25};
     return BST_OK;
 }
 
@@ -324,7 +338,16 @@ static void a_loop(void **state) {
                                  {"object_custody", 0.41},
                                  {"object_custody_seen", 0.45},
                                  {"place_rms_arcsec", 0.8},
-                                 {"tracks_rms_arcsec", 0.6}};
+                                 {"tracks_rms_arcsec", 0.6},
+                                 {"catalogue_updated", 61},
+                                 {"catalogue_in_custody", 52},
+                                 {"catalogue_tracks", 88},
+                                 {"catalogue_ambiguous", 8},
+                                 {"catalogue_cross_tags", 1},
+                                 {"catalogue_age_mean_s", 321.5},
+                                 {"catalogue_sigma_median_m", 951.5},
+                                 {"catalogue_sigma_updated_median_m", 432.5},
+                                 {"catalogue_nees", 6.25}};
     expected list[48];
     int n = of_sensor(0, list);
     memcpy(list + n, together, sizeof together);
