@@ -460,14 +460,15 @@ static void put_cards(FILE *out, const bst_report_study_view *v) {
 /* ------------------------------------------------------------------ all of it */
 
 static bst_status put_page(bst_ctx *ctx, FILE *out, const bst_report_study_view *v) {
-    char title[200], folder[256];
+    char title[200], folder[256], nonce[BST_SHA256_TEXT];
+    snprintf(title, sizeof title, "Study %.150s", v->name);
+    BST_TRY(bst_report_page_nonce(ctx, bst_run_reader_manifest(v->tables), title, nonce));
     bst_report_warnings *warnings = calloc(1, sizeof *warnings);
     if (!warnings) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the report");
     }
     gather_warnings(v, warnings);
-    snprintf(title, sizeof title, "Study %.150s", v->name);
-    bst_report_page_begin(out, title);
+    bst_report_page_begin(out, title, nonce);
     bool whole = v->runs == v->expected_runs;
     fprintf(out, "<p class=\"sub\"><span class=\"badge %s\">%s</span> Folder ",
             !whole          ? "bad"
@@ -496,8 +497,7 @@ static bst_status put_page(bst_ctx *ctx, FILE *out, const bst_report_study_view 
             "<p class=\"note\">Made by Boresight %s. study.sqlite and the CSV files beside it hold "
             "all tables.</p>\n",
             bst_version());
-    bst_report_page_end(out);
-    return BST_OK;
+    return bst_report_page_end(ctx, out, nonce);
 }
 
 bst_status bst_report_study(bst_ctx *ctx, bst_run_reader *tables, FILE *out) {
