@@ -123,9 +123,10 @@ void bst_chart_values_series(const bst_chart *c, const char *kind, const double 
     put_x(c, x, n, extents, count);
     fputs(" data-y=\"", c->out);
     for (size_t i = 0; i < count; i++) {
-        put(c->out, extents[i].low, 6, i == 0);
-        if (extents[i].high > extents[i].low) {
-            fprintf(c->out, ":%.6g", extents[i].high);
+        const bool several = extents[i].high > extents[i].low;
+        put(c->out, extents[i].low, several ? 5 : 6, i == 0);
+        if (several) {
+            fprintf(c->out, ":%.5g", extents[i].high);
         }
     }
     fputc('"', c->out);

@@ -2,7 +2,7 @@
  * makes the chart interactive (view/page/report_charts.js). Only sim/io/chart.c calls these
  * functions.
  *
- * Notes:     numbers have 6 significant digits, x of series 9; "-" is a value that is not finite.
+ * Notes:     numbers have 6 significant digits, x of series 9, extremes 5; "-" is a value that is not finite.
  *            Of the svg element:
  *            data-x, data-y  low and high end, then "log", "bare" if they apply
  *            data-unit-s     unit of an axis of time, s

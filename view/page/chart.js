@@ -17,7 +17,7 @@ export function ticksOf(from, to, count) {
 export function decadesOf(low, high) {
   const ticks = [];
   for (let k = Math.ceil(low); k <= high; k++) ticks.push(10 ** k);
-  return ticks.length > 1 ? ticks.slice(0, 8) : ticksOf(10 ** low, 10 ** high, 2).filter((tick) => tick > 0);
+  return ticks.length > 1 ? ticks.slice(0, 8) : ticksOf(10 ** low, 10 ** high, 4).filter((tick) => tick > 0);
 }
 
 /** Short text of a number. @param {number} value @param {number} [digits] significant ones; default: 3, or 5 from 100 on */
