@@ -42,7 +42,7 @@ static const char style[] =
     "white-space:nowrap}\n"
     "details>summary{cursor:pointer;margin:.4rem 0}\n"
     ".plot{display:block;width:100%;touch-action:pan-y}.wide .plot{min-width:42rem}"
-    ".plot:focus-visible,.legend button:focus-visible,.readout button:focus-visible"
+    ".plot:focus-visible,.scroll:focus-visible,.legend button:focus-visible,.readout button:focus-visible"
     "{outline:2px solid var(--k0);outline-offset:1px}\n"
     ".readout{position:relative;min-height:1.3rem;margin:-.3rem 0 0;font-size:.85rem;"
     "font-variant-numeric:tabular-nums}.readout button{position:absolute;right:0;top:-.4rem}\n"
@@ -90,13 +90,14 @@ void bst_report_page_begin(FILE *out, const char *title, const char *nonce) {
     fprintf(out, "</title>\n<style nonce=\"%s\">\n", nonce);
     fputs(style, out);
     bst_chart_style(out);
-    fputs("</style>\n</head>\n<body>\n<h1>", out);
+    fputs("</style>\n</head>\n<body>\n<main>\n<h1>", out);
     bst_html_text(out, title);
     fputs("</h1>\n", out);
 }
 
 bst_status bst_report_page_end(bst_ctx *ctx, FILE *out, const char *nonce) {
     static const char *const modules[] = {"chart.js", "report_charts.js", NULL};
+    fputs("</main>\n", out);
     BST_TRY(bst_view_page_write_modules(ctx, out, nonce, modules));
     bst_view_page_write_start(out, nonce, "report_charts.js");
     fputs("</body>\n</html>\n", out);

@@ -151,7 +151,7 @@ static void put_identity(const page *p) {
     const cJSON *manifest = bst_run_reader_manifest(p->run),
                 *scenario = bst_run_reader_scenario(p->run);
     bst_report_page_section(p->out, 2, "What was run");
-    fputs("<div class=\"scroll\"><table class=\"two\">\n", p->out);
+    fputs("<div class=\"scroll\" tabindex=\"0\"><table class=\"two\">\n", p->out);
     bst_report_page_row(
         p->out, "scenario", "%s",
         bst_json_member_text(scenario, "name", bst_json_member_text(manifest, "scenario", "-")));
@@ -288,7 +288,7 @@ static bst_status put_events(bst_ctx *ctx, const page *p) {
     fprintf(p->out, "<details%s><summary>%s</summary>\n", total <= 40 ? " open=\"open\"" : "",
             bst_text_of_count((char[BST_COUNT_TEXT]){0}, total, "event", "events"));
     fputs(
-        "<div class=\"scroll\"><table>\n<thead><tr><th class=\"n\">s</th><th>UTC</th>"
+        "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th class=\"n\">s</th><th>UTC</th>"
         "<th>from</th><th>kind</th><th>what</th></tr></thead>\n<tbody>\n",
         p->out);
     bst_status status;

@@ -313,7 +313,7 @@ static bst_status put_table(bst_ctx *ctx, FILE *out, const bst_run_reader *run) 
                              LISTED, 0, &rows));
     fprintf(out,
             "<details><summary>The %d objects with most detections</summary>\n"
-            "<div class=\"scroll\"><table>\n<thead><tr>",
+            "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr>",
             LISTED);
     for (int k = 0; k < 10; k++) {
         fprintf(out, "<th scope=\"col\"%s>%s</th>", k ? " class=\"n\"" : "", heads[k]);

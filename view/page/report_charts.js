@@ -173,7 +173,7 @@ class Chart {
       item.entry = own.find((entry) => entry.kind === kindOf(item)) || (item.dashed && this.entries.find((entry) => entry.kind === 'dash')) || own[0] || null;
       if (item.entry) item.entry.items.push(item);
     }
-    for (const entry of this.entries) if (entry.items.some((item) => item.points.length)) entry.button.append(entry.value);
+    for (const entry of this.entries) if (!this.scatter && entry.items.some((item) => item.points.length)) entry.button.append(entry.value);
   }
 
   build() {
@@ -186,6 +186,7 @@ class Chart {
     this.canvas.setAttribute('aria-label', this.name);
     this.canvas.setAttribute('aria-valuemin', String(this.x.low));
     this.canvas.setAttribute('aria-valuemax', String(this.x.high));
+    this.canvas.setAttribute('aria-valuenow', String(this.x.low));
     const line = document.createElement('p');
     line.className = 'readout';
     this.words = document.createElement('span');
@@ -270,13 +271,13 @@ class Chart {
     this.group.setRange(from, to);
   }
 
-  /** Places at which the arrow keys stop: samples of the longest line, or centres of bars. */
+  /** Places at which the arrow keys stop: centres of bars, or samples of the longest line. */
   stops() {
+    const bars = this.y.bare ? [] : this.items.filter((item) => item.kind === 'bar').map((item) => (item.numbers[0] + item.numbers[1]) / 2);
+    if (bars.length) return bars.sort((a, b) => a - b).map((time) => ({ time, low: 0, high: 0 }));
     let longest = [];
     for (const item of this.items) if (this.shown(item) && item.points.length > longest.length) longest = item.points;
-    if (longest.length) return longest;
-    const bars = this.y.bare ? [] : this.items.filter((item) => item.kind === 'bar').map((item) => (item.numbers[0] + item.numbers[1]) / 2);
-    return bars.sort((a, b) => a - b).map((time) => ({ time, low: 0, high: 0 }));
+    return longest;
   }
 
   /** Cursor `count` stops on, or without stops hundredths of what is in view. */
@@ -325,22 +326,23 @@ class Chart {
       if (dot.item.entry) words.push(dot.item.entry.name);
       return { words, spoken: words };
     }
-    const time = shortNumber(at, DIGITS + 1), bars = this.items.filter((item) => item.kind === 'bar' && item.numbers[0] <= at && item.numbers[1] >= at && this.shown(item));
-    words.push(this.svg.dataset.unitS ? withUnit(time, this.x.unit) : this.x.label ? withUnit(`${this.x.name} ${time}`, this.x.unit) : time);
+    const hasBars = this.items.some((item) => item.kind === 'bar'), time = shortNumber(at, DIGITS + 1), bars = this.items.filter((item) => item.kind === 'bar' && item.numbers[0] <= at && item.numbers[1] >= at && this.shown(item));
+    for (const { numbers: [from, to, , top] } of hasBars && !this.y.bare ? bars : []) {
+      words.push(`${shortNumber(from, DIGITS - 1)} to ${withUnit(shortNumber(to, DIGITS - 1), this.x.unit)}: ${withUnit(`${shortNumber(top, DIGITS)} ${this.y.name}`, this.y.unit)}`);
+    }
+    if (words.length === 0) words.push(this.svg.dataset.unitS ? withUnit(time, this.x.unit) : this.x.label ? withUnit(`${this.x.name} ${time}`, this.x.unit) : time);
     for (const item of this.items) {
       const band = item.kind === 'bands' ? item.numbers.findIndex((from, k) => from <= at && at < item.ends[k]) : -1;
       if (band >= 0 && item.title) words.push(item.title);
       if ((item.kind !== 'line' && item.kind !== 'dots') || !this.shown(item)) continue;
       const point = nearestPoint(item.points, at), value = point && Number.isFinite(point.low) ? spanText(point) : '–';
-      if (!item.entry) words.push(withUnit(`${this.y.name} ${value}`, this.y.unit));
+      if (!item.entry) words.push(withUnit(`${hasBars ? 'curve' : this.y.name} ${value}`, this.y.unit));
       else if (item.entry.value.textContent === '') {
         item.entry.value.textContent = value;
         spoken.push(withUnit(`${item.entry.name} ${value}`, this.y.unit));
       }
     }
-    for (const { numbers, title, entry } of bars) {
-      if (this.y.bare) { if (title || entry) words.push(title || entry.name); } else words.push(`${shortNumber(numbers[0], DIGITS)} to ${withUnit(shortNumber(numbers[1], DIGITS), this.x.unit)}: ${withUnit(`${shortNumber(numbers[3], DIGITS)} ${this.y.name}`, this.y.unit)}`);
-    }
+    if (this.y.bare) words.push(...bars.filter(({ title, entry }) => title || entry).map(({ title, entry }) => title || entry.name));
     return { words, spoken: [...words, ...spoken] };
   }
 
@@ -481,6 +483,7 @@ class Chart {
       return;
     }
     const at = this.group.cursor / this.unit;
+    if (!Number.isFinite(at)) return;
     for (const { points } of this.items.filter((item) => item.kind === 'line' && this.shown(item))) {
       const point = nearestPoint(points, at);
       if (point && point.low === point.high && Number.isFinite(point.low)) ring(point.time, point.low);
