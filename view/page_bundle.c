@@ -5,85 +5,16 @@
 #include <zlib.h>
 
 #include "sim/io/html.h"
-#include "view/page_files.h"
-
-/* Names of the modules in the import map begin so: a data: address has no folder. */
-#define PREFIX "boresight/"
-/* Scripts of this file and the modules that they import; no connection anywhere. */
-static const char policy[] = /* twice the nonce of its scripts and styles */
-    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src "
-    "'nonce-%s' 'strict-dynamic'; style-src 'nonce-%s'; img-src data:; base-uri 'none'; "
-    "form-action 'none'\">\n";
-
-static const bst_view_page_file *find(const char *name) {
-    const bst_view_page_file *file = bst_view_page_files;
-    while (file->name && strcmp(file->name, name) != 0) {
-        file++;
-    }
-    return file->name ? file : NULL;
-}
-
-static bool ends_with(const char *name, const char *end) {
-    const size_t length = strlen(name), n = strlen(end);
-    return length >= n && strcmp(name + length - n, end) == 0;
-}
-
-/* True if 'NAME.js' of a module stands here, in quotes and behind "./". */
-static bool is_module(const char *text) {
-    char name[64];
-    const char *end = strchr(text, '\'');
-    return end && snprintf(name, sizeof name, "%.*s", (int)(end - text), text) < (int)sizeof name &&
-           ends_with(name, ".js") && find(name);
-}
-
-/* Writes a module as an address; paths of other modules become names of the import map. */
-static bst_status write_module(bst_ctx *ctx, FILE *out, const bst_view_page_file *file) {
-    const char *rest = file->data, *end = file->data + file->bytes;
-    const size_t room = 2 * file->bytes + 1;
-    char *text = malloc(room), *to = text;
-    if (!text) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a module of the page");
-    }
-    while (rest < end) {
-        if (end - rest > 3 && memcmp(rest, "'./", 3) == 0 && is_module(rest + 3) &&
-            (size_t)(to - text) + sizeof PREFIX + 2 < room) {
-            to += sprintf(to, "'" PREFIX);
-            rest += 3;
-        } else {
-            *to++ = *rest++;
-        }
-    }
-    fputs("data:text/javascript;base64,", out);
-    bst_html_base64(out, text, (size_t)(to - text));
-    free(text);
-    return BST_OK;
-}
-
-static bst_status write_modules(bst_ctx *ctx, FILE *out, const char *nonce) {
-    fprintf(out, "<script type=\"importmap\" nonce=\"%s\">{\"imports\": {", nonce);
-    bool first = true;
-    for (const bst_view_page_file *file = bst_view_page_files; file->name; file++) {
-        if (!ends_with(file->name, ".js") || strcmp(file->name, "recorded_api.js") == 0) {
-            continue;
-        }
-        const bool is_api = strcmp(file->name, "api.js") == 0;
-        fprintf(out, "%s\n\"" PREFIX "%s\": \"", first ? "" : ",", file->name);
-        BST_TRY(write_module(ctx, out, is_api ? find("recorded_api.js") : file));
-        fputc('"', out);
-        first = false;
-    }
-    fputs("}}</script>\n", out);
-    return BST_OK;
-}
+#include "view/page_modules.h"
 
 /* Style sheets go into one element, those of panels behind that of the page, as where they are
  * loaded. */
 static void write_styles(FILE *out, const char *nonce) {
-    const bst_view_page_file *first = find("style.css");
+    const bst_view_page_file *first = bst_view_page_find("style.css");
     fprintf(out, "<style nonce=\"%s\">\n", nonce);
     fwrite(first->data, 1, first->bytes, out);
     for (const bst_view_page_file *file = bst_view_page_files; file->name; file++) {
-        if (ends_with(file->name, ".css") && file != first) {
+        if (strstr(file->name, ".css") && file != first) {
             fwrite(file->data, 1, file->bytes, out);
         }
     }
@@ -95,7 +26,7 @@ static void write_line(FILE *out, const char *line, size_t bytes) {
     static const char icon[] = "icon.svg";
     for (size_t k = 0; k < bytes;) {
         if (bytes - k >= sizeof icon - 1 && memcmp(line + k, icon, sizeof icon - 1) == 0) {
-            const bst_view_page_file *file = find(icon);
+            const bst_view_page_file *file = bst_view_page_find(icon);
             fputs("data:image/svg+xml;base64,", out);
             bst_html_base64(out, file->data, file->bytes);
             k += sizeof icon - 1;
@@ -111,7 +42,7 @@ static bool begins(const char *line, size_t bytes, const char *with) {
 }
 
 bst_status bst_view_bundle_begin(bst_ctx *ctx, FILE *out, const char *nonce) {
-    const bst_view_page_file *page = find("index.html");
+    const bst_view_page_file *page = bst_view_page_find("index.html");
     const char *line = page->data, *end = page->data + page->bytes;
     while (line < end) {
         const char *next = memchr(line, '\n', (size_t)(end - line));
@@ -122,12 +53,12 @@ bst_status bst_view_bundle_begin(bst_ctx *ctx, FILE *out, const char *nonce) {
         if (begins(line, bytes, "<link rel=\"stylesheet\"")) {
             write_styles(out, nonce);
         } else if (begins(line, bytes, "<script ")) {
-            BST_TRY(write_modules(ctx, out, nonce));
+            BST_TRY(bst_view_page_write_modules(ctx, out, nonce, NULL));
         } else if (!begins(line, bytes, "<link rel=\"modulepreload\"")) {
             write_line(out, line, bytes);
         }
         if (begins(line, bytes, "<meta charset")) {
-            fprintf(out, policy, nonce, nonce);
+            bst_view_page_write_policy(out, nonce);
         }
         line += bytes;
     }
@@ -151,10 +82,8 @@ void bst_view_bundle_add(FILE *out, const char *key, const bst_view_bytes *packe
 }
 
 void bst_view_bundle_end(FILE *out, const char *nonce) {
-    fprintf(out,
-            "<script type=\"module\" nonce=\"%s\">import '" PREFIX
-            "app.js';</script>\n</body>\n</html>\n",
-            nonce);
+    bst_view_page_write_start(out, nonce, "app.js");
+    fputs("</body>\n</html>\n", out);
 }
 
 size_t bst_view_bundle_size(const bst_view_bytes *packed) {

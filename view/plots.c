@@ -144,7 +144,7 @@ static bst_status read_samples(bst_ctx *ctx, bst_io_rows *rows, bst_view_line *l
             value = hypot(value, bst_io_rows_real(rows, 2));
         }
         if (count == LINE_SAMPLES_MOST) {
-            count = bst_view_thin(memory, count);
+            count = bst_io_thin_samples(memory, count);
         }
         if (room < (count + 1) * sizeof *line->samples) {
             status = bst_memory_grow(ctx, "out of memory for a time series", &memory, &room,
@@ -153,14 +153,13 @@ static bst_status read_samples(bst_ctx *ctx, bst_io_rows *rows, bst_view_line *l
                 break;
             }
         }
-        ((bst_view_sample *)memory)[count++] =
-            (bst_view_sample){time_s, isfinite(value) ? value : NAN};
+        ((bst_io_sample *)memory)[count++] = (bst_io_sample){time_s, isfinite(value) ? value : NAN};
     }
     if (status != BST_OK) {
         free(memory);
         return status;
     }
-    bst_view_sort(memory, count);
+    bst_io_sort_samples(memory, count);
     line->samples = memory ? memory : calloc(1, sizeof *line->samples);
     line->count = count;
     return line->samples ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
@@ -191,14 +190,14 @@ static bst_status need_line(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s,
 /* Appends the extents of a line. */
 static bst_status append_line(bst_ctx *ctx, const bst_view_line *line, const bst_view_plot *plot,
                               bst_view_bytes *out) {
-    const size_t head = sizeof(double), extent = sizeof(bst_view_extent);
+    const size_t head = sizeof(double), extent = sizeof(bst_io_extent);
     size_t room = 0;
     BST_TRY(bst_memory_grow(ctx, "out of memory for a plot", &out->data, &room,
                             out->bytes + head + ((size_t)plot->columns + 2) * extent));
     char *at = (char *)out->data + out->bytes;
-    bst_view_extent *extents = (bst_view_extent *)(void *)(at + head);
-    size_t count = bst_view_decimate(line->samples, line->count, plot->from_s, plot->to_s,
-                                     plot->columns, extents);
+    bst_io_extent *extents = (bst_io_extent *)(void *)(at + head);
+    size_t count = bst_io_decimate(line->samples, line->count, plot->from_s, plot->to_s,
+                                   plot->columns, extents);
     double number = (double)count;
     memcpy(at, &number, head);
     out->bytes += head + count * extent;

@@ -107,7 +107,7 @@ enum { BST_VIEW_COLUMNS = 4096 };
 /* Lines of a panel, reduced to the columns of a plot.
  *
  * Returned:  out  doubles: for each line of the panel the number of extents, then time, low and
- *                 high of each (view/decimate.h)
+ *                 high of each (sim/io/decimate.h)
  * Errors:    BST_ERR_NOT_FOUND: no such sensor or panel; BST_ERR_ARGUMENT: range or columns;
  *            BST_ERR_FORMAT: damaged tables */
 bst_status bst_view_run_plot(bst_ctx *ctx, bst_view_run *run, const bst_view_plot *plot,

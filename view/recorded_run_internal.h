@@ -5,11 +5,11 @@
 
 #include <pthread.h>
 
+#include "sim/io/decimate.h"
 #include "sim/io/fits_reader.h"
 #include "sim/io/fits_source.h"
 #include "sim/run/run_observations.h"
 #include "sim/run/run_sensors.h"
-#include "view/decimate.h"
 #include "view/recorded_run.h"
 
 /* Lines of all panels of a sensor. */
@@ -25,7 +25,7 @@ typedef struct bst_view_exposure {
 
 /* A line of a panel; read at its first use. */
 typedef struct bst_view_line {
-    bst_view_sample *samples; /* NULL: not read */
+    bst_io_sample *samples; /* NULL: not read */
     size_t count;
     uint64_t used; /* number of the last request for it */
 } bst_view_line;

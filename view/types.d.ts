@@ -3,6 +3,7 @@ interface Document {
   boresight: any;
   comparison: any;
   editor: any;
+  report: any;
   space: any;
   study: any;
 }

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "boresight/messages.h"
+#include "sim/io/chart_values.h"
 #include "sim/io/html.h"
 
 /* margins around the plotting area; the left margin belongs to the chart */
@@ -55,7 +56,7 @@ void bst_chart_style(FILE *out) {
         ".chart .g{stroke:var(--grid);fill:none}.chart .f{stroke:var(--line);fill:none}\n"
         ".chart .l{stroke:var(--c);stroke-width:1.4;fill:none;stroke-linejoin:round;"
         "vector-effect:non-scaling-stroke}\n"
-        ".chart .s{stroke-dasharray:5 4}.chart .d{fill:var(--c)}\n"
+        ".chart .s{stroke-dasharray:5 4}.chart .o{stroke-width:3.4}\n"
         ".chart .b{fill:var(--c);fill-opacity:.16}.chart .a{fill:var(--c);fill-opacity:.22}\n"
         ".chart .h{fill:var(--c);fill-opacity:.75}.chart .r{stroke:var(--c);stroke-dasharray:2 3}\n"
         ".chart .w{stroke:var(--c);stroke-width:1.3}\n"
@@ -303,7 +304,9 @@ void bst_chart_begin(bst_chart *c) {
     fprintf(c->out, "<svg class=\"chart\" viewBox=\"0 0 %g %g\" role=\"img\" aria-label=\"",
             c->width, c->height);
     bst_html_text(c->out, c->name);
-    fputs("\">", c->out);
+    fputc('"', c->out);
+    bst_chart_values_axes(c);
+    fputc('>', c->out);
     put_x_axis(c);
     put_y_axis(c);
     fputc('\n', c->out);
@@ -319,7 +322,9 @@ void bst_chart_end(bst_chart *c) {
 
 void bst_chart_bands(const bst_chart *c, const double *from, const double *to, size_t n, int colour,
                      const char *title) {
-    fprintf(c->out, "<path class=\"b c%d\" d=\"", colour);
+    fprintf(c->out, "<path class=\"b c%d\"", colour);
+    bst_chart_values_lists(c, "bands", (bst_chart_list[]){{"from", from}, {"to", to}}, 2, n);
+    fputs(" d=\"", c->out);
     for (size_t i = 0; i < n; i++) {
         double x0 = inside_x(c, from[i]), width = inside_x(c, to[i]) - x0;
         if (width > 0.0) {
@@ -342,6 +347,7 @@ void bst_chart_bar(const bst_chart *c, double x0, double x1, double y0, double y
     double top = inside_y(c, y0), bottom = inside_y(c, y1);
     fprintf(c->out, "<rect class=\"h c%d\" x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\"",
             colour, fmin(left, right), fmin(top, bottom), fabs(right - left), fabs(bottom - top));
+    bst_chart_values_of(c, "bar", (double[]){x0, x1, y0, y1}, 4);
     if (title) {
         fputs("><title>", c->out);
         bst_html_text(c->out, title);
@@ -405,8 +411,9 @@ void bst_chart_line(const bst_chart *c, const double *x, const double *y, size_t
     size_t count = bst_chart_thin(x, y, n, c->x.low, c->x.high, columns, points);
     pen p = {.out = c->out, .chart = c};
     open_clip(c);
-    fprintf(c->out, "<path class=\"l%s c%d\" stroke-linecap=\"round\" d=\"", dashed ? " s" : "",
-            colour);
+    fprintf(c->out, "<path class=\"l%s c%d\" stroke-linecap=\"round\"", dashed ? " s" : "", colour);
+    bst_chart_values_series(c, "line", x, y, n);
+    fputs(" d=\"", c->out);
     for (size_t i = 0; i < count; i++) {
         if (isnan(points[i].y) || isnan(points[i].x)) {
             p.down = false;
@@ -421,7 +428,10 @@ void bst_chart_area(const bst_chart *c, const double *x, const double *low, cons
                     size_t n, int colour) {
     pen p = {.out = c->out, .chart = c};
     open_clip(c);
-    fprintf(c->out, "<path class=\"a c%d\" d=\"", colour);
+    fprintf(c->out, "<path class=\"a c%d\"", colour);
+    bst_chart_values_lists(c, "area", (bst_chart_list[]){{"x", x}, {"low", low}, {"high", high}}, 3,
+                           n);
+    fputs(" d=\"", c->out);
     for (size_t i = 0; i < n; i++) {
         if (isfinite(high[i])) {
             pen_to(&p, x[i], high[i]);
@@ -435,34 +445,56 @@ void bst_chart_area(const bst_chart *c, const double *x, const double *low, cons
     fputs(p.down ? "z\"/></svg>\n" : "\"/></svg>\n", c->out);
 }
 
-void bst_chart_dots(const bst_chart *c, const double *x, const double *y, size_t n, int colour) {
-    /* each integer position is drawn once; without memory all points are drawn */
-    size_t wide = (size_t)c->inner_width + 2, high = (size_t)c->inner_height + 2;
+/* Indices of the points on the axes, of several at one integer position only the first; without
+ * memory for the positions all of them. Returns their number. */
+static size_t choose_dots(const bst_chart *c, const double *x, const double *y, size_t n,
+                          size_t *chosen) {
+    size_t wide = (size_t)c->inner_width + 2, high = (size_t)c->inner_height + 2, count = 0;
     bool *taken = calloc(wide * high, sizeof *taken);
-    open_clip(c);
-    /* round caps on strokes of zero length: one path for all dots */
-    fprintf(c->out,
-            "<path class=\"l c%d\" style=\"stroke-width:3.4\" stroke-linecap=\"round\" d=\"",
-            colour);
     for (size_t i = 0; i < n; i++) {
         double ax = along(&c->x, x[i]), ay = along(&c->y, y[i]);
         if (ax >= 0.0 && ax <= 1.0 && ay >= 0.0 && ay <= 1.0) {
             size_t at = (size_t)(ay * c->inner_height) * wide + (size_t)(ax * c->inner_width);
             if (!taken || !taken[at]) {
-                fprintf(c->out, "M%ld %ldh0", step_x(c, x[i]), step_y(c, y[i]));
+                chosen[count++] = i;
             }
             if (taken) {
                 taken[at] = true;
             }
         }
     }
-    fputs("\"/></svg>\n", c->out);
     free(taken);
+    return count;
+}
+
+void bst_chart_dots(const bst_chart *c, const double *x, const double *y, size_t n, int colour) {
+    size_t *chosen = malloc((n + 1) * sizeof *chosen);
+    if (!chosen) {
+        return; /* the chart lacks them */
+    }
+    size_t count = choose_dots(c, x, y, n, chosen);
+    open_clip(c);
+    /* round caps on strokes of zero length: one path for all dots */
+    fprintf(c->out, "<path class=\"l o c%d\" stroke-linecap=\"round\"", colour);
+    if (bst_chart_values_rising(x, n)) {
+        bst_chart_values_series(c, "dots", x, y, n);
+    } else {
+        bst_chart_values_chosen(c, "dots", x, y, chosen, count);
+    }
+    fputs(" d=\"", c->out);
+    for (size_t k = 0; k < count; k++) {
+        fprintf(c->out, "M%ld %ldh0", step_x(c, x[chosen[k]]), step_y(c, y[chosen[k]]));
+    }
+    fputs("\"/></svg>\n", c->out);
+    free(chosen);
 }
 
 void bst_chart_whiskers(const bst_chart *c, const double *x, const double *low, const double *high,
                         size_t n, int colour) {
-    fprintf(c->out, "<path class=\"w c%d\" fill=\"none\" d=\"", colour);
+    fprintf(c->out, "<path class=\"w c%d\" fill=\"none\"", colour);
+    bst_chart_values_lists(c, "whiskers",
+                           (bst_chart_list[]){{"x", x}, {"low", low}, {"high", high}}, 3, n);
+    fputs(" d=\"", c->out);
     for (size_t i = 0; i < n; i++) {
         double at = along(&c->x, x[i]);
         if (isfinite(low[i]) && isfinite(high[i]) && at >= 0.0 && at <= 1.0) {
@@ -478,23 +510,29 @@ void bst_chart_whiskers(const bst_chart *c, const double *x, const double *low, 
 void bst_chart_rule(const bst_chart *c, double y, int colour) {
     double at = along(&c->y, y);
     if (at >= 0.0 && at <= 1.0) {
-        fprintf(c->out, "<path class=\"r c%d\" d=\"M%.1f %.1fh%.1f\"/>\n", colour, c->left,
+        fprintf(c->out, "<path class=\"r c%d\" d=\"M%.1f %.1fh%.1f\"", colour, c->left,
                 inside_y(c, y), c->inner_width);
+        bst_chart_values_of(c, "rule", &y, 1);
+        fputs("/>\n", c->out);
     }
 }
 
 void bst_chart_mark(const bst_chart *c, double x, int colour) {
     double at = along(&c->x, x);
     if (at >= 0.0 && at <= 1.0) {
-        fprintf(c->out, "<path class=\"r c%d\" d=\"M%.1f %.1fv%.1f\"/>\n", colour, inside_x(c, x),
+        fprintf(c->out, "<path class=\"r c%d\" d=\"M%.1f %.1fv%.1f\"", colour, inside_x(c, x),
                 c->top, c->inner_height);
+        bst_chart_values_of(c, "mark", &x, 1);
+        fputs("/>\n", c->out);
     }
 }
 
 void bst_chart_word(const bst_chart *c, double x, double y, double dx, double dy,
                     const char *anchor, const char *text) {
-    fprintf(c->out, "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\">", inside_x(c, x) + dx,
+    fprintf(c->out, "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\"", inside_x(c, x) + dx,
             inside_y(c, y) + dy, anchor);
+    bst_chart_values_of(c, "word", (double[]){x, y, dx, dy}, 4);
+    fputc('>', c->out);
     bst_html_text(c->out, text);
     fputs("</text>\n", c->out);
 }

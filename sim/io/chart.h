@@ -1,6 +1,8 @@
 /* SVG charts for HTML reports: axes, lines, dots, bars, bands. Colours come from the page's style
  * sheet (bst_chart_style), so that charts suit light and dark pages and print. The output depends
- * on the data only. sim/io/plot.h makes separate pictures with gnuplot.
+ * on the data only. Elements hold their values as attributes (sim/io/chart_values.h), from which a
+ * script of the page makes the chart interactive. sim/io/plot.h makes separate pictures with
+ * gnuplot.
  * Order of calls: bst_chart_begin, then background before foreground, bst_chart_end. Errors are
  * those of the stream. */
 #ifndef BST_IO_CHART_H
@@ -15,14 +17,26 @@ typedef struct bst_chart_axis {
     double low, high;
     bool logarithmic;
     bool bare; /* no ticks and no numbers */
+    double
+        unit_s; /* of an axis of time since the epoch: its unit in seconds; 0: another quantity */
 } bst_chart_axis;
+
+/* x values that lines and dots of several charts of a page have in common: the page holds them
+ * once. The charts have the same x axis. Begin with `x`, `n` and `number` set. */
+typedef struct bst_chart_common_x {
+    const double *x; /* the array that is passed to bst_chart_line and bst_chart_dots */
+    size_t n;
+    int number;      /* of this list in the page */
+    bool written[2]; /* in its columns of wide and of narrow charts */
+} bst_chart_common_x;
 
 typedef struct bst_chart {
     FILE *out;
     const char *name;     /* description for screen readers */
     double width, height; /* of the SVG, in its units; about pixels */
     bst_chart_axis x, y;
-    double margin_left; /* minimum left margin; increased if the numbers need it */
+    double margin_left;           /* minimum left margin; increased if the numbers need it */
+    bst_chart_common_x *common_x; /* NULL: none */
     /* plotting area, set by bst_chart_begin */
     double left, top, inner_width, inner_height;
 } bst_chart;

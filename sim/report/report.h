@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "boresight/messages.h"
+#include "sim/core/sha256.h"
 #include "sim/engine/scenario/scenario.h"
 #include "sim/eval/loop_figures.h"
 #include "sim/io/chart.h"
@@ -14,10 +15,19 @@
 
 /* ---- report_page.c: the page's own elements ---- */
 
+/* Random-looking word that marks the page's own scripts and styles: a digest of the manifest and
+ * of the title, so that the same folder gives the same page.
+ *
+ * Given:     manifest  NULL: none
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_report_page_nonce(bst_ctx *ctx, const struct cJSON *manifest, const char *title,
+                                 char nonce[BST_SHA256_TEXT]) BST_MUST_CHECK;
 /* Writes the head of the HTML page; `title`: its first heading. */
-void bst_report_page_begin(FILE *out, const char *title);
-/* Ends the HTML page. */
-void bst_report_page_end(FILE *out);
+void bst_report_page_begin(FILE *out, const char *title, const char *nonce);
+/* Ends the HTML page with the modules that make its charts interactive.
+ *
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_report_page_end(bst_ctx *ctx, FILE *out, const char *nonce) BST_MUST_CHECK;
 
 /* Begins a section with a heading.
  *

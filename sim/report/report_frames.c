@@ -51,7 +51,7 @@ static bst_status put_pixels(bst_ctx *ctx, FILE *out, const bst_fits_read_frame 
     if (status == BST_OK) {
         fprintf(out,
                 "<image x=\"%.1f\" y=\"%.1f\" width=\"%.1f\" height=\"%.1f\" "
-                "style=\"image-rendering:pixelated\" href=\"data:image/png;base64,",
+                "href=\"data:image/png;base64,",
                 p->x, p->y, p->width, p->height);
         bst_html_base64(out, png, bytes);
         fputs("\"/>\n", out);
@@ -109,7 +109,7 @@ static void put_label(FILE *out, const bst_io_overlay_mark *m, const part *p, do
     /* next to the mark; on its other side near the edge of the frame */
     bool left = x > p->width - 110.0;
     bool track = m->kind == BST_OVERLAY_TRACK;
-    fprintf(out, "<text class=\"m\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\" style=\"fill:%s\">",
+    fprintf(out, "<text class=\"m\" x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\" fill=\"%s\">",
             left ? x - 14.0 : x + 14.0, track ? y - 5.0 : y + 11.0, left ? "end" : "start",
             kinds[m->kind].colour);
     bst_html_text(out, m->label);
@@ -302,7 +302,9 @@ static bst_status put_chosen(bst_ctx *ctx, FILE *out, const bst_report_sensor *s
     int count = choose(s, ids, frames, chosen);
     fputs("<ul class=\"legend\">\n", out);
     for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++) {
-        fprintf(out, "<li><span class=\"key dot\" style=\"--c:%s\"></span>%s</li>\n",
+        fprintf(out,
+                "<li><svg class=\"key dot\" viewBox=\"0 0 2 2\" aria-hidden=\"true\"><circle "
+                "cx=\"1\" cy=\"1\" r=\"1\" fill=\"%s\"/></svg>%s</li>\n",
                 kinds[k].colour, kinds[k].name);
     }
     fputs("</ul>\n", out);

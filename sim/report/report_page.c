@@ -1,9 +1,12 @@
+#include <cjson/cJSON.h>
 #include <ctype.h>
 #include <math.h>
 #include <stdarg.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "sim/report/report.h"
+#include "view/page_modules.h"
 
 static const char style[] =
     "*{box-sizing:border-box}html{color-scheme:light dark}\n"
@@ -38,31 +41,67 @@ static const char style[] =
     "th{font-weight:400;color:var(--soft);"
     "white-space:nowrap}\n"
     "details>summary{cursor:pointer;margin:.4rem 0}\n"
-    ".frame{display:block;width:100%;height:auto}.frame text{font:12px system-ui,sans-serif;"
-    "fill:var(--ink)}.frame .m{font:10px "
+    ".plot{display:block;width:100%;touch-action:pan-y}.wide .plot{min-width:42rem}"
+    ".plot:focus-visible,.scroll:focus-visible,.legend button:focus-visible,.readout button:focus-visible"
+    "{outline:2px solid var(--k0);outline-offset:1px}\n"
+    ".readout{position:relative;min-height:1.3rem;margin:-.3rem 0 0;font-size:.85rem;"
+    "font-variant-numeric:tabular-nums}.readout button{position:absolute;right:0;top:-.4rem}\n"
+    ".readout button,.legend button{font:inherit;color:inherit;background:none;cursor:pointer;"
+    "border:1px solid transparent;border-radius:.3rem;padding:.1em .4em;min-height:24px}"
+    ".readout button{border-color:var(--line);background:var(--paper)}.legend button{margin:0 "
+    "-.4em}"
+    ".legend button:hover,.readout button:hover{border-color:var(--ink)}"
+    ".legend [aria-pressed=false]{text-decoration:line-through;color:var(--soft)}"
+    ".legend b{display:inline-block;min-width:4.6em;margin-left:.5em;font-weight:600;"
+    "font-variant-numeric:tabular-nums}\n"
+    "@media screen{.answers>.chart{display:none}.answers ~ .legend{gap:0 1.4em}}\n"
+    "@media print{.plot,.readout,.legend b{display:none}.legend button{border:0;padding:0;"
+    "margin:0;min-height:0;text-decoration:none!important}}\n"
+    ".frame{display:block;width:100%;height:auto}.frame image{image-rendering:pixelated}"
+    ".frame text{font:12px system-ui,sans-serif}"
+    ".frame text:not(.m){fill:var(--ink)}.frame .m{font:10px "
     "system-ui,sans-serif;paint-order:stroke;stroke:#000;stroke-width:2.5px;"
     "stroke-linejoin:round}\n"
     "@media print{body{max-width:none;padding:0;font-size:11px}.wide .chart{min-width:0}"
     "h2,h3{break-after:avoid}tr,.card,li{break-inside:avoid}"
     ".halves{grid-template-columns:1fr 1fr}.thirds{grid-template-columns:1fr 1fr 1fr}}\n";
 
-void bst_report_page_begin(FILE *out, const char *title) {
+bst_status bst_report_page_nonce(bst_ctx *ctx, const cJSON *manifest, const char *title,
+                                 char nonce[BST_SHA256_TEXT]) {
+    char *text = manifest ? cJSON_PrintUnformatted(manifest) : NULL, both[2 * BST_SHA256_TEXT];
+    if (manifest && !text) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the report");
+    }
+    bst_sha256_text(title, strlen(title), both);
+    bst_sha256_text(text ? text : "", text ? strlen(text) : 0, both + BST_SHA256_TEXT - 1);
+    bst_sha256_text(both, 2 * BST_SHA256_TEXT - 2, nonce);
+    free(text);
+    return BST_OK;
+}
+
+void bst_report_page_begin(FILE *out, const char *title, const char *nonce) {
+    fputs("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n", out);
+    bst_view_page_write_policy(out, nonce);
     fputs(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n"
         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n"
         "<meta name=\"color-scheme\" content=\"light dark\"/>\n<title>",
         out);
     bst_html_text(out, title);
-    fputs("</title>\n<style>\n", out);
+    fprintf(out, "</title>\n<style nonce=\"%s\">\n", nonce);
     fputs(style, out);
     bst_chart_style(out);
-    fputs("</style>\n</head>\n<body>\n<h1>", out);
+    fputs("</style>\n</head>\n<body>\n<main>\n<h1>", out);
     bst_html_text(out, title);
     fputs("</h1>\n", out);
 }
 
-void bst_report_page_end(FILE *out) {
+bst_status bst_report_page_end(bst_ctx *ctx, FILE *out, const char *nonce) {
+    static const char *const modules[] = {"chart.js", "report_charts.js", NULL};
+    fputs("</main>\n", out);
+    BST_TRY(bst_view_page_write_modules(ctx, out, nonce, modules));
+    bst_view_page_write_start(out, nonce, "report_charts.js");
     fputs("</body>\n</html>\n", out);
+    return BST_OK;
 }
 
 /* Writes text in which numbers such as 1.6e-05 are not broken at the hyphen. */

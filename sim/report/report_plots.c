@@ -60,6 +60,11 @@ static void put_modes(const bst_report_drawing *d, const bst_chart *c) {
     }
 }
 
+bst_chart_axis bst_report_time_axis(const bst_report_drawing *d) {
+    return (bst_chart_axis){
+        .label = d->time_label, .low = 0.0, .high = d->span_s / d->unit_s, .unit_s = d->unit_s};
+}
+
 bst_chart bst_report_time_chart(const bst_report_drawing *d, const char *name, const char *label,
                                 double low, double high, bool logarithmic) {
     bst_chart c = {.out = d->out,
@@ -67,7 +72,8 @@ bst_chart bst_report_time_chart(const bst_report_drawing *d, const char *name, c
                    .width = 1100.0,
                    .height = 260.0,
                    .margin_left = 64.0,
-                   .x = {.label = d->time_label, .low = 0.0, .high = d->span_s / d->unit_s},
+                   .common_x = d->common_x,
+                   .x = bst_report_time_axis(d),
                    .y = {.label = label, .logarithmic = logarithmic}};
     bst_chart_fit(&c.y, low, high, 0.05);
     bst_chart_begin(&c);
@@ -522,6 +528,8 @@ bst_status bst_report_plots(bst_ctx *ctx, FILE *out, const bst_report_sensor *s,
     for (size_t i = 0; i < s->count; i++) {
         d.x[i] = s->frames[i].mid_s / d.unit_s;
     }
+    bst_chart_common_x common = {.x = d.x, .n = s->count, .number = (int)s->sensor.index};
+    d.common_x = &common;
     bst_report_spans *spans = malloc(sizeof *spans);
     if (!spans) {
         free(d.x);

@@ -151,7 +151,7 @@ static void put_identity(const page *p) {
     const cJSON *manifest = bst_run_reader_manifest(p->run),
                 *scenario = bst_run_reader_scenario(p->run);
     bst_report_page_section(p->out, 2, "What was run");
-    fputs("<div class=\"scroll\"><table class=\"two\">\n", p->out);
+    fputs("<div class=\"scroll\" tabindex=\"0\"><table class=\"two\">\n", p->out);
     bst_report_page_row(
         p->out, "scenario", "%s",
         bst_json_member_text(scenario, "name", bst_json_member_text(manifest, "scenario", "-")));
@@ -288,7 +288,7 @@ static bst_status put_events(bst_ctx *ctx, const page *p) {
     fprintf(p->out, "<details%s><summary>%s</summary>\n", total <= 40 ? " open=\"open\"" : "",
             bst_text_of_count((char[BST_COUNT_TEXT]){0}, total, "event", "events"));
     fputs(
-        "<div class=\"scroll\"><table>\n<thead><tr><th class=\"n\">s</th><th>UTC</th>"
+        "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th class=\"n\">s</th><th>UTC</th>"
         "<th>from</th><th>kind</th><th>what</th></tr></thead>\n<tbody>\n",
         p->out);
     bst_status status;
@@ -349,14 +349,15 @@ static void put_summary(const page *p) {
 }
 
 static bst_status put_page(bst_ctx *ctx, page *p) {
-    char title[200];
+    char title[200], nonce[BST_SHA256_TEXT];
     const cJSON *scenario = bst_run_reader_scenario(p->run),
                 *manifest = bst_run_reader_manifest(p->run);
     snprintf(
         title, sizeof title, "Run of %.150s",
         bst_json_member_text(scenario, "name",
                              bst_json_member_text(manifest, "scenario", "an unknown scenario")));
-    bst_report_page_begin(p->out, title);
+    BST_TRY(bst_report_page_nonce(ctx, manifest, title, nonce));
+    bst_report_page_begin(p->out, title, nonce);
     put_head(p);
     bst_report_warnings_write(p->out, &p->warnings);
     put_identity(p);
@@ -379,8 +380,7 @@ static bst_status put_page(bst_ctx *ctx, page *p) {
             "<p class=\"note\">Made by Boresight %s. boresight info lists the folder's tables and "
             "files, boresight export takes them out.</p>\n",
             bst_version());
-    bst_report_page_end(p->out);
-    return BST_OK;
+    return bst_report_page_end(ctx, p->out, nonce);
 }
 
 bst_status bst_report_run(bst_ctx *ctx, bst_run_reader *run, FILE *out) {

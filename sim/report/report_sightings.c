@@ -166,7 +166,7 @@ static bst_status put_timeline(bst_ctx *ctx, FILE *out, const bst_run_reader *ru
                    .width = 1100.0,
                    .height = 50.0 + 17.0 * count,
                    .margin_left = 180.0,
-                   .x = {.label = label, .low = 0.0, .high = span_s / unit_s},
+                   .x = {.label = label, .low = 0.0, .high = span_s / unit_s, .unit_s = unit_s},
                    .y = {.label = "", .low = 0.0, .high = count, .bare = true}};
     bst_chart_begin(&c);
     bst_status status = BST_OK;
@@ -242,7 +242,7 @@ static bst_status put_counts(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
             .width = 1100.0,
             .height = 260.0,
             .margin_left = 64.0,
-            .x = {.label = label, .low = 0.0, .high = span_s / unit_s},
+            .x = {.label = label, .low = 0.0, .high = span_s / unit_s, .unit_s = unit_s},
             .y = {.label = "objects seen so far", .low = 0.0, .high = 1.05 * (double)total}};
         bst_chart_begin(&c);
         for (int i = -1; i < names->count && status == BST_OK; i++) {
@@ -313,7 +313,7 @@ static bst_status put_table(bst_ctx *ctx, FILE *out, const bst_run_reader *run) 
                              LISTED, 0, &rows));
     fprintf(out,
             "<details><summary>The %d objects with most detections</summary>\n"
-            "<div class=\"scroll\"><table>\n<thead><tr>",
+            "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr>",
             LISTED);
     for (int k = 0; k < 10; k++) {
         fprintf(out, "<th scope=\"col\"%s>%s</th>", k ? " class=\"n\"" : "", heads[k]);

@@ -52,7 +52,8 @@ static void put_quantity(const bst_report_drawing *d, bst_report_quantity quanti
                    .name = caption,
                    .width = 360.0,
                    .height = 220.0,
-                   .x = {.label = d->time_label, .low = 0.0, .high = d->span_s / d->unit_s},
+                   .common_x = d->common_x,
+                   .x = bst_report_time_axis(d),
                    .y = {.label = label}};
     bst_chart_fit(&c.y, low, high, 0.06);
     bst_chart_begin(&c);

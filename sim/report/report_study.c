@@ -156,7 +156,7 @@ static void put_identity(FILE *out, const bst_report_study_view *v) {
     bst_report_page_row(out, "program", "Boresight %s", v->version);
     bst_report_page_row(out, "digest of the study", "%s", v->digest);
     fputs(
-        "</table>\n<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">axis</th>"
+        "</table>\n<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th scope=\"col\">axis</th>"
         "<th scope=\"col\">role</th><th scope=\"col\">values</th><th scope=\"col\">path</th></tr>"
         "</thead>\n<tbody>\n",
         out);
@@ -205,7 +205,7 @@ static bst_status put_overall(bst_ctx *ctx, FILE *out, const bst_report_study_vi
             "statistics.csv.</p>\n",
             out);
     }
-    fputs("<div class=\"scroll\"><table>\n<thead><tr>", out);
+    fputs("<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr>", out);
     for (int k = 0; k < 13; k++) {
         put_head_cell(out, k > 1 && k < 12, heads[k]);
     }
@@ -265,7 +265,7 @@ static void put_settings(FILE *out, const bst_report_study_view *v) {
     bst_report_page_section(out, 2, "Settings");
     fprintf(out, "<details%s><summary>%" PRId64 " settings</summary>\n",
             v->settings <= 40 ? " open=\"open\"" : "", v->settings);
-    fputs("<div class=\"scroll\"><table>\n<thead><tr>", out);
+    fputs("<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr>", out);
     put_head_cell(out, true, "setting");
     for (int a = 0; a < v->axis_count; a++) {
         if (v->axes[a].swept) {
@@ -311,7 +311,7 @@ static bst_status put_failed(bst_ctx *ctx, FILE *out, const bst_report_study_vie
                              MOST_FAILED, 0, &rows));
     bst_report_page_section(out, 2, "Failed runs");
     fputs(
-        "<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\" class=\"n\">runs</th>"
+        "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th scope=\"col\" class=\"n\">runs</th>"
         "<th scope=\"col\" class=\"n\">first</th><th "
         "scope=\"col\">why</th></tr></thead>\n<tbody>\n",
         out);
@@ -358,7 +358,7 @@ static void put_worst(FILE *out, const bst_report_study_view *v) {
     if (n >= 2 * MOST_WORST) {
         qsort(list, (size_t)n, sizeof *list, worst_first);
         bst_report_page_section(out, 2, "Runs with the least custody");
-        fputs("<div class=\"scroll\"><table>\n<thead><tr>", out);
+        fputs("<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr>", out);
         put_head_cell(out, true, "run");
         for (int a = 0; a < v->axis_count; a++) {
             put_head_cell(out, !v->axes[a].is_text, v->axes[a].name);
@@ -460,14 +460,15 @@ static void put_cards(FILE *out, const bst_report_study_view *v) {
 /* ------------------------------------------------------------------ all of it */
 
 static bst_status put_page(bst_ctx *ctx, FILE *out, const bst_report_study_view *v) {
-    char title[200], folder[256];
+    char title[200], folder[256], nonce[BST_SHA256_TEXT];
+    snprintf(title, sizeof title, "Study %.150s", v->name);
+    BST_TRY(bst_report_page_nonce(ctx, bst_run_reader_manifest(v->tables), title, nonce));
     bst_report_warnings *warnings = calloc(1, sizeof *warnings);
     if (!warnings) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the report");
     }
     gather_warnings(v, warnings);
-    snprintf(title, sizeof title, "Study %.150s", v->name);
-    bst_report_page_begin(out, title);
+    bst_report_page_begin(out, title, nonce);
     bool whole = v->runs == v->expected_runs;
     fprintf(out, "<p class=\"sub\"><span class=\"badge %s\">%s</span> Folder ",
             !whole          ? "bad"
@@ -496,8 +497,7 @@ static bst_status put_page(bst_ctx *ctx, FILE *out, const bst_report_study_view 
             "<p class=\"note\">Made by Boresight %s. study.sqlite and the CSV files beside it hold "
             "all tables.</p>\n",
             bst_version());
-    bst_report_page_end(out);
-    return BST_OK;
+    return bst_report_page_end(ctx, out, nonce);
 }
 
 bst_status bst_report_study(bst_ctx *ctx, bst_run_reader *tables, FILE *out) {

@@ -182,7 +182,7 @@ void bst_report_timeline(const bst_report_drawing *d) {
                    .width = 1100.0,
                    .height = 50.0 + 30.0 * ROWS,
                    .margin_left = 160.0,
-                   .x = {.label = d->time_label, .low = 0.0, .high = d->span_s / d->unit_s},
+                   .x = bst_report_time_axis(d),
                    .y = {.label = "", .low = 0.0, .high = ROWS, .bare = true}};
     bst_chart_begin(&c);
     put_modes(d, &c);

@@ -99,10 +99,27 @@ class Accessible(unittest.TestCase):
         self.look(page, scheme + " changes of a live run")
         viewer.end()
 
+    def look_at_reports(self, scheme):
+        """Reports of a run and of a study, with a part enlarged, a cursor and a line that is hidden."""
+        with chromium.Chromium(1280, 720) as page:
+            page.command("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+            page.command("Page.setBypassCSP", enabled=True)  # for axe-core itself
+            for folder in (self.made, self.study):
+                runs.call_well("report", folder)
+                page.command("Page.navigate", url=f"file://{folder}/report.html")
+                page.wait_for("!!document.report")
+                page.evaluate("""(() => { const one = document.report.charts.find((chart) => !chart.scatter), { low, high } = one.group.all;
+                    one.canvas.scrollIntoView(); one.group.setRange(low, (low + high) / 2); one.group.setCursor(low + (high - low) / 3);
+                    const button = document.querySelector('.legend button'); if (button) button.click(); })()""")
+                page.wait_for("document.report.charts.every((chart) => !chart.visible || !chart.dirty)")
+                self.look(page, f"{scheme} report of {folder}")
+
     def test_light(self):
+        self.look_at_reports("light")
         self.look_at_all("light")
 
     def test_dark(self):
+        self.look_at_reports("dark")
         self.look_at_all("dark")
 
     def test_keyboard(self):

@@ -1,8 +1,9 @@
 // The page: loads a run, and moves frame, plots and events together.
 import { getJson, getNumbers, getPixels } from './api.js';
+import { shortNumber } from './chart.js';
 import { FrameView } from './frame_view.js';
 import { Panels } from './panels.js';
-import { Plots, shortNumber } from './plots.js';
+import { Plots } from './plots.js';
 import { Strip } from './strip.js';
 
 /** Numbers of a frame in the list (view/recorded_run.h). */

@@ -1,9 +1,10 @@
 // Two runs beside each other or one over the other: frames at the same time, plots, and the difference of their figures.
 import { addStyle, getJson, getNumbers, getPixels, post } from './api.js';
+import { drawLine, prepare, shortNumber, ticksOf } from './chart.js';
 import { make } from './editor_form.js';
 import { makePainter, originOf } from './frame_gl.js';
 import { drawMarks, KINDS, sortMarks } from './marks.js';
-import { readLines, shortNumber, ticksOf } from './plots.js';
+import { readLines } from './plots.js';
 import { describePixels, limitsOf } from './statistics.js';
 
 const NUMBERS = 5;
@@ -309,11 +310,8 @@ export class Comparison {
   }
 
   drawPlot({ info, lines, canvas }) {
-    const ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight, context = canvas.getContext('2d');
-    const style = getComputedStyle(document.documentElement), colour = (name) => style.getPropertyValue(name).trim();
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    const { context, width, height } = prepare(canvas), style = getComputedStyle(document.documentElement);
+    const colour = (name) => style.getPropertyValue(name).trim();
     const log = info.name === 'pointing_error', scaled = (value) => (log ? Math.log10(Math.max(value, 1e-6)) : value);
     const all = lines.flat(2).filter((point) => Number.isFinite(point.low) && (!log || point.low > 0));
     if (all.length === 0) return;
@@ -336,21 +334,7 @@ export class Comparison {
     }
     context.textAlign = 'center';
     for (const tick of ticksOf(from, to, Math.max(2, width / 110))) context.fillText(shortNumber(tick), toX(tick), height - 4);
-    lines.forEach((own, side) => own.forEach((points, k) => {
-      context.strokeStyle = colour(`--line-${k % 3}`);
-      context.lineWidth = 1.5;
-      context.setLineDash(side ? [5, 4] : []);
-      context.beginPath();
-      let down = false;
-      for (const point of points) {
-        if (!Number.isFinite(point.low) || (log && point.low <= 0)) { down = false; continue; }
-        if (down) context.lineTo(toX(point.time), toY(point.low)); else context.moveTo(toX(point.time), toY(point.low));
-        if (point.high !== point.low) context.lineTo(toX(point.time), toY(point.high));
-        down = true;
-      }
-      context.stroke();
-    }));
-    context.setLineDash([]);
+    lines.forEach((own, side) => own.forEach((points, k) => drawLine(context, points, toX, toY, { colour: colour(`--line-${k % 3}`), log, dash: side ? [5, 4] : [], dots: false })));
     const x = Math.round(toX(this.app.timeOf(Math.max(0, this.app.current)))) + 0.5;
     context.strokeStyle = colour('--cursor');
     context.lineWidth = 1;

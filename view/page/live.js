@@ -1,7 +1,7 @@
 // A run that is steered from the page: its WebSocket, its newest frame, its controls.
 import { getJson } from './api.js';
 import { changeFields, changesOf } from './changes.js';
-import { shortNumber } from './plots.js';
+import { shortNumber } from './chart.js';
 
 /** Exposures whose track positions are drawn as trails, as those of recorded runs. */
 const TRAIL_EXPOSURES = 40;

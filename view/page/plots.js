@@ -1,5 +1,6 @@
 // Plots over time: modes as bands, one panel for each quantity, a common axis and cursor.
 import { getNumbers } from './api.js';
+import { decadesOf, drawCursor, drawLine, listenToChart, prepare, shortNumber, textsOf, ticksOf, valueAt } from './chart.js';
 
 const LEFT = 58, RIGHT = 10, TOP = 8, BOTTOM = 16;
 const COLUMNS_MOST = 4096;
@@ -12,25 +13,6 @@ const OTHER_MODE = '#999933';
 /** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 
-/** Marks of an axis: round numbers, about `count` of them. */
-export function ticksOf(from, to, count) {
-  const rough = (to - from) / Math.max(1, count);
-  if (!(rough > 0) || !Number.isFinite(rough)) return [];
-  const power = 10 ** Math.floor(Math.log10(rough)), part = rough / power;
-  const step = power * (part <= 1 ? 1 : part <= 2 ? 2 : part <= 5 ? 5 : 10);
-  const ticks = [];
-  for (let k = Math.ceil(from / step - 1e-9); k * step <= to + step * 1e-9 && ticks.length < 100; k++) ticks.push(k * step);
-  return ticks;
-}
-
-/** Short text of a number. @param {number} value */
-export function shortNumber(value) {
-  if (!Number.isFinite(value)) return '–';
-  const size = Math.abs(value);
-  if (size >= 1e6 || (size > 0 && size < 1e-3)) return value.toExponential(1).replace('e+', 'e').replace('-', '−');
-  return String(Number(value.toPrecision(size >= 100 ? 5 : 3))).replace('-', '−');
-}
-
 /** Splits an answer into lines: {time, low, high} each. @param {Float64Array} numbers @param {number} lines */
 export function readLines(numbers, lines) {
   const found = [];
@@ -40,16 +22,6 @@ export function readLines(numbers, lines) {
     found.push(points);
   }
   return found;
-}
-
-/** Value of a line at a time: the last point at or before it. */
-export function valueAt(points, time) {
-  let low = 0, high = points.length;
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (points[middle].time <= time + 1e-9) low = middle + 1; else high = middle;
-  }
-  return low > 0 ? (points[low - 1].low + points[low - 1].high) / 2 : NaN;
 }
 
 class Panel {
@@ -128,46 +100,19 @@ class Panel {
     }
     const toY = (value) => bottom - ((this.log ? Math.log10(Math.max(value, 1e-300)) : value) - extent.low) / (extent.high - extent.low) * (bottom - TOP);
     context.textAlign = 'right';
-    for (const tick of this.axisTicks(extent)) {
+    const ticks = this.log ? decadesOf(extent.low, extent.high) : ticksOf(extent.low, extent.high, 3.5), texts = textsOf(ticks);
+    ticks.forEach((tick, k) => {
       const y = Math.round(toY(tick)) + 0.5;
       context.strokeStyle = colour('--grid');
       context.beginPath(); context.moveTo(LEFT, y); context.lineTo(width - RIGHT, y); context.stroke();
-      context.fillText(shortNumber(tick), LEFT - 6, y);
-    }
+      context.fillText(texts[k], LEFT - 6, y);
+    });
     plots.drawTimes(context, bottom, colour('--faint'));
     context.save();
     context.beginPath(); context.rect(LEFT, 0, width - LEFT - RIGHT, height); context.clip();
-    this.lines.forEach((points, k) => this.drawLine(context, points, toY, colour(`--line-${k % 3}`)));
+    this.lines.forEach((points, k) => drawLine(context, points, (time) => plots.toX(time), toY, { colour: colour(`--line-${k % 3}`), log: this.log }));
     context.restore();
     plots.drawCursor(context, 0, bottom, colour('--cursor'));
-  }
-
-  axisTicks(extent) {
-    if (!this.log) return ticksOf(extent.low, extent.high, 3.5);
-    const ticks = [];
-    for (let k = Math.ceil(extent.low); k <= extent.high; k++) ticks.push(10 ** k);
-    return ticks.length > 1 ? ticks.slice(0, 8) : ticksOf(10 ** extent.low, 10 ** extent.high, 2).filter((t) => t > 0);
-  }
-
-  drawLine(context, points, toY, colour) {
-    let down = false;
-    context.strokeStyle = context.fillStyle = colour;
-    context.lineWidth = 1.5;
-    context.lineJoin = 'round';
-    context.beginPath();
-    for (const p of points) {
-      if (!Number.isFinite(p.low) || (this.log && p.high <= 0)) { down = false; continue; }
-      const x = this.plots.toX(p.time);
-      if (down) context.lineTo(x, toY(p.low)); else context.moveTo(x, toY(p.low));
-      if (p.high !== p.low) context.lineTo(x, toY(p.high));
-      down = true;
-    }
-    context.stroke();
-    if (points.length > 120) return;
-    for (const p of points) { // few samples: each one shows
-      if (!Number.isFinite(p.low)) continue;
-      context.beginPath(); context.arc(this.plots.toX(p.time), toY(p.low), 2, 0, 2 * Math.PI); context.fill();
-    }
   }
 
   /** Values at the cursor, beside the title and for screen readers. */
@@ -179,19 +124,6 @@ class Panel {
     });
     this.canvas.setAttribute('aria-label', `${this.info.title}, at ${this.plots.cursor.toFixed(2)} s: ${texts.join(', ')} ${this.info.unit}`);
   }
-}
-
-/** Fits the pixels of a canvas to its size and clears it. */
-function prepare(canvas) {
-  const ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
-  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-  }
-  const context = canvas.getContext('2d');
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  context.clearRect(0, 0, width, height);
-  return { context, width, height };
 }
 
 /** Least time between two drawings of the plots of a live run, ms: they take longer than its frames. */
@@ -334,28 +266,20 @@ export class Plots {
     context.textAlign = 'center';
     context.textBaseline = 'top';
     const ticks = ticksOf(this.range.from, this.range.to, Math.max(2, this.width() / 110));
-    for (const tick of ticks) {
+    const texts = textsOf(ticks);
+    ticks.forEach((tick, k) => {
       const x = this.toX(tick);
-      if (x < LEFT + 8 || x > this.width() - RIGHT - 16) continue;
+      if (x < LEFT + 8 || x > this.width() - RIGHT - 16) return;
       context.fillRect(Math.round(x), bottom, 1, 3);
-      context.fillText(shortNumber(tick) + (tick === ticks[ticks.length - 1] ? ' s' : ''), x, bottom + 4);
-    }
+      context.fillText(texts[k] + (k === ticks.length - 1 ? ' s' : ''), x, bottom + 4);
+    });
     context.textAlign = 'start';
   }
 
   drawCursor(context, top, bottom, colour) {
-    if (this.drag && this.drag.moved) {
-      const a = this.toX(this.drag.from), b = this.toX(this.drag.to);
-      context.globalAlpha = 0.25;
-      context.fillStyle = colour;
-      context.fillRect(Math.min(a, b), top, Math.abs(b - a), bottom - top);
-      context.globalAlpha = 1;
-    }
-    const x = Math.round(this.toX(this.cursor)) + 0.5;
-    if (x < LEFT || x > this.width() - RIGHT + 1) return;
-    context.strokeStyle = colour;
-    context.lineWidth = 1;
-    context.beginPath(); context.moveTo(x, top); context.lineTo(x, bottom); context.stroke();
+    const x = Math.round(this.toX(this.cursor)), inside = x + 0.5 >= LEFT && x + 0.5 <= this.width() - RIGHT + 1;
+    const { from, to } = this.drag || { from: NaN, to: NaN };
+    drawCursor(context, top, bottom, { x: inside ? x : NaN, from: this.toX(from), to: this.toX(to), colour });
   }
 
   drawModes() {
@@ -387,29 +311,19 @@ export class Plots {
 
   /** A click goes to its time, a drag shows its range. */
   listen(canvas) {
-    canvas.addEventListener('pointerdown', (event) => {
-      const time = this.toTime(event.offsetX);
-      this.drag = { from: time, to: time, x: event.offsetX, moved: false };
-      canvas.setPointerCapture(event.pointerId);
+    listenToChart(canvas, {
+      click: (x) => this.seek(this.toTime(x)),
+      drag: (part) => {
+        this.drag = part && { from: this.toTime(part.x0), to: this.toTime(part.x1) };
+        this.draw();
+      },
+      dragged: ({ x0, x1 }) => {
+        const from = this.toTime(Math.min(x0, x1)), to = this.toTime(Math.max(x0, x1));
+        this.drag = null;
+        this.setRange(from, to);
+      },
+      reset: () => this.setRange(this.all.from, this.all.to),
+      zoom: (factor, x) => this.zoom(factor, this.toTime(x)),
     });
-    canvas.addEventListener('pointermove', (event) => {
-      if (!this.drag) return;
-      this.drag.to = this.toTime(event.offsetX);
-      this.drag.moved = this.drag.moved || Math.abs(event.offsetX - this.drag.x) > 4;
-      this.draw();
-    });
-    canvas.addEventListener('pointerup', () => {
-      const drag = this.drag;
-      this.drag = null;
-      if (drag && drag.moved) this.setRange(Math.min(drag.from, drag.to), Math.max(drag.from, drag.to));
-      else if (drag) this.seek(drag.from);
-    });
-    canvas.addEventListener('pointercancel', () => { this.drag = null; this.draw(); });
-    canvas.addEventListener('dblclick', () => this.setRange(this.all.from, this.all.to));
-    canvas.addEventListener('wheel', (event) => {
-      if (!event.ctrlKey && !event.shiftKey) return; // scrolls the panels
-      event.preventDefault();
-      this.zoom(2 ** ((event.deltaY || event.deltaX) / 300), this.toTime(event.offsetX));
-    }, { passive: false });
   }
 }

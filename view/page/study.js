@@ -1,7 +1,7 @@
 // The runs of a study: a table of parameters and figures, and a plot of a figure over a parameter. A click opens a run.
 import { addStyle, getJson, post } from './api.js';
+import { shortNumber, ticksOf } from './chart.js';
 import { make } from './editor_form.js';
-import { shortNumber, ticksOf } from './plots.js';
 
 /** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);

@@ -1,22 +1,22 @@
 /* Time series reduced to what a plot of some columns can show. */
-#ifndef BST_VIEW_DECIMATE_H
-#define BST_VIEW_DECIMATE_H
+#ifndef BST_IO_DECIMATE_H
+#define BST_IO_DECIMATE_H
 
 #include <stddef.h>
 
 /* A value at a time. */
-typedef struct bst_view_sample {
+typedef struct bst_io_sample {
     double time_s, value; /* value NAN: a gap in the line */
-} bst_view_sample;
+} bst_io_sample;
 
 /* Extremes of the samples of one column of a plot. */
-typedef struct bst_view_extent {
+typedef struct bst_io_extent {
     double time_s;    /* of the sample, or the middle of the column */
     double low, high; /* NAN: a gap */
-} bst_view_extent;
+} bst_io_extent;
 
 /* Sorts samples by time; those in order are left as they are. */
-void bst_view_sort(bst_view_sample *samples, size_t count);
+void bst_io_sort_samples(bst_io_sample *samples, size_t count);
 
 /* Minimum and maximum of the samples in each column of a plot.
  *
@@ -28,13 +28,13 @@ void bst_view_sort(bst_view_sample *samples, size_t count);
  * Notes:     the nearest sample beyond each end is included, so that lines reach the edges. If
  *            there are no more samples than columns, each sample is an extent of its own. A column
  *            without samples has no extent; one with gaps only has a gap. No extreme is lost. */
-size_t bst_view_decimate(const bst_view_sample *samples, size_t count, double from_s, double to_s,
-                         int columns, bst_view_extent *out);
+size_t bst_io_decimate(const bst_io_sample *samples, size_t count, double from_s, double to_s,
+                       int columns, bst_io_extent *out);
 
 /* Keeps the minimum and the maximum of every four samples, in place and in order: half of them.
  *
  * Returned:  number of samples that are left
  * Notes:     gaps are dropped where four samples hold a value. */
-size_t bst_view_thin(bst_view_sample *samples, size_t count);
+size_t bst_io_thin_samples(bst_io_sample *samples, size_t count);
 
 #endif

@@ -1,4 +1,4 @@
-#include "view/decimate.h"
+#include "sim/io/decimate.h"
 
 #include <assert.h>
 #include <math.h>
@@ -6,11 +6,11 @@
 #include <stdlib.h>
 
 static int compare_times(const void *a, const void *b) {
-    const bst_view_sample *left = a, *right = b;
+    const bst_io_sample *left = a, *right = b;
     return left->time_s < right->time_s ? -1 : left->time_s > right->time_s;
 }
 
-void bst_view_sort(bst_view_sample *samples, size_t count) {
+void bst_io_sort_samples(bst_io_sample *samples, size_t count) {
     bool rising = true;
     for (size_t i = 1; i < count && rising; i++) {
         rising = samples[i - 1].time_s <= samples[i].time_s;
@@ -21,7 +21,7 @@ void bst_view_sort(bst_view_sample *samples, size_t count) {
 }
 
 /* Index of the first sample at or after a time. */
-static size_t first_from(const bst_view_sample *samples, size_t count, double time_s) {
+static size_t first_from(const bst_io_sample *samples, size_t count, double time_s) {
     size_t low = 0, high = count;
     while (low < high) {
         size_t middle = low + (high - low) / 2;
@@ -34,20 +34,20 @@ static size_t first_from(const bst_view_sample *samples, size_t count, double ti
     return low;
 }
 
-static bst_view_extent extent_of(const bst_view_sample *sample) {
-    return (bst_view_extent){sample->time_s, sample->value, sample->value};
+static bst_io_extent extent_of(const bst_io_sample *sample) {
+    return (bst_io_extent){sample->time_s, sample->value, sample->value};
 }
 
 /* Extents of the samples first to end - 1, one for each column that has any. */
-static size_t fill_columns(const bst_view_sample *samples, size_t first, size_t end, double from_s,
-                           double column_s, int columns, bst_view_extent *out) {
+static size_t fill_columns(const bst_io_sample *samples, size_t first, size_t end, double from_s,
+                           double column_s, int columns, bst_io_extent *out) {
     size_t n = 0;
     int current = -1;
     for (size_t i = first; i < end; i++) {
         int column = (int)fmin((samples[i].time_s - from_s) / column_s, columns - 1);
         if (column != current) {
             current = column;
-            out[n++] = (bst_view_extent){from_s + (column + 0.5) * column_s, NAN, NAN};
+            out[n++] = (bst_io_extent){from_s + (column + 0.5) * column_s, NAN, NAN};
         }
         out[n - 1].low = fmin(out[n - 1].low, samples[i].value);
         out[n - 1].high = fmax(out[n - 1].high, samples[i].value);
@@ -55,8 +55,8 @@ static size_t fill_columns(const bst_view_sample *samples, size_t first, size_t 
     return n;
 }
 
-size_t bst_view_decimate(const bst_view_sample *samples, size_t count, double from_s, double to_s,
-                         int columns, bst_view_extent *out) {
+size_t bst_io_decimate(const bst_io_sample *samples, size_t count, double from_s, double to_s,
+                       int columns, bst_io_extent *out) {
     assert(from_s < to_s && columns >= 1);
     size_t first = first_from(samples, count, from_s), end = first, n = 0;
     end = first_from(samples, count, to_s);
@@ -79,7 +79,7 @@ size_t bst_view_decimate(const bst_view_sample *samples, size_t count, double fr
     return n;
 }
 
-size_t bst_view_thin(bst_view_sample *samples, size_t count) {
+size_t bst_io_thin_samples(bst_io_sample *samples, size_t count) {
     size_t n = 0;
     for (size_t i = 0; i < count; i += 4) {
         size_t end = i + 4 < count ? i + 4 : count, low = i, high = i;
@@ -91,7 +91,7 @@ size_t bst_view_thin(bst_view_sample *samples, size_t count) {
                 high = isnan(samples[k].value) ? high : k;
             }
         }
-        bst_view_sample a = samples[low < high ? low : high], b = samples[low < high ? high : low];
+        bst_io_sample a = samples[low < high ? low : high], b = samples[low < high ? high : low];
         samples[n++] = a;
         if (low != high) {
             samples[n++] = b;

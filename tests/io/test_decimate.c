@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-#include "view/decimate.h"
+#include "sim/io/decimate.h"
 
 static uint64_t seed = 7;
 
@@ -21,22 +21,22 @@ static double uniform(void) {
 }
 
 /* Samples at uneven times, some equal, some gaps; returns their number. */
-static size_t make_samples(bst_view_sample *samples, size_t most) {
+static size_t make_samples(bst_io_sample *samples, size_t most) {
     size_t count = (size_t)(uniform() * (double)most);
     double time_s = -3.0;
     for (size_t i = 0; i < count; i++) {
         time_s += uniform() < 0.1 ? 0.0 : uniform() * (uniform() < 0.05 ? 20.0 : 0.1);
-        samples[i] = (bst_view_sample){time_s, uniform() < 0.05 ? NAN : uniform() - 0.5};
+        samples[i] = (bst_io_sample){time_s, uniform() < 0.05 ? NAN : uniform() - 0.5};
     }
     return count;
 }
 
 /* Extremes of all samples of a column; false: it has none. */
-static bool brute_force(const bst_view_sample *samples, size_t count, double from_s, double to_s,
-                        int columns, int column, bst_view_extent *out) {
+static bool brute_force(const bst_io_sample *samples, size_t count, double from_s, double to_s,
+                        int columns, int column, bst_io_extent *out) {
     double width = (to_s - from_s) / columns;
     bool any = false;
-    *out = (bst_view_extent){from_s + (column + 0.5) * width, NAN, NAN};
+    *out = (bst_io_extent){from_s + (column + 0.5) * width, NAN, NAN};
     for (size_t i = 0; i < count; i++) {
         if (samples[i].time_s < from_s || samples[i].time_s > to_s) {
             continue;
@@ -51,18 +51,18 @@ static bool brute_force(const bst_view_sample *samples, size_t count, double fro
     return any;
 }
 
-static void assert_same(bst_view_extent a, bst_view_extent b) {
+static void assert_same(bst_io_extent a, bst_io_extent b) {
     /* the same arithmetic on the same numbers: no tolerance */
     assert_true(a.time_s == b.time_s);
     assert_true(a.low == b.low || (isnan(a.low) && isnan(b.low)));
     assert_true(a.high == b.high || (isnan(a.high) && isnan(b.high)));
 }
 
-static void check(const bst_view_sample *samples, size_t count, double from_s, double to_s,
+static void check(const bst_io_sample *samples, size_t count, double from_s, double to_s,
                   int columns) {
-    static bst_view_extent out[64];
-    size_t n = bst_view_decimate(samples, count, from_s, to_s, columns, out), k = 0, inside = 0;
-    const bst_view_sample *before = NULL, *after = NULL;
+    static bst_io_extent out[64];
+    size_t n = bst_io_decimate(samples, count, from_s, to_s, columns, out), k = 0, inside = 0;
+    const bst_io_sample *before = NULL, *after = NULL;
     for (size_t i = 0; i < count; i++) {
         inside += samples[i].time_s >= from_s && samples[i].time_s <= to_s;
         before = samples[i].time_s < from_s ? &samples[i] : before;
@@ -70,32 +70,32 @@ static void check(const bst_view_sample *samples, size_t count, double from_s, d
     }
     assert_true(n <= (size_t)columns + 2);
     if (before) {
-        assert_same(out[k++], (bst_view_extent){before->time_s, before->value, before->value});
+        assert_same(out[k++], (bst_io_extent){before->time_s, before->value, before->value});
     }
     if (inside <= (size_t)columns) {
         for (size_t i = 0; i < count; i++) {
             if (samples[i].time_s >= from_s && samples[i].time_s <= to_s) {
-                assert_same(out[k++], (bst_view_extent){samples[i].time_s, samples[i].value,
-                                                        samples[i].value});
+                assert_same(out[k++],
+                            (bst_io_extent){samples[i].time_s, samples[i].value, samples[i].value});
             }
         }
     } else {
         for (int column = 0; column < columns; column++) {
-            bst_view_extent expected;
+            bst_io_extent expected;
             if (brute_force(samples, count, from_s, to_s, columns, column, &expected)) {
                 assert_same(out[k++], expected);
             }
         }
     }
     if (after) {
-        assert_same(out[k++], (bst_view_extent){after->time_s, after->value, after->value});
+        assert_same(out[k++], (bst_io_extent){after->time_s, after->value, after->value});
     }
     assert_int_equal(n, k);
 }
 
 static void test_against_brute_force(void **state) {
     (void)state;
-    static bst_view_sample samples[400];
+    static bst_io_sample samples[400];
     for (int trial = 0; trial < 400; trial++) {
         size_t count = make_samples(samples, 400);
         double last = count ? samples[count - 1].time_s : 1.0, from_s = -4.0 + uniform() * 5.0;
@@ -110,19 +110,19 @@ static void test_against_brute_force(void **state) {
 
 static void test_no_samples(void **state) {
     (void)state;
-    bst_view_extent out[12];
-    assert_int_equal(bst_view_decimate(NULL, 0, 0.0, 1.0, 10, out), 0);
+    bst_io_extent out[12];
+    assert_int_equal(bst_io_decimate(NULL, 0, 0.0, 1.0, 10, out), 0);
 }
 
 static void test_sort(void **state) {
     (void)state;
-    static bst_view_sample samples[300];
+    static bst_io_sample samples[300];
     double sum = 0.0, sorted_sum = 0.0;
     for (int i = 0; i < 300; i++) {
-        samples[i] = (bst_view_sample){floor(uniform() * 50.0), i};
+        samples[i] = (bst_io_sample){floor(uniform() * 50.0), i};
         sum += samples[i].time_s * i;
     }
-    bst_view_sort(samples, 300);
+    bst_io_sort_samples(samples, 300);
     for (int i = 0; i < 300; i++) {
         assert_true(i == 0 || samples[i - 1].time_s <= samples[i].time_s);
         sorted_sum += samples[i].time_s * samples[i].value; /* integers: exact */
@@ -133,11 +133,11 @@ static void test_sort(void **state) {
 /* Thinning keeps the extremes of all samples, of every four, and the order. */
 static void test_thin(void **state) {
     (void)state;
-    static bst_view_sample samples[403], all[403];
+    static bst_io_sample samples[403], all[403];
     for (int trial = 0; trial < 100; trial++) {
         size_t count = make_samples(samples, 403);
         memcpy(all, samples, sizeof all);
-        size_t left = bst_view_thin(samples, count), k = 0;
+        size_t left = bst_io_thin_samples(samples, count), k = 0;
         assert_true(left <= count / 2 + 2);
         for (size_t i = 0; i < count; i += 4) {
             double low = NAN, high = NAN, kept_low = NAN, kept_high = NAN;
