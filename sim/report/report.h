@@ -180,6 +180,10 @@ bst_status bst_report_frames(bst_ctx *ctx, FILE *out, bst_run_reader *run,
 bst_status bst_report_sightings(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
                                 double span_s) BST_MUST_CHECK;
 
+/* Writes the section on the custody of the catalogue; nothing for runs without record.custody. */
+bst_status bst_report_custody(bst_ctx *ctx, FILE *out, const bst_run_reader *run,
+                              double span_s) BST_MUST_CHECK;
+
 /* Writes the HTML page of a run. */
 bst_status bst_report_run(bst_ctx *ctx, bst_run_reader *run, FILE *out) BST_MUST_CHECK;
 

@@ -362,6 +362,7 @@ static bst_status put_page(bst_ctx *ctx, page *p) {
     bst_report_warnings_write(p->out, &p->warnings);
     put_identity(p);
     bst_status status = bst_report_sightings(ctx, p->out, p->run, p->span_s);
+    status = status == BST_OK ? bst_report_custody(ctx, p->out, p->run, p->span_s) : status;
     if (status != BST_OK && status != BST_ERR_FORMAT) {
         return status;
     }

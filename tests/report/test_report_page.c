@@ -355,6 +355,51 @@ static void events(void **state) {
     run_tables_end(&t);
 }
 
+/* Cards by the manifest, a dot for each updated object, and the largest NEES first. */
+static void custody(void **state) {
+    (void)state;
+    run_tables t;
+    char own[1200];
+    snprintf(own, sizeof own,
+             "%.*s, \"custody\": {\"objects\": 40, \"updated\": 3, \"in_custody\": 12,"
+             " \"tracks\": 9, \"correlated\": 6, \"ambiguous\": 2, \"uncorrelated\": 1,"
+             " \"cross_tags\": 5, \"age_mean_s\": 321.5, \"sigma_median_m\": 951,"
+             " \"sigma_p90_m\": 1500, \"sigma_updated_median_m\": 432, \"nees_mean\": 6.25,"
+             " \"nees_low\": 5.5, \"nees_high\": 6.5}}",
+             (int)strlen(manifest) - 1, manifest);
+    make_run(&t, own);
+    run_tables_sql(&t,
+                   "CREATE TABLE custody (object INT, name TEXT, norad INT, updates INT,"
+                   " cross_tags INT, last_s REAL, age_s REAL, sigma_m REAL, error_m REAL,"
+                   " nees REAL, chi2_mean REAL);"
+                   "CREATE TABLE custody_tracks (time_s REAL, object INT);"
+                   "INSERT INTO custody_tracks VALUES (3.0, 1), (9.0, NULL), (6.0, 2), (12.0, 1);"
+                   "INSERT INTO custody VALUES (1, 'a<b', 7, 2, 1, 12, 7200, 10, 1, 5.5, 4.25),"
+                   " (2, 'large', 8, 1, 0, 6, 14400, 1000, 100, 9.5, 3.5),"
+                   " (3, 'not updated', 9, 0, 0, NULL, NULL, 2000, 3000, 99, NULL);");
+    char *page = page_of(&t);
+    const char *part = strstr(page, ">Custody of the catalogue<");
+    assert_non_null(part);
+    expect_card(part, "objects in custody", "12", "of 40, by the uncertainty at the end");
+    expect_card(part, "objects updated", "3", "last 321.5 s ago, mean");
+    expect_card(part, "tracks correlated", "6", "of 9; 2 ambiguous, 1 of no object");
+    expect_card(part, "cross-tags", "5", "tracks of another object by the truth");
+    expect_card(part, "uncertainty of updated objects, median", "432",
+                "all objects: 951 m, 90 % below 1500 m");
+    expect_card(part, "NEES of updated objects", "6.25", "5.50 to 6.50 if consistent (95 %)");
+    (void)svg_need(page, "Updates of orbits so far", false, false);
+    (void)svg_need(page, "Uncertainty of updated objects against the age", false, true);
+    (void)svg_need(page, "Error of the position against its uncertainty", true, true);
+    const char *first = strstr(part, "<td>large</td><td class=\"n\">8</td>");
+    const char *second = strstr(part,
+                                "<td>a&lt;b</td><td class=\"n\">7</td><td class=\"n\">2</td>"
+                                "<td class=\"n\">1</td><td class=\"n\">7200</td>");
+    assert_true(first && second && first < second);
+    assert_null(strstr(part, "not updated"));
+    free(page);
+    run_tables_end(&t);
+}
+
 static void sightings(void **state) {
     (void)state;
     run_tables t;
@@ -471,6 +516,7 @@ int main(void) {
         cmocka_unit_test(cards_of_a_sensor),
         cmocka_unit_test(the_end_of_a_killed_run),
         cmocka_unit_test(events),
+        cmocka_unit_test(custody),
         cmocka_unit_test(sightings),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
