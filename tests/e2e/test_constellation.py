@@ -10,8 +10,12 @@ import collections
 import hashlib
 import math
 import os
+import subprocess
 import sys
 import unittest
+
+import sgp4.api
+import sgp4.io
 
 import runs
 
@@ -259,6 +263,40 @@ class Constellation(unittest.TestCase):
                 with open(os.path.join(self.folder, "files", name), encoding="ascii") as f:
                     angles += f.read().count("ANGLE_1 =")
         self.assertGreater(angles, 500)
+
+
+@unittest.skipIf(FULL, "of the quick version")
+class Thickened(unittest.TestCase):
+    """docs/examples/catalogue/thickened.py: element sets that others read, observers that run."""
+    def test_objects_and_observers(self):
+        out = []
+        for k in range(2):
+            folder = os.path.join(runs.scratch(), "made")
+            subprocess.run(["/usr/bin/python3", "docs/examples/catalogue/thickened.py",
+                            "scenarios/day_constellation.json", folder, "--objects",
+                            "5500", "--observers", "7"], check=True)
+            with open(os.path.join(folder, "objects.tle"), encoding="utf-8") as file:
+                out.append(file.read())
+        self.assertEqual(out[0], out[1])
+        lines = out[0].splitlines()
+        self.assertEqual(len(lines), 3 * 5500)
+        high, numbers = [0, 0], set()
+        for first, second in zip(lines[1::3], lines[2::3]):
+            satellite = sgp4.api.Satrec.twoline2rv(first, second)
+            self.assertEqual([int(first[68]), int(second[68])],
+                             [sgp4.io.compute_checksum(line) for line in (first, second)])
+            self.assertEqual(satellite.error, 0)
+            numbers.add(satellite.satnum)
+            high[satellite.satnum > 100000] += satellite.no_kozai < 0.01
+        self.assertEqual(len(numbers), 5500)
+        # the share of high orbits among 482 copies, within 4 sigma of that of the file
+        share = high[0] / 5018
+        self.assertLess(abs(high[1] / 482 - share), 4 * math.sqrt(share * (1 - share) / 482))
+        result = os.path.join(folder, "run")
+        runs.run(os.path.join(folder, "scenario.json"), result, runs.DARK, duration=10)
+        db = runs.database(result)
+        self.assertEqual(db.execute("SELECT count(DISTINCT sensor) FROM exposures").fetchone()[0], 7)
+        self.assertGreaterEqual(db.execute("SELECT count(DISTINCT object) FROM tasks").fetchone()[0], 4)
 
 
 @unittest.skipIf(FULL, "of the quick version")

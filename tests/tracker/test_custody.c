@@ -154,6 +154,10 @@ static double nees_of_passes(const bst_elements *set, double offset_s, int draws
         bst_custody_filter_init(&config, &orbit, normals, &filter);
         assert_true(observe_pass(sgp4, offset_s, 200.0 * i, key, number, pass));
         assert_true(bst_custody_update_directions(&orbit, &same_axes, pass, 4, &filter));
+        const bst_custody_filter updated = filter;
+        pass[3].direction = pass[0].direction; /* of another object, that stood still */
+        assert_false(bst_custody_update_directions(&orbit, &same_axes, pass, 4, &filter));
+        assert_memory_equal(&filter, &updated, sizeof filter);
         sum += bst_custody_nees(&filter);
     }
     bst_sgp4_free(sgp4);

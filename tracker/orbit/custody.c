@@ -440,6 +440,13 @@ static void update_covariance(const gain *g, const linear *at, double p[N][N]) {
     }
 }
 
+/* Chi-square that innovations of this size exceed with probability 2e-5, z = 4.11 (Wilson and
+ * Hilferty, PNAS 17, 1931). */
+static double most_chi2(int size) {
+    const double s = 2.0 / (9.0 * size), root = 1.0 - s + 4.11 * sqrt(s);
+    return size * root * root * root;
+}
+
 static bool update(const bst_custody_orbit *o, const measurement *z, bst_custody_filter *filter) {
     bst_custody_filter next = *filter;
     for (int iteration = 0; iteration < MOST_ITERATIONS; iteration++) {
@@ -457,6 +464,15 @@ static bool update(const bst_custody_orbit *o, const measurement *z, bst_custody
             }
         }
         solve(&g, y, w);
+        if (iteration == 0 && z->directions) {
+            double chi2 = 0.0;
+            for (int i = 0; i < z->size; i++) {
+                chi2 += y[i] * w[i];
+            }
+            if (!(chi2 < most_chi2(z->size))) {
+                return false;
+            }
+        }
         memcpy(next.p, filter->p, sizeof next.p);
         update_covariance(&g, &at, next.p);
         for (int k = 0; k < N; k++) {
