@@ -224,7 +224,7 @@ static void curves_over_an_axis(void **state) {
     for (int k = 0; k < NOISES; k++) { /* a line for each noise */
         char class_of[40];
         for (int dots = 0; dots < 2; dots++) {
-            snprintf(class_of, sizeof class_of, "%s\" st%s", colours[k], dots ? "yle" : "roke");
+            snprintf(class_of, sizeof class_of, "l %s%s\"", dots ? "o " : "", colours[k] + 2);
             assert_int_equal(svg_points(&c, class_of, 0, x, y, 100), GAINS);
             for (int g = 0; g < GAINS; g++) {
                 bst_assert_close(log10(x[g]), log10(gains[g]), 0.01);
