@@ -2,17 +2,15 @@
  * makes the chart interactive (view/page/report_charts.js). Only sim/io/chart.c calls these
  * functions.
  *
- * Notes:     numbers have 6 significant digits, x of series 9, extremes 5; "-" is a value that is not finite.
- *            Of the svg element:
- *            data-x, data-y  low and high end, then "log", "bare" if they apply
- *            data-unit-s     unit of an axis of time, s
- *            data-x-label, data-y-label
- *            data-margins    left, top, right, bottom, in units of the SVG
- *            Of others: data-kind with lists of equal length (line and dots: data-x, data-y; area
- *            and whiskers: data-x, data-low, data-high; bands: data-from, data-to), or one of
- *            data-bar (x0 x1 y0 y1), data-rule (y), data-mark (x), data-word (x y dx dy). A value
- *            "low:high" has the extremes of a column of samples. data-x="#ID" is the list of the
- *            element with this id. */
+ * Notes:
+ *   Numbers have 6 significant digits, x of series 9, extremes 5; "-" is a value that is not
+ * finite. The svg element has data-x and data-y (low and high end, then "log", "bare" if they
+ * apply), data-x-label, data-y-label, data-unit-s (unit of an axis of time, s) and data-margins
+ * (left, top, right, bottom, in units of the SVG). Other elements have data-kind with lists of
+ * equal length (line and dots: data-x, data-y; area and whiskers: data-x, data-low, data-high;
+ * bands: data-from, data-to), or one of data-bar (x0 x1 y0 y1), data-rule (y), data-mark (x),
+ * data-word (x y dx dy). A value "low:high" has the extremes of a column of samples. data-x="#ID"
+ * is the list of the element with this id. */
 #ifndef BST_IO_CHART_VALUES_H
 #define BST_IO_CHART_VALUES_H
 

@@ -60,11 +60,6 @@ static void put_modes(const bst_report_drawing *d, const bst_chart *c) {
     }
 }
 
-bst_chart_axis bst_report_time_axis(const bst_report_drawing *d) {
-    return (bst_chart_axis){
-        .label = d->time_label, .low = 0.0, .high = d->span_s / d->unit_s, .unit_s = d->unit_s};
-}
-
 bst_chart bst_report_time_chart(const bst_report_drawing *d, const char *name, const char *label,
                                 double low, double high, bool logarithmic) {
     bst_chart c = {.out = d->out,

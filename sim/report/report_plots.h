@@ -30,11 +30,11 @@ typedef struct bst_report_drawing {
     bst_chart_common_x *common_x; /* x, for all charts over time */
 } bst_report_drawing;
 
+/* Axis of time of the charts: the whole run. */
+bst_chart_axis bst_report_time_axis(const bst_report_drawing *d);
 /* Fills `series` (d->y, d->z or d->w) with a quantity of each frame; returns the number of finite
  * values. */
 size_t bst_report_fill(const bst_report_drawing *d, bst_report_quantity quantity, double *series);
-/* Axis of time of the charts: the whole run. */
-bst_chart_axis bst_report_time_axis(const bst_report_drawing *d);
 /* Begins a chart over time with the modes as background; the y axis covers low..high. */
 bst_chart bst_report_time_chart(const bst_report_drawing *d, const char *name, const char *label,
                                 double low, double high, bool logarithmic);

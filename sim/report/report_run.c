@@ -288,7 +288,8 @@ static bst_status put_events(bst_ctx *ctx, const page *p) {
     fprintf(p->out, "<details%s><summary>%s</summary>\n", total <= 40 ? " open=\"open\"" : "",
             bst_text_of_count((char[BST_COUNT_TEXT]){0}, total, "event", "events"));
     fputs(
-        "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th class=\"n\">s</th><th>UTC</th>"
+        "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th "
+        "class=\"n\">s</th><th>UTC</th>"
         "<th>from</th><th>kind</th><th>what</th></tr></thead>\n<tbody>\n",
         p->out);
     bst_status status;

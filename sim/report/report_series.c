@@ -5,6 +5,11 @@
 #include "sim/core/compare.h"
 #include "sim/report/report_plots.h"
 
+bst_chart_axis bst_report_time_axis(const bst_report_drawing *d) {
+    return (bst_chart_axis){
+        .label = d->time_label, .low = 0.0, .high = d->span_s / d->unit_s, .unit_s = d->unit_s};
+}
+
 size_t bst_report_fill(const bst_report_drawing *d, bst_report_quantity quantity, double *series) {
     size_t numbers = 0;
     for (size_t i = 0; i < d->sensor->count; i++) {

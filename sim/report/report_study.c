@@ -156,7 +156,8 @@ static void put_identity(FILE *out, const bst_report_study_view *v) {
     bst_report_page_row(out, "program", "Boresight %s", v->version);
     bst_report_page_row(out, "digest of the study", "%s", v->digest);
     fputs(
-        "</table>\n<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th scope=\"col\">axis</th>"
+        "</table>\n<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th "
+        "scope=\"col\">axis</th>"
         "<th scope=\"col\">role</th><th scope=\"col\">values</th><th scope=\"col\">path</th></tr>"
         "</thead>\n<tbody>\n",
         out);
@@ -311,7 +312,8 @@ static bst_status put_failed(bst_ctx *ctx, FILE *out, const bst_report_study_vie
                              MOST_FAILED, 0, &rows));
     bst_report_page_section(out, 2, "Failed runs");
     fputs(
-        "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th scope=\"col\" class=\"n\">runs</th>"
+        "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr><th scope=\"col\" "
+        "class=\"n\">runs</th>"
         "<th scope=\"col\" class=\"n\">first</th><th "
         "scope=\"col\">why</th></tr></thead>\n<tbody>\n",
         out);

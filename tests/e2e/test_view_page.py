@@ -267,6 +267,27 @@ class Page(unittest.TestCase):
             nearest = int(numpy.argmin(abs(rows[:, 1] - events[-1]["time_s"])))
             page.wait_for(f"{SHOWN} === {nearest}")
             self.assertEqual(page.evaluate("document.boresight.plots.cursor"), rows[nearest, 1])
+            # a click in a plot goes to its time, dragging shows a range, a double click all of it
+            plots = "document.boresight.plots"
+            whole = page.evaluate(plots + ".range")
+            place = lambda time_s: page.evaluate(f"""(() => {{ const {{ canvas }} = {plots}.panels[0], box = canvas.getBoundingClientRect();
+                return {{ x: box.left + {plots}.toX({time_s}), y: box.top + box.height / 2 }}; }})()""")
+            def mouse(kind, time_s, **more):
+                page.command("Input.dispatchMouseEvent", type=kind, button="left", **place(time_s), **more)
+            for kind in ("mousePressed", "mouseReleased"):
+                mouse(kind, rows[8, 1], clickCount=1)
+            page.wait_for(SHOWN + " === 8")
+            start, end = place(rows[4, 1]), place(rows[12, 1])
+            for kind, at in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
+                page.command("Input.dispatchMouseEvent", type=kind, button="left", buttons=1, clickCount=1, **at)
+            shown = page.evaluate(plots + ".range")
+            self.assertAlmostEqual(shown["from"], rows[4, 1], delta=0.1)
+            self.assertAlmostEqual(shown["to"], rows[12, 1], delta=0.1)
+            for count in (1, 2):
+                for kind in ("mousePressed", "mouseReleased"):
+                    page.command("Input.dispatchMouseEvent", type=kind, button="left", clickCount=count, **start)
+            self.assertEqual(page.evaluate(plots + ".range"), whole)
+            self.assertEqual(page.messages, [])
 
 
 @unittest.skipUnless(chromium.PROGRAM, "there is no chromium")

@@ -109,7 +109,7 @@ static inline double svg_high_y(const svg_chart *c) {
     return svg_value(&c->y, c->top);
 }
 
-/* Points of the n-th path of a class, "l c0" for a line or "l c0\" style" for dots; their number.
+/* Points of the n-th path of a class, "l c0" for a line or "l o c0" for dots; their number.
  */
 static inline int svg_points(const svg_chart *c, const char *class_of, int number, double *x,
                              double *y, int room) {
@@ -164,8 +164,10 @@ static inline int svg_bars(const svg_chart *c, int colour, svg_bar *bars, int ro
         svg_bar *b = &bars[count++];
         *b = (svg_bar){svg_value(&c->x, x), svg_value(&c->x, x + width),
                        svg_value(&c->y, y + height), svg_value(&c->y, y), ""};
-        if (strncmp(p + used, "><title>", 8) == 0) {
-            const char *title = p + used + 8;
+        const char *end = strchr(p + used, '>'); /* behind the values */
+        assert_non_null(end);
+        if (strncmp(end, "><title>", 8) == 0) {
+            const char *title = end + 8;
             snprintf(b->title, sizeof b->title, "%.*s", (int)(strstr(title, "</title>") - title),
                      title);
         }

@@ -12,7 +12,7 @@ enum { N = 60, MANY = 2300 };
 
 #define LINE(colour) "l c" #colour "\" stroke"
 #define DASHED(colour) "l s c" #colour
-#define DOTS(colour) "l c" #colour "\" style"
+#define DOTS(colour) "l o c" #colour
 
 static double draw(uint64_t *state) {
     *state = *state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);

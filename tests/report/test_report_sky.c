@@ -122,8 +122,8 @@ static void paths(void **state) {
             place[1][i] = f->latitude_rad * 180.0 / BST_PI;
         }
         svg_chart c = svg_need(page, "Paths of the boresight and of the target", false, false);
-        expect_points(&c, "l c1\" style", 0, ra[0], dec[0]);
-        expect_points(&c, "l c0\" style", 0, ra[1], dec[1]);
+        expect_points(&c, "l o c1", 0, ra[0], dec[0]);
+        expect_points(&c, "l o c0", 0, ra[1], dec[1]);
         if (turn) {
             bst_assert_close(svg_low_x(&c), 0.0, 0.5);
             bst_assert_close(svg_high_x(&c), 360.0, 0.5);
@@ -132,7 +132,7 @@ static void paths(void **state) {
         }
         expect_range(svg_low_y(&c), svg_high_y(&c), dec[0], dec[1], 0.06);
         c = svg_need(page, "Path of the observer", false, false);
-        expect_points(&c, "l c2\" style", 0, place[0], place[1]);
+        expect_points(&c, "l o c2", 0, place[0], place[1]);
         bst_assert_close(svg_low_x(&c), -180.0, 0.5);
         bst_assert_close(svg_high_x(&c), 180.0, 0.5);
         bst_assert_close(svg_low_y(&c), -90.0, 0.5);

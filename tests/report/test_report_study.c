@@ -224,7 +224,7 @@ static void curves_over_an_axis(void **state) {
     for (int k = 0; k < NOISES; k++) { /* a line for each noise */
         char class_of[40];
         for (int dots = 0; dots < 2; dots++) {
-            snprintf(class_of, sizeof class_of, "%s\" st%s", colours[k], dots ? "yle" : "roke");
+            snprintf(class_of, sizeof class_of, "l %s%s\"", dots ? "o " : "", colours[k] + 2);
             assert_int_equal(svg_points(&c, class_of, 0, x, y, 100), GAINS);
             for (int g = 0; g < GAINS; g++) {
                 bst_assert_close(log10(x[g]), log10(gains[g]), 0.01);
@@ -260,7 +260,7 @@ static void other_designs(void **state) {
     char *page = write_text(bst_report_study_plot_axes, &f.view);
     svg_chart c = svg_need(page, "pointing_rms_px against noise, a dot", false, false);
     double x[100], y[100];
-    assert_int_equal(svg_points(&c, "l c0\" style", 0, x, y, 100), SETTINGS);
+    assert_int_equal(svg_points(&c, "l o c0", 0, x, y, 100), SETTINGS);
     for (int s = 0; s < SETTINGS; s++) {
         bst_assert_close(x[s], noises[s % NOISES], 0.02);
         bst_assert_close(y[s], f.view.metrics[0].mean[s], 0.003);
@@ -349,10 +349,10 @@ static void effects_of_morris(void **state) {
     assert_non_null(strstr(c.caption, "Mean size of 20 elementary effects"));
     c = svg_need(page, "Spread against size of the effects on pointing_rms_px", false, false);
     double x, y;
-    assert_int_equal(svg_points(&c, "l c0\" style", 0, &x, &y, 1), 1);
+    assert_int_equal(svg_points(&c, "l o c0", 0, &x, &y, 1), 1);
     bst_assert_close(x, 1.5, 0.01);
     bst_assert_close(y, 0.3, 0.01);
-    assert_int_equal(svg_points(&c, "l c0\" style", 1, &x, &y, 1), 1);
+    assert_int_equal(svg_points(&c, "l o c0", 1, &x, &y, 1), 1);
     bst_assert_close(x, 0.4, 0.01);
     bst_assert_close(y, 0.6, 0.01);
     bst_assert_close(svg_high_y(&c), 1.15 * 0.6, 0.01);
@@ -441,7 +441,7 @@ static void curves_of_a_series(void **state) {
                 snprintf(class_of, sizeof class_of,
                          kind == 0   ? "l s %s"
                          : kind == 1 ? "l %s\" stroke"
-                                     : "l %s\" style",
+                                     : "l o %s",
                          colours[g]);
                 assert_int_equal(svg_points(&c, class_of, 0, x, y, 10), 5);
                 for (int k = 0; k < 5; k++) {

@@ -201,8 +201,8 @@ static void lanes_by_shares(void **state) {
 /* Bands of a mode in a chart over time: those from which to which times. */
 static int bands(const svg_chart *c, int mode, double from[100], double to[100]) {
     char mark[60];
-    snprintf(mark, sizeof mark, "<path class=\"b c%d\" d=\"", BST_CHART_MODE + mode);
-    const char *p = svg_after(c->from, c->to, mark);
+    snprintf(mark, sizeof mark, "<path class=\"b c%d\" ", BST_CHART_MODE + mode);
+    const char *p = svg_after(svg_after(c->from, c->to, mark), c->to, " d=\"");
     int count = 0;
     while (p && *p == 'M') {
         double x, y, width, bottom, back;
@@ -355,9 +355,9 @@ static void paths_and_angles(void **state) {
     fixture f;
     make(&f, N, 2.0, few, 5, 110.0);
     const char *sky = "Paths of the boresight and of the target";
-    expect_points(&f, sky, "l c1\" style", of_ra, of_dec);
-    expect_points(&f, sky, "l c0\" style", of_target_ra, of_target_dec);
-    expect_points(&f, "Path of the observer", "l c2\" style", of_longitude, of_latitude);
+    expect_points(&f, sky, "l o c1", of_ra, of_dec);
+    expect_points(&f, sky, "l o c0", of_target_ra, of_target_dec);
+    expect_points(&f, "Path of the observer", "l o c2", of_longitude, of_latitude);
     svg_chart ground = svg_need(f.page, "Path of the observer", false, false);
     bst_assert_close(svg_low_x(&ground), -180, 0.5);
     bst_assert_close(svg_high_y(&ground), 90, 0.5);

@@ -138,6 +138,7 @@ class Chart {
     this.yRange = null; // chosen by dragging
     this.part = null;
     this.visible = this.dirty = false;
+    this.ink = ''; // of the style in which the colours are
     /** @type {Group} */
     this.group = null;
     this.readLegend();
@@ -219,10 +220,13 @@ class Chart {
     return { left, top, right: this.canvas.clientWidth - right, bottom: this.canvas.clientHeight - bottom };
   }
 
-  toX(value) {
-    const { left, right } = this.area();
-    return left + shareOf(this.range(), value, this.x.log) * (right - left);
+  /** Function from values of the horizontal axis to pixels, for what is in view now. */
+  across() {
+    const { left, right } = this.area(), range = this.range();
+    return (value) => left + shareOf(range, value, this.x.log) * (right - left);
   }
+
+  toX(value) { return this.across()(value); }
 
   toValue(x) {
     const { left, right } = this.area();
@@ -251,9 +255,9 @@ class Chart {
       return;
     }
     let nearest = Infinity;
-    const toY = this.toHeight();
+    const toX = this.across(), toY = this.toHeight();
     this.dots.forEach((dot, k) => {
-      const distance = Math.hypot(this.toX(dot.time) - x, toY(dot.low) - y);
+      const distance = Math.hypot(toX(dot.time) - x, toY(dot.low) - y);
       if (this.shown(dot.item) && distance < nearest) { nearest = distance; this.dot = k; }
     });
     this.touch();
@@ -372,7 +376,7 @@ class Chart {
   }
 
   toHeight() {
-    const { top, bottom } = this.area(), heights = this.heights();
+    const { top, bottom } = this.area(), heights = this.heights(); // once: `heights` looks at all values
     return (value) => bottom - Math.min(3, Math.max(-2, shareOf(heights, value, this.y.log))) * (bottom - top);
   }
 
@@ -380,9 +384,9 @@ class Chart {
     if (!this.dirty || !this.visible) return;
     this.dirty = false;
     this.describe();
-    const { context } = prepare(this.canvas), { left, top, right, bottom } = this.area(), toX = (value) => this.toX(value), toY = this.toHeight();
+    const { context } = prepare(this.canvas), { left, top, right, bottom } = this.area(), toX = this.across(), toY = this.toHeight();
     const style = getComputedStyle(this.svg), ink = style.getPropertyValue('--ink').trim(), area = { left, top, right, bottom };
-    for (const item of this.items) item.colour = getComputedStyle(item.element).getPropertyValue('--c').trim() || ink;
+    this.colour(ink);
     context.font = FONT;
     this.drawAxes(context, area, toX, toY, ink, style.getPropertyValue('--grid').trim());
     context.save();
@@ -396,6 +400,20 @@ class Chart {
     context.strokeStyle = style.getPropertyValue('--line').trim();
     context.lineWidth = 1;
     context.strokeRect(Math.round(left) + 0.5, Math.round(top) + 0.5, Math.round(right - left), Math.round(bottom - top));
+  }
+
+  /** Colours of the shapes, as the style sheet has them; again where light became dark. @param {string} ink */
+  colour(ink) {
+    if (this.ink === ink) return;
+    this.ink = ink;
+    for (const item of this.items) item.colour = getComputedStyle(item.element).getPropertyValue('--c').trim() || ink;
+  }
+
+  /** Points of a series in view, and one beyond each end. @param {any[]} points */
+  inView(points) {
+    if (this.scatter || !this.group.zoomed()) return points;
+    const { low, high } = this.range();
+    return points.slice(Math.max(0, countUntil(points, low) - 1), countUntil(points, high) + 1);
   }
 
   drawAxes(context, { left, top, right, bottom }, toX, toY, ink, grid) {
@@ -430,17 +448,19 @@ class Chart {
   }
 
   drawItem(context, item, { left, top, right, bottom }, toX, toY) {
-    const { kind, points, numbers } = item;
+    const { kind, numbers } = item, points = this.inView(item.points);
     context.fillStyle = context.strokeStyle = item.colour;
     context.globalAlpha = ALPHA[kind] || 1;
     context.lineWidth = 1.4;
     if (kind === 'line') {
       drawLine(context, points, toX, toY, { colour: item.colour, log: this.y.log, dash: item.dashed ? [5, 4] : [], dots: false });
     } else if (kind === 'dots') {
+      context.beginPath();
       for (const { time, low, high } of points) {
         if (!Number.isFinite(low)) continue;
-        for (const value of low === high ? [low] : [low, high]) { context.beginPath(); context.arc(toX(time), toY(value), 1.8, 0, 2 * Math.PI); context.fill(); }
+        for (const value of low === high ? [low] : [low, high]) { context.moveTo(toX(time) + 1.8, toY(value)); context.arc(toX(time), toY(value), 1.8, 0, 2 * Math.PI); }
       }
+      context.fill();
     } else if (kind === 'area') {
       const known = points.filter((p) => Number.isFinite(p.low) && Number.isFinite(p.high));
       context.beginPath();
