@@ -201,6 +201,26 @@ class View(Checks):
                 self.viewer.get("api/pixels?sensor=0&frame=" + ("3", "-1", "x")[k])
             self.assertEqual(refused.exception.code, (404, 400, 400)[k])
 
+    def test_parts_of_frames(self):
+        """Any part has the pixels of the file; bins are means; what is not within the frame is refused."""
+        with fits.open(os.path.join(self.made, "frames.fits")) as file:
+            image = file[2].data
+
+            def ask(query):
+                data, headers = self.viewer.get("api/pixels?sensor=0&frame=1&" + query)
+                self.assertEqual(headers["X-Frame-Size"], "1024 1024")
+                return numpy.frombuffer(data, "<u2").reshape(int(headers["X-Frame-Height"]), int(headers["X-Frame-Width"])), headers
+            for x, y, width, height in ((0, 0, 1024, 1), (37, 900, 64, 64), (1000, 1020, 500, 500), (5, 0, 1, 1024)):
+                part, headers = ask(f"x={x}&y={y}&width={width}&height={height}")
+                self.assertEqual((headers["X-Frame-Part"], headers["X-Frame-Binning"]), (f"{x} {y}", "1"))
+                self.assertTrue(numpy.array_equal(part, image[y:y + height, x:x + width]), (x, y))
+            sums = image.astype(int).reshape(256, 4, 256, 4).sum(axis=(1, 3))
+            self.assertTrue(numpy.array_equal(ask("binning=4")[0], (sums + 8) // 16))
+            self.assertTrue(numpy.array_equal(ask("longest=256")[0], (sums + 8) // 16))
+            self.assertTrue(numpy.array_equal(ask("binning=4&x=512&y=256&width=64&height=400")[0], ((sums + 8) // 16)[64:164, 128:144]))
+        for query in ("x=1024", "y=2000", "x=-1", "width=0", "binning=0", "binning=257", "longest=3", "x=1.5", "x=1&x=1", "height=99999999999999999999"):
+            self.assertEqual(self.viewer.status("/{token}/api/pixels?frame=1&" + query), 400, query)
+
     def test_thumbnails(self):
         """Peaks of 13 x 13 pixels, the same when they are asked for again."""
         with fits.open(os.path.join(self.made, "frames.fits")) as file:
@@ -308,6 +328,45 @@ class View(Checks):
                      line + "Content-Length: 99999999999999999999\r\n\r\n", bytes(range(256)) * 50 + b"\r\n\r\n"):
             self.assertIn(self.viewer.raw(text), (0, 400, 403, 405, 411, 413, 414, 431, 500, 505), text[-60:])
         self.assertEqual(self.viewer.status(), 200)
+
+    def test_slow_uploads(self):
+        """Bodies that come slowly have few places and little time; data, and the editor's texts, go on meanwhile."""
+        begin, slow = time.monotonic(), []
+        head = (f"POST /{self.viewer.token}/api/editor/{{}} HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://127.0.0.1\r\n"
+                "Content-Length: {}\r\n\r\n")
+        for k in range(30):
+            peer = self.viewer.connect()
+            peer.sendall(head.format(*(("file?name=a.tle", 30 << 20) if k % 3 else ("check", 1000 + k))).encode() + b"{")
+            slow.append(peer)
+
+        def trickle():
+            for peer in slow:
+                try:
+                    peer.sendall(b" ")
+                except OSError:
+                    pass
+        answered = 0
+        while time.monotonic() < begin + 4:  # most are refused at once; the rest have their 5 s
+            trickle()
+            self.assertEqual(self.viewer.status("/{token}/api/pixels?frame=1"), 200)
+            answered += 1
+            time.sleep(0.3)
+        self.assertGreater(answered, 2)
+        ports = [peer.getsockname()[1] for peer in slow]
+        self.assertLessEqual(len(self.open_connections(ports)), 10)
+        while self.open_connections(ports):
+            trickle()
+            self.assertLess(time.monotonic(), begin + 60)
+            time.sleep(0.3)
+        statuses = set()
+        for peer in slow:
+            try:
+                statuses.add(peer.recv(12)[9:])
+            except ConnectionError:
+                pass
+            peer.close()
+        self.assertLessEqual(statuses, {b"", b"503", b"408"})
+        self.assertEqual(self.viewer.raw(head.format("satellites", 16) + '{"find":"44801"}'), 200)
 
     def open_connections(self, ports):
         """Those of the peers' ports whose connections the server has not closed."""

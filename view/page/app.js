@@ -211,9 +211,10 @@ class App {
     try {
       while (this.wanted !== this.current) {
         const next = this.wanted;
-        const loaded = await this.load(next);
+        const loaded = await this.load(next), part = await this.loadPart(next, loaded.image);
         this.current = next;
-        this.frameView.show(loaded.image, loaded.details, loaded.why);
+        this.frameView.getPart = this.exported || !loaded.image ? null : (wanted) => getPixels(this.sensor, next, undefined, undefined, wanted);
+        this.frameView.show(loaded.image, loaded.details, loaded.why, false, part);
         this.firstShown = this.firstShown || performance.now(); // ms since the page was asked for
         this.describePosition(loaded.details);
         this.plots.setCursor(this.timeOf(next));
@@ -228,6 +229,13 @@ class App {
       this.busy = false;
     }
     if (this.current + 1 < this.count) this.load(this.current + 1).catch(() => {});
+  }
+
+  /** The shown part of a frame that is too large to be loaded whole, while the view is not of the whole frame. */
+  async loadPart(frame, image) {
+    const view = this.frameView, same = image && image.binning > 1 && !view.view.fitted && !this.exported;
+    const wanted = same && view.image && view.image.frameWidth === image.frameWidth ? view.wantedPart(image) : null;
+    return wanted ? getPixels(this.sensor, frame, undefined, undefined, wanted).catch(() => null) : null;
   }
 
   load(frame) {
@@ -249,7 +257,7 @@ class App {
     const sensor = this.sensor, kept = this.frames[frame * NUMBERS + 3] >= 0;
     const dropped = this.frames[frame * NUMBERS + 4] === 1;
     const [image, details] = await Promise.all([
-      kept ? getPixels(sensor, frame) : null, getJson('frame', { sensor, frame }),
+      kept ? getPixels(sensor, frame, undefined, undefined, { longest: this.frameView.longest() }) : null, getJson('frame', { sensor, frame }),
     ]);
     details.names = this.names;
     entry.bytes = image ? image.data.byteLength : 1000;
