@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "sim/core/json_member.h"
+#include "view/large_stack.h"
 #include "view/pixel_bins.h"
 
 /* Longest message of a client, bytes. */
@@ -184,6 +185,20 @@ static int on_text(bst_view_socket *socket, struct mg_connection *peer, const ch
     return kept;
 }
 
+/* A message that a thread with a larger stack takes. */
+typedef struct message {
+    bst_view_socket *socket;
+    struct mg_connection *peer;
+    const char *data;
+    size_t bytes;
+    int kept;
+} message;
+
+static void take_message(void *user) {
+    message *m = user;
+    m->kept = on_text(m->socket, m->peer, m->data, m->bytes);
+}
+
 static int on_data(struct mg_connection *peer, int bits, char *data, size_t bytes, void *user) {
     const int opcode = bits & 0xf;
     const bool whole = bits & 0x80;
@@ -193,7 +208,8 @@ static int on_data(struct mg_connection *peer, int bits, char *data, size_t byte
     if (opcode != MG_WEBSOCKET_OPCODE_TEXT || !whole || bytes > MESSAGE_BYTES) {
         return 0;
     }
-    return on_text(user, peer, data, bytes);
+    message m = {user, peer, data, bytes, 0};
+    return bst_view_call_with_stack(take_message, &m) ? m.kept : 0;
 }
 
 bst_status bst_view_socket_open(bst_ctx *ctx, struct mg_context *http, const char *uri,

@@ -11,6 +11,7 @@
 #include <civetweb.h>
 
 #include "sim/core/wall_clock.h"
+#include "view/large_stack.h"
 #include "view/live_socket.h"
 #include "view/page_files.h"
 #include "view/request_body.h"
@@ -203,18 +204,40 @@ static void end_sending(bst_view_server *server, size_t bytes) {
     pthread_mutex_unlock(&server->lock);
 }
 
-/* Calls a route. `*text`: memory of the answer beside that of `x`; free it with cJSON_free. */
-static answer compute(bst_ctx *ctx, const bst_view_route *route, bst_view_exchange *x,
-                      char **text) {
-    const int status = bst_view_route_call(ctx, route, x);
-    *text = x->json ? cJSON_PrintUnformatted(x->json) : NULL;
-    if (status != BST_HTTP_OK) {
-        return text_answer(status, ctx->message);
+/* A call of a route. */
+typedef struct route_call {
+    const bst_view_route *route;
+    bst_view_exchange *x;
+    bst_ctx ctx;
+    int status;
+    bool is_json;
+    char *text; /* JSON; cJSON_free */
+} route_call;
+
+static void call_route(void *user) {
+    route_call *call = user;
+    call->status = bst_view_route_call(&call->ctx, call->route, call->x);
+    call->is_json = call->x->json != NULL;
+    call->text = call->is_json ? cJSON_PrintUnformatted(call->x->json) : NULL;
+    cJSON_Delete(call->x->json);
+    call->x->json = NULL;
+}
+
+/* Calls a route; the answer is in the memory of the call. */
+static answer compute(route_call *call) {
+    const bst_view_exchange *x = call->x;
+    if (!bst_view_call_with_stack(call_route, call)) {
+        return refusal(BST_HTTP_BUSY);
     }
-    if (x->json) {
-        return *text ? (answer){BST_HTTP_OK, "application/json; charset=utf-8", *text,
-                                strlen(*text), NULL}
-                     : refusal(BST_HTTP_FAILED);
+    if (call->status != BST_HTTP_OK) {
+        return text_answer(call->status, call->ctx.message);
+    }
+    if (call->text) {
+        return (answer){BST_HTTP_OK, "application/json; charset=utf-8", call->text,
+                        strlen(call->text), NULL};
+    }
+    if (call->is_json) { /* it found no memory */
+        return refusal(BST_HTTP_FAILED);
     }
     return (answer){BST_HTTP_OK, x->type ? x->type : "application/octet-stream", x->bytes.data,
                     x->bytes.bytes, &x->bytes};
@@ -231,9 +254,9 @@ static int refuse(struct mg_connection *peer, int status, bool head_only) {
 static int answer_data(struct mg_connection *peer, bst_view_server *server,
                        const bst_view_route *route, bool head_only) {
     const struct mg_request_info *info = mg_get_request_info(peer);
-    bst_ctx ctx = {0};
     bst_view_exchange x = {.subject = server->subject, .live = server->live};
-    char *text = NULL, *body = NULL;
+    route_call call = {.route = route, .x = &x};
+    char *body = NULL;
     if (!bst_view_exchange_read(info->query_string, &x)) {
         return refuse(peer, BST_HTTP_BAD_REQUEST, head_only);
     }
@@ -249,9 +272,8 @@ static int answer_data(struct mg_connection *peer, bst_view_server *server,
         free(body);
         return refuse(peer, BST_HTTP_BUSY, head_only);
     }
-    answer a = compute(&ctx, route, &x, &text);
+    answer a = compute(&call);
     free(body);
-    cJSON_Delete(x.json);
     const size_t bytes = a.bytes;
     if (begin_sending(server, bytes)) {
         send_answer(peer, &a, head_only);
@@ -259,7 +281,7 @@ static int answer_data(struct mg_connection *peer, bst_view_server *server,
     } else {
         a.status = refuse(peer, BST_HTTP_BUSY, head_only);
     }
-    cJSON_free(text);
+    cJSON_free(call.text);
     free(x.bytes.data);
     return a.status;
 }
@@ -279,6 +301,20 @@ static const char *header_of(const struct mg_request_info *info, const char *nam
     return value;
 }
 
+/* True if all names of headers are names: letters, digits and some signs (RFC 9110, section 5.6.2).
+ * Others are lines that go on, or have a space before their colon. */
+static bool are_headers(const struct mg_request_info *info) {
+    static const char allowed[] =
+        "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
+        "!#$%&'*+-.^_`|~";
+    bool good = info->num_headers < MG_MAX_HEADERS; /* further ones are not seen */
+    for (int i = 0; good && i < info->num_headers; i++) {
+        const char *name = info->http_headers[i].name;
+        good = *name && name[strspn(name, allowed)] == '\0';
+    }
+    return good;
+}
+
 /* Answers every request, so that the library serves no file of its own. Called by its threads. */
 static int on_request(struct mg_connection *peer) {
     const struct mg_request_info *info = mg_get_request_info(peer);
@@ -293,16 +329,15 @@ static int on_request(struct mg_connection *peer) {
     if (header_of(info, "Transfer-Encoding", &coded) || lengths > 1) {
         request.body_bytes = INT64_MAX; /* of unknown length */
     }
-    /* headers beyond the library's list are not seen */
-    int status = info->num_headers < MG_MAX_HEADERS ? bst_view_guard(&request, server->token, route)
-                                                    : BST_HTTP_BAD_REQUEST;
+    int status =
+        are_headers(info) ? bst_view_guard(&request, server->token, route) : BST_HTTP_BAD_REQUEST;
     bool head_only = request.method && strcmp(request.method, "HEAD") == 0;
     if (status != BST_HTTP_OK) {
         return refuse(peer, status, head_only);
     }
     int upgrades;
     if (server->live && strcmp(route, "live") == 0 && request.origin &&
-        header_of(info, "Upgrade", &upgrades)) {
+        strcmp(request.method, "GET") == 0 && header_of(info, "Upgrade", &upgrades)) {
         return 0; /* the library goes on with its WebSocket */
     }
     const bst_view_route *data = bst_view_route_find(route);
@@ -380,6 +415,8 @@ bst_status bst_view_server_start(bst_ctx *ctx, bst_view_subject *subject, bst_vi
                              "512",
                              "websocket_timeout_ms",
                              SOCKET_IDLE_MS,
+                             "decode_url",
+                             "no",
                              "enable_directory_listing",
                              "no",
                              "access_control_list",

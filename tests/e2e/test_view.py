@@ -100,6 +100,14 @@ class Viewer:
         return self.raw("\r\n".join(lines) + "\r\n" + more.format(**words) + "Connection: close\r\n\r\n")
 
 
+def open_connections(viewer, ports):
+    """Those of the peers' ports whose connections the server has not closed."""
+    with open(f"/proc/{viewer.process.pid}/net/tcp", encoding="ascii") as file:
+        rows = [line.split()[1:4] for line in file][1:]
+    return [far for near, far, state in rows if state == "01" and near.endswith(f":{viewer.port:04X}")
+            and int(far[-4:], 16) in ports]
+
+
 class Checks(unittest.TestCase):
     """Comparisons with the files of a run."""
 
@@ -154,6 +162,46 @@ class Checks(unittest.TestCase):
                         else:
                             self.assertEqual(mark[key], expected[key], (name, key))
         self.assertGreater(len(found["detections"]), 0)
+
+
+    def check_slow_uploads(self, viewer, seconds, whole=False):
+        """`whole`: until their time is over."""
+        begin, slow = time.monotonic(), []
+        head = (f"POST /{viewer.token}/api/editor/{{}} HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://127.0.0.1\r\n"
+                "Content-Length: {}\r\n\r\n")
+        for k in range(30):
+            peer = viewer.connect()
+            peer.sendall(head.format(*(("file?name=a.tle", 30 << 20) if k % 3 else ("check", 1000 + k))).encode() + b"{")
+            slow.append(peer)
+
+        def trickle():
+            for peer in slow:
+                try:
+                    peer.sendall(b" ")
+                except OSError:
+                    pass
+        while time.monotonic() < begin + seconds:  # most are refused at once
+            trickle()
+            self.assertEqual(viewer.status("/{token}/api/pixels?frame=0"), 200)
+            time.sleep(0.3)
+        ports = [peer.getsockname()[1] for peer in slow]
+        self.assertLessEqual(len(open_connections(viewer, ports)), 10)
+        while whole and open_connections(viewer, ports):
+            trickle()
+            self.assertLess(time.monotonic(), begin + 60)
+            time.sleep(0.3)
+        statuses = set()
+        for peer in slow:
+            peer.settimeout(0.01)
+            try:
+                statuses.add(peer.recv(12)[9:])
+            except (ConnectionError, TimeoutError):
+                pass
+            peer.close()
+        self.assertLessEqual(statuses, {b"", b"503"} | ({b"408"} if whole else set()))
+        end = time.monotonic() + 10
+        while viewer.raw(head.format("satellites", 16) + '{"find":"44801"}') != 200:
+            self.assertLess(time.monotonic(), end)
 
 
 class View(Checks):
@@ -320,6 +368,19 @@ class View(Checks):
         self.assertEqual(status("/{token}/ws", more="Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
                                 "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"), 404)
 
+    def test_encoded_paths(self):
+        """A path is taken as it is: nothing in it is decoded. Nested bodies deeper than a thread's stack are refused."""
+        token, own = self.viewer.token, "Origin: http://127.0.0.1:{port}\r\n"
+        for path, refused in ((f"/%{ord(token[0]):02x}{token[1:]}/api/run", 403), ("/{token}/api/run%00", 404), ("/{token}/api%2frun", 404),
+                              ("/{token}/%61pi/run", 404), ("/{token}/..\\..\\etc", 404), ("/{token}/api/run#x", 404)):
+            self.assertEqual(self.viewer.status(path), refused, path)
+        for target in ("http://127.0.0.1:{port}/{token}/api/run", "http://evil.example/{token}/api/run", "*", "127.0.0.1:1"):
+            self.assertIn(self.viewer.status(target), (0, 400, 403), target)
+        body = '{"a":' * 990 + "1" + "}" * 990
+        text = f"POST /{token}/api/open HTTP/1.1\r\nHost: localhost\r\nOrigin: http://localhost\r\nContent-Length: {len(body)}\r\n\r\n{body}"
+        self.assertIn(self.viewer.raw(text), (400, 404))
+        self.assertEqual(self.viewer.status(more=own), 200)
+
     def test_malformed(self):
         line = f"GET /{self.viewer.token}/ HTTP/1.1\r\nHost: 127.0.0.1\r\n"
         for text in (b"\x00" * 5000 + b"\r\n\r\n", "GET\r\n\r\n", "GET / HTTP/9.9\r\n\r\n", "\r\n\r\n", "GET / HTTP/1.1\r\nHost\r\n\r\n",
@@ -330,50 +391,8 @@ class View(Checks):
         self.assertEqual(self.viewer.status(), 200)
 
     def test_slow_uploads(self):
-        """Bodies that come slowly have few places and little time; data, and the editor's texts, go on meanwhile."""
-        begin, slow = time.monotonic(), []
-        head = (f"POST /{self.viewer.token}/api/editor/{{}} HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://127.0.0.1\r\n"
-                "Content-Length: {}\r\n\r\n")
-        for k in range(30):
-            peer = self.viewer.connect()
-            peer.sendall(head.format(*(("file?name=a.tle", 30 << 20) if k % 3 else ("check", 1000 + k))).encode() + b"{")
-            slow.append(peer)
-
-        def trickle():
-            for peer in slow:
-                try:
-                    peer.sendall(b" ")
-                except OSError:
-                    pass
-        answered = 0
-        while time.monotonic() < begin + 4:  # most are refused at once; the rest have their 5 s
-            trickle()
-            self.assertEqual(self.viewer.status("/{token}/api/pixels?frame=1"), 200)
-            answered += 1
-            time.sleep(0.3)
-        self.assertGreater(answered, 2)
-        ports = [peer.getsockname()[1] for peer in slow]
-        self.assertLessEqual(len(self.open_connections(ports)), 10)
-        while self.open_connections(ports):
-            trickle()
-            self.assertLess(time.monotonic(), begin + 60)
-            time.sleep(0.3)
-        statuses = set()
-        for peer in slow:
-            try:
-                statuses.add(peer.recv(12)[9:])
-            except ConnectionError:
-                pass
-            peer.close()
-        self.assertLessEqual(statuses, {b"", b"503", b"408"})
-        self.assertEqual(self.viewer.raw(head.format("satellites", 16) + '{"find":"44801"}'), 200)
-
-    def open_connections(self, ports):
-        """Those of the peers' ports whose connections the server has not closed."""
-        with open(f"/proc/{self.viewer.process.pid}/net/tcp", encoding="ascii") as file:
-            rows = [line.split()[1:4] for line in file][1:]
-        return [far for near, far, state in rows if state == "01" and near.endswith(f":{self.viewer.port:04X}")
-                and int(far[-4:], 16) in ports]
+        """Bodies that come slowly have few places; data, and the editor's texts, go on meanwhile."""
+        self.check_slow_uploads(self.viewer, 1.2)
 
     def test_slow_readers_and_many_connections(self):
         """Readers that take nothing, and 500 connections that send nothing, lose theirs; others are served."""
@@ -389,7 +408,7 @@ class View(Checks):
         while self.viewer.status() != 200:  # busy while the slow readers have their time
             self.assertLess(time.monotonic(), end)
             time.sleep(0.1)
-        while self.open_connections([peer.getsockname()[1] for peer in slow]):
+        while open_connections(self.viewer, [peer.getsockname()[1] for peer in slow]):
             self.assertLess(time.monotonic(), begin + 120)
             time.sleep(0.2)
         for peer in slow:  # cut off before the end

@@ -238,7 +238,11 @@ class Live(Tables):
             self.assertEqual(page.status, status, words)
             page.close()
         self.assertEqual(self.viewer.status("/{token}/live"), 404)
-        for data, opcode in ((b"{", 0x81), (b"[]", 0x81), (b"\xff\xfe", 0x81), (b"{}" + b" " * 9000, 0x81), (b"{}", 0x82), (b"{}", 0x01)):
+        upgrade = "Origin: http://127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n" \
+                  "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+        self.assertEqual(self.viewer.status("/{token}/live", method="POST", more=upgrade + "Content-Length: 2\r\n"), 405)
+        for data, opcode in ((b"{", 0x81), (b"[]", 0x81), (b"\xff\xfe", 0x81), (b"{}" + b" " * 9000, 0x81), (b"{}", 0x82), (b"{}", 0x01),
+                             (b"[" * 7000, 0x81), (b'{"a":' * 1000, 0x81)):  # deeper than a small stack
             page = live_page.Socket(self.viewer)
             with self.assertRaises((ConnectionError, TimeoutError)):
                 page.peer.settimeout(5)
