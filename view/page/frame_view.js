@@ -3,6 +3,7 @@ import { makePainter, originOf } from './frame_gl.js';
 import { binningAt, covers, longestSide, partFor, valueAt } from './frame_parts.js';
 import { drawCompass, drawMarks, drawShape, KINDS, sortMarks } from './marks.js';
 import { describePixels, limitsOf } from './statistics.js';
+import { setText } from './text.js';
 import { formatDec, formatRa, pixelToSky } from './wcs.js';
 
 const SCALE_LEAST = 0.02, SCALE_MOST = 128;
@@ -68,7 +69,7 @@ export class FrameView {
     if (counted || !image || !this.statistics) this.statistics = image ? describePixels(image.data) : null;
     element('no-pixels').hidden = Boolean(image);
     element('no-pixels').classList.toggle('first', !image && !details);
-    element('no-pixels').textContent = image ? '' : why;
+    setText(element('no-pixels'), image ? '' : why);
     if (image && !this.painter.fits(image)) this.usePlain();
     if (image && !this.limits) this.findLimits();
     const size = this.frameSize();
@@ -76,7 +77,7 @@ export class FrameView {
     if (image) this.fittedSize = size;
     if (this.view.fitted) this.fit();
     for (const kind of KINDS) {
-      element(`count-${kind.name}`).textContent = this.sorted ? String(this.sorted[kind.name].length) : '';
+      setText(element(`count-${kind.name}`), this.sorted ? String(this.sorted[kind.name].length) : '');
     }
     if (counted) this.drawHistogram();
     this.redraw();
@@ -114,8 +115,11 @@ export class FrameView {
 
   /** Size of the picture in px of the page: whole pixels of the screen. */
   size() {
-    const ratio = devicePixelRatio || 1, whole = (side) => Math.max(1, Math.round(side * ratio)) / ratio;
-    return { width: whole(this.stage.clientWidth), height: whole(this.stage.clientHeight) };
+    if (!this.measured) { // until it changes: a look at an element lays out the page
+      const ratio = devicePixelRatio || 1, whole = (side) => Math.max(1, Math.round(side * ratio)) / ratio;
+      this.measured = { width: whole(this.stage.clientWidth), height: whole(this.stage.clientHeight) };
+    }
+    return this.measured;
   }
 
   /** Where the corner of the frame is on the canvas, and pixels of the screen per pixel of the frame. */
@@ -159,6 +163,7 @@ export class FrameView {
   }
 
   resize() {
+    this.measured = null;
     const ratio = devicePixelRatio || 1, { width, height } = this.size();
     for (const canvas of [this.canvas, this.overlay]) {
       canvas.width = Math.round(width * ratio);
@@ -230,7 +235,7 @@ export class FrameView {
       this.drawOverlay();
       this.describeCursor();
       const percent = 100 * this.view.scale;
-      element('zoom').textContent = `${percent < 10 ? percent.toFixed(1) : Math.round(percent)} %`;
+      setText(element('zoom'), `${percent < 10 ? percent.toFixed(1) : Math.round(percent)} %`);
       if (this.binning() > 1) this.loadPart();
     });
   }
@@ -335,6 +340,9 @@ export class FrameView {
     } else {
       parts.push(['', 'Point at a pixel for its value and direction.']);
     }
+    const said = JSON.stringify(parts);
+    if (said === this.said) return;
+    this.said = said;
     element('readout').replaceChildren(...parts.map(([key, value]) => {
       const span = document.createElement('span');
       if (key) {

@@ -3,6 +3,7 @@ import { getJson } from './api.js';
 import { changeFields, changesOf } from './changes.js';
 import { binningAt, covers, partFor, WHOLE_PX } from './frame_parts.js';
 import { shortNumber } from './plots.js';
+import { setText } from './text.js';
 
 /** Exposures whose track positions are drawn as trails, as those of recorded runs. */
 const TRAIL_EXPOSURES = 40;
@@ -210,20 +211,20 @@ export class Live {
     element('live-newest').setAttribute('aria-pressed', String(newest));
   }
 
-  say(text) { element('live-message').textContent = text; }
+  say(text) { setText(element('live-message'), text); }
 
   describe(before, problem) {
     const { state } = this;
     const steers = this.controller && !state.ended;
     element('live').classList.toggle('watched', !state.steered);
-    element('live-time').textContent = `${state.time_s.toFixed(2)} / ${state.duration_s} s · ${
-      state.ended ? 'complete' : state.paused ? 'paused' : !state.steered ? 'running' : `${state.speed.toFixed(1)} × real time`}`;
-    element('live-run').textContent = this.running() ? 'Pause' : 'Run';
+    setText(element('live-time'), `${state.time_s.toFixed(2)} / ${state.duration_s} s · ${
+      state.ended ? 'complete' : state.paused ? 'paused' : !state.steered ? 'running' : `${state.speed.toFixed(1)} × real time`}`);
+    setText(element('live-run'), this.running() ? 'Pause' : 'Run');
     for (const id of ['live-run', 'live-step', 'live-rate', 'live-save', 'live-rewind', 'live-change', 'live-end']) element(id).disabled = !steers;
     element('live-branch').disabled = !this.controller;
     const refusal = performance.now() < this.refusal.until ? this.refusal.text : '';
     this.say(refusal || problem || state.message || (this.controller || !state.steered ? '' : 'Another page controls this run.'));
-    element('change-problem').textContent = refusal || problem || state.message;
+    setText(element('change-problem'), refusal || problem || state.message);
     if (before && state.obeyed > before.obeyed && this.queue.length === 0 && element('changes').open) this.fillChanges();
     if (this.shown === 0 && this.app.count === 0) element('no-pixels').textContent = this.waiting();
     const states = JSON.stringify(state.states);
