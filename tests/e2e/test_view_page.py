@@ -74,8 +74,8 @@ class Large(unittest.TestCase):
                 sums = whole.reshape(2600 // n, n, 3000 // n, n).sum(axis=(1, 3))
                 self.assertTrue(numpy.array_equal(pixels[:2600 // n, :3000 // n], (2 * sums + n * n) // (2 * n * n)))
                 seen = numpy.zeros(image.shape, bool)
-                for y in range(200, 2800, 400):
-                    for x in range(200, 3200, 400):
+                for y in range(250, 2800, 500):
+                    for x in range(300, 3200, 600):
                         page.evaluate("(() => { const v = document.boresight.frameView; Object.assign(v.view, "
                                       f"{{ x: {x}.3, y: {y}.1, scale: 1.25, fitted: false }}); v.redraw(); }})()")
                         page.wait_for(part)

@@ -3,6 +3,8 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -69,6 +71,29 @@ static void test_parts(void **state) {
     }
 }
 
+/* The largest sum: bins of 256 x 256 of the largest number. An even width: pairs. */
+static void test_largest(void **state) {
+    (void)state;
+    enum { SIDE = BST_VIEW_BINNING_MOST };
+    uint16_t *all = malloc(SIDE * SIDE * sizeof *all), out[2 * 4];
+    assert_non_null(all);
+    memset(all, 0xff, SIDE * SIDE * sizeof *all);
+    bst_view_part part = {.binning = SIDE};
+    assert_true(bst_view_fit_part(&part, SIDE, SIDE));
+    assert_true(bst_view_bin_part(all, SIDE, &part, out));
+    assert_int_equal(out[0], 65535);
+    const uint16_t pairs[5 * 8] = {0, 1,  1, 1, 65535, 65535, 7, 8, 0, 1, 1, 1, 65535, 65534,
+                                   9, 10, 1, 1, 0,     0,     3, 4, 5, 6, 2, 2, 0,     1,
+                                   3, 4,  5, 6, 1,     2,     3, 4, 5, 6, 7, 8};
+    const uint16_t means[3 * 4] = {1, 1, 65535, 9, 2, 0, 4, 6, 2, 4, 6, 8};
+    uint16_t found[3 * 4];
+    part = (bst_view_part){.binning = 2};
+    assert_true(bst_view_fit_part(&part, 8, 5));
+    assert_true(bst_view_bin_part(pairs, 8, &part, found));
+    assert_memory_equal(found, means, sizeof means);
+    free(all);
+}
+
 /* Which parts there are, and the binning that makes them fit. */
 static void test_fit(void **state) {
     (void)state;
@@ -111,6 +136,7 @@ static void test_peaks(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_means), cmocka_unit_test(test_parts),
-                                       cmocka_unit_test(test_fit), cmocka_unit_test(test_peaks)};
+                                       cmocka_unit_test(test_largest), cmocka_unit_test(test_fit),
+                                       cmocka_unit_test(test_peaks)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

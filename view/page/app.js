@@ -15,8 +15,8 @@ const PLAY_MS = 90;
 /** State of a run in progress (bst_run_state_name), and time between two looks at its folder, ms. */
 const RUNNING = 'still running';
 const REFRESH_MS = 2000;
-/** Share of the time that the looks may take at most: the run's tables grow, and are read by the program that writes them. */
-const REFRESH_SHARE = 0.05;
+/** Share of the time that the looks may take at most: the run's tables grow. A live run's are read by the program that writes them. */
+const REFRESH_SHARE = 0.05, LIVE_SHARE = 0.02;
 
 /** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
@@ -99,7 +99,7 @@ class App {
   /** Asks for what was recorded since, while the run is in progress; stays at the end if it is there. */
   async follow() {
     for (let took = 0; this.inProgress();) {
-      const wait = Math.max(REFRESH_MS, took / REFRESH_SHARE);
+      const wait = Math.max(REFRESH_MS, took / (this.live ? LIVE_SHARE : REFRESH_SHARE));
       await new Promise((done) => { setTimeout(done, wait); });
       const begin = performance.now();
       try {
