@@ -21,22 +21,22 @@ WIDE = {"detections": 3, "truth": 3}
 MEMORY_MB = 300
 
 
-def repeat(database, table):
+def repeat(database, table, exposures):
     """Rows of a table again and again, each time LENGTH_S later."""
     columns = [row[1] for row in database.execute(f'PRAGMA table_info("{table}")')]
     if not {"exposure_id", "tick", "time_s", "mid_s"} & set(columns) or table in ("passes", "sightings"):
         return
     rate = database.execute("SELECT tick_rate_hz FROM run").fetchone()[0]
-    exposures = database.execute("SELECT count(*) FROM exposures").fetchone()[0]
     steps = {"exposure_id": exposures, **{name: LENGTH_S * rate for name in ("tick", "start_tick", "end_tick", "written_tick")},
              **{name: LENGTH_S for name in ("time_s", "mid_s", "start_s")}}
-    values = ", ".join(f't."{name}" + n.k * {steps[name]}' if name in steps else f't."{name}"' for name in columns)
-    key = "t.exposure_id" if "exposure_id" in columns else "t.rowid"
-    database.execute(f'CREATE TEMP TABLE t AS SELECT * FROM "{table}"')
+    values = ", ".join(f't."{name}" + :k * {steps[name]}' if name in steps else f't."{name}"' for name in columns)
+    key = "exposure_id" if "exposure_id" in columns else "rowid"
+    copies = " UNION ALL ".join(f"SELECT {copy} AS copy" for copy in range(WIDE.get(table, 1)))
+    once = "WHERE copy = 0 OR kind <> 'object'" if table == "truth" else ""  # an object has one row an exposure
+    database.execute(f'CREATE TEMP TABLE t AS SELECT "{table}".* FROM "{table}", ({copies}) {once} ORDER BY "{table}".{key}')
     database.execute(f'DELETE FROM "{table}"')
-    database.execute(f"""INSERT INTO "{table}" WITH RECURSIVE n(k) AS (SELECT 0 UNION ALL SELECT k + 1 FROM n WHERE k < {COPIES - 1}),
-        m(j) AS (SELECT 1 UNION ALL SELECT j + 1 FROM m WHERE j < {WIDE.get(table, 1)})
-        SELECT {values} FROM n CROSS JOIN t CROSS JOIN m ORDER BY n.k, {key}""")
+    for k in range(COPIES):
+        database.execute(f'INSERT INTO "{table}" SELECT {values} FROM t', {"k": k})
     database.execute("DROP TABLE t")
 
 
@@ -58,9 +58,11 @@ class Day(unittest.TestCase):
         cls.made = os.path.join(runs.scratch(), "day")
         runs.run(runs.TRACK, cls.made, runs.GENERATOR, duration=LENGTH_S)
         with sqlite3.connect(cls.made + "/run.sqlite") as database:
-            database.execute("PRAGMA synchronous = OFF")
+            for words in ("synchronous = OFF", "journal_mode = OFF", "temp_store = MEMORY"):
+                database.execute(f"PRAGMA {words}")
+            exposures = database.execute("SELECT count(*) FROM exposures").fetchone()[0]
             for table, in database.execute("SELECT name FROM sqlite_master WHERE type = 'table'").fetchall():
-                repeat(database, table)
+                repeat(database, table, exposures)
         database.close()
 
     def timed(self, what, act):
