@@ -35,7 +35,8 @@ typedef struct feed_sensor {
     bst_camera camera;
     double watched_until, copied_at; /* wall seconds */
     waiting_exposure waiting[WAITING];
-    bst_view_live_frame ready;
+    int64_t sequence;           /* of `ready`; 0: none yet */
+    bst_view_live_frame *ready; /* NULL: none */
 } feed_sensor;
 
 struct bst_view_feed {
@@ -99,8 +100,7 @@ void bst_view_feed_free(bst_view_feed *feed) {
             for (int k = 0; k < WAITING; k++) {
                 empty(&feed->sensor[i].waiting[k]);
             }
-            free(feed->sensor[i].ready.json);
-            free(feed->sensor[i].ready.pixels);
+            bst_view_feed_release(feed->sensor[i].ready);
         }
         pthread_cond_destroy(&feed->changed);
         pthread_mutex_destroy(&feed->lock);
@@ -116,17 +116,21 @@ static void publish(bst_view_feed *feed, feed_sensor *s, waiting_exposure *w) {
             cJSON_AddArrayToObject(w->node, lists[i]);
         }
     }
-    char *json = w->node ? cJSON_PrintUnformatted(w->node) : NULL;
+    bst_view_live_frame *frame = w->node ? calloc(1, sizeof *frame) : NULL;
+    char *json = frame ? cJSON_PrintUnformatted(w->node) : NULL;
     if (json) {
-        free(s->ready.json);
-        free(s->ready.pixels);
-        s->ready.json = json;
-        s->ready.pixels = w->pixels;
-        s->ready.width = w->width;
-        s->ready.height = w->height;
-        s->ready.sequence++;
+        *frame = (bst_view_live_frame){.sequence = ++s->sequence,
+                                       .json = json,
+                                       .pixels = w->pixels,
+                                       .width = w->pixels ? w->width : 0,
+                                       .height = w->pixels ? w->height : 0,
+                                       .holders = 1};
+        bst_view_feed_release(s->ready);
+        s->ready = frame;
         w->pixels = NULL;
         pthread_cond_broadcast(&feed->changed);
+    } else {
+        free(frame);
     }
     empty(w);
 }
@@ -286,29 +290,21 @@ bst_status bst_view_feed_message(void *user, bst_ctx *ctx, int sensor, const cha
     return status;
 }
 
-/* Copies a frame; sequence 0: out of memory. */
-static void copy_frame(const bst_view_live_frame *from, bst_view_live_frame *out) {
-    const size_t bytes = (size_t)from->width * (size_t)from->height * sizeof *from->pixels;
-    *out = *from;
-    out->json = strdup(from->json);
-    out->pixels = from->pixels ? malloc(bytes + 1) : NULL;
-    if (out->pixels) {
-        memcpy(out->pixels, from->pixels, bytes);
-    } else {
-        out->width = out->height = 0;
-    }
-    if (!out->json) {
-        free(out->pixels);
-        *out = (bst_view_live_frame){.sequence = 0};
+void bst_view_feed_release(const bst_view_live_frame *frame) {
+    bst_view_live_frame *held = (bst_view_live_frame *)frame;
+    if (held && __atomic_sub_fetch(&held->holders, 1, __ATOMIC_ACQ_REL) == 0) {
+        free(held->json);
+        free(held->pixels);
+        free(held);
     }
 }
 
-void bst_view_feed_get(bst_view_feed *feed, int64_t sensor, int64_t after, double wait_s,
-                       bst_view_live_frame *out) {
+const bst_view_live_frame *bst_view_feed_get(bst_view_feed *feed, int64_t sensor, int64_t after,
+                                             double wait_s) {
     struct timespec until;
-    *out = (bst_view_live_frame){.sequence = 0};
+    bst_view_live_frame *found = NULL;
     if (sensor < 0 || sensor >= feed->sensors) {
-        return;
+        return NULL;
     }
     clock_gettime(CLOCK_MONOTONIC, &until);
     int64_t nanoseconds = until.tv_nsec + (int64_t)(1e9 * wait_s);
@@ -319,13 +315,15 @@ void bst_view_feed_get(bst_view_feed *feed, int64_t sensor, int64_t after, doubl
     __atomic_store_n(&feed->watched, true, __ATOMIC_RELAXED);
     const int64_t wakes = feed->wakes;
     s->watched_until = bst_wall_seconds() + WATCHED_S;
-    while (s->ready.sequence <= after && feed->wakes == wakes &&
+    while (s->sequence <= after && feed->wakes == wakes &&
            pthread_cond_timedwait(&feed->changed, &feed->lock, &until) == 0) {
     }
-    if (s->ready.json && s->ready.sequence > after) {
-        copy_frame(&s->ready, out);
+    if (s->ready && s->sequence > after) {
+        found = s->ready;
+        __atomic_add_fetch(&found->holders, 1, __ATOMIC_RELAXED);
     }
     pthread_mutex_unlock(&feed->lock);
+    return found;
 }
 
 void bst_view_feed_wake(bst_view_feed *feed) {

@@ -7,12 +7,13 @@
 
 typedef struct bst_view_feed bst_view_feed;
 
-/* A frame with its marks. */
+/* A frame with its marks, which all who watch share: nobody changes it. */
 typedef struct bst_view_live_frame {
-    int64_t sequence;  /* 1, 2, ... per sensor; 0: none yet */
-    char *json;        /* in the form of bst_view_run_frame, without names; malloc */
-    uint16_t *pixels;  /* [height][width], DN; malloc; NULL: none */
+    int64_t sequence;  /* 1, 2, ... per sensor */
+    char *json;        /* in the form of bst_view_run_frame, without names */
+    uint16_t *pixels;  /* [height][width], DN; NULL: none */
     int width, height; /* 0: none */
+    int holders;       /* the feed's own */
 } bst_view_live_frame;
 
 /* Creates the feed of a scenario's sensors.
@@ -34,9 +35,12 @@ bst_status bst_view_feed_message(void *feed, bst_ctx *ctx, int sensor, const cha
  * Given:     sensor  in the order of the scenario; any number
  *            after   sequence of the frame that the caller has
  *            wait_s  longest time to wait for a newer one
- * Returned:  *out    the caller frees json and pixels; sequence 0: none newer, or no such sensor */
-void bst_view_feed_get(bst_view_feed *feed, int64_t sensor, int64_t after, double wait_s,
-                       bst_view_live_frame *out);
+ * Returned:  NULL: none newer, or no such sensor
+ * Ownership: give it back with bst_view_feed_release, before the feed is freed */
+const bst_view_live_frame *bst_view_feed_get(bst_view_feed *feed, int64_t sensor, int64_t after,
+                                             double wait_s);
+/* Gives a frame back; NULL is allowed. */
+void bst_view_feed_release(const bst_view_live_frame *frame);
 /* Says whether every frame is kept, as in single steps; else those that a screen can show. */
 void bst_view_feed_set_every(bst_view_feed *feed, bool every);
 /* Forgets exposures that are not complete: the run goes on from another time, with the cameras of

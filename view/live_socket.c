@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "sim/core/json_member.h"
+#include "view/large_stack.h"
 #include "view/pixel_bins.h"
 
 /* Longest message of a client, bytes. */
@@ -63,34 +64,67 @@ static bool controls(bst_view_socket *socket, const struct mg_connection *peer, 
     return controller;
 }
 
-/* Reduces the pixels to bins, if a client asks for them: its screen has fewer pixels. */
-static void bin_frame(bst_view_live_frame *frame, const cJSON *asked, cJSON *node) {
-    const int64_t wanted = bst_json_whole(bst_json_member(asked, "binning"), 1);
-    bst_view_bytes pixels = {.data = frame->pixels, .width = frame->width, .height = frame->height};
-    bst_view_bin_pixels(&pixels, wanted > 1 && wanted <= BINNING_MOST ? (int)wanted : 1);
-    if (pixels.binning > 1) {
-        cJSON_AddNumberToObject(node, "binning", pixels.binning);
-        cJSON_AddNumberToObject(node, "frame_width", pixels.frame_width);
-        cJSON_AddNumberToObject(node, "frame_height", pixels.frame_height);
-        frame->width = pixels.width;
-        frame->height = pixels.height;
+/* What is sent of a frame. */
+typedef struct sent_part {
+    bst_view_part part;
+    int width, height; /* pixels or bins; 0: none */
+} sent_part;
+
+/* Part and bins of a frame that a client asks for; the whole frame if it asks for something else.
+ */
+static sent_part choose_part(const bst_view_live_frame *frame, const cJSON *asked) {
+    static const char *const names[] = {"x", "y", "width", "height"};
+    const int64_t binning = bst_json_whole(bst_json_member(asked, "binning"), 1);
+    const cJSON *wanted = bst_json_member(asked, "part");
+    int64_t numbers[4] = {0};
+    sent_part sent = {.width = 0};
+    for (int i = 0; i < 4; i++) {
+        numbers[i] = bst_json_whole(bst_json_member(wanted, names[i]), 0);
+    }
+    if (!frame || !frame->pixels) {
+        return sent;
+    }
+    sent.part = (bst_view_part){
+        .x = numbers[0], .y = numbers[1], .width = numbers[2], .height = numbers[3]};
+    sent.part.binning = binning > 1 && binning <= BINNING_MOST ? binning : 1;
+    if (!bst_view_fit_part(&sent.part, frame->width, frame->height)) {
+        sent.part = (bst_view_part){.width = frame->width, .height = frame->height, .binning = 1};
+    }
+    sent.width = bst_view_bins(sent.part.width, sent.part.binning);
+    sent.height = bst_view_bins(sent.part.height, sent.part.binning);
+    return sent;
+}
+
+static void describe_part(const bst_view_live_frame *frame, const sent_part *sent, cJSON *node) {
+    cJSON_AddNumberToObject(node, "width", sent->width);
+    cJSON_AddNumberToObject(node, "height", sent->height);
+    if (sent->width > 0) {
+        cJSON_AddNumberToObject(node, "binning", (double)sent->part.binning);
+        cJSON_AddNumberToObject(node, "x", (double)sent->part.x);
+        cJSON_AddNumberToObject(node, "y", (double)sent->part.y);
+        cJSON_AddNumberToObject(node, "frame_width", frame->width);
+        cJSON_AddNumberToObject(node, "frame_height", frame->height);
     }
 }
 
-/* Builds the answer; NULL: out of memory. */
-static char *make_answer(cJSON *node, const bst_view_live_frame *frame, size_t *bytes) {
+/* Builds the answer; the pixels are binned into it. NULL: out of memory. */
+static char *make_answer(cJSON *node, const bst_view_live_frame *frame, const sent_part *sent,
+                         size_t *bytes) {
     char *text = cJSON_PrintUnformatted(node);
-    const size_t pixels = (size_t)frame->width * (size_t)frame->height * sizeof *frame->pixels;
+    const size_t pixels = (size_t)sent->width * (size_t)sent->height * sizeof *frame->pixels;
     /* pixels begin at an even address of the message */
     const uint32_t length = text ? (uint32_t)(strlen(text) + strlen(text) % 2) : 0;
     *bytes = sizeof length + length + pixels;
     char *message = text ? malloc(*bytes) : NULL;
     if (message) {
         memcpy(message, &length, sizeof length);
-        memset(message + sizeof length, ' ', length);
+        message[sizeof length + length - 1] = ' ';
         memcpy(message + sizeof length, text, strlen(text));
-        if (pixels > 0) {
-            memcpy(message + sizeof length + length, frame->pixels, pixels);
+        uint16_t *out = (uint16_t *)(void *)(message + sizeof length + length);
+        if (pixels > 0 &&
+            !bst_view_bin_part(frame->pixels, (size_t)frame->width, &sent->part, out)) {
+            free(message);
+            message = NULL;
         }
     }
     cJSON_free(text);
@@ -102,34 +136,35 @@ static bool answer(bst_view_socket *socket, struct mg_connection *peer, const cJ
                    bool controller, const char *problem) {
     const cJSON *sensor = bst_json_member(asked, "sensor"),
                 *after = bst_json_member(asked, "after");
-    bst_view_live_frame frame = {.sequence = 0};
+    const bst_view_live_frame *frame = NULL;
     if (cJSON_IsNumber(sensor) && cJSON_IsNumber(after)) {
-        bst_view_feed_get(bst_view_live_feed(socket->live), sensor->valueint,
-                          bst_json_whole(after, 0), WAIT_S, &frame);
+        frame = bst_view_feed_get(bst_view_live_feed(socket->live), sensor->valueint,
+                                  bst_json_whole(after, 0), WAIT_S);
     }
+    const sent_part sent = choose_part(frame, asked);
     cJSON *node = cJSON_CreateObject();
     cJSON_AddItemToObject(node, "state", bst_view_live_state(socket->live));
     cJSON_AddBoolToObject(node, "controller", controller);
-    cJSON_AddNumberToObject(node, "sequence", (double)frame.sequence);
-    bin_frame(&frame, asked, node);
-    cJSON_AddNumberToObject(node, "width", frame.width);
-    cJSON_AddNumberToObject(node, "height", frame.height);
-    cJSON_AddItemToObject(node, "frame", frame.json ? cJSON_CreateRaw(frame.json) : NULL);
+    cJSON_AddNumberToObject(node, "sequence", frame ? (double)frame->sequence : 0.0);
+    describe_part(frame, &sent, node);
+    if (frame) {
+        cJSON_AddItemToObject(node, "frame", cJSON_CreateRaw(frame->json));
+    }
     if (problem) {
         cJSON_AddStringToObject(node, "problem", problem);
     }
     size_t bytes;
-    char *message = make_answer(node, &frame, &bytes);
-    bool sent = message && mg_websocket_write(peer, MG_WEBSOCKET_OPCODE_BINARY, message, bytes) > 0;
+    char *message = make_answer(node, frame, &sent, &bytes);
+    bst_view_feed_release(frame);
+    bool taken =
+        message && mg_websocket_write(peer, MG_WEBSOCKET_OPCODE_BINARY, message, bytes) > 0;
     free(message);
     cJSON_Delete(node);
-    free(frame.json);
-    free(frame.pixels);
-    return sent;
+    return taken;
 }
 
-/* A text of a client: {"sensor": N, "after": SEQUENCE, "take": true, "binning": N, "command":
- * {...}}; all may be left out. Anything else ends its connection. */
+/* A text of a client: {"sensor": N, "after": SEQUENCE, "take": true, "binning": N, "part": {x,
+ * y, width, height}, "command": {...}}; all may be left out. Anything else ends its connection. */
 static int on_text(bst_view_socket *socket, struct mg_connection *peer, const char *data,
                    size_t bytes) {
     cJSON *asked = cJSON_ParseWithLength(data, bytes);
@@ -150,6 +185,20 @@ static int on_text(bst_view_socket *socket, struct mg_connection *peer, const ch
     return kept;
 }
 
+/* A message that a thread with a larger stack takes. */
+typedef struct message {
+    bst_view_socket *socket;
+    struct mg_connection *peer;
+    const char *data;
+    size_t bytes;
+    int kept;
+} message;
+
+static void take_message(void *user) {
+    message *m = user;
+    m->kept = on_text(m->socket, m->peer, m->data, m->bytes);
+}
+
 static int on_data(struct mg_connection *peer, int bits, char *data, size_t bytes, void *user) {
     const int opcode = bits & 0xf;
     const bool whole = bits & 0x80;
@@ -159,7 +208,8 @@ static int on_data(struct mg_connection *peer, int bits, char *data, size_t byte
     if (opcode != MG_WEBSOCKET_OPCODE_TEXT || !whole || bytes > MESSAGE_BYTES) {
         return 0;
     }
-    return on_text(user, peer, data, bytes);
+    message m = {user, peer, data, bytes, 0};
+    return bst_view_call_with_stack(take_message, &m) ? m.kept : 0;
 }
 
 bst_status bst_view_socket_open(bst_ctx *ctx, struct mg_context *http, const char *uri,

@@ -1,8 +1,9 @@
 /* WebSocket of a live run. A client asks, and gets one binary message for each text that it sends:
  * the length of a JSON text (32 bits), the text {state, frame, controller, sequence}, and the
- * pixels of the frame, if it is newer than the client's; with "binning": N (2 to 64) the means of
- * N x N of them (view/pixel_bins.h), with binning, frame_width and frame_height in the text. So at
- * most one message is in flight per client, and a slow one waits for itself alone. */
+ * pixels of the frame, if it is newer than the client's; with "part": {x, y, width, height} those
+ * of a part of it, with "binning": N (2 to 64) the means of N x N of them (view/pixel_bins.h). The
+ * text says what was sent: x, y, binning, width, height, and frame_width and frame_height of the
+ * whole. So at most one message is in flight per client, and a slow one waits for itself alone. */
 #ifndef BST_VIEW_LIVE_SOCKET_H
 #define BST_VIEW_LIVE_SOCKET_H
 

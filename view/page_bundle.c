@@ -69,12 +69,10 @@ void bst_view_bundle_add(FILE *out, const char *key, const bst_view_bytes *packe
     fputs("<script type=\"text/plain\" data-key=\"", out);
     bst_html_text(out, key);
     if (packed->width > 0) {
-        const bool binned = packed->binning > 1;
         fprintf(out,
                 "\" data-width=\"%d\" data-height=\"%d\" data-binning=\"%d\" data-frame=\"%d,%d",
-                packed->width, packed->height, binned ? packed->binning : 1,
-                binned ? packed->frame_width : packed->width,
-                binned ? packed->frame_height : packed->height);
+                packed->width, packed->height, packed->binning, packed->frame_width,
+                packed->frame_height);
     }
     fputs("\">", out);
     bst_html_base64(out, packed->data, packed->bytes);

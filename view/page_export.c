@@ -13,7 +13,6 @@
 #include "sim/run/run_sensors.h"
 #include "view/page_bundle.h"
 #include "view/page_paths.h"
-#include "view/pixel_bins.h"
 #include "view/routes.h"
 #include "view/space.h"
 #include "view/why.h"
@@ -84,15 +83,14 @@ static bst_status pack_json(bst_ctx *ctx, const cJSON *json, bst_view_bytes *pac
     return status;
 }
 
-/* Asks a route and compresses its answer; pixels are binned first. */
+/* Asks a route and compresses its answer. */
 static bst_status record(bst_ctx *ctx, const page_export *e, const char *path, bst_view_exchange *x,
-                         int binning, bst_view_bytes *packed) {
+                         bst_view_bytes *packed) {
     *packed = (bst_view_bytes){.data = NULL};
     bst_status status = ask(ctx, e, path, x);
     if (status == BST_OK && x->json) {
         status = pack_json(ctx, x->json, packed);
     } else if (status == BST_OK) {
-        bst_view_bin_pixels(&x->bytes, binning);
         status = bst_view_bundle_pack(ctx, &x->bytes, packed);
     }
     cJSON_Delete(x->json);
@@ -104,7 +102,7 @@ static bst_status record(bst_ctx *ctx, const page_export *e, const char *path, b
 static bst_status add(bst_ctx *ctx, const page_export *e, const char *path, const char *key,
                       bst_view_exchange x) {
     bst_view_bytes packed;
-    BST_TRY(record(ctx, e, path, &x, 1, &packed));
+    BST_TRY(record(ctx, e, path, &x, &packed));
     bst_view_bundle_add(e->out, key, &packed);
     free(packed.data);
     return BST_OK;
@@ -146,12 +144,13 @@ static bst_status take_frame(bst_ctx *ctx, const page_export *e, int number, int
     const kept_sensor *s = &e->sensor[number];
     bst_view_exchange x = {.sensor = number, .frame = row}, of_pixels = x;
     *frame = (kept_frame){.row = row};
-    bst_status status = record(ctx, e, "api/frame", &x, 1, &frame->part[FRAME]);
+    bst_status status = record(ctx, e, "api/frame", &x, &frame->part[FRAME]);
     if (status == BST_OK) {
         status = record_reason(ctx, e, number, row, &frame->part[WHY]);
     }
     if (status == BST_OK && s->list[row * BST_VIEW_FRAME_NUMBERS + 3] >= 0) {
-        status = record(ctx, e, "api/pixels", &of_pixels, s->binning, &frame->part[PIXELS]);
+        of_pixels.part.binning = s->binning;
+        status = record(ctx, e, "api/pixels", &of_pixels, &frame->part[PIXELS]);
     }
     if (status != BST_OK) {
         free_frame(frame);
@@ -201,7 +200,7 @@ static bst_status open_sensor(bst_ctx *ctx, page_export *e, int number, const cJ
                                 bst_json_member(described, "height_px")->valuedouble);
     const double most =
         e->request->longest_side > 0 ? (double)e->request->longest_side : BST_VIEW_PAGE_SIDE_PX;
-    s->binning = (int)fmax(1.0, ceil(longest / most));
+    s->binning = (int)fmin(BST_VIEW_BINNING_MOST, fmax(1.0, ceil(longest / most)));
     BST_TRY(ask(ctx, e, "api/frames", &x));
     s->list = x.bytes.data;
     s->listed = x.bytes.bytes / (BST_VIEW_FRAME_NUMBERS * sizeof(double));

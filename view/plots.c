@@ -78,6 +78,15 @@ static const struct {
      false},
 };
 
+/* Lines of the target's truth, and both at once: time and SNR, time and components of the error (no
+ * time: no such exposure). The number is compared first: a word takes longer. */
+enum { TRUE_ERROR = 0, TRUE_SNR = 2 };
+static const char truth_sql[] =
+    "SELECT t.mid_s, t.snr, e.mid_s, t.x_mid_px - e.boresight_x_px, t.y_mid_px - e.boresight_y_px"
+    " FROM truth t LEFT JOIN (SELECT exposure_id, mid_s, boresight_x_px, boresight_y_px"
+    " FROM exposures WHERE sensor = ?1 GROUP BY exposure_id) e ON e.exposure_id = t.exposure_id"
+    " WHERE t.id = ?2 AND t.sensor = ?1 AND t.kind = 'object' AND t.in_field = 1";
+
 /* True if the table of a line has rows of the sensor. */
 static bool is_recorded(const bst_view_run *run, const bst_view_sensor *s, int line) {
     char sql[120];
@@ -129,40 +138,82 @@ static void make_room(bst_view_run *run, const bst_view_line *keep) {
     }
 }
 
-/* Reads the rows of a query as samples. */
-static bst_status read_samples(bst_ctx *ctx, bst_io_rows *rows, bst_view_line *line) {
-    bool more, vector = bst_io_rows_columns(rows) == 3;
-    bst_status status;
-    void *memory = NULL;
-    size_t room = 0, count = 0;
-    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
-        double time_s = bst_io_rows_real(rows, 0), value = bst_io_rows_real(rows, 1);
-        if (!isfinite(time_s)) {
-            continue;
-        }
-        if (vector) {
-            value = hypot(value, bst_io_rows_real(rows, 2));
-        }
-        if (count == LINE_SAMPLES_MOST) {
-            count = bst_io_thin_samples(memory, count);
-        }
-        if (room < (count + 1) * sizeof *line->samples) {
-            status = bst_memory_grow(ctx, "out of memory for a time series", &memory, &room,
-                                     2 * room + 65536);
-            if (status != BST_OK) {
-                break;
-            }
-        }
-        ((bst_io_sample *)memory)[count++] = (bst_io_sample){time_s, isfinite(value) ? value : NAN};
+/* Samples that are being read. */
+typedef struct collected {
+    void *samples;
+    size_t room, count;
+} collected;
+
+static bst_status collect(bst_ctx *ctx, collected *c, double time_s, double value) {
+    const size_t bytes = sizeof(bst_io_sample);
+    if (!isfinite(time_s)) {
+        return BST_OK;
     }
+    if (c->count == LINE_SAMPLES_MOST) {
+        c->count = bst_io_thin_samples(c->samples, c->count);
+    }
+    if (c->room < (c->count + 1) * bytes) {
+        BST_TRY(bst_memory_grow(ctx, "out of memory for a time series", &c->samples, &c->room,
+                                2 * c->room + 65536));
+    }
+    ((bst_io_sample *)c->samples)[c->count++] =
+        (bst_io_sample){time_s, isfinite(value) ? value : NAN};
+    return BST_OK;
+}
+
+/* Makes the samples a line, after an error none. */
+static bst_status keep_line(bst_ctx *ctx, bst_status status, bst_view_run *run, collected *c,
+                            bst_view_line *line) {
     if (status != BST_OK) {
-        free(memory);
+        free(c->samples);
         return status;
     }
-    bst_io_sort_samples(memory, count);
-    line->samples = memory ? memory : calloc(1, sizeof *line->samples);
-    line->count = count;
+    bst_view_sort(c->samples, c->count);
+    line->samples = c->samples ? c->samples : calloc(1, sizeof *line->samples);
+    line->count = c->count;
+    run->samples += line->count;
+    make_room(run, line);
     return line->samples ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
+}
+
+/* Reads the rows of a query as the samples of a line. */
+static bst_status read_line(bst_ctx *ctx, bst_view_run *run, bst_io_rows *rows,
+                            bst_view_line *line) {
+    const bool vector = bst_io_rows_columns(rows) == 3;
+    collected c = {.samples = NULL};
+    bst_status status;
+    bool more;
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
+        const double value = bst_io_rows_real(rows, 1);
+        status = collect(ctx, &c, bst_io_rows_real(rows, 0),
+                         vector ? hypot(value, bst_io_rows_real(rows, 2)) : value);
+        if (status != BST_OK) {
+            break;
+        }
+    }
+    return keep_line(ctx, status, run, &c, line);
+}
+
+/* Reads the two lines of the target's truth, a table that may have gigabytes, at once. */
+static bst_status read_truth(bst_ctx *ctx, bst_view_run *run, bst_io_rows *rows,
+                             bst_view_line *error, bst_view_line *snr) {
+    collected errors = {.samples = NULL}, snrs = errors;
+    bst_status status;
+    bool more;
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
+        status = collect(ctx, &snrs, bst_io_rows_real(rows, 0), bst_io_rows_real(rows, 1));
+        if (status == BST_OK && !bst_io_rows_is_null(rows, 2)) {
+            status = collect(ctx, &errors, bst_io_rows_real(rows, 2),
+                             hypot(bst_io_rows_real(rows, 3), bst_io_rows_real(rows, 4)));
+        }
+        if (status != BST_OK) {
+            break;
+        }
+    }
+    error->used = snr->used = run->requests;
+    const bst_status kept = keep_line(ctx, status, run, &errors, error);
+    status = keep_line(ctx, status, run, &snrs, snr);
+    return kept == BST_OK ? status : kept;
 }
 
 /* Reads a line if it is not held. A table that was not recorded gives a line without samples. */
@@ -174,16 +225,22 @@ static bst_status need_line(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s,
     }
     bst_ctx ignored = {0};
     bst_io_rows *rows = NULL;
-    bool known = !lines[k].of_target || s->target >= 0;
+    const bool known = !lines[k].of_target || s->target >= 0;
+    bst_view_line *error = &s->lines[TRUE_ERROR], *snr = &s->lines[TRUE_SNR];
+    const bool both = known && lines[k].of_target && !error->samples && !snr->samples;
+    if (both && bst_io_rows_open(&ignored, run->reader, truth_sql, s->sensor.index, s->target,
+                                 &rows) == BST_OK) {
+        bst_status status = read_truth(ctx, run, rows, error, snr);
+        bst_io_rows_close(rows);
+        return status;
+    }
     if (!known || bst_io_rows_open(&ignored, run->reader, lines[k].sql, s->sensor.index, s->target,
                                    &rows) != BST_OK) {
         line->samples = calloc(1, sizeof *line->samples);
         return line->samples ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
-    bst_status status = read_samples(ctx, rows, line);
+    bst_status status = read_line(ctx, run, rows, line);
     bst_io_rows_close(rows);
-    run->samples += line->count;
-    make_room(run, line);
     return status;
 }
 

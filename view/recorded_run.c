@@ -406,37 +406,11 @@ bst_status bst_view_run_frames(bst_ctx *ctx, bst_view_run *run, int64_t sensor,
     return status;
 }
 
-bst_status bst_view_read_frame(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t frame,
-                               bst_fits_read_frame *out) {
+bst_status bst_view_read_rows(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t frame,
+                              int first, int rows, bst_fits_read_frame *out) {
     if (frame < 0 || (uint64_t)frame >= s->count || s->exposures[frame].fits_index < 0) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "frame %lld is not kept", (long long)frame);
     }
     BST_TRY(open_pixels(ctx, run, s));
-    return bst_fits_reader_frame(ctx, s->pixels, s->exposures[frame].fits_index, out);
-}
-
-static bst_status copy_pixels(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t frame,
-                              bst_view_bytes *out) {
-    bst_fits_read_frame image;
-    BST_TRY(bst_view_read_frame(ctx, run, s, frame, &image));
-    out->bytes = (size_t)image.width * (size_t)image.height * sizeof *image.pixels;
-    out->data = malloc(out->bytes + 1);
-    if (!out->data) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a frame");
-    }
-    memcpy(out->data, image.pixels, out->bytes);
-    out->width = image.width;
-    out->height = image.height;
-    return BST_OK;
-}
-
-bst_status bst_view_run_pixels(bst_ctx *ctx, bst_view_run *run, int64_t sensor, int64_t frame,
-                               bst_view_bytes *out) {
-    bst_view_sensor *s;
-    *out = (bst_view_bytes){.data = NULL};
-    bst_status status = bst_view_lock(ctx, run);
-    status = status == BST_OK ? bst_view_find_sensor(ctx, run, sensor, &s) : status;
-    status = status == BST_OK ? copy_pixels(ctx, run, s, frame, out) : status;
-    bst_view_unlock(run);
-    return status;
+    return bst_fits_reader_rows(ctx, s->pixels, s->exposures[frame].fits_index, first, rows, out);
 }

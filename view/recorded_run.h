@@ -7,6 +7,7 @@
 
 #include "boresight/status.h"
 #include "sim/io/run_reader.h"
+#include "view/pixel_bins.h"
 
 typedef struct bst_view_run bst_view_run;
 
@@ -15,8 +16,9 @@ typedef struct bst_view_bytes {
     void *data; /* malloc; NULL: none */
     size_t bytes;
     int width, height; /* of pixels; 0: something else */
-    int binning;       /* pixels of the frame along a side of one of these; 0: not binned */
-    int frame_width, frame_height; /* of the frame, if binned */
+    int binning;       /* pixels of the frame along a side of one of these; 0: none are sent */
+    int frame_width, frame_height; /* of the whole frame, px */
+    int x, y;                      /* of the first pixel in the frame */
 } bst_view_bytes;
 
 /* Numbers of a frame in the list of frames, all 64-bit floating point. */
@@ -85,14 +87,21 @@ bst_status bst_view_run_frames(bst_ctx *ctx, bst_view_run *run, int64_t sensor,
 bst_status bst_view_run_frame(bst_ctx *ctx, bst_view_run *run, int64_t sensor, int64_t frame,
                               cJSON **out) BST_MUST_CHECK;
 
-/* Pixels of a frame.
+/* Most pixels of an answer. */
+enum { BST_VIEW_PIXELS_MOST = 1 << 24 };
+
+/* Pixels of a part of a frame, or the means of their bins. The frame is read in bands of rows, so
+ * that the memory is that of the answer and a band, however large the frame is; of a compressed
+ * frame only the rows of the part are unpacked.
  *
- * Returned:  out  [height][width] digital numbers, 16 bits in the byte order of the machine; the
- *                 first row of the file is row 0
- * Errors:    BST_ERR_NOT_FOUND: no such frame, or its pixels were not kept; those of
- *            bst_fits_reader_frame */
+ * Given:     part  which part and bins (view/pixel_bins.h); {0}: the whole frame
+ * Returned:  out   [height][width] digital numbers, 16 bits in the byte order of the machine; the
+ *                  first row of the file is row 0
+ * Errors:    BST_ERR_NOT_FOUND: no such frame, or its pixels were not kept; BST_ERR_ARGUMENT: the
+ *            part is not within the frame, or has more than BST_VIEW_PIXELS_MOST pixels or bins;
+ *            those of bst_fits_reader_rows */
 bst_status bst_view_run_pixels(bst_ctx *ctx, bst_view_run *run, int64_t sensor, int64_t frame,
-                               bst_view_bytes *out) BST_MUST_CHECK;
+                               const bst_view_part *part, bst_view_bytes *out) BST_MUST_CHECK;
 
 /* A plot that is asked for. */
 typedef struct bst_view_plot {

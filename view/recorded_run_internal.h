@@ -1,5 +1,5 @@
-/* Internal state of a recorded run, shared by recorded_run.c, describe.c, frame_details.c and
- * plots.c. */
+/* Internal state of a recorded run, shared by recorded_run.c, describe.c, frame_details.c,
+ * frame_part.c and plots.c. */
 #ifndef BST_VIEW_RECORDED_RUN_INTERNAL_H
 #define BST_VIEW_RECORDED_RUN_INTERNAL_H
 
@@ -75,13 +75,17 @@ void bst_view_unlock(bst_view_run *run);
 bst_status bst_view_find_sensor(bst_ctx *ctx, bst_view_run *run, int64_t number,
                                 bst_view_sensor **out) BST_MUST_CHECK;
 
-/* Reads the pixels of a frame. Call it with the lock held.
+/* Reads rows of a frame (bst_fits_reader_rows). Call it with the lock held.
  *
- * Returned:  *out  belongs to the reader of the sensor, until its next frame
+ * Returned:  *out  belongs to the reader of the sensor, until its next rows
  * Errors:    BST_ERR_NOT_FOUND: no such frame, or its pixels were not kept; those of
- *            bst_fits_reader_frame */
-bst_status bst_view_read_frame(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t frame,
-                               bst_fits_read_frame *out) BST_MUST_CHECK;
+ *            bst_fits_reader_rows */
+bst_status bst_view_read_rows(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t frame,
+                              int first, int rows, bst_fits_read_frame *out) BST_MUST_CHECK;
+
+/* Rows of bins of n x n pixels that are read at a time: a million pixels, at least one row of bins.
+ */
+int bst_view_band_rows(int width, int n);
 
 /* Rows of a table from the first of an exposure on.
  *

@@ -82,7 +82,7 @@ static bst_status get_frame(bst_ctx *ctx, bst_view_exchange *x) {
 static bst_status get_pixels(bst_ctx *ctx, bst_view_exchange *x) {
     bst_view_run *run;
     BST_TRY(bst_view_subject_run(ctx, x->subject, x->run, &run));
-    return bst_view_run_pixels(ctx, run, x->sensor, x->frame, &x->bytes);
+    return bst_view_run_pixels(ctx, run, x->sensor, x->frame, &x->part, &x->bytes);
 }
 
 static bst_status get_thumbnail(bst_ctx *ctx, bst_view_exchange *x) {
@@ -139,6 +139,12 @@ bool bst_view_exchange_read(const char *query, bst_view_exchange *x) {
            bst_view_query_int(query, "sensor", 0, most, &x->sensor) &&
            bst_view_query_int(query, "frame", 0, most, &x->frame) &&
            bst_view_query_int(query, "object", 0, most, &x->object) &&
+           bst_view_query_int(query, "x", 0, most, &x->part.x) &&
+           bst_view_query_int(query, "y", 0, most, &x->part.y) &&
+           bst_view_query_int(query, "width", 1, most, &x->part.width) &&
+           bst_view_query_int(query, "height", 1, most, &x->part.height) &&
+           bst_view_query_int(query, "binning", 1, BST_VIEW_BINNING_MOST, &x->part.binning) &&
+           bst_view_query_int(query, "longest", 1, most, &x->part.longest) &&
            bst_view_query_int(query, "columns", 1, BST_VIEW_COLUMNS, &x->columns) &&
            bst_view_query_real(query, "from", &x->from_s) &&
            bst_view_query_real(query, "to", &x->to_s) &&

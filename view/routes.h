@@ -13,6 +13,7 @@ typedef struct bst_view_exchange {
     bst_view_live *live; /* NULL: none */
     int64_t run, sensor, frame, columns, object;
     double from_s, to_s;
+    bst_view_part part; /* of a frame */
     char panel[32];
     char name[64];    /* of a run in runs/ */
     const char *body; /* of POST: text that ends with a zero byte; else NULL */

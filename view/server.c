@@ -10,8 +10,11 @@
 
 #include <civetweb.h>
 
+#include "sim/core/wall_clock.h"
+#include "view/large_stack.h"
 #include "view/live_socket.h"
 #include "view/page_files.h"
+#include "view/request_body.h"
 #include "view/request_guard.h"
 #include "view/routes.h"
 
@@ -26,8 +29,14 @@
 #define REQUEST_BYTES "8192"
 /* Bytes that are handed to the system at a time: IDLE_MS is counted for each. */
 enum { PIECE_BYTES = 16384 };
-/* Answers with data in memory at the same time. */
-enum { ANSWERS_MOST = 12 };
+/* A peer that takes an answer more slowly than this after the first seconds loses its connection:
+ * time, s, and bytes/s. */
+static const double FREE_S = 5.0;
+static const double LEAST_RATE = 32768.0;
+/* Answers that are computed at the same time. */
+enum { COMPUTED_MOST = 12 };
+/* Memory of all answers that are being sent; a single one may be larger, bytes. */
+static const size_t SENT_BYTES = (size_t)192 << 20;
 
 struct bst_view_server {
     struct mg_context *http;
@@ -35,8 +44,10 @@ struct bst_view_server {
     bst_view_live *live;     /* NULL: none */
     bst_view_socket *socket; /* of `live` */
     char token[BST_VIEW_TOKEN_DIGITS + 1];
-    pthread_mutex_t lock; /* of `answers` */
-    int answers;
+    bst_view_bodies bodies;
+    pthread_mutex_t lock; /* of the two below */
+    int computed;         /* answers that are being computed */
+    size_t sent_bytes;    /* of those that are being sent */
 };
 
 /* What is sent for a request. */
@@ -45,7 +56,7 @@ typedef struct answer {
     const char *type;
     const void *data;
     size_t bytes;
-    int width, height; /* of pixels; 0: something else */
+    const bst_view_bytes *pixels; /* NULL: something else */
 } answer;
 
 /* Scripts and data come from this server only, and no other page may show this one. */
@@ -72,6 +83,8 @@ static const char *reason_of(int status) {
             return "Not Found";
         case BST_HTTP_BAD_METHOD:
             return "Method Not Allowed";
+        case BST_HTTP_TIMEOUT:
+            return "Request Timeout";
         case BST_HTTP_TOO_LARGE:
             return "Content Too Large";
         case BST_HTTP_BUSY:
@@ -81,12 +94,23 @@ static const char *reason_of(int status) {
     }
 }
 
-/* Sends an answer in pieces; stops when the peer is gone or takes nothing. */
+/* Headers that say which pixels an answer has. */
+static void describe_pixels(const bst_view_bytes *pixels, char *text, size_t bytes) {
+    snprintf(text, bytes, "X-Frame-Width: %d\r\nX-Frame-Height: %d\r\n", pixels->width,
+             pixels->height);
+    if (pixels->binning > 0) {
+        const size_t length = strlen(text);
+        snprintf(text + length, bytes - length,
+                 "X-Frame-Binning: %d\r\nX-Frame-Size: %d %d\r\nX-Frame-Part: %d %d\r\n",
+                 pixels->binning, pixels->frame_width, pixels->frame_height, pixels->x, pixels->y);
+    }
+}
+
+/* Sends an answer in pieces; stops when the peer is gone, takes nothing, or is too slow. */
 static void send_answer(struct mg_connection *peer, const answer *a, bool head_only) {
-    char size[96] = "";
-    if (a->width > 0) {
-        snprintf(size, sizeof size, "X-Frame-Width: %d\r\nX-Frame-Height: %d\r\n", a->width,
-                 a->height);
+    char size[256] = "";
+    if (a->pixels && a->pixels->width > 0) {
+        describe_pixels(a->pixels, size, sizeof size);
     }
     /* a refused request may have a body that was not read */
     const char *connection = a->status == BST_HTTP_OK ? "keep-alive" : "close";
@@ -95,14 +119,18 @@ static void send_answer(struct mg_connection *peer, const answer *a, bool head_o
               "%s\r\n%s%s%s\r\n",
               a->status, reason_of(a->status), a->type, a->bytes, connection, size,
               a->status == BST_HTTP_BUSY ? "Retry-After: 1\r\n" : "", common_headers);
+    if (a->status != BST_HTTP_OK) {
+        mg_disable_connection_keep_alive(peer);
+    }
+    const double begin = bst_wall_seconds();
     for (size_t sent = 0; !head_only && sent < a->bytes;) {
         size_t piece = a->bytes - sent < PIECE_BYTES ? a->bytes - sent : PIECE_BYTES;
         int n = mg_write(peer, (const char *)a->data + sent, piece);
-        if (n <= 0) {
+        sent += n > 0 ? (size_t)n : 0;
+        if (n <= 0 || bst_wall_seconds() - begin > FREE_S + (double)sent / LEAST_RATE) {
             mg_disable_connection_keep_alive(peer); /* it may have sent further requests */
             return;
         }
-        sent += (size_t)n;
     }
 }
 
@@ -142,7 +170,7 @@ static answer page_file(const char *route) {
     const char *name = *route ? route : "index.html";
     for (const bst_view_page_file *f = bst_view_page_files; f->name; f++) {
         if (strcmp(f->name, name) == 0) {
-            return (answer){BST_HTTP_OK, type_of(name), f->data, f->bytes, 0, 0};
+            return (answer){BST_HTTP_OK, type_of(name), f->data, f->bytes, NULL};
         }
     }
     return refusal(BST_HTTP_NOT_FOUND);
@@ -150,69 +178,112 @@ static answer page_file(const char *route) {
 
 /* ------------------------------------------------------------------ data */
 
-/* Reads the body of a request, whose length was checked. NULL: it ends early. */
-static char *read_body(struct mg_connection *peer, int64_t bytes) {
-    char *body = bytes >= 0 ? malloc((size_t)bytes + 1) : NULL;
-    for (int64_t got = 0; body && got < bytes;) {
-        int n = mg_read(peer, body + got, (size_t)(bytes - got));
-        if (n <= 0) {
-            free(body);
-            return NULL;
-        }
-        got += n;
+/* Takes a place for an answer that is computed. False: there is none. */
+static bool begin_answer(bst_view_server *server) {
+    pthread_mutex_lock(&server->lock);
+    const bool room = server->computed < COMPUTED_MOST;
+    server->computed += room;
+    pthread_mutex_unlock(&server->lock);
+    return room;
+}
+
+/* Gives the place of a computed answer back, and takes memory to send it. False: those that are
+ * being sent have too much. */
+static bool begin_sending(bst_view_server *server, size_t bytes) {
+    pthread_mutex_lock(&server->lock);
+    const bool room = server->sent_bytes == 0 || server->sent_bytes + bytes <= SENT_BYTES;
+    server->computed--;
+    server->sent_bytes += room ? bytes : 0;
+    pthread_mutex_unlock(&server->lock);
+    return room;
+}
+
+static void end_sending(bst_view_server *server, size_t bytes) {
+    pthread_mutex_lock(&server->lock);
+    server->sent_bytes -= bytes;
+    pthread_mutex_unlock(&server->lock);
+}
+
+/* A call of a route. */
+typedef struct route_call {
+    const bst_view_route *route;
+    bst_view_exchange *x;
+    bst_ctx ctx;
+    int status;
+    bool is_json;
+    char *text; /* JSON; cJSON_free */
+} route_call;
+
+static void call_route(void *user) {
+    route_call *call = user;
+    call->status = bst_view_route_call(&call->ctx, call->route, call->x);
+    call->is_json = call->x->json != NULL;
+    call->text = call->is_json ? cJSON_PrintUnformatted(call->x->json) : NULL;
+    cJSON_Delete(call->x->json);
+    call->x->json = NULL;
+}
+
+/* Calls a route; the answer is in the memory of the call. */
+static answer compute(route_call *call) {
+    const bst_view_exchange *x = call->x;
+    if (!bst_view_call_with_stack(call_route, call)) {
+        return refusal(BST_HTTP_BUSY);
     }
-    if (body) {
-        body[bytes] = '\0';
+    if (call->status != BST_HTTP_OK) {
+        return text_answer(call->status, call->ctx.message);
     }
-    return body;
+    if (call->text) {
+        return (answer){BST_HTTP_OK, "application/json; charset=utf-8", call->text,
+                        strlen(call->text), NULL};
+    }
+    if (call->is_json) { /* it found no memory */
+        return refusal(BST_HTTP_FAILED);
+    }
+    return (answer){BST_HTTP_OK, x->type ? x->type : "application/octet-stream", x->bytes.data,
+                    x->bytes.bytes, &x->bytes};
+}
+
+/* Sends a refusal; returns its status. */
+static int refuse(struct mg_connection *peer, int status, bool head_only) {
+    const answer a = refusal(status);
+    send_answer(peer, &a, head_only);
+    return status;
 }
 
 /* Answers a request for data. */
 static int answer_data(struct mg_connection *peer, bst_view_server *server,
                        const bst_view_route *route, bool head_only) {
     const struct mg_request_info *info = mg_get_request_info(peer);
-    bst_ctx ctx = {0};
     bst_view_exchange x = {.subject = server->subject, .live = server->live};
-    answer a = refusal(BST_HTTP_BAD_REQUEST);
-    char *text = NULL, *body = route->post ? read_body(peer, info->content_length) : NULL;
-    x.body = body;
-    x.body_bytes = body ? (size_t)info->content_length : 0;
-    if (bst_view_exchange_read(info->query_string, &x) && (body || !route->post)) {
-        int status = bst_view_route_call(&ctx, route, &x);
-        text = x.json ? cJSON_PrintUnformatted(x.json) : NULL;
-        if (status != BST_HTTP_OK) {
-            a = text_answer(status, ctx.message);
-        } else if (x.json && !text) {
-            a = refusal(BST_HTTP_FAILED);
-        } else if (text) {
-            a = (answer){BST_HTTP_OK, "application/json; charset=utf-8", text, strlen(text), 0, 0};
-        } else {
-            a = (answer){BST_HTTP_OK,   x.type ? x.type : "application/octet-stream",
-                         x.bytes.data,  x.bytes.bytes,
-                         x.bytes.width, x.bytes.height};
-        }
+    route_call call = {.route = route, .x = &x};
+    char *body = NULL;
+    if (!bst_view_exchange_read(info->query_string, &x)) {
+        return refuse(peer, BST_HTTP_BAD_REQUEST, head_only);
     }
-    cJSON_Delete(x.json);
-    send_answer(peer, &a, head_only);
-    cJSON_free(text);
-    free(x.bytes.data);
+    if (route->post) {
+        const int status = bst_view_read_body(&server->bodies, peer, info->content_length, &body);
+        if (status != BST_HTTP_OK) {
+            return refuse(peer, status, head_only);
+        }
+        x.body = body;
+        x.body_bytes = (size_t)info->content_length;
+    }
+    if (!begin_answer(server)) {
+        free(body);
+        return refuse(peer, BST_HTTP_BUSY, head_only);
+    }
+    answer a = compute(&call);
     free(body);
+    const size_t bytes = a.bytes;
+    if (begin_sending(server, bytes)) {
+        send_answer(peer, &a, head_only);
+        end_sending(server, bytes);
+    } else {
+        a.status = refuse(peer, BST_HTTP_BUSY, head_only);
+    }
+    cJSON_free(call.text);
+    free(x.bytes.data);
     return a.status;
-}
-
-/* Counts the answers in memory. False: there are too many. */
-static bool begin_answer(bst_view_server *server) {
-    pthread_mutex_lock(&server->lock);
-    bool free_place = server->answers < ANSWERS_MOST;
-    server->answers += free_place;
-    pthread_mutex_unlock(&server->lock);
-    return free_place;
-}
-
-static void end_answer(bst_view_server *server) {
-    pthread_mutex_lock(&server->lock);
-    server->answers--;
-    pthread_mutex_unlock(&server->lock);
 }
 
 /* ------------------------------------------------------------------ requests */
@@ -230,6 +301,20 @@ static const char *header_of(const struct mg_request_info *info, const char *nam
     return value;
 }
 
+/* True if all names of headers are names: letters, digits and some signs (RFC 9110, section 5.6.2).
+ * Others are lines that go on, or have a space before their colon. */
+static bool are_headers(const struct mg_request_info *info) {
+    static const char allowed[] =
+        "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
+        "!#$%&'*+-.^_`|~";
+    bool good = info->num_headers < MG_MAX_HEADERS; /* further ones are not seen */
+    for (int i = 0; good && i < info->num_headers; i++) {
+        const char *name = info->http_headers[i].name;
+        good = *name && name[strspn(name, allowed)] == '\0';
+    }
+    return good;
+}
+
 /* Answers every request, so that the library serves no file of its own. Called by its threads. */
 static int on_request(struct mg_connection *peer) {
     const struct mg_request_info *info = mg_get_request_info(peer);
@@ -244,35 +329,23 @@ static int on_request(struct mg_connection *peer) {
     if (header_of(info, "Transfer-Encoding", &coded) || lengths > 1) {
         request.body_bytes = INT64_MAX; /* of unknown length */
     }
-    /* headers beyond the library's list are not seen */
-    int status = info->num_headers < MG_MAX_HEADERS ? bst_view_guard(&request, server->token, route)
-                                                    : BST_HTTP_BAD_REQUEST;
+    int status =
+        are_headers(info) ? bst_view_guard(&request, server->token, route) : BST_HTTP_BAD_REQUEST;
     bool head_only = request.method && strcmp(request.method, "HEAD") == 0;
     if (status != BST_HTTP_OK) {
-        answer a = refusal(status);
-        send_answer(peer, &a, head_only);
-        return status;
+        return refuse(peer, status, head_only);
     }
     int upgrades;
     if (server->live && strcmp(route, "live") == 0 && request.origin &&
-        header_of(info, "Upgrade", &upgrades)) {
+        strcmp(request.method, "GET") == 0 && header_of(info, "Upgrade", &upgrades)) {
         return 0; /* the library goes on with its WebSocket */
     }
     const bst_view_route *data = bst_view_route_find(route);
     if ((data && data->post) != (strcmp(request.method, "POST") == 0)) {
-        answer a = refusal(BST_HTTP_BAD_METHOD);
-        send_answer(peer, &a, head_only);
-        return BST_HTTP_BAD_METHOD;
+        return refuse(peer, BST_HTTP_BAD_METHOD, head_only);
     }
     if (data) {
-        if (!begin_answer(server)) {
-            answer busy = refusal(BST_HTTP_BUSY);
-            send_answer(peer, &busy, head_only);
-            return BST_HTTP_BUSY;
-        }
-        status = answer_data(peer, server, data, head_only);
-        end_answer(server);
-        return status;
+        return answer_data(peer, server, data, head_only);
     }
     answer a = page_file(route);
     send_answer(peer, &a, head_only);
@@ -313,7 +386,8 @@ bst_status bst_view_server_start(bst_ctx *ctx, bst_view_subject *subject, bst_vi
     bst_view_server *server = calloc(1, sizeof *server);
     char ports[32];
     *out = NULL;
-    if (!server || pthread_mutex_init(&server->lock, NULL) != 0) {
+    if (!server || pthread_mutex_init(&server->lock, NULL) != 0 ||
+        pthread_mutex_init(&server->bodies.lock, NULL) != 0) {
         free(server);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the server");
     }
@@ -341,6 +415,8 @@ bst_status bst_view_server_start(bst_ctx *ctx, bst_view_subject *subject, bst_vi
                              "512",
                              "websocket_timeout_ms",
                              SOCKET_IDLE_MS,
+                             "decode_url",
+                             "no",
                              "enable_directory_listing",
                              "no",
                              "access_control_list",
@@ -387,6 +463,7 @@ void bst_view_server_stop(bst_view_server *server) {
         mg_stop(server->http);
     }
     bst_view_socket_free(server->socket);
+    pthread_mutex_destroy(&server->bodies.lock);
     pthread_mutex_destroy(&server->lock);
     free(server);
 }

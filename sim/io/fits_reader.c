@@ -9,64 +9,17 @@
 #include <unistd.h>
 
 #include "sim/io/fits_cards_internal.h"
-#include "sim/io/fits_rice.h"
+#include "sim/io/fits_reader_internal.h"
 
 enum {
-    LONGEST_SIDE = 32768,
-    READ_BLOCKS = 4,      /* blocks of a header per read; our headers have 3 or 4 */
-    MOST_BLOCKS = 1000,   /* maximum blocks of a header */
-    MOST_RICE_BLOCK = 64, /* maximum pixels of a Rice block */
-    /* upper limit of a compressed 16-bit row: verbatim pixels, a code per block, the first pixel */
-    MOST_ROW_BYTES = LONGEST_SIDE * 2 + LONGEST_SIDE / 2 + 16
-};
-
-/* Layout of a tile-compressed image in its table. */
-typedef struct packed {
-    bool wide; /* descriptors of 64-bit numbers */
-    int block;
-    int64_t row_bytes; /* of the table */
-    uint64_t heap_at, heap_bytes;
-} packed;
-
-/* An HDU, from its header. */
-typedef struct hdu {
-    int number; /* from 1 */
-    uint64_t at, data_at, end;
-    int64_t axes, size[3]; /* of the image, also if compressed; axes 0: no image */
-    bool compressed;
-    packed p;
-} hdu;
-
-/* Position of a frame's HDU. */
-typedef struct frame_place {
-    uint64_t at;
-    int number;
-} frame_place;
-
-struct bst_fits_reader {
-    char path[4096];
-    int fd; /* -1: file in memory */
-    const char *data;
-    uint64_t bytes; /* of the file */
-    bst_fits_file_info info;
-    bool items;          /* pixels are 32-bit item numbers of sources */
-    frame_place *frames; /* of a file with one extension per frame */
-    size_t frame_room;
-    hdu cube;
-    uint64_t ids_at; /* offset of the cube's table; 0: none */
-    int64_t id_step, id_count;
-    char *header;
-    size_t header_bytes, header_room;
-    uint8_t *row; /* buffer of MOST_ROW_BYTES for a compressed row */
-    uint16_t *pixels;
-    size_t capacity;
-    int32_t *mask; /* pixels of a file of masks */
-    size_t mask_capacity;
+    READ_BLOCKS = 4,     /* blocks of a header per read; our headers have 3 or 4 */
+    MOST_BLOCKS = 1000,  /* maximum blocks of a header */
+    MOST_RICE_BLOCK = 64 /* maximum pixels of a Rice block */
 };
 
 /* Reads `bytes` at offset `at`, within the size that the file had when opened. */
-static bst_status read_at(bst_ctx *ctx, const bst_fits_reader *reader, void *out, uint64_t bytes,
-                          uint64_t at) {
+bst_status bst_fits_read_at(bst_ctx *ctx, const bst_fits_reader *reader, void *out, uint64_t bytes,
+                            uint64_t at) {
     if (at > reader->bytes || bytes > reader->bytes - at) {
         return bst_fail(ctx, BST_ERR_FORMAT, "%.400s: is cut short", reader->path);
     }
@@ -99,7 +52,7 @@ static bool has_end(const char *cards, size_t bytes) {
 }
 
 /* Loads a header up to the block with END. */
-static bst_status load_header(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h,
+static bst_status load_header(bst_ctx *ctx, bst_fits_reader *reader, const bst_fits_hdu *h,
                               bst_fits_cards *cards) {
     reader->header_bytes = 0;
     uint64_t left = reader->bytes - h->at;
@@ -120,7 +73,7 @@ static bst_status load_header(bst_ctx *ctx, bst_fits_reader *reader, const hdu *
             reader->header_room = bytes * 2;
         }
         char *start = reader->header + reader->header_bytes;
-        BST_TRY(read_at(ctx, reader, start, more, h->at + reader->header_bytes));
+        BST_TRY(bst_fits_read_at(ctx, reader, start, more, h->at + reader->header_bytes));
         reader->header_bytes = bytes;
         /* without SIMPLE or XTENSION it is no header: do not search for END */
         ended = has_end(start, (size_t)more) || (memcmp(reader->header, "SIMPLE", 6) != 0 &&
@@ -156,7 +109,7 @@ static bool are_known_pixels(const bst_fits_reader *reader, int64_t bitpix) {
                          : bitpix == 16 && zero == 32768.0 && scale == 1.0;
 }
 
-static bst_status not_a_frame(bst_ctx *ctx, const bst_fits_reader *reader, const hdu *h,
+static bst_status not_a_frame(bst_ctx *ctx, const bst_fits_reader *reader, const bst_fits_hdu *h,
                               const char *what) {
     return bst_fail(ctx, BST_ERR_FORMAT, "%.400s: HDU %d: %s (allowed: %s)", reader->path,
                     h->number, what,
@@ -167,7 +120,7 @@ static bst_status not_a_frame(bst_ctx *ctx, const bst_fits_reader *reader, const
 
 /* Reads the layout of a compressed image from its header. */
 static bst_status read_packed_layout(bst_ctx *ctx, const bst_fits_reader *reader,
-                                     const bst_fits_cards *cards, hdu *h) {
+                                     const bst_fits_cards *cards, bst_fits_hdu *h) {
     static const char *const sizes[] = {"ZNAXIS1", "ZNAXIS2", "ZNAXIS3"};
     static const char *const tiles[] = {"ZTILE1", "ZTILE2", "ZTILE3"};
     h->compressed = true;
@@ -215,7 +168,7 @@ static bst_status read_packed_layout(bst_ctx *ctx, const bst_fits_reader *reader
 
 /* Interprets the header in memory. *whole false: the data extend beyond the end of the file. */
 static bst_status interpret(bst_ctx *ctx, const bst_fits_reader *reader,
-                            const bst_fits_cards *cards, hdu *h, bool *whole) {
+                            const bst_fits_cards *cards, bst_fits_hdu *h, bool *whole) {
     uint64_t blocks = (cards->data_bytes + BST_FITS_BLOCK - 1) / BST_FITS_BLOCK;
     h->data_at = h->at + cards->bytes;
     h->end = h->data_at + blocks * BST_FITS_BLOCK;
@@ -236,30 +189,30 @@ static bst_status interpret(bst_ctx *ctx, const bst_fits_reader *reader,
         }
     }
     for (int i = 0; i < 2 && h->axes > 0; i++) {
-        if (h->size[i] < 1 || h->size[i] > LONGEST_SIDE) {
+        if (h->size[i] < 1 || h->size[i] > BST_FITS_LONGEST_SIDE) {
             return bst_fail(ctx, BST_ERR_FORMAT,
                             "%.400s: HDU %d: an image of %lld x %lld pixels (allowed: sides of 1 "
                             "to %d)",
                             reader->path, h->number, (long long)h->size[0], (long long)h->size[1],
-                            LONGEST_SIDE);
+                            BST_FITS_LONGEST_SIDE);
         }
     }
     return BST_OK;
 }
 
 /* Reads and interprets the FITS header at the position of an HDU. */
-static bst_status look(bst_ctx *ctx, bst_fits_reader *reader, hdu *h, bool *whole) {
+static bst_status look(bst_ctx *ctx, bst_fits_reader *reader, bst_fits_hdu *h, bool *whole) {
     bst_fits_cards cards;
     BST_TRY(load_header(ctx, reader, h, &cards));
     return interpret(ctx, reader, &cards, h, whole);
 }
 
 /* Adds the HDU of a frame to the index of the file. */
-static bst_status add_frame(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h) {
+static bst_status add_frame(bst_ctx *ctx, bst_fits_reader *reader, const bst_fits_hdu *h) {
     bst_fits_file_info *info = &reader->info;
     if ((size_t)info->frames == reader->frame_room) {
         size_t room = reader->frame_room ? 2 * reader->frame_room : 64;
-        frame_place *frames = realloc(reader->frames, room * sizeof *frames);
+        bst_fits_frame_place *frames = realloc(reader->frames, room * sizeof *frames);
         if (!frames) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the places of %zu frames",
                             room);
@@ -267,7 +220,7 @@ static bst_status add_frame(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h)
         reader->frames = frames;
         reader->frame_room = room;
     }
-    reader->frames[info->frames++] = (frame_place){h->at, h->number};
+    reader->frames[info->frames++] = (bst_fits_frame_place){h->at, h->number};
     info->compressed = info->compressed || h->compressed;
     info->width = h->size[0] > info->width ? (int)h->size[0] : info->width;
     info->height = h->size[1] > info->height ? (int)h->size[1] : info->height;
@@ -275,7 +228,7 @@ static bst_status add_frame(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h)
 }
 
 /* Counts the frames of a file with one extension per frame, starting after HDU `h`. */
-static bst_status count_extensions(bst_ctx *ctx, bst_fits_reader *reader, hdu h) {
+static bst_status count_extensions(bst_ctx *ctx, bst_fits_reader *reader, bst_fits_hdu h) {
     bool whole = true;
     bst_ctx unheard = {0};
     for (;;) {
@@ -305,10 +258,10 @@ static bst_status count_extensions(bst_ctx *ctx, bst_fits_reader *reader, hdu h)
 }
 
 /* Finds the table after a cube; FRAMEID is its first column. */
-static void find_ids(bst_fits_reader *reader, const hdu *cube) {
+static void find_ids(bst_fits_reader *reader, const bst_fits_hdu *cube) {
     bst_ctx unheard = {0};
     bst_fits_cards cards;
-    hdu h = {.number = cube->number + 1, .at = cube->end};
+    bst_fits_hdu h = {.number = cube->number + 1, .at = cube->end};
     if (h.at >= reader->bytes || load_header(&unheard, reader, &h, &cards) != BST_OK ||
         !is_text(reader, "XTENSION", "BINTABLE") || !is_text(reader, "TTYPE1", "FRAMEID") ||
         !is_text(reader, "TFORM1", "1K") || cards.naxis != 2 || cards.axes[0] < 8 ||
@@ -320,7 +273,8 @@ static void find_ids(bst_fits_reader *reader, const hdu *cube) {
     reader->id_count = cards.axes[1];
 }
 
-static bst_status take_cube(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h, bool whole) {
+static bst_status take_cube(bst_ctx *ctx, bst_fits_reader *reader, const bst_fits_hdu *h,
+                            bool whole) {
     bst_fits_file_info *info = &reader->info;
     uint64_t plane = (uint64_t)h->size[0] * (uint64_t)h->size[1] * 2;
     info->cube = true;
@@ -343,14 +297,14 @@ static bst_status take_cube(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h,
 }
 
 static bst_status count_frames(bst_ctx *ctx, bst_fits_reader *reader) {
-    hdu h = {.number = 1};
+    bst_fits_hdu h = {.number = 1};
     bool whole = true;
     BST_TRY(look(ctx, reader, &h, &whole));
     if (h.axes == 3) {
         return take_cube(ctx, reader, &h, whole);
     }
     /* a compressed cube is in the first extension, after an empty primary array */
-    hdu second = {.number = 2, .at = h.end};
+    bst_fits_hdu second = {.number = 2, .at = h.end};
     bst_ctx unheard = {0};
     if (whole && second.at < reader->bytes && look(&unheard, reader, &second, &whole) == BST_OK &&
         second.axes == 3) {
@@ -445,16 +399,9 @@ const bst_fits_file_info *bst_fits_reader_info(const bst_fits_reader *reader) {
     return &reader->info;
 }
 
-static uint64_t big_endian(const uint8_t *bytes, int count) {
-    uint64_t value = 0;
-    for (int i = 0; i < count; i++) {
-        value = value << 8 | bytes[i];
-    }
-    return value;
-}
-
 /* Finds the HDU of a frame; loads its header unless it is the cube. */
-static bst_status find_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index, hdu *h) {
+bst_status bst_fits_find_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
+                               bst_fits_hdu *h) {
     if (index < 0 || index >= reader->info.frames) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%.400s: has no frame %lld; it has %lld",
                         reader->path, (long long)index, (long long)reader->info.frames);
@@ -464,7 +411,7 @@ static bst_status find_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t inde
         return BST_OK;
     }
     bool whole;
-    *h = (hdu){.number = reader->frames[index].number, .at = reader->frames[index].at};
+    *h = (bst_fits_hdu){.number = reader->frames[index].number, .at = reader->frames[index].at};
     BST_TRY(look(ctx, reader, h, &whole));
     if (!whole || h->axes != 2) {
         return bst_fail(ctx, BST_ERR_IO, "%.400s: HDU %d: changed while it was read", reader->path,
@@ -473,127 +420,23 @@ static bst_status find_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t inde
     return BST_OK;
 }
 
-static bst_status read_id(bst_ctx *ctx, const bst_fits_reader *reader, int64_t index,
-                          int64_t *exposure_id) {
+bst_status bst_fits_read_id(bst_ctx *ctx, const bst_fits_reader *reader, int64_t index,
+                            int64_t *exposure_id) {
     *exposure_id = -1;
     if (!reader->info.cube) {
         *exposure_id = int_of(reader, "FRAMEID", -1);
     } else if (reader->ids_at > 0 && index < reader->id_count) {
         uint8_t bytes[8];
-        BST_TRY(read_at(ctx, reader, bytes, 8,
-                        reader->ids_at + (uint64_t)index * (uint64_t)reader->id_step));
-        *exposure_id = (int64_t)big_endian(bytes, 8);
+        BST_TRY(bst_fits_read_at(ctx, reader, bytes, 8,
+                                 reader->ids_at + (uint64_t)index * (uint64_t)reader->id_step));
+        *exposure_id = (int64_t)bst_fits_big_endian(bytes, 8);
     }
     return BST_OK;
 }
 
 bst_status bst_fits_reader_id(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
                               int64_t *exposure_id) {
-    hdu h;
-    BST_TRY(find_frame(ctx, reader, index, &h));
-    return read_id(ctx, reader, index, exposure_id);
-}
-
-static bst_status make_room(bst_ctx *ctx, bst_fits_reader *reader, size_t count) {
-    if (reader->capacity < count) {
-        free(reader->pixels);
-        reader->pixels = malloc(count * sizeof *reader->pixels);
-        reader->capacity = reader->pixels ? count : 0;
-    }
-    return reader->pixels ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a frame");
-}
-
-/* Converts from BZERO 32768: stored minus 2^15, which inverts the top bit. */
-static void from_fits(uint16_t *pixels, size_t count) {
-    for (size_t i = 0; i < count; i++) {
-        uint8_t *b = (uint8_t *)&pixels[i];
-        pixels[i] = (uint16_t)(((unsigned)b[0] << 8 | b[1]) ^ 0x8000u);
-    }
-}
-
-/* Decodes one compressed row of a frame; `row`: row of the table. */
-static bst_status read_row(bst_ctx *ctx, bst_fits_reader *reader, const hdu *h, int64_t row,
-                           uint16_t *out) {
-    uint8_t place[16];
-    int width = h->p.wide ? 8 : 4;
-    size_t count = (size_t)h->size[0];
-    BST_TRY(read_at(ctx, reader, place, 2 * (uint64_t)width,
-                    h->data_at + (uint64_t)row * (uint64_t)h->p.row_bytes));
-    uint64_t bytes = big_endian(place, width), offset = big_endian(place + width, width);
-    bool ok =
-        bytes <= MOST_ROW_BYTES && offset <= h->p.heap_bytes && bytes <= h->p.heap_bytes - offset;
-    if (ok) {
-        BST_TRY(read_at(ctx, reader, reader->row, bytes, h->p.heap_at + offset));
-        ok = bst_fits_rice_decode(reader->row, (size_t)bytes, h->p.block, out, count);
-    }
-    if (!ok) {
-        return bst_fail(ctx, BST_ERR_FORMAT,
-                        "%.400s: HDU %d: row %lld of the compressed pixels is damaged",
-                        reader->path, h->number, (long long)row);
-    }
-    for (size_t i = 0; i < count; i++) {
-        out[i] ^= 0x8000u;
-    }
-    return BST_OK;
-}
-
-bst_status bst_fits_reader_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
-                                 bst_fits_read_frame *out) {
-    hdu h;
-    if (reader->items) {
-        return bst_fail(ctx, BST_ERR_STATE, "%.400s: holds masks", reader->path);
-    }
-    BST_TRY(find_frame(ctx, reader, index, &h));
-    BST_TRY(read_id(ctx, reader, index, &out->exposure_id));
-    int64_t plane = reader->info.cube ? index : 0, height = h.size[1];
-    size_t count = (size_t)h.size[0] * (size_t)height;
-    if (h.compressed && !reader->row) {
-        reader->row = malloc(MOST_ROW_BYTES);
-        if (!reader->row) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a row");
-        }
-    }
-    BST_TRY(make_room(ctx, reader, count));
-    if (h.compressed) {
-        for (int64_t y = 0; y < height; y++) {
-            BST_TRY(read_row(ctx, reader, &h, plane * height + y,
-                             reader->pixels + (size_t)y * (size_t)h.size[0]));
-        }
-    } else {
-        BST_TRY(read_at(ctx, reader, reader->pixels, count * 2,
-                        h.data_at + (uint64_t)plane * count * 2));
-        from_fits(reader->pixels, count);
-    }
-    *out = (bst_fits_read_frame){.pixels = reader->pixels,
-                                 .width = (int)h.size[0],
-                                 .height = (int)height,
-                                 .exposure_id = out->exposure_id};
-    return BST_OK;
-}
-
-bst_status bst_fits_reader_mask(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
-                                bst_fits_read_mask *out) {
-    hdu h;
-    if (!reader->items) {
-        return bst_fail(ctx, BST_ERR_STATE, "%.400s: holds frames", reader->path);
-    }
-    BST_TRY(find_frame(ctx, reader, index, &h));
-    BST_TRY(read_id(ctx, reader, index, &out->exposure_id));
-    size_t count = (size_t)h.size[0] * (size_t)h.size[1];
-    if (reader->mask_capacity < count) {
-        free(reader->mask);
-        reader->mask = malloc(count * sizeof *reader->mask);
-        reader->mask_capacity = reader->mask ? count : 0;
-        if (!reader->mask) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a mask");
-        }
-    }
-    BST_TRY(read_at(ctx, reader, reader->mask, count * sizeof *reader->mask, h.data_at));
-    for (size_t i = 0; i < count; i++) {
-        reader->mask[i] = (int32_t)big_endian((const uint8_t *)&reader->mask[i], 4);
-    }
-    out->items = reader->mask;
-    out->width = (int)h.size[0];
-    out->height = (int)h.size[1];
-    return BST_OK;
+    bst_fits_hdu h;
+    BST_TRY(bst_fits_find_frame(ctx, reader, index, &h));
+    return bst_fits_read_id(ctx, reader, index, exposure_id);
 }

@@ -52,6 +52,17 @@ bst_status bst_fits_reader_id(bst_ctx *ctx, bst_fits_reader *reader, int64_t ind
 bst_status bst_fits_reader_frame(bst_ctx *ctx, bst_fits_reader *reader, int64_t index,
                                  bst_fits_read_frame *out) BST_MUST_CHECK;
 
+/* Reads rows of frame `index`. Of a compressed frame only these rows are unpacked: a row is a tile.
+ *
+ * Given:     first  from 0 to the height of the frame
+ *            rows   that are wanted; 0 or fewer: none, for the size of the frame alone
+ * Returned:  *out   pixels: [rows][width], fewer rows at the end of the frame; NULL: none. width,
+ *                   height: of the whole frame
+ * Errors:    those of bst_fits_reader_frame; BST_ERR_ARGUMENT: no such frame or row
+ * Notes:     memory: these rows. The buffer does not shrink */
+bst_status bst_fits_reader_rows(bst_ctx *ctx, bst_fits_reader *reader, int64_t index, int first,
+                                int rows, bst_fits_read_frame *out) BST_MUST_CHECK;
+
 /* Opens a FITS file of segmentation masks (segmentation.fits): uncompressed 32-bit signed image
  * extensions. Errors as bst_fits_reader_open. */
 bst_status bst_fits_reader_open_masks(bst_ctx *ctx, const char *path,

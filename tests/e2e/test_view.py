@@ -100,6 +100,14 @@ class Viewer:
         return self.raw("\r\n".join(lines) + "\r\n" + more.format(**words) + "Connection: close\r\n\r\n")
 
 
+def open_connections(viewer, ports):
+    """Those of the peers' ports whose connections the server has not closed."""
+    with open(f"/proc/{viewer.process.pid}/net/tcp", encoding="ascii") as file:
+        rows = [line.split()[1:4] for line in file][1:]
+    return [far for near, far, state in rows if state == "01" and near.endswith(f":{viewer.port:04X}")
+            and int(far[-4:], 16) in ports]
+
+
 class Checks(unittest.TestCase):
     """Comparisons with the files of a run."""
 
@@ -156,6 +164,46 @@ class Checks(unittest.TestCase):
         self.assertGreater(len(found["detections"]), 0)
 
 
+    def check_slow_uploads(self, viewer, seconds, whole=False):
+        """`whole`: until their time is over."""
+        begin, slow = time.monotonic(), []
+        head = (f"POST /{viewer.token}/api/editor/{{}} HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://127.0.0.1\r\n"
+                "Content-Length: {}\r\n\r\n")
+        for k in range(30):
+            peer = viewer.connect()
+            peer.sendall(head.format(*(("file?name=a.tle", 30 << 20) if k % 3 else ("check", 1000 + k))).encode() + b"{")
+            slow.append(peer)
+
+        def trickle():
+            for peer in slow:
+                try:
+                    peer.sendall(b" ")
+                except OSError:
+                    pass
+        while time.monotonic() < begin + seconds:  # most are refused at once
+            trickle()
+            self.assertEqual(viewer.status("/{token}/api/pixels?frame=0"), 200)
+            time.sleep(0.3)
+        ports = [peer.getsockname()[1] for peer in slow]
+        self.assertLessEqual(len(open_connections(viewer, ports)), 10)
+        while whole and open_connections(viewer, ports):
+            trickle()
+            self.assertLess(time.monotonic(), begin + 60)
+            time.sleep(0.3)
+        statuses = set()
+        for peer in slow:
+            peer.settimeout(0.01)
+            try:
+                statuses.add(peer.recv(12)[9:])
+            except (ConnectionError, TimeoutError):
+                pass
+            peer.close()
+        self.assertLessEqual(statuses, {b"", b"503"} | ({b"408"} if whole else set()))
+        end = time.monotonic() + 10
+        while viewer.raw(head.format("satellites", 16) + '{"find":"44801"}') != 200:
+            self.assertLess(time.monotonic(), end)
+
+
 class View(Checks):
     @classmethod
     def setUpClass(cls):
@@ -200,6 +248,26 @@ class View(Checks):
             with self.assertRaises(urllib.error.HTTPError) as refused:
                 self.viewer.get("api/pixels?sensor=0&frame=" + ("3", "-1", "x")[k])
             self.assertEqual(refused.exception.code, (404, 400, 400)[k])
+
+    def test_parts_of_frames(self):
+        """Any part has the pixels of the file; bins are means; what is not within the frame is refused."""
+        with fits.open(os.path.join(self.made, "frames.fits")) as file:
+            image = file[2].data
+
+            def ask(query):
+                data, headers = self.viewer.get("api/pixels?sensor=0&frame=1&" + query)
+                self.assertEqual(headers["X-Frame-Size"], "1024 1024")
+                return numpy.frombuffer(data, "<u2").reshape(int(headers["X-Frame-Height"]), int(headers["X-Frame-Width"])), headers
+            for x, y, width, height in ((0, 0, 1024, 1), (37, 900, 64, 64), (1000, 1020, 500, 500), (5, 0, 1, 1024)):
+                part, headers = ask(f"x={x}&y={y}&width={width}&height={height}")
+                self.assertEqual((headers["X-Frame-Part"], headers["X-Frame-Binning"]), (f"{x} {y}", "1"))
+                self.assertTrue(numpy.array_equal(part, image[y:y + height, x:x + width]), (x, y))
+            sums = image.astype(int).reshape(256, 4, 256, 4).sum(axis=(1, 3))
+            self.assertTrue(numpy.array_equal(ask("binning=4")[0], (sums + 8) // 16))
+            self.assertTrue(numpy.array_equal(ask("longest=256")[0], (sums + 8) // 16))
+            self.assertTrue(numpy.array_equal(ask("binning=4&x=512&y=256&width=64&height=400")[0], ((sums + 8) // 16)[64:164, 128:144]))
+        for query in ("x=1024", "y=2000", "x=-1", "width=0", "binning=0", "binning=257", "longest=3", "x=1.5", "x=1&x=1", "height=99999999999999999999"):
+            self.assertEqual(self.viewer.status("/{token}/api/pixels?frame=1&" + query), 400, query)
 
     def test_thumbnails(self):
         """Peaks of 13 x 13 pixels, the same when they are asked for again."""
@@ -300,6 +368,19 @@ class View(Checks):
         self.assertEqual(status("/{token}/ws", more="Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
                                 "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"), 404)
 
+    def test_encoded_paths(self):
+        """A path is taken as it is: nothing in it is decoded. Nested bodies deeper than a thread's stack are refused."""
+        token, own = self.viewer.token, "Origin: http://127.0.0.1:{port}\r\n"
+        for path, refused in ((f"/%{ord(token[0]):02x}{token[1:]}/api/run", 403), ("/{token}/api/run%00", 404), ("/{token}/api%2frun", 404),
+                              ("/{token}/%61pi/run", 404), ("/{token}/..\\..\\etc", 404), ("/{token}/api/run#x", 404)):
+            self.assertEqual(self.viewer.status(path), refused, path)
+        for target in ("http://127.0.0.1:{port}/{token}/api/run", "http://evil.example/{token}/api/run", "*", "127.0.0.1:1"):
+            self.assertIn(self.viewer.status(target), (0, 400, 403), target)
+        body = '{"a":' * 990 + "1" + "}" * 990
+        text = f"POST /{token}/api/open HTTP/1.1\r\nHost: localhost\r\nOrigin: http://localhost\r\nContent-Length: {len(body)}\r\n\r\n{body}"
+        self.assertIn(self.viewer.raw(text), (400, 404))
+        self.assertEqual(self.viewer.status(more=own), 200)
+
     def test_malformed(self):
         line = f"GET /{self.viewer.token}/ HTTP/1.1\r\nHost: 127.0.0.1\r\n"
         for text in (b"\x00" * 5000 + b"\r\n\r\n", "GET\r\n\r\n", "GET / HTTP/9.9\r\n\r\n", "\r\n\r\n", "GET / HTTP/1.1\r\nHost\r\n\r\n",
@@ -309,12 +390,9 @@ class View(Checks):
             self.assertIn(self.viewer.raw(text), (0, 400, 403, 405, 411, 413, 414, 431, 500, 505), text[-60:])
         self.assertEqual(self.viewer.status(), 200)
 
-    def open_connections(self, ports):
-        """Those of the peers' ports whose connections the server has not closed."""
-        with open(f"/proc/{self.viewer.process.pid}/net/tcp", encoding="ascii") as file:
-            rows = [line.split()[1:4] for line in file][1:]
-        return [far for near, far, state in rows if state == "01" and near.endswith(f":{self.viewer.port:04X}")
-                and int(far[-4:], 16) in ports]
+    def test_slow_uploads(self):
+        """Bodies that come slowly have few places; data, and the editor's texts, go on meanwhile."""
+        self.check_slow_uploads(self.viewer, 1.2)
 
     def test_slow_readers_and_many_connections(self):
         """Readers that take nothing, and 500 connections that send nothing, lose theirs; others are served."""
@@ -330,7 +408,7 @@ class View(Checks):
         while self.viewer.status() != 200:  # busy while the slow readers have their time
             self.assertLess(time.monotonic(), end)
             time.sleep(0.1)
-        while self.open_connections([peer.getsockname()[1] for peer in slow]):
+        while open_connections(self.viewer, [peer.getsockname()[1] for peer in slow]):
             self.assertLess(time.monotonic(), begin + 120)
             time.sleep(0.2)
         for peer in slow:  # cut off before the end

@@ -10,12 +10,14 @@ import os
 import sqlite3
 import subprocess
 import sys
+import time
 import unittest
 import urllib.error
 import urllib.request
 
 import numpy
 
+import chromium
 import live_page
 import runs
 import test_view
@@ -238,7 +240,11 @@ class Live(Tables):
             self.assertEqual(page.status, status, words)
             page.close()
         self.assertEqual(self.viewer.status("/{token}/live"), 404)
-        for data, opcode in ((b"{", 0x81), (b"[]", 0x81), (b"\xff\xfe", 0x81), (b"{}" + b" " * 9000, 0x81), (b"{}", 0x82), (b"{}", 0x01)):
+        upgrade = "Origin: http://127.0.0.1:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n" \
+                  "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+        self.assertEqual(self.viewer.status("/{token}/live", method="POST", more=upgrade + "Content-Length: 2\r\n"), 405)
+        for data, opcode in ((b"{", 0x81), (b"[]", 0x81), (b"\xff\xfe", 0x81), (b"{}" + b" " * 9000, 0x81), (b"{}", 0x82), (b"{}", 0x01),
+                             (b"[" * 7000, 0x81), (b'{"a":' * 1000, 0x81)):  # deeper than a small stack
             page = live_page.Socket(self.viewer)
             with self.assertRaises((ConnectionError, TimeoutError)):
                 page.peer.settimeout(5)
@@ -283,6 +289,89 @@ class Watched(Tables):
         runs.run(runs.TRACK, folder + "/plain", *sets, duration=25)
         self.assertGreater(frames, 0)
         self.assert_equal(folder + "/seen", folder + "/plain")
+
+
+def processor_s(process):
+    """Processor time of a process and of all below it, s."""
+    rows = {}
+    for name in filter(str.isdigit, os.listdir("/proc")):
+        try:
+            with open(f"/proc/{name}/stat", encoding="ascii", errors="replace") as file:
+                words = file.read().rsplit(")", 1)[1].split()
+        except OSError:
+            continue  # it has ended
+        rows[int(name)] = int(words[1]), (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
+    tree, size = {process.pid}, 0
+    while len(tree) > size:
+        size = len(tree)
+        tree |= {one for one, (parent, _) in rows.items() if parent in tree}
+    return sum(rows[one][1] for one in tree if one in rows)
+
+
+@unittest.skipUnless(FULL and chromium.PROGRAM, "with --full, and a chromium")
+class Figures(unittest.TestCase):
+    """What a page that watches the main scenario flat out costs. The figures are printed (`ctest -V`), with those that were
+    asked for; only what no other load of the machine can change is checked."""
+    SECONDS, TURNS = 8, 3
+
+    def state(self):
+        self.steering.send(b"{}")
+        data = self.steering.receive()[1]
+        length = int.from_bytes(data[:4], "little")
+        return json.loads(data[4:4 + length])["state"]
+
+    def phase(self, page=None):
+        """Simulated seconds a second, processor time of the program for each, ms; with a page: frames shown a second and
+        processor time of the browser for each, ms."""
+        def look():
+            shown = page.evaluate("document.boresight.live.shown") if page else 0
+            return self.state()["time_s"], time.monotonic(), processor_s(self.viewer.process), shown, processor_s(page.process) if page else 0
+        before = look()
+        time.sleep(self.SECONDS)
+        simulated, wall, program, shown, browser = (now - then for now, then in zip(look(), before))
+        return simulated / wall, 1e3 * program / simulated, shown / wall, 1e3 * browser / max(1, shown)
+
+    def test_watched(self):
+        """The same run with and without a page, in turns."""
+        self.viewer = test_view.Viewer(runs.TRACK, "--out", os.path.join(runs.scratch(), "run"), "--duration", "6000", *SETS)
+        self.steering = live_page.Socket(self.viewer)
+        self.steering.send(b'{"command": {"do": "run", "rate": 0}}')
+        self.steering.receive()
+        alone, watched = [], []
+        with chromium.Chromium(1280, 720, "--disable-gpu-compositing") as page:
+            time.sleep(3)
+            for _ in range(self.TURNS):
+                alone.append(self.phase())
+                page.command("Page.navigate", url=self.viewer.url)
+                page.wait_for("document.boresight && document.boresight.live && document.boresight.live.shown > 5")
+                watched.append(self.phase(page))
+                page.command("Page.navigate", url="about:blank")
+                time.sleep(1.5)  # a sensor counts as watched for a second
+            self.assertEqual(page.messages, [])
+        self.steering.close()
+        self.viewer.process.kill()
+        (speed, cost, _, _), (slower, dearer, shown, browser) = (numpy.median(rows, axis=0) for rows in (alone, watched))
+        print(f"\nlive main scenario, {self.TURNS} x {self.SECONDS} s in turns, medians, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}:"
+              f"\n  frames shown         {shown:.1f} a second (asked: 15 or more), {browser:.1f} ms of the browser each"
+              f"\n  simulated seconds    {speed:.1f} a second alone, {slower:.1f} watched: {100 * (1 - slower / speed):.1f} % slower (asked: 10 % or less)"
+              f"\n  processor time       {cost:.1f} ms a simulated second alone, {dearer:.1f} watched: {100 * (dearer / cost - 1):.1f} % more", flush=True)
+        self.assertGreater(shown, 1)
+        self.assertLess(dearer, 1.5 * cost)
+
+    def test_nobody_watches(self):
+        """`run --view` without a page, and `run`: processor time, in turns."""
+        costs = {(): [], ("--view",): []}
+        for turn in range(2 * self.TURNS):
+            words = list(costs)[turn % 2]
+            begin = os.times()
+            with open(os.devnull, "wb") as nothing:
+                subprocess.run([*runs.command(runs.TRACK, os.path.join(runs.scratch(), "run"), duration=150), *words], check=True, stdout=nothing)
+            end = os.times()
+            costs[words].append(end.children_user + end.children_system - begin.children_user - begin.children_system)
+        alone, viewed = (min(times) for times in costs.values())
+        print(f"\nmain scenario, 150 s, {self.TURNS} runs each in turns, least processor time: run {alone:.2f} s, run --view with "
+              f"nobody watching {viewed:.2f} s: {100 * (viewed / alone - 1):.1f} % more (asked: 0 %)", flush=True)
+        self.assertLess(viewed, 1.25 * alone)
 
 
 class Start(unittest.TestCase):

@@ -30,6 +30,70 @@ class Cube(test_view.Checks):
         with fits.open(os.path.join(out, "frames.fits")) as file:
             self.check_pixels(viewer, list(next(hdu.data for hdu in file if numpy.ndim(hdu.data) == 3)))
         self.check_marks(viewer, out, 1)
+        self.check_slow_uploads(viewer, 4, whole=True)
+        self.assertEqual(viewer.end()[0], 0)
+
+
+@unittest.skipUnless(chromium.PROGRAM, "there is no chromium")
+class Large(unittest.TestCase):
+    """A frame of 3000 x 2600 pixels, compressed."""
+    @classmethod
+    def setUpClass(cls):
+        cls.made = os.path.join(runs.scratch(), "large")
+        camera = runs.SENSOR + "/camera/"
+        runs.run(runs.STARE, cls.made, camera + "width_px=3000", camera + "height_px=2600", camera + "pixel_scale_arcsec=1",
+                 "/record/frames=extensions", "/record/compression=rice", duration=2)
+
+    def read_back(self, page, place):
+        found = page.evaluate("""(() => {
+            const view = document.boresight.frameView, image = %s;
+            view.painter.draw(view.image, view.drawing(), view.part, view.part && view.drawing(view.part));
+            const bytes = new Uint8Array(view.painter.readBack(%d).buffer);
+            let text = '';
+            for (let i = 0; i < bytes.length; i += 8192) text += String.fromCharCode(...bytes.subarray(i, i + 8192));
+            return [image.x, image.y, image.width, image.height, image.binning, btoa(text)];
+        })()""" % ("view.part" if place else "view.image", place))
+        pixels = numpy.frombuffer(base64.b64decode(found[5]), "<u2").reshape(found[3], found[2])
+        return found[:2], found[4], pixels
+
+    def test_zoom(self):
+        """Means of bins that fit the stage, and every pixel of the shown part: panned over the whole frame, all of them; also
+        in the next frame."""
+        viewer = test_view.Viewer(self.made)
+        part = "(() => { const v = document.boresight.frameView; return v.part && !v.loadingPart && !v.wantedPart(v.part); })()"
+        with chromium.Chromium(1280, 720) as page, fits.open(self.made + "/frames.fits") as file:
+            for painter in ("?webgl", "?plain"):
+                page.command("Page.navigate", url="about:blank")
+                page.command("Page.navigate", url=f"{viewer.url}{painter}#frame=0")
+                page.wait_for(SHOWN + " === 0")
+                image = file[1].data
+                _, n, pixels = self.read_back(page, 0)
+                self.assertGreater(n, 3)
+                self.assertLessEqual(max(pixels.shape), 768)
+                whole = image[:2600 // n * n, :3000 // n * n].astype(int)
+                sums = whole.reshape(2600 // n, n, 3000 // n, n).sum(axis=(1, 3))
+                self.assertTrue(numpy.array_equal(pixels[:2600 // n, :3000 // n], (2 * sums + n * n) // (2 * n * n)))
+                seen = numpy.zeros(image.shape, bool)
+                for y in range(250, 2800, 500):
+                    for x in range(300, 3200, 600):
+                        page.evaluate("(() => { const v = document.boresight.frameView; Object.assign(v.view, "
+                                      f"{{ x: {x}.3, y: {y}.1, scale: 1.25, fitted: false }}); v.redraw(); }})()")
+                        page.wait_for(part)
+                        (x0, y0), n, pixels = self.read_back(page, 1)
+                        height, width = pixels.shape
+                        self.assertEqual(n, 1)
+                        self.assertTrue(numpy.array_equal(pixels, image[y0:y0 + height, x0:x0 + width]), (x, y))
+                        seen[y0:y0 + height, x0:x0 + width] = True
+                self.assertTrue(seen.all())
+                # the value below the cursor, and the same place in the next frame
+                page.key("ArrowRight")
+                page.wait_for(SHOWN + " === 1")
+                (x0, y0), n, pixels = self.read_back(page, 1)
+                height, width = pixels.shape
+                self.assertTrue(numpy.array_equal(pixels, file[2].data[y0:y0 + height, x0:x0 + width]))
+                page.evaluate("(() => { const v = document.boresight.frameView; v.cursor = { x: 2990, y: 2590 }; v.redraw(); })()")
+                page.wait_for(f"document.getElementById('readout').textContent.includes('{file[2].data[2590, 2990]} DN')")
+            self.assertEqual(page.messages, [])
         self.assertEqual(viewer.end()[0], 0)
 
 

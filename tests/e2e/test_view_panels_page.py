@@ -99,6 +99,7 @@ class Page(unittest.TestCase):
 
     def open_file(self, page, path):
         self.type_into(page, "editor-file", path)
+        page.evaluate("document.editor.baseFile = null")  # it may be this file already
         self.click(page, "editor-open")
         page.wait_for(f"document.editor.baseFile === {json.dumps(path)}")
 

@@ -89,6 +89,21 @@ static void check_frame(bst_ctx *ctx, bst_fits_reader *reader, int index) {
     for (int k = 0; k < WIDTH * HEIGHT; k++) {
         assert_int_equal(frame.pixels[k], pixel(index, k % WIDTH, k / WIDTH));
     }
+    /* a band of rows, one that reaches over the edge, and none */
+    const int bands[][3] = {{1, 2, 2}, {HEIGHT - 1, 5, 1}, {0, 0, 0}, {HEIGHT, 3, 0}, {2, -1, 0}};
+    for (size_t b = 0; b < sizeof bands / sizeof *bands; b++) {
+        const int first = bands[b][0], found = bands[b][2];
+        bst_assert_ok(ctx, bst_fits_reader_rows(ctx, reader, index, first, bands[b][1], &frame));
+        assert_int_equal(frame.width, WIDTH);
+        assert_int_equal(frame.height, HEIGHT);
+        assert_int_equal(frame.pixels != NULL, found > 0);
+        for (int k = 0; k < WIDTH * found; k++) {
+            assert_int_equal(frame.pixels[k], pixel(index, k % WIDTH, first + k / WIDTH));
+        }
+    }
+    assert_int_equal(bst_fits_reader_rows(ctx, reader, index, HEIGHT + 1, 1, &frame),
+                     BST_ERR_ARGUMENT);
+    assert_int_equal(bst_fits_reader_rows(ctx, reader, index, -1, 1, &frame), BST_ERR_ARGUMENT);
 }
 
 static void test_whole(void **state) {

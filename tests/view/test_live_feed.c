@@ -95,11 +95,10 @@ static void send(const char *channel, int64_t id) {
     bst_assert_ok(&f.ctx, bst_view_feed_message(f.feed, &f.ctx, OWN, channel, payload, 0));
 }
 
-static cJSON *get(int64_t after, bst_view_live_frame *out) {
-    bst_view_feed_get(f.feed, OWN, after, 0.0, out);
-    cJSON *json = out->sequence > 0 ? cJSON_Parse(out->json) : NULL;
-    free(out->json);
-    return json;
+/* Takes the newest frame: what it says. */
+static cJSON *get(int64_t after, const bst_view_live_frame **out) {
+    *out = bst_view_feed_get(f.feed, OWN, after, 0.0);
+    return *out ? cJSON_Parse((*out)->json) : NULL;
 }
 
 static double number(const cJSON *node, const char *key) {
@@ -119,7 +118,7 @@ static void a_frame_is_complete_with_its_tracks(void **state) {
     (void)state;
     for (int order = 0; order < 2; order++) { /* truth or frame first */
         begin();
-        bst_view_live_frame frame;
+        const bst_view_live_frame *frame;
         send(BST_CHANNEL_TRUTH, 1); /* nobody watches */
         assert_null(get(0, &frame));
         bst_view_feed_set_every(f.feed, true);
@@ -130,11 +129,11 @@ static void a_frame_is_complete_with_its_tracks(void **state) {
         send(BST_CHANNEL_TRACKS, 7);
         cJSON *json = get(0, &frame);
         assert_non_null(json);
-        assert_int_equal(frame.sequence, 1);
-        assert_int_equal(frame.width, 4);
-        assert_int_equal(frame.height, 3);
-        assert_memory_equal(frame.pixels, pixels, sizeof pixels);
-        free(frame.pixels);
+        assert_int_equal(frame->sequence, 1);
+        assert_int_equal(frame->width, 4);
+        assert_int_equal(frame->height, 3);
+        assert_memory_equal(frame->pixels, pixels, sizeof pixels);
+        bst_view_feed_release(frame);
         bst_assert_close(number(json, "exposure_id"), 7, 0.0);
         bst_assert_close(number(json, "time_s"), 730.0 / RATE, 1e-12);
         bst_assert_close(number(json, "exposure_s"), 60.0 / RATE, 1e-12);
@@ -152,7 +151,7 @@ static void a_frame_is_complete_with_its_tracks(void **state) {
         json = get(0, &frame);
         assert_non_null(json);
         cJSON_Delete(json);
-        free(frame.pixels);
+        bst_view_feed_release(frame);
         end();
     }
 }
@@ -161,27 +160,32 @@ static void a_frame_is_complete_with_its_tracks(void **state) {
 static void frames_that_lack_a_part(void **state) {
     (void)state;
     begin();
-    bst_view_live_frame frame;
+    const bst_view_live_frame *frame;
     assert_null(get(0, &frame));
     bst_view_feed_set_every(f.feed, true);
     f.truth->dropped = true;
     send(BST_CHANNEL_TRUTH, 3);
     cJSON *json = get(0, &frame);
     assert_true(cJSON_IsTrue(cJSON_GetObjectItem(json, "dropped")));
-    assert_null(frame.pixels);
-    assert_int_equal(frame.width, 0);
+    assert_null(frame->pixels);
+    assert_int_equal(frame->width, 0);
     bst_assert_close(number(json, "binning"), 1, 0.0);
     expect_place(json, "truth", 30.0, 40.0); /* of the whole sensor */
     assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(json, "tracks")), 0);
     cJSON_Delete(json);
+    const bst_view_live_frame *kept = frame; /* while others become the newest */
     f.truth->dropped = false;
     send(BST_CHANNEL_TRUTH, 4);
     send(BST_CHANNEL_DETECTIONS, 4);
     send(BST_CHANNEL_TRACKS, 4);
     json = get(1, &frame);
-    assert_int_equal(frame.sequence, 2);
+    assert_int_equal(frame->sequence, 2);
     expect_place(json, "detections", 30.0, 40.0);
     cJSON_Delete(json);
+    bst_view_feed_release(frame);
+    assert_int_equal(kept->sequence, 1);
+    assert_non_null(strstr(kept->json, "\"exposure_id\":3"));
+    bst_view_feed_release(kept);
     for (int64_t id = 10; id < 14; id++) { /* four may wait */
         send(BST_CHANNEL_TRUTH, id);
         send(BST_CHANNEL_FRAME, id);
@@ -189,17 +193,16 @@ static void frames_that_lack_a_part(void **state) {
     assert_null(get(2, &frame));
     send(BST_CHANNEL_TRUTH, 14);
     json = get(2, &frame);
-    assert_int_equal(frame.sequence, 3);
+    assert_int_equal(frame->sequence, 3);
     bst_assert_close(number(json, "exposure_id"), 10, 0.0);
     assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(json, "detections")), 0);
     cJSON_Delete(json);
-    free(frame.pixels);
+    bst_view_feed_release(frame);
     /* with another time all are forgotten */
     bst_view_feed_restart(f.feed, &f.scenario);
     send(BST_CHANNEL_TRACKS, 12);
     assert_null(get(3, &frame));
-    bst_view_feed_get(f.feed, 3, 0, 0.0, &frame); /* no such sensor */
-    assert_int_equal(frame.sequence, 0);
+    assert_null(bst_view_feed_get(f.feed, 3, 0, 0.0)); /* no such sensor */
     end();
 }
 

@@ -38,12 +38,13 @@ export async function getNumbers(route, query, signal = undefined) {
 }
 
 /**
- * Pixels of a frame, [height][width], 16 bits.
+ * Pixels of a frame or of a part of it, [height][width], 16 bits, or the means of their bins.
  * @param {number} sensor @param {number} frame @param {AbortSignal} [signal]
  * @param {number | string} [run] another one than the page's
+ * @param {{x?: number, y?: number, width?: number, height?: number, binning?: number, longest?: number}} [part] longest: side of the answer at most
  */
-export async function getPixels(sensor, frame, signal = undefined, run = RUN) {
-  return getImage('pixels', { sensor, frame, run }, signal);
+export async function getPixels(sensor, frame, signal = undefined, run = RUN, part = {}) {
+  return getImage('pixels', { sensor, frame, run, ...part }, signal);
 }
 
 /** A small picture of a frame: peaks of its bins. @param {number} sensor @param {number} frame @param {AbortSignal} [signal] */
@@ -53,12 +54,11 @@ export async function getThumbnail(sensor, frame, signal = undefined) {
 
 /** @param {string} route @param {Record<string, string | number>} query @param {AbortSignal} [signal] */
 async function getImage(route, query, signal) {
-  const response = await get(route, query, signal);
-  return {
-    width: Number(response.headers.get('X-Frame-Width')),
-    height: Number(response.headers.get('X-Frame-Height')),
-    data: new Uint16Array(await response.arrayBuffer()),
-  };
+  const response = await get(route, query, signal), { headers } = response, data = new Uint16Array(await response.arrayBuffer());
+  const width = Number(headers.get('X-Frame-Width')), height = Number(headers.get('X-Frame-Height'));
+  const pair = (name, other) => (headers.get(name) || other).split(' ').map(Number);
+  const [frameWidth, frameHeight] = pair('X-Frame-Size', `${width} ${height}`), [x, y] = pair('X-Frame-Part', '0 0');
+  return { width, height, data, binning: Number(headers.get('X-Frame-Binning')) || 1, frameWidth, frameHeight, x, y };
 }
 
 /** Adds a style sheet of the page. @param {string} file */

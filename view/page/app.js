@@ -16,8 +16,8 @@ const PLAY_MS = 90;
 /** State of a run in progress (bst_run_state_name), and time between two looks at its folder, ms. */
 const RUNNING = 'still running';
 const REFRESH_MS = 2000;
-/** Share of the time that the looks may take at most: the run's tables grow, and are read by the program that writes them. */
-const REFRESH_SHARE = 0.05;
+/** Share of the time that the looks may take at most: the run's tables grow. A live run's are read by the program that writes them. */
+const REFRESH_SHARE = 0.05, LIVE_SHARE = 0.02;
 
 /** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
@@ -100,7 +100,7 @@ class App {
   /** Asks for what was recorded since, while the run is in progress; stays at the end if it is there. */
   async follow() {
     for (let took = 0; this.inProgress();) {
-      const wait = Math.max(REFRESH_MS, took / REFRESH_SHARE);
+      const wait = Math.max(REFRESH_MS, took / (this.live ? LIVE_SHARE : REFRESH_SHARE));
       await new Promise((done) => { setTimeout(done, wait); });
       const begin = performance.now();
       try {
@@ -212,9 +212,10 @@ class App {
     try {
       while (this.wanted !== this.current) {
         const next = this.wanted;
-        const loaded = await this.load(next);
+        const loaded = await this.load(next), part = await this.loadPart(next, loaded.image);
         this.current = next;
-        this.frameView.show(loaded.image, loaded.details, loaded.why);
+        this.frameView.getPart = this.exported || !loaded.image ? null : (wanted) => getPixels(this.sensor, next, undefined, undefined, wanted);
+        this.frameView.show(loaded.image, loaded.details, loaded.why, false, part);
         this.firstShown = this.firstShown || performance.now(); // ms since the page was asked for
         this.describePosition(loaded.details);
         this.plots.setCursor(this.timeOf(next));
@@ -229,6 +230,13 @@ class App {
       this.busy = false;
     }
     if (this.current + 1 < this.count) this.load(this.current + 1).catch(() => {});
+  }
+
+  /** The shown part of a frame that is too large to be loaded whole, while the view is not of the whole frame. */
+  async loadPart(frame, image) {
+    const view = this.frameView, same = image && image.binning > 1 && !view.view.fitted && !this.exported;
+    const wanted = same && view.image && view.image.frameWidth === image.frameWidth ? view.wantedPart(image) : null;
+    return wanted ? getPixels(this.sensor, frame, undefined, undefined, wanted).catch(() => null) : null;
   }
 
   load(frame) {
@@ -250,7 +258,7 @@ class App {
     const sensor = this.sensor, kept = this.frames[frame * NUMBERS + 3] >= 0;
     const dropped = this.frames[frame * NUMBERS + 4] === 1;
     const [image, details] = await Promise.all([
-      kept ? getPixels(sensor, frame) : null, getJson('frame', { sensor, frame }),
+      kept ? getPixels(sensor, frame, undefined, undefined, { longest: this.frameView.longest() }) : null, getJson('frame', { sensor, frame }),
     ]);
     details.names = this.names;
     entry.bytes = image ? image.data.byteLength : 1000;

@@ -3,6 +3,7 @@ import { addStyle, getJson, getNumbers, getPixels, post } from './api.js';
 import { drawLine, prepare, shortNumber, ticksOf } from './chart.js';
 import { make } from './editor_form.js';
 import { makePainter, originOf } from './frame_gl.js';
+import { WHOLE_PX } from './frame_parts.js';
 import { drawMarks, KINDS, sortMarks } from './marks.js';
 import { readLines } from './plots.js';
 import { describePixels, limitsOf } from './statistics.js';
@@ -93,7 +94,7 @@ class Side {
     this.image = this.details = null;
     if (frame >= 0) {
       const kept = frames[NUMBERS * frame + 3] >= 0;
-      [this.image, this.details] = await Promise.all([kept ? getPixels(sensor, frame, undefined, run) : null, getJson('frame', { sensor, frame, run })]);
+      [this.image, this.details] = await Promise.all([kept ? getPixels(sensor, frame, undefined, run, { longest: WHOLE_PX }) : null, getJson('frame', { sensor, frame, run })]);
       Object.assign(this.details, { names, target });
     }
     if (this.image && !this.limits) {
@@ -116,9 +117,9 @@ class Side {
       Object.assign(canvas.style, { width: `${width}px`, height: `${height}px` });
     }
     const { image, details } = this, context = this.overlay.getContext('2d');
-    const frame = image || { width: 1024, height: 1024 }, scale = Math.min(width / frame.width, height / frame.height);
-    const originX = originOf(this.canvas.width, (frame.width - 1) / 2, scale * ratio), originY = originOf(this.canvas.height, (frame.height - 1) / 2, scale * ratio);
-    this.painter.draw(image, { originX, originY, scale: scale * ratio, black: limits ? limits.black : 0,
+    const n = (image && image.binning) || 1, frame = image ? { width: image.frameWidth || image.width, height: image.frameHeight || image.height } : { width: 1024, height: 1024 }, scale = Math.min(width / frame.width, height / frame.height);
+    const originX = originOf(this.canvas.width, frame.width / 2 / n - 0.5, scale * ratio * n), originY = originOf(this.canvas.height, frame.height / 2 / n - 0.5, scale * ratio * n);
+    this.painter.draw(image, { originX, originY, scale: scale * ratio * n, black: limits ? limits.black : 0,
       white: limits ? limits.white : 65535, soft, invert: false });
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     if (!details) return;

@@ -33,10 +33,7 @@ out vec4 colour;
 void main() {
   vec2 screen = vec2(gl_FragCoord.x, canvas.y - gl_FragCoord.y);
   vec2 place = (screen - origin) / scale; // pixel i covers i to i + 1
-  if (any(lessThan(place, vec2(0.0))) || any(greaterThanEqual(place, size))) {
-    colour = vec4(0.0);
-    return;
-  }
+  if (any(lessThan(place, vec2(0.0))) || any(greaterThanEqual(place, size))) discard;
   float value;
   if (scale >= 1.0) {
     value = float(texelFetch(image, ivec2(place), 0).r);
@@ -98,26 +95,37 @@ class WebglPainter {
       this.places[name] = gl.getUniformLocation(program, name);
     }
     gl.bindVertexArray(gl.createVertexArray());
-    this.texture = gl.createTexture();
-    gl.bindTexture(gl.TEXTURE_2D, this.texture);
+    this.textures = [this.makeTexture(), this.makeTexture()]; // of the whole frame, and of a part of it
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 2);
+    this.held = [null, null];
+  }
+
+  makeTexture() {
+    const gl = this.gl, texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
     for (const [name, value] of [[gl.TEXTURE_MIN_FILTER, gl.NEAREST], [gl.TEXTURE_MAG_FILTER, gl.NEAREST],
       [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE]]) {
       gl.texParameteri(gl.TEXTURE_2D, name, value);
     }
-    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 2);
-    this.held = null;
+    return texture;
   }
 
-  /** @param {{width: number, height: number, data: Uint16Array} | null} image @param {Drawing} d */
-  draw(image, d) {
+  /** @param {Pixels | null} image @param {Drawing} d @param {Pixels | null} [part] drawn over it @param {Drawing | null} [partDrawing] */
+  draw(image, d, part = null, partDrawing = null) {
     const gl = this.gl, canvas = this.canvas;
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT);
-    if (!image) return;
-    if (this.held !== image) {
+    if (image) this.paint(0, image, d);
+    if (part) this.paint(1, part, partDrawing);
+  }
+
+  paint(place, image, d) {
+    const gl = this.gl, canvas = this.canvas;
+    gl.bindTexture(gl.TEXTURE_2D, this.textures[place]);
+    if (this.held[place] !== image) {
       gl.texImage2D(gl.TEXTURE_2D, 0, gl.R16UI, image.width, image.height, 0, gl.RED_INTEGER, gl.UNSIGNED_SHORT, image.data);
-      this.held = image;
+      this.held[place] = image;
     }
     const at = this.places;
     gl.uniform2f(at.size, image.width, image.height);
@@ -130,13 +138,13 @@ class WebglPainter {
 
   fits(image) { return image.width <= this.most && image.height <= this.most; }
 
-  /** The pixels as the graphics processor holds them. */
-  readBack() {
-    const gl = this.gl, image = this.held;
+  /** The pixels as the graphics processor holds them. @param {number} [place] 0: the whole frame; 1: the part of it */
+  readBack(place = 0) {
+    const gl = this.gl, image = this.held[place];
     if (!image) return null;
     const buffer = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.texture, 0);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.textures[place], 0);
     const all = new Uint32Array(4 * image.width * image.height);
     gl.readPixels(0, 0, image.width, image.height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, all);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
@@ -144,6 +152,8 @@ class WebglPainter {
     return Uint16Array.from({ length: image.width * image.height }, (_, i) => all[4 * i]);
   }
 }
+
+/** @typedef {{width: number, height: number, data: Uint16Array}} Pixels */
 
 /** Ranges of the image's pixels that lie below each pixel of the screen along an axis; empty outside the image. */
 function rangesOf(count, origin, scale, size) {
@@ -161,7 +171,7 @@ class CanvasPainter {
   constructor(canvas) {
     this.canvas = canvas;
     this.context = canvas.getContext('2d', { willReadFrequently: true }); // in memory: it is filled from there
-    this.held = null;
+    this.held = [null, null];
     this.out = null;
     this.greys = { key: '', colours: new Uint32Array(65536) };
   }
@@ -178,9 +188,10 @@ class CanvasPainter {
     return this.greys.colours;
   }
 
-  draw(image, d) {
+  /** @param {Pixels | null} image @param {Drawing} d @param {Pixels | null} [part] drawn over it @param {Drawing | null} [partDrawing] */
+  draw(image, d, part = null, partDrawing = null) {
     const { width, height } = this.canvas;
-    this.held = image;
+    this.held = [image, part];
     if (!image || width === 0 || height === 0) {
       this.context.clearRect(0, 0, width, height);
       return;
@@ -189,9 +200,15 @@ class CanvasPainter {
       this.out = this.context.createImageData(width, height);
       this.words = new Uint32Array(this.out.data.buffer);
     }
-    const colours = this.coloursOf(d), { words } = this, { data } = image;
+    this.words.fill(0);
+    this.paint(image, d);
+    if (part) this.paint(part, partDrawing);
+    this.context.putImageData(this.out, 0, 0);
+  }
+
+  paint(image, d) {
+    const { width, height } = this.canvas, colours = this.coloursOf(d), { words } = this, { data } = image;
     const columns = rangesOf(width, d.originX, d.scale, image.width), rows = rangesOf(height, d.originY, d.scale, image.height);
-    words.fill(0);
     for (let y = 0, k = 0; y < height; y++) {
       const ay = rows.from[y], by = rows.to[y], skipY = Math.max(1, (by - ay) >> 2);
       if (by === 0) { k += width; continue; }
@@ -210,10 +227,10 @@ class CanvasPainter {
         words[k] = colours[Math.round(sum / count)];
       }
     }
-    this.context.putImageData(this.out, 0, 0);
   }
 
-  readBack() { return this.held ? this.held.data : null; }
+  /** @param {number} [place] 0: the whole frame; 1: the part of it */
+  readBack(place = 0) { return this.held[place] ? this.held[place].data : null; }
 }
 
 /** True if WebGL is computed by the processor: filling a 2D canvas takes less time then. */

@@ -1,7 +1,9 @@
 // The picture of a frame: zoom, stretch, marks, the pixel under the cursor.
 import { makePainter, originOf } from './frame_gl.js';
+import { binningAt, covers, longestSide, partFor, valueAt } from './frame_parts.js';
 import { drawCompass, drawMarks, drawShape, KINDS, sortMarks } from './marks.js';
 import { describePixels, limitsOf } from './statistics.js';
+import { setText } from './text.js';
 import { formatDec, formatRa, pixelToSky } from './wcs.js';
 
 const SCALE_LEAST = 0.02, SCALE_MOST = 128;
@@ -21,8 +23,13 @@ export class FrameView {
     this.overlay = element('overlay');
     const address = new URLSearchParams(location.search);
     this.painter = makePainter(this.canvas, address.has('plain'), address.has('webgl'));
-    /** @type {{ width: number, height: number, data: Uint16Array, binning?: number, frameWidth?: number, frameHeight?: number } | null} */
+    /** @type {import('./frame_parts.js').Image | null} */
     this.image = null;
+    /** @type {import('./frame_parts.js').Image | null} */
+    this.part = null; // of the frame, with finer pixels
+    /** Gets a part of the frame that is shown; null: there is no more than the image. @type {((part: import('./frame_parts.js').Part) => Promise<any>) | null} */
+    this.getPart = null;
+    this.loadingPart = false;
     this.sensorWidth = this.sensorHeight = 0; // 0: unknown
     this.statistics = null;
     this.counted = 0; // time of the statistics
@@ -49,19 +56,20 @@ export class FrameView {
     this.view.fitted = true;
   }
 
-  /** @param {{width: number, height: number, data: Uint16Array} | null} image @param {any} details @param {string} why no pixels
-   * @param {boolean} live one of many frames a second */
-  show(image, details, why, live = false) {
+  /** @param {import('./frame_parts.js').Image | null} image @param {any} details @param {string} why no pixels
+   * @param {boolean} live one of many frames a second @param {import('./frame_parts.js').Image | null} part of it */
+  show(image, details, why, live = false, part = null) {
     // statistics of a million pixels take longer than drawing them
     const counted = !live || performance.now() - this.counted > STATISTICS_MS;
     if (counted) this.counted = performance.now();
     this.image = image;
+    this.part = part;
     this.details = details;
     this.sorted = details ? sortMarks(details) : null;
     if (counted || !image || !this.statistics) this.statistics = image ? describePixels(image.data) : null;
     element('no-pixels').hidden = Boolean(image);
     element('no-pixels').classList.toggle('first', !image && !details);
-    element('no-pixels').textContent = image ? '' : why;
+    setText(element('no-pixels'), image ? '' : why);
     if (image && !this.painter.fits(image)) this.usePlain();
     if (image && !this.limits) this.findLimits();
     const size = this.frameSize();
@@ -69,7 +77,7 @@ export class FrameView {
     if (image) this.fittedSize = size;
     if (this.view.fitted) this.fit();
     for (const kind of KINDS) {
-      element(`count-${kind.name}`).textContent = this.sorted ? String(this.sorted[kind.name].length) : '';
+      setText(element(`count-${kind.name}`), this.sorted ? String(this.sorted[kind.name].length) : '');
     }
     if (counted) this.drawHistogram();
     this.redraw();
@@ -91,12 +99,13 @@ export class FrameView {
     element('white').value = String(Math.round(this.limits.white));
   }
 
-  drawing() {
+  /** @param {import('./frame_parts.js').Image | null} [image] */
+  drawing(image = this.image) {
     const law = element('law').value, limits = this.limits || { black: 0, white: 65535 };
-    const sigma = this.statistics ? this.statistics.sigma : 1;
+    const sigma = this.statistics ? this.statistics.sigma : 1, n = (image && image.binning) || 1;
     const { x, y, scale } = this.origin();
     return {
-      originX: x, originY: y, scale,
+      originX: x + ((image && image.x) || 0) * scale, originY: y + ((image && image.y) || 0) * scale, scale: scale * n,
       black: limits.black, white: Math.max(limits.white, limits.black + 1),
       soft: law === 'asinh' ? 3 * sigma : 0, invert: element('invert').checked,
     };
@@ -106,17 +115,55 @@ export class FrameView {
 
   /** Size of the picture in px of the page: whole pixels of the screen. */
   size() {
-    const ratio = devicePixelRatio || 1, whole = (side) => Math.max(1, Math.round(side * ratio)) / ratio;
-    return { width: whole(this.stage.clientWidth), height: whole(this.stage.clientHeight) };
+    if (!this.measured) { // until it changes: a look at an element lays out the page
+      const ratio = devicePixelRatio || 1, whole = (side) => Math.max(1, Math.round(side * ratio)) / ratio;
+      this.measured = { width: whole(this.stage.clientWidth), height: whole(this.stage.clientHeight) };
+    }
+    return this.measured;
   }
 
-  /** Where the painter has the corner of the image, and its scale, in pixels of the screen. */
+  /** Where the corner of the frame is on the canvas, and pixels of the screen per pixel of the frame. */
   origin() {
-    const n = this.binning(), scale = this.view.scale * (devicePixelRatio || 1) * n, { width, height } = this.canvas;
-    return { x: originOf(width, (this.view.x + 0.5) / n - 0.5, scale), y: originOf(height, (this.view.y + 0.5) / n - 0.5, scale), scale };
+    const n = this.binning(), scale = this.view.scale * (devicePixelRatio || 1), { width, height } = this.canvas;
+    return { x: originOf(width, (this.view.x + 0.5) / n - 0.5, scale * n), y: originOf(height, (this.view.y + 0.5) / n - 0.5, scale * n), scale };
+  }
+
+  // ---------------------------------------------------------------- parts of large frames
+
+  /** What is shown of the frame. */
+  box() {
+    const { width, height } = this.size(), a = this.toFrame(0, 0), b = this.toFrame(width, height);
+    return { left: a.x + 0.5, top: a.y + 0.5, right: b.x + 0.5, bottom: b.y + 0.5 };
+  }
+
+  /** Longest side of the picture of a whole frame. */
+  longest() {
+    const { width, height } = this.size();
+    return longestSide(Math.max(this.sensorWidth || 0, this.sensorHeight || 0), Math.max(width, height) * (devicePixelRatio || 1));
+  }
+
+  /** The part of the frame that is shown, as the screen can show it; null: the image has it. @param {import('./frame_parts.js').Image | null} [image] */
+  wantedPart(image = this.image) {
+    const frame = this.frameSize(), box = this.box(), binning = binningAt(this.view.scale * (devicePixelRatio || 1));
+    return !image || covers(image, box, frame, binning) ? null : partFor(box, frame, binning);
+  }
+
+  /** Gets the part that is shown, if it is not there: one request at a time. */
+  async loadPart() {
+    const { image, getPart } = this, wanted = getPart && !this.loadingPart ? this.wantedPart() : null;
+    if (!wanted || covers(this.part, this.box(), this.frameSize(), wanted.binning)) return;
+    this.loadingPart = true;
+    let part = null;
+    try {
+      part = await getPart(wanted);
+    } catch { /* the binned picture stays; another look asks again */ }
+    this.loadingPart = false;
+    if (this.image === image && part) this.part = part;
+    if (part) this.redraw(); // which asks for more if the view has moved
   }
 
   resize() {
+    this.measured = null;
     const ratio = devicePixelRatio || 1, { width, height } = this.size();
     for (const canvas of [this.canvas, this.overlay]) {
       canvas.width = Math.round(width * ratio);
@@ -184,11 +231,12 @@ export class FrameView {
     this.waiting = true;
     requestAnimationFrame(() => {
       this.waiting = false;
-      this.painter.draw(this.image, this.drawing());
+      this.painter.draw(this.image, this.drawing(), this.part, this.part && this.drawing(this.part));
       this.drawOverlay();
       this.describeCursor();
       const percent = 100 * this.view.scale;
-      element('zoom').textContent = `${percent < 10 ? percent.toFixed(1) : Math.round(percent)} %`;
+      setText(element('zoom'), `${percent < 10 ? percent.toFixed(1) : Math.round(percent)} %`);
+      if (this.binning() > 1) this.loadPart();
     });
   }
 
@@ -197,7 +245,9 @@ export class FrameView {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
     if (!this.image) this.drawOutline(context);
-    if (this.view.scale * this.binning() >= VALUE_SCALE && this.image) this.drawValues(context);
+    for (const image of this.part ? [this.part] : [this.image]) {
+      if (image && this.view.scale * (image.binning || 1) >= VALUE_SCALE) this.drawValues(context, image);
+    }
     const wcs = this.details && this.details.wcs;
     if (this.sorted) {
       drawMarks(context, this.sorted, wcs, { toScreen: (x, y) => this.toScreen(x, y), scale: this.view.scale, width, height, shown: this.shown });
@@ -219,15 +269,15 @@ export class FrameView {
     context.strokeRect(a.x, a.y, b.x - a.x, b.y - a.y);
   }
 
-  drawValues(context) {
-    const { width, height } = this.size(), a = this.toFrame(0, 0), b = this.toFrame(width, height), image = this.image;
-    const n = this.binning(), side = this.view.scale * n, first = (at) => Math.max(0, Math.floor((at + 0.5) / n));
+  drawValues(context, image) {
+    const { width, height } = this.size(), a = this.toFrame(0, 0), b = this.toFrame(width, height), x0 = image.x || 0, y0 = image.y || 0;
+    const n = image.binning || 1, side = this.view.scale * n, first = (at) => Math.max(0, Math.floor((at + 0.5) / n));
     context.font = `${Math.min(13, Math.round(side / 3.6))}px system-ui, sans-serif`;
     context.textAlign = 'center';
     context.textBaseline = 'middle';
-    for (let y = first(a.y); y <= Math.min(image.height - 1, first(b.y)); y++) {
-      for (let x = first(a.x); x <= Math.min(image.width - 1, first(b.x)); x++) {
-        const at = this.toScreen((x + 0.5) * n - 0.5, (y + 0.5) * n - 0.5), text = String(image.data[y * image.width + x]);
+    for (let y = first(a.y - y0); y <= Math.min(image.height - 1, first(b.y - y0)); y++) {
+      for (let x = first(a.x - x0); x <= Math.min(image.width - 1, first(b.x - x0)); x++) {
+        const at = this.toScreen(x0 + (x + 0.5) * n - 0.5, y0 + (y + 0.5) * n - 0.5), text = String(image.data[y * image.width + x]);
         context.lineWidth = 2.5;
         context.strokeStyle = 'rgb(0 0 0 / 70%)';
         context.strokeText(text, at.x, at.y + 0.32 * side);
@@ -271,9 +321,9 @@ export class FrameView {
     if (place) {
       const x = Math.round(place.x), y = Math.round(place.y);
       parts.push(['Pixel', this.cursor.exact ? `${place.x.toFixed(1)}, ${place.y.toFixed(1)}` : `${x}, ${y}`]);
-      const frame = this.frameSize(), n = this.binning();
-      if (image && x >= 0 && y >= 0 && x < frame.width && y < frame.height) {
-        const dn = image.data[Math.floor(y / n) * image.width + Math.floor(x / n)], d = this.details;
+      const fine = valueAt(this.part, x, y), dn = fine === undefined ? valueAt(image, x, y) : fine, n = ((fine === undefined ? image : this.part) || {}).binning || 1;
+      if (dn !== undefined) {
+        const d = this.details;
         parts.push(['Value', n > 1 ? `${dn} DN (mean of ${n} × ${n})` : `${dn} DN`]);
         if (d && Number.isFinite(d.gain_e_per_dn)) {
           parts.push(['Charge', `${NUMBER.format((dn - (d.offset_dn || 0)) * d.gain_e_per_dn)} e−`]);
@@ -290,6 +340,9 @@ export class FrameView {
     } else {
       parts.push(['', 'Point at a pixel for its value and direction.']);
     }
+    const said = JSON.stringify(parts);
+    if (said === this.said) return;
+    this.said = said;
     element('readout').replaceChildren(...parts.map(([key, value]) => {
       const span = document.createElement('span');
       if (key) {

@@ -2,6 +2,8 @@
 import { getJson } from './api.js';
 import { changeFields, changesOf } from './changes.js';
 import { shortNumber } from './chart.js';
+import { binningAt, covers, partFor, WHOLE_PX } from './frame_parts.js';
+import { setText } from './text.js';
 
 /** Exposures whose track positions are drawn as trails, as those of recorded runs. */
 const TRAIL_EXPOSURES = 40;
@@ -58,19 +60,39 @@ export class Live {
     });
   }
 
+  /** Binning of a frame whose size is not known yet: that of the sensor. */
+  least() {
+    const { sensorWidth, sensorHeight } = this.app.frameView || {}, side = Math.max(sensorWidth || 0, sensorHeight || 0);
+    return Math.max(1, Math.ceil(side / WHOLE_PX));
+  }
+
   /** Pixels of a frame along one pixel of the screen while it runs; 1: each can be seen, or looked at. */
   binning() {
     const { frameView } = this.app;
-    if (!frameView || !this.state || this.state.paused || this.state.steps > 0) return 1;
+    if (!frameView || !this.state || this.state.paused || this.state.steps > 0) return this.least();
     return Math.max(1, Math.floor(1.02 / (frameView.view.scale * (devicePixelRatio || 1))));
+  }
+
+  /** The part of a frame that is too large to be sent whole; null: it is not too large. */
+  part() {
+    const { frameView } = this.app, { image } = frameView || {};
+    if (!image || !(Math.max(image.frameWidth, image.frameHeight) > WHOLE_PX)) return null;
+    return partFor(frameView.box(), frameView.frameSize(), binningAt(frameView.view.scale * (devicePixelRatio || 1)));
+  }
+
+  /** True if the image lacks something of what is to be seen. */
+  lacks(binning, part) {
+    const { frameView } = this.app, { image } = frameView || {};
+    if (!this.newest || !image) return false;
+    return part ? !covers(image, frameView.box(), frameView.frameSize(), part.binning) : image.binning > binning;
   }
 
   /** One request, which gets one answer. */
   ask() {
-    const binning = this.binning(), { image } = this.app.frameView || {};
-    // pixels that were binned are asked for again when they can be seen
-    const finer = this.newest && image && image.binning > binning;
-    const asked = { sensor: this.app.sensor, after: finer ? 0 : this.sequence, take: true, binning };
+    const part = this.part(), binning = part ? part.binning : this.binning();
+    // pixels that were binned, or left out, are asked for again when they can be seen
+    const asked = { sensor: this.app.sensor, after: this.lacks(binning, part) ? 0 : this.sequence, take: true, binning };
+    if (part) asked.part = { x: part.x, y: part.y, width: part.width, height: part.height };
     const next = this.state && this.state.obeyed === this.sentAt ? undefined : this.queue[0];
     if (next) asked.command = next;
     if (this.socket.readyState !== WebSocket.OPEN) return; // the next connection asks
@@ -110,8 +132,8 @@ export class Live {
     if (answer.sequence) {
       this.sequence = answer.sequence;
       const { width, height } = answer;
-      const pixels = width > 0 ? { width, height, data: new Uint16Array(data, 4 + length, width * height), binning: answer.binning || 1,
-        frameWidth: answer.frame_width || width, frameHeight: answer.frame_height || height } : null;
+      const pixels = width > 0 ? { width, height, data: new Uint16Array(data, 4 + length, width * height), binning: answer.binning,
+        frameWidth: answer.frame_width, frameHeight: answer.frame_height, x: answer.x, y: answer.y } : null;
       this.takeFrame(answer.frame, pixels);
     }
     if (answer.problem) this.sentAt = -1; // refused: it does not count
@@ -131,6 +153,7 @@ export class Live {
     this.trail.push({ id: details.exposure_id, tracks: details.tracks.map((track) => ({ ...track, now: false })) });
     if (this.trail.length > TRAIL_EXPOSURES) this.trail.shift();
     if (!sensor || !this.newest) return;
+    app.frameView.getPart = null; // it comes with the next answer
     const target = Object.entries(app.names).find(([, name]) => name === sensor.target);
     const all = { ...details, names: app.names, target: target ? Number(target[0]) : -1, tracks: details.tracks.concat(earlier) };
     app.frameView.show(pixels, all, details.dropped ? 'This frame was dropped.' : 'This run has no pixels.', !this.state.paused);
@@ -188,20 +211,20 @@ export class Live {
     element('live-newest').setAttribute('aria-pressed', String(newest));
   }
 
-  say(text) { element('live-message').textContent = text; }
+  say(text) { setText(element('live-message'), text); }
 
   describe(before, problem) {
     const { state } = this;
     const steers = this.controller && !state.ended;
     element('live').classList.toggle('watched', !state.steered);
-    element('live-time').textContent = `${state.time_s.toFixed(2)} / ${state.duration_s} s · ${
-      state.ended ? 'complete' : state.paused ? 'paused' : !state.steered ? 'running' : `${state.speed.toFixed(1)} × real time`}`;
-    element('live-run').textContent = this.running() ? 'Pause' : 'Run';
+    setText(element('live-time'), `${state.time_s.toFixed(2)} / ${state.duration_s} s · ${
+      state.ended ? 'complete' : state.paused ? 'paused' : !state.steered ? 'running' : `${state.speed.toFixed(1)} × real time`}`);
+    setText(element('live-run'), this.running() ? 'Pause' : 'Run');
     for (const id of ['live-run', 'live-step', 'live-rate', 'live-save', 'live-rewind', 'live-change', 'live-end']) element(id).disabled = !steers;
     element('live-branch').disabled = !this.controller;
     const refusal = performance.now() < this.refusal.until ? this.refusal.text : '';
     this.say(refusal || problem || state.message || (this.controller || !state.steered ? '' : 'Another page controls this run.'));
-    element('change-problem').textContent = refusal || problem || state.message;
+    setText(element('change-problem'), refusal || problem || state.message);
     if (before && state.obeyed > before.obeyed && this.queue.length === 0 && element('changes').open) this.fillChanges();
     if (this.shown === 0 && this.app.count === 0) element('no-pixels').textContent = this.waiting();
     const states = JSON.stringify(state.states);

@@ -1,6 +1,7 @@
 // Plots over time: modes as bands, one panel for each quantity, a common axis and cursor.
 import { getNumbers } from './api.js';
 import { decadesOf, drawCursor, drawLine, listenToChart, prepare, shortNumber, textsOf, ticksOf, valueAt } from './chart.js';
+import { setText } from './text.js';
 
 const LEFT = 58, RIGHT = 10, TOP = 8, BOTTOM = 16;
 const COLUMNS_MOST = 4096;
@@ -66,6 +67,7 @@ class Panel {
     const numbers = await getNumbers('plot', { sensor: this.plots.sensor, panel: this.info.name, from, to, columns }, signal);
     this.lines = readLines(numbers, this.info.lines.length);
     this.draw();
+    this.describe();
   }
 
   extent() {
@@ -88,7 +90,6 @@ class Panel {
     const { context, width, height } = prepare(this.canvas), style = getComputedStyle(document.documentElement);
     const colour = (name) => style.getPropertyValue(name).trim();
     const extent = this.extent(), bottom = height - BOTTOM, plots = this.plots;
-    this.describe();
     plots.drawBands(context, TOP, bottom, 0.13);
     context.font = '11px system-ui, sans-serif';
     context.fillStyle = colour('--faint');
@@ -119,7 +120,7 @@ class Panel {
   describe() {
     const texts = this.info.lines.map((name, k) => {
       const value = this.lines[k] ? valueAt(this.lines[k], this.plots.cursor) : NaN;
-      this.values[k].number.textContent = shortNumber(value);
+      setText(this.values[k].number, shortNumber(value));
       return `${name} ${shortNumber(value)}`;
     });
     this.canvas.setAttribute('aria-label', `${this.info.title}, at ${this.plots.cursor.toFixed(2)} s: ${texts.join(', ')} ${this.info.unit}`);
@@ -225,13 +226,15 @@ export class Plots {
   }
 
   draw() {
+    this.measured = element('modes').clientWidth;
     this.drawModes();
     for (const panel of this.panels) panel.draw();
+    for (const panel of this.panels) panel.describe(); // text last: a look at a canvas after it lays out the page
   }
 
   // ---------------------------------------------------------------- what all panels have
 
-  width() { return element('modes').clientWidth; }
+  width() { return this.measured || element('modes').clientWidth; }
 
   toX(time) {
     return LEFT + (time - this.range.from) / (this.range.to - this.range.from) * (this.width() - LEFT - RIGHT);

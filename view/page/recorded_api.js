@@ -84,7 +84,7 @@ function plotPart(numbers, { from, to }) {
   return Float64Array.from(found);
 }
 
-/** Pixels of a frame: means of `binning` x `binning`. @param {number} sensor @param {number} frame */
+/** Pixels of a frame: means of `binning` x `binning`, whatever part is asked for. @param {number} sensor @param {number} frame */
 export async function getPixels(sensor, frame) {
   const one = held.get(keyOf('pixels', { frame, sensor })), bytes = new Uint8Array(await get('pixels', { frame, sensor }));
   const { width, height, binning, frame: size } = one.dataset, count = bytes.length / 2, data = new Uint16Array(count);

@@ -1,0 +1,6 @@
+// Text of elements that is set many times a second.
+
+/** Sets the text of an element if it is another one: each set makes the browser lay out the page anew. @param {Element} element @param {string} text */
+export function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
