@@ -6,12 +6,14 @@
 #include "sim/core/json_member.h"
 #include "view/editor.h"
 #include "view/editor_drop.h"
+#include "view/noise_free.h"
 #include "view/request_guard.h"
 #include "view/scenario_list.h"
 #include "view/space.h"
 #include "view/space_shapes.h"
 #include "view/start_routes.h"
 #include "view/study_view.h"
+#include "view/track_history.h"
 #include "view/why.h"
 
 static bst_status schema_route(bst_ctx *ctx, bst_view_exchange *x) {
@@ -85,4 +87,7 @@ const bst_view_route bst_view_panel_routes[] = {
     {"api/study/open", true, bst_view_route_study_open},
     {"api/runs", false, bst_view_route_runs},
     {"api/why", false, bst_view_route_why},
+    {"api/reason", false, bst_view_route_reason},
+    {"api/track", false, bst_view_route_track},
+    {"api/noise_free", false, bst_view_route_noise_free},
     {NULL, false, NULL}};

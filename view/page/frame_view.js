@@ -23,6 +23,8 @@ export class FrameView {
     this.painter = makePainter(this.canvas, address.has('plain'), address.has('webgl'));
     /** @type {{ width: number, height: number, data: Uint16Array, binning?: number, frameWidth?: number, frameHeight?: number } | null} */
     this.image = null;
+    this.clean = null; // the frame without noise; null: not shown
+    this.cleanShown = false; // else the frame, in turn
     this.sensorWidth = this.sensorHeight = 0; // 0: unknown
     this.statistics = null;
     this.counted = 0; // time of the statistics
@@ -74,6 +76,19 @@ export class FrameView {
     if (counted) this.drawHistogram();
     this.redraw();
   }
+
+  /** The frame without noise, of the same size as the frame; null: none. @param {any} image @param {boolean} shown in place of the frame */
+  setClean(image, shown = true) {
+    const { image: frame } = this, fits = image && frame && image.width === frame.width && image.height === frame.height;
+    if (!fits && !this.clean) return;
+    this.clean = fits ? image : null;
+    this.cleanShown = Boolean(fits && shown);
+    element('clean-shown').hidden = !this.cleanShown;
+    this.redraw();
+  }
+
+  /** What is drawn now. */
+  get drawn() { return this.clean && this.cleanShown ? this.clean : this.image; }
 
   /** A canvas has one kind of context for life: the 2D painter needs a new one. */
   usePlain() {
@@ -184,7 +199,7 @@ export class FrameView {
     this.waiting = true;
     requestAnimationFrame(() => {
       this.waiting = false;
-      this.painter.draw(this.image, this.drawing());
+      this.painter.draw(this.drawn, this.drawing());
       this.drawOverlay();
       this.describeCursor();
       const percent = 100 * this.view.scale;
@@ -220,7 +235,7 @@ export class FrameView {
   }
 
   drawValues(context) {
-    const { width, height } = this.size(), a = this.toFrame(0, 0), b = this.toFrame(width, height), image = this.image;
+    const { width, height } = this.size(), a = this.toFrame(0, 0), b = this.toFrame(width, height), image = this.drawn;
     const n = this.binning(), side = this.view.scale * n, first = (at) => Math.max(0, Math.floor((at + 0.5) / n));
     context.font = `${Math.min(13, Math.round(side / 3.6))}px system-ui, sans-serif`;
     context.textAlign = 'center';
@@ -278,6 +293,10 @@ export class FrameView {
         if (d && Number.isFinite(d.gain_e_per_dn)) {
           parts.push(['Charge', `${NUMBER.format((dn - (d.offset_dn || 0)) * d.gain_e_per_dn)} e−`]);
         }
+        if (this.clean && d && Number.isFinite(d.gain_e_per_dn)) {
+          const expected = this.clean.data[y * this.clean.width + x];
+          parts.push(['Expected', `${NUMBER.format((expected - (d.offset_dn || 0)) * d.gain_e_per_dn)} e−`]);
+        }
         if (d && d.saturation_dn && dn >= d.saturation_dn) parts.push(['', 'saturated']);
       }
       if (this.details && this.details.wcs) {
@@ -320,6 +339,13 @@ export class FrameView {
       }
     }
     return text;
+  }
+
+  /** A click on a track, or a key at the pixel cursor: what made it is asked for. @param {{x: number, y: number}} place */
+  chooseAt(place) {
+    const reach = 14 / this.view.scale, away = (mark) => Math.hypot(mark.x - place.x, mark.y - place.y);
+    const [track] = (this.sorted && this.shown.tracks ? this.sorted.tracks : []).filter((mark) => away(mark) <= reach).sort((a, b) => away(a) - away(b));
+    if (track) document.dispatchEvent(new CustomEvent('trackchosen', { detail: track.id }));
   }
 
   moveCursor(dx, dy) {
@@ -376,16 +402,19 @@ export class FrameView {
       this.zoomTo(this.view.scale * 2 ** (-event.deltaY / 240), event.offsetX, event.offsetY);
     }, { passive: false });
     overlay.addEventListener('pointerdown', (event) => {
-      held = { x: event.clientX, y: event.clientY };
+      held = { x: event.clientX, y: event.clientY, firstX: event.clientX, firstY: event.clientY };
       overlay.setPointerCapture(event.pointerId);
     });
     overlay.addEventListener('pointermove', (event) => {
       this.cursor = { ...this.toFrame(event.offsetX, event.offsetY), exact: true };
       if (held) {
         this.pan(held.x - event.clientX, held.y - event.clientY);
-        held = { x: event.clientX, y: event.clientY };
+        Object.assign(held, { x: event.clientX, y: event.clientY });
       }
       this.redraw();
+    });
+    overlay.addEventListener('pointerup', (event) => {
+      if (held && Math.hypot(event.clientX - held.firstX, event.clientY - held.firstY) < 4) this.chooseAt(this.toFrame(event.offsetX, event.offsetY));
     });
     for (const name of ['pointerup', 'pointercancel']) overlay.addEventListener(name, () => { held = null; });
     overlay.addEventListener('pointerleave', () => { this.cursor = null; this.redraw(); });
