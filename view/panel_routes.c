@@ -6,6 +6,7 @@
 #include "sim/core/json_member.h"
 #include "view/editor.h"
 #include "view/editor_drop.h"
+#include "view/editor_speed.h"
 #include "view/noise_free.h"
 #include "view/request_guard.h"
 #include "view/scenario_list.h"
@@ -34,6 +35,10 @@ static bst_status check_route(bst_ctx *ctx, bst_view_exchange *x) {
 
 static bst_status loops_route(bst_ctx *ctx, bst_view_exchange *x) {
     return bst_view_editor_loops(ctx, x->body, &x->json);
+}
+
+static bst_status speed_route(bst_ctx *ctx, bst_view_exchange *x) {
+    return bst_view_editor_speed(ctx, x->body, &x->json);
 }
 
 static bst_status satellites_route(bst_ctx *ctx, bst_view_exchange *x) {
@@ -73,6 +78,7 @@ const bst_view_route bst_view_panel_routes[] = {
     {"api/editor/open", true, open_route},
     {"api/editor/check", true, check_route},
     {"api/editor/loops", true, loops_route},
+    {"api/editor/speed", true, speed_route},
     {"api/editor/satellites", true, satellites_route},
     {BST_VIEW_FILE_ROUTE, true, file_route},
     {"api/editor/save", true, save_route},
