@@ -62,9 +62,10 @@ int bst_cmd_check(int argc, char **argv) {
          .target = &figures,
          .path = BST_PATH_OUTPUT,
          .argument = "FILE",
-         .doc = "write limiting magnitudes, SNR of the targets, their fields and day, and disk space "
-                "as JSON; - prints "
-                "them in place of the scenario"},
+         .doc =
+             "write limiting magnitudes, SNR of the targets, their fields and day, and disk space "
+             "as JSON; - prints "
+             "them in place of the scenario"},
         {.name = "quiet",
          .kind = BST_OPTION_FLAG,
          .target = &quiet,
