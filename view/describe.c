@@ -6,6 +6,7 @@
 #include "boresight/version.h"
 #include "sim/core/json_member.h"
 #include "sim/core/json_number.h"
+#include "view/noise_free.h"
 #include "view/recorded_run.h"
 #include "view/recorded_run_internal.h"
 
@@ -41,6 +42,7 @@ static bst_status add_sensor(bst_ctx *ctx, bst_view_run *run, int number, cJSON 
     bst_json_add_number(node, "pixel_scale_arcsec", s->pixel_scale_arcsec);
     cJSON_AddNumberToObject(node, "frames", (double)s->count);
     bst_view_add_panels(run, s, cJSON_AddArrayToObject(node, "panels"));
+    bst_view_add_planes(run, s, node);
     return BST_OK;
 }
 

@@ -14,6 +14,8 @@
 enum { MARKS_MOST = 5000 };
 /* Earlier exposures whose track positions are sent. */
 enum { TRAIL_EXPOSURES = 40 };
+/* Earlier exposures whose states of tracks are sent: from the newest of them the page predicts. */
+enum { STATE_EXPOSURES = 6 };
 /* Orders of a SIP polynomial that are read. */
 enum { SIP_ORDER_MOST = 9 };
 
@@ -226,7 +228,10 @@ static void add_detection(cJSON *list, const bst_io_rows *rows, const bst_view_e
 static const char *const tracks[2] = {
     "tracks",
     "track_id, status, target_of_interest, x_px, y_px, snr, ra_deg, dec_deg, misses_in_row,"
-    " v_mag"};
+    " v_mag, time_s, rate_east_arcsec_per_s, rate_north_arcsec_per_s, cov_d1_d1_rad2,"
+    " cov_d1_d2_rad2, cov_d2_d2_rad2, cov_d1_r1_rad2ps, cov_d1_r2_rad2ps, cov_d2_r1_rad2ps,"
+    " cov_d2_r2_rad2ps, cov_r1_r1_rad2ps2, cov_r1_r2_rad2ps2, cov_r2_r2_rad2ps2"};
+enum { STATE_COLUMN = 11, STATE_NUMBERS = 13 }; /* of time_s; with what follows */
 
 static void add_track(cJSON *list, const bst_io_rows *rows, const bst_view_exposure *f) {
     cJSON *node = bst_view_add_object(list);
@@ -240,6 +245,18 @@ static void add_track(cJSON *list, const bst_io_rows *rows, const bst_view_expos
     bst_json_add_number(node, "dec_deg", bst_io_rows_real(rows, 8));
     cJSON_AddNumberToObject(node, "misses", (double)bst_io_rows_int(rows, 9));
     bst_json_add_number(node, "v_mag", bst_io_rows_real(rows, 10));
+    if (bst_io_rows_int(rows, 0) < f->id - STATE_EXPOSURES) {
+        return;
+    }
+    double state[STATE_NUMBERS];
+    bool known = true;
+    for (int i = 0; i < STATE_NUMBERS; i++) {
+        state[i] = bst_io_rows_real(rows, STATE_COLUMN + i);
+        known = known && isfinite(state[i]);
+    }
+    if (known) {
+        cJSON_AddItemToObject(node, "state", cJSON_CreateDoubleArray(state, STATE_NUMBERS));
+    }
 }
 
 /* Adds the WCS that the tables have, which lacks the distortion, where the header could not be

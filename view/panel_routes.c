@@ -6,12 +6,15 @@
 #include "sim/core/json_member.h"
 #include "view/editor.h"
 #include "view/editor_drop.h"
+#include "view/editor_speed.h"
+#include "view/noise_free.h"
 #include "view/request_guard.h"
 #include "view/scenario_list.h"
 #include "view/space.h"
 #include "view/space_shapes.h"
 #include "view/start_routes.h"
 #include "view/study_view.h"
+#include "view/track_history.h"
 #include "view/why.h"
 
 static bst_status schema_route(bst_ctx *ctx, bst_view_exchange *x) {
@@ -32,6 +35,10 @@ static bst_status check_route(bst_ctx *ctx, bst_view_exchange *x) {
 
 static bst_status loops_route(bst_ctx *ctx, bst_view_exchange *x) {
     return bst_view_editor_loops(ctx, x->body, &x->json);
+}
+
+static bst_status speed_route(bst_ctx *ctx, bst_view_exchange *x) {
+    return bst_view_editor_speed(ctx, x->body, &x->json);
 }
 
 static bst_status satellites_route(bst_ctx *ctx, bst_view_exchange *x) {
@@ -71,6 +78,7 @@ const bst_view_route bst_view_panel_routes[] = {
     {"api/editor/open", true, open_route},
     {"api/editor/check", true, check_route},
     {"api/editor/loops", true, loops_route},
+    {"api/editor/speed", true, speed_route},
     {"api/editor/satellites", true, satellites_route},
     {BST_VIEW_FILE_ROUTE, true, file_route},
     {"api/editor/save", true, save_route},
@@ -85,4 +93,7 @@ const bst_view_route bst_view_panel_routes[] = {
     {"api/study/open", true, bst_view_route_study_open},
     {"api/runs", false, bst_view_route_runs},
     {"api/why", false, bst_view_route_why},
+    {"api/reason", false, bst_view_route_reason},
+    {"api/track", false, bst_view_route_track},
+    {"api/noise_free", false, bst_view_route_noise_free},
     {NULL, false, NULL}};

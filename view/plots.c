@@ -5,7 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/json_member.h"
 #include "sim/core/memory.h"
+#include "view/plot_values.h"
 #include "view/recorded_run.h"
 #include "view/recorded_run_internal.h"
 
@@ -20,7 +22,12 @@ static const struct {
 } panels[] = {
     {"pointing_error", "Pointing error", "px"},
     {"snr", "SNR of the target", ""},
+    {"track_error", "Track error", "arcsec"},
+    {"innovation", "Innovation", "arcsec"},
     {"mount", "Mount angles", "deg"},
+    {"third_axis", "Third mount axis", "deg"},
+    {"limits", "At a limit", ""},
+    {"body_rate", "Body rate", "deg/s"},
     {"detections", "Detections", ""},
     {"attitude_error", "Attitude error, from stars", "arcsec"},
     {"background", "Background", "e-"},
@@ -28,12 +35,32 @@ static const struct {
 };
 enum { PANELS = sizeof panels / sizeof *panels };
 
-/* A line: time and value, or time and two components of which the length is the value. ?1: the
- * sensor; ?2: the target. */
+/* How the value of a line follows from the columns behind its time. */
+typedef enum value_kind {
+    VALUE_PLAIN,       /* one column */
+    VALUE_LENGTH,      /* two components */
+    VALUE_ANGLE,       /* right ascension and declination of two directions, deg */
+    VALUE_THREE_SIGMA, /* two variances, rad^2 */
+    VALUE_INNOVATION,  /* a state of a track (bst_view_track_state), after the one before it */
+    VALUE_INNOVATION_SIGMA,
+} value_kind;
+
+/* Columns of a state of the target's track. */
+#define TRACK_STATES                                                                              \
+    "SELECT time_s, track_id, misses_in_row, ra_deg, dec_deg, rate_east_arcsec_per_s,"            \
+    " rate_north_arcsec_per_s, cov_d1_d1_rad2, cov_d1_d2_rad2, cov_d2_d2_rad2, cov_d1_r1_rad2ps," \
+    " cov_d1_r2_rad2ps, cov_d2_r1_rad2ps, cov_d2_r2_rad2ps, cov_r1_r1_rad2ps2,"                   \
+    " cov_r1_r2_rad2ps2, cov_r2_r2_rad2ps2 FROM tracks WHERE sensor = ?1 AND target_of_interest"  \
+    " = 1"
+
+/* A line of a panel: its samples by time. ?1: the sensor; ?2: the target. `only`: the panel is
+ * left out if no row fits; "": any row does. */
 static const struct {
     int panel;
     const char *name, *table, *sql;
     bool of_target;
+    value_kind kind;
+    const char *only;
 } lines[BST_VIEW_LINES] = {
     {0, "true", "exposures",
      "SELECT e.mid_s, t.x_mid_px - e.boresight_x_px, t.y_mid_px - e.boresight_y_px"
@@ -41,41 +68,72 @@ static const struct {
      " FROM truth t JOIN (SELECT exposure_id, mid_s, boresight_x_px, boresight_y_px FROM exposures"
      " WHERE sensor = ?1 GROUP BY exposure_id) e ON e.exposure_id = t.exposure_id"
      " WHERE t.sensor = ?1 AND t.kind = 'object' AND t.id = ?2 AND t.in_field = 1",
-     true},
+     true, VALUE_LENGTH, ""},
     {0, "estimated by control", "control",
-     "SELECT time_s, aim_error_x_px, aim_error_y_px FROM control WHERE sensor = ?1", false},
+     "SELECT time_s, aim_error_x_px, aim_error_y_px FROM control WHERE sensor = ?1", false,
+     VALUE_LENGTH, ""},
     {1, "true", "truth",
      "SELECT mid_s, snr FROM truth WHERE sensor = ?1 AND kind = 'object' AND id = ?2"
      " AND in_field = 1",
-     true},
+     true, VALUE_PLAIN, ""},
     {1, "of the track", "tracks",
-     "SELECT time_s, snr FROM tracks WHERE sensor = ?1 AND target_of_interest = 1", false},
-    {2, "outer", "pointing", "SELECT time_s, axis_outer_deg FROM pointing WHERE sensor = ?1",
-     false},
-    {2, "inner", "pointing", "SELECT time_s, axis_inner_deg FROM pointing WHERE sensor = ?1",
-     false},
-    {3, "all", "detection_frames",
-     "SELECT mid_s, detections FROM detection_frames WHERE sensor = ?1", false},
-    {3, "identified stars", "detection_frames",
-     "SELECT mid_s, stars_identified FROM detection_frames WHERE sensor = ?1", false},
-    {4, "x", "track_frames",
-     "SELECT time_s, attitude_error_x_arcsec FROM track_frames WHERE sensor = ?1", false},
-    {4, "y", "track_frames",
-     "SELECT time_s, attitude_error_y_arcsec FROM track_frames WHERE sensor = ?1", false},
-    {4, "z", "track_frames",
-     "SELECT time_s, attitude_error_z_arcsec FROM track_frames WHERE sensor = ?1", false},
-    {5, "level", "detection_frames",
-     "SELECT mid_s, background_e FROM detection_frames WHERE sensor = ?1", false},
-    {5, "noise", "detection_frames",
-     "SELECT mid_s, noise_e FROM detection_frames WHERE sensor = ?1", false},
-    {6, "detections", "detection_frames",
+     "SELECT time_s, snr FROM tracks WHERE sensor = ?1 AND target_of_interest = 1", false,
+     VALUE_PLAIN, ""},
+    {2, "true", "tracks",
+     "SELECT t.time_s, t.ra_deg, t.dec_deg, u.ra_deg, u.dec_deg FROM tracks t JOIN (SELECT"
+     " exposure_id, ra_deg, dec_deg FROM truth WHERE sensor = ?1 AND kind = 'object' AND id = ?2"
+     " GROUP BY exposure_id) u ON u.exposure_id = t.exposure_id"
+     " WHERE t.sensor = ?1 AND t.target_of_interest = 1",
+     true, VALUE_ANGLE, "target_of_interest = 1"},
+    {2, "3σ of the filter", "tracks",
+     "SELECT time_s, cov_d1_d1_rad2, cov_d2_d2_rad2 FROM tracks WHERE sensor = ?1"
+     " AND target_of_interest = 1",
+     true, VALUE_THREE_SIGMA, "target_of_interest = 1"},
+    {3, "innovation", "tracks", TRACK_STATES, true, VALUE_INNOVATION, "target_of_interest = 1"},
+    {3, "3σ expected", "tracks", TRACK_STATES, true, VALUE_INNOVATION_SIGMA,
+     "target_of_interest = 1"},
+    {4, "outer", "pointing", "SELECT time_s, axis_outer_deg FROM pointing WHERE sensor = ?1", false,
+     VALUE_PLAIN, ""},
+    {4, "inner", "pointing", "SELECT time_s, axis_inner_deg FROM pointing WHERE sensor = ?1", false,
+     VALUE_PLAIN, ""},
+    {5, "third", "mount", "SELECT time_s, axis2_deg FROM mount WHERE sensor = ?1", false,
+     VALUE_PLAIN, "axes > 2"},
+    {6, "mount", "pointing", "SELECT time_s, limited FROM pointing WHERE sensor = ?1", false,
+     VALUE_PLAIN, "limited = 1"},
+    {6, "wheels", "mount", "SELECT time_s, wheels_saturated FROM mount WHERE sensor = ?1", false,
+     VALUE_PLAIN, "wheels_saturated = 1"},
+    {7, "x", "mount", "SELECT time_s, body_rate_x_degps FROM mount WHERE sensor = ?1", false,
+     VALUE_PLAIN, "body_rate_x_degps != 0"},
+    {7, "y", "mount", "SELECT time_s, body_rate_y_degps FROM mount WHERE sensor = ?1", false,
+     VALUE_PLAIN, "body_rate_y_degps != 0"},
+    {7, "z", "mount", "SELECT time_s, body_rate_z_degps FROM mount WHERE sensor = ?1", false,
+     VALUE_PLAIN, "body_rate_z_degps != 0"},
+    {8, "all", "detection_frames",
+     "SELECT mid_s, detections FROM detection_frames WHERE sensor = ?1", false, VALUE_PLAIN, ""},
+    {8, "identified stars", "detection_frames",
+     "SELECT mid_s, stars_identified FROM detection_frames WHERE sensor = ?1", false, VALUE_PLAIN,
+     ""},
+    {9, "x", "track_frames",
+     "SELECT time_s, attitude_error_x_arcsec FROM track_frames WHERE sensor = ?1", false,
+     VALUE_PLAIN, ""},
+    {9, "y", "track_frames",
+     "SELECT time_s, attitude_error_y_arcsec FROM track_frames WHERE sensor = ?1", false,
+     VALUE_PLAIN, ""},
+    {9, "z", "track_frames",
+     "SELECT time_s, attitude_error_z_arcsec FROM track_frames WHERE sensor = ?1", false,
+     VALUE_PLAIN, ""},
+    {10, "level", "detection_frames",
+     "SELECT mid_s, background_e FROM detection_frames WHERE sensor = ?1", false, VALUE_PLAIN, ""},
+    {10, "noise", "detection_frames",
+     "SELECT mid_s, noise_e FROM detection_frames WHERE sensor = ?1", false, VALUE_PLAIN, ""},
+    {11, "detections", "detection_frames",
      "SELECT mid_s, CAST(written_tick - end_tick AS REAL) / (SELECT tick_rate_hz FROM run)"
      " FROM detection_frames WHERE sensor = ?1",
-     false},
-    {6, "tracks", "track_frames",
+     false, VALUE_PLAIN, ""},
+    {11, "tracks", "track_frames",
      "SELECT time_s, CAST(written_tick - tick AS REAL) / (SELECT tick_rate_hz FROM run)"
      " FROM track_frames WHERE sensor = ?1",
-     false},
+     false, VALUE_PLAIN, ""},
 };
 
 /* Lines of the target's truth, and both at once: time and SNR, time and components of the error (no
@@ -87,13 +145,54 @@ static const char truth_sql[] =
     " FROM exposures WHERE sensor = ?1 GROUP BY exposure_id) e ON e.exposure_id = t.exposure_id"
     " WHERE t.id = ?2 AND t.sensor = ?1 AND t.kind = 'object' AND t.in_field = 1";
 
-/* True if the table of a line has rows of the sensor. */
+/* True if the table of a line has rows of the sensor that make its panel worth showing. */
 static bool is_recorded(const bst_view_run *run, const bst_view_sensor *s, int line) {
-    char sql[120];
-    snprintf(sql, sizeof sql, "SELECT EXISTS(SELECT 1 FROM %s WHERE sensor = ?1)",
-             lines[line].table);
+    char sql[160];
+    const char *only = lines[line].only;
+    snprintf(sql, sizeof sql, "SELECT EXISTS(SELECT 1 FROM %s WHERE sensor = ?1%s%s)",
+             lines[line].table, only[0] ? " AND " : "", only);
     return (!lines[line].of_target || s->target >= 0) &&
            bst_run_reader_int(run->reader, sql, s->sensor.index, 0) == 1;
+}
+
+/* Adds the stops of the mount's axes to its panel: [{line, low, high}], deg. A mount whose type the
+ * viewer does not know has none. */
+static void add_stops(const bst_view_run *run, const bst_view_sensor *s, cJSON *panel) {
+    const cJSON *node = NULL, *gimbal = NULL,
+                *observers = bst_json_member(bst_run_reader_scenario(run->reader), "observers");
+    cJSON *stops = cJSON_AddArrayToObject(panel, "stops");
+    cJSON_ArrayForEach(node, observers) {
+        const cJSON *sensor, *name = bst_json_member(node, "name");
+        cJSON_ArrayForEach(sensor, bst_json_member(node, "sensors")) {
+            const cJSON *own = bst_json_member(sensor, "name");
+            if (cJSON_IsString(name) && cJSON_IsString(own) &&
+                strcmp(name->valuestring, s->sensor.observer) == 0 &&
+                strcmp(own->valuestring, s->sensor.name) == 0) {
+                gimbal = bst_json_member(bst_json_member(sensor, "modules"), "gimbal");
+            }
+        }
+    }
+    const cJSON *inner = bst_json_member(gimbal, "inner_travel_deg");
+    const cJSON *low = bst_json_member(gimbal, "travel_min_deg");
+    const cJSON *high = bst_json_member(gimbal, "travel_max_deg");
+    for (int axis = 0; axis < 2; axis++) {
+        const cJSON *a = cJSON_GetArrayItem(low, axis), *b = cJSON_GetArrayItem(high, axis);
+        double ends[2] = {0.0, 0.0};
+        if (cJSON_IsNumber(a) && cJSON_IsNumber(b)) {
+            ends[0] = a->valuedouble;
+            ends[1] = b->valuedouble;
+        } else if (axis == 1 && cJSON_IsNumber(inner)) {
+            ends[0] = -inner->valuedouble;
+            ends[1] = inner->valuedouble;
+        }
+        if (ends[0] < ends[1]) {
+            cJSON *stop = cJSON_CreateObject();
+            cJSON_AddItemToArray(stops, stop);
+            cJSON_AddNumberToObject(stop, "line", axis);
+            cJSON_AddNumberToObject(stop, "low", ends[0]);
+            cJSON_AddNumberToObject(stop, "high", ends[1]);
+        }
+    }
 }
 
 void bst_view_add_panels(const bst_view_run *run, const bst_view_sensor *s, cJSON *out) {
@@ -115,6 +214,9 @@ void bst_view_add_panels(const bst_view_run *run, const bst_view_sensor *s, cJSO
         cJSON_AddStringToObject(node, "title", panels[k].title);
         cJSON_AddStringToObject(node, "unit", panels[k].unit);
         cJSON_AddItemToObject(node, "lines", names);
+        if (strcmp(panels[k].name, "mount") == 0) {
+            add_stops(run, s, node);
+        }
         cJSON_AddItemToArray(out, node);
     }
 }
@@ -135,6 +237,49 @@ static void make_room(bst_view_run *run, const bst_view_line *keep) {
         run->samples -= oldest->count;
         free(oldest->samples);
         *oldest = (bst_view_line){.samples = NULL};
+    }
+}
+
+static bst_view_track_state read_state(const bst_io_rows *r) {
+    return (bst_view_track_state){
+        .time_s = bst_io_rows_real(r, 0),
+        .track = bst_io_rows_int(r, 1),
+        .misses_in_row = bst_io_rows_int(r, 2),
+        .ra_deg = bst_io_rows_real(r, 3),
+        .dec_deg = bst_io_rows_real(r, 4),
+        .rate_arcsec_per_s = {bst_io_rows_real(r, 5), bst_io_rows_real(r, 6)},
+        .d11 = bst_io_rows_real(r, 7),
+        .d12 = bst_io_rows_real(r, 8),
+        .d22 = bst_io_rows_real(r, 9),
+        .dr = {{bst_io_rows_real(r, 10), bst_io_rows_real(r, 11)},
+               {bst_io_rows_real(r, 12), bst_io_rows_real(r, 13)}},
+        .r11 = bst_io_rows_real(r, 14),
+        .r12 = bst_io_rows_real(r, 15),
+        .r22 = bst_io_rows_real(r, 16)};
+}
+
+/* Value of a row; NAN: none. `before`: state of the row before, which becomes that of this row. */
+static double value_of(const bst_io_rows *rows, value_kind kind, bst_view_track_state *before) {
+    double innovation, sigma3;
+    switch (kind) {
+        case VALUE_LENGTH:
+            return hypot(bst_io_rows_real(rows, 1), bst_io_rows_real(rows, 2));
+        case VALUE_ANGLE:
+            return bst_view_angle_arcsec(bst_io_rows_real(rows, 1), bst_io_rows_real(rows, 2),
+                                         bst_io_rows_real(rows, 3), bst_io_rows_real(rows, 4));
+        case VALUE_THREE_SIGMA:
+            return bst_view_three_sigma_arcsec(bst_io_rows_real(rows, 1),
+                                               bst_io_rows_real(rows, 2));
+        case VALUE_INNOVATION:
+        case VALUE_INNOVATION_SIGMA: {
+            bst_view_track_state now = read_state(rows);
+            bool found = bst_view_innovation(before, &now, &innovation, &sigma3);
+            *before = now;
+            return !found ? NAN : kind == VALUE_INNOVATION ? innovation : sigma3;
+        }
+        case VALUE_PLAIN:
+        default:
+            return bst_io_rows_real(rows, 1);
     }
 }
 
@@ -168,7 +313,7 @@ static bst_status keep_line(bst_ctx *ctx, bst_status status, bst_view_run *run, 
         free(c->samples);
         return status;
     }
-    bst_view_sort(c->samples, c->count);
+    bst_io_sort_samples(c->samples, c->count);
     line->samples = c->samples ? c->samples : calloc(1, sizeof *line->samples);
     line->count = c->count;
     run->samples += line->count;
@@ -177,16 +322,14 @@ static bst_status keep_line(bst_ctx *ctx, bst_status status, bst_view_run *run, 
 }
 
 /* Reads the rows of a query as the samples of a line. */
-static bst_status read_line(bst_ctx *ctx, bst_view_run *run, bst_io_rows *rows,
+static bst_status read_line(bst_ctx *ctx, bst_view_run *run, bst_io_rows *rows, value_kind kind,
                             bst_view_line *line) {
-    const bool vector = bst_io_rows_columns(rows) == 3;
+    bst_view_track_state before = {.track = -1};
     collected c = {.samples = NULL};
     bst_status status;
     bool more;
     while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
-        const double value = bst_io_rows_real(rows, 1);
-        status = collect(ctx, &c, bst_io_rows_real(rows, 0),
-                         vector ? hypot(value, bst_io_rows_real(rows, 2)) : value);
+        status = collect(ctx, &c, bst_io_rows_real(rows, 0), value_of(rows, kind, &before));
         if (status != BST_OK) {
             break;
         }
@@ -227,7 +370,8 @@ static bst_status need_line(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s,
     bst_io_rows *rows = NULL;
     const bool known = !lines[k].of_target || s->target >= 0;
     bst_view_line *error = &s->lines[TRUE_ERROR], *snr = &s->lines[TRUE_SNR];
-    const bool both = known && lines[k].of_target && !error->samples && !snr->samples;
+    const bool both =
+        known && (k == TRUE_ERROR || k == TRUE_SNR) && !error->samples && !snr->samples;
     if (both && bst_io_rows_open(&ignored, run->reader, truth_sql, s->sensor.index, s->target,
                                  &rows) == BST_OK) {
         bst_status status = read_truth(ctx, run, rows, error, snr);
@@ -239,7 +383,7 @@ static bst_status need_line(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s,
         line->samples = calloc(1, sizeof *line->samples);
         return line->samples ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
-    bst_status status = read_line(ctx, run, rows, line);
+    bst_status status = read_line(ctx, run, rows, lines[k].kind, line);
     bst_io_rows_close(rows);
     return status;
 }

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "boresight/vec.h"
+#include "view/plot_values.h"
 #include "view/recorded_run_internal.h"
 
 /* Sources of an exposure that are compared with the target. */
@@ -20,7 +21,7 @@ typedef struct cursor {
 typedef struct tables {
     const bst_view_run *run;
     const bst_view_sensor *sensor;
-    cursor truth, frames, detections, tracks;
+    cursor truth, frames, detections, tracks, track_frames;
 } tables;
 
 /* A source of the truth. */
@@ -36,6 +37,7 @@ typedef struct frame_sources {
     int count;
     bool listed;
     double x, y, dx, dy;             /* target: middle, and its path */
+    double ra_deg, dec_deg;          /* target */
     double detection_x, detection_y; /* nearest detection */
     double detection_variance;       /* per axis, px^2 */
 } frame_sources;
@@ -69,7 +71,7 @@ static bst_status next_of(bst_ctx *ctx, cursor *c, int64_t exposure, bool first,
 }
 
 static void close_tables(tables *t) {
-    cursor *all[] = {&t->truth, &t->frames, &t->detections, &t->tracks};
+    cursor *all[] = {&t->truth, &t->frames, &t->detections, &t->tracks, &t->track_frames};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
         if (all[i]->rows) {
             bst_io_rows_close(all[i]->rows);
@@ -78,18 +80,20 @@ static void close_tables(tables *t) {
 }
 
 static bst_status open_tables(bst_ctx *ctx, tables *t, int64_t exposure) {
-    BST_TRY(open_cursor(ctx, t, "truth",
-                        "kind, id, in_field, occulted, saturated, x_mid_px, y_mid_px, x_start_px, "
-                        "y_start_px, x_end_px, y_end_px, v_mag, snr, sunlit_fraction",
-                        exposure, &t->truth));
+    BST_TRY(
+        open_cursor(ctx, t, "truth",
+                    "kind, id, in_field, occulted, saturated, x_mid_px, y_mid_px, x_start_px, "
+                    "y_start_px, x_end_px, y_end_px, v_mag, snr, sunlit_fraction, ra_deg, dec_deg",
+                    exposure, &t->truth));
     BST_TRY(open_cursor(ctx, t, "detection_frames", "threshold_snr, lost", exposure, &t->frames));
     BST_TRY(open_cursor(ctx, t, "detections",
                         "x_px, y_px, label, snr, blend, cov_xx_px2, cov_yy_px2", exposure,
                         &t->detections));
-    return open_cursor(
-        ctx, t, "tracks",
-        "track_id, status, x_px, y_px, misses_in_row, cov_d1_d1_rad2, cov_d2_d2_rad2", exposure,
-        &t->tracks);
+    BST_TRY(open_cursor(ctx, t, "track_frames", "attitude_valid", exposure, &t->track_frames));
+    return open_cursor(ctx, t, "tracks",
+                       "track_id, status, x_px, y_px, misses_in_row, cov_d1_d1_rad2, "
+                       "cov_d2_d2_rad2, ra_deg, dec_deg",
+                       exposure, &t->tracks);
 }
 
 /* ------------------------------------------------------------------ an exposure */
@@ -115,6 +119,8 @@ static bst_status read_truth(bst_ctx *ctx, tables *t, int64_t exposure, frame_so
             s->dy = bst_io_rows_real(r, 11) - bst_io_rows_real(r, 9);
             f->snr = bst_io_rows_real(r, 13);
             f->sunlit_fraction = bst_io_rows_real(r, 14);
+            s->ra_deg = bst_io_rows_real(r, 15);
+            s->dec_deg = bst_io_rows_real(r, 16);
         } else if (s->count < SOURCES_MOST) {
             s->items[s->count++] = (source){bst_io_rows_real(r, 6), bst_io_rows_real(r, 7),
                                             bst_io_rows_real(r, 12), bst_io_rows_int(r, 2), star};
@@ -190,8 +196,13 @@ static bst_status read_tracks(bst_ctx *ctx, tables *t, int64_t exposure, const f
             snprintf(status, 32, "%s", bst_io_rows_text(r, 2));
             continue;
         }
+        /* x, y of a track that was not updated are those of an earlier frame: its direction counts,
+         * from that of the target, which a detection within reach is taken for */
         double distance =
-            hypot(x - (seen ? s->detection_x : s->x), y - (seen ? s->detection_y : s->y));
+            updated ? hypot(x - (seen ? s->detection_x : s->x), y - (seen ? s->detection_y : s->y))
+                    : bst_view_angle_arcsec(bst_io_rows_real(r, 8), bst_io_rows_real(r, 9),
+                                            s->ra_deg, s->dec_deg) /
+                          t->sensor->pixel_scale_arcsec;
         if (distance < (isnan(f->near_px) ? INFINITY : f->near_px)) {
             double variance = 0.5 * (bst_io_rows_real(r, 6) + bst_io_rows_real(r, 7));
             f->near_px = distance;
@@ -216,8 +227,10 @@ static bst_status explain(bst_ctx *ctx, tables *t, const bst_view_exposure *e, s
                             .near_sigma = NAN};
     char status[32] = "", name[64] = "another object";
     int64_t object = -1;
-    bool processed;
+    bool processed, tracked;
     BST_TRY(read_truth(ctx, t, e->id, &s, &f));
+    BST_TRY(next_of(ctx, &t->track_frames, e->id, true, &tracked));
+    f.no_attitude = tracked && bst_io_rows_int(t->track_frames.rows, 1) == 0;
     BST_TRY(next_of(ctx, &t->frames, e->id, true, &processed));
     f.processed = processed;
     if (processed) {
@@ -315,4 +328,8 @@ bst_status bst_view_why(bst_ctx *ctx, bst_view_exchange *x, int64_t first, int64
 
 bst_status bst_view_route_why(bst_ctx *ctx, bst_view_exchange *x) {
     return bst_view_why(ctx, x, x->frame - BST_VIEW_WHY_AROUND, x->frame + BST_VIEW_WHY_AROUND);
+}
+
+bst_status bst_view_route_reason(bst_ctx *ctx, bst_view_exchange *x) {
+    return bst_view_why(ctx, x, x->frame, x->frame);
 }

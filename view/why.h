@@ -24,6 +24,7 @@ typedef struct bst_view_why_facts {
     const char *object;                 /* its name */
     double detection_px, detection_snr; /* nearest detection */
     bool is_star, is_blend;             /* its label and flag */
+    bool no_attitude;                   /* the tracker found none from the stars of the frame */
     long long track;                    /* that the detection updated; 0: none */
     const char *track_status;
     long long near_track;       /* nearest other one; 0: none */
@@ -34,9 +35,9 @@ typedef struct bst_view_why_facts {
 /* Finds the reason.
  *
  * Returned:  text    [bytes] a sentence
- *            the reason's word: "tracked", "detected", "gated", "star", "dropped", "unlisted",
- * "outside", "occulted", "dark", "unprocessed", "saturated", "merged", "near_star", "faint" or
- * "chance" */
+ *            the reason's word: "tracked", "detected", "gated", "no_attitude", "star", "dropped",
+ * "unlisted", "outside", "occulted", "dark", "unprocessed", "saturated", "merged", "near_star",
+ * "faint" or "chance" */
 const char *bst_view_why_reason(const bst_view_why_facts *facts, char *text, size_t bytes);
 
 /* Reasons for exposures first to last of the list, as far as there are any: {target, frame: {kind,
@@ -47,6 +48,9 @@ const char *bst_view_why_reason(const bst_view_why_facts *facts, char *text, siz
  * Errors:    BST_ERR_NOT_FOUND: no such sensor or frame; BST_ERR_FORMAT: damaged tables */
 bst_status bst_view_why(bst_ctx *ctx, bst_view_exchange *x, int64_t first,
                         int64_t last) BST_MUST_CHECK;
+
+/* The route of one frame: bst_view_why for x->frame alone. */
+bst_status bst_view_route_reason(bst_ctx *ctx, bst_view_exchange *x) BST_MUST_CHECK;
 
 /* The route: bst_view_why for BST_VIEW_WHY_AROUND exposures before and after x->frame. */
 bst_status bst_view_route_why(bst_ctx *ctx, bst_view_exchange *x) BST_MUST_CHECK;

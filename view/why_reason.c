@@ -20,6 +20,13 @@ static const char *say_detected(const bst_view_why_facts *f, char *text, size_t 
         snprintf(text, bytes, "%s; it updated track %lld (%s)", found, f->track, f->track_status);
         return "tracked";
     }
+    if (f->no_attitude) {
+        snprintf(text, bytes,
+                 "%s, but the tracker found no attitude from stars that is good enough to measure "
+                 "its direction",
+                 found);
+        return "no_attitude";
+    }
     if (f->near_track > 0 && f->near_coasts && isfinite(f->near_sigma)) {
         snprintf(text, bytes, "%s, but %.1f px from where track %lld expected it: about %.1f sigma",
                  found, f->near_px, f->near_track, f->near_sigma);

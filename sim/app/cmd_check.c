@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "sim/analysis/check/check_figures.h"
+#include "sim/analysis/check/check_preview.h"
 #include "sim/analysis/check/scenario_rules.h"
 #include "sim/app/app.h"
 #include "sim/cli/command_line.h"
@@ -30,6 +31,12 @@ static int report(bst_ctx *ctx, const bst_scenario *scenario, const bst_simulati
     if (status == BST_OK && figures) {
         cJSON *node;
         status = bst_check_figures(ctx, scenario, sim, &node);
+        if (status == BST_OK) {
+            status = bst_check_preview(ctx, scenario, sim, node);
+            if (status != BST_OK) {
+                cJSON_Delete(node);
+            }
+        }
         status = status == BST_OK ? bst_cli_write_json(ctx, figures, node) : status;
         quiet |= strcmp(figures, "-") == 0;
     }
@@ -55,8 +62,10 @@ int bst_cmd_check(int argc, char **argv) {
          .target = &figures,
          .path = BST_PATH_OUTPUT,
          .argument = "FILE",
-         .doc = "write limiting magnitudes, SNR of the targets and disk space as JSON; - prints "
-                "them in place of the scenario"},
+         .doc =
+             "write limiting magnitudes, SNR of the targets, their fields and day, and disk space "
+             "as JSON; - prints "
+             "them in place of the scenario"},
         {.name = "quiet",
          .kind = BST_OPTION_FLAG,
          .target = &quiet,

@@ -139,6 +139,52 @@ class Server(unittest.TestCase):
         loops = self.editor.well("loops", text=json.dumps(text))["loops"]
         self.assertEqual(loops, json.loads(runs.call_well("loop", base, "--json", "-", "--set", runs.GENERATOR, "--set", SHORT)))
 
+    def test_preview(self):
+        """Stars of the field are the catalogue's that the run has in its truth, in the tangent plane of the target; the day is
+        what a check with a later epoch finds."""
+        base = os.path.join(self.base, "neossat_geo_stare.json")
+        text = {"extends": base, "set": {runs.GENERATOR.split("=")[0]: "generator", SHORT.split("=")[0]: 0.04}}
+        sensor = self.check(text)["figures"]["sensors"][0]
+        sky, day = sensor["sky"], sensor["day"]
+        ra, dec = math.radians(sky["ra_deg"]), math.radians(sky["dec_deg"])
+        with sqlite3.connect(os.path.join(self.made, "run.sqlite")) as tables:
+            stars = tables.execute("SELECT DISTINCT ra_deg, dec_deg, v_mag FROM truth WHERE kind = 'star' AND in_field = 1").fetchall()
+        self.assertEqual(len(sky["stars"]), sky["total"])
+        listed, matched = numpy.array(sky["stars"]), 0
+        for star_ra, star_dec, v in stars:
+            a, d = math.radians(star_ra) - ra, math.radians(star_dec)
+            depth = math.sin(d) * math.sin(dec) + math.cos(d) * math.cos(dec) * math.cos(a)
+            east, north = (math.degrees(one / depth) for one in (math.cos(d) * math.sin(a), math.sin(d) * math.cos(dec) - math.cos(d) * math.sin(dec) * math.cos(a)))
+            if math.hypot(east, north) < 0.6 and v < sky["v_limit"]:  # half a diagonal is 0.603 deg
+                # 1e-8 deg: rounding; the catalogue's V has 32 bits
+                self.assertLess(numpy.abs(listed - (east, north, v)).max(axis=1).min(), 1e-6)
+                matched += 1
+        self.assertGreater(matched, 10)
+        self.assertEqual((len(day["v_mag"]), day["step_s"], day["v_mag"][0]), (145, 600, sensor["target"]["states"][0]["v_mag"]))
+        with open(base, encoding="utf-8") as file:
+            epoch = json.load(file)["epoch_utc"]
+        hour = int(epoch[11:13])
+        later = self.check({**text, "epoch_utc": f"{epoch[:11]}{hour - 6:02d}{epoch[13:]}"})["figures"]["sensors"][0]["day"]
+        for key, within in (("v_mag", 1e-6), ("sunlit_fraction", 1e-6)):  # the same instants, by other numbers of seconds
+            for one, other in zip(day[key][:100], later[key][36:136]):
+                self.assertAlmostEqual(one or 0, other or 0, delta=within)
+        self.assertEqual(day["occulted"][:100], later["occulted"][36:136])
+        self.assertTrue(0 < sum(day["occulted"]) < 145)
+
+    def test_speed(self):
+        """A trial run's speed, or why there is none; nothing remains of it."""
+        base = os.path.join(self.base, "neossat_geo_stare.json")
+        text = json.dumps({"extends": base, "set": {runs.GENERATOR.split("=")[0]: "generator"}})
+        folder = os.environ.get("TMPDIR", "/tmp")
+        before = set(glob.glob(folder + "/boresight-speed-*"))
+        found = self.editor.well("speed", text=text, duration_s=2)
+        self.assertEqual(found["duration_s"], 2)
+        self.assertGreater(found["real_time_factor"], 0)
+        self.assertIn("out of range", self.editor.well("speed", text=json.dumps({"extends": base, "set": {PSF: 60}}), duration_s=2)["problem"])
+        for wrong in (0, -1, 601, "2", None):
+            self.assertEqual(self.editor.post("speed", text=text, duration_s=wrong)[0], 400, wrong)
+        self.assertEqual(set(glob.glob(folder + "/boresight-speed-*")), before)
+
     def test_save(self):
         """Only into the folder, whole, and over nothing that is there unless asked."""
         base = os.path.join(self.base, "day_generator.json")

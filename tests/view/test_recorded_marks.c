@@ -4,7 +4,9 @@
 #include "boresight/vec.h"
 #include "tests/report/run_tables.h"
 #include "tests/test_support.h"
+#include "view/noise_free.h"
 #include "view/recorded_run_internal.h"
+#include "view/track_history.h"
 #include "view/why.h"
 
 enum { FRAMES = 9, RATE = 250, SHOWN = 4 };
@@ -61,7 +63,8 @@ static void make_tables(run_tables *t) {
         "CREATE TABLE truth (sensor INT, exposure_id INT, kind TEXT, id INT, norad INT,"
         " in_field INT, occulted INT, saturated INT, x_centroid_px REAL, y_centroid_px REAL,"
         " x_mid_px REAL, y_mid_px REAL, x_start_px REAL, y_start_px REAL, x_end_px REAL,"
-        " y_end_px REAL, v_mag REAL, snr REAL, sunlit_fraction REAL, mid_s REAL);",
+        " y_end_px REAL, v_mag REAL, snr REAL, sunlit_fraction REAL, mid_s REAL, ra_deg REAL,"
+        " dec_deg REAL);",
         RATE);
     run_tables_sql(
         t,
@@ -70,14 +73,17 @@ static void make_tables(run_tables *t) {
         " background_e REAL, noise_e REAL, threshold_snr REAL, lost INT);"
         "CREATE TABLE detections (sensor INT, exposure_id INT, label TEXT, star_id INT,"
         " x_px REAL, y_px REAL, cov_xx_px2 REAL, cov_xy_px2 REAL, cov_yy_px2 REAL, flux_e REAL,"
-        " snr REAL, length_px REAL, angle_deg REAL, v_mag REAL, blend INT);"
+        " snr REAL, length_px REAL, angle_deg REAL, v_mag REAL, blend INT, streak INT);"
         "CREATE TABLE tracks (sensor INT, exposure_id INT, time_s REAL, track_id INT,"
         " status TEXT, target_of_interest INT, x_px REAL, y_px REAL, snr REAL, ra_deg REAL,"
         " dec_deg REAL, misses_in_row INT, v_mag REAL, cov_d1_d1_rad2 REAL,"
-        " cov_d2_d2_rad2 REAL);"
+        " cov_d2_d2_rad2 REAL, rate_east_arcsec_per_s REAL, rate_north_arcsec_per_s REAL,"
+        " cov_d1_d2_rad2 REAL, cov_d1_r1_rad2ps REAL, cov_d1_r2_rad2ps REAL,"
+        " cov_d2_r1_rad2ps REAL, cov_d2_r2_rad2ps REAL, cov_r1_r1_rad2ps2 REAL,"
+        " cov_r1_r2_rad2ps2 REAL, cov_r2_r2_rad2ps2 REAL, hits INT, first_tick INT);"
         "CREATE TABLE track_frames (sensor INT, exposure_id INT, time_s REAL, tick INT,"
         " written_tick INT, attitude_error_x_arcsec REAL, attitude_error_y_arcsec REAL,"
-        " attitude_error_z_arcsec REAL);"
+        " attitude_error_z_arcsec REAL, attitude_valid INT);"
         "CREATE TABLE control (sensor INT, time_s REAL, mode TEXT, aim_error_x_px REAL,"
         " aim_error_y_px REAL);"
         "CREATE TABLE pointing (sensor INT, time_s REAL, axis_outer_deg REAL,"
@@ -100,19 +106,19 @@ static void add_rows(run_tables *t, int i, int sensor, double more) {
     double x = 100.0 + 8 * i + more, y = 150.0 + 5 * i;
     run_tables_sql(t,
                    "INSERT INTO truth VALUES (%d,%d,'object',7,25544,1,%d,%d,%.17g,%.17g,%.17g,"
-                   "%.17g,%.17g,%.17g,%.17g,%.17g,8.5,%.17g,0.75,%.17g)",
+                   "%.17g,%.17g,%.17g,%.17g,%.17g,8.5,%.17g,0.75,%.17g,121.501,-34.25)",
                    sensor, id, i == 4, i == 4, x + 0.125, y - 0.25, x, y, x - 6.0, y - 2.5, x + 6.0,
                    y + 2.5, 12.0 + i, at);
     run_tables_sql(t,
                    "INSERT INTO truth VALUES (%d,%d,'object',8,0,1,0,0,%.17g,%.17g,%.17g,%.17g,0,0,"
-                   "0,0,9.5,3.0,1.0,%.17g), (%d,%d,'object',3,0,1,0,0,400,300,400,300,0,0,0,0,"
-                   "9.5,3.0,1.0,%.17g)",
+                   "0,0,9.5,3.0,1.0,%.17g,1,2), (%d,%d,'object',3,0,1,0,0,400,300,400,300,0,0,0,0,"
+                   "9.5,3.0,1.0,%.17g,1,2)",
                    sensor, id, x + 40.0, y, x + 40.0, y + 3.0, at, sensor, id, at);
     run_tables_sql(
         t,
         "INSERT INTO truth VALUES (%d,%d,'star',77,0,1,0,0,%.17g,%.17g,%.17g,%.17g,0,0,0,"
-        "0,7.25,30.0,1.0,%.17g), (%d,%d,'star',78,0,0,0,0,-5,-6,-5,-6,0,0,0,0,"
-        "9.5,3.0,1.0,%.17g)",
+        "0,7.25,30.0,1.0,%.17g,1,2), (%d,%d,'star',78,0,0,0,0,-5,-6,-5,-6,0,0,0,0,"
+        "9.5,3.0,1.0,%.17g,1,2)",
         sensor, id, x - 3.0, y + 15.0, x - 3.0, y + 15.0, at, sensor, id, at);
     run_tables_sql(t,
                    "INSERT INTO detection_frames VALUES (%d,%d,%.17g,%d,%d,%d,%d,%d,%.17g,%.17g,"
@@ -121,18 +127,20 @@ static void add_rows(run_tables *t, int i, int sensor, double more) {
                    50.5 + i, 7.5 - 0.1 * i, 5.25, i);
     run_tables_sql(t,
                    "INSERT INTO detections VALUES (%d,%d,'star',77,%.17g,%.17g,0.9,-0.4,0.3,1000,"
-                   "20,9,35,7.5,0), (%d,%d,'unknown',0,%.17g,%.17g,0.18,0.09,0.36,2000,15,18,-40,"
-                   "8.25,1)",
+                   "20,9,35,7.5,0,0), (%d,%d,'unknown',0,%.17g,%.17g,0.18,0.09,0.36,2000,15,18,-40,"
+                   "8.25,1,1)",
                    sensor, id, x - 30.0, y + 15.5, sensor, id, x + 6.9, y + 2.8);
     run_tables_sql(t,
                    "INSERT INTO tracks VALUES (%d,%d,%.17g,4,'confirmed',1,%.17g,%.17g,14.5,120.5,"
-                   "-33.25,0,8.75,1e-10,2e-10), (%d,%d,%.17g,9,'tentative',0,%.17g,%.17g,5.5,121.5,"
-                   "-34.25,%d,9.75,3e-10,5e-10)",
-                   sensor, id, at + 0.1, x + 6.9, y + 2.8, sensor, id, at + 0.1, x + 10.0, y - 5.0,
-                   i == 4 ? 2 : 0);
-    run_tables_sql(t, "INSERT INTO track_frames VALUES (%d,%d,%.17g,%d,%d,%.17g,%.17g,%.17g)",
+                   "-33.25,0,8.75,1e-10,2e-10,3,4,5e-11,6e-11,7e-11,8e-11,9e-11,1e-11,2e-11,"
+                   "3e-11,%d,%d), (%d,%d,%.17g,9,'tentative',0,%.17g,%.17g,5.5,121.5,"
+                   "-34.25,%d,9.75,3e-10,5e-10,3,4,NULL,6e-11,7e-11,8e-11,9e-11,1e-11,2e-11,"
+                   "3e-11,1,0)",
+                   sensor, id, at + 0.1, x + 6.9, y + 2.8, 2 + i, 250, sensor, id, at + 0.1,
+                   x + 10.0, y - 5.0, i == 4 ? 2 : 0);
+    run_tables_sql(t, "INSERT INTO track_frames VALUES (%d,%d,%.17g,%d,%d,%.17g,%.17g,%.17g,%d)",
                    sensor, id, at + 0.1, 100 * i + 15, 100 * i + 60 + 3 * i, 1.5 + i, -2.5 - i,
-                   8.0 * i);
+                   8.0 * i, i != 4);
     run_tables_sql(t, "INSERT INTO control VALUES (%d,%.17g,'%s',%.17g,%.17g)", sensor, at + 0.2,
                    i < 3 ? "acquire" : "track", 3.0 * (i + 1), -4.0 * (i + 1));
     run_tables_sql(t, "INSERT INTO pointing VALUES (%d,%.17g,%.17g,%.17g)", sensor, at + 0.3,
@@ -265,6 +273,17 @@ static void check_frame(const fixture *f, int i) {
     SAME(track, "misses", 0);
     SAME(track, "v_mag", 8.75);
     assert_true(cJSON_IsFalse(member(track->next, "target")));
+    static const double state[] = {3,     4,     1e-10, 5e-11, 2e-10, 6e-11,
+                                   7e-11, 8e-11, 9e-11, 1e-11, 2e-11, 3e-11};
+    for (int k = 0; k < 12; k++) {
+        bst_assert_close(cJSON_GetArrayItem(member(track, "state"), k + 1)->valuedouble, state[k],
+                         0.0);
+    }
+    assert_null(cJSON_GetObjectItem(track->next, "state")); /* one number is missing */
+    if (i > 5) {                                            /* ids are 2 apart */
+        assert_non_null(cJSON_GetObjectItem(cJSON_GetArrayItem(tracks, 2 * i), "state"));
+        assert_null(cJSON_GetObjectItem(cJSON_GetArrayItem(tracks, 2), "state"));
+    }
     if (i > 0) {
         track = track->next->next;
         assert_true(cJSON_IsFalse(member(track, "now")));
@@ -380,8 +399,50 @@ static void modes_names_and_description(void **state) {
     SAME(sensor, "height_px", 480);
     SAME(sensor, "pixel_scale_arcsec", 4.0);
     SAME(sensor, "frames", FRAMES);
-    assert_int_equal(cJSON_GetArraySize(member(sensor, "panels")), 7);
+    assert_int_equal(cJSON_GetArraySize(member(sensor, "panels")), 9);
+    assert_int_equal(cJSON_GetArraySize(member(sensor, "planes")), 0);
     cJSON_Delete(node);
+}
+
+static void tracks_have_the_detections_that_made_them(void **state) {
+    fixture *f = *state;
+    bst_ctx ctx = {0};
+    bst_view_exchange x = {.subject = f->subject, .sensor = 1, .frame = 5, .object = 4};
+    bst_assert_ok(&ctx, bst_view_route_track(&ctx, &x));
+    const cJSON *states = member(x.json, "states"), *one = states->child;
+    assert_int_equal(cJSON_GetArraySize(states), 6);
+    SAME(x.json, "first_s", 1.0);
+    assert_true(cJSON_IsFalse(member(x.json, "earlier")));
+    for (int i = 0; i < 6; i++, one = one->next) {
+        const cJSON *detection = member(one, "detection");
+        SAME(one, "frame", i);
+        SAME(one, "time_s", mid_of(i) + 0.1);
+        SAME(one, "hits", 2 + i);
+        SAME(detection, "x", 100.0 + 8 * i + 6.9);
+        SAME(detection, "y", 150.0 + 5 * i + 2.8);
+        SAME(detection, "snr", 15.0);
+        assert_string_equal(member(detection, "label")->valuestring, "unknown");
+        assert_true(cJSON_IsTrue(member(detection, "blend")));
+    }
+    cJSON_Delete(x.json);
+    x.object = 9; /* its places are those of no detection; in the last frame it was not updated */
+    x.frame = 4;
+    bst_assert_ok(&ctx, bst_view_route_track(&ctx, &x));
+    assert_int_equal(cJSON_GetArraySize(member(x.json, "states")), 5);
+    SAME(cJSON_GetArrayItem(member(x.json, "states"), 4), "misses", 2);
+    assert_null(cJSON_GetObjectItem(member(x.json, "states")->child, "detection"));
+    cJSON_Delete(x.json);
+    x.object = 44;
+    bst_assert_ok(&ctx, bst_view_route_track(&ctx, &x));
+    assert_int_equal(cJSON_GetArraySize(member(x.json, "states")), 0);
+    cJSON_Delete(x.json);
+    x.json = NULL;
+    x.frame = FRAMES;
+    assert_int_equal(bst_view_route_track(&ctx, &x), BST_ERR_NOT_FOUND);
+    cJSON_Delete(x.json);
+    x.json = NULL;
+    x.frame = 0;
+    assert_int_equal(bst_view_route_noise_free(&ctx, &x), BST_ERR_NOT_FOUND); /* no pixels */
 }
 
 static void reasons_have_the_facts_of_the_tables(void **state) {
@@ -416,8 +477,9 @@ static void reasons_have_the_facts_of_the_tables(void **state) {
     assert_true(facts.is_blend && !facts.is_star);
     assert_int_equal(facts.track, 4);
     assert_string_equal(facts_status, "confirmed");
-    /* the other track from the detection, by both variances */
-    double away = hypot(10.0 - 6.9, -5.0 - 2.8), scale = 4.0 * BST_PI / 648000.0;
+    assert_true(facts.no_attitude);
+    /* the other track was not updated: its direction from the target's, by both variances */
+    double away = 0.001 * cos(34.25 * BST_DEG_RAD) * 3600.0 / 4.0, scale = 4.0 * BST_PI / 648000.0;
     bst_assert_close(facts.near_px, away, 1e-9);
     assert_int_equal(facts.near_track, 9);
     assert_true(facts.near_coasts);
@@ -431,6 +493,7 @@ int main(void) {
         cmocka_unit_test(marks_are_in_pixels_of_their_frame),
         cmocka_unit_test(plots_are_the_columns_of_the_tables),
         cmocka_unit_test(modes_names_and_description),
+        cmocka_unit_test(tracks_have_the_detections_that_made_them),
         cmocka_unit_test(reasons_have_the_facts_of_the_tables),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

@@ -52,6 +52,8 @@ static void detected(void **state) {
     expect(f, "detected", "no track"); /* track 4 has another detection */
     f.near_coasts = true;
     expect(f, "gated", "12.0 px from where track 4 expected it: about 5.3 sigma");
+    f.no_attitude = true;
+    expect(f, "no_attitude", "no attitude from stars");
     f.is_star = true;
     expect(f, "star", "identified as a star");
 }

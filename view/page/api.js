@@ -52,6 +52,11 @@ export async function getThumbnail(sensor, frame, signal = undefined) {
   return getImage('thumbnail', { sensor, frame }, signal);
 }
 
+/** The frame without noise, from planes that the run recorded. @param {number} sensor @param {number} frame @param {AbortSignal} [signal] */
+export async function getNoiseFree(sensor, frame, signal = undefined) {
+  return getImage('noise_free', { sensor, frame }, signal);
+}
+
 /** @param {string} route @param {Record<string, string | number>} query @param {AbortSignal} [signal] */
 async function getImage(route, query, signal) {
   const response = await get(route, query, signal), { headers } = response, data = new Uint16Array(await response.arrayBuffer());

@@ -1,9 +1,11 @@
 // The page: loads a run, and moves frame, plots and events together.
 import { getJson, getNumbers, getPixels } from './api.js';
+import { Blink } from './blink.js';
 import { shortNumber } from './chart.js';
 import { FrameView } from './frame_view.js';
 import { Panels } from './panels.js';
 import { Plots } from './plots.js';
+import { Reason } from './reason.js';
 import { Strip } from './strip.js';
 
 /** Numbers of a frame in the list (view/recorded_run.h). */
@@ -45,6 +47,9 @@ class App {
     this.events = [];
     this.names = {};
     this.strip = new Strip(this);
+    this.blink = new Blink(this);
+    this.reason = new Reason(this);
+    this.chosenTrack = 0; // whose detections the panel Why lists; 0: that of the target
     this.panels = new Panels(element('tabs'), element('main'), this);
     this.listen();
   }
@@ -180,6 +185,8 @@ class App {
     if (!info) return;
     this.sensor = sensor;
     element('sensor').value = String(sensor);
+    this.blink.offer(info);
+    this.chosenTrack = 0;
     this.frameView.sensorWidth = info.width_px;
     this.frameView.sensorHeight = info.height_px;
     this.frameView.reset();
@@ -370,6 +377,10 @@ class App {
     element('slider').addEventListener('input', () => this.goTo(Number(element('slider').value)));
     element('sensor').addEventListener('change', () => this.openSensor(Number(element('sensor').value), 0));
     document.addEventListener('keydown', (event) => this.onKey(event));
+    document.addEventListener('trackchosen', (/** @type {any} */ { detail }) => {
+      this.chosenTrack = detail;
+      this.panels.show('why');
+    });
     const light = matchMedia('(prefers-color-scheme: light)');
     light.addEventListener('change', () => this.setTheme(light.matches ? 'light' : 'dark'));
     this.setTheme(light.matches ? 'light' : 'dark');
@@ -387,13 +398,14 @@ class App {
     if (event.ctrlKey || event.altKey || event.metaKey || element('keys').open || element('changes').open || !this.panels.frameShown) return;
     if (target instanceof HTMLSelectElement || (target instanceof HTMLInputElement && ['number', 'text'].includes(target.type))) return;
     if (event.key === ' ' && (target instanceof HTMLButtonElement || target instanceof HTMLInputElement)) return;
+    if (event.key === 'Enter' && target === view.overlay && view.cursor) view.chooseAt(view.cursor);
     const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
     const actions = {
       PageUp: () => this.goTo(this.wanted - 10), PageDown: () => this.goTo(this.wanted + 10),
       Home: () => this.goTo(0), End: () => this.goTo(this.count - 1), ' ': () => (this.playing ? this.stop() : this.play()),
       '+': () => view.zoomTo(view.view.scale * 1.5), '=': () => view.zoomTo(view.view.scale * 1.5), '-': () => view.zoomTo(view.view.scale / 1.5),
       0: () => view.fit(), 1: () => view.zoomTo(1), w: () => view.pan(0, -60), a: () => view.pan(-60, 0), s: () => view.pan(0, 60), d: () => view.pan(60, 0),
-      c: () => view.centreTarget(), m: () => view.toggleMarks(), '[': () => this.plots.zoom(0.5), ']': () => this.plots.zoom(2),
+      c: () => view.centreTarget(), m: () => view.toggleMarks(), b: () => this.blink.next(), y: () => this.panels.show('why'), '[': () => this.plots.zoom(0.5), ']': () => this.plots.zoom(2),
       '?': () => element('keys').showModal(),
       r: () => this.live && this.live.toggle(), n: () => this.live && this.live.step(),
     };

@@ -152,7 +152,7 @@ export class Editor {
       if (number === this.number) this.showResult(result);
       if (result.good && number === this.number) {
         const { loops } = await post('editor/loops', body);
-        if (number === this.number) showFigures(element('editor-figures'), result.figures, loops);
+        if (number === this.number) showFigures(element('editor-figures'), result.figures, loops, (duration) => this.measure(duration));
       }
       this.checked = number;
     } catch (error) {
@@ -179,7 +179,12 @@ export class Editor {
     });
     box.replaceChildren(make('p', { textContent: good ? `The scenario is right${problems.length ? `; ${problems.length} ${problems.length === 1 ? 'warning' : 'warnings'}` : ''}.` : 'The scenario is wrong.' }), ...lines);
     this.form.showProblems(problems);
-    showFigures(element('editor-figures'), figures, null);
+    showFigures(element('editor-figures'), figures, null, (duration) => this.measure(duration));
+  }
+
+  /** Speed of the beginning of the scenario. @param {number} duration s */
+  measure(duration) {
+    return post('editor/speed', JSON.stringify({ text: element('editor-text').value, duration_s: duration }));
   }
 
   goToProblem({ pointer, line, column }) {

@@ -30,6 +30,8 @@ export class FrameView {
     /** Gets a part of the frame that is shown; null: there is no more than the image. @type {((part: import('./frame_parts.js').Part) => Promise<any>) | null} */
     this.getPart = null;
     this.loadingPart = false;
+    this.clean = null; // the frame without noise; null: not shown
+    this.cleanShown = false; // else the frame, in turn
     this.sensorWidth = this.sensorHeight = 0; // 0: unknown
     this.statistics = null;
     this.counted = 0; // time of the statistics
@@ -82,6 +84,19 @@ export class FrameView {
     if (counted) this.drawHistogram();
     this.redraw();
   }
+
+  /** The frame without noise, of the same size as the frame; null: none. @param {any} image @param {boolean} shown in place of the frame */
+  setClean(image, shown = true) {
+    const { image: frame } = this, fits = image && frame && image.width === frame.width && image.height === frame.height;
+    if (!fits && !this.clean) return;
+    this.clean = fits ? image : null;
+    this.cleanShown = Boolean(fits && shown);
+    element('clean-shown').hidden = !this.cleanShown;
+    this.redraw();
+  }
+
+  /** What is drawn now. */
+  get drawn() { return this.clean && this.cleanShown ? this.clean : this.image; }
 
   /** A canvas has one kind of context for life: the 2D painter needs a new one. */
   usePlain() {
@@ -231,7 +246,8 @@ export class FrameView {
     this.waiting = true;
     requestAnimationFrame(() => {
       this.waiting = false;
-      this.painter.draw(this.image, this.drawing(), this.part, this.part && this.drawing(this.part));
+      const part = this.cleanShown ? null : this.part;
+      this.painter.draw(this.drawn, this.drawing(), part, part && this.drawing(part));
       this.drawOverlay();
       this.describeCursor();
       const percent = 100 * this.view.scale;
@@ -245,7 +261,7 @@ export class FrameView {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
     if (!this.image) this.drawOutline(context);
-    for (const image of this.part ? [this.part] : [this.image]) {
+    for (const image of [this.cleanShown ? this.drawn : this.part || this.image]) {
       if (image && this.view.scale * (image.binning || 1) >= VALUE_SCALE) this.drawValues(context, image);
     }
     const wcs = this.details && this.details.wcs;
@@ -328,6 +344,10 @@ export class FrameView {
         if (d && Number.isFinite(d.gain_e_per_dn)) {
           parts.push(['Charge', `${NUMBER.format((dn - (d.offset_dn || 0)) * d.gain_e_per_dn)} e−`]);
         }
+        if (this.clean && d && Number.isFinite(d.gain_e_per_dn)) {
+          const expected = valueAt(this.clean, x, y);
+          parts.push(['Expected', `${NUMBER.format((expected - (d.offset_dn || 0)) * d.gain_e_per_dn)} e−`]);
+        }
         if (d && d.saturation_dn && dn >= d.saturation_dn) parts.push(['', 'saturated']);
       }
       if (this.details && this.details.wcs) {
@@ -373,6 +393,13 @@ export class FrameView {
       }
     }
     return text;
+  }
+
+  /** A click on a track, or a key at the pixel cursor: what made it is asked for. @param {{x: number, y: number}} place */
+  chooseAt(place) {
+    const reach = 14 / this.view.scale, away = (mark) => Math.hypot(mark.x - place.x, mark.y - place.y);
+    const [track] = (this.sorted && this.shown.tracks ? this.sorted.tracks : []).filter((mark) => away(mark) <= reach).sort((a, b) => away(a) - away(b));
+    if (track) document.dispatchEvent(new CustomEvent('trackchosen', { detail: track.id }));
   }
 
   moveCursor(dx, dy) {
@@ -429,16 +456,19 @@ export class FrameView {
       this.zoomTo(this.view.scale * 2 ** (-event.deltaY / 240), event.offsetX, event.offsetY);
     }, { passive: false });
     overlay.addEventListener('pointerdown', (event) => {
-      held = { x: event.clientX, y: event.clientY };
+      held = { x: event.clientX, y: event.clientY, firstX: event.clientX, firstY: event.clientY };
       overlay.setPointerCapture(event.pointerId);
     });
     overlay.addEventListener('pointermove', (event) => {
       this.cursor = { ...this.toFrame(event.offsetX, event.offsetY), exact: true };
       if (held) {
         this.pan(held.x - event.clientX, held.y - event.clientY);
-        held = { x: event.clientX, y: event.clientY };
+        Object.assign(held, { x: event.clientX, y: event.clientY });
       }
       this.redraw();
+    });
+    overlay.addEventListener('pointerup', (event) => {
+      if (held && Math.hypot(event.clientX - held.firstX, event.clientY - held.firstY) < 4) this.chooseAt(this.toFrame(event.offsetX, event.offsetY));
     });
     for (const name of ['pointerup', 'pointercancel']) overlay.addEventListener(name, () => { held = null; });
     overlay.addEventListener('pointerleave', () => { this.cursor = null; this.redraw(); });

@@ -264,7 +264,7 @@ export class Live {
 
   async fillChanges() {
     this.scenario = await getJson('scenario');
-    changeFields(element('change-fields'), this.scenario, this.app.sensor);
+    changeFields(element('change-fields'), this.scenario, this.app.sensor, this.state.time_s);
   }
 
   async openChanges() {
@@ -274,7 +274,7 @@ export class Live {
   }
 
   async applyChanges() {
-    const commands = changesOf(element('change-fields'), this.scenario);
+    const commands = changesOf(element('change-fields'), this.scenario, this.state.time_s);
     const free = element('change-set').value.trim();
     if (free) commands.push({ do: 'set', set: free });
     if (commands.length === 0) element('change-problem').textContent = 'Nothing differs.';

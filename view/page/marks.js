@@ -1,4 +1,5 @@
 // Marks over a frame: truth, detections, identified stars, tracks. Kinds differ by shape and colour.
+import { placesOf } from './prediction.js';
 import { compassOf, scaleOf, skyToPixel } from './wcs.js';
 
 /** Kinds in the order in which they are drawn. Colours: Okabe and Ito (2008). */
@@ -8,6 +9,7 @@ export const KINDS = [
   { name: 'detections', title: 'Detections', colour: '#f0e442', shape: 'circle', shown: true },
   { name: 'objects', title: 'True objects', colour: '#e884c0', shape: 'square', shown: true },
   { name: 'target', title: 'True target', colour: '#ff7a33', shape: 'square', shown: true },
+  { name: 'predicted', title: 'Predicted', colour: '#a9d8ff', shape: 'cross', shown: false },
   { name: 'tracks', title: 'Tracks', colour: '#56b4e9', shape: 'diamond', shown: true },
 ];
 
@@ -16,7 +18,7 @@ const SIGMAS = 3;
 
 /** Sorts what the server sent about a frame by kind. */
 export function sortMarks(frame) {
-  const sorted = { stars: [], identified: [], detections: [], objects: [], target: [], tracks: [], trail: [] };
+  const sorted = { stars: [], identified: [], detections: [], objects: [], target: [], predicted: [], tracks: [], trail: [] };
   for (const mark of frame.truth) {
     if (mark.kind === 'star') sorted.stars.push(mark);
     else {
@@ -27,10 +29,10 @@ export function sortMarks(frame) {
   for (const mark of frame.detections) {
     (mark.label === 'star' ? sorted.identified : sorted.detections).push(mark);
   }
-  for (const mark of frame.tracks) {
-    if (mark.now) sorted.tracks.push({ ...mark, text: `track ${mark.id}` });
-    else sorted.trail.push(mark);
-  }
+  const { tracks, predicted } = placesOf(frame);
+  sorted.tracks = tracks.map((mark) => ({ ...mark, text: `track ${mark.id}` }));
+  sorted.predicted = predicted;
+  sorted.trail = frame.tracks.filter((mark) => !mark.now);
   return sorted;
 }
 
@@ -40,6 +42,8 @@ export function drawShape(context, shape, x, y, r) {
   else if (shape === 'square') context.rect(x - r, y - r, 2 * r, 2 * r);
   else if (shape === 'plus') {
     context.moveTo(x - r, y); context.lineTo(x + r, y); context.moveTo(x, y - r); context.lineTo(x, y + r);
+  } else if (shape === 'cross') {
+    context.moveTo(x - r, y - r); context.lineTo(x + r, y + r); context.moveTo(x - r, y + r); context.lineTo(x + r, y - r);
   } else {
     context.moveTo(x, y - r); context.lineTo(x + r, y); context.lineTo(x, y + r); context.lineTo(x - r, y);
     context.closePath();
@@ -85,7 +89,7 @@ function drawTrails(context, sorted, wcs, view) {
     for (const mark of [...past, track]) {
       const there = skyToPixel(wcs, mark.ra_deg, mark.dec_deg);
       if (!there) continue;
-      // track directions are apparent ones in the telescope's frame: only differences count
+      // directions have errors of attitude: only differences count
       const at = view.toScreen(track.x + there.x - here.x, track.y + there.y - here.y);
       context.lineTo(at.x, at.y);
     }
@@ -112,15 +116,17 @@ export function drawMarks(context, sorted, wcs, view) {
       if (at.x < -40 || at.y < -40 || at.x > view.width + 40 || at.y > view.height + 40) continue;
       context.strokeStyle = kind.colour;
       context.lineWidth = kind.name === 'target' || kind.name === 'tracks' ? 2 : 1.25;
-      const r = kind.name === 'target' ? size + 5 : kind.name === 'tracks' ? size + 2 : kind.shape === 'plus' ? 4 : size;
+      const r = kind.name === 'target' ? size + 5 : kind.name === 'tracks' ? size + 2 : kind.shape === 'plus' ? 4 : kind.shape === 'cross' ? 5 : size;
+      if (mark.coasts) context.setLineDash([4, 3]); // a track that was not updated in this frame
       if (mark.length * view.scale > 3 * r) drawStreak(context, mark, at, view.scale);
       else drawShape(context, kind.shape, at.x, at.y, r);
-      const ellipse = kind.shape === 'circle' ? ellipseOf(mark) : null;
+      const ellipse = ['circle', 'cross', 'diamond'].includes(kind.shape) ? ellipseOf(mark) : null;
       if (ellipse && SIGMAS * ellipse.major * view.scale > 3) {
         context.beginPath();
         context.ellipse(at.x, at.y, SIGMAS * ellipse.major * view.scale, SIGMAS * ellipse.minor * view.scale, ellipse.angle, 0, 2 * Math.PI);
         context.stroke();
       }
+      context.setLineDash([]);
       if (mark.text) drawText(context, mark.text, at.x + r + 4, at.y + (kind.name === 'tracks' ? 14 : -4), kind.colour);
     }
   }

@@ -54,11 +54,21 @@ class Panel {
       this.scaleButton.setAttribute('aria-pressed', String(this.log));
       this.draw();
     });
-    head.append(title, ...this.values.map((v) => v.value), gap, this.scaleButton);
+    head.append(title, ...this.values.map((v) => v.value), ...this.stopTexts(), gap, this.scaleButton);
     this.canvas = document.createElement('canvas');
     this.canvas.setAttribute('role', 'img');
     this.box.append(head, this.canvas);
     plots.listen(this.canvas);
+  }
+
+  /** Stops of axes in words: they are mostly outside of what the plot shows. */
+  stopTexts() {
+    const stops = (this.info.stops || []).map(({ line, low, high }) => `${this.info.lines[line]} ${low === -high ? `±${shortNumber(high)}` : `${shortNumber(low)} to ${shortNumber(high)}`}`);
+    if (stops.length === 0) return [];
+    const text = document.createElement('span');
+    text.className = 'value';
+    text.textContent = `stops: ${stops.join(', ')}`;
+    return [text];
   }
 
   async load(signal) {
@@ -111,19 +121,34 @@ class Panel {
     plots.drawTimes(context, bottom, colour('--faint'));
     context.save();
     context.beginPath(); context.rect(LEFT, 0, width - LEFT - RIGHT, height); context.clip();
+    this.drawStops(context, extent, toY, colour);
     this.lines.forEach((points, k) => drawLine(context, points, (time) => plots.toX(time), toY, { colour: colour(`--line-${k % 3}`), log: this.log }));
     context.restore();
     plots.drawCursor(context, 0, bottom, colour('--cursor'));
   }
 
-  /** Values at the cursor, beside the title and for screen readers. */
+  /** Stops of the axes that are in view: broken lines. */
+  drawStops(context, extent, toY, colour) {
+    context.setLineDash([6, 4]);
+    for (const { line, low, high } of this.info.stops || []) {
+      context.strokeStyle = colour(`--line-${line % 3}`);
+      for (const value of [low, high]) {
+        if (this.log || value < extent.low || value > extent.high) continue;
+        context.beginPath(); context.moveTo(0, toY(value)); context.lineTo(this.canvas.clientWidth, toY(value)); context.stroke();
+      }
+    }
+    context.setLineDash([]);
+  }
+
+  /** Values at the pointer or else the cursor, beside the title and for screen readers. */
   describe() {
+    const time = this.plots.pointed ?? this.plots.cursor;
     const texts = this.info.lines.map((name, k) => {
-      const value = this.lines[k] ? valueAt(this.lines[k], this.plots.cursor) : NaN;
+      const value = this.lines[k] ? valueAt(this.lines[k], time) : NaN;
       setText(this.values[k].number, shortNumber(value));
       return `${name} ${shortNumber(value)}`;
     });
-    this.canvas.setAttribute('aria-label', `${this.info.title}, at ${this.plots.cursor.toFixed(2)} s: ${texts.join(', ')} ${this.info.unit}`);
+    this.canvas.setAttribute('aria-label', `${this.info.title}, at ${time.toFixed(2)} s: ${texts.join(', ')} ${this.info.unit}`);
   }
 }
 
@@ -139,10 +164,13 @@ export class Plots {
     this.events = [];
     this.all = this.range = { from: 0, to: 1 };
     this.cursor = 0;
+    /** @type {number | null} */
+    this.pointed = null; // time under the pointer
     this.followed = 0; // when `follow` has drawn
     this.sensor = 0;
     this.drag = null;
     this.request = null;
+    this.pointing = false; // a drawing of it waits
     this.reloading = Promise.resolve(); // the lines of the range that is shown
     this.listen(element('modes'));
     new ResizeObserver(() => { this.draw(); this.reload(); }).observe(element('panels'));
@@ -280,9 +308,31 @@ export class Plots {
   }
 
   drawCursor(context, top, bottom, colour) {
-    const x = Math.round(this.toX(this.cursor)), inside = x + 0.5 >= LEFT && x + 0.5 <= this.width() - RIGHT + 1;
-    const { from, to } = this.drag || { from: NaN, to: NaN };
-    drawCursor(context, top, bottom, { x: inside ? x : NaN, from: this.toX(from), to: this.toX(to), colour });
+    const at = (time) => {
+      const x = time === null ? NaN : Math.round(this.toX(time));
+      return x + 0.5 >= LEFT && x + 0.5 <= this.width() - RIGHT + 1 ? x : NaN;
+    };
+    const { from, to } = this.drag || { from: NaN, to: NaN }, pointed = at(this.pointed);
+    drawCursor(context, top, bottom, { x: at(this.cursor), from: this.toX(from), to: this.toX(to), colour });
+    if (!Number.isFinite(pointed)) return;
+    context.strokeStyle = colour;
+    context.lineWidth = 1;
+    context.setLineDash([3, 3]);
+    context.beginPath(); context.moveTo(pointed + 0.5, top); context.lineTo(pointed + 0.5, bottom); context.stroke();
+    context.setLineDash([]);
+  }
+
+  /** The time under the pointer: the same line in all plots, and the values there. @param {number | null} time */
+  point(time) {
+    this.pointed = time;
+    if (this.pointing) return;
+    this.pointing = true;
+    requestAnimationFrame(() => {
+      this.pointing = false;
+      const at = this.pointed === null ? '' : `at ${shortNumber(this.pointed)} s, of `;
+      setText(element('range'), `${at}${shortNumber(this.range.from)} to ${shortNumber(this.range.to)} s`);
+      this.draw();
+    });
   }
 
   drawModes() {
@@ -328,5 +378,7 @@ export class Plots {
       reset: () => this.setRange(this.all.from, this.all.to),
       zoom: (factor, x) => this.zoom(factor, this.toTime(x)),
     });
+    canvas.addEventListener('pointerleave', () => this.point(null));
+    canvas.addEventListener('pointermove', (event) => { if (!this.drag) this.point(this.toTime(event.offsetX)); });
   }
 }

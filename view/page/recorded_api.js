@@ -96,6 +96,9 @@ export async function getPixels(sensor, frame) {
 /** Longest side of a small picture (BST_VIEW_THUMBNAIL_PX). */
 const THUMBNAIL_PX = 80;
 
+/** @returns {Promise<any>} never: a page has no planes */
+export async function getNoiseFree() { throw new ServerError('this page has no noise-free frames'); }
+
 /** A small picture of a frame: peaks of bins of its pixels in this page. @param {number} sensor @param {number} frame */
 export async function getThumbnail(sensor, frame) {
   const { width, height, data } = await getPixels(sensor, frame), n = Math.ceil(Math.max(width, height) / THUMBNAIL_PX);
