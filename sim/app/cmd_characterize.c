@@ -6,12 +6,13 @@
 
 static const char help_text[] =
     "usage: boresight characterize --map MAP --out FOLDER [--bias PATH]... [--dark PATH]... "
-    "[--flat PATH]... [options]\n"
+    "[--flat PATH]... [--linearity PATH]... [options]\n"
     "\n"
     "Measures a sensor from its bias, dark and flat frames: gain, read noise, level and drift, "
     "offsets, dark current,\n"
-    "hot pixels, response, signal of the read-out, coherent pick-up, trails of charge; each with "
-    "its uncertainty. Only\n"
+    "hot pixels, response, linearity, full well, signal of the read-out, coherent pick-up, trails "
+    "of charge, radiation\n"
+    "hits; each with its uncertainty. Only\n"
     "what the given frames determine is written: FOLDER/detector.json (a scenario's camera keys), "
     "report.json, maps\n"
     "and a plot.\n"

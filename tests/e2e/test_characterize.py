@@ -34,16 +34,30 @@ def tearDownModule():
 
 
 def draw(seed):
-    """Values of a camera and of its detector."""
+    """Values of a camera, of its detector, and the names of the figures that other names stand for."""
     u = random.Random(seed).uniform
     camera = {"gain_e_per_dn": u(0.8, 4), "read_noise_e": u(4, 15), "offset_dn": u(200, 1500),
-              "dark_current_e_per_s": u(1, 8)}
+              "dark_current_e_per_s": u(1, 8), "full_well_e": u(3e4, 5e4)}  # below the converter's 65,535 DN
     detector = {"dsnu_rms": u(0.05, 0.4), "hot_fraction": u(0.003, 0.01),
                 "hot_median_e_per_s": u(300, 1000), "hot_spread_dex": u(0.2, 0.4), "prnu_rms": u(0.004, 0.02),
                 "dead_fraction": u(0.001, 0.004), "bad_columns": random.Random(seed).randint(0, 3),
                 "column_offset_rms_e": u(2, 5), "row_offset_rms_e": u(2, 5), "row_noise_e": u(1, 4),
+                "nonlinearity": [u(-0.04, 0.02), u(-0.02, 0.02), u(-0.01, 0.01)],
+                "cosmic_rays": {"rate_per_cm2_s": u(20, 100), "readout_s": u(1, 4), "depth_um": u(8, 25),
+                                "e_per_um": u(60, 120), "straggling": u(0.1, 0.3)},
                 "fixed_pattern_seed": hex(seed + 1)}
     return camera, detector
+
+
+def figures_of(camera, detector):
+    """The values by the names of the report's figures."""
+    truth = {**camera, **detector}
+    hits = truth.pop("cosmic_rays")
+    truth.update({f"nonlinearity_{i + 1}": value for i, value in enumerate(truth.pop("nonlinearity"))})
+    truth.update({"hit_" + key: value for key, value in hits.items()})
+    truth["hit_length_px"] = hits["depth_um"] / 13
+    del truth["fixed_pattern_seed"]
+    return truth
 
 
 class Characterize(unittest.TestCase):
@@ -58,19 +72,17 @@ class Characterize(unittest.TestCase):
         with open(scenario, "w", encoding="utf-8") as file:
             json.dump({"extends": os.path.abspath(runs.STARE), "seed": hex(seed), "set": values}, file)
         cal = os.path.join(folder, "cal")
-        kinds = ("bias", "dark", "flat")
-        result = call("calframes", scenario, "--out", cal, "--exposure", "8", "--threads", "1",
+        kinds, given = ("bias", "dark", "flat"), ("bias", "dark", "flat", "linearity")
+        result = call("calframes", scenario, "--out", cal, "--exposure", "8", "--threads", "1", "--linearity", "20",
                       *(word for kind in kinds for word in ("--" + kind, str(frames))),
                       "--set", "/world/star_catalogue=embedded")
         self.assertEqual(result.returncode, 0, result.stderr)
         result = call("characterize", "--map", "boresight", "--out", out, "--extends", scenario,
-                      *(word for kind in kinds for word in ("--" + kind, f"{cal}/neossat_telescope_{kind}.fits")))
+                      *(word for kind in given for word in ("--" + kind, f"{cal}/neossat_telescope_{kind}.fits")))
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         with open(out + "/report.json", encoding="utf-8") as file:
             report = json.load(file)
-        truth = {**camera, **detector}
-        del truth["fixed_pattern_seed"]
-        return out, truth, report["figures"]
+        return out, figures_of(camera, detector), report["figures"]
 
     def test_simulated_sensors_are_found_again(self):
         inside, of, wrong = collections.Counter(), collections.Counter(), []

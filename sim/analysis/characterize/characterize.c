@@ -39,6 +39,19 @@ const bst_option bst_characterize_options[] = {
      .path = BST_PATH_INPUT,
      .argument = "PATH",
      .doc = "the same of flats of one exposure"},
+    {.name = "linearity",
+     .kind = BST_OPTION_LIST,
+     .offset = offsetof(Q, linearity),
+     .path = BST_PATH_INPUT,
+     .argument = "PATH",
+     .doc = "the same of flats of several exposures in one light, to beyond the full well"},
+    {.name = "pitch",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(Q, pixel_pitch_um),
+     .argument = "UM",
+     .doc = "side of a pixel in micrometres, for radiation hits (default 13)",
+     .minimum = 0.5,
+     .maximum = 200},
     {.name = "extends",
      .kind = BST_OPTION_TEXT,
      .offset = offsetof(Q, extends),
@@ -90,6 +103,19 @@ const bst_sensor_figure_name bst_sensor_figure_names[BST_SENSOR_FIGURES] = {
     [BST_SENSOR_LINE_PHASE] = {"pick_up_cycles_per_row", "1/px", "detector/pick_up/cycles_per_row"},
     [BST_SENSOR_PARALLEL_TRAIL] = {"cti_parallel_trail_fraction", "", NULL},
     [BST_SENSOR_SERIAL_TRAIL] = {"cti_serial_trail_fraction", "", NULL},
+    [BST_SENSOR_FULL_WELL] = {"full_well_e", "e-", "full_well_e"},
+    [BST_SENSOR_SATURATION] = {"saturation_dn", "DN", NULL},
+    [BST_SENSOR_LINEARITY_ERROR] = {"linearity_error", "", NULL},
+    [BST_SENSOR_NONLINEARITY_1] = {"nonlinearity_1", "", NULL},
+    [BST_SENSOR_NONLINEARITY_2] = {"nonlinearity_2", "", NULL},
+    [BST_SENSOR_NONLINEARITY_3] = {"nonlinearity_3", "", NULL},
+    [BST_SENSOR_HIT_RATE] = {"hit_rate_per_cm2_s", "1/cm2/s", "detector/cosmic_rays/rate_per_cm2_s"},
+    [BST_SENSOR_HIT_READOUT] = {"hit_readout_s", "s", "detector/cosmic_rays/readout_s"},
+    [BST_SENSOR_HIT_CHARGE] = {"hit_charge_e", "e-", NULL},
+    [BST_SENSOR_HIT_LENGTH] = {"hit_length_px", "px", NULL},
+    [BST_SENSOR_HIT_DEPTH] = {"hit_depth_um", "um", "detector/cosmic_rays/depth_um"},
+    [BST_SENSOR_HIT_E_PER_UM] = {"hit_e_per_um", "e-/um", "detector/cosmic_rays/e_per_um"},
+    [BST_SENSOR_HIT_STRAGGLING] = {"hit_straggling", "", "detector/cosmic_rays/straggling"},
 };
 
 static void print_figures(FILE *out, const bst_sensor_stacks *s, const bst_sensor_figures *f) {
@@ -126,7 +152,12 @@ static bst_status read_stacks(bst_ctx *ctx, const bst_characterize_request *q,
     BST_TRY(bst_keyword_map_load(ctx, path, &map));
     BST_TRY(read_stack(ctx, "bias", &q->bias, &map, &stacks->bias));
     BST_TRY(read_stack(ctx, "dark", &q->dark, &map, &stacks->dark));
-    return read_stack(ctx, "flat", &q->flat, &map, &stacks->flat);
+    BST_TRY(read_stack(ctx, "flat", &q->flat, &map, &stacks->flat));
+    stacks->pixel_pitch_um = q->pixel_pitch_um;
+    return q->linearity.count > 0
+               ? bst_linearity_series_read(ctx, q->linearity.items, q->linearity.count, &map,
+                                           &stacks->linearity)
+               : BST_OK;
 }
 
 bst_status bst_characterize_run(bst_ctx *ctx, const bst_characterize_request *q, FILE *out) {
@@ -153,5 +184,6 @@ bst_status bst_characterize_run(bst_ctx *ctx, const bst_characterize_request *q,
     bst_frame_stack_free(&stacks.bias);
     bst_frame_stack_free(&stacks.dark);
     bst_frame_stack_free(&stacks.flat);
+    bst_linearity_series_free(&stacks.linearity);
     return status;
 }

@@ -10,13 +10,14 @@
 /* What the command line asks for. */
 typedef struct bst_characterize_request {
     const char *map, *out, *extends, *camera;
-    bst_option_list bias, dark, flat;
+    bst_option_list bias, dark, flat, linearity;
+    double pixel_pitch_um;
     bool overwrite, maps, help;
 } bst_characterize_request;
 
 /* Request without any option given. */
 #define BST_CHARACTERIZE_REQUEST_DEFAULTS \
-    { .camera = "/observers/0/sensors/0/camera" }
+    { .camera = "/observers/0/sensors/0/camera", .pixel_pitch_um = 13.0 }
 
 /* Table of the options, with offsets in a bst_characterize_request. */
 extern const bst_option bst_characterize_options[];
@@ -36,6 +37,13 @@ typedef struct bst_sensor_figure_name {
 } bst_sensor_figure_name;
 
 extern const bst_sensor_figure_name bst_sensor_figure_names[BST_SENSOR_FIGURES];
+
+/* Draws plot.png of the folder: spectrum of the rows, dark current, linearity and photon transfer,
+ * radiation hits; none without any of these.
+ *
+ * Errors:    those of the outputs */
+bst_status bst_characterize_plot(bst_ctx *ctx, const char *folder, const bst_sensor_stacks *stacks,
+                                 const bst_sensor_figures *figures) BST_MUST_CHECK;
 
 /* Writes the files of the folder.
  *

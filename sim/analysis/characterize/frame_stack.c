@@ -7,7 +7,6 @@
 
 #include "sim/analysis/characterize/clipped_moments.h"
 #include "sim/cli/stop_signals.h"
-#include "sim/io/recorded_frames.h"
 
 enum { LEAST_SIDE = 64, MOST_FRAMES = 100000 };
 
@@ -26,6 +25,7 @@ typedef struct reduction {
     float *scratch; /* [height * width] */
     double *rows;   /* [height] */
     bst_time first_start;
+    bool find_hits;
 } reduction;
 
 void bst_frame_stack_free(bst_frame_stack *s) {
@@ -33,6 +33,7 @@ void bst_frame_stack_free(bst_frame_stack *s) {
     free(s->mean);
     free(s->last);
     free(s->overscan);
+    bst_radiation_hits_free(&s->hits);
     *s = (bst_frame_stack){0};
 }
 
@@ -121,8 +122,9 @@ static void add_covariance(bst_frame_stack *s, const float *a, const float *b,
 
 /* Adds the variance between two frames: rows are levelled, so that noise common to a row is
  * separate. */
-static void add_pair(reduction *r) {
+static bst_status add_pair(bst_ctx *ctx, reduction *r) {
     bst_frame_stack *s = r->stack;
+    double hot[BST_STACK_BLOCKS], sigma[BST_STACK_BLOCKS];
     double rows2 = 0.0, within = 0.0, mean = 0.0;
     size_t width = (size_t)s->width;
     for (int y = 0; y < s->height; y++) {
@@ -165,9 +167,15 @@ static void add_pair(reduction *r) {
             }
         }
         double freedom = 1.0 - 1.0 / s->width; /* the row's mean is of the same pixels */
-        s->variance[k] += 0.5 * bst_clipped_moments_of(r->scratch, n, CLIP).variance / freedom;
+        double variance = bst_clipped_moments_of(r->scratch, n, CLIP).variance / freedom;
+        s->variance[k] += 0.5 * variance;
+        hot[k] = 0.5 * sum.high;
+        sigma[k] = sqrt(variance);
     }
     s->pairs++;
+    const bst_hit_pair pair = {s->width, s->height, r->before, s->last,
+                               r->rows,  hot,       sigma,     BST_STACK_SIDE};
+    return r->find_hits ? bst_radiation_hits_add(ctx, &pair, &s->hits) : BST_OK;
 }
 
 /* Reads a frame and adds it to the sums. */
@@ -186,7 +194,7 @@ static bst_status add_frame(bst_ctx *ctx, reduction *r, int64_t index, int frame
     }
     /* an overscan of columns beside all rows; others are not used */
     bool beside = bias[2] > 0 && bias[1] == box[1] && bias[3] == box[3];
-    if (index == 0) {
+    if (r->stack->count == 0) {
         BST_TRY(make_room(ctx, r, &f, box, beside ? bias[2] : 0, frames));
     }
     BST_TRY(check_frame(ctx, r, &f, box));
@@ -202,25 +210,23 @@ static bst_status add_frame(bst_ctx *ctx, reduction *r, int64_t index, int frame
         r->sum[i] += s->last[i];
         r->scratch[i] = s->last[i];
     }
-    s->levels[index] = bst_clipped_moments_of(r->scratch, pixels, CLIP).mean;
+    s->levels[s->count] = bst_clipped_moments_of(r->scratch, pixels, CLIP).mean;
     s->start_s = bst_time_diff(f.values.start, r->first_start);
-    if (index % 2 == 1) {
-        add_pair(r);
+    if (s->count % 2 == 1) {
+        BST_TRY(add_pair(ctx, r));
     }
     memcpy(r->before, s->last, pixels * sizeof *r->before);
     s->count++;
     return BST_OK;
 }
 
-static bst_status reduce(bst_ctx *ctx, reduction *r, const char *const *paths, int count) {
+static bst_status reduce(bst_ctx *ctx, reduction *r, int64_t first, int64_t frames) {
     bst_frame_stack *s = r->stack;
-    BST_TRY(bst_recorded_frames_open(ctx, paths, count, &r->recorded));
-    int64_t frames = bst_recorded_frames_count(r->recorded);
     if (frames > MOST_FRAMES) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%lld %s frames were given (allowed: %d)",
                         (long long)frames, r->kind, MOST_FRAMES);
     }
-    for (int64_t i = 0; i < frames; i++) {
+    for (int64_t i = first; i < first + frames; i++) {
         if (bst_stop_requested()) {
             return bst_fail(ctx, BST_ERR_INTERRUPTED, "interrupted");
         }
@@ -240,17 +246,32 @@ static bst_status reduce(bst_ctx *ctx, reduction *r, const char *const *paths, i
     return BST_OK;
 }
 
-bst_status bst_frame_stack_read(bst_ctx *ctx, const char *kind, const char *const *paths, int count,
-                                const bst_keyword_map *map, bst_frame_stack *out) {
-    assert(kind && paths && count > 0 && map && out);
+bst_status bst_frame_stack_reduce(bst_ctx *ctx, const char *kind, bst_recorded_frames *recorded,
+                                  int64_t first, int64_t count, const bst_keyword_map *map,
+                                  bst_frame_stack *out) {
+    assert(kind && recorded && first >= 0 && count > 0 && map && out);
     *out = (bst_frame_stack){0};
-    reduction r = {.kind = kind, .map = map, .whole = *map, .stack = out};
+    reduction r = {.kind = kind, .map = map, .whole = *map, .recorded = recorded, .stack = out};
+    r.find_hits = strcmp(kind, "bias") == 0 || strcmp(kind, "dark") == 0;
     r.whole.image_section[0] = r.whole.bias_section[0] = '\0';
-    bst_status status = reduce(ctx, &r, paths, count);
-    bst_recorded_frames_close(r.recorded);
+    bst_status status = reduce(ctx, &r, first, count);
     free(r.sum);
     free(r.before);
     free(r.scratch);
     free(r.rows);
+    return status;
+}
+
+bst_status bst_frame_stack_read(bst_ctx *ctx, const char *kind, const char *const *paths, int count,
+                                const bst_keyword_map *map, bst_frame_stack *out) {
+    assert(kind && paths && count > 0 && map && out);
+    *out = (bst_frame_stack){0};
+    bst_recorded_frames *recorded = NULL;
+    bst_status status = bst_recorded_frames_open(ctx, paths, count, &recorded);
+    if (status == BST_OK) {
+        status = bst_frame_stack_reduce(ctx, kind, recorded, 0, bst_recorded_frames_count(recorded),
+                                        map, out);
+    }
+    bst_recorded_frames_close(recorded);
     return status;
 }
