@@ -43,7 +43,7 @@ def draw(seed):
                 "dead_fraction": u(0.001, 0.004), "bad_columns": random.Random(seed).randint(0, 3),
                 "column_offset_rms_e": u(2, 5), "row_offset_rms_e": u(2, 5), "row_noise_e": u(1, 4),
                 "nonlinearity": [u(-0.04, 0.02), u(-0.02, 0.02), u(-0.01, 0.01)],
-                "cosmic_rays": {"rate_per_cm2_s": u(20, 100), "readout_s": u(1, 4), "depth_um": u(8, 25),
+                "cosmic_rays": {"rate_per_cm2_s": u(5, 20), "readout_s": u(1, 4), "depth_um": u(8, 25),
                                 "e_per_um": u(60, 120), "straggling": u(0.1, 0.3)},
                 "fixed_pattern_seed": hex(seed + 1)}
     return camera, detector

@@ -24,8 +24,8 @@ typedef struct reduction {
     float *before;  /* [height][width] the first frame of a pair */
     float *scratch; /* [height * width] */
     double *rows;   /* [height] */
+    uint8_t *hit;   /* [height * width] 1: pixel of a radiation hit of the last pair */
     bst_time first_start;
-    bool find_hits;
 } reduction;
 
 void bst_frame_stack_free(bst_frame_stack *s) {
@@ -62,8 +62,9 @@ static bst_status make_room(bst_ctx *ctx, reduction *r, const bst_recorded_frame
     r->before = calloc(pixels, sizeof *r->before);
     r->scratch = calloc(pixels, sizeof *r->scratch);
     r->rows = calloc((size_t)s->height, sizeof *r->rows);
+    r->hit = calloc(pixels, sizeof *r->hit);
     return s->levels && s->mean && s->last && s->overscan && r->sum && r->before && r->scratch &&
-                   r->rows
+                   r->rows && r->hit
                ? BST_OK
                : bst_fail(ctx, BST_ERR_MEMORY, "no memory for frames of %d x %d pixels", s->width,
                           s->height);
@@ -120,11 +121,68 @@ static void add_covariance(bst_frame_stack *s, const float *a, const float *b,
     }
 }
 
+/* True if a pixel or one beside it is part of a radiation hit. */
+static bool near_hit(const reduction *r, int x, int y) {
+    for (int k = 0; k < 9; k++) {
+        int u = x + k % 3 - 1, v = y + k / 3 - 1;
+        if (u >= 0 && v >= 0 && u < r->stack->width && v < r->stack->height &&
+            r->hit[(size_t)v * (size_t)r->stack->width + (size_t)u]) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Variance of the difference of two frames in a block, rows levelled.
+ *
+ * Given:     hits  pixels of radiation hits are left out
+ * Returned:  *hot  level above which a pixel is hot */
+static double variance_of(reduction *r, int block, bool hits, double *hot) {
+    const bst_frame_stack *s = r->stack;
+    size_t width = (size_t)s->width, n = 0;
+    int x0 = block_edge(block % BST_STACK_SIDE, s->width),
+        x1 = block_edge(block % BST_STACK_SIDE + 1, s->width);
+    int y0 = block_edge(block / BST_STACK_SIDE, s->height),
+        y1 = block_edge(block / BST_STACK_SIDE + 1, s->height);
+    for (int y = y0; y < y1; y++) {
+        for (int x = x0; x < x1; x++) {
+            size_t i = (size_t)y * width + (size_t)x;
+            r->scratch[n++] = s->last[i] + r->before[i];
+        }
+    }
+    /* dead and hot pixels have other noise; the sum is independent of the difference */
+    bst_clipped_moments sum = bst_clipped_moments_of(r->scratch, n, CLIP);
+    n = 0;
+    for (int y = y0; y < y1; y++) {
+        for (int x = x0; x < x1; x++) {
+            size_t i = (size_t)y * width + (size_t)x;
+            double both = (double)s->last[i] + (double)r->before[i];
+            if (both >= sum.low && both <= sum.high && !(hits && near_hit(r, x, y))) {
+                r->scratch[n++] = s->last[i] - r->before[i] - (float)r->rows[y];
+            }
+        }
+    }
+    *hot = 0.5 * sum.high;
+    double freedom = 1.0 - 1.0 / s->width; /* the row's mean is of the same pixels */
+    return bst_clipped_moments_of(r->scratch, n, CLIP).variance / freedom;
+}
+
+/* Takes the charge of radiation hits out of the sum: the other frame of the pair has none. */
+static void remove_hits(reduction *r) {
+    const bst_frame_stack *s = r->stack;
+    for (size_t i = 0; i < (size_t)s->width * (size_t)s->height; i++) {
+        if (r->hit[i]) {
+            double row = r->rows[i / (size_t)s->width];
+            r->sum[i] -= fabs((double)s->last[i] - (double)r->before[i] - row);
+        }
+    }
+}
+
 /* Adds the variance between two frames: rows are levelled, so that noise common to a row is
  * separate. */
 static bst_status add_pair(bst_ctx *ctx, reduction *r) {
     bst_frame_stack *s = r->stack;
-    double hot[BST_STACK_BLOCKS], sigma[BST_STACK_BLOCKS];
+    double hot[BST_STACK_BLOCKS], sigma[BST_STACK_BLOCKS], variance[BST_STACK_BLOCKS];
     double rows2 = 0.0, within = 0.0, mean = 0.0;
     size_t width = (size_t)s->width;
     for (int y = 0; y < s->height; y++) {
@@ -143,39 +201,22 @@ static bst_status add_pair(bst_ctx *ctx, reduction *r) {
     }
     s->row_variance += 0.5 * (rows2 - within);
     for (int k = 0; k < BST_STACK_BLOCKS; k++) {
-        int x0 = block_edge(k % BST_STACK_SIDE, s->width),
-            x1 = block_edge(k % BST_STACK_SIDE + 1, s->width);
-        int y0 = block_edge(k / BST_STACK_SIDE, s->height),
-            y1 = block_edge(k / BST_STACK_SIDE + 1, s->height);
-        size_t n = 0;
-        for (int y = y0; y < y1; y++) {
-            for (int x = x0; x < x1; x++) {
-                size_t i = (size_t)y * width + (size_t)x;
-                r->scratch[n++] = s->last[i] + r->before[i];
-            }
-        }
-        /* dead and hot pixels have other noise; the sum is independent of the difference */
-        bst_clipped_moments sum = bst_clipped_moments_of(r->scratch, n, CLIP);
-        n = 0;
-        for (int y = y0; y < y1; y++) {
-            for (int x = x0; x < x1; x++) {
-                size_t i = (size_t)y * width + (size_t)x;
-                double both = (double)s->last[i] + (double)r->before[i];
-                if (both >= sum.low && both <= sum.high) {
-                    r->scratch[n++] = s->last[i] - r->before[i] - (float)r->rows[y];
-                }
-            }
-        }
-        double freedom = 1.0 - 1.0 / s->width; /* the row's mean is of the same pixels */
-        double variance = bst_clipped_moments_of(r->scratch, n, CLIP).variance / freedom;
-        s->variance[k] += 0.5 * variance;
-        hot[k] = 0.5 * sum.high;
-        sigma[k] = sqrt(variance);
+        variance[k] = variance_of(r, k, false, &hot[k]);
+        sigma[k] = sqrt(variance[k]);
     }
-    s->pairs++;
     const bst_hit_pair pair = {s->width, s->height, r->before, s->last,
                                r->rows,  hot,       sigma,     BST_STACK_SIDE};
-    return r->find_hits ? bst_radiation_hits_add(ctx, &pair, &s->hits) : BST_OK;
+    size_t found = s->hits.used;
+    BST_TRY(bst_radiation_hits_add(ctx, &pair, r->hit, &s->hits));
+    bool hits = s->hits.used > found;
+    for (int k = 0; k < BST_STACK_BLOCKS; k++) {
+        s->variance[k] += 0.5 * (hits ? variance_of(r, k, true, &hot[k]) : variance[k]);
+    }
+    if (hits) {
+        remove_hits(r);
+    }
+    s->pairs++;
+    return BST_OK;
 }
 
 /* Reads a frame and adds it to the sums. */
@@ -252,13 +293,13 @@ bst_status bst_frame_stack_reduce(bst_ctx *ctx, const char *kind, bst_recorded_f
     assert(kind && recorded && first >= 0 && count > 0 && map && out);
     *out = (bst_frame_stack){0};
     reduction r = {.kind = kind, .map = map, .whole = *map, .recorded = recorded, .stack = out};
-    r.find_hits = strcmp(kind, "bias") == 0 || strcmp(kind, "dark") == 0;
     r.whole.image_section[0] = r.whole.bias_section[0] = '\0';
     bst_status status = reduce(ctx, &r, first, count);
     free(r.sum);
     free(r.before);
     free(r.scratch);
     free(r.rows);
+    free(r.hit);
     return status;
 }
 

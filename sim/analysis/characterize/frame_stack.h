@@ -25,12 +25,14 @@ typedef struct bst_frame_stack {
     double variance[BST_STACK_BLOCKS]; /* of a pixel between frames, mean of the pairs */
     double row_variance;               /* of the mean of a row between frames, in excess */
     double covariance[BST_STACK_LAGS]; /* of pixels 1, 2, ... apart in a row between frames */
-    bst_radiation_hits hits;           /* of bias frames and darks, in the pairs */
+    bst_radiation_hits hits;           /* in the pairs; out of the mean */
     int overscan_width;                /* 0: none */
     float *overscan;                   /* [height][overscan_width] of the last frame */
 } bst_frame_stack;
 
 /* Reads and reduces frames. Memory does not grow with their number.
+ *
+ * Radiation hits that the other frame of a pair shows are left out of mean and variance.
  *
  * Given:     kind   for messages: "bias", "dark", "flat"
  *            paths  [count] as bst_recorded_frames_open takes them

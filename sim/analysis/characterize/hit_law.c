@@ -17,6 +17,7 @@ static const double STEP = 0.02;
 typedef struct pixel_law {
     double mu[ANGLES];
     double of_pixels[ANGLES][MOST_PIXELS + 1];
+    double inside; /* share of the tracks that do not touch the frame's edge */
 } pixel_law;
 
 /* Adds the law of a track's pixels: the numbers of its crossings of columns and rows are whole
@@ -33,8 +34,9 @@ static void add_crossings(double x, double y, double weight, double *of_pixels) 
 
 /* Given:     depth  px
  *            end    surface length whose charge is the threshold, of a track along the surface, px
- */
-static void make_pixel_law(double depth, double end, pixel_law *law) {
+ * Notes:     Long tracks touch the edge more often, and are not in the list then. */
+static void make_pixel_law(double depth, double end, const bst_radiation_hits *hits,
+                           pixel_law *law) {
     *law = (pixel_law){.mu = {0}};
     for (int a = 0; a < ANGLES; a++) {
         double mu = sqrt((a + 0.5) / ANGLES), sine = sqrt(1.0 - mu * mu);
@@ -42,8 +44,10 @@ static void make_pixel_law(double depth, double end, pixel_law *law) {
         law->mu[a] = mu;
         for (int k = 0; k < AZIMUTHS; k++) {
             double azimuth = 0.5 * BST_PI * (k + 0.5) / AZIMUTHS;
-            add_crossings(length * cos(azimuth), length * sin(azimuth), 1.0 / AZIMUTHS,
-                          law->of_pixels[a]);
+            double x = length * cos(azimuth), y = length * sin(azimuth);
+            double inside = fmax(1.0 - x / hits->width, 0.0) * fmax(1.0 - y / hits->height, 0.0);
+            add_crossings(x, y, inside / AZIMUTHS, law->of_pixels[a]);
+            law->inside += inside / (AZIMUTHS * ANGLES);
         }
     }
 }
@@ -53,7 +57,7 @@ static double cost_of(const void *user, const double *x) {
     const bst_radiation_hits *hits = user;
     double depth = exp(x[0]), charge = exp(x[1]), straggling = exp(x[2]), total = 0.0;
     pixel_law law;
-    make_pixel_law(depth, hits->threshold_dn / charge, &law);
+    make_pixel_law(depth, hits->threshold_dn / charge, hits, &law);
     size_t n = hits->used < MOST_USED ? hits->used : MOST_USED;
     for (size_t i = 0; i < n; i++) {
         double q = (double)hits->items[i].charge_dn, sum = 0.0;
@@ -64,7 +68,7 @@ static double cost_of(const void *user, const double *x) {
             double m = (q / probable - 1.0) / straggling;
             sum += law.of_pixels[a][pixels] * exp(-0.5 * (m + exp(-m))) / (probable * straggling);
         }
-        sum *= 1.0 / (ANGLES * sqrt(2.0 * BST_PI));
+        sum *= 1.0 / (ANGLES * law.inside * sqrt(2.0 * BST_PI));
         total -= log((1.0 - OTHERS) * sum + OTHERS / (OTHER_RANGE * q));
     }
     /* far outside what the detector takes */

@@ -2,8 +2,8 @@
 
 #include <assert.h>
 #include <math.h>
-#include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Least difference of a hit's brightest pixel, and of its others, in standard deviations: of a
  * million pixels 0.002 pass the first by noise, and 60 the second. */
@@ -19,9 +19,8 @@ void bst_radiation_hits_free(bst_radiation_hits *hits) {
 /* A pair being searched. */
 typedef struct search {
     const bst_hit_pair *pair;
-    uint8_t *seen;    /* [height * width] */
-    int *open;        /* [MOST_PIXELS] pixels whose neighbours are to be looked at */
-    double threshold; /* sum of the blocks' */
+    uint8_t *seen; /* [height * width] */
+    int *open;     /* [MOST_PIXELS] pixels whose neighbours are to be looked at */
 } search;
 
 /* Difference of a pixel in standard deviations; 0 where it is not used. */
@@ -80,16 +79,13 @@ static bst_status follow(bst_ctx *ctx, search *s, int x0, int y0, double sign,
                                                            : add_hit(ctx, hits, charge, count);
 }
 
-bst_status bst_radiation_hits_add(bst_ctx *ctx, const bst_hit_pair *pair,
+bst_status bst_radiation_hits_add(bst_ctx *ctx, const bst_hit_pair *pair, uint8_t *mask,
                                   bst_radiation_hits *hits) {
-    assert(pair && hits);
-    size_t pixels = (size_t)pair->width * (size_t)pair->height;
-    search s = {.pair = pair,
-                .seen = calloc(pixels, sizeof *s.seen),
-                .open = malloc(MOST_PIXELS * sizeof *s.open)};
-    bst_status status = s.seen && s.open
-                            ? BST_OK
-                            : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
+    assert(pair && mask && hits);
+    search s = {.pair = pair, .seen = mask, .open = malloc(MOST_PIXELS * sizeof *s.open)};
+    bst_status status =
+        s.open ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for a radiation hit");
+    memset(mask, 0, (size_t)pair->width * (size_t)pair->height);
     for (int y = 0; status == BST_OK && y < pair->height; y++) {
         for (int x = 0; status == BST_OK && x < pair->width; x++) {
             double d, v = deviation(pair, x, y, &d);
@@ -101,7 +97,8 @@ bst_status bst_radiation_hits_add(bst_ctx *ctx, const bst_hit_pair *pair,
     int blocks = pair->blocks_per_side * pair->blocks_per_side;
     hits->threshold_dn = GROW * bst_mean_estimate(pair->sigma, blocks).value;
     hits->frames += 2;
-    free(s.seen);
+    hits->width = pair->width;
+    hits->height = pair->height;
     free(s.open);
     return status;
 }

@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 #include "boresight/status.h"
 #include "sim/analysis/characterize/clipped_moments.h"
@@ -17,6 +18,7 @@ typedef struct bst_radiation_hit {
 /* Hits of the frames of a stack. */
 typedef struct bst_radiation_hits {
     int frames;               /* that were searched */
+    int width, height;        /* of a frame */
     int count;                /* without those that touch the last row or column */
     double threshold_dn;      /* of a pixel of a hit, of the last pair */
     bst_radiation_hit *items; /* [used] inside the frame */
@@ -37,8 +39,9 @@ typedef struct bst_hit_pair {
  * and all pixels around it of 4 or more with the same sign. Pixels that are hot in both frames
  * are left out: their noise is larger.
  *
+ * Returned:  mask  [height][width] 1 in pixels of hits
  * Errors:    BST_ERR_MEMORY */
-bst_status bst_radiation_hits_add(bst_ctx *ctx, const bst_hit_pair *pair,
+bst_status bst_radiation_hits_add(bst_ctx *ctx, const bst_hit_pair *pair, uint8_t *mask,
                                   bst_radiation_hits *hits) BST_MUST_CHECK;
 /* Frees the list. */
 void bst_radiation_hits_free(bst_radiation_hits *hits);
