@@ -44,7 +44,10 @@ static void make_pixel_law(double depth, double end, const bst_radiation_hits *h
         law->mu[a] = mu;
         for (int k = 0; k < AZIMUTHS; k++) {
             double azimuth = 0.5 * BST_PI * (k + 0.5) / AZIMUTHS;
-            double x = length * cos(azimuth), y = length * sin(azimuth);
+            double cosine = cos(azimuth), sine_of = sin(azimuth);
+            /* corners that are cut by less than that, of 2 cos sin per length, are lost as well */
+            double whole = 1.0 - 2.0 * cosine * sine_of * end * sine / (cosine + sine_of);
+            double x = whole * length * cosine, y = whole * length * sine_of;
             double inside = fmax(1.0 - x / hits->width, 0.0) * fmax(1.0 - y / hits->height, 0.0);
             add_crossings(x, y, inside / AZIMUTHS, law->of_pixels[a]);
             law->inside += inside / (AZIMUTHS * ANGLES);
