@@ -85,28 +85,33 @@ class Characterize(unittest.TestCase):
         return out, figures_of(camera, detector), report["figures"]
 
     def test_simulated_sensors_are_found_again(self):
-        inside, of, wrong = collections.Counter(), collections.Counter(), []
+        inside, of, unknown, wrong = collections.Counter(), collections.Counter(), collections.Counter(), []
         for seed in range(20 if FULL else 2):
             out, truth, figures = self.made(seed, 256 if FULL else 160, 8 if FULL else 4)
             for key, value in truth.items():
                 found = figures[key]
+                if found["low_95"] is None:  # the report says why; of hits fewer than 30
+                    unknown[key] += 1
+                    continue
                 of[key] += 1
                 good = found["low_95"] - 1e-12 <= value <= found["high_95"] + 1e-12
                 inside[key] += good
                 if not good:
                     wrong.append((seed, key, value, found["value"], found["standard_error"]))
         if FULL:
-            print("inside their 95 % interval:", {key: f"{inside[key]} of {of[key]}" for key in of})
+            print("inside their 95 % interval:", {key: f"{inside[key]} of {of[key]}" for key in of},
+                  "not determined:", dict(unknown), "outside:", *wrong, sep="\n")
         # detector.json is a scenario's change of its camera
         result = call("check", out + "/detector.json")
         self.assertEqual(result.returncode, 0, result.stderr)
         resolved = json.loads(result.stdout)["observers"][0]["sensors"][0]["camera"]
         self.assertAlmostEqual(resolved["read_noise_e"], figures["read_noise_e"]["value"], delta=1e-9)
         self.assertAlmostEqual(resolved["detector"]["prnu_rms"], figures["prnu_rms"]["value"], delta=1e-9)
-        # of intervals of 95 %; two sensors: 28 values, of which 5 or more lie outside once in 70
-        self.assertGreaterEqual(sum(inside.values()), 0.9 * sum(of.values()) if FULL else sum(of.values()) - 4, wrong)
+        self.assertLessEqual({key for key in unknown if not key.startswith("hit_")}, set(), unknown)
+        # of intervals of 95 %; two sensors: some 40 values, of which 7 or more lie outside once in 300
+        self.assertGreaterEqual(sum(inside.values()), 0.9 * sum(of.values()) if FULL else sum(of.values()) - 6, wrong)
         for key in of if FULL else ():
-            self.assertGreaterEqual(inside[key], 16, wrong)  # fewer of 20 once in 400 if 95 % are inside
+            self.assertGreaterEqual(inside[key], of[key] - 4, wrong)  # fewer of 20 once in 400 if 95 % are inside
 
     def test_readout_pick_up_and_traps_are_found_again(self):
         """Dark signal gathered during read-out, a coherent line and charge-transfer inefficiency, from bias frames and darks."""

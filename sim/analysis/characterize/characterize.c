@@ -45,6 +45,13 @@ const bst_option bst_characterize_options[] = {
      .path = BST_PATH_INPUT,
      .argument = "PATH",
      .doc = "the same of flats of several exposures in one light, to beyond the full well"},
+    {.name = "simulated",
+     .kind = BST_OPTION_LIST,
+     .offset = offsetof(Q, simulated),
+     .path = BST_PATH_INPUT,
+     .argument = "PATH",
+     .doc = "frames that boresight calframes made with detector.json, like the darks (without darks "
+            "the bias frames, else the flats), to compare with them"},
     {.name = "pitch",
      .kind = BST_OPTION_REAL,
      .offset = offsetof(Q, pixel_pitch_um),
@@ -154,16 +161,51 @@ static bst_status read_stacks(bst_ctx *ctx, const bst_characterize_request *q,
     BST_TRY(read_stack(ctx, "dark", &q->dark, &map, &stacks->dark));
     BST_TRY(read_stack(ctx, "flat", &q->flat, &map, &stacks->flat));
     stacks->pixel_pitch_um = q->pixel_pitch_um;
+    if (q->simulated.count > 0) {
+        bst_keyword_map ours;
+        BST_TRY(bst_cli_find_keyword_map(ctx, "boresight", path));
+        BST_TRY(bst_keyword_map_load(ctx, path, &ours));
+        BST_TRY(read_stack(ctx, "simulated", &q->simulated, &ours, &stacks->simulated));
+    }
     return q->linearity.count > 0
                ? bst_linearity_series_read(ctx, q->linearity.items, q->linearity.count, &map,
                                            &stacks->linearity)
                : BST_OK;
 }
 
+/* Compares the last frame of the darks, else of the bias frames or flats, with a simulated one. */
+static bst_status compare(bst_ctx *ctx, const bst_sensor_stacks *s,
+                          bst_characterize_comparison *out) {
+    const bst_frame_stack *sim = &s->simulated;
+    const bst_frame_stack *real = s->dark.count > 0 ? &s->dark
+                                  : s->bias.count > 0 ? &s->bias
+                                                      : &s->flat;
+    if (sim->count == 0) {
+        return BST_OK;
+    }
+    out->made = true;
+    out->kind = real == &s->dark ? "dark" : real == &s->bias ? "bias" : "flat";
+    if (sim->width != real->width || sim->height != real->height) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "the simulated frames have %d x %d pixels, the image of the %s frames %d x "
+                        "%d (allowed: one size; simulate without overscan)",
+                        sim->width, sim->height, out->kind, real->width, real->height);
+    }
+    if (fabs(sim->exposure_s - real->exposure_s) > 1e-3 * real->exposure_s + 1e-6) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "the simulated frames have an exposure of %g s, the %s frames %g s "
+                        "(allowed: one exposure)",
+                        sim->exposure_s, out->kind, real->exposure_s);
+    }
+    BST_TRY(bst_frame_statistics_of(ctx, real->last, real->width, real->height, &out->real));
+    return bst_frame_statistics_of(ctx, sim->last, sim->width, sim->height, &out->simulated);
+}
+
 bst_status bst_characterize_run(bst_ctx *ctx, const bst_characterize_request *q, FILE *out) {
     char path[4096];
     bst_sensor_stacks stacks = {0};
     bst_sensor_figures figures = {0};
+    bst_characterize_comparison comparison = {.made = false};
     int n = snprintf(path, sizeof path, "%s/report.json", q->out);
     if (n < 0 || (size_t)n >= sizeof path) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%.80s...: the path is too long", q->out);
@@ -174,16 +216,20 @@ bst_status bst_characterize_run(bst_ctx *ctx, const bst_characterize_request *q,
         status = bst_sensor_figures_compute(ctx, &stacks, &figures);
     }
     if (status == BST_OK) {
+        status = compare(ctx, &stacks, &comparison);
+    }
+    if (status == BST_OK) {
         print_figures(out, &stacks, &figures);
         status = bst_folder_make(ctx, q->out);
     }
     if (status == BST_OK) {
-        status = bst_characterize_write(ctx, q, &stacks, &figures);
+        status = bst_characterize_write(ctx, q, &stacks, &figures, &comparison);
     }
     bst_sensor_figures_free(&figures);
     bst_frame_stack_free(&stacks.bias);
     bst_frame_stack_free(&stacks.dark);
     bst_frame_stack_free(&stacks.flat);
+    bst_frame_stack_free(&stacks.simulated);
     bst_linearity_series_free(&stacks.linearity);
     return status;
 }

@@ -21,6 +21,7 @@ typedef struct writer {
     const bst_characterize_request *request;
     const bst_sensor_stacks *stacks;
     const bst_sensor_figures *figures;
+    const bst_characterize_comparison *comparison;
 } writer;
 
 /* Read noise without what other keys add to the differences that it was measured by: pick-up, and
@@ -213,6 +214,44 @@ static void add_linearity(cJSON *root, const writer *w) {
     }
 }
 
+/* A list of what both frames have at a place: distance, frequency, percentile. */
+static void add_both(cJSON *root, const char *name, const char *place, const double *places,
+                     int first, const double *real, const double *simulated, int count) {
+    cJSON *list = cJSON_AddArrayToObject(root, name);
+    for (int i = 0; i < count; i++) {
+        cJSON *item = cJSON_CreateObject();
+        cJSON_AddItemToArray(list, item);
+        cJSON_AddNumberToObject(item, place, places ? places[i] : first + i);
+        bst_json_add_number(item, "real", real[i]);
+        bst_json_add_number(item, "simulated", simulated[i]);
+    }
+}
+
+/* How the simulated frame reproduces the real one. */
+static void add_comparison(cJSON *root, const bst_characterize_comparison *c) {
+    const bst_frame_statistics *r = &c->real, *s = &c->simulated;
+    double frequencies[BST_COMPARISON_BANDS];
+    if (!c->made) {
+        return;
+    }
+    for (int i = 0; i < BST_COMPARISON_BANDS; i++) {
+        frequencies[i] = bst_comparison_frequency(i);
+    }
+    cJSON *node = cJSON_AddObjectToObject(root, "reproduction");
+    cJSON_AddStringToObject(node, "kind", c->kind);
+    cJSON *median = cJSON_AddObjectToObject(node, "median_dn");
+    bst_json_add_number(median, "real", r->median_dn);
+    bst_json_add_number(median, "simulated", s->median_dn);
+    add_both(node, "percentiles_over_median_dn", "percentile", bst_sensor_percentiles, 0,
+             r->percentiles_dn, s->percentiles_dn, BST_SENSOR_PERCENTILES);
+    add_both(node, "power_along_rows_dn2_px", "cycles_per_px", frequencies, 0, r->spectrum,
+             s->spectrum, BST_COMPARISON_BANDS);
+    add_both(node, "correlation_along_rows", "distance_px", NULL, 1, r->along_rows, s->along_rows,
+             BST_COMPARISON_LAGS);
+    add_both(node, "correlation_along_columns", "distance_px", NULL, 1, r->along_columns,
+             s->along_columns, BST_COMPARISON_LAGS);
+}
+
 /* All figures with their uncertainties; NULL: out of memory. */
 static cJSON *report_json(const writer *w) {
     const bst_sensor_figures *f = w->figures;
@@ -256,6 +295,7 @@ static cJSON *report_json(const writer *w) {
     }
     add_trail(root, w);
     add_linearity(root, w);
+    add_comparison(root, w->comparison);
     return root;
 }
 
@@ -290,8 +330,9 @@ static void remove_earlier(const bst_characterize_request *request) {
 
 bst_status bst_characterize_write(bst_ctx *ctx, const bst_characterize_request *request,
                                   const bst_sensor_stacks *stacks,
-                                  const bst_sensor_figures *figures) {
-    const writer w = {request, stacks, figures};
+                                  const bst_sensor_figures *figures,
+                                  const bst_characterize_comparison *comparison) {
+    const writer w = {request, stacks, figures, comparison};
     char path[4096 + 32];
     if (request->overwrite) {
         remove_earlier(request);
@@ -302,7 +343,7 @@ bst_status bst_characterize_write(bst_ctx *ctx, const bst_characterize_request *
     if (figures->prnu_map) {
         BST_TRY(write_map(ctx, &w, "prnu_map.fits", figures->prnu_map, ""));
     }
-    BST_TRY(bst_characterize_plot(ctx, request->out, stacks, figures));
+    BST_TRY(bst_characterize_plot(ctx, request->out, stacks, figures, comparison));
     snprintf(path, sizeof path, "%s/detector.json", request->out);
     BST_TRY(bst_cli_write_json(ctx, path, detector_json(&w)));
     snprintf(path, sizeof path, "%s/report.json", request->out);

@@ -9,7 +9,7 @@ enum { HISTOGRAM_BINS = 200, HIT_BINS = 40 };
 
 /* Panels of the plot. */
 typedef struct panels {
-    bool rows, dark, linearity, hits;
+    bool rows, dark, linearity, hits, comparison;
 } panels;
 
 /* Histogram of the dark map from below its 5th percentile, by a fifth of the distance to the 95th,
@@ -69,6 +69,22 @@ static void put_hits(FILE *script, const bst_radiation_hits *h, double gain, dou
     fprintf(script, "EOD\n");
 }
 
+/* Power along the rows, and percentiles, of a real and a simulated frame. */
+static void put_comparison(FILE *script, const bst_characterize_comparison *c) {
+    fprintf(script, "$power << EOD\n");
+    for (int i = 0; i < BST_COMPARISON_BANDS; i++) {
+        fprintf(script, "%.6g %.6g %.6g\n", bst_comparison_frequency(i), c->real.spectrum[i],
+                c->simulated.spectrum[i]);
+    }
+    fprintf(script, "EOD\n$correlation << EOD\n");
+    for (int i = 0; i < BST_COMPARISON_LAGS; i++) {
+        fprintf(script, "%d %.6g %.6g %.6g %.6g\n", i + 1, c->real.along_rows[i],
+                c->simulated.along_rows[i], c->real.along_columns[i],
+                c->simulated.along_columns[i]);
+    }
+    fprintf(script, "EOD\n");
+}
+
 static void draw(FILE *script, const panels *p, const bst_sensor_figures *f) {
     if (p->rows) {
         fprintf(script,
@@ -88,6 +104,16 @@ static void draw(FILE *script, const panels *p, const bst_sensor_figures *f) {
                 "set logscale x\nset xlabel 'charge of a radiation hit, e-'\nset ylabel 'hits'\n"
                 "plot $hits with steps\nunset logscale x\n");
     }
+    if (p->comparison) {
+        fprintf(script,
+                "set key\nset xlabel 'frequency along a row, cycles/px'\nset ylabel 'power, DN^2 "
+                "px'\nplot $power using 1:2 with lines title 'real', $power using 1:3 with lines "
+                "title 'simulated'\nset xlabel 'distance, px'\nset ylabel 'correlation'\n"
+                "plot $correlation using 1:2 with lines title 'real, along rows', "
+                "$correlation using 1:3 with lines title 'simulated', "
+                "$correlation using 1:4 with lines title 'real, along columns', "
+                "$correlation using 1:5 with lines title 'simulated'\nunset key\n");
+    }
     if (p->dark) {
         fprintf(script,
                 "set logscale y\nset xlabel 'dark current, e-/s'\nset ylabel 'pixels'\n"
@@ -96,15 +122,17 @@ static void draw(FILE *script, const panels *p, const bst_sensor_figures *f) {
 }
 
 bst_status bst_characterize_plot(bst_ctx *ctx, const char *folder, const bst_sensor_stacks *stacks,
-                                 const bst_sensor_figures *f) {
+                                 const bst_sensor_figures *f,
+                                 const bst_characterize_comparison *comparison) {
     char path[4096 + 32];
     bst_plot plot;
     double charge = f->figures[BST_SENSOR_HIT_CHARGE].value;
     const panels p = {f->line.power != NULL,
                       f->dark_map && isfinite(f->percentiles_e_per_s[0]), /* a pixel has a value */
                       f->linearity.used > 0 && isfinite(f->linearity.slope_dn_per_s),
-                      charge > 0.0};
-    int count = p.rows + p.dark + 2 * p.linearity + p.hits;
+                      charge > 0.0,
+                      comparison->made};
+    int count = p.rows + p.dark + 2 * p.linearity + p.hits + 2 * p.comparison;
     if (count == 0) {
         return BST_OK;
     }
@@ -125,6 +153,9 @@ bst_status bst_characterize_plot(bst_ctx *ctx, const char *folder, const bst_sen
     }
     if (p.hits) {
         put_hits(plot.script, &stacks->dark.hits, f->figures[BST_SENSOR_GAIN].value, charge);
+    }
+    if (p.comparison) {
+        put_comparison(plot.script, comparison);
     }
     fprintf(plot.script, "set multiplot layout %d,1\nset grid\nunset key\n", count);
     draw(plot.script, &p, f);

@@ -56,6 +56,7 @@ extern const double bst_sensor_percentiles[BST_SENSOR_PERCENTILES];
 /* Frames of a sensor; a stack without frames has count 0. */
 typedef struct bst_sensor_stacks {
     bst_frame_stack bias, dark, flat;
+    bst_frame_stack simulated;      /* frames made with the figures, to compare with the real */
     bst_linearity_series linearity; /* without any: count 0 */
     double pixel_pitch_um;          /* side of a pixel, for areas and lengths of radiation hits */
 } bst_sensor_stacks;
