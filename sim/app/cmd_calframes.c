@@ -95,7 +95,8 @@ int bst_cmd_calframes(int argc, char **argv) {
         printf(
             "usage: boresight calframes SCENARIO.json --out FOLDER [options]\n\n"
             "Makes bias, dark and flat frames of a scenario's sensors: FITS files\n"
-            "OBSERVER_SENSOR_bias.fits, _dark.fits, _flat.fits and _linearity.fits with one extension per frame.\n"
+            "OBSERVER_SENSOR_bias.fits, _dark.fits, _flat.fits and _linearity.fits with one "
+            "extension per frame.\n"
             "Fixed patterns are those of the scenario's runs.\n\n"
             "  boresight calframes scenarios/neossat_geo_track.json --out cal --dark 50\n\n"
             "options:\n");

@@ -310,9 +310,10 @@ static void files_of_the_figures(void **state) {
     scratch s;
     scratch_make(&s);
     const bst_characterize_request request = {.out = s.folder, .camera = CAMERA};
-    bst_sensor_stacks stacks = {
-        .bias = {.count = 4}, .dark = {.count = 5, .exposure_s = 12.5}, .flat = {.count = 6},
-        .pixel_pitch_um = 9.0};
+    bst_sensor_stacks stacks = {.bias = {.count = 4},
+                                .dark = {.count = 5, .exposure_s = 12.5},
+                                .flat = {.count = 6},
+                                .pixel_pitch_um = 9.0};
     bst_sensor_figures f = written_figures();
     bst_characterize_comparison comparison = {.made = true, .kind = "dark"};
     comparison.real.percentiles_dn[7] = 812.0;

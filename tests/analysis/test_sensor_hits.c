@@ -69,7 +69,7 @@ static void hits_of_a_pair(void **state) {
     a[40 * W + 5] += 500.0F;    /* hot in both */
     b[40 * W + 5] += 700.0F;
     b[10 * W + 12] += 3.0F; /* below four standard deviations */
-    const bst_hit_pair pair = {W, H, a, b, rows, hot, sigma, SIDE};
+    const bst_hit_pair pair = {W, H, a, b, rows, hot, sigma, SIDE, 6.0, 4.0};
     bst_radiation_hits hits = {0};
     assert_int_equal(bst_radiation_hits_add(&ctx, &pair, mask, &hits), BST_OK);
     assert_int_equal(hits.count, 3);
@@ -104,7 +104,8 @@ static void make_series(bst_linearity_point *points, bst_linearity_series *s, do
         for (int k = 0; k < BST_STACK_BLOCKS; k++) {
             double response = 1.0 - vignetting * k / BST_STACK_BLOCKS;
             double q = response * WELL / 10.0 * points[i].exposure_s, u = fmin(q / WELL, 1.0);
-            double signal = u * WELL / GAIN * (1.0 + u * (TERMS[0] + u * (TERMS[1] + u * TERMS[2])));
+            double signal =
+                u * WELL / GAIN * (1.0 + u * (TERMS[0] + u * (TERMS[1] + u * TERMS[2])));
             double bend = 1.0 + u * (2.0 * TERMS[0] + u * (3.0 * TERMS[1] + u * 4.0 * TERMS[2]));
             double shot = q < WELL ? q / (GAIN * GAIN) * bend * bend : 0.0;
             double v = signal < most ? shot + READ_DN * READ_DN : 0.0;
@@ -137,10 +138,12 @@ static void linearity_and_full_well(void **state) {
         make_series(points, &s, 14.0, INFINITY, vignetted ? 0.2 : 0.0);
         bst_linearity_fit(&s, dark_of_series(), header, &fit);
         assert_true(fit.saturates && !fit.of_converter);
-        /* the 14th is at 98 % of the well, within five times the scatter of it; with vignetting too */
+        /* the 14th is at 98 % of the well, within five times the scatter of it; with vignetting too
+         */
         assert_in_range(fit.used, 10, 13);
         double full = WELL / GAIN * (1.0 + TERMS[0] + TERMS[1] + TERMS[2]);
-        bst_assert_close(fit.saturation_dn.value, full, 5.0 * fit.saturation_dn.sigma + 1e-3 * full);
+        bst_assert_close(fit.saturation_dn.value, full,
+                         5.0 * fit.saturation_dn.sigma + 1e-3 * full);
         /* four standard errors, and that they are small enough to say something */
         bst_assert_close(fit.gain_e_per_dn.value, GAIN, 4.0 * fit.gain_e_per_dn.sigma);
         assert_true(fit.gain_e_per_dn.sigma < 0.005 * GAIN);
@@ -173,7 +176,8 @@ static void linearity_and_full_well(void **state) {
                      4.0 * fit.error.sigma);
 }
 
-/* Noise whose neighbours along a row have a correlation of 0.4, a ramp over the rows, hot pixels. */
+/* Noise whose neighbours along a row have a correlation of 0.4, a ramp over the rows, hot pixels.
+ */
 static void statistics_of_a_frame(void **state) {
     (void)state;
     enum { W = 300, H = 200 };
@@ -181,7 +185,8 @@ static void statistics_of_a_frame(void **state) {
     static float image[W * H];
     bst_frame_statistics s;
     for (int i = 0; i < W * H; i++) {
-        double e = bst_rng_normal(KEY, (uint64_t)i, 30), before = bst_rng_normal(KEY, (uint64_t)i - 1, 30);
+        double e = bst_rng_normal(KEY, (uint64_t)i, 30),
+               before = bst_rng_normal(KEY, (uint64_t)i - 1, 30);
         image[i] = (float)(1000.0 + 4.0 * (e + 0.5 * before) + 0.02 * (i / W));
         image[i] += i % 997 == 0 ? 5000.0F : 0.0F;
     }
@@ -199,7 +204,8 @@ static void statistics_of_a_frame(void **state) {
     bst_assert_close(s.spectrum[0], variance * (1.0 + 0.8 * window), 0.15 * 36.0);
     bst_assert_close(s.spectrum[BST_COMPARISON_BANDS - 1], variance * (1.0 - 0.8 * window), 2.0);
     bst_assert_close(bst_comparison_frequency(BST_COMPARISON_BANDS - 1), 0.5, 1e-15);
-    /* a normal law with the ramp of 4 DN: 16th percentile one standard deviation below the median */
+    /* a normal law with the ramp of 4 DN: 16th percentile one standard deviation below the median
+     */
     double sigma = sqrt(variance + 16.0 / 12.0);
     bst_assert_close(s.percentiles_dn[1], -sigma, 0.15);
     bst_assert_close(s.percentiles_dn[2], 0.0, 1e-6);

@@ -22,7 +22,7 @@ typedef struct series {
     const char *name, *type; /* file name, IMAGETYP */
     int64_t count;
     double exposure_s, level_e; /* flat field: electrons per pixel of mean response */
-    int64_t steps;              /* exposures from 1 / steps of exposure_s on, in the same light; 0: one */
+    int64_t steps; /* exposures from 1 / steps of exposure_s on, in the same light; 0: one */
 } series;
 
 /* State of making the frames of one sensor. */

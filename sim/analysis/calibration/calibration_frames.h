@@ -16,9 +16,9 @@ typedef struct bst_calibration_frames {
 } bst_calibration_frames;
 
 /* Writes OBSERVER_SENSOR_bias.fits, _dark.fits, _flat.fits and _linearity.fits, one extension per
- * frame, with the fixed patterns of the scenario's runs, and prints a line for each. Prepares the scenario's
- * cameras. Errors: BST_ERR_IO: a file exists or cannot be created; BST_ERR_INTERRUPTED: stop
- * requested; errors of the renderer. */
+ * frame, with the fixed patterns of the scenario's runs, and prints a line for each. Prepares the
+ * scenario's cameras. Errors: BST_ERR_IO: a file exists or cannot be created; BST_ERR_INTERRUPTED:
+ * stop requested; errors of the renderer. */
 bst_status bst_calibration_frames_make(bst_ctx *ctx, const bst_calibration_frames *frames,
                                        bst_scenario *scenario) BST_MUST_CHECK;
 

@@ -50,8 +50,9 @@ const bst_option bst_characterize_options[] = {
      .offset = offsetof(Q, simulated),
      .path = BST_PATH_INPUT,
      .argument = "PATH",
-     .doc = "frames that boresight calframes made with detector.json, like the darks (without darks "
-            "the bias frames, else the flats), to compare with them"},
+     .doc =
+         "frames that boresight calframes made with detector.json, like the darks (without darks "
+         "the bias frames, else the flats), to compare with them"},
     {.name = "pitch",
      .kind = BST_OPTION_REAL,
      .offset = offsetof(Q, pixel_pitch_um),
@@ -116,7 +117,8 @@ const bst_sensor_figure_name bst_sensor_figure_names[BST_SENSOR_FIGURES] = {
     [BST_SENSOR_NONLINEARITY_1] = {"nonlinearity_1", "", NULL},
     [BST_SENSOR_NONLINEARITY_2] = {"nonlinearity_2", "", NULL},
     [BST_SENSOR_NONLINEARITY_3] = {"nonlinearity_3", "", NULL},
-    [BST_SENSOR_HIT_RATE] = {"hit_rate_per_cm2_s", "1/cm2/s", "detector/cosmic_rays/rate_per_cm2_s"},
+    [BST_SENSOR_HIT_RATE] = {"hit_rate_per_cm2_s", "1/cm2/s",
+                             "detector/cosmic_rays/rate_per_cm2_s"},
     [BST_SENSOR_HIT_READOUT] = {"hit_readout_s", "s", "detector/cosmic_rays/readout_s"},
     [BST_SENSOR_HIT_CHARGE] = {"hit_charge_e", "e-", NULL},
     [BST_SENSOR_HIT_LENGTH] = {"hit_length_px", "px", NULL},
@@ -177,7 +179,7 @@ static bst_status read_stacks(bst_ctx *ctx, const bst_characterize_request *q,
 static bst_status compare(bst_ctx *ctx, const bst_sensor_stacks *s,
                           bst_characterize_comparison *out) {
     const bst_frame_stack *sim = &s->simulated;
-    const bst_frame_stack *real = s->dark.count > 0 ? &s->dark
+    const bst_frame_stack *real = s->dark.count > 0   ? &s->dark
                                   : s->bias.count > 0 ? &s->bias
                                                       : &s->flat;
     if (sim->count == 0) {

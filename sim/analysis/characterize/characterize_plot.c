@@ -129,8 +129,7 @@ bst_status bst_characterize_plot(bst_ctx *ctx, const char *folder, const bst_sen
     double charge = f->figures[BST_SENSOR_HIT_CHARGE].value;
     const panels p = {f->line.power != NULL,
                       f->dark_map && isfinite(f->percentiles_e_per_s[0]), /* a pixel has a value */
-                      f->linearity.used > 0 && isfinite(f->linearity.slope_dn_per_s),
-                      charge > 0.0,
+                      f->linearity.used > 0 && isfinite(f->linearity.slope_dn_per_s), charge > 0.0,
                       comparison->made};
     int count = p.rows + p.dark + 2 * p.linearity + p.hits + 2 * p.comparison;
     if (count == 0) {

@@ -153,8 +153,8 @@ static bool fit_block(work *w, int block) {
     const bst_linearity_series *s = w->series;
     double matrix[UNKNOWNS][UNKNOWNS] = {{0.0}}, side[UNKNOWNS] = {0.0};
     for (int i = 0; i < s->count; i++) {
-        double u = s->points[i].exposure_s / w->longest_s, row[UNKNOWNS] = {u, u * u, u * u * u,
-                                                                           u * u * u * u};
+        double u = s->points[i].exposure_s / w->longest_s,
+               row[UNKNOWNS] = {u, u * u, u * u * u, u * u * u * u};
         double weight = w->used[i] ? 1.0 / noise_of(w, i, block) : 0.0;
         for (int a = 0; a < UNKNOWNS; a++) {
             side[a] += w->used[i] ? weight * row[a] * signal_of(w, i, block) : 0.0;
@@ -240,7 +240,7 @@ static void average(const work *w, int last, double factor, bst_linearity *out) 
             out->shape[i] += c->shape[i] / BLOCKS;
         }
     }
-    bst_sensor_estimate *to[] = {&out->full_well_e, &out->saturation_dn, &out->error, NULL,
+    bst_sensor_estimate *to[] = {&out->full_well_e, &out->saturation_dn, &out->error,   NULL,
                                  &out->terms[0],    &out->terms[1],      &out->terms[2]};
     for (int i = 0; i < 7; i++) {
         if (to[i]) {
@@ -256,8 +256,12 @@ void bst_linearity_fit(const bst_linearity_series *series, const bst_linearity_d
                        bst_sensor_estimate gain, bst_linearity *out) {
     assert(series && dark && out && series->count > 0);
     const bst_sensor_estimate none = {NAN, NAN};
-    *out = (bst_linearity){.gain_e_per_dn = none, .saturation_dn = none, .full_well_e = none,
-                           .terms = {none, none, none}, .error = none, .slope_dn_per_s = NAN};
+    *out = (bst_linearity){.gain_e_per_dn = none,
+                           .saturation_dn = none,
+                           .full_well_e = none,
+                           .terms = {none, none, none},
+                           .error = none,
+                           .slope_dn_per_s = NAN};
     work w = {.series = series,
               .dark = dark,
               .longest_s = series->points[series->count - 1].exposure_s,
@@ -280,9 +284,9 @@ void bst_linearity_fit(const bst_linearity_series *series, const bst_linearity_d
         double read = bst_mean_estimate(dark->variance, BLOCKS).value, noise = INFINITY;
         for (int i = 0; i < series->count; i++) {
             last = w.used[i] ? i : last;
-            noise = w.full[i] ? fmin(noise, bst_mean_estimate(series->points[i].variance,
-                                                              BLOCKS).value)
-                              : noise;
+            noise = w.full[i]
+                        ? fmin(noise, bst_mean_estimate(series->points[i].variance, BLOCKS).value)
+                        : noise;
         }
         if (good) {
             average(&w, last, common_factor(&w, out->used), out);
@@ -290,7 +294,8 @@ void bst_linearity_fit(const bst_linearity_series *series, const bst_linearity_d
             out->gain_e_per_dn = measure_gain(&w);
             bst_sensor_estimate k = isfinite(out->gain_e_per_dn.value) ? out->gain_e_per_dn : gain;
             bst_sensor_estimate *well = &out->full_well_e;
-            double relative = hypot(well->sigma / well->value, k.sigma > 0.0 ? k.sigma / k.value : 0.0);
+            double relative =
+                hypot(well->sigma / well->value, k.sigma > 0.0 ? k.sigma / k.value : 0.0);
             *well = (bst_sensor_estimate){well->value * k.value, well->value * k.value * relative};
         }
         /* pixels that are full still have the noise of the read-out, a full converter has none */

@@ -15,21 +15,21 @@ typedef struct bst_linearity_dark {
 
 /* What the series says; NAN: not determined. */
 typedef struct bst_linearity {
-    bool saturates;       /* the longest exposures show the same signal */
-    bool of_converter;    /* it is the converter that saturates, not the pixel */
-    int used;             /* exposures below saturation */
-    double largest_dn;    /* signal of the longest of these, mean of the blocks */
+    bool saturates;                    /* the longest exposures show the same signal */
+    bool of_converter;                 /* it is the converter that saturates, not the pixel */
+    int used;                          /* exposures below saturation */
+    double largest_dn;                 /* signal of the longest of these, mean of the blocks */
     bst_sensor_estimate gain_e_per_dn; /* photon transfer, freed of the non-linearity */
     bst_sensor_estimate saturation_dn; /* signal above the level without light */
     bst_sensor_estimate full_well_e;   /* NAN where the converter saturates */
     bst_sensor_estimate terms[BST_LINEARITY_TERMS]; /* of n (1 + c1 u + c2 u^2 + c3 u^3), u = n over
                                                        the full well */
-    bst_sensor_estimate error;    /* departure from the slope at 0, at largest_dn, share */
-    double significance;          /* chi-squared of the curve against a line, per term */
-    double slope_dn_per_s;        /* at 0, mean of the blocks */
+    bst_sensor_estimate error;         /* departure from the slope at 0, at largest_dn, share */
+    double significance;               /* chi-squared of the curve against a line, per term */
+    double slope_dn_per_s;             /* at 0, mean of the blocks */
     double shape[BST_LINEARITY_TERMS]; /* of the curve over slope times time, in time over
                                           longest_s; mean of the blocks */
-    double longest_s;             /* of the series */
+    double longest_s;                  /* of the series */
 } bst_linearity;
 
 /* Fits the detector's response to each of the blocks.
@@ -40,9 +40,9 @@ typedef struct bst_linearity {
  *            noise of each mean. The full well is where the curve reaches the saturated signal;
  *            terms c_i = b_i t_full^i. Exposures count as saturated beyond the break of photon
  *            transfer, where the variance falls below a quarter of its maximum; those with pixels
- *            within 5 standard deviations of it are left out. Errors from the scatter of the blocks,
- *            times what is common to all blocks.
- * Reference: Janesick 2007, Photon Transfer, chapters 5 and 7 */
+ *            within 5 standard deviations of it are left out. Errors from the scatter of the
+ * blocks, times what is common to all blocks. Reference: Janesick 2007, Photon Transfer, chapters 5
+ * and 7 */
 void bst_linearity_fit(const bst_linearity_series *series, const bst_linearity_dark *dark,
                        bst_sensor_estimate gain, bst_linearity *out);
 

@@ -5,9 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Least difference of a hit's brightest pixel, and of its others, in standard deviations: of a
- * million pixels 0.002 pass the first by noise, and 60 the second. */
-static const double SEED = 6.0, GROW = 4.0;
 /* Most pixels of a hit: longer groups are no tracks. */
 enum { MOST_PIXELS = 4096 };
 
@@ -67,7 +64,7 @@ static bst_status follow(bst_ctx *ctx, search *s, int x0, int y0, double sign,
         for (int k = 0; k < 9; k++) {
             int u = x + k % 3 - 1, v = y + k / 3 - 1;
             if (u < 0 || v < 0 || u >= p->width || v >= p->height || count == MOST_PIXELS ||
-                s->seen[v * p->width + u] || !(sign * deviation(p, u, v, &d) > GROW)) {
+                s->seen[v * p->width + u] || !(sign * deviation(p, u, v, &d) > p->grow)) {
                 continue;
             }
             s->seen[v * p->width + u] = 1;
@@ -89,13 +86,13 @@ bst_status bst_radiation_hits_add(bst_ctx *ctx, const bst_hit_pair *pair, uint8_
     for (int y = 0; status == BST_OK && y < pair->height; y++) {
         for (int x = 0; status == BST_OK && x < pair->width; x++) {
             double d, v = deviation(pair, x, y, &d);
-            if (fabs(v) > SEED && !s.seen[(size_t)y * (size_t)pair->width + (size_t)x]) {
+            if (fabs(v) > pair->seed && !s.seen[(size_t)y * (size_t)pair->width + (size_t)x]) {
                 status = follow(ctx, &s, x, y, v > 0.0 ? 1.0 : -1.0, hits);
             }
         }
     }
     int blocks = pair->blocks_per_side * pair->blocks_per_side;
-    hits->threshold_dn = GROW * bst_mean_estimate(pair->sigma, blocks).value;
+    hits->threshold_dn = pair->grow * bst_mean_estimate(pair->sigma, blocks).value;
     hits->frames += 2;
     hits->width = pair->width;
     hits->height = pair->height;

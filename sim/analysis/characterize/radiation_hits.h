@@ -33,11 +33,12 @@ typedef struct bst_hit_pair {
     const double *hot;           /* [blocks] level above which a pixel is hot */
     const double *sigma;         /* [blocks] standard deviation of the difference */
     int blocks_per_side;
+    double seed, grow; /* least difference of a hit's brightest pixel and of its others, in sigma */
 } bst_hit_pair;
 
-/* Adds the hits of a pair. A hit has a pixel whose difference is 6 standard deviations or more,
- * and all pixels around it of 4 or more with the same sign. Pixels that are hot in both frames
- * are left out: their noise is larger.
+/* Adds the hits of a pair. A hit has a pixel whose difference is `seed` standard deviations or
+ * more, and all pixels around it of `grow` or more with the same sign. Pixels that are hot in both
+ * frames are left out: their noise is larger.
  *
  * Returned:  mask  [height][width] 1 in pixels of hits
  * Errors:    BST_ERR_MEMORY */

@@ -77,8 +77,8 @@ typedef struct bst_sensor_figures {
     double trap_misfit[2]; /* RMS of parallel and serial ones, shares of charge */
     bst_pick_up_line line;
     bst_linearity linearity; /* used 0: no series */
-    float *dark_map; /* [height][width] e-/s; NULL: none */
-    float *prnu_map; /* [height][width] relative to 1; NULL: none */
+    float *dark_map;         /* [height][width] e-/s; NULL: none */
+    float *prnu_map;         /* [height][width] relative to 1; NULL: none */
 } bst_sensor_figures;
 
 /* Computes what the frames determine; the rest is NAN with its reason in `method`.

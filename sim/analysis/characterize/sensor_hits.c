@@ -18,8 +18,7 @@ static bst_sensor_estimate median_charge(const bst_radiation_hits *h) {
         qsort(sorted, h->used, sizeof *sorted, bst_compare_doubles);
         /* density at the median from the quarters beside it: 1.25 / (f sqrt(n)) of a normal law */
         double spread = sorted[5 * h->used / 8] - sorted[3 * h->used / 8];
-        median = (bst_sensor_estimate){sorted[h->used / 2],
-                                       2.0 * spread / sqrt((double)h->used)};
+        median = (bst_sensor_estimate){sorted[h->used / 2], 2.0 * spread / sqrt((double)h->used)};
         free(sorted);
     }
     return median;
@@ -43,9 +42,9 @@ static void measure_rate(const bst_sensor_stacks *s, bst_sensor_figures *out) {
     if (b->frames > 0 && rate > 5.0 * sigma) {
         double bias_sigma = sqrt(fmax(b->count, 1.0)) / b->frames / of_exposure;
         double value = bias / of_exposure;
-        out->figures[BST_SENSOR_HIT_READOUT] = (bst_sensor_estimate){
-            value * s->dark.exposure_s,
-            hypot(bias_sigma, value * sigma / rate) * s->dark.exposure_s};
+        out->figures[BST_SENSOR_HIT_READOUT] =
+            (bst_sensor_estimate){value * s->dark.exposure_s,
+                                  hypot(bias_sigma, value * sigma / rate) * s->dark.exposure_s};
         out->method[BST_SENSOR_HIT_READOUT] = "hits of bias frames over the rate";
     }
 }
@@ -64,16 +63,15 @@ void bst_sensor_measure_hits(const bst_sensor_stacks *s, bst_sensor_figures *out
     measure_rate(s, out);
     bst_sensor_estimate median = median_charge(h);
     out->figures[BST_SENSOR_HIT_CHARGE] = (bst_sensor_estimate){
-        median.value * gain->value,
-        hypot(median.sigma, median.value * relative) * gain->value};
+        median.value * gain->value, hypot(median.sigma, median.value * relative) * gain->value};
     bst_hit_law law = bst_radiation_hits_fit(h);
     out->figures[BST_SENSOR_HIT_LENGTH] = law.depth_px; /* of half the tracks: tan of 45 degrees */
     out->figures[BST_SENSOR_HIT_DEPTH] = (bst_sensor_estimate){
         law.depth_px.value * s->pixel_pitch_um, law.depth_px.sigma * s->pixel_pitch_um};
     double per_um = gain->value / s->pixel_pitch_um;
-    out->figures[BST_SENSOR_HIT_E_PER_UM] = (bst_sensor_estimate){
-        law.charge_dn.value * per_um,
-        hypot(law.charge_dn.sigma, law.charge_dn.value * relative) * per_um};
+    out->figures[BST_SENSOR_HIT_E_PER_UM] =
+        (bst_sensor_estimate){law.charge_dn.value * per_um,
+                              hypot(law.charge_dn.sigma, law.charge_dn.value * relative) * per_um};
     out->figures[BST_SENSOR_HIT_STRAGGLING] = law.straggling;
     bool found = isfinite(law.depth_px.value);
     for (int i = BST_SENSOR_HIT_LENGTH; i <= BST_SENSOR_HIT_STRAGGLING; i++) {

@@ -27,8 +27,8 @@ static bool find_dark(const bst_sensor_stacks *s, const bst_sensor_figures *f,
     *dark = (bst_linearity_dark){.level_variance = level_variance(&s->bias)};
     for (int k = 0; k < BST_STACK_BLOCKS; k++) {
         dark->level[k] = f->figures[BST_SENSOR_OFFSET].value;
-        dark->variance[k] = s->bias.pairs > 0 ? s->bias.variance[k]
-                                              : read->value * read->value + 1.0 / 12.0;
+        dark->variance[k] =
+            s->bias.pairs > 0 ? s->bias.variance[k] : read->value * read->value + 1.0 / 12.0;
     }
     if (s->bias.count > 0) {
         float *scratch = malloc(pixels * sizeof *scratch);
@@ -66,12 +66,14 @@ static void put(const bst_linearity *l, bst_sensor_figures *out) {
                                                     : full;
     out->figures[BST_SENSOR_SATURATION] = l->saturation_dn;
     out->method[BST_SENSOR_SATURATION] =
-        !l->saturates     ? "none: no exposure saturates"
-        : l->of_converter ? "signal beyond the break of photon transfer, where the converter is full"
-                          : "signal beyond the break of photon transfer";
+        !l->saturates ? "none: no exposure saturates"
+        : l->of_converter
+            ? "signal beyond the break of photon transfer, where the converter is full"
+            : "signal beyond the break of photon transfer";
     out->figures[BST_SENSOR_LINEARITY_ERROR] = l->error;
     out->method[BST_SENSOR_LINEARITY_ERROR] =
-        fitted ? "curve over its slope at 0, less 1, at the largest signal below saturation" : below;
+        fitted ? "curve over its slope at 0, less 1, at the largest signal below saturation"
+               : below;
     for (int i = 0; i < BST_LINEARITY_TERMS; i++) {
         out->figures[terms[i]] = l->terms[i];
         out->method[terms[i]] = full;
