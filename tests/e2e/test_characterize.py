@@ -72,8 +72,8 @@ class Characterize(unittest.TestCase):
         with open(scenario, "w", encoding="utf-8") as file:
             json.dump({"extends": os.path.abspath(runs.STARE), "seed": hex(seed), "set": values}, file)
         cal = os.path.join(folder, "cal")
-        kinds, given = ("bias", "dark", "flat"), ("bias", "dark", "flat", "linearity")
-        result = call("calframes", scenario, "--out", cal, "--exposure", "8", "--threads", "1", "--linearity", "20",
+        kinds, given = ("bias", "dark", "flat"), ("bias", "dark", "flat") + (() if more else ("linearity",))
+        result = call("calframes", scenario, "--out", cal, "--exposure", "8", "--threads", "1", "--linearity", "0" if more else "20",
                       *(word for kind in kinds for word in ("--" + kind, str(frames))),
                       "--set", "/world/star_catalogue=embedded")
         self.assertEqual(result.returncode, 0, result.stderr)
@@ -118,7 +118,8 @@ class Characterize(unittest.TestCase):
         traps = {"traps_per_px": [12, 0, 0], "release_px": [0.8, 1, 1], "fill_exponent": 0.5}
         more = {"readout_s": 12, "pick_up": {"amplitude_e": 12, "cycles_per_px": 0.17, "cycles_per_row": -0.31},
                 "parallel_traps": traps, "output": {"top": True}, "hot_fraction": 0.006, "hot_median_e_per_s": 600,
-                "hot_spread_dex": 0.3, "row_offset_rms_e": 0, "dsnu_rms": 0.1, "bad_columns": 0}
+                "hot_spread_dex": 0.3, "row_offset_rms_e": 0, "dsnu_rms": 0.1, "bad_columns": 0,
+                "cosmic_rays": {"rate_per_cm2_s": 0, "depth_um": 15}}
         for seed in range(6 if FULL else 1):
             out, _, figures = self.made(seed, 256 if FULL else 192, 4, more)
             with open(out + "/detector.json", encoding="utf-8") as file:
@@ -179,6 +180,21 @@ class Characterize(unittest.TestCase):
         self.assertEqual(given["set"]["/camera/gain_e_per_dn"], 1.6)
         # 7,680 pixels: 0.8 %; the interval of 5 standard errors
         self.assertAlmostEqual(given["set"]["/camera/read_noise_e"], 8, delta=0.33)
+        # frames against themselves, and against those of another size
+        call_well(*words, "--overwrite", "--simulated", bias)
+        with open(folder + "/out/report.json", encoding="utf-8") as file:
+            both = json.load(file)["reproduction"]
+        self.assertEqual(both["kind"], "bias")
+        for key in ("percentiles_over_median_dn", "power_along_rows_dn2_px", "correlation_along_rows", "correlation_along_columns"):
+            self.assertTrue(both[key], key)
+            for item in both[key]:
+                self.assertEqual(item["real"], item["simulated"], key)
+        with fits.open(bias) as hdus:
+            noise = hdus[2].data.astype(float)
+        # RMS by numpy; the median is a whole number, of which noise of 5 DN has 7 % of the pixels
+        power = np.mean([item["real"] for item in both["power_along_rows_dn2_px"][1:-1]])
+        self.assertAlmostEqual(power / np.var(noise), 1, delta=0.05)
+        self.assertEqual(both["median_dn"]["real"], np.median(noise))
         again = call(*words)
         self.assertEqual(again.returncode, 1)
         self.assertIn("report.json: is there already; give another folder or --overwrite", again.stderr)
