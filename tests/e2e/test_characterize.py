@@ -161,6 +161,24 @@ class Characterize(unittest.TestCase):
                 # the phase at the first pixel, by frequencies that are right to 1e-3 of a bin
                 self.assertAlmostEqual(given["/camera/detector/pick_up/phase_deg"], 40, delta=4)
 
+    def test_dark_current_by_temperature(self):
+        """Darks at -20 and at -10 degrees of a sensor whose dark current doubles every 6 K."""
+        folder = runs.scratch()
+        for name, temperature in (("cold", -20), ("warm", -10)):
+            sets = {"width_px": 128, "height_px": 128, "dark_current_e_per_s": 40,
+                    "detector": json.dumps({"temperature_c": temperature, "reference_temperature_c": -20, "dark_doubling_k": 6})}
+            call_well("calframes", runs.STARE, "--out", f"{folder}/{name}", "--bias", "2", "--dark", "2", "--flat", "0",
+                      "--exposure", "10", "--set", "/world/star_catalogue=embedded",
+                      *(word for key, value in sets.items() for word in ("--set", f"{CAMERA}{key}={value}")))
+        call_well("characterize", "--map", "boresight", "--bias", folder + "/cold/neossat_telescope_bias.fits", "--dark",
+                  folder + "/cold/neossat_telescope_dark.fits", "--warm", folder + "/warm/neossat_telescope_dark.fits",
+                  "--warmer", "10", "--out", folder + "/out")
+        with open(folder + "/out/report.json", encoding="utf-8") as file:
+            found = json.load(file)["figures"]["dark_doubling_k"]
+        # 16,384 pixels of 400 e- twice: 0.04 % of the ratio, four standard errors
+        self.assertAlmostEqual(found["value"], 6, delta=4 * found["standard_error"])
+        self.assertLess(found["standard_error"], 0.02)
+
     def test_what_frames_do_not_say_is_not_written(self):
         """Bias frames alone: no dark current, no response, and the gain of the header."""
         folder = runs.scratch()

@@ -168,6 +168,7 @@ LINES = [
     (("characterize", "--map", "nix", "--bias", RUN, "--out", OUT), 1, "--map nix: there is no such keyword map"),
     (("characterize", "--map", "boresight", "--dark", T, "--out", OUT), 1, "track.json: does not begin as a FITS file"),
     (("characterize", "--map", "neossat", "--dark", RUN, "--out", OUT), 1, "frames.fits: HDU 1, plane 1: "),
+    (("characterize", "--map", "boresight", "--bias", RUN, "--warm", RUN, "--out", OUT), 2, "--warm and --warmer belong together"),
     (("characterize", "--map", "boresight", "--bias", RUN, "--linearity", T, "--out", OUT), 1, "track.json: does not begin as a FITS file"),
     (("characterize", "--map", "boresight", "--bias", RUN, "--linearity", RUN, "--out", OUT), 1, "the flats have 1 exposures .allowed: 6 or more"),
     (("characterize", "--map", "boresight", "--bias", RUN, "--pitch", "0", "--out", OUT), 2, "--pitch 0: give a number from 0.5"),

@@ -45,6 +45,19 @@ const bst_option bst_characterize_options[] = {
      .path = BST_PATH_INPUT,
      .argument = "PATH",
      .doc = "the same of flats of several exposures in one light, to beyond the full well"},
+    {.name = "warm",
+     .kind = BST_OPTION_LIST,
+     .offset = offsetof(Q, warm),
+     .path = BST_PATH_INPUT,
+     .argument = "PATH",
+     .doc = "darks of one exposure at another temperature, with --warmer"},
+    {.name = "warmer",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(Q, warmer_k),
+     .argument = "K",
+     .doc = "temperature of the warm darks above that of the darks",
+     .minimum = -300,
+     .maximum = 300},
     {.name = "simulated",
      .kind = BST_OPTION_LIST,
      .offset = offsetof(Q, simulated),
@@ -125,6 +138,7 @@ const bst_sensor_figure_name bst_sensor_figure_names[BST_SENSOR_FIGURES] = {
     [BST_SENSOR_HIT_DEPTH] = {"hit_depth_um", "um", "detector/cosmic_rays/depth_um"},
     [BST_SENSOR_HIT_E_PER_UM] = {"hit_e_per_um", "e-/um", "detector/cosmic_rays/e_per_um"},
     [BST_SENSOR_HIT_STRAGGLING] = {"hit_straggling", "", "detector/cosmic_rays/straggling"},
+    [BST_SENSOR_DARK_DOUBLING] = {"dark_doubling_k", "K", "detector/dark_doubling_k"},
 };
 
 static void print_figures(FILE *out, const bst_sensor_stacks *s, const bst_sensor_figures *f) {
@@ -162,6 +176,8 @@ static bst_status read_stacks(bst_ctx *ctx, const bst_characterize_request *q,
     BST_TRY(read_stack(ctx, "bias", &q->bias, &map, &stacks->bias));
     BST_TRY(read_stack(ctx, "dark", &q->dark, &map, &stacks->dark));
     BST_TRY(read_stack(ctx, "flat", &q->flat, &map, &stacks->flat));
+    BST_TRY(read_stack(ctx, "warm dark", &q->warm, &map, &stacks->warm));
+    stacks->warmer_k = q->warmer_k;
     stacks->pixel_pitch_um = q->pixel_pitch_um;
     if (q->simulated.count > 0) {
         bst_keyword_map ours;
@@ -232,6 +248,7 @@ bst_status bst_characterize_run(bst_ctx *ctx, const bst_characterize_request *q,
     bst_frame_stack_free(&stacks.dark);
     bst_frame_stack_free(&stacks.flat);
     bst_frame_stack_free(&stacks.simulated);
+    bst_frame_stack_free(&stacks.warm);
     bst_linearity_series_free(&stacks.linearity);
     return status;
 }

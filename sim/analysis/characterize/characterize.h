@@ -2,6 +2,7 @@
 #ifndef BST_ANALYSIS_CHARACTERIZE_CHARACTERIZE_H
 #define BST_ANALYSIS_CHARACTERIZE_CHARACTERIZE_H
 
+#include <math.h>
 #include <stdio.h>
 
 #include "sim/analysis/characterize/frame_comparison.h"
@@ -10,14 +11,14 @@
 /* What the command line asks for. */
 typedef struct bst_characterize_request {
     const char *map, *out, *extends, *camera;
-    bst_option_list bias, dark, flat, linearity, simulated;
-    double pixel_pitch_um;
+    bst_option_list bias, dark, flat, linearity, simulated, warm;
+    double pixel_pitch_um, warmer_k;
     bool overwrite, maps, help;
 } bst_characterize_request;
 
 /* Request without any option given. */
 #define BST_CHARACTERIZE_REQUEST_DEFAULTS \
-    { .camera = "/observers/0/sensors/0/camera", .pixel_pitch_um = 13.0 }
+    { .camera = "/observers/0/sensors/0/camera", .pixel_pitch_um = 13.0, .warmer_k = NAN }
 
 /* Table of the options, with offsets in a bst_characterize_request. */
 extern const bst_option bst_characterize_options[];

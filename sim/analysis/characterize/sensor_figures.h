@@ -46,6 +46,7 @@ typedef enum bst_sensor_figure {
     BST_SENSOR_HIT_DEPTH,
     BST_SENSOR_HIT_E_PER_UM,
     BST_SENSOR_HIT_STRAGGLING,
+    BST_SENSOR_DARK_DOUBLING,
     BST_SENSOR_FIGURES
 } bst_sensor_figure;
 
@@ -56,6 +57,8 @@ extern const double bst_sensor_percentiles[BST_SENSOR_PERCENTILES];
 /* Frames of a sensor; a stack without frames has count 0. */
 typedef struct bst_sensor_stacks {
     bst_frame_stack bias, dark, flat;
+    bst_frame_stack warm;           /* darks at another temperature */
+    double warmer_k;                /* by how much, above that of `dark` */
     bst_frame_stack simulated;      /* frames made with the figures, to compare with the real */
     bst_linearity_series linearity; /* without any: count 0 */
     double pixel_pitch_um;          /* side of a pixel, for areas and lengths of radiation hits */
@@ -106,6 +109,9 @@ bst_status bst_sensor_measure_noise(bst_ctx *ctx, const bst_sensor_stacks *stack
 /* Linearity, full well, and gain of flats of several exposures. */
 bst_status bst_sensor_measure_linearity(bst_ctx *ctx, const bst_sensor_stacks *stacks,
                                         bst_sensor_figures *out) BST_MUST_CHECK;
+/* Temperature step that doubles the dark current. */
+bst_status bst_sensor_measure_warm(bst_ctx *ctx, const bst_sensor_stacks *stacks,
+                                   bst_sensor_figures *out) BST_MUST_CHECK;
 /* Rate, charge and length of radiation hits. */
 void bst_sensor_measure_hits(const bst_sensor_stacks *stacks, bst_sensor_figures *out);
 /* Gain, PRNU, dead pixels of flats. */
