@@ -6,14 +6,15 @@
 #include "sim/analysis/characterize/radiation_hits.h"
 #include "sim/analysis/characterize/simplex_search.h"
 
-enum { ANGLES = 64, AZIMUTHS = 12, MOST_PIXELS = 24, PARAMETERS = 3, MOST_USED = 4000 };
+enum { ANGLES = 128, AZIMUTHS = 24, MOST_PIXELS = 24, PARAMETERS = 3, MOST_USED = 4000 };
 enum { TURNS = 400 };
 /* Share of groups that are no tracks, spread over ten octaves of charge: telegraph noise, decays.
  * With 0.005 the fit took 3 % of depth and straggling for them (tests/analysis/test_sensor_hits.c).
  */
 static const double OTHERS = 1e-4, OTHER_RANGE = 7.0;
-/* Step of the logarithms for the likelihood's curvature: hundreds of hits give some 0.05. */
-static const double STEP = 0.02;
+/* Step of the logarithms for the curvature: hundreds of hits give errors of some 0.05; the law of
+ * whole numbers of pixels has kinks, which smaller steps would see. */
+static const double STEP = 0.08;
 
 /* Probabilities of the numbers of pixels of a track, by its angle; at MOST_PIXELS: that or more. */
 typedef struct pixel_law {
