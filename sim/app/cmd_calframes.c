@@ -45,6 +45,13 @@ static const bst_option OPTIONS[] = {
      .doc = "frames in even light (default 10)",
      .minimum = 0,
      .maximum = 1e6},
+    {.name = "linearity",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(calframes_request, frames.linearity),
+     .argument = "N",
+     .doc = "exposures in the light of the flats, two frames each, to beyond what fits (default 0)",
+     .minimum = 0,
+     .maximum = 10000},
     {.name = "exposure",
      .kind = BST_OPTION_REAL,
      .offset = offsetof(calframes_request, frames.exposure_s),
@@ -88,7 +95,8 @@ int bst_cmd_calframes(int argc, char **argv) {
         printf(
             "usage: boresight calframes SCENARIO.json --out FOLDER [options]\n\n"
             "Makes bias, dark and flat frames of a scenario's sensors: FITS files\n"
-            "OBSERVER_SENSOR_bias.fits, _dark.fits and _flat.fits with one extension per frame.\n"
+            "OBSERVER_SENSOR_bias.fits, _dark.fits, _flat.fits and _linearity.fits with one "
+            "extension per frame.\n"
             "Fixed patterns are those of the scenario's runs.\n\n"
             "  boresight calframes scenarios/neossat_geo_track.json --out cal --dark 50\n\n"
             "options:\n");
@@ -99,9 +107,9 @@ int bst_cmd_calframes(int argc, char **argv) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "one scenario file is expected, %d were given", arguments);
         return bst_options_misuse(&ctx, "calframes");
     }
-    if (r.frames.bias + r.frames.dark + r.frames.flat == 0) {
+    if (r.frames.bias + r.frames.dark + r.frames.flat + r.frames.linearity == 0) {
         bst_fail(&ctx, BST_ERR_ARGUMENT,
-                 "--bias, --dark and --flat are all 0, so that nothing would be made");
+                 "--bias, --dark, --flat and --linearity are all 0, so that nothing would be made");
         return bst_options_misuse(&ctx, "calframes");
     }
     if (bst_load_check(&ctx, &r.load, table) != BST_OK) {

@@ -1,4 +1,6 @@
 /* boresight characterize: a sensor's detector block from its own frames. */
+#include <math.h>
+
 #include "sim/analysis/characterize/characterize.h"
 #include "sim/app/app.h"
 #include "sim/cli/command_line.h"
@@ -6,12 +8,13 @@
 
 static const char help_text[] =
     "usage: boresight characterize --map MAP --out FOLDER [--bias PATH]... [--dark PATH]... "
-    "[--flat PATH]... [options]\n"
+    "[--flat PATH]... [--linearity PATH]... [options]\n"
     "\n"
     "Measures a sensor from its bias, dark and flat frames: gain, read noise, level and drift, "
     "offsets, dark current,\n"
-    "hot pixels, response, signal of the read-out, coherent pick-up, trails of charge; each with "
-    "its uncertainty. Only\n"
+    "hot pixels, response, linearity, full well, signal of the read-out, coherent pick-up, trails "
+    "of charge, radiation\n"
+    "hits; each with its uncertainty. Only\n"
     "what the given frames determine is written: FOLDER/detector.json (a scenario's camera keys), "
     "report.json, maps\n"
     "and a plot.\n"
@@ -38,6 +41,12 @@ int bst_cmd_characterize(int argc, char **argv) {
     }
     if (q.bias.count + q.dark.count + q.flat.count == 0) {
         bst_fail(&ctx, BST_ERR_ARGUMENT, "--bias, --dark or --flat is expected");
+        return bst_options_misuse(&ctx, "characterize");
+    }
+    if ((q.warm.count > 0) != isfinite(q.warmer_k) || q.warmer_k == 0.0) {
+        bst_fail(&ctx, BST_ERR_ARGUMENT,
+                 "--warm and --warmer belong together, and --warmer is not 0: darks at another "
+                 "temperature, and by how much it is higher");
         return bst_options_misuse(&ctx, "characterize");
     }
     bst_stop_catch_signals();

@@ -285,6 +285,8 @@ static bst_sensor_figures written_figures(void) {
         f.percentiles_e_per_s[i] = NAN; /* no plot */
     }
     f.line = (bst_pick_up_line){.found = true, .phase_deg = 77.0, .pair_power = 3.0};
+    f.linearity = (bst_linearity){
+        .used = 9, .significance = 3.0, .terms = {{-0.03, 0.01}, {0.02, 0.02}, {-0.01, 0.03}}};
     f.trail = (bst_charge_trail){.used = 60, .parallel = {0.1, 0.01}, .serial_right = true};
     for (int c = 0; c < BST_TRAIL_CLASSES; c++) {
         f.trail.class_charge[c] = 100.0 + c;
@@ -308,13 +310,21 @@ static void files_of_the_figures(void **state) {
     scratch s;
     scratch_make(&s);
     const bst_characterize_request request = {.out = s.folder, .camera = CAMERA};
-    bst_sensor_stacks stacks = {
-        .bias = {.count = 4}, .dark = {.count = 5, .exposure_s = 12.5}, .flat = {.count = 6}};
+    bst_sensor_stacks stacks = {.bias = {.count = 4},
+                                .dark = {.count = 5, .exposure_s = 12.5},
+                                .flat = {.count = 6},
+                                .pixel_pitch_um = 9.0};
     bst_sensor_figures f = written_figures();
+    bst_characterize_comparison comparison = {.made = true, .kind = "dark"};
+    comparison.real.percentiles_dn[7] = 812.0;
+    comparison.simulated.percentiles_dn[7] = 900.5;
+    comparison.real.along_columns[2] = 0.25;
+    comparison.simulated.spectrum[BST_COMPARISON_BANDS - 1] = 17.0;
     for (int pairs = 0; pairs < 2; pairs++) {
         f.noise_of_pairs = pairs;
         f.line.locked = pairs;
-        bst_assert_ok(&ctx, bst_characterize_write(&ctx, &request, &stacks, &f));
+        f.linearity.significance = pairs ? 3.0 : 1.9;
+        bst_assert_ok(&ctx, bst_characterize_write(&ctx, &request, &stacks, &f, &comparison));
         cJSON *root = read_json(&s, "detector.json");
         const cJSON *set = cJSON_GetObjectItem(root, "set");
         double line = f.figures[BST_SENSOR_LINE_AMPLITUDE].value, sum = 0.0;
@@ -339,6 +349,11 @@ static void files_of_the_figures(void **state) {
         bst_assert_close(AT(OF(set, "detector/parallel_traps"), "release_px", "2"), 6.0, 0.0);
         bst_assert_close(AT(OF(set, "detector/serial_traps"), "traps_per_px", "1"), 8.0, 0.0);
         bst_assert_close(AT(OF(set, "detector/serial_traps"), "fill_exponent"), 0.25, 0.0);
+        /* all terms of a curve that differs from a line, none otherwise */
+        bst_assert_close(AT(OF(set, "detector/nonlinearity"), "1"), pairs ? 0.02 : 0.0, 1e-15);
+        bst_assert_close(AT(OF(set, "detector/nonlinearity"), "2"), pairs ? -0.01 : 0.0, 1e-15);
+        bst_assert_close(OF(set, "full_well_e")->valuedouble, 10.0 + BST_SENSOR_FULL_WELL, 0.0);
+        bst_assert_close(OF(set, "detector/cosmic_rays/pixel_pitch_um")->valuedouble, 9.0, 0.0);
         const cJSON *phase = OF(set, "detector/pick_up/phase_deg");
         assert_true(pairs ? phase && phase->valuedouble == 77.0 : !phase);
         cJSON_Delete(root);
@@ -362,6 +377,14 @@ static void files_of_the_figures(void **state) {
         }
     }
     bst_assert_close(AT(report, "shielded_columns"), 7, 0.0);
+    const cJSON *both = cJSON_GetObjectItem(report, "reproduction");
+    bst_assert_close(AT(both, "percentiles_over_median_dn", "7", "real"), 812.0, 0.0);
+    bst_assert_close(AT(both, "percentiles_over_median_dn", "7", "simulated"), 900.5, 0.0);
+    bst_assert_close(AT(both, "percentiles_over_median_dn", "7", "percentile"), 99.99, 1e-12);
+    bst_assert_close(AT(both, "correlation_along_columns", "2", "real"), 0.25, 0.0);
+    bst_assert_close(AT(both, "correlation_along_columns", "2", "distance_px"), 3.0, 0.0);
+    bst_assert_close(AT(both, "power_along_rows_dn2_px", "24", "simulated"), 17.0, 0.0);
+    bst_assert_close(AT(both, "power_along_rows_dn2_px", "24", "cycles_per_px"), 0.5, 1e-12);
     bst_assert_close(AT(report, "hot_pixels"), 321, 0.0);
     bst_assert_close(AT(report, "pick_up", "power_in_pairs_e2"), 3.0 * 6.25, 1e-12);
     static const char *const sides[] = {"rows_above", "rows_below", "columns_right",

@@ -38,7 +38,7 @@ class Outputs(unittest.TestCase):
     INPUTS = {("run", "replay"), ("run", "restore"), ("run", "link-keys"), ("serve", "link-keys"),
               ("schema", "plugin"), ("orbit", "observer"), ("propagate", "elements"), ("propagate", "tle"), ("propagate", "eop"),
               ("calibrate-obsgen", "calibration"), ("bench", "tle"), ("bench", "scenario"),
-              ("calibrate-camera", "extends"), ("characterize", "bias"), ("characterize", "dark"), ("characterize", "flat"), ("characterize", "extends"),
+              ("calibrate-camera", "extends"), ("characterize", "bias"), ("characterize", "dark"), ("characterize", "flat"), ("characterize", "linearity"), ("characterize", "simulated"), ("characterize", "warm"), ("characterize", "extends"),
               ("score", "truth"), ("study", "site"), ("study", "scheduler"), ("lightcurve", "satellite"), ("lightcurve", "elements")}
 
     @classmethod

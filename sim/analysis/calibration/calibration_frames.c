@@ -22,6 +22,7 @@ typedef struct series {
     const char *name, *type; /* file name, IMAGETYP */
     int64_t count;
     double exposure_s, level_e; /* flat field: electrons per pixel of mean response */
+    int64_t steps; /* exposures from 1 / steps of exposure_s on, in the same light; 0: one */
 } series;
 
 /* State of making the frames of one sensor. */
@@ -39,14 +40,16 @@ typedef struct job {
 /* Renders and writes one bias, dark or flat frame. */
 static bst_status write_frame(bst_ctx *ctx, job *j, const series *s, int64_t i, bst_fits *fits) {
     const bst_camera *camera = &j->sensor->camera;
-    double time_s[2] = {0.0, s->exposure_s};
+    /* of a series of exposures: two frames of each */
+    double share = s->steps > 0 ? (double)(i / 2 + 1) / (double)s->steps : 1.0;
+    double exposure_s = share * s->exposure_s, time_s[2] = {0.0, exposure_s};
     bst_quat q[2] = {BST_QUAT_IDENTITY, BST_QUAT_IDENTITY};
     bst_los_track track = {2, time_s, q};
-    double dark_e = bst_camera_dark_e_per_s(camera) * s->exposure_s;
+    double dark_e = bst_camera_dark_e_per_s(camera) * exposure_s;
     bst_render_request request = {
         .window = {0, 0, (int)camera->width_px, (int)camera->height_px},
         .track = &track,
-        .background_e = s->level_e + dark_e,
+        .background_e = share * s->level_e + dark_e,
         .dark_e = dark_e,
         .key = bst_rng_make_key(j->scenario->seed, (uint64_t)j->scenario->run, j->name, s->type),
         .exposure_id = i,
@@ -58,7 +61,7 @@ static bst_status write_frame(bst_ctx *ctx, job *j, const series *s, int64_t i, 
     if (status == BST_OK) {
         bst_fits_frame head = {.id = i,
                                .start = bst_time_add(j->scenario->epoch, request.start_s),
-                               .exposure_s = s->exposure_s,
+                               .exposure_s = exposure_s,
                                .window = request.window,
                                .binning = 1,
                                .bits = (int)camera->bits};
@@ -66,9 +69,12 @@ static bst_status write_frame(bst_ctx *ctx, job *j, const series *s, int64_t i, 
         bst_frame_unmap(frame);
     }
     bst_frame_release(frame);
-    j->start_s += s->exposure_s + 1.0;
+    j->start_s += exposure_s + 1.0;
     return status;
 }
+
+/* Charge of the longest exposure of the series for linearity, over what fits. */
+static const double BEYOND_FULL = 1.3;
 
 /* Draft name of a file, which is renamed when complete. */
 static bst_status draft_of(bst_ctx *ctx, const char *path, char *draft, size_t bytes) {
@@ -117,9 +123,9 @@ static bst_status write_series(bst_ctx *ctx, job *j, const series *s) {
     if (status != BST_OK) {
         unlink(draft);
     } else {
-        printf("%s: %s of %g s\n", path,
+        printf("%s: %s of %s%g s\n", path,
                bst_text_of_count((char[BST_COUNT_TEXT]){0}, s->count, "frame", "frames"),
-               s->exposure_s);
+               s->steps > 0 ? "up to " : "", s->exposure_s);
     }
     return status;
 }
@@ -144,9 +150,13 @@ static bst_status do_sensor(bst_ctx *ctx, job *j) {
     BST_TRY(bst_renderer_create(ctx, j->device, &camera, &options, &j->renderer));
     double exposure_s = r->exposure_s > 0.0 ? r->exposure_s : s->exposure.exposure_s;
     double level_e = r->level_e > 0.0 ? r->level_e : half_level_e(&s->camera);
-    const series all[] = {{"bias", "BIAS", r->bias, 0.0, 0.0},
-                          {"dark", "DARK", r->dark, exposure_s, 0.0},
-                          {"flat", "FLAT", r->flat, exposure_s, level_e}};
+    /* the longest exposure collects 1.3 times what fits */
+    double longest = BEYOND_FULL * 2.0 * half_level_e(&s->camera) / level_e;
+    const series all[] = {{"bias", "BIAS", r->bias, 0.0, 0.0, 0},
+                          {"dark", "DARK", r->dark, exposure_s, 0.0, 0},
+                          {"flat", "FLAT", r->flat, exposure_s, level_e, 0},
+                          {"linearity", "LINEARITY", 2 * r->linearity, longest * exposure_s,
+                           longest * level_e, r->linearity}};
     /* before the first file: OpenCL's compiler ends the program where it cannot write */
     bst_status status = bst_renderer_prepare(ctx, j->renderer);
     for (size_t i = 0; status == BST_OK && i < sizeof all / sizeof *all; i++) {

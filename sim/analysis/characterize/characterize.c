@@ -39,6 +39,40 @@ const bst_option bst_characterize_options[] = {
      .path = BST_PATH_INPUT,
      .argument = "PATH",
      .doc = "the same of flats of one exposure"},
+    {.name = "linearity",
+     .kind = BST_OPTION_LIST,
+     .offset = offsetof(Q, linearity),
+     .path = BST_PATH_INPUT,
+     .argument = "PATH",
+     .doc = "the same of flats of several exposures in one light, to beyond the full well"},
+    {.name = "warm",
+     .kind = BST_OPTION_LIST,
+     .offset = offsetof(Q, warm),
+     .path = BST_PATH_INPUT,
+     .argument = "PATH",
+     .doc = "darks of one exposure at another temperature, with --warmer"},
+    {.name = "warmer",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(Q, warmer_k),
+     .argument = "K",
+     .doc = "temperature of the warm darks above that of the darks",
+     .minimum = -300,
+     .maximum = 300},
+    {.name = "simulated",
+     .kind = BST_OPTION_LIST,
+     .offset = offsetof(Q, simulated),
+     .path = BST_PATH_INPUT,
+     .argument = "PATH",
+     .doc =
+         "frames that boresight calframes made with detector.json, like the darks (without darks "
+         "the bias frames, else the flats), to compare with them"},
+    {.name = "pitch",
+     .kind = BST_OPTION_REAL,
+     .offset = offsetof(Q, pixel_pitch_um),
+     .argument = "UM",
+     .doc = "side of a pixel in micrometres, for radiation hits (default 13)",
+     .minimum = 0.5,
+     .maximum = 200},
     {.name = "extends",
      .kind = BST_OPTION_TEXT,
      .offset = offsetof(Q, extends),
@@ -90,6 +124,21 @@ const bst_sensor_figure_name bst_sensor_figure_names[BST_SENSOR_FIGURES] = {
     [BST_SENSOR_LINE_PHASE] = {"pick_up_cycles_per_row", "1/px", "detector/pick_up/cycles_per_row"},
     [BST_SENSOR_PARALLEL_TRAIL] = {"cti_parallel_trail_fraction", "", NULL},
     [BST_SENSOR_SERIAL_TRAIL] = {"cti_serial_trail_fraction", "", NULL},
+    [BST_SENSOR_FULL_WELL] = {"full_well_e", "e-", "full_well_e"},
+    [BST_SENSOR_SATURATION] = {"saturation_dn", "DN", NULL},
+    [BST_SENSOR_LINEARITY_ERROR] = {"linearity_error", "", NULL},
+    [BST_SENSOR_NONLINEARITY_1] = {"nonlinearity_1", "", NULL},
+    [BST_SENSOR_NONLINEARITY_2] = {"nonlinearity_2", "", NULL},
+    [BST_SENSOR_NONLINEARITY_3] = {"nonlinearity_3", "", NULL},
+    [BST_SENSOR_HIT_RATE] = {"hit_rate_per_cm2_s", "1/cm2/s",
+                             "detector/cosmic_rays/rate_per_cm2_s"},
+    [BST_SENSOR_HIT_READOUT] = {"hit_readout_s", "s", "detector/cosmic_rays/readout_s"},
+    [BST_SENSOR_HIT_CHARGE] = {"hit_charge_e", "e-", NULL},
+    [BST_SENSOR_HIT_LENGTH] = {"hit_length_px", "px", NULL},
+    [BST_SENSOR_HIT_DEPTH] = {"hit_depth_um", "um", "detector/cosmic_rays/depth_um"},
+    [BST_SENSOR_HIT_E_PER_UM] = {"hit_e_per_um", "e-/um", "detector/cosmic_rays/e_per_um"},
+    [BST_SENSOR_HIT_STRAGGLING] = {"hit_straggling", "", "detector/cosmic_rays/straggling"},
+    [BST_SENSOR_DARK_DOUBLING] = {"dark_doubling_k", "K", "detector/dark_doubling_k"},
 };
 
 static void print_figures(FILE *out, const bst_sensor_stacks *s, const bst_sensor_figures *f) {
@@ -126,13 +175,55 @@ static bst_status read_stacks(bst_ctx *ctx, const bst_characterize_request *q,
     BST_TRY(bst_keyword_map_load(ctx, path, &map));
     BST_TRY(read_stack(ctx, "bias", &q->bias, &map, &stacks->bias));
     BST_TRY(read_stack(ctx, "dark", &q->dark, &map, &stacks->dark));
-    return read_stack(ctx, "flat", &q->flat, &map, &stacks->flat);
+    BST_TRY(read_stack(ctx, "flat", &q->flat, &map, &stacks->flat));
+    BST_TRY(read_stack(ctx, "warm dark", &q->warm, &map, &stacks->warm));
+    stacks->warmer_k = q->warmer_k;
+    stacks->pixel_pitch_um = q->pixel_pitch_um;
+    if (q->simulated.count > 0) {
+        bst_keyword_map ours;
+        BST_TRY(bst_cli_find_keyword_map(ctx, "boresight", path));
+        BST_TRY(bst_keyword_map_load(ctx, path, &ours));
+        BST_TRY(read_stack(ctx, "simulated", &q->simulated, &ours, &stacks->simulated));
+    }
+    return q->linearity.count > 0
+               ? bst_linearity_series_read(ctx, q->linearity.items, q->linearity.count, &map,
+                                           &stacks->linearity)
+               : BST_OK;
+}
+
+/* Compares the last frame of the darks, else of the bias frames or flats, with a simulated one. */
+static bst_status compare(bst_ctx *ctx, const bst_sensor_stacks *s,
+                          bst_characterize_comparison *out) {
+    const bst_frame_stack *sim = &s->simulated;
+    const bst_frame_stack *real = s->dark.count > 0   ? &s->dark
+                                  : s->bias.count > 0 ? &s->bias
+                                                      : &s->flat;
+    if (sim->count == 0) {
+        return BST_OK;
+    }
+    out->made = true;
+    out->kind = real == &s->dark ? "dark" : real == &s->bias ? "bias" : "flat";
+    if (sim->width != real->width || sim->height != real->height) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "the simulated frames have %d x %d pixels, the image of the %s frames %d x "
+                        "%d (allowed: one size; simulate without overscan)",
+                        sim->width, sim->height, out->kind, real->width, real->height);
+    }
+    if (fabs(sim->exposure_s - real->exposure_s) > 1e-3 * real->exposure_s + 1e-6) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "the simulated frames have an exposure of %g s, the %s frames %g s "
+                        "(allowed: one exposure)",
+                        sim->exposure_s, out->kind, real->exposure_s);
+    }
+    BST_TRY(bst_frame_statistics_of(ctx, real->last, real->width, real->height, &out->real));
+    return bst_frame_statistics_of(ctx, sim->last, sim->width, sim->height, &out->simulated);
 }
 
 bst_status bst_characterize_run(bst_ctx *ctx, const bst_characterize_request *q, FILE *out) {
     char path[4096];
     bst_sensor_stacks stacks = {0};
     bst_sensor_figures figures = {0};
+    bst_characterize_comparison comparison = {.made = false};
     int n = snprintf(path, sizeof path, "%s/report.json", q->out);
     if (n < 0 || (size_t)n >= sizeof path) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%.80s...: the path is too long", q->out);
@@ -143,15 +234,21 @@ bst_status bst_characterize_run(bst_ctx *ctx, const bst_characterize_request *q,
         status = bst_sensor_figures_compute(ctx, &stacks, &figures);
     }
     if (status == BST_OK) {
+        status = compare(ctx, &stacks, &comparison);
+    }
+    if (status == BST_OK) {
         print_figures(out, &stacks, &figures);
         status = bst_folder_make(ctx, q->out);
     }
     if (status == BST_OK) {
-        status = bst_characterize_write(ctx, q, &stacks, &figures);
+        status = bst_characterize_write(ctx, q, &stacks, &figures, &comparison);
     }
     bst_sensor_figures_free(&figures);
     bst_frame_stack_free(&stacks.bias);
     bst_frame_stack_free(&stacks.dark);
     bst_frame_stack_free(&stacks.flat);
+    bst_frame_stack_free(&stacks.simulated);
+    bst_frame_stack_free(&stacks.warm);
+    bst_linearity_series_free(&stacks.linearity);
     return status;
 }

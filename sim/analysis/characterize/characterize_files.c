@@ -11,19 +11,17 @@
 #include "sim/core/compare.h"
 #include "sim/core/json_number.h"
 #include "sim/io/fits_image.h"
-#include "sim/io/plot.h"
 
 /* Statistics below this many standard errors are 0, also where the scenario that is extended has
  * another value. */
 static const double LEAST_SIGNIFICANCE = 2.0;
-
-enum { HISTOGRAM_BINS = 200 };
 
 /* Files being written. */
 typedef struct writer {
     const bst_characterize_request *request;
     const bst_sensor_stacks *stacks;
     const bst_sensor_figures *figures;
+    const bst_characterize_comparison *comparison;
 } writer;
 
 /* Read noise without what other keys add to the differences that it was measured by: pick-up, and
@@ -102,6 +100,20 @@ static void set_transfer(const writer *w, cJSON *set) {
     }
 }
 
+/* Adds the terms of the non-linearity: their errors are correlated, so that all are written, or all
+ * are 0 where the curve does not differ from a line. */
+static void set_linearity(const writer *w, cJSON *set) {
+    const bst_linearity *l = &w->figures->linearity;
+    double terms[BST_LINEARITY_TERMS];
+    if (l->used == 0 || !isfinite(l->terms[0].value)) {
+        return;
+    }
+    for (int i = 0; i < BST_LINEARITY_TERMS; i++) {
+        terms[i] = l->significance > LEAST_SIGNIFICANCE ? l->terms[i].value : 0.0;
+    }
+    set_detector(w, set, "nonlinearity", cJSON_CreateDoubleArray(terms, BST_LINEARITY_TERMS));
+}
+
 /* The scenario that changes a camera; NULL: out of memory. */
 static cJSON *detector_json(const writer *w) {
     char pointer[512], base[4096];
@@ -125,6 +137,11 @@ static cJSON *detector_json(const writer *w) {
     set_transfer(w, set);
     if (w->figures->line.locked && isfinite(w->figures->line.phase_deg)) {
         set_detector(w, set, "pick_up/phase_deg", cJSON_CreateNumber(w->figures->line.phase_deg));
+    }
+    set_linearity(w, set);
+    if (isfinite(w->figures->figures[BST_SENSOR_HIT_DEPTH].value)) { /* what lengths refer to */
+        set_detector(w, set, "cosmic_rays/pixel_pitch_um",
+                     cJSON_CreateNumber(w->stacks->pixel_pitch_um));
     }
     if (w->request->maps && w->figures->dark_map) {
         snprintf(pointer, sizeof pointer, "%.400s/detector/dark_map", w->request->camera);
@@ -175,6 +192,66 @@ static void add_trail(cJSON *root, const writer *w) {
     }
 }
 
+/* Signals and variances of the flats of several exposures, means of the blocks. */
+static void add_linearity(cJSON *root, const writer *w) {
+    const bst_linearity_series *s = &w->stacks->linearity;
+    double level = w->figures->figures[BST_SENSOR_OFFSET].value;
+    if (s->count == 0) {
+        return;
+    }
+    cJSON *node = cJSON_AddObjectToObject(root, "linearity");
+    cJSON_AddNumberToObject(node, "exposures_used", w->figures->linearity.used);
+    cJSON_AddBoolToObject(node, "saturates", w->figures->linearity.saturates);
+    cJSON *list = cJSON_AddArrayToObject(node, "exposures");
+    for (int i = 0; i < s->count; i++) {
+        cJSON *point = cJSON_CreateObject();
+        cJSON_AddItemToArray(list, point);
+        bst_json_add_number(point, "exposure_s", s->points[i].exposure_s);
+        double mean = bst_mean_estimate(s->points[i].mean, BST_STACK_BLOCKS).value;
+        double variance = bst_mean_estimate(s->points[i].variance, BST_STACK_BLOCKS).value;
+        bst_json_add_number(point, "signal_dn", mean - level);
+        bst_json_add_number(point, "variance_dn2", variance);
+    }
+}
+
+/* A list of what both frames have at a place: distance, frequency, percentile. */
+static void add_both(cJSON *root, const char *name, const char *place, const double *places,
+                     int first, const double *real, const double *simulated, int count) {
+    cJSON *list = cJSON_AddArrayToObject(root, name);
+    for (int i = 0; i < count; i++) {
+        cJSON *item = cJSON_CreateObject();
+        cJSON_AddItemToArray(list, item);
+        cJSON_AddNumberToObject(item, place, places ? places[i] : first + i);
+        bst_json_add_number(item, "real", real[i]);
+        bst_json_add_number(item, "simulated", simulated[i]);
+    }
+}
+
+/* How the simulated frame reproduces the real one. */
+static void add_comparison(cJSON *root, const bst_characterize_comparison *c) {
+    const bst_frame_statistics *r = &c->real, *s = &c->simulated;
+    double frequencies[BST_COMPARISON_BANDS];
+    if (!c->made) {
+        return;
+    }
+    for (int i = 0; i < BST_COMPARISON_BANDS; i++) {
+        frequencies[i] = bst_comparison_frequency(i);
+    }
+    cJSON *node = cJSON_AddObjectToObject(root, "reproduction");
+    cJSON_AddStringToObject(node, "kind", c->kind);
+    cJSON *median = cJSON_AddObjectToObject(node, "median_dn");
+    bst_json_add_number(median, "real", r->median_dn);
+    bst_json_add_number(median, "simulated", s->median_dn);
+    add_both(node, "percentiles_over_median_dn", "percentile", bst_sensor_percentiles, 0,
+             r->percentiles_dn, s->percentiles_dn, BST_SENSOR_PERCENTILES);
+    add_both(node, "power_along_rows_dn2_px", "cycles_per_px", frequencies, 0, r->spectrum,
+             s->spectrum, BST_COMPARISON_BANDS);
+    add_both(node, "correlation_along_rows", "distance_px", NULL, 1, r->along_rows, s->along_rows,
+             BST_COMPARISON_LAGS);
+    add_both(node, "correlation_along_columns", "distance_px", NULL, 1, r->along_columns,
+             s->along_columns, BST_COMPARISON_LAGS);
+}
+
 /* All figures with their uncertainties; NULL: out of memory. */
 static cJSON *report_json(const writer *w) {
     const bst_sensor_figures *f = w->figures;
@@ -182,6 +259,8 @@ static cJSON *report_json(const writer *w) {
     cJSON_AddNumberToObject(frames, "bias", w->stacks->bias.count);
     cJSON_AddNumberToObject(frames, "dark", w->stacks->dark.count);
     cJSON_AddNumberToObject(frames, "flat", w->stacks->flat.count);
+    cJSON_AddNumberToObject(frames, "linearity", w->stacks->linearity.count);
+    cJSON_AddNumberToObject(frames, "hits_found", w->stacks->dark.hits.count);
     cJSON_AddNumberToObject(frames, "width_px", f->width);
     cJSON_AddNumberToObject(frames, "height_px", f->height);
     bst_json_add_number(frames, "dark_exposure_s",
@@ -215,6 +294,8 @@ static cJSON *report_json(const writer *w) {
         bst_json_add_number(line, "power_in_pairs_e2", power_e2);
     }
     add_trail(root, w);
+    add_linearity(root, w);
+    add_comparison(root, w->comparison);
     return root;
 }
 
@@ -237,66 +318,6 @@ static bst_status write_map(bst_ctx *ctx, const writer *w, const char *name, con
     return status;
 }
 
-/* Histogram of the dark map from below its 5th percentile, by a fifth of the distance to the 95th,
- * to the 99.9th. */
-static void put_histogram(FILE *script, const bst_sensor_figures *f) {
-    int64_t bins[HISTOGRAM_BINS] = {0};
-    double low = f->percentiles_e_per_s[0], high = f->percentiles_e_per_s[6];
-    low -= high - low > 0.0 ? 0.2 * (f->percentiles_e_per_s[4] - low) : 1.0;
-    double width = (high - low) / HISTOGRAM_BINS;
-    size_t pixels = (size_t)f->width * (size_t)f->height;
-    for (size_t i = 0; i < pixels && width > 0.0; i++) {
-        double at = ((double)f->dark_map[i] - low) / width;
-        if (at >= 0.0 && at < HISTOGRAM_BINS) {
-            bins[(int)at]++;
-        }
-    }
-    fprintf(script, "$dark << EOD\n");
-    for (int k = 0; k < HISTOGRAM_BINS; k++) {
-        fprintf(script, "%.6g %lld\n", low + (k + 0.5) * width,
-                (long long)bins[k] + (bins[k] == 0));
-    }
-    fprintf(script, "EOD\n");
-}
-
-/* Plot of the spectrum of the rows and the distribution of the dark current. */
-static bst_status write_plot(bst_ctx *ctx, const writer *w) {
-    const bst_sensor_figures *f = w->figures;
-    char path[4096 + 32];
-    bst_plot plot;
-    bool dark = f->dark_map && isfinite(f->percentiles_e_per_s[0]); /* a pixel has a value */
-    int panels = (f->line.power != NULL) + dark;
-    if (panels == 0) {
-        return BST_OK;
-    }
-    snprintf(path, sizeof path, "%s/plot.png", w->request->out);
-    BST_TRY(bst_plot_begin(ctx, &plot, path, 900, 380 * panels));
-    if (f->line.power) {
-        fprintf(plot.script, "$rows << EOD\n");
-        for (int k = 1; k < f->line.bins; k++) {
-            fprintf(plot.script, "%.6g %.6g\n", (double)k / f->width, f->line.power[k]);
-        }
-        fprintf(plot.script, "EOD\n");
-    }
-    if (dark) {
-        put_histogram(plot.script, f);
-    }
-    fprintf(plot.script, "set multiplot layout %d,1\nset grid\nunset key\n", panels);
-    if (f->line.power) {
-        fprintf(plot.script,
-                "set xlabel 'frequency along a row, cycles/px'\nset ylabel 'power over continuum'\n"
-                "plot $rows with lines, %.6g with lines dashtype 2\n",
-                f->line.least_ratio);
-    }
-    if (dark) {
-        fprintf(plot.script,
-                "set logscale y\nset xlabel 'dark current, e-/s'\nset ylabel 'pixels'\n"
-                "plot $dark with steps\n");
-    }
-    fprintf(plot.script, "unset multiplot\n");
-    return bst_plot_end(ctx, &plot, NULL);
-}
-
 /* Removes maps and plot of an earlier run, which would not belong to the new report. */
 static void remove_earlier(const bst_characterize_request *request) {
     static const char *const names[] = {"dark_map.fits", "prnu_map.fits", "plot.png"};
@@ -309,8 +330,9 @@ static void remove_earlier(const bst_characterize_request *request) {
 
 bst_status bst_characterize_write(bst_ctx *ctx, const bst_characterize_request *request,
                                   const bst_sensor_stacks *stacks,
-                                  const bst_sensor_figures *figures) {
-    const writer w = {request, stacks, figures};
+                                  const bst_sensor_figures *figures,
+                                  const bst_characterize_comparison *comparison) {
+    const writer w = {request, stacks, figures, comparison};
     char path[4096 + 32];
     if (request->overwrite) {
         remove_earlier(request);
@@ -321,7 +343,7 @@ bst_status bst_characterize_write(bst_ctx *ctx, const bst_characterize_request *
     if (figures->prnu_map) {
         BST_TRY(write_map(ctx, &w, "prnu_map.fits", figures->prnu_map, ""));
     }
-    BST_TRY(write_plot(ctx, &w));
+    BST_TRY(bst_characterize_plot(ctx, request->out, stacks, figures, comparison));
     snprintf(path, sizeof path, "%s/detector.json", request->out);
     BST_TRY(bst_cli_write_json(ctx, path, detector_json(&w)));
     snprintf(path, sizeof path, "%s/report.json", request->out);

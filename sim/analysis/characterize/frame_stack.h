@@ -4,7 +4,8 @@
 
 #include <stdbool.h>
 
-#include "sim/io/keyword_map.h"
+#include "sim/analysis/characterize/radiation_hits.h"
+#include "sim/io/recorded_frames.h"
 
 /* Blocks per side: statistics are taken in 8 x 8 blocks, whose scatter gives the uncertainty. */
 enum { BST_STACK_SIDE = 8, BST_STACK_BLOCKS = BST_STACK_SIDE * BST_STACK_SIDE };
@@ -24,11 +25,14 @@ typedef struct bst_frame_stack {
     double variance[BST_STACK_BLOCKS]; /* of a pixel between frames, mean of the pairs */
     double row_variance;               /* of the mean of a row between frames, in excess */
     double covariance[BST_STACK_LAGS]; /* of pixels 1, 2, ... apart in a row between frames */
+    bst_radiation_hits hits;           /* in the pairs; out of the mean */
     int overscan_width;                /* 0: none */
     float *overscan;                   /* [height][overscan_width] of the last frame */
 } bst_frame_stack;
 
 /* Reads and reduces frames. Memory does not grow with their number.
+ *
+ * Radiation hits that the other frame of a pair shows are left out of mean and variance.
  *
  * Given:     kind   for messages: "bias", "dark", "flat"
  *            paths  [count] as bst_recorded_frames_open takes them
@@ -38,6 +42,13 @@ typedef struct bst_frame_stack {
  * Ownership: free *out with bst_frame_stack_free, also after an error */
 bst_status bst_frame_stack_read(bst_ctx *ctx, const char *kind, const char *const *paths, int count,
                                 const bst_keyword_map *map, bst_frame_stack *out) BST_MUST_CHECK;
+/* The same of frames of a list that is open.
+ *
+ * Given:     first, count  frames of the list
+ * Errors:    as bst_frame_stack_read */
+bst_status bst_frame_stack_reduce(bst_ctx *ctx, const char *kind, bst_recorded_frames *recorded,
+                                  int64_t first, int64_t count, const bst_keyword_map *map,
+                                  bst_frame_stack *out) BST_MUST_CHECK;
 /* Frees the arrays. */
 void bst_frame_stack_free(bst_frame_stack *stack);
 

@@ -23,9 +23,9 @@ static const bst_frame_stack *first_stack(const bst_sensor_stacks *s) {
 
 static bst_status check_sizes(bst_ctx *ctx, const bst_sensor_stacks *s) {
     const bst_frame_stack *first = first_stack(s);
-    const bst_frame_stack *const all[] = {&s->bias, &s->dark, &s->flat};
-    const char *const names[] = {"bias", "dark", "flat"};
-    for (int i = 0; i < 3; i++) {
+    const bst_frame_stack *const all[] = {&s->bias, &s->dark, &s->flat, &s->warm};
+    const char *const names[] = {"bias", "dark", "flat", "warm dark"};
+    for (int i = 0; i < 4; i++) {
         if (all[i]->count > 0 &&
             (all[i]->width != first->width || all[i]->height != first->height)) {
             return bst_fail(ctx, BST_ERR_ARGUMENT,
@@ -33,6 +33,13 @@ static bst_status check_sizes(bst_ctx *ctx, const bst_sensor_stacks *s) {
                             "one sensor and size)",
                             names[i], all[i]->width, all[i]->height, first->width, first->height);
         }
+    }
+    if (s->linearity.count > 0 &&
+        (s->linearity.width != first->width || s->linearity.height != first->height)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "the flats of several exposures have %d x %d pixels, others %d x %d "
+                        "(allowed: frames of one sensor and size)",
+                        s->linearity.width, s->linearity.height, first->width, first->height);
     }
     return BST_OK;
 }
@@ -55,8 +62,11 @@ bst_status bst_sensor_figures_compute(bst_ctx *ctx, const bst_sensor_stacks *sta
     out->method[BST_SENSOR_GAIN] = "header or map; pairs of flats and bias frames would measure it";
     out->gain_of_header = true;
     BST_TRY(bst_sensor_measure_noise(ctx, stacks, out));
+    BST_TRY(bst_sensor_measure_linearity(ctx, stacks, out));
     BST_TRY(bst_sensor_measure_flat(ctx, stacks, out));
     BST_TRY(bst_sensor_measure_dark(ctx, stacks, out));
+    BST_TRY(bst_sensor_measure_warm(ctx, stacks, out));
+    bst_sensor_measure_hits(stacks, out);
     const bst_sensor_figure in_dn[] = {BST_SENSOR_READ_NOISE, BST_SENSOR_ROW_NOISE,
                                        BST_SENSOR_COLUMN_OFFSET, BST_SENSOR_ROW_OFFSET,
                                        BST_SENSOR_LINE_AMPLITUDE};

@@ -4,6 +4,7 @@
 
 #include "sim/analysis/characterize/frame_stack.h"
 #include "sim/analysis/characterize/hot_pixels.h"
+#include "sim/analysis/characterize/linearity_fit.h"
 #include "sim/analysis/characterize/pick_up_line.h"
 #include "sim/analysis/characterize/trap_correction.h"
 
@@ -32,6 +33,20 @@ typedef enum bst_sensor_figure {
     BST_SENSOR_LINE_PHASE,
     BST_SENSOR_PARALLEL_TRAIL,
     BST_SENSOR_SERIAL_TRAIL,
+    BST_SENSOR_FULL_WELL,
+    BST_SENSOR_SATURATION,
+    BST_SENSOR_LINEARITY_ERROR,
+    BST_SENSOR_NONLINEARITY_1,
+    BST_SENSOR_NONLINEARITY_2,
+    BST_SENSOR_NONLINEARITY_3,
+    BST_SENSOR_HIT_RATE,
+    BST_SENSOR_HIT_READOUT,
+    BST_SENSOR_HIT_CHARGE,
+    BST_SENSOR_HIT_LENGTH,
+    BST_SENSOR_HIT_DEPTH,
+    BST_SENSOR_HIT_E_PER_UM,
+    BST_SENSOR_HIT_STRAGGLING,
+    BST_SENSOR_DARK_DOUBLING,
     BST_SENSOR_FIGURES
 } bst_sensor_figure;
 
@@ -42,6 +57,11 @@ extern const double bst_sensor_percentiles[BST_SENSOR_PERCENTILES];
 /* Frames of a sensor; a stack without frames has count 0. */
 typedef struct bst_sensor_stacks {
     bst_frame_stack bias, dark, flat;
+    bst_frame_stack warm;           /* darks at another temperature */
+    double warmer_k;                /* by how much, above that of `dark` */
+    bst_frame_stack simulated;      /* frames made with the figures, to compare with the real */
+    bst_linearity_series linearity; /* without any: count 0 */
+    double pixel_pitch_um;          /* side of a pixel, for areas and lengths of radiation hits */
 } bst_sensor_stacks;
 
 /* Results. */
@@ -59,8 +79,9 @@ typedef struct bst_sensor_figures {
     bst_trap_model traps;  /* that leave the trails; none if they are not certain */
     double trap_misfit[2]; /* RMS of parallel and serial ones, shares of charge */
     bst_pick_up_line line;
-    float *dark_map; /* [height][width] e-/s; NULL: none */
-    float *prnu_map; /* [height][width] relative to 1; NULL: none */
+    bst_linearity linearity; /* used 0: no series */
+    float *dark_map;         /* [height][width] e-/s; NULL: none */
+    float *prnu_map;         /* [height][width] relative to 1; NULL: none */
 } bst_sensor_figures;
 
 /* Computes what the frames determine; the rest is NAN with its reason in `method`.
@@ -85,6 +106,14 @@ bool bst_sensor_has_level(const bst_sensor_stacks *stacks);
 /* Figures of bias frames and overscan: gain excepted, in DN until bst_sensor_to_electrons. */
 bst_status bst_sensor_measure_noise(bst_ctx *ctx, const bst_sensor_stacks *stacks,
                                     bst_sensor_figures *out) BST_MUST_CHECK;
+/* Linearity, full well, and gain of flats of several exposures. */
+bst_status bst_sensor_measure_linearity(bst_ctx *ctx, const bst_sensor_stacks *stacks,
+                                        bst_sensor_figures *out) BST_MUST_CHECK;
+/* Temperature step that doubles the dark current. */
+bst_status bst_sensor_measure_warm(bst_ctx *ctx, const bst_sensor_stacks *stacks,
+                                   bst_sensor_figures *out) BST_MUST_CHECK;
+/* Rate, charge and length of radiation hits. */
+void bst_sensor_measure_hits(const bst_sensor_stacks *stacks, bst_sensor_figures *out);
 /* Gain, PRNU, dead pixels of flats. */
 bst_status bst_sensor_measure_flat(bst_ctx *ctx, const bst_sensor_stacks *stacks,
                                    bst_sensor_figures *out) BST_MUST_CHECK;

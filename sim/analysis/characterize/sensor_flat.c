@@ -60,7 +60,7 @@ static void measure_gain(const bst_sensor_stacks *s, float *scratch, bst_sensor_
                                    : s->dark.pairs > 0 ? &s->dark
                                                        : NULL;
     double charge[BST_STACK_BLOCKS], below[BST_STACK_BLOCKS], excess[BST_STACK_BLOCKS];
-    if (s->flat.pairs == 0 || !quiet) {
+    if (s->flat.pairs == 0 || !quiet || !out->gain_of_header) { /* a series gave the gain */
         return;
     }
     /* charge that has shot noise: all above the level whose variance is subtracted */
@@ -135,6 +135,18 @@ static void measure_dead(float *map, const flat_level *level, const double *hot,
     out->method[BST_SENSOR_BAD_COLUMNS] = "columns with 8 dead pixels or more from an end on";
 }
 
+/* Signals spread by other shares than charges where the response bends. */
+static void free_of_non_linearity(double signal_dn, bst_sensor_figures *out) {
+    double slope = out->linearity.used > 0 ? bst_linearity_slope(&out->linearity, signal_dn) : NAN;
+    if (slope > 0.5 && slope < 2.0) {
+        out->figures[BST_SENSOR_PRNU].value /= slope;
+        out->figures[BST_SENSOR_PRNU].sigma /= slope;
+        for (size_t i = 0; i < (size_t)out->width * (size_t)out->height; i++) {
+            out->prnu_map[i] = (float)(1.0 + ((double)out->prnu_map[i] - 1.0) / slope);
+        }
+    }
+}
+
 /* Spread of the response in blocks, and the map of the response. */
 static void measure_response(const bst_sensor_stacks *s, const flat_level *level, float *scratch,
                              bst_sensor_figures *out) {
@@ -165,6 +177,7 @@ static void measure_response(const bst_sensor_stacks *s, const flat_level *level
         prnu[k] = variances[k] - noise / (signal[k] * signal[k]);
     }
     out->figures[BST_SENSOR_PRNU] = bst_root_estimate(bst_mean_estimate(prnu, BST_STACK_BLOCKS));
+    free_of_non_linearity(bst_mean_estimate(signal, BST_STACK_BLOCKS).value, out);
     out->method[BST_SENSOR_PRNU] = "scatter of the mean flat in 8 x 8 blocks, less its noise";
     measure_dead(map, level, hot, out);
 }
