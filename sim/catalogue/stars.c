@@ -12,6 +12,7 @@
 #include "boresight/rng.h"
 #include "sim/catalogue/bright_stars.h"
 #include "sim/catalogue/star_index.h"
+#include "sim/catalogue/variable_stars.h"
 #include "sim/core/file.h"
 
 #define MAX_FILE_BYTES ((uint64_t)1 << 33)
@@ -87,6 +88,9 @@ static uint32_t identity(const bst_star_view *view, uint32_t c, const bst_star_r
 
 /* limit of normal deviates, in sigma: Box-Muller with 53 bits ends at 8.6 */
 #define MOST_SIGMAS 9.0
+
+/* largest parallax that a record holds, at the Earth's largest distance from the barycentre */
+#define MOST_PARALLAX_RAD (1.04e-3 * BST_STAR_PARALLAX_MAX_MAS * BST_ARCSEC_RAD)
 
 /* random draws per star */
 enum { DRAW_DROPPED, DRAW_DISPLACED, DRAW_OFFSET };
@@ -254,6 +258,8 @@ void bst_stars_get_info(const bst_stars *stars, bst_stars_info *out) {
     snprintf(out->path, sizeof out->path, "%s", stars->path);
     out->count = (long long)h->star_count;
     out->table_count = (long long)h->star_count - stars->view.tycho2_count;
+    out->variable_count = stars->view.variable_count;
+    out->has_parallax = stars->view.has_parallax;
     out->complete_to_v_mag = h->complete_to_v_mag;
     out->patches = (int)h->patch_count;
 }
@@ -308,11 +314,15 @@ static radec_box box_around(bst_vec3 centre, double radius_rad) {
     return box;
 }
 
+static const double LIGHT_SPEED_MPS = 299792458.0, DAY_S = 86400.0;
+
 /* largest difference of Tycho-2's V and the published one, mag */
 #define MOST_WRONG_MAG 0.5
 
-/* Unpacks a star. True: its magnitudes are from the table of bright stars. */
-static bool unpack(const bst_star_record *r, uint32_t id, bst_vec3 direction, bst_star *out) {
+/* Unpacks a star. True: its magnitudes are from the table of bright stars, or of the observer's
+ * time. */
+static bool unpack(const bst_star_view *view, const bst_star_record *r, uint32_t id,
+                   bst_vec3 direction, const bst_star_observer *observer, bst_star *out) {
     int colour = (int)(r->pm_ra_colour & 0x3FFFu) - BST_STAR_COLOUR_OFFSET;
     out->icrs = direction;
     out->v_mag = (float)(bst_star_record_v(r) / 1e5);
@@ -320,8 +330,18 @@ static bool unpack(const bst_star_record *r, uint32_t id, bst_vec3 direction, bs
     out->b_minus_v = r->pm_dec_flags & BST_STAR_NO_COLOUR ? NAN : (float)(0.850 * colour / 1000.0);
     out->id = id;
     /* a file may have been imported without the table */
-    return (double)out->v_mag < BST_BRIGHT_STARS_V &&
-           bst_bright_star(out->id, &out->v_mag, &out->b_minus_v);
+    bool published = (double)out->v_mag < BST_BRIGHT_STARS_V &&
+                     bst_bright_star(out->id, &out->v_mag, &out->b_minus_v);
+    const bst_star_variable *v = r->pm_dec_flags & BST_STAR_VARIABLE
+                                     ? bst_star_variable_of(view, (uint32_t)(r - view->records))
+                                     : NULL;
+    if (v) {
+        /* at the barycentre the light has the phase that is seen by the observer */
+        double ahead_s = bst_vec3_dot(observer->barycentre_m, direction) / LIGHT_SPEED_MPS;
+        double mag = bst_star_variable_mag(view, v, observer->jd + ahead_s / DAY_S);
+        out->v_mag += (float)(published ? mag - (double)v->table_mag : mag);
+    }
+    return published || v;
 }
 
 /* Moves the last of count stars to its position by brightness; only stars of the table are out of
@@ -343,26 +363,30 @@ static bool may_reach(const cell_group *group, bst_vec3 centre, double radius_ra
     return group->radius >= 0.0 && bst_vec3_dot(d, d) <= reach * reach;
 }
 
-bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad,
-                           double v_limit, double julian_year, bst_star *out, int capacity,
-                           int *count) {
-    assert(stars && count);
+bst_status bst_stars_query_seen(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre,
+                                double radius_rad, double v_limit, const bst_star_epoch *epoch,
+                                bst_star *out, int capacity, int *count) {
+    assert(stars && epoch && count);
     *count = 0;
-    if (!(radius_rad >= 0.0 && radius_rad <= BST_PI) || isnan(v_limit) || !isfinite(julian_year) ||
-        !(fabs(bst_vec3_norm(centre) - 1.0) < 1e-6) || capacity < 0 || (!out && capacity > 0)) {
+    if (!(radius_rad >= 0.0 && radius_rad <= BST_PI) || isnan(v_limit) ||
+        !isfinite(epoch->julian_year) || !(fabs(bst_vec3_norm(centre) - 1.0) < 1e-6) ||
+        capacity < 0 || (!out && capacity > 0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "star query: radius %g rad (0 to pi), limit V %g, year %g, |centre| %g "
                         "(1), room for %d stars",
-                        radius_rad, v_limit, julian_year, bst_vec3_norm(centre), capacity);
+                        radius_rad, v_limit, epoch->julian_year, bst_vec3_norm(centre), capacity);
     }
-    double years = julian_year - BST_STAR_EPOCH_YEAR;
+    bst_star_observer observer;
+    bst_star_observer_at(&stars->view, epoch, &observer);
+    const double years = observer.years;
     double chord = 2.0 * sin(radius_rad / 2.0);
     /* rounding must not exclude the antipode */
     double chord2 = radius_rad >= BST_PI - 1e-9 ? 5.0 : chord * chord;
-    /* displaced stars may come from outside */
+    /* displaced stars and those with a parallax may come from outside */
     double slack = stars->altered && stars->errors.position_error_fraction > 0.0
                        ? MOST_SIGMAS * stars->errors.position_error_sigma_arcsec * BST_ARCSEC_RAD
                        : 0.0;
+    slack += observer.at_barycentre ? 0.0 : MOST_PARALLAX_RAD;
     int found = 0;
     for (uint32_t c = 0; c < stars->view.header->cell_count; c++) {
         if (c % GROUP == 0 &&
@@ -392,7 +416,7 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
             if (r->dec < box.dec_min || r->dec > box.dec_max || r->ra - box.ra_min > box.ra_width) {
                 continue;
             }
-            bst_vec3 direction = bst_star_record_direction(r, years);
+            bst_vec3 direction = bst_star_record_seen(r, &observer);
             const uint32_t id = identity(&stars->view, c, r);
             if (stars->altered && !alter(stars, id, &direction)) {
                 continue;
@@ -402,13 +426,13 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
             if (bst_vec3_dot(d, d) > chord2) {
                 continue;
             }
-            bool published = unpack(r, id, direction, &star);
-            if (published ? (double)star.v_mag > v_limit : v_mag > v_limit) {
+            bool reordered = unpack(&stars->view, r, id, direction, &observer, &star);
+            if (reordered ? (double)star.v_mag > v_limit : v_mag > v_limit) {
                 continue;
             }
             if (found < capacity) {
                 out[found] = star;
-                out_of_order = out_of_order || published;
+                out_of_order = out_of_order || reordered;
                 if (out_of_order) {
                     put_in_order(out + first, found - first + 1);
                 }
@@ -418,6 +442,19 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
     }
     *count = found;
     return BST_OK;
+}
+
+bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad,
+                           double v_limit, double julian_year, bst_star *out, int capacity,
+                           int *count) {
+    const bst_star_epoch epoch = {.julian_year = julian_year};
+    return bst_stars_query_seen(ctx, stars, centre, radius_rad, v_limit, &epoch, out, capacity,
+                                count);
+}
+
+double bst_stars_year_after(const bst_stars *stars, double julian_year, double seconds) {
+    const bool in_time = stars->view.has_parallax || stars->view.variable_count > 0;
+    return in_time ? julian_year + seconds / (DAY_S * 365.25) : julian_year;
 }
 
 /* Record of a star; NULL: not in the catalogue. */
@@ -440,13 +477,15 @@ static const bst_star_record *find_record(const bst_star_view *view, uint32_t id
     return NULL;
 }
 
-bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, double julian_year,
-                          bst_star *out) {
-    const bst_star_record *r = isfinite(julian_year) ? find_record(&stars->view, id) : NULL;
+bst_status bst_stars_find_seen(bst_ctx *ctx, const bst_stars *stars, uint32_t id,
+                               const bst_star_epoch *epoch, bst_star *out) {
+    const bst_star_record *r = isfinite(epoch->julian_year) ? find_record(&stars->view, id) : NULL;
     if (r) {
-        bst_vec3 direction = bst_star_record_direction(r, julian_year - BST_STAR_EPOCH_YEAR);
+        bst_star_observer observer;
+        bst_star_observer_at(&stars->view, epoch, &observer);
+        bst_vec3 direction = bst_star_record_seen(r, &observer);
         if (!stars->altered || alter(stars, id, &direction)) {
-            (void)unpack(r, id, direction, out);
+            (void)unpack(&stars->view, r, id, direction, &observer, out);
             return BST_OK;
         }
     }
@@ -459,6 +498,12 @@ bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, dou
                     tyc3);
 }
 
+bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, double julian_year,
+                          bst_star *out) {
+    const bst_star_epoch epoch = {.julian_year = julian_year};
+    return bst_stars_find_seen(ctx, stars, id, &epoch, out);
+}
+
 int64_t bst_stars_source(const bst_stars *stars, uint32_t id) {
     const bst_star_view *view = &stars->view;
     int64_t source = 0;
@@ -467,4 +512,26 @@ int64_t bst_stars_source(const bst_stars *stars, uint32_t id) {
                sizeof source);
     }
     return source;
+}
+
+void bst_stars_change(const bst_stars *stars, uint32_t id, bst_star_change *out) {
+    const bst_star_view *view = &stars->view;
+    const bst_star_record *r = find_record(view, id);
+    *out = (bst_star_change){.parallax_mas = r ? bst_star_record_parallax_mas(r) : 0.0};
+    const bst_star_variable *v = r && r->pm_dec_flags & BST_STAR_VARIABLE
+                                     ? bst_star_variable_of(view, (uint32_t)(r - view->records))
+                                     : NULL;
+    if (!v) {
+        return;
+    }
+    double range = v->point_count > 0 ? 0.0 : (double)v->amplitude_mag;
+    for (uint32_t i = 0; i < v->point_count; i++) {
+        range = fmax(range, (double)view->points[v->first_point + i].mag);
+    }
+    out->varies = true;
+    out->brightest_v_mag = bst_star_record_v(r) / 1e5;
+    out->faintest_v_mag = out->brightest_v_mag + range;
+    out->period_d = v->period_d;
+    out->epoch_jd = v->epoch_jd;
+    out->points = (int)v->point_count;
 }
