@@ -21,8 +21,8 @@
 extern const unsigned char bst_stars_embedded_begin[];
 extern const unsigned char bst_stars_embedded_end[];
 
-/* Cap that contains all cells of a group. Cells with consecutive numbers are neighbours: a query
- * skips most of the sky group by group. */
+/* Cap that contains all cells of a group, or all groups of a region. Cells with consecutive numbers
+ * are neighbours: a query skips most of the sky region by region, then group by group. */
 typedef struct cell_group {
     double centre[3], radius, pm_max_radpyr;
 } cell_group;
@@ -31,8 +31,9 @@ enum { GROUP = 32 };
 
 struct bst_stars {
     bst_star_view view;
-    cell_group *groups; /* one per GROUP cells; shared as the mapping is */
-    void *mapping;      /* NULL: embedded */
+    cell_group *groups;  /* one per GROUP cells; shared as the mapping is */
+    cell_group *regions; /* one per GROUP groups; behind the groups in memory */
+    void *mapping;       /* NULL: embedded */
     size_t mapping_bytes;
     char path[512];
     bool borrowed; /* another catalogue owns the mapping and the groups */
@@ -41,40 +42,58 @@ struct bst_stars {
     bst_rng_key key;
 };
 
-/* Computes centre and radius that enclose each group of star cells. */
+/* Cap around one cell; radius below 0: it has no stars. */
+static cell_group cap_of_cell(const bst_star_cell *cell) {
+    return (cell_group){{cell->centre[0], cell->centre[1], cell->centre[2]},
+                        cell->count > 0 ? (double)cell->radius_rad : -1.0,
+                        cell->pm_max_radpyr};
+}
+
+/* Cap around other caps. */
+static cell_group enclose(const cell_group *caps, uint32_t count) {
+    cell_group out = {.radius = -1.0}; /* no stars */
+    int filled = 0;
+    for (uint32_t c = 0; c < count; c++) {
+        filled += caps[c].radius >= 0.0;
+        for (int k = 0; k < 3 && caps[c].radius >= 0.0; k++) {
+            out.centre[k] += caps[c].centre[k];
+        }
+    }
+    for (int k = 0; k < 3 && filled > 0; k++) {
+        out.centre[k] /= filled;
+    }
+    for (uint32_t c = 0; c < count; c++) {
+        if (caps[c].radius >= 0.0) {
+            double dx = caps[c].centre[0] - out.centre[0], dy = caps[c].centre[1] - out.centre[1],
+                   dz = caps[c].centre[2] - out.centre[2];
+            double away = sqrt(dx * dx + dy * dy + dz * dz);
+            out.radius = fmax(out.radius, away + caps[c].radius + 1e-9);
+            out.pm_max_radpyr = fmax(out.pm_max_radpyr, caps[c].pm_max_radpyr);
+        }
+    }
+    return out;
+}
+
+/* Computes centre and radius that enclose each group of star cells, and each region of groups. */
 static bst_status group_cells(bst_ctx *ctx, bst_stars *s) {
     const uint32_t cells = s->view.header->cell_count;
-    s->groups = calloc(cells / GROUP + 1, sizeof *s->groups);
+    const uint32_t groups = cells / GROUP + 1, regions = groups / GROUP + 1;
+    s->groups = calloc(groups + regions, sizeof *s->groups);
     if (!s->groups) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the star catalogue");
     }
-    for (uint32_t g = 0; g * GROUP < cells; g++) {
-        cell_group *group = &s->groups[g];
-        uint32_t first = g * GROUP, last = first + GROUP;
-        uint32_t end = last < cells ? last : cells;
-        *group = (cell_group){.radius = -1.0}; /* no stars */
-        int filled = 0;
-        for (uint32_t c = first; c < end; c++) {
-            const bst_star_cell *cell = &s->view.cells[c];
-            filled += cell->count > 0;
-            for (int k = 0; k < 3 && cell->count > 0; k++) {
-                group->centre[k] += cell->centre[k];
-            }
+    for (uint32_t g = 0; g < groups; g++) {
+        cell_group caps[GROUP];
+        uint32_t count = 0;
+        for (uint32_t c = g * GROUP; c < cells && count < GROUP; c++) {
+            caps[count++] = cap_of_cell(&s->view.cells[c]);
         }
-        for (int k = 0; k < 3 && filled > 0; k++) {
-            group->centre[k] /= filled;
-        }
-        for (uint32_t c = first; c < end; c++) {
-            const bst_star_cell *cell = &s->view.cells[c];
-            if (cell->count > 0) {
-                double dx = cell->centre[0] - group->centre[0],
-                       dy = cell->centre[1] - group->centre[1],
-                       dz = cell->centre[2] - group->centre[2];
-                double away = sqrt(dx * dx + dy * dy + dz * dz);
-                group->radius = fmax(group->radius, away + cell->radius_rad + 1e-9);
-                group->pm_max_radpyr = fmax(group->pm_max_radpyr, cell->pm_max_radpyr);
-            }
-        }
+        s->groups[g] = enclose(caps, count);
+    }
+    s->regions = s->groups + groups;
+    for (uint32_t r = 0; r < regions; r++) {
+        uint32_t first = r * GROUP, left = groups > first ? groups - first : 0;
+        s->regions[r] = enclose(s->groups + first, left < GROUP ? left : GROUP);
     }
     return BST_OK;
 }
@@ -388,7 +407,14 @@ bst_status bst_stars_query_seen(bst_ctx *ctx, const bst_stars *stars, bst_vec3 c
                        : 0.0;
     slack += observer.at_barycentre ? 0.0 : MOST_PARALLAX_RAD;
     int found = 0;
+    radec_box box = {0};
+    double box_drift = -1.0;
     for (uint32_t c = 0; c < stars->view.header->cell_count; c++) {
+        if (c % (GROUP * GROUP) == 0 && !may_reach(&stars->regions[c / (GROUP * GROUP)], centre,
+                                                   radius_rad + slack, fabs(years))) {
+            c += GROUP * GROUP - 1;
+            continue;
+        }
         if (c % GROUP == 0 &&
             !may_reach(&stars->groups[c / GROUP], centre, radius_rad + slack, fabs(years))) {
             c += GROUP - 1;
@@ -403,7 +429,10 @@ bst_status bst_stars_query_seen(bst_ctx *ctx, const bst_stars *stars, bst_vec3 c
         if (cell->count == 0 || bst_vec3_dot(d, d) > reach * reach) {
             continue;
         }
-        radec_box box = box_around(centre, radius_rad + drift + slack);
+        if (drift > box_drift) { /* it holds for less motion, too */
+            box = box_around(centre, radius_rad + drift + slack);
+            box_drift = drift;
+        }
         bool out_of_order = false;
         const int first = found;
         const bst_star_record *r = stars->view.records + cell->first;
