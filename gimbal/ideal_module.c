@@ -73,7 +73,11 @@ static bst_status find_target(const bst_module_env *env, const config *c, module
                                    (unsigned)c->star_tyc[2]);
     bst_time epoch = bst_world_time(env->world, 0.0);
     double year = 2000.0 + (epoch.jd1 - 2451545.0 + epoch.jd2) / 365.25;
-    bst_status status = bst_stars_find(env->ctx, bst_world_stars(env->world), id, year, &star);
+    bst_bodies bodies;
+    bst_bodies_at(epoch, &bodies);
+    const bst_star_epoch seen = {year, bodies.sun_m};
+    bst_status status =
+        bst_stars_find_seen(env->ctx, bst_world_stars(env->world), id, &seen, &star);
     if (status != BST_OK) {
         return bst_fail_prefix(env->ctx, status, "star_tyc");
     }

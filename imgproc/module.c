@@ -116,9 +116,9 @@ static bst_status prepare(const bst_module_env *env, bst_imgproc_state *m) {
                                          &m->pixels));
     }
     BST_TRY(open_lane(env->ctx, m, &m->lanes[0]));
+    m->epoch_julian_year = bst_knowledge_julian_year(env->knowledge);
     BST_TRY(bst_predicted_stars_create(env->ctx, &m->camera, bst_knowledge_stars(env->knowledge),
-                                       bst_knowledge_julian_year(env->knowledge),
-                                       CATALOGUE_CAPACITY, &m->sky));
+                                       m->epoch_julian_year, CATALOGUE_CAPACITY, &m->sky));
     BST_TRY(bst_starid_create(env->ctx, CATALOGUE_CAPACITY, (int)m->config->capacity,
                               m->config->search_radius_px, &m->starid));
     BST_TRY(bst_imgproc_discriminator_create(env->ctx, &m->camera, (int)m->config->capacity,
@@ -388,6 +388,8 @@ static bst_status detect_frame(bst_imgproc_state *m, struct bst_step *step, bst_
     if (e->navigated) {
         e->light = observer_at(m, nav.payload, middle);
     }
+    m->sky.julian_year =
+        bst_stars_year_after(m->sky.stars, m->epoch_julian_year, middle / (double)m->tick_rate_hz);
     if (m->config->track_windows && e->locked && e->predictions && e->navigated) {
         BST_TRY(plan_windows(bst_step_ctx(step), m, e, out->q_cam_from_gcrf));
         out->windows = m->windows.count;

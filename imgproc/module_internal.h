@@ -48,6 +48,7 @@ typedef struct bst_imgproc_state {
     bst_starid *starid;
     bst_imgproc_discriminator *discriminator;
     bst_predicted_stars sky;
+    double epoch_julian_year;       /* of the run's epoch */
     bst_region_of_interest windows; /* of the current frame; none: the whole frame */
     bst_stack *stack;               /* NULL: no stacking */
     bst_optics_photometer photometer;

@@ -51,7 +51,8 @@ static bst_status catalogue_offset_px(bst_ctx *ctx, const bst_identify_options *
         return BST_OK;
     }
     bst_star star;
-    bst_status status = bst_stars_find(ctx, o->catalogue, item->id, o->julian_year, &star);
+    const bst_star_epoch epoch = {o->julian_year, truth->sun_m};
+    bst_status status = bst_stars_find_seen(ctx, o->catalogue, item->id, &epoch, &star);
     if (status == BST_ERR_NOT_FOUND) {
         *off = INFINITY;
         return BST_OK;

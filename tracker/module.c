@@ -42,7 +42,8 @@ typedef struct tracker_module {
     bst_tracker *tracker;
     bst_knowledge_view *view;
     const bst_stars *stars;
-    double julian_year, blend_rad;
+    bst_star_epoch epoch; /* of the run, with the Sun of the latest frame */
+    double blend_rad;
     double tick_rate_hz;
     bool orbits;
     bst_tracker_catalogue *catalogue; /* NULL: tracks are not compared with it */
@@ -57,8 +58,8 @@ enum { MAX_COMPANIONS = 16 };
 static bst_vec3 photocentre(const tracker_module *m, bst_ctx *ctx, const bst_star *star) {
     bst_star near[MAX_COMPANIONS];
     int count = 0;
-    if (bst_stars_query(ctx, m->stars, star->icrs, m->blend_rad, star->v_mag + COMPANION_MAG,
-                        m->julian_year, near, MAX_COMPANIONS, &count) != BST_OK ||
+    if (bst_stars_query_seen(ctx, m->stars, star->icrs, m->blend_rad, star->v_mag + COMPANION_MAG,
+                             &m->epoch, near, MAX_COMPANIONS, &count) != BST_OK ||
         count > MAX_COMPANIONS) {
         return star->icrs;
     }
@@ -70,7 +71,7 @@ static bool find_star(void *user, uint32_t star_id, bst_vec3 *icrs) {
     const tracker_module *m = user;
     bst_ctx quiet = {0}; /* an unknown identity is no failure of the run */
     bst_star star;
-    if (bst_stars_find(&quiet, m->stars, star_id, m->julian_year, &star) != BST_OK) {
+    if (bst_stars_find_seen(&quiet, m->stars, star_id, &m->epoch, &star) != BST_OK) {
         return false;
     }
     *icrs = photocentre(m, &quiet, &star);
@@ -99,7 +100,7 @@ static bst_status create(const bst_module_env *env, const void *config, bst_filt
         return bst_fail(env->ctx, BST_ERR_MEMORY, "tracker: out of memory");
     }
     m->stars = bst_knowledge_stars(env->knowledge);
-    m->julian_year = bst_knowledge_julian_year(env->knowledge);
+    m->epoch.julian_year = bst_knowledge_julian_year(env->knowledge);
     m->tick_rate_hz = (double)env->tick_rate_hz;
     m->orbits = c->motion == 1;
     const bst_camera *camera = bst_knowledge_camera(env->knowledge);
@@ -235,6 +236,8 @@ static bst_status process_detections(tracker_module *m, struct bst_step *step,
         bst_step_count(step, "tracker_no_navigation");
         return BST_OK;
     }
+    const bst_nav_telemetry *place = nav.payload;
+    m->epoch.sun_m = place->sun_m;
     bst_sample pointing = bst_step_latest(step, PORT_POINTING);
     const bst_pointing_telemetry *telemetry = pointing.payload;
     bst_tracker_input input = {.detections = detections, .nav = nav.payload};

@@ -10,7 +10,7 @@
 typedef struct bst_predicted_stars {
     const bst_camera *camera;
     const bst_stars *stars;
-    double julian_year;
+    double julian_year; /* of proper motion and variable stars; may change between queries */
     int capacity;
     bst_star *found;                     /* catalogue stars of the query */
     bst_imgproc_expected_star *expected; /* their predicted positions */
@@ -34,7 +34,7 @@ void bst_predicted_stars_free(bst_predicted_stars *sky);
  */
 typedef struct bst_predicted_stars_query {
     bst_quat q_cam_from_gcrf;
-    /* velocity and position for aberration and parallax */
+    /* velocity for aberration, the Sun's place for light deflection and parallax */
     const bst_light *light;
     bst_window window;
     double margin_px, v_limit;

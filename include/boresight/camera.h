@@ -45,7 +45,11 @@ typedef struct bst_camera {
     double quantum_efficiency;      /* band mean, 0..1 */
     double photon_flux_v0_per_s_m2; /* photons of a V = 0 star in the camera's band */
     double psf_fwhm_px;             /* Gaussian, Moffat */
-    double background_mag_arcsec2;  /* uniform sky, V per square arcsecond */
+    /* in place of throughput or photon_flux_v0_per_s_m2, and of psf_fwhm_px, which follow from them
+     * (bst_camera_resolve_figures); NAN or 0: not given */
+    double zero_point_mag;   /* V of a Sun-like star of 1 electron/s */
+    double ensquared_energy; /* share of a point's light in the pixel on whose centre it lies */
+    double background_mag_arcsec2; /* uniform sky, V per square arcsecond */
     double dark_current_e_per_s;
     double read_noise_e;
     double full_well_e;
@@ -81,6 +85,18 @@ extern const bst_config_desc bst_distortion_config[];
  *            scale is kept. f_number and pixel_pitch_um of the blocks `optics` and `background` are
  *            compared too. */
 bst_status bst_camera_resolve_scale(bst_ctx *ctx, bst_camera *camera) BST_MUST_CHECK;
+
+/* Computes what follows from a camera's zero point and ensquared energy; without them the camera is
+ * unchanged.
+ *
+ * Given:     camera  as read from a configuration. A camera with a spectrum gets the throughput
+ * that makes the zero point, one of the preset "v" the photon flux Returned:  *camera throughput or
+ * photon_flux_v0_per_s_m2; psf_fwhm_px of a Gaussian or Moffat PSF Errors:    BST_ERR_CONFIG with
+ * the key: a throughput above 1, no aperture or quantum efficiency, an energy that no width from
+ * 0.3 to 50 px has, a PSF without a width Notes:     a camera whose spectrum is made later is
+ * resolved twice: the first call leaves its throughput Reference: ensquared energy of a Gaussian:
+ * erf(1 / (2 sqrt 2 sigma))^2 */
+bst_status bst_camera_resolve_figures(bst_ctx *ctx, bst_camera *camera) BST_MUST_CHECK;
 
 /* Computes `geometry` from rotation and distortion.
  *

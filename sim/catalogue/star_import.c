@@ -172,7 +172,7 @@ bst_status bst_star_write(bst_ctx *ctx, const bst_star_values *values, size_t co
     if (status == BST_OK) {
         status = bst_star_list_write(ctx, &list, &head, out_path);
     }
-    free(list.stars);
+    bst_star_list_free(&list);
     return status;
 }
 
@@ -197,7 +197,7 @@ bst_status bst_star_import_rows(bst_ctx *ctx, FILE *rows, const bst_star_import_
     if (stars_written) {
         *stars_written = status == BST_OK ? (long long)list.count : 0;
     }
-    free(list.stars);
+    bst_star_list_free(&list);
     return status;
 }
 
@@ -233,6 +233,6 @@ bst_status bst_star_import_tarball(bst_ctx *ctx, const char *tarball_path,
     if (status == BST_OK && stars_written) {
         *stars_written = (long long)list.count;
     }
-    free(list.stars);
+    bst_star_list_free(&list);
     return status;
 }

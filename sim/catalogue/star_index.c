@@ -56,6 +56,13 @@ bst_vec3 bst_star_record_direction(const bst_star_record *r, double years) {
     return bst_vec3_scale(p, 1.0 / sqrt(1.0 + east * east + north * north));
 }
 
+void bst_star_record_set_parallax(bst_star_record *record, double parallax_mas) {
+    double most = BST_STAR_PARALLAX_MAX_MAS;
+    uint32_t units =
+        (uint32_t)lround(fmin(fmax(parallax_mas, 0.0), most) / BST_STAR_PARALLAX_UNIT_MAS);
+    record->pm_dec_flags = (record->pm_dec_flags & ~BST_STAR_PARALLAX_BITS) | units << 2;
+}
+
 void bst_star_move_epoch(bst_star_values *v, double years) {
     const double unit = 1e-4 * BST_ARCSEC_RAD;
     double sa = sin(v->ra_rad), ca = cos(v->ra_rad);
@@ -137,6 +144,32 @@ static bst_status check_cells(bst_ctx *ctx, const char *label, const bst_star_vi
     return BST_OK;
 }
 
+/* Checks variables and light curves. */
+static bst_status check_variables(bst_ctx *ctx, const char *label, const bst_star_view *view,
+                                  uint32_t point_count) {
+    for (uint32_t i = 0; i < view->variable_count; i++) {
+        const bst_star_variable *v = &view->variables[i];
+        bool good = v->star < view->header->star_count &&
+                    (i == 0 || v->star > view->variables[i - 1].star) &&
+                    (uint64_t)v->first_point + v->point_count <= point_count &&
+                    v->amplitude_mag >= 0.0F && v->amplitude_mag <= 40.0F &&
+                    v->table_mag >= -40.0F && v->table_mag <= 40.0F && isfinite(v->epoch_jd) &&
+                    v->period_d >= 0.0 && isfinite(v->period_d) &&
+                    (v->point_count > 0 || v->period_d > 0.0);
+        for (uint32_t k = 0; good && k < v->point_count; k++) {
+            const bst_star_point *p = &view->points[v->first_point + k];
+            good = isfinite(p->time) && p->mag >= 0.0F && p->mag <= 40.0F &&
+                   (k == 0 || p->time > p[-1].time);
+        }
+        if (!good) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "star catalogue %s is damaged (variable star %" PRIu32 "): " REMEDY,
+                            label, i);
+        }
+    }
+    return BST_OK;
+}
+
 static bst_status damaged_header(bst_ctx *ctx, const char *label) {
     return bst_fail(ctx, BST_ERR_FORMAT,
                     "star catalogue %s is damaged (numbers in the header): " REMEDY, label);
@@ -162,11 +195,11 @@ bst_status bst_star_view_init(bst_ctx *ctx, const char *label, const void *data,
                         "order: " REMEDY,
                         label);
     }
-    if (h->version != BST_STAR_VERSION && h->version != BST_STAR_TABLE_VERSION) {
+    if (h->version < BST_STAR_VERSION || h->version > BST_STAR_TIME_VERSION) {
         return bst_fail(ctx, BST_ERR_FORMAT,
                         "star catalogue %s has format version %" PRIu32
-                        ", this program reads %u and %u: " REMEDY,
-                        label, h->version, BST_STAR_VERSION, BST_STAR_TABLE_VERSION);
+                        ", this program reads %u to %u: " REMEDY,
+                        label, h->version, BST_STAR_VERSION, BST_STAR_TIME_VERSION);
     }
     if (bytes != h->file_bytes) {
         return bst_fail(ctx, BST_ERR_FORMAT,
@@ -184,28 +217,41 @@ bst_status bst_star_view_init(bst_ctx *ctx, const char *label, const void *data,
                         ", expected %016" PRIx64 "): " REMEDY,
                         label, found, h->checksum);
     }
-    uint64_t whole = sizeof *h + h->patch_count * (uint64_t)sizeof(bst_star_patch) +
+    bst_star_extension more = {0};
+    const bool in_time = h->version == BST_STAR_TIME_VERSION;
+    const size_t extension = in_time ? sizeof more : 0;
+    if (in_time && bytes >= sizeof *h + sizeof more) {
+        memcpy(&more, h + 1, sizeof more);
+    }
+    uint64_t whole = sizeof *h + extension + h->patch_count * (uint64_t)sizeof(bst_star_patch) +
+                     more.variable_count * (uint64_t)sizeof(bst_star_variable) +
+                     more.point_count * (uint64_t)sizeof(bst_star_point) +
                      h->cell_count * (uint64_t)sizeof(bst_star_cell);
     bool counts_fit = h->patch_count <= BST_STAR_PATCHES_MAX && h->star_count <= UINT32_MAX &&
                       h->cell_count >= BST_STAR_CELLS && h->cell_count <= BST_STAR_CELLS_MAX &&
-                      (h->cell_count == BST_STAR_CELLS || h->version == BST_STAR_TABLE_VERSION);
+                      (h->cell_count == BST_STAR_CELLS || h->version != BST_STAR_VERSION);
     whole += h->star_count * (uint64_t)sizeof(bst_star_record);
     if (!counts_fit || !isfinite(h->complete_to_v_mag) || bytes < whole) {
         return damaged_header(ctx, label);
     }
     out->header = h;
-    out->patches = (const bst_star_patch *)(h + 1);
-    out->cells = (const bst_star_cell *)(out->patches + h->patch_count);
+    const unsigned char *after = (const unsigned char *)(h + 1) + extension;
+    out->patches = (const bst_star_patch *)(const void *)after;
+    out->variables = (const bst_star_variable *)(const void *)(out->patches + h->patch_count);
+    out->variable_count = more.variable_count;
+    out->points = (const bst_star_point *)(out->variables + more.variable_count);
+    out->cells = (const bst_star_cell *)(const void *)(out->points + more.point_count);
     out->records = (const bst_star_record *)(out->cells + h->cell_count);
+    out->has_parallax = in_time;
     BST_TRY(check_patches(ctx, label, out));
     BST_TRY(check_cells(ctx, label, out));
+    BST_TRY(check_variables(ctx, label, out, more.point_count));
     const bst_star_cell *last = &out->cells[BST_STAR_CELLS - 1];
     out->tycho2_count = last->first + last->count;
     uint64_t table = h->star_count - out->tycho2_count;
     if (bytes != whole + table * sizeof(int64_t) || table > BST_STAR_TABLE_IDS) {
         return damaged_header(ctx, label);
     }
-    out->sources =
-        h->version == BST_STAR_TABLE_VERSION ? (const unsigned char *)data + whole : NULL;
+    out->sources = h->version != BST_STAR_VERSION ? (const unsigned char *)data + whole : NULL;
     return BST_OK;
 }

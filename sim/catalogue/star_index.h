@@ -1,11 +1,12 @@
 /* File format of the star catalogue, for mapped files, the embedded catalogue and the importers.
  *
- * header | patches | cells | records | sources, in the byte order of the machine that wrote it
- * (checked). The first sky cells are the 9,537 regions of the Guide Star Catalog that Tycho-2
- * numbers its stars by (TYC1), so a star's identity names its cell. Cells after them, in files of
- * version 2 only, hold the stars of a user's table, numbered in the order of their records; their
- * sources are the table's own identities. Each cell stores the cap that contains its stars, which
- * are sorted brightest first. */
+ * header | extension | patches | variables | points | cells | records | sources, in the byte order
+ * of the machine that wrote it (checked). Extension, variables and points are in files of version 3
+ * only, which have parallaxes or variable stars. The first sky cells are the 9,537 regions of the
+ * Guide Star Catalog that Tycho-2 numbers its stars by (TYC1), so a star's identity names its cell.
+ * Cells after them, in files of version 2 and 3, hold the stars of a user's table, numbered in the
+ * order of their records; their sources are the table's own identities. Each cell stores the cap
+ * that contains its stars, which are sorted brightest first. */
 #ifndef BST_CATALOGUE_STAR_INDEX_H
 #define BST_CATALOGUE_STAR_INDEX_H
 
@@ -19,6 +20,7 @@
 #define BST_STAR_ENDIAN 0x01020304u
 #define BST_STAR_VERSION 1u       /* stars of Tycho-2 only */
 #define BST_STAR_TABLE_VERSION 2u /* also stars of a table */
+#define BST_STAR_TIME_VERSION 3u  /* also parallaxes and variable stars */
 #define BST_STAR_CELLS 9538u      /* one per TYC1, 1 to 9537; cell 0 is empty */
 #define BST_STAR_CELLS_MAX (1u << 22)
 #define BST_STAR_PATCHES_MAX 64u
@@ -36,6 +38,30 @@ typedef struct bst_star_header {
     double complete_to_v_mag; /* over the whole sky */
     char source[40];          /* zero-terminated */
 } bst_star_header;
+
+/* What files of version 3 have behind the header. */
+typedef struct bst_star_extension {
+    uint32_t variable_count;
+    uint32_t point_count;
+} bst_star_extension;
+
+/* Variability of a star: V is that of its record, the brightest one, plus what follows. */
+typedef struct bst_star_variable {
+    uint32_t star;        /* index of its record */
+    uint32_t first_point; /* of its light curve */
+    uint32_t point_count; /* 0: a cosine */
+    float amplitude_mag;  /* cosine: faintest less brightest V */
+    float table_mag;      /* the table's V less the brightest */
+    float spare;
+    double period_d; /* 0: times of the curve are days, not phases; constant beyond its ends */
+    double epoch_jd; /* of phase 0 or of the curve's time 0, barycentric Julian date (TDB) */
+} bst_star_variable;
+
+/* A point of a light curve; straight lines join the points. */
+typedef struct bst_star_point {
+    float time; /* phase from 0 to 1, or days */
+    float mag;  /* V less the brightest */
+} bst_star_point;
 
 /* A cap of the sky in which the catalogue has fainter stars. */
 typedef struct bst_star_patch {
@@ -59,18 +85,26 @@ typedef struct bst_star_record {
     int32_t dec;           /* the same unit */
     uint32_t tyc_vt;       /* low 16 bits of the identity, then VT in mmag + BST_STAR_VT_OFFSET */
     uint32_t pm_ra_colour; /* pm_ra cos(dec), 0.1 mas/yr, 18 bits; BT-VT, mmag + offset, 14 bits */
-    uint32_t pm_dec_flags; /* pm_dec, 0.1 mas/yr, 18 bits; BST_STAR_NO_COLOUR and spare bits */
+    uint32_t pm_dec_flags; /* pm_dec, 0.1 mas/yr, 18 bits; parallax, 0.2 mas, 12 bits;
+                              BST_STAR_VARIABLE and BST_STAR_NO_COLOUR */
 } bst_star_record;
 
 #define BST_STAR_VT_OFFSET 3000
 #define BST_STAR_COLOUR_OFFSET 4000
 #define BST_STAR_PM_LIMIT 131071 /* 0.1 mas/yr */
 #define BST_STAR_NO_COLOUR 1u    /* BT-VT is assumed, not measured */
+#define BST_STAR_VARIABLE 2u     /* one of the file's variables */
+#define BST_STAR_PARALLAX_BITS 0x3FFCu
+#define BST_STAR_PARALLAX_UNIT_MAS 0.2
+#define BST_STAR_PARALLAX_MAX_MAS 819.0 /* what the bits hold; the largest known is 768.5 */
 
 _Static_assert(sizeof(bst_star_header) == 96, "file layout");
 _Static_assert(sizeof(bst_star_patch) == 32, "file layout");
 _Static_assert(sizeof(bst_star_cell) == 28, "file layout");
 _Static_assert(sizeof(bst_star_record) == 20, "file layout");
+_Static_assert(sizeof(bst_star_extension) == 8, "file layout");
+_Static_assert(sizeof(bst_star_variable) == 40, "file layout");
+_Static_assert(sizeof(bst_star_point) == 8, "file layout");
 
 /* A star's catalogue values before packing. */
 typedef struct bst_star_values {
@@ -91,6 +125,10 @@ typedef struct bst_star_view {
     const bst_star_record *records;
     const unsigned char *sources; /* int64_t for each star of a table, not aligned; NULL: none */
     uint32_t tycho2_count;        /* stars of Tycho-2; those of a table follow */
+    const bst_star_variable *variables; /* [variable_count], by ascending star */
+    const bst_star_point *points;
+    uint32_t variable_count;
+    bool has_parallax; /* version 3: some stars may have one */
 } bst_star_view;
 
 /* Brings position and proper motion to another epoch, on a straight line.
@@ -112,6 +150,16 @@ static inline int32_t bst_star_record_v(const bst_star_record *r) {
 /* Direction of a star (ICRS unit vector) `years` Julian years after J2000: (u + t mu) / |u + t mu|,
  * uniform straight motion without radial velocity. */
 bst_vec3 bst_star_record_direction(const bst_star_record *r, double years);
+
+/* Sets a record's parallax, rounded to BST_STAR_PARALLAX_UNIT_MAS.
+ *
+ * Given:     parallax_mas  up to BST_STAR_PARALLAX_MAX_MAS; a measured one below 0 becomes 0 */
+void bst_star_record_set_parallax(bst_star_record *record, double parallax_mas);
+
+/* Parallax of a record, mas; 0: none is known. */
+static inline double bst_star_record_parallax_mas(const bst_star_record *r) {
+    return (double)((r->pm_dec_flags & BST_STAR_PARALLAX_BITS) >> 2) * BST_STAR_PARALLAX_UNIT_MAS;
+}
 
 /* Checksum of a catalogue file: four interleaved multiply-xor lanes of 64-bit words. It detects any
  * change within one 8-byte word. */

@@ -20,9 +20,60 @@ bst_status bst_star_list_add(bst_ctx *ctx, bst_star_list *list, const bst_star_r
         list->stars = grown;
         list->room = room;
     }
-    list->stars[list->count++] =
-        (bst_star_entry){*record, cell, bst_star_record_v(record), 0.0F, 0};
+    list->stars[list->count++] = (bst_star_entry){*record, cell, 0, 0.0F, 0};
     return BST_OK;
+}
+
+/* Makes room for `more` items behind *count. */
+static bst_status make_room(bst_ctx *ctx, void **items, size_t size, size_t count, size_t more,
+                            size_t *room) {
+    if (count + more > UINT32_MAX) {
+        return bst_fail(ctx, BST_ERR_RANGE,
+                        "%zu variable stars or points of light curves are more "
+                        "than a catalogue holds",
+                        count + more);
+    }
+    if (count + more > *room) {
+        size_t wanted = 2 * (count + more);
+        void *grown = realloc(*items, wanted * size);
+        if (!grown) {
+            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %zu variable stars", wanted);
+        }
+        *items = grown;
+        *room = wanted;
+    }
+    return BST_OK;
+}
+
+bst_status bst_star_list_add_variable(bst_ctx *ctx, bst_star_list *list,
+                                      const bst_star_variable *variable,
+                                      const bst_star_point *points, uint32_t *index) {
+    void *variables = list->variables, *curve = list->points;
+    bst_status status =
+        make_room(ctx, &variables, sizeof *variable, list->variable_count, 1, &list->variable_room);
+    list->variables = variables;
+    if (status == BST_OK) {
+        status = make_room(ctx, &curve, sizeof *points, list->point_count, variable->point_count,
+                           &list->point_room);
+        list->points = curve;
+    }
+    BST_TRY(status);
+    bst_star_variable *v = &list->variables[list->variable_count++];
+    *v = *variable;
+    v->first_point = (uint32_t)list->point_count;
+    if (v->point_count > 0) {
+        memcpy(list->points + list->point_count, points, v->point_count * sizeof *points);
+        list->point_count += v->point_count;
+    }
+    *index = (uint32_t)list->variable_count;
+    return BST_OK;
+}
+
+void bst_star_list_free(bst_star_list *list) {
+    free(list->stars);
+    free(list->variables);
+    free(list->points);
+    *list = (bst_star_list){0};
 }
 
 static int compare_u32(uint32_t a, uint32_t b) {
@@ -35,7 +86,8 @@ static int compare_stars(const void *pa, const void *pb) {
     const bst_star_entry *a = pa, *b = pb;
     int c = compare_u32(a->cell, b->cell);
     if (c == 0) {
-        c = (a->v > b->v) - (a->v < b->v);
+        int32_t va = bst_star_record_v(&a->record), vb = bst_star_record_v(&b->record);
+        c = (va > vb) - (va < vb);
     }
     if (c == 0) {
         c = compare_u32(a->record.tyc_vt & 0xFFFFu, b->record.tyc_vt & 0xFFFFu);
@@ -152,38 +204,76 @@ static void bound_cell(const bst_star_entry *stars, bst_star_cell *cell) {
     cell->pm_max_radpyr = (float)(motion * (1.0 + 1e-6));
 }
 
-/* Builds the catalogue file in memory; the caller frees *out. */
-static bst_status build_image(bst_ctx *ctx, const bst_star_list *list, const bst_star_head *head,
-                              unsigned char **out, size_t *out_bytes) {
-    const uint32_t cell_count = list->cells ? list->cells : BST_STAR_CELLS;
-    size_t patch_bytes = (size_t)head->patch_count * sizeof(bst_star_patch);
-    size_t cell_bytes = cell_count * sizeof(bst_star_cell), sources = 0;
-    for (size_t i = 0; i < list->count; i++) {
-        sources += list->stars[i].cell >= BST_STAR_CELLS;
-    }
-    size_t source_bytes = sources * sizeof(int64_t);
-    size_t bytes = sizeof(bst_star_header) + patch_bytes + cell_bytes +
-                   list->count * sizeof(bst_star_record) + source_bytes;
-    unsigned char *image = calloc(1, bytes);
-    bst_star_cell *cells = calloc(cell_count, sizeof *cells);
-    if (!image || !cells) {
-        free(image);
-        free(cells);
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a catalogue of %zu bytes", bytes);
-    }
-    unsigned char *records = image + bytes - source_bytes - list->count * sizeof(bst_star_record);
-    unsigned char *source = image + bytes - source_bytes;
+/* Where the parts of a file begin, and its version. */
+typedef struct layout {
+    uint32_t version, cells;
+    size_t patches, variables, points, cell, records, sources, bytes;
+} layout;
+
+static layout lay_out(const bst_star_list *list, const bst_star_head *head) {
+    layout l = {.version = list->cells ? BST_STAR_TABLE_VERSION : BST_STAR_VERSION,
+                .cells = list->cells ? list->cells : BST_STAR_CELLS};
+    size_t of_table = 0, variables = 0;
     for (size_t i = 0; i < list->count; i++) {
         const bst_star_entry *star = &list->stars[i];
+        of_table += star->cell >= BST_STAR_CELLS;
+        variables += star->variable > 0;
+        if (star->variable > 0 || star->record.pm_dec_flags & BST_STAR_PARALLAX_BITS) {
+            l.version = BST_STAR_TIME_VERSION;
+        }
+    }
+    const bool in_time = l.version == BST_STAR_TIME_VERSION;
+    l.patches = sizeof(bst_star_header) + (in_time ? sizeof(bst_star_extension) : 0);
+    l.variables = l.patches + (size_t)head->patch_count * sizeof(bst_star_patch);
+    l.points = l.variables + variables * sizeof(bst_star_variable);
+    l.cell = l.points + (variables > 0 ? list->point_count * sizeof(bst_star_point) : 0);
+    l.records = l.cell + l.cells * sizeof(bst_star_cell);
+    l.sources = l.records + list->count * sizeof(bst_star_record);
+    l.bytes = l.sources + of_table * sizeof(int64_t);
+    return l;
+}
+
+/* Copies records, sources and variables, and counts the stars of each cell. */
+static void copy_stars(const bst_star_list *list, const layout *l, unsigned char *image,
+                       bst_star_cell *cells) {
+    unsigned char *source = image + l->sources, *variable = image + l->variables;
+    for (size_t i = 0; i < list->count; i++) {
+        const bst_star_entry *star = &list->stars[i];
+        bst_star_record r = star->record;
+        r.pm_dec_flags &= ~BST_STAR_VARIABLE;
+        r.pm_dec_flags |= star->variable > 0 ? BST_STAR_VARIABLE : 0;
         cells[star->cell].count++;
-        memcpy(records + i * sizeof(bst_star_record), &star->record, sizeof(bst_star_record));
+        memcpy(image + l->records + i * sizeof r, &r, sizeof r);
         if (star->cell >= BST_STAR_CELLS) {
             memcpy(source, &star->source, sizeof star->source);
             source += sizeof star->source;
         }
+        if (star->variable > 0) {
+            bst_star_variable v = list->variables[star->variable - 1];
+            v.star = (uint32_t)i;
+            memcpy(variable, &v, sizeof v);
+            variable += sizeof v;
+        }
     }
+    if (l->cell > l->points) {
+        memcpy(image + l->points, list->points, l->cell - l->points);
+    }
+}
+
+/* Builds the catalogue file in memory; the caller frees *out. */
+static bst_status build_image(bst_ctx *ctx, const bst_star_list *list, const bst_star_head *head,
+                              unsigned char **out, size_t *out_bytes) {
+    const layout l = lay_out(list, head);
+    unsigned char *image = calloc(1, l.bytes);
+    bst_star_cell *cells = calloc(l.cells, sizeof *cells);
+    if (!image || !cells) {
+        free(image);
+        free(cells);
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a catalogue of %zu bytes", l.bytes);
+    }
+    copy_stars(list, &l, image, cells);
     uint32_t next = 0;
-    for (uint32_t c = 0; c < cell_count; c++) {
+    for (uint32_t c = 0; c < l.cells; c++) {
         cells[c].first = next;
         bound_cell(list->stars + next, &cells[c]);
         next += cells[c].count;
@@ -191,22 +281,28 @@ static bst_status build_image(bst_ctx *ctx, const bst_star_list *list, const bst
     bst_star_header header = {0};
     memcpy(header.magic, BST_STAR_MAGIC, sizeof header.magic);
     header.endian = BST_STAR_ENDIAN;
-    header.version = list->cells ? BST_STAR_TABLE_VERSION : BST_STAR_VERSION;
-    header.file_bytes = bytes;
+    header.version = l.version;
+    header.file_bytes = l.bytes;
     header.star_count = list->count;
-    header.cell_count = cell_count;
+    header.cell_count = l.cells;
     header.patch_count = (uint32_t)head->patch_count;
     header.complete_to_v_mag = head->complete_to_v_mag;
     memcpy(header.source, head->source, sizeof header.source);
     memcpy(image, &header, sizeof header);
-    memcpy(image + sizeof header, head->patches, patch_bytes);
-    memcpy(image + sizeof header + patch_bytes, cells, cell_bytes);
+    if (l.version == BST_STAR_TIME_VERSION) {
+        const bst_star_extension more = {
+            (uint32_t)((l.points - l.variables) / sizeof(bst_star_variable)),
+            (uint32_t)((l.cell - l.points) / sizeof(bst_star_point))};
+        memcpy(image + sizeof header, &more, sizeof more);
+    }
+    memcpy(image + l.patches, head->patches, l.variables - l.patches);
+    memcpy(image + l.cell, cells, l.records - l.cell);
     free(cells);
     size_t skip = offsetof(bst_star_header, checksum) + sizeof header.checksum;
-    header.checksum = bst_star_checksum(image + skip, bytes - skip);
+    header.checksum = bst_star_checksum(image + skip, l.bytes - skip);
     memcpy(image, &header, sizeof header);
     *out = image;
-    *out_bytes = bytes;
+    *out_bytes = l.bytes;
     return BST_OK;
 }
 

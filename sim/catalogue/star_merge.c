@@ -5,8 +5,10 @@
 #include <string.h>
 
 #include "sim/catalogue/bright_stars.h"
+#include "sim/catalogue/star_curves.h"
 #include "sim/catalogue/star_list.h"
 #include "sim/catalogue/stars.h"
+#include "sim/catalogue/variable_stars.h"
 
 enum { ROWS_PER_PROGRESS = 20000, NEIGHBOURS = 64 };
 
@@ -31,7 +33,26 @@ typedef struct merge {
     bst_star_list list;
     size_t base_count; /* first entries of the list, in the order of the base's records */
     same_star *same;   /* of each star of the base */
+    bst_star_curves curves;
+    int64_t curves_used; /* stars */
 } merge;
+
+/* The table's V of a star less its brightest one. */
+static double table_mag(const merge *m, const bst_star_entry *star) {
+    return star->variable > 0 ? (double)m->list.variables[star->variable - 1].table_mag : 0.0;
+}
+
+/* V of a star as its table has it, variable or not. */
+static double table_v(const merge *m, const bst_star_entry *star) {
+    return bst_star_record_v(&star->record) / 1e5 + table_mag(m, star);
+}
+
+/* Sets V of a record; its colour stays. */
+static void set_v(bst_star_record *r, double v_mag) {
+    int colour = (int)(r->pm_ra_colour & 0x3FFFu) - BST_STAR_COLOUR_OFFSET;
+    long vt = lround(1000.0 * v_mag + 0.090 * colour) + BST_STAR_VT_OFFSET;
+    r->tyc_vt = (r->tyc_vt & 0xFFFFu) | (uint32_t)(vt < 0 ? 0 : vt > 0xFFFF ? 0xFFFF : vt) << 16;
+}
 
 /* ---------------------------------------------------------------- the base */
 
@@ -44,6 +65,11 @@ static bst_status take_base(bst_ctx *ctx, merge *m) {
         }
     }
     m->base_count = m->list.count;
+    for (uint32_t i = 0; i < view->variable_count; i++) {
+        const bst_star_variable *v = &view->variables[i];
+        BST_TRY(bst_star_list_add_variable(ctx, &m->list, v, view->points + v->first_point,
+                                           &m->list.stars[v->star].variable));
+    }
     for (size_t i = view->tycho2_count; i < m->base_count; i++) {
         m->list.stars[i].source =
             bst_stars_source(m->base, BST_STAR_TABLE_ID + (uint32_t)(i - view->tycho2_count));
@@ -92,13 +118,16 @@ static bst_status search(bst_ctx *ctx, const merge *m, bst_vec3 at, double year,
                          bool at_rest, candidates *out) {
     bst_star found[NEIGHBOURS];
     int count;
-    BST_TRY(
-        bst_stars_query(ctx, m->base, at, SAME_RAD, v + SAME_MAG, year, found, NEIGHBOURS, &count));
+    /* variable stars are compared by the V of their table, whatever they have in that year */
+    const bool vary = bst_stars_records(m->base)->variable_count > 0;
+    BST_TRY(bst_stars_query(ctx, m->base, at, SAME_RAD, vary ? INFINITY : v + SAME_MAG, year, found,
+                            NEIGHBOURS, &count));
     for (int i = 0; i < count && i < NEIGHBOURS; i++) {
         size_t r = base_record(m, &found[i], year - BST_STAR_EPOCH_YEAR);
         const bst_star_record *base = &m->list.stars[r].record;
         bool rests = (base->pm_ra_colour | base->pm_dec_flags) >> 14 == 0;
-        if (fabs((double)found[i].v_mag - v) <= SAME_MAG && (!at_rest || rests)) {
+        double base_v = vary ? table_v(m, &m->list.stars[r]) : (double)found[i].v_mag;
+        if (fabs(base_v - v) <= SAME_MAG && (!at_rest || rests)) {
             out->record[out->count] = r;
             out->distance_rad[out->count++] = bst_vec3_norm(bst_vec3_sub(found[i].icrs, at));
         }
@@ -109,7 +138,7 @@ static bst_status search(bst_ctx *ctx, const merge *m, bst_vec3 at, double year,
 /* Finds the stars of the base that an entry may be. */
 static bst_status find_candidates(bst_ctx *ctx, const merge *m, const bst_star_entry *star,
                                   candidates *out) {
-    const double v = star->v / 1e5;
+    const double v = table_v(m, star);
     out->count = 0;
     if (v > FAINTEST_TYCHO2 && !bst_stars_records(m->base)->sources) {
         return BST_OK;
@@ -152,6 +181,53 @@ static bst_status match(bst_ctx *ctx, merge *m, size_t entry) {
 
 /* ---------------------------------------------------------------- the table */
 
+/* Adds the variability of a row to the list.
+ *
+ * Returned:  *index  for bst_star_entry.variable; 0: it is not variable */
+static bst_status add_variability(bst_ctx *ctx, merge *m, const bst_star_table_row *row,
+                                  uint32_t *index) {
+    int count = 0;
+    const bst_star_curve_row *curve =
+        row->source != 0 ? bst_star_curves_of(&m->curves, row->source, &count) : NULL;
+    bst_star_variable v = {.period_d = row->period_d, .epoch_jd = row->maximum_jd};
+    *index = 0;
+    if (!curve) {
+        v.amplitude_mag = (float)row->amplitude_mag;
+        v.table_mag = 0.5F * v.amplitude_mag;
+        return row->period_d > 0.0 && row->amplitude_mag > 0.0
+                   ? bst_star_list_add_variable(ctx, &m->list, &v, NULL, index)
+                   : BST_OK;
+    }
+    m->curves_used++;
+    if (!m->curves.by_phase) {
+        v.period_d = 0.0;
+        v.epoch_jd = curve->time;
+    } else if (!(v.period_d > 0.0)) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "source_id %lld has a light curve by phase and no period (allowed: a "
+                        "column %s, or a light curve by time_jd)",
+                        (long long)row->source, "period_d");
+    }
+    double brightest = INFINITY;
+    for (int i = 0; i < count; i++) {
+        brightest = fmin(brightest, curve[i].mag);
+    }
+    bst_star_point *points = malloc((size_t)count * sizeof *points);
+    if (!points) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a light curve");
+    }
+    for (int i = 0; i < count; i++) {
+        double begin = m->curves.by_phase ? 0.0 : v.epoch_jd;
+        points[i] =
+            (bst_star_point){(float)(curve[i].time - begin), (float)(curve[i].mag - brightest)};
+    }
+    v.table_mag = (float)-brightest;
+    v.point_count = (uint32_t)count;
+    bst_status status = bst_star_list_add_variable(ctx, &m->list, &v, points, index);
+    free(points);
+    return status;
+}
+
 /* Adds a row to the list. */
 static bst_status add_row(bst_ctx *ctx, merge *m, const bst_star_table_row *row) {
     bst_star_values v = {.ra_rad = row->ra_deg * BST_DEG_RAD,
@@ -160,15 +236,22 @@ static bst_status add_row(bst_ctx *ctx, merge *m, const bst_star_table_row *row)
                          .pm_dec = (int)lround(10.0 * row->pm_dec_masyr),
                          .has_colour = isfinite(row->b_minus_v)};
     v.colour_mmag = v.has_colour ? (int)lround(1000.0 / 0.850 * row->b_minus_v) : USUAL_COLOUR_MMAG;
-    v.vt_mmag = (int)lround(1000.0 * row->v_mag + 0.090 * v.colour_mmag);
+    uint32_t variable;
+    BST_TRY(add_variability(ctx, m, row, &variable));
+    const bst_star_entry none = {.variable = variable};
+    const double brightest = row->v_mag - table_mag(m, &none);
+    v.vt_mmag = (int)lround(1000.0 * brightest + 0.090 * v.colour_mmag);
     if (row->has_motion) {
         bst_star_move_epoch(&v, BST_STAR_EPOCH_YEAR - row->epoch_year);
     }
     bst_star_record record;
     BST_TRY(bst_star_pack(ctx, &v, &record));
+    bst_star_record_set_parallax(&record, row->parallax_mas);
     BST_TRY(bst_star_list_add(ctx, &m->list, &record, BST_STAR_CELLS));
-    m->list.stars[m->list.count - 1].source = row->source;
-    m->list.stars[m->list.count - 1].rest_year = row->has_motion ? 0.0F : (float)row->epoch_year;
+    bst_star_entry *added = &m->list.stars[m->list.count - 1];
+    added->source = row->source;
+    added->variable = variable;
+    added->rest_year = row->has_motion ? 0.0F : (float)row->epoch_year;
     return BST_OK;
 }
 
@@ -197,39 +280,50 @@ static bst_status read_table(bst_ctx *ctx, merge *m, bst_star_table *table,
     return BST_OK;
 }
 
+/* What the table says of a star of the base, of which *from is the row. */
+static bst_star_entry united(const merge *m, const bst_star_entry *from, const bst_star_entry *to) {
+    bst_star_record r = from->record;
+    const uint32_t identity = to->record.tyc_vt & 0xFFFFu;
+    double v = table_v(m, from);
+    if (table_v(m, to) < BST_BRIGHT_STARS_V) { /* place and magnitudes stay the base's */
+        r = to->record;
+        v = table_v(m, to);
+    } else if (r.pm_dec_flags & BST_STAR_NO_COLOUR) { /* the base's colour, with the table's V */
+        r.pm_ra_colour = (r.pm_ra_colour & ~0x3FFFu) | (to->record.pm_ra_colour & 0x3FFFu);
+        r.pm_dec_flags =
+            (r.pm_dec_flags & ~BST_STAR_NO_COLOUR) | (to->record.pm_dec_flags & BST_STAR_NO_COLOUR);
+    }
+    r.tyc_vt = (r.tyc_vt & 0xFFFF0000u) | identity;
+    if (from->rest_year > 0.0F) { /* place and motion stay the base's */
+        r.ra = to->record.ra;
+        r.dec = to->record.dec;
+        r.pm_ra_colour = (r.pm_ra_colour & 0x3FFFu) | (to->record.pm_ra_colour & ~0x3FFFu);
+        r.pm_dec_flags = (r.pm_dec_flags & 0x3FFFu) | (to->record.pm_dec_flags & ~0x3FFFu);
+    }
+    const bst_star_record *measured =
+        from->record.pm_dec_flags & BST_STAR_PARALLAX_BITS ? &from->record : &to->record;
+    r.pm_dec_flags = (r.pm_dec_flags & ~BST_STAR_PARALLAX_BITS) |
+                     (measured->pm_dec_flags & BST_STAR_PARALLAX_BITS);
+    const int64_t source = from->source != 0 ? from->source : to->source;
+    bst_star_entry out = {r, to->cell, from->variable > 0 ? from->variable : to->variable, 0.0F,
+                          to->cell < BST_STAR_CELLS ? 0 : source};
+    if (fabs(table_v(m, &out) - v) > 1e-9) {
+        set_v(&out.record, v - table_mag(m, &out));
+    }
+    return out;
+}
+
 /* Gives the base's stars what the table says of them, and takes those rows out of the list. */
 static void unite(merge *m, bst_star_merge_counts *counts) {
     bst_star_entry *stars = m->list.stars;
     enum { TAKEN = UINT32_MAX };
     for (size_t i = 0; i < m->base_count; i++) {
-        if (m->same[i].distance_rad == INFINITY) {
-            continue;
+        if (m->same[i].distance_rad < INFINITY) {
+            bst_star_entry *from = &stars[m->same[i].entry];
+            stars[i] = united(m, from, &stars[i]);
+            from->cell = TAKEN;
+            counts->same++;
         }
-        bst_star_entry *from = &stars[m->same[i].entry], *to = &stars[i];
-        from->cell = TAKEN;
-        counts->same++;
-        if (to->v / 1e5 < BST_BRIGHT_STARS_V) {
-            continue;
-        }
-        bst_star_record r = from->record;
-        const uint32_t identity = to->record.tyc_vt & 0xFFFFu;
-        if (r.pm_dec_flags & BST_STAR_NO_COLOUR) { /* the base's colour, with the table's V */
-            const uint32_t colour = to->record.pm_ra_colour & 0x3FFFu;
-            const double vt_mmag = from->v / 100.0 + 0.090 * ((int)colour - BST_STAR_COLOUR_OFFSET);
-            r.pm_ra_colour = (r.pm_ra_colour & ~0x3FFFu) | colour;
-            r.pm_dec_flags = (r.pm_dec_flags & ~0x3FFFu) | (to->record.pm_dec_flags & 0x3FFFu);
-            r.tyc_vt = (uint32_t)(lround(vt_mmag) + BST_STAR_VT_OFFSET) << 16;
-        }
-        r.tyc_vt = (r.tyc_vt & 0xFFFF0000u) | identity;
-        if (from->rest_year > 0.0F) { /* place and motion stay the base's */
-            r.ra = to->record.ra;
-            r.dec = to->record.dec;
-            r.pm_ra_colour = (r.pm_ra_colour & 0x3FFFu) | (to->record.pm_ra_colour & ~0x3FFFu);
-            r.pm_dec_flags = (r.pm_dec_flags & 0x3FFFu) | (to->record.pm_dec_flags & ~0x3FFFu);
-        }
-        const int64_t source = from->source != 0 ? from->source : to->source;
-        *to = (bst_star_entry){r, to->cell, bst_star_record_v(&r), 0.0F,
-                               to->cell < BST_STAR_CELLS ? 0 : source};
     }
     size_t kept = m->base_count;
     for (size_t i = m->base_count; i < m->list.count; i++) {
@@ -238,6 +332,19 @@ static void unite(merge *m, bst_star_merge_counts *counts) {
         }
     }
     m->list.count = kept;
+    for (size_t i = 0; i < kept; i++) {
+        counts->parallaxes += (stars[i].record.pm_dec_flags & BST_STAR_PARALLAX_BITS) != 0;
+        counts->variables += stars[i].variable > 0;
+    }
+}
+
+/* Number of stars with a light curve. */
+static int64_t count_curves(const bst_star_curves *c) {
+    int64_t stars = 0;
+    for (int i = 0; i < c->count; i++) {
+        stars += i == 0 || c->rows[i].source != c->rows[i - 1].source;
+    }
+    return stars;
 }
 
 /* ---------------------------------------------------------------- the catalogue */
@@ -302,6 +409,9 @@ bst_status bst_star_merge(bst_ctx *ctx, const bst_star_merge_request *request,
         }
         counts->base = (int64_t)m.base_count;
     }
+    if (status == BST_OK && request->curves) {
+        status = bst_star_curves_read(ctx, request->curves, &m.curves);
+    }
     if (status == BST_OK) {
         status = read_table(ctx, &m, table, counts);
     }
@@ -309,10 +419,12 @@ bst_status bst_star_merge(bst_ctx *ctx, const bst_star_merge_request *request,
         unite(&m, counts);
         status = write_stars(ctx, &m);
         counts->written = (int64_t)m.list.count;
+        counts->curves_left = count_curves(&m.curves) - m.curves_used;
     }
     bst_star_table_close(table);
     bst_stars_close(m.base);
     free(m.same);
-    free(m.list.stars);
+    bst_star_list_free(&m.list);
+    bst_star_curves_free(&m.curves);
     return status;
 }

@@ -15,6 +15,9 @@ bst_status bst_stars_print_summary(bst_ctx *ctx, const bst_stars *stars, FILE *s
     if (i.table_count > 0) {
         fprintf(stream, "          %lld of them from a table\n", i.table_count);
     }
+    if (i.has_parallax || i.variable_count > 0) {
+        fprintf(stream, "          with parallaxes; %lld are variable\n", i.variable_count);
+    }
     if (i.complete_to_v_mag > BST_STAR_BRIGHTER_THAN_ALL) {
         fprintf(stream, "complete  to V %.1f over the whole sky%s\n", i.complete_to_v_mag,
                 i.complete_to_v_mag == BST_STAR_TYCHO2_COMPLETE_V && i.table_count == 0
@@ -71,6 +74,18 @@ bst_status bst_stars_print_star(bst_ctx *ctx, const bst_stars *stars, uint32_t i
     fprintf(stream, "V         %.3f\n", (double)star.v_mag);
     if (isfinite(star.b_minus_v)) {
         fprintf(stream, "B-V       %.3f\n", (double)star.b_minus_v);
+    }
+    bst_star_change change;
+    bst_stars_change(stars, id, &change);
+    if (change.parallax_mas > 0.0) {
+        fprintf(stream, "parallax  %.1f mas\n", change.parallax_mas);
+    }
+    if (change.varies) {
+        fprintf(stream, "varies    V %.3f to %.3f", change.brightest_v_mag, change.faintest_v_mag);
+        fprintf(stream, change.period_d > 0.0 ? ", period %.7g d, " : ", no period, ",
+                change.period_d);
+        fprintf(stream, "%s at JD %.4f\n", change.points > 0 ? "light curve's zero" : "brightest",
+                change.epoch_jd);
     }
     return BST_OK;
 }

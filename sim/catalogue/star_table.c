@@ -6,8 +6,12 @@
 #include <strings.h>
 #include <unistd.h>
 
+#include "sim/catalogue/star_index.h"
 #include "sim/catalogue/star_table_internal.h"
 #include "sim/core/file.h"
+
+/* zero of the times of Gaia's tables of variable stars, barycentric Julian date */
+static const double GAIA_JD = 2455197.5;
 
 /* ---------------------------------------------------------------- photometry */
 
@@ -47,6 +51,47 @@ static void set_magnitudes(const bst_star_table_options *options, const double *
                                                     : value[BST_STAR_BP_RP];
         from_gaia(value[BST_STAR_G], bp_rp, &row->v_mag, &row->b_minus_v);
     }
+}
+
+/* Checks that a number of the present row is within its range. */
+static bst_status check_range(bst_ctx *ctx, const bst_star_table *t, bst_star_quantity q,
+                              double value, double low, double high) {
+    if (value >= low && value <= high) {
+        return BST_OK;
+    }
+    return bst_fail(ctx, BST_ERR_RANGE, "%s: row %lld: column %s: %.17g is outside %g to %g",
+                    t->path, (long long)t->rows, t->name[q][0] ? t->name[q] : "magnitude", value,
+                    low, high);
+}
+
+/* Sets what of a star changes with place and time, from the values that are known.
+ *
+ * Errors:    BST_ERR_RANGE with row, column and what is allowed */
+static bst_status set_parallax_and_period(bst_ctx *ctx, const bst_star_table *t, const double *v,
+                                          bst_star_table_row *row) {
+    if (!isnan(v[BST_STAR_PARALLAX])) {
+        /* a measured parallax has noise on both sides of 0 */
+        BST_TRY(check_range(ctx, t, BST_STAR_PARALLAX, v[BST_STAR_PARALLAX], -1e3,
+                            BST_STAR_PARALLAX_MAX_MAS));
+        row->parallax_mas = fmax(v[BST_STAR_PARALLAX], 0.0);
+    }
+    if (!isnan(v[BST_STAR_PERIOD])) {
+        BST_TRY(check_range(ctx, t, BST_STAR_PERIOD, v[BST_STAR_PERIOD], 0.0, 1e7));
+        row->period_d = v[BST_STAR_PERIOD];
+    }
+    if (!isnan(v[BST_STAR_AMPLITUDE])) {
+        BST_TRY(check_range(ctx, t, BST_STAR_AMPLITUDE, v[BST_STAR_AMPLITUDE], 0.0, 20.0));
+        row->amplitude_mag = v[BST_STAR_AMPLITUDE];
+    }
+    row->maximum_jd = 2451545.0;
+    if (!isnan(v[BST_STAR_MAXIMUM])) {
+        BST_TRY(check_range(ctx, t, BST_STAR_MAXIMUM, v[BST_STAR_MAXIMUM], 2e6, 3e6));
+        row->maximum_jd = v[BST_STAR_MAXIMUM];
+    } else if (!isnan(v[BST_STAR_MAXIMUM_GAIA])) {
+        BST_TRY(check_range(ctx, t, BST_STAR_MAXIMUM_GAIA, v[BST_STAR_MAXIMUM_GAIA], -4e5, 4e5));
+        row->maximum_jd = GAIA_JD + v[BST_STAR_MAXIMUM_GAIA];
+    }
+    return BST_OK;
 }
 
 /* ---------------------------------------------------------------- opening */
@@ -156,17 +201,6 @@ bst_status bst_star_table_open(bst_ctx *ctx, const char *path,
 
 /* ---------------------------------------------------------------- rows */
 
-/* Checks that a number of the present row is within its range. */
-static bst_status check_range(bst_ctx *ctx, const bst_star_table *t, bst_star_quantity q,
-                              double value, double low, double high) {
-    if (value >= low && value <= high) {
-        return BST_OK;
-    }
-    return bst_fail(ctx, BST_ERR_RANGE, "%s: row %lld: column %s: %.17g is outside %g to %g",
-                    t->path, (long long)t->rows, t->name[q][0] ? t->name[q] : "magnitude", value,
-                    low, high);
-}
-
 bst_status bst_star_table_next(bst_ctx *ctx, bst_star_table *t, bst_star_table_row *row,
                                bool *end) {
     for (;;) {
@@ -199,6 +233,7 @@ bst_status bst_star_table_next(bst_ctx *ctx, bst_star_table *t, bst_star_table_r
             BST_TRY(check_range(ctx, t, BST_STAR_PM_RA, row->pm_ra_cosdec_masyr, -13e3, 13e3));
             BST_TRY(check_range(ctx, t, BST_STAR_PM_DEC, row->pm_dec_masyr, -13e3, 13e3));
         }
+        BST_TRY(set_parallax_and_period(ctx, t, v, row));
         if (!isnan(row->b_minus_v)) {
             row->b_minus_v = fmin(fmax(row->b_minus_v, -1.0), 6.0);
         }

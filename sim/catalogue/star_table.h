@@ -22,6 +22,10 @@ typedef struct bst_star_table_row {
     double pm_ra_cosdec_masyr, pm_dec_masyr; /* 0 where unknown */
     bool has_motion;                         /* false: unknown */
     double v_mag, b_minus_v;                 /* Johnson; b_minus_v NAN: unknown */
+    double parallax_mas;                     /* 0: unknown, or measured below 0 */
+    double period_d;                         /* 0: not periodic, or unknown */
+    double amplitude_mag;                    /* faintest less brightest; 0: unknown */
+    double maximum_jd;                       /* a time of maximum light, or of phase 0 */
 } bst_star_table_row;
 
 typedef struct bst_star_table bst_star_table;

@@ -20,6 +20,11 @@ const char *const bst_star_quantity_names[BST_STAR_QUANTITIES] = {
     [BST_STAR_B_MINUS_V] = "b_minus_v b-v b_v",
     [BST_STAR_B] = "b_mag bmag b",
     [BST_STAR_ELECTRONS] = "electrons_per_s",
+    [BST_STAR_PARALLAX] = "parallax plx parallax_mas",
+    [BST_STAR_PERIOD] = "period_d period pf",
+    [BST_STAR_AMPLITUDE] = "amplitude_mag amplitude peak_to_peak_g",
+    [BST_STAR_MAXIMUM] = "maximum_jd",
+    [BST_STAR_MAXIMUM_GAIA] = "epoch_g", /* less BST_STAR_GAIA_JD */
 };
 
 bool bst_star_name_is(const char *names, const char *name, size_t length) {
@@ -44,6 +49,14 @@ static const char *units_of(bst_star_quantity q) {
         case BST_STAR_PM_RA:
         case BST_STAR_PM_DEC:
             return "mas/yr mas/year mas.yr**-1 mas.yr-1 masyr-1 masyr**-1 mas/a";
+        case BST_STAR_PARALLAX:
+            return "mas";
+        case BST_STAR_PERIOD:
+        case BST_STAR_MAXIMUM:
+        case BST_STAR_MAXIMUM_GAIA:
+            return "d day days";
+        case BST_STAR_AMPLITUDE:
+            return "mag";
         default:
             return "";
     }

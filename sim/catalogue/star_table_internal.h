@@ -24,6 +24,11 @@ typedef enum bst_star_quantity {
     BST_STAR_B_MINUS_V,
     BST_STAR_B,
     BST_STAR_ELECTRONS,
+    BST_STAR_PARALLAX,
+    BST_STAR_PERIOD,
+    BST_STAR_AMPLITUDE,
+    BST_STAR_MAXIMUM,
+    BST_STAR_MAXIMUM_GAIA,
     BST_STAR_QUANTITIES
 } bst_star_quantity;
 

@@ -12,6 +12,7 @@
 #include "boresight/rng.h"
 #include "sim/catalogue/bright_stars.h"
 #include "sim/catalogue/star_index.h"
+#include "sim/catalogue/variable_stars.h"
 #include "sim/core/file.h"
 
 #define MAX_FILE_BYTES ((uint64_t)1 << 33)
@@ -20,8 +21,8 @@
 extern const unsigned char bst_stars_embedded_begin[];
 extern const unsigned char bst_stars_embedded_end[];
 
-/* Cap that contains all cells of a group. Cells with consecutive numbers are neighbours: a query
- * skips most of the sky group by group. */
+/* Cap that contains all cells of a group, or all groups of a region. Cells with consecutive numbers
+ * are neighbours: a query skips most of the sky region by region, then group by group. */
 typedef struct cell_group {
     double centre[3], radius, pm_max_radpyr;
 } cell_group;
@@ -30,8 +31,9 @@ enum { GROUP = 32 };
 
 struct bst_stars {
     bst_star_view view;
-    cell_group *groups; /* one per GROUP cells; shared as the mapping is */
-    void *mapping;      /* NULL: embedded */
+    cell_group *groups;  /* one per GROUP cells; shared as the mapping is */
+    cell_group *regions; /* one per GROUP groups; behind the groups in memory */
+    void *mapping;       /* NULL: embedded */
     size_t mapping_bytes;
     char path[512];
     bool borrowed; /* another catalogue owns the mapping and the groups */
@@ -40,40 +42,58 @@ struct bst_stars {
     bst_rng_key key;
 };
 
-/* Computes centre and radius that enclose each group of star cells. */
+/* Cap around one cell; radius below 0: it has no stars. */
+static cell_group cap_of_cell(const bst_star_cell *cell) {
+    return (cell_group){{cell->centre[0], cell->centre[1], cell->centre[2]},
+                        cell->count > 0 ? (double)cell->radius_rad : -1.0,
+                        cell->pm_max_radpyr};
+}
+
+/* Cap around other caps. */
+static cell_group enclose(const cell_group *caps, uint32_t count) {
+    cell_group out = {.radius = -1.0}; /* no stars */
+    int filled = 0;
+    for (uint32_t c = 0; c < count; c++) {
+        filled += caps[c].radius >= 0.0;
+        for (int k = 0; k < 3 && caps[c].radius >= 0.0; k++) {
+            out.centre[k] += caps[c].centre[k];
+        }
+    }
+    for (int k = 0; k < 3 && filled > 0; k++) {
+        out.centre[k] /= filled;
+    }
+    for (uint32_t c = 0; c < count; c++) {
+        if (caps[c].radius >= 0.0) {
+            double dx = caps[c].centre[0] - out.centre[0], dy = caps[c].centre[1] - out.centre[1],
+                   dz = caps[c].centre[2] - out.centre[2];
+            double away = sqrt(dx * dx + dy * dy + dz * dz);
+            out.radius = fmax(out.radius, away + caps[c].radius + 1e-9);
+            out.pm_max_radpyr = fmax(out.pm_max_radpyr, caps[c].pm_max_radpyr);
+        }
+    }
+    return out;
+}
+
+/* Computes centre and radius that enclose each group of star cells, and each region of groups. */
 static bst_status group_cells(bst_ctx *ctx, bst_stars *s) {
     const uint32_t cells = s->view.header->cell_count;
-    s->groups = calloc(cells / GROUP + 1, sizeof *s->groups);
+    const uint32_t groups = cells / GROUP + 1, regions = groups / GROUP + 1;
+    s->groups = calloc(groups + regions, sizeof *s->groups);
     if (!s->groups) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the star catalogue");
     }
-    for (uint32_t g = 0; g * GROUP < cells; g++) {
-        cell_group *group = &s->groups[g];
-        uint32_t first = g * GROUP, last = first + GROUP;
-        uint32_t end = last < cells ? last : cells;
-        *group = (cell_group){.radius = -1.0}; /* no stars */
-        int filled = 0;
-        for (uint32_t c = first; c < end; c++) {
-            const bst_star_cell *cell = &s->view.cells[c];
-            filled += cell->count > 0;
-            for (int k = 0; k < 3 && cell->count > 0; k++) {
-                group->centre[k] += cell->centre[k];
-            }
+    for (uint32_t g = 0; g < groups; g++) {
+        cell_group caps[GROUP];
+        uint32_t count = 0;
+        for (uint32_t c = g * GROUP; c < cells && count < GROUP; c++) {
+            caps[count++] = cap_of_cell(&s->view.cells[c]);
         }
-        for (int k = 0; k < 3 && filled > 0; k++) {
-            group->centre[k] /= filled;
-        }
-        for (uint32_t c = first; c < end; c++) {
-            const bst_star_cell *cell = &s->view.cells[c];
-            if (cell->count > 0) {
-                double dx = cell->centre[0] - group->centre[0],
-                       dy = cell->centre[1] - group->centre[1],
-                       dz = cell->centre[2] - group->centre[2];
-                double away = sqrt(dx * dx + dy * dy + dz * dz);
-                group->radius = fmax(group->radius, away + cell->radius_rad + 1e-9);
-                group->pm_max_radpyr = fmax(group->pm_max_radpyr, cell->pm_max_radpyr);
-            }
-        }
+        s->groups[g] = enclose(caps, count);
+    }
+    s->regions = s->groups + groups;
+    for (uint32_t r = 0; r < regions; r++) {
+        uint32_t first = r * GROUP, left = groups > first ? groups - first : 0;
+        s->regions[r] = enclose(s->groups + first, left < GROUP ? left : GROUP);
     }
     return BST_OK;
 }
@@ -87,6 +107,9 @@ static uint32_t identity(const bst_star_view *view, uint32_t c, const bst_star_r
 
 /* limit of normal deviates, in sigma: Box-Muller with 53 bits ends at 8.6 */
 #define MOST_SIGMAS 9.0
+
+/* largest parallax that a record holds, at the Earth's largest distance from the barycentre */
+#define MOST_PARALLAX_RAD (1.04e-3 * BST_STAR_PARALLAX_MAX_MAS * BST_ARCSEC_RAD)
 
 /* random draws per star */
 enum { DRAW_DROPPED, DRAW_DISPLACED, DRAW_OFFSET };
@@ -254,6 +277,8 @@ void bst_stars_get_info(const bst_stars *stars, bst_stars_info *out) {
     snprintf(out->path, sizeof out->path, "%s", stars->path);
     out->count = (long long)h->star_count;
     out->table_count = (long long)h->star_count - stars->view.tycho2_count;
+    out->variable_count = stars->view.variable_count;
+    out->has_parallax = stars->view.has_parallax;
     out->complete_to_v_mag = h->complete_to_v_mag;
     out->patches = (int)h->patch_count;
 }
@@ -308,11 +333,15 @@ static radec_box box_around(bst_vec3 centre, double radius_rad) {
     return box;
 }
 
+static const double LIGHT_SPEED_MPS = 299792458.0, DAY_S = 86400.0;
+
 /* largest difference of Tycho-2's V and the published one, mag */
 #define MOST_WRONG_MAG 0.5
 
-/* Unpacks a star. True: its magnitudes are from the table of bright stars. */
-static bool unpack(const bst_star_record *r, uint32_t id, bst_vec3 direction, bst_star *out) {
+/* Unpacks a star. True: its magnitudes are from the table of bright stars, or of the observer's
+ * time. */
+static bool unpack(const bst_star_view *view, const bst_star_record *r, uint32_t id,
+                   bst_vec3 direction, const bst_star_observer *observer, bst_star *out) {
     int colour = (int)(r->pm_ra_colour & 0x3FFFu) - BST_STAR_COLOUR_OFFSET;
     out->icrs = direction;
     out->v_mag = (float)(bst_star_record_v(r) / 1e5);
@@ -320,8 +349,18 @@ static bool unpack(const bst_star_record *r, uint32_t id, bst_vec3 direction, bs
     out->b_minus_v = r->pm_dec_flags & BST_STAR_NO_COLOUR ? NAN : (float)(0.850 * colour / 1000.0);
     out->id = id;
     /* a file may have been imported without the table */
-    return (double)out->v_mag < BST_BRIGHT_STARS_V &&
-           bst_bright_star(out->id, &out->v_mag, &out->b_minus_v);
+    bool published = (double)out->v_mag < BST_BRIGHT_STARS_V &&
+                     bst_bright_star(out->id, &out->v_mag, &out->b_minus_v);
+    const bst_star_variable *v = r->pm_dec_flags & BST_STAR_VARIABLE
+                                     ? bst_star_variable_of(view, (uint32_t)(r - view->records))
+                                     : NULL;
+    if (v) {
+        /* at the barycentre the light has the phase that is seen by the observer */
+        double ahead_s = bst_vec3_dot(observer->barycentre_m, direction) / LIGHT_SPEED_MPS;
+        double mag = bst_star_variable_mag(view, v, observer->jd + ahead_s / DAY_S);
+        out->v_mag += (float)(published ? mag - (double)v->table_mag : mag);
+    }
+    return published || v;
 }
 
 /* Moves the last of count stars to its position by brightness; only stars of the table are out of
@@ -343,28 +382,39 @@ static bool may_reach(const cell_group *group, bst_vec3 centre, double radius_ra
     return group->radius >= 0.0 && bst_vec3_dot(d, d) <= reach * reach;
 }
 
-bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad,
-                           double v_limit, double julian_year, bst_star *out, int capacity,
-                           int *count) {
-    assert(stars && count);
+bst_status bst_stars_query_seen(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre,
+                                double radius_rad, double v_limit, const bst_star_epoch *epoch,
+                                bst_star *out, int capacity, int *count) {
+    assert(stars && epoch && count);
     *count = 0;
-    if (!(radius_rad >= 0.0 && radius_rad <= BST_PI) || isnan(v_limit) || !isfinite(julian_year) ||
-        !(fabs(bst_vec3_norm(centre) - 1.0) < 1e-6) || capacity < 0 || (!out && capacity > 0)) {
+    if (!(radius_rad >= 0.0 && radius_rad <= BST_PI) || isnan(v_limit) ||
+        !isfinite(epoch->julian_year) || !(fabs(bst_vec3_norm(centre) - 1.0) < 1e-6) ||
+        capacity < 0 || (!out && capacity > 0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "star query: radius %g rad (0 to pi), limit V %g, year %g, |centre| %g "
                         "(1), room for %d stars",
-                        radius_rad, v_limit, julian_year, bst_vec3_norm(centre), capacity);
+                        radius_rad, v_limit, epoch->julian_year, bst_vec3_norm(centre), capacity);
     }
-    double years = julian_year - BST_STAR_EPOCH_YEAR;
+    bst_star_observer observer;
+    bst_star_observer_at(&stars->view, epoch, &observer);
+    const double years = observer.years;
     double chord = 2.0 * sin(radius_rad / 2.0);
     /* rounding must not exclude the antipode */
     double chord2 = radius_rad >= BST_PI - 1e-9 ? 5.0 : chord * chord;
-    /* displaced stars may come from outside */
+    /* displaced stars and those with a parallax may come from outside */
     double slack = stars->altered && stars->errors.position_error_fraction > 0.0
                        ? MOST_SIGMAS * stars->errors.position_error_sigma_arcsec * BST_ARCSEC_RAD
                        : 0.0;
+    slack += observer.at_barycentre ? 0.0 : MOST_PARALLAX_RAD;
     int found = 0;
+    radec_box box = {0};
+    double box_drift = -1.0;
     for (uint32_t c = 0; c < stars->view.header->cell_count; c++) {
+        if (c % (GROUP * GROUP) == 0 && !may_reach(&stars->regions[c / (GROUP * GROUP)], centre,
+                                                   radius_rad + slack, fabs(years))) {
+            c += GROUP * GROUP - 1;
+            continue;
+        }
         if (c % GROUP == 0 &&
             !may_reach(&stars->groups[c / GROUP], centre, radius_rad + slack, fabs(years))) {
             c += GROUP - 1;
@@ -379,7 +429,10 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
         if (cell->count == 0 || bst_vec3_dot(d, d) > reach * reach) {
             continue;
         }
-        radec_box box = box_around(centre, radius_rad + drift + slack);
+        if (drift > box_drift) { /* it holds for less motion, too */
+            box = box_around(centre, radius_rad + drift + slack);
+            box_drift = drift;
+        }
         bool out_of_order = false;
         const int first = found;
         const bst_star_record *r = stars->view.records + cell->first;
@@ -392,7 +445,7 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
             if (r->dec < box.dec_min || r->dec > box.dec_max || r->ra - box.ra_min > box.ra_width) {
                 continue;
             }
-            bst_vec3 direction = bst_star_record_direction(r, years);
+            bst_vec3 direction = bst_star_record_seen(r, &observer);
             const uint32_t id = identity(&stars->view, c, r);
             if (stars->altered && !alter(stars, id, &direction)) {
                 continue;
@@ -402,13 +455,13 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
             if (bst_vec3_dot(d, d) > chord2) {
                 continue;
             }
-            bool published = unpack(r, id, direction, &star);
-            if (published ? (double)star.v_mag > v_limit : v_mag > v_limit) {
+            bool reordered = unpack(&stars->view, r, id, direction, &observer, &star);
+            if (reordered ? (double)star.v_mag > v_limit : v_mag > v_limit) {
                 continue;
             }
             if (found < capacity) {
                 out[found] = star;
-                out_of_order = out_of_order || published;
+                out_of_order = out_of_order || reordered;
                 if (out_of_order) {
                     put_in_order(out + first, found - first + 1);
                 }
@@ -418,6 +471,19 @@ bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre
     }
     *count = found;
     return BST_OK;
+}
+
+bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad,
+                           double v_limit, double julian_year, bst_star *out, int capacity,
+                           int *count) {
+    const bst_star_epoch epoch = {.julian_year = julian_year};
+    return bst_stars_query_seen(ctx, stars, centre, radius_rad, v_limit, &epoch, out, capacity,
+                                count);
+}
+
+double bst_stars_year_after(const bst_stars *stars, double julian_year, double seconds) {
+    const bool in_time = stars->view.has_parallax || stars->view.variable_count > 0;
+    return in_time ? julian_year + seconds / (DAY_S * 365.25) : julian_year;
 }
 
 /* Record of a star; NULL: not in the catalogue. */
@@ -440,13 +506,15 @@ static const bst_star_record *find_record(const bst_star_view *view, uint32_t id
     return NULL;
 }
 
-bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, double julian_year,
-                          bst_star *out) {
-    const bst_star_record *r = isfinite(julian_year) ? find_record(&stars->view, id) : NULL;
+bst_status bst_stars_find_seen(bst_ctx *ctx, const bst_stars *stars, uint32_t id,
+                               const bst_star_epoch *epoch, bst_star *out) {
+    const bst_star_record *r = isfinite(epoch->julian_year) ? find_record(&stars->view, id) : NULL;
     if (r) {
-        bst_vec3 direction = bst_star_record_direction(r, julian_year - BST_STAR_EPOCH_YEAR);
+        bst_star_observer observer;
+        bst_star_observer_at(&stars->view, epoch, &observer);
+        bst_vec3 direction = bst_star_record_seen(r, &observer);
         if (!stars->altered || alter(stars, id, &direction)) {
-            (void)unpack(r, id, direction, out);
+            (void)unpack(&stars->view, r, id, direction, &observer, out);
             return BST_OK;
         }
     }
@@ -459,6 +527,12 @@ bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, dou
                     tyc3);
 }
 
+bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, double julian_year,
+                          bst_star *out) {
+    const bst_star_epoch epoch = {.julian_year = julian_year};
+    return bst_stars_find_seen(ctx, stars, id, &epoch, out);
+}
+
 int64_t bst_stars_source(const bst_stars *stars, uint32_t id) {
     const bst_star_view *view = &stars->view;
     int64_t source = 0;
@@ -467,4 +541,26 @@ int64_t bst_stars_source(const bst_stars *stars, uint32_t id) {
                sizeof source);
     }
     return source;
+}
+
+void bst_stars_change(const bst_stars *stars, uint32_t id, bst_star_change *out) {
+    const bst_star_view *view = &stars->view;
+    const bst_star_record *r = find_record(view, id);
+    *out = (bst_star_change){.parallax_mas = r ? bst_star_record_parallax_mas(r) : 0.0};
+    const bst_star_variable *v = r && r->pm_dec_flags & BST_STAR_VARIABLE
+                                     ? bst_star_variable_of(view, (uint32_t)(r - view->records))
+                                     : NULL;
+    if (!v) {
+        return;
+    }
+    double range = v->point_count > 0 ? 0.0 : (double)v->amplitude_mag;
+    for (uint32_t i = 0; i < v->point_count; i++) {
+        range = fmax(range, (double)view->points[v->first_point + i].mag);
+    }
+    out->varies = true;
+    out->brightest_v_mag = bst_star_record_v(r) / 1e5;
+    out->faintest_v_mag = out->brightest_v_mag + range;
+    out->period_d = v->period_d;
+    out->epoch_jd = v->epoch_jd;
+    out->points = (int)v->point_count;
 }

@@ -11,8 +11,8 @@
 
 /* A star in the result of a query. */
 typedef struct bst_star {
-    bst_vec3 icrs;   /* unit vector, ICRS, barycentric, at the query's epoch */
-    float v_mag;     /* Johnson V */
+    bst_vec3 icrs;   /* unit vector, ICRS axes, from the query's observer at its epoch */
+    float v_mag;     /* Johnson V, at the query's epoch */
     float b_minus_v; /* Johnson B-V; NAN: unknown */
     uint32_t id;     /* Tycho-2 identity, see bst_star_id_make; or BST_STAR_TABLE_ID and more */
 } bst_star;
@@ -42,6 +42,8 @@ typedef struct bst_stars_info {
     double complete_to_v_mag; /* of the whole sky */
     int patches;              /* caps with fainter stars, see bst_stars_patch */
     long long table_count;    /* of them, stars of a user's table that Tycho-2 lacks */
+    long long variable_count; /* variable stars */
+    bool has_parallax;        /* stars may have parallaxes */
     bool embedded;
 } bst_stars_info;
 
@@ -73,25 +75,60 @@ double bst_stars_complete_to(const bst_stars *stars, bst_vec3 centre, double rad
  * too small. */
 bst_status bst_stars_default_path(bst_ctx *ctx, char *buffer, size_t bytes) BST_MUST_CHECK;
 
+/* Time of a query, and where the observer is. */
+typedef struct bst_star_epoch {
+    double julian_year; /* TT or TDB, for example 2022.46 */
+    bst_vec3 sun_m; /* observer to the Sun's centre (bst_light.sun_m), ICRS axes; zero: seen from
+                       the solar-system barycentre */
+} bst_star_epoch;
+
 /* Stars within radius_rad (0 to pi) of `centre` (unit, ICRS) that are not fainter than v_limit,
- * with proper motion to julian_year (for example 2022.46). Writes at most `capacity` stars, in the
+ * with proper motion to the epoch, and as seen from the observer's place: with annual parallax,
+ * before light deflection and aberration. Variable stars have the magnitude of the epoch, with the
+ * light time from the barycentre. Writes at most `capacity` stars, in the
  * catalogue's order (by sky cell, brightest first in each, ties by identity), and returns in *count
  * how many there are in all (may exceed capacity: then those written are the first ones met and the
  * caller asks again with more room). `out` may be NULL when capacity is 0. No allocation.
  *
- * Motion is uniform along the great circle's tangent, without radial velocity and parallax: over 35
- * years that is right to 1 mas but for the nearest stars, where the neglected change of perspective
+ * Motion is uniform along the great circle's tangent, without radial velocity: over 35 years
+ * that is right to 1 mas but for the nearest stars, where the neglected change of perspective
  * grows to 0.7 arcsec (Barnard's star; all others under 0.2). Tycho-2 itself has no proper motion
  * for 5 % of its stars, those without a mean position (109,445) and Tycho-1's (13,082): they stay
  * where they were observed about 1991.5, fast ones such as Polaris, 61 Cygni and GJ 887 among them.
  */
+bst_status bst_stars_query_seen(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre,
+                                double radius_rad, double v_limit, const bst_star_epoch *epoch,
+                                bst_star *out, int capacity, int *count) BST_MUST_CHECK;
+
+/* As bst_stars_query_seen, from the barycentre: without parallax and light time. */
 bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad,
                            double v_limit, double julian_year, bst_star *out, int capacity,
                            int *count) BST_MUST_CHECK;
 
 /* Finds a star by identity (the brighter one if two share it); BST_ERR_NOT_FOUND. */
+bst_status bst_stars_find_seen(bst_ctx *ctx, const bst_stars *stars, uint32_t id,
+                               const bst_star_epoch *epoch, bst_star *out) BST_MUST_CHECK;
+
+/* As bst_stars_find_seen, from the barycentre. */
 bst_status bst_stars_find(bst_ctx *ctx, const bst_stars *stars, uint32_t id, double julian_year,
                           bst_star *out) BST_MUST_CHECK;
+
+/* Julian year of queries `seconds` after an epoch: year itself in a catalogue without parallaxes
+ * and variable stars, where proper motion within a run does not count. */
+double bst_stars_year_after(const bst_stars *stars, double julian_year, double seconds);
+
+/* What of a star changes with the observer's place and time. */
+typedef struct bst_star_change {
+    double parallax_mas; /* 0: not known */
+    bool varies;         /* the rest holds only if true */
+    double brightest_v_mag, faintest_v_mag;
+    double period_d; /* 0: a light curve without a period */
+    double epoch_jd; /* of phase 0: brightest, or of the light curve's zero; barycentric (TDB) */
+    int points;      /* of the light curve; 0: a cosine */
+} bst_star_change;
+
+/* Parallax and variability of a star; all zero without, or for an identity that is not there. */
+void bst_stars_change(const bst_stars *stars, uint32_t id, bst_star_change *out);
 
 /* The table's own identity of a star (Gaia's source_id, for example); 0: the star is not of a
  * table, or the table has none. */

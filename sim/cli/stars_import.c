@@ -49,6 +49,14 @@ const bst_option bst_stars_import_options[] = {
      .doc = "table with a column electrons_per_s: V of a star of 1 electron/s",
      .minimum = 0,
      .maximum = 40},
+    {.name = "light-curves",
+     .kind = BST_OPTION_TEXT,
+     .offset = OFFSET(curves),
+     .argument = "FILE",
+     .doc =
+         "table: light curves of its variable stars, CSV with source_id, delta_mag, and phase or "
+         "time_jd",
+     .path = BST_PATH_INPUT},
     {.name = "complete-to",
      .kind = BST_OPTION_REAL,
      .offset = OFFSET(complete_to_v_mag),
@@ -89,10 +97,10 @@ static bst_status is_archive(bst_ctx *ctx, const char *path, bool *yes) {
 static bst_status import_archive(bst_ctx *ctx, const bst_stars_import_request *q,
                                  const char *file) {
     if (q->base || q->cone || !isnan(q->epoch_year) || !isnan(q->zero_point_mag) ||
-        !isnan(q->complete_to_v_mag)) {
+        !isnan(q->complete_to_v_mag) || q->curves) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "%s is no table of stars: --base, --epoch, --zero-point, --complete-to and "
-                        "--cone have no effect",
+                        "%s is no table of stars: --base, --epoch, --zero-point, --light-curves, "
+                        "--complete-to and --cone have no effect",
                         file);
     }
     bst_catalogue_progress line = bst_catalogue_progress_start();
@@ -129,6 +137,7 @@ static bst_status import_table(bst_ctx *ctx, const bst_stars_import_request *q, 
         .base = !q->base                       ? "default"
                 : strcmp(q->base, "none") == 0 ? NULL
                                                : q->base,
+        .curves = q->curves,
         .complete_to_v_mag = q->complete_to_v_mag,
         .has_cone = q->cone != NULL,
         .out = q->out,
@@ -154,6 +163,14 @@ static bst_status import_table(bst_ctx *ctx, const bst_stars_import_request *q, 
         printf("%s: %lld stars: %lld of the base, of which the table has %lld, and %lld more\n",
                q->out, (long long)n.written, (long long)n.base, (long long)n.same,
                (long long)(n.written - n.base));
+        if (n.parallaxes > 0 || n.variables > 0) {
+            printf("%lld have a parallax, %lld are variable\n", (long long)n.parallaxes,
+                   (long long)n.variables);
+        }
+        if (n.curves_left > 0) {
+            printf("%lld stars with a light curve are not in the table\n",
+                   (long long)n.curves_left);
+        }
         if (n.at_rest > 0) {
             printf("%lld rows have no proper motion: their stars stay where they were\n",
                    (long long)n.at_rest);

@@ -8,7 +8,7 @@
 #include "sim/cli/options.h"
 
 typedef struct bst_stars_import_request {
-    const char *out, *subset, *base, *cone;
+    const char *out, *subset, *base, *curves, *cone;
     double epoch_year, zero_point_mag, complete_to_v_mag; /* NAN: not given */
     bool help;
 } bst_stars_import_request;

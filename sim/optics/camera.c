@@ -40,6 +40,13 @@ const bst_config_desc bst_camera_config[] = {
              "four to five times as many."),
     BST_REAL(bst_camera, psf_fwhm_px, "px", 0.3, 50, "2",
              "Full width at half maximum of a Gaussian or Moffat PSF."),
+    BST_OPEN_REAL(
+        bst_camera, zero_point_mag, "mag", 1, 45,
+        "V of a Sun-like star of 1 electron/s, in place of photon_flux_v0_per_s_m2 (with "
+        "the band's preset v) or of throughput (with other bands), which follow from it."),
+    BST_OPEN_REAL(bst_camera, ensquared_energy, "", 1e-4, 0.9999,
+                  "Share of a point's light in the pixel on whose centre it lies, in place of "
+                  "psf_fwhm_px, which follows from it. For a Gaussian or Moffat PSF."),
     BST_REAL(bst_camera, background_mag_arcsec2, "mag/arcsec2", 5, 40, "22",
              "V surface brightness of the sky (zodiacal light and the like), uniform."),
     BST_REAL(bst_camera, dark_current_e_per_s, "e/s", 0, 1e6, "0", "Dark current per pixel."),

@@ -20,17 +20,16 @@ bst_status bst_mesh_add_vertex(bst_ctx *ctx, bst_mesh *mesh, bst_vec3 v) {
         return bst_fail(ctx, BST_ERR_FORMAT,
                         "vertex (%g, %g, %g) (allowed: finite numbers within 1e7)", v.x, v.y, v.z);
     }
+    const int most = 4 * BST_SATELLITE_FACETS_MAX;
+    if (mesh->vertex_count == most) {
+        return bst_fail(ctx, BST_ERR_FORMAT,
+                        "more than %d vertices (allowed: %d); simplify the mesh", most, most);
+    }
     if (mesh->vertex_count == mesh->vertex_capacity) {
         int capacity = mesh->vertex_capacity ? 2 * mesh->vertex_capacity : 256;
-        bst_vec3 *grown = mesh->vertex_count < 4 * BST_SATELLITE_FACETS_MAX
-                              ? realloc(mesh->vertices, (size_t)capacity * sizeof *grown)
-                              : NULL;
+        bst_vec3 *grown = realloc(mesh->vertices, (size_t)capacity * sizeof *grown);
         if (!grown) {
-            return bst_fail(
-                ctx,
-                mesh->vertex_count < 4 * BST_SATELLITE_FACETS_MAX ? BST_ERR_MEMORY : BST_ERR_FORMAT,
-                "more than %d vertices (allowed: %d); simplify the mesh", mesh->vertex_count,
-                4 * BST_SATELLITE_FACETS_MAX);
+            return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d vertices", capacity);
         }
         mesh->vertices = grown;
         mesh->vertex_capacity = capacity;

@@ -74,7 +74,10 @@ static bst_status make_spectrum(const bst_world_builder *b, bst_camera *camera, 
     camera->spectrum = band;
     /* the configuration owns the lists */
     camera->band.response = camera->band.transmission = (bst_config_list){0};
-    return BST_OK;
+    status = bst_camera_resolve_figures(b->ctx, camera);
+    return status == BST_OK ? BST_OK
+                            : bst_fail_prefix(b->ctx, status, "%s: /observers/%d/sensors/%d/camera",
+                                              b->scenario, observer, sensor);
 }
 
 static bst_status make_pst(const bst_world_builder *b, bst_camera *camera, int observer,

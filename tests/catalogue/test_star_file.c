@@ -145,7 +145,7 @@ static void test_other_machine_and_version(void **state) {
     h = original;
     h.version = 7;
     memcpy(f->data, &h, sizeof h);
-    refuse(f, f->bytes, "has format version 7, this program reads 1 and 2");
+    refuse(f, f->bytes, "has format version 7, this program reads 1 to 3");
     memcpy(f->data, &original, sizeof original);
 }
 

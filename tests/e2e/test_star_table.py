@@ -1,6 +1,7 @@
 """A user's table of stars as a catalogue: each kind of file gives the same bytes, stars stand where astropy's proper
 motion puts them, and a run draws, identifies and names them."""
 import gzip
+import json
 import os
 import re
 import unittest
@@ -8,7 +9,7 @@ import warnings
 
 import astropy.units as u
 import numpy as np
-from astropy.coordinates import SkyCoord
+from astropy.coordinates import GCRS, CartesianRepresentation, Distance, SkyCoord, get_body_barycentric
 from astropy.table import MaskedColumn, Table
 from astropy.time import Time
 
@@ -112,6 +113,63 @@ class StarTable(unittest.TestCase):
         self.assertEqual(len(found), alone)
         self.assertTrue(all(2**30 <= row[0] < 2**30 + n for row in found))
         self.assertLess(np.median(np.hypot([row[2] for row in found], [row[3] for row in found])), 0.3)
+
+    def test_variable_stars_and_parallax(self):
+        """A pulsating star and a near one, in rendered frames, in the truth and by the generator."""
+        out = self.path("first")
+        runs.run(STARE[0], out, duration=1)
+        with runs.database(out) as rows:
+            ra, dec = rows.execute("SELECT boresight_ra_deg, boresight_dec_deg FROM exposures LIMIT 1").fetchone()
+        with open(STARE[0], encoding="utf-8") as file:
+            start = Time(json.load(file)["epoch_utc"].rstrip("Z"), scale="utc")
+        # V 7 to 9 in 40 s; two near stars and ten others
+        period_d, epoch_jd = 40 / 86400, float(np.floor(start.tdb.jd))
+        places = [(ra, dec)] + [(ra + 0.2 * np.cos(k), dec + 0.2 * np.sin(k)) for k in range(12)]
+        with open(self.path("vary.csv"), "w", encoding="ascii") as file:
+            file.write("source_id,ra,dec,ref_epoch,pmra,pmdec,v_mag,b_minus_v,parallax,period_d,amplitude_mag,maximum_jd\n")
+            file.write(f"1,{ra:.9f},{dec:.9f},2000,0,0,8,0.6,0,{period_d:.15f},2,{epoch_jd}\n")
+            for k, (x, y) in enumerate(places[1:], 2):
+                file.write(f"{k},{x:.9f},{y:.9f},2000,0,0,{7 + 0.1 * k:.1f},0.6,{600 if k < 4 else ''},,,\n")
+        text = self.load("vary.csv", "vary.stars", "--base", "none")
+        self.assertIn("2 have a parallax, 1 are variable", text)
+        info = runs.call_well("stars", "info", self.path("vary.stars"))
+        self.assertIn("with parallaxes; 1 are variable", info)
+        earth = get_body_barycentric("earth", start, ephemeris="builtin").xyz.to_value(u.m)
+        rate = {}
+        for name, words in (("frames", ()), ("generator", (runs.GENERATOR,))):
+            runs.run(STARE[0], self.path(name), f"/world/star_catalogue={self.path('vary.stars')}", *words, duration=20)
+            with runs.database(self.path(name)) as rows:
+                found = rows.execute(
+                    "SELECT e.mid_s, t.id, t.v_mag, t.ra_deg, t.dec_deg, d.flux_e / t.electrons, e.observer_gcrf_x_m, "
+                    "e.observer_gcrf_y_m, e.observer_gcrf_z_m, d.v_mag FROM truth t JOIN exposures e USING (exposure_id) "
+                    "LEFT JOIN detections d ON d.exposure_id = t.exposure_id AND d.star_id = t.id WHERE t.kind = 'star' "
+                    "ORDER BY 1, 2").fetchall()
+            varied = [row for row in found if 6.9 < row[2] < 9.1 and abs(row[3] - ra) < 1e-6 and abs(row[4] - dec) < 1e-6]
+            self.assertEqual(len(varied), 20)
+            for row in varied:
+                # the light time from the barycentre is minutes, the observer's part of it 0.02 s
+                toward = SkyCoord(ra * u.deg, dec * u.deg).cartesian.xyz.value
+                delay_s = (earth + row[6:9]) @ toward / 299792458.0
+                days = (start.tdb.jd1 - epoch_jd) + start.tdb.jd2 + (row[0] + delay_s) / 86400
+                # tolerance: 7 us of the year, the Earth's motion in 20 s (2 ms of light time), 1 mmag of the file
+                self.assertAlmostEqual(row[2], 8 - np.cos(2 * np.pi * days / period_d), delta=2e-3)
+            self.assertGreater(max(row[2] for row in varied) - min(row[2] for row in varied), 0.8)
+            flux = [row[5] for row in varied if row[5] is not None]
+            self.assertGreater(len(flux), 10)
+            rate[name] = np.mean(flux)
+            # measured light follows the truth's: of V 9 to 10 sigma in a frame
+            self.assertTrue(all(abs(f - rate[name]) < 0.2 for f in flux), flux)
+            for k in (1, 2):
+                far = SkyCoord(places[k][0] * u.deg, places[k][1] * u.deg)
+                frame = GCRS(obstime=start, obsgeoloc=CartesianRepresentation(*found[0][6:9] * u.m))
+                near = SkyCoord(far, distance=Distance(parallax=600 * u.mas))
+                seen = [SkyCoord(row[3] * u.deg, row[4] * u.deg) for row in found if
+                        abs(row[3] - places[k][0]) < 3e-4 and abs(row[4] - places[k][1]) < 3e-4 and row[0] < 1]
+                self.assertEqual(len(seen), 1)
+                shift = near.transform_to(frame).separation(far.transform_to(frame)).mas
+                self.assertGreater(shift, 100)
+                self.assertAlmostEqual(seen[0].separation(far).mas, shift, delta=1.0)
+        self.assertAlmostEqual(rate["frames"], rate["generator"], delta=0.1)
 
     def test_usage(self):
         with open(self.path("bad.csv"), "w", encoding="ascii") as file:

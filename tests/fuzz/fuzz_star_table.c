@@ -12,6 +12,9 @@ static void check_row(const bst_star_table_row *row) {
     if (!(row->ra_deg >= 0.0 && row->ra_deg <= 360.0 && fabs(row->dec_deg) <= 90.0 &&
           fabs(row->v_mag) <= 40.0 && row->epoch_year >= 1800.0 &&
           fabs(row->pm_ra_cosdec_masyr) <= 13e3 && fabs(row->pm_dec_masyr) <= 13e3 &&
+          row->parallax_mas >= 0.0 && row->parallax_mas <= 819.0 && row->period_d >= 0.0 &&
+          row->period_d <= 1e7 && row->amplitude_mag >= 0.0 && row->amplitude_mag <= 20.0 &&
+          row->maximum_jd >= 2e6 && row->maximum_jd <= 3e6 &&
           (isnan(row->b_minus_v) || fabs(row->b_minus_v) <= 6.0))) {
         abort();
     }

@@ -1,15 +1,17 @@
 /* The star catalogue's file. An input of odd length is the file itself. Another input builds one
  * that is whole but for the numbers in it: 8 bytes for the limit of completeness, one for the
  * number of patches, then the patches, then cells (2 bytes for which, 20 for its cap, 1 for its
- * stars) up to one without stars, then the records. What is accepted must answer queries with
- * finite stars. */
+ * stars) up to one without stars, then the records. One whose length is a multiple of 4 has
+ * variable stars too: a byte for their number, one for that of points, then these, behind the
+ * patches. What is accepted must give finite directions and magnitudes. */
 #include <math.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/catalogue/star_index.h"
+#include "sim/catalogue/variable_stars.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes);
 
@@ -27,10 +29,13 @@ static void take(source *s, void *out, size_t bytes) {
     s->left -= n;
 }
 
-static unsigned char *build(source *s, size_t *bytes) {
+static unsigned char *build(source *s, bool in_time, size_t *bytes) {
+    static bst_star_variable variables[256];
+    static bst_star_point points[256];
+    bst_star_extension more = {0, 0};
     bst_star_header h = {.magic = {'B', 'S', 'T', 'S', 'T', 'A', 'R', 'S'},
                          .endian = BST_STAR_ENDIAN,
-                         .version = BST_STAR_VERSION,
+                         .version = in_time ? BST_STAR_TIME_VERSION : BST_STAR_VERSION,
                          .cell_count = BST_STAR_CELLS};
     bst_star_patch patches[BST_STAR_PATCHES_MAX];
     bst_star_cell *cells = calloc(BST_STAR_CELLS, sizeof *cells);
@@ -39,6 +44,13 @@ static unsigned char *build(source *s, size_t *bytes) {
     take(s, &count, 1);
     h.patch_count = count % (BST_STAR_PATCHES_MAX + 1);
     take(s, patches, h.patch_count * sizeof *patches);
+    if (in_time) {
+        uint8_t counts[2];
+        take(s, counts, sizeof counts);
+        more = (bst_star_extension){counts[0], counts[1]};
+        take(s, variables, more.variable_count * sizeof *variables);
+        take(s, points, more.point_count * sizeof *points);
+    }
     do {
         uint16_t which;
         take(s, &which, sizeof which);
@@ -52,13 +64,20 @@ static unsigned char *build(source *s, size_t *bytes) {
         h.star_count += cells[i].count;
     }
     size_t patch_bytes = h.patch_count * sizeof *patches;
+    size_t extension = in_time ? sizeof more : 0;
+    size_t variable_bytes = more.variable_count * sizeof *variables;
+    size_t point_bytes = more.point_count * sizeof *points;
     size_t cell_bytes = BST_STAR_CELLS * sizeof *cells;
     size_t record_bytes = h.star_count * sizeof(bst_star_record);
-    *bytes = sizeof h + patch_bytes + cell_bytes + record_bytes;
-    unsigned char *image = malloc(*bytes);
-    memcpy(image + sizeof h, patches, patch_bytes);
-    memcpy(image + sizeof h + patch_bytes, cells, cell_bytes);
-    take(s, image + sizeof h + patch_bytes + cell_bytes, record_bytes);
+    *bytes = sizeof h + extension + patch_bytes + variable_bytes + point_bytes + cell_bytes +
+             record_bytes;
+    unsigned char *image = malloc(*bytes), *at = image + sizeof h;
+    memcpy(at, &more, extension);
+    memcpy(at += extension, patches, patch_bytes);
+    memcpy(at += patch_bytes, variables, variable_bytes);
+    memcpy(at += variable_bytes, points, point_bytes);
+    memcpy(at += point_bytes, cells, cell_bytes);
+    take(s, at + cell_bytes, record_bytes);
     free(cells);
     h.file_bytes = *bytes;
     memcpy(image, &h, sizeof h);
@@ -76,7 +95,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes) {
         image = malloc(bytes);
         memcpy(image, data, bytes);
     } else {
-        image = build(&s, &image_bytes);
+        image = build(&s, bytes % 4 == 0, &image_bytes);
     }
     bst_ctx ctx;
     bst_star_view view;
@@ -89,6 +108,16 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes) {
         bst_vec3 u = bst_star_record_direction(&view.records[i], 22.5);
         if (!(fabs(bst_vec3_norm(u) - 1.0) < 1e-9)) {
             abort();
+        }
+    }
+    for (uint32_t i = 0; status == BST_OK && i < view.variable_count; i++) {
+        for (int k = -2; k <= 2; k++) {
+            const bst_star_variable *v = &view.variables[i];
+            double mag = bst_star_variable_mag(&view, v, 2459000.0 + 1e3 * k);
+            if (!(mag >= -1e-6 && mag <= 40.0 + 1e-6) ||
+                bst_star_variable_of(&view, v->star) != v) {
+                abort();
+            }
         }
     }
     free(image);

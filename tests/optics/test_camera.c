@@ -3,6 +3,7 @@
 
 #include <string.h>
 
+#include "sim/optics/band.h"
 #include "sim/world/world.h"
 #include "tests/test_support.h"
 
@@ -245,6 +246,94 @@ static void light_falls_off_from_the_boresight(void **state) {
     assert_true(bst_camera_illumination(&c, x0 + 300, y0 + 160) == 0.0);
 }
 
+/* Share of a radial profile's light in a pixel, by rings: a ring of radius r from 0.5 to sqrt(0.5)
+ * px lies outside the square on eight arcs of acos(0.5 / r). `within` is the closed form of the
+ * light in a circle. */
+static double energy_by_rings(double (*within)(double r, double width), double width) {
+    enum { RINGS = 200000 };
+    const double corner = sqrt(0.5);
+    double sum = within(0.5, width);
+    for (int i = 0; i < RINGS; i++) {
+        double r0 = 0.5 + (corner - 0.5) * i / RINGS, r1 = 0.5 + (corner - 0.5) * (i + 1) / RINGS;
+        double inside = 1.0 - 8.0 * acos(fmin(1.0, 1.0 / (r0 + r1))) / (2.0 * BST_PI);
+        sum += inside * (within(r1, width) - within(r0, width));
+    }
+    return sum;
+}
+
+static double gaussian_within(double r, double fwhm_px) {
+    double sigma = fwhm_px / sqrt(8.0 * log(2.0));
+    return 1.0 - exp(-0.5 * r * r / (sigma * sigma));
+}
+
+static double moffat_within(double r, double fwhm_px) {
+    double alpha = 0.5 * fwhm_px / sqrt(exp2(1.0 / 2.5) - 1.0);
+    return 1.0 - pow(1.0 + r * r / (alpha * alpha), 1.0 - 2.5);
+}
+
+static void width_from_ensquared_energy(void **state) {
+    (void)state;
+    static const double energies[] = {0.05, 0.2, 0.5, 0.8};
+    for (int k = 0; k < 8; k++) {
+        bst_ctx ctx = {0};
+        bst_camera c = {.ensquared_energy = energies[k / 2]};
+        c.optics.psf = k % 2 ? BST_PSF_MOFFAT : BST_PSF_GAUSSIAN;
+        c.optics.moffat_beta = 2.5;
+        bst_assert_ok(&ctx, bst_camera_resolve_figures(&ctx, &c));
+        /* tolerance: Simpson's rule, 1e-5, and the rings */
+        bst_assert_close(energy_by_rings(k % 2 ? moffat_within : gaussian_within, c.psf_fwhm_px),
+                         energies[k / 2], 2e-5);
+    }
+    bst_ctx ctx = {0};
+    bst_camera c = {.psf_fwhm_px = 2.5, .ensquared_energy = NAN, .zero_point_mag = NAN};
+    bst_assert_ok(&ctx, bst_camera_resolve_figures(&ctx, &c));
+    bst_assert_close(c.psf_fwhm_px, 2.5, 0.0);
+    c.ensquared_energy = 0.99999;
+    assert_int_equal(bst_camera_resolve_figures(&ctx, &c), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "ensquared_energy 0.99999 (allowed: 0.000"));
+    c.ensquared_energy = 0.3;
+    c.optics.psf = BST_PSF_DIFFRACTION;
+    assert_int_equal(bst_camera_resolve_figures(&ctx, &c), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "neither gaussian nor moffat"));
+}
+
+static void light_from_zero_point(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_camera c = {.aperture_m = 0.15,
+                    .throughput = 0.8,
+                    .quantum_efficiency = 0.7,
+                    .photon_flux_v0_per_s_m2 = 8.8e9,
+                    .zero_point_mag = 22.5};
+    for (int again = 0; again < 2; again++) { /* the resolved scenario is read again */
+        bst_assert_ok(&ctx, bst_camera_resolve_figures(&ctx, &c));
+        bst_assert_close(bst_camera_electrons_per_s(&c, 22.5), 1.0, 1e-13);
+        bst_assert_close(bst_camera_electrons_per_s(&c, 20.0), 10.0, 1e-12);
+        assert_true(c.throughput == 0.8);
+    }
+    /* with a spectrum the throughput follows, and thermal light with it */
+    c.band.preset = BST_BAND_SILICON;
+    double photons = c.photon_flux_v0_per_s_m2;
+    bst_assert_ok(&ctx, bst_camera_resolve_figures(&ctx, &c)); /* it has none yet */
+    assert_true(c.throughput == 0.8 && c.photon_flux_v0_per_s_m2 == photons);
+    bst_band *band;
+    bst_assert_ok(&ctx, bst_band_create(&ctx, &c.band, "", &band));
+    c.spectrum = band;
+    c.zero_point_mag = bst_camera_v_mag(&c, 1.0) - 1.0;
+    bst_assert_ok(&ctx, bst_camera_resolve_figures(&ctx, &c));
+    bst_assert_close(c.throughput, 0.8 * pow(10.0, -0.4), 1e-13);
+    bst_assert_close(bst_camera_electrons_per_s(&c, c.zero_point_mag), 1.0, 1e-13);
+    c.zero_point_mag += 2.0;
+    assert_int_equal(bst_camera_resolve_figures(&ctx, &c), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "needs throughput 2.01"));
+    bst_band_free(band);
+    c.spectrum = NULL;
+    c.band.preset = BST_BAND_V;
+    c.quantum_efficiency = 0.0;
+    assert_int_equal(bst_camera_resolve_figures(&ctx, &c), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "photon_flux_v0_per_s_m2"));
+}
+
 /* The field that is symmetric about the boresight: twice the way to the nearer edge. */
 static void field_about_a_boresight_off_the_centre(void **state) {
     (void)state;
@@ -263,6 +352,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(light_falls_off_from_the_boresight),
         cmocka_unit_test(field_about_a_boresight_off_the_centre),
+        cmocka_unit_test(width_from_ensquared_energy),
+        cmocka_unit_test(light_from_zero_point),
         cmocka_unit_test(scale_from_focal_length_and_pitch),
         cmocka_unit_test(scales_that_contradict),
         cmocka_unit_test(projection_is_gnomonic),

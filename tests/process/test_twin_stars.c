@@ -29,13 +29,13 @@ WRAP(bst_status, bst_stars_open, (bst_ctx * ctx, const char *name, bst_stars **o
     return BST_OK;
 }
 
-WRAP(bst_status, bst_stars_query,
+WRAP(bst_status, bst_stars_query_seen,
      (bst_ctx * ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad, double v_limit,
-      double julian_year, bst_star *out, int capacity, int *count)) {
+      const bst_star_epoch *epoch, bst_star *out, int capacity, int *count)) {
     (void)ctx;
     (void)stars;
     bst_assert_close(v_limit, 30.0, 0.0);
-    bst_assert_close(julian_year, 2024.5, 0.0);
+    bst_assert_close(epoch->julian_year, 2024.5, 0.0);
     script.centre = centre;
     script.radius = radius_rad;
     *count = script.count;

@@ -138,6 +138,32 @@ static void gltf_has_its_transforms_and_materials(void **state) {
     }
 }
 
+/* A mesh of a million vertices is refused at the first one too many, and says how many are
+ * allowed. */
+static void too_many_vertices_are_refused(void **state) {
+    (void)state;
+    enum { VERTICES = 1000000, MOST = 4 * BST_SATELLITE_FACETS_MAX };
+    static const char line[] = "v 0 1 2\n";
+    char path[BST_TEST_PATH], text[700], says[64];
+    char *mesh = malloc(VERTICES * (sizeof line - 1) + 1);
+    bst_ctx ctx = {0};
+    bst_satellite *s;
+    assert_non_null(mesh);
+    for (size_t i = 0; i < VERTICES; i++) {
+        memcpy(mesh + i * (sizeof line - 1), line, sizeof line);
+    }
+    write_file(".obj", mesh, path);
+    snprintf(text, sizeof text,
+             "{\"parts\": [{\"name\": \"m\", \"kind\": \"mesh\", \"file\": \"%s\"}]}", path);
+    assert_int_not_equal(bst_test_satellite(&ctx, text, &s), BST_OK);
+    snprintf(says, sizeof says, "line %d: more than %d vertices (allowed: %d)", MOST + 1, MOST,
+             MOST);
+    assert_non_null(strstr(ctx.message, says));
+    assert_non_null(strstr(ctx.message, path));
+    remove(path);
+    free(mesh);
+}
+
 static void damaged_meshes_are_refused(void **state) {
     (void)state;
     static const char *const wrong[][3] = {
@@ -199,6 +225,7 @@ int main(void) {
         cmocka_unit_test(open_meshes_have_two_sides_and_shadows),
         cmocka_unit_test(gltf_has_its_transforms_and_materials),
         cmocka_unit_test(damaged_meshes_are_refused),
+        cmocka_unit_test(too_many_vertices_are_refused),
         cmocka_unit_test(too_many_facets_are_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -20,7 +20,8 @@ enum {
 /* One source of the true scene. Pixels are full-sensor coordinates; NAN where behind the camera. */
 typedef struct bst_truth_item {
     int32_t kind;  /* bst_source_kind */
-    uint32_t id;   /* star: identity in the catalogue, or statistical (bit 31); object: index in the world */
+    uint32_t id;   /* star: identity in the catalogue, or statistical (bit 31); object: index in the
+                      world */
     int32_t norad; /* object: catalogue number, else 0 */
     uint32_t flags;
     double x_start_px, y_start_px, x_mid_px, y_mid_px, x_end_px, y_end_px;
@@ -30,9 +31,9 @@ typedef struct bst_truth_item {
     double x_chief_px, y_chief_px, x_centroid_px, y_centroid_px;
     double delay_s; /* rolling shutter: delay of the middle of the source's own row exposure, to
                        which these positions refer, relative to the header's ticks; else 0 */
-    double ra_rad, dec_rad; /* ICRS; star: catalogue position at epoch; object: geometric with light
-                               time, mid-exposure */
-    double v_mag;
+    double ra_rad, dec_rad; /* ICRS; star: place at epoch, from the observer (parallax); object:
+                               geometric with light time, mid-exposure */
+    double v_mag;           /* of a variable star: at mid-exposure */
     double electrons;       /* detected in the exposure, whole PSF */
     double snr;             /* sqrt(sum s^2 / sigma^2), sigma without the source's own light */
     double sunlit_fraction; /* object: visible fraction of the Sun's disc, mid-exposure */

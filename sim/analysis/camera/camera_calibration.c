@@ -109,8 +109,9 @@ static bst_status add_star(bst_ctx *ctx, reading *d, const bst_io_rows *r) {
     bst_star star;
     bst_ctx quiet;
     bst_ctx_init(&quiet, NULL, NULL, BST_LOG_ERROR);
-    if (bst_stars_find(&quiet, d->catalogue, (uint32_t)bst_io_rows_int(r, 1), d->julian_year,
-                       &star) != BST_OK) {
+    const bst_star_epoch epoch = {d->julian_year, vector(r, 23)};
+    if (bst_stars_find_seen(&quiet, d->catalogue, (uint32_t)bst_io_rows_int(r, 1), &epoch, &star) !=
+        BST_OK) {
         d->unknown++;
         return BST_OK;
     }

@@ -88,7 +88,8 @@ static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
     for (int i = 0; i < s->observers.count; i++) {
         for (int k = 0; k < observers[i].sensors.count; k++) {
             bst_camera *camera = &((bst_sensor_config *)observers[i].sensors.items)[k].camera;
-            if (bst_camera_resolve_scale(ctx, camera) != BST_OK) {
+            if (bst_camera_resolve_scale(ctx, camera) != BST_OK ||
+                bst_camera_resolve_figures(ctx, camera) != BST_OK) {
                 return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s: /observers/%d/sensors/%d/camera",
                                        s->file, i, k);
             }
