@@ -136,6 +136,19 @@ class Twin(unittest.TestCase):
         self.assertNotIn("V 11", call_well("stars", "info", self.folder + "/twin_stars.bin"))
         self.refuses_to_replace(out)
 
+    def test_short_streaks(self):
+        """The ends of streaks of 3 px seem to be 8 px apart: the PSF blurs them."""
+        folder = os.path.join(self.folder, "short")
+        os.mkdir(folder)
+        path = attitudes(numpy.random.default_rng(6), self.path[SAMPLES // 2], 3.0, self.scale_rad)
+        camera = {"width_px": 128, "height_px": 128, "pixel_scale_arcsec": 120, "aperture_m": 0.04, "psf_fwhm_px": 2.2,
+                  "full_well_e": 1e6, "gain_e_per_dn": 4}
+        runs.run(write_scenario(folder, path, camera, "embedded"), folder + "/run")
+        call_well("twin", folder + "/run", *self.words[2:], "--out", folder + "/twin.json", timeout=600)
+        self.assertLess(path_error_px(folder, "twin", path, self.scale_rad), 0.05)
+        # standard deviation 0.011
+        self.assertAlmostEqual(self.report("short/twin")["figures"]["chi2_per_pixel_by_header_noise"], 1.0, delta=0.04)
+
     def refuses_to_replace(self, out):
         os.remove(out)
         again = call(*self.words, "--out", out)
