@@ -12,7 +12,10 @@ static const char help_text[] =
     "colour term, each with\n"
     "its uncertainty. Each frame's attitude is free. FOLDER/camera.json has a scenario's camera "
     "keys; report.json,\n"
-    "stars.csv and plot.png say how good it is.\n"
+    "stars.csv and plot.png say how good it is. With --psf-columns and --psf-rows FOLDER/psf.fits "
+    "is "
+    "the PSF, measured on\n"
+    "the stars.\n"
     "\n"
     "  boresight process night/*.fits --map neossat --out runs/real\n"
     "  boresight calibrate-camera runs/real/run --extends my_camera.json --out runs/camera\n"
@@ -22,7 +25,7 @@ static const char help_text[] =
     "options:\n";
 
 int bst_cmd_calibrate_camera(int argc, char **argv) {
-    bst_camera_calibration_request q = {0};
+    bst_camera_calibration_request q = BST_CAMERA_CALIBRATION_DEFAULTS;
     bst_option options[BST_OPTIONS_MAX];
     bst_options_bind(bst_camera_calibration_options, &q, options);
     bst_ctx ctx;

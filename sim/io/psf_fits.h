@@ -1,5 +1,4 @@
-/* Reads point spread functions from FITS images: a width for onboard knowledge, samples for
- * rendering. */
+/* Point spread functions in FITS images: a width for onboard knowledge, samples for rendering. */
 #ifndef BST_IO_PSF_FITS_H
 #define BST_IO_PSF_FITS_H
 
@@ -36,5 +35,12 @@ bst_status bst_psf_fits_read(bst_ctx *ctx, const char *path, double oversampling
  * bst_fits_read_image. */
 bst_status bst_psf_fits_samples(bst_ctx *ctx, const char *path, double oversampling,
                                 bst_psf_samples *out) BST_MUST_CHECK;
+
+/* Writes PSF samples as bst_psf_fits_samples reads them: an image, or a cube of several planes,
+ * with the keyword OVERSAMP. The file appears complete or not at all.
+ *
+ * Errors:    BST_ERR_IO with path and reason */
+bst_status bst_psf_fits_write(bst_ctx *ctx, const char *path,
+                              const bst_psf_samples *psf) BST_MUST_CHECK;
 
 #endif

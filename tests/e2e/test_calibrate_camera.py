@@ -5,6 +5,7 @@ import os
 import unittest
 
 import numpy as np
+from astropy.io import fits
 
 import runs
 
@@ -18,8 +19,10 @@ class Camera(unittest.TestCase):
         run, made = os.path.join(out, "run"), os.path.join(out, "camera")
         words = [f"{SENSOR}/{'' if key.startswith('pixel') else 'distortion/'}{key}={value}" for key, value in TRUE.items()]
         runs.run(runs.STARE, run, *words, duration=15)
-        said = runs.call_well("calibrate-camera", run, "--out", made, "--extends", runs.STARE)
+        said = runs.call_well("calibrate-camera", run, "--out", made, "--extends", runs.STARE, "--psf-rows", "1",
+                              "--psf-radius", "8")
         self.assertIn("zero point", said)
+        self.assertIn("PSF              1 x 1 nodes", said)
         with open(os.path.join(made, "report.json"), encoding="utf-8") as file:
             report = json.load(file)
         for key, value in TRUE.items():
@@ -28,6 +31,15 @@ class Camera(unittest.TestCase):
         self.assertLess(report["geometry"]["corner_sigma_px"], 0.1)
         # the frames are smeared a little, which the width contains
         self.assertAlmostEqual(report["psf"]["fwhm_px"]["value"], 2.02, delta=0.05)
+        # a Gaussian of 2 px, jitter and smear; the light beyond 5 px is 1e-8, what the noise makes of it 1 %
+        psf = report["psf_file"]["nodes"][0]
+        for key in ("xx_px2", "yy_px2"):
+            self.assertAlmostEqual(psf[key]["value"], (2.02 / 2.3548)**2, delta=0.04)
+        self.assertAlmostEqual(psf["encircled_1_px"]["value"], 1 - np.exp(-0.5 / (2.02 / 2.3548)**2), delta=0.015)
+        with fits.open(made + "/psf.fits") as file, fits.open(made + "/psf_sigma.fits") as errors:
+            self.assertEqual((file[0].data.shape, file[0].header["OVERSAMP"], errors[0].data.shape), ((65, 65), 4, (65, 65)))
+            self.assertAlmostEqual(file[0].data.sum(), 1, delta=1e-5)
+            self.assertGreater(errors[0].data.min(), 0)
         # electrons/s of V 0: flux of the band, aperture, optics and detector; the same for all colours
         light = report["photometry"]
         scene = json.loads(runs.call("check", runs.STARE).stdout)["observers"][0]["sensors"][0]["camera"]
@@ -46,6 +58,8 @@ class Camera(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         camera = json.loads(result.stdout)["observers"][0]["sensors"][0]["camera"]
         self.assertEqual(camera["pixel_scale_arcsec"], report["geometry"]["pixel_scale_arcsec"]["value"])
+        self.assertEqual([camera["optics"][key] for key in ("psf", "file_centre", "field_rows")], ["file", "array", 1])
+        self.assertTrue(os.path.samefile(camera["optics"]["psf_file"], made + "/psf.fits"))
         self.assertEqual(camera["distortion"]["k2"], report["geometry"]["k2"]["value"])
         for width in report["psf"]["fwhm_px_by_ninth"]:
             self.assertAlmostEqual(width, 2.02, delta=0.1)

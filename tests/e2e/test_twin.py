@@ -136,6 +136,19 @@ class Twin(unittest.TestCase):
         self.assertNotIn("V 11", call_well("stars", "info", self.folder + "/twin_stars.bin"))
         self.refuses_to_replace(out)
 
+    def test_short_streaks(self):
+        """The ends of streaks of 3 px seem to be 8 px apart: the PSF blurs them."""
+        folder = os.path.join(self.folder, "short")
+        os.mkdir(folder)
+        path = attitudes(numpy.random.default_rng(6), self.path[SAMPLES // 2], 3.0, self.scale_rad)
+        camera = {"width_px": 128, "height_px": 128, "pixel_scale_arcsec": 120, "aperture_m": 0.04, "psf_fwhm_px": 2.2,
+                  "full_well_e": 1e6, "gain_e_per_dn": 4}
+        runs.run(write_scenario(folder, path, camera, "embedded"), folder + "/run")
+        call_well("twin", folder + "/run", *self.words[2:], "--out", folder + "/twin.json", timeout=600)
+        self.assertLess(path_error_px(folder, "twin", path, self.scale_rad), 0.05)
+        # standard deviation 0.011
+        self.assertAlmostEqual(self.report("short/twin")["figures"]["chi2_per_pixel_by_header_noise"], 1.0, delta=0.04)
+
     def refuses_to_replace(self, out):
         os.remove(out)
         again = call(*self.words, "--out", out)
@@ -163,13 +176,33 @@ class Twin(unittest.TestCase):
                     off.append((star["flux_e"] - truth[away.argmin(), 2]) / star["flux_sigma_e"])
         return numpy.mean(off)
 
+    def middle_limit_px(self, name):
+        """Standard deviation of the time's middle along a path of length L by the noise of the light.
+
+        Light that falls linearly by a share d from one end to the other moves the middle of the time by d L / 8. Stars of
+        signal-to-noise ratios s tell d with a standard deviation of sqrt(12) / sqrt(sum s^2), as uniform light has a
+        standard deviation of L / sqrt(12): L sqrt(3) / (4 sqrt(sum s^2)).
+        """
+        report = self.report(name)
+        snr2 = sum((s["flux_e"] / s["flux_sigma_e"])**2 for s in report["stars"] if s["flux_sigma_e"])
+        return report["fit"]["path_length_px"] * numpy.sqrt(3) / 4 / numpy.sqrt(snr2)
+
+    def sees_stars(self, run, path):
+        """True if the Earth, its air (100 km) and 2 degrees about it are beside the field of 1.67 degrees."""
+        with fits.open(run + "/frames.fits") as file:
+            place = numpy.array([file[1].header["OBSPOS" + axis] for axis in "XYZ"])
+        x, y, z, w = path.mean(0) / numpy.linalg.norm(path.mean(0))
+        ahead = numpy.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+        away = numpy.linalg.norm(place)
+        return numpy.degrees(numpy.arccos(-ahead @ place / away) - numpy.arcsin(6478e3 / away)) > 1.18 + 2
+
     @unittest.skipUnless(FULL, "only with --full")
     def test_random_frames(self):
-        """50 frames with hidden paths, in directions that the Earth does not hide."""
+        """50 frames with hidden paths; directions near the Earth are drawn again, whatever the twin makes of them."""
         runs.need_full_catalogue()
-        errors, chi2, bias, unsolved = [], [], [], 0
+        errors, limits, chi2, bias, beside_earth = [], [], [], [], 0
         for seed in range(200):
-            if len(errors) + unsolved == 50:
+            if len(errors) == 50:
                 break
             rng = numpy.random.default_rng(seed)
             folder = os.path.join(self.folder, str(seed))
@@ -180,28 +213,25 @@ class Twin(unittest.TestCase):
             camera = {"width_px": 300, "height_px": 300, "pixel_scale_arcsec": 20, "aperture_m": 0.12,
                       "psf_fwhm_px": rng.uniform(1.8, 2.6), "full_well_e": 1e6, "gain_e_per_dn": 4}
             call_well("run", write_scenario(folder, path, camera, "default"), "--quiet", "--out", folder + "/run", timeout=600)
+            if not self.sees_stars(folder + "/run", path):
+                beside_earth += 1
+                continue
             found = call("twin", folder + "/run", "--map", "boresight", "--v-limit", "10.5", "--quiet",
                          "--out", folder + "/twin.json", timeout=1800)
-            if "give no attitude (0 detections" in found.stderr:  # the Earth is in front
-                continue
-            if "give no attitude" in found.stderr:  # of the solver, which has tests of its own
-                print(f"{seed}: no attitude")
-                unsolved += 1
-                continue
-            self.assertEqual(found.returncode, 0)
-            if not self.report(f"{seed}/twin")["streaks_fit"]:  # an attitude that is none, and the twin says so
-                print(f"{seed}: the streaks are not those of the frame")
-                unsolved += 1
-                continue
-            self.assertEqual(found.stderr, "")
+            self.assertEqual((found.returncode, found.stderr), (0, ""), seed)
+            self.assertTrue(self.report(f"{seed}/twin")["streaks_fit"], seed)
             bias.append(self.light_off(f"{seed}/twin", folder + "/run"))
             errors.append(path_error_px(folder, "twin", path, scale_rad))
             chi2.append(self.report(f"{seed}/twin")["figures"]["chi2_per_pixel_by_header_noise"])
-            print(f"{seed}: path {errors[-1]:.4f} px, chi2 {chi2[-1]:.4f}, light {bias[-1]:+.2f}", flush=True)
-        self.assertLessEqual(unsolved, 12)
+            limits.append(self.middle_limit_px(f"{seed}/twin"))
+            print(f"{seed}: path {errors[-1]:.4f} px ({errors[-1] / limits[-1]:.1f} of its limit), chi2 {chi2[-1]:.4f}, "
+                  f"light {bias[-1]:+.2f}", flush=True)
+        print(f"{beside_earth} directions near the Earth were drawn again")
         print(f"path: median {numpy.median(errors):.4f}, largest {max(errors):.4f} px; chi2 {min(chi2):.4f} to {max(chi2):.4f}")
         print(f"light of the stars off by {numpy.mean(bias):+.3f} standard deviations")
         self.assertLess(numpy.median(errors), 0.03)
+        # what the noise of the light allows, where that is more; other errors of the path add to it
+        self.assertTrue((numpy.array(errors) < numpy.maximum(0.03, 3 * numpy.array(limits))).all())
         self.assertLess(abs(numpy.mean(bias)), 0.1)
         self.assertLess(numpy.abs(numpy.array(chi2) - 1).max(), 0.02)
 

@@ -139,13 +139,10 @@ static void stars_of_the_catalogue(void **state) {
     double least = 2.0 * 5.0 * sqrt(area), faint = 18.0 - 2.5 * log10(least / 4.0);
     const struct {
         double x, y, v;
-    } given[] = {{20.0, 15.0, 9.0},
-                 {43.0, 20.0, 8.0},
-                 {30.0, -9.0, 7.0},
-                 {10.0, 36.5, faint - 0.02},
-                 {25.0, 25.0, faint + 0.02}};
-    script.count = 5;
-    for (int i = 0; i < 5; i++) {
+    } given[] = {{20.0, 15.0, 9.0},          {43.0, 20.0, 8.0},          {30.0, -9.0, 7.0},
+                 {10.0, 36.5, faint - 0.02}, {25.0, 25.0, faint + 0.02}, {22.0, -6.5, 6.9}};
+    script.count = 6;
+    for (int i = 0; i < 6; i++) {
         script.stars[i] = (bst_star){.icrs = direction_of(&t, given[i].x, given[i].y),
                                      .v_mag = (float)given[i].v,
                                      .b_minus_v = 0.4F,
@@ -159,11 +156,12 @@ static void stars_of_the_catalogue(void **state) {
         bst_camera_half_diagonal_rad(&t.model.camera) + 1e-3 + (t.length_px + 20.0) * scale, 1e-9);
     bst_vec3 ahead = bst_quat_rotate(bst_quat_conj(frame.q_middle), (bst_vec3){0, 0, 1});
     bst_assert_close(bst_vec3_norm(bst_vec3_sub(script.centre, ahead)), 0.0, 1e-12);
-    /* the brighter first; one is outside, one too faint */
-    assert_int_equal(t.model.count, 3);
-    assert_int_equal(t.catalogue_stars, 3);
-    static const int order[] = {1, 0, 3};
-    for (int i = 0; i < 3; i++) {
+    /* the brighter first, of which the first ends beside the frame; one is outside, one too faint
+     */
+    assert_int_equal(t.model.count, 4);
+    assert_int_equal(t.catalogue_stars, 4);
+    static const int order[] = {5, 1, 0, 3};
+    for (int i = 0; i < 4; i++) {
         const bst_twin_star *s = &t.model.stars[i];
         double x, y, e = 4.0 * pow(10.0, 0.4 * (18.0 - (double)(float)given[order[i]].v));
         assert_int_equal(s->id, order[i] + 10);
@@ -173,7 +171,8 @@ static void stars_of_the_catalogue(void **state) {
         bst_assert_close(s->inside, mean_of(&t, s->apparent, &x, &y), 6e-3);
         assert_false(s->found);
     }
-    assert_true(t.model.stars[0].inside < 0.9); /* at the edge */
+    assert_true(t.model.stars[0].inside == 0.0);
+    assert_true(t.model.stars[1].inside < 0.9); /* at the edge */
 }
 
 static void stars_of_the_residual(void **state) {

@@ -4,6 +4,7 @@
 #include <stddef.h>
 #include <stdlib.h>
 
+#include "sim/analysis/camera/camera_psf.h"
 #include "sim/analysis/camera/point_width.h"
 #include "sim/catalogue/stars.h"
 #include "sim/cli/outputs.h"
@@ -37,6 +38,27 @@ const bst_option bst_camera_calibration_options[] = {
      .offset = offsetof(Q, camera),
      .argument = "POINTER",
      .doc = "place of the camera in that scenario (default: as in the run's)"},
+    {.name = "psf-columns",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(Q, psf_columns),
+     .argument = "N",
+     .doc = "measure the PSF at so many places along x, from the first to the last column",
+     .minimum = 1,
+     .maximum = BST_EFFECTIVE_PSF_NODES},
+    {.name = "psf-rows",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(Q, psf_rows),
+     .argument = "N",
+     .doc = "the same along y",
+     .minimum = 1,
+     .maximum = BST_EFFECTIVE_PSF_NODES},
+    {.name = "psf-radius",
+     .kind = BST_OPTION_INT,
+     .offset = offsetof(Q, psf_radius_px),
+     .argument = "PX",
+     .doc = "reach of the PSF's wings (default 12)",
+     .minimum = 6,
+     .maximum = 64},
     {.name = "overwrite",
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(Q, overwrite),
@@ -313,6 +335,11 @@ static void print_figures(FILE *out, const bst_camera_figures *f) {
         fprintf(out, "FWHM             %.3f +- %.3f px, Gaussian, %d stars\n", f->widths.fwhm_px,
                 f->widths.fwhm_sigma_px, f->widths.stars);
     }
+    if (f->psf.value) {
+        fprintf(out,
+                "PSF              %d x %d nodes, %d stars, chi2 %.3f per pixel of their cores\n",
+                f->psf.options.columns, f->psf.options.rows, f->psf.stars, f->psf.chi_squared);
+    }
     if (f->photometry.stars > 0) {
         const bst_camera_photometry_fit *p = &f->photometry;
         fprintf(out, "zero point       V %.4f +- %.4f gives 1 electron/s\n", p->zero_point_mag,
@@ -324,27 +351,66 @@ static void print_figures(FILE *out, const bst_camera_figures *f) {
     }
 }
 
+/* Measures the PSF if it is asked for. One number of nodes alone: the other is 1. */
+static bst_status measure_psf(bst_ctx *ctx, const bst_camera_calibration_request *q,
+                              const reading *d, bst_effective_psf *out) {
+    if (q->psf_columns == 0 && q->psf_rows == 0) {
+        return BST_OK;
+    }
+    if (!d->sensor.file[0]) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "the run has no frames to measure a PSF on: leave --psf-columns and "
+                        "--psf-rows out, or record frames");
+    }
+    const bst_effective_psf_options options = {.columns = q->psf_columns ? (int)q->psf_columns : 1,
+                                               .rows = q->psf_rows ? (int)q->psf_rows : 1,
+                                               .half_px = (int)q->psf_radius_px};
+    char path[4096];
+    BST_TRY(bst_run_reader_file(ctx, d->run, d->sensor.file, path, sizeof path));
+    const bst_camera_psf_stars stars = {.frames = path,
+                                        .camera = &d->camera,
+                                        .stars = d->stars,
+                                        .fits_index = d->fits_index,
+                                        .window = d->window,
+                                        .count = d->count};
+    return bst_camera_psf_fit(ctx, &stars, &options, out);
+}
+
+/* Fits all. */
+static bst_status fit_all(bst_ctx *ctx, const bst_camera_calibration_request *q, reading *d,
+                          bst_camera_figures *f) {
+    BST_TRY(bst_camera_fit_geometry(ctx, &d->camera, d->stars, d->count, d->frames, &f->geometry));
+    bst_ctx quiet;
+    bst_ctx_init(&quiet, NULL, NULL, BST_LOG_ERROR);
+    if (bst_camera_fit_photometry(&quiet, d->stars, d->count, &f->photometry) != BST_OK) {
+        bst_log(ctx, BST_LOG_WARNING, "no zero point: %s", quiet.message);
+        f->photometry.stars = 0;
+    }
+    if (d->sensor.file[0]) {
+        BST_TRY(measure_widths(ctx, d, &f->widths));
+    }
+    return measure_psf(ctx, q, d, &f->psf);
+}
+
 /* Fits all, prints and writes it. */
 static bst_status calibrate(bst_ctx *ctx, const bst_camera_calibration_request *q, reading *d,
                             FILE *out) {
-    bst_camera_figures f = {0};
-    BST_TRY(bst_camera_fit_geometry(ctx, &d->camera, d->stars, d->count, d->frames, &f.geometry));
-    bst_ctx quiet;
-    bst_ctx_init(&quiet, NULL, NULL, BST_LOG_ERROR);
-    if (bst_camera_fit_photometry(&quiet, d->stars, d->count, &f.photometry) != BST_OK) {
-        bst_log(ctx, BST_LOG_WARNING, "no zero point: %s", quiet.message);
-        f.photometry.stars = 0;
+    bst_camera_figures f = {.psf = {.value = NULL}};
+    bst_status status = fit_all(ctx, q, d, &f);
+    if (status == BST_OK) {
+        status = bst_folder_make(ctx, q->out);
     }
-    if (d->sensor.file[0]) {
-        BST_TRY(measure_widths(ctx, d, &f.widths));
+    if (status == BST_OK) {
+        bst_camera_calibration_request where = *q;
+        where.camera = q->camera ? q->camera : d->pointer;
+        status = bst_camera_calibration_write(ctx, &where, &d->camera, &f, d->stars, d->exposures,
+                                              d->count);
     }
-    BST_TRY(bst_folder_make(ctx, q->out));
-    bst_camera_calibration_request where = *q;
-    where.camera = q->camera ? q->camera : d->pointer;
-    BST_TRY(bst_camera_calibration_write(ctx, &where, &d->camera, &f, d->stars, d->exposures,
-                                         d->count));
-    print_figures(out, &f);
-    return BST_OK;
+    if (status == BST_OK) {
+        print_figures(out, &f);
+    }
+    bst_effective_psf_free(&f.psf);
+    return status;
 }
 
 /* Checks that --camera can be a camera's place. */

@@ -5,19 +5,26 @@
 #include <stdio.h>
 
 #include "sim/analysis/camera/camera_fit.h"
+#include "sim/analysis/camera/effective_psf.h"
 #include "sim/cli/options.h"
 
 typedef struct bst_camera_calibration_request {
     const char *out, *extends, *camera, *sensor; /* camera NULL: the place that the run has */
+    int64_t psf_columns, psf_rows;               /* nodes of the PSF over the field; 0: none */
+    int64_t psf_radius_px;
     bool overwrite, help;
 } bst_camera_calibration_request;
+
+/* Request without any option given. */
+#define BST_CAMERA_CALIBRATION_DEFAULTS \
+    { .psf_radius_px = 12 }
 
 /* Table of the options, with offsets in a request. */
 extern const bst_option bst_camera_calibration_options[];
 
 /* Fits the camera to the detections of a run that are identified stars and to its frames, prints
- * the figures and writes the folder request->out: camera.json, report.json, stars.csv, plot.png
- * (docs/how-to/real_frames.md).
+ * the figures and writes the folder request->out: camera.json, report.json, stars.csv, plot.png,
+ * and the PSF if it is asked for (docs/how-to/real_frames.md).
  *
  * Errors:    BST_ERR_RANGE: too few stars; those of the run and of the outputs */
 bst_status bst_camera_calibration_run(bst_ctx *ctx, const bst_camera_calibration_request *request,
@@ -33,6 +40,7 @@ typedef struct bst_camera_figures {
     bst_camera_geometry_fit geometry;
     bst_camera_photometry_fit photometry; /* stars 0: none */
     bst_camera_widths widths;
+    bst_effective_psf psf; /* value NULL: none */
 } bst_camera_figures;
 
 /* Writes the files of the folder.

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 
 #include "sim/analysis/camera/camera_calibration.h"
+#include "sim/analysis/camera/camera_psf.h"
 #include "sim/cli/print_json.h"
 #include "sim/core/json_number.h"
 #include "sim/io/draft_file.h"
@@ -28,6 +29,22 @@ static void set_camera(const writer *w, cJSON *set, const char *key, double valu
     bst_json_add_number(set, pointer, value);
 }
 
+static void set_text(const writer *w, cJSON *set, const char *key, const char *value) {
+    char pointer[512];
+    snprintf(pointer, sizeof pointer, "%.400s/%s", w->request->camera, key);
+    cJSON_AddStringToObject(set, pointer, value);
+}
+
+/* The PSF of the file; its middle is that of the light within 3 px. */
+static void set_psf(const writer *w, cJSON *set) {
+    const bst_effective_psf_options *o = &w->figures->psf.options;
+    set_text(w, set, "optics/psf", "file");
+    set_text(w, set, "optics/psf_file", "psf.fits");
+    set_text(w, set, "optics/file_centre", "array");
+    set_camera(w, set, "optics/field_columns", o->columns);
+    set_camera(w, set, "optics/field_rows", o->rows);
+}
+
 /* The scenario that changes a camera; NULL: out of memory. */
 static cJSON *camera_json(const writer *w) {
     const bst_camera_geometry_fit *g = &w->figures->geometry;
@@ -46,6 +63,9 @@ static cJSON *camera_json(const writer *w) {
     set_camera(w, set, "distortion/k2", d->k2);
     set_camera(w, set, "distortion/p1", d->p1);
     set_camera(w, set, "distortion/p2", d->p2);
+    if (w->figures->psf.value) {
+        set_psf(w, set);
+    }
     return root;
 }
 
@@ -182,6 +202,14 @@ bst_status bst_camera_calibration_write(bst_ctx *ctx, const bst_camera_calibrati
     const writer w = {request, start, figures, stars, exposures, count};
     BST_TRY(write_stars(ctx, &w));
     BST_TRY(plot(ctx, &w));
-    BST_TRY(write_json(ctx, &w, "report.json", report_json(&w)));
+    cJSON *report = report_json(&w);
+    if (figures->psf.value) {
+        bst_status status = bst_camera_psf_write(ctx, request->out, &figures->psf, report);
+        if (status != BST_OK) {
+            cJSON_Delete(report);
+            return status;
+        }
+    }
+    BST_TRY(write_json(ctx, &w, "report.json", report));
     return write_json(ctx, &w, "camera.json", camera_json(&w));
 }

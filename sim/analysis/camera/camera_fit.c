@@ -7,7 +7,14 @@
 
 #include "sim/core/symmetric.h"
 
-enum { SIZE = BST_CAMERA_FIT_SIZE, ALL = SIZE + 3, ITERATIONS = 8, ROUNDS = 4, LEAST_STARS = 4 };
+enum {
+    SIZE = BST_CAMERA_FIT_SIZE,
+    ALL = SIZE + 3,
+    ITERATIONS = 8,
+    ROUNDS = 4,
+    HALVINGS = 60,
+    LEAST_STARS = 4
+};
 
 /* Steps of the numerical derivatives: rad, and displacement at the field's corner over its radius.
  */
@@ -18,6 +25,8 @@ static const double MOST_SIGMAS = 4.5;
 static const double MOST_STEP = 0.1;
 /* Largest 1 sigma of the map in the corner, px, that counts as determined. */
 static const double DETERMINED_PX = 100.0;
+/* Limits of the scatter, px^2. */
+static const double LEAST_SCATTER2 = 1e-8, MOST_SCATTER2 = 1e6;
 
 typedef struct geometry {
     const bst_camera *start;
@@ -241,6 +250,36 @@ static bool iterate(geometry *g, double gate, frame_solution *solutions) {
     return true;
 }
 
+/* Chi squared of the present residuals with another scatter. */
+static double chi2_of(const geometry *g, double scatter2) {
+    double sum = 0.0;
+    for (int i = 0; i < g->count; i++) {
+        const bst_camera_fit_star *s = &g->stars[i];
+        if (isnan(s->residual_x_px)) {
+            continue;
+        }
+        const double xx = s->cov_xx + scatter2, xy = s->cov_xy, yy = s->cov_yy + scatter2,
+                     x = s->residual_x_px, y = s->residual_y_px;
+        sum += (yy * x * x - 2.0 * xy * x * y + xx * y * y) / (xx * yy - xy * xy);
+    }
+    return sum;
+}
+
+/* Scatter with which chi squared of the present residuals is its expectation: by halving, in
+ * logarithm. */
+static double scatter2_of(const geometry *g) {
+    double low = LEAST_SCATTER2, high = MOST_SCATTER2;
+    for (int i = 0; i < HALVINGS; i++) {
+        const double middle = sqrt(low * high);
+        if (chi2_of(g, middle) > g->degrees) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return high;
+}
+
 /* Iterates with the scatter that makes chi squared its expectation. False: not determined, or not
  * at rest at the end. */
 static bool solve(geometry *g, frame_solution *solutions) {
@@ -251,15 +290,7 @@ static bool solve(geometry *g, frame_solution *solutions) {
             if (!iterate(g, gate, solutions)) {
                 return false;
             }
-            /* at the optimum chi2 falls about as 1 / (mean covariance + scatter2) */
-            double mean = 0.0;
-            for (int i = 0; i < g->count; i++) {
-                if (!isnan(g->stars[i].residual_x_px)) {
-                    mean += 0.5 * (g->stars[i].cov_xx + g->stars[i].cov_yy) / g->used;
-                }
-            }
-            const double grown = (mean + g->scatter2) * g->chi2 / g->degrees - mean;
-            g->scatter2 = fmax(grown, 1e-8);
+            g->scatter2 = scatter2_of(g);
         }
         gate = MOST_SIGMAS;
     }

@@ -12,6 +12,10 @@
 static const int COEFFICIENTS[] = {4, 5, 7, 11, 19, 35, 67};
 enum { TRIED = sizeof COEFFICIENTS / sizeof *COEFFICIENTS, ROLL_MOST = 7 };
 static const double LEAST_INTERVAL_PX = 5.0;
+/* Intervals that are tried however short the path is, and length up to which the ends of streaks
+ * are not trusted: the fit begins with points, too. */
+enum { FREE_INTERVALS = 4 };
+static const double SHORT_PX = 12.0;
 /* Loss by which a value of the path must improve the fit on average. */
 static const double GAIN_PER_VALUE = 1.0;
 /* Faintest stars that are added, in rounds. */
@@ -197,7 +201,7 @@ static bst_status refine_path(bst_ctx *ctx, bst_twin *t, double *loss) {
         if (m->path.count[0] == 1 || (n <= m->path.count[0] && roll <= m->path.count[1])) {
             continue;
         }
-        if (intervals > 1 && t->length_px / intervals < LEAST_INTERVAL_PX) {
+        if (intervals > FREE_INTERVALS && t->length_px / intervals < LEAST_INTERVAL_PX) {
             break;
         }
         bst_twin_model before = *m;
@@ -271,6 +275,36 @@ static bst_status seed_motion(bst_ctx *ctx, bst_twin *t, double *loss) {
     return status;
 }
 
+/* The ends of short streaks, which the PSF blurs, can be a few pixels off, and the fit does not
+ * find back from a path that is much too long: begins with points as well, and takes what fits
+ * better. */
+static bst_status try_points(bst_ctx *ctx, bst_twin *t, double *loss) {
+    bst_twin_model *m = &t->model, streaks = *m;
+    size_t bytes = BST_TWIN_STARS * sizeof *m->stars;
+    bst_twin_star *own = m->stars, *kept = malloc(bytes);
+    double as_streaks = *loss;
+    if (!kept) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d stars", BST_TWIN_STARS);
+    }
+    memcpy(kept, own, bytes);
+    m->path =
+        (bst_twin_path){.q_reference = bst_twin_path_attitude(&streaks.path, 0.5), .count = {1, 1}};
+    bst_status status = fit_all(ctx, t, 0.0, 8, loss);
+    if (status == BST_OK) {
+        status = seed_motion(ctx, t, loss);
+    }
+    if (status == BST_OK) {
+        status = fit_all(ctx, t, 0.0, 8, loss);
+    }
+    if (status == BST_OK && !(*loss < as_streaks)) {
+        *m = streaks;
+        memcpy(own, kept, bytes);
+        *loss = as_streaks;
+    }
+    free(kept);
+    return status;
+}
+
 /* One round: stars down to a signal-to-noise ratio, then all parameters. */
 static bst_status add_stars(bst_ctx *ctx, bst_twin *t, double least_snr, double *loss) {
     int added;
@@ -292,6 +326,9 @@ bst_status bst_twin_fit_frame(bst_ctx *ctx, bst_twin *t) {
     BST_TRY(fit_all(ctx, t, 0.0, 8, &loss));
     if (t->model.path.count[0] == 1) {
         BST_TRY(seed_motion(ctx, t, &loss));
+        t->length_px = bst_twin_path_length_px(&t->model);
+    } else if (t->length_px < SHORT_PX) {
+        BST_TRY(try_points(ctx, t, &loss));
         t->length_px = bst_twin_path_length_px(&t->model);
     }
     for (int i = 0; i < ROUNDS; i++) {

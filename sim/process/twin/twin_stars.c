@@ -16,20 +16,29 @@ static const double FAINTEST = 30.0;
 static const double CATALOGUE_SNR = 2.0;
 /* Least share of a star's light on the frame. */
 static const double LEAST_INSIDE = 0.05;
+/* The end of a bright streak so far beside the frame lights its pixels: without the star, others
+ * near the edge would be given its light. */
+static const double EDGE_PX = 6.0;
 /* A found star nearer than this to one that is so much brighter is what its fit left. */
 static const double REMNANT_PX = 3.0, REMNANT_SHARE = 0.1;
 enum { PATH_SAMPLES = 256 };
 
-/* Share of a star's light on the frame. */
-static double share_inside(const bst_twin_model *m, bst_vec3 apparent) {
+/* Share of a star's light on the frame, widened on all sides. */
+static double share_within(const bst_twin_model *m, bst_vec3 apparent, double margin_px) {
+    const double low = -0.5 - margin_px, x_most = m->width - 0.5 + margin_px,
+                 y_most = m->height - 0.5 + margin_px;
     int inside = 0;
     for (int i = 0; i < PATH_SAMPLES; i++) {
         bst_quat q = bst_twin_path_attitude(&m->path, (i + 0.5) / PATH_SAMPLES);
         double x, y;
-        inside += bst_camera_project(&m->camera, bst_quat_rotate(q, apparent), &x, &y) &&
-                  x > -0.5 && y > -0.5 && x < m->width - 0.5 && y < m->height - 0.5;
+        inside += bst_camera_project(&m->camera, bst_quat_rotate(q, apparent), &x, &y) && x > low &&
+                  y > low && x < x_most && y < y_most;
     }
     return (double)inside / PATH_SAMPLES;
+}
+
+static double share_inside(const bst_twin_model *m, bst_vec3 apparent) {
+    return share_within(m, apparent, 0.0);
 }
 
 /* Electrons of the exposure that make a signal-to-noise ratio of 1. */
@@ -65,7 +74,8 @@ static void add_sorted(bst_twin *t, const bst_star *stars, int count) {
                               .b_minus_v = (double)s->b_minus_v,
                               .id = s->id};
         star.inside = share_inside(m, star.apparent);
-        if (star.inside > LEAST_INSIDE) {
+        bool lights = isfinite(e) && e * share_within(m, star.apparent, EDGE_PX) > least;
+        if (star.inside > LEAST_INSIDE || lights) {
             m->stars[m->count++] = star;
         }
     }
