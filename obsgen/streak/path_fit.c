@@ -9,6 +9,7 @@
 enum {
     SAMPLES = 64, /* of a path */
     MODEL = 48,   /* of a streak model */
+    LIGHTS = 256, /* of several streaks */
     /* of the grid on which light is fitted: along the streak and across */
     COLUMNS = 96,
     ROWS = 32,
@@ -29,7 +30,7 @@ static const double LEAST_WIDENING = -0.6, MOST_WIDENING = 1.8;
 static const double MOST_STEP_PX = 0.7, SETTLED_PX = 1e-3;
 
 typedef struct samples {
-    double x[SAMPLES], y[SAMPLES], weight[SAMPLES]; /* weight: share of the exposure */
+    double x[LIGHTS], y[LIGHTS], weight[LIGHTS]; /* weight: share of the exposure */
     int count;
 } samples;
 
@@ -239,6 +240,51 @@ bst_path_point_fit bst_path_fit_points(const bst_path_point *points, int count, 
         (void)improve(&seen, &shape, n, light, model_px * model_px, &f, &squares);
     }
     return (bst_path_point_fit){f.x, f.y, f.flux, f.widening};
+}
+
+/* Adds a streak's light at points at most a sigma of the image apart. */
+static void add_streak(const bst_path_streak *s, double image_px, double peak, samples *out) {
+    int pieces = (int)fmin(ceil(1.5 * hypot(s->path.dx, s->path.dy) / image_px) + 1.0, MODEL);
+    for (int i = 0; i < pieces && out->count < LIGHTS; i++) {
+        double u = (i + 0.5) / pieces - 0.5;
+        out->x[out->count] = s->x_px + u * s->path.dx;
+        out->y[out->count] = s->y_px + u * s->path.dy;
+        out->weight[out->count++] = peak * s->flux / pieces;
+    }
+}
+
+bst_path_point_fit bst_path_fit_streaks(const bst_path_streak *streaks, int count, double image_px,
+                                        const bst_streak_model *model, double light,
+                                        double limit_px) {
+    assert(streaks && count > 0 && model && image_px > 0.0 && model->sigma_px > 0.0);
+    const double sigma = model->sigma_px, length = hypot(model->path.dx, model->path.dy);
+    const double c = length > 0.0 ? model->path.dx / length : 1.0;
+    const double s = length > 0.0 ? model->path.dy / length : 0.0;
+    const bst_streak_model straight = {.path = model->path, .sigma_px = sigma};
+    samples seen_at = {.count = 0}, streak;
+    fitted f = {0.0, 0.0, 0.0, 0.0};
+    for (int i = 0; i < count; i++) {
+        /* render() gives each Gaussian the peak of its weight */
+        add_streak(&streaks[i], image_px, sigma * sigma / (image_px * image_px), &seen_at);
+        f.flux += streaks[i].flux;
+    }
+    sample_model(&straight, &streak);
+    turn(&seen_at, c, s);
+    turn(&streak, c, s);
+    planes seen, shape;
+    bst_path_fit_squares squares;
+    const grid g = grid_about(&streak, model->saturated > 0.0 ? SATURATED_STEP * sigma : sigma,
+                              fmax(MARGIN_SIGMAS * sigma, LEAST_MARGIN_PX));
+    const int n = g.columns * g.rows;
+    render(&g, &seen_at, 0.0, 0.0, image_px, false, &seen);
+    seen.full = model->saturated > 0.0 ? model->saturated : INFINITY;
+    for (int round = 0; round < ROUNDS; round++) { /* the width settles after the place */
+        render(&g, &streak, f.x, f.y, sigma, true, &shape);
+        (void)improve(&seen, &shape, n, light, sigma * sigma, &f, &squares);
+        f.x = fmin(fmax(f.x, -limit_px), limit_px);
+        f.y = fmin(fmax(f.y, -limit_px), limit_px);
+    }
+    return (bst_path_point_fit){f.x * c - f.y * s, f.x * s + f.y * c, f.flux, f.widening};
 }
 
 /* Sum of the products of two sets of Gaussians whose product has the deviation `root`, the second
