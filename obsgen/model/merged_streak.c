@@ -70,14 +70,16 @@ static void fit_as_streak(const bst_generator *g, const generator_source *s,
         }
     }
     const bst_response *r = &g->response;
+    double reach = fmax(LEAST_REACH_PX, ceil(REACH_SIGMAS * g->fitted_sigma));
     double image = r->source.across_px * r->source.along_px;
     bst_streak_model model = {.path = g->fit_path, .sigma_px = g->filter_sigma};
     double peak_e = s->flux_e / (2.0 * BST_PI * model.sigma_px * model.sigma_px);
     model.saturated = s->saturated ? fmax(bst_generator_saturation_e(g), 1.0) / peak_e : 0.0;
     double limit =
         LIMIT_PX + g->fitted_sigma + LIMIT_PER_PATH * hypot(g->fit_path.dx, g->fit_path.dy);
-    bst_path_point_fit fit = bst_path_fit_streaks(lights, used, sqrt(image), &model,
-                                                  bst_generator_streak_light(g, s->flux_e), limit);
+    bst_path_point_fit fit =
+        bst_path_fit_streaks(lights, used, sqrt(image), &model,
+                             bst_generator_streak_light(g, s->flux_e), reach + 0.5, limit);
     at->x += fit.x_px;
     at->y += fit.y_px;
     at->flux_e = fit.flux * s->flux_e;

@@ -24,6 +24,8 @@ static const double MARGIN_SIGMAS = 4.0, STEP_SIGMAS = 1.0;
 static const double SATURATED_STEP = 0.3;
 /* Least margin of the pixels on which a point is fitted (imgproc/measure/deblend.c). */
 static const double LEAST_MARGIN_PX = 3.5;
+/* A longer streak's fit is on a grid along it: one along the frame's axes would have wide steps. */
+static const double LONG_SIGMAS = 20.0;
 /* Limits of the fitted widening relative to the PSF's variance (imgproc/measure/fit.c). */
 static const double LEAST_WIDENING = -0.6, MOST_WIDENING = 1.8;
 /* Largest and smallest step of a fit, px. */
@@ -255,11 +257,13 @@ static void add_streak(const bst_path_streak *s, double image_px, double peak, s
 
 bst_path_point_fit bst_path_fit_streaks(const bst_path_streak *streaks, int count, double image_px,
                                         const bst_streak_model *model, double light,
-                                        double limit_px) {
+                                        double margin_px, double limit_px) {
     assert(streaks && count > 0 && model && image_px > 0.0 && model->sigma_px > 0.0);
     const double sigma = model->sigma_px, length = hypot(model->path.dx, model->path.dy);
-    const double c = length > 0.0 ? model->path.dx / length : 1.0;
-    const double s = length > 0.0 ? model->path.dy / length : 0.0;
+    /* pixels of images are those of the frame's axes; a long streak's margin is small beside it */
+    bool turned = length > LONG_SIGMAS * sigma;
+    const double c = turned ? model->path.dx / length : 1.0;
+    const double s = turned ? model->path.dy / length : 0.0;
     const bst_streak_model straight = {.path = model->path, .sigma_px = sigma};
     samples seen_at = {.count = 0}, streak;
     fitted f = {0.0, 0.0, 0.0, 0.0};
@@ -273,8 +277,8 @@ bst_path_point_fit bst_path_fit_streaks(const bst_path_streak *streaks, int coun
     turn(&streak, c, s);
     planes seen, shape;
     bst_path_fit_squares squares;
-    const grid g = grid_about(&streak, model->saturated > 0.0 ? SATURATED_STEP * sigma : sigma,
-                              fmax(MARGIN_SIGMAS * sigma, LEAST_MARGIN_PX));
+    const grid g =
+        grid_about(&streak, model->saturated > 0.0 ? SATURATED_STEP * sigma : sigma, margin_px);
     const int n = g.columns * g.rows;
     render(&g, &seen_at, 0.0, 0.0, image_px, false, &seen);
     seen.full = model->saturated > 0.0 ? model->saturated : INFINITY;

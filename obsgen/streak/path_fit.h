@@ -73,10 +73,11 @@ typedef struct bst_path_streak {
  *            image_px  deviation of a point's image, including the pixel
  *            model     fitted streak; its bend is not used
  *            light     brightest pixel of a fitted streak of flux 1 over the variance of the noise
- *            limit_px  farthest place on each axis, along and across the model */
+ *            margin_px of the fitted pixels about the streak
+ *            limit_px  farthest place on each axis */
 bst_path_point_fit bst_path_fit_streaks(const bst_path_streak *streaks, int count, double image_px,
                                         const bst_streak_model *model, double light,
-                                        double limit_px);
+                                        double margin_px, double limit_px);
 
 /* Widths of the images of a point, px, including the pixel: of the star, of the filters, and of
  * the product of both. */
