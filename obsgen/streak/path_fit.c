@@ -34,6 +34,7 @@ static const double MOST_STEP_PX = 0.7, SETTLED_PX = 1e-3;
 typedef struct samples {
     double x[LIGHTS], y[LIGHTS], weight[LIGHTS]; /* weight: share of the exposure */
     int count;
+    double spread; /* mean variance of the path about its samples, per axis, px^2 */
 } samples;
 
 /* Turns samples into the axes along and across a direction. */
@@ -45,9 +46,12 @@ static void turn(samples *s, double cosine, double sine) {
     }
 }
 
-/* Averages the path over at most SAMPLES equal parts of the exposure. */
+/* Averages the path over at most SAMPLES equal parts of the exposure. Faster jitter is in the
+ * spread.
+ */
 static void sample_path(const bst_star_trail_path *p, samples *out) {
     out->count = p->count < SAMPLES ? p->count : SAMPLES;
+    double squares = 0.0;
     for (int i = 0; i < out->count; i++) {
         out->x[i] = out->y[i] = out->weight[i] = 0.0;
     }
@@ -57,11 +61,14 @@ static void sample_path(const bst_star_trail_path *p, samples *out) {
         out->x[i] += w * p->x_px[k];
         out->y[i] += w * p->y_px[k];
         out->weight[i] += w;
+        squares += w * (p->x_px[k] * p->x_px[k] + p->y_px[k] * p->y_px[k]);
     }
     for (int i = 0; i < out->count; i++) {
         out->x[i] /= out->weight[i];
         out->y[i] /= out->weight[i];
+        squares -= out->weight[i] * (out->x[i] * out->x[i] + out->y[i] * out->y[i]);
     }
+    out->spread = fmax(0.5 * squares, 0.0);
 }
 
 /* Positions of the streak model about its mean. */
@@ -201,9 +208,12 @@ bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_str
     turn(&streak, c, s);
     turn(&about, c, s);
     grid g = grid_about(&about, stamp->sigma_px, MARGIN_SIGMAS * stamp->sigma_px);
-    double sigma = model->sigma_px;
+    double sigma = model->sigma_px, image = sqrt(sigma * sigma + star.spread);
     int n = g.columns * g.rows;
-    render(&g, &star, 0.0, 0.0, sigma, false, &seen);
+    for (int i = 0; i < star.count; i++) { /* render() gives each Gaussian the peak of its weight */
+        star.weight[i] *= sigma * sigma / (image * image);
+    }
+    render(&g, &star, 0.0, 0.0, image, false, &seen);
     seen.full = model->saturated > 0.0 ? model->saturated : INFINITY;
     fitted f = {place_px[0] * c + place_px[1] * s, place_px[1] * c - place_px[0] * s, 1.0, 0.0};
     bool moving = true;
@@ -306,14 +316,15 @@ static double overlap(const samples *a, const samples *b, double dx, double dy, 
 
 /* sqrt(sum p^2) of the star's image. */
 static double image_norm(const samples *s, const bst_path_widths *w) {
-    return sqrt(overlap(s, s, 0.0, 0.0, w->source_px * sqrt(2.0)));
+    return sqrt(overlap(s, s, 0.0, 0.0, sqrt(2.0 * (w->source_px * w->source_px + s->spread))));
 }
 
 bst_path_outputs bst_path_fit_outputs(const bst_star_trail_path *path, bst_obsgen_path_px filter,
                                       const bst_path_widths *w) {
     samples s;
     sample_path(path, &s);
-    double length = hypot(filter.dx, filter.dy), root = w->both_px * sqrt(2.0);
+    double length = hypot(filter.dx, filter.dy);
+    double root = sqrt(2.0 * w->both_px * w->both_px + s.spread);
     double c = length > 0.0 ? filter.dx / length : 1.0, n = length > 0.0 ? filter.dy / length : 0.0;
     double streak = 0.0, beside = 0.0;
     bst_path_outputs out = {0.0, 0.0, {0.0, 0.0}, 0.0};
