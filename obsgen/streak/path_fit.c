@@ -287,8 +287,11 @@ bst_path_point_fit bst_path_fit_streaks(const bst_path_streak *streaks, int coun
     turn(&streak, c, s);
     planes seen, shape;
     bst_path_fit_squares squares;
-    const grid g =
+    grid g =
         grid_about(&streak, model->saturated > 0.0 ? SATURATED_STEP * sigma : sigma, margin_px);
+    /* about the middle: the fit is the same whichever way the frame is turned */
+    g.x0 = -0.5 * g.step * (g.columns - 1);
+    g.y0 = -0.5 * g.step * (g.rows - 1);
     const int n = g.columns * g.rows;
     render(&g, &seen_at, 0.0, 0.0, image_px, false, &seen);
     seen.full = model->saturated > 0.0 ? model->saturated : INFINITY;
