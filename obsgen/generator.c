@@ -150,7 +150,10 @@ static void set_amplitude(const bst_generator *g, generator_source *s) {
     double flatness = g->cross_sigma / g->filter_sigma;
     gain = g->smeared ? 1.0 : 1.0 + (gain - 1.0) * flatness * flatness;
     s->unraised = efficiency * ideal;
-    s->amplitude = bst_obsgen_peak(s->unraised, gain);
+    /* that of the greater output, if the source is seen in the smaller one */
+    double most = s->unraised * fmax(s->other, 1.0);
+    s->rise = bst_obsgen_peak(most, gain) - most;
+    s->amplitude = s->unraised + s->rise;
 }
 
 /* Grows the arrays of sources. */

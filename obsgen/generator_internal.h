@@ -21,6 +21,7 @@ typedef struct generator_source {
     double snr_ratio, filter_ratio, shape_xx, shape_xy, shape_yy;
     double sharp;         /* factor on its amplitude; 1 for the PSF alone */
     double unraised;      /* SNR in the filter output at its place, without noise */
+    double rise;          /* by noise, in `amplitude` */
     double amplitude;     /* mean peak of the filter output, SNR */
     double peak;          /* amplitude including the light of neighbours */
     double noise, spread; /* noise draw of the peak; its standard deviation */
@@ -87,7 +88,7 @@ struct bst_generator {
     bst_path_outputs outputs;
     /* lead of a point's fit over a streak's on an uneven path, by light level; see point_lead() */
     double point_lead[GENERATOR_BIASES];
-    double known_width; /* width of the filters' images relative to the PSF's */
+    double known_width;           /* width of the filters' images relative to the PSF's */
     /* centroid variance relative to a Gaussian of the PSF's noise-equivalent area */
     double place_ratio2;
     double norm_ratio[2]; /* sqrt(sum p^2) of the filters' images relative to the bound's */
@@ -166,6 +167,10 @@ double bst_generator_column_variance(const bst_generator *g);
 /* Variance of a filter's output at a source, in SNR^2; other: of the filter that it does not show
  * best. */
 double bst_generator_output_variance(const bst_generator *g, const generator_source *s, bool other);
+/* Standard normal noise of a filter (0: for points, 1: for streaks) at a source. */
+double bst_generator_filter_noise(const bst_generator *g, const generator_source *s, int filter);
+/* Output of the other filter at a source whose own filter has the output `peak`. */
+double bst_generator_other_output(const generator_source *s, double peak);
 /* Standard normal noise of the other filter at a source, of which the own filter has s->noise. */
 double bst_generator_other_noise(const bst_generator *g, const generator_source *s);
 /* Output of the filter for source a at its position, caused by source b, relative to b's amplitude.

@@ -96,7 +96,8 @@ bool bst_generator_fits_point(const bst_generator *g, const generator_source *s,
         return false;
     }
     /* A fit lowers chi-square by the squared filter output. */
-    return s->other * s->amplitude + bst_generator_other_noise(g, s) > s->amplitude + s->noise;
+    return bst_generator_other_output(s, s->amplitude) + bst_generator_other_noise(g, s) >
+           s->amplitude + s->noise;
 }
 
 /* Draws the position error of a point, in standard deviations of the linear fit: that of a maximum

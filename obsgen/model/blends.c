@@ -57,10 +57,20 @@ double bst_generator_output_variance(const bst_generator *g, const generator_sou
     return filter->variance + filter->shot * fmax(seen, 0.0);
 }
 
+double bst_generator_filter_noise(const bst_generator *g, const generator_source *s, int filter) {
+    double peak = bst_generator_draw(g, s, GENERATOR_PEAK), shared = g->shared_noise;
+    if (filter == 1 || !(g->streak > 0.0)) {
+        return peak;
+    }
+    return shared * peak + sqrt(1.0 - shared * shared) * bst_generator_draw(g, s, GENERATOR_SHAPE);
+}
+
 double bst_generator_other_noise(const bst_generator *g, const generator_source *s) {
-    double shared = g->shared_noise;
-    return shared * s->noise +
-           sqrt(1.0 - shared * shared) * bst_generator_draw(g, s, GENERATOR_SHAPE);
+    return bst_generator_filter_noise(g, s, !s->as_streak);
+}
+
+double bst_generator_other_output(const generator_source *s, double peak) {
+    return s->other > 1.0 ? s->other * (peak - s->rise) + s->rise : s->other * peak;
 }
 
 /* Margin of a peak above the threshold of the filter that shows the source best, or of the other
@@ -72,7 +82,7 @@ static double margin_of(const bst_generator *g, const generator_source *s, doubl
         return g->calibration.slope * (peak - threshold) + s->spread * s->noise;
     }
     double spread = sqrt(bst_generator_output_variance(g, s, true));
-    return g->calibration.slope * (s->other * peak - threshold) +
+    return g->calibration.slope * (bst_generator_other_output(s, peak) - threshold) +
            spread * bst_generator_other_noise(g, s);
 }
 
@@ -81,7 +91,7 @@ static double noisy_level(const bst_generator *g, const generator_source *s) {
     double level = s->amplitude + s->spread * s->noise / g->calibration.slope;
     if (s->other > 0.0) {
         double spread = sqrt(bst_generator_output_variance(g, s, true));
-        level = fmax(level, s->other * s->amplitude +
+        level = fmax(level, bst_generator_other_output(s, s->amplitude) +
                                 spread * bst_generator_other_noise(g, s) / g->calibration.slope);
     }
     return level;
@@ -133,7 +143,7 @@ void bst_generator_decide(bst_generator *g) {
     for (int i = 0; i < g->source_count; i++) {
         generator_source *s = &g->sources[i];
         if (s->amplitude > FAINTEST_SHARE * g->threshold) {
-            s->noise = bst_generator_draw(g, s, GENERATOR_PEAK);
+            s->noise = bst_generator_filter_noise(g, s, s->as_streak);
             s->spread = sqrt(bst_generator_output_variance(g, s, false));
             s->level = noisy_level(g, s);
             generator_source pixel = {.x = round(s->x), .y = round(s->y)};

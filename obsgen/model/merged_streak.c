@@ -1,4 +1,4 @@
-/* Stars merged into one detection that image processing fits as one streak. */
+/* Stars merged into one detection: how image processing fits them as one point or streak. */
 #include <assert.h>
 #include <math.h>
 
@@ -16,7 +16,9 @@ static const double LEAST_GAIN = 9.0;
  * (REACH_SIGMAS of imgproc/measure/deblend.c, in whole pixels), and so does the light. */
 static const double FITTED_SIGMAS = 8.0;
 /* Stamp and largest move of a fit (imgproc/measure/deblend.c). */
-static const double REACH_SIGMAS = 3.6, LEAST_REACH_PX = 3.0, LIMIT_PX = 1.5;
+static const double REACH_SIGMAS = 3.6, LEAST_REACH_PX = 3.0, LIMIT_PX = 1.5, LIMIT_PER_PATH = 0.4;
+/* Most sources whose light is fitted as one streak. */
+enum { MOST_LIGHTS = 65 };
 
 /* Symmetric 2 x 2 matrix. */
 typedef struct covariance {
@@ -52,6 +54,35 @@ static int gather_points(const bst_generator *g, const generator_source *s,
         points[used++] = (bst_path_point){dx + px, dy + py, half};
     }
     return used;
+}
+
+/* Gives a bright streak with other streaks in its light the place and flux of a fit with a free
+ * width. */
+static void fit_as_streak(const bst_generator *g, const generator_source *s,
+                          const generator_source *merged, int count, generator_blend *at) {
+    bst_path_streak lights[MOST_LIGHTS];
+    int used = 0;
+    for (int k = -1; k < count && used < MOST_LIGHTS; k++) {
+        const generator_source *o = k < 0 ? s : &merged[k];
+        if (!is_of_another(g, s, o)) {
+            lights[used++] =
+                (bst_path_streak){o->x - at->x, o->y - at->y, o->flux_e / s->flux_e, o->path};
+        }
+    }
+    const bst_response *r = &g->response;
+    double reach = fmax(LEAST_REACH_PX, ceil(REACH_SIGMAS * g->fitted_sigma));
+    double image = r->source.across_px * r->source.along_px;
+    bst_streak_model model = {.path = g->fit_path, .sigma_px = g->filter_sigma};
+    double peak_e = s->flux_e / (2.0 * BST_PI * model.sigma_px * model.sigma_px);
+    model.saturated = s->saturated ? fmax(bst_generator_saturation_e(g), 1.0) / peak_e : 0.0;
+    double limit =
+        LIMIT_PX + g->fitted_sigma + LIMIT_PER_PATH * hypot(g->fit_path.dx, g->fit_path.dy);
+    bst_path_point_fit fit =
+        bst_path_fit_streaks(lights, used, sqrt(image), &model,
+                             bst_generator_streak_light(g, s->flux_e), reach + 0.5, limit);
+    at->x += fit.x_px;
+    at->y += fit.y_px;
+    at->flux_e = fit.flux * s->flux_e;
 }
 
 /* Fits a single point: gives a bright one the place and flux of a fit with a free width. Returns
@@ -196,7 +227,13 @@ void bst_generator_fit_merged(const bst_generator *g, const generator_source *s,
     assert(g && s && out && count >= 0 && (merged || count == 0));
     double snr = out->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e;
     double point = g->fitted_sigma * g->fitted_sigma;
-    if (g->smeared || out->near || s->as_streak || snr < OWN_STREAK_SNR) {
+    if (g->smeared || out->near || snr < OWN_STREAK_SNR) {
+        return;
+    }
+    if (s->as_streak) {
+        if (s->peak > WIDTH_SNR) {
+            fit_as_streak(g, s, merged, count, out);
+        }
         return;
     }
     double fitted = point + 1.0 / 12.0, moment;

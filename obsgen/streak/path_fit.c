@@ -9,6 +9,7 @@
 enum {
     SAMPLES = 64, /* of a path */
     MODEL = 48,   /* of a streak model */
+    LIGHTS = 256, /* of several streaks */
     /* of the grid on which light is fitted: along the streak and across */
     COLUMNS = 96,
     ROWS = 32,
@@ -23,14 +24,17 @@ static const double MARGIN_SIGMAS = 4.0, STEP_SIGMAS = 1.0;
 static const double SATURATED_STEP = 0.3;
 /* Least margin of the pixels on which a point is fitted (imgproc/measure/deblend.c). */
 static const double LEAST_MARGIN_PX = 3.5;
+/* A longer streak's fit is on a grid along it: one along the frame's axes would have wide steps. */
+static const double LONG_SIGMAS = 20.0;
 /* Limits of the fitted widening relative to the PSF's variance (imgproc/measure/fit.c). */
 static const double LEAST_WIDENING = -0.6, MOST_WIDENING = 1.8;
 /* Largest and smallest step of a fit, px. */
 static const double MOST_STEP_PX = 0.7, SETTLED_PX = 1e-3;
 
 typedef struct samples {
-    double x[SAMPLES], y[SAMPLES], weight[SAMPLES]; /* weight: share of the exposure */
+    double x[LIGHTS], y[LIGHTS], weight[LIGHTS]; /* weight: share of the exposure */
     int count;
+    double spread; /* mean variance of the path about its samples, per axis, px^2 */
 } samples;
 
 /* Turns samples into the axes along and across a direction. */
@@ -42,9 +46,12 @@ static void turn(samples *s, double cosine, double sine) {
     }
 }
 
-/* Averages the path over at most SAMPLES equal parts of the exposure. */
+/* Averages the path over at most SAMPLES equal parts of the exposure. Faster jitter is in the
+ * spread.
+ */
 static void sample_path(const bst_star_trail_path *p, samples *out) {
     out->count = p->count < SAMPLES ? p->count : SAMPLES;
+    double squares = 0.0;
     for (int i = 0; i < out->count; i++) {
         out->x[i] = out->y[i] = out->weight[i] = 0.0;
     }
@@ -54,11 +61,14 @@ static void sample_path(const bst_star_trail_path *p, samples *out) {
         out->x[i] += w * p->x_px[k];
         out->y[i] += w * p->y_px[k];
         out->weight[i] += w;
+        squares += w * (p->x_px[k] * p->x_px[k] + p->y_px[k] * p->y_px[k]);
     }
     for (int i = 0; i < out->count; i++) {
         out->x[i] /= out->weight[i];
         out->y[i] /= out->weight[i];
+        squares -= out->weight[i] * (out->x[i] * out->x[i] + out->y[i] * out->y[i]);
     }
+    out->spread = fmax(0.5 * squares, 0.0);
 }
 
 /* Positions of the streak model about its mean. */
@@ -198,9 +208,12 @@ bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_str
     turn(&streak, c, s);
     turn(&about, c, s);
     grid g = grid_about(&about, stamp->sigma_px, MARGIN_SIGMAS * stamp->sigma_px);
-    double sigma = model->sigma_px;
+    double sigma = model->sigma_px, image = sqrt(sigma * sigma + star.spread);
     int n = g.columns * g.rows;
-    render(&g, &star, 0.0, 0.0, sigma, false, &seen);
+    for (int i = 0; i < star.count; i++) { /* render() gives each Gaussian the peak of its weight */
+        star.weight[i] *= sigma * sigma / (image * image);
+    }
+    render(&g, &star, 0.0, 0.0, image, false, &seen);
     seen.full = model->saturated > 0.0 ? model->saturated : INFINITY;
     fitted f = {place_px[0] * c + place_px[1] * s, place_px[1] * c - place_px[0] * s, 1.0, 0.0};
     bool moving = true;
@@ -241,6 +254,56 @@ bst_path_point_fit bst_path_fit_points(const bst_path_point *points, int count, 
     return (bst_path_point_fit){f.x, f.y, f.flux, f.widening};
 }
 
+/* Adds a streak's light at points at most a sigma of the image apart. */
+static void add_streak(const bst_path_streak *s, double image_px, double peak, samples *out) {
+    int pieces = (int)fmin(ceil(1.5 * hypot(s->path.dx, s->path.dy) / image_px) + 1.0, MODEL);
+    for (int i = 0; i < pieces && out->count < LIGHTS; i++) {
+        double u = (i + 0.5) / pieces - 0.5;
+        out->x[out->count] = s->x_px + u * s->path.dx;
+        out->y[out->count] = s->y_px + u * s->path.dy;
+        out->weight[out->count++] = peak * s->flux / pieces;
+    }
+}
+
+bst_path_point_fit bst_path_fit_streaks(const bst_path_streak *streaks, int count, double image_px,
+                                        const bst_streak_model *model, double light,
+                                        double margin_px, double limit_px) {
+    assert(streaks && count > 0 && model && image_px > 0.0 && model->sigma_px > 0.0);
+    const double sigma = model->sigma_px, length = hypot(model->path.dx, model->path.dy);
+    /* pixels of images are those of the frame's axes; a long streak's margin is small beside it */
+    bool turned = length > LONG_SIGMAS * sigma;
+    const double c = turned ? model->path.dx / length : 1.0;
+    const double s = turned ? model->path.dy / length : 0.0;
+    const bst_streak_model straight = {.path = model->path, .sigma_px = sigma};
+    samples seen_at = {.count = 0}, streak;
+    fitted f = {0.0, 0.0, 0.0, 0.0};
+    for (int i = 0; i < count; i++) {
+        /* render() gives each Gaussian the peak of its weight */
+        add_streak(&streaks[i], image_px, sigma * sigma / (image_px * image_px), &seen_at);
+        f.flux += streaks[i].flux;
+    }
+    sample_model(&straight, &streak);
+    turn(&seen_at, c, s);
+    turn(&streak, c, s);
+    planes seen, shape;
+    bst_path_fit_squares squares;
+    grid g =
+        grid_about(&streak, model->saturated > 0.0 ? SATURATED_STEP * sigma : sigma, margin_px);
+    /* about the middle: the fit is the same whichever way the frame is turned */
+    g.x0 = -0.5 * g.step * (g.columns - 1);
+    g.y0 = -0.5 * g.step * (g.rows - 1);
+    const int n = g.columns * g.rows;
+    render(&g, &seen_at, 0.0, 0.0, image_px, false, &seen);
+    seen.full = model->saturated > 0.0 ? model->saturated : INFINITY;
+    for (int round = 0; round < ROUNDS; round++) { /* the width settles after the place */
+        render(&g, &streak, f.x, f.y, sigma, true, &shape);
+        (void)improve(&seen, &shape, n, light, sigma * sigma, &f, &squares);
+        f.x = fmin(fmax(f.x, -limit_px), limit_px);
+        f.y = fmin(fmax(f.y, -limit_px), limit_px);
+    }
+    return (bst_path_point_fit){f.x * c - f.y * s, f.x * s + f.y * c, f.flux, f.widening};
+}
+
 /* Sum of the products of two sets of Gaussians whose product has the deviation `root`, the second
  * set displaced by (dx, dy). */
 static double overlap(const samples *a, const samples *b, double dx, double dy, double root) {
@@ -256,14 +319,15 @@ static double overlap(const samples *a, const samples *b, double dx, double dy, 
 
 /* sqrt(sum p^2) of the star's image. */
 static double image_norm(const samples *s, const bst_path_widths *w) {
-    return sqrt(overlap(s, s, 0.0, 0.0, w->source_px * sqrt(2.0)));
+    return sqrt(overlap(s, s, 0.0, 0.0, sqrt(2.0 * (w->source_px * w->source_px + s->spread))));
 }
 
 bst_path_outputs bst_path_fit_outputs(const bst_star_trail_path *path, bst_obsgen_path_px filter,
                                       const bst_path_widths *w) {
     samples s;
     sample_path(path, &s);
-    double length = hypot(filter.dx, filter.dy), root = w->both_px * sqrt(2.0);
+    double length = hypot(filter.dx, filter.dy);
+    double root = sqrt(2.0 * w->both_px * w->both_px + s.spread);
     double c = length > 0.0 ? filter.dx / length : 1.0, n = length > 0.0 ? filter.dy / length : 0.0;
     double streak = 0.0, beside = 0.0;
     bst_path_outputs out = {0.0, 0.0, {0.0, 0.0}, 0.0};

@@ -61,6 +61,24 @@ enum { BST_PATH_POINTS = 64 };
 bst_path_point_fit bst_path_fit_points(const bst_path_point *points, int count, double image_px,
                                        double model_px, double light, double saturated);
 
+/* A streak's light: uniform along its path about (x_px, y_px). */
+typedef struct bst_path_streak {
+    double x_px, y_px, flux;
+    bst_obsgen_path_px path;
+} bst_path_streak;
+
+/* Fits one streak to the light of several, as bst_path_fit_points: place, flux and width are free.
+ *
+ * Given:     streaks   about (0, 0), the centre of the fitted streak and start of the iterations
+ *            image_px  deviation of a point's image, including the pixel
+ *            model     fitted streak; its bend is not used
+ *            light     brightest pixel of a fitted streak of flux 1 over the variance of the noise
+ *            margin_px of the fitted pixels about the streak
+ *            limit_px  farthest place on each axis */
+bst_path_point_fit bst_path_fit_streaks(const bst_path_streak *streaks, int count, double image_px,
+                                        const bst_streak_model *model, double light,
+                                        double margin_px, double limit_px);
+
 /* Widths of the images of a point, px, including the pixel: of the star, of the filters, and of
  * the product of both. */
 typedef struct bst_path_widths {

@@ -47,8 +47,7 @@ static double point_lead(const bst_generator *g, const bst_star_trail_path *path
 /* True if a point fits a noisy source better than a streak. */
 static bool leads(const bst_generator *g, const generator_source *s, double lead) {
     double snr = s->sharp * s->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e;
-    double scatter = sqrt(2.0 * fmax(1.0 - g->shared_noise, 1e-6));
-    return lead * snr + scatter * bst_generator_draw(g, s, GENERATOR_SHAPE) > 0.0;
+    return lead * snr + bst_generator_filter_noise(g, s, 0) > bst_generator_filter_noise(g, s, 1);
 }
 
 double bst_generator_streak_light(const bst_generator *g, double flux_e) {

@@ -33,11 +33,13 @@ static fixture *make(const bst_pd_options *options) {
                              .throughput = 0.7,
                              .quantum_efficiency = 0.8,
                              .photon_flux_v0_per_s_m2 = 3.6e10,
+                             .dark_current_e_per_s = 10.0,
                              .read_noise_e = 6.0};
     s->sigma_px = bst_camera_psf_sigma_px(&s->camera);
     s->exposure_s = 0.4;
     s->sky_e = 30.0;
-    s->dark_e = 4.0;
+    s->dark_e = bst_camera_dark_e(&s->camera, s->exposure_s);
+    bst_assert_close(s->dark_e, 4.0, 1e-12);
     s->noise_e = sqrt(30.0 + 4.0 + 36.0);
     s->columns = COLUMNS;
     s->rows = ROWS;

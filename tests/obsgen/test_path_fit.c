@@ -333,12 +333,71 @@ static void stars_that_rest_are_points_where_they_rest(void **state) {
     close_scene(&s);
 }
 
+/* Jitter that is faster than the path is sampled for fits widens the image as much as all of it. */
+static void fast_jitter_widens_the_image(void **state) {
+    (void)state;
+    const double jitter = 1.0, length = 8.0;
+    path smooth = slowing(length, 0.0), shaken = smooth;
+    for (int k = 0; k < STEPS; k++) { /* equal squares on both axes, no mean over four steps */
+        shaken.x[k] += jitter * (k % 2 ? 1.0 : -1.0);
+        shaken.y[k] += jitter * (k / 2 % 2 ? 1.0 : -1.0);
+    }
+    const bst_obsgen_path_px filter = {0.8 * length, 0.6 * length};
+    const double own2 = 0.8, source2 = own2 + jitter * jitter;
+    const bst_path_widths narrow = {sqrt(own2), sqrt(own2), sqrt(own2)};
+    const bst_path_widths wide = {sqrt(source2), sqrt(own2), sqrt(0.5 * (own2 + source2))};
+    const bst_star_trail_path paths[2] = {route_of(&smooth), route_of(&shaken)};
+    bst_path_outputs seen = bst_path_fit_outputs(&paths[1], filter, &narrow);
+    bst_path_outputs expected = bst_path_fit_outputs(&paths[0], filter, &wide);
+    bst_assert_close(seen.streak, expected.streak, 0.01);
+    bst_assert_close(seen.point, expected.point, 0.01);
+}
+
+/* A source that is seen as a point has less noise in the filter for streaks, and one that is seen
+ * as a streak less in the filter for points: the same noise decides the shape and both detections.
+ */
+static void shape_and_detection_have_one_noise(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    path p = resting(8.0, 0.3);
+    (void)run_on(&s, &p, 5.0, 0);
+    const bst_generator *g = s.generator;
+    double both = 0.0, square[2] = {0.0, 0.0}, other[2] = {0.0, 0.0};
+    int seen[2] = {0, 0};
+    assert_true(g->shared_noise > 0.3 && g->shared_noise < 0.95 && g->source_count > 800);
+    for (int i = 0; i < g->source_count; i++) {
+        generator_source o = g->sources[i];
+        const double noise[2] = {bst_generator_filter_noise(g, &o, 0),
+                                 bst_generator_filter_noise(g, &o, 1)};
+        both += noise[0] * noise[1] / g->source_count;
+        for (int k = 0; k < 2; k++) {
+            square[k] += noise[k] * noise[k] / g->source_count;
+            if (noise[k] > noise[!k]) {
+                o.as_streak = k == 1;
+                other[k] += bst_generator_other_noise(g, &o) - noise[k];
+                assert_true(bst_generator_other_noise(g, &o) == noise[!k]);
+                seen[k]++;
+            }
+        }
+    }
+    /* 900 sources: three standard errors */
+    bst_assert_close(square[0], 1.0, 0.15);
+    bst_assert_close(square[1], 1.0, 0.15);
+    bst_assert_close(both, g->shared_noise, 0.15);
+    assert_true(seen[0] > 300 && seen[1] > 300 && other[0] < 0.0 && other[1] < 0.0);
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fits_end_where_they_would_on_fine_pixels),
         cmocka_unit_test(saturated_pixels_are_left_out),
         cmocka_unit_test(a_bend_is_measured_on_bright_streaks),
         cmocka_unit_test(outputs_are_those_of_sums),
+        cmocka_unit_test(fast_jitter_widens_the_image),
+        cmocka_unit_test(shape_and_detection_have_one_noise),
         cmocka_unit_test(bright_streaks_have_another_bias),
         cmocka_unit_test(stars_that_rest_are_points_where_they_rest),
     };

@@ -2,8 +2,9 @@
  * generator with the shipped calibration.
  *
  * Usage of the program beside the test, from the repository root:
- *   build/tests/obsgen/test_obsgen_streak_detection LENGTH_PX FWHM_PX ALARMS_PER_FRAME FRAMES
- * prints both by SNR; with the word slow alone the test has more frames. */
+ *   build/tests/obsgen/test_obsgen_streak_detection LENGTH_PX FWHM_PX ALARMS FRAMES [JITTER_PX]
+ * prints both by SNR, with jitter that is unknown on board; with the word slow alone the test has
+ * more frames. */
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -28,11 +29,14 @@ typedef struct setup {
     bst_truth *truth;
     bst_detections *detections;
     bst_rng_key key;
-    double length, fwhm;
+    double length, fwhm; /* fwhm: of the onboard PSF */
+    double sigma2;       /* variance of the PSF with jitter and pixel, px^2 */
 } setup;
 
-static void open_setup(setup *s, double length, double fwhm, double alarms) {
+static void open_setup(setup *s, double length, double fwhm, double alarms, double jitter) {
     *s = (setup){.length = length, .fwhm = fwhm};
+    double sigma = fwhm / BST_FWHM_PER_SIGMA;
+    s->sigma2 = sigma * sigma + jitter * jitter + 1.0 / 12.0;
     synthetic_init(&s->pixels, SIDE, SIDE);
     s->pixels.sky_e = 50.0;
     s->pixels.camera.psf_fwhm_px = fwhm;
@@ -49,8 +53,10 @@ static void open_setup(setup *s, double length, double fwhm, double alarms) {
     bst_obsgen_calibration shipped;
     bst_assert_ok(&s->ctx, bst_obsgen_calibration_read(
                                &s->ctx, "scenarios/calibration/neossat.obsgen", &shipped));
-    bst_assert_ok(&s->ctx, bst_generator_create(&s->ctx, &s->pixels.camera, &s->pixels.camera,
-                                                &settings, &shipped, s->key, &s->generator));
+    const bst_camera onboard = s->pixels.camera;
+    s->pixels.camera.psf_fwhm_px = BST_FWHM_PER_SIGMA * hypot(sigma, jitter);
+    bst_assert_ok(&s->ctx, bst_generator_create(&s->ctx, &s->pixels.camera, &onboard, &settings,
+                                                &shipped, s->key, &s->generator));
 }
 
 static void close_setup(setup *s) {
@@ -63,9 +69,8 @@ static void close_setup(setup *s) {
 
 /* Draws a frame's stars, all along (dx, dy), and states them in the truth. */
 static void draw_stars(setup *s, int frame, double dx, double dy) {
-    double sigma2 = pow(s->fwhm / BST_FWHM_PER_SIGMA, 2.0) + 1.0 / 12.0;
     const bst_obsgen_path_px path = {dx, dy};
-    double norm = sqrt(bst_matched_product(path, path, sqrt(sigma2)));
+    double norm = sqrt(bst_matched_product(path, path, sqrt(s->sigma2)));
     synthetic_clear(&s->pixels);
     s->truth->count = 0;
     s->truth->exposure_id = frame;
@@ -107,10 +112,10 @@ static void add_found(const setup *s, double dx, double dy, double found[SNRS]) 
     }
 }
 
-static outcome compare(double length, double fwhm, double alarms, int frames) {
+static outcome compare(double length, double fwhm, double alarms, double jitter, int frames) {
     setup s;
     outcome o = {.threshold = {0.0, 0.0}};
-    open_setup(&s, length, fwhm, alarms);
+    open_setup(&s, length, fwhm, alarms, jitter);
     for (int f = 0; f < frames; f++) {
         double angle = 2.0 * BST_PI * bst_rng_uniform(s.key, (uint64_t)f, 1 << 20);
         double dx = length * cos(angle), dy = length * sin(angle);
@@ -150,7 +155,7 @@ static int frames = 30;
 /* Short streaks near the threshold, which both filters of a frame show. */
 static void short_streaks_are_found_as_often_as_in_images(void **state) {
     (void)state;
-    outcome o = compare(3.0, 2.9, 1.0, frames);
+    outcome o = compare(3.0, 2.9, 1.0, 0.0, frames);
     double off = 0.0;
     for (int b = 0; b < 4; b++) {
         off += 0.25 * (o.generator[b] - o.image[b]) / o.stars[b];
@@ -162,7 +167,8 @@ static void short_streaks_are_found_as_often_as_in_images(void **state) {
 }
 
 static int print_comparison(char **argv) {
-    outcome o = compare(atof(argv[1]), atof(argv[2]), atof(argv[3]), atoi(argv[4]));
+    double jitter = argv[5] ? atof(argv[5]) : 0.0;
+    outcome o = compare(atof(argv[1]), atof(argv[2]), atof(argv[3]), jitter, atoi(argv[4]));
     printf("threshold: images %.3f, generator %.3f\n", o.threshold[0], o.threshold[1]);
     for (int b = 0; b < SNRS; b++) {
         double image = o.image[b] / o.stars[b], generator = o.generator[b] / o.stars[b];
@@ -177,5 +183,5 @@ int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(short_streaks_are_found_as_often_as_in_images),
     };
-    return argc == 5 ? print_comparison(argv) : cmocka_run_group_tests(tests, NULL, NULL);
+    return argc >= 5 ? print_comparison(argv) : cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -64,9 +64,7 @@ static bst_status read_psf(bst_ctx *ctx, bst_pd_scene *s) {
 /* Noise of a pixel without source. */
 static double noise_at(const bst_pd_scene *s, double x_px, double y_px) {
     double sky_e = s->sky ? bst_pd_sky_e(s->sky, x_px, y_px) : s->sky_e;
-    double shot_e2 = bst_camera_excess_noise(&s->camera) * (sky_e + s->dark_e);
-    double read_e = bst_camera_read_noise_e(&s->camera);
-    return sqrt(shot_e2 + read_e * read_e);
+    return bst_camera_noise_e(&s->camera, sky_e, s->exposure_s);
 }
 
 /* Evaluates the scenario's sky for its level at the boresight. */
