@@ -28,7 +28,7 @@ typedef struct run_request {
     bst_run_saving saving;
     const char *out, *replay;
     int64_t threads;
-    bool help, overwrite, quiet, serial, force, view;
+    bool help, overwrite, quiet, serial, force, view, no_pictures;
 } run_request;
 
 /* Creates the simulation and runs it. */
@@ -59,6 +59,7 @@ static bst_status run_loaded(bst_ctx *ctx, run_request *r, const bst_json *json,
                                .force = r->force,
                                .progress = !r->quiet && isatty(STDERR_FILENO),
                                .print = true,
+                               .no_pictures = r->no_pictures,
                                .saving = &r->saving};
     bst_simulation *sim = NULL;
     struct bst_view_attached *page = NULL;
@@ -93,6 +94,10 @@ static const bst_option OPTIONS[] = {
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(run_request, serial),
      .doc = "do not process and record beside the simulation; the results are the same"},
+    {.name = "no-pictures",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(run_request, no_pictures),
+     .doc = "do not write quicklook.png and pointing.png"},
     {.name = "view",
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(run_request, view),
