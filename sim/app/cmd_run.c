@@ -15,8 +15,7 @@ static const char help_text[] =
     "usage: boresight run SCENARIO.json [options]\n"
     "\nRuns a scenario and writes its results to a folder: frames.fits (opens in ds9), run.sqlite\n"
     "(truth, detections, tracks, commands, telemetry, events), manifest.json, quicklook.png,\n"
-    "pointing.png. While it runs the folder is called OUT.partial. Ctrl-C closes the run "
-    "properly,\n"
+    "pointing.png. While it runs the folder is OUT.partial. Ctrl-C closes the run properly,\n"
     "a second one ends it at once.\n\n"
     "  boresight run scenarios/neossat_geo_track.json --out runs/demo\n"
     "  boresight run scenarios/neossat_geo_track.json --duration 60 --set /record/frames=none\n"
@@ -28,7 +27,7 @@ typedef struct run_request {
     bst_run_saving saving;
     const char *out, *replay;
     int64_t threads;
-    bool help, overwrite, quiet, serial, force, view;
+    bool help, overwrite, quiet, serial, force, view, no_pictures;
 } run_request;
 
 /* Creates the simulation and runs it. */
@@ -59,6 +58,7 @@ static bst_status run_loaded(bst_ctx *ctx, run_request *r, const bst_json *json,
                                .force = r->force,
                                .progress = !r->quiet && isatty(STDERR_FILENO),
                                .print = true,
+                               .no_pictures = r->no_pictures,
                                .saving = &r->saving};
     bst_simulation *sim = NULL;
     struct bst_view_attached *page = NULL;
@@ -93,6 +93,10 @@ static const bst_option OPTIONS[] = {
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(run_request, serial),
      .doc = "do not process and record beside the simulation; the results are the same"},
+    {.name = "no-pictures",
+     .kind = BST_OPTION_FLAG,
+     .offset = offsetof(run_request, no_pictures),
+     .doc = "do not write quicklook.png and pointing.png"},
     {.name = "view",
      .kind = BST_OPTION_FLAG,
      .offset = offsetof(run_request, view),

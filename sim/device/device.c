@@ -9,6 +9,7 @@
 #include <string.h>
 #include <time.h>
 
+#include "bst_device_kernels.h"
 #include "sim/device/build_log.h"
 #include "sim/device/kernel_cache.h"
 
@@ -39,6 +40,7 @@ struct bst_device {
     int built_count;
     kept_program programs[MAX_PROGRAMS];
     int program_count;
+    int header_builds; /* programs that were built with the device's own headers */
 };
 
 static const struct {
@@ -408,6 +410,10 @@ const bst_device_kernel_source *bst_device_built(const bst_device *device, int i
     return index >= 0 && index < device->built_count ? device->built[index] : NULL;
 }
 
+int bst_device_header_builds(const bst_device *device) {
+    return (device->origin ? device->origin : device)->header_builds;
+}
+
 void bst_device_begin_list(bst_device *device) {
     device->built_count = 0;
 }
@@ -450,6 +456,35 @@ static const char no_abi_warnings[] =
     "#endif\n"
     "#endif\n";
 
+/* The guard of Clang's opencl-c.h. */
+static const char no_header[] = " -D_OPENCL_H_";
+
+/* Builds a program for PoCL with declarations of the built-in functions in place of its headers,
+ * which it would read for 50 ms even if the kernels are cached; false: with the headers, then. */
+static bool build_without_headers(bst_device *device, const char **texts, cl_uint count,
+                                  const char *options, cl_program *out) {
+    const char *prelude = texts[0];
+    size_t bytes = strlen(prelude) + strlen(bst_kernel_builtins.text) + 1,
+           option_bytes = strlen(options) + sizeof no_header;
+    char *declared = malloc(bytes), *all_options = malloc(option_bytes);
+    cl_program program = NULL;
+    if (declared && all_options) {
+        snprintf(declared, bytes, "%s%s", prelude, bst_kernel_builtins.text);
+        snprintf(all_options, option_bytes, "%s%s", options, no_header);
+        texts[0] = declared;
+        program = clCreateProgramWithSource(device->context, count, texts, NULL, NULL);
+        texts[0] = prelude;
+    }
+    if (program && clBuildProgram(program, 1, &device->id, all_options, NULL, NULL) != CL_SUCCESS) {
+        clReleaseProgram(program);
+        program = NULL;
+    }
+    free(declared);
+    free(all_options);
+    *out = program;
+    return program != NULL;
+}
+
 /* Builds an OpenCL program, or returns the one already built. */
 static bst_status build(bst_ctx *ctx, bst_device *device,
                         const bst_device_kernel_source *const *sources, int count,
@@ -477,6 +512,11 @@ static bst_status build(bst_ctx *ctx, bst_device *device,
         texts[2 * i + 1] = lines[i];
         texts[2 * i + 2] = sources[i]->text;
     }
+    if (device->pocl && build_without_headers(device, texts, (cl_uint)count * 2 + 1,
+                                              options ? options : "", &program)) {
+        goto built;
+    }
+    device->header_builds++;
     cl_int code;
     program =
         clCreateProgramWithSource(device->context, (cl_uint)count * 2 + 1, texts, NULL, &code);
@@ -488,6 +528,7 @@ static bst_status build(bst_ctx *ctx, bst_device *device,
         status = build_failure(ctx, device, program, texts, count * 2 + 1, sources);
         goto exit;
     }
+built:
     for (int i = 0; i < count; i++) {
         note_built(device, sources[i]);
     }

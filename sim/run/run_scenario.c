@@ -321,7 +321,7 @@ static bst_status write_ending(bst_run_execution *run, double wall, bst_status e
     memcpy(why, ctx->message, sizeof why);
     bool failed = ended != BST_OK && ended != BST_ERR_INTERRUPTED;
     bst_status status = BST_OK;
-    if (!failed) {
+    if (!failed && !run->request->no_pictures) {
         bst_loop_figures figures;
         bst_loop_summary_figures(run->sensors->summary, &figures);
         status = bst_run_pictures_write(ctx, run->sensors->pictures, bst_run_folder(run->store),

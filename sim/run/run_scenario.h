@@ -37,6 +37,7 @@ typedef struct bst_run_request {
     bool force;                   /* start even if the disk is too small for the frames */
     bool progress;                /* progress display on standard error */
     bool print;                   /* table of results on standard output */
+    bool no_pictures;             /* quicklook.png and pointing.png are not written */
     bool metrics;                 /* without folder: compute sightings and custody too */
     double most_s;                /* > 0, without folder: limit of stepping time */
     const bst_run_saving *saving; /* NULL: the whole run, without saved states */

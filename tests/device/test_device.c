@@ -63,6 +63,33 @@ static void build_errors_name_the_file(void **state) {
     bst_device_close(device);
 }
 
+/* A function that builtins.cl does not declare is found in the headers of the OpenCL
+ * implementation. */
+static void other_functions_are_found_in_headers(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_device *device;
+    bst_assert_ok(&ctx, bst_device_open(&ctx, "", 1, &device));
+    const bool pocl = strncmp(bst_device_description(device), "PoCL", 4) == 0;
+    bst_device_kernel_source
+        known = {"known.cl", "kernel void f(global float *a) { a[0] = fma(a[1], a[2], a[3]); }\n",
+                 0, 0},
+        other = {"other.cl", "kernel void f(global float *a) { a[0] = lgamma(a[1]); }\n", 0, 0};
+    const bst_device_kernel_source *sources[] = {&known, &other};
+    for (int i = 0; i < 2; i++) {
+        cl_program program;
+        bst_assert_ok(&ctx,
+                      bst_device_build(&ctx, device, &sources[i], 1, "-cl-std=CL1.2", &program));
+        cl_int code;
+        cl_kernel kernel = clCreateKernel(program, "f", &code);
+        bst_assert_ok(&ctx, bst_device_check(&ctx, code, "kernel"));
+        clReleaseKernel(kernel);
+        clReleaseProgram(program);
+        assert_int_equal(bst_device_header_builds(device), pocl ? i : i + 1);
+    }
+    bst_device_close(device);
+}
+
 /* The log of NVIDIA's compiler, which ignores #line and counts the lines of all sources. */
 static void logs_without_names_get_them(void **state) {
     (void)state;
@@ -200,6 +227,7 @@ int main(void) {
         cmocka_unit_test(unknown_selectors_list_what_there_is),
         cmocka_unit_test(threads_limit_a_cpu_device),
         cmocka_unit_test(build_errors_name_the_file),
+        cmocka_unit_test(other_functions_are_found_in_headers),
         cmocka_unit_test(logs_without_names_get_them),
         cmocka_unit_test(philox_is_the_same_on_the_device),
         cmocka_unit_test(buffers_hold_their_content),

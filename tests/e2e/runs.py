@@ -40,10 +40,12 @@ def clean():
         shutil.rmtree(_folders.pop(), ignore_errors=True)
 
 
-def command(scenario, out, *sets, seed=None, duration=None, threads=1, serial=False):
-    """Arguments of `boresight run`; `sets` are overrides "/path=value"."""
+def command(scenario, out, *sets, seed=None, duration=None, threads=1, serial=False, pictures=False):
+    """Arguments of `boresight run`; `sets` are overrides "/path=value". Pictures take 0.2 s."""
     words = [BORESIGHT, "run", scenario, "--quiet", "--out", out, "--threads", str(threads),
              "--set", "/world/star_catalogue=embedded"]
+    if not pictures:
+        words.append("--no-pictures")
     if seed is not None:
         words += ["--seed", hex(seed)]
     if duration is not None:

@@ -95,6 +95,8 @@ class BadInput(unittest.TestCase):
         for (reader, path), result in zip(jobs, results):
             with self.subTest(reader=reader, path=path):
                 self.refused(result, path)
+                if reader == "star import" and path.endswith("hole"):  # read to its end, it takes ten seconds
+                    self.assertIn("a zero byte: the file is not text", result.stderr)
         self.assertFalse(os.path.exists(NEVER))
 
     def test_output_that_cannot_be_written(self):
@@ -122,7 +124,7 @@ class BadInput(unittest.TestCase):
             subprocess.run(["cp", "-r", *glob.glob(KERNELS + "/[A-Z]*"), cache], check=False, stderr=subprocess.DEVNULL)
 
         def run():
-            words = [runs.BORESIGHT, "run", runs.STARE, "--quiet", "--duration", "1", "--out",
+            words = [runs.BORESIGHT, "run", runs.STARE, "--quiet", "--no-pictures", "--duration", "1", "--out",
                      os.path.join(runs.scratch(), "run"), "--set", runs.NO_FRAMES, "--set",
                      "/world/star_catalogue=embedded"]
             return subprocess.run(["sh", "-c", 'ulimit -s 64; exec "$@"', "sh", *words],

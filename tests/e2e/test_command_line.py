@@ -144,7 +144,7 @@ class Messages(unittest.TestCase):
 
 
 class Folders(unittest.TestCase):
-    quick = ("--quiet", "--duration", "1", *NO_IMAGES, "--set", runs.NO_FRAMES, "--set",
+    quick = ("--quiet", "--no-pictures", "--duration", "1", *NO_IMAGES, "--set", runs.NO_FRAMES, "--set",
              "/world/star_catalogue=embedded")
 
     def run_to(self, out, *words):
@@ -153,6 +153,7 @@ class Folders(unittest.TestCase):
     def test_existing_folder(self):
         out = os.path.join(runs.scratch(), "run")
         self.assertEqual(self.run_to(out).returncode, 0)
+        self.assertEqual(sorted(os.listdir(out)), ["manifest.json", "run.sqlite", "scenario.json"])
         first = os.stat(os.path.join(out, "manifest.json")).st_ino
         result = self.run_to(out)
         self.assertEqual(result.returncode, 1)

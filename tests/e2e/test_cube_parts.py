@@ -59,7 +59,7 @@ class CubeParts(unittest.TestCase):
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         with open(scenario, "w", encoding="utf-8") as file:
             file.write(runs.call("study", path, "--emit", "0").stdout)
-        result = subprocess.run([runs.BORESIGHT, "run", scenario, "--quiet", "--out", hand], capture_output=True,
+        result = subprocess.run([runs.BORESIGHT, "run", scenario, "--quiet", "--no-pictures", "--out", hand], capture_output=True,
                                 text=True, timeout=600)
         self.assertEqual(result.returncode, 0, result.stderr)
         ours_path = os.path.join(out, "PartFiles", "000000.fits")

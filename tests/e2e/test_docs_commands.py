@@ -48,9 +48,11 @@ if "run" in words[:3] and length and "--replay" not in words and "--help" not in
         words += ["--duration", length]
     elif os.environ.get("DOCS_OWN"):
         words[words.index("--duration") + 1] = length
+    if words[0] == "run":
+        words += ["--no-pictures"]
 if words[:1] == ["run"] and length and os.environ.get("DOCS_CHECK"):
     at = words.index("--out")
-    words = ["check", "--quiet"] + [word for word in words[1:at] + words[at + 2:] if word != "--overwrite"]
+    words = ["check", "--quiet"] + [word for word in words[1:at] + words[at + 2:] if word not in ("--overwrite", "--no-pictures")]
 if words[:1] == ["study"] and length and "--out" in words and "--emit" not in words and "scenarios/" in words[1]:
     words += ["--dry-run"] if "--dry-run" not in words else []
 elif (words[:1] == ["study"] and length and "--out" in words and words[1].endswith(".json")

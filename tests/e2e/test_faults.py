@@ -88,7 +88,7 @@ class Faults(unittest.TestCase):
 
         def reference(form):
             out = os.path.join(cls.folder, f"reference {form}")
-            runs.run(runs.TRACK, out, *FORMS[form], duration=DURATION_S)
+            runs.run(runs.TRACK, out, *FORMS[form], duration=DURATION_S, pictures=True)
             path = os.path.join(out, "frames.fits")
             cls.reference[form] = leftovers.frames_in(path) if os.path.exists(path) else []
             sizes = [os.path.getsize(os.path.join(out, name)) for name in os.listdir(out)]
@@ -101,7 +101,7 @@ class Faults(unittest.TestCase):
     def call_limited(self, out, form, limit, duration=DURATION_S):
         """Runs the program; the limit holds from when its first frames are on their way, because
         OpenCL compiles to files until then."""
-        words = runs.command(runs.TRACK, out, *FORMS[form], duration=duration)
+        words = runs.command(runs.TRACK, out, *FORMS[form], duration=duration, pictures=True)
         first = out + (".partial/run.sqlite" if form == "none" else ".partial/frames.fits")
         with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                               text=True) as process:
@@ -156,7 +156,7 @@ class Faults(unittest.TestCase):
         form = list(FORMS)[k % 4]
         size = int(rng.uniform(0, 1.02) * self.size[form]) // 4096 * 4096 + 4096 \
             if k % 8 else 4096 * (k + 1)
-        words = runs.command(runs.TRACK, "@DISK@/run", *FORMS[form], duration=DURATION_S)
+        words = runs.command(runs.TRACK, "@DISK@/run", *FORMS[form], duration=DURATION_S, pictures=True)
         result, disk, left = on_a_small_disk(size, words)
         out = os.path.join(left, "run")
         where, frames, _ = leftovers.check(out, self.reference[form], DURATION_S) \

@@ -36,7 +36,7 @@ LONGEST_WAIT_S = 1.5 if FULL else 0.4
 
 
 def start(out, form, duration, *words):
-    return subprocess.Popen(runs.command(runs.TRACK, out, *FORMS[form], duration=duration) + [*words],
+    return subprocess.Popen(runs.command(runs.TRACK, out, *FORMS[form], duration=duration, pictures=True) + [*words],
                             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
 

@@ -16,7 +16,8 @@ class MainJob(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.out = os.path.join(runs.scratch(), "track")
-        cls.manifest = runs.run(runs.TRACK, cls.out, runs.NO_FRAMES, threads=os.cpu_count())
+        cls.manifest = runs.run(runs.TRACK, cls.out, runs.NO_FRAMES, threads=os.cpu_count(),
+                                 pictures=True)
         cls.summary = cls.manifest["summary"]
         print("summary:", cls.summary)
 

@@ -153,7 +153,7 @@ class New(unittest.TestCase):
         self.assertEqual(made.returncode, 0, made.stderr)
         sensor, out = "/observers/0/sensors/0", os.path.join(runs.scratch(), "run")
         modules = {"gimbal": {"type": "ideal", "object": "STARLINK-1709"}, "scenegen": {"type": "opencl"}}
-        result = call("run", path, "--quiet", "--out", out, "--set", runs.NO_FRAMES,
+        result = call("run", path, "--quiet", "--no-pictures", "--out", out, "--set", runs.NO_FRAMES,
                       "--set", f"{sensor}/modules={json.dumps(modules)}",
                       "--set", sensor + '/exposure={"exposure_s": 0.1, "period_s": 5}',
                       # the same field of few pixels: light of the Earth takes time in each

@@ -42,7 +42,7 @@ class Repeat(unittest.TestCase):
             scenario, form, seed, threads, duration = JOBS[name]
             return runs.run(scenario, os.path.join(cls.folder, name), f"/record/frames={form}",
                             *(NEAR if scenario == runs.TRACK else []), seed=seed, threads=threads, duration=duration,
-                            serial=name.endswith("serial"))
+                            serial=name.endswith("serial"), pictures=True)
         cls.manifests = dict(zip(JOBS, runs.parallel(one, JOBS)))
 
     def path(self, name, file="frames.fits"):

@@ -276,7 +276,7 @@ class Crowded(OnePage):
         cls.made = os.path.join(runs.scratch(), "run")
         runs.run("scenarios/crowded_geo_track.json", cls.made, "/record/frames=cube",
                  "/world/faint_limit_v_mag=17", runs.SENSOR + "/modules/scenegen/star_limit_v_mag=17",
-                 duration=24)
+                 duration=24, pictures=True)
         assert report(cls.made).returncode == 0
         cls.page = Page(cls.made + "/report.html")
         with runs.database(cls.made) as tables:

@@ -57,6 +57,11 @@ def content(out):
     return found
 
 
+def with_pictures(sets):
+    """The pictures of one form of the runs are enough."""
+    return RICE[0] in sets
+
+
 class Interruption:
     """A run of a scenario that is interrupted and resumed."""
 
@@ -67,7 +72,7 @@ class Interruption:
 
     def words(self, *more, every=None, **options):
         return runs.command(self.scenario, self.out, *self.sets, duration=self.duration,
-                            **options) + ["--save-every", str(every or self.every), *more]
+                            pictures=with_pictures(self.sets), **options) + ["--save-every", str(every or self.every), *more]
 
     def stop(self, number, saves, *more, **options):
         """Starts the run and sends a signal after a number of saved states; what it said. A run
@@ -125,7 +130,7 @@ class Resume(unittest.TestCase):
         """What the uninterrupted run leaves; one run for each name."""
         if name not in self.references:
             out = os.path.join(self.folder, "reference " + name)
-            runs.run(scenario, out, *sets, duration=duration)
+            runs.run(scenario, out, *sets, duration=duration, pictures=with_pictures(sets))
             self.references[name] = content(out)
         return self.references[name]
 
