@@ -1,6 +1,6 @@
 // Pictures of what a scenario's numbers mean: the field with its stars, and the target's SNR over a day.
 import { make } from './editor_form.js';
-import { shortNumber, ticksOf } from './plots.js';
+import { shortNumber, ticksOf } from './chart.js';
 
 const SVG = 'http://www.w3.org/2000/svg';
 /** SNR of the limiting magnitude (sim/analysis/check/check_figures.h). */
