@@ -11,12 +11,14 @@ int bst_view_band_rows(int width, int n) {
     return (bins > 1 ? bins : 1) * n;
 }
 
-/* Reads the bands of a part that was fitted to the frame, of `most` rows, and bins them. */
+/* Reads the bands of a part that was fitted to the frame and bins them. */
 static bst_status read_bands(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int64_t frame,
-                             int most, const bst_view_part *part, uint32_t *sums, uint16_t *out) {
+                             const bst_view_part *part, uint32_t *sums, uint16_t *out) {
     const int n = (int)part->binning, width = (int)part->width;
     const int64_t end = part->y + part->height;
     bst_fits_read_frame band;
+    BST_TRY(bst_view_read_rows(ctx, run, s, frame, 0, 0, &band));
+    const int most = bst_view_band_rows(band.width, n);
     for (int64_t y = part->y; y < end;) {
         const int rows = end - y < most ? (int)(end - y) : most;
         BST_TRY(bst_view_read_rows(ctx, run, s, frame, (int)y, rows, &band));
@@ -56,9 +58,8 @@ static bst_status read_part(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s,
     out->frame_height = image.height;
     out->data = malloc(out->bytes);
     uint32_t *sums = malloc((size_t)part.width * sizeof *sums);
-    const int most = bst_view_band_rows(image.width, (int)part.binning);
     bst_status status = out->data && sums
-                            ? read_bands(ctx, run, s, frame, most, &part, sums, out->data)
+                            ? read_bands(ctx, run, s, frame, &part, sums, out->data)
                             : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a frame");
     free(sums);
     return status;

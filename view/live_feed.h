@@ -7,7 +7,7 @@
 
 typedef struct bst_view_feed bst_view_feed;
 
-/* A frame with its marks, which all who watch share: nobody changes it. */
+/* A frame with its marks, which all who watch share; it does not change. */
 typedef struct bst_view_live_frame {
     int64_t sequence;  /* 1, 2, ... per sensor */
     char *json;        /* in the form of bst_view_run_frame, without names */
