@@ -55,15 +55,23 @@ static int64_t row_of(const bst_view_sensor *s, int64_t from, int64_t exposure) 
     return from < (int64_t)s->count && s->exposures[from].id == exposure ? from : -1;
 }
 
-static bst_status list_states(bst_ctx *ctx, const bst_view_sensor *s, int64_t first, int64_t last,
-                              int64_t track, cursor *tracks, cursor *detections, cJSON *out) {
+/* Which states are listed: of a track, in exposures first to last of the sensor's list. */
+typedef struct history {
+    const bst_view_sensor *sensor;
+    int64_t first, last, track;
+    cursor tracks, detections;
+} history;
+
+static bst_status list_states(bst_ctx *ctx, history *h, cJSON *out) {
+    const bst_view_sensor *s = h->sensor;
+    cursor *tracks = &h->tracks;
     cJSON *states = cJSON_AddArrayToObject(out, "states");
-    int64_t row = first;
+    int64_t row = h->first;
     for (; tracks->rows && tracks->more &&
-           bst_io_rows_int(tracks->rows, 0) <= s->exposures[last].id;) {
+           bst_io_rows_int(tracks->rows, 0) <= s->exposures[h->last].id;) {
         const bst_io_rows *r = tracks->rows;
         const int64_t exposure = bst_io_rows_int(r, 0), found = row_of(s, row, exposure);
-        if (bst_io_rows_int(r, 1) == track && found >= 0) {
+        if (bst_io_rows_int(r, 1) == h->track && found >= 0) {
             cJSON *node = bst_view_add_object(states);
             row = found;
             cJSON_AddNumberToObject(node, "frame", (double)found);
@@ -76,7 +84,7 @@ static bst_status list_states(bst_ctx *ctx, const bst_view_sensor *s, int64_t fi
             cJSON_DeleteItemFromObjectCaseSensitive(out, "first_s");
             bst_json_add_number(out, "first_s", bst_io_rows_real(r, 10));
             if (bst_io_rows_int(r, 5) == 0) {
-                BST_TRY(add_detection(ctx, detections, exposure, bst_io_rows_real(r, 6),
+                BST_TRY(add_detection(ctx, &h->detections, exposure, bst_io_rows_real(r, 6),
                                       bst_io_rows_real(r, 7), node));
             }
         }
@@ -94,7 +102,7 @@ static bst_status answer(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) 
     const int64_t first =
         x->frame >= BST_VIEW_TRACK_EXPOSURES ? x->frame - BST_VIEW_TRACK_EXPOSURES + 1 : 0;
     const int64_t exposure = s->exposures[first].id, sensor = s->sensor.index;
-    cursor tracks, detections = {NULL, false};
+    history h = {s, first, x->frame, x->object, {NULL, false}, {NULL, false}};
     x->json = cJSON_CreateObject();
     cJSON_AddNumberToObject(x->json, "track", (double)x->object);
     cJSON_AddBoolToObject(x->json, "earlier", first > 0);
@@ -102,19 +110,17 @@ static bst_status answer(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) 
         open_cursor(ctx, run, sensor, "tracks",
                     "track_id, time_s, status, hits, misses_in_row, x_px, y_px, snr, v_mag,"
                     " CAST(first_tick AS REAL) / (SELECT tick_rate_hz FROM run)",
-                    exposure, &tracks);
+                    exposure, &h.tracks);
     status = status == BST_OK ? open_cursor(ctx, run, sensor, "detections",
                                             "x_px, y_px, label, snr, v_mag, streak, blend",
-                                            exposure, &detections)
+                                            exposure, &h.detections)
                               : status;
-    status = status == BST_OK
-                 ? list_states(ctx, s, first, x->frame, x->object, &tracks, &detections, x->json)
-                 : status;
-    if (tracks.rows) {
-        bst_io_rows_close(tracks.rows);
+    status = status == BST_OK ? list_states(ctx, &h, x->json) : status;
+    if (h.tracks.rows) {
+        bst_io_rows_close(h.tracks.rows);
     }
-    if (detections.rows) {
-        bst_io_rows_close(detections.rows);
+    if (h.detections.rows) {
+        bst_io_rows_close(h.detections.rows);
     }
     return status;
 }

@@ -70,6 +70,8 @@ export function spansOf(states) {
 }
 
 const WORDS = { visible: 'visible', faint: `SNR below ${LIMIT_SNR}`, dark: 'in shadow', occulted: 'behind the Earth' };
+/** Colours of the bands in words (editor.css). */
+const BANDS = { occulted: 'orange', faint: 'green', dark: 'grey' };
 
 /** SNR over the day from the epoch on. @param {any} sensor of the figures @param {number} duration of the run, s */
 function dayPicture(sensor, duration) {
@@ -96,7 +98,8 @@ function dayPicture(sensor, duration) {
   add('polyline', { points: states.map((one, k) => `${toX(k * step).toFixed(1)},${toY(one.snr).toFixed(1)}`).join(' '), class: 'preview-line' });
   add('line', { x1: left, x2: width - right, y1: toY(LIMIT_SNR), y2: toY(LIMIT_SNR), class: 'preview-limit' });
   add('line', { x1: toX(0), x2: Math.max(toX(0) + 2, toX(Math.min(span, duration / 3600))), y1: height - bottom, y2: height - bottom, class: 'preview-run' });
-  return make('figure', {}, root, make('figcaption', { textContent: `${text} The thick line below is the run.` }));
+  const bands = Object.keys(BANDS).filter((state) => states.some((one) => one.state === state)).map((state) => `${BANDS[state]} ${WORDS[state]}`);
+  return make('figure', {}, root, make('figcaption', { textContent: `${text} The thick line below is the run.${bands.length ? ` Bands: ${bands.join(', ')}.` : ''}` }));
 }
 
 /** Pictures of a sensor. @param {any} sensor of the figures @param {number} duration of the run, s @returns {Node[]} */

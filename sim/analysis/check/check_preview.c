@@ -23,22 +23,29 @@ static double julian_year(const bst_world *world) {
     return 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25;
 }
 
+/* Stars of a field: the brightest, their number, the limit down to which they are listed, and the
+ * number of all down to the limit that was asked for. */
+typedef struct field_stars {
+    bst_star *stars; /* [BST_CHECK_PREVIEW_STARS] */
+    int count, total;
+    double v_limit;
+} field_stars;
+
 /* Stars around a direction, not more than BST_CHECK_PREVIEW_STARS: the limit is lowered for that.
  */
 static bst_status query_stars(bst_ctx *ctx, const bst_world *world, bst_vec3 centre,
-                              double radius_rad, double *v_limit, bst_star *stars, int *count,
-                              int *total) {
+                              double radius_rad, field_stars *out) {
     const double year = julian_year(world);
     for (int step = 0;; step++) {
-        BST_TRY(bst_stars_query(ctx, bst_world_stars(world), centre, radius_rad, *v_limit, year,
-                                stars, BST_CHECK_PREVIEW_STARS, count));
+        BST_TRY(bst_stars_query(ctx, bst_world_stars(world), centre, radius_rad, out->v_limit, year,
+                                out->stars, BST_CHECK_PREVIEW_STARS, &out->count));
         if (step == 0) {
-            *total = *count;
+            out->total = out->count;
         }
-        if (*count <= BST_CHECK_PREVIEW_STARS) {
+        if (out->count <= BST_CHECK_PREVIEW_STARS) {
             return BST_OK;
         }
-        *v_limit -= LIMIT_STEP_MAG;
+        out->v_limit -= LIMIT_STEP_MAG;
     }
 }
 
@@ -48,26 +55,25 @@ static bst_status add_sky(bst_ctx *ctx, const bst_world *world, bst_vec3 centre,
     const double half[2] = {0.5 * cJSON_GetArrayItem(field, 0)->valuedouble * BST_DEG_RAD,
                             0.5 * cJSON_GetArrayItem(field, 1)->valuedouble * BST_DEG_RAD};
     const double radius_rad = fmin(hypot(half[0], half[1]), 0.25 * BST_PI);
-    double v_limit = bst_json_member_number(sensor, "v_mag_at_snr_5"), ra, dec;
-    int count = 0, total = 0;
+    const double v_limit = bst_json_member_number(sensor, "v_mag_at_snr_5");
+    double ra, dec;
     bst_star *stars = calloc(BST_CHECK_PREVIEW_STARS, sizeof *stars);
     if (!stars) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the stars of a field");
     }
-    v_limit = isfinite(v_limit) ? v_limit : 0.0;
-    bst_status status =
-        query_stars(ctx, world, centre, radius_rad, &v_limit, stars, &count, &total);
+    field_stars found = {.stars = stars, .v_limit = isfinite(v_limit) ? v_limit : 0.0};
+    bst_status status = query_stars(ctx, world, centre, radius_rad, &found);
     if (status == BST_OK) {
         cJSON *sky = cJSON_AddObjectToObject(sensor, "sky");
         bst_vec3_to_radec(centre, &ra, &dec);
         bst_json_add_number(sky, "ra_deg", ra / BST_DEG_RAD);
         bst_json_add_number(sky, "dec_deg", dec / BST_DEG_RAD);
-        bst_json_add_number(sky, "v_limit", v_limit);
-        cJSON_AddNumberToObject(sky, "total", total);
+        bst_json_add_number(sky, "v_limit", found.v_limit);
+        cJSON_AddNumberToObject(sky, "total", found.total);
         cJSON *list = cJSON_AddArrayToObject(sky, "stars");
         const bst_vec3 east = {-sin(ra), cos(ra), 0.0};
         const bst_vec3 north = {-sin(dec) * cos(ra), -sin(dec) * sin(ra), cos(dec)};
-        for (int i = 0; i < count; i++) {
+        for (int i = 0; i < found.count; i++) {
             const double depth = bst_vec3_dot(stars[i].icrs, centre) * BST_DEG_RAD;
             const double place[3] = {bst_vec3_dot(stars[i].icrs, east) / depth,
                                      bst_vec3_dot(stars[i].icrs, north) / depth,
