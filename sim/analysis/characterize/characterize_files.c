@@ -214,14 +214,15 @@ static void add_linearity(cJSON *root, const writer *w) {
     }
 }
 
-/* A list of what both frames have at a place: distance, frequency, percentile. */
+/* A list of what both frames have at a place: frequency or percentile; NULL: distances from 1 px.
+ */
 static void add_both(cJSON *root, const char *name, const char *place, const double *places,
-                     int first, const double *real, const double *simulated, int count) {
+                     const double *real, const double *simulated, int count) {
     cJSON *list = cJSON_AddArrayToObject(root, name);
     for (int i = 0; i < count; i++) {
         cJSON *item = cJSON_CreateObject();
         cJSON_AddItemToArray(list, item);
-        cJSON_AddNumberToObject(item, place, places ? places[i] : first + i);
+        cJSON_AddNumberToObject(item, place, places ? places[i] : 1.0 + i);
         bst_json_add_number(item, "real", real[i]);
         bst_json_add_number(item, "simulated", simulated[i]);
     }
@@ -242,13 +243,13 @@ static void add_comparison(cJSON *root, const bst_characterize_comparison *c) {
     cJSON *median = cJSON_AddObjectToObject(node, "median_dn");
     bst_json_add_number(median, "real", r->median_dn);
     bst_json_add_number(median, "simulated", s->median_dn);
-    add_both(node, "percentiles_over_median_dn", "percentile", bst_sensor_percentiles, 0,
+    add_both(node, "percentiles_over_median_dn", "percentile", bst_sensor_percentiles,
              r->percentiles_dn, s->percentiles_dn, BST_SENSOR_PERCENTILES);
-    add_both(node, "power_along_rows_dn2_px", "cycles_per_px", frequencies, 0, r->spectrum,
+    add_both(node, "power_along_rows_dn2_px", "cycles_per_px", frequencies, r->spectrum,
              s->spectrum, BST_COMPARISON_BANDS);
-    add_both(node, "correlation_along_rows", "distance_px", NULL, 1, r->along_rows, s->along_rows,
+    add_both(node, "correlation_along_rows", "distance_px", NULL, r->along_rows, s->along_rows,
              BST_COMPARISON_LAGS);
-    add_both(node, "correlation_along_columns", "distance_px", NULL, 1, r->along_columns,
+    add_both(node, "correlation_along_columns", "distance_px", NULL, r->along_columns,
              s->along_columns, BST_COMPARISON_LAGS);
 }
 
