@@ -58,8 +58,8 @@ enum { MAX_COMPANIONS = 16 };
 static bst_vec3 photocentre(const tracker_module *m, bst_ctx *ctx, const bst_star *star) {
     bst_star near[MAX_COMPANIONS];
     int count = 0;
-    if (bst_stars_query_seen(ctx, m->stars, star->icrs, m->blend_rad, star->v_mag + COMPANION_MAG,
-                             &m->epoch, near, MAX_COMPANIONS, &count) != BST_OK ||
+    const bst_star_query cone = {star->icrs, m->blend_rad, star->v_mag + COMPANION_MAG, m->epoch};
+    if (bst_stars_query_seen(ctx, m->stars, &cone, near, MAX_COMPANIONS, &count) != BST_OK ||
         count > MAX_COMPANIONS) {
         return star->icrs;
     }
