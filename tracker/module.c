@@ -236,8 +236,7 @@ static bst_status process_detections(tracker_module *m, struct bst_step *step,
         bst_step_count(step, "tracker_no_navigation");
         return BST_OK;
     }
-    const bst_nav_telemetry *place = nav.payload;
-    m->epoch.sun_m = place->sun_m;
+    m->epoch.sun_m = ((const bst_nav_telemetry *)nav.payload)->sun_m;
     bst_sample pointing = bst_step_latest(step, PORT_POINTING);
     const bst_pointing_telemetry *telemetry = pointing.payload;
     bst_tracker_input input = {.detections = detections, .nav = nav.payload};
