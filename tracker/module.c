@@ -58,8 +58,8 @@ enum { MAX_COMPANIONS = 16 };
 static bst_vec3 photocentre(const tracker_module *m, bst_ctx *ctx, const bst_star *star) {
     bst_star near[MAX_COMPANIONS];
     int count = 0;
-    if (bst_stars_query_seen(ctx, m->stars, star->icrs, m->blend_rad, star->v_mag + COMPANION_MAG,
-                             &m->epoch, near, MAX_COMPANIONS, &count) != BST_OK ||
+    const bst_star_query cone = {star->icrs, m->blend_rad, star->v_mag + COMPANION_MAG, m->epoch};
+    if (bst_stars_query_seen(ctx, m->stars, &cone, near, MAX_COMPANIONS, &count) != BST_OK ||
         count > MAX_COMPANIONS) {
         return star->icrs;
     }
@@ -236,8 +236,7 @@ static bst_status process_detections(tracker_module *m, struct bst_step *step,
         bst_step_count(step, "tracker_no_navigation");
         return BST_OK;
     }
-    const bst_nav_telemetry *place = nav.payload;
-    m->epoch.sun_m = place->sun_m;
+    m->epoch.sun_m = ((const bst_nav_telemetry *)nav.payload)->sun_m;
     bst_sample pointing = bst_step_latest(step, PORT_POINTING);
     const bst_pointing_telemetry *telemetry = pointing.payload;
     bst_tracker_input input = {.detections = detections, .nav = nav.payload};

@@ -226,11 +226,12 @@ static bst_status predict(const attempt *a, const bst_star_fit *fit, int *count)
     bst_vec3 direction = bst_light_catalogue_star(
         a->frame->light, bst_quat_rotate(bst_quat_conj(fit->q_cam_from_gcrf), centre));
     int total = 0;
-    const bst_star_epoch epoch = {s->julian_year, a->frame->light->sun_m};
-    double v_limit = fmin(a->frame->v_limit, s->depth_v_mag);
-    for (; v_limit > BRIGHTEST_V; v_limit -= 0.5) {
-        BST_TRY(bst_stars_query_seen(a->ctx, s->stars, direction, radius, v_limit, &epoch, s->found,
-                                     MOST_PREDICTED, &total));
+    bst_star_query cone = {direction,
+                           radius,
+                           fmin(a->frame->v_limit, s->depth_v_mag),
+                           {s->julian_year, a->frame->light->sun_m}};
+    for (; cone.v_limit > BRIGHTEST_V; cone.v_limit -= 0.5) {
+        BST_TRY(bst_stars_query_seen(a->ctx, s->stars, &cone, s->found, MOST_PREDICTED, &total));
         if (total <= MOST_PREDICTED) {
             break;
         }

@@ -63,10 +63,10 @@ bst_status bst_predicted_stars_expect(bst_ctx *ctx, bst_predicted_stars *sky,
     bst_vec3 direction = bst_quat_rotate(bst_quat_conj(q_cam_from_gcrf), centre);
     direction = bst_light_catalogue_star(light, direction);
     int total = 0;
-    const bst_star_epoch epoch = {sky->julian_year, light->sun_m};
-    for (double v_limit = query->v_limit; v_limit > BRIGHTEST_V; v_limit -= 0.5) {
-        BST_TRY(bst_stars_query_seen(ctx, sky->stars, direction, radius + BST_ARCSEC_RAD, v_limit,
-                                     &epoch, sky->found, sky->capacity, &total));
+    bst_star_query cone = {
+        direction, radius + BST_ARCSEC_RAD, query->v_limit, {sky->julian_year, light->sun_m}};
+    for (; cone.v_limit > BRIGHTEST_V; cone.v_limit -= 0.5) {
+        BST_TRY(bst_stars_query_seen(ctx, sky->stars, &cone, sky->found, sky->capacity, &total));
         if (total <= sky->capacity) {
             break;
         }

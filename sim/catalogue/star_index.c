@@ -175,8 +175,9 @@ static bst_status damaged_header(bst_ctx *ctx, const char *label) {
                     "star catalogue %s is damaged (numbers in the header): " REMEDY, label);
 }
 
-bst_status bst_star_view_init(bst_ctx *ctx, const char *label, const void *data, uint64_t bytes,
-                              bool sum, bst_star_view *out) {
+/* Checks what a file says of itself, its length and its checksum. */
+static bst_status check_header(bst_ctx *ctx, const char *label, const void *data, uint64_t bytes,
+                               bool sum) {
     const bst_star_header *h = data;
     if (bytes < sizeof h->magic || memcmp(h->magic, BST_STAR_MAGIC, sizeof h->magic) != 0) {
         return bst_fail(ctx, BST_ERR_FORMAT,
@@ -217,6 +218,13 @@ bst_status bst_star_view_init(bst_ctx *ctx, const char *label, const void *data,
                         ", expected %016" PRIx64 "): " REMEDY,
                         label, found, h->checksum);
     }
+    return BST_OK;
+}
+
+bst_status bst_star_view_init(bst_ctx *ctx, const char *label, const void *data, uint64_t bytes,
+                              bool sum, bst_star_view *out) {
+    const bst_star_header *h = data;
+    BST_TRY(check_header(ctx, label, data, bytes, sum));
     bst_star_extension more = {0};
     const bool in_time = h->version == BST_STAR_TIME_VERSION;
     const size_t extension = in_time ? sizeof more : 0;

@@ -382,103 +382,128 @@ static bool may_reach(const cell_group *group, bst_vec3 centre, double radius_ra
     return group->radius >= 0.0 && bst_vec3_dot(d, d) <= reach * reach;
 }
 
-bst_status bst_stars_query_seen(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre,
-                                double radius_rad, double v_limit, const bst_star_epoch *epoch,
+/* State of a query. */
+typedef struct star_search {
+    const bst_stars *stars;
+    const bst_star_query *query;
+    bst_star_observer observer;
+    double chord2, slack; /* slack: from where stars may enter the cone, rad */
+    radec_box box;
+    double box_drift; /* proper motion that the box holds for; -1: there is none yet */
+    bst_star *out;
+    int capacity, found;
+} star_search;
+
+/* Number of the next cell from c on that may reach into the cone by its group and region. */
+static uint32_t next_cell(const star_search *q, uint32_t c) {
+    const double reach = q->query->radius_rad + q->slack, years = fabs(q->observer.years);
+    const uint32_t cells = q->stars->view.header->cell_count, region = GROUP * GROUP;
+    while (c < cells && c % GROUP == 0) {
+        if (c % region == 0 &&
+            !may_reach(&q->stars->regions[c / region], q->query->centre, reach, years)) {
+            c += region;
+        } else if (!may_reach(&q->stars->groups[c / GROUP], q->query->centre, reach, years)) {
+            c += GROUP;
+        } else {
+            break;
+        }
+    }
+    return c;
+}
+
+/* Adds the stars of a cell that are in the cone. */
+static void search_cell(star_search *q, uint32_t c) {
+    const bst_stars *stars = q->stars;
+    const double v_limit = q->query->v_limit;
+    bool out_of_order = false;
+    const int first = q->found;
+    const bst_star_record *r = stars->view.records + stars->view.cells[c].first;
+    for (const bst_star_record *end = r + stars->view.cells[c].count; r < end; r++) {
+        double v_mag = bst_star_record_v(r) / 1e5;
+        if (v_mag > v_limit && (v_mag > BST_BRIGHT_STARS_V || v_mag > v_limit + MOST_WRONG_MAG)) {
+            break; /* sorted brightest first */
+        }
+        if (r->dec < q->box.dec_min || r->dec > q->box.dec_max ||
+            r->ra - q->box.ra_min > q->box.ra_width) {
+            continue;
+        }
+        bst_vec3 direction = bst_star_record_seen(r, &q->observer);
+        const uint32_t id = identity(&stars->view, c, r);
+        if (stars->altered && !alter(stars, id, &direction)) {
+            continue;
+        }
+        bst_vec3 d = bst_vec3_sub(direction, q->query->centre);
+        bst_star star;
+        if (bst_vec3_dot(d, d) > q->chord2) {
+            continue;
+        }
+        bool reordered = unpack(&stars->view, r, id, direction, &q->observer, &star);
+        if (reordered ? (double)star.v_mag > v_limit : v_mag > v_limit) {
+            continue;
+        }
+        if (q->found < q->capacity) {
+            q->out[q->found] = star;
+            out_of_order = out_of_order || reordered;
+            if (out_of_order) {
+                put_in_order(q->out + first, q->found - first + 1);
+            }
+        }
+        q->found++;
+    }
+}
+
+bst_status bst_stars_query_seen(bst_ctx *ctx, const bst_stars *stars, const bst_star_query *query,
                                 bst_star *out, int capacity, int *count) {
-    assert(stars && epoch && count);
+    assert(stars && query && count);
+    const bst_vec3 centre = query->centre;
+    const double radius_rad = query->radius_rad;
     *count = 0;
-    if (!(radius_rad >= 0.0 && radius_rad <= BST_PI) || isnan(v_limit) ||
-        !isfinite(epoch->julian_year) || !(fabs(bst_vec3_norm(centre) - 1.0) < 1e-6) ||
+    if (!(radius_rad >= 0.0 && radius_rad <= BST_PI) || isnan(query->v_limit) ||
+        !isfinite(query->epoch.julian_year) || !(fabs(bst_vec3_norm(centre) - 1.0) < 1e-6) ||
         capacity < 0 || (!out && capacity > 0)) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "star query: radius %g rad (0 to pi), limit V %g, year %g, |centre| %g "
                         "(1), room for %d stars",
-                        radius_rad, v_limit, epoch->julian_year, bst_vec3_norm(centre), capacity);
+                        radius_rad, query->v_limit, query->epoch.julian_year, bst_vec3_norm(centre),
+                        capacity);
     }
-    bst_star_observer observer;
-    bst_star_observer_at(&stars->view, epoch, &observer);
-    const double years = observer.years;
+    star_search q = {
+        .stars = stars, .query = query, .box_drift = -1.0, .out = out, .capacity = capacity};
+    bst_star_observer_at(&stars->view, &query->epoch, &q.observer);
     double chord = 2.0 * sin(radius_rad / 2.0);
     /* rounding must not exclude the antipode */
-    double chord2 = radius_rad >= BST_PI - 1e-9 ? 5.0 : chord * chord;
+    q.chord2 = radius_rad >= BST_PI - 1e-9 ? 5.0 : chord * chord;
     /* displaced stars and those with a parallax may come from outside */
-    double slack = stars->altered && stars->errors.position_error_fraction > 0.0
-                       ? MOST_SIGMAS * stars->errors.position_error_sigma_arcsec * BST_ARCSEC_RAD
-                       : 0.0;
-    slack += observer.at_barycentre ? 0.0 : MOST_PARALLAX_RAD;
-    int found = 0;
-    radec_box box = {0};
-    double box_drift = -1.0;
-    for (uint32_t c = 0; c < stars->view.header->cell_count; c++) {
-        if (c % (GROUP * GROUP) == 0 && !may_reach(&stars->regions[c / (GROUP * GROUP)], centre,
-                                                   radius_rad + slack, fabs(years))) {
-            c += GROUP * GROUP - 1;
-            continue;
-        }
-        if (c % GROUP == 0 &&
-            !may_reach(&stars->groups[c / GROUP], centre, radius_rad + slack, fabs(years))) {
-            c += GROUP - 1;
-            continue;
-        }
+    q.slack = stars->altered && stars->errors.position_error_fraction > 0.0
+                  ? MOST_SIGMAS * stars->errors.position_error_sigma_arcsec * BST_ARCSEC_RAD
+                  : 0.0;
+    q.slack += q.observer.at_barycentre ? 0.0 : MOST_PARALLAX_RAD;
+    const uint32_t cells = stars->view.header->cell_count;
+    for (uint32_t c = next_cell(&q, 0); c < cells; c = next_cell(&q, c + 1)) {
         const bst_star_cell *cell = &stars->view.cells[c];
-        double drift = cell->pm_max_radpyr * fabs(years);
-        double reach = radius_rad + cell->radius_rad + drift + slack;
+        double drift = cell->pm_max_radpyr * fabs(q.observer.years);
+        double reach = radius_rad + cell->radius_rad + drift + q.slack;
         bst_vec3 d = {centre.x - cell->centre[0], centre.y - cell->centre[1],
                       centre.z - cell->centre[2]};
         /* a chord is shorter than its angle: no cell is missed */
         if (cell->count == 0 || bst_vec3_dot(d, d) > reach * reach) {
             continue;
         }
-        if (drift > box_drift) { /* it holds for less motion, too */
-            box = box_around(centre, radius_rad + drift + slack);
-            box_drift = drift;
+        if (drift > q.box_drift) { /* it holds for less motion, too */
+            q.box = box_around(centre, radius_rad + drift + q.slack);
+            q.box_drift = drift;
         }
-        bool out_of_order = false;
-        const int first = found;
-        const bst_star_record *r = stars->view.records + cell->first;
-        for (const bst_star_record *end = r + cell->count; r < end; r++) {
-            double v_mag = bst_star_record_v(r) / 1e5;
-            if (v_mag > v_limit &&
-                (v_mag > BST_BRIGHT_STARS_V || v_mag > v_limit + MOST_WRONG_MAG)) {
-                break; /* sorted brightest first */
-            }
-            if (r->dec < box.dec_min || r->dec > box.dec_max || r->ra - box.ra_min > box.ra_width) {
-                continue;
-            }
-            bst_vec3 direction = bst_star_record_seen(r, &observer);
-            const uint32_t id = identity(&stars->view, c, r);
-            if (stars->altered && !alter(stars, id, &direction)) {
-                continue;
-            }
-            d = bst_vec3_sub(direction, centre);
-            bst_star star;
-            if (bst_vec3_dot(d, d) > chord2) {
-                continue;
-            }
-            bool reordered = unpack(&stars->view, r, id, direction, &observer, &star);
-            if (reordered ? (double)star.v_mag > v_limit : v_mag > v_limit) {
-                continue;
-            }
-            if (found < capacity) {
-                out[found] = star;
-                out_of_order = out_of_order || reordered;
-                if (out_of_order) {
-                    put_in_order(out + first, found - first + 1);
-                }
-            }
-            found++;
-        }
+        search_cell(&q, c);
     }
-    *count = found;
+    *count = q.found;
     return BST_OK;
 }
 
 bst_status bst_stars_query(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad,
                            double v_limit, double julian_year, bst_star *out, int capacity,
                            int *count) {
-    const bst_star_epoch epoch = {.julian_year = julian_year};
-    return bst_stars_query_seen(ctx, stars, centre, radius_rad, v_limit, &epoch, out, capacity,
-                                count);
+    const bst_star_query query = {centre, radius_rad, v_limit, {.julian_year = julian_year}};
+    return bst_stars_query_seen(ctx, stars, &query, out, capacity, count);
 }
 
 double bst_stars_year_after(const bst_stars *stars, double julian_year, double seconds) {

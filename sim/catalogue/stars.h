@@ -82,6 +82,13 @@ typedef struct bst_star_epoch {
                        the solar-system barycentre */
 } bst_star_epoch;
 
+/* A cone of the sky, seen at an epoch. */
+typedef struct bst_star_query {
+    bst_vec3 centre; /* unit, ICRS axes */
+    double radius_rad, v_limit;
+    bst_star_epoch epoch;
+} bst_star_query;
+
 /* Stars within radius_rad (0 to pi) of `centre` (unit, ICRS) that are not fainter than v_limit,
  * with proper motion to the epoch, and as seen from the observer's place: with annual parallax,
  * before light deflection and aberration. Variable stars have the magnitude of the epoch, with the
@@ -96,8 +103,7 @@ typedef struct bst_star_epoch {
  * for 5 % of its stars, those without a mean position (109,445) and Tycho-1's (13,082): they stay
  * where they were observed about 1991.5, fast ones such as Polaris, 61 Cygni and GJ 887 among them.
  */
-bst_status bst_stars_query_seen(bst_ctx *ctx, const bst_stars *stars, bst_vec3 centre,
-                                double radius_rad, double v_limit, const bst_star_epoch *epoch,
+bst_status bst_stars_query_seen(bst_ctx *ctx, const bst_stars *stars, const bst_star_query *query,
                                 bst_star *out, int capacity, int *count) BST_MUST_CHECK;
 
 /* As bst_stars_query_seen, from the barycentre: without parallax and light time. */

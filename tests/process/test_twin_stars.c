@@ -30,14 +30,14 @@ WRAP(bst_status, bst_stars_open, (bst_ctx * ctx, const char *name, bst_stars **o
 }
 
 WRAP(bst_status, bst_stars_query_seen,
-     (bst_ctx * ctx, const bst_stars *stars, bst_vec3 centre, double radius_rad, double v_limit,
-      const bst_star_epoch *epoch, bst_star *out, int capacity, int *count)) {
+     (bst_ctx * ctx, const bst_stars *stars, const bst_star_query *query, bst_star *out,
+      int capacity, int *count)) {
     (void)ctx;
     (void)stars;
-    bst_assert_close(v_limit, 30.0, 0.0);
-    bst_assert_close(epoch->julian_year, 2024.5, 0.0);
-    script.centre = centre;
-    script.radius = radius_rad;
+    bst_assert_close(query->v_limit, 30.0, 0.0);
+    bst_assert_close(query->epoch.julian_year, 2024.5, 0.0);
+    script.centre = query->centre;
+    script.radius = query->radius_rad;
     *count = script.count;
     for (int i = 0; i < script.count && i < capacity; i++) {
         out[i] = script.stars[i];

@@ -88,14 +88,13 @@ bst_status bst_twin_query_stars(bst_ctx *ctx, const bst_twin *t, const bst_stars
     int all;
     *out = NULL;
     *count = 0;
-    const bst_star_epoch epoch = {t->julian_year, t->light.sun_m};
-    BST_TRY(bst_stars_query_seen(ctx, catalogue, centre, radius, FAINTEST, &epoch, NULL, 0, &all));
+    const bst_star_query cone = {centre, radius, FAINTEST, {t->julian_year, t->light.sun_m}};
+    BST_TRY(bst_stars_query_seen(ctx, catalogue, &cone, NULL, 0, &all));
     bst_star *stars = malloc(((size_t)all + 1) * sizeof *stars);
     if (!stars) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d stars", all);
     }
-    bst_status status =
-        bst_stars_query_seen(ctx, catalogue, centre, radius, FAINTEST, &epoch, stars, all, count);
+    bst_status status = bst_stars_query_seen(ctx, catalogue, &cone, stars, all, count);
     if (status != BST_OK) {
         free(stars);
         return status;

@@ -395,10 +395,10 @@ static bst_status find_background(bst_ctx *ctx, bst_field *field, const query *q
 static bst_status query_stars(bst_ctx *ctx, bst_field *field, const query *q, double julian_year,
                               int *count) {
     int known, drawn = 0;
-    const bst_star_epoch epoch = {julian_year, q->light.sun_m};
+    const bst_star_query cone = {
+        q->cone.axis, q->cone.radius, q->v_limit, {julian_year, q->light.sun_m}};
     for (;;) {
-        BST_TRY(bst_stars_query_seen(ctx, bst_world_stars(field->world), q->cone.axis,
-                                     q->cone.radius, q->v_limit, &epoch, field->stars,
+        BST_TRY(bst_stars_query_seen(ctx, bst_world_stars(field->world), &cone, field->stars,
                                      field->star_capacity, &known));
         if (known > field->star_capacity) {
             BST_TRY(reserve_stars(ctx, field, known));
