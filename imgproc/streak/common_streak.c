@@ -12,8 +12,13 @@
 /* LINE_HALF: samples of a line on either side of a pixel, LINE_STEP px apart. */
 enum { LINE_HALF = 5, LINE_STEP = 2, DIRECTIONS = 16, LINE_REACH = BST_STREAK_LINE_REACH };
 enum { MOST_REACH = 12, REFINING_STARS = 15 };
+/* Side of the cells of an uneven background, px. */
+enum { CELL = 32 };
 enum { OVERLAP = 12 }; /* samples on either side: MOST_PSF_SIGMA_PX six times over */
 
+/* A background is uneven if the levels of its cells differ by more than this; others stay as they
+ * are. */
+static const double UNEVEN_SIGMA = 50.0;
 /* Negative pixels below this are bad, sigma. */
 static const float LEAST_SIGMA = -5.0f;
 /* A pixel above HOT_SIGMA is bad if its neighbours, less their noise, are below this share of it.
@@ -53,6 +58,73 @@ static float median(float *values, int count) {
     return kept > 0 ? bst_value_of_rank(values, kept, kept / 2) : 0.0f;
 }
 
+/* Noise of the image, by the median of its absolute values. */
+static double noise_of(finder *f) {
+    const size_t pixels = (size_t)f->width * (size_t)f->height;
+    for (size_t i = 0; i < pixels; i++) {
+        f->scratch[i] = fabsf(f->image[i]);
+    }
+    return fmax(1.4826 * (double)median(f->scratch, (int)pixels), 1e-9);
+}
+
+/* Level and noise of a cell; the noise by what lies below the level, where no stars are. */
+static void measure_cell(finder *f, int cx, int cy, float out[2]) {
+    int count = 0;
+    for (int y = cy * CELL; y < (cy + 1) * CELL && y < f->height; y++) {
+        for (int x = cx * CELL; x < (cx + 1) * CELL && x < f->width; x++) {
+            float v = f->image[(size_t)y * (size_t)f->width + (size_t)x];
+            if (!isnan(v)) {
+                f->scratch[count++] = v;
+            }
+        }
+    }
+    out[0] = count > 0 ? bst_value_of_rank(f->scratch, count, count / 2) : 0.0f;
+    out[1] =
+        count > 0 ? (out[0] - bst_value_of_rank(f->scratch, count, count / 4)) / 0.6745f : 0.0f;
+}
+
+/* Removes a very uneven background, as of the Earth's limb or a ghost: levels of cells, between
+ * whose middles it is bilinear. Noise that is greater there is reduced to the frame's. True if the
+ * background was so. */
+static bool flatten(finder *f) {
+    const int nx = (f->width + CELL - 1) / CELL, ny = (f->height + CELL - 1) / CELL;
+    float low = HUGE_VALF, high = -HUGE_VALF;
+    float(*cells)[2] = (float(*)[2])f->lines; /* not in use yet; a cell has 32 x 32 px */
+    if ((size_t)nx * (size_t)ny * 2 > (size_t)f->width * (size_t)f->height) {
+        return false;
+    }
+    for (int i = 0; i < nx * ny; i++) {
+        measure_cell(f, i % nx, i / nx, cells[i]);
+        low = fminf(low, cells[i][0]);
+        high = fmaxf(high, cells[i][0]);
+    }
+    for (int i = 0; i < nx * ny; i++) {
+        f->scratch[i] = cells[i][1];
+    }
+    const float usual = fmaxf(median(f->scratch, nx * ny), 1e-9f);
+    if (!((double)(high - low) > UNEVEN_SIGMA * (double)usual)) {
+        return false;
+    }
+    for (int y = 0; y < f->height; y++) {
+        float v = fmaxf(((float)y + 0.5f) / CELL - 0.5f, 0.0f);
+        int j = (int)v, j1 = j + 1 < ny ? j + 1 : j;
+        for (int x = 0; x < f->width; x++) {
+            float u = fmaxf(((float)x + 0.5f) / CELL - 0.5f, 0.0f), value[2];
+            int i = (int)u, i1 = i + 1 < nx ? i + 1 : i;
+            for (int k = 0; k < 2; k++) {
+                float top = cells[j * nx + i][k] +
+                            (u - (float)i) * (cells[j * nx + i1][k] - cells[j * nx + i][k]);
+                float bottom = cells[j1 * nx + i][k] +
+                               (u - (float)i) * (cells[j1 * nx + i1][k] - cells[j1 * nx + i][k]);
+                value[k] = top + (v - (float)j) * (bottom - top);
+            }
+            float *at = &f->image[(size_t)y * (size_t)f->width + (size_t)x];
+            *at = (*at - value[0]) / fmaxf(value[1] / usual, 1.0f);
+        }
+    }
+    return true;
+}
+
 /* Removes the medians of columns and rows and divides by the noise. */
 static void clean(finder *f) {
     const int w = f->width, h = f->height;
@@ -75,10 +147,10 @@ static void clean(finder *f) {
         }
     }
     const size_t pixels = (size_t)w * (size_t)h;
-    for (size_t i = 0; i < pixels; i++) {
-        scratch[i] = fabsf(f->image[i]);
+    f->sigma = noise_of(f);
+    if (flatten(f)) {
+        f->sigma = noise_of(f);
     }
-    f->sigma = fmax(1.4826 * (double)median(scratch, (int)pixels), 1e-9);
     for (size_t i = 0; i < pixels; i++) {
         float v = f->image[i] / (float)f->sigma;
         f->image[i] = isnan(v) ? 0.0f : v < LEAST_SIGMA ? LEAST_SIGMA : v;

@@ -105,6 +105,33 @@ static void check(scene *s, double length) {
     bst_streak_finder_free(finder);
 }
 
+/* Light of 300 standard deviations about a place beside the frame, as of a limb or a ghost. */
+static void uneven_background(void **state) {
+    (void)state;
+    static scene s;
+    draw(&s, 40.0, 14.0);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        double x = i % SIDE - 250.0, y = (double)(i / SIDE) - 250.0;
+        s.pixels[i] += (float)(300.0 * exp(-(x * x + y * y) / (2.0 * 70.0 * 70.0)));
+    }
+    bst_common_streak found;
+    bst_streak_finder *finder = find(&s, &found);
+    double dx, dy;
+    int matched = 0;
+    path(40.0, 1.0, &dx, &dy);
+    bst_assert_close(found.ends[1].x_px - found.ends[0].x_px, dx, 1.0);
+    bst_assert_close(found.ends[1].y_px - found.ends[0].y_px, dy, 1.0);
+    for (int k = 0; k < found.count; k++) {
+        for (int i = 0; i < STARS; i++) {
+            matched += hypot(found.items[k].x_px + found.ends[0].x_px - s.x[i],
+                             found.items[k].y_px + found.ends[0].y_px - s.y[i]) < 4.0;
+        }
+    }
+    assert_true(matched >= STARS - 1);     /* one lies in the brightest corner */
+    assert_true(found.count <= 2 * STARS); /* what the cells leave of the glow */
+    bst_streak_finder_free(finder);
+}
+
 static void points(void **state) {
     (void)state;
     static scene s;
@@ -183,11 +210,9 @@ static void ends_of_a_long_path(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(points),
-        cmocka_unit_test(curved_streaks),
-        cmocka_unit_test(streaks_at_the_edge),
-        cmocka_unit_test(nothing_to_find),
-        cmocka_unit_test(ends_of_a_long_path),
+        cmocka_unit_test(uneven_background), cmocka_unit_test(points),
+        cmocka_unit_test(curved_streaks),    cmocka_unit_test(streaks_at_the_edge),
+        cmocka_unit_test(nothing_to_find),   cmocka_unit_test(ends_of_a_long_path),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
