@@ -18,6 +18,8 @@ static const double CLIP_SIGMA = 3.0;
 /* Sources with a smaller share of their image on the frame, and less than this SNR of it, are not
  * generated. */
 static const double LEAST_VISIBLE = 0.01, LEAST_VISIBLE_SNR = 1.0;
+/* SNR below which noise alone determines a maximum, as in bst_obsgen_peak. */
+static const double LEAST_RAISED = 3.0;
 
 bst_status bst_generator_create(bst_ctx *ctx, const bst_camera *camera, const bst_camera *knowledge,
                                 const bst_generator_settings *settings,
@@ -128,6 +130,16 @@ static bool position_source(const bst_generator *g, const bst_generator_frame *f
     return s->broken || s->visible > 0.0;
 }
 
+/* Factor by which noise raises the maximum of a wider image more than that of one of the fitted
+ * width. On each axis it does so by the noise's squared gradient over the curvature: that of the
+ * image, which is flatter, and that of the noise which lifts a fainter source to the threshold and
+ * is as curved as the output of a source of the fitted width. */
+static double flatness_of(const bst_generator *g, double amplitude) {
+    double width = g->filter_sigma / g->cross_sigma, level = fmax(amplitude, LEAST_RAISED);
+    double lift = fmax(g->threshold - level, 0.0);
+    return (level + lift) / (width * width * level + lift);
+}
+
 /* Noise-free amplitude of a source in the matched-filter output, and the filter that gives it. */
 static void set_amplitude(const bst_generator *g, generator_source *s) {
     double gain = bst_obsgen_between(bst_obsgen_lengths_px, g->calibration.gain, BST_OBSGEN_LENGTHS,
@@ -146,10 +158,8 @@ static void set_amplitude(const bst_generator *g, generator_source *s) {
     } else if (g->response.source.across_px != g->response.source.along_px) {
         ideal *= bst_response_norm_ratio(&g->response, s->length);
     }
-    /* noise raises the maximum near a source, the more, the flatter the image's peak is */
-    double flatness = g->cross_sigma / g->filter_sigma;
-    gain = g->smeared ? 1.0 : 1.0 + (gain - 1.0) * flatness * flatness;
     s->unraised = efficiency * ideal;
+    gain = g->smeared ? 1.0 : 1.0 + (gain - 1.0) * flatness_of(g, s->unraised);
     /* that of the greater output, if the source is seen in the smaller one */
     double most = s->unraised * fmax(s->other, 1.0);
     s->rise = bst_obsgen_peak(most, gain) - most;
@@ -366,6 +376,8 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
     const bst_truth *t = f->truth;
     BST_TRY(reserve(ctx, g, t->count));
     g->source_count = 0;
+    g->open_share = 1.0;
+    bst_generator_set_filters(g); /* amplitudes depend on the threshold */
     for (int i = 0; i < t->count; i++) {
         generator_source *s = &g->sources[g->source_count];
         *s = (generator_source){.item = i, .star = t->items[i].kind == BST_SOURCE_STAR, .head = -1};
@@ -379,7 +391,6 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
             s->broken || s->visible > LEAST_VISIBLE || s->unraised > LEAST_VISIBLE_SNR;
     }
     add_crowding(g);
-    g->open_share = 1.0;
     bst_generator_set_filters(g);
     if (!g->smeared) {
         set_open_sky(g);
