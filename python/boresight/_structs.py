@@ -95,6 +95,7 @@ class CameraHead(ctypes.Structure):
                 ("pixel_pitch_um", c_double), ("aperture_m", c_double), ("obscuration", c_double),
                 ("throughput", c_double), ("quantum_efficiency", c_double),
                 ("photon_flux_v0_per_s_m2", c_double), ("psf_fwhm_px", c_double),
+                ("zero_point_mag", c_double), ("ensquared_energy", c_double),
                 ("background_mag_arcsec2", c_double), ("dark_current_e_per_s", c_double),
                 ("read_noise_e", c_double), ("full_well_e", c_double), ("gain_e_per_dn", c_double),
                 ("offset_dn", c_double), ("bits", c_int64), ("rotation_deg", c_double)]
