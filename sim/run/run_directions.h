@@ -51,6 +51,7 @@ const bst_run_centroid *bst_run_centroids_find(const bst_run_centroids *centroid
 /* Saves or restores them. Errors: BST_ERR_MEMORY */
 bst_status bst_run_centroids_archive(bst_run_centroids *centroids,
                                      bst_archive *archive) BST_MUST_CHECK;
+/* Frees the centroids of all frames. */
 void bst_run_centroids_clear(bst_run_centroids *centroids);
 
 #endif
