@@ -34,8 +34,8 @@ class Chart:
             if part.tag == "svg":
                 for path in part.iter("path"):
                     origin = float(part.get("x")), float(part.get("y"))
-                    self.lines.setdefault(path.get("class").split()[1], []).extend(
-                        self.points(path.get("d"), *origin))
+                    colour = re.search(r"\bc\d+\b", path.get("class")).group()
+                    self.lines.setdefault(colour, []).extend(self.points(path.get("d"), *origin))
 
     @staticmethod
     def points(d, x0, y0):
