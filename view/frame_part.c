@@ -18,10 +18,15 @@ static bst_status read_bands(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s
     const int64_t end = part->y + part->height;
     bst_fits_read_frame band;
     BST_TRY(bst_view_read_rows(ctx, run, s, frame, 0, 0, &band));
-    const int most = bst_view_band_rows(band.width, n);
+    const int most = bst_view_band_rows(band.width, n), frame_width = band.width,
+              frame_height = band.height;
     for (int64_t y = part->y; y < end;) {
         const int rows = end - y < most ? (int)(end - y) : most;
         BST_TRY(bst_view_read_rows(ctx, run, s, frame, (int)y, rows, &band));
+        if (band.width != frame_width || band.height != frame_height) {
+            return bst_fail(ctx, BST_ERR_IO, "frame %lld: changed while it was read",
+                            (long long)frame);
+        }
         for (int k = 0; k < rows; k += n) {
             bst_view_bin_row(band.pixels + (size_t)k * (size_t)band.width + part->x,
                              (size_t)band.width, width, rows - k < n ? rows - k : n, n, sums, out);
