@@ -94,7 +94,10 @@ static bst_status put_updates(bst_ctx *ctx, FILE *out, const bst_run_reader *run
         bst_chart_begin(&c);
         bst_chart_line(&c, p.x, p.y, p.n, BST_CHART_BLUE, false);
         bst_chart_end(&c);
-        bst_report_page_figure_end(out, "Tracks that updated an orbit, by their last detection.");
+        bst_report_page_figure_end(
+            out, p.n == MOST_POINTS
+                     ? "The first 200,000 tracks that updated an orbit, by their last detection."
+                     : "Tracks that updated an orbit, by their last detection.");
     }
     free(p.x);
     return status;
