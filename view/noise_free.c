@@ -112,6 +112,21 @@ static bst_status sum_planes(bst_ctx *ctx, const bst_view_run *run, const bst_vi
                : status;
 }
 
+/* Writes the part that is asked for, in digital numbers. sum: [height][width], electrons. */
+static bst_status write_part(bst_ctx *ctx, bst_view_exchange *x, const float *sum,
+                             const bst_fits_source_frame *size, double gain, double offset) {
+    const size_t pixels = (size_t)size->width * (size_t)size->height;
+    BST_TRY(bst_view_begin_part(ctx, &x->part, size->width, size->height, &x->bytes));
+    uint16_t *whole = malloc(pixels * sizeof *whole);
+    for (size_t i = 0; whole && i < pixels; i++) {
+        double dn = (double)sum[i] / gain + offset;
+        whole[i] = (uint16_t)(dn > 0.0 ? fmin(dn + 0.5, 65535.0) : 0.0);
+    }
+    bool done = whole && bst_view_bin_part(whole, (size_t)size->width, &x->part, x->bytes.data);
+    free(whole);
+    return done ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a frame");
+}
+
 static bst_status answer(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) {
     bst_view_sensor *s;
     bst_fits_source_frame size = {.width = 0};
@@ -125,15 +140,7 @@ static bst_status answer(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) 
     bst_status status = sum_planes(ctx, run, s, index, &sum, &size);
     status = status == BST_OK ? read_calibration(ctx, run, s, index, &gain, &offset) : status;
     if (status == BST_OK) {
-        const size_t pixels = (size_t)size.width * (size_t)size.height;
-        uint16_t *out = malloc(pixels * sizeof *out + 1);
-        x->bytes = (bst_view_bytes){
-            .data = out, .bytes = pixels * sizeof *out, .width = size.width, .height = size.height};
-        status = out ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a frame");
-        for (size_t i = 0; out && i < pixels; i++) {
-            double dn = (double)sum[i] / gain + offset;
-            out[i] = (uint16_t)(dn > 0.0 ? fmin(dn + 0.5, 65535.0) : 0.0);
-        }
+        status = write_part(ctx, x, sum, &size, gain, offset);
     }
     free(sum);
     return status;

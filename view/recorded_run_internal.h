@@ -87,6 +87,17 @@ bst_status bst_view_read_rows(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *
  */
 int bst_view_band_rows(int width, int n);
 
+/* Fits a part to a frame, and begins its answer.
+ *
+ * Given:     width, height  of the frame, px
+ * Returned:  part  as bst_view_fit_part
+ *            out   sizes and places; data: room for its pixels
+ * Errors:    BST_ERR_ARGUMENT: the part is not within the frame, or has more than
+ *            BST_VIEW_PIXELS_MOST pixels or bins; BST_ERR_MEMORY
+ * Ownership: free out->data, also after an error */
+bst_status bst_view_begin_part(bst_ctx *ctx, bst_view_part *part, int width, int height,
+                               bst_view_bytes *out) BST_MUST_CHECK;
+
 /* Rows of a table from the first of an exposure on.
  *
  * Given:     sensor    row of the table sensors

@@ -45,21 +45,26 @@ class Frame(unittest.TestCase):
         page.command("Page.navigate", url=f"{self.viewer.url}#frame={frame}")
         page.wait_for(f"{SHOWN} === {frame} && document.boresight.plots.cursor > {frame} && document.boresight.plots.panels.length > 0 && document.boresight.plots.panels.every((one) => one.lines.length > 0)")
 
-    def test_frame_without_noise(self):
-        """The sum of the planes over the gain, plus the offset, at every pixel; B goes on to both in turn, and back."""
+    def expected(self):
+        """Frame 20 without noise, DN."""
         with fits.open(os.path.join(self.made, "frames.fits")) as file:
             gain, offset = file[21].header["GAIN"], file[21].header["OFFSET"]
         light = numpy.zeros((256, 256))
         for plane in ("stars", "targets", "background"):
             with fits.open(os.path.join(self.made, plane + ".fits")) as file:
                 light += file[21].data
+        return light / gain + offset
+
+    def test_frame_without_noise(self):
+        """The sum of the planes over the gain, plus the offset, at every pixel; B goes on to both in turn, and back."""
+        expected = self.expected()
         with chromium.Chromium(1280, 720) as page:
             self.open(page, 20)
             page.key("b")
             page.wait_for(f"{VIEW}.clean && {VIEW}.cleanShown")
             clean = numpy.array(page.evaluate(f"[...{VIEW}.drawn.data]")).reshape(256, 256)
             # 0.501: rounding to whole numbers; planes are added in 32 bits
-            numpy.testing.assert_allclose(clean, light / gain + offset, rtol=0, atol=0.501)
+            numpy.testing.assert_allclose(clean, expected, rtol=0, atol=0.501)
             self.assertGreater(clean.max() - clean.min(), 30)
             self.assertFalse(page.evaluate("document.getElementById('clean-shown').hidden"))
             page.key("b")
@@ -69,6 +74,32 @@ class Frame(unittest.TestCase):
             page.wait_for(f"{SHOWN} === 21 && {VIEW}.clean")
             page.key("b")
             page.wait_for(f"{VIEW}.clean === null && {VIEW}.drawn === {VIEW}.image")
+            self.assertEqual(page.messages, [])
+
+    def test_frame_without_noise_in_parts(self):
+        """Of a frame that is sent binned: the same bins, and where the view is enlarged a part with all pixels."""
+        expected, drawn = self.expected(), f"(() => {{ const {{ x, y, width, height, binning, data }} = {VIEW}.drawnPart || {VIEW}.drawn; return [x, y, width, height, binning, [...data]]; }})()"
+
+        def check(binning):
+            x, y, width, height, n, data = page.evaluate(drawn)
+            self.assertEqual(n, binning)
+            means = expected.reshape(256 // n, n, 256 // n, n).mean(axis=(1, 3))[y // n:y // n + height, x // n:x // n + width]
+            # 1.001: rounding to whole numbers, twice
+            numpy.testing.assert_allclose(numpy.array(data).reshape(height, width), means, rtol=0, atol=1.001)
+
+        with chromium.Chromium(1280, 720) as page:
+            self.open(page, 20)
+            page.evaluate(f"(() => {{ const app = document.boresight; {VIEW}.longest = () => 64; app.cache.clear(); app.current = -1; return app.goTo(20); }})()")
+            page.wait_for(f"{SHOWN} === 20 && {VIEW}.image.binning === 4")
+            page.evaluate(f"{VIEW}.zoomTo(0.2)")
+            page.key("b")
+            page.wait_for(f"{VIEW}.cleanShown")
+            check(4)
+            page.evaluate(f"{VIEW}.zoomTo(40)")
+            page.wait_for(f"{VIEW}.cleanPart && {VIEW}.cleanPart.binning === 1")
+            check(1)
+            page.key("ArrowRight")
+            page.wait_for(f"{SHOWN} === 21 && {VIEW}.cleanShown && {VIEW}.cleanPart && document.getElementById('problems').hidden")
             self.assertEqual(page.messages, [])
 
     def test_tracks(self):

@@ -2,7 +2,7 @@
 //   node --test tests/view/page_chart.test.mjs
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { countUntil, decadesOf, shortNumber, textsOf, ticksOf, valueAt } from '../../view/page/chart.js';
+import { countUntil, decadesOf, listenToChart, shortNumber, textsOf, ticksOf, valueAt } from '../../view/page/chart.js';
 import { axisOf, nearestPoint, numbersOf, pointsOf, rangeOf, shareOf, valueOf } from '../../view/page/report_charts.js';
 
 test('marks of an axis are round and inside', () => {
@@ -70,4 +70,18 @@ test('the range of values has a margin, and is none without values', () => {
   assert.deepEqual(rangeOf([0, 10], false), { low: 0, high: 10.6 });
   const { low, high } = rangeOf([3, 3], false);
   assert.ok(low < 3 && high > 3);
+});
+
+test('only the first button begins a gesture: a menu of the second one takes its end', () => {
+  const heard = {}, dragged = [], canvas = { addEventListener: (name, act) => { heard[name] = act; }, setPointerCapture() {} };
+  listenToChart(canvas, { click() {}, drag: () => dragged.push('drag'), dragged: (part) => dragged.push(part.x1 - part.x0), reset() {}, zoom() {} });
+  const gesture = (button) => {
+    heard.pointerdown({ button, offsetX: 10, offsetY: 5, pointerId: 1 });
+    heard.pointermove({ offsetX: 40, offsetY: 5 });
+  };
+  gesture(2);
+  assert.deepEqual(dragged, []);
+  gesture(0);
+  heard.pointerup({});
+  assert.deepEqual(dragged, ['drag', 30]);
 });

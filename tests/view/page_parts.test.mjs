@@ -38,6 +38,29 @@ test('the value of a pixel is that of the part', () => {
   assert.equal(valueAt(null, 0, 0), undefined);
 });
 
+test('while the frame without noise is shown, the part is its own', async () => {
+  const asked = [], image = { width: 512, height: 512, binning: 16, frameWidth: 8192, frameHeight: 8192, data: new Uint16Array(0) }, clean = { ...image };
+  const get = (name) => async (part) => { asked.push(name); return { ...part, name, data: new Uint16Array(0) }; };
+  const view = Object.assign(Object.create(FrameView.prototype), {
+    canvas: { width: 600, height: 600 }, stage: { clientWidth: 600, clientHeight: 600 }, image, part: null, clean: null, cleanPart: null, cleanShown: false, loadingPart: false, redraw() {},
+    view: { x: 4000, y: 4000, scale: 4, fitted: false }, getPart: get('frame'), getCleanPart: get('clean'),
+  });
+  await view.loadPart();
+  assert.equal(view.setClean({ ...clean, binning: 8 }), false); // not of these bins
+  assert.deepEqual([view.drawn, view.drawnPart.name], [image, 'frame']);
+  assert.equal(view.setClean(clean), true);
+  assert.deepEqual([view.drawn, view.drawnPart], [clean, null]);
+  await view.loadPart();
+  assert.deepEqual([view.drawnPart.name, view.part.name], ['clean', 'frame']);
+  view.setClean(clean, false); // in turn
+  assert.deepEqual([view.drawn, view.drawnPart.name], [image, 'frame']);
+  view.setClean(clean, true);
+  await view.loadPart();
+  assert.deepEqual([view.drawnPart.name, asked], ['clean', ['frame', 'clean']]); // each once
+  view.setClean(null);
+  assert.deepEqual([view.drawn, view.cleanPart], [image, null]);
+});
+
 test('a view that moves asks for one part at a time, and drops one of another frame', async () => {
   const asked = [], answers = [], image = { width: 512, height: 512, binning: 16, frameWidth: 8192, frameHeight: 8192, data: new Uint16Array(0) };
   const view = Object.assign(Object.create(FrameView.prototype), {

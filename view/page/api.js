@@ -52,9 +52,9 @@ export async function getThumbnail(sensor, frame, signal = undefined) {
   return getImage('thumbnail', { sensor, frame }, signal);
 }
 
-/** The frame without noise, from planes that the run recorded. @param {number} sensor @param {number} frame @param {AbortSignal} [signal] */
-export async function getNoiseFree(sensor, frame, signal = undefined) {
-  return getImage('noise_free', { sensor, frame }, signal);
+/** The frame without noise, or a part of it as `getPixels`, from planes that the run recorded. @param {number} sensor @param {number} frame @param {AbortSignal} [signal] */
+export async function getNoiseFree(sensor, frame, signal = undefined, part = {}) {
+  return getImage('noise_free', { sensor, frame, ...part }, signal);
 }
 
 /** @param {string} route @param {Record<string, string | number>} query @param {AbortSignal} [signal] */

@@ -48,10 +48,11 @@ export class Blink {
     this.request = new AbortController();
     const { signal } = this.request;
     try {
-      const image = await getNoiseFree(sensor, current, signal);
+      const image = await getNoiseFree(sensor, current, signal, { binning: frameView.binning() });
       if (signal.aborted) return;
       this.turn = true;
-      frameView.setClean(image);
+      frameView.getCleanPart = (part) => getNoiseFree(sensor, current, undefined, part);
+      if (!frameView.setClean(image)) throw new Error(`${image.frameWidth} × ${image.frameHeight} pixels, the frame has ${frameView.image.frameWidth} × ${frameView.image.frameHeight}`);
       if (this.what !== 'blink') return;
       this.timer = window.setInterval(() => {
         this.turn = !this.turn;

@@ -119,6 +119,7 @@ export function drawCursor(context, top, bottom, what) {
 export function listenToChart(canvas, on) {
   let part = null, moved = false;
   canvas.addEventListener('pointerdown', (event) => {
+    if (event.button !== 0) return; // a menu takes the end of the gesture
     part = { x0: event.offsetX, y0: event.offsetY, x1: event.offsetX, y1: event.offsetY };
     moved = false;
     canvas.setPointerCapture(event.pointerId);

@@ -30,7 +30,9 @@ export class FrameView {
     /** Gets a part of the frame that is shown; null: there is no more than the image. @type {((part: import('./frame_parts.js').Part) => Promise<any>) | null} */
     this.getPart = null;
     this.loadingPart = false;
-    this.clean = null; // the frame without noise; null: not shown
+    this.clean = this.cleanPart = null; // the frame without noise, and a part of it; null: not shown
+    /** Gets a part of the frame without noise. @type {((part: import('./frame_parts.js').Part) => Promise<any>) | null} */
+    this.getCleanPart = null;
     this.cleanShown = false; // else the frame, in turn
     this.sensorWidth = this.sensorHeight = 0; // 0: unknown
     this.statistics = null;
@@ -66,6 +68,7 @@ export class FrameView {
     if (counted) this.counted = performance.now();
     this.image = image;
     this.part = part;
+    this.setClean(null); // that of the frame before
     this.details = details;
     this.sorted = details ? sortMarks(details) : null;
     if (counted || !image || !this.statistics) this.statistics = image ? describePixels(image.data) : null;
@@ -85,18 +88,23 @@ export class FrameView {
     this.redraw();
   }
 
-  /** The frame without noise, of the same size as the frame; null: none. @param {any} image @param {boolean} shown in place of the frame */
+  /** The frame without noise, of the same size and binning as the frame; null: none. @param {any} image @param {boolean} shown in place of the frame @returns {boolean} it is of that size */
   setClean(image, shown = true) {
-    const { image: frame } = this, fits = image && frame && image.width === frame.width && image.height === frame.height;
-    if (!fits && !this.clean) return;
+    const { image: frame } = this, fits = Boolean(image && frame && ['width', 'height', 'binning', 'frameWidth', 'frameHeight'].every((name) => image[name] === frame[name]));
+    if (!fits && !this.clean) return false;
+    if (!fits || this.clean !== image) this.cleanPart = null;
     this.clean = fits ? image : null;
-    this.cleanShown = Boolean(fits && shown);
+    this.cleanShown = fits && shown;
     element('clean-shown').hidden = !this.cleanShown;
     this.redraw();
+    return fits;
   }
 
   /** What is drawn now. */
   get drawn() { return this.clean && this.cleanShown ? this.clean : this.image; }
+
+  /** Its part with finer pixels. */
+  get drawnPart() { return this.clean && this.cleanShown ? this.cleanPart : this.part; }
 
   /** A canvas has one kind of context for life: the 2D painter needs a new one. */
   usePlain() {
@@ -165,15 +173,15 @@ export class FrameView {
 
   /** Gets the part that is shown, if it is not there: one request at a time. */
   async loadPart() {
-    const { image, getPart } = this, wanted = getPart && !this.loadingPart ? this.wantedPart() : null;
-    if (!wanted || covers(this.part, this.box(), this.frameSize(), wanted.binning)) return;
+    const { image, clean } = this, get = clean && this.cleanShown ? this.getCleanPart : this.getPart, wanted = get && !this.loadingPart ? this.wantedPart() : null;
+    if (!wanted || covers(this.drawnPart, this.box(), this.frameSize(), wanted.binning)) return;
     this.loadingPart = true;
     let part = null;
     try {
-      part = await getPart(wanted);
+      part = await get(wanted);
     } catch { /* the binned picture stays; another look asks again */ }
     this.loadingPart = false;
-    if (this.image === image && part) this.part = part;
+    if (part && get === this.getCleanPart) { if (this.clean === clean) this.cleanPart = part; } else if (part && this.image === image) this.part = part;
     if (part) this.redraw(); // which asks for more if the view has moved
   }
 
@@ -246,7 +254,7 @@ export class FrameView {
     this.waiting = true;
     requestAnimationFrame(() => {
       this.waiting = false;
-      const part = this.cleanShown ? null : this.part;
+      const part = this.drawnPart;
       this.painter.draw(this.drawn, this.drawing(), part, part && this.drawing(part));
       this.drawOverlay();
       this.describeCursor();
@@ -261,9 +269,8 @@ export class FrameView {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, width, height);
     if (!this.image) this.drawOutline(context);
-    for (const image of [this.cleanShown ? this.drawn : this.part || this.image]) {
-      if (image && this.view.scale * (image.binning || 1) >= VALUE_SCALE) this.drawValues(context, image);
-    }
+    const image = this.drawnPart || this.drawn;
+    if (image && this.view.scale * (image.binning || 1) >= VALUE_SCALE) this.drawValues(context, image);
     const wcs = this.details && this.details.wcs;
     if (this.sorted) {
       drawMarks(context, this.sorted, wcs, { toScreen: (x, y) => this.toScreen(x, y), scale: this.view.scale, width, height, shown: this.shown });
@@ -345,7 +352,7 @@ export class FrameView {
           parts.push(['Charge', `${NUMBER.format((dn - (d.offset_dn || 0)) * d.gain_e_per_dn)} e−`]);
         }
         if (this.clean && d && Number.isFinite(d.gain_e_per_dn)) {
-          const expected = valueAt(this.clean, x, y);
+          const expected = valueAt(this.cleanPart, x, y) ?? valueAt(this.clean, x, y) ?? NaN;
           parts.push(['Expected', `${NUMBER.format((expected - (d.offset_dn || 0)) * d.gain_e_per_dn)} e−`]);
         }
         if (d && d.saturation_dn && dn >= d.saturation_dn) parts.push(['', 'saturated']);

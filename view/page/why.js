@@ -84,8 +84,8 @@ export async function open(box, app) {
   let shown = false;
 
   const showReason = async (frame) => {
-    const found = await getJson('why', { sensor: app.sensor, frame });
-    if (frame !== app.current) return;
+    const { sensor } = app, found = await getJson('why', { sensor, frame });
+    if (frame !== app.current || sensor !== app.sensor) return;
     list.hidden = text.hidden = !found.target;
     if (!found.target) {
       head.textContent = 'This sensor has no target';

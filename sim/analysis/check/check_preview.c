@@ -15,6 +15,8 @@
 static const double DAY_S = 86400.0;
 /* Steps by which the limit is lowered until few enough stars are left, mag. */
 static const double LIMIT_STEP_MAG = 0.25;
+/* Most steps: 50 mag down from any camera's limit there is no star. */
+enum { LIMIT_STEPS = 200 };
 
 /* Years of Terrestrial Time at the epoch of a world. */
 static double julian_year(const bst_world *world) {
@@ -32,7 +34,7 @@ typedef struct field_stars {
 } field_stars;
 
 /* Stars around a direction, not more than BST_CHECK_PREVIEW_STARS: the limit is lowered for that.
- */
+ * Of a catalogue with more stars than that at any limit, the first ones. */
 static bst_status query_stars(bst_ctx *ctx, const bst_world *world, bst_vec3 centre,
                               double radius_rad, field_stars *out) {
     const double year = julian_year(world);
@@ -42,7 +44,9 @@ static bst_status query_stars(bst_ctx *ctx, const bst_world *world, bst_vec3 cen
         if (step == 0) {
             out->total = out->count;
         }
-        if (out->count <= BST_CHECK_PREVIEW_STARS) {
+        if (out->count <= BST_CHECK_PREVIEW_STARS || step == LIMIT_STEPS) {
+            out->count =
+                out->count < BST_CHECK_PREVIEW_STARS ? out->count : BST_CHECK_PREVIEW_STARS;
             return BST_OK;
         }
         out->v_limit -= LIMIT_STEP_MAG;
