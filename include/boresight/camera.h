@@ -89,13 +89,13 @@ bst_status bst_camera_resolve_scale(bst_ctx *ctx, bst_camera *camera) BST_MUST_C
 /* Computes what follows from a camera's zero point and ensquared energy; without them the camera is
  * unchanged.
  *
- * Given:     camera  as read from a configuration. A camera with a spectrum gets the throughput
- * that makes the zero point, one of the preset "v" the photon flux Returned:  *camera throughput or
- * photon_flux_v0_per_s_m2; psf_fwhm_px of a Gaussian or Moffat PSF Errors:    BST_ERR_CONFIG with
- * the key: a throughput above 1, no aperture or quantum efficiency, an energy that no width from
- * 0.3 to 50 px has, a PSF without a width Notes:     a camera whose spectrum is made later is
- * resolved twice: the first call leaves its throughput Reference: ensquared energy of a Gaussian:
- * erf(1 / (2 sqrt 2 sigma))^2 */
+ * Given:     camera  as read from a configuration; all but the members below are unchanged
+ * Returned:  *camera  throughput (with a spectrum) or photon_flux_v0_per_s_m2 (preset "v"), and
+ *            psf_fwhm_px of a Gaussian or Moffat PSF, whatever they were; the same bits if repeated
+ * Errors:    BST_ERR_CONFIG with the key: a value out of its range, or a PSF without a width
+ * Notes:     a camera whose spectrum is made later keeps its throughput until then: it is resolved
+ *            twice
+ * Reference: ensquared energy of a Gaussian: erf(1 / (2 sqrt 2 sigma))^2 */
 bst_status bst_camera_resolve_figures(bst_ctx *ctx, bst_camera *camera) BST_MUST_CHECK;
 
 /* Computes `geometry` from rotation and distortion.

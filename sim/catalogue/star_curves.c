@@ -92,9 +92,11 @@ static bst_status read_row(reader *r, const bst_text_line *line) {
                    &row.time));
     BST_TRY(number(r, line, fields, MAG, -20.0, 20.0, &row.mag));
     if (r->out->count == r->room) {
+        if (r->room >= MOST_ROWS) {
+            return bst_text_fail_line(&r->where, line, "too many points", "at most 100 million");
+        }
         int room = r->room ? 2 * r->room : 1024;
-        bst_star_curve_row *rows =
-            r->room < MOST_ROWS ? realloc(r->out->rows, (size_t)room * sizeof *rows) : NULL;
+        bst_star_curve_row *rows = realloc(r->out->rows, (size_t)room * sizeof *rows);
         if (!rows) {
             return bst_text_fail_memory(&r->where, "rows");
         }
@@ -120,18 +122,19 @@ static bst_status check_curves(bst_ctx *ctx, const char *path, const bst_star_cu
         const bst_star_curve_row *row = &c->rows[i];
         bool first = i == 0 || row[-1].source != row->source;
         bool last = i + 1 == c->count || row[1].source != row->source;
-        begin = first ? row->time : begin;
+        begin = first && !c->by_phase ? row->time : begin;
         if (first && last) {
             return bst_fail(ctx, BST_ERR_FORMAT,
                             "%s:%d: source_id %lld has one point (allowed: two and more)", path,
                             row->line, (long long)row->source);
         }
-        /* a catalogue has times in single precision, from the first one on */
+        /* a catalogue has phases, and times from the first one on, in single precision */
         if (!first && !((float)(row->time - begin) > (float)(row[-1].time - begin))) {
             return bst_fail(ctx, BST_ERR_FORMAT,
                             "%s:%d: source_id %lld has another point at the same time, in line %d "
-                            "(allowed: different times)",
-                            path, row->line, (long long)row->source, row[-1].line);
+                            "(allowed: times that differ in single precision, %s)",
+                            path, row->line, (long long)row->source, row[-1].line,
+                            c->by_phase ? "as phases" : "as days after the first");
         }
     }
     return c->count > 0

@@ -12,6 +12,7 @@ typedef struct bst_star_curve_row {
     double time;    /* phase from 0 to 1, or barycentric Julian date (TDB) */
     double mag;     /* V less that of the table of stars */
     int line;       /* of the file */
+    bool used;      /* first point of a star: a row of the table has its light curve */
 } bst_star_curve_row;
 
 typedef struct bst_star_curves {

@@ -108,9 +108,10 @@ uint64_t bst_star_checksum(const void *data, size_t bytes) {
     return sum ^ sum >> 32;
 }
 
-static bool is_finite_cell(const bst_star_cell *c) {
+/* Checks a cell's cap: a larger one or a faster star would overflow a query's box. */
+static bool is_cap_valid(const bst_star_cell *c) {
     return isfinite(c->centre[0]) && isfinite(c->centre[1]) && isfinite(c->centre[2]) &&
-           isfinite(c->radius_rad) && isfinite(c->pm_max_radpyr);
+           fabsf(c->radius_rad) <= 7.0F && fabsf(c->pm_max_radpyr) <= 1.0F;
 }
 
 static bst_status check_patches(bst_ctx *ctx, const char *label, const bst_star_view *view) {
@@ -128,7 +129,7 @@ static bst_status check_patches(bst_ctx *ctx, const char *label, const bst_star_
 static bst_status check_cells(bst_ctx *ctx, const char *label, const bst_star_view *view) {
     uint64_t next = 0;
     for (uint32_t i = 0; i < view->header->cell_count; i++) {
-        if (view->cells[i].first != next || !is_finite_cell(&view->cells[i])) {
+        if (view->cells[i].first != next || !is_cap_valid(&view->cells[i])) {
             return bst_fail(ctx, BST_ERR_FORMAT,
                             "star catalogue %s is damaged (sky cell %" PRIu32 "): " REMEDY, label,
                             i);
@@ -144,21 +145,31 @@ static bst_status check_cells(bst_ctx *ctx, const char *label, const bst_star_vi
     return BST_OK;
 }
 
+/* Checks the numbers of a variable star without its light curve. */
+static bool is_variable_valid(const bst_star_variable *v) {
+    const bool has_period =
+        v->period_d >= BST_STAR_PERIOD_MIN_D && v->period_d <= BST_STAR_PERIOD_MAX_D;
+    return v->amplitude_mag >= 0.0F && v->amplitude_mag <= 40.0F && v->table_mag >= -40.0F &&
+           v->table_mag <= 40.0F && fabs(v->epoch_jd) <= 1e7 &&
+           (has_period || (v->period_d == 0.0 && v->point_count > 0));
+}
+
 /* Checks variables and light curves. */
 static bst_status check_variables(bst_ctx *ctx, const char *label, const bst_star_view *view,
                                   uint32_t point_count) {
+    uint64_t points = 0; /* no two stars share points: the work grows with the file only */
     for (uint32_t i = 0; i < view->variable_count; i++) {
         const bst_star_variable *v = &view->variables[i];
+        points += v->point_count;
         bool good = v->star < view->header->star_count &&
-                    (i == 0 || v->star > view->variables[i - 1].star) &&
+                    (i == 0 || v->star > view->variables[i - 1].star) && points <= point_count &&
                     (uint64_t)v->first_point + v->point_count <= point_count &&
-                    v->amplitude_mag >= 0.0F && v->amplitude_mag <= 40.0F &&
-                    v->table_mag >= -40.0F && v->table_mag <= 40.0F && isfinite(v->epoch_jd) &&
-                    v->period_d >= 0.0 && isfinite(v->period_d) &&
-                    (v->point_count > 0 || v->period_d > 0.0);
+                    is_variable_valid(v);
+        const float least = v->period_d > 0.0 ? 0.0F : -1e7F;
+        const float most = v->period_d > 0.0 ? 1.0F : 1e7F;
         for (uint32_t k = 0; good && k < v->point_count; k++) {
             const bst_star_point *p = &view->points[v->first_point + k];
-            good = isfinite(p->time) && p->mag >= 0.0F && p->mag <= 40.0F &&
+            good = p->time >= least && p->time <= most && p->mag >= 0.0F && p->mag <= 40.0F &&
                    (k == 0 || p->time > p[-1].time);
         }
         if (!good) {

@@ -97,6 +97,8 @@ typedef struct bst_star_record {
 #define BST_STAR_PARALLAX_BITS 0x3FFCu
 #define BST_STAR_PARALLAX_UNIT_MAS 0.2
 #define BST_STAR_PARALLAX_MAX_MAS 819.0 /* what the bits hold; the largest known is 768.5 */
+#define BST_STAR_PERIOD_MIN_D 1e-9      /* 86 us: a Julian date in a double has 40 us */
+#define BST_STAR_PERIOD_MAX_D 1e7
 
 _Static_assert(sizeof(bst_star_header) == 96, "file layout");
 _Static_assert(sizeof(bst_star_patch) == 32, "file layout");

@@ -34,7 +34,6 @@ typedef struct merge {
     size_t base_count; /* first entries of the list, in the order of the base's records */
     same_star *same;   /* of each star of the base */
     bst_star_curves curves;
-    int64_t curves_used; /* stars */
 } merge;
 
 /* The table's V of a star less its brightest one. */
@@ -198,7 +197,7 @@ static bst_status add_variability(bst_ctx *ctx, merge *m, const bst_star_table_r
                    ? bst_star_list_add_variable(ctx, &m->list, &v, NULL, index)
                    : BST_OK;
     }
-    m->curves_used++;
+    m->curves.rows[curve - m->curves.rows].used = true;
     if (!m->curves.by_phase) {
         v.period_d = 0.0;
         v.epoch_jd = curve->time;
@@ -338,11 +337,12 @@ static void unite(merge *m, bst_star_merge_counts *counts) {
     }
 }
 
-/* Number of stars with a light curve. */
-static int64_t count_curves(const bst_star_curves *c) {
+/* Number of stars whose light curve no row of the table has. */
+static int64_t count_unused(const bst_star_curves *c) {
     int64_t stars = 0;
     for (int i = 0; i < c->count; i++) {
-        stars += i == 0 || c->rows[i].source != c->rows[i - 1].source;
+        bool first = i == 0 || c->rows[i].source != c->rows[i - 1].source;
+        stars += first && !c->rows[i].used;
     }
     return stars;
 }
@@ -419,7 +419,7 @@ bst_status bst_star_merge(bst_ctx *ctx, const bst_star_merge_request *request,
         unite(&m, counts);
         status = write_stars(ctx, &m);
         counts->written = (int64_t)m.list.count;
-        counts->curves_left = count_curves(&m.curves) - m.curves_used;
+        counts->curves_left = count_unused(&m.curves);
     }
     bst_star_table_close(table);
     bst_stars_close(m.base);

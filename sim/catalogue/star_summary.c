@@ -4,7 +4,18 @@
 #include <math.h>
 
 #include "sim/catalogue/star_import.h"
+#include "sim/catalogue/star_index.h"
 #include "sim/catalogue/star_list.h"
+
+/* Stars with a parallax. */
+static long long count_parallaxes(const bst_stars *stars) {
+    const bst_star_view *view = bst_stars_records(stars);
+    long long count = 0;
+    for (uint64_t i = 0; i < view->header->star_count; i++) {
+        count += (view->records[i].pm_dec_flags & BST_STAR_PARALLAX_BITS) != 0;
+    }
+    return count;
+}
 
 bst_status bst_stars_print_summary(bst_ctx *ctx, const bst_stars *stars, FILE *stream) {
     bst_stars_info i;
@@ -15,8 +26,9 @@ bst_status bst_stars_print_summary(bst_ctx *ctx, const bst_stars *stars, FILE *s
     if (i.table_count > 0) {
         fprintf(stream, "          %lld of them from a table\n", i.table_count);
     }
-    if (i.has_parallax || i.variable_count > 0) {
-        fprintf(stream, "          with parallaxes; %lld are variable\n", i.variable_count);
+    if (i.has_parallax) {
+        fprintf(stream, "          %lld of them with a parallax, %lld variable\n",
+                count_parallaxes(stars), i.variable_count);
     }
     if (i.complete_to_v_mag > BST_STAR_BRIGHTER_THAN_ALL) {
         fprintf(stream, "complete  to V %.1f over the whole sky%s\n", i.complete_to_v_mag,

@@ -76,7 +76,10 @@ static bst_status set_parallax_and_period(bst_ctx *ctx, const bst_star_table *t,
         row->parallax_mas = fmax(v[BST_STAR_PARALLAX], 0.0);
     }
     if (!isnan(v[BST_STAR_PERIOD])) {
-        BST_TRY(check_range(ctx, t, BST_STAR_PERIOD, v[BST_STAR_PERIOD], 0.0, 1e7));
+        if (v[BST_STAR_PERIOD] != 0.0) { /* 0: unknown */
+            BST_TRY(check_range(ctx, t, BST_STAR_PERIOD, v[BST_STAR_PERIOD], BST_STAR_PERIOD_MIN_D,
+                                BST_STAR_PERIOD_MAX_D));
+        }
         row->period_d = v[BST_STAR_PERIOD];
     }
     if (!isnan(v[BST_STAR_AMPLITUDE])) {

@@ -69,7 +69,8 @@ static bst_status resolve_zero_point(bst_ctx *ctx, bst_camera *c) {
     double *factor = c->spectrum ? &c->throughput : &c->photon_flux_v0_per_s_m2;
     const char *key = c->spectrum ? "throughput" : "photon_flux_v0_per_s_m2";
     double low = c->spectrum ? 0.0 : 1.0, high = c->spectrum ? 1.0 : 1e15;
-    double value = *factor / rate;
+    /* another rounding of a resolved value would change the bytes of a repeated run */
+    double value = fabs(rate - 1.0) < 1e-13 ? *factor : *factor / rate;
     if (!(rate > 0.0 && value > low && value <= high * (1.0 + 1e-12))) {
         return bst_fail(ctx, BST_ERR_CONFIG,
                         "zero_point_mag %g needs %s %.4g (allowed: %g to %g; it follows from "

@@ -328,7 +328,8 @@ static void test_versions(void **state) {
     write_text(f->table,
                "source_id,ra,dec,ref_epoch,v_mag,period_d,amplitude_mag\n"
                "1,2,3,2016,9,0.5,1\n2,2,4,2016,9,0.7,2\n");
-    bst_assert_ok(&f->ctx, merge(f, NULL, false, f->out));
+    write_text(f->curves, "source_id,phase,delta_mag\n1,0,0\n1,0.5,1\n2,0.6,1\n2,1,0\n");
+    bst_assert_ok(&f->ctx, merge(f, NULL, true, f->out));
     stars = open_stars(f, f->out);
     bst_assert_close(bst_stars_year_after(stars, 2020.0, 86400.0 * 365.25), 2021.0, 1e-12);
     const bst_star_view *whole = bst_stars_records(stars);
@@ -336,13 +337,15 @@ static void test_versions(void **state) {
     unsigned char *copy = malloc(bytes);
     memcpy(copy, whole->header, bytes);
     bst_stars_close(stars);
-    for (int damage = 0; damage < 6; damage++) {
+    for (int damage = 0; damage < 13; damage++) {
         bst_star_view view;
         bst_assert_ok(&f->ctx, bst_star_view_init(&f->ctx, "copy", copy, bytes, false, &view));
         assert_int_equal(view.variable_count, 2);
         bst_star_variable *v = (bst_star_variable *)(void *)(copy + sizeof(bst_star_header) +
                                                              sizeof(bst_star_extension));
+        bst_star_point *p = (bst_star_point *)(void *)(v + 2);
         const bst_star_variable kept = *v;
+        const bst_star_point kept_point = *p;
         switch (damage) {
             case 0:
                 v->star = 1; /* not ascending */
@@ -352,12 +355,34 @@ static void test_versions(void **state) {
                 break;
             case 2:
                 v->period_d = 0.0;
+                v->point_count = 0;
                 break;
             case 3:
                 v->epoch_jd = NAN;
                 break;
             case 4:
                 v->amplitude_mag = NAN;
+                break;
+            case 5:
+                v->period_d = 1e-310;
+                break;
+            case 6:
+                v->period_d = 1e300;
+                break;
+            case 7:
+                v->epoch_jd = -1e300;
+                break;
+            case 8:
+                v->point_count = 4; /* all of them within the file, but two are of the other star */
+                break;
+            case 9:
+                p->time = -5.0F; /* no phase */
+                break;
+            case 10:
+                p->time = 0.75F; /* not ascending */
+                break;
+            case 11:
+                p->mag = NAN;
                 break;
             default:
                 v->star = 9;
@@ -366,6 +391,7 @@ static void test_versions(void **state) {
                          BST_ERR_FORMAT);
         assert_non_null(strstr(f->ctx.message, "variable star"));
         *v = kept;
+        *p = kept_point;
         bst_ctx_init(&f->ctx, NULL, NULL, BST_LOG_ERROR);
     }
     free(copy);
@@ -379,6 +405,8 @@ static void test_bad_input(void **state) {
         {"ra,dec,ref_epoch,v_mag,parallax\n1,2,2016,9,820\n", NULL,
          "column parallax: 820 is outside -1000 to 819"},
         {"ra,dec,ref_epoch,v_mag,period_d\n1,2,2016,9,-1\n", NULL, "column period_d: -1"},
+        /* the phase of so short a period overflows */
+        {"ra,dec,ref_epoch,v_mag,period_d\n1,2,2016,9,1e-305\n", NULL, "is outside 1e-09 to 1e+07"},
         {"ra,dec,ref_epoch,v_mag,amplitude_mag\n1,2,2016,9,21\n", NULL, "column amplitude_mag: 21"},
         {"ra,dec,ref_epoch,v_mag,maximum_jd\n1,2,2016,9,59000\n", NULL, "column maximum_jd: 59000"},
         {"source_id,ra,dec,ref_epoch,v_mag\n1,1,2,2016,9\n",
@@ -390,6 +418,10 @@ static void test_bad_input(void **state) {
         {"", "source_id,phase,delta_mag\n1,0.5\n", "wrong number of fields"},
         {"", "source_id,phase,delta_mag\n1,0.5,1\n", "has one point"},
         {"", "source_id,phase,delta_mag\n1,0.5,1\n1,0.5,2\n", "at the same time, in line 2"},
+        /* phases are stored as they are, times from the first one on */
+        {"", "source_id,phase,delta_mag\n1,0.9,1\n1,0.900000001,2\n", "as phases"},
+        {"", "source_id,time_jd,delta_mag\n1,2400000,1\n1,2500000,1\n1,2500000.0001,2\n",
+         "as days after the first"},
         {"", "source_id,phase,delta_mag\n", "is empty"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         write_text(f->table, *cases[i].table ? cases[i].table

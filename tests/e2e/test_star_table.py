@@ -133,7 +133,7 @@ class StarTable(unittest.TestCase):
         text = self.load("vary.csv", "vary.stars", "--base", "none")
         self.assertIn("2 have a parallax, 1 are variable", text)
         info = runs.call_well("stars", "info", self.path("vary.stars"))
-        self.assertIn("with parallaxes; 1 are variable", info)
+        self.assertIn("2 of them with a parallax, 1 variable", info)
         earth = get_body_barycentric("earth", start, ephemeris="builtin").xyz.to_value(u.m)
         rate = {}
         for name, words in (("frames", ()), ("generator", (runs.GENERATOR,))):

@@ -311,6 +311,14 @@ static void light_from_zero_point(void **state) {
         bst_assert_close(bst_camera_electrons_per_s(&c, 20.0), 10.0, 1e-12);
         assert_true(c.throughput == 0.8);
     }
+    for (int k = 0; k < 64; k++) { /* a resolved scenario has the same bits when it is read again */
+        bst_camera first = c;
+        first.zero_point_mag = 20.0 + 0.05 * k;
+        bst_assert_ok(&ctx, bst_camera_resolve_figures(&ctx, &first));
+        bst_camera second = first;
+        bst_assert_ok(&ctx, bst_camera_resolve_figures(&ctx, &second));
+        assert_true(second.photon_flux_v0_per_s_m2 == first.photon_flux_v0_per_s_m2);
+    }
     /* with a spectrum the throughput follows, and thermal light with it */
     c.band.preset = BST_BAND_SILICON;
     double photons = c.photon_flux_v0_per_s_m2;
