@@ -13,6 +13,7 @@ enum { MOST_NODES = BST_EFFECTIVE_PSF_NODES * BST_EFFECTIVE_PSF_NODES };
 /* Iterations of all stars, and of each part left out, which begin with the PSF of all. */
 enum { ITERATIONS = 24, PART_ITERATIONS = 5, STAR_VALUES = 3 };
 enum { LEAST_STARS = 10 };
+enum { MOST_HALF = 12 }; /* of the smoothing's windows, samples */
 /* The PSF has settled when its samples change by less than this share of its peak. */
 static const double SETTLED = 1e-3;
 /* Errors of the form, as a share of the light: at first, and at least. */
@@ -277,6 +278,11 @@ static double polynomial_weight(int h, int k) {
 /* Filters a plane along both axes; samples outside repeat those of the border. */
 static void filter(const fit *f, const double *plane, int h, double *out) {
     const int side = f->side;
+    double weights[2 * MOST_HALF + 1];
+    assert(h <= MOST_HALF);
+    for (int k = -h; k <= h; k++) {
+        weights[k + h] = polynomial_weight(h, k);
+    }
     for (int pass = 0; pass < 2; pass++) {
         const double *from = pass == 0 ? plane : f->scratch;
         double *to = pass == 0 ? f->scratch : out;
@@ -286,9 +292,9 @@ static void filter(const fit *f, const double *plane, int h, double *out) {
                 for (int k = -h; k <= h; k++) {
                     int at = (pass == 0 ? i : j) + k;
                     at = at < 0 ? 0 : at >= side ? side - 1 : at;
-                    sum += polynomial_weight(h, k) *
-                           (pass == 0 ? from[(size_t)j * (size_t)side + (size_t)at]
-                                      : from[(size_t)at * (size_t)side + (size_t)i]);
+                    sum +=
+                        weights[k + h] * (pass == 0 ? from[(size_t)j * (size_t)side + (size_t)at]
+                                                    : from[(size_t)at * (size_t)side + (size_t)i]);
                 }
                 to[(size_t)j * (size_t)side + (size_t)i] = sum;
             }
@@ -307,7 +313,7 @@ static void smooth(fit *f) {
     static const struct {
         int half;
         double from_px;
-    } windows[] = {{3, 0.0}, {4, 4.0}, {8, 7.0}, {12, 11.0}};
+    } windows[] = {{3, 0.0}, {4, 4.0}, {8, 7.0}, {MOST_HALF, 11.0}};
     enum { WINDOWS = sizeof windows / sizeof *windows };
     for (int n = 0; n < f->nodes; n++) {
         double *plane = f->value + (size_t)n * f->samples;
