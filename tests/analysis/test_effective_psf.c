@@ -8,7 +8,7 @@
 
 #include "sim/analysis/camera/effective_psf.h"
 
-enum { HALF = 10, STAMP = 2 * HALF + 1, STARS = 160, OVER = BST_EFFECTIVE_PSF_OVERSAMPLING };
+enum { HALF = 10, STAMP = 2 * HALF + 1, STARS = 120, OVER = BST_EFFECTIVE_PSF_OVERSAMPLING };
 enum { SIDE = 2 * HALF * OVER + 1, SAMPLES = SIDE * SIDE, LOBES = 3 };
 static const double NOISE_E = 10.0;
 
@@ -120,7 +120,7 @@ static void test_coma_and_wings_come_back(void **state) {
     bst_assert_ok(&ctx, bst_effective_psf_fit(&ctx, stars, STARS, &options, &psf));
     assert_int_equal(psf.side, SIDE);
     assert_in_range(psf.stars, STARS - 20, STARS);
-    /* 4,400 pixels of cores: a standard deviation of 0.02; the samples that are fitted to them take
+    /* 3,400 pixels of cores: a standard deviation of 0.02; the samples that are fitted to them take
      * up to a tenth */
     bst_assert_close(psf.chi_squared, 1.0, 0.12);
     for (int node = 0; node < 2; node++) {

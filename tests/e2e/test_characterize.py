@@ -25,6 +25,7 @@ from runs import call, call_well
 FULL = "--full" in sys.argv
 if FULL:
     sys.argv.remove("--full")
+LIMIT_S = 3600 if FULL else 120
 CAMERA = runs.SENSOR + "/camera/"
 NEOSSAT = os.path.join(os.environ.get("BORESIGHT_NEOSSAT", ""), "NEOSSAT_240__30_2020214095318.fits")
 
@@ -75,10 +76,10 @@ class Characterize(unittest.TestCase):
         kinds, given = ("bias", "dark", "flat"), ("bias", "dark", "flat") + (() if more else ("linearity",))
         result = call("calframes", scenario, "--out", cal, "--exposure", "8", "--threads", "1", "--linearity", "0" if more else "20",
                       *(word for kind in kinds for word in ("--" + kind, str(frames))),
-                      "--set", "/world/star_catalogue=embedded")
+                      "--set", "/world/star_catalogue=embedded", timeout=LIMIT_S)
         self.assertEqual(result.returncode, 0, result.stderr)
         result = call("characterize", "--map", "boresight", "--out", out, "--extends", scenario,
-                      *(word for kind in given for word in ("--" + kind, f"{cal}/neossat_telescope_{kind}.fits")))
+                      *(word for kind in given for word in ("--" + kind, f"{cal}/neossat_telescope_{kind}.fits")), timeout=LIMIT_S)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         with open(out + "/report.json", encoding="utf-8") as file:
             report = json.load(file)

@@ -13,6 +13,7 @@ enum { MOST_NODES = BST_EFFECTIVE_PSF_NODES * BST_EFFECTIVE_PSF_NODES };
 /* Iterations of all stars, and of each part left out, which begin with the PSF of all. */
 enum { ITERATIONS = 24, PART_ITERATIONS = 5, STAR_VALUES = 3 };
 enum { LEAST_STARS = 10 };
+enum { MOST_HALF = 12 }; /* of the smoothing's windows, samples */
 /* The PSF has settled when its samples change by less than this share of its peak. */
 static const double SETTLED = 1e-3;
 /* Errors of the form, as a share of the light: at first, and at least. */
@@ -60,12 +61,15 @@ static void cubic(double t, double w[4], double d[4]) {
     d[3] = 0.5 * t * (3.0 * t - 2.0);
 }
 
-/* Value of a plane and its gradient per pixel at an offset from the middle; 0 outside. */
+/* Value of a plane and its gradient per pixel (g; NULL: not wanted) at an offset from the middle; 0
+ * outside. */
 static double value_at(const double *plane, int side, double dx_px, double dy_px, double g[2]) {
     double u = dx_px * OVER + 0.5 * (side - 1), v = dy_px * OVER + 0.5 * (side - 1);
     double wx[4], wy[4], sx[4], sy[4], sum = 0.0;
     int i = (int)floor(u), j = (int)floor(v);
-    g[0] = g[1] = 0.0;
+    if (g) {
+        g[0] = g[1] = 0.0;
+    }
     if (i < 1 || j < 1 || i + 2 >= side || j + 2 >= side) {
         return 0.0;
     }
@@ -76,11 +80,13 @@ static double value_at(const double *plane, int side, double dx_px, double dy_px
         double along = 0.0, slope = 0.0;
         for (int a = 0; a < 4; a++) {
             along += wx[a] * row[a];
-            slope += sx[a] * row[a];
+            slope += g ? sx[a] * row[a] : 0.0;
         }
         sum += wy[b] * along;
-        g[0] += OVER * wy[b] * slope;
-        g[1] += OVER * sy[b] * along;
+        if (g) {
+            g[0] += OVER * wy[b] * slope;
+            g[1] += OVER * sy[b] * along;
+        }
     }
     return sum;
 }
@@ -99,9 +105,13 @@ static void shares_of(const fit *f, const bst_effective_psf_star *s, double shar
 static void mix(fit *f, const double share[MOST_NODES]) {
     memset(f->mixed, 0, f->samples * sizeof *f->mixed);
     for (int n = 0; n < f->nodes; n++) {
-        const double *plane = f->value + (size_t)n * f->samples;
-        for (size_t k = 0; k < f->samples && share[n] > 0.0; k++) {
-            f->mixed[k] += share[n] * plane[k];
+        if (share[n] > 0.0) {
+            const double *plane = f->value + (size_t)n * f->samples;
+            const double w = share[n];
+            double *restrict mixed = f->mixed;
+            for (size_t k = 0; k < f->samples; k++) {
+                mixed[k] += w * plane[k];
+            }
         }
     }
 }
@@ -204,7 +214,7 @@ static void add_residual(fit *f, const double share[MOST_NODES], double dx, doub
  * Returned:  chi_squared  of a pixel of a star's core; form_error  its error beyond the noise */
 static void gather(fit *f, int without, bool first, int steps, double *chi_squared,
                    double *form_error) {
-    double chi2 = 0.0, pixels = 0.0, excess = 0.0, light2 = 0.0, share[MOST_NODES], g[2];
+    double chi2 = 0.0, pixels = 0.0, excess = 0.0, light2 = 0.0, share[MOST_NODES];
     memset(f->normal, 0,
            f->samples * (size_t)(f->nodes * (f->nodes + 1) / 2 + f->nodes) * sizeof *f->normal);
     for (int i = 0; i < f->count; i++) {
@@ -221,7 +231,7 @@ static void gather(fit *f, int without, bool first, int steps, double *chi_squar
         pixels -= p->used ? STAR_VALUES : 0.0;
         for (int k = 0; k < f->stamp * f->stamp && p->used; k++) {
             double dx = k % f->stamp - f->half - p->x, dy = k / f->stamp - f->half - p->y;
-            double e = value_at(f->mixed, f->side, dx, dy, g), light = p->light * e;
+            double e = value_at(f->mixed, f->side, dx, dy, NULL), light = p->light * e;
             double left = (double)s->pixels[k] - p->level - light;
             double variance = variance_of(f, s, first ? (double)s->pixels[k] - p->level : light);
             if (!(left * left < CLIP * CLIP * variance) && !(first && isfinite(left))) {
@@ -277,6 +287,11 @@ static double polynomial_weight(int h, int k) {
 /* Filters a plane along both axes; samples outside repeat those of the border. */
 static void filter(const fit *f, const double *plane, int h, double *out) {
     const int side = f->side;
+    double weights[2 * MOST_HALF + 1];
+    assert(h <= MOST_HALF);
+    for (int k = -h; k <= h; k++) {
+        weights[k + h] = polynomial_weight(h, k);
+    }
     for (int pass = 0; pass < 2; pass++) {
         const double *from = pass == 0 ? plane : f->scratch;
         double *to = pass == 0 ? f->scratch : out;
@@ -286,9 +301,9 @@ static void filter(const fit *f, const double *plane, int h, double *out) {
                 for (int k = -h; k <= h; k++) {
                     int at = (pass == 0 ? i : j) + k;
                     at = at < 0 ? 0 : at >= side ? side - 1 : at;
-                    sum += polynomial_weight(h, k) *
-                           (pass == 0 ? from[(size_t)j * (size_t)side + (size_t)at]
-                                      : from[(size_t)at * (size_t)side + (size_t)i]);
+                    sum +=
+                        weights[k + h] * (pass == 0 ? from[(size_t)j * (size_t)side + (size_t)at]
+                                                    : from[(size_t)at * (size_t)side + (size_t)i]);
                 }
                 to[(size_t)j * (size_t)side + (size_t)i] = sum;
             }
@@ -307,7 +322,7 @@ static void smooth(fit *f) {
     static const struct {
         int half;
         double from_px;
-    } windows[] = {{3, 0.0}, {4, 4.0}, {8, 7.0}, {12, 11.0}};
+    } windows[] = {{3, 0.0}, {4, 4.0}, {8, 7.0}, {MOST_HALF, 11.0}};
     enum { WINDOWS = sizeof windows / sizeof *windows };
     for (int n = 0; n < f->nodes; n++) {
         double *plane = f->value + (size_t)n * f->samples;
@@ -326,7 +341,7 @@ static void smooth(fit *f) {
 static void normalise(fit *f) {
     for (int n = 0; n < f->nodes; n++) {
         double *plane = f->value + (size_t)n * f->samples;
-        double ring = 0.0, in = 0.0, sum = 0.0, core = 0.0, x = 0.0, y = 0.0, g[2];
+        double ring = 0.0, in = 0.0, sum = 0.0, core = 0.0, x = 0.0, y = 0.0;
         for (size_t k = 0; k < f->samples; k++) {
             double r = radius_px(f, k);
             ring += r > f->half - 1.0 && r <= f->half ? plane[k] : 0.0;
@@ -352,7 +367,7 @@ static void normalise(fit *f) {
         for (size_t k = 0; k < f->samples; k++) {
             double dx = ((double)(k % (size_t)f->side) - 0.5 * (f->side - 1)) / OVER,
                    dy = ((double)(k / (size_t)f->side) - 0.5 * (f->side - 1)) / OVER;
-            plane[k] = value_at(f->smooth, f->side, dx + x, dy + y, g) / sum;
+            plane[k] = value_at(f->smooth, f->side, dx + x, dy + y, NULL) / sum;
         }
     }
 }
