@@ -4,44 +4,43 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/core/json_member.h"
 #include "sim/io/html.h"
 #include "sim/report/report_plots.h"
 
 enum { LISTED = 25, MOST_POINTS = 200000 };
 
-static double number_of(const cJSON *node, const char *key) {
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(node, key);
-    return cJSON_IsNumber(item) ? item->valuedouble : NAN;
-}
-
 /* Writes the key figures: objects, tracks, uncertainty, consistency. */
 static void put_cards(FILE *out, const cJSON *f) {
     char text[32], more[32], least[32], note[160];
     fputs("<div class=\"cards\">\n", out);
-    snprintf(text, sizeof text, "%.0f", number_of(f, "in_custody"));
-    snprintf(note, sizeof note, "of %.0f, by the uncertainty at the end", number_of(f, "objects"));
+    snprintf(text, sizeof text, "%.0f", bst_json_member_number(f, "in_custody"));
+    snprintf(note, sizeof note, "of %.0f, by the uncertainty at the end",
+             bst_json_member_number(f, "objects"));
     bst_report_page_card(out, text, "", "objects in custody", note);
-    snprintf(text, sizeof text, "%.0f", number_of(f, "updated"));
+    snprintf(text, sizeof text, "%.0f", bst_json_member_number(f, "updated"));
     snprintf(note, sizeof note, "last %s s ago, mean",
-             bst_report_page_number(more, number_of(f, "age_mean_s"), 4));
+             bst_report_page_number(more, bst_json_member_number(f, "age_mean_s"), 4));
     bst_report_page_card(out, text, "", "objects updated", note);
-    snprintf(text, sizeof text, "%.0f", number_of(f, "correlated"));
+    snprintf(text, sizeof text, "%.0f", bst_json_member_number(f, "correlated"));
     snprintf(note, sizeof note, "of %.0f; %.0f ambiguous, %.0f of no object",
-             number_of(f, "tracks"), number_of(f, "ambiguous"), number_of(f, "uncorrelated"));
+             bst_json_member_number(f, "tracks"), bst_json_member_number(f, "ambiguous"),
+             bst_json_member_number(f, "uncorrelated"));
     bst_report_page_card(out, text, "", "tracks correlated", note);
-    snprintf(text, sizeof text, "%.0f", number_of(f, "cross_tags"));
+    snprintf(text, sizeof text, "%.0f", bst_json_member_number(f, "cross_tags"));
     bst_report_page_card(out, text, "", "cross-tags", "tracks of another object by the truth");
     snprintf(note, sizeof note, "all objects: %s m, 90 %% below %s m",
-             bst_report_page_number(more, number_of(f, "sigma_median_m"), 3),
-             bst_report_page_number(least, number_of(f, "sigma_p90_m"), 3));
-    bst_report_page_card(out,
-                         bst_report_page_number(text, number_of(f, "sigma_updated_median_m"), 3),
-                         "m", "uncertainty of updated objects, median", note);
+             bst_report_page_number(more, bst_json_member_number(f, "sigma_median_m"), 3),
+             bst_report_page_number(least, bst_json_member_number(f, "sigma_p90_m"), 3));
+    bst_report_page_card(
+        out, bst_report_page_number(text, bst_json_member_number(f, "sigma_updated_median_m"), 3),
+        "m", "uncertainty of updated objects, median", note);
     snprintf(note, sizeof note, "%s to %s if consistent (95 %%)",
-             bst_report_page_number(least, number_of(f, "nees_low"), 3),
-             bst_report_page_number(more, number_of(f, "nees_high"), 3));
-    bst_report_page_card(out, bst_report_page_number(text, number_of(f, "nees_mean"), 3), "",
-                         "NEES of updated objects", note);
+             bst_report_page_number(least, bst_json_member_number(f, "nees_low"), 3),
+             bst_report_page_number(more, bst_json_member_number(f, "nees_high"), 3));
+    bst_report_page_card(out,
+                         bst_report_page_number(text, bst_json_member_number(f, "nees_mean"), 3),
+                         "", "NEES of updated objects", note);
     fputs("</div>\n", out);
 }
 

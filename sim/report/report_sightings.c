@@ -6,6 +6,7 @@
 
 #include <cjson/cJSON.h>
 
+#include "sim/core/json_member.h"
 #include "sim/core/text.h"
 #include "sim/report/report_plots.h"
 
@@ -17,11 +18,6 @@ typedef struct sensor_names {
     char names[SENSORS][100];
     int count;
 } sensor_names;
-
-static double number_of(const cJSON *node, const char *key) {
-    const cJSON *item = cJSON_GetObjectItemCaseSensitive(node, key);
-    return cJSON_IsNumber(item) ? item->valuedouble : NAN;
-}
 
 /* Chart colour of a sensor; grey beyond the number of named sensors. */
 static int colour_of(int64_t sensor) {
@@ -68,30 +64,35 @@ static void put_cards(FILE *out, const bst_run_reader *run) {
         return; /* without summary: charts only */
     }
     fputs("<div class=\"cards\">\n", out);
-    snprintf(text, sizeof text, "%.0f", number_of(f, "objects_seen"));
-    snprintf(note, sizeof note, "of %.0f, %.0f of them in a field", number_of(f, "objects"),
-             number_of(f, "objects_in_field"));
+    snprintf(text, sizeof text, "%.0f", bst_json_member_number(f, "objects_seen"));
+    snprintf(note, sizeof note, "of %.0f, %.0f of them in a field",
+             bst_json_member_number(f, "objects"), bst_json_member_number(f, "objects_in_field"));
     bst_report_page_card(out, text, "", "objects seen", note);
-    snprintf(text, sizeof text, "%.0f", number_of(f, "passes_seen"));
-    snprintf(note, sizeof note, "of %.0f through a field", number_of(f, "passes"));
+    snprintf(text, sizeof text, "%.0f", bst_json_member_number(f, "passes_seen"));
+    snprintf(note, sizeof note, "of %.0f through a field", bst_json_member_number(f, "passes"));
     bst_report_page_card(out, text, "", "passes seen", note);
     snprintf(note, sizeof note, "at most %s s",
-             bst_report_page_number(more, number_of(f, "revisit_most_s"), 4));
-    bst_report_page_card(out, bst_report_page_number(text, number_of(f, "revisit_mean_s"), 4), "s",
-                         "revisit, mean", note);
-    snprintf(note, sizeof note, "%s %% of those seen",
-             bst_report_page_number(more, 100.0 * number_of(f, "custody_fraction_seen"), 3));
+             bst_report_page_number(more, bst_json_member_number(f, "revisit_most_s"), 4));
     bst_report_page_card(
-        out, bst_report_page_number(text, 100.0 * number_of(f, "custody_fraction_all"), 3), "%",
-        "object custody, mean of all", note);
+        out, bst_report_page_number(text, bst_json_member_number(f, "revisit_mean_s"), 4), "s",
+        "revisit, mean", note);
+    snprintf(note, sizeof note, "%s %% of those seen",
+             bst_report_page_number(more,
+                                    100.0 * bst_json_member_number(f, "custody_fraction_seen"), 3));
+    bst_report_page_card(
+        out,
+        bst_report_page_number(text, 100.0 * bst_json_member_number(f, "custody_fraction_all"), 3),
+        "%", "object custody, mean of all", note);
     snprintf(note, sizeof note, "tracks %s arcsec",
-             bst_report_page_number(more, number_of(f, "track_rms_arcsec"), 3));
-    bst_report_page_card(out, bst_report_page_number(text, number_of(f, "place_rms_arcsec"), 3),
-                         "arcsec", "detections from truth, RMS", note);
-    if (number_of(f, "tasks") > 0.0) {
-        snprintf(text, sizeof text, "%.0f", number_of(f, "tasks_done"));
-        snprintf(note, sizeof note, "of %.0f; %.0f not found, %.0f lost", number_of(f, "tasks"),
-                 number_of(f, "tasks_not_found"), number_of(f, "tasks_lost"));
+             bst_report_page_number(more, bst_json_member_number(f, "track_rms_arcsec"), 3));
+    bst_report_page_card(
+        out, bst_report_page_number(text, bst_json_member_number(f, "place_rms_arcsec"), 3),
+        "arcsec", "detections from truth, RMS", note);
+    if (bst_json_member_number(f, "tasks") > 0.0) {
+        snprintf(text, sizeof text, "%.0f", bst_json_member_number(f, "tasks_done"));
+        snprintf(note, sizeof note, "of %.0f; %.0f not found, %.0f lost",
+                 bst_json_member_number(f, "tasks"), bst_json_member_number(f, "tasks_not_found"),
+                 bst_json_member_number(f, "tasks_lost"));
         bst_report_page_card(out, text, "", "tasks done", note);
     }
     fputs("</div>\n", out);

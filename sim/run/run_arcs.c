@@ -14,14 +14,16 @@
 enum { SLOTS = 64 };
 /* detections of an arc: with fewer its rate is that of the initiation */
 enum { LEAST_HITS = 5 };
+/* directions of a track: more than any run has, and no overflow */
+static const int64_t MOST_SEEN = INT64_C(1) << 53;
 
 /* A track that has not ended. */
 typedef struct slot {
     bst_run_arc arc; /* id 0: free; hits 0: not confirmed yet */
     int64_t tick;    /* of the newest state with a detection */
-    int32_t seen;    /* directions that were measured, and of which every one of these is kept: */
-    int32_t every;
-    double shared; /* fraction of the attitude's variance that successive frames share */
+    int64_t seen;    /* directions that were measured */
+    int64_t every;   /* one in so many of them is kept */
+    double shared;   /* fraction of the attitude's variance that successive frames share */
     bst_quat attitude[BST_CUSTODY_DIRECTIONS];
 } slot;
 
@@ -102,7 +104,8 @@ static void archive_slot(slot *s, bst_archive *archive) {
     if (s->arc.id != 0) {
         BST_ARCHIVE(archive, *s);
         s->arc.count = bst_archive_count(archive, s->arc.count, BST_CUSTODY_DIRECTIONS);
-        s->every = s->every > 1 ? s->every : 1;
+        s->seen = bst_archive_integer(archive, s->seen, 0, MOST_SEEN);
+        s->every = bst_archive_integer(archive, s->every, 1, MOST_SEEN);
     }
 }
 
@@ -156,9 +159,6 @@ static bst_status add_direction(bst_ctx *ctx, bst_run_arcs *a, const sensor *s,
         for (int i = 1; i < arc->count; i++) {
             arc->directions[i] = arc->directions[2 * i];
             own->attitude[i] = own->attitude[2 * i];
-        }
-        if ((own->seen - 1) % own->every != 0) {
-            return BST_OK;
         }
     }
     bst_light light;

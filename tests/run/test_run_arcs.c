@@ -117,6 +117,29 @@ static void copy_state(bst_run_arcs *from, bst_run_arcs *to) {
     bst_archive_free(saved);
 }
 
+/* A saved state with fewer centroids than it says is an error, before memory is taken for them. */
+static void saved_centroids_are_there(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_archive *saved, *read;
+    bst_run_centroids centroids = {.next = 0};
+    size_t size;
+    int64_t few[4] = {0, 0, 0, 0};
+    bst_assert_ok(&ctx, bst_archive_create(&ctx, &saved));
+    bst_assert_ok(&ctx, bst_archive_begin(&ctx, saved, "centroids"));
+    (void)bst_archive_count(saved, 1 << 24, 1 << 24);
+    BST_ARCHIVE(saved, few);
+    bst_assert_ok(&ctx, bst_archive_end(&ctx, saved));
+    const void *bytes = bst_archive_data(saved, &size);
+    bst_assert_ok(&ctx, bst_archive_open(&ctx, bytes, size, &read));
+    bst_assert_ok(&ctx, bst_archive_begin(&ctx, read, "centroids"));
+    assert_int_equal(bst_run_centroids_archive(&centroids, read), BST_ERR_FORMAT);
+    assert_int_equal(centroids.frames[0].room, 0);
+    bst_run_centroids_clear(&centroids);
+    bst_archive_free(read);
+    bst_archive_free(saved);
+}
+
 /* An arc has the track's last state, and directions from its first detection on, fewer in long
  * arcs; it is the same in a run that goes on from a saved state. */
 static void arcs_of_tracks(void **state) {
@@ -207,6 +230,7 @@ static void arcs_that_lack_something(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(measured_directions),
+        cmocka_unit_test(saved_centroids_are_there),
         cmocka_unit_test(arcs_of_tracks),
         cmocka_unit_test(arcs_that_lack_something),
     };
