@@ -88,7 +88,7 @@ struct bst_generator {
     bst_path_outputs outputs;
     /* lead of a point's fit over a streak's on an uneven path, by light level; see point_lead() */
     double point_lead[GENERATOR_BIASES];
-    double known_width;           /* width of the filters' images relative to the PSF's */
+    double known_width; /* width of the filters' images relative to the PSF's */
     /* centroid variance relative to a Gaussian of the PSF's noise-equivalent area */
     double place_ratio2;
     double norm_ratio[2]; /* sqrt(sum p^2) of the filters' images relative to the bound's */

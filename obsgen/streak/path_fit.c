@@ -254,10 +254,11 @@ bst_path_point_fit bst_path_fit_points(const bst_path_point *points, int count, 
     return (bst_path_point_fit){f.x, f.y, f.flux, f.widening};
 }
 
-/* Adds a streak's light at points at most a sigma of the image apart. */
-static void add_streak(const bst_path_streak *s, double image_px, double peak, samples *out) {
-    int pieces = (int)fmin(ceil(1.5 * hypot(s->path.dx, s->path.dy) / image_px) + 1.0, MODEL);
-    for (int i = 0; i < pieces && out->count < LIGHTS; i++) {
+/* Adds a streak's light at points at most a sigma of the image apart, or `most` points. */
+static void add_streak(const bst_path_streak *s, double image_px, double peak, int most,
+                       samples *out) {
+    int pieces = (int)fmin(ceil(1.5 * hypot(s->path.dx, s->path.dy) / image_px) + 1.0, most);
+    for (int i = 0; i < pieces; i++) {
         double u = (i + 0.5) / pieces - 0.5;
         out->x[out->count] = s->x_px + u * s->path.dx;
         out->y[out->count] = s->y_px + u * s->path.dy;
@@ -268,7 +269,8 @@ static void add_streak(const bst_path_streak *s, double image_px, double peak, s
 bst_path_point_fit bst_path_fit_streaks(const bst_path_streak *streaks, int count, double image_px,
                                         const bst_streak_model *model, double light,
                                         double margin_px, double limit_px) {
-    assert(streaks && count > 0 && model && image_px > 0.0 && model->sigma_px > 0.0);
+    assert(streaks && count > 0 && count <= LIGHTS && model && image_px > 0.0 &&
+           model->sigma_px > 0.0);
     const double sigma = model->sigma_px, length = hypot(model->path.dx, model->path.dy);
     /* pixels of images are those of the frame's axes; a long streak's margin is small beside it */
     bool turned = length > LONG_SIGMAS * sigma;
@@ -277,9 +279,10 @@ bst_path_point_fit bst_path_fit_streaks(const bst_path_streak *streaks, int coun
     const bst_streak_model straight = {.path = model->path, .sigma_px = sigma};
     samples seen_at = {.count = 0}, streak;
     fitted f = {0.0, 0.0, 0.0, 0.0};
+    const int most = LIGHTS / count < MODEL ? LIGHTS / count : MODEL;
     for (int i = 0; i < count; i++) {
         /* render() gives each Gaussian the peak of its weight */
-        add_streak(&streaks[i], image_px, sigma * sigma / (image_px * image_px), &seen_at);
+        add_streak(&streaks[i], image_px, sigma * sigma / (image_px * image_px), most, &seen_at);
         f.flux += streaks[i].flux;
     }
     sample_model(&straight, &streak);

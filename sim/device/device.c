@@ -33,6 +33,7 @@ struct bst_device {
     char description[4 * NAME_BYTES];
     time_t opened;
     bool pocl;
+    bool declares_builtins; /* kernels are built with kernels/builtins.cl, not with its headers */
     pthread_mutex_t
         lock; /* protects all members below: cameras that change build programs on any thread */
     const bst_device_kernel_source
@@ -244,6 +245,7 @@ bst_status bst_device_open(bst_ctx *ctx, const char *selector, int threads, bst_
     const candidate *c = &list[chosen];
     device->parent = device->id = c->id;
     device->pocl = c->pocl;
+    device->declares_builtins = c->pocl && c->cpu; /* PoCL's GPU targets were not tested with it */
     cl_uint units = 1;
     if ((status = limit_threads(ctx, device, c, threads, &units)) != BST_OK) {
         goto exit;
@@ -459,8 +461,9 @@ static const char no_abi_warnings[] =
 /* The guard of Clang's opencl-c.h. */
 static const char no_header[] = " -D_OPENCL_H_";
 
-/* Builds a program for PoCL with declarations of the built-in functions in place of its headers,
- * which it would read for 50 ms even if the kernels are cached; false: with the headers, then. */
+/* Builds a program for PoCL on a CPU with declarations of the built-in functions in place of its
+ * headers, which it would read for 50 ms even if the kernels are cached; false: with the headers,
+ * then. */
 static bool build_without_headers(bst_device *device, const char **texts, cl_uint count,
                                   const char *options, cl_program *out) {
     const char *prelude = texts[0];
@@ -512,8 +515,8 @@ static bst_status build(bst_ctx *ctx, bst_device *device,
         texts[2 * i + 1] = lines[i];
         texts[2 * i + 2] = sources[i]->text;
     }
-    if (device->pocl && build_without_headers(device, texts, (cl_uint)count * 2 + 1,
-                                              options ? options : "", &program)) {
+    if (device->declares_builtins && build_without_headers(device, texts, (cl_uint)count * 2 + 1,
+                                                           options ? options : "", &program)) {
         goto built;
     }
     device->header_builds++;

@@ -62,9 +62,9 @@ bst_status bst_device_build(bst_ctx *ctx, bst_device *device,
 
 /* Kernel sources that were built on this device, in order of first use; NULL after the last. */
 const bst_device_kernel_source *bst_device_built(const bst_device *device, int index);
-/* Number of programs that were built with the headers of the OpenCL implementation: with PoCL those
- * that call a built-in function that sim/device/kernels/builtins.cl does not declare, or that have
- * an error. */
+/* Number of programs that were built with the headers of the OpenCL implementation: with PoCL
+ * on a CPU those that call a built-in function that sim/device/kernels/builtins.cl does not
+ * declare, or that have an error; with others all. */
 int bst_device_header_builds(const bst_device *device);
 /* Clears the list of built sources, for a new user of the device. */
 void bst_device_begin_list(bst_device *device);

@@ -14,14 +14,18 @@
 enum { SLOTS = 64 };
 /* detections of an arc: with fewer its rate is that of the initiation */
 enum { LEAST_HITS = 5 };
+/* directions of a track: more than any run has, and no overflow */
+static const int64_t MOST_SEEN = INT64_C(1) << 53;
+/* time that a saved state may have: SGP4 steps to it by 720 minutes */
+static const double LONGEST_S = 1e10;
 
 /* A track that has not ended. */
 typedef struct slot {
     bst_run_arc arc; /* id 0: free; hits 0: not confirmed yet */
     int64_t tick;    /* of the newest state with a detection */
-    int32_t seen;    /* directions that were measured, and of which every one of these is kept: */
-    int32_t every;
-    double shared; /* fraction of the attitude's variance that successive frames share */
+    int64_t seen;    /* directions that were measured */
+    int64_t every;   /* one in so many of them is kept */
+    double shared;   /* fraction of the attitude's variance that successive frames share */
     bst_quat attitude[BST_CUSTODY_DIRECTIONS];
 } slot;
 
@@ -97,19 +101,31 @@ void bst_run_arcs_free(bst_run_arcs *a) {
 }
 
 /* Archives the id of a slot, and the rest unless it is free. */
-static void archive_slot(slot *s, bst_archive *archive) {
+static bst_status archive_slot(const bst_run_arcs *a, slot *s, bst_archive *archive) {
     BST_ARCHIVE(archive, s->arc.id);
-    if (s->arc.id != 0) {
-        BST_ARCHIVE(archive, *s);
-        s->arc.count = bst_archive_count(archive, s->arc.count, BST_CUSTODY_DIRECTIONS);
-        s->every = s->every > 1 ? s->every : 1;
+    if (s->arc.id == 0) {
+        return BST_OK;
     }
+    BST_ARCHIVE(archive, *s);
+    s->arc.count = bst_archive_count(archive, s->arc.count, BST_CUSTODY_DIRECTIONS);
+    s->seen = bst_archive_integer(archive, s->seen, 0, MOST_SEEN);
+    s->every = bst_archive_integer(archive, s->every, 1, MOST_SEEN);
+    s->tick = bst_archive_integer(archive, s->tick, 0, (int64_t)(LONGEST_S * a->tick_rate_hz));
+    for (int i = 0; i < s->arc.count; i++) {
+        const double time_s = s->arc.directions[i].observer.time_s;
+        if (!(time_s >= 0.0 && time_s <= LONGEST_S)) {
+            return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                            "the saved state has a direction at %g s (allowed: 0 to %g)", time_s,
+                            LONGEST_S);
+        }
+    }
+    return BST_OK;
 }
 
 bst_status bst_run_arcs_archive(bst_run_arcs *a, bst_archive *archive) {
     for (int i = 0; i < a->count; i++) {
         for (int k = 0; k < SLOTS; k++) {
-            archive_slot(&a->sensors[i].slots[k], archive);
+            BST_TRY(archive_slot(a, &a->sensors[i].slots[k], archive));
         }
         BST_TRY(bst_run_centroids_archive(&a->sensors[i].recent, archive));
         BST_TRY(bst_run_used_tracks_archive(&a->sensors[i].used, archive));
@@ -156,9 +172,6 @@ static bst_status add_direction(bst_ctx *ctx, bst_run_arcs *a, const sensor *s,
         for (int i = 1; i < arc->count; i++) {
             arc->directions[i] = arc->directions[2 * i];
             own->attitude[i] = own->attitude[2 * i];
-        }
-        if ((own->seen - 1) % own->every != 0) {
-            return BST_OK;
         }
     }
     bst_light light;

@@ -44,7 +44,7 @@ bst_status bst_run_arcs_finish(bst_ctx *ctx, bst_run_arcs *arcs, bst_run_arc_fn 
                                void *user) BST_MUST_CHECK;
 
 /* Saves or restores the tracks that have not ended and the ids of those that have. Errors:
- * BST_ERR_MEMORY */
+ * BST_ERR_MEMORY; BST_ERR_FORMAT: the saved state lacks a part of them */
 bst_status bst_run_arcs_archive(bst_run_arcs *arcs, bst_archive *archive) BST_MUST_CHECK;
 
 #endif

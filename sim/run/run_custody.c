@@ -40,9 +40,8 @@ struct bst_run_custody {
     const bst_world *world;
     bst_world_view *view;
     bst_custody_config config;
-    double tick_rate_hz, within_m;
+    double within_m;
     int object_count, sensor_count;
-    int *observer;             /* [sensor] */
     double *pixel_rad;         /* [sensor] */
     bst_custody_orbit *orbits; /* [object]; a_m 0: none */
     bst_custody_filter *filters;
@@ -97,14 +96,12 @@ static bst_io_value number(double value) {
 
 static bst_status allocate(bst_ctx *ctx, bst_run_custody *c) {
     size_t n = (size_t)c->object_count + 1, sensors = (size_t)c->sensor_count + 1;
-    c->observer = calloc(sensors, sizeof *c->observer);
     c->pixel_rad = calloc(sensors, sizeof *c->pixel_rad);
     c->orbits = calloc(n, sizeof *c->orbits);
     c->filters = calloc(n, sizeof *c->filters);
     c->scores = calloc(n, sizeof *c->scores);
     c->place_m[0] = calloc(3 * n, sizeof *c->place_m[0]);
-    if (!c->observer || !c->pixel_rad || !c->orbits || !c->filters || !c->scores ||
-        !c->place_m[0]) {
+    if (!c->pixel_rad || !c->orbits || !c->filters || !c->scores || !c->place_m[0]) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the custody of %d objects",
                         c->object_count);
     }
@@ -172,7 +169,6 @@ bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the custody of the catalogue");
     }
     c->world = world;
-    c->tick_rate_hz = (double)scenario->tick_rate_hz;
     c->within_m = record->custody_within_m;
     c->config = (bst_custody_config){record->custody_sigma_m, record->custody_drift_m_per_day,
                                      record->custody_noise_m_per_day};
@@ -183,13 +179,14 @@ bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
     bst_status status = allocate(ctx, c);
     for (int i = 0, k = 0; status == BST_OK && i < bst_world_observer_count(world); i++) {
         for (int s = 0; s < bst_world_sensor_count(world, i); s++, k++) {
-            c->observer[k] = i;
             c->pixel_rad[k] = bst_camera_scale_rad(bst_world_camera(world, i, s));
         }
     }
     status = status == BST_OK ? start_filters(ctx, c, scenario) : status;
     status = status == BST_OK ? bst_world_view_create(ctx, world, &c->view) : status;
-    status = status == BST_OK ? bst_run_arcs_create(ctx, world, c->tick_rate_hz, &c->arcs) : status;
+    status = status == BST_OK
+                 ? bst_run_arcs_create(ctx, world, (double)scenario->tick_rate_hz, &c->arcs)
+                 : status;
     status = status == BST_OK && store ? make_tables(ctx, c, store) : status;
     if (status != BST_OK) {
         bst_run_custody_free(c);
@@ -203,7 +200,6 @@ void bst_run_custody_free(bst_run_custody *c) {
     if (c) {
         bst_world_view_free(c->view);
         bst_run_arcs_free(c->arcs);
-        free(c->observer);
         free(c->pixel_rad);
         free(c->orbits);
         free(c->filters);

@@ -10,10 +10,10 @@
 
 struct cJSON;
 
-/* Filters of all objects on element sets; fed with one observation from each confirmed track, when
- * the tracker no longer lists it. A track that the tracker resumes after that is not used again.
- * The truth is used for the error that the catalogue begins with, which it lacks, and for scoring.
- * Observers are where they are in truth: navigation errors are left out. */
+/* Filters of all objects on element sets; each confirmed track gives one update, when the tracker
+ * no longer lists it. A track that the tracker resumes after that is not used again. The truth is
+ * used for the error that the catalogue begins with, which it lacks, and for scoring. Observers are
+ * where they are in truth: navigation errors are left out. */
 typedef struct bst_run_custody bst_run_custody;
 
 typedef struct bst_custody_figures {
@@ -46,15 +46,14 @@ void bst_run_custody_free(bst_run_custody *custody); /* NULL allowed */
 /* Saves or restores the filters, the tracks that have not ended and the ids of those used. Objects
  * on another element set than in the saved state start anew. NULL custody: nothing.
  *
- * Errors:    BST_ERR_MEMORY */
+ * Errors:    BST_ERR_MEMORY, BST_ERR_FORMAT */
 bst_status bst_run_custody_archive(bst_run_custody *custody, bst_archive *archive) BST_MUST_CHECK;
 
 /* Takes the detections of a frame, whose centroids the tracks of this frame, which come later,
  * refer to. NULL custody: nothing. Errors: BST_ERR_MEMORY */
 bst_status bst_run_custody_detections(bst_ctx *ctx, bst_run_custody *custody, int sensor,
                                       const bst_detections *detections) BST_MUST_CHECK;
-/* Takes the tracks of a frame; `sensor`: index over all observers; `observer`: that of the sensor.
- * NULL custody: nothing. */
+/* Takes the tracks of a frame; `sensor`: index over all observers. NULL custody: nothing. */
 bst_status bst_run_custody_tracks(bst_ctx *ctx, bst_run_custody *custody, int sensor,
                                   const bst_tracks *tracks) BST_MUST_CHECK;
 /* Ends all tracks and writes the table custody. */

@@ -3,9 +3,11 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "sim/core/archive.h"
 #include "tracker/mtt/tangent.h"
 
 enum { MOST_CENTROIDS = 1 << 24 };
+#define CENTROID_BYTES sizeof(bst_run_centroid)
 
 void bst_run_measure_direction(const bst_camera *camera, double x_px, double y_px,
                                const double cov_px2[3], const bst_attitude_fix *attitude,
@@ -58,7 +60,7 @@ double bst_run_change_of_stars(const bst_camera *camera, bst_quat q_cam_from_gcr
 /* Makes room for the centroids of a frame. */
 static bst_status make_room(bst_ctx *ctx, bst_run_centroids *c, int frame, int count) {
     if (count > c->frames[frame].room) {
-        size_t size = (size_t)count * sizeof *c->frames[frame].items;
+        size_t size = (size_t)count * CENTROID_BYTES;
         bst_run_centroid *items = realloc(c->frames[frame].items, size);
         if (!items) {
             return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d centroids", count);
@@ -97,13 +99,18 @@ const bst_run_centroid *bst_run_centroids_find(const bst_run_centroids *c, int64
 }
 
 bst_status bst_run_centroids_archive(bst_run_centroids *c, bst_archive *archive) {
+    bst_ctx *ctx = bst_archive_ctx(archive);
     for (int i = 0; i < BST_RUN_CENTROID_FRAMES; i++) {
         int count = bst_archive_count(archive, c->frames[i].count, MOST_CENTROIDS);
-        BST_TRY(make_room(bst_archive_ctx(archive), c, i, count));
+        if (bst_archive_is_restoring(archive) &&
+            bst_archive_remaining(archive) / CENTROID_BYTES < (size_t)count) {
+            return bst_fail(ctx, BST_ERR_FORMAT, "the saved state has not all of %d centroids",
+                            count);
+        }
+        BST_TRY(make_room(ctx, c, i, count));
         BST_ARCHIVE(archive, c->frames[i].exposure_id);
         if (count > 0) {
-            bst_archive_bytes(archive, c->frames[i].items,
-                              (size_t)count * sizeof *c->frames[i].items);
+            bst_archive_bytes(archive, c->frames[i].items, (size_t)count * CENTROID_BYTES);
         }
     }
     int next = bst_archive_count(archive, c->next, BST_RUN_CENTROID_FRAMES - 1);

@@ -48,7 +48,7 @@ bst_status bst_run_centroids_add(bst_ctx *ctx, bst_run_centroids *centroids,
 /* The centroid at exactly a place in the frame of an exposure; NULL: not there, or too old. */
 const bst_run_centroid *bst_run_centroids_find(const bst_run_centroids *centroids,
                                                int64_t exposure_id, double x_px, double y_px);
-/* Saves or restores them. Errors: BST_ERR_MEMORY */
+/* Saves or restores them. Errors: BST_ERR_MEMORY; BST_ERR_FORMAT: the saved state lacks some */
 bst_status bst_run_centroids_archive(bst_run_centroids *centroids,
                                      bst_archive *archive) BST_MUST_CHECK;
 /* Frees the centroids of all frames. */

@@ -3,6 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/archive.h"
+
 enum { MOST_USED = 1 << 24 };
 
 /* Number of used tracks with a smaller id. */
@@ -54,6 +56,11 @@ bst_status bst_run_used_tracks_add(bst_ctx *ctx, bst_run_used_tracks *u, int64_t
 
 bst_status bst_run_used_tracks_archive(bst_run_used_tracks *u, bst_archive *archive) {
     int count = bst_archive_count(archive, u->count, MOST_USED);
+    if (bst_archive_is_restoring(archive) &&
+        bst_archive_remaining(archive) / sizeof *u->ids < (size_t)count) {
+        return bst_fail(bst_archive_ctx(archive), BST_ERR_FORMAT,
+                        "the saved state has not all of %d ids of used tracks", count);
+    }
     BST_TRY(make_room(bst_archive_ctx(archive), u, count));
     u->count = count;
     if (count > 0) {

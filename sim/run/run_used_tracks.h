@@ -22,7 +22,7 @@ bst_status bst_run_used_tracks_add(bst_ctx *ctx, bst_run_used_tracks *used,
 
 /* Saves or restores the ids.
  *
- * Errors:    BST_ERR_MEMORY */
+ * Errors:    BST_ERR_MEMORY; BST_ERR_FORMAT: the saved state lacks some */
 bst_status bst_run_used_tracks_archive(bst_run_used_tracks *used,
                                        bst_archive *archive) BST_MUST_CHECK;
 

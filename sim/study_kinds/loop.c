@@ -264,8 +264,8 @@ static const bst_study_metric metrics[ALL_METRICS] = {
                            "Confirmed tracks of all objects against the truth, RMS.",
                            BST_METRIC_VALUE},
     [CATALOGUE_UPDATED] = {"catalogue_updated", "",
-                           "Objects whose orbit a track updated (record.custody; so are all that "
-                           "follow).",
+                           "Objects whose orbit a track updated (with record.custody only, as all "
+                           "that follow).",
                            BST_METRIC_VALUE},
     [CATALOGUE_IN_CUSTODY] = {"catalogue_in_custody", "",
                               "Objects with a standard deviation of the position within "

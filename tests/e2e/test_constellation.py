@@ -299,6 +299,21 @@ class Thickened(unittest.TestCase):
         self.assertGreaterEqual(db.execute("SELECT count(DISTINCT object) FROM tasks").fetchone()[0], 4)
 
 
+    def test_input_that_cannot_be(self):
+        folder = runs.scratch()
+        plain = os.path.join(folder, "plain.json")
+        with open(plain, "w", encoding="utf-8") as file:
+            file.write('{"world": {"catalogues": []}, "observers": []}')
+        for words, expected in (((plain,), "/world/catalogues has 0 catalogues"),
+                                (("scenarios/day_constellation.json", "--objects", "7"), "--objects 7: allowed are 5018"),
+                                ((os.path.join(folder, "nix.json"),), "nix.json")):
+            result = subprocess.run(["/usr/bin/python3", "docs/examples/catalogue/thickened.py", words[0], folder,
+                                     *words[1:]], capture_output=True, text=True, check=False)
+            self.assertEqual(result.returncode, 1, words)
+            self.assertIn(expected, result.stderr)
+            self.assertNotIn("Traceback", result.stderr)
+
+
 @unittest.skipIf(FULL, "of the quick version")
 class Repeated(unittest.TestCase):
     def test_serial_and_overlapped_runs_are_equal(self):

@@ -353,6 +353,25 @@ static void fast_jitter_widens_the_image(void **state) {
     bst_assert_close(seen.point, expected.point, 0.01);
 }
 
+/* A streak in ten parts, one over the other, is fitted as the whole streak. */
+static void the_light_of_many_streaks_is_complete(void **state) {
+    (void)state;
+    const bst_obsgen_path_px along = {24.0, 32.0};
+    const bst_streak_model model = {.path = along, .sigma_px = 1.0};
+    const bst_path_streak whole = {0.3, -0.2, 1.0, along};
+    bst_path_streak parts[10];
+    for (int i = 0; i < 10; i++) {
+        parts[i] = (bst_path_streak){0.3, -0.2, 0.1, along};
+    }
+    bst_path_point_fit one = bst_path_fit_streaks(&whole, 1, 1.0, &model, 0.0, 4.0, 3.0);
+    bst_path_point_fit ten = bst_path_fit_streaks(parts, 10, 1.0, &model, 0.0, 4.0, 3.0);
+    bst_assert_close(one.flux, 1.0, 0.05);
+    bst_assert_close(ten.flux, one.flux, 0.02);
+    bst_assert_close(ten.x_px, one.x_px, 0.01);
+    bst_assert_close(ten.y_px, one.y_px, 0.01);
+    bst_assert_close(ten.x_px, 0.3, 0.02);
+}
+
 /* A source that is seen as a point has less noise in the filter for streaks, and one that is seen
  * as a streak less in the filter for points: the same noise decides the shape and both detections.
  */
@@ -397,6 +416,7 @@ int main(void) {
         cmocka_unit_test(a_bend_is_measured_on_bright_streaks),
         cmocka_unit_test(outputs_are_those_of_sums),
         cmocka_unit_test(fast_jitter_widens_the_image),
+        cmocka_unit_test(the_light_of_many_streaks_is_complete),
         cmocka_unit_test(shape_and_detection_have_one_noise),
         cmocka_unit_test(bright_streaks_have_another_bias),
         cmocka_unit_test(stars_that_rest_are_points_where_they_rest),

@@ -117,6 +117,29 @@ static void copy_state(bst_run_arcs *from, bst_run_arcs *to) {
     bst_archive_free(saved);
 }
 
+/* A saved state with fewer centroids than it says is an error, before memory is taken for them. */
+static void saved_centroids_are_there(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_archive *saved, *read;
+    bst_run_centroids centroids = {.next = 0};
+    size_t size;
+    int64_t few[4] = {0, 0, 0, 0};
+    bst_assert_ok(&ctx, bst_archive_create(&ctx, &saved));
+    bst_assert_ok(&ctx, bst_archive_begin(&ctx, saved, "centroids"));
+    (void)bst_archive_count(saved, 1 << 24, 1 << 24);
+    BST_ARCHIVE(saved, few);
+    bst_assert_ok(&ctx, bst_archive_end(&ctx, saved));
+    const void *bytes = bst_archive_data(saved, &size);
+    bst_assert_ok(&ctx, bst_archive_open(&ctx, bytes, size, &read));
+    bst_assert_ok(&ctx, bst_archive_begin(&ctx, read, "centroids"));
+    assert_int_equal(bst_run_centroids_archive(&centroids, read), BST_ERR_FORMAT);
+    assert_int_equal(centroids.frames[0].room, 0);
+    bst_run_centroids_clear(&centroids);
+    bst_archive_free(read);
+    bst_archive_free(saved);
+}
+
 /* An arc has the track's last state, and directions from its first detection on, fewer in long
  * arcs; it is the same in a run that goes on from a saved state. */
 static void arcs_of_tracks(void **state) {
@@ -169,6 +192,43 @@ static void arcs_of_tracks(void **state) {
     bst_world_free(world);
 }
 
+/* A saved state with a direction at a time that no run has is an error. */
+static void saved_times_are_possible(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = test_world_with("", "");
+    bst_run_arcs *arcs = arcs_of(world), *later = arcs_of(world);
+    bst_archive *saved, *read;
+    taken out = {0};
+    size_t size;
+    const double first = 1.0, hostile = 1e300;
+    for (int k = 1; k <= 5; k++) {
+        take_frame(&ctx, arcs, k, 3, BST_TRACK_CONFIRMED, true, keep, &out);
+    }
+    bst_assert_ok(&ctx, bst_archive_create(&ctx, &saved));
+    bst_assert_ok(&ctx, bst_archive_begin(&ctx, saved, "arcs"));
+    bst_assert_ok(&ctx, bst_run_arcs_archive(arcs, saved));
+    bst_assert_ok(&ctx, bst_archive_end(&ctx, saved));
+    const char *bytes = bst_archive_data(saved, &size);
+    char *changed = test_malloc(size);
+    memcpy(changed, bytes, size);
+    for (size_t i = 0; i + sizeof first <= size; i++) {
+        if (memcmp(bytes + i, &first, sizeof first) == 0) {
+            memcpy(changed + i, &hostile, sizeof hostile);
+        }
+    }
+    bst_assert_ok(&ctx, bst_archive_open(&ctx, changed, size, &read));
+    bst_assert_ok(&ctx, bst_archive_begin(&ctx, read, "arcs"));
+    assert_int_equal(bst_run_arcs_archive(later, read), BST_ERR_FORMAT);
+    assert_non_null(strstr(ctx.message, "a direction at 1e+300 s"));
+    bst_archive_free(read);
+    bst_archive_free(saved);
+    test_free(changed);
+    bst_run_arcs_free(arcs);
+    bst_run_arcs_free(later);
+    bst_world_free(world);
+}
+
 /* Centroids that are too old, and short or unconfirmed tracks, give nothing; confirmed tracks take
  * the place of others. */
 static void arcs_that_lack_something(void **state) {
@@ -206,8 +266,8 @@ static void arcs_that_lack_something(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(measured_directions),
-        cmocka_unit_test(arcs_of_tracks),
+        cmocka_unit_test(measured_directions),      cmocka_unit_test(saved_centroids_are_there),
+        cmocka_unit_test(saved_times_are_possible), cmocka_unit_test(arcs_of_tracks),
         cmocka_unit_test(arcs_that_lack_something),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

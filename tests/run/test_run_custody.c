@@ -75,6 +75,53 @@ static void take_track(bst_ctx *ctx, bst_run_custody *c, const bst_world *world,
     test_free(tracks);
 }
 
+/* Six frames in which `objects` are detected, as track `id` and as seen from the field's middle;
+ * one that ends it. */
+static void take_detected(bst_ctx *ctx, bst_run_custody *c, const bst_world *world,
+                          const int objects[6], int64_t id, double seconds) {
+    bst_detections *found = test_calloc(1, sizeof *found + sizeof found->items[0]);
+    bst_tracks *tracks = test_calloc(1, sizeof *tracks + sizeof tracks->items[0]);
+    bst_world_view *view;
+    bst_assert_ok(ctx, bst_world_view_create(ctx, world, &view));
+    for (int k = 0; k < 6; k++) {
+        const double now_s = seconds + 10.0 * k, sigma = 0.1 * BST_ARCSEC_RAD;
+        bst_world_sight now, later;
+        bst_assert_ok(ctx, bst_world_view_sight(ctx, view, 0, objects[k], now_s, &now));
+        bst_assert_ok(ctx, bst_world_view_sight(ctx, view, 0, objects[k], now_s + 0.1, &later));
+        const bst_quat attitude = bst_quat_look(now.apparent, (bst_vec3){0.1, 0.2, 1.0});
+        bst_vec3 moved = bst_vec3_scale(bst_vec3_sub(later.geometric, now.geometric), 10.0);
+        double x, y;
+        assert_true(bst_camera_project(bst_world_camera(world, 0, 0),
+                                       bst_quat_rotate(attitude, now.apparent), &x, &y));
+        *found = (bst_detections){.exposure_id = 100 * id + k, .count = 1};
+        found->items[0] = (bst_detection){.x_px = x, .y_px = y, .cov_xx = 0.01, .cov_yy = 0.01};
+        *tracks = (bst_tracks){
+            .exposure_id = found->exposure_id,
+            .tick = (int64_t)(now_s * RATE),
+            .count = 1,
+            .attitude = {
+                .valid = true, .q_cam_from_gcrf = attitude, .sigma_rad = {sigma, sigma, sigma}}};
+        tracks->items[0] = (bst_track){.id = id,
+                                       .status = BST_TRACK_CONFIRMED,
+                                       .direction_gcrf = now.geometric,
+                                       .rate_gcrf_radps = bst_tangent_project(now.geometric, moved),
+                                       .hits = k + 1,
+                                       .x_px = x,
+                                       .y_px = y};
+        for (int i = 0; i < 4; i++) {
+            double deviation = (i < 2 ? 0.5 : 0.05) * BST_ARCSEC_RAD;
+            tracks->items[0].covariance[i][i] = deviation * deviation;
+        }
+        bst_assert_ok(ctx, bst_run_custody_detections(ctx, c, 0, found));
+        bst_assert_ok(ctx, bst_run_custody_tracks(ctx, c, 0, tracks));
+    }
+    tracks->count = 0;
+    bst_assert_ok(ctx, bst_run_custody_tracks(ctx, c, 0, tracks));
+    bst_world_view_free(view);
+    test_free(found);
+    test_free(tracks);
+}
+
 static void take(bst_ctx *ctx, bst_run_custody *c, const bst_world *world, int object, int64_t id,
                  int hits, double seconds, double off_rad) {
     take_track(ctx, c, world, object, id, hits, 0, seconds, off_rad);
@@ -316,6 +363,35 @@ static void a_failed_update_is_counted(void **state) {
     bst_world_free(world);
 }
 
+/* A track with detections updates its object with their directions, not with its state; one whose
+ * detections are of two objects updates none. */
+static void directions_update_their_object(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_world *world = world_of_two();
+    bst_run_custody *c, *plain;
+    bst_custody_figures f, without;
+    const int own[6] = {0, 0, 0, 0, 0, 0}, mixed[6] = {1, 1, 0, 0, 0, 0};
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &c));
+    bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &SCENARIO(5, 0), NULL, &plain));
+    updates_fail = true; /* those with a state */
+    take_detected(&ctx, c, world, own, 1, 100.0);
+    take_detected(&ctx, c, world, mixed, 2, 300.0);
+    updates_fail = false;
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 500.0));
+    assert_true(bst_run_custody_figures(c, &f));
+    assert_true(f.tracks == 2 && f.correlated == 1 && f.uncorrelated == 1 && f.updated == 1);
+    assert_true(f.cross_tags == 0 && f.ambiguous == 0);
+    /* 264 m, of 2,031 m for all objects without updates */
+    bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, plain, 500.0));
+    assert_true(bst_run_custody_figures(plain, &without));
+    assert_true(f.sigma_updated_median_m < 0.2 * without.sigma_median_m);
+    assert_true(f.nees_mean > 0.5 && f.nees_mean < 20.0);
+    bst_run_custody_free(c);
+    bst_run_custody_free(plain);
+    bst_world_free(world);
+}
+
 static void off_and_without_objects(void **state) {
     (void)state;
     bst_ctx ctx = {0};
@@ -340,9 +416,13 @@ static void off_and_without_objects(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(tracks_update_their_objects), cmocka_unit_test(saved_states_go_on),
-        cmocka_unit_test(a_track_is_used_once),        cmocka_unit_test(changed_objects_start_anew),
-        cmocka_unit_test(errors_of_the_catalogue),     cmocka_unit_test(a_failed_update_is_counted),
+        cmocka_unit_test(tracks_update_their_objects),
+        cmocka_unit_test(saved_states_go_on),
+        cmocka_unit_test(a_track_is_used_once),
+        cmocka_unit_test(changed_objects_start_anew),
+        cmocka_unit_test(errors_of_the_catalogue),
+        cmocka_unit_test(a_failed_update_is_counted),
+        cmocka_unit_test(directions_update_their_object),
         cmocka_unit_test(off_and_without_objects),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -13,6 +13,8 @@ revolutions a day of the geostationary ring, whose slots the mean anomaly fills)
 strangers: the model has no clusters, no breakups and no shells that are finer than this. Copies have catalogue numbers
 from 100,001 on, in Alpha-5, and their sources' names with the number of the copy.
 
+The names of other files in the scenario are changed to where they are, seen from FOLDER.
+
 Observers. Those of the scenario are kept; further ones have the sensors of one of them in turn, on orbits of the file
 drawn at random: nearly circular ones of 500 km to 1,500 km height, and geostationary ones, in turn.
 
@@ -51,7 +53,35 @@ def read(path):
             name = first.strip().removeprefix("0 ")
     if not sets:
         sys.exit(f"{path}: there is no element set of two or three lines")
+    for _, first, _ in sets:
+        if not first[2:7].strip().isdigit():
+            sys.exit(f"{path}: catalogue number {first[2:7]} (allowed: 0 to 99999; copies have those from {FIRST} on)")
     return sets
+
+
+def load(path):
+    try:
+        with open(path, encoding="utf-8") as file:
+            scenario = json.load(file)
+    except (OSError, ValueError) as error:
+        sys.exit(f"{path}: {error}")
+    catalogues = scenario.get("world", {}).get("catalogues", [])
+    if len(catalogues) != 1 or not scenario.get("observers"):
+        sys.exit(f"{path}: /world/catalogues has {len(catalogues)} catalogues and /observers "
+                 f"{len(scenario.get('observers', []))} observers (allowed: 1 catalogue, 1 observer or more, both in "
+                 "this file)")
+    return scenario
+
+
+def moved(node, base, folder):
+    """A part of the scenario with the names of files relative to another folder."""
+    if isinstance(node, dict):
+        return {key: moved(value, base, folder) for key, value in node.items()}
+    if isinstance(node, list):
+        return [moved(value, base, folder) for value in node]
+    if isinstance(node, str) and "." in node and os.path.isfile(os.path.join(base, node)):
+        return os.path.relpath(os.path.join(base, node), folder)
+    return node
 
 
 def numbered(line, number):
@@ -86,21 +116,24 @@ def main():
     parser.add_argument("--observers", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
-    with open(arguments.scenario, encoding="utf-8") as file:
-        scenario = json.load(file)
+    scenario = load(arguments.scenario)
     base = os.path.dirname(os.path.abspath(arguments.scenario))
+    path = os.path.join(base, scenario["world"]["catalogues"][0]["elements_file"])
+    sets = read(path)
+    scenario = moved(scenario, base, os.path.abspath(arguments.folder))
     catalogue = scenario["world"]["catalogues"][0]
     own = catalogue["elements_file"]
-    sets = read(os.path.join(base, own))
     rng = random.Random(arguments.seed)
     if not len(sets) <= arguments.objects <= len(sets) + MOST:
-        sys.exit(f"--objects {arguments.objects}: allowed are {len(sets)}, those of {own}, to {len(sets) + MOST}")
+        sys.exit(f"--objects {arguments.objects}: allowed are {len(sets)}, those of {path}, to {len(sets) + MOST}")
     if arguments.observers < len(scenario["observers"]):
         sys.exit(f"--observers {arguments.observers}: the scenario has {len(scenario['observers'])}")
     all_sets = sets + [copy_of(sets[rng.randrange(len(sets))], FIRST + k, rng)
                        for k in range(arguments.objects - len(sets))]
     low = [s for s in sets if float("0." + s[2][26:33].strip()) < 0.01 and 500.0 < height_km(s[2]) < 1500.0]
     high = [s for s in sets if abs(float(s[2][52:63]) - 1.0027) < 0.01 and float(s[2][8:16]) < 5.0]
+    if not low:
+        sys.exit(f"{path}: no nearly circular orbit of 500 km to 1,500 km height for observers")
     observers = scenario["observers"]
     for observer in observers:
         if observer["orbit"].get("elements_file") == own:
