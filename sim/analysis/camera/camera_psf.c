@@ -157,8 +157,8 @@ static void report_node(cJSON *nodes, const node *n) {
     }
 }
 
-/* Undoes the pixel of a node's samples, and measures them. Values that noise makes negative stay so:
- * without them the wings would have too much light. */
+/* Undoes the pixel of a node's samples, and measures them. Values that noise makes negative stay
+ * so: without them the wings would have too much light. */
 static bst_status make_node(bst_ctx *ctx, const bst_effective_psf *psf, size_t index, node *n,
                             float *value, float *sigma) {
     const size_t samples = (size_t)psf->side * (size_t)psf->side,

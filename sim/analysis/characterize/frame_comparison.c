@@ -24,8 +24,8 @@ static size_t find_percentiles(float *values, size_t count, bst_frame_statistics
     bst_sort_floats(values, n);
     out->median_dn = bst_sorted_median(values, n);
     for (int i = 0; i < BST_SENSOR_PERCENTILES; i++) {
-        size_t at = (size_t)(bst_sensor_percentiles[i] / 100.0 * ((double)n - 1.0) + 0.5);
-        out->percentiles_dn[i] = n > 0 ? (double)values[at] - out->median_dn : NAN;
+        double at = bst_sensor_percentiles[i] / 100.0 * ((double)n - 1.0) + 0.5;
+        out->percentiles_dn[i] = n > 0 ? (double)values[(size_t)at] - out->median_dn : NAN;
     }
     return n;
 }
