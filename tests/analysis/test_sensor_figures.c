@@ -221,8 +221,9 @@ static void dead_pixels_and_columns(void **state) {
     bst_sensor_figures f;
     for (int y = 0; y < HEIGHT; y++) { /* from either end; and too short for a column */
         for (int x = 0; x < WIDTH; x++) {
-            bool dead = (x == 30 && y >= 40) || (x == 71 && y < 9) || (x == 50 && y < 7) ||
-                        (x == 12 && y > 20 && y < 25);
+            /* hot pixels at the end and in the middle do not hide a column */
+            bool dead = (x == 30 && y >= 40 && y != HEIGHT - 1 && y != HEIGHT - 25) ||
+                        (x == 71 && y < 9) || (x == 50 && y < 7) || (x == 12 && y > 20 && y < 25);
             int i = y * WIDTH + x;
             flat_mean[i] = dead ? bias_mean[i] : flat_mean[i];
         }

@@ -440,11 +440,12 @@ static void update_covariance(const gain *g, const linear *at, double p[N][N]) {
     }
 }
 
-/* Chi-square that innovations of this size exceed with probability 2e-5, z = 4.11 (Wilson and
- * Hilferty, PNAS 17, 1931). */
+/* Chi-square above which directions are not those of one object: what innovations of this size
+ * exceed with probability 2e-5, z = 4.11 (Wilson and Hilferty, PNAS 17, 1931), if their errors are
+ * twice as large as stated. */
 static double most_chi2(int size) {
     const double s = 2.0 / (9.0 * size), root = 1.0 - s + 4.11 * sqrt(s);
-    return size * root * root * root;
+    return 4.0 * size * root * root * root;
 }
 
 static bool update(const bst_custody_orbit *o, const measurement *z, bst_custody_filter *filter) {

@@ -103,8 +103,9 @@ bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observ
                         bst_custody_filter *filter);
 
 /* The same with directions as they were measured, without rates: errors that they share count
- * (bst_od_observation). False also for directions that are not of this object or of several ones:
- * a chi-square of the innovations that is exceeded with probability 2e-5.
+ * (bst_od_observation). False also for directions that are of another object or of several ones: a
+ * chi-square of the innovations that is exceeded with probability 2e-5 by errors twice as large as
+ * stated.
  *
  * Given:     count  1 to BST_CUSTODY_DIRECTIONS, in order of time; gcrf_from_teme: for all of them
  */
