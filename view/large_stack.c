@@ -3,7 +3,7 @@
 #include <pthread.h>
 #include <stddef.h>
 
-static const size_t STACK_BYTES = (size_t)8 << 20;
+#include "sim/core/parallel.h"
 
 typedef struct call {
     void (*work)(void *user);
@@ -18,13 +18,6 @@ static void *run(void *user) {
 
 bool bst_view_call_with_stack(void (*work)(void *user), void *user) {
     call c = {work, user};
-    pthread_attr_t attributes;
     pthread_t thread;
-    if (pthread_attr_init(&attributes) != 0) {
-        return false;
-    }
-    const bool begun = pthread_attr_setstacksize(&attributes, STACK_BYTES) == 0 &&
-                       pthread_create(&thread, &attributes, run, &c) == 0;
-    pthread_attr_destroy(&attributes);
-    return begun && pthread_join(thread, NULL) == 0;
+    return bst_core_thread_start(&thread, run, &c) == 0 && pthread_join(thread, NULL) == 0;
 }
