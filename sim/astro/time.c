@@ -195,6 +195,12 @@ void bst_time_tt(bst_time t, double *jd1, double *jd2) {
     *jd2 = tt.jd2;
 }
 
+double bst_time_julian_year(bst_time t) {
+    double tt1, tt2;
+    bst_time_tt(t, &tt1, &tt2);
+    return 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25;
+}
+
 void bst_time_utc(bst_time t, double *jd1, double *jd2) {
     double utc1 = t.jd1, utc2 = t.jd2;
     if (eraTaiutc(t.jd1, t.jd2, &utc1, &utc2) < 0) {

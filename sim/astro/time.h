@@ -33,6 +33,8 @@ double bst_time_diff(bst_time a, bst_time b);
 
 /* Converts a time to TT as a two-part Julian date, split like bst_time. */
 void bst_time_tt(bst_time t, double *jd1, double *jd2);
+/* Julian year in TT, 2000.0 at J2000: the time of proper motions. */
+double bst_time_julian_year(bst_time t);
 void bst_time_utc(bst_time t, double *jd1, double *jd2); /* ERFA's quasi-JD */
 /* Converts a quasi-JD in UTC, as in TLE epochs, to a time. BST_ERR_RANGE as bst_time_from_utc. */
 bst_status bst_time_from_utc_jd(bst_ctx *ctx, double jd1, double jd2, bst_time *out) BST_MUST_CHECK;

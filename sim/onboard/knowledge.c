@@ -64,9 +64,7 @@ bst_status bst_knowledge_create(bst_ctx *ctx, const bst_world *world, int observ
     k->observer = observer;
     k->sensor = sensor;
     k->camera = config->camera;
-    double tt1, tt2;
-    bst_time_tt(world->epoch, &tt1, &tt2);
-    k->julian_year = 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25;
+    k->julian_year = bst_time_julian_year(world->epoch);
     if (*config->knowledge.star_catalogue) {
         bst_status status = bst_stars_open(ctx, config->knowledge.star_catalogue, &k->own_stars);
         if (status != BST_OK) {

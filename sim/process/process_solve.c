@@ -31,9 +31,7 @@ static void close_solver(solver *s) {
 }
 
 double bst_process_julian_year(const bst_process_frame *f) {
-    double tt1, tt2;
-    bst_time_tt(f->values.start, &tt1, &tt2);
-    return 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25;
+    return bst_time_julian_year(f->values.start);
 }
 
 static double v_limit_of(const bst_process *p) {

@@ -119,6 +119,8 @@ static void scales_are_offset_as_defined(void **state) {
     bst_time_tt(t, &jd1, &jd2); /* TT = UTC + 37 s + 32.184 s */
     assert_true(jd1 == 2459747.5);
     bst_assert_close(jd2 * 86400.0, 39.184, 1e-10);
+    /* 8202.5 days and 39.184 s after J2000 */
+    bst_assert_close(bst_time_julian_year(t), 2000.0 + (8202.5 + 39.184 / 86400.0) / 365.25, 1e-12);
     bst_time_utc(t, &jd1, &jd2);
     assert_true(jd1 == 2459746.5);
     bst_assert_close(jd2 * 86400.0, 86370.0, 2e-11 * 2);

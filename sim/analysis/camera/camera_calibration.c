@@ -189,9 +189,7 @@ static bst_status read_run(bst_ctx *ctx, const bst_camera_calibration_request *q
     const char *own = config[sensor].knowledge.star_catalogue;
     BST_TRY(
         bst_stars_open(ctx, *own ? own : d->scene.scenario.world.star_catalogue, &d->catalogue));
-    double tt1, tt2;
-    bst_time_tt(d->scene.scenario.epoch, &tt1, &tt2);
-    d->julian_year = 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25;
+    d->julian_year = bst_time_julian_year(d->scene.scenario.epoch);
     bst_io_rows *rows;
     BST_TRY(bst_io_rows_open(ctx, d->run, stars_sql, d->sensor.index, 0, &rows));
     bst_status status = BST_OK;

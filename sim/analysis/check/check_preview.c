@@ -18,13 +18,6 @@ static const double LIMIT_STEP_MAG = 0.25;
 /* Most steps: 50 mag down from any camera's limit there is no star. */
 enum { LIMIT_STEPS = 200 };
 
-/* Years of Terrestrial Time at the epoch of a world. */
-static double julian_year(const bst_world *world) {
-    double tt1, tt2;
-    bst_time_tt(bst_world_time(world, 0.0), &tt1, &tt2);
-    return 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25;
-}
-
 /* Stars of a field: the brightest, their number, the limit down to which they are listed, and the
  * number of all down to the limit that was asked for. */
 typedef struct field_stars {
@@ -37,7 +30,7 @@ typedef struct field_stars {
  * Of a catalogue with more stars than that at any limit, the first ones. */
 static bst_status query_stars(bst_ctx *ctx, const bst_world *world, bst_vec3 centre,
                               double radius_rad, field_stars *out) {
-    const double year = julian_year(world);
+    const double year = bst_time_julian_year(bst_world_time(world, 0.0));
     for (int step = 0;; step++) {
         BST_TRY(bst_stars_query(ctx, bst_world_stars(world), centre, radius_rad, out->v_limit, year,
                                 out->stars, BST_CHECK_PREVIEW_STARS, &out->count));

@@ -97,10 +97,8 @@ static bst_status open_all(bst_ctx *ctx, solving *s, int width, int height) {
     const bst_solve_request *q = s->request;
     bst_time time;
     bst_bodies bodies;
-    double tt1, tt2;
     BST_TRY(bst_time_from_utc(ctx, q->utc, &time));
-    bst_time_tt(time, &tt1, &tt2);
-    s->julian_year = 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25;
+    s->julian_year = bst_time_julian_year(time);
     bst_bodies_at(time, &bodies);
     s->light = bst_light_at(&bodies, (bst_vec3){0, 0, 0},
                             bst_vec3_scale(bst_vec3_from_array(q->speed_kmps), 1e3));

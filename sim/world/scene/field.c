@@ -458,9 +458,8 @@ static bool make_star(const bst_field *field, const query *q, const bst_star *st
 /* Collects the sources of a field query: stars, then objects. */
 static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, int *count) {
     int star_count, near_count, n = 0;
-    double tt1, tt2;
-    bst_time_tt(bst_world_time(field->world, q->mid_s), &tt1, &tt2);
-    BST_TRY(query_stars(ctx, field, q, 2000.0 + (tt1 - 2451545.0 + tt2) / 365.25, &star_count));
+    BST_TRY(query_stars(ctx, field, q, bst_time_julian_year(bst_world_time(field->world, q->mid_s)),
+                        &star_count));
     const bst_world_view_span span = {field->observer, q->start_s, q->end_s};
     BST_TRY(bst_world_view_near(ctx, field->view, &span, q->cone.axis, q->cone.radius, field->near,
                                 &near_count));
