@@ -92,6 +92,16 @@ bst_status bst_kernel_cache_prepare(bst_ctx *ctx) {
     return BST_OK;
 }
 
+void bst_kernel_cache_take(const char *folder) {
+    char path[4096];
+    bst_ctx quiet = {0};
+    cache_path(path);
+    if (bst_folder_check_private(&quiet, path) == BST_OK) {
+        bst_kernel_cache_link(path, folder);
+    }
+    setenv("POCL_CACHE_DIR", folder, 1);
+}
+
 void bst_kernel_cache_settle(time_t since) {
     char path[4096];
     cache_path(path);

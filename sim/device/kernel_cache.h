@@ -21,6 +21,10 @@ bool bst_kernel_cache_is_unusable(char *text, size_t bytes);
  * this user's alone. */
 bst_status bst_kernel_cache_prepare(bst_ctx *ctx) BST_MUST_CHECK;
 
+/* Makes PoCL use the cache `folder`, which this user alone can write to, with the kernels that the
+ * cache chosen as in bst_kernel_cache_prepare has now (bst_kernel_cache_link). */
+void bst_kernel_cache_take(const char *folder);
+
 /* Records the checksums of programs built since `since` (bst_kernel_cache_note). */
 void bst_kernel_cache_settle(time_t since);
 

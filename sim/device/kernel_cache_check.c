@@ -3,6 +3,7 @@
 
 #include <dirent.h>
 #include <elf.h>
+#include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
 #include <stdio.h>
@@ -13,6 +14,7 @@
 
 #include "sim/core/draft.h"
 #include "sim/core/fnv.h"
+#include "sim/core/folder.h"
 
 enum { PATH_BYTES = 4096, DEEPEST = 8 };
 static const char sums_name[] = "boresight.sums";
@@ -219,14 +221,29 @@ static void write_sums(const char *program) {
 /* ------------------------------------------------------------------ all programs */
 
 typedef struct sweep {
-    time_t since; /* recording; 0: repairing */
+    time_t since; /* recording; 0: repairing or linking */
     int removed;
+    const char *to; /* linking: the other cache */
+    size_t root;    /* linking: length of the path of this cache */
 } sweep;
+
+/* Links a file of a program into the other cache. A file there stays. */
+static bool link_file(void *user, const char *path, const char *below) {
+    const char *to = user;
+    char other[PATH_BYTES + 1];
+    bst_ctx quiet = {0};
+    int n = snprintf(other, sizeof other, "%s/%s", to, below);
+    return n < 0 || (size_t)n >= sizeof other ||
+           (bst_folder_make_above(&quiet, other) == BST_OK &&
+            (link(path, other) == 0 || errno == EEXIST));
+}
 
 /* Checks a program folder of the kernel cache and removes it if damaged. */
 static void look_at(sweep *s, const char *program) {
     struct stat info;
-    if (s->since == 0) {
+    if (s->to) {
+        walk(program, s->root + 1, 0, link_file, (void *)(uintptr_t)s->to);
+    } else if (s->since == 0) {
         char *sums = read_sums(program);
         judged j = {.sums = sums};
         walk(program, strlen(program) + 1, 0, judge, &j);
@@ -269,5 +286,10 @@ int bst_kernel_cache_repair(const char *root) {
 
 void bst_kernel_cache_note(const char *root, time_t since) {
     sweep s = {.since = since > 0 ? since : 1};
+    each_program(root, 0, &s);
+}
+
+void bst_kernel_cache_link(const char *root, const char *to) {
+    sweep s = {.to = to, .root = strlen(root)};
     each_program(root, 0, &s);
 }

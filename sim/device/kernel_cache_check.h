@@ -16,4 +16,9 @@ int bst_kernel_cache_repair(const char *root);
  * ROOT/XX/PROGRAM/boresight.sums. */
 void bst_kernel_cache_note(const char *root, time_t since);
 
+/* Makes the kernels of the cache `root` known to the cache `to` on the same file system, by hard
+ * links: PoCL replaces such files by renaming and never writes into one. Kernels of `to` stay;
+ * what cannot be linked is compiled there when it is needed. */
+void bst_kernel_cache_link(const char *root, const char *to);
+
 #endif

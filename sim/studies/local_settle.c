@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "sim/core/folder.h"
+#include "sim/device/kernel_cache.h"
 #include "sim/studies/local_pool.h"
 
 enum { CACHES = 4096 };
@@ -62,8 +63,8 @@ static bool cache_root(char *out, size_t bytes) {
     return n > 0 && (size_t)n < bytes;
 }
 
-/* Takes the first kernel cache that no running process uses and locks it until exit. Without one
- * PoCL's default is used. */
+/* Takes the first kernel cache that no running process uses, with the kernels of the user's cache,
+ * and locks it until exit. Without one PoCL's default is used. */
 static void take_cache(void) {
     char root[2048], path[2200], lock[2300];
     if (!cache_root(root, sizeof root)) {
@@ -82,7 +83,7 @@ static void take_cache(void) {
             return;
         }
         if (flock(fd, LOCK_EX | LOCK_NB) == 0) {
-            setenv("POCL_CACHE_DIR", path, 1);
+            bst_kernel_cache_take(path);
             return;
         }
         close(fd);

@@ -131,8 +131,58 @@ static void caches_of_others_are_not_used(void **state) {
     scratch_remove(&place);
 }
 
+/* A worker's cache begins with the kernels of the user's, keeps its own, and takes nothing from a
+ * cache that others can write to. */
+static void workers_begin_with_the_users_kernels(void **state) {
+    (void)state;
+    scratch place;
+    scratch_make(&place);
+    char cache[700], worker[800], path[1000], both[2][1000];
+    snprintf(cache, sizeof cache, "%s/cache", place.folder);
+    snprintf(worker, sizeof worker, "%s/worker-0", cache);
+    const char *const folders[] = {
+        "",          "/AB",          "/AB/ONE",          "/AB/ONE/kernel", "/CD",         "/CD/TWO",
+        "/worker-0", "/worker-0/AB", "/worker-0/AB/ONE", "/worker-1",      "/worker-1/AB"};
+    for (size_t i = 0; i < sizeof folders / sizeof *folders; i++) {
+        snprintf(path, sizeof path, "%s%s", cache, folders[i]);
+        assert_int_equal(mkdir(path, 0700), 0);
+    }
+    const char *const files[] = {"AB/ONE/program.bc",          "AB/ONE/kernel/k.so",
+                                 "CD/TWO/program.bc",          "CD/TWO/last_accessed",
+                                 "worker-0/AB/ONE/program.bc", "worker-1/AB/other.bc"};
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        snprintf(path, sizeof path, "%s/%s", cache, files[i]);
+        write_bytes(path, files[i], strlen(files[i]));
+    }
+    assert_int_equal(chmod(cache, 0777), 0);
+    setenv("POCL_CACHE_DIR", cache, 1);
+    bst_kernel_cache_take(worker);
+    assert_string_equal(getenv("POCL_CACHE_DIR"), worker);
+    snprintf(path, sizeof path, "%s/CD", worker);
+    assert_false(scratch_has(path));
+
+    assert_int_equal(chmod(cache, 0700), 0);
+    setenv("POCL_CACHE_DIR", cache, 1);
+    bst_kernel_cache_take(worker);
+    for (int i = 0; i < 3; i++) {
+        struct stat info[2];
+        snprintf(both[0], sizeof both[0], "%s/%s", cache, files[i]);
+        snprintf(both[1], sizeof both[1], "%s/%s", worker, files[i]);
+        assert_int_equal(stat(both[0], &info[0]), 0);
+        assert_int_equal(stat(both[1], &info[1]), 0);
+        assert_int_equal(info[0].st_ino == info[1].st_ino, i != 0); /* the worker's own stays */
+    }
+    snprintf(path, sizeof path, "%s/CD/TWO/last_accessed", worker);
+    assert_false(scratch_has(path));
+    snprintf(path, sizeof path, "%s/worker-1", worker);
+    assert_false(scratch_has(path));
+    unsetenv("POCL_CACHE_DIR");
+    scratch_remove(&place);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(names_folder_and_reason),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(workers_begin_with_the_users_kernels),
+                                       cmocka_unit_test(names_folder_and_reason),
                                        cmocka_unit_test(damaged_programs_are_removed),
                                        cmocka_unit_test(caches_of_others_are_not_used)};
     return cmocka_run_group_tests(tests, NULL, NULL);
