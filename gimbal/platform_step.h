@@ -11,7 +11,8 @@ enum {
     BST_GIMBAL_HISTORY,
     BST_GIMBAL_POINTING,
     BST_GIMBAL_NAV,
-    BST_GIMBAL_MOUNT, /* not for a scripted line of sight */
+    BST_GIMBAL_MOUNT, /* not for a scripted line of sight, as what follows */
+    BST_GIMBAL_WHEELS,
     BST_GIMBAL_PORTS
 };
 /* clang-format off */
@@ -25,7 +26,9 @@ enum {
     [BST_GIMBAL_NAV] = {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_OUT}
 #define BST_GIMBAL_PORTS_ALL                                             \
     BST_GIMBAL_PORTS_SEEN,                                               \
-    [BST_GIMBAL_MOUNT] = {.channel = BST_CHANNEL_MOUNT_STATUS, .direction = BST_PORT_OUT}
+    [BST_GIMBAL_MOUNT] = {.channel = BST_CHANNEL_MOUNT_STATUS,           \
+                          .direction = BST_PORT_OUT},                    \
+    [BST_GIMBAL_WHEELS] = {.channel = BST_CHANNEL_WHEEL_STATUS, .direction = BST_PORT_OUT}
 /* clang-format on */
 
 /* Base of a gimbal module's instance; its first member. */
@@ -97,7 +100,8 @@ typedef struct bst_gimbal_reading {
 bst_gimbal_reading bst_gimbal_exact(const bst_platform *platform, int64_t n,
                                     bst_quat q_cam_from_body);
 
-/* Publishes a reading and, with the body's part added, the mount status (NULL: not published). */
+/* Publishes a reading and, with the body's part added, the mount status (NULL: not published); with
+ * it the status of the spacecraft's wheels, if it has any. */
 void bst_gimbal_publish_reading(struct bst_step *step, const bst_platform *platform,
                                 const bst_gimbal_reading *reading, bst_mount_status *status);
 
