@@ -10,7 +10,6 @@ import csv
 import json
 import os
 import sqlite3
-import sys
 import unittest
 
 import numpy
@@ -21,9 +20,7 @@ import runs
 import test_view
 import test_view_live
 
-FULL = "--full" in sys.argv[1:]
-if FULL:
-    sys.argv.remove("--full")
+FULL = test_view_live.FULL  # which takes the option
 IMGPROC = runs.SENSOR + "/modules/imgproc"
 SMALL = [f"{runs.SENSOR}/camera/{side}_px=512" for side in ("width", "height")] + [runs.SENSOR + "/cue/offset_deg=0.01", runs.SENSOR + "/cue/sigma_deg=0.01"]
 WINDOWS = [IMGPROC + "/track_windows=true", IMGPROC + "/window_px=48", IMGPROC + "/window_stars=5", IMGPROC + "/full_frame_period=100", IMGPROC + "/full_frame_count=4"]
@@ -156,8 +153,7 @@ class Recorded(unittest.TestCase):
                     self.assertGreaterEqual(checked, 4 if zoom else 4 * len(boxes), (name, zoom))
                 page.evaluate("document.boresight.frameView.setShown('windows', false)")
                 self.assertEqual(page.evaluate("document.getElementById('show-windows').getAttribute('aria-pressed')"), "false")
-                page.key("m")
-                page.key("m")
+                page.key("m")  # none was shown: those that are at first
                 self.assertEqual(page.evaluate("document.getElementById('show-windows').getAttribute('aria-pressed')"), "true")
                 said = page.evaluate("(() => { const view = document.boresight.frameView, [one] = view.sorted.windows; for (const name of Object.keys(view.shown)) view.setShown(name, name === 'windows'); return view.nearest({ x: one.x, y: one.y }); })()")
                 self.assertRegex(said, r"^window: (target \(track \d+\)|track \d+|star \d+)")
