@@ -1,6 +1,6 @@
 #include <stdlib.h>
 
-#include "gimbal/platform_step.h"
+#include "gimbal/platform.h"
 #include "sim/onboard/knowledge.h"
 #include "sim/world/world.h"
 
@@ -70,9 +70,7 @@ bst_status bst_platform_equip(const bst_module_env *env, bst_platform *platform,
                                   .seed = env->seed,
                                   .run = env->run,
                                   .instance = env->instance};
-    BST_TRY(bst_spacecraft_create(env->ctx, &config->spacecraft, &setup, &platform->spacecraft));
-    bst_env_set_capacity(env, BST_GIMBAL_WHEELS, bst_spacecraft_wheel_count(platform->spacecraft));
-    return BST_OK;
+    return bst_spacecraft_create(env->ctx, &config->spacecraft, &setup, &platform->spacecraft);
 }
 
 bst_status bst_platform_check_mount(bst_ctx *ctx, const bst_platform *platform,

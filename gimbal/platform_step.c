@@ -67,6 +67,10 @@ bst_status bst_gimbal_base_init(const bst_module_env *env, const bst_platform_co
     bst_env_set_capacity(
         env, BST_GIMBAL_POINTING,
         ring(fmax(config->telemetry_history_s, late_s), config->telemetry_rate_hz));
+    if (base->platform && base->platform->spacecraft) {
+        bst_env_set_capacity(env, BST_GIMBAL_WHEELS,
+                             bst_spacecraft_wheel_count(base->platform->spacecraft));
+    }
     return BST_OK;
 }
 

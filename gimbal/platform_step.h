@@ -63,7 +63,8 @@ double bst_gimbal_pixel_rad(const bst_module_env *env);
 bst_status bst_gimbal_platform_init(const bst_module_env *env, const bst_platform_config *config,
                                     bst_gimbal_base *base, bst_platform *platform) BST_MUST_CHECK;
 
-/* Completes the base: rate dividers, view, and capacities of the rings.
+/* Completes the base: rate dividers, view, and capacities of the rings and of the wheels. Call it
+ * after bst_platform_equip.
  *
  * Given:     exposure_s    longest exposure of the sensor, which the history must cover
  *            history_more  additional samples besides the plant steps

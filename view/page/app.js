@@ -130,13 +130,28 @@ class App {
         this.setFrames(frames);
         this.showEvents(events);
         this.plots.extend(run.sensors[sensor].panels, modes, this.events, this.lastTime(modes));
-        if (atEnd && this.count && !(this.live && this.live.newest)) await this.goTo(this.count - 1);
+        if (this.live && this.live.newest) await this.showMissed();
+        else if (atEnd && this.count) await this.goTo(this.count - 1);
         await this.plots.reloading;
       } catch (error) {
         this.showProblems([`The run cannot be followed: ${error.message}`]);
       }
       took = performance.now() - begin;
     }
+  }
+
+  /** A live run that pauses may have gone on while the page could not ask: the last frame with tracks, from the record. */
+  async showMissed() {
+    const frame = this.count - 2, { live } = this; // the last one may still be processed
+    if (frame < 0 || !live.state.paused || live.shownExposure() >= this.frames[frame * NUMBERS]) return;
+    const { image, details, why } = await this.load(frame);
+    if (!live.newest || !live.state.paused) return;
+    this.current = this.wanted = frame;
+    this.frameView.getPart = image ? (wanted) => getPixels(this.sensor, frame, undefined, undefined, wanted) : null;
+    this.frameView.show(image, details, why);
+    this.describePosition(details);
+    this.plots.setCursor(this.timeOf(frame));
+    live.missed = details.exposure_id;
   }
 
   /** @param {Float64Array} frames numbers of all frames */

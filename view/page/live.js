@@ -30,6 +30,7 @@ export class Live {
     this.sequence = 0;
     this.newest = true; // the page shows the newest frame
     this.trail = [];
+    this.missed = -1; // exposure that was shown from the record
     this.askedNames = 0; // when names of objects were asked for
     this.queue = []; // commands that wait until the one before is obeyed
     this.sentAt = -1; // commands that the run had obeyed when the last one was sent; -1: none is awaited
@@ -152,6 +153,7 @@ export class Live {
     const again = this.trail.length > 0 && details.exposure_id === this.trail[this.trail.length - 1].id; // with finer pixels
     if (again) this.trail.pop();
     if (this.trail.length && details.exposure_id <= this.trail[this.trail.length - 1].id) this.trail = [];
+    this.missed = -1;
     const earlier = this.trail.flatMap((one) => one.tracks);
     this.trail.push({ id: details.exposure_id, tracks: details.tracks.map((track) => ({ ...track, now: false })) });
     if (this.trail.length > TRAIL_EXPOSURES) this.trail.shift();
@@ -167,6 +169,9 @@ export class Live {
     if (!again) this.shown++;
     document.dispatchEvent(new CustomEvent('liveframe', { detail: details.exposure_id }));
   }
+
+  /** Number of the newest exposure that the page has shown; -1: none. */
+  shownExposure() { return Math.max(this.missed, ...this.trail.slice(-1).map(({ id }) => id), -1); }
 
   /** Asks for the names of objects if one has none yet: a run has recorded them some time after its first frames. @param {any} details */
   needNames(details) {
