@@ -67,6 +67,10 @@ bst_status bst_gimbal_base_init(const bst_module_env *env, const bst_platform_co
     bst_env_set_capacity(
         env, BST_GIMBAL_POINTING,
         ring(fmax(config->telemetry_history_s, late_s), config->telemetry_rate_hz));
+    if (base->platform && base->platform->spacecraft) {
+        bst_env_set_capacity(env, BST_GIMBAL_WHEELS,
+                             bst_spacecraft_wheel_count(base->platform->spacecraft));
+    }
     return BST_OK;
 }
 
@@ -133,6 +137,22 @@ bst_gimbal_reading bst_gimbal_exact(const bst_platform *platform, int64_t n,
         .settled = true};
 }
 
+/* Publishes the state of the spacecraft's wheels, if it has any. */
+static void publish_wheels(struct bst_step *step, const bst_platform *platform) {
+    if (!platform->spacecraft || bst_spacecraft_wheel_count(platform->spacecraft) == 0) {
+        return;
+    }
+    int capacity;
+    bst_wheel_status *out = bst_step_write(step, BST_GIMBAL_WHEELS, &capacity);
+    out->tick = bst_step_tick(step);
+    out->count = bst_spacecraft_wheel_count(platform->spacecraft);
+    assert(out->count <= capacity);
+    for (int i = 0; i < out->count; i++) {
+        out->items[i] = bst_spacecraft_wheel_state(platform->spacecraft, i);
+    }
+    assert(bst_wheel_status_is_valid(out, capacity));
+}
+
 void bst_gimbal_publish_reading(struct bst_step *step, const bst_platform *platform,
                                 const bst_gimbal_reading *reading, bst_mount_status *status) {
     int capacity;
@@ -149,6 +169,7 @@ void bst_gimbal_publish_reading(struct bst_step *step, const bst_platform *platf
     assert(bst_pointing_telemetry_is_valid(telemetry));
     if (status) {
         bst_platform_add_status(platform, reading->q_body_from_gcrf, status);
+        publish_wheels(step, platform);
     }
 }
 

@@ -11,7 +11,8 @@ enum {
     BST_GIMBAL_HISTORY,
     BST_GIMBAL_POINTING,
     BST_GIMBAL_NAV,
-    BST_GIMBAL_MOUNT, /* not for a scripted line of sight */
+    BST_GIMBAL_MOUNT, /* not for a scripted line of sight, as what follows */
+    BST_GIMBAL_WHEELS,
     BST_GIMBAL_PORTS
 };
 /* clang-format off */
@@ -25,7 +26,9 @@ enum {
     [BST_GIMBAL_NAV] = {.channel = BST_CHANNEL_NAV_TELEMETRY, .direction = BST_PORT_OUT}
 #define BST_GIMBAL_PORTS_ALL                                             \
     BST_GIMBAL_PORTS_SEEN,                                               \
-    [BST_GIMBAL_MOUNT] = {.channel = BST_CHANNEL_MOUNT_STATUS, .direction = BST_PORT_OUT}
+    [BST_GIMBAL_MOUNT] = {.channel = BST_CHANNEL_MOUNT_STATUS,           \
+                          .direction = BST_PORT_OUT},                    \
+    [BST_GIMBAL_WHEELS] = {.channel = BST_CHANNEL_WHEEL_STATUS, .direction = BST_PORT_OUT}
 /* clang-format on */
 
 /* Base of a gimbal module's instance; its first member. */
@@ -60,7 +63,8 @@ double bst_gimbal_pixel_rad(const bst_module_env *env);
 bst_status bst_gimbal_platform_init(const bst_module_env *env, const bst_platform_config *config,
                                     bst_gimbal_base *base, bst_platform *platform) BST_MUST_CHECK;
 
-/* Completes the base: rate dividers, view, and capacities of the rings.
+/* Completes the base: rate dividers, view, and capacities of the rings and of the wheels. Call it
+ * after bst_platform_equip.
  *
  * Given:     exposure_s    longest exposure of the sensor, which the history must cover
  *            history_more  additional samples besides the plant steps
@@ -97,7 +101,8 @@ typedef struct bst_gimbal_reading {
 bst_gimbal_reading bst_gimbal_exact(const bst_platform *platform, int64_t n,
                                     bst_quat q_cam_from_body);
 
-/* Publishes a reading and, with the body's part added, the mount status (NULL: not published). */
+/* Publishes a reading and, with the body's part added, the mount status (NULL: not published); with
+ * it the status of the spacecraft's wheels, if it has any. */
 void bst_gimbal_publish_reading(struct bst_step *step, const bst_platform *platform,
                                 const bst_gimbal_reading *reading, bst_mount_status *status);
 

@@ -10,7 +10,15 @@
 #include "sim/onboard/knowledge.h"
 #include "sim/onboard/nav_motion.h"
 
-enum { PORT_FRAME, PORT_PREDICTIONS, PORT_POINTING, PORT_NAV, PORT_DETECTIONS, PORT_COUNT };
+enum {
+    PORT_FRAME,
+    PORT_PREDICTIONS,
+    PORT_POINTING,
+    PORT_NAV,
+    PORT_DETECTIONS,
+    PORT_REGIONS,
+    PORT_COUNT
+};
 
 static const bst_port ports[PORT_COUNT] = {
     {BST_CHANNEL_FRAME, BST_PORT_IN, BST_PORT_TRIGGER, 0.0, 0},
@@ -18,6 +26,7 @@ static const bst_port ports[PORT_COUNT] = {
     {BST_CHANNEL_POINTING_TELEMETRY, BST_PORT_IN, 0, 10.0, 0},
     {BST_CHANNEL_NAV_TELEMETRY, BST_PORT_IN, 0, 60.0, 0},
     {BST_CHANNEL_DETECTIONS, BST_PORT_OUT, 0, 0.0, 2048},
+    {BST_CHANNEL_REGIONS_OF_INTEREST, BST_PORT_OUT, 0, 0.0, 0},
 };
 
 enum { CATALOGUE_CAPACITY = 16384 };
@@ -74,6 +83,28 @@ static bst_status open_plugin(const bst_module_env *env, bst_imgproc_state *m) {
                                       (int)m->config->capacity, &m->plugin);
 }
 
+/* Restores a stack of another number of frames than is configured now, to leave it out: the next
+ * frame begins a new stack. */
+static bst_status skip_stack(bst_imgproc_state *m, bst_archive *archive, int64_t frames) {
+    bst_stack_config config = m->config->stack;
+    bst_stack *skipped;
+    config.frames = frames;
+    BST_TRY(bst_stack_create(bst_archive_ctx(archive), &m->camera, &config, 1, &skipped));
+    bst_status status = bst_stack_archive(skipped, archive);
+    bst_stack_free(skipped);
+    return status;
+}
+
+/* Saves or restores the stack, whose number of frames may change during a run. */
+static bst_status archive_stack(bst_imgproc_state *m, bst_archive *archive) {
+    const int64_t own = m->stack ? m->config->stack.frames : 0;
+    const int64_t saved = bst_archive_integer(archive, own, 0, BST_STACK_MAX_FRAMES);
+    if (saved != own) {
+        return saved > 0 ? skip_stack(m, archive, saved) : BST_OK;
+    }
+    return m->stack ? bst_stack_archive(m->stack, archive) : BST_OK;
+}
+
 /* Saves or restores the module between two steps. Detections made ahead are not archived: the step
  * makes them again. */
 static bst_status archive_module(void *self, bst_archive *archive) {
@@ -85,9 +116,7 @@ static bst_status archive_module(void *self, bst_archive *archive) {
     if (m->pixels) {
         BST_TRY(bst_pixel_learner_archive(m->pixels, archive));
     }
-    if (m->stack) {
-        BST_TRY(bst_stack_archive(m->stack, archive));
-    }
+    BST_TRY(archive_stack(m, archive));
     bst_imgproc_lost_archive(&m->lost, archive);
     BST_TRY(bst_imgproc_calibration_archive(m, archive));
     if (bst_archive_is_restoring(archive)) {
@@ -147,6 +176,7 @@ static bst_status prepare(const bst_module_env *env, bst_imgproc_state *m) {
     bst_imgproc_lost_open(m, bst_knowledge_stars(env->knowledge),
                           bst_knowledge_julian_year(env->knowledge));
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)m->config->capacity);
+    bst_env_set_capacity(env, PORT_REGIONS, m->config->track_windows ? BST_WINDOWS_MAX : 0);
     return BST_OK;
 }
 
@@ -197,7 +227,9 @@ static bst_status plan_windows(bst_ctx *ctx, bst_imgproc_state *m, const bst_img
         .q_cam_from_gcrf = q_cam_from_gcrf};
     bool use;
     BST_TRY(bst_window_plan_make(ctx, &input, &m->sky, &m->windows, &use));
-    m->windows.count = use ? m->windows.count : 0;
+    if (!use) {
+        bst_region_of_interest_clear(&m->windows);
+    }
     return BST_OK;
 }
 
@@ -382,7 +414,7 @@ static bst_status detect_frame(bst_imgproc_state *m, struct bst_step *step, bst_
         e->locked = e->motion && bst_imgproc_lost_attitude(&m->lost, out->q_telemetry_from_gcrf,
                                                            &out->q_cam_from_gcrf);
     }
-    m->windows.count = 0;
+    bst_region_of_interest_clear(&m->windows);
     out->windows = 0;
     e->navigated = nav.payload && !nav.stale;
     if (e->navigated) {
@@ -403,6 +435,23 @@ static bst_status detect_frame(bst_imgproc_state *m, struct bst_step *step, bst_
         bst_extended_step_begin(&m->extended, &input, out);
     }
     return BST_OK;
+}
+
+/* Publishes the windows of a frame, if not all of it was searched. */
+static void publish_windows(const bst_imgproc_state *m, struct bst_step *step,
+                            const bst_frame_message *message) {
+    if (m->windows.count == 0) {
+        return;
+    }
+    int capacity;
+    bst_regions_of_interest *out = bst_step_write(step, PORT_REGIONS, &capacity);
+    assert(m->windows.planned_count <= capacity);
+    out->exposure_id = message->exposure_id;
+    out->start_tick = message->start_tick;
+    out->end_tick = message->end_tick;
+    out->count = m->windows.planned_count;
+    memcpy(out->items, m->windows.planned, (size_t)out->count * sizeof out->items[0]);
+    assert(bst_regions_of_interest_are_valid(out, capacity));
 }
 
 /* Adds what needs labels: extended targets, and detections of a stack. */
@@ -449,6 +498,7 @@ static bst_status process_frame(bst_imgproc_state *m, struct bst_step *step,
     bst_imgproc_exposure e = {
         .message = message, .motion = oriented ? &motion : NULL, .predictions = predictions};
     BST_TRY(detect_frame(m, step, l, &e, out, capacity));
+    publish_windows(m, step, message);
     bool smeared = !m->plugin && bst_imgproc_smeared(l->ip), followed = false;
     if (smeared && m->config->long_streaks) {
         bst_sample pointing = bst_step_latest(step, PORT_POINTING);

@@ -27,8 +27,10 @@ static void add_star_windows(const bst_window_plan_input *in, bst_predicted_star
         e[chosen] = star;
         double dx, dy;
         bst_camera_motion_streak(in->motion, in->camera, star.x_px, star.y_px, &dx, &dy);
-        (void)bst_region_of_interest_add(windows, &in->message->window, star.x_px, star.y_px,
-                                         half + 0.5 * fabs(dx), half + 0.5 * fabs(dy));
+        const bst_searched_window why = {
+            .reason = BST_REGION_STAR, .star_id = star.id, .x_px = star.x_px, .y_px = star.y_px};
+        (void)bst_region_of_interest_add(windows, &in->message->window, &why, half + 0.5 * fabs(dx),
+                                         half + 0.5 * fabs(dy));
     }
 }
 
@@ -38,7 +40,7 @@ bst_status bst_window_plan_make(bst_ctx *ctx, const bst_window_plan_input *in,
     const bst_predictions *predictions = in->predictions;
     const bst_window *frame = &in->message->window;
     *use = false;
-    windows->count = 0;
+    bst_region_of_interest_clear(windows);
     double half = 0.5 * (double)in->config->window_px, scale = bst_camera_scale_rad(in->camera);
     bool target = false;
     for (int i = 0; i < predictions->count; i++) {
@@ -46,9 +48,12 @@ bst_status bst_window_plan_make(bst_ctx *ctx, const bst_window_plan_input *in,
         bst_vec3 d = bst_vec3_unit(
             bst_vec3_axpy(p->direction_gcrf, in->predictions_age_s, p->rate_gcrf_radps));
         bst_vec3 v = bst_quat_rotate(in->q_cam_from_gcrf, bst_light_aberrate(in->light, d));
-        double x, y, reach = half + 5.0 * p->sigma_rad / scale;
-        bool added = bst_camera_project(in->camera, v, &x, &y) &&
-                     bst_region_of_interest_add(windows, frame, x, y, reach, reach);
+        double reach = half + 5.0 * p->sigma_rad / scale;
+        bst_searched_window why = {
+            .reason = p->target_of_interest ? BST_REGION_TARGET : BST_REGION_TRACK,
+            .track_id = p->track_id};
+        bool added = bst_camera_project(in->camera, v, &why.x_px, &why.y_px) &&
+                     bst_region_of_interest_add(windows, frame, &why, reach, reach);
         target = target || (added && p->target_of_interest);
     }
     if (!target || windows->count == BST_WINDOWS_MAX) {

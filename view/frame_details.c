@@ -259,6 +259,32 @@ static void add_track(cJSON *list, const bst_io_rows *rows, const bst_view_expos
     }
 }
 
+static const char *const windows[2] = {
+    "regions_of_interest", "window, x0_px, y0_px, width_px, height_px, reason, track_id, star_id"};
+
+static void add_window(cJSON *list, const bst_io_rows *rows, const bst_view_exposure *f) {
+    cJSON *node = bst_view_add_object(list);
+    cJSON_AddNumberToObject(node, "window", (double)bst_io_rows_int(rows, 1));
+    bst_json_add_number(node, "x0", (bst_io_rows_real(rows, 2) - f->x0_px) / f->binning);
+    bst_json_add_number(node, "y0", (bst_io_rows_real(rows, 3) - f->y0_px) / f->binning);
+    bst_json_add_number(node, "width", bst_io_rows_real(rows, 4) / f->binning);
+    bst_json_add_number(node, "height", bst_io_rows_real(rows, 5) / f->binning);
+    cJSON_AddStringToObject(node, "reason", bst_io_rows_text(rows, 6));
+    cJSON_AddNumberToObject(node, "track_id", (double)bst_io_rows_int(rows, 7));
+    cJSON_AddNumberToObject(node, "star_id", (double)bst_io_rows_int(rows, 8));
+}
+
+/* Adds the windows that image processing searched; nothing for a run without such a table. */
+static bst_status add_windows(bst_ctx *ctx, const bst_view_run *run, const bst_view_sensor *s,
+                              const bst_view_exposure *frame, exposure_range now, cJSON *node) {
+    if (bst_run_reader_int(run->reader, "SELECT EXISTS(SELECT 1 FROM regions_of_interest)", 0, -1) <
+        0) {
+        return BST_OK;
+    }
+    return add_rows(ctx, run, s, frame, windows, now, add_window,
+                    cJSON_AddArrayToObject(node, "windows"));
+}
+
 /* Adds the WCS that the tables have, which lacks the distortion, where the header could not be
  * read: the file of a run in progress, or of one that was killed, may end within a frame. */
 static bst_status add_recorded_wcs(bst_ctx *ctx, const bst_view_run *run, const bst_view_sensor *s,
@@ -322,6 +348,7 @@ static bst_status describe_frame(bst_ctx *ctx, bst_view_run *run, bst_view_senso
     BST_TRY(add_rows(ctx, run, s, f, truth, now, add_truth, cJSON_AddArrayToObject(node, "truth")));
     BST_TRY(add_rows(ctx, run, s, f, detections, now, add_detection,
                      cJSON_AddArrayToObject(node, "detections")));
+    BST_TRY(add_windows(ctx, run, s, f, now, node));
     cJSON *list = cJSON_AddArrayToObject(node, "tracks");
     BST_TRY(add_rows(ctx, run, s, f, tracks, now, add_track, list));
     if (oldest == frame) {

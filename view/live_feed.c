@@ -255,6 +255,12 @@ static bst_status take(bst_view_feed *feed, bst_ctx *ctx, feed_sensor *s, const 
         if (w && w->node && !cJSON_HasObjectItem(w->node, "detections")) {
             bst_view_add_live_detections(w->node, detections, &w->frame);
         }
+    } else if (strcmp(channel, BST_CHANNEL_REGIONS_OF_INTEREST) == 0) {
+        const bst_regions_of_interest *regions = payload;
+        waiting_exposure *w = find(s, regions->exposure_id);
+        if (w && w->node && !cJSON_HasObjectItem(w->node, "windows")) {
+            bst_view_add_live_windows(w->node, regions, &w->frame);
+        }
     } else if (strcmp(channel, BST_CHANNEL_TRACKS) == 0) {
         const bst_tracks *tracks = payload;
         waiting_exposure *w = find(s, tracks->exposure_id);

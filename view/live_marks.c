@@ -84,6 +84,24 @@ void bst_view_add_live_detections(cJSON *node, const bst_detections *detections,
     }
 }
 
+void bst_view_add_live_windows(cJSON *node, const bst_regions_of_interest *regions,
+                               const bst_frame_message *frame) {
+    cJSON *list = cJSON_AddArrayToObject(node, "windows");
+    const double binning = binning_of(frame);
+    for (int i = 0; i < regions->count; i++) {
+        const bst_searched_window *k = &regions->items[i];
+        cJSON *mark = bst_view_add_object(list);
+        cJSON_AddNumberToObject(mark, "window", k->number);
+        bst_json_add_number(mark, "x0", (k->window.x0 - frame->window.x0) / binning);
+        bst_json_add_number(mark, "y0", (k->window.y0 - frame->window.y0) / binning);
+        bst_json_add_number(mark, "width", k->window.width / binning);
+        bst_json_add_number(mark, "height", k->window.height / binning);
+        cJSON_AddStringToObject(mark, "reason", bst_recorder_region_reason_name(k->reason));
+        cJSON_AddNumberToObject(mark, "track_id", (double)k->track_id);
+        cJSON_AddNumberToObject(mark, "star_id", k->star_id);
+    }
+}
+
 void bst_view_add_live_tracks(cJSON *node, const bst_tracks *tracks,
                               const bst_frame_message *frame) {
     cJSON *list = cJSON_AddArrayToObject(node, "tracks");

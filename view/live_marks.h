@@ -17,4 +17,9 @@ void bst_view_add_live_detections(cJSON *node, const bst_detections *detections,
 void bst_view_add_live_tracks(cJSON *node, const bst_tracks *tracks,
                               const bst_frame_message *frame);
 
+/* Adds the windows of a frame that image processing searched: array "windows" as
+ * bst_view_run_frame. */
+void bst_view_add_live_windows(cJSON *node, const bst_regions_of_interest *regions,
+                               const bst_frame_message *frame);
+
 #endif

@@ -8,6 +8,7 @@
 #include "sim/core/json_member.h"
 #include "sim/core/memory.h"
 #include "view/plot_values.h"
+#include "view/real_time_factor.h"
 #include "view/recorded_run.h"
 #include "view/recorded_run_internal.h"
 
@@ -32,6 +33,8 @@ static const struct {
     {"attitude_error", "Attitude error, from stars", "arcsec"},
     {"background", "Background", "e-"},
     {"latency", "Age of the result", "s"},
+    {"wheels", "Reaction wheels", "rpm"},
+    {"real_time_factor", "Real-time factor", ""},
 };
 enum { PANELS = sizeof panels / sizeof *panels };
 
@@ -43,6 +46,7 @@ typedef enum value_kind {
     VALUE_THREE_SIGMA, /* two variances, rad^2 */
     VALUE_INNOVATION,  /* a state of a track (bst_view_track_state), after the one before it */
     VALUE_INNOVATION_SIGMA,
+    VALUE_REAL_TIME, /* of file wall_clock.csv, no table */
 } value_kind;
 
 /* Columns of a state of the target's track. */
@@ -52,6 +56,16 @@ typedef enum value_kind {
     " cov_d1_r2_rad2ps, cov_d2_r1_rad2ps, cov_d2_r2_rad2ps, cov_r1_r1_rad2ps2,"                   \
     " cov_r1_r2_rad2ps2, cov_r2_r2_rad2ps2 FROM tracks WHERE sensor = ?1 AND target_of_interest"  \
     " = 1"
+
+/* Panel of the wheels: it has a line for each wheel there is. */
+enum { WHEELS_PANEL = 12 };
+/* Speed of a wheel. All wheels are among the first rows: each time has a row of each. */
+#define WHEEL(n)                                                                             \
+    {                                                                                        \
+        WHEELS_PANEL, "wheel " #n, "wheels",                                                 \
+            "SELECT time_s, speed_rpm FROM wheels WHERE sensor = ?1 AND wheel = " #n, false, \
+            VALUE_PLAIN, "rowid < 10000 AND wheel = " #n                                     \
+    }
 
 /* A line of a panel: its samples by time. ?1: the sensor; ?2: the target. `only`: the panel is
  * left out if no row fits; "": any row does. */
@@ -134,6 +148,15 @@ static const struct {
      "SELECT time_s, CAST(written_tick - tick AS REAL) / (SELECT tick_rate_hz FROM run)"
      " FROM track_frames WHERE sensor = ?1",
      false, VALUE_PLAIN, ""},
+    WHEEL(0),
+    WHEEL(1),
+    WHEEL(2),
+    WHEEL(3),
+    WHEEL(4),
+    WHEEL(5),
+    WHEEL(6),
+    WHEEL(7),
+    {13, "simulated over wall time", "", "", false, VALUE_REAL_TIME, ""},
 };
 
 /* Lines of the target's truth, and both at once: time and SNR, time and components of the error (no
@@ -145,14 +168,54 @@ static const char truth_sql[] =
     " FROM exposures WHERE sensor = ?1 GROUP BY exposure_id) e ON e.exposure_id = t.exposure_id"
     " WHERE t.id = ?2 AND t.sensor = ?1 AND t.kind = 'object' AND t.in_field = 1";
 
+/* Path of the file that says how fast the run was. False: the path is too long. */
+static bool wall_clock_path(const bst_view_run *run, char *path, size_t bytes) {
+    bst_ctx ignored = {0};
+    return bst_run_reader_file(&ignored, run->reader, "wall_clock.csv", path, bytes) == BST_OK;
+}
+
 /* True if the table of a line has rows of the sensor that make its panel worth showing. */
 static bool is_recorded(const bst_view_run *run, const bst_view_sensor *s, int line) {
-    char sql[160];
+    char sql[160], path[4200];
     const char *only = lines[line].only;
+    if (lines[line].kind == VALUE_REAL_TIME) {
+        return wall_clock_path(run, path, sizeof path) && bst_view_has_wall_clock(path);
+    }
     snprintf(sql, sizeof sql, "SELECT EXISTS(SELECT 1 FROM %s WHERE sensor = ?1%s%s)",
              lines[line].table, only[0] ? " AND " : "", only);
     return (!lines[line].of_target || s->target >= 0) &&
            bst_run_reader_int(run->reader, sql, s->sensor.index, 0) == 1;
+}
+
+/* True if a line is in its panel, where that is shown. */
+static bool is_in_panel(const bst_view_run *run, const bst_view_sensor *s, int line) {
+    return lines[line].panel != WHEELS_PANEL || is_recorded(run, s, line);
+}
+
+/* Adds the speed limits of the wheels to their panel: [{line, low, high}], rpm. */
+static void add_wheel_limits(const bst_view_run *run, const bst_view_sensor *s, cJSON *panel) {
+    cJSON *limits = cJSON_AddArrayToObject(panel, "stops");
+    bst_ctx ignored = {0};
+    bst_io_rows *rows;
+    bool more;
+    cJSON_AddStringToObject(panel, "limit_word", "limits");
+    if (bst_io_rows_open(&ignored, run->reader,
+                         "SELECT wheel, max(speed_limit_rpm) FROM wheels WHERE sensor = ?1 AND"
+                         " rowid < 10000 GROUP BY wheel ORDER BY wheel LIMIT 8",
+                         s->sensor.index, 0, &rows) != BST_OK) {
+        return;
+    }
+    for (int line = 0; bst_io_rows_next(&ignored, rows, &more) == BST_OK && more; line++) {
+        const double limit = bst_io_rows_real(rows, 1);
+        if (isfinite(limit)) {
+            cJSON *stop = cJSON_CreateObject();
+            cJSON_AddItemToArray(limits, stop);
+            cJSON_AddNumberToObject(stop, "line", line);
+            cJSON_AddNumberToObject(stop, "low", -limit);
+            cJSON_AddNumberToObject(stop, "high", limit);
+        }
+    }
+    bst_io_rows_close(rows);
 }
 
 /* Adds the stops of the mount's axes to its panel: [{line, low, high}], deg. A mount whose type the
@@ -200,7 +263,7 @@ void bst_view_add_panels(const bst_view_run *run, const bst_view_sensor *s, cJSO
         cJSON *names = cJSON_CreateArray();
         bool any = false;
         for (int i = 0; i < BST_VIEW_LINES; i++) {
-            if (lines[i].panel == k) {
+            if (lines[i].panel == k && is_in_panel(run, s, i)) {
                 any = is_recorded(run, s, i) || any;
                 cJSON_AddItemToArray(names, cJSON_CreateString(lines[i].name));
             }
@@ -216,6 +279,8 @@ void bst_view_add_panels(const bst_view_run *run, const bst_view_sensor *s, cJSO
         cJSON_AddItemToObject(node, "lines", names);
         if (strcmp(panels[k].name, "mount") == 0) {
             add_stops(run, s, node);
+        } else if (k == WHEELS_PANEL) {
+            add_wheel_limits(run, s, node);
         }
         cJSON_AddItemToArray(out, node);
     }
@@ -278,6 +343,7 @@ static double value_of(const bst_io_rows *rows, value_kind kind, bst_view_track_
             return !found ? NAN : kind == VALUE_INNOVATION ? innovation : sigma3;
         }
         case VALUE_PLAIN:
+        case VALUE_REAL_TIME:
         default:
             return bst_io_rows_real(rows, 1);
     }
@@ -337,6 +403,21 @@ static bst_status read_line(bst_ctx *ctx, bst_view_run *run, bst_io_rows *rows, 
     return keep_line(ctx, status, run, &c, line);
 }
 
+static bst_status collect_factor(bst_ctx *ctx, void *user, double time_s, double factor) {
+    return collect(ctx, user, time_s, factor);
+}
+
+/* Reads the speed of the run. */
+static bst_status read_factors(bst_ctx *ctx, bst_view_run *run, bst_view_line *line) {
+    collected c = {.samples = NULL};
+    char path[4200];
+    bst_status status = BST_OK;
+    if (wall_clock_path(run, path, sizeof path)) {
+        status = bst_view_read_factors(ctx, path, collect_factor, &c);
+    }
+    return keep_line(ctx, status, run, &c, line);
+}
+
 /* Reads the two lines of the target's truth, a table that may have gigabytes, at once. */
 static bst_status read_truth(bst_ctx *ctx, bst_view_run *run, bst_io_rows *rows,
                              bst_view_line *error, bst_view_line *snr) {
@@ -365,6 +446,9 @@ static bst_status need_line(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s,
     line->used = ++run->requests;
     if (line->samples) {
         return BST_OK;
+    }
+    if (lines[k].kind == VALUE_REAL_TIME) {
+        return read_factors(ctx, run, line);
     }
     bst_ctx ignored = {0};
     bst_io_rows *rows = NULL;
@@ -422,7 +506,7 @@ static bst_status plot_panel(bst_ctx *ctx, bst_view_run *run, const bst_view_plo
                         plot->from_s, plot->to_s, plot->columns, BST_VIEW_COLUMNS);
     }
     for (int i = 0; i < BST_VIEW_LINES; i++) {
-        if (lines[i].panel == panel) {
+        if (lines[i].panel == panel && is_in_panel(run, s, i)) {
             BST_TRY(need_line(ctx, run, s, i));
             BST_TRY(append_line(ctx, &s->lines[i], plot, out));
         }

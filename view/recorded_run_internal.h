@@ -13,7 +13,7 @@
 #include "view/recorded_run.h"
 
 /* Lines of all panels of a sensor. */
-enum { BST_VIEW_LINES = 25 };
+enum { BST_VIEW_LINES = 34 };
 
 /* An exposure of a sensor. */
 typedef struct bst_view_exposure {

@@ -65,6 +65,19 @@ bst_vec3 bst_spacecraft_gyro_bias(const bst_spacecraft *craft) {
     return craft->gyro.bias_radps;
 }
 
+int bst_spacecraft_wheel_count(const bst_spacecraft *craft) {
+    return craft->wheels.count;
+}
+
+bst_wheel_state bst_spacecraft_wheel_state(const bst_spacecraft *craft, int index) {
+    assert(index >= 0 && index < craft->wheels.count);
+    const bst_wheel *wheel = &craft->wheels.wheel[index];
+    return (bst_wheel_state){.speed_radps = craft->now.wheel_radps[index],
+                             .speed_limit_radps = wheel->speed_limit_radps,
+                             .motor_nm = craft->motor_nm[index],
+                             .motor_limit_nm = wheel->torque_limit_nm};
+}
+
 void bst_spacecraft_command_roll(bst_spacecraft *craft, double roll_rad) {
     craft->roll_target_rad = roll_rad;
 }

@@ -65,6 +65,11 @@ typedef struct bst_spacecraft_now {
 /* Current state of the spacecraft; it belongs to the spacecraft. */
 const bst_spacecraft_now *bst_spacecraft_at(const bst_spacecraft *craft);
 
+/* Number of its reaction wheels. */
+int bst_spacecraft_wheel_count(const bst_spacecraft *craft);
+/* State and limits of a wheel after the last step. */
+bst_wheel_state bst_spacecraft_wheel_state(const bst_spacecraft *craft, int index);
+
 /* Dynamics of the spacecraft, for tests and analysis; they belong to the spacecraft. */
 const bst_spacecraft_body *bst_spacecraft_dynamics(const bst_spacecraft *craft);
 /* Attitude filter of the spacecraft, for tests and analysis; it belongs to the spacecraft. */

@@ -5,7 +5,9 @@
 #include <string.h>
 
 bool bst_region_of_interest_add(bst_region_of_interest *windows, const bst_window *frame,
-                                double x_px, double y_px, double half_x_px, double half_y_px) {
+                                const bst_searched_window *why, double half_x_px,
+                                double half_y_px) {
+    const double x_px = why->x_px, y_px = why->y_px;
     assert(windows && frame && windows->count >= 0 && windows->count <= BST_WINDOWS_MAX);
     assert(half_x_px >= 0.0 && half_y_px >= 0.0);
     double x0 = fmax(floor(x_px - half_x_px), frame->x0);
@@ -15,9 +17,29 @@ bool bst_region_of_interest_add(bst_region_of_interest *windows, const bst_windo
     if (windows->count == BST_WINDOWS_MAX || !(x1 >= x0 && y1 >= y0)) {
         return false;
     }
+    bst_searched_window *planned = &windows->planned[windows->planned_count++];
+    *planned = *why;
+    planned->number = windows->count;
     windows->items[windows->count++] =
         (bst_window){(int)x0, (int)y0, (int)(x1 - x0) + 1, (int)(y1 - y0) + 1};
     return true;
+}
+
+void bst_region_of_interest_clear(bst_region_of_interest *windows) {
+    windows->count = windows->planned_count = 0;
+}
+
+/* Gives the reasons of window `from` to window `to`; -1: removes them. */
+static void move_reasons(bst_region_of_interest *windows, int from, int to) {
+    int kept = 0;
+    for (int i = 0; i < windows->planned_count; i++) {
+        bst_searched_window r = windows->planned[i];
+        r.number = r.number == from ? to : r.number;
+        if (r.number >= 0) {
+            windows->planned[kept++] = r;
+        }
+    }
+    windows->planned_count = kept;
 }
 
 /* True if two windows overlap or touch. */
@@ -51,7 +73,10 @@ bool bst_region_of_interest_settle(bst_region_of_interest *windows, const bst_wi
         align(&w.x0, &w.width, frame->x0, frame->width, binning);
         align(&w.y0, &w.height, frame->y0, frame->height, binning);
         if (w.width > 0 && w.height > 0) {
+            move_reasons(windows, i, kept);
             windows->items[kept++] = w;
+        } else {
+            move_reasons(windows, i, -1);
         }
     }
     windows->count = kept;
@@ -68,10 +93,15 @@ bool bst_region_of_interest_settle(bst_region_of_interest *windows, const bst_wi
             a->width = x1 - a->x0;
             a->height = y1 - a->y0;
             *b = windows->items[--windows->count];
+            move_reasons(windows, i, j);
+            move_reasons(windows, windows->count, i);
             /* the merged window may touch others */
             i = -1;
             break;
         }
+    }
+    for (int i = 0; i < windows->planned_count; i++) {
+        windows->planned[i].window = windows->items[windows->planned[i].number];
     }
     double area = 0.0;
     for (int i = 0; i < windows->count; i++) {

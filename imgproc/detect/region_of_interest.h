@@ -12,15 +12,23 @@ enum { BST_WINDOWS_MAX = 128 };
 typedef struct bst_region_of_interest {
     int count;
     bst_window items[BST_WINDOWS_MAX];
+    int planned_count;
+    bst_searched_window planned[BST_WINDOWS_MAX]; /* why: `number` is the index of its window */
 } bst_region_of_interest;
 
-/* Adds a window of half widths half_x_px, half_y_px about a position, full-sensor px, clipped to
- * `frame`. Returns false if the list is full or the window lies outside. */
+/* Adds a window of half widths half_x_px, half_y_px about the position `why`->x_px, y_px, clipped
+ * to `frame`. Returns false if the list is full or the window lies outside.
+ *
+ * Given:     why  reason, identity and position; window and number are not used */
 bool bst_region_of_interest_add(bst_region_of_interest *windows, const bst_window *frame,
-                                double x_px, double y_px, double half_x_px, double half_y_px);
+                                const bst_searched_window *why, double half_x_px, double half_y_px);
 
-/* Aligns the windows with the frame's binned pixels and merges those that touch. Returns false if
- * they cover more than `share` of the frame: a search of the whole frame is then cheaper. */
+/* Removes all windows. */
+void bst_region_of_interest_clear(bst_region_of_interest *windows);
+
+/* Aligns the windows with the frame's binned pixels and merges those that touch; sets `window` of
+ * each reason to what is searched. Returns false if they cover more than `share` of the frame: a
+ * search of the whole frame is then cheaper. */
 bool bst_region_of_interest_settle(bst_region_of_interest *windows, const bst_window *frame,
                                    int binning, double share);
 

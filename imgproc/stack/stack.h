@@ -67,7 +67,9 @@ void bst_stack_free(bst_stack *stack);
 /* Saves or restores the frames of a stack that is not full, and the figures of the latest search.
  *
  * Errors:    BST_ERR_FORMAT for restored frames with attitudes, times or noise that no frame has;
- *            the stack is empty then */
+ *            the stack is empty then
+ * Notes:     the number of frames of a stack must be the saved one; imgproc/module.c begins a new
+ *            stack where it has changed */
 bst_status bst_stack_archive(bst_stack *stack, bst_archive *archive) BST_MUST_CHECK;
 
 /* Adds a frame. A stack with config->frames frames is full: bst_stack_search is next.

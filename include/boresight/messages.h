@@ -22,12 +22,14 @@
 #include "boresight/messages/planes.h"
 #include "boresight/messages/pointing_telemetry.h"
 #include "boresight/messages/predictions.h"
+#include "boresight/messages/regions_of_interest.h"
 #include "boresight/messages/sensor_command.h"
 #include "boresight/messages/task.h"
 #include "boresight/messages/track_identities.h"
 #include "boresight/messages/tracks.h"
 #include "boresight/messages/tracks_smoothed.h"
 #include "boresight/messages/truth.h"
+#include "boresight/messages/wheel_status.h"
 #include "boresight/messages/window.h"
 
 #pragma GCC visibility push(default)

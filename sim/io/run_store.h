@@ -46,8 +46,10 @@ bool bst_run_is_reopened(const bst_run *run);
 
 /* Saves how many rows each table has, or removes the rows after the saved ones.
  *
- * Errors:    BST_ERR_FORMAT: a table has fewer rows than were saved; BST_ERR_IO
- * Notes:     commits the rows; saving also flushes them to disk. */
+ * Errors:    BST_ERR_FORMAT: a table has fewer rows than were saved, or a saved one is not made;
+ *            BST_ERR_IO
+ * Notes:     commits the rows; saving also flushes them to disk. Tables that the saved run did not
+ *            have are emptied. */
 bst_status bst_run_archive(bst_ctx *ctx, bst_run *run, bst_archive *archive) BST_MUST_CHECK;
 
 /* The folder that is being written ("<out>.partial"); owned by the run. */
@@ -143,6 +145,9 @@ static inline bst_io_value bst_io_null_value(bst_io_column_type type) {
 bst_status bst_io_table_create(bst_ctx *ctx, bst_run *run, const char *name, const char *doc,
                                const bst_io_column *columns, int count,
                                bst_io_table **out) BST_MUST_CHECK;
+
+/* True if the database has this table: also of a reopened run, whose program made it. */
+bool bst_run_has_table(const bst_run *run, const char *name);
 
 /* Appends a row with a value per column, of the column's type. Rows are committed in batches: after
  * 50,000 rows, or at the first row 2 s after the batch began. A killed run loses at most one

@@ -9,6 +9,7 @@
 #define BATCH_ROWS 50000
 #define BATCH_SECONDS 2.0
 #define SQL_BYTES 8192
+#define TABLES_MOST 256
 /* The end of a run waits up to 2 s for other programs that read its database. */
 #define MERGE_TRIALS 40
 #define MERGE_PAUSE_NS 50000000
@@ -208,6 +209,11 @@ static bst_status note_columns(bst_ctx *ctx, bst_run *run, const char *name, con
     return BST_OK;
 }
 
+bool bst_run_has_table(const bst_run *run, const char *name) {
+    return run->db && sqlite3_table_column_metadata(run->db, NULL, name, NULL, NULL, NULL, NULL,
+                                                    NULL, NULL) == SQLITE_OK;
+}
+
 bst_status bst_io_table_create(bst_ctx *ctx, bst_run *run, const char *name, const char *doc,
                                const bst_io_column *columns, int count, bst_io_table **out) {
     assert(run && name && columns && out);
@@ -219,7 +225,7 @@ bst_status bst_io_table_create(bst_ctx *ctx, bst_run *run, const char *name, con
     /* 64 names of 63 characters with quotes fit into SQL_BYTES */
     char create[SQL_BYTES], insert[SQL_BYTES];
     BST_TRY(write_sql(ctx, name, columns, count, create, insert));
-    if (!run->reopened) {
+    if (!run->reopened || !bst_run_has_table(run, name)) {
         BST_TRY(begin_batch(ctx, run));
         BST_TRY(execute(ctx, run, create, "cannot make a table"));
         BST_TRY(note_columns(ctx, run, name, doc, columns, count));
@@ -303,16 +309,47 @@ static bst_status cut_table(bst_ctx *ctx, bst_run *run, bst_io_table *table) {
                           run->folder, BST_RUN_DATABASE, table->name, rows, (long long)table->rows);
 }
 
+/* Restores how many rows each table has. Tables that the saved run did not have yet are emptied. */
+static bst_status restore_rows(bst_ctx *ctx, bst_run *run, bst_archive *archive) {
+    bst_io_table *table;
+    for (table = run->tables; table; table = table->next) {
+        table->rows = 0;
+    }
+    const int64_t count = bst_archive_integer(archive, 0, 0, TABLES_MOST);
+    for (int64_t i = 0; i < count; i++) {
+        char name[sizeof table->name] = "";
+        BST_ARCHIVE(archive, name);
+        name[sizeof name - 1] = '\0';
+        for (table = run->tables; table && strcmp(table->name, name) != 0; table = table->next) {
+        }
+        const int64_t rows = bst_archive_integer(archive, 0, 0, INT64_MAX);
+        if (!table) {
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "%s/%s: the saved state has a table that this run does not write: the "
+                            "run cannot go on from it; run it again from the start",
+                            run->folder, BST_RUN_DATABASE);
+        }
+        table->rows = rows;
+    }
+    for (table = run->tables; table; table = table->next) {
+        BST_TRY(cut_table(ctx, run, table));
+    }
+    return bst_run_commit(ctx, run);
+}
+
 bst_status bst_run_archive(bst_ctx *ctx, bst_run *run, bst_archive *archive) {
     BST_TRY(bst_run_commit(ctx, run));
-    for (bst_io_table *table = run->tables; table; table = table->next) {
-        table->rows = bst_archive_integer(archive, table->rows, 0, INT64_MAX);
-        if (bst_archive_is_restoring(archive)) {
-            BST_TRY(cut_table(ctx, run, table));
-        }
-    }
     if (bst_archive_is_restoring(archive)) {
-        return bst_run_commit(ctx, run);
+        return restore_rows(ctx, run, archive);
+    }
+    int64_t count = 0;
+    for (const bst_io_table *table = run->tables; table; table = table->next) {
+        count++;
+    }
+    (void)bst_archive_integer(archive, count, 0, TABLES_MOST);
+    for (bst_io_table *table = run->tables; table; table = table->next) {
+        BST_ARCHIVE(archive, table->name);
+        (void)bst_archive_integer(archive, table->rows, 0, INT64_MAX);
     }
     /* to disk: a commit alone may be lost with the power */
     return execute(ctx, run, "PRAGMA wal_checkpoint(PASSIVE)", "cannot be flushed to disk");

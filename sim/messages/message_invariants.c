@@ -155,6 +155,29 @@ bool bst_track_identities_are_valid(const bst_track_identities *t, int capacity)
     return valid;
 }
 
+bool bst_regions_of_interest_are_valid(const bst_regions_of_interest *r, int capacity) {
+    bool valid = r->exposure_id >= 0 && r->start_tick <= r->end_tick && r->count >= 0 &&
+                 r->count <= capacity;
+    for (int i = 0; valid && i < r->count; i++) {
+        const bst_searched_window *item = &r->items[i];
+        valid = bst_window_is_valid(&item->window) && item->number >= 0 &&
+                item->number < r->count && item->reason >= 0 &&
+                item->reason < BST_REGION_REASON_COUNT && isfinite(item->x_px) &&
+                isfinite(item->y_px) && (item->reason != BST_REGION_STAR || item->track_id == 0);
+    }
+    return valid;
+}
+
+bool bst_wheel_status_is_valid(const bst_wheel_status *s, int capacity) {
+    bool valid = s->count >= 0 && s->count <= capacity;
+    for (int i = 0; valid && i < s->count; i++) {
+        const bst_wheel_state *w = &s->items[i];
+        valid = isfinite(w->speed_radps) && bst_is_variance(w->speed_limit_radps) &&
+                isfinite(w->motor_nm) && bst_is_variance(w->motor_limit_nm);
+    }
+    return valid;
+}
+
 bool bst_tracks_smoothed_are_valid(const bst_tracks_smoothed *t, int capacity) {
     bool valid = is_count(t->count, t->lost, capacity);
     for (int i = 0; valid && i < t->count; i++) {

@@ -26,6 +26,11 @@ bool bst_mount_status_is_valid(const bst_mount_status *status);
 bool bst_los_command_is_valid(const bst_los_command *command);
 /* Settings of a sensor are finite, or 0 and less for "keep". */
 bool bst_sensor_command_is_valid(const bst_sensor_command *command);
+/* Windows of a frame: at most `capacity`, numbered from 0 without gaps, with a bst_region_reason
+ * and finite places; those of stars have no track. */
+bool bst_regions_of_interest_are_valid(const bst_regions_of_interest *regions, int capacity);
+/* Wheels: at most `capacity`, with finite speeds and torques, and limits of 0 or more. */
+bool bst_wheel_status_is_valid(const bst_wheel_status *status, int capacity);
 /* A bst_mode and finite errors. */
 bool bst_control_status_is_valid(const bst_control_status *status);
 /* A task: object -1 or more, standard deviations of 0 or more, a bst_task_end. */

@@ -30,6 +30,12 @@ static int count_tracks(const void *payload) {
 static int count_identities(const void *payload) {
     return ((const bst_track_identities *)payload)->count;
 }
+static int count_regions(const void *payload) {
+    return ((const bst_regions_of_interest *)payload)->count;
+}
+static int count_wheels(const void *payload) {
+    return ((const bst_wheel_status *)payload)->count;
+}
 static int count_smoothed(const void *payload) {
     return ((const bst_tracks_smoothed *)payload)->count;
 }
@@ -48,6 +54,8 @@ static const bst_channel_type types[] = {
     RING(BST_CHANNEL_LOS_HISTORY, bst_los_history, bst_los_sample),
     RING(BST_CHANNEL_POINTING_TELEMETRY, bst_pointing_telemetry, bst_pointing_sample),
     HEADER_ONLY(BST_CHANNEL_MOUNT_STATUS, BST_CHANNEL_LATEST, bst_mount_status),
+    WITH_ITEMS(BST_CHANNEL_WHEEL_STATUS, BST_CHANNEL_LATEST, bst_wheel_status, bst_wheel_state,
+               count_wheels),
     HEADER_ONLY(BST_CHANNEL_NAV_TELEMETRY, BST_CHANNEL_LATEST, bst_nav_telemetry),
     {BST_CHANNEL_FRAME, BST_CHANNEL_QUEUE, sizeof(bst_frame_message), 0, false, release_frame,
      retain_frame, false, NULL},
@@ -57,6 +65,8 @@ static const bst_channel_type types[] = {
                count_detections),
     WITH_ITEMS(BST_CHANNEL_PREDICTIONS, BST_CHANNEL_LATEST, bst_predictions, bst_prediction,
                count_predictions),
+    WITH_ITEMS(BST_CHANNEL_REGIONS_OF_INTEREST, BST_CHANNEL_QUEUE, bst_regions_of_interest,
+               bst_searched_window, count_regions),
     WITH_ITEMS(BST_CHANNEL_TRACKS, BST_CHANNEL_QUEUE, bst_tracks, bst_track, count_tracks),
     WITH_ITEMS(BST_CHANNEL_TRACK_IDENTITIES, BST_CHANNEL_QUEUE, bst_track_identities,
                bst_track_identity, count_identities),
@@ -80,10 +90,12 @@ const char *bst_channel_writers(const char *name) {
         {BST_CHANNEL_LOS_HISTORY, "gimbal"},
         {BST_CHANNEL_POINTING_TELEMETRY, "gimbal"},
         {BST_CHANNEL_MOUNT_STATUS, "gimbal"},
+        {BST_CHANNEL_WHEEL_STATUS, "gimbal"},
         {BST_CHANNEL_FRAME, "scenegen"},
         {BST_CHANNEL_PLANES, "scenegen"},
         {BST_CHANNEL_TRUTH, "scenegen or obsgen"},
         {BST_CHANNEL_DETECTIONS, "imgproc or obsgen"},
+        {BST_CHANNEL_REGIONS_OF_INTEREST, "imgproc"},
         {BST_CHANNEL_PREDICTIONS, "tracker"},
         {BST_CHANNEL_TRACKS, "tracker"},
         {BST_CHANNEL_TRACK_IDENTITIES, "tracker"},

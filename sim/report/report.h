@@ -170,6 +170,11 @@ void bst_report_run_warnings(bst_run_reader *run, const bst_report_sensor *senso
 /* Writes the charts of a sensor into the HTML page. `span_s`: simulated duration so far. */
 bst_status bst_report_plots(bst_ctx *ctx, FILE *out, const bst_report_sensor *sensor,
                             double span_s) BST_MUST_CHECK;
+/* Writes the chart of a spacecraft's wheels; nothing without table `wheels`.
+ *
+ * Given:     sensor  row of the table sensors */
+bst_status bst_report_wheels(bst_ctx *ctx, FILE *out, const bst_run_reader *run, int64_t sensor,
+                             double span_s) BST_MUST_CHECK;
 /* Writes selected frames with overlays into the page. Unreadable frames are reported on the page
  * and as problems of the run. */
 bst_status bst_report_frames(bst_ctx *ctx, FILE *out, bst_run_reader *run,

@@ -325,6 +325,7 @@ static bst_status put_sensor(bst_ctx *ctx, const page *p, int i) {
     bst_report_page_section(p->out, 2, heading);
     put_cards(p, i);
     BST_TRY(bst_report_plots(ctx, p->out, s, p->span_s));
+    BST_TRY(bst_report_wheels(ctx, p->out, p->run, s->sensor.index, p->span_s));
     bst_report_page_section(p->out, 3, "Frames");
     BST_TRY(bst_report_frames(ctx, p->out, p->run, s));
     bst_report_page_section_end(p->out);

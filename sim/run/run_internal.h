@@ -11,6 +11,7 @@
 #include "sim/run/run_saving.h"
 #include "sim/run/run_scenario.h"
 #include "sim/run/run_sightings.h"
+#include "sim/run/run_wall_clock.h"
 #include "sim/run/run_watched.h"
 
 enum { BST_RUN_WATCHED_CHANNELS = 32 };
@@ -47,6 +48,7 @@ typedef struct bst_run_execution {
     bool part_ended;                  /* by BST_RUN_PART */
     bst_run_sightings *sightings;     /* NULL: not requested */
     bst_run_custody *custody;         /* NULL: not requested */
+    bst_run_wall_clock *wall_clock;   /* NULL: nothing is recorded */
     bool progress;
     double earlier_s;      /* wall time of stepping before start_tick, since begin_tick */
     double started, shown; /* wall seconds */

@@ -365,7 +365,9 @@ static bst_status advance_steered(bst_run_execution *run) {
     int64_t tick = run->start_tick;
     while (status == BST_OK && tick < run->end_tick) {
         int64_t until = run->end_tick;
+        bst_run_wall_clock_stop(run->wall_clock); /* a pause, or a rate that was chosen */
         bst_run_action action = steering->next(steering->user, tick, &until);
+        bst_run_wall_clock_go(run->wall_clock);
         if (action == BST_RUN_END) {
             run->end_tick = tick;
         } else if (action == BST_RUN_ADVANCE) {

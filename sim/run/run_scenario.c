@@ -177,6 +177,7 @@ static void show_progress(bst_run_execution *run, int64_t tick, bool last) {
 static bool interrupted(void *user, int64_t tick) {
     bst_run_execution *run = user;
     show_progress(run, tick, false);
+    bst_run_wall_clock_note(run->wall_clock, (double)tick / (double)run->scenario->tick_rate_hz);
     run->cut = run->most_s > 0.0 && bst_wall_seconds() - run->started > run->most_s;
     return run->cut || (!(run->steering && run->steering->stops) && bst_stop_requested());
 }
@@ -262,6 +263,17 @@ static bool has_module(const bst_scenario *scenario, int observer, int sensor, c
     return false;
 }
 
+/* True if a module of the sensor has room for messages on a channel with items. */
+static bool has_channel(const bst_run_execution *run, const char *scope, const char *name) {
+    const bst_engine *engine = bst_simulation_engine(run->sim);
+    const int index = bst_engine_find_channel(engine, scope, name);
+    int capacity = 0;
+    if (index >= 0) {
+        (void)bst_engine_channel(engine, index, NULL, &capacity);
+    }
+    return capacity > 0;
+}
+
 /* Opens the recorder with all sensors of the run. */
 static bst_status open_recorder(bst_run_execution *run, const bst_world *world) {
     const bst_scenario *scenario = run->scenario;
@@ -274,12 +286,15 @@ static bst_status open_recorder(bst_run_execution *run, const bst_world *world) 
     for (int i = 0; i < scenario->observers.count; i++) {
         const bst_sensor_config *sensors = observers[i].sensors.items;
         for (int s = 0; s < observers[i].sensors.count; s++) {
+            const char *scope = run->sensors[n].scope; /* watch_sensors has the same order */
             list[n++] = (bst_recorder_sensor){
                 .observer = observers[i].name,
                 .sensor = sensors[s].name,
                 .target = *sensors[s].cue.object ? sensors[s].cue.object : NULL,
                 .camera = bst_world_camera(world, i, s),
-                .has_truth = has_module(scenario, i, s, "scenegen")};
+                .has_truth = has_module(scenario, i, s, "scenegen"),
+                .has_regions = has_channel(run, scope, BST_CHANNEL_REGIONS_OF_INTEREST),
+                .has_wheels = has_channel(run, scope, BST_CHANNEL_WHEEL_STATUS)};
         }
     }
     char program[64];
@@ -353,7 +368,9 @@ static bst_status step_through(bst_run_execution *run, double *wall) {
         BST_TRY(on_event(run, run->start_tick, "scenario", "change", run->request->changes[i].set));
     }
     run->started = bst_wall_seconds();
+    bst_run_wall_clock_go(run->wall_clock);
     bst_status status = bst_run_advance(run);
+    bst_run_wall_clock_stop(run->wall_clock);
     *wall = bst_run_wall_s(run);
     ctx->warnings += run->hooks.warnings;
     for (int i = 0; i < run->sensor_count; i++) {
@@ -393,6 +410,14 @@ static void take_targets(bst_run_execution *run) {
     }
 }
 
+/* Begins file wall_clock.csv, or goes on with it. */
+static bst_status open_wall_clock(bst_run_execution *run, bool resumes) {
+    char path[4200];
+    const double begin_s = (double)run->start_tick / (double)run->scenario->tick_rate_hz;
+    BST_TRY(bst_run_file(run->ctx, run->store, BST_RUN_WALL_CLOCK, path, sizeof path));
+    return bst_run_wall_clock_open(run->ctx, path, resumes, begin_s, &run->wall_clock);
+}
+
 /* Opens the folder of the run with its tables and the recorder. */
 static bst_status open_record(bst_run_execution *run, const bst_run_request *request) {
     bst_ctx *ctx = run->ctx;
@@ -412,6 +437,7 @@ static bst_status open_record(bst_run_execution *run, const bst_run_request *req
                                      run->scenario->tick_rate_hz, run->store, &run->sightings));
     BST_TRY(bst_run_custody_create(ctx, world, run->scenario, run->store, &run->custody));
     BST_TRY(resumes ? bst_run_resume(run, request->restored) : BST_OK);
+    BST_TRY(open_wall_clock(run, resumes));
     take_targets(run);
     return bst_run_link_record(ctx, run->sim, bst_run_folder(run->store));
 }
@@ -436,6 +462,9 @@ static bst_status close_record(bst_run_execution *run, bool stepped, bst_status 
     }
     bst_status closed = bst_recorder_close(&closing, run->recorder);
     run->recorder = NULL;
+    bst_status clocked = bst_run_wall_clock_close(closed == BST_OK ? &closing : NULL,
+                                                  run->wall_clock, bst_run_seconds(run));
+    closed = closed == BST_OK ? clocked : closed;
     if (closed == BST_OK) {
         closed = bst_run_link_recorded(&closing, run->sim);
     }

@@ -19,7 +19,8 @@ enum { FIRST_SHOWN = 64, LAST_SHOWN = 16, SHOWN_EVERY = 64 };
 void bst_run_watch(bst_run_watched *w, const bst_recorder *recorder, const char *channel,
                    const bst_run_pixels *pixels) {
     static const char *const telemetry[] = {BST_CHANNEL_LOS_HISTORY, BST_CHANNEL_POINTING_TELEMETRY,
-                                            BST_CHANNEL_MOUNT_STATUS, BST_CHANNEL_NAV_TELEMETRY};
+                                            BST_CHANNEL_MOUNT_STATUS, BST_CHANNEL_NAV_TELEMETRY,
+                                            BST_CHANNEL_WHEEL_STATUS};
     static const char *const judged[] = {
         BST_CHANNEL_TRUTH,           BST_CHANNEL_DETECTIONS,       BST_CHANNEL_TRACKS,
         BST_CHANNEL_TRACKS_SMOOTHED, BST_CHANNEL_TRACK_IDENTITIES, BST_CHANNEL_TASK};
@@ -32,7 +33,7 @@ void bst_run_watch(bst_run_watched *w, const bst_recorder *recorder, const char 
         w->kind = BST_WATCH_FRAMES;
     } else if (strcmp(channel, BST_CHANNEL_CONTROL_STATUS) == 0) {
         w->kind = BST_WATCH_STATUS;
-    } else if (is_one_of(channel, telemetry, 4)) {
+    } else if (is_one_of(channel, telemetry, 5)) {
         w->kind = w->recorded ? BST_WATCH_TELEMETRY : BST_WATCH_NONE;
     } else {
         w->kind = w->recorded || is_one_of(channel, judged, 6) ? BST_WATCH_ALL : BST_WATCH_NONE;

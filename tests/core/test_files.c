@@ -186,6 +186,10 @@ static void channels_by_name(void **state) {
          BST_CHANNEL_QUEUE, false},
         {"track_identities", sizeof(bst_track_identities), sizeof(bst_track_identity),
          BST_CHANNEL_QUEUE, false},
+        {"regions_of_interest", sizeof(bst_regions_of_interest), sizeof(bst_searched_window),
+         BST_CHANNEL_QUEUE, false},
+        {"wheel_status", sizeof(bst_wheel_status), sizeof(bst_wheel_state), BST_CHANNEL_LATEST,
+         false},
         {"control_status", sizeof(bst_control_status), 0, BST_CHANNEL_LATEST, false},
         {"frame", sizeof(bst_frame_message), 0, BST_CHANNEL_QUEUE, false},
         {"task", sizeof(bst_task), 0, BST_CHANNEL_LATEST, false},
@@ -206,6 +210,8 @@ static void channels_by_name(void **state) {
                 bst_tracks tracks;
                 bst_tracks_smoothed smoothed;
                 bst_track_identities identities;
+                bst_regions_of_interest regions;
+                bst_wheel_status wheels;
             } m;
             memset(&m, 0, sizeof m);
             *(i == 3   ? &m.truth.count
@@ -213,7 +219,9 @@ static void channels_by_name(void **state) {
               : i == 5 ? &m.predictions.count
               : i == 6 ? &m.tracks.count
               : i == 7 ? &m.smoothed.count
-                       : &m.identities.count) = 17;
+              : i == 8 ? &m.identities.count
+              : i == 9 ? &m.regions.count
+                       : &m.wheels.count) = 17;
             assert_int_equal(t->count(&m), 17);
         }
         assert_true((t->count != NULL) == (cases[i].item > 0 && !cases[i].extended));

@@ -153,7 +153,7 @@ class Folders(unittest.TestCase):
     def test_existing_folder(self):
         out = os.path.join(runs.scratch(), "run")
         self.assertEqual(self.run_to(out).returncode, 0)
-        self.assertEqual(sorted(os.listdir(out)), ["manifest.json", "run.sqlite", "scenario.json"])
+        self.assertEqual(sorted(os.listdir(out)), ["manifest.json", "run.sqlite", "scenario.json", "wall_clock.csv"])
         first = os.stat(os.path.join(out, "manifest.json")).st_ino
         result = self.run_to(out)
         self.assertEqual(result.returncode, 1)

@@ -135,7 +135,7 @@ class Interrupted(unittest.TestCase):
         # closed properly: no journal beside the tables, a manifest that says what it is
         self.assertEqual(sorted(name for name in os.listdir(left) if name != "lock"),
                          ["frames.fits", "manifest.json", "pointing.png", "quicklook.png",
-                          "run.sqlite", "scenario.json"])
+                          "run.sqlite", "scenario.json", "wall_clock.csv"])
         manifest = runs.manifest(left)
         self.assertEqual((manifest["complete"], manifest["ended"]), (False, "interrupted"))
         self.assertEqual(manifest["summary"]["frames"], frames)

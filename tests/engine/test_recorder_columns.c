@@ -14,8 +14,12 @@ static const bst_camera camera = {.width_px = WIDTH,
                                   .bits = 16};
 
 static bst_recorder *make(bst_ctx *ctx, bst_run *run, const bst_recorder_config *config) {
-    const bst_recorder_sensor one = {
-        .observer = "alpha", .sensor = "wide", .camera = &camera, .has_truth = true};
+    const bst_recorder_sensor one = {.observer = "alpha",
+                                     .sensor = "wide",
+                                     .camera = &camera,
+                                     .has_truth = true,
+                                     .has_regions = true,
+                                     .has_wheels = true};
     bst_recorder_info info = {
         .tick_rate_hz = RATE, .program = "test", .sensors = &one, .sensor_count = 1};
     bst_assert_ok(ctx, bst_time_from_utc(ctx, "2022-06-16T22:10:00Z", &info.epoch));
@@ -292,6 +296,40 @@ static void send_full_telemetry(bst_ctx *ctx, bst_recorder *recorder) {
     send(ctx, recorder, BST_CHANNEL_CONTROL_STATUS, &control, 4800);
 }
 
+static void send_full_windows_and_wheels(bst_ctx *ctx, bst_recorder *recorder) {
+    const char *table = "regions_of_interest";
+    bst_regions_of_interest *r = calloc(1, sizeof *r + sizeof r->items[0]);
+    assert_non_null(r);
+    r->count = 1;
+    r->end_tick = 2 * RATE;
+    r->exposure_id = (int64_t)keep(table, "exposure_id", 1.0);
+    bst_searched_window *w = &r->items[0];
+    PUT_INT(w, number, "window");
+    PUT_INT(w, window.x0, "x0_px");
+    PUT_INT(w, window.y0, "y0_px");
+    PUT_INT(w, window.width, "width_px");
+    PUT_INT(w, window.height, "height_px");
+    w->reason = BST_REGION_TRACK;
+    w->track_id = (int64_t)keep(table, "track_id", 1.0);
+    w->star_id = (uint32_t)keep(table, "star_id", 1.0);
+    PUT(w, x_px, "x_px");
+    PUT(w, y_px, "y_px");
+    send(ctx, recorder, BST_CHANNEL_REGIONS_OF_INTEREST, r, 4800);
+    free(r);
+    table = "wheels";
+    const double rpm = 60.0 / (2.0 * BST_PI);
+    bst_wheel_status *s = calloc(1, sizeof *s + sizeof s->items[0]);
+    assert_non_null(s);
+    s->count = 1;
+    PUT_INT(s, tick, "tick");
+    s->items[0].speed_radps = keep(table, "speed_rpm", rpm);
+    s->items[0].speed_limit_radps = keep(table, "speed_limit_rpm", rpm);
+    PUT(&s->items[0], motor_nm, "motor_nm");
+    PUT(&s->items[0], motor_limit_nm, "motor_limit_nm");
+    send(ctx, recorder, BST_CHANNEL_WHEEL_STATUS, s, 4800);
+    free(s);
+}
+
 /* Every column has the value of its own field of the message, in its unit. */
 static void test_columns(void **state) {
     (void)state;
@@ -312,10 +350,14 @@ static void test_columns(void **state) {
     send_full_detections(&ctx, recorder);
     send_full_tracks(&ctx, recorder);
     send_full_telemetry(&ctx, recorder);
+    send_full_windows_and_wheels(&ctx, recorder);
     bst_assert_ok(&ctx, bst_recorder_close(&ctx, recorder));
     bst_assert_ok(&ctx, bst_run_finish(&ctx, run));
+    snprintf(sql, sizeof sql, "SELECT reason = 'track' FROM regions_of_interest");
+    assert_true(number(db, sql) == 1.0);
     for (int i = 0; i < kept.count; i++) {
-        snprintf(sql, sizeof sql, "SELECT %s FROM %s", kept.items[i].column, kept.items[i].table);
+        snprintf(sql, sizeof sql, "SELECT \"%s\" FROM %s", kept.items[i].column,
+                 kept.items[i].table);
         double expected = kept.items[i].value, found = number(db, sql);
         if (!(fabs(found - expected) <= 1e-12 * expected)) { /* rounding of units */
             fail_msg("%s: %.17g, expected %.17g", sql, found, expected);

@@ -101,6 +101,8 @@ static void allocate_messages(bst_step *s) {
         (size_t)s->capacity[BST_GIMBAL_POINTING] * sizeof(bst_pointing_sample);
     s->bytes[BST_GIMBAL_NAV] = sizeof(bst_nav_telemetry);
     s->bytes[BST_GIMBAL_MOUNT] = sizeof(bst_mount_status);
+    s->bytes[BST_GIMBAL_WHEELS] =
+        sizeof(bst_wheel_status) + (size_t)s->capacity[BST_GIMBAL_WHEELS] * sizeof(bst_wheel_state);
     for (int port = 0; port < BST_GIMBAL_PORTS; port++) {
         s->message[port] = calloc(1, s->bytes[port]);
         assert_non_null(s->message[port]);

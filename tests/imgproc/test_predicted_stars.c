@@ -128,6 +128,7 @@ static void windows_about_tracks_and_stars(void **state) {
                 (bst_prediction){.direction_gcrf = bst_vec3_axpy(from, -age_s, rate),
                                  .rate_gcrf_radps = rate,
                                  .sigma_rad = sigmas_px[i] * scale,
+                                 .track_id = 7 + i,
                                  .target_of_interest = target && i == 0};
         }
         bst_region_of_interest windows;
@@ -138,6 +139,19 @@ static void windows_about_tracks_and_stars(void **state) {
             continue;
         }
         assert_int_equal(windows.count, 5);
+        assert_int_equal(windows.planned_count, 5);
+        for (int i = 0; i < 5; i++) { /* why, and where it was expected */
+            const bst_searched_window *p = &windows.planned[i];
+            assert_int_equal(p->reason, i == 0   ? BST_REGION_TARGET
+                                        : i == 1 ? BST_REGION_TRACK
+                                                 : BST_REGION_STAR);
+            assert_int_equal(p->track_id, i < 2 ? 7 + i : 0);
+            assert_true((p->star_id != 0) == (i >= 2));
+            if (i < 2) { /* the place is seen, moved on for age_s: rounding */
+                bst_assert_close(p->x_px, places[i][0], 1e-3);
+                bst_assert_close(p->y_px, places[i][1], 1e-3);
+            }
+        }
         for (int i = 0; i < 2; i++) {
             double half = 20.0 + 5.0 * sigmas_px[i];
             expect_window(&windows, &message.window, places[i][0], places[i][1], half, half);

@@ -24,6 +24,7 @@ static void windows_are_apart_and_hold_all(void **state) {
         bst_region_of_interest w = {0};
         double place[40][2];
         int count = 0;
+        int64_t tracks = 0;
         for (int i = 0; i < 40; i++) {
             double x = -50 + 1100 * bst_rng_uniform(key, 0, u++);
             double y = -50 + 900 * bst_rng_uniform(key, 0, u++);
@@ -31,7 +32,11 @@ static void windows_are_apart_and_hold_all(void **state) {
                           y <= frame.y0 + frame.height - binning;
             double half_x = 5 + 30 * bst_rng_uniform(key, 0, u++);
             double half_y = 5 + 30 * bst_rng_uniform(key, 0, u++);
-            bool added = bst_region_of_interest_add(&w, &frame, x, y, half_x, half_y);
+            const bst_searched_window why = {.reason = BST_REGION_TRACK,
+                                             .track_id = inside ? ++tracks : 1000,
+                                             .x_px = x,
+                                             .y_px = y};
+            bool added = bst_region_of_interest_add(&w, &frame, &why, half_x, half_y);
             assert_true(added || !inside);
             if (inside) {
                 place[count][0] = x;
@@ -57,12 +62,30 @@ static void windows_are_apart_and_hold_all(void **state) {
         for (int i = 0; i < count; i++) {
             assert_true(bst_region_of_interest_hold(&w, place[i][0], place[i][1], 0.5));
         }
+        /* each place that was asked for is the reason of the window that has it */
+        int reasons = 0;
+        for (int i = 0; i < w.planned_count; i++) {
+            const bst_searched_window *r = &w.planned[i];
+            assert_in_range(r->number, 0, w.count - 1);
+            assert_memory_equal(&r->window, &w.items[r->number], sizeof r->window);
+            if (r->track_id < 1000) {
+                assert_true(r->x_px == place[r->track_id - 1][0]);
+                assert_true(r->x_px >= r->window.x0 - 0.5 &&
+                            r->x_px <= r->window.x0 + r->window.width - 0.5);
+                assert_true(r->y_px >= r->window.y0 - 0.5 &&
+                            r->y_px <= r->window.y0 + r->window.height - 0.5);
+                reasons++;
+            }
+        }
+        assert_int_equal(reasons, count);
         double share = area / ((double)frame.width * frame.height);
         assert_false(bst_region_of_interest_settle(&w, &frame, binning, 0.9 * share));
     }
     bst_region_of_interest none = {0};
     bst_window frame = {0, 0, 100, 100};
-    assert_false(bst_region_of_interest_add(&none, &frame, 150, 50, 20, 20));
+    const bst_searched_window outside = {.x_px = 150, .y_px = 50};
+    assert_false(bst_region_of_interest_add(&none, &frame, &outside, 20, 20));
+    assert_int_equal(none.planned_count, 0);
     assert_false(bst_region_of_interest_settle(&none, &frame, 1, 1.0));
 }
 

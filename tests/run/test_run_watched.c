@@ -43,6 +43,8 @@ static void kinds(void **state) {
                  {BST_CHANNEL_LOS_HISTORY, BST_WATCH_NONE},
                  {BST_CHANNEL_MOUNT_STATUS, BST_WATCH_NONE},
                  {BST_CHANNEL_NAV_TELEMETRY, BST_WATCH_NONE},
+                 {BST_CHANNEL_WHEEL_STATUS, BST_WATCH_NONE},
+                 {BST_CHANNEL_REGIONS_OF_INTEREST, BST_WATCH_NONE},
                  {BST_CHANNEL_SENSOR_COMMAND, BST_WATCH_NONE},
                  {BST_CHANNEL_CONTROL_STATUS, BST_WATCH_STATUS},
                  {BST_CHANNEL_FRAME, BST_WATCH_FRAMES}};

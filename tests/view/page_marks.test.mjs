@@ -5,7 +5,7 @@ import test from 'node:test';
 
 Object.assign(globalThis, { location: { search: '' }, document: { getElementById: () => null } });
 const { covarianceAfter, directionAfter, placeOf, placesOf } = await import('../../view/page/prediction.js');
-const { sortMarks } = await import('../../view/page/marks.js');
+const { sortMarks, windowsOf } = await import('../../view/page/marks.js');
 const { rowsOfTrack, kindOfDetection } = await import('../../view/page/why.js');
 
 const ARCSEC = Math.PI / 648000;
@@ -54,4 +54,13 @@ test('exposures without a detection are one row, newest first', () => {
   assert.deepEqual(rowsOfTrack([one(3, found), one(4), one(5), one(6, undefined, 'coasting'), one(7, found)]).map((row) => [row.first, row.last, row.time, Boolean(row.detection)]),
     [[7, 7, 7.5, true], [6, 6, 6.5, false], [4, 5, 4.5, false], [3, 3, 3.5, true]]);
   assert.equal(kindOfDetection(found), 'object, streak, blended');
+});
+
+test('a window is drawn once, around its pixels, with all that was expected there', () => {
+  const row = { window: 1, x0: 10, y0: 20, width: 4, height: 3, reason: 'target', track_id: 7, star_id: 0 };
+  const windows = windowsOf([{ ...row, window: 0, reason: 'track', track_id: 9 }, row, { ...row, reason: 'star', track_id: 0, star_id: 5 }]);
+  assert.equal(windows.length, 2);
+  assert.deepEqual(windows[1], { x: 11.5, y: 21, left: 9.5, top: 19.5, right: 13.5, bottom: 22.5, said: 'window: target (track 7), star 5' });
+  assert.equal(windows[0].said, 'window: track 9');
+  assert.deepEqual(sortMarks({ ...frame, windows: undefined }).windows, []);
 });

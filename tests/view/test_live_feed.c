@@ -34,6 +34,7 @@ typedef struct fixture {
     bst_truth *truth;
     bst_detections *detections;
     bst_tracks *tracks;
+    bst_regions_of_interest *regions;
 } fixture;
 
 static fixture f;
@@ -56,6 +57,10 @@ static void begin(void) {
     f.truth = calloc(1, sizeof *f.truth + sizeof f.truth->items[0]);
     f.detections = calloc(1, sizeof *f.detections + sizeof f.detections->items[0]);
     f.tracks = calloc(1, sizeof *f.tracks + sizeof f.tracks->items[0]);
+    f.regions = calloc(1, sizeof *f.regions + sizeof f.regions->items[0]);
+    f.regions->count = 1;
+    f.regions->items[0] = (bst_searched_window){
+        .window = {20, 26, 24, 16}, .reason = BST_REGION_TARGET, .track_id = 5};
     f.truth->q_cam_from_gcrf_mean = BST_QUAT_IDENTITY;
     f.truth->sun_m = (bst_vec3){1.5e11, 0.0, 0.0};
     f.truth->count = f.detections->count = f.tracks->count = 1;
@@ -74,6 +79,7 @@ static void end(void) {
     free(f.truth);
     free(f.detections);
     free(f.tracks);
+    free(f.regions);
 }
 
 static void send(const char *channel, int64_t id) {
@@ -88,6 +94,9 @@ static void send(const char *channel, int64_t id) {
     } else if (strcmp(channel, BST_CHANNEL_DETECTIONS) == 0) {
         f.detections->exposure_id = id;
         payload = f.detections;
+    } else if (strcmp(channel, BST_CHANNEL_REGIONS_OF_INTEREST) == 0) {
+        f.regions->exposure_id = id;
+        payload = f.regions;
     } else if (strcmp(channel, BST_CHANNEL_TRACKS) == 0) {
         f.tracks->exposure_id = id;
         payload = f.tracks;
@@ -126,6 +135,7 @@ static void a_frame_is_complete_with_its_tracks(void **state) {
         send(order ? BST_CHANNEL_TRUTH : BST_CHANNEL_FRAME, 7);
         send(BST_CHANNEL_DETECTIONS, 7);
         assert_null(get(0, &frame));
+        send(BST_CHANNEL_REGIONS_OF_INTEREST, 7);
         send(BST_CHANNEL_TRACKS, 7);
         cJSON *json = get(0, &frame);
         assert_non_null(json);
@@ -146,6 +156,13 @@ static void a_frame_is_complete_with_its_tracks(void **state) {
         expect_place(json, "truth", 9.75, 9.75);
         expect_place(json, "detections", 9.75, 9.75);
         expect_place(json, "tracks", 9.75, 9.75);
+        const cJSON *window = cJSON_GetObjectItem(json, "windows")->child;
+        bst_assert_close(number(window, "x0"), 5.0, 0.0);
+        bst_assert_close(number(window, "y0"), 3.0, 0.0);
+        bst_assert_close(number(window, "width"), 12.0, 0.0);
+        bst_assert_close(number(window, "height"), 8.0, 0.0);
+        assert_string_equal(cJSON_GetObjectItem(window, "reason")->valuestring, "target");
+        bst_assert_close(number(window, "track_id"), 5.0, 0.0);
         cJSON_Delete(json);
         assert_null(get(1, &frame)); /* none newer */
         json = get(0, &frame);

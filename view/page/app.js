@@ -18,6 +18,8 @@ const PLAY_MS = 90;
 /** State of a run in progress (bst_run_state_name), and time between two looks at its folder, ms. */
 const RUNNING = 'still running';
 const REFRESH_MS = 2000;
+/** Time between two looks at whether it is time, ms. */
+const LOOK_MS = 200;
 /** Share of the time that the looks may take at most: the run's tables grow. A live run's are read by the program that writes them. */
 const REFRESH_SHARE = 0.05, LIVE_SHARE = 0.02;
 
@@ -102,11 +104,16 @@ class App {
 
   inProgress() { return this.run.state === RUNNING || Boolean(this.live && !this.live.over); }
 
+  /** Time until the next question, ms: a live run that goes on is slowed by few of them; one that pauses shows at once what it has. @param {number} took ms, the last one */
+  refreshWait(took) {
+    const goesOn = this.live && !(this.live.state && this.live.state.paused);
+    return Math.max(REFRESH_MS, took / (goesOn ? LIVE_SHARE : REFRESH_SHARE));
+  }
+
   /** Asks for what was recorded since, while the run is in progress; stays at the end if it is there. */
   async follow() {
     for (let took = 0; this.inProgress();) {
-      const wait = Math.max(REFRESH_MS, took / (this.live ? LIVE_SHARE : REFRESH_SHARE));
-      await new Promise((done) => { setTimeout(done, wait); });
+      for (const end = performance.now(); performance.now() - end < this.refreshWait(took);) await new Promise((done) => { setTimeout(done, LOOK_MS); });
       const begin = performance.now();
       try {
         const { sensor } = this, run = await getJson('refresh'), frames = await getNumbers('frames', { sensor });
@@ -123,13 +130,28 @@ class App {
         this.setFrames(frames);
         this.showEvents(events);
         this.plots.extend(run.sensors[sensor].panels, modes, this.events, this.lastTime(modes));
-        if (atEnd && this.count && !(this.live && this.live.newest)) await this.goTo(this.count - 1);
+        if (this.live && this.live.newest) await this.showMissed();
+        else if (atEnd && this.count) await this.goTo(this.count - 1);
         await this.plots.reloading;
       } catch (error) {
         this.showProblems([`The run cannot be followed: ${error.message}`]);
       }
       took = performance.now() - begin;
     }
+  }
+
+  /** A live run that pauses may have gone on while the page could not ask: the last frame with tracks, from the record. */
+  async showMissed() {
+    const frame = this.count - 2, { live } = this; // the last one may still be processed
+    if (frame < 0 || !live.state.paused || live.shownExposure() >= this.frames[frame * NUMBERS]) return;
+    const { image, details, why } = await this.load(frame);
+    if (!live.newest || !live.state.paused) return;
+    this.current = this.wanted = frame;
+    this.frameView.getPart = image ? (wanted) => getPixels(this.sensor, frame, undefined, undefined, wanted) : null;
+    this.frameView.show(image, details, why);
+    this.describePosition(details);
+    this.plots.setCursor(this.timeOf(frame));
+    live.missed = details.exposure_id;
   }
 
   /** @param {Float64Array} frames numbers of all frames */

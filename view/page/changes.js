@@ -35,6 +35,9 @@ const BODY_LAWS = ['inertial', 'nadir', 'sun', 'target', 'free'];
 /** True for a module of the program itself, whose keys are known. */
 const known = (scenario, pointer, types) => { const node = valueAt(scenario, pointer); return Boolean(node) && !node.plugin && types.includes(node.type); };
 const control = (scenario, sensor) => known(scenario, `${sensor}/modules/control`, ['standard']);
+/** Stacks are of whole frames, by the detector of the program. */
+const stacks = (scenario, sensor) => known(scenario, `${sensor}/modules/imgproc`, ['standard'])
+  && !['track_windows', 'detector/plugin', 'extended/enabled'].some((key) => valueAt(scenario, `${sensor}/modules/imgproc/${key}`));
 const onImageError = (scenario, sensor) => ['pi', 'pid', 'lead_lag'].includes(valueAt(scenario, `${sensor}/modules/control/compensator/type`));
 
 /** @type {Field[]} */
@@ -50,6 +53,7 @@ const FIELDS = [
   { group: 'Sky', title: 'Faintest star drawn', unit: 'V', fallback: 16, pointer: (scenario, sensor) => (known(scenario, `${sensor}/modules/scenegen`, ['opencl'])
     ? `${sensor}/modules/scenegen/star_limit_v_mag` : '') },
   { group: 'Sky', title: 'Faintest statistical star', unit: 'V', fallback: 16, pointer: (scenario) => (valueAt(scenario, '/world/faint_stars') === 'statistical' ? '/world/faint_limit_v_mag' : '') },
+  { group: 'Image processing', title: 'Frames in a stack (0: none, or a multiple of 4)', fallback: 0, pointer: (scenario, sensor) => (stacks(scenario, sensor) ? `${sensor}/modules/imgproc/stack/frames` : '') },
   { group: 'Platform and loop', title: 'Slow jitter', unit: 'px', fallback: 0, pointer: (_, sensor) => `${sensor}/modules/gimbal/platform/jitter_low_px_rms` },
   { group: 'Platform and loop', title: 'Fast jitter', unit: 'px', fallback: 0, pointer: (_, sensor) => `${sensor}/modules/gimbal/platform/jitter_high_px_rms` },
   { group: 'Platform and loop', title: 'Gain of the compensator', unit: 'factor', fallback: 1, pointer: (scenario, sensor) => (control(scenario, sensor) && onImageError(scenario, sensor)

@@ -2,6 +2,9 @@
 
 /** A sample, or the extremes of the samples of a column; NaN: a gap. @typedef {{time: number, low: number, high: number}} Extent */
 
+/** Colours of the lines of a plot, `--line-0` to `--line-5` of style.css. */
+export const LINE_COLOURS = 6;
+
 /** Marks of an axis: round numbers, about `count` of them. */
 export function ticksOf(from, to, count) {
   const rough = (to - from) / Math.max(1, count);

@@ -1,6 +1,6 @@
 // Two runs beside each other or one over the other: frames at the same time, plots, and the difference of their figures.
 import { addStyle, getJson, getNumbers, getPixels, post } from './api.js';
-import { drawLine, prepare, shortNumber, ticksOf } from './chart.js';
+import { drawLine, LINE_COLOURS, prepare, shortNumber, ticksOf } from './chart.js';
 import { make } from './editor_form.js';
 import { makePainter, originOf } from './frame_gl.js';
 import { WHOLE_PX } from './frame_parts.js';
@@ -296,7 +296,7 @@ export class Comparison {
     }
     this.range = range;
     this.panels = panels;
-    const swatch = (k, more) => make('i', { className: `swatch swatch-${k % 3} ${more}` });
+    const swatch = (k, more) => make('i', { className: `swatch swatch-${k % LINE_COLOURS} ${more}` });
     this.plots.replaceChildren(...panels.map(({ info, canvas }) => {
       const title = make('h2', { textContent: info.title + (info.unit ? ` [${info.unit}]` : '') });
       const key = make('span', { className: 'hint compare-key' }, ...info.lines.map((name, k) => make('span', {}, `${name}: A `, swatch(k, ''), ' B ', swatch(k, 'broken'))));
@@ -335,7 +335,7 @@ export class Comparison {
     }
     context.textAlign = 'center';
     for (const tick of ticksOf(from, to, Math.max(2, width / 110))) context.fillText(shortNumber(tick), toX(tick), height - 4);
-    lines.forEach((own, side) => own.forEach((points, k) => drawLine(context, points, toX, toY, { colour: colour(`--line-${k % 3}`), log, dash: side ? [5, 4] : [], dots: false })));
+    lines.forEach((own, side) => own.forEach((points, k) => drawLine(context, points, toX, toY, { colour: colour(`--line-${k % LINE_COLOURS}`), log, dash: side ? [5, 4] : [], dots: false })));
     const x = Math.round(toX(this.app.timeOf(Math.max(0, this.app.current)))) + 0.5;
     context.strokeStyle = colour('--cursor');
     context.lineWidth = 1;

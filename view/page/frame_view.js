@@ -58,6 +58,7 @@ export class FrameView {
   reset() {
     this.limits = null;
     this.view.fitted = true;
+    element('show-windows').hidden = true; // until a frame has them
   }
 
   /** @param {import('./frame_parts.js').Image | null} image @param {any} details @param {string} why no pixels
@@ -84,6 +85,7 @@ export class FrameView {
     for (const kind of KINDS) {
       setText(element(`count-${kind.name}`), this.sorted ? String(this.sorted[kind.name].length) : '');
     }
+    if (details && details.windows) element('show-windows').hidden = false;
     if (counted) this.drawHistogram();
     this.redraw();
   }
@@ -391,7 +393,7 @@ export class FrameView {
         const distance = Math.hypot(mark.x - place.x, mark.y - place.y);
         if (distance <= best) {
           best = distance;
-          text = `${mark.text || kind.title.toLowerCase().replace(/s$/, '')}` +
+          text = `${mark.text || mark.said || kind.title.toLowerCase().replace(/s$/, '')}` +
             (Number.isFinite(mark.v_mag) ? `, V ${mark.v_mag.toFixed(2)}` : '') +
             (Number.isFinite(mark.snr) ? `, SNR ${NUMBER.format(mark.snr)}` : '') +
             (kind.name === 'detections' && mark.label ? ` (${mark.label})` : '') +
@@ -435,7 +437,7 @@ export class FrameView {
       const context = sample.getContext('2d');
       context.strokeStyle = kind.colour;
       context.lineWidth = 4;
-      drawShape(context, kind.shape, 18, 18, kind.shape === 'square' ? 10 : 12);
+      drawShape(context, kind.shape, 18, 18, ['square', 'window'].includes(kind.shape) ? 10 : 12);
       count.className = 'count';
       count.id = `count-${kind.name}`;
       button.append(sample, kind.title, count);

@@ -13,6 +13,8 @@ const RATES = [0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 0];
 const QUEUE_MOST = 64, COMMAND_BYTES = 8000;
 /** Time that a command which was not taken is named, ms. */
 const REFUSAL_MS = 6000;
+/** Time between two questions for names, ms. */
+const NAMES_MS = 1000;
 /** Time before another attempt to connect, ms. */
 const RETRY_MS = 1000;
 
@@ -28,6 +30,8 @@ export class Live {
     this.sequence = 0;
     this.newest = true; // the page shows the newest frame
     this.trail = [];
+    this.missed = -1; // exposure that was shown from the record
+    this.askedNames = 0; // when names of objects were asked for
     this.queue = []; // commands that wait until the one before is obeyed
     this.sentAt = -1; // commands that the run had obeyed when the last one was sent; -1: none is awaited
     this.refusal = { text: '', until: 0 }; // of the last command that was not taken
@@ -149,11 +153,13 @@ export class Live {
     const again = this.trail.length > 0 && details.exposure_id === this.trail[this.trail.length - 1].id; // with finer pixels
     if (again) this.trail.pop();
     if (this.trail.length && details.exposure_id <= this.trail[this.trail.length - 1].id) this.trail = [];
+    this.missed = -1;
     const earlier = this.trail.flatMap((one) => one.tracks);
     this.trail.push({ id: details.exposure_id, tracks: details.tracks.map((track) => ({ ...track, now: false })) });
     if (this.trail.length > TRAIL_EXPOSURES) this.trail.shift();
     if (!sensor || !this.newest) return;
     app.frameView.getPart = null; // it comes with the next answer
+    this.needNames(details);
     const target = Object.entries(app.names).find(([, name]) => name === sensor.target);
     const all = { ...details, names: app.names, target: target ? Number(target[0]) : -1, tracks: details.tracks.concat(earlier) };
     app.frameView.show(pixels, all, details.dropped ? 'This frame was dropped.' : 'This run has no pixels.', !this.state.paused);
@@ -162,6 +168,17 @@ export class Live {
     app.plots.follow(details.time_s);
     if (!again) this.shown++;
     document.dispatchEvent(new CustomEvent('liveframe', { detail: details.exposure_id }));
+  }
+
+  /** Number of the newest exposure that the page has shown; -1: none. */
+  shownExposure() { return Math.max(this.missed, ...this.trail.slice(-1).map(({ id }) => id), -1); }
+
+  /** Asks for the names of objects if one has none yet: a run has recorded them some time after its first frames. @param {any} details */
+  needNames(details) {
+    const { app } = this, unknown = details.truth.some((mark) => mark.kind !== 'star' && !(mark.id in app.names));
+    if (!unknown || performance.now() - this.askedNames < NAMES_MS) return;
+    this.askedNames = performance.now();
+    getJson('names').then(({ names }) => { app.names = names; }).catch(() => {});
   }
 
   // ---------------------------------------------------------------- controls

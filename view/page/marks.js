@@ -4,6 +4,7 @@ import { compassOf, scaleOf, skyToPixel } from './wcs.js';
 
 /** Kinds in the order in which they are drawn. Colours: Okabe and Ito (2008). */
 export const KINDS = [
+  { name: 'windows', title: 'Windows', colour: '#cfb0ff', shape: 'window', shown: true },
   { name: 'stars', title: 'True stars', colour: '#b8c4cf', shape: 'plus', shown: false },
   { name: 'identified', title: 'Stars', colour: '#2fc79b', shape: 'circle', shown: true },
   { name: 'detections', title: 'Detections', colour: '#f0e442', shape: 'circle', shown: true },
@@ -16,9 +17,29 @@ export const KINDS = [
 /** Ellipses contain 98.9 % of the errors: 3 sigma in two dimensions. */
 const SIGMAS = 3;
 
+/**
+ * Windows that image processing searched, each once with what was expected there. Edges are those of pixels.
+ * @param {any[]} rows one for each reason of a window, in pixels of the frame
+ */
+export function windowsOf(rows) {
+  const windows = new Map();
+  for (const row of rows) {
+    const what = row.reason === 'star' ? `star ${row.star_id}` : row.reason === 'target' ? `target (track ${row.track_id})` : `track ${row.track_id}`;
+    const held = windows.get(row.window);
+    if (held) held.said += `, ${what}`;
+    else {
+      windows.set(row.window, {
+        x: row.x0 + (row.width - 1) / 2, y: row.y0 + (row.height - 1) / 2,
+        left: row.x0 - 0.5, top: row.y0 - 0.5, right: row.x0 + row.width - 0.5, bottom: row.y0 + row.height - 0.5, said: `window: ${what}`,
+      });
+    }
+  }
+  return [...windows.keys()].sort((a, b) => a - b).map((number) => windows.get(number));
+}
+
 /** Sorts what the server sent about a frame by kind. */
 export function sortMarks(frame) {
-  const sorted = { stars: [], identified: [], detections: [], objects: [], target: [], predicted: [], tracks: [], trail: [] };
+  const sorted = { windows: windowsOf(frame.windows || []), stars: [], identified: [], detections: [], objects: [], target: [], predicted: [], tracks: [], trail: [] };
   for (const mark of frame.truth) {
     if (mark.kind === 'star') sorted.stars.push(mark);
     else {
@@ -42,6 +63,10 @@ export function drawShape(context, shape, x, y, r) {
   else if (shape === 'square') context.rect(x - r, y - r, 2 * r, 2 * r);
   else if (shape === 'plus') {
     context.moveTo(x - r, y); context.lineTo(x + r, y); context.moveTo(x, y - r); context.lineTo(x, y + r);
+  } else if (shape === 'window') { // its corners
+    for (const [sx, sy] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
+      context.moveTo(x + sx * r, y + sy * r / 3); context.lineTo(x + sx * r, y + sy * r); context.lineTo(x + sx * r / 3, y + sy * r);
+    }
   } else if (shape === 'cross') {
     context.moveTo(x - r, y - r); context.lineTo(x + r, y + r); context.moveTo(x - r, y + r); context.lineTo(x + r, y - r);
   } else {
@@ -57,6 +82,18 @@ export function ellipseOf(mark) {
   const mean = (mark.xx + mark.yy) / 2, half = (mark.xx - mark.yy) / 2, root = Math.hypot(half, mark.xy);
   if (mean - root < 0) return null;
   return { major: Math.sqrt(mean + root), minor: Math.sqrt(mean - root), angle: 0.5 * Math.atan2(2 * mark.xy, mark.xx - mark.yy) };
+}
+
+/** Windows have their own size: the middle of the line is on the edge of their pixels. */
+function drawWindows(context, windows, view) {
+  context.strokeStyle = KINDS[0].colour;
+  context.lineWidth = 1;
+  context.setLineDash([6, 3]);
+  for (const { left, top, right, bottom } of windows) {
+    const a = view.toScreen(left, top), b = view.toScreen(right, bottom);
+    context.strokeRect(a.x, a.y, b.x - a.x, b.y - a.y);
+  }
+  context.setLineDash([]);
 }
 
 function drawText(context, text, x, y, colour) {
@@ -107,9 +144,10 @@ export function drawMarks(context, sorted, wcs, view) {
   const size = Math.min(14, Math.max(6, 1.6 * view.scale));
   context.font = '12px system-ui, sans-serif';
   context.lineJoin = 'round';
+  if (view.shown.windows) drawWindows(context, sorted.windows, view);
   if (view.shown.tracks) drawTrails(context, sorted, wcs, view);
   for (const kind of KINDS) {
-    if (!view.shown[kind.name]) continue;
+    if (!view.shown[kind.name] || kind.shape === 'window') continue;
     for (const mark of sorted[kind.name]) {
       if (!Number.isFinite(mark.x) || !Number.isFinite(mark.y)) continue;
       const at = view.toScreen(mark.x, mark.y);

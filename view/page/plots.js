@@ -1,6 +1,6 @@
 // Plots over time: modes as bands, one panel for each quantity, a common axis and cursor.
 import { getNumbers } from './api.js';
-import { decadesOf, drawCursor, drawLine, listenToChart, prepare, shortNumber, textsOf, ticksOf, valueAt } from './chart.js';
+import { decadesOf, drawCursor, drawLine, LINE_COLOURS, listenToChart, prepare, shortNumber, textsOf, ticksOf, valueAt } from './chart.js';
 import { setText } from './text.js';
 
 const LEFT = 58, RIGHT = 10, TOP = 8, BOTTOM = 16;
@@ -40,7 +40,7 @@ class Panel {
     this.values = info.lines.map((name, k) => {
       const value = document.createElement('span'), swatch = document.createElement('i'), number = document.createElement('b');
       value.className = 'value';
-      swatch.className = `swatch swatch-${k % 3}`;
+      swatch.className = `swatch swatch-${k % LINE_COLOURS}`;
       value.append(swatch, `${name} `, number);
       return { value, number };
     });
@@ -63,11 +63,13 @@ class Panel {
 
   /** Stops of axes in words: they are mostly outside of what the plot shows. */
   stopTexts() {
-    const stops = (this.info.stops || []).map(({ line, low, high }) => `${this.info.lines[line]} ${low === -high ? `±${shortNumber(high)}` : `${shortNumber(low)} to ${shortNumber(high)}`}`);
+    const range = ({ low, high }) => (low === -high ? `±${shortNumber(high)}` : `${shortNumber(low)} to ${shortNumber(high)}`);
+    const all = this.info.stops || [], same = all.length === this.info.lines.length && all.length > 2 && all.every((stop) => range(stop) === range(all[0]));
+    const stops = same ? [range(all[0])] : all.map((stop) => `${this.info.lines[stop.line]} ${range(stop)}`);
     if (stops.length === 0) return [];
     const text = document.createElement('span');
     text.className = 'value';
-    text.textContent = `stops: ${stops.join(', ')}`;
+    text.textContent = `${this.info.limit_word || 'stops'}: ${stops.join(', ')}`;
     return [text];
   }
 
@@ -122,7 +124,7 @@ class Panel {
     context.save();
     context.beginPath(); context.rect(LEFT, 0, width - LEFT - RIGHT, height); context.clip();
     this.drawStops(context, extent, toY, colour);
-    this.lines.forEach((points, k) => drawLine(context, points, (time) => plots.toX(time), toY, { colour: colour(`--line-${k % 3}`), log: this.log }));
+    this.lines.forEach((points, k) => drawLine(context, points, (time) => plots.toX(time), toY, { colour: colour(`--line-${k % LINE_COLOURS}`), log: this.log }));
     context.restore();
     plots.drawCursor(context, 0, bottom, colour('--cursor'));
   }
@@ -131,7 +133,7 @@ class Panel {
   drawStops(context, extent, toY, colour) {
     context.setLineDash([6, 4]);
     for (const { line, low, high } of this.info.stops || []) {
-      context.strokeStyle = colour(`--line-${line % 3}`);
+      context.strokeStyle = colour(`--line-${line % LINE_COLOURS}`);
       for (const value of [low, high]) {
         if (this.log || value < extent.low || value > extent.high) continue;
         context.beginPath(); context.moveTo(0, toY(value)); context.lineTo(this.canvas.clientWidth, toY(value)); context.stroke();

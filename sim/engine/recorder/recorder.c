@@ -120,6 +120,8 @@ static const channel_rows channels[] = {
     {BST_CHANNEL_TRACKS, BST_TABLE_TRACKS, bst_recorder_track_rows},
     {BST_CHANNEL_TRACKS_SMOOTHED, BST_TABLE_TRACKS_SMOOTHED, bst_recorder_smoothed_rows},
     {BST_CHANNEL_TRACK_IDENTITIES, BST_TABLE_TRACK_IDENTITIES, bst_recorder_identity_rows},
+    {BST_CHANNEL_REGIONS_OF_INTEREST, BST_TABLE_REGIONS_OF_INTEREST, bst_recorder_region_rows},
+    {BST_CHANNEL_WHEEL_STATUS, BST_TABLE_WHEELS, bst_recorder_wheel_rows},
     {BST_CHANNEL_LOS_COMMAND, BST_TABLE_LOS_COMMANDS, bst_recorder_los_command_rows},
     {BST_CHANNEL_SENSOR_COMMAND, BST_TABLE_SENSOR_COMMANDS, bst_recorder_sensor_command_rows},
     {BST_CHANNEL_POINTING_TELEMETRY, BST_TABLE_POINTING, bst_recorder_pointing_rows},
@@ -187,6 +189,9 @@ static bst_status fill(bst_ctx *ctx, bst_recorder *recorder, const bst_recorder_
         s->camera = *from->camera;
         s->has_truth = from->has_truth;
         s->last_los = s->last_pointing = s->last_mount = s->last_nav = s->last_control = -1;
+        s->last_wheels = -1;
+        recorder->has_regions = recorder->has_regions || from->has_regions;
+        recorder->has_wheels = recorder->has_wheels || from->has_wheels;
         s->last_mode = -1;
         s->shown.id = -1;
         s->last_target = -1;

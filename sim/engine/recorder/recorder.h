@@ -58,8 +58,10 @@ typedef struct bst_recorder_sensor {
     const char *observer, *sensor;
     const char *target;       /* FITS OBJECT; may be NULL */
     const bst_camera *camera; /* the true camera */
-    bool has_truth; /* each frame has a truth message in the same tick or earlier; the frame waits
-                       for it */
+    bool has_truth;   /* each frame has a truth message in the same tick or earlier; the frame waits
+                         for it */
+    bool has_regions; /* image processing may search windows of its frames */
+    bool has_wheels;  /* its spacecraft has reaction wheels */
 } bst_recorder_sensor;
 
 typedef struct bst_recorder_info {
@@ -92,6 +94,9 @@ bst_status bst_recorder_archive(bst_ctx *ctx, bst_recorder *recorder,
 const char *bst_recorder_label_name(int32_t label);
 /* Word for a bst_track_status ("confirmed") in table tracks. Never NULL. */
 const char *bst_recorder_track_status_name(int32_t status);
+
+/* Word for a bst_region_reason ("target") in table regions_of_interest. Never NULL. */
+const char *bst_recorder_region_reason_name(int32_t reason);
 
 /* Index of a sensor in info->sensors, -1 when it is not recorded. */
 int bst_recorder_find(const bst_recorder *recorder, const char *observer, const char *sensor);

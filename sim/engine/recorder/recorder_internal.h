@@ -32,6 +32,8 @@ typedef enum bst_recorder_table {
     BST_TABLE_CAMERA_CALIBRATION,
     BST_TABLE_TRACKS_SMOOTHED,
     BST_TABLE_TRACK_IDENTITIES,
+    BST_TABLE_REGIONS_OF_INTEREST,
+    BST_TABLE_WHEELS,
     BST_TABLE_COUNT
 } bst_recorder_table;
 
@@ -62,7 +64,7 @@ typedef struct bst_recorder_state {
     bst_recorder_truth_head heads[BST_TRUTH_HEADS];
     int next_head;
     /* the last recorded grid point of telemetry, for each of these tables */
-    int64_t last_los, last_pointing, last_mount, last_nav, last_control;
+    int64_t last_los, last_pointing, last_mount, last_nav, last_control, last_wheels;
     int32_t last_mode;
     int64_t last_target;
 } bst_recorder_state;
@@ -72,6 +74,7 @@ struct bst_recorder {
     bst_recorder_config config;
     bst_time epoch;
     int64_t tick_rate_hz, begin_tick;
+    bool has_regions, has_wheels; /* of any sensor */
     char program[64];
     const struct bst_world *world;         /* NULL: objects have no names */
     bool *object_seen;                     /* [objects of the world] */
@@ -148,5 +151,7 @@ BST_RECORDER_ROWS(bst_recorder_mount_rows);
 BST_RECORDER_ROWS(bst_recorder_nav_rows);
 BST_RECORDER_ROWS(bst_recorder_control_rows);
 BST_RECORDER_ROWS(bst_recorder_task_rows);
+BST_RECORDER_ROWS(bst_recorder_region_rows);
+BST_RECORDER_ROWS(bst_recorder_wheel_rows);
 
 #endif

@@ -70,6 +70,7 @@ static bst_status archive_sensor(bst_ctx *ctx, bst_recorder *recorder, int senso
     BST_ARCHIVE(archive, s->last_mount);
     BST_ARCHIVE(archive, s->last_nav);
     BST_ARCHIVE(archive, s->last_control);
+    BST_ARCHIVE(archive, s->last_wheels);
     BST_ARCHIVE(archive, s->last_mode);
     BST_ARCHIVE(archive, s->last_target);
     return BST_OK;

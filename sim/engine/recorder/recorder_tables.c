@@ -115,7 +115,8 @@ static const bst_io_column truth_columns[] = {
         "number of the source in its exposure, from 1: its pixels in segmentation.fits"),
     TEXT("kind", "star or object"),
     INT("id", "",
-        "star: identity in the catalogue, from 2147483648 on statistical; object: index in the scenario"),
+        "star: identity in the catalogue, from 2147483648 on statistical; object: index in the "
+        "scenario"),
     INT("norad", "", "object: catalogue number, else 0"),
     INT("in_field", "", "1: the chief ray's mean place is on the window"),
     INT("occulted", "", "1: behind the Earth, a star also behind a satellite with a shape"),
@@ -400,6 +401,34 @@ static const bst_io_column extended_columns[] = {
     REAL("range_sigma_m", "m", "its standard deviation"),
 };
 
+static const bst_io_column region_columns[] = {
+    SENSOR,
+    EXPOSURE,
+    MID,
+    INT("window", "",
+        "number of the window in its frame, from 0; windows that touched are one, with a row for "
+        "each reason"),
+    INT("x0_px", "px", "first column of the window on the whole sensor"),
+    INT("y0_px", "px", "first row"),
+    INT("width_px", "px", "of the window, in pixels of the sensor"),
+    INT("height_px", "px", "of the window, in pixels of the sensor"),
+    TEXT("reason", "target, track or star: what was expected there"),
+    INT("track_id", "", "as in tracks; 0: a star"),
+    INT("star_id", "", "identity in the star catalogue, 0: a track"),
+    REAL("x_px", "px", "column where it was expected, mid exposure, whole sensor"),
+    REAL("y_px", "px", "row where it was expected"),
+};
+static const bst_io_column wheel_columns[] = {
+    SENSOR,
+    TICK,
+    TIME,
+    INT("wheel", "", "index in the configuration, from 0"),
+    REAL("speed_rpm", "rpm", "relative to the body"),
+    REAL("speed_limit_rpm", "rpm", "in both directions"),
+    REAL("motor_nm", "N m", "commanded torque of the motor on the wheel"),
+    REAL("motor_limit_nm", "N m", "in both directions; 0: the wheel has failed"),
+};
+
 static const bst_io_column part_columns[] = {
     INT("number", "", "value of its pixels in parts.fits, from 1"),
     INT("id", "", "object: index in the scenario"),
@@ -483,6 +512,10 @@ static const table_spec specs[BST_TABLE_COUNT] = {
     [BST_TABLE_TRACKS_SMOOTHED] =
         SPEC("tracks_smoothed", smoothed_columns,
              "Tracks of each frame given later frames too (tracker, smoothing_lag_frames)."),
+    [BST_TABLE_REGIONS_OF_INTEREST] =
+        SPEC("regions_of_interest", region_columns,
+             "Windows of a frame that image processing searched; none: the whole frame."),
+    [BST_TABLE_WHEELS] = SPEC("wheels", wheel_columns, "Reaction wheels of the spacecraft."),
     [BST_TABLE_PARTS] = SPEC("parts", part_columns, "Parts of the objects with a shape."),
 };
 
@@ -526,6 +559,10 @@ static bool wanted(const bst_recorder *recorder, bst_recorder_table table) {
         case BST_TABLE_EVENTS:
         case BST_TABLE_TASKS:
             return config->events;
+        case BST_TABLE_REGIONS_OF_INTEREST:
+            return config->detections && recorder->has_regions;
+        case BST_TABLE_WHEELS:
+            return config->telemetry_hz > 0.0 && recorder->has_wheels;
         case BST_TABLE_SHAPES:
             return config->truth && has_shapes(recorder);
         case BST_TABLE_EXTENDED:
@@ -539,7 +576,11 @@ static bool wanted(const bst_recorder *recorder, bst_recorder_table table) {
 
 bst_status bst_recorder_make_tables(bst_ctx *ctx, bst_recorder *recorder) {
     for (int i = 0; i < BST_TABLE_COUNT; i++) {
-        if (wanted(recorder, (bst_recorder_table)i)) {
+        /* a run that goes on keeps the tables that it had: a change of the scenario may need fewer
+         */
+        if (wanted(recorder, (bst_recorder_table)i) ||
+            (bst_run_is_reopened(recorder->run) &&
+             bst_run_has_table(recorder->run, specs[i].name))) {
             BST_TRY(bst_io_table_create(ctx, recorder->run, specs[i].name, specs[i].doc,
                                         specs[i].columns, specs[i].count, &recorder->tables[i]));
         }
