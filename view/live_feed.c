@@ -10,13 +10,12 @@
 #include "sim/core/json_number.h"
 #include "sim/core/wall_clock.h"
 #include "view/live_marks.h"
+#include "view/live_pace.h"
 
 /* Exposures of a sensor that wait for their detections and tracks. */
 enum { WAITING = 4 };
 /* A sensor counts as watched for so long after a request, s. */
 static const double WATCHED_S = 1.0;
-/* Least time between two frames that are copied, s: screens show no more. */
-static const double INTERVAL_S = 0.02;
 
 /* An exposure that is not complete. */
 typedef struct waiting_exposure {
@@ -33,7 +32,10 @@ typedef struct waiting_exposure {
 
 typedef struct feed_sensor {
     bst_camera camera;
-    double watched_until, copied_at; /* wall seconds */
+    double watched_until; /* wall seconds */
+    bst_view_pace pace;
+    int64_t asked_id; /* exposure about which `due` was asked; -1: none */
+    bool due;         /* it is shown */
     waiting_exposure waiting[WAITING];
     int64_t sequence;           /* of `ready`; 0: none yet */
     bst_view_live_frame *ready; /* NULL: none */
@@ -83,6 +85,9 @@ bst_status bst_view_feed_create(bst_ctx *ctx, const bst_scenario *scenario, bst_
     feed->epoch = scenario->epoch;
     feed->sensors = count;
     take_cameras(feed, scenario);
+    for (int i = 0; i < count; i++) {
+        feed->sensor[i].asked_id = -1;
+    }
     *out = feed;
     return BST_OK;
 }
@@ -144,11 +149,23 @@ static waiting_exposure *find(feed_sensor *s, int64_t id) {
     return NULL;
 }
 
+/* True if an exposure of which there is no message yet is shown: asked about once, as a message
+ * that comes later makes no whole frame. Their numbers rise. */
+static bool is_due(const bst_view_feed *feed, feed_sensor *s, int64_t id) {
+    if (id > s->asked_id) {
+        const double now = bst_wall_seconds();
+        s->asked_id = id;
+        bst_view_pace_adapt(&s->pace, now, bst_view_read_processors);
+        s->due = bst_view_pace_take(&s->pace, now);
+    }
+    return feed->every || (s->due && id == s->asked_id);
+}
+
 /* The place of an exposure, which is new if there is none; in place of the oldest one if there is
- * no room. NULL: the last one was copied just before. */
+ * no room. NULL: it is not shown. */
 static waiting_exposure *place_of(bst_view_feed *feed, feed_sensor *s, int64_t id) {
     waiting_exposure *place = find(s, id);
-    if (place || (!feed->every && bst_wall_seconds() - s->copied_at < INTERVAL_S)) {
+    if (place || !is_due(feed, s, id)) {
         return place;
     }
     for (int k = 0; k < WAITING; k++) {
@@ -161,7 +178,6 @@ static waiting_exposure *place_of(bst_view_feed *feed, feed_sensor *s, int64_t i
         publish(feed, s, place);
     }
     *place = (waiting_exposure){.used = true, .id = id};
-    s->copied_at = bst_wall_seconds();
     return place;
 }
 
@@ -352,6 +368,7 @@ void bst_view_feed_restart(bst_view_feed *feed, const bst_scenario *scenario) {
         for (int k = 0; k < WAITING; k++) {
             empty(&feed->sensor[i].waiting[k]);
         }
+        feed->sensor[i].asked_id = -1;
     }
     pthread_mutex_unlock(&feed->lock);
 }

@@ -4,22 +4,31 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
 
 #include "sim/core/json_member.h"
 #include "view/large_stack.h"
 #include "view/pixel_bins.h"
+#include "view/socket_frames.h"
 
-/* Longest message of a client, bytes. */
-enum { MESSAGE_BYTES = 8192 };
 /* Clients at the same time: each has a thread of the server. */
 enum { CLIENTS_MOST = 48 };
 /* Largest bins of pixels that a client may ask for. */
 enum { BINNING_MOST = 64 };
 /* Longest time that an answer waits for a newer frame, s. Commands of the client wait as long. */
 static const double WAIT_S = 0.1;
+/* Longest times that a client lets wait, s: for its first request, for a further one, for the rest
+ * of one, and to take an answer, with the least bytes/s beyond. A page that is in the background
+ * asks once a minute. */
+static const double FIRST_S = 5.0;
+static const double IDLE_S = 90.0;
+static const double REST_S = 1.5;
+static const double SEND_S = 5.0;
+static const double LEAST_RATE = 32768.0;
 
 struct bst_view_socket {
     bst_view_live *live;
+    bool stopped;                           /* the server ends; atomic */
     pthread_mutex_t lock;                   /* of all below */
     const struct mg_connection *controller; /* NULL: none */
     int clients;
@@ -33,14 +42,6 @@ static int on_connect(const struct mg_connection *peer, void *user) {
     socket->clients += room;
     pthread_mutex_unlock(&socket->lock);
     return room ? 0 : 1;
-}
-
-/* The first client is the controller. */
-static void on_ready(struct mg_connection *peer, void *user) {
-    bst_view_socket *socket = user;
-    pthread_mutex_lock(&socket->lock);
-    socket->controller = socket->controller ? socket->controller : peer;
-    pthread_mutex_unlock(&socket->lock);
 }
 
 static void on_close(const struct mg_connection *peer, void *user) {
@@ -132,7 +133,7 @@ static char *make_answer(cJSON *node, const bst_view_live_frame *frame, const se
 }
 
 /* Sends what a client asks for. False: it is gone, or takes nothing. */
-static bool answer(bst_view_socket *socket, struct mg_connection *peer, const cJSON *asked,
+static bool answer(bst_view_socket *socket, bst_view_peer *peer, const cJSON *asked,
                    bool controller, const char *problem) {
     const cJSON *sensor = bst_json_member(asked, "sensor"),
                 *after = bst_json_member(asked, "after");
@@ -156,60 +157,84 @@ static bool answer(bst_view_socket *socket, struct mg_connection *peer, const cJ
     size_t bytes;
     char *message = make_answer(node, frame, &sent, &bytes);
     bst_view_feed_release(frame);
-    bool taken =
-        message && mg_websocket_write(peer, MG_WEBSOCKET_OPCODE_BINARY, message, bytes) > 0;
+    const bool taken = message && bst_view_send_frame(peer, BST_VIEW_BINARY, message, bytes);
     free(message);
     cJSON_Delete(node);
     return taken;
 }
 
+/* A client: the library's connection, and what is read from it. */
+typedef struct client {
+    bst_view_socket *socket;
+    const struct mg_connection *connection;
+    bst_view_peer peer;
+} client;
+
 /* A text of a client: {"sensor": N, "after": SEQUENCE, "take": true, "binning": N, "part": {x,
- * y, width, height}, "command": {...}}; all may be left out. Anything else ends its connection. */
-static int on_text(bst_view_socket *socket, struct mg_connection *peer, const char *data,
-                   size_t bytes) {
+ * y, width, height}, "command": {...}}; all may be left out. False: it is something else, or its
+ * answer is not taken, and the connection ends. */
+static bool on_text(client *c, const char *data, size_t bytes) {
     cJSON *asked = cJSON_ParseWithLength(data, bytes);
     const char *problem = NULL;
     bool kept = cJSON_IsObject(asked);
     if (kept) {
         const bool controller =
-            controls(socket, peer, cJSON_IsTrue(bst_json_member(asked, "take")));
+            controls(c->socket, c->connection, cJSON_IsTrue(bst_json_member(asked, "take")));
         const cJSON *command = bst_json_member(asked, "command");
         if (command && !controller) {
             problem = "another page controls the run";
-        } else if (command && !bst_view_live_command(socket->live, command)) {
+        } else if (command && !bst_view_live_command(c->socket->live, command)) {
             problem = "this is no command of a live run, or too many are waiting";
         }
-        kept = answer(socket, peer, asked, controller, problem);
+        kept = answer(c->socket, &c->peer, asked, controller, problem);
     }
     cJSON_Delete(asked);
     return kept;
 }
 
-/* A message that a thread with a larger stack takes. */
-typedef struct message {
-    bst_view_socket *socket;
-    struct mg_connection *peer;
-    const char *data;
+/* Answers a client until its connection ends. JSON that is deeply nested needs the larger stack. */
+static void serve(void *user) {
+    client *c = user;
+    const char *text;
     size_t bytes;
-    int kept;
-} message;
-
-static void take_message(void *user) {
-    message *m = user;
-    m->kept = on_text(m->socket, m->peer, m->data, m->bytes);
+    while (bst_view_next_text(&c->peer, &text, &bytes) && on_text(c, text, bytes)) {
+    }
 }
 
+/* Takes a connection over from the library after the handshake, and gives it back when it is shut.
+ * The first client is the controller. */
+static void on_ready(struct mg_connection *connection, void *user) {
+    bst_view_socket *socket = user;
+    const struct mg_request_info *info = mg_get_request_info(connection);
+    const int fd = bst_view_find_socket(info->remote_port, info->server_port);
+    client *c = fd >= 0 ? calloc(1, sizeof *c) : NULL;
+    pthread_mutex_lock(&socket->lock);
+    socket->controller = socket->controller ? socket->controller : connection;
+    pthread_mutex_unlock(&socket->lock);
+    if (c) {
+        *c = (client){.socket = socket, .connection = connection};
+        c->peer = (bst_view_peer){.fd = fd,
+                                  .stopped = &socket->stopped,
+                                  .first_s = FIRST_S,
+                                  .idle_s = IDLE_S,
+                                  .frame_s = REST_S,
+                                  .send_s = SEND_S,
+                                  .least_rate = LEAST_RATE};
+        (void)bst_view_call_with_stack(serve, c);
+        shutdown(fd, SHUT_RDWR);
+    }
+    free(c);
+}
+
+/* A frame that came with the request of the handshake, before the connection was taken over, or on
+ * one that could not be taken over: no browser sends one. */
 static int on_data(struct mg_connection *peer, int bits, char *data, size_t bytes, void *user) {
-    const int opcode = bits & 0xf;
-    const bool whole = bits & 0x80;
-    if (opcode == MG_WEBSOCKET_OPCODE_PING || opcode == MG_WEBSOCKET_OPCODE_PONG) {
-        return 1;
-    }
-    if (opcode != MG_WEBSOCKET_OPCODE_TEXT || !whole || bytes > MESSAGE_BYTES) {
-        return 0;
-    }
-    message m = {user, peer, data, bytes, 0};
-    return bst_view_call_with_stack(take_message, &m) ? m.kept : 0;
+    (void)peer;
+    (void)bits;
+    (void)data;
+    (void)bytes;
+    (void)user;
+    return 0;
 }
 
 bst_status bst_view_socket_open(bst_ctx *ctx, struct mg_context *http, const char *uri,
@@ -224,6 +249,12 @@ bst_status bst_view_socket_open(bst_ctx *ctx, struct mg_context *http, const cha
     mg_set_websocket_handler(http, uri, on_connect, on_ready, on_data, on_close, socket);
     *out = socket;
     return BST_OK;
+}
+
+void bst_view_socket_stop(bst_view_socket *socket) {
+    if (socket) {
+        __atomic_store_n(&socket->stopped, true, __ATOMIC_RELAXED);
+    }
 }
 
 void bst_view_socket_free(bst_view_socket *socket) {

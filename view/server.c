@@ -459,6 +459,7 @@ void bst_view_server_stop(bst_view_server *server) {
     if (!server) {
         return;
     }
+    bst_view_socket_stop(server->socket);
     if (server->http) {
         mg_stop(server->http);
     }

@@ -305,8 +305,9 @@ class Page(unittest.TestCase):
             for name, value in (("black", "-65536"), ("white", "131072")):
                 wide = page.evaluate(f"(() => {{ const field = document.getElementById('{name}'), was = field.value; field.value = '{value}'; const found = [field.scrollWidth, field.clientWidth]; field.value = was; return found; }})()")
                 self.assertLessEqual(wide[0], wide[1], name)
-            sky = "(() => { const c = document.querySelector('#strip canvas'), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; return [c.width, Math.max(...d.filter((_, k) => k % 4 === 0))]; })()"
-            self.assertEqual(page.evaluate(sky), [79, 255])
+            sky = """(() => { const { kept, canvas } = document.boresight.strip, [one] = kept.values(), bright = (c, x, y, side) => Math.max(...c.getContext('2d').getImageData(x, y, side, side).data.filter((_, k) => k % 4 === 0));
+                return [one.width, bright(one, 0, 0, one.width), ...[...document.querySelectorAll('#strip [data-frame]')].map((cell) => bright(canvas, cell.offsetLeft + 3, cell.offsetTop + 3, 52) > 200)]; })()"""
+            self.assertEqual(page.evaluate(sky), [79, 255, *[True] * len(shown)])
             page.evaluate(f"document.querySelector('[data-frame=\"{shown[3]}\"]').click()")
             page.wait_for(f"{SHOWN} === {shown[3]} && document.querySelector('#strip [aria-selected=true]').dataset.frame === '{shown[3]}'")
             page.evaluate("document.getElementById('strip').focus()")

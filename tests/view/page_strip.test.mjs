@@ -38,7 +38,9 @@ test('noise is dark and a point of light is bright', () => {
 
 test('after a rewind no picture of the discarded future is left, nor comes', async () => {
   globalThis.fetch = () => new Promise((done) => { setTimeout(() => done({ ok: true, headers: new Map([['X-Frame-Width', '1'], ['X-Frame-Height', '1']]), arrayBuffer: async () => new ArrayBuffer(2) }), 5); });
-  const strip = Object.assign(Object.create(Strip.prototype), { kept: new Map(), box: { querySelector: () => null }, app: { sensor: 0, frames: [0, 1.5, 0.1, 0, 0, 1, 2.5, 0.1, 0, 0], timeOf: (k) => k + 1.5 } });
+  globalThis.ImageData = class {};
+  globalThis.document = { createElement: () => ({ getContext: () => ({ putImageData() {} }) }) };
+  const strip = Object.assign(Object.create(Strip.prototype), { kept: new Map(), draw() {}, app: { sensor: 0, frames: [0, 1.5, 0.1, 0, 0, 1, 2.5, 0.1, 0, 0], timeOf: (k) => k + 1.5 } });
   await strip.load([0], new AbortController().signal);
   assert.equal(strip.kept.size, 1);
   strip.request = new AbortController();

@@ -167,6 +167,36 @@ function rangesOf(count, origin, scale, size) {
   return { from, to };
 }
 
+/** What is known of the columns of a picture: those that show the image, and which of its pixels. `several`: columns that show the mean of more than one. */
+function spanOf(count, origin, scale, size) {
+  const { from, to } = rangesOf(count, origin, scale, size), several = [];
+  let left = count, right = 0, gap = false;
+  for (let x = 0; x < count; x++) {
+    if (to[x] === 0) continue;
+    left = Math.min(left, x);
+    right = x + 1;
+    if (to[x] > from[x] + 1) several.push(x);
+    gap = gap || from[x] !== from[left] + x - left;
+  }
+  return { left, right, from, to, several, gap };
+}
+
+/** A row of the picture: each pixel of the screen shows one of the image. */
+function pickRow(out, row, { left, right, from, gap }, colours) {
+  if (gap) for (let x = left; x < right; x++) out[x] = colours[row[from[x]]];
+  else for (let x = left, i = from[left]; x < right; x++, i++) out[x] = colours[row[i]];
+}
+
+/** Mean of pixels of the image below one of the screen, of at most some 4 x 4 of them. */
+function meanOf({ data, width }, ax, bx, ay, by) {
+  const skipX = Math.max(1, (bx - ax) >> 2), skipY = Math.max(1, (by - ay) >> 2);
+  let sum = 0, count = 0;
+  for (let j = ay; j < by; j += skipY) {
+    for (let i = ax; i < bx; i += skipX) { sum += data[j * width + i]; count++; }
+  }
+  return Math.round(sum / count);
+}
+
 class CanvasPainter {
   constructor(canvas) {
     this.canvas = canvas;
@@ -207,24 +237,16 @@ class CanvasPainter {
   }
 
   paint(image, d) {
-    const { width, height } = this.canvas, colours = this.coloursOf(d), { words } = this, { data } = image;
-    const columns = rangesOf(width, d.originX, d.scale, image.width), rows = rangesOf(height, d.originY, d.scale, image.height);
-    for (let y = 0, k = 0; y < height; y++) {
-      const ay = rows.from[y], by = rows.to[y], skipY = Math.max(1, (by - ay) >> 2);
-      if (by === 0) { k += width; continue; }
-      for (let x = 0; x < width; x++, k++) {
-        const ax = columns.from[x], bx = columns.to[x];
-        if (bx === 0) continue;
-        if (bx - ax === 1 && by - ay === 1) {
-          words[k] = colours[data[ay * image.width + ax]];
-          continue;
-        }
-        const skipX = Math.max(1, (bx - ax) >> 2);
-        let sum = 0, count = 0;
-        for (let j = ay; j < by; j += skipY) {
-          for (let i = ax; i < bx; i += skipX) { sum += data[j * image.width + i]; count++; }
-        }
-        words[k] = colours[Math.round(sum / count)];
+    const { width, height } = this.canvas, colours = this.coloursOf(d), span = spanOf(width, d.originX, d.scale, image.width), { from, to } = span;
+    const rows = rangesOf(height, d.originY, d.scale, image.height), few = 4 * span.several.length < span.right - span.left;
+    for (let y = 0; y < height && span.left < span.right; y++) {
+      const ay = rows.from[y], by = rows.to[y], out = this.words.subarray(y * width, (y + 1) * width);
+      if (by === 0) continue;
+      if (by === ay + 1 && few) {
+        pickRow(out, image.data.subarray(ay * image.width, by * image.width), span, colours);
+        for (const x of span.several) out[x] = colours[meanOf(image, from[x], to[x], ay, by)];
+      } else {
+        for (let x = span.left; x < span.right; x++) out[x] = colours[meanOf(image, from[x], to[x], ay, by)];
       }
     }
   }

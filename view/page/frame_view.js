@@ -1,7 +1,7 @@
 // The picture of a frame: zoom, stretch, marks, the pixel under the cursor.
 import { makePainter, originOf } from './frame_gl.js';
 import { binningAt, covers, longestSide, partFor, valueAt } from './frame_parts.js';
-import { drawCompass, drawMarks, drawShape, KINDS, sortMarks } from './marks.js';
+import { drawCompass, drawMarks, KINDS, makeSample, sortMarks } from './marks.js';
 import { describePixels, limitsOf } from './statistics.js';
 import { setText } from './text.js';
 import { formatDec, formatRa, pixelToSky } from './wcs.js';
@@ -82,12 +82,15 @@ export class FrameView {
     if (image && (this.fittedSize.width !== size.width || this.fittedSize.height !== size.height)) this.view.fitted = true;
     if (image) this.fittedSize = size;
     if (this.view.fitted) this.fit();
-    for (const kind of KINDS) {
-      setText(element(`count-${kind.name}`), this.sorted ? String(this.sorted[kind.name].length) : '');
-    }
+    if (!live) this.sayCounts();
     if (details && details.windows) element('show-windows').hidden = false;
     if (counted) this.drawHistogram();
     this.redraw();
+  }
+
+  /** Numbers of marks, in the legend: of live frames some times a second, as texts change more of the page than the picture. */
+  sayCounts() {
+    for (const kind of KINDS) setText(element(`count-${kind.name}`), this.sorted ? String(this.sorted[kind.name].length) : '');
   }
 
   /** The frame without noise, of the same size and binning as the frame; null: none. @param {any} image @param {boolean} shown in place of the frame @returns {boolean} it is of that size */
@@ -428,19 +431,13 @@ export class FrameView {
 
   makeLegend() {
     element('legend').replaceChildren(...KINDS.map((kind) => {
-      const button = document.createElement('button'), sample = document.createElement('canvas'), count = document.createElement('span');
+      const button = document.createElement('button'), count = document.createElement('span');
       button.type = 'button';
       button.id = `show-${kind.name}`;
       button.addEventListener('click', () => this.setShown(kind.name, !this.shown[kind.name]));
-      sample.width = sample.height = 36;
-      sample.setAttribute('aria-hidden', 'true');
-      const context = sample.getContext('2d');
-      context.strokeStyle = kind.colour;
-      context.lineWidth = 4;
-      drawShape(context, kind.shape, 18, 18, ['square', 'window'].includes(kind.shape) ? 10 : 12);
       count.className = 'count';
       count.id = `count-${kind.name}`;
-      button.append(sample, kind.title, count);
+      button.append(makeSample(kind), kind.title, count);
       return button;
     }));
     for (const kind of KINDS) this.setShown(kind.name, kind.shown);

@@ -15,6 +15,8 @@ const QUEUE_MOST = 64, COMMAND_BYTES = 8000;
 const REFUSAL_MS = 6000;
 /** Time between two questions for names, ms. */
 const NAMES_MS = 1000;
+/** Least time between two changes of the texts of a run that goes on, ms: they change more of the page than the picture does. */
+const TEXT_MS = 250;
 /** Time before another attempt to connect, ms. */
 const RETRY_MS = 1000;
 
@@ -36,6 +38,8 @@ export class Live {
     this.sentAt = -1; // commands that the run had obeyed when the last one was sent; -1: none is awaited
     this.refusal = { text: '', until: 0 }; // of the last command that was not taken
     this.shown = 0; // frames
+    this.told = 0; // when the texts were set
+    this.untold = null; // sets the texts of the frame that is shown
     this.over = false; // the run has ended, and the page knows its end
     this.ready = null;
     this.first = new Promise((done) => { this.ready = done; });
@@ -141,7 +145,10 @@ export class Live {
       this.takeFrame(answer.frame, pixels);
     }
     if (answer.problem) this.sentAt = -1; // refused: it does not count
-    this.describe(before, answer.problem);
+    const now = performance.now(), due = !this.running() || !before || before.paused || now - this.told >= TEXT_MS;
+    if (due) this.told = now;
+    if (due && this.untold) this.untold();
+    this.describe(before, answer.problem, due);
     if (this.state.run >= 0) this.ready();
     // the answer is drawn before the next one is asked for
     if (document.hidden) setTimeout(() => this.ask(), 200);
@@ -163,8 +170,12 @@ export class Live {
     const target = Object.entries(app.names).find(([, name]) => name === sensor.target);
     const all = { ...details, names: app.names, target: target ? Number(target[0]) : -1, tracks: details.tracks.concat(earlier) };
     app.frameView.show(pixels, all, details.dropped ? 'This frame was dropped.' : 'This run has no pixels.', !this.state.paused);
-    element('position').textContent = `exposure ${details.exposure_id} · ${details.time_s.toFixed(2)} s · ${details.utc.replace('T', ' ').replace('Z', '')} UTC`;
-    element('slider').value = element('slider').max;
+    this.untold = () => {
+      this.untold = null;
+      app.frameView.sayCounts();
+      setText(element('position'), `exposure ${details.exposure_id} · ${details.time_s.toFixed(2)} s · ${details.utc.replace('T', ' ').replace('Z', '')} UTC`);
+      element('slider').value = element('slider').max;
+    };
     app.plots.follow(details.time_s);
     if (!again) this.shown++;
     document.dispatchEvent(new CustomEvent('liveframe', { detail: details.exposure_id }));
@@ -225,17 +236,21 @@ export class Live {
   follow(newest) {
     if (newest && !this.newest) this.sequence = 0; // show it again
     this.newest = newest;
+    if (!newest) this.untold = null;
     element('live-newest').setAttribute('aria-pressed', String(newest));
   }
 
   say(text) { setText(element('live-message'), text); }
 
-  describe(before, problem) {
+  /** @param {any} before state before this one @param {string} problem @param {boolean} [due] the time is said */
+  describe(before, problem, due = true) {
     const { state } = this;
     const steers = this.controller && !state.ended;
     element('live').classList.toggle('watched', !state.steered);
-    setText(element('live-time'), `${state.time_s.toFixed(2)} / ${state.duration_s} s · ${
-      state.ended ? 'complete' : state.paused ? 'paused' : !state.steered ? 'running' : `${state.speed.toFixed(1)} × real time`}`);
+    if (due) {
+      setText(element('live-time'), `${state.time_s.toFixed(2)} / ${state.duration_s} s · ${
+        state.ended ? 'complete' : state.paused ? 'paused' : !state.steered ? 'running' : `${state.speed.toFixed(1)} × real time`}`);
+    }
     setText(element('live-run'), this.running() ? 'Pause' : 'Run');
     for (const id of ['live-run', 'live-step', 'live-rate', 'live-save', 'live-rewind', 'live-change', 'live-end']) element(id).disabled = !steers;
     element('live-branch').disabled = !this.controller;

@@ -76,6 +76,25 @@ export function drawShape(context, shape, x, y, r) {
   context.stroke();
 }
 
+/** Shapes in the legend, of 16 x 16. */
+const SAMPLES = {
+  circle: 'M8 2.7a5.3 5.3 0 1 0 0 10.6a5.3 5.3 0 1 0 0-10.6z', square: 'M3.5 3.5h9v9h-9z', plus: 'M2.7 8h10.6M8 2.7v10.6',
+  cross: 'M2.7 2.7l10.6 10.6M2.7 13.3L13.3 2.7', diamond: 'M8 2.7L13.3 8L8 13.3L2.7 8z',
+  window: 'M3 6.5v-3.5h3.5M9.5 3h3.5v3.5M13 9.5v3.5h-3.5M6.5 13h-3.5v-3.5',
+};
+
+/** Picture of a mark for the legend. No canvas: the browser composes each of those anew in every picture of the page. @param {typeof KINDS[number]} kind */
+export function makeSample(kind) {
+  const of = (name, attributes) => {
+    const node = document.createElementNS('http://www.w3.org/2000/svg', name);
+    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+    return node;
+  };
+  const sample = of('svg', { viewBox: '0 0 16 16', class: 'sample', 'aria-hidden': 'true' });
+  sample.append(of('path', { d: SAMPLES[kind.shape], stroke: kind.colour }));
+  return sample;
+}
+
 /** Half axes and angle of an error ellipse; null without a covariance. */
 export function ellipseOf(mark) {
   if (![mark.xx, mark.xy, mark.yy].every(Number.isFinite)) return null;

@@ -3,8 +3,8 @@ import { getThumbnail } from './api.js';
 
 /** Numbers of a frame in the list (view/recorded_run.h). */
 const NUMBERS = 5;
-/** Width of a picture with the gap beside it, px of the screen (style.css). */
-const CELL_PX = 62;
+/** Width of a picture with the gap beside it, px of the screen; the first picture's place, and its side (style.css). */
+const CELL_PX = 62, LEFT_PX = 13, TOP_PX = 8, SIDE_PX = 52;
 /** Pictures that are kept; a picture takes 13 KB at most. */
 const KEPT_MOST = 400;
 /** Pictures that are asked for at a time: the frame itself goes first. */
@@ -42,11 +42,21 @@ export function greyOf(data) {
   return pixels;
 }
 
+/** A small picture as a canvas that is not on the page. */
+function canvasOf({ width, height, data }) {
+  const canvas = Object.assign(document.createElement('canvas'), { width, height });
+  canvas.getContext('2d').putImageData(new ImageData(/** @type {any} */ (greyOf(data)), width, height), 0, 0);
+  return canvas;
+}
+
 export class Strip {
   /** @param {any} app */
   constructor(app) {
     this.app = app;
     this.box = element('strip');
+    // one canvas for all: the browser composes each canvas anew in every picture of the page
+    this.canvas = document.createElement('canvas');
+    this.canvas.setAttribute('aria-hidden', 'true');
     this.frames = []; // that are shown
     this.kept = new Map(); // pictures by sensor, exposure and its time
     this.request = null;
@@ -92,8 +102,9 @@ export class Strip {
     if (app.current < 0 && !app.live) return; // the frame comes first
     this.frames = this.choose();
     this.box.hidden = this.frames.length === 0;
-    this.box.replaceChildren(...this.frames.map((frame) => this.cell(frame)));
+    this.box.replaceChildren(this.canvas, ...this.frames.map((frame) => this.cell(frame)));
     this.mark();
+    this.draw();
     if (this.request) this.request.abort();
     this.request = new AbortController();
     const { signal } = this.request, wanted = this.frames.filter((frame) => this.hasPixels(frame) && !this.kept.has(this.keyOf(frame)));
@@ -115,12 +126,11 @@ export class Strip {
     while (wanted.length && !signal.aborted) {
       const frame = wanted.shift(), key = this.keyOf(frame);
       try {
-        const picture = await getThumbnail(this.app.sensor, frame, signal);
+        const picture = canvasOf(await getThumbnail(this.app.sensor, frame, signal));
         if (signal.aborted) return;
         this.kept.set(key, picture);
         if (this.kept.size > KEPT_MOST) this.kept.delete(this.kept.keys().next().value);
-        const cell = this.box.querySelector(`[data-frame="${frame}"]`);
-        if (cell) this.draw(cell.querySelector('canvas'), picture);
+        this.draw();
       } catch {
         if (signal.aborted) return; // else this picture stays dark; the frame itself says why
       }
@@ -128,24 +138,34 @@ export class Strip {
   }
 
   cell(frame) {
-    const { app } = this, cell = document.createElement('div'), canvas = document.createElement('canvas'), time = app.timeOf(frame);
+    const { app } = this, cell = document.createElement('div'), time = app.timeOf(frame);
     const state = app.frames[frame * NUMBERS + 4] === 1 ? 'dropped' : this.hasPixels(frame) ? '' : 'not kept';
-    canvas.setAttribute('aria-hidden', 'true');
     const shortTime = `${time.toFixed(time < 1000 ? 1 : 0)} s`;
     cell.id = `strip-${frame}`;
     cell.dataset.frame = String(frame);
     cell.setAttribute('role', 'option');
     cell.setAttribute('aria-label', `Frame ${frame + 1}, ${shortTime}${state ? `, ${state}` : ''}`);
     cell.title = `Frame ${frame + 1}, ${time.toFixed(2)} s`;
-    cell.append(canvas, state || shortTime);
-    const picture = this.kept.get(this.keyOf(frame));
-    if (picture) this.draw(canvas, picture);
+    cell.append(state || shortTime);
     return cell;
   }
 
-  draw(canvas, { width, height, data }) {
-    Object.assign(canvas, { width, height });
-    canvas.getContext('2d').putImageData(new ImageData(/** @type {any} */ (greyOf(data)), width, height), 0, 0);
+  /** Draws the pictures that are there; the others stay dark. */
+  draw() {
+    const ratio = devicePixelRatio || 1, { canvas } = this;
+    Object.assign(canvas, { width: Math.round(this.box.clientWidth * ratio), height: Math.round((TOP_PX + SIDE_PX) * ratio) });
+    Object.assign(canvas.style, { width: `${canvas.width / ratio}px`, height: `${canvas.height / ratio}px` });
+    const context = canvas.getContext('2d');
+    context.scale(ratio, ratio);
+    context.imageSmoothingEnabled = false;
+    context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue('--stage');
+    this.frames.forEach((frame, k) => {
+      const picture = this.kept.get(this.keyOf(frame)), x = LEFT_PX + k * CELL_PX;
+      context.fillRect(x, TOP_PX, SIDE_PX, SIDE_PX);
+      if (!picture) return;
+      const scale = SIDE_PX / Math.max(picture.width, picture.height), width = picture.width * scale, height = picture.height * scale;
+      context.drawImage(picture, x + (SIDE_PX - width) / 2, TOP_PX + (SIDE_PX - height) / 2, width, height);
+    });
   }
 
   /** Place of the frame that is shown, or of the last one before it. */
@@ -159,7 +179,7 @@ export class Strip {
 
   mark() {
     const now = this.placeNow();
-    [...this.box.children].forEach((cell, k) => cell.setAttribute('aria-selected', String(k === now)));
+    this.box.querySelectorAll('[data-frame]').forEach((cell, k) => cell.setAttribute('aria-selected', String(k === now)));
     if (this.frames.length) this.box.setAttribute('aria-activedescendant', `strip-${this.frames[now]}`);
   }
 
