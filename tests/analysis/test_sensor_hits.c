@@ -49,7 +49,7 @@ static void hits_of_a_pair(void **state) {
     bst_ctx ctx = {0};
     static float a[W * H], b[W * H];
     static uint8_t mask[W * H];
-    double rows[H], hot[SIDE * SIDE], sigma[SIDE * SIDE];
+    double rows[H], hot[SIDE * SIDE], level[SIDE * SIDE], sigma[SIDE * SIDE];
     for (int i = 0; i < W * H; i++) {
         a[i] = (float)(100.0 + bst_rng_normal(KEY, (uint64_t)i, 20));
         b[i] = (float)(103.0 + bst_rng_normal(KEY, (uint64_t)i, 21));
@@ -59,6 +59,7 @@ static void hits_of_a_pair(void **state) {
     }
     for (int k = 0; k < SIDE * SIDE; k++) {
         hot[k] = 110.0;
+        level[k] = 101.5;
         sigma[k] = sqrt(2.0);
     }
     b[10 * W + 10] += 50.0F; /* two pixels, corner to corner */
@@ -69,14 +70,23 @@ static void hits_of_a_pair(void **state) {
     a[40 * W + 5] += 500.0F;    /* hot in both */
     b[40 * W + 5] += 700.0F;
     b[10 * W + 12] += 3.0F; /* below four standard deviations */
-    const bst_hit_pair pair = {W, H, a, b, rows, hot, sigma, SIDE, 6.0, 4.0};
+    for (int x = 20; x < 27; x++) { /* a track across a hot pixel */
+        b[35 * W + x] += 80.0F;
+    }
+    a[35 * W + 22] += 150.0F; /* noise of 17 */
+    b[35 * W + 22] += 150.0F;
+    a[44 * W + 50] += 10000.0F; /* noise of 141 is no hit */
+    b[44 * W + 50] += 10300.0F;
+    const bst_hit_pair pair = {W, H, a, b, rows, hot, level, sigma, 1.0, SIDE, 6.0, 4.0};
     bst_radiation_hits hits = {0};
     assert_int_equal(bst_radiation_hits_add(&ctx, &pair, mask, &hits), BST_OK);
-    assert_int_equal(hits.count, 3);
-    assert_int_equal(hits.used, 2);
+    assert_int_equal(hits.count, 4);
+    assert_int_equal(hits.used, 3);
     assert_int_equal(hits.frames, 2);
     assert_int_equal(hits.items[0].pixels, 2);
     assert_int_equal(hits.items[1].pixels, 1);
+    assert_int_equal(hits.items[2].pixels, 7); /* and not one of 2 and one of 4 */
+    bst_assert_close((double)hits.items[2].charge_dn, 7 * 80.0, 5 * 1.5 * sqrt(7.0));
     /* noise of 1.4 in each pixel: five standard deviations */
     bst_assert_close((double)hits.items[0].charge_dn, 70.0, 10.0);
     bst_assert_close((double)hits.items[1].charge_dn, 400.0, 7.0);
@@ -85,7 +95,7 @@ static void hits_of_a_pair(void **state) {
     for (int i = 0; i < W * H; i++) {
         marked += mask[i];
     }
-    assert_int_equal(marked, 5);
+    assert_int_equal(marked, 12);
     assert_true(mask[11 * W + 11] && !mask[10 * W + 12] && !mask[40 * W + 5]);
     bst_radiation_hits_free(&hits);
 }

@@ -126,9 +126,11 @@ bst_status bst_camera_psf_fit(bst_ctx *ctx, const bst_camera_psf_stars *stars,
 
 /* ---------------------------------------------------------------- files */
 
-/* A node: its PSF before the pixel, the same without parts of the stars, and figures of all. */
+/* A node: its PSF before the pixel, the same without parts of the stars, and figures of all; then
+ * standard errors, and pooled ones. */
+enum { PLANES = 1 + PARTS + 2 };
 typedef struct node {
-    double *plane[1 + PARTS];
+    double *plane[PLANES];
     bst_effective_psf_figures figures[1 + PARTS];
 } node;
 
@@ -161,6 +163,7 @@ static void report_node(cJSON *nodes, const node *n) {
  * so: without them the wings would have too much light. */
 static bst_status make_node(bst_ctx *ctx, const bst_effective_psf *psf, size_t index, node *n,
                             float *value, float *sigma) {
+    double *errors = n->plane[1 + PARTS], *pooled = n->plane[2 + PARTS];
     const size_t samples = (size_t)psf->side * (size_t)psf->side,
                  all = samples * (size_t)(psf->options.columns * psf->options.rows);
     for (size_t p = 0; p <= PARTS; p++) {
@@ -174,7 +177,11 @@ static bst_status make_node(bst_ctx *ctx, const bst_effective_psf *psf, size_t i
             without[p] = n->plane[1 + p][k];
         }
         value[k] = (float)n->plane[0][k];
-        sigma[k] = (float)bst_effective_psf_standard_error(without);
+        errors[k] = bst_effective_psf_standard_error(without);
+    }
+    bst_effective_psf_pool_errors(errors, psf->side, pooled);
+    for (size_t k = 0; k < samples; k++) {
+        sigma[k] = (float)pooled[k];
     }
     return BST_OK;
 }
@@ -206,14 +213,14 @@ bst_status bst_camera_psf_write(bst_ctx *ctx, const char *folder, const bst_effe
     const int count = psf->options.columns * psf->options.rows;
     const size_t samples = (size_t)psf->side * (size_t)psf->side;
     float *value = calloc(2 * samples * (size_t)count, sizeof *value);
-    double *planes = calloc(samples * (1 + PARTS), sizeof *planes);
+    double *planes = calloc(samples * PLANES, sizeof *planes);
     node *n = calloc(1, sizeof *n);
     bst_status status = value && planes && n ? BST_OK
                                              : bst_fail(ctx, BST_ERR_MEMORY,
                                                         "no memory for a PSF of %d nodes", count);
     if (status == BST_OK) {
         float *sigma = value + samples * (size_t)count;
-        for (size_t p = 0; p <= PARTS; p++) {
+        for (size_t p = 0; p < PLANES; p++) {
             n->plane[p] = planes + p * samples;
         }
         status = make_nodes(ctx, psf, n, value, sigma, report);

@@ -84,10 +84,20 @@ extern const double bst_effective_psf_radius_px[BST_EFFECTIVE_PSF_RADII];
  * Given:     plane  [side][side] of BST_EFFECTIVE_PSF_OVERSAMPLING, centred on the middle one */
 bst_effective_psf_figures bst_effective_psf_measure(const double *plane, int side);
 
-/* Standard error by the delete-a-group jackknife: sqrt((n - 1) / n sum (value - mean)^2).
+/* Standard error by the delete-a-group jackknife: sqrt((n - 1) / n sum (value - mean)^2), of seven
+ * degrees of freedom.
  *
- * Notes:     Of samples within 3 px it is 1.2 times too small (docs/results/camera.md).
  * Reference: Efron & Tibshirani 1993, An Introduction to the Bootstrap, equation 11.5 */
 double bst_effective_psf_standard_error(const double without[BST_EFFECTIVE_PSF_PARTS]);
+
+/* Pools the standard errors of samples over BST_EFFECTIVE_PSF_POOL samples on each side: their
+ * geometric mean, as they fall steeply from the middle, times what makes it unbiased. Of single
+ * ones, the root mean square of error over standard error is 1.18, that of Student's law of seven
+ * degrees of freedom. 0 stays 0.
+ *
+ * Given:     sigma  [side][side]
+ * Returned:  pooled  [side][side] */
+enum { BST_EFFECTIVE_PSF_POOL = 3 };
+void bst_effective_psf_pool_errors(const double *sigma, int side, double *pooled);
 
 #endif

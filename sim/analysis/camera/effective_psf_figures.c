@@ -128,3 +128,24 @@ double bst_effective_psf_standard_error(const double without[BST_EFFECTIVE_PSF_P
     }
     return sqrt(sum * (PARTS - 1) / PARTS);
 }
+
+/* Minus the mean logarithm of the root of chi-squared over its seven degrees of freedom:
+ * -(digamma(3.5) + ln(2 / 7)) / 2. */
+static const double MEAN_LOG = 0.0748;
+
+void bst_effective_psf_pool_errors(const double *sigma, int side, double *pooled) {
+    enum { REACH = BST_EFFECTIVE_PSF_POOL };
+    for (int j = 0; j < side; j++) {
+        for (int i = 0; i < side; i++) {
+            double sum = 0.0, in = 0.0, here = sigma[(size_t)j * (size_t)side + (size_t)i];
+            for (int v = j > REACH ? j - REACH : 0; v < side && v <= j + REACH; v++) {
+                for (int u = i > REACH ? i - REACH : 0; u < side && u <= i + REACH; u++) {
+                    double one = sigma[(size_t)v * (size_t)side + (size_t)u];
+                    sum += one > 0.0 ? log(one) : 0.0;
+                    in += one > 0.0 ? 1.0 : 0.0;
+                }
+            }
+            pooled[(size_t)j * (size_t)side + (size_t)i] = here > 0.0 ? exp(sum / in + MEAN_LOG) : 0.0;
+        }
+    }
+}

@@ -151,8 +151,15 @@ static void print_figures(FILE *out, const bst_sensor_stacks *s, const bst_senso
         if (!isfinite(e->value)) {
             fprintf(out, "%-28s %12s   %s\n", name->key, "-", f->method[i]);
         } else if (isfinite(e->sigma)) {
-            fprintf(out, "%-28s %12.6g   +-%.2g %s\n", name->key, e->value,
-                    BST_SENSOR_T95 * e->sigma, name->unit);
+            double low, high;
+            bst_sensor_interval(f, (bst_sensor_figure)i, &low, &high);
+            if (high - e->value > 1.01 * (e->value - low)) {
+                fprintf(out, "%-28s %12.6g   %.3g to %.3g %s\n", name->key, e->value, low, high,
+                        name->unit);
+            } else {
+                fprintf(out, "%-28s %12.6g   +-%.2g %s\n", name->key, e->value, high - e->value,
+                        name->unit);
+            }
         } else {
             fprintf(out, "%-28s %12.6g   %s (%s)\n", name->key, e->value, name->unit, f->method[i]);
         }

@@ -272,8 +272,10 @@ static cJSON *report_json(const writer *w) {
         cJSON *node = cJSON_AddObjectToObject(figures, bst_sensor_figure_names[i].key);
         bst_json_add_number(node, "value", e->value);
         bst_json_add_number(node, "standard_error", e->sigma);
-        bst_json_add_number(node, "low_95", e->value - BST_SENSOR_T95 * e->sigma);
-        bst_json_add_number(node, "high_95", e->value + BST_SENSOR_T95 * e->sigma);
+        double low, high;
+        bst_sensor_interval(f, (bst_sensor_figure)i, &low, &high);
+        bst_json_add_number(node, "low_95", low);
+        bst_json_add_number(node, "high_95", high);
         cJSON_AddStringToObject(node, "method", f->method[i]);
         cJSON_AddBoolToObject(node, "in_detector_model",
                               bst_sensor_figure_names[i].camera_key != NULL);

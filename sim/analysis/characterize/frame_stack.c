@@ -140,8 +140,9 @@ static bool near_hit(const reduction *r, int x, int y) {
 /* Variance of the difference of two frames in a block, rows levelled.
  *
  * Given:     hits  pixels of radiation hits are left out
- * Returned:  *hot  level above which a pixel is hot */
-static double variance_of(reduction *r, int block, bool hits, double *hot) {
+ * Returned:  *hot    level above which a pixel is hot
+ *            *level  mean of the others */
+static double variance_of(reduction *r, int block, bool hits, double *hot, double *level) {
     const bst_frame_stack *s = r->stack;
     size_t width = (size_t)s->width, n = 0;
     int x0 = block_edge(block % BST_STACK_SIDE, s->width),
@@ -167,6 +168,7 @@ static double variance_of(reduction *r, int block, bool hits, double *hot) {
         }
     }
     *hot = 0.5 * sum.high;
+    *level = 0.5 * sum.mean;
     double freedom = 1.0 - 1.0 / s->width; /* the row's mean is of the same pixels */
     return bst_clipped_moments_of(r->scratch, n, CLIP).variance / freedom;
 }
@@ -186,7 +188,8 @@ static void remove_hits(reduction *r) {
  * separate. */
 static bst_status add_pair(bst_ctx *ctx, reduction *r) {
     bst_frame_stack *s = r->stack;
-    double hot[BST_STACK_BLOCKS], sigma[BST_STACK_BLOCKS], variance[BST_STACK_BLOCKS];
+    double hot[BST_STACK_BLOCKS], sigma[BST_STACK_BLOCKS], variance[BST_STACK_BLOCKS],
+        level[BST_STACK_BLOCKS];
     double rows2 = 0.0, within = 0.0, mean = 0.0;
     size_t width = (size_t)s->width;
     for (int y = 0; y < s->height; y++) {
@@ -205,7 +208,7 @@ static bst_status add_pair(bst_ctx *ctx, reduction *r) {
     }
     s->row_variance += 0.5 * (rows2 - within);
     for (int k = 0; k < BST_STACK_BLOCKS; k++) {
-        variance[k] = variance_of(r, k, false, &hot[k]);
+        variance[k] = variance_of(r, k, false, &hot[k], &level[k]);
         sigma[k] = sqrt(variance[k]);
     }
     /* of a million pixels 0.002 pass 6 standard deviations by noise. In flats hits are only left
@@ -217,7 +220,9 @@ static bst_status add_pair(bst_ctx *ctx, reduction *r) {
                                s->last,
                                r->rows,
                                hot,
+                               level,
                                sigma,
+                               s->gain_e_per_dn,
                                BST_STACK_SIDE,
                                flat ? FLAT_SEED : SEED,
                                flat ? FLAT_GROW : GROW};
@@ -225,7 +230,7 @@ static bst_status add_pair(bst_ctx *ctx, reduction *r) {
     BST_TRY(bst_radiation_hits_add(ctx, &pair, r->hit, &s->hits));
     bool hits = s->hits.used > found;
     for (int k = 0; k < BST_STACK_BLOCKS; k++) {
-        s->variance[k] += 0.5 * (hits ? variance_of(r, k, true, &hot[k]) : variance[k]);
+        s->variance[k] += 0.5 * (hits ? variance_of(r, k, true, &hot[k], &level[k]) : variance[k]);
     }
     if (hits) {
         remove_hits(r);

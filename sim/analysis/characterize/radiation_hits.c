@@ -21,14 +21,16 @@ typedef struct search {
 } search;
 
 /* Difference of a pixel in standard deviations; 0 where it is not used. */
-static double deviation(const bst_hit_pair *p, int x, int y, double *difference) {
+static double deviation(const bst_hit_pair *p, int x, int y, double *difference, bool *hot) {
     size_t i = (size_t)y * (size_t)p->width + (size_t)x;
     int block = (int)((int64_t)x * p->blocks_per_side / p->width) +
                 p->blocks_per_side * (int)((int64_t)y * p->blocks_per_side / p->height);
     double a = (double)p->first[i], b = (double)p->second[i], sigma = p->sigma[block];
     *difference = b - a - p->rows[y];
-    bool hot = fmin(a, b) > p->hot[block];
-    return isfinite(*difference) && !hot && sigma > 0.0 ? *difference / sigma : 0.0;
+    double below = fmin(a, b);
+    *hot = below > p->hot[block];
+    double shot = *hot ? 2.0 * (below - p->level[block]) / p->gain_e_per_dn : 0.0;
+    return isfinite(*difference) && sigma > 0.0 ? *difference / sqrt(sigma * sigma + shot) : 0.0;
 }
 
 static bst_status add_hit(bst_ctx *ctx, bst_radiation_hits *h, double charge, int pixels) {
@@ -51,20 +53,20 @@ static bst_status follow(bst_ctx *ctx, search *s, int x0, int y0, double sign,
     const bst_hit_pair *p = s->pair;
     int count = 0, done = 0;
     double charge = 0.0, d;
-    bool first_edge = false, last_edge = false;
+    bool first_edge = false, last_edge = false, hot;
     s->open[count++] = y0 * p->width + x0;
     s->seen[y0 * p->width + x0] = 1;
     while (done < count) {
         int x = s->open[done] % p->width, y = s->open[done] / p->width;
         done++;
-        (void)deviation(p, x, y, &d);
+        (void)deviation(p, x, y, &d, &hot);
         charge += fabs(d);
         first_edge = first_edge || x == 0 || y == 0;
         last_edge = last_edge || x == p->width - 1 || y == p->height - 1;
         for (int k = 0; k < 9; k++) {
             int u = x + k % 3 - 1, v = y + k / 3 - 1;
             if (u < 0 || v < 0 || u >= p->width || v >= p->height || count == MOST_PIXELS ||
-                s->seen[v * p->width + u] || !(sign * deviation(p, u, v, &d) > p->grow)) {
+                s->seen[v * p->width + u] || !(sign * deviation(p, u, v, &d, &hot) > p->grow)) {
                 continue;
             }
             s->seen[v * p->width + u] = 1;
@@ -85,8 +87,9 @@ bst_status bst_radiation_hits_add(bst_ctx *ctx, const bst_hit_pair *pair, uint8_
     memset(mask, 0, (size_t)pair->width * (size_t)pair->height);
     for (int y = 0; status == BST_OK && y < pair->height; y++) {
         for (int x = 0; status == BST_OK && x < pair->width; x++) {
-            double d, v = deviation(pair, x, y, &d);
-            if (fabs(v) > pair->seed && !s.seen[(size_t)y * (size_t)pair->width + (size_t)x]) {
+            bool hot;
+            double d, v = deviation(pair, x, y, &d, &hot);
+            if (!hot && fabs(v) > pair->seed && !s.seen[(size_t)y * (size_t)pair->width + (size_t)x]) {
                 status = follow(ctx, &s, x, y, v > 0.0 ? 1.0 : -1.0, hits);
             }
         }

@@ -31,14 +31,17 @@ typedef struct bst_hit_pair {
     const float *first, *second; /* [height][width] DN */
     const double *rows;          /* [height] mean difference of each row, second less first */
     const double *hot;           /* [blocks] level above which a pixel is hot */
+    const double *level;         /* [blocks] mean of the others */
     const double *sigma;         /* [blocks] standard deviation of the difference */
+    double gain_e_per_dn;        /* for the shot noise of hot pixels */
     int blocks_per_side;
     double seed, grow; /* least difference of a hit's brightest pixel and of its others, in sigma */
 } bst_hit_pair;
 
 /* Adds the hits of a pair. A hit has a pixel whose difference is `seed` standard deviations or
  * more, and all pixels around it of `grow` or more with the same sign. Pixels that are hot in both
- * frames are left out: their noise is larger.
+ * frames have the shot noise of their charge, and do not begin a hit: others would be cut in two
+ * there, or lose charge.
  *
  * Returned:  mask  [height][width] 1 in pixels of hits
  * Errors:    BST_ERR_MEMORY */

@@ -33,6 +33,7 @@ typedef struct dark_signal {
     float *scratch; /* [height * width] */
     double slope;   /* DN per row; 0: no ramp */
     double noise;   /* temporal variance of the map, DN^2, without shot noise of the dark */
+    double row_noise; /* the part of it that is common to a row */
 } dark_signal;
 
 /* Level of an overscan in each row would add its noise: its mean is subtracted. */
@@ -204,17 +205,46 @@ static void measure_readout(dark_signal *d) {
     free(columns);
 }
 
+/* Scatter of the map in blocks, rows levelled: noise that is common to a row would add its own
+ * random variance, which is more than that of weak dark currents. */
+static bst_status scatter_of_blocks(bst_ctx *ctx, dark_signal *d, double *variances) {
+    size_t width = (size_t)d->out->width, height = (size_t)d->out->height;
+    double means[BST_STACK_BLOCKS];
+    float *levelled = malloc(width * height * sizeof *levelled);
+    if (!levelled) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", width * height);
+    }
+    for (size_t y = 0; y < height; y++) {
+        float *row = levelled + y * width;
+        memcpy(d->scratch, d->map + y * width, width * sizeof *row);
+        float level = (float)bst_clipped_moments_of(d->scratch, width, CLIP).mean;
+        for (size_t x = 0; x < width; x++) {
+            row[x] = d->map[y * width + x] - level;
+        }
+    }
+    bst_sensor_block_moments(levelled, d->out->width, d->out->height, CLIP, d->scratch, means,
+                             variances);
+    double freedom = 1.0 - 1.0 / (double)width; /* the row's mean is of the same pixels */
+    for (int k = 0; k < BST_STACK_BLOCKS; k++) {
+        variances[k] /= freedom;
+    }
+    free(levelled);
+    return BST_OK;
+}
+
 /* Mean and spread of the core, and the limit above which pixels are hot. */
-static bst_clipped_moments measure_core(dark_signal *d, double per_s) {
+static bst_status measure_core(bst_ctx *ctx, dark_signal *d, double per_s,
+                               bst_clipped_moments *core) {
     bst_sensor_figures *out = d->out;
     size_t pixels = (size_t)out->width * (size_t)out->height;
     double means[BST_STACK_BLOCKS], variances[BST_STACK_BLOCKS], medians[BST_STACK_BLOCKS];
     memcpy(d->scratch, d->map, pixels * sizeof *d->scratch);
-    bst_clipped_moments core = bst_clipped_moments_of(d->scratch, pixels, CLIP);
-    bst_sensor_block_moments(d->map, out->width, out->height, CLIP, d->scratch, means, variances);
+    *core = bst_clipped_moments_of(d->scratch, pixels, CLIP);
+    bst_sensor_block_moments(d->map, out->width, out->height, CLIP, d->scratch, means, NULL);
+    BST_TRY(scatter_of_blocks(ctx, d, variances));
     for (int k = 0; k < BST_STACK_BLOCKS; k++) {
         double shot = fmax(means[k], 0.0) / out->figures[BST_SENSOR_GAIN].value;
-        double rest = variances[k] - d->noise - shot / d->stacks->dark.count;
+        double rest = variances[k] - (d->noise - d->row_noise) - shot / d->stacks->dark.count;
         medians[k] = means[k] > 0.0 ? rest / (means[k] * means[k]) : NAN;
     }
     bst_sensor_estimate dark = bst_mean_estimate(means, BST_STACK_BLOCKS);
@@ -222,13 +252,15 @@ static bst_clipped_moments measure_core(dark_signal *d, double per_s) {
     double relative = gain->sigma > 0.0 ? gain->sigma / gain->value : 0.0;
     double level = d->stacks->bias.count > 0 ? 0.0 : out->figures[BST_SENSOR_OFFSET].sigma;
     dark.sigma = hypot(dark.sigma, level);
+    /* blocks beside one another share the noise of their rows */
+    dark.sigma = hypot(dark.sigma, sqrt(d->row_noise / out->height));
     dark.sigma = hypot(dark.sigma, dark.value * relative);
     out->figures[BST_SENSOR_DARK] = (bst_sensor_estimate){dark.value * per_s, dark.sigma * per_s};
     out->method[BST_SENSOR_DARK] = "mean of the pixels that are not hot";
     bst_sensor_estimate v = bst_mean_estimate(medians, BST_STACK_BLOCKS);
     out->figures[BST_SENSOR_DSNU] = bst_root_estimate(v);
     out->method[BST_SENSOR_DSNU] = "scatter of the dark map in 8 x 8 blocks, less its noise";
-    return core;
+    return BST_OK;
 }
 
 /* Percentiles of the pixels of every step-th row from `first` on; returns the number of pixels,
@@ -423,14 +455,15 @@ static bst_status correct_transfer(bst_ctx *ctx, dark_signal *d) {
     return BST_OK;
 }
 
-/* Temporal variance of the map without the dark's shot noise. */
-static double map_noise(const dark_signal *d) {
+/* Temporal variance of the map without the dark's shot noise, and that common to a row. */
+static void measure_map_noise(dark_signal *d) {
     const bst_frame_stack *bias = &d->stacks->bias, *dark = &d->stacks->dark;
     double read = d->out->figures[BST_SENSOR_READ_NOISE].value;
     double row = d->out->figures[BST_SENSOR_ROW_NOISE].value;
-    double one = (isfinite(read) ? read * read : 0.0) + (isfinite(row) ? row * row : 0.0) +
-                 (dark->integer ? 1.0 / 12.0 : 0.0);
-    return one / dark->count + (bias->count > 0 ? one / bias->count : 0.0);
+    double one = (isfinite(read) ? read * read : 0.0) + (dark->integer ? 1.0 / 12.0 : 0.0);
+    double means = 1.0 / dark->count + (bias->count > 0 ? 1.0 / bias->count : 0.0);
+    d->row_noise = isfinite(row) ? row * row * means : 0.0;
+    d->noise = one * means + d->row_noise;
 }
 
 static bst_status measure_all(bst_ctx *ctx, dark_signal *d) {
@@ -439,11 +472,12 @@ static bst_status measure_all(bst_ctx *ctx, dark_signal *d) {
     subtract_level(d);
     exclude_shielded(d);
     measure_ramp(d);
-    d->noise = map_noise(d);
+    measure_map_noise(d);
     measure_percentiles(d, per_s);
     fit_traps(d, measure_trail(d));
     BST_TRY(correct_transfer(ctx, d));
-    bst_clipped_moments core = measure_core(d, per_s);
+    bst_clipped_moments core;
+    BST_TRY(measure_core(ctx, d, per_s, &core));
     /* standard error of a median: sqrt(pi / 2) of that of a mean; the core's as above */
     out->figures[BST_SENSOR_DARK_MEDIAN].sigma = 1.2533 * out->figures[BST_SENSOR_DARK].sigma;
     measure_readout(d);

@@ -83,6 +83,20 @@ bst_status bst_sensor_figures_compute(bst_ctx *ctx, const bst_sensor_stacks *sta
     return BST_OK;
 }
 
+void bst_sensor_interval(const bst_sensor_figures *figures, bst_sensor_figure which, double *low,
+                         double *high) {
+    const bst_sensor_estimate *e = &figures->figures[which];
+    double reach = BST_SENSOR_T95 * e->sigma;
+    bool of_hits = which >= BST_SENSOR_HIT_RATE && which <= BST_SENSOR_HIT_STRAGGLING;
+    if (of_hits && e->value > 0.0) {
+        *low = e->value * exp(-reach / e->value);
+        *high = e->value * exp(reach / e->value);
+    } else {
+        *low = e->value - reach;
+        *high = e->value + reach;
+    }
+}
+
 void bst_sensor_figures_free(bst_sensor_figures *figures) {
     free(figures->line.power);
     free(figures->dark_map);

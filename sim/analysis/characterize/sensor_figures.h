@@ -97,6 +97,12 @@ void bst_sensor_figures_free(bst_sensor_figures *figures);
 /* 95 % interval of an estimate from 64 blocks or fewer: +-2.1 standard errors, Student's t with 20
  * degrees of freedom. */
 #define BST_SENSOR_T95 2.09
+/* The 95 % interval of a figure.
+ *
+ * Notes:     Figures of radiation hits come from few counts, or from a fit of logarithms: their
+ *            interval is that of the logarithm, value * exp(-+2.1 sigma / value). */
+void bst_sensor_interval(const bst_sensor_figures *figures, bst_sensor_figure which, double *low,
+                         double *high);
 
 /* Level of a pixel without charge: mean of the bias frames, or of the overscan.
  *

@@ -148,6 +148,12 @@ static void free_of_non_linearity(double signal_dn, bst_sensor_figures *out) {
     }
 }
 
+/* Light of a pixel over that of its block. */
+static float relative_to(const bst_sensor_stacks *s, const flat_level *level, const double *signal,
+                         int block, size_t i) {
+    return (float)((s->flat.mean[i] - level->mean[i]) / signal[block]);
+}
+
 /* Spread of the response in blocks, and the map of the response. */
 static void measure_response(const bst_sensor_stacks *s, const flat_level *level, float *scratch,
                              bst_sensor_figures *out) {
@@ -161,10 +167,15 @@ static void measure_response(const bst_sensor_stacks *s, const flat_level *level
         signal[k] -= means[k];
         hot[k] = means[k] + CLIP * sqrt(variances[k]); /* the limit of the clipped mean */
     }
+    /* a hot pixel's charge has shot noise of its own, and lies elsewhere on a bent response */
     for (size_t i = 0; i < pixels; i++) {
-        map[i] = (float)((s->flat.mean[i] - level->mean[i]) / signal[block_of(i, out)]);
+        int k = block_of(i, out);
+        map[i] = level->mean[i] > hot[k] ? NAN : relative_to(s, level, signal, k, i);
     }
     bst_sensor_block_moments(map, out->width, out->height, CLIP, scratch, means, variances);
+    for (size_t i = 0; i < pixels; i++) {
+        map[i] = relative_to(s, level, signal, block_of(i, out), i);
+    }
     const double shares[] = {level->share_bias, level->share_dark};
     const bst_frame_stack *const stacks[] = {&s->bias, &s->dark};
     double level_noise = 0.0;
