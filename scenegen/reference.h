@@ -2,8 +2,8 @@
  *
  * Gaussian PSF: erf-integrated pixels and Gauss-Legendre quadrature in time. Other PSFs: inverse
  * transform of the OTF times the spectrum of the source's positions in time. It includes all wings
- * and all frequencies up to the PSF's cut-off. The period is so large that wrap-around is below
- * 1e-9 of a source's peak (1e-8 along diffraction spikes). */
+ * and all frequencies up to the PSF's cut-off. The period is so large that wrap-around is below the
+ * tolerance, or 1e-9 of a source's peak (1e-8 along diffraction spikes). */
 #ifndef BST_SCENEGEN_REFERENCE_H
 #define BST_SCENEGEN_REFERENCE_H
 

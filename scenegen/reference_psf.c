@@ -312,7 +312,8 @@ bst_status bst_reference_spectrum(bst_ctx *ctx, const bst_camera *camera, const 
                   .track = track,
                   .tolerance = tolerance,
                   .cutoff = bst_psf_cutoff(psf),
-                  .margin = (int)fmin(fmax(ceil(bst_psf_reach_px(psf)), 16.0), 1024.0)};
+                  .margin = (int)fmin(
+                      fmax(ceil(bst_psf_reach_px(psf, fmax(tolerance, 1e-9))), 16.0), 1024.0)};
     bst_status status = spectrum_create(ctx, &s);
     if (status == BST_OK) {
         status = add_all(ctx, &s, sources, count);

@@ -42,8 +42,10 @@ double bst_psf_cutoff(const bst_psf *psf) {
     return psf->cutoff;
 }
 
-double bst_psf_reach_px(const bst_psf *psf) {
-    return psf->reach_px;
+double bst_psf_reach_px(const bst_psf *psf, double part) {
+    assert(part >= 1e-9);
+    double nearer = psf->wing_power > 0.0 ? pow(1e9 * part, -1.0 / psf->wing_power) : 1.0;
+    return psf->reach_px * nearer + psf->wider_px;
 }
 
 int bst_psf_nodes(const bst_psf *psf) {
@@ -243,6 +245,7 @@ static bst_status make_profiles(bst_ctx *ctx, const bst_camera *camera, bst_psf 
             double alpha = 0.5 * fwhm / sqrt(exp2(1.0 / beta) - 1.0);
             psf->cutoff = fmax(psf->cutoff, psf->nodes[k].own_radial.limit);
             psf->reach_px = fmax(psf->reach_px, alpha * pow(1e9, 0.5 / beta));
+            psf->wing_power = 2.0 * beta;
         }
     }
     return BST_OK;
@@ -254,7 +257,7 @@ static void widen(bst_psf *psf, double sigma_px) {
         /* both decrease from 1: their product is below 1e-9 where one of them is */
         psf->cutoff = fmin(psf->cutoff, GAUSSIAN_CUTOFF / psf->diffusion_px);
     }
-    psf->reach_px += GAUSSIAN_REACH * sigma_px;
+    psf->wider_px += GAUSSIAN_REACH * sigma_px;
     double sigma;
     bool gaussian = bst_psf_gaussian(psf, &sigma);
     for (int k = 0; k < bst_psf_nodes(psf); k++) {
@@ -279,7 +282,7 @@ static bst_status fill_in(bst_ctx *ctx, const bst_camera *camera, const bst_psf_
         default:
             BST_TRY(make_profiles(ctx, camera, psf));
     }
-    psf->reach_px += 1.0;
+    psf->wider_px += 1.0;
     widen(psf, psf->diffusion_px);
     for (int k = 0; k < bst_psf_nodes(psf); k++) {
         find_centroid(psf, k, psf->nodes[k].centroid_px);

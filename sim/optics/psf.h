@@ -77,8 +77,9 @@ void bst_psf_otf(const bst_psf *psf, int node, double fx, double fy, double out[
 /* Frequency, cycles/px, above which the OTF without the pixel is below 1e-9. */
 double bst_psf_cutoff(const bst_psf *psf);
 
-/* Distance, px, beyond which the mean light per pixel of a point is below 1e-9 of its peak. */
-double bst_psf_reach_px(const bst_psf *psf);
+/* Distance, px, beyond which the mean light per pixel of a point is below this part of its peak, at
+ * least 1e-9. */
+double bst_psf_reach_px(const bst_psf *psf, double part);
 
 /* Number of nodes: those of the field grid (1: uniform PSF) for each spectrum, one spectrum after
  * the other. */

@@ -337,6 +337,7 @@ bst_status bst_psf_make_diffraction(bst_ctx *ctx, const bst_camera *camera,
         q_most = fmax(q_most, b.q[k]);
     }
     psf->reach_px = q_most * cbrt(4e9 / (pow(BST_PI, 4.0) * (1.0 - e) * (1.0 - e) * (1.0 + e)));
+    psf->wing_power = 3.0;
     int nodes = psf->columns * psf->rows;
     for (int s = 0; s < b.spectra; s++) {
         BST_TRY(bst_optics_radial_create(ctx, psf->cutoff, &psf->shared[s]));

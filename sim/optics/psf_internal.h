@@ -99,7 +99,10 @@ struct bst_psf {
     double fwhm_px; /* of the camera */
     double width_px, height_px;
     double diffusion_px, fill[2];
-    double cutoff, reach_px;
+    double cutoff;
+    /* light below 1e-9 of the peak: reach of the optics, whose light per pixel decreases with this
+     * power of the distance (0: faster than any), and what pixel and diffusion add */
+    double reach_px, wing_power, wider_px;
     bst_psf *base; /* NULL, or the PSF whose tables this widened one borrows */
     bst_optics_radial_otf shared[BST_PSF_SPECTRA]; /* diffraction: annulus without aberrations,
                                                       common to all nodes of a spectrum */

@@ -20,8 +20,8 @@ void synthetic_free(synthetic *s);
 
 /* mean_e = sky */
 void synthetic_clear(synthetic *s);
-/* Adds a source: a Gaussian drawn uniformly along (dx, dy) about (x, y), integrated over pixels, by
- * 400 midpoints (one for a point). */
+/* Adds a source: a Gaussian drawn uniformly along (dx, dy) about (x, y), integrated over pixels, to
+ * 1e-7 of its peak. */
 void synthetic_add(synthetic *s, double x, double y, double flux_e, double dx, double dy);
 /* Poisson, multiplication (detector.em_gain), read noise, gain, offset, quantisation and clipping.
  */

@@ -92,10 +92,12 @@ static tally measure(double dx, double dy, double snr, int frames) {
     return measure_apart(dx, dy, snr, frames, 38);
 }
 
+static bool long_run;
+
 /* The required Pd; theory at 1 false alarm per frame of 256^2 gives about 0.96. */
 static void finds_snr_six(void **state) {
     (void)state;
-    tally point = measure(0, 0, 6, 14), streak = measure(8.3, 0, 6, 14);
+    tally point = measure(0, 0, 6, 8), streak = measure(8.3, 0, 6, 8);
     assert_true(point.found >= 0.85 * point.sources);
     assert_true(streak.found >= 0.85 * streak.sources);
 }
@@ -104,9 +106,10 @@ static void finds_snr_six(void **state) {
  * three of those. */
 static void locates_to_the_bound(void **state) {
     (void)state;
-    static const double cases[][3] = {{0, 0, 15}, {0, 0, 60},   {0, 0, 500},
-                                      {8, 0, 15}, {5, 6.5, 15}, {5, 6.5, 200}};
-    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+    static const double cases[][3] = {{0, 0, 15},    {0, 0, 500}, {5, 6.5, 15},
+                                      {5, 6.5, 200}, {0, 0, 60},  {8, 0, 15}};
+    enum { SHORT_FORM = 4 };
+    for (size_t c = 0; c < (long_run ? sizeof cases / sizeof *cases : SHORT_FORM); c++) {
         tally t = measure(cases[c][0], cases[c][1], cases[c][2], 10);
         assert_int_equal(t.found, t.sources);
         assert_true(t.ratio_along < 1.15);
@@ -139,19 +142,20 @@ static void multiplied_light_is_as_good_as_it_says(void **state) {
     em_gain = 0.0;
 }
 
-/* 1.05 of the bound is what is asked; 720 points or 360 streaks know the RMS to 2.6 or 3.7 %
- * (1 sigma; two of them are allowed for). The longer run, `test_imgproc_statistics long`, holds
- * 7,200 each to 1.07, two of its standard deviations. */
-static bool long_run;
+/* 1.05 of the bound is what is asked; 720 points, 360 or (long ones) 252 streaks know the RMS to
+ * 2.6, 3.7 or 4.5 % (1 sigma; two of them are allowed for). The longer run,
+ * `test_imgproc_statistics long`, holds 7,200 each to 1.07, two of its standard deviations, and has
+ * the other cases. */
 static void within_five_percent_of_the_bound(void **state) {
     (void)state;
     static const double cases[][4] = {/* path, SNR, spacing */
-                                      {0, 0, 10, 38},  {0, 0, 30, 38},  {0, 0, 100, 38},
-                                      {5, 0, 10, 38},  {20, 0, 20, 60}, {14, 14, 20, 60},
-                                      {60, 0, 50, 90}, {42, 42, 50, 80}};
-    for (size_t c = 0; c < sizeof cases / sizeof *cases; c++) {
+                                      {0, 0, 10, 38},   {0, 0, 100, 38},  {5, 0, 10, 38},
+                                      {14, 14, 20, 60}, {42, 42, 50, 80}, {60, 0, 50, 90},
+                                      {0, 0, 30, 38},   {20, 0, 20, 60}};
+    enum { SHORT_FORM = 5 };
+    for (size_t c = 0; c < (long_run ? sizeof cases / sizeof *cases : SHORT_FORM); c++) {
         const double *p = cases[c];
-        int frames = long_run ? 200 : p[3] > 40 ? 10 : 20;
+        int frames = long_run ? 200 : p[3] > 60 ? 7 : p[3] > 40 ? 10 : 20;
         double limit = 1.05 + 2.0 / sqrt(2.0 * 36 * frames);
         tally t = measure_apart(p[0], p[1], p[2], frames, (int)p[3]);
         print_message(
@@ -204,7 +208,7 @@ static void no_bias_over_pixel_phase(void **state) {
     }
 }
 
-/* Three-sigma of the Poisson count of about 480 events is 14 %; 20 % is what is asked. */
+/* Three-sigma of the Poisson count of about 320 events is 17 %; 20 % is what is asked. */
 static void false_alarms_are_as_requested(void **state) {
     (void)state;
     static const double paths[][2] = {{0, 0}, {8.3, 0}, {5.5, -6}};
@@ -220,7 +224,7 @@ static void false_alarms_are_as_requested(void **state) {
         bst_camera_motion motion = synthetic_motion(&s, paths[c][0], paths[c][1]);
         bst_imgproc_frame frame = synthetic_frame(&s);
         bst_rng_key key = bst_rng_make_key(7, 0, "test", "noise");
-        int alarms = 0, frames = 120;
+        int alarms = 0, frames = 80;
         for (int i = 0; i < frames; i++) {
             synthetic_expose(&s, key, (uint64_t)i);
             bst_assert_ok(&ctx, bst_imgproc_detect(&ctx, ip, &frame, &motion, d, 2048));
