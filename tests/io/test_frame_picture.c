@@ -70,6 +70,18 @@ static void places_in_the_picture(void **state) {
         assert_true(centre_of_change(without, with, width, height, &x, &y));
         bst_assert_close(x, left + 12.8 * scale - 0.5, 1.2);
         bst_assert_close(y, top + 9.1 * scale - 0.5, 1.2);
+        /* beside the frame all is black but for a line round it */
+        for (int i = 0; i < width * height; i++) {
+            int u = i % width - (int)left, v = i / width - (int)top;
+            int w = (int)(40 * scale), h = (int)(20 * scale);
+            const uint8_t *p = plain + 3 * i;
+            if (u < 0 || v < 0 || u >= w || v >= h) {
+                bool on = u >= -1 && v >= -1 && u <= w && v <= h; /* the line; its edges are soft */
+                bool beyond = u < -2 || v < -2 || u > w + 1 || v > h + 1;
+                int light = p[0] + p[1] + p[2];
+                assert_true(on ? light > 0 : !beyond || light == 0);
+            }
+        }
         free(plain);
         free(lit);
         free(without);

@@ -122,7 +122,44 @@ static void a_pair_splits_its_track(void **state) {
     }
 }
 
+/* Two lights as far apart as the resolution reaches are one object until then, farther ones are
+ * not. */
+static void distant_lights_are_no_pair(void **state) {
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        bst_ctx ctx = {0};
+        bst_mtt *m;
+        bst_mtt_params params = defaults();
+        params.association = BST_MTT_PMB;
+        params.max_tracks = params.max_detections = 10;
+        bst_assert_ok(&ctx, bst_mtt_create(&ctx, &params, &m));
+        bst_vec3 at = bst_vec3_from_radec(2.0, 0.9);
+        double apart = params.merge_rad + (k == 0 ? -0.1 : 0.1) * AS;
+        m->alarm_density = 3.0 / params.field_sr;
+        add(&m->now, beside(at, 0.3 * apart, 0.4 * apart), 11.4, false);
+        add(&m->now, beside(at, -0.3 * apart, -0.4 * apart), 11.4, false);
+        bst_mtt_pool_index(&m->now);
+        m->tracks[0] = (bst_mtt_track){.id = 5,
+                                       .status = BST_TRACK_CONFIRMED,
+                                       .state = {.direction = at},
+                                       .v_mag = 11.4 - 2.5 * log10(2.0),
+                                       .v_mag_variance = 0.04,
+                                       .existence = 0.8,
+                                       .may_miss = true};
+        for (int i = 0; i < 4; i++) {
+            m->tracks[0].state.covariance[i][i] = i < 2 ? AS * AS : 1e-14;
+        }
+        m->track_count = 1;
+        m->observable[0] = true;
+        m->detection_of_track[0] = -1;
+        bst_mtt_split_tracks(m);
+        assert_int_equal(m->track_count, k == 0 ? 2 : 1);
+        bst_mtt_free(m);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(a_pair_splits_its_track)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(a_pair_splits_its_track),
+                                       cmocka_unit_test(distant_lights_are_no_pair)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
