@@ -99,9 +99,9 @@ static void errors_of(const bst_camera_geometry_fit *fit, double pull[6]) {
               fit->corner_sigma_px;
 }
 
-/* Mean square of the pulls over the seeds: 1 but for chance. */
-static void check_pulls(field *f, double low, double high) {
-    double sum[6] = {0};
+/* Mean square of the pulls over the seeds: 1 but for chance. Returned: mean scatter, px. */
+static double check_pulls(field *f, double low, double high) {
+    double sum[6] = {0}, scatter = 0.0;
     for (int seed = 0; seed < SEEDS; seed++) {
         bst_ctx ctx = {0};
         const bst_camera start = first_guess();
@@ -110,6 +110,7 @@ static void check_pulls(field *f, double low, double high) {
         draw(f, 1000 + (uint64_t)seed);
         bst_assert_ok(&ctx, bst_camera_fit_geometry(&ctx, &start, f->stars, ALL, FRAMES, &fit));
         errors_of(&fit, pull);
+        scatter += fit.scatter_px / SEEDS;
         for (int k = 0; k < 6; k++) {
             assert_true(fabs(pull[k]) < 5.0);
             sum[k] += pull[k] * pull[k] / SEEDS;
@@ -120,16 +121,19 @@ static void check_pulls(field *f, double low, double high) {
             fail_msg("parameter %d: mean square of the pulls %.3f", k, sum[k]);
         }
     }
+    return scatter;
 }
 
 static void test_errors_are_as_stated(void **state) {
     (void)state;
     static field f = {.noise_px = 0.1};
     /* chi squared of 40 over 40: 0.46 to 1.8 with 99.9 % */
-    check_pulls(&f, 0.46, 1.8);
+    double scatter = check_pulls(&f, 0.46, 1.8);
+    /* the covariances say all: what is left is chance of 900 degrees of freedom, 0.022 px in half of the seeds */
+    assert_true(scatter < 0.02);
     /* the same stars with their own errors in all frames: 12 times as many places say no more */
     static field rest = {.noise_px = 0.02, .own_px = 0.1, .at_rest = true};
-    check_pulls(&rest, 0.46, 2.4);
+    (void)check_pulls(&rest, 0.46, 2.4);
 }
 
 static void test_exact_places(void **state) {

@@ -1,5 +1,7 @@
 /* Laws that `boresight characterize` fits to a sensor: dark currents against sums over fine steps
  * of their distributions, traps against lines of a whole sensor. */
+#include <stdlib.h>
+
 #include "sim/analysis/characterize/dark_distribution.h"
 #include "sim/analysis/characterize/trap_correction.h"
 #include "sim/analysis/characterize/trap_fit.h"
@@ -132,9 +134,39 @@ static void traps_are_found_on_each_side(void **state) {
     }
 }
 
+/* Counts of hits in ten darks and four bias frames: a rate by area and time, and the time of read-out, with the errors of
+ * counts. */
+static void hits_are_counted_by_area_and_time(void **state) {
+    (void)state;
+    bst_sensor_stacks s = {.pixel_pitch_um = 15.0};
+    s.dark.exposure_s = 20.0;
+    s.dark.hits.frames = 10;
+    s.dark.hits.count = 450;
+    s.bias.hits.frames = 4;
+    s.bias.hits.count = 80;
+    bst_sensor_figures *f = calloc(1, sizeof *f);
+    assert_non_null(f);
+    f->width = 300;
+    f->height = 200;
+    f->figures[BST_SENSOR_GAIN] = (bst_sensor_estimate){1.5, 0.01};
+    bst_sensor_measure_hits(&s, f);
+    const double per_frame = 45.0 - 20.0, sigma = sqrt(45.0 / 10.0 + 20.0 / 4.0);
+    const double unit = 20.0 * (300 * 15e-4) * (200 * 15e-4); /* cm^2 s */
+    bst_assert_close(f->figures[BST_SENSOR_HIT_RATE].value, per_frame / unit, 1e-9);
+    bst_assert_close(f->figures[BST_SENSOR_HIT_RATE].sigma, sigma / unit, 1e-9);
+    /* 20 hits at 25 in 20 s */
+    bst_assert_close(f->figures[BST_SENSOR_HIT_READOUT].value, 16.0, 1e-9);
+    double of_bias = sqrt(20.0 / 4.0) / per_frame, of_rate = 0.8 * sigma / per_frame;
+    bst_assert_close(f->figures[BST_SENSOR_HIT_READOUT].sigma,
+                     20.0 * sqrt(of_bias * of_bias + of_rate * of_rate), 1e-9);
+    assert_true(isnan(f->figures[BST_SENSOR_HIT_CHARGE].value));
+    free(f);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(shares_are_those_of_the_distributions),
                                        cmocka_unit_test(fit_finds_the_distribution),
-                                       cmocka_unit_test(traps_are_found_on_each_side)};
+                                       cmocka_unit_test(traps_are_found_on_each_side),
+                                       cmocka_unit_test(hits_are_counted_by_area_and_time)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

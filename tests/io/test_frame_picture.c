@@ -84,6 +84,25 @@ static void places_in_the_picture(void **state) {
         }
         free(plain);
         free(lit);
+        /* a streak's line goes from one end to the other, downwards to the right */
+        mark = (bst_io_overlay_mark){.kind = BST_OVERLAY_DETECTION,
+                                     .x_px = 18.0,
+                                     .y_px = 9.0,
+                                     .half_x_px = 6.0,
+                                     .half_y_px = 3.0};
+        uint8_t *streak = drawn(pixels, &one, width, height);
+        for (int end = -1; end <= 1; end += 2) {
+            for (int side = -1; side <= 1; side += 2) {
+                double u = left + (18.5 + 5.0 * end) * scale - 0.5;
+                double v = top + (9.5 + 2.5 * end * side) * scale - 0.5;
+                int at = 3 * ((int)lround(v) * width + (int)lround(u)), change = 0;
+                for (int c = 0; c < 3; c++) {
+                    change += abs(streak[at + c] - without[at + c]);
+                }
+                assert_int_equal(change > 0, side == 1);
+            }
+        }
+        free(streak);
         free(without);
         free(with);
     }
