@@ -5,6 +5,7 @@
 #include "boresight/vec.h"
 #include "sim/analysis/pd/pd.h"
 #include "sim/eval/detection_theory.h"
+#include "tests/io/plot_script.h"
 #include "tests/stdout_text.h"
 #include "tests/test_support.h"
 
@@ -295,6 +296,53 @@ static void words_of_a_measurement(void **state) {
     free(f);
 }
 
+/* The same point in the plot, the ideal curve, and the title. */
+static void plot_of_a_measurement(void **state) {
+    (void)state;
+    static char text[60000];
+    char path[700], line[200];
+    bst_ctx ctx = {0};
+    fixture *f = make(0.0);
+    f->result.tallies[4] = (bst_pd_tally){.trials = 500,
+                                          .matched = 400,
+                                          .error_square = {36.0, 64.0},
+                                          .bound_square = {0.4, 1.0},
+                                          .flux_square = 4.0,
+                                          .flux_bound_square = 0.05,
+                                          .chi_square = 880.0,
+                                          .bounds = 10};
+    bst_pd_figures g;
+    bst_pd_figures_of(&f->scene, &f->result, &g);
+    plot_script p;
+    plot_script_begin(&p);
+    snprintf(path, sizeof path, "%s/pd.png", p.folder.folder);
+    bst_assert_ok(&ctx, bst_pd_plot(&ctx, path, &f->scene, &f->result, &g));
+    plot_script_end(&p, text, sizeof text);
+    const char *at = text;
+    double row[7], ideal[3], range[2];
+    plot_script_numbers(&at, "\n7 ", 6, row);
+    /* 100 of 400 px^2 per axis against 0.04 and 0.1; as in the words above */
+    const double of_point[6] = {0.8, 0.7627, 0.8327, 1.5, 1.265, 1.414};
+    for (int k = 0; k < 6; k++) {
+        bst_assert_close(row[k], of_point[k], 5e-4);
+    }
+    plot_script_numbers(&at, "$ideal << BST_END\n", 3, ideal);
+    for (int i = 1; i <= 100; i++) {
+        plot_script_numbers(&at, "\n", 3, ideal);
+    }
+    bst_assert_close(ideal[0], 7.0, 1e-9);
+    bst_assert_close(ideal[1], bst_eval_ideal_pd(2.5e-6, 7), 1e-8);
+    bst_assert_close(ideal[2], bst_eval_matched_filter_pd(2.5e-6, 7, 0.05), 1e-8);
+    plot_script_numbers(&at, "set xrange [", 2, range);
+    bst_assert_close(range[0], 3.0 - 0.16, 1e-9);
+    bst_assert_close(range[1], 11.0 + 0.16, 1e-9);
+    snprintf(line, sizeof line,
+             "points, 2.5 false alarms per 1250 x 800 px; loss %.2f dB at 0.5, %.2f dB at 0.9\"",
+             g.loss_db_pd50, g.loss_db_pd90);
+    bst_assert_has(at, line);
+    free(f);
+}
+
 /* Stars in cells as bst_pd_sky_stars sorts them, and whether a detection is one of them, against a
  * look at each. */
 static double draw(uint64_t *state) {
@@ -504,6 +552,7 @@ int main(void) {
         cmocka_unit_test(losses),
         cmocka_unit_test(errors_against_bounds),
         cmocka_unit_test(words_of_a_measurement),
+        cmocka_unit_test(plot_of_a_measurement),
         cmocka_unit_test(detections_of_stars),
         cmocka_unit_test(stars_of_a_look),
     };

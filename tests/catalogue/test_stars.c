@@ -248,6 +248,32 @@ static void test_motion_is_erfas(void **state) {
     }
 }
 
+/* A row of a table that is moved to another epoch, with its motion in the axes there. */
+static void test_row_moves_as_erfa_says(void **state) {
+    (void)state;
+    static const double places[][2] = {{0.003, -37.0}, {101.3, -16.7}, {250.0, 60.0}, {88.0, 89.2}};
+    static const int motions[][2] = {{0, 0}, {-5460, -12231}, {-7988, 102773}, {65442, -57743}};
+    const double unit = 1e-4 * BST_ARCSEC_RAD;
+    for (int i = 0; i < 16; i++) {
+        bst_star_values v = {.ra_rad = places[i / 4][0] * BST_DEG_RAD,
+                             .dec_rad = places[i / 4][1] * BST_DEG_RAD,
+                             .pm_ra_cosdec = motions[i % 4][0],
+                             .pm_dec = motions[i % 4][1]};
+        double years = i % 2 ? -40.0 : 25.5, ra, dec, pm_ra, pm_dec, parallax, rv;
+        int warn = eraStarpm(v.ra_rad, v.dec_rad, v.pm_ra_cosdec * unit / cos(v.dec_rad),
+                             v.pm_dec * unit, 1.0, 0.0, 2451545.0, 0.0, 2451545.0, years * 365.25,
+                             &ra, &dec, &pm_ra, &pm_dec, &parallax, &rv);
+        assert_int_equal(warn, 0);
+        bst_star_move_epoch(&v, years);
+        bst_vec3 found = bst_vec3_from_radec(v.ra_rad, v.dec_rad);
+        /* 0.03 mas: light time; the motion is a whole number */
+        bst_assert_close(bst_vec3_angle(found, bst_vec3_from_radec(ra, dec)) / BST_ARCSEC_RAD, 0.0,
+                         0.04e-3);
+        bst_assert_close(v.pm_ra_cosdec, pm_ra * cos(dec) / unit, 1.0);
+        bst_assert_close(v.pm_dec, pm_dec / unit, 1.0);
+    }
+}
+
 static void test_find(void **state) {
     fixture *f = *state;
     bst_star star;
@@ -367,6 +393,7 @@ int main(void) {
         cmocka_unit_test(test_bright_stars_stand_where_published),
         cmocka_unit_test(test_colours),
         cmocka_unit_test(test_motion_is_erfas),
+        cmocka_unit_test(test_row_moves_as_erfa_says),
         cmocka_unit_test(test_find),
         cmocka_unit_test(test_bad_arguments),
         cmocka_unit_test(test_embedded_says_how_far_it_goes),

@@ -176,6 +176,10 @@ static void times_of_slews_and_sweeps(void **state) {
     bst_assert_close(bst_search_slew_s(4.0, 2.0, 4.0), 2.5, 1e-12);
     /* 0.25 deg: never at full rate; 2 sqrt(0.25 / 4) */
     bst_assert_close(bst_search_slew_s(0.25, 2.0, 4.0), 0.5, 1e-12);
+    /* both ramps are 1 deg long: up to there the full rate is not reached */
+    bst_assert_close(bst_search_slew_s(0.8, 2.0, 4.0), 2.0 * sqrt(0.2), 1e-12);
+    bst_assert_close(bst_search_slew_s(1.0, 2.0, 4.0), 1.0, 1e-12);
+    bst_assert_close(bst_search_slew_s(1.1, 2.0, 4.0), 1.05, 1e-12);
     bst_search s = {.count = 3, .complete = true, .tile = {{0, 0}, {0.5, 0.25}, {4.5, 0}}};
     const bst_search_timing timing = {.rate_radps = 2.0,
                                       .accel_radps2 = 4.0,

@@ -2,6 +2,7 @@
 #include <sqlite3.h>
 
 #include "sim/engine/recorder/recorder.h"
+#include "sim/world/world.h"
 #include "tests/io/scratch.h"
 
 enum { RATE = 6000, WIDTH = 8, HEIGHT = 6 };
@@ -13,6 +14,24 @@ static const bst_camera camera = {.width_px = WIDTH,
                                   .gain_e_per_dn = 2.0,
                                   .bits = 16};
 
+/* A world with one object, which has a shape. */
+static bst_world_object_info object;
+static int some_shape, some_world;
+
+int __wrap_bst_world_object_count(const bst_world *world);
+const bst_world_object_info *__wrap_bst_world_object(const bst_world *world, int index);
+
+int __wrap_bst_world_object_count(const bst_world *world) {
+    assert_ptr_equal(world, &some_world);
+    return 1;
+}
+
+const bst_world_object_info *__wrap_bst_world_object(const bst_world *world, int index) {
+    assert_ptr_equal(world, &some_world);
+    assert_int_equal(index, 0);
+    return &object;
+}
+
 static bst_recorder *make(bst_ctx *ctx, bst_run *run, const bst_recorder_config *config) {
     const bst_recorder_sensor one = {.observer = "alpha",
                                      .sensor = "wide",
@@ -22,6 +41,7 @@ static bst_recorder *make(bst_ctx *ctx, bst_run *run, const bst_recorder_config 
                                      .has_wheels = true};
     bst_recorder_info info = {
         .tick_rate_hz = RATE, .program = "test", .sensors = &one, .sensor_count = 1};
+    info.world = (const bst_world *)(const void *)&some_world;
     bst_assert_ok(ctx, bst_time_from_utc(ctx, "2022-06-16T22:10:00Z", &info.epoch));
     bst_recorder *recorder;
     bst_assert_ok(ctx, bst_recorder_create(ctx, run, config, &info, &recorder));
@@ -134,6 +154,19 @@ static void send_full_truth(bst_ctx *ctx, bst_recorder *recorder) {
     PUT(i, sunlit_fraction, "sunlit_fraction");
     i->phase_rad = keep(table, "phase_deg", 180.0 / BST_PI);
     PUT(i, range_m, "range_m");
+    t->shape_count = 1;
+    bst_truth_shape *s = &t->shapes[0];
+    table = "shapes";
+    PUT(s, x_px, "x_px");
+    PUT(s, y_px, "y_px");
+    PUT(s, x_light_px, "x_light_px");
+    PUT(s, y_light_px, "y_light_px");
+    PUT(s, x0_px, "x0_px");
+    PUT(s, y0_px, "y0_px");
+    PUT(s, x1_px, "x1_px");
+    PUT(s, y1_px, "y1_px");
+    PUT(s, size_px, "size_px");
+    s->q_body_from_gcrf = keep_quat(table, XYZW("q_body_from_gcrf"));
     send(ctx, recorder, BST_CHANNEL_TRUTH, t, t->end_tick);
     free(t);
 }
@@ -191,6 +224,22 @@ static void send_full_detections(bst_ctx *ctx, bst_recorder *recorder) {
     PUT(i, rate_x_pxps, "rate_x_pxps");
     PUT(i, rate_y_pxps, "rate_y_pxps");
     PUT(i, rate_sigma_pxps, "rate_sigma_pxps");
+    i->flags |= BST_DETECTION_EXTENDED;
+    table = "extended_targets";
+    bst_detection_extent *e = &i->extent;
+    PUT(e, light_x_px, "x_light_px");
+    PUT(e, light_y_px, "y_light_px");
+    PUT(e, x0_px, "x0_px");
+    PUT(e, y0_px, "y0_px");
+    PUT(e, x1_px, "x1_px");
+    PUT(e, y1_px, "y1_px");
+    PUT(e, size_px, "size_px");
+    PUT(e, size_sigma_px, "size_sigma_px");
+    PUT(e, area_px2, "area_px2");
+    PUT(e, saturated_share, "saturated_share");
+    e->phase_rad = keep(table, "phase_deg", 180.0 / BST_PI);
+    PUT(e, range_m, "range_m");
+    PUT(e, range_sigma_m, "range_sigma_m");
     send(ctx, recorder, BST_CHANNEL_DETECTIONS, d, 4000);
     free(d);
 }
@@ -344,8 +393,13 @@ static void test_columns(void **state) {
     snprintf(db, sizeof db, "%s/run.sqlite", out);
     bst_run *run;
     bst_assert_ok(&ctx, bst_run_create(&ctx, out, false, &run));
-    bst_recorder *recorder = make(&ctx, run, &config);
     kept.count = 0;
+    object = (bst_world_object_info){
+        .name = "box", .shape = (const struct bst_object_shape *)(const void *)&some_shape};
+    object.norad = (int)keep("objects", "norad", 1.0);
+    object.area_m2 = keep("objects", "area_m2", 1.0);
+    object.albedo = keep("objects", "albedo", 1.0);
+    bst_recorder *recorder = make(&ctx, run, &config);
     send_full_truth(&ctx, recorder);
     send_full_detections(&ctx, recorder);
     send_full_tracks(&ctx, recorder);

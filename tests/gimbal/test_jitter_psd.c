@@ -218,6 +218,20 @@ static void samples_and_what_they_lack_are_all_of_it(void **state) {
     bst_assert_close(whole / (px * px), 3.0 * (0.09 + 0.176) + 3.0 * 0.005 + 0.04, 1e-12);
     bst_assert_close(bst_jitter_spectrum_at(&s, 1, 100.0) / (px * px), 2.0 * 2e-4 + 0.02 / 195.0,
                      1e-15);
+    /* the tables twice in y alone, one line in both axes, the other one in x */
+    bst_assert_close(bst_jitter_spectrum_variance(&s, 0, 0.0, 1e9) / (px * px),
+                     0.09 + 0.176 + 2.0 * 0.005 + 0.02, 1e-12);
+    bst_assert_close(bst_jitter_spectrum_variance(&s, 1, 0.0, 1e9) / (px * px),
+                     2.0 * (0.09 + 0.176) + 0.005 + 0.02, 1e-12);
+    for (int axis = 0; axis < 2; axis++) { /* a band in which there is all but the second line */
+        double sum = 0.0;
+        for (double hz = 3.05; hz < 150.0; hz += 0.1) {
+            sum += 0.1 * bst_jitter_spectrum_at(&s, axis, hz);
+        }
+        /* half a step at each of the ends of table and band within */
+        bst_assert_close(bst_jitter_spectrum_variance(&s, axis, 3.0, 150.0) / (px * px),
+                         sum / (px * px) + 0.005, 3e-3);
+    }
     for (double rate_hz = 300.0; rate_hz < 1e4; rate_hz *= 5.0) {
         double dt_s = 1.0 / rate_hz, sum = 0.0, before[2] = {0.0, 0.0};
         bst_jitter_spec resolved = bst_jitter_resolved(&flat, dt_s);

@@ -166,6 +166,38 @@ static void streaks_at_the_edge(void **state) {
     bst_streak_finder_free(finder);
 }
 
+/* Frames that end on stars: places are those whose middle is in the frame, below and to the right
+ * alike. */
+static void places_are_in_frames_of_any_shape(void **state) {
+    (void)state;
+    static scene s;
+    static float part[SIDE * SIDE];
+    draw(&s, 20.0, 25.0);
+    for (int k = 0; k < 6; k++) {
+        /* 3, 5 or 7 px beyond the middle of a star in the last row, or of one in the last column */
+        double dx, dy;
+        path(20.0, 0.5, &dx, &dy);
+        int width = k % 2 ? (int)(s.x[8] + dx) - 2 - k : SIDE;
+        int height = k % 2 ? SIDE : (int)(s.y[8] + dy) - 2 - k;
+        for (int i = 0; i < width * height; i++) {
+            part[i] = s.pixels[i / width * SIDE + i % width];
+        }
+        const bst_common_streak_options options = {.max_sources = 40, .least_snr = 8.0};
+        bst_streak_finder *finder;
+        bst_common_streak found;
+        bst_assert_ok(&s.ctx,
+                      bst_streak_finder_create(&s.ctx, part, width, height, &options, &finder));
+        assert_true(bst_streak_finder_shapes(finder) >= 1);
+        bst_assert_ok(&s.ctx, bst_streak_finder_find(&s.ctx, finder, 0, &found));
+        assert_true(found.count >= 6);
+        for (int i = 0; i < found.count; i++) {
+            assert_true(found.items[i].x_px >= 0.0 && found.items[i].x_px <= width - 1);
+            assert_true(found.items[i].y_px >= 0.0 && found.items[i].y_px <= height - 1);
+        }
+        bst_streak_finder_free(finder);
+    }
+}
+
 /* Noise alone has no shape. */
 static void nothing_to_find(void **state) {
     (void)state;
@@ -210,9 +242,13 @@ static void ends_of_a_long_path(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(uneven_background), cmocka_unit_test(points),
-        cmocka_unit_test(curved_streaks),    cmocka_unit_test(streaks_at_the_edge),
-        cmocka_unit_test(nothing_to_find),   cmocka_unit_test(ends_of_a_long_path),
+        cmocka_unit_test(uneven_background),
+        cmocka_unit_test(points),
+        cmocka_unit_test(curved_streaks),
+        cmocka_unit_test(streaks_at_the_edge),
+        cmocka_unit_test(places_are_in_frames_of_any_shape),
+        cmocka_unit_test(nothing_to_find),
+        cmocka_unit_test(ends_of_a_long_path),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -70,8 +70,39 @@ static void places_in_the_picture(void **state) {
         assert_true(centre_of_change(without, with, width, height, &x, &y));
         bst_assert_close(x, left + 12.8 * scale - 0.5, 1.2);
         bst_assert_close(y, top + 9.1 * scale - 0.5, 1.2);
+        /* beside the frame all is black but for a line round it */
+        for (int i = 0; i < width * height; i++) {
+            int u = i % width - (int)left, v = i / width - (int)top;
+            int w = (int)(40 * scale), h = (int)(20 * scale);
+            const uint8_t *p = plain + 3 * i;
+            if (u < 0 || v < 0 || u >= w || v >= h) {
+                bool on = u >= -1 && v >= -1 && u <= w && v <= h; /* the line; its edges are soft */
+                bool beyond = u < -2 || v < -2 || u > w + 1 || v > h + 1;
+                int light = p[0] + p[1] + p[2];
+                assert_true(on ? light > 0 : !beyond || light == 0);
+            }
+        }
         free(plain);
         free(lit);
+        /* a streak's line goes from one end to the other, downwards to the right */
+        mark = (bst_io_overlay_mark){.kind = BST_OVERLAY_DETECTION,
+                                     .x_px = 18.0,
+                                     .y_px = 9.0,
+                                     .half_x_px = 6.0,
+                                     .half_y_px = 3.0};
+        uint8_t *streak = drawn(pixels, &one, width, height);
+        for (int end = -1; end <= 1; end += 2) {
+            for (int side = -1; side <= 1; side += 2) {
+                double u = left + (18.5 + 5.0 * end) * scale - 0.5;
+                double v = top + (9.5 + 2.5 * end * side) * scale - 0.5;
+                int at = 3 * ((int)lround(v) * width + (int)lround(u)), change = 0;
+                for (int c = 0; c < 3; c++) {
+                    change += abs(streak[at + c] - without[at + c]);
+                }
+                assert_int_equal(change > 0, side == 1);
+            }
+        }
+        free(streak);
         free(without);
         free(with);
     }

@@ -6,7 +6,7 @@
 #include "sim/io/picture.h"
 #include "sim/io/plot.h"
 #include "sim/io/quicklook.h"
-#include "tests/io/scratch.h"
+#include "tests/io/plot_script.h"
 
 enum { SIZE = 512 };
 
@@ -297,10 +297,70 @@ static void test_pointing_plot(void **state) {
     scratch_remove(&s);
 }
 
+/* Data, ranges and lines of the plot: errors that are larger in y, seven points of which four
+ * count. */
+static void test_pointing_plot_shows_its_points(void **state) {
+    (void)state;
+    static char text[20000];
+    bst_ctx ctx = {0};
+    bst_io_pointing_point points[7];
+    for (int i = 0; i < 7; i++) {
+        points[i] = (bst_io_pointing_point){.time_s = 2.0 + 0.5 * i,
+                                            .dx_px = i < 3 ? 40.0 - i : 0.2 * i - 1.0,
+                                            .dy_px = i < 3 ? -75.0 + i : 0.5 * i - 3.1,
+                                            .mode = i < 2 ? BST_MODE_SLEW : BST_MODE_TRACK,
+                                            .in_track = i >= 2,
+                                            .counted = i >= 3,
+                                            .visible = i != 1};
+    }
+    plot_script p;
+    plot_script_begin(&p);
+    bool made = false;
+    char path[700];
+    snprintf(path, sizeof path, "%s/plot.png", p.folder.folder);
+    bst_assert_ok(&ctx, bst_io_pointing_plot(&ctx, path, "name", "label", points, 7, 0.9, &made));
+    assert_true(made);
+    plot_script_end(&p, text, sizeof text);
+    const char *at = text;
+    double row[6], range[2];
+    plot_script_numbers(&at, "$points << BST_END\n", 6, row);
+    for (int i = 0; i < 7; i++) {
+        if (i > 0) {
+            if (i == 1) { /* not visible: no error is drawn */
+                plot_script_numbers(&at, "\n", 0, row);
+                continue;
+            }
+            plot_script_numbers(&at, "\n", 6, row);
+        }
+        const double expected[6] = {points[i].time_s,   hypot(points[i].dx_px, points[i].dy_px),
+                                    points[i].dx_px,    points[i].dy_px,
+                                    points[i].in_track, points[i].counted};
+        for (int k = 0; k < 6; k++) {
+            bst_assert_close(row[k], expected[k], 1e-6 * fabs(expected[k]));
+        }
+    }
+    plot_script_numbers(&at, "set xrange [", 2, range);
+    bst_assert_close(range[0], 2.0, 0.0);
+    bst_assert_close(range[1], 5.0, 0.0);
+    plot_script_numbers(&at, "rectangle from first", 1, range);
+    bst_assert_close(range[0], 2.0, 0.0);
+    plot_script_numbers(&at, "to first", 1, range); /* the mode of the third point begins there */
+    bst_assert_close(range[0], 3.0, 0.0);
+    plot_script_numbers(&at, "set yrange [", 2, range); /* 85 px is the largest error */
+    bst_assert_close(range[1], 100.0, 1e-9);
+    plot_script_numbers(&at, "plot", 0, range);
+    plot_script_numbers(&at, "set yrange [", 2, range); /* 1.6 px in y is the largest that counts */
+    bst_assert_close(range[0], -1.45 * 1.6, 1e-6);
+    bst_assert_close(range[1], 1.45 * 1.6, 1e-6);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_quicklook),     cmocka_unit_test(test_mark_sort),
-        cmocka_unit_test(test_stretch),       cmocka_unit_test(test_picture_errors),
+        cmocka_unit_test(test_pointing_plot_shows_its_points),
+        cmocka_unit_test(test_quicklook),
+        cmocka_unit_test(test_mark_sort),
+        cmocka_unit_test(test_stretch),
+        cmocka_unit_test(test_picture_errors),
         cmocka_unit_test(test_pointing_plot),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -94,11 +94,15 @@ class QuickTree(build_files.Judges):
 
     def link_of(self, program):
         """The words that link a program; None for one that is not linked with the libraries themselves."""
-        if program not in self.links:
-            lines = [line for line in self.ninja("-t", "commands", program).stdout.split("\n")
-                     if re.search(rf" -o (\S*/)?{re.escape(program)} ", line)]
-            words = shlex.split(lines[-1].removeprefix(": && ").removesuffix(" && :")) if lines else None
-            self.links[program] = None if words and any("libboresight.so" in w for w in words) else words
+        if not self.links:  # one call for all programs: Ninja needs long to read a build
+            programs = sorted({self.program_of(n) for n in self.tests} - {None})
+            for line in self.ninja("-t", "commands", *programs).stdout.split("\n"):
+                made = re.search(r" -o (\S+) ", line)
+                if made and (name := os.path.basename(made[1])) in programs and ".o " not in made[0]:
+                    words = shlex.split(line.removeprefix(": && ").removesuffix(" && :"))
+                    self.links[name] = None if any("libboresight.so" in w for w in words) else words
+            for name in programs:
+                self.links.setdefault(name, None)
         return self.links[program]
 
     def link(self, program):

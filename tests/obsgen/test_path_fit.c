@@ -353,6 +353,41 @@ static void fast_jitter_widens_the_image(void **state) {
     bst_assert_close(seen.point, expected.point, 0.01);
 }
 
+/* Two points apart widen a point's image by half their variance, to first order, in whatever
+ * direction; the fit is the same with x and y exchanged. */
+static void points_apart_widen_the_image(void **state) {
+    (void)state;
+    const double sigma = 1.3, apart = 0.3, flux[2] = {0.7, 0.3};
+    for (int k = 0; k < 8; k++) {
+        double c = cos(0.9 * k), s = sin(0.9 * k);
+        bst_path_point one[2], other[2];
+        for (int i = 0; i < 2; i++) {
+            double u = (i == 0 ? flux[1] : -flux[0]) * apart;
+            one[i] =
+                (bst_path_point){.x_px = 0.2 + u * c, .y_px = -0.4 + u * s, .flux = 3.0 * flux[i]};
+            other[i] =
+                (bst_path_point){.x_px = one[i].y_px, .y_px = one[i].x_px, .flux = one[i].flux};
+        }
+        bst_path_point_fit a = bst_path_fit_points(one, 2, sigma, sigma, 0.0, 0.0);
+        bst_path_point_fit b = bst_path_fit_points(other, 2, sigma, sigma, 0.0, 0.0);
+        /* second order: the square of 0.3 / 1.3 */
+        bst_assert_close(a.x_px, 0.2, 3e-3);
+        bst_assert_close(a.y_px, -0.4, 3e-3);
+        bst_assert_close(a.flux, 3.0, 3e-3);
+        bst_assert_close(a.widening_px2, 0.5 * flux[0] * flux[1] * apart * apart, 5e-4);
+        bst_assert_close(b.x_px, a.y_px, 1e-9);
+        bst_assert_close(b.y_px, a.x_px, 1e-9);
+        bst_assert_close(b.flux, a.flux, 1e-9);
+        bst_assert_close(b.widening_px2, a.widening_px2, 1e-9);
+    }
+    /* a wider image, without a direction */
+    const bst_path_point at = {.x_px = 0.2, .y_px = -0.4, .flux = 1.0};
+    bst_path_point_fit wide =
+        bst_path_fit_points(&at, 1, sqrt(sigma * sigma + 0.05), sigma, 0.0, 0.0);
+    bst_assert_close(wide.widening_px2, 0.05, 2e-3);
+    bst_assert_close(wide.flux, 1.0, 3e-3);
+}
+
 /* A streak in ten parts, one over the other, is fitted as the whole streak. */
 static void the_light_of_many_streaks_is_complete(void **state) {
     (void)state;
@@ -416,6 +451,7 @@ int main(void) {
         cmocka_unit_test(a_bend_is_measured_on_bright_streaks),
         cmocka_unit_test(outputs_are_those_of_sums),
         cmocka_unit_test(fast_jitter_widens_the_image),
+        cmocka_unit_test(points_apart_widen_the_image),
         cmocka_unit_test(the_light_of_many_streaks_is_complete),
         cmocka_unit_test(shape_and_detection_have_one_noise),
         cmocka_unit_test(bright_streaks_have_another_bias),

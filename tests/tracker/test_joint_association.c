@@ -129,6 +129,38 @@ static void one_detection_of_two_tracks(void **state) {
     bst_mtt_free(m);
 }
 
+/* The same with objects that may not exist, in clutter: the detection is the clutter's and both are
+ * missed, or the light of both, or that light is missed too. */
+static void one_detection_of_doubtful_tracks(void **state) {
+    (void)state;
+    const double r[2] = {0.7, 0.5};
+    for (int k = 0; k < 3; k++) {
+        bench *b = start_jointly(18 * AS);
+        bst_mtt *m = b->mtt;
+        const double pd = m->params.detection_probability, floor_rad = m->params.merge_floor_rad;
+        const double clutter = 0.05 * pow(4.0, k) / (AS * AS);
+        bst_vec3 at = bst_vec3_from_radec(1.0, 0.4);
+        m->alarm_density = m->clutter_density = clutter;
+        add_track(m, at, SIGMA, r[0]);
+        add_track(m, along(at, 0.3, 6 * AS), SIGMA, r[1]);
+        put(m, along(at, 0.3, 3 * AS));
+        double unresolved = bst_mtt_unresolved(18 * AS, &m->tracks[0], &m->tracks[1]);
+        assert_true(unresolved > 0.5 && unresolved < 0.95);
+        bst_mtt_associate(m, false);
+        double variance = 1.5 * SIGMA * SIGMA + floor_rad * floor_rad;
+        double density = 1.0 / (2.0 * BST_PI * variance);
+        double both = r[0] * r[1] * unresolved / (1.0 - unresolved);
+        double none = (1.0 - r[0] * pd) * (1.0 - r[1] * pd), lost = both * (1.0 - pd);
+        double merged = both * pd * density / clutter, sum = none + lost + merged;
+        for (int t = 0; t < 2; t++) {
+            double missed = r[t] * (1.0 - pd) / (1.0 - r[t] * pd);
+            /* 1e-6: the sphere, and the place between the tracks */
+            bst_assert_close(m->tracks[t].existence, (lost + merged + none * missed) / sum, 1e-6);
+        }
+        bst_mtt_free(m);
+    }
+}
+
 /* A detection between two tentative tracks, nearer to the first: it may be merged with the second's
  * only if that one exists. Both are 6 sigma apart: two objects, not one. */
 static void false_track_shares_no_light(void **state) {
@@ -230,6 +262,7 @@ int main(void) {
         cmocka_unit_test(misses_lower_existence),
         cmocka_unit_test(merged_measurement_is_inverted),
         cmocka_unit_test(one_detection_of_two_tracks),
+        cmocka_unit_test(one_detection_of_doubtful_tracks),
         cmocka_unit_test(false_track_shares_no_light),
         cmocka_unit_test(shared_light_widens_along_the_line),
         cmocka_unit_test(observed_sky_starts_fewer_tracks),

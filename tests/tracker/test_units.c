@@ -59,6 +59,8 @@ static void units_of_the_keys(void **state) {
     c.max_dormant_sigma_deg = 1.1;
     c.assumed_range_km = 37000;
     c.orbit_noise_mps15 = 1.7e-3;
+    c.identity_period_s = 7.0;
+    c.uncatalogued_per_field = 0.07;
     bst_assert_ok(&ctx, bst_tracker_create(&ctx, &c, &camera, 6000, no_star, NULL, &t));
     const bst_mtt_params *m = &t->mtt->params;
     const pair list[] = {
@@ -90,7 +92,10 @@ static void units_of_the_keys(void **state) {
         {"merge", m->merge_rad, 5.9 * PX},
         {"merge floor", m->merge_floor_rad, 0.37 * PX},
         {"feed forward", m->feed_forward_rad, 4.7 * BST_DEG_RAD},
-        {"stationary", m->star_rate_radps, 0.59 * AS}};
+        {"stationary", m->star_rate_radps, 0.59 * AS},
+        /* per steradian, (rad/s)^2 of the disc of rates, and magnitude of 10 */
+        {"unknown objects", t->identity_params.unknown_density,
+         0.07 / (900.0 * 500.0 * PX * PX) / (BST_PI * 113 * AS * 113 * AS) / 10.0}};
     expect(list, sizeof list / sizeof *list);
     bst_tracker_free(t);
     bst_config_free(bst_tracker_config_table, &c);

@@ -179,6 +179,12 @@ static void wrong_ones_are_refused(void **state) {
            "\"true_anomaly_deg\": 0, \"mean_anomaly_deg\": 90}}}",
            "test: /world/objects/0/orbit/state: true_anomaly_deg 0 is a mean anomaly of 0 degrees, "
            "but mean_anomaly_deg gives 90; give one of the two");
+    refuse(
+        NUMERICAL
+        "\"state\": {\"source\": \"keplerian\", \"semi_major_axis_m\": 8e6, "
+        "\"true_anomaly_deg\": 30, \"mean_anomaly_deg\": -150}}}",
+        "test: /world/objects/0/orbit/state: true_anomaly_deg 30 is a mean anomaly of 30 degrees, "
+        "but mean_anomaly_deg gives -150; give one of the two");
     refuse(NUMERICAL
            "\"state\": {\"source\": \"keplerian\", \"semi_major_axis_m\": 8e6, "
            "\"eccentricity\": 1.5}}}",

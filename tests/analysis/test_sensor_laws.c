@@ -1,0 +1,172 @@
+/* Laws that `boresight characterize` fits to a sensor: dark currents against sums over fine steps
+ * of their distributions, traps against lines of a whole sensor. */
+#include <stdlib.h>
+
+#include "sim/analysis/characterize/dark_distribution.h"
+#include "sim/analysis/characterize/trap_correction.h"
+#include "sim/analysis/characterize/trap_fit.h"
+#include "tests/test_support.h"
+
+static double below_normal(double z) {
+    return 0.5 * erfc(-z / sqrt(2.0));
+}
+
+/* Share below a rate of the dark current of relative RMS dsnu plus `extra`, with shot noise and the
+ * other noise. */
+static double core(const bst_dark_distribution *d, const bst_dark_noise *noise, double extra,
+                   double rate) {
+    double sum = 0.0, width = sqrt(log(1.0 + d->dsnu * d->dsnu));
+    const double step = 0.2;
+    for (double z = -6.0; z < 6.1; z += step) {
+        /* the mean of exp(width z) is exp(width^2 / 2) */
+        double mean = extra + d->dark * exp(width * z) / exp(0.5 * width * width);
+        sum += step * exp(-0.5 * z * z) / sqrt(2.0 * BST_PI) *
+               below_normal((rate - mean) / sqrt(noise->variance + mean / noise->exposure_s));
+    }
+    return sum;
+}
+
+static double below(const bst_dark_distribution *d, const bst_dark_noise *noise, double rate) {
+    double sum = 0.0;
+    const double step = 0.2;
+    for (double z = -6.0; z < 6.1; z += step) {
+        double extra = d->hot_median * exp(log(10.0) * d->hot_spread_dex * z);
+        sum += step * exp(-0.5 * z * z) / sqrt(2.0 * BST_PI) * core(d, noise, extra, rate);
+    }
+    return (1.0 - d->hot_fraction) * core(d, noise, 0.0, rate) + d->hot_fraction * sum;
+}
+
+static const bst_dark_distribution sensors[] = {
+    {3.0, 0.3, 0.02, 40.0, 0.4}, {0.2, 0.1, 0.7, 0.5, 0.25}, {12.0, 0.5, 0.2, 20.0, 0.25}};
+static const bst_dark_noise noises[] = {{1.0, 3.0}, {0.005, 30.0}, {16.0, 2.0}};
+
+static void shares_are_those_of_the_distributions(void **state) {
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        static const double rates[] = {0.5, 0.9, 1.0, 1.3, 3.0, 20.0};
+        for (int k = 0; k < 6; k++) {
+            double rate = rates[k] * sensors[i].dark;
+            /* its steps are 0.7 and 0.15 standard deviations, less than the noise here */
+            bst_assert_close(bst_dark_distribution_below(&sensors[i], &noises[i], rate),
+                             below(&sensors[i], &noises[i], rate), 2e-3);
+        }
+    }
+}
+
+static void fit_finds_the_distribution(void **state) {
+    (void)state;
+    const bst_dark_distribution *sensor = &sensors[0];
+    double percentiles[BST_SENSOR_PERCENTILES];
+    for (int k = 0; k < BST_SENSOR_PERCENTILES; k++) {
+        double low = 0.0, high = 1e4, share = bst_sensor_percentiles[k] / 100.0;
+        while (high - low > 1e-6 * high) {
+            double rate = 0.5 * (low + high);
+            *(bst_dark_distribution_below(sensor, &noises[0], rate) < share ? &low : &high) = rate;
+        }
+        percentiles[k] = low;
+    }
+    bst_dark_distribution found;
+    assert_true(bst_dark_distribution_fit(percentiles, &noises[0], NULL, &found));
+    const double got[5] = {found.dark, found.dsnu, found.hot_fraction, found.hot_median,
+                           found.hot_spread_dex};
+    const double expected[5] = {sensor->dark, sensor->dsnu, sensor->hot_fraction,
+                                sensor->hot_median, sensor->hot_spread_dex};
+    for (int k = 0; k < 5; k++) { /* a search in five dimensions; shares to 5 % of themselves */
+        bst_assert_close(got[k] / expected[k], 1.0, k == 1 ? 0.1 : 0.03);
+    }
+    percentiles[3] = NAN;
+    assert_false(bst_dark_distribution_fit(percentiles, &noises[0], NULL, &found));
+}
+
+enum { ROW = 700, BEYOND = 12 };
+
+/* The trail behind the middle pixel of a line that is read pixel by pixel, as shares of its charge.
+ */
+static void trail_of(const bst_detector_traps_config *traps, double background_e, double charge_e,
+                     double out[BST_TRAIL_PIXELS]) {
+    static float line[ROW + BEYOND];
+    for (int i = 0; i < ROW + BEYOND; i++) {
+        line[i] = (float)(background_e + (i == ROW ? charge_e : 0.0));
+    }
+    bst_trap_pass_line(traps, 0, ROW + BEYOND, 1, line);
+    for (int k = 0; k < BST_TRAIL_PIXELS; k++) {
+        out[k] = ((double)line[ROW + 1 + k] - background_e) / (double)(line[ROW] - line[ROW - 1]);
+    }
+}
+
+static void traps_are_found_on_each_side(void **state) {
+    (void)state;
+    static const bst_detector_traps_config traps = {.traps_per_px = {0.9, 0.5, 0.0},
+                                                    .release_px = {0.6, 4.0, 1.0},
+                                                    .fill_exponent = 0.6,
+                                                    .reference_e = 10000.0};
+    static const double charge_dn[BST_TRAIL_CLASSES] = {400, 900, 2200, 7000};
+    const bst_trap_fit_input input = {.gain_e_per_dn = 1.7, .background_e = 15.0, .transfers = ROW};
+    for (int side = 0; side < BST_TRAIL_SIDES; side++) {
+        bst_charge_trail trail = {.parallel_up = side == 0, .serial_right = side == 2};
+        double found[BST_TRAIL_PIXELS];
+        for (int c = 0; c < BST_TRAIL_CLASSES; c++) {
+            double sum = 0.0;
+            trail_of(&traps, input.background_e, input.gain_e_per_dn * charge_dn[c], found);
+            for (int k = 0; k < BST_TRAIL_PIXELS; k++) {
+                sum += found[k];
+            }
+            trail.class_charge[c] = charge_dn[c];
+            *(side < 2 ? &trail.class_parallel[c] : &trail.class_serial[c]) = sum;
+        }
+        trail_of(&traps, input.background_e, input.gain_e_per_dn * sqrt(900.0 * 2200.0), found);
+        for (int k = 0; k < BST_TRAIL_PIXELS; k++) {
+            /* both sides have wings, which the difference removes; the other direction has none */
+            trail.profile[side][k] = found[k] + 0.01 / (k + 1);
+            trail.profile[side ^ 1][k] = 0.01 / (k + 1);
+        }
+        bst_detector_traps_config out;
+        double rms = bst_trap_fit(&trail, side < 2, &input, &out);
+        assert_true(rms < 2e-4); /* of trails of some hundredths */
+        int fast = out.release_px[0] > out.release_px[1];
+        double scale = pow(out.reference_e / traps.reference_e, -traps.fill_exponent);
+        bst_assert_close(out.release_px[fast], 0.6, 0.1);
+        bst_assert_close(out.release_px[1 - fast], 4.0, 0.8);
+        bst_assert_close(out.traps_per_px[fast] * scale, 0.9, 0.1);
+        bst_assert_close(out.traps_per_px[1 - fast] * scale, 0.5, 0.07);
+        bst_assert_close(out.fill_exponent, 0.6, 0.03);
+        bst_assert_close(out.traps_per_px[2], 0.0, 0.0);
+    }
+}
+
+/* Counts of hits in ten darks and four bias frames: a rate by area and time, and the time of read-out, with the errors of
+ * counts. */
+static void hits_are_counted_by_area_and_time(void **state) {
+    (void)state;
+    bst_sensor_stacks s = {.pixel_pitch_um = 15.0};
+    s.dark.exposure_s = 20.0;
+    s.dark.hits.frames = 10;
+    s.dark.hits.count = 450;
+    s.bias.hits.frames = 4;
+    s.bias.hits.count = 80;
+    bst_sensor_figures *f = calloc(1, sizeof *f);
+    assert_non_null(f);
+    f->width = 300;
+    f->height = 200;
+    f->figures[BST_SENSOR_GAIN] = (bst_sensor_estimate){1.5, 0.01};
+    bst_sensor_measure_hits(&s, f);
+    const double per_frame = 45.0 - 20.0, sigma = sqrt(45.0 / 10.0 + 20.0 / 4.0);
+    const double unit = 20.0 * (300 * 15e-4) * (200 * 15e-4); /* cm^2 s */
+    bst_assert_close(f->figures[BST_SENSOR_HIT_RATE].value, per_frame / unit, 1e-9);
+    bst_assert_close(f->figures[BST_SENSOR_HIT_RATE].sigma, sigma / unit, 1e-9);
+    /* 20 hits at 25 in 20 s */
+    bst_assert_close(f->figures[BST_SENSOR_HIT_READOUT].value, 16.0, 1e-9);
+    double of_bias = sqrt(20.0 / 4.0) / per_frame, of_rate = 0.8 * sigma / per_frame;
+    bst_assert_close(f->figures[BST_SENSOR_HIT_READOUT].sigma,
+                     20.0 * sqrt(of_bias * of_bias + of_rate * of_rate), 1e-9);
+    assert_true(isnan(f->figures[BST_SENSOR_HIT_CHARGE].value));
+    free(f);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(shares_are_those_of_the_distributions),
+                                       cmocka_unit_test(fit_finds_the_distribution),
+                                       cmocka_unit_test(traps_are_found_on_each_side),
+                                       cmocka_unit_test(hits_are_counted_by_area_and_time)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
