@@ -489,10 +489,10 @@ static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_rend
                                    int binning, cl_mem frame) {
     BST_TRY(build_expected(ctx, r));
     BST_TRY(r->intervals ? render_ramp(ctx, r, q) : render_light(ctx, r, q));
-    int rows = q->window.height / binning;
+    int parts = bst_readout_parts(r->readout, q->window, binning);
     cl_mem saturated;
-    BST_TRY(saturated_room(ctx, r, (size_t)rows, &saturated));
-    r->saturation.tiles[r->set] = rows;
+    BST_TRY(saturated_room(ctx, r, (size_t)parts, &saturated));
+    r->saturation.tiles[r->set] = parts;
     bst_kernel_frame_params p = bst_render_params(&r->fixed, &r->camera, &r->options, q, 0);
     return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, q->start_s, frame,
                            saturated);

@@ -48,6 +48,9 @@ bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name)
  *   read noise >= 0.75 e-   means from 30 e- on, to 1/sigma^4
  *   below                   never: single electrons are resolved */
 void bst_detector_options(const bst_detector *detector, bool shared, char *text, size_t bytes);
+/* True if the read noise has a tail (telegraph noise). */
+bool bst_detector_has_tail(const bst_camera *camera);
+
 /* Build options of kernels/read_tail.cl and of a multiplication register, each preceded by a
  * space. */
 const char *bst_detector_tail_options(const bst_camera *camera);

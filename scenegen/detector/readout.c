@@ -391,6 +391,17 @@ static bst_status collect_charge(bst_ctx *ctx, bst_readout *r, const cl_mem *map
     return enqueue_kernel(ctx, r, CHARGE, (arguments){p, sizeof *p, charge, 5}, rows);
 }
 
+int bst_readout_parts(const bst_readout *r, bst_window window, int binning) {
+    assert(r && binning >= 1);
+    int height = window.height / binning, width = window.width / binning;
+    if (!bst_detector_has_tail(&r->camera)) {
+        return height;
+    }
+    int top = window.y0 / binning, left = window.x0 / binning;
+    int blocks = (top + height - 1) / BST_TAIL_ROWS - top / BST_TAIL_ROWS + 1;
+    return blocks * ((left % 64 + width + 63) / 64);
+}
+
 bst_status bst_readout_archive(bst_readout *r, bst_archive *archive) {
     assert(r && archive);
     return wanted(r, PERSISTENCE)
@@ -423,5 +434,5 @@ bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *det
     cl_mem table = wanted(r, RAMP) ? r->planes : r->multiplication;
     cl_mem read[] = {r->image, frame, saturated, maps[3], maps[4], maps[5], r->full, table};
     return enqueue_kernel(ctx, r, READ, (arguments){&p, sizeof p, read, 8},
-                          (size_t)p.window_height);
+                          (size_t)bst_readout_parts(r, window, binning));
 }

@@ -45,12 +45,17 @@ bst_status bst_readout_interval(bst_ctx *ctx, bst_readout *readout, const bst_de
                                 const bst_kernel_frame_params *params, bst_window window,
                                 int interval, double start_s) BST_MUST_CHECK;
 
+/* Number of parts of a frame that are read independently of each other.
+ *
+ * Given:     window  on the sensor, before binning */
+int bst_readout_parts(const bst_readout *readout, bst_window window, int binning);
+
 /* Enqueues the read-out of a frame from the light image, or from the intervals of a ramp.
  *
  * Given:     params     of the frame: window, exposure, noise
  *            window     on the sensor, before binning
  *            start_s    start of the exposure, for persistence
- *            saturated  room for one int per frame row */
+ *            saturated  room for one int per part (bst_readout_parts) */
 bst_status bst_readout_run(bst_ctx *ctx, bst_readout *readout, const bst_detector *detector,
                            const bst_kernel_frame_params *params, bst_window window, int binning,
                            double start_s, cl_mem frame, cl_mem saturated) BST_MUST_CHECK;

@@ -32,6 +32,8 @@
 #define BST_ROW_LANES 16
 /* Cosmic-ray pixels placed by a work-group. */
 #define BST_HIT_GROUP 64
+/* Rows of a block of the read-out in which the tail of the read noise is drawn (read_tail.cl). */
+#define BST_TAIL_ROWS 16
 /* Work-items of a work-group of the staged read-out. */
 #define BST_READOUT_GROUP 64
 /* Multiplication register (multiplication.h): fewer electrons than this have a row in its table
