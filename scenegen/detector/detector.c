@@ -56,7 +56,8 @@ bst_window bst_detector_light_window(const bst_camera *camera, bst_window window
 
 bool bst_detector_is_staged(const bst_detector *detector) {
     return bst_detector_config_whole_columns(&detector->camera.detector) ||
-           detector->camera.detector.ramp.reads > 0 || multiplies(&detector->camera);
+           detector->camera.detector.ramp.reads > 0 || multiplies(&detector->camera) ||
+           bst_detector_has_pixel_flicker(&detector->camera.detector);
 }
 
 /* True if offsets are new in every frame. */

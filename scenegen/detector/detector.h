@@ -62,7 +62,7 @@ void bst_detector_params(const bst_detector *detector, bst_kernel_frame_params *
 bst_window bst_detector_light_window(const bst_camera *camera, bst_window window);
 
 /* True if frames pass the staged read-out (readout.h): effects between pixels, multiplication of
- * charge, ramps. */
+ * charge, ramps, 1/f noise of pixels. */
 bool bst_detector_is_staged(const bst_detector *detector);
 
 /* Prepares the per-exposure effects: cosmic rays, level, row offsets, phases of the pick-up. */

@@ -306,8 +306,28 @@ typedef struct read_buffers {
     global ushort *frame;
     global uchar *flags;
     global const uchar *full;
-    global const float *table;
+    global const float *table, *noise;
 } read_buffers;
+
+/* Charge behind the amplifier with read noise; row, column: as gather_charge. */
+INLINE chunk add_read_noise(bst_kernel_frame_params p, read_buffers from, uint counter, int row,
+                            int column, chunk q) {
+    chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
+#ifdef RAMP
+    chunk_flags none;
+    chunk noise = gather_charge(p, from.table, from.full, row, column, &none);
+    e.a = fma(sqrt(noise.a), z.a, q.a);
+    e.b = fma(sqrt(noise.b), z.b, q.b);
+    e.c = fma(sqrt(noise.c), z.c, q.c);
+    e.d = fma(sqrt(noise.d), z.d, q.d);
+#else
+    e.a = read_out(p, q.a, z.a);
+    e.b = read_out(p, q.b, z.b);
+    e.c = read_out(p, q.c, z.c);
+    e.d = read_out(p, q.d, z.d);
+#endif
+    return e;
+}
 
 /* Reads the 64 pixels of a frame row y from x - skip on, columns from first + x on of the binned
  * sensor. Returns the saturated ones as store_dn does. */
@@ -320,20 +340,16 @@ INLINE int16 read_chunk(bst_kernel_frame_params p, detector_maps maps, read_buff
 #ifdef MULTIPLY
     q = multiply_chunk(p, to.table, counter, q);
 #endif
-    chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
-#ifdef RAMP
-    chunk_flags none;
-    chunk noise = gather_charge(p, to.table, to.full, row, x - skip, &none);
-    e.a = fma(sqrt(noise.a), z.a, q.a);
-    e.b = fma(sqrt(noise.b), z.b, q.b);
-    e.c = fma(sqrt(noise.c), z.c, q.c);
-    e.d = fma(sqrt(noise.d), z.d, q.d);
-#else
-    e.a = read_out(p, q.a, z.a);
-    e.b = read_out(p, q.b, z.b);
-    e.c = read_out(p, q.c, z.c);
-    e.d = read_out(p, q.d, z.d);
-#endif
+    chunk e;
+    if (HAS(p, BST_EFFECT_FLICKER)) {
+        chunk n = load_chunk(to.noise + (size_t)row * p.maps_stride + first + x);
+        e.a = n.a + respond(p, q.a);
+        e.b = n.b + respond(p, q.b);
+        e.c = n.c + respond(p, q.c);
+        e.d = n.d + respond(p, q.d);
+    } else {
+        e = add_read_noise(p, to, counter, row, x - skip, q);
+    }
     e = ADD_TAIL(tail, row / b, e);
     size_t line = (size_t)y * p.window_width;
     global uchar *marks = HAS(p, BST_EFFECT_FLAGS) ? to.flags + line : 0;
@@ -344,14 +360,16 @@ INLINE int16 read_chunk(bst_kernel_frame_params p, detector_maps maps, read_buff
 /* Reads charge as digital numbers: p.binning x p.binning pixels are summed before they are read.
  * frame: [window_height][window_width], both after binning. saturated: pixels per work-item. full:
  * of bst_detector_mark, with BST_EFFECT_MARKS. table: of multiply_chunk, or with RAMP the variance
- * of the read noise of each pixel, as image. One work-item per frame row; with TAIL one per block of
+ * of the read noise of each pixel, as image. noise: of bst_detector_flicker, with
+ * BST_EFFECT_FLICKER. One work-item per frame row; with TAIL one per block of
  * read_tail.cl, whose noise is drawn at once, the blocks of a row side by side. */
 READOUT_GROUP kernel void bst_detector_read(bst_kernel_frame_params p, global const float *image, global ushort *frame,
                               global int *saturated, global const float *offsets,
                               global const ushort *codes, global uchar *flags,
-                              global const uchar *full, global const float *table) {
+                              global const uchar *full, global const float *table,
+                              global const float *noise) {
     detector_maps maps = {0, 0, 0, offsets, codes, 0};
-    read_buffers to = {image, frame, flags, full, table};
+    read_buffers to = {image, frame, flags, full, table, noise};
     /* binned pixels lie on a grid that starts at the window's first pixel */
     int item = (int)get_global_id(0), b = p.binning;
     int first = p.window_x0 / b / 64 * 64, skip = p.window_x0 / b - first;

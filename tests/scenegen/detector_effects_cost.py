@@ -32,8 +32,10 @@ PERSISTENCE = {"persistence": {"trapped_share": [0.002, 0.001, 0.001, 0.0005, 0.
 PARALLEL = {"parallel_traps": {"traps_per_px": [0.4, 0.2, 0], "release_px": [0.6, 20, 1]}}
 SERIAL = {"serial_traps": {"traps_per_px": [0.1, 0, 0], "release_px": [2, 1, 1]}}
 CROSSTALK = {"crosstalk": {"outputs": 2, "coupling": 1e-3}}
-PIXEL_NOISE = {"reset_noise_e": 4, "pixel_flicker": {"rms_e": 3}}
+PIXEL_NOISE = {"reset_noise_e": 4, "pixel_flicker_noise": {"rms_e": 3}}
+# several outputs and traps along rows exclude each other
 BUT_MULTIPLY = {**BEFORE, **READ_OUT, **COUPLING, **PERSISTENCE, **PARALLEL, **SERIAL}
+OUTPUTS = {**BEFORE, **READ_OUT, **COUPLING, **PERSISTENCE, **PARALLEL, **CROSSTALK, **MULTIPLY}
 CASES = {
     "none": {},
     "before": BEFORE,
@@ -46,8 +48,8 @@ CASES = {
     "before and pixel noise": {**BEFORE, **PIXEL_NOISE},
     "all but multiplication": BUT_MULTIPLY,
     "all with multiplication": {**BUT_MULTIPLY, **MULTIPLY},
-    "all with crosstalk": {**BUT_MULTIPLY, **MULTIPLY, **CROSSTALK},
-    "all": {**BUT_MULTIPLY, **MULTIPLY, **CROSSTALK, **PIXEL_NOISE},
+    "all with crosstalk": OUTPUTS,
+    "all with pixel noise": {**BUT_MULTIPLY, **MULTIPLY, **PIXEL_NOISE},
     "ramp of 4 reads": {"ramp": {"reads": 4}},
     "ramp of 16 reads": {"ramp": {"reads": 16}},
     "ramp of 16 reads, slope": {"ramp": {"reads": 16, "flicker_noise_e": 4}},
