@@ -46,6 +46,12 @@ bst_status bst_render_request_check(bst_ctx *ctx, const bst_camera *camera,
         return bst_fail(ctx, BST_ERR_ARGUMENT, "binning %d does not fit a window of %d x %d pixels",
                         binning, w.width, w.height);
     }
+    if (binning > 1 && bst_detector_has_pixel_flicker(&camera->detector)) {
+        return bst_fail(ctx, BST_ERR_ARGUMENT,
+                        "binning is %d, but the camera's detector/pixel_flicker_noise is that of "
+                        "single pixels (allowed: 1)",
+                        binning);
+    }
     if (!(q->background_e >= 0.0) || !isfinite(q->background_e) || q->track->count < 2) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
                         "a request needs a background that is finite and not negative (it is %g) "

@@ -448,16 +448,21 @@ bst_status bst_renderer_plan(bst_ctx *ctx, bst_renderer *r, const bst_render_req
     return enqueue_image(ctx, r, request, (target){.kernel = NULL});
 }
 
-/* Renders the light that the staged read-out of a request needs. */
-static bst_status render_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q) {
+/* Renders the light that the staged read-out of a request needs; interval: of a ramp, else 0. */
+static bst_status render_light(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
+                               int interval) {
     bst_render_request light = *q;
     cl_mem image;
     int stride;
     light.window = bst_readout_light_window(r->readout, q->window);
     BST_TRY(bst_readout_image(ctx, r->readout, light.window, &image, &stride));
-    return enqueue_image(
-        ctx, r, &light,
-        (target){.kernel = r->expected_kernel, .out = image, .stride = stride, .light_only = true});
+    int number = interval % bst_readout_images(r->readout);
+    return enqueue_image(ctx, r, &light,
+                         (target){.kernel = r->expected_kernel,
+                                  .out = image,
+                                  .stride = stride,
+                                  .light_only = true,
+                                  .first_row = number * light.window.height});
 }
 
 /* Renders the intervals of a ramp, and sets the statistics of the whole exposure. */
@@ -469,7 +474,7 @@ static bst_status render_ramp(bst_ctx *ctx, bst_renderer *r, const bst_render_re
         BST_TRY(bst_ramp_interval(ctx, r->intervals, q, i, intervals, &part));
         BST_TRY(bst_detector_interval(ctx, r->detector, r->stage, q->key, q->exposure_id, i,
                                       bst_render_exposure_s(&part)));
-        BST_TRY(render_light(ctx, r, &part));
+        BST_TRY(render_light(ctx, r, &part, i));
         all.nodes += r->stats.nodes;
         all.nodes_bounded = all.nodes_bounded || r->stats.nodes_bounded;
         all.single_kernel = all.single_kernel && r->stats.single_kernel;
@@ -488,11 +493,11 @@ static bst_status render_ramp(bst_ctx *ctx, bst_renderer *r, const bst_render_re
 static bst_status render_in_stages(bst_ctx *ctx, bst_renderer *r, const bst_render_request *q,
                                    int binning, cl_mem frame) {
     BST_TRY(build_expected(ctx, r));
-    BST_TRY(r->intervals ? render_ramp(ctx, r, q) : render_light(ctx, r, q));
-    int rows = q->window.height / binning;
+    BST_TRY(r->intervals ? render_ramp(ctx, r, q) : render_light(ctx, r, q, 0));
+    int parts = bst_readout_parts(r->readout, q->window, binning);
     cl_mem saturated;
-    BST_TRY(saturated_room(ctx, r, (size_t)rows, &saturated));
-    r->saturation.tiles[r->set] = rows;
+    BST_TRY(saturated_room(ctx, r, (size_t)parts, &saturated));
+    r->saturation.tiles[r->set] = parts;
     bst_kernel_frame_params p = bst_render_params(&r->fixed, &r->camera, &r->options, q, 0);
     return bst_readout_run(ctx, r->readout, r->detector, &p, q->window, binning, q->start_s, frame,
                            saturated);

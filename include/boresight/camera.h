@@ -300,8 +300,11 @@ double bst_camera_dark_e(const bst_camera *c, double exposure_s);
 /* Variance of read charge over its mean: 2 - 1 / em_gain with a multiplication register (of the
  * charge itself); with a ramp, whose line weighs the charge of its intervals, up to 1.2; else 1. */
 double bst_camera_excess_noise(const bst_camera *c);
-/* RMS of the read noise of a pixel in a frame, e-: read_noise_e, or that of the line through the
- * reads of a ramp. */
+/* RMS of what a pixel's read noise has anew in each frame, e-: of the read, and of the reset; or of
+ * the two reads of double sampling. Not for a ramp. */
+double bst_camera_white_noise_e(const bst_camera *c);
+/* RMS of the read noise of a pixel in a frame, e-: bst_camera_white_noise_e and 1/f noise of the
+ * pixel, or noise of the line through the reads of a ramp. */
 double bst_camera_read_noise_e(const bst_camera *c);
 /* Light of an exposure that fills a pixel's well before a frame shows that it is full, e-:
  * full_well_e, with a ramp of N reads N - 1 times as much. */

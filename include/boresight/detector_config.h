@@ -71,6 +71,12 @@ typedef struct bst_detector_ramp_config {
     double flicker_noise_e; /* 1/f noise of a pixel from read to read, RMS */
 } bst_detector_ramp_config;
 
+/* 1/f noise of single pixels, correlated from frame to frame. */
+typedef struct bst_detector_pixel_flicker_config {
+    double rms_e;
+    double lowest_hz, highest_hz; /* equal power in each octave in between */
+} bst_detector_pixel_flicker_config;
+
 /* Side of the frame that is read first. */
 typedef struct bst_detector_output_config {
     bool right, top; /* the last column, the last row; otherwise column 0, row 0 */
@@ -103,6 +109,10 @@ typedef struct bst_detector_config {
     double readout_s; /* time of the read-out, in which packets gather dark current */
     double clock_induced_e;
     double offset_noise_e, offset_drift_dn_per_frame, flicker_noise_e;
+    double reset_noise_e; /* of each pixel, new in every frame */
+    double
+        double_sampling_s; /* from the read that is subtracted to the one of the frame; 0: none */
+    bst_detector_pixel_flicker_config pixel_flicker_noise;
     bst_detector_edges_config shielded, overscan;
     bst_detector_pick_up_config pick_up;
     bst_detector_glow_config glow;
@@ -135,12 +145,15 @@ bool bst_detector_has_traps(const bst_detector_traps_config *t);
 /* True if pixels keep charge of earlier frames. */
 bool bst_detector_has_persistence(const bst_detector_config *d);
 
+/* True if pixels have 1/f noise from frame to frame. */
+bool bst_detector_has_pixel_flicker(const bst_detector_config *d);
+
 /* Checks for effects that exclude each other.
  *
  * Errors:    BST_ERR_CONFIG, with the key: a rolling shutter beside effects that need whole columns
  *            (bst_detector_config_whole_columns); traps along rows beside several outputs;
  *            persistence that traps more than all charge; a ramp of one read, or beside effects of
- *            a read-out that moves charge */
+ *            a read-out that moves charge; a range of 1/f noise that is empty or too wide */
 bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d) BST_MUST_CHECK;
 /* Checks edges and outputs against the size of the frame.
  *

@@ -56,7 +56,8 @@ bst_window bst_detector_light_window(const bst_camera *camera, bst_window window
 
 bool bst_detector_is_staged(const bst_detector *detector) {
     return bst_detector_config_whole_columns(&detector->camera.detector) ||
-           detector->camera.detector.ramp.reads > 0 || multiplies(&detector->camera);
+           detector->camera.detector.ramp.reads > 0 || multiplies(&detector->camera) ||
+           bst_detector_has_pixel_flicker(&detector->camera.detector);
 }
 
 /* True if offsets are new in every frame. */
@@ -77,15 +78,14 @@ static bool charge_first(const bst_camera *c) {
     return 2.0 * bend * c->read_noise_e * c->read_noise_e / c->full_well_e > 3e-5;
 }
 
-/* True if the read noise has a tail. */
-static bool has_tail(const bst_camera *c) {
+bool bst_detector_has_tail(const bst_camera *c) {
     return c->detector.telegraph_noise_fraction > 0.0 && c->detector.telegraph_noise_rms_e > 0.0;
 }
 
 const char *bst_detector_tail_options(const bst_camera *camera) {
     static const char *const options[2][2] = {{"", " -DMULTIPLY"},
                                               {" -DTAIL", " -DTAIL -DMULTIPLY"}};
-    return options[has_tail(camera)][multiplies(camera)];
+    return options[bst_detector_has_tail(camera)][multiplies(camera)];
 }
 
 /* BST_EFFECT_... of the camera. */
@@ -128,7 +128,7 @@ void bst_detector_params(const bst_detector *detector, bst_kernel_frame_params *
     p->bend1 = (float)n[0];
     p->bend2 = (float)n[1];
     p->bend3 = (float)n[2];
-    if (has_tail(c)) {
+    if (bst_detector_has_tail(c)) {
         p->tail_gap = (float)(-0.5 / log1p(-d->telegraph_noise_fraction));
         p->tail_rms_e = (float)d->telegraph_noise_rms_e;
     }

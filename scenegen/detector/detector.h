@@ -48,6 +48,9 @@ bst_rng_key bst_detector_pattern_key(const bst_camera *camera, const char *name)
  *   read noise >= 0.75 e-   means from 30 e- on, to 1/sigma^4
  *   below                   never: single electrons are resolved */
 void bst_detector_options(const bst_detector *detector, bool shared, char *text, size_t bytes);
+/* True if the read noise has a tail (telegraph noise). */
+bool bst_detector_has_tail(const bst_camera *camera);
+
 /* Build options of kernels/read_tail.cl and of a multiplication register, each preceded by a
  * space. */
 const char *bst_detector_tail_options(const bst_camera *camera);
@@ -59,7 +62,7 @@ void bst_detector_params(const bst_detector *detector, bst_kernel_frame_params *
 bst_window bst_detector_light_window(const bst_camera *camera, bst_window window);
 
 /* True if frames pass the staged read-out (readout.h): effects between pixels, multiplication of
- * charge, ramps. */
+ * charge, ramps, 1/f noise of pixels. */
 bool bst_detector_is_staged(const bst_detector *detector);
 
 /* Prepares the per-exposure effects: cosmic rays, level, row offsets, phases of the pick-up. */

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "scenegen/detector/saved_floats.h"
+
 double bst_persistence_fill(double x) {
     assert(x >= 0.0);
     /* the closed form loses digits as 1e-16 / x, the series' first neglected term is x^4 / 120 */
@@ -78,35 +80,8 @@ bst_status bst_persistence_archive(bst_persistence *p, bst_device *device,
         return BST_OK;
     }
     BST_TRY(bst_persistence_prepare(ctx, p, device, d, pixels));
-    cl_command_queue queue = bst_device_queue(device);
-    void *copy = malloc(p->bytes);
-    if (!copy) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the trapped charge of the pixels");
-    }
-    bst_status status = BST_OK;
-    if (!restoring) {
-        status = bst_device_check(
-            ctx, clEnqueueReadBuffer(queue, p->trapped, CL_TRUE, 0, p->bytes, copy, 0, NULL, NULL),
-            "reading the trapped charge of the pixels");
-    }
-    bst_archive_bytes(archive, copy, p->bytes);
-    if (restoring) {
-        const float *charge = copy;
-        for (size_t i = 0; i < p->bytes / sizeof *charge; i++) {
-            double found_e = (double)charge[i];
-            if (!(found_e >= 0.0 && found_e < 1e9)) {
-                free(copy);
-                return bst_fail(ctx, BST_ERR_FORMAT,
-                                "the saved state has a trapped charge of %g e- (allowed: 0 to 1e9)",
-                                found_e);
-            }
-        }
-        status = bst_device_check(
-            ctx, clEnqueueWriteBuffer(queue, p->trapped, CL_TRUE, 0, p->bytes, copy, 0, NULL, NULL),
-            "restoring the trapped charge of the pixels");
-    }
-    free(copy);
-    return status;
+    return bst_saved_floats(archive, device, p->trapped, p->bytes, 0.0, 1e9,
+                            "trapped charge of the pixels");
 }
 
 void bst_persistence_clear(bst_persistence *p) {

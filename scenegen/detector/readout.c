@@ -8,6 +8,7 @@
 #include "bst_scenegen_kernels.h"
 #include "scenegen/detector/multiplication.h"
 #include "scenegen/detector/persistence.h"
+#include "scenegen/detector/pixel_noise.h"
 #include "scenegen/scene_kernels.h"
 #include "sim/optics/ramp_fit.h"
 
@@ -17,6 +18,7 @@ enum {
     BLOOM,
     MARK,
     READ,
+    FLICKER,
     PERSISTENCE,
     RAMP,
     RAMP_FIT,
@@ -37,6 +39,7 @@ struct bst_readout {
     cl_mem multiplication; /* table of the register, NULL without one */
     size_t bytes;
     bst_persistence persistence;
+    bst_pixel_noise pixel_noise;
     cl_mem planes, held;         /* of a ramp: kernels/ramp.cl, persistence.cl */
     bst_kernel_ramp_params ramp; /* of the latest interval */
 };
@@ -49,6 +52,8 @@ static bool wanted(const bst_readout *r, int kernel) {
             return d->frame_transfer_s > 0.0;
         case BLOOM:
             return d->saturation == BST_WELL_BLOOM;
+        case FLICKER:
+            return bst_detector_has_pixel_flicker(d);
         case PERSISTENCE:
             return bst_detector_has_persistence(d);
         case RAMP:
@@ -77,13 +82,15 @@ static bool needs_over(const bst_readout *r) {
 
 bst_status bst_readout_prepare(bst_ctx *ctx, bst_readout *r) {
     static const char *const names[KERNELS] = {
-        "bst_detector_transfer", "bst_detector_charge",   "bst_detector_bloom",
-        "bst_detector_mark",     "bst_detector_read",     "bst_detector_persistence",
-        "bst_detector_ramp",     "bst_detector_ramp_fit", "bst_detector_neighbours",
-        "bst_detector_parallel", "bst_detector_serial",   "bst_detector_crosstalk"};
+        "bst_detector_transfer",    "bst_detector_charge",   "bst_detector_bloom",
+        "bst_detector_mark",        "bst_detector_read",     "bst_detector_flicker",
+        "bst_detector_persistence", "bst_detector_ramp",     "bst_detector_ramp_fit",
+        "bst_detector_neighbours",  "bst_detector_parallel", "bst_detector_serial",
+        "bst_detector_crosstalk"};
     static const bst_device_kernel_source *const staged[] = {
-        &bst_kernel_scene_shared, &bst_kernel_lanes,    &bst_kernel_random,   &bst_kernel_chunk,
-        &bst_kernel_read_tail,    &bst_kernel_detector, &bst_kernel_store_dn, &bst_kernel_readout,
+        &bst_kernel_scene_shared, &bst_kernel_lanes,     &bst_kernel_random,
+        &bst_kernel_chunk,        &bst_kernel_read_tail, &bst_kernel_detector,
+        &bst_kernel_store_dn,     &bst_kernel_readout,   &bst_kernel_pixel_flicker,
         &bst_kernel_persistence,  &bst_kernel_ramp};
     static const bst_device_kernel_source *const moving[] = {
         &bst_kernel_scene_shared, &bst_kernel_lanes, &bst_kernel_charge_transfer,
@@ -100,7 +107,7 @@ bst_status bst_readout_prepare(bst_ctx *ctx, bst_readout *r) {
              wanted(r, RAMP) ? " -DRAMP" : "");
     for (int i = 0; i < KERNELS; i++) {
         if (wanted(r, i) && !r->kernels[i]) {
-            int sources = (int)(sizeof staged / sizeof *staged) - (i <= READ ? 2 : 0);
+            int sources = (int)(sizeof staged / sizeof *staged) - (i <= READ ? 3 : 0);
             BST_TRY(i <= RAMP_FIT
                         ? bst_scene_kernel(ctx, r->device, staged, sources, options, names[i],
                                            &r->kernels[i])
@@ -157,6 +164,7 @@ void bst_readout_free(bst_readout *r) {
         clReleaseMemObject(r->held);
     }
     bst_persistence_clear(&r->persistence);
+    bst_pixel_noise_clear(&r->pixel_noise);
     clReleaseCommandQueue(r->queue);
     clReleaseContext(r->context);
     free(r);
@@ -170,11 +178,45 @@ bst_window bst_readout_light_window(const bst_readout *r, bst_window window) {
     return light;
 }
 
-enum { RAMP_PLANES = 4 }; /* of kernels/ramp.cl */
+enum {
+    RAMP_PLANES = 3, /* of kernels/ramp.cl */
+    /* images of intervals that are read at once: all of the ramp if those of the whole sensor take
+     * at most this, bytes, and else eight, so that a pixel's values are loaded and stored less
+     * often */
+    RAMP_BYTES = 256 << 20,
+    RAMP_IMAGES = 8,
+    /* reads of a ramp from which on the possible signals of a pixel lie close together: six give
+     * multiples of a seventh of an electron */
+    RAMP_LINE_READS = 6
+};
+/* Signals from here on, e-, are drawn by an expansion whose first neglected term is 1e-4 of their
+ * standard deviation at three of these (skewness 0.06). */
+static const float RAMP_LINE_FROM = 400.0F;
 
 /* Row stride of an image, floats. */
 static int stride_of(int width) {
     return (width + 63) / 64 * 64;
+}
+
+/* Images that hold the light of intervals of a ramp until they are read. */
+int bst_readout_images(const bst_readout *r) {
+    assert(r);
+    const bst_camera *c = &r->camera;
+    if (!wanted(r, RAMP) || c->detector.cosmic_rays.rate_per_cm2_s > 0.0) {
+        return 1; /* hits of an interval lie in a map for all */
+    }
+    size_t intervals = (size_t)c->detector.ramp.reads - 1;
+    size_t bytes = (size_t)stride_of((int)c->width_px) * (size_t)c->height_px * sizeof(float);
+    return intervals * bytes <= RAMP_BYTES || intervals < RAMP_IMAGES ? (int)intervals
+                                                                      : RAMP_IMAGES;
+}
+
+/* True if the signal of a pixel may be drawn at once instead of read by read. */
+static bool draws_lines(const bst_readout *r) {
+    const bst_detector_config *d = &r->camera.detector;
+    const double *n = d->nonlinearity;
+    return d->ramp.fit == BST_RAMP_SLOPE && d->ramp.reads >= RAMP_LINE_READS && n[0] == 0.0 &&
+           n[1] == 0.0 && n[2] == 0.0 && bst_readout_images(r) == (int)d->ramp.reads - 1;
 }
 
 bst_status bst_readout_image(bst_ctx *ctx, bst_readout *r, bst_window light, cl_mem *image,
@@ -185,8 +227,10 @@ bst_status bst_readout_image(bst_ctx *ctx, bst_readout *r, bst_window light, cl_
         enum { BUFFERS = 5 };
         cl_mem *buffers[BUFFERS] = {&r->image, &r->over, &r->full, &r->planes, &r->held};
         bool ramp = wanted(r, RAMP);
+        const size_t images = (size_t)bst_readout_images(r) * bytes;
         const size_t room[BUFFERS] = {
-            bytes, needs_over(r) ? bytes : 0, wanted(r, MARK) ? bytes / sizeof(float) : 0,
+            images, needs_over(r) ? images : 0,
+            /* they change places */ wanted(r, MARK) ? bytes / sizeof(float) : 0,
             ramp ? RAMP_PLANES * bytes : 0, ramp && wanted(r, PERSISTENCE) ? bytes : 0};
         for (int i = 0; i < BUFFERS; i++) {
             if (*buffers[i]) {
@@ -310,7 +354,7 @@ static bst_status move_charge(bst_ctx *ctx, bst_readout *r, const bst_kernel_fra
     return BST_OK;
 }
 
-/* Pixels whose traps are followed. */
+/* Pixels whose traps or 1/f noise are followed. */
 static size_t persistent_pixels(const bst_readout *r) {
     return (size_t)stride_of((int)r->camera.width_px) * (size_t)r->camera.height_px;
 }
@@ -325,11 +369,28 @@ static bst_status enqueue_persistence(bst_ctx *ctx, bst_readout *r, const cl_mem
     bst_kernel_persistence_params t = bst_persistence_begin(&r->persistence, d, p, start_s);
     t.in_ramp = wanted(r, RAMP);
     t.continues = interval > 0;
+    t.image = interval % bst_readout_images(r);
     cl_mem b[] = {r->image, maps[0], maps[1], maps[2], maps[6], r->persistence.trapped, r->held};
     BST_TRY(enqueue_kernel(ctx, r, PERSISTENCE, (arguments){&t, sizeof t, b, 7},
                            (size_t)p->light_height));
     p->effects |= BST_EFFECT_MEANS;
     return BST_OK;
+}
+
+/* Read noise of all pixels of the sensor, with 1/f noise. */
+static bst_status enqueue_flicker(bst_ctx *ctx, bst_readout *r, double read_s,
+                                  bst_kernel_frame_params *p) {
+    if (!wanted(r, FLICKER)) {
+        return BST_OK;
+    }
+    assert(p->binning == 1);
+    bst_pixel_noise *n = &r->pixel_noise;
+    BST_TRY(bst_pixel_noise_prepare(ctx, n, r->device, &r->camera.detector, persistent_pixels(r)));
+    bst_kernel_flicker_params t = bst_pixel_noise_begin(n, &r->camera, p, read_s);
+    cl_mem b[] = {n->state, n->noise};
+    p->effects |= BST_EFFECT_FLICKER;
+    return enqueue_kernel(ctx, r, FLICKER, (arguments){&t, sizeof t, b, 2},
+                          (size_t)r->camera.height_px);
 }
 
 /* Parameters of a frame whose light covers a window. */
@@ -359,13 +420,25 @@ bst_status bst_readout_interval(bst_ctx *ctx, bst_readout *r, const bst_detector
     if (wanted(r, PERSISTENCE)) {
         BST_TRY(enqueue_persistence(ctx, r, maps, start_s, interval, &p));
     }
+    int images = bst_readout_images(r), image = interval % images;
     r->ramp.frame = p;
-    r->ramp.interval = interval;
+    r->ramp.interval = interval - image;
+    r->ramp.intervals = image + 1;
     r->ramp.reads = (int)ramp->reads;
     r->ramp.last_minus_first = ramp->fit == BST_RAMP_LAST_MINUS_FIRST;
+    r->ramp.line_from = draws_lines(r) ? RAMP_LINE_FROM : -1.0F;
+    double weight[BST_RAMP_READS], later = 0.0;
+    bst_ramp_weights(ramp, r->ramp.reads, weight);
+    for (int i = r->ramp.reads - 1; i > 0; i--) { /* an interval's charge is in all later reads */
+        later += weight[i];
+        r->ramp.weight[i - 1] = (float)later;
+    }
     for (int used = 2; interval == 0 && used <= r->ramp.reads; used++) {
         double noise_e = bst_ramp_noise_e(ramp, r->camera.read_noise_e, used);
         r->ramp.variance[used] = (float)(noise_e * noise_e);
+    }
+    if (image + 1 < images && interval + 2 < r->ramp.reads) {
+        return BST_OK; /* waits for the next intervals */
     }
     cl_mem b[] = {r->image, maps[0], maps[1], maps[2], r->planes};
     return enqueue_kernel(ctx, r, RAMP, (arguments){&r->ramp, sizeof r->ramp, b, 5},
@@ -391,12 +464,27 @@ static bst_status collect_charge(bst_ctx *ctx, bst_readout *r, const cl_mem *map
     return enqueue_kernel(ctx, r, CHARGE, (arguments){p, sizeof *p, charge, 5}, rows);
 }
 
+int bst_readout_parts(const bst_readout *r, bst_window window, int binning) {
+    assert(r && binning >= 1);
+    int height = window.height / binning, width = window.width / binning;
+    if (!bst_detector_has_tail(&r->camera)) {
+        return height;
+    }
+    int top = window.y0 / binning, left = window.x0 / binning;
+    int blocks = (top + height - 1) / BST_TAIL_ROWS - top / BST_TAIL_ROWS + 1;
+    return blocks * ((left % 64 + width + 63) / 64);
+}
+
 bst_status bst_readout_archive(bst_readout *r, bst_archive *archive) {
     assert(r && archive);
-    return wanted(r, PERSISTENCE)
-               ? bst_persistence_archive(&r->persistence, r->device, &r->camera.detector,
-                                         persistent_pixels(r), archive)
-               : BST_OK;
+    const bst_detector_config *d = &r->camera.detector;
+    if (wanted(r, PERSISTENCE)) {
+        BST_TRY(
+            bst_persistence_archive(&r->persistence, r->device, d, persistent_pixels(r), archive));
+    }
+    return wanted(r, FLICKER) ? bst_pixel_noise_archive(&r->pixel_noise, r->device, d,
+                                                        persistent_pixels(r), archive)
+                              : BST_OK;
 }
 
 void bst_readout_inherit(bst_readout *r, bst_readout *before) {
@@ -404,6 +492,9 @@ void bst_readout_inherit(bst_readout *r, bst_readout *before) {
     bst_persistence_clear(&r->persistence);
     r->persistence = before->persistence;
     before->persistence = (bst_persistence){0};
+    bst_pixel_noise_clear(&r->pixel_noise);
+    r->pixel_noise = before->pixel_noise;
+    before->pixel_noise = (bst_pixel_noise){0};
 }
 
 bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *detector,
@@ -419,9 +510,11 @@ bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *det
     p.window_height = window.height / binning;
     BST_TRY(collect_charge(ctx, r, maps, start_s, &p));
     BST_TRY(move_charge(ctx, r, &p));
+    BST_TRY(enqueue_flicker(ctx, r, start_s + (double)p.exposure_s, &p));
     p.per_full_well /= (float)(binning * binning);
     cl_mem table = wanted(r, RAMP) ? r->planes : r->multiplication;
-    cl_mem read[] = {r->image, frame, saturated, maps[3], maps[4], maps[5], r->full, table};
-    return enqueue_kernel(ctx, r, READ, (arguments){&p, sizeof p, read, 8},
-                          (size_t)p.window_height);
+    cl_mem read[] = {r->image, frame, saturated,           maps[3], maps[4], maps[5],
+                     r->full,  table, r->pixel_noise.noise};
+    return enqueue_kernel(ctx, r, READ, (arguments){&p, sizeof p, read, 9},
+                          (size_t)bst_readout_parts(r, window, binning));
 }

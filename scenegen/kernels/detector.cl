@@ -58,7 +58,7 @@ INLINE lanes poisson_search(lanes mean, lanes_uint word, lanes_int wanted) {
         }
         left = MASK(chance == 0u) & MASK(mean < (float)(k - 1));
     }
-    return select(to_lanes(count), floor(mean), active & left);
+    return select(to_lanes(count), FLOOR(mean), active & left);
 }
 
 /* Poisson deviates of mean >= POISSON_SWITCH from a standard normal: the floor of the
@@ -66,11 +66,11 @@ INLINE lanes poisson_search(lanes mean, lanes_uint word, lanes_int wanted) {
  * with terms up to 1/mean). */
 INLINE lanes poisson_expand(lanes mean, lanes w) {
     lanes root = sqrt(mean), q = w * w;
-    lanes whole = floor(mean);
+    lanes whole = FLOOR(mean);
     lanes d = (mean - whole) + root * w + (1.0f / 3 + q * (1.0f / 6)) -
                 w * (1.0f / 36 + q * (1.0f / 72)) / root +
                 (-8.0f / 405 + q * (7.0f / 810 + q * (1.0f / 270))) / mean;
-    return fmax(whole + floor(d), 0.0f);
+    return fmax(whole + FLOOR(d), 0.0f);
 }
 
 /* Amplifier response (nonlinearity) to a charge. */

@@ -37,6 +37,17 @@ typedef ushort16 lanes_ushort;
 #define SIGN_MASK(v) (v)
 #endif
 
+/* floor() of lanes by the processor's instruction, where the compiler has it as a function for all
+ * vectors; some OpenCL libraries emulate floor() by six. */
+#if !defined(ONE_LANE) && defined(__has_builtin)
+#if __has_builtin(__builtin_elementwise_floor)
+#define FLOOR(x) __builtin_elementwise_floor(x)
+#endif
+#endif
+#ifndef FLOOR
+#define FLOOR(x) floor(x)
+#endif
+
 #ifdef ONE_LANE
 INLINE int any_of(int mask) {
     return mask < 0;

@@ -45,6 +45,7 @@ READOUT_GROUP kernel void bst_detector_persistence(
         return;
     }
     size_t plane = (size_t)p.light_height * p.light_stride;
+    image += t.image * plane;
     for (int x = 0; x < p.light_stride; x += 64) {
         size_t at = (size_t)y * p.light_stride + x;
         size_t map = (size_t)row * p.maps_stride + p.tiles_x0 + x;

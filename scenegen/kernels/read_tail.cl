@@ -4,7 +4,7 @@
  * The reads are drawn in blocks of TAIL_ROWS rows and 64 columns of the read-out, because a single
  * chunk has few reads in the tail. Within a block the distance from one to the next is
  * geometrically distributed. */
-#define TAIL_ROWS 16
+#define TAIL_ROWS BST_TAIL_ROWS
 #define TAIL_READS (TAIL_ROWS * 64)
 /* Most generator calls of a block, a power of two. */
 #define TAIL_CALLS 64u

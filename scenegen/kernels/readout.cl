@@ -229,7 +229,7 @@ INLINE lanes gamma_lacks(global const float *table, lanes n, lanes z) {
  * z by up to 6e-4 as bits of the angle, and by more in the tails as bits of the radius. */
 INLINE lanes multiply_charge(bst_kernel_frame_params p, global const float *table, lanes_uint word,
                              lanes z, lanes q) {
-    lanes whole = floor(q), u = to_lanes(as_lanes_int(word & 0xFFFFu)) * 0x1p-16f;
+    lanes whole = FLOOR(q), u = to_lanes(as_lanes_int(word & 0xFFFFu)) * 0x1p-16f;
     lanes n = fmax(whole + select((lanes)0.0f, (lanes)1.0f, MASK(u < q - whole)), 0.0f);
     lanes some = fmax(n, 1.0f), x = gamma_expand(some, z);
     if (any_of(MASK(n < (float)BST_MULTIPLY_FEW))) {
@@ -300,55 +300,101 @@ INLINE chunk gather_charge(bst_kernel_frame_params p, global const float *image,
     return q;
 }
 
+/* What the read-out of a frame takes and gives. */
+typedef struct read_buffers {
+    global const float *image;
+    global ushort *frame;
+    global uchar *flags;
+    global const uchar *full;
+    global const float *table, *noise;
+} read_buffers;
+
+/* Charge behind the amplifier with read noise; row, column: as gather_charge. */
+INLINE chunk add_read_noise(bst_kernel_frame_params p, read_buffers from, uint counter, int row,
+                            int column, chunk q) {
+    chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
+#ifdef RAMP
+    chunk_flags none;
+    chunk noise = gather_charge(p, from.table, from.full, row, column, &none);
+    e.a = fma(sqrt(noise.a), z.a, q.a);
+    e.b = fma(sqrt(noise.b), z.b, q.b);
+    e.c = fma(sqrt(noise.c), z.c, q.c);
+    e.d = fma(sqrt(noise.d), z.d, q.d);
+#else
+    e.a = read_out(p, q.a, z.a);
+    e.b = read_out(p, q.b, z.b);
+    e.c = read_out(p, q.c, z.c);
+    e.d = read_out(p, q.d, z.d);
+#endif
+    return e;
+}
+
+/* Reads the 64 pixels of a frame row y from x - skip on, columns from first + x on of the binned
+ * sensor. Returns the saturated ones as store_dn does. */
+INLINE int16 read_chunk(bst_kernel_frame_params p, detector_maps maps, read_buffers to,
+                        const tail_block *tail, int y, int first, int x, int skip) {
+    int b = p.binning, row = p.window_y0 + y * b;
+    chunk_flags brim;
+    chunk q = gather_charge(p, to.image, to.full, row, x - skip, &brim);
+    uint counter = counter_of(row / b, first + x, p.sensor_width / b);
+#ifdef MULTIPLY
+    q = multiply_chunk(p, to.table, counter, q);
+#endif
+    chunk e;
+    if (HAS(p, BST_EFFECT_FLICKER)) {
+        chunk n = load_chunk(to.noise + (size_t)row * p.maps_stride + first + x);
+        e.a = n.a + respond(p, q.a);
+        e.b = n.b + respond(p, q.b);
+        e.c = n.c + respond(p, q.c);
+        e.d = n.d + respond(p, q.d);
+    } else {
+        e = add_read_noise(p, to, counter, row, x - skip, q);
+    }
+    e = ADD_TAIL(tail, row / b, e);
+    size_t line = (size_t)y * p.window_width;
+    global uchar *marks = HAS(p, BST_EFFECT_FLAGS) ? to.flags + line : 0;
+    return store_dn(p, maps, convert_chunk(p, maps, row, first + x, e), brim, x - skip,
+                    to.frame + line, marks);
+}
+
 /* Reads charge as digital numbers: p.binning x p.binning pixels are summed before they are read.
- * frame: [window_height][window_width], both after binning. saturated: pixels per row. full: of
- * bst_detector_mark, with BST_EFFECT_MARKS. table: of multiply_chunk, or with RAMP the variance of
- * the read noise of each pixel, as image. One work-item per frame row. */
+ * frame: [window_height][window_width], both after binning. saturated: pixels per work-item. full:
+ * of bst_detector_mark, with BST_EFFECT_MARKS. table: of multiply_chunk, or with RAMP the variance
+ * of the read noise of each pixel, as image. noise: of bst_detector_flicker, with
+ * BST_EFFECT_FLICKER. One work-item per frame row; with TAIL one per block of
+ * read_tail.cl, whose noise is drawn at once, the blocks of a row side by side. */
 READOUT_GROUP kernel void bst_detector_read(bst_kernel_frame_params p, global const float *image, global ushort *frame,
                               global int *saturated, global const float *offsets,
                               global const ushort *codes, global uchar *flags,
-                              global const uchar *full, global const float *table) {
+                              global const uchar *full, global const float *table,
+                              global const float *noise) {
     detector_maps maps = {0, 0, 0, offsets, codes, 0};
-    int y = (int)get_global_id(0), b = p.binning;
-    if (y >= p.window_height) {
-        return;
-    }
-    int row = p.window_y0 + y * b;
-    global ushort *out = frame + (size_t)y * p.window_width;
-    global uchar *marks =
-        HAS(p, BST_EFFECT_FLAGS) ? flags + (size_t)y * p.window_width : 0;
+    read_buffers to = {image, frame, flags, full, table, noise};
     /* binned pixels lie on a grid that starts at the window's first pixel */
+    int item = (int)get_global_id(0), b = p.binning;
     int first = p.window_x0 / b / 64 * 64, skip = p.window_x0 / b - first;
+    int left = 0, right = skip + p.window_width, from = item, end = item + 1;
     int16 full_count = (int16)0;
     tail_block tail;
-    for (int x = 0; x < skip + p.window_width; x += 64) {
-        chunk_flags brim;
-        chunk q = gather_charge(p, image, full, row, x - skip, &brim);
-        uint counter = counter_of(row / b, first + x, p.sensor_width / b);
-#ifdef MULTIPLY
-        q = multiply_chunk(p, table, counter, q);
+#ifdef TAIL
+    int across = (right + 63) / 64, top = p.window_y0 / b;
+    int block = (top / TAIL_ROWS + item / across) * TAIL_ROWS - top;
+    left = item % across * 64;
+    right = min(right, left + 64);
+    from = max(block, 0);
+    end = min(block + TAIL_ROWS, p.window_height);
 #endif
-        chunk e, z = chunk_normal(chunk_random(p, counter, STREAM_NOISE));
-#ifdef RAMP
-        chunk_flags none;
-        chunk noise = gather_charge(p, table, full, row, x - skip, &none);
-        e.a = fma(sqrt(noise.a), z.a, q.a);
-        e.b = fma(sqrt(noise.b), z.b, q.b);
-        e.c = fma(sqrt(noise.c), z.c, q.c);
-        e.d = fma(sqrt(noise.d), z.d, q.d);
-#else
-        e.a = read_out(p, q.a, z.a);
-        e.b = read_out(p, q.b, z.b);
-        e.c = read_out(p, q.c, z.c);
-        e.d = read_out(p, q.d, z.d);
-#endif
-        DRAW_TAIL(p, row / b, first + x, p.sensor_width / b, &tail);
-        e = ADD_TAIL(&tail, row / b, e);
-        chunk dn = convert_chunk(p, maps, row, first + x, e);
-        full_count -= store_dn(p, maps, dn, brim, x - skip, out, marks);
+    if (from >= p.window_height) {
+        return;
+    }
+    DRAW_TAIL(p, top + from, first + left, p.sensor_width / b, &tail);
+    for (int y = from; y < end; y++) {
+        for (int x = left; x < right; x += 64) {
+            full_count -= read_chunk(p, maps, to, &tail, y, first, x, skip);
+        }
     }
     int8 s8 = full_count.lo + full_count.hi;
     int4 s4 = s8.lo + s8.hi;
     int2 s2 = s4.lo + s4.hi;
-    saturated[y] = s2.lo + s2.hi;
+    saturated[item] = s2.lo + s2.hi;
 }

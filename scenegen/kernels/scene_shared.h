@@ -32,6 +32,8 @@
 #define BST_ROW_LANES 16
 /* Cosmic-ray pixels placed by a work-group. */
 #define BST_HIT_GROUP 64
+/* Rows of a block of the read-out in which the tail of the read noise is drawn (read_tail.cl). */
+#define BST_TAIL_ROWS 16
 /* Work-items of a work-group of the staged read-out. */
 #define BST_READOUT_GROUP 64
 /* Multiplication register (multiplication.h): fewer electrons than this have a row in its table
@@ -72,8 +74,9 @@
 #define BST_EFFECT_FLAGS 256
 #define BST_EFFECT_READOUT 512
 #define BST_EFFECT_PICK_UP 1024
-#define BST_EFFECT_MARKS 2048 /* pixels at full well are marked before charge moves on */
-#define BST_EFFECT_MEANS 4096 /* the image holds expected charge, dark current included */
+#define BST_EFFECT_MARKS 2048   /* pixels at full well are marked before charge moves on */
+#define BST_EFFECT_MEANS 4096   /* the image holds expected charge, dark current included */
+#define BST_EFFECT_FLICKER 8192 /* the read noise of each pixel is drawn beforehand */
 
 /* Laws of bst_kernel_vignetting_params: none; the fourth power of the cosine of the field angle,
  * 1 / (1 + v1 s)^2; a polynomial, 1 + v1 s + v2 s^2 + v3 s^3. s: squared distance from the centre.
@@ -160,6 +163,7 @@ typedef struct bst_kernel_persistence_params {
     int kinds;                             /* species with traps */
     int in_ramp;                           /* the image is the charge of an interval of a ramp */
     int continues;                         /* not its first interval: the pixels hold charge */
+    int image;                             /* 0, 1, ...: of the light, in its buffer */
     float share[BST_PERSISTENCE_KINDS];    /* of the charge that they hold after a long time */
     float gap[BST_PERSISTENCE_KINDS];      /* of their charge that stays between the exposures */
     float stay[BST_PERSISTENCE_KINDS];     /* and during the exposure */
@@ -167,12 +171,25 @@ typedef struct bst_kernel_persistence_params {
     float duration[BST_PERSISTENCE_KINDS]; /* of the exposure in time constants */
 } bst_kernel_persistence_params;
 
+#define BST_FLICKER_KINDS 10
+/* 1/f noise of single pixels (kernels/pixel_flicker.cl). */
+typedef struct bst_kernel_flicker_params {
+    bst_kernel_frame_params frame;
+    int terms;
+    float spread; /* of a frame about what is expected, e- */
+    float weight[BST_FLICKER_KINDS], decay[BST_FLICKER_KINDS];
+    float gain[BST_FLICKER_KINDS]; /* e- */
+} bst_kernel_flicker_params;
+
 /* A ramp of non-destructive reads (kernels/ramp.cl). */
 typedef struct bst_kernel_ramp_params {
-    bst_kernel_frame_params frame; /* of the interval */
-    int interval;                  /* 0, 1, ...: that before read interval + 1 */
+    bst_kernel_frame_params frame; /* of each interval */
+    int interval;                  /* 0, 1, ...: that before read interval + 1; the first one */
+    int intervals;                 /* from it on, whose light lies in images behind each other */
     int reads;
     int last_minus_first; /* instead of the least-squares line */
+    float line_from;      /* signals from here on, e-, are drawn at once; below 0: none */
+    float weight[64];     /* of the charge of each interval in the signal */
     float variance[65];   /* of the read noise, by the number of reads used, e-^2 */
 } bst_kernel_ramp_params;
 

@@ -57,18 +57,37 @@ INLINE int16 store_pixels(bst_kernel_frame_params p, detector_maps maps, float16
     return vload16(0, flags);
 }
 
+/* Output codes of 16 digital numbers. */
+INLINE ushort16 codes_of(detector_maps maps, ushort16 dn) {
+    ushort values[16], found[16];
+    vstore16(dn, 0, values);
+    for (int i = 0; i < 16; i++) {
+        found[i] = maps.codes[values[i]];
+    }
+    return vload16(0, found);
+}
+
+/* 16 numbers of the frame, inside the window. */
+INLINE ushort16 number_of(bst_kernel_frame_params p, detector_maps maps, float16 dn) {
+    ushort16 values = clip_dn(p, dn);
+    if (HAS(p, BST_EFFECT_CODES)) {
+        values = codes_of(maps, values);
+    }
+    return values;
+}
+
 /* Stores the digital numbers (plus one half) of a chunk in the window's row at `column`. Returns
  * saturated pixels (`brim`, or converter at its maximum) as -1, added up by float16; pixels outside
  * the window are 0. marks: row of flags, if they are stored. */
 INLINE int16 store_dn(bst_kernel_frame_params p, detector_maps maps, chunk dn, chunk_flags brim,
                       int column, global ushort *row, global uchar *marks) {
-    if (!HAS(p, BST_EFFECT_CODES | BST_EFFECT_FLAGS) && column >= 0 &&
+    if (!HAS(p, BST_EFFECT_FLAGS) && column >= 0 &&
         column + 64 <= p.window_width) {
         global ushort16_anywhere *to = (global ushort16_anywhere *)(row + column);
-        to[0] = clip_dn(p, dn.a);
-        to[1] = clip_dn(p, dn.b);
-        to[2] = clip_dn(p, dn.c);
-        to[3] = clip_dn(p, dn.d);
+        to[0] = number_of(p, maps, dn.a);
+        to[1] = number_of(p, maps, dn.b);
+        to[2] = number_of(p, maps, dn.c);
+        to[3] = number_of(p, maps, dn.d);
         return (brim.a | (dn.a >= p.max_dn)) + (brim.b | (dn.b >= p.max_dn)) +
                (brim.c | (dn.c >= p.max_dn)) + (brim.d | (dn.d >= p.max_dn));
     }
@@ -77,9 +96,9 @@ INLINE int16 store_dn(bst_kernel_frame_params p, detector_maps maps, chunk dn, c
     KEEP_LOOP
     for (int v = 0; v < 4; v++) {
         int at = column + 16 * v;
-        if (!HAS(p, BST_EFFECT_CODES | BST_EFFECT_FLAGS) && at >= 0 &&
+        if (!HAS(p, BST_EFFECT_FLAGS) && at >= 0 &&
             at + 16 <= p.window_width) {
-            *(global ushort16_anywhere *)(row + at) = clip_dn(p, numbers[v]);
+            *(global ushort16_anywhere *)(row + at) = number_of(p, maps, numbers[v]);
             full += brims[v] | (numbers[v] >= p.max_dn);
         } else {
             full += store_pixels(p, maps, numbers[v], brims[v], at, row, marks);

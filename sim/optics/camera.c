@@ -1,5 +1,6 @@
 #include "boresight/camera.h"
 #include "sim/optics/band.h"
+#include "sim/optics/pixel_flicker.h"
 #include "sim/optics/ramp_fit.h"
 
 #define DISTORTION(k, doc) BST_REAL(bst_camera_distortion, k, "", -1e30, 1e30, "0", doc)
@@ -169,10 +170,16 @@ double bst_camera_excess_noise(const bst_camera *c) {
     return c->detector.em_gain > 1.0 ? 2.0 - 1.0 / c->detector.em_gain : 1.0;
 }
 
+double bst_camera_white_noise_e(const bst_camera *c) {
+    return c->detector.double_sampling_s > 0.0 ? sqrt(2.0) * c->read_noise_e
+                                               : hypot(c->read_noise_e, c->detector.reset_noise_e);
+}
+
 double bst_camera_read_noise_e(const bst_camera *c) {
     const bst_detector_ramp_config *ramp = &c->detector.ramp;
-    return ramp->reads > 0 ? bst_ramp_noise_e(ramp, c->read_noise_e, (int)ramp->reads)
-                           : c->read_noise_e;
+    return ramp->reads > 0
+               ? bst_ramp_noise_e(ramp, c->read_noise_e, (int)ramp->reads)
+               : hypot(bst_camera_white_noise_e(c), bst_pixel_flicker_noise_e(&c->detector));
 }
 
 double bst_camera_full_e(const bst_camera *c) {

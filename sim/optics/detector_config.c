@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "sim/optics/pixel_flicker.h"
+
 static const char *const wells[] = {"clip", "bloom", NULL};
 static const char *const fits[] = {"slope", "last_minus_first", NULL};
 static const char *const quantisers[] = {"uniform", "square_root", "table", NULL};
@@ -113,6 +115,16 @@ static const bst_config_desc ramp_table[] = {
     BST_CONFIG_END,
 };
 
+static const bst_config_desc pixel_flicker_table[] = {
+    BST_REAL(bst_detector_pixel_flicker_config, rms_e, "e", 0, 1e5, "0",
+             "RMS of a pixel's noise over all times. 0: none."),
+    BST_REAL(bst_detector_pixel_flicker_config, lowest_hz, "Hz", 1e-9, 1e9, "0.0001",
+             "Frequency below which the power spectrum is flat."),
+    BST_REAL(bst_detector_pixel_flicker_config, highest_hz, "Hz", 1e-9, 1e9, "1",
+             "Frequency above which it falls as 1/f^2; at most 262144 lowest_hz."),
+    BST_CONFIG_END,
+};
+
 static const bst_config_desc crosstalk_table[] = {
     BST_INT(bst_detector_crosstalk_config, outputs, "", 1, 64, "1",
             "Outputs that read equal numbers of columns at the same time."),
@@ -193,6 +205,17 @@ const bst_config_desc bst_detector_table[] = {
     BST_REAL(bst_detector_config, flicker_noise_e, "e", 0, 1e5, "0",
              "1/f noise of the level from row to row, RMS: equal power in each factor of 4 from a "
              "period of some rows to one of several thousand."),
+    BST_REAL(bst_detector_config, reset_noise_e, "e", 0, 1e5, "0",
+             "kTC noise of the reset: new in each pixel of every frame, common to all reads of a "
+             "ramp and of double sampling, which therefore do not have it, RMS."),
+    BST_REAL(bst_detector_config, double_sampling_s, "s", 0, 1e4, "0",
+             "Correlated double sampling: the read so long before the one of the frame is "
+             "subtracted. Removes reset noise and slow 1/f noise; read_noise_e is that of each of "
+             "the two reads. 0: the frame is one read. Not with a ramp."),
+    BST_OBJECT(
+        bst_detector_config, pixel_flicker_noise, pixel_flicker_table, "{}",
+        "1/f noise of each pixel, correlated from frame to frame. Frames are not binned; not "
+        "with a ramp."),
     BST_OBJECT(bst_detector_config, shielded, edges_table, "{}",
                "Edges of the frame that light does not reach; they have dark current."),
     BST_OBJECT(bst_detector_config, overscan, edges_table, "{}",
@@ -267,6 +290,26 @@ bool bst_detector_has_persistence(const bst_detector_config *d) {
     return false;
 }
 
+bool bst_detector_has_pixel_flicker(const bst_detector_config *d) {
+    return d->pixel_flicker_noise.rms_e > 0.0;
+}
+
+/* The frequencies of pixels' 1/f noise. */
+static bst_status check_pixel_flicker(bst_ctx *ctx, const bst_detector_config *d) {
+    const bst_detector_pixel_flicker_config *f = &d->pixel_flicker_noise;
+    if (!bst_detector_has_pixel_flicker(d)) {
+        return BST_OK;
+    }
+    double ratio = f->highest_hz / f->lowest_hz, most = pow(4.0, BST_FLICKER_TERMS - 1);
+    if (!(ratio >= 1.0 && ratio <= most)) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "pixel_flicker_noise: highest_hz is %g and lowest_hz %g; allowed are 1 to "
+                        "%.0f times lowest_hz",
+                        f->highest_hz, f->lowest_hz, most);
+    }
+    return BST_OK;
+}
+
 /* A ramp against what excludes it. */
 static bst_status check_ramp(bst_ctx *ctx, const bst_detector_config *d) {
     if (d->ramp.reads == 0) {
@@ -291,6 +334,9 @@ static bst_status check_ramp(bst_ctx *ctx, const bst_detector_config *d) {
                   {d->clock_induced_e > 0.0, "clock_induced_e"},
                   {d->glow.peak_e > 0.0, "glow"},
                   {d->cosmic_rays.readout_s > 0.0, "cosmic_rays/readout_s"},
+                  {d->double_sampling_s > 0.0, "double_sampling_s"},
+                  {bst_detector_has_pixel_flicker(d),
+                   "pixel_flicker_noise (a ramp has flicker_noise_e of its own)"},
                   {d->telegraph_noise_fraction > 0.0, "telegraph_noise_fraction"}};
     for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
         if (others[i].on) {
@@ -313,6 +359,7 @@ bst_status bst_detector_config_check(bst_ctx *ctx, const bst_detector_config *d)
             "brighter_fatter_per_e, crosstalk or persistence; set one of them to its default");
     }
     BST_TRY(check_ramp(ctx, d));
+    BST_TRY(check_pixel_flicker(ctx, d));
     double trapped = 0.0;
     for (int i = 0; i < BST_PERSISTENCE_SPECIES; i++) {
         trapped += d->persistence.trapped_share[i];

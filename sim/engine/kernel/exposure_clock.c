@@ -21,7 +21,7 @@ typedef struct exposure_clock {
     } set;                        /* by the scenario */
     bst_window full, own, window; /* of the sensor, of the scenario, of the current exposure */
     int binning;
-    bool ramp;                 /* the detector reads a ramp: frames are not binned */
+    bool single_pixels;        /* the detector reads a ramp: frames are not binned */
     double pixel_scale_arcsec; /* 0: the camera's scale */
     bst_frame_cursor updates;  /* exposures from a file, frame by frame; updates NULL: none */
     double dropped_fraction;
@@ -94,13 +94,17 @@ static bst_status check_rows(const bst_module_env *env, const exposure_clock *cl
     return BST_OK;
 }
 
-/* Checks that no frame of a ramp is binned: pixels of a ramp are summed after they are read, each
- * with the noise of its own line, which bst_camera_read_noise_e does not contain. */
-static bst_status check_ramp(const bst_module_env *env, const bst_exposure_config *c,
-                             const bst_frame_updates *updates) {
-    static const char why[] =
-        "the camera's detector/ramp reads each pixel by itself (allowed: 1, "
-        "or ramp/reads 0)";
+/* Checks that no frame is binned whose pixels are read one by one: with a ramp or 1/f noise of each
+ * pixel. Pixels would be summed with the noise of each, which bst_camera_read_noise_e does not
+ * contain. */
+static bst_status check_single_pixels(const bst_module_env *env, const bst_exposure_config *c,
+                                      const bst_frame_updates *updates) {
+    const bst_camera *camera = bst_world_camera(env->world, env->observer, env->sensor);
+    const char *why = camera->detector.ramp.reads > 0
+                          ? "the camera's detector/ramp reads each pixel by itself (allowed: 1, "
+                            "or ramp/reads 0)"
+                          : "the camera's detector/pixel_flicker_noise is that of single pixels "
+                            "(allowed: 1, or pixel_flicker_noise/rms_e 0)";
     if (c->binning > 1) {
         return bst_fail(env->ctx, BST_ERR_CONFIG, "binning: %lld, but %s", (long long)c->binning,
                         why);
@@ -184,9 +188,10 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     }
     const bst_frame_updates *updates =
         bst_world_frame_updates(env->world, env->observer, env->sensor);
-    clock->ramp = camera->detector.ramp.reads > 0;
-    if (status == BST_OK && clock->ramp) {
-        status = check_ramp(env, c, updates);
+    clock->single_pixels =
+        camera->detector.ramp.reads > 0 || bst_detector_has_pixel_flicker(&camera->detector);
+    if (status == BST_OK && clock->single_pixels) {
+        status = check_single_pixels(env, c, updates);
     }
     if (status == BST_OK && updates) {
         status = check_updates(env, updates);
@@ -247,7 +252,7 @@ static void latch(exposure_clock *clock, const bst_sensor_command *command) {
         int64_t period = commanded_ticks(clock, command->period_s);
         clock->period_ticks = period > 0 ? period : 1;
     }
-    if (command->binning > 0 && !clock->ramp) {
+    if (command->binning > 0 && !clock->single_pixels) {
         clock->binning = command->binning;
     }
     if (command->pixel_scale_arcsec > 0.0) {
@@ -334,7 +339,8 @@ static void take_changes(exposure_clock *clock, const exposure_clock *saved) {
     if (saved->set.binning != clock->set.binning) {
         clock->binning = (int)clock->set.binning;
     }
-    clock->binning = clock->ramp ? 1 : clock->binning; /* commanded before there was a ramp */
+    clock->binning =
+        clock->single_pixels ? 1 : clock->binning; /* commanded before there was a ramp */
     if (memcmp(&saved->own, &clock->own, sizeof saved->own) != 0) {
         clock->window = clock->own;
     }
