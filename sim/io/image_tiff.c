@@ -1,5 +1,6 @@
 /* TIFF files by libtiff: grey pages of integers or floats, values as stored. */
 #include <inttypes.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -49,6 +50,29 @@ static bst_status fail(bst_ctx *ctx, const bst_image_file *f, const char *what) 
     return bst_image_fail(ctx, f, text);
 }
 
+/* Begins a compression that is not read. */
+static int refuse_codec(TIFF *handle, int scheme) {
+    TIFFErrorExtR(handle, "bst",
+                  "Compression is %d (allowed: 1 none, 5 LZW, 8 and 32946 Deflate, 32773 PackBits)",
+                  scheme);
+    return 0;
+}
+
+/* Replaces libtiff's other codecs, in this process: the libraries behind them are never called, by
+ * whatever file. */
+static void refuse_codecs(void) {
+    static const uint16_t schemes[] = {
+        COMPRESSION_CCITTRLE,  COMPRESSION_CCITTRLEW, COMPRESSION_CCITTFAX3,
+        COMPRESSION_CCITTFAX4, COMPRESSION_OJPEG,     COMPRESSION_JPEG,
+        COMPRESSION_JBIG,      COMPRESSION_NEXT,      COMPRESSION_THUNDERSCAN,
+        COMPRESSION_PIXARLOG,  COMPRESSION_SGILOG,    COMPRESSION_SGILOG24,
+        COMPRESSION_LERC,      COMPRESSION_LZMA,      COMPRESSION_ZSTD,
+        COMPRESSION_WEBP};
+    for (size_t i = 0; i < sizeof schemes / sizeof *schemes; i++) {
+        (void)TIFFRegisterCODEC(schemes[i], "refused", refuse_codec); /* NULL: out of memory */
+    }
+}
+
 bst_status bst_image_tiff_open(bst_ctx *ctx, bst_image_file *f, int fd) {
     struct bst_image_tiff *t = calloc(1, sizeof *t);
     TIFFOpenOptions *options = TIFFOpenOptionsAlloc();
@@ -58,6 +82,8 @@ bst_status bst_image_tiff_open(bst_ctx *ctx, bst_image_file *f, int fd) {
         TIFFOpenOptionsFree(options);
         return bst_fail(ctx, BST_ERR_MEMORY, "%.400s: no memory to open it", f->path);
     }
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    (void)pthread_once(&once, refuse_codecs);
     /* no more memory than the file can unpack to, as bst_image_check_size has it */
     uint64_t most = f->bytes * 1500 + (1 << 20);
     TIFFOpenOptionsSetMaxSingleMemAlloc(options, (tmsize_t)most);
@@ -68,7 +94,7 @@ bst_status bst_image_tiff_open(bst_ctx *ctx, bst_image_file *f, int fd) {
     f->tiff = t;
     if (!t->handle) {
         close(fd);
-        return fail(ctx, f, "is a damaged TIFF file");
+        return fail(ctx, f, "cannot be read as a TIFF file");
     }
     t->current = 0;
     *t->message = '\0';

@@ -79,6 +79,10 @@ const bst_config_desc bst_keyword_map_table[] = {
      .size = sizeof(int64_t)},
     BST_STRING(bst_keyword_map, name, "\"map\"", "Name, for messages and the scenario."),
     BST_OBJECT(bst_keyword_map, time, time_table, "{}", "Time of the exposure."),
+    BST_OBJECT(
+        bst_keyword_map, plane_period_s, number_table, "{\"value\": 0}",
+        "From the start of a plane of a cube to that of the next, s, where the header has the "
+        "time of the first plane alone; 0: the time is that of the frame."),
     BST_OBJECT(bst_keyword_map, exposure_s, number_table, "{\"keyword\": \"EXPTIME|EXPOSURE\"}",
                "Exposure time, s."),
     BST_OBJECT(bst_keyword_map, gain_e_per_dn, number_table, "{\"value\": 1}",

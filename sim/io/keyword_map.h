@@ -52,8 +52,8 @@ typedef struct bst_keyword_map {
     int64_t format;
     char name[64];
     bst_keyword_time time;
-    bst_keyword_number exposure_s, gain_e_per_dn, read_noise_e, offset_dn, full_well_e,
-        pixel_scale_arcsec, exposure_id;
+    bst_keyword_number plane_period_s, exposure_s, gain_e_per_dn, read_noise_e, offset_dn,
+        full_well_e, pixel_scale_arcsec, exposure_id;
     bst_keyword_vector observer_position_gcrf_m, observer_velocity_gcrf_mps;
     bst_keyword_history rate_history;
     int32_t attitude; /* BST_KEYWORD_NO_ATTITUDE, _WCS, _DIRECTION, _QUATERNION */

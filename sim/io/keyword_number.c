@@ -26,9 +26,8 @@ bst_status bst_keyword_wrong(const bst_keyword_reading *r, const char *keyword, 
     char where[BST_FRAME_WHERE_TEXT], name[BST_KEYWORD_TEXT];
     return bst_fail(r->ctx, BST_ERR_FORMAT, "%s: %s%s (%s of the map %s): %s",
                     bst_frame_where(bst_frame_source_path(r->source), r->frame, where),
-                    bst_frame_source_noun(r->source),
-                    bst_keyword_name(r->source, keyword, name), key, r->map ? r->map->name : "-",
-                    what);
+                    bst_frame_source_noun(r->source), bst_keyword_name(r->source, keyword, name),
+                    key, r->map ? r->map->name : "-", what);
 }
 
 /* As bst_keyword_find; empty: an empty field counts. */

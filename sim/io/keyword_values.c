@@ -188,7 +188,14 @@ bst_status bst_keyword_map_read(bst_ctx *ctx, const bst_keyword_map *map, bst_fr
                         &out->position_gcrf_m));
     BST_TRY(read_vector(&r, &map->observer_velocity_gcrf_mps, &speeds, &out->has_velocity,
                         &out->velocity_gcrf_mps));
-    return read_time(&r, out->exposure_s, &out->start);
+    double period_s;
+    const bst_keyword_range periods = {"plane_period_s", 0.0, 1e6};
+    BST_TRY(bst_keyword_read_number(&r, &map->plane_period_s, &periods, &period_s));
+    BST_TRY(read_time(&r, out->exposure_s, &out->start));
+    if (frame->plane > 0) {
+        out->start = bst_time_add(out->start, period_s * (double)frame->plane);
+    }
+    return BST_OK;
 }
 
 bst_status bst_keyword_section(bst_ctx *ctx, const char *keyword, bst_frame_source *source,

@@ -73,6 +73,25 @@ class Recorded(unittest.TestCase):
         self.compare_results(self.recorded(folder, TABLE_MAP))
         self.compare_results(self.recorded(self.path("cube.csv"), TABLE_MAP))
 
+    def test_frames_that_others_compressed(self):
+        """GZIP_2, RICE_1 of 32 bits, and floats as scaled integers with dithering, against astropy's pixels."""
+        with fits.open(os.path.join(self.made, "frames.fits")) as file:
+            frames, headers = [hdu.data for hdu in file[1:]], [hdu.header for hdu in file[1:]]
+        kinds = ((numpy.int32, {"compression_type": "GZIP_2"}), (numpy.int32, {"compression_type": "RICE_1"}),
+                 (numpy.float32, {"compression_type": "RICE_1", "quantize_method": 1, "dither_seed": 9999, "quantize_level": 64}))
+        hdus = [fits.PrimaryHDU()]
+        for pixels, header, (kind, options) in zip(frames, headers, kinds):
+            kept = fits.Header((key, header[key]) for key in ("DATE-OBS", "EXPTIME", "PIXSCALE", "FRAMEID"))
+            hdus.append(fits.CompImageHDU(pixels.astype(kind), kept, **options))
+        packed, again = self.path("packed.fits"), self.path("unpacked")
+        fits.HDUList(hdus).writeto(packed)
+        runs.run(self.scenario, again, self.recorded(packed), duration=3)
+        with fits.open(packed) as ours, fits.open(os.path.join(again, "frames.fits")) as read:
+            self.assertEqual(len(read), 4)
+            self.assertTrue(numpy.any(ours[3].data != numpy.floor(ours[3].data)))
+            for a, b in zip(ours[1:], read[1:]):
+                numpy.testing.assert_array_equal(b.data, numpy.floor(a.data.astype(float) + 0.5))
+
     def compare_results(self, scenegen):
         again = runs.scratch()
         runs.run(self.scenario, os.path.join(again, "run"), scenegen, duration=3)

@@ -207,6 +207,11 @@ static void test_cube_table(void **state) {
     bst_assert_close(r.values.pixel_scale_arcsec, 4.0, 0.0);
     bst_assert_ok(&f.ctx, bst_recorded_frames_pixels(&f.ctx, frames, &options, &r, &pixels));
     bst_assert_close(pixels[1], 4.0, 0.0);
+    /* one time for all planes */
+    bst_time start = r.values.start;
+    map.plane_period_s = (bst_keyword_number){.factor = 1.0, .value = 2.5};
+    bst_assert_ok(&f.ctx, bst_recorded_frames_select(&f.ctx, frames, 1, &options, &r));
+    bst_assert_close(bst_time_diff(r.values.start, start), 2.5, 1e-9); /* rounded once */
     bst_recorded_frames_close(frames);
     end(&f);
 }

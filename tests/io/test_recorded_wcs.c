@@ -57,14 +57,14 @@ static void test_turned_wcs(void **state) {
     /* rotation of the axes, after the scales */
     const double cd[2][2] = {{dx * cos(angle), -dy * sin(angle)},
                              {dx * sin(angle), dy * cos(angle)}};
-    for (int matrix = 0; matrix < 2; matrix++) {
+    for (int matrix = 0; matrix < 3; matrix++) {
         fixture f = begin("turned.fits");
         begin_image(&f, true, 8, WIDTH, HEIGHT, 0);
         card(&f, "CRPIX1  = %20.3f", -3.25);
         card(&f, "CRPIX2  = %20.3f", 11.5);
         card(&f, "CRVAL1  = %20.3f", ra);
         card(&f, "CRVAL2  = %20.3f", dec);
-        if (matrix) {
+        if (matrix == 1) {
             card(&f, "CD1_1   = %20.13E", cd[0][0]);
             card(&f, "CD1_2   = %20.13E", cd[0][1]);
             card(&f, "CD2_1   = %20.13E", cd[1][0]);
@@ -72,7 +72,14 @@ static void test_turned_wcs(void **state) {
         } else {
             card(&f, "CDELT1  = %20.4f", dx);
             card(&f, "CDELT2  = %20.4f", dy);
-            card(&f, "CROTA2  = %20.4f", angle / BST_DEG_RAD);
+            if (matrix == 2) { /* the rotation by itself, without the scales */
+                card(&f, "PC1_1   = %20.13E", cos(angle));
+                card(&f, "PC1_2   = %20.13E", -dy / dx * sin(angle));
+                card(&f, "PC2_1   = %20.13E", dx / dy * sin(angle));
+                card(&f, "PC2_2   = %20.13E", cos(angle));
+            } else {
+                card(&f, "CROTA2  = %20.4f", angle / BST_DEG_RAD);
+            }
         }
         end_header(&f);
         put(&f, "12345678901234567890123456789012345", WIDTH * HEIGHT);

@@ -133,6 +133,78 @@ static void test_first_row(void **state) {
     }
 }
 
+/* Attitude of the only row of a table. */
+static bst_status read_attitude(fixture *f, const char *map_text_, const char *table, bool *has,
+                                bst_quat *q) {
+    bst_keyword_map map;
+    load_map(f, map_text_, &map);
+    write_text(f, "one.csv", table);
+    const char *paths[] = {f->path};
+    const bst_recorded_options options = {.map = &map};
+    bst_recorded_frames *frames;
+    bst_recorded_frame r;
+    bst_assert_ok(&f->ctx, bst_recorded_frames_open(&f->ctx, paths, 1, &map, &frames));
+    bst_assert_ok(&f->ctx, bst_recorded_frames_select(&f->ctx, frames, 0, &options, &r));
+    bst_status status = bst_keyword_attitude(&f->ctx, &map, bst_recorded_frames_source(frames),
+                                             &r.place, false, has, q);
+    bst_recorded_frames_close(frames);
+    return status;
+}
+
+/* Attitudes by direction and by quaternion: a camera at RA 90, Dec 0 with up to the north looks
+ * along GCRF's y, its x is GCRF's x (the west), its y the south: a rotation by 90 degrees about x.
+ */
+static void test_attitudes(void **state) {
+    (void)state;
+#define TIMES                                                                               \
+    "\"time\": {\"keyword\": \"t\", \"format\": \"mjd\"}, \"exposure_s\": {\"value\": 1}, " \
+    "\"pixel_scale_arcsec\": {\"value\": 5}"
+    static const char by_direction[] =
+        "{\"boresight_keyword_map\": 1, " TIMES ", \"attitude\": \"direction\"}";
+    static const char inward[] =
+        "{\"boresight_keyword_map\": 1, " TIMES ", \"attitude\": \"quaternion\"}";
+    static const char outward[] = "{\"boresight_keyword_map\": 1, " TIMES
+                                  ", \"attitude\": \"quaternion\", \"quaternion\":"
+                                  " {\"rotates\": \"camera_to_gcrf\"}}";
+    static const struct {
+        const char *map, *table;
+        double x, y, z; /* what the camera's x axis is in GCRF */
+    } cases[] = {
+        {by_direction, "file,t,ra,dec,roll\na.png,60000,90,0,0\n", 1, 0, 0},
+        {by_direction, "file,t,ra,dec,roll\na.png,60000,6:00:00.0,-0:00:00,0\n", 1, 0, 0},
+        {by_direction, "file,t,RA,DEC,ROLL\na.png,60000,6 00 00,0,90\n", 0, 0, 1}, /* up is east */
+        {inward, "file,t,qw,qx,qy,qz\na.png,60000,0.70710678,0.70710678,0,0\n", 1, 0, 0},
+        {outward, "file,t,qx,qy,qz,qw\na.png,60000,0.70710678,0,0,-0.70710678\n", 1, 0, 0},
+    };
+    bst_keyword_map map;
+    fixture f = begin_pictures(&map, map_text);
+    bool has;
+    bst_quat q;
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        bst_assert_ok(&f.ctx, read_attitude(&f, cases[i].map, cases[i].table, &has, &q));
+        assert_true(has);
+        bst_vec3 z = bst_quat_rotate(q, (bst_vec3){0, 1, 0});
+        bst_vec3 x = bst_quat_rotate(bst_quat_conj(q), (bst_vec3){1, 0, 0});
+        bst_assert_close(z.z, 1.0, 1e-8); /* eight digits of the quaternion */
+        bst_assert_close(x.x, cases[i].x, 1e-8);
+        bst_assert_close(x.y, cases[i].y, 1e-8);
+        bst_assert_close(x.z, cases[i].z, 1e-8);
+    }
+    bst_assert_ok(&f.ctx, read_attitude(&f, inward, "file,t,qx\na.png,60000,1\n", &has, &q));
+    assert_false(has); /* not all of it */
+    assert_int_equal(
+        read_attitude(&f, inward, "file,t,qx,qy,qz,qw\na.png,60000,1,1,0,0\n", &has, &q),
+        BST_ERR_FORMAT);
+    assert_non_null(strstr(f.ctx.message,
+                           "one.csv: line 2: column QW (quaternion of the map map): "
+                           "is a quaternion of length 1.41421"));
+    assert_int_equal(
+        read_attitude(&f, by_direction, "file,t,ra,dec,roll\na.png,60000,1,91:00:00,0\n", &has, &q),
+        BST_ERR_FORMAT);
+    assert_non_null(strstr(f.ctx.message, "column DEC (dec_deg of the map map): is out of range"));
+    end(&f);
+}
+
 /* What is wrong is said with the table, its line and column. */
 static void test_messages(void **state) {
     (void)state;
@@ -229,9 +301,10 @@ static void test_folder(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_values),          cmocka_unit_test(test_pages),
-        cmocka_unit_test(test_first_row),       cmocka_unit_test(test_messages),
-        cmocka_unit_test(test_damaged_picture), cmocka_unit_test(test_folder),
+        cmocka_unit_test(test_values),    cmocka_unit_test(test_pages),
+        cmocka_unit_test(test_first_row), cmocka_unit_test(test_attitudes),
+        cmocka_unit_test(test_messages),  cmocka_unit_test(test_damaged_picture),
+        cmocka_unit_test(test_folder),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -67,6 +67,25 @@ WRAP(bst_frame_source *, bst_recorded_frames_source, (bst_recorded_frames * fram
     return NULL;
 }
 
+WRAP(bst_status, bst_keyword_attitude,
+     (bst_ctx * ctx, const bst_keyword_map *map, bst_frame_source *source,
+      const bst_frame_place *frame, bool flip_rows, bool *has, bst_quat *q_cam_from_gcrf)) {
+    (void)ctx;
+    (void)map;
+    (void)source;
+    (void)frame;
+    (void)flip_rows;
+    (void)q_cam_from_gcrf;
+    *has = false;
+    return BST_OK;
+}
+
+WRAP(const char *, bst_keyword_name,
+     (bst_frame_source * source, const char *keywords, char *text)) {
+    (void)source;
+    return strcpy(text, keywords);
+}
+
 WRAP(void, bst_keyword_rate_trend,
      (bst_ctx * ctx, const bst_keyword_map *map, bst_frame_source *source,
       const bst_frame_place *frame, double exposure_s, double *trend, double *sigma)) {

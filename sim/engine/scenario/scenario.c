@@ -85,7 +85,8 @@ static bst_status check_name(bst_ctx *ctx, const bst_scenario *s, const char *pa
 
 /* A number of a camera as the scenario gives it; NAN: it does not. */
 static double given_number(const cJSON *root, int observer, int sensor, const char *key) {
-    const cJSON *o = cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(root, "observers"), observer);
+    const cJSON *o =
+        cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(root, "observers"), observer);
     const cJSON *s = cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(o, "sensors"), sensor);
     const cJSON *camera = cJSON_GetObjectItemCaseSensitive(s, "camera");
     const cJSON *value = cJSON_GetObjectItemCaseSensitive(camera, key);
