@@ -19,15 +19,18 @@ typedef struct recorded_config {
 } recorded_config;
 
 static const bst_config_desc config_table[] = {
-    BST_PATH(recorded_config, frames, NULL,
-             "A FITS file of frames; a folder of them, in the order of their names; the folder of "
-             "a run or of a SatNet set; or a text file *.txt with a path a line."),
+    BST_PATH(
+        recorded_config, frames, NULL,
+        "A FITS file of frames; a side table *.csv of PNG or TIFF files; a folder of files, in "
+        "the order of their names; the folder of a run or of a SatNet set; or a text file "
+        "*.txt with a path a line."),
     BST_PATH(recorded_config, keyword_map, "\"\"",
              "Keyword map (JSON) that gives time, exposure, sections and scaling of the frames; "
              "empty: frames are taken in their order as they are."),
     BST_INT(recorded_config, first_frame, "", 0, 1e9, "0",
             "Frame of the first exposure, where the map gives no exposure_id."),
-    BST_BOOL(recorded_config, flip_rows, "false", "The camera's first row is the file's last."),
+    BST_BOOL(recorded_config, flip_rows, "false",
+             "Reverses the order of rows that the map's first_row gives."),
     BST_REAL(recorded_config, time_tolerance_s, "s", 0, 1e9, "0.01",
              "Largest difference of a header's time and exposure to those of the scenario."),
     BST_REAL(recorded_config, star_limit_v_mag, "mag", -30.0, 30.0, "-30",
@@ -80,7 +83,7 @@ static bst_status open_all(const bst_module_env *env, recorded *r) {
         r->options.map = &r->map;
     }
     const char *const paths[] = {c->frames};
-    BST_TRY(bst_recorded_frames_open(env->ctx, paths, 1, &r->frames));
+    BST_TRY(bst_recorded_frames_open(env->ctx, paths, 1, r->options.map, &r->frames));
     if (c->first_frame >= bst_recorded_frames_count(r->frames)) {
         return bst_fail(env->ctx, BST_ERR_CONFIG,
                         "first_frame: %lld (allowed: 0 to %lld, the last frame of %s)",
@@ -114,11 +117,8 @@ static bst_status create(const bst_module_env *env, const void *config, void **s
     return BST_OK;
 }
 
-/* Fails for a frame: file, HDU and plane before the message. */
 static bst_status fail_frame(bst_ctx *ctx, const bst_recorded_frame *f, bst_status status) {
-    return f->place.plane < 0 ? bst_fail_prefix(ctx, status, "%s: HDU %d", f->path, f->place.hdu)
-                              : bst_fail_prefix(ctx, status, "%s: HDU %d, plane %lld", f->path,
-                                                f->place.hdu, (long long)f->place.plane + 1);
+    return bst_recorded_frame_fail(ctx, f->path, &f->place, status);
 }
 
 /* Compares the header with the exposure of the scenario. */
@@ -128,9 +128,10 @@ static bst_status check_frame(bst_ctx *ctx, const recorded *r, const bst_exposur
     if (f->width != e->window.width / binning || f->height != e->window.height / binning) {
         bst_status status = bst_fail(
             ctx, BST_ERR_CONFIG,
-            "NAXIS1 and NAXIS2 give %d x %d pixels, the exposure's window %d x %d; give the "
-            "camera, window_px and binning of the frames, or a map with image_section",
-            f->width, f->height, e->window.width / binning, e->window.height / binning);
+            "%s %d x %d pixels, the exposure's window %d x %d; give the camera, window_px and "
+            "binning of the frames, or a map with image_section",
+            f->place.hdu > 0 ? "NAXIS1 and NAXIS2 give" : "the picture has", f->width, f->height,
+            e->window.width / binning, e->window.height / binning);
         return fail_frame(ctx, f, status);
     }
     if (!r->options.map) {
@@ -142,11 +143,14 @@ static bst_status check_frame(bst_ctx *ctx, const recorded *r, const bst_exposur
     double longer = f->values.exposure_s - (double)(e->end_tick - e->start_tick) / rate;
     if (!(fabs(late) <= allowed) || !(fabs(longer) <= allowed)) {
         bool time = !(fabs(late) <= allowed);
+        char keyword[BST_KEYWORD_TEXT];
         bst_status status = bst_fail(
             ctx, BST_ERR_CONFIG,
-            "%s gives %s %.6g s %s than exposure %lld of the scenario has (allowed: "
+            "%s%s gives %s %.6g s %s than exposure %lld of the scenario has (allowed: "
             "time_tolerance_s, %.6g s)",
-            time ? r->map.time.keyword : r->map.exposure_s.keyword,
+            f->place.line > 0 ? "column " : "",
+            bst_keyword_name(bst_recorded_frames_source(r->frames),
+                             time ? r->map.time.keyword : r->map.exposure_s.keyword, keyword),
             time ? "a start" : "an exposure", fabs(time ? late : longer),
             time ? (late > 0.0 ? "later" : "earlier") : (longer > 0.0 ? "longer" : "shorter"),
             (long long)e->id, r->config->time_tolerance_s);
@@ -291,7 +295,7 @@ const bst_module_desc bst_scenegen_recorded_module = {
     .abi = BST_MODULE_ABI,
     .role = "scenegen",
     .type = "recorded",
-    .doc = "Takes the frames from FITS files instead of rendering them.",
+    .doc = "Takes the frames from FITS, PNG or TIFF files instead of rendering them.",
     .flags = BST_MODULE_READS_TRUTH,
     .config = config_table,
     .config_bytes = sizeof(recorded_config),

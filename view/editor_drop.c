@@ -17,7 +17,6 @@
 #include "sim/astro/tle.h"
 #include "sim/core/draft.h"
 #include "sim/core/file.h"
-#include "sim/io/fits_source.h"
 #include "sim/io/keyword_map.h"
 #include "sim/satellite/model.h"
 #include "view/request_guard.h"
@@ -206,11 +205,11 @@ static void add_change(cJSON *changes, const char *key, cJSON *value) {
 }
 
 /* A number of the header, under the first of some names ("" ends them). False: none has it. */
-static bool number_of(bst_fits_source *source, const char *const *names, double *value,
+static bool number_of(bst_frame_source *source, const char *const *names, double *value,
                       const char **from) {
     char text[BST_FITS_SOURCE_TEXT], *end;
     for (; **names; names++) {
-        if (bst_fits_source_text(source, *names, text)) {
+        if (bst_frame_source_text(source, *names, text)) {
             *value = strtod(text, &end);
             if (end != text && *end == '\0' && isfinite(*value)) {
                 *from = *names;
@@ -222,7 +221,7 @@ static bool number_of(bst_fits_source *source, const char *const *names, double 
 }
 
 /* Offers a number of the header for a key of the sensor, if the key may have it. */
-static void offer_number(bst_fits_source *source, const char *const *names, const char *key,
+static void offer_number(bst_frame_source *source, const char *const *names, const char *key,
                          const char *what, const double range[2], cJSON *offers) {
     double value;
     const char *from;
@@ -236,8 +235,7 @@ static void offer_number(bst_fits_source *source, const char *const *names, cons
 }
 
 /* Offers the direction of the middle of the frame, and the pixel scale, by the WCS. */
-static void offer_pointing(bst_fits_source *source, const bst_fits_source_frame *frame,
-                           cJSON *offers) {
+static void offer_pointing(bst_frame_source *source, const bst_frame_place *frame, cJSON *offers) {
     bst_quat q;
     double scale, ra, dec;
     char text[120];
@@ -261,11 +259,11 @@ static void offer_pointing(bst_fits_source *source, const bst_fits_source_frame 
 }
 
 /* Offers the time of the frame as the scenario's epoch. */
-static void offer_epoch(bst_fits_source *source, cJSON *offers) {
+static void offer_epoch(bst_frame_source *source, cJSON *offers) {
     char date[BST_FITS_SOURCE_TEXT + 1], text[200];
     bst_ctx ignored = {0};
     bst_time time;
-    if (!bst_fits_source_text(source, "DATE-OBS", date)) {
+    if (!bst_frame_source_text(source, "DATE-OBS", date)) {
         return;
     }
     const size_t length = strlen(date);
@@ -279,7 +277,7 @@ static void offer_epoch(bst_fits_source *source, cJSON *offers) {
     }
 }
 
-static void offer_all(bst_fits_source *source, const bst_fits_source_frame *frame, cJSON *offers) {
+static void offer_all(bst_frame_source *source, const bst_frame_place *frame, cJSON *offers) {
     static const char *const exposure[] = {"EXPTIME", "EXPOSURE", ""},
                              *const gain[] = {"EGAIN", "GAIN", ""},
                              *const noise[] = {"RDNOISE", "READNOIS", ""};
@@ -303,16 +301,16 @@ static void offer_all(bst_fits_source *source, const bst_fits_source_frame *fram
 static bst_status read_frame(bst_ctx *ctx, const char *name, const char *data, size_t bytes,
                              cJSON *out) {
     scratch_file file;
-    bst_fits_source *source = NULL;
-    bst_fits_source_frame frame;
+    bst_frame_source *source = NULL;
+    bst_frame_place frame;
     BST_TRY(scratch_make(ctx, name, data, bytes, &file));
-    bst_status status = bst_fits_source_open(ctx, file.path, &source);
-    status = status == BST_OK ? bst_fits_source_select(ctx, source, 0, &frame) : status;
+    bst_status status = bst_frame_source_open(ctx, file.path, NULL, &source);
+    status = status == BST_OK ? bst_frame_source_select(ctx, source, 0, &frame) : status;
     if (status == BST_OK) {
         cJSON_AddStringToObject(out, "kind", "frame");
         offer_all(source, &frame, cJSON_AddArrayToObject(out, "offers"));
     }
-    bst_fits_source_close(source);
+    bst_frame_source_close(source);
     scratch_remove(&file);
     return name_file(ctx, status, &file);
 }

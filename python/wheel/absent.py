@@ -1,7 +1,7 @@
 """Substitutes for libraries that Debian's builds of our libraries ask for and Boresight never calls.
 
 Debian's cfitsio can open files on the web, its ZeroMQ knows Kerberos and multicast, its OpenCV
-knows OpenGL windows and LAPACK. These features pull some forty libraries into a wheel, of other
+knows OpenGL windows and LAPACK, its TIFF library ten more compressions. These features pull some forty libraries into a wheel, of other
 licences. The wheel has small libraries of the same names instead. Their functions fail in the way
 that the caller expects, or end the program with a message where nothing in Boresight can reach
 them.
@@ -21,6 +21,12 @@ ABSENT = {
     "libpgm-5.3.so.0": {"pgm_init": 1, "pgm_shutdown": 1},
     "libnorm.so.1": {},
     "libgssapi_krb5.so.2": {},
+    # libtiff: sim/io/image_tiff.c replaces the codecs that use these
+    "libjbig.so.0": {},
+    "libjpeg.so.62": {},
+    "libwebp.so.7": {},
+    "libLerc.so.4": {},
+    "liblzma.so.5": {},
     "liblapack.so.3": {},
     "libblas.so.3": {},
 }

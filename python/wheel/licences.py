@@ -15,6 +15,7 @@ LICENCES = {
     "libexpat1": "MIT",
     "libgeographiclib23": "MIT",
     "libgeographiclib26": "MIT",
+    "libdeflate0": "MIT",
     "libmd0": "BSD-3-Clause AND BSD-2-Clause AND ISC AND Beerware",
     "libopencv-core406": "Apache-2.0 AND BSD-3-Clause",
     "libopencv-core410": "Apache-2.0 AND BSD-3-Clause",
@@ -25,6 +26,8 @@ LICENCES = {
     "libsodium23": "ISC",
     "libsqlite3-0": "blessing",
     "libtbb12": "Apache-2.0",
+    "libtiff6": "libtiff",
+    "libzstd1": "BSD-3-Clause",
     "libtbbmalloc2": "Apache-2.0",
     # linked as a shared library of its own, which a user can replace
     "libzmq5": "LGPL-3.0-or-later WITH LGPL-3.0-linking-exception",

@@ -7,6 +7,7 @@
 #include <png.h>
 #include <sqlite3.h>
 #include <stdio.h>
+#include <tiffio.h>
 #include <unistd.h>
 #include <zlib.h>
 #include <zmq.h>
@@ -53,6 +54,10 @@ static cJSON *libraries(void) {
     cJSON_AddStringToObject(out, "ZeroMQ", text);
     cJSON_AddStringToObject(out, "cJSON", cJSON_Version());
     cJSON_AddStringToObject(out, "libpng", png_get_libpng_ver(NULL));
+    unsigned tiff[3] = {0};
+    (void)sscanf(TIFFGetVersion(), "LIBTIFF, Version %u.%u.%u", &tiff[0], &tiff[1], &tiff[2]);
+    snprintf(text, sizeof text, "%u.%u.%u", tiff[0], tiff[1], tiff[2]);
+    cJSON_AddStringToObject(out, "libtiff", text);
     cJSON_AddStringToObject(out, "zlib", zlibVersion());
     cJSON_AddStringToObject(out, "civetweb", mg_version());
     XML_Expat_Version expat = XML_ExpatVersionInfo();

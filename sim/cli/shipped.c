@@ -35,6 +35,6 @@ bst_status bst_cli_find_keyword_map(bst_ctx *ctx, const char *name, char *path) 
     }
     return bst_fail(ctx, BST_ERR_NOT_FOUND,
                     "--map %.400s: there is no such keyword map (allowed: neossat, boresight, "
-                    "satnet, or the path of a file)",
+                    "satnet, table, or the path of a file)",
                     name);
 }

@@ -59,29 +59,68 @@ static bool take_unary(bit_reader *r, uint32_t most, uint32_t *zeros) {
     return false;
 }
 
+/* The bits of a kind of pixels: of a pixel, of a block's code; the code of verbatim differences. */
+typedef struct rice_kind {
+    int pixel_bits, code_bits, verbatim;
+    uint32_t most;
+} rice_kind;
+
+/* Decodes one block; false: an invalid code. Stored in one of narrow and wide. */
+static inline bool decode_block(bit_reader *r, const rice_kind *k, size_t at, size_t stop,
+                                uint32_t *last, uint16_t *narrow, int32_t *wide) {
+    int code = (int)take(r, k->code_bits);
+    if (code > k->verbatim) {
+        return false;
+    }
+    for (size_t i = at; i < stop; i++) {
+        uint32_t high = 0, mapped = 0;
+        if (code == k->verbatim) {
+            mapped = take(r, k->pixel_bits);
+        } else if (code > 0) {
+            int low_bits = code - 1;
+            if (!take_unary(r, k->most >> low_bits, &high)) {
+                return false;
+            }
+            mapped = high << low_bits | take(r, low_bits);
+        }
+        /* 0, 1, 2, 3, ... encode 0, -1, 1, -2, ... */
+        *last += mapped & 1 ? ~(mapped >> 1) : mapped >> 1;
+        if (narrow) {
+            narrow[i] = (uint16_t)*last;
+        } else {
+            wide[i] = k->pixel_bits == 8    ? (int32_t)(uint8_t)*last
+                      : k->pixel_bits == 16 ? (int32_t)(int16_t)*last
+                                            : (int32_t)*last;
+        }
+    }
+    return !is_exhausted(r);
+}
+
 bool bst_fits_rice_decode(const uint8_t *data, size_t bytes, int block, uint16_t *out,
                           size_t count) {
+    static const rice_kind kind = {PIXEL_BITS, CODE_BITS, VERBATIM, UINT16_MAX};
     bit_reader r = {.next = data, .end = data + bytes};
     uint32_t last = take(&r, PIXEL_BITS);
     for (size_t at = 0; at < count; at += (size_t)block) {
         size_t stop = count - at < (size_t)block ? count : at + (size_t)block;
-        int code = (int)take(&r, CODE_BITS);
-        for (size_t i = at; i < stop; i++) {
-            uint32_t high = 0, mapped = 0;
-            if (code == VERBATIM) {
-                mapped = take(&r, PIXEL_BITS);
-            } else if (code > 0) {
-                int low_bits = code - 1;
-                if (!take_unary(&r, UINT16_MAX >> low_bits, &high)) {
-                    return false;
-                }
-                mapped = high << low_bits | take(&r, low_bits);
-            }
-            /* 0, 1, 2, 3, ... encode 0, -1, 1, -2, ... */
-            last += mapped & 1 ? ~(mapped >> 1) : mapped >> 1;
-            out[i] = (uint16_t)last;
+        if (!decode_block(&r, &kind, at, stop, &last, out, NULL)) {
+            return false;
         }
-        if (is_exhausted(&r)) {
+    }
+    return true;
+}
+
+bool bst_fits_rice_decode_wide(const uint8_t *data, size_t bytes, int block, int pixel_bytes,
+                               int32_t *out, size_t count) {
+    static const rice_kind kinds[] = {{8, 3, 7, UINT8_MAX},
+                                      {PIXEL_BITS, CODE_BITS, VERBATIM, UINT16_MAX},
+                                      {32, 5, 26, UINT32_MAX}};
+    const rice_kind *kind = &kinds[pixel_bytes == 1 ? 0 : pixel_bytes == 2 ? 1 : 2];
+    bit_reader r = {.next = data, .end = data + bytes};
+    uint32_t last = take(&r, kind->pixel_bits);
+    for (size_t at = 0; at < count; at += (size_t)block) {
+        size_t stop = count - at < (size_t)block ? count : at + (size_t)block;
+        if (!decode_block(&r, kind, at, stop, &last, NULL, out)) {
             return false;
         }
     }

@@ -1,4 +1,4 @@
-/* Rice decoder for 16-bit FITS pixels. cfitsio 4.2 reads beyond its memory on damaged data. */
+/* Rice decoder for FITS pixels. cfitsio 4.2 reads beyond its memory on damaged data. */
 #ifndef BST_IO_FITS_RICE_H
 #define BST_IO_FITS_RICE_H
 
@@ -12,5 +12,12 @@
  * L. White et al., "Tiled Image Convention for Storing Compressed Images", 2009. */
 bool bst_fits_rice_decode(const uint8_t *data, size_t bytes, int block, uint16_t *out,
                           size_t count);
+
+/* The same for pixels of 1, 2 or 4 bytes.
+ *
+ * Given:     pixel_bytes  1, 2, 4: BYTEPIX of the standard
+ * Returned:  out  [count] unsigned of 1 byte, else signed */
+bool bst_fits_rice_decode_wide(const uint8_t *data, size_t bytes, int block, int pixel_bytes,
+                               int32_t *out, size_t count);
 
 #endif

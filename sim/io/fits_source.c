@@ -10,7 +10,6 @@
 #include <unistd.h>
 
 #include "sim/core/file.h"
-#include "sim/io/fits_reader.h"
 #include "sim/io/fits_source_internal.h"
 
 enum { LONGEST_SIDE = 32768, MOST_HEADER_BLOCKS = 1000, READ_BLOCKS = 8, MOST_FRAMES = 1 << 24 };
@@ -238,7 +237,6 @@ void bst_fits_source_close(bst_fits_source *s) {
     if (s->fd >= 0) {
         close(s->fd);
     }
-    bst_fits_reader_close(s->packed);
     free(s->primary.text);
     free(s->header.text);
     free(s->table.text);
@@ -299,28 +297,6 @@ bst_status bst_fits_source_select(bst_ctx *ctx, bst_fits_source *s, int64_t inde
     return BST_OK;
 }
 
-/* Pixels of a compressed frame, by the reader of compressed files. */
-static bst_status read_packed(bst_ctx *ctx, bst_fits_source *s, const bst_fits_source_hdu *h,
-                              float *pixels) {
-    if (!s->packed) {
-        BST_TRY(bst_fits_reader_open(ctx, s->path, &s->packed));
-    }
-    bst_fits_read_frame frame;
-    bool cube = bst_fits_reader_info(s->packed)->cube;
-    BST_TRY(bst_fits_reader_frame(ctx, s->packed, cube ? s->plane : h->image, &frame));
-    if (frame.width != h->size[0] || frame.height != h->size[1]) {
-        return bst_fail(ctx, BST_ERR_FORMAT,
-                        "%.400s: HDU %d: cannot be read beside images of another kind; give it a "
-                        "file of its own",
-                        s->path, h->number);
-    }
-    size_t count = (size_t)frame.width * (size_t)frame.height;
-    for (size_t i = 0; i < count; i++) {
-        pixels[i] = (float)frame.pixels[i];
-    }
-    return BST_OK;
-}
-
 /* Big-endian integer of 1 to 8 bytes; of one byte unsigned, else signed. */
 static int64_t integer_at(const uint8_t *bytes, int width) {
     uint64_t v = width > 1 && bytes[0] & 0x80 ? UINT64_MAX : 0;
@@ -364,7 +340,7 @@ bst_status bst_fits_source_pixels(bst_ctx *ctx, bst_fits_source *s, float *pixel
     assert(s && pixels && s->selected >= 0);
     const bst_fits_source_hdu *h = &s->hdus[s->selected];
     if (h->compressed) {
-        return read_packed(ctx, s, h, pixels);
+        return bst_fits_source_tiles(ctx, s, h, pixels);
     }
     uint64_t row_bytes = (uint64_t)h->size[0] * (uint64_t)(abs(h->bitpix) / 8);
     uint64_t at = h->data_at + (uint64_t)s->plane * (uint64_t)h->size[1] * row_bytes;

@@ -23,7 +23,7 @@ typedef struct bst_fits_source_frame {
 } bst_fits_source_frame;
 
 /* Opens a FITS file and lists its frames: every image of two axes, and every plane of images of
- * three, in the order of the file; any BITPIX, or tile-compressed as bst_fits_reader_open takes it.
+ * three, in the order of the file; any BITPIX, or compressed in tiles (RICE_1, GZIP_1, GZIP_2).
  *
  * Given:     path  a file
  * Returned:  *out  the open file

@@ -5,8 +5,6 @@
 #include "sim/io/fits_cards_internal.h"
 #include "sim/io/fits_source.h"
 
-struct bst_fits_reader;
-
 /* A header in memory; bytes 0: none. */
 typedef struct bst_fits_source_header {
     char *text;
@@ -37,7 +35,6 @@ struct bst_fits_source {
     bst_fits_source_header primary, header, table; /* header, table: of the selected HDU */
     uint64_t table_at;                             /* data of the table */
     int64_t selected, plane;                       /* index in hdus, -1: none; plane of the frame */
-    struct bst_fits_reader *packed;
 };
 
 /* Reads bytes at an offset; BST_ERR_FORMAT beyond the file's end, BST_ERR_IO. */
@@ -49,6 +46,27 @@ bst_status bst_fits_source_load_header(bst_ctx *ctx, const bst_fits_source *sour
 /* Value of a key as an integer; `fallback` if it is missing or none. */
 int64_t bst_fits_source_int(const bst_fits_source_header *header, const char *key,
                             int64_t fallback);
+/* A column of a table. */
+typedef struct bst_fits_source_column {
+    int64_t offset, repeat; /* bytes from the start of a row; elements */
+    char letter;            /* of its TFORM */
+    int width;              /* bytes of an element */
+} bst_fits_source_column;
+
+/* Finds a column by its name, without regard to case (FITS Standard 4.0, section 7.3.1). False:
+ * there is none, or the columns are not those of a table. */
+bool bst_fits_source_find_column(const bst_fits_source_header *header, const char *name,
+                                 size_t length, bst_fits_source_column *out);
+
+/* Pixels of the selected frame, which is compressed in tiles: RICE_1, GZIP_1, GZIP_2, NOCOMPRESS;
+ * integers, floats, floats as scaled integers with or without dithering.
+ *
+ * Returned:  pixels  [height][width], NAN for blank ones
+ * Errors:    BST_ERR_FORMAT with file, HDU and keyword or tile; BST_ERR_IO, BST_ERR_MEMORY
+ * Source:    FITS Standard 4.0, section 10 */
+bst_status bst_fits_source_tiles(bst_ctx *ctx, const bst_fits_source *source,
+                                 const bst_fits_source_hdu *hdu, float *pixels) BST_MUST_CHECK;
+
 /* Big-endian floating-point number of 4 or 8 bytes. */
 double bst_fits_source_real_at(const uint8_t *bytes, int width);
 /* Big-endian integer of 1, 2, 4 or 8 bytes; of one byte unsigned. */

@@ -35,16 +35,8 @@ static int width_of(char letter) {
     }
 }
 
-/* A column of the table. */
-typedef struct column {
-    int64_t offset, repeat; /* bytes from the start of a row; elements */
-    char letter;
-    int width;
-} column;
-
-/* Finds a column by its name, without regard to case (FITS Standard 4.0, section 7.3.1). */
-static bool find_column(const bst_fits_source_header *h, const char *name, size_t length,
-                        column *out) {
+bool bst_fits_source_find_column(const bst_fits_source_header *h, const char *name, size_t length,
+                                 bst_fits_source_column *out) {
     int64_t offset = 0, fields = bst_fits_source_int(h, "TFIELDS", 0);
     for (int64_t i = 1; i <= fields && i <= 999; i++) {
         char key[16], form[BST_FITS_CARD], type[BST_FITS_CARD], *letter;
@@ -62,7 +54,7 @@ static bool find_column(const bst_fits_source_header *h, const char *name, size_
         snprintf(key, sizeof key, "TTYPE%" PRId64, i);
         if (bst_fits_card_text(h->text, h->bytes, key, type) && strlen(type) == length &&
             strncasecmp(type, name, length) == 0 && *letter != 'X') {
-            *out = (column){offset, repeat, *letter, width};
+            *out = (bst_fits_source_column){offset, repeat, *letter, width};
             return offset + bytes <= h->cards.axes[0];
         }
         offset += bytes;
@@ -71,7 +63,8 @@ static bool find_column(const bst_fits_source_header *h, const char *name, size_
 }
 
 /* Reads an element of a column as text. */
-static bool element(const bst_fits_source *s, const column *c, int64_t index, char *value) {
+static bool element(const bst_fits_source *s, const bst_fits_source_column *c, int64_t index,
+                    char *value) {
     uint8_t bytes[BST_FITS_SOURCE_TEXT] = {0};
     bst_ctx unheard = {0};
     bool text = c->letter == 'A';
@@ -107,8 +100,9 @@ static bool table_text(const bst_fits_source *s, const char *keyword, char *valu
     size_t length = strcspn(keyword, "[");
     char *end;
     long index = keyword[length] == '[' ? strtol(keyword + length + 1, &end, 10) : 1;
-    column c;
-    return s->table.bytes > 0 && index >= 1 && find_column(&s->table, keyword, length, &c) &&
+    bst_fits_source_column c;
+    return s->table.bytes > 0 && index >= 1 &&
+           bst_fits_source_find_column(&s->table, keyword, length, &c) &&
            element(s, &c, index - 1, value);
 }
 

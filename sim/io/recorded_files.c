@@ -1,4 +1,4 @@
-/* Lists the FITS files of recorded frames: files, folders and lists. */
+/* Lists the files of recorded frames: files, folders and lists. */
 #include <dirent.h>
 #include <errno.h>
 #include <stdbool.h>
@@ -42,13 +42,17 @@ void bst_recorded_files_free(bst_recorded_files *f) {
     *f = (bst_recorded_files){0};
 }
 
-/* True if a name ends in one of the endings of FITS files. */
-static bool is_fits_name(const char *name) {
-    static const char *const endings[] = {".fits", ".fit", ".fts", ".fits.fz"};
+/* Endings of the files of a kind. */
+static const char *const fits_names[] = {".fits", ".fit", ".fts", ".fits.fz", NULL};
+static const char *const table_names[] = {".csv", NULL};
+static const char *const picture_names[] = {".png", ".tif", ".tiff", NULL};
+
+/* True if a name ends in one of some endings. */
+static bool ends_in(const char *name, const char *const *endings) {
     size_t length = strlen(name);
-    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++) {
-        size_t n = strlen(endings[i]);
-        if (length > n && strcasecmp(name + length - n, endings[i]) == 0) {
+    for (; *endings; endings++) {
+        size_t n = strlen(*endings);
+        if (length > n && strcasecmp(name + length - n, *endings) == 0) {
             return name[0] != '.';
         }
     }
@@ -66,7 +70,29 @@ static int by_name(const void *a, const void *b) {
     return strcmp(*(char *const *)a, *(char *const *)b);
 }
 
-/* Adds the FITS files of a folder in the order of their names. */
+/* Adds the files of a folder with some endings in the order of their names. */
+static bst_status add_named(bst_ctx *ctx, bst_recorded_files *f, const char *folder,
+                            const char *const *endings) {
+    char path[PATH_ROOM];
+    DIR *dir = opendir(folder);
+    if (!dir) {
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be read: %s", folder, strerror(errno));
+    }
+    int first = f->count;
+    bst_status status = BST_OK;
+    for (const struct dirent *e; status == BST_OK && (e = readdir(dir));) {
+        if (ends_in(e->d_name, endings) && exists(folder, e->d_name, false, path)) {
+            status = add(ctx, f, path);
+        }
+    }
+    closedir(dir);
+    if (status == BST_OK) {
+        qsort(f->paths + first, (size_t)(f->count - first), sizeof *f->paths, by_name);
+    }
+    return status;
+}
+
+/* Adds what a folder has: FITS files, else a side table, else pictures. */
 static bst_status add_folder(bst_ctx *ctx, bst_recorded_files *f, const char *folder) {
     char path[PATH_ROOM];
     if (exists(folder, "run.sqlite", false, path)) { /* a run: its planes are no frames */
@@ -81,27 +107,23 @@ static bst_status add_folder(bst_ctx *ctx, bst_recorded_files *f, const char *fo
     if (exists(folder, "ImageFiles", true, path)) {
         return add_folder(ctx, f, path);
     }
-    DIR *dir = opendir(folder);
-    if (!dir) {
-        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be read: %s", folder, strerror(errno));
-    }
     int first = f->count;
-    bst_status status = BST_OK;
-    for (const struct dirent *e; status == BST_OK && (e = readdir(dir));) {
-        if (is_fits_name(e->d_name) && exists(folder, e->d_name, false, path)) {
-            status = add(ctx, f, path);
+    static const char *const *const kinds[] = {fits_names, table_names, picture_names};
+    for (size_t i = 0; i < sizeof kinds / sizeof *kinds && f->count == first; i++) {
+        BST_TRY(add_named(ctx, f, folder, kinds[i]));
+        if (kinds[i] == table_names && f->count > first + 1) {
+            return bst_fail(ctx, BST_ERR_ARGUMENT,
+                            "%.300s: has several side tables, as %.300s and %.300s (allowed: one, "
+                            "or the paths of those that are meant)",
+                            folder, f->paths[first], f->paths[first + 1]);
         }
     }
-    closedir(dir);
-    if (status == BST_OK && f->count == first) {
-        status = bst_fail(ctx, BST_ERR_NOT_FOUND,
-                          "%s: holds no FITS file (allowed: files *.fits, *.fit, *.fts, *.fits.fz)",
+    return f->count > first
+               ? BST_OK
+               : bst_fail(ctx, BST_ERR_NOT_FOUND,
+                          "%s: holds no FITS file and no picture (allowed: files *.fits, *.fit, "
+                          "*.fts, *.fits.fz; *.png, *.tif, *.tiff, with a side table *.csv)",
                           folder);
-    }
-    if (status == BST_OK) {
-        qsort(f->paths + first, (size_t)(f->count - first), sizeof *f->paths, by_name);
-    }
-    return status;
 }
 
 /* Adds the files of a list, a path a line. */

@@ -1,4 +1,4 @@
-/* List of the FITS files of recorded frames. */
+/* List of the files of recorded frames. */
 #ifndef BST_IO_RECORDED_FILES_INTERNAL_H
 #define BST_IO_RECORDED_FILES_INTERNAL_H
 

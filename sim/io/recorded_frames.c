@@ -11,9 +11,11 @@
 struct bst_recorded_frames {
     bst_recorded_files files;
     int64_t *first; /* [files.count + 1] number of each file's first frame; the last: of all */
-    bst_fits_source *source;
+    bst_frame_source *source;
+    bst_keyword_map map; /* of the options below */
+    bst_frame_source_options options;
     int open; /* index of the open file; -1: none */
-    bst_fits_source_frame place;
+    bst_frame_place place;
     int box[4], bias[4]; /* x0, y0, width, height; width 0: none */
     float *image, *used;
     size_t image_room, used_room;
@@ -24,10 +26,10 @@ static bst_status open_file(bst_ctx *ctx, bst_recorded_frames *f, int index) {
     if (f->open == index) {
         return BST_OK;
     }
-    bst_fits_source_close(f->source);
+    bst_frame_source_close(f->source);
     f->source = NULL;
     f->open = -1;
-    BST_TRY(bst_fits_source_open(ctx, f->files.paths[index], &f->source));
+    BST_TRY(bst_frame_source_open(ctx, f->files.paths[index], &f->options, &f->source));
     f->open = index;
     return BST_OK;
 }
@@ -40,13 +42,13 @@ static bst_status count_frames(bst_ctx *ctx, bst_recorded_frames *f) {
     }
     for (int i = 0; i < f->files.count; i++) {
         BST_TRY(open_file(ctx, f, i));
-        f->first[i + 1] = f->first[i] + bst_fits_source_count(f->source);
+        f->first[i + 1] = f->first[i] + bst_frame_source_count(f->source);
     }
     return BST_OK;
 }
 
 bst_status bst_recorded_frames_open(bst_ctx *ctx, const char *const *paths, int count,
-                                    bst_recorded_frames **out) {
+                                    const bst_keyword_map *map, bst_recorded_frames **out) {
     assert(paths && count > 0 && out);
     *out = NULL;
     bst_recorded_frames *f = calloc(1, sizeof *f);
@@ -54,6 +56,12 @@ bst_status bst_recorded_frames_open(bst_ctx *ctx, const char *const *paths, int 
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for recorded frames");
     }
     f->open = -1;
+    f->options =
+        (bst_frame_source_options){.columns = {BST_FRAME_FILE_COLUMNS, BST_FRAME_PAGE_COLUMNS}};
+    if (map) {
+        f->map = *map;
+        f->options = bst_keyword_map_source(&f->map);
+    }
     bst_status status = BST_OK;
     for (int i = 0; i < count && status == BST_OK; i++) {
         status = bst_recorded_files_add(ctx, &f->files, paths[i]);
@@ -71,7 +79,7 @@ bst_status bst_recorded_frames_open(bst_ctx *ctx, const char *const *paths, int 
 
 void bst_recorded_frames_close(bst_recorded_frames *f) {
     if (f) {
-        bst_fits_source_close(f->source);
+        bst_frame_source_close(f->source);
         bst_recorded_files_free(&f->files);
         free(f->first);
         free(f->image);
@@ -93,7 +101,18 @@ const char *bst_recorded_frames_file(const bst_recorded_frames *f, int index) {
     return f->files.paths[index];
 }
 
-bst_fits_source *bst_recorded_frames_source(bst_recorded_frames *f) {
+bool bst_recorded_flips(const bst_recorded_options *options) {
+    bool bottom = options->map && options->map->first_row == BST_KEYWORD_BOTTOM;
+    return options->flip_rows != bottom;
+}
+
+bst_status bst_recorded_frame_fail(bst_ctx *ctx, const char *path, const bst_frame_place *place,
+                                   bst_status status) {
+    char where[BST_FRAME_WHERE_TEXT];
+    return bst_fail_prefix(ctx, status, "%s", bst_frame_where(path, place, where));
+}
+
+bst_frame_source *bst_recorded_frames_source(bst_recorded_frames *f) {
     return f->source;
 }
 
@@ -113,7 +132,7 @@ bst_status bst_recorded_frames_select(bst_ctx *ctx, bst_recorded_frames *f, int6
         *(f->first[middle] <= index ? &low : &high) = middle;
     }
     BST_TRY(open_file(ctx, f, low));
-    BST_TRY(bst_fits_source_select(ctx, f->source, index - f->first[low], &f->place));
+    BST_TRY(bst_frame_source_select(ctx, f->source, index - f->first[low], &f->place));
     *out = (bst_recorded_frame){.path = f->files.paths[low],
                                 .place = f->place,
                                 .width = f->place.width,
@@ -173,14 +192,14 @@ bst_status bst_recorded_frames_pixels(bst_ctx *ctx, bst_recorded_frames *f,
     size_t count = (size_t)box[2] * (size_t)box[3];
     size_t overscan = (size_t)f->bias[2] * (size_t)f->bias[3];
     BST_TRY(make_room(ctx, whole, &f->image, &f->image_room));
-    BST_TRY(bst_fits_source_pixels(ctx, f->source, f->image));
+    BST_TRY(bst_frame_source_pixels(ctx, f->source, f->image));
     BST_TRY(make_room(ctx, count > overscan ? count : overscan, &f->used, &f->used_room));
     frame->bias_dn = 0.0;
     if (overscan > 0) {
         copy_box(f, f->bias, false, f->used);
         frame->bias_dn = median(f->used, overscan);
     }
-    copy_box(f, box, options->flip_rows, f->used);
+    copy_box(f, box, bst_recorded_flips(options), f->used);
     for (size_t i = 0; i < count && frame->bias_dn != 0.0; i++) {
         f->used[i] -= (float)frame->bias_dn;
     }

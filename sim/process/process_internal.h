@@ -21,11 +21,11 @@ typedef struct bst_process_node {
 typedef struct bst_process_frame {
     int64_t index; /* in the recorded frames */
     const char *path;
-    bst_fits_source_frame place;
+    bst_frame_place place;
     bst_keyword_values values;
     int64_t start_tick, exposure_ticks; /* after the first frame's start */
     bool has_header_attitude;
-    bst_quat q_header;                   /* by the header's WCS */
+    bst_quat q_header;                   /* by the header */
     double rate_trend, rate_trend_sigma; /* bst_keyword_rate_trend */
     /* of the stars */
     bool solved, points;
@@ -71,7 +71,7 @@ bool bst_process_orient_by_rates(bst_process_frame *f);
 /* Reads the map and all headers.
  *
  * Errors:    those of bst_keyword_map_load and bst_recorded_frames_open; BST_ERR_ARGUMENT with
- * file, HDU and keyword for frames of several sizes or times out of order */
+ * place and keyword for frames of several sizes or times out of order */
 bst_status bst_process_survey(bst_ctx *ctx, bst_process *p, const char *const *paths,
                               int count) BST_MUST_CHECK;
 /* Finds the attitudes of the frames from their stars; frames without enough stars stay unsolved.

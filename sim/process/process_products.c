@@ -34,6 +34,16 @@ static void put_field(FILE *out, const char *text) {
     fputc('"', out);
 }
 
+/* Path of the file with a frame's pixels: in a side table its picture. */
+static const char *picture_of(bst_ctx *ctx, const bst_process *p, const bst_process_frame *f) {
+    const bst_recorded_options plain = {.map = NULL};
+    bst_recorded_frame r;
+    return f->place.line > 0 &&
+                   bst_recorded_frames_select(ctx, p->recorded, f->index, &plain, &r) == BST_OK
+               ? bst_frame_source_picture(bst_recorded_frames_source(p->recorded))
+               : f->path;
+}
+
 /* attitudes.csv: a row for each frame. */
 static bst_status write_attitudes(bst_ctx *ctx, const bst_process *p) {
     char path[4096], utc[40];
@@ -49,10 +59,11 @@ static bst_status write_attitudes(bst_ctx *ctx, const bst_process *p) {
         const bst_process_frame *f = &p->frames[i];
         bst_time_to_utc(f->values.start, 6, utc, sizeof utc);
         fprintf(out, "%d,", i);
-        put_field(out, f->path);
+        put_field(out, picture_of(ctx, p, f));
         fprintf(out, ",%d,%" PRId64 ",%s,%.9g,%d,%d,%d,%d,%.3f,%.2f,%d,", f->place.hdu,
-                f->place.plane + 1, utc, f->values.exposure_s, f->solved, f->found, f->matched,
-                f->predicted, f->rms_px, f->streak_px, f->node_count == 0 || p->direction_known);
+                f->place.hdu > 0 ? f->place.plane + 1 : f->place.page, utc, f->values.exposure_s,
+                f->solved, f->found, f->matched, f->predicted, f->rms_px, f->streak_px,
+                f->node_count == 0 || p->direction_known);
         if (f->solved) {
             put_direction(out, f->q_middle);
         } else {

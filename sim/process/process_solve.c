@@ -229,9 +229,11 @@ bst_status bst_process_solve(bst_ctx *ctx, bst_process *p) {
     for (int i = 0; i < p->count; i++) {
         bst_process_frame *f = &p->frames[i];
         /* the headers were read for the order of rows in the files */
-        f->has_header_attitude = f->has_header_attitude &&
-                                 p->options.flip_rows == (p->request->flip == BST_PROCESS_FLIP_YES);
-        if (f->has_header_attitude) {
+        bool same = p->map.attitude != BST_KEYWORD_WCS ||
+                    p->options.flip_rows == (p->request->flip == BST_PROCESS_FLIP_YES);
+        f->has_header_attitude = f->has_header_attitude && same;
+        /* a quaternion is of the camera, the others are of catalogue places */
+        if (f->has_header_attitude && p->map.attitude != BST_KEYWORD_QUATERNION) {
             const bst_light light = bst_process_light(f);
             aberrate_header(f, &light);
         }

@@ -23,11 +23,8 @@ static bst_status read_map(bst_ctx *ctx, bst_process *p) {
     return BST_OK;
 }
 
-/* Fails for a frame: "FILE: HDU n: ...". */
 static bst_status fail_frame(bst_ctx *ctx, const bst_process_frame *f, bst_status status) {
-    return f->place.plane < 0 ? bst_fail_prefix(ctx, status, "%s: HDU %d", f->path, f->place.hdu)
-                              : bst_fail_prefix(ctx, status, "%s: HDU %d, plane %lld", f->path,
-                                                f->place.hdu, (long long)f->place.plane + 1);
+    return bst_recorded_frame_fail(ctx, f->path, &f->place, status);
 }
 
 /* Reads the header of one frame. */
@@ -44,14 +41,14 @@ static bst_status read_frame(bst_ctx *ctx, bst_process *p, int64_t index, bst_pr
     if (r.width != p->width || r.height != p->height) {
         return fail_frame(ctx, f,
                           bst_fail(ctx, BST_ERR_ARGUMENT,
-                                   "NAXIS1 and NAXIS2 give %d x %d pixels, those of the first "
-                                   "frame are %d x %d (allowed: frames of one size)",
+                                   "%s %d x %d pixels, the first frame has %d x %d (allowed: "
+                                   "frames of one size)",
+                                   r.place.hdu > 0 ? "NAXIS1 and NAXIS2 give" : "the picture has",
                                    r.width, r.height, p->width, p->height));
     }
-    double scale;
-    f->has_header_attitude = p->map.attitude == BST_KEYWORD_WCS &&
-                             bst_keyword_wcs(bst_recorded_frames_source(p->recorded), &r.place,
-                                             p->options.flip_rows, &f->q_header, &scale);
+    BST_TRY(bst_keyword_attitude(ctx, &p->map, bst_recorded_frames_source(p->recorded), &r.place,
+                                 bst_recorded_flips(&p->options), &f->has_header_attitude,
+                                 &f->q_header));
     bst_keyword_rate_trend(ctx, &p->map, bst_recorded_frames_source(p->recorded), &r.place,
                            r.values.exposure_s, &f->rate_trend, &f->rate_trend_sigma);
     return BST_OK;
@@ -63,6 +60,17 @@ static int by_start(const void *a, const void *b) {
     return d != 0.0 ? (d > 0.0 ? 1 : -1) : (f->index > g->index) - (f->index < g->index);
 }
 
+/* Keyword of a frame's time, for messages. */
+static const char *time_keyword(bst_ctx *ctx, const bst_process *p, const bst_process_frame *f,
+                                char keyword[BST_KEYWORD_TEXT]) {
+    const bst_recorded_options plain = {.map = NULL};
+    bst_recorded_frame r;
+    return bst_recorded_frames_select(ctx, p->recorded, f->index, &plain, &r) == BST_OK
+               ? bst_keyword_name(bst_recorded_frames_source(p->recorded), p->map.time.keyword,
+                                  keyword)
+               : p->map.time.keyword;
+}
+
 /* Sets the ticks and checks that exposures follow each other. */
 static bst_status set_ticks(bst_ctx *ctx, bst_process *p) {
     for (int i = 0; i < p->count; i++) {
@@ -72,15 +80,18 @@ static bst_status set_ticks(bst_ctx *ctx, bst_process *p) {
         f->exposure_ticks = (int64_t)floor(f->values.exposure_s * BST_PROCESS_TICK_RATE_HZ + 0.5);
         int64_t ended = before ? before->start_tick + before->exposure_ticks : 0;
         if (before && (f->start_tick < ended || f->start_tick <= before->start_tick)) {
+            char where[BST_FRAME_WHERE_TEXT], keyword[BST_KEYWORD_TEXT];
             return fail_frame(
                 ctx, f,
-                bst_fail(ctx, BST_ERR_ARGUMENT,
-                         "%s begins %.6g s before the end of the exposure before it, %s, HDU %d "
-                         "(allowed: frames of one camera, in the order of time); give the files in "
-                         "that order, or a map with the right time and exposure_s",
-                         p->map.time.keyword,
-                         (double)(ended - f->start_tick) / BST_PROCESS_TICK_RATE_HZ, before->path,
-                         before->place.hdu));
+                bst_fail(
+                    ctx, BST_ERR_ARGUMENT,
+                    "%s%s begins %.6g s before the end of the exposure before it, %s (allowed: "
+                    "frames of one camera, in the order of time); give the %s in that order, "
+                    "or a map with the right time and exposure_s",
+                    f->place.line > 0 ? "column " : "", time_keyword(ctx, p, f, keyword),
+                    (double)(ended - f->start_tick) / BST_PROCESS_TICK_RATE_HZ,
+                    bst_frame_where(before->path, &before->place, where),
+                    f->place.line > 0 ? "rows" : "files"));
         }
         if (start_s > 1e9) {
             return fail_frame(ctx, f,
@@ -94,7 +105,7 @@ static bst_status set_ticks(bst_ctx *ctx, bst_process *p) {
 
 bst_status bst_process_survey(bst_ctx *ctx, bst_process *p, const char *const *paths, int count) {
     BST_TRY(read_map(ctx, p));
-    BST_TRY(bst_recorded_frames_open(ctx, paths, count, &p->recorded));
+    BST_TRY(bst_recorded_frames_open(ctx, paths, count, &p->map, &p->recorded));
     int64_t frames = bst_recorded_frames_count(p->recorded);
     if (frames > MOST_FRAMES) {
         return bst_fail(ctx, BST_ERR_ARGUMENT, "%lld frames were given (allowed: %d)",

@@ -204,6 +204,9 @@ typedef struct bst_sensor_config {
     bst_cue_config cue;
     bst_knowledge_config knowledge;
     int32_t observation_source; /* BST_OBSERVE_... */
+    /* set by bst_scenario_read, not by the table: the camera's numbers as the scenario gives them,
+     * before ensquared_energy and zero_point_mag replace them; NAN: not given */
+    double given_psf_fwhm_px, given_throughput, given_flux_v0;
 } bst_sensor_config;
 
 typedef struct bst_observer_config {

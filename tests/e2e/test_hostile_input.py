@@ -151,6 +151,7 @@ LINES = [
     (("view", F), 1, "is not the folder of a run"),
     (("view", F + "/file"), 1, "file:1:1: this is not valid JSON"),
     (("process", F + "/none.fits", "--map", "neossat", "--out", OUT), 1, "none.fits: cannot be opened"),
+    (("process", F + "/rows.csv", "--map", "table", "--out", OUT), 1, "rows.csv: line 2: column file: .*none.png: cannot be opened"),
     (("process", T, "--map", "neossat", "--out", OUT), 1, "track.json: does not begin as a FITS file"),
     (("process", RUN, "--map", "nix", "--out", OUT), 1, "--map nix: there is no such keyword map .allowed: "),
     (("process", RUN, "--map", "neossat", "--out", OUT), 1, "frames.fits: HDU 1, plane 1: TRIMSEC .section of the map"),
@@ -236,6 +237,7 @@ class Hostile(unittest.TestCase):
         cards = ["SIMPLE  = T", "BITPIX  = -32", "NAXIS   = 2", "NAXIS1  = 1024", "NAXIS2  = 1024", "END"]
         head = "".join(f"{card[:10]}{card[10:].strip():>20}".ljust(80) if "=" in card else card.ljust(80)
                        for card in cards)
+        cls.write("rows.csv", "file,time_utc\nnone.png,2024-08-26T17:45:45Z\n")
         cls.write("cut.fits", head.ljust(2880) + "\0" * 2880)
         cls.write("study.json", json.dumps({"boresight_study": 1, "name": "s", "kind": "loop", "seed": "0x1",
                                             "scenarios": [{"file": os.path.abspath(T)}], "replicates": 1}))

@@ -17,11 +17,13 @@ from astropy.io import fits
 from astropy.wcs import WCS
 
 import runs
+from pictures import write_png, write_table, write_tiff
 from runs import call, call_well
 
 CAMERA = "/observers/0/sensors/0/camera/"
 MODULES = "/observers/0/sensors/0/modules/"
 MAP = os.path.abspath("scenarios/maps/boresight.json")
+TABLE_MAP = os.path.abspath("scenarios/maps/table.json")
 SOLVE = ("--v-limit", "7.5", "--least-snr", "8", "--catalogue", "embedded", "--quiet")
 NEOSSAT = os.path.join(os.environ.get("BORESIGHT_NEOSSAT", ""), "NEOS_SCI_2024239174545_cord.fits")
 # tables of what is known only where frames are rendered
@@ -55,8 +57,45 @@ class Recorded(unittest.TestCase):
                                                    "keyword_map": keyword_map, **keys})
 
     def test_recorded_frames_give_the_same_results_as_rendered_ones(self):
-        again = self.path("again")
-        runs.run(self.scenario, again, self.recorded(self.made), duration=3)
+        self.compare_results(self.recorded(self.made))
+
+    def test_pictures_give_the_same_results_as_rendered_frames(self):
+        """16-bit PNG files with a side table; pages of a TIFF file, of the other order of bytes."""
+        with fits.open(os.path.join(self.made, "frames.fits")) as file:
+            hdus = file[1:]
+            folder = self.path("pictures")
+            os.mkdir(folder)
+            for i, hdu in enumerate(hdus):
+                write_png(os.path.join(folder, f"{i}.png"), hdu.data)
+            write_table(os.path.join(folder, "night.csv"), hdus, lambda i: f"{i}.png")
+            write_tiff(self.path("cube.tif"), [hdu.data for hdu in hdus], ">")
+            write_table(self.path("cube.csv"), hdus, lambda i: "cube.tif")
+        self.compare_results(self.recorded(folder, TABLE_MAP))
+        self.compare_results(self.recorded(self.path("cube.csv"), TABLE_MAP))
+
+    def test_frames_that_others_compressed(self):
+        """GZIP_2, RICE_1 of 32 bits, and floats as scaled integers with dithering, against astropy's pixels."""
+        with fits.open(os.path.join(self.made, "frames.fits")) as file:
+            frames, headers = [hdu.data for hdu in file[1:]], [hdu.header for hdu in file[1:]]
+        kinds = ((numpy.int32, {"compression_type": "GZIP_2"}), (numpy.int32, {"compression_type": "RICE_1"}),
+                 (numpy.float32, {"compression_type": "RICE_1", "quantize_method": 1, "dither_seed": 9999, "quantize_level": 64}))
+        hdus = [fits.PrimaryHDU()]
+        for pixels, header, (kind, options) in zip(frames, headers, kinds):
+            kept = fits.Header((key, header[key]) for key in ("DATE-OBS", "EXPTIME", "PIXSCALE", "FRAMEID"))
+            hdus.append(fits.CompImageHDU(pixels.astype(kind), kept, **options))
+        packed, again = self.path("packed.fits"), self.path("unpacked")
+        fits.HDUList(hdus).writeto(packed)
+        runs.run(self.scenario, again, self.recorded(packed), duration=3)
+        with fits.open(packed) as ours, fits.open(os.path.join(again, "frames.fits")) as read:
+            self.assertEqual(len(read), 4)
+            self.assertTrue(numpy.any(ours[3].data != numpy.floor(ours[3].data)))
+            for a, b in zip(ours[1:], read[1:]):
+                numpy.testing.assert_array_equal(b.data, numpy.floor(a.data.astype(float) + 0.5))
+
+    def compare_results(self, scenegen):
+        again = runs.scratch()
+        runs.run(self.scenario, os.path.join(again, "run"), scenegen, duration=3)
+        again = os.path.join(again, "run")
         for name, in rows(self.made, "SELECT name FROM sqlite_master WHERE type = 'table'"):
             if name not in OF_RENDERING:
                 with self.subTest(table=name):

@@ -47,7 +47,7 @@ static bst_recorded_frames *the_frame(void) {
         bst_ctx ctx;
         bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
         const char *path = fuzz_write_file("frame.fits", file, sizeof file);
-        if (bst_recorded_frames_open(&ctx, &path, 1, &frames) != BST_OK) {
+        if (bst_recorded_frames_open(&ctx, &path, 1, NULL, &frames) != BST_OK) {
             abort();
         }
     }

@@ -61,7 +61,7 @@ static void read_frame(bst_recorded_frames *frames, int64_t index,
     }
     bst_quat q;
     double scale, trend, sigma;
-    bst_fits_source *source = bst_recorded_frames_source(frames);
+    bst_frame_source *source = bst_recorded_frames_source(frames);
     if (bst_keyword_wcs(source, &frame.place, options->flip_rows, &q, &scale) &&
         !(scale > 0.0 && isfinite(scale) && isfinite(q.x + q.y + q.z + q.w))) {
         abort();
@@ -90,7 +90,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t bytes) {
     bst_ctx ctx;
     bst_recorded_frames *frames;
     bst_ctx_init(&ctx, NULL, NULL, BST_LOG_ERROR);
-    bst_status status = bst_recorded_frames_open(&ctx, paths, 1, &frames);
+    bst_status status = bst_recorded_frames_open(&ctx, paths, 1, map, &frames);
     FUZZ_CHECK_REASON(ctx, status);
     for (int64_t i = 0;
          status == BST_OK && i < bst_recorded_frames_count(frames) && i < MOST_FRAMES; i++) {

@@ -117,7 +117,7 @@ static void test_keywords_and_sections(void **state) {
     bst_recorded_frames *frames;
     bst_recorded_frame r;
     bst_recorded_options options = {.map = &map, .flip_rows = true};
-    bst_assert_ok(&f.ctx, bst_recorded_frames_open(&f.ctx, paths, 1, &frames));
+    bst_assert_ok(&f.ctx, bst_recorded_frames_open(&f.ctx, paths, 1, NULL, &frames));
     bst_assert_ok(&f.ctx, bst_recorded_frames_select(&f.ctx, frames, 0, &options, &r));
     assert_int_equal(r.width, 2);
     assert_int_equal(r.height, 2);
@@ -198,7 +198,7 @@ static void test_cube_table(void **state) {
     bst_recorded_frame r;
     const bst_recorded_options options = {.map = &map};
     const float *pixels;
-    bst_assert_ok(&f.ctx, bst_recorded_frames_open(&f.ctx, paths, 1, &frames));
+    bst_assert_ok(&f.ctx, bst_recorded_frames_open(&f.ctx, paths, 1, NULL, &frames));
     assert_int_equal(bst_recorded_frames_count(frames), 2);
     bst_assert_ok(&f.ctx, bst_recorded_frames_select(&f.ctx, frames, 1, &options, &r));
     assert_int_equal(r.values.exposure_id, 42);
@@ -207,6 +207,11 @@ static void test_cube_table(void **state) {
     bst_assert_close(r.values.pixel_scale_arcsec, 4.0, 0.0);
     bst_assert_ok(&f.ctx, bst_recorded_frames_pixels(&f.ctx, frames, &options, &r, &pixels));
     bst_assert_close(pixels[1], 4.0, 0.0);
+    /* one time for all planes */
+    bst_time start = r.values.start;
+    map.plane_period_s = (bst_keyword_number){.factor = 1.0, .value = 2.5};
+    bst_assert_ok(&f.ctx, bst_recorded_frames_select(&f.ctx, frames, 1, &options, &r));
+    bst_assert_close(bst_time_diff(r.values.start, start), 2.5, 1e-9); /* rounded once */
     bst_recorded_frames_close(frames);
     end(&f);
 }
@@ -218,7 +223,7 @@ static bst_status try_file(fixture *f, const bst_keyword_map *map) {
     bst_recorded_frame r;
     const bst_recorded_options options = {.map = map};
     const float *pixels;
-    bst_status status = bst_recorded_frames_open(&f->ctx, paths, 1, &frames);
+    bst_status status = bst_recorded_frames_open(&f->ctx, paths, 1, NULL, &frames);
     for (int64_t i = 0; status == BST_OK && i < bst_recorded_frames_count(frames) && i < 3; i++) {
         status = bst_recorded_frames_select(&f->ctx, frames, i, &options, &r);
         if (status == BST_OK && (int64_t)r.place.width * r.place.height < 1 << 16) {
@@ -348,11 +353,11 @@ static void test_files(void **state) {
     fclose(list);
     bst_recorded_frames *frames;
     const char *folder[] = {f.place.folder}, *lists[] = {f.path};
-    bst_assert_ok(&f.ctx, bst_recorded_frames_open(&f.ctx, folder, 1, &frames));
+    bst_assert_ok(&f.ctx, bst_recorded_frames_open(&f.ctx, folder, 1, NULL, &frames));
     assert_int_equal(bst_recorded_frames_files(frames), 2);
     assert_non_null(strstr(bst_recorded_frames_file(frames, 0), "a.FIT"));
     bst_recorded_frames_close(frames);
-    bst_assert_ok(&f.ctx, bst_recorded_frames_open(&f.ctx, lists, 1, &frames));
+    bst_assert_ok(&f.ctx, bst_recorded_frames_open(&f.ctx, lists, 1, NULL, &frames));
     assert_int_equal(bst_recorded_frames_count(frames), 2);
     assert_non_null(strstr(bst_recorded_frames_file(frames, 0), "b.fits"));
     bst_recorded_frames_close(frames);
@@ -364,8 +369,8 @@ static void test_rate_trend(void **state) {
     (void)state;
     fixture f = begin("history.fits");
     bst_keyword_map map;
-    bst_fits_source *s;
-    bst_fits_source_frame frame;
+    bst_frame_source *s;
+    bst_frame_place frame;
     double trend, sigma;
     const double uneven[7] = {9.0, 1.0, 1.0, 2.0, 3.0, 1.0, 9.0};
     load_map(&f,
@@ -384,8 +389,8 @@ static void test_rate_trend(void **state) {
     put(&f, "x", 1);
     pad(&f, 0);
     save(&f, f.count);
-    bst_assert_ok(&f.ctx, bst_fits_source_open(&f.ctx, f.path, &s));
-    bst_assert_ok(&f.ctx, bst_fits_source_select(&f.ctx, s, 0, &frame));
+    bst_assert_ok(&f.ctx, bst_frame_source_open(&f.ctx, f.path, NULL, &s));
+    bst_assert_ok(&f.ctx, bst_frame_source_select(&f.ctx, s, 0, &frame));
     bst_keyword_rate_trend(&f.ctx, &map, s, &frame, 4.0, &trend, &sigma);
     bst_assert_close(trend, 0.5 * 4.0 / 4.0, 1e-12); /* slope times exposure over the mean */
     bst_assert_close(sigma, 0.0, 1e-7);              /* a root of rounding errors */
@@ -404,7 +409,7 @@ static void test_rate_trend(void **state) {
     bst_keyword_rate_trend(&f.ctx, &map, s, &frame, 4.0, &trend, &sigma);
     assert_true(isnan(trend) && isnan(sigma)); /* a hint that cannot be read is none */
     assert_int_equal(f.ctx.warnings, 1);
-    bst_fits_source_close(s);
+    bst_frame_source_close(s);
     end(&f);
 }
 

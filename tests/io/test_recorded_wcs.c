@@ -17,12 +17,12 @@ static void test_wcs(void **state) {
         end_header(&f);
         put(&f, "123456789", 9);
         save(&f, f.count);
-        bst_fits_source *s;
-        bst_fits_source_frame frame;
+        bst_frame_source *s;
+        bst_frame_place frame;
         bst_quat q;
         double scale;
-        bst_assert_ok(&f.ctx, bst_fits_source_open(&f.ctx, f.path, &s));
-        bst_assert_ok(&f.ctx, bst_fits_source_select(&f.ctx, s, 0, &frame));
+        bst_assert_ok(&f.ctx, bst_frame_source_open(&f.ctx, f.path, NULL, &s));
+        bst_assert_ok(&f.ctx, bst_frame_source_select(&f.ctx, s, 0, &frame));
         assert_false(bst_keyword_wcs(s, &frame, !flip, &q, &scale)); /* mirrored */
         assert_true(bst_keyword_wcs(s, &frame, flip, &q, &scale));
         bst_assert_close(scale, 3.6, 1e-12);                   /* rounding */
@@ -30,7 +30,7 @@ static void test_wcs(void **state) {
         bst_vec3 y = bst_quat_rotate(q, (bst_vec3){0, 0, -1}); /* south */
         bst_assert_close(z.z, 1.0, 1e-12);
         bst_assert_close(y.y, 1.0, 1e-9); /* a pixel to the right is 1.7e-5 rad away */
-        bst_fits_source_close(s);
+        bst_frame_source_close(s);
         end(&f);
     }
 }
@@ -57,14 +57,14 @@ static void test_turned_wcs(void **state) {
     /* rotation of the axes, after the scales */
     const double cd[2][2] = {{dx * cos(angle), -dy * sin(angle)},
                              {dx * sin(angle), dy * cos(angle)}};
-    for (int matrix = 0; matrix < 2; matrix++) {
+    for (int matrix = 0; matrix < 3; matrix++) {
         fixture f = begin("turned.fits");
         begin_image(&f, true, 8, WIDTH, HEIGHT, 0);
         card(&f, "CRPIX1  = %20.3f", -3.25);
         card(&f, "CRPIX2  = %20.3f", 11.5);
         card(&f, "CRVAL1  = %20.3f", ra);
         card(&f, "CRVAL2  = %20.3f", dec);
-        if (matrix) {
+        if (matrix == 1) {
             card(&f, "CD1_1   = %20.13E", cd[0][0]);
             card(&f, "CD1_2   = %20.13E", cd[0][1]);
             card(&f, "CD2_1   = %20.13E", cd[1][0]);
@@ -72,17 +72,24 @@ static void test_turned_wcs(void **state) {
         } else {
             card(&f, "CDELT1  = %20.4f", dx);
             card(&f, "CDELT2  = %20.4f", dy);
-            card(&f, "CROTA2  = %20.4f", angle / BST_DEG_RAD);
+            if (matrix == 2) { /* the rotation by itself, without the scales */
+                card(&f, "PC1_1   = %20.13E", cos(angle));
+                card(&f, "PC1_2   = %20.13E", -dy / dx * sin(angle));
+                card(&f, "PC2_1   = %20.13E", dx / dy * sin(angle));
+                card(&f, "PC2_2   = %20.13E", cos(angle));
+            } else {
+                card(&f, "CROTA2  = %20.4f", angle / BST_DEG_RAD);
+            }
         }
         end_header(&f);
         put(&f, "12345678901234567890123456789012345", WIDTH * HEIGHT);
         save(&f, f.count);
-        bst_fits_source *s;
-        bst_fits_source_frame frame;
+        bst_frame_source *s;
+        bst_frame_place frame;
         bst_quat q;
         double scale;
-        bst_assert_ok(&f.ctx, bst_fits_source_open(&f.ctx, f.path, &s));
-        bst_assert_ok(&f.ctx, bst_fits_source_select(&f.ctx, s, 0, &frame));
+        bst_assert_ok(&f.ctx, bst_frame_source_open(&f.ctx, f.path, NULL, &s));
+        bst_assert_ok(&f.ctx, bst_frame_source_select(&f.ctx, s, 0, &frame));
         assert_true(bst_keyword_wcs(s, &frame, false, &q, &scale));
         bst_assert_close(scale, 3600.0 * sqrt(dx * dy), 1e-9); /* 13 digits */
         double x = 4.0 + 3.25, y = 3.0 - 11.5;                 /* the middle, from CRPIX */
@@ -93,7 +100,7 @@ static void test_turned_wcs(void **state) {
         bst_assert_close(edge.x, bst_vec3_angle(z, right), 1e-10);
         bst_assert_close(edge.y, 0.0,
                          1e-8); /* 1.1e-4 rad from the axis: the plane's bend is 1e-8 */
-        bst_fits_source_close(s);
+        bst_frame_source_close(s);
         end(&f);
     }
 }

@@ -42,10 +42,12 @@ WRAP(bst_status, bst_keyword_map_camera, (bst_ctx * ctx, const char *path, struc
 }
 
 WRAP(bst_status, bst_recorded_frames_open,
-     (bst_ctx * ctx, const char *const *paths, int count, bst_recorded_frames **out)) {
+     (bst_ctx * ctx, const char *const *paths, int count, const bst_keyword_map *map,
+      bst_recorded_frames **out)) {
     (void)ctx;
     (void)paths;
     (void)count;
+    (void)map;
     *out = NULL;
     return BST_OK;
 }
@@ -60,14 +62,33 @@ WRAP(int, bst_recorded_frames_files, (const bst_recorded_frames *frames)) {
     return script.files;
 }
 
-WRAP(bst_fits_source *, bst_recorded_frames_source, (bst_recorded_frames * frames)) {
+WRAP(bst_frame_source *, bst_recorded_frames_source, (bst_recorded_frames * frames)) {
     (void)frames;
     return NULL;
 }
 
+WRAP(bst_status, bst_keyword_attitude,
+     (bst_ctx * ctx, const bst_keyword_map *map, bst_frame_source *source,
+      const bst_frame_place *frame, bool flip_rows, bool *has, bst_quat *q_cam_from_gcrf)) {
+    (void)ctx;
+    (void)map;
+    (void)source;
+    (void)frame;
+    (void)flip_rows;
+    (void)q_cam_from_gcrf;
+    *has = false;
+    return BST_OK;
+}
+
+WRAP(const char *, bst_keyword_name,
+     (bst_frame_source * source, const char *keywords, char *text)) {
+    (void)source;
+    return strcpy(text, keywords);
+}
+
 WRAP(void, bst_keyword_rate_trend,
-     (bst_ctx * ctx, const bst_keyword_map *map, bst_fits_source *source,
-      const bst_fits_source_frame *frame, double exposure_s, double *trend, double *sigma)) {
+     (bst_ctx * ctx, const bst_keyword_map *map, bst_frame_source *source,
+      const bst_frame_place *frame, double exposure_s, double *trend, double *sigma)) {
     (void)ctx;
     (void)map;
     (void)source;

@@ -309,9 +309,10 @@ static void background_with_more_slope_than_noise(void **state) {
 
     t.process.zero_point_mag = NAN;
     frame.path = "some.fits";
+    frame.place = (bst_frame_place){.hdu = 2, .plane = -1};
     json = camera_json();
     assert_int_equal(bst_twin_make_camera(&ctx, &t, json, &c), BST_ERR_NUMERIC);
-    assert_non_null(strstr(ctx.message, "some.fits: HDU 0: none of the 0 catalogue stars"));
+    assert_non_null(strstr(ctx.message, "some.fits: HDU 2: none of the 0 catalogue stars"));
     cJSON_Delete(json);
 }
 

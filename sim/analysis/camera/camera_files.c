@@ -195,11 +195,24 @@ static bst_status plot(bst_ctx *ctx, const writer *w) {
     return bst_plot_end(ctx, &p, NULL);
 }
 
+/* Removes the PSF of an earlier run, which would not belong to the new report. */
+static void remove_earlier_psf(const bst_camera_calibration_request *request) {
+    static const char *const names[] = {"psf.fits", "psf_sigma.fits"};
+    char path[4096 + 32];
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        snprintf(path, sizeof path, "%s/%s", request->out, names[i]);
+        (void)remove(path); /* mostly there is none */
+    }
+}
+
 bst_status bst_camera_calibration_write(bst_ctx *ctx, const bst_camera_calibration_request *request,
                                         const bst_camera *start, const bst_camera_figures *figures,
                                         const bst_camera_fit_star *stars, const int64_t *exposures,
                                         int count) {
     const writer w = {request, start, figures, stars, exposures, count};
+    if (request->overwrite) {
+        remove_earlier_psf(request);
+    }
     BST_TRY(write_stars(ctx, &w));
     BST_TRY(plot(ctx, &w));
     cJSON *report = report_json(&w);

@@ -78,27 +78,30 @@ static bst_status make_room(bst_ctx *ctx, reduction *r, const bst_recorded_frame
 static bst_status check_frame(bst_ctx *ctx, const reduction *r, const bst_recorded_frame *f,
                               const int box[4]) {
     const bst_frame_stack *s = r->stack;
+    char where[BST_FRAME_WHERE_TEXT];
+    (void)bst_frame_where(f->path, &f->place, where);
     if (box[2] != s->width || box[3] != s->height) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "%.400s: HDU %d: %d x %d pixels, those of the first %s frame are %d x %d "
+                        "%s: %d x %d pixels, those of the first %s frame are %d x %d "
                         "(allowed: frames of one size)",
-                        f->path, f->place.hdu, box[2], box[3], r->kind, s->width, s->height);
+                        where, box[2], box[3], r->kind, s->width, s->height);
     }
     if (fabs(f->values.exposure_s - s->exposure_s) > 1e-3 * s->exposure_s + 1e-6) {
         return bst_fail(ctx, BST_ERR_ARGUMENT,
-                        "%.400s: HDU %d: %s gives %g s, the first %s frame has %g s (allowed: %s "
+                        "%s: %s gives %g s, the first %s frame has %g s (allowed: %s "
                         "frames of one exposure); give the others to another run",
-                        f->path, f->place.hdu, r->map->exposure_s.keyword, f->values.exposure_s,
-                        r->kind, s->exposure_s, r->kind);
+                        where, r->map->exposure_s.keyword, f->values.exposure_s, r->kind,
+                        s->exposure_s, r->kind);
     }
     return BST_OK;
 }
 
-/* Copies a part of an image of `width` columns. */
-static void cut_out(const float *image, int width, const int box[4], float *to) {
+/* Copies a part of an image of `width` columns, in the camera's order of rows. */
+static void cut_out(const float *image, int width, const int box[4], bool flip_rows, float *to) {
     for (int y = 0; y < box[3]; y++) {
+        int row = flip_rows ? box[3] - 1 - y : y;
         memcpy(to + (size_t)y * (size_t)box[2],
-               image + (size_t)(box[1] + y) * (size_t)width + (size_t)box[0],
+               image + (size_t)(box[1] + row) * (size_t)width + (size_t)box[0],
                (size_t)box[2] * sizeof *to);
     }
 }
@@ -246,7 +249,7 @@ static bst_status add_frame(bst_ctx *ctx, reduction *r, int64_t index, int frame
     const float *image;
     int box[4], bias[4];
     BST_TRY(bst_recorded_frames_select(ctx, r->recorded, index, &options, &f));
-    bst_fits_source *source = bst_recorded_frames_source(r->recorded);
+    bst_frame_source *source = bst_recorded_frames_source(r->recorded);
     BST_TRY(bst_keyword_section(ctx, r->map->image_section, source, &f.place, box));
     BST_TRY(bst_keyword_section(ctx, r->map->bias_section, source, &f.place, bias));
     if (box[2] == 0) {
@@ -261,10 +264,11 @@ static bst_status add_frame(bst_ctx *ctx, reduction *r, int64_t index, int frame
     BST_TRY(check_frame(ctx, r, &f, box));
     BST_TRY(bst_recorded_frames_pixels(ctx, r->recorded, &options, &f, &image));
     bst_frame_stack *s = r->stack;
+    bool flip_rows = r->map->first_row == BST_KEYWORD_BOTTOM;
     size_t pixels = (size_t)s->width * (size_t)s->height;
-    cut_out(image, f.width, box, s->last);
+    cut_out(image, f.width, box, flip_rows, s->last);
     if (beside && bias[2] == s->overscan_width) {
-        cut_out(image, f.width, bias, s->overscan);
+        cut_out(image, f.width, bias, flip_rows, s->overscan);
     }
     for (size_t i = 0; i < pixels; i++) {
         s->integer = s->integer && (isnan(s->last[i]) || s->last[i] == floorf(s->last[i]));
@@ -314,6 +318,7 @@ bst_status bst_frame_stack_reduce(bst_ctx *ctx, const char *kind, bst_recorded_f
     *out = (bst_frame_stack){0};
     reduction r = {.kind = kind, .map = map, .whole = *map, .recorded = recorded, .stack = out};
     r.whole.image_section[0] = r.whole.bias_section[0] = '\0';
+    r.whole.first_row = BST_KEYWORD_TOP; /* sections are of the file's rows */
     bst_status status = reduce(ctx, &r, first, count);
     free(r.sum);
     free(r.before);
@@ -328,7 +333,7 @@ bst_status bst_frame_stack_read(bst_ctx *ctx, const char *kind, const char *cons
     assert(kind && paths && count > 0 && map && out);
     *out = (bst_frame_stack){0};
     bst_recorded_frames *recorded = NULL;
-    bst_status status = bst_recorded_frames_open(ctx, paths, count, &recorded);
+    bst_status status = bst_recorded_frames_open(ctx, paths, count, map, &recorded);
     if (status == BST_OK) {
         status = bst_frame_stack_reduce(ctx, kind, recorded, 0, bst_recorded_frames_count(recorded),
                                         map, out);

@@ -85,7 +85,7 @@ bst_status bst_linearity_series_read(bst_ctx *ctx, const char *const *paths, int
     assert(paths && count > 0 && map && out);
     *out = (bst_linearity_series){0};
     bst_recorded_frames *frames = NULL;
-    bst_status status = bst_recorded_frames_open(ctx, paths, count, &frames);
+    bst_status status = bst_recorded_frames_open(ctx, paths, count, map, &frames);
     status = status == BST_OK ? read_points(ctx, frames, map, out) : status;
     bst_recorded_frames_close(frames);
     BST_TRY(status);

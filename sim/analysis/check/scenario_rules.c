@@ -247,6 +247,34 @@ static bst_status short_times(const subject *s) {
     return BST_OK;
 }
 
+/* Numbers differ by more than the rounding of a resolved scenario that is read again. */
+#define REPLACED_SHARE 1e-9
+
+static void warn_replaced(const subject *s, const char *key, double given, double used,
+                          const char *by) {
+    if (fabs(given - used) > REPLACED_SHARE * fabs(used)) { /* false for NAN: not given */
+        bst_log(s->ctx, BST_LOG_WARNING,
+                "%s/camera/%s: %.6g is not used: %s/camera/%s gives %.6g; leave out one of them",
+                s->place, key, given, strstr(s->place, "/observers"), by, used);
+    }
+}
+
+/* Keys of which one replaces the other. */
+static bst_status replaced_figures(const subject *s) {
+    const bst_camera *c = bst_world_camera(s->world, s->observer, s->number);
+    if (c->ensquared_energy > 0.0) {
+        warn_replaced(s, "psf_fwhm_px", s->sensor->given_psf_fwhm_px, c->psf_fwhm_px,
+                      "ensquared_energy");
+    }
+    if (c->zero_point_mag > 0.0) {
+        warn_replaced(s, "throughput", s->sensor->given_throughput, c->throughput,
+                      "zero_point_mag");
+        warn_replaced(s, "photon_flux_v0_per_s_m2", s->sensor->given_flux_v0,
+                      c->photon_flux_v0_per_s_m2, "zero_point_mag");
+    }
+    return BST_OK;
+}
+
 /* ---- the list ---- */
 
 typedef struct rule {
@@ -277,6 +305,8 @@ static const rule rules[] = {
     {"lost_frames", "a sensor all of whose frames are lost", NULL, no_frames, NULL},
     {"wide_field", "a field too wide for the gnomonic projection (an error from 160 degrees on)",
      NULL, wide_field, NULL},
+    {"replaced", "psf_fwhm_px beside ensquared_energy, throughput or flux beside zero_point_mag",
+     NULL, replaced_figures, NULL},
     {"short_times", "times of tracker and control that are over before the frames they wait for",
      NULL, short_times, NULL},
     {"loops", "loops that are unstable or have thin margins", NULL, NULL, loops},

@@ -83,6 +83,28 @@ static bst_status check_name(bst_ctx *ctx, const bst_scenario *s, const char *pa
     return BST_OK;
 }
 
+/* A number of a camera as the scenario gives it; NAN: it does not. */
+static double given_number(const cJSON *root, int observer, int sensor, const char *key) {
+    const cJSON *o =
+        cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(root, "observers"), observer);
+    const cJSON *s = cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(o, "sensors"), sensor);
+    const cJSON *camera = cJSON_GetObjectItemCaseSensitive(s, "camera");
+    const cJSON *value = cJSON_GetObjectItemCaseSensitive(camera, key);
+    return cJSON_IsNumber(value) ? value->valuedouble : NAN;
+}
+
+static void note_given(const cJSON *root, bst_scenario *s) {
+    const bst_observer_config *observers = s->observers.items;
+    for (int i = 0; i < s->observers.count; i++) {
+        bst_sensor_config *sensors = observers[i].sensors.items;
+        for (int k = 0; k < observers[i].sensors.count; k++) {
+            sensors[k].given_psf_fwhm_px = given_number(root, i, k, "psf_fwhm_px");
+            sensors[k].given_throughput = given_number(root, i, k, "throughput");
+            sensors[k].given_flux_v0 = given_number(root, i, k, "photon_flux_v0_per_s_m2");
+        }
+    }
+}
+
 static bst_status prepare_cameras(bst_ctx *ctx, bst_scenario *s) {
     const bst_observer_config *observers = s->observers.items;
     for (int i = 0; i < s->observers.count; i++) {
@@ -230,6 +252,7 @@ static bst_status read_scenario(bst_ctx *ctx, const bst_json *json,
         return bst_fail_prefix(ctx, BST_ERR_CONFIG, "%s", out->file);
     }
     BST_TRY(check_changes(ctx, out));
+    note_given(bst_json_root(json), out);
     BST_TRY(prepare_cameras(ctx, out));
     BST_TRY(resolve_states(ctx, out));
     BST_TRY(check_names(ctx, out));

@@ -17,7 +17,7 @@ const bst_option bst_twin_options[] = {
      .kind = BST_OPTION_TEXT,
      .offset = offsetof(Q, map),
      .argument = "MAP",
-     .doc = "keyword map: neossat, boresight, satnet, or the path of a JSON file",
+     .doc = "keyword map: neossat, boresight, satnet, table, or the path of a JSON file",
      .required = true},
     {.name = "out",
      .kind = BST_OPTION_TEXT,
@@ -119,10 +119,11 @@ static bst_status solve(bst_ctx *ctx, bst_twin *t, const char *const *paths, int
     }
     if (!t->frame || !t->frame->solved) {
         const bst_process_frame *f = t->frame ? t->frame : &p->frames[0];
+        char where[BST_FRAME_WHERE_TEXT];
         return bst_fail(ctx, BST_ERR_NOT_FOUND,
-                        "%s: HDU %d: its stars give no attitude (%d detections of SNR %g); see "
+                        "%s: its stars give no attitude (%d detections of SNR %g); see "
                         "--scale, --v-limit, --least-snr and --catalogue",
-                        f->path, f->place.hdu, f->found, q->least_snr);
+                        bst_frame_where(f->path, &f->place, where), f->found, q->least_snr);
     }
     t->light = bst_process_light(t->frame);
     t->julian_year = bst_process_julian_year(t->frame);

@@ -80,11 +80,13 @@ static bst_status choose_throughput(bst_ctx *ctx, const bst_twin *t, const cJSON
     double zero = isfinite(t->photometry.zero_point_mag) ? t->photometry.zero_point_mag
                                                          : t->process.zero_point_mag;
     if (!isfinite(zero)) {
+        char where[BST_FRAME_WHERE_TEXT];
         return bst_fail(ctx, BST_ERR_NUMERIC,
-                        "%s: HDU %d: none of the %d catalogue stars on the frame gives a zero "
+                        "%s: none of the %d catalogue stars on the frame gives a zero "
                         "point; give --catalogue with stars of known brightness there, or a "
                         "fainter --v-limit",
-                        t->frame->path, t->frame->place.hdu, t->catalogue_stars);
+                        bst_frame_where(t->frame->path, &t->frame->place, where),
+                        t->catalogue_stars);
     }
     c->rate_v0 = pow(10.0, 0.4 * zero);
     c->aperture_m = number_of(json, "aperture_m", 0.1);
@@ -127,11 +129,13 @@ static void choose_background(bst_ctx *ctx, const bst_twin *t, double gain, bst_
     c->background_e = level - mean;
     c->read_noise_e = sqrt(fmax(noise2 - level, 0.0));
     if (level > noise2) {
+        char where[BST_FRAME_WHERE_TEXT];
         bst_log(ctx, BST_LOG_WARNING,
-                "%s: HDU %d: the background varies by %.6g e-, whose shot noise is more than the "
+                "%s: the background varies by %.6g e-, whose shot noise is more than the "
                 "measured noise of %.6g e-: the twin has no read noise, and more noise than the "
                 "frame; check gain and offset of the map",
-                t->frame->path, t->frame->place.hdu, mean - least_background(m), m->noise_e);
+                bst_frame_where(t->frame->path, &t->frame->place, where),
+                mean - least_background(m), m->noise_e);
     }
 }
 

@@ -167,8 +167,9 @@ static bst_status begin(bst_ctx *ctx, bst_twin *t) {
             m->path.count[0] = COEFFICIENTS[2];
         }
         if (!bst_twin_path_fit(&m->path, nodes, count)) {
-            return bst_fail(ctx, BST_ERR_NUMERIC, "%s: HDU %d: the streaks give no path", f->path,
-                            f->place.hdu);
+            return bst_recorded_frame_fail(
+                ctx, f->path, &f->place,
+                bst_fail(ctx, BST_ERR_NUMERIC, "the streaks give no path"));
         }
     }
     m->form_error = FIRST_FORM_ERROR;

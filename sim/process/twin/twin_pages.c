@@ -212,9 +212,9 @@ static bst_status write_page(bst_ctx *ctx, const bst_twin *t, const cJSON *root)
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Twin"
             "</title>\n<style>body{font-family:sans-serif;margin:2em}td{padding:0 1em}"
             "img{max-width:100%%}</style></head><body>\n<h1>Twin of ");
-    bst_html_format(out, "%s", t->frame->path);
-    fprintf(out, ", HDU %d</h1>\n<p><img alt=\"recorded, twin, residual\" src=\"",
-            t->frame->place.hdu);
+    char where[BST_FRAME_WHERE_TEXT];
+    bst_html_format(out, "%s", bst_frame_where(t->frame->path, &t->frame->place, where));
+    fprintf(out, "</h1>\n<p><img alt=\"recorded, twin, residual\" src=\"");
     bst_html_format(out, "%s", slash ? slash + 1 : picture);
     fprintf(out, "\"></p>\n");
     write_table(out, root, "figures");
@@ -270,7 +270,13 @@ bst_status bst_twin_write_report(bst_ctx *ctx, const bst_twin *t, const bst_twin
     char path[4096];
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "frame", t->frame->path);
-    cJSON_AddNumberToObject(root, "hdu", t->frame->place.hdu);
+    if (t->frame->place.line > 0) {
+        cJSON_AddNumberToObject(root, "line", (double)t->frame->place.line);
+    } else if (t->frame->place.page > 0) {
+        cJSON_AddNumberToObject(root, "page", (double)t->frame->place.page);
+    } else if (t->frame->place.hdu > 0) {
+        cJSON_AddNumberToObject(root, "hdu", t->frame->place.hdu);
+    }
     add_figures(root, t, f);
     add_fit(root, t);
     add_camera(root, camera, frames);
