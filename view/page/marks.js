@@ -63,10 +63,6 @@ export function drawShape(context, shape, x, y, r) {
   else if (shape === 'square') context.rect(x - r, y - r, 2 * r, 2 * r);
   else if (shape === 'plus') {
     context.moveTo(x - r, y); context.lineTo(x + r, y); context.moveTo(x, y - r); context.lineTo(x, y + r);
-  } else if (shape === 'window') { // its corners
-    for (const [sx, sy] of [[-1, -1], [1, -1], [1, 1], [-1, 1]]) {
-      context.moveTo(x + sx * r, y + sy * r / 3); context.lineTo(x + sx * r, y + sy * r); context.lineTo(x + sx * r / 3, y + sy * r);
-    }
   } else if (shape === 'cross') {
     context.moveTo(x - r, y - r); context.lineTo(x + r, y + r); context.moveTo(x - r, y + r); context.lineTo(x + r, y - r);
   } else {
