@@ -244,9 +244,35 @@ class Changes(test_view_live.Tables):
         self.assertGreater(len(stacked), 0, "no stack found anything: the test needs other stars")
 
 
+@unittest.skipUnless(FULL and chromium.PROGRAM, "needs --full, and chromium")
+class LivePage(unittest.TestCase):
+    def test_pause(self):
+        """A page that could not take frames while the run went on shows the last one with tracks at the pause; objects have their names
+        without the look at the tables that comes every few seconds."""
+        viewer = test_view.Viewer(runs.TRACK, "--out", runs.scratch() + "/run", "--duration", "300", "--threads", "1", "--set", "/world/star_catalogue=embedded", "--set", runs.GENERATOR)
+        app = "document.boresight"
+        with chromium.Chromium(1280, 720) as page:
+            page.command("Page.navigate", url=viewer.url)
+            page.wait_for(f"{app} && {app}.live && {app}.live.state && {app}.live.state.run === 0")
+            page.key("n")
+            page.wait_for(f"{app}.live.trail.length > 0 && {app}.live.state.paused")
+            page.evaluate(f"{app}.take = {app}.live.takeFrame, {app}.live.takeFrame = () => {{}}, document.getElementById('live-rate').value = '10', document.getElementById('live-rate').dispatchEvent(new Event('change'))")
+            page.key("r")
+            page.wait_for(f"{app}.live.state.time_s > 25")
+            page.key("r")
+            page.wait_for(f"{app}.live.state.paused")
+            page.wait_for(f"{app}.count > 20 && {app}.frameView.details.exposure_id === {app}.frames[({app}.count - 2) * 5]")
+            self.assertEqual(page.evaluate(f"[{app}.live.newest, {app}.live.shownExposure() === {app}.frameView.details.exposure_id]"), [True, True])
+            page.evaluate(f"{app}.refreshWait = () => 1e9, {app}.live.takeFrame = {app}.take, {app}.names = {{}}, 0")
+            page.key("n")
+            page.wait_for(f"{app}.live.state.paused && Object.values({app}.names).includes('INMARSAT GX5')")
+            self.assertEqual(page.messages, [])
+        self.assertEqual(viewer.end()[0], 0)
+
+
 def load_tests(loader, _, __):
     """Not the tests of the modules that are imported."""
-    return unittest.TestSuite(loader.loadTestsFromTestCase(one) for one in (Recorded, Wheels, Changes))
+    return unittest.TestSuite(loader.loadTestsFromTestCase(one) for one in (Recorded, Wheels, Changes, LivePage))
 
 
 def tearDownModule():
