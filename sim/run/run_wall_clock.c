@@ -28,7 +28,7 @@ static double wall_s(const bst_run_wall_clock *clock) {
 
 static void write_row(bst_run_wall_clock *clock, double time_s, double wall) {
     fprintf(clock->file, "%.9g,%.6f\n", time_s, wall);
-    fflush(clock->file); /* whoever watches the run sees it at once */
+    fflush(clock->file); /* a viewer of the run sees it at once */
     clock->noted_s = wall;
     clock->noted_time = time_s;
 }
