@@ -28,7 +28,7 @@ static double wall_s(const bst_run_wall_clock *clock) {
 
 static void write_row(bst_run_wall_clock *clock, double time_s, double wall) {
     fprintf(clock->file, "%.9g,%.6f\n", time_s, wall);
-    fflush(clock->file); /* whoever watches the run sees it at once */
+    fflush(clock->file); /* a viewer of the run sees it at once */
     clock->noted_s = wall;
     clock->noted_time = time_s;
 }
@@ -65,10 +65,6 @@ static double *read_rows(const char *path, double begin_s, size_t *count) {
     return rows;
 }
 
-static bst_status fail(bst_ctx *ctx, const char *path) {
-    return bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", path, strerror(errno));
-}
-
 bst_status bst_run_wall_clock_open(bst_ctx *ctx, const char *path, bool resumes, double begin_s,
                                    bst_run_wall_clock **out) {
     size_t count = 0;
@@ -86,7 +82,7 @@ bst_status bst_run_wall_clock_open(bst_ctx *ctx, const char *path, bool resumes,
     if (!clock->file) {
         free(rows);
         free(clock);
-        return fail(ctx, path);
+        return bst_fail(ctx, BST_ERR_IO, "%s: cannot be made: %s", path, strerror(errno));
     }
     fputs("time_s,wall_s\n", clock->file);
     for (size_t i = 0; i < count; i++) {
@@ -134,7 +130,11 @@ bst_status bst_run_wall_clock_close(bst_ctx *ctx, bst_run_wall_clock *clock, dou
     errno = 0;
     const bool good = !ferror(clock->file);
     const bool closed = fclose(clock->file) == 0;
-    bst_status status = good && closed ? BST_OK : fail(ctx, clock->path);
+    bst_status status = BST_OK;
+    if (!good || !closed) {
+        status =
+            bst_fail(ctx, BST_ERR_IO, "%s: cannot be written: %s", clock->path, strerror(errno));
+    }
     free(clock);
     return status;
 }

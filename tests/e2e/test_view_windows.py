@@ -47,7 +47,8 @@ EDGES = """(() => {
         return sum > 0 ? moment / sum / ratio : null;
     };
     const { scale, x, y } = view.view, { width, height } = view.size();
-    return { scale, x, y, width, height, windows: view.sorted.windows.map((one) => {
+    const { originX, originY } = view.drawing(); // of the pixels of the picture
+    return { scale, x, y, width, height, originX, originY, windows: view.sorted.windows.map((one) => {
         const a = view.toScreen(one.left, one.top), b = view.toScreen(one.right, one.bottom);
         return [one.said, middle(a.x, a.y, b.y, false), middle(a.y, a.x, b.x, true), middle(b.x, a.y, b.y, false), middle(b.y, a.x, b.x, true)];
     }) };
@@ -146,11 +147,15 @@ class Recorded(unittest.TestCase):
                         # pixel p of a binned frame begins at (sensor - corner) / binning - 0.5
                         places = [((at - corner) / binning - 0.5 - seen[axis]) * seen["scale"] + seen[size] / 2
                                   for at, corner, axis, size in ((x, x0, "x", "width"), (y, y0, "y", "height"), (x + w, x0, "x", "width"), (y + h, y0, "y", "height"))]
-                        for found, place in zip(edges, places):
-                            if found is not None: # in view
-                                self.assertAlmostEqual(found, place, delta=0.5)
+                        # the picture begins at a whole pixel of the screen, so that it may be half of one away; its windows are not away from it
+                        drawn = [seen[origin] + (at - corner) / binning * seen["scale"]
+                                 for at, corner, origin in ((x, x0, "originX"), (y, y0, "originY"), (x + w, x0, "originX"), (y + h, y0, "originY"))]
+                        for found, place, there, size in zip(edges, places, drawn, ("width", "height") * 2, strict=True):
+                            if found is not None and 1 < there < seen[size] - 1:  # in view
+                                self.assertAlmostEqual(found, there, delta=0.2)  # the browser's own placing of lines: at most 0.16 measured
+                                self.assertAlmostEqual(there, place, delta=0.5 + 1e-9)
                                 checked += 1
-                    self.assertGreaterEqual(checked, 4 if zoom else 4 * len(boxes), (name, zoom))
+                    self.assertGreaterEqual(checked, 4 if zoom else 3 * len(boxes), (name, zoom))
                 page.evaluate("document.boresight.frameView.setShown('windows', false)")
                 self.assertEqual(page.evaluate("document.getElementById('show-windows').getAttribute('aria-pressed')"), "false")
                 page.key("m")  # none was shown: those that are at first
@@ -244,9 +249,35 @@ class Changes(test_view_live.Tables):
         self.assertGreater(len(stacked), 0, "no stack found anything: the test needs other stars")
 
 
+@unittest.skipUnless(FULL and chromium.PROGRAM, "needs --full, and chromium")
+class LivePage(unittest.TestCase):
+    def test_pause(self):
+        """A page that could not take frames while the run went on shows the last one with tracks at the pause; objects have their names
+        without the look at the tables that comes every few seconds."""
+        viewer = test_view.Viewer(runs.TRACK, "--out", runs.scratch() + "/run", "--duration", "300", "--threads", "1", "--set", "/world/star_catalogue=embedded", "--set", runs.GENERATOR)
+        app = "document.boresight"
+        with chromium.Chromium(1280, 720) as page:
+            page.command("Page.navigate", url=viewer.url)
+            page.wait_for(f"{app} && {app}.live && {app}.live.state && {app}.live.state.run === 0")
+            page.key("n")
+            page.wait_for(f"{app}.live.trail.length > 0 && {app}.live.state.paused")
+            page.evaluate(f"{app}.take = {app}.live.takeFrame, {app}.live.takeFrame = () => {{}}, document.getElementById('live-rate').value = '10', document.getElementById('live-rate').dispatchEvent(new Event('change'))")
+            page.key("r")
+            page.wait_for(f"{app}.live.state.time_s > 25")
+            page.key("r")
+            page.wait_for(f"{app}.live.state.paused")
+            page.wait_for(f"{app}.count > 20 && {app}.frameView.details.exposure_id === {app}.frames[({app}.count - 2) * 5]")
+            self.assertEqual(page.evaluate(f"[{app}.live.newest, {app}.live.shownExposure() === {app}.frameView.details.exposure_id]"), [True, True])
+            page.evaluate(f"{app}.refreshWait = () => 1e9, {app}.live.takeFrame = {app}.take, {app}.names = {{}}, 0")
+            page.key("n")
+            page.wait_for(f"{app}.live.state.paused && Object.values({app}.names).includes('INMARSAT GX5')")
+            self.assertEqual(page.messages, [])
+        self.assertEqual(viewer.end()[0], 0)
+
+
 def load_tests(loader, _, __):
     """Not the tests of the modules that are imported."""
-    return unittest.TestSuite(loader.loadTestsFromTestCase(one) for one in (Recorded, Wheels, Changes))
+    return unittest.TestSuite(loader.loadTestsFromTestCase(one) for one in (Recorded, Wheels, Changes, LivePage))
 
 
 def tearDownModule():
