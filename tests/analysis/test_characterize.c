@@ -153,7 +153,7 @@ static void law_of_hot_pixels(void **state) {
     }
     for (int k = 0; k < 2; k++) {
         double limit = pow(10.0, m + s * cuts[k]), f[3];
-        bst_hot_pixels hot = bst_hot_pixels_fit(excess, HOT + COLD, limit);
+        bst_hot_pixels hot = bst_hot_pixels_fit(excess, HOT + COLD, limit, INFINITY);
         cut_information(cuts[k], f);
         double share = 0.5 * erfc(cuts[k] / sqrt(2.0)), det = f[0] * f[2] - f[1] * f[1];
         double found = (double)hot.found;
@@ -174,6 +174,16 @@ static void law_of_hot_pixels(void **state) {
         double relative = hot.fraction.sigma / hot.fraction.value;
         bst_assert_close(relative / sqrt((1.0 + by_fit) / found), 1.0, 0.02);
     }
+    /* pixels that are full, 16 % of them: the same law, and not one that ends there */
+    double limit = pow(10.0, m - 1.5 * s), most = pow(10.0, m + s);
+    for (int i = 0; i < HOT; i++) {
+        excess[i] = fminf(excess[i], (float)(1.02 * most));
+    }
+    bst_hot_pixels hot = bst_hot_pixels_fit(excess, HOT + COLD, limit, most);
+    bst_assert_close((double)hot.found, HOT * 0.5 * erfc(-1.5 / sqrt(2.0)), 1.0);
+    bst_assert_close(log10(hot.median.value), m, 0.2 * s / sqrt(HOT));
+    bst_assert_close(hot.spread_dex.value, s, 0.3 * hot.spread_dex.sigma);
+    bst_assert_close(hot.fraction.value, (double)HOT / (HOT + COLD), 0.002);
     test_free(excess);
 }
 

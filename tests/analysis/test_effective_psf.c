@@ -1,4 +1,7 @@
-/* A PSF with coma that changes over the field and wings comes back from noisy stars. */
+/* A PSF with coma that changes over the field and wings comes back from noisy stars.
+ *
+ * Usage: test_effective_psf [DRAWS]   stars drawn so many times; the standard errors are judged by
+ * all of them (1; ./dev slow: 12) */
 #include "tests/test_support.h"
 
 #include <stdlib.h>
@@ -79,14 +82,14 @@ static void middle_of(const lobe l[LOBES], double *x, double *y) {
 
 /* Stars whose PSF is mixed between those of the field's two sides, each about its middle, as the
  * renderer mixes them. */
-static void draw(bst_effective_psf_star *stars, float *pixels) {
+static void draw(int turn, bst_effective_psf_star *stars, float *pixels) {
     lobe side[2][LOBES];
     double c[2][2];
     for (int n = 0; n < 2; n++) {
         lobes_at(n, side[n]);
         middle_of(side[n], &c[n][0], &c[n][1]);
     }
-    state_of_draws = 7;
+    state_of_draws = UINT64_C(7) + UINT64_C(1000003) * (uint64_t)turn;
     for (int i = 0; i < STARS; i++) {
         double u = uniform(), light = 2e4 * pow(40.0, uniform()), level = 300.0 * uniform();
         double x = uniform() - 0.5, y = uniform() - 0.5;
@@ -108,48 +111,67 @@ static void draw(bst_effective_psf_star *stars, float *pixels) {
     }
 }
 
-static void test_coma_and_wings_come_back(void **state) {
-    (void)state;
+/* Draws, and the errors of the samples within 3 px over their standard errors. */
+typedef struct trial {
+    int draws;
+    double off2, in;
+} trial;
+
+/* Errors over the standard errors as the file of samples has them. */
+static void add_errors(const bst_effective_psf *psf, int node, const double *truth, trial *t) {
+    static double sigma[SAMPLES], pooled[SAMPLES];
+    for (int k = 0; k < SAMPLES; k++) {
+        double without[BST_EFFECTIVE_PSF_PARTS];
+        for (int p = 0; p < BST_EFFECTIVE_PSF_PARTS; p++) {
+            without[p] = psf->without[(size_t)(2 * p + node) * SAMPLES + (size_t)k];
+        }
+        sigma[k] = bst_effective_psf_standard_error(without);
+    }
+    bst_effective_psf_pool_errors(sigma, SIDE, pooled);
+    for (int k = 0; k < SAMPLES; k++) {
+        if (hypot(k % SIDE - SIDE / 2, k / SIDE - SIDE / 2) < 3.0 * OVER) {
+            double error = psf->value[(size_t)node * SAMPLES + (size_t)k] - truth[k];
+            t->off2 += error * error / (pooled[k] * pooled[k]);
+            t->in += 1.0;
+        }
+    }
+}
+
+static void come_back(int turn, trial *total) {
     static float pixels[STARS * STAMP * STAMP];
     static bst_effective_psf_star stars[STARS];
-    static double before[SAMPLES], truth[SAMPLES];
+    static double before[SAMPLES], truth[SAMPLES], effective_truth[SAMPLES];
     bst_ctx ctx = {0};
     bst_effective_psf psf;
-    draw(stars, pixels);
+    draw(turn, stars, pixels);
     const bst_effective_psf_options options = {.columns = 2, .rows = 1, .half_px = HALF};
     bst_assert_ok(&ctx, bst_effective_psf_fit(&ctx, stars, STARS, &options, &psf));
     assert_int_equal(psf.side, SIDE);
     assert_in_range(psf.stars, STARS - 20, STARS);
     /* 3,400 pixels of cores: a standard deviation of 0.02; the samples that are fitted to them take
-     * up to a tenth */
-    bst_assert_close(psf.chi_squared, 1.0, 0.12);
+     * a tenth: 0.87 to 0.92 in four draws */
+    bst_assert_close(psf.chi_squared, 0.92, 0.1);
     for (int node = 0; node < 2; node++) {
         lobe l[LOBES];
-        double cx, cy, peak = 0.0, worst = 0.0, off2 = 0.0, in = 0.0;
+        double cx, cy, peak = 0.0, worst = 0.0;
         lobes_at(node, l);
         middle_of(l, &cx, &cy);
         const double *plane = psf.value + (size_t)node * SAMPLES;
         for (int k = 0; k < SAMPLES; k++) {
             double x = (k % SIDE - SIDE / 2) / (double)OVER,
                    y = (k / SIDE - SIDE / 2) / (double)OVER;
-            double without[BST_EFFECTIVE_PSF_PARTS];
-            for (int p = 0; p < BST_EFFECTIVE_PSF_PARTS; p++) {
-                without[p] = psf.without[(size_t)(2 * p + node) * SAMPLES + (size_t)k];
-            }
             double true_value = effective(l, cx + x, cy + y);
+            effective_truth[k] = true_value;
             truth[k] = before_pixel(l, cx + x, cy + y);
             peak = fmax(peak, true_value);
             worst = fmax(worst, fabs(plane[k] - true_value));
-            if (hypot(x, y) < 3.0) {
-                double u = (plane[k] - true_value) / bst_effective_psf_standard_error(without);
-                off2 += u * u;
-                in += 1.0;
-            }
+        }
+        add_errors(&psf, node, effective_truth, total);
+        if (turn > 0) {
+            continue;
         }
         /* noise of a sample is 0.3 % of the peak, and smoothing bends its sharpest part by 0.5 % */
         assert_true(worst < 0.012 * peak);
-        /* within what the standard errors say, but for the smoothing; heavy tails of 8 parts */
-        assert_in_range((int)(100.0 * sqrt(off2 / in)), 50, 250);
         bst_assert_ok(&ctx, bst_effective_psf_undo_pixel(&ctx, plane, SIDE, before));
         bst_effective_psf_figures f = bst_effective_psf_measure(before, SIDE),
                                   t = bst_effective_psf_measure(truth, SIDE);
@@ -165,13 +187,23 @@ static void test_coma_and_wings_come_back(void **state) {
     bst_effective_psf_free(&psf);
 }
 
+static void test_coma_and_wings_come_back(void **state) {
+    trial *t = *state;
+    for (int turn = 0; turn < t->draws; turn++) {
+        come_back(turn, t);
+    }
+    /* some 100 independent samples a draw, with what smoothing bends: of single draws of 160 stars
+     * 0.91 to 1.16 */
+    bst_assert_close(sqrt(t->off2 / t->in), 1.0, t->draws < 10 ? 0.25 : 0.1);
+}
+
 static void test_too_few_stars(void **state) {
     (void)state;
     static float pixels[STARS * STAMP * STAMP];
     static bst_effective_psf_star stars[STARS];
     bst_ctx ctx = {0};
     bst_effective_psf psf;
-    draw(stars, pixels);
+    draw(0, stars, pixels);
     const bst_effective_psf_options options = {.columns = 2, .rows = 1, .half_px = HALF};
     assert_int_equal(bst_effective_psf_fit(&ctx, stars, 19, &options, &psf), BST_ERR_RANGE);
     assert_non_null(strstr(
@@ -183,9 +215,10 @@ static void test_too_few_stars(void **state) {
     assert_non_null(strstr(ctx.message, "are near the node of the field in column 1, row 0"));
 }
 
-int main(void) {
+int main(int argc, char **argv) {
+    trial t = {.draws = argc > 1 ? atoi(argv[1]) : 1};
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_coma_and_wings_come_back),
+        cmocka_unit_test_prestate(test_coma_and_wings_come_back, &t),
         cmocka_unit_test(test_too_few_stars),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -69,7 +69,7 @@ static void hits_of_a_pair(void **state) {
     b[20 * W + W - 1] += 90.0F; /* last column */
     a[40 * W + 5] += 500.0F;    /* hot in both */
     b[40 * W + 5] += 700.0F;
-    b[10 * W + 12] += 3.0F; /* below four standard deviations */
+    b[10 * W + 12] += 3.0F;         /* below four standard deviations */
     for (int x = 20; x < 27; x++) { /* a track across a hot pixel */
         b[35 * W + x] += 80.0F;
     }

@@ -287,6 +287,23 @@ class Characterize(unittest.TestCase):
         self.assertTrue(0.10 <= value["cti_parallel_trail_fraction"] <= 0.13)
         self.assertEqual(report["charge_trail"]["parallel_direction"], "rows_above")
         self.assertIsNone(value["prnu_rms"])
+        # a frame made with the keys: what characterize says of both
+        with open(out + "/detector.json", encoding="utf-8") as file:
+            scenario = json.load(file)
+        scenario["extends"] = os.path.abspath(runs.STARE)
+        scenario["set"].update({CAMERA + "width_px": 1072, CAMERA + "height_px": 1030})
+        with open(out + "/scene.json", "w", encoding="utf-8") as file:
+            json.dump(scenario, file)
+        call_well("calframes", out + "/scene.json", "--out", out + "/sim", "--bias", "0", "--dark", "1", "--flat", "0",
+                  "--exposure", "28", "--threads", "1", "--set", "/world/star_catalogue=embedded")
+        call_well("characterize", "--map", "neossat", "--dark", NEOSSAT, "--out", out, "--overwrite",
+                  "--simulated", out + "/sim/neossat_telescope_dark.fits")
+        with open(out + "/report.json", encoding="utf-8") as file:
+            both = json.load(file)["reproduction"]
+        self.assertAlmostEqual(both["median_dn"]["simulated"] / both["median_dn"]["real"], 1, delta=0.1)
+        for item in both["percentiles_over_median_dn"]:
+            if item["percentile"] != 50:
+                self.assertAlmostEqual(item["simulated"] / item["real"], 1, delta=0.1 if item["percentile"] <= 95 else 0.3, msg=item)
 
 
 if __name__ == "__main__":

@@ -90,6 +90,7 @@ bst_effective_psf_figures bst_effective_psf_measure(const double *plane, int sid
  * Reference: Efron & Tibshirani 1993, An Introduction to the Bootstrap, equation 11.5 */
 double bst_effective_psf_standard_error(const double without[BST_EFFECTIVE_PSF_PARTS]);
 
+enum { BST_EFFECTIVE_PSF_POOL = 3 }; /* samples on each side */
 /* Pools the standard errors of samples over BST_EFFECTIVE_PSF_POOL samples on each side: their
  * geometric mean, as they fall steeply from the middle, times what makes it unbiased. Of single
  * ones, the root mean square of error over standard error is 1.18, that of Student's law of seven
@@ -97,7 +98,6 @@ double bst_effective_psf_standard_error(const double without[BST_EFFECTIVE_PSF_P
  *
  * Given:     sigma  [side][side]
  * Returned:  pooled  [side][side] */
-enum { BST_EFFECTIVE_PSF_POOL = 3 };
 void bst_effective_psf_pool_errors(const double *sigma, int side, double *pooled);
 
 #endif

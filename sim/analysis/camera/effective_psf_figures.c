@@ -145,7 +145,8 @@ void bst_effective_psf_pool_errors(const double *sigma, int side, double *pooled
                     in += one > 0.0 ? 1.0 : 0.0;
                 }
             }
-            pooled[(size_t)j * (size_t)side + (size_t)i] = here > 0.0 ? exp(sum / in + MEAN_LOG) : 0.0;
+            pooled[(size_t)j * (size_t)side + (size_t)i] =
+                here > 0.0 ? exp(sum / in + MEAN_LOG) : 0.0;
         }
     }
 }

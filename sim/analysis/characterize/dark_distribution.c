@@ -10,10 +10,12 @@
 enum { CORE_NODES = 11, HOT_NODES = 61, MOST_TURNS = 700 };
 static const double CORE_REACH = 3.5, HOT_REACH = 4.5;
 
-/* Tolerances of the logarithms of the shares: those of the percentiles times the slopes of a heavy
- * tail above the median (2) and of the core's edge below it. */
-static const double TOLERANCES[BST_SENSOR_PERCENTILES] = {0.3,  0.15, 0.06, 0.06,
-                                                          0.06, 0.2,  0.2,  0.4};
+/* Tolerances of the logarithms of the shares. The real tail has fewer pixels near the 99th
+ * percentile and more beyond the 99.9th than a lognormal law: they set how the misfit is shared.
+ * With 0.06, 0.2, 0.2, 0.4 from the 95th on, the 99th of NEOSSat's dark was 31 % too high
+ * (docs/results/characterize.md). */
+static const double TOLERANCES[BST_SENSOR_PERCENTILES] = {0.3,  0.15, 0.06, 0.04,
+                                                          0.06, 0.14, 0.3,  0.36};
 static const double MOST_MISSED = 3.0;
 /* Cost of parameters without a value. */
 static const double UNDEFINED = 1e12;

@@ -9,9 +9,10 @@
 enum { ALL = -1, CLASS = 100 };
 enum { LEAST_HOT = 20, LEAST_TRAILS = 50, MOST_TRAILS = 4000, GROUPS = 10, SCAN = 60 };
 
-/* Sums of the decimal logarithms of hot rates above the limit. */
+/* Sums of the decimal logarithms of hot rates above the limit and below what fits. */
 typedef struct hot_sums {
     double n, mean, variance, cut;
+    double full, most; /* pixels from `most` on */
 } hot_sums;
 
 /* Share of a normal distribution above x. */
@@ -19,11 +20,16 @@ static double above(double x) {
     return 0.5 * erfc(x / sqrt(2.0));
 }
 
-/* Logarithm of the likelihood of mean m and deviation s, cut off below. */
+/* Logarithm of the likelihood of mean m and deviation s, cut off below; of full pixels it is only
+ * known that they have more. */
 static double likelihood(const hot_sums *h, double m, double s) {
-    double d = h->mean - m;
-    double q = above((h->cut - m) / s);
-    return q > 0.0 ? -h->n * (log(s) + 0.5 * (h->variance + d * d) / (s * s) + log(q)) : -INFINITY;
+    double d = h->mean - m, q = above((h->cut - m) / s);
+    double full = h->full > 0.0 ? above((h->most - m) / s) : 1.0;
+    if (!(q > 0.0 && full > 0.0)) {
+        return -INFINITY;
+    }
+    return h->full * log(full) - h->n * (log(s) + 0.5 * (h->variance + d * d) / (s * s)) -
+           (h->n + h->full) * log(q);
 }
 
 /* Most likely mean and deviation: a grid that shrinks about its best point. */
@@ -71,25 +77,34 @@ static bool curvature(const hot_sums *h, double m, double s, double covariance[3
     return true;
 }
 
-bst_hot_pixels bst_hot_pixels_fit(const float *excess, size_t count, double limit) {
+bst_hot_pixels bst_hot_pixels_fit(const float *excess, size_t count, double limit, double most) {
     const bst_sensor_estimate none = {NAN, NAN};
     bst_hot_pixels out = {0, limit, none, none, none};
     double sum = 0.0, sum2 = 0.0, covariance[3], m, s;
     size_t pixels = 0;
+    int64_t full = 0;
     for (size_t i = 0; i < count; i++) {
         pixels += isnan(excess[i]) ? 0 : 1;
-        if (excess[i] > limit) {
+        full += excess[i] >= most;
+        if (excess[i] > limit && excess[i] < most) {
             double x = log10((double)excess[i]);
             sum += x;
             sum2 += x * x;
             out.found++;
         }
     }
-    if (out.found < LEAST_HOT) {
+    double n = (double)out.found;
+    out.found += full;
+    if (n < LEAST_HOT) {
         return out;
     }
-    double n = (double)out.found;
-    const hot_sums h = {n, sum / n, fmax(sum2 / n - sum * sum / n / n, 1e-12), log10(limit)};
+    const hot_sums h = {n,
+                        sum / n,
+                        fmax(sum2 / n - sum * sum / n / n, 1e-12),
+                        log10(limit),
+                        (double)full,
+                        full > 0 ? log10(most) : INFINITY};
+    n += (double)full;
     most_likely(&h, &m, &s);
     double share = above((h.cut - m) / s);
     if (share < 0.5 || !curvature(&h, m, s, covariance)) {

@@ -19,9 +19,11 @@ typedef struct bst_hot_pixels {
  *
  * Given:     excess  [count] rates over the mean of the other pixels; NAN is skipped
  *            limit   above the noise of other pixels, > 0
+ *            most    rate from which on a pixel may be full: such ones count as "more than that"
  * Returned:  NAN estimates with fewer than 20 hot pixels, or where most would lie below the limit
- * Reference: maximum likelihood of a normal distribution cut off below (Cohen 1950) */
-bst_hot_pixels bst_hot_pixels_fit(const float *excess, size_t count, double limit);
+ * Reference: maximum likelihood of a normal distribution cut off below (Cohen 1950) and censored
+ *            above (Cohen 1959, Technometrics 1, 217) */
+bst_hot_pixels bst_hot_pixels_fit(const float *excess, size_t count, double limit, double most);
 
 enum { BST_TRAIL_PIXELS = 5, BST_TRAIL_SIDES = 4, BST_TRAIL_CLASSES = 4 };
 

@@ -89,7 +89,8 @@ bst_status bst_radiation_hits_add(bst_ctx *ctx, const bst_hit_pair *pair, uint8_
         for (int x = 0; status == BST_OK && x < pair->width; x++) {
             bool hot;
             double d, v = deviation(pair, x, y, &d, &hot);
-            if (!hot && fabs(v) > pair->seed && !s.seen[(size_t)y * (size_t)pair->width + (size_t)x]) {
+            if (!hot && fabs(v) > pair->seed &&
+                !s.seen[(size_t)y * (size_t)pair->width + (size_t)x]) {
                 status = follow(ctx, &s, x, y, v > 0.0 ? 1.0 : -1.0, hits);
             }
         }

@@ -19,6 +19,8 @@ static const double CERTAIN = 5.0;
 static const double TRAIL = 20.0;
 /* Largest RMS misfit of traps, share of the trail: below 0.12 on real and simulated darks. */
 static const double MOST_MISFIT = 0.3;
+/* Share of the saturated signal that may be full. */
+static const double FULL = 0.9;
 /* Hot pixels from which on their law is sought. */
 enum { LEAST_HOT = 20 };
 /* Hot pixels lie beyond this quantile of the core's lognormal law, in standard deviations: of a
@@ -29,10 +31,10 @@ static const double HOT = 5.0;
 typedef struct dark_signal {
     const bst_sensor_stacks *stacks;
     bst_sensor_figures *out;
-    float *map;     /* [height][width] DN; NAN in shielded columns */
-    float *scratch; /* [height * width] */
-    double slope;   /* DN per row; 0: no ramp */
-    double noise;   /* temporal variance of the map, DN^2, without shot noise of the dark */
+    float *map;       /* [height][width] DN; NAN in shielded columns */
+    float *scratch;   /* [height * width] */
+    double slope;     /* DN per row; 0: no ramp */
+    double noise;     /* temporal variance of the map, DN^2, without shot noise of the dark */
     double row_noise; /* the part of it that is common to a row */
 } dark_signal;
 
@@ -338,6 +340,14 @@ static void measure_percentiles(dark_signal *d, double per_s) {
     out->method[BST_SENSOR_DARK_MEDIAN] = "median of all pixels that gather dark current";
 }
 
+/* Signal from which on a pixel may be full, DN above the level: of the converter or, if a series of
+ * flats showed it, of the pixel. */
+static double full_signal(const bst_sensor_figures *out) {
+    double pixel = out->figures[BST_SENSOR_SATURATION].value;
+    double converter = 65535.0 - out->figures[BST_SENSOR_OFFSET].value;
+    return FULL * (pixel < converter ? pixel : converter);
+}
+
 /* Hot pixels and the charge that trails them. */
 static void measure_hot(dark_signal *d, const bst_clipped_moments *core, double per_s) {
     bst_sensor_figures *out = d->out;
@@ -353,7 +363,8 @@ static void measure_hot(dark_signal *d, const bst_clipped_moments *core, double 
                                        d->stacks->dark.count);
     double tail = core->mean * (exp(HOT * sqrt(log2_sigma) - 0.5 * log2_sigma) - 1.0);
     double limit = fmax(core->high - core->mean, tail + HOT * noise) * per_s;
-    bst_hot_pixels hot = bst_hot_pixels_fit(d->scratch, pixels, limit);
+    double most = (full_signal(out) - core->mean) * per_s;
+    bst_hot_pixels hot = bst_hot_pixels_fit(d->scratch, pixels, limit, most);
     out->hot_found = hot.found;
     out->hot_limit_e_per_s = limit + core->mean * per_s;
     out->figures[BST_SENSOR_HOT_FRACTION] = hot.fraction;
@@ -377,9 +388,8 @@ static double measure_trail(dark_signal *d) {
     for (size_t i = 0; i < pixels; i++) {
         d->scratch[i] = d->map[i] - (float)median;
     }
-    double saturated = 0.9 * 65535.0 - out->figures[BST_SENSOR_OFFSET].value;
-    out->trail =
-        bst_charge_trail_measure(d->scratch, out->width, out->height, TRAIL * spread, saturated);
+    out->trail = bst_charge_trail_measure(d->scratch, out->width, out->height, TRAIL * spread,
+                                          full_signal(out));
     out->figures[BST_SENSOR_PARALLEL_TRAIL] = out->trail.parallel;
     out->figures[BST_SENSOR_SERIAL_TRAIL] = out->trail.serial;
     out->method[BST_SENSOR_PARALLEL_TRAIL] = out->method[BST_SENSOR_SERIAL_TRAIL] =
