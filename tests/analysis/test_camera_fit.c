@@ -129,7 +129,8 @@ static void test_errors_are_as_stated(void **state) {
     static field f = {.noise_px = 0.1};
     /* chi squared of 40 over 40: 0.46 to 1.8 with 99.9 % */
     double scatter = check_pulls(&f, 0.46, 1.8);
-    /* the covariances say all: what is left is chance of 900 degrees of freedom, 0.022 px in half of the seeds */
+    /* the covariances say all: what is left is chance of 900 degrees of freedom, 0.022 px in half
+     * of the seeds */
     assert_true(scatter < 0.02);
     /* the same stars with their own errors in all frames: 12 times as many places say no more */
     static field rest = {.noise_px = 0.02, .own_px = 0.1, .at_rest = true};

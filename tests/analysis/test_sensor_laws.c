@@ -134,8 +134,8 @@ static void traps_are_found_on_each_side(void **state) {
     }
 }
 
-/* Counts of hits in ten darks and four bias frames: a rate by area and time, and the time of read-out, with the errors of
- * counts. */
+/* Counts of hits in ten darks and four bias frames: a rate by area and time, and the time of
+ * read-out, with the errors of counts. */
 static void hits_are_counted_by_area_and_time(void **state) {
     (void)state;
     bst_sensor_stacks s = {.pixel_pitch_um = 15.0};

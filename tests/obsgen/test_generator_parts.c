@@ -40,6 +40,22 @@ static void expect_extent(const bst_detection *d, double xx, double xy, double y
     bst_assert_close(s * s * a + c * c * b, yy, 1e-9);
 }
 
+/* A pixel of the frame is saturated by its converter, above the offset, or from 98 % of the wells
+ * of its four pixels on. */
+static void saturation_of_binned_pixels(void **state) {
+    (void)state;
+    bst_camera camera = {
+        .bits = 12, .offset_dn = 90.0, .gain_e_per_dn = 4.0, .full_well_e = 50000.0};
+    bst_generator *g = make(0.9);
+    g->camera = &camera;
+    g->background_e = 120.0;
+    bst_assert_close(bst_generator_saturation_e(g), (4095.0 - 90.0) * 4.0 - 120.0, 1e-9);
+    camera.bits = 16;
+    bst_assert_close(bst_generator_saturation_e(g), 0.98 * 4 * 50000.0 - 120.0, 1e-9);
+    g->binning = 1;
+    bst_assert_close(bst_generator_saturation_e(g), 0.98 * 50000.0 - 120.0, 1e-9);
+}
+
 /* Light of a shape, in square pixels of the sensor, widens the image by its covariance in those
  * that are read. */
 static void widths_of_shapes(void **state) {
@@ -568,9 +584,9 @@ static void one_scene_in_many_ways(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(widths_of_shapes),       cmocka_unit_test(errors_of_false_alarms),
-        cmocka_unit_test(merged_stars),           cmocka_unit_test(noise_of_the_moment),
-        cmocka_unit_test(one_scene_in_many_ways),
+        cmocka_unit_test(saturation_of_binned_pixels), cmocka_unit_test(widths_of_shapes),
+        cmocka_unit_test(errors_of_false_alarms),      cmocka_unit_test(merged_stars),
+        cmocka_unit_test(noise_of_the_moment),         cmocka_unit_test(one_scene_in_many_ways),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
