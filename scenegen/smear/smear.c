@@ -281,8 +281,9 @@ bst_status bst_smear_begin(bst_ctx *ctx, bst_smear *s, const bst_smear_frame *fr
     int binned = s->binning < BST_PIXEL_PARTS ? s->binning : BST_PIXEL_PARTS;
     if (s->options.node_sigma_px > 0.0) {
         memcpy(s->pixel_part, s->options.pixel_part[binned - 1], sizeof s->pixel_part);
-    } else {
+    } else if (s->parts_binning != s->binning) {
         bst_smear_find_pixel_parts(s->sigma_px, s->binning, s->pixel_part);
+        s->parts_binning = s->binning;
     }
     BST_TRY(bst_smear_find_sensitivity(ctx, s));
     bst_smear_clear_ahead(s);

@@ -7,27 +7,49 @@
 
 enum { MAX_TAPS = BST_PLACE_TAPS };
 
-/* pixel_part of bst_smear_node_aim for a Gaussian: its derivatives and values averaged over the
- * side of `binning` pixels; integrals of Hermite functions are those of one order less. */
-void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]) {
-    enum { STEPS = 48 };
-    static const double greatest[3] = {1.0, 3.0, 15.0};
-    double half = 0.5 * binning / sigma_px, most[3] = {0.0};
-    for (int k = 0; k <= STEPS; k++) {
-        double at = 3.5 * k / STEPS, side[2][3];
-        for (int end = 0; end < 2; end++) {
-            double x = at + (end ? half : -half), y = x * x, g = exp(-0.5 * y);
-            side[end][0] = -x * g;
-            side[end][1] = -(y - 3.0) * x * g;
-            side[end][2] = -((y - 10.0) * y + 15.0) * x * g;
-        }
-        for (int n = 0; n < 3; n++) {
-            most[n] = fmax(most[n], fabs(side[1][n] - side[0][n]));
+/* Means over a pixel's side of a Gaussian of unit sigma at x and of its derivatives up to the
+ * sixth; integrals of Hermite functions are those of one order less. */
+static void find_means(double x, double half, double out[7]) {
+    double side[2][6];
+    for (int end = 0; end < 2; end++) {
+        double at = x + (end ? half : -half);
+        side[end][0] = exp(-0.5 * at * at);
+        side[end][1] = -at * side[end][0];
+        for (int n = 2; n < 6; n++) {
+            side[end][n] = -at * side[end][n - 1] - (n - 1) * side[end][n - 2];
         }
     }
-    double peak = sqrt(2.0 * BST_PI) * erf(half / sqrt(2.0));
+    out[0] = sqrt(0.5 * BST_PI) * (erf((x + half) / sqrt(2.0)) - erf((x - half) / sqrt(2.0)));
+    for (int n = 1; n < 7; n++) {
+        out[n] = side[1][n - 1] - side[0][n - 1];
+    }
+}
+
+/* pixel_part of bst_smear_node_aim for a Gaussian: its derivatives and values averaged over the
+ * `binning` pixels of a side, the greatest of the directions along the rows to the diagonal. Along
+ * the diagonal a pixel smooths the high frequencies of a narrow Gaussian less. */
+void bst_smear_find_pixel_parts(double sigma_px, int binning, double part[3]) {
+    enum { STEPS = 48, ANGLES = 3 };
+    static const double greatest[3] = {1.0, 3.0, 15.0};
+    double half = 0.5 * binning / sigma_px, most[3] = {0.0}, x[7], y[7];
+    for (int k = 0; k < ANGLES * (STEPS + 1); k++) {
+        double angle = 0.25 * BST_PI * (k % ANGLES) / (ANGLES - 1), at = 3.5 * (k / ANGLES) / STEPS;
+        double c = cos(angle), d = sin(angle);
+        find_means(at * c, half, x);
+        find_means(at * d, half, y);
+        for (int n = 0; n < 3; n++) {
+            int order = 2 * n + 2;
+            double sum = 0.0, choose = 1.0;
+            for (int i = 0; i <= order; i++) {
+                sum += choose * pow(c, order - i) * pow(d, i) * x[order - i] * y[i];
+                choose *= (double)(order - i) / (i + 1);
+            }
+            most[n] = fmax(most[n], fabs(sum));
+        }
+    }
+    find_means(0.0, half, x);
     for (int n = 0; n < 3; n++) {
-        part[n] = most[n] / (greatest[n] * peak);
+        part[n] = most[n] / (greatest[n] * x[0] * x[0]);
     }
 }
 

@@ -65,6 +65,7 @@ struct bst_smear {
     double margin_px, dark_variance_e2, duration_s;
     int binning, sources;
     double pixel_part[3];                   /* as in bst_smear_node_aim */
+    int parts_binning;                      /* of which pixel_part is, for a Gaussian; 0: of none */
     const bst_psf_sensitivity *sensitivity; /* of the frame; NULL: as of the Gaussian */
     const bst_flank_curve *flanks;          /* [BST_FLANKS] of the frame, for any derivative */
     /* those of binnings used so far, by binning - 1, NULL: none. Without a sensitivity of the PSF

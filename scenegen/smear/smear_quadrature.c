@@ -247,9 +247,44 @@ static double raise_error(const bst_smear_maker *m, const double axis[3], const 
            part[BST_NODE_SCALES - 2] * r->missed;
 }
 
-/* Compares a group with the last one, which it becomes. */
-static double beside_last(bst_smear_maker *m, const bst_smear_moments *g, double weight) {
+/* Change of the velocity from one group to the next, over the greater speed, up to which they lie
+ * in an even row whatever their mean speeds. */
+#define EVEN_CHANGE 0.3
+
+/* Velocity of the path's segment k. */
+static void velocity_of(const bst_smear_maker *m, int k, double v[3]) {
+    const bst_smear_path_point *p = &m->path[k], *q = p + 1;
+    for (int i = 0; i < 3; i++) {
+        v[i] = (q->p[i] - p->p[i]) / (q->s - p->s);
+    }
+}
+
+/* Whether the velocity hardly changes from the last group to this one. last->velocity becomes that
+ * at the end of this one. */
+static bool goes_on(bst_smear_maker *m, const group *range) {
     bst_smear_last_group *last = &m->last;
+    double v[3], change2 = 0.0, most2[2] = {0.0, 0.0};
+    int k = range->first;
+    while (m->path[k + 1].s <= range->from) {
+        k++;
+    }
+    velocity_of(m, k, v);
+    for (int i = 0; i < 3; i++) {
+        change2 += (v[i] - last->velocity[i]) * (v[i] - last->velocity[i]);
+        most2[0] += v[i] * v[i];
+        most2[1] += last->velocity[i] * last->velocity[i];
+    }
+    for (; k + 2 < m->count && m->path[k + 1].s < range->to; k++) {
+    }
+    velocity_of(m, k, last->velocity);
+    return change2 <= EVEN_CHANGE * EVEN_CHANGE * fmax(most2[0], most2[1]);
+}
+
+/* Compares a group with the last one, which it becomes. */
+static double beside_last(bst_smear_maker *m, const bst_smear_moments *g, const group *range,
+                          double weight) {
+    bst_smear_last_group *last = &m->last;
+    bool smooth = goes_on(m, range);
     double distance2 = 0.0, length = sqrt(12.0 * g->along[2]), speed = length / weight;
     double ratio = last->rests         ? INFINITY
                    : last->speed > 0.0 ? fmax(speed / last->speed, last->speed / speed)
@@ -258,7 +293,8 @@ static double beside_last(bst_smear_maker *m, const bst_smear_moments *g, double
         distance2 += (g->mean[i] - last->mean[i]) * (g->mean[i] - last->mean[i]);
     }
     double apart = 0.5 * EVEN_DISTANCE * (length + last->length);
-    bool even = !(last->speed > 0.0) || (ratio < EVEN_SPEEDS && distance2 > apart * apart);
+    bool even =
+        !(last->speed > 0.0) || smooth || (ratio < EVEN_SPEEDS && distance2 > apart * apart);
     memcpy(last->mean, g->mean, sizeof last->mean);
     last->length = length;
     last->speed = speed;
@@ -284,9 +320,9 @@ static bst_status emit_rest(bst_ctx *ctx, bst_smear_maker *m, const double mean[
 }
 
 static bst_status emit(bst_ctx *ctx, bst_smear_maker *m, const bst_smear_moments *g,
-                       const bst_smear_rule *r, double weight) {
+                       const group *range, const bst_smear_rule *r, double weight) {
     bool split = r->pair[0] != 0.0 || r->pair[1] != 0.0 || r->pair[2] != 0.0;
-    double beside = beside_last(m, g, weight);
+    double beside = beside_last(m, g, range, weight);
     raise_last(m, beside);
     m->last.beside = beside;
     m->last.first = m->list->count;
@@ -418,7 +454,7 @@ static bst_status close_group(bst_ctx *ctx, bst_smear_maker *m, group g, int dep
         bst_smear_choose_rule(m, &t, INFINITY, &best);
     }
     set_kernel(m, &g, &t, &best);
-    return emit(ctx, m, &t, &best, weight);
+    return emit(ctx, m, &t, &g, &best, weight);
 }
 
 /* Moments of a part of the path about an origin, for the greedy grouping. */

@@ -42,6 +42,7 @@ typedef struct bst_smear_last_group {
     double beside;        /* its predicted error beside others, over that alone; 0: none */
     int first, end;       /* its nodes in the list: the first, and the one after the last */
     bst_smear_rule rule;
+    double velocity[3]; /* at its end, px over the path's time */
 } bst_smear_last_group;
 
 /* A path to be replaced by nodes, with its requirements. */
