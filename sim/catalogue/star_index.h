@@ -5,10 +5,8 @@
  * only, which have parallaxes or variable stars. The first sky cells are the 9,537 regions of the
  * Guide Star Catalog that Tycho-2 numbers its stars by (TYC1), so a star's identity names its cell.
  * Cells after them, in files of version 2 and 3, hold the stars of a user's table, numbered in the
- * order of their records; their sources are the table's own identities. They are triangles of the
- * sky, eight, and four in each that has more stars than a cell holds: the larger one then has its
- * brightest stars. Each cell stores the cap that contains its stars, which are sorted brightest
- * first. */
+ * order of their records; their sources are the table's own identities. Each cell stores the cap
+ * that contains its stars, which are sorted brightest first. */
 #ifndef BST_CATALOGUE_STAR_INDEX_H
 #define BST_CATALOGUE_STAR_INDEX_H
 

@@ -101,7 +101,7 @@ static int compare_stars(const void *pa, const void *pb) {
 /* ---------------------------------------------------------------- cells of a table's stars */
 
 /* bits of a triangle's number: 3 for the octant, 2 for each division */
-enum { DIVISIONS = 14, STARS_PER_CELL = 128 };
+enum { DIVISIONS = 14, STARS_PER_CELL = 512 };
 
 /* Number of the smallest triangle that contains a direction. */
 static uint32_t triangle_of(bst_vec3 u) {
@@ -134,60 +134,22 @@ static uint32_t triangle_of(bst_vec3 u) {
     return number;
 }
 
-/* Cells of the triangles: a triangle with more stars than a cell holds has its brightest ones, its
- * four parts the others. So a query of bright stars reads few cells, however many faint ones the
- * catalogue has. */
-typedef struct division {
-    bst_star_entry *stars;
-    uint32_t cells[DIVISIONS + 1]; /* by the number of divisions of their triangles */
-} division;
-
-enum { LEVEL_SHIFT = 24, BINS = 7000 };
-
-/* Class of a star's brightness, 0.01 mag wide. */
-static int brightness_bin(const bst_star_record *r) {
-    int bin = (bst_star_record_v(r) + 500000) / 1000;
-    return bin < 0 ? 0 : bin < BINS ? bin : BINS - 1;
-}
-
-/* First class of the stars that a cell of the triangle's brightest ones has no room for. */
-static int first_faint_bin(const division *d, const uint32_t *order, size_t count) {
-    uint32_t of_bin[BINS] = {0}, sum = 0;
-    for (size_t i = 0; i < count; i++) {
-        of_bin[brightness_bin(&d->stars[order[i]].record)]++;
-    }
-    int bin = 0;
-    while (bin < BINS && sum + of_bin[bin] <= STARS_PER_CELL) {
-        sum += of_bin[bin++];
-    }
-    return bin;
-}
-
-/* Gives stars of one triangle with `left` divisions below it their cells, numbered by level.
- *
- * Given:     order  [count] their indices, sorted by the smallest triangles; overwritten */
-static void divide(division *d, uint32_t *order, size_t count, int left) {
-    const int level = DIVISIONS - left;
-    const bool whole = count <= STARS_PER_CELL || left == 0;
-    const int faint = whole ? BINS : first_faint_bin(d, order, count);
-    const uint32_t cell = (uint32_t)level << LEVEL_SHIFT | d->cells[level];
-    size_t others = 0;
-    for (size_t i = 0; i < count; i++) {
-        bst_star_entry *star = &d->stars[order[i]];
-        if (whole || brightness_bin(&star->record) < faint) {
-            star->cell = cell;
-        } else {
-            order[others++] = order[i];
+/* Gives the stars [first, end), of one triangle with `left` divisions below it, their cells. */
+static void divide(bst_star_entry *stars, size_t first, size_t end, int left, uint32_t *cells) {
+    if (end - first <= STARS_PER_CELL || left == 0) {
+        for (size_t i = first; i < end; i++) {
+            stars[i].cell = *cells;
         }
+        *cells += end > first;
+        return;
     }
-    d->cells[level] += others < count;
-    for (uint32_t piece = 0, first = 0; piece < 4 && first < others; piece++) {
+    for (uint32_t piece = 0; piece < 4; piece++) {
         size_t next = first;
-        while (next < others && (d->stars[order[next]].cell >> 2 * (left - 1) & 3u) == piece) {
+        while (next < end && (stars[next].cell >> 2 * (left - 1) & 3u) == piece) {
             next++;
         }
-        divide(d, order + first, next - first, left - 1);
-        first = (uint32_t)next;
+        divide(stars, first, next, left - 1, cells);
+        first = next;
     }
 }
 
@@ -197,34 +159,18 @@ bst_status bst_star_list_divide(bst_ctx *ctx, bst_star_list *list, size_t first)
     if (first >= list->count) {
         return BST_OK;
     }
-    size_t count = list->count - first;
-    uint32_t *order = malloc(count * sizeof *order);
-    if (!order) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %zu stars", count);
-    }
     for (size_t i = first; i < list->count; i++) {
         stars[i].cell = triangle_of(bst_star_record_direction(&stars[i].record, 0.0));
-        order[i - first] = (uint32_t)i;
     }
-    qsort(stars + first, count, sizeof *stars, compare_stars);
-    division d = {.stars = stars};
-    for (uint32_t octant = 0, begin = 0; octant < 8; octant++) {
-        uint32_t next = begin;
-        while (next < count && stars[order[next]].cell >> 2 * DIVISIONS == octant) {
+    qsort(stars + first, list->count - first, sizeof *stars, compare_stars);
+    uint32_t cells = BST_STAR_CELLS;
+    for (uint32_t octant = 0; octant < 8; octant++) {
+        size_t next = first;
+        while (next < list->count && stars[next].cell >> 2 * DIVISIONS == octant) {
             next++;
         }
-        divide(&d, order + begin, next - begin, DIVISIONS);
-        begin = next;
-    }
-    free(order);
-    uint32_t base[DIVISIONS + 1], cells = BST_STAR_CELLS;
-    for (int level = 0; level <= DIVISIONS; level++) {
-        base[level] = cells;
-        cells += d.cells[level];
-    }
-    for (size_t i = first; i < list->count; i++) {
-        const uint32_t number = stars[i].cell & ((1u << LEVEL_SHIFT) - 1u);
-        stars[i].cell = base[stars[i].cell >> LEVEL_SHIFT] + number;
+        divide(stars, first, next, DIVISIONS, &cells);
+        first = next;
     }
     list->cells = cells;
     return cells <= BST_STAR_CELLS_MAX

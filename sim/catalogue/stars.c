@@ -11,7 +11,6 @@
 
 #include "boresight/rng.h"
 #include "sim/catalogue/bright_stars.h"
-#include "sim/catalogue/star_groups.h"
 #include "sim/catalogue/star_index.h"
 #include "sim/catalogue/variable_stars.h"
 #include "sim/core/file.h"
@@ -22,10 +21,19 @@
 extern const unsigned char bst_stars_embedded_begin[];
 extern const unsigned char bst_stars_embedded_end[];
 
+/* Cap that contains all cells of a group, or all groups of a region. Cells with consecutive numbers
+ * are neighbours: a query skips most of the sky region by region, then group by group. */
+typedef struct cell_group {
+    double centre[3], radius, pm_max_radpyr;
+} cell_group;
+
+enum { GROUP = 32 };
+
 struct bst_stars {
     bst_star_view view;
-    bst_star_groups groups; /* shared as the mapping is */
-    void *mapping;          /* NULL: embedded */
+    cell_group *groups;  /* one per GROUP cells; shared as the mapping is */
+    cell_group *regions; /* one per GROUP groups; behind the groups in memory */
+    void *mapping;       /* NULL: embedded */
     size_t mapping_bytes;
     char path[512];
     bool borrowed; /* another catalogue owns the mapping and the groups */
@@ -33,6 +41,62 @@ struct bst_stars {
     bst_star_errors_config errors;
     bst_rng_key key;
 };
+
+/* Cap around one cell; radius below 0: it has no stars. */
+static cell_group cap_of_cell(const bst_star_cell *cell) {
+    return (cell_group){{cell->centre[0], cell->centre[1], cell->centre[2]},
+                        cell->count > 0 ? (double)cell->radius_rad : -1.0,
+                        cell->pm_max_radpyr};
+}
+
+/* Cap around other caps. */
+static cell_group enclose(const cell_group *caps, uint32_t count) {
+    cell_group out = {.radius = -1.0}; /* no stars */
+    int filled = 0;
+    for (uint32_t c = 0; c < count; c++) {
+        filled += caps[c].radius >= 0.0;
+        for (int k = 0; k < 3 && caps[c].radius >= 0.0; k++) {
+            out.centre[k] += caps[c].centre[k];
+        }
+    }
+    for (int k = 0; k < 3 && filled > 0; k++) {
+        out.centre[k] /= filled;
+    }
+    for (uint32_t c = 0; c < count; c++) {
+        if (caps[c].radius >= 0.0) {
+            double dx = caps[c].centre[0] - out.centre[0], dy = caps[c].centre[1] - out.centre[1],
+                   dz = caps[c].centre[2] - out.centre[2];
+            double away = sqrt(dx * dx + dy * dy + dz * dz);
+            out.radius = fmax(out.radius, away + caps[c].radius + 1e-9);
+            out.pm_max_radpyr = fmax(out.pm_max_radpyr, caps[c].pm_max_radpyr);
+        }
+    }
+    return out;
+}
+
+/* Computes centre and radius that enclose each group of star cells, and each region of groups. */
+static bst_status group_cells(bst_ctx *ctx, bst_stars *s) {
+    const uint32_t cells = s->view.header->cell_count;
+    const uint32_t groups = cells / GROUP + 1, regions = groups / GROUP + 1;
+    s->groups = calloc(groups + regions, sizeof *s->groups);
+    if (!s->groups) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the star catalogue");
+    }
+    for (uint32_t g = 0; g < groups; g++) {
+        cell_group caps[GROUP];
+        uint32_t count = 0;
+        for (uint32_t c = g * GROUP; c < cells && count < GROUP; c++) {
+            caps[count++] = cap_of_cell(&s->view.cells[c]);
+        }
+        s->groups[g] = enclose(caps, count);
+    }
+    s->regions = s->groups + groups;
+    for (uint32_t r = 0; r < regions; r++) {
+        uint32_t first = r * GROUP, left = groups > first ? groups - first : 0;
+        s->regions[r] = enclose(s->groups + first, left < GROUP ? left : GROUP);
+    }
+    return BST_OK;
+}
 
 /* Identity of the star of a record in cell c. */
 static uint32_t identity(const bst_star_view *view, uint32_t c, const bst_star_record *r) {
@@ -174,7 +238,7 @@ bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) {
         status = s->path[0] ? open_file(ctx, s->path, s) : open_embedded(ctx, s);
     }
     if (status == BST_OK) {
-        status = bst_star_groups_make(ctx, &s->view, &s->groups);
+        status = group_cells(ctx, s);
     }
     if (status != BST_OK) {
         bst_stars_close(s);
@@ -193,7 +257,7 @@ bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) {
 
 void bst_stars_close(bst_stars *stars) {
     if (stars && !stars->borrowed) {
-        bst_star_groups_free(&stars->groups);
+        free(stars->groups);
         if (stars->mapping) {
             munmap(stars->mapping, stars->mapping_bytes);
         }
@@ -311,8 +375,7 @@ static void put_in_order(bst_star *stars, int count) {
 
 /* Checks whether a star of the group can be within radius_rad of a direction after that many
  * years. */
-static bool may_reach(const bst_star_group *group, bst_vec3 centre, double radius_rad,
-                      double years) {
+static bool may_reach(const cell_group *group, bst_vec3 centre, double radius_rad, double years) {
     double reach = radius_rad + group->radius + group->pm_max_radpyr * years;
     bst_vec3 d = {centre.x - group->centre[0], centre.y - group->centre[1],
                   centre.z - group->centre[2]};
@@ -331,28 +394,16 @@ typedef struct star_search {
     int capacity, found;
 } star_search;
 
-/* True if a star of V (record, 1e-5 mag) is too faint for a query. Published magnitudes of the
- * brightest stars may differ from those of records. */
-static bool is_too_faint(int32_t record_v, double v_limit) {
-    double v_mag = record_v / 1e5;
-    return v_mag > v_limit && (v_mag > BST_BRIGHT_STARS_V || v_mag > v_limit + MOST_WRONG_MAG);
-}
-
 /* Number of the next cell from c on that may reach into the cone by its group and region. */
 static uint32_t next_cell(const star_search *q, uint32_t c) {
     const double reach = q->query->radius_rad + q->slack, years = fabs(q->observer.years);
-    const double v_limit = q->query->v_limit;
-    const uint32_t cells = q->stars->view.header->cell_count,
-                   region = BST_STAR_GROUP * BST_STAR_GROUP;
-    while (c < cells && c % BST_STAR_GROUP == 0) {
-        const bst_star_group *r = &q->stars->groups.regions[c / region],
-                             *g = &q->stars->groups.groups[c / BST_STAR_GROUP];
-        if (c % region == 0 && (is_too_faint(r->brightest, v_limit) ||
-                                !may_reach(r, q->query->centre, reach, years))) {
+    const uint32_t cells = q->stars->view.header->cell_count, region = GROUP * GROUP;
+    while (c < cells && c % GROUP == 0) {
+        if (c % region == 0 &&
+            !may_reach(&q->stars->regions[c / region], q->query->centre, reach, years)) {
             c += region;
-        } else if (is_too_faint(g->brightest, v_limit) ||
-                   !may_reach(g, q->query->centre, reach, years)) {
-            c += BST_STAR_GROUP;
+        } else if (!may_reach(&q->stars->groups[c / GROUP], q->query->centre, reach, years)) {
+            c += GROUP;
         } else {
             break;
         }
@@ -368,8 +419,8 @@ static void search_cell(star_search *q, uint32_t c) {
     const int first = q->found;
     const bst_star_record *r = stars->view.records + stars->view.cells[c].first;
     for (const bst_star_record *end = r + stars->view.cells[c].count; r < end; r++) {
-        const double v_mag = bst_star_record_v(r) / 1e5;
-        if (is_too_faint(bst_star_record_v(r), v_limit)) {
+        double v_mag = bst_star_record_v(r) / 1e5;
+        if (v_mag > v_limit && (v_mag > BST_BRIGHT_STARS_V || v_mag > v_limit + MOST_WRONG_MAG)) {
             break; /* sorted brightest first */
         }
         if (r->dec < q->box.dec_min || r->dec > q->box.dec_max ||
@@ -430,9 +481,6 @@ bst_status bst_stars_query_seen(bst_ctx *ctx, const bst_stars *stars, const bst_
     const uint32_t cells = stars->view.header->cell_count;
     for (uint32_t c = next_cell(&q, 0); c < cells; c = next_cell(&q, c + 1)) {
         const bst_star_cell *cell = &stars->view.cells[c];
-        if (is_too_faint(stars->groups.brightest[c], query->v_limit)) {
-            continue;
-        }
         double drift = cell->pm_max_radpyr * fabs(q.observer.years);
         double reach = radius_rad + cell->radius_rad + drift + q.slack;
         bst_vec3 d = {centre.x - cell->centre[0], centre.y - cell->centre[1],
