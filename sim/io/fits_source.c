@@ -1,7 +1,6 @@
 #include "sim/io/fits_source.h"
 
 #include <assert.h>
-#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -14,26 +13,6 @@
 
 enum { LONGEST_SIDE = 32768, MOST_HEADER_BLOCKS = 1000, READ_BLOCKS = 8, MOST_FRAMES = 1 << 24 };
 static const uint64_t MAX_FILE_BYTES = (uint64_t)1 << 46;
-
-/* Reads `bytes` at an offset inside the file. */
-bst_status bst_fits_source_read_at(bst_ctx *ctx, const bst_fits_source *s, void *out,
-                                   uint64_t bytes, uint64_t at) {
-    if (at > s->bytes || bytes > s->bytes - at) {
-        return bst_fail(ctx, BST_ERR_FORMAT, "%.400s: is cut short", s->path);
-    }
-    for (uint64_t done = 0; done < bytes;) {
-        ssize_t n = pread(s->fd, (char *)out + done, bytes - done, (off_t)(at + done));
-        if (n == 0) {
-            return bst_fail(ctx, BST_ERR_IO, "%.400s: became shorter while it was read", s->path);
-        }
-        if (n < 0 && errno != EINTR) {
-            return bst_fail(ctx, BST_ERR_IO, "%.400s: cannot be read: %s", s->path,
-                            strerror(errno));
-        }
-        done += n > 0 ? (uint64_t)n : 0;
-    }
-    return BST_OK;
-}
 
 /* True if a block of cards holds END. */
 static bool has_end(const char *cards, size_t bytes) {
@@ -70,11 +49,6 @@ bst_status bst_fits_source_load_header(bst_ctx *ctx, const bst_fits_source *s, i
         h->bytes = bytes;
     }
     return bst_fits_read_cards(ctx, s->path, number, h->text, h->bytes, &h->cards);
-}
-
-int64_t bst_fits_source_int(const bst_fits_source_header *h, const char *key, int64_t fallback) {
-    int64_t value;
-    return bst_fits_card_int(h->text, h->bytes, key, &value) ? value : fallback;
 }
 
 /* Value of a key as a number; `fallback` if it is missing or no number. */
@@ -297,31 +271,6 @@ bst_status bst_fits_source_select(bst_ctx *ctx, bst_fits_source *s, int64_t inde
     return BST_OK;
 }
 
-/* Big-endian integer of 1 to 8 bytes; of one byte unsigned, else signed. */
-static int64_t integer_at(const uint8_t *bytes, int width) {
-    uint64_t v = width > 1 && bytes[0] & 0x80 ? UINT64_MAX : 0;
-    for (int i = 0; i < width; i++) {
-        v = v << 8 | bytes[i];
-    }
-    return (int64_t)v;
-}
-
-double bst_fits_source_real_at(const uint8_t *bytes, int width) {
-    union {
-        uint64_t u;
-        double d;
-    } wide = {.u = (uint64_t)integer_at(bytes, width)};
-    union {
-        uint32_t u;
-        float f;
-    } narrow = {.u = (uint32_t)wide.u};
-    return width == 4 ? (double)narrow.f : wide.d;
-}
-
-int64_t bst_fits_source_integer_at(const uint8_t *bytes, int width) {
-    return integer_at(bytes, width);
-}
-
 /* Physical values of a row of pixels. */
 static void convert_row(const bst_fits_source_hdu *h, const uint8_t *row, float *out) {
     int width = abs(h->bitpix) / 8;
@@ -330,7 +279,7 @@ static void convert_row(const bst_fits_source_hdu *h, const uint8_t *row, float 
         if (h->bitpix < 0) {
             out[x] = (float)(h->zero + h->scale * bst_fits_source_real_at(at, width));
         } else {
-            int64_t v = integer_at(at, width);
+            int64_t v = bst_fits_source_integer_at(at, width);
             out[x] = h->has_blank && v == h->blank ? NAN : (float)(h->zero + h->scale * (double)v);
         }
     }

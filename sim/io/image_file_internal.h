@@ -1,4 +1,5 @@
-/* The two kinds of picture files, shared by image_file.c, image_png.c and image_tiff.c. */
+/* The two kinds of picture files, shared by image_file.c, image_page.c, image_png.c and
+ * image_tiff.c. */
 #ifndef BST_IO_IMAGE_FILE_INTERNAL_H
 #define BST_IO_IMAGE_FILE_INTERNAL_H
 

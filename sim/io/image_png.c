@@ -48,6 +48,12 @@ static void read_head(reading *r) {
     png_set_read_fn(r->png, r, on_read);
     png_read_info(r->png, r->info);
     png_get_IHDR(r->png, r->info, &width, &height, &depth, &colour, &interlace, NULL, NULL);
+    if (width > BST_IMAGE_LONGEST_SIDE || height > BST_IMAGE_LONGEST_SIDE) {
+        /* before libpng takes memory for a row */
+        snprintf(what, sizeof what, "is %lu x %lu pixels (allowed: sides of 1 to %d)",
+                 (unsigned long)width, (unsigned long)height, BST_IMAGE_LONGEST_SIDE);
+        png_error(r->png, what);
+    }
     if (colour != PNG_COLOR_TYPE_GRAY && r->file->colour == BST_IMAGE_COLOUR_REFUSE) {
         snprintf(what, sizeof what, "has %s (allowed: grey, or a map with `colour`)",
                  colour == PNG_COLOR_TYPE_PALETTE      ? "a palette of colours"

@@ -55,11 +55,11 @@ class Camera(unittest.TestCase):
         left = np.array([[float(row["residual_x_px"]), float(row["residual_y_px"])] for row in rows])
         self.assertAlmostEqual(np.sqrt(np.mean(left**2)), report["geometry"]["rms_px"], delta=1e-4)
         # without a PSF none of an earlier run is left
-        runs.call_well("calibrate-camera", run, "--out", made + "2", "--extends", runs.STARE)
+        runs.call_well("calibrate-camera", run, "--out", made + "_again", "--extends", runs.STARE)
         for name in ("psf.fits", "psf_sigma.fits"):
-            shutil.copy(os.path.join(made, name), made + "2")
-        runs.call_well("calibrate-camera", run, "--out", made + "2", "--extends", runs.STARE, "--overwrite")
-        self.assertEqual(sorted(os.listdir(made + "2")), ["camera.json", "plot.png", "report.json", "stars.csv"])
+            shutil.copy(os.path.join(made, name), made + "_again")
+        runs.call_well("calibrate-camera", run, "--out", made + "_again", "--extends", runs.STARE, "--overwrite")
+        self.assertEqual(sorted(os.listdir(made + "_again")), ["camera.json", "plot.png", "report.json", "stars.csv"])
         # camera.json is a scenario
         result = runs.call("check", os.path.join(made, "camera.json"))
         self.assertEqual(result.returncode, 0, result.stderr)

@@ -81,7 +81,7 @@ class Recorded(unittest.TestCase):
                  (numpy.float32, {"compression_type": "RICE_1", "quantize_method": 1, "dither_seed": 9999, "quantize_level": 64}))
         hdus = [fits.PrimaryHDU()]
         for pixels, header, (kind, options) in zip(frames, headers, kinds):
-            kept = fits.Header((key, header[key]) for key in ("DATE-OBS", "EXPTIME", "PIXSCALE", "FRAMEID"))
+            kept = fits.Header((key, header[key]) for key in ("DATE-OBS", "EXPTIME", "PIXSCALE", "FRAMEID", "GAIN", "RDNOISE", "OFFSET"))
             hdus.append(fits.CompImageHDU(pixels.astype(kind), kept, **options))
         packed, again = self.path("packed.fits"), self.path("unpacked")
         fits.HDUList(hdus).writeto(packed)
