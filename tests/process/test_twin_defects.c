@@ -1,4 +1,4 @@
-/* Defects of a frame: found where they are, told from stars, and fitted beside them. */
+/* Defects of a frame: found where they are, stars are none, and fitted beside them. */
 #include "sim/process/twin/twin_defects.h"
 
 #include "tests/process/frame_by_sums.h"
