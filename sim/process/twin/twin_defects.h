@@ -17,8 +17,8 @@ double bst_twin_defect_neighbours(const bst_twin_psf *psf);
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_twin_find_defects(bst_ctx *ctx, bst_twin *twin) BST_MUST_CHECK;
 
-/* Fits the model with the level of each defect as a free value: its pixel has no other information, so
- * that this is a fit without these pixels.
+/* Fits the model with the level of each defect as a free value: its pixel has no other information,
+ * so that this is a fit without these pixels.
  *
  * Given:     fit  of twin->model to its data_e
  * Returned:  level_e of the defects
