@@ -129,7 +129,7 @@ static double share(const parts *p, double noise) {
 static void figures_are_sums_over_pixels(void **state) {
     (void)state;
     static float residual[BST_TEST_PIXELS], stars_e[BST_TEST_PIXELS], variance[BST_TEST_PIXELS],
-        background[BST_TEST_PIXELS];
+        background[BST_TEST_PIXELS], defects[BST_TEST_PIXELS];
     static double by_catalogue[BST_TEST_PIXELS], frame_e[BST_TEST_PIXELS];
     bst_ctx ctx = {0};
     bst_twin_star *stars = calloc(BST_TWIN_STARS, sizeof *stars);
@@ -147,7 +147,9 @@ static void figures_are_sums_over_pixels(void **state) {
         s.flux_e = s.expected_e;
         bst_test_add_star(&t.model, &s, 0.0, 0.0, by_catalogue);
     }
-    parts all = {0}, on = {0}, in = {0}, on_in = {0}, header = {0}, catalogue = {0};
+    double fitted[2] = {0.0, 0.0}; /* levels of defects: of all, and on streaks */
+    int outliers = 0;
+    parts alone = {0}, all = {0}, on = {0}, in = {0}, on_in = {0}, header = {0}, catalogue = {0};
     for (int i = 0; i < BST_TEST_PIXELS; i++) {
         double b = bst_twin_background(&t.model, i % BST_TEST_NX, i / BST_TEST_NX);
         background[i] = (float)(b - (i % 11 == 0 ? 40.0 : 0.0));
@@ -157,14 +159,19 @@ static void figures_are_sums_over_pixels(void **state) {
         if (i % 97 == 0) {
             residual[i] = 8.0F * sqrtf(variance[i]);
         }
+        defects[i] = i % 61 == 5 ? (float)(200 - i) : 0.0F;
         if (i % 50 == 7) {
             residual[i] = NAN;
         }
         if (!isfinite(residual[i])) {
             continue;
         }
-        double r = residual[i], v = variance[i], s = stars_e[i], light = r + s;
-        bool streak = s > 5.0, sound = r * r < 25.0 * v;
+        double r = residual[i], v = variance[i], s = stars_e[i], light = r + s + defects[i];
+        bool own = defects[i] != 0.0F, streak = s > 5.0, sound = r * r < 25.0 * v && !own;
+        fitted[0] += own;
+        fitted[1] += own && streak;
+        outliers += r * r >= 25.0 * v;
+        count(&alone, true, r + defects[i], light, v);
         double h = 16.0 + 9.0 / 12.0 + fmax(background[i], 0.0) + fmax(s, 0.0);
         count(&all, true, r, light, v);
         count(&on, streak, r, light, v);
@@ -175,20 +182,22 @@ static void figures_are_sums_over_pixels(void **state) {
     }
     const bst_twin_frames f = {.stars_e = stars_e,
                                .background_e = background,
+                               .defects_e = defects,
                                .residual_e = residual,
                                .variance_e2 = variance};
     bst_twin_figures g;
     bst_assert_ok(&ctx, bst_twin_figures_compute(&ctx, &t, &f, &g));
     assert_int_equal(g.pixels, (int)all.n);
     assert_int_equal(g.streak_pixels, (int)on.n);
-    assert_int_equal(g.outliers, (int)(all.n - in.n));
-    assert_int_equal(g.streak_outliers, (int)(on.n - on_in.n));
+    assert_int_equal(g.outliers, outliers);
     assert_true(g.streak_outliers > 0 && g.streak_outliers < g.outliers);
-    bst_assert_close(g.chi2, all.chi2 / all.n, 1e-9);
-    bst_assert_close(g.chi2_streaks, on.chi2 / on.n, 1e-9);
+    assert_true(fitted[1] > 0.0 && fitted[0] > fitted[1]);
+    bst_assert_close(g.chi2, all.chi2 / (all.n - fitted[0]), 1e-9);
+    bst_assert_close(g.chi2_stars, alone.chi2 / alone.n, 1e-9 * g.chi2_stars);
+    bst_assert_close(g.chi2_streaks, on.chi2 / (on.n - fitted[1]), 1e-9);
     bst_assert_close(g.chi2_clipped, in.chi2 / in.n, 1e-9);
     bst_assert_close(g.chi2_streaks_clipped, on_in.chi2 / on_in.n, 1e-9);
-    bst_assert_close(g.chi2_header, header.chi2 / header.n, 1e-9);
+    bst_assert_close(g.chi2_header, header.chi2 / (header.n - fitted[0]), 1e-9);
     bst_assert_close(g.explained, share(&all, 0.0), 1e-9);
     bst_assert_close(g.explained_clipped, share(&in, in.variance), 1e-9);
     bst_assert_close(g.explained_streaks, 1.0 - on.residual2 / on.light2, 1e-9);
@@ -282,6 +291,27 @@ static void camera_has_the_frames_noise_level_and_zero_point(void **state) {
         "frame_psf.fits");
     assert_null(cJSON_GetObjectItem(json, "rotation_deg"));
     assert_null(cJSON_GetObjectItem(json, "boresight_offset_px"));
+    cJSON_Delete(json);
+}
+
+static void defects_take_the_dark_part_of_the_background(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    bst_process_frame frame;
+    bst_twin t = camera_twin(&frame);
+    bst_twin_camera c;
+    t.defect_count = 1;
+    cJSON *json = camera_json();
+    bst_assert_ok(&ctx, bst_twin_make_camera(&ctx, &t, json, &c));
+    double shot = 121.0 - 4.0 / 12.0 - 36.0;
+    /* darkest at u = -1, v = 1 with the quadratic terms: 7.0 - 0.75 below the mean; 1 e- is left */
+    bst_assert_close(c.dark_e, shot - 6.25 - 1.0, 1e-9);
+    bst_assert_close(value(cJSON_GetObjectItem(json, "background"), "stray_e_per_s"), 7.25 / 4.0,
+                     1e-9);
+    bst_assert_close(value(json, "offset_dn"), 100.0 - c.background_e / 2.0, 1e-9);
+    assert_string_equal(
+        cJSON_GetObjectItem(cJSON_GetObjectItem(json, "detector"), "dark_map")->valuestring,
+        "frame_dark.fits");
     cJSON_Delete(json);
 }
 
@@ -395,6 +425,7 @@ int main(void) {
         cmocka_unit_test(photometry_without_stars),
         cmocka_unit_test(figures_are_sums_over_pixels),
         cmocka_unit_test(camera_has_the_frames_noise_level_and_zero_point),
+        cmocka_unit_test(defects_take_the_dark_part_of_the_background),
         cmocka_unit_test(background_with_more_slope_than_noise),
         cmocka_unit_test(offsets_below_zero_are_a_pedestal),
         cmocka_unit_test(band_has_the_colour_term_and_the_zero_point),

@@ -10,7 +10,7 @@
 
 static struct {
     cJSON *scenario, *path, *report;
-    float *psf;
+    float *psf, dark[BST_TEST_PIXELS];
     int side;
     bool stars;
 } written;
@@ -42,7 +42,14 @@ WRAP(bst_status, bst_fits_write_map,
      (bst_ctx * ctx, const char *path, int width, int height, const float *pixels,
       const char *unit)) {
     (void)ctx;
-    (void)unit;
+    if (strstr(path, "_dark.fits")) {
+        assert_string_equal(path, "folder/twin_dark.fits");
+        assert_string_equal(unit, "electron/s");
+        assert_int_equal(width, BST_TEST_NX);
+        assert_int_equal(height, BST_TEST_NY);
+        memcpy(written.dark, pixels, sizeof written.dark);
+        return BST_OK;
+    }
     assert_string_equal(path, "folder/twin_psf.fits");
     assert_int_equal(width, height);
     written.side = width;
@@ -95,9 +102,16 @@ static void files_of_the_fit(void **state) {
     all[1].values.exposure_s = 2.0;
     all[1].values.gain_e_per_dn = 1.0;
     t.process.map.dn_per_unit = 1.0;
+    bst_twin_defect defect = {5, 3, 700.0};
+    t.defects = &defect;
+    t.defect_count = 1;
     bst_twin_camera c;
     bst_assert_ok(&ctx, bst_twin_write(&ctx, &t, &c));
     assert_true(written.stars);
+
+    /* dark current: of an exposure of 2 s */
+    bst_assert_close((double)written.dark[0], c.dark_e / 2.0, 1e-6 * c.dark_e);
+    bst_assert_close((double)written.dark[3 * BST_TEST_NX + 5], (c.dark_e + 700.0) / 2.0, 1e-3);
 
     /* PSF: five samples a pixel, to six widths of the wide Gaussian */
     int half = (int)ceil(6.0 * 1.1 * 2.1 * 5.0);
@@ -145,6 +159,9 @@ static void files_of_the_fit(void **state) {
     bst_assert_close(number(member(member(sensor, "camera"), "pixel_scale_arcsec")), 60.0, 0.0);
     assert_string_equal(member(member(member(sensor, "camera"), "optics"), "psf_file")->valuestring,
                         "twin_psf.fits");
+    assert_string_equal(
+        member(member(member(sensor, "camera"), "detector"), "dark_map")->valuestring,
+        "twin_dark.fits");
     assert_string_equal(member(member(member(sensor, "modules"), "scenegen"), "type")->valuestring,
                         "opencl");
     assert_int_equal(cJSON_GetArraySize(member(member(root, "record"), "planes")), 2);

@@ -132,6 +132,7 @@ static bst_status solve(bst_ctx *ctx, bst_twin *t, const char *const *paths, int
 
 static void twin_free(bst_twin *t) {
     free(t->data_e);
+    free(t->defects);
     free(t->model.stars);
     free(t->model.variance_e2);
     bst_parallel_free(t->pool);
@@ -155,8 +156,9 @@ static bst_status set_stem(bst_ctx *ctx, bst_twin *t) {
 /* Checks the files beside the scenario as its own path is checked. */
 static bst_status check_outputs(bst_ctx *ctx, const bst_twin *t, const char *const *paths,
                                 int count) {
-    static const char *const endings[] = {"_path.json",   "_psf.fits",    "_stars.bin", "_run",
-                                          "_report.json", "_report.html", "_report.png"};
+    static const char *const endings[] = {"_path.json",  "_psf.fits",    "_stars.bin",
+                                          "_run",        "_report.json", "_report.html",
+                                          "_report.png", "_dark.fits"};
     enum { FILES = sizeof endings / sizeof *endings };
     char names[FILES][4096];
     const char *targets[FILES];

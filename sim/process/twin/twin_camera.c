@@ -128,6 +128,9 @@ static void choose_background(bst_ctx *ctx, const bst_twin *t, double gain, bst_
     double level = fmax(shot, mean - least_background(m) + 1.0);
     c->background_e = level - mean;
     c->read_noise_e = sqrt(fmax(noise2 - level, 0.0));
+    /* what the sky does not need is dark signal, from which defects below the others subtract */
+    double sky = mean - least_background(m) + 1.0;
+    c->dark_e = t->defect_count > 0 ? fmax(level - sky, 0.0) : 0.0;
     if (level > noise2) {
         char where[BST_FRAME_WHERE_TEXT];
         bst_log(ctx, BST_LOG_WARNING,
@@ -139,14 +142,14 @@ static void choose_background(bst_ctx *ctx, const bst_twin *t, double gain, bst_
     }
 }
 
-/* Keys of the background: all light of the sky is in stray_e_per_s. */
+/* Keys of the background: all light of the sky is in stray_e_per_s, the dark signal in dark_map. */
 static void put_background(const bst_twin *t, cJSON *json, bst_twin_camera *c) {
     const bst_twin_model *m = &t->model;
     double exposure_s = t->frame->values.exposure_s;
     cJSON_DeleteItemFromObjectCaseSensitive(json, "background");
     cJSON *block = cJSON_AddObjectToObject(json, "background");
     cJSON_AddNumberToObject(block, "stray_e_per_s",
-                            (m->background_e[0] + c->background_e) / exposure_s);
+                            (m->background_e[0] + c->background_e - c->dark_e) / exposure_s);
     cJSON *gradient = cJSON_AddArrayToObject(block, "gradient_e_per_s");
     cJSON *curvature = cJSON_AddArrayToObject(block, "curvature_e_per_s");
     for (int k = 1; k < BST_TWIN_BACKGROUND; k++) {
@@ -176,6 +179,12 @@ static void put_psf(const bst_twin *t, cJSON *json, const char *file) {
         cJSON_AddStringToObject(optics, "psf_file", file);
         cJSON_AddNumberToObject(optics, "psf_oversampling", BST_TWIN_OVERSAMPLING);
     }
+}
+
+/* Name of a file in its folder. */
+static const char *name_within(const char *path) {
+    const char *slash = strrchr(path, '/');
+    return slash ? slash + 1 : path;
 }
 
 bst_status bst_twin_make_camera(bst_ctx *ctx, const bst_twin *t, cJSON *json,
@@ -209,7 +218,11 @@ bst_status bst_twin_make_camera(bst_ctx *ctx, const bst_twin *t, cJSON *json,
     }
     put_background(t, json, out);
     bst_twin_file(t, "_psf.fits", path);
-    const char *slash = strrchr(path, '/');
-    put_psf(t, json, slash ? slash + 1 : path);
+    put_psf(t, json, name_within(path));
+    if (t->defect_count > 0) {
+        bst_twin_file(t, "_dark.fits", path);
+        cJSON_AddStringToObject(cJSON_AddObjectToObject(json, "detector"), "dark_map",
+                                name_within(path));
+    }
     return BST_OK;
 }

@@ -12,7 +12,7 @@ static const double STREAK = 1.0;
 /* Sums over pixels. */
 typedef struct sums {
     double chi2, residual2, light, light2, variance;
-    int64_t count;
+    int64_t count, fitted; /* pixels, and those whose own level is fitted */
 } sums;
 
 static void add(sums *s, double residual, double light, double variance) {
@@ -25,7 +25,7 @@ static void add(sums *s, double residual, double light, double variance) {
 }
 
 static double mean_chi2(const sums *s) {
-    return s->count > 0 ? s->chi2 / (double)s->count : NAN;
+    return s->count > s->fitted ? s->chi2 / (double)(s->count - s->fitted) : NAN;
 }
 
 /* Share of the variance of the light that the model explains; `noise`: the noise's part of it. */
@@ -58,7 +58,8 @@ static bst_status explain_by_catalogue(bst_ctx *ctx, const bst_twin *t, const bs
     for (size_t i = 0; i < pixels && status == BST_OK; i++) {
         double r = (double)f->residual_e[i], v = (double)f->variance_e2[i];
         double data = (double)(f->residual_e[i] + f->stars_e[i]);
-        if (isfinite(r) && r * r < OUTLIER * OUTLIER * v) {
+        bool fitted = f->defects_e && f->defects_e[i] != 0.0F;
+        if (isfinite(r) && !fitted && r * r < OUTLIER * OUTLIER * v) {
             add(&s, data - (double)light[i], data, v);
         }
     }
@@ -98,18 +99,26 @@ bst_status bst_twin_figures_compute(bst_ctx *ctx, const bst_twin *t, const bst_t
                                     bst_twin_figures *out) {
     const bst_twin_model *m = &t->model;
     size_t pixels = (size_t)m->width * (size_t)m->height;
-    sums all = {0}, streaks = {0}, clipped = {0}, streaks_clipped = {0}, header = {0};
+    sums all = {0}, streaks = {0}, clipped = {0}, streaks_clipped = {0}, header = {0},
+         stars_alone = {0};
     double gain = t->frame->values.gain_e_per_dn;
     double header_noise2 = t->read_noise_e * t->read_noise_e + gain * gain / 12.0;
     *out = (bst_twin_figures){.outliers = 0};
     for (size_t i = 0; i < pixels; i++) {
         double r = (double)f->residual_e[i], v = (double)f->variance_e2[i];
-        double stars = (double)f->stars_e[i], light = r + stars;
+        double defect = f->defects_e ? (double)f->defects_e[i] : 0.0;
+        double stars = (double)f->stars_e[i], light = r + stars + defect;
         if (!isfinite(r)) {
             continue;
         }
-        bool on = stars > STREAK * m->noise_e, in = r * r < OUTLIER * OUTLIER * v;
+        bool fitted = f->defects_e && f->defects_e[i] != 0.0F;
+        bool on = stars > STREAK * m->noise_e;
+        bool out_of = r * r >= OUTLIER * OUTLIER * v, in = !out_of && !fitted;
         add(&all, r, light, v);
+        all.fitted += fitted;
+        streaks.fitted += on && fitted;
+        header.fitted += fitted;
+        add(&stars_alone, r + defect, light, v);
         add(&header, r, light,
             header_noise2 + fmax((double)f->background_e[i], 0.0) + fmax(stars, 0.0));
         if (on) {
@@ -121,12 +130,13 @@ bst_status bst_twin_figures_compute(bst_ctx *ctx, const bst_twin *t, const bst_t
         if (on && in) {
             add(&streaks_clipped, r, light, v);
         }
+        out->outliers += out_of;
+        out->streak_outliers += on && out_of;
     }
     out->pixels = all.count;
     out->streak_pixels = streaks.count;
-    out->outliers = all.count - clipped.count;
-    out->streak_outliers = streaks.count - streaks_clipped.count;
     out->chi2 = mean_chi2(&all);
+    out->chi2_stars = mean_chi2(&stars_alone);
     out->chi2_streaks = mean_chi2(&streaks);
     out->chi2_clipped = mean_chi2(&clipped);
     out->chi2_streaks_clipped = mean_chi2(&streaks_clipped);

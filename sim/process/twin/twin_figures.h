@@ -2,14 +2,15 @@
 #ifndef BST_PROCESS_TWIN_TWIN_FIGURES_H
 #define BST_PROCESS_TWIN_TWIN_FIGURES_H
 
-#include "sim/process/twin/twin_internal.h"
+#include "sim/process/twin/twin_defects.h"
 
 /* Frames to compare, all [height][width] electrons. */
 typedef struct bst_twin_frames {
     float *stars_e, *background_e; /* of the twin, without noise; background as in data_e */
-    float *residual_e;             /* data_e minus both; NAN: no value */
-    float *variance_e2;            /* measured noise and the shot noise of the stars */
-    double level_dn;               /* of the twin's dark pixels over the recorded ones */
+    float *defects_e;   /* levels by the twin's dark map, 0 elsewhere; NULL: no defects */
+    float *residual_e;  /* data_e minus all three; NAN: no value */
+    float *variance_e2; /* measured noise and the shot noise of the stars */
+    double level_dn;    /* of the twin's dark pixels over the recorded ones */
 } bst_twin_frames;
 
 /* Computes the figures.

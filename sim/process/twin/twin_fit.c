@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "sim/core/compare.h"
-#include "sim/process/twin/twin_internal.h"
+#include "sim/process/twin/twin_defects.h"
 
 /* Coefficients of the path that are tried in turn, and length of the path per interval that is
  * allowed at least, px. */
@@ -56,7 +56,10 @@ static bst_status read_data(bst_ctx *ctx, bst_twin *t) {
         double e = v->gain_e_per_dn * ((double)pixels[i] - offset);
         double count_dn = p->map.pedestal_dn + p->map.dn_per_unit * (double)pixels[i];
         bool full = e > FULL_SHARE * v->full_well_e || count_dn > FULL_SHARE * LARGEST_DN;
-        t->data_e[i] = full ? NAN : (float)e;
+        bool below =
+            p->map.pedestal_dn > 0.0 && count_dn < 0.0; /* where frames are recorded as 0 */
+        t->data_e[i] = full || below ? NAN : (float)e;
+        t->below_range += below;
     }
     t->model.width = r.width;
     t->model.height = r.height;
@@ -315,6 +318,11 @@ static bst_status add_stars(bst_ctx *ctx, bst_twin *t, double least_snr, double 
     return measure_noise(ctx, t);
 }
 
+static bst_status fit_last(bst_ctx *ctx, bst_twin *t) {
+    double loss;
+    return fit_all(ctx, t, 0.0, 4, &loss);
+}
+
 bst_status bst_twin_fit_frame(bst_ctx *ctx, bst_twin *t) {
     static const bst_twin_freedom fluxes = {.iterations = 3};
     double loss;
@@ -339,6 +347,7 @@ bst_status bst_twin_fit_frame(bst_ctx *ctx, bst_twin *t) {
         BST_TRY(refine_path(ctx, t, &loss));
         t->length_px = bst_twin_path_length_px(&t->model);
     }
-    BST_TRY(fit_all(ctx, t, 0.0, 4, &loss));
+    BST_TRY(bst_twin_find_defects(ctx, t));
+    BST_TRY(bst_twin_fit_defects(ctx, t, fit_last));
     return bst_twin_measure_photometry(ctx, t);
 }

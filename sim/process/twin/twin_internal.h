@@ -21,6 +21,13 @@ typedef struct bst_twin_photometry {
 } bst_twin_photometry;
 #define BST_TWIN_BRIGHT_V 11.5
 
+/* A pixel whose level no light explains. */
+typedef struct bst_twin_defect {
+    int x, y;
+    double level_e; /* above the model; below 0 where a dark frame was subtracted that was too
+                       bright */
+} bst_twin_defect;
+
 /* State of the command. */
 typedef struct bst_twin {
     const bst_twin_request *request;
@@ -36,6 +43,9 @@ typedef struct bst_twin {
     bst_parallel *pool;
     bst_twin_photometry photometry;
     int catalogue_stars; /* of model.stars, the first */
+    bst_twin_defect *defects;
+    int defect_count;
+    int64_t below_range; /* pixels below the least count, which the pedestal does not lift to 0 */
     char stem[4096];     /* of the output files */
 } bst_twin;
 
@@ -76,6 +86,7 @@ typedef struct bst_twin_camera {
     bst_optics_response_point response[32];
     int points;                /* of the response; 0: the V band */
     double background_e;       /* per pixel and exposure where the fitted background is 0 */
+    double dark_e;             /* the part of it that is dark signal; 0: no defects */
     double recorded_offset_dn; /* level of a pixel without light by header or map */
     double pedestal_dn;        /* by which the twin's level is above the recorded one */
     double read_noise_e;
@@ -116,9 +127,10 @@ bst_status bst_twin_write_stars(bst_ctx *ctx, const bst_twin *twin, const bst_tw
 
 /* Residual figures of the rendered twin. */
 typedef struct bst_twin_figures {
-    double chi2, chi2_streaks;                 /* per pixel, by the measured noise */
-    double chi2_clipped, chi2_streaks_clipped; /* without pixels beyond 5 sigma */
+    double chi2, chi2_streaks; /* per pixel, less one for each defect, by the measured noise */
+    double chi2_clipped, chi2_streaks_clipped; /* without defects and pixels beyond 5 sigma */
     double chi2_header; /* by the header's read noise and the background's shot noise */
+    double chi2_stars;  /* as chi2, by background and stars alone: defects count as residuals */
     int64_t pixels, streak_pixels, outliers, streak_outliers; /* outliers: beyond 5 sigma */
     double explained;           /* share of the frame's variance, noise included */
     double explained_clipped;   /* the same without outliers and noise */

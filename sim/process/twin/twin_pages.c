@@ -107,6 +107,7 @@ static void add_figures(cJSON *root, const bst_twin *t, const bst_twin_figures *
     bst_json_add_number(node, "chi2_per_pixel_without_outliers", f->chi2_clipped);
     bst_json_add_number(node, "chi2_per_pixel_on_streaks_without_outliers",
                         f->chi2_streaks_clipped);
+    bst_json_add_number(node, "chi2_per_pixel_without_defect_map", f->chi2_stars);
     bst_json_add_number(node, "chi2_per_pixel_by_header_noise", f->chi2_header);
     bst_json_add_number(node, "explained_variance", f->explained);
     bst_json_add_number(node, "explained_variance_of_light", f->explained_clipped);
@@ -120,6 +121,8 @@ static void add_figures(cJSON *root, const bst_twin *t, const bst_twin_figures *
     bst_json_add_number(node, "photometry_scatter_bright_mag", t->photometry.bright_mag);
     cJSON_AddNumberToObject(node, "photometry_stars_bright", t->photometry.bright);
     cJSON_AddNumberToObject(node, "pixels", (double)f->pixels);
+    cJSON_AddNumberToObject(node, "pixels_with_a_level_of_their_own", t->defect_count);
+    cJSON_AddNumberToObject(node, "pixels_below_the_range", (double)t->below_range);
     cJSON_AddNumberToObject(node, "pixels_on_streaks", (double)f->streak_pixels);
     cJSON_AddNumberToObject(node, "pixels_on_streaks_beyond_5_sigma", (double)f->streak_outliers);
 }
@@ -129,6 +132,7 @@ static void add_camera(cJSON *root, const bst_twin_camera *c, const bst_twin_fra
     cJSON *node = cJSON_AddObjectToObject(root, "camera");
     bst_json_add_number(node, "read_noise_e", c->read_noise_e);
     bst_json_add_number(node, "background_behind_e", c->background_e);
+    bst_json_add_number(node, "dark_behind_e", c->dark_e);
     bst_json_add_number(node, "pedestal_dn", c->pedestal_dn);
     bst_json_add_number(node, "level_rendered_minus_recorded_dn", frames->level_dn);
 }
@@ -244,6 +248,14 @@ static void print(const bst_twin *t, const bst_twin_camera *camera, const bst_tw
     printf("chi2       %.3f per pixel, %.3f on streaks; without %" PRId64
            " outliers %.3f and %.3f\n",
            f->chi2, f->chi2_streaks, f->outliers, f->chi2_clipped, f->chi2_streaks_clipped);
+    if (t->defect_count > 0) {
+        printf("defects    %d pixels have a level of their own; as residuals: chi2 %.3f\n",
+               t->defect_count, f->chi2_stars);
+    }
+    if (t->below_range > 0) {
+        printf("note       %" PRId64 " pixels are below the least count and have no value\n",
+               t->below_range);
+    }
     printf(
         "explained  %.2f %% of the light's variance (by the catalogue %.2f %%), %.2f %% on "
         "streaks with noise\n",

@@ -36,11 +36,10 @@ static bst_status run_scenario(bst_ctx *ctx, const bst_twin *t) {
     return bst_check_run_file(ctx, q->out, load, NULL, &options, &request);
 }
 
-/* Reads a noise-free plane of the run. */
-static bst_status read_plane(bst_ctx *ctx, const bst_twin *t, const char *name, float **out) {
-    char path[4096], ending[64];
+/* Reads an image of the frame's size. */
+static bst_status read_file(bst_ctx *ctx, const bst_twin *t, const char *ending, float **out) {
+    char path[4096];
     int width, height;
-    snprintf(ending, sizeof ending, "_run/%s", name);
     bst_twin_file(t, ending, path);
     BST_TRY(bst_fits_read_image(ctx, path, &width, &height, out));
     if (width != t->model.width || height != t->model.height) {
@@ -50,9 +49,37 @@ static bst_status read_plane(bst_ctx *ctx, const bst_twin *t, const char *name, 
     return BST_OK;
 }
 
+/* Reads a noise-free plane of the run. */
+static bst_status read_plane(bst_ctx *ctx, const bst_twin *t, const char *name, float **out) {
+    char ending[64];
+    snprintf(ending, sizeof ending, "_run/%s", name);
+    return read_file(ctx, t, ending, out);
+}
+
+/* Levels of the defects by the dark map that the run has read; NULL: the twin has none. */
+static bst_status read_defects(bst_ctx *ctx, const bst_twin *t, const bst_twin_camera *camera,
+                               float **out) {
+    if (t->defect_count == 0) {
+        return BST_OK;
+    }
+    size_t pixels = (size_t)t->model.width * (size_t)t->model.height;
+    float *dark;
+    BST_TRY(read_file(ctx, t, "_dark.fits", &dark));
+    *out = calloc(pixels, sizeof **out);
+    bst_status status =
+        *out ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
+    for (int k = 0; k < t->defect_count && status == BST_OK; k++) {
+        size_t i = (size_t)t->defects[k].y * (size_t)t->model.width + (size_t)t->defects[k].x;
+        (*out)[i] = (float)((double)dark[i] * t->frame->values.exposure_s - camera->dark_e);
+    }
+    free(dark);
+    return status;
+}
+
 static void frames_free(bst_twin_frames *f) {
     free(f->stars_e);
     free(f->background_e);
+    free(f->defects_e);
     free(f->residual_e);
     free(f->variance_e2);
 }
@@ -64,14 +91,16 @@ static bst_status read_frames(bst_ctx *ctx, const bst_twin *t, const bst_twin_ca
     double noise2 = t->model.noise_e * t->model.noise_e;
     BST_TRY(read_plane(ctx, t, "stars.fits", &f->stars_e));
     BST_TRY(read_plane(ctx, t, "background.fits", &f->background_e));
+    BST_TRY(read_defects(ctx, t, camera, &f->defects_e));
     f->residual_e = malloc(pixels * sizeof *f->residual_e);
     f->variance_e2 = malloc(pixels * sizeof *f->variance_e2);
     if (!f->residual_e || !f->variance_e2) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
     }
     for (size_t i = 0; i < pixels; i++) {
-        f->background_e[i] -= (float)camera->background_e;
-        f->residual_e[i] = t->data_e[i] - f->stars_e[i] - f->background_e[i];
+        f->background_e[i] -= (float)(camera->background_e - camera->dark_e);
+        f->residual_e[i] = t->data_e[i] - f->stars_e[i] - f->background_e[i] -
+                           (f->defects_e ? f->defects_e[i] : 0.0F);
         f->variance_e2[i] = (float)(noise2 + fmax((double)f->stars_e[i], 0.0));
     }
     return BST_OK;
@@ -161,7 +190,8 @@ static bst_status read_twin(bst_ctx *ctx, const bst_twin *t, const bst_twin_came
            gain = t->frame->values.gain_e_per_dn / t->process.map.dn_per_unit;
     for (size_t i = 0; i < pixels && status == BST_OK; i++) {
         (*out)[i] *= (float)gain;
-        double level = (double)((*out)[i] - f->stars_e[i] - f->background_e[i]);
+        double level = (double)((*out)[i] - f->stars_e[i] - f->background_e[i]) -
+                       (f->defects_e ? (double)f->defects_e[i] : 0.0);
         double r = (double)f->residual_e[i];
         mean += level / (double)pixels;
         if (r * r < 25.0 * (double)f->variance_e2[i] && (double)f->stars_e[i] < t->model.noise_e) {

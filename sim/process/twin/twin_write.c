@@ -9,7 +9,7 @@
 
 #include "sim/cli/print_json.h"
 #include "sim/io/fits_image.h"
-#include "sim/process/twin/twin_internal.h"
+#include "sim/process/twin/twin_defects.h"
 
 /* Attitudes of the exposure in the file of the path. */
 enum { NODES = 257 };
@@ -125,6 +125,29 @@ static bst_status write_psf(bst_ctx *ctx, const bst_twin *t) {
     return status;
 }
 
+/* The dark current of the pixels, with the defects in it; removes that of an earlier twin. */
+static bst_status write_dark(bst_ctx *ctx, const bst_twin *t, const bst_twin_camera *camera) {
+    char path[4096];
+    size_t pixels = (size_t)t->model.width * (size_t)t->model.height;
+    bst_twin_file(t, "_dark.fits", path);
+    if (t->defect_count == 0) {
+        (void)remove(path); /* what is left over harms nothing but the reader */
+        return BST_OK;
+    }
+    float *dark = malloc(pixels * sizeof *dark);
+    if (!dark) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
+    }
+    bst_twin_defect_map(t, camera->dark_e, dark);
+    for (size_t i = 0; i < pixels; i++) {
+        dark[i] /= (float)t->frame->values.exposure_s;
+    }
+    bst_status status =
+        bst_fits_write_map(ctx, path, t->model.width, t->model.height, dark, "electron/s");
+    free(dark);
+    return status;
+}
+
 bst_status bst_twin_write(bst_ctx *ctx, const bst_twin *t, bst_twin_camera *camera) {
     char path[4096];
     bst_process_frame frame;
@@ -142,6 +165,9 @@ bst_status bst_twin_write(bst_ctx *ctx, const bst_twin *t, bst_twin_camera *came
     status = bst_cli_write_json(ctx, path, bst_process_make_pointing(&alone));
     if (status == BST_OK) {
         status = write_psf(ctx, t);
+    }
+    if (status == BST_OK) {
+        status = write_dark(ctx, t, camera);
     }
     bst_twin_file(t, "_stars.bin", path);
     if (t->request->catalogue_only) {
