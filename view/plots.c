@@ -7,15 +7,12 @@
 
 #include "sim/core/json_member.h"
 #include "sim/core/memory.h"
+#include "view/plot_samples.h"
+#include "view/plot_truth.h"
 #include "view/plot_values.h"
 #include "view/real_time_factor.h"
 #include "view/recorded_run.h"
 #include "view/recorded_run_internal.h"
-
-/* Samples of a line that are kept: more are thinned to their extremes. 16 bytes each. */
-static const size_t LINE_SAMPLES_MOST = 4000000;
-/* Samples of all lines that are kept. */
-static const size_t SAMPLES_MOST = 12000000;
 
 /* A panel of plots with a common axis. */
 static const struct {
@@ -159,14 +156,8 @@ static const struct {
     {13, "simulated over wall time", "", "", false, VALUE_REAL_TIME, ""},
 };
 
-/* Lines of the target's truth, and both at once: time and SNR, time and components of the error (no
- * time: no such exposure). The number is compared first: a word takes longer. */
+/* Lines of the target's truth that are read at once with the line of kind VALUE_ANGLE. */
 enum { TRUE_ERROR = 0, TRUE_SNR = 2 };
-static const char truth_sql[] =
-    "SELECT t.mid_s, t.snr, e.mid_s, t.x_mid_px - e.boresight_x_px, t.y_mid_px - e.boresight_y_px"
-    " FROM truth t LEFT JOIN (SELECT exposure_id, mid_s, boresight_x_px, boresight_y_px"
-    " FROM exposures WHERE sensor = ?1 GROUP BY exposure_id) e ON e.exposure_id = t.exposure_id"
-    " WHERE t.id = ?2 AND t.sensor = ?1 AND t.kind = 'object' AND t.in_field = 1";
 
 /* Path of the file that says how fast the run was. False: the path is too long. */
 static bool wall_clock_path(const bst_view_run *run, char *path, size_t bytes) {
@@ -286,25 +277,6 @@ void bst_view_add_panels(const bst_view_run *run, const bst_view_sensor *s, cJSO
     }
 }
 
-/* Frees the lines that were not used for the longest time, until there is room for another one. */
-static void make_room(bst_view_run *run, const bst_view_line *keep) {
-    while (run->samples > SAMPLES_MOST) {
-        bst_view_line *oldest = NULL;
-        for (int k = 0; k < run->sensors * BST_VIEW_LINES; k++) {
-            bst_view_line *line = &run->sensor[k / BST_VIEW_LINES].lines[k % BST_VIEW_LINES];
-            if (line->samples && line != keep && (!oldest || line->used < oldest->used)) {
-                oldest = line;
-            }
-        }
-        if (!oldest) {
-            return;
-        }
-        run->samples -= oldest->count;
-        free(oldest->samples);
-        *oldest = (bst_view_line){.samples = NULL};
-    }
-}
-
 static bst_view_track_state read_state(const bst_io_rows *r) {
     return (bst_view_track_state){
         .time_s = bst_io_rows_real(r, 0),
@@ -349,94 +321,69 @@ static double value_of(const bst_io_rows *rows, value_kind kind, bst_view_track_
     }
 }
 
-/* Samples that are being read. */
-typedef struct collected {
-    void *samples;
-    size_t room, count;
-} collected;
-
-static bst_status collect(bst_ctx *ctx, collected *c, double time_s, double value) {
-    const size_t bytes = sizeof(bst_io_sample);
-    if (!isfinite(time_s)) {
-        return BST_OK;
-    }
-    if (c->count == LINE_SAMPLES_MOST) {
-        c->count = bst_io_thin_samples(c->samples, c->count);
-    }
-    if (c->room < (c->count + 1) * bytes) {
-        BST_TRY(bst_memory_grow(ctx, "out of memory for a time series", &c->samples, &c->room,
-                                2 * c->room + 65536));
-    }
-    ((bst_io_sample *)c->samples)[c->count++] =
-        (bst_io_sample){time_s, isfinite(value) ? value : NAN};
-    return BST_OK;
-}
-
-/* Makes the samples a line, after an error none. */
-static bst_status keep_line(bst_ctx *ctx, bst_status status, bst_view_run *run, collected *c,
-                            bst_view_line *line) {
-    if (status != BST_OK) {
-        free(c->samples);
-        return status;
-    }
-    bst_io_sort_samples(c->samples, c->count);
-    line->samples = c->samples ? c->samples : calloc(1, sizeof *line->samples);
-    line->count = c->count;
-    run->samples += line->count;
-    make_room(run, line);
-    return line->samples ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
-}
-
 /* Reads the rows of a query as the samples of a line. */
 static bst_status read_line(bst_ctx *ctx, bst_view_run *run, bst_io_rows *rows, value_kind kind,
                             bst_view_line *line) {
     bst_view_track_state before = {.track = -1};
-    collected c = {.samples = NULL};
+    bst_view_samples c = {.samples = NULL};
     bst_status status;
     bool more;
     while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
-        status = collect(ctx, &c, bst_io_rows_real(rows, 0), value_of(rows, kind, &before));
+        status =
+            bst_view_collect(ctx, &c, bst_io_rows_real(rows, 0), value_of(rows, kind, &before));
         if (status != BST_OK) {
             break;
         }
     }
-    return keep_line(ctx, status, run, &c, line);
+    return bst_view_keep_line(ctx, status, run, &c, line);
 }
 
 static bst_status collect_factor(bst_ctx *ctx, void *user, double time_s, double factor) {
-    return collect(ctx, user, time_s, factor);
+    return bst_view_collect(ctx, user, time_s, factor);
 }
 
 /* Reads the speed of the run. */
 static bst_status read_factors(bst_ctx *ctx, bst_view_run *run, bst_view_line *line) {
-    collected c = {.samples = NULL};
+    bst_view_samples c = {.samples = NULL};
     char path[4200];
     bst_status status = BST_OK;
     if (wall_clock_path(run, path, sizeof path)) {
         status = bst_view_read_factors(ctx, path, collect_factor, &c);
     }
-    return keep_line(ctx, status, run, &c, line);
+    return bst_view_keep_line(ctx, status, run, &c, line);
 }
 
-/* Reads the two lines of the target's truth, a table that may have gigabytes, at once. */
-static bst_status read_truth(bst_ctx *ctx, bst_view_run *run, bst_io_rows *rows,
-                             bst_view_line *error, bst_view_line *snr) {
-    collected errors = {.samples = NULL}, snrs = errors;
+/* Number of the line of a kind of which there is one. */
+static int line_of(value_kind kind) {
+    int k = 0;
+    while (k < BST_VIEW_LINES - 1 && lines[k].kind != kind) {
+        k++;
+    }
+    return k;
+}
+
+/* Reads the innovations and their spread, which follow from the same rows, at once. */
+static bst_status read_innovations(bst_ctx *ctx, bst_view_run *run, bst_io_rows *rows,
+                                   bst_view_line *line, bst_view_line *spread) {
+    bst_view_track_state before = {.track = -1};
+    bst_view_samples values = {.samples = NULL}, sigmas = values;
     bst_status status;
     bool more;
     while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
-        status = collect(ctx, &snrs, bst_io_rows_real(rows, 0), bst_io_rows_real(rows, 1));
-        if (status == BST_OK && !bst_io_rows_is_null(rows, 2)) {
-            status = collect(ctx, &errors, bst_io_rows_real(rows, 2),
-                             hypot(bst_io_rows_real(rows, 3), bst_io_rows_real(rows, 4)));
-        }
+        const bst_view_track_state now = read_state(rows);
+        double innovation, sigma3;
+        const bool found = bst_view_innovation(&before, &now, &innovation, &sigma3);
+        before = now;
+        status = bst_view_collect(ctx, &values, now.time_s, found ? innovation : NAN);
+        status = status == BST_OK ? bst_view_collect(ctx, &sigmas, now.time_s, found ? sigma3 : NAN)
+                                  : status;
         if (status != BST_OK) {
             break;
         }
     }
-    error->used = snr->used = run->requests;
-    const bst_status kept = keep_line(ctx, status, run, &errors, error);
-    status = keep_line(ctx, status, run, &snrs, snr);
+    line->used = spread->used = run->requests;
+    const bst_status kept = bst_view_keep_line(ctx, status, run, &values, line);
+    status = bst_view_keep_line(ctx, status, run, &sigmas, spread);
     return kept == BST_OK ? status : kept;
 }
 
@@ -452,22 +399,28 @@ static bst_status need_line(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s,
     }
     bst_ctx ignored = {0};
     bst_io_rows *rows = NULL;
+    const int angle = line_of(VALUE_ANGLE);
+    bst_view_line *innovation = &s->lines[line_of(VALUE_INNOVATION)],
+                  *spread = &s->lines[line_of(VALUE_INNOVATION_SIGMA)];
     const bool known = !lines[k].of_target || s->target >= 0;
-    bst_view_line *error = &s->lines[TRUE_ERROR], *snr = &s->lines[TRUE_SNR];
-    const bool both =
-        known && (k == TRUE_ERROR || k == TRUE_SNR) && !error->samples && !snr->samples;
-    if (both && bst_io_rows_open(&ignored, run->reader, truth_sql, s->sensor.index, s->target,
-                                 &rows) == BST_OK) {
-        bst_status status = read_truth(ctx, run, rows, error, snr);
-        bst_io_rows_close(rows);
-        return status;
+    if (known && (k == TRUE_ERROR || k == TRUE_SNR || k == angle) &&
+        !s->lines[TRUE_ERROR].samples && !s->lines[TRUE_SNR].samples && !s->lines[angle].samples) {
+        bool done;
+        BST_TRY(bst_view_read_truth(ctx, run, s, &s->lines[TRUE_ERROR], &s->lines[TRUE_SNR],
+                                    &s->lines[angle], &done));
+        if (done) {
+            return BST_OK;
+        }
     }
     if (!known || bst_io_rows_open(&ignored, run->reader, lines[k].sql, s->sensor.index, s->target,
                                    &rows) != BST_OK) {
         line->samples = calloc(1, sizeof *line->samples);
         return line->samples ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
-    bst_status status = read_line(ctx, run, rows, lines[k].kind, line);
+    const bool both =
+        (line == innovation || line == spread) && !innovation->samples && !spread->samples;
+    bst_status status = both ? read_innovations(ctx, run, rows, innovation, spread)
+                             : read_line(ctx, run, rows, lines[k].kind, line);
     bst_io_rows_close(rows);
     return status;
 }

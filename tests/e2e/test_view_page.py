@@ -276,6 +276,7 @@ class Page(unittest.TestCase):
             self.assertEqual(at[0], test_view.HOSTILE)
             self.assertAlmostEqual(at[1], 0, delta=1e-6)
             page.wait_for("document.boresight.strip.kept.size > 5")
+            page.wait_for("document.boresight.plots.panels.every((panel) => panel.lines.length > 0)")
             samples = page.evaluate("document.boresight.plots.panels.find((p) => p.info.name === 'detections').lines[0].map((p) => p.high)")
             numbers = self.viewer.numbers("api/plot?sensor=0&panel=detections&from=0&to=100&columns=2000")
             self.assertEqual(samples, numbers[1:1 + 3 * int(numbers[0])].reshape(-1, 3)[:, 2].tolist())
