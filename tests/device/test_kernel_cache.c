@@ -198,7 +198,7 @@ static void workers_begin_with_the_users_kernels(void **state) {
     assert_false(scratch_has(path));
     snprintf(path, sizeof path, "%s/EF", worker);
     assert_false(scratch_has(path));
-    snprintf(path, sizeof path, "%s/EF/CHANGED", cache); /* removed by whom it belongs to */
+    snprintf(path, sizeof path, "%s/EF/CHANGED", cache); /* linking removes nothing */
     assert_true(scratch_has(path));
     snprintf(path, sizeof path, "%s/worker-1", worker);
     assert_false(scratch_has(path));
