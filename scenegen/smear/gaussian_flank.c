@@ -48,6 +48,16 @@ static double derivative(const double x[], const double y[], int order, double c
     return sum;
 }
 
+/* Absolute derivative along an angle. both_ways: of order 2 also with that across subtracted, as of
+ * a covariance that is too large along the angle and as much too small across: twice the mixed
+ * derivative of axes at 45 degrees. */
+static double greatest_of(const double x[], const double y[], int order, double c, double s,
+                          bool both_ways) {
+    double along = derivative(x, y, order, c, s);
+    double across = both_ways && order == 2 ? derivative(x, y, 2, -s, c) : 0.0;
+    return fmax(fabs(along), fabs(along - across));
+}
+
 void bst_gaussian_flank_measure(double sigma_px, int binning, double smoothed_px2,
                                 bst_light_flank *out) {
     assert(sigma_px > 0.0 && binning >= 1 && smoothed_px2 >= 0.0 && out);
@@ -72,9 +82,9 @@ void bst_gaussian_flank_measure(double sigma_px, int binning, double smoothed_px
                 if (a == 0 && k % PLACES > 0) { /* along the rows most is in the row of the peak */
                     continue;
                 }
-                double e = derivative(image.at[i], image.at[j], orders[o], c, s);
+                double e = greatest_of(image.at[i], image.at[j], orders[o], c, s, angles > 1);
                 double share = light.at[i][0] * image.at[j][0] / peak;
-                double error = fabs(e) / top;
+                double error = e / top;
                 bst_light_flank_raise(out, share, error, error / sqrt(fmax(share, 1e-12)));
             }
         }

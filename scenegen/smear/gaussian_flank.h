@@ -6,7 +6,9 @@
 #include "scenegen/light_flank.h"
 
 /* Measures the derivatives of order 2, 3, 4 and 6 of a point's image, along the pixels' rows and at
- * two angles to them, over the greatest along the rows, by the light of the pixel.
+ * two angles to them, over the greatest along the rows, by the light of the pixel. For a point,
+ * those of order 2 also of a covariance that is too large along an angle and as much too small
+ * across it.
  *
  * Given:     sigma_px     of the PSF, more than 0
  *            binning      side of a read-out pixel in the sensor's, at least 1

@@ -238,20 +238,27 @@ static bool link_file(void *user, const char *path, const char *below) {
             (link(path, other) == 0 || errno == EEXIST));
 }
 
-/* Checks a program folder of the kernel cache and removes it if damaged. */
+/* Repairing or linking: removes a damaged program, or links one that is whole. */
+static void check(sweep *s, const char *program) {
+    char *sums = read_sums(program);
+    judged j = {.sums = sums};
+    walk(program, strlen(program) + 1, 0, judge, &j);
+    free(sums);
+    if (s->to) {
+        if (!j.damaged) {
+            walk(program, s->root + 1, 0, link_file, (void *)(uintptr_t)s->to);
+        }
+    } else if (j.damaged) {
+        remove_below(program, 0);
+        s->removed++;
+    }
+}
+
+/* Checks a program folder of the kernel cache, or records its checksums. */
 static void look_at(sweep *s, const char *program) {
     struct stat info;
-    if (s->to) {
-        walk(program, s->root + 1, 0, link_file, (void *)(uintptr_t)s->to);
-    } else if (s->since == 0) {
-        char *sums = read_sums(program);
-        judged j = {.sums = sums};
-        walk(program, strlen(program) + 1, 0, judge, &j);
-        free(sums);
-        if (j.damaged) {
-            remove_below(program, 0);
-            s->removed++;
-        }
+    if (s->since == 0) {
+        check(s, program);
     } else if (stat(program, &info) == 0 && info.st_mtim.tv_sec >= s->since) {
         write_sums(program);
     }

@@ -17,8 +17,10 @@ int bst_kernel_cache_repair(const char *root);
 void bst_kernel_cache_note(const char *root, time_t since);
 
 /* Makes the kernels of the cache `root` known to the cache `to` on the same file system, by hard
- * links: PoCL replaces such files by renaming and never writes into one. Kernels of `to` stay;
- * what cannot be linked is compiled there when it is needed. */
+ * links: PoCL replaces such files by renaming and never writes into one. Kernels of `to` stay. A
+ * damaged program, as in bst_kernel_cache_repair, is not linked; its checksums stay with `root`.
+ * What is not linked (another file system, a path of 4096 bytes or more) is compiled in `to` when
+ * it is needed. */
 void bst_kernel_cache_link(const char *root, const char *to);
 
 #endif

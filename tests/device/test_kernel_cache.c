@@ -1,6 +1,8 @@
 /* A kernel cache that cannot be written is said to be the reason, before and behind the device. */
 #define _XOPEN_SOURCE 700 /* setenv */
+#include <fcntl.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "sim/device/kernel_cache.h"
 #include "sim/device/kernel_cache_check.h"
@@ -132,7 +134,8 @@ static void caches_of_others_are_not_used(void **state) {
 }
 
 /* A worker's cache begins with the kernels of the user's, keeps its own, and takes nothing from a
- * cache that others can write to. */
+ * cache that others can write to, and no program with a symbolic link or with code that is not as
+ * it was noted. */
 static void workers_begin_with_the_users_kernels(void **state) {
     (void)state;
     scratch place;
@@ -140,20 +143,39 @@ static void workers_begin_with_the_users_kernels(void **state) {
     char cache[700], worker[800], path[1000], both[2][1000];
     snprintf(cache, sizeof cache, "%s/cache", place.folder);
     snprintf(worker, sizeof worker, "%s/worker-0", cache);
-    const char *const folders[] = {
-        "",          "/AB",          "/AB/ONE",          "/AB/ONE/kernel", "/CD",         "/CD/TWO",
-        "/worker-0", "/worker-0/AB", "/worker-0/AB/ONE", "/worker-1",      "/worker-1/AB"};
+    const char *const folders[] = {"",
+                                   "/AB",
+                                   "/AB/ONE",
+                                   "/AB/ONE/kernel",
+                                   "/CD",
+                                   "/CD/TWO",
+                                   "/worker-0",
+                                   "/worker-0/AB",
+                                   "/worker-0/AB/ONE",
+                                   "/worker-1",
+                                   "/worker-1/AB",
+                                   "/EF",
+                                   "/EF/LINK",
+                                   "/EF/CHANGED"};
     for (size_t i = 0; i < sizeof folders / sizeof *folders; i++) {
         snprintf(path, sizeof path, "%s%s", cache, folders[i]);
         assert_int_equal(mkdir(path, 0700), 0);
     }
-    const char *const files[] = {"AB/ONE/program.bc",          "AB/ONE/kernel/k.so",
+    const char *const files[] = {"AB/ONE/program.bc",          "AB/ONE/kernel/k.bc",
                                  "CD/TWO/program.bc",          "CD/TWO/last_accessed",
-                                 "worker-0/AB/ONE/program.bc", "worker-1/AB/other.bc"};
+                                 "worker-0/AB/ONE/program.bc", "worker-1/AB/other.bc",
+                                 "EF/CHANGED/program.bc"};
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         snprintf(path, sizeof path, "%s/%s", cache, files[i]);
-        write_bytes(path, files[i], strlen(files[i]));
+        write_bytes(path, "BC\xC0\xDE++++", 8);
     }
+    bst_kernel_cache_note(cache, time(NULL) - 100);
+    write_bytes(path, "BC\xC0\xDE+-++", 8);
+    const struct timespec then[2] = {{1000, 0},
+                                     {1000, 0}}; /* a time of its own at any resolution */
+    assert_int_equal(utimensat(AT_FDCWD, path, then, 0), 0);
+    snprintf(path, sizeof path, "%s/EF/LINK/program.bc", cache);
+    assert_int_equal(symlink("../../AB/ONE/program.bc", path), 0);
     assert_int_equal(chmod(cache, 0777), 0);
     setenv("POCL_CACHE_DIR", cache, 1);
     bst_kernel_cache_take(worker);
@@ -174,6 +196,10 @@ static void workers_begin_with_the_users_kernels(void **state) {
     }
     snprintf(path, sizeof path, "%s/CD/TWO/last_accessed", worker);
     assert_false(scratch_has(path));
+    snprintf(path, sizeof path, "%s/EF", worker);
+    assert_false(scratch_has(path));
+    snprintf(path, sizeof path, "%s/EF/CHANGED", cache); /* linking removes nothing */
+    assert_true(scratch_has(path));
     snprintf(path, sizeof path, "%s/worker-1", worker);
     assert_false(scratch_has(path));
     unsetenv("POCL_CACHE_DIR");

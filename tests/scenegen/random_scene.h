@@ -285,14 +285,14 @@ static void make_sources(scene *s) {
     }
 }
 
-static void open_scene(fixture *f, scene *s, int index) {
+static void open_scene_of(fixture *f, scene *s, int index, motion_kind motion, psf_kind psf) {
     static const double tolerances[] = {0.02, 0.05, 0.05, 0.2};
     memset(s, 0, sizeof *s);
     uint64_t own_seed = seed + (uint64_t)(index / SCENES_OF_A_SEED);
     index %= SCENES_OF_A_SEED;
     s->key = bst_rng_make_key((uint64_t)index, own_seed, "test", "tolerance sweep");
-    s->motion = (motion_kind)(index % MOTIONS);
-    s->psf_kind = (psf_kind)(index / MOTIONS * 2 + index % MOTIONS) % PSFS;
+    s->motion = motion;
+    s->psf_kind = psf;
     s->camera = scene_camera(WIDTH, HEIGHT);
     s->camera.read_noise_e = draw_log(s, 2.0, 15.0);
     s->background_e = draw_log(s, 0.5, 300.0);
@@ -307,6 +307,12 @@ static void open_scene(fixture *f, scene *s, int index) {
         s->window = (bst_window){x0, y0, 48, 40};
     }
     s->binning = draw(s, 0.0, 1.0) < 0.2 ? 2 : 1;
+}
+
+static void open_scene(fixture *f, scene *s, int index) {
+    int k = index % SCENES_OF_A_SEED;
+    open_scene_of(f, s, index, (motion_kind)(k % MOTIONS),
+                  (psf_kind)((k / MOTIONS * 2 + k % MOTIONS) % PSFS));
 }
 
 static void close_scene(scene *s) {

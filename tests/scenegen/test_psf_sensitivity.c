@@ -69,7 +69,7 @@ static void derivatives_are_those_of_each_direction(void **state) {
  * |He_n(u)| exp(-u^2 / 2), He_n the Hermite polynomials of order 2, 3, 4 and 6. */
 static void errors_beside_a_gaussian_are_those_of_hermite_functions(void **state) {
     (void)state;
-    double peak[4] = {0.0}, beside[4] = {0.0}, expected = 0.0;
+    double peak[4] = {0.0}, beside[4] = {0.0}, expected = 0.0, along = 0.0;
     for (double u = 0.0; u < 6.0; u += 1e-3) {
         double v = u * u, light = exp(-0.5 * v);
         const double he[4] = {v - 1.0, u * (v - 3.0), (v - 6.0) * v + 3.0,
@@ -78,10 +78,12 @@ static void errors_beside_a_gaussian_are_those_of_hermite_functions(void **state
             peak[k] = fmax(peak[k], fabs(he[k]) * light);
             beside[k] = fmax(beside[k], fabs(he[k]) * sqrt(light));
         }
+        expected = fmax(expected, v * sqrt(light));
     }
     for (int k = 0; k < 4; k++) {
-        expected = fmax(expected, beside[k] / peak[k]);
+        along = fmax(along, beside[k] / peak[k]);
     }
+    assert_true(expected > 1.05 * along);
     bst_light_flank flank;
     bst_flank_curve curve;
     bst_gaussian_flank_measure(50.0, 1, 0.0, &flank);
@@ -89,6 +91,10 @@ static void errors_beside_a_gaussian_are_those_of_hermite_functions(void **state
     /* places are 0.14 sigma apart */
     bst_assert_close(bst_flank_curve_at(&curve, 1e5), expected, 0.03 * expected);
     bst_assert_close(bst_flank_curve_at(&curve, 1e-3), 1.0, 0.02); /* dark: that of the peak */
+    /* a long path along the rows has errors along it only, and its light is as wide */
+    bst_gaussian_flank_measure(50.0, 1, 1e3 * 2500.0, &flank);
+    bst_flank_curve_make(&flank, &curve);
+    assert_true(bst_flank_curve_at(&curve, 1e5) < 1.03);
     /* in a pixel of 2.8 sigma, the next one has a fifth of the light and as much error */
     bst_gaussian_flank_measure(0.36, 1, 0.0, &flank);
     bst_flank_curve_make(&flank, &curve);
