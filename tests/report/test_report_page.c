@@ -359,9 +359,10 @@ static void events(void **state) {
 static void wheels(void **state) {
     (void)state;
     static const char *const limits[] = {"6000", "NULL"};
-    static const char *const expected[] = {"Limit: 6000 rpm in both directions. Largest: 1500 rpm,"
-                                           " 25 % of it, wheel 1.",
-                                           "No limit was recorded."};
+    static const char *const expected[] = {
+        "Limit: 6000 rpm in both directions. Largest: 1500 rpm,"
+        " 25 % of it, wheel 1.",
+        "No limit was recorded."};
     for (int k = 0; k < 2; k++) {
         run_tables t;
         make_run(&t, manifest);
