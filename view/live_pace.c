@@ -6,9 +6,9 @@
 /* Time between two looks at the processors, s. */
 static const double LOOK_S = 1.0;
 /* Shares of idle time above and below which there are more and fewer pictures. A picture of the
- * main scenario costs 10 to 15 ms in a browser without a graphics processor (docs/results/view.md):
- * 16 a second are some 10 % of two processors, 20 more are as much again, which the upper share
- * leaves room for. */
+ * main scenario costs 19 ms in a browser without a graphics processor (docs/results/view.md): a
+ * step from 18 to 22 a second costs 4 % of two processors, one from 40 to 50 costs 10 %, which is
+ * the distance of the shares. So a step does not cause the step back. */
 static const double IDLE_SHARE = 0.35;
 static const double BUSY_SHARE = 0.25;
 /* Factors by which they become more and fewer. */

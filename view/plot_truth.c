@@ -37,7 +37,7 @@ static int compare_exposures(const void *left, const void *right) {
     return (a->id > b->id) - (a->id < b->id);
 }
 
-/* Lists rows {exposure, time, a, b}; none if the table was not recorded. */
+/* Lists rows {exposure, time, a, b} whose time is a number; none if the table was not recorded. */
 static bst_status list_rows(bst_ctx *ctx, bst_view_run *run, const bst_view_sensor *s,
                             const char *sql, exposure_list *list) {
     bst_ctx ignored = {0};
@@ -48,6 +48,9 @@ static bst_status list_rows(bst_ctx *ctx, bst_view_run *run, const bst_view_sens
         return BST_OK;
     }
     while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
+        if (!isfinite(bst_io_rows_real(rows, 1))) {
+            continue;
+        }
         if (list->count == FOUND_MOST) {
             list->too_many = true;
             break;
@@ -107,13 +110,14 @@ static bst_status take_truth(bst_ctx *ctx, const bst_io_rows *rows, truth_lines 
         }
     }
     const of_exposure *end = (const of_exposure *)t->tracks.items + t->tracks.count;
+    /* repeated rows of a hostile file would multiply: those of an exposure are taken once */
     for (of_exposure *track = find_exposure(&t->tracks, id);
-         track && track < end && track->id == id; track++) {
+         track && track < end && track->id == id && isfinite(track->time_s); track++) {
         BST_TRY(
             bst_view_collect(ctx, &t->angles, track->time_s,
                              bst_view_angle_arcsec(track->a, track->b, bst_io_rows_real(rows, 5),
                                                    bst_io_rows_real(rows, 6))));
-        track->time_s = NAN; /* repeated rows of a hostile file would multiply */
+        track->time_s = NAN;
     }
     return BST_OK;
 }

@@ -1,11 +1,10 @@
 #include "view/socket_frames.h"
 
 #include <arpa/inet.h>
-#include <dirent.h>
 #include <errno.h>
 #include <poll.h>
-#include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/types.h>
 #include <sys/uio.h>
@@ -16,6 +15,8 @@
 enum { CONTROL_MOST = 125 };
 /* Time between two looks at whether the server ends, ms. */
 enum { LOOK_MS = 200 };
+/* Largest number of a file descriptor that is looked at: the server has some 200 connections. */
+enum { DESCRIPTOR_MOST = 65535 };
 
 /* ------------------------------------------------------------------ frames */
 
@@ -81,24 +82,19 @@ static bool is_at(const struct sockaddr_in *end, int port) {
 }
 
 int bst_view_find_socket(int peer_port, int own_port) {
-    DIR *folder = opendir("/proc/self/fd");
-    int found = -1;
-    for (const struct dirent *entry; folder && found < 0 && (entry = readdir(folder)) != NULL;) {
-        char *rest;
-        const long fd = strtol(entry->d_name, &rest, 10);
+    /* no list of them is opened: that needs a descriptor, and there may be none left */
+    struct rlimit most = {.rlim_cur = DESCRIPTOR_MOST};
+    (void)getrlimit(RLIMIT_NOFILE, &most);
+    for (int fd = 0; fd <= DESCRIPTOR_MOST && (rlim_t)fd < most.rlim_cur; fd++) {
         struct sockaddr_in peer = {.sin_family = AF_UNSPEC}, own = peer;
         socklen_t peer_bytes = sizeof peer, own_bytes = sizeof own;
-        if (rest != entry->d_name && *rest == '\0' &&
-            getpeername((int)fd, (struct sockaddr *)&peer, &peer_bytes) == 0 &&
-            getsockname((int)fd, (struct sockaddr *)&own, &own_bytes) == 0 &&
-            is_at(&peer, peer_port) && is_at(&own, own_port)) {
-            found = (int)fd;
+        if (getpeername(fd, (struct sockaddr *)&peer, &peer_bytes) == 0 &&
+            getsockname(fd, (struct sockaddr *)&own, &own_bytes) == 0 && is_at(&peer, peer_port) &&
+            is_at(&own, own_port)) {
+            return fd;
         }
     }
-    if (folder) {
-        closedir(folder);
-    }
-    return found;
+    return -1;
 }
 
 /* Waits until a connection is ready; true if it is. */

@@ -72,6 +72,7 @@ static void describe(const wheel_speeds *w, char *text, size_t bytes) {
     int worst = -1;
     double share = -1.0, low = INFINITY, high = 0.0;
     char limits[64];
+    static const char cut[] = " The first 100,000 times are drawn.";
     for (int k = 0; k < WHEELS_MOST; k++) {
         if (w->n[k] == 0 || !(w->limit_rpm[k] > 0.0)) {
             continue;
@@ -83,6 +84,12 @@ static void describe(const wheel_speeds *w, char *text, size_t bytes) {
             worst = k;
         }
     }
+    if (worst < 0) {
+        snprintf(text, bytes,
+                 "Speed of the reaction wheels relative to the body. No limit was recorded.%s",
+                 w->cut ? cut : "");
+        return;
+    }
     if (low < high) {
         snprintf(limits, sizeof limits, "%.6g to %.6g", low, high);
     } else {
@@ -91,8 +98,7 @@ static void describe(const wheel_speeds *w, char *text, size_t bytes) {
     snprintf(text, bytes,
              "Speed of the reaction wheels relative to the body. Limit: %s rpm in both directions. "
              "Largest: %.4g rpm, %.3g %% of it, wheel %d.%s",
-             worst < 0 ? "unknown" : limits, worst < 0 ? NAN : w->most_rpm[worst], 100.0 * share,
-             worst, w->cut ? " The first 100,000 times are drawn." : "");
+             limits, w->most_rpm[worst], 100.0 * share, worst, w->cut ? cut : "");
 }
 
 static void put_chart(FILE *out, const wheel_speeds *w, const char *label, double span,

@@ -101,8 +101,11 @@ class Day(unittest.TestCase):
         self.assertEqual((numpy.min(points[:, 1]), numpy.max(points[:, 2])), (low, high))
         if chromium.PROGRAM:
             with chromium.Chromium(1280, 720) as page:
+                # the browser is open: its graphics, which start with the first canvas, are not the page's
+                page.evaluate("document.createElement('canvas').getContext('2d') && document.createElement('canvas').getContext('webgl2') && 1")
                 shown = "document.boresight && document.boresight.plots.panels.length && document.boresight.plots.panels.every((panel) => panel.lines.length > 0)"
                 self.timed("page: plots", lambda: (page.command("Page.navigate", url=self.viewer.url), page.wait_for(shown)))
+                self.assertIsNone(page.evaluate("document.boresight.frameView.made"))  # a run without pixels does not wait for WebGL
                 zoom = "(async () => { const { plots } = document.boresight; plots.setRange(%d, %d); await plots.reloading; })()"
                 self.timed("page: zoom", lambda: page.evaluate(zoom % (30000, 33600)))
                 self.assertEqual(page.messages, [])

@@ -355,6 +355,31 @@ static void events(void **state) {
     run_tables_end(&t);
 }
 
+/* The largest speed of a wheel is given as a share of its limit, where one was recorded. */
+static void wheels(void **state) {
+    (void)state;
+    static const char *const limits[] = {"6000", "NULL"};
+    static const char *const expected[] = {
+        "Limit: 6000 rpm in both directions. Largest: 1500 rpm,"
+        " 25 % of it, wheel 1.",
+        "No limit was recorded."};
+    for (int k = 0; k < 2; k++) {
+        run_tables t;
+        make_run(&t, manifest);
+        run_tables_sql(&t,
+                       "CREATE TABLE wheels (sensor INT, time_s REAL, wheel INT, speed_rpm REAL,"
+                       " speed_limit_rpm REAL);"
+                       "INSERT INTO wheels VALUES (0, 1, 0, 10, %s), (0, 1, 1, -1500, %s),"
+                       " (0, 2, 0, 20, %s), (0, 2, 1, -1400, %s)",
+                       limits[k], limits[k], limits[k], limits[k]);
+        char *page = page_of(&t);
+        assert_non_null(strstr(page, expected[k]));
+        assert_null(strstr(page, "nan rpm"));
+        free(page);
+        run_tables_end(&t);
+    }
+}
+
 /* Cards by the manifest, a dot for each updated object, and the largest NEES first. */
 static void custody(void **state) {
     (void)state;
@@ -516,6 +541,7 @@ int main(void) {
         cmocka_unit_test(cards_of_a_sensor),
         cmocka_unit_test(the_end_of_a_killed_run),
         cmocka_unit_test(events),
+        cmocka_unit_test(wheels),
         cmocka_unit_test(custody),
         cmocka_unit_test(sightings),
     };

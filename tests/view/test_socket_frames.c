@@ -3,6 +3,7 @@
 #include <arpa/inet.h>
 #include <pthread.h>
 #include <stdlib.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <time.h>
 #include <unistd.h>
@@ -218,6 +219,20 @@ static void sockets_are_found_by_their_ports(void **state) {
     assert_int_equal(bst_view_find_socket(peer, port), accepted);
     assert_int_equal(bst_view_find_socket(port, peer), client);
     assert_int_equal(bst_view_find_socket(port, port), -1);
+    /* also while no descriptor is left */
+    struct rlimit before, few;
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &before), 0);
+    few = (struct rlimit){64, before.rlim_max};
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
+    int filled[64], count = 0;
+    while (count < 64 && (filled[count] = dup(listener)) >= 0) {
+        count++;
+    }
+    assert_int_equal(bst_view_find_socket(peer, port), accepted);
+    while (count > 0) {
+        close(filled[--count]);
+    }
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
     close(accepted);
     close(client);
     close(listener);

@@ -21,8 +21,8 @@ export class FrameView {
     this.stage = element('stage');
     this.canvas = element('image');
     this.overlay = element('overlay');
-    const address = new URLSearchParams(location.search);
-    this.painter = makePainter(this.canvas, address.has('plain'), address.has('webgl'));
+    /** @type {ReturnType<typeof makePainter> | null} */
+    this.made = null; // the painter
     /** @type {import('./frame_parts.js').Image | null} */
     this.image = null;
     /** @type {import('./frame_parts.js').Image | null} */
@@ -111,12 +111,19 @@ export class FrameView {
   /** Its part with finer pixels. */
   get drawnPart() { return this.clean && this.cleanShown ? this.cleanPart : this.part; }
 
+  /** What draws the pixels. It is made with the first of them: WebGL takes up to seconds to start, and a run may have none. */
+  get painter() {
+    const address = new URLSearchParams(location.search);
+    this.made = this.made || makePainter(this.canvas, address.has('plain'), address.has('webgl'));
+    return this.made;
+  }
+
   /** A canvas has one kind of context for life: the 2D painter needs a new one. */
   usePlain() {
     const fresh = this.canvas.cloneNode();
     this.canvas.replaceWith(fresh);
     this.canvas = fresh;
-    this.painter = makePainter(fresh, true);
+    this.made = makePainter(fresh, true);
     this.resize();
   }
 
@@ -260,7 +267,7 @@ export class FrameView {
     requestAnimationFrame(() => {
       this.waiting = false;
       const part = this.drawnPart;
-      this.painter.draw(this.drawn, this.drawing(), part, part && this.drawing(part));
+      if (this.made || this.drawn) this.painter.draw(this.drawn, this.drawing(), part, part && this.drawing(part));
       this.drawOverlay();
       this.describeCursor();
       const percent = 100 * this.view.scale;

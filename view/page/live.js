@@ -38,8 +38,8 @@ export class Live {
     this.sentAt = -1; // commands that the run had obeyed when the last one was sent; -1: none is awaited
     this.refusal = { text: '', until: 0 }; // of the last command that was not taken
     this.shown = 0; // frames
-    this.told = 0; // when the texts were set
-    this.untold = null; // sets the texts of the frame that is shown
+    this.textsSet = 0; // when the texts were set
+    this.setTexts = null; // sets the texts of the frame that is shown
     this.over = false; // the run has ended, and the page knows its end
     this.ready = null;
     this.first = new Promise((done) => { this.ready = done; });
@@ -145,9 +145,9 @@ export class Live {
       this.takeFrame(answer.frame, pixels);
     }
     if (answer.problem) this.sentAt = -1; // refused: it does not count
-    const now = performance.now(), due = !this.running() || !before || before.paused || now - this.told >= TEXT_MS;
-    if (due) this.told = now;
-    if (due && this.untold) this.untold();
+    const now = performance.now(), due = !this.running() || !before || before.paused || now - this.textsSet >= TEXT_MS;
+    if (due) this.textsSet = now;
+    if (due && this.setTexts) this.setTexts();
     this.describe(before, answer.problem, due);
     if (this.state.run >= 0) this.ready();
     // the answer is drawn before the next one is asked for
@@ -170,8 +170,8 @@ export class Live {
     const target = Object.entries(app.names).find(([, name]) => name === sensor.target);
     const all = { ...details, names: app.names, target: target ? Number(target[0]) : -1, tracks: details.tracks.concat(earlier) };
     app.frameView.show(pixels, all, details.dropped ? 'This frame was dropped.' : 'This run has no pixels.', !this.state.paused);
-    this.untold = () => {
-      this.untold = null;
+    this.setTexts = () => {
+      this.setTexts = null;
       app.frameView.sayCounts();
       setText(element('position'), `exposure ${details.exposure_id} · ${details.time_s.toFixed(2)} s · ${details.utc.replace('T', ' ').replace('Z', '')} UTC`);
       element('slider').value = element('slider').max;
@@ -236,7 +236,7 @@ export class Live {
   follow(newest) {
     if (newest && !this.newest) this.sequence = 0; // show it again
     this.newest = newest;
-    if (!newest) this.untold = null;
+    if (!newest) this.setTexts = null;
     element('live-newest').setAttribute('aria-pressed', String(newest));
   }
 

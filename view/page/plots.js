@@ -40,7 +40,7 @@ class Panel {
     this.values = info.lines.map((name, k) => {
       const value = document.createElement('span'), swatch = document.createElement('i'), number = document.createElement('b');
       value.className = 'value';
-      swatch.className = `swatch swatch-${k % LINE_COLOURS}`;
+      swatch.className = `swatch swatch-${k % LINE_COLOURS}${k < LINE_COLOURS ? '' : ' dashed'}`;
       value.append(swatch, `${name} `, number);
       return { value, number };
     });
@@ -124,7 +124,9 @@ class Panel {
     context.save();
     context.beginPath(); context.rect(LEFT, 0, width - LEFT - RIGHT, height); context.clip();
     this.drawStops(context, extent, toY, colour);
-    this.lines.forEach((points, k) => drawLine(context, points, (time) => plots.toX(time), toY, { colour: colour(`--line-${k % LINE_COLOURS}`), log: this.log }));
+    this.lines.forEach((points, k) => drawLine(context, points, (time) => plots.toX(time), toY, {
+      colour: colour(`--line-${k % LINE_COLOURS}`), log: this.log, dash: k < LINE_COLOURS ? [] : [5, 3],
+    }));
     context.restore();
     plots.drawCursor(context, 0, bottom, colour('--cursor'));
   }
