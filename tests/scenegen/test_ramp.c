@@ -165,7 +165,8 @@ static void flats_have_their_noise(void **state) {
 }
 
 /* Signals that are drawn at once, a little above the least of them, in steady light: mean, variance
- * and skewness of the line through Poisson charges, whose cumulants are the sums of weight^k mean. */
+ * and skewness of the line through Poisson charges, whose cumulants are the sums of weight^k mean.
+ */
 static void lines_drawn_at_once_have_the_moments(void **state) {
     static double frame[PIXELS];
     enum { FRAMES = 12 };
