@@ -32,21 +32,34 @@ INLINE float16 log_two(float16 v) {
     return fma(s * series, (float16)1.44269504f, convert_float16(exponent));
 }
 
-/* A packet of 16 columns or rows on its way to the output. held: charge in the traps. */
+/* A packet of 16 columns or rows meets the traps of species k. held: charge in them. */
+INLINE float16 pass_species(bst_kernel_trap_params p, int k, float transfers, float16 q,
+                            float16 *held) {
+    float16 least = q > TRAP_LEAST ? q : TRAP_LEAST;
+    float16 g = transfers * p.density[k] * power_of_two((p.exponent - 1.0f) * log_two(least));
+    float16 caught = fma(g, q, -held[k]) / (g + 1.0f);
+    caught = select((float16)0.0f, caught, (q > TRAP_LEAST) & (caught > 0.0f));
+    held[k] += caught;
+    float16 released = held[k] * p.release[k];
+    held[k] -= released;
+    return q + (released - caught);
+}
+
+#if BST_TRAP_KINDS != 3
+#error "pass_traps has three species"
+#endif
+
+/* A packet on its way to the output. No loop, so that the traps stay in registers: compilers do not
+ * unroll one whose end is not known. */
 INLINE float16 pass_traps(bst_kernel_trap_params p, float transfers, float16 q, float16 *held) {
-#pragma unroll
-    for (int k = 0; k < BST_TRAP_KINDS; k++) {
-        if (k >= p.kinds) { /* unrolled, so that the traps stay in registers */
-            break;
-        }
-        float16 least = q > TRAP_LEAST ? q : TRAP_LEAST;
-        float16 g = transfers * p.density[k] * power_of_two((p.exponent - 1.0f) * log_two(least));
-        float16 caught = fma(g, q, -held[k]) / (g + 1.0f);
-        caught = select((float16)0.0f, caught, (q > TRAP_LEAST) & (caught > 0.0f));
-        held[k] += caught;
-        float16 released = held[k] * p.release[k];
-        held[k] -= released;
-        q += released - caught;
+    if (p.kinds > 0) {
+        q = pass_species(p, 0, transfers, q, held);
+    }
+    if (p.kinds > 1) {
+        q = pass_species(p, 1, transfers, q, held);
+    }
+    if (p.kinds > 2) {
+        q = pass_species(p, 2, transfers, q, held);
     }
     return q;
 }

@@ -184,6 +184,15 @@ static void law_of_hot_pixels(void **state) {
     bst_assert_close(log10(hot.median.value), m, 0.2 * s / sqrt(HOT));
     bst_assert_close(hot.spread_dex.value, s, 0.3 * hot.spread_dex.sigma);
     bst_assert_close(hot.fraction.value, (double)HOT / (HOT + COLD), 0.002);
+    /* all are full: pixels below the limit are not hot */
+    const int64_t found = hot.found;
+    hot = bst_hot_pixels_fit(excess, HOT + COLD, limit, -limit);
+    assert_int_equal(hot.found, found);
+    assert_true(isnan(hot.median.value));
+    /* it is not known when pixels are full */
+    hot = bst_hot_pixels_fit(excess, HOT + COLD, limit, NAN);
+    assert_int_equal(hot.found, found);
+    assert_true(isfinite(hot.median.value));
     test_free(excess);
 }
 

@@ -46,6 +46,7 @@ CASES = {
     "before and traps": {**BEFORE, **PARALLEL, **SERIAL},
     "before and crosstalk": {**BEFORE, **CROSSTALK},
     "before and pixel noise": {**BEFORE, **PIXEL_NOISE},
+    "before and level noise": {**BEFORE, "flicker_noise_e": 3},
     "all but multiplication": BUT_MULTIPLY,
     "all with multiplication": {**BUT_MULTIPLY, **MULTIPLY},
     "all with crosstalk": OUTPUTS,

@@ -164,6 +164,52 @@ static void flats_have_their_noise(void **state) {
     bst_assert_close(sum, mean, 4.0 * sqrt(2300.0 / PIXELS));
 }
 
+/* Signals that are drawn at once, a little above the least of them, in steady light: mean, variance
+ * and skewness of the line through Poisson charges, whose cumulants are the sums of weight^k mean.
+ */
+static void lines_drawn_at_once_have_the_moments(void **state) {
+    static double frame[PIXELS];
+    enum { FRAMES = 12 };
+    static const int reads[2] = {6, 16};
+    const double all = (double)FRAMES * PIXELS;
+    fixture *f = open_with(state, 405.0, 0.0);
+    f->camera.gain_e_per_dn = 0.05;
+    f->camera.read_noise_e = 0.0;
+    for (int c = 0; c < 2; c++) {
+        const bst_detector_ramp_config ramp = {.reads = reads[c]};
+        double weight[BST_RAMP_READS], of_interval = 0.0, cumulant[4] = {0.0};
+        bst_ramp_weights(&ramp, reads[c], weight);
+        for (int i = reads[c] - 1; i > 0; i--) {
+            double part = 405.0 / (reads[c] - 1);
+            of_interval += weight[i];
+            for (int k = 1; k <= 3; k++) {
+                part *= of_interval;
+                cumulant[k] += part;
+            }
+        }
+        assert_true(cumulant[1] > 400.0);
+        f->camera.detector.ramp = ramp;
+        make(f);
+        double moment[4] = {0.0};
+        for (int id = 0; id < FRAMES; id++) {
+            expose(f, 20 + id, frame);
+            for (int i = 0; i < PIXELS; i++) {
+                double d = frame[i] - cumulant[1];
+                moment[1] += d / all;
+                moment[2] += d * d / all;
+                moment[3] += d * d * d / all;
+            }
+        }
+        double sigma = sqrt(cumulant[2]), skewness = cumulant[3] / (sigma * sigma * sigma);
+        double found = (moment[3] - 3.0 * moment[1] * moment[2]) / pow(moment[2], 1.5);
+        /* four standard errors: 0.12 e-, 0.9 %, 0.015 */
+        bst_assert_close(moment[1], 0.0, 4.0 * sigma / sqrt(all));
+        bst_assert_close(moment[2] / cumulant[2], 1.0, 4.0 * sqrt(2.0 / all));
+        assert_true(skewness > 0.05); /* 0 without the expansion */
+        bst_assert_close(found, skewness, 4.0 * sqrt(6.0 / all));
+    }
+}
+
 /* A star that crosses the frame: each part of its streak has the weight of its time. */
 static void light_has_the_weight_of_its_time(void **state) {
     static double frame[PIXELS], want[PIXELS], variance[PIXELS];
@@ -369,6 +415,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(lines_have_closed_forms),
         cmocka_unit_test(flats_have_their_noise),
+        cmocka_unit_test(lines_drawn_at_once_have_the_moments),
         cmocka_unit_test(light_has_the_weight_of_its_time),
         cmocka_unit_test(hits_come_between_the_reads),
         cmocka_unit_test(full_pixels_stay_full),

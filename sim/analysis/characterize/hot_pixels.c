@@ -83,9 +83,10 @@ bst_hot_pixels bst_hot_pixels_fit(const float *excess, size_t count, double limi
     double sum = 0.0, sum2 = 0.0, covariance[3], m, s;
     size_t pixels = 0;
     int64_t full = 0;
+    most = isnan(most) ? INFINITY : fmax(most, limit);
     for (size_t i = 0; i < count; i++) {
         pixels += isnan(excess[i]) ? 0 : 1;
-        full += excess[i] >= most;
+        full += excess[i] > limit && excess[i] >= most;
         if (excess[i] > limit && excess[i] < most) {
             double x = log10((double)excess[i]);
             sum += x;

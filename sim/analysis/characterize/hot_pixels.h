@@ -19,7 +19,8 @@ typedef struct bst_hot_pixels {
  *
  * Given:     excess  [count] rates over the mean of the other pixels; NAN is skipped
  *            limit   above the noise of other pixels, > 0
- *            most    rate from which on a pixel may be full: such ones count as "more than that"
+ *            most    rate from which on a pixel may be full: such ones count as "more than that";
+ *                    NAN: none is, below the limit: all hot pixels may be
  * Returned:  NAN estimates with fewer than 20 hot pixels, or where most would lie below the limit
  * Reference: maximum likelihood of a normal distribution cut off below (Cohen 1950) and censored
  *            above (Cohen 1959, Technometrics 1, 217) */
