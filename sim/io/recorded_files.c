@@ -86,7 +86,7 @@ static bst_status add_named(bst_ctx *ctx, bst_recorded_files *f, const char *fol
         }
     }
     closedir(dir);
-    if (status == BST_OK) {
+    if (status == BST_OK && f->count > first) {
         qsort(f->paths + first, (size_t)(f->count - first), sizeof *f->paths, by_name);
     }
     return status;
