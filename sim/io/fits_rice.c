@@ -42,7 +42,8 @@ static bool is_exhausted(const bit_reader *r) {
     return r->missing > (size_t)r->count;
 }
 
-/* Reads a unary number: zeros before the next one. False: more zeros than any code has. */
+/* Reads a unary number: zeros before the next one. False: more zeros than any code has, or the
+ * bytes end: those of 32-bit pixels have no other limit. */
 static bool take_unary(bit_reader *r, uint32_t most, uint32_t *zeros) {
     for (*zeros = 0; *zeros <= most;) {
         if (r->bits != 0) {
@@ -51,6 +52,9 @@ static bool take_unary(bit_reader *r, uint32_t most, uint32_t *zeros) {
             r->bits = r->bits << n << 1;
             r->count -= n + 1;
             return *zeros <= most;
+        }
+        if (is_exhausted(r)) {
+            return false;
         }
         *zeros += (uint32_t)r->count;
         r->count = 0;

@@ -18,7 +18,7 @@ typedef struct reading {
     float *pixels;       /* NULL: only the head is read */
     int width, height, depth, channels;
     bool interlaced;
-    size_t row_bytes;
+    size_t row_bytes, stored_bytes; /* of a row as it is given, and as it is in the file */
 } reading;
 
 static void on_error(png_structp png, png_const_charp message) {
@@ -61,6 +61,7 @@ static void read_head(reading *r) {
                                                        : "colours");
         png_error(r->png, what);
     }
+    r->stored_bytes = png_get_rowbytes(r->png, r->info);
     if (colour == PNG_COLOR_TYPE_PALETTE) {
         png_set_palette_to_rgb(r->png);
     }
@@ -153,7 +154,7 @@ static bst_status read_file(bst_ctx *ctx, bst_image_file *f, float *pixels) {
     }
     if (status == BST_OK && !pixels) {
         status = bst_image_check_size(ctx, f, (uint64_t)r->width, (uint64_t)r->height,
-                                      (uint64_t)r->row_bytes);
+                                      (uint64_t)r->stored_bytes);
         f->width = r->width;
         f->height = r->height;
     }

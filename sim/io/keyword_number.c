@@ -24,10 +24,10 @@ const char *bst_keyword_name(bst_frame_source *source, const char *keywords,
 bst_status bst_keyword_wrong(const bst_keyword_reading *r, const char *keyword, const char *key,
                              const char *what) {
     char where[BST_FRAME_WHERE_TEXT], name[BST_KEYWORD_TEXT];
-    return bst_fail(r->ctx, BST_ERR_FORMAT, "%s: %s%s (%s of the map %s): %s",
+    return bst_fail(r->ctx, BST_ERR_FORMAT, "%s: %s%s (%s of the map%s%s): %s",
                     bst_frame_where(bst_frame_source_path(r->source), r->frame, where),
                     bst_frame_source_noun(r->source), bst_keyword_name(r->source, keyword, name),
-                    key, r->map ? r->map->name : "-", what);
+                    key, r->map ? " " : "", r->map ? r->map->name : "", what);
 }
 
 /* As bst_keyword_find; empty: an empty field counts. */

@@ -181,6 +181,11 @@ bst_status bst_keyword_map_read(bst_ctx *ctx, const bst_keyword_map *map, bst_fr
     double id;
     const bst_keyword_range ids = {"exposure_id", -1.0, 9e15};
     BST_TRY(bst_keyword_read_number(&r, &map->exposure_id, &ids, &id));
+    if (id != floor(id)) {
+        char what[80];
+        snprintf(what, sizeof what, "gives %.9g (allowed: a whole number)", id);
+        return bst_keyword_wrong(&r, map->exposure_id.keyword, ids.key, what);
+    }
     out->exposure_id = (int64_t)id;
     const bst_keyword_range places = {"observer_position_gcrf_m", -1e13, 1e13};
     const bst_keyword_range speeds = {"observer_velocity_gcrf_mps", -1e6, 1e6};

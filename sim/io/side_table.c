@@ -63,6 +63,12 @@ static bst_status read_names(bst_ctx *ctx, bst_side_table *t, const bst_text_lin
         t->columns = 0;
         return fail(ctx, t, line->number, what);
     }
+    if (t->columns == 1 && (memchr(fields[0].text, ';', fields[0].length) ||
+                            memchr(fields[0].text, '\t', fields[0].length))) {
+        t->columns = 0;
+        return fail(ctx, t, line->number,
+                    "has column names separated by semicolons or tabs (allowed: by commas)");
+    }
     for (int i = 0; i < t->columns; i++) {
         bst_text_span name = bst_text_trimmed(fields[i]);
         if (name.length >= NAME_ROOM) {
@@ -83,10 +89,10 @@ static bst_status read_names(bst_ctx *ctx, bst_side_table *t, const bst_text_lin
     t->file = find_column(t, columns->file);
     t->page = find_column(t, columns->page);
     if (t->file < 0) {
-        bool other = t->columns == 1 && strpbrk(t->names[0], ";\t") != NULL;
-        snprintf(what, sizeof what, "has no column with the files' names (allowed: %.200s%s)",
-                 columns->file,
-                 other ? "; columns separated by commas" : "; `file_column` of a keyword map");
+        snprintf(what, sizeof what,
+                 "has no column with the files' names (allowed: %.200s; `file_column` of a keyword "
+                 "map)",
+                 columns->file);
         return fail(ctx, t, line->number, what);
     }
     return BST_OK;

@@ -90,6 +90,18 @@ const bst_option bst_process_options[] = {
 };
 #undef Q
 
+/* Warns if no frame has an attitude: directions then say nothing of the sky. */
+static void warn_without_attitude(bst_ctx *ctx, const bst_process *p) {
+    for (int i = 0; i < p->count; i++) {
+        if (p->frames[i].solved || p->frames[i].has_header_attitude) {
+            return;
+        }
+    }
+    bst_log(ctx, BST_LOG_WARNING,
+            "no frame has an attitude, from its stars or by the map: all are taken to point at the "
+            "celestial north pole; look at pixel scale, --v-limit and --flip");
+}
+
 /* Says what the stars gave. */
 static void print_solved(const bst_process *p) {
     const bst_process_frame *first = NULL;
@@ -151,6 +163,7 @@ bst_status bst_process_frames(bst_ctx *ctx, const bst_process_request *request,
     }
     if (status == BST_OK) {
         print_solved(&p);
+        warn_without_attitude(ctx, &p);
         status = bst_process_write_input(ctx, &p);
     }
     if (status == BST_OK && !request->prepare) {

@@ -228,6 +228,15 @@ class Recorded(unittest.TestCase):
         self.assertIn("first row last", said)
         self.compare_wcs(out)
 
+    def test_frames_without_an_attitude_are_a_warning(self):
+        wrong = self.path("wrong.json")
+        with open(wrong, "w", encoding="utf-8") as file:
+            json.dump({"boresight_keyword_map": 1, "name": "wrong", "pixel_scale_arcsec": {"value": 12}}, file)
+        result = call("process", self.made, "--map", wrong, "--out", self.path("wrong"), "--prepare", *SOLVE)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("attitude from the stars in 0", result.stdout)
+        self.assertIn("no frame has an attitude", result.stderr)
+
     @unittest.skipUnless(os.path.exists(NEOSSAT), "BORESIGHT_NEOSSAT names no folder with the frame")
     def test_neossat(self):
         """The science frame: curved streaks of 228 px, whose ends and others' eyes gave."""

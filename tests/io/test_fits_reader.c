@@ -421,11 +421,25 @@ static void test_rice(void **state) {
     assert_int_equal(out[0], 32769);
 }
 
+/* 32-bit pixels of code 1, whose number of zeros the code does not limit: +2 as 0 0001 | 0000 1,
+ * and data that end before the one. */
+static void test_rice_of_32_bits(void **state) {
+    (void)state;
+    int32_t out[64];
+    const uint8_t whole[] = {0x00, 0x00, 0x00, 0x07, 0x08, 0x40};
+    assert_true(bst_fits_rice_decode_wide(whole, 6, 32, 4, out, 1));
+    assert_int_equal(out[0], 9);
+    uint8_t endless[40] = {0x00, 0x00, 0x00, 0x07, 0x08};
+    assert_false(bst_fits_rice_decode_wide(endless, 5, 32, 4, out, 1));
+    assert_false(bst_fits_rice_decode_wide(endless, sizeof endless, 32, 4, out, 64));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_whole),   cmocka_unit_test(test_cut_off),
         cmocka_unit_test(test_damaged), cmocka_unit_test(test_messages),
-        cmocka_unit_test(test_rice),    cmocka_unit_test(test_windows),
+        cmocka_unit_test(test_rice),    cmocka_unit_test(test_rice_of_32_bits),
+        cmocka_unit_test(test_windows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -52,6 +52,15 @@ static void test_png(void **state) {
     expect(&f, 0, 0, 2, 1, (const double[]){5, 15});
     write_png(&f, 2, 2, 8, 0, 0, "\2\1\2\2\3\4", 6); /* filter "up" */
     expect(&f, 0, 0, 2, 2, (const double[]){1, 2, 4, 6});
+    /* a black picture of 1 bit, 1024 bytes a row that unpack to 8192 values */
+    uint8_t black[64 * 1025] = {0};
+    write_png(&f, 8192, 64, 1, 0, 0, black, sizeof black);
+    int width, height;
+    bst_image_file *file;
+    bst_assert_ok(&f.ctx, bst_image_file_open(&f.ctx, f.path, BST_IMAGE_COLOUR_REFUSE, &file));
+    bst_assert_ok(&f.ctx, bst_image_file_select(&f.ctx, file, 0, &width, &height));
+    assert_int_equal(width, 8192);
+    bst_image_file_close(file);
     /* Adam7: the first pixel is of pass 1, the second one of pass 6 */
     write_png(&f, 2, 1, 8, 0, 1, "\0\7\0\x9", 4);
     expect(&f, 0, 0, 2, 1, (const double[]){7, 9});

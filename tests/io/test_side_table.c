@@ -6,7 +6,8 @@ static const char map_text[] =
     " \"exposure_s\": {\"keyword\": \"ms\", \"factor\": 0.001},"
     " \"gain_e_per_dn\": {\"keyword\": \"Gain\", \"value\": 3},"
     " \"pixel_scale_arcsec\": {\"value\": 5}, \"image_section\": \"part\","
-    " \"file_column\": \"path|file\", \"attitude\": \"direction\"}";
+    " \"file_column\": \"path|file\", \"attitude\": \"direction\","
+    " \"exposure_id\": {\"keyword\": \"id\", \"value\": -1}}";
 
 /* Writes text to a file of the scratch folder. */
 static void write_text(fixture *f, const char *name, const char *text) {
@@ -220,7 +221,7 @@ static void test_messages(void **state) {
          {"line 3: column ms (exposure_s of the map mine)", "no number"}},
         {HEAD "a.png,2024-08-26T17:45:45,-250,1,\n", {"line 2: column ms", "gives -0.25"}},
         {HEAD "a.png,2024-08-26T17:45:45,250,1,\"[1:4,1:2]\"\n",
-         {"line 2: column part (section of the map", "within 3 x 2"}},
+         {"line 2: column part (section of the map): ", "within 3 x 2"}},
         {HEAD "a.png,2024-08-26T17:45:45,250\n", {"line 2: has 3 fields", "has 5 columns"}},
         {HEAD "a.png,\"2024,250,1,\n", {"line 2: has an unclosed quote", "RFC 4180"}},
         {HEAD ",2024-08-26T17:45:45,250,1,\n", {"line 2: column path", "is empty"}},
@@ -233,7 +234,12 @@ static void test_messages(void **state) {
         {"path,page\ncube.tif,1\na.png,1\ncube.tif,1\n", {"line 4: column path", "in line 2, too"}},
         {"path,ms,MS\na.png,1,2\n", {"line 1: column MS", "twice, as columns 2 and 3"}},
         {"name,ms\na.png,1\n", {"line 1: has no column", "path|file"}},
-        {"path;ms\na.png;1\n", {"line 1: has no column", "separated by commas"}},
+        {"path;ms\na.png;1\n", {"line 1: has column names", "(allowed: by commas)"}},
+        {"path;time_utc;exposure_s;gain_e_per_dn;read_noise_e;offset_dn;pixel_scale_arcsec;ra_"
+         "deg\n",
+         {"line 1: has column names", "(allowed: by commas)"}},
+        {"path,WHEN,ms,id\na.png,2024-08-26T17:45:45,1,7.5\n",
+         {"line 2: column id (exposure_id of the map mine)", "gives 7.5 (allowed: a whole number"}},
         {HEAD, {"has no rows", "a row for each frame"}},
         {"path,WHEN,ms,ra,dec,roll\na.png,2024-08-26T17:45:45,1,x,0,0\n",
          {"line 2: column RA (ra_deg of the map mine)", "no number"}},
