@@ -57,7 +57,8 @@ typedef struct scene {
     bst_scene_source_path paths[MOST_SOURCES];
     int count;
     double background_e, tolerance_sigma;
-    double reference; /* tolerance of the reference image, over the peak of each star; 0: 1e-8 */
+    double reference; /* tolerance of the reference image, over the peak of each star; 0: by the
+                         test */
 } scene;
 
 /* Uniform in [low, high). */

@@ -35,6 +35,10 @@ static double largest_error(const scene *s, const float *fast, const double *ref
     return worst;
 }
 
+/* Precision of the reference image, over the peak of each star. 1e-8 is an error of up to 0.06
+ * sigma in scenes with the brightest stars and diffraction, of which the short form has none. */
+static double reference_part = 1e-8;
+
 typedef struct outcome {
     double measured, predicted;
     long long nodes;
@@ -56,9 +60,10 @@ static outcome render(fixture *f, scene *s) {
     float *fast = malloc(pixels * sizeof *fast);
     double *reference = calloc(pixels, sizeof *reference);
     bst_assert_ok(&f->ctx, bst_renderer_render_noise_free(&f->ctx, r, &q, fast));
-    bst_assert_ok(&f->ctx, bst_reference_render(
-                               &f->ctx, &s->camera, s->window, &s->track.track, s->sources,
-                               s->count, s->reference > 0.0 ? s->reference : 1e-8, reference));
+    bst_assert_ok(
+        &f->ctx,
+        bst_reference_render(&f->ctx, &s->camera, s->window, &s->track.track, s->sources, s->count,
+                             s->reference > 0.0 ? s->reference : reference_part, reference));
     bst_render_stats stats;
     bst_renderer_get_stats(r, &stats);
     outcome o = {.measured = largest_error(s, fast, reference),
@@ -297,6 +302,9 @@ int main(int argc, char **argv) {
         scenes = 2 * SCENES_OF_A_SEED;
         first_scene = 0;
         next++;
+    }
+    if (argc > 1) {
+        reference_part = 1e-9;
     }
     if (argc > next) {
         scenes = atoi(argv[next]);
