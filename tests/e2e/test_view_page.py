@@ -357,6 +357,58 @@ class Page(unittest.TestCase):
 
 
 @unittest.skipUnless(chromium.PROGRAM, "there is no chromium")
+class LongRun(unittest.TestCase):
+    # centre of the marks on the screen, from the pixels of the overlay weighted by opacity, with the true target's mark alone
+    MARK = """(() => {
+        const view = document.boresight.frameView, { overlay } = view;
+        for (const name of Object.keys(view.shown)) view.setShown(name, name === 'target');
+        view.details.wcs = null; // no compass
+        view.sorted.target[0].text = '';
+        view.drawOverlay();
+        const ratio = devicePixelRatio || 1, data = overlay.getContext('2d').getImageData(0, 0, overlay.width, overlay.height).data;
+        let sum = 0, x = 0, y = 0;
+        for (let j = 0; j < overlay.height; j++) for (let i = 0; i < overlay.width; i++) {
+            const a = data[4 * (j * overlay.width + i) + 3];
+            sum += a;
+            x += a * (i + 0.5);
+            y += a * (j + 0.5);
+        }
+        return [x / sum / ratio, y / sum / ratio, view.view.scale, view.stage.clientWidth, view.stage.clientHeight];
+    })()"""
+
+    def test_truth_at_frame_200(self):
+        """With the mouse on the slider and with keys: the mark that is drawn is where the table of the truth says."""
+        out = os.path.join(runs.scratch(), "long")
+        runs.run(runs.TRACK, out, duration=240)
+        database = runs.database(out)
+        rows = database.execute("SELECT x_mid_px, y_mid_px FROM truth WHERE kind = 'object' AND in_field = 1 AND exposure_id ="
+                                " (SELECT exposure_id FROM exposures ORDER BY start_tick LIMIT 1 OFFSET 200)").fetchall()
+        database.close()
+        viewer = test_view.Viewer(out)
+        with chromium.Chromium(1280, 720) as page:
+            page.command("Page.navigate", url=viewer.url + "#frame=0")
+            page.wait_for(SHOWN + " === 0")
+            count = page.evaluate("document.boresight.count")
+            left, top, width, height = page.evaluate("(() => { const box = document.getElementById('slider').getBoundingClientRect(); return [box.x, box.y, box.width, box.height]; })()")
+            for kind in ("mousePressed", "mouseReleased"):
+                page.command("Input.dispatchMouseEvent", type=kind, x=left + 8 + (width - 16) * 200 / (count - 1), y=top + height / 2, button="left", clickCount=1)
+            page.wait_for(f"{SHOWN} >= 190 && {SHOWN} <= 210")
+            for _ in range(20):
+                before = page.evaluate(SHOWN)
+                if before == 200:
+                    break
+                page.key("ArrowRight" if before < 200 else "ArrowLeft")
+                page.wait_for(f"{SHOWN} === {before + (1 if before < 200 else -1)}")
+            page.wait_for("document.boresight.frameView.sorted && document.boresight.frameView.sorted.target.length === 1")
+            at_x, at_y, scale, wide, high = page.evaluate(self.MARK)
+            self.assertEqual(len(rows), 1)
+            x, y = rows[0][0], rows[0][1]
+            self.assertAlmostEqual(at_x, wide / 2 + (x - 511.5) * scale, delta=0.5)
+            self.assertAlmostEqual(at_y, high / 2 + (y - 511.5) * scale, delta=0.5)
+            print(f"truth at frame 200: mark {at_x - wide / 2 - (x - 511.5) * scale:.3f}, {at_y - high / 2 - (y - 511.5) * scale:.3f} px of the screen from its place")
+        self.assertEqual(viewer.end()[0], 0)
+
+
 class LivePage(unittest.TestCase):
     def test_live(self):
         """Keys step and run it, the form changes it, the page shows the newest frame and then plays the run back."""
