@@ -338,17 +338,13 @@ static bst_status read_line(bst_ctx *ctx, bst_view_run *run, bst_io_rows *rows, 
     return bst_view_keep_line(ctx, status, run, &c, line);
 }
 
-static bst_status collect_factor(bst_ctx *ctx, void *user, double time_s, double factor) {
-    return bst_view_collect(ctx, user, time_s, factor);
-}
-
 /* Reads the speed of the run. */
 static bst_status read_factors(bst_ctx *ctx, bst_view_run *run, bst_view_line *line) {
     bst_view_samples c = {.samples = NULL};
     char path[4200];
     bst_status status = BST_OK;
     if (wall_clock_path(run, path, sizeof path)) {
-        status = bst_view_read_factors(ctx, path, collect_factor, &c);
+        status = bst_view_read_factors(ctx, path, &c);
     }
     return bst_view_keep_line(ctx, status, run, &c, line);
 }

@@ -1,45 +1,42 @@
 #include "view/real_time_factor.h"
 
-#include <fcntl.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
-#include <sys/stat.h>
 #include <unistd.h>
+
+#include "sim/core/file.h"
 
 /* Shortest wall time of a sample, s: shorter ones show the clock's grain. */
 static const double INTERVAL_S = 0.05;
 /* Lines that are read. */
 enum { LINES_MOST = 1000000 };
 
-/* Opens a regular file, whatever a folder of others has in its place. NULL: it is none. */
-static FILE *open_regular(const char *path) {
-    struct stat found;
-    const int file = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-    if (file < 0 || fstat(file, &found) != 0 || !S_ISREG(found.st_mode)) {
-        if (file >= 0) {
-            close(file);
-        }
+/* Opens the file. NULL: there is none, or something else in its place. */
+static FILE *open_clock(const char *path) {
+    bst_ctx ignored = {0};
+    uint64_t bytes;
+    int fd;
+    if (bst_file_open(&ignored, path, INT64_MAX, "a wall clock", &fd, &bytes) != BST_OK) {
         return NULL;
     }
-    FILE *stream = fdopen(file, "r");
-    if (!stream) {
-        close(file);
+    FILE *file = fdopen(fd, "r");
+    if (!file) {
+        close(fd);
     }
-    return stream;
+    return file;
 }
 
 bool bst_view_has_wall_clock(const char *path) {
-    FILE *file = open_regular(path);
+    FILE *file = open_clock(path);
     if (file) {
         fclose(file);
     }
     return file != NULL;
 }
 
-bst_status bst_view_read_factors(bst_ctx *ctx, const char *path, bst_view_take_factor take,
-                                 void *user) {
-    FILE *file = open_regular(path);
+bst_status bst_view_read_factors(bst_ctx *ctx, const char *path, bst_view_samples *out) {
+    FILE *file = open_clock(path);
     char line[128];
     double begin_s = NAN, begin_wall = NAN;
     bst_status status = BST_OK;
@@ -54,7 +51,7 @@ bst_status bst_view_read_factors(bst_ctx *ctx, const char *path, bst_view_take_f
             continue;
         }
         if (isfinite(begin_s)) {
-            status = take(ctx, user, time_s, (time_s - begin_s) / (wall_s - begin_wall));
+            status = bst_view_collect(ctx, out, time_s, (time_s - begin_s) / (wall_s - begin_wall));
         }
         begin_s = time_s;
         begin_wall = wall_s;
