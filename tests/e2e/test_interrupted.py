@@ -20,8 +20,8 @@ from astropy.io import fits
 import leftovers
 import runs
 
-KILLS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 9
-FULL = KILLS > 9
+KILLS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 6
+FULL = KILLS > 6
 signal.signal(signal.SIGHUP, signal.SIG_DFL)  # runs take it over: under nohup they would ignore it
 # a quarter of the pixels leaves the time of frames to be that of files
 SMALL = [] if FULL else [f"{runs.SENSOR}/camera/{side}_px=512" for side in ("width", "height")]
