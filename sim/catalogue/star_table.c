@@ -3,12 +3,12 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <unistd.h>
 
 #include "sim/catalogue/star_index.h"
 #include "sim/catalogue/star_table_internal.h"
 #include "sim/core/file.h"
+#include "sim/core/text.h"
 
 /* zero of the times of Gaia's tables of variable stars, barycentric Julian date */
 static const double GAIA_JD = 2455197.5;
@@ -139,12 +139,6 @@ static bst_status check_columns(bst_ctx *ctx, const bst_star_table *t) {
     return BST_OK;
 }
 
-/* True if a path ends with `end`, in any case. */
-static bool ends_with(const char *path, const char *end) {
-    size_t length = strlen(path), n = strlen(end);
-    return length > n && strcasecmp(path + length - n, end) == 0;
-}
-
 /* Opens a table by the first bytes of its file. */
 static bst_status open_kind(bst_ctx *ctx, bst_star_table *t) {
     int fd;
@@ -157,14 +151,14 @@ static bst_status open_kind(bst_ctx *ctx, bst_star_table *t) {
     close(fd);
     const char *text = (const char *)head;
     bool gzip = got > 2 && head[0] == 0x1F && head[1] == 0x8B;
-    if ((gzip && ends_with(t->path, ".fits.gz")) || strncmp(text, "SIMPLE  =", 9) == 0) {
+    if ((gzip && bst_text_ends_in(t->path, ".fits.gz")) || strncmp(text, "SIMPLE  =", 9) == 0) {
         return bst_star_fits_open(ctx, t);
     }
     if (strncmp(text, "<?xml", 5) == 0 || strstr(text, "<VOTABLE")) {
         return bst_star_votable_open(ctx, t, false);
     }
-    if (gzip && (ends_with(t->path, ".vot.gz") || ends_with(t->path, ".xml.gz") ||
-                 ends_with(t->path, ".votable.gz"))) {
+    if (gzip && (bst_text_ends_in(t->path, ".vot.gz") || bst_text_ends_in(t->path, ".xml.gz") ||
+                 bst_text_ends_in(t->path, ".votable.gz"))) {
         return bst_star_votable_open(ctx, t, true);
     }
     return bst_star_text_open(ctx, t, gzip);

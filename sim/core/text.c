@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 enum { LONGEST_WORD = 64, FARTHEST_SUGGESTION = 3 };
 
@@ -60,6 +61,11 @@ bool bst_text_is_file_name(const char *word) {
         }
     }
     return true;
+}
+
+bool bst_text_ends_in(const char *text, const char *ending) {
+    size_t length = strlen(text), n = strlen(ending);
+    return length > n && strcasecmp(text + length - n, ending) == 0;
 }
 
 void bst_text_of_number(double value, char *buffer, size_t bytes) {

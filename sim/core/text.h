@@ -37,6 +37,9 @@ void bst_text_of_number(double value, char *buffer, size_t bytes);
  * characters, not beginning with "." (which excludes "." and ".."). */
 bool bst_text_is_file_name(const char *word);
 
+/* True if a text ends in `ending`, in capitals or not, and is longer: "a.FITS" ends in ".fits". */
+bool bst_text_ends_in(const char *text, const char *ending);
+
 #ifdef __cplusplus
 }
 #endif

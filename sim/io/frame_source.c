@@ -6,8 +6,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <unistd.h>
+
+#include "sim/core/text.h"
 
 struct bst_frame_source {
     bst_frame_source_options options;
@@ -118,11 +119,6 @@ static bst_status find_pages(bst_ctx *ctx, bst_frame_source *s) {
     return status;
 }
 
-static bool ends_in(const char *path, const char *ending) {
-    size_t length = strlen(path), n = strlen(ending);
-    return length > n && strcasecmp(path + length - n, ending) == 0;
-}
-
 /* True if a file begins as a picture does. */
 static bool is_picture(const char *path) {
     char begins[8];
@@ -135,11 +131,12 @@ static bool is_picture(const char *path) {
 }
 
 static bst_status open_kind(bst_ctx *ctx, bst_frame_source *s) {
-    if (ends_in(s->path, ".csv")) {
+    if (bst_text_ends_in(s->path, ".csv")) {
         BST_TRY(bst_side_table_open(ctx, s->path, &s->options.columns, &s->table));
         return find_pages(ctx, s);
     }
-    bool named = ends_in(s->path, ".png") || ends_in(s->path, ".tif") || ends_in(s->path, ".tiff");
+    bool named = bst_text_ends_in(s->path, ".png") || bst_text_ends_in(s->path, ".tif") ||
+                 bst_text_ends_in(s->path, ".tiff");
     return named || is_picture(s->path)
                ? bst_image_file_open(ctx, s->path, s->options.colour, &s->image)
                : bst_fits_source_open(ctx, s->path, &s->fits);

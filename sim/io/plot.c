@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "sim/core/draft.h"
+#include "sim/core/text.h"
 
 extern char **environ;
 
@@ -26,13 +27,8 @@ static void put_quoted(FILE *script, const char *text) {
     fputc('\'', script);
 }
 
-static bool ends_in(const char *path, const char *suffix) {
-    size_t length = strlen(path), n = strlen(suffix);
-    return length > n && strcmp(path + length - n, suffix) == 0;
-}
-
 bst_status bst_plot_check_path(bst_ctx *ctx, const char *path) {
-    return !path || ends_in(path, ".png") || ends_in(path, ".svg")
+    return !path || bst_text_ends_in(path, ".png") || bst_text_ends_in(path, ".svg")
                ? BST_OK
                : bst_fail(
                      ctx, BST_ERR_ARGUMENT,
@@ -62,7 +58,7 @@ bst_status bst_plot_begin(bst_ctx *ctx, bst_plot *plot, const char *path, int wi
         return status;
     }
     close(fd); /* gnuplot overwrites the existing file */
-    if (ends_in(path, ".svg")) {
+    if (bst_text_ends_in(path, ".svg")) {
         fprintf(plot->script,
                 "set terminal svg size %d,%d font 'DejaVu Sans,11' background '#ffffff'\n", width,
                 height);

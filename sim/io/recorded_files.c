@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 
 #include "sim/core/file.h"
+#include "sim/core/text.h"
 #include "sim/io/recorded_files_internal.h"
 
 enum { MOST_FILES = 1 << 20, PATH_ROOM = 4096 };
@@ -49,10 +50,8 @@ static const char *const picture_names[] = {".png", ".tif", ".tiff", NULL};
 
 /* True if a name ends in one of some endings. */
 static bool ends_in(const char *name, const char *const *endings) {
-    size_t length = strlen(name);
     for (; *endings; endings++) {
-        size_t n = strlen(*endings);
-        if (length > n && strcasecmp(name + length - n, *endings) == 0) {
+        if (bst_text_ends_in(name, *endings)) {
             return name[0] != '.';
         }
     }

@@ -51,11 +51,22 @@ static void test_file_name(void **state) {
     assert_true(bst_text_is_file_name(name + 1));
 }
 
+static void test_ends_in(void **state) {
+    (void)state;
+    assert_true(bst_text_ends_in("a/frame.FITS", ".fits"));
+    assert_true(bst_text_ends_in("list.txt", ".txt"));
+    assert_false(bst_text_ends_in(".txt", ".txt"));
+    assert_false(bst_text_ends_in("txt", ".txt"));
+    assert_false(bst_text_ends_in("list.txt.gz", ".txt"));
+    assert_false(bst_text_ends_in("", ".txt"));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_distance),
         cmocka_unit_test(test_nearer),
         cmocka_unit_test(test_file_name),
+        cmocka_unit_test(test_ends_in),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
