@@ -260,7 +260,7 @@ class LivePage(unittest.TestCase):
             page.command("Page.navigate", url=viewer.url)
             page.wait_for(f"{app} && {app}.live && {app}.live.state && {app}.live.state.run === 0")
             page.key("n")
-            page.wait_for(f"{app}.live.trail.length > 0 && {app}.live.state.paused")
+            page.wait_for(f"{app}.live.trail.exposures.length > 0 && {app}.live.state.paused")
             page.evaluate(f"{app}.take = {app}.live.takeFrame, {app}.live.takeFrame = () => {{}}, document.getElementById('live-rate').value = '10', document.getElementById('live-rate').dispatchEvent(new Event('change'))")
             page.key("r")
             page.wait_for(f"{app}.live.state.time_s > 25")

@@ -17,6 +17,13 @@ export function originOf(side, centre, scale) {
   return scale >= 1 ? Math.round(origin) : origin;
 }
 
+/** Where the corner of the frame is on a canvas, and pixels of the canvas per pixel of the frame.
+ * @param {{x: number, y: number, scale: number}} view @param {{width: number, height: number}} canvas @param {number} n binning of the image @param {number} ratio pixels of the canvas per px of the page */
+export function placeOf(view, { width, height }, n, ratio) {
+  const scale = view.scale * ratio;
+  return { x: originOf(width, (view.x + 0.5) / n - 0.5, scale * n), y: originOf(height, (view.y + 0.5) / n - 0.5, scale * n), scale };
+}
+
 const VERTEX = `#version 300 es
 void main() { // one triangle over the whole canvas
   vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
@@ -197,10 +204,14 @@ function meanOf({ data, width }, ax, bx, ay, by) {
   return Math.round(sum / count);
 }
 
-class CanvasPainter {
-  constructor(canvas) {
+export class CanvasPainter {
+  /** @param {any} canvas @param {any} [context] its own one */
+  constructor(canvas, context = canvas.getContext('2d', { willReadFrequently: true })) { // in memory: it is filled from there
     this.canvas = canvas;
-    this.context = canvas.getContext('2d', { willReadFrequently: true }); // in memory: it is filled from there
+    this.context = context;
+    this.plain = true;
+    this.background = ''; // colour beside the image, where marks are drawn on the same canvas; '': nothing
+    this.filled = ''; // where the words have the image
     this.held = [null, null];
     this.out = null;
     this.greys = { key: '', colours: new Uint32Array(65536) };
@@ -212,8 +223,13 @@ class CanvasPainter {
   coloursOf(d) {
     const key = [d.black, d.white, d.soft, d.invert].join();
     if (this.greys.key !== key) {
+      const { colours } = this.greys, of = (value) => 0xff000000 | Math.round(255 * greyOf(value, d)) * 0x010101;
+      // all values below black, and all from white on, have the same colour
+      const low = Math.min(65536, Math.max(0, Math.ceil(d.black))), high = Math.min(65536, Math.max(low, Math.ceil(d.white)));
       this.greys.key = key;
-      for (let value = 0; value < 65536; value++) this.greys.colours[value] = 0xff000000 | Math.round(255 * greyOf(value, d)) * 0x010101;
+      colours.fill(of(d.black), 0, low);
+      for (let value = low; value < high; value++) colours[value] = of(value);
+      colours.fill(of(d.white), high);
     }
     return this.greys.colours;
   }
@@ -230,15 +246,26 @@ class CanvasPainter {
       this.out = this.context.createImageData(width, height);
       this.words = new Uint32Array(this.out.data.buffer);
     }
-    this.words.fill(0);
-    this.paint(image, d);
-    if (part) this.paint(part, partDrawing);
-    this.context.putImageData(this.out, 0, 0);
+    const span = spanOf(width, d.originX, d.scale, image.width), rows = rangesOf(height, d.originY, d.scale, image.height);
+    const top = rows.to.findIndex((to) => to > 0), bottom = rows.to.findLastIndex((to) => to > 0) + 1, where = [span.left, span.right, top, bottom].join();
+    const here = where === this.filled && !part;
+    if (!here) this.words.fill(0);
+    this.filled = part ? '' : where;
+    this.paint(image, d, span, rows);
+    if (part) this.paint(part, partDrawing, spanOf(width, partDrawing.originX, partDrawing.scale, part.width), rangesOf(height, partDrawing.originY, partDrawing.scale, part.height));
+    if (this.background && span.left < span.right && top >= 0) {
+      this.context.putImageData(this.out, 0, 0, span.left, top, span.right - span.left, bottom - top);
+      this.context.fillStyle = this.background;
+      for (const [x0, y0, x1, y1] of [[0, 0, width, top], [0, bottom, width, height], [0, top, span.left, bottom], [span.right, top, width, bottom]]) {
+        if (x1 > x0 && y1 > y0) this.context.fillRect(x0, y0, x1 - x0, y1 - y0);
+      }
+    } else if (here) this.context.putImageData(this.out, 0, 0, span.left, top, Math.max(0, span.right - span.left), bottom - top);
+    else this.context.putImageData(this.out, 0, 0);
   }
 
-  paint(image, d) {
-    const { width, height } = this.canvas, colours = this.coloursOf(d), span = spanOf(width, d.originX, d.scale, image.width), { from, to } = span;
-    const rows = rangesOf(height, d.originY, d.scale, image.height), few = 4 * span.several.length < span.right - span.left;
+  paint(image, d, span, rows) {
+    const { width, height } = this.canvas, colours = this.coloursOf(d), { from, to } = span;
+    const few = 4 * span.several.length < span.right - span.left;
     for (let y = 0; y < height && span.left < span.right; y++) {
       const ay = rows.from[y], by = rows.to[y], out = this.words.subarray(y * width, (y + 1) * width);
       if (by === 0) continue;

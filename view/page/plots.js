@@ -57,6 +57,8 @@ class Panel {
     head.append(title, ...this.values.map((v) => v.value), ...this.stopTexts(), gap, this.scaleButton);
     this.canvas = document.createElement('canvas');
     this.canvas.setAttribute('role', 'img');
+    this.inView = true;
+    this.late = false; // what is drawn is not of now
     this.box.append(head, this.canvas);
     plots.listen(this.canvas);
   }
@@ -99,6 +101,7 @@ class Panel {
   }
 
   draw() {
+    this.late = false;
     const { context, width, height } = prepare(this.canvas), style = getComputedStyle(document.documentElement);
     const colour = (name) => style.getPropertyValue(name).trim();
     const extent = this.extent(), bottom = height - BOTTOM, plots = this.plots;
@@ -184,6 +187,15 @@ export class Plots {
     /** @type {any[] | null} */
     this.bandsOf = null;
     this.reloading = Promise.resolve(); // the lines of the range that is shown
+    // while a run goes on, plots out of view are drawn when they come into view
+    this.seen = new IntersectionObserver((entries) => {
+      for (const { target, isIntersecting } of entries) {
+        const panel = this.panels.find(({ box }) => box === target);
+        if (!panel) continue;
+        panel.inView = isIntersecting;
+        if (isIntersecting && panel.late) { panel.draw(); panel.describe(); }
+      }
+    });
     this.listen(element('modes'));
     new ResizeObserver(() => this.resize()).observe(element('panels'));
     element('time-in').addEventListener('click', () => this.zoom(0.5));
@@ -198,6 +210,8 @@ export class Plots {
     this.events = events;
     this.all = { from, to: to > from ? to : from + 1 };
     this.panels = panels.map((info) => new Panel(this, info));
+    this.seen.disconnect();
+    for (const panel of this.panels) this.seen.observe(panel.box);
     element('panels').replaceChildren(...this.panels.map((panel) => panel.box));
     this.setRange(this.all.from, this.all.to);
   }
@@ -273,15 +287,16 @@ export class Plots {
     if (all) this.range = { from: this.range.from, to: this.all.to };
     if (performance.now() - this.followed < FOLLOW_MS) return;
     this.followed = performance.now();
-    element('range').textContent = `${shortNumber(this.range.from)} to ${shortNumber(this.range.to)} s`;
-    this.draw();
+    setText(element('range'), `${shortNumber(this.range.from)} to ${shortNumber(this.range.to)} s`);
+    this.draw(this.panels.filter((panel) => panel.inView));
+    for (const panel of this.panels) panel.late = !panel.inView;
   }
 
-  draw() {
+  draw(panels = this.panels) {
     this.measured = element('modes').clientWidth;
     this.drawModes();
-    for (const panel of this.panels) panel.draw();
-    for (const panel of this.panels) panel.describe(); // text last: a look at a canvas after it lays out the page
+    for (const panel of panels) panel.draw();
+    for (const panel of panels) panel.describe(); // text last: a look at a canvas after it lays out the page
   }
 
   // ---------------------------------------------------------------- what all panels have
