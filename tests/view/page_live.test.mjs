@@ -66,6 +66,12 @@ test('while a run goes on, pixels that the screen cannot show are binned; they a
   one.app.frameView.image = { binning: 1 };
   one.ask();
   assert.deepEqual(asked.map(({ binning, after }) => [binning, after]), [[2, 7], [1, 0], [1, 0], [1, 7]]);
+  one.state.paused = false;
+  const binnings = [true, false].map((plain) => [0.7, 0.6, 0.45, 0.38, 0.3].map((scale) => {
+    one.app.frameView = { view: { scale }, image: { binning: 1 }, made: { plain } };
+    return one.binning();
+  }));
+  assert.deepEqual(binnings, [[1, 2, 2, 3, 3], [1, 1, 2, 2, 3]]); // by the processor, by a graphics processor
 });
 
 test('rewound: nothing of the discarded future is kept', () => {

@@ -188,10 +188,40 @@ function spanOf(count, origin, scale, size) {
   return { left, right, from, to, several, gap };
 }
 
-/** A row of the picture: each pixel of the screen shows one of the image. */
-function pickRow(out, row, { left, right, from, gap }, colours) {
-  if (gap) for (let x = left; x < right; x++) out[x] = colours[row[from[x]]];
-  else for (let x = left, i = from[left]; x < right; x++, i++) out[x] = colours[row[i]];
+/** Pixels of the image along a side of one of the screen up to which all of them are in the mean. */
+const MEAN_MOST = 6;
+
+/** Rows of the picture whose pixels show one of the image each. One function with all loops: the browser compiles it well while the
+ * first picture is drawn, not after thousands of short calls. @param {Uint32Array} words @param {number} pitch words of a row */
+function pickRows(words, pitch, { data, width }, { left, right, from, gap }, rows, colours) {
+  for (let y = 0; y < rows.to.length; y++) {
+    if (rows.to[y] !== rows.from[y] + 1) continue;
+    const at = y * pitch, row = rows.from[y] * width, first = row + from[left] - left;
+    if (gap) for (let x = left; x < right; x++) words[at + x] = colours[data[row + from[x]]];
+    else for (let x = left; x < right; x++) words[at + x] = colours[data[first + x]];
+  }
+}
+
+/** Rows of the picture whose pixels show the mean of a few of the image: from sums up to each column. @param {Uint32Array} words @param {number} pitch words of a row */
+function meanRows(words, pitch, { data, width }, { left, right, from, to }, rows, colours) {
+  const sums = new Uint32Array(width + 1), first = from[left], end = to[right - 1];
+  for (let y = 0; y < rows.to.length; y++) {
+    const a = rows.from[y] * width, n = rows.to[y] - rows.from[y], b = a + width, at = y * pitch;
+    if (n <= 0) continue;
+    let sum = 0;
+    if (n === 1) for (let i = first; i < end; i++) { sum = (sum + data[a + i]) >>> 0; sums[i + 1] = sum; }
+    else if (n === 2) for (let i = first; i < end; i++) { sum = (sum + data[a + i] + data[b + i]) >>> 0; sums[i + 1] = sum; }
+    else {
+      for (let i = first; i < end; i++) {
+        for (let j = 0; j < n; j++) sum = (sum + data[a + j * width + i]) >>> 0;
+        sums[i + 1] = sum;
+      }
+    }
+    for (let x = left; x < right; x++) { // rounded; differences are right also where the sums wrap
+      const count = n * (to[x] - from[x]), part = (sums[to[x]] - sums[from[x]]) | 0;
+      words[at + x] = colours[((2 * part + count) / (2 * count)) | 0];
+    }
+  }
 }
 
 /** Mean of pixels of the image below one of the screen, of at most some 4 x 4 of them. */
@@ -266,14 +296,18 @@ export class CanvasPainter {
   paint(image, d, span, rows) {
     const { width, height } = this.canvas, colours = this.coloursOf(d), { from, to } = span;
     const few = 4 * span.several.length < span.right - span.left;
+    if (few && span.left < span.right) pickRows(this.words, width, image, span, rows, colours);
+    if (!few && 1 / d.scale < MEAN_MOST) {
+      meanRows(this.words, width, image, span, rows, colours);
+      return;
+    }
     for (let y = 0; y < height && span.left < span.right; y++) {
-      const ay = rows.from[y], by = rows.to[y], out = this.words.subarray(y * width, (y + 1) * width);
+      const ay = rows.from[y], by = rows.to[y], at = y * width;
       if (by === 0) continue;
       if (by === ay + 1 && few) {
-        pickRow(out, image.data.subarray(ay * image.width, by * image.width), span, colours);
-        for (const x of span.several) out[x] = colours[meanOf(image, from[x], to[x], ay, by)];
+        for (const x of span.several) this.words[at + x] = colours[meanOf(image, from[x], to[x], ay, by)];
       } else {
-        for (let x = span.left; x < span.right; x++) out[x] = colours[meanOf(image, from[x], to[x], ay, by)];
+        for (let x = span.left; x < span.right; x++) this.words[at + x] = colours[meanOf(image, from[x], to[x], ay, by)];
       }
     }
   }

@@ -75,11 +75,13 @@ export class Live {
     return Math.max(1, Math.ceil(side / WHOLE_PX));
   }
 
-  /** Pixels of a frame along one pixel of the screen while it runs; 1: each can be seen, or looked at. */
+  /** Pixels of a frame along one pixel of the screen while it runs; 1: each can be seen, or looked at. Where the processor draws, the
+   * picture has up to a third fewer pixels along a side than the screen, rather than more: it is the run's processor. */
   binning() {
     const { frameView } = this.app;
     if (!frameView || !this.state || this.state.paused || this.state.steps > 0) return this.least();
-    return Math.max(1, Math.floor(1.02 / (frameView.view.scale * (devicePixelRatio || 1))));
+    const pixels = 1 / (frameView.view.scale * (devicePixelRatio || 1));
+    return Math.max(1, frameView.made && frameView.made.plain ? Math.round(pixels) : Math.floor(1.02 * pixels));
   }
 
   /** The part of a frame that is too large to be sent whole; null: it is not too large. */
