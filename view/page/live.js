@@ -5,7 +5,7 @@ import { shortNumber } from './chart.js';
 import { binningAt, covers, partFor, WHOLE_PX } from './frame_parts.js';
 import { imageOf, readAnswer, Trail } from './live_answer.js';
 import { LivePicture } from './live_picture.js';
-import { setText } from './text.js';
+import { setProperty, setText } from './text.js';
 
 /** Rates that are offered, times real time; 0: flat out. */
 const RATES = [0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 0];
@@ -171,7 +171,7 @@ export class Live {
     const { app } = this, sensor = app.run && app.run.sensors[app.sensor], before = [...this.trail.exposures], { earlier, again } = this.trail.add(details);
     this.missed = -1;
     if (!sensor || !this.newest) return false;
-    const elsewhere = Boolean(data && this.running() && !this.part() && !document.hidden && this.picture.suits(pixels));
+    const elsewhere = Boolean(data && app.panels.frameShown && this.running() && !this.part() && !document.hidden && this.picture.suits(pixels));
     if (!elsewhere) this.picture.hide();
     if (due || !elsewhere) this.keepFrame(details, elsewhere ? { ...pixels, data: pixels.data.slice() } : pixels, earlier);
     if (elsewhere) this.picture.show(data, before, () => this.ask());
@@ -271,8 +271,8 @@ export class Live {
         state.ended ? 'complete' : state.paused ? 'paused' : !state.steered ? 'running' : `${state.speed.toFixed(1)} × real time`}`);
     }
     setText(element('live-run'), this.running() ? 'Pause' : 'Run');
-    for (const id of ['live-run', 'live-step', 'live-rate', 'live-save', 'live-rewind', 'live-change', 'live-end']) element(id).disabled = !steers;
-    element('live-branch').disabled = !this.controller;
+    for (const id of ['live-run', 'live-step', 'live-rate', 'live-save', 'live-rewind', 'live-change', 'live-end']) setProperty(element(id), 'disabled', !steers);
+    setProperty(element('live-branch'), 'disabled', !this.controller);
     const refusal = performance.now() < this.refusal.until ? this.refusal.text : '';
     this.say(refusal || problem || state.message || (this.controller || !state.steered ? '' : 'Another page controls this run.'));
     setText(element('change-problem'), refusal || problem || state.message);

@@ -20,8 +20,8 @@ export class LivePicture {
 
   /** True if pictures can be drawn by the worker: whole ones without values, where no graphics processor draws them. @param {any} image */
   suits(image) {
-    const { made, view, clean } = this.frameView, { stage } = this.frameView;
-    return Boolean(!this.failed && image && made && made.plain && !clean && !(view.scale * image.binning >= 6) && stage.offsetParent);
+    const { made, view, clean } = this.frameView;
+    return Boolean(!this.failed && image && made && made.plain && !clean && !(view.scale * image.binning >= 6));
   }
 
   start() {

@@ -162,7 +162,7 @@ class Panel {
 /** Requests for plots at a time: three may wait for the truth, which is read once for them. */
 const REQUESTS = 4;
 /** Least time between two drawings of the plots of a live run, ms: they take longer than its frames. */
-const FOLLOW_MS = 1000;
+const FOLLOW_MS = 2000;
 
 export class Plots {
   /** @param {(time: number) => void} seek goes to the frame of a time */
