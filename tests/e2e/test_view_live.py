@@ -351,7 +351,7 @@ class Figures(unittest.TestCase):
         """Simulated seconds a second, processor time of the program for each, ms; with a page: frames shown a second and
         processor time of the browser for each, ms."""
         def look():
-            shown = page.evaluate("document.boresight.live.shown") if page else 0
+            shown = page.evaluate("document.boresight.live.picture.count()") if page else 0
             return self.state()["time_s"], time.monotonic(), processor_s(self.viewer.process), shown, processor_s(page.process) if page else 0
         before = look()
         time.sleep(self.SECONDS)

@@ -32,7 +32,7 @@ export class Live {
     this.sequence = 0;
     this.newest = true; // the page shows the newest frame
     this.trail = new Trail();
-    this.picture = new LivePicture(app.frameView);
+    this.picture = new LivePicture(this, app.frameView);
     this.missed = -1; // exposure that was shown from the record
     this.askedNames = 0; // when names of objects were asked for
     this.queue = []; // commands that wait until the one before is obeyed
@@ -59,10 +59,10 @@ export class Live {
   connect() {
     const address = new URL('live', location.href);
     address.protocol = 'ws:';
-    this.socket = new WebSocket(address);
+    this.socket = this.picture.connect(address);
     this.socket.binaryType = 'arraybuffer';
     this.socket.addEventListener('open', () => { this.sentAt = -1; this.ask(); });
-    this.socket.addEventListener('message', (event) => this.take(event.data));
+    this.socket.addEventListener('message', (/** @type {any} */ event) => this.take(event.data));
     this.socket.addEventListener('close', () => {
       if (this.state && !this.state.ended) this.say('The run cannot be reached. Is "boresight view" still running?');
       setTimeout(() => this.connect(), RETRY_MS);
@@ -98,12 +98,18 @@ export class Live {
     return part ? !covers(image, frameView.box(), frameView.frameSize(), part.binning) : image.binning > binning;
   }
 
-  /** One request, which gets one answer. */
-  ask() {
+  /** What is asked for now. */
+  wanted() {
     const part = this.part(), binning = part ? part.binning : this.binning();
     // pixels that were binned, or left out, are asked for again when they can be seen
     const asked = { sensor: this.app.sensor, after: this.lacks(binning, part) ? 0 : this.sequence, take: true, binning };
     if (part) asked.part = { x: part.x, y: part.y, width: part.width, height: part.height };
+    return asked;
+  }
+
+  /** One request, which gets one answer. */
+  ask() {
+    const asked = this.wanted();
     const next = this.state && this.state.obeyed === this.sentAt ? undefined : this.queue[0];
     if (next) asked.command = next;
     if (this.socket.readyState !== WebSocket.OPEN) return; // the next connection asks
@@ -129,6 +135,7 @@ export class Live {
     } else {
       this.refusal.until = 0;
       this.queue.push(...commands);
+      if (this.picture) this.picture.stop();
     }
     return !why;
   }
@@ -174,7 +181,8 @@ export class Live {
     const elsewhere = Boolean(data && app.panels.frameShown && this.running() && !this.part() && !document.hidden && this.picture.suits(pixels));
     if (!elsewhere) this.picture.hide();
     if (due || !elsewhere) this.keepFrame(details, elsewhere ? { ...pixels, data: pixels.data.slice() } : pixels, earlier);
-    if (elsewhere) this.picture.show(data, before, () => this.ask());
+    if (elsewhere) this.picture.show(data, { asked: this.wanted(), trail: before, time: TEXT_MS });
+    if (elsewhere && this.queue.length > 0) this.picture.stop();
     app.plots.follow(details.time_s);
     if (!again) this.shown++;
     document.dispatchEvent(new CustomEvent('liveframe', { detail: details.exposure_id }));
