@@ -336,6 +336,71 @@ def processor_s(process):
 
 
 @unittest.skipUnless(FULL and chromium.PROGRAM, "with --full, and a chromium")
+class Drawn(unittest.TestCase):
+    """While a run goes on, a worker draws; when it pauses, is zoomed, or an older frame is shown, the page does."""
+    # share of the stage that has grey pixels of the frame, and pixels in the colours of marks: of both canvases of the page, and the worker's
+    LOOK = """(() => {
+        const colours = (id) => {
+            const from = document.getElementById(id), copy = document.createElement('canvas');
+            if (from.hidden || !from.width) return [0, 0];
+            [copy.width, copy.height] = [from.width, from.height];
+            const context = copy.getContext('2d');
+            context.drawImage(from, 0, 0);
+            const { data } = context.getImageData(0, 0, copy.width, copy.height);
+            let grey = 0, marks = 0;
+            for (let k = 0; k < data.length; k += 4) {
+                if (data[k] === data[k + 1] && data[k] === data[k + 2] && data[k + 3] === 255 && data[k] > 0) grey++;
+                else if (data[k + 3] > 0 && Math.max(data[k], data[k + 1], data[k + 2]) - Math.min(data[k], data[k + 1], data[k + 2]) > 60) marks++;
+            }
+            return [grey / (copy.width * copy.height), marks];
+        };
+        return { worker: colours('live-image'), page: [colours('image')[0], colours('overlay')[1]], shown: document.getElementById('stage').classList.contains('live-shown') };
+    })()"""
+    LIVE = "document.boresight.live"
+
+    def test_drawn(self):
+        viewer = test_view.Viewer(runs.TRACK, "--out", os.path.join(runs.scratch(), "run"), "--duration", "6000", *SETS)
+        with chromium.Chromium(1280, 720) as page:
+            page.command("Page.navigate", url=viewer.url)
+            page.wait_for(f"document.boresight && document.boresight.run && {self.LIVE} && {self.LIVE}.state.run === 0")
+            page.evaluate(f"{self.LIVE}.command({{ do: 'run', rate: 0 }})")
+            page.wait_for(f"{self.LIVE}.state.time_s > 25 && document.getElementById('stage').classList.contains('live-shown')")
+            before = page.evaluate(f"{self.LIVE}.picture.count()")
+            page.wait_for(f"{self.LIVE}.shown > {before} + 10")
+            seen = page.evaluate(self.LOOK)
+            self.assertTrue(seen["shown"])
+            self.assertGreater(seen["worker"][0], 0.2)
+            self.assertGreater(seen["worker"][1], 100)
+            # a pause: the page has the newest frame with all its pixels
+            page.evaluate(f"{self.LIVE}.command({{ do: 'pause' }})")
+            page.wait_for(f"{self.LIVE}.state.paused && document.boresight.frameView.image.binning === 1 && {self.LIVE}.shownExposure() === document.boresight.frameView.details.exposure_id")
+            page.wait_for("!document.getElementById('stage').classList.contains('live-shown')")
+            seen = page.evaluate(self.LOOK)
+            self.assertEqual(seen["worker"], [0, 0])
+            self.assertGreater(seen["page"][0], 0.2)
+            self.assertGreater(seen["page"][1], 100)
+            # a frame from before while it goes on, and the newest one again
+            page.evaluate(f"{self.LIVE}.command({{ do: 'run', rate: 20 }})")
+            page.wait_for("document.getElementById('stage').classList.contains('live-shown')")
+            page.wait_for("document.boresight.count > 5")
+            page.key("Home")
+            page.wait_for("document.boresight.current === 0 && !document.getElementById('stage').classList.contains('live-shown')")
+            page.evaluate("document.getElementById('live-newest').click()")
+            page.wait_for("document.getElementById('stage').classList.contains('live-shown')")
+            # zoomed: the page draws, with all pixels
+            page.evaluate("document.boresight.frameView.zoomTo(8)")
+            page.wait_for("!document.getElementById('stage').classList.contains('live-shown') && document.boresight.frameView.image.binning === 1")
+            page.evaluate("document.boresight.frameView.fit()")
+            page.wait_for("document.getElementById('stage').classList.contains('live-shown')")
+            # commands are obeyed while the worker goes on
+            obeyed = page.evaluate(f"{self.LIVE}.state.obeyed")
+            page.evaluate(f"{self.LIVE}.command({{ do: 'save' }}, {{ do: 'save' }}, {{ do: 'pause' }})")
+            page.wait_for(f"{self.LIVE}.state.obeyed === {obeyed + 3} && {self.LIVE}.state.paused")
+            self.assertEqual(page.messages, [])
+        viewer.end()
+
+
+@unittest.skipUnless(FULL and chromium.PROGRAM, "with --full, and a chromium")
 class Figures(unittest.TestCase):
     """What a page that watches the main scenario flat out costs. The figures are printed (`ctest -V`), with those that were
     asked for; only what no other load of the machine can change is checked."""
