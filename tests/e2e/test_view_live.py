@@ -404,7 +404,7 @@ class Drawn(unittest.TestCase):
 class Figures(unittest.TestCase):
     """What a page that watches the main scenario flat out costs. The figures are printed (`ctest -V`), with those that were
     asked for; only what no other load of the machine can change is checked."""
-    SECONDS, TURNS = 8, 3
+    SECONDS, TURNS = 6, 5
 
     def state(self):
         self.steering.send(b"{}")
@@ -435,7 +435,7 @@ class Figures(unittest.TestCase):
             for _ in range(self.TURNS):
                 alone.append(self.phase())
                 page.command("Page.navigate", url=self.viewer.url)
-                page.wait_for("document.boresight && document.boresight.live && document.boresight.live.shown > 5")
+                page.wait_for("document.boresight && document.boresight.live && document.boresight.live.shown > 30")
                 watched.append(self.phase(page))
                 page.command("Page.navigate", url="about:blank")
                 time.sleep(1.5)  # a sensor counts as watched for a second
@@ -443,9 +443,10 @@ class Figures(unittest.TestCase):
         self.steering.close()
         self.viewer.process.kill()
         (speed, cost, _, _), (slower, dearer, shown, browser) = (numpy.median(rows, axis=0) for rows in (alone, watched))
+        kept = numpy.median([there[0] / without[0] for there, without in zip(watched, alone)])  # of neighbours: other load changes slowly
         print(f"\nlive main scenario, {self.TURNS} x {self.SECONDS} s in turns, medians, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}:"
               f"\n  frames shown         {shown:.1f} a second (asked: 15 or more), {browser:.1f} ms of the browser each"
-              f"\n  simulated seconds    {speed:.1f} a second alone, {slower:.1f} watched: {100 * (1 - slower / speed):.1f} % slower (asked: 10 % or less)"
+              f"\n  simulated seconds    {speed:.1f} a second alone, {slower:.1f} watched: {100 * (1 - kept):.1f} % slower (asked: 10 % or less)"
               f"\n  processor time       {cost:.1f} ms a simulated second alone, {dearer:.1f} watched: {100 * (dearer / cost - 1):.1f} % more", flush=True)
         self.assertGreater(shown, 1)
         self.assertLess(dearer, 1.5 * cost)
@@ -460,12 +461,12 @@ class Figures(unittest.TestCase):
             after = resource.getrusage(resource.RUSAGE_CHILDREN)
             return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         costs = {(words, duration): [] for duration in (2, 152) for words in ((), ("--view",))}
-        for _ in range(2 * self.TURNS):
+        for _ in range(6):
             for (words, duration), times in costs.items():
                 times.append(cost(duration, *words))
         start, viewed_start, alone, viewed = (min(costs[key]) for key in (((), 2), (("--view",), 2), ((), 152), (("--view",), 152)))
         slope = (viewed - viewed_start) / (alone - start) - 1
-        print(f"\nmain scenario, {2 * self.TURNS} runs each in turns, least processor time: of 150 s after the first 2 s, run {alone - start:.2f} s, run --view "
+        print(f"\nmain scenario, 6 runs each in turns, least processor time: of 150 s after the first 2 s, run {alone - start:.2f} s, run --view "
               f"with nobody watching {viewed - viewed_start:.2f} s: {100 * slope:.1f} % more (asked: 0 %); start of the server {1e3 * (viewed_start - start):.0f} ms", flush=True)
         self.assertLess(viewed, 1.25 * alone)
 

@@ -12,6 +12,7 @@ class WorkerSocket extends EventTarget {
   constructor(worker) {
     super();
     this.worker = worker;
+    /** @type {number} */
     this.readyState = WebSocket.CONNECTING;
     this.binaryType = 'arraybuffer';
   }
