@@ -38,6 +38,7 @@ typedef struct feed_sensor {
     bool due;         /* it is shown */
     waiting_exposure waiting[WAITING];
     int64_t sequence;           /* of `ready`; 0: none yet */
+    int64_t sent;               /* newest that a client has got */
     bst_view_live_frame *ready; /* NULL: none */
 } feed_sensor;
 
@@ -156,7 +157,8 @@ static bool is_due(const bst_view_feed *feed, feed_sensor *s, int64_t id) {
         const double now = bst_wall_seconds();
         s->asked_id = id;
         bst_view_pace_adapt(&s->pace, now, bst_view_read_processors);
-        s->due = bst_view_pace_take(&s->pace, now);
+        /* none in the place of one that nobody has got yet: it would be lost */
+        s->due = s->sent >= s->sequence && bst_view_pace_take(&s->pace, now);
     }
     return feed->every || (s->due && id == s->asked_id);
 }
@@ -336,12 +338,14 @@ const bst_view_live_frame *bst_view_feed_get(bst_view_feed *feed, int64_t sensor
     feed_sensor *s = &feed->sensor[sensor];
     __atomic_store_n(&feed->watched, true, __ATOMIC_RELAXED);
     const int64_t wakes = feed->wakes;
+    s->sent = after > s->sent ? after : s->sent;
     s->watched_until = bst_wall_seconds() + WATCHED_S;
     while (s->sequence <= after && feed->wakes == wakes &&
            pthread_cond_timedwait(&feed->changed, &feed->lock, &until) == 0) {
     }
     if (s->ready && s->sequence > after) {
         found = s->ready;
+        s->sent = s->sequence;
         __atomic_add_fetch(&found->holders, 1, __ATOMIC_RELAXED);
     }
     pthread_mutex_unlock(&feed->lock);

@@ -6,8 +6,8 @@
 /* Time between two looks at the processors, s. */
 static const double LOOK_S = 1.0;
 /* Shares of idle time above and below which there are more and fewer pictures. A picture of the
- * main scenario costs 19 ms in a browser without a graphics processor (docs/results/view.md): a
- * step from 18 to 22 a second costs 4 % of two processors, one from 40 to 50 costs 10 %, which is
+ * main scenario costs some 15 ms in a browser without a graphics processor (docs/results/view.md):
+ * a step from 16 to 20 a second costs 3 % of two processors, one from 40 to 50 costs 8 %, less than
  * the distance of the shares. So a step does not cause the step back. */
 static const double IDLE_SHARE = 0.35;
 static const double BUSY_SHARE = 0.25;
@@ -20,9 +20,9 @@ bool bst_view_pace_take(bst_view_pace *pace, double now_s) {
         return false;
     }
     const double interval_s = 1.0 / fmax(pace->pictures_hz, BST_VIEW_PICTURES_LEAST);
-    /* counted from when it was due: frames come some time later; one that was missed is not made
-     * up for */
-    pace->due_s = fmax(pace->due_s + interval_s, now_s);
+    /* counted from when it was due: frames come some time later. One that was late is made up for,
+     * those of a gap are not */
+    pace->due_s = fmax(pace->due_s + interval_s, now_s - interval_s);
     return true;
 }
 

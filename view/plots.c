@@ -17,7 +17,7 @@
 /* A panel of plots with a common axis. */
 static const struct {
     const char *name, *title, *unit;
-} panels[] = {
+} panels[BST_VIEW_PANELS] = {
     {"pointing_error", "Pointing error", "px"},
     {"snr", "SNR of the target", ""},
     {"track_error", "Track error", "arcsec"},
@@ -33,7 +33,6 @@ static const struct {
     {"wheels", "Reaction wheels", "rpm"},
     {"real_time_factor", "Real-time factor", ""},
 };
-enum { PANELS = sizeof panels / sizeof *panels };
 
 /* How the value of a line follows from the columns behind its time. */
 typedef enum value_kind {
@@ -165,8 +164,8 @@ static bool wall_clock_path(const bst_view_run *run, char *path, size_t bytes) {
     return bst_run_reader_file(&ignored, run->reader, "wall_clock.csv", path, bytes) == BST_OK;
 }
 
-/* True if the table of a line has rows of the sensor that make its panel worth showing. */
-static bool is_recorded(const bst_view_run *run, const bst_view_sensor *s, int line) {
+/* Looks whether the table of a line has rows of the sensor that make its panel worth showing. */
+static bool find_recorded(const bst_view_run *run, const bst_view_sensor *s, int line) {
     char sql[160], path[4200];
     const char *only = lines[line].only;
     if (lines[line].kind == VALUE_REAL_TIME) {
@@ -178,8 +177,17 @@ static bool is_recorded(const bst_view_run *run, const bst_view_sensor *s, int l
            bst_run_reader_int(run->reader, sql, s->sensor.index, 0) == 1;
 }
 
+/* True if the table of a line has rows of the sensor that make its panel worth showing. A look may
+ * read the whole table, so it is made once, if no process writes the run. */
+static bool is_recorded(const bst_view_run *run, bst_view_sensor *s, int line) {
+    if (s->recorded[line] == 0 || run->running) {
+        s->recorded[line] = find_recorded(run, s, line) ? 1 : -1;
+    }
+    return s->recorded[line] > 0;
+}
+
 /* True if a line is in its panel, where that is shown. */
-static bool is_in_panel(const bst_view_run *run, const bst_view_sensor *s, int line) {
+static bool is_in_panel(const bst_view_run *run, bst_view_sensor *s, int line) {
     return lines[line].panel != WHEELS_PANEL || is_recorded(run, s, line);
 }
 
@@ -249,8 +257,8 @@ static void add_stops(const bst_view_run *run, const bst_view_sensor *s, cJSON *
     }
 }
 
-void bst_view_add_panels(const bst_view_run *run, const bst_view_sensor *s, cJSON *out) {
-    for (int k = 0; k < PANELS; k++) {
+void bst_view_add_panels(const bst_view_run *run, bst_view_sensor *s, cJSON *out) {
+    for (int k = 0; k < BST_VIEW_PANELS; k++) {
         cJSON *names = cJSON_CreateArray();
         bool any = false;
         for (int i = 0; i < BST_VIEW_LINES; i++) {
@@ -443,10 +451,10 @@ static bst_status plot_panel(bst_ctx *ctx, bst_view_run *run, const bst_view_plo
     bst_view_sensor *s;
     int panel = 0;
     BST_TRY(bst_view_find_sensor(ctx, run, plot->sensor, &s));
-    while (panel < PANELS && strcmp(panels[panel].name, plot->panel) != 0) {
+    while (panel < BST_VIEW_PANELS && strcmp(panels[panel].name, plot->panel) != 0) {
         panel++;
     }
-    if (panel == PANELS) {
+    if (panel == BST_VIEW_PANELS) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "there is no panel \"%s\"", plot->panel);
     }
     if (!(plot->from_s < plot->to_s) || plot->columns < 1 || plot->columns > BST_VIEW_COLUMNS) {
@@ -463,9 +471,66 @@ static bst_status plot_panel(bst_ctx *ctx, bst_view_run *run, const bst_view_plo
     return BST_OK;
 }
 
+bst_status bst_view_read_panel(bst_ctx *ctx, bst_view_run *run, int sensor, int panel) {
+    bst_status status = bst_view_lock(ctx, run);
+    for (int i = 0; status == BST_OK && sensor < run->sensors && i < BST_VIEW_LINES; i++) {
+        bst_view_sensor *s = &run->sensor[sensor];
+        if (lines[i].panel == panel && is_in_panel(run, s, i)) {
+            status = need_line(ctx, run, s, i);
+        }
+    }
+    bst_view_unlock(run);
+    return status;
+}
+
+void bst_view_take_lines(bst_view_run *run, bst_view_run *from, int sensor, int panel) {
+    pthread_mutex_lock(&run->lock);
+    for (int i = 0; sensor < run->sensors && sensor < from->sensors && i < BST_VIEW_LINES; i++) {
+        bst_view_line *line = &run->sensor[sensor].lines[i],
+                      *other = &from->sensor[sensor].lines[i];
+        if (lines[i].panel == panel && other->samples && !line->samples) {
+            *line = *other;
+            line->used = ++run->requests;
+            run->samples += line->count;
+            from->samples -= line->count;
+            *other = (bst_view_line){.samples = NULL};
+        }
+    }
+    pthread_mutex_unlock(&run->lock);
+}
+
+void bst_view_begin_wait(bst_view_run *run, int first, int end) {
+    pthread_mutex_lock(&run->ahead_lock);
+    for (int panel = first; panel < end; panel++) {
+        run->ahead[panel] = true;
+    }
+    pthread_mutex_unlock(&run->ahead_lock);
+}
+
+void bst_view_end_wait(bst_view_run *run, int panel) {
+    pthread_mutex_lock(&run->ahead_lock);
+    run->ahead[panel] = false;
+    pthread_cond_broadcast(&run->ahead_changed);
+    pthread_mutex_unlock(&run->ahead_lock);
+}
+
+/* Waits while a panel is being read ahead. */
+static void wait_ahead(bst_view_run *run, const bst_view_plot *plot) {
+    int panel = 0;
+    while (panel < BST_VIEW_PANELS && strcmp(panels[panel].name, plot->panel) != 0) {
+        panel++;
+    }
+    pthread_mutex_lock(&run->ahead_lock);
+    while (plot->sensor == 0 && panel < BST_VIEW_PANELS && run->ahead[panel]) {
+        pthread_cond_wait(&run->ahead_changed, &run->ahead_lock);
+    }
+    pthread_mutex_unlock(&run->ahead_lock);
+}
+
 bst_status bst_view_run_plot(bst_ctx *ctx, bst_view_run *run, const bst_view_plot *plot,
                              bst_view_bytes *out) {
     *out = (bst_view_bytes){.data = NULL};
+    wait_ahead(run, plot);
     bst_status status = bst_view_lock(ctx, run);
     status = status == BST_OK ? plot_panel(ctx, run, plot, out) : status;
     bst_view_unlock(run);

@@ -153,7 +153,9 @@ void bst_view_unlock(bst_view_run *run) {
 bst_status bst_view_run_open(bst_ctx *ctx, const char *path, bst_view_run **out) {
     bst_view_run *run = calloc(1, sizeof *run);
     *out = NULL;
-    if (!run || pthread_mutex_init(&run->lock, NULL) != 0) {
+    if (!run || pthread_mutex_init(&run->lock, NULL) != 0 ||
+        pthread_mutex_init(&run->ahead_lock, NULL) != 0 ||
+        pthread_cond_init(&run->ahead_changed, NULL) != 0) {
         free(run);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the run");
     }
@@ -216,6 +218,8 @@ void bst_view_run_close(bst_view_run *run) {
         forget_sensors(run);
         bst_run_reader_close(run->reader);
         close_scene(run);
+        pthread_cond_destroy(&run->ahead_changed);
+        pthread_mutex_destroy(&run->ahead_lock);
         pthread_mutex_destroy(&run->lock);
         free(run);
     }

@@ -12,8 +12,8 @@
 #include "sim/run/run_sensors.h"
 #include "view/recorded_run.h"
 
-/* Lines of all panels of a sensor. */
-enum { BST_VIEW_LINES = 34 };
+/* Lines of all panels of a sensor, and panels. */
+enum { BST_VIEW_LINES = 34, BST_VIEW_PANELS = 14 };
 
 /* An exposure of a sensor. */
 typedef struct bst_view_exposure {
@@ -41,6 +41,8 @@ typedef struct bst_view_sensor {
     bst_fits_source *header; /* NULL: not open */
     bool listed, no_header;  /* no_header: the headers cannot be read */
     bst_view_line lines[BST_VIEW_LINES];
+    signed char recorded[BST_VIEW_LINES]; /* 1: the line is worth showing; -1: it is not; 0: unknown
+                                           */
 } bst_view_sensor;
 
 struct bst_view_run {
@@ -57,6 +59,10 @@ struct bst_view_run {
     size_t samples;                         /* held by all lines */
     bst_run_scene *scene;                   /* its world; NULL: not made (view/space_scene.c) */
     struct bst_view_thumbnails *thumbnails; /* NULL: none (view/thumbnail_store.h) */
+    /* of what is read ahead (view/read_ahead.h), with a lock of its own */
+    pthread_mutex_t ahead_lock;
+    pthread_cond_t ahead_changed;
+    bool ahead[BST_VIEW_PANELS]; /* panels of the first sensor that are being read */
 };
 
 /* Begins a call: locks the run and opens its tables if they are not open. End it with
@@ -112,7 +118,23 @@ bst_status bst_view_open_from(bst_ctx *ctx, const bst_view_run *run, int64_t sen
 /* Ends a description: deletes it after an error, *out is then NULL. Returns the status. */
 bst_status bst_view_keep(bst_status status, cJSON **out);
 
+/* Reads the lines of a panel of a sensor that are not held.
+ *
+ * Errors:    those of bst_view_run_plot */
+bst_status bst_view_read_panel(bst_ctx *ctx, bst_view_run *run, int sensor,
+                               int panel) BST_MUST_CHECK;
+/* Moves the lines of a panel to the same run, opened again. Lines that it holds stay.
+ *
+ * Given:     from  belongs to the caller alone
+ * Returned:  run   has the lines; nothing happens if its sensors are not there */
+void bst_view_take_lines(bst_view_run *run, bst_view_run *from, int sensor, int panel);
+/* Says that the panels from `first` to before `end` of the first sensor are being read: requests
+ * for them wait. */
+void bst_view_begin_wait(bst_view_run *run, int first, int end);
+/* Ends the waiting for a panel. */
+void bst_view_end_wait(bst_view_run *run, int panel);
+
 /* Adds the panels of a sensor to its description: [{name, title, unit, lines}]. */
-void bst_view_add_panels(const bst_view_run *run, const bst_view_sensor *sensor, cJSON *out);
+void bst_view_add_panels(const bst_view_run *run, bst_view_sensor *sensor, cJSON *out);
 
 #endif

@@ -10,6 +10,7 @@
 #include "sim/cli/stop_signals.h"
 #include "sim/core/folder.h"
 #include "view/browser.h"
+#include "view/read_ahead.h"
 #include "view/server.h"
 #include "view/study_view.h"
 
@@ -46,11 +47,21 @@ static bst_status serve_run(bst_ctx *ctx, const bst_view_session *r, bst_view_su
             BST_TRY(open_folder(ctx, subject, folders[i]));
         }
     }
-    BST_TRY(bst_view_server_start(ctx, subject, NULL, (int)r->port, url, &server));
-    announce(r, url);
-    wait_for_stop();
-    bst_view_server_stop(server);
-    return BST_OK;
+    bst_view_run *run;
+    bst_ctx ignored = {0};
+    bst_view_ahead *ahead = bst_view_subject_run(&ignored, subject, 0, &run) == BST_OK
+                                ? bst_view_ahead_start(run)
+                                : NULL;
+    bst_status status = bst_view_server_start(ctx, subject, NULL, (int)r->port, url, &server);
+    if (status == BST_OK) {
+        announce(r, url);
+        wait_for_stop();
+    }
+    bst_view_ahead_stop(ahead);
+    if (status == BST_OK) {
+        bst_view_server_stop(server);
+    }
+    return status;
 }
 
 /* A folder in runs/ that does not exist yet. Its .partial folder is made, empty, so that no other

@@ -380,6 +380,12 @@ void bst_run_reader_allow(bst_run_reader *reader, int64_t steps) {
     }
 }
 
+void bst_run_reader_interrupt(bst_run_reader *reader) {
+    if (reader->db) {
+        sqlite3_interrupt(reader->db);
+    }
+}
+
 static bst_status fail_sql(bst_ctx *ctx, const bst_run_reader *reader) {
     if (sqlite3_errcode(reader->db) == SQLITE_INTERRUPT) {
         return bst_fail(ctx, BST_ERR_FORMAT,
@@ -406,12 +412,17 @@ bst_status bst_io_rows_open(bst_ctx *ctx, const bst_run_reader *reader, const ch
         free(rows);
         return fail_sql(ctx, reader);
     }
+    bst_io_rows_restart(rows, parameter1, parameter2);
+    *out = rows;
+    return BST_OK;
+}
+
+void bst_io_rows_restart(bst_io_rows *rows, int64_t parameter1, int64_t parameter2) {
     const int64_t values[2] = {parameter1, parameter2};
+    sqlite3_reset(rows->statement);
     for (int i = 0; i < 2 && i < sqlite3_bind_parameter_count(rows->statement); i++) {
         sqlite3_bind_int64(rows->statement, i + 1, values[i]);
     }
-    *out = rows;
-    return BST_OK;
 }
 
 bst_status bst_io_rows_next(bst_ctx *ctx, bst_io_rows *rows, bool *more) {

@@ -66,6 +66,9 @@ bst_status bst_run_reader_file(bst_ctx *ctx, const bst_run_reader *reader, const
  * Given:     steps  of SQLite's virtual machine, about 1e8 in a second; 0: no limit */
 void bst_run_reader_allow(bst_run_reader *reader, int64_t steps);
 
+/* Ends the query that another thread is making, if there is one: it fails with BST_ERR_FORMAT. */
+void bst_run_reader_interrupt(bst_run_reader *reader);
+
 /* A query on the run's tables, row by row, in constant memory. */
 typedef struct bst_io_rows bst_io_rows;
 
@@ -75,6 +78,8 @@ typedef struct bst_io_rows bst_io_rows;
 bst_status bst_io_rows_open(bst_ctx *ctx, const bst_run_reader *reader, const char *sql,
                             int64_t parameter1, int64_t parameter2,
                             bst_io_rows **out) BST_MUST_CHECK;
+/* Begins the query again with other parameters: what it has prepared is kept. */
+void bst_io_rows_restart(bst_io_rows *rows, int64_t parameter1, int64_t parameter2);
 /* Fetches the next row; *more false: no further row. BST_ERR_FORMAT: damaged file. */
 bst_status bst_io_rows_next(bst_ctx *ctx, bst_io_rows *rows, bool *more) BST_MUST_CHECK;
 /* Number of columns of the rows; columns count from 0. */

@@ -317,6 +317,25 @@ class View(Checks):
                       "panel=detections&columns=1e3", "panel=a;b", "panel=detections&sensor=99"):
             self.assertIn(self.viewer.status("/{token}/api/plot?" + query), (400, 404), query)
 
+    def test_truth_where_exposures_say(self):
+        """Plots of the truth are the same where the exposures say how many rows they have, and where that is wrong."""
+        made, plots = os.path.join(runs.scratch(), "track"), []
+        runs.run(runs.TRACK, made, runs.GENERATOR, duration=40)
+        for change in ("", "UPDATE exposures SET sources = sources + 1 WHERE exposure_id = 3", "UPDATE exposures SET sources = "
+                       "sources + CASE exposure_id WHEN 3 THEN -1 WHEN 20 THEN 1 ELSE 0 END", "ALTER TABLE exposures DROP COLUMN sources"):
+            with sqlite3.connect(made + "/run.sqlite") as tables:
+                tables.execute(change)
+                snr = tables.execute("SELECT mid_s, snr FROM truth WHERE kind = 'object' AND in_field = 1 ORDER BY mid_s").fetchall()
+            tables.close()
+            viewer = Viewer(made)
+            plots.append([viewer.numbers(f"api/plot?sensor=0&panel={name}&from=0&to=40&columns=4000") for name in ("pointing_error", "snr", "track_error")])
+            self.assertEqual(viewer.end()[0], 0)
+            numbers = plots[-1][1]
+            self.assertGreater(len(snr), 20)
+            self.assertEqual([tuple(one) for one in numbers[1:1 + 3 * int(numbers[0])].reshape(-1, 3)], [(time, value, value) for time, value in snr])
+        for other in plots[1:]:
+            self.assertEqual([one.tobytes() for one in other], [one.tobytes() for one in plots[0]])
+
     def test_hostile_names_are_text(self):
         described = self.viewer.json("api/run")
         self.assertEqual(described["name"], "<b>run")

@@ -336,10 +336,75 @@ def processor_s(process):
 
 
 @unittest.skipUnless(FULL and chromium.PROGRAM, "with --full, and a chromium")
+class Drawn(unittest.TestCase):
+    """While a run goes on, a worker draws; when it pauses, is zoomed, or an older frame is shown, the page does."""
+    # share of the stage that has grey pixels of the frame, and pixels in the colours of marks: of both canvases of the page, and the worker's
+    LOOK = """(() => {
+        const colours = (id) => {
+            const from = document.getElementById(id), copy = document.createElement('canvas');
+            if (from.hidden || !from.width) return [0, 0];
+            [copy.width, copy.height] = [from.width, from.height];
+            const context = copy.getContext('2d');
+            context.drawImage(from, 0, 0);
+            const { data } = context.getImageData(0, 0, copy.width, copy.height);
+            let grey = 0, marks = 0;
+            for (let k = 0; k < data.length; k += 4) {
+                if (data[k] === data[k + 1] && data[k] === data[k + 2] && data[k + 3] === 255 && data[k] > 0) grey++;
+                else if (data[k + 3] > 0 && Math.max(data[k], data[k + 1], data[k + 2]) - Math.min(data[k], data[k + 1], data[k + 2]) > 60) marks++;
+            }
+            return [grey / (copy.width * copy.height), marks];
+        };
+        return { worker: colours('live-image'), page: [colours('image')[0], colours('overlay')[1]], shown: document.getElementById('stage').classList.contains('live-shown') };
+    })()"""
+    LIVE = "document.boresight.live"
+
+    def test_drawn(self):
+        viewer = test_view.Viewer(runs.TRACK, "--out", os.path.join(runs.scratch(), "run"), "--duration", "6000", *SETS)
+        with chromium.Chromium(1280, 720) as page:
+            page.command("Page.navigate", url=viewer.url)
+            page.wait_for(f"document.boresight && document.boresight.run && {self.LIVE} && {self.LIVE}.state.run === 0")
+            page.evaluate(f"{self.LIVE}.command({{ do: 'run', rate: 0 }})")
+            page.wait_for(f"{self.LIVE}.state.time_s > 25 && document.getElementById('stage').classList.contains('live-shown')")
+            before = page.evaluate(f"{self.LIVE}.picture.count()")
+            page.wait_for(f"{self.LIVE}.shown > {before} + 10")
+            seen = page.evaluate(self.LOOK)
+            self.assertTrue(seen["shown"])
+            self.assertGreater(seen["worker"][0], 0.2)
+            self.assertGreater(seen["worker"][1], 100)
+            # a pause: the page has the newest frame with all its pixels
+            page.evaluate(f"{self.LIVE}.command({{ do: 'pause' }})")
+            page.wait_for(f"{self.LIVE}.state.paused && document.boresight.frameView.image.binning === 1 && {self.LIVE}.shownExposure() === document.boresight.frameView.details.exposure_id")
+            page.wait_for("!document.getElementById('stage').classList.contains('live-shown')")
+            seen = page.evaluate(self.LOOK)
+            self.assertEqual(seen["worker"], [0, 0])
+            self.assertGreater(seen["page"][0], 0.2)
+            self.assertGreater(seen["page"][1], 100)
+            # a frame from before while it goes on, and the newest one again
+            page.evaluate(f"{self.LIVE}.command({{ do: 'run', rate: 20 }})")
+            page.wait_for("document.getElementById('stage').classList.contains('live-shown')")
+            page.wait_for("document.boresight.count > 5")
+            page.key("Home")
+            page.wait_for("document.boresight.current === 0 && !document.getElementById('stage').classList.contains('live-shown')")
+            page.evaluate("document.getElementById('live-newest').click()")
+            page.wait_for("document.getElementById('stage').classList.contains('live-shown')")
+            # zoomed: the page draws, with all pixels
+            page.evaluate("document.boresight.frameView.zoomTo(8)")
+            page.wait_for("!document.getElementById('stage').classList.contains('live-shown') && document.boresight.frameView.image.binning === 1")
+            page.evaluate("document.boresight.frameView.fit()")
+            page.wait_for("document.getElementById('stage').classList.contains('live-shown')")
+            # commands are obeyed while the worker goes on
+            obeyed = page.evaluate(f"{self.LIVE}.state.obeyed")
+            page.evaluate(f"{self.LIVE}.command({{ do: 'save' }}, {{ do: 'save' }}, {{ do: 'pause' }})")
+            page.wait_for(f"{self.LIVE}.state.obeyed === {obeyed + 3} && {self.LIVE}.state.paused")
+            self.assertEqual(page.messages, [])
+        viewer.end()
+
+
+@unittest.skipUnless(FULL and chromium.PROGRAM, "with --full, and a chromium")
 class Figures(unittest.TestCase):
     """What a page that watches the main scenario flat out costs. The figures are printed (`ctest -V`), with those that were
     asked for; only what no other load of the machine can change is checked."""
-    SECONDS, TURNS = 8, 3
+    SECONDS, TURNS = 6, 5
 
     def state(self):
         self.steering.send(b"{}")
@@ -351,7 +416,7 @@ class Figures(unittest.TestCase):
         """Simulated seconds a second, processor time of the program for each, ms; with a page: frames shown a second and
         processor time of the browser for each, ms."""
         def look():
-            shown = page.evaluate("document.boresight.live.shown") if page else 0
+            shown = page.evaluate("document.boresight.live.picture.count()") if page else 0
             return self.state()["time_s"], time.monotonic(), processor_s(self.viewer.process), shown, processor_s(page.process) if page else 0
         before = look()
         time.sleep(self.SECONDS)
@@ -370,7 +435,7 @@ class Figures(unittest.TestCase):
             for _ in range(self.TURNS):
                 alone.append(self.phase())
                 page.command("Page.navigate", url=self.viewer.url)
-                page.wait_for("document.boresight && document.boresight.live && document.boresight.live.shown > 5")
+                page.wait_for("document.boresight && document.boresight.live && document.boresight.live.shown > 30")
                 watched.append(self.phase(page))
                 page.command("Page.navigate", url="about:blank")
                 time.sleep(1.5)  # a sensor counts as watched for a second
@@ -378,9 +443,10 @@ class Figures(unittest.TestCase):
         self.steering.close()
         self.viewer.process.kill()
         (speed, cost, _, _), (slower, dearer, shown, browser) = (numpy.median(rows, axis=0) for rows in (alone, watched))
+        kept = numpy.median([there[0] / without[0] for there, without in zip(watched, alone)])  # of neighbours: other load changes slowly
         print(f"\nlive main scenario, {self.TURNS} x {self.SECONDS} s in turns, medians, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}:"
               f"\n  frames shown         {shown:.1f} a second (asked: 15 or more), {browser:.1f} ms of the browser each"
-              f"\n  simulated seconds    {speed:.1f} a second alone, {slower:.1f} watched: {100 * (1 - slower / speed):.1f} % slower (asked: 10 % or less)"
+              f"\n  simulated seconds    {speed:.1f} a second alone, {slower:.1f} watched: {100 * (1 - kept):.1f} % slower (asked: 10 % or less)"
               f"\n  processor time       {cost:.1f} ms a simulated second alone, {dearer:.1f} watched: {100 * (dearer / cost - 1):.1f} % more", flush=True)
         self.assertGreater(shown, 1)
         self.assertLess(dearer, 1.5 * cost)
@@ -395,12 +461,12 @@ class Figures(unittest.TestCase):
             after = resource.getrusage(resource.RUSAGE_CHILDREN)
             return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         costs = {(words, duration): [] for duration in (2, 152) for words in ((), ("--view",))}
-        for _ in range(2 * self.TURNS):
+        for _ in range(6):
             for (words, duration), times in costs.items():
                 times.append(cost(duration, *words))
         start, viewed_start, alone, viewed = (min(costs[key]) for key in (((), 2), (("--view",), 2), ((), 152), (("--view",), 152)))
         slope = (viewed - viewed_start) / (alone - start) - 1
-        print(f"\nmain scenario, {2 * self.TURNS} runs each in turns, least processor time: of 150 s after the first 2 s, run {alone - start:.2f} s, run --view "
+        print(f"\nmain scenario, 6 runs each in turns, least processor time: of 150 s after the first 2 s, run {alone - start:.2f} s, run --view "
               f"with nobody watching {viewed - viewed_start:.2f} s: {100 * slope:.1f} % more (asked: 0 %); start of the server {1e3 * (viewed_start - start):.0f} ms", flush=True)
         self.assertLess(viewed, 1.25 * alone)
 

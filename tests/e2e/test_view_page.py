@@ -16,6 +16,7 @@ from astropy.io import fits
 from astropy.wcs import WCS
 
 import chromium
+import overlay
 import runs
 import test_view
 
@@ -358,23 +359,10 @@ class Page(unittest.TestCase):
 
 @unittest.skipUnless(chromium.PROGRAM, "there is no chromium")
 class LongRun(unittest.TestCase):
-    # centre of the marks on the screen, from the pixels of the overlay weighted by opacity, with the true target's mark alone
-    MARK = """(() => {
-        const view = document.boresight.frameView, { overlay } = view;
-        for (const name of Object.keys(view.shown)) view.setShown(name, name === 'target');
-        view.details.wcs = null; // no compass
-        view.sorted.target[0].text = '';
-        view.drawOverlay();
-        const ratio = devicePixelRatio || 1, data = overlay.getContext('2d').getImageData(0, 0, overlay.width, overlay.height).data;
-        let sum = 0, x = 0, y = 0;
-        for (let j = 0; j < overlay.height; j++) for (let i = 0; i < overlay.width; i++) {
-            const a = data[4 * (j * overlay.width + i) + 3];
-            sum += a;
-            x += a * (i + 0.5);
-            y += a * (j + 0.5);
-        }
-        return [x / sum / ratio, y / sum / ratio, view.view.scale, view.stage.clientWidth, view.stage.clientHeight];
-    })()"""
+    # the true target's mark alone
+    MARK = overlay.script("target", """
+        return [...centre(0, 0, overlay.width, overlay.height), view.view.scale, view.stage.clientWidth, view.stage.clientHeight];
+    """, prepare="view.sorted.target[0].text = '';")
 
     def test_truth_at_frame_200(self):
         """With the mouse on the slider and with keys: the mark that is drawn is where the table of the truth says."""

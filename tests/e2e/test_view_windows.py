@@ -16,6 +16,7 @@ import numpy
 
 import chromium
 import live_page
+import overlay
 import runs
 import test_view
 import test_view_live
@@ -27,24 +28,13 @@ WINDOWS = [IMGPROC + "/track_windows=true", IMGPROC + "/window_px=48", IMGPROC +
 # the second: binned by 2, and a window of the sensor whose corner is odd
 READ_OUT = [runs.SENSOR + "/exposure/binning=2", runs.SENSOR + "/exposure/window_px=[31, 45, 442, 420]"]
 
-# Middle of the line at each edge of the windows, from the pixels of the overlay: weighted by opacity, over the whole edge. Dots of the
-# page: [left, top, right, bottom, and where they should be]
-EDGES = """(() => {
-    const view = document.boresight.frameView, { overlay } = view;
-    for (const name of Object.keys(view.shown)) view.setShown(name, name === 'windows');
-    view.details.wcs = null; // no compass
-    view.drawOverlay();
-    const ratio = devicePixelRatio || 1, data = overlay.getContext('2d').getImageData(0, 0, overlay.width, overlay.height).data;
-    const opacity = (x, y) => (x >= 0 && y >= 0 && x < overlay.width && y < overlay.height ? data[4 * (y * overlay.width + x) + 3] : 0);
-    // the profile across an edge near `at`, between two ends along it
+# Middle of the line at each edge of the windows, over the whole edge. Dots of the page: [left, top, right, bottom, and where they should be]
+EDGES = overlay.script("windows", """
+    // the middle across an edge near `at`, between two ends along it
     const middle = (at, from, to, turned) => {
-        let sum = 0, moment = 0;
-        for (let d = Math.round(at * ratio) - 4; d <= Math.round(at * ratio) + 4; d++) for (let s = Math.ceil(from * ratio) + 6; s < Math.floor(to * ratio) - 6; s++) {
-            const a = turned ? opacity(s, d) : opacity(d, s);
-            sum += a;
-            moment += a * (d + 0.5);
-        }
-        return sum > 0 ? moment / sum / ratio : null;
+        const across = [Math.round(at * ratio) - 4, Math.round(at * ratio) + 5], along = [Math.ceil(from * ratio) + 6, Math.floor(to * ratio) - 6];
+        const found = turned ? centre(along[0], across[0], along[1], across[1]) : centre(across[0], along[0], across[1], along[1]);
+        return found && found[turned ? 1 : 0];
     };
     const { scale, x, y } = view.view, { width, height } = view.size();
     const { originX, originY } = view.drawing(); // of the pixels of the picture
@@ -52,7 +42,7 @@ EDGES = """(() => {
         const a = view.toScreen(one.left, one.top), b = view.toScreen(one.right, one.bottom);
         return [one.said, middle(a.x, a.y, b.y, false), middle(a.y, a.x, b.x, true), middle(b.x, a.y, b.y, false), middle(b.y, a.x, b.x, true)];
     }) };
-})()"""
+""")
 
 
 def rows_of(folder, query):
@@ -260,7 +250,7 @@ class LivePage(unittest.TestCase):
             page.command("Page.navigate", url=viewer.url)
             page.wait_for(f"{app} && {app}.live && {app}.live.state && {app}.live.state.run === 0")
             page.key("n")
-            page.wait_for(f"{app}.live.trail.length > 0 && {app}.live.state.paused")
+            page.wait_for(f"{app}.live.trail.exposures.length > 0 && {app}.live.state.paused")
             page.evaluate(f"{app}.take = {app}.live.takeFrame, {app}.live.takeFrame = () => {{}}, document.getElementById('live-rate').value = '10', document.getElementById('live-rate').dispatchEvent(new Event('change'))")
             page.key("r")
             page.wait_for(f"{app}.live.state.time_s > 25")

@@ -7,6 +7,7 @@ const texts = {};
 const node = (id) => ({ set textContent(text) { texts[id] = text; } });
 Object.assign(globalThis, { location: { search: '' }, document: { getElementById: node }, WebSocket: { OPEN: 1 } });
 const { Live } = await import('../../view/page/live.js');
+const { imageOf, readAnswer, Trail } = await import('../../view/page/live_answer.js');
 
 /** A live run without its controls. */
 function live() {
@@ -65,16 +66,44 @@ test('while a run goes on, pixels that the screen cannot show are binned; they a
   one.app.frameView.image = { binning: 1 };
   one.ask();
   assert.deepEqual(asked.map(({ binning, after }) => [binning, after]), [[2, 7], [1, 0], [1, 0], [1, 7]]);
+  one.state.paused = false;
+  const binnings = [true, false].map((plain) => [0.7, 0.6, 0.45, 0.38, 0.3].map((scale) => {
+    one.app.frameView = { view: { scale }, image: { binning: 1 }, made: { plain } };
+    return one.binning();
+  }));
+  assert.deepEqual(binnings, [[1, 2, 2, 3, 3], [1, 1, 2, 2, 3]]); // by the processor, by a graphics processor
 });
 
 test('rewound: nothing of the discarded future is kept', () => {
   const { one } = live(), element = document.getElementById, done = [];
   document.getElementById = () => ({ classList: { toggle() {} } });
   const state = { time_s: 2, duration_s: 9, obeyed: 0, run: 0, steps: 0, paused: true, steered: true, states: [], message: '' };
-  Object.assign(one, { state, states: '[]', shown: 1, trail: [1], app: { cache: { clear: () => done.push('cache') }, strip: { forget: () => done.push('strip') }, count: 3, current: 2 } });
+  Object.assign(one, { state, states: '[]', shown: 1, trail: new Trail([{ id: 1, tracks: [] }]), app: { cache: { clear: () => done.push('cache') }, strip: { forget: () => done.push('strip') }, count: 3, current: 2 } });
   one.describe({ ...state, time_s: 1 }, '');
   assert.deepEqual([one.app.current, done], [2, []]);
   one.describe({ ...state, time_s: 5 }, '');
-  assert.deepEqual([one.app.current, done, one.trail], [-1, ['cache', 'strip'], []]);
+  assert.deepEqual([one.app.current, done, one.trail.newest], [-1, ['cache', 'strip'], -1]);
   document.getElementById = element;
+});
+
+test('an answer: its words, and its pixels behind them', () => {
+  const words = '{"width":2,"height":1,"binning":3,"frame_width":6,"frame_height":3,"x":0,"y":0}', length = words.length + words.length % 2;
+  const data = new ArrayBuffer(4 + length + 4);
+  new DataView(data).setUint32(0, length, true);
+  new Uint8Array(data, 4, length).set(new TextEncoder().encode(words.padEnd(length)));
+  new Uint16Array(data, 4 + length).set([7, 65535]);
+  const answer = readAnswer(data), image = imageOf(data, answer);
+  assert.deepEqual([image.width, image.height, image.binning, image.frameWidth, [...image.data]], [2, 1, 3, 6, [7, 65535]]);
+  assert.equal(imageOf(data, { ...answer, width: 0 }), null);
+});
+
+test('a trail: tracks of the exposures before, without a future that was discarded', () => {
+  const trail = new Trail(), at = (id) => trail.add({ exposure_id: id, tracks: [{ id: 1, x: id, now: true }] });
+  assert.deepEqual(at(3), { earlier: [], again: false });
+  assert.deepEqual(at(4), { earlier: [{ id: 1, x: 3, now: false }], again: false });
+  assert.deepEqual(at(4), { earlier: [{ id: 1, x: 3, now: false }], again: true }); // with other pixels
+  for (let id = 5; id < 60; id++) at(id);
+  assert.equal(at(60).earlier.length, 40);
+  assert.deepEqual(at(20), { earlier: [], again: false });
+  assert.equal(trail.newest, 20);
 });

@@ -1,5 +1,7 @@
 /* The newest frames of a run in progress: which messages make a frame, in which order, and what it
  * says; the second sensor of three. */
+#include <time.h>
+
 #include <cjson/cJSON.h>
 
 #include "boresight/frame.h"
@@ -223,8 +225,39 @@ static void frames_that_lack_a_part(void **state) {
     end();
 }
 
+static void send_all(int64_t id) {
+    send(BST_CHANNEL_TRUTH, id);
+    send(BST_CHANNEL_FRAME, id);
+    send(BST_CHANNEL_DETECTIONS, id);
+    send(BST_CHANNEL_TRACKS, id);
+}
+
+/* Nothing is taken in the place of a frame that nobody has got: it would be lost. */
+static void what_is_taken_is_got(void **state) {
+    (void)state;
+    const struct timespec longer_than_due = {.tv_nsec = 150000000};
+    begin();
+    const bst_view_live_frame *frame;
+    assert_null(get(0, &frame));
+    send_all(1);
+    nanosleep(&longer_than_due, NULL);
+    send_all(2);
+    for (int64_t sequence = 1; sequence <= 2; sequence++) {
+        cJSON *json = get(sequence - 1, &frame);
+        assert_non_null(json);
+        assert_int_equal(frame->sequence, sequence);
+        bst_assert_close(number(json, "exposure_id"), sequence == 1 ? 1.0 : 3.0, 0.0);
+        cJSON_Delete(json);
+        bst_view_feed_release(frame);
+        nanosleep(&longer_than_due, NULL);
+        send_all(1 + 2 * sequence);
+    }
+    end();
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_taken_is_got),
         cmocka_unit_test(a_frame_is_complete_with_its_tracks),
         cmocka_unit_test(frames_that_lack_a_part),
     };

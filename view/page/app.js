@@ -23,6 +23,9 @@ const LOOK_MS = 200;
 /** Share of the time that the looks may take at most: the run's tables grow. A live run's are read by the program that writes them. */
 const REFRESH_SHARE = 0.05, LIVE_SHARE = 0.02;
 
+/** Events that are listed at once, more than are in view; the others follow after the plots. */
+const EVENTS_FIRST = 100;
+
 /** An element by its id; which kind it is stands in index.html. @param {string} id @returns {any} */
 const element = (id) => document.getElementById(id);
 
@@ -30,6 +33,9 @@ const element = (id) => document.getElementById(id);
 async function getModes(sensor) {
   return (await getJson('modes', { sensor })).modes.filter((change) => Number.isFinite(change.time_s));
 }
+
+/** Those of the events that have a time: a damaged table may have others. @param {{events: any[]}} answer */
+const listedEvents = ({ events }) => events.filter((event) => Number.isFinite(event.time_s));
 
 class App {
   constructor() {
@@ -213,6 +219,8 @@ class App {
     this.frameView.sensorHeight = info.height_px;
     this.frameView.reset();
     this.cache.clear();
+    const others = Promise.all([getModes(sensor), getJson('events')]);
+    others.catch(() => {}); // said where they are awaited
     this.setFrames(await getNumbers('frames', { sensor }));
     this.current = -1;
     if (this.count === 0) {
@@ -221,11 +229,12 @@ class App {
     } else {
       await this.goTo(Math.min(frame, this.count - 1)); // the picture first
     }
-    const [modes, events] = await Promise.all([getModes(sensor), getJson('events')]);
-    this.showEvents(events);
+    const [modes, events] = await others;
+    this.events = listedEvents(events);
     const first = this.count ? this.frames[1] - (this.frames[2] || 0) / 2 : 0;
     this.plots.show(sensor, info.panels, modes, this.events, Math.min(0, first), this.lastTime(modes));
     if (this.count) this.plots.setCursor(this.timeOf(Math.max(0, this.current)));
+    this.showEvents(events);
   }
 
   timeOf(frame) { return this.frames[frame * NUMBERS + 1]; }
@@ -349,31 +358,42 @@ class App {
   // ---------------------------------------------------------------- events
 
   showEvents({ total, events: listed }) {
-    const events = listed.filter((event) => Number.isFinite(event.time_s)); // a damaged table may have others
-    this.events = events;
+    const events = this.events = listedEvents({ events: listed }), shown = events.slice(0, EVENTS_FIRST);
     element('event-count').textContent = total > events.length ? `first ${events.length} of ${total}` : String(total);
-    element('events').replaceChildren(...events.map((event) => {
-      const item = document.createElement('li'), button = document.createElement('button');
-      for (const [name, text] of [['when', `${event.time_s.toFixed(2)} s`], ['kind', event.kind], ['what', event.text]]) {
-        const span = document.createElement('span');
-        span.className = name;
-        span.textContent = text;
-        span.dir = name === 'when' ? 'ltr' : 'auto';
-        button.append(span);
-      }
-      if (this.run.sensors.length > 1) { // which of them
-        const source = document.createElement('span');
-        source.className = 'source';
-        source.textContent = `${event.source}: `;
-        button.lastElementChild.prepend(source);
-      }
-      button.type = 'button';
-      button.title = event.source;
-      button.addEventListener('click', () => this.seek(event.time_s));
-      item.append(button);
-      return item;
-    }));
+    element('events').replaceChildren(...shown.map((event) => this.eventItem(event)));
     this.markEvent();
+    if (events.length > shown.length) this.plots.reloading.then(() => setTimeout(() => this.showFurther(events)));
+  }
+
+  /** The events that are out of view, some at a time, after the plots. @param {any[]} events */
+  showFurther(events) {
+    const list = element('events'), from = list.children.length;
+    if (events !== this.events || from >= events.length) return;
+    list.append(...events.slice(from, from + EVENTS_FIRST).map((event) => this.eventItem(event)));
+    this.markEvent();
+    setTimeout(() => this.showFurther(events));
+  }
+
+  eventItem(event) {
+    const item = document.createElement('li'), button = document.createElement('button');
+    for (const [name, text] of [['when', `${event.time_s.toFixed(2)} s`], ['kind', event.kind], ['what', event.text]]) {
+      const span = document.createElement('span');
+      span.className = name;
+      span.textContent = text;
+      span.dir = name === 'when' ? 'ltr' : 'auto';
+      button.append(span);
+    }
+    if (this.run.sensors.length > 1) { // which of them
+      const source = document.createElement('span');
+      source.className = 'source';
+      source.textContent = `${event.source}: `;
+      button.lastElementChild.prepend(source);
+    }
+    button.type = 'button';
+    button.title = event.source;
+    button.addEventListener('click', () => this.seek(event.time_s));
+    item.append(button);
+    return item;
   }
 
   /** Marks the last event at or before the frame. */

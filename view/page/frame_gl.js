@@ -17,6 +17,13 @@ export function originOf(side, centre, scale) {
   return scale >= 1 ? Math.round(origin) : origin;
 }
 
+/** Where the corner of the frame is on a canvas, and pixels of the canvas per pixel of the frame.
+ * @param {{x: number, y: number, scale: number}} view @param {{width: number, height: number}} canvas @param {number} n binning of the image @param {number} ratio pixels of the canvas per px of the page */
+export function placeOf(view, { width, height }, n, ratio) {
+  const scale = view.scale * ratio;
+  return { x: originOf(width, (view.x + 0.5) / n - 0.5, scale * n), y: originOf(height, (view.y + 0.5) / n - 0.5, scale * n), scale };
+}
+
 const VERTEX = `#version 300 es
 void main() { // one triangle over the whole canvas
   vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
@@ -181,10 +188,40 @@ function spanOf(count, origin, scale, size) {
   return { left, right, from, to, several, gap };
 }
 
-/** A row of the picture: each pixel of the screen shows one of the image. */
-function pickRow(out, row, { left, right, from, gap }, colours) {
-  if (gap) for (let x = left; x < right; x++) out[x] = colours[row[from[x]]];
-  else for (let x = left, i = from[left]; x < right; x++, i++) out[x] = colours[row[i]];
+/** Pixels of the image along a side of one of the screen up to which all of them are in the mean. */
+const MEAN_MOST = 6;
+
+/** Rows of the picture whose pixels show one of the image each. One function with all loops: the browser compiles it well while the
+ * first picture is drawn, not after thousands of short calls. @param {Uint32Array} words @param {number} pitch words of a row */
+function pickRows(words, pitch, { data, width }, { left, right, from, gap }, rows, colours) {
+  for (let y = 0; y < rows.to.length; y++) {
+    if (rows.to[y] !== rows.from[y] + 1) continue;
+    const at = y * pitch, row = rows.from[y] * width, first = row + from[left] - left;
+    if (gap) for (let x = left; x < right; x++) words[at + x] = colours[data[row + from[x]]];
+    else for (let x = left; x < right; x++) words[at + x] = colours[data[first + x]];
+  }
+}
+
+/** Rows of the picture whose pixels show the mean of a few of the image: from sums up to each column. @param {Uint32Array} words @param {number} pitch words of a row */
+function meanRows(words, pitch, { data, width }, { left, right, from, to }, rows, colours) {
+  const sums = new Uint32Array(width + 1), first = from[left], end = to[right - 1];
+  for (let y = 0; y < rows.to.length; y++) {
+    const a = rows.from[y] * width, n = rows.to[y] - rows.from[y], b = a + width, at = y * pitch;
+    if (n <= 0) continue;
+    let sum = 0;
+    if (n === 1) for (let i = first; i < end; i++) { sum = (sum + data[a + i]) >>> 0; sums[i + 1] = sum; }
+    else if (n === 2) for (let i = first; i < end; i++) { sum = (sum + data[a + i] + data[b + i]) >>> 0; sums[i + 1] = sum; }
+    else {
+      for (let i = first; i < end; i++) {
+        for (let j = 0; j < n; j++) sum = (sum + data[a + j * width + i]) >>> 0;
+        sums[i + 1] = sum;
+      }
+    }
+    for (let x = left; x < right; x++) { // rounded; differences are right also where the sums wrap
+      const count = n * (to[x] - from[x]), part = (sums[to[x]] - sums[from[x]]) | 0;
+      words[at + x] = colours[((2 * part + count) / (2 * count)) | 0];
+    }
+  }
 }
 
 /** Mean of pixels of the image below one of the screen, of at most some 4 x 4 of them. */
@@ -197,10 +234,14 @@ function meanOf({ data, width }, ax, bx, ay, by) {
   return Math.round(sum / count);
 }
 
-class CanvasPainter {
-  constructor(canvas) {
+export class CanvasPainter {
+  /** @param {any} canvas @param {any} [context] its own one */
+  constructor(canvas, context = canvas.getContext('2d', { willReadFrequently: true })) { // in memory: it is filled from there
     this.canvas = canvas;
-    this.context = canvas.getContext('2d', { willReadFrequently: true }); // in memory: it is filled from there
+    this.context = context;
+    this.plain = true;
+    this.background = ''; // colour beside the image, where marks are drawn on the same canvas; '': nothing
+    this.filled = ''; // where the words have the image
     this.held = [null, null];
     this.out = null;
     this.greys = { key: '', colours: new Uint32Array(65536) };
@@ -212,8 +253,13 @@ class CanvasPainter {
   coloursOf(d) {
     const key = [d.black, d.white, d.soft, d.invert].join();
     if (this.greys.key !== key) {
+      const { colours } = this.greys, of = (value) => 0xff000000 | Math.round(255 * greyOf(value, d)) * 0x010101;
+      // all values below black, and all from white on, have the same colour
+      const low = Math.min(65536, Math.max(0, Math.ceil(d.black))), high = Math.min(65536, Math.max(low, Math.ceil(d.white)));
       this.greys.key = key;
-      for (let value = 0; value < 65536; value++) this.greys.colours[value] = 0xff000000 | Math.round(255 * greyOf(value, d)) * 0x010101;
+      colours.fill(of(d.black), 0, low);
+      for (let value = low; value < high; value++) colours[value] = of(value);
+      colours.fill(of(d.white), high);
     }
     return this.greys.colours;
   }
@@ -230,23 +276,38 @@ class CanvasPainter {
       this.out = this.context.createImageData(width, height);
       this.words = new Uint32Array(this.out.data.buffer);
     }
-    this.words.fill(0);
-    this.paint(image, d);
-    if (part) this.paint(part, partDrawing);
-    this.context.putImageData(this.out, 0, 0);
+    const span = spanOf(width, d.originX, d.scale, image.width), rows = rangesOf(height, d.originY, d.scale, image.height);
+    const top = rows.to.findIndex((to) => to > 0), bottom = rows.to.findLastIndex((to) => to > 0) + 1, where = [span.left, span.right, top, bottom].join();
+    const here = where === this.filled && !part;
+    if (!here) this.words.fill(0);
+    this.filled = part ? '' : where;
+    this.paint(image, d, span, rows);
+    if (part) this.paint(part, partDrawing, spanOf(width, partDrawing.originX, partDrawing.scale, part.width), rangesOf(height, partDrawing.originY, partDrawing.scale, part.height));
+    if (this.background && span.left < span.right && top >= 0) {
+      this.context.putImageData(this.out, 0, 0, span.left, top, span.right - span.left, bottom - top);
+      this.context.fillStyle = this.background;
+      for (const [x0, y0, x1, y1] of [[0, 0, width, top], [0, bottom, width, height], [0, top, span.left, bottom], [span.right, top, width, bottom]]) {
+        if (x1 > x0 && y1 > y0) this.context.fillRect(x0, y0, x1 - x0, y1 - y0);
+      }
+    } else if (here) this.context.putImageData(this.out, 0, 0, span.left, top, Math.max(0, span.right - span.left), bottom - top);
+    else this.context.putImageData(this.out, 0, 0);
   }
 
-  paint(image, d) {
-    const { width, height } = this.canvas, colours = this.coloursOf(d), span = spanOf(width, d.originX, d.scale, image.width), { from, to } = span;
-    const rows = rangesOf(height, d.originY, d.scale, image.height), few = 4 * span.several.length < span.right - span.left;
+  paint(image, d, span, rows) {
+    const { width, height } = this.canvas, colours = this.coloursOf(d), { from, to } = span;
+    const few = 4 * span.several.length < span.right - span.left;
+    if (few && span.left < span.right) pickRows(this.words, width, image, span, rows, colours);
+    if (!few && 1 / d.scale < MEAN_MOST) {
+      meanRows(this.words, width, image, span, rows, colours);
+      return;
+    }
     for (let y = 0; y < height && span.left < span.right; y++) {
-      const ay = rows.from[y], by = rows.to[y], out = this.words.subarray(y * width, (y + 1) * width);
+      const ay = rows.from[y], by = rows.to[y], at = y * width;
       if (by === 0) continue;
       if (by === ay + 1 && few) {
-        pickRow(out, image.data.subarray(ay * image.width, by * image.width), span, colours);
-        for (const x of span.several) out[x] = colours[meanOf(image, from[x], to[x], ay, by)];
+        for (const x of span.several) this.words[at + x] = colours[meanOf(image, from[x], to[x], ay, by)];
       } else {
-        for (let x = span.left; x < span.right; x++) out[x] = colours[meanOf(image, from[x], to[x], ay, by)];
+        for (let x = span.left; x < span.right; x++) this.words[at + x] = colours[meanOf(image, from[x], to[x], ay, by)];
       }
     }
   }

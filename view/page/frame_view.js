@@ -1,5 +1,5 @@
 // The picture of a frame: zoom, stretch, marks, the pixel under the cursor.
-import { makePainter, originOf } from './frame_gl.js';
+import { makePainter, placeOf } from './frame_gl.js';
 import { binningAt, covers, longestSide, partFor, valueAt } from './frame_parts.js';
 import { drawCompass, drawMarks, KINDS, makeSample, sortMarks } from './marks.js';
 import { describePixels, limitsOf } from './statistics.js';
@@ -44,6 +44,8 @@ export class FrameView {
     this.limits = null;
     this.cursor = null;
     this.shown = Object.fromEntries(KINDS.map((kind) => [kind.name, kind.shown]));
+    /** What draws in the place of this page. @type {import('./live_picture.js').LivePicture | null} */
+    this.remote = null;
     this.waiting = true; // until all is there
     this.makeLegend();
     this.listen();
@@ -136,13 +138,22 @@ export class FrameView {
 
   /** @param {import('./frame_parts.js').Image | null} [image] */
   drawing(image = this.image) {
-    const law = element('law').value, limits = this.limits || { black: 0, white: 65535 };
-    const sigma = this.statistics ? this.statistics.sigma : 1, n = (image && image.binning) || 1;
-    const { x, y, scale } = this.origin();
+    const n = (image && image.binning) || 1, { x, y, scale } = this.origin();
+    return { originX: x + ((image && image.x) || 0) * scale, originY: y + ((image && image.y) || 0) * scale, scale: scale * n, ...this.stretch() };
+  }
+
+  /** How values become grey levels. */
+  stretch() {
+    const law = element('law').value, limits = this.limits || { black: 0, white: 65535 }, sigma = this.statistics ? this.statistics.sigma : 1;
+    return { black: limits.black, white: Math.max(limits.white, limits.black + 1), soft: law === 'asinh' ? 3 * sigma : 0, invert: element('invert').checked };
+  }
+
+  /** What a worker needs to draw pictures in the place of this page. */
+  picture() {
+    const { x, y, scale } = this.view, { width, height } = this.canvas, { names, target } = this.details || { names: {}, target: -1 };
     return {
-      originX: x + ((image && image.x) || 0) * scale, originY: y + ((image && image.y) || 0) * scale, scale: scale * n,
-      black: limits.black, white: Math.max(limits.white, limits.black + 1),
-      soft: law === 'asinh' ? 3 * sigma : 0, invert: element('invert').checked,
+      x, y, scale, width, height, ratio: devicePixelRatio || 1, stretch: this.stretch(), shown: this.shown, names, target,
+      background: getComputedStyle(this.stage).backgroundColor || '#000',
     };
   }
 
@@ -159,8 +170,7 @@ export class FrameView {
 
   /** Where the corner of the frame is on the canvas, and pixels of the screen per pixel of the frame. */
   origin() {
-    const n = this.binning(), scale = this.view.scale * (devicePixelRatio || 1), { width, height } = this.canvas;
-    return { x: originOf(width, (this.view.x + 0.5) / n - 0.5, scale * n), y: originOf(height, (this.view.y + 0.5) / n - 0.5, scale * n), scale };
+    return placeOf(this.view, this.canvas, this.binning(), devicePixelRatio || 1);
   }
 
   // ---------------------------------------------------------------- parts of large frames
@@ -267,12 +277,13 @@ export class FrameView {
     requestAnimationFrame(() => {
       this.waiting = false;
       const part = this.drawnPart;
-      if (this.made || this.drawn) this.painter.draw(this.drawn, this.drawing(), part, part && this.drawing(part));
-      this.drawOverlay();
+      if (this.remote) this.remote.setView(this.picture());
+      else if (this.made || this.drawn) this.painter.draw(this.drawn, this.drawing(), part, part && this.drawing(part));
+      if (!this.remote) this.drawOverlay();
       this.describeCursor();
       const percent = 100 * this.view.scale;
       setText(element('zoom'), `${percent < 10 ? percent.toFixed(1) : Math.round(percent)} %`);
-      if (this.binning() > 1) this.loadPart();
+      if (this.binning() > 1 && !this.remote) this.loadPart();
     });
   }
 

@@ -3,10 +3,10 @@ import { getJson } from './api.js';
 import { changeFields, changesOf } from './changes.js';
 import { shortNumber } from './chart.js';
 import { binningAt, covers, partFor, WHOLE_PX } from './frame_parts.js';
-import { setText } from './text.js';
+import { imageOf, readAnswer, Trail } from './live_answer.js';
+import { LivePicture } from './live_picture.js';
+import { setProperty, setText } from './text.js';
 
-/** Exposures whose track positions are drawn as trails, as those of recorded runs. */
-const TRAIL_EXPOSURES = 40;
 /** Rates that are offered, times real time; 0: flat out. */
 const RATES = [0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 0];
 /** Commands that wait at most, and the longest one, bytes: the program takes 8192 bytes a message. */
@@ -16,7 +16,7 @@ const REFUSAL_MS = 6000;
 /** Time between two questions for names, ms. */
 const NAMES_MS = 1000;
 /** Least time between two changes of the texts of a run that goes on, ms: they change more of the page than the picture does. */
-const TEXT_MS = 250;
+const TEXT_MS = 500;
 /** Time before another attempt to connect, ms. */
 const RETRY_MS = 1000;
 
@@ -31,7 +31,8 @@ export class Live {
     this.controller = false;
     this.sequence = 0;
     this.newest = true; // the page shows the newest frame
-    this.trail = [];
+    this.trail = new Trail();
+    this.picture = new LivePicture(this, app.frameView);
     this.missed = -1; // exposure that was shown from the record
     this.askedNames = 0; // when names of objects were asked for
     this.queue = []; // commands that wait until the one before is obeyed
@@ -58,10 +59,10 @@ export class Live {
   connect() {
     const address = new URL('live', location.href);
     address.protocol = 'ws:';
-    this.socket = new WebSocket(address);
+    this.socket = this.picture.connect(address);
     this.socket.binaryType = 'arraybuffer';
     this.socket.addEventListener('open', () => { this.sentAt = -1; this.ask(); });
-    this.socket.addEventListener('message', (event) => this.take(event.data));
+    this.socket.addEventListener('message', (/** @type {any} */ event) => this.take(event.data));
     this.socket.addEventListener('close', () => {
       if (this.state && !this.state.ended) this.say('The run cannot be reached. Is "boresight view" still running?');
       setTimeout(() => this.connect(), RETRY_MS);
@@ -74,11 +75,13 @@ export class Live {
     return Math.max(1, Math.ceil(side / WHOLE_PX));
   }
 
-  /** Pixels of a frame along one pixel of the screen while it runs; 1: each can be seen, or looked at. */
+  /** Pixels of a frame along one pixel of the screen while it runs; 1: each can be seen, or looked at. Where the processor draws, the
+   * picture has up to a third fewer pixels along a side than the screen, rather than more: it is the run's processor. */
   binning() {
     const { frameView } = this.app;
     if (!frameView || !this.state || this.state.paused || this.state.steps > 0) return this.least();
-    return Math.max(1, Math.floor(1.02 / (frameView.view.scale * (devicePixelRatio || 1))));
+    const pixels = 1 / (frameView.view.scale * (devicePixelRatio || 1));
+    return Math.max(1, frameView.made && frameView.made.plain ? Math.round(pixels) : Math.floor(1.02 * pixels));
   }
 
   /** The part of a frame that is too large to be sent whole; null: it is not too large. */
@@ -95,12 +98,18 @@ export class Live {
     return part ? !covers(image, frameView.box(), frameView.frameSize(), part.binning) : image.binning > binning;
   }
 
-  /** One request, which gets one answer. */
-  ask() {
+  /** What is asked for now. */
+  wanted() {
     const part = this.part(), binning = part ? part.binning : this.binning();
     // pixels that were binned, or left out, are asked for again when they can be seen
     const asked = { sensor: this.app.sensor, after: this.lacks(binning, part) ? 0 : this.sequence, take: true, binning };
     if (part) asked.part = { x: part.x, y: part.y, width: part.width, height: part.height };
+    return asked;
+  }
+
+  /** One request, which gets one answer. */
+  ask() {
+    const asked = this.wanted();
     const next = this.state && this.state.obeyed === this.sentAt ? undefined : this.queue[0];
     if (next) asked.command = next;
     if (this.socket.readyState !== WebSocket.OPEN) return; // the next connection asks
@@ -126,45 +135,63 @@ export class Live {
     } else {
       this.refusal.until = 0;
       this.queue.push(...commands);
+      if (this.picture) this.picture.stop();
     }
     return !why;
   }
 
   /** @param {ArrayBuffer} data */
   take(data) {
-    const length = new DataView(data).getUint32(0, true);
-    const answer = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-    const before = this.state;
+    const answer = readAnswer(data), before = this.state;
+    let drawn = false; // elsewhere
     this.state = answer.state;
     this.controller = answer.controller;
-    if (answer.sequence) {
-      this.sequence = answer.sequence;
-      const { width, height } = answer;
-      const pixels = width > 0 ? { width, height, data: new Uint16Array(data, 4 + length, width * height), binning: answer.binning,
-        frameWidth: answer.frame_width, frameHeight: answer.frame_height, x: answer.x, y: answer.y } : null;
-      this.takeFrame(answer.frame, pixels);
-    }
-    if (answer.problem) this.sentAt = -1; // refused: it does not count
     const now = performance.now(), due = !this.running() || !before || before.paused || now - this.textsSet >= TEXT_MS;
     if (due) this.textsSet = now;
+    if (this.picture.shown && !this.running()) this.drawHere();
+    else if (answer.sequence) {
+      this.sequence = answer.sequence;
+      drawn = this.takeFrame(answer.frame, imageOf(data, answer), data, due);
+    }
+    if (answer.problem) this.sentAt = -1; // refused: it does not count
     if (due && this.setTexts) this.setTexts();
     this.describe(before, answer.problem, due);
     if (this.state.run >= 0) this.ready();
     // the answer is drawn before the next one is asked for
+    if (drawn) return;
     if (document.hidden) setTimeout(() => this.ask(), 200);
     else requestAnimationFrame(() => this.ask());
   }
 
-  takeFrame(details, pixels) {
-    const { app } = this, sensor = app.run && app.run.sensors[app.sensor];
-    const again = this.trail.length > 0 && details.exposure_id === this.trail[this.trail.length - 1].id; // with finer pixels
-    if (again) this.trail.pop();
-    if (this.trail.length && details.exposure_id <= this.trail[this.trail.length - 1].id) this.trail = [];
+  /** The page draws again, the newest frame first. */
+  drawHere() {
+    this.sequence = 0;
+    this.picture.hide();
+  }
+
+  /**
+   * Shows a frame. While the run goes on, a worker draws it, and the page takes it some times a second for what is written about it.
+   * @param {any} details @param {import('./frame_parts.js').Image | null} pixels @param {ArrayBuffer | null} [data] the answer with both
+   * @param {boolean} [due] something is written @returns {boolean} the worker draws it, and the next one is asked for then
+   */
+  takeFrame(details, pixels, data = null, due = true) {
+    const { app } = this, sensor = app.run && app.run.sensors[app.sensor], before = [...this.trail.exposures], { earlier, again } = this.trail.add(details);
     this.missed = -1;
-    const earlier = this.trail.flatMap((one) => one.tracks);
-    this.trail.push({ id: details.exposure_id, tracks: details.tracks.map((track) => ({ ...track, now: false })) });
-    if (this.trail.length > TRAIL_EXPOSURES) this.trail.shift();
-    if (!sensor || !this.newest) return;
+    if (!sensor || !this.newest) return false;
+    const elsewhere = Boolean(data && app.panels.frameShown && this.running() && !this.part() && !document.hidden && this.picture.suits(pixels));
+    if (!elsewhere) this.picture.hide();
+    if (due || !elsewhere) this.keepFrame(details, elsewhere ? { ...pixels, data: pixels.data.slice() } : pixels, earlier);
+    if (elsewhere) this.picture.show(data, { asked: this.wanted(), trail: before, time: TEXT_MS });
+    if (elsewhere && this.queue.length > 0) this.picture.stop();
+    app.plots.follow(details.time_s);
+    if (!again) this.shown++;
+    document.dispatchEvent(new CustomEvent('liveframe', { detail: details.exposure_id }));
+    return elsewhere;
+  }
+
+  /** The page has a frame: for its drawing, for values under the pointer, and for its texts. */
+  keepFrame(details, pixels, earlier) {
+    const { app } = this, sensor = app.run.sensors[app.sensor];
     app.frameView.getPart = null; // it comes with the next answer
     this.needNames(details);
     const target = Object.entries(app.names).find(([, name]) => name === sensor.target);
@@ -176,13 +203,10 @@ export class Live {
       setText(element('position'), `exposure ${details.exposure_id} · ${details.time_s.toFixed(2)} s · ${details.utc.replace('T', ' ').replace('Z', '')} UTC`);
       element('slider').value = element('slider').max;
     };
-    app.plots.follow(details.time_s);
-    if (!again) this.shown++;
-    document.dispatchEvent(new CustomEvent('liveframe', { detail: details.exposure_id }));
   }
 
   /** Number of the newest exposure that the page has shown; -1: none. */
-  shownExposure() { return Math.max(this.missed, ...this.trail.slice(-1).map(({ id }) => id), -1); }
+  shownExposure() { return Math.max(this.missed, this.trail.newest); }
 
   /** Asks for the names of objects if one has none yet: a run has recorded them some time after its first frames. @param {any} details */
   needNames(details) {
@@ -236,7 +260,10 @@ export class Live {
   follow(newest) {
     if (newest && !this.newest) this.sequence = 0; // show it again
     this.newest = newest;
-    if (!newest) this.setTexts = null;
+    if (!newest) {
+      this.setTexts = null;
+      this.picture.hide();
+    }
     element('live-newest').setAttribute('aria-pressed', String(newest));
   }
 
@@ -252,8 +279,8 @@ export class Live {
         state.ended ? 'complete' : state.paused ? 'paused' : !state.steered ? 'running' : `${state.speed.toFixed(1)} × real time`}`);
     }
     setText(element('live-run'), this.running() ? 'Pause' : 'Run');
-    for (const id of ['live-run', 'live-step', 'live-rate', 'live-save', 'live-rewind', 'live-change', 'live-end']) element(id).disabled = !steers;
-    element('live-branch').disabled = !this.controller;
+    for (const id of ['live-run', 'live-step', 'live-rate', 'live-save', 'live-rewind', 'live-change', 'live-end']) setProperty(element(id), 'disabled', !steers);
+    setProperty(element('live-branch'), 'disabled', !this.controller);
     const refusal = performance.now() < this.refusal.until ? this.refusal.text : '';
     this.say(refusal || problem || state.message || (this.controller || !state.steered ? '' : 'Another page controls this run.'));
     setText(element('change-problem'), refusal || problem || state.message);
@@ -278,7 +305,7 @@ export class Live {
     }
     if (state.ended && this.app.run && this.app.run.state !== 'still running') this.over = true;
     if (before && state.time_s < before.time_s - 1e-9) { // rewound: what came later is recorded anew
-      this.trail = [];
+      this.trail = new Trail();
       this.app.cache.clear();
       this.app.strip.forget();
       this.app.current = -1;

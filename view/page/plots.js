@@ -57,6 +57,8 @@ class Panel {
     head.append(title, ...this.values.map((v) => v.value), ...this.stopTexts(), gap, this.scaleButton);
     this.canvas = document.createElement('canvas');
     this.canvas.setAttribute('role', 'img');
+    this.inView = true;
+    this.late = false; // what is drawn is not of now
     this.box.append(head, this.canvas);
     plots.listen(this.canvas);
   }
@@ -99,6 +101,7 @@ class Panel {
   }
 
   draw() {
+    this.late = false;
     const { context, width, height } = prepare(this.canvas), style = getComputedStyle(document.documentElement);
     const colour = (name) => style.getPropertyValue(name).trim();
     const extent = this.extent(), bottom = height - BOTTOM, plots = this.plots;
@@ -156,8 +159,10 @@ class Panel {
   }
 }
 
+/** Requests for plots at a time: three may wait for the truth, which is read once for them. */
+const REQUESTS = 4;
 /** Least time between two drawings of the plots of a live run, ms: they take longer than its frames. */
-const FOLLOW_MS = 1000;
+const FOLLOW_MS = 2000;
 
 export class Plots {
   /** @param {(time: number) => void} seek goes to the frame of a time */
@@ -175,9 +180,24 @@ export class Plots {
     this.drag = null;
     this.request = null;
     this.pointing = false; // a drawing of it waits
+    this.columnsWidth = 0; // of the box of the panels, for which the lines were asked
+    /** @type {any} */
+    this.strip = null; // the bands of `bandsOf`, in the range and width of `bandsKey`
+    this.bandsKey = '';
+    /** @type {any[] | null} */
+    this.bandsOf = null;
     this.reloading = Promise.resolve(); // the lines of the range that is shown
+    // while a run goes on, plots out of view are drawn when they come into view
+    this.seen = new IntersectionObserver((entries) => {
+      for (const { target, isIntersecting } of entries) {
+        const panel = this.panels.find(({ box }) => box === target);
+        if (!panel) continue;
+        panel.inView = isIntersecting;
+        if (isIntersecting && panel.late) { panel.draw(); panel.describe(); }
+      }
+    });
     this.listen(element('modes'));
-    new ResizeObserver(() => { this.draw(); this.reload(); }).observe(element('panels'));
+    new ResizeObserver(() => this.resize()).observe(element('panels'));
     element('time-in').addEventListener('click', () => this.zoom(0.5));
     element('time-out').addEventListener('click', () => this.zoom(2));
     element('time-all').addEventListener('click', () => this.setRange(this.all.from, this.all.to));
@@ -190,6 +210,8 @@ export class Plots {
     this.events = events;
     this.all = { from, to: to > from ? to : from + 1 };
     this.panels = panels.map((info) => new Panel(this, info));
+    this.seen.disconnect();
+    for (const panel of this.panels) this.seen.observe(panel.box);
     element('panels').replaceChildren(...this.panels.map((panel) => panel.box));
     this.setRange(this.all.from, this.all.to);
   }
@@ -223,19 +245,31 @@ export class Plots {
     this.setRange(inside - (inside - from) * factor, inside + (to - inside) * factor);
   }
 
-  /** One request for each panel, the older ones given up. */
+  /** Other columns are asked for if the width has changed; more panels alone make the box higher. */
+  resize() {
+    const width = element('panels').clientWidth;
+    if (width === this.columnsWidth) return;
+    this.columnsWidth = width;
+    this.draw();
+    this.reloading = this.reload();
+  }
+
+  /** One request for each panel, some at a time: one that waits for a long table does not keep the others. The older ones are given up. */
   async reload() {
     if (this.request) this.request.abort();
-    const request = this.request = new AbortController();
-    for (const panel of this.panels) {
-      try {
-        await panel.load(request.signal);
-      } catch (error) {
-        if (request.signal.aborted) return;
-        panel.values.forEach((v) => { v.number.textContent = '–'; });
-        panel.canvas.setAttribute('aria-label', `${panel.info.title}: ${error.message}`);
+    const request = this.request = new AbortController(), waiting = [...this.panels];
+    const work = async () => {
+      for (let panel = waiting.shift(); panel && !request.signal.aborted; panel = waiting.shift()) {
+        try {
+          await panel.load(request.signal);
+        } catch (error) {
+          if (request.signal.aborted) return;
+          panel.values.forEach((v) => { v.number.textContent = '–'; });
+          panel.canvas.setAttribute('aria-label', `${panel.info.title}: ${error.message}`);
+        }
       }
-    }
+    };
+    await Promise.all(Array.from({ length: REQUESTS }, work));
   }
 
   setCursor(time) {
@@ -253,15 +287,16 @@ export class Plots {
     if (all) this.range = { from: this.range.from, to: this.all.to };
     if (performance.now() - this.followed < FOLLOW_MS) return;
     this.followed = performance.now();
-    element('range').textContent = `${shortNumber(this.range.from)} to ${shortNumber(this.range.to)} s`;
-    this.draw();
+    setText(element('range'), `${shortNumber(this.range.from)} to ${shortNumber(this.range.to)} s`);
+    this.draw(this.panels.filter((panel) => panel.inView));
+    for (const panel of this.panels) panel.late = !panel.inView;
   }
 
-  draw() {
+  draw(panels = this.panels) {
     this.measured = element('modes').clientWidth;
     this.drawModes();
-    for (const panel of this.panels) panel.draw();
-    for (const panel of this.panels) panel.describe(); // text last: a look at a canvas after it lays out the page
+    for (const panel of panels) panel.draw();
+    for (const panel of panels) panel.describe(); // text last: a look at a canvas after it lays out the page
   }
 
   // ---------------------------------------------------------------- what all panels have
@@ -287,12 +322,32 @@ export class Plots {
     });
   }
 
+  /** The bands, one pixel high, drawn once for all panels: a day has thousands. */
+  bands() {
+    const ratio = devicePixelRatio || 1, width = Math.max(1, Math.round(this.width() * ratio));
+    const key = [this.range.from, this.range.to, this.all.to, width, this.modes.length].join();
+    if (this.bandsKey !== key || this.bandsOf !== this.modes) {
+      this.bandsKey = key;
+      this.bandsOf = this.modes;
+      this.strip = document.createElement('canvas');
+      this.strip.width = width;
+      this.strip.height = 1;
+      const context = this.strip.getContext('2d');
+      context.scale(ratio, 1);
+      this.eachBand((mode, a, b, colour) => {
+        context.fillStyle = colour;
+        context.fillRect(a, 0, b - a, 1);
+      });
+    }
+    return this.strip;
+  }
+
   drawBands(context, top, bottom, alpha) {
+    if (this.modes.length === 0) return;
+    const strip = this.bands();
     context.globalAlpha = alpha;
-    this.eachBand((mode, a, b, colour) => {
-      context.fillStyle = colour;
-      context.fillRect(a, top, b - a, bottom - top);
-    });
+    context.imageSmoothingEnabled = false;
+    context.drawImage(strip, 0, 0, strip.width, 1, 0, top, strip.width / (devicePixelRatio || 1), bottom - top);
     context.globalAlpha = 1;
   }
 

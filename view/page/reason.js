@@ -1,5 +1,6 @@
 // The reason of the frame that is shown, over its picture: whether the target was detected, and if not, why.
 import { getJson } from './api.js';
+import { setProperty } from './text.js';
 
 /** Reasons in words; shapes beside them, so that colour is not the only difference. */
 export const TITLES = {
@@ -19,7 +20,7 @@ export class Reason {
   constructor(app) {
     this.app = app;
     document.addEventListener('frameshown', () => this.show());
-    document.addEventListener('liveframe', () => { element('reason').hidden = true; });
+    document.addEventListener('liveframe', () => setProperty(element('reason'), 'hidden', true));
     element('reason').addEventListener('click', () => app.panels.show('why'));
   }
 
