@@ -103,6 +103,12 @@ static int compare_stars(const void *pa, const void *pb) {
 /* bits of a triangle's number: 3 for the octant, 2 for each division */
 enum { DIVISIONS = 14, STARS_PER_CELL = 512 };
 
+/* Stars of a table are divided by brightness first, V in 1e-5 mag: a query of bright stars passes
+ * the cells of the faint ones, and finds bright ones in a few cells that lie close in the file.
+ * From one limit to the next, stars become three to four times as many. */
+static const int32_t SHELL_LIMITS[] = {1200000, 1350000, 1500000, 1650000,
+                                       1800000, 1950000, 2100000, INT32_MAX};
+
 /* Number of the smallest triangle that contains a direction. */
 static uint32_t triangle_of(bst_vec3 u) {
     const double sx = u.x < 0.0 ? -1.0 : 1.0, sy = u.y < 0.0 ? -1.0 : 1.0,
@@ -153,27 +159,42 @@ static void divide(bst_star_entry *stars, size_t first, size_t end, int left, ui
     }
 }
 
-bst_status bst_star_list_divide(bst_ctx *ctx, bst_star_list *list, size_t first) {
-    bst_star_entry *stars = list->stars;
-    list->cells = BST_STAR_CELLS;
-    if (first >= list->count) {
-        return BST_OK;
+/* Puts the stars [first, end) that are up to a V before the others; returns their end. */
+static size_t part_by_brightness(bst_star_entry *stars, size_t first, size_t end, int32_t v) {
+    for (size_t i = first; i < end; i++) {
+        if (bst_star_record_v(&stars[i].record) <= v) {
+            bst_star_entry swap = stars[first];
+            stars[first++] = stars[i];
+            stars[i] = swap;
+        }
     }
-    for (size_t i = first; i < list->count; i++) {
+    return first;
+}
+
+/* Divides the stars [first, end) into cells by their places, and orders them by cell. */
+static void divide_shell(bst_star_entry *stars, size_t first, size_t end, uint32_t *cells) {
+    for (size_t i = first; i < end; i++) {
         stars[i].cell = triangle_of(bst_star_record_direction(&stars[i].record, 0.0));
     }
-    qsort(stars + first, list->count - first, sizeof *stars, compare_stars);
-    uint32_t cells = BST_STAR_CELLS;
+    qsort(stars + first, end - first, sizeof *stars, compare_stars);
     for (uint32_t octant = 0; octant < 8; octant++) {
         size_t next = first;
-        while (next < list->count && stars[next].cell >> 2 * DIVISIONS == octant) {
+        while (next < end && stars[next].cell >> 2 * DIVISIONS == octant) {
             next++;
         }
-        divide(stars, first, next, DIVISIONS, &cells);
+        divide(stars, first, next, DIVISIONS, cells);
         first = next;
     }
-    list->cells = cells;
-    return cells <= BST_STAR_CELLS_MAX
+}
+
+bst_status bst_star_list_divide(bst_ctx *ctx, bst_star_list *list, size_t first) {
+    list->cells = BST_STAR_CELLS;
+    for (size_t k = 0; first < list->count; k++) {
+        size_t end = part_by_brightness(list->stars, first, list->count, SHELL_LIMITS[k]);
+        divide_shell(list->stars, first, end, &list->cells);
+        first = end;
+    }
+    return list->cells <= BST_STAR_CELLS_MAX
                ? BST_OK
                : bst_fail(ctx, BST_ERR_RANGE, "too many stars for one catalogue (%zu)",
                           list->count);
