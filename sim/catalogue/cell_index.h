@@ -2,7 +2,7 @@
  *
  * Each cell has a cap that contains its stars, and the magnitude of its brightest star. Cells with
  * consecutive numbers are neighbours: 32 of them have a common cap, and 32 of these groups as well.
- * Caps are stored as a structure of arrays, of which the compiler tests several at once. */
+ * 32 caps that belong together lie together, and the compiler tests several of them at once. */
 #ifndef BST_CATALOGUE_CELL_INDEX_H
 #define BST_CATALOGUE_CELL_INDEX_H
 
@@ -15,20 +15,21 @@
 /* Caps per cap of the next level */
 #define BST_CELL_BRANCHES 32u
 
-/* Caps of a level. Their number is a multiple of BST_CELL_BRANCHES: the last ones are empty. */
-typedef struct bst_cell_caps {
-    uint32_t count;
-    float *x, *y, *z;   /* centre; beyond all reach if the cap has no stars */
-    float *radius;      /* chord that contains the stars at J2000, rad */
-    float *motion;      /* largest proper motion, rad/yr */
-    int32_t *brightest; /* V of the brightest star, 1e-5 mag */
-} bst_cell_caps;
+/* Caps that have a common one in the next level; the last ones of a level may be empty. */
+typedef struct bst_cell_block {
+    float x[BST_CELL_BRANCHES]; /* centre; beyond all reach if the cap has no stars */
+    float y[BST_CELL_BRANCHES];
+    float z[BST_CELL_BRANCHES];
+    float radius[BST_CELL_BRANCHES];      /* chord that contains the stars at J2000, rad */
+    float motion[BST_CELL_BRANCHES];      /* largest proper motion, rad/yr */
+    int32_t brightest[BST_CELL_BRANCHES]; /* V of the brightest star, 1e-5 mag */
+} bst_cell_block;
 
 enum { BST_CELL_LEVELS = 3 }; /* cells, groups, regions */
 
 typedef struct bst_cell_index {
-    bst_cell_caps level[BST_CELL_LEVELS];
-    void *memory;
+    bst_cell_block *level[BST_CELL_LEVELS]; /* [blocks[k]]; one allocation */
+    uint32_t blocks[BST_CELL_LEVELS];
 } bst_cell_index;
 
 /* A cone of the sky in which cells are searched. */
@@ -44,8 +45,8 @@ typedef struct bst_cell_search {
     const bst_cell_index *index;
     float centre[3], reach, years;
     int32_t faintest;
-    uint32_t first[BST_CELL_LEVELS]; /* cap of bit 0 of hits */
-    uint32_t hits[BST_CELL_LEVELS];  /* bit i: cap first + i is to be visited */
+    uint32_t block[BST_CELL_LEVELS]; /* whose caps are visited */
+    uint32_t hits[BST_CELL_LEVELS];  /* bit i: cap i of it is to be visited */
 } bst_cell_search;
 
 /* Builds the index of a catalogue's cells; free *out with bst_cell_index_free. BST_ERR_MEMORY. */
