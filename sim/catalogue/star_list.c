@@ -101,7 +101,18 @@ static int compare_stars(const void *pa, const void *pb) {
 /* ---------------------------------------------------------------- cells of a table's stars */
 
 /* bits of a triangle's number: 3 for the octant, 2 for each division */
-enum { DIVISIONS = 14, STARS_PER_CELL = 512 };
+enum { DIVISIONS = 14 };
+
+/* Most stars of a cell: larger cells for so many stars that a file could not have all the cells. */
+static size_t cell_size(size_t stars) {
+    return stars <= 100000000 ? 128 : 512;
+}
+
+/* Stars of a table are divided by brightness first, V in 1e-5 mag: a query of bright stars passes
+ * the cells of the faint ones, and finds bright ones in a few cells that lie close in the file.
+ * Each step costs a query of all stars the same again: steps of 3 mag with cells of 128 stars were
+ * faster than those of 1.5 and 2 mag and cells of 512 (docs/results/star_catalogue.md). */
+static const int32_t SHELL_LIMITS[] = {1200000, 1500000, 1800000, 2100000, INT32_MAX};
 
 /* Number of the smallest triangle that contains a direction. */
 static uint32_t triangle_of(bst_vec3 u) {
@@ -134,9 +145,11 @@ static uint32_t triangle_of(bst_vec3 u) {
     return number;
 }
 
-/* Gives the stars [first, end), of one triangle with `left` divisions below it, their cells. */
-static void divide(bst_star_entry *stars, size_t first, size_t end, int left, uint32_t *cells) {
-    if (end - first <= STARS_PER_CELL || left == 0) {
+/* Gives the stars [first, end), of one triangle with `left` divisions below it, their cells of up
+ * to `most` stars. */
+static void divide(bst_star_entry *stars, size_t first, size_t end, size_t most, int left,
+                   uint32_t *cells) {
+    if (end - first <= most || left == 0) {
         for (size_t i = first; i < end; i++) {
             stars[i].cell = *cells;
         }
@@ -148,32 +161,50 @@ static void divide(bst_star_entry *stars, size_t first, size_t end, int left, ui
         while (next < end && (stars[next].cell >> 2 * (left - 1) & 3u) == piece) {
             next++;
         }
-        divide(stars, first, next, left - 1, cells);
+        divide(stars, first, next, most, left - 1, cells);
+        first = next;
+    }
+}
+
+/* Puts the stars [first, end) that are up to a V before the others; returns their end. */
+static size_t part_by_brightness(bst_star_entry *stars, size_t first, size_t end, int32_t v) {
+    for (size_t i = first; i < end; i++) {
+        if (bst_star_record_v(&stars[i].record) <= v) {
+            bst_star_entry swap = stars[first];
+            stars[first++] = stars[i];
+            stars[i] = swap;
+        }
+    }
+    return first;
+}
+
+/* Divides the stars [first, end) into cells by their places, of up to `most` stars, and orders them
+ * by cell. */
+static void divide_shell(bst_star_entry *stars, size_t first, size_t end, size_t most,
+                         uint32_t *cells) {
+    for (size_t i = first; i < end; i++) {
+        stars[i].cell = triangle_of(bst_star_record_direction(&stars[i].record, 0.0));
+    }
+    qsort(stars + first, end - first, sizeof *stars, compare_stars);
+    for (uint32_t octant = 0; octant < 8; octant++) {
+        size_t next = first;
+        while (next < end && stars[next].cell >> 2 * DIVISIONS == octant) {
+            next++;
+        }
+        divide(stars, first, next, most, DIVISIONS, cells);
         first = next;
     }
 }
 
 bst_status bst_star_list_divide(bst_ctx *ctx, bst_star_list *list, size_t first) {
-    bst_star_entry *stars = list->stars;
     list->cells = BST_STAR_CELLS;
-    if (first >= list->count) {
-        return BST_OK;
+    const size_t most = cell_size(list->count - first);
+    for (size_t k = 0; first < list->count; k++) {
+        size_t end = part_by_brightness(list->stars, first, list->count, SHELL_LIMITS[k]);
+        divide_shell(list->stars, first, end, most, &list->cells);
+        first = end;
     }
-    for (size_t i = first; i < list->count; i++) {
-        stars[i].cell = triangle_of(bst_star_record_direction(&stars[i].record, 0.0));
-    }
-    qsort(stars + first, list->count - first, sizeof *stars, compare_stars);
-    uint32_t cells = BST_STAR_CELLS;
-    for (uint32_t octant = 0; octant < 8; octant++) {
-        size_t next = first;
-        while (next < list->count && stars[next].cell >> 2 * DIVISIONS == octant) {
-            next++;
-        }
-        divide(stars, first, next, DIVISIONS, &cells);
-        first = next;
-    }
-    list->cells = cells;
-    return cells <= BST_STAR_CELLS_MAX
+    return list->cells <= BST_STAR_CELLS_MAX
                ? BST_OK
                : bst_fail(ctx, BST_ERR_RANGE, "too many stars for one catalogue (%zu)",
                           list->count);

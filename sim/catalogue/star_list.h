@@ -52,10 +52,12 @@ bst_status bst_star_list_add_variable(bst_ctx *ctx, bst_star_list *list,
 /* Frees what a list holds. */
 void bst_star_list_free(bst_star_list *list);
 
-/* Divides the stars of a table, from list->stars[first] on, into cells of neighbours and orders
- * them by cell. Cells are triangles of the hierarchical triangular mesh (Kunszt, Szalay and Thakar
- * 2001, in Mining the Sky, 631), each cut into four while it holds more than 512 stars, 14 times
- * at most. Sets list->cells. BST_ERR_RANGE: more cells than a file may have. */
+/* Divides the stars of a table, from list->stars[first] on, into cells of neighbours of like
+ * brightness and orders them by cell: those up to V 12 first, then in steps of 3 mag. The cells
+ * of a step are triangles of the hierarchical triangular mesh (Kunszt, Szalay and Thakar 2001, in
+ * Mining the Sky, 631), each cut into four while it holds more than 128 stars (512 of a table of
+ * more than 100 million), 14 times at most. Sets list->cells. BST_ERR_RANGE: more cells than a file
+ * may have. */
 bst_status bst_star_list_divide(bst_ctx *ctx, bst_star_list *list, size_t first) BST_MUST_CHECK;
 
 /* Orders the stars by cell, brightest first, and writes the catalogue file, under a temporary name

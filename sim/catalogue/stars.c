@@ -11,6 +11,7 @@
 
 #include "boresight/rng.h"
 #include "sim/catalogue/bright_stars.h"
+#include "sim/catalogue/cell_index.h"
 #include "sim/catalogue/star_index.h"
 #include "sim/catalogue/variable_stars.h"
 #include "sim/core/file.h"
@@ -21,82 +22,17 @@
 extern const unsigned char bst_stars_embedded_begin[];
 extern const unsigned char bst_stars_embedded_end[];
 
-/* Cap that contains all cells of a group, or all groups of a region. Cells with consecutive numbers
- * are neighbours: a query skips most of the sky region by region, then group by group. */
-typedef struct cell_group {
-    double centre[3], radius, pm_max_radpyr;
-} cell_group;
-
-enum { GROUP = 32 };
-
 struct bst_stars {
     bst_star_view view;
-    cell_group *groups;  /* one per GROUP cells; shared as the mapping is */
-    cell_group *regions; /* one per GROUP groups; behind the groups in memory */
-    void *mapping;       /* NULL: embedded */
+    bst_cell_index *index; /* shared as the mapping is */
+    void *mapping;         /* NULL: embedded */
     size_t mapping_bytes;
     char path[512];
-    bool borrowed; /* another catalogue owns the mapping and the groups */
+    bool borrowed; /* another catalogue owns the mapping and the index */
     bool altered;
     bst_star_errors_config errors;
     bst_rng_key key;
 };
-
-/* Cap around one cell; radius below 0: it has no stars. */
-static cell_group cap_of_cell(const bst_star_cell *cell) {
-    return (cell_group){{cell->centre[0], cell->centre[1], cell->centre[2]},
-                        cell->count > 0 ? (double)cell->radius_rad : -1.0,
-                        cell->pm_max_radpyr};
-}
-
-/* Cap around other caps. */
-static cell_group enclose(const cell_group *caps, uint32_t count) {
-    cell_group out = {.radius = -1.0}; /* no stars */
-    int filled = 0;
-    for (uint32_t c = 0; c < count; c++) {
-        filled += caps[c].radius >= 0.0;
-        for (int k = 0; k < 3 && caps[c].radius >= 0.0; k++) {
-            out.centre[k] += caps[c].centre[k];
-        }
-    }
-    for (int k = 0; k < 3 && filled > 0; k++) {
-        out.centre[k] /= filled;
-    }
-    for (uint32_t c = 0; c < count; c++) {
-        if (caps[c].radius >= 0.0) {
-            double dx = caps[c].centre[0] - out.centre[0], dy = caps[c].centre[1] - out.centre[1],
-                   dz = caps[c].centre[2] - out.centre[2];
-            double away = sqrt(dx * dx + dy * dy + dz * dz);
-            out.radius = fmax(out.radius, away + caps[c].radius + 1e-9);
-            out.pm_max_radpyr = fmax(out.pm_max_radpyr, caps[c].pm_max_radpyr);
-        }
-    }
-    return out;
-}
-
-/* Computes centre and radius that enclose each group of star cells, and each region of groups. */
-static bst_status group_cells(bst_ctx *ctx, bst_stars *s) {
-    const uint32_t cells = s->view.header->cell_count;
-    const uint32_t groups = cells / GROUP + 1, regions = groups / GROUP + 1;
-    s->groups = calloc(groups + regions, sizeof *s->groups);
-    if (!s->groups) {
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the star catalogue");
-    }
-    for (uint32_t g = 0; g < groups; g++) {
-        cell_group caps[GROUP];
-        uint32_t count = 0;
-        for (uint32_t c = g * GROUP; c < cells && count < GROUP; c++) {
-            caps[count++] = cap_of_cell(&s->view.cells[c]);
-        }
-        s->groups[g] = enclose(caps, count);
-    }
-    s->regions = s->groups + groups;
-    for (uint32_t r = 0; r < regions; r++) {
-        uint32_t first = r * GROUP, left = groups > first ? groups - first : 0;
-        s->regions[r] = enclose(s->groups + first, left < GROUP ? left : GROUP);
-    }
-    return BST_OK;
-}
 
 /* Identity of the star of a record in cell c. */
 static uint32_t identity(const bst_star_view *view, uint32_t c, const bst_star_record *r) {
@@ -238,7 +174,7 @@ bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) {
         status = s->path[0] ? open_file(ctx, s->path, s) : open_embedded(ctx, s);
     }
     if (status == BST_OK) {
-        status = group_cells(ctx, s);
+        status = bst_cell_index_create(ctx, &s->view, &s->index);
     }
     if (status != BST_OK) {
         bst_stars_close(s);
@@ -257,7 +193,7 @@ bst_status bst_stars_open(bst_ctx *ctx, const char *name, bst_stars **out) {
 
 void bst_stars_close(bst_stars *stars) {
     if (stars && !stars->borrowed) {
-        free(stars->groups);
+        bst_cell_index_free(stars->index);
         if (stars->mapping) {
             munmap(stars->mapping, stars->mapping_bytes);
         }
@@ -373,58 +309,50 @@ static void put_in_order(bst_star *stars, int count) {
     }
 }
 
-/* Checks whether a star of the group can be within radius_rad of a direction after that many
- * years. */
-static bool may_reach(const cell_group *group, bst_vec3 centre, double radius_rad, double years) {
-    double reach = radius_rad + group->radius + group->pm_max_radpyr * years;
-    bst_vec3 d = {centre.x - group->centre[0], centre.y - group->centre[1],
-                  centre.z - group->centre[2]};
-    return group->radius >= 0.0 && bst_vec3_dot(d, d) <= reach * reach;
-}
-
 /* State of a query. */
 typedef struct star_search {
     const bst_stars *stars;
     const bst_star_query *query;
     bst_star_observer observer;
     double chord2, slack; /* slack: from where stars may enter the cone, rad */
+    int32_t faintest;     /* V of the faintest record that counts, 1e-5 mag */
     radec_box box;
     double box_drift; /* proper motion that the box holds for; -1: there is none yet */
     bst_star *out;
     int capacity, found;
 } star_search;
 
-/* Number of the next cell from c on that may reach into the cone by its group and region. */
-static uint32_t next_cell(const star_search *q, uint32_t c) {
-    const double reach = q->query->radius_rad + q->slack, years = fabs(q->observer.years);
-    const uint32_t cells = q->stars->view.header->cell_count, region = GROUP * GROUP;
-    while (c < cells && c % GROUP == 0) {
-        if (c % region == 0 &&
-            !may_reach(&q->stars->regions[c / region], q->query->centre, reach, years)) {
-            c += region;
-        } else if (!may_reach(&q->stars->groups[c / GROUP], q->query->centre, reach, years)) {
-            c += GROUP;
-        } else {
-            break;
-        }
+/* V of the faintest record that may be within v_limit, 1e-5 mag: published magnitudes of bright
+ * stars differ from those of records. */
+static int32_t faintest_record(double v_limit) {
+    const double most = v_limit >= BST_BRIGHT_STARS_V
+                            ? fmin(v_limit, 1e4)
+                            : fmax(fmin(BST_BRIGHT_STARS_V, v_limit + MOST_WRONG_MAG), -1e4);
+    int32_t v = (int32_t)floor(most * 1e5);
+    while ((v + 1) / 1e5 <= most) {
+        v++;
     }
-    return c;
+    while (v / 1e5 > most) {
+        v--;
+    }
+    return v;
 }
 
 /* Adds the stars of a cell that are in the cone. */
 static void search_cell(star_search *q, uint32_t c) {
     const bst_stars *stars = q->stars;
     const double v_limit = q->query->v_limit;
+    const radec_box box = q->box;
     bool out_of_order = false;
     const int first = q->found;
     const bst_star_record *r = stars->view.records + stars->view.cells[c].first;
     for (const bst_star_record *end = r + stars->view.cells[c].count; r < end; r++) {
-        double v_mag = bst_star_record_v(r) / 1e5;
-        if (v_mag > v_limit && (v_mag > BST_BRIGHT_STARS_V || v_mag > v_limit + MOST_WRONG_MAG)) {
+        const int32_t v = bst_star_record_v(r);
+        if (v > q->faintest) {
             break; /* sorted brightest first */
         }
-        if (r->dec < q->box.dec_min || r->dec > q->box.dec_max ||
-            r->ra - q->box.ra_min > q->box.ra_width) {
+        /* one branch: either comparison alone is hard to predict */
+        if ((r->dec < box.dec_min) | (r->dec > box.dec_max) | (r->ra - box.ra_min > box.ra_width)) {
             continue;
         }
         bst_vec3 direction = bst_star_record_seen(r, &q->observer);
@@ -438,7 +366,7 @@ static void search_cell(star_search *q, uint32_t c) {
             continue;
         }
         bool reordered = unpack(&stars->view, r, id, direction, &q->observer, &star);
-        if (reordered ? (double)star.v_mag > v_limit : v_mag > v_limit) {
+        if (reordered ? (double)star.v_mag > v_limit : v / 1e5 > v_limit) {
             continue;
         }
         if (q->found < q->capacity) {
@@ -449,6 +377,25 @@ static void search_cell(star_search *q, uint32_t c) {
             }
         }
         q->found++;
+    }
+}
+
+/* Adds the stars in the cone of cells [count]. */
+static void search_cells(star_search *q, const uint32_t *cells, uint32_t count) {
+    const bst_star_view *view = &q->stars->view;
+    for (uint32_t i = 0; i < count; i++) {
+        /* the cells are far apart: memory gets their brightest stars while others are looked at */
+        const char *record = (const char *)(view->records + view->cells[cells[i]].first);
+        __builtin_prefetch(record);
+        __builtin_prefetch(record + 64);
+    }
+    for (uint32_t i = 0; i < count; i++) {
+        const double drift = view->cells[cells[i]].pm_max_radpyr * fabs(q->observer.years);
+        if (drift > q->box_drift) { /* it holds for less motion, too */
+            q->box = box_around(q->query->centre, q->query->radius_rad + drift + q->slack);
+            q->box_drift = drift;
+        }
+        search_cell(q, cells[i]);
     }
 }
 
@@ -478,22 +425,13 @@ bst_status bst_stars_query_seen(bst_ctx *ctx, const bst_stars *stars, const bst_
                   ? MOST_SIGMAS * stars->errors.position_error_sigma_arcsec * BST_ARCSEC_RAD
                   : 0.0;
     q.slack += q.observer.at_barycentre ? 0.0 : MOST_PARALLAX_RAD;
-    const uint32_t cells = stars->view.header->cell_count;
-    for (uint32_t c = next_cell(&q, 0); c < cells; c = next_cell(&q, c + 1)) {
-        const bst_star_cell *cell = &stars->view.cells[c];
-        double drift = cell->pm_max_radpyr * fabs(q.observer.years);
-        double reach = radius_rad + cell->radius_rad + drift + q.slack;
-        bst_vec3 d = {centre.x - cell->centre[0], centre.y - cell->centre[1],
-                      centre.z - cell->centre[2]};
-        /* a chord is shorter than its angle: no cell is missed */
-        if (cell->count == 0 || bst_vec3_dot(d, d) > reach * reach) {
-            continue;
-        }
-        if (drift > q.box_drift) { /* it holds for less motion, too */
-            q.box = box_around(centre, radius_rad + drift + q.slack);
-            q.box_drift = drift;
-        }
-        search_cell(&q, c);
+    q.faintest = faintest_record(query->v_limit);
+    const bst_cell_cone cone = {centre, radius_rad + q.slack, fabs(q.observer.years), q.faintest};
+    bst_cell_search search;
+    bst_cell_search_begin(stars->index, &cone, &search);
+    uint32_t cells[4 * BST_CELL_BRANCHES], cell_count;
+    while ((cell_count = bst_cell_search_next(&search, cells, 4 * BST_CELL_BRANCHES)) > 0) {
+        search_cells(&q, cells, cell_count);
     }
     *count = q.found;
     return BST_OK;
