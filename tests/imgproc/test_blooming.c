@@ -127,9 +127,9 @@ static void neighbours_stay(void **state) {
     synthetic_free(&s);
 }
 
-/* Errors of places: a fit has its own, three times what it misses by beyond chance, and 0.4 % of the
- * bleed's width; without one it is 3 % of the width, 0.1 px at least. Those of the light are its
- * shot noise and 2 % of the wells. */
+/* Errors of places: a fit has its own, three times what it misses by beyond chance, and 0.4 % of
+ * the bleed's width; without one it is 3 % of the width, 0.1 px at least. Those of the light are
+ * its shot noise and 2 % of the wells. */
 static void errors_go_by_misfit_and_width(void **state) {
     (void)state;
     static const double widths[] = {2.0, 3.5, 40.0}, misfits[] = {0.5, 1.0, 7.0};
