@@ -67,16 +67,17 @@ static void draw(field *f, uint64_t seed) {
                 place[i][1] = 1199.0 * uniform();
             }
             const bst_vec3 v = bst_camera_unproject(&c, place[i][0], place[i][1]);
-            /* correlated errors: of the covariance (a, b; b, d) by its Cholesky factor */
+            /* correlated errors, by the Cholesky factor of their covariance: so strongly that
+             * weights of the wrong slant would show */
             const double n = f->noise_px, e1 = normal(), e2 = normal();
             *s = (bst_camera_fit_star){.frame = k,
                                        .id = f->at_rest ? i : k * STARS + i,
                                        .cam = bst_quat_rotate(bst_quat_from_rotvec(wrong), v),
                                        .x_px = place[i][0] + own[i][0] + n * e1,
-                                       .y_px = place[i][1] + own[i][1] + n * (0.5 * e1 + 0.7 * e2),
+                                       .y_px = place[i][1] + own[i][1] + n * (0.98 * e1 + 0.2 * e2),
                                        .cov_xx = n * n,
-                                       .cov_xy = 0.5 * n * n,
-                                       .cov_yy = n * n * (0.25 + 0.49)};
+                                       .cov_xy = 0.98 * n * n,
+                                       .cov_yy = n * n * (0.98 * 0.98 + 0.2 * 0.2)};
         }
     }
 }

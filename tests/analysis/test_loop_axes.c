@@ -3,6 +3,8 @@
 #include <cjson/cJSON.h>
 
 #include "boresight/vec.h"
+#include "gimbal/modules.h"
+#include "gimbal/mount/second_order.h"
 #include "gimbal/spacecraft/spacecraft_response.h"
 #include "sim/analysis/loop/loop_model.h"
 #include "sim/cli/load.h"
@@ -166,6 +168,41 @@ static void a_second_order_mount(void **state) {
         bst_assert_close(p->above_px * p->above_px, 0.02, 1e-6);
         assert_true(p->noise_px > 0.0 && p->noise_px < 0.3);
     }
+    bst_loop_model_free(m);
+    bst_scenario_free(&scenario);
+    bst_json_free(json);
+}
+
+/* What an attitude estimate that is worse about one axis than about another adds to each loop: the
+ * outer axis turns about y, along which the star trackers look, the inner one about x. */
+static void the_body_by_axis(void **state) {
+    (void)state;
+    const char *const sets[] = {GIMBAL "platform/drift_arcsec_per_s=[0,0,0]",
+                                GIMBAL "platform/jitter_high_px_rms=0",
+                                GIMBAL "platform/jitter_low_px_rms=0",
+                                GIMBAL "platform/spacecraft={\"type\": \"rigid_body\"}"};
+    bst_json *json;
+    bst_scenario scenario;
+    bst_loop_model *m = model_of(&json, &scenario, sets, 4);
+    const bst_spacecraft_config *craft = NULL;
+    for (int i = 0; i < scenario.module_count; i++) {
+        if (scenario.modules[i].desc->config == bst_two_axis_config_table) {
+            const bst_mount_two_axis_config *mount = scenario.modules[i].config;
+            craft = &mount->platform.spacecraft;
+        }
+    }
+    assert_non_null(craft);
+    bst_loop_axis *a = calloc(1, sizeof *a);
+    assert_non_null(a);
+    double open2[2];
+    for (int k = 0; k < 2; k++) {
+        a->band_count = 0;
+        bst_loop_body_bands(craft, k == 0 ? 1 : 0, m->pixel_rad, a);
+        open2[k] = variance_between(a, 0.0, 1e9);
+        bst_assert_close(pow(m->axis[k].prediction.open_px, 2.0) / open2[k], 1.0, 1e-9);
+    }
+    assert_true(open2[0] > 1.2 * open2[1]);
+    free(a);
     bst_loop_model_free(m);
     bst_scenario_free(&scenario);
     bst_json_free(json);
@@ -437,13 +474,10 @@ static void every_key(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(bands_of_the_jitter),
-        cmocka_unit_test(bands_of_the_attitude),
-        cmocka_unit_test(a_second_order_mount),
-        cmocka_unit_test(predictions_scale),
-        cmocka_unit_test(response_and_gains),
-        cmocka_unit_test(a_full_mount),
-        cmocka_unit_test(every_key),
+        cmocka_unit_test(bands_of_the_jitter),  cmocka_unit_test(bands_of_the_attitude),
+        cmocka_unit_test(a_second_order_mount), cmocka_unit_test(the_body_by_axis),
+        cmocka_unit_test(predictions_scale),    cmocka_unit_test(response_and_gains),
+        cmocka_unit_test(a_full_mount),         cmocka_unit_test(every_key),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -89,6 +89,10 @@ static void check(scene *s, double length) {
                 sum_y += ey;
                 square += ex * ex + ey * ey;
                 assert_true(found.items[k].cov_xx > 0.0 && found.items[k].cov_yy > 0.0);
+                if (length > 10.0) { /* vague along it, which is right and down */
+                    assert_true(found.items[k].cov_xy > 0.0 &&
+                                found.items[k].cov_xx > found.items[k].cov_yy);
+                }
             }
         }
     }

@@ -259,6 +259,29 @@ static void parts_and_shadows(void **state) {
     bench_free(&b);
 }
 
+/* Two bars side by side are one target if the gap is less than join_share of a bar's diagonal,
+ * however they stand. */
+static void bars_side_by_side(void **state) {
+    (void)state;
+    bench b;
+    bench_init(&b, &SPHERE);
+    for (int lying = 0; lying < 2; lying++) {
+        synthetic_clear(&b.s);
+        for (int k = 0; k < 2; k++) {
+            double off = 25.0 * k - 12.5, wide = lying ? 30.0 : 6.0, high = lying ? 6.0 : 30.0;
+            const double p[] = {
+                150.0 + (lying ? 0.0 : off), 150.0 + (lying ? off : 0.0), wide, high, 8e3, 8e3};
+            draw(&b.s, faces, p);
+        }
+        const bst_detection *t = process(&b, 0.0, 0.0); /* the only one */
+        assert_non_null(t);
+        bst_assert_close(t->x_px, 150.0, 0.3); /* pixels of the outline's corners */
+        bst_assert_close(t->y_px, 150.0, 0.3);
+        bst_assert_close(t->extent.size_px, hypot(37.0, 60.0), 2.0);
+    }
+    bench_free(&b);
+}
+
 /* Edges of bright, dim and full faces are all in their places: the centre is that of the box,
  * however unlike its faces are. */
 static void unlike_faces(void **state) {
@@ -517,6 +540,7 @@ int main(void) {
         cmocka_unit_test(points_are_moved_back_from_the_sun),
         cmocka_unit_test(spheres),
         cmocka_unit_test(parts_and_shadows),
+        cmocka_unit_test(bars_side_by_side),
         cmocka_unit_test(unlike_faces),
         cmocka_unit_test(saturated),
         cmocka_unit_test(limits),

@@ -133,10 +133,81 @@ static void test_stars_points_and_edges(void **state) {
     synthetic_free(&s);
 }
 
+/* The same pixels as those of a finer sensor that are binned, in a window off its corner: the same
+ * streaks, in its pixels. */
+static void test_binned_pixels_in_a_window(void **state) {
+    (void)state;
+    enum { LEFT = 12, TOP = 30 };
+    bst_ctx ctx = {0};
+    bst_star_path_node nodes[NODES];
+    double mean[2];
+    bst_detections *seen[3];
+    bent_motion(nodes);
+    mean_of(nodes, mean);
+    synthetic s;
+    synthetic_init(&s, SIDE, SIDE);
+    add_star(&s, nodes, mean, 110.0, 45.0, 60000.0);
+    add_star(&s, nodes, mean, 95.0, 140.0, 30000.0);
+    synthetic_expose(&s, bst_rng_make_key(27, 0, "test", "long_streaks"), 1);
+    for (int b = 1; b <= 3; b++) {
+        synthetic o = s;
+        int left = b > 1 ? LEFT : 0, top = b > 1 ? TOP : 0;
+        o.camera.width_px = 2 * left + b * SIDE;
+        o.camera.height_px = 2 * top + b * SIDE;
+        o.camera.pixel_scale_arcsec /= b;
+        o.camera.psf_fwhm_px *= b;
+        o.camera.full_well_e /= b * b;
+        bst_imgproc *ip = synthetic_processor(&ctx, &o);
+        bst_detections *d = seen[b - 1] = synthetic_detections(2048);
+        const bst_imgproc_frame frame = {.pixels = s.pixels,
+                                         .window = {left, top, b * SIDE, b * SIDE},
+                                         .binning = b,
+                                         .bits = 16,
+                                         .exposure_s = 0.5};
+        bst_camera_motion motion = synthetic_motion(&o, 116.0 * b, 40.0 * b);
+        bst_star_path_node finer[NODES];
+        for (int k = 0; k < NODES; k++) {
+            finer[k] = (bst_star_path_node){nodes[k].time, b * nodes[k].x_px, b * nodes[k].y_px};
+        }
+        bool followed;
+        bst_assert_ok(&ctx, bst_imgproc_detect(&ctx, ip, &frame, &motion, d, 2048));
+        bst_assert_ok(&ctx, bst_imgproc_follow_streaks(&ctx, ip, finer, NODES, d, 2048, &followed));
+        assert_true(followed);
+        for (int i = 0; i < 2; i++) {
+            double x = i == 0 ? 110.0 : 95.0, y = i == 0 ? 45.0 : 140.0;
+            int one = synthetic_nearest(seen[0], x, y, 1.0);
+            int k = synthetic_nearest(d, left + b * x + 0.5 * (b - 1), top + b * y + 0.5 * (b - 1),
+                                      1.0 * b);
+            assert_true(one >= 0 && k >= 0);
+            const bst_detection *p = &seen[0]->items[one], *q = &d->items[k];
+            bst_assert_close((q->x_px - left - 0.5 * (b - 1)) / b, p->x_px, 0.02);
+            bst_assert_close((q->y_px - top - 0.5 * (b - 1)) / b, p->y_px, 0.02);
+            bst_assert_close(q->cov_xx / (b * b * p->cov_xx), 1.0, 0.02);
+            bst_assert_close(q->cov_xy / (b * b * p->cov_xy), 1.0, 0.02);
+            bst_assert_close(q->cov_yy / (b * b * p->cov_yy), 1.0, 0.02);
+            bst_assert_close(q->flux_e / p->flux_e, 1.0, 0.02);
+            bst_assert_close(q->snr / p->snr, 1.0, 0.02);
+            bst_assert_close(q->length_px / (b * p->length_px), 1.0, 0.02);
+            bst_assert_close(q->width_px / (b * p->width_px), 1.0, 0.02);
+            bst_assert_close(q->angle_rad, p->angle_rad, 0.01);
+            bst_assert_close(q->v_mag, p->v_mag, 0.02);
+            /* from upper left to lower right: vague along it */
+            assert_true(q->cov_xy > 0.0 && q->cov_xx > q->cov_yy);
+            bst_assert_close(q->angle_rad, atan2(40.0, 116.0), 0.01);
+        }
+        bst_imgproc_free(ip);
+    }
+    for (int b = 0; b < 3; b++) {
+        free(seen[b]);
+    }
+    synthetic_free(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_path_of_a_motion),
         cmocka_unit_test(test_stars_points_and_edges),
+        cmocka_unit_test(test_binned_pixels_in_a_window),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -338,6 +338,41 @@ static void masked_charge_on_a_stamp(void **state) {
     }
 }
 
+/* Light of a streak about (0, 0) in a pixel: the mean of points along it. */
+static double streak_in_pixel(double sigma, double dx, double dy, double x, double y) {
+    enum { POINTS = 60 };
+    double sum = 0.0, u = 1.0 / (sigma * sqrt(2.0));
+    for (int k = 0; k < POINTS; k++) {
+        double t = (k + 0.5) / POINTS - 0.5, a = x - t * dx, b = y - t * dy;
+        sum += 0.25 / POINTS * (erf((a + 0.5) * u) - erf((a - 0.5) * u)) *
+               (erf((b + 0.5) * u) - erf((b - 0.5) * u));
+    }
+    return sum;
+}
+
+/* Covariance of a place: that of white noise, inverse of the slopes' products; and the mean of its
+ * two axes' photon noise relative to it, with the image's light as weight. */
+static void law_by_sums(double sigma, double dx, double dy, bst_imgproc_peak_law *law) {
+    const double h = 1e-3;
+    double s[3] = {0}, k[3] = {0};
+    for (int y = -16; y <= 16; y++) {
+        for (int x = -16; x <= 16; x++) {
+            double p = streak_in_pixel(sigma, dx, dy, x, y);
+            double a = (streak_in_pixel(sigma, dx, dy, x + h, y) - p) / h,
+                   b = (streak_in_pixel(sigma, dx, dy, x, y + h) - p) / h;
+            const double products[3] = {a * a, a * b, b * b};
+            for (int i = 0; i < 3; i++) {
+                s[i] += products[i];
+                k[i] += products[i] * p;
+            }
+        }
+    }
+    double det = s[0] * s[2] - s[1] * s[1];
+    *law = (bst_imgproc_peak_law){.xx = s[2] / det, .xy = -s[1] / det, .yy = s[0] / det};
+    /* half of the trace of K S^-1, K with photons as weights */
+    law->photons = 0.5 * (k[0] * law->xx + 2.0 * k[1] * law->xy + k[2] * law->yy);
+}
+
 /* Law of a place: white noise over the slopes of the image, and photons of the source itself. For a
  * Gaussian that is wide against a pixel: 8 pi sigma^4 on noise over flux squared; sum p^2 is
  * 1 / (4 pi sigma^2), sum p^3 / sum p^2 is 1 / (3 pi sigma^2) ... of half that in the place. */
@@ -366,6 +401,12 @@ static void law_of_a_place(void **state) {
     double c = 0.6, s = 0.8, along = c * c * law.xx + 2 * c * s * law.xy + s * s * law.yy,
            across = s * s * law.xx - 2 * c * s * law.xy + c * c * law.yy;
     assert_true(along > 5 * across && law.xy > 0);
+    bst_imgproc_peak_law sums;
+    law_by_sums(sigma, 9, 12, &sums);
+    bst_assert_close(law.xx / sums.xx, 1.0, 0.01);
+    bst_assert_close(law.xy / sums.xx, sums.xy / sums.xx, 0.01);
+    bst_assert_close(law.yy / sums.yy, 1.0, 0.01);
+    bst_assert_close(law.photons / sums.photons, 1.0, 0.01);
     bst_assert_close(law.floor_px2, pow(0.012 + 0.0013 * 15, 2), 1e-12);
     /* the place of a source takes them */
     b.l.law[0] = (bst_imgproc_peak_law){.xx = 50,

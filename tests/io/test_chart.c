@@ -261,6 +261,40 @@ static void time_units(void **state) {
     assert_string_equal(name, "d");
 }
 
+static void write_axes(FILE *out, void *user) {
+    bst_chart *c = user;
+    c->out = out;
+    bst_chart_begin(c);
+    bst_chart_end(c);
+}
+
+/* Numbers of both axes stand apart, and are many enough, on charts that lie and that stand. */
+static void numbers_by_the_shape_of_the_chart(void **state) {
+    (void)state;
+    static const double shapes[][2] = {{900, 160}, {240, 700}};
+    for (int k = 0; k < 2; k++) {
+        bst_chart c = {.width = shapes[k][0],
+                       .height = shapes[k][1],
+                       .x = {.label = "x", .low = 0, .high = 100},
+                       .y = {.label = "y", .low = 0, .high = 100}};
+        char *text = written(write_axes, &c);
+        double last = NAN, nearest = INFINITY;
+        int count = 0;
+        for (const char *at = text; (at = strstr(at, "<path class=\"g\" d=\"M")); at++) {
+            double x, y, to;
+            if (sscanf(at, "<path class=\"g\" d=\"M%lf %lfH%lf", &x, &y, &to) == 3) {
+                nearest = isnan(last) ? nearest : fmin(nearest, fabs(y - last));
+                last = y;
+                count++;
+                bst_assert_close(to - x, c.inner_width, 0.11);
+            }
+        }
+        assert_true(nearest >= 16.0); /* 1.5 lines */
+        assert_true(count >= 2 && count >= (int)(c.inner_height / 80.0));
+        free(text);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(text_cannot_become_markup),
@@ -268,6 +302,7 @@ int main(void) {
         cmocka_unit_test(ticks_are_round),
         cmocka_unit_test(ticks_of_logarithms),
         cmocka_unit_test(axes_of_any_range),
+        cmocka_unit_test(numbers_by_the_shape_of_the_chart),
         cmocka_unit_test(thinning_keeps_extremes),
         cmocka_unit_test(thinning_breaks_at_gaps),
         cmocka_unit_test(charts_are_sound),

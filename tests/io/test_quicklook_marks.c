@@ -6,11 +6,11 @@
 #include "sim/io/quicklook.h"
 #include "tests/io/scratch.h"
 
-enum { WIDTH = 300, HEIGHT = 420, MOST = 80 };
+enum { WIDTH = 300, HEIGHT = 420, MOST = 200 };
 
 typedef struct call {
-    char what; /* c circle, x cross, r rectangle, d diamond, w window of a view */
-    double x, y, w, h;
+    char what;         /* c circle, x cross, r rectangle, d diamond, w window of a view, l line */
+    double x, y, w, h; /* of a line its start and its end */
 } call;
 
 static call calls[MOST];
@@ -29,6 +29,16 @@ void __wrap_bst_picture_rectangle(bst_picture *p, double x, double y, double w, 
                                   bst_io_colour colour, double width);
 void __wrap_bst_mark_cross(bst_picture *p, double x, double y, double gap, double arm);
 void __wrap_bst_mark_diamond(bst_picture *p, double x, double y, double r);
+void __wrap_bst_picture_line(bst_picture *p, double x0, double y0, double x1, double y1,
+                             bst_io_colour colour, double thickness);
+
+void __wrap_bst_picture_line(bst_picture *p, double x0, double y0, double x1, double y1,
+                             bst_io_colour colour, double thickness) {
+    (void)p;
+    (void)colour;
+    (void)thickness;
+    keep('l', x0, y0, x1, y1);
+}
 
 void __wrap_bst_picture_clip(bst_picture *p, bst_io_box box) {
     (void)p;
@@ -137,7 +147,56 @@ static void marks_are_at_their_places(void **state) {
     free(pixels);
 }
 
+/* Number of lines with these ends, to rounding. */
+static int lines(double x0, double y0, double x1, double y1) {
+    int found = 0;
+    for (int i = 0; i < call_count; i++) {
+        const call *c = &calls[i];
+        found += c->what == 'l' && hypot(c->x - x0, c->y - y0) < 1e-6 &&
+                 hypot(c->w - x1, c->h - y1) < 1e-6;
+    }
+    return found;
+}
+
+/* Of a target outside the frame an arrow from the boresight shows the way, in all directions. */
+static void an_arrow_to_what_is_outside(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    scratch s;
+    uint16_t *pixels = calloc(WIDTH * HEIGHT, sizeof *pixels);
+    assert_non_null(pixels);
+    scratch_make(&s);
+    for (int k = 0; k < 7; k++) {
+        const bst_io_mark marks[2] = {{.x_px = 20.5, .y_px = 391.25, .radius_px = 30.0},
+                                      {.x_px = 271.0, .y_px = 33.5, .radius_px = 40.0}};
+        double dx = cos(0.3 + 0.9 * k), dy = sin(0.3 + 0.9 * k);
+        const bst_quicklook_frame frame = {.pixels = pixels,
+                                           .width = WIDTH,
+                                           .height = HEIGHT,
+                                           .detections = marks,
+                                           .detection_count = 2,
+                                           .has_target = true,
+                                           .target_x_px = 160.5 + 900.0 * dx,
+                                           .target_y_px = 230.75 + 900.0 * dy,
+                                           .boresight_x_px = 160.5,
+                                           .boresight_y_px = 230.75};
+        call_count = 0;
+        bst_assert_ok(&ctx,
+                      bst_quicklook_write(&ctx, scratch_path(&s, "q.png"), "t", &frame, NULL));
+        call cross = nth(0, 'x', 0);
+        double x = cross.x + 98.0 * dx, y = cross.y + 98.0 * dy;
+        assert_int_equal(lines(cross.x + 28.0 * dx, cross.y + 28.0 * dy, x, y), 1);
+        for (int side = -1; side < 2; side += 2) { /* the head's lines go back from its tip */
+            assert_int_equal(
+                lines(x, y, x - 11.0 * dx - side * 6.0 * dy, y - 11.0 * dy + side * 6.0 * dx), 1);
+        }
+    }
+    scratch_remove(&s);
+    free(pixels);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(marks_are_at_their_places)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(marks_are_at_their_places),
+                                       cmocka_unit_test(an_arrow_to_what_is_outside)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

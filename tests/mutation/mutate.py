@@ -74,6 +74,20 @@ OPERATORS = {
                 (r"(?<=[\w\)\]]) [+-] (?:\w+(?:(?:->|\.)\w+|\[\w+\])*|\d+\.\d+)(?=[;,)])", ""),
                 (r" \* BST_(?:DEG|ARCSEC)_RAD\b", ""), (r" / BST_(?:DEG|ARCSEC)_RAD\b", "")],
 }
+# Bugs of physical code by class: {kind: (lines that it concerns, rules)}
+VALUE = r"\w+(?:(?:->|\.)\w+|\[\w+\])*"
+TERM = rf"(?<=[\w\)\]]) [+-] {VALUE}(?: \* {VALUE})*(?=[;,)])"
+CLASSES = {
+    "window": (re.compile(r"window|binning|first_|\b[xy]0\b|offset|corner|origin"),
+               OPERATORS["sign"] + AXES + [(r" [*/] [\w.>-]*binning\w*", ""), (TERM, "")]),
+    "covariance": (re.compile(r"cov|varian|sigma|_px2|_rad2|\b[pr]\[|xy|noise|error"),
+                   [(rf"(?<![\w.>])({VALUE}(?:xy|\[1\]|\[2\]))(?= \*|[;,)])", r"-\1"), (r"\b2\.0 \* ", ""), (r"\b2\.0f? \* ", "3.0 * "),
+                    (r"(?<=[\w\)\]] )-(?= [\w\(])", "+"), (TERM, ""), (r"\[1\]", "[0]"), (r"\[2\]", "[1]"), (r"\[3\]", "[0]")]),
+    "squared": (re.compile(r""), [(rf"(?<![\w.>])({VALUE}) \* \1(?![\w\[(.-])", r"\1"), (r"\bsqrtf?\(", "(")]),
+    "swapped": (re.compile(r""), [(rf"(?<=[(,\s])({VALUE}), ({VALUE})(?=\))", r"\2, \1"), (rf"\(({VALUE}), ({VALUE})(?=,)", r"(\2, \1")]),
+    "time": (re.compile(r"light_time|SPEED_OF_LIGHT|BST_C_|_time|mid|delay|start_s|end_s|exposure_s|\bt\b|dt"),
+             OPERATORS["sign"] + [(TERM, ""), (r"\b0\.5 \* ", "")]),
+}
 TABLE_ROW = re.compile(r"^\s*\{?\s*[-+]?[\d.][\d.eExXa-fA-F+\-,\s{}]*\}?,?\s*$")
 STATEMENT = re.compile(r"^\s+[\w>\.\[\]\-\*\(\) ]+ (?:=|\+=|-=|\*=) [^=].*;$")
 
@@ -99,6 +113,10 @@ def mutants_of(path, text):
                 for pattern, new in rules:
                     for m in re.finditer(pattern, line):
                         found.append((kind, at + m.start(), text[at + m.start():at + m.end()], m.expand(new) if "\\" in new else new))
+            for kind, (concerned, rules) in CLASSES.items():
+                for pattern, new in rules if concerned.search(line) else []:
+                    for m in re.finditer(pattern, line):
+                        found.append((kind, at + m.start(), text[at + m.start():at + m.end()], m.expand(new)))
             if STATEMENT.match(line) and re.match(r"^\s+(?:[\w\.\[\]>-]+) ?(?:=|\+=|-=|\*=)", line):
                 first, last = at + len(line) - len(line.lstrip()), at + len(line.rstrip())
                 found.append(("statement", first, text[first:last], ";"))
@@ -256,7 +274,8 @@ def candidates(options, tree):
     for name in sorted(names):
         with open(os.path.join(tree.folder, name), encoding="utf-8") as file:
             text = file.read()
-        mutants = [m for m in mutants_of(name, text) if not options.kinds or m[0] in options.kinds]
+        mutants = [m for m in mutants_of(name, text)
+                   if (m[0] in options.kinds if options.kinds else m[0] not in CLASSES)]
         found.append((name, mutants, len({text.count("\n", 0, m[1]) for m in mutants})))
     return [f for f in found if f[1]]
 
@@ -365,8 +384,9 @@ def main():
     parser.add_argument("--suite", choices=["unit", "e2e", "ci"], default="unit",
                         help="which tests judge (default unit, which leaves sim/app out: its tests are the e2e suite); ci: "
                         "the unit tests, then the e2e ones that concern the file, as ./dev test runs both")
-    parser.add_argument("--kinds", nargs="+", choices=sorted(OPERATORS) + ["statement"], metavar="KIND",
-                        help=f"only bugs of these kinds: {', '.join(sorted(OPERATORS))}, statement")
+    parser.add_argument("--kinds", nargs="+", choices=sorted(OPERATORS) + sorted(CLASSES) + ["statement"], metavar="KIND",
+                        help=f"only bugs of these kinds: {', '.join(sorted(OPERATORS) + sorted(CLASSES))}, statement; "
+                        "the last ones but statement only if named")
     parser.add_argument("--count", type=int, default=30, help="bugs to plant (default 30)")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="plant no more after so many minutes")
     parser.add_argument("--budget", type=float, default=float("inf"), metavar="SECONDS",

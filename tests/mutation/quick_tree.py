@@ -16,6 +16,10 @@ import tempfile
 import build_files
 
 
+# tests that compare all outputs of a part of the tree in cases without symmetry
+DENSE = re.compile(r"symmetr|_parts$|_frame$|_units$|_columns$|(control|obsgen|tracker|imgproc)_module")
+
+
 def children_seconds():
     """Processor time of all child processes so far."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -152,7 +156,7 @@ class QuickTree(build_files.Judges):
         program = self.program_of(name)
         own, folder = os.path.splitext(path)[0], os.path.dirname(path)
         words = set(re.split(r"[/_.]", path)[-3:-1]) | {os.path.basename(own)}
-        score = sum(w in name for w in words if len(w) > 3)
+        score = sum(w in name for w in words if len(w) > 3) + 2.0 * bool(DENSE.search(name))
         for headers, known in self.sources_of(program):
             score += 4 * (own in headers) + any(os.path.dirname(h) == folder for h in headers)
             score += sum(near[w] for w in known if w in near)

@@ -1,6 +1,6 @@
 /* Made-up observations for the tests of orbits from angles: a body and an observer in two-body or
  * integrated motion, light time and the Earth's own motion solved by a plain iteration of its own,
- * noise by a counter. */
+ * noise by a counter, of which the components are correlated by 0.6. */
 #ifndef BST_TESTS_ORBIT_SCENE_H
 #define BST_TESTS_ORBIT_SCENE_H
 
@@ -58,8 +58,9 @@ static inline void observe(const scene *s, int run, bst_od_observation *out) {
             bst_rng_normal2(key, (uint64_t)i, 0, noise);
         }
         bst_tangent axes = bst_tangent_at(d);
-        d = bst_tangent_exp(
-            d, bst_tangent_vector(&axes, s->sigma_rad * noise[0], s->sigma_rad * noise[1]));
+        d = bst_tangent_exp(d,
+                            bst_tangent_vector(&axes, s->sigma_rad * noise[0],
+                                               s->sigma_rad * (0.6 * noise[0] + 0.8 * noise[1])));
         double variance = s->sigma_rad * s->sigma_rad;
         out[i] = (bst_od_observation){.observer = {.time_s = t,
                                                    .position_m = here.position_m,
@@ -67,6 +68,7 @@ static inline void observe(const scene *s, int run, bst_od_observation *out) {
                                                    .earth_bary_mps = s->earth_mps},
                                       .direction = d,
                                       .cov_11 = variance,
+                                      .cov_12 = 0.6 * variance,
                                       .cov_22 = variance};
     }
     bst_od_path_free(body);

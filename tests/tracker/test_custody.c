@@ -36,9 +36,13 @@ static bool observe(const bst_sgp4 *sgp4, double offset_s, double time_s, bst_rn
         return false;
     }
     bst_od_see(&state, &out->observer, &sight);
+    /* and a larger error of all four at once: their covariance slants */
+    const double slant = bst_rng_normal(key, number, 4), part[4] = {2.0, -1.5, 1.0, 1.5};
     for (int i = 0; i < 4; i++) {
-        noise[i] = sigma[i] * bst_rng_normal(key, number, (uint64_t)i);
-        out->covariance[i][i] = sigma[i] * sigma[i];
+        noise[i] = sigma[i] * (bst_rng_normal(key, number, (uint64_t)i) + part[i] * slant);
+        for (int k = 0; k < 4; k++) {
+            out->covariance[i][k] = sigma[i] * sigma[k] * (part[i] * part[k] + (i == k));
+        }
     }
     bst_tangent axes = bst_tangent_at(sight.direction);
     out->direction =
@@ -111,8 +115,8 @@ static void errors_agree_with_covariances(void **state) {
     assert_true(sigma_after < 0.2 * sigma_before);
 }
 
-/* Four directions of a pass of a minute with errors of 0.5 arcsec, and one of 2 arcsec that they
- * share. */
+/* Four directions of a pass of a minute with slanting errors of 0.5 to 1.3 arcsec, and one of 2
+ * arcsec that they share. */
 static bool observe_pass(const bst_sgp4 *sgp4, double offset_s, double time_s, bst_rng_key key,
                          uint64_t number, bst_od_observation out[4]) {
     const double own = 0.5 * BST_ARCSEC_RAD, shared = 2.0 * BST_ARCSEC_RAD;
@@ -127,8 +131,9 @@ static bool observe_pass(const bst_sgp4 *sgp4, double offset_s, double time_s, b
             .observer = at.observer,
             .direction = bst_tangent_exp(
                 at.direction, bst_tangent_vector(&axes, shared * common[0], shared * common[1])),
-            .cov_11 = own * own + shared * shared,
-            .cov_22 = own * own + shared * shared,
+            .cov_11 = own * own * (1.0 + 4.0) + shared * shared, /* as in observe */
+            .cov_12 = own * own * -3.0,
+            .cov_22 = own * own * (1.0 + 2.25) + shared * shared,
             .shared_rad = {{shared, 0.0}, {0.0, shared}}};
     }
     return true;

@@ -110,6 +110,29 @@ static void merged_measurement_is_inverted(void **state) {
     bst_mtt_free(m);
 }
 
+/* The gate of a merged detection is gate_chi2 about the centre of light, across the pair's line
+ * too: its variance there is half of a track's, the detection's, and the floor's. */
+static void gate_of_a_merged_detection(void **state) {
+    (void)state;
+    static const double shares[] = {0.1, 0.9, 1.1};
+    for (int k = 0; k < 3; k++) {
+        bench *b = start_jointly(18 * AS);
+        bst_mtt *m = b->mtt;
+        bst_vec3 at = bst_vec3_from_radec(1.0, 0.4), middle = along(at, 0.3, 3 * AS);
+        double floor2 = m->params.merge_floor_rad * m->params.merge_floor_rad;
+        double sigma = sqrt(1.5 * SIGMA * SIGMA + floor2);
+        add_track(m, at, SIGMA, 0.99);
+        add_track(m, along(at, 0.3, 6 * AS), SIGMA, 0.99);
+        put(m, along(middle, 0.3 + 0.5 * BST_PI, sigma * sqrt(shares[k] * m->params.gate_chi2)));
+        bst_mtt_associate(m, false);
+        for (int t = 0; t < 2; t++) {
+            assert_int_equal(m->detection_of_track[t], shares[k] < 1.0 ? 0 : -1);
+            assert_int_equal(m->shared[t], shares[k] < 1.0 ? BST_MTT_WIDENED : BST_MTT_ALONE);
+        }
+        bst_mtt_free(m);
+    }
+}
+
 /* One detection midway between two tracks that are closer than the resolution is of both; were they
  * resolved, one of them would have been missed and the detection far from either. */
 static void one_detection_of_two_tracks(void **state) {
@@ -261,6 +284,7 @@ int main(void) {
         cmocka_unit_test(two_tracks_compete),
         cmocka_unit_test(misses_lower_existence),
         cmocka_unit_test(merged_measurement_is_inverted),
+        cmocka_unit_test(gate_of_a_merged_detection),
         cmocka_unit_test(one_detection_of_two_tracks),
         cmocka_unit_test(one_detection_of_doubtful_tracks),
         cmocka_unit_test(false_track_shares_no_light),

@@ -199,8 +199,34 @@ static void both_axes_of_the_attitude_are_needed(void **state) {
     }
 }
 
+/* An object that is a little more vague than max_attitude_sigma_px of 2 px, along columns or along
+ * rows, begins no track. */
+static void both_axes_of_an_object_are_needed(void **state) {
+    (void)state;
+    static const options o = {.sigma_px = 0.1, .pd = 1.0, .frames = 1};
+    for (int vague = 0; vague < 3; vague++) {
+        static world w;
+        world_open(&w, 7, &o);
+        for (int k = 0; k < 4; k++) {
+            (void)expose(&w, k);
+            for (int i = 0; i < w.detections->count; i++) {
+                bst_detection *d = &w.detections->items[i];
+                if (d->label != BST_LABEL_STAR) {
+                    d->cov_xx = vague == 1 ? 4.5 : 0.01;
+                    d->cov_yy = vague == 2 ? 4.5 : 0.01;
+                }
+            }
+            bst_tracker_input input = make_input(&w, k);
+            (void)bst_tracker_step(w.tracker, &input, w.tracks, 256, w.predictions, 256);
+        }
+        assert_int_equal(w.tracks->count, vague == 0);
+        world_close(&w);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_turned_sky),
-                                       cmocka_unit_test(both_axes_of_the_attitude_are_needed)};
+                                       cmocka_unit_test(both_axes_of_the_attitude_are_needed),
+                                       cmocka_unit_test(both_axes_of_an_object_are_needed)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -118,10 +118,12 @@ static void monte_carlo(const setup *s, figures *out) {
             double n[2];
             bst_rng_normal2(key, 2, (uint64_t)k, n);
             bst_tangent at = bst_tangent_at(now.direction);
-            bst_vec3 off = bst_tangent_vector(&at, sigma_as * AS * n[0], sigma_as * AS * n[1]);
+            bst_vec3 off = bst_tangent_vector(&at, sigma_as * AS * n[0],
+                                              sigma_as * AS * (0.8 * n[0] + 0.6 * n[1]));
             const bst_mtt_detection seen = {
                 .sky = {.direction = bst_tangent_exp(now.direction, off),
                         .cov_11 = pow(sigma_as * AS, 2),
+                        .cov_12 = 0.8 * pow(sigma_as * AS, 2),
                         .cov_22 = pow(sigma_as * AS, 2)},
                 .v_mag = 13.0,
                 .v_mag_sigma = 0.1,
