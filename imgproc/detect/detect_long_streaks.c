@@ -8,9 +8,8 @@
 #include "imgproc/detect/detect_internal.h"
 #include "imgproc/streak/common_streak.h"
 
-/* Least SNR of a streak; above the detection threshold, because the residuals of bright streaks
- * have no Gaussian tail. */
-static const double LEAST_SNR = 6.0;
+/* Variance of a position uniform over a pixel, px^2: widens the PSF to its integral over pixels. */
+static const double PIXEL_VARIANCE = 1.0 / 12.0;
 /* Share of the path that must be inside the frame, and its least length there, PSF sigma. */
 static const double LEAST_INSIDE = 0.04, LEAST_PIECE_SIGMA = 6.0;
 /* Fragments this far from a streak's path belong to it, PSF sigma; further from bright streaks. */
@@ -142,18 +141,23 @@ static bool make_path(const bst_imgproc *ip, const bst_star_path_node *nodes, in
 static bst_status follow(bst_ctx *ctx, bst_imgproc *ip, const bst_star_path *path,
                          const float *pixels, bst_detections *out, int capacity) {
     const bst_locate_frame *v = &ip->view;
+    const double psf = sqrt(v->sigma_px * v->sigma_px + PIXEL_VARIANCE);
     const bst_common_streak_options options = {.max_sources = capacity,
                                                .tangent_per_px = path->tangent_per_px,
-                                               .psf_sigma_px = v->sigma_px,
+                                               .psf_sigma_px = psf,
+                                               .shot_variance = 1.0,
                                                .known_path = true};
-    double length = path->count * BST_STAR_PATH_STEP_PX, snr = fmax(out->threshold_snr, LEAST_SNR);
+    double length = path->count * BST_STAR_PATH_STEP_PX;
     double inside = fmin(fmax(LEAST_INSIDE, LEAST_PIECE_SIGMA * v->sigma_px / length), 1.0);
+    double snr = bst_streak_path_threshold(path, v->width, v->height, psf, inside,
+                                           ip->config.false_alarms_per_frame);
     bst_streak_finder *finder;
     bst_common_streak found;
     BST_TRY(bst_streak_finder_create(ctx, pixels, v->width, v->height, &options, &finder));
     bst_status status = bst_streak_finder_follow(ctx, finder, path, snr, inside, &found);
     if (status == BST_OK) {
         ip->streak_px = v->binning * length;
+        out->threshold_snr = snr;
         /* of a line that is summed along the path after the convolution with the PSF */
         ip->followed_sigma_e = found.sigma * sqrt(2.0 * sqrt(BST_PI) * v->sigma_px * length);
         status = replace(ctx, ip, &found, path, out, capacity);

@@ -106,14 +106,15 @@ static void forget_rows(bst_path_filter *f, int first, int last) {
 }
 
 /* Sums the image along the path for a block of places. */
-static void filter_block(bst_path_filter *f, const bst_star_path_image *image, int bx, int by) {
+static void filter_block(bst_path_filter *f, const bst_star_path_image *image,
+                         const float *weights, int bx, int by) {
     const bst_star_path *p = f->path;
     const int x1 = bx + BLOCK < f->width ? bx + BLOCK : f->width;
     const int y1 = by + BLOCK < f->height ? by + BLOCK : f->height;
     float light[BLOCK][BLOCK] = {{0}}, squares[BLOCK][BLOCK] = {{0}};
     double m[3];
     float all = 0.0f;  /* squared light of the whole path */
-    bool whole = true; /* all samples of all places are inside */
+    bool whole = !weights; /* all samples of all places are inside */
     bst_star_path_map(p, bx + 0.5 * BLOCK - f->margin, by + 0.5 * BLOCK - f->margin, m);
     for (int k = 0; k < p->count; k++) {
         double u = p->place[k][0], v = p->place[k][1];
@@ -135,7 +136,13 @@ static void filter_block(bst_path_filter *f, const bst_star_path_image *image, i
             for (int x = from; x < to; x++) {
                 light[y - by][x - bx] += w * row[x];
             }
-            for (int x = from; x < to && !whole; x++) {
+            if (weights) {
+                const float *share = &weights[(y + dy) * image->width + dx];
+                for (int x = from; x < to; x++) {
+                    squares[y - by][x - bx] += w2 * share[x];
+                }
+            }
+            for (int x = from; x < to && !whole && !weights; x++) {
                 squares[y - by][x - bx] += w2;
             }
         }
@@ -154,6 +161,13 @@ static void filter_block(bst_path_filter *f, const bst_star_path_image *image, i
 bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
                                   const bst_star_path_image *image, double psf_sigma_px,
                                   double least_inside, bst_path_filter **out) {
+    return bst_path_filter_create_weighted(ctx, path, image, NULL, psf_sigma_px, least_inside, out);
+}
+
+bst_status bst_path_filter_create_weighted(bst_ctx *ctx, const bst_star_path *path,
+                                           const bst_star_path_image *image, const float *weights,
+                                           double psf_sigma_px, double least_inside,
+                                           bst_path_filter **out) {
     assert(path && path->count > 0 && image && psf_sigma_px > 0.0 && least_inside > 0.0 && out);
     *out = NULL;
     bst_path_filter *f = calloc(1, sizeof *f);
@@ -181,7 +195,7 @@ bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
     measure_path(f);
     for (int y = 0; y < f->height; y += BLOCK) {
         for (int x = 0; x < f->width; x += BLOCK) {
-            filter_block(f, image, x, y);
+            filter_block(f, image, weights, x, y);
         }
     }
     *out = f;
