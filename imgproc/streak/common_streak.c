@@ -311,8 +311,7 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
                            .flags = peak.inside < WHOLE ? BST_DETECTION_EDGE : 0};
         bool inside = q->outside || (d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= f->width - 1 &&
                                      d.y_px <= f->height - 1);
-        bool left = is_ghost(out, &d) ||
-                    (!point && bst_streak_finder_is_covered(f, &peak));
+        bool left = is_ghost(out, &d) || (!point && bst_streak_finder_is_covered(f, &peak));
         if (!point && q->outside && bst_streak_finder_is_uneven(f, &peak)) {
             bst_path_filter_leave_out(filter, &peak, CLOSE_PX);
             continue;

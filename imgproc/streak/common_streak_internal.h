@@ -24,10 +24,10 @@ struct bst_streak_finder {
     float *lines;   /* line filter's output */
     float *scratch; /* amplitude of the brightest star found about each pixel */
     int *label, *stack;
-    const float *weights; /* of the smooth image's pixels, see bst_path_filter_create_weighted; NULL:
-                             all are 1 */
+    const float *weights; /* of the smooth image's pixels, see bst_path_filter_create_weighted;
+                             NULL: all are 1 */
     double point[2];      /* place of the point source that was removed last; NAN: none was */
-    int count; /* pixels on the stack: those of the latest source */
+    int count;            /* pixels on the stack: those of the latest source */
     bst_star_path path;
     bst_common_streak_options options;
     bst_detection *items; /* [max_sources + REFINING_STARS] */

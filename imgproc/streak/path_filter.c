@@ -2,11 +2,14 @@
 
 #include <assert.h>
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* BLOCK: side of the squares over which the path's shape changes by less than a pixel. */
 enum { BLOCK = 16, KERNEL = 5, SHIFTS = 24 };
+/* Passes of the clipped spread, and the places that it needs. */
+enum { SPREAD_PASSES = 3, LEAST_PLACES = 1000 };
 
 /* Position error beside the noise: samples at whole pixels, and the path's own error. */
 static const double SYSTEMATIC_PX = 0.2;
@@ -16,6 +19,10 @@ static const double REACH_SHARE = 12.0, MOST_REACH = 10.0;
 /* Standard deviation of the place along a streak: the shift at which the expected logarithm of the
  * likelihood falls by this; calibrated by tests/imgproc/streak_fields.c. */
 static const double ALONG_LOSS = 0.5;
+
+/* Values of the response beyond this are clipped; mean square of a normal deviate up to it:
+ * 1 - 2 c phi(c) / erf(c / sqrt(2)) */
+static const double SPREAD_CLIP = 3.0, SPREAD_SHARE = 0.9733;
 
 struct bst_path_filter {
     const bst_star_path *path;
@@ -106,14 +113,14 @@ static void forget_rows(bst_path_filter *f, int first, int last) {
 }
 
 /* Sums the image along the path for a block of places. */
-static void filter_block(bst_path_filter *f, const bst_star_path_image *image,
-                         const float *weights, int bx, int by) {
+static void filter_block(bst_path_filter *f, const bst_star_path_image *image, const float *weights,
+                         int bx, int by) {
     const bst_star_path *p = f->path;
     const int x1 = bx + BLOCK < f->width ? bx + BLOCK : f->width;
     const int y1 = by + BLOCK < f->height ? by + BLOCK : f->height;
     float light[BLOCK][BLOCK] = {{0}}, squares[BLOCK][BLOCK] = {{0}};
     double m[3];
-    float all = 0.0f;  /* squared light of the whole path */
+    float all = 0.0f;      /* squared light of the whole path */
     bool whole = !weights; /* all samples of all places are inside */
     bst_star_path_map(p, bx + 0.5 * BLOCK - f->margin, by + 0.5 * BLOCK - f->margin, m);
     for (int k = 0; k < p->count; k++) {
@@ -207,6 +214,27 @@ static float snr_at(const bst_path_filter *f, int x, int y) {
         return -1.0f;
     }
     return f->response[y * f->width + x] * f->per_noise[y * f->width + x];
+}
+
+double bst_path_filter_spread(const bst_path_filter *f) {
+    assert(f);
+    double spread = 1.0;
+    for (int pass = 0; pass < SPREAD_PASSES; pass++) {
+        double sum = 0.0;
+        int64_t count = 0;
+        for (int i = 0; i < f->width * f->height; i++) {
+            double snr = (double)(f->response[i] * f->per_noise[i]);
+            if (snr < 0.0 && snr > -SPREAD_CLIP * spread) {
+                sum += snr * snr;
+                count++;
+            }
+        }
+        if (count < LEAST_PLACES) {
+            return 1.0;
+        }
+        spread = sqrt(sum / (double)count / SPREAD_SHARE);
+    }
+    return spread;
 }
 
 /* SNR at a place, bilinear. */

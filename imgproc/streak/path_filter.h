@@ -37,6 +37,11 @@ bst_status bst_path_filter_create_weighted(bst_ctx *ctx, const bst_star_path *pa
 /* Frees a filter; NULL is allowed. */
 void bst_path_filter_free(bst_path_filter *filter);
 
+/* Standard deviation of the response over that of white noise: the root mean square of what is
+ * below zero and not below CLIP standard deviations, where no stars are. 1: too few places are
+ * searched. */
+double bst_path_filter_spread(const bst_path_filter *filter);
+
 /* A maximum of the response. */
 typedef struct bst_path_filter_peak {
     double x_px, y_px; /* of the path's middle; may lie outside the frame */

@@ -10,7 +10,14 @@
 
 /* CELL: side of the cells of the background, px. LEAST_CELL: values of a cell that has a median.
  * MOST_REACH: of the PSF, px. LEAST_ERRORS: pixels that tell the error of the model. */
-enum { CELL = 64, LEAST_CELL = 100, MOST_REACH = 24, LEAST_ERRORS = 60, SHIFTS = 6, CLIP_PASSES = 3 };
+enum {
+    CELL = 64,
+    LEAST_CELL = 100,
+    MOST_REACH = 24,
+    LEAST_ERRORS = 60,
+    SHIFTS = 6,
+    CLIP_PASSES = 3
+};
 
 /* Extent of the PSF, sigma. */
 static const double REACH_SIGMA = 3.5;
@@ -49,6 +56,7 @@ bst_status bst_streak_deblend_create(bst_ctx *ctx, const float *image, int width
                                 .psf_sigma_px = psf_sigma_px,
                                 .shot = shot,
                                 .noise2 = 1.0,
+                                .spread = 1.0,
                                 .error = USUAL_ERROR,
                                 .room = room};
     out->residual = calloc(7 * n, sizeof *out->residual);
@@ -222,14 +230,14 @@ static void measure(bst_streak_deblend *d, bst_deblended_star *s) {
         sum += w * v * v;
         squares += v * v;
     }
-    s->snr = s->flux * sqrt(sum);
+    s->snr = s->flux * sqrt(sum) / d->spread;
     s->inside = squares;
 }
 
-void bst_streak_deblend_fit(bst_streak_deblend *d, int sweeps) {
-    assert(d && sweeps >= 0);
+void bst_streak_deblend_fit(bst_streak_deblend *d, int sweeps, int first) {
+    assert(d && sweeps >= 1 && first >= 0);
     for (int k = 0; k < sweeps; k++) {
-        for (int i = 0; i < d->count; i++) {
+        for (int i = k + 1 < sweeps ? 0 : first; i < d->count; i++) {
             improve(d, &d->stars[i]);
         }
     }

@@ -26,6 +26,8 @@ typedef struct bst_streak_deblend {
                     no shot noise */
     double noise2; /* variance of a background pixel */
     double error;  /* relative error of the model, measured on the residual */
+    double spread; /* standard deviation of the matched filter's response over that of white noise,
+                      at least 1; set by the caller: structure of the background has it */
     float *residual; /* [height][width] image less background and stars, unit noise */
     float *model;    /* [height][width] of all stars */
     float *weight;   /* [height][width] 1 / variance; 0: no value */
@@ -60,10 +62,12 @@ void bst_streak_deblend_leave_out(bst_streak_deblend *d, double x_px, double y_p
 /* Improves flux and place of each star in turn by weighted least squares, `sweeps` times
  * (Gauss-Seidel on the normal equations of all stars), and measures the SNR of each.
  *
+ * Given:     first  number of the first star of the last sweep; the sweeps before take all
+ *
  * Notes:     The variance of a pixel is that of the background, the shot noise of the model, and
  *            for the light of other stars the error of their model, which is the same along a
  *            streak: COHERENT pixels have it in common. */
-void bst_streak_deblend_fit(bst_streak_deblend *d, int sweeps);
+void bst_streak_deblend_fit(bst_streak_deblend *d, int sweeps, int first);
 
 /* Removes the stars whose SNR is below a limit, and gives back their light; returns how many. */
 int bst_streak_deblend_drop(bst_streak_deblend *d, double least_snr);

@@ -28,7 +28,7 @@ static const double SYSTEMATIC_PX = 0.1;
 static const double STEP_PX = 0.5;
 /* Excursions of the field on its grid of whole pixels over those of the formula, the pieces at the
  * edges included; calibrated by tests/imgproc/star_streak_completeness.c. */
-static const double FOUND_SHARE = 1.0;
+static const double FOUND_SHARE = 0.4;
 
 typedef bst_streak_finder finder;
 
@@ -39,9 +39,9 @@ static double autocorrelation(const bst_star_path *p, double psf_sigma_px, doubl
         for (int l = 0; l < p->count; l++) {
             double u = p->place[k][0] - p->place[l][0] - dx;
             double v = p->place[k][1] - p->place[l][1] - dy, r2 = u * u + v * v;
-            sum += r2 < most ? p->light[k] * p->light[l] *
-                                   exp(-0.25 * r2 / (psf_sigma_px * psf_sigma_px))
-                             : 0.0;
+            sum += r2 < most
+                       ? p->light[k] * p->light[l] * exp(-0.25 * r2 / (psf_sigma_px * psf_sigma_px))
+                       : 0.0;
         }
     }
     return sum;
@@ -93,25 +93,29 @@ static double flux_of(const finder *f, double amplitude) {
     return amplitude * 2.0 * sqrt(BST_PI) * f->psf_sigma_px * f->path.count;
 }
 
-/* Adds the stars of one search; returns how many. *lowest: the limit that it has reached. */
+/* Adds the stars of one search; *last: it has reached the limit. */
 static bst_status search(bst_ctx *ctx, finder *f, bst_streak_deblend *d, float *weights,
-                         double least_snr, double least_inside, int *added, double *lowest) {
+                         double least_snr, double least_inside, int *added, bool *last) {
     const bst_star_path_image image = {f->smooth, f->width, f->height};
     bst_path_filter *filter;
     prepare(f, d, weights);
     BST_TRY(bst_path_filter_create_weighted(ctx, &f->path, &image, weights, f->psf_sigma_px,
                                             least_inside, &filter));
     f->weights = weights;
+    d->spread = fmax(bst_path_filter_spread(filter), 1.0);
+    least_snr *= d->spread;
     *added = 0;
-    *lowest = 0.0;
+    *last = false;
+    double lowest = 0.0;
     for (int i = 0; i < 20 * d->room; i++) {
         bst_path_filter_peak peak;
         if (!bst_path_filter_highest(filter, &peak)) {
-            *lowest = least_snr;
+            *last = true;
             break;
         }
-        *lowest = *lowest > 0.0 ? *lowest : fmax(BRIGHTEST_SHARE * peak.snr, least_snr);
-        if (peak.snr < *lowest) {
+        lowest = lowest > 0.0 ? lowest : fmax(BRIGHTEST_SHARE * peak.snr, least_snr);
+        if (peak.snr < lowest) {
+            *last = !(lowest > least_snr);
             break;
         }
         if (bst_streak_finder_remove_point(f, filter, &peak)) {
@@ -126,7 +130,7 @@ static bst_status search(bst_ctx *ctx, finder *f, bst_streak_deblend *d, float *
             continue;
         }
         if (!bst_streak_deblend_add(d, peak.x_px, peak.y_px, flux_of(f, peak.amplitude))) {
-            *lowest = least_snr;
+            *last = true;
             break;
         }
         (*added)++;
@@ -142,17 +146,17 @@ static bst_status find_and_fit(bst_ctx *ctx, finder *f, bst_streak_deblend *d, f
                                double least_snr, double least_inside) {
     for (int round = 0; round < ROUNDS; round++) {
         int before = d->count, added;
-        double lowest;
+        bool last;
         bst_streak_deblend_weigh(d);
-        BST_TRY(search(ctx, f, d, weights, least_snr, least_inside, &added, &lowest));
-        bst_streak_deblend_fit(d, SWEEPS);
+        BST_TRY(search(ctx, f, d, weights, least_snr, least_inside, &added, &last));
+        bst_streak_deblend_fit(d, SWEEPS, before);
         (void)bst_streak_deblend_drop(d, least_snr);
-        if (lowest <= least_snr && d->count <= before) {
+        if (last && d->count <= before) {
             break;
         }
     }
     bst_streak_deblend_weigh(d);
-    bst_streak_deblend_fit(d, LAST_SWEEPS);
+    bst_streak_deblend_fit(d, LAST_SWEEPS, 0);
     (void)bst_streak_deblend_drop(d, least_snr);
     return BST_OK;
 }

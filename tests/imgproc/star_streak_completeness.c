@@ -1,9 +1,9 @@
 /* Completeness and false alarms of star streaks along a known path, as a table.
  *
  * Usage: test_imgproc_star_streak_completeness [NAME=VALUE ...], with the names of `arguments`
- * below. Each frame has stars of random places and a power law of fluxes on one curved, unevenly lit
- * path, Poisson and read noise. The SNR of a star is the bound of the matched filter: the root of
- * the sum of its squared image over the variance of the background, inside the frame. */
+ * below. Each frame has stars of random places and a power law of fluxes on one curved, unevenly
+ * lit path, Poisson and read noise. The SNR of a star is the bound of the matched filter: the root
+ * of the sum of its squared image over the variance of the background, inside the frame. */
 #include <stdlib.h>
 #include <time.h>
 
@@ -19,11 +19,11 @@ static const double WING = 2.5;
 
 typedef struct arguments {
     double frames, first, side, stars, length, bend, angle;
-    double faintest;   /* SNR of a whole streak; the cumulative number falls as 1 / SNR */
-    double brightest;  /* SNR */
-    double wings;      /* share of the PSF that the processing does not know */
-    double path_error; /* amplitude of a ripple of the given path across, px */
-    double alarms;     /* false_alarms_per_frame */
+    double faintest;    /* SNR of a whole streak; the cumulative number falls as 1 / SNR */
+    double brightest;   /* SNR */
+    double wings;       /* share of the PSF that the processing does not know */
+    double path_error;  /* amplitude of a ripple of the given path across, px */
+    double alarms;      /* false_alarms_per_frame */
     double least, most; /* check: least share of stars above SNR 8, most false alarms a frame */
 } arguments;
 
@@ -54,13 +54,12 @@ static void read_arguments(int argc, char **argv, arguments *a) {
         struct {
             const char *name;
             double *value;
-        } all[] = {{"frames=", &a->frames},       {"first=", &a->first},
-                   {"side=", &a->side},           {"stars=", &a->stars},
-                   {"length=", &a->length},       {"bend=", &a->bend},
-                   {"angle=", &a->angle},         {"faintest=", &a->faintest},
-                   {"brightest=", &a->brightest}, {"wings=", &a->wings},
-                   {"path=", &a->path_error},     {"alarms=", &a->alarms},
-                   {"least=", &a->least},         {"most=", &a->most}};
+        } all[] = {
+            {"frames=", &a->frames}, {"first=", &a->first},       {"side=", &a->side},
+            {"stars=", &a->stars},   {"length=", &a->length},     {"bend=", &a->bend},
+            {"angle=", &a->angle},   {"faintest=", &a->faintest}, {"brightest=", &a->brightest},
+            {"wings=", &a->wings},   {"path=", &a->path_error},   {"alarms=", &a->alarms},
+            {"least=", &a->least},   {"most=", &a->most}};
         bool taken = false;
         for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
             size_t n = strlen(all[k].name);
@@ -186,8 +185,8 @@ static void assign(const bst_detections *d, star *stars, int count, totals *t) {
         t->detections += streak;
         t->false_alarms += streak && !taken[k];
         if (streak && !taken[k] && getenv("VERBOSE")) {
-            fprintf(stderr, "false: frame %d, %.1f, %.1f, SNR %.1f\n", t->frames,
-                    d->items[k].x_px, d->items[k].y_px, d->items[k].snr);
+            fprintf(stderr, "false: frame %d, %.1f, %.1f, SNR %.1f\n", t->frames, d->items[k].x_px,
+                    d->items[k].y_px, d->items[k].snr);
         }
     }
 }
@@ -260,11 +259,13 @@ int main(int argc, char **argv) {
     int bright = 0, found = 0;
     for (int b = 0; b < BINS; b++) {
         if (t.stars[b] > 0) {
-            printf("SNR %4.0f to %-4.0f %5d stars, found %.3f, bound %.3f, their SNR %.3f and light %.3f of "
-                   "the true\n", EDGES[b],
-                   fmin(EDGES[b + 1], 9999.0), t.stars[b], (double)t.found[b] / t.stars[b],
-                   t.expected[b] / t.stars[b],
-                   t.share[b] / fmax(t.found[b], 1), t.light[b] / fmax(t.found[b], 1));
+            printf(
+                "SNR %4.0f to %-4.0f %5d stars, found %.3f, bound %.3f, their SNR %.3f and light "
+                "%.3f of "
+                "the true\n",
+                EDGES[b], fmin(EDGES[b + 1], 9999.0), t.stars[b], (double)t.found[b] / t.stars[b],
+                t.expected[b] / t.stars[b], t.share[b] / fmax(t.found[b], 1),
+                t.light[b] / fmax(t.found[b], 1));
         }
         bright += EDGES[b] >= 8.0 ? t.stars[b] : 0;
         found += EDGES[b] >= 8.0 ? t.found[b] : 0;
