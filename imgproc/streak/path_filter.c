@@ -8,8 +8,8 @@
 
 /* BLOCK: side of the squares over which the path's shape changes by less than a pixel. */
 enum { BLOCK = 16, KERNEL = 5, SHIFTS = 24 };
-/* Passes of the clipped spread, and the places that it needs. */
-enum { SPREAD_PASSES = 3, LEAST_PLACES = 1000 };
+/* Passes of the clipped spread, the places that it needs, and those that it takes. */
+enum { SPREAD_PASSES = 3, LEAST_PLACES = 1000, SPREAD_PLACES = 65536 };
 
 /* Position error beside the noise: samples at whole pixels, and the path's own error. */
 static const double SYSTEMATIC_PX = 0.2;
@@ -219,10 +219,11 @@ static float snr_at(const bst_path_filter *f, int x, int y) {
 double bst_path_filter_spread(const bst_path_filter *f) {
     assert(f);
     double spread = 1.0;
+    const int stride = f->width * f->height / SPREAD_PLACES | 1; /* odd: columns do not repeat */
     for (int pass = 0; pass < SPREAD_PASSES; pass++) {
         double sum = 0.0;
         int64_t count = 0;
-        for (int i = 0; i < f->width * f->height; i++) {
+        for (int i = 0; i < f->width * f->height; i += stride) {
             double snr = (double)(f->response[i] * f->per_noise[i]);
             if (snr < 0.0 && snr > -SPREAD_CLIP * spread) {
                 sum += snr * snr;

@@ -9,14 +9,16 @@
 #include "sim/core/symmetric.h"
 
 /* CELL: side of the cells of the background, px. LEAST_CELL: values of a cell that has a median.
- * MOST_REACH: of the PSF, px. LEAST_ERRORS: pixels that tell the error of the model. */
+ * MOST_REACH: of the PSF, px. SAMPLED: pixels that tell
+ * the noise. LEAST_ERRORS: pixels that tell the error of the model. */
 enum {
     CELL = 64,
     LEAST_CELL = 100,
     MOST_REACH = 24,
     LEAST_ERRORS = 60,
     SHIFTS = 6,
-    CLIP_PASSES = 3
+    CLIP_PASSES = 3,
+    SAMPLED = 65536
 };
 
 /* Extent of the PSF, sigma. */
@@ -294,7 +296,7 @@ static float cell_median(const bst_streak_deblend *d, int cx, int cy) {
 /* Subtracts the background of what is left: bilinear between the cells' middles. */
 static void subtract_background(bst_streak_deblend *d) {
     const int nx = (d->width + CELL - 1) / CELL, ny = (d->height + CELL - 1) / CELL;
-    float *cells = d->image; /* at rest */
+    float *cells = d->image, *column = d->image_x; /* at rest */
     if (nx * ny > d->width * d->height) {
         return;
     }
@@ -307,24 +309,32 @@ static void subtract_background(bst_streak_deblend *d) {
     for (int y = 0; y < d->height; y++) {
         float v = fmaxf(((float)y + 0.5f) / CELL - 0.5f, 0.0f);
         int j = (int)v, j1 = j + 1 < ny ? j + 1 : j;
+        for (int i = 0; i < nx; i++) {
+            column[i] =
+                cells[j * nx + i] + (v - (float)j) * (cells[j1 * nx + i] - cells[j * nx + i]);
+        }
         for (int x = 0; x < d->width; x++) {
             float u = fmaxf(((float)x + 0.5f) / CELL - 0.5f, 0.0f);
             int i = (int)u, i1 = i + 1 < nx ? i + 1 : i;
-            float f = u - (float)i, g = v - (float)j;
-            float level = (1.0f - g) * ((1.0f - f) * cells[j * nx + i] + f * cells[j * nx + i1]) +
-                          g * ((1.0f - f) * cells[j1 * nx + i] + f * cells[j1 * nx + i1]);
+            float f = u - (float)i, level = column[i] + f * (column[i1] - column[i]);
             int at = y * d->width + x;
             d->residual[at] -= d->weight[at] > 0.0f ? level : 0.0f;
         }
     }
     memset(cells, 0, (size_t)(nx * ny) * sizeof *cells);
+    memset(column, 0, (size_t)nx * sizeof *column);
+}
+
+/* Every so many pixels tell the noise; odd, so that columns do not repeat. */
+static int stride_of(const bst_streak_deblend *d) {
+    return d->width * d->height / SAMPLED | 1;
 }
 
 /* Variance of the dark pixels: by the mean of their absolute values up to CLIP sigma, which coarse
  * counts change less than their median. */
 static double noise2_of(const bst_streak_deblend *d) {
-    int count = 0;
-    for (int i = 0; i < d->width * d->height; i++) {
+    int count = 0, stride = stride_of(d);
+    for (int i = 0; i < d->width * d->height; i += stride) {
         if (d->weight[i] > 0.0f && (double)d->model[i] < DARK) {
             d->scratch[count++] = fabsf(d->residual[i]);
         }
@@ -370,10 +380,10 @@ void bst_streak_deblend_weigh(bst_streak_deblend *d) {
     subtract_background(d);
     d->noise2 = noise2_of(d);
     d->error = error_of(d);
+    const float dark = (float)(1.0 / d->noise2);
     for (int i = 0; i < d->width * d->height; i++) {
         if (d->weight[i] > 0.0f) {
-            d->weight[i] = 1.0f;
-            d->weight[i] = (float)weight_at(d, i, 0.0);
+            d->weight[i] = d->model[i] > 0.0f ? (float)weight_at(d, i, 0.0) : dark;
         }
     }
 }

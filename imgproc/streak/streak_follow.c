@@ -10,8 +10,8 @@
 #include "imgproc/streak/streak_deblend.h"
 
 /* ROUNDS: most searches; each goes down by BRIGHTEST_SHARE. SWEEPS: of the fit in a round, and at
- * the end. */
-enum { ROUNDS = 12, SWEEPS = 2, LAST_SWEEPS = 4 };
+ * the end. The search ends when a round adds one star of FEW. */
+enum { ROUNDS = 12, SWEEPS = 2, LAST_SWEEPS = 3, FEW = 50 };
 
 /* A round finds stars down to this share of the brightest's SNR: what their subtraction leaves
  * before the fit is fainter. */
@@ -151,7 +151,7 @@ static bst_status find_and_fit(bst_ctx *ctx, finder *f, bst_streak_deblend *d, f
         BST_TRY(search(ctx, f, d, weights, least_snr, least_inside, &added, &last));
         bst_streak_deblend_fit(d, SWEEPS, before);
         (void)bst_streak_deblend_drop(d, least_snr);
-        if (last && d->count <= before) {
+        if (last && d->count <= before + before / FEW) {
             break;
         }
     }
