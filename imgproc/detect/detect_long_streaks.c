@@ -15,6 +15,10 @@ static const double LEAST_INSIDE = 0.04, LEAST_PIECE_SIGMA = 6.0;
 /* Fragments this far from a streak's path belong to it, PSF sigma; further from bright streaks. */
 static const double NEAR_SIGMA = 3.0, MOST_NEAR_SIGMA = 8.0;
 
+/* A point on a streak is another source if it is this much brighter than the streak's light there,
+ * and by this many standard deviations. */
+static const double OTHER_SHARE = 2.0, OTHER_SIGMA = 4.0;
+
 /* Copies the signal above the background; what was not measured is NAN. */
 static float *copy_signal(const bst_imgproc *ip) {
     const bst_locate_frame *v = &ip->view;
@@ -27,9 +31,10 @@ static float *copy_signal(const bst_imgproc *ip) {
     return pixels;
 }
 
-/* Marks the pixels near the path of a star. */
-static void mark_path(const bst_star_path *path, const bst_detection *d, double reach, int width,
-                      int height, uint8_t *mask) {
+/* Notes near the path of a star how bright a point its light looks like, if no other is brighter.
+ */
+static void mark_path(const bst_star_path *path, const bst_detection *d, double reach, float flux,
+                      int width, int height, float *mask) {
     double m[3];
     int r = (int)ceil(reach);
     bst_star_path_map(path, d->x_px, d->y_px, m);
@@ -42,22 +47,31 @@ static void mark_path(const bst_star_path *path, const bst_detection *d, double 
         int cx = (int)lround(x), cy = (int)lround(y);
         for (int j = cy - r < 0 ? 0 : cy - r; j <= cy + r && j < height; j++) {
             int from = cx - r < 0 ? 0 : cx - r, to = cx + r < width ? cx + r : width - 1;
-            if (from <= to) {
-                memset(mask + (size_t)j * (size_t)width + (size_t)from, 1, (size_t)(to - from + 1));
+            for (int i = from; i <= to; i++) {
+                float *at = &mask[(size_t)j * (size_t)width + (size_t)i];
+                *at = fmaxf(*at, flux);
             }
         }
     }
 }
 
-/* Removes the detections near the paths of stars; returns how many are left. */
-static int remove_fragments(const bst_imgproc *ip, const uint8_t *mask, bst_detections *out) {
+/* True for a point that is too bright for the streak on which it lies. */
+static bool is_other(const bst_detection *d, double streak_e) {
+    return !(d->flags & BST_DETECTION_STREAK) &&
+           d->flux_e > OTHER_SHARE * streak_e + OTHER_SIGMA * d->flux_sigma_e;
+}
+
+/* Removes the detections near the paths of stars, but for brighter points; returns how many are
+ * left. */
+static int remove_fragments(const bst_imgproc *ip, const float *mask, bst_detections *out) {
     const bst_locate_frame *v = &ip->view;
     int kept = 0;
     for (int i = 0; i < out->count; i++) {
         int x = (int)lround((out->items[i].x_px - v->origin_x_px) / v->binning);
         int y = (int)lround((out->items[i].y_px - v->origin_y_px) / v->binning);
         bool inside = x >= 0 && y >= 0 && x < v->width && y < v->height;
-        if (!inside || !mask[(size_t)y * (size_t)v->width + (size_t)x]) {
+        double streak = inside ? (double)mask[(size_t)y * (size_t)v->width + (size_t)x] : 0.0;
+        if (!(streak > 0.0) || is_other(&out->items[i], streak)) {
             out->items[kept++] = out->items[i];
         }
     }
@@ -98,7 +112,7 @@ static int by_place(const void *a, const void *b) {
 static bst_status replace(bst_ctx *ctx, bst_imgproc *ip, const bst_common_streak *found,
                           const bst_star_path *path, bst_detections *out, int capacity) {
     const bst_locate_frame *v = &ip->view;
-    uint8_t *mask = calloc((size_t)v->width * (size_t)v->height, 1);
+    float *mask = calloc((size_t)v->width * (size_t)v->height, sizeof *mask);
     if (!mask) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the paths of %d streaks", found->count);
     }
@@ -107,8 +121,11 @@ static bst_status replace(bst_ctx *ctx, bst_imgproc *ip, const bst_common_streak
         /* where the wings of the PSF sink into the noise */
         double amplitude = fmax(found->items[i].flux_e / per_px, 1.0);
         double reach = NEAR_SIGMA + sqrt(2.0 * log(amplitude));
-        mark_path(path, &found->items[i], fmin(reach, MOST_NEAR_SIGMA) * v->sigma_px, v->width,
-                  v->height, mask);
+        /* response of the filter for points to a line */
+        double per_length = found->items[i].flux_e / (path->count * BST_STAR_PATH_STEP_PX);
+        double point = per_length * 2.0 * sqrt(BST_PI) * v->sigma_px;
+        mark_path(path, &found->items[i], fmin(reach, MOST_NEAR_SIGMA) * v->sigma_px, (float)point,
+                  v->width, v->height, mask);
     }
     (void)remove_fragments(ip, mask, out);
     free(mask);
