@@ -46,17 +46,18 @@ void bst_streak_deblend_free(bst_streak_deblend *d) {
     *d = (bst_streak_deblend){.width = 0};
 }
 
-bst_status bst_streak_deblend_create(bst_ctx *ctx, const float *image, int width, int height,
-                                     const bst_star_path *path, double psf_sigma_px, double shot,
-                                     int room, bst_streak_deblend *out) {
-    assert(image && width > 0 && height > 0 && path && psf_sigma_px > 0.0 && shot >= 0.0 &&
-           room > 0 && out);
+bst_status bst_streak_deblend_create(bst_ctx *ctx, const float *image,
+                                     const bst_streak_deblend_config *config,
+                                     bst_streak_deblend *out) {
+    assert(image && config && config->width > 0 && config->height > 0 && config->path &&
+           config->psf_sigma_px > 0.0 && config->shot >= 0.0 && config->room > 0 && out);
+    const int width = config->width, height = config->height, room = config->room;
     const size_t n = (size_t)width * (size_t)height;
     *out = (bst_streak_deblend){.width = width,
                                 .height = height,
-                                .path = path,
-                                .psf_sigma_px = psf_sigma_px,
-                                .shot = shot,
+                                .path = config->path,
+                                .psf_sigma_px = config->psf_sigma_px,
+                                .shot = config->shot,
                                 .noise2 = 1.0,
                                 .spread = 1.0,
                                 .error = USUAL_ERROR,

@@ -39,16 +39,21 @@ typedef struct bst_streak_deblend {
     float *scratch;
 } bst_streak_deblend;
 
+/* What a fit is made for. */
+typedef struct bst_streak_deblend_config {
+    int width, height, room;   /* room: most stars */
+    const bst_star_path *path; /* must outlive the fit */
+    double psf_sigma_px, shot; /* as in the fit */
+} bst_streak_deblend_config;
+
 /* Creates a fit without stars.
  *
  * Given:     image  [height][width], of unit noise; NAN: no value
- *            path   must outlive it
- *            room   most stars
  * Errors:    BST_ERR_MEMORY
  * Ownership: free with bst_streak_deblend_free */
-bst_status bst_streak_deblend_create(bst_ctx *ctx, const float *image, int width, int height,
-                                     const bst_star_path *path, double psf_sigma_px, double shot,
-                                     int room, bst_streak_deblend *out) BST_MUST_CHECK;
+bst_status bst_streak_deblend_create(bst_ctx *ctx, const float *image,
+                                     const bst_streak_deblend_config *config,
+                                     bst_streak_deblend *out) BST_MUST_CHECK;
 /* Frees the memory of a fit and clears the struct, which belongs to the caller. */
 void bst_streak_deblend_free(bst_streak_deblend *d);
 

@@ -93,9 +93,23 @@ static double flux_of(const finder *f, double amplitude) {
     return amplitude * 2.0 * sqrt(BST_PI) * f->psf_sigma_px * f->path.count;
 }
 
-/* Adds the stars of one search; *last: it has reached the limit. */
+/* Least SNR and share in the frame of a star. */
+typedef struct limits {
+    double snr, inside;
+} limits;
+
+/* What a search has done. */
+typedef struct progress {
+    int added;
+    bool last;
+} progress;
+
+/* Adds the stars of one search; out->last: it has reached the limit. */
 static bst_status search(bst_ctx *ctx, finder *f, bst_streak_deblend *d, float *weights,
-                         double least_snr, double least_inside, int *added, bool *last) {
+                         const limits *least, progress *out) {
+    int *added = &out->added;
+    bool *last = &out->last;
+    double least_snr = least->snr, least_inside = least->inside;
     const bst_star_path_image image = {f->smooth, f->width, f->height};
     bst_path_filter *filter;
     prepare(f, d, weights);
@@ -145,13 +159,14 @@ static bst_status search(bst_ctx *ctx, finder *f, bst_streak_deblend *d, float *
 static bst_status find_and_fit(bst_ctx *ctx, finder *f, bst_streak_deblend *d, float *weights,
                                double least_snr, double least_inside) {
     for (int round = 0; round < ROUNDS; round++) {
-        int before = d->count, added;
-        bool last;
+        int before = d->count;
+        progress done;
+        const limits least = {least_snr, least_inside};
         bst_streak_deblend_weigh(d);
-        BST_TRY(search(ctx, f, d, weights, least_snr, least_inside, &added, &last));
+        BST_TRY(search(ctx, f, d, weights, &least, &done));
         bst_streak_deblend_fit(d, SWEEPS, before);
         (void)bst_streak_deblend_drop(d, least_snr);
-        if (last && d->count <= before + before / FEW) {
+        if (done.last && d->count <= before + before / FEW) {
             break;
         }
     }
@@ -209,9 +224,13 @@ bst_status bst_streak_finder_follow(bst_ctx *ctx, bst_streak_finder *f, const bs
         status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for weights of %d x %d px", f->width,
                           f->height);
     } else {
-        status = bst_streak_deblend_create(ctx, f->image, f->width, f->height, &f->path,
-                                           f->psf_sigma_px, f->options.shot_variance / f->sigma,
-                                           f->options.max_sources, &d);
+        const bst_streak_deblend_config config = {.width = f->width,
+                                                  .height = f->height,
+                                                  .room = f->options.max_sources,
+                                                  .path = &f->path,
+                                                  .psf_sigma_px = f->psf_sigma_px,
+                                                  .shot = f->options.shot_variance / f->sigma};
+        status = bst_streak_deblend_create(ctx, f->image, &config, &d);
     }
     if (status == BST_OK) {
         status = find_and_fit(ctx, f, &d, weights, least_snr, least_inside);

@@ -19,7 +19,7 @@ static const double LEAST_LIGHT = 0.2;
 
 typedef bst_streak_finder finder;
 
-/* Least weight of a pixel that tells the light of a path. */
+/* Least weight of a pixel that shows the light of a path. */
 static const float LEAST_WEIGHT = 0.5f;
 
 /* Weight of the pixel at a place. */
