@@ -8,13 +8,16 @@
 #include "imgproc/detect/detect_internal.h"
 #include "imgproc/streak/common_streak.h"
 
-/* Least SNR of a streak; above the detection threshold, because the residuals of bright streaks
- * have no Gaussian tail. */
-static const double LEAST_SNR = 6.0;
+/* Variance of a position uniform over a pixel, px^2: widens the PSF to its integral over pixels. */
+static const double PIXEL_VARIANCE = 1.0 / 12.0;
 /* Share of the path that must be inside the frame, and its least length there, PSF sigma. */
 static const double LEAST_INSIDE = 0.04, LEAST_PIECE_SIGMA = 6.0;
 /* Fragments this far from a streak's path belong to it, PSF sigma; further from bright streaks. */
 static const double NEAR_SIGMA = 3.0, MOST_NEAR_SIGMA = 8.0;
+
+/* A point on a streak is another source if it is this much brighter than the streak's light there,
+ * and by this many standard deviations. */
+static const double OTHER_SHARE = 2.0, OTHER_SIGMA = 4.0;
 
 /* Copies the signal above the background; what was not measured is NAN. */
 static float *copy_signal(const bst_imgproc *ip) {
@@ -28,9 +31,10 @@ static float *copy_signal(const bst_imgproc *ip) {
     return pixels;
 }
 
-/* Marks the pixels near the path of a star. */
-static void mark_path(const bst_star_path *path, const bst_detection *d, double reach, int width,
-                      int height, uint8_t *mask) {
+/* Notes near the path of a star how bright a point its light looks like, if no other is brighter.
+ */
+static void mark_path(const bst_star_path *path, const bst_detection *d, double reach, float flux,
+                      int width, int height, float *mask) {
     double m[3];
     int r = (int)ceil(reach);
     bst_star_path_map(path, d->x_px, d->y_px, m);
@@ -43,22 +47,31 @@ static void mark_path(const bst_star_path *path, const bst_detection *d, double 
         int cx = (int)lround(x), cy = (int)lround(y);
         for (int j = cy - r < 0 ? 0 : cy - r; j <= cy + r && j < height; j++) {
             int from = cx - r < 0 ? 0 : cx - r, to = cx + r < width ? cx + r : width - 1;
-            if (from <= to) {
-                memset(mask + (size_t)j * (size_t)width + (size_t)from, 1, (size_t)(to - from + 1));
+            for (int i = from; i <= to; i++) {
+                float *at = &mask[(size_t)j * (size_t)width + (size_t)i];
+                *at = fmaxf(*at, flux);
             }
         }
     }
 }
 
-/* Removes the detections near the paths of stars; returns how many are left. */
-static int remove_fragments(const bst_imgproc *ip, const uint8_t *mask, bst_detections *out) {
+/* True for a point that is too bright for the streak on which it lies. */
+static bool is_other(const bst_detection *d, double streak_e) {
+    return !(d->flags & BST_DETECTION_STREAK) &&
+           d->flux_e > OTHER_SHARE * streak_e + OTHER_SIGMA * d->flux_sigma_e;
+}
+
+/* Removes the detections near the paths of stars, but for brighter points; returns how many are
+ * left. */
+static int remove_fragments(const bst_imgproc *ip, const float *mask, bst_detections *out) {
     const bst_locate_frame *v = &ip->view;
     int kept = 0;
     for (int i = 0; i < out->count; i++) {
         int x = (int)lround((out->items[i].x_px - v->origin_x_px) / v->binning);
         int y = (int)lround((out->items[i].y_px - v->origin_y_px) / v->binning);
         bool inside = x >= 0 && y >= 0 && x < v->width && y < v->height;
-        if (!inside || !mask[(size_t)y * (size_t)v->width + (size_t)x]) {
+        double streak = inside ? (double)mask[(size_t)y * (size_t)v->width + (size_t)x] : 0.0;
+        if (!(streak > 0.0) || is_other(&out->items[i], streak)) {
             out->items[kept++] = out->items[i];
         }
     }
@@ -99,7 +112,7 @@ static int by_place(const void *a, const void *b) {
 static bst_status replace(bst_ctx *ctx, bst_imgproc *ip, const bst_common_streak *found,
                           const bst_star_path *path, bst_detections *out, int capacity) {
     const bst_locate_frame *v = &ip->view;
-    uint8_t *mask = calloc((size_t)v->width * (size_t)v->height, 1);
+    float *mask = calloc((size_t)v->width * (size_t)v->height, sizeof *mask);
     if (!mask) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for the paths of %d streaks", found->count);
     }
@@ -108,8 +121,11 @@ static bst_status replace(bst_ctx *ctx, bst_imgproc *ip, const bst_common_streak
         /* where the wings of the PSF sink into the noise */
         double amplitude = fmax(found->items[i].flux_e / per_px, 1.0);
         double reach = NEAR_SIGMA + sqrt(2.0 * log(amplitude));
-        mark_path(path, &found->items[i], fmin(reach, MOST_NEAR_SIGMA) * v->sigma_px, v->width,
-                  v->height, mask);
+        /* response of the filter for points to a line */
+        double per_length = found->items[i].flux_e / (path->count * BST_STAR_PATH_STEP_PX);
+        double point = per_length * 2.0 * sqrt(BST_PI) * v->sigma_px;
+        mark_path(path, &found->items[i], fmin(reach, MOST_NEAR_SIGMA) * v->sigma_px, (float)point,
+                  v->width, v->height, mask);
     }
     (void)remove_fragments(ip, mask, out);
     free(mask);
@@ -142,18 +158,23 @@ static bool make_path(const bst_imgproc *ip, const bst_star_path_node *nodes, in
 static bst_status follow(bst_ctx *ctx, bst_imgproc *ip, const bst_star_path *path,
                          const float *pixels, bst_detections *out, int capacity) {
     const bst_locate_frame *v = &ip->view;
+    const double psf = sqrt(v->sigma_px * v->sigma_px + PIXEL_VARIANCE);
     const bst_common_streak_options options = {.max_sources = capacity,
                                                .tangent_per_px = path->tangent_per_px,
-                                               .psf_sigma_px = v->sigma_px,
+                                               .psf_sigma_px = psf,
+                                               .shot_variance = 1.0,
                                                .known_path = true};
-    double length = path->count * BST_STAR_PATH_STEP_PX, snr = fmax(out->threshold_snr, LEAST_SNR);
+    double length = path->count * BST_STAR_PATH_STEP_PX;
     double inside = fmin(fmax(LEAST_INSIDE, LEAST_PIECE_SIGMA * v->sigma_px / length), 1.0);
+    double snr = bst_streak_path_threshold(path, v->width, v->height, psf, inside,
+                                           ip->config.false_alarms_per_frame);
     bst_streak_finder *finder;
     bst_common_streak found;
     BST_TRY(bst_streak_finder_create(ctx, pixels, v->width, v->height, &options, &finder));
     bst_status status = bst_streak_finder_follow(ctx, finder, path, snr, inside, &found);
     if (status == BST_OK) {
         ip->streak_px = v->binning * length;
+        out->threshold_snr = snr;
         /* of a line that is summed along the path after the convolution with the PSF */
         ip->followed_sigma_e = found.sigma * sqrt(2.0 * sqrt(BST_PI) * v->sigma_px * length);
         status = replace(ctx, ip, &found, path, out, capacity);

@@ -176,8 +176,8 @@ static void remove_hot_pixels(finder *f) {
     }
 }
 
-/* Convolves the image with a Gaussian; the result has unit noise. */
-static void convolve(finder *f, double sigma_px) {
+void bst_streak_finder_convolve(finder *f, const float *from_image, float *to_image,
+                                double sigma_px, bool squared) {
     const int w = f->width, h = f->height, reach = (int)ceil(3.0 * sigma_px);
     float kernel[2 * MOST_REACH + 1];
     double squares = 0.0;
@@ -188,13 +188,14 @@ static void convolve(finder *f, double sigma_px) {
     }
     for (int k = 0; k <= 2 * reach; k++) {
         kernel[k] /= (float)sqrt(squares);
+        kernel[k] = squared ? kernel[k] * kernel[k] : kernel[k];
     }
-    memset(f->smooth, 0, (size_t)w * (size_t)h * sizeof *f->smooth);
+    memset(to_image, 0, (size_t)w * (size_t)h * sizeof *to_image);
     for (int y = 0; y < h; y++) {
         float *to = &f->scratch[y * w];
         memset(to, 0, (size_t)w * sizeof *to);
         for (int k = -reach; k <= reach; k++) {
-            const float *from = &f->image[y * w + k], c = kernel[k + reach];
+            const float *from = &from_image[y * w + k], c = kernel[k + reach];
             int last = k > 0 ? w - k : w;
             for (int x = k < 0 ? -k : 0; x < last; x++) {
                 to[x] += c * from[x];
@@ -208,10 +209,15 @@ static void convolve(finder *f, double sigma_px) {
             }
             const float *from = &f->scratch[(y + k) * w], c = kernel[k + reach];
             for (int x = 0; x < w; x++) {
-                f->smooth[y * w + x] += c * from[x];
+                to_image[y * w + x] += c * from[x];
             }
         }
     }
+}
+
+/* Convolves the image with a Gaussian; the result has unit noise. */
+static void convolve(finder *f, double sigma_px) {
+    bst_streak_finder_convolve(f, f->image, f->smooth, sigma_px, false);
     f->psf_sigma_px = sigma_px;
 }
 
@@ -274,7 +280,6 @@ typedef struct wanted {
     int most;
     double least_inside; /* share of the path */
     bool outside;        /* also stars whose place is outside the frame */
-    bool no_points;      /* removes points from the image */
 } wanted;
 
 /* Finds the stars one after the other; those that are not kept are subtracted, too. */
@@ -295,9 +300,6 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
         if (!bst_path_filter_highest(filter, &peak) || peak.snr < q->least_snr) {
             break;
         }
-        if (q->no_points && bst_streak_finder_remove_point(f, filter, &peak)) {
-            continue;
-        }
         bst_detection d = {.x_px = peak.x_px,
                            .y_px = peak.y_px,
                            .flux_e = peak.amplitude * f->sigma,
@@ -309,9 +311,8 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
                            .flags = peak.inside < WHOLE ? BST_DETECTION_EDGE : 0};
         bool inside = q->outside || (d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= f->width - 1 &&
                                      d.y_px <= f->height - 1);
-        bool left = (!q->no_points && is_ghost(out, &d)) ||
-                    (!point && bst_streak_finder_is_covered(f, &peak));
-        if (!point && !q->no_points && q->outside && bst_streak_finder_is_uneven(f, &peak)) {
+        bool left = is_ghost(out, &d) || (!point && bst_streak_finder_is_covered(f, &peak));
+        if (!point && q->outside && bst_streak_finder_is_uneven(f, &peak)) {
             bst_path_filter_leave_out(filter, &peak, CLOSE_PX);
             continue;
         }
@@ -362,7 +363,7 @@ static bst_status find_all(bst_ctx *ctx, finder *f, bst_common_streak *out) {
         out->ends[e] = (bst_common_streak_point){f->path.ends[e][0], f->path.ends[e][1]};
     }
     const wanted all = {f->options.least_snr, f->options.max_sources, USUAL_INSIDE,
-                        f->path.count > 1, false};
+                        f->path.count > 1};
     return find_stars(ctx, f, &all, out);
 }
 
@@ -404,7 +405,7 @@ bst_status bst_streak_finder_measure(bst_ctx *ctx, bst_streak_finder *f, int ind
                                      bst_star_path *path, double *quality) {
     assert(f && path && quality && index >= BST_STREAK_FINDER_POINT && index < f->shape_count);
     bst_common_streak found;
-    const wanted bright = {REFINING_SNR, REFINING_STARS, USUAL_INSIDE, false, false};
+    const wanted bright = {REFINING_SNR, REFINING_STARS, USUAL_INSIDE, false};
     *quality = 0.0;
     if (index == BST_STREAK_FINDER_POINT) {
         bst_star_path_point(&f->path);
@@ -467,30 +468,6 @@ bst_status bst_streak_finder_repeat(bst_ctx *ctx, bst_streak_finder *f, const bo
 
 const bst_star_path *bst_streak_finder_path(const bst_streak_finder *f) {
     return &f->path;
-}
-
-bst_status bst_streak_finder_follow(bst_ctx *ctx, bst_streak_finder *f, const bst_star_path *path,
-                                    double least_snr, double least_inside, bst_common_streak *out) {
-    assert(f && f->options.known_path && path && path->count > 0 && least_snr > 0.0 &&
-           least_inside > 0.0 && out);
-    f->path = *path;
-    *out = (bst_common_streak){.items = f->items, .sigma = f->sigma};
-    for (int e = 0; e < 2; e++) {
-        out->ends[e] = (bst_common_streak_point){f->path.ends[e][0], f->path.ends[e][1]};
-    }
-    const wanted all = {least_snr, f->options.max_sources, least_inside, true, true};
-    BST_TRY(find_stars(ctx, f, &all, out));
-    /* The convolution with the PSF keeps a line's light per pixel of its length. The amplitude is
-     * that of one sample; its neighbours overlap it. */
-    double length = 0.0, step = BST_STAR_PATH_STEP_PX / f->psf_sigma_px;
-    for (int k = -path->count; k <= path->count; k++) {
-        length += path->count * BST_STAR_PATH_STEP_PX * exp(-0.25 * k * k * step * step);
-    }
-    for (int i = 0; i < out->count; i++) {
-        out->items[i].flux_e *= length;
-        out->items[i].flux_sigma_e *= length;
-    }
-    return BST_OK;
 }
 
 int bst_streak_finder_shapes(const bst_streak_finder *f) {

@@ -14,6 +14,7 @@ typedef struct bst_common_streak_options {
     double tangent_per_px; /* of the gnomonic projection, at the frame's middle: streaks differ with
                               the place in a wide field; 0: all are equal */
     double psf_sigma_px;   /* 0: 1 px */
+    double shot_variance;  /* of a unit of light: 1 if the pixels are electrons; 0: not known */
     bool known_path;       /* the path comes from bst_streak_finder_follow: no shapes are listed */
 } bst_common_streak_options;
 
@@ -94,6 +95,10 @@ const bst_star_path *bst_streak_finder_path(const bst_streak_finder *finder);
 
 /* Finds all stars by a known path, also those whose own place is outside the frame.
  *
+ * A matched filter along the path gives the brightest stars. All that are known are then fitted
+ * together on the pixels, and the filter searches what is left for fainter ones, with weights for
+ * the light of the known ones, and so on (cf. DAOPHOT, Stetson 1987, PASP 99, 191).
+ *
  * Given:     finder        made with known_path
  *            path          copied; centre and tangent_per_px as for this frame
  *            least_snr     of the part of a streak inside the frame
@@ -105,5 +110,18 @@ const bst_star_path *bst_streak_finder_path(const bst_streak_finder *finder);
 bst_status bst_streak_finder_follow(bst_ctx *ctx, bst_streak_finder *finder,
                                     const bst_star_path *path, double least_snr,
                                     double least_inside, bst_common_streak *out) BST_MUST_CHECK;
+
+/* SNR that noise alone exceeds `false_alarms` times in a frame, at all places where the frame holds
+ * a part of the path.
+ *
+ * Given:     path  centre set
+ *
+ * Notes:     A smooth Gaussian field over an area A has A sqrt(det L) (2 pi)^(-3/2) u exp(-u^2 / 2)
+ *            excursions above a high u, L the covariance of its gradient: minus the second
+ *            derivatives of the response of the filter to its own path. Where the frame cuts the
+ *            path, the rest has a greater gradient along it.
+ * Reference: Adler, The Geometry of Random Fields, 1981, ch. 6 */
+double bst_streak_path_threshold(const bst_star_path *path, int width, int height,
+                                 double psf_sigma_px, double least_inside, double false_alarms);
 
 #endif

@@ -24,7 +24,10 @@ struct bst_streak_finder {
     float *lines;   /* line filter's output */
     float *scratch; /* amplitude of the brightest star found about each pixel */
     int *label, *stack;
-    int count; /* pixels on the stack: those of the latest source */
+    const float *weights; /* of the smooth image's pixels, see bst_path_filter_create_weighted;
+                             NULL: all are 1 */
+    double point[2];      /* place of the point source that was removed last; NAN: none was */
+    int count;            /* pixels on the stack: those of the latest source */
     bst_star_path path;
     bst_common_streak_options options;
     bst_detection *items; /* [max_sources + REFINING_STARS] */
@@ -34,6 +37,12 @@ struct bst_streak_finder {
     int measured_count;
 };
 
+/* Convolves an image of the frame's size with a Gaussian; uses finder->scratch.
+ *
+ * Given:     sigma_px  at most 4 px
+ *            squared   with the squared Gaussian of unit sum, in place of that of unit noise */
+void bst_streak_finder_convolve(bst_streak_finder *finder, const float *from, float *to,
+                                double sigma_px, bool squared);
 /* Collects the connected pixels of a source above a level, in finder->stack.
  *
  * Given:     from    its first pixel

@@ -2,11 +2,14 @@
 
 #include <assert.h>
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* BLOCK: side of the squares over which the path's shape changes by less than a pixel. */
 enum { BLOCK = 16, KERNEL = 5, SHIFTS = 24 };
+/* Passes of the clipped spread, the places that it needs, and those that it takes. */
+enum { SPREAD_PASSES = 3, LEAST_PLACES = 1000, SPREAD_PLACES = 65536 };
 
 /* Position error beside the noise: samples at whole pixels, and the path's own error. */
 static const double SYSTEMATIC_PX = 0.2;
@@ -16,6 +19,10 @@ static const double REACH_SHARE = 12.0, MOST_REACH = 10.0;
 /* Standard deviation of the place along a streak: the shift at which the expected logarithm of the
  * likelihood falls by this; calibrated by tests/imgproc/streak_fields.c. */
 static const double ALONG_LOSS = 0.5;
+
+/* Values of the response beyond this are clipped; mean square of a normal deviate up to it:
+ * 1 - 2 c phi(c) / erf(c / sqrt(2)) */
+static const double SPREAD_CLIP = 3.0, SPREAD_SHARE = 0.9733;
 
 struct bst_path_filter {
     const bst_star_path *path;
@@ -106,14 +113,15 @@ static void forget_rows(bst_path_filter *f, int first, int last) {
 }
 
 /* Sums the image along the path for a block of places. */
-static void filter_block(bst_path_filter *f, const bst_star_path_image *image, int bx, int by) {
+static void filter_block(bst_path_filter *f, const bst_star_path_image *image, const float *weights,
+                         int bx, int by) {
     const bst_star_path *p = f->path;
     const int x1 = bx + BLOCK < f->width ? bx + BLOCK : f->width;
     const int y1 = by + BLOCK < f->height ? by + BLOCK : f->height;
     float light[BLOCK][BLOCK] = {{0}}, squares[BLOCK][BLOCK] = {{0}};
     double m[3];
-    float all = 0.0f;  /* squared light of the whole path */
-    bool whole = true; /* all samples of all places are inside */
+    float all = 0.0f;      /* squared light of the whole path */
+    bool whole = !weights; /* all samples of all places are inside */
     bst_star_path_map(p, bx + 0.5 * BLOCK - f->margin, by + 0.5 * BLOCK - f->margin, m);
     for (int k = 0; k < p->count; k++) {
         double u = p->place[k][0], v = p->place[k][1];
@@ -135,7 +143,13 @@ static void filter_block(bst_path_filter *f, const bst_star_path_image *image, i
             for (int x = from; x < to; x++) {
                 light[y - by][x - bx] += w * row[x];
             }
-            for (int x = from; x < to && !whole; x++) {
+            if (weights) {
+                const float *share = &weights[(y + dy) * image->width + dx];
+                for (int x = from; x < to; x++) {
+                    squares[y - by][x - bx] += w2 * share[x];
+                }
+            }
+            for (int x = from; x < to && !whole && !weights; x++) {
                 squares[y - by][x - bx] += w2;
             }
         }
@@ -154,6 +168,13 @@ static void filter_block(bst_path_filter *f, const bst_star_path_image *image, i
 bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
                                   const bst_star_path_image *image, double psf_sigma_px,
                                   double least_inside, bst_path_filter **out) {
+    return bst_path_filter_create_weighted(ctx, path, image, NULL, psf_sigma_px, least_inside, out);
+}
+
+bst_status bst_path_filter_create_weighted(bst_ctx *ctx, const bst_star_path *path,
+                                           const bst_star_path_image *image, const float *weights,
+                                           double psf_sigma_px, double least_inside,
+                                           bst_path_filter **out) {
     assert(path && path->count > 0 && image && psf_sigma_px > 0.0 && least_inside > 0.0 && out);
     *out = NULL;
     bst_path_filter *f = calloc(1, sizeof *f);
@@ -181,7 +202,7 @@ bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
     measure_path(f);
     for (int y = 0; y < f->height; y += BLOCK) {
         for (int x = 0; x < f->width; x += BLOCK) {
-            filter_block(f, image, x, y);
+            filter_block(f, image, weights, x, y);
         }
     }
     *out = f;
@@ -193,6 +214,28 @@ static float snr_at(const bst_path_filter *f, int x, int y) {
         return -1.0f;
     }
     return f->response[y * f->width + x] * f->per_noise[y * f->width + x];
+}
+
+double bst_path_filter_spread(const bst_path_filter *f) {
+    assert(f);
+    double spread = 1.0;
+    const int stride = f->width * f->height / SPREAD_PLACES | 1; /* odd: columns do not repeat */
+    for (int pass = 0; pass < SPREAD_PASSES; pass++) {
+        double sum = 0.0;
+        int64_t count = 0;
+        for (int i = 0; i < f->width * f->height; i += stride) {
+            double snr = (double)(f->response[i] * f->per_noise[i]);
+            if (snr < 0.0 && snr > -SPREAD_CLIP * spread) {
+                sum += snr * snr;
+                count++;
+            }
+        }
+        if (count < LEAST_PLACES) {
+            return 1.0;
+        }
+        spread = sqrt(sum / (double)count / SPREAD_SHARE);
+    }
+    return spread;
 }
 
 /* SNR at a place, bilinear. */

@@ -20,8 +20,27 @@ typedef struct bst_path_filter bst_path_filter;
 bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
                                   const bst_star_path_image *image, double psf_sigma_px,
                                   double least_inside, bst_path_filter **out) BST_MUST_CHECK;
+/* Filters an image whose pixels have different variances.
+ *
+ * Given:     image    divided by the variance before the convolution
+ *            weights  [height][width] one over the variance, convolved with the squared PSF of unit
+ *                     sum; not needed after the call. The share inside the frame counts by it
+ * Errors:    BST_ERR_MEMORY
+ * Ownership: free *out with bst_path_filter_free
+ *
+ * Notes:     bst_path_filter_subtract subtracts the response of unit weights, which is too much
+ *            where they are smaller */
+bst_status bst_path_filter_create_weighted(bst_ctx *ctx, const bst_star_path *path,
+                                           const bst_star_path_image *image, const float *weights,
+                                           double psf_sigma_px, double least_inside,
+                                           bst_path_filter **out) BST_MUST_CHECK;
 /* Frees a filter; NULL is allowed. */
 void bst_path_filter_free(bst_path_filter *filter);
+
+/* Standard deviation of the response over that of white noise: the root mean square of what is
+ * below zero and not below CLIP standard deviations, where no stars are. 1: too few places are
+ * searched. */
+double bst_path_filter_spread(const bst_path_filter *filter);
 
 /* A maximum of the response. */
 typedef struct bst_path_filter_peak {

@@ -19,6 +19,14 @@ static const double LEAST_LIGHT = 0.2;
 
 typedef bst_streak_finder finder;
 
+/* Least weight of a pixel that shows the light of a path. */
+static const float LEAST_WEIGHT = 0.5f;
+
+/* Weight of the pixel at a place. */
+static float weight_at(const finder *f, double x, double y) {
+    return f->weights ? f->weights[(int)lround(y) * f->width + (int)lround(x)] : 1.0f;
+}
+
 /* Light of a peak's path: median of its samples, and the brightest. */
 typedef struct path_light {
     double median; /* of the light over that of the path; NAN: no sample is inside */
@@ -39,7 +47,11 @@ static path_light light_along(const finder *f, const bst_path_filter_peak *peak)
         if (!(x >= 0.0 && y >= 0.0 && x < f->width - 1 && y < f->height - 1)) {
             continue;
         }
-        double v = bst_star_path_image_at(&image, x, y);
+        float weight = weight_at(f, x, y);
+        if (weight < LEAST_WEIGHT) {
+            continue;
+        }
+        double v = bst_star_path_image_at(&image, x, y) / (double)weight;
         values[inside++] = (float)(v / fmax(f->path.light[k], LEAST_LIGHT));
         if (v > out.most) {
             out.x = x;
@@ -71,6 +83,7 @@ static void climb(const finder *f, path_light *at) {
 bool bst_streak_finder_remove_point(finder *f, bst_path_filter *filter,
                                     const bst_path_filter_peak *peak) {
     path_light l = light_along(f, peak);
+    f->point[0] = f->point[1] = NAN;
     if (!(l.median < EVEN_SHARE * peak->amplitude)) {
         return false;
     }
@@ -79,6 +92,8 @@ bool bst_streak_finder_remove_point(finder *f, bst_path_filter *filter,
         return true;
     }
     climb(f, &l);
+    f->point[0] = l.x;
+    f->point[1] = l.y;
     bst_path_filter_subtract_point(filter, l.x, l.y, l.most);
     int r = (int)ceil(POINT_SIGMA * f->psf_sigma_px);
     int cx = (int)lround(l.x), cy = (int)lround(l.y);

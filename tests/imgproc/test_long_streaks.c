@@ -5,7 +5,7 @@
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 
-enum { SIDE = 224, NODES = 11, STARS = 9, POINTS = 2 };
+enum { SIDE = 224, NODES = 11, STARS = 9, POINTS = 3 };
 
 /* A bent motion of 120 px that slows down. */
 static void bent_motion(bst_star_path_node nodes[NODES]) {
@@ -76,7 +76,7 @@ static void test_stars_points_and_edges(void **state) {
         {20, 150, 20000, true},   {-25, 60, 60000, true}, /* mean places outside: */
         {235, 190, 40000, true},  {215, 60, 25000, true},
     };
-    static const double points[POINTS][2] = {{60.3, 200.6}, {170.7, 20.2}};
+    double points[POINTS][2] = {{60.3, 200.6}, {170.7, 20.2}, {0.0, 0.0}};
     bst_ctx ctx = {0};
     synthetic s;
     synthetic_init(&s, SIDE, SIDE);
@@ -87,6 +87,9 @@ static void test_stars_points_and_edges(void **state) {
     for (int i = 0; i < STARS; i++) {
         add_star(&s, nodes, mean, stars[i].x, stars[i].y, stars[i].flux_e);
     }
+    /* the last one on the streak of a faint star */
+    points[2][0] = stars[2].x + nodes[7].x_px - mean[0];
+    points[2][1] = stars[2].y + nodes[7].y_px - mean[1];
     for (int i = 0; i < POINTS; i++) {
         synthetic_add(&s, points[i][0], points[i][1], 1200.0, 0.0, 0.0);
     }
