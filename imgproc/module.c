@@ -45,7 +45,7 @@ static void destroy(void *self) {
     }
     bst_calibration_free(&m->maps);
     bst_starid_free(m->starid);
-    bst_imgproc_discriminator_free(m->discriminator);
+    bst_discriminator_free(m->discriminator);
     bst_predicted_stars_free(&m->sky);
     bst_stack_free(m->stack);
     bst_optics_photometer_free(&m->photometer);
@@ -111,7 +111,7 @@ static bst_status archive_module(void *self, bst_archive *archive) {
     bst_imgproc_state *m = self;
     m->steps = bst_archive_integer(archive, m->steps, 0, INT64_MAX / 2);
     BST_ARCHIVE(archive, m->window_v_limit);
-    bst_imgproc_discriminator_archive(m->discriminator, archive);
+    bst_discriminator_archive(m->discriminator, archive);
     bst_extended_step_archive(&m->extended, archive);
     if (m->pixels) {
         BST_TRY(bst_pixel_learner_archive(m->pixels, archive));
@@ -150,8 +150,8 @@ static bst_status prepare(const bst_module_env *env, bst_imgproc_state *m) {
                                        m->epoch_julian_year, CATALOGUE_CAPACITY, &m->sky));
     BST_TRY(bst_starid_create(env->ctx, CATALOGUE_CAPACITY, (int)m->config->capacity,
                               m->config->search_radius_px, &m->starid));
-    BST_TRY(bst_imgproc_discriminator_create(env->ctx, &m->camera, (int)m->config->capacity,
-                                             &m->discriminator));
+    BST_TRY(bst_discriminator_create(env->ctx, &m->camera, (int)m->config->capacity,
+                                     &m->discriminator));
     if (m->config->stack.frames > 0 && m->config->track_windows) {
         return bst_fail(env->ctx, BST_ERR_CONFIG,
                         "imgproc: track_windows and stack do not go together: stacks are made of "
@@ -240,8 +240,8 @@ static void ground_at(const void *user, double x_px, double y_px, bst_psf_wings_
 
 /* Labels artefacts in the PSF wings of bright stars. */
 static bst_status label_wings(bst_ctx *ctx, bst_imgproc_state *m, const bst_imgproc_lane *l,
-                              const bst_imgproc_exposure *e,
-                              const bst_imgproc_frame_knowledge *known, bst_detections *out) {
+                              const bst_imgproc_exposure *e, const bst_frame_knowledge *known,
+                              bst_detections *out) {
     const bst_frame_message *message = e->message;
     const bst_wing_labels_input input = {
         .camera = &m->calibrator.camera,
@@ -361,7 +361,7 @@ static void add_to_stack(bst_imgproc_state *m, const bst_imgproc_lane *l, double
 
 /* Updates the bad-pixel learner with the frame. */
 static void learn_pixels(bst_imgproc_state *m, struct bst_step *step, const bst_imgproc_lane *l,
-                         const bst_frame_message *message, const bst_imgproc_frame_knowledge *known,
+                         const bst_frame_message *message, const bst_frame_knowledge *known,
                          bst_detections *out) {
     int64_t lost = bst_pixel_learner_lost(m->pixels);
     double middle_s =
@@ -386,9 +386,9 @@ static bst_light observer_at(const bst_imgproc_state *m, const bst_nav_telemetry
 
 /* Labels detections that are no stars, and refines the fit of possible objects. */
 static void label_objects(bst_imgproc_state *m, const bst_imgproc_lane *l,
-                          const bst_imgproc_frame_knowledge *known,
-                          const bst_optics_zero_point *zero_point, bst_detections *out) {
-    bst_imgproc_discriminator_label(m->discriminator, known, out);
+                          const bst_frame_knowledge *known, const bst_optics_zero_point *zero_point,
+                          bst_detections *out) {
+    bst_discriminator_label(m->discriminator, known, out);
     for (int i = 0; i < out->count && !m->plugin; i++) {
         if (out->items[i].label == BST_LABEL_OBJECT) {
             bst_imgproc_refine(l->ip, out, i, zero_point);
@@ -479,6 +479,18 @@ static void count_losses(struct bst_step *step, const bst_detections *out) {
     }
 }
 
+/* Bad-pixel learner, and the map that masked a frame. */
+typedef struct suspected_pixels {
+    const bst_pixel_learner *learner;
+    const bst_pixel_map *left_out;
+} suspected_pixels;
+
+/* Log odds that a pixel is a defect, for the labels of the frame's detections. */
+static double suspicion_of(const void *user, int32_t pixel) {
+    const suspected_pixels *s = user;
+    return bst_pixel_learner_suspicion(s->learner, s->left_out, pixel);
+}
+
 /* Processes a frame message into detections. */
 static bst_status process_frame(bst_imgproc_state *m, struct bst_step *step,
                                 const bst_frame_message *message) {
@@ -505,12 +517,11 @@ static bst_status process_frame(bst_imgproc_state *m, struct bst_step *step,
         BST_TRY(bst_imgproc_find_long_streaks(ctx, m, l, &e, pointing.payload, out, &followed));
     }
     bst_optics_photometer_begin(&m->photometer);
-    bst_imgproc_frame_knowledge known = {.q_cam_from_gcrf = out->q_cam_from_gcrf,
-                                         .window = message->window,
-                                         .streak_px = m->plugin
-                                                          ? bst_plugin_detector_streak_px(m->plugin)
-                                                          : bst_imgproc_streak_px(l->ip),
-                                         .predictions = predictions};
+    bst_frame_knowledge known = {.q_cam_from_gcrf = out->q_cam_from_gcrf,
+                                 .window = message->window,
+                                 .streak_px = m->plugin ? bst_plugin_detector_streak_px(m->plugin)
+                                                        : bst_imgproc_streak_px(l->ip),
+                                 .predictions = predictions};
     if (oriented && e.navigated && (!smeared || followed)) {
         BST_TRY(m->lost.enabled
                     ? bst_imgproc_lost_identify(m, step, l, &e, out, &known.q_cam_from_gcrf)
@@ -525,8 +536,10 @@ static bst_status process_frame(bst_imgproc_state *m, struct bst_step *step,
         double middle = 0.5 * ((double)message->start_tick + (double)message->end_tick);
         known.predictions_age_s = (middle - (double)predictions->tick) / (double)m->tick_rate_hz;
     }
-    known.learned = m->pixels;
-    known.left_out = m->pixels ? bst_pixel_learner_map(m->pixels, l->map) : NULL;
+    suspected_pixels suspected = {m->pixels,
+                                  m->pixels ? bst_pixel_learner_map(m->pixels, l->map) : NULL};
+    known.suspicion = m->pixels ? suspicion_of : NULL;
+    known.suspicion_user = &suspected;
     if (m->pixels && oriented) {
         learn_pixels(m, step, l, message, &known, out);
     }

@@ -27,7 +27,7 @@ bst_status bst_imgproc_calibration_archive(bst_imgproc_state *m, bst_archive *ar
     BST_TRY(bst_camera_calibrator_archive(&m->calibrator, archive));
     m->calibration_misses = bst_archive_integer(archive, m->calibration_misses, 0, INT64_MAX / 2);
     if (bst_archive_is_restoring(archive) && m->calibrator.frames > 0) {
-        bst_imgproc_discriminator_use_camera(m->discriminator, &m->calibrator.camera);
+        bst_discriminator_use_camera(m->discriminator, &m->calibrator.camera);
     }
     return BST_OK;
 }
@@ -177,7 +177,7 @@ bst_status bst_imgproc_calibrate_camera(bst_imgproc_state *m, struct bst_step *s
         }
     }
     if (update(m, e, out)) {
-        bst_imgproc_discriminator_use_camera(m->discriminator, &m->calibrator.camera);
+        bst_discriminator_use_camera(m->discriminator, &m->calibrator.camera);
         m->calibration_misses = 0;
     }
     bst_camera_calibrator_get(&m->calibrator, &out->calibration);

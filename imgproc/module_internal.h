@@ -9,8 +9,8 @@
 #include "imgproc/identify/lost_in_space.h"
 #include "imgproc/identify/predicted_stars.h"
 #include "imgproc/imgproc.h"
-#include "imgproc/measure/discriminate.h"
 #include "imgproc/wing_labels.h"
+#include "sim/onboard/discriminate.h"
 #include "sim/optics/photometry.h"
 
 /* Stars by which the camera's scale is found coarsely. */
@@ -46,7 +46,7 @@ typedef struct bst_imgproc_state {
     bst_imgproc_maps maps;
     bst_imgproc_lane lanes[BST_STEP_LANES];
     bst_starid *starid;
-    bst_imgproc_discriminator *discriminator;
+    bst_discriminator *discriminator;
     bst_predicted_stars sky;
     double epoch_julian_year;       /* of the run's epoch */
     bst_region_of_interest windows; /* of the current frame; none: the whole frame */

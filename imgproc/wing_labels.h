@@ -5,12 +5,12 @@
 #include "boresight/camera_motion.h"
 #include "imgproc/detect/psf_wings.h"
 #include "imgproc/identify/predicted_stars.h"
-#include "imgproc/measure/discriminate.h"
+#include "sim/onboard/discriminate.h"
 
 /* A frame whose stars have been identified. */
 typedef struct bst_wing_labels_input {
     const bst_camera *camera;
-    const bst_imgproc_frame_knowledge *known;
+    const bst_frame_knowledge *known;
     const bst_camera_motion *motion; /* NULL: unknown */
     int binning;
     double exposure_s;

@@ -29,6 +29,7 @@ typedef struct generator_source {
     /* output of the frame's other filter relative to this one's amplitude; 0: one filter only */
     double other;
     double start_x, start_y; /* where a point fit to it begins, relative to the mean of its path */
+    double point_flux;       /* uneven path: light that a point fit to it finds, of the whole */
     uint64_t name;           /* stream of its random draws */
     int item, head;          /* head: source with which it is merged; -1: none */
     bool star, as_streak, found, saturated;
@@ -88,7 +89,8 @@ struct bst_generator {
     bst_path_outputs outputs;
     /* lead of a point's fit over a streak's on an uneven path, by light level; see point_lead() */
     double point_lead[GENERATOR_BIASES];
-    double known_width; /* width of the filters' images relative to the PSF's */
+    double point_flux[GENERATOR_BIASES]; /* light that a point's fit finds on it, of the whole */
+    double known_width;                  /* width of the filters' images relative to the PSF's */
     /* centroid variance relative to a Gaussian of the PSF's noise-equivalent area */
     double place_ratio2;
     double norm_ratio[2]; /* sqrt(sum p^2) of the filters' images relative to the bound's */

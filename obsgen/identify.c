@@ -145,18 +145,3 @@ bst_status bst_obsgen_identify(bst_ctx *ctx, const bst_identify_options *o,
     }
     return BST_OK;
 }
-
-void bst_obsgen_label(bst_detection *items, int count, bool found_stars, double streak_px) {
-    assert(count >= 0 && (items || count == 0));
-    for (int i = 0; i < count; i++) {
-        bst_detection *d = &items[i];
-        bool unknown = d->label == BST_LABEL_UNKNOWN;
-        bool moved_as_stars = streak_px >= 3.0 && (d->flags & BST_DETECTION_STREAK);
-        if (unknown && (d->flags & BST_DETECTION_EDGE)) {
-            d->label = BST_LABEL_ARTEFACT;
-        } else if (unknown && !moved_as_stars && (found_stars || streak_px >= 3.0)) {
-            d->label = BST_LABEL_OBJECT;
-        }
-        d->label_probability = d->label == BST_LABEL_UNKNOWN ? 0.0 : 1.0;
-    }
-}

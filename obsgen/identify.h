@@ -27,8 +27,4 @@ bst_status bst_obsgen_identify(bst_ctx *ctx, const bst_identify_options *options
                                const bst_obsgen_generated *generated, bst_detection *items,
                                int count, int *identified) BST_MUST_CHECK;
 
-/* Labels the remaining detections: ARTEFACT at the frame's edge; OBJECT if stars were found or are
- * streaks, unless it moved like the stars. All labels have probability 1. */
-void bst_obsgen_label(bst_detection *items, int count, bool found_stars, double streak_px);
-
 #endif

@@ -242,6 +242,14 @@ static void fit_visible_part(const bst_generator *g, const generator_source *s, 
     d->label = BST_LABEL_ARTEFACT;
 }
 
+/* Share of a moving source's light that a fit of a point to it finds. */
+static double caught_by_point(const bst_generator *g, const generator_source *s) {
+    const bst_obsgen_path_px rest = {0.0, 0.0};
+    return g->uneven ? s->point_flux
+                     : bst_matched_product(s->path, rest, g->total_sigma) /
+                           bst_matched_product(rest, rest, g->total_sigma);
+}
+
 bst_detection bst_generator_measure(const bst_generator *g, const generator_source *s,
                                     const generator_blend *b) {
     bst_detection d = {0};
@@ -249,10 +257,7 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     /* the point filter's flux of a streak too faint to be fitted as one */
     bool own = !b->point && (s->as_streak || s->peak >= MOMENTS_SNR || s->length < 0.5);
     double length = own && (s->as_streak || is_drawn_out(g, s)) ? s->length : 0.0;
-    double caught = own ? 1.0
-                        : bst_matched_product(s->path, (bst_obsgen_path_px){0, 0}, g->total_sigma) /
-                              bst_matched_product((bst_obsgen_path_px){0, 0},
-                                                  (bst_obsgen_path_px){0, 0}, g->total_sigma);
+    double caught = own ? 1.0 : caught_by_point(g, s);
     double flux = b->flux_e * caught;
     /* errors follow the image's bound; the stated covariance follows that of the onboard PSF */
     bst_crlb_table_at truth = bound_of_image(g, b->flux_e, s->length);

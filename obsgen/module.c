@@ -5,6 +5,7 @@
 
 #include "boresight/camera_motion.h"
 #include "obsgen/generator.h"
+#include "obsgen/labels.h"
 #include "obsgen/lost_attitude.h"
 #include "obsgen/model/psf_bound.h"
 #include "obsgen/obsgen.h"
@@ -98,8 +99,8 @@ static const bst_port ports[PORT_COUNT] = {
     [PORT_DETECTIONS] = {BST_CHANNEL_DETECTIONS, BST_PORT_OUT, 0, 0.0, 2048},
 };
 
-/* Largest number of pending exposures and of stored path steps. */
-enum { PENDING = 16, MOST_STEPS = 1024 };
+/* Largest number of pending exposures. */
+enum { PENDING = 16 };
 /* Relative change of the PSF width above which its bound is tabulated anew. */
 static const double SAME_WIDTH = 0.005;
 
@@ -124,6 +125,7 @@ typedef struct obsgen {
     bst_optics_photometer photometer;
     bst_obsgen_pending waiting[PENDING];
     bst_obsgen_lost lost;
+    bst_discriminator *discriminator;
 } obsgen;
 
 static void destroy(void *self) {
@@ -136,6 +138,7 @@ static void destroy(void *self) {
     bst_generator_free(o->generator);
     bst_psf_free(o->psf);
     bst_optics_photometer_free(&o->photometer);
+    bst_discriminator_free(o->discriminator);
     for (int i = 0; i < PENDING; i++) {
         bst_obsgen_pending_free(&o->waiting[i]);
     }
@@ -175,6 +178,8 @@ static bst_status prepare(const bst_module_env *env, obsgen *o) {
     BST_TRY(bst_field_create(env->ctx, env->world, env->observer, env->sensor, &o->field));
     bst_field_set_background_places_only(o->field);
     BST_TRY(bst_optics_photometer_create(env->ctx, (int)c->capacity, &o->photometer));
+    BST_TRY(bst_discriminator_create(env->ctx, bst_knowledge_camera(env->knowledge),
+                                     (int)c->capacity, &o->discriminator));
     bst_env_set_capacity(env, PORT_TRUTH, (int)c->truth_capacity);
     bst_env_set_capacity(env, PORT_DETECTIONS, (int)c->capacity);
     return BST_OK;
@@ -283,41 +288,6 @@ static double peak_e(const void *user, int index, const bst_truth_item *item) {
     return bst_generator_peak_e(*(const double *)user, item);
 }
 
-/* Path of a star at the window's centre at even steps: the plant's steps within the exposure. */
-static bst_status star_path(bst_ctx *ctx, const obsgen *o, const bst_los_track *track,
-                            double lead_s, bst_window window, bst_obsgen_pending *p) {
-    double x = window.x0 + 0.5 * (window.width - 1), y = window.y0 + 0.5 * (window.height - 1);
-    bst_vec3 star = bst_quat_rotate(bst_quat_conj(track->q_cam_from_gcrf[track->count / 2]),
-                                    bst_camera_unproject(&o->camera, x, y));
-    int count = track->count < MOST_STEPS ? track->count : MOST_STEPS;
-    double step_s = (track->time_s[track->count - 1] - 2.0 * lead_s) / (count - 1);
-    double mean_x = 0.0, mean_y = 0.0;
-    bool even = lead_s == 0.0 && count == track->count;
-    for (int k = 1; k < count && even; k++) {
-        even = fabs(track->time_s[k] - k * step_s) < 1e-3 * step_s;
-    }
-    BST_TRY(bst_obsgen_pending_reserve_path(ctx, p, count));
-    p->path_count = count;
-    for (int k = 0; k < count; k++) {
-        bst_quat q =
-            even ? track->q_cam_from_gcrf[k] : bst_los_track_attitude(track, lead_s + k * step_s);
-        double weight = (k == 0 || k == count - 1 ? 0.5 : 1.0) / (count - 1);
-        if (!bst_camera_project(&o->camera, bst_quat_rotate(q, star), &x, &y)) {
-            p->path_count = 0;
-            return BST_OK;
-        }
-        p->path_x_px[k] = x;
-        p->path_y_px[k] = y;
-        mean_x += weight * x;
-        mean_y += weight * y;
-    }
-    for (int k = 0; k < count; k++) {
-        p->path_x_px[k] -= mean_x;
-        p->path_y_px[k] -= mean_y;
-    }
-    return BST_OK;
-}
-
 /* Publishes the truth of an exposure and stores all its sources until it is processed. */
 static bst_status store_exposure(obsgen *o, struct bst_step *step, const bst_exposure *e,
                                  const bst_los_history *history) {
@@ -364,7 +334,7 @@ static bst_status store_exposure(obsgen *o, struct bst_step *step, const bst_exp
     if (e->dropped) {
         return BST_OK;
     }
-    BST_TRY(star_path(ctx, o, &track, options.lead_s, e->window, p));
+    BST_TRY(bst_obsgen_pending_set_path(ctx, p, &o->camera, &track, options.lead_s, e->window));
     p->sigma_px = o->sigma_px;
     BST_TRY(set_response(ctx, o, e->binning > 1 ? e->binning : 1, p));
     BST_TRY(bst_obsgen_pending_reserve(ctx, p, count));
@@ -426,6 +396,24 @@ static void add_stars(obsgen *o, const bst_generator_frame *frame,
                 bst_camera_v_mag(o->world_camera, electrons / frame->exposure_s));
         }
     }
+}
+
+/* Labels the detections that are no identified stars. */
+static void label(const obsgen *o, struct bst_step *step, const bst_exposure *e,
+                  const bst_truth *truth, const bst_generator_result *made, bst_detections *out) {
+    const bst_sample nav = bst_step_latest(step, PORT_NAV);
+    const bst_sample predicted = bst_step_latest(step, PORT_PREDICTIONS);
+    const bst_obsgen_labels_frame frame = {
+        .camera = bst_knowledge_camera(o->knowledge),
+        .truth = truth,
+        .generated = made->items,
+        .window = e->window,
+        .streak_px = made->streak_px,
+        .nav = nav.stale ? NULL : nav.payload,
+        .predicted = predicted.stale ? NULL : predicted.payload,
+        .middle_tick = 0.5 * ((double)e->start_tick + (double)e->end_tick),
+        .tick_rate_hz = (double)o->tick_rate_hz};
+    bst_obsgen_label(o->discriminator, &frame, out);
 }
 
 /* Generates and publishes the detections of a stored exposure. */
@@ -497,7 +485,7 @@ static bst_status process_exposure(obsgen *o, struct bst_step *step, const bst_e
     bst_photometry_apply(&zero_point, bst_camera_v_mag(bst_knowledge_camera(o->knowledge), 1.0),
                          out);
     if (!made.smeared) {
-        bst_obsgen_label(out->items, out->count, out->stars_identified > 0, made.streak_px);
+        label(o, step, e, p->truth, &made, out);
     }
     if (out->stars_identified == 0) {
         bst_step_count(step, "frame_without_stars");
@@ -550,6 +538,7 @@ static bst_status archive_module(void *self, bst_archive *archive) {
     obsgen *o = self;
     BST_TRY(archive_camera(o, archive));
     bst_obsgen_lost_archive(&o->lost, archive);
+    bst_discriminator_archive(o->discriminator, archive);
     BST_ARCHIVE(archive, o->bound_binning);
     if (o->bound_binning != 0) {
         BST_ARCHIVE(archive, o->image_bound);

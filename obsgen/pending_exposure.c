@@ -1,10 +1,15 @@
 #include "obsgen/pending_exposure.h"
 
+#include <assert.h>
+#include <math.h>
 #include <stdlib.h>
 
 /* Greatest number of sources of an exposure and of steps of a path in a saved state: a damaged
  * number must not take all memory. */
 enum { MOST_SOURCES = 1 << 24, MOST_STEPS = 1 << 20 };
+
+/* Largest number of steps of a path that is set. */
+enum { PATH_STEPS = 1024 };
 
 void bst_obsgen_pending_free(bst_obsgen_pending *p) {
     free(p->truth);
@@ -24,6 +29,42 @@ bst_status bst_obsgen_pending_reserve_path(bst_ctx *ctx, bst_obsgen_pending *p, 
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a path of %d steps", count);
     }
     p->path_room = count;
+    return BST_OK;
+}
+
+bst_status bst_obsgen_pending_set_path(bst_ctx *ctx, bst_obsgen_pending *p,
+                                       const bst_camera *camera, const bst_los_track *track,
+                                       double lead_s, bst_window window) {
+    assert(p && camera && track && track->count >= 2 && lead_s >= 0.0);
+    double x = window.x0 + 0.5 * (window.width - 1), y = window.y0 + 0.5 * (window.height - 1);
+    bst_vec3 star = bst_quat_rotate(bst_quat_conj(track->q_cam_from_gcrf[track->count / 2]),
+                                    bst_camera_unproject(camera, x, y));
+    int count = track->count < PATH_STEPS ? track->count : PATH_STEPS;
+    double step_s = (track->time_s[track->count - 1] - 2.0 * lead_s) / (count - 1);
+    double mean_x = 0.0, mean_y = 0.0;
+    bool even = lead_s == 0.0 && count == track->count;
+    for (int k = 1; k < count && even; k++) {
+        even = fabs(track->time_s[k] - k * step_s) < 1e-3 * step_s;
+    }
+    BST_TRY(bst_obsgen_pending_reserve_path(ctx, p, count));
+    p->path_count = count;
+    for (int k = 0; k < count; k++) {
+        bst_quat q =
+            even ? track->q_cam_from_gcrf[k] : bst_los_track_attitude(track, lead_s + k * step_s);
+        double weight = (k == 0 || k == count - 1 ? 0.5 : 1.0) / (count - 1);
+        if (!bst_camera_project(camera, bst_quat_rotate(q, star), &x, &y)) {
+            p->path_count = 0;
+            return BST_OK;
+        }
+        p->path_x_px[k] = x;
+        p->path_y_px[k] = y;
+        mean_x += weight * x;
+        mean_y += weight * y;
+    }
+    for (int k = 0; k < count; k++) {
+        p->path_x_px[k] -= mean_x;
+        p->path_y_px[k] -= mean_y;
+    }
     return BST_OK;
 }
 

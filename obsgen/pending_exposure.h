@@ -6,6 +6,7 @@
 #include "boresight/messages.h"
 #include "obsgen/model/crlb_table.h"
 #include "obsgen/model/response.h"
+#include "sim/world/scene/los_track.h"
 
 typedef struct bst_obsgen_pending {
     int64_t exposure_id; /* -1: none */
@@ -33,6 +34,15 @@ bst_status bst_obsgen_pending_reserve(bst_ctx *ctx, bst_obsgen_pending *pending,
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_obsgen_pending_reserve_path(bst_ctx *ctx, bst_obsgen_pending *pending,
                                            int count) BST_MUST_CHECK;
+
+/* Sets the path of a star at the window's centre, at even steps: the plant's steps within the
+ * exposure. The path is left empty if the star leaves the camera's view.
+ *
+ * Given:     track   attitude from lead_s before the exposure to lead_s after it
+ * Errors:    BST_ERR_MEMORY */
+bst_status bst_obsgen_pending_set_path(bst_ctx *ctx, bst_obsgen_pending *pending,
+                                       const bst_camera *camera, const bst_los_track *track,
+                                       double lead_s, bst_window window) BST_MUST_CHECK;
 
 /* Saves or restores a pending exposure, for bst_module_desc.archive.
  *

@@ -26,8 +26,7 @@ static void count_sharp_stars(bst_pixel_learner *learner, const bst_camera *came
 }
 
 /* Position and radius, px, of the predicted tracks in the frame. Returns their number. */
-static int predict_track_positions(const bst_camera *camera,
-                                   const bst_imgproc_frame_knowledge *known,
+static int predict_track_positions(const bst_camera *camera, const bst_frame_knowledge *known,
                                    double out[MOST_PREDICTED][3]) {
     int count = 0, given = known->predictions ? known->predictions->count : 0;
     for (int i = 0; i < given && count < MOST_PREDICTED; i++) {

@@ -4,11 +4,11 @@
 
 #include "imgproc/calibrate/pixel_learner.h"
 #include "imgproc/detect/region_of_interest.h"
-#include "imgproc/measure/discriminate.h"
+#include "sim/onboard/discriminate.h"
 
 /* Input of bst_pixel_step: a frame whose stars have been identified. */
 typedef struct bst_pixel_step_input {
-    const bst_imgproc_frame_knowledge *known;
+    const bst_frame_knowledge *known;
     const bst_region_of_interest *windows; /* windows searched; NULL or none: the whole frame */
     int binning;
     double time_s; /* mid-exposure */

@@ -6,8 +6,8 @@
 
 #include "imgproc/identify/null_model.h"
 #include "imgproc/identify/star_fit.h"
-#include "imgproc/measure/heapsort.h"
 #include "sim/core/arena.h"
+#include "sim/core/heapsort.h"
 
 enum { MOST_PREDICTED = 512, MOST_CANDIDATES = 64, PASSES = 5, PATH_STEPS = 32 };
 /* Patterns that are looked at for each one that is verified. */

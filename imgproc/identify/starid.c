@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/measure/heapsort.h"
 #include "sim/core/arena.h"
+#include "sim/core/heapsort.h"
 #include "sim/optics/photometry.h"
 
 enum { VOTERS = 150, PASSES = 5 };

@@ -4,14 +4,10 @@
 #define BST_IMGPROC_MEASURE_COSMIC_RAY_H
 
 #include "imgproc/measure/locate.h"
+#include "sim/onboard/discriminate.h"
 
 /* SNR of light beside charge above which there is also a source. */
 #define BST_CHARGE_LIGHT_SNR 4.0
-
-/* True if a label stands for charge (hot pixel or cosmic ray) instead of light. */
-static inline bool bst_cosmic_ray_label(int32_t label) {
-    return label == BST_LABEL_HOT_PIXEL || label == BST_LABEL_HIT;
-}
 
 /* Finds the charge about every candidate (bst_imgproc_found.charge), then masks all pixels that
  * hold it. All are found before any is masked, so that one candidate's charge cannot hide

@@ -82,7 +82,7 @@ void bst_deblend_gather(const bst_imgproc_locator *l, const bst_locate_frame *f,
     for (int c = 0; c < across * (last_row - first_row + 1); c++) {
         int cell = (first_row + c / across) * l->columns + first_column + c % across;
         for (int k = l->cell[cell]; k >= 0; k = l->found[k].next) {
-            if (k == i || l->found[k].dropped || bst_cosmic_ray_label(l->found[k].label)) {
+            if (k == i || l->found[k].dropped || bst_label_is_charge(l->found[k].label)) {
                 continue;
             }
             bst_imgproc_stamp other = bst_fit_stamp(&l->found[k].source, bst_deblend_reach(f),
@@ -178,8 +178,8 @@ void bst_deblend_drop_doubles(bst_imgproc_locator *l, const bst_locate_frame *f,
                 const bst_imgproc_shape *b = &l->found[k].source.shape;
                 /* indices are by brightness: drop the fainter one */
                 if (k < i && !l->found[k].dropped &&
-                    bst_cosmic_ray_label(l->found[k].label) ==
-                        bst_cosmic_ray_label(l->found[i].label) &&
+                    bst_label_is_charge(l->found[k].label) ==
+                        bst_label_is_charge(l->found[i].label) &&
                     hypot(a->x_px - b->x_px, a->y_px - b->y_px) < radius) {
                     l->found[i].dropped = true;
                 }

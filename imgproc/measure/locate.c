@@ -320,7 +320,7 @@ static void process_range(void *user, int begin, int end) {
     bst_imgproc_worker w = {l, p->f, &l->fits[taken]};
     for (int i = p->first + begin; i < p->first + end; i++) {
         l->next[i] = l->found[i];
-        if (!l->found[i].dropped && !bst_cosmic_ray_label(l->found[i].label)) {
+        if (!l->found[i].dropped && !bst_label_is_charge(l->found[i].label)) {
             p->each(&w, i, &l->next[i]);
         }
     }

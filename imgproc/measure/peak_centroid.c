@@ -69,7 +69,7 @@ static void check_neighbours(const bst_imgproc_worker *w, int i, bst_imgproc_fou
         for (int u = left; u <= right; u++) {
             for (int k = l->cell[v * l->columns + u]; k >= 0; k = l->found[k].next) {
                 const bst_imgproc_found *other = &l->found[k];
-                if (k == i || other->dropped || bst_cosmic_ray_label(other->label)) {
+                if (k == i || other->dropped || bst_label_is_charge(other->label)) {
                     continue;
                 }
                 double dx = fabs(other->source.shape.x_px - s->x_px);

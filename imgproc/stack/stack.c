@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/measure/heapsort.h"
 #include "imgproc/stack/stack_internal.h"
+#include "sim/core/heapsort.h"
 #include "sim/core/invariant.h"
 
 const bst_config_desc bst_stack_config_table[] = {

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/measure/heapsort.h"
 #include "imgproc/stack/stack_internal.h"
+#include "sim/core/heapsort.h"
 
 /* Charge: SNR of the pixel's own sum over the frames, and the deficit of its neighbours against a
  * point's. */

@@ -2,8 +2,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/measure/heapsort.h"
 #include "imgproc/stack/stack_internal.h"
+#include "sim/core/heapsort.h"
 
 enum { GROUP = 4, MAX_GROUPS = BST_STACK_MAX_FRAMES / GROUP, HITS = 16384, MAX_RATES = 1024 };
 

@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "imgproc/detect/simd_layout.h"
-#include "imgproc/measure/heapsort.h"
+#include "sim/core/heapsort.h"
 
 /* A tile holds the lines that start in it. */
 enum { TILE_COLUMNS = 512, TILE_ROWS = 256, TILE_HITS = 2048, PIECES = 8 };

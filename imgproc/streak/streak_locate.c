@@ -84,7 +84,7 @@ static int drop_fragments(bst_streak_locator *l, bst_imgproc_locator *found, int
         double beyond = fmax(-along, along - 1.0) * length;
         bool inside = distance < 3.0 * sigma_px + 0.5 && beyond < beyond_px;
         bool own = !f->streak && f->snr > OWN_LIGHT * piece_snr + OWN_LIGHT_SNR;
-        if (inside && !own && !f->dropped && !bst_cosmic_ray_label(f->label)) {
+        if (inside && !own && !f->dropped && !bst_label_is_charge(f->label)) {
             f->dropped = true;
             assert(pieces < found->capacity);
             l->pieces[pieces++] = i;
@@ -102,7 +102,7 @@ static void mask_other_sources(bst_streak_locator *l, const bst_locate_frame *f,
         const bst_imgproc_found *o = &found->found[i];
         double x = o->source.shape.x_px - stamp->x0, y = o->source.shape.y_px - stamp->y0;
         double radius = disc_radius(o->snr, f->sigma_px);
-        if (o->dropped || bst_cosmic_ray_label(o->label) || x < -radius || y < -radius ||
+        if (o->dropped || bst_label_is_charge(o->label) || x < -radius || y < -radius ||
             x > stamp->width + radius || y > stamp->height + radius) {
             continue;
         }
@@ -400,7 +400,7 @@ void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
     for (int i = 0; i < points; i++) {
         const bst_imgproc_found *o = &found->found[i];
         bool saturated = o->flags & BST_DETECTION_SATURATED;
-        if (bst_cosmic_ray_label(o->label)) {
+        if (bst_label_is_charge(o->label)) {
             mask_cosmic_ray(l, o);
         } else if (saturated || is_bright_point(f, o)) {
             mask_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px,
@@ -414,7 +414,7 @@ void bst_streak_locate(bst_streak_locator *l, const bst_locate_frame *f,
     int light = 0;
     for (int i = 0; i < points; i++) {
         const bst_imgproc_found *o = &found->found[i];
-        if (!o->dropped && !bst_cosmic_ray_label(o->label)) {
+        if (!o->dropped && !bst_label_is_charge(o->label)) {
             light++;
             mask_point(l, o->source.shape.x_px, o->source.shape.y_px, o->snr, f->sigma_px, 1.0);
         }

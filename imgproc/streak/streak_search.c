@@ -5,7 +5,7 @@
 #include <stdlib.h>
 
 #include "boresight/vec.h"
-#include "imgproc/measure/heapsort.h"
+#include "sim/core/heapsort.h"
 
 /* Lines of the filter bank down to this margin below the threshold are refined: the loss of the
  * bank's steps, at most 0.65 (tests/imgproc/calibrate_streak_search.c). */

@@ -166,6 +166,10 @@ void bst_false_alarms_cosmic_rays(bst_generator *g) {
             y > g->height - 0.5) {
             continue;
         }
+        if (g->smeared) { /* nothing is fitted, and no shape is looked at */
+            bst_generator_keep_rough(g, (int)lround(x), (int)lround(y), peak, -1);
+            continue;
+        }
         bst_obsgen_generated item = {
             .detection = bst_false_alarms_point(g, x, y, peak, 0.0), .item = -1, .hit = true};
         bst_detection *d = &item.detection;

@@ -28,6 +28,9 @@ static const double LEAST_MARGIN_PX = 3.5;
 static const double LONG_SIGMAS = 20.0;
 /* Limits of the fitted widening relative to the PSF's variance (imgproc/measure/fit.c). */
 static const double LEAST_WIDENING = -0.6, MOST_WIDENING = 1.8;
+/* About a maximum of the streak filter, image processing looks so far on each axis for one of the
+ * point filter (imgproc/measure/locate.c). */
+static const double BESIDE_PX = 2.0;
 /* Largest and smallest step of a fit, px. */
 static const double MOST_STEP_PX = 0.7, SETTLED_PX = 1e-3;
 
@@ -102,8 +105,11 @@ static grid grid_about(const samples *model, double sigma, double margin) {
     double wide = high[0] - low[0], tall = high[1] - low[1];
     double step = fmax(STEP_SIGMAS * sigma, fmax((wide + 2.0 * margin) / (COLUMNS - 1),
                                                  (tall + 2.0 * margin) / (ROWS - 1)));
-    return (grid){low[0] - margin, low[1] - margin, step, (int)((wide + 2.0 * margin) / step) + 1,
-                  (int)((tall + 2.0 * margin) / step) + 1};
+    int columns = (int)((wide + 2.0 * margin) / step) + 1;
+    int rows = (int)((tall + 2.0 * margin) / step) + 1;
+    /* about the middle: the fit is the same whichever way the frame is turned */
+    return (grid){0.5 * (low[0] + high[0] - step * (columns - 1)),
+                  0.5 * (low[1] + high[1] - step * (rows - 1)), step, columns, rows};
 }
 
 /* Light on the grid and its derivatives by x, by y and by variance. */
@@ -162,7 +168,7 @@ static bool improve(const planes *seen, const planes *model, int n, double light
     for (int i = 0; i < n; i++) {
         top = fmax(top, model->value[0][i]);
     }
-    *squares = (bst_path_fit_squares){0.0, 0.0};
+    *squares = (bst_path_fit_squares){0.0, 0.0, 0.0};
     for (int i = 0; i < n; i++) {
         double shape = model->value[0][i] + f->widening * model->value[3][i];
         const double by[PARAMETERS] = {f->flux * model->value[1][i], f->flux * model->value[2][i],
@@ -195,7 +201,7 @@ static bool improve(const planes *seen, const planes *model, int n, double light
 
 bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_streak_model *model,
                                   const bst_streak_model *stamp, double light, double place_px[2]) {
-    bst_path_fit_squares squares = {0.0, 0.0};
+    bst_path_fit_squares squares = {0.0, 0.0, 0.0};
     samples star, streak, about;
     planes seen, shape;
     sample_path(path, &star);
@@ -223,6 +229,7 @@ bst_path_fit_squares bst_path_fit(const bst_star_trail_path *path, const bst_str
     }
     place_px[0] = f.x * c - f.y * s;
     place_px[1] = f.x * s + f.y * c;
+    squares.flux = f.flux;
     return squares;
 }
 
@@ -292,9 +299,6 @@ bst_path_point_fit bst_path_fit_streaks(const bst_path_streak *streaks, int coun
     bst_path_fit_squares squares;
     grid g =
         grid_about(&streak, model->saturated > 0.0 ? SATURATED_STEP * sigma : sigma, margin_px);
-    /* about the middle: the fit is the same whichever way the frame is turned */
-    g.x0 = -0.5 * g.step * (g.columns - 1);
-    g.y0 = -0.5 * g.step * (g.rows - 1);
     const int n = g.columns * g.rows;
     render(&g, &seen_at, 0.0, 0.0, image_px, false, &seen);
     seen.full = model->saturated > 0.0 ? model->saturated : INFINITY;
@@ -332,8 +336,9 @@ bst_path_outputs bst_path_fit_outputs(const bst_star_trail_path *path, bst_obsge
     double length = hypot(filter.dx, filter.dy);
     double root = sqrt(2.0 * w->both_px * w->both_px + s.spread);
     double c = length > 0.0 ? filter.dx / length : 1.0, n = length > 0.0 ? filter.dy / length : 0.0;
-    double streak = 0.0, beside = 0.0;
-    bst_path_outputs out = {0.0, 0.0, {0.0, 0.0}, 0.0};
+    double streak = 0.0, beside = 0.0, points[SAMPLES];
+    int streak_at = 0;
+    bst_path_outputs out = {.point = 0.0};
     for (int k = 0; k < s.count; k++) {
         double point = 0.0, drawn = 0.0;
         for (int i = 0; i < s.count; i++) {
@@ -352,12 +357,23 @@ bst_path_outputs bst_path_fit_outputs(const bst_star_trail_path *path, bst_obsge
             out.point_at[1] = s.y[k];
             beside = drawn;
         }
-        streak = fmax(streak, drawn);
+        points[k] = point;
+        if (drawn > streak) {
+            streak = drawn;
+            streak_at = k;
+        }
+    }
+    for (int k = 0; k < s.count; k++) {
+        if (fmax(fabs(s.x[k] - s.x[streak_at]), fabs(s.y[k] - s.y[streak_at])) <= BESIDE_PX) {
+            out.point_beside = fmax(out.point_beside, points[k]);
+        }
     }
     const bst_obsgen_path_px rest = {0.0, 0.0};
     double norm = image_norm(&s, w);
-    out.point /=
+    double unit =
         2.0 * BST_PI * root * root * sqrt(bst_matched_product(rest, rest, w->filter_px)) * norm;
+    out.point /= unit;
+    out.point_beside /= unit;
     if (length > 0.0) {
         double scale = 1.0 / (sqrt(2.0 * BST_PI) * root * length *
                               sqrt(bst_matched_product(filter, filter, w->filter_px)) * norm);

@@ -17,10 +17,11 @@ typedef struct bst_streak_model {
     double saturated;
 } bst_streak_model;
 
-/* Weighted squares on the fitted pixels, of one unit: of all light, and of what the model leaves.
+/* Weighted squares on the fitted pixels, of one unit: of all light, and of what the model leaves;
+ * fitted flux relative to the true one.
  */
 typedef struct bst_path_fit_squares {
-    double all, left;
+    double all, left, flux;
 } bst_path_fit_squares;
 
 /* Fits a streak model, or a point (a model of no length), to the light of a star on its true path,
@@ -91,6 +92,7 @@ typedef struct bst_path_outputs {
     double point, streak; /* streak: 0 without a streak filter */
     double point_at[2];   /* of the point filter's maximum relative to the mean of the path, px */
     double streak_beside; /* output of the streak filter at the point filter's maximum */
+    double point_beside; /* largest output of the point filter within 2 px of the streak filter's */
 } bst_path_outputs;
 
 /* Computes the largest outputs of the filters for a point and for the straight streak `filter`. */

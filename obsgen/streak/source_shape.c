@@ -10,10 +10,11 @@
  * and faint stars to 0.01 px. */
 static const double UNIFORM_PX = 0.05;
 
-/* Image processing fits both shapes to a point whose streak output is above this share. */
-static const double CLOSE_SHARE = 0.8;
-/* Lead of a point over a streak that is not fitted. */
-static const double NO_STREAK = 1e3;
+/* Image processing fits both shapes to a point whose streak output is above this share, and to a
+ * streak whose squared point output is within these limits below its own
+ * (imgproc/measure/locate.c).
+ */
+static const double CLOSE_SHARE = 0.8, CLEAR_CHI = 3.0, CLEAR_SHARE = 0.04;
 
 bst_streak_model bst_generator_streak_model(const bst_generator *g) {
     return (bst_streak_model){
@@ -29,25 +30,37 @@ bool bst_generator_is_uniform(const bst_generator *g) {
  *
  * Given:     streak  squares of the streak's fit
  *            plain   weighted square of all light without the source's own noise
- *            at_px   start of the point's fit */
-static double point_lead(const bst_generator *g, const bst_star_trail_path *path,
-                         const bst_path_outputs *o, double light, bst_path_fit_squares streak,
-                         double plain, double at_px[2]) {
+ *            at_px   start of the point's fit
+ * Returned:  *flux   light that the point's fit finds, of the whole */
+static double point_lead(const bst_generator *g, const bst_star_trail_path *path, double light,
+                         bst_path_fit_squares streak, double plain, double at_px[2], double *flux) {
     const bst_streak_model model = bst_generator_streak_model(g),
                            point = {.sigma_px = g->total_sigma};
-    if (!(o->streak > o->point) && !(o->streak_beside > CLOSE_SHARE * o->point)) {
-        return NO_STREAK; /* image processing fits no streak */
-    }
-    double left = bst_path_fit(path, &point, &model, light, at_px).left;
-    double own = sqrt(fmax(1.0 - left / streak.all, 0.0));
+    bst_path_fit_squares fit = bst_path_fit(path, &point, &model, light, at_px);
+    *flux = fmin(fmax(fit.flux, 0.0), 1.0);
+    double own = sqrt(fmax(1.0 - fit.left / streak.all, 0.0));
     double other = sqrt(fmax(1.0 - streak.left / streak.all, 0.0));
     return sqrt(streak.all / plain) * (own - other);
 }
 
-/* True if a point fits a noisy source better than a streak. */
-static bool leads(const bst_generator *g, const generator_source *s, double lead) {
+/* True if image processing sees a noisy source as a point: the shape of the greater output, or of
+ * the better fit where it fits both. */
+static bool is_point(const bst_generator *g, const generator_source *s, const bst_path_outputs *o,
+                     double lead) {
     double snr = s->sharp * s->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e;
-    return lead * snr + bst_generator_filter_noise(g, s, 0) > bst_generator_filter_noise(g, s, 1);
+    double noise = bst_generator_filter_noise(g, s, 0), other = bst_generator_filter_noise(g, s, 1);
+    double point = snr * o->point + noise, streak = snr * o->streak + other;
+    if (point > streak) {
+        if (!(snr * o->streak_beside + other > CLOSE_SHARE * point)) {
+            return true;
+        }
+    } else {
+        double beside = fmax(snr * o->point_beside + noise, 0.0);
+        if (!(beside * beside > (1.0 - CLEAR_SHARE) * streak * streak - CLEAR_CHI)) {
+            return false;
+        }
+    }
+    return lead * snr + noise > other;
 }
 
 double bst_generator_streak_light(const bst_generator *g, double flux_e) {
@@ -56,14 +69,15 @@ double bst_generator_streak_light(const bst_generator *g, double flux_e) {
     return sqrt(2.0) * g->excess * flux_e * norm * norm / (g->noise_e * g->noise_e);
 }
 
-/* Lead of a point's fit for a star on an uneven path. */
-static double lead_of_star(const bst_generator *g, double flux_e) {
+/* Value of a table by light level for a star of this flux. */
+static double by_light(const bst_generator *g, const double table[GENERATOR_BIASES],
+                       double flux_e) {
     double light = bst_generator_streak_light(g, flux_e);
     double at = log10(fmax(light, GENERATOR_FIRST_LIGHT) / GENERATOR_FIRST_LIGHT);
     /* inside of the last interval of the table */
     at = fmin(at, GENERATOR_BIASES - 1.001);
     int i = (int)at;
-    return g->point_lead[i] + (at - i) * (g->point_lead[i + 1] - g->point_lead[i]);
+    return table[i] + (at - i) * (table[i + 1] - table[i]);
 }
 
 /* Centroid bias of the stars' streaks for each light level, and whether a point fits better. */
@@ -74,7 +88,7 @@ static void set_streak_bias(bst_generator *g) {
     bst_star_trail_bias(&g->path, g->fit_path.dx, g->fit_path.dy, g->fit_bend_x, g->fit_bend_y,
                         g->total_sigma, g->streak_bias[0]);
     for (int i = 0; i < GENERATOR_BIASES; i++, light *= 10.0) {
-        bst_path_fit_squares squares = {0.0, 0.0};
+        bst_path_fit_squares squares = {0.0, 0.0, 0.0};
         if (i > 0) {
             memcpy(g->streak_bias[i], g->streak_bias[i - 1], sizeof g->streak_bias[0]);
         }
@@ -82,8 +96,11 @@ static void set_streak_bias(bst_generator *g) {
             squares = bst_path_fit(&g->path, &model, &model, light, g->streak_bias[i]);
         }
         plain = i == 0 ? squares.all : plain;
-        g->point_lead[i] =
-            g->uneven ? point_lead(g, &g->path, &g->outputs, light, squares, plain, at) : 0.0;
+        g->point_lead[i] = 0.0;
+        if (g->uneven) {
+            g->point_lead[i] =
+                point_lead(g, &g->path, light, squares, plain, at, &g->point_flux[i]);
+        }
     }
 }
 
@@ -132,7 +149,8 @@ static void set_uneven_object(const bst_generator *g, generator_source *s, doubl
     bst_path_fit_squares streak = bst_path_fit(&path, &model, &model, light, at);
     at[0] = s->start_x = o.point_at[0];
     at[1] = s->start_y = o.point_at[1];
-    s->as_streak = !leads(g, s, point_lead(g, &path, &o, light, streak, plain, at));
+    s->as_streak =
+        !is_point(g, s, &o, point_lead(g, &path, light, streak, plain, at, &s->point_flux));
     efficiency[0] = fmin(o.point, 1.0);
     efficiency[1] = fmin(o.streak, 1.0);
 }
@@ -154,7 +172,9 @@ double bst_generator_set_filter(const bst_generator *g, generator_source *s) {
         efficiency[1] = bst_response_efficiency(&g->response, s->path, g->star_path);
         s->as_streak = efficiency[1] > efficiency[0];
     } else {
-        s->as_streak = !(g->uneven && leads(g, s, lead_of_star(g, s->flux_e)));
+        s->point_flux = g->uneven ? by_light(g, g->point_flux, s->flux_e) : 1.0;
+        s->as_streak =
+            !(g->uneven && is_point(g, s, &g->outputs, by_light(g, g->point_lead, s->flux_e)));
     }
     s->other = efficiency[!s->as_streak] / efficiency[s->as_streak];
     return efficiency[s->as_streak];

@@ -25,6 +25,8 @@ CASES = [("duration", "/duration_s=0", "/duration_s: the run lasts 0 s"),
           "/world/objects/0/burns/0/time_s: the burn at 300 s is after the run's end at 300 s"),
          ("lost_frames", runs.SENSOR + "/exposure/dropped_fraction=1", "1 loses every frame"),
          ("modules", MODULES + "={}", "nothing is seen or recorded"),
+         ("modules", MODULES + '={"gimbal": {"type": "second_order"}, "scenegen": {"type": "opencl"}, "imgproc": '
+          '{"type": "standard"}, "control": {"type": "standard"}}', "modules/tracker: there is none"),
          ("exposure_period", runs.SENSOR + "/exposure/exposure_s=2", "longer than the period_s of 1 s"),
          ("wide_field", runs.SENSOR + "/camera/pixel_scale_arcsec=300", "diagonal is 93 degrees"),
          ("replaced", runs.SENSOR + "/camera/ensquared_energy=0.4",

@@ -2,7 +2,7 @@
 #include <stdlib.h>
 
 #include "imgproc/calibrate/pixel_learner.h"
-#include "imgproc/measure/discriminate.h"
+#include "sim/onboard/discriminate.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
 
@@ -11,9 +11,9 @@ enum { SIDE = 512, ROOM = 2048 };
 typedef struct scene {
     bst_ctx ctx;
     synthetic s;
-    bst_imgproc_discriminator *d;
+    bst_discriminator *d;
     bst_detections *out;
-    bst_imgproc_frame_knowledge frame;
+    bst_frame_knowledge frame;
     bst_rng_key key;
     int number;
 } scene;
@@ -22,16 +22,16 @@ static scene make(void) {
     scene s = {.out = synthetic_detections(ROOM), .key = bst_rng_make_key(2, 0, "test", "labels")};
     synthetic_init(&s.s, SIDE, SIDE);
     s.s.camera.psf_fwhm_px = 2;
-    bst_assert_ok(&s.ctx, bst_imgproc_discriminator_create(&s.ctx, &s.s.camera, ROOM, &s.d));
-    s.frame = (bst_imgproc_frame_knowledge){.oriented = true,
-                                            .light = {.sun_m = {1.5e11, 0, 0}},
-                                            .q_cam_from_gcrf = BST_QUAT_IDENTITY,
-                                            .window = {0, 0, SIDE, SIDE}};
+    bst_assert_ok(&s.ctx, bst_discriminator_create(&s.ctx, &s.s.camera, ROOM, &s.d));
+    s.frame = (bst_frame_knowledge){.oriented = true,
+                                    .light = {.sun_m = {1.5e11, 0, 0}},
+                                    .q_cam_from_gcrf = BST_QUAT_IDENTITY,
+                                    .window = {0, 0, SIDE, SIDE}};
     return s;
 }
 
 static void end(scene *s) {
-    bst_imgproc_discriminator_free(s->d);
+    bst_discriminator_free(s->d);
     synthetic_free(&s->s);
     free(s->out);
 }
@@ -70,7 +70,7 @@ static bst_detection *add_sky(scene *s, double x, double y, double v_mag) {
 }
 
 static void label(scene *s) {
-    bst_imgproc_discriminator_label(s->d, &s->frame, s->out);
+    bst_discriminator_label(s->d, &s->frame, s->out);
     for (int i = 0; i < s->out->count; i++) {
         double p = s->out->items[i].label_probability;
         assert_true(p >= 0 && p <= 1);
@@ -234,6 +234,10 @@ static void drawn_among_points(void **state) {
     end(&s);
 }
 
+static double suspicion_of(const void *user, int32_t pixel) {
+    return bst_pixel_learner_suspicion(user, bst_pixel_learner_map(user, 0), pixel);
+}
+
 /* A source on a pixel that learning suspects is a hot pixel before the pixel is bad, and no more
  * once the map leaves it out: what shows there then is light about it. */
 static void suspected_pixels(void **state) {
@@ -246,8 +250,8 @@ static void suspected_pixels(void **state) {
     bst_pixel_show show = {.pixel = 200 * SIDE + 300, .sharp = {6, 6, 6, 6}};
     const bst_pixel_shows shows = {
         .items = &show, .count = 1, .maxima = 20, .usable = true, .pixels = SIDE * SIDE};
-    s.frame.learned = learner;
-    s.frame.left_out = bst_pixel_learner_map(learner, 0);
+    s.frame.suspicion = suspicion_of;
+    s.frame.suspicion_user = learner;
     for (int frame = 0; frame < 5; frame++) {
         next(&s, 7);
         bst_detection *d = add(&s, 300.2, 199.8, 12, BST_LABEL_UNKNOWN);

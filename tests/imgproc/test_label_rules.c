@@ -1,5 +1,5 @@
 /* Probabilities of labels, worked out by hand from the rules in discriminate.h. */
-#include "imgproc/measure/discriminate.h"
+#include "sim/onboard/discriminate.h"
 #include "sim/optics/photometry.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
@@ -9,24 +9,24 @@ enum { SIDE = 512, ROOM = 256 };
 typedef struct scene {
     bst_ctx ctx;
     synthetic s;
-    bst_imgproc_discriminator *d;
+    bst_discriminator *d;
     bst_detections *out;
-    bst_imgproc_frame_knowledge frame;
+    bst_frame_knowledge frame;
 } scene;
 
 static scene make(void) {
     scene s = {.out = synthetic_detections(ROOM)};
     synthetic_init(&s.s, SIDE, SIDE);
-    bst_assert_ok(&s.ctx, bst_imgproc_discriminator_create(&s.ctx, &s.s.camera, ROOM, &s.d));
-    s.frame = (bst_imgproc_frame_knowledge){.oriented = true,
-                                            .light = {.sun_m = {1.5e11, 0, 0}},
-                                            .q_cam_from_gcrf = BST_QUAT_IDENTITY,
-                                            .window = {100, 50, 300, 200}};
+    bst_assert_ok(&s.ctx, bst_discriminator_create(&s.ctx, &s.s.camera, ROOM, &s.d));
+    s.frame = (bst_frame_knowledge){.oriented = true,
+                                    .light = {.sun_m = {1.5e11, 0, 0}},
+                                    .q_cam_from_gcrf = BST_QUAT_IDENTITY,
+                                    .window = {100, 50, 300, 200}};
     return s;
 }
 
 static void end(scene *s) {
-    bst_imgproc_discriminator_free(s->d);
+    bst_discriminator_free(s->d);
     synthetic_free(&s->s);
     free(s->out);
 }
@@ -47,7 +47,7 @@ static bst_detection *add(scene *s, double x, double y, int label, double probab
 }
 
 static void label(scene *s) {
-    bst_imgproc_discriminator_label(s->d, &s->frame, s->out);
+    bst_discriminator_label(s->d, &s->frame, s->out);
 }
 
 static void expect(const scene *s, int i, int label_of, double probability) {

@@ -265,7 +265,7 @@ static void stars_of_the_catalogue_and_saturated_ones_have_wings(void **state) {
                                .throughput = 0.7,
                                .quantum_efficiency = 0.6,
                                .photon_flux_v0_per_s_m2 = 3.6e10};
-    bst_imgproc_frame_knowledge known = {
+    bst_frame_knowledge known = {
         .q_cam_from_gcrf = bst_quat_look(bst_vec3_from_radec(1.4, -0.1), (bst_vec3){0.1, 0.3, 0.9}),
         .light = {{29000.0, -7000.0, 3000.0}, {1e11, 1.1e11, 0.2e11}},
         .window = {300, 200, 400, 250}};
@@ -332,7 +332,7 @@ static void wings_are_spread_by_the_cameras_motion(void **state) {
     const double scale = bst_camera_scale_rad(&camera);
     const bst_camera_motion motion = {.q_cam_from_gcrf = BST_QUAT_IDENTITY,
                                       .turn_cam_rad = {20.0 * scale, 6.0 * scale, 0.0}};
-    const bst_imgproc_frame_knowledge known = {.oriented = false};
+    const bst_frame_knowledge known = {.oriented = false};
     bst_predicted_stars sky = {.capacity = 0};
     bst_psf_wings_ground here = {3.0, NOISE_E};
     const bst_wing_labels_input in = {.camera = &camera,

@@ -82,7 +82,7 @@ static void given_stars(void **state) {
                                .throughput = 0.6,
                                .quantum_efficiency = 0.5,
                                .photon_flux_v0_per_s_m2 = 2e10};
-    bst_imgproc_frame_knowledge known = {
+    bst_frame_knowledge known = {
         .q_cam_from_gcrf = {.w = 0.6, .y = 0.8}, .window = {40, 20, 500, 300}, .oriented = true};
     /* a turn r moves the boresight's direction by r x z: here 6 px to the left, 2.5 px down */
     double px = 5.0 * BST_ARCSEC_RAD;

@@ -185,6 +185,35 @@ static void crowded_frames_are_looked_at_twice(void **state) {
     close_scene(&s);
 }
 
+/* Where stars move further than is filtered for, images fit nothing and look at no shape: hits are
+ * whole pixels without a label. */
+static void hits_of_a_smeared_frame(void **state) {
+    (void)state;
+    for (int smeared = 0; smeared < 2; smeared++) {
+        scene s;
+        open_scene(&s);
+        s.camera.detector.cosmic_rays = (bst_detector_cosmic_ray_config){.rate_per_cm2_s = 20.0,
+                                                                         .pixel_pitch_um = 13.0,
+                                                                         .depth_um = 15.0,
+                                                                         .e_per_um = 75.0,
+                                                                         .straggling = 0.15};
+        s.frame.streak_dx_px = smeared ? 100.0 : 0.0;
+        start(&s);
+        bst_generator_result r = run(&s, 7);
+        assert_true(r.count > 5 && r.smeared == (smeared == 1));
+        int labelled = 0;
+        for (int i = 0; i < r.count; i++) {
+            const bst_detection *d = &r.items[i].detection;
+            labelled += d->label == BST_LABEL_HIT;
+            if (smeared) {
+                assert_true(d->cov_xx == 1.0 && d->cov_yy == 1.0 && d->x_px == floor(d->x_px));
+            }
+        }
+        assert_true(smeared ? labelled == 0 : labelled > 3);
+        close_scene(&s);
+    }
+}
+
 /* Radiation comes by the sensor's area, whatever pixels are read, for as long as charge is
  * collected, and from all directions of a half space: a track goes by tan(theta) of the depth,
  * which exceeds T with probability 1 / (1 + T^2) for a flux that falls on a surface (cosine law).
@@ -359,6 +388,7 @@ int main(void) {
         cmocka_unit_test(a_full_sky_hides_everything),
         cmocka_unit_test(wings_make_alarms),
         cmocka_unit_test(crowded_frames_are_looked_at_twice),
+        cmocka_unit_test(hits_of_a_smeared_frame),
         cmocka_unit_test(hits_on_a_binned_window),
         cmocka_unit_test(alarms_of_a_streak_are_streaks),
         cmocka_unit_test(bright_stars_beyond_the_edge_are_on_it),

@@ -1,5 +1,5 @@
 /* Which generated detections are labelled as stars: magnitudes, numbers that chance does not
- * explain, neighbours that are mistaken; the labels of the others. */
+ * explain, neighbours that are mistaken. */
 #include "obsgen/identify.h"
 #include "tests/test_support.h"
 
@@ -248,36 +248,12 @@ static void some_are_missed(void **state) {
     finish(f);
 }
 
-static void the_other_labels(void **state) {
-    (void)state;
-    static const struct {
-        uint32_t flags;
-        int label;
-        bool found_stars;
-        double streak_px;
-        int wanted;
-    } cases[] = {{0, BST_LABEL_UNKNOWN, true, 0, BST_LABEL_OBJECT},
-                 {0, BST_LABEL_UNKNOWN, false, 2.9, BST_LABEL_UNKNOWN},
-                 {0, BST_LABEL_UNKNOWN, false, 3.0, BST_LABEL_OBJECT},
-                 {BST_DETECTION_STREAK, BST_LABEL_UNKNOWN, true, 3.0, BST_LABEL_UNKNOWN},
-                 {BST_DETECTION_STREAK, BST_LABEL_UNKNOWN, true, 2.9, BST_LABEL_OBJECT},
-                 {BST_DETECTION_EDGE, BST_LABEL_UNKNOWN, true, 0, BST_LABEL_ARTEFACT},
-                 {BST_DETECTION_EDGE, BST_LABEL_STAR, true, 0, BST_LABEL_STAR}};
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-        bst_detection d = {.flags = cases[i].flags, .label = cases[i].label};
-        bst_obsgen_label(&d, 1, cases[i].found_stars, cases[i].streak_px);
-        assert_int_equal(d.label, cases[i].wanted);
-        bst_assert_close(d.label_probability, d.label == BST_LABEL_UNKNOWN ? 0.0 : 1.0, 0);
-    }
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(magnitudes_agree),
         cmocka_unit_test(chance_is_excluded),
         cmocka_unit_test(neighbours_are_mistaken),
         cmocka_unit_test(some_are_missed),
-        cmocka_unit_test(the_other_labels),
         cmocka_unit_test(the_catalogue_on_board_has_other_places),
         cmocka_unit_test(the_nearer_of_two_is_taken),
     };

@@ -398,14 +398,16 @@ static void generator_gets_the_exposure(void **state) {
 /* True path at even steps less its mean by trapezia. */
 static double path_x[NODES], path_y[NODES];
 
-bst_status __real_bst_obsgen_pending_reserve_path(bst_ctx *ctx, bst_obsgen_pending *pending,
-                                                  int count);
+bst_status __real_bst_obsgen_pending_set_path(bst_ctx *ctx, bst_obsgen_pending *pending,
+                                              const bst_camera *camera, const bst_los_track *track,
+                                              double lead_s, bst_window window);
 static bst_obsgen_pending *kept;
 
-WRAP(bst_status, bst_obsgen_pending_reserve_path,
-     (bst_ctx * ctx, bst_obsgen_pending *pending, int count)) {
+WRAP(bst_status, bst_obsgen_pending_set_path,
+     (bst_ctx * ctx, bst_obsgen_pending *pending, const bst_camera *camera,
+      const bst_los_track *track, double lead_s, bst_window window)) {
     kept = pending;
-    return __real_bst_obsgen_pending_reserve_path(ctx, pending, count);
+    return __real_bst_obsgen_pending_set_path(ctx, pending, camera, track, lead_s, window);
 }
 
 void __real_bst_obsgen_pending_free(bst_obsgen_pending *pending);

@@ -193,8 +193,8 @@ static void outputs_are_those_of_sums(void **state) {
     bst_path_outputs o =
         bst_path_fit_outputs(&route, (bst_obsgen_path_px){0.8 * length, 0.6 * length}, &widths);
     draw(&seen, &p, 0.0, 0.0, sigma);
-    double best[2] = {0.0, 0.0}, at = 0.0;
-    for (int shape = 0; shape < 2; shape++) {
+    double best[2] = {0.0, 0.0}, at = 0.0, streak_at = 0.0, beside = 0.0;
+    for (int shape = 1; shape >= 0; shape--) {
         for (double shift = -6.0; shift <= 6.0; shift += 0.25) {
             double both = 0.0, own = 0.0, norm = 0.0;
             draw(&filter, NULL, shape ? length : 1e-6, shift, sigma);
@@ -207,6 +207,11 @@ static void outputs_are_those_of_sums(void **state) {
             }
             double output = both / sqrt(own * norm);
             at = shape == 0 && output > best[0] ? shift : at;
+            streak_at = shape == 1 && output > best[1] ? shift : streak_at;
+            /* within 2 px on the frame's first axis, which is 0.8 of the way */
+            if (shape == 0 && fabs(shift - streak_at) <= 2.5) {
+                beside = fmax(beside, output);
+            }
             best[shape] = fmax(best[shape], output);
         }
     }
@@ -215,6 +220,8 @@ static void outputs_are_those_of_sums(void **state) {
     bst_assert_close(o.streak, best[1], 0.01);
     bst_assert_close(0.8 * o.point_at[0] + 0.6 * o.point_at[1], at, 0.3);
     assert_true(o.streak_beside <= o.streak);
+    /* the greatest on a slope, at steps of 0.25 px and of the path */
+    bst_assert_close(o.point_beside, beside, 0.05);
 }
 
 /* Stars of one SNR on a path, of which telemetry reports the ends. */
@@ -444,6 +451,56 @@ static void shape_and_detection_have_one_noise(void **state) {
     close_scene(&s);
 }
 
+/* A star that moves by 22 px and then rests for 0.46 of the exposure: a point's fit has the light
+ * at rest and some of the rest, not that of a uniform streak under a point, 0.2. */
+static void a_point_has_the_light_at_rest(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    path p = resting(22.0, 0.46);
+    for (int k = 0; k < 2; k++) {
+        double electrons = electrons_of(&s, k == 0 ? 60.0 : 200.0), flux = 0.0, snr = 0.0;
+        bst_generator_result r = run_on(&s, &p, k == 0 ? 60.0 : 200.0, k);
+        assert_true(r.count > 850);
+        for (int i = 0; i < r.count; i++) {
+            assert_int_equal(r.items[i].detection.flags & BST_DETECTION_STREAK, 0);
+            flux += r.items[i].detection.flux_e / electrons / r.count;
+            snr += r.items[i].detection.snr / r.count;
+        }
+        /* 1.5 px of the way are within two deviations of the point: 0.04 of the light */
+        assert_true(flux > 0.46 && flux < 0.6);
+        double norm = bst_crlb_table_norm(&s.generator->bound, 0.0);
+        bst_assert_close(snr, flux * electrons * norm / r.noise_e, 0.05 * snr);
+    }
+    close_scene(&s);
+}
+
+/* Noise decides the shape of a faint star whose streak has a lower output than its point: one that
+ * the streak's filter alone shows is a streak, and is no point below the threshold. */
+static void faint_stars_may_be_streaks(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s);
+    start(&s);
+    path p = resting(14.0, 0.46);
+    bst_generator_result r = run_on(&s, &p, 24.0, 3);
+    const bst_path_outputs *o = &s.generator->outputs;
+    assert_true(s.generator->uneven && o->streak < o->point && o->streak_beside < 0.8 * o->point);
+    int streaks = 0, below = 0;
+    for (int i = 0; i < r.count; i++) {
+        const bst_detection *d = &r.items[i].detection;
+        streaks += (d->flags & BST_DETECTION_STREAK) != 0;
+        below += d->snr < 0.6 * r.threshold_snr;
+    }
+    printf(
+        "outputs %.2f, %.2f, beside %.2f, %.2f: %d of %d are streaks, %d far below the threshold\n",
+        o->point, o->streak, o->point_beside, o->streak_beside, streaks, r.count, below);
+    assert_true(r.count > 700 && streaks > 40 && streaks < r.count / 5);
+    assert_true(below < 5);
+    close_scene(&s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(fits_end_where_they_would_on_fine_pixels),
@@ -456,6 +513,8 @@ int main(void) {
         cmocka_unit_test(shape_and_detection_have_one_noise),
         cmocka_unit_test(bright_streaks_have_another_bias),
         cmocka_unit_test(stars_that_rest_are_points_where_they_rest),
+        cmocka_unit_test(a_point_has_the_light_at_rest),
+        cmocka_unit_test(faint_stars_may_be_streaks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -26,14 +26,45 @@ static bst_status reserve(bst_ctx *ctx, bst_pairing *p, int items, int detection
     return BST_OK;
 }
 
-/* Distance of a detection from a source relative to the allowed distance; above 1: no match. */
-static double off(const bst_truth_item *t, const bst_detection *d, double fwhm_px) {
+/* Distance of a detection from a source relative to the allowed distance; above 1: no match.
+ *
+ * Given:     share  of the streak's half length that is allowed besides fwhm_px */
+static double off(const bst_truth_item *t, const bst_detection *d, double fwhm_px, double share) {
     double dx = d->x_px - t->x_centroid_px, dy = d->y_px - t->y_centroid_px;
     double lx = t->x_end_px - t->x_start_px, ly = t->y_end_px - t->y_start_px;
     double length = hypot(lx, ly), c = length > 0.0 ? lx / length : 1.0,
            s = length > 0.0 ? ly / length : 0.0;
-    double along = (dx * c + dy * s) / (fwhm_px + 0.5 * length), across = dy * c - dx * s;
+    double along = (dx * c + dy * s) / (fwhm_px + 0.5 * share * length), across = dy * c - dx * s;
     return hypot(along, across / fwhm_px);
+}
+
+/* Gives the sources without a detection, the brightest first, the nearest free one. */
+static void take(bst_pairing *p, const bst_truth *truth, const bst_detections *detections,
+                 int count, double fwhm_px, double share) {
+    for (int k = 0; k < count; k++) {
+        int item = p->order[k];
+        const bst_truth_item *t = &truth->items[item];
+        double nearest = 1.0,
+               length = hypot(t->x_end_px - t->x_start_px, t->y_end_px - t->y_start_px);
+        double reach = fwhm_px + 0.5 * share * length;
+        int best = p->detection_of[item];
+        for (int i = 0; i < detections->count && p->detection_of[item] < 0; i++) {
+            const bst_detection *d = &detections->items[i];
+            if (p->item_of[i] >= 0 || fabs(d->x_px - t->x_centroid_px) > reach ||
+                fabs(d->y_px - t->y_centroid_px) > reach) {
+                continue;
+            }
+            double distance = off(t, d, fwhm_px, share);
+            if (distance < nearest) {
+                nearest = distance;
+                best = i;
+            }
+        }
+        if (best >= 0) {
+            p->detection_of[item] = best;
+            p->item_of[best] = item;
+        }
+    }
 }
 
 bst_status bst_pairing_make(bst_ctx *ctx, bst_pairing *p, const bst_truth *truth,
@@ -58,26 +89,9 @@ bst_status bst_pairing_make(bst_ctx *ctx, bst_pairing *p, const bst_truth *truth
     for (int i = 0; i < detections->count; i++) {
         p->item_of[i] = -1;
     }
-    for (int k = 0; k < n; k++) {
-        const bst_truth_item *t = &truth->items[p->order[k]];
-        double nearest = 1.0,
-               length = hypot(t->x_end_px - t->x_start_px, t->y_end_px - t->y_start_px);
-        double reach = fwhm_px + 0.5 * length;
-        for (int i = 0; i < detections->count; i++) {
-            const bst_detection *d = &detections->items[i];
-            if (p->item_of[i] >= 0 || fabs(d->x_px - t->x_centroid_px) > reach ||
-                fabs(d->y_px - t->y_centroid_px) > reach) {
-                continue;
-            }
-            double distance = off(t, d, fwhm_px);
-            if (distance < nearest) {
-                nearest = distance;
-                p->detection_of[p->order[k]] = i;
-            }
-        }
-        if (p->detection_of[p->order[k]] >= 0) {
-            p->item_of[p->detection_of[p->order[k]]] = p->order[k];
-        }
-    }
+    /* A streak takes what is at its middle first: another one's detection, half a length away, may
+     * be that of a fainter source. */
+    take(p, truth, detections, n, fwhm_px, 0.0);
+    take(p, truth, detections, n, fwhm_px, 1.0);
     return BST_OK;
 }

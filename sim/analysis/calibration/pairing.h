@@ -13,8 +13,8 @@ typedef struct bst_pairing {
 } bst_pairing;
 
 /* Pairs detections with sources, the brightest first: each takes the nearest free detection within
- * fwhm_px of its position (for a streak plus half its length). Sources outside the field or without
- * light take none. BST_ERR_MEMORY. */
+ * fwhm_px of its position. Streaks that have none then take the nearest free one within half their
+ * length more. Sources outside the field or without light take none. BST_ERR_MEMORY. */
 bst_status bst_pairing_make(bst_ctx *ctx, bst_pairing *pairing, const bst_truth *truth,
                             const bst_detections *detections, double fwhm_px) BST_MUST_CHECK;
 /* Frees the memory of a pairing and clears the struct, which belongs to the caller. */

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "control/control.h"
 #include "sim/analysis/check/check_bodies.h"
 #include "sim/analysis/check/check_burns.h"
 #include "sim/analysis/check/check_reach.h"
@@ -136,6 +137,16 @@ static bst_status late_burns(bst_ctx *ctx, const bst_scenario *scenario, const b
 
 /* ---- rules about a sensor ---- */
 
+/* True if control acts on tracks alone. */
+static bool follows_tracks(const subject *s) {
+    const bst_scenario_module_config *control = module_of(s, "control");
+    if (!control || control->desc->config != bst_control_config_table) {
+        return false;
+    }
+    const bst_control_config *config = control->config;
+    return config->strategy == BST_CONTROL_TRACK;
+}
+
 static bst_status no_modules(const subject *s) {
     static const char *const roles[] = {"scenegen", "obsgen"};
     bool any = false, sees = false, moves = module_of(s, "gimbal") != NULL;
@@ -160,6 +171,11 @@ static bst_status no_modules(const subject *s) {
         bst_log(s->ctx, BST_LOG_WARNING,
                 "%s/modules: there is a tracker but neither scenegen nor obsgen: it gets no "
                 "detections",
+                s->place);
+    } else if (follows_tracks(s) && !module_of(s, "tracker")) {
+        bst_log(s->ctx, BST_LOG_WARNING,
+                "%s/modules/tracker: there is none, so that control of strategy track finds no "
+                "target and searches until the end; add one, or take the strategy rate or stare",
                 s->place);
     }
     return BST_OK;
@@ -298,7 +314,9 @@ static const rule rules[] = {
      "dates beyond the table of the Earth's orientation, predicted with an uncertainty",
      predicted_earth, NULL, NULL},
     {"burns", "burns after the end of the run", late_burns, NULL, NULL},
-    {"modules", "a sensor without modules, without a gimbal, or with a tracker and no detections",
+    {"modules",
+     "a sensor without modules, without a gimbal, with a tracker and no detections, or with "
+     "control that follows tracks and no tracker",
      NULL, no_modules, NULL},
     {"exposure_period", "an exposure longer than the period of the exposures", NULL, long_exposure,
      NULL},

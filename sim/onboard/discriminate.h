@@ -1,7 +1,8 @@
 /* Classification of detections with a probability: by shape, catalogue, and earlier frames at the
- * same position of the sky and of the sensor. */
-#ifndef BST_IMGPROC_MEASURE_DISCRIMINATE_H
-#define BST_IMGPROC_MEASURE_DISCRIMINATE_H
+ * same position of the sky and of the sensor. Image processing and the observation generator label
+ * their detections with it. */
+#ifndef BST_ONBOARD_DISCRIMINATE_H
+#define BST_ONBOARD_DISCRIMINATE_H
 
 #include "boresight/archive.h"
 #include "boresight/camera.h"
@@ -9,35 +10,40 @@
 #include "sim/astro/bodies.h"
 
 /* What is known of a frame before its detections are labelled. */
-typedef struct bst_imgproc_frame_knowledge {
+typedef struct bst_frame_knowledge {
     bool oriented;            /* stars are identified and set the attitude */
     bst_quat q_cam_from_gcrf; /* mid-exposure */
     bst_light light;
     bst_window window;
-    double streak_px;                        /* of the stars; 0 if below streak_min_px */
-    const bst_predictions *predictions;      /* moving tracks; NULL: none */
-    double predictions_age_s;                /* from their epoch to mid-exposure */
-    const struct bst_pixel_learner *learned; /* bad-pixel learner; NULL: none */
-    const struct bst_pixel_map *left_out; /* with `learned`: bad-pixel map that masked this frame */
-} bst_imgproc_frame_knowledge;
+    double streak_px;                   /* of the stars; 0 if below streak_min_px */
+    const bst_predictions *predictions; /* moving tracks; NULL: none */
+    double predictions_age_s;           /* from their epoch to mid-exposure */
+    /* log odds that a sensor pixel, y * width + x, is a defect that causes a maximum; NULL: no
+     * pixel is suspected */
+    double (*suspicion)(const void *user, int32_t pixel);
+    const void *suspicion_user;
+} bst_frame_knowledge;
 
 /* Classifier of detections with its sources and charge of earlier frames. */
-typedef struct bst_imgproc_discriminator bst_imgproc_discriminator;
+typedef struct bst_discriminator bst_discriminator;
+
+/* True if a label stands for charge (hot pixel or radiation hit) instead of light. */
+static inline bool bst_label_is_charge(int32_t label) {
+    return label == BST_LABEL_HOT_PIXEL || label == BST_LABEL_HIT;
+}
 
 /* Creates a discriminator for frames of up to `capacity` detections; `camera` is copied. Errors:
  * BST_ERR_MEMORY. */
-bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
-                                            bst_imgproc_discriminator **out) BST_MUST_CHECK;
+bst_status bst_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
+                                    bst_discriminator **out) BST_MUST_CHECK;
 /* Frees a discriminator; NULL is allowed. */
-void bst_imgproc_discriminator_free(bst_imgproc_discriminator *discriminator);
+void bst_discriminator_free(bst_discriminator *discriminator);
 
 /* Replaces the camera by one of the same sensor whose geometry is known better. */
-void bst_imgproc_discriminator_use_camera(bst_imgproc_discriminator *discriminator,
-                                          const bst_camera *camera);
+void bst_discriminator_use_camera(bst_discriminator *discriminator, const bst_camera *camera);
 
 /* Saves or restores what is remembered of earlier frames. */
-void bst_imgproc_discriminator_archive(bst_imgproc_discriminator *discriminator,
-                                       bst_archive *archive);
+void bst_discriminator_archive(bst_discriminator *discriminator, bst_archive *archive);
 
 /* Sets label and label_probability of a frame's detections. Frames come in order of time.
  *
@@ -61,8 +67,7 @@ void bst_imgproc_discriminator_archive(bst_imgproc_discriminator *discriminator,
  *            earlier frames that stayed at rest. Without earlier frames ten objects are expected in
  *            a frame, and the others are stars.
  *            Without orientation only charge is labelled. */
-void bst_imgproc_discriminator_label(bst_imgproc_discriminator *discriminator,
-                                     const bst_imgproc_frame_knowledge *frame,
-                                     bst_detections *detections);
+void bst_discriminator_label(bst_discriminator *discriminator, const bst_frame_knowledge *frame,
+                             bst_detections *detections);
 
 #endif

@@ -1,4 +1,4 @@
-#include "imgproc/measure/discriminate.h"
+#include "sim/onboard/discriminate.h"
 
 #include <assert.h>
 #include <limits.h>
@@ -6,10 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "imgproc/calibrate/pixel_learner.h"
-#include "imgproc/measure/cosmic_ray.h"
-#include "imgproc/measure/heapsort.h"
 #include "sim/core/arena.h"
+#include "sim/core/heapsort.h"
 #include "sim/optics/photometry.h"
 
 enum { BAND = 8, MAG_BINS = 60, KEEP_MISSED = 8, KEEP_CHARGE = 50 };
@@ -58,7 +56,7 @@ typedef struct outcome {
     double judged, stayed;
 } outcome;
 
-struct bst_imgproc_discriminator {
+struct bst_discriminator {
     bst_arena arena; /* of all arrays below */
     bst_camera camera;
     int capacity, room;
@@ -78,7 +76,7 @@ struct bst_imgproc_discriminator {
     bst_window window, charge_window;
 };
 
-static void lay_out(bst_imgproc_discriminator *d) {
+static void lay_out(bst_discriminator *d) {
     size_t room = (size_t)d->room, capacity = (size_t)d->capacity;
     BST_ARENA_TAKE(&d->arena, d->sources, room);
     BST_ARENA_TAKE(&d->arena, d->charge, room);
@@ -89,11 +87,11 @@ static void lay_out(bst_imgproc_discriminator *d) {
     BST_ARENA_TAKE(&d->arena, d->band, (size_t)d->bands);
 }
 
-bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
-                                            bst_imgproc_discriminator **out) {
+bst_status bst_discriminator_create(bst_ctx *ctx, const bst_camera *camera, int capacity,
+                                    bst_discriminator **out) {
     assert(camera && out && capacity > 0);
     *out = NULL;
-    bst_imgproc_discriminator *d = calloc(1, sizeof *d);
+    bst_discriminator *d = calloc(1, sizeof *d);
     if (!d) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for discrimination");
     }
@@ -104,7 +102,7 @@ bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *came
     lay_out(d);
     bst_status status = bst_arena_alloc(ctx, &d->arena, "the memory of earlier detections");
     if (status != BST_OK) {
-        bst_imgproc_discriminator_free(d);
+        bst_discriminator_free(d);
         return status;
     }
     lay_out(d);
@@ -112,12 +110,12 @@ bst_status bst_imgproc_discriminator_create(bst_ctx *ctx, const bst_camera *came
     return BST_OK;
 }
 
-void bst_imgproc_discriminator_use_camera(bst_imgproc_discriminator *d, const bst_camera *camera) {
+void bst_discriminator_use_camera(bst_discriminator *d, const bst_camera *camera) {
     assert(d && camera && camera->width_px == d->camera.width_px);
     d->camera = *camera;
 }
 
-void bst_imgproc_discriminator_free(bst_imgproc_discriminator *d) {
+void bst_discriminator_free(bst_discriminator *d) {
     if (!d) {
         return;
     }
@@ -152,7 +150,7 @@ static void archive_window(bst_archive *archive, const bst_camera *camera, bst_w
     w->height = (int)bst_archive_integer(archive, w->height, 0, camera->height_px - w->y0);
 }
 
-void bst_imgproc_discriminator_archive(bst_imgproc_discriminator *d, bst_archive *archive) {
+void bst_discriminator_archive(bst_discriminator *d, bst_archive *archive) {
     assert(d && archive);
     int sources = bst_archive_count(archive, d->count, d->room);
     for (int i = 0; i < sources; i++) {
@@ -189,7 +187,7 @@ static bool in_window(const bst_window *w, double x, double y, double margin) {
 /* ---- Hot pixels and cosmic rays: charge at the same sensor pixel as before ---- */
 
 /* Sensor pixel of a detection. */
-static int64_t pixel_of(const bst_imgproc_discriminator *d, const bst_detection *item) {
+static int64_t pixel_of(const bst_discriminator *d, const bst_detection *item) {
     return (int64_t)llround(item->y_px) * d->camera.width_px + (int64_t)llround(item->x_px);
 }
 
@@ -199,7 +197,7 @@ static bool key_less(const void *context, int a, int b) {
 }
 
 /* Number of earlier frames in which a pixel held charge. */
-static int earlier_charge_count(const bst_imgproc_discriminator *d, int64_t pixel) {
+static int earlier_charge_count(const bst_discriminator *d, int64_t pixel) {
     int lo = 0, hi = d->charge_count;
     while (lo < hi) {
         int mid = lo + (hi - lo) / 2;
@@ -213,17 +211,14 @@ static int earlier_charge_count(const bst_imgproc_discriminator *d, int64_t pixe
 }
 
 /* Log-odds that a detection is caused by a pixel under suspicion of the bad-pixel learner. */
-static double bad_pixel_log_odds(const bst_imgproc_discriminator *d,
-                                 const bst_imgproc_frame_knowledge *f, const bst_detection *item) {
-    return f->learned
-               ? bst_pixel_learner_suspicion(f->learned, f->left_out, (int32_t)pixel_of(d, item))
-               : 0.0;
+static double bad_pixel_log_odds(const bst_discriminator *d, const bst_frame_knowledge *f,
+                                 const bst_detection *item) {
+    return f->suspicion ? f->suspicion(f->suspicion_user, (int32_t)pixel_of(d, item)) : 0.0;
 }
 
 /* Labels charge as hot pixel (again at the same sensor pixel) or cosmic ray (pixel covered before
  * without charge). */
-static void label_hot_pixel_or_cosmic_ray(const bst_imgproc_discriminator *d,
-                                          const bst_imgproc_frame_knowledge *f,
+static void label_hot_pixel_or_cosmic_ray(const bst_discriminator *d, const bst_frame_knowledge *f,
                                           bst_detection *item) {
     int64_t pixel = pixel_of(d, item);
     bool again = earlier_charge_count(d, pixel) > 0 || bad_pixel_log_odds(d, f, item) >= SUSPICIOUS;
@@ -248,11 +243,11 @@ static void label_hot_pixel_or_cosmic_ray(const bst_imgproc_discriminator *d,
 }
 
 /* Merges the frame's charge into the list of earlier charge; both are ascending in pixel. */
-static void store_charge(bst_imgproc_discriminator *d, const bst_window *window,
+static void store_charge(bst_discriminator *d, const bst_window *window,
                          const bst_detections *out) {
     int fresh = 0;
     for (int i = 0; i < out->count && fresh < d->capacity; i++) {
-        if (bst_cosmic_ray_label(out->items[i].label)) {
+        if (bst_label_is_charge(out->items[i].label)) {
             d->keys_order[fresh] = fresh;
             d->keys[fresh++] = pixel_of(d, &out->items[i]);
         }
@@ -291,14 +286,13 @@ static void store_charge(bst_imgproc_discriminator *d, const bst_window *window,
 /* ---- Sources: at the same position of the sky as before ---- */
 
 /* Projects a GCRF direction to the sensor; false if it is out of view. */
-static bool project(const bst_imgproc_discriminator *d, bst_quat q, bst_vec3 direction, double *x,
+static bool project(const bst_discriminator *d, bst_quat q, bst_vec3 direction, double *x,
                     double *y) {
     return bst_camera_project(&d->camera, bst_quat_rotate(q, direction), x, y);
 }
 
 /* Projects the earlier sources into this frame and indexes them by row bands. */
-static void project_earlier_sources(bst_imgproc_discriminator *d,
-                                    const bst_imgproc_frame_knowledge *f) {
+static void project_earlier_sources(bst_discriminator *d, const bst_frame_knowledge *f) {
     for (int i = 0; i < d->bands; i++) {
         d->band[i] = -1;
     }
@@ -326,7 +320,7 @@ static double mag_sigma(const bst_detection *item) {
 }
 
 /* Index of the nearest earlier source of similar brightness; -1: none. */
-static int match_earlier_source(bst_imgproc_discriminator *d, const bst_detection *item) {
+static int match_earlier_source(bst_discriminator *d, const bst_detection *item) {
     double scale = bst_camera_scale_rad(&d->camera), closest = 1.0;
     int best = -1;
     int band = (int)(item->y_px / BAND);
@@ -349,18 +343,18 @@ static int match_earlier_source(bst_imgproc_discriminator *d, const bst_detectio
 }
 
 /* Statistics bin of new sources of a magnitude. */
-static outcome *statistics_of(bst_imgproc_discriminator *d, double v_mag, bool blend) {
+static outcome *statistics_of(bst_discriminator *d, double v_mag, bool blend) {
     int bin = (int)floor(2.0 * (v_mag + 5.0));
     return &d->outcomes[blend][bin < 0 ? 0 : bin >= MAG_BINS ? MAG_BINS - 1 : bin];
 }
 
 /* True if a detection is light of a source: neither charge nor an artefact. */
 static bool is_source(const bst_detection *item) {
-    return !bst_cosmic_ray_label(item->label) && item->label != BST_LABEL_ARTEFACT;
+    return !bst_label_is_charge(item->label) && item->label != BST_LABEL_ARTEFACT;
 }
 
 /* Updates an earlier source that was detected again; tests if it has moved. */
-static void update_earlier_source(bst_imgproc_discriminator *d, const bst_detection *item,
+static void update_earlier_source(bst_discriminator *d, const bst_detection *item,
                                   bst_vec3 direction, earlier_source *r) {
     double scale = bst_camera_scale_rad(&d->camera);
     double variance = position_variance(item) * scale * scale;
@@ -374,16 +368,15 @@ static void update_earlier_source(bst_imgproc_discriminator *d, const bst_detect
 }
 
 /* GCRF direction of a detection. */
-static bst_vec3 direction_of(const bst_imgproc_discriminator *d,
-                             const bst_imgproc_frame_knowledge *f, const bst_detection *item) {
+static bst_vec3 direction_of(const bst_discriminator *d, const bst_frame_knowledge *f,
+                             const bst_detection *item) {
     return bst_quat_rotate(bst_quat_conj(f->q_cam_from_gcrf),
                            bst_camera_unproject(&d->camera, item->x_px, item->y_px));
 }
 
 /* Matches detections to earlier sources, and updates the statistics of sources that were new in the
  * frame before. */
-static void match_to_earlier_frames(bst_imgproc_discriminator *d,
-                                    const bst_imgproc_frame_knowledge *f,
+static void match_to_earlier_frames(bst_discriminator *d, const bst_frame_knowledge *f,
                                     const bst_detections *out) {
     for (int i = 0; i < out->count && i < d->capacity; i++) {
         d->again[i] = is_source(&out->items[i]) ? match_earlier_source(d, &out->items[i]) : -1;
@@ -404,8 +397,8 @@ static void match_to_earlier_frames(bst_imgproc_discriminator *d,
 }
 
 /* Stores a detection as a source for later frames. */
-static void store_source(bst_imgproc_discriminator *d, const bst_detection *item,
-                         bst_vec3 direction, bool fresh) {
+static void store_source(bst_discriminator *d, const bst_detection *item, bst_vec3 direction,
+                         bool fresh) {
     if (d->count >= d->room) {
         return;
     }
@@ -424,7 +417,7 @@ static void store_source(bst_imgproc_discriminator *d, const bst_detection *item
 }
 
 /* Removes sources not detected for long or far from the current field of view. */
-static void remove_old_sources(bst_imgproc_discriminator *d) {
+static void remove_old_sources(bst_discriminator *d) {
     int kept = 0;
     for (int i = 0; i < d->count; i++) {
         earlier_source *r = &d->sources[i];
@@ -437,7 +430,7 @@ static void remove_old_sources(bst_imgproc_discriminator *d) {
 }
 
 /* Probability that a source without an earlier match is a star. */
-static double new_star_probability(bst_imgproc_discriminator *d, const bst_detection *item) {
+static double new_star_probability(bst_discriminator *d, const bst_detection *item) {
     const outcome *t = statistics_of(d, item->v_mag, (item->flags & BST_DETECTION_BLEND) != 0);
     /* prior of two tested sources that moved */
     double stayed = t->stayed / (t->judged + 2.0);
@@ -447,8 +440,8 @@ static double new_star_probability(bst_imgproc_discriminator *d, const bst_detec
 /* ---- Labels of a frame ---- */
 
 /* Labels the detections at predicted positions of moving tracks as OBJECT. */
-static void label_predicted(const bst_imgproc_discriminator *d,
-                            const bst_imgproc_frame_knowledge *f, bst_detections *out) {
+static void label_predicted(const bst_discriminator *d, const bst_frame_knowledge *f,
+                            bst_detections *out) {
     double scale = bst_camera_scale_rad(&d->camera);
     for (int p = 0; f->predictions && p < f->predictions->count; p++) {
         const bst_prediction *track = &f->predictions->items[p];
@@ -479,8 +472,8 @@ static bool is_long_streak(const bst_detection *item) {
 }
 
 /* Labels a source by the rules in discriminate.h. */
-static void label_source(bst_imgproc_discriminator *d, const bst_imgproc_frame_knowledge *f,
-                         double unlisted, int again, bst_detection *item) {
+static void label_source(bst_discriminator *d, const bst_frame_knowledge *f, double unlisted,
+                         int again, bst_detection *item) {
     bool open = item->label == BST_LABEL_UNKNOWN;
     double star = 0.0;
     if (again >= 0) {
@@ -512,14 +505,14 @@ static void label_source(bst_imgproc_discriminator *d, const bst_imgproc_frame_k
     }
 }
 
-void bst_imgproc_discriminator_label(bst_imgproc_discriminator *d,
-                                     const bst_imgproc_frame_knowledge *f, bst_detections *out) {
+void bst_discriminator_label(bst_discriminator *d, const bst_frame_knowledge *f,
+                             bst_detections *out) {
     assert(d && f && out && out->count >= 0 && out->count <= d->capacity);
     double unlisted = 0.0;
     for (int i = 0; i < out->count; i++) {
         bst_detection *item = &out->items[i];
         double odds = item->label == BST_LABEL_UNKNOWN ? bad_pixel_log_odds(d, f, item) : 0.0;
-        if (bst_cosmic_ray_label(item->label)) {
+        if (bst_label_is_charge(item->label)) {
             label_hot_pixel_or_cosmic_ray(d, f, item);
         } else if (odds >= SUSPICIOUS) {
             set_label(item, BST_LABEL_HOT_PIXEL, 1.0 - exp(-odds));
