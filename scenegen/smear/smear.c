@@ -421,8 +421,9 @@ static int choose_radius(const bst_smear *s, double peak_e) {
                      : bst_stamp_radius(&s->stamp, peak_e, limit, most);
 }
 
-bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, double *y) {
-    bst_vec3 c = bst_quat_rotate(q, v);
+bool bst_smear_project(const bst_smear *s, const bst_scene_source *source, bst_quat q, bst_vec3 v,
+                       double *x, double *y) {
+    bst_vec3 c = bst_scene_source_seen(&s->camera, source, bst_quat_rotate(q, v));
     if (s->camera.geometry.general) {
         c = turned(s, c, 1.0);
         double f = 1.0 / (bst_camera_scale_rad(&s->camera) * c.z);
@@ -441,9 +442,9 @@ bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, do
 bool bst_smear_place_source(const bst_smear *s, const bst_scene_source *source,
                             bst_smear_place *out) {
     double electrons = source->electrons_per_s * s->duration_s, x, y;
-    bool moving = source->path || source->rate || source->shape || source->body;
+    bool moving = source->path || source->rate || source->shape || source->body || source->ghost;
     double disc_px = bst_smear_radius_px(s, source);
-    bool front = bst_smear_project(s, s->q_reference, source->apparent_mid, &x, &y);
+    bool front = bst_smear_project(s, source, s->q_reference, source->apparent_mid, &x, &y);
     /* a star that only a wide rotation brings into the field: a float offset is inaccurate */
     double wide = 4.0 * (s->far_px + disc_px);
     moving = moving || !front || x * x + y * y > wide * wide;
@@ -525,6 +526,10 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
     }
     s->last_widening_px2 = used->widening_px2;
     int radius = choose_radius(s, s->last_peak_e * s->binning);
+    if (source->ghost) { /* its nodes are wider than the PSF */
+        double wider = sqrt(1.0 + used->widening_px2 / (s->sigma_px * s->sigma_px));
+        radius = (int)fmin(ceil(radius * wider), s->options.taps / 2 - 1);
+    }
     bst_smear_drawn drawn = {.x = x,
                              .y = y,
                              .travel_px = travel_px,
