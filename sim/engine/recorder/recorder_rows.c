@@ -251,16 +251,8 @@ bst_status bst_recorder_los_rows(bst_ctx *ctx, bst_recorder *recorder, int senso
 }
 
 const char *bst_recorder_source_name(int32_t kind) {
-    switch (kind) {
-        case BST_SOURCE_STAR:
-            return "star";
-        case BST_SOURCE_STAR_GHOST:
-            return "star_ghost";
-        case BST_SOURCE_OBJECT_GHOST:
-            return "object_ghost";
-        default:
-            return "object";
-    }
+    static const char *const names[] = {"star", "object", "star_ghost", "object_ghost"};
+    return names[kind & 3];
 }
 
 const char *bst_recorder_label_name(int32_t label) {
