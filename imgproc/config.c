@@ -70,6 +70,9 @@ const bst_config_desc bst_imgproc_config_table[] = {
                "Search for objects too faint for one frame in stacks of frames."),
     BST_OBJECT(bst_imgproc_config, extended, bst_extended_config_table, "{}",
                "Targets larger than the PSF: silhouette, centre of mass, range from the size."),
+    BST_OBJECT(
+        bst_imgproc_config, reference_pixels, bst_reference_pixels_config_table, "{}",
+        "Level of the reference pixels (overscan) in the frame, taken off before detection."),
     BST_ENUM(bst_imgproc_config, column_correction, bst_column_level_words, "\"auto\"",
              "Whether each column's level over the others' is taken off, with the noise that it "
              "brings: the smear of a frame transfer under light, offsets of columns. auto: where "

@@ -21,6 +21,14 @@ typedef struct bst_imgproc_bad_pixel {
     int64_t x, y; /* full-sensor coordinates */
 } bst_imgproc_bad_pixel;
 
+/* Subtraction of reference pixels (calibrate/reference_pixels.h). */
+typedef struct bst_reference_pixels_config {
+    bool enabled, alternating_columns;
+    int64_t smooth_rows;
+} bst_reference_pixels_config;
+
+extern const bst_config_desc bst_reference_pixels_config_table[];
+
 typedef struct bst_imgproc_config {
     int64_t capacity;              /* detections per frame */
     int64_t max_fits;              /* number of brightest detections located by a fit; 0: all */
@@ -40,6 +48,7 @@ typedef struct bst_imgproc_config {
     bst_stack_config stack;
     bst_extended_config extended;
     bst_pixel_learner_config bad_pixel_learning;
+    bst_reference_pixels_config reference_pixels;
     int column_correction;      /* see sim/optics/column_level.h */
     int64_t threads;            /* 0: one per processor */
     bst_config_list bad_pixels; /* of bst_imgproc_bad_pixel */

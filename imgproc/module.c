@@ -42,6 +42,7 @@ static void destroy(void *self) {
     for (int i = 0; i < BST_STEP_LANES; i++) {
         bst_imgproc_free(m->lanes[i].ip);
         free(m->lanes[i].made);
+        bst_reference_pixels_free(&m->lanes[i].references);
     }
     bst_calibration_free(&m->maps);
     bst_starid_free(m->starid);
@@ -266,9 +267,9 @@ static bool motion_of(struct bst_step *step, const bst_frame_message *message,
 
 /* Detects the sources of a frame. The result depends on the camera's rotation during the exposure,
  * not on its pointing. */
-static bst_status detect_sources(bst_ctx *ctx, const bst_imgproc_state *m,
-                                 const bst_imgproc_lane *l, const bst_imgproc_exposure *e,
-                                 bool beside_another, bst_detections *out, int capacity) {
+static bst_status detect_sources(bst_ctx *ctx, const bst_imgproc_state *m, bst_imgproc_lane *l,
+                                 const bst_imgproc_exposure *e, bool beside_another,
+                                 bst_detections *out, int capacity) {
     const bst_frame_message *message = e->message;
     const bst_camera_motion *motion = e->motion;
     const bst_imgproc_windows windows = {m->windows.items, m->windows.count};
@@ -284,12 +285,17 @@ static bst_status detect_sources(bst_ctx *ctx, const bst_imgproc_state *m,
         .bits = message->bits,
         .exposure_s = (double)(message->end_tick - message->start_tick) / (double)m->tick_rate_hz,
         .beside_another = beside_another};
-    bst_status status =
-        m->plugin ? bst_plugin_detector_detect(ctx, m->plugin, &frame, message->exposure_id, motion,
-                                               out, capacity)
-        : windows.count > 0
-            ? bst_imgproc_detect_windows(ctx, l->ip, &frame, &windows, motion, out, capacity)
-            : bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
+    bst_status status = bst_reference_pixels_subtract(
+        ctx, &l->references, &m->config->reference_pixels, &m->camera, &frame, &frame);
+    if (status != BST_OK) {
+        bst_frame_unmap(message->frame);
+        return status;
+    }
+    status = m->plugin ? bst_plugin_detector_detect(ctx, m->plugin, &frame, message->exposure_id,
+                                                    motion, out, capacity)
+             : windows.count > 0
+                 ? bst_imgproc_detect_windows(ctx, l->ip, &frame, &windows, motion, out, capacity)
+                 : bst_imgproc_detect(ctx, l->ip, &frame, motion, out, capacity);
     bst_frame_unmap(message->frame);
     return status;
 }

@@ -3,6 +3,7 @@
 #define BST_IMGPROC_MODULE_INTERNAL_H
 
 #include "imgproc/calibrate/pixel_learning.h"
+#include "imgproc/calibrate/reference_pixels.h"
 #include "imgproc/detect/plugin_detector.h"
 #include "imgproc/detect/region_of_interest.h"
 #include "imgproc/extended/extended_step.h"
@@ -37,6 +38,7 @@ typedef struct bst_imgproc_lane {
     bool ready;           /* `made` holds the detections of the frame below */
     int map;              /* slot of the learned bad-pixel map used in the current step */
     int64_t exposure_id;
+    bst_reference_pixels references;
 } bst_imgproc_lane;
 
 typedef struct bst_imgproc_state {

@@ -385,7 +385,7 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
         if (!position_source(g, f, &t->items[i], s)) {
             continue;
         }
-        s->name = (uint64_t)t->items[i].id | (uint64_t)(t->items[i].kind & 1) << 32;
+        s->name = (uint64_t)t->items[i].id | (uint64_t)(t->items[i].kind & 3) << 32;
         set_amplitude(g, s);
         g->source_count +=
             s->broken || s->visible > LEAST_VISIBLE || s->unraised > LEAST_VISIBLE_SNR;

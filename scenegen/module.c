@@ -418,6 +418,8 @@ static bst_status process_exposure(scenegen *s, struct bst_step *step, const bst
         bst_detector_lead_ticks(&s->camera->detector, e->window.height, (double)s->tick_rate_hz);
     s->options.lead_s = (double)lead / (double)s->tick_rate_hz;
     s->options.read_charge = true;
+    s->options.ghost_sigma = s->renderer_options.tolerance_sigma;
+    s->options.binning = e->binning;
     bst_status status = bst_field_track(ctx, s->field, history, e->start_tick - lead,
                                         e->end_tick + lead, s->tick_rate_hz, &track);
     if (status != BST_OK) {

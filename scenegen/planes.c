@@ -367,7 +367,7 @@ bst_status bst_plane_maker_render(bst_ctx *ctx, bst_plane_maker *m, bst_renderer
         BST_TRY(list_shapes(ctx, m, renderer, camera, request, item_source, item_count,
                             (double)m->level, &shapes));
     }
-    while (stars < request->count && request->sources[stars].kind == BST_SOURCE_STAR) {
+    while (stars < request->count && request->sources[stars].kind != BST_SOURCE_OBJECT) {
         stars++;
     }
     bst_render_request empty = *request;

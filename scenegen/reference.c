@@ -84,7 +84,8 @@ bool bst_reference_place(const bst_camera *camera, const bst_los_track *track,
     double from_s = track->time_s[k], dt = track->time_s[k + 1] - from_s;
     bst_quat q = bst_quat_slerp(track->q_cam_from_gcrf[k], track->q_cam_from_gcrf[k + 1], u);
     bst_vec3 v = bst_scene_source_direction(s, (from_s + u * dt) / track->time_s[track->count - 1]);
-    if (!bst_camera_project(camera, bst_quat_rotate(q, v), x, y)) {
+    v = bst_scene_source_seen(camera, s, bst_quat_rotate(q, v));
+    if (!bst_camera_project(camera, v, x, y)) {
         return false;
     }
     *light = bst_scene_source_rate_at(s, (from_s + u * dt) / track->time_s[track->count - 1]);

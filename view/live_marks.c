@@ -53,7 +53,7 @@ void bst_view_add_live_truth(cJSON *node, const bst_truth *truth, const bst_fram
             continue;
         }
         cJSON *mark = bst_view_add_object(list);
-        cJSON_AddStringToObject(mark, "kind", item->kind == BST_SOURCE_STAR ? "star" : "object");
+        cJSON_AddStringToObject(mark, "kind", bst_recorder_source_name(item->kind));
         cJSON_AddNumberToObject(mark, "id", item->id);
         cJSON_AddNumberToObject(mark, "norad", item->norad);
         add_place(mark, item->x_centroid_px, item->y_centroid_px, frame);

@@ -5,6 +5,7 @@
 
 #include "imgproc/calibrate/bad_map.h"
 #include "imgproc/calibrate/pixel_learner.h"
+#include "imgproc/calibrate/reference_pixels.h"
 #include "imgproc/detect/detect_internal.h"
 #include "imgproc/detect/region_of_interest.h"
 #include "imgproc/detect/row_kernels.h"
@@ -50,6 +51,7 @@ static bst_status allocate(bst_ctx *ctx, bst_imgproc *ip) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for a frame of %d x %d", width, height);
     }
     BST_TRY(bst_bad_map_create(ctx, &ip->camera, &ip->maps, &ip->config.bad_pixels, &ip->bad));
+    BST_TRY(bst_reference_pixels_mask(ctx, &ip->config.reference_pixels, &ip->camera, &ip->bad));
     if (bst_column_level_wanted(ip->config.column_correction, &ip->camera)) {
         BST_TRY(bst_columns_create(ctx, width, &ip->columns));
     }

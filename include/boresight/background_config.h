@@ -10,6 +10,8 @@
 #pragma GCC visibility push(default)
 
 enum { BST_BACKGROUND_UNIFORM, BST_BACKGROUND_SKY };
+/* What the numbers of a map of stray light are. */
+enum { BST_STRAY_MAP_ELECTRONS, BST_STRAY_MAP_SHARE };
 
 /* A point of the table of point source transmittance. */
 typedef struct bst_optics_pst_point {
@@ -28,6 +30,9 @@ typedef struct bst_background_config {
     /* added in either model: with u, v from -1 to 1 over the sensor's columns and rows,
      * stray + gradient . (u, v) + curvature . (u^2, u v, v^2) */
     double stray_e_per_s, gradient_e_per_s[2], curvature_e_per_s[3];
+    char stray_map_file[512]; /* FITS image over the sensor; "": none */
+    int32_t stray_map;        /* BST_STRAY_MAP_... */
+    double stray_map_scale;   /* factor on its numbers */
 } bst_background_config;
 
 extern const bst_config_desc bst_background_config_table[];

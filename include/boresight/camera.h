@@ -10,6 +10,7 @@
 #include "boresight/band_config.h"
 #include "boresight/config.h"
 #include "boresight/detector_config.h"
+#include "boresight/ghost_config.h"
 #include "boresight/psf_config.h"
 #include "boresight/vec.h"
 
@@ -68,6 +69,9 @@ typedef struct bst_camera {
                                         photon_flux_v0_per_s_m2, equal for all colours */
     bst_background_config background;
     const struct bst_scene_pst *pst; /* made from `background`, owned by the world; NULL: none */
+    const struct bst_stray_map *stray_map; /* read from `background`, owned by the world; or NULL */
+    bst_config_list ghosts;                /* bst_ghost_config */
+    const struct bst_ghosts *ghost_images; /* made from `ghosts`, owned by the world; NULL: none */
     bst_camera_geometry geometry; /* by bst_camera_prepare; all zero: no rotation, no distortion */
 } bst_camera;
 

@@ -44,6 +44,14 @@ struct bst_readout {
     bst_kernel_ramp_params ramp; /* of the latest interval */
 };
 
+static bool wanted(const bst_readout *r, int kernel);
+
+/* True if charge may change after it was limited to the full well and before it is read. */
+static bool moves_charge(const bst_readout *r) {
+    return bst_detector_has_traps(&r->camera.detector.parallel_traps) || wanted(r, RAMP) ||
+           wanted(r, NEIGHBOURS) || wanted(r, SERIAL);
+}
+
 /* True if the camera needs a kernel of the staged read-out. */
 static bool wanted(const bst_readout *r, int kernel) {
     const bst_detector_config *d = &r->camera.detector;
@@ -67,12 +75,16 @@ static bool wanted(const bst_readout *r, int kernel) {
             return bst_detector_has_traps(&d->serial_traps);
         case CROSSTALK:
             return d->crosstalk.outputs > 1 && d->crosstalk.coupling != 0.0;
-        case MARK: /* charge may change after it was limited to the full well */
-            return bst_detector_has_traps(&d->parallel_traps) || wanted(r, RAMP) ||
-                   wanted(r, NEIGHBOURS) || wanted(r, SERIAL) || wanted(r, CROSSTALK);
+        case MARK:
+            return moves_charge(r) || wanted(r, CROSSTALK);
         default:
             return true;
     }
+}
+
+/* True if crosstalk is added while charge is read; binned pixels have it before they are summed. */
+static bool reads_crosstalk(const bst_readout *r, const bst_kernel_frame_params *p) {
+    return wanted(r, CROSSTALK) && p->binning == 1;
 }
 
 /* True if a step needs a second image. */
@@ -333,7 +345,7 @@ static bst_status move_charge(bst_ctx *ctx, bst_readout *r, const bst_kernel_fra
         BST_TRY(enqueue_kernel(ctx, r, BLOOM, (arguments){p, sizeof *p, b, 2},
                                (size_t)p->light_stride / 16));
     }
-    if (wanted(r, MARK) && !wanted(r, RAMP)) {
+    if (p->effects & BST_EFFECT_MARKS && !wanted(r, RAMP)) {
         cl_mem b[] = {r->image, r->full};
         BST_TRY(
             enqueue_kernel(ctx, r, MARK, (arguments){p, sizeof *p, b, 2}, (size_t)p->light_height));
@@ -344,7 +356,7 @@ static bst_status move_charge(bst_ctx *ctx, bst_readout *r, const bst_kernel_fra
         }
     }
     BST_TRY(enqueue_neighbours(ctx, r, p, 0.0, d->interpixel_coupling));
-    if (wanted(r, CROSSTALK)) {
+    if (wanted(r, CROSSTALK) && !reads_crosstalk(r, p)) {
         bst_kernel_coupling_params q = coupling_params(r, p);
         q.outputs = (int)d->crosstalk.outputs;
         q.mirrored = d->crosstalk.mirrored;
@@ -405,7 +417,14 @@ static bst_kernel_frame_params light_params(const bst_readout *r,
     p.light_stride = stride_of(light.width);
     p.real_y0 = (int)r->camera.detector.overscan.bottom;
     p.real_y1 = (int)(r->camera.height_px - r->camera.detector.overscan.top);
-    p.effects |= wanted(r, MARK) ? BST_EFFECT_MARKS : 0;
+    if (reads_crosstalk(r, &p)) {
+        p.effects |= BST_EFFECT_CROSSTALK;
+        p.outputs = (int)r->camera.detector.crosstalk.outputs;
+        p.mirrored = r->camera.detector.crosstalk.mirrored;
+        p.crosstalk = (float)r->camera.detector.crosstalk.coupling;
+    }
+    bool marked = moves_charge(r) || (wanted(r, CROSSTALK) && !reads_crosstalk(r, &p));
+    p.effects |= marked ? BST_EFFECT_MARKS : 0;
     return p;
 }
 
@@ -503,10 +522,11 @@ bst_status bst_readout_run(bst_ctx *ctx, bst_readout *r, const bst_detector *det
                            double start_s, cl_mem frame, cl_mem saturated) {
     assert(r && detector && params && window.width > 0 && window.height > 0);
     BST_TRY(bst_readout_prepare(ctx, r));
-    bst_kernel_frame_params p = light_params(r, params, bst_readout_light_window(r, window));
+    bst_kernel_frame_params p = *params;
+    p.binning = binning;
+    p = light_params(r, &p, bst_readout_light_window(r, window));
     cl_mem maps[BST_DETECTOR_BUFFERS];
     bst_detector_buffers(detector, maps);
-    p.binning = binning;
     p.window_width = window.width / binning;
     p.window_height = window.height / binning;
     BST_TRY(collect_charge(ctx, r, maps, start_s, &p));

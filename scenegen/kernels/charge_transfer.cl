@@ -32,11 +32,26 @@ INLINE float16 log_two(float16 v) {
     return fma(s * series, (float16)1.44269504f, convert_float16(exponent));
 }
 
+/* 1 / sqrt(v) for v > 0, to 2e-7: three steps of Newton's method from a guess by the bits. */
+INLINE float16 inverse_root_of(float16 v) {
+    float16 y = as_float16((int16)0x5F375A86 - (as_int16(v) >> 1)), h = -0.5f * v;
+    y *= fma(h * y, y, (float16)1.5f);
+    y *= fma(h * y, y, (float16)1.5f);
+    y *= fma(h * y, y, (float16)1.5f);
+    return y;
+}
+
+/* Charge to the power p.exponent - 1: the traps that one electron of it meets. */
+INLINE float16 traps_met(bst_kernel_trap_params p, float16 charge) {
+    return p.exponent == 0.5f ? inverse_root_of(charge)
+                              : power_of_two((p.exponent - 1.0f) * log_two(charge));
+}
+
 /* A packet of 16 columns or rows meets the traps of species k. held: charge in them. */
 INLINE float16 pass_species(bst_kernel_trap_params p, int k, float transfers, float16 q,
                             float16 *held) {
     float16 least = q > TRAP_LEAST ? q : TRAP_LEAST;
-    float16 g = transfers * p.density[k] * power_of_two((p.exponent - 1.0f) * log_two(least));
+    float16 g = transfers * p.density[k] * traps_met(p, least);
     float16 caught = fma(g, q, -held[k]) / (g + 1.0f);
     caught = select((float16)0.0f, caught, (q > TRAP_LEAST) & (caught > 0.0f));
     held[k] += caught;

@@ -300,6 +300,41 @@ INLINE chunk gather_charge(bst_kernel_frame_params p, global const float *image,
     return q;
 }
 
+/* Signal of 16 pixels of a sensor row from column `first` on, with a share of what the other outputs
+ * read at the same time. The same as bst_detector_crosstalk, without a pass over the image. */
+INLINE float16 add_crosstalk(bst_kernel_frame_params p, global const float *row, int first, float16 q) {
+    int part = p.sensor_width / p.outputs, own = first / part;
+    if (first >= 0 && first + 16 <= p.sensor_width && (first + 15) / part == own) {
+        /* lane l reads the i-th pixel of its output, i = from + l, or from - l if it reads backwards */
+        int backwards = p.mirrored & own;
+        int from = backwards ? (own + 1) * part - 1 - first : first - own * part;
+        float16 sum = (float16)0.0f;
+        for (int o = 0; o < p.outputs; o++) {
+            int reversed = (p.mirrored & o) != backwards;
+            int lowest = backwards ? from - 15 : from; /* i of the lane with the lowest one */
+            int at = p.mirrored & o ? (o + 1) * part - 16 - lowest : o * part + lowest;
+            float16 there = vload16(0, row + at);
+            sum += reversed ? there.sfedcba9876543210 : there;
+        }
+        return fma((float16)p.crosstalk, sum - q, q);
+    }
+    float signal[16];
+    vstore16(q, 0, signal);
+    for (int l = 0; l < 16; l++) {
+        int x = first + l, output = x / part, i = x - output * part;
+        if (x < 0 || output >= p.outputs) {
+            continue;
+        }
+        i = p.mirrored & output ? part - 1 - i : i;
+        float sum = 0.0f;
+        for (int o = 0; o < p.outputs; o++) {
+            sum += row[p.mirrored & o ? (o + 1) * part - 1 - i : o * part + i];
+        }
+        signal[l] = fma(p.crosstalk, sum - signal[l], signal[l]);
+    }
+    return vload16(0, signal);
+}
+
 /* What the read-out of a frame takes and gives. */
 typedef struct read_buffers {
     global const float *image;
@@ -336,6 +371,14 @@ INLINE int16 read_chunk(bst_kernel_frame_params p, detector_maps maps, read_buff
     int b = p.binning, row = p.window_y0 + y * b;
     chunk_flags brim;
     chunk q = gather_charge(p, to.image, to.full, row, x - skip, &brim);
+    if (HAS(p, BST_EFFECT_CROSSTALK)) { /* b is 1 */
+        global const float *line = to.image + (long)(row - p.light_y0) * p.light_stride;
+        int from = first + x;
+        q.a = add_crosstalk(p, line, from, q.a);
+        q.b = add_crosstalk(p, line, from + 16, q.b);
+        q.c = add_crosstalk(p, line, from + 32, q.c);
+        q.d = add_crosstalk(p, line, from + 48, q.d);
+    }
     uint counter = counter_of(row / b, first + x, p.sensor_width / b);
 #ifdef MULTIPLY
     q = multiply_chunk(p, to.table, counter, q);

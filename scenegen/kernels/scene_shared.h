@@ -77,6 +77,7 @@
 #define BST_EFFECT_MARKS 2048   /* pixels at full well are marked before charge moves on */
 #define BST_EFFECT_MEANS 4096   /* the image holds expected charge, dark current included */
 #define BST_EFFECT_FLICKER 8192 /* the read noise of each pixel is drawn beforehand */
+#define BST_EFFECT_CROSSTALK 16384 /* is added while charge is read */
 
 /* Laws of bst_kernel_vignetting_params: none; the fourth power of the cosine of the field angle,
  * 1 / (1 + v1 s)^2; a polynomial, 1 + v1 s + v2 s^2 + v3 s^3. s: squared distance from the centre.
@@ -143,6 +144,8 @@ typedef struct bst_kernel_frame_params {
     float transfer_row_s;       /* transfer time per row */
     int offsets_rows;           /* first row offset in the buffer of offsets */
     float multiply_rms;         /* spread of the multiplication: sqrt(1 - 1 / gain) */
+    int outputs, mirrored;      /* crosstalk, with BST_EFFECT_CROSSTALK, as in */
+    float crosstalk;            /* bst_kernel_coupling_params */
 } bst_kernel_frame_params;
 
 #define BST_TRAP_KINDS 3

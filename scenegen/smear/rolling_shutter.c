@@ -101,6 +101,10 @@ static source_rows rows_of(const bst_rolling *r, const bst_scene_source *source,
     if (!source->path) {
         bst_quat q = bst_los_track_attitude(track, 0.5 * duration);
         bst_vec3 v = bst_quat_rotate(q, source->apparent_mid);
+        v = bst_scene_source_seen(&r->camera, source, v);
+        double larger = source->ghost ? bst_ghost_magnification(source->ghost) : 1.0;
+        reach_px *= larger;
+        *moved_px *= larger;
         bool front = bst_camera_project(&r->camera, v, &x, &y);
         return front && reach_px < 1e5 ? (source_rows){y - reach_px, y + reach_px} : all;
     }
@@ -109,8 +113,8 @@ static source_rows rows_of(const bst_rolling *r, const bst_scene_source *source,
     for (int k = 0; k < INSTANTS; k++) {
         double u = k / (INSTANTS - 1.0), to_x, to_y;
         bst_quat q = bst_los_track_attitude(track, u * duration);
-        if (!bst_camera_project(
-                &r->camera, bst_quat_rotate(q, bst_scene_source_direction(source, u)), &x, &y)) {
+        bst_vec3 v = bst_quat_rotate(q, bst_scene_source_direction(source, u));
+        if (!bst_camera_project(&r->camera, bst_scene_source_seen(&r->camera, source, v), &x, &y)) {
             *moved_px = INFINITY;
             return all;
         }
@@ -121,6 +125,7 @@ static source_rows rows_of(const bst_rolling *r, const bst_scene_source *source,
         double later = u + r->times.exposure_s / duration;
         q = bst_los_track_attitude(track, fmin(later, 1.0) * duration);
         bst_vec3 to = bst_quat_rotate(q, bst_scene_source_direction(source, fmin(later, 1.0)));
+        to = bst_scene_source_seen(&r->camera, source, to);
         if (bst_camera_project(&r->camera, to, &to_x, &to_y)) {
             *moved_px =
                 k == 0 ? hypot(to_x - x, to_y - y) : fmax(*moved_px, hypot(to_x - x, to_y - y));
@@ -218,6 +223,7 @@ bst_status bst_rolling_begin(bst_ctx *ctx, bst_rolling *r, const bst_render_requ
         const bst_scene_source *s = &q->sources[i];
         double moved,
             disc_px = s->shape ? s->shape->radius / bst_camera_scale_rad(&r->camera) : 0.0;
+        disc_px = s->ghost ? bst_ghost_reach_px(s->ghost) : disc_px;
         r->rows[i] = rows_of(r, s, reach, &moved);
         r->rows[i].first -= disc_px + q->window.y0;
         r->rows[i].last += disc_px - q->window.y0;

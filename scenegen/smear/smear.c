@@ -421,8 +421,16 @@ static int choose_radius(const bst_smear *s, double peak_e) {
                      : bst_stamp_radius(&s->stamp, peak_e, limit, most);
 }
 
-bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, double *y) {
-    bst_vec3 c = bst_quat_rotate(q, v);
+/* Radius of the latest source's stamp; nodes of a ghost are wider than the PSF. */
+static int radius_of(const bst_smear *s, const bst_scene_source *source) {
+    int radius = choose_radius(s, s->last_peak_e * s->binning);
+    double wide = radius * sqrt(1.0 + s->last_widening_px2 / (s->sigma_px * s->sigma_px));
+    return source->ghost ? (int)fmin(ceil(wide), s->options.taps / 2 - 1) : radius;
+}
+
+bool bst_smear_project(const bst_smear *s, const bst_scene_source *source, bst_quat q, bst_vec3 v,
+                       double *x, double *y) {
+    bst_vec3 c = bst_scene_source_seen(&s->camera, source, bst_quat_rotate(q, v));
     if (s->camera.geometry.general) {
         c = turned(s, c, 1.0);
         double f = 1.0 / (bst_camera_scale_rad(&s->camera) * c.z);
@@ -441,9 +449,9 @@ bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, do
 bool bst_smear_place_source(const bst_smear *s, const bst_scene_source *source,
                             bst_smear_place *out) {
     double electrons = source->electrons_per_s * s->duration_s, x, y;
-    bool moving = source->path || source->rate || source->shape || source->body;
+    bool moving = source->path || source->rate || source->shape || source->body || source->ghost;
     double disc_px = bst_smear_radius_px(s, source);
-    bool front = bst_smear_project(s, s->q_reference, source->apparent_mid, &x, &y);
+    bool front = bst_smear_project(s, source, s->q_reference, source->apparent_mid, &x, &y);
     /* a star that only a wide rotation brings into the field: a float offset is inaccurate */
     double wide = 4.0 * (s->far_px + disc_px);
     moving = moving || !front || x * x + y * y > wide * wide;
@@ -524,7 +532,6 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
         BST_TRY(star_level(ctx, s, cell, &used, &error, &predicted));
     }
     s->last_widening_px2 = used->widening_px2;
-    int radius = choose_radius(s, s->last_peak_e * s->binning);
     bst_smear_drawn drawn = {.x = x,
                              .y = y,
                              .travel_px = travel_px,
@@ -532,24 +539,23 @@ bst_status bst_smear_source(bst_ctx *ctx, bst_smear *s, const bst_scene_source *
                              .predicted = predicted,
                              .level = used,
                              .scale = cell ? cell->scale : 1.0,
-                             .radius = radius,
+                             .radius = radius_of(s, source),
                              .moving = moving};
     memcpy(drawn.low, low, sizeof low);
     memcpy(drawn.high, high, sizeof high);
     bst_smear_set_error(s, &drawn);
     bst_smear_bring_to_window(s, &drawn);
-    double parts = s->place_parts;
     /* light beyond the stamp is added to it, so that flux is conserved */
-    electrons /= s->stamp.kept[radius] * s->stamp.kept[radius];
+    electrons /= s->stamp.kept[drawn.radius] * s->stamp.kept[drawn.radius];
     *out = (bst_kernel_source_record){
         .x_px = (float)x,
         .y_px = (float)y,
-        .place_x = (int)lrint((x + bst_camera_centre_x(&s->camera)) * parts),
-        .place_y = (int)lrint((y + bst_camera_centre_y(&s->camera)) * parts),
+        .place_x = (int)lrint((x + bst_camera_centre_x(&s->camera)) * s->place_parts),
+        .place_y = (int)lrint((y + bst_camera_centre_y(&s->camera)) * s->place_parts),
         .electrons = (float)electrons,
         .first_table = used->first_block,
         .blocks = used->blocks,
-        .radius = radius};
+        .radius = drawn.radius};
     return BST_OK;
 }
 

@@ -44,7 +44,7 @@ static void find_paths(bst_smear *s, const bst_smear_frame *frame) {
         const bst_scene_source *source = &frame->list[i];
         bst_smear_place place;
         /* bodies keep images, which one thread makes */
-        if (!(source->path || source->rate || source->shape) || source->body ||
+        if (!(source->path || source->rate || source->shape || source->ghost) || source->body ||
             !bst_smear_place_source(s, source, &place)) {
             continue;
         }

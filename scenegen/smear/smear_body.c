@@ -56,7 +56,8 @@ double bst_smear_radius_px(const bst_smear *s, const bst_scene_source *source) {
     if (source->body) {
         return source->body->satellite->radius_m / fmax(source->range_m, 1e-3) / scale_rad;
     }
-    return source->shape ? tan(asin(source->shape->radius)) / scale_rad : 0.0;
+    double ghost_px = source->ghost ? bst_ghost_reach_px(source->ghost) : 0.0;
+    return source->shape ? tan(asin(source->shape->radius)) / scale_rad : ghost_px;
 }
 
 /* Finds or creates the work memory of a source. Memory of a source that left the field is used
@@ -425,7 +426,7 @@ static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
     }
     b->x0 = b->y0 = 0.0;
     if (b->one_pose) {
-        (void)bst_smear_project(s, bst_los_track_attitude(&s->track, 0.5 * s->duration_s),
+        (void)bst_smear_project(s, source, bst_los_track_attitude(&s->track, 0.5 * s->duration_s),
                                 bst_scene_source_direction(source, 0.5), &b->x0, &b->y0);
     }
     clip_box(s, b->one_pose ? moved_px : 0.0, low, high);

@@ -3,6 +3,7 @@
 #define BST_SCENEGEN_SMEAR_SMEAR_INTERNAL_H
 
 #include "scenegen/smear/extended_source.h"
+#include "scenegen/smear/ghost_points.h"
 #include "scenegen/smear/motion_map.h"
 #include "scenegen/smear/smear.h"
 #include "scenegen/smear/smear_body.h"
@@ -115,9 +116,11 @@ struct bst_smear {
 bst_status bst_smear_reserve(bst_ctx *ctx, void **items, int *capacity, int need,
                              size_t bytes) BST_MUST_CHECK;
 
-/* Projects to the focal plane: position from the boresight, px, without distortion, which the
- * kernel adds. Returns false if it is behind the camera or far away. */
-bool bst_smear_project(const bst_smear *s, bst_quat q, bst_vec3 v, double *x, double *y);
+/* Projects the image of a source in direction v (GCRF) to the focal plane: position from the
+ * boresight, px, without distortion, which the kernel adds. Returns false if it is behind the
+ * camera or far away. */
+bool bst_smear_project(const bst_smear *s, const bst_scene_source *source, bst_quat q, bst_vec3 v,
+                       double *x, double *y);
 
 /* A source's position at the reference attitude, px from the boresight; for a moving one, where its
  * nodes are relative to. */

@@ -17,6 +17,8 @@ static double far_px(const bst_smear *s) {
  * from its chord, and a Gaussian changes by 0.607 / sigma of its peak per px. */
 #define CHORD_SHARE 0.05
 #define CHORD_ERROR (0.607 * 2.0 / 3.0)
+/* Share of the tolerance for the points of a ghost with a size. */
+#define GHOST_SHARE 0.5
 
 /* Number of chords of a curved image path for a deviation of at most miss_px: a parabola deviates
  * by its bend / chords^2. It is sampled at 17 times; positions off the sensor do not count, but a
@@ -26,8 +28,9 @@ static double chords_of(const bst_smear *s, const bst_scene_source *source, doub
     double x[N + 1], y[N + 1], far = far_px(s), chords = 0.0;
     bool front[N + 1];
     for (int k = 0; k <= N; k++) {
-        front[k] = bst_smear_project(
-            s, s->q_reference, bst_scene_source_direction(source, (double)k / N), &x[k], &y[k]);
+        front[k] =
+            bst_smear_project(s, source, s->q_reference,
+                              bst_scene_source_direction(source, (double)k / N), &x[k], &y[k]);
     }
     for (int k = 0; k < N; k++) {
         if (!front[k] || !front[k + 1]) {
@@ -81,7 +84,8 @@ static bst_status own_path(bst_ctx *ctx, bst_smear *s, const bst_scene_source *s
                 bst_quat q = known ? turn[n]
                                    : bst_quat_slerp(track->q_cam_from_gcrf[k],
                                                     track->q_cam_from_gcrf[k + 1], u);
-                bool front = bst_smear_project(s, q, bst_scene_source_direction(source, t), &x, &y);
+                bool front =
+                    bst_smear_project(s, source, q, bst_scene_source_direction(source, t), &x, &y);
                 s->own_path[(*count)++] = (bst_smear_path_point){
                     {front ? (x - x0) * s->stretch : NAN, front ? (y - y0) * s->stretch : NAN, 0.0},
                     bst_scene_source_light(source, t)};
@@ -139,7 +143,7 @@ static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_scene_sourc
                                double y, double *peak) {
     enum { MOST_NODES = 2000000 };
     double x0 = x, y0 = y, low[2] = {0.0, 0.0}, high[2] = {0.0, 0.0};
-    (void)bst_smear_project(s, s->q_reference, source->apparent_mid, &x0, &y0);
+    (void)bst_smear_project(s, source, s->q_reference, source->apparent_mid, &x0, &y0);
     for (int n = 0; n < s->nodes.count; n++) {
         double way[2] = {s->nodes.items[n].p[0] / s->stretch + x - x0,
                          s->nodes.items[n].p[1] / s->stretch + y - y0};
@@ -166,6 +170,22 @@ static bst_status shape_points(bst_ctx *ctx, bst_smear *s, const bst_scene_sourc
     return bst_extended_source_points(ctx, source, &view, &s->points, peak);
 }
 
+/* Most nodes of a ghost with a size. */
+enum { GHOST_NODES = 2000000 };
+
+/* Replaces the nodes of a ghost's centre by those of its image, and adds its error. */
+static bst_status spread_ghost(bst_ctx *ctx, bst_smear *s, const bst_ghost *ghost) {
+    double error;
+    const bst_ghost_points_aim aim = {
+        .sigma_px = s->sigma_px,
+        .widest = s->widest,
+        .allowed = GHOST_SHARE * bst_smear_allowed(s, s->last_read_e),
+        .most_points = GHOST_NODES / (s->nodes.count > 0 ? s->nodes.count : 1) + 1};
+    BST_TRY(bst_ghost_points(ctx, ghost, &aim, &s->points, &error));
+    s->chord_error += error;
+    return bst_extended_source_spread(ctx, &s->points, s->stretch, &s->nodes);
+}
+
 bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_source *source,
                                   double electrons, double x, double y) {
     int count;
@@ -188,6 +208,12 @@ bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_so
         share = fmin(share, peak);
         read_share = fmin(read_share, peak * s->binning * s->binning);
     }
+    bool wide = source->ghost && bst_ghost_reach_px(source->ghost) > 0.0;
+    if (wide) {
+        peak = bst_ghost_peak_share(source->ghost);
+        share = fmin(share, peak);
+        read_share = fmin(read_share, peak * s->binning * s->binning);
+    }
     s->last_peak_e = electrons * share;
     s->last_read_e = electrons * read_share;
     double miss_px = bst_smear_allowed(s, s->last_read_e) * CHORD_SHARE * s->sigma_px / CHORD_ERROR;
@@ -198,6 +224,9 @@ bst_status bst_smear_moving_nodes(bst_ctx *ctx, bst_smear *s, const bst_scene_so
     s->chord_error = source->path ? CHORD_ERROR * miss_px / s->sigma_px : 0.0;
     int level = bst_smear_choose_level(s, 1.0);
     BST_TRY(own_nodes(ctx, s, count, x, y, s->tolerance[level]));
+    if (wide && s->nodes.count > 0) {
+        return spread_ghost(ctx, s, source->ghost);
+    }
     return source->shape ? bst_extended_source_spread(ctx, &s->points, s->stretch, &s->nodes)
                          : BST_OK;
 }

@@ -3,7 +3,9 @@
 #include <assert.h>
 #include <stdlib.h>
 
+#include "sim/core/file.h"
 #include "sim/device/device.h"
+#include "sim/io/fits_image.h"
 #include "sim/io/psf_fits.h"
 
 /* Creates the onboard knowledge of each sensor: camera, catalogue, cue. */
@@ -57,6 +59,43 @@ static bst_status read_psfs(bst_ctx *ctx, const bst_scenario *scenario, bst_worl
     return BST_OK;
 }
 
+bst_status bst_shared_model_read_stray_map(bst_ctx *ctx, const char *base_dir, bst_world *world,
+                                           int observer, int sensor) {
+    const bst_background_config *c = &bst_world_camera(world, observer, sensor)->background;
+    if (!*c->stray_map_file) {
+        return BST_OK;
+    }
+    char path[1100];
+    int width, height;
+    float *pixels = NULL;
+    bst_file_resolve(base_dir, c->stray_map_file, path, sizeof path);
+    bst_status status = bst_fits_read_image(ctx, path, &width, &height, &pixels);
+    if (status == BST_OK) {
+        status = bst_world_set_stray_map(ctx, world, observer, sensor, width, height, pixels);
+        status = status == BST_OK ? status : bst_fail_prefix(ctx, status, "%s", path);
+    }
+    return status == BST_OK
+               ? status
+               : bst_fail_prefix(ctx, status,
+                                 "/observers/%d/sensors/%d/camera/background/stray_map_file",
+                                 observer, sensor);
+}
+
+/* Reads the maps of stray light of sensors from their files. */
+static bst_status read_stray_maps(bst_ctx *ctx, const bst_scenario *scenario, bst_world *world) {
+    const bst_observer_config *observers = scenario->observers.items;
+    for (int o = 0; o < scenario->observers.count; o++) {
+        for (int s = 0; s < observers[o].sensors.count; s++) {
+            bst_status status =
+                bst_shared_model_read_stray_map(ctx, scenario->base_dir, world, o, s);
+            if (status != BST_OK) {
+                return bst_fail_prefix(ctx, status, "%s", scenario->file);
+            }
+        }
+    }
+    return BST_OK;
+}
+
 bool bst_shared_model_needs_device(const bst_scenario *scenario) {
     for (int m = 0; m < scenario->module_count; m++) {
         const bst_scenario_module_config *module = &scenario->modules[m];
@@ -72,6 +111,7 @@ static bst_status build_model(bst_ctx *ctx, const bst_scenario *scenario,
     BST_TRY(bst_world_create(ctx, scenario->file, &scenario->world, &scenario->observers,
                              scenario->base_dir, scenario->epoch, &model->world));
     BST_TRY(read_psfs(ctx, scenario, model->world));
+    BST_TRY(read_stray_maps(ctx, scenario, model->world));
     BST_TRY(bst_world_check_spans(ctx, scenario->file, model->world, scenario->duration_s));
     BST_TRY(bst_world_prepare(ctx, model->world, options->threads));
     BST_TRY(make_knowledge(ctx, scenario, model));

@@ -34,6 +34,11 @@ bst_status bst_shared_model_create(bst_ctx *ctx, const bst_scenario *scenario,
 /* Frees a shared model; NULL is allowed. */
 void bst_shared_model_free(bst_shared_model *model);
 
+/* Reads the map of stray light of a sensor whose background names one; `base_dir`: base of its
+ * path. Errors with the key: those of bst_fits_read_image and bst_stray_map_create. */
+bst_status bst_shared_model_read_stray_map(bst_ctx *ctx, const char *base_dir, bst_world *world,
+                                           int observer, int sensor) BST_MUST_CHECK;
+
 /* True if a module of the scenario needs an OpenCL device. */
 bool bst_shared_model_needs_device(const bst_scenario *scenario);
 

@@ -67,7 +67,7 @@ static const char truth_sql[] =
     " t.y_end_px, t.v_mag, t.electrons, t.snr, t.x_chief_px, t.y_chief_px, t.x_centroid_px,"
     " t.y_centroid_px, o.name, t.norad, t.item, t.id FROM truth t"
     " LEFT JOIN objects o ON t.kind = 'object' AND o.id = t.id"
-    " WHERE t.sensor = ?1 ORDER BY t.exposure_id, t.rowid";
+    " WHERE t.sensor = ?1 AND t.kind IN ('star', 'object') ORDER BY t.exposure_id, t.rowid";
 
 /* Extent of a streak along one axis with `margin`, clipped to 0 ... size. False: less than LEAST_PX
  * remains. */

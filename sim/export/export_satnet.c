@@ -139,7 +139,8 @@ static const char truth_sql[] =
 /* Label of the current truth row; NULL: not in the frame. */
 static cJSON *label(const job *j, const bst_fits_frame *f, int width, int height) {
     const bst_io_rows *r = j->truth;
-    bool star = strcmp(bst_io_rows_text(r, 1), "star") == 0;
+    const char *kind = bst_io_rows_text(r, 1);
+    bool ghost = strstr(kind, "ghost") != NULL, star = strncmp(kind, "star", 4) == 0;
     double x[3], y[3], v_mag = bst_io_rows_real(r, 10), electrons = bst_io_rows_real(r, 11);
     double binning = f->binning > 1 ? f->binning : 1;
     double chief_x = bst_io_rows_real(r, 17), chief_y = bst_io_rows_real(r, 18);
@@ -160,8 +161,8 @@ static cJSON *label(const job *j, const bst_fits_frame *f, int width, int height
     }
     char id[32];
     cJSON *node = cJSON_CreateObject();
-    cJSON_AddStringToObject(node, "class_name", star ? "Star" : "Satellite");
-    cJSON_AddNumberToObject(node, "class_id", star ? 2 : 1);
+    cJSON_AddStringToObject(node, "class_name", ghost ? "Ghost" : star ? "Star" : "Satellite");
+    cJSON_AddNumberToObject(node, "class_id", ghost ? 3 : star ? 2 : 1);
     put_axis(node, 'y', y, j->e->box_px / height);
     put_axis(node, 'x', x, j->e->box_px / width);
     bst_json_add_number(node, "x_centroid",
@@ -214,7 +215,7 @@ static bst_status add_labels(bst_ctx *ctx, job *j, const frame_row *row, int wid
             cJSON *node = label(j, &row->frame, width, height);
             if (node) {
                 BST_TRY(add_shape(ctx, j, row, width, height, node));
-                *satellites += strcmp(bst_io_rows_text(j->truth, 1), "star") != 0;
+                *satellites += strcmp(bst_io_rows_text(j->truth, 1), "object") == 0;
                 cJSON_AddItemToArray(list, node);
             }
         }

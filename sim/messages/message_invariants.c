@@ -204,9 +204,9 @@ bool bst_predictions_are_valid(const bst_predictions *p, int capacity) {
 }
 
 static bool is_truth_item(const bst_truth_item *t) {
-    return (t->kind == BST_SOURCE_STAR || t->kind == BST_SOURCE_OBJECT) &&
+    return t->kind >= BST_SOURCE_STAR && t->kind <= BST_SOURCE_OBJECT_GHOST &&
            bst_is_variance(t->electrons) && t->snr >= 0.0 &&
-           (t->kind == BST_SOURCE_STAR || bst_is_share(t->sunlit_fraction));
+           (!bst_source_is_object(t->kind) || bst_is_share(t->sunlit_fraction));
 }
 
 bool bst_truth_is_valid(const bst_truth *t, int capacity) {

@@ -2,6 +2,8 @@
 
 static const char *const models[] = {"uniform", "sky", NULL};
 
+static const char *const map_units[] = {"electrons_per_s", "share", NULL};
+
 static const bst_config_desc pst_table[] = {
     BST_REAL(bst_optics_pst_point, angle_deg, "deg", 0, 180, NULL,
              "Angle of the source from the boresight."),
@@ -54,5 +56,14 @@ const bst_config_desc bst_background_config_table[] = {
         bst_background_config, curvature_e_per_s, "e/s", -1e9, 1e9, "[0, 0, 0]",
         "Factors of u^2, u v and v^2, u and v from -1 to 1 across columns and rows. The sum is "
         "never below 0."),
+    BST_PATH(bst_background_config, stray_map_file, "\"\"",
+             "FITS image with stray light over the sensor, of its size or a whole part of it per "
+             "axis (then linear between the middles of the map's pixels)."),
+    BST_ENUM(bst_background_config, stray_map, map_units, "\"electrons_per_s\"",
+             "\"electrons_per_s\": the map's numbers are electrons per second and sensor pixel, "
+             "added in both models. \"share\": they are factors on the stray light of Sun, Moon "
+             "and Earth by pst, which is even without a map; with model sky."),
+    BST_REAL(bst_background_config, stray_map_scale, "", 0, 1e9, "1",
+             "Factor on the map's numbers."),
     BST_CONFIG_END,
 };

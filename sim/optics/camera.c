@@ -73,6 +73,8 @@ const bst_config_desc bst_camera_config[] = {
                "What wavelengths the camera sees, and the warmth of its optics."),
     BST_OBJECT(bst_camera, background, bst_background_config_table, "{}",
                "Light between the sources: sky, bright bodies, stray light, gradients."),
+    BST_LIST(bst_camera, ghosts, bst_ghost_config, bst_ghost_config_table, 0, 64, "[]",
+             "Ghosts: faint second images that every bright star and object has."),
     BST_CONFIG_END,
 };
 

@@ -42,7 +42,7 @@ static void put_axis(FILE *stream, char axis, const double v[3], double box) {
 
 static bool put_object(bst_study_labels *l, const bst_frame_message *f, double exposure_s,
                        const bst_truth_item *item, int number, bool first) {
-    bool star = item->kind == BST_SOURCE_STAR;
+    bool star = !bst_source_is_object(item->kind), ghost = bst_source_is_ghost(item->kind);
     double binning = f->binning > 1 ? f->binning : 1;
     double width = f->frame->width, height = f->frame->height;
     const double xs[3] = {item->x_start_px, item->x_mid_px, item->x_end_px};
@@ -65,7 +65,12 @@ static bool put_object(bst_study_labels *l, const bst_frame_message *f, double e
     }
     FILE *s = l->stream;
     fprintf(s, "%s\n{\"class_name\":\"%s\",\"class_id\":%d", first ? "" : ",",
-            star ? "Star" : "Satellite", star ? 2 : 1);
+            ghost  ? "Ghost"
+            : star ? "Star"
+                   : "Satellite",
+            ghost  ? 3
+            : star ? 2
+                   : 1);
     put_axis(s, 'y', y, l->box_px / height);
     put_axis(s, 'x', x, l->box_px / width);
     put_number(s, "x_centroid", (item->x_centroid_px - f->window.x0 + 0.5) / binning / width);
@@ -84,8 +89,8 @@ static bool put_object(bst_study_labels *l, const bst_frame_message *f, double e
     put_number(s, "ra", item->ra_rad * DEG);
     put_number(s, "dec", item->dec_rad * DEG);
     putc('}', s);
-    l->stars += star;
-    if (!star) {
+    l->stars += star && !ghost;
+    if (!star && !ghost) {
         l->satellites++;
         l->snr_sum += item->snr;
         l->longest_px = fmax(l->longest_px, hypot(xs[2] - xs[0], ys[2] - ys[0]));

@@ -4,11 +4,13 @@
 #include <string.h>
 
 #include "sim/optics/band.h"
+#include "sim/optics/ghosts.h"
 #include "sim/optics/psf.h"
 #include "sim/world/orbit/constellation.h"
 #include "sim/world/orbit/ephemeris.h"
 #include "sim/world/scene/object_shape.h"
 #include "sim/world/scene/stray.h"
+#include "sim/world/scene/stray_map.h"
 #include "sim/world/world_build.h"
 
 static bst_status open_stars(const bst_world_builder *b, const char *name, const char *where,
@@ -63,6 +65,16 @@ bst_status bst_world_set_psf(bst_ctx *ctx, bst_world *world, int observer, int s
     return BST_OK;
 }
 
+bst_status bst_world_set_stray_map(bst_ctx *ctx, bst_world *world, int observer, int sensor,
+                                   int width, int height, float *pixels) {
+    bst_camera *camera = &world->observers[observer].sensors[sensor].config.camera;
+    bst_stray_map *map;
+    BST_TRY(bst_stray_map_create(ctx, camera, width, height, pixels, &map));
+    bst_stray_map_free((bst_stray_map *)camera->stray_map);
+    camera->stray_map = map;
+    return BST_OK;
+}
+
 static bst_status make_spectrum(const bst_world_builder *b, bst_camera *camera, int observer,
                                 int sensor) {
     bst_band *band;
@@ -95,6 +107,19 @@ static bst_status make_pst(const bst_world_builder *b, bst_camera *camera, int o
     }
     camera->pst = pst;
     camera->background.pst = (bst_config_list){0}; /* the configuration owns it */
+    return BST_OK;
+}
+
+static bst_status make_ghosts(const bst_world_builder *b, bst_camera *camera, int observer,
+                              int sensor) {
+    bst_ghosts *ghosts;
+    bst_status status = bst_ghosts_create(b->ctx, camera, b->base_dir, &ghosts);
+    if (status != BST_OK) {
+        return bst_fail_prefix(b->ctx, BST_ERR_CONFIG, "%s: /observers/%d/sensors/%d/camera",
+                               b->scenario, observer, sensor);
+    }
+    camera->ghost_images = ghosts;
+    camera->ghosts = (bst_config_list){0}; /* the configuration owns it */
     return BST_OK;
 }
 
@@ -145,6 +170,7 @@ static bst_status make_observers(const bst_world_builder *b, const bst_config_li
             }
             BST_TRY(make_spectrum(b, &observer->sensors[s].config.camera, i, s));
             BST_TRY(make_pst(b, &observer->sensors[s].config.camera, i, s));
+            BST_TRY(make_ghosts(b, &observer->sensors[s].config.camera, i, s));
             BST_TRY(make_psf(b, &observer->sensors[s].config.camera, i, s));
         }
     }
@@ -245,6 +271,8 @@ void bst_world_free(bst_world *world) {
             bst_psf_free((bst_psf *)camera->psf);
             bst_band_free((bst_band *)camera->spectrum);
             bst_scene_pst_free((bst_scene_pst *)camera->pst);
+            bst_stray_map_free((bst_stray_map *)camera->stray_map);
+            bst_ghosts_free((bst_ghosts *)camera->ghost_images);
             free(camera->optics.field.items);
         }
         free(observer->sensors);

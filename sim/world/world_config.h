@@ -247,6 +247,10 @@ struct bst_psf_samples;
  * other data depend on the sensor. Errors of bst_psf_create_from. */
 bst_status bst_world_set_psf(bst_ctx *ctx, struct bst_world *world, int observer, int sensor,
                              const struct bst_psf_samples *samples) BST_MUST_CHECK;
+/* Sets the map of stray light of a sensor whose background names a file (stray_map_file), before
+ * other data depend on the sensor. pixels: as of bst_stray_map_create, with its errors. */
+bst_status bst_world_set_stray_map(bst_ctx *ctx, struct bst_world *world, int observer, int sensor,
+                                   int width, int height, float *pixels) BST_MUST_CHECK;
 
 /* Optional, before the first frame: starts `threads` threads (0: one per processor) for large
  * numbers of orbits and precomputes ephemerides. The results do not change. Not while other threads

@@ -9,7 +9,21 @@
 
 #define BST_CHANNEL_TRUTH "truth"
 
-typedef enum bst_source_kind { BST_SOURCE_STAR = 0, BST_SOURCE_OBJECT = 1 } bst_source_kind;
+typedef enum bst_source_kind {
+    BST_SOURCE_STAR = 0,
+    BST_SOURCE_OBJECT = 1,
+    BST_SOURCE_STAR_GHOST = 2, /* ghost of a star, or of an object */
+    BST_SOURCE_OBJECT_GHOST = 3
+} bst_source_kind;
+
+/* True for an object and for a ghost of an object: the id is the object's. */
+static inline bool bst_source_is_object(int32_t kind) {
+    return kind == BST_SOURCE_OBJECT || kind == BST_SOURCE_OBJECT_GHOST;
+}
+/* True for a ghost. */
+static inline bool bst_source_is_ghost(int32_t kind) {
+    return kind == BST_SOURCE_STAR_GHOST || kind == BST_SOURCE_OBJECT_GHOST;
+}
 
 enum {
     BST_TRUTH_IN_FIELD = 1u << 0, /* mean position on the window */
@@ -21,7 +35,7 @@ enum {
 typedef struct bst_truth_item {
     int32_t kind;  /* bst_source_kind */
     uint32_t id;   /* star: identity in the catalogue, or statistical (bit 31); object: index in the
-                      world */
+                      world; ghost: that of its source */
     int32_t norad; /* object: catalogue number, else 0 */
     uint32_t flags;
     double x_start_px, y_start_px, x_mid_px, y_mid_px, x_end_px, y_end_px;

@@ -6,6 +6,7 @@
 #include "scenegen/detector/detector.h"
 #include "sim/analysis/pd/pd.h"
 #include "sim/cli/load.h"
+#include "sim/engine/shared_model.h"
 #include "sim/eval/location_bound.h"
 #include "sim/io/psf_fits.h"
 #include "sim/onboard/knowledge.h"
@@ -275,6 +276,8 @@ static bst_status open_scene(bst_ctx *ctx, bst_pd_scene *s) {
     BST_TRY(bst_world_create(ctx, scenario->file, &scenario->world, &scenario->observers,
                              scenario->base_dir, scenario->epoch, &s->world));
     BST_TRY(read_psf(ctx, s));
+    BST_TRY(
+        bst_shared_model_read_stray_map(ctx, scenario->base_dir, s->world, s->observer, s->sensor));
     BST_TRY(bst_knowledge_create(ctx, s->world, s->observer, s->sensor, &s->knowledge));
     if (s->options.jitter_px < 0.0) {
         s->options.jitter_px = s->imgproc->desc == &bst_imgproc_module

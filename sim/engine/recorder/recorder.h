@@ -90,6 +90,8 @@ bst_status bst_recorder_create(bst_ctx *ctx, bst_run *run, const bst_recorder_co
 bst_status bst_recorder_archive(bst_ctx *ctx, bst_recorder *recorder,
                                 bst_archive *archive) BST_MUST_CHECK;
 
+/* Word for a bst_source_kind ("star") in table truth. Never NULL. */
+const char *bst_recorder_source_name(int32_t kind);
 /* Word for a bst_label ("star") in table detections. Never NULL. */
 const char *bst_recorder_label_name(int32_t label);
 /* Word for a bst_track_status ("confirmed") in table tracks. Never NULL. */

@@ -192,7 +192,7 @@ bst_status bst_recorder_truth_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
     double mid_s = bst_recorder_mid_s(recorder, t->start_tick, t->end_tick);
     for (int i = 0; i < t->count; i++) {
         const bst_truth_item *item = &t->items[i];
-        bool star = item->kind == BST_SOURCE_STAR;
+        bool star = !bst_source_is_object(item->kind);
         if (star && !recorder->config.truth_stars) {
             continue;
         }
@@ -204,7 +204,7 @@ bst_status bst_recorder_truth_rows(bst_ctx *ctx, bst_recorder *recorder, int sen
         put_int(&r, t->exposure_id);
         put_real(&r, mid_s + item->delay_s);
         put_int(&r, i + 1);
-        put_text(&r, star ? "star" : "object");
+        put_text(&r, bst_recorder_source_name(item->kind));
         put_int(&r, item->id);
         put_int(&r, item->norad);
         put_flag(&r, item->flags & BST_TRUTH_IN_FIELD);
@@ -248,6 +248,11 @@ bst_status bst_recorder_los_rows(bst_ctx *ctx, bst_recorder *recorder, int senso
     put_quat(&r, s->q_cam_from_gcrf);
     put_radec(&r, boresight(s->q_cam_from_gcrf));
     return append(ctx, recorder, BST_TABLE_LOS_TRUTH, &r);
+}
+
+const char *bst_recorder_source_name(int32_t kind) {
+    static const char *const names[] = {"star", "object", "star_ghost", "object_ghost"};
+    return names[kind & 3];
 }
 
 const char *bst_recorder_label_name(int32_t label) {

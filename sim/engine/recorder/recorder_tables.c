@@ -113,7 +113,7 @@ static const bst_io_column truth_columns[] = {
          "middle of the exposure, with a rolling shutter of the source's own row, since the epoch"),
     INT("item", "",
         "number of the source in its exposure, from 1: its pixels in segmentation.fits"),
-    TEXT("kind", "star or object"),
+    TEXT("kind", "star, object, star_ghost or object_ghost"),
     INT("id", "",
         "star: identity in the catalogue, from 2147483648 on statistical; object: index in the "
         "scenario"),

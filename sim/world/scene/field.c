@@ -1,19 +1,16 @@
 #include "sim/world/scene/field.h"
 
 #include <assert.h>
-#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "sim/messages/message_invariants.h"
 #include "sim/optics/psf.h"
+#include "sim/world/scene/field_ghosts.h"
 #include "sim/world/scene/field_internal.h"
 #include "sim/world/scene/field_objects.h"
 #include "sim/world/scene/los_track.h"
 #include "sim/world/scene/skylight.h"
-
-/* upper limit of aberration and light deflection */
-#define APPARENT_SHIFT_RAD (30.0 * BST_ARCSEC_RAD)
 
 /* statistical stars cached for the next field query: 40 MiB */
 #define FAINT_CACHE_STARS 1048576
@@ -68,6 +65,7 @@ void bst_field_free(bst_field *field) {
         free(field->sources);
         free_parts(field);
         free(field->near);
+        free(field->ghost_near);
         bst_star_occultation_free(&field->hiding);
         free(field);
     }
@@ -176,26 +174,11 @@ bool bst_field_project(const bst_camera *camera, const bst_los_track *track, int
     double exposure = track->time_s[track->count - 1];
     double u = exposure > 0.0 ? track->time_s[k] / exposure : 0.5;
     return bst_camera_project(
-        camera, bst_quat_rotate(track->q_cam_from_gcrf[k], bst_scene_source_direction(source, u)),
+        camera,
+        bst_scene_source_seen(
+            camera, source,
+            bst_quat_rotate(track->q_cam_from_gcrf[k], bst_scene_source_direction(source, u))),
         x_px, y_px);
-}
-
-/* Capacity for `count` items and half as many more: few later frames then need another one. */
-static int with_margin(int count) {
-    return count < INT_MAX / 2 ? count + count / 2 : count;
-}
-
-static bst_status reserve_stars(bst_ctx *ctx, bst_field *field, int count) {
-    if (count > field->star_capacity) {
-        count = with_margin(count);
-        bst_star *more = realloc(field->stars, (size_t)count * sizeof *more);
-        if (!more) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d stars", count);
-        }
-        field->stars = more;
-        field->star_capacity = count;
-    }
-    return BST_OK;
 }
 
 /* Records in the truth how much of the window Earth, Moon and Sun cover. True: a disc must be
@@ -210,22 +193,9 @@ static bool bodies_in_field(const bst_camera *camera, const bst_scene_surroundin
     return bst_discs_any(&discs);
 }
 
-static bst_status reserve_sources(bst_ctx *ctx, bst_field *field, int count) {
-    if (count > field->source_capacity) {
-        count = with_margin(count);
-        bst_scene_source *more = realloc(field->sources, (size_t)count * sizeof *more);
-        if (!more) {
-            return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for %d sources", count);
-        }
-        field->sources = more;
-        field->source_capacity = count;
-    }
-    return BST_OK;
-}
-
 static bst_status reserve_parts(bst_ctx *ctx, bst_field *field, int count) {
     if (count > field->part_capacity) {
-        count = with_margin(count);
+        count += count / 2; /* few later frames then need more */
         free_parts(field);
         field->parts = calloc((size_t)count, sizeof *field->parts);
         field->part_capacity = field->parts ? count : 0;
@@ -236,52 +206,9 @@ static bst_status reserve_parts(bst_ctx *ctx, bst_field *field, int count) {
     return BST_OK;
 }
 
-/* True if a direction projects into the window with its margin. */
-static bool near_window(const bst_field *field, bst_quat q, bst_vec3 direction, bst_window window,
-                        double margin_px) {
-    double x, y;
-    bst_vec3 v = bst_quat_rotate(q, direction);
-    if (field->camera->geometry.general && bst_camera_beyond_fold(field->camera, v, margin_px)) {
-        return true; /* behind the camera now, but it may enter during the exposure */
-    }
-    return bst_camera_project(field->camera, v, &x, &y) && x >= window.x0 - margin_px &&
-           y >= window.y0 - margin_px && x <= window.x0 + window.width - 1 + margin_px &&
-           y <= window.y0 + window.height - 1 + margin_px;
-}
-
-/* Checks whether a catalogue object is the observer's own satellite; both orbits may differ by
- * metres. */
-static bool is_self(const bst_field *field, int index) {
-    const world_object *object = &field->world->objects[index];
-    if (index == field->world->observers[field->observer].own_object) {
-        return true;
-    }
-    return object->catalogued && object->info.norad != 0 &&
-           object->info.norad == field->world->observers[field->observer].norad;
-}
-
-/* State of one field query. */
-typedef struct query {
-    double start_s, end_s; /* start and end of the attitude track */
-    double mid_s, exposure_s;
-    bst_los_track own; /* track of the exposure alone */
-    bst_quat mean;
-    bst_window window;
-    bst_window lit;           /* part of the sensor whose sources count: the window, or more */
-    bool wider;               /* it is more */
-    double margin_px;         /* around `lit`, including the motion during the exposure */
-    bst_scene_cone cone;      /* contains `lit` with its margin */
-    bst_scene_cone near_cone; /* contains the window with its margin */
-    bst_world_state eye;
-    bst_bodies bodies;
-    bst_mat3 itrf_from_gcrf;
-    bst_light light, geocentric;
-    double v_limit, faint_limit; /* magnitude limits: catalogue stars; statistical stars */
-} query;
-
 /* Prepares the attitude track of a field query: times, mean attitude, and margin for the motion. */
 static bst_status settle_track(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
-                               const bst_field_options *options, query *q) {
+                               const bst_field_options *options, bst_field_scene *q) {
     double reach_px;
     q->own = *track;
     if (options->lead_s > 0.0) {
@@ -300,7 +227,7 @@ static bst_status settle_track(bst_ctx *ctx, bst_field *field, const bst_los_tra
 }
 
 /* Computes observer, Earth, Sun and Moon at mid-exposure, with aberration and light deflection. */
-static bst_status place_observer(bst_ctx *ctx, bst_field *field, query *q) {
+static bst_status place_observer(bst_ctx *ctx, bst_field *field, bst_field_scene *q) {
     bst_astro_earth_frames frames;
     BST_TRY(bst_world_view_observer_state(ctx, field->view, field->observer, q->mid_s, &q->eye));
     BST_TRY(bst_world_view_bodies(ctx, field->view, q->mid_s, &q->bodies));
@@ -312,7 +239,7 @@ static bst_status place_observer(bst_ctx *ctx, bst_field *field, query *q) {
 }
 
 /* Fills the header of the truth message: times, attitudes, observer. */
-static void fill_header(const bst_field *field, const query *q, bst_truth *truth) {
+static void fill_header(const bst_field *field, const bst_field_scene *q, bst_truth *truth) {
     const bst_camera *camera = field->camera;
     truth->q_cam_from_gcrf_mid = field->q_mid;
     truth->q_cam_from_gcrf_mean = q->mean;
@@ -340,28 +267,8 @@ static bst_window light_window(const bst_camera *camera, bst_window window) {
     return window;
 }
 
-/* Computes the cone of directions that contains a part of the sensor with its margin. */
-static bst_scene_cone find_cone(const bst_field *field, const query *q, bst_window window) {
-    const bst_camera *camera = field->camera;
-    bst_scene_cone cone;
-    bst_vec3 centre_cam = bst_camera_unproject(camera, window.x0 + 0.5 * (window.width - 1),
-                                               window.y0 + 0.5 * (window.height - 1));
-    cone.axis = bst_quat_rotate(bst_quat_conj(field->q_mid), centre_cam);
-    cone.radius = APPARENT_SHIFT_RAD;
-    if (camera->geometry.general) {
-        cone.radius +=
-            bst_camera_reach_rad(camera, centre_cam, window.x0 - q->margin_px,
-                                 window.y0 - q->margin_px, window.x0 + window.width + q->margin_px,
-                                 window.y0 + window.height + q->margin_px, q->margin_px);
-    } else {
-        cone.radius += atan(bst_camera_scale_rad(camera) *
-                            (0.5 * hypot(window.width, window.height) + sqrt(2.0) * q->margin_px));
-    }
-    return cone;
-}
-
 /* Computes the background of the exposure: bright bodies, sky and stars that are not rendered. */
-static bst_status find_background(bst_ctx *ctx, bst_field *field, const query *q,
+static bst_status find_background(bst_ctx *ctx, bst_field *field, const bst_field_scene *q,
                                   bst_truth *truth) {
     const bst_camera *camera = field->camera;
     bst_window window = q->window;
@@ -391,83 +298,21 @@ static bst_status find_background(bst_ctx *ctx, bst_field *field, const query *q
     return BST_OK;
 }
 
-/* Collects catalogue stars, then statistical stars down to faint_limit, in the cone. */
-static bst_status query_stars(bst_ctx *ctx, bst_field *field, const query *q, double julian_year,
-                              int *count) {
-    int known, drawn = 0;
-    const bst_star_query cone = {
-        q->cone.axis, q->cone.radius, q->v_limit, {julian_year, q->light.sun_m}};
-    for (;;) {
-        BST_TRY(bst_stars_query_seen(ctx, bst_world_stars(field->world), &cone, field->stars,
-                                     field->star_capacity, &known));
-        if (known > field->star_capacity) {
-            BST_TRY(reserve_stars(ctx, field, known));
-            continue;
-        }
-        if (field->faint) {
-            int room = field->star_capacity - known;
-            BST_TRY(bst_faint_stars_query(ctx, field->faint, q->cone.axis, q->cone.radius,
-                                          q->faint_limit, field->stars + known, room, &drawn));
-            if (drawn > room) {
-                BST_TRY(reserve_stars(ctx, field, known + drawn + drawn / 4));
-                continue;
-            }
-        }
-        *count = known + drawn;
-        return BST_OK;
-    }
-}
-
-/* Makes the source of a star. False: its image does not touch the lit part of the sensor. */
-static bool make_star(const bst_field *field, const query *q, const bst_star *star,
-                      bst_scene_source *s) {
-    const bst_camera *camera = field->camera;
-    bst_vec3 apparent = bst_light_apparent_star(&q->light, star->icrs);
-    if (!near_window(field, field->q_mid, apparent, q->lit, q->margin_px)) {
-        return false;
-    }
-    *s = (bst_scene_source){
-        .kind = BST_SOURCE_STAR,
-        .id = star->id,
-        .apparent_mid = apparent,
-        .electrons_per_s =
-            bst_camera_star_electrons_per_s(camera, (double)star->v_mag, (double)star->b_minus_v),
-        .v_mag = (double)star->v_mag,
-        .sunlit_fraction = NAN,
-        .phase_rad = NAN,
-        .range_m = INFINITY,
-        .outside =
-            q->wider && !(bst_vec3_angle(star->icrs, q->near_cone.axis) <= q->near_cone.radius &&
-                          near_window(field, field->q_mid, apparent, q->window, q->margin_px))};
-    bool coloured = camera->psf && bst_psf_spectra(camera->psf) > 1;
-    if (coloured && !isnan(star->b_minus_v)) {
-        bst_psf_colour(camera->psf, bst_optics_star_spectrum_k((double)star->b_minus_v), s->colour);
-    }
-    /* the Earth occults stars too: a distant point on the line of sight, in axes that move with the
-     * Earth, represents the star */
-    bst_vec3 ray = bst_light_apparent_star(&q->geocentric, star->icrs);
-    s->occulted = bst_astro_earth_occults(
-        q->eye.position_m, bst_vec3_axpy(q->eye.position_m, 1e12, ray), q->bodies.pole);
-    if (s->occulted) {
-        s->electrons_per_s = 0.0;
-    }
-    bst_vec3_to_radec(star->icrs, &s->ra_rad, &s->dec_rad);
-    return true;
-}
-
 /* Collects the sources of a field query: stars, then objects. */
-static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, int *count) {
-    int star_count, near_count, n = 0;
-    BST_TRY(query_stars(ctx, field, q, bst_time_julian_year(bst_world_time(field->world, q->mid_s)),
-                        &star_count));
+static bst_status find_sources(bst_ctx *ctx, bst_field *field, const bst_field_scene *q,
+                               int *count) {
+    int star_count, near_count, ghost_near, n = 0, used = 0, stars;
+    BST_TRY(bst_field_query_stars(ctx, field, q, &star_count));
+    BST_TRY(bst_field_near_ghosts(ctx, field, q, &ghost_near));
     const bst_world_view_span span = {field->observer, q->start_s, q->end_s};
     BST_TRY(bst_world_view_near(ctx, field->view, &span, q->cone.axis, q->cone.radius, field->near,
                                 &near_count));
-    BST_TRY(reserve_sources(ctx, field, star_count + near_count));
+    BST_TRY(bst_field_reserve_sources(ctx, field, star_count + near_count));
     for (int i = 0; i < star_count; i++) {
-        n += make_star(field, q, &field->stars[i], &field->sources[n]);
+        n += bst_field_make_star(field, q, &field->stars[i], &field->sources[n]);
     }
-    BST_TRY(reserve_parts(ctx, field, near_count));
+    stars = n;
+    BST_TRY(reserve_parts(ctx, field, near_count + ghost_near));
     const bst_scene_object_query objects = {.view = field->view,
                                             .camera = field->camera,
                                             .span = span,
@@ -478,9 +323,9 @@ static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, i
                                             .margin_px = q->margin_px,
                                             .cone = q->cone,
                                             .near_cone = q->near_cone};
-    for (int i = 0, used = 0; i < near_count; i++) {
+    for (int i = 0; i < near_count; i++) {
         bool there;
-        if (is_self(field, field->near[i])) {
+        if (bst_field_is_self(field, field->near[i])) {
             continue;
         }
         BST_TRY(bst_field_object(ctx, &objects, field->near[i], &field->parts[used],
@@ -489,7 +334,8 @@ static bst_status find_sources(bst_ctx *ctx, bst_field *field, const query *q, i
         used += there;
     }
     *count = n;
-    return bst_star_occultation_apply(ctx, &field->hiding, field->sources, n);
+    BST_TRY(bst_star_occultation_apply(ctx, &field->hiding, field->sources, n));
+    return bst_field_add_ghosts(ctx, field, q, stars, ghost_near, used, count);
 }
 
 bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
@@ -498,12 +344,15 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
                            const bst_scene_source **sources, int *count) {
     assert(field && track && track->count >= 2 && options && truth && sources && count);
     assert(start_tick <= end_tick && tick_rate_hz > 0 && bst_window_is_valid(&window));
-    query q = {.start_s = (double)start_tick / (double)tick_rate_hz,
-               .end_s = (double)end_tick / (double)tick_rate_hz,
-               .window = window,
-               .lit = options->read_charge ? light_window(field->camera, window) : window,
-               .v_limit = options->v_limit,
-               .faint_limit = fmin(options->v_limit, field->world->faint_limit_v_mag)};
+    bst_field_scene q = {.start_s = (double)start_tick / (double)tick_rate_hz,
+                         .end_s = (double)end_tick / (double)tick_rate_hz,
+                         .window = window,
+                         .lit = options->read_charge ? light_window(field->camera, window) : window,
+                         .v_limit = options->v_limit,
+                         .faint_limit = fmin(options->v_limit, field->world->faint_limit_v_mag),
+                         .ghost_sigma = field->camera->ghost_images ? options->ghost_sigma : 0.0,
+                         .image_margin_px = options->margin_px,
+                         .binning = options->binning > 1 ? options->binning : 1};
     q.mid_s = 0.5 * (q.start_s + q.end_s);
     q.exposure_s = q.end_s - q.start_s;
     BST_TRY(settle_track(ctx, field, track, options, &q));
@@ -511,10 +360,11 @@ bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *
     truth->start_tick = start_tick;
     truth->end_tick = end_tick;
     fill_header(field, &q, truth);
-    q.cone = find_cone(field, &q, q.lit);
+    q.cone = bst_field_find_cone(field, &q, q.lit);
     q.wider = memcmp(&q.lit, &window, sizeof window) != 0;
-    q.near_cone = q.wider ? find_cone(field, &q, window) : q.cone;
+    q.near_cone = q.wider ? bst_field_find_cone(field, &q, window) : q.cone;
     BST_TRY(find_background(ctx, field, &q, truth));
+    bst_field_limit_ghosts(field, &q, truth);
     BST_TRY(find_sources(ctx, field, &q, count));
     *sources = field->sources;
     return BST_OK;

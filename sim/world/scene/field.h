@@ -4,6 +4,7 @@
 #define BST_WORLD_SCENE_FIELD_H
 
 #include "boresight/messages.h"
+#include "sim/optics/ghosts.h"
 #include "sim/world/world.h"
 
 /* Apparent motion of an object during an exposure, at equidistant times from start to end. The
@@ -50,6 +51,7 @@ typedef struct bst_scene_source {
     const bst_scene_source_path *path;   /* NULL: at rest; owned by the creator of the source */
     const bst_scene_source_rate *rate;   /* NULL: constant; owned by the creator */
     const bst_scene_source_shape *shape; /* sphere; NULL: a point; owned by the creator */
+    const bst_ghost *ghost; /* the image is that ghost of the source; NULL: of the source itself */
     const struct bst_scene_source_body *body; /* model of a satellite (source_body.h); NULL: a point
                                                  or a sphere; owned by the creator */
     double body_u[2];                         /* the exposure, as a part of the body's times */
@@ -93,6 +95,13 @@ static inline bst_vec3 bst_scene_source_direction(const bst_scene_source *s, dou
     }
     bst_vec3 place = bst_scene_source_place(s->path, u);
     return bst_vec3_axpy(place, bst_vec3_norm(place), bst_scene_source_shift(s->path, u));
+}
+
+/* Direction in the camera frame of a source's image, from the direction v_cam of its light: the
+ * same, but for a ghost. */
+static inline bst_vec3 bst_scene_source_seen(const bst_camera *camera, const bst_scene_source *s,
+                                             bst_vec3 v_cam) {
+    return s->ghost ? bst_ghost_direction(s->ghost, camera, v_cam) : v_cam;
 }
 
 /* Fraction of the exposure's light that a source emits until time u in [0, 1]; it weights the
@@ -151,6 +160,9 @@ typedef struct bst_field_options {
     double margin_px; /* margin around the window in which sources still count (PSF wings) */
     double lead_s;    /* rolling shutter: the track extends by this before and after the exposure of
                          the window's middle row */
+    /* ghosts count whose light in a pixel is above this, in sigma of a dark pixel; 0: none do */
+    double ghost_sigma;
+    int binning;      /* of the read-out pixels, for ghost_sigma; 0: 1 */
     bool read_charge; /* sources count that light any part of the sensor whose charge the read-out
                          of the window depends on (bst_detector_config_whole_columns) */
 } bst_field_options;
@@ -184,8 +196,8 @@ bst_status bst_field_track(bst_ctx *ctx, bst_field *field, const bst_los_history
                            bst_los_track *out) BST_MUST_CHECK;
 
 /* Fills the header of `truth` (attitudes, observer, light, background) and returns the sources that
- * touch `window`: stars by cell and brightness, then objects by index. `field` holds *sources until
- * the next query. Paths and rates refer to the complete track. */
+ * touch `window`: stars by cell and brightness, then ghosts, then objects by index. `field` holds
+ * *sources until the next query. Paths and rates refer to the complete track. */
 bst_status bst_field_query(bst_ctx *ctx, bst_field *field, const bst_los_track *track,
                            int64_t start_tick, int64_t end_tick, int64_t tick_rate_hz,
                            bst_window window, const bst_field_options *options, bst_truth *truth,

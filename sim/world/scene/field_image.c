@@ -27,8 +27,8 @@ bst_scene_image_moments bst_scene_image_by_light(const bst_camera *camera,
         bst_quat q =
             bst_quat_slerp(track->q_cam_from_gcrf[sample], track->q_cam_from_gcrf[sample + 1],
                            step > 0.0 ? (u * duration - track->time_s[sample]) / step : 0.0);
-        (void)bst_camera_project(camera, bst_quat_rotate(q, bst_scene_source_direction(source, u)),
-                                 &x, &y);
+        bst_vec3 v = bst_quat_rotate(q, bst_scene_source_direction(source, u));
+        (void)bst_camera_project(camera, bst_scene_source_seen(camera, source, v), &x, &y);
         double dx = x - m.x_mean, dy = y - m.y_mean;
         if (n == 0) { /* moments about the first position */
             m.x_mean = x;
@@ -156,8 +156,9 @@ static bool path_in_pieces(const bst_camera *camera, const bst_los_track *track,
         double u = u01[0] + (u01[1] - u01[0]) * k / count;
         bst_quat q = bst_los_track_attitude(track, u * duration);
         double after = bst_scene_source_light(source, u);
-        if (!bst_camera_project(camera, bst_quat_rotate(q, bst_scene_source_direction(source, u)),
-                                &path->x[k], &path->y[k])) {
+        bst_vec3 v = bst_quat_rotate(q, bst_scene_source_direction(source, u));
+        if (!bst_camera_project(camera, bst_scene_source_seen(camera, source, v), &path->x[k],
+                                &path->y[k])) {
             return false;
         }
         if (k > 0) {

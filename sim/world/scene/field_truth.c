@@ -11,8 +11,8 @@ static bst_scene_image_moments smear_of(const bst_field *field, const bst_scene_
     for (int p = 0; p < BST_FIELD_SIGMA_POINTS; p++) {
         bst_vec3 d = bst_scene_source_direction(source, field->sigma_time[p]);
         x[p] = y[p] = NAN;
-        (void)bst_camera_project(field->camera, bst_quat_rotate(field->sigma_q[p], d), &x[p],
-                                 &y[p]);
+        d = bst_scene_source_seen(field->camera, source, bst_quat_rotate(field->sigma_q[p], d));
+        (void)bst_camera_project(field->camera, d, &x[p], &y[p]);
     }
     for (int p = 1; p < BST_FIELD_SIGMA_POINTS; p++) {
         m.x_mean += x[p] / (BST_FIELD_SIGMA_POINTS - 1);
@@ -51,8 +51,8 @@ static bst_scene_image_moments image_in_rows(const bst_field *field, const bst_l
     *q_mid = bst_los_track_attitude(track, middle * duration);
     for (int k = 0; k < 3; k++) {
         bst_quat q = bst_los_track_attitude(track, when[k] * duration);
-        (void)bst_camera_project(field->camera,
-                                 bst_quat_rotate(q, bst_scene_source_direction(source, when[k])),
+        bst_vec3 v = bst_quat_rotate(q, bst_scene_source_direction(source, when[k]));
+        (void)bst_camera_project(field->camera, bst_scene_source_seen(field->camera, source, v),
                                  x[k], y[k]);
     }
     out->delay_s = (middle - 0.5) * duration;
@@ -65,7 +65,7 @@ static bst_scene_image_moments image_in_rows(const bst_field *field, const bst_l
 static bst_truth_item item_without_place(const bst_field *field, const bst_scene_source *source) {
     return (bst_truth_item){.kind = source->kind,
                             .id = source->id,
-                            .norad = source->kind == BST_SOURCE_OBJECT
+                            .norad = bst_source_is_object(source->kind)
                                          ? bst_world_object(field->world, (int)source->id)->norad
                                          : 0,
                             .ra_rad = source->ra_rad,
@@ -99,8 +99,9 @@ static bst_scene_image_moments source_image(const bst_field *field, const bst_lo
     (void)bst_field_project(camera, track, 0, source, &out->x_start_px, &out->y_start_px);
     (void)bst_field_project(camera, track, track->count - 1, source, &out->x_end_px,
                             &out->y_end_px);
-    (void)bst_camera_project(camera, bst_quat_rotate(field->q_mid, source->apparent_mid),
-                             &out->x_mid_px, &out->y_mid_px);
+    bst_vec3 mid = bst_quat_rotate(field->q_mid, source->apparent_mid);
+    (void)bst_camera_project(camera, bst_scene_source_seen(camera, source, mid), &out->x_mid_px,
+                             &out->y_mid_px);
     return source->rate ? bst_scene_image_by_light(field->camera, track, source, 0.0, 1.0)
                         : smear_of(field, source);
 }
@@ -182,6 +183,10 @@ void bst_field_truth_item(const bst_field *field, const bst_los_track *track,
     out->y_chief_px = image.y_mean;
     if (source->shape) {
         bst_scene_image_add_disc(field->camera, q_mid, source, &image);
+    }
+    if (source->ghost) {
+        image.xx += bst_ghost_variance_px2(source->ghost);
+        image.yy += bst_ghost_variance_px2(source->ghost);
     }
     bst_scene_image_centroid(camera, source, &image, &out->x_centroid_px, &out->y_centroid_px);
     if (isfinite(image.x_mean)) {

@@ -16,7 +16,7 @@ static bool row_of(const bst_camera *camera, const bst_row_times *rows, const bs
     double x, u = time_s / track->time_s[track->count - 1];
     bst_vec3 v = bst_quat_rotate(bst_los_track_attitude(track, time_s),
                                  bst_scene_source_direction(source, u));
-    if (!bst_camera_project(camera, v, &x, y)) {
+    if (!bst_camera_project(camera, bst_scene_source_seen(camera, source, v), &x, y)) {
         return false;
     }
     *y = fmin(fmax(*y, rows->window.y0), rows->window.y0 + rows->window.height - 1.0);

@@ -6,6 +6,7 @@
 
 #include "sim/messages/message_invariants.h"
 #include "sim/world/scene/stray.h"
+#include "sim/world/scene/stray_map.h"
 #include "sim/world/scene/zodiacal.h"
 #include "sim/world/world_internal.h"
 
@@ -40,6 +41,7 @@ typedef struct painter {
     double sun_e, star_e; /* electrons per pixel and second of one star of V = 0 per steradian */
     double even_e;        /* uniform background per pixel and second, after vignetting */
     double earth_e;       /* the Earth's own emission, per pixel and second */
+    double map_e; /* electrons of an exposure that 1 of the map of stray light is; 0: none */
 } painter;
 
 struct bst_skylight {
@@ -60,7 +62,7 @@ struct bst_skylight {
 bool bst_skylight_varies(const bst_camera *camera) {
     const bst_background_config *c = &camera->background;
     const bst_optics_vignetting *v = &camera->optics.vignetting;
-    bool added = c->stray_e_per_s != 0.0;
+    bool added = c->stray_e_per_s != 0.0 || *c->stray_map_file;
     for (int i = 0; i < 2; i++) {
         added = added || c->gradient_e_per_s[i] != 0.0;
     }
@@ -324,7 +326,9 @@ static double place_at(const bst_skylight *b, double x_px, double y_px) {
         sum += weight > 0.0 ? weight * (double)paint_pixel(&b->painter, i + (k & 1), j + (k >> 1))
                             : 0.0;
     }
-    return sum;
+    return b->painter.map_e > 0.0
+               ? sum + b->painter.map_e * bst_stray_map_at(b->camera->stray_map, x, y)
+               : sum;
 }
 
 double bst_skylight_at(const bst_skylight_map *map, double x_px, double y_px) {
@@ -453,6 +457,7 @@ static void prepare(painter *p) {
     p->earth_e = bst_camera_thermal_electrons_per_s(camera, c->earth_temperature_k, pixel_sr);
     p->even_e = bst_camera_optics_e_per_s(camera);
     bst_discs_make(camera, a, &p->discs);
+    double stray_e = 0.0;
     if (c->model == BST_BACKGROUND_SKY && camera->pst) {
         /* irradiance per detector area equals that at the entrance times PST; the PST includes
          * light-gathering area and transmission */
@@ -461,9 +466,45 @@ static void prepare(painter *p) {
         double pitch = bst_scene_pst_pixel_m(camera->pst);
         double irradiance = bst_stray_irradiance(camera->pst, c, a->eye_m, &a->bodies,
                                                  to_gcrf(p, (bst_vec3){0, 0, 1}));
-        p->even_e += gathered > 0.0 ? irradiance * pitch * pitch *
-                                          bst_camera_electrons_per_s(camera, 0.0) / gathered
-                                    : 0.0;
+        stray_e = gathered > 0.0 ? irradiance * pitch * pitch *
+                                       bst_camera_electrons_per_s(camera, 0.0) / gathered
+                                 : 0.0;
+    }
+    bool shared = camera->stray_map && c->stray_map == BST_STRAY_MAP_SHARE;
+    p->even_e += shared ? 0.0 : stray_e;
+    p->map_e = camera->stray_map ? (shared ? stray_e : 1.0) * a->exposure_s : 0.0;
+}
+
+/* Computes the background per pixel by interpolation between the nodes. */
+static bst_status spread_nodes(bst_ctx *ctx, bst_skylight *b, bst_window window) {
+    lattice *out = &b->pixels;
+    const lattice *n = &b->nodes;
+    BST_TRY(set_nodes(ctx, out, 1, window));
+    out->columns = window.width;
+    out->rows = window.height;
+    for (int y = 0; y < out->rows; y++) {
+        int down = window.y0 + y - n->y0, j = down / n->step;
+        float t = (float)(down - j * n->step) / (float)n->step;
+        float *row = out->value + (size_t)y * (size_t)out->columns;
+        for (int i = 0; i < n->columns - 1; i++) {
+            const float *a = n->value + (size_t)j * (size_t)n->columns + i, *c = a + n->columns;
+            float left = a[0] + t * (c[0] - a[0]), right = a[1] + t * (c[1] - a[1]);
+            float slope = (right - left) / (float)n->step;
+            int first = n->x0 + i * n->step - window.x0, last = first + n->step;
+            int from = first > 0 ? first : 0, to = last < out->columns ? last : out->columns;
+            for (int x = from; x < to; x++) {
+                row[x] = left + slope * (float)(x - first);
+            }
+        }
+    }
+    return BST_OK;
+}
+
+/* Adds the map of stray light to the pixels. */
+static void add_stray_map(const painter *p, lattice *pixels) {
+    for (int y = 0; y < pixels->rows; y++) {
+        bst_stray_map_add_row(p->b->camera->stray_map, pixels->x0, pixels->y0 + y, pixels->columns,
+                              (float)p->map_e, pixels->value + (size_t)y * (size_t)pixels->columns);
     }
 }
 
@@ -491,14 +532,19 @@ bst_status bst_skylight_make(bst_ctx *ctx, bst_skylight *b, const bst_scene_surr
     }
     bool edge;
     BST_TRY(find_edge(ctx, &p, b, &edge));
-    if (edge && !b->places_only) {
-        BST_TRY(paint_pixels(ctx, &p, b, window));
+    bool mapped = p.map_e > 0.0;
+    if ((edge || mapped) && !b->places_only) {
+        BST_TRY(edge ? paint_pixels(ctx, &p, b, window) : spread_nodes(ctx, b, window));
         n = &b->pixels;
         n->x0 = window.x0;
         n->y0 = window.y0;
+        if (mapped) {
+            add_stray_map(&p, n);
+        }
     }
-    b->map = (bst_skylight_map){n->step, n->x0,    n->y0,    n->columns,
-                                n->rows, n->value, INFINITY, edge && b->places_only ? b : NULL};
+    b->map = (bst_skylight_map){
+        n->step, n->x0,    n->y0,    n->columns,
+        n->rows, n->value, INFINITY, (edge || mapped) && b->places_only ? b : NULL};
     for (int i = 0; i < n->columns * n->rows; i++) {
         b->map.least_e = fmin(b->map.least_e, (double)n->value[i]);
     }
