@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sim/core/json_member.h"
 #include "sim/core/memory.h"
+#include "view/plot_limits.h"
 #include "view/plot_samples.h"
 #include "view/plot_truth.h"
 #include "view/plot_values.h"
@@ -56,94 +56,75 @@ typedef enum value_kind {
 /* Panel of the wheels: it has a line for each wheel there is. */
 enum { WHEELS_PANEL = 12 };
 /* Speed of a wheel. All wheels are among the first rows: each time has a row of each. */
-#define WHEEL(n)                                                                             \
-    {                                                                                        \
-        WHEELS_PANEL, "wheel " #n, "wheels",                                                 \
-            "SELECT time_s, speed_rpm FROM wheels WHERE sensor = ?1 AND wheel = " #n, false, \
-            VALUE_PLAIN, "rowid < 10000 AND wheel = " #n                                     \
+#define WHEEL(n)                                                                              \
+    {                                                                                         \
+        WHEELS_PANEL, "wheel " #n, "wheels", "time_s", "speed_rpm", " AND wheel = " #n, NULL, \
+            false, VALUE_PLAIN, "rowid < 10000 AND wheel = " #n                               \
     }
+#define OF_TARGET " AND target_of_interest = 1"
 
-/* A line of a panel: its samples by time. ?1: the sensor; ?2: the target. `only`: the panel is
+/* A line of a panel: its samples by time, columns `values` of the rows of `table` of the sensor for
+ * which `where` holds. sql: its own query; ?1: the sensor; ?2: the target. `only`: the panel is
  * left out if no row fits; "": any row does. */
 static const struct {
     int panel;
-    const char *name, *table, *sql;
+    const char *name, *table, *time, *values, *where, *sql;
     bool of_target;
     value_kind kind;
     const char *only;
 } lines[BST_VIEW_LINES] = {
-    {0, "true", "exposures",
+    {0, "true", "exposures", "", "", "",
      "SELECT e.mid_s, t.x_mid_px - e.boresight_x_px, t.y_mid_px - e.boresight_y_px"
      /* one row an exposure: repeated ones of a hostile file would multiply */
      " FROM truth t JOIN (SELECT exposure_id, mid_s, boresight_x_px, boresight_y_px FROM exposures"
      " WHERE sensor = ?1 GROUP BY exposure_id) e ON e.exposure_id = t.exposure_id"
      " WHERE t.sensor = ?1 AND t.kind = 'object' AND t.id = ?2 AND t.in_field = 1",
      true, VALUE_LENGTH, ""},
-    {0, "estimated by control", "control",
-     "SELECT time_s, aim_error_x_px, aim_error_y_px FROM control WHERE sensor = ?1", false,
-     VALUE_LENGTH, ""},
-    {1, "true", "truth",
+    {0, "estimated by control", "control", "time_s", "aim_error_x_px, aim_error_y_px", "", NULL,
+     false, VALUE_LENGTH, ""},
+    {1, "true", "truth", "", "", "",
      "SELECT mid_s, snr FROM truth WHERE sensor = ?1 AND kind = 'object' AND id = ?2"
      " AND in_field = 1",
      true, VALUE_PLAIN, ""},
-    {1, "of the track", "tracks",
-     "SELECT time_s, snr FROM tracks WHERE sensor = ?1 AND target_of_interest = 1", false,
-     VALUE_PLAIN, ""},
-    {2, "true", "tracks",
+    {1, "of the track", "tracks", "time_s", "snr", OF_TARGET, NULL, false, VALUE_PLAIN, ""},
+    {2, "true", "tracks", "", "", "",
      "SELECT t.time_s, t.ra_deg, t.dec_deg, u.ra_deg, u.dec_deg FROM tracks t JOIN (SELECT"
      " exposure_id, ra_deg, dec_deg FROM truth WHERE sensor = ?1 AND kind = 'object' AND id = ?2"
      " GROUP BY exposure_id) u ON u.exposure_id = t.exposure_id"
      " WHERE t.sensor = ?1 AND t.target_of_interest = 1",
      true, VALUE_ANGLE, "target_of_interest = 1"},
-    {2, "3σ of the filter", "tracks",
-     "SELECT time_s, cov_d1_d1_rad2, cov_d2_d2_rad2 FROM tracks WHERE sensor = ?1"
-     " AND target_of_interest = 1",
+    {2, "3σ of the filter", "tracks", "time_s", "cov_d1_d1_rad2, cov_d2_d2_rad2", OF_TARGET, NULL,
      true, VALUE_THREE_SIGMA, "target_of_interest = 1"},
-    {3, "innovation", "tracks", TRACK_STATES, true, VALUE_INNOVATION, "target_of_interest = 1"},
-    {3, "3σ expected", "tracks", TRACK_STATES, true, VALUE_INNOVATION_SIGMA,
+    {3, "innovation", "tracks", "", "", "", TRACK_STATES, true, VALUE_INNOVATION,
      "target_of_interest = 1"},
-    {4, "outer", "pointing", "SELECT time_s, axis_outer_deg FROM pointing WHERE sensor = ?1", false,
+    {3, "3σ expected", "tracks", "", "", "", TRACK_STATES, true, VALUE_INNOVATION_SIGMA,
+     "target_of_interest = 1"},
+    {4, "outer", "pointing", "time_s", "axis_outer_deg", "", NULL, false, VALUE_PLAIN, ""},
+    {4, "inner", "pointing", "time_s", "axis_inner_deg", "", NULL, false, VALUE_PLAIN, ""},
+    {5, "third", "mount", "time_s", "axis2_deg", "", NULL, false, VALUE_PLAIN, "axes > 2"},
+    {6, "mount", "pointing", "time_s", "limited", "", NULL, false, VALUE_PLAIN, "limited = 1"},
+    {6, "wheels", "mount", "time_s", "wheels_saturated", "", NULL, false, VALUE_PLAIN,
+     "wheels_saturated = 1"},
+    {7, "x", "mount", "time_s", "body_rate_x_degps", "", NULL, false, VALUE_PLAIN,
+     "body_rate_x_degps != 0"},
+    {7, "y", "mount", "time_s", "body_rate_y_degps", "", NULL, false, VALUE_PLAIN,
+     "body_rate_y_degps != 0"},
+    {7, "z", "mount", "time_s", "body_rate_z_degps", "", NULL, false, VALUE_PLAIN,
+     "body_rate_z_degps != 0"},
+    {8, "all", "detection_frames", "mid_s", "detections", "", NULL, false, VALUE_PLAIN, ""},
+    {8, "identified stars", "detection_frames", "mid_s", "stars_identified", "", NULL, false,
      VALUE_PLAIN, ""},
-    {4, "inner", "pointing", "SELECT time_s, axis_inner_deg FROM pointing WHERE sensor = ?1", false,
+    {9, "x", "track_frames", "time_s", "attitude_error_x_arcsec", "", NULL, false, VALUE_PLAIN, ""},
+    {9, "y", "track_frames", "time_s", "attitude_error_y_arcsec", "", NULL, false, VALUE_PLAIN, ""},
+    {9, "z", "track_frames", "time_s", "attitude_error_z_arcsec", "", NULL, false, VALUE_PLAIN, ""},
+    {10, "level", "detection_frames", "mid_s", "background_e", "", NULL, false, VALUE_PLAIN, ""},
+    {10, "noise", "detection_frames", "mid_s", "noise_e", "", NULL, false, VALUE_PLAIN, ""},
+    {11, "detections", "detection_frames", "mid_s",
+     "CAST(written_tick - end_tick AS REAL) / (SELECT tick_rate_hz FROM run)", "", NULL, false,
      VALUE_PLAIN, ""},
-    {5, "third", "mount", "SELECT time_s, axis2_deg FROM mount WHERE sensor = ?1", false,
-     VALUE_PLAIN, "axes > 2"},
-    {6, "mount", "pointing", "SELECT time_s, limited FROM pointing WHERE sensor = ?1", false,
-     VALUE_PLAIN, "limited = 1"},
-    {6, "wheels", "mount", "SELECT time_s, wheels_saturated FROM mount WHERE sensor = ?1", false,
-     VALUE_PLAIN, "wheels_saturated = 1"},
-    {7, "x", "mount", "SELECT time_s, body_rate_x_degps FROM mount WHERE sensor = ?1", false,
-     VALUE_PLAIN, "body_rate_x_degps != 0"},
-    {7, "y", "mount", "SELECT time_s, body_rate_y_degps FROM mount WHERE sensor = ?1", false,
-     VALUE_PLAIN, "body_rate_y_degps != 0"},
-    {7, "z", "mount", "SELECT time_s, body_rate_z_degps FROM mount WHERE sensor = ?1", false,
-     VALUE_PLAIN, "body_rate_z_degps != 0"},
-    {8, "all", "detection_frames",
-     "SELECT mid_s, detections FROM detection_frames WHERE sensor = ?1", false, VALUE_PLAIN, ""},
-    {8, "identified stars", "detection_frames",
-     "SELECT mid_s, stars_identified FROM detection_frames WHERE sensor = ?1", false, VALUE_PLAIN,
-     ""},
-    {9, "x", "track_frames",
-     "SELECT time_s, attitude_error_x_arcsec FROM track_frames WHERE sensor = ?1", false,
+    {11, "tracks", "track_frames", "time_s",
+     "CAST(written_tick - tick AS REAL) / (SELECT tick_rate_hz FROM run)", "", NULL, false,
      VALUE_PLAIN, ""},
-    {9, "y", "track_frames",
-     "SELECT time_s, attitude_error_y_arcsec FROM track_frames WHERE sensor = ?1", false,
-     VALUE_PLAIN, ""},
-    {9, "z", "track_frames",
-     "SELECT time_s, attitude_error_z_arcsec FROM track_frames WHERE sensor = ?1", false,
-     VALUE_PLAIN, ""},
-    {10, "level", "detection_frames",
-     "SELECT mid_s, background_e FROM detection_frames WHERE sensor = ?1", false, VALUE_PLAIN, ""},
-    {10, "noise", "detection_frames",
-     "SELECT mid_s, noise_e FROM detection_frames WHERE sensor = ?1", false, VALUE_PLAIN, ""},
-    {11, "detections", "detection_frames",
-     "SELECT mid_s, CAST(written_tick - end_tick AS REAL) / (SELECT tick_rate_hz FROM run)"
-     " FROM detection_frames WHERE sensor = ?1",
-     false, VALUE_PLAIN, ""},
-    {11, "tracks", "track_frames",
-     "SELECT time_s, CAST(written_tick - tick AS REAL) / (SELECT tick_rate_hz FROM run)"
-     " FROM track_frames WHERE sensor = ?1",
-     false, VALUE_PLAIN, ""},
     WHEEL(0),
     WHEEL(1),
     WHEEL(2),
@@ -152,9 +133,11 @@ static const struct {
     WHEEL(5),
     WHEEL(6),
     WHEEL(7),
-    {13, "simulated over wall time", "", "", false, VALUE_REAL_TIME, ""},
+    {13, "simulated over wall time", "", "", "", "", "", false, VALUE_REAL_TIME, ""},
 };
 
+/* Most rows of a table of which several lines are read at once: all their samples are held. */
+enum { ROWS_TOGETHER = 500000 };
 /* Lines of the target's truth that are read at once with the line of kind VALUE_ANGLE. */
 enum { TRUE_ERROR = 0, TRUE_SNR = 2 };
 
@@ -191,85 +174,25 @@ static bool is_in_panel(const bst_view_run *run, bst_view_sensor *s, int line) {
     return lines[line].panel != WHEELS_PANEL || is_recorded(run, s, line);
 }
 
-/* Adds the speed limits of the wheels to their panel: [{line, low, high}], rpm. */
-static void add_wheel_limits(const bst_view_run *run, const bst_view_sensor *s, cJSON *panel) {
-    cJSON *limits = cJSON_AddArrayToObject(panel, "stops");
-    bst_ctx ignored = {0};
-    bst_io_rows *rows;
-    bool more;
-    cJSON_AddStringToObject(panel, "limit_word", "limits");
-    if (bst_io_rows_open(&ignored, run->reader,
-                         "SELECT wheel, max(speed_limit_rpm) FROM wheels WHERE sensor = ?1 AND"
-                         " rowid < 10000 GROUP BY wheel ORDER BY wheel LIMIT 8",
-                         s->sensor.index, 0, &rows) != BST_OK) {
-        return;
+/* True if a panel is shown: a line of it is worth showing. */
+static bool is_shown(const bst_view_run *run, bst_view_sensor *s, int panel) {
+    bool any = false;
+    for (int i = 0; i < BST_VIEW_LINES && !any; i++) {
+        any = lines[i].panel == panel && is_recorded(run, s, i);
     }
-    for (int line = 0; bst_io_rows_next(&ignored, rows, &more) == BST_OK && more; line++) {
-        const double limit = bst_io_rows_real(rows, 1);
-        if (isfinite(limit)) {
-            cJSON *stop = cJSON_CreateObject();
-            cJSON_AddItemToArray(limits, stop);
-            cJSON_AddNumberToObject(stop, "line", line);
-            cJSON_AddNumberToObject(stop, "low", -limit);
-            cJSON_AddNumberToObject(stop, "high", limit);
-        }
-    }
-    bst_io_rows_close(rows);
-}
-
-/* Adds the stops of the mount's axes to its panel: [{line, low, high}], deg. A mount whose type the
- * viewer does not know has none. */
-static void add_stops(const bst_view_run *run, const bst_view_sensor *s, cJSON *panel) {
-    const cJSON *node = NULL, *gimbal = NULL,
-                *observers = bst_json_member(bst_run_reader_scenario(run->reader), "observers");
-    cJSON *stops = cJSON_AddArrayToObject(panel, "stops");
-    cJSON_ArrayForEach(node, observers) {
-        const cJSON *sensor, *name = bst_json_member(node, "name");
-        cJSON_ArrayForEach(sensor, bst_json_member(node, "sensors")) {
-            const cJSON *own = bst_json_member(sensor, "name");
-            if (cJSON_IsString(name) && cJSON_IsString(own) &&
-                strcmp(name->valuestring, s->sensor.observer) == 0 &&
-                strcmp(own->valuestring, s->sensor.name) == 0) {
-                gimbal = bst_json_member(bst_json_member(sensor, "modules"), "gimbal");
-            }
-        }
-    }
-    const cJSON *inner = bst_json_member(gimbal, "inner_travel_deg");
-    const cJSON *low = bst_json_member(gimbal, "travel_min_deg");
-    const cJSON *high = bst_json_member(gimbal, "travel_max_deg");
-    for (int axis = 0; axis < 2; axis++) {
-        const cJSON *a = cJSON_GetArrayItem(low, axis), *b = cJSON_GetArrayItem(high, axis);
-        double ends[2] = {0.0, 0.0};
-        if (cJSON_IsNumber(a) && cJSON_IsNumber(b)) {
-            ends[0] = a->valuedouble;
-            ends[1] = b->valuedouble;
-        } else if (axis == 1 && cJSON_IsNumber(inner)) {
-            ends[0] = -inner->valuedouble;
-            ends[1] = inner->valuedouble;
-        }
-        if (ends[0] < ends[1]) {
-            cJSON *stop = cJSON_CreateObject();
-            cJSON_AddItemToArray(stops, stop);
-            cJSON_AddNumberToObject(stop, "line", axis);
-            cJSON_AddNumberToObject(stop, "low", ends[0]);
-            cJSON_AddNumberToObject(stop, "high", ends[1]);
-        }
-    }
+    return any;
 }
 
 void bst_view_add_panels(const bst_view_run *run, bst_view_sensor *s, cJSON *out) {
     for (int k = 0; k < BST_VIEW_PANELS; k++) {
+        if (!is_shown(run, s, k)) {
+            continue;
+        }
         cJSON *names = cJSON_CreateArray();
-        bool any = false;
         for (int i = 0; i < BST_VIEW_LINES; i++) {
             if (lines[i].panel == k && is_in_panel(run, s, i)) {
-                any = is_recorded(run, s, i) || any;
                 cJSON_AddItemToArray(names, cJSON_CreateString(lines[i].name));
             }
-        }
-        if (!any) {
-            cJSON_Delete(names);
-            continue;
         }
         cJSON *node = cJSON_CreateObject();
         cJSON_AddStringToObject(node, "name", panels[k].name);
@@ -277,9 +200,9 @@ void bst_view_add_panels(const bst_view_run *run, bst_view_sensor *s, cJSON *out
         cJSON_AddStringToObject(node, "unit", panels[k].unit);
         cJSON_AddItemToObject(node, "lines", names);
         if (strcmp(panels[k].name, "mount") == 0) {
-            add_stops(run, s, node);
+            bst_view_add_stops(run, s, node);
         } else if (k == WHEELS_PANEL) {
-            add_wheel_limits(run, s, node);
+            bst_view_add_wheel_limits(run, s, node);
         }
         cJSON_AddItemToArray(out, node);
     }
@@ -303,18 +226,20 @@ static bst_view_track_state read_state(const bst_io_rows *r) {
         .r22 = bst_io_rows_real(r, 16)};
 }
 
-/* Value of a row; NAN: none. `before`: state of the row before, which becomes that of this row. */
-static double value_of(const bst_io_rows *rows, value_kind kind, bst_view_track_state *before) {
+/* Value of a row, from column `at`; NAN: none. `before`: state of the row before, which becomes
+ * that of this row. */
+static double value_of(const bst_io_rows *rows, value_kind kind, int at,
+                       bst_view_track_state *before) {
     double innovation, sigma3;
     switch (kind) {
         case VALUE_LENGTH:
-            return hypot(bst_io_rows_real(rows, 1), bst_io_rows_real(rows, 2));
+            return hypot(bst_io_rows_real(rows, at), bst_io_rows_real(rows, at + 1));
         case VALUE_ANGLE:
             return bst_view_angle_arcsec(bst_io_rows_real(rows, 1), bst_io_rows_real(rows, 2),
                                          bst_io_rows_real(rows, 3), bst_io_rows_real(rows, 4));
         case VALUE_THREE_SIGMA:
-            return bst_view_three_sigma_arcsec(bst_io_rows_real(rows, 1),
-                                               bst_io_rows_real(rows, 2));
+            return bst_view_three_sigma_arcsec(bst_io_rows_real(rows, at),
+                                               bst_io_rows_real(rows, at + 1));
         case VALUE_INNOVATION:
         case VALUE_INNOVATION_SIGMA: {
             bst_view_track_state now = read_state(rows);
@@ -325,11 +250,11 @@ static double value_of(const bst_io_rows *rows, value_kind kind, bst_view_track_
         case VALUE_PLAIN:
         case VALUE_REAL_TIME:
         default:
-            return bst_io_rows_real(rows, 1);
+            return bst_io_rows_real(rows, at);
     }
 }
 
-/* Reads the rows of a query as the samples of a line. */
+/* Reads the rows of a line's own query as its samples. */
 static bst_status read_line(bst_ctx *ctx, bst_view_run *run, bst_io_rows *rows, value_kind kind,
                             bst_view_line *line) {
     bst_view_track_state before = {.track = -1};
@@ -338,7 +263,7 @@ static bst_status read_line(bst_ctx *ctx, bst_view_run *run, bst_io_rows *rows, 
     bool more;
     while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
         status =
-            bst_view_collect(ctx, &c, bst_io_rows_real(rows, 0), value_of(rows, kind, &before));
+            bst_view_collect(ctx, &c, bst_io_rows_real(rows, 0), value_of(rows, kind, 1, &before));
         if (status != BST_OK) {
             break;
         }
@@ -391,6 +316,65 @@ static bst_status read_innovations(bst_ctx *ctx, bst_view_run *run, bst_io_rows 
     return kept == BST_OK ? status : kept;
 }
 
+/* True if line i is read with line k: from the same rows, not held, and to be shown. */
+static bool is_read_with(const bst_view_run *run, bst_view_sensor *s, int i, int k) {
+    return !lines[i].sql && strcmp(lines[i].table, lines[k].table) == 0 &&
+           strcmp(lines[i].where, lines[k].where) == 0 && !s->lines[i].samples &&
+           (!lines[i].of_target || s->target >= 0) && is_in_panel(run, s, i) &&
+           is_shown(run, s, lines[i].panel);
+}
+
+/* Reads line k, and with it the other lines of the same rows if there are not too many rows: most
+ * of the time goes into finding the rows.
+ *
+ * Given:     alone  line k only
+ * Returned:  *done  false: there is no such table, or it lacks a column */
+static bst_status read_rows(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int k, bool alone,
+                            bool *done) {
+    bst_view_samples samples[BST_VIEW_LINES] = {{.samples = NULL}};
+    int list[BST_VIEW_LINES], count = 0;
+    char sql[2048];
+    bst_ctx ignored = {0};
+    bst_io_rows *rows;
+    bst_status status;
+    bool more;
+    snprintf(sql, sizeof sql, "SELECT max(rowid) FROM %s", lines[k].table);
+    const bool together = !alone && bst_run_reader_int(run->reader, sql, 0, 0) <= ROWS_TOGETHER;
+    int n = snprintf(sql, sizeof sql, "SELECT %s", lines[k].time);
+    for (int i = 0; i < BST_VIEW_LINES; i++) {
+        if (i == k || (together && is_read_with(run, s, i, k))) {
+            list[count++] = i;
+            n += snprintf(sql + n, sizeof sql - (size_t)n, ", %s", lines[i].values);
+        }
+    }
+    snprintf(sql + n, sizeof sql - (size_t)n, " FROM %s WHERE sensor = ?1%s", lines[k].table,
+             lines[k].where);
+    *done = bst_io_rows_open(&ignored, run->reader, sql, s->sensor.index, 0, &rows) == BST_OK;
+    if (!*done) {
+        return BST_OK;
+    }
+    while ((status = bst_io_rows_next(ctx, rows, &more)) == BST_OK && more) {
+        for (int i = 0, at = 1; status == BST_OK && i < count; i++) {
+            const value_kind kind = lines[list[i]].kind;
+            status = bst_view_collect(ctx, &samples[i], bst_io_rows_real(rows, 0),
+                                      value_of(rows, kind, at, NULL));
+            at += kind == VALUE_PLAIN ? 1 : 2;
+        }
+        if (status != BST_OK) {
+            break;
+        }
+    }
+    bst_io_rows_close(rows);
+    bst_status kept = status;
+    for (int i = 0; i < count; i++) {
+        bst_view_line *line = &s->lines[list[i]];
+        line->used = run->requests;
+        status = bst_view_keep_line(ctx, kept, run, &samples[i], line);
+        kept = status == BST_OK ? kept : status;
+    }
+    return kept;
+}
+
 /* Reads a line if it is not held. A table that was not recorded gives a line without samples. */
 static bst_status need_line(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s, int k) {
     bst_view_line *line = &s->lines[k];
@@ -416,8 +400,16 @@ static bst_status need_line(bst_ctx *ctx, bst_view_run *run, bst_view_sensor *s,
             return BST_OK;
         }
     }
-    if (!known || bst_io_rows_open(&ignored, run->reader, lines[k].sql, s->sensor.index, s->target,
-                                   &rows) != BST_OK) {
+    for (int alone = 0; known && !lines[k].sql && alone < 2; alone++) {
+        bool done;
+        BST_TRY(read_rows(ctx, run, s, k, alone, &done));
+        if (done) {
+            return BST_OK;
+        }
+    }
+    if (!known || !lines[k].sql ||
+        bst_io_rows_open(&ignored, run->reader, lines[k].sql, s->sensor.index, s->target, &rows) !=
+            BST_OK) {
         line->samples = calloc(1, sizeof *line->samples);
         return line->samples ? BST_OK : bst_fail(ctx, BST_ERR_MEMORY, "out of memory");
     }
@@ -475,12 +467,21 @@ bst_status bst_view_read_panel(bst_ctx *ctx, bst_view_run *run, int sensor, int 
     bst_status status = bst_view_lock(ctx, run);
     for (int i = 0; status == BST_OK && sensor < run->sensors && i < BST_VIEW_LINES; i++) {
         bst_view_sensor *s = &run->sensor[sensor];
-        if (lines[i].panel == panel && is_in_panel(run, s, i)) {
+        if (lines[i].panel == panel && is_in_panel(run, s, i) && is_shown(run, s, panel)) {
             status = need_line(ctx, run, s, i);
         }
     }
     bst_view_unlock(run);
     return status;
+}
+
+void bst_view_take_looks(bst_view_run *to, bst_view_run *from, int sensor) {
+    pthread_mutex_lock(&from->lock);
+    if (sensor < to->sensors && sensor < from->sensors) {
+        memcpy(to->sensor[sensor].recorded, from->sensor[sensor].recorded,
+               sizeof to->sensor[sensor].recorded);
+    }
+    pthread_mutex_unlock(&from->lock);
 }
 
 void bst_view_take_lines(bst_view_run *run, bst_view_run *from, int sensor, int panel) {

@@ -40,6 +40,9 @@ static void read_panels(ahead_reader *reader) {
     bst_ctx ignored = {0};
     const bool opened = bst_view_run_open(&ignored, run->path, &own) == BST_OK;
     set_own(reader, opened ? own : NULL);
+    if (opened) {
+        bst_view_take_looks(own, run, 0);
+    }
     for (int panel = reader->first; panel < reader->end; panel++) {
         if (opened && !__atomic_load_n(&reader->ahead->stopping, __ATOMIC_RELAXED) &&
             bst_view_read_panel(&ignored, own, 0, panel) == BST_OK) {

@@ -118,11 +118,15 @@ bst_status bst_view_open_from(bst_ctx *ctx, const bst_view_run *run, int64_t sen
 /* Ends a description: deletes it after an error, *out is then NULL. Returns the status. */
 bst_status bst_view_keep(bst_status status, cJSON **out);
 
-/* Reads the lines of a panel of a sensor that are not held.
+/* Reads the lines of a panel of a sensor that are not held; none if the panel is not shown.
  *
  * Errors:    those of bst_view_run_plot */
 bst_status bst_view_read_panel(bst_ctx *ctx, bst_view_run *run, int sensor,
                                int panel) BST_MUST_CHECK;
+/* Takes over which lines are worth showing from the same run, opened before.
+ *
+ * Given:     to  belongs to the caller alone */
+void bst_view_take_looks(bst_view_run *to, bst_view_run *from, int sensor);
 /* Moves the lines of a panel to the same run, opened again. Lines that it holds stay.
  *
  * Given:     from  belongs to the caller alone

@@ -336,6 +336,20 @@ class View(Checks):
         for other in plots[1:]:
             self.assertEqual([one.tobytes() for one in other], [one.tobytes() for one in plots[0]])
 
+    def test_a_line_without_column(self):
+        """Lines of a table are read at once; one whose column is missing is empty, the others are not."""
+        made = os.path.join(runs.scratch(), "columns")
+        runs.run(runs.TRACK, made, runs.GENERATOR, duration=20)
+        with sqlite3.connect(made + "/run.sqlite") as tables:
+            tables.execute("ALTER TABLE detection_frames DROP COLUMN noise_e")
+            level = tables.execute("SELECT mid_s, background_e FROM detection_frames ORDER BY mid_s").fetchall()
+        tables.close()
+        viewer = Viewer(made)
+        numbers = viewer.numbers("api/plot?sensor=0&panel=background&from=0&to=20&columns=4000")
+        self.assertEqual(viewer.end()[0], 0)
+        self.assertEqual([int(numbers[0]), int(numbers[1 + 3 * len(level)])], [len(level), 0])
+        self.assertEqual([tuple(one) for one in numbers[1:1 + 3 * len(level)].reshape(-1, 3)], [(time, value, value) for time, value in level])
+
     def test_hostile_names_are_text(self):
         described = self.viewer.json("api/run")
         self.assertEqual(described["name"], "<b>run")
