@@ -123,7 +123,8 @@ bst_status bst_view_keep(bst_status status, cJSON **out);
  * Errors:    those of bst_view_run_plot */
 bst_status bst_view_read_panel(bst_ctx *ctx, bst_view_run *run, int sensor,
                                int panel) BST_MUST_CHECK;
-/* Moves the lines of a panel to the same run, opened again. Lines that it holds stay.
+/* Moves the lines of a panel to the same run, opened again. Lines that it holds stay, and those for
+ * which it has no room are left.
  *
  * Given:     from  belongs to the caller alone
  * Returned:  run   has the lines; nothing happens if its sensors are not there */
