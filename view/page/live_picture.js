@@ -66,7 +66,7 @@ export class LivePicture {
     const { live, socket } = this;
     if (this.failed || !socket) return;
     live.shown += shown;
-    if (trail) live.trail.exposures = trail;
+    if (trail && live.asked === live.app.sensor) live.trail.exposures = trail; // not of the sensor before
     if (open) socket.tell('open', null, WebSocket.OPEN);
     else if (closed) socket.tell('close', null, WebSocket.CLOSED);
     else if (message) socket.tell('message', message);
