@@ -338,7 +338,6 @@ const bst_view_live_frame *bst_view_feed_get(bst_view_feed *feed, int64_t sensor
     feed_sensor *s = &feed->sensor[sensor];
     __atomic_store_n(&feed->watched, true, __ATOMIC_RELAXED);
     const int64_t wakes = feed->wakes;
-    s->sent = after > s->sent ? after : s->sent;
     s->watched_until = bst_wall_seconds() + WATCHED_S;
     while (s->sequence <= after && feed->wakes == wakes &&
            pthread_cond_timedwait(&feed->changed, &feed->lock, &until) == 0) {

@@ -29,6 +29,10 @@ static void make_room(bst_view_run *run, const bst_view_line *keep) {
     }
 }
 
+bool bst_view_has_room(const bst_view_run *run, size_t samples) {
+    return run->samples + samples <= SAMPLES_MOST;
+}
+
 bst_status bst_view_collect(bst_ctx *ctx, bst_view_samples *c, double time_s, double value) {
     const size_t bytes = sizeof(bst_io_sample);
     if (!isfinite(time_s)) {

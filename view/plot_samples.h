@@ -10,6 +10,9 @@ typedef struct bst_view_samples {
     size_t room, count;
 } bst_view_samples;
 
+/* True if the lines that are held leave room for further samples. */
+bool bst_view_has_room(const bst_view_run *run, size_t samples);
+
 /* Adds a sample; too many are thinned to their extremes. A time that is no number is left out.
  *
  * Errors:    BST_ERR_MEMORY */

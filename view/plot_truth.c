@@ -19,6 +19,9 @@ static const char truth_sql[] =
 static const char truth_part_sql[] =
     "SELECT " TRUTH_COLUMNS ", rowid FROM truth WHERE rowid BETWEEN ?1 AND ?2 AND id = %" PRId64
     " AND sensor = %" PRId64 " AND kind = 'object'";
+/* The rows at the ends of a range, and those beside it. */
+static const char truth_ends_sql[] =
+    "SELECT exposure_id, sensor, rowid FROM truth WHERE rowid IN (?1 - 1, ?1, ?2, ?2 + 1)";
 /* Of all sensors: their exposures, in the order in which the truth has their rows, with the number
  * of these. */
 static const char exposures_sql[] =
@@ -150,32 +153,49 @@ static bst_status take_truth(bst_ctx *ctx, const bst_io_rows *rows, truth_lines 
     return BST_OK;
 }
 
+/* Looks whether an exposure has the rows that it should have, and none beside them: those of an
+ * exposure follow each other.
+ *
+ * Given:     ends  of truth_ends_sql */
+static bst_status has_its_rows(bst_ctx *ctx, bst_io_rows *ends, const of_exposure *e,
+                               int64_t sensor, bool *has) {
+    bst_status status;
+    bool more;
+    bst_io_rows_restart(ends, e->first_row, e->end - 1);
+    while ((status = bst_io_rows_next(ctx, ends, &more)) == BST_OK && more) {
+        const int64_t row = bst_io_rows_int(ends, 2);
+        const bool own = bst_io_rows_int(ends, 0) == e->id && bst_io_rows_int(ends, 1) == sensor;
+        *has = *has && own == (row >= e->first_row && row < e->end);
+    }
+    return status;
+}
+
 /* Reads the rows of the target where the exposures say that they are: an object's row is as far
  * from the end of its exposure's rows as in the exposure before, most often. So not all rows are
  * read.
  *
+ * Given:     rows, ends  of truth_part_sql and truth_ends_sql
  * Returned:  *there  false: the rows are not where they should be, and some may be missing */
-static bst_status read_parts(bst_ctx *ctx, bst_io_rows *rows, truth_lines *t, bool *there) {
+static bst_status read_parts(bst_ctx *ctx, bst_io_rows *rows, bst_io_rows *ends, int64_t sensor,
+                             truth_lines *t, bool *there) {
     const of_exposure *exposures = t->exposures.items;
     int64_t from_end = 1;
     for (size_t k = 0; k < t->exposures.count && *there; k++) {
         const of_exposure *e = &exposures[k];
         const int64_t guess = e->end - from_end;
         bool more = false;
-        if (e->end == e->first_row) {
-            continue;
-        }
         if (guess >= e->first_row) {
             bst_io_rows_restart(rows, guess, guess);
             BST_TRY(bst_io_rows_next(ctx, rows, &more));
         }
         if (!more) {
+            BST_TRY(has_its_rows(ctx, ends, e, sensor, there));
             bst_io_rows_restart(rows, e->first_row, e->end - 1);
             BST_TRY(bst_io_rows_next(ctx, rows, &more));
         }
         if (more) {
             from_end = e->end - bst_io_rows_int(rows, 8);
-            *there = bst_io_rows_int(rows, 0) == e->id;
+            *there = *there && bst_io_rows_int(rows, 0) == e->id;
             BST_TRY(take_truth(ctx, rows, t));
         }
     }
@@ -195,7 +215,7 @@ static void forget_samples(truth_lines *t) {
 static bool read_known_places(bst_view_run *run, const bst_view_sensor *s, int64_t last_row,
                               truth_lines *t) {
     bst_ctx ignored = {0};
-    bst_io_rows *rows;
+    bst_io_rows *rows, *ends;
     char sql[sizeof truth_part_sql + 48];
     bool there = last_row > 0 &&
                  bst_run_reader_int(run->reader, "SELECT max(rowid) FROM truth", 0, 0) == last_row;
@@ -203,7 +223,11 @@ static bool read_known_places(bst_view_run *run, const bst_view_sensor *s, int64
     if (!there || bst_io_rows_open(&ignored, run->reader, sql, 0, 0, &rows) != BST_OK) {
         return false;
     }
-    there = read_parts(&ignored, rows, t, &there) == BST_OK && there;
+    there = bst_io_rows_open(&ignored, run->reader, truth_ends_sql, 0, 0, &ends) == BST_OK;
+    if (there) {
+        there = read_parts(&ignored, rows, ends, s->sensor.index, t, &there) == BST_OK && there;
+        bst_io_rows_close(ends);
+    }
     bst_io_rows_close(rows);
     return there;
 }

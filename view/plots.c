@@ -147,24 +147,28 @@ static bool wall_clock_path(const bst_view_run *run, char *path, size_t bytes) {
     return bst_run_reader_file(&ignored, run->reader, "wall_clock.csv", path, bytes) == BST_OK;
 }
 
-/* Looks whether the table of a line has rows of the sensor that make its panel worth showing. */
-static bool find_recorded(const bst_view_run *run, const bst_view_sensor *s, int line) {
+/* Looks whether the table of a line has rows of the sensor that make its panel worth showing: 1 or
+ * 0; -1: it cannot be read. */
+static int find_recorded(const bst_view_run *run, const bst_view_sensor *s, int line) {
     char sql[160], path[4200];
     const char *only = lines[line].only;
     if (lines[line].kind == VALUE_REAL_TIME) {
-        return wall_clock_path(run, path, sizeof path) && bst_view_has_wall_clock(path);
+        return wall_clock_path(run, path, sizeof path) && bst_view_has_wall_clock(path) ? 1 : 0;
     }
     snprintf(sql, sizeof sql, "SELECT EXISTS(SELECT 1 FROM %s WHERE sensor = ?1%s%s)",
              lines[line].table, only[0] ? " AND " : "", only);
-    return (!lines[line].of_target || s->target >= 0) &&
-           bst_run_reader_int(run->reader, sql, s->sensor.index, 0) == 1;
+    return !lines[line].of_target || s->target >= 0
+               ? (int)bst_run_reader_int(run->reader, sql, s->sensor.index, -1)
+               : 0;
 }
 
 /* True if the table of a line has rows of the sensor that make its panel worth showing. A look may
- * read the whole table, so it is made once, if no process writes the run. */
+ * read the whole table, so it is made once, if no process writes the run. One that fails, which may
+ * be for the work of a request alone, is made again. */
 static bool is_recorded(const bst_view_run *run, bst_view_sensor *s, int line) {
     if (s->recorded[line] == 0 || run->running) {
-        s->recorded[line] = find_recorded(run, s, line) ? 1 : -1;
+        const int found = find_recorded(run, s, line);
+        s->recorded[line] = found > 0 ? 1 : found == 0 ? -1 : 0;
     }
     return s->recorded[line] > 0;
 }
@@ -489,7 +493,8 @@ void bst_view_take_lines(bst_view_run *run, bst_view_run *from, int sensor, int 
     for (int i = 0; sensor < run->sensors && sensor < from->sensors && i < BST_VIEW_LINES; i++) {
         bst_view_line *line = &run->sensor[sensor].lines[i],
                       *other = &from->sensor[sensor].lines[i];
-        if (lines[i].panel == panel && other->samples && !line->samples) {
+        if (lines[i].panel == panel && other->samples && !line->samples &&
+            bst_view_has_room(run, other->count)) {
             *line = *other;
             line->used = ++run->requests;
             run->samples += line->count;

@@ -38,7 +38,11 @@ static void set_own(ahead_reader *reader, bst_view_run *own) {
 static void read_panels(ahead_reader *reader) {
     bst_view_run *run = reader->ahead->run, *own;
     bst_ctx ignored = {0};
-    const bool opened = bst_view_run_open(&ignored, run->path, &own) == BST_OK;
+    bool opened = bst_view_run_open(&ignored, run->path, &own) == BST_OK;
+    if (opened && own->running) { /* since it was opened for the page: its reader closes often */
+        bst_view_run_close(own);
+        opened = false;
+    }
     set_own(reader, opened ? own : NULL);
     if (opened) {
         bst_view_take_looks(own, run, 0);

@@ -15,7 +15,8 @@ typedef struct bst_view_ahead bst_view_ahead;
  * Returned:  NULL: nothing is read ahead, also if there is no memory for it: requests read then
  * Ownership: end it with bst_view_ahead_stop */
 bst_view_ahead *bst_view_ahead_start(bst_view_run *run);
-/* Ends the reading at once, and waits for its threads; NULL is allowed. */
+/* Interrupts the queries of the threads, and waits for them; a description that is being made, for
+ * which requests may wait too, is made first. NULL is allowed. */
 void bst_view_ahead_stop(bst_view_ahead *ahead);
 
 #endif

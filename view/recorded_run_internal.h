@@ -127,7 +127,8 @@ bst_status bst_view_read_panel(bst_ctx *ctx, bst_view_run *run, int sensor,
  *
  * Given:     to  belongs to the caller alone */
 void bst_view_take_looks(bst_view_run *to, bst_view_run *from, int sensor);
-/* Moves the lines of a panel to the same run, opened again. Lines that it holds stay.
+/* Moves the lines of a panel to the same run, opened again. Lines that it holds stay, and those for
+ * which it has no room are left.
  *
  * Given:     from  belongs to the caller alone
  * Returned:  run   has the lines; nothing happens if its sensors are not there */

@@ -204,6 +204,18 @@ class Checks(unittest.TestCase):
             self.assertLess(time.monotonic(), end)
 
 
+# the rows that exposure 20 has are said to be those of one of another sensor, behind it
+MOVED = """
+    UPDATE exposures SET rowid = -2 * rowid;
+    UPDATE exposures SET rowid = -rowid;
+    CREATE TEMP TABLE another AS SELECT * FROM exposures WHERE exposure_id = 20;
+    UPDATE another SET sensor = 9;
+    INSERT INTO exposures SELECT * FROM another;
+    UPDATE exposures SET rowid = (SELECT rowid + 1 FROM exposures WHERE sensor = 0 AND exposure_id = 20) WHERE sensor = 9;
+    UPDATE exposures SET sources = 0 WHERE sensor = 0 AND exposure_id = 20;
+"""
+
+
 class View(Checks):
     @classmethod
     def setUpClass(cls):
@@ -321,10 +333,14 @@ class View(Checks):
         """Plots of the truth are the same where the exposures say how many rows they have, and where that is wrong."""
         made, plots = os.path.join(runs.scratch(), "track"), []
         runs.run(runs.TRACK, made, runs.GENERATOR, duration=40)
+        with open(made + "/run.sqlite", "rb") as file:
+            recorded = file.read()
         for change in ("", "UPDATE exposures SET sources = sources + 1 WHERE exposure_id = 3", "UPDATE exposures SET sources = "
-                       "sources + CASE exposure_id WHEN 3 THEN -1 WHEN 20 THEN 1 ELSE 0 END", "ALTER TABLE exposures DROP COLUMN sources"):
+                       "sources + CASE exposure_id WHEN 3 THEN -1 WHEN 20 THEN 1 ELSE 0 END", MOVED, "ALTER TABLE exposures DROP COLUMN sources"):
+            with open(made + "/run.sqlite", "wb") as file:
+                file.write(recorded)
             with sqlite3.connect(made + "/run.sqlite") as tables:
-                tables.execute(change)
+                tables.executescript(change)
                 snr = tables.execute("SELECT mid_s, snr FROM truth WHERE kind = 'object' AND in_field = 1 ORDER BY mid_s").fetchall()
             tables.close()
             viewer = Viewer(made)

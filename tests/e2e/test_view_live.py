@@ -396,6 +396,15 @@ class Drawn(unittest.TestCase):
             obeyed = page.evaluate(f"{self.LIVE}.state.obeyed")
             page.evaluate(f"{self.LIVE}.command({{ do: 'save' }}, {{ do: 'save' }}, {{ do: 'pause' }})")
             page.wait_for(f"{self.LIVE}.state.obeyed === {obeyed + 3} && {self.LIVE}.state.paused")
+            # a worker that fails: the page draws, and still controls the run
+            page.evaluate(f"{self.LIVE}.command({{ do: 'run', rate: 20 }})")
+            page.wait_for("document.getElementById('stage').classList.contains('live-shown')")
+            page.evaluate(f"{self.LIVE}.picture.worker.dispatchEvent(new Event('error'))")
+            page.wait_for(f"!document.getElementById('stage').classList.contains('live-shown') && {self.LIVE}.socket instanceof WebSocket && {self.LIVE}.socket.readyState === 1")
+            shown = page.evaluate(f"{self.LIVE}.shown")
+            page.wait_for(f"{self.LIVE}.shown > {shown} + 3")
+            page.evaluate(f"{self.LIVE}.command({{ do: 'pause' }})")
+            page.wait_for(f"{self.LIVE}.state.paused")
             self.assertEqual(page.messages, [])
         viewer.end()
 

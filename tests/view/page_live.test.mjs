@@ -7,6 +7,7 @@ const texts = {};
 const node = (id) => ({ set textContent(text) { texts[id] = text; } });
 Object.assign(globalThis, { location: { search: '' }, document: { getElementById: node }, WebSocket: { OPEN: 1 } });
 const { Live } = await import('../../view/page/live.js');
+const { LivePicture } = await import('../../view/page/live_picture.js');
 const { imageOf, readAnswer, Trail } = await import('../../view/page/live_answer.js');
 
 /** A live run without its controls. */
@@ -106,4 +107,26 @@ test('a trail: tracks of the exposures before, without a future that was discard
   assert.equal(at(60).earlier.length, 40);
   assert.deepEqual(at(20), { earlier: [], again: false });
   assert.equal(trail.newest, 20);
+});
+
+test('another sensor: a frame of the one before, which was asked for, is not shown', () => {
+  const { one } = live(), shown = [], state = { obeyed: 0, run: -1, steps: 0, paused: true };
+  const answer = (sequence) => {
+    const words = JSON.stringify({ state, controller: true, sequence, width: 0, frame: { exposure_id: sequence } }), data = new ArrayBuffer(4 + words.length);
+    new DataView(data).setUint32(0, words.length, true);
+    new Uint8Array(data, 4).set(new TextEncoder().encode(words));
+    return data;
+  };
+  globalThis.requestAnimationFrame = () => {};
+  Object.assign(one, { trail: new Trail([{ id: 8, tracks: [] }]), picture: { hide() {} }, describe() {}, takeFrame: ({ exposure_id: id }) => { shown.push(id); } });
+  Object.assign(one.app, { frameView: null });
+  one.ask();
+  one.app.sensor = 1;
+  one.changeSensor();
+  one.take(answer(9));
+  LivePicture.prototype.take.call({ live: one, socket: { tell() {} } }, { message: answer(9), trail: [{ id: 8, tracks: [] }] }); // of the worker
+  assert.deepEqual([shown, one.sequence, one.trail.newest], [[], 0, -1]);
+  one.ask();
+  one.take(answer(3));
+  assert.deepEqual([shown, one.sequence], [[3], 3]);
 });

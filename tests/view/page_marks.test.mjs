@@ -32,6 +32,14 @@ test('a direction has its pixel and its error ellipse there', () => {
   near(place.xy, 0, 0.01);
 });
 
+test('ghosts in the optics are neither the target nor an object of their own', () => {
+  const truth = ['object', 'object_ghost', 'star', 'star_ghost'].map((kind, k) => ({ kind, id: k < 2 ? 3 : 2147483650, norad: 0, x: k, y: 0 }));
+  const sorted = sortMarks({ ...frame, names: { 3: 'A' }, target: 3, truth });
+  assert.deepEqual(sorted.target.map(({ x, text }) => [x, text]), [[0, 'A']]);
+  assert.deepEqual(sorted.objects.map(({ x, text }) => [x, text]), [[1, 'ghost of A']]);
+  assert.deepEqual(sorted.stars.map(({ x }) => x), [2, 3]);
+});
+
 test('a track that was not updated is where its state says; the others where their detections are', () => {
   const now = { now: true, id: 7, status: 'confirmed', target: true, x: 3, y: 4, misses: 0, ra_deg: 40, dec_deg: 60, state: state(10, 20, 0) };
   const before = { ...now, now: false, ra_deg: 40 - 20 / 3600 / 0.5, state: state(9, 24, 0) }, older = { ...before, state: state(8, 90, 90) };

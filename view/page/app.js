@@ -212,6 +212,7 @@ class App {
     const info = this.run.sensors[sensor];
     if (!info) return;
     this.sensor = sensor;
+    if (this.live) this.live.changeSensor();
     element('sensor').value = String(sensor);
     this.blink.offer(info);
     this.chosenTrack = 0;

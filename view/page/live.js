@@ -33,6 +33,7 @@ export class Live {
     this.newest = true; // the page shows the newest frame
     this.trail = new Trail();
     this.picture = new LivePicture(this, app.frameView);
+    this.asked = -1; // sensor that the last request was about
     this.missed = -1; // exposure that was shown from the record
     this.askedNames = 0; // when names of objects were asked for
     this.queue = []; // commands that wait until the one before is obeyed
@@ -76,7 +77,7 @@ export class Live {
   }
 
   /** Pixels of a frame along one pixel of the screen while it runs; 1: each can be seen, or looked at. Where the processor draws, the
-   * picture has up to a third fewer pixels along a side than the screen, rather than more: it is the run's processor. */
+   * nearest number: the picture has 0.75 to 1.5 times the pixels of the screen along a side, as it is the run's processor. */
   binning() {
     const { frameView } = this.app;
     if (!frameView || !this.state || this.state.paused || this.state.steps > 0) return this.least();
@@ -113,6 +114,7 @@ export class Live {
     const next = this.state && this.state.obeyed === this.sentAt ? undefined : this.queue[0];
     if (next) asked.command = next;
     if (this.socket.readyState !== WebSocket.OPEN) return; // the next connection asks
+    this.asked = asked.sensor;
     this.socket.send(JSON.stringify(asked));
     if (!next) return;
     this.queue.shift();
@@ -149,7 +151,7 @@ export class Live {
     const now = performance.now(), due = !this.running() || !before || before.paused || now - this.textsSet >= TEXT_MS;
     if (due) this.textsSet = now;
     if (this.picture.shown && !this.running()) this.drawHere();
-    else if (answer.sequence) {
+    else if (answer.sequence && this.asked === this.app.sensor) {
       this.sequence = answer.sequence;
       drawn = this.takeFrame(answer.frame, imageOf(data, answer), data, due);
     }
@@ -210,7 +212,7 @@ export class Live {
 
   /** Asks for the names of objects if one has none yet: a run has recorded them some time after its first frames. @param {any} details */
   needNames(details) {
-    const { app } = this, unknown = details.truth.some((mark) => mark.kind !== 'star' && !(mark.id in app.names));
+    const { app } = this, unknown = details.truth.some((mark) => mark.kind.startsWith('object') && !(mark.id in app.names));
     if (!unknown || performance.now() - this.askedNames < NAMES_MS) return;
     this.askedNames = performance.now();
     getJson('names').then(({ names }) => { app.names = names; }).catch(() => {});
@@ -265,6 +267,13 @@ export class Live {
       this.picture.hide();
     }
     element('live-newest').setAttribute('aria-pressed', String(newest));
+  }
+
+  /** Another sensor is shown: frames have numbers, and tracks, of their own in each. */
+  changeSensor() {
+    this.sequence = 0;
+    this.trail = new Trail();
+    this.picture.hide();
   }
 
   say(text) { setText(element('live-message'), text); }

@@ -48,9 +48,10 @@ export class LivePicture {
     if (!this.worker && !this.failed) {
       this.worker = new Worker('live_worker.js', { type: 'module' });
       this.worker.onmessage = ({ data }) => this.take(data);
-      this.worker.onerror = () => { // it could not be loaded: the page does all itself
+      this.worker.onerror = () => { // it could not be loaded, or failed: the page does all itself
         this.failed = true;
         this.hide();
+        this.worker.terminate(); // and closes its connection, which may control the run
         if (this.socket) this.socket.tell('close', null, WebSocket.CLOSED);
       };
     }
@@ -65,7 +66,7 @@ export class LivePicture {
     const { live, socket } = this;
     if (this.failed || !socket) return;
     live.shown += shown;
-    if (trail) live.trail.exposures = trail;
+    if (trail && live.asked === live.app.sensor) live.trail.exposures = trail; // not of the sensor before
     if (open) socket.tell('open', null, WebSocket.OPEN);
     else if (closed) socket.tell('close', null, WebSocket.CLOSED);
     else if (message) socket.tell('message', message);

@@ -41,10 +41,11 @@ export function windowsOf(rows) {
 export function sortMarks(frame) {
   const sorted = { windows: windowsOf(frame.windows || []), stars: [], identified: [], detections: [], objects: [], target: [], predicted: [], tracks: [], trail: [] };
   for (const mark of frame.truth) {
-    if (mark.kind === 'star') sorted.stars.push(mark);
+    const ghost = mark.kind.endsWith('_ghost'); // in the optics: it is not where its source is
+    if (mark.kind.startsWith('star')) sorted.stars.push(mark);
     else {
       const name = frame.names[mark.id] || (mark.norad > 0 ? `NORAD ${mark.norad}` : `object ${mark.id}`);
-      (mark.id === frame.target ? sorted.target : sorted.objects).push({ ...mark, text: name });
+      (mark.id === frame.target && !ghost ? sorted.target : sorted.objects).push({ ...mark, text: ghost ? `ghost of ${name}` : name });
     }
   }
   for (const mark of frame.detections) {
