@@ -210,7 +210,7 @@ export class Live {
 
   /** Asks for the names of objects if one has none yet: a run has recorded them some time after its first frames. @param {any} details */
   needNames(details) {
-    const { app } = this, unknown = details.truth.some((mark) => mark.kind !== 'star' && !(mark.id in app.names));
+    const { app } = this, unknown = details.truth.some((mark) => mark.kind.startsWith('object') && !(mark.id in app.names));
     if (!unknown || performance.now() - this.askedNames < NAMES_MS) return;
     this.askedNames = performance.now();
     getJson('names').then(({ names }) => { app.names = names; }).catch(() => {});
