@@ -107,7 +107,11 @@ static bst_status read_truth(bst_ctx *ctx, tables *t, int64_t exposure, frame_so
             return BST_OK;
         }
         const bst_io_rows *r = t->truth.rows;
-        bool star = strcmp(bst_io_rows_text(r, 1), "star") == 0;
+        const char *kind = bst_io_rows_text(r, 1);
+        bool star = strcmp(kind, "star") == 0;
+        if (!star && strcmp(kind, "object") != 0) {
+            continue; /* a ghost */
+        }
         if (!star && bst_io_rows_int(r, 2) == t->sensor->target) {
             s->listed = f->listed = true;
             f->in_field = bst_io_rows_int(r, 3) == 1;

@@ -144,8 +144,13 @@ bst_status bst_reference_pixels_mask(bst_ctx *ctx, const bst_reference_pixels_co
                                      const bst_camera *camera, uint8_t **bad) {
     int width = (int)camera->width_px, height = (int)camera->height_px;
     const inside lit = lit_part(camera, (bst_window){0, 0, width, height});
-    if (!config->enabled || (lit.x0 == 0 && lit.x1 == width && lit.y0 == 0 && lit.y1 == height)) {
+    if (!config->enabled) {
         return BST_OK;
+    }
+    if (lit.x0 == 0 && lit.x1 == width && lit.y0 == 0 && lit.y1 == height) {
+        return bst_fail(ctx, BST_ERR_CONFIG,
+                        "reference_pixels/enabled: is true, but the onboard camera has no "
+                        "reference pixels; give detector/overscan, or set it to false");
     }
     if (!*bad) {
         *bad = calloc((size_t)width, (size_t)height);

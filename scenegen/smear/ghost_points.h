@@ -21,8 +21,8 @@ typedef struct bst_ghost_points_aim {
  * Errors:    BST_ERR_MEMORY
  * Notes:     a disc is cut into square cells of side h. Each is a Gaussian at its centroid, with
  *            the mean of its second moments as variance: h^2 / 12 inside. A Gaussian is a lattice
- * of narrower ones, whose variances add. The error of a lattice of Gaussians of variance v is 4
- * exp(-2 pi^2 v / h^2) (Poisson's sum). */
+ *            of narrower ones, whose variances add. The error of a lattice of Gaussians of
+ *            variance v is 4 exp(-2 pi^2 v / h^2) (Poisson's sum). */
 bst_status bst_ghost_points(bst_ctx *ctx, const bst_ghost *ghost, const bst_ghost_points_aim *aim,
                             bst_disc_points *points, double *error) BST_MUST_CHECK;
 

@@ -8,6 +8,9 @@
 #include "sim/core/text_reader.h"
 
 #define MAX_FILE_BYTES ((uint64_t)16 << 20)
+/* Ghosts that move further than this for each px of their source are no ghosts but errors of a
+ * table, and their streaks have millions of nodes. */
+#define MOST_MAGNIFICATION 100.0
 
 enum { SOURCE_X, SOURCE_Y, GHOST_X, GHOST_Y, INTENSITY, COLUMNS };
 enum { MOST_ROWS = 250000, MAX_LINE = 4096 };
@@ -117,24 +120,33 @@ static bst_status fail_grid(const bst_text_source *source, const row *at) {
                     source->name, at->v[SOURCE_X], at->v[SOURCE_Y]);
 }
 
-/* Largest ratio of lengths over the edges of the cells, times sqrt(2) for their diagonals. */
-static double magnification(const bst_ghost_map *m) {
+/* Ratio of lengths of the ghost's and the source's way between two points of the grid. */
+static double ratio(const bst_ghost_map *m, int from, int to, double source_px) {
+    return hypot(m->x[to] - m->x[from], m->y[to] - m->y[from]) / source_px;
+}
+
+/* Finds the largest ratio of lengths over the edges of the cells, times sqrt(2) for their
+ * diagonals. */
+static bst_status find_magnification(const bst_text_source *source, bst_ghost_map *m) {
     double most = 0.0;
     for (int j = 0; j < m->rows; j++) {
         for (int i = 0; i < m->columns; i++) {
             int k = j * m->columns + i;
-            if (i > 0) {
-                most = fmax(most, hypot(m->x[k] - m->x[k - 1], m->y[k] - m->y[k - 1]) /
-                                      (m->source_x[i] - m->source_x[i - 1]));
-            }
-            if (j > 0) {
-                int b = k - m->columns;
-                most = fmax(most, hypot(m->x[k] - m->x[b], m->y[k] - m->y[b]) /
-                                      (m->source_y[j] - m->source_y[j - 1]));
+            double x = i > 0 ? ratio(m, k - 1, k, m->source_x[i] - m->source_x[i - 1]) : 0.0;
+            double y =
+                j > 0 ? ratio(m, k - m->columns, k, m->source_y[j] - m->source_y[j - 1]) : 0.0;
+            most = fmax(most, fmax(x, y));
+            if (most > MOST_MAGNIFICATION) {
+                return bst_fail(source->ctx, BST_ERR_FORMAT,
+                                "%.400s: the ghost moves %.4g px for each px of its source (at "
+                                "source_x_px %g, source_y_px %g); allowed are up to %g",
+                                source->name, most, m->source_x[i], m->source_y[j],
+                                MOST_MAGNIFICATION);
             }
         }
     }
-    return sqrt(2.0) * most;
+    m->magnification = sqrt(2.0) * most;
+    return BST_OK;
 }
 
 /* Makes the grid of the sorted rows. */
@@ -177,8 +189,7 @@ static bst_status make_grid(const bst_text_source *source, const table *t, bst_g
     }
     m->columns = columns;
     m->rows = rows;
-    m->magnification = magnification(m);
-    return BST_OK;
+    return find_magnification(source, m);
 }
 
 static bst_status read_lines(const bst_text_source *source, const char *text, size_t bytes,

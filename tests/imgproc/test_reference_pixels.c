@@ -2,6 +2,7 @@
 #include "imgproc/calibrate/reference_pixels.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 #include "tests/test_support.h"
 
@@ -125,6 +126,12 @@ static void reference_pixels_are_bad(void **state) {
         assert_int_equal(bad[i], !is_lit(i % W, i / W));
     }
     free(bad);
+    bad = NULL;
+    bst_camera without = camera; /* no silent nothing */
+    without.detector.overscan = (bst_detector_edges_config){0};
+    assert_int_equal(bst_reference_pixels_mask(&ctx, &settings, &without, &bad), BST_ERR_CONFIG);
+    assert_non_null(strstr(ctx.message, "reference_pixels/enabled: is true, but"));
+    assert_null(bad);
 }
 
 int main(void) {

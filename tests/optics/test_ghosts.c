@@ -49,6 +49,11 @@ static void bad_tables_are_named(void **state) {
          "no rectangular grid (at source_x_px 2, source_y_px 1)"},
         {"source_x_px,source_y_px,x_px,y_px\n0,0,1,1\n0,0,1,1\n0,1,1,1\n0,1,1,1\n",
          "no rectangular grid"},
+        {"source_x_px,source_y_px,x_px,y_px\n0,0,0,0\n1,0,100,0\n0,1,0,0\n1,1,0,101\n",
+         "ghosts.csv: the ghost moves 142.1 px for each px of its source (at source_x_px 1, "
+         "source_y_px 1); allowed are up to 100"},
+        {"source_x_px,source_y_px,x_px,y_px\n0,0,0,0\n1e-300,0,1,0\n0,1,0,0\n1e-300,1,1,0\n",
+         "the ghost moves 1e+300 px for each px"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         bst_ctx ctx = {0};

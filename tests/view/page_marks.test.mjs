@@ -56,6 +56,14 @@ test('a track that was not updated is where its state says; the others where the
   assert.deepEqual(placesOf({ ...frame, wcs: undefined, tracks: [now] }).tracks, [now]);
 });
 
+test('ghosts are said to be ghosts, and that of the target is not the target', () => {
+  const at = (kind, id) => ({ kind, id, norad: 0, x: id, y: 0 }), truth = [at('star', 9), at('star_ghost', 3), at('object_ghost', 3), at('object', 3), at('object', 4)];
+  const sorted = sortMarks({ ...frame, names: { 3: 'AURA' }, target: 3, truth });
+  assert.deepEqual(sorted.stars.map((mark) => mark.said), [undefined, 'ghost of star 3']);
+  assert.deepEqual(sorted.objects.map((mark) => mark.text), ['ghost of AURA', 'object 4']);
+  assert.deepEqual(sorted.target.map((mark) => [mark.kind, mark.text]), [['object', 'AURA']]);
+});
+
 test('exposures without a detection are one row, newest first', () => {
   const one = (row, detection, status = 'confirmed') => ({ frame: row, time_s: row + 0.5, status, detection });
   const found = { label: 'object', streak: true, blend: true, x: 1, y: 2 };

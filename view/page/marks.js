@@ -41,11 +41,12 @@ export function windowsOf(rows) {
 export function sortMarks(frame) {
   const sorted = { windows: windowsOf(frame.windows || []), stars: [], identified: [], detections: [], objects: [], target: [], predicted: [], tracks: [], trail: [] };
   for (const mark of frame.truth) {
-    const ghost = mark.kind.endsWith('_ghost'); // in the optics: it is not where its source is
-    if (mark.kind.startsWith('star')) sorted.stars.push(mark);
+    if (mark.kind === 'star') sorted.stars.push(mark);
+    else if (mark.kind === 'star_ghost') sorted.stars.push({ ...mark, said: `ghost of star ${mark.id}` });
     else {
       const name = frame.names[mark.id] || (mark.norad > 0 ? `NORAD ${mark.norad}` : `object ${mark.id}`);
-      (mark.id === frame.target && !ghost ? sorted.target : sorted.objects).push({ ...mark, text: ghost ? `ghost of ${name}` : name });
+      if (mark.kind === 'object_ghost') sorted.objects.push({ ...mark, text: `ghost of ${name}` });
+      else (mark.id === frame.target ? sorted.target : sorted.objects).push({ ...mark, text: name });
     }
   }
   for (const mark of frame.detections) {

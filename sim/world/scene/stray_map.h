@@ -12,8 +12,9 @@ typedef struct bst_stray_map bst_stray_map;
  * Given:     camera   its background says what the numbers are, and their factor
  *            pixels   [height][width], row 0 first; taken over, freed after an error, too
  * Returned:  *out     NULL on error; free with bst_stray_map_free
- * Errors:    BST_ERR_CONFIG: sides that do not divide the sensor's, a number that is negative or
- * not finite (with its place), numbers that are shares without stray light by pst */
+ * Errors:    BST_ERR_CONFIG: sides that do not divide the sensor's, a number that is
+ *            negative, not finite or above 1e12 (with its place), numbers that are shares without
+ *            stray light by pst */
 bst_status bst_stray_map_create(bst_ctx *ctx, const bst_camera *camera, int width, int height,
                                 float *pixels, bst_stray_map **out) BST_MUST_CHECK;
 void bst_stray_map_free(bst_stray_map *map); /* NULL allowed */
