@@ -429,6 +429,7 @@ void bst_path_filter_subtract_point(bst_path_filter *f, double x_px, double y_px
     add_points(f, x_px, y_px, amplitude, m, &box);
     if (box.x1 >= box.x0) {
         subtract_points(f, box);
+        forget_rows(f, box.y0 - KERNEL, box.y1 + KERNEL);
     }
 }
 

@@ -36,6 +36,9 @@ static const double LEAST_NOISE2 = 0.1;
 /* Mean absolute value of a normal deviate up to CLIP sigma: sqrt(2 / pi) (1 - exp(-CLIP^2 / 2)) /
  * erf(CLIP / sqrt(2)). */
 static const double CLIP = 2.5, CLIPPED_MEAN = 0.7724;
+/* Median of chi squared with one degree of freedom: over it, a squared residual's median is the
+ * variance. */
+static const double MEDIAN_CHI2 = 0.455;
 /* Largest step of a place in a sweep, px; standard deviation of the step that damps it. */
 static const double MOST_STEP_PX = 1.5, STEP_SIGMA_PX = 2.0;
 
@@ -364,14 +367,14 @@ static double error_of(const bst_streak_deblend *d) {
         double m = (double)d->model[i];
         if (m > BRIGHT && d->weight[i] > 0.0f) {
             double r = (double)d->residual[i];
-            d->scratch[count++] = (float)((r * r - d->noise2 - d->shot * m) / (m * m));
+            d->scratch[count++] =
+                (float)((r * r / MEDIAN_CHI2 - d->noise2 - d->shot * m) / (m * m));
         }
     }
     if (count < LEAST_ERRORS) {
         return USUAL_ERROR;
     }
-    /* the mean of squares, by the median of chi squared with one degree of freedom */
-    double middle = (double)bst_value_of_rank(d->scratch, count, count / 2) / 0.455;
+    double middle = (double)bst_value_of_rank(d->scratch, count, count / 2);
     return fmin(fmax(sqrt(fmax(middle, 0.0)), LEAST_ERROR), MOST_ERROR);
 }
 

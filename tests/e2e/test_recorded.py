@@ -253,7 +253,8 @@ class Recorded(unittest.TestCase):
         missed = [number for number, places in streaks
                   if not any(all(numpy.hypot(*(middle + path - place).T).min() <= 3.0 for place in places)
                              for middle in found)]
-        self.assertLessEqual(len(missed), 0.1 * len(streaks), missed)
+        # 3 of 104; 8 without the joint fit
+        self.assertLessEqual(len(missed), 0.05 * len(streaks), missed)
 
 
 def streaks_seen():

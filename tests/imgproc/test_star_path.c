@@ -359,11 +359,36 @@ static void over_the_edges(void **state) {
     }
 }
 
+/* Once a point is subtracted, the highest place in its rows is that of the star. */
+static void a_point_beside_a_star(void **state) {
+    (void)state;
+    static bst_star_path p;
+    bst_ctx ctx = {0};
+    bst_path_filter *f;
+    bst_path_filter_peak peak;
+    straight(&p, 0.0, 0.0);
+    memset(image, 0, sizeof image);
+    draw_star(&p, 100.0, 50.0, 3.0);
+    add_gaussian(40.0, 51.0, 60.0);
+    bst_assert_ok(&ctx, bst_path_filter_create(&ctx, &p, &picture, PSF, LEAST_INSIDE, &f));
+    assert_true(bst_path_filter_highest(f, &peak));
+    assert_true(peak.x_px < 55.0);
+    bst_path_filter_subtract_point(f, 40.0, 51.0, 60.0);
+    assert_true(bst_path_filter_highest(f, &peak));
+    bst_assert_close(peak.x_px, 100.0, 0.4); /* samples at whole pixels */
+    bst_assert_close(peak.y_px, 50.0, 0.4);
+    bst_path_filter_free(f);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(map_of_a_turn), cmocka_unit_test(between_pixels),
-        cmocka_unit_test(path_of_stars), cmocka_unit_test(point_source),
-        cmocka_unit_test(two_stars),     cmocka_unit_test(over_the_edges),
+        cmocka_unit_test(map_of_a_turn),
+        cmocka_unit_test(between_pixels),
+        cmocka_unit_test(path_of_stars),
+        cmocka_unit_test(point_source),
+        cmocka_unit_test(two_stars),
+        cmocka_unit_test(over_the_edges),
+        cmocka_unit_test(a_point_beside_a_star),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
