@@ -5,9 +5,10 @@ Usage, from the repository root:
   /usr/bin/python3 tests/e2e/test_random_scenes.py BORESIGHT [--full]
 
 Without --full: one scene, few seeds, the embedded star catalogue; each interval must reach into
-twice its margin (places: three times). With --full: ten scenes, a hundred seeds, the full star catalogue: prints which
-intervals lie inside their margins (docs/how-to/observation_generator.md), and fails where a figure
-is further off than the known differences.
+twice its margin, but for one known bias (see BIAS). With --full: ten scenes, a hundred seeds, the
+full star catalogue: prints which intervals lie inside their margins
+(docs/how-to/observation_generator.md), and fails where a figure is further off than the known
+differences.
 """
 import json
 import subprocess
@@ -48,10 +49,10 @@ class Scenes(unittest.TestCase):
                 # a figure is never both shown to be right and shown to be wrong
                 self.assertFalse(f["inside"] and f["beyond"], (number, f))
                 self.assertGreaterEqual(f["sigma"], 0.0, (number, f))
-                # twice the margin: with three seeds resampling finds too small an interval; three
-                # times for places, 1.13 in the slew's frames (docs/results/observation_generator.md)
-                wide = (3.0 if f["name"].startswith("RMS of places") else 2.0) * f["margin"]
-                self.assertLess(f["low"], middle + wide, (number, f))
+                # twice the margin: with three seeds resampling finds too small an interval
+                wide = 2.0 * f["margin"]
+                bias = next((v for name, v in BIAS.items() if f["name"].startswith(name)), 0.0)
+                self.assertLess(f["low"], middle + max(wide, bias), (number, f))
                 self.assertGreater(f["high"], middle - wide, (number, f))
 
     @unittest.skipUnless(FULL, "--full")
@@ -79,6 +80,10 @@ KNOWN = {"Pd": 0.12, "false alarms": 1.1, "RMS of places": 0.5, "RMS of the trac
          "time to confirm": 0.3}
 # one whose kernels other tests compile: hits in a crowded sky
 SHORT = (2,)
+# biases of the generator in SHORT that are known and not mended, upwards: places are 1.13 in the
+# frames of the slew, beyond the margin of 0.05 by far more than sampling. Stars beside another are
+# merged by the generator and apart in images (docs/results/observation_generator.md).
+BIAS = {"RMS of places": 0.15}
 
 
 def tearDownModule():

@@ -10,7 +10,8 @@ UNIT_TESTS = {f"sim/{name}": name for name in (
     "core", "messages", "dynamics", "astro", "device", "catalogue", "optics", "world", "onboard", "io", "link",
     "engine", "eval", "studies", "satellite", "api", "registry", "cli", "run", "analysis", "process", "export", "report", "study_kinds", "bench")}
 UNIT_TESTS["sim/app"] = "app|bad_input"
-UNIT_TESTS["sim/onboard"] = "onboard|world_cue"  # the cue as the spacecraft and the world have it
+# the cue as the spacecraft and the world have it; labels as image processing and the generator make them
+UNIT_TESTS["sim/onboard"] = "onboard|world_cue|imgproc_discriminate|imgproc_label|obsgen_labels"
 
 
 def run(command, **keywords):
