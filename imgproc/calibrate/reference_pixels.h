@@ -12,6 +12,7 @@ typedef struct bst_reference_pixels {
     size_t capacity, rows;
 } bst_reference_pixels;
 
+/* Frees the buffers; a zeroed structure is allowed. */
 void bst_reference_pixels_free(bst_reference_pixels *references);
 
 /* Takes the level of the reference pixels off a frame.
