@@ -301,9 +301,6 @@ static float cell_median(const bst_streak_deblend *d, int cx, int cy) {
 static void subtract_background(bst_streak_deblend *d) {
     const int nx = (d->width + CELL - 1) / CELL, ny = (d->height + CELL - 1) / CELL;
     float *cells = d->image, *column = d->image_x; /* at rest */
-    if (nx * ny > d->width * d->height) {
-        return;
-    }
     for (int i = 0; i < nx * ny; i++) {
         cells[i] = cell_median(d, i % nx, i / nx);
     }
