@@ -157,7 +157,7 @@ static bool is_due(const bst_view_feed *feed, feed_sensor *s, int64_t id) {
         const double now = bst_wall_seconds();
         s->asked_id = id;
         bst_view_pace_adapt(&s->pace, now, bst_view_read_processors);
-        /* none in the place of one that nobody has got yet: it would be lost */
+        /* none in the place of one that no page has got yet: it would be lost */
         s->due = s->sent >= s->sequence && bst_view_pace_take(&s->pace, now);
     }
     return feed->every || (s->due && id == s->asked_id);
