@@ -1,4 +1,5 @@
-/* What the controller of a module receives about its sensor: the parts around it are replaced here. */
+/* What the controller of a module receives about its sensor: the parts around it are replaced here.
+ */
 #include "control/control.h"
 #include "control/modules.h"
 #include "sim/onboard/knowledge.h"
