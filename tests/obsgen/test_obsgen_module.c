@@ -240,6 +240,9 @@ WRAP(bst_sample, bst_step_next, (struct bst_step * step, int port)) {
 
 WRAP(bst_sample, bst_step_latest, (struct bst_step * step, int port)) {
     static const bst_los_history history = {.jitter_rad2 = 0.0};
+    static const bst_nav_telemetry nav = {.position_gcrf_m = {7e6, 0, 0},
+                                          .velocity_gcrf_mps = {0, 7500, 0},
+                                          .velocity_bary_mps = {0, 7500, 0}};
     (void)step;
     const char *name = channel_of(port);
     if (strcmp(name, BST_CHANNEL_PREDICTIONS) == 0) {
@@ -248,7 +251,10 @@ WRAP(bst_sample, bst_step_latest, (struct bst_step * step, int port)) {
     if (strcmp(name, BST_CHANNEL_POINTING_TELEMETRY) == 0) {
         return (bst_sample){.payload = m.pointing, .stale = m.telemetry_stale};
     }
-    return (bst_sample){.payload = &history}; /* of the line of sight, and the navigation's */
+    if (strcmp(name, BST_CHANNEL_NAV_TELEMETRY) == 0) {
+        return (bst_sample){.payload = &nav};
+    }
+    return (bst_sample){.payload = &history}; /* of the line of sight */
 }
 
 WRAP(void *, bst_step_write, (struct bst_step * step, int port, int *capacity)) {
