@@ -66,15 +66,19 @@ typedef struct plane {
 static void draw(plane *out, const path *p, double length, double shift, double sigma) {
     memset(out, 0, sizeof *out);
     int count = p ? STEPS : 200;
+    double along[ALONG] = {0.0};
     for (int k = 0; k < count; k++) {
         double u = p ? 0.8 * p->x[k] + 0.6 * p->y[k] : length * ((k + 0.5) / count - 0.5) + shift;
         double w = p ? share_of(k) : 1.0 / count;
-        for (int j = 0; j < ACROSS; j++) {
-            double y = (double)(j - ACROSS / 2) / FINE, e = exp(-0.5 * y * y / (sigma * sigma));
-            for (int i = 0; i < ALONG && e > 1e-8; i++) {
-                double x = (double)(i - ALONG / 2) / FINE - u;
-                out->v[j][i] += w * e * exp(-0.5 * x * x / (sigma * sigma));
-            }
+        for (int i = 0; i < ALONG; i++) {
+            double x = (double)(i - ALONG / 2) / FINE - u;
+            along[i] += w * exp(-0.5 * x * x / (sigma * sigma));
+        }
+    }
+    for (int j = 0; j < ACROSS; j++) {
+        double y = (double)(j - ACROSS / 2) / FINE, e = exp(-0.5 * y * y / (sigma * sigma));
+        for (int i = 0; i < ALONG && e > 1e-8; i++) {
+            out->v[j][i] = e * along[i];
         }
     }
 }
