@@ -442,14 +442,20 @@ static bst_status append_line(bst_ctx *ctx, const bst_view_line *line, const bst
     return BST_OK;
 }
 
+/* Number of a panel; BST_VIEW_PANELS: there is none of that name. */
+static int panel_named(const char *name) {
+    int panel = 0;
+    while (panel < BST_VIEW_PANELS && strcmp(panels[panel].name, name) != 0) {
+        panel++;
+    }
+    return panel;
+}
+
 static bst_status plot_panel(bst_ctx *ctx, bst_view_run *run, const bst_view_plot *plot,
                              bst_view_bytes *out) {
     bst_view_sensor *s;
-    int panel = 0;
+    const int panel = panel_named(plot->panel);
     BST_TRY(bst_view_find_sensor(ctx, run, plot->sensor, &s));
-    while (panel < BST_VIEW_PANELS && strcmp(panels[panel].name, plot->panel) != 0) {
-        panel++;
-    }
     if (panel == BST_VIEW_PANELS) {
         return bst_fail(ctx, BST_ERR_NOT_FOUND, "there is no panel \"%s\"", plot->panel);
     }
@@ -522,10 +528,7 @@ void bst_view_end_wait(bst_view_run *run, int panel) {
 
 /* Waits while a panel is being read ahead. */
 static void wait_ahead(bst_view_run *run, const bst_view_plot *plot) {
-    int panel = 0;
-    while (panel < BST_VIEW_PANELS && strcmp(panels[panel].name, plot->panel) != 0) {
-        panel++;
-    }
+    const int panel = panel_named(plot->panel);
     pthread_mutex_lock(&run->ahead_lock);
     while (plot->sensor == 0 && panel < BST_VIEW_PANELS && run->ahead[panel]) {
         pthread_cond_wait(&run->ahead_changed, &run->ahead_lock);

@@ -31,8 +31,9 @@ static const double USUAL_PSF_SIGMA_PX = 1.0;
 static const double MOST_PSF_SIGMA_PX = 4.0;
 /* A source this near to a brighter one, and fainter by this share, is what its subtraction left. */
 static const double GHOST_PX = 15.0, GHOST_SHARE = 0.25;
-/* Points brighter than BRIGHT_SNR leave residuals up to GHOST_PX, fainter ones up to CLOSE_PX. */
-static const double BRIGHT_SNR = 100.0, CLOSE_PX = 5.0;
+/* Points brighter than BRIGHT_SNR leave residuals up to GHOST_PX, fainter ones up to
+ * BST_STREAK_CLOSE_PX. */
+static const double BRIGHT_SNR = 100.0;
 /* Share of the quality of a source's own path that a refined one keeps: its ends, by all stars, are
  * more accurate, unless crowded stars have moved them to wrong places. */
 static const double LEAST_REFINED = 0.9;
@@ -43,8 +44,6 @@ static const double REFINING_SNR = 15.0;
 /* Least share of the path inside the frame, by its squared light, for a star whose middle is too.
  */
 static const double USUAL_INSIDE = 0.25;
-/* Share of the path inside the frame from which on a streak is whole. */
-static const double WHOLE = 0.97;
 
 typedef bst_streak_finder finder;
 
@@ -308,12 +307,12 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
                            .cov_xx = peak.cov_xx,
                            .cov_xy = peak.cov_xy,
                            .cov_yy = peak.cov_yy,
-                           .flags = peak.inside < WHOLE ? BST_DETECTION_EDGE : 0};
+                           .flags = peak.inside < BST_STREAK_WHOLE ? BST_DETECTION_EDGE : 0};
         bool inside = q->outside || (d.x_px >= 0.0 && d.y_px >= 0.0 && d.x_px <= f->width - 1 &&
                                      d.y_px <= f->height - 1);
         bool left = is_ghost(out, &d) || (!point && bst_streak_finder_is_covered(f, &peak));
         if (!point && q->outside && bst_streak_finder_is_uneven(f, &peak)) {
-            bst_path_filter_leave_out(filter, &peak, CLOSE_PX);
+            bst_path_filter_leave_out(filter, &peak, BST_STREAK_CLOSE_PX);
             continue;
         }
         if (inside && peak.whole && !left) {
@@ -324,7 +323,8 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
         }
         bst_path_filter_subtract(filter, &peak);
         if (point) {
-            bst_path_filter_leave_out(filter, &peak, peak.snr > BRIGHT_SNR ? GHOST_PX : CLOSE_PX);
+            bst_path_filter_leave_out(filter, &peak,
+                                      peak.snr > BRIGHT_SNR ? GHOST_PX : BST_STREAK_CLOSE_PX);
         }
     }
     bst_path_filter_free(filter);

@@ -8,6 +8,11 @@
 /* BST_STREAK_LINE_REACH: furthest sample of the line filter, px. */
 enum { BST_STREAK_SHAPES = 64, BST_STREAK_LINE_REACH = 11 };
 
+/* Share of the path inside the frame from which on a streak is whole. */
+#define BST_STREAK_WHOLE 0.97
+/* A peak that is no streak is left out of the search up to this distance, px. */
+#define BST_STREAK_CLOSE_PX 5.0
+
 /* A connected source. */
 typedef struct bst_streak_shape {
     double sum, rank;

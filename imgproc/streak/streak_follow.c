@@ -16,12 +16,8 @@ enum { ROUNDS = 12, SWEEPS = 2, LAST_SWEEPS = 3, FEW = 50 };
 /* A round finds stars down to this share of the brightest's SNR: what their subtraction leaves
  * before the fit is fainter. */
 static const double BRIGHTEST_SHARE = 0.2;
-/* A peak that is no streak is left out of the search up to this distance, px. */
-static const double CLOSE_PX = 5.0;
 /* Radius of a point source that is taken out of the fit, PSF sigma. */
 static const double POINT_SIGMA = 3.5;
-/* Share of the path inside the frame from which on a streak is whole. */
-static const double WHOLE = 0.97;
 /* Error of a place beside the noise: the path's own error. */
 static const double SYSTEMATIC_PX = 0.1;
 /* Step of the second derivatives of a response, px. */
@@ -140,7 +136,7 @@ static bst_status search(bst_ctx *ctx, finder *f, bst_streak_deblend *d, float *
             continue;
         }
         if (!peak.whole) {
-            bst_path_filter_leave_out(filter, &peak, CLOSE_PX);
+            bst_path_filter_leave_out(filter, &peak, BST_STREAK_CLOSE_PX);
             continue;
         }
         if (!bst_streak_deblend_add(d, peak.x_px, peak.y_px, flux_of(f, peak.amplitude))) {
@@ -194,15 +190,16 @@ static void list_stars(finder *f, const bst_streak_deblend *d, bst_common_streak
     out->items = f->items;
     for (int i = 0; i < d->count; i++) {
         const bst_deblended_star *s = &d->stars[i];
-        f->items[i] = (bst_detection){.x_px = s->x_px,
-                                      .y_px = s->y_px,
-                                      .flux_e = s->flux * f->sigma,
-                                      .flux_sigma_e = s->flux * f->sigma / s->snr,
-                                      .snr = s->snr,
-                                      .cov_xx = s->cov_xx,
-                                      .cov_xy = s->cov_xy,
-                                      .cov_yy = s->cov_yy,
-                                      .flags = s->inside < WHOLE ? BST_DETECTION_EDGE : 0};
+        f->items[i] =
+            (bst_detection){.x_px = s->x_px,
+                            .y_px = s->y_px,
+                            .flux_e = s->flux * f->sigma,
+                            .flux_sigma_e = s->flux * f->sigma / s->snr,
+                            .snr = s->snr,
+                            .cov_xx = s->cov_xx,
+                            .cov_xy = s->cov_xy,
+                            .cov_yy = s->cov_yy,
+                            .flags = s->inside < BST_STREAK_WHOLE ? BST_DETECTION_EDGE : 0};
     }
     out->count = d->count;
     qsort(f->items, (size_t)out->count, sizeof *f->items, brighter_first);
