@@ -2,7 +2,10 @@
  * of their distributions, traps against lines of a whole sensor. */
 #include <stdlib.h>
 
+#include "boresight/rng.h"
 #include "sim/analysis/characterize/dark_distribution.h"
+#include "sim/analysis/characterize/neighbour_covariance.h"
+#include "sim/analysis/characterize/readout_time.h"
 #include "sim/analysis/characterize/trap_correction.h"
 #include "sim/analysis/characterize/trap_fit.h"
 #include "tests/test_support.h"
@@ -163,10 +166,107 @@ static void hits_are_counted_by_area_and_time(void **state) {
     free(f);
 }
 
+enum { SIDE = 200 };
+
+static double normal(uint32_t stream, size_t i) {
+    return bst_rng_normal((bst_rng_key){{21, 7}}, i, stream);
+}
+
+/* Noise of SIDE x SIDE pixels of which each has parts of its neighbours' (column, row), rows
+ * levelled; returns its variance. */
+static double make_noise(float *out, uint32_t stream, double sigma, double beside, double above) {
+    double square = 0.0;
+    for (size_t y = 0; y < SIDE; y++) {
+        double mean = 0.0;
+        for (size_t x = 0; x < SIDE; x++) {
+            size_t i = y * (SIDE + 1) + x;
+            double v = (1.0 - beside - above) * normal(stream, i) + beside * normal(stream, i + 1) +
+                       above * normal(stream, i + SIDE + 1);
+            out[y * SIDE + x] = (float)(sigma * sqrt(2.0) * v);
+            mean += sigma * sqrt(2.0) * v / SIDE;
+        }
+        for (size_t x = 0; x < SIDE; x++) {
+            out[y * SIDE + x] -= (float)mean;
+            square += 0.5 * (double)out[y * SIDE + x] * (double)out[y * SIDE + x];
+        }
+    }
+    return square / (SIDE * (SIDE - 1.0));
+}
+
+static void neighbours_give_back_the_noise_that_they_share(void **state) {
+    (void)state;
+    float *noise = malloc(SIDE * SIDE * sizeof *noise);
+    assert_non_null(noise);
+    for (int shared = 0; shared < 2; shared++) {
+        bst_neighbour_covariance light = {.count = 0.0}, dark = {.count = 0.0};
+        double beside = shared ? 0.04 : 0.0, above = shared ? 0.06 : 0.0, v[2] = {0.0, 0.0};
+        for (uint32_t pair = 0; pair < 4; pair++) {
+            v[0] += make_noise(noise, pair, 100.0, beside, above) / 4.0;
+            noise[0] = NAN;
+            bst_neighbour_covariance_add(&light, noise, SIDE, SIDE);
+            v[1] += make_noise(noise, 8 + pair, 10.0, 0.0, 0.0) / 4.0;
+            bst_neighbour_covariance_add(&dark, noise, SIDE, SIDE);
+        }
+        bst_shared_noise sum = {.excess = 0.0};
+        bst_shared_noise_add(&sum, 3.0, &light, v[0], &dark, v[1]);
+        bst_sensor_estimate factor = bst_shared_noise_factor(&sum);
+        /* the charge that is shared is kept: 100^2 of a pixel with all its neighbours */
+        double own = 1.0 - beside - above;
+        double expected = 1.0 / (own * own + beside * beside + above * above);
+        if (shared) { /* two neighbours of 160,000 products are certain; of variances sqrt(2 / n) */
+            bst_assert_close(factor.value, expected, 4.0 * factor.sigma);
+            assert_true(factor.sigma > 0.006 && factor.sigma < 0.011);
+            bst_assert_close(factor.value * (v[0] - v[1]), 1e4 - 1e2, 4.0 * 1e4 * factor.sigma);
+        } else {
+            bst_assert_close(factor.value, 1.0, 1e-12);
+            bst_assert_close(factor.sigma, 0.0, 1e-12);
+        }
+    }
+    free(noise);
+}
+
+static void readout_time_is_that_of_the_charge_behind_hot_pixels(void **state) {
+    (void)state;
+    enum { COLUMNS = 90, ROWS = 120 };
+    const double exposure_s = 8.0, readout_s = 3.0;
+    float *bias = malloc(sizeof *bias * COLUMNS * ROWS),
+          *dark = malloc(sizeof *dark * COLUMNS * ROWS);
+    assert_true(bias && dark);
+    for (int last_first = 0; last_first < 2; last_first++) {
+        for (size_t x = 0; x < COLUMNS; x++) {
+            double passed = 0.0;
+            for (size_t n = 0; n < ROWS; n++) {
+                size_t i = (last_first ? ROWS - 1 - n : n) * COLUMNS + x;
+                double rate =
+                    2.0 + (bst_rng_uniform((bst_rng_key){{3, 4}}, i, 0) < 0.01 ? 300.0 : 0.0);
+                dark[i] = (float)(rate * exposure_s);
+                bias[i] = (float)(500.0 + 3.0 * (double)(x % 7) + passed * readout_s / ROWS +
+                                  2.0 * normal(40, i));
+                passed += rate;
+            }
+        }
+        bias[7 * COLUMNS + 5] += 4000.0F; /* a radiation hit */
+        dark[9 * COLUMNS + 11] = NAN;
+        bst_sensor_estimate time =
+            bst_readout_time(bias, dark, COLUMNS, ROWS, exposure_s, last_first);
+        bst_assert_close(time.value, readout_s, 4.0 * time.sigma);
+        assert_true(time.sigma > 0.0 && time.sigma < 0.01 * readout_s);
+    }
+    for (int x = 0; x < COLUMNS - BST_READOUT_TIME_COLUMNS + 1; x++) {
+        dark[x] = NAN;
+    }
+    assert_true(isnan(bst_readout_time(bias, dark, COLUMNS, ROWS, exposure_s, true).value));
+    free(bias);
+    free(dark);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(shares_are_those_of_the_distributions),
-                                       cmocka_unit_test(fit_finds_the_distribution),
-                                       cmocka_unit_test(traps_are_found_on_each_side),
-                                       cmocka_unit_test(hits_are_counted_by_area_and_time)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shares_are_those_of_the_distributions),
+        cmocka_unit_test(fit_finds_the_distribution),
+        cmocka_unit_test(traps_are_found_on_each_side),
+        cmocka_unit_test(hits_are_counted_by_area_and_time),
+        cmocka_unit_test(neighbours_give_back_the_noise_that_they_share),
+        cmocka_unit_test(readout_time_is_that_of_the_charge_behind_hot_pixels)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -162,3 +162,9 @@ bst_sensor_estimate bst_mean_estimate(const double *values, int count) {
     }
     return (bst_sensor_estimate){mean, n > 1 ? sqrt(sum2 / (n - 1) / n) : NAN};
 }
+
+bst_sensor_estimate bst_sensor_ratio(bst_sensor_estimate above, bst_sensor_estimate below) {
+    double ratio = above.value / below.value;
+    return (bst_sensor_estimate){ratio,
+                                 hypot(above.sigma, ratio * below.sigma) / fabs(below.value)};
+}

@@ -41,5 +41,7 @@ bst_sensor_estimate bst_root_estimate(bst_sensor_estimate variance);
 
 /* Mean of values and its standard error from their scatter; NAN values are skipped. */
 bst_sensor_estimate bst_mean_estimate(const double *values, int count);
+/* Ratio of two independent estimates. */
+bst_sensor_estimate bst_sensor_ratio(bst_sensor_estimate above, bst_sensor_estimate below);
 
 #endif

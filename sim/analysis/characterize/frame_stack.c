@@ -187,6 +187,22 @@ static void remove_hits(reduction *r) {
     }
 }
 
+/* Adds the covariance of neighbours between two frames, without outliers and radiation hits. */
+static void add_neighbours(reduction *r, const double *sigma, bool hits) {
+    bst_frame_stack *s = r->stack;
+    for (int y = 0; y < s->height; y++) {
+        for (int x = 0; x < s->width; x++) {
+            size_t i = (size_t)y * (size_t)s->width + (size_t)x;
+            int block =
+                x * BST_STACK_SIDE / s->width + BST_STACK_SIDE * (y * BST_STACK_SIDE / s->height);
+            float d = s->last[i] - r->before[i] - (float)r->rows[y];
+            bool out = fabsf(d) > (float)(CLIP * sigma[block]) || (hits && near_hit(r, x, y));
+            r->scratch[i] = out ? NAN : d;
+        }
+    }
+    bst_neighbour_covariance_add(&s->neighbours, r->scratch, s->width, s->height);
+}
+
 /* Adds the variance between two frames: rows are levelled, so that noise common to a row is
  * separate. */
 static bst_status add_pair(bst_ctx *ctx, reduction *r) {
@@ -235,6 +251,7 @@ static bst_status add_pair(bst_ctx *ctx, reduction *r) {
     for (int k = 0; k < BST_STACK_BLOCKS; k++) {
         s->variance[k] += 0.5 * (hits ? variance_of(r, k, true, &hot[k], &level[k]) : variance[k]);
     }
+    add_neighbours(r, sigma, hits);
     if (hits) {
         remove_hits(r);
     }

@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 
+#include "sim/analysis/characterize/neighbour_covariance.h"
 #include "sim/analysis/characterize/radiation_hits.h"
 #include "sim/io/recorded_frames.h"
 
@@ -15,19 +16,20 @@ enum { BST_STACK_LAGS = 16 };
 /* Frames of one kind. Values are DN. */
 typedef struct bst_frame_stack {
     int count, width, height;
-    double exposure_s, gain_e_per_dn;  /* by the header of the first frame */
-    double start_s;                    /* of the last frame, after that of the first */
-    bool integer;                      /* all values are whole numbers: quantised */
-    double *levels;                    /* [count] mean of each frame without outliers */
-    float *mean;                       /* [height][width] */
-    float *last;                       /* [height][width] the last frame */
-    int pairs;                         /* of successive frames, each frame in one */
-    double variance[BST_STACK_BLOCKS]; /* of a pixel between frames, mean of the pairs */
-    double row_variance;               /* of the mean of a row between frames, in excess */
-    double covariance[BST_STACK_LAGS]; /* of pixels 1, 2, ... apart in a row between frames */
-    bst_radiation_hits hits;           /* in the pairs; out of the mean */
-    int overscan_width;                /* 0: none */
-    float *overscan;                   /* [height][overscan_width] of the last frame */
+    double exposure_s, gain_e_per_dn;    /* by the header of the first frame */
+    double start_s;                      /* of the last frame, after that of the first */
+    bool integer;                        /* all values are whole numbers: quantised */
+    double *levels;                      /* [count] mean of each frame without outliers */
+    float *mean;                         /* [height][width] */
+    float *last;                         /* [height][width] the last frame */
+    int pairs;                           /* of successive frames, each frame in one */
+    double variance[BST_STACK_BLOCKS];   /* of a pixel between frames, mean of the pairs */
+    double row_variance;                 /* of the mean of a row between frames, in excess */
+    double covariance[BST_STACK_LAGS];   /* of pixels 1, 2, ... apart in a row between frames */
+    bst_neighbour_covariance neighbours; /* between frames, outliers left out */
+    bst_radiation_hits hits;             /* in the pairs; out of the mean */
+    int overscan_width;                  /* 0: none */
+    float *overscan;                     /* [height][overscan_width] of the last frame */
 } bst_frame_stack;
 
 /* Reads and reduces frames. Memory does not grow with their number.

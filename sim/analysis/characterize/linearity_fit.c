@@ -195,10 +195,21 @@ static double common_factor(const work *w, int used) {
 }
 
 /* Gain: charge over the variance between the pairs, both summed over the exposures of a block with
- * weights of the variance's accuracy; error by leaving out each block in turn. */
+ * weights of the variance's accuracy, with what neighbours share; error by leaving out each block
+ * in turn. */
 static bst_sensor_estimate measure_gain(const work *w) {
     double charge[BLOCKS] = {0.0}, excess[BLOCKS] = {0.0}, a = 0.0, b = 0.0, rest = 0.0;
+    double dark = bst_mean_estimate(w->dark->variance, BLOCKS).value;
+    bst_shared_noise shared = {.excess = 0.0};
     int n = 0;
+    for (int i = 0; i < w->series->count; i++) {
+        const bst_linearity_point *p = &w->series->points[i];
+        if (w->used[i]) {
+            bst_shared_noise_add(&shared, p->pairs / pow(mean_signal(w, i) + dark, 2.0),
+                                 &p->neighbours, bst_mean_estimate(p->variance, BLOCKS).value,
+                                 &w->dark->neighbours, dark);
+        }
+    }
     for (int k = 0; k < BLOCKS; k++) {
         const curve *c = &w->curves[k];
         for (int i = 0; i < w->series->count; i++) {
@@ -220,7 +231,8 @@ static bst_sensor_estimate measure_gain(const work *w) {
         double d = (a - charge[k]) / (b - excess[k]) - a / b;
         rest += d * d * (BLOCKS - 1.0) / BLOCKS;
     }
-    return n > 0 ? (bst_sensor_estimate){a / b, sqrt(rest)} : (bst_sensor_estimate){NAN, NAN};
+    bst_sensor_estimate factor = bst_shared_noise_factor(&shared), gain = {a / b, sqrt(rest)};
+    return n > 0 ? bst_sensor_ratio(gain, factor) : (bst_sensor_estimate){NAN, NAN};
 }
 
 /* Means of the blocks, and what is common to them. */

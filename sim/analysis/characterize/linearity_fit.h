@@ -8,9 +8,10 @@ enum { BST_LINEARITY_TERMS = 3 };
 
 /* Level and noise of a frame without light. */
 typedef struct bst_linearity_dark {
-    double level[BST_STACK_BLOCKS];    /* DN */
-    double variance[BST_STACK_BLOCKS]; /* of a pixel between frames, DN^2; NAN: unknown */
-    double level_variance;             /* of the level from frame to frame, DN^2 */
+    double level[BST_STACK_BLOCKS];      /* DN */
+    double variance[BST_STACK_BLOCKS];   /* of a pixel between frames, DN^2; NAN: unknown */
+    bst_neighbour_covariance neighbours; /* between frames */
+    double level_variance;               /* of the level from frame to frame, DN^2 */
 } bst_linearity_dark;
 
 /* What the series says; NAN: not determined. */

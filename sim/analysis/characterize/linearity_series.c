@@ -42,7 +42,10 @@ static bst_status add_point(bst_ctx *ctx, const bst_frame_stack *s, bst_linearit
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %zu pixels", pixels);
     }
     bst_linearity_point *p = &out->points[out->count++];
-    *p = (bst_linearity_point){.exposure_s = s->exposure_s, .frames = s->count, .pairs = s->pairs};
+    *p = (bst_linearity_point){.exposure_s = s->exposure_s,
+                               .frames = s->count,
+                               .pairs = s->pairs,
+                               .neighbours = s->neighbours};
     out->width = s->width;
     out->height = s->height;
     bst_sensor_block_moments(s->mean, s->width, s->height, CLIP, scratch, p->mean, p->scatter);

@@ -8,9 +8,10 @@
 typedef struct bst_linearity_point {
     double exposure_s;
     int frames, pairs;
-    double mean[BST_STACK_BLOCKS];     /* of the pixels, without outliers */
-    double variance[BST_STACK_BLOCKS]; /* of a pixel between frames; NAN without a pair */
-    double scatter[BST_STACK_BLOCKS];  /* standard deviation over the block's pixels in a frame */
+    double mean[BST_STACK_BLOCKS];       /* of the pixels, without outliers */
+    double variance[BST_STACK_BLOCKS];   /* of a pixel between frames; NAN without a pair */
+    bst_neighbour_covariance neighbours; /* between frames */
+    double scatter[BST_STACK_BLOCKS];    /* standard deviation over the block's pixels in a frame */
 } bst_linearity_point;
 
 typedef struct bst_linearity_series {

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "sim/analysis/characterize/dark_distribution.h"
+#include "sim/analysis/characterize/readout_time.h"
 #include "sim/analysis/characterize/sensor_figures.h"
 #include "sim/analysis/characterize/trap_fit.h"
 #include "sim/core/compare.h"
@@ -168,10 +169,32 @@ static void measure_ramp(dark_signal *d) {
     }
 }
 
-/* Time of the read-out: the ramp over the dark current that packets pass in the time of a row, that
- * of a typical column with its hot pixels. */
+/* Time of the read-out from the levels of bias frames; false: there are none. */
+static bool measure_readout_of_bias(const dark_signal *d) {
+    const bst_sensor_estimate *ramp = &d->out->figures[BST_SENSOR_RAMP];
+    if (d->stacks->bias.count == 0 || !isfinite(ramp->value)) {
+        return false;
+    }
+    bst_sensor_estimate time =
+        bst_readout_time(d->stacks->bias.mean, d->map, d->out->width, d->out->height,
+                         d->stacks->dark.exposure_s, ramp->value < 0.0);
+    if (!(time.value > CERTAIN * time.sigma)) {
+        return false;
+    }
+    /* offsets of rows are common to the columns: the ramp's error has them */
+    time.sigma = hypot(time.sigma, time.value * ramp->sigma / ramp->value);
+    d->out->figures[BST_SENSOR_READOUT] = time;
+    d->out->method[BST_SENSOR_READOUT] = "bias frames against the dark current that packets pass";
+    return true;
+}
+
+/* Time of the read-out: without bias frames the ramp over the dark current that packets pass in the
+ * time of a row, that of a typical column with its hot pixels. */
 static void measure_readout(dark_signal *d) {
     bst_sensor_figures *out = d->out;
+    if (measure_readout_of_bias(d)) {
+        return;
+    }
     int width = out->width, height = out->height, known = 0;
     double *columns = malloc((size_t)width * sizeof *columns);
     out->method[BST_SENSOR_READOUT] = "none: no ramp over the rows";

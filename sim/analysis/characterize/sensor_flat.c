@@ -53,8 +53,8 @@ static bst_sensor_estimate ratio_of_sums(const double *above, const double *belo
     return n > 1 ? (bst_sensor_estimate){a / b, sqrt(rest)} : (bst_sensor_estimate){NAN, NAN};
 }
 
-/* Gain by the variance between flats against their level. A mean of the blocks' ratios would be
- * too large, since the noise stands in the denominator. */
+/* Gain by the variance between flats, with what neighbours share, against their level. A mean of
+ * the blocks' ratios would be too large, since the noise stands in the denominator. */
 static void measure_gain(const bst_sensor_stacks *s, float *scratch, bst_sensor_figures *out) {
     const bst_frame_stack *quiet = s->bias.pairs > 0   ? &s->bias
                                    : s->dark.pairs > 0 ? &s->dark
@@ -70,7 +70,13 @@ static void measure_gain(const bst_sensor_stacks *s, float *scratch, bst_sensor_
         charge[k] -= below[k];
         excess[k] = s->flat.variance[k] - quiet->variance[k];
     }
-    bst_sensor_estimate gain = ratio_of_sums(charge, excess, BST_STACK_BLOCKS);
+    bst_shared_noise shared = {.excess = 0.0};
+    bst_shared_noise_add(&shared, 1.0, &s->flat.neighbours,
+                         bst_mean_estimate(s->flat.variance, BST_STACK_BLOCKS).value,
+                         &quiet->neighbours,
+                         bst_mean_estimate(quiet->variance, BST_STACK_BLOCKS).value);
+    bst_sensor_estimate gain = bst_sensor_ratio(ratio_of_sums(charge, excess, BST_STACK_BLOCKS),
+                                                bst_shared_noise_factor(&shared));
     if (!(gain.value > CERTAIN * gain.sigma && gain.sigma > 0.0)) {
         out->method[BST_SENSOR_GAIN] =
             "header or map: the noise of the flats is not above that of the others";

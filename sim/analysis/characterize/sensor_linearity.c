@@ -30,6 +30,7 @@ static bool find_dark(const bst_sensor_stacks *s, const bst_sensor_figures *f,
         dark->variance[k] =
             s->bias.pairs > 0 ? s->bias.variance[k] : read->value * read->value + 1.0 / 12.0;
     }
+    dark->neighbours = s->bias.neighbours;
     if (s->bias.count > 0) {
         float *scratch = malloc(pixels * sizeof *scratch);
         if (!scratch) {
