@@ -15,6 +15,8 @@
 /* Statistics below this many standard errors are 0, also where the scenario that is extended has
  * another value. */
 static const double LEAST_SIGNIFICANCE = 2.0;
+/* Standard deviations of a covariance that is certain. */
+static const double CERTAIN = 4.0;
 
 /* Files being written. */
 typedef struct writer {
@@ -24,9 +26,25 @@ typedef struct writer {
     const bst_characterize_comparison *comparison;
 } writer;
 
+/* Noise that deferred charge takes out of the pixels of pairs of bias frames, DN^2: the covariance
+ * along columns without that of pick-up, if it is certain. */
+static double deferred_noise(const bst_frame_stack *bias, const bst_sensor_figures *f) {
+    double sum = 0.0, variance = bst_mean_estimate(bias->variance, BST_STACK_BLOCKS).value;
+    double line = isfinite(f->line.pair_power) ? f->line.pair_power : 0.0;
+    double turns = f->figures[BST_SENSOR_LINE_PHASE].value;
+    for (int rows = 1; rows <= 2; rows++) {
+        double of_line =
+            line > 0.0 && isfinite(turns) ? line * cos(2.0 * M_PI * turns * rows) : 0.0;
+        double shared = bst_neighbour_covariance_along(&bias->neighbours, rows) - of_line;
+        sum += shared > CERTAIN * variance / sqrt(bias->neighbours.count) ? 2.0 * shared : 0.0;
+    }
+    return sum;
+}
+
 /* Read noise without what other keys add to the differences that it was measured by: pick-up, and
- * shot noise of the charge that bias frames gather during read-out. */
-static double white_noise_e(const bst_sensor_figures *f) {
+ * shot noise of the charge that bias frames gather during read-out, of which traps leave less in
+ * the pixels. */
+static double white_noise_e(const bst_sensor_stacks *s, const bst_sensor_figures *f) {
     double v = f->figures[BST_SENSOR_READ_NOISE].value,
            line = f->figures[BST_SENSOR_LINE_AMPLITUDE].value;
     double gain = f->figures[BST_SENSOR_GAIN].value, rest = v * v;
@@ -38,7 +56,7 @@ static double white_noise_e(const bst_sensor_figures *f) {
         rest -= 0.5 * line * line * (1.0 - turn);
     }
     if (isfinite(ramp_e) && f->noise_of_pairs) {
-        rest -= 0.5 * ramp_e;
+        rest += fmin(deferred_noise(&s->bias, f) * gain * gain, 0.5 * ramp_e) - 0.5 * ramp_e;
     }
     return sqrt(fmax(rest, 0.0));
 }
@@ -54,7 +72,7 @@ static double value_given(const writer *w, int i) {
         return NAN;
     }
     if (i == BST_SENSOR_READ_NOISE) {
-        return white_noise_e(w->figures);
+        return white_noise_e(w->stacks, w->figures);
     }
     if (strncmp(key, "detector/", 9) != 0) {
         return fmax(e->value, 0.0);

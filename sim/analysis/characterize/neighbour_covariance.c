@@ -45,6 +45,15 @@ void bst_neighbour_covariance_add(bst_neighbour_covariance *c, const float *diff
     c->count += count;
 }
 
+double bst_neighbour_covariance_along(const bst_neighbour_covariance *c, int rows) {
+    int n = 0;
+    while (n < BST_NEIGHBOURS && !(neighbours[n][0] == 0 && neighbours[n][1] == rows)) {
+        n++;
+    }
+    assert(n < BST_NEIGHBOURS);
+    return c->covariance[n];
+}
+
 void bst_shared_noise_add(bst_shared_noise *sum, double weight,
                           const bst_neighbour_covariance *light, double light_variance,
                           const bst_neighbour_covariance *dark, double dark_variance) {

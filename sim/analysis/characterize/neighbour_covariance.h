@@ -28,6 +28,11 @@ typedef struct bst_shared_noise {
 void bst_neighbour_covariance_add(bst_neighbour_covariance *c, const float *difference, int width,
                                   int height);
 
+/* Covariance of pixels of a column, DN^2.
+ *
+ * Given:     rows  1 or 2 apart */
+double bst_neighbour_covariance_along(const bst_neighbour_covariance *c, int rows);
+
 /* Adds what light adds to the noise of one exposure.
  *
  * Given:     weight                        of the exposure
