@@ -187,8 +187,8 @@ static void nearest_within_travel(void **state) {
                 bool within = true;
                 for (int i = 0; i < 2; i++) {
                     const bst_mount_axis *axis = &m.axis[i];
-                    within = within && ((n % 3 == 0 && i == 0) || (tried[i] >= axis->min_rad &&
-                                                                   tried[i] <= axis->max_rad));
+                    within = within && ((n % 3 == 0 && i == 0) ||
+                                        (tried[i] >= axis->min_rad && tried[i] <= axis->max_rad));
                 }
                 if (within && off < least) {
                     least = off;
@@ -240,10 +240,8 @@ static void over_the_zenith(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(known_angles),
-        cmocka_unit_test(any_direction),
-        cmocka_unit_test(nearest_within_travel),
-        cmocka_unit_test(wrap_that_serves),
+        cmocka_unit_test(known_angles),          cmocka_unit_test(any_direction),
+        cmocka_unit_test(nearest_within_travel), cmocka_unit_test(wrap_that_serves),
         cmocka_unit_test(over_the_zenith),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

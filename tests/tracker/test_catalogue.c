@@ -1,5 +1,5 @@
-/* Objects near a field as tracks are compared with them: from sights of a script, whose paths, ranges
- * and light are known. The linker puts these functions in the place of the knowledge's. */
+/* Objects near a field as tracks are compared with them: from sights of a script, whose paths,
+ * ranges and light are known. The linker puts these functions in the place of the knowledge's. */
 #include "tracker/catalogue.h"
 
 #include "tests/test_support.h"
@@ -12,9 +12,9 @@ static const double NOW_S = 40.0, HALF_RAD = 2.0 * BST_DEG_RAD;
 static const bst_vec3 axis = {0.36, -0.48, 0.8};
 
 /* Place of an object in the tangent plane, arcsec, and its rate, arcsec/s. */
-static const double place_as[OBJECTS][2] = {{300, -40}, {-900, 700}, {2000, 1500}, {-5000, -4900},
-                                            {10, 10},   {20, 20},    {30, 30},     {40, 40},
-                                            {50, 50}};
+static const double place_as[OBJECTS][2] = {{300, -40},     {-900, 700}, {2000, 1500},
+                                            {-5000, -4900}, {10, 10},    {20, 20},
+                                            {30, 30},       {40, 40},    {50, 50}};
 static const double rate_as[2] = {35.0, -12.0};
 
 static double asked_axis_off, asked_half_rad, asked_s;
@@ -89,9 +89,9 @@ static bst_tracker_catalogue *create(bst_ctx *ctx) {
     const bst_tracker_config config = {
         .catalogue_sigma_m = 300.0, .catalogue_sigma_mps = 0.7, .catalogue_mag_sigma = 0.4};
     bst_tracker_catalogue *c = NULL;
-    bst_assert_ok(ctx,
-                  bst_tracker_catalogue_create(ctx, &config, (const bst_knowledge *)(void *)&nothing,
-                                               (bst_knowledge_view *)(void *)&nothing, &c));
+    bst_assert_ok(
+        ctx, bst_tracker_catalogue_create(ctx, &config, (const bst_knowledge *)(void *)&nothing,
+                                          (bst_knowledge_view *)(void *)&nothing, &c));
     assert_int_equal(bst_tracker_catalogue_set(c, NOW_S), CUE);
     return c;
 }
@@ -117,8 +117,8 @@ static void what_is_in_the_cone(void **state) {
     bst_tracker_catalogue *c = create(&ctx);
     const bst_tracker_search search = {.axis = axis, .half_angle_rad = 0.75 * HALF_RAD};
     bst_identity_object out[BST_IDENTITY_OBJECTS];
-    int left_out = -1, count = bst_tracker_catalogue_near(c, &search, out, BST_IDENTITY_OBJECTS,
-                                                          &left_out);
+    int left_out = -1,
+        count = bst_tracker_catalogue_near(c, &search, out, BST_IDENTITY_OBJECTS, &left_out);
     assert_int_equal(count, 3);
     assert_int_equal(left_out, 0);
     for (int i = 0; i < count; i++) {
@@ -145,10 +145,8 @@ static void the_nearest_have_the_room(void **state) {
         for (int room = 1; room <= 4; room++) {
             bst_identity_object out[4];
             int left_out = -1, of_them = 0;
-            const bst_tracker_search search = {.axis = axis,
-                                               .half_angle_rad = HALF_RAD,
-                                               .tracks = tracks,
-                                               .track_count = 2 * k};
+            const bst_tracker_search search = {
+                .axis = axis, .half_angle_rad = HALF_RAD, .tracks = tracks, .track_count = 2 * k};
             assert_int_equal(bst_tracker_catalogue_near(c, &search, out, room, &left_out), room);
             assert_int_equal(left_out, 4 - room);
             for (int i = 0; i < room; i++) {
