@@ -26,6 +26,7 @@ CONCERNED = [
     (r"sim/app/cmd_check|sim/analysis/check", "rules earth_in_field"),
     (r"sim/app/cmd_(challenge|score)|sim/analysis/(challenge|score)", "challenge skewed_exports satnet"),
     (r"imgproc/module_lost", "generator"),
+    (r"imgproc/(module_calibration|calibrate/camera)", "knowledge"),
     (r"sim/analysis/camera", "calibrate_camera"),
     (r"sim/app/cmd_characterize|sim/analysis/characterize", "characterize"),
     (r"sim/app/cmd_(process|solve)|sim/process|sim/analysis/solve|sim/io/keyword", "solve recorded detections characterize"),
