@@ -25,6 +25,7 @@ CONCERNED = [
     (r"sim/link|sim/run/(link_|run_link)|sim/app/cmd_serve", "link"),
     (r"sim/app/cmd_check|sim/analysis/check", "rules earth_in_field"),
     (r"sim/app/cmd_(challenge|score)|sim/analysis/(challenge|score)", "challenge skewed_exports satnet"),
+    (r"sim/io/(fits_(source|tiles)|recorded|side_table|image_file)", "recorded"),
     (r"imgproc/module_lost", "generator"),
     (r"imgproc/(module_calibration|calibrate/camera)", "knowledge"),
     (r"sim/analysis/camera", "calibrate_camera"),
