@@ -203,13 +203,13 @@ class LoopTables:
         tracks = {(written[t["exposure_id"]], t["track_id"]): t for t in self.tables["tracks"]}
         seen = set()
         for row in self.tables["events"]:
-            told = re.fullmatch(r"track (\d+) at RA (\S+) Dec (\S+) deg, (\S+) arcsec/s, V (\S+)", row["text"])
-            track = tracks.get((row["tick"], int(told[1]))) if told else None
+            stated = re.fullmatch(r"track (\d+) at RA (\S+) Dec (\S+) deg, (\S+) arcsec/s, V (\S+)", row["text"])
+            track = tracks.get((row["tick"], int(stated[1]))) if stated else None
             if track is None:
                 continue  # lost ones are no longer in the table
             seen.add(row["kind"])
             rate = np.hypot(track["rate_east_arcsec_per_s"], track["rate_north_arcsec_per_s"])
-            for text, value, digits in zip(told.groups()[1:], (track["ra_deg"], track["dec_deg"], rate, track["v_mag"]), (5, 5, 3, 2)):
+            for text, value, digits in zip(stated.groups()[1:], (track["ra_deg"], track["dec_deg"], rate, track["v_mag"]), (5, 5, 3, 2)):
                 self.assertAlmostEqual(float(text), value, delta=0.501 * 10.0 ** -digits, msg=row["text"])
         self.assertLessEqual({"track_confirmed", "target_selected"}, seen)
 
