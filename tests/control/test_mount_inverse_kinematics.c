@@ -158,6 +158,58 @@ static void wrap_that_serves(void **state) {
     bst_assert_close(c.slew_s, 5.5, 1e-9);
 }
 
+/* The angles of a direction that are nearest to given ones within the travel: by trial of all turns
+ * of both ways. */
+static void nearest_within_travel(void **state) {
+    (void)state;
+    bst_rng_key key = bst_rng_make_key(2, 0, "test", "nearest");
+    int found = 0, none = 0;
+    for (uint64_t n = 0; n < 600; n++) {
+        bst_mount_status m = n % 2 ? azimuth_elevation() : cross_elevation();
+        double u[10], near[BST_MOUNT_AXES] = {0}, a[2][BST_MOUNT_AXES], got[BST_MOUNT_AXES];
+        for (uint64_t k = 0; k < 10; k++) {
+            u[k] = 2.0 * bst_rng_uniform(key, n, k) - 1.0;
+        }
+        bst_vec3 d = bst_vec3_unit((bst_vec3){u[0], u[1], u[2]});
+        for (int i = 0; i < 2; i++) {
+            double middle = 3.0 * u[3 + i], half = 0.3 + 3.0 * fabs(u[5 + i]);
+            m.axis[i].min_rad = n % 3 == 0 && i == 0 ? 0.0 : middle - half; /* 0, 0: endless */
+            m.axis[i].max_rad = n % 3 == 0 && i == 0 ? 0.0 : middle + half;
+            near[i] = 6.0 * u[7 + i];
+        }
+        int ways = bst_mount_angles(&m, d, near, a);
+        double least = INFINITY, best[2] = {0};
+        for (int way = 0; way < ways; way++) {
+            for (int turns = 0; turns < 81; turns++) {
+                double tried[2] = {a[way][0] + 2.0 * BST_PI * (turns / 9 - 4),
+                                   a[way][1] + 2.0 * BST_PI * (turns % 9 - 4)};
+                double off = fmax(fabs(tried[0] - near[0]), fabs(tried[1] - near[1]));
+                bool within = true;
+                for (int i = 0; i < 2; i++) {
+                    const bst_mount_axis *axis = &m.axis[i];
+                    within = within && ((n % 3 == 0 && i == 0) ||
+                                        (tried[i] >= axis->min_rad && tried[i] <= axis->max_rad));
+                }
+                if (within && off < least) {
+                    least = off;
+                    best[0] = tried[0];
+                    best[1] = tried[1];
+                }
+            }
+        }
+        bool has = bst_mount_nearest(&m, d, near, got);
+        assert_int_equal(has, isfinite(least));
+        found += has;
+        none += !has;
+        for (int i = 0; has && i < 2; i++) {
+            /* of two turns that are as far by one axis the other may differ */
+            bst_assert_close(fmax(fabs(got[0] - near[0]), fabs(got[1] - near[1])), least, 1e-12);
+            bst_assert_close(remainder(got[i] - best[i], 2.0 * BST_PI), 0.0, 1e-12);
+        }
+    }
+    assert_true(found > 100 && none > 50);
+}
+
 /* A pass straight over the zenith: with travel over the top it is served as it is, by the way that
  * turns no azimuth at all. */
 static void over_the_zenith(void **state) {
@@ -188,9 +240,8 @@ static void over_the_zenith(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(known_angles),
-        cmocka_unit_test(any_direction),
-        cmocka_unit_test(wrap_that_serves),
+        cmocka_unit_test(known_angles),          cmocka_unit_test(any_direction),
+        cmocka_unit_test(nearest_within_travel), cmocka_unit_test(wrap_that_serves),
         cmocka_unit_test(over_the_zenith),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

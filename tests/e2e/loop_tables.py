@@ -1,4 +1,6 @@
 """Columns of run.sqlite that the loop fills, against numbers of our own and the truth."""
+import re
+
 import numpy as np
 
 import optics
@@ -194,6 +196,22 @@ class LoopTables:
                 self.assertEqual(row["text"].split(" -> ")[0], mode)
                 mode = row["text"].split(" -> ")[1].split(":")[0]
         return mode
+
+    def test_events_of_tracks(self):
+        """Places, rates and magnitudes in their words are those of the tracks of the same time."""
+        written = {f["exposure_id"]: f["written_tick"] for f in self.tables["track_frames"]}
+        tracks = {(written[t["exposure_id"]], t["track_id"]): t for t in self.tables["tracks"]}
+        seen = set()
+        for row in self.tables["events"]:
+            stated = re.fullmatch(r"track (\d+) at RA (\S+) Dec (\S+) deg, (\S+) arcsec/s, V (\S+)", row["text"])
+            track = tracks.get((row["tick"], int(stated[1]))) if stated else None
+            if track is None:
+                continue  # lost ones are no longer in the table
+            seen.add(row["kind"])
+            rate = np.hypot(track["rate_east_arcsec_per_s"], track["rate_north_arcsec_per_s"])
+            for text, value, digits in zip(stated.groups()[1:], (track["ra_deg"], track["dec_deg"], rate, track["v_mag"]), (5, 5, 3, 2)):
+                self.assertAlmostEqual(float(text), value, delta=0.501 * 10.0 ** -digits, msg=row["text"])
+        self.assertLessEqual({"track_confirmed", "target_selected"}, seen)
 
     def test_control(self):
         fixes, modes = self.tables["track_frames"], set()

@@ -44,6 +44,7 @@ class Challenge(unittest.TestCase):
             for row in bright:
                 at = next(f for f in frames if (f["sequence"], f["frame"]) == (row["sequence"], row["frame"]))
                 image = hdus[int(at["hdu"]) - 1].data.astype(float)
+                self.assertEqual(image.shape, (128, 128))
                 x, y = round(float(row["x"])), round(float(row["y"]))
                 box = image[max(y - 1, 0):y + 2, max(x - 1, 0):x + 2]
                 # SNR 30 over a PSF of up to 3 px: the brightest pixel is above 5 standard deviations

@@ -68,7 +68,8 @@ class CubeParts(unittest.TestCase):
             self.assertGreaterEqual(len(ours), 3)
             for one, other in zip(ours[1:], theirs[1:], strict=True):
                 self.assertTrue((one.data == other.data).all())
-                self.assertEqual(one.header["FRAMEID"], other.header["FRAMEID"])
+                for key in ("FRAMEID", "DATE-OBS", "DATE-END", "EXPTIME", "WINX0", "WINY0", "BINNING", "PIXSCALE"):
+                    self.assertEqual(one.header[key], other.header[key], key)
                 self.assertGreaterEqual(len(set(one.data.ravel())), 3)  # none and two parts at least
         with open(os.path.join(out, "Annotations", "000000.json"), encoding="utf-8") as file:
             labels = json.load(file)["data"]

@@ -74,11 +74,14 @@ class Recorded(unittest.TestCase):
         self.compare_results(self.recorded(self.path("cube.csv"), TABLE_MAP))
 
     def test_frames_that_others_compressed(self):
-        """GZIP_2, RICE_1 of 32 bits, and floats as scaled integers with dithering, against astropy's pixels."""
+        """GZIP_2, RICE_1 of 32 bits, and floats as scaled integers with dithering, in rows, in blocks of several rows and
+        columns that do not divide the frame, against astropy's pixels."""
         with fits.open(os.path.join(self.made, "frames.fits")) as file:
             frames, headers = [hdu.data for hdu in file[1:]], [hdu.header for hdu in file[1:]]
-        kinds = ((numpy.int32, {"compression_type": "GZIP_2"}), (numpy.int32, {"compression_type": "RICE_1"}),
-                 (numpy.float32, {"compression_type": "RICE_1", "quantize_method": 1, "dither_seed": 9999, "quantize_level": 64}))
+        kinds = ((numpy.int32, {"compression_type": "GZIP_2", "tile_size": (140, 110)}),
+                 (numpy.int32, {"compression_type": "RICE_1"}),
+                 (numpy.float32, {"compression_type": "RICE_1", "quantize_method": 1, "dither_seed": 9999, "quantize_level": 64,
+                                  "tile_size": (70, 200)}))
         hdus = [fits.PrimaryHDU()]
         for pixels, header, (kind, options) in zip(frames, headers, kinds):
             kept = fits.Header((key, header[key]) for key in ("DATE-OBS", "EXPTIME", "PIXSCALE", "FRAMEID", "GAIN", "RDNOISE", "OFFSET"))

@@ -308,6 +308,14 @@ class View(Checks):
         self.check_marks(viewer, made, 2)
         self.assertEqual(viewer.end()[0], 0)
 
+    def test_corners_in_space(self):
+        """Those of the sensor's outermost pixels, from the first row on, round the field."""
+        sensor, = self.viewer.json("api/space/scene")["sensors"]
+        half = numpy.tan(numpy.radians(512 * 3 / 3600))  # 512 px of 3 arcsec to either side
+        corners = numpy.array(sensor["corners"])
+        numpy.testing.assert_allclose(corners[:, :2] / corners[:, 2:], half * numpy.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]),
+                                      rtol=1e-4)  # the scale in the middle of a tangent plane
+
     def test_plots_modes_events(self):
         described = self.viewer.json("api/run")
         panels = {panel["name"]: panel["lines"] for panel in described["sensors"][0]["panels"]}

@@ -58,6 +58,60 @@ static void mass_matrix_is_that_of_the_kinetic_energy(void **state) {
     }
 }
 
+/* Momentum of a joint, the derivative of the kinetic energy by its rate: exact by differences, for
+ * the energy is a square of rates. */
+static double joint_momentum(const bst_mount_joints *j, const double angle[3], const double rate[3],
+                             int joint, bst_vec3 base_radps) {
+    double energy[2];
+    for (int side = 0; side < 2; side++) {
+        bst_mount_joints moved = *j;
+        put(&moved, angle, rate);
+        moved.state.rate_radps[joint] += side ? 1.0 : -1.0;
+        energy[side] = bst_mount_chain_energy(&moved.chain, &moved.state, base_radps);
+    }
+    return 0.5 * (energy[1] - energy[0]);
+}
+
+/* Lagrange's equations of the kinetic energy on a base that turns and accelerates: what gyroscopic
+ * torques do not show in the energy, for they do no work. */
+static void bias_is_that_of_the_kinetic_energy(void **state) {
+    (void)state;
+    const double h = 1e-4;
+    for (int which = 0; which < 8; which++) {
+        double angle[3], rate[3], s[3], c[3];
+        for (int k = 0; k < 3; k++) {
+            angle[k] = 1.3 * sin(1.0 + 3.0 * which + 2.0 * k);
+            rate[k] = 2.0 * cos(2.0 + 5.0 * which + 3.0 * k);
+            s[k] = sin(angle[k]);
+            c[k] = cos(angle[k]);
+        }
+        bst_mount_chain_base base = {{0.4, -0.9, 0.7}, {-1.1, 0.5, 0.8}};
+        if (which == 0) {
+            base = (bst_mount_chain_base){still, still};
+        }
+        bst_mount_joints j = bare(2 + which % 2);
+        put(&j, angle, rate);
+        bst_mount_chain_equations eq;
+        bst_mount_chain_equations_at(&j.chain, &j.state, s, c, &base, &eq);
+        for (int k = 0; k < j.chain.stages; k++) {
+            double momentum[2], energy[2];
+            for (int side = 0; side < 2; side++) {
+                double dt = side ? h : -h, then[3], moved[3] = {angle[0], angle[1], angle[2]};
+                for (int i = 0; i < 3; i++) {
+                    then[i] = angle[i] + dt * rate[i];
+                }
+                moved[k] += dt;
+                momentum[side] = joint_momentum(
+                    &j, then, rate, k, bst_vec3_axpy(base.rate_radps, dt, base.accel_radps2));
+                put(&j, moved, rate);
+                energy[side] = bst_mount_chain_energy(&j.chain, &j.state, base.rate_radps);
+            }
+            double expected = (momentum[1] - momentum[0] - energy[1] + energy[0]) / (2.0 * h);
+            bst_assert_close(eq.bias_nm[k], expected, 1e-6); /* h^2 of torques near 1 N m */
+        }
+    }
+}
+
 /* Free joints on a base at rest: nothing but the coupling acts, and energy is kept only when it is
  * right. */
 static void energy_is_kept_without_torque(void **state) {
@@ -378,6 +432,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_outer_axis_passes_the_pole_in_time),
         cmocka_unit_test(mass_matrix_is_that_of_the_kinetic_energy),
+        cmocka_unit_test(bias_is_that_of_the_kinetic_energy),
         cmocka_unit_test(energy_is_kept_without_torque),
         cmocka_unit_test(momentum_of_body_and_mount_is_kept),
         cmocka_unit_test(cable_swings_at_its_frequency),

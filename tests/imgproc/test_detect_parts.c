@@ -3,6 +3,8 @@
 #include "boresight/vec.h"
 #include "imgproc/detect/background.h"
 #include "imgproc/detect/filter.h"
+#include "imgproc/extended/silhouette.h"
+#include "imgproc/measure/source_profile.h"
 #include "sim/core/threshold_statistics.h"
 #include "tests/imgproc/synthetic.h"
 #include "tests/test_support.h"
@@ -45,6 +47,45 @@ double __wrap_bst_filter_threshold(bst_filter *filter, double false_alarms, doub
     return __real_bst_filter_threshold(filter, false_alarms, area);
 }
 
+static bst_silhouette_frame outlines; /* what the search for silhouettes was given */
+
+void __real_bst_silhouettes_find(bst_silhouette_finder *finder, const bst_extended_config *config,
+                                 const bst_silhouette_frame *frame, uint8_t *mask,
+                                 bst_silhouettes *out);
+void __wrap_bst_silhouettes_find(bst_silhouette_finder *finder, const bst_extended_config *config,
+                                 const bst_silhouette_frame *frame, uint8_t *mask,
+                                 bst_silhouettes *out);
+void __wrap_bst_silhouettes_find(bst_silhouette_finder *finder, const bst_extended_config *config,
+                                 const bst_silhouette_frame *frame, uint8_t *mask,
+                                 bst_silhouettes *out) {
+    outlines = *frame;
+    __real_bst_silhouettes_find(finder, config, frame, mask, out);
+}
+
+static bst_imgproc_shape first_path; /* with which the fit of the motion begins */
+static int paths;
+
+void __real_bst_source_profile_render_motion(const bst_source_profiles *profiles,
+                                             const bst_imgproc_gauss *psf,
+                                             const bst_imgproc_shape *shape,
+                                             const bst_imgproc_stamp *stamp, const double along[2],
+                                             float *scratch, float *planes);
+void __wrap_bst_source_profile_render_motion(const bst_source_profiles *profiles,
+                                             const bst_imgproc_gauss *psf,
+                                             const bst_imgproc_shape *shape,
+                                             const bst_imgproc_stamp *stamp, const double along[2],
+                                             float *scratch, float *planes);
+void __wrap_bst_source_profile_render_motion(const bst_source_profiles *profiles,
+                                             const bst_imgproc_gauss *psf,
+                                             const bst_imgproc_shape *shape,
+                                             const bst_imgproc_stamp *stamp, const double along[2],
+                                             float *scratch, float *planes) {
+    if (paths++ == 0) {
+        first_path = *shape;
+    }
+    __real_bst_source_profile_render_motion(profiles, psf, shape, stamp, along, scratch, planes);
+}
+
 /* Of the noise of a pixel, read noise and the quantisation are no counted electrons. */
 double __real_bst_threshold_quantile(double u, const bst_threshold_weights *weights,
                                      const bst_threshold_noise *noise);
@@ -66,6 +107,9 @@ double __wrap_bst_threshold_quantile(double u, const bst_threshold_weights *weig
     return __real_bst_threshold_quantile(u, weights, noise);
 }
 
+static bool streaks; /* the sources are streaks along the motion */
+static double bend_px[2];
+
 /* A frame of the sensor's middle, binned by two, under a motion; its sources are points. */
 static void detect(synthetic *s, double gain_e, double read_e, double dx, double dy) {
     bst_ctx ctx = {0};
@@ -78,11 +122,14 @@ static void detect(synthetic *s, double gain_e, double read_e, double dx, double
     bst_rng_key key = bst_rng_make_key(5, 0, "test", "parts");
     for (int i = 0; i < 12; i++) {
         double unit = synthetic_noise(s) / synthetic_norm(s, 30, 30, 0, 0);
-        synthetic_add(s, 15.0 + 19.0 * i, 12.0 + 13.5 * i, (6.0 + 0.3 * i) * unit, 0, 0);
+        synthetic_add(s, 15.0 + 19.0 * i, 12.0 + 13.5 * i, (streaks ? 60.0 : 6.0 + 0.3 * i) * unit,
+                      streaks ? 0.5 * dx : 0.0, streaks ? 0.5 * dy : 0.0);
     }
     synthetic_expose(s, key, 1);
     camera = s->camera;
     bst_camera_motion moving = synthetic_motion(s, dx, dy);
+    double scale = bst_camera_scale_rad(&camera);
+    moving.bend_cam_rad = (bst_vec3){-bend_px[1] * scale, bend_px[0] * scale, 0.0};
     bst_imgproc_frame frame = synthetic_frame(s);
     frame.window = (bst_window){120, 50, 2 * WIDE, 2 * HIGH};
     frame.binning = 2;
@@ -122,7 +169,37 @@ static void at_rest_and_in_motion(void **state) {
     synthetic_free(&s);
 }
 
+/* Paths, their bends and what is taken for outlines, in pixels of the frame that was read. */
+static void paths_and_outlines(void **state) {
+    (void)state;
+    synthetic s;
+    synthetic_init(&s, WIDE, HIGH);
+    s.config.extended.enabled = true;
+    s.sky_e = 30.0;
+    streaks = true;
+    in_coarse_steps = false;
+    bend_px[0] = 0.3;
+    bend_px[1] = -0.5;
+    paths = 0;
+    detect(&s, 1.5, 2.0, -9.7, 6.6);
+    assert_true(paths > 0);
+    /* the camera's plane across half a frame of 700 px of 4 arcsec: 1e-4 */
+    bst_assert_close(first_path.dx_px, -4.85, 1e-3);
+    bst_assert_close(first_path.dy_px, 3.3, 1e-3);
+    bst_assert_close(first_path.bend_x_px, 0.15, 1e-4);
+    bst_assert_close(first_path.bend_y_px, -0.25, 1e-4);
+    bst_assert_close(outlines.streak_x_px, -4.85, 1e-3);
+    bst_assert_close(outlines.streak_y_px, 3.3, 1e-3);
+    assert_int_equal(outlines.width, WIDE);
+    assert_int_equal(outlines.height, HIGH);
+    bst_assert_close(outlines.sigma_px, 1.0 / sqrt(8.0 * log(2.0)), 1e-9);
+    bst_assert_close(outlines.read_variance_e2, 2.0 * 2.0 + 1.5 * 1.5 / 12.0, 1e-12);
+    bst_assert_close(outlines.full_e, (outlines.saturated_dn - 100.0) * 1.5, 1e-9);
+    synthetic_free(&s);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(at_rest_and_in_motion)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(at_rest_and_in_motion),
+                                       cmocka_unit_test(paths_and_outlines)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -42,8 +42,10 @@ static struct {
     int lights, frames, steps, stacked;
     double after_s[BENCH_KEPT], exposure_s[BENCH_KEPT], learned_s[BENCH_KEPT],
         stacked_s[BENCH_KEPT];
-    int binning[BENCH_KEPT];
+    int binning[BENCH_KEPT], labelled;
+    bst_frame_knowledge known[BENCH_KEPT];
 } handed;
+static double streak_px; /* > 0: of all frames, whatever the camera does */
 
 bst_light __real_bst_nav_light_after(const bst_nav_telemetry *nav, double dt_s);
 bst_light __wrap_bst_nav_light_after(const bst_nav_telemetry *nav, double dt_s);
@@ -86,6 +88,22 @@ bst_stack_frame __wrap_bst_imgproc_stack_frame(const bst_imgproc *ip, double tim
     return __real_bst_imgproc_stack_frame(ip, time_s, q_cam_from_gcrf);
 }
 
+double __real_bst_imgproc_streak_px(const bst_imgproc *ip);
+double __wrap_bst_imgproc_streak_px(const bst_imgproc *ip);
+double __wrap_bst_imgproc_streak_px(const bst_imgproc *ip) {
+    return streak_px > 0.0 ? streak_px : __real_bst_imgproc_streak_px(ip);
+}
+
+void __real_bst_discriminator_label(bst_discriminator *d, const bst_frame_knowledge *frame,
+                                    bst_detections *out);
+void __wrap_bst_discriminator_label(bst_discriminator *d, const bst_frame_knowledge *frame,
+                                    bst_detections *out);
+void __wrap_bst_discriminator_label(bst_discriminator *d, const bst_frame_knowledge *frame,
+                                    bst_detections *out) {
+    handed.known[handed.labelled++ % BENCH_KEPT] = *frame;
+    __real_bst_discriminator_label(d, frame, out);
+}
+
 /* Light, bad pixels and stacks are of the middle of an exposure; thermal signal is of its length.
  */
 static void times_of_a_frame(void **state) {
@@ -99,10 +117,13 @@ static void times_of_a_frame(void **state) {
         bench_configure(
             &b, "{\"stack\": {\"frames\": 8}, \"bad_pixel_learning\": {\"capacity\": 100}}"));
     onboard_add_telemetry(&b.o, 0, 0);
-    bst_assert_ok(&b.o.ctx, bench_load(&b, 1000, 1000, false));
+    bst_assert_ok(&b.o.ctx, bench_load(&b, 1000, 1000, true)); /* predictions of tick 0 */
     memset(&handed, 0, sizeof handed);
+    streak_px = 7.25;
     bst_assert_ok(&b.o.ctx, bst_engine_run(&b.o.ctx, b.o.engine, 4000));
+    streak_px = 0.0;
     assert_int_equal(b.count, 3);
+    assert_int_equal(handed.labelled, 3);
     assert_int_equal(handed.lights, 3);
     assert_int_equal(handed.frames, 3);
     assert_int_equal(handed.steps, 3);
@@ -114,6 +135,15 @@ static void times_of_a_frame(void **state) {
         bst_assert_close(handed.stacked_s[i], middle_s, 1e-12);
         bst_assert_close(handed.exposure_s[i], (double)BENCH_EXPOSURE / ONBOARD_RATE, 1e-12);
         assert_int_equal(handed.binning[i], 1);
+        const bst_frame_knowledge *k = &handed.known[i];
+        assert_true(k->streak_px == 7.25 && k->oriented && k->predictions);
+        bst_assert_close(k->predictions_age_s, middle_s, 1e-12);
+        /* by the stars: 0.05 px of twenty of them are 0.7e-6 rad, and 7e-5 rad of roll */
+        bst_vec3 off =
+            bst_quat_to_rotvec(bst_quat_mul(k->q_cam_from_gcrf, bst_quat_conj(b.o.q_true)));
+        bst_assert_close(hypot(off.x, off.y), 0.0, 4e-6);
+        bst_assert_close(off.z, 0.0, 3e-4);
+        assert_true(k->window.width == ONBOARD_SIDE && k->window.height == ONBOARD_SIDE);
     }
     bench_free(&b);
 }

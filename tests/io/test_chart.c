@@ -135,6 +135,31 @@ static void axes_of_any_range(void **state) {
     }
 }
 
+/* Axes hold exactly the finite values: a margin on either side, or whole decades that a round value
+ * does not push further. */
+static void axes_of_values(void **state) {
+    (void)state;
+    const double values[7] = {NAN, 3.0, -2.0, 0.25, INFINITY, 0.0, 5.0};
+    double low = INFINITY, high = -INFINITY;
+    bst_chart_widen(values, 7, false, &low, &high);
+    assert_true(low == -2.0 && high == 5.0);
+    bst_chart_axis axis = {.label = ""};
+    bst_chart_fit(&axis, low, high, 0.05);
+    bst_assert_close(axis.low, -2.35, 1e-12);
+    bst_assert_close(axis.high, 5.35, 1e-12);
+    low = INFINITY, high = -INFINITY;
+    bst_chart_widen(values, 7, true, &low, &high);
+    assert_true(low == 0.25 && high == 5.0);
+    static const double decades[][4] = {
+        {0.25, 5.0, 0.1, 10.0}, {1.0, 1000.0, 1.0, 1000.0}, {1e-3, 2e-3, 1e-3, 1e-2}};
+    axis.logarithmic = true;
+    for (int i = 0; i < 3; i++) {
+        bst_chart_fit(&axis, decades[i][0], decades[i][1], 0.05);
+        bst_assert_close(axis.low / decades[i][2], 1.0, 1e-12);
+        bst_assert_close(axis.high / decades[i][3], 1.0, 1e-12);
+    }
+}
+
 enum { LONG = 43200, COLUMNS = 400 };
 
 /* Every column keeps its lowest and highest value, and the ends of the series stay. */
@@ -302,6 +327,7 @@ int main(void) {
         cmocka_unit_test(ticks_are_round),
         cmocka_unit_test(ticks_of_logarithms),
         cmocka_unit_test(axes_of_any_range),
+        cmocka_unit_test(axes_of_values),
         cmocka_unit_test(numbers_by_the_shape_of_the_chart),
         cmocka_unit_test(thinning_keeps_extremes),
         cmocka_unit_test(thinning_breaks_at_gaps),

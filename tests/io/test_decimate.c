@@ -128,6 +128,16 @@ static void test_sort(void **state) {
         sorted_sum += samples[i].time_s * samples[i].value; /* integers: exact */
     }
     assert_true(sum == sorted_sum);
+    /* falling throughout, and one sample alone too early at each place */
+    for (int early = 0; early <= 5; early++) {
+        for (int i = 0; i < 5; i++) {
+            samples[i].time_s = early == 5 ? -i : i == early ? -1.0 : i;
+        }
+        bst_io_sort_samples(samples, 5);
+        for (int i = 1; i < 5; i++) {
+            assert_true(samples[i - 1].time_s < samples[i].time_s);
+        }
+    }
 }
 
 /* Thinning keeps the extremes of all samples, of every four, and the order. */

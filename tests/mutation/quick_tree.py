@@ -58,6 +58,17 @@ class QuickTree(build_files.Judges):
     def make(self, *targets):
         return self.ninja(*targets).returncode == 0
 
+    @staticmethod
+    def words_of(entry):
+        """The words of a compilation without its source, its object and its level of optimisation."""
+        words, skip = [], 0
+        for word in shlex.split(entry["command"]):
+            if skip or word in ("-o", "-c", "-MT", "-MF"):
+                skip = 0 if skip else 1
+            elif word != "-MD" and not re.fullmatch(r"-O\w*|.*ccache", word):
+                words.append(word)
+        return words
+
     def compile(self, target, name, text):
         """Compiles a source, by itself or within its unity build, with this text; digest of the object, or None."""
         place = os.path.join(self.scratch.name, name)
@@ -74,13 +85,7 @@ class QuickTree(build_files.Judges):
                 file.write(together.replace(os.path.join(self.folder, name), place))
         else:
             unit = place
-        words, skip = [], 0
-        for word in shlex.split(entry["command"]):
-            if skip or word in ("-o", "-c", "-MT", "-MF"):
-                skip = 0 if skip else 1
-            elif word != "-MD" and not re.fullmatch(r"-O\w*|.*ccache", word):
-                words.append(word)
-        made = build_files.run([*words, "-O1", "-w", "-iquote", os.path.join(self.folder, os.path.dirname(name)),
+        made = build_files.run([*self.words_of(entry), "-O1", "-w", "-iquote", os.path.join(self.folder, os.path.dirname(name)),
                                 "-o", self.object(), "-c", unit], cwd=entry["directory"])
         if made.returncode:
             return None

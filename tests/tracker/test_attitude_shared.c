@@ -112,8 +112,51 @@ static void begins_with_the_assumption(void **state) {
     bst_assert_close(got, 0.04, 0.1); /* one product in eleven */
 }
 
+/* Two frames of cameras that are turned and tilted against each other: the products of the pulls in
+ * the sky's axes, by hand. */
+static void products_are_those_of_the_sky(void **state) {
+    (void)state;
+    static bst_attitude_shared shared;
+    memset(&shared, 0, sizeof shared);
+    const bst_vec3 turns[2] = {{0.4, -0.9, 0.3}, {-0.2, 0.5, 1.7}};
+    const double pulls[2][6][2] = {{{3, -1}, {-2, 4}, {1, 5}, {-6, 2}, {2, 2}, {9, 9}},
+                                   {{-1, -4}, {-5, 3}, {2, -6}, {-3, -1}, {7, -8}, {9, 9}}};
+    const double leverage[6] = {0.1, 0.3, 0.9, 0.2, 0.05, 0.0};
+    const double variance[2][3] = {{30, 20, 1e4}, {45, 80, 2e4}};
+    bst_vec3 seen[2][6];
+    for (int f = 0; f < 2; f++) {
+        bst_quat q = bst_quat_from_rotvec(turns[f]);
+        bst_attitude_star stars[6] = {{0}};
+        bst_attitude_solution fix = {.valid = true, .stars_used = 5, .q_cam_from_gcrf = q};
+        for (int i = 0; i < 6; i++) {
+            /* the fifth is another star in the second frame, the sixth is rejected there */
+            stars[i] = (bst_attitude_star){.id = (uint32_t)(i == 4 ? 50 + f : 10 + i),
+                                           .weight = f == 1 && i == 5 ? 0.0 : 1.0,
+                                           .pull_rad = {pulls[f][i][0], pulls[f][i][1], 77.0},
+                                           .leverage = leverage[i]};
+            bst_vec3 x = bst_quat_rotate(bst_quat_conj(q), (bst_vec3){1, 0, 0});
+            bst_vec3 y = bst_quat_rotate(bst_quat_conj(q), (bst_vec3){0, 1, 0});
+            seen[f][i] = bst_vec3_axpy(bst_vec3_scale(x, pulls[f][i][0]), pulls[f][i][1], y);
+        }
+        for (int a = 0; a < 3; a++) {
+            fix.covariance[a][a] = variance[f][a];
+        }
+        bst_attitude_shared_update(&shared, &fix, stars, 6);
+        bst_assert_close(shared.variance_rad2, variance[f][0] + variance[f][1], 1e-12);
+    }
+    double sum = 0.0;
+    for (int i = 0; i < 4; i++) {
+        sum += bst_vec3_dot(seen[0][i], seen[1][i]) / (1.0 - fmin(leverage[i], 0.5));
+    }
+    double ratio = sum / sqrt(50.0 * 125.0), mean = (0.04 * 10.0 + ratio) / 11.0;
+    bst_assert_close(shared.ratios, ratio, 1e-12);
+    assert_true(ratio > 0.1);
+    bst_assert_close(bst_attitude_shared_get(&shared), mean, 1e-12);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(follows_the_share),
+                                       cmocka_unit_test(products_are_those_of_the_sky),
                                        cmocka_unit_test(begins_with_the_assumption)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -309,11 +309,31 @@ static void tracks_without_room(void **unused) {
     assert_int_equal(identity.left_out, 0);
 }
 
+/* Tracks are compared once their rates are known along both axes, and only those of objects. */
+static void which_tracks_are_compared(void **unused) {
+    (void)unused;
+    const bst_identity_params p = params();
+    const double limit = pow(p.fit.max_rate_sigma_radps, 2);
+    for (int k = 0; k < 16; k++) {
+        bst_mtt_track track = {.status = BST_TRACK_CONFIRMED};
+        track.state.covariance[2][2] = limit * (k & 1 ? 1.01 : 0.99);
+        track.state.covariance[3][3] = limit * (k & 2 ? 1.01 : 0.99);
+        track.state.covariance[2][3] = track.state.covariance[3][2] = k & 4 ? 2.0 * limit : 0.0;
+        track.state.covariance[0][0] = track.state.covariance[1][1] = k & 8 ? 2.0 * limit : 0.0;
+        assert_int_equal(bst_identity_compares(&p, &track), (k & 3) == 0);
+        track.star = k & 4;
+        track.at_rest = !(k & 4);
+        assert_false(bst_identity_compares(&p, &track));
+    }
+    assert_false(bst_identity_compares(&p, &(bst_mtt_track){.status = BST_TRACK_TENTATIVE}));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(probabilities_are_reliable),
                                        cmocka_unit_test(closed_form),
                                        cmocka_unit_test(an_object_has_one_track),
                                        cmocka_unit_test(extreme_weights),
+                                       cmocka_unit_test(which_tracks_are_compared),
                                        cmocka_unit_test(tracks_without_room),
                                        cmocka_unit_test(the_target_is_what_nothing_else_explains)};
     return cmocka_run_group_tests(tests, NULL, NULL);
