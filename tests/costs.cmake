@@ -10,13 +10,13 @@ set(bst_costs
   e2e_passes 14  e2e_docs 13  imgproc_archive 12  e2e_orbit_consistency 12  e2e_tables 12
   e2e_acquisition 12  e2e_loop 12  e2e_frames 12  e2e_report 12  tracker_consistency 11
   e2e_export 11  e2e_planes 11  e2e_bad_input 11  imgproc_streaks 11  scenegen_hard_cases 11
-  headers_compile_alone 11  optics_psf_colour 10  e2e_bench 10  e2e_random_labels 10  e2e_seeds 10
+  headers_compile_alone 11  optics_psf_colour 7  e2e_bench 10  e2e_random_labels 10  e2e_seeds 10
   e2e_calframes 10  e2e_loop_latency 10  imgproc_false_alarms 10  e2e_faint_sky 9  e2e_outputs 9
   e2e_constellation 9  e2e_day_modes 9  e2e_hostile_input 9  world_ephemeris 9  e2e_install 9
-  control_archive 8  imgproc_statistics 8  python_program_plugins 8  scenegen_extended_source 8
+  control_archive 4  imgproc_statistics 8  python_program_plugins 8  scenegen_extended_source 8
   headers_words 8  python_examples 8  e2e_repeat 8  e2e_manoeuvre 8  e2e_pd 8  e2e_new 8
   e2e_skewed_frames 8  e2e_camera 8  e2e_propagate 8  e2e_plugins 8  obsgen_streak_detection 8
-  e2e_pacing 12  e2e_view 12  e2e_cube_parts 7  e2e_recorded 7  control_loop 7  e2e_earth_in_field 7
+  e2e_pacing 12  e2e_view 12  e2e_cube_parts 7  e2e_recorded 7  control_loop 5  e2e_earth_in_field 7
   e2e_threads 7  e2e_info 7  e2e_figures 7  e2e_orbit_files 7  e2e_boxes 6  e2e_rules 6
   e2e_skewed_exports 6  e2e_random_scenes 6  e2e_generator 6  obsgen_deblend 6  python_runs 6
   scenegen_gpu_form 6  e2e_hostile_folders 6  e2e_inspection 6  scenegen_flags 6

@@ -51,6 +51,13 @@ double bst_optics_moffat_otf(double alpha_px, double beta, double f) {
     return 2.0 * step * sum;
 }
 
+/* Area of a segment of the unit circle of half-angle A: A - sin A cos A, by tan^2(A / 2) = y2 / x2,
+ * from which sine and cosine are rational in x and y. */
+static double segment(double y2, double x2) {
+    double x = sqrt(x2), y = sqrt(y2), sum = x2 + y2;
+    return 2.0 * atan2(y, x) - 2.0 * x * y * (x2 - y2) / (sum * sum);
+}
+
 /* Area common to two circles of radii a >= b with centres d apart. */
 static double lens(double a, double b, double d) {
     if (d >= a + b) {
@@ -63,9 +70,8 @@ static double lens(double a, double b, double d) {
      * s, tan^2(A / 2) = (s - b)(s - c) / (s (s - a)) */
     double s = 0.5 * (a + b + d);
     double to_a = fmax(s - a, 0.0), to_b = fmax(s - b, 0.0), to_d = fmax(s - d, 0.0);
-    double at_a = 2.0 * atan2(sqrt(to_a * to_d), sqrt(s * to_b));
-    double at_b = 2.0 * atan2(sqrt(to_b * to_d), sqrt(s * to_a));
-    return a * a * (at_a - 0.5 * sin(2.0 * at_a)) + b * b * (at_b - 0.5 * sin(2.0 * at_b));
+    double part = segment(to_a * to_d, s * to_b);
+    return a * a * part + b * b * (a == b ? part : segment(to_b * to_d, s * to_a));
 }
 
 double bst_optics_annulus_otf(double inner, double s) {

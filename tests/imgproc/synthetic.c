@@ -127,6 +127,24 @@ static double poisson(double mean, double none, double normal) {
     return k;
 }
 
+enum { SKY_COUNTS = 24 };
+
+/* The normal deviates from which on poisson() of a mean has one event more: most pixels are sky,
+ * and comparing them spares erfc. With more than SKY_COUNTS - 1 events, poisson() counts. */
+static void make_limits(double mean, double limit[SKY_COUNTS]) {
+    double p = exp(-mean), sum = p;
+    for (int k = 0; k < SKY_COUNTS; k++) {
+        double low = -9.0, high = 9.0;
+        for (int i = 0; i < 60; i++) {
+            double middle = 0.5 * (low + high);
+            *(0.5 * erfc(-middle / sqrt(2.0)) > sum ? &high : &low) = middle;
+        }
+        limit[k] = high;
+        p *= mean / (k + 1);
+        sum += p;
+    }
+}
+
 /* Electrons after a multiplication register, over its gain: 1 + sqrt(1 - 1 / gain) (e - 1) of each,
  * e exponential (Basden, Haniff & Mackay 2003, MNRAS 345, 985); the sum of more than a few by the
  * cube root (Wilson & Hilferty 1931, PNAS 17, 684). */
@@ -147,12 +165,24 @@ static double multiplied(double electrons, double gain, bst_rng_key key, uint64_
 }
 
 void synthetic_expose(synthetic *s, bst_rng_key key, uint64_t frame) {
-    double top = ldexp(1.0, (int)s->camera.bits) - 1.0, dark = exp(-s->sky_e);
+    double top = ldexp(1.0, (int)s->camera.bits) - 1.0, limit[SKY_COUNTS];
+    bool counts = s->sky_e > 0.0 && s->sky_e <= 50.0;
+    if (counts) {
+        make_limits(s->sky_e, limit);
+    }
     for (int i = 0; i < s->width * s->height; i++) {
         double z[2];
         bst_rng_normal2(key, frame, (uint64_t)i, z);
-        double mean = s->mean_e[i], none = mean == s->sky_e ? dark : exp(-mean);
-        double e = poisson(mean, none, z[1]);
+        double e, mean = s->mean_e[i];
+        if (counts && mean == s->sky_e && z[1] < limit[SKY_COUNTS - 1]) {
+            int k = 0;
+            while (z[1] >= limit[k]) {
+                k++;
+            }
+            e = k;
+        } else {
+            e = poisson(mean, exp(-mean), z[1]);
+        }
         if (s->camera.detector.em_gain > 1.0) {
             e = multiplied(e, s->camera.detector.em_gain, key, frame, (uint64_t)i);
         }
