@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/simd.h"
+
 /* BLOCK: side of the squares over which the path's shape changes by less than a pixel. */
 enum { BLOCK = 16, KERNEL = 5, SHIFTS = 24 };
 /* Passes of the clipped spread, the places that it needs, and those that it takes. */
@@ -24,14 +26,26 @@ static const double ALONG_LOSS = 0.5;
  * 1 - 2 c phi(c) / erf(c / sqrt(2)) */
 static const double SPREAD_CLIP = 3.0, SPREAD_SHARE = 0.9733;
 
+#define BST_SIMD_KERNELS "imgproc/streak/path_filter_kernels.inc"
+#include "sim/core/simd_each.inc"
+
+/* An image with BLOCK zeros on all sides. */
+typedef struct padded_image {
+    float *values;
+    size_t stride;
+} padded_image;
+
 struct bst_path_filter {
     const bst_star_path *path;
     int margin;         /* of places outside the frame, px */
     int width, height;  /* of the arrays below: the frame and its margins */
     float *response;    /* [height][width] */
     float *per_noise;   /* [height][width] one over the noise of the response; 0: not searched */
-    int *highest;       /* [height] place of a row's highest SNR; -1: not known */
-    float *scratch[2];  /* [height][width] of a star's response; zero between calls */
+    float *highest;     /* [height] highest SNR of a row; below 0: not known */
+    float *scratch;     /* [height][width] points of a star's response; zero between calls */
+    float *blurred;     /* [height][width] their convolution along rows */
+    int (*extent)[2];   /* [height] first and last point of a row of the scratch; empty between
+                           calls */
     double correlation; /* variance of the response over the sum of the squared light */
     double squares;     /* sum of the squared light of the whole path */
     double psf_sigma_px;
@@ -48,8 +62,9 @@ void bst_path_filter_free(bst_path_filter *f) {
     free(f->response);
     free(f->per_noise);
     free(f->highest);
-    free(f->scratch[0]);
-    free(f->scratch[1]);
+    free(f->scratch);
+    free(f->blurred);
+    free(f->extent);
     free(f);
 }
 
@@ -108,61 +123,138 @@ static void measure_path(bst_path_filter *f) {
 /* Marks rows whose response changes. */
 static void forget_rows(bst_path_filter *f, int first, int last) {
     for (int y = first < 0 ? 0 : first; y <= last && y < f->height; y++) {
-        f->highest[y] = -1;
+        f->highest[y] = -1.0f;
+    }
+}
+
+/* Empties rows of the scratch. */
+static void empty_rows(bst_path_filter *f, int first, int last) {
+    for (int y = first; y <= last; y++) {
+        f->extent[y][0] = f->width;
+        f->extent[y][1] = -1;
+    }
+}
+
+/* Nearest whole number, halves away from zero. */
+static int nearest(double v) {
+    return (int)(v < 0.0 ? v - 0.5 : v + 0.5);
+}
+
+/* What a filter sums over: the image, and the weights of its pixels. */
+typedef struct filter_input {
+    int width, height;
+    padded_image image, weights;
+    bool equal; /* all weights are 1 */
+} filter_input;
+
+/* Samples of the path whose light some places of a block have in the frame. */
+typedef struct block_samples {
+    int count;
+    const float *image[BST_STAR_PATH_ROOM], *weights[BST_STAR_PATH_ROOM];
+    float light[BST_STAR_PATH_ROOM], squared[BST_STAR_PATH_ROOM];
+    bool whole; /* all samples of all places are inside */
+} block_samples;
+
+static void list_samples(const bst_path_filter *f, const filter_input *in, int bx, int by,
+                         block_samples *out) {
+    const bst_star_path *p = f->path;
+    double m[3];
+    out->count = 0;
+    out->whole = true;
+    bst_star_path_map(p, bx + 0.5 * BLOCK - f->margin, by + 0.5 * BLOCK - f->margin, m);
+    for (int k = 0; k < p->count; k++) {
+        double u = p->place[k][0], v = p->place[k][1];
+        int x = bx + nearest(m[0] * u + m[1] * v) - f->margin;
+        int y = by + nearest(m[1] * u + m[2] * v) - f->margin;
+        out->whole = out->whole && x >= 0 && x + BLOCK <= in->width && y >= 0 &&
+                     y + BLOCK <= in->height;
+        if (x <= -BLOCK || x >= in->width || y <= -BLOCK || y >= in->height) {
+            continue;
+        }
+        size_t at = (size_t)(y + BLOCK) * in->image.stride + (size_t)(x + BLOCK);
+        float w = (float)p->light[k];
+        out->image[out->count] = in->image.values + at;
+        out->weights[out->count] = in->weights.values + at;
+        out->light[out->count] = w;
+        out->squared[out->count++] = w * w;
     }
 }
 
 /* Sums the image along the path for a block of places. */
-static void filter_block(bst_path_filter *f, const bst_star_path_image *image, const float *weights,
-                         int bx, int by) {
-    const bst_star_path *p = f->path;
-    const int x1 = bx + BLOCK < f->width ? bx + BLOCK : f->width;
-    const int y1 = by + BLOCK < f->height ? by + BLOCK : f->height;
-    float light[BLOCK][BLOCK] = {{0}}, squares[BLOCK][BLOCK] = {{0}};
-    double m[3];
-    float all = 0.0f;      /* squared light of the whole path */
-    bool whole = !weights; /* all samples of all places are inside */
-    bst_star_path_map(p, bx + 0.5 * BLOCK - f->margin, by + 0.5 * BLOCK - f->margin, m);
-    for (int k = 0; k < p->count; k++) {
-        double u = p->place[k][0], v = p->place[k][1];
-        int dx = (int)lround(m[0] * u + m[1] * v) - f->margin;
-        int dy = (int)lround(m[1] * u + m[2] * v) - f->margin;
-        float w = (float)p->light[k];
-        all += w * w;
-        whole = whole && bx + dx >= 0 && x1 + dx <= image->width && by + dy >= 0 &&
-                y1 + dy <= image->height;
+static void filter_block(bst_path_filter *f, const filter_input *in, int bx, int by,
+                         block_samples *samples) {
+    float light[BLOCK * BLOCK], squares[BLOCK * BLOCK];
+    double most = 0.0;
+    list_samples(f, in, bx, by, samples);
+    for (int k = 0; k < samples->count; k++) {
+        most += (double)samples->squared[k];
     }
-    for (int k = 0; k < p->count; k++) {
-        double u = p->place[k][0], v = p->place[k][1];
-        int dx = (int)lround(m[0] * u + m[1] * v) - f->margin;
-        int dy = (int)lround(m[1] * u + m[2] * v) - f->margin;
-        float w = (float)p->light[k], w2 = w * w;
-        int from = bx + dx < 0 ? -dx : bx, to = x1 + dx > image->width ? image->width - dx : x1;
-        for (int y = by + dy < 0 ? -dy : by; y < y1 && y + dy < image->height; y++) {
-            const float *row = &image->values[(y + dy) * image->width + dx];
-            for (int x = from; x < to; x++) {
-                light[y - by][x - bx] += w * row[x];
+    const bool equal = in->equal && samples->whole;
+    const float whole = (float)(1.0 / sqrt(f->squares * f->correlation));
+    /* no place of the block has enough of the path inside */
+    const bool outside = in->equal && most < f->least_inside * f->squares;
+    if (!outside) {
+        BST_SIMD_PICK(sum_block)
+        (samples->image, samples->light, samples->count, in->image.stride, light);
+    }
+    if (!outside && !equal) {
+        BST_SIMD_PICK(sum_block)
+        (samples->weights, samples->squared, samples->count, in->weights.stride, squares);
+    }
+    for (int y = 0; y < BLOCK && by + y < f->height; y++) {
+        float *response = &f->response[(by + y) * f->width + bx];
+        float *per_noise = &f->per_noise[(by + y) * f->width + bx];
+        for (int x = 0; x < BLOCK && bx + x < f->width; x++) {
+            response[x] = outside ? 0.0f : light[y * BLOCK + x];
+            per_noise[x] = outside ? 0.0f : whole;
+            if (outside || equal) {
+                continue;
             }
-            if (weights) {
-                const float *share = &weights[(y + dy) * image->width + dx];
-                for (int x = from; x < to; x++) {
-                    squares[y - by][x - bx] += w2 * share[x];
-                }
-            }
-            for (int x = from; x < to && !whole && !weights; x++) {
-                squares[y - by][x - bx] += w2;
-            }
+            double share = (double)squares[y * BLOCK + x] / f->squares;
+            per_noise[x] = share < f->least_inside
+                               ? 0.0f
+                               : (float)(1.0 / sqrt(share * f->squares * f->correlation));
         }
     }
-    for (int y = by; y < y1; y++) {
-        for (int x = bx; x < x1; x++) {
-            double share = (double)(whole ? all : squares[y - by][x - bx]) / f->squares;
-            f->response[y * f->width + x] = light[y - by][x - bx];
-            f->per_noise[y * f->width + x] =
-                share < f->least_inside ? 0.0f
-                                        : (float)(1.0 / sqrt(share * f->squares * f->correlation));
+}
+
+/* Copies an image into a padded one; NULL: ones. */
+static bool pad_image(padded_image *out, const float *values, int width, int height) {
+    out->stride = (size_t)width + 2 * BLOCK;
+    out->values = calloc(out->stride * ((size_t)height + 2 * BLOCK), sizeof *out->values);
+    for (int y = 0; out->values && y < height; y++) {
+        float *row = out->values + (size_t)(y + BLOCK) * out->stride + BLOCK;
+        for (int x = 0; x < width && !values; x++) {
+            row[x] = 1.0f;
+        }
+        if (values) {
+            memcpy(row, values + (size_t)y * (size_t)width, (size_t)width * sizeof *row);
         }
     }
+    return out->values;
+}
+
+/* Filters all places. */
+static bst_status filter_image(bst_ctx *ctx, bst_path_filter *f, const bst_star_path_image *image,
+                               const float *weights) {
+    filter_input in = {.width = image->width, .height = image->height, .equal = !weights};
+    block_samples *samples = malloc(sizeof *samples);
+    bst_status status = BST_OK;
+    if (samples && pad_image(&in.image, image->values, image->width, image->height) &&
+        pad_image(&in.weights, weights, image->width, image->height)) {
+        for (int y = 0; y < f->height; y += BLOCK) {
+            for (int x = 0; x < f->width; x += BLOCK) {
+                filter_block(f, &in, x, y, samples);
+            }
+        }
+    } else {
+        status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter of %d x %d px",
+                          image->width, image->height);
+    }
+    free(samples);
+    free(in.image.values);
+    free(in.weights.values);
+    return status;
 }
 
 bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
@@ -191,19 +283,21 @@ bst_status bst_path_filter_create_weighted(bst_ctx *ctx, const bst_star_path *pa
     f->response = malloc(places * sizeof *f->response);
     f->per_noise = malloc(places * sizeof *f->per_noise);
     f->highest = malloc((size_t)f->height * sizeof *f->highest);
-    f->scratch[0] = calloc(places, sizeof *f->scratch[0]);
-    f->scratch[1] = calloc(places, sizeof *f->scratch[1]);
-    if (!f->response || !f->per_noise || !f->highest || !f->scratch[0] || !f->scratch[1]) {
+    f->scratch = calloc(places, sizeof *f->scratch);
+    f->blurred = malloc(places * sizeof *f->blurred);
+    f->extent = malloc((size_t)f->height * sizeof *f->extent);
+    if (!f->response || !f->per_noise || !f->highest || !f->scratch || !f->blurred || !f->extent) {
         bst_path_filter_free(f);
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter of %d x %d px",
                         image->width, image->height);
     }
     forget_rows(f, 0, f->height - 1);
+    empty_rows(f, 0, f->height - 1);
     measure_path(f);
-    for (int y = 0; y < f->height; y += BLOCK) {
-        for (int x = 0; x < f->width; x += BLOCK) {
-            filter_block(f, image, weights, x, y);
-        }
+    bst_status status = filter_image(ctx, f, image, weights);
+    if (status != BST_OK) {
+        bst_path_filter_free(f);
+        return status;
     }
     *out = f;
     return BST_OK;
@@ -277,31 +371,60 @@ static double along_sigma_px(const bst_path_filter *f, double snr) {
     return SHIFTS;
 }
 
-/* Place of the highest SNR; rows that have not changed keep theirs. */
-static int highest_place(bst_path_filter *f) {
-    int best = 0;
-    for (int y = 0; y < f->height; y++) {
-        if (f->highest[y] < 0) {
-            int at = y * f->width;
-            for (int i = at; i < (y + 1) * f->width; i++) {
-                at = f->response[i] * f->per_noise[i] > f->response[at] * f->per_noise[at] ? i : at;
-            }
-            f->highest[y] = at;
-        }
-        int at = f->highest[y];
-        best =
-            f->response[at] * f->per_noise[at] > f->response[best] * f->per_noise[best] ? at : best;
+/* Greatest product of two rows. */
+BST_CLONES
+static float highest_product(const float *a, const float *b, int count) {
+    float most[BLOCK];
+    int whole = count / BLOCK * BLOCK;
+    for (int k = 0; k < BLOCK; k++) {
+        most[k] = 0.0f;
     }
-    return best;
+    for (int i = 0; i < whole; i += BLOCK) {
+        for (int k = 0; k < BLOCK; k++) {
+            float v = a[i + k] * b[i + k];
+            most[k] = v > most[k] ? v : most[k];
+        }
+    }
+    for (int i = whole; i < count; i++) {
+        most[0] = a[i] * b[i] > most[0] ? a[i] * b[i] : most[0];
+    }
+    for (int k = 1; k < BLOCK; k++) {
+        most[0] = most[k] > most[0] ? most[k] : most[0];
+    }
+    return most[0];
+}
+
+/* Place of the highest SNR; rows that have not changed keep theirs. -1: no SNR is positive. */
+static int highest_place(bst_path_filter *f) {
+    float best = 0.0f;
+    int row = -1, at;
+    for (int y = 0; y < f->height; y++) {
+        if (f->highest[y] < 0.0f) {
+            at = y * f->width;
+            f->highest[y] = highest_product(&f->response[at], &f->per_noise[at], f->width);
+        }
+        if (f->highest[y] > best) {
+            best = f->highest[y];
+            row = y;
+        }
+    }
+    if (row < 0) {
+        return -1;
+    }
+    at = row * f->width;
+    while (f->response[at] * f->per_noise[at] < best) {
+        at++;
+    }
+    return at;
 }
 
 bool bst_path_filter_highest(bst_path_filter *f, bst_path_filter_peak *out) {
     assert(f && out);
     int at = highest_place(f);
-    float best = f->response[at] * f->per_noise[at];
-    if (!(best > 0.0f)) {
+    if (at < 0) {
         return false;
     }
+    const float best = f->response[at] * f->per_noise[at];
     const int x = at % f->width, y = at / f->width;
     bool whole = true;
     for (int k = 0; k < 9; k++) {
@@ -334,67 +457,76 @@ bool bst_path_filter_highest(bst_path_filter *f, bst_path_filter_peak *out) {
     return true;
 }
 
-/* A rectangle of places. */
-typedef struct rectangle {
-    int x0, y0, x1, y1;
-} rectangle;
+/* Rows of places. */
+typedef struct row_range {
+    int first, last;
+} row_range;
 
 /* Adds the response to a source at a place of the image, as a sum of points. */
 static void add_points(bst_path_filter *f, double x, double y, double amount, const double m[3],
-                       rectangle *box) {
+                       row_range *rows) {
     const bst_star_path *p = f->path;
     for (int k = 0; k < p->count; k++) {
         double u = x - (m[0] * p->place[k][0] + m[1] * p->place[k][1]) + f->margin;
         double v = y - (m[1] * p->place[k][0] + m[2] * p->place[k][1]) + f->margin;
-        int i = (int)floor(u), j = (int)floor(v);
-        if (i < KERNEL || j < KERNEL || i + 1 + KERNEL >= f->width || j + 1 + KERNEL >= f->height) {
+        if (!(u >= KERNEL && v >= KERNEL && u < f->width - 1 - KERNEL &&
+              v < f->height - 1 - KERNEL)) {
             continue;
         }
+        int i = (int)u, j = (int)v;
         double a = u - i, b = v - j, value = amount * p->light[k];
-        float *at = &f->scratch[0][j * f->width + i];
+        float *at = &f->scratch[j * f->width + i];
         at[0] += (float)((1.0 - a) * (1.0 - b) * value);
         at[1] += (float)(a * (1.0 - b) * value);
         at[f->width] += (float)((1.0 - a) * b * value);
         at[f->width + 1] += (float)(a * b * value);
-        box->x0 = i < box->x0 ? i : box->x0;
-        box->y0 = j < box->y0 ? j : box->y0;
-        box->x1 = i + 1 > box->x1 ? i + 1 : box->x1;
-        box->y1 = j + 1 > box->y1 ? j + 1 : box->y1;
+        for (int r = j; r <= j + 1; r++) {
+            f->extent[r][0] = i < f->extent[r][0] ? i : f->extent[r][0];
+            f->extent[r][1] = i + 1 > f->extent[r][1] ? i + 1 : f->extent[r][1];
+        }
+        rows->first = j < rows->first ? j : rows->first;
+        rows->last = j + 1 > rows->last ? j + 1 : rows->last;
+    }
+}
+
+/* Adds a row, scaled. */
+BST_CLONES
+static void add_scaled(float *restrict to, const float *restrict from, float by, int count) {
+    for (int x = 0; x < count; x++) {
+        to[x] += by * from[x];
     }
 }
 
 /* Convolves the points with the correlation of samples, subtracts them, and clears the scratch. */
-static void subtract_points(bst_path_filter *f, rectangle box) {
+static void subtract_points(bst_path_filter *f, row_range rows) {
     float kernel[2 * KERNEL + 1];
     for (int k = -KERNEL; k <= KERNEL; k++) {
         kernel[k + KERNEL] = (float)correlation_at(f, k * k);
     }
     const int w = f->width;
-    for (int y = box.y0; y <= box.y1; y++) {
-        for (int x = box.x0 - KERNEL; x <= box.x1 + KERNEL; x++) {
-            float sum = 0.0f;
-            for (int k = -KERNEL; k <= KERNEL; k++) {
-                if (x + k >= box.x0 && x + k <= box.x1) {
-                    sum += kernel[k + KERNEL] * f->scratch[0][y * w + x + k];
-                }
-            }
-            f->scratch[1][y * w + x] = sum;
+    for (int y = rows.first; y <= rows.last; y++) {
+        const int from = f->extent[y][0], count = f->extent[y][1] - from + 1;
+        float *points = &f->scratch[y * w + from], *to = &f->blurred[y * w + from];
+        if (count < 1) {
+            continue;
         }
+        memset(to - KERNEL, 0, (size_t)(count + 2 * KERNEL) * sizeof *to);
+        for (int k = -KERNEL; k <= KERNEL; k++) {
+            add_scaled(to - k, points, kernel[k + KERNEL], count);
+        }
+        memset(points, 0, (size_t)count * sizeof *points);
     }
     for (int k = -KERNEL; k <= KERNEL; k++) {
-        float v = kernel[k + KERNEL];
-        for (int y = box.y0; y <= box.y1; y++) {
-            const float *from = &f->scratch[1][y * w];
-            float *to = &f->response[(y + k) * w];
-            for (int x = box.x0 - KERNEL; x <= box.x1 + KERNEL; x++) {
-                to[x] -= v * from[x];
+        for (int y = rows.first; y <= rows.last; y++) {
+            const int from = f->extent[y][0] - KERNEL;
+            if (f->extent[y][1] >= 0) {
+                add_scaled(&f->response[(y + k) * w + from], &f->blurred[y * w + from],
+                           -kernel[k + KERNEL], f->extent[y][1] + KERNEL - from + 1);
             }
         }
     }
-    for (int y = box.y0; y <= box.y1; y++) {
-        size_t bytes = (size_t)(box.x1 - box.x0 + 1) * sizeof(float);
-        memset(&f->scratch[0][y * w + box.x0], 0, bytes);
-    }
+    empty_rows(f, rows.first, rows.last);
+    forget_rows(f, rows.first - KERNEL, rows.last + KERNEL);
 }
 
 void bst_path_filter_subtract(bst_path_filter *f, const bst_path_filter_peak *peak) {
@@ -402,7 +534,7 @@ void bst_path_filter_subtract(bst_path_filter *f, const bst_path_filter_peak *pe
     const bst_star_path *p = f->path;
     const double right = 2.0 * p->centre[0], bottom = 2.0 * p->centre[1];
     double m[3], there[3];
-    rectangle box = {f->width, f->height, -1, -1};
+    row_range rows = {f->height, -1};
     bst_star_path_map(p, peak->x_px, peak->y_px, m);
     for (int l = 0; l < p->count; l++) {
         double x = peak->x_px + m[0] * p->place[l][0] + m[1] * p->place[l][1];
@@ -412,25 +544,19 @@ void bst_path_filter_subtract(bst_path_filter *f, const bst_path_filter_peak *pe
         }
         /* places whose sample k lies here are about as far from here as the star itself is */
         bst_star_path_map(p, x, y, there);
-        add_points(f, x, y, peak->amplitude * p->light[l], there, &box);
+        add_points(f, x, y, peak->amplitude * p->light[l], there, &rows);
     }
-    if (box.x1 >= box.x0) {
-        subtract_points(f, box);
-        forget_rows(f, box.y0 - KERNEL, box.y1 + KERNEL);
-    }
+    subtract_points(f, rows);
 }
 
 void bst_path_filter_subtract_point(bst_path_filter *f, double x_px, double y_px,
                                     double amplitude) {
     assert(f);
     double m[3];
-    rectangle box = {f->width, f->height, -1, -1};
+    row_range rows = {f->height, -1};
     bst_star_path_map(f->path, x_px, y_px, m);
-    add_points(f, x_px, y_px, amplitude, m, &box);
-    if (box.x1 >= box.x0) {
-        subtract_points(f, box);
-        forget_rows(f, box.y0 - KERNEL, box.y1 + KERNEL);
-    }
+    add_points(f, x_px, y_px, amplitude, m, &rows);
+    subtract_points(f, rows);
 }
 
 void bst_path_filter_leave_out(bst_path_filter *f, const bst_path_filter_peak *peak,
