@@ -304,9 +304,9 @@ typedef struct wanted {
 static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_common_streak *out) {
     const bst_star_path_image image = image_of(f);
     const int most = q->most;
-    bst_path_filter *filter;
-    BST_TRY(
-        bst_path_filter_create(ctx, &f->path, &image, f->psf_sigma_px, q->least_inside, &filter));
+    BST_TRY(bst_path_filter_renew(ctx, &f->path, &image, NULL, f->psf_sigma_px, q->least_inside,
+                                  &f->filter));
+    bst_path_filter *filter = f->filter;
     const bool point = f->path.count == 1;
     out->items = f->items;
     out->count = 0;
@@ -346,7 +346,6 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
                                       peak.snr > BRIGHT_SNR ? GHOST_PX : BST_STREAK_CLOSE_PX);
         }
     }
-    bst_path_filter_free(filter);
     return BST_OK;
 }
 
@@ -546,6 +545,7 @@ void bst_streak_finder_free(bst_streak_finder *f) {
     if (!f) {
         return;
     }
+    bst_path_filter_free(f->filter);
     free(f->image);
     free(f->label);
     free(f->items);

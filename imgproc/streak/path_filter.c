@@ -21,6 +21,8 @@ static const double REACH_SHARE = 12.0, MOST_REACH = 10.0;
 /* Standard deviation of the place along a streak: the shift at which the expected logarithm of the
  * likelihood falls by this; calibrated by tests/imgproc/streak_fields.c. */
 static const double ALONG_LOSS = 0.5;
+/* Least share of the path inside the frame over what is asked: weights may exceed 1 a little. */
+static const double WEIGHED = 0.8;
 
 /* Values of the response beyond this are clipped; mean square of a normal deviate up to it:
  * 1 - 2 c phi(c) / erf(c / sqrt(2)) */
@@ -29,16 +31,15 @@ static const double SPREAD_CLIP = 3.0, SPREAD_SHARE = 0.9733;
 #define BST_SIMD_KERNELS "imgproc/streak/path_filter_kernels.inc"
 #include "sim/core/simd_each.inc"
 
-/* An image with BLOCK zeros on all sides. */
-typedef struct padded_image {
-    float *values;
-    size_t stride;
-} padded_image;
-
 struct bst_path_filter {
     const bst_star_path *path;
     int margin;         /* of places outside the frame, px */
     int width, height;  /* of the arrays below: the frame and its margins */
+    size_t places, pixels; /* that there is memory for */
+    int rows;              /* likewise, of places */
+    size_t stride;         /* of the two images below */
+    float *image, *weights; /* the input with BLOCK zeros on all sides */
+    bool equal;            /* all weights are 1 */
     float *response;    /* [height][width] */
     float *per_noise;   /* [height][width] one over the noise of the response; 0: not searched */
     float *highest;     /* [height] highest SNR of a row; below 0: not known */
@@ -55,28 +56,49 @@ struct bst_path_filter {
     double loss[SHIFTS]; /* share of the response that a shift by so many px along loses */
 };
 
-void bst_path_filter_free(bst_path_filter *f) {
-    if (!f) {
-        return;
-    }
+static void free_memory(bst_path_filter *f) {
+    free(f->image);
+    free(f->weights);
     free(f->response);
     free(f->per_noise);
     free(f->highest);
     free(f->scratch);
     free(f->blurred);
     free(f->extent);
-    free(f);
 }
 
-/* Greatest distance from the middle in x or y, with the map of the frame's corner. */
-static int margin_of(const bst_star_path *p) {
-    double most = 0.0, m[3];
+void bst_path_filter_free(bst_path_filter *f) {
+    if (f) {
+        free_memory(f);
+        free(f);
+    }
+}
+
+/* Greatest distance from the frame in x or y at which it has the least share of the path, with the
+ * map of its corner; and room for the subtraction. */
+static int margin_of(const bst_path_filter *f) {
+    const bst_star_path *p = f->path;
+    double share[BST_STAR_PATH_ROOM + 1] = {0}, m[3], least = 0.0;
     bst_star_path_map(p, 2.0 * p->centre[0], 2.0 * p->centre[1], m);
     for (int k = 0; k < p->count; k++) {
-        double u = fabs(p->place[k][0]), v = fabs(p->place[k][1]);
-        most = fmax(most, fmax(m[0] * u + fabs(m[1]) * v, fabs(m[1]) * u + m[2] * v));
+        least += WEIGHED * f->least_inside * p->light[k] * p->light[k];
     }
-    return (int)ceil(most) + 2;
+    int most = 0;
+    for (int side = 0; side < 4; side++) {
+        double sum = 0.0;
+        memset(share, 0, sizeof share);
+        for (int k = 0; k < p->count; k++) {
+            double u = p->place[k][side % 2], v = fabs(p->place[k][1 - side % 2]);
+            double d = m[side % 2 ? 2 : 0] * (side < 2 ? u : -u) + fabs(m[1]) * v;
+            int at = (int)fmax(fmin(ceil(d), BST_STAR_PATH_ROOM), 0.0);
+            share[at] += p->light[k] * p->light[k];
+        }
+        for (int d = BST_STAR_PATH_ROOM; d > most; d--) {
+            sum += share[d];
+            most = sum >= least ? d : most;
+        }
+    }
+    return most + 2 * KERNEL;
 }
 
 /* Correlation of two samples of the image at a distance. */
@@ -103,6 +125,7 @@ static double response_at(const bst_path_filter *f, double shift_px) {
 
 static void measure_path(bst_path_filter *f) {
     const bst_star_path *p = f->path;
+    f->squares = 0.0;
     for (int k = 0; k < p->count; k++) {
         f->squares += p->light[k] * p->light[k];
     }
@@ -140,66 +163,67 @@ static int nearest(double v) {
     return (int)(v < 0.0 ? v - 0.5 : v + 0.5);
 }
 
-/* What a filter sums over: the image, and the weights of its pixels. */
-typedef struct filter_input {
-    int width, height;
-    padded_image image, weights;
-    bool equal; /* all weights are 1 */
-} filter_input;
-
 /* Samples of the path whose light some places of a block have in the frame. */
 typedef struct block_samples {
     int count;
+    int shift[BST_STAR_PATH_ROOM][2]; /* of all samples, whole pixels */
     const float *image[BST_STAR_PATH_ROOM], *weights[BST_STAR_PATH_ROOM];
     float light[BST_STAR_PATH_ROOM], squared[BST_STAR_PATH_ROOM];
     bool whole; /* all samples of all places are inside */
 } block_samples;
 
-static void list_samples(const bst_path_filter *f, const filter_input *in, int bx, int by,
+/* Shifts of the path's samples at a place, to whole pixels. */
+BST_CLONES
+static void shift_samples(const double (*place)[2], int count, const double m[3],
+                          int (*restrict shift)[2]) {
+    for (int k = 0; k < count; k++) {
+        shift[k][0] = nearest(m[0] * place[k][0] + m[1] * place[k][1]);
+        shift[k][1] = nearest(m[1] * place[k][0] + m[2] * place[k][1]);
+    }
+}
+
+static void list_samples(const bst_path_filter *f, int width, int height, int bx, int by,
                          block_samples *out) {
     const bst_star_path *p = f->path;
     double m[3];
     out->count = 0;
     out->whole = true;
     bst_star_path_map(p, bx + 0.5 * BLOCK - f->margin, by + 0.5 * BLOCK - f->margin, m);
+    shift_samples(p->place, p->count, m, out->shift);
     for (int k = 0; k < p->count; k++) {
-        double u = p->place[k][0], v = p->place[k][1];
-        int x = bx + nearest(m[0] * u + m[1] * v) - f->margin;
-        int y = by + nearest(m[1] * u + m[2] * v) - f->margin;
-        out->whole = out->whole && x >= 0 && x + BLOCK <= in->width && y >= 0 &&
-                     y + BLOCK <= in->height;
-        if (x <= -BLOCK || x >= in->width || y <= -BLOCK || y >= in->height) {
+        int x = bx + out->shift[k][0] - f->margin, y = by + out->shift[k][1] - f->margin;
+        out->whole =
+            out->whole && x >= 0 && x + BLOCK <= width && y >= 0 && y + BLOCK <= height;
+        if (x <= -BLOCK || x >= width || y <= -BLOCK || y >= height) {
             continue;
         }
-        size_t at = (size_t)(y + BLOCK) * in->image.stride + (size_t)(x + BLOCK);
+        size_t at = (size_t)(y + BLOCK) * f->stride + (size_t)(x + BLOCK);
         float w = (float)p->light[k];
-        out->image[out->count] = in->image.values + at;
-        out->weights[out->count] = in->weights.values + at;
+        out->image[out->count] = f->image + at;
+        out->weights[out->count] = f->weights + at;
         out->light[out->count] = w;
         out->squared[out->count++] = w * w;
     }
 }
 
 /* Sums the image along the path for a block of places. */
-static void filter_block(bst_path_filter *f, const filter_input *in, int bx, int by,
-                         block_samples *samples) {
+static void filter_block(bst_path_filter *f, int bx, int by, const block_samples *samples) {
     float light[BLOCK * BLOCK], squares[BLOCK * BLOCK];
     double most = 0.0;
-    list_samples(f, in, bx, by, samples);
     for (int k = 0; k < samples->count; k++) {
         most += (double)samples->squared[k];
     }
-    const bool equal = in->equal && samples->whole;
+    const bool equal = f->equal && samples->whole;
     const float whole = (float)(1.0 / sqrt(f->squares * f->correlation));
     /* no place of the block has enough of the path inside */
-    const bool outside = in->equal && most < f->least_inside * f->squares;
+    const bool outside = f->equal && most < f->least_inside * f->squares;
     if (!outside) {
         BST_SIMD_PICK(sum_block)
-        (samples->image, samples->light, samples->count, in->image.stride, light);
+        (samples->image, samples->light, samples->count, f->stride, light);
     }
     if (!outside && !equal) {
         BST_SIMD_PICK(sum_block)
-        (samples->weights, samples->squared, samples->count, in->weights.stride, squares);
+        (samples->weights, samples->squared, samples->count, f->stride, squares);
     }
     for (int y = 0; y < BLOCK && by + y < f->height; y++) {
         float *response = &f->response[(by + y) * f->width + bx];
@@ -219,11 +243,11 @@ static void filter_block(bst_path_filter *f, const filter_input *in, int bx, int
 }
 
 /* Copies an image into a padded one; NULL: ones. */
-static bool pad_image(padded_image *out, const float *values, int width, int height) {
-    out->stride = (size_t)width + 2 * BLOCK;
-    out->values = calloc(out->stride * ((size_t)height + 2 * BLOCK), sizeof *out->values);
-    for (int y = 0; out->values && y < height; y++) {
-        float *row = out->values + (size_t)(y + BLOCK) * out->stride + BLOCK;
+static void pad_image(const bst_path_filter *f, float *to, const float *values, int width,
+                      int height) {
+    memset(to, 0, f->stride * ((size_t)height + 2 * BLOCK) * sizeof *to);
+    for (int y = 0; y < height; y++) {
+        float *row = to + (size_t)(y + BLOCK) * f->stride + BLOCK;
         for (int x = 0; x < width && !values; x++) {
             row[x] = 1.0f;
         }
@@ -231,30 +255,32 @@ static bool pad_image(padded_image *out, const float *values, int width, int hei
             memcpy(row, values + (size_t)y * (size_t)width, (size_t)width * sizeof *row);
         }
     }
-    return out->values;
 }
 
-/* Filters all places. */
-static bst_status filter_image(bst_ctx *ctx, bst_path_filter *f, const bst_star_path_image *image,
-                               const float *weights) {
-    filter_input in = {.width = image->width, .height = image->height, .equal = !weights};
-    block_samples *samples = malloc(sizeof *samples);
-    bst_status status = BST_OK;
-    if (samples && pad_image(&in.image, image->values, image->width, image->height) &&
-        pad_image(&in.weights, weights, image->width, image->height)) {
-        for (int y = 0; y < f->height; y += BLOCK) {
-            for (int x = 0; x < f->width; x += BLOCK) {
-                filter_block(f, &in, x, y, samples);
-            }
-        }
-    } else {
-        status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter of %d x %d px",
-                          image->width, image->height);
+/* Makes room for the places of a filter and its input. */
+static bst_status make_room(bst_ctx *ctx, bst_path_filter *f, const bst_star_path_image *image) {
+    const size_t places = (size_t)f->width * (size_t)f->height;
+    const size_t pixels = f->stride * ((size_t)image->height + 2 * BLOCK);
+    if (places <= f->places && f->height <= f->rows && pixels <= f->pixels) {
+        return BST_OK;
     }
-    free(samples);
-    free(in.image.values);
-    free(in.weights.values);
-    return status;
+    free_memory(f);
+    f->places = places;
+    f->rows = f->height;
+    f->pixels = pixels;
+    f->image = malloc(pixels * sizeof *f->image);
+    f->weights = malloc(pixels * sizeof *f->weights);
+    f->response = malloc(places * sizeof *f->response);
+    f->per_noise = malloc(places * sizeof *f->per_noise);
+    f->highest = malloc((size_t)f->height * sizeof *f->highest);
+    f->scratch = calloc(places, sizeof *f->scratch);
+    f->blurred = malloc(places * sizeof *f->blurred);
+    f->extent = malloc((size_t)f->height * sizeof *f->extent);
+    if (!f->image || !f->weights || !f->response || !f->per_noise || !f->highest || !f->scratch || !f->blurred || !f->extent) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter of %d x %d px",
+                        image->width, image->height);
+    }
+    return BST_OK;
 }
 
 bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
@@ -267,39 +293,51 @@ bst_status bst_path_filter_create_weighted(bst_ctx *ctx, const bst_star_path *pa
                                            const bst_star_path_image *image, const float *weights,
                                            double psf_sigma_px, double least_inside,
                                            bst_path_filter **out) {
-    assert(path && path->count > 0 && image && psf_sigma_px > 0.0 && least_inside > 0.0 && out);
     *out = NULL;
-    bst_path_filter *f = calloc(1, sizeof *f);
+    return bst_path_filter_renew(ctx, path, image, weights, psf_sigma_px, least_inside, out);
+}
+
+bst_status bst_path_filter_renew(bst_ctx *ctx, const bst_star_path *path,
+                                 const bst_star_path_image *image, const float *weights,
+                                 double psf_sigma_px, double least_inside,
+                                 bst_path_filter **out) {
+    assert(path && path->count > 0 && image && psf_sigma_px > 0.0 && least_inside > 0.0 && out);
+    bst_path_filter *f = *out ? *out : calloc(1, sizeof *f);
     if (!f) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter");
     }
+    *out = f;
     f->path = path;
     f->psf_sigma_px = psf_sigma_px;
     f->least_inside = least_inside;
-    f->margin = margin_of(path);
+    f->equal = !weights;
+    f->margin = margin_of(f);
     f->width = image->width + 2 * f->margin;
     f->height = image->height + 2 * f->margin;
-    size_t places = (size_t)f->width * (size_t)f->height;
-    f->response = malloc(places * sizeof *f->response);
-    f->per_noise = malloc(places * sizeof *f->per_noise);
-    f->highest = malloc((size_t)f->height * sizeof *f->highest);
-    f->scratch = calloc(places, sizeof *f->scratch);
-    f->blurred = malloc(places * sizeof *f->blurred);
-    f->extent = malloc((size_t)f->height * sizeof *f->extent);
-    if (!f->response || !f->per_noise || !f->highest || !f->scratch || !f->blurred || !f->extent) {
+    f->stride = (size_t)image->width + 2 * BLOCK;
+    bst_status status = make_room(ctx, f, image);
+    block_samples *samples = malloc(sizeof *samples);
+    if (status == BST_OK && !samples) {
+        status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter");
+    }
+    if (status != BST_OK) {
+        free(samples);
         bst_path_filter_free(f);
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter of %d x %d px",
-                        image->width, image->height);
+        *out = NULL;
+        return status;
     }
     forget_rows(f, 0, f->height - 1);
     empty_rows(f, 0, f->height - 1);
     measure_path(f);
-    bst_status status = filter_image(ctx, f, image, weights);
-    if (status != BST_OK) {
-        bst_path_filter_free(f);
-        return status;
+    pad_image(f, f->image, image->values, image->width, image->height);
+    pad_image(f, f->weights, weights, image->width, image->height);
+    for (int y = 0; y < f->height; y += BLOCK) {
+        for (int x = 0; x < f->width; x += BLOCK) {
+            list_samples(f, image->width, image->height, x, y, samples);
+            filter_block(f, x, y, samples);
+        }
     }
-    *out = f;
+    free(samples);
     return BST_OK;
 }
 

@@ -34,6 +34,15 @@ bst_status bst_path_filter_create_weighted(bst_ctx *ctx, const bst_star_path *pa
                                            const bst_star_path_image *image, const float *weights,
                                            double psf_sigma_px, double least_inside,
                                            bst_path_filter **out) BST_MUST_CHECK;
+/* As bst_path_filter_create_weighted, in the memory of an earlier filter.
+ *
+ * Given:     weights  NULL: all are 1
+ *            *filter  NULL, or the earlier filter
+ * Errors:    BST_ERR_MEMORY; *filter is then NULL, and the earlier one is freed */
+bst_status bst_path_filter_renew(bst_ctx *ctx, const bst_star_path *path,
+                                 const bst_star_path_image *image, const float *weights,
+                                 double psf_sigma_px, double least_inside,
+                                 bst_path_filter **filter) BST_MUST_CHECK;
 /* Frees a filter; NULL is allowed. */
 void bst_path_filter_free(bst_path_filter *filter);
 
