@@ -206,6 +206,16 @@ static void list_samples(const bst_path_filter *f, int width, int height, int bx
     }
 }
 
+/* One over the noise of the response at the places of a block, from the sums of squares there. */
+BST_CLONES
+static void invert_noise(float *values, double squares, double least_inside, double correlation) {
+    for (int i = 0; i < BLOCK * BLOCK; i++) {
+        double share = (double)values[i] / squares;
+        double v = 1.0 / sqrt(share * squares * correlation);
+        values[i] = share < least_inside ? 0.0f : (float)v;
+    }
+}
+
 /* Sums the image along the path for a block of places. */
 static void filter_block(bst_path_filter *f, int bx, int by, const block_samples *samples) {
     float light[BLOCK * BLOCK], squares[BLOCK * BLOCK];
@@ -225,19 +235,15 @@ static void filter_block(bst_path_filter *f, int bx, int by, const block_samples
         BST_SIMD_PICK(sum_block)
         (samples->weights, samples->squared, samples->count, f->stride, squares);
     }
+    if (!outside && !equal) {
+        invert_noise(squares, f->squares, f->least_inside, f->correlation);
+    }
     for (int y = 0; y < BLOCK && by + y < f->height; y++) {
         float *response = &f->response[(by + y) * f->width + bx];
         float *per_noise = &f->per_noise[(by + y) * f->width + bx];
         for (int x = 0; x < BLOCK && bx + x < f->width; x++) {
             response[x] = outside ? 0.0f : light[y * BLOCK + x];
-            per_noise[x] = outside ? 0.0f : whole;
-            if (outside || equal) {
-                continue;
-            }
-            double share = (double)squares[y * BLOCK + x] / f->squares;
-            per_noise[x] = share < f->least_inside
-                               ? 0.0f
-                               : (float)(1.0 / sqrt(share * f->squares * f->correlation));
+            per_noise[x] = outside ? 0.0f : equal ? whole : squares[y * BLOCK + x];
         }
     }
 }
