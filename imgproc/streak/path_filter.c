@@ -10,6 +10,8 @@
 
 /* BLOCK: side of the squares over which the path's shape changes by less than a pixel. */
 enum { BLOCK = 16, KERNEL = 5, SHIFTS = 24 };
+/* Widest PSF and its reach, px. */
+enum { MOST_SIGMA = 4, MOST_KERNEL = KERNEL * MOST_SIGMA };
 /* Passes of the clipped spread, the places that it needs, and those that it takes. */
 enum { SPREAD_PASSES = 3, LEAST_PLACES = 1000, SPREAD_PLACES = 65536 };
 
@@ -31,22 +33,33 @@ static const double SPREAD_CLIP = 3.0, SPREAD_SHARE = 0.9733;
 #define BST_SIMD_KERNELS "imgproc/streak/path_filter_kernels.inc"
 #include "sim/core/simd_each.inc"
 
+/* Samples of the path whose light some places of a block have in the frame. */
+typedef struct block_samples {
+    int count;
+    int shift[BST_STAR_PATH_ROOM][2]; /* of all samples, whole pixels */
+    const float *image[BST_STAR_PATH_ROOM], *weights[BST_STAR_PATH_ROOM];
+    float light[BST_STAR_PATH_ROOM], squared[BST_STAR_PATH_ROOM];
+    bool whole; /* all samples of all places are inside */
+} block_samples;
+
+/* Subtractions change the image. A block of places is filtered again when its highest SNR, which
+ * they can only lower, is the highest of all. */
 struct bst_path_filter {
     const bst_star_path *path;
-    int margin;         /* of places outside the frame, px */
-    int width, height;  /* of the arrays below: the frame and its margins */
-    size_t places, pixels; /* that there is memory for */
-    int rows;              /* likewise, of places */
-    size_t stride;         /* of the two images below */
+    block_samples samples;  /* of the latest block */
+    int margin;             /* of places outside the frame, px */
+    int width, height;      /* of the places: the frame and its margins */
+    int columns, blocks;    /* of places: in a row, in all */
+    size_t places, pixels;  /* that there is memory for */
+    int frame[2];           /* width and height of the frame */
+    size_t stride;          /* of the two images below */
     float *image, *weights; /* the input with BLOCK zeros on all sides */
-    bool equal;            /* all weights are 1 */
-    float *response;    /* [height][width] */
-    float *per_noise;   /* [height][width] one over the noise of the response; 0: not searched */
-    float *highest;     /* [height] highest SNR of a row; below 0: not known */
-    float *scratch;     /* [height][width] points of a star's response; zero between calls */
-    float *blurred;     /* [height][width] their convolution along rows */
-    int (*extent)[2];   /* [height] first and last point of a row of the scratch; empty between
-                           calls */
+    bool equal;             /* all weights are 1 */
+    float *response;        /* [blocks][BLOCK][BLOCK] */
+    float *per_noise;       /* likewise: one over the noise of the response; 0: not searched */
+    float *highest;         /* [blocks] highest SNR when the block was filtered */
+    int *filtered;          /* [blocks] subtractions before that; -1: to be filtered again */
+    int subtractions;
     double correlation; /* variance of the response over the sum of the squared light */
     double squares;     /* sum of the squared light of the whole path */
     double psf_sigma_px;
@@ -62,9 +75,7 @@ static void free_memory(bst_path_filter *f) {
     free(f->response);
     free(f->per_noise);
     free(f->highest);
-    free(f->scratch);
-    free(f->blurred);
-    free(f->extent);
+    free(f->filtered);
 }
 
 void bst_path_filter_free(bst_path_filter *f) {
@@ -75,7 +86,7 @@ void bst_path_filter_free(bst_path_filter *f) {
 }
 
 /* Greatest distance from the frame in x or y at which it has the least share of the path, with the
- * map of its corner; and room for the subtraction. */
+ * map of its corner. */
 static int margin_of(const bst_path_filter *f) {
     const bst_star_path *p = f->path;
     double share[BST_STAR_PATH_ROOM + 1] = {0}, m[3], least = 0.0;
@@ -98,7 +109,7 @@ static int margin_of(const bst_path_filter *f) {
             most = sum >= least ? d : most;
         }
     }
-    return most + 2 * KERNEL;
+    return most + 2;
 }
 
 /* Correlation of two samples of the image at a distance. */
@@ -143,34 +154,10 @@ static void measure_path(bst_path_filter *f) {
     }
 }
 
-/* Marks rows whose response changes. */
-static void forget_rows(bst_path_filter *f, int first, int last) {
-    for (int y = first < 0 ? 0 : first; y <= last && y < f->height; y++) {
-        f->highest[y] = -1.0f;
-    }
-}
-
-/* Empties rows of the scratch. */
-static void empty_rows(bst_path_filter *f, int first, int last) {
-    for (int y = first; y <= last; y++) {
-        f->extent[y][0] = f->width;
-        f->extent[y][1] = -1;
-    }
-}
-
 /* Nearest whole number, halves away from zero. */
 static int nearest(double v) {
     return (int)(v < 0.0 ? v - 0.5 : v + 0.5);
 }
-
-/* Samples of the path whose light some places of a block have in the frame. */
-typedef struct block_samples {
-    int count;
-    int shift[BST_STAR_PATH_ROOM][2]; /* of all samples, whole pixels */
-    const float *image[BST_STAR_PATH_ROOM], *weights[BST_STAR_PATH_ROOM];
-    float light[BST_STAR_PATH_ROOM], squared[BST_STAR_PATH_ROOM];
-    bool whole; /* all samples of all places are inside */
-} block_samples;
 
 /* Shifts of the path's samples at a place, to whole pixels. */
 BST_CLONES
@@ -182,9 +169,11 @@ static void shift_samples(const double (*place)[2], int count, const double m[3]
     }
 }
 
-static void list_samples(const bst_path_filter *f, int width, int height, int bx, int by,
-                         block_samples *out) {
+static void list_samples(bst_path_filter *f, int block) {
     const bst_star_path *p = f->path;
+    const int bx = block % f->columns * BLOCK, by = block / f->columns * BLOCK;
+    const int width = f->frame[0], height = f->frame[1];
+    block_samples *out = &f->samples;
     double m[3];
     out->count = 0;
     out->whole = true;
@@ -192,8 +181,7 @@ static void list_samples(const bst_path_filter *f, int width, int height, int bx
     shift_samples(p->place, p->count, m, out->shift);
     for (int k = 0; k < p->count; k++) {
         int x = bx + out->shift[k][0] - f->margin, y = by + out->shift[k][1] - f->margin;
-        out->whole =
-            out->whole && x >= 0 && x + BLOCK <= width && y >= 0 && y + BLOCK <= height;
+        out->whole = out->whole && x >= 0 && x + BLOCK <= width && y >= 0 && y + BLOCK <= height;
         if (x <= -BLOCK || x >= width || y <= -BLOCK || y >= height) {
             continue;
         }
@@ -206,6 +194,31 @@ static void list_samples(const bst_path_filter *f, int width, int height, int bx
     }
 }
 
+/* Greatest product of two arrays of a block. */
+BST_CLONES
+static float highest_product(const float *a, const float *b) {
+    float most[BLOCK] = {0.0f};
+    for (int i = 0; i < BLOCK * BLOCK; i += BLOCK) {
+        for (int k = 0; k < BLOCK; k++) {
+            float v = a[i + k] * b[i + k];
+            most[k] = v > most[k] ? v : most[k];
+        }
+    }
+    for (int k = 1; k < BLOCK; k++) {
+        most[0] = most[k] > most[0] ? most[k] : most[0];
+    }
+    return most[0];
+}
+
+/* Sums the image along the path for the places of a block; its samples are listed. */
+static void sum_light(bst_path_filter *f, int block) {
+    const block_samples *s = &f->samples;
+    float *response = f->response + (size_t)block * BLOCK * BLOCK;
+    BST_SIMD_PICK(sum_block)(s->image, s->light, s->count, f->stride, response);
+    f->highest[block] = highest_product(response, f->per_noise + (size_t)block * BLOCK * BLOCK);
+    f->filtered[block] = f->subtractions;
+}
+
 /* One over the noise of the response at the places of a block, from the sums of squares there. */
 BST_CLONES
 static void invert_noise(float *values, double squares, double least_inside, double correlation) {
@@ -216,41 +229,37 @@ static void invert_noise(float *values, double squares, double least_inside, dou
     }
 }
 
-/* Sums the image along the path for a block of places. */
-static void filter_block(bst_path_filter *f, int bx, int by, const block_samples *samples) {
-    float light[BLOCK * BLOCK], squares[BLOCK * BLOCK];
+/* Filters a block of places for the first time. */
+static void filter_block(bst_path_filter *f, int block) {
+    const block_samples *s = &f->samples;
+    float *per_noise = f->per_noise + (size_t)block * BLOCK * BLOCK;
     double most = 0.0;
-    for (int k = 0; k < samples->count; k++) {
-        most += (double)samples->squared[k];
+    list_samples(f, block);
+    for (int k = 0; k < s->count; k++) {
+        most += (double)s->squared[k];
     }
-    const bool equal = f->equal && samples->whole;
-    const float whole = (float)(1.0 / sqrt(f->squares * f->correlation));
-    /* no place of the block has enough of the path inside */
-    const bool outside = f->equal && most < f->least_inside * f->squares;
-    if (!outside) {
-        BST_SIMD_PICK(sum_block)
-        (samples->image, samples->light, samples->count, f->stride, light);
+    f->highest[block] = 0.0f;
+    f->filtered[block] = 0;
+    if (f->equal && most < f->least_inside * f->squares) {
+        /* no place of the block has enough of the path inside */
+        memset(per_noise, 0, sizeof(float) * BLOCK * BLOCK);
+        memset(f->response + (size_t)block * BLOCK * BLOCK, 0, sizeof(float) * BLOCK * BLOCK);
+        return;
     }
-    if (!outside && !equal) {
-        BST_SIMD_PICK(sum_block)
-        (samples->weights, samples->squared, samples->count, f->stride, squares);
-    }
-    if (!outside && !equal) {
-        invert_noise(squares, f->squares, f->least_inside, f->correlation);
-    }
-    for (int y = 0; y < BLOCK && by + y < f->height; y++) {
-        float *response = &f->response[(by + y) * f->width + bx];
-        float *per_noise = &f->per_noise[(by + y) * f->width + bx];
-        for (int x = 0; x < BLOCK && bx + x < f->width; x++) {
-            response[x] = outside ? 0.0f : light[y * BLOCK + x];
-            per_noise[x] = outside ? 0.0f : equal ? whole : squares[y * BLOCK + x];
+    if (f->equal && s->whole) {
+        for (int i = 0; i < BLOCK * BLOCK; i++) {
+            per_noise[i] = (float)(1.0 / sqrt(f->squares * f->correlation));
         }
+    } else {
+        BST_SIMD_PICK(sum_block)(s->weights, s->squared, s->count, f->stride, per_noise);
+        invert_noise(per_noise, f->squares, f->least_inside, f->correlation);
     }
+    sum_light(f, block);
 }
 
 /* Copies an image into a padded one; NULL: ones. */
-static void pad_image(const bst_path_filter *f, float *to, const float *values, int width,
-                      int height) {
+static void pad_image(const bst_path_filter *f, float *to, const float *values) {
+    const int width = f->frame[0], height = f->frame[1];
     memset(to, 0, f->stride * ((size_t)height + 2 * BLOCK) * sizeof *to);
     for (int y = 0; y < height; y++) {
         float *row = to + (size_t)(y + BLOCK) * f->stride + BLOCK;
@@ -264,27 +273,24 @@ static void pad_image(const bst_path_filter *f, float *to, const float *values, 
 }
 
 /* Makes room for the places of a filter and its input. */
-static bst_status make_room(bst_ctx *ctx, bst_path_filter *f, const bst_star_path_image *image) {
-    const size_t places = (size_t)f->width * (size_t)f->height;
-    const size_t pixels = f->stride * ((size_t)image->height + 2 * BLOCK);
-    if (places <= f->places && f->height <= f->rows && pixels <= f->pixels) {
+static bst_status make_room(bst_ctx *ctx, bst_path_filter *f) {
+    const size_t blocks = (size_t)f->blocks, places = blocks * BLOCK * BLOCK;
+    const size_t pixels = f->stride * ((size_t)f->frame[1] + 2 * BLOCK);
+    if (places <= f->places && pixels <= f->pixels) {
         return BST_OK;
     }
     free_memory(f);
     f->places = places;
-    f->rows = f->height;
     f->pixels = pixels;
     f->image = malloc(pixels * sizeof *f->image);
     f->weights = malloc(pixels * sizeof *f->weights);
     f->response = malloc(places * sizeof *f->response);
     f->per_noise = malloc(places * sizeof *f->per_noise);
-    f->highest = malloc((size_t)f->height * sizeof *f->highest);
-    f->scratch = calloc(places, sizeof *f->scratch);
-    f->blurred = malloc(places * sizeof *f->blurred);
-    f->extent = malloc((size_t)f->height * sizeof *f->extent);
-    if (!f->image || !f->weights || !f->response || !f->per_noise || !f->highest || !f->scratch || !f->blurred || !f->extent) {
+    f->highest = malloc(blocks * sizeof *f->highest);
+    f->filtered = malloc(blocks * sizeof *f->filtered);
+    if (!f->image || !f->weights || !f->response || !f->per_noise || !f->highest || !f->filtered) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter of %d x %d px",
-                        image->width, image->height);
+                        f->frame[0], f->frame[1]);
     }
     return BST_OK;
 }
@@ -305,9 +311,9 @@ bst_status bst_path_filter_create_weighted(bst_ctx *ctx, const bst_star_path *pa
 
 bst_status bst_path_filter_renew(bst_ctx *ctx, const bst_star_path *path,
                                  const bst_star_path_image *image, const float *weights,
-                                 double psf_sigma_px, double least_inside,
-                                 bst_path_filter **out) {
-    assert(path && path->count > 0 && image && psf_sigma_px > 0.0 && least_inside > 0.0 && out);
+                                 double psf_sigma_px, double least_inside, bst_path_filter **out) {
+    assert(path && path->count > 0 && image && psf_sigma_px > 0.0 && psf_sigma_px <= MOST_SIGMA &&
+           least_inside > 0.0 && out);
     bst_path_filter *f = *out ? *out : calloc(1, sizeof *f);
     if (!f) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter");
@@ -320,48 +326,50 @@ bst_status bst_path_filter_renew(bst_ctx *ctx, const bst_star_path *path,
     f->margin = margin_of(f);
     f->width = image->width + 2 * f->margin;
     f->height = image->height + 2 * f->margin;
+    f->columns = (f->width + BLOCK - 1) / BLOCK;
+    f->blocks = f->columns * ((f->height + BLOCK - 1) / BLOCK);
+    f->frame[0] = image->width;
+    f->frame[1] = image->height;
     f->stride = (size_t)image->width + 2 * BLOCK;
-    bst_status status = make_room(ctx, f, image);
-    block_samples *samples = malloc(sizeof *samples);
-    if (status == BST_OK && !samples) {
-        status = bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter");
-    }
+    f->subtractions = 0;
+    bst_status status = make_room(ctx, f);
     if (status != BST_OK) {
-        free(samples);
         bst_path_filter_free(f);
         *out = NULL;
         return status;
     }
-    forget_rows(f, 0, f->height - 1);
-    empty_rows(f, 0, f->height - 1);
     measure_path(f);
-    pad_image(f, f->image, image->values, image->width, image->height);
-    pad_image(f, f->weights, weights, image->width, image->height);
-    for (int y = 0; y < f->height; y += BLOCK) {
-        for (int x = 0; x < f->width; x += BLOCK) {
-            list_samples(f, image->width, image->height, x, y, samples);
-            filter_block(f, x, y, samples);
-        }
+    pad_image(f, f->image, image->values);
+    pad_image(f, f->weights, weights);
+    for (int i = 0; i < f->blocks; i++) {
+        filter_block(f, i);
     }
-    free(samples);
     return BST_OK;
 }
 
+/* Index of a place in arrays by blocks. */
+static size_t index_of(const bst_path_filter *f, int x, int y) {
+    size_t block = (size_t)(y / BLOCK * f->columns + x / BLOCK);
+    return (block * BLOCK + (size_t)(y % BLOCK)) * BLOCK + (size_t)(x % BLOCK);
+}
+
 static float snr_at(const bst_path_filter *f, int x, int y) {
-    if (x < 0 || y < 0 || x >= f->width || y >= f->height || f->per_noise[y * f->width + x] == 0) {
+    if (x < 0 || y < 0 || x >= f->width || y >= f->height) {
         return -1.0f;
     }
-    return f->response[y * f->width + x] * f->per_noise[y * f->width + x];
+    size_t at = index_of(f, x, y);
+    return f->per_noise[at] > 0.0f ? f->response[at] * f->per_noise[at] : -1.0f;
 }
 
 double bst_path_filter_spread(const bst_path_filter *f) {
     assert(f);
     double spread = 1.0;
-    const int stride = f->width * f->height / SPREAD_PLACES | 1; /* odd: columns do not repeat */
+    const int places = f->blocks * BLOCK * BLOCK;
+    const int stride = places / SPREAD_PLACES | 1; /* odd: columns do not repeat */
     for (int pass = 0; pass < SPREAD_PASSES; pass++) {
         double sum = 0.0;
         int64_t count = 0;
-        for (int i = 0; i < f->width * f->height; i += stride) {
+        for (int i = 0; i < places; i += stride) {
             double snr = (double)(f->response[i] * f->per_noise[i]);
             if (snr < 0.0 && snr > -SPREAD_CLIP * spread) {
                 sum += snr * snr;
@@ -415,61 +423,56 @@ static double along_sigma_px(const bst_path_filter *f, double snr) {
     return SHIFTS;
 }
 
-/* Greatest product of two rows. */
-BST_CLONES
-static float highest_product(const float *a, const float *b, int count) {
-    float most[BLOCK];
-    int whole = count / BLOCK * BLOCK;
-    for (int k = 0; k < BLOCK; k++) {
-        most[k] = 0.0f;
+/* Filters a block again if it was before the latest subtraction. */
+static void refresh(bst_path_filter *f, int block) {
+    if (f->filtered[block] < f->subtractions) {
+        list_samples(f, block);
+        sum_light(f, block);
     }
-    for (int i = 0; i < whole; i += BLOCK) {
-        for (int k = 0; k < BLOCK; k++) {
-            float v = a[i + k] * b[i + k];
-            most[k] = v > most[k] ? v : most[k];
-        }
-    }
-    for (int i = whole; i < count; i++) {
-        most[0] = a[i] * b[i] > most[0] ? a[i] * b[i] : most[0];
-    }
-    for (int k = 1; k < BLOCK; k++) {
-        most[0] = most[k] > most[0] ? most[k] : most[0];
-    }
-    return most[0];
 }
 
-/* Place of the highest SNR; rows that have not changed keep theirs. -1: no SNR is positive. */
-static int highest_place(bst_path_filter *f) {
-    float best = 0.0f;
-    int row = -1, at;
-    for (int y = 0; y < f->height; y++) {
-        if (f->highest[y] < 0.0f) {
-            at = y * f->width;
-            f->highest[y] = highest_product(&f->response[at], &f->per_noise[at], f->width);
+/* Block with the highest SNR; -1: no SNR is positive. It and those about it are up to date. */
+static int highest_block(bst_path_filter *f) {
+    int best = -1;
+    do {
+        float most = 0.0f;
+        if (best >= 0) {
+            refresh(f, best);
+            most = f->highest[best];
         }
-        if (f->highest[y] > best) {
-            best = f->highest[y];
-            row = y;
+        for (int i = 0; i < f->blocks; i++) {
+            if (f->highest[i] > most) {
+                most = f->highest[i];
+                best = i;
+            }
+        }
+        if (!(most > 0.0f)) {
+            return -1;
+        }
+    } while (f->filtered[best] < f->subtractions);
+    const int x = best % f->columns, y = best / f->columns, rows = f->blocks / f->columns;
+    for (int k = 0; k < 9; k++) {
+        int i = x + k % 3 - 1, j = y + k / 3 - 1;
+        if (i >= 0 && j >= 0 && i < f->columns && j < rows) {
+            refresh(f, j * f->columns + i);
         }
     }
-    if (row < 0) {
-        return -1;
-    }
-    at = row * f->width;
-    while (f->response[at] * f->per_noise[at] < best) {
-        at++;
-    }
-    return at;
+    return best;
 }
 
 bool bst_path_filter_highest(bst_path_filter *f, bst_path_filter_peak *out) {
     assert(f && out);
-    int at = highest_place(f);
-    if (at < 0) {
+    const int block = highest_block(f);
+    if (block < 0) {
         return false;
     }
-    const float best = f->response[at] * f->per_noise[at];
-    const int x = at % f->width, y = at / f->width;
+    const float best = f->highest[block];
+    size_t at = (size_t)block * BLOCK * BLOCK;
+    while (f->response[at] * f->per_noise[at] < best) {
+        at++;
+    }
+    const int x = block % f->columns * BLOCK + (int)(at % BLOCK);
+    const int y = block / f->columns * BLOCK + (int)(at / BLOCK % BLOCK);
     bool whole = true;
     for (int k = 0; k < 9; k++) {
         whole = whole && snr_at(f, x + k % 3 - 1, y + k / 3 - 1) >= 0.0f;
@@ -501,106 +504,46 @@ bool bst_path_filter_highest(bst_path_filter *f, bst_path_filter_peak *out) {
     return true;
 }
 
-/* Rows of places. */
-typedef struct row_range {
-    int first, last;
-} row_range;
-
-/* Adds the response to a source at a place of the image, as a sum of points. */
-static void add_points(bst_path_filter *f, double x, double y, double amount, const double m[3],
-                       row_range *rows) {
-    const bst_star_path *p = f->path;
-    for (int k = 0; k < p->count; k++) {
-        double u = x - (m[0] * p->place[k][0] + m[1] * p->place[k][1]) + f->margin;
-        double v = y - (m[1] * p->place[k][0] + m[2] * p->place[k][1]) + f->margin;
-        if (!(u >= KERNEL && v >= KERNEL && u < f->width - 1 - KERNEL &&
-              v < f->height - 1 - KERNEL)) {
-            continue;
-        }
-        int i = (int)u, j = (int)v;
-        double a = u - i, b = v - j, value = amount * p->light[k];
-        float *at = &f->scratch[j * f->width + i];
-        at[0] += (float)((1.0 - a) * (1.0 - b) * value);
-        at[1] += (float)(a * (1.0 - b) * value);
-        at[f->width] += (float)((1.0 - a) * b * value);
-        at[f->width + 1] += (float)(a * b * value);
-        for (int r = j; r <= j + 1; r++) {
-            f->extent[r][0] = i < f->extent[r][0] ? i : f->extent[r][0];
-            f->extent[r][1] = i + 1 > f->extent[r][1] ? i + 1 : f->extent[r][1];
-        }
-        rows->first = j < rows->first ? j : rows->first;
-        rows->last = j + 1 > rows->last ? j + 1 : rows->last;
+/* Subtracts a point from the image, convolved as it is. */
+static void subtract_from_image(bst_path_filter *f, double x, double y, double amplitude) {
+    const int reach = (int)ceil(KERNEL * f->psf_sigma_px), i0 = (int)floor(x), j0 = (int)floor(y);
+    if (!(x > -reach && y > -reach && x < f->frame[0] + reach && y < f->frame[1] + reach)) {
+        return;
     }
-}
-
-/* Adds a row, scaled. */
-BST_CLONES
-static void add_scaled(float *restrict to, const float *restrict from, float by, int count) {
-    for (int x = 0; x < count; x++) {
-        to[x] += by * from[x];
+    const int left = i0 - reach > 0 ? i0 - reach : 0, top = j0 - reach > 0 ? j0 - reach : 0;
+    const int right = i0 + reach < f->frame[0] - 1 ? i0 + reach : f->frame[0] - 1;
+    const int bottom = j0 + reach < f->frame[1] - 1 ? j0 + reach : f->frame[1] - 1;
+    float along[2 * MOST_KERNEL + 1];
+    for (int i = left; i <= right; i++) {
+        along[i - left] = (float)correlation_at(f, (i - x) * (i - x));
     }
-}
-
-/* Convolves the points with the correlation of samples, subtracts them, and clears the scratch. */
-static void subtract_points(bst_path_filter *f, row_range rows) {
-    float kernel[2 * KERNEL + 1];
-    for (int k = -KERNEL; k <= KERNEL; k++) {
-        kernel[k + KERNEL] = (float)correlation_at(f, k * k);
-    }
-    const int w = f->width;
-    for (int y = rows.first; y <= rows.last; y++) {
-        const int from = f->extent[y][0], count = f->extent[y][1] - from + 1;
-        float *points = &f->scratch[y * w + from], *to = &f->blurred[y * w + from];
-        if (count < 1) {
-            continue;
-        }
-        memset(to - KERNEL, 0, (size_t)(count + 2 * KERNEL) * sizeof *to);
-        for (int k = -KERNEL; k <= KERNEL; k++) {
-            add_scaled(to - k, points, kernel[k + KERNEL], count);
-        }
-        memset(points, 0, (size_t)count * sizeof *points);
-    }
-    for (int k = -KERNEL; k <= KERNEL; k++) {
-        for (int y = rows.first; y <= rows.last; y++) {
-            const int from = f->extent[y][0] - KERNEL;
-            if (f->extent[y][1] >= 0) {
-                add_scaled(&f->response[(y + k) * w + from], &f->blurred[y * w + from],
-                           -kernel[k + KERNEL], f->extent[y][1] + KERNEL - from + 1);
-            }
+    for (int j = top; j <= bottom; j++) {
+        float *row = f->image + (size_t)(j + BLOCK) * f->stride + BLOCK;
+        float value = (float)(amplitude * correlation_at(f, (j - y) * (j - y)));
+        for (int i = left; i <= right; i++) {
+            row[i] -= value * along[i - left];
         }
     }
-    empty_rows(f, rows.first, rows.last);
-    forget_rows(f, rows.first - KERNEL, rows.last + KERNEL);
 }
 
 void bst_path_filter_subtract(bst_path_filter *f, const bst_path_filter_peak *peak) {
     assert(f && peak);
     const bst_star_path *p = f->path;
-    const double right = 2.0 * p->centre[0], bottom = 2.0 * p->centre[1];
-    double m[3], there[3];
-    row_range rows = {f->height, -1};
+    double m[3];
     bst_star_path_map(p, peak->x_px, peak->y_px, m);
     for (int l = 0; l < p->count; l++) {
         double x = peak->x_px + m[0] * p->place[l][0] + m[1] * p->place[l][1];
         double y = peak->y_px + m[1] * p->place[l][0] + m[2] * p->place[l][1];
-        if (x < 0.0 || y < 0.0 || x > right || y > bottom) {
-            continue;
-        }
-        /* places whose sample k lies here are about as far from here as the star itself is */
-        bst_star_path_map(p, x, y, there);
-        add_points(f, x, y, peak->amplitude * p->light[l], there, &rows);
+        subtract_from_image(f, x, y, peak->amplitude * p->light[l]);
     }
-    subtract_points(f, rows);
+    f->subtractions++;
 }
 
 void bst_path_filter_subtract_point(bst_path_filter *f, double x_px, double y_px,
                                     double amplitude) {
     assert(f);
-    double m[3];
-    row_range rows = {f->height, -1};
-    bst_star_path_map(f->path, x_px, y_px, m);
-    add_points(f, x_px, y_px, amplitude, m, &rows);
-    subtract_points(f, rows);
+    subtract_from_image(f, x_px, y_px, amplitude);
+    f->subtractions++;
 }
 
 void bst_path_filter_leave_out(bst_path_filter *f, const bst_path_filter_peak *peak,
@@ -613,9 +556,9 @@ void bst_path_filter_leave_out(bst_path_filter *f, const bst_path_filter_peak *p
     for (int y = y0; y <= y1; y++) {
         for (int x = x0; x <= x1; x++) {
             if (hypot(x - cx, y - cy) <= radius_px) {
-                f->per_noise[y * f->width + x] = 0.0f;
+                f->per_noise[index_of(f, x, y)] = 0.0f;
+                f->filtered[y / BLOCK * f->columns + x / BLOCK] = -1;
             }
         }
     }
-    forget_rows(f, y0, y1);
 }
