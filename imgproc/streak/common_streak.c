@@ -81,9 +81,11 @@ static void measure_cell(finder *f, int cx, int cy, float out[2]) {
             }
         }
     }
+    /* which leaves the values up to it in front */
     out[0] = count > 0 ? bst_value_of_rank(f->scratch, count, count / 2) : 0.0f;
-    out[1] =
-        count > 0 ? (out[0] - bst_value_of_rank(f->scratch, count, count / 4)) / 0.6745f : 0.0f;
+    out[1] = count > 0
+                 ? (out[0] - bst_value_of_rank(f->scratch, count / 2 + 1, count / 4)) / 0.6745f
+                 : 0.0f;
 }
 
 /* Removes a very uneven background, as of the Earth's limb or a ghost: levels of cells, between
