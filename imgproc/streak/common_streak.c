@@ -8,10 +8,13 @@
 #include "boresight/vec.h"
 #include "imgproc/streak/common_streak_internal.h"
 #include "imgproc/value_of_rank.h"
+#include "sim/core/simd.h"
 
 /* LINE_HALF: samples of a line on either side of a pixel, LINE_STEP px apart. */
 enum { LINE_HALF = 5, LINE_STEP = 2, DIRECTIONS = 16, LINE_REACH = BST_STREAK_LINE_REACH };
 enum { MOST_REACH = 12, REFINING_STARS = 15 };
+/* Columns whose medians are taken together. */
+enum { COLUMNS = 16 };
 /* Side of the cells of an uneven background, px. */
 enum { CELL = 32 };
 enum { OVERLAP = 12 }; /* samples on either side: MOST_PSF_SIGMA_PX six times over */
@@ -78,9 +81,11 @@ static void measure_cell(finder *f, int cx, int cy, float out[2]) {
             }
         }
     }
+    /* which leaves the values up to it in front */
     out[0] = count > 0 ? bst_value_of_rank(f->scratch, count, count / 2) : 0.0f;
-    out[1] =
-        count > 0 ? (out[0] - bst_value_of_rank(f->scratch, count, count / 4)) / 0.6745f : 0.0f;
+    out[1] = count > 0
+                 ? (out[0] - bst_value_of_rank(f->scratch, count / 2 + 1, count / 4)) / 0.6745f
+                 : 0.0f;
 }
 
 /* Removes a very uneven background, as of the Earth's limb or a ghost: levels of cells, between
@@ -129,13 +134,21 @@ static bool flatten(finder *f) {
 static void clean(finder *f) {
     const int w = f->width, h = f->height;
     float *scratch = f->scratch;
-    for (int x = 0; x < w; x++) {
-        for (int y = 0; y < h; y++) {
-            scratch[y] = f->image[(size_t)y * (size_t)w + (size_t)x];
+    for (int x0 = 0; x0 < w; x0 += COLUMNS) {
+        const int columns = x0 + COLUMNS < w ? COLUMNS : w - x0;
+        float level[COLUMNS];
+        for (int y = 0; y < h; y++) { /* a cache line of each row */
+            for (int x = 0; x < columns; x++) {
+                scratch[x * h + y] = f->image[(size_t)y * (size_t)w + (size_t)(x0 + x)];
+            }
         }
-        float level = median(scratch, h);
+        for (int x = 0; x < columns; x++) {
+            level[x] = median(&scratch[x * h], h);
+        }
         for (int y = 0; y < h; y++) {
-            f->image[(size_t)y * (size_t)w + (size_t)x] -= level;
+            for (int x = 0; x < columns; x++) {
+                f->image[(size_t)y * (size_t)w + (size_t)(x0 + x)] -= level[x];
+            }
         }
     }
     for (int y = 0; y < h; y++) {
@@ -175,6 +188,14 @@ static void remove_hot_pixels(finder *f) {
     }
 }
 
+/* Adds a row, scaled. */
+BST_CLONES
+static void add_scaled(float *restrict to, const float *restrict from, float by, int count) {
+    for (int x = 0; x < count; x++) {
+        to[x] += by * from[x];
+    }
+}
+
 void bst_streak_finder_convolve(finder *f, const float *from_image, float *to_image,
                                 double sigma_px, bool squared) {
     const int w = f->width, h = f->height, reach = (int)ceil(3.0 * sigma_px);
@@ -194,21 +215,14 @@ void bst_streak_finder_convolve(finder *f, const float *from_image, float *to_im
         float *to = &f->scratch[y * w];
         memset(to, 0, (size_t)w * sizeof *to);
         for (int k = -reach; k <= reach; k++) {
-            const float *from = &from_image[y * w + k], c = kernel[k + reach];
-            int last = k > 0 ? w - k : w;
-            for (int x = k < 0 ? -k : 0; x < last; x++) {
-                to[x] += c * from[x];
-            }
+            int first = k < 0 ? -k : 0, last = k > 0 ? w - k : w;
+            add_scaled(to + first, &from_image[y * w + k + first], kernel[k + reach], last - first);
         }
     }
     for (int y = 0; y < h; y++) {
         for (int k = -reach; k <= reach; k++) {
-            if (y + k < 0 || y + k >= h) {
-                continue;
-            }
-            const float *from = &f->scratch[(y + k) * w], c = kernel[k + reach];
-            for (int x = 0; x < w; x++) {
-                to_image[y * w + x] += c * from[x];
+            if (y + k >= 0 && y + k < h) {
+                add_scaled(&to_image[y * w], &f->scratch[(y + k) * w], kernel[k + reach], w);
             }
         }
     }
@@ -218,6 +232,20 @@ void bst_streak_finder_convolve(finder *f, const float *from_image, float *to_im
 static void convolve(finder *f, double sigma_px) {
     bst_streak_finder_convolve(f, f->image, f->smooth, sigma_px, false);
     f->psf_sigma_px = sigma_px;
+}
+
+/* Raises places of a row to the sums along the lines through them. */
+BST_CLONES
+static void raise_to_line(float *restrict to, const float *restrict from,
+                          const int offset[2 * LINE_HALF + 1], float scale, int count) {
+    for (int x = 0; x < count; x++) {
+        float sum = 0.0f;
+        for (int k = 0; k <= 2 * LINE_HALF; k++) {
+            sum += from[x + offset[k]];
+        }
+        sum *= scale;
+        to[x] = sum > to[x] ? sum : to[x];
+    }
 }
 
 /* Largest mean along short lines of many directions through each pixel, in units of its noise. */
@@ -236,14 +264,7 @@ static void filter_lines(finder *f) {
         for (int y = LINE_REACH; y < h - LINE_REACH; y++) {
             float *to = &f->lines[y * w];
             const float *from = &f->smooth[y * w];
-            for (int x = LINE_REACH; x < w - LINE_REACH; x++) {
-                float sum = 0.0f;
-                for (int k = 0; k <= 2 * LINE_HALF; k++) {
-                    sum += from[x + offset[k]];
-                }
-                sum *= scale;
-                to[x] = sum > to[x] ? sum : to[x];
-            }
+            raise_to_line(to + LINE_REACH, from + LINE_REACH, offset, scale, w - 2 * LINE_REACH);
         }
     }
 }
@@ -285,9 +306,9 @@ typedef struct wanted {
 static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_common_streak *out) {
     const bst_star_path_image image = image_of(f);
     const int most = q->most;
-    bst_path_filter *filter;
-    BST_TRY(
-        bst_path_filter_create(ctx, &f->path, &image, f->psf_sigma_px, q->least_inside, &filter));
+    BST_TRY(bst_path_filter_renew(ctx, &f->path, &image, NULL, f->psf_sigma_px, q->least_inside,
+                                  &f->filter));
+    bst_path_filter *filter = f->filter;
     const bool point = f->path.count == 1;
     out->items = f->items;
     out->count = 0;
@@ -327,7 +348,6 @@ static bst_status find_stars(bst_ctx *ctx, finder *f, const wanted *q, bst_commo
                                       peak.snr > BRIGHT_SNR ? GHOST_PX : BST_STREAK_CLOSE_PX);
         }
     }
-    bst_path_filter_free(filter);
     return BST_OK;
 }
 
@@ -527,6 +547,7 @@ void bst_streak_finder_free(bst_streak_finder *f) {
     if (!f) {
         return;
     }
+    bst_path_filter_free(f->filter);
     free(f->image);
     free(f->label);
     free(f->items);

@@ -34,6 +34,7 @@ struct bst_streak_finder {
     double point[2];      /* place of the point source that was removed last; NAN: none was */
     int count;            /* pixels on the stack: those of the latest source */
     bst_star_path path;
+    bst_path_filter *filter; /* of the latest search; NULL: none yet */
     bst_common_streak_options options;
     bst_detection *items; /* [max_sources + REFINING_STARS] */
     bst_streak_shape shapes[BST_STREAK_SHAPES];

@@ -6,8 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "sim/core/simd.h"
+
 /* BLOCK: side of the squares over which the path's shape changes by less than a pixel. */
 enum { BLOCK = 16, KERNEL = 5, SHIFTS = 24 };
+/* Widest PSF and its reach, px. */
+enum { MOST_SIGMA = 4, MOST_KERNEL = KERNEL * MOST_SIGMA };
 /* Passes of the clipped spread, the places that it needs, and those that it takes. */
 enum { SPREAD_PASSES = 3, LEAST_PLACES = 1000, SPREAD_PLACES = 65536 };
 
@@ -19,19 +23,43 @@ static const double REACH_SHARE = 12.0, MOST_REACH = 10.0;
 /* Standard deviation of the place along a streak: the shift at which the expected logarithm of the
  * likelihood falls by this; calibrated by tests/imgproc/streak_fields.c. */
 static const double ALONG_LOSS = 0.5;
+/* Least share of the path inside the frame over what is asked: weights may exceed 1 a little. */
+static const double WEIGHED = 0.8;
 
 /* Values of the response beyond this are clipped; mean square of a normal deviate up to it:
  * 1 - 2 c phi(c) / erf(c / sqrt(2)) */
 static const double SPREAD_CLIP = 3.0, SPREAD_SHARE = 0.9733;
 
+#define BST_SIMD_KERNELS "imgproc/streak/path_filter_kernels.inc"
+#include "sim/core/simd_each.inc"
+
+/* Samples of the path whose light some places of a block have in the frame. */
+typedef struct block_samples {
+    int count;
+    int shift[BST_STAR_PATH_ROOM][2]; /* of all samples, whole pixels */
+    const float *image[BST_STAR_PATH_ROOM], *weights[BST_STAR_PATH_ROOM];
+    float light[BST_STAR_PATH_ROOM], squared[BST_STAR_PATH_ROOM];
+    bool whole; /* all samples of all places are inside */
+} block_samples;
+
+/* Subtractions change the image. A block of places is filtered again when its highest SNR, which
+ * they can only lower, is the highest of all. */
 struct bst_path_filter {
     const bst_star_path *path;
-    int margin;         /* of places outside the frame, px */
-    int width, height;  /* of the arrays below: the frame and its margins */
-    float *response;    /* [height][width] */
-    float *per_noise;   /* [height][width] one over the noise of the response; 0: not searched */
-    int *highest;       /* [height] place of a row's highest SNR; -1: not known */
-    float *scratch[2];  /* [height][width] of a star's response; zero between calls */
+    block_samples samples;  /* of the latest block */
+    int margin;             /* of places outside the frame, px */
+    int width, height;      /* of the places: the frame and its margins */
+    int columns, blocks;    /* of places: in a row, in all */
+    size_t places, pixels;  /* that there is memory for */
+    int frame[2];           /* width and height of the frame */
+    size_t stride;          /* of the two images below */
+    float *image, *weights; /* the input with BLOCK zeros on all sides */
+    bool equal;             /* all weights are 1 */
+    float *response;        /* [blocks][BLOCK][BLOCK] */
+    float *per_noise;       /* likewise: one over the noise of the response; 0: not searched */
+    float *highest;         /* [blocks] highest SNR when the block was filtered */
+    int *filtered;          /* [blocks] subtractions before that; -1: to be filtered again */
+    int subtractions;
     double correlation; /* variance of the response over the sum of the squared light */
     double squares;     /* sum of the squared light of the whole path */
     double psf_sigma_px;
@@ -41,27 +69,47 @@ struct bst_path_filter {
     double loss[SHIFTS]; /* share of the response that a shift by so many px along loses */
 };
 
-void bst_path_filter_free(bst_path_filter *f) {
-    if (!f) {
-        return;
-    }
+static void free_memory(bst_path_filter *f) {
+    free(f->image);
+    free(f->weights);
     free(f->response);
     free(f->per_noise);
     free(f->highest);
-    free(f->scratch[0]);
-    free(f->scratch[1]);
-    free(f);
+    free(f->filtered);
 }
 
-/* Greatest distance from the middle in x or y, with the map of the frame's corner. */
-static int margin_of(const bst_star_path *p) {
-    double most = 0.0, m[3];
+void bst_path_filter_free(bst_path_filter *f) {
+    if (f) {
+        free_memory(f);
+        free(f);
+    }
+}
+
+/* Greatest distance from the frame in x or y at which it has the least share of the path, with the
+ * map of its corner. */
+static int margin_of(const bst_path_filter *f) {
+    const bst_star_path *p = f->path;
+    double share[BST_STAR_PATH_ROOM + 1] = {0}, m[3], least = 0.0;
     bst_star_path_map(p, 2.0 * p->centre[0], 2.0 * p->centre[1], m);
     for (int k = 0; k < p->count; k++) {
-        double u = fabs(p->place[k][0]), v = fabs(p->place[k][1]);
-        most = fmax(most, fmax(m[0] * u + fabs(m[1]) * v, fabs(m[1]) * u + m[2] * v));
+        least += WEIGHED * f->least_inside * p->light[k] * p->light[k];
     }
-    return (int)ceil(most) + 2;
+    int most = 0;
+    for (int side = 0; side < 4; side++) {
+        double sum = 0.0;
+        memset(share, 0, sizeof share);
+        for (int k = 0; k < p->count; k++) {
+            double u = p->place[k][side % 2], v = fabs(p->place[k][1 - side % 2]);
+            double d = m[side % 2 ? 2 : 0] * (side < 2 ? u : -u) + fabs(m[1]) * v;
+            int at = (int)fmax(fmin(ceil(d), BST_STAR_PATH_ROOM), 0.0);
+            share[at] += p->light[k] * p->light[k];
+        }
+        for (int d = BST_STAR_PATH_ROOM; d > most; d--) {
+            sum += share[d];
+            most = sum >= least ? d : most;
+        }
+    }
+    return most + 2;
 }
 
 /* Correlation of two samples of the image at a distance. */
@@ -88,6 +136,7 @@ static double response_at(const bst_path_filter *f, double shift_px) {
 
 static void measure_path(bst_path_filter *f) {
     const bst_star_path *p = f->path;
+    f->squares = 0.0;
     for (int k = 0; k < p->count; k++) {
         f->squares += p->light[k] * p->light[k];
     }
@@ -105,64 +154,145 @@ static void measure_path(bst_path_filter *f) {
     }
 }
 
-/* Marks rows whose response changes. */
-static void forget_rows(bst_path_filter *f, int first, int last) {
-    for (int y = first < 0 ? 0 : first; y <= last && y < f->height; y++) {
-        f->highest[y] = -1;
+/* Nearest whole number, halves away from zero. */
+static int nearest(double v) {
+    return (int)(v < 0.0 ? v - 0.5 : v + 0.5);
+}
+
+/* Shifts of the path's samples at a place, to whole pixels. */
+BST_CLONES
+static void shift_samples(const double (*place)[2], int count, const double m[3],
+                          int (*restrict shift)[2]) {
+    for (int k = 0; k < count; k++) {
+        shift[k][0] = nearest(m[0] * place[k][0] + m[1] * place[k][1]);
+        shift[k][1] = nearest(m[1] * place[k][0] + m[2] * place[k][1]);
     }
 }
 
-/* Sums the image along the path for a block of places. */
-static void filter_block(bst_path_filter *f, const bst_star_path_image *image, const float *weights,
-                         int bx, int by) {
+static void list_samples(bst_path_filter *f, int block) {
     const bst_star_path *p = f->path;
-    const int x1 = bx + BLOCK < f->width ? bx + BLOCK : f->width;
-    const int y1 = by + BLOCK < f->height ? by + BLOCK : f->height;
-    float light[BLOCK][BLOCK] = {{0}}, squares[BLOCK][BLOCK] = {{0}};
+    const int bx = block % f->columns * BLOCK, by = block / f->columns * BLOCK;
+    const int width = f->frame[0], height = f->frame[1];
+    block_samples *out = &f->samples;
     double m[3];
-    float all = 0.0f;      /* squared light of the whole path */
-    bool whole = !weights; /* all samples of all places are inside */
+    out->count = 0;
+    out->whole = true;
     bst_star_path_map(p, bx + 0.5 * BLOCK - f->margin, by + 0.5 * BLOCK - f->margin, m);
+    shift_samples(p->place, p->count, m, out->shift);
     for (int k = 0; k < p->count; k++) {
-        double u = p->place[k][0], v = p->place[k][1];
-        int dx = (int)lround(m[0] * u + m[1] * v) - f->margin;
-        int dy = (int)lround(m[1] * u + m[2] * v) - f->margin;
+        int x = bx + out->shift[k][0] - f->margin, y = by + out->shift[k][1] - f->margin;
+        out->whole = out->whole && x >= 0 && x + BLOCK <= width && y >= 0 && y + BLOCK <= height;
+        if (x <= -BLOCK || x >= width || y <= -BLOCK || y >= height) {
+            continue;
+        }
+        size_t at = (size_t)(y + BLOCK) * f->stride + (size_t)(x + BLOCK);
         float w = (float)p->light[k];
-        all += w * w;
-        whole = whole && bx + dx >= 0 && x1 + dx <= image->width && by + dy >= 0 &&
-                y1 + dy <= image->height;
+        out->image[out->count] = f->image + at;
+        out->weights[out->count] = f->weights + at;
+        out->light[out->count] = w;
+        out->squared[out->count++] = w * w;
     }
-    for (int k = 0; k < p->count; k++) {
-        double u = p->place[k][0], v = p->place[k][1];
-        int dx = (int)lround(m[0] * u + m[1] * v) - f->margin;
-        int dy = (int)lround(m[1] * u + m[2] * v) - f->margin;
-        float w = (float)p->light[k], w2 = w * w;
-        int from = bx + dx < 0 ? -dx : bx, to = x1 + dx > image->width ? image->width - dx : x1;
-        for (int y = by + dy < 0 ? -dy : by; y < y1 && y + dy < image->height; y++) {
-            const float *row = &image->values[(y + dy) * image->width + dx];
-            for (int x = from; x < to; x++) {
-                light[y - by][x - bx] += w * row[x];
-            }
-            if (weights) {
-                const float *share = &weights[(y + dy) * image->width + dx];
-                for (int x = from; x < to; x++) {
-                    squares[y - by][x - bx] += w2 * share[x];
-                }
-            }
-            for (int x = from; x < to && !whole && !weights; x++) {
-                squares[y - by][x - bx] += w2;
-            }
+}
+
+/* Greatest product of two arrays of a block. */
+BST_CLONES
+static float highest_product(const float *a, const float *b) {
+    float most[BLOCK] = {0.0f};
+    for (int i = 0; i < BLOCK * BLOCK; i += BLOCK) {
+        for (int k = 0; k < BLOCK; k++) {
+            float v = a[i + k] * b[i + k];
+            most[k] = v > most[k] ? v : most[k];
         }
     }
-    for (int y = by; y < y1; y++) {
-        for (int x = bx; x < x1; x++) {
-            double share = (double)(whole ? all : squares[y - by][x - bx]) / f->squares;
-            f->response[y * f->width + x] = light[y - by][x - bx];
-            f->per_noise[y * f->width + x] =
-                share < f->least_inside ? 0.0f
-                                        : (float)(1.0 / sqrt(share * f->squares * f->correlation));
+    for (int k = 1; k < BLOCK; k++) {
+        most[0] = most[k] > most[0] ? most[k] : most[0];
+    }
+    return most[0];
+}
+
+/* Sums the image along the path for the places of a block; its samples are listed. */
+static void sum_light(bst_path_filter *f, int block) {
+    const block_samples *s = &f->samples;
+    float *response = f->response + (size_t)block * BLOCK * BLOCK;
+    BST_SIMD_PICK(sum_block)(s->image, s->light, s->count, f->stride, response);
+    f->highest[block] = highest_product(response, f->per_noise + (size_t)block * BLOCK * BLOCK);
+    f->filtered[block] = f->subtractions;
+}
+
+/* One over the noise of the response at the places of a block, from the sums of squares there. */
+BST_CLONES
+static void invert_noise(float *values, double squares, double least_inside, double correlation) {
+    for (int i = 0; i < BLOCK * BLOCK; i++) {
+        double share = (double)values[i] / squares;
+        double v = 1.0 / sqrt(share * squares * correlation);
+        values[i] = share < least_inside ? 0.0f : (float)v;
+    }
+}
+
+/* Filters a block of places for the first time. */
+static void filter_block(bst_path_filter *f, int block) {
+    const block_samples *s = &f->samples;
+    float *per_noise = f->per_noise + (size_t)block * BLOCK * BLOCK;
+    double most = 0.0;
+    list_samples(f, block);
+    for (int k = 0; k < s->count; k++) {
+        most += (double)s->squared[k];
+    }
+    f->highest[block] = 0.0f;
+    f->filtered[block] = 0;
+    if (f->equal && most < f->least_inside * f->squares) {
+        /* no place of the block has enough of the path inside */
+        memset(per_noise, 0, sizeof(float) * BLOCK * BLOCK);
+        memset(f->response + (size_t)block * BLOCK * BLOCK, 0, sizeof(float) * BLOCK * BLOCK);
+        return;
+    }
+    if (f->equal && s->whole) {
+        for (int i = 0; i < BLOCK * BLOCK; i++) {
+            per_noise[i] = (float)(1.0 / sqrt(f->squares * f->correlation));
+        }
+    } else {
+        BST_SIMD_PICK(sum_block)(s->weights, s->squared, s->count, f->stride, per_noise);
+        invert_noise(per_noise, f->squares, f->least_inside, f->correlation);
+    }
+    sum_light(f, block);
+}
+
+/* Copies an image into a padded one; NULL: ones. */
+static void pad_image(const bst_path_filter *f, float *to, const float *values) {
+    const int width = f->frame[0], height = f->frame[1];
+    memset(to, 0, f->stride * ((size_t)height + 2 * BLOCK) * sizeof *to);
+    for (int y = 0; y < height; y++) {
+        float *row = to + (size_t)(y + BLOCK) * f->stride + BLOCK;
+        for (int x = 0; x < width && !values; x++) {
+            row[x] = 1.0f;
+        }
+        if (values) {
+            memcpy(row, values + (size_t)y * (size_t)width, (size_t)width * sizeof *row);
         }
     }
+}
+
+/* Makes room for the places of a filter and its input. */
+static bst_status make_room(bst_ctx *ctx, bst_path_filter *f) {
+    const size_t blocks = (size_t)f->blocks, places = blocks * BLOCK * BLOCK;
+    const size_t pixels = f->stride * ((size_t)f->frame[1] + 2 * BLOCK);
+    if (places <= f->places && pixels <= f->pixels) {
+        return BST_OK;
+    }
+    free_memory(f);
+    f->places = places;
+    f->pixels = pixels;
+    f->image = malloc(pixels * sizeof *f->image);
+    f->weights = malloc(pixels * sizeof *f->weights);
+    f->response = malloc(places * sizeof *f->response);
+    f->per_noise = malloc(places * sizeof *f->per_noise);
+    f->highest = malloc(blocks * sizeof *f->highest);
+    f->filtered = malloc(blocks * sizeof *f->filtered);
+    if (!f->image || !f->weights || !f->response || !f->per_noise || !f->highest || !f->filtered) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter of %d x %d px",
+                        f->frame[0], f->frame[1]);
+    }
+    return BST_OK;
 }
 
 bst_status bst_path_filter_create(bst_ctx *ctx, const bst_star_path *path,
@@ -175,55 +305,71 @@ bst_status bst_path_filter_create_weighted(bst_ctx *ctx, const bst_star_path *pa
                                            const bst_star_path_image *image, const float *weights,
                                            double psf_sigma_px, double least_inside,
                                            bst_path_filter **out) {
-    assert(path && path->count > 0 && image && psf_sigma_px > 0.0 && least_inside > 0.0 && out);
     *out = NULL;
-    bst_path_filter *f = calloc(1, sizeof *f);
+    return bst_path_filter_renew(ctx, path, image, weights, psf_sigma_px, least_inside, out);
+}
+
+bst_status bst_path_filter_renew(bst_ctx *ctx, const bst_star_path *path,
+                                 const bst_star_path_image *image, const float *weights,
+                                 double psf_sigma_px, double least_inside, bst_path_filter **out) {
+    assert(path && path->count > 0 && image && psf_sigma_px > 0.0 && psf_sigma_px <= MOST_SIGMA &&
+           least_inside > 0.0 && out);
+    bst_path_filter *f = *out ? *out : calloc(1, sizeof *f);
     if (!f) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter");
     }
+    *out = f;
     f->path = path;
     f->psf_sigma_px = psf_sigma_px;
     f->least_inside = least_inside;
-    f->margin = margin_of(path);
+    f->equal = !weights;
+    f->margin = margin_of(f);
     f->width = image->width + 2 * f->margin;
     f->height = image->height + 2 * f->margin;
-    size_t places = (size_t)f->width * (size_t)f->height;
-    f->response = malloc(places * sizeof *f->response);
-    f->per_noise = malloc(places * sizeof *f->per_noise);
-    f->highest = malloc((size_t)f->height * sizeof *f->highest);
-    f->scratch[0] = calloc(places, sizeof *f->scratch[0]);
-    f->scratch[1] = calloc(places, sizeof *f->scratch[1]);
-    if (!f->response || !f->per_noise || !f->highest || !f->scratch[0] || !f->scratch[1]) {
+    f->columns = (f->width + BLOCK - 1) / BLOCK;
+    f->blocks = f->columns * ((f->height + BLOCK - 1) / BLOCK);
+    f->frame[0] = image->width;
+    f->frame[1] = image->height;
+    f->stride = (size_t)image->width + 2 * BLOCK;
+    f->subtractions = 0;
+    bst_status status = make_room(ctx, f);
+    if (status != BST_OK) {
         bst_path_filter_free(f);
-        return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for a matched filter of %d x %d px",
-                        image->width, image->height);
+        *out = NULL;
+        return status;
     }
-    forget_rows(f, 0, f->height - 1);
     measure_path(f);
-    for (int y = 0; y < f->height; y += BLOCK) {
-        for (int x = 0; x < f->width; x += BLOCK) {
-            filter_block(f, image, weights, x, y);
-        }
+    pad_image(f, f->image, image->values);
+    pad_image(f, f->weights, weights);
+    for (int i = 0; i < f->blocks; i++) {
+        filter_block(f, i);
     }
-    *out = f;
     return BST_OK;
 }
 
+/* Index of a place in arrays by blocks. */
+static size_t index_of(const bst_path_filter *f, int x, int y) {
+    size_t block = (size_t)(y / BLOCK * f->columns + x / BLOCK);
+    return (block * BLOCK + (size_t)(y % BLOCK)) * BLOCK + (size_t)(x % BLOCK);
+}
+
 static float snr_at(const bst_path_filter *f, int x, int y) {
-    if (x < 0 || y < 0 || x >= f->width || y >= f->height || f->per_noise[y * f->width + x] == 0) {
+    if (x < 0 || y < 0 || x >= f->width || y >= f->height) {
         return -1.0f;
     }
-    return f->response[y * f->width + x] * f->per_noise[y * f->width + x];
+    size_t at = index_of(f, x, y);
+    return f->per_noise[at] > 0.0f ? f->response[at] * f->per_noise[at] : -1.0f;
 }
 
 double bst_path_filter_spread(const bst_path_filter *f) {
     assert(f);
     double spread = 1.0;
-    const int stride = f->width * f->height / SPREAD_PLACES | 1; /* odd: columns do not repeat */
+    const int places = f->blocks * BLOCK * BLOCK;
+    const int stride = places / SPREAD_PLACES | 1; /* odd: columns do not repeat */
     for (int pass = 0; pass < SPREAD_PASSES; pass++) {
         double sum = 0.0;
         int64_t count = 0;
-        for (int i = 0; i < f->width * f->height; i += stride) {
+        for (int i = 0; i < places; i += stride) {
             double snr = (double)(f->response[i] * f->per_noise[i]);
             if (snr < 0.0 && snr > -SPREAD_CLIP * spread) {
                 sum += snr * snr;
@@ -277,32 +423,56 @@ static double along_sigma_px(const bst_path_filter *f, double snr) {
     return SHIFTS;
 }
 
-/* Place of the highest SNR; rows that have not changed keep theirs. */
-static int highest_place(bst_path_filter *f) {
-    int best = 0;
-    for (int y = 0; y < f->height; y++) {
-        if (f->highest[y] < 0) {
-            int at = y * f->width;
-            for (int i = at; i < (y + 1) * f->width; i++) {
-                at = f->response[i] * f->per_noise[i] > f->response[at] * f->per_noise[at] ? i : at;
-            }
-            f->highest[y] = at;
+/* Filters a block again if it was before the latest subtraction. */
+static void refresh(bst_path_filter *f, int block) {
+    if (f->filtered[block] < f->subtractions) {
+        list_samples(f, block);
+        sum_light(f, block);
+    }
+}
+
+/* Block with the highest SNR; -1: no SNR is positive. It and those about it are up to date. */
+static int highest_block(bst_path_filter *f) {
+    int best = -1;
+    do {
+        float most = 0.0f;
+        if (best >= 0) {
+            refresh(f, best);
+            most = f->highest[best];
         }
-        int at = f->highest[y];
-        best =
-            f->response[at] * f->per_noise[at] > f->response[best] * f->per_noise[best] ? at : best;
+        for (int i = 0; i < f->blocks; i++) {
+            if (f->highest[i] > most) {
+                most = f->highest[i];
+                best = i;
+            }
+        }
+        if (!(most > 0.0f)) {
+            return -1;
+        }
+    } while (f->filtered[best] < f->subtractions);
+    const int x = best % f->columns, y = best / f->columns, rows = f->blocks / f->columns;
+    for (int k = 0; k < 9; k++) {
+        int i = x + k % 3 - 1, j = y + k / 3 - 1;
+        if (i >= 0 && j >= 0 && i < f->columns && j < rows) {
+            refresh(f, j * f->columns + i);
+        }
     }
     return best;
 }
 
 bool bst_path_filter_highest(bst_path_filter *f, bst_path_filter_peak *out) {
     assert(f && out);
-    int at = highest_place(f);
-    float best = f->response[at] * f->per_noise[at];
-    if (!(best > 0.0f)) {
+    const int block = highest_block(f);
+    if (block < 0) {
         return false;
     }
-    const int x = at % f->width, y = at / f->width;
+    const float best = f->highest[block];
+    size_t at = (size_t)block * BLOCK * BLOCK;
+    while (f->response[at] * f->per_noise[at] < best) {
+        at++;
+    }
+    const int x = block % f->columns * BLOCK + (int)(at % BLOCK);
+    const int y = block / f->columns * BLOCK + (int)(at / BLOCK % BLOCK);
     bool whole = true;
     for (int k = 0; k < 9; k++) {
         whole = whole && snr_at(f, x + k % 3 - 1, y + k / 3 - 1) >= 0.0f;
@@ -334,103 +504,46 @@ bool bst_path_filter_highest(bst_path_filter *f, bst_path_filter_peak *out) {
     return true;
 }
 
-/* A rectangle of places. */
-typedef struct rectangle {
-    int x0, y0, x1, y1;
-} rectangle;
-
-/* Adds the response to a source at a place of the image, as a sum of points. */
-static void add_points(bst_path_filter *f, double x, double y, double amount, const double m[3],
-                       rectangle *box) {
-    const bst_star_path *p = f->path;
-    for (int k = 0; k < p->count; k++) {
-        double u = x - (m[0] * p->place[k][0] + m[1] * p->place[k][1]) + f->margin;
-        double v = y - (m[1] * p->place[k][0] + m[2] * p->place[k][1]) + f->margin;
-        int i = (int)floor(u), j = (int)floor(v);
-        if (i < KERNEL || j < KERNEL || i + 1 + KERNEL >= f->width || j + 1 + KERNEL >= f->height) {
-            continue;
+/* Subtracts a point from the image, convolved as it is. */
+static void subtract_from_image(bst_path_filter *f, double x, double y, double amplitude) {
+    const int reach = (int)ceil(KERNEL * f->psf_sigma_px), i0 = (int)floor(x), j0 = (int)floor(y);
+    if (!(x > -reach && y > -reach && x < f->frame[0] + reach && y < f->frame[1] + reach)) {
+        return;
+    }
+    const int left = i0 - reach > 0 ? i0 - reach : 0, top = j0 - reach > 0 ? j0 - reach : 0;
+    const int right = i0 + reach < f->frame[0] - 1 ? i0 + reach : f->frame[0] - 1;
+    const int bottom = j0 + reach < f->frame[1] - 1 ? j0 + reach : f->frame[1] - 1;
+    float along[2 * MOST_KERNEL + 1];
+    for (int i = left; i <= right; i++) {
+        along[i - left] = (float)correlation_at(f, (i - x) * (i - x));
+    }
+    for (int j = top; j <= bottom; j++) {
+        float *row = f->image + (size_t)(j + BLOCK) * f->stride + BLOCK;
+        float value = (float)(amplitude * correlation_at(f, (j - y) * (j - y)));
+        for (int i = left; i <= right; i++) {
+            row[i] -= value * along[i - left];
         }
-        double a = u - i, b = v - j, value = amount * p->light[k];
-        float *at = &f->scratch[0][j * f->width + i];
-        at[0] += (float)((1.0 - a) * (1.0 - b) * value);
-        at[1] += (float)(a * (1.0 - b) * value);
-        at[f->width] += (float)((1.0 - a) * b * value);
-        at[f->width + 1] += (float)(a * b * value);
-        box->x0 = i < box->x0 ? i : box->x0;
-        box->y0 = j < box->y0 ? j : box->y0;
-        box->x1 = i + 1 > box->x1 ? i + 1 : box->x1;
-        box->y1 = j + 1 > box->y1 ? j + 1 : box->y1;
-    }
-}
-
-/* Convolves the points with the correlation of samples, subtracts them, and clears the scratch. */
-static void subtract_points(bst_path_filter *f, rectangle box) {
-    float kernel[2 * KERNEL + 1];
-    for (int k = -KERNEL; k <= KERNEL; k++) {
-        kernel[k + KERNEL] = (float)correlation_at(f, k * k);
-    }
-    const int w = f->width;
-    for (int y = box.y0; y <= box.y1; y++) {
-        for (int x = box.x0 - KERNEL; x <= box.x1 + KERNEL; x++) {
-            float sum = 0.0f;
-            for (int k = -KERNEL; k <= KERNEL; k++) {
-                if (x + k >= box.x0 && x + k <= box.x1) {
-                    sum += kernel[k + KERNEL] * f->scratch[0][y * w + x + k];
-                }
-            }
-            f->scratch[1][y * w + x] = sum;
-        }
-    }
-    for (int k = -KERNEL; k <= KERNEL; k++) {
-        float v = kernel[k + KERNEL];
-        for (int y = box.y0; y <= box.y1; y++) {
-            const float *from = &f->scratch[1][y * w];
-            float *to = &f->response[(y + k) * w];
-            for (int x = box.x0 - KERNEL; x <= box.x1 + KERNEL; x++) {
-                to[x] -= v * from[x];
-            }
-        }
-    }
-    for (int y = box.y0; y <= box.y1; y++) {
-        size_t bytes = (size_t)(box.x1 - box.x0 + 1) * sizeof(float);
-        memset(&f->scratch[0][y * w + box.x0], 0, bytes);
     }
 }
 
 void bst_path_filter_subtract(bst_path_filter *f, const bst_path_filter_peak *peak) {
     assert(f && peak);
     const bst_star_path *p = f->path;
-    const double right = 2.0 * p->centre[0], bottom = 2.0 * p->centre[1];
-    double m[3], there[3];
-    rectangle box = {f->width, f->height, -1, -1};
+    double m[3];
     bst_star_path_map(p, peak->x_px, peak->y_px, m);
     for (int l = 0; l < p->count; l++) {
         double x = peak->x_px + m[0] * p->place[l][0] + m[1] * p->place[l][1];
         double y = peak->y_px + m[1] * p->place[l][0] + m[2] * p->place[l][1];
-        if (x < 0.0 || y < 0.0 || x > right || y > bottom) {
-            continue;
-        }
-        /* places whose sample k lies here are about as far from here as the star itself is */
-        bst_star_path_map(p, x, y, there);
-        add_points(f, x, y, peak->amplitude * p->light[l], there, &box);
+        subtract_from_image(f, x, y, peak->amplitude * p->light[l]);
     }
-    if (box.x1 >= box.x0) {
-        subtract_points(f, box);
-        forget_rows(f, box.y0 - KERNEL, box.y1 + KERNEL);
-    }
+    f->subtractions++;
 }
 
 void bst_path_filter_subtract_point(bst_path_filter *f, double x_px, double y_px,
                                     double amplitude) {
     assert(f);
-    double m[3];
-    rectangle box = {f->width, f->height, -1, -1};
-    bst_star_path_map(f->path, x_px, y_px, m);
-    add_points(f, x_px, y_px, amplitude, m, &box);
-    if (box.x1 >= box.x0) {
-        subtract_points(f, box);
-        forget_rows(f, box.y0 - KERNEL, box.y1 + KERNEL);
-    }
+    subtract_from_image(f, x_px, y_px, amplitude);
+    f->subtractions++;
 }
 
 void bst_path_filter_leave_out(bst_path_filter *f, const bst_path_filter_peak *peak,
@@ -443,9 +556,9 @@ void bst_path_filter_leave_out(bst_path_filter *f, const bst_path_filter_peak *p
     for (int y = y0; y <= y1; y++) {
         for (int x = x0; x <= x1; x++) {
             if (hypot(x - cx, y - cy) <= radius_px) {
-                f->per_noise[y * f->width + x] = 0.0f;
+                f->per_noise[index_of(f, x, y)] = 0.0f;
+                f->filtered[y / BLOCK * f->columns + x / BLOCK] = -1;
             }
         }
     }
-    forget_rows(f, y0, y1);
 }

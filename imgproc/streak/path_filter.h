@@ -14,6 +14,7 @@ typedef struct bst_path_filter bst_path_filter;
  *
  * Given:     path          must outlive the filter
  *            image         of unit noise after the convolution with a Gaussian of psf_sigma_px
+ *            psf_sigma_px  up to 4 px
  *            least_inside  share of the path that must be inside the frame, by its squared light
  * Errors:    BST_ERR_MEMORY
  * Ownership: free *out with bst_path_filter_free */
@@ -34,6 +35,15 @@ bst_status bst_path_filter_create_weighted(bst_ctx *ctx, const bst_star_path *pa
                                            const bst_star_path_image *image, const float *weights,
                                            double psf_sigma_px, double least_inside,
                                            bst_path_filter **out) BST_MUST_CHECK;
+/* As bst_path_filter_create_weighted, in the memory of an earlier filter.
+ *
+ * Given:     weights  NULL: all are 1
+ *            *filter  NULL, or the earlier filter
+ * Errors:    BST_ERR_MEMORY; *filter is then NULL, and the earlier one is freed */
+bst_status bst_path_filter_renew(bst_ctx *ctx, const bst_star_path *path,
+                                 const bst_star_path_image *image, const float *weights,
+                                 double psf_sigma_px, double least_inside,
+                                 bst_path_filter **filter) BST_MUST_CHECK;
 /* Frees a filter; NULL is allowed. */
 void bst_path_filter_free(bst_path_filter *filter);
 
@@ -55,7 +65,10 @@ typedef struct bst_path_filter_peak {
 /* Highest maximum in SNR. Returns false if no value is positive. */
 bool bst_path_filter_highest(bst_path_filter *filter, bst_path_filter_peak *out);
 
-/* Subtracts the response to a star (Hogbom 1974, A&AS 15, 417). */
+/* Subtracts the response to a star (Hogbom 1974, A&AS 15, 417).
+ *
+ * Notes:     The star is subtracted from the image. The response can only fall, so places are
+ *            filtered again when their former response is the highest of all. */
 void bst_path_filter_subtract(bst_path_filter *filter, const bst_path_filter_peak *peak);
 
 /* Subtracts the response to a point source of the image.

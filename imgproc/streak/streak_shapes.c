@@ -96,12 +96,19 @@ static bool is_cut(const finder *f, const shape *s) {
 
 /* Lists the sources at several levels, by rank; returns their number. */
 int bst_streak_finder_list_shapes(finder *f, shape out[BST_STREAK_SHAPES]) {
-    int count = 0, number = 0;
-    memset(f->label, 0, (size_t)f->width * (size_t)f->height * sizeof *f->label);
+    const int pixels = f->width * f->height;
+    int count = 0, number = 0, bright = 0;
+    int *seeds = (int *)f->scratch; /* not in use */
+    for (int i = 0; i < pixels; i++) {
+        seeds[bright] = i;
+        bright += f->lines[i] > SEED;
+    }
+    memset(f->label, 0, (size_t)pixels * sizeof *f->label);
     for (int l = LEVELS - 1; l >= 0; l--) {
         float level = GROW * (float)(1 << l), seed = l > 0 ? level : SEED;
         int first = number;
-        for (int i = 0; i < f->width * f->height; i++) {
+        for (int k = 0; k < bright; k++) {
+            int i = seeds[k];
             if (f->lines[i] <= seed || f->label[i] > first) {
                 continue;
             }
