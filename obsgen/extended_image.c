@@ -47,16 +47,16 @@ void bst_generator_set_ghost_image(const bst_generator *g, const bst_ghost *ghos
     if (!(variance > 0.0)) {
         return;
     }
-    double wide = sqrt(g->total_sigma * g->total_sigma + variance), width = g->cross_sigma;
+    double wide = sqrt(g->total_sigma * g->total_sigma + variance);
     s->shape_xx = s->shape_yy = variance;
     s->snr_ratio = sqrt(bst_matched_product(s->path, s->path, wide) /
                         bst_matched_product(s->path, s->path, g->total_sigma));
     /* a Gaussian that has the same output at rest */
-    double output = ghost_output(ghost, pixel, width, &from_middle);
-    double blur = sqrt(0.5 * width * width / fmax(output, 1e-6));
+    double output = ghost_output(ghost, pixel, sqrt(2.0) * g->cross_sigma, &from_middle);
+    double blur = g->cross_sigma / sqrt(fmax(output, 1e-6));
     const bst_obsgen_path_px rest = {0.0, 0.0};
     s->filter_ratio = bst_matched_product(s->path, rest, blur) /
-                      bst_matched_product(s->path, rest, width * sqrt(0.5));
+                      bst_matched_product(s->path, rest, g->cross_sigma);
     double angle = 2.0 * BST_PI *
                    bst_generator_uniform(g, GHOST_PLACE + s->name * GENERATOR_DRAWS);
     s->x += from_middle * cos(angle);
