@@ -8,7 +8,7 @@ static const uint64_t GHOST_PLACE = (uint64_t)1 << 43;
 
 void bst_generator_set_image(const bst_generator *g, const bst_truth *truth, generator_source *s) {
     double pixel2 = (double)g->binning * g->binning;
-    s->snr_ratio = s->filter_ratio = 1.0;
+    s->snr_ratio = s->filter_ratio = s->curvature = 1.0;
     for (int i = 0; i < truth->shape_count; i++) {
         const bst_truth_shape *shape = &truth->shapes[i];
         if (shape->item == s->item) {
@@ -21,46 +21,25 @@ void bst_generator_set_image(const bst_generator *g, const bst_truth *truth, gen
     }
 }
 
-/* Output of a filter for a ghost's image at rest over that for a point of the same light; width:
- * of the filter output about a point, per axis. A disc with a hole has its greatest output in its
- * middle, or along its ring: there as a straight strip. *from_middle: distance of that place. */
-static double ghost_output(const bst_ghost *ghost, double pixel, double width,
-                           double *from_middle) {
-    *from_middle = 0.0;
-    double square = width * width;
-    if (!(ghost->radius_px > 0.0)) {
-        double sigma = ghost->sigma_px / pixel;
-        return square / (square + sigma * sigma);
-    }
-    double far = ghost->radius_px / pixel, near = ghost->inner_radius_px / pixel;
-    double share = 2.0 * square / (far * far - near * near);
-    double middle = share * (exp(-0.5 * near * near / square) - exp(-0.5 * far * far / square));
-    double ring = share * erf(0.5 * (far - near) / (sqrt(2.0) * width));
-    *from_middle = near > 0.0 && ring > middle ? 0.5 * (far + near) : 0.0;
-    return near > 0.0 ? fmax(ring, middle) : middle;
-}
-
 void bst_generator_set_ghost_image(const bst_generator *g, const bst_ghost *ghost,
                                    generator_source *s) {
-    double pixel = g->binning, from_middle;
-    double variance = bst_ghost_variance_px2(ghost) / (pixel * pixel);
+    double variance = bst_ghost_variance_px2(ghost) / ((double)g->binning * g->binning);
     if (!(variance > 0.0)) {
         return;
     }
     double wide = sqrt(g->total_sigma * g->total_sigma + variance);
-    s->shape_xx = s->shape_yy = variance;
-    s->snr_ratio = sqrt(bst_matched_product(s->path, s->path, wide) /
-                        bst_matched_product(s->path, s->path, g->total_sigma));
-    /* a Gaussian that has the same output at rest */
-    double output = ghost_output(ghost, pixel, sqrt(2.0) * g->cross_sigma, &from_middle);
-    double blur = g->cross_sigma / sqrt(fmax(output, 1e-6));
-    const bst_obsgen_path_px rest = {0.0, 0.0};
-    s->filter_ratio = bst_matched_product(s->path, rest, blur) /
-                      bst_matched_product(s->path, rest, g->cross_sigma);
-    double angle = 2.0 * BST_PI *
-                   bst_generator_uniform(g, GHOST_PLACE + s->name * GENERATOR_DRAWS);
-    s->x += from_middle * cos(angle);
-    s->y += from_middle * sin(angle);
+    double square = 2.0 * g->cross_sigma * g->cross_sigma; /* of the filter output for a point */
+    s->blur = s->shape_xx = s->shape_yy = variance;
+    s->curvature = square / (square + variance);
+    s->snr_ratio = s->filter_ratio = sqrt(bst_matched_product(s->path, s->path, wide) /
+                                          bst_matched_product(s->path, s->path, g->total_sigma));
+    if (ghost->inner_radius_px > 0.0) { /* found somewhere on the ring */
+        double angle =
+            2.0 * BST_PI * bst_generator_uniform(g, GHOST_PLACE + s->name * GENERATOR_DRAWS);
+        double far = 0.5 * (ghost->radius_px + ghost->inner_radius_px) / g->binning;
+        s->x += far * cos(angle);
+        s->y += far * sin(angle);
+    }
 }
 
 double bst_generator_image_factor(const bst_generator *g, const generator_source *s, double c,

@@ -110,8 +110,7 @@ static double ghost_motion(const bst_generator *g, const bst_ghost *ghost,
     }
     const bst_obsgen_path_px *stars = &g->whole_path;
     double square = stars->dx * stars->dx + stars->dy * stars->dy;
-    double motion =
-        square > 0.0 ? (path->dx * stars->dx + path->dy * stars->dy) / square : 0.0;
+    double motion = square > 0.0 ? (path->dx * stars->dx + path->dy * stars->dy) / square : 0.0;
     return fmin(fmax(motion, -ghost->map.magnification), ghost->map.magnification);
 }
 
@@ -156,10 +155,10 @@ static bool position_source(const bst_generator *g, const bst_generator_frame *f
  * width. On each axis it does so by the noise's squared gradient over the curvature: that of the
  * image, which is flatter, and that of the noise which lifts a fainter source to the threshold and
  * is as curved as the output of a source of the fitted width. */
-static double flatness_of(const bst_generator *g, double amplitude) {
-    double width = g->filter_sigma / g->cross_sigma, level = fmax(amplitude, LEAST_RAISED);
+static double flatness_of(const bst_generator *g, const generator_source *s) {
+    double width = g->filter_sigma / g->cross_sigma, level = fmax(s->unraised, LEAST_RAISED);
     double lift = fmax(g->threshold - level, 0.0);
-    return (level + lift) / (width * width * level + lift);
+    return (level + lift) / (s->curvature * width * width * level + lift);
 }
 
 /* Noise-free amplitude of a source in the matched-filter output, and the filter that gives it. */
@@ -181,7 +180,7 @@ static void set_amplitude(const bst_generator *g, generator_source *s) {
         ideal *= bst_response_norm_ratio(&g->response, s->length);
     }
     s->unraised = efficiency * ideal;
-    gain = g->smeared ? 1.0 : 1.0 + (gain - 1.0) * flatness_of(g, s->unraised);
+    gain = g->smeared ? 1.0 : 1.0 + (gain - 1.0) * flatness_of(g, s);
     /* that of the greater output, if the source is seen in the smaller one */
     double most = s->unraised * fmax(s->other, 1.0);
     s->rise = bst_obsgen_peak(most, gain) - most;

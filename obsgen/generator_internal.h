@@ -20,6 +20,8 @@ typedef struct generator_source {
     double seen_x, seen_y; /* centre of the visible part */
     /* image of a shape (bst_truth_shape), read-out px^2; ratios 1 and moments 0: a point */
     double snr_ratio, filter_ratio, shape_xx, shape_xy, shape_yy;
+    double blur;          /* variance of a ghost's image besides the PSF's, per axis, px^2 */
+    double curvature;     /* of its maximum in the filter output, relative to a point's */
     double sharp;         /* factor on its amplitude; 1 for the PSF alone */
     double unraised;      /* SNR in the filter output at its place, without noise */
     double rise;          /* by noise, in `amplitude` */

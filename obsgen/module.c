@@ -99,8 +99,8 @@ static const bst_port ports[PORT_COUNT] = {
     [PORT_DETECTIONS] = {BST_CHANNEL_DETECTIONS, BST_PORT_OUT, 0, 0.0, 2048},
 };
 
-/* Ghosts are sources if their light in a pixel is above this, in sigma of a dark one: the default of
- * scenegen's fidelity.tolerance_sigma. */
+/* Ghosts are sources if their light in a pixel is above this, in sigma of a dark one: the default
+ * of scenegen's fidelity.tolerance_sigma. */
 static const double GHOST_SIGMA = 0.05;
 /* Largest number of pending exposures. */
 enum { PENDING = 16 };
