@@ -1,11 +1,14 @@
-/* Sources whose image is larger than the PSF: satellites with a shape. */
+/* Sources whose image is larger than the PSF: satellites with a shape, and ghosts. */
 #include <math.h>
 
 #include "obsgen/generator_internal.h"
 
+/* Stream of the places along rings, beyond those of the generator. */
+static const uint64_t GHOST_PLACE = (uint64_t)1 << 43;
+
 void bst_generator_set_image(const bst_generator *g, const bst_truth *truth, generator_source *s) {
     double pixel2 = (double)g->binning * g->binning;
-    s->snr_ratio = s->filter_ratio = 1.0;
+    s->snr_ratio = s->filter_ratio = s->curvature = 1.0;
     for (int i = 0; i < truth->shape_count; i++) {
         const bst_truth_shape *shape = &truth->shapes[i];
         if (shape->item == s->item) {
@@ -15,6 +18,27 @@ void bst_generator_set_image(const bst_generator *g, const bst_truth *truth, gen
             s->shape_xy = shape->light_xy_px2 / pixel2;
             s->shape_yy = shape->light_yy_px2 / pixel2;
         }
+    }
+}
+
+void bst_generator_set_ghost_image(const bst_generator *g, const bst_ghost *ghost,
+                                   generator_source *s) {
+    double variance = bst_ghost_variance_px2(ghost) / ((double)g->binning * g->binning);
+    if (!(variance > 0.0)) {
+        return;
+    }
+    double wide = sqrt(g->total_sigma * g->total_sigma + variance);
+    double square = 2.0 * g->cross_sigma * g->cross_sigma; /* of the filter output for a point */
+    s->blur = s->shape_xx = s->shape_yy = variance;
+    s->curvature = square / (square + variance);
+    s->snr_ratio = s->filter_ratio = sqrt(bst_matched_product(s->path, s->path, wide) /
+                                          bst_matched_product(s->path, s->path, g->total_sigma));
+    if (ghost->inner_radius_px > 0.0) { /* found somewhere on the ring */
+        double angle =
+            2.0 * BST_PI * bst_generator_uniform(g, GHOST_PLACE + s->name * GENERATOR_DRAWS);
+        double far = 0.5 * (ghost->radius_px + ghost->inner_radius_px) / g->binning;
+        s->x += far * cos(angle);
+        s->y += far * sin(angle);
     }
 }
 

@@ -18,6 +18,8 @@ static const double CLIP_SIGMA = 3.0;
 /* Sources with a smaller share of their image on the frame, and less than this SNR of it, are not
  * generated. */
 static const double LEAST_VISIBLE = 0.01, LEAST_VISIBLE_SNR = 1.0;
+/* Ghosts of one source with random draws of their own. */
+enum { GHOST_STREAMS = 32 };
 /* SNR below which noise alone determines a maximum, as in bst_obsgen_peak. */
 static const double LEAST_RAISED = 3.0;
 
@@ -99,9 +101,24 @@ static double snr_factor(const bst_generator *g, const bst_generator_frame *f,
     return factor * s->snr_ratio;
 }
 
-/* Position of a true source in frame pixels; false if nothing of it is on the frame. */
+/* Motion of a ghost over that of its source; path: of the ghost. By a table that of a ghost of a
+ * star, whose path is the stars'. */
+static double ghost_motion(const bst_generator *g, const bst_ghost *ghost,
+                           const bst_obsgen_path_px *path) {
+    if (ghost->map.columns == 0) {
+        return ghost->factor;
+    }
+    const bst_obsgen_path_px *stars = &g->whole_path;
+    double square = stars->dx * stars->dx + stars->dy * stars->dy;
+    double motion = square > 0.0 ? (path->dx * stars->dx + path->dy * stars->dy) / square : 0.0;
+    return fmin(fmax(motion, -ghost->map.magnification), ghost->map.magnification);
+}
+
+/* Position of a true source in frame pixels; false if nothing of it is on the frame. ghost: that
+ * the source is; NULL: none. */
 static bool position_source(const bst_generator *g, const bst_generator_frame *f,
-                            const bst_truth_item *item, generator_source *s) {
+                            const bst_truth_item *item, const bst_ghost *ghost,
+                            generator_source *s) {
     double b = g->binning;
     if (!(item->electrons > 0.0) || (item->flags & BST_TRUTH_OCCULTED) ||
         !isfinite(item->x_centroid_px) || !isfinite(item->x_start_px) ||
@@ -114,11 +131,15 @@ static bool position_source(const bst_generator *g, const bst_generator_frame *f
     s->x = (item->x_centroid_px - x0) / b;
     s->y = (item->y_centroid_px - y0) / b;
     if (!g->smeared) { /* ends displaced by jitter only are no path */
-        s->path.dx += g->straight_path.dx - g->whole_path.dx;
-        s->path.dy += g->straight_path.dy - g->whole_path.dy;
+        double share = ghost ? ghost_motion(g, ghost, &s->path) : 1.0;
+        s->path.dx += share * (g->straight_path.dx - g->whole_path.dx);
+        s->path.dy += share * (g->straight_path.dy - g->whole_path.dy);
     }
     s->length = hypot(s->path.dx, s->path.dy);
     s->flux_e = item->electrons;
+    if (ghost) {
+        bst_generator_set_ghost_image(g, ghost, s);
+    }
     s->sharp = snr_factor(g, f, item, s);
     s->visible = s->ends = 1.0;
     s->seen_x = s->x;
@@ -134,10 +155,10 @@ static bool position_source(const bst_generator *g, const bst_generator_frame *f
  * width. On each axis it does so by the noise's squared gradient over the curvature: that of the
  * image, which is flatter, and that of the noise which lifts a fainter source to the threshold and
  * is as curved as the output of a source of the fitted width. */
-static double flatness_of(const bst_generator *g, double amplitude) {
-    double width = g->filter_sigma / g->cross_sigma, level = fmax(amplitude, LEAST_RAISED);
+static double flatness_of(const bst_generator *g, const generator_source *s) {
+    double width = g->filter_sigma / g->cross_sigma, level = fmax(s->unraised, LEAST_RAISED);
     double lift = fmax(g->threshold - level, 0.0);
-    return (level + lift) / (width * width * level + lift);
+    return (level + lift) / (s->curvature * width * width * level + lift);
 }
 
 /* Noise-free amplitude of a source in the matched-filter output, and the filter that gives it. */
@@ -159,7 +180,7 @@ static void set_amplitude(const bst_generator *g, generator_source *s) {
         ideal *= bst_response_norm_ratio(&g->response, s->length);
     }
     s->unraised = efficiency * ideal;
-    gain = g->smeared ? 1.0 : 1.0 + (gain - 1.0) * flatness_of(g, s->unraised);
+    gain = g->smeared ? 1.0 : 1.0 + (gain - 1.0) * flatness_of(g, s);
     /* that of the greater output, if the source is seen in the smaller one */
     double most = s->unraised * fmax(s->other, 1.0);
     s->rise = bst_obsgen_peak(most, gain) - most;
@@ -382,10 +403,13 @@ static bst_status collect(bst_ctx *ctx, bst_generator *g, const bst_generator_fr
         generator_source *s = &g->sources[g->source_count];
         *s = (generator_source){.item = i, .star = t->items[i].kind == BST_SOURCE_STAR, .head = -1};
         bst_generator_set_image(g, t, s);
-        if (!position_source(g, f, &t->items[i], s)) {
+        int of = f->ghost ? f->ghost[i] : -1; /* each ghost of a source has draws of its own */
+        s->name = (uint64_t)t->items[i].id | (uint64_t)(t->items[i].kind & 3) << 32 |
+                  (uint64_t)(of > 0 ? of % GHOST_STREAMS : 0) << 34;
+        const bst_ghost *ghost = of >= 0 ? &g->camera->ghost_images->items[of] : NULL;
+        if (!position_source(g, f, &t->items[i], ghost, s)) {
             continue;
         }
-        s->name = (uint64_t)t->items[i].id | (uint64_t)(t->items[i].kind & 3) << 32;
         set_amplitude(g, s);
         g->source_count +=
             s->broken || s->visible > LEAST_VISIBLE || s->unraised > LEAST_VISIBLE_SNR;

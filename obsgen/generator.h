@@ -50,6 +50,8 @@ bst_status bst_generator_reserve_streaks(bst_ctx *ctx, bst_generator *generator,
 /* Truth and settings of an exposure. */
 typedef struct bst_generator_frame {
     const bst_truth *truth;
+    const int32_t *ghost; /* [truth->count]: index of the camera's ghost that an item is; -1: of
+                             none; NULL: all are none */
     bst_window window;
     int binning;
     double exposure_s;

@@ -8,6 +8,7 @@
 #include "obsgen/streak/path_fit.h"
 #include "obsgen/streak/star_trail.h"
 #include "obsgen/streak/streak_centroid_error.h"
+#include "sim/optics/ghosts.h"
 
 /* A truth source on the frame, in read-out pixels. */
 typedef struct generator_source {
@@ -19,6 +20,8 @@ typedef struct generator_source {
     double seen_x, seen_y; /* centre of the visible part */
     /* image of a shape (bst_truth_shape), read-out px^2; ratios 1 and moments 0: a point */
     double snr_ratio, filter_ratio, shape_xx, shape_xy, shape_yy;
+    double blur;          /* variance of a ghost's image besides the PSF's, per axis, px^2 */
+    double curvature;     /* of its maximum in the filter output, relative to a point's */
     double sharp;         /* factor on its amplitude; 1 for the PSF alone */
     double unraised;      /* SNR in the filter output at its place, without noise */
     double rise;          /* by noise, in `amplitude` */
@@ -147,6 +150,10 @@ void bst_generator_set_visible_share(const bst_generator *g, generator_source *s
 void bst_generator_cut_light(const bst_generator *g, generator_source *light);
 /* Sets the image of a source that has a shape in the truth. */
 void bst_generator_set_image(const bst_generator *g, const bst_truth *truth, generator_source *s);
+/* Sets the image of a ghost at its path, which must be set, and moves it to the brightest place of
+ * its image in the filter output. */
+void bst_generator_set_ghost_image(const bst_generator *g, const bst_ghost *ghost,
+                                   generator_source *s);
 /* Factor on the standard deviation of a source's position by the width of its image, along a unit
  * direction (c, n): that of a Gaussian with its second moments, at its lower SNR. */
 double bst_generator_image_factor(const bst_generator *g, const generator_source *s, double c,

@@ -99,6 +99,9 @@ static const bst_port ports[PORT_COUNT] = {
     [PORT_DETECTIONS] = {BST_CHANNEL_DETECTIONS, BST_PORT_OUT, 0, 0.0, 2048},
 };
 
+/* Ghosts are sources if their light in a pixel is above this, in sigma of a dark one: the default
+ * of scenegen's fidelity.tolerance_sigma. */
+static const double GHOST_SIGMA = 0.05;
 /* Largest number of pending exposures. */
 enum { PENDING = 16 };
 /* Relative change of the PSF width above which its bound is tabulated anew. */
@@ -282,10 +285,27 @@ static bst_status set_response(bst_ctx *ctx, obsgen *o, int binning, bst_obsgen_
     return BST_OK;
 }
 
+/* Sources whose brightest pixels are wanted. */
+typedef struct peak_request {
+    double sigma_px;
+    const bst_scene_source *sources;
+} peak_request;
+
 /* Expected brightest-pixel electrons of a truth item (callback). */
 static double peak_e(const void *user, int index, const bst_truth_item *item) {
-    (void)index;
-    return bst_generator_peak_e(*(const double *)user, item);
+    const peak_request *q = user;
+    const bst_ghost *ghost = q->sources[index].ghost;
+    double blur2 = ghost ? bst_ghost_variance_px2(ghost) : 0.0;
+    return bst_generator_peak_e(sqrt(q->sigma_px * q->sigma_px + blur2), item);
+}
+
+/* Stores of which ghosts the items of a pending exposure are. */
+static void store_ghosts(const obsgen *o, const bst_scene_source *sources, bst_obsgen_pending *p) {
+    const bst_ghosts *ghosts = o->camera.ghost_images;
+    for (int i = 0; i < p->truth->count; i++) {
+        const bst_ghost *ghost = sources[o->list.source_of[i]].ghost;
+        p->ghost[i] = ghost ? (int32_t)(ghost - ghosts->items) : -1;
+    }
 }
 
 /* Publishes the truth of an exposure and stores all its sources until it is processed. */
@@ -301,7 +321,9 @@ static bst_status store_exposure(obsgen *o, struct bst_step *step, const bst_exp
     const bst_field_options options = {
         .v_limit = o->config->star_limit_v_mag,
         .margin_px = fmax(o->config->margin_px, ceil(6.0 * o->sigma_px)),
-        .lead_s = (double)lead / (double)o->tick_rate_hz};
+        .lead_s = (double)lead / (double)o->tick_rate_hz,
+        .ghost_sigma = GHOST_SIGMA,
+        .binning = e->binning};
     int capacity, count;
     const bst_scene_source *sources;
     bst_truth *truth = bst_step_write(step, PORT_TRUTH, &capacity);
@@ -314,6 +336,7 @@ static bst_status store_exposure(obsgen *o, struct bst_step *step, const bst_exp
     truth->error_sigma = NAN;
     truth->nodes = 0;
     truth->one_track = false;
+    const peak_request peaks = {o->sigma_px, sources};
     const bst_truth_request request = {.field = o->field,
                                        .camera = &o->camera,
                                        .track = &track,
@@ -323,7 +346,7 @@ static bst_status store_exposure(obsgen *o, struct bst_step *step, const bst_exp
                                        .binning = e->binning,
                                        .peak_e = peak_e,
                                        .peak_of_points = true,
-                                       .user = &o->sigma_px};
+                                       .user = &peaks};
     BST_TRY(bst_truth_list_fill(ctx, &o->list, &request, truth, capacity, NULL));
     if (truth->lost > 0) {
         bst_step_count(step, "truth_overflow");
@@ -340,10 +363,12 @@ static bst_status store_exposure(obsgen *o, struct bst_step *step, const bst_exp
     BST_TRY(bst_obsgen_pending_reserve(ctx, p, count));
     if (truth->lost == 0) {
         memcpy(p->truth, truth, sizeof *truth + (size_t)count * sizeof truth->items[0]);
-        return BST_OK;
+    } else {
+        memcpy(p->truth, truth, sizeof *truth);
+        BST_TRY(bst_truth_list_fill(ctx, &o->list, &request, p->truth, p->room, NULL));
     }
-    memcpy(p->truth, truth, sizeof *truth);
-    return bst_truth_list_fill(ctx, &o->list, &request, p->truth, p->room, NULL);
+    store_ghosts(o, sources, p);
+    return BST_OK;
 }
 
 /* Sets the onboard attitude of an exposure from telemetry. */
@@ -434,6 +459,7 @@ static bst_status process_exposure(obsgen *o, struct bst_step *step, const bst_e
     set_attitude(o, step, e, &oriented, &locked, &motion, out);
     bst_generator_frame frame = {
         .truth = p->truth,
+        .ghost = p->ghost,
         .window = e->window,
         .binning = e->binning,
         .exposure_s = (double)(e->end_tick - e->start_tick) / (double)o->tick_rate_hz,
@@ -545,7 +571,7 @@ static bst_status archive_module(void *self, bst_archive *archive) {
         BST_ARCHIVE(archive, o->onboard_bound);
     }
     for (int i = 0; i < PENDING; i++) {
-        BST_TRY(bst_obsgen_pending_archive(&o->waiting[i], archive));
+        BST_TRY(bst_obsgen_pending_archive(&o->waiting[i], o->world_camera->ghosts.count, archive));
     }
     return BST_OK;
 }

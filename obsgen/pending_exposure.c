@@ -13,6 +13,7 @@ enum { PATH_STEPS = 1024 };
 
 void bst_obsgen_pending_free(bst_obsgen_pending *p) {
     free(p->truth);
+    free(p->ghost);
     free(p->path_x_px);
     free(p->path_y_px);
 }
@@ -74,16 +75,18 @@ bst_status bst_obsgen_pending_reserve(bst_ctx *ctx, bst_obsgen_pending *p, int c
     }
     int room = count + count / 4 + 64;
     bst_truth *more = realloc(p->truth, sizeof *more + (size_t)room * sizeof more->items[0]);
-    if (!more) {
+    p->truth = more ? more : p->truth;
+    int32_t *ghost = realloc(p->ghost, (size_t)room * sizeof *ghost);
+    p->ghost = ghost ? ghost : p->ghost;
+    if (!more || !ghost) {
         return bst_fail(ctx, BST_ERR_MEMORY, "no memory for %d sources", room);
     }
-    p->truth = more;
     p->room = room;
     return BST_OK;
 }
 
-/* Saves or restores header and items of the truth. */
-static bst_status archive_truth(bst_obsgen_pending *p, bst_archive *archive) {
+/* Saves or restores header and items of the truth, and of which ghosts these are. */
+static bst_status archive_truth(bst_obsgen_pending *p, int ghosts, bst_archive *archive) {
     bst_ctx *ctx = bst_archive_ctx(archive);
     BST_TRY(bst_obsgen_pending_reserve(ctx, p, 0));
     BST_ARCHIVE(archive, *p->truth);
@@ -97,15 +100,26 @@ static bst_status archive_truth(bst_obsgen_pending *p, bst_archive *archive) {
     }
     BST_TRY(bst_obsgen_pending_reserve(ctx, p, count));
     bst_archive_bytes(archive, p->truth->items, (size_t)count * sizeof *p->truth->items);
+    bst_archive_bytes(archive, p->ghost, (size_t)count * sizeof *p->ghost);
+    for (int i = 0; bst_archive_is_restoring(archive) && i < count; i++) {
+        if (p->ghost[i] < -1 || p->ghost[i] >= ghosts) {
+            int found = p->ghost[i];
+            p->truth->count = 0;
+            return bst_fail(ctx, BST_ERR_FORMAT,
+                            "the saved truth of exposure %lld is damaged: ghost %d of a camera "
+                            "with %d",
+                            (long long)p->exposure_id, found, ghosts);
+        }
+    }
     return BST_OK;
 }
 
-bst_status bst_obsgen_pending_archive(bst_obsgen_pending *p, bst_archive *archive) {
+bst_status bst_obsgen_pending_archive(bst_obsgen_pending *p, int ghosts, bst_archive *archive) {
     BST_ARCHIVE(archive, p->exposure_id);
     if (p->exposure_id < 0) {
         return BST_OK;
     }
-    BST_TRY(archive_truth(p, archive));
+    BST_TRY(archive_truth(p, ghosts, archive));
     BST_ARCHIVE(archive, p->sigma_px);
     bst_archive_bool(archive, &p->own_response);
     if (p->own_response) {

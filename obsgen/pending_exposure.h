@@ -11,7 +11,8 @@
 typedef struct bst_obsgen_pending {
     int64_t exposure_id; /* -1: none */
     bst_truth *truth;
-    int room; /* items of `truth`; 0 with NULL */
+    int32_t *ghost; /* [truth->count]: index of the camera's ghost that an item is; -1: of none */
+    int room;       /* items of `truth` and `ghost`; 0 with NULL */
     double sigma_px;
     bst_response response; /* valid if `own_response` */
     bst_crlb_table image_bound, onboard_bound;
@@ -23,7 +24,7 @@ typedef struct bst_obsgen_pending {
 /* Frees the memory of a pending exposure; the struct belongs to the caller. */
 void bst_obsgen_pending_free(bst_obsgen_pending *pending);
 
-/* Makes room for the truth of a number of sources.
+/* Makes room for the truth of a number of sources and their ghosts.
  *
  * Errors:    BST_ERR_MEMORY */
 bst_status bst_obsgen_pending_reserve(bst_ctx *ctx, bst_obsgen_pending *pending,
@@ -46,8 +47,9 @@ bst_status bst_obsgen_pending_set_path(bst_ctx *ctx, bst_obsgen_pending *pending
 
 /* Saves or restores a pending exposure, for bst_module_desc.archive.
  *
- * Errors:    BST_ERR_FORMAT for a damaged truth or path; BST_ERR_MEMORY */
-bst_status bst_obsgen_pending_archive(bst_obsgen_pending *pending,
+ * Given:     ghosts  number of ghosts of the camera
+ * Errors:    BST_ERR_FORMAT for a damaged truth, ghost or path; BST_ERR_MEMORY */
+bst_status bst_obsgen_pending_archive(bst_obsgen_pending *pending, int ghosts,
                                       bst_archive *archive) BST_MUST_CHECK;
 
 #endif

@@ -226,7 +226,7 @@ static double pull_of(const bst_generator *g, const generator_source *a,
 static void draw_streak_position(const bst_generator *g, const generator_source *s,
                                  const generator_source *merged, int count, double beside,
                                  generator_blend *out) {
-    if (!s->as_streak || s->length < 1.0) {
+    if (!s->as_streak || s->length < 1.0 || s->blur > 0.0) { /* the peak is that of a PSF's image */
         return;
     }
     const bst_obsgen_calibration *cal = &g->calibration;

@@ -160,8 +160,16 @@ double bst_generator_set_filter(const bst_generator *g, generator_source *s) {
     double efficiency[2] = {g->filters[0].efficiency, g->filters[1].efficiency};
     s->as_streak = false;
     s->other = 0.0;
+    bst_response wide; /* widths alone */
+    const bst_response *response = &g->response;
+    if (s->blur > 0.0) {
+        wide = (bst_response){
+            .source = g->response.source, .filter = g->response.filter, .both = g->response.both};
+        wide = bst_response_widened(&wide, s->blur);
+        response = &wide;
+    }
     if (!s->star) {
-        efficiency[0] = bst_response_efficiency(&g->response, s->path, point);
+        efficiency[0] = bst_response_efficiency(response, s->path, point);
     }
     if (!(g->streak > 0.0)) {
         return efficiency[0];
@@ -169,7 +177,7 @@ double bst_generator_set_filter(const bst_generator *g, generator_source *s) {
     if (!s->star && g->uneven) {
         set_uneven_object(g, s, efficiency);
     } else if (!s->star) {
-        efficiency[1] = bst_response_efficiency(&g->response, s->path, g->star_path);
+        efficiency[1] = bst_response_efficiency(response, s->path, g->star_path);
         s->as_streak = efficiency[1] > efficiency[0];
     } else {
         s->point_flux = g->uneven ? by_light(g, g->point_flux, s->flux_e) : 1.0;

@@ -9,7 +9,7 @@
 #include "sim/device/device.h"
 
 typedef struct bst_persistence {
-    cl_mem trapped; /* [kinds][height][stride], e-; NULL: all traps are empty */
+    cl_mem trapped; /* of kernels/persistence.cl; NULL: all traps are empty */
     size_t bytes;
     double end_s; /* of the latest exposure */
 } bst_persistence;

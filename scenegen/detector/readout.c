@@ -302,7 +302,7 @@ static bst_status enqueue_traps(bst_ctx *ctx, bst_readout *r, int kernel,
             q.release[q.kinds++] = (float)-expm1(-1.0 / t->release_px[i]);
         }
     }
-    size_t items = kernel == PARALLEL ? (size_t)q.stride / 64 : ((size_t)q.height + 15) / 16;
+    size_t items = kernel == PARALLEL ? (size_t)q.stride / 64 : ((size_t)q.height + 31) / 32;
     return enqueue_kernel(ctx, r, kernel, (arguments){&q, sizeof q, &r->image, 1}, items);
 }
 

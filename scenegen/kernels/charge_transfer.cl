@@ -2,7 +2,7 @@
  * into later ones (Short et al. 2013, MNRAS 430, 3078, equations 23 and 24, with a capture that is
  * much faster than a transfer). A packet of q electrons that is transferred n times meets n density
  * q^exponent traps; all of these share one state, so that the cost is that of one pass over the
- * pixels. One work-item per 64 columns or 16 rows. */
+ * pixels. One work-item per 64 columns or 32 rows. */
 
 /* Charge of packets and traps below this, e-, is neither captured nor followed. */
 #define TRAP_LEAST 0.01f
@@ -113,39 +113,105 @@ __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_d
     }
 }
 
-/* Transfers along rows. */
+/* Transposes 16 vectors: each of four steps interleaves the first eight of them with the others. */
+INLINE void transpose(float16 *v) {
+    float16 w[16];
+#pragma unroll
+    for (int step = 0; step < 4; step++) {
+#pragma unroll
+        for (int i = 0; i < 8; i++) {
+            w[2 * i].even = v[i].lo;
+            w[2 * i].odd = v[i + 8].lo;
+            w[2 * i + 1].even = v[i].hi;
+            w[2 * i + 1].odd = v[i + 8].hi;
+        }
+#pragma unroll
+        for (int i = 0; i < 16; i++) {
+            v[i] = w[i];
+        }
+    }
+}
+
+/* Columns n to n + 16 of 16 rows from `image` on, in the order of their transfers, [transfer][row].
+ * Rows from `rows` on repeat the last one, columns beyond the end are 0. */
+INLINE void load_block(bst_kernel_trap_params p, global const float *image, int rows, int n,
+                       float16 *block) {
+    int columns = min(p.width - n, 16);
+    if (columns == 16) {
+        int first = p.backwards ? p.width - 16 - n : n;
+        for (int r = 0; r < 16; r++) {
+            float16 v = vload16(0, image + (size_t)min(r, rows - 1) * p.stride + first);
+            block[r] = p.backwards ? v.sfedcba9876543210 : v;
+        }
+        transpose(block);
+        return;
+    }
+    for (int c = 0; c < 16; c++) {
+        float at[16];
+        for (int r = 0; r < 16; r++) {
+            int x = p.backwards ? p.width - 1 - n - c : n + c;
+            at[r] = c < columns ? image[(size_t)min(r, rows - 1) * p.stride + x] : 0.0f;
+        }
+        block[c] = vload16(0, at);
+    }
+}
+
+/* Stores what load_block loaded. */
+INLINE void store_block(bst_kernel_trap_params p, global float *image, int rows, int n,
+                        float16 *block) {
+    int columns = min(p.width - n, 16);
+    if (columns == 16) {
+        int first = p.backwards ? p.width - 16 - n : n;
+        transpose(block);
+        for (int r = 0; r < rows; r++) {
+            float16 v = p.backwards ? block[r].sfedcba9876543210 : block[r];
+            vstore16(v, 0, image + (size_t)r * p.stride + first);
+        }
+        return;
+    }
+    for (int c = 0; c < columns; c++) {
+        float at[16];
+        vstore16(block[c], 0, at);
+        for (int r = 0; r < rows; r++) {
+            image[(size_t)r * p.stride + (p.backwards ? p.width - 1 - n - c : n + c)] = at[r];
+        }
+    }
+}
+
+/* Transfers along rows. Two blocks of 16 rows side by side: each waits for its own packet before. */
 __attribute__((reqd_work_group_size(BST_READOUT_GROUP, 1, 1))) kernel void bst_detector_serial(
     bst_kernel_trap_params p, global float *image) {
-    int y = (int)get_global_id(0) * 16, rows = min(p.height - y, 16);
+    int y = (int)get_global_id(0) * 32, rows = min(p.height - y, 32);
     if (rows <= 0) {
         return;
     }
-    float16 held[BST_TRAP_KINDS];
+    float16 held[2][BST_TRAP_KINDS];
     for (int k = 0; k < BST_TRAP_KINDS; k++) {
-        held[k] = (float16)0.0f;
+        held[0][k] = held[1][k] = (float16)0.0f;
     }
+    global float *low = image + (size_t)y * p.stride;
+    /* of a last block of 16 rows or fewer the second copy is not stored */
+    global float *high = rows > 16 ? low + (size_t)16 * p.stride : low;
+    int low_rows = min(rows, 16), high_rows = rows > 16 ? rows - 16 : low_rows;
     for (int n = 0; n < p.width; n += 16) {
-        /* of a last block of fewer columns the others, beyond the end, are read as 0 */
-        int columns = min(p.width - n, 16), first = p.backwards ? p.width - 1 - n : n;
-        int step = p.backwards ? -1 : 1;
-        float block[16][16]; /* [transfer][row] */
-        for (int r = 0; r < 16; r++) {
-            global const float *row = image + (size_t)(y + min(r, rows - 1)) * p.stride + first;
-            for (int c = 0; c < 16; c++) {
-                block[c][r] = c < columns ? row[c * step] : 0.0f;
-            }
-        }
+        float16 a[16], b[16]; /* [transfer][row] */
+        load_block(p, low, low_rows, n, a);
+        load_block(p, high, high_rows, n, b);
         for (int c = 0; c < 16; c++) {
-            float16 q = vload16(0, block[c]);
-            if (has_charge(p, q, held)) {
-                vstore16(pass_traps(p, (float)(n + c + 1), q, held), 0, block[c]);
+            int some_a = has_charge(p, a[c], held[0]), some_b = has_charge(p, b[c], held[1]);
+            float transfers = (float)(n + c + 1);
+            if (some_a & some_b) {
+                a[c] = pass_traps(p, transfers, a[c], held[0]);
+                b[c] = pass_traps(p, transfers, b[c], held[1]);
+            } else if (some_a) {
+                a[c] = pass_traps(p, transfers, a[c], held[0]);
+            } else if (some_b) {
+                b[c] = pass_traps(p, transfers, b[c], held[1]);
             }
         }
-        for (int r = 0; r < rows; r++) {
-            global float *row = image + (size_t)(y + r) * p.stride + first;
-            for (int c = 0; c < columns; c++) {
-                row[c * step] = block[c][r];
-            }
+        store_block(p, low, low_rows, n, a);
+        if (rows > 16) {
+            store_block(p, high, high_rows, n, b);
         }
     }
 }

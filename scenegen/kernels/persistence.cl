@@ -13,13 +13,12 @@ INLINE lanes filled_by_ramp(lanes y) {
 }
 
 /* Trapped charge of species k after an exposure in which the charge grows from `from` to `to`, which
- * may lie above the full well. */
+ * lies above the full well where `full`; some_full: in one lane at least. */
 INLINE lanes trapped_after(bst_kernel_persistence_params t, int k, lanes before, lanes from,
-                           lanes to) {
+                           lanes to, lanes_int full, int some_full) {
     lanes n = fma(before, (lanes)t.stay[k],
                   t.share[k] * fma(from, (lanes)(1.0f - t.stay[k]), (to - from) * t.fill[k]));
-    lanes_int full = MASK(to > t.frame.full_well_e);
-    if (any_of(full)) { /* the well is full before the end */
+    if (some_full) { /* the well is full before the end */
         lanes well = (lanes)t.frame.full_well_e, rise = fmax(well - from, 0.0f);
         lanes x = rise / fmax(to - from, 1e-6f), y = x * t.duration[k], r = t.duration[k] - y;
         lanes grown = exp(-y), rest = exp(-r);
@@ -31,9 +30,9 @@ INLINE lanes trapped_after(bst_kernel_persistence_params t, int k, lanes before,
 }
 
 /* Replaces the sources' light by the expected charge that is left and released. It may be below 0
- * where a radiation hit (overlay) filled traps. trapped: [kinds][light_height][light_stride], e-.
- * held: expected charge so far in a ramp, as image.
- * One work-item per row. */
+ * where a radiation hit (overlay) filled traps. trapped: e-,
+ * [light_height][light_stride / 16][kinds][16], so that a work-item reads one stream instead of one
+ * for each species. held: expected charge so far in a ramp, as image. One work-item per row. */
 READOUT_GROUP kernel void bst_detector_persistence(
     bst_kernel_persistence_params t, global float *image, global const float *gain,
     global const float *dark, global const float *overlay, global const float *readout,
@@ -68,9 +67,11 @@ READOUT_GROUP kernel void bst_detector_persistence(
             if (t.in_ramp) {
                 *charge = to;
             }
+            lanes_int full = MASK(to > t.frame.full_well_e);
+            int some_full = any_of(full);
             for (int k = 0; k < t.kinds; k++) {
-                global lanes *n = (global lanes *)(trapped + k * plane + at) + v;
-                lanes before = *n * t.gap[k], after = trapped_after(t, k, before, from, to);
+                global lanes *n = (global lanes *)trapped + (at / 16 + v) * t.kinds + k;
+                lanes before = *n * t.gap[k], after = trapped_after(t, k, before, from, to, full, some_full);
                 mean[v] += before - after;
                 *n = after;
             }

@@ -186,8 +186,9 @@ READOUT_GROUP kernel void bst_detector_mark(bst_kernel_frame_params p, global co
     }
     for (int x = 0; x < p.light_stride; x += 16) {
         size_t at = (size_t)y * p.light_stride + x;
-        int16 mark = vload16(0, image + at) >= p.full_well_e;
-        vstore16(convert_uchar16(mark & 1), 0, full + at);
+        /* the sign of a difference: some compilers narrow comparisons to bytes lane by lane */
+        uint16 below = as_uint16(vload16(0, image + at) - p.full_well_e) >> 31;
+        vstore16(convert_uchar16(1u - below), 0, full + at);
     }
 }
 
@@ -300,23 +301,33 @@ INLINE chunk gather_charge(bst_kernel_frame_params p, global const float *image,
     return q;
 }
 
-/* Signal of 16 pixels of a sensor row from column `first` on, with a share of what the other outputs
- * read at the same time. The same as bst_detector_crosstalk, without a pass over the image. */
-INLINE float16 add_crosstalk(bst_kernel_frame_params p, global const float *row, int first, float16 q) {
-    int part = p.sensor_width / p.outputs, own = first / part;
-    if (first >= 0 && first + 16 <= p.sensor_width && (first + 15) / part == own) {
-        /* lane l reads the i-th pixel of its output, i = from + l, or from - l if it reads backwards */
-        int backwards = p.mirrored & own;
-        int from = backwards ? (own + 1) * part - 1 - first : first - own * part;
-        float16 sum = (float16)0.0f;
-        for (int o = 0; o < p.outputs; o++) {
-            int reversed = (p.mirrored & o) != backwards;
-            int lowest = backwards ? from - 15 : from; /* i of the lane with the lowest one */
-            int at = p.mirrored & o ? (o + 1) * part - 16 - lowest : o * part + lowest;
-            float16 there = vload16(0, row + at);
-            sum += reversed ? there.sfedcba9876543210 : there;
+/* Signal of 16 pixels of output `own`, from column `first` on, with a share of what the other outputs
+ * read at the same time. part: columns of an output. */
+INLINE float16 add_others(bst_kernel_frame_params p, global const float *row, int part, int own,
+                          int first, float16 q) {
+    /* lane l reads the i-th pixel of its output, i = from + l, or from - l if it reads backwards */
+    int backwards = p.mirrored & own;
+    int from = backwards ? (own + 1) * part - 1 - first : first - own * part;
+    int lowest = backwards ? from - 15 : from; /* i of the lane with the lowest one */
+    float16 sum = (float16)0.0f;
+    for (int o = 0; o < p.outputs; o++) {
+        if (o == own) {
+            sum += q;
+            continue;
         }
-        return fma((float16)p.crosstalk, sum - q, q);
+        int at = p.mirrored & o ? (o + 1) * part - 16 - lowest : o * part + lowest;
+        float16 there = vload16(0, row + at);
+        sum += (p.mirrored & o) != backwards ? there.sfedcba9876543210 : there;
+    }
+    return fma((float16)p.crosstalk, sum - q, q);
+}
+
+/* The same for pixels that may belong to several outputs or lie beside the sensor. */
+INLINE float16 add_others_at_edge(bst_kernel_frame_params p, global const float *row, int part,
+                                  int first, float16 q) {
+    int own = first / part;
+    if (first >= 0 && first + 16 <= p.sensor_width && first + 16 <= (own + 1) * part) {
+        return add_others(p, row, part, own, first, q);
     }
     float signal[16];
     vstore16(q, 0, signal);
@@ -333,6 +344,24 @@ INLINE float16 add_crosstalk(bst_kernel_frame_params p, global const float *row,
         signal[l] = fma(p.crosstalk, sum - signal[l], signal[l]);
     }
     return vload16(0, signal);
+}
+
+/* Signal of the 64 pixels of a chunk of a sensor row with crosstalk. The same as
+ * bst_detector_crosstalk, without a pass over the image. */
+INLINE chunk add_crosstalk(bst_kernel_frame_params p, global const float *row, int first, chunk q) {
+    int part = p.sensor_width / p.outputs, own = first / part;
+    if (first >= 0 && first + 64 <= p.sensor_width && first + 64 <= (own + 1) * part) {
+        q.a = add_others(p, row, part, own, first, q.a);
+        q.b = add_others(p, row, part, own, first + 16, q.b);
+        q.c = add_others(p, row, part, own, first + 32, q.c);
+        q.d = add_others(p, row, part, own, first + 48, q.d);
+        return q;
+    }
+    q.a = add_others_at_edge(p, row, part, first, q.a);
+    q.b = add_others_at_edge(p, row, part, first + 16, q.b);
+    q.c = add_others_at_edge(p, row, part, first + 32, q.c);
+    q.d = add_others_at_edge(p, row, part, first + 48, q.d);
+    return q;
 }
 
 /* What the read-out of a frame takes and gives. */
@@ -373,11 +402,7 @@ INLINE int16 read_chunk(bst_kernel_frame_params p, detector_maps maps, read_buff
     chunk q = gather_charge(p, to.image, to.full, row, x - skip, &brim);
     if (HAS(p, BST_EFFECT_CROSSTALK)) { /* b is 1 */
         global const float *line = to.image + (long)(row - p.light_y0) * p.light_stride;
-        int from = first + x;
-        q.a = add_crosstalk(p, line, from, q.a);
-        q.b = add_crosstalk(p, line, from + 16, q.b);
-        q.c = add_crosstalk(p, line, from + 32, q.c);
-        q.d = add_crosstalk(p, line, from + 48, q.d);
+        q = add_crosstalk(p, line, first + x, q);
     }
     uint counter = counter_of(row / b, first + x, p.sensor_width / b);
 #ifdef MULTIPLY

@@ -138,7 +138,11 @@ WRAP(bst_status, bst_field_query,
     truth->pixel_scale_arcsec = 6.0;
     truth->boresight_x_px = truth->boresight_y_px = 1.0;
     truth->lost = truth->count = truth->shape_count = 0;
-    *sources = NULL;
+    bst_assert_close(options->ghost_sigma, 0.05, 0.0); /* as in scenegen by default */
+    assert_int_equal(options->binning, 2);
+    static bst_scene_source seen[ITEMS];
+    seen[ITEMS - 2].ghost = &m.camera.ghost_images->items[1];
+    *sources = seen;
     *count = ITEMS;
     return BST_OK;
 }
@@ -147,13 +151,15 @@ WRAP(bst_status, bst_truth_list_fill,
      (bst_ctx * ctx, bst_truth_list *list, const bst_truth_request *request, bst_truth *truth,
       int capacity, int *source_of)) {
     (void)ctx;
-    (void)list;
     (void)source_of;
+    list->source_of = list->source_of ? list->source_of : calloc(ITEMS, sizeof(int));
+    assert_non_null(list->source_of);
     assert_int_equal(request->count, ITEMS);
     assert_int_equal(request->binning, 2);
     assert_true(capacity >= ITEMS);
     truth->count = ITEMS;
     for (int i = 0; i < ITEMS; i++) {
+        list->source_of[i] = ITEMS - 1 - i; /* in another order */
         truth->items[i] = (bst_truth_item){.kind = BST_SOURCE_STAR,
                                            .id = (uint32_t)i + 1,
                                            .electrons = 5000.0 + 400.0 * i,
@@ -168,6 +174,9 @@ WRAP(bst_status, bst_generator_run,
     (void)ctx;
     (void)g;
     m.frame = *frame;
+    for (int i = 0; i < ITEMS; i++) { /* the source before the last is the second item */
+        assert_int_equal(frame->ghost[i], i == 1 ? 1 : -1);
+    }
     for (int i = 0; i < ITEMS; i++) { /* four fifths of the light; the last is of no star */
         double flux = 0.8 * (5000.0 + 400.0 * i);
         m.items[i] =
@@ -318,6 +327,11 @@ static void begin(void) {
                             .full_well_e = 1e5,
                             .gain_e_per_dn = 1.6,
                             .bits = 16};
+    static bst_ghosts *two;
+    two = two ? two : calloc(1, sizeof *two + 2 * sizeof two->items[0]);
+    assert_non_null(two);
+    two->count = 2;
+    m.camera.ghost_images = two;
     m.exposure = (bst_exposure){
         .id = 4, .start_tick = START, .end_tick = END, .window = {40, 20, 300, 200}, .binning = 2};
     m.truth = calloc(1, sizeof *m.truth + 100 * sizeof m.truth->items[0]);

@@ -2,10 +2,10 @@
 #include "obsgen/pending_exposure.h"
 #include "tests/archive_support.h"
 
-enum { SOURCES = 40, STEPS = 17 };
+enum { SOURCES = 40, STEPS = 17, GHOSTS = 3 };
 
 static bst_status archive_pending(void *pending, bst_archive *archive) {
-    return bst_obsgen_pending_archive(pending, archive);
+    return bst_obsgen_pending_archive(pending, GHOSTS, archive);
 }
 
 static bst_obsgen_pending make(bst_ctx *ctx, bool own_response) {
@@ -17,6 +17,7 @@ static bst_obsgen_pending make(bst_ctx *ctx, bool own_response) {
     p.truth->count = SOURCES;
     for (int i = 0; i < SOURCES; i++) {
         p.truth->items[i] = (bst_truth_item){.id = (uint32_t)i, .electrons = 100.0 * i};
+        p.ghost[i] = i % (GHOSTS + 1) - 1;
     }
     bst_assert_ok(ctx, bst_obsgen_pending_reserve_path(ctx, &p, STEPS));
     p.path_count = STEPS;
@@ -44,6 +45,7 @@ static void comes_back(void **state) {
         assert_true(q.sigma_px == 0.85 && q.own_response == own);
         assert_int_equal(q.path_count, STEPS);
         assert_memory_equal(q.truth, p.truth, sizeof *p.truth + SOURCES * sizeof p.truth->items[0]);
+        assert_memory_equal(q.ghost, p.ghost, SOURCES * sizeof *p.ghost);
         assert_memory_equal(q.path_x_px, p.path_x_px, STEPS * sizeof *p.path_x_px);
         assert_memory_equal(q.path_y_px, p.path_y_px, STEPS * sizeof *p.path_y_px);
         if (own) {

@@ -291,18 +291,6 @@ static bst_status replaced_figures(const subject *s) {
     return BST_OK;
 }
 
-/* Ghosts that the observation generator leaves out. */
-static bst_status no_ghosts(const subject *s) {
-    const bst_camera *c = &s->sensor->camera;
-    if (c->ghosts.count > 0 && s->sensor->observation_source == BST_OBSERVE_GENERATOR) {
-        bst_log(s->ctx, BST_LOG_WARNING,
-                "%s/camera/ghosts: has %d, but observation_source is \"generator\", which has no "
-                "ghosts; take \"images\" or leave them out",
-                s->place, c->ghosts.count);
-    }
-    return BST_OK;
-}
-
 /* ---- the list ---- */
 
 typedef struct rule {
@@ -337,8 +325,6 @@ static const rule rules[] = {
      NULL, wide_field, NULL},
     {"replaced", "psf_fwhm_px beside ensquared_energy, throughput or flux beside zero_point_mag",
      NULL, replaced_figures, NULL},
-    {"ghosts", "ghosts of a camera whose detections the observation generator makes", NULL,
-     no_ghosts, NULL},
     {"short_times", "times of tracker and control that are over before the frames they wait for",
      NULL, short_times, NULL},
     {"loops", "loops that are unstable or have thin margins", NULL, NULL, loops},
