@@ -202,6 +202,12 @@ bool bst_generator_separates(const bst_generator *g, const generator_source *bri
                              const generator_source *faint);
 /* Decides which sources are detected and which are merged with a brighter one. */
 void bst_generator_decide(bst_generator *g);
+/* SNR per electron of a fit with the PSF that image processing knows.
+ *
+ * Given:     length_px  of the fitted streak; 0: a point
+ *            as_streak  the fit is that of the streak filter */
+double bst_generator_fit_norm(const bst_generator *g, const generator_source *s, double length_px,
+                              bool as_streak);
 /* Merged light of source i and the neighbours fitted with it. */
 generator_blend bst_generator_blend_of(const bst_generator *g, int i);
 /* Fits an isolated merged detection as image processing does: a bright point with a free width; one

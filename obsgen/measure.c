@@ -242,12 +242,28 @@ static void fit_visible_part(const bst_generator *g, const generator_source *s, 
     d->label = BST_LABEL_ARTEFACT;
 }
 
-/* Share of a moving source's light that a fit of a point to it finds. */
+/* Share of a moving source's light that a fit of a point to it finds. The point has the mean width
+ * of the stars' images (widening of imgproc/measure/locate.c), and with it that of their paths
+ * where they are fitted as points. */
 static double caught_by_point(const bst_generator *g, const generator_source *s) {
+    if (g->uneven) {
+        return s->point_flux;
+    }
     const bst_obsgen_path_px rest = {0.0, 0.0};
-    return g->uneven ? s->point_flux
-                     : bst_matched_product(s->path, rest, g->total_sigma) /
-                           bst_matched_product(rest, rest, g->total_sigma);
+    double image = g->response.source.across_px * g->response.source.along_px;
+    double stars = g->straight_path.dx * g->straight_path.dx +
+                   g->straight_path.dy * g->straight_path.dy;
+    double fitted = image + (g->streak > 0.0 ? 0.0 : stars / 24.0);
+    return bst_matched_product(s->path, rest, sqrt(0.5 * (image + fitted))) /
+           bst_matched_product(rest, rest, sqrt(fitted));
+}
+
+double bst_generator_fit_norm(const bst_generator *g, const generator_source *s, double length_px,
+                              bool as_streak) {
+    double norm = g->onboard_bound
+                      ? bst_crlb_table_norm(g->onboard_bound, length_px)
+                      : bst_crlb_table_norm(&g->bound, length_px) * g->norm_ratio[as_streak];
+    return norm / g->noise_e * s->snr_ratio;
 }
 
 bst_detection bst_generator_measure(const bst_generator *g, const generator_source *s,
@@ -275,9 +291,7 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     }
     bst_crlb_table_at crlb = bound_of_model(g, d.flux_e, length);
     d.flux_sigma_e = sqrt(crlb.flux_variance * b->widen / seen) / s->snr_ratio;
-    double norm = bst_crlb_table_norm(&g->bound, length) * g->norm_ratio[own && s->as_streak];
-    d.snr = d.flux_e * (g->onboard_bound ? bst_crlb_table_norm(g->onboard_bound, length) : norm) /
-            g->noise_e * s->snr_ratio;
+    d.snr = d.flux_e * bst_generator_fit_norm(g, s, length, own && s->as_streak);
     measure_place(g, s, b, &truth, &crlb, b->flux_e * truth.norm / g->noise_e, length, &d);
     d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
     set_extent(g, s, s->as_streak && !b->point, &d);

@@ -213,21 +213,22 @@ static double fit_psf(const bst_generator *g, const generator_source *s,
     return longest_with_noise(g, s, all, window, fit.flux);
 }
 
-/* By how much a streak's fit lowers chi-square below that of a point: both are 1 - r^2 of the
- * squared SNR, with the correlation r of two Gaussian images.
+/* By how much a streak's fit lowers chi-square below that of a point: each fit lowers it by its
+ * squared SNR, and that of the point is r times the streak's, with the correlation r of two
+ * Gaussian images.
  *
- * Given:     fitted, along, across  variances of the point's fit and of the streak, px^2 */
+ * Given:     snr                    of the point's fit
+ *            fitted, along, across  variances of the point's fit and of the streak, px^2 */
 static double gain_of_streak(double snr, double fitted, double along, double across) {
     double r2 = 4.0 * fitted * sqrt(along * across) / ((along + fitted) * (across + fitted));
-    return snr * snr * (1.0 - r2);
+    return snr * snr * (1.0 / r2 - 1.0);
 }
 
 void bst_generator_fit_merged(const bst_generator *g, const generator_source *s,
                               const generator_source *merged, int count, generator_blend *out) {
     assert(g && s && out && count >= 0 && (merged || count == 0));
-    double snr = out->flux_e * bst_crlb_table_norm(&g->bound, s->length) / g->noise_e;
     double point = g->fitted_sigma * g->fitted_sigma;
-    if (g->smeared || out->near || snr < OWN_STREAK_SNR) {
+    if (g->smeared || out->near) {
         return;
     }
     if (s->as_streak) {
@@ -244,7 +245,9 @@ void bst_generator_fit_merged(const bst_generator *g, const generator_source *s,
         fitted = 0.5 * window;
         moment = longest_moment(g, s, merged, count, window, out);
     }
-    if (moment < OWN_STREAK_LENGTH * OWN_STREAK_LENGTH * point ||
+    /* the noise of the flux that is measured */
+    double snr = out->flux_e * bst_generator_fit_norm(g, s, 0.0, false) + s->noise;
+    if (snr < OWN_STREAK_SNR || moment < OWN_STREAK_LENGTH * OWN_STREAK_LENGTH * point ||
         gain_of_streak(snr, fitted, moment + 1.0 / 12.0, point + 1.0 / 12.0) < LEAST_GAIN) {
         return;
     }
