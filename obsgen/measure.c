@@ -178,8 +178,8 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     double x = b->x + c * error[0] - n * error[1], y = b->y + n * error[0] + c * error[1];
     double bias = cal->phase_bias_px / g->binning, shared[2];
     bool drawn = s->as_streak && !b->point;
-    double light =
-        drawn ? bst_generator_streak_light(g, b->flux_e) : b->flux_e * truth->norm * g->fit_light;
+    double light = drawn ? bst_generator_streak_light(g, b->flux_e, g->streak)
+                         : b->flux_e * truth->norm * g->fit_light;
     shared_bias(g, s, drawn, light, shared);
     x += shared[0] + bias * sin(2.0 * BST_PI * b->x);
     y += shared[1] + bias * sin(2.0 * BST_PI * b->y);
@@ -242,12 +242,28 @@ static void fit_visible_part(const bst_generator *g, const generator_source *s, 
     d->label = BST_LABEL_ARTEFACT;
 }
 
-/* Share of a moving source's light that a fit of a point to it finds. */
+/* Share of a moving source's light that a fit of a point to it finds. The point has the mean width
+ * of the stars' images (widening of imgproc/measure/locate.c), and with it that of their paths
+ * where they are fitted as points. */
 static double caught_by_point(const bst_generator *g, const generator_source *s) {
+    if (g->uneven) {
+        return s->point_flux;
+    }
     const bst_obsgen_path_px rest = {0.0, 0.0};
-    return g->uneven ? s->point_flux
-                     : bst_matched_product(s->path, rest, g->total_sigma) /
-                           bst_matched_product(rest, rest, g->total_sigma);
+    double image = g->response.source.across_px * g->response.source.along_px;
+    double stars =
+        g->straight_path.dx * g->straight_path.dx + g->straight_path.dy * g->straight_path.dy;
+    double fitted = image + (g->streak > 0.0 ? 0.0 : stars / 24.0);
+    return bst_matched_product(s->path, rest, sqrt(0.5 * (image + fitted))) /
+           bst_matched_product(rest, rest, sqrt(fitted));
+}
+
+double bst_generator_fit_norm(const bst_generator *g, const generator_source *s, double length_px,
+                              bool as_streak) {
+    double norm = g->onboard_bound
+                      ? bst_crlb_table_norm(g->onboard_bound, length_px)
+                      : bst_crlb_table_norm(&g->bound, length_px) * g->norm_ratio[as_streak];
+    return norm / g->noise_e * s->snr_ratio;
 }
 
 bst_detection bst_generator_measure(const bst_generator *g, const generator_source *s,
@@ -275,12 +291,12 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     }
     bst_crlb_table_at crlb = bound_of_model(g, d.flux_e, length);
     d.flux_sigma_e = sqrt(crlb.flux_variance * b->widen / seen) / s->snr_ratio;
-    double norm = bst_crlb_table_norm(&g->bound, length) * g->norm_ratio[own && s->as_streak];
-    d.snr = d.flux_e * (g->onboard_bound ? bst_crlb_table_norm(g->onboard_bound, length) : norm) /
-            g->noise_e * s->snr_ratio;
+    double own_path = hypot(b->own_path.dx, b->own_path.dy);
+    d.snr = d.flux_e * bst_generator_fit_norm(g, s, fmax(length, own_path), own && s->as_streak);
     measure_place(g, s, b, &truth, &crlb, b->flux_e * truth.norm / g->noise_e, length, &d);
     d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
     set_extent(g, s, s->as_streak && !b->point, &d);
+    d.flags |= own_path > 0.0 ? BST_DETECTION_STREAK : 0u;
     d.flags |= b->near ? BST_DETECTION_BLEND : 0u;
     d.flags |= s->saturated ? BST_DETECTION_SATURATED : 0u;
     double half_x = 0.5 * fabs(s->path.dx) + 2.0 * g->sigma;

@@ -271,7 +271,7 @@ def modules(rng, c, sky, period, exposure, limit, strategy, leo):
     }
     imgproc = {"type": "standard", "delay_s": {"frame": rounded(0.15 * period, 3)}}
     if modelled:
-        imgproc["jitter_px"] = true_jitter
+        imgproc["jitter_px"] = rounded(true_jitter / math.sqrt(2.0), 3)  # per axis; the mount's is radial
     control = {"type": "standard", "delay_s": {"tracks": rounded(0.2 * period, 3)},
                "command_latency_s": rounded(0.05 * period, 3), "exposure_s": exposure}
     if strategy != "track":
