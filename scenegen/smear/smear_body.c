@@ -19,9 +19,10 @@
 #define POINT_PX 2.0
 #define IMAGE_PX 32.0
 
-/* Share of the tolerance for cells with a border, and light of the pixel with the largest error
- * over that of the body. */
+/* Shares of the tolerance for cells with a border and for those of curved surfaces, and light of
+ * the pixel with the largest error over that of the body. */
 #define CELL_SHARE 0.8
+#define LIMB_SHARE 0.1
 #define BORDER_LIGHT 0.01
 
 /* Share of the tolerance for the poses, and PSF sigmas from the end of the motion within which
@@ -109,6 +110,7 @@ static void pose_at(const bst_smear *s, const bst_scene_source *source, double u
     view->q_image_from_body = bst_quat_mul(focal, bst_quat_conj(state.q_body_from_gcrf));
     view->origin_m = bst_vec3_scale(bst_quat_rotate(focal, state.apparent), state.range_m);
     view->scale_rad = bst_camera_scale_rad(&s->camera);
+    view->limb_px = 0.0;
     if (pose) {
         bst_source_body_set_pose(source, &state, pose);
     }
@@ -172,6 +174,15 @@ static double per_px_e(const bst_smear *s, const bst_scene_source *source) {
 static double cell_error(const bst_smear *s, double side_px) {
     double sides = side_px / s->sigma_px;
     return sides * sides * sides / 480.0;
+}
+
+/* Error of borders of curved surfaces, px, that is LIMB_SHARE of the tolerance in a pixel beside
+ * them: a border that is moved by 1 px changes it by 0.4 / sigma of the body's light. */
+static double limb_for(const bst_smear *s, const bst_scene_source *source) {
+    double light_e = per_px_e(s, source);
+    double allowed_e = LIMB_SHARE * s->options.tolerance_sigma *
+                       sqrt(BORDER_LIGHT * light_e + s->dark_variance_e2);
+    return allowed_e * s->sigma_px / (0.4 * fmax(light_e, 1e-9));
 }
 
 /* Side of the cells for the body, px: a power of two of pixels, or less for small bodies. */
@@ -343,6 +354,7 @@ typedef struct drawing {
     const bst_smear *s;
     const bst_scene_source *source;
     bst_body_times times; /* weights with the factors on the light */
+    double limb_px;       /* see bst_resolved_view */
 } drawing;
 
 /* Adds pose k to an image: its light only, or with `light_only` false with cover and parts. */
@@ -353,6 +365,7 @@ static bst_status draw(bst_ctx *ctx, const drawing *d, int k, bool light_only,
     bst_resolved_view view;
     double weight = d->times.weight[k];
     pose_at(d->s, d->source, d->times.u[k], pose, &view, &light, &earthlight);
+    view.limb_px = d->limb_px;
     return light_only ? bst_resolved_add_light(ctx, image, pose, &view, &light, weight)
                       : bst_resolved_add(ctx, image, pose, &view, &light, weight, NULL);
 }
@@ -370,6 +383,7 @@ static bst_status draw_poses(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, draw
     b->cell_px = light_only ? light_cell_for(s, d->source, d->times.count)
                             : cell_for(s, d->source, d->times.count);
     BST_TRY(bst_resolved_begin(ctx, b->image, low, high, b->cell_px));
+    d->limb_px = limb_for(s, d->source);
     double inverse = 1.0 / d->source->electrons_per_s;
     if (b->one_pose && d->source->rate) { /* the path has the rate */
         inverse /= bst_scene_source_rate_at(d->source, 0.5);
@@ -412,7 +426,7 @@ static bst_status draw_poses(bst_ctx *ctx, bst_smear *s, bst_smear_body *b, draw
 static bst_status make_image(bst_ctx *ctx, bst_smear *s, bst_smear_body *b,
                              const bst_scene_source *source, bool *there) {
     double moved_px, turned_px, low[2], high[2];
-    drawing d = {s, source, {.u = {0.5}, .weight = {1.0}, .count = 1}};
+    drawing d = {s, source, {.u = {0.5}, .weight = {1.0}, .count = 1}, 0.0};
     measure(s, source, &moved_px, &turned_px);
     b->one_pose = turned_px <= STILL_PX;
     double sigma_px = sqrt(s->sigma_px * s->sigma_px + 1.0 / 12.0);

@@ -259,20 +259,21 @@ bst_status bst_resolved_add_fragments(bst_ctx *ctx, const bst_resolved_adding *a
     return BST_OK;
 }
 
-/* Step between the corners of a circle's polygon at the limb, px: the polygon has the area of the
- * circle, and its borders are wrong by LIMB_PX. A circle in the image plane is wrong by step^2 /
- * (24 radius), the straight side of a cylinder by twice that. */
-static const double LIMB_PX = 4e-5;
-
 /* Largest angle of a part of a curved surface: the light of a part is that of its middle. */
 static const double PART_RAD = 0.05;
 
+/* The step between the corners of a circle's polygon is that of its error: the polygon has the area
+ * of the circle. A circle in the image plane is wrong by step^2 / (24 radius), the straight side of
+ * a cylinder by twice that. */
 int bst_resolved_parts(const bst_resolved_adding *a, double radius_m, double angle, bst_vec3 at,
                        bool limb) {
-    double depth_m;
+    double depth_m, error_px = BST_RESOLVED_CURVED_PX;
     (void)bst_resolved_project(a, at, &depth_m);
     double radius_px = radius_m * a->per_m / depth_m * a->r->image.cell_px;
-    double step_px = sqrt(12.0 * radius_px * (limb ? LIMB_PX : BST_RESOLVED_CURVED_PX));
+    if (limb) {
+        error_px = fmin(fmax(a->view->limb_px, BST_RESOLVED_LIMB_PX), error_px);
+    }
+    double step_px = sqrt(12.0 * radius_px * error_px);
     double parts = fmax(angle * radius_px / step_px, angle / PART_RAD);
     return (int)fmin(ceil(parts - 1e-6), PARTS_MAX);
 }

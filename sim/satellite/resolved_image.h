@@ -10,6 +10,8 @@ typedef struct bst_resolved_view {
     bst_quat q_image_from_body;
     bst_vec3 origin_m; /* from the observer to the body's origin, image axes */
     double scale_rad;  /* angle of a px at the boresight */
+    double limb_px;    /* error of borders of curved surfaces that is allowed, px: from
+                          BST_RESOLVED_LIMB_PX to BST_RESOLVED_CURVED_PX; 0: the first */
 } bst_resolved_view;
 
 /* Light of a material, in any unit: from a solid angle of one steradian whose BRDF times cosine of
@@ -53,6 +55,8 @@ typedef struct bst_resolved bst_resolved;
 
 /* Gaps and overlaps between parts of curved surfaces have up to half of that width, px. */
 #define BST_RESOLVED_CURVED_PX 2.5e-4
+/* Least error of their borders, px. */
+#define BST_RESOLVED_LIMB_PX 4e-5
 
 /* Largest number of cells. */
 enum { BST_RESOLVED_CELLS_MAX = 1 << 26 };

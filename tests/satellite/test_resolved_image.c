@@ -6,7 +6,7 @@
 static bst_resolved_view look_from(bst_vec3 direction, bst_vec3 right, double range_m,
                                    double scale_rad) {
     bst_quat q = bst_quat_look(bst_vec3_scale(direction, -1.0), right);
-    return (bst_resolved_view){q, {0, 0, range_m}, scale_rad};
+    return (bst_resolved_view){q, {0, 0, range_m}, scale_rad, 0.0};
 }
 
 /* Light and cover (px^2) of an image. */
@@ -256,9 +256,72 @@ static void test_second_moments(void **state) {
     bst_test_model_close(&m);
 }
 
+/* Light of a pixel behind a Gaussian PSF. */
+static double blurred(const bst_resolved_image *m, double x, double y, double sigma_px) {
+    double sum = 0.0, reach = 6.0 * sigma_px;
+    for (int j = 0; j < m->height; j++) {
+        double dy = (m->y0 + j + 0.5) * m->cell_px - y;
+        for (int i = 0; i < m->width && fabs(dy) < reach; i++) {
+            const bst_resolved_cell *c = &m->cells[j * m->width + i];
+            double dx = (m->x0 + i + 0.5) * m->cell_px - x, light = (double)c->light;
+            if (light > 0.0 && fabs(dx) < reach) {
+                double u = dx + (double)c->moment_x / light * m->cell_px;
+                double v = dy + (double)c->moment_y / light * m->cell_px;
+                sum += light * exp(-0.5 * (u * u + v * v) / (sigma_px * sigma_px));
+            }
+        }
+    }
+    return sum;
+}
+
+/* Behind a PSF, borders of curved surfaces are as right as asked: spheres of 1 to 8 px, a cylinder
+ * and a dish, in shadows of one another. */
+static void test_allowed_limb(void **state) {
+    (void)state;
+    const double sigma_px = 0.85;
+    bst_ctx ctx = {0};
+    bst_test_model m = bst_test_model_open(bus);
+    bst_resolved_gain gain[2] = {{.sun = 1.0}, {.sun = 1.0}};
+    bst_resolved_light light = {.sun = bst_vec3_unit((bst_vec3){0.7, 0.9, 0.4}), .gain = gain};
+    for (int scale = 0; scale < 3; scale++) {
+        bst_resolved *r[2];
+        const double range_m = 40.0, px_per_m[] = {1.7, 5.0, 13.0};
+        bst_resolved_view view = look_from((bst_vec3){0.2, 0.7, 0.9}, (bst_vec3){1, 0, 0}, range_m,
+                                           1.0 / (range_m * px_per_m[scale]));
+        double low[2], high[2], total[2], brightest = 0.0, worst = 0.0;
+        assert_true(bst_resolved_box(m.pose, &view, low, high));
+        for (int n = 0; n < 2; n++) {
+            view.limb_px = n == 0 ? 0.0 : BST_RESOLVED_CURVED_PX;
+            bst_assert_ok(&ctx, bst_resolved_create(&ctx, m.satellite, &r[n]));
+            bst_assert_ok(&ctx, bst_resolved_begin(&ctx, r[n], low, high, 0.25));
+            bst_assert_ok(&ctx,
+                          bst_resolved_add(&ctx, r[n], m.pose, &view, &light, 1.0, &total[n]));
+        }
+        double step = (high[0] - low[0]) / 40.0;
+        for (double y = low[1] - 1.0; y < high[1] + 1.0; y += step) {
+            for (double x = low[0] - 1.0; x < high[0] + 1.0; x += step) {
+                double right = blurred(bst_resolved_image_of(r[0]), x, y, sigma_px);
+                double coarse = blurred(bst_resolved_image_of(r[1]), x, y, sigma_px);
+                brightest = fmax(brightest, right);
+                worst = fmax(worst, fabs(coarse - right));
+            }
+        }
+        /* a border that is moved by 1 px changes a pixel by 0.4 / sigma_px of the light */
+        bst_assert_close(worst / brightest, 0.0, 0.4 / sigma_px * BST_RESOLVED_CURVED_PX);
+        /* it is finer where that is asked for */
+        assert_true(worst > 0.0);
+        bst_assert_close(total[1] / total[0], 1.0, 1e-4);
+        assert_true(brightest > 0.0);
+        bst_resolved_free(r[0]);
+        bst_resolved_free(r[1]);
+    }
+    bst_test_model_close(&m);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_agrees_with_flux), cmocka_unit_test(test_perspective),
-        cmocka_unit_test(test_light), cmocka_unit_test(test_second_moments)};
+        cmocka_unit_test(test_light), cmocka_unit_test(test_second_moments),
+        cmocka_unit_test(test_allowed_limb)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
