@@ -1,5 +1,5 @@
 /* Rice code of FITS pixels. The decoder: cfitsio 4.2 reads beyond its memory on damaged data. The
- * encoder: its bytes are those of cfitsio, in a fifth of the time (docs/results/benchmarks.md). */
+ * encoder: its bytes are those of cfitsio, in a sixth of the time (docs/results/benchmarks.md). */
 #ifndef BST_IO_FITS_RICE_H
 #define BST_IO_FITS_RICE_H
 

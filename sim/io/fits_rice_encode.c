@@ -39,8 +39,8 @@ static inline void map_differences(const uint16_t *pixels, int count, difference
     uint32_t sum = 0;
     uint16_t most = 0;
     for (int i = 0; i < count; i++) {
-        const int16_t step = (int16_t)(pixels[i] - pixels[i - 1]);
-        const uint16_t mapped = (uint16_t)((uint16_t)(step << 1) ^ (uint16_t)(step >> 15));
+        const uint16_t step = (uint16_t)(pixels[i] - pixels[i - 1]);
+        const uint16_t sign = (uint16_t)(0 - (step >> 15)), mapped = (uint16_t)(step << 1 ^ sign);
         d->mapped[i] = mapped;
         sum += mapped;
         most = mapped > most ? mapped : most;
