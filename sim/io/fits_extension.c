@@ -1,9 +1,11 @@
 /* Writes frames and planes as FITS image extensions. */
 #include <errno.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "sim/io/fits_internal.h"
+#include "sim/io/fits_rice.h"
 
 bst_status bst_fits_sign_hdu(bst_ctx *ctx, const bst_fits *fits, char *hdu, long long bytes,
                              const uint16_t *pixels, size_t count) {
@@ -36,6 +38,23 @@ static bool set_size(char *header, int width, int height) {
     return true;
 }
 
+/* Writes the rows of an image, coded, as the tiles of a compressed image: as cfitsio does in some
+ * six times the time. */
+static bst_status write_rows(bst_ctx *ctx, bst_fits *fits, const uint16_t *pixels, int width,
+                             int height, int *code) {
+    uint8_t *coded = malloc(bst_fits_rice_bytes((size_t)width));
+    if (!coded) {
+        return bst_fail(ctx, BST_ERR_MEMORY, "%s: out of memory for a row", fits->path);
+    }
+    for (int y = 0; y < height && *code == 0; y++) {
+        const size_t bytes =
+            bst_fits_rice_encode(pixels + (size_t)y * (size_t)width, (size_t)width, coded);
+        fits_write_col(fits->memory.file, TBYTE, 1, 1 + y, 1, (LONGLONG)bytes, coded, code);
+    }
+    free(coded);
+    return BST_OK;
+}
+
 bst_status bst_fits_write_extension(bst_ctx *ctx, bst_fits *fits, const bst_fits_frame *frame,
                                     const uint16_t *pixels, int width, int height, int64_t number) {
     bool rice = fits->compression == BST_FITS_RICE;
@@ -44,6 +63,7 @@ bst_status bst_fits_write_extension(bst_ctx *ctx, bst_fits *fits, const bst_fits
     char *hdu = NULL;
     long long bytes = 0;
     int code = 0;
+    bst_status status = BST_OK;
     errno = 0;
     bst_fits_memory_open(&fits->memory, true, &code);
     fitsfile *file = fits->memory.file;
@@ -58,11 +78,12 @@ bst_status bst_fits_write_extension(bst_ctx *ctx, bst_fits *fits, const bst_fits
     bst_fits_put_statements(file, &code);
     bst_fits_put_sums(fits, file, &code);
     if (rice) {
-        /* cfitsio's prototype lacks const; it does not write to the array */
-        fits_write_img(file, TUSHORT, 1, (LONGLONG)count, (void *)(uintptr_t)pixels, &code);
+        status = write_rows(ctx, fits, pixels, width, height, &code);
     }
     bst_fits_memory_hdu(&fits->memory, &hdu, &bytes, &code);
-    bst_status status = bst_fits_check(ctx, fits, code, "cannot be written");
+    if (status == BST_OK) {
+        status = bst_fits_check(ctx, fits, code, "cannot be written");
+    }
     if (status == BST_OK && !rice && !set_size(hdu, width, height)) {
         status = bst_fail(ctx, BST_ERR_FORMAT, "%s: NAXIS1 is not where it belongs", fits->path);
     }
