@@ -37,8 +37,8 @@ static uint16_t make_pixel(tile_kind kind, uint16_t base, int bits) {
     }
 }
 
-/* Tiles of all kinds, lengths and sizes of noise have cfitsio's bytes, within the space that is
- * promised, and decode to what they were. */
+/* Tiles of all kinds, lengths and sizes of noise have cfitsio's bytes, fit the space of
+ * bst_fits_rice_bytes, and decode to what they were. */
 static void test_tiles(void **state) {
     (void)state;
     static uint16_t pixels[TILE_MOST], decoded[TILE_MOST];
