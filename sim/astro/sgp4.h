@@ -32,6 +32,12 @@ typedef struct bst_sgp4 bst_sgp4;
  * sidereal time and node of the operational code. */
 bst_status bst_sgp4_create(bst_ctx *ctx, const bst_elements *elements, bst_sgp4_gravity gravity,
                            bst_sgp4_mode mode, bst_sgp4 **out) BST_MUST_CHECK;
+/* The same for one of several element sets near each other, as in differences: the terms of drag
+ * with 1 / e, which SGP4 leaves out up to e = 1e-4, where they jump, have e = drag_eccentricity,
+ * that of the set in the middle. Where it is that of the set, this is bst_sgp4_create. */
+bst_status bst_sgp4_create_near(bst_ctx *ctx, const bst_elements *elements,
+                                double drag_eccentricity, bst_sgp4_gravity gravity,
+                                bst_sgp4_mode mode, bst_sgp4 **out) BST_MUST_CHECK;
 /* Frees a propagator; NULL is allowed. */
 void bst_sgp4_free(bst_sgp4 *sgp4);
 

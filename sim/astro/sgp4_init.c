@@ -75,8 +75,9 @@ static void set_secular_rates(bst_sgp4 *s) {
     s->raan_drag = -3.5 * beta2 * q1 * s->plane.cos_i; /* times C1, once that is known */
 }
 
-/* Atmospheric drag in powers of time (STR3 section 6, C1 to C5 and D2 to D4). */
-static void set_drag(bst_sgp4 *s, double bstar) {
+/* Atmospheric drag in powers of time (STR3 section 6, C1 to C5 and D2 to D4). drag_e: eccentricity
+ * of the terms with 1 / e. */
+static void set_drag(bst_sgp4 *s, double bstar, double drag_e) {
     const double a = s->a0, e = s->e0, n = s->n0;
     const double radius = s->k.radius_km;
     double perigee_km = (a * (1.0 - e) - 1.0) * radius;
@@ -116,10 +117,10 @@ static void set_drag(bst_sgp4 *s, double bstar) {
     s->sin_m0 = sin(s->m0);
     s->cube_m0 = w * w * w;
     s->e_drag_sin = bstar * c5;
-    if (e > 1e-4) { /* both contain 1 / e (VCHK) */
-        double c3 = -2.0 * q_xi4 * xi * s->k.j3_over_j2 * n * s->plane.sin_i / e;
+    if (drag_e > 1e-4) { /* both contain 1 / e (VCHK) */
+        double c3 = -2.0 * q_xi4 * xi * s->k.j3_over_j2 * n * s->plane.sin_i / drag_e;
         s->argp_drag = bstar * c3 * cos(s->argp0);
-        s->m_drag = -(2.0 / 3.0) * q_xi4 * bstar / e_eta;
+        s->m_drag = -(2.0 / 3.0) * q_xi4 * bstar / (drag_e * (a * drag_e * xi));
     }
     double d2 = 4.0 * a * xi * c1 * c1;
     double d3 = d2 * xi * c1 / 3.0 * (17.0 * a + floor_re);
@@ -145,6 +146,12 @@ static bst_status refuse(bst_ctx *ctx, const bst_elements *el, bst_sgp4_error co
 
 bst_status bst_sgp4_create(bst_ctx *ctx, const bst_elements *elements, bst_sgp4_gravity gravity,
                            bst_sgp4_mode mode, bst_sgp4 **out) {
+    return bst_sgp4_create_near(ctx, elements, elements->eccentricity, gravity, mode, out);
+}
+
+bst_status bst_sgp4_create_near(bst_ctx *ctx, const bst_elements *elements,
+                                double drag_eccentricity, bst_sgp4_gravity gravity,
+                                bst_sgp4_mode mode, bst_sgp4 **out) {
     const bst_elements *el = elements;
     *out = NULL;
     double sum = el->epoch_utc_jd1 + el->epoch_utc_jd2 + el->bstar + el->raan_rad +
@@ -182,7 +189,7 @@ bst_status bst_sgp4_create(bst_ctx *ctx, const bst_elements *elements, bst_sgp4_
     s->deep_space = BST_SGP4_TWO_PI / s->n0 >= DEEP_SPACE_PERIOD_MIN;
     bst_sgp4_set_plane(&s->k, sin(s->i0), cos_i, &s->plane);
     set_secular_rates(s);
-    set_drag(s, el->bstar);
+    set_drag(s, el->bstar, drag_eccentricity);
     if (s->deep_space) {
         /* summed to one double first, like the reference: rounding moves the Moon by 1e-10 rad,
          * 1e-6 km at the highest orbits */

@@ -1,5 +1,6 @@
 #include "sim/run/run_custody.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -43,6 +44,7 @@ struct bst_run_custody {
     double within_m;
     int object_count, sensor_count;
     double *pixel_rad;         /* [sensor] */
+    double *fwhm_rad;          /* [sensor] of the PSF */
     bst_custody_orbit *orbits; /* [object]; a_m 0: none */
     bst_custody_filter *filters;
     score *scores;
@@ -96,7 +98,7 @@ static bst_io_value number(double value) {
 
 static bst_status allocate(bst_ctx *ctx, bst_run_custody *c) {
     size_t n = (size_t)c->object_count + 1, sensors = (size_t)c->sensor_count + 1;
-    c->pixel_rad = calloc(sensors, sizeof *c->pixel_rad);
+    c->pixel_rad = calloc(2 * sensors, sizeof *c->pixel_rad);
     c->orbits = calloc(n, sizeof *c->orbits);
     c->filters = calloc(n, sizeof *c->filters);
     c->scores = calloc(n, sizeof *c->scores);
@@ -105,6 +107,7 @@ static bst_status allocate(bst_ctx *ctx, bst_run_custody *c) {
         return bst_fail(ctx, BST_ERR_MEMORY, "out of memory for the custody of %d objects",
                         c->object_count);
     }
+    c->fwhm_rad = c->pixel_rad + sensors;
     c->place_m[1] = c->place_m[0] + n;
     c->place_m[2] = c->place_m[1] + n;
     return BST_OK;
@@ -179,7 +182,9 @@ bst_status bst_run_custody_create(bst_ctx *ctx, const bst_world *world,
     bst_status status = allocate(ctx, c);
     for (int i = 0, k = 0; status == BST_OK && i < bst_world_observer_count(world); i++) {
         for (int s = 0; s < bst_world_sensor_count(world, i); s++, k++) {
-            c->pixel_rad[k] = bst_camera_scale_rad(bst_world_camera(world, i, s));
+            const bst_camera *camera = bst_world_camera(world, i, s);
+            c->pixel_rad[k] = bst_camera_scale_rad(camera);
+            c->fwhm_rad[k] = BST_FWHM_PER_SIGMA * bst_camera_psf_sigma_px(camera) * c->pixel_rad[k];
         }
     }
     status = status == BST_OK ? start_filters(ctx, c, scenario) : status;
@@ -282,6 +287,7 @@ static bool may_be(const bst_run_custody *c, int object, const bst_custody_obser
 /* Objects in the gate of an observation. */
 typedef struct match {
     int count;                  /* in the gate */
+    int close;                  /* predicted within the FWHM, the best one left out */
     int best, true_object;      /* -1: none */
     double chi2, merit, second; /* of the best; merit: chi-square + log determinant */
 } match;
@@ -294,6 +300,7 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
     const double time_s = z->observer.time_s;
     const bst_world_state eye = {z->observer.position_m, z->observer.velocity_mps};
     double nearest = TRACK_PX * c->pixel_rad[sensor];
+    bool best_is_close = false;
     (void)bst_world_places(c->world, time_s, c->place_m[0], c->place_m[1], c->place_m[2]);
     for (int i = 0; i < c->object_count; i++) {
         bst_world_sight sight;
@@ -313,7 +320,12 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
             continue;
         }
         bst_custody_add_process_noise(&c->config, time_s, &c->filters[i]);
-        if (!bst_custody_predict(&c->orbits[i], &c->filters[i], z, &p) || !(p.chi2 < GATE)) {
+        if (!bst_custody_predict(&c->orbits[i], &c->filters[i], z, &p)) {
+            continue;
+        }
+        const bool close = hypot(p.innovation[0], p.innovation[1]) < c->fwhm_rad[sensor];
+        out->close += close;
+        if (!(p.chi2 < GATE)) {
             continue;
         }
         double merit = p.chi2 + p.log_determinant;
@@ -323,10 +335,12 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
             out->merit = merit;
             out->chi2 = p.chi2;
             out->best = i;
+            best_is_close = close;
         } else {
             out->second = fmin(out->second, merit);
         }
     }
+    out->close -= best_is_close;
 }
 
 /* Updates an object with the directions that were measured, which do not have the process noise of
@@ -346,7 +360,8 @@ static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_a
     match m;
     find_object(c, sensor, z, &m);
     bst_custody_figures *f = &c->figures;
-    bool clear = m.best >= 0 && m.second > m.merit + LIKELIHOOD_MARGIN;
+    /* light of two objects within the FWHM is that of neither */
+    bool clear = m.best >= 0 && m.second > m.merit + LIKELIHOOD_MARGIN && m.close == 0;
     bool updated = clear && update(&c->orbits[m.best], arc, &c->filters[m.best]);
     f->tracks++;
     f->ambiguous += m.best >= 0 && !clear;

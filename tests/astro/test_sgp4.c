@@ -382,6 +382,40 @@ static void every_error_has_its_text(void **state) {
     }
 }
 
+/* Distance that a change of the eccentricity from 1.0001e-4 to 0.9999e-4, 0.14 m, moves an object
+ * after a day, km, with the terms of drag for an eccentricity of `drag_e`. */
+static double jump_km(double drag_e) {
+    bst_ctx ctx = {0};
+    double at[2][3], v[3];
+    for (int i = 0; i < 2; i++) {
+        const bst_elements el = {.norad = 1,
+                                 .epoch_utc_jd1 = 2459746.5,
+                                 .bstar = -0.02,
+                                 .eccentricity = i == 0 ? 1.0001e-4 : 0.9999e-4,
+                                 .inclination_rad = 0.93,
+                                 .arg_perigee_rad = 2.0,
+                                 .mean_anomaly_rad = 0.5,
+                                 .mean_motion_radpmin = 0.067};
+        bst_sgp4 *s;
+        bst_assert_ok(&ctx, bst_sgp4_create_near(&ctx, &el, drag_e > 0.0 ? drag_e : el.eccentricity,
+                                                 BST_SGP4_WGS72, BST_SGP4_IMPROVED, &s));
+        assert_int_equal(bst_sgp4_propagate(s, 1440.0, at[i], v), BST_SGP4_OK);
+        bst_sgp4_free(s);
+    }
+    return hypot(hypot(at[0][0] - at[1][0], at[0][1] - at[1][1]), at[0][2] - at[1][2]);
+}
+
+/* Element sets near each other move alike if they have the terms with 1 / e of one eccentricity, on
+ * either side of the 1e-4 where SGP4 drops them. */
+static void drag_near_an_eccentricity_is_smooth(void **state) {
+    (void)state;
+    const double own = jump_km(0.0), above = jump_km(1.3e-4), below = jump_km(0.7e-4);
+    print_message("%g km, %g km, %g km\n", own, above, below);
+    assert_true(own > 0.02);
+    /* 2 a de = 0.3 m, times what drag makes of it in a day */
+    assert_true(above < 0.01 && below < 0.01);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(verification_output_in_full),
@@ -392,6 +426,7 @@ int main(void) {
         cmocka_unit_test(refuses_what_is_no_orbit),
         cmocka_unit_test(times_out_of_reach_are_errors),
         cmocka_unit_test(every_error_has_its_text),
+        cmocka_unit_test(drag_near_an_eccentricity_is_smooth),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

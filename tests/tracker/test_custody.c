@@ -160,7 +160,8 @@ static double nees_of_passes(const bst_elements *set, double offset_s, int draws
         assert_true(observe_pass(sgp4, offset_s, 200.0 * i, key, number, pass));
         assert_true(bst_custody_update_directions(&orbit, &same_axes, pass, 4, &filter));
         const bst_custody_filter updated = filter;
-        pass[3].direction = pass[0].direction; /* of another object, that stood still */
+        /* half of another object, that stood still */
+        pass[2].direction = pass[3].direction = pass[0].direction;
         assert_false(bst_custody_update_directions(&orbit, &same_axes, pass, 4, &filter));
         assert_memory_equal(&filter, &updated, sizeof filter);
         sum += bst_custody_nees(&filter);
@@ -198,6 +199,95 @@ static void directions_and_strong_drag(void **state) {
     }
     assert_int_equal(found, 4);
     free(sets);
+}
+
+/* Mean NEES of low orbits after a pass of twelve directions whose errors are `scale` times as large
+ * as stated; the last `outliers` are half a degree off. *sigma: mean of the position's standard
+ * deviation, m; *updated: how many. */
+static double nees_of_arcs(double scale, int outliers, double *sigma, int *updated) {
+    bst_ctx ctx = {0};
+    enum { DRAWS = 400, COUNT = 12 };
+    const bst_elements set = {.norad = 6,
+                              .epoch_utc_jd1 = 2459746.5,
+                              .eccentricity = 0.01,
+                              .inclination_rad = 1.2,
+                              .raan_rad = 1.0,
+                              .arg_perigee_rad = 2.0,
+                              .mean_anomaly_rad = 0.5,
+                              .mean_motion_radpmin = 0.06};
+    const bst_rng_key key = bst_rng_make_key(9, 0, "test", "arcs");
+    const double own = 0.5 * BST_ARCSEC_RAD;
+    bst_custody_orbit orbit;
+    bst_sgp4 *sgp4;
+    double sum = 0.0;
+    *sigma = 0.0;
+    *updated = 0;
+    bst_assert_ok(&ctx, bst_sgp4_create(&ctx, &set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &sgp4));
+    bst_assert_ok(&ctx, bst_custody_orbit_init(&ctx, &set, 0.0, 0.0, &orbit));
+    for (int i = 0; i < DRAWS; i++) {
+        double normals[BST_CUSTODY_STATE], one;
+        bst_vec3 place;
+        bst_custody_filter filter;
+        bst_od_observation arc[COUNT];
+        for (int k = 0; k < BST_CUSTODY_STATE; k++) {
+            normals[k] = bst_rng_normal(key, (uint64_t)i, (uint64_t)k);
+        }
+        bst_custody_filter_init(&config, &orbit, normals, &filter);
+        for (int k = 0; k < COUNT; k++) {
+            bst_custody_observation at;
+            bst_od_state object = {.time_s = 500.0 + 5.0 * k};
+            bst_od_sight sight;
+            assert_true(observe(sgp4, 0.0, object.time_s, key, 0, &at));
+            assert_true(bst_sgp4_motion(sgp4, object.time_s / 60.0, &object.position_m,
+                                        &object.velocity_mps));
+            bst_od_see(&object, &at.observer, &sight);
+            const bst_tangent axes = bst_tangent_at(sight.direction);
+            const double off = k >= COUNT - outliers ? 0.5 * BST_DEG_RAD : 0.0;
+            const bst_vec3 error = bst_tangent_vector(
+                &axes, off + scale * own * bst_rng_normal(key, (uint64_t)i, (uint64_t)(10 + 2 * k)),
+                scale * own * bst_rng_normal(key, (uint64_t)i, (uint64_t)(11 + 2 * k)));
+            arc[k] = (bst_od_observation){.observer = at.observer,
+                                          .direction = bst_tangent_exp(sight.direction, error),
+                                          .cov_11 = own * own,
+                                          .cov_22 = own * own};
+        }
+        if (bst_custody_update_directions(&orbit, &same_axes, arc, COUNT, &filter)) {
+            double nees = bst_custody_nees(&filter);
+            assert_true(bst_custody_predict_position(&orbit, &filter, 530.0, &place, &one));
+            *sigma += one;
+            sum += nees;
+            (*updated)++;
+        }
+    }
+    bst_sgp4_free(sgp4);
+    *sigma /= fmax(*updated, 1.0);
+    return sum / fmax(*updated, 1.0);
+}
+
+/* An arc tells how large its errors are, and single directions far off are left out; several are
+ * another object's. */
+static void arcs_scale_their_errors(void **state) {
+    (void)state;
+    double stated_m, larger_m, without_m, unused_m;
+    int stated_count, larger_count, without_count, refused_count;
+    const double stated = nees_of_arcs(1.0, 0, &stated_m, &stated_count);
+    const double larger = nees_of_arcs(2.0, 0, &larger_m, &larger_count);
+    const double without = nees_of_arcs(1.0, 2, &without_m, &without_count);
+    (void)nees_of_arcs(1.0, 6, &unused_m, &refused_count);
+    print_message("NEES %.2f (%.1f m), %.2f (%.1f m), %.2f (%.1f m)\n", stated, stated_m, larger,
+                  larger_m, without, without_m);
+    assert_int_equal(stated_count, 400);
+    assert_true(larger_count > 390);
+    assert_int_equal(without_count, 400);
+    assert_int_equal(refused_count, 0);
+    /* 4 sigma of the mean of 400 chi-squares of 6 degrees of freedom, and the scatter of the
+     * factor: its mean of 1 / factor is above 1 by its variance, 2 * 18 / 38^2 */
+    bst_assert_close(stated, 6.0 * 1.025, 4.0 * sqrt(12.0 / 400.0));
+    bst_assert_close(without, 6.0 * 1.025, 4.0 * sqrt(12.0 / 400.0));
+    /* errors of twice the size, not known before, half made good by the factor (20 + 4 * 18) / (20
+     * + 18): 4 / 2.4 of the variance remain for what the pass measures */
+    assert_true(larger > 6.0 && larger < 6.0 * 4.0 / 2.2);
+    assert_true(larger_m > 1.2 * stated_m);
 }
 
 static bst_elements low_orbit(void) {
@@ -295,6 +385,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(errors_agree_with_covariances),
         cmocka_unit_test(directions_and_strong_drag),
+        cmocka_unit_test(arcs_scale_their_errors),
         cmocka_unit_test(noise_spreads_places),
         cmocka_unit_test(photocentre_and_strangers),
         cmocka_unit_test(refuses_what_is_no_ellipse),

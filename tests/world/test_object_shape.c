@@ -202,6 +202,42 @@ static void glints_are_neither_missed_nor_smeared(void **state) {
     }
 }
 
+/* A sphere is a disc from a fiftieth of a pixel on: its light then comes from beside its centre. */
+static void small_spheres_are_discs(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    const double areas_m2[2] = {20.0, 500.0}; /* 0.01 and 0.05 px across at 36,000 km */
+    for (int n = 0; n < 2; n++) {
+        char object[256];
+        snprintf(object, sizeof object, "{\"name\": \"s\", \"area_m2\": %g, " TEST_GX5 "}",
+                 areas_m2[n]);
+        bst_world *world = test_world_with(object, "");
+        bst_world_view *view;
+        bst_assert_ok(&ctx, bst_world_view_create(&ctx, world, &view));
+        const bst_camera *camera = bst_world_camera(world, 0, 0);
+        bst_scene_object_query query = {
+            .view = view,
+            .camera = camera,
+            .span = {0, 100, 100.5},
+            .lit = {0, 0, (int)camera->width_px, (int)camera->height_px},
+            .window = {0, 0, (int)camera->width_px, (int)camera->height_px},
+            .q_mid = {0, 0, 0, 1},
+            .cone = {{0, 0, 1}, BST_PI},
+            .margin_px = 1e9};
+        bst_scene_object_parts parts = {.body = NULL};
+        bst_scene_source source;
+        bool there;
+        bst_assert_ok(&ctx, bst_field_object(&ctx, &query, 0, &parts, &source, &there));
+        assert_true(there && (source.shape != NULL) == (n == 1));
+        if (source.shape) {
+            const double radius = sqrt(areas_m2[n] / BST_PI) / source.range_m;
+            bst_assert_close(source.shape->radius, radius, 1e-12);
+        }
+        bst_world_view_free(view);
+        bst_world_free(world);
+    }
+}
+
 /* Earthlight on a shape is that of the sphere's model where the shape is a sphere. */
 static void earthlight_is_that_of_spheres(void **state) {
     (void)state;
@@ -382,6 +418,7 @@ int main(void) {
         cmocka_unit_test(farther_from_the_sun),
         cmocka_unit_test(a_spinning_plate_glints),
         cmocka_unit_test(glints_are_neither_missed_nor_smeared),
+        cmocka_unit_test(small_spheres_are_discs),
         cmocka_unit_test(earthlight_is_that_of_spheres),
         cmocka_unit_test(facets_have_their_temperatures),
         cmocka_unit_test(light_is_reflected_twice),

@@ -13,8 +13,11 @@ enum {
     N = BST_CUSTODY_STATE,
     SETS = 2 * N + 1,
     M = 2 * BST_CUSTODY_DIRECTIONS, /* most numbers of a measurement */
-    MOST_ITERATIONS = 5
+    MOST_ITERATIONS = 5,
+    MOST_REJECTED = 4 /* of the directions of an arc one in so many may be outliers */
 };
+/* chi-square of a direction, 2 degrees of freedom: beyond it are 4e-6 of good ones */
+#define OUTLIER 25.0
 #define DAY_S 86400.0
 /* Below this inclination SGP4's periodics are not smooth in its elements (Lyddane's, by Sun and
  * Moon: 0.02 degrees), and differences are those of osculating elements. */
@@ -146,7 +149,8 @@ static bool motion(const bst_custody_orbit *o, const double x[N], int count, con
     bst_elements set = o->elements;
     bst_sgp4 *sgp4;
     if ((!flat && !elements_at(o, x, &set)) ||
-        bst_sgp4_create(NULL, &set, BST_SGP4_WGS72, BST_SGP4_IMPROVED, &sgp4) != BST_OK) {
+        bst_sgp4_create_near(NULL, &set, o->elements.eccentricity, BST_SGP4_WGS72,
+                             BST_SGP4_IMPROVED, &sgp4) != BST_OK) {
         return false;
     }
     bool good = true;
@@ -194,6 +198,7 @@ typedef struct measurement {
     const bst_mat3 *gcrf_from_teme;
     const bst_custody_observation *track; /* NULL: directions */
     const bst_od_observation *directions;
+    double factor; /* on the stated covariances */
 } measurement;
 
 /* What is measured less what is predicted for a state, in the tangent axes at the observed
@@ -257,7 +262,7 @@ static void noise(const bst_custody_orbit *o, const measurement *z,
                     double sum = k == i ? own[p][q]
                                         : kept * (a->shared_rad[p][0] * b->shared_rad[q][0] +
                                                   a->shared_rad[p][1] * b->shared_rad[q][1]);
-                    sum += spread2 * bst_vec3_dot(ea[p], eb[q]);
+                    sum = z->factor * sum + spread2 * bst_vec3_dot(ea[p], eb[q]);
                     r[2 * i + p][2 * k + q] = r[2 * k + q][2 * i + p] = sum;
                 }
             }
@@ -367,6 +372,7 @@ static void solve(const gain *g, const double y[M], double out[M]) {
 static measurement of_track(const bst_custody_observation *z) {
     return (measurement){.times = 1,
                          .size = 4,
+                         .factor = 1.0,
                          .time_s = {z->observer.time_s},
                          .gcrf_from_teme = &z->gcrf_from_teme,
                          .track = z};
@@ -448,7 +454,38 @@ static double most_chi2(int size) {
     return 4.0 * size * root * root * root;
 }
 
-static bool update(const bst_custody_orbit *o, const measurement *z, bst_custody_filter *filter) {
+/* How an update fits its measurement. */
+typedef struct fit {
+    double innovations; /* chi-square of them, by the covariance before the update */
+    /* chi-square of what the update leaves, by the covariance of the errors; its expectation */
+    double rest, expected;
+    double each[BST_CUSTODY_DIRECTIONS]; /* of a direction, by its own covariance */
+} fit;
+
+/* With w = S^-1 y the update leaves e = R w, and e' R^-1 e has the expectation tr(S^-1 R). */
+static void judge_fit(const gain *g, const linear *at, const double w[M], fit *out) {
+    double e[M];
+    out->rest = out->expected = 0.0;
+    for (int i = 0; i < g->size; i++) {
+        double column[M];
+        e[i] = 0.0;
+        for (int k = 0; k < g->size; k++) {
+            e[i] += at->r[i][k] * w[k];
+        }
+        out->rest += w[i] * e[i];
+        solve(g, at->r[i], column);
+        out->expected += column[i];
+    }
+    for (int i = 0; i + 1 < g->size; i += 2) {
+        const double xx = at->r[i][i], xy = at->r[i][i + 1], yy = at->r[i + 1][i + 1];
+        out->each[i / 2] =
+            (e[i] * e[i] * yy - 2.0 * e[i] * e[i + 1] * xy + e[i + 1] * e[i + 1] * xx) /
+            (xx * yy - xy * xy);
+    }
+}
+
+static bool update(const bst_custody_orbit *o, const measurement *z, bst_custody_filter *filter,
+                   fit *quality) {
     bst_custody_filter next = *filter;
     for (int iteration = 0; iteration < MOST_ITERATIONS; iteration++) {
         linear at;
@@ -465,13 +502,10 @@ static bool update(const bst_custody_orbit *o, const measurement *z, bst_custody
             }
         }
         solve(&g, y, w);
-        if (iteration == 0 && z->directions) {
-            double chi2 = 0.0;
+        if (iteration == 0) {
+            quality->innovations = 0.0;
             for (int i = 0; i < z->size; i++) {
-                chi2 += y[i] * w[i];
-            }
-            if (!(chi2 < most_chi2(z->size))) {
-                return false;
+                quality->innovations += y[i] * w[i];
             }
         }
         memcpy(next.p, filter->p, sizeof next.p);
@@ -484,7 +518,8 @@ static bool update(const bst_custody_orbit *o, const measurement *z, bst_custody
             moved = fmax(moved, fabs(to - next.x[k]) / sqrt(next.p[k][k]));
             next.x[k] = to;
         }
-        if (moved < 1e-2) {
+        if (moved < 1e-2 || iteration + 1 == MOST_ITERATIONS) {
+            judge_fit(&g, &at, w, quality);
             break;
         }
     }
@@ -496,7 +531,46 @@ bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observ
                         bst_custody_filter *filter) {
     assert(orbit && observation && filter);
     const measurement z = of_track(observation);
-    return update(orbit, &z, filter);
+    fit unused;
+    return update(orbit, &z, filter, &unused);
+}
+
+static measurement of_directions(const bst_mat3 *gcrf_from_teme,
+                                 const bst_od_observation *directions, int count) {
+    measurement z = {.times = count,
+                     .size = 2 * count,
+                     .gcrf_from_teme = gcrf_from_teme,
+                     .directions = directions,
+                     .factor = 1.0};
+    for (int i = 0; i < count; i++) {
+        z.time_s[i] = directions[i].observer.time_s;
+    }
+    return z;
+}
+
+/* The direction that fits worst, if it is an outlier: its chi-square (2 degrees of freedom) exceeds
+ * OUTLIER and ten times the median of all. -1: none. */
+static int find_outlier(const double *chi2, int count) {
+    double sorted[BST_CUSTODY_DIRECTIONS];
+    int worst = 0;
+    for (int i = 0; i < count; i++) {
+        int k = i;
+        for (; k > 0 && sorted[k - 1] > chi2[i]; k--) {
+            sorted[k] = sorted[k - 1];
+        }
+        sorted[k] = chi2[i];
+        worst = chi2[i] > chi2[worst] ? i : worst;
+    }
+    return chi2[worst] > fmax(OUTLIER, 10.0 * sorted[count / 2]) ? worst : -1;
+}
+
+/* Removes a direction; the change of shared errors over it is that of both of its intervals. */
+static void drop_direction(bst_od_observation *directions, int count, int index) {
+    if (index + 1 < count) {
+        directions[index + 1].shared_change += directions[index].shared_change;
+    }
+    memmove(&directions[index], &directions[index + 1],
+            (size_t)(count - index - 1) * sizeof *directions);
 }
 
 bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat3 *gcrf_from_teme,
@@ -504,14 +578,34 @@ bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat
                                    bst_custody_filter *filter) {
     assert(orbit && gcrf_from_teme && directions && filter);
     assert(count > 0 && count <= BST_CUSTODY_DIRECTIONS);
-    measurement z = {.times = count,
-                     .size = 2 * count,
-                     .gcrf_from_teme = gcrf_from_teme,
-                     .directions = directions};
-    for (int i = 0; i < count; i++) {
-        z.time_s[i] = directions[i].observer.time_s;
+    bst_od_observation kept[BST_CUSTODY_DIRECTIONS];
+    memcpy(kept, directions, (size_t)count * sizeof *kept);
+    const int least = count - count / MOST_REJECTED;
+    measurement z = of_directions(gcrf_from_teme, kept, count);
+    bst_custody_filter next;
+    fit quality;
+    for (;;) {
+        next = *filter;
+        if (!update(orbit, &z, &next, &quality)) {
+            return false;
+        }
+        const int worst = find_outlier(quality.each, z.times);
+        if (worst < 0 || z.times == least) {
+            break;
+        }
+        drop_direction(kept, z.times, worst);
+        z = of_directions(gcrf_from_teme, kept, z.times - 1);
     }
-    return update(orbit, &z, filter);
+    if (!(quality.innovations < most_chi2(z.size))) {
+        return false;
+    }
+    z.factor = (BST_OD_PRIOR_DOF + quality.rest) / (BST_OD_PRIOR_DOF + quality.expected);
+    next = *filter;
+    if (!update(orbit, &z, &next, &quality)) {
+        return false;
+    }
+    *filter = next;
+    return true;
 }
 
 bool bst_custody_catalogued_position(const bst_custody_orbit *orbit, double time_s,

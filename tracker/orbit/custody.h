@@ -37,8 +37,8 @@ typedef struct bst_custody_orbit {
     bst_elements elements;
     double epoch_offset_s; /* time 0 minus the epoch of the elements */
     double a_m;            /* semi-major axis */
-    /* standard deviation of the photocentre from the centre of mass along each axis, m: of a sunlit
-     * sphere up to 0.59 radii (a Lambertian one, 3 pi / 16) */
+    /* standard deviation of the photocentre from the centre of mass along each axis, m. Of a
+     * Lambertian sphere the displacement is 0.59 radii (3 pi / 16) at a phase of 90 degrees */
     double photocentre_m;
 } bst_custody_orbit;
 
@@ -103,9 +103,11 @@ bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observ
                         bst_custody_filter *filter);
 
 /* The same with directions as they were measured, without rates: errors that they share count
- * (bst_od_observation). False also for directions that are of another object or of several ones: a
- * chi-square of the innovations that is exceeded with probability 2e-5 by errors twice as large as
- * stated.
+ * (bst_od_observation). Single directions far off the others are left out, and the covariances are
+ * scaled by the variance of unit weight of the arc (Koch, Parameter Estimation and Hypothesis
+ * Testing in Linear Models, 1999, 4.3). False also for directions that are of another object or of
+ * several ones: a chi-square of the innovations that is exceeded with probability 2e-5 by errors
+ * twice as large as stated.
  *
  * Given:     count  1 to BST_CUSTODY_DIRECTIONS, in order of time; gcrf_from_teme: for all of them
  */

@@ -41,6 +41,6 @@ const bst_config_desc bst_brightness_config_table[] = {
              "diffuse; at most 1000 facets."),
     BST_BOOL(bst_brightness_config, resolved, "true",
              "Whether the object is drawn as the disc of a sphere of area_m2, with its terminator, "
-             "where that is larger than 0.2 px."),
+             "where that is larger than 0.02 px."),
     BST_CONFIG_END,
 };

@@ -193,15 +193,15 @@ static void make_colour(const course *c, const bst_world_sight *mid, bst_scene_s
     }
 }
 
-/* Makes an object's disc if it spans more than 0.2 px. The fractions are means over the
- * exposure. */
+/* Makes an object's disc if it spans more than a fiftieth of a pixel: its centre of light is then
+ * at most 0.01 px from its centre of mass. The fractions are means over the exposure. */
 static bool make_shape(const course *c, const bst_world_sight *mid, const bst_scene_source *source,
                        bst_scene_source_shape *shape) {
     const bst_camera *camera = c->query->camera;
     const bst_world_object_info *info = bst_scene_view_object(c->query->view, (int)source->id);
     double radius = sqrt(info->area_m2 / BST_PI) / mid->range_m;
     double pixels = 2.0 * radius / bst_camera_scale_rad(camera) * bst_camera_stretch(camera);
-    if (!mid->glow.resolved || !(radius < 1.0) || !(pixels > 0.2)) {
+    if (!mid->glow.resolved || !(radius < 1.0) || !(pixels > 0.02)) {
         return false;
     }
     *shape = (bst_scene_source_shape){.radius = radius};
