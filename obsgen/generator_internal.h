@@ -46,10 +46,9 @@ typedef struct generator_rank {
 
 /* Light of a merged detection and its fitted neighbours. */
 typedef struct generator_blend {
-    double flux_e, x, y;         /* as a single source */
-    double widen;                /* variance factor by neighbours fitted jointly */
-    double flat;                 /* error factor along a streak that contains other light */
-    bst_obsgen_path_px own_path; /* of the streak fitted to merged points; 0: a point */
+    double flux_e, x, y; /* as a single source */
+    double widen;        /* variance factor by neighbours fitted jointly */
+    double flat;         /* error factor along a streak that contains other light */
     bool near;  /* another detection in the fitted pixels, or a significant merged source */
     bool drawn; /* x and y already include their error */
     bool point; /* streak that the point filter shows better */
@@ -200,7 +199,7 @@ bst_streak_model bst_generator_streak_model(const bst_generator *g);
 /* True if the streak's fit is worth an iteration of its own: see UNIFORM_PX. */
 bool bst_generator_is_uniform(const bst_generator *g);
 /* Light level of a streak's fit: brightest pixel of the fitted streak over the noise variance. */
-double bst_generator_streak_light(const bst_generator *g, double flux_e, double length_px);
+double bst_generator_streak_light(const bst_generator *g, double flux_e);
 /* Filter output above which image processing interpolates maxima. */
 double bst_generator_looks_from(const bst_generator *g);
 /* By how much the output must fall about a maximum of this level, SNR, for a source of its own. */

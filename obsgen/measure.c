@@ -178,8 +178,8 @@ static void measure_place(const bst_generator *g, const generator_source *s,
     double x = b->x + c * error[0] - n * error[1], y = b->y + n * error[0] + c * error[1];
     double bias = cal->phase_bias_px / g->binning, shared[2];
     bool drawn = s->as_streak && !b->point;
-    double light = drawn ? bst_generator_streak_light(g, b->flux_e, g->streak)
-                         : b->flux_e * truth->norm * g->fit_light;
+    double light =
+        drawn ? bst_generator_streak_light(g, b->flux_e) : b->flux_e * truth->norm * g->fit_light;
     shared_bias(g, s, drawn, light, shared);
     x += shared[0] + bias * sin(2.0 * BST_PI * b->x);
     y += shared[1] + bias * sin(2.0 * BST_PI * b->y);
@@ -291,12 +291,10 @@ bst_detection bst_generator_measure(const bst_generator *g, const generator_sour
     }
     bst_crlb_table_at crlb = bound_of_model(g, d.flux_e, length);
     d.flux_sigma_e = sqrt(crlb.flux_variance * b->widen / seen) / s->snr_ratio;
-    double own_path = hypot(b->own_path.dx, b->own_path.dy);
-    d.snr = d.flux_e * bst_generator_fit_norm(g, s, fmax(length, own_path), own && s->as_streak);
+    d.snr = d.flux_e * bst_generator_fit_norm(g, s, length, own && s->as_streak);
     measure_place(g, s, b, &truth, &crlb, b->flux_e * truth.norm / g->noise_e, length, &d);
     d.v_mag = -2.5 * log10(d.flux_e / (fmax(g->exposure_s, 1e-9) * g->electrons_per_s_v0));
     set_extent(g, s, s->as_streak && !b->point, &d);
-    d.flags |= own_path > 0.0 ? BST_DETECTION_STREAK : 0u;
     d.flags |= b->near ? BST_DETECTION_BLEND : 0u;
     d.flags |= s->saturated ? BST_DETECTION_SATURATED : 0u;
     double half_x = 0.5 * fabs(s->path.dx) + 2.0 * g->sigma;

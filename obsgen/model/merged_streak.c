@@ -56,11 +56,10 @@ static int gather_points(const bst_generator *g, const generator_source *s,
     return used;
 }
 
-/* Gives a detection with other sources in its light the place and flux of a streak's fit with a
- * free width. */
+/* Gives a bright streak with other streaks in its light the place and flux of a fit with a free
+ * width. */
 static void fit_as_streak(const bst_generator *g, const generator_source *s,
-                          const generator_source *merged, int count, bst_obsgen_path_px path,
-                          generator_blend *at) {
+                          const generator_source *merged, int count, generator_blend *at) {
     bst_path_streak lights[MOST_LIGHTS];
     int used = 0;
     for (int k = -1; k < count && used < MOST_LIGHTS; k++) {
@@ -73,14 +72,14 @@ static void fit_as_streak(const bst_generator *g, const generator_source *s,
     const bst_response *r = &g->response;
     double reach = fmax(LEAST_REACH_PX, ceil(REACH_SIGMAS * g->fitted_sigma));
     double image = r->source.across_px * r->source.along_px;
-    bst_streak_model model = {.path = path, .sigma_px = g->filter_sigma};
+    bst_streak_model model = {.path = g->fit_path, .sigma_px = g->filter_sigma};
     double peak_e = s->flux_e / (2.0 * BST_PI * model.sigma_px * model.sigma_px);
     model.saturated = s->saturated ? fmax(bst_generator_saturation_e(g), 1.0) / peak_e : 0.0;
-    double length = hypot(path.dx, path.dy);
-    double limit = LIMIT_PX + g->fitted_sigma + LIMIT_PER_PATH * length;
+    double limit =
+        LIMIT_PX + g->fitted_sigma + LIMIT_PER_PATH * hypot(g->fit_path.dx, g->fit_path.dy);
     bst_path_point_fit fit =
         bst_path_fit_streaks(lights, used, sqrt(image), &model,
-                             bst_generator_streak_light(g, s->flux_e, length), reach + 0.5, limit);
+                             bst_generator_streak_light(g, s->flux_e), reach + 0.5, limit);
     at->x += fit.x_px;
     at->y += fit.y_px;
     at->flux_e = fit.flux * s->flux_e;
@@ -142,11 +141,9 @@ static double moment_noise(const bst_generator *g, double flux_e, double window,
 
 /* Larger principal moment without the pixel's, px^2, with the noise of its measurement.
  *
- * Given:     m  moments with the pixel
- * Returned:  *angle_rad  of its axis */
+ * Given:     m  moments with the pixel */
 static double longest_with_noise(const bst_generator *g, const generator_source *s, covariance m,
-                                 double window, double flux_e, double *angle_rad) {
-    *angle_rad = 0.5 * atan2(2.0 * m.xy, m.xx - m.yy);
+                                 double window, double flux_e) {
     double mean = 0.5 * (m.xx + m.yy), half = hypot(0.5 * (m.xx - m.yy), m.xy);
     double noise = moment_noise(g, flux_e, window, mean + half, mean - half);
     return mean + half - 1.0 / 12.0 + noise * bst_generator_draw(g, s, GENERATOR_MOMENT);
@@ -157,7 +154,7 @@ static double longest_with_noise(const bst_generator *g, const generator_source 
  * subtracted. */
 static double longest_moment(const bst_generator *g, const generator_source *s,
                              const generator_source *merged, int count, double window,
-                             const generator_blend *at, double *angle_rad) {
+                             const generator_blend *at) {
     double image = g->response.source.across_px * g->response.source.along_px;
     double sum = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;
     for (int k = -1; k < count; k++) {
@@ -184,14 +181,13 @@ static double longest_moment(const bst_generator *g, const generator_source *s,
     if (!(seen.xx > 0.0 && seen.yy > 0.0 && seen.xx * seen.yy > seen.xy * seen.xy)) {
         return 0.0; /* image processing measures no moments */
     }
-    return longest_with_noise(g, s, inverse(seen), window, at->flux_e, angle_rad);
+    return longest_with_noise(g, s, inverse(seen), window, at->flux_e);
 }
 
 /* As fit_as_point and longest_moment, on pixels with a PSF that is no Gaussian: the place and flux
  * of the fit, and the largest second moment about it. */
 static double fit_psf(const bst_generator *g, const generator_source *s,
-                      const generator_source *merged, int count, generator_blend *at,
-                      double *angle_rad) {
+                      const generator_source *merged, int count, generator_blend *at) {
     bst_path_point points[BST_PATH_POINTS];
     double reach = fmax(LEAST_REACH_PX, ceil(REACH_SIGMAS * g->fitted_sigma));
     const double about[2] = {s->x, s->y};
@@ -214,7 +210,7 @@ static double fit_psf(const bst_generator *g, const generator_source *s,
     const double pixel = 1.0 / 12.0;
     double window = 2.0 * (g->fitted_sigma * g->fitted_sigma + fmax(fit.widening_px2, 0.0) + pixel);
     covariance all = {m.xx + pixel, m.xy, m.yy + pixel};
-    return longest_with_noise(g, s, all, window, fit.flux, angle_rad);
+    return longest_with_noise(g, s, all, window, fit.flux);
 }
 
 /* By how much a streak's fit lowers chi-square below that of a point: each fit lowers it by its
@@ -237,17 +233,17 @@ void bst_generator_fit_merged(const bst_generator *g, const generator_source *s,
     }
     if (s->as_streak) {
         if (s->peak > WIDTH_SNR) {
-            fit_as_streak(g, s, merged, count, g->fit_path, out);
+            fit_as_streak(g, s, merged, count, out);
         }
         return;
     }
-    double fitted = point + 1.0 / 12.0, moment, angle = 0.0;
+    double fitted = point + 1.0 / 12.0, moment;
     if (g->response.falloff.tabulated && s->peak > WIDTH_SNR) {
-        moment = fit_psf(g, s, merged, count, out, &angle);
+        moment = fit_psf(g, s, merged, count, out);
     } else {
         double window = fit_as_point(g, s, merged, count, out);
         fitted = 0.5 * window;
-        moment = longest_moment(g, s, merged, count, window, out, &angle);
+        moment = longest_moment(g, s, merged, count, window, out);
     }
     /* the noise of the flux that is measured */
     double snr = out->flux_e * bst_generator_fit_norm(g, s, 0.0, false) + s->noise;
@@ -256,7 +252,16 @@ void bst_generator_fit_merged(const bst_generator *g, const generator_source *s,
         return;
     }
     /* a uniform streak of this length has this moment */
-    double length = sqrt(12.0 * (moment - point));
-    out->own_path = (bst_obsgen_path_px){length * cos(angle), length * sin(angle)};
-    fit_as_streak(g, s, merged, count, out->own_path, out);
+    double length = sqrt(12.0 * (moment - point)), x = 0.0, y = 0.0, sum = 0.0;
+    for (int k = -1; k < count; k++) {
+        const generator_source *o = k < 0 ? s : &merged[k];
+        if (hypot(o->x - out->x, o->y - out->y) <= length && !is_of_another(g, s, o)) {
+            sum += o->flux_e;
+            x += o->flux_e * (o->x - s->x);
+            y += o->flux_e * (o->y - s->y);
+        }
+    }
+    out->flux_e = sum;
+    out->x = s->x + x / sum;
+    out->y = s->y + y / sum;
 }

@@ -63,16 +63,16 @@ static bool is_point(const bst_generator *g, const generator_source *s, const bs
     return lead * snr + noise > other;
 }
 
-double bst_generator_streak_light(const bst_generator *g, double flux_e, double length_px) {
+double bst_generator_streak_light(const bst_generator *g, double flux_e) {
     /* the brightest pixel of a long line is sqrt(2) sum p^2 of its light */
-    double norm = bst_crlb_table_norm(&g->bound, length_px);
+    double norm = bst_crlb_table_norm(&g->bound, g->streak);
     return sqrt(2.0) * g->excess * flux_e * norm * norm / (g->noise_e * g->noise_e);
 }
 
 /* Value of a table by light level for a star of this flux. */
 static double by_light(const bst_generator *g, const double table[GENERATOR_BIASES],
                        double flux_e) {
-    double light = bst_generator_streak_light(g, flux_e, g->streak);
+    double light = bst_generator_streak_light(g, flux_e);
     double at = log10(fmax(light, GENERATOR_FIRST_LIGHT) / GENERATOR_FIRST_LIGHT);
     /* inside of the last interval of the table */
     at = fmin(at, GENERATOR_BIASES - 1.001);
@@ -142,7 +142,7 @@ static void set_uneven_object(const bst_generator *g, generator_source *s, doubl
     const bst_path_widths widths = {g->image_sigma, g->filter_sigma, g->bias_sigma};
     const bst_streak_model model = bst_generator_streak_model(g);
     bst_path_outputs o = bst_path_fit_outputs(&path, g->star_path, &widths);
-    double light = bst_generator_streak_light(g, s->flux_e, g->streak), at[2] = {0.0, 0.0};
+    double light = bst_generator_streak_light(g, s->flux_e), at[2] = {0.0, 0.0};
     bst_star_trail_bias(&path, g->fit_path.dx, g->fit_path.dy, g->fit_bend_x, g->fit_bend_y,
                         g->total_sigma, at);
     double plain = bst_path_fit(&path, &model, &model, GENERATOR_FIRST_LIGHT, at).all;

@@ -74,9 +74,9 @@
 #define BST_EFFECT_FLAGS 256
 #define BST_EFFECT_READOUT 512
 #define BST_EFFECT_PICK_UP 1024
-#define BST_EFFECT_MARKS 2048   /* pixels at full well are marked before charge moves on */
-#define BST_EFFECT_MEANS 4096   /* the image holds expected charge, dark current included */
-#define BST_EFFECT_FLICKER 8192 /* the read noise of each pixel is drawn beforehand */
+#define BST_EFFECT_MARKS 2048      /* pixels at full well are marked before charge moves on */
+#define BST_EFFECT_MEANS 4096      /* the image holds expected charge, dark current included */
+#define BST_EFFECT_FLICKER 8192    /* the read noise of each pixel is drawn beforehand */
 #define BST_EFFECT_CROSSTALK 16384 /* is added while charge is read */
 
 /* Laws of bst_kernel_vignetting_params: none; the fourth power of the cosine of the field angle,

@@ -137,7 +137,8 @@ static const bst_wire_field truth[] = {
 
 static const bst_wire_field truth_items[] = {
     INT(bst_truth_item, kind, 0, 3, "", "0 star, 1 object, 2 ghost of a star, 3 of an object."),
-    BITS(bst_truth_item, id, "Star: identity in the catalogue or statistical (bit 31); object: its index."),
+    BITS(bst_truth_item, id,
+         "Star: identity in the catalogue or statistical (bit 31); object: its index."),
     INT(bst_truth_item, norad, -MANY, MANY, "", "Object: catalogue number, else 0."),
     BITS(bst_truth_item, flags, "1 in the field, 2 occulted, 4 saturated."),
     ANY(bst_truth_item, x_start_px, "px",
