@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <string.h>
 
 #include "sim/core/simd.h"
@@ -114,7 +115,8 @@ static inline void put_block(bit_writer *w, const differences *d, int count) {
     }
 }
 
-BST_CLONES size_t bst_fits_rice_encode(const uint16_t *pixels, size_t count, uint8_t *out) {
+/* Clones are seen from outside of a library: not the function of the header. */
+BST_CLONES static size_t encode(const uint16_t *pixels, size_t count, uint8_t *out) {
     bit_writer w = {.next = out};
     put(&w, pixels[0] ^ 0x8000u, PIXEL_BITS);
     for (size_t at = 0; at < count; at += BST_FITS_RICE_BLOCK) {
@@ -132,4 +134,9 @@ BST_CLONES size_t bst_fits_rice_encode(const uint16_t *pixels, size_t count, uin
         }
     }
     return (size_t)(w.next - out) + (w.count > 0);
+}
+
+size_t bst_fits_rice_encode(const uint16_t *pixels, size_t count, uint8_t *out) {
+    assert(pixels && count > 0 && out);
+    return encode(pixels, count, out);
 }

@@ -363,6 +363,51 @@ static void a_failed_update_is_counted(void **state) {
     bst_world_free(world);
 }
 
+/* A track beside which a second object is predicted, outside of the gate but nearer than two images
+ * can be separated, updates none. */
+static void neighbours_are_ambiguous(void **state) {
+    (void)state;
+    bst_ctx ctx = {0};
+    scratch place;
+    scratch_make(&place);
+    /* GX5, and objects 0.001 degrees (4 arcsec, 0.7 of a FWHM) and 0.01 degrees beside it */
+    const char *anomalies[2] = {"191.6451", "191.6541"};
+    for (int n = 0; n < 2; n++) {
+        char text[256], objects[2048], line[70];
+        snprintf(line, sizeof line,
+                 "2 44802   0.0366 343.6423 0001933 100.2390 %s  1.00270919  944", anomalies[n]);
+        int sum = 0;
+        for (const char *c = line; *c; c++) {
+            sum += *c >= '0' && *c <= '9' ? *c - '0' : 0;
+        }
+        snprintf(text, sizeof text,
+                 "1 44802U 19080B   22167.00079919  .00000075  00000+0  00000+0 0  9999\n%s%d\n",
+                 line, sum % 10);
+        FILE *file = fopen(scratch_path(&place, "near.tle"), "w");
+        assert_non_null(file);
+        fputs(text, file);
+        fclose(file);
+        snprintf(objects, sizeof objects,
+                 "{\"name\": \"A\", " TEST_GX5
+                 "}, {\"name\": \"C\", \"orbit\": {\"elements_file\": \"%s\", \"norad\": 44802}}",
+                 scratch_path(&place, "near.tle"));
+        bst_world *world = test_world_with(objects, "");
+        bst_scenario scenario = SCENARIO(5, 0);
+        scenario.record.custody_sigma_m = 20;
+        scenario.record.custody_drift_m_per_day = 20;
+        bst_run_custody *c;
+        bst_custody_figures f;
+        bst_assert_ok(&ctx, bst_run_custody_create(&ctx, world, &scenario, NULL, &c));
+        take(&ctx, c, world, 0, 1, 9, 100.0, 0.0);
+        bst_assert_ok(&ctx, bst_run_custody_finish(&ctx, c, 500.0));
+        assert_true(bst_run_custody_figures(c, &f));
+        assert_true(f.tracks == 1 && f.ambiguous == (n == 0) && f.correlated == (n == 1));
+        bst_run_custody_free(c);
+        bst_world_free(world);
+    }
+    scratch_remove(&place);
+}
+
 /* A track with detections updates its object with their directions, not with its state; one whose
  * detections are of two objects updates none. */
 static void directions_update_their_object(void **state) {
@@ -422,6 +467,7 @@ int main(void) {
         cmocka_unit_test(changed_objects_start_anew),
         cmocka_unit_test(errors_of_the_catalogue),
         cmocka_unit_test(a_failed_update_is_counted),
+        cmocka_unit_test(neighbours_are_ambiguous),
         cmocka_unit_test(directions_update_their_object),
         cmocka_unit_test(off_and_without_objects),
     };

@@ -264,7 +264,7 @@ static double nees_of_arcs(double scale, int outliers, double *sigma, int *updat
     return sum / fmax(*updated, 1.0);
 }
 
-/* An arc tells how large its errors are, and single directions far off are left out; several are
+/* An arc shows how large its errors are, and single directions far off are left out; several are
  * another object's. */
 static void arcs_scale_their_errors(void **state) {
     (void)state;

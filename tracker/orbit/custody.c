@@ -8,6 +8,7 @@
 #include "sim/astro/sgp4_fit.h"
 #include "sim/core/cholesky.h"
 #include "tracker/mtt/tangent.h"
+#include "tracker/orbit/arc_outliers.h"
 
 enum {
     N = BST_CUSTODY_STATE,
@@ -16,8 +17,6 @@ enum {
     MOST_ITERATIONS = 5,
     MOST_REJECTED = 4 /* of the directions of an arc one in so many may be outliers */
 };
-/* chi-square of a direction, 2 degrees of freedom: beyond it are 4e-6 of good ones */
-#define OUTLIER 25.0
 #define DAY_S 86400.0
 /* Below this inclination SGP4's periodics are not smooth in its elements (Lyddane's, by Sun and
  * Moon: 0.02 degrees), and differences are those of osculating elements. */
@@ -58,42 +57,6 @@ static bool elements_at(const bst_custody_orbit *o, const double x[N], bst_eleme
         e->mean_anomaly_rad + perigee + x[BST_CUSTODY_ALONG] / o->a_m - dn * o->epoch_offset_s};
     *out = *e;
     return bst_sgp4_regular_elements(y, out);
-}
-
-void bst_custody_filter_init(const bst_custody_config *config, const bst_custody_orbit *orbit,
-                             const double normals[N], bst_custody_filter *out) {
-    assert(config && orbit && out && config->sigma_m > 0.0 && config->drift_m_per_day > 0.0);
-    *out = (bst_custody_filter){.noise_until_s = 0.0};
-    /* the error along the orbit has grown since the epoch of the elements by that of the drift */
-    const double age = orbit->epoch_offset_s / DAY_S;
-    const double s = config->sigma_m, drift = config->drift_m_per_day;
-    for (int i = 0; i < N; i++) {
-        out->p[i][i] = i == BST_CUSTODY_DRIFT ? drift * drift : s * s;
-        out->x[i] = normals ? normals[i] * (i == BST_CUSTODY_DRIFT ? drift : s) : 0.0;
-    }
-    out->p[BST_CUSTODY_ALONG][BST_CUSTODY_ALONG] += drift * drift * age * age;
-    out->p[BST_CUSTODY_ALONG][BST_CUSTODY_DRIFT] = out->p[BST_CUSTODY_DRIFT][BST_CUSTODY_ALONG] =
-        drift * drift * age;
-    out->x[BST_CUSTODY_ALONG] += out->x[BST_CUSTODY_DRIFT] * age;
-}
-
-void bst_custody_add_process_noise(const bst_custody_config *config, double time_s,
-                                   bst_custody_filter *filter) {
-    if (!(time_s > filter->noise_until_s)) {
-        return;
-    }
-    /* A change dD of the drift at time u displaces the object by (s - u) dD at time s, which is
-     * the state's DRIFT + dD and ALONG - u dD. The sums over u of a random walk with variance
-     * `rate` per day are integrals of 1, -u and u^2. */
-    const double rate = config->noise_m_per_day * config->noise_m_per_day;
-    const double from = filter->noise_until_s / DAY_S, to = time_s / DAY_S;
-    const double cross = -rate * (to * to - from * from) / 2.0;
-    double(*p)[N] = filter->p;
-    p[BST_CUSTODY_DRIFT][BST_CUSTODY_DRIFT] += rate * (to - from);
-    p[BST_CUSTODY_DRIFT][BST_CUSTODY_ALONG] += cross;
-    p[BST_CUSTODY_ALONG][BST_CUSTODY_DRIFT] += cross;
-    p[BST_CUSTODY_ALONG][BST_CUSTODY_ALONG] += rate * (to * to * to - from * from * from) / 3.0;
-    filter->noise_until_s = time_s;
 }
 
 /* ------------------------------------------------------------------ Motion */
@@ -548,31 +511,6 @@ static measurement of_directions(const bst_mat3 *gcrf_from_teme,
     return z;
 }
 
-/* The direction that fits worst, if it is an outlier: its chi-square (2 degrees of freedom) exceeds
- * OUTLIER and ten times the median of all. -1: none. */
-static int find_outlier(const double *chi2, int count) {
-    double sorted[BST_CUSTODY_DIRECTIONS];
-    int worst = 0;
-    for (int i = 0; i < count; i++) {
-        int k = i;
-        for (; k > 0 && sorted[k - 1] > chi2[i]; k--) {
-            sorted[k] = sorted[k - 1];
-        }
-        sorted[k] = chi2[i];
-        worst = chi2[i] > chi2[worst] ? i : worst;
-    }
-    return chi2[worst] > fmax(OUTLIER, 10.0 * sorted[count / 2]) ? worst : -1;
-}
-
-/* Removes a direction; the change of shared errors over it is that of both of its intervals. */
-static void drop_direction(bst_od_observation *directions, int count, int index) {
-    if (index + 1 < count) {
-        directions[index + 1].shared_change += directions[index].shared_change;
-    }
-    memmove(&directions[index], &directions[index + 1],
-            (size_t)(count - index - 1) * sizeof *directions);
-}
-
 bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat3 *gcrf_from_teme,
                                    const bst_od_observation *directions, int count,
                                    bst_custody_filter *filter) {
@@ -589,11 +527,11 @@ bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat
         if (!update(orbit, &z, &next, &quality)) {
             return false;
         }
-        const int worst = find_outlier(quality.each, z.times);
+        const int worst = bst_arc_outlier(quality.each, z.times);
         if (worst < 0 || z.times == least) {
             break;
         }
-        drop_direction(kept, z.times, worst);
+        bst_arc_drop(kept, z.times, worst);
         z = of_directions(gcrf_from_teme, kept, z.times - 1);
     }
     if (!(quality.innovations < most_chi2(z.size))) {
@@ -641,25 +579,4 @@ bool bst_custody_predict_position(const bst_custody_orbit *orbit, const bst_cust
     }
     *sigma_m = sqrt(sum);
     return true;
-}
-
-double bst_custody_nees(const bst_custody_filter *filter) {
-    double l[N][N], y[N], sum = 0.0;
-    for (int i = 0; i < N; i++) {
-        double unit = sqrt(filter->p[i][i]);
-        y[i] = filter->x[i] / unit;
-        for (int j = 0; j < N; j++) {
-            l[i][j] = filter->p[i][j] / (unit * sqrt(filter->p[j][j]));
-        }
-    }
-    double w[N];
-    memcpy(w, y, sizeof w);
-    if (!bst_cholesky_factor(&l[0][0], N, N, 1e-15)) {
-        return NAN;
-    }
-    bst_cholesky_solve(&l[0][0], N, N, w);
-    for (int i = 0; i < N; i++) {
-        sum += w[i] * y[i];
-    }
-    return sum;
 }
