@@ -229,6 +229,16 @@ static void invert_noise(float *values, double squares, double least_inside, dou
     }
 }
 
+/* Places of the last blocks beyond the right and the lower end are none. */
+static void leave_out_beyond(const bst_path_filter *f, int block) {
+    const int columns = f->width - block % f->columns * BLOCK;
+    const int rows = f->height - block / f->columns * BLOCK;
+    float *per_noise = f->per_noise + (size_t)block * BLOCK * BLOCK;
+    for (int i = 0; i < BLOCK * BLOCK && (columns < BLOCK || rows < BLOCK); i++) {
+        per_noise[i] = i % BLOCK < columns && i / BLOCK < rows ? per_noise[i] : 0.0f;
+    }
+}
+
 /* Filters a block of places for the first time. */
 static void filter_block(bst_path_filter *f, int block) {
     const block_samples *s = &f->samples;
@@ -254,6 +264,7 @@ static void filter_block(bst_path_filter *f, int block) {
         BST_SIMD_PICK(sum_block)(s->weights, s->squared, s->count, f->stride, per_noise);
         invert_noise(per_noise, f->squares, f->least_inside, f->correlation);
     }
+    leave_out_beyond(f, block);
     sum_light(f, block);
 }
 
@@ -468,7 +479,7 @@ bool bst_path_filter_highest(bst_path_filter *f, bst_path_filter_peak *out) {
     }
     const float best = f->highest[block];
     size_t at = (size_t)block * BLOCK * BLOCK;
-    while (f->response[at] * f->per_noise[at] < best) {
+    while (!(f->response[at] * f->per_noise[at] >= best)) { /* of values that are not NAN */
         at++;
     }
     const int x = block % f->columns * BLOCK + (int)(at % BLOCK);

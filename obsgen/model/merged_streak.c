@@ -261,6 +261,9 @@ void bst_generator_fit_merged(const bst_generator *g, const generator_source *s,
             y += o->flux_e * (o->y - s->y);
         }
     }
+    if (!(sum > 0.0)) { /* the place that was fitted is far from all of them */
+        return;
+    }
     out->flux_e = sum;
     out->x = s->x + x / sum;
     out->y = s->y + y / sum;

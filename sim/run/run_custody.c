@@ -26,6 +26,9 @@ enum { IDENTITY = 10 };
  * which it is no candidate, m; and standard deviations of its own position. */
 #define TABLE_REACH_M (4.1 * 11500.0 + 1000.0)
 #define CANDIDATE_SIGMAS 6.0
+/* The light of an object may be in an image within one FWHM and so many standard deviations of its
+ * predicted direction, but two FWHM at most: farther apart two images are resolved. */
+#define BLEND_SIGMAS 2.0
 /* a track belongs to the object within this distance of it, as in sightings.c */
 #define TRACK_PX 5.0
 /* an object nearer than this is the observer's spacecraft itself, m */
@@ -287,7 +290,7 @@ static bool may_be(const bst_run_custody *c, int object, const bst_custody_obser
 /* Objects in the gate of an observation. */
 typedef struct match {
     int count;                  /* in the gate */
-    int close;                  /* predicted within the FWHM, the best one left out */
+    int close;                  /* whose light may be in the image, the best one left out */
     int best, true_object;      /* -1: none */
     double chi2, merit, second; /* of the best; merit: chi-square + log determinant */
 } match;
@@ -323,7 +326,10 @@ static void find_object(bst_run_custody *c, int sensor, const bst_custody_observ
         if (!bst_custody_predict(&c->orbits[i], &c->filters[i], z, &p)) {
             continue;
         }
-        const bool close = hypot(p.innovation[0], p.innovation[1]) < c->fwhm_rad[sensor];
+        const double fwhm = c->fwhm_rad[sensor];
+        const double sigma = sqrt(p.covariance[0][0] + p.covariance[1][1]);
+        const bool close =
+            hypot(p.innovation[0], p.innovation[1]) < fwhm + fmin(BLEND_SIGMAS * sigma, fwhm);
         out->close += close;
         if (!(p.chi2 < GATE)) {
             continue;
@@ -360,7 +366,7 @@ static bst_status take_arc(void *user, bst_ctx *ctx, int sensor, const bst_run_a
     match m;
     find_object(c, sensor, z, &m);
     bst_custody_figures *f = &c->figures;
-    /* light of two objects within the FWHM is that of neither */
+    /* an image of two objects is that of neither */
     bool clear = m.best >= 0 && m.second > m.merit + LIKELIHOOD_MARGIN && m.close == 0;
     bool updated = clear && update(&c->orbits[m.best], arc, &c->filters[m.best]);
     f->tracks++;

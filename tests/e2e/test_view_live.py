@@ -434,7 +434,7 @@ class Figures(unittest.TestCase):
 
     def test_watched(self):
         """The same run with and without a page, in turns."""
-        self.viewer = test_view.Viewer(runs.TRACK, "--out", os.path.join(runs.scratch(), "run"), "--duration", "6000", *SETS)
+        self.viewer = test_view.Viewer(runs.TRACK, "--out", os.path.join(runs.scratch(), "run"), "--duration", "60000", *SETS)
         self.steering = live_page.Socket(self.viewer)
         self.steering.send(b'{"command": {"do": "run", "rate": 0}}')
         self.steering.receive()
