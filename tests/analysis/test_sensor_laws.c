@@ -225,37 +225,62 @@ static void neighbours_give_back_the_noise_that_they_share(void **state) {
     free(noise);
 }
 
+/* Fills frames that are read in 3 s with the noise sigma of a bias frame and of a dark. */
+static bst_readout_frames make_readout(bst_readout_frames f, float *bias, float *dark, double hot,
+                                       double sigma) {
+    const size_t columns = (size_t)f.width, rows = (size_t)f.height;
+    for (size_t x = 0; x < columns; x++) {
+        double passed = 0.0;
+        for (size_t n = 0; n < rows; n++) {
+            size_t i = (f.last_first ? rows - 1 - n : n) * columns + x;
+            bool is_hot = bst_rng_uniform((bst_rng_key){{3, 4}}, i, 0) < 0.01;
+            double rate = 2.0 + (is_hot ? hot : 0.0), noise = sigma * normal(40, i);
+            dark[i] = (float)(rate * f.exposure_s + sigma * normal(41, i) - noise);
+            bias[i] = (float)(500.0 + 3.0 * (double)(x % 7) + passed * 3.0 / (double)rows + noise);
+            passed += rate;
+        }
+    }
+    f.bias = bias;
+    f.dark = dark;
+    f.bias_variance = sigma * sigma;
+    f.dark_variance = 2.0 * sigma * sigma;
+    return f;
+}
+
 static void readout_time_is_that_of_the_charge_behind_hot_pixels(void **state) {
     (void)state;
-    enum { COLUMNS = 90, ROWS = 120 };
-    const double exposure_s = 8.0, readout_s = 3.0;
-    float *bias = malloc(sizeof *bias * COLUMNS * ROWS),
-          *dark = malloc(sizeof *dark * COLUMNS * ROWS);
+    enum { MOST = 64000 };
+    float *bias = malloc(sizeof *bias * MOST), *dark = malloc(sizeof *dark * MOST);
     assert_true(bias && dark);
+    bst_readout_frames f;
     for (int last_first = 0; last_first < 2; last_first++) {
-        for (size_t x = 0; x < COLUMNS; x++) {
-            double passed = 0.0;
-            for (size_t n = 0; n < ROWS; n++) {
-                size_t i = (last_first ? ROWS - 1 - n : n) * COLUMNS + x;
-                double rate =
-                    2.0 + (bst_rng_uniform((bst_rng_key){{3, 4}}, i, 0) < 0.01 ? 300.0 : 0.0);
-                dark[i] = (float)(rate * exposure_s);
-                bias[i] = (float)(500.0 + 3.0 * (double)(x % 7) + passed * readout_s / ROWS +
-                                  2.0 * normal(40, i));
-                passed += rate;
-            }
-        }
-        bias[7 * COLUMNS + 5] += 4000.0F; /* a radiation hit */
-        dark[9 * COLUMNS + 11] = NAN;
-        bst_sensor_estimate time =
-            bst_readout_time(bias, dark, COLUMNS, ROWS, exposure_s, last_first);
-        bst_assert_close(time.value, readout_s, 4.0 * time.sigma);
-        assert_true(time.sigma > 0.0 && time.sigma < 0.01 * readout_s);
+        f = make_readout(
+            (bst_readout_frames){
+                .width = 90, .height = 120, .exposure_s = 8.0, .last_first = last_first},
+            bias, dark, 300.0, 2.0);
+        bias[7 * 90 + 5] += 4000.0F; /* a radiation hit */
+        dark[9 * 90 + 11] = NAN;
+        bst_sensor_estimate time = bst_readout_time(&f);
+        bst_assert_close(time.value, 3.0, 4.0 * time.sigma);
+        assert_true(time.sigma > 0.0 && time.sigma < 0.01 * 3.0);
+        /* dark signal of 8, noise of 12 in both frames: 3.6 standard errors too long if it counted
+         */
+        f = make_readout(
+            (bst_readout_frames){
+                .width = 1000, .height = 64, .exposure_s = 4.0, .last_first = last_first},
+            bias, dark, 0.0, 12.0);
+        time = bst_readout_time(&f);
+        bst_assert_close(time.value, 3.0, 4.0 * time.sigma);
+        assert_true(time.sigma > 0.0 && time.sigma < 0.15 * 3.0);
+        bst_readout_frames quiet = f;
+        quiet.bias_variance = quiet.dark_variance = 0.0;
+        bst_sensor_estimate naive = bst_readout_time(&quiet);
+        assert_true(naive.value - 3.0 > 3.0 * naive.sigma);
     }
-    for (int x = 0; x < COLUMNS - BST_READOUT_TIME_COLUMNS + 1; x++) {
+    for (int x = 0; x < f.width - BST_READOUT_TIME_COLUMNS + 1; x++) {
         dark[x] = NAN;
     }
-    assert_true(isnan(bst_readout_time(bias, dark, COLUMNS, ROWS, exposure_s, true).value));
+    assert_true(isnan(bst_readout_time(&f).value));
     free(bias);
     free(dark);
 }

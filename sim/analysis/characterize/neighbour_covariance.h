@@ -10,7 +10,7 @@ enum { BST_NEIGHBOURS = 12 };
 /* Covariance between two frames. */
 typedef struct bst_neighbour_covariance {
     double covariance[BST_NEIGHBOURS]; /* DN^2 */
-    double count;                      /* products of each; 0: unknown */
+    double count;                      /* pixels of the pairs; 0: unknown */
 } bst_neighbour_covariance;
 
 /* Sums over exposures of what light adds. */
@@ -24,7 +24,7 @@ typedef struct bst_shared_noise {
  * Given:     difference   [height][width] of two frames without the means of its rows; NAN: left
  *                         out
  * Notes:     The covariance is half of that of the difference, freed of what the removal of a
- *            row's mean makes of white noise. Weighted by the number of products. */
+ *            row's mean makes of white noise. Weighted by the number of pixels. */
 void bst_neighbour_covariance_add(bst_neighbour_covariance *c, const float *difference, int width,
                                   int height);
 

@@ -59,24 +59,27 @@ static sums sums_of(const column *c, double slope, double limit) {
     return s;
 }
 
-bst_sensor_estimate bst_readout_time(const float *bias, const float *dark, int width, int height,
-                                     double exposure_s, bool last_first) {
-    assert(bias && dark && width > 0 && height > 1 && exposure_s > 0.0);
-    double slope = 0.0, limit = INFINITY, sigma = NAN;
+bst_sensor_estimate bst_readout_time(const bst_readout_frames *f) {
+    assert(f && f->bias && f->dark && f->width > 0 && f->height > 1 && f->exposure_s > 0.0);
+    const int width = f->width, height = f->height;
+    /* with its own mean, a column's noise n and its walk -n_1, -n_1 - n_2, ... have these sums */
+    const double noise_xy = 0.5 * f->bias_variance * (height - 1);
+    const double noise_xx = f->dark_variance * ((double)height * height - 1.0) / 6.0;
+    double slope = 0.0, limit = INFINITY, sigma = NAN, squares = 0.0;
     int known = 0;
     for (int turn = 0; turn < 4; turn++) {
         double xx[PARTS] = {0.0}, xy[PARTS] = {0.0}, yy = 0.0, n = 0.0, all_xx = 0.0, all_xy = 0.0;
         known = 0;
         for (int x = 0; x < width; x++) {
-            size_t first = (size_t)x + (last_first ? (size_t)(height - 1) * (size_t)width : 0);
-            column c = {bias + first, dark + first, last_first ? -width : width, height};
+            size_t first = (size_t)x + (f->last_first ? (size_t)(height - 1) * (size_t)width : 0);
+            column c = {f->bias + first, f->dark + first, f->last_first ? -width : width, height};
             if (has_values(&c)) {
                 sums s = sums_of(&c, slope, limit);
                 int part = (int)((int64_t)x * PARTS / width);
-                xx[part] += s.xx;
-                xy[part] += s.xy;
+                xx[part] += s.xx - noise_xx;
+                xy[part] += s.xy - noise_xy;
                 yy += s.yy;
-                n += s.n - 1.0;
+                n += fmax(s.n - 1.0, 0.0);
                 known++;
             }
         }
@@ -85,6 +88,7 @@ bst_sensor_estimate bst_readout_time(const float *bias, const float *dark, int w
             all_xy += xy[k];
         }
         double rest = 0.0;
+        squares = all_xx;
         slope = all_xy / all_xx;
         for (int k = 0; k < PARTS; k++) {
             double d = (all_xy - xy[k]) / (all_xx - xx[k]) - slope;
@@ -93,7 +97,8 @@ bst_sensor_estimate bst_readout_time(const float *bias, const float *dark, int w
         sigma = sqrt(rest);
         limit = CLIP * sqrt(fmax(yy - slope * all_xy, 0.0) / n);
     }
-    double scale = height * exposure_s;
-    return known >= BST_READOUT_TIME_COLUMNS ? (bst_sensor_estimate){slope * scale, sigma * scale}
-                                             : (bst_sensor_estimate){NAN, NAN};
+    double scale = height * f->exposure_s;
+    return known >= BST_READOUT_TIME_COLUMNS && squares > 0.0
+               ? (bst_sensor_estimate){slope * scale, sigma * scale}
+               : (bst_sensor_estimate){NAN, NAN};
 }

@@ -175,9 +175,23 @@ static bool measure_readout_of_bias(const dark_signal *d) {
     if (d->stacks->bias.count == 0 || !isfinite(ramp->value)) {
         return false;
     }
-    bst_sensor_estimate time =
-        bst_readout_time(d->stacks->bias.mean, d->map, d->out->width, d->out->height,
-                         d->stacks->dark.exposure_s, ramp->value < 0.0);
+    const bst_frame_stack *bias = &d->stacks->bias, *dark = &d->stacks->dark;
+    double one = d->noise - d->row_noise; /* of the map, by the read noise */
+    double of_bias = bias->pairs > 0
+                         ? bst_mean_estimate(bias->variance, BST_STACK_BLOCKS).value / bias->count
+                         : one * dark->count / (bias->count + dark->count);
+    double of_dark = dark->pairs > 0
+                         ? bst_mean_estimate(dark->variance, BST_STACK_BLOCKS).value / dark->count
+                         : fmax(one - of_bias, 0.0);
+    const bst_readout_frames frames = {.bias = bias->mean,
+                                       .dark = d->map,
+                                       .bias_variance = of_bias,
+                                       .dark_variance = of_bias + of_dark,
+                                       .width = d->out->width,
+                                       .height = d->out->height,
+                                       .exposure_s = dark->exposure_s,
+                                       .last_first = ramp->value < 0.0};
+    bst_sensor_estimate time = bst_readout_time(&frames);
     if (!(time.value > CERTAIN * time.sigma)) {
         return false;
     }
