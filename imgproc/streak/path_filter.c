@@ -517,10 +517,11 @@ bool bst_path_filter_highest(bst_path_filter *f, bst_path_filter_peak *out) {
 
 /* Subtracts a point from the image, convolved as it is. */
 static void subtract_from_image(bst_path_filter *f, double x, double y, double amplitude) {
-    const int reach = (int)ceil(KERNEL * f->psf_sigma_px), i0 = (int)floor(x), j0 = (int)floor(y);
+    const int reach = (int)ceil(KERNEL * f->psf_sigma_px);
     if (!(x > -reach && y > -reach && x < f->frame[0] + reach && y < f->frame[1] + reach)) {
         return;
     }
+    const int i0 = (int)floor(x), j0 = (int)floor(y);
     const int left = i0 - reach > 0 ? i0 - reach : 0, top = j0 - reach > 0 ? j0 - reach : 0;
     const int right = i0 + reach < f->frame[0] - 1 ? i0 + reach : f->frame[0] - 1;
     const int bottom = j0 + reach < f->frame[1] - 1 ? j0 + reach : f->frame[1] - 1;

@@ -447,6 +447,7 @@ static void judge_fit(const gain *g, const linear *at, const double w[M], fit *o
     }
 }
 
+/* quality: NULL if it is not asked for. */
 static bool update(const bst_custody_orbit *o, const measurement *z, bst_custody_filter *filter,
                    fit *quality) {
     bst_custody_filter next = *filter;
@@ -465,7 +466,7 @@ static bool update(const bst_custody_orbit *o, const measurement *z, bst_custody
             }
         }
         solve(&g, y, w);
-        if (iteration == 0) {
+        if (iteration == 0 && quality) {
             quality->innovations = 0.0;
             for (int i = 0; i < z->size; i++) {
                 quality->innovations += y[i] * w[i];
@@ -482,7 +483,9 @@ static bool update(const bst_custody_orbit *o, const measurement *z, bst_custody
             next.x[k] = to;
         }
         if (moved < 1e-2 || iteration + 1 == MOST_ITERATIONS) {
-            judge_fit(&g, &at, w, quality);
+            if (quality) {
+                judge_fit(&g, &at, w, quality);
+            }
             break;
         }
     }
@@ -494,8 +497,7 @@ bool bst_custody_update(const bst_custody_orbit *orbit, const bst_custody_observ
                         bst_custody_filter *filter) {
     assert(orbit && observation && filter);
     const measurement z = of_track(observation);
-    fit unused;
-    return update(orbit, &z, filter, &unused);
+    return update(orbit, &z, filter, NULL);
 }
 
 static measurement of_directions(const bst_mat3 *gcrf_from_teme,
@@ -538,12 +540,7 @@ bool bst_custody_update_directions(const bst_custody_orbit *orbit, const bst_mat
         return false;
     }
     z.factor = (BST_OD_PRIOR_DOF + quality.rest) / (BST_OD_PRIOR_DOF + quality.expected);
-    next = *filter;
-    if (!update(orbit, &z, &next, &quality)) {
-        return false;
-    }
-    *filter = next;
-    return true;
+    return update(orbit, &z, filter, NULL);
 }
 
 bool bst_custody_catalogued_position(const bst_custody_orbit *orbit, double time_s,

@@ -34,7 +34,7 @@ static double deferred_noise(const bst_frame_stack *bias, const bst_sensor_figur
     double turns = f->figures[BST_SENSOR_LINE_PHASE].value;
     for (int rows = 1; rows <= 2; rows++) {
         double of_line =
-            line > 0.0 && isfinite(turns) ? line * cos(2.0 * M_PI * turns * rows) : 0.0;
+            line > 0.0 && isfinite(turns) ? line * cos(2.0 * BST_PI * turns * rows) : 0.0;
         double shared = bst_neighbour_covariance_along(&bias->neighbours, rows) - of_line;
         sum += shared > CERTAIN * variance / sqrt(bias->neighbours.count) ? 2.0 * shared : 0.0;
     }
@@ -52,7 +52,7 @@ static double white_noise_e(const bst_sensor_stacks *s, const bst_sensor_figures
     if (isfinite(line) && f->noise_of_pairs) { /* a line of one phase in all frames cancels */
         rest -= isfinite(f->line.pair_power) ? f->line.pair_power * gain * gain : 0.0;
     } else if (isfinite(line)) { /* the mean square of a sine's differences of neighbours */
-        double turn = cos(2.0 * M_PI * f->figures[BST_SENSOR_LINE_FREQUENCY].value);
+        double turn = cos(2.0 * BST_PI * f->figures[BST_SENSOR_LINE_FREQUENCY].value);
         rest -= 0.5 * line * line * (1.0 - turn);
     }
     if (isfinite(ramp_e) && f->noise_of_pairs) {

@@ -193,8 +193,7 @@ static void add_neighbours(reduction *r, const double *sigma, bool hits) {
     for (int y = 0; y < s->height; y++) {
         for (int x = 0; x < s->width; x++) {
             size_t i = (size_t)y * (size_t)s->width + (size_t)x;
-            int block =
-                x * BST_STACK_SIDE / s->width + BST_STACK_SIDE * (y * BST_STACK_SIDE / s->height);
+            int block = bst_stack_block_of(x, y, s->width, s->height);
             float d = s->last[i] - r->before[i] - (float)r->rows[y];
             bool out = fabsf(d) > (float)(CLIP * sigma[block]) || (hits && near_hit(r, x, y));
             r->scratch[i] = out ? NAN : d;

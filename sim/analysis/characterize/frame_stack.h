@@ -32,6 +32,12 @@ typedef struct bst_frame_stack {
     float *overscan;                     /* [height][overscan_width] of the last frame */
 } bst_frame_stack;
 
+/* Block of a pixel of a frame of width x height. */
+static inline int bst_stack_block_of(int x, int y, int width, int height) {
+    return (int)((int64_t)x * BST_STACK_SIDE / width) +
+           BST_STACK_SIDE * (int)((int64_t)y * BST_STACK_SIDE / height);
+}
+
 /* Reads and reduces frames. Memory does not grow with their number.
  *
  * Radiation hits that the other frame of a pair shows are left out of mean and variance.

@@ -100,8 +100,7 @@ static double noise_of(const bst_frame_stack *f, double signal_dn, const bst_sen
 /* Block of a pixel. */
 static int block_of(size_t i, const bst_sensor_figures *f) {
     int x = (int)(i % (size_t)f->width), y = (int)(i / (size_t)f->width);
-    return (int)((int64_t)x * BST_STACK_SIDE / f->width) +
-           BST_STACK_SIDE * (int)((int64_t)y * BST_STACK_SIDE / f->height);
+    return bst_stack_block_of(x, y, f->width, f->height);
 }
 
 /* Counts columns that are dead from one end on, and dead pixels elsewhere.
