@@ -198,7 +198,7 @@ static bst_status pose(bst_ctx *ctx, bst_view_run *run, bst_view_exchange *x) {
     bst_scene_lighting lighting;
     bst_object_aspect aspect;
     bst_vec3 velocity;
-    bst_quat recorded;
+    bst_quat recorded = {0};
     BST_TRY(bst_view_space_check_time(ctx, x->from_s));
     BST_TRY(find_shape(ctx, run, x->object, &shape));
     BST_TRY(bst_view_find_sensor(ctx, run, x->sensor, &s));

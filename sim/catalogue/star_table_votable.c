@@ -67,8 +67,17 @@ static void stop(bst_star_votable *v, bst_status status) {
     }
 }
 
+/* Expat 2.9 deprecates the functions of the width of a long. */
+#if XML_MAJOR_VERSION > 2 || XML_MINOR_VERSION >= 9
+#define LINE_NUMBER XML_GetCurrentLineNumber64
+#define BYTE_INDEX XML_GetCurrentByteIndex64
+#else
+#define LINE_NUMBER XML_GetCurrentLineNumber
+#define BYTE_INDEX XML_GetCurrentByteIndex
+#endif
+
 static unsigned long line_of(const bst_star_votable *v) {
-    return (unsigned long)XML_GetCurrentLineNumber(v->parser);
+    return (unsigned long)LINE_NUMBER(v->parser);
 }
 
 /* Stops with a message of the present line. */
@@ -461,7 +470,7 @@ static bst_status parse_chunk(bst_ctx *ctx, bst_star_votable *v, bool *end) {
         return bst_fail(ctx, BST_ERR_FORMAT, "%s:%lu: is no XML: %s", t->path, line_of(v),
                         XML_ErrorString(XML_GetErrorCode(v->parser)));
     }
-    if (!*end && v->fed - (long long)XML_GetCurrentByteIndex(v->parser) > MOST_TAG) {
+    if (!*end && v->fed - (long long)BYTE_INDEX(v->parser) > MOST_TAG) {
         return bst_fail(ctx, BST_ERR_FORMAT, "%s:%lu: a tag is longer than 1 MiB", t->path,
                         line_of(v));
     }

@@ -331,7 +331,7 @@ static bst_status add_node(gltf *g, int64_t index, const transform *parent, int 
                         "at most %d levels and %d nodes)",
                         (long long)index, DEPTH_MAX, NODES_MAX);
     }
-    transform own, place;
+    transform own = {0}, place;
     BST_TRY(node_transform(g, node, index, &own));
     place.m = bst_mat3_mul(&parent->m, &own.m);
     place.shift = bst_vec3_add(bst_mat3_mul_vec(&parent->m, own.shift), parent->shift);
