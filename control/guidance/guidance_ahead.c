@@ -87,10 +87,10 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
     if (reach != BST_REACH_OK) {
         if ((int)reach != g->reach) {
             BST_TRY(bst_pointing_feasibility_next(ctx, &problem, &reached, &back));
-            add_event(g, BST_GUIDANCE_UNREACHABLE, reach, now_s,
+            add_event(g, BST_GUIDANCE_UNREACHABLE, (int)reach, now_s,
                       back.found ? now_s + back.when_s : INFINITY);
         }
-        g->reach = reach;
+        g->reach = (int)reach;
         return BST_OK;
     }
     if (g->reach != BST_REACH_OK) {
@@ -115,15 +115,15 @@ bst_status bst_guidance_look_ahead(bst_ctx *ctx, bst_guidance *g, int64_t tick) 
         }
         if (rolls && g->event_count < BST_GUIDANCE_EVENTS) {
             g->events[g->event_count++] = (bst_guidance_event){
-                .kind = BST_GUIDANCE_ROLL, .reason = why, .length_rad = g->roll_rad - before};
+                .kind = BST_GUIDANCE_ROLL, .reason = (int)why, .length_rad = g->roll_rad - before};
         } else if (losses > 0) {
-            report_loss(g, now_s, BST_GUIDANCE_LOSS, why, loss.from_s, loss.until_s);
+            report_loss(g, now_s, BST_GUIDANCE_LOSS, (int)why, loss.from_s, loss.until_s);
         }
         return BST_OK;
     }
     const bst_pointing_feasibility_search again = {lost.when_s, horizon, step, true};
     BST_TRY(bst_pointing_feasibility_next(ctx, &problem, &again, &back));
-    report_loss(g, now_s, BST_GUIDANCE_AHEAD, why, lost.when_s,
+    report_loss(g, now_s, BST_GUIDANCE_AHEAD, (int)why, lost.when_s,
                 back.found ? back.when_s : INFINITY);
     return BST_OK;
 }

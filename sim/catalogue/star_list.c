@@ -119,7 +119,7 @@ static uint32_t triangle_of(bst_vec3 u) {
     const double sx = u.x < 0.0 ? -1.0 : 1.0, sy = u.y < 0.0 ? -1.0 : 1.0,
                  sz = u.z < 0.0 ? -1.0 : 1.0;
     bst_vec3 corner[3] = {{sx, 0.0, 0.0}, {0.0, sy, 0.0}, {0.0, 0.0, sz}};
-    uint32_t number = (u.x < 0.0) | (u.y < 0.0) << 1 | (u.z < 0.0) << 2;
+    uint32_t number = (u.x < 0.0 ? 1u : 0u) | (u.y < 0.0 ? 2u : 0u) | (u.z < 0.0 ? 4u : 0u);
     /* sense of the corners as seen from outside; a division keeps it */
     const double sense = sx * sy * sz;
     for (int k = 0; k < DIVISIONS; k++) {

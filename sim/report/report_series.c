@@ -14,7 +14,7 @@ size_t bst_report_fill(const bst_report_drawing *d, bst_report_quantity quantity
     size_t numbers = 0;
     for (size_t i = 0; i < d->sensor->count; i++) {
         series[i] = quantity(&d->sensor->frames[i]);
-        numbers += isfinite(series[i]);
+        numbers += isfinite(series[i]) ? 1 : 0;
     }
     return numbers;
 }

@@ -153,7 +153,7 @@ static void add_tables(const bst_run_reader *run, const bst_report_sensor *senso
                        bst_report_warnings *w) {
     static const struct {
         const char *sql;
-        bst_run_severity severity;
+        int severity; /* bst_run_severity, or -1: no warning */
         const char *text;
     } checks[] = {
         {"SELECT count(*) FROM mount WHERE sensor = ?1 AND"
@@ -221,7 +221,7 @@ static void add_events(const bst_run_reader *run, bst_report_warnings *w) {
         int severity = BST_SEVERITY_NOTE;
         for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
             if (strcmp(known[k].kind, kind) == 0) {
-                severity = (int)known[k].severity;
+                severity = known[k].severity;
                 text = known[k].text;
             }
         }

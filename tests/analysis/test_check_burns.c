@@ -106,7 +106,7 @@ static void expect(const double direction[3], double duration_s, const char *eve
             assert_string_equal(said, "");
             continue;
         }
-        double km, turn, follows;
+        double km = 0.0, turn = 0.0, follows = 0.0;
         char units[2][20];
         const char *at = strstr(said, ": at ");
         if (!at ||

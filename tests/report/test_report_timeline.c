@@ -253,7 +253,7 @@ static void modes_as_bands(void **state) {
     bst_assert_close(from[0], 60, 0.1);
     assert_int_equal(bands(&c, BST_MODE_SEARCH, from, to), 0);
     c = svg_need(f.page, "Timeline of the mode", false, false);
-    int count = svg_bars(&c, BST_CHART_MODE + BST_MODE_SLEW, bars, 20000);
+    int count = svg_bars(&c, (int)BST_CHART_MODE + (int)BST_MODE_SLEW, bars, 20000);
     assert_int_equal(count, 1);
     bst_assert_close(bars[0].x0, 20, 0.1);
     bst_assert_close(bars[0].x1, 45, 0.1);

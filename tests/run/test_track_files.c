@@ -185,7 +185,7 @@ static void tdm(void **state) {
     snprintf(sigma, sizeof sigma, "standard deviation per axis %.4f arcsec", sqrt(29.25 / 4));
     assert_non_null(strstr(text, sigma));
     assert_non_null(strstr(text, "track 7, which the tracker took for its target"));
-    double ra, dec, mag;
+    double ra = 0.0, dec = 0.0, mag = 0.0;
     const char *angles = strstr(text, "ANGLE_1 = 2022-06-16T22:10:01.25");
     assert_true(angles && sscanf(angles, "ANGLE_1 = %*s %lf", &ra) == 1);
     angles = strstr(angles, "ANGLE_2 = 2022-06-16T22:10:01.25");

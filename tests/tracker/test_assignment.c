@@ -29,8 +29,9 @@ static double exhaustive(const problem *p, int row, unsigned taken) {
 
 static problem make(bst_rng_key key, uint64_t seed) {
     uint64_t n = 0;
-    problem p = {.rows = 1 + (int)(bst_rng_uniform(key, seed, n++) * MAX_ROWS),
-                 .columns = 1 + (int)(bst_rng_uniform(key, seed, n++) * MAX_COLUMNS)};
+    int rows = 1 + (int)(bst_rng_uniform(key, seed, n++) * MAX_ROWS);
+    int columns = 1 + (int)(bst_rng_uniform(key, seed, n++) * MAX_COLUMNS);
+    problem p = {.rows = rows, .columns = columns};
     double density = bst_rng_uniform(key, seed, n++);
     int edges = 0;
     for (int i = 0; i < p.rows; i++) {

@@ -51,11 +51,13 @@ static void measure(int count, double share, int turnover, int frames, double *e
             assert_true(bst_camera_project(&camera, bst_quat_rotate(q, s.place[n]), &x, &y));
             /* what stays turns with the sky */
             double c = cos(turn.z), d = sin(turn.z), *b = s.stays_px[n];
+            double dx = own * bst_rng_normal(key, 2, draw++);
+            double dy = own * bst_rng_normal(key, 2, draw++);
             stars[i] = (bst_attitude_star){
                 .id = (uint32_t)(n + 1),
                 .apparent_gcrf = s.place[n],
-                .x_px = x + c * b[0] - d * b[1] + own * bst_rng_normal(key, 2, draw++),
-                .y_px = y + d * b[0] + c * b[1] + own * bst_rng_normal(key, 2, draw++),
+                .x_px = x + c * b[0] - d * b[1] + dx,
+                .y_px = y + d * b[0] + c * b[1] + dy,
                 .cov_xx = sigma * sigma,
                 .cov_yy = sigma * sigma};
         }

@@ -124,7 +124,7 @@ static void monte_carlo(const setup *s, figures *out) {
     const double r[3] = {pow(sigma_as * AS, 2), 0.0, pow(sigma_as * AS, 2)};
     double factor = bst_eval_information_factor(s->pd, per_as2 * sigma_as * sigma_as);
     double angle2 = 0.0, rate2 = 0.0, bound_angle2 = 0.0, bound_rate2 = 0.0;
-    int settled = 0, in_gate = 0, gates = 0;
+    int in_gate = 0, gates = 0;
     for (uint64_t run = 0; run < (uint64_t)runs; run++) {
         bst_ctx ctx = {0};
         bst_mtt *mtt;
@@ -222,7 +222,6 @@ static void monte_carlo(const setup *s, figures *out) {
             rate2 += bst_vec3_dot(rate, rate);
             bound_angle2 += p[0][0] + p[1][1];
             bound_rate2 += p[2][2] + p[3][3];
-            settled++;
         }
         out->lost += gone;
         bst_mtt_free(mtt);

@@ -17,8 +17,8 @@ static void parts_are_the_same_polynomials(void **state) {
     bst_scene_source_rate rate = {.count = 7};
     uint64_t n = 0;
     for (int k = 0; k < BST_PATH_NODES; k++) {
-        path.place[k] = (bst_vec3){4e7 + 1e5 * k + 3e3 * bst_rng_uniform(key, 0, n++),
-                                   1e6 * bst_rng_uniform(key, 0, n++), 2e5 * k * k};
+        double along = bst_rng_uniform(key, 0, n++), across = bst_rng_uniform(key, 0, n++);
+        path.place[k] = (bst_vec3){4e7 + 1e5 * k + 3e3 * along, 1e6 * across, 2e5 * k * k};
     }
     for (int k = 0; k < 3; k++) {
         path.shift[k] = (bst_vec3){1e-5 * k, 1e-5 * bst_rng_uniform(key, 0, n++), 1e-6 * k * k};
