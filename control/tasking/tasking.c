@@ -200,16 +200,40 @@ static bst_task_end ending(const bst_tasking *t, const bst_tasking_sensor *s, do
     return now_s > s->arrival_s + t->config.find_timeout_s ? BST_TASK_NOT_FOUND : BST_TASK_NONE;
 }
 
-/* qsort order: largest value first, then catalogue order. */
-static int compare_choices(const void *a, const void *b) {
-    const bst_tasking_choice *x = a, *y = b;
-    if (x->value != y->value) {
-        return x->value > y->value ? -1 : 1;
-    }
-    return (x->object > y->object) - (x->object < y->object);
+/* True if a choice comes before another: the larger value, then catalogue order. */
+static bool comes_before(const bst_tasking_choice *a, const bst_tasking_choice *b) {
+    return a->value != b->value ? a->value > b->value : a->object < b->object;
 }
 
-/* Lists the targets that are due, unassigned, and visible by a quick check. */
+/* Moves the choice at a place of a heap down until none below comes before it. */
+static void sift_down(bst_tasking_choice *heap, int count, int place) {
+    const bst_tasking_choice moved = heap[place];
+    for (int below = 2 * place + 1; below < count; below = 2 * place + 1) {
+        below += below + 1 < count && comes_before(&heap[below + 1], &heap[below]);
+        if (!comes_before(&heap[below], &moved)) {
+            break;
+        }
+        heap[place] = heap[below];
+        place = below;
+    }
+    heap[place] = moved;
+}
+
+/* Takes the first choice from a heap. */
+static bst_tasking_choice take_first(bst_tasking_choice *heap, int *count) {
+    const bst_tasking_choice first = heap[0];
+    heap[0] = heap[--*count];
+    sift_down(heap, *count, 0);
+    return first;
+}
+
+/* Tabulated position of an object, geocentric. */
+static bst_vec3 place_of(const bst_tasking *t, int object) {
+    return (bst_vec3){t->place_m[0][object], t->place_m[1][object], t->place_m[2][object]};
+}
+
+/* Lists the targets that are due, unassigned, and outside of the keep-out zones by the table of
+ * positions, as a heap. */
 static int list_choices(bst_tasking *t, int sensor, double now_s) {
     const bst_tasking_sensor *s = &t->sensors[sensor];
     const bst_tasking_config *c = &t->config;
@@ -225,8 +249,7 @@ static int list_choices(bst_tasking *t, int sensor, double now_s) {
         if (since < line->revisit_s) {
             continue;
         }
-        bst_vec3 place = {t->place_m[0][i], t->place_m[1][i], t->place_m[2][i]};
-        bst_vec3 direction = s->direction;
+        bst_vec3 place = place_of(t, i), direction = s->direction;
         if (!isnan(place.x) && (bst_vec3_norm(place) == 0.0 ||
                                 bst_tasking_glance(s, place, &direction) != BST_WHY_NOT)) {
             continue;
@@ -239,7 +262,9 @@ static int list_choices(bst_tasking *t, int sensor, double now_s) {
             .value = line->priority * fmin(since / line->revisit_s, URGENCY_MOST) / work_s,
             .slew_s = slew_s};
     }
-    qsort(t->choices, (size_t)count, sizeof *t->choices, compare_choices);
+    for (int i = count / 2 - 1; i >= 0; i--) {
+        sift_down(t->choices, count, i);
+    }
     return count;
 }
 
@@ -286,21 +311,28 @@ static void assign_task(bst_tasking *t, int sensor, int64_t tick, bst_task_end b
     }
 }
 
-/* Best target that the sensor can see, -1: none. */
-static bst_status choose_target(bst_ctx *ctx, bst_tasking *t, int sensor, double now_s, int *chosen,
-                                bst_tasking_visibility *seen) {
-    int count = list_choices(t, sensor, now_s);
-    *chosen = -1;
-    for (int i = 0; i < count && i < TRIES && *chosen < 0; i++) {
-        BST_TRY(sees(ctx, t, sensor, &t->choices[i], now_s, seen));
-        if (seen->why == BST_WHY_NOT) {
-            *chosen = i;
-        } else {
-            double wait_s = seen->why == BST_WHY_FAINT    ? t->config.retry_s
-                            : seen->why == BST_WHY_ITSELF ? INFINITY
-                                                          : HIDDEN_RETRY_S;
-            *not_before(t, sensor, t->choices[i].object) = (float)(now_s + wait_s);
+/* Best target that the sensor can see; object -1: none. */
+static bst_status choose_target(bst_ctx *ctx, bst_tasking *t, int sensor, double now_s,
+                                bst_tasking_choice *chosen, bst_tasking_visibility *seen) {
+    int count = list_choices(t, sensor, now_s), tries = 0;
+    chosen->object = -1;
+    while (count > 0 && tries < TRIES) {
+        const bst_tasking_choice next = take_first(t->choices, &count);
+        const bst_vec3 place = place_of(t, next.object);
+        /* the shadow, which costs more than the zones, only of those that are tried */
+        if (!isnan(place.x) && bst_tasking_in_shadow(&t->sensors[sensor], place)) {
+            continue;
         }
+        tries++;
+        BST_TRY(sees(ctx, t, sensor, &next, now_s, seen));
+        if (seen->why == BST_WHY_NOT) {
+            *chosen = next;
+            return BST_OK;
+        }
+        double wait_s = seen->why == BST_WHY_FAINT    ? t->config.retry_s
+                        : seen->why == BST_WHY_ITSELF ? INFINITY
+                                                      : HIDDEN_RETRY_S;
+        *not_before(t, sensor, next.object) = (float)(now_s + wait_s);
     }
     return BST_OK;
 }
@@ -326,7 +358,7 @@ static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick,
     double now_s = seconds_of(t, tick);
     bst_task_end before = BST_TASK_NONE;
     bst_tasking_visibility seen;
-    int chosen;
+    bst_tasking_choice chosen;
     if (s->task.object >= 0) {
         before = ending(t, s, now_s);
         if (before == BST_TASK_NONE) {
@@ -338,8 +370,8 @@ static bst_status change(bst_ctx *ctx, bst_tasking *t, int sensor, int64_t tick,
         }
     }
     BST_TRY(choose_target(ctx, t, sensor, now_s, &chosen, &seen));
-    if (chosen >= 0) {
-        assign_task(t, sensor, tick, before, &t->choices[chosen], &seen);
+    if (chosen.object >= 0) {
+        assign_task(t, sensor, tick, before, &chosen, &seen);
         *given = true;
     } else {
         *given = s->task.object >= 0;

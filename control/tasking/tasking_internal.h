@@ -4,10 +4,11 @@
 
 #include "control/tasking/tasking.h"
 
-/* tasking_look.c: quick visibility check of a geocentric position from the spacecraft's current
- * position: Earth, keep-out cones and shadow. */
+/* tasking_look.c: quick checks of a geocentric position: keep-out zones, among them the Earth, seen
+ * from the spacecraft's current position; and the Earth's shadow. */
 bst_tasking_why bst_tasking_glance(const bst_tasking_sensor *sensor, bst_vec3 place_m,
                                    bst_vec3 *direction);
+bool bst_tasking_in_shadow(const bst_tasking_sensor *sensor, bst_vec3 place_m);
 /* Visibility of a target from a sensor, as bst_tasking_look has it. The table of positions
  * `place_m` rejects first, with a margin for its error and for the age of the navigation message;
  * where it does not decide, and without such a message, bst_tasking_look does. */

@@ -69,15 +69,13 @@ static bst_tasking_why zone_reason(const bst_keep_out_zone *zones, const double 
 
 bst_tasking_why bst_tasking_glance(const bst_tasking_sensor *s, bst_vec3 place_m,
                                    bst_vec3 *direction) {
-    bst_vec3 line = bst_vec3_sub(place_m, s->nav.position_gcrf_m);
-    *direction = bst_vec3_unit(line);
-    bst_tasking_why why = zone_reason(s->zones, s->zone_cosines, s->zone_count, *direction);
-    if (why == BST_WHY_NOT) {
-        bst_vec3 sun_m = bst_vec3_add(s->nav.sun_m, s->nav.position_gcrf_m);
-        why = bst_astro_sun_fraction(place_m, sun_m, BST_EARTH_POLE_J2000) > 0.5 ? BST_WHY_NOT
-                                                                                 : BST_WHY_SHADOW;
-    }
-    return why;
+    *direction = bst_vec3_unit(bst_vec3_sub(place_m, s->nav.position_gcrf_m));
+    return zone_reason(s->zones, s->zone_cosines, s->zone_count, *direction);
+}
+
+bool bst_tasking_in_shadow(const bst_tasking_sensor *s, bst_vec3 place_m) {
+    bst_vec3 sun_m = bst_vec3_add(s->nav.sun_m, s->nav.position_gcrf_m);
+    return !(bst_astro_sun_fraction(place_m, sun_m, BST_EARTH_POLE_J2000) > 0.5);
 }
 
 /* Context of the callback of bst_pointing_feasibility_at. */
@@ -127,7 +125,8 @@ bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int 
     const bst_tasking_sensor *s = &t->sensors[sensor];
     const double step_s = 1.0; /* interval of the rate difference */
     bst_ctx quiet = {0};       /* an orbit that has ended is no error here */
-    bst_world_sight now, later;
+    bst_world_sight now;
+    bst_vec3 later;
     bst_world_state eye;
     bst_bodies bodies;
     out->snr = 0.0;
@@ -159,10 +158,10 @@ bst_status bst_tasking_look(bst_ctx *ctx, const bst_tasking *t, int sensor, int 
     bool reached = true;
     if (out->snr < t->config.min_snr) {
         out->why = BST_WHY_FAINT;
-    } else if (bst_knowledge_sight_at(&quiet, s->view, object, seconds + step_s, &later) !=
+    } else if (bst_knowledge_direction_at(&quiet, s->view, object, seconds + step_s, &later) !=
                BST_OK) {
         out->why = BST_WHY_NO_ORBIT;
-    } else if (bst_vec3_angle(now.geometric, later.geometric) >
+    } else if (bst_vec3_angle(now.geometric, later) >
                t->config.max_rate_arcsec_per_s * BST_ARCSEC_RAD * step_s) {
         out->why = BST_WHY_RATE;
     } else {

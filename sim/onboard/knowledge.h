@@ -132,6 +132,10 @@ int bst_knowledge_cue_object(const bst_knowledge_view *view);
 /* Observer state by onboard navigation, and Sun and Moon at the onboard clock's time. */
 bst_status bst_knowledge_eye_at(bst_ctx *ctx, bst_knowledge_view *view, double seconds,
                                 bst_world_state *eye, bst_bodies *bodies) BST_MUST_CHECK;
+/* Geometric direction (GCRF, unit vector) of an object as in bst_knowledge_sight_at, without its
+ * light: the same bits in a third of the time. BST_ERR_NUMERIC: an orbit has ended. */
+bst_status bst_knowledge_direction_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
+                                      double seconds, bst_vec3 *geometric) BST_MUST_CHECK;
 /* Predicted sight of an object from the estimated observer state. BST_ERR_NUMERIC: an orbit has
  * ended. */
 bst_status bst_knowledge_sight_at(bst_ctx *ctx, bst_knowledge_view *view, int object,
